@@ -1,0 +1,34 @@
+#pragma once
+
+// What a tool is and what it can be asked to do.
+
+#include <cstdint>
+
+#include "common/math/frame.h"
+
+namespace trocar::scene {
+
+// What the holder wants the tool to do, as long as the sample says so.
+enum class Verb : std::uint8_t { None = 0, Push = 1, Grasp = 2 };
+inline constexpr int kVerbCount = 3;
+const char* name_of(Verb verb);
+
+// A capsule: tip at the tool frame's origin, shaft along +z.
+struct ToolShape {
+  float radius_m = 0.005f;  // 0.0005 to 0.05
+  float length_m = 0.30f;   // 0.01 to 1
+  float reach_m = 0.010f;   // a grasp takes the surface nodes this near to the tip; 0.001 to 0.05
+
+  bool operator==(const ToolShape&) const = default;
+};
+bool is_valid(const ToolShape& shape);
+
+// One reading of a tool, as the client sent it.
+struct ToolSample {
+  Pose world_from_tool;
+  Verb verb = Verb::None;
+
+  bool operator==(const ToolSample&) const = default;
+};
+
+}  // namespace trocar::scene

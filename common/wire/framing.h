@@ -1,0 +1,32 @@
+#pragma once
+
+// Frame on a stream: u32 little-endian length, then one Envelope.
+
+#include <cstdint>
+#include <memory>
+
+#include "common/base/bytes.h"
+#include "common/base/result.h"
+
+namespace trocar::proto {
+class Envelope;
+}
+
+namespace trocar::wire {
+
+inline constexpr std::uint32_t kMaxUpstreamBytes = 64 * 1024;           // client to server
+inline constexpr std::uint32_t kMaxDownstreamBytes = 16 * 1024 * 1024;  // server to client
+inline constexpr std::size_t kHeaderBytes = 4;
+
+using SharedBytes = std::shared_ptr<const Bytes>;  // one immutable buffer may go to many receivers
+
+// Header and encoding in one buffer.
+SharedBytes encode_envelope(const proto::Envelope& envelope);
+
+// Length from a header; error if zero or over `limit`.
+Result<std::uint32_t> decode_length(std::span<const std::uint8_t, kHeaderBytes> header,
+                                    std::uint32_t limit);
+// Parses the body of one frame; error if it is not an Envelope or has no message set.
+Status decode_envelope(BytesView body, proto::Envelope& envelope);
+
+}  // namespace trocar::wire

@@ -1,0 +1,26 @@
+# Every third-party package, once. Versions are those of Debian 12 (deploy/setup installs them).
+find_package(Threads REQUIRED)
+find_package(PkgConfig REQUIRED)
+find_package(Boost 1.81 REQUIRED)
+find_package(Protobuf REQUIRED)
+find_package(spdlog REQUIRED)
+find_package(CLI11 REQUIRED)
+find_package(tomlplusplus REQUIRED)
+find_package(ZLIB REQUIRED)
+pkg_check_modules(zstd REQUIRED IMPORTED_TARGET libzstd)
+pkg_check_modules(xxhash REQUIRED IMPORTED_TARGET libxxhash)
+if(TROCAR_CLIENT)
+  find_package(glfw3 REQUIRED)
+  find_package(OpenGL REQUIRED COMPONENTS OpenGL EGL)
+  pkg_check_modules(imgui REQUIRED IMPORTED_TARGET imgui)
+endif()
+if(TROCAR_TESTS)
+  find_package(GTest REQUIRED)
+  include(GoogleTest)
+endif()
+
+# Asio compiled once (common/base) instead of in every file that includes it.
+add_library(trocar_boost INTERFACE)
+target_include_directories(trocar_boost SYSTEM INTERFACE ${Boost_INCLUDE_DIRS})
+target_compile_definitions(trocar_boost INTERFACE
+  BOOST_ASIO_SEPARATE_COMPILATION BOOST_ASIO_NO_DEPRECATED BOOST_ALL_NO_LIB)

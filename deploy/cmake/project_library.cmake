@@ -1,0 +1,32 @@
+# project_library(<folder> SOURCES a.cpp... HEADERS a.h... DEPENDS common/base... LINK pkg...)
+# One folder, one static library: target trocar_<folder with _>, alias trocar::<folder with _>.
+# DEPENDS names folders (public), LINK third-party targets (public).
+function(project_library folder)
+  cmake_parse_arguments(ARG "" "" "SOURCES;HEADERS;DEPENDS;LINK" ${ARGN})
+  if(ARG_UNPARSED_ARGUMENTS)
+    message(FATAL_ERROR "project_library(${folder}): unknown arguments ${ARG_UNPARSED_ARGUMENTS}")
+  endif()
+  string(REPLACE "/" "_" name ${folder})
+  add_library(trocar_${name} STATIC ${ARG_SOURCES})
+  add_library(trocar::${name} ALIAS trocar_${name})
+  target_sources(trocar_${name} PUBLIC FILE_SET HEADERS BASE_DIRS "${PROJECT_SOURCE_DIR}"
+    FILES ${ARG_HEADERS})
+  set_property(GLOBAL APPEND PROPERTY TROCAR_LIBRARIES trocar_${name})
+  target_link_libraries(trocar_${name} PUBLIC trocar_options)
+  foreach(dependency IN LISTS ARG_DEPENDS)
+    string(REPLACE "/" "_" dependency_name ${dependency})
+    target_link_libraries(trocar_${name} PUBLIC trocar_${dependency_name})
+  endforeach()
+  target_link_libraries(trocar_${name} PUBLIC ${ARG_LINK})
+endfunction()
+
+# project_program(<name> MAIN file.cpp DEPENDS folder...): one executable in build/<preset>/bin.
+function(project_program name)
+  cmake_parse_arguments(ARG "" "" "MAIN;DEPENDS" ${ARGN})
+  add_executable(${name} ${ARG_MAIN})
+  target_link_libraries(${name} PRIVATE trocar_options)
+  foreach(dependency IN LISTS ARG_DEPENDS)
+    string(REPLACE "/" "_" dependency_name ${dependency})
+    target_link_libraries(${name} PRIVATE trocar_${dependency_name})
+  endforeach()
+endfunction()

@@ -1,0 +1,19 @@
+# project_test(<name> SOURCES x_test.cpp... DEPENDS folder... [LINK target...]): a GoogleTest program;
+# each of its tests becomes one ctest test.
+function(project_test name)
+  cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;DEPENDS;LINK" ${ARGN})
+  if(NOT ARG_TIMEOUT)
+    set(ARG_TIMEOUT 300)
+  endif()
+  add_executable(${name} ${ARG_SOURCES})
+  set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/tests")
+  target_link_libraries(${name} PRIVATE trocar_options GTest::gtest_main ${ARG_LINK})
+  foreach(dependency IN LISTS ARG_DEPENDS)
+    string(REPLACE "/" "_" dependency_name ${dependency})
+    target_link_libraries(${name} PRIVATE trocar_${dependency_name})
+  endforeach()
+  target_compile_definitions(${name} PRIVATE
+    TROCAR_SOURCE_DIR="${PROJECT_SOURCE_DIR}" TROCAR_BINARY_DIR="${PROJECT_BINARY_DIR}/bin")
+  gtest_discover_tests(${name} TEST_PREFIX "${name}." DISCOVERY_TIMEOUT 60
+    PROPERTIES TIMEOUT ${ARG_TIMEOUT})
+endfunction()

@@ -1,0 +1,41 @@
+#pragma once
+
+// What a tick takes from outside. A TickInputs is all that the network, scripts or a journal can say
+// to the simulation; with TickDecisions it determines the next state to the bit.
+
+#include <array>
+#include <vector>
+
+#include "common/base/ids.h"
+#include "common/scene/tool.h"
+
+namespace trocar::session {
+
+struct HandJoin {
+  ParticipantSlot slot;  // has_tools()
+  int tool_count = 1;    // 1 or 2
+  std::array<scene::ToolShape, kToolsPerHand> shapes;
+};
+
+struct ToolInput {
+  ToolSlot tool;
+  scene::ToolSample sample;
+};
+
+// Admitted in this order: leaves, joins, samples. Several samples of one tool: the last one counts.
+// Everything is validated before (server/replication); the tick drops what does not fit its state,
+// such as a sample for an empty slot, and counts it.
+struct TickInputs {
+  std::vector<ParticipantSlot> leaves;
+  std::vector<HandJoin> joins;
+  std::vector<ToolInput> samples;
+
+  bool empty() const { return leaves.empty() && joins.empty() && samples.empty(); }
+  void clear() {
+    leaves.clear();
+    joins.clear();
+    samples.clear();
+  }
+};
+
+}  // namespace trocar::session

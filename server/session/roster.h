@@ -1,0 +1,46 @@
+#pragma once
+
+// Who is in the session: names, roles, slots. Lives on the I/O strand; the simulation only knows
+// which slots have tools.
+
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/base/ids.h"
+#include "common/base/result.h"
+#include "common/scene/tool.h"
+
+namespace trocar::session {
+
+enum class Role : std::uint8_t { Surgeon = 1, Assistant = 2, Instructor = 3, Observer = 4 };
+inline bool has_tools(Role role) { return role == Role::Surgeon || role == Role::Assistant; }
+const char* name_of(Role role);
+
+struct Participant {
+  ParticipantSlot slot;
+  std::string name;
+  Role role = Role::Observer;
+  std::vector<scene::ToolShape> tools;  // 1 or 2 for roles with tools, else none
+};
+
+enum class JoinRefusal { NameInvalid, NameTaken, Full, ToolsInvalid };
+
+class Roster {
+ public:
+  // Admits a participant into the lowest free slot of its kind, or says why not. `refusal` is set
+  // on error. A name is 1 to 32 bytes of printable UTF-8 and unique; a role with tools that names
+  // none gets one default tool; a role without tools may not bring any.
+  Result<Participant> join(std::string_view name, Role role, std::vector<scene::ToolShape> tools,
+                           JoinRefusal& refusal);
+  void leave(ParticipantSlot slot);
+
+  const Participant* find(ParticipantSlot slot) const;
+  std::vector<Participant> list() const;  // by slot
+
+ private:
+  std::array<std::optional<Participant>, kMaxParticipants> slots_;
+};
+
+}  // namespace trocar::session

@@ -1,0 +1,58 @@
+#pragma once
+
+// What leaves the simulation every 16th tick: one immutable object, shared by the replication
+// strand and the journal. Nobody outside the simulation thread sees anything else of its state.
+
+#include <array>
+#include <memory>
+#include <vector>
+
+#include "common/base/bytes.h"
+#include "common/base/ids.h"
+#include "common/base/tick.h"
+#include "common/scene/tool.h"
+#include "common/wire/quantise.h"
+#include "server/locks/claims.h"
+#include "server/session/inputs.h"
+#include "server/step/tick_report.h"
+
+namespace trocar::step {
+
+struct ToolFrame {
+  ToolSlot tool;
+  Pose world_from_tool;
+  scene::Verb verb = scene::Verb::None;
+  Vec3f force_n;                 // of the tissue on the tool, world frame
+  std::uint32_t contact_nodes = 0;
+  float penetration_m = 0;       // deepest contact, >= 0
+  bool has_claim = false;        // its push or grasp is in effect
+  bool is_silent = false;        // lease no longer fresh
+};
+
+// What the journal needs to simulate one tick again.
+struct TickRecord {
+  Tick tick = 0;
+  TickDecisions decisions;
+  session::TickInputs inputs;
+  std::uint64_t state_hash = 0;  // after the tick
+};
+
+struct PublishedFrame {
+  Frame frame = 0;
+  Tick tick = 0;
+  std::uint32_t epoch = 0;
+  wire::QuantisedSurface surface;  // displacements from rest, per vertex slot
+  std::uint32_t surface_crc = 0;
+  std::vector<std::uint16_t> regions;  // per vertex slot: 0 not active, else merged region 1, 2, ...
+  std::vector<ToolFrame> tools;        // occupied tools, by slot
+  std::vector<locks::ClaimEvent> claim_events;  // of the ticks since the frame before
+  std::vector<TickRecord> records;              // of the ticks since the frame before
+  std::shared_ptr<const Bytes> snapshot;  // full state after `tick`, at start and every 10 s, else null
+  std::uint64_t state_hash = 0;
+  std::uint32_t active_nodes = 0, queue_nodes = 0, region_count = 0;
+  StageStatistics statistics;  // of the last second; for people, never an input
+};
+
+using SharedFrame = std::shared_ptr<const PublishedFrame>;
+
+}  // namespace trocar::step

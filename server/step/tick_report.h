@@ -1,0 +1,58 @@
+#pragma once
+
+// What a tick is told (TickDecisions) and what it says about itself (TickReport).
+
+#include <array>
+#include <cstdint>
+
+#include "common/base/tick.h"
+
+namespace trocar::step {
+
+// Decided between ticks, recorded in the journal. Defaults: decisions that everything shares.
+struct TickDecisions {
+  std::uint32_t depth_limit = 6;     // propagation layers
+  std::uint32_t node_limit = 1200;   // nodes in the queue; may end inside a layer
+  std::uint32_t sweeps = 4;
+  float over_relaxation = 1.5f;      // 1 to 1.9; for fewer than 3 sweeps at most 1.3 is used
+
+  bool operator==(const TickDecisions&) const = default;
+};
+inline constexpr std::uint32_t kMaxDepthLimit = 1000;
+inline constexpr std::uint32_t kMaxNodeLimit = 10'000'000;
+inline constexpr std::uint32_t kMaxSweeps = 64;
+
+enum class Stage { Admit, Contacts, Queue, Solve, Claims, Hash, Publish };
+inline constexpr int kStageCount = 7;
+const char* name_of(Stage stage);
+
+// Error bits: what was dropped or degraded, and which limit to raise.
+enum TickFault : std::uint32_t {
+  kFaultInputDropped = 1u << 0,    // an input did not fit the state (empty slot, no such tool)
+  kFaultContactLimit = 1u << 1,    // more contact nodes than the contact list holds
+  kFaultOverRelaxation = 1u << 2,  // residual grew: the tick went on without over-relaxation
+  kFaultNonFinite = 1u << 3,       // a node's update was not finite: the node kept its last state
+};
+
+struct TickReport {
+  Tick tick = 0;
+  std::array<std::uint32_t, kStageCount> stage_cpu_ns{};
+  std::uint32_t contact_nodes = 0;
+  std::uint32_t queue_nodes = 0;   // nodes the propagation reached
+  std::uint32_t active_nodes = 0;  // queue plus nodes that have not come to rest
+  std::uint32_t region_count = 0;
+  std::uint32_t inputs_dropped = 0;
+  std::uint32_t nodes_rejected = 0;  // see kFaultNonFinite
+  std::uint32_t faults = 0;        // TickFault bits
+  float residual_n = 0;            // root mean square nodal force imbalance in the last sweep
+  std::uint64_t state_hash = 0;
+};
+
+struct StageStatistics {
+  std::array<float, kStageCount> median_us{};
+  std::array<float, kStageCount> p99_us{};
+  float tick_median_us = 0, tick_p99_us = 0;
+  std::uint64_t slow_ticks = 0;  // ticks by which simulated time fell behind real time
+};
+
+}  // namespace trocar::step
