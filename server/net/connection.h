@@ -9,6 +9,8 @@
 // While Draining the peer's bytes are read and thrown away: closing a socket with unread bytes
 // makes the kernel send a reset, and the peer could lose the last words that are on their way.
 
+#include "common/base/asio.h"  // before Boost: see there
+
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/steady_timer.hpp>

@@ -26,8 +26,8 @@ constexpr std::chrono::milliseconds kAcceptRetry{100};
 
 class TcpServer::Core : public std::enable_shared_from_this<TcpServer::Core> {
  public:
-  Core(asio::io_context& context, const TcpServerOptions& options)
-      : options(options), acceptor(context), sweep(context), retry(context) {}
+  Core(asio::io_context& context, const TcpServerOptions& chosen)
+      : options(chosen), acceptor(context), sweep(context), retry(context) {}
 
   Status open() {
     boost::system::error_code error;

@@ -36,7 +36,6 @@ struct Replicator::Client {
   std::array<std::optional<std::uint32_t>, kToolsPerHand> last_sequence;
   std::uint64_t rate_window_begin_ns = 0;
   std::uint32_t messages_in_window = 0;
-  bool is_ending = false;  // an outbox overflowed while others were being served
 };
 
 Replicator::Replicator(net::Connections& connections, session::SimulationInbox& inbox,
@@ -125,7 +124,7 @@ void Replicator::end_all(EndReason reason, const std::string& text) {
 
 // ---- what they say ----
 
-bool Replicator::exceeds_rate(Client& client) const {
+bool Replicator::exceeds_rate(Client& client) {
   const auto now = options_.clock_ns();
   if (now - client.rate_window_begin_ns >= kSecondNs) {
     client.rate_window_begin_ns = now;

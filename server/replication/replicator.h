@@ -117,7 +117,7 @@ class Replicator final : public net::ConnectionHandler {
   std::optional<Ending> admit(Client& client, const proto::Hello& hello);
   std::optional<Ending> take_sample(Client& client, const proto::ToolSample& sample);
   std::optional<Ending> take_ack(Client& client, Frame frame, std::uint32_t crc);
-  bool exceeds_rate(Client& client) const;
+  bool exceeds_rate(Client& client);
 
   bool send(Client& client, const wire::SharedBytes& bytes);
   void broadcast(const wire::SharedBytes& bytes);
