@@ -45,9 +45,10 @@ double DisplayClock::advance(std::uint64_t now_ns) {
   }
   const double elapsed = now_ns > last_ns_ ? static_cast<double>(now_ns - last_ns_) * 1e-9 : 0.0;
   last_ns_ = std::max(last_ns_, now_ns);
-  const double slew = std::clamp(1.0 + (target - display_tick_) / kSlewTicks, 0.0, 2.0);
+  const double step = elapsed * speed;
+  const double slew = std::clamp((target - display_tick_ - step) / kSlewTicks, -1.0, 1.0);
   display_tick_ =
-      std::max(display_tick_, std::min(display_tick_ + elapsed * speed * slew, newest_tick));
+      std::max(display_tick_, std::min(display_tick_ + step * (1.0 + slew), newest_tick));
   return display_tick_;
 }
 
