@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "client/replica/session_source.h"
+#include "common/base/result.h"
 #include "common/scene/tool.h"
 
 namespace trocar::net {
