@@ -49,8 +49,6 @@ Replicator::Replicator(net::Connections& connections, session::SimulationInbox& 
 
 Replicator::~Replicator() = default;
 
-std::size_t Replicator::topology_bytes() const { return topology_->size(); }
-
 // ---- who is here ----
 
 void Replicator::on_open(net::ConnectionId id) {
@@ -113,7 +111,10 @@ void Replicator::forget(Client& client) {
 void Replicator::settle_participants() {
   while (participants_changed_) {
     participants_changed_ = false;
-    broadcast(encode_participants(roster_.list()));
+    const auto present = roster_.list();
+    if (options_.on_participants)
+      options_.on_participants(present, encoder_.current() ? encoder_.current()->tick : 0);
+    broadcast(encode_participants(present));
   }
 }
 

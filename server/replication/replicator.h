@@ -52,6 +52,8 @@ struct ReplicatorOptions {
   Frame keyframe_after_frames = 63;              // about 1 s
   std::uint64_t keyframe_interval_ns = 250'000'000;  // of keyframes on request
   std::function<std::uint64_t()> clock_ns = monotonic_ns;
+  // Told who is here after each change, with the tick of the newest frame; may be empty.
+  std::function<void(const std::vector<session::Participant>&, Tick)> on_participants;
 };
 
 struct BarrierResult {
@@ -94,7 +96,6 @@ class Replicator final : public net::ConnectionHandler {
   // Goodbye to everybody.
   void end_all(EndReason reason, const std::string& text);
 
-  std::size_t topology_bytes() const;
   std::size_t session_count() const { return clients_.size(); }
   const session::Roster& roster() const { return roster_; }
   const ReplicatorCounters& counters() const { return counters_; }
