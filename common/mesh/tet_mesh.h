@@ -2,17 +2,20 @@
 
 // Tetrahedral mesh: nodes, tets, edges, boundary triangles, links, and compact adjacency.
 //
-// Given: rest positions, tets, links (springs; separate from tets, a lattice has links only) and, for
-// a mesh without tets, boundary triangles. Derived by build_adjacency(): edges, boundary triangles of
-// the tets, and the lists below. Invariants, all checked by validate():
-//   - every index is in range; a tet has four distinct nodes and positive rest volume, no tet twice;
+// Given: rest positions, tets, links (springs; separate from tets, a lattice has links only) and,
+// for a mesh without tets, boundary triangles. Derived by build_adjacency(): edges, boundary
+// triangles of the tets, and the lists below. Invariants, all checked by validate():
+//   - every index is in range; a tet has four distinct nodes and positive rest volume, no tet
+//   twice;
 //   - edges are the distinct node pairs of the tets, (a < b), in lexicographic order;
 //   - links are distinct node pairs (a < b), in lexicographic order;
-//   - boundary triangles face outward and form closed surfaces: each directed edge once, its reverse
+//   - boundary triangles face outward and form closed surfaces: each directed edge once, its
+//   reverse
 //     once; with tets they are exactly the faces that belong to one tet; each edge of the surface
 //     has exactly two triangles (manifold);
 //   - adjacency equals what the elements say, rows ascending; every node is used.
-// Complexity of build_adjacency: O(n log n). Not thread-safe; a const mesh may be read by any thread.
+// Complexity of build_adjacency: O(n log n). Not thread-safe; a const mesh may be read by any
+// thread.
 
 #include <array>
 #include <vector>

@@ -3,6 +3,7 @@
 // An organ: mesh, material, what holds it, and where it came from. This is what `.organ` files hold
 // and what the server is started with.
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -20,8 +21,8 @@ enum class SpringLaw : std::uint8_t {
 struct Material {
   double density_kg_m3 = 1060;
   SpringLaw spring_law = SpringLaw::VolumeConsistent;
-  double spring_stiffness_n_m = 100;   // SpringLaw::Constant
-  double young_modulus_pa = 4000;      // SpringLaw::VolumeConsistent
+  double spring_stiffness_n_m = 100;  // SpringLaw::Constant
+  double young_modulus_pa = 4000;     // SpringLaw::VolumeConsistent
   // Damping of each node in proportion to its velocity: d_i = rate x m_i (Choi 2002 eq. 1).
   double node_damping_per_s = 10;
   // Damping along each spring: b = time x k (Kelvin-Voigt).
@@ -42,17 +43,22 @@ struct Organ {
   bool operator==(const Organ&) const = default;
 };
 
-// Spring constants for mesh.spring_pairs(), N/m.
+// Spring constants for mesh.spring_pairs(), N/m. SpringLaw::VolumeConsistent: k = E x (volume of
+// the tets at the edge) / length^2, derived in the source; it gives Young's modulus E on average
+// over orientations, and Poisson's ratio 1/4, as every network of springs does. Needs springs on
+// tet edges.
 std::vector<double> spring_stiffnesses(const Organ& organ);
 
 // m_i = sum over tets k at node i of rho V_k / 4 (Nakao 2003 eq. 4). Needs tets.
 std::vector<double> lumped_masses(const mesh::TetMesh& mesh, double density_kg_m3);
 
-// XXH3-64 over the organ's arrays (not over a file's bytes): names a mesh and material for files and
-// sessions that depend on it.
+// XXH3-64 over the organ's arrays (not over a file's bytes): names a mesh and material for files
+// and sessions that depend on it. Each array is preceded by its length (u64); in order: rest
+// positions, tets, links, boundary triangles, fixed nodes, node masses, the six numbers of the
+// material. Name, source and source offset are left out: they change no result.
 std::uint64_t organ_hash(const Organ& organ);
 
-// Validates mesh, sizes and ranges.
+// Validates mesh, sizes and ranges; the rest bounding box is centred on the origin and at most 2 m.
 Status validate(const Organ& organ);
 
 }  // namespace trocar::scene

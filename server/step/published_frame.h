@@ -47,7 +47,10 @@ struct PublishedFrame {
   std::vector<ToolFrame> tools;        // occupied tools, by slot
   std::vector<locks::ClaimEvent> claim_events;  // of the ticks since the frame before
   std::vector<TickRecord> records;              // of the ticks since the frame before
-  std::shared_ptr<const Bytes> snapshot;  // full state after `tick`, at start and every 10 s, else null
+  // Full state after `snapshot_tick`, at the start and every 10 s, else null. Taken between
+  // publications: publishing changes the quantisation's hysteresis after the tick's hash.
+  std::shared_ptr<const Bytes> snapshot;
+  Tick snapshot_tick = 0;
   std::uint64_t state_hash = 0;
   std::uint32_t active_nodes = 0, queue_nodes = 0, region_count = 0;
   StageStatistics statistics;  // of the last second; for people, never an input

@@ -1,0 +1,23 @@
+#include "common/scene/tool.h"
+
+namespace trocar::scene {
+
+const char* name_of(Verb verb) {
+  switch (verb) {
+    case Verb::None:
+      return "none";
+    case Verb::Push:
+      return "push";
+    case Verb::Grasp:
+      return "grasp";
+  }
+  return "unknown";
+}
+
+bool is_valid(const ToolShape& shape) {
+  // Written so that NaN fails.
+  return shape.radius_m >= 0.0005f && shape.radius_m <= 0.05f && shape.length_m >= 0.01f &&
+         shape.length_m <= 1.0f && shape.reach_m >= 0.001f && shape.reach_m <= 0.05f;
+}
+
+}  // namespace trocar::scene
