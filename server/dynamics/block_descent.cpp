@@ -8,6 +8,8 @@ namespace {
 
 constexpr std::uint32_t kNone = 0xffffffffu;
 constexpr float kMaxOverRelaxationFewSweeps = 1.3f;
+// Residuals below this are rounding noise and say nothing about divergence.
+constexpr float kNoiseFloorNewton = 1e-5f;
 
 using contact::NodeConstraint;
 
@@ -64,6 +66,13 @@ void BlockDescent::link_constraints(const contact::ContactList& contacts) {
   }
 }
 
+bool BlockDescent::is_touched(const contact::ContactList& contacts, NodeIndex node) const {
+  if (constraint_stamp_[node.value] != current_) return false;
+  for (auto i = first_constraint_[node.value]; i != kNone; i = next_constraint_[i])
+    if (contacts.constraints[i].kind == NodeConstraint::Kind::HalfSpace) return true;
+  return false;
+}
+
 BlockDescent::NodeStep BlockDescent::linearise(const SpringNetwork& springs,
                                                const contact::ContactList& contacts,
                                                const world::World& world, NodeIndex node,
@@ -101,7 +110,10 @@ SolveReport BlockDescent::solve(const SpringNetwork& springs, const contact::Con
     for (std::size_t i = 0; i < active.size(); ++i) {
       const auto step = linearise(springs, contacts, world, active[i], inverse_dt);
       const float squared = length_squared(step.gradient);
-      const Vec3f dx = solve_positive_definite(step.block, step.gradient) * -omega;
+      // Across the kink of a contact an over-relaxed step overshoots from pressed to free and back,
+      // for ever: touched nodes take the plain Newton step.
+      const float relaxation = is_touched(contacts, active[i]) ? 1.0f : omega;
+      const Vec3f dx = solve_positive_definite(step.block, step.gradient) * -relaxation;
       if (!is_finite(dx) || !std::isfinite(squared)) {
         ++report.nodes_rejected;
         residuals_[i] = 0;
@@ -111,7 +123,8 @@ SolveReport BlockDescent::solve(const SpringNetwork& springs, const contact::Con
       residuals_[i] = std::sqrt(squared);
       x_[active[i].value] += dx;
     }
-    if (sum > last_sum && omega > 1.0f) {
+    const float noise = kNoiseFloorNewton * kNoiseFloorNewton * static_cast<float>(active.size());
+    if (sum > last_sum && sum > noise && omega > 1.0f) {
       omega = 1.0f;
       report.is_stepped_down = true;
     }

@@ -54,6 +54,7 @@ class BlockDescent {
   };
   void reset(const world::World& world);
   void link_constraints(const contact::ContactList& contacts);
+  bool is_touched(const contact::ContactList& contacts, NodeIndex node) const;
   NodeStep linearise(const SpringNetwork& springs, const contact::ContactList& contacts,
                      const world::World& world, NodeIndex node, float inverse_dt) const;
 
