@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <span>
 
 #include "common/base/bytes.h"
 #include "common/base/result.h"
@@ -26,7 +27,8 @@ SharedBytes encode_envelope(const proto::Envelope& envelope);
 // Length from a header; error if zero or over `limit`.
 Result<std::uint32_t> decode_length(std::span<const std::uint8_t, kHeaderBytes> header,
                                     std::uint32_t limit);
-// Parses the body of one frame; error if it is not an Envelope or has no message set.
+// Parses the body of one frame; error if it is not an Envelope or an empty one. A message of a
+// newer minor version is ok with message_case() == MESSAGE_NOT_SET: ignore it.
 Status decode_envelope(BytesView body, proto::Envelope& envelope);
 
 }  // namespace trocar::wire

@@ -7,11 +7,14 @@
 //     varint ((gap << 1) | is_full), gap = blocks skipped since the last one listed;
 //     unless full: two u32 masks, low slots first.
 //   Then groups of up to 16 changed vertices in slot order, never across a block:
-//     2-bit mode, three 5-bit widths (x, y, z), then per vertex three zig-zag integers of that width.
-//     Mode 0 temporal: value - baseline. 1 temporal+spatial: minus the previous changed vertex's
-//     temporal difference. 2 absolute+spatial: value minus the previous changed vertex's value.
-//   The bit stream is padded to a whole byte; the payload must be consumed exactly.
+//     2-bit mode, three 5-bit widths (x, y, z; at most 18), then per vertex three zig-zag integers
+//     of those widths. With d = value - baseline, and prev the changed vertex before this one in
+//     the payload (zero before the first, carried across groups and blocks): mode 0 temporal: d. 1
+//     temporal+spatial: d - d(prev). 2 absolute+spatial: value - value(prev).
+//   The bit stream is padded with zeros to a whole byte; the payload must be consumed exactly.
+// The encoder takes the mode with the fewest bits per group, the lowest where they tie.
 // Across an epoch, and for keyframes, only mode 2 is allowed and all vertices are listed.
+// Values lie within +-kMaxQuanta: quantise() clamps, the encoder asserts, the decoder rejects.
 // Lossless; 0.95-1.25 bytes per changed vertex on smooth tissue at 62.5 Hz.
 
 #include <span>
@@ -34,7 +37,8 @@ void encode_keyframe(std::span<const QuantisedVertex> current, Bytes& out);
 
 // Applies a delta in place: `surface` holds the baseline on entry and the new frame on success. On
 // error it is unchanged. Never reads outside `payload`, never writes outside `surface`, and rejects
-// blocks, widths and values out of range, and trailing bytes.
+// blocks, widths and values out of range, and trailing bytes. No allocation except for an error's
+// text.
 Status decode_delta(BytesView payload, std::span<QuantisedVertex> surface);
 Status decode_keyframe(BytesView payload, std::span<QuantisedVertex> surface);
 

@@ -1,0 +1,43 @@
+#include "common/wire/surface_layout.h"
+
+#include <algorithm>
+
+#include "common/base/assert.h"
+
+namespace trocar::wire {
+
+SurfaceLayout make_surface_layout(const scene::Organ& organ) {
+  const mesh::TetMesh& mesh = organ.mesh;
+  std::vector<Vec3d> positions;
+  positions.reserve(mesh.surface_nodes.size());
+  for (const NodeIndex node : mesh.surface_nodes)
+    positions.push_back(mesh.rest_positions[node.value]);
+
+  SurfaceLayout layout;
+  layout.vertex_of_node.resize(mesh.node_count());
+  std::vector<Vec3d> positions_by_slot;
+  positions_by_slot.reserve(positions.size());
+  for (const std::uint32_t i : morton_order(positions)) {
+    const NodeIndex node = mesh.surface_nodes[i];
+    layout.vertex_of_node[node.value] = VertexIndex(layout.node_of_vertex.size());
+    layout.node_of_vertex.push_back(node);
+    positions_by_slot.push_back(positions[i]);
+  }
+  layout.rest_quanta = quantise_rest(positions_by_slot);
+
+  layout.triangles.reserve(mesh.boundary_triangles.size());
+  for (const mesh::Triangle& triangle : mesh.boundary_triangles) {
+    auto& slots = layout.triangles.emplace_back();
+    for (std::size_t corner = 0; corner < 3; ++corner) {
+      slots[corner] = layout.vertex_of_node[triangle[corner].value];
+      TROCAR_ASSERT(slots[corner].is_valid());
+    }
+  }
+  for (const NodeIndex node : organ.fixed_nodes)
+    if (const VertexIndex vertex = layout.vertex_of_node[node.value]; vertex.is_valid())
+      layout.fixed_vertices.push_back(vertex);
+  std::sort(layout.fixed_vertices.begin(), layout.fixed_vertices.end());
+  return layout;
+}
+
+}  // namespace trocar::wire

@@ -13,11 +13,11 @@
 namespace trocar::wire {
 
 struct SurfaceLayout {
-  std::vector<NodeIndex> node_of_vertex;                // per slot, Morton order of rest positions
-  std::vector<VertexIndex> vertex_of_node;              // per node; invalid for interior nodes
-  std::vector<std::array<VertexIndex, 3>> triangles;    // outward, in the organ's triangle order
-  std::vector<QuantisedVertex> rest_quanta;             // per slot
-  std::vector<VertexIndex> fixed_vertices;              // ascending slots
+  std::vector<NodeIndex> node_of_vertex;              // per slot, Morton order of rest positions
+  std::vector<VertexIndex> vertex_of_node;            // per node; invalid for interior nodes
+  std::vector<std::array<VertexIndex, 3>> triangles;  // outward, in the organ's triangle order
+  std::vector<QuantisedVertex> rest_quanta;           // per slot
+  std::vector<VertexIndex> fixed_vertices;            // ascending slots
 
   std::size_t vertex_count() const { return node_of_vertex.size(); }
 };

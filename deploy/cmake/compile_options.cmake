@@ -24,7 +24,7 @@ target_compile_options(trocar_options INTERFACE
   # A contracted multiply-add rounds once where the source rounds twice, and compilers choose
   # differently where to contract: state hashes would depend on the compiler.
   -ffp-contract=off
-  -Wall -Wextra -Wshadow -Wconversion -Wno-sign-conversion -Wnon-virtual-dtor -Werror
+  -Wall -Wextra -Wno-missing-field-initializers -Wshadow -Wconversion -Wno-sign-conversion -Wnon-virtual-dtor -Werror
   $<$<CXX_COMPILER_ID:GNU>:-Wno-psabi>)
 if(TROCAR_SANITIZE)
   add_compile_options(-fsanitize=${TROCAR_SANITIZE} -fno-omit-frame-pointer)

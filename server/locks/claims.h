@@ -6,27 +6,26 @@
 // matter. All of the core or nothing; no hold and wait, so no deadlock.
 //
 // Life of a grasp:  wanted -> (refused, retried while the verb is held)* -> held -> released.
-// A silent holder (no sample for 250 ticks) keeps its grasp, but others may take the core over; then
-// its force ramps to zero in 100 ticks. If nobody does, it is held for 2,000 ticks and then ramped
-// down over 500. A holder that leaves frees its core at once.
+// A silent holder (no sample for 250 ticks) keeps its grasp, but others may take the core over;
+// then its force ramps to zero in 100 ticks. If nobody does, it is held for 2,000 ticks and then
+// ramped down over 500. A holder that leaves frees its core at once.
 
 #include <array>
 #include <span>
 #include <vector>
 
-#include "common/base/bytes.h"
 #include "common/base/ids.h"
 #include "common/base/index.h"
-#include "common/base/result.h"
 #include "common/base/tick.h"
 #include "common/scene/tool.h"
+#include "server/world/state_archive.h"
 
 namespace trocar::locks {
 
-inline constexpr Tick kLeaseTicks = 250;           // without a sample: others may take the core
-inline constexpr Tick kAbandonTicks = 2000;        // without a sample: the grasp starts to ramp down
+inline constexpr Tick kLeaseTicks = 250;     // without a sample: others may take the core
+inline constexpr Tick kAbandonTicks = 2000;  // without a sample: the grasp starts to ramp down
 inline constexpr Tick kAbandonRampTicks = 500;
-inline constexpr Tick kTakeoverRampTicks = 100;    // also when the holder leaves
+inline constexpr Tick kTakeoverRampTicks = 100;  // also when the holder leaves
 
 enum class ClaimOutcome : std::uint8_t {
   Granted = 0,
@@ -43,6 +42,65 @@ struct ClaimEvent {
   scene::Verb verb = scene::Verb::None;
   ClaimOutcome outcome = ClaimOutcome::Granted;
   ToolSlot holder;  // RefusedHeld: who holds it; TakenOver: who took it; else invalid
+};
+
+// What a tool asks for at the end of a tick.
+struct ClaimRequest {
+  ToolSlot tool;
+  scene::Verb verb = scene::Verb::None;
+  Tick last_sample_tick = 0;
+  std::span<const NodeIndex> core;  // of a grasp: the nodes in reach, ascending
+};
+
+enum class ClaimPhase : std::uint8_t {
+  None = 0,
+  Wanted = 1,   // refused, and retried while the verb is held
+  Held = 2,     // in effect from the tick after the grant
+  Ramping = 3,  // taken over, left or abandoned: core is free, force fades out
+};
+
+struct Claim {
+  ClaimPhase phase = ClaimPhase::None;
+  scene::Verb verb = scene::Verb::None;
+  ClaimOutcome last_refusal = ClaimOutcome::Granted;  // Granted: not refused yet
+  ToolSlot last_holder;
+  Tick first_refusal_tick = 0;  // phase Wanted
+  Tick ramp_start_tick = 0;     // phase Ramping
+  std::uint32_t ramp_ticks = 0;
+};
+
+class ClaimTable {
+ public:
+  explicit ClaimTable(std::size_t node_count);
+
+  // The tool whose grasp holds the node exclusively; invalid if none.
+  ToolSlot owner(NodeIndex node) const { return owners_[node.value]; }
+  const Claim& claim(ToolSlot tool) const { return claims_[tool.value]; }
+  // In effect this tick: granted in an earlier one.
+  bool is_in_effect(ToolSlot tool) const {
+    return claim(tool).phase == ClaimPhase::Held || claim(tool).phase == ClaimPhase::Ramping;
+  }
+  // 1 while held, then down to 0 along the ramp: scales the force of the claim's verb.
+  float strength(ToolSlot tool, Tick tick) const;
+
+  // A hand left: its grasps free their core now and fade out; its other claims end.
+  void leave(ToolSlot tool, Tick tick);
+
+  // Decides all requests (ascending tool slots, occupied tools only) at the end of `tick`. Appends
+  // to `events` what a person should hear of, once per change, not once per retry.
+  void update(Tick tick, std::span<const ClaimRequest> requests, std::vector<ClaimEvent>& events);
+
+  void visit_state(world::StateArchive& archive);
+
+ private:
+  void release_core(ToolSlot tool);
+  void start_ramp(ToolSlot tool, Tick tick, Tick ramp_ticks);
+  void decide_grasp(Tick tick, const ClaimRequest& request, std::span<const ClaimRequest> requests,
+                    std::vector<ClaimEvent>& events);
+
+  std::vector<ToolSlot> owners_;  // per node
+  std::array<Claim, kMaxTools> claims_;
+  std::vector<const ClaimRequest*> waiting_;  // scratch
 };
 
 }  // namespace trocar::locks

@@ -1,0 +1,45 @@
+#pragma once
+
+// Which nodes each grasping tool holds, and where in its frame. Created when a claim is granted,
+// dropped when it ends. While a claim fades out (its holder left, fell silent or was taken over)
+// the grasp stays where it last was, whatever becomes of the tool's slot.
+
+#include <array>
+#include <span>
+#include <vector>
+
+#include "server/input/tool_table.h"
+#include "server/locks/claims.h"
+#include "server/world/world.h"
+
+namespace trocar::contact {
+
+struct Grasp {
+  std::vector<NodeIndex> nodes;  // ascending; empty: nothing held
+  std::vector<Vec3f> offsets;    // m, tool frame
+  bool is_anchored = false;      // fading out: `anchor` replaces the tool's pose
+  Pose anchor;                   // world_from_tool
+};
+
+class GraspTable {
+ public:
+  const Grasp& operator[](ToolSlot slot) const { return grasps_[slot.value]; }
+  // Where the grasp's frame is this tick.
+  Pose pose(ToolSlot slot, const input::Tool& tool) const {
+    return grasps_[slot.value].is_anchored ? grasps_[slot.value].anchor : tool.pose;
+  }
+
+  // Before inputs change a tool: keeps the last pose of grasps that are going to fade.
+  void anchor(ToolSlot slot, const Pose& pose);
+  // After the claims were decided: takes hold of what was granted, lets go of what ended.
+  void follow_claims(const world::World& world, const input::ToolTable& tools,
+                     const locks::ClaimTable& claims,
+                     std::span<const locks::ClaimRequest> requests);
+
+  void visit_state(world::StateArchive& archive, std::size_t node_count);
+
+ private:
+  std::array<Grasp, kMaxTools> grasps_;
+};
+
+}  // namespace trocar::contact

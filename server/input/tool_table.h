@@ -1,0 +1,51 @@
+#pragma once
+
+// The tools in the session as the simulation knows them. Samples arrive at about 125 Hz, ticks run
+// at 1 kHz: each tool latches its newest sample and moves to it in equal steps, so that tissue
+// meets a moving tool and not a jumping one. Verbs change at once.
+
+#include <array>
+
+#include "common/base/ids.h"
+#include "common/base/tick.h"
+#include "common/math/frame.h"
+#include "common/scene/tool.h"
+#include "server/session/inputs.h"
+#include "server/world/state_archive.h"
+
+namespace trocar::input {
+
+// Ticks in which a tool reaches a new sample: a little over the 8 ms between samples, so that
+// jitter leaves no stand-still.
+inline constexpr std::uint32_t kPoseTicks = 10;
+
+struct Tool {
+  bool is_present = false;
+  bool has_sample = false;  // until the first sample the tool touches nothing
+  scene::ToolShape shape;
+  scene::Verb verb = scene::Verb::None;
+  Pose pose;                     // world_from_tool, this tick
+  Pose target;                   // of the newest sample
+  std::uint32_t steps_left = 0;  // until pose reaches target
+  Vec3f tip_motion;              // of this tick, m
+  Tick last_sample_tick = 0;
+};
+
+class ToolTable {
+ public:
+  const Tool& operator[](ToolSlot slot) const { return tools_[slot.value]; }
+
+  // Admits a tick's inputs, then moves every tool one step. Returns how many inputs did not fit the
+  // state (an empty slot, a taken one) and were dropped.
+  std::uint32_t admit(const session::TickInputs& inputs, Tick tick);
+
+  void visit_state(world::StateArchive& archive);
+
+ private:
+  bool admit_join(const session::HandJoin& join, Tick tick);
+  bool admit_sample(const session::ToolInput& input, Tick tick);
+
+  std::array<Tool, kMaxTools> tools_;
+};
+
+}  // namespace trocar::input

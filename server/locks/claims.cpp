@@ -1,0 +1,141 @@
+#include "server/locks/claims.h"
+
+#include <algorithm>
+
+#include "common/base/assert.h"
+
+namespace trocar::locks {
+
+using scene::Verb;
+
+ClaimTable::ClaimTable(std::size_t node_count) : owners_(node_count) {
+  waiting_.reserve(kMaxTools);
+}
+
+float ClaimTable::strength(ToolSlot tool, Tick tick) const {
+  const Claim& c = claim(tool);
+  if (c.phase == ClaimPhase::Held) return 1.0f;
+  if (c.phase != ClaimPhase::Ramping) return 0.0f;
+  const Tick elapsed = tick - c.ramp_start_tick;
+  if (elapsed >= c.ramp_ticks) return 0.0f;
+  return 1.0f - static_cast<float>(elapsed) / static_cast<float>(c.ramp_ticks);
+}
+
+void ClaimTable::release_core(ToolSlot tool) {
+  std::replace(owners_.begin(), owners_.end(), tool, ToolSlot{});
+}
+
+void ClaimTable::start_ramp(ToolSlot tool, Tick tick, Tick ramp_ticks) {
+  release_core(tool);
+  Claim& c = claims_[tool.value];
+  c.phase = ClaimPhase::Ramping;
+  c.ramp_start_tick = tick;
+  c.ramp_ticks = static_cast<std::uint32_t>(ramp_ticks);
+}
+
+void ClaimTable::leave(ToolSlot tool, Tick tick) {
+  Claim& c = claims_[tool.value];
+  if (c.phase == ClaimPhase::Held && c.verb == Verb::Grasp) {
+    start_ramp(tool, tick, kTakeoverRampTicks);
+  } else if (c.phase != ClaimPhase::Ramping) {
+    c = Claim{};
+  }
+}
+
+void ClaimTable::update(Tick tick, std::span<const ClaimRequest> requests,
+                        std::vector<ClaimEvent>& events) {
+  for (auto& c : claims_)
+    if (c.phase == ClaimPhase::Ramping && tick - c.ramp_start_tick >= c.ramp_ticks) c = Claim{};
+
+  // Ends first, so that what is freed in this tick can be granted in it.
+  for (const auto& request : requests) {
+    Claim& c = claims_[request.tool.value];
+    const bool verb_ended = request.verb != c.verb;
+    const Tick silent = tick - request.last_sample_tick;
+    if (c.phase == ClaimPhase::Held && verb_ended) {
+      events.push_back({tick, request.tool, c.verb, ClaimOutcome::Released, {}});
+      release_core(request.tool);
+      c = Claim{};
+    } else if (c.phase == ClaimPhase::Wanted && verb_ended) {
+      c = Claim{};
+    } else if (c.phase == ClaimPhase::Held && c.verb == Verb::Grasp && silent > kAbandonTicks) {
+      events.push_back({tick, request.tool, c.verb, ClaimOutcome::Expired, {}});
+      start_ramp(request.tool, tick, kAbandonRampTicks);
+    } else if (c.phase == ClaimPhase::Held && c.verb == Verb::Push && silent > kLeaseTicks) {
+      events.push_back({tick, request.tool, c.verb, ClaimOutcome::Expired, {}});
+      start_ramp(request.tool, tick, kTakeoverRampTicks);
+    }
+  }
+
+  waiting_.clear();
+  for (const auto& request : requests) {
+    Claim& c = claims_[request.tool.value];
+    const bool is_open = c.phase == ClaimPhase::None || c.phase == ClaimPhase::Wanted;
+    // A tool that has fallen silent asks for nothing: its last word is too old.
+    if (!is_open || tick - request.last_sample_tick > kLeaseTicks) continue;
+    if (request.verb == Verb::Push) {
+      c = Claim{.phase = ClaimPhase::Held, .verb = Verb::Push};
+      events.push_back({tick, request.tool, Verb::Push, ClaimOutcome::Granted, {}});
+    } else if (request.verb == Verb::Grasp) {
+      if (c.phase == ClaimPhase::None)
+        c = Claim{.phase = ClaimPhase::Wanted, .verb = Verb::Grasp, .first_refusal_tick = tick};
+      waiting_.push_back(&request);
+    }
+  }
+  std::sort(waiting_.begin(), waiting_.end(), [this](const auto* a, const auto* b) {
+    const Tick ta = claim(a->tool).first_refusal_tick, tb = claim(b->tool).first_refusal_tick;
+    return ta != tb ? ta < tb : a->tool < b->tool;
+  });
+  for (const auto* request : waiting_) decide_grasp(tick, *request, requests, events);
+}
+
+void ClaimTable::decide_grasp(Tick tick, const ClaimRequest& request,
+                              std::span<const ClaimRequest> requests,
+                              std::vector<ClaimEvent>& events) {
+  Claim& c = claims_[request.tool.value];
+  const auto refuse = [&](ClaimOutcome outcome, ToolSlot holder) {
+    if (c.last_refusal != outcome || c.last_holder != holder)
+      events.push_back({tick, request.tool, Verb::Grasp, outcome, holder});
+    c.last_refusal = outcome;
+    c.last_holder = holder;
+  };
+  if (request.core.empty()) return refuse(ClaimOutcome::RefusedNothingInReach, {});
+
+  // All of the core or nothing: every holder must have fallen silent before any is taken over.
+  const auto is_silent = [&](ToolSlot holder) {
+    const auto it = std::find_if(requests.begin(), requests.end(),
+                                 [&](const auto& r) { return r.tool == holder; });
+    return it == requests.end() || tick - it->last_sample_tick > kLeaseTicks;
+  };
+  for (const auto node : request.core)
+    if (const auto holder = owner(node); holder.is_valid() && !is_silent(holder))
+      return refuse(ClaimOutcome::RefusedHeld, holder);
+  for (const auto node : request.core)
+    if (const auto holder = owner(node); holder.is_valid()) {
+      events.push_back({tick, holder, Verb::Grasp, ClaimOutcome::TakenOver, request.tool});
+      start_ramp(holder, tick, kTakeoverRampTicks);
+    }
+  for (const auto node : request.core) owners_[node.value] = request.tool;
+  c = Claim{.phase = ClaimPhase::Held, .verb = Verb::Grasp};
+  events.push_back({tick, request.tool, Verb::Grasp, ClaimOutcome::Granted, {}});
+}
+
+void ClaimTable::visit_state(world::StateArchive& archive) {
+  archive.fixed_array(owners_);
+  for (auto& c : claims_) {
+    archive.value(c.phase);
+    archive.value(c.verb);
+    archive.value(c.last_refusal);
+    archive.value(c.last_holder);
+    archive.value(c.first_refusal_tick);
+    archive.value(c.ramp_start_tick);
+    archive.value(c.ramp_ticks);
+    if (archive.is_reading() && (c.phase > ClaimPhase::Ramping || c.verb > Verb::Grasp))
+      archive.fail();
+  }
+  if (!archive.is_reading()) return;
+  for (const auto owner : owners_)
+    if (owner != ToolSlot{} && !owner.is_valid()) archive.fail();
+}
+
+}  // namespace trocar::locks

@@ -1,0 +1,93 @@
+#include "server/step/simulation.h"
+
+#include <cmath>
+#include <string>
+
+namespace trocar::step {
+
+State::State(const scene::Organ& organ, const wire::SurfaceLayout& layout)
+    : world(organ), claims(organ.mesh.node_count()), quantised(layout.vertex_count()) {}
+
+void State::visit(world::StateArchive& archive) {
+  world.visit_state(archive);
+  tools.visit_state(archive);
+  claims.visit_state(archive);
+  grasps.visit_state(archive, world.node_count());
+  archive.fixed_array(quantised);
+}
+
+Scene::Scene(scene::Organ o)
+    : organ(std::move(o)), layout(wire::make_surface_layout(organ)), springs(organ) {}
+
+StepContext::StepContext(const Scene& s, const world::World& world)
+    : scene(s),
+      queue(world.node_count()),
+      active(world.node_count()),
+      solver(world),
+      surface_displacements(s.layout.vertex_count()) {
+  // Enough for many tools in contact; beyond it a tick may allocate once more.
+  contacts.constraints.reserve(8 * contact::kMaxNodesPerTool);
+  contacts.seeds.reserve(8 * contact::kMaxNodesPerTool);
+  contacts.reach_nodes.reserve(8 * contact::kMaxNodesPerTool);
+  contacts.tools.reserve(kMaxTools);
+  seeds.reserve(kMaxTools);
+  requests.reserve(kMaxTools);
+  claim_events.reserve(4 * kMaxTools);
+}
+
+Status validate(const TickDecisions& d) {
+  const auto out_of_range = [](const char* field, auto value, const char* range) {
+    return Error{ErrorCode::Usage,
+                 std::string(field) + ": " + std::to_string(value) + " is outside " + range};
+  };
+  if (d.depth_limit > kMaxDepthLimit)
+    return out_of_range("depth_limit", d.depth_limit, "0 to 1000 layers");
+  if (d.node_limit < 1 || d.node_limit > kMaxNodeLimit)
+    return out_of_range("node_limit", d.node_limit, "1 to 10000000 nodes");
+  if (d.sweeps < 1 || d.sweeps > kMaxSweeps) return out_of_range("sweeps", d.sweeps, "1 to 64");
+  if (!(d.over_relaxation >= 1.0f && d.over_relaxation <= 1.9f))
+    return out_of_range("over_relaxation", d.over_relaxation, "1 to 1.9");
+  return {};
+}
+
+Simulation::Simulation(scene::Organ organ)
+    : scene_(std::make_unique<Scene>(std::move(organ))),
+      state_(std::make_unique<State>(scene_->organ, scene_->layout)),
+      context_(std::make_unique<StepContext>(*scene_, state_->world)) {}
+
+const TickReport& Simulation::tick(const session::TickInputs& inputs,
+                                   const TickDecisions& decisions) {
+  context_->inputs = &inputs;
+  context_->decisions = decisions;
+  run_tick(*state_, *context_);
+  context_->inputs = nullptr;
+  return context_->report;
+}
+
+void Simulation::write_snapshot(Bytes& out) const {
+  auto archive = world::StateArchive::writing(out);
+  state_->visit(archive);
+}
+
+std::uint64_t Simulation::state_hash() const {
+  StateHasher hasher;
+  auto archive = world::StateArchive::hashing(hasher);
+  state_->visit(archive);
+  return hasher.digest();
+}
+
+Status Simulation::restore_snapshot(BytesView snapshot) {
+  auto restored = std::make_unique<State>(scene_->organ, scene_->layout);
+  auto archive = world::StateArchive::reading(snapshot);
+  restored->visit(archive);
+  if (!archive.ok() || !archive.at_end())
+    return Error{ErrorCode::BadFile, "snapshot: " + std::to_string(snapshot.size()) +
+                                         " bytes do not hold a state of this organ (" +
+                                         std::to_string(scene_->organ.mesh.node_count()) +
+                                         " nodes)"};
+  state_ = std::move(restored);
+  context_ = std::make_unique<StepContext>(*scene_, state_->world);
+  return {};
+}
+
+}  // namespace trocar::step

@@ -1,0 +1,45 @@
+#pragma once
+
+// The simulation as everybody outside sees it: inputs and decisions in, reports and frames out,
+// snapshots both ways. Used by the server, by re-simulation of journals, and by tests. One thread
+// at a time.
+
+#include <memory>
+
+#include "server/step/tick.h"
+
+namespace trocar::step {
+
+// Checks ranges of what a person or a journal may choose; error names the field and the limit.
+Status validate(const TickDecisions& decisions);
+
+class Simulation {
+ public:
+  explicit Simulation(scene::Organ organ);
+
+  // Simulates one tick. After a tick that publishes, take_frame() has the frame.
+  const TickReport& tick(const session::TickInputs& inputs, const TickDecisions& decisions);
+
+  // The frame of the last tick, or null. Not yet shared, so the caller may add what is not
+  // simulation: statistics, a snapshot for the journal. Frame f shows the state after tick 16 f.
+  std::shared_ptr<PublishedFrame> take_frame() { return std::move(context_->frame); }
+
+  // Full state: exactly the bytes that the tick hash covers.
+  void write_snapshot(Bytes& out) const;
+  // Replaces the state, or leaves it as it was and says what is wrong with the bytes.
+  Status restore_snapshot(BytesView snapshot);
+  std::uint64_t state_hash() const;
+
+  Tick current_tick() const { return state_->world.tick; }
+  const wire::SurfaceLayout& layout() const { return scene_->layout; }
+  const scene::Organ& organ() const { return scene_->organ; }
+  const State& state() const { return *state_; }
+  const StepContext& context() const { return *context_; }
+
+ private:
+  std::unique_ptr<Scene> scene_;
+  std::unique_ptr<State> state_;
+  std::unique_ptr<StepContext> context_;
+};
+
+}  // namespace trocar::step

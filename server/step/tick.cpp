@@ -1,0 +1,137 @@
+#include "server/step/tick.h"
+
+#include "common/base/timing.h"
+
+namespace trocar::step {
+namespace {
+
+void admit_inputs(State& state, StepContext& context) {
+  for (const auto slot : context.inputs->leaves)
+    for (int i = 0; slot.has_tools() && i < kToolsPerHand; ++i) {
+      const auto tool = tool_slot(slot, i);
+      state.grasps.anchor(tool, state.tools[tool].pose);
+      state.claims.leave(tool, state.world.tick);
+    }
+  context.report.inputs_dropped = state.tools.admit(*context.inputs, state.world.tick);
+  if (context.report.inputs_dropped > 0) context.report.faults |= kFaultInputDropped;
+}
+
+void find_contacts(const State& state, StepContext& context) {
+  contact::find_contacts(state.world, state.tools, state.claims, state.grasps, state.world.tick,
+                         context.contacts);
+  context.report.contact_nodes = static_cast<std::uint32_t>(context.contacts.seeds.size());
+  if (context.contacts.dropped > 0) context.report.faults |= kFaultContactLimit;
+}
+
+void fill_queue(State& state, StepContext& context) {
+  context.seeds.clear();
+  for (const auto& tool : context.contacts.tools)
+    context.seeds.push_back(context.contacts.seeds_of(tool));
+  context.queue.fill(context.scene.organ.mesh.node_neighbours, context.seeds,
+                     {context.decisions.depth_limit, context.decisions.node_limit});
+  context.active.collect(context.queue, state.world);
+  context.report.queue_nodes = static_cast<std::uint32_t>(context.queue.nodes().size());
+  context.report.active_nodes = static_cast<std::uint32_t>(context.active.nodes().size());
+  context.report.region_count = context.queue.region_count();
+}
+
+void solve(State& state, StepContext& context) {
+  const auto solved = context.solver.solve(
+      context.scene.springs, context.contacts, context.active.nodes(),
+      {context.decisions.sweeps, context.decisions.over_relaxation, kTickSeconds}, state.world);
+  context.active.freeze_quiet(context.queue, context.solver.residuals_n(), state.world);
+  context.report.residual_n = solved.residual_n;
+  context.report.nodes_rejected = solved.nodes_rejected;
+  if (solved.is_stepped_down) context.report.faults |= kFaultOverRelaxation;
+  if (solved.nodes_rejected > 0) context.report.faults |= kFaultNonFinite;
+}
+
+void update_claims(State& state, StepContext& context) {
+  context.requests.clear();
+  for (std::uint8_t i = 0; i < kMaxTools; ++i) {
+    const auto& tool = state.tools[ToolSlot{i}];
+    if (!tool.has_sample) continue;
+    context.requests.push_back(
+        {ToolSlot{i}, tool.verb, tool.last_sample_tick, context.contacts.reach_of(ToolSlot{i})});
+  }
+  state.claims.update(state.world.tick, context.requests, context.claim_events);
+  state.grasps.follow_claims(state.world, state.tools, state.claims, context.requests);
+}
+
+ToolFrame describe_tool(const State& state, const StepContext& context, ToolSlot slot) {
+  const auto& tool = state.tools[slot];
+  ToolFrame frame{.tool = slot, .world_from_tool = tool.pose, .verb = tool.verb};
+  frame.has_claim = state.claims.is_in_effect(slot);
+  frame.is_silent = state.world.tick - tool.last_sample_tick > locks::kLeaseTicks;
+  for (const auto& contact : context.contacts.tools) {
+    if (contact.tool != slot) continue;
+    frame.contact_nodes = contact.seeds_end - contact.seeds_begin;
+    frame.force_n = context.solver.reaction(context.contacts, contact, state.world, kTickSeconds);
+    for (auto i = contact.begin; i < contact.end; ++i) {
+      const auto& c = context.contacts.constraints[i];
+      if (c.kind != contact::NodeConstraint::Kind::HalfSpace) continue;
+      const float gap = dot(c.normal, state.world.displacements[c.node.value] - c.target);
+      frame.penetration_m = std::max(frame.penetration_m, -gap);
+    }
+  }
+  return frame;
+}
+
+void quantise_and_publish(State& state, StepContext& context) {
+  const auto& layout = context.scene.layout;
+  for (std::size_t v = 0; v < layout.vertex_count(); ++v)
+    context.surface_displacements[v] = state.world.displacements[layout.node_of_vertex[v].value];
+  wire::quantise(context.surface_displacements, state.quantised);
+
+  auto frame = std::make_shared<PublishedFrame>();
+  frame->frame = frame_of(state.world.tick);
+  frame->tick = state.world.tick;
+  frame->epoch = state.world.topology_epoch;
+  frame->surface = state.quantised;
+  frame->surface_crc = wire::surface_crc(state.quantised);
+  frame->regions.reserve(layout.vertex_count());
+  for (const auto node : layout.node_of_vertex)
+    frame->regions.push_back(context.queue.region(node));
+  for (std::uint8_t i = 0; i < kMaxTools; ++i)
+    if (state.tools[ToolSlot{i}].has_sample)
+      frame->tools.push_back(describe_tool(state, context, ToolSlot{i}));
+  frame->claim_events = context.claim_events;
+  context.claim_events.clear();
+  frame->active_nodes = context.report.active_nodes;
+  frame->queue_nodes = context.report.queue_nodes;
+  frame->region_count = context.report.region_count;
+  context.frame = std::move(frame);
+}
+
+void hash_state(State& state, StepContext& context) {
+  context.hasher.reset();
+  auto archive = world::StateArchive::hashing(context.hasher);
+  state.visit(archive);
+  context.report.state_hash = context.hasher.digest();
+}
+
+}  // namespace
+
+void run_tick(State& state, StepContext& context) {
+  auto& report = context.report;
+  report = TickReport{};
+  context.frame.reset();
+  std::uint64_t before = thread_cpu_ns();
+  const auto stage = [&](Stage name, auto&& body) {
+    body(state, context);
+    const std::uint64_t now = thread_cpu_ns();
+    report.stage_cpu_ns[static_cast<std::size_t>(name)] = static_cast<std::uint32_t>(now - before);
+    before = now;
+  };
+
+  report.tick = ++state.world.tick;
+  stage(Stage::Admit, admit_inputs);
+  stage(Stage::Contacts, find_contacts);
+  stage(Stage::Queue, fill_queue);
+  stage(Stage::Solve, solve);
+  stage(Stage::Claims, update_claims);
+  stage(Stage::Hash, hash_state);
+  if (publishes_frame(state.world.tick)) stage(Stage::Publish, quantise_and_publish);
+}
+
+}  // namespace trocar::step

@@ -1,0 +1,77 @@
+#pragma once
+
+// One tick: a pure function of (state, admitted inputs, decisions). tick.cpp is the table of
+// contents.
+
+#include <memory>
+
+#include "common/base/checksum.h"
+#include "common/wire/surface_layout.h"
+#include "server/contact/contact_list.h"
+#include "server/contact/grasps.h"
+#include "server/dynamics/block_descent.h"
+#include "server/dynamics/spring_network.h"
+#include "server/input/tool_table.h"
+#include "server/locks/claims.h"
+#include "server/propagation/active_set.h"
+#include "server/propagation/queue.h"
+#include "server/step/published_frame.h"
+#include "server/step/tick_report.h"
+#include "server/world/world.h"
+
+namespace trocar::step {
+
+// Everything a later tick depends on. Each member names its arrays in visit_state; these bytes are
+// the snapshot and what the tick hash covers.
+struct State {
+  explicit State(const scene::Organ& organ, const wire::SurfaceLayout& layout);
+
+  world::World world;
+  input::ToolTable tools;
+  locks::ClaimTable claims;
+  contact::GraspTable grasps;
+  // Last published integers: quantisation has hysteresis, so they are state.
+  wire::QuantisedSurface quantised;
+
+  void visit(world::StateArchive& archive);
+};
+
+// Constant in a session: follows from the organ.
+struct Scene {
+  explicit Scene(scene::Organ o);
+
+  scene::Organ organ;
+  wire::SurfaceLayout layout;
+  dynamics::SpringNetwork springs;
+};
+
+// Laid out as input, scratch and output of a tick. Scratch keeps its capacity, so that a tick does
+// not allocate after warm-up; nothing in it outlives a tick's meaning.
+struct StepContext {
+  StepContext(const Scene& scene, const world::World& world);
+
+  // Input.
+  const Scene& scene;
+  const session::TickInputs* inputs = nullptr;
+  TickDecisions decisions;
+
+  // Scratch and stage results, valid from their stage to the end of the tick.
+  contact::ContactList contacts;
+  propagation::PropagationQueue queue;
+  propagation::ActiveSet active;
+  dynamics::BlockDescent solver;
+  std::vector<std::span<const NodeIndex>> seeds;
+  std::vector<locks::ClaimRequest> requests;
+  std::vector<Vec3f> surface_displacements;
+  StateHasher hasher;
+
+  // Output.
+  std::vector<locks::ClaimEvent> claim_events;  // gathered until published
+  std::shared_ptr<PublishedFrame> frame;        // set by the publish stage
+  TickReport report;
+};
+
+// The stages, in order, each timed.
+void run_tick(State& state, StepContext& context);
+
+}  // namespace trocar::step

@@ -1,0 +1,40 @@
+#include "server/world/world.h"
+
+namespace trocar::world {
+
+World::World(const scene::Organ& organ)
+    : surface_nodes(organ.mesh.surface_nodes),
+      displacements(organ.mesh.node_count()),
+      velocities(organ.mesh.node_count()),
+      node_classes(organ.mesh.node_count(), NodeClass::Frozen),
+      quiet_ticks(organ.mesh.node_count()) {
+  const auto& mesh = organ.mesh;
+  rest_positions.reserve(mesh.node_count());
+  masses.reserve(mesh.node_count());
+  for (const auto& p : mesh.rest_positions) rest_positions.push_back(to_float(p));
+  for (const double m : organ.node_masses_kg) masses.push_back(static_cast<float>(m));
+  std::vector<double> areas(mesh.node_count());
+  for (const auto& [a, b, c] : mesh.boundary_triangles) {
+    const auto& p = mesh.rest_positions;
+    const double third = length(cross(p[b.value] - p[a.value], p[c.value] - p[a.value])) / 6.0;
+    for (const auto node : {a, b, c}) areas[node.value] += third;
+  }
+  for (const double area : areas) surface_areas.push_back(static_cast<float>(area));
+  for (const auto node : organ.fixed_nodes) node_classes[node.value] = NodeClass::Fixed;
+}
+
+void World::visit_state(StateArchive& archive) {
+  archive.value(tick);
+  archive.value(topology_epoch);
+  archive.fixed_array(displacements);
+  archive.fixed_array(velocities);
+  archive.fixed_array(node_classes);
+  archive.fixed_array(quiet_ticks);
+  if (!archive.is_reading()) return;
+  for (std::size_t i = 0; i < node_count(); ++i)
+    if (node_classes[i] > NodeClass::Active || !is_finite(displacements[i]) ||
+        !is_finite(velocities[i]))
+      archive.fail();
+}
+
+}  // namespace trocar::world

@@ -1,0 +1,50 @@
+#pragma once
+
+// The authoritative tissue state as arrays over nodes, in the organ's own numbering.
+//
+// Displacements are float32 relative to rest (the rest pose stays in double in the organ), so a
+// micrometre is still exact a metre from the origin. Invariants: fixed nodes have zero displacement
+// and velocity; frozen nodes have zero velocity; everything is finite.
+// Owned by the simulation thread; nobody else sees it.
+
+#include <vector>
+
+#include "common/base/tick.h"
+#include "common/math/vec3.h"
+#include "common/scene/organ.h"
+#include "server/world/state_archive.h"
+
+namespace trocar::world {
+
+enum class NodeClass : std::uint8_t {
+  Fixed = 0,   // held by ligaments: never moves
+  Frozen = 1,  // at rest: not swept
+  Active = 2,  // swept this tick, or not yet come to rest
+};
+
+struct World {
+  explicit World(const scene::Organ& organ);
+
+  std::size_t node_count() const { return displacements.size(); }
+  Vec3f position(NodeIndex node) const {
+    return rest_positions[node.value] + displacements[node.value];
+  }
+
+  // Constant in a session.
+  std::vector<Vec3f> rest_positions;  // m, world frame
+  std::vector<float> masses;          // kg
+  std::vector<float> surface_areas;   // m^2 of boundary triangles per node, 0 inside
+  std::vector<NodeIndex> surface_nodes;
+
+  // State, in snapshot and hash.
+  Tick tick = 0;  // ticks done
+  std::uint32_t topology_epoch = 0;
+  std::vector<Vec3f> displacements;  // m, from rest
+  std::vector<Vec3f> velocities;     // m/s
+  std::vector<NodeClass> node_classes;
+  std::vector<std::uint16_t> quiet_ticks;  // ticks in a row below the freezing thresholds
+
+  void visit_state(StateArchive& archive);
+};
+
+}  // namespace trocar::world
