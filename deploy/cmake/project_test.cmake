@@ -1,7 +1,9 @@
-# project_test(<name> SOURCES x_test.cpp... DEPENDS folder... [LINK target...]): a GoogleTest program;
-# each of its tests becomes one ctest test.
+# project_test(<name> SOURCES x_test.cpp... DEPENDS folder... [LINK target...] [SANITIZED]): a
+# GoogleTest program; each of its tests becomes one ctest test. SANITIZED: deploy/test runs it a second
+# time with address and undefined-behaviour sanitizers; for what reads outside data.
+add_custom_target(sanitized_tests)
 function(project_test name)
-  cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;DEPENDS;LINK" ${ARGN})
+  cmake_parse_arguments(ARG "SANITIZED" "TIMEOUT" "SOURCES;DEPENDS;LINK" ${ARGN})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 300)
   endif()
@@ -14,6 +16,11 @@ function(project_test name)
   endforeach()
   target_compile_definitions(${name} PRIVATE
     TROCAR_SOURCE_DIR="${PROJECT_SOURCE_DIR}" TROCAR_BINARY_DIR="${PROJECT_BINARY_DIR}/bin")
+  set(labels)
+  if(ARG_SANITIZED)
+    set(labels LABELS sanitized)
+    add_dependencies(sanitized_tests ${name})
+  endif()
   gtest_discover_tests(${name} TEST_PREFIX "${name}." DISCOVERY_TIMEOUT 60
-    PROPERTIES TIMEOUT ${ARG_TIMEOUT})
+    PROPERTIES TIMEOUT ${ARG_TIMEOUT} ${labels})
 endfunction()

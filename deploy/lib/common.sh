@@ -1,0 +1,45 @@
+# Shared by the scripts in deploy/. Sourced, never run. Each script sets `program` before.
+set -euo pipefail
+
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
+
+say() { printf '%s\n' "$*"; }
+step() { printf '\n== %s\n' "$*"; }
+# fail CODE MESSAGE: exit codes are those of the programs: 1 mismatch, 2 usage, 3 bad file,
+# 5 something is missing.
+fail() {
+  printf '%s: %s\n' "$program" "$2" >&2
+  exit "$1"
+}
+
+# Objects may be shared between checkouts of the same sources.
+export CCACHE_BASEDIR=${CCACHE_BASEDIR:-$root} CCACHE_NOHASHDIR=1
+export NINJA_STATUS='[%f/%t %es] '
+
+# need_value OPTION "$@"-rest: fails unless the option is followed by a value.
+need_value() {
+  [ $# -ge 2 ] && [ -n "$2" ] || fail 2 "$1: needs a value, see $program --help"
+}
+
+# absolute PATH: relative to where the person is, not to the repository.
+absolute() {
+  case $1 in
+    /*) printf '%s' "$1" ;;
+    *) printf '%s/%s' "$PWD" "$1" ;;
+  esac
+}
+
+# build PRESET [TARGET...]: configures if needed and builds.
+build() {
+  local preset=$1
+  shift
+  if [ ! -e "$root/build/$preset/build.ninja" ]; then
+    (cd "$root" && cmake --preset "$preset" >"$root/build-$preset.log" 2>&1) || {
+      cat "$root/build-$preset.log" >&2
+      rm -f "$root/build-$preset.log"
+      return 1
+    }
+    rm -f "$root/build-$preset.log"
+  fi
+  ninja -C "$root/build/$preset" "$@"
+}

@@ -1,0 +1,200 @@
+// The rules on synthetic trees: each breach is found, and a good tree has none.
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "tests/architecture/rules.h"
+
+namespace trocar::architecture {
+namespace {
+
+namespace fs = std::filesystem;
+
+class Rules : public ::testing::Test {
+ protected:
+  Rules() {
+    const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
+    root_ = fs::path(::testing::TempDir()) / (std::string("trocar_rules_") + test->name());
+    fs::remove_all(root_);
+    write("CMakeLists.txt",
+          "set(TROCAR_LAYERS # the order\n  common/base common/math\n  proto common/wire\n"
+          "  server/world server/step server/net\n  client/net client/render)\n");
+    library("common/base", "SOURCES a.cpp HEADERS a.h");
+    write("common/base/a.h", "#pragma once\n#include <vector>\n");
+    write("common/base/a.cpp", "#include \"common/base/a.h\"\n");
+    library("common/math", "HEADERS m.h DEPENDS common/base");
+    write("common/math/m.h", "#pragma once\n#include \"common/base/a.h\"\n");
+    library("common/wire", "SOURCES w.cpp HEADERS w.h DEPENDS common/math proto LINK zstd");
+    write("common/wire/w.h", "#pragma once\n#include \"common/math/m.h\"\n");
+    write("common/wire/w.cpp", "#include \"proto/wire.pb.h\"\n#include \"common/base/a.h\"\n");
+    library("server/world", "HEADERS world.h DEPENDS common/math");
+    write("server/world/world.h", "#pragma once\n#include \"common/math/m.h\"\n");
+    library("server/step", "SOURCES tick.cpp DEPENDS server/world");
+    write("server/step/tick.cpp",
+          "#include \"common/base/timing.h\"\n#include <cmath>\n// std::sin(x) is not used\n"
+          "float f(float x) { return std::sqrt(x) + g(thread_cpu_ns()) + h(\"std::cos(\"); }\n");
+    write("common/base/timing.h", "#pragma once\n");
+    library("common/base", "SOURCES a.cpp HEADERS a.h timing.h");
+    library("server/net", "SOURCES n.cpp DEPENDS common/wire");
+    write("server/net/n.cpp", "#include \"common/wire/w.h\"\n");
+    library("client/net", "SOURCES n.cpp DEPENDS common/wire");
+    write("client/net/n.cpp", "#include \"proto/wire.pb.h\"\n");
+    library("client/render", "SOURCES r.cpp DEPENDS common/math");
+    write("client/render/r.cpp", "#include <GLFW/glfw3.h>\n#include <imgui.h>\n");
+  }
+  ~Rules() override { fs::remove_all(root_); }
+
+  void write(const std::string& path, const std::string& text) {
+    fs::create_directories((root_ / path).parent_path());
+    std::ofstream(root_ / path) << text;
+  }
+  void append(const std::string& path, const std::string& text) {
+    std::ofstream(root_ / path, std::ios::app) << text;
+  }
+  void library(const std::string& folder, const std::string& rest) {
+    write(folder + "/CMakeLists.txt",
+          "project_library(" + folder + " # one folder\n  " + rest + ")\n");
+  }
+  const fs::path& root() const { return root_; }
+  SourceTree tree() const { return read_source_tree(root_); }
+
+  // Exactly one breach, which starts with `where` and contains `what`.
+  static void expect_one(const Breaches& breaches, const std::string& where,
+                         const std::string& what) {
+    ASSERT_EQ(breaches.size(), 1u) << (breaches.empty() ? "none" : breaches.back());
+    EXPECT_EQ(breaches[0].rfind(where, 0), 0u) << breaches[0];
+    EXPECT_NE(breaches[0].find(what), std::string::npos) << breaches[0];
+  }
+
+ private:
+  fs::path root_;
+};
+
+TEST_F(Rules, AGoodTreeHasNoBreach) {
+  const auto good = tree();
+  for (const auto& breaches :
+       {check_folders(good), check_includes(good), check_net_sees_no_world(good),
+        check_protobuf(good), check_graphics(good), check_determinism(good), check_files(good)})
+    EXPECT_TRUE(breaches.empty()) << breaches.front();
+}
+
+TEST_F(Rules, AnIncludeThatIsNotAmongTheDependsIsFound) {
+  append("client/render/r.cpp", "#include \"common/wire/w.h\"\n");
+  expect_one(check_includes(tree()), "client/render/r.cpp:3: ", "not among the DEPENDS");
+}
+
+TEST_F(Rules, ADependencyThatPointsDownIsFound) {
+  library("common/base", "SOURCES a.cpp HEADERS a.h timing.h DEPENDS common/math");
+  expect_one(check_folders(tree()), "common/base/CMakeLists.txt:1: ", "turn it around");
+}
+
+TEST_F(Rules, ADependencyThatDoesNotExistIsFound) {
+  library("server/world", "HEADERS world.h DEPENDS common/math common/maths");
+  expect_one(check_folders(tree()), "server/world/CMakeLists.txt:1: ", "not in TROCAR_LAYERS");
+}
+
+TEST_F(Rules, ServerAndClientInEitherDirectionAreFound) {
+  library("client/net", "SOURCES n.cpp DEPENDS common/wire server/world");
+  append("client/net/n.cpp", "#include \"server/world/world.h\"\n");
+  append("server/net/n.cpp", "#include \"client/net/n.h\"\n");
+  expect_one(check_folders(tree()), "client/net/CMakeLists.txt:1: ", "do not see each other");
+  const auto breaches = check_includes(tree());
+  ASSERT_EQ(breaches.size(), 2u);
+  EXPECT_EQ(breaches[0].rfind("client/net/n.cpp:2: ", 0), 0u) << breaches[0];
+  EXPECT_EQ(breaches[1].rfind("server/net/n.cpp:2: ", 0), 0u) << breaches[1];
+}
+
+TEST_F(Rules, AnIncludeThatIsNotFromTheRootIsFound) {
+  append("common/wire/w.cpp", "#include \"w.h\"\n");
+  expect_one(check_includes(tree()), "common/wire/w.cpp:3: ", "from the root");
+}
+
+TEST_F(Rules, AnIncludeInACommentIsNone) {
+  append("client/render/r.cpp",
+         "// #include \"common/wire/w.h\"\n/*\n#include \"nowhere.h\"\n*/\n");
+  EXPECT_TRUE(check_includes(tree()).empty());
+}
+
+TEST_F(Rules, AFolderOutsideTheLayersAndAFileThatIsNotListedAreFound) {
+  write("server/magic/x.cpp", "");
+  expect_one(check_folders(tree()), "server/magic/x.cpp:1: ", "not in TROCAR_LAYERS");
+  fs::remove_all(root() / "server/magic");
+  write("common/wire/forgotten.h", "#pragma once\n");
+  expect_one(check_folders(tree()), "common/wire/forgotten.h:1: ", "not listed");
+}
+
+TEST_F(Rules, NetThatSeesTheWorldThroughAnotherFolderIsFound) {
+  library("server/net", "SOURCES n.cpp DEPENDS common/wire server/step");
+  const auto breaches = check_net_sees_no_world(tree());
+  ASSERT_EQ(breaches.size(), 2u) << "step itself and world through it";
+  append("server/net/n.cpp", "#include \"server/world/world.h\"\n");
+  EXPECT_EQ(check_net_sees_no_world(tree()).size(), 3u);
+}
+
+TEST_F(Rules, ProtobufElsewhereIsFound) {
+  append("server/step/tick.cpp", "#include \"proto/wire.pb.h\"\n");
+  expect_one(check_protobuf(tree()), "server/step/tick.cpp:5: ", "plain types");
+  append("server/net/n.cpp", "#include <google/protobuf/message.h>\n");
+  EXPECT_EQ(check_protobuf(tree()).size(), 2u);
+}
+
+TEST_F(Rules, DrawingElsewhereIsFound) {
+  for (const char* header : {"<GL/gl.h>", "<EGL/egl.h>", "<GLFW/glfw3.h>", "<imgui.h>",
+                             "<backends/imgui_impl_glfw.h>"}) {
+    write("client/net/n.cpp", std::string("#include ") + header + "\n");
+    expect_one(check_graphics(tree()), "client/net/n.cpp:1: ", "draw");
+  }
+}
+
+TEST_F(Rules, EverySourceOfNondeterminismIsFound) {
+  for (const char* line :
+       {"#include <unordered_map>", "#include <unordered_set>", "#include <random>",
+        "#include <chrono>", "#include <ctime>", "#include \"common/base/timing.h\"",
+        "#include <Eigen/Dense>", "x = std::sin(y);", "x = cosf(y);", "x = std::atan2(y, z);",
+        "x = std::exp(y);", "x = pow (y, 2);", "x = std::fma(a, b, c);",
+        "auto h = std::hash<int>{};", "x = rand();", "t = thread_cpu_ns();",
+        "clock_gettime(c, &t);"}) {
+    write("server/world/world.h", std::string("#pragma once\n") + line + "\n");
+    expect_one(check_determinism(tree()), "server/world/world.h:2: ", ":");
+  }
+}
+
+TEST_F(Rules, ExactlyRoundedFunctionsAndLikeNamesAreAllowed) {
+  write("server/world/world.h",
+        "#pragma once\nx = std::sqrt(a) + std::abs(b) + std::floor(c) + position(d) + "
+        "expand(e) + log_it(f) + distance(g) + cosine_of(h) + 1'000;\n");
+  EXPECT_TRUE(check_determinism(tree()).empty());
+}
+
+TEST_F(Rules, OnlyTheStageTimersMayReadAClock) {
+  library("server/step", "SOURCES tick.cpp other.cpp DEPENDS server/world");
+  write("server/step/other.cpp", "#include \"common/base/timing.h\"\n");
+  expect_one(check_determinism(tree()), "server/step/other.cpp:1: ", "timing.h");
+}
+
+TEST_F(Rules, LongFilesMachinePathsAndMissingGuardsAreFound) {
+  write("common/base/a.h", "#include <vector>\n");
+  expect_one(check_files(tree()), "common/base/a.h:1: ", "#pragma once");
+  write("common/base/a.h", "#pragma once\n");
+  write("common/base/a.cpp", std::string(601, '\n'));
+  expect_one(check_files(tree()), "common/base/a.cpp:601: ", "600 lines");
+  write("common/base/a.cpp", std::string(600, '\n'));
+  EXPECT_TRUE(check_files(tree()).empty());
+  write("deploy/start", std::string("cd /ho") + "me/somebody/trocar\n");
+  expect_one(check_files(tree()), "deploy/start:1: ", "one machine");
+  write("deploy/start", "cd /usr/share/trocar && cat out/work/x\n");
+  EXPECT_TRUE(check_files(tree()).empty());
+}
+
+TEST(WithoutComments, KeepsLinesAndSeesThroughLiterals) {
+  EXPECT_EQ(without_comments("a // b\nc", false), "a     \nc");
+  EXPECT_EQ(without_comments("a /* b\nc */ d", false), "a     \n     d");
+  EXPECT_EQ(without_comments("\"// no\" x // yes", true), "\"// no\" x       ");
+  EXPECT_EQ(without_comments("\"a\\\"b\" c", false), "\"    \" c");
+  EXPECT_EQ(without_comments("R\"x(\"//)x\" y", false), "R\"     )x\" y");
+  EXPECT_EQ(without_comments("10'000 // x", false), "10'000     ");
+}
+
+}  // namespace
+}  // namespace trocar::architecture
