@@ -13,7 +13,7 @@ using contact::NodeConstraint;
 
 // Energy of a constraint at displacement x, as gradient and block.
 //   tie:        k/2 |x - target|^2
-//   half-space: k/2 min(0, g)^2 with gap g = n . (x - target), and while g < 0 a drag
+//   half-space: k/2 min(0, g)^2 with gap g = n . (x - target), and a drag
 //               c/(2 dt) |T (x - start - tool_motion)|^2 with T = I - n n^T
 void add_constraint(const NodeConstraint& c, const Vec3f& x, const Vec3f& start, float inverse_dt,
                     Vec3f& gradient, SymMat3f* block) {
@@ -24,14 +24,17 @@ void add_constraint(const NodeConstraint& c, const Vec3f& x, const Vec3f& start,
     return;
   }
   const float gap = dot(c.normal, from_target);
-  if (gap >= 0) return;
-  gradient += c.normal * (c.stiffness * gap);
+  if (gap < 0) {
+    gradient += c.normal * (c.stiffness * gap);
+    if (block) block->add_outer(c.normal, c.stiffness);
+  }
+  if (c.drag == 0) return;
   const Vec3f slip = x - start - c.tool_motion;
   const float drag = c.drag * inverse_dt;
   gradient += (slip - c.normal * dot(c.normal, slip)) * drag;
   if (block) {
     block->add_identity(drag);
-    block->add_outer(c.normal, c.stiffness - drag);
+    block->add_outer(c.normal, -drag);
   }
 }
 
@@ -40,6 +43,7 @@ void add_constraint(const NodeConstraint& c, const Vec3f& x, const Vec3f& start,
 BlockDescent::BlockDescent(const world::World& world)
     : first_constraint_(world.node_count()), constraint_stamp_(world.node_count()) {
   residuals_.reserve(world.node_count());
+  next_constraint_.reserve(8 * contact::kMaxNodesPerTool);
   reset(world);
 }
 
@@ -91,6 +95,9 @@ SolveReport BlockDescent::solve(const SpringNetwork& springs, const contact::Con
   link_constraints(contacts);
   residuals_.resize(active.size());
   const float inverse_dt = 1.0f / settings.dt;
+  // Starting where inertia alone would lead makes rigid motion exact from the first sweep; starting
+  // at rest instead acts as a drag as long as sweeps are few.
+  for (const auto node : active) x_[node.value] += world.velocities[node.value] * settings.dt;
   float omega = settings.sweeps < 3
                     ? std::min(settings.over_relaxation, kMaxOverRelaxationFewSweeps)
                     : settings.over_relaxation;
@@ -122,14 +129,12 @@ SolveReport BlockDescent::solve(const SpringNetwork& springs, const contact::Con
     world.velocities[n] = (x_[n] - start_[n]) * inverse_dt;
     world.displacements[n] = x_[n];
   }
-  if (!active.empty())
-    report.residual_n = std::sqrt(last_sum / static_cast<float>(active.size()));
+  if (!active.empty()) report.residual_n = std::sqrt(last_sum / static_cast<float>(active.size()));
   return report;
 }
 
-Vec3f BlockDescent::reaction(const contact::ContactList& contacts,
-                             const contact::ToolContact& tool, const world::World& world,
-                             float dt) const {
+Vec3f BlockDescent::reaction(const contact::ContactList& contacts, const contact::ToolContact& tool,
+                             const world::World& world, float dt) const {
   // The constraint's energy gradient is minus the force on the node, hence the force on the tool.
   Vec3f force;
   for (auto i = tool.begin; i < tool.end; ++i) {
