@@ -57,8 +57,10 @@ class RawClient {
   std::uint32_t last_base = 0;  // of the last delta
   bool last_was_keyframe = false;
   int frames_followed = 0;
-  // Reads up to the next SurfaceFrame and applies it; fails the test on a wrong baseline or CRC.
-  bool follow();
+  enum class Expect { RightCrc, WrongCrc };
+  // Reads up to the next SurfaceFrame and applies it; fails the test on a wrong baseline, or a CRC
+  // that is not as expected.
+  bool follow(Expect expect = Expect::RightCrc);
 
  private:
   bool receive_exactly(std::uint8_t* to, std::size_t count);
