@@ -8,10 +8,10 @@ namespace trocar {
 }  // namespace trocar
 
 // Always on.
-#define TROCAR_ASSERT(condition)                                                       \
-  do {                                                                                 \
-    if (!(condition)) [[unlikely]]                                                     \
-      ::trocar::assert_failed(#condition, __FILE__, __LINE__);                         \
+#define TROCAR_ASSERT(condition)                               \
+  do {                                                         \
+    if (!(condition)) [[unlikely]]                             \
+      ::trocar::assert_failed(#condition, __FILE__, __LINE__); \
   } while (false)
 
 // For inner loops: on unless built as Release.

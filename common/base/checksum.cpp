@@ -30,12 +30,18 @@ StateHasher::StateHasher() : state_(std::make_unique<State>()) {
 }
 StateHasher::~StateHasher() = default;
 
-void StateHasher::reset() { XXH3_64bits_reset(state_->xxh); }
+void StateHasher::reset() {
+  XXH3_64bits_reset(state_->xxh);
+}
 void StateHasher::update(BytesView bytes) {
   if (!bytes.empty()) XXH3_64bits_update(state_->xxh, bytes.data(), bytes.size());
 }
-std::uint64_t StateHasher::digest() const { return XXH3_64bits_digest(state_->xxh); }
+std::uint64_t StateHasher::digest() const {
+  return XXH3_64bits_digest(state_->xxh);
+}
 
-std::uint64_t xxh3_64(BytesView bytes) { return XXH3_64bits(bytes.data(), bytes.size()); }
+std::uint64_t xxh3_64(BytesView bytes) {
+  return XXH3_64bits(bytes.data(), bytes.size());
+}
 
 }  // namespace trocar

@@ -20,11 +20,11 @@ struct Index {
   constexpr bool is_valid() const { return value != 0xffffffffu; }
 };
 
-using NodeIndex = Index<struct NodeTag>;      // mesh node, the organ's own numbering everywhere
-using TetIndex = Index<struct TetTag>;        // tetrahedron
-using EdgeIndex = Index<struct EdgeTag>;      // undirected edge between two nodes of a tet
-using LinkIndex = Index<struct LinkTag>;      // spring that is not (necessarily) a tet edge
-using TriangleIndex = Index<struct TriangleTag>;      // boundary triangle
-using VertexIndex = Index<struct SurfaceVertexTag>;   // surface vertex slot (Morton order)
+using NodeIndex = Index<struct NodeTag>;          // mesh node, the organ's own numbering everywhere
+using TetIndex = Index<struct TetTag>;            // tetrahedron
+using EdgeIndex = Index<struct EdgeTag>;          // undirected edge between two nodes of a tet
+using LinkIndex = Index<struct LinkTag>;          // spring that is not (necessarily) a tet edge
+using TriangleIndex = Index<struct TriangleTag>;  // boundary triangle
+using VertexIndex = Index<struct SurfaceVertexTag>;  // surface vertex slot (Morton order)
 
 }  // namespace trocar

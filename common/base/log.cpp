@@ -7,11 +7,11 @@
 namespace trocar::log {
 
 Status configure(std::string_view program, std::string_view level) {
-  const bool known = level == "error" || level == "warn" || level == "info" || level == "debug" ||
-                     level == "off";
+  const bool known =
+      level == "error" || level == "warn" || level == "info" || level == "debug" || level == "off";
   if (!known)
-    return Error{ErrorCode::Usage,
-                 "--log-level: '" + std::string(level) + "' is not one of error, warn, info, debug, off"};
+    return Error{ErrorCode::Usage, "--log-level: '" + std::string(level) +
+                                       "' is not one of error, warn, info, debug, off"};
   auto logger = spdlog::stderr_color_mt(std::string(program));
   logger->set_pattern("%H:%M:%S.%e %n %^%l%$ %v");
   logger->set_level(spdlog::level::from_str(std::string(level)));

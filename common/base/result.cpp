@@ -6,12 +6,17 @@ namespace trocar {
 
 ExitCode exit_code_of(ErrorCode code) {
   switch (code) {
-    case ErrorCode::Usage: return ExitCode::Usage;
+    case ErrorCode::Usage:
+      return ExitCode::Usage;
     case ErrorCode::BadFile:
-    case ErrorCode::BadMessage: return ExitCode::BadFile;
-    case ErrorCode::Refused: return ExitCode::Refused;
-    case ErrorCode::ResourceMissing: return ExitCode::ResourceMissing;
-    case ErrorCode::Mismatch: return ExitCode::Mismatch;
+    case ErrorCode::BadMessage:
+      return ExitCode::BadFile;
+    case ErrorCode::Refused:
+      return ExitCode::Refused;
+    case ErrorCode::ResourceMissing:
+      return ExitCode::ResourceMissing;
+    case ErrorCode::Mismatch:
+      return ExitCode::Mismatch;
   }
   return ExitCode::Usage;
 }

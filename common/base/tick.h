@@ -15,7 +15,11 @@ inline constexpr Tick kTicksPerSecond = 1000;
 inline constexpr Tick kTicksPerFrame = 16;  // 62.5 Hz
 inline constexpr std::uint64_t kTickNanoseconds = 1'000'000;
 
-inline bool publishes_frame(Tick tick) { return tick % kTicksPerFrame == 0; }
-inline Frame frame_of(Tick tick) { return static_cast<Frame>(tick / kTicksPerFrame); }
+inline bool publishes_frame(Tick tick) {
+  return tick % kTicksPerFrame == 0;
+}
+inline Frame frame_of(Tick tick) {
+  return static_cast<Frame>(tick / kTicksPerFrame);
+}
 
 }  // namespace trocar

@@ -4,20 +4,23 @@
 
 namespace trocar {
 
-float norm(const Quatf& q) { return std::sqrt(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w); }
+float norm(const Quatf& q) {
+  return std::sqrt(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w);
+}
 
 Quatf normalized(const Quatf& q) {
   const float n = norm(q);
   return {q.x / n, q.y / n, q.z / n, q.w / n};
 }
 
-Quatf conjugate(const Quatf& q) { return {-q.x, -q.y, -q.z, q.w}; }
+Quatf conjugate(const Quatf& q) {
+  return {-q.x, -q.y, -q.z, q.w};
+}
 
 Quatf operator*(const Quatf& a, const Quatf& b) {
-  return {a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y,
-          a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x,
-          a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w,
-          a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z};
+  return {
+      a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y, a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x,
+      a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w, a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z};
 }
 
 Vec3f rotate(const Quatf& q, const Vec3f& v) {

@@ -31,9 +31,7 @@ struct Pose {
   Quatf orientation;
 
   Vec3f apply(const Vec3f& p) const { return rotate(orientation, p) + position; }
-  Vec3f apply_inverse(const Vec3f& p) const {
-    return rotate(conjugate(orientation), p - position);
-  }
+  Vec3f apply_inverse(const Vec3f& p) const { return rotate(conjugate(orientation), p - position); }
   constexpr bool operator==(const Pose&) const = default;
 };
 

@@ -60,7 +60,9 @@ using Vec3d = Vec3<double>;
 inline Vec3f to_float(const Vec3d& a) {
   return {static_cast<float>(a.x), static_cast<float>(a.y), static_cast<float>(a.z)};
 }
-inline Vec3d to_double(const Vec3f& a) { return {a.x, a.y, a.z}; }
+inline Vec3d to_double(const Vec3f& a) {
+  return {a.x, a.y, a.z};
+}
 
 // Symmetric 3x3 matrix, upper triangle.
 template <typename T>

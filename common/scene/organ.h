@@ -26,7 +26,7 @@ struct Material {
   // Damping of each node in proportion to its velocity: d_i = rate x m_i (Choi 2002 eq. 1).
   double node_damping_per_s = 10;
   // Damping along each spring: b = time x k (Kelvin-Voigt).
-  double spring_damping_time_s = 0.005;
+  double spring_damping_time_s = 0.001;
 
   bool operator==(const Material&) const = default;
 };

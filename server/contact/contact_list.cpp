@@ -23,8 +23,8 @@ struct Capsule {
   }
 };
 
-void find_push(const world::World& world, const locks::ClaimTable& claims,
-               const input::Tool& tool, ToolSlot slot, float strength, ContactList& out) {
+void find_push(const world::World& world, const locks::ClaimTable& claims, const input::Tool& tool,
+               ToolSlot slot, float strength, ContactList& out) {
   const Capsule capsule(tool);
   const float range = capsule.radius + kMarginMetres;
   const std::size_t first = out.constraints.size();
@@ -41,11 +41,13 @@ void find_push(const world::World& world, const locks::ClaimTable& claims,
     const Vec3f on_plane = p - from_axis + normal * capsule.radius;
     const auto owner = claims.owner(node);
     const float area = world.surface_areas[node.value] * strength;
+    const float pressed = capsule.radius - std::sqrt(distance_squared);
+    const float grip = std::clamp(pressed / kFullDragMetres, 0.0f, 1.0f);
     out.constraints.push_back({.node = node,
                                .kind = NodeConstraint::Kind::HalfSpace,
                                .moves_node = !owner.is_valid() || owner == slot,
                                .stiffness = kStiffnessPaPerM * area,
-                               .drag = kDragPaSPerM * area,
+                               .drag = kDragPaSPerM * area * grip,
                                .normal = normal,
                                .target = on_plane - world.rest_positions[node.value],
                                .tool_motion = tool.tip_motion});

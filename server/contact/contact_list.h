@@ -4,12 +4,11 @@
 //
 // A push is a capsule against surface nodes: every surface node in the capsule, or within a margin
 // of it, gets a half-space whose plane touches the capsule at the point nearest to the node; the
-// solver lets nodes leave it freely and resists entering it (stiffness per area), with a viscous drag
-// along it. A grasp ties its nodes to places in the tool's frame. Both are constraints on single
-// nodes, so the solver's 3x3 blocks stay exact.
-// Only claims in effect act. Nodes that another tool holds exclusively are immovable for a push: the
-// pusher feels them, they do not move for it.
-// Order: ascending tool slot, then ascending node. O(surface nodes) per pushing tool.
+// solver lets nodes leave it freely and resists entering it (stiffness per area), with a viscous
+// drag along it. A grasp ties its nodes to places in the tool's frame. Both are constraints on
+// single nodes, so the solver's 3x3 blocks stay exact. Only claims in effect act. Nodes that
+// another tool holds exclusively are immovable for a push: the pusher feels them, they do not move
+// for it. Order: ascending tool slot, then ascending node. O(surface nodes) per pushing tool.
 
 #include <span>
 #include <vector>
@@ -29,7 +28,11 @@ namespace trocar::contact {
 inline constexpr float kStiffnessPaPerM = 2.5e7f;
 // Drag along the tool's surface while pressed, Pa s/m: keeps nodes from squirting past a tip.
 inline constexpr float kDragPaSPerM = 2000.0f;
-// Nodes this near to a tool get a constraint before they touch, so that none slips in during a tick.
+// The drag rises with the penetration at the start of the tick up to this depth. It stays constant
+// in the tick: a drag that switched on inside the solve would make the answer depend on rounding.
+inline constexpr float kFullDragMetres = 1e-4f;
+// Nodes this near to a tool get a constraint before they touch, so that none slips in during a
+// tick.
 inline constexpr float kMarginMetres = 0.002f;
 inline constexpr std::size_t kMaxNodesPerTool = 1024;
 
@@ -53,7 +56,7 @@ struct ToolContact {
 };
 
 struct ContactList {
-  std::vector<ToolContact> tools;           // tools whose claim is in effect and that touch a node
+  std::vector<ToolContact> tools;  // tools whose claim is in effect and that touch a node
   std::vector<NodeConstraint> constraints;
   std::vector<NodeIndex> seeds;
   // Surface nodes within reach of each tool that wants to grasp and does not hold: core of its

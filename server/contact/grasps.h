@@ -1,8 +1,8 @@
 #pragma once
 
 // Which nodes each grasping tool holds, and where in its frame. Created when a claim is granted,
-// dropped when it ends. While a claim fades out (its holder left, fell silent or was taken over) the
-// grasp stays where it last was, whatever becomes of the tool's slot.
+// dropped when it ends. While a claim fades out (its holder left, fell silent or was taken over)
+// the grasp stays where it last was, whatever becomes of the tool's slot.
 
 #include <array>
 #include <span>

@@ -8,14 +8,12 @@ namespace {
 
 constexpr std::uint32_t kNone = 0xffffffffu;
 constexpr float kMaxOverRelaxationFewSweeps = 1.3f;
-// Residuals below this are rounding noise and say nothing about divergence.
-constexpr float kNoiseFloorNewton = 1e-5f;
 
 using contact::NodeConstraint;
 
 // Energy of a constraint at displacement x, as gradient and block.
 //   tie:        k/2 |x - target|^2
-//   half-space: k/2 min(0, g)^2 with gap g = n . (x - target), and while g < 0 a drag
+//   half-space: k/2 min(0, g)^2 with gap g = n . (x - target), and a drag
 //               c/(2 dt) |T (x - start - tool_motion)|^2 with T = I - n n^T
 void add_constraint(const NodeConstraint& c, const Vec3f& x, const Vec3f& start, float inverse_dt,
                     Vec3f& gradient, SymMat3f* block) {
@@ -26,14 +24,17 @@ void add_constraint(const NodeConstraint& c, const Vec3f& x, const Vec3f& start,
     return;
   }
   const float gap = dot(c.normal, from_target);
-  if (gap >= 0) return;
-  gradient += c.normal * (c.stiffness * gap);
+  if (gap < 0) {
+    gradient += c.normal * (c.stiffness * gap);
+    if (block) block->add_outer(c.normal, c.stiffness);
+  }
+  if (c.drag == 0) return;
   const Vec3f slip = x - start - c.tool_motion;
   const float drag = c.drag * inverse_dt;
   gradient += (slip - c.normal * dot(c.normal, slip)) * drag;
   if (block) {
     block->add_identity(drag);
-    block->add_outer(c.normal, c.stiffness - drag);
+    block->add_outer(c.normal, -drag);
   }
 }
 
@@ -42,6 +43,7 @@ void add_constraint(const NodeConstraint& c, const Vec3f& x, const Vec3f& start,
 BlockDescent::BlockDescent(const world::World& world)
     : first_constraint_(world.node_count()), constraint_stamp_(world.node_count()) {
   residuals_.reserve(world.node_count());
+  next_constraint_.reserve(8 * contact::kMaxNodesPerTool);
   reset(world);
 }
 
@@ -64,13 +66,6 @@ void BlockDescent::link_constraints(const contact::ContactList& contacts) {
     constraint_stamp_[node] = current_;
     first_constraint_[node] = i;
   }
-}
-
-bool BlockDescent::is_touched(const contact::ContactList& contacts, NodeIndex node) const {
-  if (constraint_stamp_[node.value] != current_) return false;
-  for (auto i = first_constraint_[node.value]; i != kNone; i = next_constraint_[i])
-    if (contacts.constraints[i].kind == NodeConstraint::Kind::HalfSpace) return true;
-  return false;
 }
 
 BlockDescent::NodeStep BlockDescent::linearise(const SpringNetwork& springs,
@@ -100,6 +95,9 @@ SolveReport BlockDescent::solve(const SpringNetwork& springs, const contact::Con
   link_constraints(contacts);
   residuals_.resize(active.size());
   const float inverse_dt = 1.0f / settings.dt;
+  // Starting where inertia alone would lead makes rigid motion exact from the first sweep; starting
+  // at rest instead acts as a drag as long as sweeps are few.
+  for (const auto node : active) x_[node.value] += world.velocities[node.value] * settings.dt;
   float omega = settings.sweeps < 3
                     ? std::min(settings.over_relaxation, kMaxOverRelaxationFewSweeps)
                     : settings.over_relaxation;
@@ -110,10 +108,7 @@ SolveReport BlockDescent::solve(const SpringNetwork& springs, const contact::Con
     for (std::size_t i = 0; i < active.size(); ++i) {
       const auto step = linearise(springs, contacts, world, active[i], inverse_dt);
       const float squared = length_squared(step.gradient);
-      // Across the kink of a contact an over-relaxed step overshoots from pressed to free and back,
-      // for ever: touched nodes take the plain Newton step.
-      const float relaxation = is_touched(contacts, active[i]) ? 1.0f : omega;
-      const Vec3f dx = solve_positive_definite(step.block, step.gradient) * -relaxation;
+      const Vec3f dx = solve_positive_definite(step.block, step.gradient) * -omega;
       if (!is_finite(dx) || !std::isfinite(squared)) {
         ++report.nodes_rejected;
         residuals_[i] = 0;
@@ -123,8 +118,7 @@ SolveReport BlockDescent::solve(const SpringNetwork& springs, const contact::Con
       residuals_[i] = std::sqrt(squared);
       x_[active[i].value] += dx;
     }
-    const float noise = kNoiseFloorNewton * kNoiseFloorNewton * static_cast<float>(active.size());
-    if (sum > last_sum && sum > noise && omega > 1.0f) {
+    if (sum > last_sum && omega > 1.0f) {
       omega = 1.0f;
       report.is_stepped_down = true;
     }
@@ -135,14 +129,12 @@ SolveReport BlockDescent::solve(const SpringNetwork& springs, const contact::Con
     world.velocities[n] = (x_[n] - start_[n]) * inverse_dt;
     world.displacements[n] = x_[n];
   }
-  if (!active.empty())
-    report.residual_n = std::sqrt(last_sum / static_cast<float>(active.size()));
+  if (!active.empty()) report.residual_n = std::sqrt(last_sum / static_cast<float>(active.size()));
   return report;
 }
 
-Vec3f BlockDescent::reaction(const contact::ContactList& contacts,
-                             const contact::ToolContact& tool, const world::World& world,
-                             float dt) const {
+Vec3f BlockDescent::reaction(const contact::ContactList& contacts, const contact::ToolContact& tool,
+                             const world::World& world, float dt) const {
   // The constraint's energy gradient is minus the force on the node, hence the force on the tool.
   Vec3f force;
   for (auto i = tool.begin; i < tool.end; ++i) {

@@ -1,12 +1,12 @@
 #pragma once
 
-// Implicit Euler by block descent (vertex block descent, Chen et al. 2024): for each node in turn one
-// Newton step on the node's own 3x3 block of the incremental potential
+// Implicit Euler by block descent (vertex block descent, Chen et al. 2024): for each node in turn
+// one Newton step on the node's own 3x3 block of the incremental potential
 //   sum_i m_i/(2 dt^2) |x_i - u_i - dt v_i|^2 + springs + damping + contacts,
-// several sweeps per step, over-relaxed. Over-relaxation is stepped down to 1 for the rest of the tick
-// when a sweep's residual grew against the sweep before.
-// Plain scalar form in the order of the active set. Order was measured to be irrelevant to
-// convergence. O(sweeps x active nodes x springs per node); no allocation after construction.
+// several sweeps per step, over-relaxed. Over-relaxation is stepped down to 1 for the rest of the
+// tick when a sweep's residual grew against the sweep before. Plain scalar form in the order of the
+// active set. Order was measured to be irrelevant to convergence. O(sweeps x active nodes x springs
+// per node); no allocation after construction.
 
 #include <span>
 #include <vector>
@@ -54,7 +54,6 @@ class BlockDescent {
   };
   void reset(const world::World& world);
   void link_constraints(const contact::ContactList& contacts);
-  bool is_touched(const contact::ContactList& contacts, NodeIndex node) const;
   NodeStep linearise(const SpringNetwork& springs, const contact::ContactList& contacts,
                      const world::World& world, NodeIndex node, float inverse_dt) const;
 

@@ -41,9 +41,8 @@ bool ToolTable::admit_join(const session::HandJoin& join, Tick tick) {
   const auto shapes = std::span(join.shapes).first(static_cast<std::size_t>(join.tool_count));
   if (!std::all_of(shapes.begin(), shapes.end(), scene::is_valid)) return false;
   for (int i = 0; i < join.tool_count; ++i)
-    tools_[tool_slot(join.slot, i).value] = Tool{.is_present = true,
-                                                 .shape = shapes[static_cast<std::size_t>(i)],
-                                                 .last_sample_tick = tick};
+    tools_[tool_slot(join.slot, i).value] = Tool{
+        .is_present = true, .shape = shapes[static_cast<std::size_t>(i)], .last_sample_tick = tick};
   return true;
 }
 

@@ -1,8 +1,8 @@
 #pragma once
 
-// The tools in the session as the simulation knows them. Samples arrive at about 125 Hz, ticks run at
-// 1 kHz: each tool latches its newest sample and moves to it in equal steps, so that tissue meets a
-// moving tool and not a jumping one. Verbs change at once.
+// The tools in the session as the simulation knows them. Samples arrive at about 125 Hz, ticks run
+// at 1 kHz: each tool latches its newest sample and moves to it in equal steps, so that tissue
+// meets a moving tool and not a jumping one. Verbs change at once.
 
 #include <array>
 
@@ -15,8 +15,8 @@
 
 namespace trocar::input {
 
-// Ticks in which a tool reaches a new sample: a little over the 8 ms between samples, so that jitter
-// leaves no stand-still.
+// Ticks in which a tool reaches a new sample: a little over the 8 ms between samples, so that
+// jitter leaves no stand-still.
 inline constexpr std::uint32_t kPoseTicks = 10;
 
 struct Tool {

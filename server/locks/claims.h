@@ -6,9 +6,9 @@
 // matter. All of the core or nothing; no hold and wait, so no deadlock.
 //
 // Life of a grasp:  wanted -> (refused, retried while the verb is held)* -> held -> released.
-// A silent holder (no sample for 250 ticks) keeps its grasp, but others may take the core over; then
-// its force ramps to zero in 100 ticks. If nobody does, it is held for 2,000 ticks and then ramped
-// down over 500. A holder that leaves frees its core at once.
+// A silent holder (no sample for 250 ticks) keeps its grasp, but others may take the core over;
+// then its force ramps to zero in 100 ticks. If nobody does, it is held for 2,000 ticks and then
+// ramped down over 500. A holder that leaves frees its core at once.
 
 #include <array>
 #include <span>
@@ -22,10 +22,10 @@
 
 namespace trocar::locks {
 
-inline constexpr Tick kLeaseTicks = 250;           // without a sample: others may take the core
-inline constexpr Tick kAbandonTicks = 2000;        // without a sample: the grasp starts to ramp down
+inline constexpr Tick kLeaseTicks = 250;     // without a sample: others may take the core
+inline constexpr Tick kAbandonTicks = 2000;  // without a sample: the grasp starts to ramp down
 inline constexpr Tick kAbandonRampTicks = 500;
-inline constexpr Tick kTakeoverRampTicks = 100;    // also when the holder leaves
+inline constexpr Tick kTakeoverRampTicks = 100;  // also when the holder leaves
 
 enum class ClaimOutcome : std::uint8_t {
   Granted = 0,

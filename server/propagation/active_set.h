@@ -22,13 +22,13 @@ class ActiveSet {
  public:
   explicit ActiveSet(std::size_t node_count) { nodes_.reserve(node_count); }
 
-  // Sets classes of queued nodes to Active. Sweep order: queue order, then lingering nodes ascending;
-  // fixed nodes are left out.
+  // Sets classes of queued nodes to Active. Sweep order: queue order, then lingering nodes
+  // ascending; fixed nodes are left out.
   void collect(const PropagationQueue& queue, world::World& world);
   std::span<const NodeIndex> nodes() const { return nodes_; }
 
-  // After the solve: counts quiet ticks of lingering nodes (`residuals_n`: per entry of nodes()) and
-  // freezes those that are due, at rest.
+  // After the solve: counts quiet ticks of lingering nodes (`residuals_n`: per entry of nodes())
+  // and freezes those that are due, at rest.
   void freeze_quiet(const PropagationQueue& queue, std::span<const float> residuals_n,
                     world::World& world) const;
 

@@ -30,8 +30,8 @@ void PropagationQueue::offer(NodeIndex node, std::uint16_t contact) {
     owner = contact;
     offered_.push_back(node);
   } else if (owner != contact) {
-    // Reached by two contacts: the node lies in both regions. One that has already entered keeps its
-    // contact; one of the coming layer goes to the lowest.
+    // Reached by two contacts: the node lies in both regions. One that has already entered keeps
+    // its contact; one of the coming layer goes to the lowest.
     merge(owner, contact);
     if (!contains(node)) owner = std::min(owner, contact);
   }
@@ -85,7 +85,8 @@ void PropagationQueue::fill(const Neighbours& neighbours,
   enter_layer(limits.nodes);
   for (std::uint32_t depth = 0; depth < limits.depth && nodes_.size() < limits.nodes; ++depth) {
     for (std::uint32_t i = layer_offsets_[depth]; i < layer_offsets_[depth + 1]; ++i)
-      for (const auto neighbour : neighbours[nodes_[i]]) offer(neighbour, contact_[nodes_[i].value]);
+      for (const auto neighbour : neighbours[nodes_[i]])
+        offer(neighbour, contact_[nodes_[i].value]);
     if (offered_.empty()) break;
     enter_layer(limits.nodes);
   }

@@ -2,17 +2,17 @@
 
 // Layered force propagation (Choi 2002 sec. 2.2-2.4): which nodes a tick moves, in which layers.
 //
-// All contacted nodes of all contacts enter first (layer 0), then every contact's layer 1, then every
-// contact's layer 2, ...: equal depth has equal priority. Each node enters once, over the organ's
-// neighbour table, so any mesh works. The search ends at the depth limit or at the node limit, which
-// may fall inside a layer (Nakao 2003 sec. 4.2). Where the regions of two contacts overlap they
-// become one region, on which their forces act together.
+// All contacted nodes of all contacts enter first (layer 0), then every contact's layer 1, then
+// every contact's layer 2, ...: equal depth has equal priority. Each node enters once, over the
+// organ's neighbour table, so any mesh works. The search ends at the depth limit or at the node
+// limit, which may fall inside a layer (Nakao 2003 sec. 4.2). Where the regions of two contacts
+// overlap they become one region, on which their forces act together.
 //
 // Canonical order, a function of the state and not of the search: by layer; within a layer the
 // contacts take turns, each giving its nodes in ascending order, so a node limit inside a layer
 // treats them alike. A node belongs to the lowest contact that reaches it in the fewest layers.
-// Two regions merge exactly if some node lies within the depth limit of both (without a node limit).
-// O(nodes reached x neighbours); no allocation after warm-up.
+// Two regions merge exactly if some node lies within the depth limit of both (without a node
+// limit). O(nodes reached x neighbours); no allocation after warm-up.
 
 #include <cstdint>
 #include <span>
@@ -34,7 +34,8 @@ class PropagationQueue {
  public:
   explicit PropagationQueue(std::size_t node_count);
 
-  // `seeds[c]` are the nodes that contact c touches; a node touched by several belongs to the first.
+  // `seeds[c]` are the nodes that contact c touches; a node touched by several belongs to the
+  // first.
   void fill(const Neighbours& neighbours, std::span<const std::span<const NodeIndex>> seeds,
             const QueueLimits& limits);
 

@@ -1,7 +1,7 @@
 #pragma once
 
-// What a tick takes from outside. A TickInputs is all that the network, scripts or a journal can say
-// to the simulation; with TickDecisions it determines the next state to the bit.
+// What a tick takes from outside. A TickInputs is all that the network, scripts or a journal can
+// say to the simulation; with TickDecisions it determines the next state to the bit.
 
 #include <array>
 #include <vector>

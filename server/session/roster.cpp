@@ -62,10 +62,14 @@ bool is_valid_name(std::string_view name) {
 
 const char* name_of(Role role) {
   switch (role) {
-    case Role::Surgeon: return "surgeon";
-    case Role::Assistant: return "assistant";
-    case Role::Instructor: return "instructor";
-    case Role::Observer: return "observer";
+    case Role::Surgeon:
+      return "surgeon";
+    case Role::Assistant:
+      return "assistant";
+    case Role::Instructor:
+      return "instructor";
+    case Role::Observer:
+      return "observer";
   }
   return "unknown";
 }

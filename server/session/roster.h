@@ -15,7 +15,9 @@
 namespace trocar::session {
 
 enum class Role : std::uint8_t { Surgeon = 1, Assistant = 2, Instructor = 3, Observer = 4 };
-inline bool has_tools(Role role) { return role == Role::Surgeon || role == Role::Assistant; }
+inline bool has_tools(Role role) {
+  return role == Role::Surgeon || role == Role::Assistant;
+}
 const char* name_of(Role role);
 
 struct Participant {

@@ -22,11 +22,11 @@ struct ToolFrame {
   ToolSlot tool;
   Pose world_from_tool;
   scene::Verb verb = scene::Verb::None;
-  Vec3f force_n;                 // of the tissue on the tool, world frame
+  Vec3f force_n;  // of the tissue on the tool, world frame
   std::uint32_t contact_nodes = 0;
-  float penetration_m = 0;       // deepest contact, >= 0
-  bool has_claim = false;        // its push or grasp is in effect
-  bool is_silent = false;        // lease no longer fresh
+  float penetration_m = 0;  // deepest contact, >= 0
+  bool has_claim = false;   // its push or grasp is in effect
+  bool is_silent = false;   // lease no longer fresh
 };
 
 // What the journal needs to simulate one tick again.
@@ -43,8 +43,9 @@ struct PublishedFrame {
   std::uint32_t epoch = 0;
   wire::QuantisedSurface surface;  // displacements from rest, per vertex slot
   std::uint32_t surface_crc = 0;
-  std::vector<std::uint16_t> regions;  // per vertex slot: 0 not active, else merged region 1, 2, ...
-  std::vector<ToolFrame> tools;        // occupied tools, by slot
+  std::vector<std::uint16_t>
+      regions;                   // per vertex slot: 0 not active, else merged region 1, 2, ...
+  std::vector<ToolFrame> tools;  // occupied tools, by slot
   std::vector<locks::ClaimEvent> claim_events;  // of the ticks since the frame before
   std::vector<TickRecord> records;              // of the ticks since the frame before
   // Full state after `snapshot_tick`, at the start and every 10 s, else null. Taken between

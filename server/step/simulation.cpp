@@ -24,12 +24,21 @@ StepContext::StepContext(const Scene& s, const world::World& world)
       queue(world.node_count()),
       active(world.node_count()),
       solver(world),
-      surface_displacements(s.layout.vertex_count()) {}
+      surface_displacements(s.layout.vertex_count()) {
+  // Enough for many tools in contact; beyond it a tick may allocate once more.
+  contacts.constraints.reserve(8 * contact::kMaxNodesPerTool);
+  contacts.seeds.reserve(8 * contact::kMaxNodesPerTool);
+  contacts.reach_nodes.reserve(8 * contact::kMaxNodesPerTool);
+  contacts.tools.reserve(kMaxTools);
+  seeds.reserve(kMaxTools);
+  requests.reserve(kMaxTools);
+  claim_events.reserve(4 * kMaxTools);
+}
 
 Status validate(const TickDecisions& d) {
   const auto out_of_range = [](const char* field, auto value, const char* range) {
-    return Error{ErrorCode::Usage, std::string(field) + ": " + std::to_string(value) +
-                                       " is outside " + range};
+    return Error{ErrorCode::Usage,
+                 std::string(field) + ": " + std::to_string(value) + " is outside " + range};
   };
   if (d.depth_limit > kMaxDepthLimit)
     return out_of_range("depth_limit", d.depth_limit, "0 to 1000 layers");

@@ -1,8 +1,8 @@
 #pragma once
 
 // The simulation as everybody outside sees it: inputs and decisions in, reports and frames out,
-// snapshots both ways. Used by the server, by re-simulation of journals, and by tests. One thread at
-// a time.
+// snapshots both ways. Used by the server, by re-simulation of journals, and by tests. One thread
+// at a time.
 
 #include <memory>
 

@@ -90,11 +90,13 @@ void quantise_and_publish(State& state, StepContext& context) {
   frame->surface = state.quantised;
   frame->surface_crc = wire::surface_crc(state.quantised);
   frame->regions.reserve(layout.vertex_count());
-  for (const auto node : layout.node_of_vertex) frame->regions.push_back(context.queue.region(node));
+  for (const auto node : layout.node_of_vertex)
+    frame->regions.push_back(context.queue.region(node));
   for (std::uint8_t i = 0; i < kMaxTools; ++i)
     if (state.tools[ToolSlot{i}].has_sample)
       frame->tools.push_back(describe_tool(state, context, ToolSlot{i}));
-  frame->claim_events = std::exchange(context.claim_events, {});
+  frame->claim_events = context.claim_events;
+  context.claim_events.clear();
   frame->active_nodes = context.report.active_nodes;
   frame->queue_nodes = context.report.queue_nodes;
   frame->region_count = context.report.region_count;

@@ -1,6 +1,7 @@
 #pragma once
 
-// One tick: a pure function of (state, admitted inputs, decisions). tick.cpp is the table of contents.
+// One tick: a pure function of (state, admitted inputs, decisions). tick.cpp is the table of
+// contents.
 
 #include <memory>
 
@@ -44,8 +45,8 @@ struct Scene {
   dynamics::SpringNetwork springs;
 };
 
-// Laid out as input, scratch and output of a tick. Scratch keeps its capacity, so that a tick does not
-// allocate after warm-up; nothing in it outlives a tick's meaning.
+// Laid out as input, scratch and output of a tick. Scratch keeps its capacity, so that a tick does
+// not allocate after warm-up; nothing in it outlives a tick's meaning.
 struct StepContext {
   StepContext(const Scene& scene, const world::World& world);
 

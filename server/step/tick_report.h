@@ -11,10 +11,10 @@ namespace trocar::step {
 
 // Decided between ticks, recorded in the journal. Defaults: decisions that everything shares.
 struct TickDecisions {
-  std::uint32_t depth_limit = 6;     // propagation layers
-  std::uint32_t node_limit = 1200;   // nodes in the queue; may end inside a layer
+  std::uint32_t depth_limit = 6;    // propagation layers
+  std::uint32_t node_limit = 1200;  // nodes in the queue; may end inside a layer
   std::uint32_t sweeps = 4;
-  float over_relaxation = 1.5f;      // 1 to 1.9; for fewer than 3 sweeps at most 1.3 is used
+  float over_relaxation = 1.5f;  // 1 to 1.9; for fewer than 3 sweeps at most 1.3 is used
 
   bool operator==(const TickDecisions&) const = default;
 };
@@ -43,8 +43,8 @@ struct TickReport {
   std::uint32_t region_count = 0;
   std::uint32_t inputs_dropped = 0;
   std::uint32_t nodes_rejected = 0;  // see kFaultNonFinite
-  std::uint32_t faults = 0;        // TickFault bits
-  float residual_n = 0;            // root mean square nodal force imbalance in the last sweep
+  std::uint32_t faults = 0;          // TickFault bits
+  float residual_n = 0;              // root mean square nodal force imbalance in the last sweep
   std::uint64_t state_hash = 0;
 };
 

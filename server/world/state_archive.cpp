@@ -5,7 +5,9 @@ namespace trocar::world {
 StateArchive StateArchive::hashing(StateHasher& hasher) {
   return {Mode::Hash, &hasher, nullptr, {}};
 }
-StateArchive StateArchive::writing(Bytes& out) { return {Mode::Write, nullptr, &out, {}}; }
+StateArchive StateArchive::writing(Bytes& out) {
+  return {Mode::Write, nullptr, &out, {}};
+}
 StateArchive StateArchive::reading(BytesView bytes) {
   return {Mode::Read, nullptr, nullptr, bytes};
 }
@@ -21,8 +23,12 @@ void StateArchive::flag(bool& value) {
 
 void StateArchive::bytes(std::span<std::uint8_t> data) {
   switch (mode_) {
-    case Mode::Hash: hasher_->update(data); return;
-    case Mode::Write: out_->insert(out_->end(), data.begin(), data.end()); return;
+    case Mode::Hash:
+      hasher_->update(data);
+      return;
+    case Mode::Write:
+      out_->insert(out_->end(), data.begin(), data.end());
+      return;
     case Mode::Read: {
       const auto source = ok_ ? reader_.take_bytes(data.size()) : BytesView{};
       if (source.size() != data.size()) {

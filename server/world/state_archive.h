@@ -1,8 +1,8 @@
 #pragma once
 
-// One walk over the state serves three ends: hashing it, writing it, and reading it back. Each stage
-// has one function that names its arrays to an archive, so a snapshot holds exactly the bytes that
-// the tick hash covers, and a field that is forgotten is forgotten by all three alike.
+// One walk over the state serves three ends: hashing it, writing it, and reading it back. Each
+// stage has one function that names its arrays to an archive, so a snapshot holds exactly the bytes
+// that the tick hash covers, and a field that is forgotten is forgotten by all three alike.
 //
 // Reading treats the bytes as untrusted: sizes are checked before use, and after the first failure
 // every later field reads as zero and `ok()` stays false.

@@ -16,8 +16,7 @@ World::World(const scene::Organ& organ)
   std::vector<double> areas(mesh.node_count());
   for (const auto& [a, b, c] : mesh.boundary_triangles) {
     const auto& p = mesh.rest_positions;
-    const double third =
-        length(cross(p[b.value] - p[a.value], p[c.value] - p[a.value])) / 6.0;
+    const double third = length(cross(p[b.value] - p[a.value], p[c.value] - p[a.value])) / 6.0;
     for (const auto node : {a, b, c}) areas[node.value] += third;
   }
   for (const double area : areas) surface_areas.push_back(static_cast<float>(area));

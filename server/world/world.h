@@ -37,10 +37,10 @@ struct World {
   std::vector<NodeIndex> surface_nodes;
 
   // State, in snapshot and hash.
-  Tick tick = 0;                         // ticks done
+  Tick tick = 0;  // ticks done
   std::uint32_t topology_epoch = 0;
-  std::vector<Vec3f> displacements;      // m, from rest
-  std::vector<Vec3f> velocities;         // m/s
+  std::vector<Vec3f> displacements;  // m, from rest
+  std::vector<Vec3f> velocities;     // m/s
   std::vector<NodeClass> node_classes;
   std::vector<std::uint16_t> quiet_ticks;  // ticks in a row below the freezing thresholds
 

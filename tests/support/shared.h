@@ -1,7 +1,8 @@
 #pragma once
 
-// Optional test material outside the repository: environment variable TROCAR_SHARED, else the folder
-// `shared` beside the source tree. A test that needs it and does not find it is skipped, loudly.
+// Optional test material outside the repository: environment variable TROCAR_SHARED, else the
+// folder `shared` beside the source tree. A test that needs it and does not find it is skipped,
+// loudly.
 
 #include <gtest/gtest.h>
 
@@ -17,7 +18,7 @@ inline std::filesystem::path shared_folder() {
 
 }  // namespace trocar::testing
 
-#define TROCAR_SKIP_WITHOUT_SHARED(relative_path)                                              \
-  if (!std::filesystem::exists(::trocar::testing::shared_folder() / (relative_path)))          \
-  GTEST_SKIP() << "test material not found: " << ::trocar::testing::shared_folder() / (relative_path) \
-               << " (set TROCAR_SHARED)"
+#define TROCAR_SKIP_WITHOUT_SHARED(relative_path)                                     \
+  if (!std::filesystem::exists(::trocar::testing::shared_folder() / (relative_path))) \
+  GTEST_SKIP() << "test material not found: "                                         \
+               << ::trocar::testing::shared_folder() / (relative_path) << " (set TROCAR_SHARED)"

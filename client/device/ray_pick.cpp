@@ -1,0 +1,27 @@
+#include "client/device/ray_pick.h"
+
+namespace trocar::device {
+
+std::optional<float> pick(std::span<const Vec3f> positions, Triangles triangles,
+                          const Vec3f& origin, const Vec3f& direction) {
+  std::optional<float> nearest;
+  for (const auto& triangle : triangles) {
+    // Moller and Trumbore 1997, with culling.
+    const Vec3f a = positions[triangle[0]];
+    const Vec3f ab = positions[triangle[1]] - a, ac = positions[triangle[2]] - a;
+    const Vec3f p = cross(direction, ac);
+    const float determinant = dot(ab, p);
+    if (determinant <= 0) continue;
+    const Vec3f s = origin - a;
+    const float u = dot(s, p);
+    if (u < 0 || u > determinant) continue;
+    const Vec3f q = cross(s, ab);
+    const float v = dot(direction, q);
+    if (v < 0 || u + v > determinant) continue;
+    const float t = dot(ac, q) / determinant;
+    if (t > 0 && (!nearest || t < *nearest)) nearest = t;
+  }
+  return nearest;
+}
+
+}  // namespace trocar::device

@@ -1,0 +1,273 @@
+#include "client/net/net_session.h"
+
+#include <algorithm>
+#include <boost/asio/as_tuple.hpp>
+#include <boost/asio/buffer.hpp>
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/read.hpp>
+#include <boost/asio/use_awaitable.hpp>
+#include <boost/asio/write.hpp>
+
+#include "common/base/timing.h"
+#include "common/base/version.h"
+
+namespace trocar::net {
+namespace {
+
+constexpr auto kNoThrow = asio::as_tuple(asio::use_awaitable);
+constexpr std::chrono::milliseconds kCloseDeadline{200};
+// How soon a full inbound queue is looked at again: well below one frame.
+constexpr std::chrono::milliseconds kRoomRetry{2};
+constexpr std::size_t kBuffersPerWrite = 16;
+constexpr std::size_t kMaxByeBytes = 200;
+
+void ignore_completion(std::exception_ptr) {}
+
+}  // namespace
+
+NetSource::Session::Session(NetSourceOptions options)
+    : options_(std::move(options)),
+      inbound_(options_.inbound_capacity),
+      outbound_(options_.outbound_capacity) {
+  asio::co_spawn(context_, run(), ignore_completion);
+  thread_ = std::thread([this] { context_.run(); });
+}
+
+NetSource::Session::~Session() { thread_.join(); }
+
+// ---- render thread ----
+
+bool NetSource::Session::try_send(wire::SharedBytes frame) {
+  if (frame->size() > wire::kMaxUpstreamBytes || !outbound_.try_push(std::move(frame))) {
+    sends_dropped_.fetch_add(1, std::memory_order_relaxed);
+    return false;
+  }
+  if (!is_wake_posted_.exchange(true))
+    asio::post(context_, [this] {
+      is_wake_posted_.exchange(false);  // acquires what was pushed before
+      wake_timer_.cancel();
+    });
+  return true;
+}
+
+void NetSource::Session::request_close(const std::string& reason) {
+  asio::post(context_, [this, reason] { begin_close(reason); });
+}
+
+replica::SourceStatistics NetSource::Session::statistics() const {
+  return {.bytes_received = bytes_received_, .bytes_sent = bytes_sent_,
+          .messages_received = messages_received_, .frames_received = frames_received_,
+          .sends_dropped = sends_dropped_, .round_trip_seconds = round_trip_seconds_};
+}
+
+std::string NetSource::Session::server_name() const {
+  const bool is_ipv6 = options_.host.find(':') != std::string::npos;
+  return (is_ipv6 ? "[" + options_.host + "]" : options_.host) + ":" +
+         std::to_string(options_.port);
+}
+
+// ---- Asio thread ----
+
+void NetSource::Session::end(replica::CloseKind kind, std::string text) {
+  if (is_done_) return;
+  is_done_ = true;
+  close_reason_ = {kind, std::move(text)};
+  stop_io();
+}
+
+void NetSource::Session::stop_io() {
+  boost::system::error_code ignored;
+  socket_.close(ignored);
+  resolver_.cancel();
+  for (auto* timer : {&retry_timer_, &room_timer_, &ping_timer_, &wake_timer_, &deadline_timer_})
+    timer->cancel();
+}
+
+void NetSource::Session::begin_close(const std::string& reason) {
+  if (is_done_ || is_closing_) return;
+  if (!is_connected_) return end(replica::CloseKind::Ended, "closed: " + reason);
+  is_closing_ = true;
+  proto::Envelope envelope;
+  envelope.mutable_bye()->set_reason(reason.substr(0, kMaxByeBytes));
+  control_.push_back(wire::encode_envelope(envelope));
+  wake_timer_.cancel();
+  room_timer_.cancel();
+  asio::co_spawn(context_, expire(Clock::now() + kCloseDeadline), ignore_completion);
+}
+
+asio::awaitable<void> NetSource::Session::expire(Clock::time_point deadline) {
+  deadline_timer_.expires_at(deadline);
+  const auto [error] = co_await deadline_timer_.async_wait(kNoThrow);
+  if (error || is_done_) co_return;
+  if (is_closing_) {
+    end(replica::CloseKind::Ended, "closed");
+  } else {
+    stop_io();  // connecting took too long: the pending operation fails and says so
+  }
+}
+
+wire::SharedBytes NetSource::Session::encode_hello() const {
+  proto::Envelope envelope;
+  auto& hello = *envelope.mutable_hello();
+  hello.set_protocol_major(kProtocolMajor);
+  hello.set_protocol_minor(kProtocolMinor);
+  hello.set_name(options_.participant_name);
+  hello.set_role(static_cast<proto::Role>(options_.role));
+  for (const auto& shape : options_.tools) {
+    auto& tool = *hello.add_tool();
+    tool.set_radius_m(shape.radius_m);
+    tool.set_length_m(shape.length_m);
+    tool.set_reach_m(shape.reach_m);
+  }
+  return wire::encode_envelope(envelope);
+}
+
+asio::awaitable<void> NetSource::Session::run() {
+  if (co_await connect()) {
+    is_connected_ = true;
+    last_heard_ = Clock::now();
+    control_.push_back(encode_hello());
+    asio::co_spawn(context_, write_messages(), ignore_completion);
+    asio::co_spawn(context_, ping(), ignore_completion);
+    co_await read_messages();
+    end(is_closing_ ? replica::CloseKind::Ended : replica::CloseKind::Lost,
+        is_closing_ ? "closed" : "connection to " + server_name() + " broke: the server is gone");
+  }
+  has_ended_.store(true, std::memory_order_release);
+}
+
+asio::awaitable<bool> NetSource::Session::connect() {
+  const auto deadline = Clock::now() + options_.connect_deadline;
+  asio::co_spawn(context_, expire(deadline), ignore_completion);
+  std::string why = "no answer";
+  while (!is_done_ && Clock::now() < deadline) {
+    const auto [unresolved, endpoints] = co_await resolver_.async_resolve(
+        options_.host, std::to_string(options_.port), kNoThrow);
+    if (unresolved) why = unresolved.message();
+    for (const auto& endpoint : endpoints) {
+      if (is_done_ || Clock::now() >= deadline) break;
+      boost::system::error_code ignored;
+      socket_.close(ignored);
+      const auto [error] = co_await socket_.async_connect(endpoint, kNoThrow);
+      if (!error) {
+        socket_.set_option(tcp::no_delay(true), ignored);
+        deadline_timer_.cancel();
+        co_return true;
+      }
+      if (error != asio::error::operation_aborted) why = error.message();
+    }
+    if (is_done_ || Clock::now() >= deadline) break;
+    retry_timer_.expires_after(options_.connect_retry);
+    co_await retry_timer_.async_wait(kNoThrow);
+  }
+  end(replica::CloseKind::Unreachable, "no server at " + server_name() + " (" + why +
+                                           "): start trocar-server, or check address and port");
+  co_return false;
+}
+
+asio::awaitable<bool> NetSource::Session::read_exactly(std::uint8_t* to, std::size_t count) {
+  const auto [error, taken] =
+      co_await asio::async_read(socket_, asio::buffer(to, count), kNoThrow);
+  bytes_received_.fetch_add(taken, std::memory_order_relaxed);
+  co_return !error;
+}
+
+asio::awaitable<void> NetSource::Session::read_messages() {
+  std::array<std::uint8_t, wire::kHeaderBytes> header{};
+  while (!is_done_) {
+    if (!co_await read_exactly(header.data(), header.size())) co_return;
+    const auto length = wire::decode_length(header, wire::kMaxDownstreamBytes);
+    if (!length) co_return end(replica::CloseKind::Lost, length.error().message);
+    body_.resize(*length);
+    if (!co_await read_exactly(body_.data(), body_.size())) co_return;
+    last_heard_ = Clock::now();
+    auto message = std::make_shared<proto::Envelope>();
+    if (const auto decoded = wire::decode_envelope(body_, *message); !decoded)
+      co_return end(replica::CloseKind::Lost, server_name() + ": " + decoded.error().message);
+    messages_received_.fetch_add(1, std::memory_order_relaxed);
+    if (message->has_pong()) {
+      const auto now_us = monotonic_ns() / 1000;
+      round_trip_seconds_ =
+          static_cast<double>(now_us - message->pong().client_time_us()) * 1e-6;
+      continue;
+    }
+    if (message->message_case() == proto::Envelope::MESSAGE_NOT_SET) continue;
+    if (message->has_surface_frame()) frames_received_.fetch_add(1, std::memory_order_relaxed);
+    has_heard_ = true;
+    co_await deliver(message, header.size() + body_.size());
+    if (message->has_goodbye()) {
+      const bool is_closing = message->goodbye().reason() == proto::GOODBYE_SERVER_CLOSING;
+      co_return end(is_closing ? replica::CloseKind::Ended : replica::CloseKind::Refused,
+                    "server: " + message->goodbye().text());
+    }
+    if (message->has_welcome() && message->welcome().protocol_major() != kProtocolMajor)
+      co_return end(replica::CloseKind::Refused,
+                    "server speaks protocol " +
+                        std::to_string(message->welcome().protocol_major()) + ", this client " +
+                        std::to_string(kProtocolMajor) + ": use programs of one release");
+  }
+}
+
+asio::awaitable<void> NetSource::Session::deliver(std::shared_ptr<const proto::Envelope> message,
+                                                  std::size_t bytes) {
+  const Arrival arrival{std::move(message), monotonic_ns(), bytes};
+  while (!inbound_.try_push(arrival)) {
+    if (is_done_ || is_closing_) co_return;
+    is_stalled_ = true;
+    room_timer_.expires_after(kRoomRetry);
+    co_await room_timer_.async_wait(kNoThrow);
+  }
+  is_stalled_ = false;
+  last_heard_ = Clock::now();
+}
+
+asio::awaitable<void> NetSource::Session::write_messages() {
+  std::vector<asio::const_buffer> buffers;
+  while (!is_done_) {
+    in_flight_ = std::move(control_);
+    control_.clear();
+    is_ping_queued_ = false;
+    while (in_flight_.size() < kBuffersPerWrite) {
+      auto next = outbound_.try_pop();
+      if (!next) break;
+      in_flight_.push_back(std::move(*next));
+    }
+    if (in_flight_.empty()) {
+      // Nothing can slip in between: wakers run on this thread.
+      wake_timer_.expires_at(Clock::time_point::max());
+      co_await wake_timer_.async_wait(kNoThrow);
+      continue;
+    }
+    buffers.clear();
+    for (const auto& frame : in_flight_) buffers.emplace_back(frame->data(), frame->size());
+    const auto [error, written] = co_await asio::async_write(socket_, buffers, kNoThrow);
+    bytes_sent_.fetch_add(written, std::memory_order_relaxed);
+    if (error) co_return;  // the reader sees it too and says so
+    if (is_closing_ && control_.empty()) {
+      boost::system::error_code ignored;
+      socket_.shutdown(tcp::socket::shutdown_send, ignored);
+      co_return;  // the server closes, or the deadline
+    }
+  }
+}
+
+asio::awaitable<void> NetSource::Session::ping() {
+  while (!is_done_ && !is_closing_) {
+    if (!is_ping_queued_) {
+      proto::Envelope envelope;
+      envelope.mutable_ping()->set_client_time_us(monotonic_ns() / 1000);
+      control_.push_back(wire::encode_envelope(envelope));
+      is_ping_queued_ = true;
+      wake_timer_.cancel();
+    }
+    ping_timer_.expires_after(options_.ping_interval);
+    co_await ping_timer_.async_wait(kNoThrow);
+    if (!is_stalled_ && !is_done_ && Clock::now() - last_heard_ > options_.silence_deadline)
+      end(replica::CloseKind::Lost,
+          has_heard_ ? "connection to " + server_name() + " is silent: check the network"
+                     : server_name() + " does not answer: is it a Trocar server?");
+  }
+}
+
+}  // namespace trocar::net

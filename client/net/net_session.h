@@ -1,0 +1,89 @@
+#pragma once
+
+// The Asio side of a NetSource. The members under "Render thread" may be called there while the
+// thread runs; all others belong to the Asio thread.
+
+#include "common/base/asio.h"  // before Boost: see there
+
+#include <array>
+#include <atomic>
+#include <boost/asio/awaitable.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <optional>
+#include <thread>
+#include <vector>
+
+#include "client/net/net_source.h"
+#include "common/base/spsc_queue.h"
+#include "common/wire/framing.h"
+#include "proto/wire.pb.h"
+
+namespace trocar::net {
+
+class NetSource::Session {
+ public:
+  struct Arrival {
+    std::shared_ptr<const proto::Envelope> message;  // null in empty slots
+    std::uint64_t arrival_ns = 0;
+    std::size_t bytes = 0;
+  };
+
+  explicit Session(NetSourceOptions options);
+  ~Session();
+
+  // Render thread.
+  std::optional<Arrival> try_pop() { return inbound_.try_pop(); }
+  bool try_send(wire::SharedBytes frame);
+  void request_close(const std::string& reason);
+  // After true: everything was pushed, close_reason() does not change any more.
+  bool has_ended() const { return has_ended_.load(std::memory_order_acquire); }
+  const replica::CloseReason& close_reason() const { return close_reason_; }
+  replica::SourceStatistics statistics() const;
+  std::string server_name() const;
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  using tcp = asio::ip::tcp;
+
+  asio::awaitable<void> run();
+  asio::awaitable<bool> connect();
+  asio::awaitable<void> read_messages();
+  asio::awaitable<bool> read_exactly(std::uint8_t* to, std::size_t count);
+  asio::awaitable<void> deliver(std::shared_ptr<const proto::Envelope> message, std::size_t bytes);
+  asio::awaitable<void> write_messages();
+  asio::awaitable<void> ping();
+  asio::awaitable<void> expire(Clock::time_point deadline);
+
+  void begin_close(const std::string& reason);
+  void end(replica::CloseKind kind, std::string text);  // the first one counts
+  void stop_io();
+  wire::SharedBytes encode_hello() const;
+
+  const NetSourceOptions options_;
+  asio::io_context context_{1};
+  tcp::socket socket_{context_};
+  tcp::resolver resolver_{context_};
+  asio::steady_timer retry_timer_{context_}, room_timer_{context_}, ping_timer_{context_};
+  asio::steady_timer wake_timer_{context_}, deadline_timer_{context_};
+  std::vector<wire::SharedBytes> control_;  // Hello, Ping, Bye: at most one of each
+  std::vector<wire::SharedBytes> in_flight_;
+  bool is_connected_ = false, is_closing_ = false, is_done_ = false, is_stalled_ = false;
+  bool has_heard_ = false;
+  bool is_ping_queued_ = false;
+  Clock::time_point last_heard_{};
+  Bytes body_;
+
+  SpscQueue<Arrival> inbound_;
+  SpscQueue<wire::SharedBytes> outbound_;
+  std::atomic<bool> is_wake_posted_{false};
+  std::atomic<bool> has_ended_{false};
+  replica::CloseReason close_reason_;  // written before has_ended_ is set
+  std::atomic<std::uint64_t> bytes_received_{0}, bytes_sent_{0}, messages_received_{0};
+  std::atomic<std::uint64_t> frames_received_{0}, sends_dropped_{0};
+  std::atomic<double> round_trip_seconds_{0};
+  std::thread thread_;
+};
+
+}  // namespace trocar::net

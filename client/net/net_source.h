@@ -1,0 +1,65 @@
+#pragma once
+
+// A live server as a source of messages: TCP, handshake, pings, on a thread of its own.
+//
+//   Asio thread                                             render thread
+//   connect (retry until the deadline), Hello
+//   read frame -> decode -> inbound queue [256 messages] --> poll(sink)
+//   write <---------------- outbound queue [256 messages] <-- send(envelope)
+//   Ping every 200 ms, Pong -> round trip
+//
+// Inbound queue full: nothing is read until there is room, so TCP holds the server back and the
+// server skips frames for us; nothing is dropped and nothing grows. Outbound queue full: send()
+// says false. state() changes inside poll() only, so call poll() also while connecting.
+// See session_source.h for what each member promises.
+
+#include <chrono>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "client/replica/session_source.h"
+#include "common/base/result.h"
+#include "common/scene/tool.h"
+
+namespace trocar::net {
+
+struct NetSourceOptions {
+  std::string host = "127.0.0.1";  // address or name
+  std::uint16_t port = 7690;
+  std::string participant_name;
+  int role = 1;                         // proto::Role
+  std::vector<scene::ToolShape> tools;  // empty: one default tool for roles that have tools
+  std::chrono::milliseconds connect_deadline{5000};
+  std::chrono::milliseconds connect_retry{200};
+  std::chrono::milliseconds ping_interval{200};
+  std::chrono::milliseconds silence_deadline{10000};  // nothing from the server: lost
+  std::size_t inbound_capacity = 256;                 // messages
+  std::size_t outbound_capacity = 256;
+};
+
+// "HOST", "HOST:PORT" or "[IPV6]:PORT" into options.host and options.port.
+Status parse_server_address(const std::string& text, NetSourceOptions& options);
+
+class NetSource final : public replica::SessionSource {
+ public:
+  explicit NetSource(NetSourceOptions options);
+  // Says Bye if still connected; returns within about 200 ms.
+  ~NetSource() override;
+
+  void poll(replica::MessageSink& sink) override;
+  bool send(const proto::Envelope& message) override;
+  void close(const std::string& reason) override;
+  replica::SourceState state() const override;
+  replica::CloseReason close_reason() const override;
+  replica::SourceStatistics statistics() const override;
+  std::string name() const override;
+
+ private:
+  class Session;  // everything the Asio thread touches
+
+  std::unique_ptr<Session> session_;
+  replica::SourceState state_ = replica::SourceState::Connecting;
+};
+
+}  // namespace trocar::net

@@ -1,0 +1,112 @@
+#include "client/render/camera.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace trocar::render {
+namespace {
+
+constexpr float kTanHalfHeight = 0.2867f;  // 32 degrees of vertical field of view
+constexpr float kNear = 0.02f, kFar = 6.0f;
+constexpr float kOrbitPerPixel = 0.006f;
+
+}  // namespace
+
+void OrbitCamera::frame(const Vec3f& centre, float radius) {
+  centre_ = centre;
+  radius_ = radius;
+  yaw_ = 0;
+  pitch_ = 0.42f;
+  distance_ = radius * 2.95f / kTanHalfHeight * 0.36f;
+}
+
+void OrbitCamera::orbit(float yaw, float pitch) {
+  yaw_ += yaw;
+  pitch_ = std::clamp(pitch_ + pitch, -1.5f, 1.5f);
+}
+
+void OrbitCamera::zoom(float factor) {
+  distance_ = std::clamp(distance_ * factor, radius_ * 0.8f, radius_ * 12);
+}
+
+void OrbitCamera::update(const device::PointerInput& input, Size size, float seconds) {
+  if (input.right) orbit(-input.dx * kOrbitPerPixel, input.dy * kOrbitPerPixel);
+  if (input.middle) {
+    const device::ViewRays view = rays(size);
+    const float metres = 2 * kTanHalfHeight * distance_ / view.height;
+    centre_ += view.right * (-input.dx * metres) + view.up * (input.dy * metres);
+  }
+  if (input.control && input.wheel != 0) zoom(std::pow(0.9f, input.wheel));
+  if (input.zoom_in != input.zoom_out) zoom(std::exp((input.zoom_in ? -1.0f : 1.0f) * seconds));
+}
+
+device::ViewRays OrbitCamera::rays(Size size) const {
+  device::ViewRays view;
+  view.forward = Vec3f{-std::sin(yaw_) * std::cos(pitch_), -std::sin(pitch_),
+                       -std::cos(yaw_) * std::cos(pitch_)};
+  view.right = {std::cos(yaw_), 0, -std::sin(yaw_)};
+  view.up = cross(view.right, view.forward);
+  view.eye = centre_ - view.forward * distance_;
+  view.tan_half_height = kTanHalfHeight;
+  view.width = static_cast<float>(std::max(size.width, 1));
+  view.height = static_cast<float>(std::max(size.height, 1));
+  return view;
+}
+
+Matrix4 OrbitCamera::clip_from_world(Size size) const {
+  const device::ViewRays v = rays(size);
+  const Matrix4 eye_from_world = {v.right.x,
+                                  v.up.x,
+                                  -v.forward.x,
+                                  0,
+                                  v.right.y,
+                                  v.up.y,
+                                  -v.forward.y,
+                                  0,
+                                  v.right.z,
+                                  v.up.z,
+                                  -v.forward.z,
+                                  0,
+                                  -dot(v.right, v.eye),
+                                  -dot(v.up, v.eye),
+                                  dot(v.forward, v.eye),
+                                  1};
+  const float f = 1 / v.tan_half_height;
+  const Matrix4 clip_from_eye = {f * v.height / v.width,
+                                 0,
+                                 0,
+                                 0,
+                                 0,
+                                 f,
+                                 0,
+                                 0,
+                                 0,
+                                 0,
+                                 (kFar + kNear) / (kNear - kFar),
+                                 -1,
+                                 0,
+                                 0,
+                                 2 * kFar * kNear / (kNear - kFar),
+                                 0};
+  return multiply(clip_from_eye, eye_from_world);
+}
+
+std::optional<ScreenPoint> OrbitCamera::project(const Vec3f& world, Size size) const {
+  const device::ViewRays v = rays(size);
+  const Vec3f p = world - v.eye;
+  const float depth = dot(p, v.forward);
+  if (depth < kNear) return std::nullopt;
+  const float scale = v.height / (2 * v.tan_half_height * depth);
+  return ScreenPoint{v.width / 2 + dot(p, v.right) * scale, v.height / 2 - dot(p, v.up) * scale};
+}
+
+Matrix4 multiply(const Matrix4& a, const Matrix4& b) {
+  Matrix4 product{};
+  for (std::size_t column = 0; column < 4; ++column)
+    for (std::size_t row = 0; row < 4; ++row)
+      for (std::size_t k = 0; k < 4; ++k)
+        product[column * 4 + row] += a[k * 4 + row] * b[column * 4 + k];
+  return product;
+}
+
+}  // namespace trocar::render

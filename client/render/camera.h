@@ -1,0 +1,41 @@
+#pragma once
+
+// Orbit camera and the 4x4 matrices OpenGL wants.
+
+#include <array>
+#include <optional>
+
+#include "client/device/view_rays.h"
+#include "client/render/gl_context.h"
+#include "common/math/vec3.h"
+
+namespace trocar::render {
+
+using Matrix4 = std::array<float, 16>;  // column by column
+
+struct ScreenPoint {
+  float x = 0, y = 0;  // pixels, origin top left
+};
+
+class OrbitCamera {
+ public:
+  // Looks at the centre of a body of this radius (m) from the front, a little from above.
+  void frame(const Vec3f& centre, float radius);
+  // Right drag orbits, middle drag pans, Ctrl + wheel and the zoom keys zoom.
+  void update(const device::PointerInput& input, Size size, float seconds);
+  void orbit(float yaw, float pitch);  // rad
+  void zoom(float factor);
+
+  device::ViewRays rays(Size size) const;
+  Matrix4 clip_from_world(Size size) const;
+  std::optional<ScreenPoint> project(const Vec3f& world, Size size) const;  // none behind the eye
+
+ private:
+  Vec3f centre_;
+  float radius_ = 0.12f;
+  float yaw_ = 0, pitch_ = 0.42f, distance_ = 0.5f;
+};
+
+Matrix4 multiply(const Matrix4& a, const Matrix4& b);
+
+}  // namespace trocar::render

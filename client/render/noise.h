@@ -1,0 +1,14 @@
+#pragma once
+
+// The relief of tissue as a tileable volume texture: made once, looked up by rest position, so that
+// it moves with the tissue.
+
+#include <cstdint>
+#include <vector>
+
+namespace trocar::render {
+
+// size^3 RGBA8 texels: slope in rgb (0.5 = flat), height in a. `size` is a power of two >= 16.
+std::vector<std::uint8_t> make_tissue_noise(int size);
+
+}  // namespace trocar::render

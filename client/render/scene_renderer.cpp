@@ -1,0 +1,361 @@
+#include "client/render/scene_renderer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <string>
+
+#include "client/render/gl.h"
+#include "client/render/noise.h"
+#include "client/render/shader.h"
+#include "client/render/shader_sources.h"
+#include "client/render/smooth_surface.h"
+
+namespace trocar::render {
+namespace {
+
+constexpr int kMaxShadows = 8;
+constexpr float kOverlayStrength = 0.42f;
+constexpr float kOverlayFadeSeconds = 0.12f;
+constexpr std::size_t kTriangleBudgetSoftware = 16'000, kTriangleBudget = 100'000;
+
+struct Tint {
+  float r = 0, g = 0, b = 0, a = 0;  // colour weighted by a
+  Tint operator+(const Tint& o) const { return {r + o.r, g + o.g, b + o.b, a + o.a}; }
+  Tint operator*(float s) const { return {r * s, g * s, b * s, a * s}; }
+};
+
+struct OrganVertex {
+  Vec3f position, normal;
+  std::array<std::uint8_t, 4> tint;
+};
+
+Matrix4 matrix_of(const Pose& pose) {
+  const Vec3f x = rotate(pose.orientation, {1, 0, 0}), y = rotate(pose.orientation, {0, 1, 0}),
+              z = rotate(pose.orientation, {0, 0, 1}), p = pose.position;
+  return {x.x, x.y, x.z, 0, y.x, y.y, y.z, 0, z.x, z.y, z.z, 0, p.x, p.y, p.z, 1};
+}
+
+// Jaw in the tool frame: turned about z by half a turn for the lower one, opened about its hinge.
+Matrix4 jaw_matrix(float hinge, float opening, bool is_lower) {
+  const float c = std::cos(opening), s = std::sin(opening), turn = is_lower ? -1.0f : 1.0f;
+  // Rotation about x through (0, 0, hinge) that lifts the nose (z < hinge) towards +y.
+  const Matrix4 opened = {1, 0, 0, 0, 0, c, s, 0, 0, -s, c, 0, 0, s * hinge, hinge - c * hinge, 1};
+  const Matrix4 turned = {turn, 0, 0, 0, 0, turn, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+  return multiply(turned, opened);
+}
+
+const void* offset(std::size_t bytes) {
+  return reinterpret_cast<const void*>(bytes);
+}
+
+struct VertexArray {
+  GLuint array = 0, buffer = 0;
+
+  VertexArray() {
+    glGenVertexArrays(1, &array);
+    glGenBuffers(1, &buffer);
+  }
+  ~VertexArray() {
+    glDeleteBuffers(1, &buffer);
+    glDeleteVertexArrays(1, &array);
+  }
+  VertexArray(const VertexArray&) = delete;
+  VertexArray& operator=(const VertexArray&) = delete;
+};
+
+struct Target {
+  Size size;
+  int samples = 0;
+  GLuint framebuffer = 0, colour = 0, depth = 0;
+
+  void resize(Size wanted) {
+    if (framebuffer != 0 && wanted.width == size.width && wanted.height == size.height) return;
+    release();
+    size = wanted;
+    glGenRenderbuffers(1, &colour);
+    glBindRenderbuffer(GL_RENDERBUFFER, colour);
+    glRenderbufferStorageMultisample(GL_RENDERBUFFER, samples, GL_RGBA8, size.width, size.height);
+    glGenRenderbuffers(1, &depth);
+    glBindRenderbuffer(GL_RENDERBUFFER, depth);
+    glRenderbufferStorageMultisample(GL_RENDERBUFFER, samples, GL_DEPTH_COMPONENT24, size.width,
+                                     size.height);
+    glGenFramebuffers(1, &framebuffer);
+    glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
+    glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_RENDERBUFFER, colour);
+    glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_RENDERBUFFER, depth);
+  }
+  void release() {
+    glDeleteFramebuffers(1, &framebuffer);
+    glDeleteRenderbuffers(1, &colour);
+    glDeleteRenderbuffers(1, &depth);
+    framebuffer = colour = depth = 0;
+  }
+};
+
+}  // namespace
+
+std::optional<Vec3f> arrow_end(const Vec3f& tip, const Vec3f& force_n) {
+  const float newton = length(force_n);
+  if (!(newton >= kMinArrowNewton)) return std::nullopt;
+  return tip + force_n * (std::min(newton * kArrowMetresPerNewton, kMaxArrowMetres) / newton);
+}
+
+struct SceneRenderer::Parts {
+  Shader organ{kOrganVertexSource, (std::string(kLightingSource) + kOrganFragmentSource).c_str()};
+  Shader tool{kToolVertexSource, (std::string(kLightingSource) + kToolFragmentSource).c_str()};
+  Shader background{kBackgroundVertexSource, kBackgroundFragmentSource};
+  VertexArray organ_array, tool_array, background_array;
+  GLuint rest_buffer = 0, index_buffer = 0, noise = 0;
+  Target target;
+  bool is_software = false;
+  std::string renderer_name;
+
+  std::uint64_t topology_version = 0;
+  SmoothSurface surface;
+  std::vector<Tint> tints;  // coarse vertices keep their fading state, midpoints follow
+  std::vector<OrganVertex> vertices;
+
+  explicit Parts(const GlContext& context);
+  ~Parts();
+  void load_topology(const SceneView& scene);
+  void upload_organ(const SceneView& scene);
+  void fade_tints(const SceneView& scene);
+  void set_lights(const Shader& shader, const OrbitCamera& camera) const;
+  void draw_organ(const SceneView& scene, const OrbitCamera& camera);
+  void draw_tools(const SceneView& scene, const OrbitCamera& camera);
+  void draw_mesh(const MeshVertices& mesh, const Matrix4& world_from_model, float glow, float dim);
+};
+
+SceneRenderer::Parts::Parts(const GlContext& context)
+    : is_software(context.is_software()), renderer_name(context.renderer_name()) {
+  GLint most = 0;
+  glGetIntegerv(GL_MAX_SAMPLES, &most);
+  target.samples = std::min(4, static_cast<int>(most));
+
+  glBindVertexArray(organ_array.array);
+  glBindBuffer(GL_ARRAY_BUFFER, organ_array.buffer);
+  constexpr GLsizei kStride = sizeof(OrganVertex);
+  glVertexAttribPointer(0, 3, GL_FLOAT, GL_FALSE, kStride, offset(0));
+  glVertexAttribPointer(1, 3, GL_FLOAT, GL_FALSE, kStride, offset(offsetof(OrganVertex, normal)));
+  glVertexAttribPointer(2, 4, GL_UNSIGNED_BYTE, GL_TRUE, kStride,
+                        offset(offsetof(OrganVertex, tint)));
+  glGenBuffers(1, &rest_buffer);
+  glBindBuffer(GL_ARRAY_BUFFER, rest_buffer);
+  glVertexAttribPointer(3, 3, GL_FLOAT, GL_FALSE, sizeof(Vec3f), offset(0));
+  for (GLuint i = 0; i < 4; ++i) glEnableVertexAttribArray(i);
+  glGenBuffers(1, &index_buffer);
+  glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, index_buffer);
+
+  glBindVertexArray(tool_array.array);
+  glBindBuffer(GL_ARRAY_BUFFER, tool_array.buffer);
+  constexpr GLsizei kToolStride = sizeof(MeshVertex);
+  glVertexAttribPointer(0, 3, GL_FLOAT, GL_FALSE, kToolStride, offset(0));
+  glVertexAttribPointer(1, 3, GL_FLOAT, GL_FALSE, kToolStride,
+                        offset(offsetof(MeshVertex, normal)));
+  glVertexAttribPointer(2, 4, GL_UNSIGNED_BYTE, GL_TRUE, kToolStride,
+                        offset(offsetof(MeshVertex, material)));
+  for (GLuint i = 0; i < 3; ++i) glEnableVertexAttribArray(i);
+  glBindVertexArray(0);
+
+  constexpr int kNoiseSize = 64;
+  const auto texels = make_tissue_noise(kNoiseSize);
+  glGenTextures(1, &noise);
+  glBindTexture(GL_TEXTURE_3D, noise);
+  glTexImage3D(GL_TEXTURE_3D, 0, GL_RGBA8, kNoiseSize, kNoiseSize, kNoiseSize, 0, GL_RGBA,
+               GL_UNSIGNED_BYTE, texels.data());
+  glTexParameteri(GL_TEXTURE_3D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+  // Mip maps cost a software rasteriser a second look-up, and the pattern is never much smaller
+  // than a pixel.
+  glTexParameteri(GL_TEXTURE_3D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+}
+
+SceneRenderer::Parts::~Parts() {
+  target.release();
+  glDeleteTextures(1, &noise);
+  glDeleteBuffers(1, &rest_buffer);
+  glDeleteBuffers(1, &index_buffer);
+}
+
+void SceneRenderer::Parts::load_topology(const SceneView& scene) {
+  topology_version = scene.topology_version;
+  surface = SmoothSurface(scene.rest_positions.size(), scene.triangles,
+                          is_software ? kTriangleBudgetSoftware : kTriangleBudget);
+  surface.update(scene.rest_positions);
+  tints.assign(surface.vertex_count(), Tint{});
+  vertices.assign(surface.vertex_count(), OrganVertex{});
+  const auto bytes = [](std::size_t count, std::size_t each) {
+    return static_cast<GLsizeiptr>(count * each);
+  };
+  glBindBuffer(GL_ARRAY_BUFFER, rest_buffer);
+  glBufferData(GL_ARRAY_BUFFER, bytes(surface.vertex_count(), sizeof(Vec3f)),
+               surface.positions().data(), GL_STATIC_DRAW);
+  glBindVertexArray(organ_array.array);
+  glBufferData(GL_ELEMENT_ARRAY_BUFFER, bytes(surface.triangles().size(), sizeof(TriangleCorners)),
+               surface.triangles().data(), GL_STATIC_DRAW);
+}
+
+void SceneRenderer::Parts::fade_tints(const SceneView& scene) {
+  const float share = 1 - std::exp(-scene.seconds / kOverlayFadeSeconds);
+  for (std::size_t i = 0; i < surface.coarse_vertex_count(); ++i) {
+    Tint wanted;
+    if (scene.shows_regions && i < scene.regions.size() && scene.regions[i] != 0) {
+      const Colour c = colour_of_region(scene.regions[i]);
+      const auto linear = [](std::uint8_t v) {
+        const float x = static_cast<float>(v) / 255;
+        return x * x;
+      };
+      wanted = Tint{linear(c.r), linear(c.g), linear(c.b), 1} * kOverlayStrength;
+    }
+    tints[i] = tints[i] * (1 - share) + wanted * share;
+  }
+  surface.average_midpoints(tints);
+}
+
+void SceneRenderer::Parts::upload_organ(const SceneView& scene) {
+  surface.update(scene.positions);
+  fade_tints(scene);
+  const auto byte = [](float v) {
+    return static_cast<std::uint8_t>(std::clamp(v, 0.0f, 1.0f) * 255);
+  };
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    const Tint& t = tints[i];
+    const float whole = t.a > 1e-3f ? 1 / t.a : 0.0f;
+    vertices[i] = {surface.positions()[i],
+                   surface.normals()[i],
+                   {byte(t.r * whole), byte(t.g * whole), byte(t.b * whole), byte(t.a)}};
+  }
+  glBindBuffer(GL_ARRAY_BUFFER, organ_array.buffer);
+  glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(vertices.size() * sizeof(OrganVertex)),
+               vertices.data(), GL_STREAM_DRAW);
+}
+
+void SceneRenderer::Parts::set_lights(const Shader& shader, const OrbitCamera& camera) const {
+  const device::ViewRays view = camera.rays(target.size);
+  shader.set("clip_from_world", camera.clip_from_world(target.size));
+  shader.set("eye", view.eye);
+  const auto direction = [&](float right, float up, float back) {
+    return normalized(view.right * right + view.up * up - view.forward * back, Vec3f{0, 1, 0});
+  };
+  shader.set("key_direction", direction(0.42f, 0.88f, 0.55f));
+  shader.set("fill_direction", direction(-0.9f, 0.15f, 0.35f));
+}
+
+void SceneRenderer::Parts::draw_organ(const SceneView& scene, const OrbitCamera& camera) {
+  if (scene.topology_version != topology_version) load_topology(scene);
+  if (scene.positions.empty() || scene.positions.size() != surface.coarse_vertex_count()) return;
+  upload_organ(scene);
+  organ.use();
+  set_lights(organ, camera);
+  organ.set("noise", 0);
+  glActiveTexture(GL_TEXTURE0);
+  glBindTexture(GL_TEXTURE_3D, noise);
+  std::vector<float> tips, shafts;
+  const int shadow_count = std::min(kMaxShadows, static_cast<int>(scene.tools.size()));
+  for (int i = 0; i < shadow_count; ++i) {
+    const SceneTool& tool = scene.tools[static_cast<std::size_t>(i)];
+    const Vec3f p = tool.world_from_tool.position;
+    const Vec3f a = rotate(tool.world_from_tool.orientation, {0, 0, 1});
+    tips.insert(tips.end(), {p.x, p.y, p.z, tool.shape.radius_m});
+    shafts.insert(shafts.end(), {a.x, a.y, a.z, tool.shape.length_m});
+  }
+  organ.set("shadow_count", shadow_count);
+  organ.set_array("shadow_tip", tips.data(), shadow_count);
+  organ.set_array("shadow_shaft", shafts.data(), shadow_count);
+  glEnable(GL_CULL_FACE);
+  glBindVertexArray(organ_array.array);
+  glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(surface.triangles().size() * 3),
+                 GL_UNSIGNED_INT, nullptr);
+  glDisable(GL_CULL_FACE);
+}
+
+void SceneRenderer::Parts::draw_mesh(const MeshVertices& mesh, const Matrix4& world_from_model,
+                                     float glow, float dim) {
+  tool.set("world_from_model", world_from_model);
+  tool.set("glow", glow);
+  tool.set("dim", dim);
+  glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(mesh.size() * sizeof(MeshVertex)),
+               mesh.data(), GL_STREAM_DRAW);
+  glDrawArrays(GL_TRIANGLES, 0, static_cast<GLsizei>(mesh.size()));
+}
+
+void SceneRenderer::Parts::draw_tools(const SceneView& scene, const OrbitCamera& camera) {
+  tool.use();
+  set_lights(tool, camera);
+  glBindVertexArray(tool_array.array);
+  glBindBuffer(GL_ARRAY_BUFFER, tool_array.buffer);
+  for (const SceneTool& shown : scene.tools) {
+    const Colour colour = colour_of_slot(shown.slot.owner().value);
+    const Matrix4 world = matrix_of(shown.world_from_tool);
+    const float dim = shown.is_silent ? 0.45f : 1.0f;
+    draw_mesh(make_shaft(shown.shape, colour), world, 0, dim);
+    // Open while a grasp looks for tissue, parted by what it holds, else closed.
+    const float opening = shown.verb != scene::Verb::Grasp ? 0.0f : shown.has_claim ? 0.12f : 0.34f;
+    const MeshVertices jaw = make_jaw(shown.shape);
+    for (const bool is_lower : {false, true})
+      draw_mesh(jaw, multiply(world, jaw_matrix(jaw_length(shown.shape), opening, is_lower)), 0,
+                dim);
+  }
+  // Arrows show through tissue: first faintly without the depth test, then solid where in front.
+  for (const SceneTool& shown : scene.tools) {
+    const Vec3f tip = shown.world_from_tool.position;
+    const auto end = arrow_end(tip, shown.force_n);
+    if (!end) continue;
+    const Vec3f along = *end - tip;
+    const Pose pose{tip, rotation_from_z(normalized(along, Vec3f{0, 0, 1}))};
+    const Colour colour = colour_of_slot(shown.slot.owner().value);
+    const MeshVertices arrow = make_arrow(length(along), 0.0016f, colour);
+    glDepthFunc(GL_ALWAYS);
+    glEnable(GL_BLEND);
+    glBlendColor(0, 0, 0, 0.35f);
+    glBlendFunc(GL_CONSTANT_ALPHA, GL_ONE_MINUS_CONSTANT_ALPHA);
+    glEnable(GL_CULL_FACE);
+    glDepthMask(GL_FALSE);
+    draw_mesh(arrow, matrix_of(pose), 1, 1);
+    glDepthMask(GL_TRUE);
+    glDisable(GL_CULL_FACE);
+    glDisable(GL_BLEND);
+    glDepthFunc(GL_LESS);
+    draw_mesh(arrow, matrix_of(pose), 0.55f, 1);
+  }
+}
+
+SceneRenderer::SceneRenderer(const GlContext& context)
+    : context_(context), parts_(std::make_unique<Parts>(context)) {}
+
+SceneRenderer::~SceneRenderer() = default;
+
+void SceneRenderer::draw(const SceneView& scene, const OrbitCamera& camera) {
+  const Size size = context_.size();
+  if (size.width <= 0 || size.height <= 0) return;  // minimised
+  Parts& parts = *parts_;
+  parts.target.resize(size);
+  glBindFramebuffer(GL_FRAMEBUFFER, parts.target.framebuffer);
+  glViewport(0, 0, size.width, size.height);
+  glDisable(GL_BLEND);
+  glDisable(GL_SCISSOR_TEST);
+  glEnable(GL_MULTISAMPLE);
+  glClear(GL_DEPTH_BUFFER_BIT);
+  glDisable(GL_DEPTH_TEST);
+  parts.background.use();
+  glBindVertexArray(parts.background_array.array);
+  glDrawArrays(GL_TRIANGLES, 0, 3);
+  glEnable(GL_DEPTH_TEST);
+  parts.draw_organ(scene, camera);
+  parts.draw_tools(scene, camera);
+  glDisable(GL_DEPTH_TEST);
+  glBindVertexArray(0);
+
+  glBindFramebuffer(GL_READ_FRAMEBUFFER, parts.target.framebuffer);
+  glBindFramebuffer(GL_DRAW_FRAMEBUFFER, context_.framebuffer());
+  glBlitFramebuffer(0, 0, size.width, size.height, 0, 0, size.width, size.height,
+                    GL_COLOR_BUFFER_BIT, GL_NEAREST);
+  glBindFramebuffer(GL_FRAMEBUFFER, context_.framebuffer());
+}
+
+std::string SceneRenderer::description() const {
+  return parts_->renderer_name + ", " + std::to_string(parts_->target.samples) + " samples, " +
+         std::to_string(parts_->surface.triangles().size()) + " triangles";
+}
+
+}  // namespace trocar::render

@@ -1,0 +1,64 @@
+#pragma once
+
+// Draws one picture of the session: background, organ, tools, force arrows. Needs a current OpenGL
+// 3.3 core context for its whole life. Draws into a multisampled buffer of its own (plain on a
+// software rasteriser that cannot afford it) and resolves that into the context's framebuffer.
+// Thread: render thread.
+
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "client/render/camera.h"
+#include "client/render/tool_mesh.h"
+#include "common/base/ids.h"
+#include "common/math/frame.h"
+#include "common/scene/tool.h"
+
+namespace trocar::render {
+
+inline constexpr float kArrowMetresPerNewton = 0.020f;  // 20 mm per N
+inline constexpr float kMaxArrowMetres = 0.10f;
+inline constexpr float kMinArrowNewton = 0.05f;  // smaller forces are not drawn
+
+struct SceneTool {
+  ToolSlot slot;
+  Pose world_from_tool;
+  scene::ToolShape shape;
+  scene::Verb verb = scene::Verb::None;
+  bool has_claim = false;
+  bool is_silent = false;
+  Vec3f force_n;  // of the tissue on the tool
+};
+
+struct SceneView {
+  std::uint64_t topology_version = 0;  // changes when rest positions and triangles do
+  std::span<const Vec3f> rest_positions;
+  std::span<const std::array<std::uint32_t, 3>> triangles;
+  std::span<const Vec3f> positions;        // m, as many as rest_positions; empty: no organ yet
+  std::span<const std::uint16_t> regions;  // per vertex; may be empty
+  bool shows_regions = true;
+  std::vector<SceneTool> tools;
+  float seconds = 0;  // since the last picture
+};
+
+class SceneRenderer {
+ public:
+  explicit SceneRenderer(const GlContext& context);
+  ~SceneRenderer();
+
+  void draw(const SceneView& scene, const OrbitCamera& camera);
+  // What limits the picture, for --log-level debug: renderer, samples, triangles drawn.
+  std::string description() const;
+
+ private:
+  struct Parts;
+  const GlContext& context_;
+  std::unique_ptr<Parts> parts_;
+};
+
+// Where an arrow for this force ends, from the tip; none if too small to draw.
+std::optional<Vec3f> arrow_end(const Vec3f& tip, const Vec3f& force_n);
+
+}  // namespace trocar::render

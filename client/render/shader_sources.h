@@ -1,0 +1,172 @@
+#pragma once
+
+// GLSL of the scene. Light is computed in linear colour and encoded at the end of each fragment
+// shader, so that the picture is the same in a window and in memory.
+
+namespace trocar::render {
+
+// Two lamps that move with the camera (a key light from above right, a cool one from the left), and
+// soft light from above. Prefixed to both lit shaders.
+inline constexpr const char* kLightingSource = R"(#version 330 core
+uniform vec3 eye;
+uniform vec3 key_direction;
+uniform vec3 fill_direction;
+const vec3 key_colour = vec3(2.55, 2.42, 2.25);
+const vec3 fill_colour = vec3(0.42, 0.52, 0.68);
+const vec3 sky_colour = vec3(0.34, 0.40, 0.48);
+const vec3 ground_colour = vec3(0.10, 0.075, 0.075);
+
+vec3 hemisphere(vec3 n) { return mix(ground_colour, sky_colour, 0.5 + 0.5 * n.y); }
+float highlight(vec3 n, vec3 view, vec3 light, float sharpness) {
+  return pow(max(dot(n, normalize(view + light)), 0.0), sharpness);
+}
+// Filmic curve (after Narkowicz 2015), then the sRGB transfer function as a power.
+vec4 encode(vec3 c) {
+  c = clamp(c * (2.51 * c + 0.03) / (c * (2.43 * c + 0.59) + 0.14), 0.0, 1.0);
+  return vec4(pow(c, vec3(1.0 / 2.2)), 1.0);
+}
+)";
+
+inline constexpr const char* kOrganVertexSource = R"(#version 330 core
+layout(location = 0) in vec3 position;
+layout(location = 1) in vec3 normal;
+layout(location = 2) in vec4 overlay;
+layout(location = 3) in vec3 rest;
+uniform mat4 clip_from_world;
+out vec3 world_position, world_normal, rest_position;
+out vec4 tint;
+void main() {
+  world_position = position;
+  world_normal = normal;
+  rest_position = rest;
+  tint = overlay;
+  gl_Position = clip_from_world * vec4(position, 1.0);
+}
+)";
+
+inline constexpr const char* kOrganFragmentSource = R"(
+in vec3 world_position, world_normal, rest_position;
+in vec4 tint;
+out vec4 colour;
+uniform sampler3D noise;       // rgb: slope of the relief, a: its height
+uniform int shadow_count;
+uniform vec4 shadow_tip[8];    // xyz tip, w radius
+uniform vec4 shadow_shaft[8];  // xyz direction, w length
+
+// Light that a tool takes away at p: the key lamp's shadow and a soft one where it touches.
+float tool_shadow(vec3 p) {
+  float light = 1.0;
+  for (int i = 0; i < shadow_count; ++i) {
+    vec3 a = shadow_shaft[i].xyz;
+    vec3 w = p - shadow_tip[i].xyz;
+    float radius = shadow_tip[i].w;
+    // Closest approach of the ray p + s key and the shaft tip + t a.
+    float along = dot(key_direction, a);
+    float wl = dot(w, key_direction), wa = dot(w, a);
+    float t = clamp((wa - along * wl) / max(1.0 - along * along, 0.02), 0.0, shadow_shaft[i].w);
+    float s = max(t * along - wl, 0.0);
+    float gap = length(w + key_direction * s - a * t) / radius;
+    float soft = 1.3 + 12.0 * s;
+    light *= mix(1.0, smoothstep(0.4, 0.6 + soft, gap), 0.62 / (1.0 + 5.0 * s));
+    float touch = length(w - a * clamp(wa, 0.0, shadow_shaft[i].w)) / radius;
+    light *= 0.62 + 0.38 * smoothstep(0.8, 2.6, touch);
+  }
+  return light;
+}
+
+void main() {
+  vec4 coarse = texture(noise, rest_position * 11.0);
+  vec4 fine = texture(noise, rest_position * 58.0 + 0.37);
+  vec3 n = normalize(world_normal);
+  n = normalize(n + 0.16 * (coarse.rgb - 0.5) + 0.13 * (fine.rgb - 0.5));
+  vec3 view = normalize(eye - world_position);
+  float facing = max(dot(n, view), 0.0);
+
+  float mottle = clamp(0.62 * coarse.a + 0.38 * fine.a, 0.0, 1.0);
+  vec3 albedo = mix(vec3(0.155, 0.022, 0.019), vec3(0.37, 0.070, 0.047), smoothstep(0.25, 0.78, mottle));
+  albedo = mix(albedo, vec3(0.40, 0.125, 0.075), 0.35 * smoothstep(0.62, 0.9, fine.a));
+
+  float shade = tool_shadow(world_position);
+  // Light wraps around the edge of the shadow, red farthest: it has been under the surface.
+  vec3 wrap = vec3(0.38, 0.14, 0.10);
+  vec3 key = clamp((vec3(dot(n, key_direction)) + wrap) / (1.0 + wrap), 0.0, 1.0) * shade;
+  vec3 fill = clamp((vec3(dot(n, fill_direction)) + wrap) / (1.0 + wrap), 0.0, 1.0);
+  vec3 lit = albedo * (key_colour * key * key + fill_colour * fill + hemisphere(n) * (0.6 + 0.4 * shade));
+  lit += vec3(0.10, 0.012, 0.008) * pow(1.0 - facing, 3.0) * shade;  // thin at the rim
+
+  float fresnel = 0.035 + 0.965 * pow(1.0 - facing, 5.0);
+  float wet = 0.75 + 0.5 * coarse.a;
+  float sharp = highlight(n, view, key_direction, 210.0), broad = highlight(n, view, key_direction, 26.0);
+  vec3 film = key_colour * shade * (0.62 * sharp + 0.045 * broad) * wet;
+  film += fill_colour * (0.30 * highlight(n, view, fill_direction, 90.0)) * wet;
+  film += hemisphere(reflect(-view, n)) * fresnel * 0.55 * (0.5 + 0.5 * shade);
+
+  lit = mix(lit, tint.rgb * (0.18 + 0.42 * key + 0.25 * fill), tint.a);
+  colour = encode(lit + film);
+}
+)";
+
+inline constexpr const char* kToolVertexSource = R"(#version 330 core
+layout(location = 0) in vec3 position;
+layout(location = 1) in vec3 normal;
+layout(location = 2) in vec4 material;  // rgb colour, a: 0 plastic to 1 steel
+uniform mat4 clip_from_world;
+uniform mat4 world_from_model;
+out vec3 world_position, world_normal;
+out vec4 surface;
+void main() {
+  vec4 p = world_from_model * vec4(position, 1.0);
+  world_position = p.xyz;
+  world_normal = mat3(world_from_model) * normal;
+  surface = material;
+  gl_Position = clip_from_world * p;
+}
+)";
+
+inline constexpr const char* kToolFragmentSource = R"(
+in vec3 world_position, world_normal;
+in vec4 surface;
+out vec4 colour;
+uniform float glow;  // 0 lit, 1 its own colour
+uniform float dim;   // 1 as it is; less for a tool that has fallen silent
+void main() {
+  vec3 n = normalize(world_normal);
+  vec3 view = normalize(eye - world_position);
+  vec3 base = pow(surface.rgb, vec3(2.2)) * dim;
+  float steel = surface.a;
+  float fresnel = pow(1.0 - max(dot(n, view), 0.0), 5.0);
+  vec3 diffuse = key_colour * max(dot(n, key_direction), 0.0) + fill_colour * max(dot(n, fill_direction), 0.0)
+      + hemisphere(n);
+  vec3 r = reflect(-view, n);
+  // A theatre reflected in steel: dark below, a bright lamp band above.
+  float band = smoothstep(-0.15, 0.25, r.y) * (0.35 + 0.65 * smoothstep(0.25, 0.8, r.y));
+  vec3 mirror = mix(vec3(0.05, 0.06, 0.075), vec3(0.95, 1.0, 1.05), band);
+  vec3 lit = base * diffuse * mix(0.75, 0.22, steel) + mirror * mix(vec3(0.05), base * 0.9, steel)
+      + mirror * fresnel * 0.5;
+  lit += key_colour * highlight(n, view, key_direction, mix(60.0, 130.0, steel)) * mix(0.25, 0.8, steel);
+  colour = encode(mix(lit, base * 1.35, glow));
+}
+)";
+
+inline constexpr const char* kBackgroundVertexSource = R"(#version 330 core
+out vec2 at;
+void main() {
+  at = vec2((gl_VertexID << 1) & 2, gl_VertexID & 2);
+  gl_Position = vec4(at * 2.0 - 1.0, 1.0, 1.0);
+}
+)";
+
+inline constexpr const char* kBackgroundFragmentSource = R"(#version 330 core
+in vec2 at;
+out vec4 colour;
+void main() {
+  vec2 q = (at - vec2(0.5, 0.56)) * vec2(1.15, 1.0);
+  float centre = 1.0 - smoothstep(0.05, 0.85, length(q));
+  vec3 c = mix(vec3(0.043, 0.055, 0.070), vec3(0.150, 0.195, 0.232), centre * centre);
+  // One step of dither, so that the slow gradient shows no bands.
+  float grain = fract(sin(dot(gl_FragCoord.xy, vec2(12.9898, 78.233))) * 43758.5453) - 0.5;
+  colour = vec4(c + grain / 255.0, 1.0);
+}
+)";
+
+}  // namespace trocar::render

@@ -1,0 +1,156 @@
+#include "client/render/tool_mesh.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <span>
+
+namespace trocar::render {
+namespace {
+
+using Material = std::array<std::uint8_t, 4>;
+constexpr Material kSteel = {196, 201, 208, 255};
+constexpr Material kDarkSteel = {120, 124, 132, 255};
+constexpr Material kGrip = {44, 48, 55, 30};
+constexpr float kPi = std::numbers::pi_v<float>;
+
+Material plastic(Colour c) {
+  return {c.r, c.g, c.b, 0};
+}
+
+struct ProfilePoint {
+  float z, radius;
+  Material material;       // of the band that ends here
+  bool is_smooth = false;  // share the normal with the band before
+};
+
+// Sweeps a profile (z descending towards the tip or ascending, either way outward is away from the
+// axis) around +z over an arc.
+void revolve(std::span<const ProfilePoint> profile, int segments, float from, float to,
+             MeshVertices& out) {
+  const auto slope = [&](std::size_t band) {  // outward normal of a band in (radius, z)
+    const float dz = profile[band].z - profile[band - 1].z;
+    const float dr = profile[band].radius - profile[band - 1].radius;
+    const float l = std::max(std::sqrt(dz * dz + dr * dr), 1e-9f);
+    return std::array<float, 2>{dz / l, -dr / l};
+  };
+  for (std::size_t band = 1; band < profile.size(); ++band) {
+    auto first = slope(band), last = first;
+    const auto blend = [&](std::array<float, 2>& a, const std::array<float, 2>& b) {
+      const float x = a[0] + b[0], y = a[1] + b[1], l = std::max(std::sqrt(x * x + y * y), 1e-9f);
+      a = {x / l, y / l};
+    };
+    if (band > 1 && profile[band - 1].is_smooth) blend(first, slope(band - 1));
+    if (band + 1 < profile.size() && profile[band].is_smooth) blend(last, slope(band + 1));
+    const auto vertex = [&](std::size_t point, float angle, const std::array<float, 2>& n) {
+      const float c = std::cos(angle), s = std::sin(angle), r = profile[point].radius;
+      return MeshVertex{
+          {r * c, r * s, profile[point].z}, {n[0] * c, n[0] * s, n[1]}, profile[band].material};
+    };
+    for (int i = 0; i < segments; ++i) {
+      const float step = (to - from) / static_cast<float>(segments);
+      const float a = from + step * static_cast<float>(i), b = a + step;
+      const auto p = vertex(band - 1, a, first), q = vertex(band - 1, b, first);
+      const auto r = vertex(band, b, last), s = vertex(band, a, last);
+      out.insert(out.end(), {p, q, r, p, r, s});
+    }
+  }
+}
+
+}  // namespace
+
+Colour colour_of_slot(int slot) {
+  static constexpr std::array<Colour, 16> kColours = {{{64, 186, 255},
+                                                       {255, 176, 46},
+                                                       {112, 224, 112},
+                                                       {232, 116, 236},
+                                                       {255, 112, 98},
+                                                       {74, 226, 206},
+                                                       {240, 226, 84},
+                                                       {150, 140, 255},
+                                                       {255, 150, 190},
+                                                       {170, 220, 60},
+                                                       {60, 140, 230},
+                                                       {230, 130, 40},
+                                                       {120, 200, 160},
+                                                       {200, 90, 160},
+                                                       {200, 200, 210},
+                                                       {190, 150, 110}}};
+  return kColours[static_cast<std::size_t>(slot) % kColours.size()];
+}
+
+Colour colour_of_region(int region) {
+  static constexpr std::array<Colour, 6> kColours = {{{38, 208, 190},
+                                                      {250, 190, 60},
+                                                      {120, 150, 255},
+                                                      {236, 110, 190},
+                                                      {150, 220, 80},
+                                                      {255, 130, 80}}};
+  return kColours[static_cast<std::size_t>(std::max(region - 1, 0)) % kColours.size()];
+}
+
+float jaw_length(const scene::ToolShape& shape) {
+  return shape.radius_m * 4.2f;
+}
+
+MeshVertices make_shaft(const scene::ToolShape& shape, Colour colour) {
+  const float r = shape.radius_m, hinge = jaw_length(shape);
+  const float end = std::max(shape.length_m, hinge + 12 * r);
+  const float grip = std::max(end - 0.09f, hinge + 9 * r);
+  const Material ring = plastic(colour);
+  const ProfilePoint profile[] = {{hinge - 0.7f * r, 0, kDarkSteel},
+                                  {hinge - 0.7f * r, 0.66f * r, kDarkSteel},
+                                  {hinge + 0.6f * r, 0.80f * r, kDarkSteel},
+                                  {hinge + 0.8f * r, 0.98f * r, ring},
+                                  {hinge + 4.4f * r, 0.98f * r, ring},
+                                  {hinge + 4.6f * r, 0.82f * r, kSteel},
+                                  {grip, 0.82f * r, kSteel},
+                                  {grip + 0.3f * r, 1.3f * r, ring},
+                                  {grip + 2.2f * r, 1.5f * r, ring},
+                                  {end - r, 1.6f * r, kGrip},
+                                  {end, 1.2f * r, kGrip},
+                                  {end, 0, kGrip}};
+  MeshVertices out;
+  revolve(profile, 28, 0, 2 * kPi, out);
+  return out;
+}
+
+MeshVertices make_jaw(const scene::ToolShape& shape) {
+  const float r = shape.radius_m, hinge = jaw_length(shape);
+  std::vector<ProfilePoint> profile;
+  constexpr int kRings = 8;
+  for (int i = 0; i <= kRings; ++i) {  // the nose: a quarter circle around the tip
+    const float a = 0.5f * kPi * static_cast<float>(i) / kRings;
+    profile.push_back({-r * std::cos(a), r * std::sin(a), kSteel, true});
+  }
+  profile.push_back({1.9f * r, r, kSteel, true});
+  profile.push_back({hinge, 0.74f * r, kSteel});
+  MeshVertices out;
+  revolve(profile, 14, 0, kPi, out);
+  // The gripping face, y = 0, with teeth as bands of light and dark steel.
+  const Vec3f down{0, -1, 0};
+  for (std::size_t band = 1; band < profile.size(); ++band) {
+    const auto& a = profile[band - 1];
+    const auto& b = profile[band];
+    const Material material = band % 2 == 0 ? kSteel : kDarkSteel;
+    const MeshVertex p{{-a.radius, 0, a.z}, down, material}, q{{a.radius, 0, a.z}, down, material};
+    const MeshVertex s{{b.radius, 0, b.z}, down, material}, t{{-b.radius, 0, b.z}, down, material};
+    out.insert(out.end(), {p, q, s, p, s, t});
+  }
+  return out;
+}
+
+MeshVertices make_arrow(float length, float radius, Colour colour) {
+  const float head = std::min(length * 0.6f, radius * 5.5f);
+  const Material m = plastic(colour);
+  const ProfilePoint profile[] = {{0, 0, m},
+                                  {0, radius, m},
+                                  {length - head, radius, m},
+                                  {length - head, radius * 2.5f, m},
+                                  {length, 0, m}};
+  MeshVertices out;
+  revolve(profile, 18, 0, 2 * kPi, out);
+  return out;
+}
+
+}  // namespace trocar::render

@@ -1,0 +1,115 @@
+#include "client/replica/interpolated_surface.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace trocar::replica {
+namespace {
+
+constexpr std::size_t kArrivalWindow = 32;  // half a second
+constexpr double kJumpTicks = 250;
+constexpr double kSlewTicks = 120;  // an error of this size changes the speed by 100 %
+
+}  // namespace
+
+void DisplayClock::restart() {
+  arrivals_.clear();
+  display_tick_ = -1;
+}
+
+void DisplayClock::add_arrival(Tick tick, std::uint64_t arrival_ns) {
+  arrivals_.push_back({tick, arrival_ns});
+  if (arrivals_.size() > kArrivalWindow) arrivals_.pop_front();
+}
+
+double DisplayClock::rate() const {
+  const double nominal = static_cast<double>(kTicksPerSecond);
+  if (arrivals_.size() < 4 || arrivals_.back().ns <= arrivals_.front().ns) return nominal;
+  const double seconds = static_cast<double>(arrivals_.back().ns - arrivals_.front().ns) * 1e-9;
+  const auto ticks = static_cast<double>(arrivals_.back().tick - arrivals_.front().tick);
+  return std::clamp(ticks / seconds, 0.02 * nominal, 20 * nominal);
+}
+
+double DisplayClock::advance(std::uint64_t now_ns) {
+  if (arrivals_.empty()) return display_tick_;
+  const Arrival& newest = arrivals_.back();
+  const auto newest_tick = static_cast<double>(newest.tick);
+  const double speed = rate();
+  const double age = now_ns > newest.ns ? static_cast<double>(now_ns - newest.ns) * 1e-9 : 0.0;
+  const double target = std::min(newest_tick, newest_tick - kDisplayDelayTicks + age * speed);
+  // A first frame is shown as it is.
+  if (display_tick_ < 0 || std::abs(target - display_tick_) > kJumpTicks) {
+    display_tick_ = arrivals_.size() == 1 ? newest_tick : target;
+    last_ns_ = now_ns;
+    return display_tick_;
+  }
+  const double elapsed = now_ns > last_ns_ ? static_cast<double>(now_ns - last_ns_) * 1e-9 : 0.0;
+  last_ns_ = std::max(last_ns_, now_ns);
+  const double step = elapsed * speed;
+  const double slew = std::clamp((target - display_tick_ - step) / kSlewTicks, -1.0, 1.0);
+  display_tick_ =
+      std::max(display_tick_, std::min(display_tick_ + step * (1.0 + slew), newest_tick));
+  return display_tick_;
+}
+
+void InterpolatedSurface::update(const Replica& replica, std::uint64_t now_ns) {
+  const auto& history = replica.history();
+  if (replica.history_version() != history_version_) {
+    history_version_ = replica.history_version();
+    clock_.restart();
+    has_tick_ = false;
+  }
+  if (history.empty()) {
+    is_valid_ = false;
+    return;
+  }
+  for (const SessionFrame& frame : history) {
+    if (has_tick_ && frame.tick <= last_tick_) continue;
+    clock_.add_arrival(frame.tick, frame.arrival_ns);
+    last_tick_ = frame.tick;
+    has_tick_ = true;
+  }
+  tick_ = clock_.advance(now_ns);
+  const SessionFrame* before = &history.front();
+  const SessionFrame* after = before;
+  for (const SessionFrame& frame : history) {
+    after = &frame;
+    if (static_cast<double>(frame.tick) >= tick_) break;
+    before = &frame;
+  }
+  const double span = static_cast<double>(after->tick) - static_cast<double>(before->tick);
+  const double t = span > 0 ? (tick_ - static_cast<double>(before->tick)) / span : 1.0;
+  interpolate(replica.topology(), *before, *after, static_cast<float>(std::clamp(t, 0.0, 1.0)));
+  is_valid_ = true;
+}
+
+void InterpolatedSurface::interpolate(const Topology& topology, const SessionFrame& before,
+                                      const SessionFrame& after, float t) {
+  const auto& rest = topology.rest_positions;
+  positions_.resize(rest.size());
+  const float from = (1 - t) * wire::kQuantumMetres, to = t * wire::kQuantumMetres;
+  for (std::size_t i = 0; i < rest.size(); ++i) {
+    const auto& a = before.surface[i];
+    const auto& b = after.surface[i];
+    positions_[i] = {rest[i].x + from * static_cast<float>(a.x) + to * static_cast<float>(b.x),
+                     rest[i].y + from * static_cast<float>(a.y) + to * static_cast<float>(b.y),
+                     rest[i].z + from * static_cast<float>(a.z) + to * static_cast<float>(b.z)};
+  }
+  // A frame whose FrameState is still under way shows what was known before it.
+  const SessionFrame& known = after.has_state ? after : before;
+  if (!known.has_state) return;
+  tools_ = known.tools;
+  regions_ = t < 0.5f && before.has_state ? before.regions : known.regions;
+  if (&known == &before || !before.has_state) return;
+  for (Tool& tool : tools_) {
+    const auto earlier = std::ranges::find(before.tools, tool.slot, &Tool::slot);
+    if (earlier == before.tools.end()) continue;
+    tool.world_from_tool.position =
+        earlier->world_from_tool.position * (1 - t) + tool.world_from_tool.position * t;
+    tool.world_from_tool.orientation = ::trocar::interpolate(earlier->world_from_tool.orientation,
+                                                             tool.world_from_tool.orientation, t);
+    tool.force_n = earlier->force_n * (1 - t) + tool.force_n * t;
+  }
+}
+
+}  // namespace trocar::replica

@@ -1,0 +1,339 @@
+#include "client/replica/replica.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/base/version.h"
+#include "common/wire/surface_codec.h"
+#include "proto/wire.pb.h"
+
+namespace trocar::replica {
+namespace {
+
+constexpr int kMaxVertices = 4'000'000;
+// 1 mm in quanta, squared.
+constexpr std::int64_t kMovedQuantaSquared = 976;  // (1 mm / 32 um)^2 = 976.6
+// A jump in time this large is a seek, not a late frame.
+constexpr Tick kSeekTicks = 1000;
+
+Vec3f to_vec3(const proto::Vec3& v) {
+  return {v.x(), v.y(), v.z()};
+}
+
+scene::Verb to_verb(proto::Verb verb) {
+  switch (verb) {
+    case proto::VERB_PUSH:
+      return scene::Verb::Push;
+    case proto::VERB_GRASP:
+      return scene::Verb::Grasp;
+    default:
+      return scene::Verb::None;
+  }
+}
+
+Pose to_pose(const proto::Vec3& position, const proto::Quat& orientation) {
+  const Quatf q{orientation.x(), orientation.y(), orientation.z(), orientation.w()};
+  const float length = norm(q);
+  return {to_vec3(position), length > 0.5f ? normalized(q) : Quatf{}};
+}
+
+// Run lengths to one region per vertex; false if they do not cover the surface exactly.
+bool expand_regions(const proto::FrameState& message, std::vector<std::uint16_t>& regions) {
+  if (message.region_runs_size() % 2 != 0) return false;
+  std::size_t at = 0;
+  for (int i = 0; i < message.region_runs_size(); i += 2) {
+    const std::size_t count = message.region_runs(i + 1);
+    if (count > regions.size() - at) return false;
+    std::fill_n(
+        regions.begin() + static_cast<std::ptrdiff_t>(at), count,
+        static_cast<std::uint16_t>(std::min<std::uint32_t>(message.region_runs(i), 0xffff)));
+    at += count;
+  }
+  std::fill(regions.begin() + static_cast<std::ptrdiff_t>(at), regions.end(), std::uint16_t{0});
+  return true;
+}
+
+}  // namespace
+
+const char* name_of(Role role) {
+  switch (role) {
+    case Role::Surgeon:
+      return "surgeon";
+    case Role::Assistant:
+      return "assistant";
+    case Role::Instructor:
+      return "instructor";
+    case Role::Observer:
+      return "observer";
+    case Role::Unknown:
+      break;
+  }
+  return "unknown role";
+}
+
+Replica::Replica(Send send) : send_(std::move(send)) {}
+
+void Replica::fail(std::string what) {
+  if (fault_.ok()) fault_ = Error{ErrorCode::BadMessage, std::move(what)};
+}
+
+void Replica::on_message(const proto::Envelope& message, std::uint64_t arrival_ns,
+                         std::size_t bytes) {
+  counters_.bytes += bytes;
+  if (!fault_.ok()) return;
+  switch (message.message_case()) {
+    case proto::Envelope::kWelcome:
+      return apply_welcome(message.welcome());
+    case proto::Envelope::kSurfaceTopology:
+      return apply_topology(message.surface_topology());
+    case proto::Envelope::kSurfaceFrame:
+      return apply_surface(message.surface_frame(), arrival_ns);
+    case proto::Envelope::kFrameState:
+      return apply_state(message.frame_state());
+    case proto::Envelope::kParticipants:
+      return apply_participants(message.participants());
+    case proto::Envelope::kClaimEvent:
+      return apply_claim(message.claim_event(), arrival_ns);
+    case proto::Envelope::kBarrier:
+      barrier_ = BarrierOutcome{message.barrier().frame(), message.barrier().surface_crc(), 0};
+      barrier_answered_ = false;
+      return answer_barrier();
+    case proto::Envelope::kGoodbye:
+      goodbye_text_ = message.goodbye().text();
+      return;
+    default:
+      return;  // a newer minor version's message, or the source's own business
+  }
+}
+
+void Replica::apply_welcome(const proto::Welcome& message) {
+  if (message.protocol_major() != kProtocolMajor)
+    return fail("the server speaks protocol " + std::to_string(message.protocol_major()) +
+                ", this client " + std::to_string(kProtocolMajor) + ": use the same release");
+  if (message.ticks_per_frame() != kTicksPerFrame || message.tick_us() != 1000)
+    return fail("Welcome: tick_us and ticks_per_frame must be 1000 and 16");
+  if (message.participant() < kMaxParticipants)
+    own_slot_.value = static_cast<std::uint8_t>(message.participant());
+}
+
+void Replica::apply_topology(const proto::SurfaceTopology& message) {
+  const int coordinates = message.rest_position_quanta_size();
+  const int corners = message.triangle_size();
+  if (coordinates == 0 || coordinates % 3 != 0 || coordinates / 3 > kMaxVertices)
+    return fail("SurfaceTopology.rest_position_quanta: " + std::to_string(coordinates) +
+                " numbers are not 1 to 4,000,000 vertices of three");
+  if (corners % 3 != 0) return fail("SurfaceTopology.triangle: not three corners each");
+  if (message.quantum_m() != wire::kQuantumMetres)
+    return fail("SurfaceTopology.quantum_m: this client knows a grid of 32 um only");
+  const auto vertex_count = static_cast<std::uint32_t>(coordinates / 3);
+  for (const std::uint32_t v : message.triangle())
+    if (v >= vertex_count) return fail("SurfaceTopology.triangle: vertex out of range");
+  for (const std::uint32_t v : message.fixed_vertex())
+    if (v >= vertex_count) return fail("SurfaceTopology.fixed_vertex: vertex out of range");
+
+  Topology next;
+  next.epoch = message.epoch();
+  next.organ_name = message.organ_name();
+  next.rest_positions.reserve(vertex_count);
+  for (int i = 0; i < coordinates; i += 3)
+    next.rest_positions.push_back(
+        wire::to_metres({message.rest_position_quanta(i), message.rest_position_quanta(i + 1),
+                         message.rest_position_quanta(i + 2)}));
+  next.triangles.reserve(static_cast<std::size_t>(corners / 3));
+  for (int i = 0; i < corners; i += 3)
+    next.triangles.push_back(
+        {message.triangle(i), message.triangle(i + 1), message.triangle(i + 2)});
+  next.fixed_vertices.assign(message.fixed_vertex().begin(), message.fixed_vertex().end());
+
+  topology_ = std::move(next);
+  ++topology_version_;
+  history_.clear();
+  ++history_version_;
+  if (has_moved_.size() < vertex_count) has_moved_.resize(vertex_count, 0);
+  request_pending_ = false;
+  if (sync_state_ != SyncState::Healing) sync_state_ = SyncState::WaitingForKeyframe;
+}
+
+bool Replica::decode_surface(const proto::SurfaceFrame& message) {
+  Bytes payload(message.payload().begin(), message.payload().end());
+  if (!message.is_keyframe() && ++deltas_seen_ == corrupt_at_ && !payload.empty())
+    payload[payload.size() / 2] ^= 0x10u;
+  if (message.is_keyframe()) {
+    scratch_.assign(topology_.rest_positions.size(), {});
+    if (!wire::decode_keyframe(payload, scratch_).ok()) return false;
+  } else {
+    scratch_ = history_.back().surface;
+    if (!wire::decode_delta(payload, scratch_).ok()) return false;
+  }
+  return wire::surface_crc(scratch_) == message.surface_crc();
+}
+
+void Replica::apply_surface(const proto::SurfaceFrame& message, std::uint64_t arrival_ns) {
+  if (sync_state_ == SyncState::WaitingForTopology) return;
+  if (request_pending_) need_keyframe(message.frame());
+  if (!message.is_keyframe()) {
+    if (sync_state_ != SyncState::InStep) {
+      ++counters_.deltas_ignored;
+      return;
+    }
+    if (message.base_frame() != history_.back().frame || message.epoch() != topology_.epoch) {
+      ++counters_.base_mismatches;
+      return need_keyframe(message.frame());
+    }
+  } else if (message.epoch() != topology_.epoch) {
+    return fail("SurfaceFrame: keyframe of epoch " + std::to_string(message.epoch()) +
+                " without its SurfaceTopology");
+  }
+  if (!decode_surface(message)) {
+    ++counters_.crc_mismatches;
+    return need_keyframe(message.frame());
+  }
+  accept_frame(message, arrival_ns);
+}
+
+void Replica::accept_frame(const proto::SurfaceFrame& message, std::uint64_t arrival_ns) {
+  ++counters_.frames;
+  if (message.is_keyframe()) {
+    ++counters_.keyframes;
+    if (sync_state_ == SyncState::Healing) ++counters_.healed;
+    sync_state_ = SyncState::InStep;
+    request_pending_ = false;
+    if (!history_.empty() && (message.tick() <= history_.back().tick ||
+                              message.tick() - history_.back().tick > kSeekTicks)) {
+      history_.clear();
+      ++history_version_;
+    }
+  } else {
+    counters_.delta_bytes += message.payload().size();
+  }
+  for (std::size_t i = 0; i < scratch_.size(); ++i) {
+    const auto& v = scratch_[i];
+    if (!message.is_keyframe() && !(v == history_.back().surface[i])) ++counters_.changed_vertices;
+    const std::int64_t x = v.x, y = v.y, z = v.z;
+    if (has_moved_[i] == 0 && x * x + y * y + z * z > kMovedQuantaSquared) {
+      has_moved_[i] = 1;
+      ++moved_count_;
+    }
+  }
+  SessionFrame next;
+  if (history_.size() >= kHistoryFrames) {
+    next = std::move(history_.front());  // its buffers are used again
+    history_.pop_front();
+  }
+  next.frame = message.frame();
+  next.tick = message.tick();
+  next.arrival_ns = arrival_ns;
+  next.surface = scratch_;
+  next.has_state = false;
+  history_.push_back(std::move(next));
+  surface_crc_ = message.surface_crc();
+
+  if (counters_.frames % kFramesPerAck == 0) {
+    proto::Envelope ack;
+    ack.mutable_frame_ack()->set_frame(message.frame());
+    ack.mutable_frame_ack()->set_surface_crc(surface_crc_);
+    send_(ack);  // the next one, 16 frames on, says the same
+  }
+  if (barrier_ && !barrier_answered_) answer_barrier();
+}
+
+void Replica::need_keyframe(Frame frame) {
+  if (sync_state_ == SyncState::Healing && !request_pending_) return;  // asked once already
+  sync_state_ = SyncState::Healing;
+  proto::Envelope request;
+  request.mutable_keyframe_request()->set_frame(frame);
+  request_pending_ = !send_(request);
+}
+
+void Replica::answer_barrier() {
+  const SessionFrame* last = newest();
+  if (sync_state_ == SyncState::InStep && last != nullptr && last->frame == barrier_->frame) {
+    // Computed anew from the integers held, not copied from the frame's header.
+    barrier_->own_crc = wire::surface_crc(last->surface);
+    proto::Envelope ack;
+    ack.mutable_frame_ack()->set_frame(barrier_->frame);
+    ack.mutable_frame_ack()->set_surface_crc(barrier_->own_crc);
+    barrier_answered_ = send_(ack);
+  } else if (sync_state_ == SyncState::InStep && last != nullptr && last->frame < barrier_->frame) {
+    need_keyframe(barrier_->frame);
+  }
+}
+
+void Replica::apply_state(const proto::FrameState& message) {
+  if (history_.empty() || history_.back().frame != message.frame())
+    return;  // its surface was ignored
+  SessionFrame& frame = history_.back();
+  frame.tools.clear();
+  for (const auto& state : message.tool()) {
+    if (state.tool() >= kMaxTools) return fail("FrameState.tool: slot out of range");
+    Tool tool;
+    tool.slot.value = static_cast<std::uint8_t>(state.tool());
+    tool.world_from_tool = to_pose(state.position_m(), state.orientation());
+    tool.verb = to_verb(state.verb());
+    tool.force_n = to_vec3(state.force_n());
+    if (!is_finite(tool.world_from_tool.position) || !is_finite(tool.force_n))
+      return fail("FrameState.tool: position or force is not finite");
+    tool.contact_nodes = state.contact_nodes();
+    tool.penetration_m = state.penetration_m();
+    tool.has_claim = state.has_claim();
+    tool.is_silent = state.is_silent();
+    frame.tools.push_back(tool);
+  }
+  std::ranges::sort(frame.tools, {}, &Tool::slot);
+  frame.regions.resize(topology_.rest_positions.size());
+  if (!expand_regions(message, frame.regions))
+    return fail("FrameState.region_runs: runs exceed the surface");
+  frame.figures.active_nodes = message.active_nodes();
+  frame.figures.queue_nodes = message.queue_nodes();
+  frame.figures.region_count = message.region_count();
+  frame.figures.tick_median_us = message.tick_cpu_us();
+  frame.figures.tick_p99_us = message.tick_cpu_p99_us();
+  frame.figures.stage_median_us.assign(message.stage_cpu_us().begin(),
+                                       message.stage_cpu_us().end());
+  frame.figures.slow_ticks = message.slow_ticks();
+  frame.figures.state_hash = message.state_hash();
+  frame.has_state = true;
+}
+
+void Replica::apply_participants(const proto::Participants& message) {
+  participants_.clear();
+  for (const auto& entry : message.participant()) {
+    if (entry.slot() >= kMaxParticipants) return fail("Participants: slot out of range");
+    Participant participant;
+    participant.slot.value = static_cast<std::uint8_t>(entry.slot());
+    participant.name = entry.name();
+    if (entry.role() >= 0 && entry.role() <= 4) participant.role = static_cast<Role>(entry.role());
+    for (const auto& shape : entry.tool())
+      participant.tools.push_back({shape.radius_m(), shape.length_m(), shape.reach_m()});
+    participants_.push_back(std::move(participant));
+  }
+  std::ranges::sort(participants_, {}, &Participant::slot);
+}
+
+void Replica::apply_claim(const proto::ClaimEvent& message, std::uint64_t arrival_ns) {
+  if (message.tool() >= kMaxTools) return fail("ClaimEvent.tool: slot out of range");
+  ClaimNotice notice;
+  notice.tick = message.tick();
+  notice.tool.value = static_cast<std::uint8_t>(message.tool());
+  notice.verb = to_verb(message.verb());
+  if (message.outcome() >= 0 && message.outcome() <= 5)
+    notice.outcome = static_cast<ClaimOutcome>(message.outcome());
+  notice.text = message.text();
+  notice.arrival_ns = arrival_ns;
+  notices_.push_back(std::move(notice));
+  if (notices_.size() > kMaxNotices) notices_.pop_front();
+  ++notice_count_;
+}
+
+const Participant* Replica::find_participant(ParticipantSlot slot) const {
+  const auto found = std::ranges::find(participants_, slot, &Participant::slot);
+  return found == participants_.end() ? nullptr : &*found;
+}
+
+double Replica::share_moved() const {
+  return has_moved_.empty()
+             ? 0.0
+             : static_cast<double>(moved_count_) / static_cast<double>(has_moved_.size());
+}
+
+}  // namespace trocar::replica

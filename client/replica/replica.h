@@ -1,0 +1,144 @@
+#pragma once
+
+// The client's copy of the session, built from messages and nothing else.
+//
+// The surface is the server's own integers. Every delta names the frame it starts from and carries
+// the CRC of what must come out:
+//
+//   in step --(CRC differs, base or epoch unknown, payload malformed)--> needs keyframe
+//      ^                                                                     | one KeyframeRequest,
+//      +---------------------- keyframe with right CRC <---------------------+ deltas ignored
+//
+// A frame that does not check out is never shown: the last good one stays. A keyframe may go back
+// in time (a replay that seeks), which clears the history. Barrier is answered with FrameAck for
+// exactly that frame and the replica's own CRC, after healing if need be; FrameAck also goes out
+// every 16 frames. Outside data: an invalid message sets `fault()`, after which messages are
+// ignored. Thread: render thread.
+
+#include <deque>
+#include <functional>
+#include <optional>
+
+#include "client/replica/session_source.h"
+#include "client/replica/session_view.h"
+#include "common/base/result.h"
+
+namespace trocar::proto {
+class Barrier;
+class ClaimEvent;
+class FrameState;
+class Participants;
+class SurfaceFrame;
+class SurfaceTopology;
+class Welcome;
+}  // namespace trocar::proto
+
+namespace trocar::replica {
+
+inline constexpr std::size_t kHistoryFrames = 8;  // 128 ms: covers the display delay and its jitter
+inline constexpr std::size_t kMaxNotices = 32;
+inline constexpr Frame kFramesPerAck = 16;
+
+enum class SyncState : std::uint8_t {
+  WaitingForTopology,
+  WaitingForKeyframe,  // the first one
+  InStep,
+  Healing,  // a keyframe was asked for
+};
+
+struct ReplicaCounters {
+  std::uint64_t frames = 0;          // applied, keyframes included
+  std::uint64_t keyframes = 0;       // applied
+  std::uint64_t deltas_ignored = 0;  // while healing
+  std::uint64_t crc_mismatches = 0;  // also payloads that do not decode
+  std::uint64_t base_mismatches = 0;
+  std::uint64_t healed = 0;            // returned to InStep after a mismatch of either kind
+  std::uint64_t bytes = 0;             // all messages, on the wire
+  std::uint64_t delta_bytes = 0;       // payloads of applied deltas
+  std::uint64_t changed_vertices = 0;  // by applied deltas
+  double bytes_per_changed_vertex() const {
+    return changed_vertices == 0
+               ? 0.0
+               : static_cast<double>(delta_bytes) / static_cast<double>(changed_vertices);
+  }
+};
+
+struct BarrierOutcome {
+  Frame frame = 0;
+  std::uint32_t server_crc = 0;
+  std::uint32_t own_crc = 0;
+};
+
+class Replica final : public MessageSink {
+ public:
+  // `send` queues a message to the server and returns false if it could not; then it is tried again
+  // with the next frame.
+  using Send = std::function<bool(const proto::Envelope&)>;
+  explicit Replica(Send send);
+
+  void on_message(const proto::Envelope& message, std::uint64_t arrival_ns,
+                  std::size_t bytes) override;
+
+  SyncState sync_state() const { return sync_state_; }
+  const Status& fault() const { return fault_; }
+  // Invalid until Welcome.
+  ParticipantSlot own_slot() const { return own_slot_; }
+  // Valid once sync_state() is past WaitingForTopology; `topology_version` counts replacements.
+  const Topology& topology() const { return topology_; }
+  std::uint64_t topology_version() const { return topology_version_; }
+  // Ascending by tick, at most kHistoryFrames; `history_version` counts restarts (seek, topology).
+  const std::deque<SessionFrame>& history() const { return history_; }
+  std::uint64_t history_version() const { return history_version_; }
+  const SessionFrame* newest() const { return history_.empty() ? nullptr : &history_.back(); }
+  std::uint32_t surface_crc() const { return surface_crc_; }  // of the newest frame
+  const std::vector<Participant>& participants() const { return participants_; }
+  const Participant* find_participant(ParticipantSlot slot) const;
+  // Latest last; `notice_count` counts all that ever came.
+  const std::deque<ClaimNotice>& notices() const { return notices_; }
+  std::uint64_t notice_count() const { return notice_count_; }
+  const std::optional<BarrierOutcome>& barrier() const { return barrier_; }
+  const std::string& goodbye_text() const { return goodbye_text_; }
+  const ReplicaCounters& counters() const { return counters_; }
+  // Share of surface vertices whose displacement exceeded 1 mm in any applied frame, 0 to 1.
+  double share_moved() const;
+
+  // For tests of healing: flips one byte of the n-th delta (from 1) before it is applied.
+  void corrupt_delta(std::uint64_t n) { corrupt_at_ = n; }
+
+ private:
+  void apply_welcome(const proto::Welcome& message);
+  void apply_topology(const proto::SurfaceTopology& message);
+  void apply_surface(const proto::SurfaceFrame& message, std::uint64_t arrival_ns);
+  void apply_state(const proto::FrameState& message);
+  void apply_participants(const proto::Participants& message);
+  void apply_claim(const proto::ClaimEvent& message, std::uint64_t arrival_ns);
+  bool decode_surface(const proto::SurfaceFrame& message);
+  void accept_frame(const proto::SurfaceFrame& message, std::uint64_t arrival_ns);
+  void need_keyframe(Frame frame);
+  void answer_barrier();
+  void fail(std::string what);
+
+  Send send_;
+  Status fault_;
+  SyncState sync_state_ = SyncState::WaitingForTopology;
+  ParticipantSlot own_slot_;
+  Topology topology_;
+  std::uint64_t topology_version_ = 0;
+  std::deque<SessionFrame> history_;
+  std::uint64_t history_version_ = 0;
+  wire::QuantisedSurface scratch_;  // the frame being reconstructed
+  std::uint32_t surface_crc_ = 0;
+  bool request_pending_ = false;  // a KeyframeRequest that could not be queued yet
+  std::vector<Participant> participants_;
+  std::deque<ClaimNotice> notices_;
+  std::uint64_t notice_count_ = 0;
+  std::optional<BarrierOutcome> barrier_;
+  bool barrier_answered_ = false;
+  std::string goodbye_text_;
+  ReplicaCounters counters_;
+  std::uint64_t deltas_seen_ = 0, corrupt_at_ = 0;
+  std::vector<std::uint8_t> has_moved_;  // per vertex slot
+  std::size_t moved_count_ = 0;
+};
+
+}  // namespace trocar::replica

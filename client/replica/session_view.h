@@ -1,0 +1,98 @@
+#pragma once
+
+// What a client knows of the session, in plain types: nothing above the replica sees a Protobuf
+// message. Metres, world frame.
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "common/base/ids.h"
+#include "common/base/tick.h"
+#include "common/scene/tool.h"
+#include "common/wire/quantise.h"
+
+namespace trocar::replica {
+
+enum class Role : std::uint8_t {
+  Unknown = 0,
+  Surgeon = 1,
+  Assistant = 2,
+  Instructor = 3,
+  Observer = 4
+};
+inline bool has_tools(Role role) {
+  return role == Role::Surgeon || role == Role::Assistant;
+}
+const char* name_of(Role role);
+
+struct Participant {
+  ParticipantSlot slot;
+  std::string name;
+  Role role = Role::Unknown;
+  std::vector<scene::ToolShape> tools;
+};
+
+struct Tool {
+  ToolSlot slot;
+  Pose world_from_tool;
+  scene::Verb verb = scene::Verb::None;
+  Vec3f force_n;  // of the tissue on the tool
+  std::uint32_t contact_nodes = 0;
+  float penetration_m = 0;  // deepest contact
+  bool has_claim = false;   // its push or grasp is in effect
+  bool is_silent = false;   // no sample for 250 ticks
+};
+
+// The surface at rest, per vertex slot.
+struct Topology {
+  std::uint32_t epoch = 0;
+  std::string organ_name;
+  std::vector<Vec3f> rest_positions;
+  std::vector<std::array<std::uint32_t, 3>> triangles;  // outward, indices into rest_positions
+  std::vector<std::uint32_t> fixed_vertices;
+};
+
+// What the server says about itself with each frame.
+struct FrameFigures {
+  std::uint32_t active_nodes = 0, queue_nodes = 0, region_count = 0;
+  float tick_median_us = 0, tick_p99_us = 0;
+  std::vector<float> stage_median_us;  // order of Stage in server/step
+  std::uint64_t slow_ticks = 0;
+  std::uint64_t state_hash = 0;
+};
+
+// One frame as the server published it.
+struct SessionFrame {
+  Frame frame = 0;
+  Tick tick = 0;
+  std::uint64_t arrival_ns = 0;        // monotonic
+  wire::QuantisedSurface surface;      // displacements from rest
+  bool has_state = false;              // the rest is valid: its FrameState has arrived
+  std::vector<Tool> tools;             // by slot
+  std::vector<std::uint16_t> regions;  // per vertex slot: 0 not active, else merged region
+  FrameFigures figures;
+};
+
+enum class ClaimOutcome : std::uint8_t {
+  Granted = 0,
+  RefusedHeld = 1,
+  RefusedNothingInReach = 2,
+  Released = 3,
+  TakenOver = 4,
+  Expired = 5,
+};
+inline bool is_refusal(ClaimOutcome outcome) {
+  return outcome == ClaimOutcome::RefusedHeld || outcome == ClaimOutcome::RefusedNothingInReach;
+}
+
+struct ClaimNotice {
+  Tick tick = 0;
+  ToolSlot tool;
+  scene::Verb verb = scene::Verb::None;
+  ClaimOutcome outcome = ClaimOutcome::Granted;
+  std::string text;  // one line for the person
+  std::uint64_t arrival_ns = 0;
+};
+
+}  // namespace trocar::replica

@@ -1,0 +1,155 @@
+#include "client/ui/hud.h"
+
+#include <algorithm>
+#include <filesystem>
+
+#include "client/render/gl.h"
+#include "client/ui/hud_panels.h"
+
+#define GLFW_INCLUDE_NONE
+#include <GLFW/glfw3.h>
+#include <backends/imgui_impl_glfw.h>
+#include <backends/imgui_impl_opengl3.h>
+#include <imgui.h>
+
+namespace trocar::ui {
+namespace {
+
+constexpr const char* kFont = "/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf";
+constexpr const char* kBoldFont = "/usr/share/fonts/truetype/dejavu/DejaVuSans-Bold.ttf";
+constexpr float kFontPixels = 14.0f;
+
+void set_style(float scale) {
+  ImGui::StyleColorsDark();
+  ImGuiStyle& style = ImGui::GetStyle();
+  style.WindowRounding = 9;
+  style.FrameRounding = 5;
+  style.GrabRounding = 5;
+  style.WindowBorderSize = 1;
+  style.WindowPadding = {13, 11};
+  style.ItemSpacing = {8, 5};
+  style.CellPadding = {5, 2};
+  ImVec4* colours = style.Colors;
+  colours[ImGuiCol_WindowBg] = {0.035f, 0.050f, 0.066f, 0.80f};
+  colours[ImGuiCol_Border] = {0.55f, 0.70f, 0.80f, 0.16f};
+  colours[ImGuiCol_Text] = {0.87f, 0.91f, 0.94f, 1};
+  colours[ImGuiCol_TextDisabled] = {0.52f, 0.60f, 0.66f, 1};
+  colours[ImGuiCol_FrameBg] = {0.16f, 0.21f, 0.26f, 0.75f};
+  colours[ImGuiCol_FrameBgHovered] = {0.20f, 0.28f, 0.35f, 0.85f};
+  colours[ImGuiCol_FrameBgActive] = {0.22f, 0.33f, 0.42f, 0.95f};
+  colours[ImGuiCol_SliderGrab] = {0.30f, 0.72f, 0.92f, 1};
+  colours[ImGuiCol_SliderGrabActive] = {0.45f, 0.82f, 1.0f, 1};
+  colours[ImGuiCol_Button] = {0.16f, 0.23f, 0.29f, 0.9f};
+  colours[ImGuiCol_ButtonHovered] = {0.22f, 0.36f, 0.46f, 1};
+  colours[ImGuiCol_ButtonActive] = {0.26f, 0.46f, 0.60f, 1};
+  colours[ImGuiCol_Separator] = {0.55f, 0.70f, 0.80f, 0.16f};
+  style.ScaleAllSizes(scale);
+}
+
+}  // namespace
+
+Hud::Hud(render::GlContext& context) : context_(context) {
+  IMGUI_CHECKVERSION();
+  ImGui::CreateContext();
+  ImGuiIO& io = ImGui::GetIO();
+  io.IniFilename = nullptr;
+  if (GLFWwindow* window = context.window()) {
+    float x = 1, y = 1;
+    glfwGetWindowContentScale(window, &x, &y);
+    scale_ = std::clamp(x, 1.0f, 3.0f);
+    ImGui_ImplGlfw_InitForOpenGL(window, true);
+  }
+  const int height = context.size().height;
+  if (height > 1300) scale_ = std::max(scale_, static_cast<float>(height) / 1080.0f);
+  ImGui_ImplOpenGL3_Init("#version 330 core");
+  if (std::filesystem::exists(kFont) && std::filesystem::exists(kBoldFont)) {
+    io.Fonts->AddFontFromFileTTF(kFont, kFontPixels * scale_);
+    io.Fonts->AddFontFromFileTTF(kBoldFont, kFontPixels * scale_);
+  } else {
+    ImFontConfig config;
+    config.SizePixels = 13 * scale_;
+    io.Fonts->AddFontDefault(&config);
+  }
+  set_style(scale_);
+}
+
+Hud::~Hud() {
+  ImGui_ImplOpenGL3_Shutdown();
+  if (context_.window() != nullptr) ImGui_ImplGlfw_Shutdown();
+  ImGui::DestroyContext();
+}
+
+void Hud::begin_frame(float seconds) {
+  ImGui_ImplOpenGL3_NewFrame();
+  if (context_.window() != nullptr) {
+    ImGui_ImplGlfw_NewFrame();
+  } else {
+    const render::Size size = context_.size();
+    ImGui::GetIO().DisplaySize = {static_cast<float>(size.width), static_cast<float>(size.height)};
+    ImGui::GetIO().DeltaTime = std::max(seconds, 1e-4f);
+  }
+  ImGui::NewFrame();
+}
+
+device::PointerInput Hud::input() const {
+  device::PointerInput input;
+  input.is_over_scene = false;
+  if (context_.window() == nullptr) return input;
+  const ImGuiIO& io = ImGui::GetIO();
+  const auto key = [](int code) { return ImGui::IsKeyDown(code); };
+  // Dear ImGui counts in screen coordinates, the camera in pixels of the framebuffer.
+  input.x = io.MousePos.x * io.DisplayFramebufferScale.x;
+  input.y = io.MousePos.y * io.DisplayFramebufferScale.y;
+  input.dx = io.MouseDelta.x * io.DisplayFramebufferScale.x;
+  input.dy = io.MouseDelta.y * io.DisplayFramebufferScale.y;
+  const bool is_inside = io.MousePos.x >= 0 && io.MousePos.y >= 0 &&
+                         io.MousePos.x < io.DisplaySize.x && io.MousePos.y < io.DisplaySize.y;
+  input.is_over_scene = is_inside && !io.WantCaptureMouse;
+  if (!io.WantCaptureMouse) {
+    input.wheel = io.MouseWheel;
+    input.left = io.MouseDown[0];
+    input.right = io.MouseDown[1];
+    input.middle = io.MouseDown[2];
+  }
+  input.control = io.KeyCtrl;
+  input.shift = io.KeyShift;
+  if (io.WantTextInput) return input;
+  input.push = key(GLFW_KEY_F);
+  input.grasp = key(GLFW_KEY_SPACE);
+  input.deeper = key(GLFW_KEY_W);
+  input.nearer = key(GLFW_KEY_S);
+  input.zoom_in = key(GLFW_KEY_EQUAL) || key(GLFW_KEY_KP_ADD);
+  input.zoom_out = key(GLFW_KEY_MINUS) || key(GLFW_KEY_KP_SUBTRACT);
+  return input;
+}
+
+HudActions Hud::draw(const HudModel& model) {
+  HudActions actions;
+  draw_labels(model, scale_);
+  draw_session_panel(model, scale_);
+  draw_participants_panel(model, scale_);
+  draw_messages(model, scale_);
+  if (model.timeline) draw_timeline(*model.timeline, scale_, actions);
+  draw_help(model, scale_);
+  draw_status(model, scale_);
+  if (context_.window() == nullptr || ImGui::GetIO().WantTextInput) return actions;
+  const auto pressed = [](int code) { return ImGui::IsKeyPressed(code, false); };
+  actions.toggle_help = pressed(GLFW_KEY_H) || pressed(GLFW_KEY_F1);
+  actions.toggle_regions = pressed(GLFW_KEY_O);
+  actions.reset_camera = pressed(GLFW_KEY_C);
+  actions.screenshot = pressed(GLFW_KEY_F12);
+  if (model.timeline && pressed(GLFW_KEY_SPACE)) actions.toggle_play = true;
+  if (model.timeline && (pressed(GLFW_KEY_LEFT) || pressed(GLFW_KEY_RIGHT)))
+    actions.seek_seconds = model.timeline->position_seconds + (pressed(GLFW_KEY_LEFT) ? -2.0 : 2.0);
+  return actions;
+}
+
+void Hud::render() {
+  ImGui::Render();
+  glBindFramebuffer(GL_FRAMEBUFFER, context_.framebuffer());
+  const render::Size size = context_.size();
+  glViewport(0, 0, size.width, size.height);
+  ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
+}
+
+}  // namespace trocar::ui

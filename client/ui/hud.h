@@ -1,0 +1,95 @@
+#pragma once
+
+// What stands in front of the scene: figures of the session, participants, messages, names at
+// tools, help, and the timeline of a replay. Dear ImGui, with a window's events or (headless) none.
+//
+// Per picture: begin_frame, then input(), then draw(model), then, after the scene was drawn into
+// the context's framebuffer, render(). Thread: render thread. One Hud per process (Dear ImGui keeps
+// one context).
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "client/device/view_rays.h"
+#include "client/render/gl_context.h"
+#include "client/render/tool_mesh.h"
+#include "client/replica/session_view.h"
+
+namespace trocar::ui {
+
+struct HudParticipant {
+  std::string name;
+  replica::Role role = replica::Role::Unknown;
+  bool is_self = false;
+  bool has_tool = false;  // the rest is valid
+  render::Colour colour;
+  scene::Verb verb = scene::Verb::None;
+  bool has_claim = false, is_silent = false;
+  float force_n = 0;
+  std::uint32_t contact_nodes = 0;
+};
+
+struct HudLabel {
+  float x = 0, y = 0;  // pixels; the text stands to the right
+  std::string text;
+  render::Colour colour;
+};
+
+struct HudMessage {
+  std::string text;
+  float age_seconds = 0;  // fades between 4 and 5 s
+  bool is_trouble = false;
+};
+
+struct HudTimeline {
+  double first_seconds = 0, last_seconds = 0, position_seconds = 0;
+  bool is_playing = false;
+  float speed = 1;
+};
+
+struct HudModel {
+  std::string title;     // "127.0.0.1:7690" or a file's name
+  std::string organ;     // "liver, 1,553 surface vertices"
+  std::string own_role;  // "surgeon", "instructor, watching", "replay"
+  std::string status;    // empty when live; else what it waits for, in the middle of the screen
+  replica::FrameFigures figures;
+  double session_seconds = 0, round_trip_ms = 0;
+  double pictures_per_second = 0, frames_per_second = 0, bytes_per_second = 0;
+  std::string sync_text;  // "in step, CRC 1a2b3c4d"
+  bool is_in_step = false;
+  std::vector<HudParticipant> participants;
+  std::vector<HudLabel> labels;
+  std::vector<HudMessage> messages;
+  std::optional<HudTimeline> timeline;
+  bool shows_regions = true;
+  bool shows_help = false;
+  bool has_own_tool = false;
+};
+
+struct HudActions {
+  bool toggle_help = false, toggle_regions = false, reset_camera = false, screenshot = false;
+  bool toggle_play = false;
+  std::optional<double> seek_seconds;
+  std::optional<float> speed;
+};
+
+class Hud {
+ public:
+  explicit Hud(render::GlContext& context);
+  ~Hud();
+  Hud(const Hud&) = delete;
+  Hud& operator=(const Hud&) = delete;
+
+  void begin_frame(float seconds);
+  device::PointerInput input() const;
+  HudActions draw(const HudModel& model);
+  void render();
+
+ private:
+  render::GlContext& context_;
+  float scale_ = 1;
+};
+
+}  // namespace trocar::ui

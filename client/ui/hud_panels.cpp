@@ -1,0 +1,276 @@
+#include "client/ui/hud_panels.h"
+
+#include <imgui.h>
+
+#include <algorithm>
+#include <cstdarg>
+#include <cstdio>
+
+namespace trocar::ui {
+namespace {
+
+constexpr ImGuiWindowFlags kPanel = ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove |
+                                    ImGuiWindowFlags_NoSavedSettings |
+                                    ImGuiWindowFlags_AlwaysAutoResize |
+                                    ImGuiWindowFlags_NoFocusOnAppearing | ImGuiWindowFlags_NoNav;
+// A panel that only informs lets the pointer through to the scene.
+constexpr ImGuiWindowFlags kGlass = kPanel | ImGuiWindowFlags_NoInputs;
+constexpr float kMargin = 14;
+
+const ImVec4 kGood = {0.42f, 0.86f, 0.58f, 1};
+const ImVec4 kTrouble = {1.0f, 0.66f, 0.30f, 1};
+
+ImVec4 to_imgui(render::Colour c, float alpha = 1) {
+  return {static_cast<float>(c.r) / 255, static_cast<float>(c.g) / 255,
+          static_cast<float>(c.b) / 255, alpha};
+}
+
+ImFont* bold() {
+  const auto& fonts = ImGui::GetIO().Fonts->Fonts;
+  return fonts[fonts.Size - 1];
+}
+
+std::string format(const char* pattern, ...) __attribute__((format(printf, 1, 2)));
+std::string format(const char* pattern, ...) {
+  char text[160];
+  va_list arguments;
+  va_start(arguments, pattern);
+  std::vsnprintf(text, sizeof text, pattern, arguments);
+  va_end(arguments);
+  return text;
+}
+
+void row(const char* name, const std::string& value) {
+  ImGui::TableNextRow();
+  ImGui::TableNextColumn();
+  ImGui::TextDisabled("%s", name);
+  ImGui::TableNextColumn();
+  ImGui::TextUnformatted(value.c_str());
+}
+
+void heading(const char* text) {
+  ImGui::PushFont(bold());
+  ImGui::TextUnformatted(text);
+  ImGui::PopFont();
+}
+
+std::string clock_text(double seconds) {
+  const int whole = static_cast<int>(seconds);
+  return format("%d:%04.1f", whole / 60, seconds - whole / 60 * 60);
+}
+
+void help_row(const char* key, const char* what) {
+  ImGui::TableNextRow();
+  ImGui::TableNextColumn();
+  ImGui::PushFont(bold());
+  ImGui::TextUnformatted(key);
+  ImGui::PopFont();
+  ImGui::TableNextColumn();
+  ImGui::TextUnformatted(what);
+}
+
+}  // namespace
+
+std::string with_thousands(std::uint64_t value) {
+  std::string text = std::to_string(value);
+  for (int at = static_cast<int>(text.size()) - 3; at > 0; at -= 3)
+    text.insert(static_cast<std::size_t>(at), ",");
+  return text;
+}
+
+std::string byte_rate(double bytes_per_second) {
+  if (bytes_per_second < 1e6) return format("%.1f kB/s", bytes_per_second / 1e3);
+  return format("%.2f MB/s", bytes_per_second / 1e6);
+}
+
+void draw_session_panel(const HudModel& model, float scale) {
+  ImGui::SetNextWindowPos({kMargin * scale, kMargin * scale});
+  ImGui::Begin("session", nullptr, kGlass);
+  heading(model.title.c_str());
+  ImGui::TextDisabled("%s", model.own_role.c_str());
+  ImGui::TextDisabled("%s", model.organ.c_str());
+  ImGui::Separator();
+  if (ImGui::BeginTable("figures", 2, ImGuiTableFlags_SizingFixedFit)) {
+    const auto& f = model.figures;
+    row("session time", clock_text(model.session_seconds));
+    row("tick", format("%.0f us median, %.0f us p99", f.tick_median_us, f.tick_p99_us));
+    row("slow ticks", with_thousands(f.slow_ticks));
+    row("active nodes", format("%s, queue %s", with_thousands(f.active_nodes).c_str(),
+                               with_thousands(f.queue_nodes).c_str()));
+    row("regions", std::to_string(f.region_count));
+    if (!model.timeline) row("round trip", format("%.1f ms", model.round_trip_ms));
+    row("stream", format("%.1f frames/s, %s", model.frames_per_second,
+                         byte_rate(model.bytes_per_second).c_str()));
+    row("display", format("%.0f pictures/s", model.pictures_per_second));
+    ImGui::TableNextRow();
+    ImGui::TableNextColumn();
+    ImGui::TextDisabled("surface");
+    ImGui::TableNextColumn();
+    ImGui::TextColored(model.is_in_step ? kGood : kTrouble, "%s", model.sync_text.c_str());
+    ImGui::EndTable();
+  }
+  ImGui::End();
+}
+
+void draw_participants_panel(const HudModel& model, float scale) {
+  if (model.participants.empty()) return;
+  const ImVec2 screen = ImGui::GetIO().DisplaySize;
+  ImGui::SetNextWindowPos({screen.x - kMargin * scale, kMargin * scale}, 0, {1, 0});
+  ImGui::Begin("participants", nullptr, kGlass);
+  heading("Participants");
+  ImGui::Separator();
+  if (ImGui::BeginTable("list", 4, ImGuiTableFlags_SizingFixedFit)) {
+    for (const HudParticipant& p : model.participants) {
+      ImGui::TableNextRow();
+      ImGui::TableNextColumn();
+      const ImVec2 at = ImGui::GetCursorScreenPos();
+      const float side = ImGui::GetTextLineHeight();
+      const ImU32 colour =
+          ImGui::GetColorU32(p.has_tool ? to_imgui(p.colour, p.is_silent ? 0.4f : 1.0f)
+                                        : ImVec4{0.4f, 0.47f, 0.53f, 1});
+      if (p.has_tool)
+        ImGui::GetWindowDrawList()->AddCircleFilled({at.x + side / 2, at.y + side / 2},
+                                                    side * 0.36f, colour, 20);
+      else
+        ImGui::GetWindowDrawList()->AddCircle({at.x + side / 2, at.y + side / 2}, side * 0.30f,
+                                              colour, 20, 1.5f * scale);
+      ImGui::Dummy({side, side});
+      ImGui::TableNextColumn();
+      if (p.is_self) ImGui::PushFont(bold());
+      ImGui::TextUnformatted((p.is_self ? p.name + " (you)" : p.name).c_str());
+      if (p.is_self) ImGui::PopFont();
+      ImGui::TableNextColumn();
+      const char* doing = p.is_silent                    ? "silent"
+                          : p.verb == scene::Verb::None  ? replica::name_of(p.role)
+                          : !p.has_claim                 ? "refused"
+                          : p.verb == scene::Verb::Grasp ? "grasps"
+                                                         : "pushes";
+      if (p.has_tool && p.verb != scene::Verb::None && !p.is_silent)
+        ImGui::TextColored(p.has_claim ? ImGui::GetStyle().Colors[ImGuiCol_Text] : kTrouble, "%s",
+                           doing);
+      else
+        ImGui::TextDisabled("%s", doing);
+      ImGui::TableNextColumn();
+      if (p.has_tool && (p.contact_nodes > 0 || p.force_n >= 0.005f))
+        ImGui::Text("%.2f N, %u nodes", p.force_n, p.contact_nodes);
+    }
+    ImGui::EndTable();
+  }
+  ImGui::End();
+}
+
+void draw_labels(const HudModel& model, float scale) {
+  ImDrawList* list = ImGui::GetBackgroundDrawList();
+  for (const HudLabel& label : model.labels) {
+    const ImVec2 size = ImGui::CalcTextSize(label.text.c_str());
+    const ImVec2 from = {label.x + 12 * scale, label.y - size.y / 2};
+    const ImVec2 pad = {7 * scale, 3 * scale};
+    list->AddRectFilled({from.x - pad.x, from.y - pad.y},
+                        {from.x + size.x + pad.x, from.y + size.y + pad.y},
+                        IM_COL32(8, 12, 16, 170), 6 * scale);
+    list->AddRectFilled({from.x - pad.x, from.y - pad.y},
+                        {from.x - pad.x + 3 * scale, from.y + size.y + pad.y},
+                        ImGui::GetColorU32(to_imgui(label.colour)), 2 * scale);
+    list->AddText({from.x + 2 * scale, from.y}, IM_COL32(232, 240, 245, 255), label.text.c_str());
+  }
+}
+
+void draw_messages(const HudModel& model, float scale) {
+  const ImVec2 screen = ImGui::GetIO().DisplaySize;
+  float y = screen.y - (model.timeline ? 92 : 40) * scale;
+  ImDrawList* list = ImGui::GetForegroundDrawList();
+  for (auto message = model.messages.rbegin(); message != model.messages.rend(); ++message) {
+    const float alpha = std::clamp(5.0f - message->age_seconds, 0.0f, 1.0f);
+    if (alpha <= 0) continue;
+    const ImVec2 size = ImGui::CalcTextSize(message->text.c_str());
+    const ImVec2 pad = {14 * scale, 7 * scale};
+    const ImVec2 from = {(screen.x - size.x) / 2, y - size.y};
+    const auto fade = [&](int a) { return static_cast<int>(static_cast<float>(a) * alpha); };
+    const ImU32 edge = message->is_trouble ? IM_COL32(255, 160, 70, fade(190))
+                                           : IM_COL32(110, 190, 230, fade(120));
+    list->AddRectFilled({from.x - pad.x, from.y - pad.y},
+                        {from.x + size.x + pad.x, from.y + size.y + pad.y},
+                        IM_COL32(9, 13, 17, fade(215)), 9 * scale);
+    list->AddRect({from.x - pad.x, from.y - pad.y},
+                  {from.x + size.x + pad.x, from.y + size.y + pad.y}, edge, 9 * scale, 0,
+                  1.5f * scale);
+    list->AddText(from, IM_COL32(238, 242, 245, fade(255)), message->text.c_str());
+    y -= size.y + 3 * pad.y;
+  }
+}
+
+void draw_timeline(const HudTimeline& timeline, float scale, HudActions& actions) {
+  const ImVec2 screen = ImGui::GetIO().DisplaySize;
+  const float width = std::min(screen.x - 2 * kMargin * scale, 900 * scale);
+  ImGui::SetNextWindowPos({screen.x / 2, screen.y - kMargin * scale}, 0, {0.5f, 1});
+  ImGui::SetNextWindowSize({width, 0});
+  ImGui::Begin("timeline", nullptr, kPanel & ~ImGuiWindowFlags_AlwaysAutoResize);
+  if (ImGui::Button(timeline.is_playing ? "Pause" : "Play", {70 * scale, 0}))
+    actions.toggle_play = true;
+  ImGui::SameLine();
+  auto position = static_cast<float>(timeline.position_seconds);
+  const std::string text =
+      clock_text(timeline.position_seconds) + " / " + clock_text(timeline.last_seconds);
+  ImGui::SetNextItemWidth(width - 290 * scale);
+  if (ImGui::SliderFloat("##seek", &position, static_cast<float>(timeline.first_seconds),
+                         static_cast<float>(timeline.last_seconds), text.c_str(),
+                         ImGuiSliderFlags_AlwaysClamp | ImGuiSliderFlags_NoInput))
+    actions.seek_seconds = position;
+  for (const float speed : {0.25f, 1.0f, 4.0f}) {
+    ImGui::SameLine();
+    const bool is_current = timeline.speed == speed;
+    if (is_current)
+      ImGui::PushStyleColor(ImGuiCol_Button, ImGui::GetStyle().Colors[ImGuiCol_ButtonActive]);
+    if (ImGui::Button(format("%gx", speed).c_str(), {52 * scale, 0})) actions.speed = speed;
+    if (is_current) ImGui::PopStyleColor();
+  }
+  ImGui::End();
+}
+
+void draw_help(const HudModel& model, float scale) {
+  const ImVec2 screen = ImGui::GetIO().DisplaySize;
+  ImGui::SetNextWindowPos({kMargin * scale, screen.y - kMargin * scale}, 0, {0, 1});
+  ImGui::SetNextWindowBgAlpha(model.shows_help ? 0.86f : 0.45f);
+  ImGui::Begin("help", nullptr, kGlass);
+  if (!model.shows_help) {
+    ImGui::TextDisabled(model.has_own_tool ? "left button push   Space grasp   wheel depth   H help"
+                                           : "right drag turn   Ctrl+wheel zoom   H help");
+    ImGui::End();
+    return;
+  }
+  heading("Mouse and keyboard");
+  ImGui::Separator();
+  if (ImGui::BeginTable("keys", 2, ImGuiTableFlags_SizingFixedFit)) {
+    if (model.has_own_tool) {
+      help_row("move", "the tip follows the pointer, just above the tissue");
+      help_row("left button, F", "push: hold, then wheel or W / S for depth");
+      help_row("Space", "grasp: hold near the surface, lift by moving");
+      help_row("wheel, W / S", "depth along the view; Shift: finer");
+    }
+    if (model.timeline) {
+      help_row("Space", "play or pause");
+      help_row("left, right", "two seconds back or on");
+    }
+    help_row("right drag", "turn the view");
+    help_row("middle drag", "move the view");
+    help_row("Ctrl+wheel, + -", "zoom");
+    help_row("C", "view as at the start");
+    help_row("O", model.shows_regions ? "hide active regions" : "show active regions");
+    help_row("F12", "screenshot into the current folder");
+    help_row("H, F1", "hide this");
+    ImGui::EndTable();
+  }
+  ImGui::TextDisabled("Arrows: force of the tissue on a tool, 20 mm per N.");
+  ImGui::End();
+}
+
+void draw_status(const HudModel& model, float) {
+  if (model.status.empty()) return;
+  const ImVec2 screen = ImGui::GetIO().DisplaySize;
+  ImGui::SetNextWindowPos({screen.x / 2, screen.y / 2}, 0, {0.5f, 0.5f});
+  ImGui::Begin("status", nullptr, kGlass);
+  ImGui::TextUnformatted(model.status.c_str());
+  ImGui::End();
+}
+
+}  // namespace trocar::ui

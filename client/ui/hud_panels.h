@@ -1,0 +1,23 @@
+#pragma once
+
+// The parts of the HUD, each drawn with Dear ImGui between NewFrame and Render. `scale` is pixels
+// per design pixel.
+
+#include "client/ui/hud.h"
+
+namespace trocar::ui {
+
+void draw_session_panel(const HudModel& model, float scale);
+void draw_participants_panel(const HudModel& model, float scale);
+void draw_labels(const HudModel& model, float scale);
+void draw_messages(const HudModel& model, float scale);
+void draw_timeline(const HudTimeline& timeline, float scale, HudActions& actions);
+void draw_help(const HudModel& model, float scale);
+void draw_status(const HudModel& model, float scale);
+
+// "1,553"
+std::string with_thousands(std::uint64_t value);
+// "12.3 kB/s"
+std::string byte_rate(double bytes_per_second);
+
+}  // namespace trocar::ui

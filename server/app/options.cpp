@@ -1,0 +1,97 @@
+#include "server/app/options.h"
+
+#include <CLI/CLI.hpp>
+#include <charconv>
+
+#include "common/base/version.h"
+#include "server/app/journal_sink.h"
+#include "server/step/simulation.h"
+
+namespace trocar::app {
+namespace {
+
+constexpr const char* kExamples = R"(
+Examples:
+  trocar-server
+      the built-in liver at 127.0.0.1:7690, for programs on this machine
+  trocar-server --organ lattice --listen 0.0.0.0:7690
+      a block of springs, for everybody on the network (there is no access control yet)
+  trocar-server --seconds 20 --summary out/summary.json --journal out/session.mcap
+      20 simulated seconds, then the replicas are compared, and the figures written
+
+Ctrl-C or SIGTERM: everybody is asked for the CRC of what they show, told goodbye, and the journal
+is closed. Exit codes: 0 ok, 2 command line, 3 bad file, 5 port taken or processor too old.
+)";
+
+std::string version_text() {
+  return std::string("trocar-server ") + kVersion + ", sim_version " +
+         std::to_string(kSimVersion) + ", protocol " + std::to_string(kProtocolMajor) + "." +
+         std::to_string(kProtocolMinor);
+}
+
+}  // namespace
+
+Status parse_listen_address(const std::string& text, ServerOptions& options) {
+  const Error bad{ErrorCode::Usage,
+                  "--listen: '" + text + "' is not ADDRESS:PORT, such as 127.0.0.1:7690"};
+  const auto colon = text.rfind(':');
+  if (colon == std::string::npos || colon == 0) return bad;
+  std::string address = text.substr(0, colon);
+  if (address.starts_with('[') && address.ends_with(']'))
+    address = address.substr(1, address.size() - 2);
+  std::uint16_t port = 0;
+  const char* end = text.data() + text.size();
+  const auto parsed = std::from_chars(text.data() + colon + 1, end, port);
+  if (address.empty() || parsed.ec != std::errc{} || parsed.ptr != end) return bad;
+  options.address = std::move(address);
+  options.port = port;
+  return {};
+}
+
+Result<std::optional<ServerOptions>> parse_command_line(int argc, char** argv) {
+  ServerOptions options;
+  std::string listen = "127.0.0.1:7690";
+  CLI::App app("Hosts one session: one organ, simulated 1000 times per second, shared by up to 16 "
+               "people with tools and 100 who watch.",
+               "trocar-server");
+  app.footer(kExamples);
+  app.set_version_flag("--version", version_text());
+  app.add_option("--organ", options.organ, "built-in organ (liver, lattice) or an .organ file")
+      ->type_name("NAME|FILE")->capture_default_str();
+  app.add_option("--listen", listen, "where to listen; port 0 takes any free one")
+      ->type_name("ADDR:PORT")->capture_default_str();
+  app.add_option("--journal", options.journal,
+                 "file to record the session in, or none [./trocar-<UTC>.mcap]")
+      ->type_name("FILE");
+  app.add_option("--seconds", options.seconds, "end after this many simulated seconds")
+      ->type_name("N")->check(CLI::Range(0.0, 1e9));
+  app.add_option("--summary", options.summary_file, "write figures of the run as JSON at the end")
+      ->type_name("FILE");
+  app.add_option("--ready-file", options.ready_file, "write the port to this file when listening")
+      ->type_name("FILE");
+  app.add_option("--depth", options.decisions.depth_limit, "layers that a force propagates")
+      ->capture_default_str();
+  app.add_option("--nodes", options.decisions.node_limit, "nodes that all forces together reach")
+      ->capture_default_str();
+  app.add_option("--sweeps", options.decisions.sweeps, "passes of the solver per tick")
+      ->capture_default_str();
+  app.add_option("--omega", options.decisions.over_relaxation, "over-relaxation, 1 to 1.9")
+      ->capture_default_str();
+  app.add_option("--log-level", options.log_level, "error, warn, info, debug or off")
+      ->capture_default_str();
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) {
+      app.exit(error);
+      return std::optional<ServerOptions>();
+    }
+    return Error{ErrorCode::Usage, std::string(error.what()) + " (see --help)"};
+  }
+  if (const auto parsed = parse_listen_address(listen, options); !parsed) return parsed.error();
+  if (const auto valid = step::validate(options.decisions); !valid) return valid.error();
+  if (options.journal.empty()) options.journal = default_journal_path();
+  return std::optional(std::move(options));
+}
+
+}  // namespace trocar::app

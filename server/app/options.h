@@ -1,0 +1,31 @@
+#pragma once
+
+// trocar-server's command line.
+
+#include <optional>
+#include <string>
+
+#include "common/base/result.h"
+#include "server/step/tick_report.h"
+
+namespace trocar::app {
+
+struct ServerOptions {
+  std::string organ = "liver";
+  std::string address = "127.0.0.1";
+  std::uint16_t port = 7690;
+  std::string journal;       // a file, or "none"
+  double seconds = 0;        // simulated; 0: until told to end
+  std::string summary_file;  // empty: none
+  std::string ready_file;    // empty: none
+  step::TickDecisions decisions;
+  std::string log_level = "info";
+};
+
+// Nothing if the program is done (after --help or --version).
+Result<std::optional<ServerOptions>> parse_command_line(int argc, char** argv);
+
+// "ADDR:PORT" or "[IPV6]:PORT"; the port may be 0 (any free one).
+Status parse_listen_address(const std::string& text, ServerOptions& options);
+
+}  // namespace trocar::app

@@ -1,0 +1,202 @@
+#include "server/app/server.h"
+
+#include "common/base/asio.h"  // before Boost: see there
+
+#include <algorithm>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/signal_set.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <functional>
+#include <vector>
+
+#include "common/base/log.h"
+#include "common/base/timing.h"
+#include "server/app/organ_choice.h"
+#include "server/app/simulation_loop.h"
+#include "server/app/summary.h"
+#include "server/net/tcp_server.h"
+#include "server/replication/messages.h"
+#include "server/replication/replicator.h"
+
+namespace trocar::app {
+namespace {
+
+using std::chrono::milliseconds;
+constexpr milliseconds kBarrierDeadline{2000};
+constexpr milliseconds kGoodbyeDeadline{2500};  // a little more than the flush deadline
+constexpr milliseconds kPollPeriod{5};
+
+Tick ticks_of(double seconds) {
+  return static_cast<Tick>(std::llround(seconds * static_cast<double>(kTicksPerSecond)));
+}
+
+class Server {
+ public:
+  Server(const ServerOptions& options, scene::Organ organ)
+      : options_(options), simulation_(std::move(organ)) {}
+
+  // Binds the port and opens the journal.
+  Status open();
+  // Until the session has ended.
+  Status run();
+
+ private:
+  void take_frames();
+  void on_signal(int signal);
+  void begin_end();
+  // Calls `then` when `is_done` holds, at the latest after `deadline`.
+  void wait_for(std::function<bool()> is_done, milliseconds deadline, std::function<void()> then);
+  void say_goodbye();
+  Status finish();
+
+  const ServerOptions& options_;
+  step::Simulation simulation_;
+  std::unique_ptr<JournalSink> journal_;
+  session::SimulationInbox inbox_;
+  asio::io_context io_{1};
+  asio::signal_set signals_{io_};
+  asio::steady_timer poll_{io_};
+  std::unique_ptr<net::TcpServer> tcp_;
+  std::unique_ptr<replication::Replicator> replicator_;
+  FrameHandover handover_{[this] { asio::post(io_, [this] { take_frames(); }); }};
+  std::vector<step::SharedFrame> frames_;
+  std::vector<replication::BarrierResult> barrier_;
+  bool is_ending_ = false;
+  double wall_seconds_ = 0;
+  std::unique_ptr<SimulationLoop> loop_;  // last: its thread uses what stands above
+};
+
+Status Server::open() {
+  const auto& organ = simulation_.organ();
+  const auto& layout = simulation_.layout();
+  net::TcpServerOptions tcp{.address = options_.address, .port = options_.port};
+  // Topology and a keyframe of about that size must fit at once for somebody who joins.
+  const auto topology_bytes = replication::encode_topology(layout, 0, organ.name)->size();
+  tcp.outbox_bytes = std::max(tcp.outbox_bytes, 3 * topology_bytes);
+  auto listening = net::TcpServer::listen(io_, tcp);
+  if (!listening) return listening.error();
+  tcp_ = std::move(*listening);
+
+  auto journal = open_journal(options_.journal, organ, layout);
+  if (!journal) return journal.error();
+  journal_ = std::move(*journal);
+
+  replication::ReplicatorOptions replication;
+  if (journal_)
+    replication.on_participants = [this](const auto& present, Tick tick) {
+      journal_->take_participants(present, tick);
+    };
+  replicator_ = std::make_unique<replication::Replicator>(
+      *tcp_, inbox_, layout, organ.name, scene::organ_hash(organ), std::move(replication));
+  loop_ = std::make_unique<SimulationLoop>(
+      simulation_, inbox_, handover_, journal_.get(),
+      LoopOptions{options_.decisions, ticks_of(options_.seconds)},
+      [this] { asio::post(io_, [this] { begin_end(); }); });
+  return {};
+}
+
+Status Server::run() {
+  const auto begin = monotonic_ns();
+  boost::system::error_code ignored;
+  signals_.add(SIGINT, ignored);
+  signals_.add(SIGTERM, ignored);
+  signals_.async_wait([this](boost::system::error_code error, int signal) {
+    if (!error) on_signal(signal);
+  });
+  tcp_->start(*replicator_);
+  if (!options_.ready_file.empty())
+    if (const auto written =
+            write_text_file(options_.ready_file, std::to_string(tcp_->port()) + "\n");
+        !written)
+      return written;
+  log::info("{} ({} nodes) at {}:{}, Ctrl-C ends the session", simulation_.organ().name,
+            simulation_.organ().mesh.node_count(), options_.address, tcp_->port());
+  loop_->start();
+  io_.run();
+  wall_seconds_ = static_cast<double>(monotonic_ns() - begin) * 1e-9;
+  return finish();
+}
+
+void Server::on_signal(int signal) {
+  log::info("{}: ending the session", signal == SIGINT ? "Ctrl-C" : "SIGTERM");
+  loop_->request_stop();
+  signals_.cancel();
+  signals_.clear();  // a second one ends the process at once
+}
+
+void Server::take_frames() {
+  if (is_ending_) return;
+  handover_.take_all(frames_);
+  replicator_->publish(frames_);
+}
+
+void Server::begin_end() {
+  take_frames();
+  is_ending_ = true;
+  signals_.cancel();
+  tcp_->stop_accepting();
+  replicator_->begin_barrier(loop_->report().last_frame);
+  wait_for([this] { return replicator_->is_barrier_complete(); }, kBarrierDeadline,
+           [this] { say_goodbye(); });
+}
+
+void Server::say_goodbye() {
+  barrier_ = replicator_->barrier_results();
+  replicator_->end_all(replication::EndReason::ServerClosing, "the session is over");
+  wait_for([this] { return tcp_->connection_count() == 0; }, kGoodbyeDeadline,
+           [this] { io_.stop(); });
+}
+
+void Server::wait_for(std::function<bool()> is_done, milliseconds deadline,
+                      std::function<void()> then) {
+  if (is_done() || deadline <= milliseconds::zero()) return then();
+  poll_.expires_after(kPollPeriod);
+  poll_.async_wait([this, is_done, deadline, then](boost::system::error_code error) {
+    if (!error) wait_for(is_done, deadline - kPollPeriod, then);
+  });
+}
+
+Status Server::finish() {
+  Status closed;
+  if (journal_) closed = journal_->close();
+  const auto& report = loop_->report();
+  std::size_t equal = 0;
+  for (const auto& result : barrier_) equal += result.is_equal;
+  log::info("{:.3f} s simulated in {:.3f} s, {} slow ticks, {} of {} replicas equal",
+            static_cast<double>(report.ticks) / static_cast<double>(kTicksPerSecond), wall_seconds_,
+            report.slow_ticks, equal, barrier_.size());
+  if (handover_.dropped() > 0)
+    log::warn("{} frames never reached the clients: the network thread was stuck",
+              handover_.dropped());
+  if (options_.summary_file.empty()) return closed;
+  const Summary summary{.organ = simulation_.organ().name,
+                        .node_count = simulation_.organ().mesh.node_count(),
+                        .surface_vertex_count = simulation_.layout().vertex_count(),
+                        .wall_seconds = wall_seconds_,
+                        .journal = journal_ ? options_.journal : "none",
+                        .frames_lost = handover_.dropped(),
+                        .loop = report,
+                        .barrier = barrier_,
+                        .replication = replicator_->counters(),
+                        .encoding = replicator_->encode_statistics(),
+                        .tcp = tcp_->counters(),
+                        .inbox = inbox_.counters()};
+  const auto written = write_text_file(options_.summary_file, to_json(summary));
+  return closed ? written : closed;
+}
+
+}  // namespace
+
+Status run_server(const ServerOptions& options) {
+  auto organ = load_organ(options.organ);
+  if (!organ) return organ.error();
+  const auto server = std::make_unique<Server>(options, std::move(*organ));
+  if (const auto opened = server->open(); !opened) return opened;
+  return server->run();
+}
+
+}  // namespace trocar::app

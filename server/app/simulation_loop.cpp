@@ -1,0 +1,136 @@
+#include "server/app/simulation_loop.h"
+
+#include <sys/prctl.h>
+
+#include <algorithm>
+#include <ctime>
+
+#include "common/base/timing.h"
+
+namespace trocar::app {
+namespace {
+
+// A snapshot every 10 s, in the middle between two publications: publishing changes the hysteresis
+// of the quantisation after the tick's hash was taken.
+constexpr Tick kSnapshotPeriod = 10'000;
+constexpr Tick kSnapshotPhase = kTicksPerFrame / 2;
+constexpr unsigned long kTimerSlackNs = 1000;
+
+void sleep_until(std::uint64_t monotonic) {
+  const timespec until{static_cast<time_t>(monotonic / 1'000'000'000),
+                       static_cast<long>(monotonic % 1'000'000'000)};
+  while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr) == EINTR) {
+  }
+}
+
+}  // namespace
+
+void StageTimes::add(const step::TickReport& report) {
+  std::uint64_t total = 0;
+  for (std::size_t i = 0; i < stages.size(); ++i) {
+    total += report.stage_cpu_ns[i];
+    const bool has_run = i != static_cast<std::size_t>(step::Stage::Publish) ||
+                         publishes_frame(report.tick);
+    if (has_run) stages[i].add(report.stage_cpu_ns[i]);
+  }
+  tick.add(total);
+}
+
+void StageTimes::clear() {
+  for (auto& stage : stages) stage.clear();
+  tick.clear();
+}
+
+step::StageStatistics StageTimes::statistics() const {
+  step::StageStatistics result;
+  for (std::size_t i = 0; i < stages.size(); ++i) {
+    result.median_us[i] = static_cast<float>(stages[i].quantile_us(0.5));
+    result.p99_us[i] = static_cast<float>(stages[i].quantile_us(0.99));
+  }
+  result.tick_median_us = static_cast<float>(tick.quantile_us(0.5));
+  result.tick_p99_us = static_cast<float>(tick.quantile_us(0.99));
+  return result;
+}
+
+SimulationLoop::SimulationLoop(step::Simulation& simulation, session::SimulationInbox& inbox,
+                               FrameHandover& handover, JournalSink* journal, LoopOptions options,
+                               std::function<void()> ended)
+    : simulation_(simulation),
+      inbox_(inbox),
+      handover_(handover),
+      journal_(journal),
+      options_(options),
+      ended_(std::move(ended)) {
+  records_.reserve(kTicksPerFrame);
+  take_snapshot();
+}
+
+SimulationLoop::~SimulationLoop() {
+  request_stop();
+  if (thread_.joinable()) thread_.join();
+}
+
+void SimulationLoop::start() {
+  thread_ = std::thread([this] { run(); });
+}
+
+void SimulationLoop::run() {
+  // The default slack of 50 us would be 5 % of a tick.
+  prctl(PR_SET_TIMERSLACK, kTimerSlackNs, 0, 0, 0);
+  Pacer pacer(monotonic_ns());
+  bool is_last = false;
+  while (!is_last) {
+    sleep_until(pacer.due_ns());
+    pacer.begin_tick(monotonic_ns());
+    slow_ticks_ = pacer.slow_ticks();
+    is_last = run_tick();
+  }
+  ended_();
+}
+
+bool SimulationLoop::run_tick() {
+  inbox_.drain(inputs_);
+  const auto& report = simulation_.tick(inputs_, options_.decisions);
+  records_.push_back({report.tick, options_.decisions, inputs_, report.state_hash});
+  second_.add(report);
+  report_.times.add(report);
+  report_.ticks = report.tick;
+  report_.inputs_dropped += report.inputs_dropped;
+  report_.nodes_rejected += report.nodes_rejected;
+  report_.faults |= report.faults;
+  report_.max_active_nodes = std::max(report_.max_active_nodes, report.active_nodes);
+  if (report.tick % kTicksPerSecond == 0) {
+    statistics_ = second_.statistics();
+    second_.clear();
+  }
+  if (report.tick % kSnapshotPeriod == kSnapshotPhase && report.tick > kSnapshotPeriod)
+    take_snapshot();
+  auto frame = simulation_.take_frame();
+  if (!frame) return false;
+  finish_frame(std::move(frame));
+  return is_stop_requested_.load(std::memory_order_relaxed) ||
+         (options_.tick_count > 0 && report.tick >= options_.tick_count);
+}
+
+void SimulationLoop::finish_frame(std::shared_ptr<step::PublishedFrame> frame) {
+  frame->state_hash = records_.back().state_hash;
+  frame->records = std::exchange(records_, {});
+  records_.reserve(kTicksPerFrame);
+  frame->snapshot = std::exchange(snapshot_, nullptr);
+  frame->snapshot_tick = snapshot_tick_;
+  frame->statistics = statistics_;
+  frame->statistics.slow_ticks = slow_ticks_;
+  report_.slow_ticks = slow_ticks_;
+  report_.last_frame = frame;
+  if (journal_) journal_->take_frame(report_.last_frame);
+  handover_.push(report_.last_frame);
+}
+
+void SimulationLoop::take_snapshot() {
+  Bytes bytes;
+  simulation_.write_snapshot(bytes);
+  snapshot_ = std::make_shared<const Bytes>(std::move(bytes));
+  snapshot_tick_ = simulation_.current_tick();
+}
+
+}  // namespace trocar::app

@@ -1,0 +1,93 @@
+#pragma once
+
+// The simulation thread: 1 kHz by absolute time, inputs in, frames out.
+//
+//   inbox.drain -> Simulation::tick -> record; every 16th tick: complete the frame (records, hash,
+//   statistics, snapshot), journal.take_frame, handover.push
+//
+// It never waits for the I/O thread or the journal. It ends after a published frame, so the last
+// frame shows the last tick.
+
+#include <atomic>
+#include <functional>
+#include <memory>
+#include <thread>
+#include <vector>
+
+#include "server/app/frame_handover.h"
+#include "server/app/journal_sink.h"
+#include "server/app/pacer.h"
+#include "server/replication/duration_histogram.h"
+#include "server/session/inbox.h"
+#include "server/step/simulation.h"
+
+namespace trocar::app {
+
+// Thread CPU time of the stages.
+struct StageTimes {
+  std::array<replication::DurationHistogram, step::kStageCount> stages;
+  replication::DurationHistogram tick;
+
+  void add(const step::TickReport& report);
+  void clear();
+  step::StageStatistics statistics() const;  // slow_ticks stays 0
+};
+
+struct LoopReport {
+  Tick ticks = 0;
+  std::uint64_t slow_ticks = 0;
+  std::uint64_t inputs_dropped = 0, nodes_rejected = 0;
+  std::uint32_t faults = 0;  // TickFault bits of all ticks
+  std::uint32_t max_active_nodes = 0;
+  step::SharedFrame last_frame;
+  StageTimes times;  // of the whole run
+};
+
+struct LoopOptions {
+  step::TickDecisions decisions;
+  Tick tick_count = 0;  // end at the first frame at or after this; 0: when told to
+};
+
+class SimulationLoop {
+ public:
+  // All references outlive the loop; `journal` may be null. `ended` is called on the simulation
+  // thread after its last access to any of them.
+  SimulationLoop(step::Simulation& simulation, session::SimulationInbox& inbox,
+                 FrameHandover& handover, JournalSink* journal, LoopOptions options,
+                 std::function<void()> ended);
+  ~SimulationLoop();
+
+  void start();
+  void request_stop() { is_stop_requested_.store(true, std::memory_order_relaxed); }  // any thread
+  // After `ended` was called, or start() never was.
+  const LoopReport& report() const { return report_; }
+
+  // One tick without pacing; true if it was the last. For start()'s thread, and for tests.
+  bool run_tick();
+
+ private:
+  void run();
+  void finish_frame(std::shared_ptr<step::PublishedFrame> frame);
+  void take_snapshot();
+
+  step::Simulation& simulation_;
+  session::SimulationInbox& inbox_;
+  FrameHandover& handover_;
+  JournalSink* const journal_;
+  const LoopOptions options_;
+  const std::function<void()> ended_;
+  std::atomic<bool> is_stop_requested_{false};
+
+  // Simulation thread.
+  session::TickInputs inputs_;
+  std::vector<step::TickRecord> records_;   // since the last frame
+  std::shared_ptr<const Bytes> snapshot_;   // waits for the next frame
+  Tick snapshot_tick_ = 0;
+  StageTimes second_;                       // since the last statistics
+  step::StageStatistics statistics_;        // of the last full second
+  std::uint64_t slow_ticks_ = 0;
+  LoopReport report_;
+  std::thread thread_;
+};
+
+}  // namespace trocar::app

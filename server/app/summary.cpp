@@ -1,0 +1,121 @@
+#include "server/app/summary.h"
+
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <filesystem>
+
+#include "common/base/version.h"
+
+namespace trocar::app {
+namespace {
+
+std::string quoted(const std::string& text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\')
+      out += {'\\', c};
+    else if (static_cast<unsigned char>(c) < 0x20)
+      out += fmt::format("\\u{:04x}", static_cast<unsigned>(c));
+    else
+      out += c;
+  }
+  return out + "\"";
+}
+
+std::string times(const replication::DurationHistogram& histogram) {
+  return fmt::format(R"({{"count": {}, "median": {:.3f}, "p99": {:.3f}}})", histogram.count(),
+                     histogram.quantile_us(0.5), histogram.quantile_us(0.99));
+}
+
+std::string participants(const std::vector<replication::BarrierResult>& results) {
+  std::string out;
+  for (const auto& result : results)
+    out += fmt::format(
+        "{}\n    {{\"slot\": {}, \"name\": {}, \"role\": \"{}\", \"answered\": {}, \"frame\": {}, "
+        "\"surface_crc\": \"{:08x}\", \"equal\": {}}}",
+        out.empty() ? "" : ",", result.slot.value, quoted(result.name),
+        session::name_of(result.role), result.has_answered, result.frame, result.surface_crc,
+        result.is_equal);
+  return out;
+}
+
+std::string stages(const StageTimes& of) {
+  std::string out;
+  for (std::size_t i = 0; i < of.stages.size(); ++i)
+    out += fmt::format("{}\n    \"{}\": {}", out.empty() ? "" : ",",
+                       step::name_of(static_cast<step::Stage>(i)), times(of.stages[i]));
+  return out;
+}
+
+std::string replication_figures(const Summary& s) {
+  const auto& e = s.encoding;
+  const double per_vertex =
+      e.changed_vertices ? static_cast<double>(e.delta_payload_bytes) /
+                               static_cast<double>(e.changed_vertices)
+                         : 0.0;
+  const auto& r = s.replication;
+  return fmt::format(
+      R"("sessions": {}, "bytes_sent": {}, "bytes_received": {}, "samples": {},
+    "samples_dropped": {}, "frames_published": {}, "frames_conflated": {}, "frames_lost": {},
+    "frames_given": {}, "frames_skipped": {}, "keyframes_given": {}, "buffers_shared": {},
+    "deltas": {}, "delta_payload_bytes": {}, "changed_vertices": {},
+    "bytes_per_changed_vertex": {:.3f},
+    "encode_delta_cpu_us": {}, "encode_keyframe_cpu_us": {})",
+      r.sessions, s.tcp.bytes_out, s.tcp.bytes_in, r.samples, s.inbox.samples_dropped,
+      r.frames_published, r.frames_conflated, s.frames_lost, r.frames_given, r.frames_skipped,
+      r.keyframes_given, e.shared, e.deltas, e.delta_payload_bytes, e.changed_vertices, per_vertex,
+      times(e.delta_cpu), times(e.keyframe_cpu));
+}
+
+}  // namespace
+
+std::string to_json(const Summary& s) {
+  const auto& last = *s.loop.last_frame;
+  bool all_equal = true;
+  for (const auto& result : s.barrier) all_equal = all_equal && result.is_equal;
+  return fmt::format(
+      R"({{
+  "program": "trocar-server", "version": "{}", "sim_version": {}, "protocol": "{}.{}",
+  "organ": {}, "nodes": {}, "surface_vertices": {}, "journal": {},
+  "ticks": {}, "simulated_seconds": {:.3f}, "wall_seconds": {:.3f}, "slow_ticks": {},
+  "last_tick": {}, "last_frame": {}, "state_hash": "{:016x}", "surface_crc": "{:08x}",
+  "all_replicas_equal": {},
+  "participants": [{}
+  ],
+  "max_active_nodes": {}, "faults": {}, "inputs_dropped": {}, "nodes_rejected": {},
+  "tick_cpu_us": {},
+  "stage_cpu_us": {{{}
+  }},
+  "replication": {{
+    {}
+  }}
+}}
+)",
+      kVersion, kSimVersion, kProtocolMajor, kProtocolMinor, quoted(s.organ), s.node_count,
+      s.surface_vertex_count, quoted(s.journal), s.loop.ticks,
+      static_cast<double>(s.loop.ticks) / static_cast<double>(kTicksPerSecond), s.wall_seconds,
+      s.loop.slow_ticks, last.tick, last.frame, last.state_hash, last.surface_crc, all_equal,
+      participants(s.barrier), s.loop.max_active_nodes, s.loop.faults, s.loop.inputs_dropped,
+      s.loop.nodes_rejected, times(s.loop.times.tick), stages(s.loop.times),
+      replication_figures(s));
+}
+
+Status write_text_file(const std::string& path, const std::string& text) {
+  // Written beside and renamed: whoever waits for the file never sees half of it.
+  const std::string partial = path + ".part";
+  const auto fail = [&path] {
+    return Error{ErrorCode::ResourceMissing,
+                 path + ": cannot be written: check that the folder exists and has room"};
+  };
+  std::FILE* file = std::fopen(partial.c_str(), "wb");
+  if (!file) return fail();
+  const bool is_written = std::fwrite(text.data(), 1, text.size(), file) == text.size();
+  const bool is_closed = std::fclose(file) == 0;
+  std::error_code error;
+  if (is_written && is_closed) std::filesystem::rename(partial, path, error);
+  if (!is_written || !is_closed || error) return fail();
+  return {};
+}
+
+}  // namespace trocar::app

@@ -1,0 +1,31 @@
+#pragma once
+
+// Figures of one run as JSON, for scripts and people.
+
+#include <string>
+#include <vector>
+
+#include "server/app/simulation_loop.h"
+#include "server/net/tcp_server.h"
+#include "server/replication/replicator.h"
+
+namespace trocar::app {
+
+struct Summary {
+  std::string organ;
+  std::size_t node_count = 0, surface_vertex_count = 0;
+  double wall_seconds = 0;
+  std::string journal;
+  std::uint64_t frames_lost = 0;  // between simulation and I/O thread
+  const LoopReport& loop;
+  const std::vector<replication::BarrierResult>& barrier;
+  const replication::ReplicatorCounters& replication;
+  const replication::EncodeStatistics& encoding;
+  const net::TcpCounters& tcp;
+  const session::SimulationInbox::Counters& inbox;
+};
+
+std::string to_json(const Summary& summary);
+Status write_text_file(const std::string& path, const std::string& text);
+
+}  // namespace trocar::app

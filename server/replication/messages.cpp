@@ -1,0 +1,183 @@
+#include "server/replication/messages.h"
+
+#include <cmath>
+
+#include "common/base/version.h"
+#include "proto/wire.pb.h"
+
+namespace trocar::replication {
+namespace {
+
+static_assert(static_cast<int>(locks::ClaimOutcome::Expired) == proto::CLAIM_EXPIRED);
+
+void write(const Vec3f& from, proto::Vec3& to) {
+  to.set_x(from.x);
+  to.set_y(from.y);
+  to.set_z(from.z);
+}
+
+void write(const Quatf& from, proto::Quat& to) {
+  to.set_x(from.x);
+  to.set_y(from.y);
+  to.set_z(from.z);
+  to.set_w(from.w);
+}
+
+std::string name_of_holder(ToolSlot tool, const session::Roster& roster) {
+  const auto* participant = roster.find(tool.owner());
+  return participant ? participant->name : "somebody who has left";
+}
+
+const scene::ToolShape* find_shape(ToolSlot tool, const session::Roster& roster) {
+  const auto* participant = roster.find(tool.owner());
+  const auto number = static_cast<std::size_t>(tool.number());
+  return participant && number < participant->tools.size() ? &participant->tools[number] : nullptr;
+}
+
+}  // namespace
+
+wire::SharedBytes encode_welcome(ParticipantSlot slot, std::uint64_t organ_hash) {
+  proto::Envelope envelope;
+  auto& welcome = *envelope.mutable_welcome();
+  welcome.set_protocol_major(kProtocolMajor);
+  welcome.set_protocol_minor(kProtocolMinor);
+  welcome.set_sim_version(kSimVersion);
+  welcome.set_participant(slot.value);
+  welcome.set_organ_hash(organ_hash);
+  welcome.set_tick_us(static_cast<std::uint32_t>(kTickNanoseconds / 1000));
+  welcome.set_ticks_per_frame(static_cast<std::uint32_t>(kTicksPerFrame));
+  return wire::encode_envelope(envelope);
+}
+
+wire::SharedBytes encode_participants(const std::vector<session::Participant>& present) {
+  proto::Envelope envelope;
+  auto& list = *envelope.mutable_participants();
+  for (const auto& participant : present) {
+    auto& entry = *list.add_participant();
+    entry.set_slot(participant.slot.value);
+    entry.set_name(participant.name);
+    entry.set_role(static_cast<proto::Role>(participant.role));
+    for (const auto& shape : participant.tools) {
+      auto& tool = *entry.add_tool();
+      tool.set_radius_m(shape.radius_m);
+      tool.set_length_m(shape.length_m);
+      tool.set_reach_m(shape.reach_m);
+    }
+  }
+  return wire::encode_envelope(envelope);
+}
+
+wire::SharedBytes encode_topology(const wire::SurfaceLayout& layout, std::uint32_t epoch,
+                                  const std::string& organ_name) {
+  proto::Envelope envelope;
+  auto& topology = *envelope.mutable_surface_topology();
+  topology.set_epoch(epoch);
+  topology.set_quantum_m(wire::kQuantumMetres);
+  topology.set_organ_name(organ_name);
+  for (const auto& vertex : layout.rest_quanta) {
+    topology.add_rest_position_quanta(vertex.x);
+    topology.add_rest_position_quanta(vertex.y);
+    topology.add_rest_position_quanta(vertex.z);
+  }
+  for (const auto& triangle : layout.triangles)
+    for (const auto vertex : triangle) topology.add_triangle(vertex.value);
+  for (const auto vertex : layout.fixed_vertices) topology.add_fixed_vertex(vertex.value);
+  return wire::encode_envelope(envelope);
+}
+
+wire::SharedBytes encode_frame_state(const step::PublishedFrame& frame) {
+  proto::Envelope envelope;
+  auto& state = *envelope.mutable_frame_state();
+  state.set_frame(frame.frame);
+  state.set_tick(frame.tick);
+  for (const auto& tool : frame.tools) {
+    auto& entry = *state.add_tool();
+    entry.set_tool(tool.tool.value);
+    write(tool.world_from_tool.position, *entry.mutable_position_m());
+    write(tool.world_from_tool.orientation, *entry.mutable_orientation());
+    entry.set_verb(static_cast<proto::Verb>(tool.verb));
+    write(tool.force_n, *entry.mutable_force_n());
+    entry.set_contact_nodes(tool.contact_nodes);
+    entry.set_has_claim(tool.has_claim);
+    entry.set_penetration_m(tool.penetration_m);
+    entry.set_is_silent(tool.is_silent);
+  }
+  for (std::size_t begin = 0; begin < frame.regions.size();) {
+    std::size_t end = begin + 1;
+    while (end < frame.regions.size() && frame.regions[end] == frame.regions[begin]) ++end;
+    state.add_region_runs(frame.regions[begin]);
+    state.add_region_runs(static_cast<std::uint32_t>(end - begin));
+    begin = end;
+  }
+  state.set_active_nodes(frame.active_nodes);
+  state.set_queue_nodes(frame.queue_nodes);
+  state.set_region_count(frame.region_count);
+  state.set_tick_cpu_us(frame.statistics.tick_median_us);
+  state.set_tick_cpu_p99_us(frame.statistics.tick_p99_us);
+  for (const float median : frame.statistics.median_us) state.add_stage_cpu_us(median);
+  state.set_slow_ticks(frame.statistics.slow_ticks);
+  state.set_state_hash(frame.state_hash);
+  return wire::encode_envelope(envelope);
+}
+
+std::string describe(const locks::ClaimEvent& event, const session::Roster& roster) {
+  const std::string who = name_of_holder(event.tool, roster);
+  const std::string holder = name_of_holder(event.holder, roster);
+  const bool is_grasp = event.verb == scene::Verb::Grasp;
+  switch (event.outcome) {
+    case locks::ClaimOutcome::Granted: return who + (is_grasp ? " has a grasp" : " pushes");
+    case locks::ClaimOutcome::RefusedHeld:
+      return "held by " + holder + " (grasp): wait, or ask " + holder + " to let go";
+    case locks::ClaimOutcome::RefusedNothingInReach: {
+      const auto* shape = find_shape(event.tool, roster);
+      const auto reach_mm = std::lround((shape ? *shape : scene::ToolShape{}).reach_m * 1000);
+      return "nothing in reach of " + who + ": bring the tip within " + std::to_string(reach_mm) +
+             " mm of the surface";
+    }
+    case locks::ClaimOutcome::Released: return who + (is_grasp ? " let go" : " stopped pushing");
+    case locks::ClaimOutcome::TakenOver: return who + " was silent: " + holder + " took over";
+    case locks::ClaimOutcome::Expired:
+      return who + " was silent for " + std::to_string(locks::kAbandonTicks / kTicksPerSecond) +
+             " s: the grasp was let go";
+  }
+  return {};
+}
+
+wire::SharedBytes encode_claim_event(const locks::ClaimEvent& event,
+                                     const session::Roster& roster) {
+  proto::Envelope envelope;
+  auto& message = *envelope.mutable_claim_event();
+  message.set_tick(event.tick);
+  message.set_tool(event.tool.value);
+  message.set_verb(static_cast<proto::Verb>(event.verb));
+  message.set_outcome(static_cast<proto::ClaimOutcome>(event.outcome));
+  if (event.holder.is_valid()) {
+    message.set_holder(event.holder.value);
+    message.set_holder_name(name_of_holder(event.holder, roster));
+  }
+  message.set_text(describe(event, roster));
+  return wire::encode_envelope(envelope);
+}
+
+wire::SharedBytes encode_barrier(const step::PublishedFrame& frame) {
+  proto::Envelope envelope;
+  envelope.mutable_barrier()->set_frame(frame.frame);
+  envelope.mutable_barrier()->set_surface_crc(frame.surface_crc);
+  return wire::encode_envelope(envelope);
+}
+
+wire::SharedBytes encode_pong(std::uint64_t client_time_us, Tick tick) {
+  proto::Envelope envelope;
+  envelope.mutable_pong()->set_client_time_us(client_time_us);
+  envelope.mutable_pong()->set_tick(tick);
+  return wire::encode_envelope(envelope);
+}
+
+wire::SharedBytes encode_goodbye(EndReason reason, const std::string& text) {
+  proto::Envelope envelope;
+  envelope.mutable_goodbye()->set_reason(static_cast<proto::GoodbyeReason>(reason));
+  envelope.mutable_goodbye()->set_text(text);
+  return wire::encode_envelope(envelope);
+}
+
+}  // namespace trocar::replication

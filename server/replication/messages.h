@@ -1,0 +1,32 @@
+#pragma once
+
+// Builders of what the server says, each as one framed, encoded, immutable buffer.
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/wire/framing.h"
+#include "common/wire/surface_layout.h"
+#include "server/locks/claims.h"
+#include "server/replication/validation.h"
+#include "server/session/roster.h"
+#include "server/step/published_frame.h"
+
+namespace trocar::replication {
+
+wire::SharedBytes encode_welcome(ParticipantSlot slot, std::uint64_t organ_hash);
+wire::SharedBytes encode_participants(const std::vector<session::Participant>& present);
+wire::SharedBytes encode_topology(const wire::SurfaceLayout& layout, std::uint32_t epoch,
+                                  const std::string& organ_name);
+wire::SharedBytes encode_frame_state(const step::PublishedFrame& frame);
+wire::SharedBytes encode_claim_event(const locks::ClaimEvent& event, const session::Roster& roster);
+wire::SharedBytes encode_barrier(const step::PublishedFrame& frame);
+wire::SharedBytes encode_pong(std::uint64_t client_time_us, Tick tick);
+wire::SharedBytes encode_goodbye(EndReason reason, const std::string& text);
+
+// One line for a person about what became of a claim: by whom it is held and what to do.
+std::string describe(const locks::ClaimEvent& event, const session::Roster& roster);
+
+}  // namespace trocar::replication

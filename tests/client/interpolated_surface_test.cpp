@@ -1,0 +1,114 @@
+#include "client/replica/interpolated_surface.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "common/base/timing.h"
+#include "tests/client/synthetic_source.h"
+
+namespace trocar::replica {
+namespace {
+
+constexpr std::uint64_t kMillisecond = 1'000'000;
+
+// Arrivals with jitter; display at a rate of its own: never backwards, never beyond the newest
+// frame, and settled near the wanted delay.
+TEST(DisplayClock, IsMonotoneAndSettlesBehindTheNewestFrame) {
+  for (unsigned seed = 0; seed < 20; ++seed) {
+    std::mt19937 random(seed);
+    std::uniform_int_distribution<std::uint64_t> jitter(0, 6 * kMillisecond);
+    DisplayClock clock;
+    std::uint64_t next_arrival = 26 * kMillisecond;
+    Tick tick = 0, newest = 0;
+    double last = -1, delay_sum = 0;
+    int delay_count = 0;
+    for (std::uint64_t now = 0; now < 4000 * kMillisecond; now += 7 * kMillisecond) {
+      while (next_arrival <= now) {
+        tick += kTicksPerFrame;
+        clock.add_arrival(tick, next_arrival);
+        newest = tick;
+        next_arrival = 10 * kMillisecond + (tick + kTicksPerFrame) * kMillisecond + jitter(random);
+      }
+      if (newest == 0) continue;
+      const double shown = clock.advance(now);
+      ASSERT_GE(shown, last) << "seed " << seed;
+      ASSERT_LE(shown, static_cast<double>(newest)) << "seed " << seed;
+      last = shown;
+      if (now > 2000 * kMillisecond) {
+        delay_sum += static_cast<double>(now) / kMillisecond - 10 - shown;
+        ++delay_count;
+      }
+    }
+    // Counted from publication: the delay itself plus the mean jitter of 3 ms.
+    EXPECT_NEAR(delay_sum / delay_count, kDisplayDelayTicks + 3, 4) << "seed " << seed;
+  }
+}
+
+TEST(DisplayClock, FollowsASlowServerWithoutStopping) {
+  DisplayClock clock;
+  double last = -1;
+  int stops = 0;
+  Tick tick = 0;
+  std::uint64_t arrival = 0;
+  for (std::uint64_t now = 0; now < 6000 * kMillisecond; now += 10 * kMillisecond) {
+    while (arrival <= now) {  // 16 ticks in 40 ms
+      clock.add_arrival(tick += 16, arrival);
+      arrival += 40 * kMillisecond;
+    }
+    const double shown = clock.advance(now);
+    if (now > 2000 * kMillisecond && shown - last < 1e-6) ++stops;
+    last = shown;
+  }
+  EXPECT_EQ(stops, 0);
+}
+
+TEST(DisplayClock, JumpsAfterASeekAndHoldsAtTheNewestFrame) {
+  DisplayClock clock;
+  clock.add_arrival(16, 0);
+  EXPECT_EQ(clock.advance(kMillisecond), 16);
+  clock.restart();
+  clock.add_arrival(160'000, 5 * kMillisecond);
+  EXPECT_EQ(clock.advance(6 * kMillisecond), 160'000);
+  for (int i = 0; i < 100; ++i) EXPECT_LE(clock.advance((6 + 16 * i) * kMillisecond), 160'000);
+}
+
+TEST(InterpolatedSurface, LiesBetweenTheFramesOnEitherSide) {
+  testing::SyntheticSource source(testing::make_blob_layout(12, 16, 0.08));
+  Replica replica([&](const proto::Envelope& message) { return source.send(message); });
+  InterpolatedSurface shown;
+  source.queue_start();
+  std::uint64_t now = monotonic_ns();
+  shown.update(replica, now);
+  EXPECT_FALSE(shown.is_valid());
+  double last_tick = -1;
+  for (int i = 0; i < 60; ++i) {
+    source.queue_frame();
+    source.poll(replica);
+    for (int k = 0; k < 3; ++k) {
+      shown.update(replica, now += 5 * kMillisecond);
+      ASSERT_TRUE(shown.is_valid());
+      ASSERT_GE(shown.tick(), last_tick);
+      last_tick = shown.tick();
+      ASSERT_LE(shown.tick(), static_cast<double>(replica.newest()->tick));
+      const auto& history = replica.history();
+      const auto after = std::ranges::find_if(
+          history, [&](const auto& f) { return static_cast<double>(f.tick) >= shown.tick(); });
+      ASSERT_NE(after, history.end());
+      const auto before = after == history.begin() ? after : std::prev(after);
+      for (std::size_t v = 0; v < shown.positions().size(); ++v) {
+        const float rest = replica.topology().rest_positions[v].y;
+        const float a = rest + wire::to_metres(before->surface[v]).y;
+        const float b = rest + wire::to_metres(after->surface[v]).y;
+        ASSERT_GE(shown.positions()[v].y, std::min(a, b) - 1e-6f);
+        ASSERT_LE(shown.positions()[v].y, std::max(a, b) + 1e-6f);
+      }
+      ASSERT_EQ(shown.tools().size(), 2u);
+      ASSERT_NEAR(norm(shown.tools()[0].world_from_tool.orientation), 1.0f, 1e-5f);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace trocar::replica

@@ -1,0 +1,240 @@
+#include "client/replica/replica.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "common/wire/surface_codec.h"
+#include "proto/wire.pb.h"
+#include "tests/client/synthetic_source.h"
+
+namespace trocar::replica {
+namespace {
+
+class ReplicaTest : public ::testing::Test {
+ protected:
+  void start() {
+    source_.queue_start();
+    advance(1);
+  }
+  void advance(int frames) {
+    for (int i = 0; i < frames; ++i) {
+      source_.queue_frame();
+      source_.poll(replica_);
+    }
+  }
+  int sent_requests() const {
+    return static_cast<int>(std::ranges::count_if(
+        source_.sent, [](const auto& m) { return m.has_keyframe_request(); }));
+  }
+  void expect_in_step() {
+    ASSERT_TRUE(replica_.fault().ok()) << replica_.fault().error().message;
+    EXPECT_EQ(replica_.sync_state(), SyncState::InStep);
+    ASSERT_NE(replica_.newest(), nullptr);
+    EXPECT_EQ(replica_.newest()->frame, source_.frame());
+    EXPECT_EQ(replica_.newest()->surface, source_.surface());
+  }
+
+  testing::SyntheticSource source_{testing::make_blob_layout(16, 24, 0.08)};
+  Replica replica_{[this](const proto::Envelope& message) { return source_.send(message); }};
+};
+
+TEST_F(ReplicaTest, FollowsTheServerBitForBit) {
+  start();
+  for (int i = 0; i < 100; ++i) {
+    advance(1);
+    expect_in_step();
+  }
+  EXPECT_EQ(replica_.counters().frames, 101u);
+  EXPECT_EQ(replica_.counters().keyframes, 1u);
+  EXPECT_EQ(replica_.counters().crc_mismatches, 0u);
+  EXPECT_EQ(replica_.history().size(), kHistoryFrames);
+  EXPECT_GT(replica_.counters().changed_vertices, 0u);
+  EXPECT_GT(replica_.share_moved(), 0.0);
+  EXPECT_LT(replica_.share_moved(), 1.0);
+  EXPECT_EQ(replica_.participants().size(), 4u);
+  EXPECT_EQ(replica_.own_slot().value, 2);
+  EXPECT_EQ(replica_.newest()->regions.size(), source_.surface().size());
+  EXPECT_EQ(replica_.newest()->tools.size(), 2u);
+}
+
+TEST_F(ReplicaTest, AcknowledgesEverySixteenthFrame) {
+  start();
+  advance(63);
+  const auto acks =
+      std::ranges::count_if(source_.sent, [](const auto& m) { return m.has_frame_ack(); });
+  EXPECT_EQ(acks, 4);
+}
+
+TEST_F(ReplicaTest, CorruptedDeltaIsNeverShownAndHealsWithOneRequest) {
+  start();
+  advance(10);
+  source_.answer_requests = false;
+  replica_.corrupt_delta(11);
+  const auto before = replica_.newest()->surface;
+  const Frame frame_before = replica_.newest()->frame;
+  advance(20);
+  EXPECT_EQ(replica_.sync_state(), SyncState::Healing);
+  EXPECT_EQ(replica_.counters().crc_mismatches, 1u);
+  EXPECT_EQ(replica_.counters().deltas_ignored, 19u);
+  EXPECT_EQ(replica_.newest()->frame, frame_before);
+  EXPECT_EQ(replica_.newest()->surface, before);
+  EXPECT_EQ(sent_requests(), 1);
+  source_.queue_frame(true);
+  source_.poll(replica_);
+  expect_in_step();
+  EXPECT_EQ(replica_.counters().healed, 1u);
+  advance(5);
+  expect_in_step();
+  EXPECT_EQ(sent_requests(), 1);
+}
+
+TEST_F(ReplicaTest, NoDamagedDeltaIsEverShown) {
+  start();
+  advance(3);
+  std::size_t at = 0, deltas = 0;
+  source_.tamper = [&](proto::Envelope& message) {
+    if (message.has_surface_frame() && !message.surface_frame().is_keyframe()) {
+      auto& payload = *message.mutable_surface_frame()->mutable_payload();
+      payload[at++ % payload.size()] ^= 0x40;
+      ++deltas;
+    }
+    return true;
+  };
+  for (int i = 0; i < 200; ++i) {
+    advance(1);
+    if (replica_.sync_state() != SyncState::InStep) continue;
+    ASSERT_EQ(replica_.newest()->surface, source_.surface()) << "frame " << i;
+  }
+  source_.tamper = nullptr;
+  advance(2);
+  expect_in_step();
+  // A flipped bit of the padding changes nothing and may pass; nearly all others must be found.
+  EXPECT_GE(deltas, 100u);
+  EXPECT_GE(replica_.counters().crc_mismatches, 95u);
+  EXPECT_EQ(replica_.counters().healed, replica_.counters().crc_mismatches);
+}
+
+TEST_F(ReplicaTest, LostDeltaIsNoticedByItsBase) {
+  start();
+  advance(5);
+  bool drop = true;
+  source_.tamper = [&](proto::Envelope& message) {
+    return !(message.has_surface_frame() && std::exchange(drop, false));
+  };
+  advance(2);
+  EXPECT_EQ(replica_.counters().base_mismatches, 1u);
+  EXPECT_EQ(sent_requests(), 1);
+  advance(2);
+  expect_in_step();
+  EXPECT_EQ(replica_.counters().healed, 1u);
+}
+
+TEST_F(ReplicaTest, RequestThatCouldNotBeQueuedIsTriedAgain) {
+  int attempts = 0;
+  Replica replica([&](const proto::Envelope& message) {
+    return message.has_keyframe_request() ? ++attempts > 3 : true;
+  });
+  source_.queue_start();
+  replica.corrupt_delta(1);
+  for (int i = 0; i < 10; ++i) {
+    source_.queue_frame();
+    source_.poll(replica);
+  }
+  EXPECT_EQ(attempts, 4);
+}
+
+TEST_F(ReplicaTest, BarrierIsAnsweredWithOwnCrcAlsoAfterHealing) {
+  start();
+  advance(4);
+  replica_.corrupt_delta(5);
+  source_.queue_frame();
+  proto::Envelope barrier;
+  barrier.mutable_barrier()->set_frame(source_.frame());
+  barrier.mutable_barrier()->set_surface_crc(wire::surface_crc(source_.surface()));
+  source_.queue(barrier);
+  source_.poll(replica_);
+  const auto acks = [&] {
+    return std::ranges::count_if(source_.sent, [](const auto& m) { return m.has_frame_ack(); });
+  };
+  EXPECT_EQ(acks(), 0);
+  // The server answers the request with a keyframe of the same, last frame.
+  proto::Envelope keyframe;
+  auto& frame = *keyframe.mutable_surface_frame();
+  frame.set_frame(source_.frame());
+  frame.set_tick(source_.frame() * kTicksPerFrame);
+  frame.set_epoch(1);
+  frame.set_is_keyframe(true);
+  frame.set_surface_crc(wire::surface_crc(source_.surface()));
+  Bytes payload;
+  wire::encode_keyframe(source_.surface(), payload);
+  frame.set_payload(payload.data(), payload.size());
+  source_.queue(keyframe);
+  source_.poll(replica_);
+  ASSERT_EQ(acks(), 1);
+  EXPECT_EQ(source_.sent.back().frame_ack().frame(), source_.frame());
+  EXPECT_EQ(source_.sent.back().frame_ack().surface_crc(), wire::surface_crc(source_.surface()));
+  ASSERT_TRUE(replica_.barrier().has_value());
+  EXPECT_EQ(replica_.barrier()->own_crc, replica_.barrier()->server_crc);
+}
+
+TEST_F(ReplicaTest, KeyframeMayGoBackInTime) {
+  start();
+  const auto early = source_.surface();
+  proto::Envelope back;
+  auto& frame = *back.mutable_surface_frame();
+  frame.set_frame(1), frame.set_tick(16), frame.set_epoch(1), frame.set_is_keyframe(true);
+  frame.set_surface_crc(wire::surface_crc(early));
+  Bytes payload;
+  wire::encode_keyframe(early, payload);
+  frame.set_payload(payload.data(), payload.size());
+  advance(30);
+  const auto version = replica_.history_version();
+  source_.queue(back);
+  source_.poll(replica_);
+  EXPECT_EQ(replica_.history().size(), 1u);
+  EXPECT_GT(replica_.history_version(), version);
+  EXPECT_EQ(replica_.newest()->surface, early);
+}
+
+TEST_F(ReplicaTest, InvalidMessagesAreAFaultThatNamesTheField) {
+  const auto fault_of = [&](auto change) {
+    testing::SyntheticSource source(testing::make_blob_layout(6, 8, 0.08));
+    source.tamper = [&](proto::Envelope& message) {
+      change(message);
+      return true;
+    };
+    Replica replica([](const proto::Envelope&) { return true; });
+    source.queue_start();
+    source.queue_frame();
+    source.queue_frame();
+    source.poll(replica);
+    return replica.fault().ok() ? std::string() : replica.fault().error().message;
+  };
+  EXPECT_EQ(fault_of([](proto::Envelope&) {}), "");
+  EXPECT_NE(fault_of([](proto::Envelope& m) {
+              if (m.has_surface_topology()) m.mutable_surface_topology()->set_triangle(4, 9999);
+            }).find("SurfaceTopology.triangle"),
+            std::string::npos);
+  EXPECT_NE(fault_of([](proto::Envelope& m) {
+              if (m.has_surface_topology())
+                m.mutable_surface_topology()->add_rest_position_quanta(1);
+            }).find("rest_position_quanta"),
+            std::string::npos);
+  EXPECT_NE(fault_of([](proto::Envelope& m) {
+              if (m.has_frame_state()) m.mutable_frame_state()->add_region_runs(1);
+            }).find("region_runs"),
+            std::string::npos);
+  EXPECT_NE(fault_of([](proto::Envelope& m) {
+              if (m.has_frame_state()) m.mutable_frame_state()->mutable_tool(0)->set_tool(77);
+            }).find("FrameState.tool"),
+            std::string::npos);
+  EXPECT_NE(fault_of([](proto::Envelope& m) {
+              if (m.has_welcome()) m.mutable_welcome()->set_protocol_major(9);
+            }).find("protocol 9"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace trocar::replica

@@ -1,0 +1,156 @@
+// The solver: against closed forms, and the momentum balance of the whole system with reactions.
+
+#include "server/dynamics/block_descent.h"
+
+#include <gtest/gtest.h>
+
+#include <numeric>
+
+#include "common/scene/builtin_organs.h"
+
+namespace trocar::dynamics {
+namespace {
+
+using contact::ContactList;
+using contact::NodeConstraint;
+
+struct Bench {
+  explicit Bench(scene::Organ o)
+      : organ(std::move(o)), world(organ), springs(organ), solver(world) {
+    for (std::uint32_t i = 0; i < organ.mesh.node_count(); ++i)
+      if (world.node_classes[i] != world::NodeClass::Fixed) free_nodes.push_back(NodeIndex(i));
+  }
+  SolveReport step(const SolveSettings& settings) {
+    return solver.solve(springs, contacts, free_nodes, settings, world);
+  }
+  void tie(NodeIndex node, const Vec3f& target, float stiffness) {
+    contacts.constraints.push_back({.node = node,
+                                    .kind = NodeConstraint::Kind::Tie,
+                                    .stiffness = stiffness,
+                                    .target = target});
+    contacts.tools = {
+        {.tool = ToolSlot{0}, .end = static_cast<std::uint32_t>(contacts.constraints.size())}};
+  }
+
+  scene::Organ organ;
+  world::World world;
+  SpringNetwork springs;
+  BlockDescent solver;
+  ContactList contacts;
+  std::vector<NodeIndex> free_nodes;
+};
+
+scene::Organ lattice(int nx, int ny, int nz) {
+  auto organ = scene::make_lattice({.nx = nx, .ny = ny, .nz = nz});
+  EXPECT_TRUE(organ.ok()) << (organ.ok() ? "" : organ.error().message);
+  return *organ;
+}
+
+TEST(BlockDescent, AColumnUnderAPullStretchesLikeSpringsInSeries) {
+  Bench bench(lattice(2, 6, 2));
+  double top = 0;
+  for (const auto& p : bench.organ.mesh.rest_positions) top = std::max(top, p.y);
+  // Ties so weak that they are all but constant forces: F = k_tie x distance.
+  const float k_tie = 1e-3f, far = 100.0f;
+  for (std::uint32_t i = 0; i < bench.organ.mesh.node_count(); ++i)
+    if (bench.organ.mesh.rest_positions[i].y > top - 1e-6)
+      bench.tie(NodeIndex(i), {0, far, 0}, k_tie);
+  for (int tick = 0; tick < 4000; ++tick) bench.step({.sweeps = 8});
+  const double force = static_cast<double>(k_tie * far);
+  const double expected = force * 5 / bench.organ.material.spring_stiffness_n_m;
+  for (std::uint32_t i = 0; i < bench.organ.mesh.node_count(); ++i)
+    if (bench.organ.mesh.rest_positions[i].y > top - 1e-6) {
+      EXPECT_NEAR(bench.world.displacements[i].y, expected, 1e-3 * expected);
+    }
+  const Vec3f reaction =
+      bench.solver.reaction(bench.contacts, bench.contacts.tools[0], bench.world, kTickSeconds);
+  EXPECT_NEAR(reaction.y, -4 * force, 4e-3 * force) << "the tissue pulls the tool down";
+}
+
+TEST(BlockDescent, FreeFlightWithNodalDampingFollowsImplicitEuler) {
+  // One unsprung axis of motion: all nodes move alike, so springs are silent and
+  // v_{n+1} = v_n / (1 + rate dt) exactly.
+  auto organ = lattice(3, 3, 3);
+  organ.fixed_nodes.clear();
+  Bench bench(organ);
+  for (auto& v : bench.world.velocities) v = {0.2f, 0, 0};
+  for (int tick = 0; tick < 100; ++tick) bench.step({.sweeps = 60});
+  const double rate = bench.organ.material.node_damping_per_s;
+  const double expected = 0.2 * std::pow(1.0 + rate * 1e-3, -100);
+  for (const auto& v : bench.world.velocities) {
+    EXPECT_NEAR(v.x, expected, 1e-3 * expected);
+    EXPECT_NEAR(v.y, 0, 1e-4);
+  }
+}
+
+TEST(BlockDescent, MomentumChangesByTheForcesOfToolsAndDampingAlone) {
+  auto organ = lattice(5, 5, 5);
+  organ.fixed_nodes.clear();
+  organ.material.node_damping_per_s = 0;
+  Bench bench(organ);
+  bench.tie(NodeIndex(7), {0.004f, 0.002f, -0.003f}, 500.0f);
+  const auto momentum = [&] {
+    Vec3d p;
+    for (std::size_t i = 0; i < bench.world.node_count(); ++i)
+      p += to_double(bench.world.velocities[i]) * static_cast<double>(bench.world.masses[i]);
+    return p;
+  };
+  for (int tick = 0; tick < 200; ++tick) {
+    const Vec3d before = momentum();
+    const auto report = bench.step({.sweeps = 60, .over_relaxation = 1.2f});
+    const Vec3d on_tool = to_double(
+        bench.solver.reaction(bench.contacts, bench.contacts.tools[0], bench.world, kTickSeconds));
+    const Vec3d change = momentum() - before;
+    // Each node's imbalance enters the sum: the residual bounds the error of the balance.
+    const double bound = 1e-3 * (static_cast<double>(report.residual_n) *
+                                     static_cast<double>(bench.world.node_count()) +
+                                 1e-4);
+    EXPECT_LT(length(change + on_tool * 1e-3), bound) << "tick " << tick;
+  }
+}
+
+TEST(BlockDescent, EnergyNeverGrowsWithoutATool) {
+  auto organ = lattice(5, 5, 5);
+  Bench bench(organ);
+  for (std::uint32_t i = 0; i < bench.world.node_count(); ++i)
+    if (bench.world.node_classes[i] != world::NodeClass::Fixed)
+      bench.world.velocities[i] = {0.3f * static_cast<float>(i % 3), -0.2f, 0.1f};
+  const auto energy = [&] {
+    double e = bench.springs.elastic_energy(bench.world.displacements);
+    for (std::size_t i = 0; i < bench.world.node_count(); ++i)
+      e += 0.5 * static_cast<double>(bench.world.masses[i]) *
+           length_squared(to_double(bench.world.velocities[i]));
+    return e;
+  };
+  double last = energy();
+  const double first = last;
+  for (int tick = 0; tick < 500; ++tick) {
+    bench.step({.sweeps = 20, .over_relaxation = 1.3f});
+    const double now = energy();
+    EXPECT_LE(now, last + 1e-6 * first) << "tick " << tick;
+    last = now;
+  }
+  EXPECT_LT(last, 0.2 * first);
+}
+
+TEST(BlockDescent, MoreSweepsReduceTheResidual) {
+  double last = INFINITY;
+  for (const std::uint32_t sweeps : {1u, 4u, 16u, 64u}) {
+    Bench bench(lattice(6, 6, 6));
+    bench.tie(NodeIndex(100), {0.003f, 0.004f, 0}, 2000.0f);
+    const double residual = bench.step({.sweeps = sweeps}).residual_n;
+    EXPECT_LT(residual, 0.5 * last);
+    last = residual;
+  }
+}
+
+TEST(BlockDescent, ANonFiniteNodeIsRejectedAndCounted) {
+  Bench bench(lattice(4, 4, 4));
+  bench.tie(NodeIndex(40), {INFINITY, 0, 0}, 2000.0f);
+  const auto report = bench.step({});
+  EXPECT_EQ(report.nodes_rejected, 1u);
+  for (const auto& u : bench.world.displacements) EXPECT_TRUE(is_finite(u));
+}
+
+}  // namespace
+}  // namespace trocar::dynamics

@@ -1,0 +1,60 @@
+// No allocation in a tick after warm-up. Publishing makes one frame object for other threads every
+// 16th tick: those ticks are counted separately and bounded.
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <new>
+
+#include "tests/step/hands.h"
+
+namespace {
+std::atomic<std::size_t> allocations{0};
+}
+
+void* operator new(std::size_t size) {
+  ++allocations;
+  if (void* p = std::malloc(size)) return p;
+  throw std::bad_alloc();
+}
+void operator delete(void* p) noexcept {
+  std::free(p);
+}
+void operator delete(void* p, std::size_t) noexcept {
+  std::free(p);
+}
+
+namespace trocar::step {
+namespace {
+
+TEST(Tick, DoesNotAllocateAfterWarmUp) {
+  Simulation simulation(scene::make_lattice());
+  const float top = testing::top_of(simulation.organ());
+  // Warm-up and measurement replay the same motion: the second run finds its capacity ready.
+  Bytes start;
+  simulation.write_snapshot(start);
+  session::TickInputs inputs;
+  inputs.samples.reserve(8);
+  std::size_t between = 0, publishing = 0, largest_publish = 0;
+  for (Tick tick = 1; tick <= 1600; ++tick) {
+    inputs.clear();
+    testing::add_two_hands(tick, top, inputs);
+    const std::size_t before = allocations;
+    simulation.tick(inputs, {});
+    const std::size_t count = allocations - before;
+    if (publishes_frame(tick)) {
+      largest_publish = std::max(largest_publish, count);
+      ++publishing;
+    } else if (tick > 400 && tick < 1200) {
+      between += count;
+    }
+    simulation.take_frame();
+  }
+  EXPECT_EQ(between, 0u);
+  EXPECT_GT(publishing, 0u);
+  EXPECT_LE(largest_publish, 12u);
+}
+
+}  // namespace
+}  // namespace trocar::step

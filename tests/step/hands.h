@@ -1,0 +1,38 @@
+#pragma once
+
+// Two scripted hands on Choi's lattice for tests: one presses and slides, the other grasps and
+// lifts.
+
+#include <algorithm>
+
+#include "common/scene/builtin_organs.h"
+#include "server/step/simulation.h"
+
+namespace trocar::step::testing {
+
+inline float top_of(const scene::Organ& organ) {
+  double top = 0;
+  for (const auto& p : organ.mesh.rest_positions) top = std::max(top, p.y);
+  return static_cast<float>(top);
+}
+
+// Inputs of tick `tick` (1, 2, ...): joins first, then samples every 8 ticks.
+inline void add_two_hands(Tick tick, float top, session::TickInputs& inputs) {
+  if (tick == 1)
+    for (std::uint8_t hand = 0; hand < 2; ++hand) {
+      session::HandJoin join{.slot = {hand}};
+      join.shapes[0] = {.radius_m = 0.012f, .length_m = 0.3f, .reach_m = 0.012f};
+      inputs.joins.push_back(join);
+    }
+  if (tick % 8 != 1) return;
+  const float t = static_cast<float>(tick) * 1e-3f;
+  const auto add = [&](std::uint8_t hand, const Vec3f& tip, scene::Verb verb) {
+    inputs.samples.push_back({tool_slot({hand}, 0), {{tip, rotation_from_z({0, 1, 0})}, verb}});
+  };
+  const float press = std::min(0.01f, 0.05f * t);
+  add(0, {-0.105f + 0.06f * t, top - press, 0.004f}, scene::Verb::Push);
+  add(1, {0.04f, top + std::min(0.02f, 0.04f * t), 0.003f},
+      t < 1.2f ? scene::Verb::Grasp : scene::Verb::None);
+}
+
+}  // namespace trocar::step::testing

@@ -1,0 +1,202 @@
+// The tick as a pure function: same inputs, same hash; snapshots continue bit for bit; what comes
+// from outside cannot break it.
+
+#include "server/step/simulation.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "tests/step/hands.h"
+
+namespace trocar::step {
+namespace {
+
+using testing::add_two_hands;
+using testing::top_of;
+
+class TwoHands : public ::testing::Test {
+ protected:
+  static TickReport run_tick(Simulation& simulation) {
+    session::TickInputs inputs;
+    add_two_hands(simulation.current_tick() + 1, top_of(simulation.organ()), inputs);
+    return simulation.tick(inputs, {});
+  }
+};
+
+TEST_F(TwoHands, SameInputsGiveSameHashes) {
+  Simulation a(scene::make_lattice()), b(scene::make_lattice());
+  for (int i = 0; i < 600; ++i) ASSERT_EQ(run_tick(a).state_hash, run_tick(b).state_hash);
+}
+
+TEST_F(TwoHands, AnyInputChangesTheHash) {
+  Simulation a(scene::make_lattice()), b(scene::make_lattice());
+  for (int i = 0; i < 50; ++i) run_tick(a), run_tick(b);
+  session::TickInputs inputs;
+  add_two_hands(57, top_of(a.organ()), inputs);
+  a.tick(inputs, {});
+  inputs.samples[0].sample.world_from_tool.position.x += 1e-6f;
+  b.tick(inputs, {});
+  EXPECT_NE(a.state_hash(), b.state_hash());
+}
+
+TEST_F(TwoHands, ASnapshotIsWhatTheHashCoversAndContinuesBitForBit) {
+  Simulation a(scene::make_lattice());
+  for (const int stop : {0, 15, 300}) {
+    while (a.current_tick() < static_cast<Tick>(stop)) run_tick(a);
+    Bytes snapshot;
+    a.write_snapshot(snapshot);
+    EXPECT_EQ(xxh3_64(snapshot), a.state_hash());
+    Simulation b(scene::make_lattice());
+    const auto restored = b.restore_snapshot(snapshot);
+    ASSERT_TRUE(restored.ok()) << restored.error().message;
+    Simulation c(scene::make_lattice());
+    ASSERT_TRUE(c.restore_snapshot(snapshot).ok());
+    for (int i = 0; i < 100; ++i) ASSERT_EQ(run_tick(b).state_hash, run_tick(c).state_hash);
+    EXPECT_EQ(b.current_tick(), static_cast<Tick>(stop) + 100);
+    // And equal to the run that never stopped.
+    Simulation d(scene::make_lattice());
+    while (d.current_tick() < b.current_tick()) run_tick(d);
+    EXPECT_EQ(d.state_hash(), b.state_hash());
+  }
+}
+
+TEST_F(TwoHands, TheHashReportedByATickIsTheHashOfItsSnapshotBetweenPublications) {
+  Simulation a(scene::make_lattice());
+  while (a.current_tick() < 15) run_tick(a);
+  const auto reported = a.context().report.state_hash;
+  Bytes snapshot;
+  a.write_snapshot(snapshot);
+  EXPECT_EQ(xxh3_64(snapshot), reported);
+}
+
+TEST_F(TwoHands, ATornOrWrongSnapshotIsRefusedAndChangesNothing) {
+  Simulation a(scene::make_lattice());
+  for (int i = 0; i < 100; ++i) run_tick(a);
+  Bytes snapshot;
+  a.write_snapshot(snapshot);
+  Simulation b(scene::make_lattice());
+  const auto hash = b.state_hash();
+  for (std::size_t size = 0; size < snapshot.size(); size += 9973)
+    EXPECT_FALSE(b.restore_snapshot(BytesView(snapshot).first(size)).ok());
+  auto longer = snapshot;
+  longer.push_back(0);
+  EXPECT_FALSE(b.restore_snapshot(longer).ok());
+  EXPECT_EQ(b.state_hash(), hash);
+}
+
+TEST_F(TwoHands, RegionsMergeAndTissueComesToRestAgain) {
+  Simulation simulation(scene::make_lattice());
+  bool was_apart = false, was_merged = false;
+  for (int i = 0; i < 1500; ++i) {
+    const auto report = run_tick(simulation);
+    was_apart |= report.region_count == 2;
+    was_merged |= report.region_count == 1 && report.contact_nodes > 6;
+  }
+  EXPECT_TRUE(was_apart);
+  EXPECT_TRUE(was_merged);
+  session::TickInputs leave;
+  leave.leaves = {{0}, {1}};
+  simulation.tick(leave, {});
+  int ticks = 0;
+  while (simulation.context().report.active_nodes > 0 && ticks < 20'000) {
+    simulation.tick({}, {});
+    ++ticks;
+  }
+  EXPECT_LT(ticks, 20'000) << "nothing stays active for ever";
+  for (const auto& u : simulation.state().world.displacements)
+    EXPECT_EQ(u, Vec3f{}) << "nothing freezes with a dent";
+}
+
+TEST_F(TwoHands, FramesCarryTheQuantisedSurfaceAndItsCrc) {
+  Simulation simulation(scene::make_lattice());
+  for (int i = 1; i <= 320; ++i) {
+    run_tick(simulation);
+    const auto frame = simulation.take_frame();
+    ASSERT_EQ(frame != nullptr, i % 16 == 0);
+    if (!frame) continue;
+    EXPECT_EQ(frame->frame, static_cast<Frame>(i / 16));
+    EXPECT_EQ(frame->surface_crc, wire::surface_crc(frame->surface));
+    const auto& layout = simulation.layout();
+    for (std::size_t v = 0; v < layout.vertex_count(); ++v) {
+      const auto u = simulation.state().world.displacements[layout.node_of_vertex[v].value];
+      EXPECT_LE(length(wire::to_metres(frame->surface[v]) - u), 1.3f * wire::kQuantumMetres);
+    }
+  }
+}
+
+TEST(Simulation, APushOnAHeldNodeIsFeltButDoesNotMoveIt) {
+  Simulation simulation(scene::make_lattice());
+  const float top = testing::top_of(simulation.organ());
+  session::TickInputs inputs;
+  for (std::uint8_t hand = 0; hand < 2; ++hand) {
+    session::HandJoin join{.slot = {hand}};
+    join.shapes[0] = {.radius_m = 0.02f, .length_m = 0.3f, .reach_m = 0.008f};
+    inputs.joins.push_back(join);
+  }
+  float pushed_force = 0;
+  Vec3f held_at{};
+  for (int tick = 1; tick <= 600; ++tick) {
+    const auto add = [&](std::uint8_t hand, float height, scene::Verb verb) {
+      inputs.samples.push_back(
+          {tool_slot({hand}, 0), {{{0, top + height, 0}, rotation_from_z({0, 1, 0})}, verb}});
+    };
+    add(0, 0, scene::Verb::Grasp);
+    add(1, tick < 100 ? 0.02f : -0.003f, scene::Verb::Push);
+    simulation.tick(inputs, {});
+    inputs.clear();
+    const auto frame = simulation.take_frame();
+    if (!frame || tick < 500) continue;
+    for (const auto& tool : frame->tools)
+      if (tool.tool == ToolSlot{2}) pushed_force = tool.force_n.y;
+  }
+  const auto& grasp = simulation.state().grasps[ToolSlot{0}];
+  ASSERT_EQ(grasp.nodes.size(), 4u);
+  held_at = simulation.state().world.displacements[grasp.nodes[0].value];
+  EXPECT_LT(length(held_at), 5e-5f) << "the grasp holds its nodes at rest";
+  EXPECT_GT(pushed_force, 0.5f) << "the pusher feels them";
+}
+
+TEST(Simulation, RandomInputsNeverBreakIt) {
+  auto organ = scene::make_lattice({.nx = 8, .ny = 6, .nz = 8});
+  ASSERT_TRUE(organ.ok());
+  Simulation simulation(*organ);
+  std::mt19937 random(7);
+  const auto pick = [&](std::uint32_t n) { return static_cast<std::uint32_t>(random() % n); };
+  std::uniform_real_distribution<float> place(-0.06f, 0.06f);
+  for (int tick = 0; tick < 4000; ++tick) {
+    session::TickInputs inputs;
+    if (pick(40) == 0) inputs.leaves.push_back({static_cast<std::uint8_t>(pick(20))});
+    if (pick(20) == 0) {
+      session::HandJoin join{.slot = {static_cast<std::uint8_t>(pick(20))},
+                             .tool_count = static_cast<int>(pick(4))};
+      join.shapes[0].radius_m = pick(10) == 0 ? -1.0f : 0.01f;
+      inputs.joins.push_back(join);
+    }
+    for (std::uint32_t i = pick(6); i > 0; --i)
+      inputs.samples.push_back(
+          {ToolSlot{static_cast<std::uint8_t>(pick(40))},
+           {{{place(random), place(random), place(random)}, rotation_from_z({0, 1, 0})},
+            static_cast<scene::Verb>(pick(3))}});
+    TickDecisions decisions{
+        .depth_limit = pick(8), .node_limit = 1 + pick(400), .sweeps = 1 + pick(6)};
+    const auto report = simulation.tick(inputs, decisions);
+    ASSERT_EQ(report.nodes_rejected, 0u);
+  }
+  for (const auto& u : simulation.state().world.displacements) ASSERT_TRUE(is_finite(u));
+  for (std::size_t i = 0; i < simulation.state().world.node_count(); ++i)
+    if (simulation.state().world.node_classes[i] == world::NodeClass::Fixed) {
+      EXPECT_EQ(simulation.state().world.displacements[i], Vec3f{});
+    }
+}
+
+TEST(Decisions, OutOfRangeIsRefusedByName) {
+  EXPECT_TRUE(validate(TickDecisions{}).ok());
+  EXPECT_NE(validate({.sweeps = 0}).error().message.find("sweeps"), std::string::npos);
+  EXPECT_NE(validate({.node_limit = 0}).error().message.find("node_limit"), std::string::npos);
+  EXPECT_FALSE(validate({.over_relaxation = NAN}).ok());
+  EXPECT_FALSE(validate({.depth_limit = 5000}).ok());
+}
+
+}  // namespace
+}  // namespace trocar::step
