@@ -24,7 +24,9 @@ class Picture {
             std::uint64_t now_ns);
   bool should_close() const { return context_->should_close(); }
   std::uint64_t count() const { return count_; }
-  Status save(const std::string& file) const;  // the last picture
+  // The last picture; kept only with --screenshot.
+  const render::Image& image() const { return last_; }
+  Status save(const std::string& file) const;
 
  private:
   explicit Picture(std::unique_ptr<render::GlContext> context, const ClientOptions& options);
