@@ -92,10 +92,10 @@ Status Server::open() {
     };
   replicator_ = std::make_unique<replication::Replicator>(
       *tcp_, inbox_, layout, organ.name, scene::organ_hash(organ), std::move(replication));
-  loop_ = std::make_unique<SimulationLoop>(
-      simulation_, inbox_, handover_, journal_.get(),
-      LoopOptions{options_.decisions, ticks_of(options_.seconds)},
-      [this] { asio::post(io_, [this] { begin_end(); }); });
+  loop_ =
+      std::make_unique<SimulationLoop>(simulation_, inbox_, handover_, journal_.get(),
+                                       LoopOptions{options_.decisions, ticks_of(options_.seconds)},
+                                       [this] { asio::post(io_, [this] { begin_end(); }); });
   return {};
 }
 

@@ -135,7 +135,8 @@ std::string describe(const locks::ClaimEvent& event, const session::Roster& rost
   const std::string holder = name_of_holder(event.holder, roster);
   const bool is_grasp = event.verb == scene::Verb::Grasp;
   switch (event.outcome) {
-    case locks::ClaimOutcome::Granted: return who + (is_grasp ? " has a grasp" : " pushes");
+    case locks::ClaimOutcome::Granted:
+      return who + (is_grasp ? " has a grasp" : " pushes");
     case locks::ClaimOutcome::RefusedHeld:
       return "held by " + holder + " (grasp): wait, or ask " + holder + " to let go";
     case locks::ClaimOutcome::RefusedNothingInReach: {
@@ -144,8 +145,10 @@ std::string describe(const locks::ClaimEvent& event, const session::Roster& rost
       return "nothing in reach of " + who + ": bring the tip within " + std::to_string(reach_mm) +
              " mm of the surface";
     }
-    case locks::ClaimOutcome::Released: return who + (is_grasp ? " let go" : " stopped pushing");
-    case locks::ClaimOutcome::TakenOver: return who + " was silent: " + holder + " took over";
+    case locks::ClaimOutcome::Released:
+      return who + (is_grasp ? " let go" : " stopped pushing");
+    case locks::ClaimOutcome::TakenOver:
+      return who + " was silent: " + holder + " took over";
     case locks::ClaimOutcome::Expired:
       return who + " was silent for " + std::to_string(locks::kAbandonTicks / kTicksPerSecond) +
              " s: the grasp was let go";
