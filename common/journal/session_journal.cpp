@@ -1,0 +1,174 @@
+#include "common/journal/session_journal.h"
+
+#include <algorithm>
+#include <charconv>
+#include <limits>
+
+namespace trocar::journal {
+namespace {
+
+template <typename Number>
+bool parse_number(const StringMap& entries, const char* key, int base, Number& value) {
+  const auto found = entries.find(key);
+  if (found == entries.end()) return false;
+  const char* end = found->second.data() + found->second.size();
+  const auto [stopped, error] = std::from_chars(found->second.data(), end, value, base);
+  return error == std::errc() && stopped == end;
+}
+bool parse_message_bytes(BytesView bytes, google::protobuf::Message& message) {
+  return bytes.size() <= kMaxChunkBytes &&
+         message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
+}
+
+}  // namespace
+
+Result<std::unique_ptr<SessionJournal>> SessionJournal::open(const std::string& path) {
+  auto mcap = McapReader::open(path);
+  if (!mcap.ok()) return mcap.error();
+  std::unique_ptr<SessionJournal> journal(new SessionJournal(std::move(*mcap)));
+  if (Status read = journal->read_info(); !read.ok()) return read.error();
+  return journal;
+}
+
+Status SessionJournal::read_info() {
+  const auto& all = mcap_->metadata();
+  const auto metadata = std::find_if(
+      all.begin(), all.end(), [](const McapMetadata& m) { return m.name == kSessionMetadataName; });
+  if (mcap_->header().profile != kJournalProfile || metadata == all.end())
+    return Error{ErrorCode::BadFile, mcap_->path() + ": an MCAP file, but not of a Trocar session"};
+  const StringMap& entries = metadata->entries;
+  const auto text = [&entries](const char* key) {
+    const auto found = entries.find(key);
+    return found == entries.end() ? std::string() : found->second;
+  };
+  if (!parse_number(entries, "start_utc_ns", 10, info_.start_utc_ns) ||
+      !parse_number(entries, "sim_version", 10, info_.sim_version) ||
+      !parse_number(entries, "organ_hash", 16, info_.organ_hash))
+    return Error{ErrorCode::BadFile, mcap_->path() + ": metadata " + kSessionMetadataName +
+                                         " lacks start_utc_ns, sim_version or organ_hash"};
+  times_.start_utc_ns = info_.start_utc_ns;
+  info_.protocol = text("protocol");
+  info_.organ_name = text("organ_name");
+  info_.last_tick = times_.tick(mcap_->statistics().end_time);
+  info_.is_finished = mcap_->is_finished();
+  info_.summary = mcap_->summary_text();
+  return read_participants();
+}
+
+// Damage here costs names, not the journal.
+Status SessionJournal::read_participants() {
+  const auto everything = std::numeric_limits<Tick>::max();
+  const TickVisitor<proto::Participants> note = [this](Tick, const proto::Participants& list) {
+    for (const proto::Participant& participant : list.participant()) {
+      const bool is_known =
+          std::any_of(info_.participants.begin(), info_.participants.end(), [&](const auto& known) {
+            return known.slot() == participant.slot() && known.name() == participant.name();
+          });
+      if (!is_known) info_.participants.push_back(participant);
+    }
+    return true;
+  };
+  const TickVisitor<proto::JournalGap> count = [this](Tick, const proto::JournalGap& gap) {
+    info_.gap_messages += gap.messages();
+    return true;
+  };
+  for (const Status& read : {read_topic(JournalTopic::Participants, 0, everything, note),
+                             read_topic(JournalTopic::Gap, 0, everything, count)})
+    if (!read.ok()) info_.summary += "; " + read.error().message;
+  return {};
+}
+
+Error SessionJournal::not_a(JournalTopic topic, std::uint64_t log_time) const {
+  return {ErrorCode::BadFile, mcap_->path() + ": message on " + topic_name(topic) + " at tick " +
+                                  std::to_string(times_.tick(log_time)) +
+                                  " is malformed; was it written by another program?"};
+}
+
+template <typename Message>
+Status SessionJournal::read_topic(JournalTopic topic, Tick from, Tick to,
+                                  const TickVisitor<Message>& visitor) {
+  // Ticks beyond the last one could overflow the time.
+  const Tick last_tick = std::min(to, info_.last_tick);
+  if (from > last_tick) return {};
+  Message message;
+  Status failure;
+  const ReadReport report = mcap_->read(
+      [topic](const McapChannel& channel) { return channel.topic == topic_name(topic); },
+      {times_.log_time(from), times_.log_time(last_tick)},
+      [&](const McapMessage& m) {
+        if (!parse_message_bytes(m.data, message)) {
+          failure = not_a(topic, m.log_time);
+          return false;
+        }
+        return visitor(times_.tick(m.log_time), message);
+      });
+  return failure.ok() ? report.status() : failure;
+}
+
+template <typename Message>
+Result<std::optional<Message>> SessionJournal::last(JournalTopic topic, Tick tick) {
+  auto found =
+      mcap_->last_before(topic_name(topic), times_.log_time(std::min(tick, info_.last_tick)));
+  if (!found.ok()) return found.error();
+  if (!*found) return std::optional<Message>();
+  Message message;
+  if (!parse_message_bytes((*found)->data, message)) return not_a(topic, (*found)->log_time);
+  return std::optional<Message>(std::move(message));
+}
+
+Result<proto::Organ> SessionJournal::organ() {
+  auto organ = last<proto::Organ>(JournalTopic::Organ, 0);
+  if (!organ.ok()) return organ.error();
+  if (!*organ)
+    return Error{ErrorCode::BadFile, mcap_->path() + ": no organ; the recording ended too early"};
+  return std::move(**organ);
+}
+
+Status SessionJournal::read_tick_records(Tick from, Tick to,
+                                         const TickVisitor<proto::TickRecord>& visitor) {
+  // A batch carries the tick of its frame, the last of its records.
+  const Tick last_batch = to > info_.last_tick ? to : to + kTicksPerFrame;
+  return read_topic<proto::TickBatch>(JournalTopic::TickBatch, from, last_batch,
+                                      [&](Tick, const proto::TickBatch& batch) {
+                                        for (const proto::TickRecord& record : batch.record()) {
+                                          if (record.tick() < from || record.tick() > to) continue;
+                                          if (!visitor(record.tick(), record)) return false;
+                                        }
+                                        return true;
+                                      });
+}
+
+Status SessionJournal::read_surface_deltas(Tick from, Tick to,
+                                           const TickVisitor<proto::SurfaceFrame>& visitor) {
+  return read_topic(JournalTopic::SurfaceDelta, from, to, visitor);
+}
+Status SessionJournal::read_frame_states(Tick from, Tick to,
+                                         const TickVisitor<proto::FrameState>& visitor) {
+  return read_topic(JournalTopic::FrameState, from, to, visitor);
+}
+Status SessionJournal::read_claims(Tick from, Tick to,
+                                   const TickVisitor<proto::ClaimLog>& visitor) {
+  return read_topic(JournalTopic::Claims, from, to, visitor);
+}
+Status SessionJournal::read_snapshots(Tick from, Tick to,
+                                      const TickVisitor<proto::WorldSnapshot>& visitor) {
+  return read_topic(JournalTopic::Snapshot, from, to, visitor);
+}
+
+Result<std::optional<proto::WorldSnapshot>> SessionJournal::snapshot_before(Tick tick) {
+  return last<proto::WorldSnapshot>(JournalTopic::Snapshot, tick);
+}
+Result<std::optional<proto::SurfaceFrame>> SessionJournal::surface_key_before(Tick tick) {
+  return last<proto::SurfaceFrame>(JournalTopic::SurfaceKey, tick);
+}
+Result<std::optional<proto::SurfaceTopology>> SessionJournal::topology_before(Tick tick) {
+  return last<proto::SurfaceTopology>(JournalTopic::Topology, tick);
+}
+Result<std::optional<proto::Participants>> SessionJournal::participants_before(Tick tick) {
+  return last<proto::Participants>(JournalTopic::Participants, tick);
+}
+Result<std::optional<proto::FrameState>> SessionJournal::frame_state_before(Tick tick) {
+  return last<proto::FrameState>(JournalTopic::FrameState, tick);
+}
+
+}  // namespace trocar::journal

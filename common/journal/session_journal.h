@@ -1,0 +1,76 @@
+#pragma once
+
+// Reads the journal of a session, finished or cut short. Ticks in and out; the container's damage
+// comes back as an error of the call that met it, after everything readable was visited. One
+// thread.
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/journal/mcap_reader.h"
+#include "common/journal/session_topics.h"
+#include "proto/journal.pb.h"
+#include "proto/organ.pb.h"
+#include "proto/wire.pb.h"
+
+namespace trocar::journal {
+
+struct SessionInfo {
+  std::uint64_t start_utc_ns = 0;
+  std::uint32_t sim_version = 0;
+  std::string protocol;  // "major.minor"
+  std::string organ_name;
+  std::uint64_t organ_hash = 0;
+  Tick last_tick = 0;                            // of the last message
+  std::vector<proto::Participant> participants;  // everyone who was ever in, in order of joining
+  std::uint64_t gap_messages = 0;                // that the session dropped while recording
+  bool is_finished = false;
+  std::string summary;  // one line for people
+};
+
+template <typename Message>
+using TickVisitor = std::function<bool(Tick, const Message&)>;  // false stops
+
+class SessionJournal {
+ public:
+  static Result<std::unique_ptr<SessionJournal>> open(const std::string& path);
+
+  const SessionInfo& info() const { return info_; }
+  const McapReader& container() const { return *mcap_; }
+
+  Result<proto::Organ> organ();
+
+  // Records of ticks in [from, to], in order.
+  Status read_tick_records(Tick from, Tick to, const TickVisitor<proto::TickRecord>& visitor);
+  // Deltas of frames with tick in [from, to], in order.
+  Status read_surface_deltas(Tick from, Tick to, const TickVisitor<proto::SurfaceFrame>& visitor);
+  Status read_frame_states(Tick from, Tick to, const TickVisitor<proto::FrameState>& visitor);
+  Status read_claims(Tick from, Tick to, const TickVisitor<proto::ClaimLog>& visitor);
+  Status read_snapshots(Tick from, Tick to, const TickVisitor<proto::WorldSnapshot>& visitor);
+
+  // The latest at or before `tick`; nothing if there is none.
+  Result<std::optional<proto::WorldSnapshot>> snapshot_before(Tick tick);
+  Result<std::optional<proto::SurfaceFrame>> surface_key_before(Tick tick);
+  Result<std::optional<proto::SurfaceTopology>> topology_before(Tick tick);
+  Result<std::optional<proto::Participants>> participants_before(Tick tick);
+  Result<std::optional<proto::FrameState>> frame_state_before(Tick tick);
+
+ private:
+  explicit SessionJournal(std::unique_ptr<McapReader> mcap) : mcap_(std::move(mcap)) {}
+  Status read_info();
+  Status read_participants();
+  Error not_a(JournalTopic topic, std::uint64_t log_time) const;
+  template <typename Message>
+  Status read_topic(JournalTopic topic, Tick from, Tick to, const TickVisitor<Message>& visitor);
+  template <typename Message>
+  Result<std::optional<Message>> last(JournalTopic topic, Tick tick);
+
+  std::unique_ptr<McapReader> mcap_;
+  JournalTimes times_;
+  SessionInfo info_;
+};
+
+}  // namespace trocar::journal

@@ -1,0 +1,41 @@
+#include "common/journal/session_topics.h"
+
+#include <array>
+
+#include "proto/journal.pb.h"
+#include "proto/organ.pb.h"
+#include "proto/wire.pb.h"
+
+namespace trocar::journal {
+namespace {
+
+struct TopicEntry {
+  const char* name;
+  const google::protobuf::Descriptor* message;
+};
+const TopicEntry& entry_of(JournalTopic topic) {
+  static const std::array<TopicEntry, kJournalTopicCount> kEntries{{
+      {"/organ", proto::Organ::descriptor()},
+      {"/world/snapshot", proto::WorldSnapshot::descriptor()},
+      {"/tick_batch", proto::TickBatch::descriptor()},
+      {"/surface/key", proto::SurfaceFrame::descriptor()},
+      {"/surface/delta", proto::SurfaceFrame::descriptor()},
+      {"/topology", proto::SurfaceTopology::descriptor()},
+      {"/participants", proto::Participants::descriptor()},
+      {"/claims", proto::ClaimLog::descriptor()},
+      {"/frame_state", proto::FrameState::descriptor()},
+      {"/gap", proto::JournalGap::descriptor()},
+  }};
+  return kEntries[static_cast<std::size_t>(topic)];
+}
+
+}  // namespace
+
+const char* topic_name(JournalTopic topic) {
+  return entry_of(topic).name;
+}
+const google::protobuf::Descriptor& topic_message(JournalTopic topic) {
+  return *entry_of(topic).message;
+}
+
+}  // namespace trocar::journal

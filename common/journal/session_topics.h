@@ -1,0 +1,61 @@
+#pragma once
+
+// The channels of a Trocar journal, and how ticks become times.
+//
+//   /organ           Organ            once, first
+//   /world/snapshot  WorldSnapshot    full state: at start, every 10 s, at marks
+//   /tick_batch      TickBatch        one per frame: inputs, decisions, hashes of its ticks
+//   /surface/key     SurfaceFrame     1 Hz
+//   /surface/delta   SurfaceFrame     every frame, against the frame before
+//   /topology        SurfaceTopology  at start and at every cut
+//   /participants    Participants     on change
+//   /claims          ClaimLog         frames that have claim events
+//   /frame_state     FrameState       tools, regions and figures of a frame, as a client got them
+//   /gap             JournalGap       where the queue to the writer was full
+//   /tool/<slot>     ToolState        one channel per tool, for plots in other programs
+//
+// A message of frame f carries tick 16 f; log_time = start (UTC) + tick x 1 ms, so all messages of
+// a tick share it. publish_time is the wall clock.
+
+#include <cstdint>
+
+#include "common/base/tick.h"
+
+namespace google::protobuf {
+class Descriptor;
+}
+
+namespace trocar::journal {
+
+enum class JournalTopic : std::uint8_t {
+  Organ,
+  Snapshot,
+  TickBatch,
+  SurfaceKey,
+  SurfaceDelta,
+  Topology,
+  Participants,
+  Claims,
+  FrameState,
+  Gap,
+};
+inline constexpr int kJournalTopicCount = 10;
+
+inline constexpr const char* kJournalProfile = "trocar";
+inline constexpr const char* kSessionMetadataName = "trocar.session";
+
+const char* topic_name(JournalTopic topic);
+const google::protobuf::Descriptor& topic_message(JournalTopic topic);
+
+// Log times of one session.
+struct JournalTimes {
+  std::uint64_t start_utc_ns = 0;  // of tick 0
+
+  std::uint64_t log_time(Tick tick) const { return start_utc_ns + tick * kTickNanoseconds; }
+  // The tick at or before a log time; 0 before the start.
+  Tick tick(std::uint64_t log_time_ns) const {
+    return log_time_ns <= start_utc_ns ? 0 : (log_time_ns - start_utc_ns) / kTickNanoseconds;
+  }
+};
+
+}  // namespace trocar::journal
