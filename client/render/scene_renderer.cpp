@@ -15,7 +15,7 @@ namespace trocar::render {
 namespace {
 
 constexpr int kMaxShadows = 8;
-constexpr float kOverlayStrength = 0.85f;
+constexpr float kOverlayStrength = 0.80f;
 constexpr float kOverlayFadeSeconds = 0.12f;
 constexpr std::size_t kTriangleBudgetSoftware = 16'000, kTriangleBudget = 100'000;
 
@@ -96,6 +96,10 @@ struct Target {
   }
 };
 
+std::string lit(const char* head, const char* fragment_source) {
+  return std::string(head) + kLightingSource + fragment_source;
+}
+
 void blit(GLuint from, GLuint to, Size size) {
   glBindFramebuffer(GL_READ_FRAMEBUFFER, from);
   glBindFramebuffer(GL_DRAW_FRAMEBUFFER, to);
@@ -112,8 +116,9 @@ std::optional<Vec3f> arrow_end(const Vec3f& tip, const Vec3f& force_n) {
 }
 
 struct SceneRenderer::Parts {
-  Shader organ{kOrganVertexSource, (std::string(kLightingSource) + kOrganFragmentSource).c_str()};
-  Shader tool{kToolVertexSource, (std::string(kLightingSource) + kToolFragmentSource).c_str()};
+  Shader fine_organ{kOrganVertexSource, lit(kFineHead, kOrganFragmentSource).c_str()};
+  Shader plain_organ{kOrganVertexSource, lit(kPlainHead, kOrganFragmentSource).c_str()};
+  Shader tool{kToolVertexSource, lit(kFineHead, kToolFragmentSource).c_str()};
   Shader background{kBackgroundVertexSource, kBackgroundFragmentSource};
   VertexArray organ_array, tool_array, background_array;
   GLuint rest_buffer = 0, index_buffer = 0, noise = 0;
@@ -135,7 +140,7 @@ struct SceneRenderer::Parts {
   void fade_tints(const SceneView& scene);
   void set_lights(const Shader& shader, const OrbitCamera& camera) const;
   void draw_background();
-  void draw_organ(const SceneView& scene, const OrbitCamera& camera);
+  void draw_organ(const SceneView& scene, const OrbitCamera& camera, const Shader& organ);
   void draw_tools(const SceneView& scene, const OrbitCamera& camera);
   void draw_mesh(const MeshVertices& mesh, const Matrix4& world_from_model, float glow, float dim);
 };
@@ -255,7 +260,8 @@ void SceneRenderer::Parts::set_lights(const Shader& shader, const OrbitCamera& c
   shader.set("fill_direction", direction(-0.9f, 0.15f, 0.35f));
 }
 
-void SceneRenderer::Parts::draw_organ(const SceneView& scene, const OrbitCamera& camera) {
+void SceneRenderer::Parts::draw_organ(const SceneView& scene, const OrbitCamera& camera,
+                                      const Shader& organ) {
   if (scene.topology_version != topology_version) load_topology(scene);
   if (scene.positions.empty() || scene.positions.size() != surface.coarse_vertex_count()) return;
   upload_organ(scene);
@@ -372,7 +378,7 @@ void SceneRenderer::draw(const SceneView& scene, const OrbitCamera& camera, Qual
   glClear(GL_DEPTH_BUFFER_BIT);
   glEnable(GL_MULTISAMPLE);
   glEnable(GL_DEPTH_TEST);
-  parts.draw_organ(scene, camera);
+  parts.draw_organ(scene, camera, is_sharp ? parts.fine_organ : parts.plain_organ);
   parts.draw_tools(scene, camera);
   glDisable(GL_DEPTH_TEST);
   glBindVertexArray(0);
