@@ -32,7 +32,9 @@ NetSource::Session::Session(NetSourceOptions options)
   thread_ = std::thread([this] { context_.run(); });
 }
 
-NetSource::Session::~Session() { thread_.join(); }
+NetSource::Session::~Session() {
+  thread_.join();
+}
 
 // ---- render thread ----
 
@@ -54,9 +56,12 @@ void NetSource::Session::request_close(const std::string& reason) {
 }
 
 replica::SourceStatistics NetSource::Session::statistics() const {
-  return {.bytes_received = bytes_received_, .bytes_sent = bytes_sent_,
-          .messages_received = messages_received_, .frames_received = frames_received_,
-          .sends_dropped = sends_dropped_, .round_trip_seconds = round_trip_seconds_};
+  return {.bytes_received = bytes_received_,
+          .bytes_sent = bytes_sent_,
+          .messages_received = messages_received_,
+          .frames_received = frames_received_,
+          .sends_dropped = sends_dropped_,
+          .round_trip_seconds = round_trip_seconds_};
 }
 
 std::string NetSource::Session::server_name() const {
@@ -163,8 +168,8 @@ asio::awaitable<bool> NetSource::Session::connect() {
   asio::co_spawn(context_, expire(deadline), [](std::exception_ptr) {});
   std::string why = "no answer";
   while (!is_done_ && Clock::now() < deadline) {
-    const auto [unresolved, endpoints] = co_await resolver_.async_resolve(
-        options_.host, std::to_string(options_.port), kNoThrow);
+    const auto [unresolved, endpoints] =
+        co_await resolver_.async_resolve(options_.host, std::to_string(options_.port), kNoThrow);
     if (unresolved) why = unresolved.message();
     for (const auto& endpoint : endpoints) {
       if (is_done_ || Clock::now() >= deadline) break;
@@ -187,8 +192,7 @@ asio::awaitable<bool> NetSource::Session::connect() {
 }
 
 asio::awaitable<bool> NetSource::Session::read_exactly(std::uint8_t* to, std::size_t count) {
-  const auto [error, taken] =
-      co_await asio::async_read(socket_, asio::buffer(to, count), kNoThrow);
+  const auto [error, taken] = co_await asio::async_read(socket_, asio::buffer(to, count), kNoThrow);
   bytes_received_.fetch_add(taken, std::memory_order_relaxed);
   co_return !error;
 }

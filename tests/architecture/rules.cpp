@@ -55,6 +55,7 @@ Breaches matching_includes(const SourceTree& tree, const std::regex& pattern,
 void check_depends(const SourceTree& tree, const std::string& name, Breaches& breaches) {
   const int layer = tree.layer_of(name);
   for (const auto& dependency : tree.folders.at(name).depends) {
+    if (dependency == name) continue;  // a program and the library beside it
     const int other = tree.layer_of(dependency);
     const std::string start = name + "/CMakeLists.txt:1: DEPENDS " + dependency;
     if (other < 0)

@@ -89,6 +89,14 @@ TEST_F(Rules, ADependencyThatPointsDownIsFound) {
   expect_one(check_folders(tree()), "common/base/CMakeLists.txt:1: ", "turn it around");
 }
 
+TEST_F(Rules, AProgramMayDependOnTheLibraryBesideIt) {
+  append("server/step/CMakeLists.txt",
+         "project_program(run MAIN main.cpp DEPENDS server/step common/math)\n");
+  write("server/step/main.cpp", "#include \"common/math/m.h\"\n");
+  EXPECT_TRUE(check_folders(tree()).empty());
+  EXPECT_TRUE(check_includes(tree()).empty());
+}
+
 TEST_F(Rules, ADependencyThatDoesNotExistIsFound) {
   library("server/world", "HEADERS world.h DEPENDS common/math common/maths");
   expect_one(check_folders(tree()), "server/world/CMakeLists.txt:1: ", "not in TROCAR_LAYERS");

@@ -1,5 +1,5 @@
-// The inbox against a plain model: what reaches the tick is what a simulation that saw every item in
-// order would hold; and what happens when it is full.
+// The inbox against a plain model: what reaches the tick is what a simulation that saw every item
+// in order would hold; and what happens when it is full.
 
 #include "server/session/inbox.h"
 

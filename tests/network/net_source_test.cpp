@@ -51,9 +51,8 @@ TEST(NetSource, joins_and_gets_everything_in_order_with_round_trips) {
   net::NetSource source(options_for(session.port(), "Anna"));
   Collector sink;
   EXPECT_FALSE(source.send(make_sample(1))) << "not live yet";
-  ASSERT_TRUE(poll_until(source, sink, [&] {
-    return sink.count(proto::Envelope::kSurfaceFrame) == 1;
-  }));
+  ASSERT_TRUE(
+      poll_until(source, sink, [&] { return sink.count(proto::Envelope::kSurfaceFrame) == 1; }));
   EXPECT_EQ(source.state(), SourceState::Live);
   EXPECT_TRUE(sink.messages[0].has_welcome());
   EXPECT_TRUE(sink.messages[1].has_participants());
@@ -79,9 +78,8 @@ TEST(NetSource, a_full_queue_stops_reading_and_loses_nothing) {
   options.inbound_capacity = 8;
   net::NetSource source(options);
   Collector sink;
-  ASSERT_TRUE(poll_until(source, sink, [&] {
-    return sink.count(proto::Envelope::kSurfaceFrame) == 1;
-  }));
+  ASSERT_TRUE(
+      poll_until(source, sink, [&] { return sink.count(proto::Envelope::kSurfaceFrame) == 1; }));
   for (int i = 0; i < 700; ++i) session.publish(6000);
   EXPECT_GT(session.on_io([&] { return session.replicator().counters().frames_skipped; }), 0u)
       << "the server was never held back";
@@ -90,9 +88,8 @@ TEST(NetSource, a_full_queue_stops_reading_and_loses_nothing) {
     return session.on_io([&] { return session.replicator().counters().frames_given; });
   };
   const auto given_so_far = given();
-  ASSERT_TRUE(poll_until(source, sink, [&] {
-    return sink.count(proto::Envelope::kSurfaceFrame) == given_so_far;
-  }));
+  ASSERT_TRUE(poll_until(
+      source, sink, [&] { return sink.count(proto::Envelope::kSurfaceFrame) == given_so_far; }));
   session.publish(10);
   ASSERT_TRUE(poll_until(source, sink, [&] {
     return sink.count(proto::Envelope::kSurfaceFrame) == given_so_far + 1;

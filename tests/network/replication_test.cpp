@@ -108,13 +108,11 @@ TEST(Replication, equal_lag_shares_one_buffer) {
     clients.push_back(std::make_unique<RawClient>(session.port()));
     ASSERT_TRUE(clients.back()->join("w" + std::to_string(i), proto::ROLE_OBSERVER));
   }
-  const auto before = session.on_io([&] {
-    return session.replicator().encode_statistics().delta_cpu.count();
-  });
+  const auto before =
+      session.on_io([&] { return session.replicator().encode_statistics().delta_cpu.count(); });
   for (int i = 0; i < 10; ++i) session.publish(10);
-  const auto after = session.on_io([&] {
-    return session.replicator().encode_statistics().delta_cpu.count();
-  });
+  const auto after =
+      session.on_io([&] { return session.replicator().encode_statistics().delta_cpu.count(); });
   EXPECT_EQ(after - before, 10u) << "one delta per frame, whoever gets it";
 }
 
@@ -190,8 +188,7 @@ TEST(Replication, claim_events_of_skipped_frames_arrive_with_names) {
     const auto refused = client->receive(Envelope::kClaimEvent);
     ASSERT_TRUE(refused);
     EXPECT_EQ(refused->claim_event().holder_name(), "Anna");
-    EXPECT_EQ(refused->claim_event().text(),
-              "held by Anna (grasp): wait, or ask Anna to let go");
+    EXPECT_EQ(refused->claim_event().text(), "held by Anna (grasp): wait, or ask Anna to let go");
     const auto surface = client->receive(Envelope::kSurfaceFrame);
     ASSERT_TRUE(surface);
     EXPECT_EQ(surface->surface_frame().frame(), frames.back()->frame) << "only the newest surface";

@@ -174,8 +174,8 @@ class ServerProcess : public ::testing::Test {
  protected:
   // Starts the program and waits for its port.
   std::uint16_t start(std::vector<std::string> arguments) {
-    folder_ = std::filesystem::temp_directory_path() /
-              ("trocar_server_" + std::to_string(::getpid()));
+    folder_ =
+        std::filesystem::temp_directory_path() / ("trocar_server_" + std::to_string(::getpid()));
     std::filesystem::create_directories(folder_);
     const auto ready = folder_ / "port";
     for (const std::string& more :
@@ -262,9 +262,9 @@ TEST_F(ServerProcess, sigterm_asks_for_the_crc_says_goodbye_and_exits_with_0) {
       ASSERT_TRUE(client.send(ack));
     } else {
       const auto& payload = message->surface_frame().payload();
-      ASSERT_TRUE(wire::decode_delta({reinterpret_cast<const std::uint8_t*>(payload.data()),
-                                      payload.size()},
-                                     client.surface)
+      ASSERT_TRUE(wire::decode_delta(
+                      {reinterpret_cast<const std::uint8_t*>(payload.data()), payload.size()},
+                      client.surface)
                       .ok());
     }
   }
@@ -278,8 +278,10 @@ TEST_F(ServerProcess, sigterm_asks_for_the_crc_says_goodbye_and_exits_with_0) {
 TEST_F(ServerProcess, seconds_end_by_themselves_and_a_taken_port_is_exit_code_5) {
   const auto port = start({"--seconds", "0.5"});
   ASSERT_NE(port, 0);
-  const std::string second = TROCAR_BINARY_DIR "/trocar-server --organ lattice --journal none "
-                             "--listen 127.0.0.1:" + std::to_string(port) + " 2>/dev/null";
+  const std::string second = TROCAR_BINARY_DIR
+                             "/trocar-server --organ lattice --journal none "
+                             "--listen 127.0.0.1:" +
+                             std::to_string(port) + " 2>/dev/null";
   EXPECT_EQ(WEXITSTATUS(std::system(second.c_str())), 5);
   EXPECT_EQ(wait_for_exit(), 0);
   EXPECT_NE(summary().find("\"last_tick\": 512"), std::string::npos) << summary();

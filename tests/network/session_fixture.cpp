@@ -32,7 +32,9 @@ RawClient::RawClient(std::uint16_t port, int receive_buffer_bytes)
   EXPECT_EQ(::connect(socket_, to, sizeof address), 0);
 }
 
-RawClient::~RawClient() { ::close(socket_); }
+RawClient::~RawClient() {
+  ::close(socket_);
+}
 
 bool RawClient::send_bytes(BytesView bytes) {
   while (!bytes.empty()) {
@@ -47,7 +49,9 @@ bool RawClient::send(const proto::Envelope& envelope) {
   return send_bytes(*wire::encode_envelope(envelope));
 }
 
-void RawClient::shut_down_sending() { ::shutdown(socket_, SHUT_WR); }
+void RawClient::shut_down_sending() {
+  ::shutdown(socket_, SHUT_WR);
+}
 
 bool RawClient::receive_exactly(std::uint8_t* to, std::size_t count) {
   while (count > 0) {

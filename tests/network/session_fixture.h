@@ -99,7 +99,7 @@ class LiveSession {
   bool wait_for_sessions(std::size_t count);
 
   session::SimulationInbox inbox;
-  net::TcpServer& tcp() { return *tcp_; }              // inside on_io
+  net::TcpServer& tcp() { return *tcp_; }                         // inside on_io
   replication::Replicator& replicator() { return *replicator_; }  // inside on_io
 
  private:
