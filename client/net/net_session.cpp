@@ -22,19 +22,19 @@ constexpr std::chrono::milliseconds kRoomRetry{2};
 constexpr std::size_t kBuffersPerWrite = 16;
 constexpr std::size_t kMaxByeBytes = 200;
 
-void ignore_completion(std::exception_ptr) {}
-
 }  // namespace
 
 NetSource::Session::Session(NetSourceOptions options)
     : options_(std::move(options)),
       inbound_(options_.inbound_capacity),
       outbound_(options_.outbound_capacity) {
-  asio::co_spawn(context_, run(), ignore_completion);
+  asio::co_spawn(context_, run(), [](std::exception_ptr) {});
   thread_ = std::thread([this] { context_.run(); });
 }
 
-NetSource::Session::~Session() { thread_.join(); }
+NetSource::Session::~Session() {
+  thread_.join();
+}
 
 // ---- render thread ----
 
@@ -56,9 +56,12 @@ void NetSource::Session::request_close(const std::string& reason) {
 }
 
 replica::SourceStatistics NetSource::Session::statistics() const {
-  return {.bytes_received = bytes_received_, .bytes_sent = bytes_sent_,
-          .messages_received = messages_received_, .frames_received = frames_received_,
-          .sends_dropped = sends_dropped_, .round_trip_seconds = round_trip_seconds_};
+  return {.bytes_received = bytes_received_,
+          .bytes_sent = bytes_sent_,
+          .messages_received = messages_received_,
+          .frames_received = frames_received_,
+          .sends_dropped = sends_dropped_,
+          .round_trip_seconds = round_trip_seconds_};
 }
 
 std::string NetSource::Session::server_name() const {
@@ -93,7 +96,7 @@ void NetSource::Session::begin_close(const std::string& reason) {
   control_.push_back(wire::encode_envelope(envelope));
   wake_timer_.cancel();
   room_timer_.cancel();
-  asio::co_spawn(context_, expire(Clock::now() + kCloseDeadline), ignore_completion);
+  asio::co_spawn(context_, expire(Clock::now() + kCloseDeadline), [](std::exception_ptr) {});
 }
 
 asio::awaitable<void> NetSource::Session::expire(Clock::time_point deadline) {
@@ -123,27 +126,50 @@ wire::SharedBytes NetSource::Session::encode_hello() const {
   return wire::encode_envelope(envelope);
 }
 
+// Coroutines here hold no temporaries across a co_await and leave the text to plain functions:
+// GCC 12 miscompiles some of them otherwise (seen as a trap on resuming).
 asio::awaitable<void> NetSource::Session::run() {
-  if (co_await connect()) {
-    is_connected_ = true;
-    last_heard_ = Clock::now();
-    control_.push_back(encode_hello());
-    asio::co_spawn(context_, write_messages(), ignore_completion);
-    asio::co_spawn(context_, ping(), ignore_completion);
+  const bool has_connected = co_await connect();
+  if (has_connected) {
+    begin_conversation();
     co_await read_messages();
-    end(is_closing_ ? replica::CloseKind::Ended : replica::CloseKind::Lost,
-        is_closing_ ? "closed" : "connection to " + server_name() + " broke: the server is gone");
+    end_after_stream();
   }
   has_ended_.store(true, std::memory_order_release);
 }
 
+void NetSource::Session::begin_conversation() {
+  is_connected_ = true;
+  last_heard_ = Clock::now();
+  control_.push_back(encode_hello());
+  asio::co_spawn(context_, write_messages(), [](std::exception_ptr) {});
+  asio::co_spawn(context_, ping(), [](std::exception_ptr) {});
+}
+
+void NetSource::Session::end_after_stream() {
+  if (is_closing_) return end(replica::CloseKind::Ended, "closed");
+  end(replica::CloseKind::Lost, "connection to " + server_name() + " broke: the server is gone");
+}
+
+void NetSource::Session::end_unreachable(const std::string& why) {
+  end(replica::CloseKind::Unreachable, "no server at " + server_name() + " (" + why +
+                                           "): start trocar-server, or check address and port");
+}
+
+void NetSource::Session::check_silence() {
+  if (is_stalled_ || is_done_ || Clock::now() - last_heard_ <= options_.silence_deadline) return;
+  end(replica::CloseKind::Lost,
+      has_heard_ ? "connection to " + server_name() + " is silent: check the network"
+                 : server_name() + " does not answer: is it a Trocar server?");
+}
+
 asio::awaitable<bool> NetSource::Session::connect() {
   const auto deadline = Clock::now() + options_.connect_deadline;
-  asio::co_spawn(context_, expire(deadline), ignore_completion);
+  asio::co_spawn(context_, expire(deadline), [](std::exception_ptr) {});
   std::string why = "no answer";
   while (!is_done_ && Clock::now() < deadline) {
-    const auto [unresolved, endpoints] = co_await resolver_.async_resolve(
-        options_.host, std::to_string(options_.port), kNoThrow);
+    const auto [unresolved, endpoints] =
+        co_await resolver_.async_resolve(options_.host, std::to_string(options_.port), kNoThrow);
     if (unresolved) why = unresolved.message();
     for (const auto& endpoint : endpoints) {
       if (is_done_ || Clock::now() >= deadline) break;
@@ -161,14 +187,12 @@ asio::awaitable<bool> NetSource::Session::connect() {
     retry_timer_.expires_after(options_.connect_retry);
     co_await retry_timer_.async_wait(kNoThrow);
   }
-  end(replica::CloseKind::Unreachable, "no server at " + server_name() + " (" + why +
-                                           "): start trocar-server, or check address and port");
+  end_unreachable(why);
   co_return false;
 }
 
 asio::awaitable<bool> NetSource::Session::read_exactly(std::uint8_t* to, std::size_t count) {
-  const auto [error, taken] =
-      co_await asio::async_read(socket_, asio::buffer(to, count), kNoThrow);
+  const auto [error, taken] = co_await asio::async_read(socket_, asio::buffer(to, count), kNoThrow);
   bytes_received_.fetch_add(taken, std::memory_order_relaxed);
   co_return !error;
 }
@@ -176,36 +200,55 @@ asio::awaitable<bool> NetSource::Session::read_exactly(std::uint8_t* to, std::si
 asio::awaitable<void> NetSource::Session::read_messages() {
   std::array<std::uint8_t, wire::kHeaderBytes> header{};
   while (!is_done_) {
-    if (!co_await read_exactly(header.data(), header.size())) co_return;
-    const auto length = wire::decode_length(header, wire::kMaxDownstreamBytes);
-    if (!length) co_return end(replica::CloseKind::Lost, length.error().message);
-    body_.resize(*length);
-    if (!co_await read_exactly(body_.data(), body_.size())) co_return;
-    last_heard_ = Clock::now();
-    auto message = std::make_shared<proto::Envelope>();
-    if (const auto decoded = wire::decode_envelope(body_, *message); !decoded)
-      co_return end(replica::CloseKind::Lost, server_name() + ": " + decoded.error().message);
-    messages_received_.fetch_add(1, std::memory_order_relaxed);
-    if (message->has_pong()) {
-      const auto now_us = monotonic_ns() / 1000;
-      round_trip_seconds_ =
-          static_cast<double>(now_us - message->pong().client_time_us()) * 1e-6;
-      continue;
-    }
-    if (message->message_case() == proto::Envelope::MESSAGE_NOT_SET) continue;
-    if (message->has_surface_frame()) frames_received_.fetch_add(1, std::memory_order_relaxed);
-    has_heard_ = true;
+    const bool has_header = co_await read_exactly(header.data(), header.size());
+    if (!has_header || !make_room_for(header)) break;
+    const bool has_body = co_await read_exactly(body_.data(), body_.size());
+    if (!has_body) break;
+    const auto message = take_message();
+    if (!message) continue;
     co_await deliver(message, header.size() + body_.size());
-    if (message->has_goodbye()) {
-      const bool is_closing = message->goodbye().reason() == proto::GOODBYE_SERVER_CLOSING;
-      co_return end(is_closing ? replica::CloseKind::Ended : replica::CloseKind::Refused,
-                    "server: " + message->goodbye().text());
-    }
-    if (message->has_welcome() && message->welcome().protocol_major() != kProtocolMajor)
-      co_return end(replica::CloseKind::Refused,
-                    "server speaks protocol " +
-                        std::to_string(message->welcome().protocol_major()) + ", this client " +
-                        std::to_string(kProtocolMajor) + ": use programs of one release");
+    end_if_final(*message);
+  }
+}
+
+bool NetSource::Session::make_room_for(std::span<const std::uint8_t, wire::kHeaderBytes> header) {
+  const auto length = wire::decode_length(header, wire::kMaxDownstreamBytes);
+  if (!length)
+    end(replica::CloseKind::Lost, server_name() + ": " + length.error().message);
+  else
+    body_.resize(*length);
+  return length.ok();
+}
+
+// What is for the render thread; null for what is our own business or broken.
+std::shared_ptr<const proto::Envelope> NetSource::Session::take_message() {
+  last_heard_ = Clock::now();
+  auto message = std::make_shared<proto::Envelope>();
+  if (const auto decoded = wire::decode_envelope(body_, *message); !decoded) {
+    end(replica::CloseKind::Lost, server_name() + ": " + decoded.error().message);
+    return nullptr;
+  }
+  messages_received_.fetch_add(1, std::memory_order_relaxed);
+  if (message->has_pong()) {
+    const auto elapsed_us = monotonic_ns() / 1000 - message->pong().client_time_us();
+    round_trip_seconds_ = static_cast<double>(elapsed_us) * 1e-6;
+    return nullptr;
+  }
+  if (message->message_case() == proto::Envelope::MESSAGE_NOT_SET) return nullptr;
+  if (message->has_surface_frame()) frames_received_.fetch_add(1, std::memory_order_relaxed);
+  has_heard_ = true;
+  return message;
+}
+
+void NetSource::Session::end_if_final(const proto::Envelope& message) {
+  if (message.has_goodbye()) {
+    const bool is_over = message.goodbye().reason() == proto::GOODBYE_SERVER_CLOSING;
+    end(is_over ? replica::CloseKind::Ended : replica::CloseKind::Refused,
+        "server: " + message.goodbye().text());
+  } else if (message.has_welcome() && message.welcome().protocol_major() != kProtocolMajor) {
+    end(replica::CloseKind::Refused,
+        "server speaks protocol " + std::to_string(message.welcome().protocol_major()) +
+            ", this client " + std::to_string(kProtocolMajor) + ": use programs of one release");
   }
 }
 
@@ -254,20 +297,20 @@ asio::awaitable<void> NetSource::Session::write_messages() {
 
 asio::awaitable<void> NetSource::Session::ping() {
   while (!is_done_ && !is_closing_) {
-    if (!is_ping_queued_) {
-      proto::Envelope envelope;
-      envelope.mutable_ping()->set_client_time_us(monotonic_ns() / 1000);
-      control_.push_back(wire::encode_envelope(envelope));
-      is_ping_queued_ = true;
-      wake_timer_.cancel();
-    }
+    queue_ping();
     ping_timer_.expires_after(options_.ping_interval);
     co_await ping_timer_.async_wait(kNoThrow);
-    if (!is_stalled_ && !is_done_ && Clock::now() - last_heard_ > options_.silence_deadline)
-      end(replica::CloseKind::Lost,
-          has_heard_ ? "connection to " + server_name() + " is silent: check the network"
-                     : server_name() + " does not answer: is it a Trocar server?");
+    check_silence();
   }
+}
+
+void NetSource::Session::queue_ping() {
+  if (is_ping_queued_) return;  // the last one is still waiting to be written
+  proto::Envelope envelope;
+  envelope.mutable_ping()->set_client_time_us(monotonic_ns() / 1000);
+  control_.push_back(wire::encode_envelope(envelope));
+  is_ping_queued_ = true;
+  wake_timer_.cancel();
 }
 
 }  // namespace trocar::net

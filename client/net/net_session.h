@@ -56,6 +56,14 @@ class NetSource::Session {
   asio::awaitable<void> ping();
   asio::awaitable<void> expire(Clock::time_point deadline);
 
+  void begin_conversation();
+  bool make_room_for(std::span<const std::uint8_t, wire::kHeaderBytes> header);
+  std::shared_ptr<const proto::Envelope> take_message();
+  void end_if_final(const proto::Envelope& message);
+  void end_after_stream();
+  void end_unreachable(const std::string& why);
+  void check_silence();
+  void queue_ping();
   void begin_close(const std::string& reason);
   void end(replica::CloseKind kind, std::string text);  // the first one counts
   void stop_io();

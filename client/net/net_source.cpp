@@ -8,8 +8,9 @@ namespace trocar::net {
 
 Status parse_server_address(const std::string& text, NetSourceOptions& options) {
   const auto bad = [&text] {
-    return Error{ErrorCode::Usage, "'" + text + "' is not HOST, HOST:PORT or [IPV6]:PORT: try "
-                                                "127.0.0.1:7690"};
+    return Error{ErrorCode::Usage, "'" + text +
+                                       "' is not HOST, HOST:PORT or [IPV6]:PORT: try "
+                                       "127.0.0.1:7690"};
   };
   std::string host = text, port;
   if (text.starts_with('[')) {
@@ -42,7 +43,9 @@ Status parse_server_address(const std::string& text, NetSourceOptions& options) 
 NetSource::NetSource(NetSourceOptions options)
     : session_(std::make_unique<Session>(std::move(options))) {}
 
-NetSource::~NetSource() { session_->request_close("client ends"); }
+NetSource::~NetSource() {
+  session_->request_close("client ends");
+}
 
 void NetSource::poll(replica::MessageSink& sink) {
   // Asked before the queue is emptied: what ended before had pushed everything before.
@@ -59,15 +62,23 @@ bool NetSource::send(const proto::Envelope& message) {
   return session_->try_send(wire::encode_envelope(message));
 }
 
-void NetSource::close(const std::string& reason) { session_->request_close(reason); }
+void NetSource::close(const std::string& reason) {
+  session_->request_close(reason);
+}
 
-replica::SourceState NetSource::state() const { return state_; }
+replica::SourceState NetSource::state() const {
+  return state_;
+}
 
 replica::CloseReason NetSource::close_reason() const {
   return state_ == replica::SourceState::Closed ? session_->close_reason() : replica::CloseReason{};
 }
 
-replica::SourceStatistics NetSource::statistics() const { return session_->statistics(); }
-std::string NetSource::name() const { return session_->server_name(); }
+replica::SourceStatistics NetSource::statistics() const {
+  return session_->statistics();
+}
+std::string NetSource::name() const {
+  return session_->server_name();
+}
 
 }  // namespace trocar::net

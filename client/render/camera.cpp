@@ -17,7 +17,7 @@ void OrbitCamera::frame(const Vec3f& centre, float radius) {
   radius_ = radius;
   yaw_ = 0;
   pitch_ = 0.42f;
-  distance_ = radius * 2.95f / kTanHalfHeight * 0.36f;
+  distance_ = radius / kTanHalfHeight * 0.90f;
 }
 
 void OrbitCamera::orbit(float yaw, float pitch) {

@@ -15,7 +15,7 @@ namespace trocar::render {
 namespace {
 
 constexpr int kMaxShadows = 8;
-constexpr float kOverlayStrength = 0.42f;
+constexpr float kOverlayStrength = 0.85f;
 constexpr float kOverlayFadeSeconds = 0.12f;
 constexpr std::size_t kTriangleBudgetSoftware = 16'000, kTriangleBudget = 100'000;
 
@@ -253,11 +253,11 @@ void SceneRenderer::Parts::draw_organ(const SceneView& scene, const OrbitCamera&
   std::vector<float> tips, shafts;
   const int shadow_count = std::min(kMaxShadows, static_cast<int>(scene.tools.size()));
   for (int i = 0; i < shadow_count; ++i) {
-    const SceneTool& tool = scene.tools[static_cast<std::size_t>(i)];
-    const Vec3f p = tool.world_from_tool.position;
-    const Vec3f a = rotate(tool.world_from_tool.orientation, {0, 0, 1});
-    tips.insert(tips.end(), {p.x, p.y, p.z, tool.shape.radius_m});
-    shafts.insert(shafts.end(), {a.x, a.y, a.z, tool.shape.length_m});
+    const SceneTool& caster = scene.tools[static_cast<std::size_t>(i)];
+    const Vec3f p = caster.world_from_tool.position;
+    const Vec3f a = rotate(caster.world_from_tool.orientation, {0, 0, 1});
+    tips.insert(tips.end(), {p.x, p.y, p.z, caster.shape.radius_m});
+    shafts.insert(shafts.end(), {a.x, a.y, a.z, caster.shape.length_m});
   }
   organ.set("shadow_count", shadow_count);
   organ.set_array("shadow_tip", tips.data(), shadow_count);

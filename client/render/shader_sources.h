@@ -78,13 +78,14 @@ void main() {
   vec4 coarse = texture(noise, rest_position * 11.0);
   vec4 fine = texture(noise, rest_position * 58.0 + 0.37);
   vec3 n = normalize(world_normal);
-  n = normalize(n + 0.16 * (coarse.rgb - 0.5) + 0.13 * (fine.rgb - 0.5));
+  n = normalize(n + 0.10 * (coarse.rgb - 0.5) + 0.10 * (fine.rgb - 0.5));
   vec3 view = normalize(eye - world_position);
   float facing = max(dot(n, view), 0.0);
 
-  float mottle = clamp(0.62 * coarse.a + 0.38 * fine.a, 0.0, 1.0);
-  vec3 albedo = mix(vec3(0.155, 0.022, 0.019), vec3(0.37, 0.070, 0.047), smoothstep(0.25, 0.78, mottle));
-  albedo = mix(albedo, vec3(0.40, 0.125, 0.075), 0.35 * smoothstep(0.62, 0.9, fine.a));
+  // Red-brown parenchyma, broad clouds with a fine grain under the capsule.
+  float mottle = clamp(0.70 * coarse.a + 0.30 * fine.a, 0.0, 1.0);
+  vec3 albedo = mix(vec3(0.098, 0.0150, 0.0125), vec3(0.180, 0.0300, 0.0215), mottle);
+  albedo *= 0.93 + 0.14 * fine.a;
 
   float shade = tool_shadow(world_position);
   // Light wraps around the edge of the shadow, red farthest: it has been under the surface.
@@ -92,16 +93,17 @@ void main() {
   vec3 key = clamp((vec3(dot(n, key_direction)) + wrap) / (1.0 + wrap), 0.0, 1.0) * shade;
   vec3 fill = clamp((vec3(dot(n, fill_direction)) + wrap) / (1.0 + wrap), 0.0, 1.0);
   vec3 lit = albedo * (key_colour * key * key + fill_colour * fill + hemisphere(n) * (0.6 + 0.4 * shade));
-  lit += vec3(0.10, 0.012, 0.008) * pow(1.0 - facing, 3.0) * shade;  // thin at the rim
+  lit += vec3(0.050, 0.007, 0.005) * pow(1.0 - facing, 3.0) * shade;  // thin at the rim
 
   float fresnel = 0.035 + 0.965 * pow(1.0 - facing, 5.0);
   float wet = 0.75 + 0.5 * coarse.a;
   float sharp = highlight(n, view, key_direction, 210.0), broad = highlight(n, view, key_direction, 26.0);
-  vec3 film = key_colour * shade * (0.62 * sharp + 0.045 * broad) * wet;
+  vec3 film = key_colour * shade * (0.80 * sharp + 0.038 * broad) * wet;
   film += fill_colour * (0.30 * highlight(n, view, fill_direction, 90.0)) * wet;
   film += hemisphere(reflect(-view, n)) * fresnel * 0.55 * (0.5 + 0.5 * shade);
 
-  lit = mix(lit, tint.rgb * (0.18 + 0.42 * key + 0.25 * fill), tint.a);
+  // The overlay glows through: tissue darkens and takes the region's colour, the film stays.
+  lit = mix(lit, lit * 0.45 + tint.rgb * (0.07 + 0.16 * key.g + 0.10 * fill.g), tint.a);
   colour = encode(lit + film);
 }
 )";

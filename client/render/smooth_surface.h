@@ -7,6 +7,7 @@
 // Thread: render thread.
 
 #include <array>
+#include <cstdint>
 #include <span>
 #include <vector>
 

@@ -123,6 +123,17 @@ double total_volume(const TetMesh& mesh) {
   return sum;
 }
 
+Vec3d centre_on_origin(TetMesh& mesh) {
+  Vec3d low = mesh.rest_positions.front(), high = low;
+  for (const Vec3d& p : mesh.rest_positions) {
+    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
+    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+  }
+  const Vec3d centre = low + (high - low) * 0.5;
+  for (Vec3d& p : mesh.rest_positions) p -= centre;
+  return centre;
+}
+
 std::vector<Vec3d> surface_normals(const TetMesh& mesh) {
   std::vector<Vec3d> normals(mesh.node_count());
   for (const auto& [a, b, c] : mesh.boundary_triangles) {

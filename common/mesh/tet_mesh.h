@@ -65,6 +65,8 @@ Status validate(const TetMesh& mesh);
 // Signed rest volume of a tet, m^3.
 double tet_volume(const TetMesh& mesh, TetIndex tet);
 double total_volume(const TetMesh& mesh);
+// Moves the centre of the rest bounding box to the origin; returns the old centre. Needs a node.
+Vec3d centre_on_origin(TetMesh& mesh);
 // Area-weighted outward surface normal per node, unit length (zero for interior nodes).
 std::vector<Vec3d> surface_normals(const TetMesh& mesh);
 

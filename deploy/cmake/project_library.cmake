@@ -20,11 +20,11 @@ function(project_library folder)
   target_link_libraries(trocar_${name} PUBLIC ${ARG_LINK})
 endfunction()
 
-# project_program(<name> MAIN file.cpp DEPENDS folder...): one executable in build/<preset>/bin.
+# project_program(<name> MAIN file.cpp DEPENDS folder... LINK target...): one executable in build/<preset>/bin.
 function(project_program name)
-  cmake_parse_arguments(ARG "" "" "MAIN;DEPENDS" ${ARGN})
+  cmake_parse_arguments(ARG "" "" "MAIN;DEPENDS;LINK" ${ARGN})
   add_executable(${name} ${ARG_MAIN})
-  target_link_libraries(${name} PRIVATE trocar_options)
+  target_link_libraries(${name} PRIVATE trocar_options ${ARG_LINK})
   foreach(dependency IN LISTS ARG_DEPENDS)
     string(REPLACE "/" "_" dependency_name ${dependency})
     target_link_libraries(${name} PRIVATE trocar_${dependency_name})

@@ -2,11 +2,35 @@
 
 #include <ctime>
 
-namespace trocar::app {
+#include "server/recording/recorder.h"
 
-Result<std::unique_ptr<JournalSink>> open_journal(const std::string&, const scene::Organ&,
-                                                  const wire::SurfaceLayout&) {
-  return std::unique_ptr<JournalSink>();
+namespace trocar::app {
+namespace {
+
+class RecordedSession : public JournalSink {
+ public:
+  explicit RecordedSession(std::unique_ptr<recording::Recorder> recorder)
+      : recorder_(std::move(recorder)) {}
+
+  void take_frame(const step::SharedFrame& frame) override { recorder_->take_frame(frame); }
+  void take_participants(const std::vector<session::Participant>& present, Tick tick) override {
+    recorder_->take_participants(present, tick);
+  }
+  Status close() override { return recorder_->close(); }
+
+ private:
+  std::unique_ptr<recording::Recorder> recorder_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<JournalSink>> open_journal(const std::string& path,
+                                                  const scene::Organ& organ,
+                                                  const wire::SurfaceLayout& layout) {
+  if (path == "none") return std::unique_ptr<JournalSink>();
+  auto recorder = recording::Recorder::create(path, organ, layout);
+  if (!recorder) return recorder.error();
+  return std::unique_ptr<JournalSink>(std::make_unique<RecordedSession>(std::move(*recorder)));
 }
 
 std::string default_journal_path() {

@@ -24,9 +24,8 @@ is closed. Exit codes: 0 ok, 2 command line, 3 bad file, 5 port taken or process
 )";
 
 std::string version_text() {
-  return std::string("trocar-server ") + kVersion + ", sim_version " +
-         std::to_string(kSimVersion) + ", protocol " + std::to_string(kProtocolMajor) + "." +
-         std::to_string(kProtocolMinor);
+  return std::string("trocar-server ") + kVersion + ", sim_version " + std::to_string(kSimVersion) +
+         ", protocol " + std::to_string(kProtocolMajor) + "." + std::to_string(kProtocolMinor);
 }
 
 }  // namespace
@@ -51,20 +50,24 @@ Status parse_listen_address(const std::string& text, ServerOptions& options) {
 Result<std::optional<ServerOptions>> parse_command_line(int argc, char** argv) {
   ServerOptions options;
   std::string listen = "127.0.0.1:7690";
-  CLI::App app("Hosts one session: one organ, simulated 1000 times per second, shared by up to 16 "
-               "people with tools and 100 who watch.",
-               "trocar-server");
+  CLI::App app(
+      "Hosts one session: one organ, simulated 1000 times per second, shared by up to 16 "
+      "people with tools and 100 who watch.",
+      "trocar-server");
   app.footer(kExamples);
   app.set_version_flag("--version", version_text());
   app.add_option("--organ", options.organ, "built-in organ (liver, lattice) or an .organ file")
-      ->type_name("NAME|FILE")->capture_default_str();
+      ->type_name("NAME|FILE")
+      ->capture_default_str();
   app.add_option("--listen", listen, "where to listen; port 0 takes any free one")
-      ->type_name("ADDR:PORT")->capture_default_str();
+      ->type_name("ADDR:PORT")
+      ->capture_default_str();
   app.add_option("--journal", options.journal,
                  "file to record the session in, or none [./trocar-<UTC>.mcap]")
       ->type_name("FILE");
   app.add_option("--seconds", options.seconds, "end after this many simulated seconds")
-      ->type_name("N")->check(CLI::Range(0.0, 1e9));
+      ->type_name("N")
+      ->check(CLI::Range(0.0, 1e9));
   app.add_option("--summary", options.summary_file, "write figures of the run as JSON at the end")
       ->type_name("FILE");
   app.add_option("--ready-file", options.ready_file, "write the port to this file when listening")

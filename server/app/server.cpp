@@ -15,7 +15,7 @@
 
 #include "common/base/log.h"
 #include "common/base/timing.h"
-#include "server/app/organ_choice.h"
+#include "common/scene/load_organ.h"
 #include "server/app/simulation_loop.h"
 #include "server/app/summary.h"
 #include "server/net/tcp_server.h"
@@ -92,10 +92,10 @@ Status Server::open() {
     };
   replicator_ = std::make_unique<replication::Replicator>(
       *tcp_, inbox_, layout, organ.name, scene::organ_hash(organ), std::move(replication));
-  loop_ = std::make_unique<SimulationLoop>(
-      simulation_, inbox_, handover_, journal_.get(),
-      LoopOptions{options_.decisions, ticks_of(options_.seconds)},
-      [this] { asio::post(io_, [this] { begin_end(); }); });
+  loop_ =
+      std::make_unique<SimulationLoop>(simulation_, inbox_, handover_, journal_.get(),
+                                       LoopOptions{options_.decisions, ticks_of(options_.seconds)},
+                                       [this] { asio::post(io_, [this] { begin_end(); }); });
   return {};
 }
 
@@ -192,7 +192,7 @@ Status Server::finish() {
 }  // namespace
 
 Status run_server(const ServerOptions& options) {
-  auto organ = load_organ(options.organ);
+  auto organ = scene::load_organ(options.organ);
   if (!organ) return organ.error();
   const auto server = std::make_unique<Server>(options, std::move(*organ));
   if (const auto opened = server->open(); !opened) return opened;

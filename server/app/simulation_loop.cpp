@@ -29,8 +29,8 @@ void StageTimes::add(const step::TickReport& report) {
   std::uint64_t total = 0;
   for (std::size_t i = 0; i < stages.size(); ++i) {
     total += report.stage_cpu_ns[i];
-    const bool has_run = i != static_cast<std::size_t>(step::Stage::Publish) ||
-                         publishes_frame(report.tick);
+    const bool has_run =
+        i != static_cast<std::size_t>(step::Stage::Publish) || publishes_frame(report.tick);
     if (has_run) stages[i].add(report.stage_cpu_ns[i]);
   }
   tick.add(total);

@@ -80,11 +80,11 @@ class SimulationLoop {
 
   // Simulation thread.
   session::TickInputs inputs_;
-  std::vector<step::TickRecord> records_;   // since the last frame
-  std::shared_ptr<const Bytes> snapshot_;   // waits for the next frame
+  std::vector<step::TickRecord> records_;  // since the last frame
+  std::shared_ptr<const Bytes> snapshot_;  // waits for the next frame
   Tick snapshot_tick_ = 0;
-  StageTimes second_;                       // since the last statistics
-  step::StageStatistics statistics_;        // of the last full second
+  StageTimes second_;                 // since the last statistics
+  step::StageStatistics statistics_;  // of the last full second
   std::uint64_t slow_ticks_ = 0;
   LoopReport report_;
   std::thread thread_;

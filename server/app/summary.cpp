@@ -50,10 +50,9 @@ std::string stages(const StageTimes& of) {
 
 std::string replication_figures(const Summary& s) {
   const auto& e = s.encoding;
-  const double per_vertex =
-      e.changed_vertices ? static_cast<double>(e.delta_payload_bytes) /
-                               static_cast<double>(e.changed_vertices)
-                         : 0.0;
+  const double per_vertex = e.changed_vertices ? static_cast<double>(e.delta_payload_bytes) /
+                                                     static_cast<double>(e.changed_vertices)
+                                               : 0.0;
   const auto& r = s.replication;
   return fmt::format(
       R"("sessions": {}, "bytes_sent": {}, "bytes_received": {}, "samples": {},

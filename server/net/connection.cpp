@@ -13,17 +13,21 @@ namespace trocar::net {
 namespace {
 
 constexpr auto kNoThrow = asio::as_tuple(asio::use_awaitable);
-constexpr std::size_t kReadChunk = 8 * 1024;     // most upstream messages are far below 200 bytes
+constexpr std::size_t kReadChunk = 8 * 1024;  // most upstream messages are far below 200 bytes
 constexpr std::size_t kBuffersPerWrite = 16;
 
 }  // namespace
 
 const char* describe(ConnectionFault fault) {
   switch (fault) {
-    case ConnectionFault::EmptyFrame: return "a frame of length zero";
-    case ConnectionFault::OversizedFrame: return "a frame longer than 64 KiB";
-    case ConnectionFault::HelloTimeout: return "no Hello within the deadline after connecting";
-    case ConnectionFault::IdleTimeout: return "no message for too long: send a Ping every second";
+    case ConnectionFault::EmptyFrame:
+      return "a frame of length zero";
+    case ConnectionFault::OversizedFrame:
+      return "a frame longer than 64 KiB";
+    case ConnectionFault::HelloTimeout:
+      return "no Hello within the deadline after connecting";
+    case ConnectionFault::IdleTimeout:
+      return "no message for too long: send a Ping every second";
   }
   return "unknown";
 }

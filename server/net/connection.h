@@ -69,7 +69,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
   bool first_message_seen_ = false;
   Clock::time_point last_message_ = Clock::now();
   Clock::time_point drain_deadline_{};
-  Bytes inbound_;               // received and not yet delivered: [begin_, end_)
+  Bytes inbound_;  // received and not yet delivered: [begin_, end_)
   std::size_t begin_ = 0, end_ = 0;
   std::deque<wire::SharedBytes> outbox_;
   std::vector<wire::SharedBytes> in_flight_;

@@ -161,13 +161,25 @@ Result<std::unique_ptr<TcpServer>> TcpServer::listen(asio::io_context& context,
 }
 
 TcpServer::TcpServer(std::shared_ptr<Core> core) : core_(std::move(core)) {}
-TcpServer::~TcpServer() { core_->stop(); }
+TcpServer::~TcpServer() {
+  core_->stop();
+}
 
-void TcpServer::start(ConnectionHandler& handler) { core_->start(handler); }
-void TcpServer::stop_accepting() { core_->stop_accepting(); }
-std::uint16_t TcpServer::port() const { return core_->port; }
-std::size_t TcpServer::connection_count() const { return core_->connections.size(); }
-const TcpCounters& TcpServer::counters() const { return core_->counters; }
+void TcpServer::start(ConnectionHandler& handler) {
+  core_->start(handler);
+}
+void TcpServer::stop_accepting() {
+  core_->stop_accepting();
+}
+std::uint16_t TcpServer::port() const {
+  return core_->port;
+}
+std::size_t TcpServer::connection_count() const {
+  return core_->connections.size();
+}
+const TcpCounters& TcpServer::counters() const {
+  return core_->counters;
+}
 
 bool TcpServer::send(ConnectionId id, wire::SharedBytes frame) {
   auto* connection = core_->find(id);

@@ -31,7 +31,7 @@ namespace trocar::net {
 
 struct TcpServerOptions {
   std::string address = "127.0.0.1";
-  std::uint16_t port = 7690;  // 0: any free port
+  std::uint16_t port = 7690;                            // 0: any free port
   std::size_t max_connections = kMaxParticipants + 12;  // some room to tell the next one "full"
   std::uint32_t max_message_bytes = wire::kMaxUpstreamBytes;
   std::size_t outbox_bytes = 1024 * 1024;

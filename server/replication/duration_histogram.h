@@ -1,7 +1,7 @@
 #pragma once
 
-// Durations as counts in 32 buckets per octave, from 1 ns to 34 s: quantiles within 2 %, fixed size,
-// no allocation. For reports.
+// Durations as counts in 32 buckets per octave, from 1 ns to 34 s: quantiles within 2 %, fixed
+// size, no allocation. For reports.
 
 #include <array>
 #include <bit>

@@ -14,7 +14,7 @@
 namespace trocar::replication {
 
 struct EncodeStatistics {
-  DurationHistogram delta_cpu;     // thread CPU time of one delta
+  DurationHistogram delta_cpu;  // thread CPU time of one delta
   DurationHistogram keyframe_cpu;
   // Deltas against the frame just before, where one was encoded: the stream as recorded and as a
   // client that keeps up sees it.

@@ -49,9 +49,7 @@ wire::SharedBytes encode_welcome(ParticipantSlot slot, std::uint64_t organ_hash)
   return wire::encode_envelope(envelope);
 }
 
-wire::SharedBytes encode_participants(const std::vector<session::Participant>& present) {
-  proto::Envelope envelope;
-  auto& list = *envelope.mutable_participants();
+void describe(const std::vector<session::Participant>& present, proto::Participants& list) {
   for (const auto& participant : present) {
     auto& entry = *list.add_participant();
     entry.set_slot(participant.slot.value);
@@ -64,13 +62,16 @@ wire::SharedBytes encode_participants(const std::vector<session::Participant>& p
       tool.set_reach_m(shape.reach_m);
     }
   }
+}
+
+wire::SharedBytes encode_participants(const std::vector<session::Participant>& present) {
+  proto::Envelope envelope;
+  describe(present, *envelope.mutable_participants());
   return wire::encode_envelope(envelope);
 }
 
-wire::SharedBytes encode_topology(const wire::SurfaceLayout& layout, std::uint32_t epoch,
-                                  const std::string& organ_name) {
-  proto::Envelope envelope;
-  auto& topology = *envelope.mutable_surface_topology();
+void describe(const wire::SurfaceLayout& layout, std::uint32_t epoch, const std::string& organ_name,
+              proto::SurfaceTopology& topology) {
   topology.set_epoch(epoch);
   topology.set_quantum_m(wire::kQuantumMetres);
   topology.set_organ_name(organ_name);
@@ -82,12 +83,16 @@ wire::SharedBytes encode_topology(const wire::SurfaceLayout& layout, std::uint32
   for (const auto& triangle : layout.triangles)
     for (const auto vertex : triangle) topology.add_triangle(vertex.value);
   for (const auto vertex : layout.fixed_vertices) topology.add_fixed_vertex(vertex.value);
+}
+
+wire::SharedBytes encode_topology(const wire::SurfaceLayout& layout, std::uint32_t epoch,
+                                  const std::string& organ_name) {
+  proto::Envelope envelope;
+  describe(layout, epoch, organ_name, *envelope.mutable_surface_topology());
   return wire::encode_envelope(envelope);
 }
 
-wire::SharedBytes encode_frame_state(const step::PublishedFrame& frame) {
-  proto::Envelope envelope;
-  auto& state = *envelope.mutable_frame_state();
+void describe(const step::PublishedFrame& frame, proto::FrameState& state) {
   state.set_frame(frame.frame);
   state.set_tick(frame.tick);
   for (const auto& tool : frame.tools) {
@@ -117,6 +122,11 @@ wire::SharedBytes encode_frame_state(const step::PublishedFrame& frame) {
   for (const float median : frame.statistics.median_us) state.add_stage_cpu_us(median);
   state.set_slow_ticks(frame.statistics.slow_ticks);
   state.set_state_hash(frame.state_hash);
+}
+
+wire::SharedBytes encode_frame_state(const step::PublishedFrame& frame) {
+  proto::Envelope envelope;
+  describe(frame, *envelope.mutable_frame_state());
   return wire::encode_envelope(envelope);
 }
 
@@ -125,7 +135,8 @@ std::string describe(const locks::ClaimEvent& event, const session::Roster& rost
   const std::string holder = name_of_holder(event.holder, roster);
   const bool is_grasp = event.verb == scene::Verb::Grasp;
   switch (event.outcome) {
-    case locks::ClaimOutcome::Granted: return who + (is_grasp ? " has a grasp" : " pushes");
+    case locks::ClaimOutcome::Granted:
+      return who + (is_grasp ? " has a grasp" : " pushes");
     case locks::ClaimOutcome::RefusedHeld:
       return "held by " + holder + " (grasp): wait, or ask " + holder + " to let go";
     case locks::ClaimOutcome::RefusedNothingInReach: {
@@ -134,8 +145,10 @@ std::string describe(const locks::ClaimEvent& event, const session::Roster& rost
       return "nothing in reach of " + who + ": bring the tip within " + std::to_string(reach_mm) +
              " mm of the surface";
     }
-    case locks::ClaimOutcome::Released: return who + (is_grasp ? " let go" : " stopped pushing");
-    case locks::ClaimOutcome::TakenOver: return who + " was silent: " + holder + " took over";
+    case locks::ClaimOutcome::Released:
+      return who + (is_grasp ? " let go" : " stopped pushing");
+    case locks::ClaimOutcome::TakenOver:
+      return who + " was silent: " + holder + " took over";
     case locks::ClaimOutcome::Expired:
       return who + " was silent for " + std::to_string(locks::kAbandonTicks / kTicksPerSecond) +
              " s: the grasp was let go";
@@ -143,10 +156,8 @@ std::string describe(const locks::ClaimEvent& event, const session::Roster& rost
   return {};
 }
 
-wire::SharedBytes encode_claim_event(const locks::ClaimEvent& event,
-                                     const session::Roster& roster) {
-  proto::Envelope envelope;
-  auto& message = *envelope.mutable_claim_event();
+void describe(const locks::ClaimEvent& event, const session::Roster& roster,
+              proto::ClaimEvent& message) {
   message.set_tick(event.tick);
   message.set_tool(event.tool.value);
   message.set_verb(static_cast<proto::Verb>(event.verb));
@@ -156,6 +167,12 @@ wire::SharedBytes encode_claim_event(const locks::ClaimEvent& event,
     message.set_holder_name(name_of_holder(event.holder, roster));
   }
   message.set_text(describe(event, roster));
+}
+
+wire::SharedBytes encode_claim_event(const locks::ClaimEvent& event,
+                                     const session::Roster& roster) {
+  proto::Envelope envelope;
+  describe(event, roster, *envelope.mutable_claim_event());
   return wire::encode_envelope(envelope);
 }
 

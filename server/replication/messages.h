@@ -14,7 +14,22 @@
 #include "server/session/roster.h"
 #include "server/step/published_frame.h"
 
+namespace trocar::proto {
+class ClaimEvent;
+class FrameState;
+class Participants;
+class SurfaceTopology;
+}  // namespace trocar::proto
+
 namespace trocar::replication {
+
+// Messages that clients and journal get alike.
+void describe(const std::vector<session::Participant>& present, proto::Participants& message);
+void describe(const wire::SurfaceLayout& layout, std::uint32_t epoch, const std::string& organ_name,
+              proto::SurfaceTopology& message);
+void describe(const step::PublishedFrame& frame, proto::FrameState& message);
+void describe(const locks::ClaimEvent& event, const session::Roster& roster,
+              proto::ClaimEvent& message);
 
 wire::SharedBytes encode_welcome(ParticipantSlot slot, std::uint64_t organ_hash);
 wire::SharedBytes encode_participants(const std::vector<session::Participant>& present);

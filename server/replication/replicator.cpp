@@ -12,13 +12,18 @@ namespace {
 
 constexpr std::uint64_t kSecondNs = 1'000'000'000;
 
-std::string text_of_role(session::Role role) { return session::name_of(role); }
+std::string text_of_role(session::Role role) {
+  return session::name_of(role);
+}
 
 EndReason reason_of(session::JoinRefusal refusal, session::Role role) {
   switch (refusal) {
-    case session::JoinRefusal::NameInvalid: return EndReason::ProtocolError;
-    case session::JoinRefusal::NameTaken: return EndReason::NameTaken;
-    case session::JoinRefusal::Full: return EndReason::Full;
+    case session::JoinRefusal::NameInvalid:
+      return EndReason::ProtocolError;
+    case session::JoinRefusal::NameTaken:
+      return EndReason::NameTaken;
+    case session::JoinRefusal::Full:
+      return EndReason::Full;
     case session::JoinRefusal::ToolsInvalid:
       return session::has_tools(role) ? EndReason::ProtocolError : EndReason::Role;
   }
@@ -70,10 +75,10 @@ void Replicator::on_close(net::ConnectionId id) {
 void Replicator::on_fault(net::ConnectionId id, net::ConnectionFault fault) {
   const auto found = clients_.find(id);
   if (found == clients_.end()) return connections_.close(id);
-  const bool is_timeout = fault == net::ConnectionFault::HelloTimeout ||
-                          fault == net::ConnectionFault::IdleTimeout;
-  end_session(*found->second, {is_timeout ? EndReason::Timeout : EndReason::ProtocolError,
-                               net::describe(fault)});
+  const bool is_timeout =
+      fault == net::ConnectionFault::HelloTimeout || fault == net::ConnectionFault::IdleTimeout;
+  end_session(*found->second,
+              {is_timeout ? EndReason::Timeout : EndReason::ProtocolError, net::describe(fault)});
   settle_participants();
 }
 
@@ -148,8 +153,10 @@ std::optional<Replicator::Ending> Replicator::take_message(Client& client, Bytes
     return protocol_error("the first message must be Hello");
 
   switch (envelope.message_case()) {
-    case proto::Envelope::kHello: return admit(client, envelope.hello());
-    case proto::Envelope::kToolSample: return take_sample(client, envelope.tool_sample());
+    case proto::Envelope::kHello:
+      return admit(client, envelope.hello());
+    case proto::Envelope::kToolSample:
+      return take_sample(client, envelope.tool_sample());
     case proto::Envelope::kFrameAck:
       return take_ack(client, envelope.frame_ack().frame(), envelope.frame_ack().surface_crc());
     case proto::Envelope::kKeyframeRequest:
@@ -171,7 +178,8 @@ std::optional<Replicator::Ending> Replicator::take_message(Client& client, Bytes
     }
     case proto::Envelope::MESSAGE_NOT_SET:
       return std::nullopt;  // a message of a newer minor version (decode_envelope knows)
-    default: return protocol_error("a message that only the server may send");
+    default:
+      return protocol_error("a message that only the server may send");
   }
 }
 
@@ -229,8 +237,8 @@ std::optional<Replicator::Ending> Replicator::take_sample(Client& client,
 std::optional<Replicator::Ending> Replicator::take_ack(Client& client, Frame frame,
                                                        std::uint32_t crc) {
   if (!client.baseline || frame > client.baseline->frame)
-    return Ending{EndReason::ProtocolError, "FrameAck.frame: " + std::to_string(frame) +
-                                                " was not given to you yet"};
+    return Ending{EndReason::ProtocolError,
+                  "FrameAck.frame: " + std::to_string(frame) + " was not given to you yet"};
   if (!barrier_ || frame != barrier_->frame) return std::nullopt;
   const auto slot = client.participant->slot;
   for (auto& result : barrier_results_) {
@@ -256,8 +264,9 @@ void Replicator::broadcast(const wire::SharedBytes& bytes) {
     auto& client = *next->second;
     ++next;  // ending a session erases it
     if (client.participant && !send(client, bytes))
-      end_session(client, {EndReason::TooSlow,
-                           "your connection is too slow: messages that cannot be skipped piled up"});
+      end_session(client,
+                  {EndReason::TooSlow,
+                   "your connection is too slow: messages that cannot be skipped piled up"});
   }
 }
 
@@ -326,6 +335,8 @@ bool Replicator::is_barrier_complete() const {
   });
 }
 
-std::vector<BarrierResult> Replicator::barrier_results() const { return barrier_results_; }
+std::vector<BarrierResult> Replicator::barrier_results() const {
+  return barrier_results_;
+}
 
 }  // namespace trocar::replication

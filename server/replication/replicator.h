@@ -47,9 +47,9 @@ class ToolSample;
 namespace trocar::replication {
 
 struct ReplicatorOptions {
-  std::uint32_t max_messages_per_second = 2000;  // per connection; two tools at 250 Hz need 500
-  std::size_t skip_above_bytes = 64 * 1024;      // see above
-  Frame keyframe_after_frames = 63;              // about 1 s
+  std::uint32_t max_messages_per_second = 2000;      // per connection; two tools at 250 Hz need 500
+  std::size_t skip_above_bytes = 64 * 1024;          // see above
+  Frame keyframe_after_frames = 63;                  // about 1 s
   std::uint64_t keyframe_interval_ns = 250'000'000;  // of keyframes on request
   std::function<std::uint64_t()> clock_ns = monotonic_ns;
   // Told who is here after each change, with the tick of the newest frame; may be empty.
@@ -67,7 +67,7 @@ struct BarrierResult {
 };
 
 struct ReplicatorCounters {
-  std::uint64_t sessions = 0;       // welcomed
+  std::uint64_t sessions = 0;                          // welcomed
   std::array<std::uint64_t, kEndReasonCount> ended{};  // by EndReason, where we ended it
   std::uint64_t samples = 0;
   std::uint64_t frames_published = 0;
@@ -90,7 +90,7 @@ class Replicator final : public net::ConnectionHandler {
 
   // `last` has been or is now published; no further publish(). New Hellos are refused.
   void begin_barrier(const step::SharedFrame& last);
-  bool is_barrier_complete() const;  // everybody who is still here has answered
+  bool is_barrier_complete() const;                    // everybody who is still here has answered
   std::vector<BarrierResult> barrier_results() const;  // those present when it began, by slot
 
   // Goodbye to everybody.

@@ -13,7 +13,9 @@ static_assert(static_cast<int>(session::Role::Observer) == proto::ROLE_OBSERVER)
 static_assert(static_cast<int>(scene::Verb::Grasp) == proto::VERB_GRASP);
 static_assert(scene::kVerbCount == proto::Verb_ARRAYSIZE);
 
-Error bad(std::string message) { return {ErrorCode::BadMessage, std::move(message)}; }
+Error bad(std::string message) {
+  return {ErrorCode::BadMessage, std::move(message)};
+}
 
 }  // namespace
 

@@ -5,8 +5,8 @@
 //   I/O thread: try_push_join / push_leave / push_sample --> [1024] --> drain: simulation thread
 //
 // When full: samples are dropped and counted (the next one of that tool replaces it anyway). Joins
-// and leaves have reserved room: a join is taken only if there is also room for everybody present to
-// leave, so a leave always fits. drain() gives one tick's inputs in the order a tick admits them
+// and leaves have reserved room: a join is taken only if there is also room for everybody present
+// to leave, so a leave always fits. drain() gives one tick's inputs in the order a tick admits them
 // (leaves, joins, samples): only the newest sample of each tool, and none that an earlier tenant of
 // a slot left behind. So a new tenant never starts with somebody else's pose.
 

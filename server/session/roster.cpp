@@ -74,6 +74,11 @@ const char* name_of(Role role) {
   return "unknown";
 }
 
+Roster::Roster(const std::vector<Participant>& present) {
+  for (const auto& participant : present)
+    if (participant.slot.is_valid()) slots_[participant.slot.value] = participant;
+}
+
 Result<Participant> Roster::join(std::string_view name, Role role,
                                  std::vector<scene::ToolShape> tools, JoinRefusal& refusal) {
   const auto refuse = [&refusal](JoinRefusal why, std::string message) {

@@ -31,6 +31,10 @@ enum class JoinRefusal { NameInvalid, NameTaken, Full, ToolsInvalid };
 
 class Roster {
  public:
+  Roster() = default;
+  // The same people in the same slots, e.g. as a journal lists them.
+  explicit Roster(const std::vector<Participant>& present);
+
   // Admits a participant into the lowest free slot of its kind, or says why not. `refusal` is set
   // on error. A name is 1 to 32 bytes of printable UTF-8 and unique; a role with tools that names
   // none gets one default tool; a role without tools may not bring any.

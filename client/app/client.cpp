@@ -1,0 +1,207 @@
+#include "client/app/client.h"
+
+#include <algorithm>
+#include <chrono>
+#include <csignal>
+#include <fstream>
+#include <thread>
+
+#include "client/app/client_summary.h"
+#include "client/app/picture.h"
+#include "client/net/net_source.h"
+#include "common/base/log.h"
+#include "common/base/timing.h"
+#include "common/scene/script.h"
+
+namespace trocar::app {
+namespace {
+
+volatile std::sig_atomic_t stop_requested = 0;
+
+constexpr std::uint64_t kPollNs = 4'000'000;       // samples leave every 8 ms
+constexpr std::uint64_t kGoodbyeNs = 400'000'000;  // time to say Bye
+
+class Run {
+ public:
+  Run(const ClientOptions& options, replica::SessionSource& source, Hands& hands)
+      : options_(options),
+        source_(source),
+        hands_(hands),
+        replica_([&source](const proto::Envelope& message) { return source.send(message); }) {
+    replica_.corrupt_delta(options.corrupt_frame);
+    const double rate = options.pictures_per_second > 0        ? options.pictures_per_second
+                        : options.display == Display::Headless ? 15
+                                                               : 60;
+    picture_interval_ns_ = static_cast<std::uint64_t>(1e9 / rate);
+  }
+
+  Result<ExitCode> run();
+
+ private:
+  Status step(std::uint64_t now_ns);
+  bool is_over(std::uint64_t now_ns);
+  Status take_screenshot(std::uint64_t now_ns, bool is_last);
+  Status write_summary() const;
+  Result<ExitCode> conclude(const Status& outcome);
+
+  const ClientOptions& options_;
+  replica::SessionSource& source_;
+  Hands& hands_;
+  replica::Replica replica_;
+  std::unique_ptr<Picture> picture_;
+  std::uint64_t picture_interval_ns_ = 0, next_picture_ns_ = 0;
+  std::uint64_t start_ns_ = 0;
+  std::uint64_t live_ns_ = 0;  // when the first frame was there
+  bool has_screenshot_ = false;
+  std::string exit_reason_;
+};
+
+Status Run::step(std::uint64_t now_ns) {
+  source_.poll(replica_);
+  if (!replica_.fault().ok())
+    return Error{replica_.fault().error().code,
+                 source_.name() + ": " + replica_.fault().error().message};
+  if (live_ns_ == 0 && replica_.newest() != nullptr) {
+    live_ns_ = now_ns;
+    log::info("in the session: {}, {} surface vertices", replica_.topology().organ_name,
+              replica_.topology().rest_positions.size());
+  }
+  if (const auto sent = hands_.send_due(replica_, source_, now_ns); !sent) return sent.error();
+  if (picture_ && now_ns >= next_picture_ns_) {
+    next_picture_ns_ = std::max(next_picture_ns_ + picture_interval_ns_, now_ns);
+    picture_->draw(replica_, source_, hands_, now_ns);
+    if (const auto taken = take_screenshot(now_ns, false); !taken) return taken.error();
+  }
+  return {};
+}
+
+bool Run::is_over(std::uint64_t now_ns) {
+  if (source_.state() == replica::SourceState::Closed)
+    exit_reason_ = source_.close_reason().text;
+  else if (stop_requested != 0)
+    exit_reason_ = "stopped by a signal";
+  else if (picture_ && picture_->should_close())
+    exit_reason_ = "window closed";
+  else if (options_.seconds > 0 && live_ns_ != 0 &&
+           static_cast<double>(now_ns - live_ns_) * 1e-9 >= options_.seconds)
+    exit_reason_ = "end of --seconds";
+  return !exit_reason_.empty() || source_.state() == replica::SourceState::Closed;
+}
+
+Status Run::take_screenshot(std::uint64_t now_ns, bool is_last) {
+  if (options_.screenshot_file.empty() || has_screenshot_ || !picture_ || picture_->count() == 0)
+    return {};
+  const double at = options_.screenshot_at;
+  const bool is_due =
+      at >= 0 && live_ns_ != 0 && static_cast<double>(now_ns - live_ns_) * 1e-9 >= at;
+  if (!is_due && !is_last) return {};
+  has_screenshot_ = true;
+  return picture_->save(options_.screenshot_file);
+}
+
+Status Run::write_summary() const {
+  if (options_.summary_file.empty()) return {};
+  ClientSummary summary;
+  summary.name = options_.name;
+  summary.role = replica::name_of(options_.role);
+  summary.exit_reason = exit_reason_;
+  summary.wall_seconds = static_cast<double>(monotonic_ns() - start_ns_) * 1e-9;
+  summary.pictures = picture_ ? picture_->count() : 0;
+  const auto statistics = source_.statistics();
+  summary.round_trip_ms = statistics.round_trip_seconds * 1e3;
+  std::ofstream file(options_.summary_file);
+  file << to_json(summary, replica_, statistics);
+  file.close();
+  if (!file)
+    return Error{ErrorCode::ResourceMissing,
+                 options_.summary_file + ": cannot write the summary; does the folder exist?"};
+  return {};
+}
+
+Result<ExitCode> Run::run() {
+  start_ns_ = monotonic_ns();
+  if (options_.display != Display::None) {
+    auto picture = Picture::make(options_, "Trocar: " + source_.name());
+    if (!picture) return picture.error();
+    picture_ = std::move(*picture);
+  }
+  for (;;) {
+    const std::uint64_t now = monotonic_ns();
+    if (const auto stepped = step(now); !stepped) return conclude(stepped);
+    if (is_over(now)) return conclude({});
+    const std::uint64_t after = monotonic_ns();
+    std::uint64_t wake = after + kPollNs;
+    if (picture_) wake = std::clamp(next_picture_ns_, after, wake);
+    std::this_thread::sleep_for(std::chrono::nanoseconds(wake - after));
+  }
+}
+
+Result<ExitCode> Run::conclude(const Status& outcome) {
+  if (!outcome.ok()) exit_reason_ = outcome.error().message;
+  const bool we_leave = source_.state() != replica::SourceState::Closed;
+  if (we_leave) {
+    source_.close(exit_reason_);
+    const std::uint64_t until = monotonic_ns() + kGoodbyeNs;
+    while (source_.state() != replica::SourceState::Closed && monotonic_ns() < until) {
+      source_.poll(replica_);
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    }
+  }
+  const auto taken = take_screenshot(monotonic_ns(), true);
+  const auto written = write_summary();
+  if (!outcome.ok()) return outcome.error();
+  if (!taken) return taken.error();
+  if (!written) return written.error();
+  if (we_leave) {
+    log::info("left: {}", exit_reason_);
+    return ExitCode::Ok;
+  }
+  switch (source_.close_reason().kind) {
+    case replica::CloseKind::Refused:
+      return Error{ErrorCode::Refused, exit_reason_};
+    case replica::CloseKind::Unreachable:
+    case replica::CloseKind::Lost:
+      return Error{ErrorCode::ResourceMissing, exit_reason_};
+    case replica::CloseKind::None:
+    case replica::CloseKind::Ended:
+      break;
+  }
+  log::info("session ended: {}", exit_reason_);
+  return ExitCode::Ok;
+}
+
+}  // namespace
+
+void install_signal_handlers() {
+  const auto stop = [](int) { stop_requested = 1; };
+  std::signal(SIGINT, stop);
+  std::signal(SIGTERM, stop);
+}
+
+Result<ExitCode> run_with_source(const ClientOptions& options, replica::SessionSource& source,
+                                 Hands& hands) {
+  return Run(options, source, hands).run();
+}
+
+Result<ExitCode> run_client(const ClientOptions& options) {
+  if (!options.replay_file.empty())
+    return Error{ErrorCode::Usage, "--replay: this build cannot read journals"};
+  Hands hands;
+  if (!options.script_file.empty()) {
+    auto script = scene::parse_script(options.script_file);
+    if (!script) return script.error();
+    hands = Hands::scripted(std::move(*script));
+  } else if (options.display == Display::Window && replica::has_tools(options.role)) {
+    hands = Hands::mouse(scene::ToolShape{});
+  }
+  net::NetSourceOptions connection;
+  if (const auto parsed = net::parse_server_address(options.server, connection); !parsed)
+    return Error{parsed.error().code, "--server: " + parsed.error().message};
+  connection.participant_name = options.name;
+  connection.role = static_cast<int>(options.role);
+  connection.tools = hands.shapes();
+  net::NetSource source(std::move(connection));
+  return run_with_source(options, source, hands);
+}
+
+}  // namespace trocar::app

@@ -1,0 +1,20 @@
+#pragma once
+
+// The client's main loop: poll the source, apply, send tool samples, draw.
+
+#include "client/app/client_options.h"
+#include "client/app/hands.h"
+#include "client/replica/session_source.h"
+
+namespace trocar::app {
+
+// Set by SIGINT and SIGTERM: leave politely.
+void install_signal_handlers();
+
+// Runs with a given source until it closes, or the person, a signal or --seconds ends it.
+Result<ExitCode> run_with_source(const ClientOptions& options, replica::SessionSource& source,
+                                 Hands& hands);
+// Makes source and hands from the options, then runs.
+Result<ExitCode> run_client(const ClientOptions& options);
+
+}  // namespace trocar::app

@@ -1,0 +1,138 @@
+#include "client/app/client_options.h"
+
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <charconv>
+#include <cstdlib>
+#include <iostream>
+#include <map>
+
+#include "common/base/version.h"
+
+namespace trocar::app {
+namespace {
+
+constexpr const char* kExamples = R"(
+Examples:
+  trocar-client
+      a window; the mouse is an instrument (press H in it for the keys)
+  trocar-client --server 192.168.1.20:7690 --name "Dr. Ada" --role assistant
+  trocar-client --role observer --headless --seconds 10 --screenshot out/last.png
+      watches without a display and leaves its last picture
+  trocar-client --no-render --name Left --script deploy/scenes/lift.toml --summary out/left.json
+      a robot: a scripted hand, no picture
+  trocar-client --replay trocar-20261121T120000Z.mcap
+      plays a recorded session with a free camera
+
+Ends with the session, with --seconds, Ctrl-C, or the window. Exit codes: 0 ok, 2 command line,
+3 bad file, 4 refused by the server, 5 server not reached or lost, or no display.
+)";
+
+std::string version_text() {
+  return std::string("trocar-client ") + kVersion + ", sim_version " + std::to_string(kSimVersion) +
+         ", protocol " + std::to_string(kProtocolMajor) + "." + std::to_string(kProtocolMinor);
+}
+
+Status parse_size(const std::string& text, render::Size& size) {
+  const Error bad{ErrorCode::Usage,
+                  "--size: '" + text + "' is not WxH from 64x64 to 7680x4320, such as 1280x720"};
+  const auto x = text.find('x');
+  if (x == std::string::npos) return bad;
+  const char* const begin = text.data();
+  const char* const end = begin + text.size();
+  const auto width = std::from_chars(begin, begin + x, size.width);
+  const auto height = std::from_chars(begin + x + 1, end, size.height);
+  if (width.ec != std::errc{} || width.ptr != begin + x || height.ec != std::errc{} ||
+      height.ptr != end || size.width < 64 || size.height < 64 || size.width > 7680 ||
+      size.height > 4320)
+    return bad;
+  return {};
+}
+
+std::string default_name() {
+  const char* login = std::getenv("USER");
+  const std::string base = login != nullptr && *login != '\0' ? login : "guest";
+  return base.substr(0, 20) + "-" + std::to_string(getpid() % 10000);
+}
+
+Status check(const ClientOptions& options) {
+  if (!options.replay_file.empty() && !options.script_file.empty())
+    return Error{ErrorCode::Usage, "--replay and --script: a recording takes no tools; choose one"};
+  if (!options.script_file.empty() && !replica::has_tools(options.role))
+    return Error{ErrorCode::Usage, "--script: an " + std::string(replica::name_of(options.role)) +
+                                       " has no tools; use --role surgeon or assistant"};
+  if (options.display == Display::None && !options.screenshot_file.empty())
+    return Error{ErrorCode::Usage, "--screenshot: --no-render draws nothing; use --headless"};
+  return {};
+}
+
+}  // namespace
+
+Result<std::optional<ClientOptions>> parse_client_command_line(int argc, char** argv) {
+  ClientOptions options;
+  std::string size;
+  bool is_headless = false, draws_nothing = false;
+  const std::map<std::string, replica::Role> roles = {{"surgeon", replica::Role::Surgeon},
+                                                      {"assistant", replica::Role::Assistant},
+                                                      {"instructor", replica::Role::Instructor},
+                                                      {"observer", replica::Role::Observer}};
+  CLI::App app("Takes part in a session, watches one, or plays a recorded one.", "trocar-client");
+  app.footer(kExamples);
+  app.set_version_flag("--version", version_text());
+  app.add_option("--server", options.server, "where the session is")
+      ->type_name("HOST:PORT")
+      ->capture_default_str();
+  app.add_option("--name", options.name, "how others see you, unique in the session")
+      ->type_name("NAME");
+  std::string role = "surgeon";
+  app.add_option("--role", role, "surgeon, assistant (with tools), instructor, observer (watch)")
+      ->check(CLI::IsMember(roles))
+      ->type_name("ROLE")
+      ->capture_default_str();
+  app.add_flag("--headless", is_headless, "draw into memory, needs no display");
+  app.add_flag("--no-render", draws_nothing, "draw nothing: a robot or a watcher by program");
+  app.add_option("--size", size, "of the picture [1280x720]")->type_name("WxH");
+  app.add_option("--fps", options.pictures_per_second,
+                 "pictures per second [window 60, headless 15]")
+      ->type_name("N")
+      ->check(CLI::Range(1.0, 240.0));
+  app.add_option("--screenshot", options.screenshot_file, "write a picture (PNG)")
+      ->type_name("FILE");
+  app.add_option("--screenshot-at", options.screenshot_at,
+                 "seconds after joining at which it is taken [the last picture]")
+      ->type_name("S")
+      ->check(CLI::Range(0.0, 1e6));
+  app.add_option("--seconds", options.seconds, "leave after this many seconds")
+      ->type_name("N")
+      ->check(CLI::Range(0.0, 1e9));
+  app.add_option("--script", options.script_file, "scripted hand instead of the mouse (TOML)")
+      ->type_name("FILE");
+  app.add_option("--replay", options.replay_file, "play a recorded session (.mcap)")
+      ->type_name("FILE");
+  app.add_option("--summary", options.summary_file, "write figures of the run as JSON at the end")
+      ->type_name("FILE");
+  app.add_option("--corrupt-frame", options.corrupt_frame, "")->group("");
+  app.add_option("--log-level", options.log_level, "error, warn, info, debug or off")
+      ->capture_default_str();
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& success) {  // --help and --version
+    app.exit(success);
+    return std::optional<ClientOptions>{};
+  } catch (const CLI::ParseError& error) {
+    return Error{ErrorCode::Usage, std::string(error.what()) + " (see --help)"};
+  }
+  options.role = roles.at(role);
+  if (draws_nothing)
+    options.display = Display::None;
+  else if (is_headless)
+    options.display = Display::Headless;
+  if (options.name.empty()) options.name = default_name();
+  if (!size.empty())
+    if (const auto parsed = parse_size(size, options.size); !parsed) return parsed.error();
+  if (const auto checked = check(options); !checked) return checked.error();
+  return std::optional<ClientOptions>(std::move(options));
+}
+
+}  // namespace trocar::app

@@ -1,0 +1,34 @@
+#pragma once
+
+// The command line of trocar-client.
+
+#include <optional>
+#include <string>
+
+#include "client/render/gl_context.h"
+#include "client/replica/session_view.h"
+#include "common/base/result.h"
+
+namespace trocar::app {
+
+enum class Display : std::uint8_t { Window, Headless, None };
+
+struct ClientOptions {
+  std::string server = "127.0.0.1:7690";
+  std::string name;  // empty: made from the login name and the process
+  replica::Role role = replica::Role::Surgeon;
+  Display display = Display::Window;
+  render::Size size{1280, 720};
+  double pictures_per_second = 0;  // 0: 60 in a window, 15 headless
+  std::string screenshot_file;
+  double screenshot_at = -1;  // seconds after joining; < 0: the last picture
+  double seconds = 0;         // 0: until the session ends
+  std::string script_file, replay_file, summary_file;
+  std::uint64_t corrupt_frame = 0;  // hidden: damages the n-th delta, to prove healing
+  std::string log_level = "info";
+};
+
+// No value: --help or --version was asked for and printed.
+Result<std::optional<ClientOptions>> parse_client_command_line(int argc, char** argv);
+
+}  // namespace trocar::app

@@ -1,0 +1,43 @@
+#pragma once
+
+// The tools this client brings: a person's mouse or a script, and when their samples leave.
+// Thread: render thread.
+
+#include <optional>
+#include <vector>
+
+#include "client/device/mouse_tool.h"
+#include "client/device/script_hand.h"
+#include "client/replica/replica.h"
+
+namespace trocar::app {
+
+class Hands {
+ public:
+  // No hands at all: a watcher.
+  Hands() = default;
+  static Hands mouse(const scene::ToolShape& shape);
+  static Hands scripted(scene::Script script);
+
+  // What to offer when joining.
+  std::vector<scene::ToolShape> shapes() const;
+  device::MouseTool* mouse_tool() { return mouse_ ? &*mouse_ : nullptr; }
+
+  // Sends what is due. A script begins with the first frame this client shows; an error means that
+  // it does not fit the organ.
+  Status send_due(const replica::Replica& replica, replica::SessionSource& source,
+                  std::uint64_t now_ns);
+
+ private:
+  void send(replica::SessionSource& source, std::uint32_t tool, const scene::ToolSample& sample);
+
+  std::optional<device::MouseTool> mouse_;
+  scene::ToolShape mouse_shape_;
+  std::optional<scene::Script> script_;  // until the surface is known
+  std::optional<device::ScriptHand> script_hand_;
+  std::vector<scene::ToolShape> script_shapes_;
+  std::uint64_t script_start_ns_ = 0, script_sent_ns_ = 0;
+  std::uint32_t sequence_ = 0;
+};
+
+}  // namespace trocar::app

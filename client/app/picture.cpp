@@ -1,0 +1,251 @@
+#include "client/app/picture.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "client/ui/hud_panels.h"
+#include "common/base/log.h"
+
+namespace trocar::app {
+namespace {
+
+const replica::Participant* owner_of(const replica::Replica& replica, ToolSlot slot) {
+  return replica.find_participant(slot.owner());
+}
+
+scene::ToolShape shape_of(const replica::Replica& replica, ToolSlot slot) {
+  const auto* owner = owner_of(replica, slot);
+  const auto number = static_cast<std::size_t>(slot.number());
+  return owner != nullptr && number < owner->tools.size() ? owner->tools[number]
+                                                          : scene::ToolShape{};
+}
+
+std::string sync_text(const replica::Replica& replica) {
+  char text[80];
+  const auto& counters = replica.counters();
+  switch (replica.sync_state()) {
+    case replica::SyncState::WaitingForTopology:
+    case replica::SyncState::WaitingForKeyframe:
+      return "waiting";
+    case replica::SyncState::Healing:
+      return "healing: keyframe asked for";
+    case replica::SyncState::InStep:
+      std::snprintf(text, sizeof text,
+                    counters.healed > 0 ? "in step, CRC %08x, healed %llu" : "in step, CRC %08x",
+                    replica.surface_crc(), static_cast<unsigned long long>(counters.healed));
+      return text;
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Picture>> Picture::make(const ClientOptions& options,
+                                               const std::string& title) {
+  auto context = options.display == Display::Window
+                     ? render::make_window_context(options.size, title)
+                     : render::make_headless_context(options.size);
+  if (!context) return context.error();
+  return std::unique_ptr<Picture>(new Picture(std::move(*context), options));
+}
+
+Picture::Picture(std::unique_ptr<render::GlContext> context, const ClientOptions& options)
+    : role_(options.role),
+      context_(std::move(context)),
+      renderer_(*context_),
+      hud_(*context_),
+      shows_help_(options.display == Display::Window),
+      keeps_image_(!options.screenshot_file.empty()) {
+  log::debug("drawing with {}", renderer_.description());
+}
+
+void Picture::frame_camera(const replica::Replica& replica) {
+  const auto& rest = replica.topology().rest_positions;
+  if (rest.empty()) return;
+  Vec3f low = rest.front(), high = low;
+  for (const Vec3f& p : rest) {
+    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
+    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+  }
+  camera_.frame((low + high) * 0.5f, length(high - low) * 0.5f);
+  framed_topology_ = replica.topology_version();
+}
+
+void Picture::measure(const replica::Replica& replica, std::uint64_t now_ns) {
+  const auto& counters = replica.counters();
+  const double seconds = static_cast<double>(now_ns - rate_.start_ns) * 1e-9;
+  if (rate_.start_ns != 0 && seconds < 1.0) return;
+  if (rate_.start_ns != 0) {
+    rate_.pictures_per_second = static_cast<double>(count_ - rate_.pictures) / seconds;
+    rate_.frames_per_second = static_cast<double>(counters.frames - rate_.frames) / seconds;
+    rate_.bytes_per_second = static_cast<double>(counters.bytes - rate_.bytes) / seconds;
+  }
+  rate_.start_ns = now_ns;
+  rate_.pictures = count_;
+  rate_.frames = counters.frames;
+  rate_.bytes = counters.bytes;
+}
+
+render::SceneView Picture::scene_view(const replica::Replica& replica, Hands& hands,
+                                      float seconds) const {
+  render::SceneView scene;
+  scene.seconds = seconds;
+  scene.shows_regions = shows_regions_;
+  if (!surface_.is_valid()) return scene;
+  scene.topology_version = replica.topology_version();
+  scene.rest_positions = replica.topology().rest_positions;
+  scene.triangles = replica.topology().triangles;
+  scene.positions = surface_.positions();
+  scene.regions = surface_.regions();
+  for (const replica::Tool& tool : surface_.tools()) {
+    render::SceneTool shown{tool.slot,   tool.world_from_tool, shape_of(replica, tool.slot),
+                            tool.verb,   tool.has_claim,       tool.is_silent,
+                            tool.force_n};
+    // A person sees the own tool where the hand is, not where it was a round trip ago.
+    device::MouseTool* mouse = hands.mouse_tool();
+    if (mouse != nullptr && mouse->is_valid() && tool.slot.owner() == replica.own_slot()) {
+      shown.world_from_tool = mouse->current().world_from_tool;
+      shown.verb = mouse->current().verb;
+    }
+    scene.tools.push_back(shown);
+  }
+  return scene;
+}
+
+ui::HudModel Picture::hud_model(const replica::Replica& replica, replica::SessionSource& source,
+                                const render::SceneView& scene, Hands& hands,
+                                std::uint64_t now_ns) const {
+  ui::HudModel model;
+  const auto* own = replica.find_participant(replica.own_slot());
+  const bool is_replay = source.playback() != nullptr;
+  model.title = source.name();
+  model.own_role = is_replay ? "replay" : replica::name_of(own != nullptr ? own->role : role_);
+  if (!is_replay && own != nullptr) model.own_role += ", " + own->name;
+  if (!replica.topology().rest_positions.empty())
+    model.organ = replica.topology().organ_name + ", " +
+                  ui::with_thousands(replica.topology().rest_positions.size()) +
+                  " surface vertices";
+  if (source.state() == replica::SourceState::Connecting)
+    model.status = "Connecting to " + source.name() + " ...";
+  else if (!surface_.is_valid())
+    model.status = "Waiting for the organ ...";
+  if (const auto* newest = replica.newest()) {
+    // The state of the newest frame may still be under way; then the one before has it.
+    const auto& history = replica.history();
+    const bool is_complete = newest->has_state || history.size() < 2;
+    model.figures = (is_complete ? *newest : history[history.size() - 2]).figures;
+    model.session_seconds = static_cast<double>(newest->tick) * 1e-3;
+  }
+  model.round_trip_ms = source.statistics().round_trip_seconds * 1e3;
+  model.pictures_per_second = rate_.pictures_per_second;
+  model.frames_per_second = rate_.frames_per_second;
+  model.bytes_per_second = rate_.bytes_per_second;
+  model.sync_text = sync_text(replica);
+  model.is_in_step = replica.sync_state() == replica::SyncState::InStep;
+  model.shows_regions = shows_regions_;
+  model.shows_help = shows_help_;
+  model.has_own_tool = hands.mouse_tool() != nullptr;
+
+  for (const auto& participant : replica.participants()) {
+    ui::HudParticipant shown;
+    shown.name = participant.name;
+    shown.role = participant.role;
+    shown.is_self = !is_replay && participant.slot == replica.own_slot();
+    shown.colour = render::colour_of_slot(participant.slot.value);
+    for (const replica::Tool& tool : surface_.tools()) {
+      if (tool.slot.owner() != participant.slot) continue;
+      shown.has_tool = true;
+      shown.is_silent = tool.is_silent;
+      if (tool.verb != scene::Verb::None) shown.verb = tool.verb, shown.has_claim = tool.has_claim;
+      shown.force_n += length(tool.force_n);
+      shown.contact_nodes += tool.contact_nodes;
+    }
+    model.participants.push_back(std::move(shown));
+  }
+  for (const render::SceneTool& tool : scene.tools) {
+    const auto* owner = owner_of(replica, tool.slot);
+    const Vec3f collar = tool.world_from_tool.apply({0, 0, tool.shape.radius_m * 7});
+    const auto at = camera_.project(collar, context_->size());
+    if (owner == nullptr || !at) continue;
+    char force[32] = "";
+    if (length(tool.force_n) >= render::kMinArrowNewton)
+      std::snprintf(force, sizeof force, "  %.2f N", length(tool.force_n));
+    model.labels.push_back(
+        {at->x, at->y, owner->name + force, render::colour_of_slot(tool.slot.owner().value)});
+  }
+  for (const auto& notice : replica.notices()) {
+    const double age =
+        now_ns > notice.arrival_ns ? static_cast<double>(now_ns - notice.arrival_ns) * 1e-9 : 0.0;
+    const bool is_own = notice.tool.owner() == replica.own_slot();
+    const bool is_news = replica::is_refusal(notice.outcome)
+                             ? is_own
+                             : notice.outcome == replica::ClaimOutcome::TakenOver ||
+                                   notice.outcome == replica::ClaimOutcome::Expired;
+    if (age > 5 || notice.text.empty() || !is_news) continue;
+    // A claim is retried while the verb is held: the same words once.
+    if (!model.messages.empty() && model.messages.back().text == notice.text)
+      model.messages.pop_back();
+    model.messages.push_back({notice.text, static_cast<float>(age), true});
+  }
+  if (model.messages.size() > 3)
+    model.messages.erase(model.messages.begin(), model.messages.end() - 3);
+  if (const auto* playback = source.playback()) {
+    const auto seconds = [](Tick tick) { return static_cast<double>(tick) * 1e-3; };
+    model.timeline =
+        ui::HudTimeline{seconds(playback->first_tick()), seconds(playback->last_tick()),
+                        seconds(playback->position()), playback->is_playing(), playback->speed()};
+  }
+  return model;
+}
+
+void Picture::act(const ui::HudActions& actions, const replica::Replica& replica,
+                  replica::SessionSource& source) {
+  if (actions.toggle_help) shows_help_ = !shows_help_;
+  if (actions.toggle_regions) shows_regions_ = !shows_regions_;
+  if (actions.reset_camera) frame_camera(replica);
+  if (actions.screenshot) wants_screenshot_ = true;
+  replica::PlaybackControl* playback = source.playback();
+  if (playback == nullptr) return;
+  if (actions.toggle_play) playback->is_playing() ? playback->pause() : playback->play();
+  if (actions.speed) playback->set_speed(*actions.speed);
+  if (actions.seek_seconds)
+    playback->seek(static_cast<Tick>(std::llround(std::max(0.0, *actions.seek_seconds) * 1e3)));
+}
+
+void Picture::draw(const replica::Replica& replica, replica::SessionSource& source, Hands& hands,
+                   std::uint64_t now_ns) {
+  const float seconds =
+      last_ns_ == 0 ? 1e-3f : std::min(static_cast<float>(now_ns - last_ns_) * 1e-9f, 0.25f);
+  last_ns_ = now_ns;
+  measure(replica, now_ns);
+  surface_.update(replica, now_ns);
+  if (surface_.is_valid() && framed_topology_ != replica.topology_version()) frame_camera(replica);
+  context_->poll_events();
+  hud_.begin_frame(seconds);
+  const device::PointerInput input = hud_.input();
+  camera_.update(input, context_->size(), seconds);
+  if (device::MouseTool* mouse = hands.mouse_tool(); mouse != nullptr && surface_.is_valid())
+    mouse->update(input, camera_.rays(context_->size()), surface_.positions(),
+                  replica.topology().triangles, seconds);
+  const render::SceneView scene = scene_view(replica, hands, seconds);
+  act(hud_.draw(hud_model(replica, source, scene, hands, now_ns)), replica, source);
+  renderer_.draw(scene, camera_);
+  hud_.render();
+  if (keeps_image_ || wants_screenshot_) last_ = context_->read_image();
+  if (std::exchange(wants_screenshot_, false)) {
+    const std::string file = "trocar-" + std::to_string(now_ns / 1'000'000) + ".png";
+    if (const auto saved = save(file); !saved)
+      log::warn("{}", saved.error().message);
+    else
+      log::info("screenshot: {}", file);
+  }
+  context_->present();
+  ++count_;
+}
+
+Status Picture::save(const std::string& file) const {
+  return render::write_png(last_, file);
+}
+
+}  // namespace trocar::app

@@ -1,0 +1,61 @@
+#pragma once
+
+// One picture after another: input, camera, scene and HUD of a session, in a window or in memory.
+// Thread: render thread.
+
+#include <deque>
+#include <memory>
+
+#include "client/app/client_options.h"
+#include "client/app/hands.h"
+#include "client/render/scene_renderer.h"
+#include "client/replica/interpolated_surface.h"
+#include "client/ui/hud.h"
+
+namespace trocar::app {
+
+class Picture {
+ public:
+  static Result<std::unique_ptr<Picture>> make(const ClientOptions& options,
+                                               const std::string& title);
+
+  // Draws the session as it is at `now_ns` and acts on what the person does.
+  void draw(const replica::Replica& replica, replica::SessionSource& source, Hands& hands,
+            std::uint64_t now_ns);
+  bool should_close() const { return context_->should_close(); }
+  std::uint64_t count() const { return count_; }
+  // The last picture; kept only with --screenshot.
+  const render::Image& image() const { return last_; }
+  Status save(const std::string& file) const;
+
+ private:
+  explicit Picture(std::unique_ptr<render::GlContext> context, const ClientOptions& options);
+
+  void measure(const replica::Replica& replica, std::uint64_t now_ns);
+  render::SceneView scene_view(const replica::Replica& replica, Hands& hands, float seconds) const;
+  ui::HudModel hud_model(const replica::Replica& replica, replica::SessionSource& source,
+                         const render::SceneView& scene, Hands& hands, std::uint64_t now_ns) const;
+  void act(const ui::HudActions& actions, const replica::Replica& replica,
+           replica::SessionSource& source);
+  void frame_camera(const replica::Replica& replica);
+
+  struct Rate {  // over the last second
+    std::uint64_t start_ns = 0, pictures = 0, frames = 0, bytes = 0;
+    double pictures_per_second = 0, frames_per_second = 0, bytes_per_second = 0;
+  };
+
+  replica::Role role_;
+  std::unique_ptr<render::GlContext> context_;
+  render::SceneRenderer renderer_;
+  ui::Hud hud_;
+  render::OrbitCamera camera_;
+  replica::InterpolatedSurface surface_;
+  std::uint64_t framed_topology_ = 0;
+  std::uint64_t last_ns_ = 0, count_ = 0;
+  bool shows_help_ = false, shows_regions_ = true, wants_screenshot_ = false;
+  Rate rate_;
+  render::Image last_;
+  bool keeps_image_ = false;
+};
+
+}  // namespace trocar::app

@@ -1,0 +1,164 @@
+// trocar-journal: what a recorded session holds, and whether it simulates to the same bits again.
+
+#include <CLI/CLI.hpp>
+
+#include <cinttypes>
+#include <cstdio>
+
+#include "common/base/cpu.h"
+#include "common/base/log.h"
+#include "common/base/timing.h"
+#include "common/base/version.h"
+#include "common/journal/session_journal.h"
+#include "server/recording/verify.h"
+
+namespace trocar::app {
+namespace {
+
+constexpr const char* kProgram = "trocar-journal";
+
+std::string json_escaped(const std::string& text) {
+  std::string out;
+  for (const char c : text) {
+    if (c == '"' || c == '\\') out += '\\';
+    if (static_cast<unsigned char>(c) < 0x20)
+      out += ' ';
+    else
+      out += c;
+  }
+  return out;
+}
+
+const char* role_name(proto::Role role) {
+  switch (role) {
+    case proto::ROLE_SURGEON: return "surgeon";
+    case proto::ROLE_ASSISTANT: return "assistant";
+    case proto::ROLE_INSTRUCTOR: return "instructor";
+    case proto::ROLE_OBSERVER: return "observer";
+    default: return "?";
+  }
+}
+
+int show_info(const std::string& path, bool as_json) {
+  auto journal = journal::SessionJournal::open(path);
+  if (!journal) return report(kProgram, journal.error());
+  const auto& info = (*journal)->info();
+  const auto& mcap = (*journal)->container();
+  const double seconds = static_cast<double>(info.last_tick) / static_cast<double>(kTicksPerSecond);
+  if (as_json) {
+    std::printf("{\"seconds\": %.3f, \"last_tick\": %" PRIu64
+                ", \"sim_version\": %u, \"protocol\": \"%s\", \"organ\": \"%s\", "
+                "\"finished\": %s, \"gap_messages\": %" PRIu64 ", \"channels\": {",
+                seconds, info.last_tick, info.sim_version, info.protocol.c_str(),
+                json_escaped(info.organ_name).c_str(), info.is_finished ? "true" : "false",
+                info.gap_messages);
+    const char* separator = "";
+    for (const auto& [id, channel] : mcap.channels()) {
+      const auto count = mcap.statistics().channel_message_counts.find(id);
+      std::printf("%s\"%s\": %" PRIu64, separator, json_escaped(channel.topic).c_str(),
+                  count == mcap.statistics().channel_message_counts.end() ? 0 : count->second);
+      separator = ", ";
+    }
+    std::printf("}}\n");
+    return 0;
+  }
+  std::printf("%s\n", path.c_str());
+  std::printf("  %s\n", info.summary.c_str());
+  std::printf("  organ        %s (hash %016" PRIx64 ")\n", info.organ_name.c_str(), info.organ_hash);
+  std::printf("  length       %.1f s, %" PRIu64 " ticks\n", seconds, info.last_tick);
+  std::printf("  sim_version  %u%s, protocol %s\n", info.sim_version,
+              info.sim_version == kSimVersion ? "" : " (this program has another)",
+              info.protocol.c_str());
+  std::printf("  participants %zu\n", info.participants.size());
+  for (const auto& participant : info.participants)
+    std::printf("    %-24s %s\n", participant.name().c_str(), role_name(participant.role()));
+  std::printf("  channels\n");
+  for (const auto& [id, channel] : mcap.channels()) {
+    const auto count = mcap.statistics().channel_message_counts.find(id);
+    std::printf("    %-24s %8" PRIu64 " messages\n", channel.topic.c_str(),
+                count == mcap.statistics().channel_message_counts.end() ? 0 : count->second);
+  }
+  if (info.gap_messages > 0)
+    std::printf("  gaps         %" PRIu64 " frames were dropped while recording\n",
+                info.gap_messages);
+  return 0;
+}
+
+int verify(const std::string& path, bool as_json) {
+  const std::uint64_t started = monotonic_ns();
+  bool is_progress_shown = false;
+  auto verified = recording::verify_journal(path, [&](Tick tick, Tick last) {
+    if (as_json || monotonic_ns() - started < 2'000'000'000u) return;
+    is_progress_shown = true;
+    std::fprintf(stderr, "\r%s: %" PRIu64 " of %" PRIu64 " s", kProgram, tick / kTicksPerSecond,
+                 last / kTicksPerSecond);
+  });
+  if (is_progress_shown) std::fprintf(stderr, "\n");
+  if (!verified) return report(kProgram, verified.error());
+  const auto& r = *verified;
+  if (as_json) {
+    std::printf("{\"verified\": %s, \"resimulated\": %s, \"ticks_verified\": %" PRIu64
+                ", \"last_tick\": %" PRIu64 ", \"ticks_missing\": %" PRIu64
+                ", \"snapshots_verified\": %" PRIu64 ", \"surfaces_verified\": %" PRIu64
+                ", \"first_mismatch_tick\": %s, \"mismatch\": \"%s\", \"last_hash\": \"%016" PRIx64
+                "\", \"container\": \"%s\"}\n",
+                r.ok() ? "true" : "false", r.is_resimulated ? "true" : "false", r.ticks_verified,
+                r.last_tick, r.ticks_missing, r.snapshots_verified, r.surfaces_verified,
+                r.ok() ? "null" : std::to_string(r.first_mismatch->tick).c_str(),
+                r.ok() ? "" : r.first_mismatch->what.c_str(), r.last_hash,
+                json_escaped(r.container).c_str());
+  } else {
+    std::printf("%s: %s\n", path.c_str(), r.container.c_str());
+    if (!r.is_resimulated)
+      std::printf("recorded with another sim_version: cannot re-simulate, stored bytes checked\n");
+    std::printf("%" PRIu64 " ticks re-simulated to the same hash, %" PRIu64
+                " missing; %" PRIu64 " snapshots, %" PRIu64 " surfaces equal\n",
+                r.ticks_verified, r.ticks_missing, r.snapshots_verified, r.surfaces_verified);
+    if (r.ok())
+      std::printf("verified to tick %" PRIu64 ", hash %016" PRIx64 "\n", r.last_tick, r.last_hash);
+    else
+      std::printf("first difference at tick %" PRIu64 ": %s\n", r.first_mismatch->tick,
+                  r.first_mismatch->what.c_str());
+  }
+  return static_cast<int>(r.ok() ? ExitCode::Ok : ExitCode::Mismatch);
+}
+
+int run(int argc, char** argv) {
+  CLI::App app{"Looks into recorded Trocar sessions (.mcap).", kProgram};
+  app.footer(
+      "Examples:\n"
+      "  trocar-journal info out/demo/session.mcap     who, how long, which channels\n"
+      "  trocar-journal verify out/demo/session.mcap   simulate again, name the first difference\n"
+      "Exit codes: 0 ok, 1 difference found, 2 usage, 3 file cannot be read.");
+  app.require_subcommand(1);
+  std::string log_level = "warn", path;
+  bool as_json = false;
+  app.set_version_flag("--version", std::string(kProgram) + " " + kVersion + ", sim_version " +
+                                        std::to_string(kSimVersion) + ", protocol " +
+                                        std::to_string(kProtocolMajor) + "." +
+                                        std::to_string(kProtocolMinor));
+  app.add_option("--log-level", log_level, "error, warn, info, debug or off")
+      ->capture_default_str();
+  auto* info = app.add_subcommand("info", "Show what the journal holds");
+  auto* check = app.add_subcommand("verify", "Simulate the session again and compare every tick");
+  for (auto* command : {info, check}) {
+    command->add_option("FILE", path, "a journal (.mcap)")->required();
+    command->add_flag("--json", as_json, "print one JSON object");
+  }
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    const int code = app.exit(e);
+    return code == 0 ? 0 : static_cast<int>(ExitCode::Usage);
+  }
+  if (auto s = log::configure(kProgram, log_level); !s) return report(kProgram, s.error());
+  return check->parsed() ? verify(path, as_json) : show_info(path, as_json);
+}
+
+}  // namespace
+}  // namespace trocar::app
+
+int main(int argc, char** argv) {
+  trocar::require_cpu_features(trocar::app::kProgram);
+  return trocar::app::run(argc, argv);
+}

@@ -1,0 +1,327 @@
+// trocar-organ: makes, imports and inspects organs.
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cinttypes>
+#include <cstdio>
+#include <filesystem>
+#include <numeric>
+#include <string>
+
+#include "common/base/cpu.h"
+#include "common/base/log.h"
+#include "common/base/version.h"
+#include "common/scene/builtin_organs.h"
+#include "common/scene/load_organ.h"
+#include "common/scene/organ_file.h"
+
+namespace trocar::app {
+namespace {
+
+constexpr const char* kProgram = "trocar-organ";
+// From here on the work takes longer than two seconds, and a line says that it goes on.
+constexpr int kManyTets = 100'000;
+constexpr std::uintmax_t kLargeFileBytes = 20'000'000;
+
+constexpr const char* kExamples = R"(
+Examples:
+  trocar-organ make liver
+      the built-in liver with about 4,000 nodes, into liver.organ
+  trocar-organ make liver --tets 100000 --out fine.organ
+      the same liver, finer
+  trocar-organ import stomach.msh --unit mm --fix back:0.1
+      a mesh in millimetres, held at the hindmost tenth, into stomach.organ
+  trocar-organ inspect stomach.organ --json
+      its figures, for other programs
+
+Exit codes: 0 ok, 2 command line, 3 bad file, 5 cannot write or processor too old.
+)";
+
+struct Options {
+  std::string log_level = "info";
+  std::string made_name;
+  int tets = 0;  // 0: the default
+  std::string out;
+  std::string import_file;
+  std::string unit = "m";
+  std::string fix = "bottom:0.2";
+  std::string import_name;
+  std::string inspected;
+  bool json = false;
+};
+
+struct EdgeLengths {
+  double min_mm = 0, mean_mm = 0, max_mm = 0;
+};
+
+// Lengths of the springs' edges.
+EdgeLengths edge_lengths(const mesh::TetMesh& mesh) {
+  EdgeLengths lengths;
+  const auto& pairs = mesh.spring_pairs();
+  if (pairs.empty()) return lengths;
+  lengths.min_mm = 1e9;
+  for (const auto& [a, b] : pairs) {
+    const double l = 1e3 * length(mesh.rest_positions[b.value] - mesh.rest_positions[a.value]);
+    lengths.min_mm = std::min(lengths.min_mm, l);
+    lengths.max_mm = std::max(lengths.max_mm, l);
+    lengths.mean_mm += l / static_cast<double>(pairs.size());
+  }
+  return lengths;
+}
+
+// Of what the surface encloses: that of the tets where there are any, and of a lattice too.
+double enclosed_volume(const mesh::TetMesh& mesh) {
+  double volume = 0;
+  for (const auto& [a, b, c] : mesh.boundary_triangles)
+    volume += dot(cross(mesh.rest_positions[a.value], mesh.rest_positions[b.value]),
+                  mesh.rest_positions[c.value]) /
+              6;
+  return volume;
+}
+
+Vec3d size_mm(const mesh::TetMesh& mesh) {
+  Vec3d half{};  // the rest bounding box is centred on the origin
+  for (const Vec3d& p : mesh.rest_positions)
+    half = {std::max(half.x, p.x), std::max(half.y, p.y), std::max(half.z, p.z)};
+  return half * 2e3;
+}
+
+double mass_kg(const scene::Organ& organ) {
+  return std::accumulate(organ.node_masses_kg.begin(), organ.node_masses_kg.end(), 0.0);
+}
+
+std::string grouped(std::size_t number) {
+  std::string digits = std::to_string(number);
+  for (auto i = static_cast<int>(digits.size()) - 3; i > 0; i -= 3)
+    digits.insert(static_cast<std::size_t>(i), ",");
+  return digits;
+}
+
+void print_material(const scene::Organ& organ) {
+  const scene::Material& m = organ.material;
+  if (m.spring_law == scene::SpringLaw::Constant)
+    std::printf("  springs             constant, %.4g N/m\n", m.spring_stiffness_n_m);
+  else
+    std::printf("  springs             from Young's modulus %.4g kPa\n", m.young_modulus_pa / 1e3);
+  std::printf("  density             %.4g kg/m^3\n", m.density_kg_m3);
+  std::printf("  damping             %.4g 1/s per node, %.4g ms along springs\n",
+              m.node_damping_per_s, m.spring_damping_time_s * 1e3);
+}
+
+void print_text(const scene::Organ& organ) {
+  const mesh::TetMesh& mesh = organ.mesh;
+  const Vec3d size = size_mm(mesh);
+  const EdgeLengths edges = edge_lengths(mesh);
+  std::printf("%s  (%s)\n", organ.name.c_str(), organ.source.c_str());
+  std::printf("  nodes               %s, %s of them on the surface\n",
+              grouped(mesh.node_count()).c_str(), grouped(mesh.surface_nodes.size()).c_str());
+  std::printf("  tets                %s\n", grouped(mesh.tets.size()).c_str());
+  if (mesh.links.empty())
+    std::printf("  edges               %s\n", grouped(mesh.edges.size()).c_str());
+  else
+    std::printf("  links               %s\n", grouped(mesh.links.size()).c_str());
+  std::printf("  surface triangles   %s\n", grouped(mesh.boundary_triangles.size()).c_str());
+  std::printf("  size                %.1f x %.1f x %.1f mm\n", size.x, size.y, size.z);
+  std::printf("  volume              %.4g l\n", enclosed_volume(mesh) * 1e3);
+  std::printf("  mass                %.4g kg\n", mass_kg(organ));
+  std::printf("  edge lengths        %.2f / %.2f / %.2f mm (least, mean, largest)\n", edges.min_mm,
+              edges.mean_mm, edges.max_mm);
+  if (!mesh.tets.empty()) {
+    const auto angles = mesh::dihedral_range(mesh);
+    std::printf("  dihedral angles     %.1f to %.1f degrees\n", angles.min_deg, angles.max_deg);
+  }
+  print_material(organ);
+  std::printf("  fixed nodes         %s (%.1f %%)\n", grouped(organ.fixed_nodes.size()).c_str(),
+              100.0 * static_cast<double>(organ.fixed_nodes.size()) /
+                  static_cast<double>(mesh.node_count()));
+  std::printf("  hash                %016" PRIx64 "\n", scene::organ_hash(organ));
+}
+
+// A JSON string. Names in files may hold any UTF-8, so only what JSON forbids is escaped.
+std::string quoted(const std::string& text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') {
+      out += '\\';
+      out += c;
+    } else if (static_cast<unsigned char>(c) < 32) {
+      char escaped[8];
+      std::snprintf(escaped, sizeof escaped, "\\u%04x", static_cast<unsigned>(c));
+      out += escaped;
+    } else {
+      out += c;
+    }
+  }
+  return out + "\"";
+}
+
+void print_json(const scene::Organ& organ) {
+  const mesh::TetMesh& mesh = organ.mesh;
+  const Vec3d size = size_mm(mesh);
+  const EdgeLengths edges = edge_lengths(mesh);
+  const scene::Material& m = organ.material;
+  std::printf("{\n  \"name\": %s,\n  \"source\": %s,\n", quoted(organ.name).c_str(),
+              quoted(organ.source).c_str());
+  std::printf("  \"nodes\": %zu,\n  \"surface_nodes\": %zu,\n  \"tets\": %zu,\n", mesh.node_count(),
+              mesh.surface_nodes.size(), mesh.tets.size());
+  std::printf("  \"edges\": %zu,\n  \"links\": %zu,\n  \"surface_triangles\": %zu,\n",
+              mesh.edges.size(), mesh.links.size(), mesh.boundary_triangles.size());
+  std::printf("  \"size_mm\": [%.6g, %.6g, %.6g],\n  \"volume_l\": %.9g,\n  \"mass_kg\": %.9g,\n",
+              size.x, size.y, size.z, enclosed_volume(mesh) * 1e3, mass_kg(organ));
+  std::printf("  \"edge_mm\": {\"min\": %.6g, \"mean\": %.6g, \"max\": %.6g},\n", edges.min_mm,
+              edges.mean_mm, edges.max_mm);
+  if (mesh.tets.empty()) {
+    std::printf("  \"dihedral_deg\": null,\n");
+  } else {
+    const auto angles = mesh::dihedral_range(mesh);
+    std::printf("  \"dihedral_deg\": {\"min\": %.6g, \"max\": %.6g},\n", angles.min_deg,
+                angles.max_deg);
+  }
+  std::printf("  \"spring_law\": \"%s\",\n  \"spring_stiffness_n_m\": %.9g,\n",
+              m.spring_law == scene::SpringLaw::Constant ? "constant" : "volume_consistent",
+              m.spring_stiffness_n_m);
+  std::printf("  \"young_modulus_pa\": %.9g,\n  \"density_kg_m3\": %.9g,\n", m.young_modulus_pa,
+              m.density_kg_m3);
+  std::printf("  \"node_damping_per_s\": %.9g,\n  \"spring_damping_time_s\": %.9g,\n",
+              m.node_damping_per_s, m.spring_damping_time_s);
+  std::printf("  \"source_offset_m\": [%.9g, %.9g, %.9g],\n", organ.source_offset_m.x,
+              organ.source_offset_m.y, organ.source_offset_m.z);
+  std::printf("  \"fixed_nodes\": %zu,\n  \"hash\": \"%016" PRIx64 "\"\n}\n",
+              organ.fixed_nodes.size(), scene::organ_hash(organ));
+}
+
+Status save(const scene::Organ& organ, const std::string& path) {
+  if (auto status = scene::write_organ(path, organ); !status) return status;
+  print_text(organ);
+  std::error_code ignored;
+  std::printf("  file                %s, %s bytes\n", path.c_str(),
+              grouped(std::filesystem::file_size(path, ignored)).c_str());
+  return {};
+}
+
+Result<scene::Organ> make_named(const std::string& name, int tets) {
+  if (name == "lattice") {
+    if (tets != 0)
+      return Error{ErrorCode::Usage, "make lattice: --tets does not apply, a lattice has none"};
+    return scene::make_lattice();
+  }
+  if (tets >= kManyTets)
+    std::fprintf(stderr, "%s: meshing a liver of about %s tets, this takes some seconds\n",
+                 kProgram, grouped(static_cast<std::size_t>(tets)).c_str());
+  return scene::make_liver(tets == 0 ? scene::kDefaultLiverTets : tets);
+}
+
+Status run_make(const Options& options) {
+  const auto organ = make_named(options.made_name, options.tets);
+  if (!organ) return organ.error();
+  return save(*organ, options.out.empty() ? options.made_name + ".organ" : options.out);
+}
+
+Status run_import(const Options& options) {
+  const auto unit = mesh::parse_unit(options.unit);
+  if (!unit) return unit.error();
+  const auto fix = scene::parse_fix_rule(options.fix);
+  if (!fix) return fix.error();
+  scene::ImportOptions import_options{*unit, *fix, std::nullopt};
+  if (!options.import_name.empty()) import_options.name = options.import_name;
+  const std::filesystem::path path(options.import_file);
+  std::error_code missing;
+  if (const auto bytes = std::filesystem::file_size(path, missing);
+      !missing && bytes >= kLargeFileBytes)
+    std::fprintf(stderr, "%s: reading %s, %s MB, this takes some seconds\n", kProgram,
+                 options.import_file.c_str(), grouped(bytes / 1'000'000).c_str());
+  const auto imported = scene::import_organ(path, import_options);
+  if (!imported) return imported.error();
+  for (const std::string& warning : imported->warnings)
+    std::fprintf(stderr, "%s: warning: %s: %s\n", kProgram, options.import_file.c_str(),
+                 warning.c_str());
+  if (imported->organ.fixed_nodes.empty())
+    std::fprintf(stderr, "%s: warning: %s: nothing holds this organ, a push moves all of it\n",
+                 kProgram, options.import_file.c_str());
+  return save(imported->organ, options.out.empty() ? path.stem().string() + ".organ" : options.out);
+}
+
+Status run_inspect(const Options& options) {
+  const auto organ = scene::load_organ(options.inspected);
+  if (!organ) return organ.error();
+  options.json ? print_json(*organ) : print_text(*organ);
+  return {};
+}
+
+std::string version_text() {
+  return std::string(kProgram) + " " + kVersion + ", sim_version " + std::to_string(kSimVersion) +
+         ", protocol " + std::to_string(kProtocolMajor) + "." + std::to_string(kProtocolMinor);
+}
+
+void add_commands(CLI::App& app, Options& options) {
+  auto* make = app.add_subcommand("make", "make a built-in organ");
+  make->add_option("NAME", options.made_name, "liver or lattice (Choi's 30 x 15 x 30 nodes)")
+      ->required()
+      ->check(CLI::IsMember({"liver", "lattice"}));
+  make->add_option(
+          "--tets", options.tets,
+          "tets of the liver, met within 5 % [" + std::to_string(scene::kDefaultLiverTets) + "]")
+      ->type_name("N")
+      ->check(CLI::Range(scene::kMinLiverTets, scene::kMaxLiverTets));
+  make->add_option("--out", options.out, "file to write [NAME.organ]")->type_name("FILE");
+
+  auto* import = app.add_subcommand("import", "turn a Gmsh 2.2 ASCII mesh into an organ");
+  import->add_option("FILE", options.import_file, ".msh file")->required();
+  import->add_option("--unit", options.unit, "length unit of the file: m, cm or mm")
+      ->type_name("UNIT")
+      ->capture_default_str();
+  import
+      ->add_option("--fix", options.fix,
+                   "which surface nodes are held: bottom:F, top:F, back:F (share of the height or "
+                   "depth), or none")
+      ->type_name("RULE")
+      ->capture_default_str();
+  import->add_option("--name", options.import_name, "name of the organ [the file's]")
+      ->type_name("NAME");
+  import->add_option("--out", options.out, "file to write [<file's name>.organ, here]")
+      ->type_name("FILE");
+
+  auto* inspect = app.add_subcommand("inspect", "check an organ and print its figures");
+  inspect->add_option("FILE", options.inspected, ".organ or .msh file, liver or lattice")
+      ->required();
+  inspect->add_flag("--json", options.json, "print JSON");
+}
+
+int run(int argc, char** argv) {
+  Options options;
+  CLI::App app(
+      "Makes, imports and inspects organs: the meshes, materials and held nodes that a "
+      "session is about.",
+      kProgram);
+  app.footer(kExamples);
+  app.set_version_flag("--version", version_text());
+  app.add_option("--log-level", options.log_level, "error, warn, info, debug or off")
+      ->capture_default_str();
+  app.require_subcommand(1);
+  app.fallthrough();
+  add_commands(app, options);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return app.exit(error);
+    return report(kProgram, {ErrorCode::Usage, std::string(error.what()) + " (see --help)"});
+  }
+  if (const auto set = log::configure(kProgram, options.log_level); !set)
+    return report(kProgram, set.error());
+  Status status;
+  if (app.got_subcommand("make"))
+    status = run_make(options);
+  else if (app.got_subcommand("import"))
+    status = run_import(options);
+  else
+    status = run_inspect(options);
+  return status ? static_cast<int>(ExitCode::Ok) : report(kProgram, status.error());
+}
+
+}  // namespace
+}  // namespace trocar::app
+
+int main(int argc, char** argv) {
+  trocar::require_cpu_features("trocar-organ");
+  return trocar::app::run(argc, argv);
+}

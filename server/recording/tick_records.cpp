@@ -1,0 +1,104 @@
+#include "server/recording/tick_records.h"
+
+#include <cmath>
+#include <string>
+
+#include "proto/journal.pb.h"
+#include "server/step/simulation.h"
+
+namespace trocar::recording {
+namespace {
+
+Error bad(Tick tick, const char* what) {
+  return {ErrorCode::BadFile, "tick " + std::to_string(tick) + ": " + what};
+}
+
+bool read_pose(const proto::ToolInput& message, Pose& pose) {
+  const auto& p = message.position_m();
+  const auto& q = message.orientation();
+  pose = {{p.x(), p.y(), p.z()}, {q.x(), q.y(), q.z(), q.w()}};
+  return is_finite(pose.position) && length_squared(pose.position) <= 4.0f &&
+         std::abs(norm(pose.orientation) - 1.0f) <= 1e-3f;
+}
+
+}  // namespace
+
+void to_message(const step::TickRecord& record, const step::TickDecisions* previous,
+                proto::TickRecord& message) {
+  message.set_tick(record.tick);
+  message.set_state_hash(record.state_hash);
+  const auto& d = record.decisions;
+  if (!previous || *previous != d) {
+    auto& decisions = *message.mutable_decisions();
+    decisions.set_depth_limit(d.depth_limit);
+    decisions.set_node_limit(d.node_limit);
+    decisions.set_sweeps(d.sweeps);
+    decisions.set_over_relaxation(d.over_relaxation);
+  }
+  for (const auto slot : record.inputs.leaves) message.add_leave()->set_slot(slot.value);
+  for (const auto& join : record.inputs.joins) {
+    auto& entry = *message.add_join();
+    entry.set_slot(join.slot.value);
+    for (int i = 0; i < join.tool_count; ++i) {
+      const auto& shape = join.shapes[static_cast<std::size_t>(i)];
+      auto& tool = *entry.add_tool();
+      tool.set_radius_m(shape.radius_m);
+      tool.set_length_m(shape.length_m);
+      tool.set_reach_m(shape.reach_m);
+    }
+  }
+  for (const auto& sample : record.inputs.samples) {
+    auto& entry = *message.add_sample();
+    entry.set_tool(sample.tool.value);
+    const auto& pose = sample.sample.world_from_tool;
+    entry.mutable_position_m()->set_x(pose.position.x);
+    entry.mutable_position_m()->set_y(pose.position.y);
+    entry.mutable_position_m()->set_z(pose.position.z);
+    entry.mutable_orientation()->set_x(pose.orientation.x);
+    entry.mutable_orientation()->set_y(pose.orientation.y);
+    entry.mutable_orientation()->set_z(pose.orientation.z);
+    entry.mutable_orientation()->set_w(pose.orientation.w);
+    entry.set_verb(static_cast<proto::Verb>(sample.sample.verb));
+  }
+}
+
+Status from_message(const proto::TickRecord& message, step::TickRecord& record) {
+  record.tick = message.tick();
+  record.state_hash = message.state_hash();
+  record.inputs.clear();
+  if (message.has_decisions()) {
+    const auto& d = message.decisions();
+    record.decisions = {d.depth_limit(), d.node_limit(), d.sweeps(), d.over_relaxation()};
+    if (auto valid = step::validate(record.decisions); !valid)
+      return bad(record.tick, valid.error().message.c_str());
+  }
+  for (const auto& leave : message.leave()) {
+    if (leave.slot() >= kMaxHands) return bad(record.tick, "leave: slot out of range");
+    record.inputs.leaves.push_back({static_cast<std::uint8_t>(leave.slot())});
+  }
+  for (const auto& entry : message.join()) {
+    session::HandJoin join{.slot = {static_cast<std::uint8_t>(entry.slot())},
+                           .tool_count = entry.tool_size()};
+    if (entry.slot() >= kMaxHands) return bad(record.tick, "join: slot out of range");
+    if (join.tool_count < 1 || join.tool_count > kToolsPerHand)
+      return bad(record.tick, "join: a hand has 1 or 2 tools");
+    for (int i = 0; i < join.tool_count; ++i) {
+      const auto& tool = entry.tool(i);
+      join.shapes[static_cast<std::size_t>(i)] = {tool.radius_m(), tool.length_m(), tool.reach_m()};
+    }
+    record.inputs.joins.push_back(join);
+  }
+  for (const auto& entry : message.sample()) {
+    session::ToolInput input{.tool = {static_cast<std::uint8_t>(entry.tool())}};
+    if (entry.tool() >= kMaxTools) return bad(record.tick, "sample: tool out of range");
+    if (!read_pose(entry, input.sample.world_from_tool))
+      return bad(record.tick, "sample: pose not finite, beyond 2 m or not a unit rotation");
+    if (entry.verb() < 0 || entry.verb() >= scene::kVerbCount)
+      return bad(record.tick, "sample: unknown verb");
+    input.sample.verb = static_cast<scene::Verb>(entry.verb());
+    record.inputs.samples.push_back(input);
+  }
+  return {};
+}
+
+}  // namespace trocar::recording

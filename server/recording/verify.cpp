@@ -1,0 +1,151 @@
+#include "server/recording/verify.h"
+
+#include <algorithm>
+#include <map>
+
+#include "common/base/version.h"
+#include "common/journal/session_journal.h"
+#include "common/scene/organ_file.h"
+#include "common/wire/surface_codec.h"
+#include "server/recording/tick_records.h"
+#include "server/step/simulation.h"
+
+namespace trocar::recording {
+namespace {
+
+constexpr Tick kWindow = 1000;
+
+BytesView view(const std::string& bytes) { return bytes_of(std::string_view(bytes)); }
+
+class Verifier {
+ public:
+  Verifier(journal::SessionJournal& journal, scene::Organ organ, VerifyReport& report)
+      : journal_(journal), simulation_(std::move(organ)), report_(report) {
+    surface_.resize(simulation_.layout().vertex_count());
+  }
+
+  // Ticks [from, to].
+  void verify_window(Tick from, Tick to) {
+    snapshots_.clear();
+    note(journal_.read_snapshots(from, to, [&](Tick, const proto::WorldSnapshot& snapshot) {
+      snapshots_[snapshot.tick()] = snapshot;
+      return true;
+    }));
+    if (report_.is_resimulated) {
+      if (from == 0) start_from_snapshot(0);
+      note(journal_.read_tick_records(from, to, [&](Tick, const proto::TickRecord& message) {
+        verify_tick(message);
+        return report_.ok();
+      }));
+    }
+    note(journal_.read_surface_deltas(from, to, [&](Tick, const proto::SurfaceFrame& frame) {
+      verify_surface(frame);
+      return report_.ok();
+    }));
+    simulated_crcs_.clear();
+  }
+
+ private:
+  void mismatch(Tick tick, const char* what) {
+    if (report_.ok()) report_.first_mismatch = Mismatch{tick, what};
+  }
+  void note(const Status& read) {
+    if (!read.ok() && report_.container.find(read.error().message) == std::string::npos)
+      report_.container += "; " + read.error().message;
+  }
+
+  void start_from_snapshot(Tick tick) {
+    is_in_step_ = false;
+    const auto it = snapshots_.find(tick);
+    if (it == snapshots_.end()) return;
+    const auto state = view(it->second.state());
+    if (xxh3_64(state) != it->second.state_hash()) return mismatch(tick, "snapshot's own hash");
+    is_in_step_ = simulation_.restore_snapshot(state).ok() && simulation_.current_tick() == tick;
+    if (!is_in_step_) return mismatch(tick, "snapshot");
+    ++report_.snapshots_verified;
+  }
+
+  void verify_tick(const proto::TickRecord& message) {
+    const Tick tick = message.tick();
+    if (auto read = from_message(message, record_); !read) {
+      note(read);
+      return mismatch(tick, "tick record");
+    }
+    if (is_in_step_ && tick != simulation_.current_tick() + 1) is_in_step_ = false;
+    if (!is_in_step_) {
+      // Ticks are missing before this one: only a snapshot brings the simulation back in step.
+      ++report_.ticks_missing;
+      start_from_snapshot(tick);
+      return;
+    }
+    const auto& done = simulation_.tick(record_.inputs, record_.decisions);
+    if (done.state_hash != record_.state_hash) return mismatch(tick, "state hash");
+    ++report_.ticks_verified;
+    report_.last_hash = done.state_hash;
+    if (auto frame = simulation_.take_frame()) simulated_crcs_[tick] = frame->surface_crc;
+    if (const auto it = snapshots_.find(tick); it != snapshots_.end()) {
+      Bytes state;
+      simulation_.write_snapshot(state);
+      if (!std::ranges::equal(state, view(it->second.state()))) return mismatch(tick, "snapshot");
+      ++report_.snapshots_verified;
+    }
+  }
+
+  void verify_surface(const proto::SurfaceFrame& frame) {
+    if (frame.base_frame() != surface_frame_ || !has_surface_) {
+      const auto key = journal_.surface_key_before(Tick{frame.base_frame()} * kTicksPerFrame);
+      has_surface_ = key.ok() && key->has_value() && (*key)->frame() == frame.base_frame() &&
+                     wire::decode_keyframe(view((*key)->payload()), surface_).ok();
+      if (!has_surface_) return;  // in a gap: the next keyframe starts again
+    }
+    if (!wire::decode_delta(view(frame.payload()), surface_).ok())
+      return mismatch(frame.tick(), "surface delta");
+    surface_frame_ = frame.frame();
+    if (wire::surface_crc(surface_) != frame.surface_crc())
+      return mismatch(frame.tick(), "surface CRC");
+    const auto it = simulated_crcs_.find(frame.tick());
+    if (it != simulated_crcs_.end() && it->second != frame.surface_crc())
+      return mismatch(frame.tick(), "surface");
+    ++report_.surfaces_verified;
+  }
+
+  journal::SessionJournal& journal_;
+  step::Simulation simulation_;
+  VerifyReport& report_;
+  step::TickRecord record_;
+  bool is_in_step_ = false;
+  std::map<Tick, proto::WorldSnapshot> snapshots_;        // of the window
+  std::map<Tick, std::uint32_t> simulated_crcs_;          // of the window
+  wire::QuantisedSurface surface_;
+  Frame surface_frame_ = 0;
+  bool has_surface_ = false;
+};
+
+}  // namespace
+
+Result<VerifyReport> verify_journal(const std::string& path,
+                                    const std::function<void(Tick, Tick last)>& progress) {
+  auto journal = journal::SessionJournal::open(path);
+  if (!journal) return journal.error();
+  const auto& info = (*journal)->info();
+  auto message = (*journal)->organ();
+  if (!message) return message.error();
+  const std::string encoded = message->SerializeAsString();
+  auto organ = scene::decode_organ(view(encoded));
+  if (!organ) return Error{organ.error().code, path + ": /organ: " + organ.error().message};
+  if (scene::organ_hash(*organ) != info.organ_hash)
+    return Error{ErrorCode::BadFile, path + ": /organ is not the organ that the session names"};
+
+  VerifyReport report;
+  report.is_resimulated = info.sim_version == kSimVersion;
+  report.last_tick = info.last_tick;
+  report.container = info.summary;
+  Verifier verifier(**journal, std::move(*organ), report);
+  for (Tick from = 0; from <= info.last_tick && report.ok(); from += kWindow) {
+    verifier.verify_window(from, std::min(info.last_tick, from + kWindow - 1));
+    if (progress) progress(std::min(info.last_tick, from + kWindow - 1), info.last_tick);
+  }
+  return report;
+}
+
+}  // namespace trocar::recording

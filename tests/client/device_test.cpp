@@ -1,0 +1,188 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "client/device/mouse_tool.h"
+#include "client/render/camera.h"
+#include "client/render/smooth_surface.h"
+#include "tests/client/synthetic_source.h"
+
+namespace trocar {
+namespace {
+
+struct Blob {
+  std::vector<Vec3f> positions;
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+
+  Blob() {
+    const auto layout = testing::make_blob_layout(16, 24, 0.08);
+    for (const auto& q : layout.rest_quanta) positions.push_back(wire::to_metres(q));
+    for (const auto& t : layout.triangles)
+      triangles.push_back({t[0].value, t[1].value, t[2].value});
+  }
+};
+
+TEST(RayPick, FindsTheNearSideAndNotTheFar) {
+  const Blob blob;
+  const auto near = device::pick(blob.positions, blob.triangles, {0.013f, 0.011f, 1}, {0, 0, -1});
+  ASSERT_TRUE(near.has_value());
+  EXPECT_GT(*near, 0.88f);
+  EXPECT_LT(*near, 0.96f);
+  EXPECT_FALSE(device::pick(blob.positions, blob.triangles, {0.5f, 0, 1}, {0, 0, -1}));
+  EXPECT_FALSE(device::pick(blob.positions, blob.triangles, {0.013f, 0.011f, 1}, {0, 0, 1}));
+}
+
+TEST(Camera, ProjectsWhatItsRaysPassThrough) {
+  render::OrbitCamera camera;
+  camera.frame({0.01f, 0.02f, 0}, 0.15f);
+  const render::Size size{1280, 720};
+  std::mt19937 random(3);
+  std::uniform_real_distribution<float> any(0, 1);
+  for (int i = 0; i < 200; ++i) {
+    camera.orbit(any(random) - 0.5f, any(random) - 0.5f);
+    const float x = 1280 * any(random), y = 720 * any(random);
+    const auto view = camera.rays(size);
+    const auto at = camera.project(view.eye + view.ray_through(x, y) * (0.1f + any(random)), size);
+    ASSERT_TRUE(at.has_value());
+    EXPECT_NEAR(at->x, x, 0.05f);
+    EXPECT_NEAR(at->y, y, 0.05f);
+  }
+}
+
+class MouseToolTest : public ::testing::Test {
+ protected:
+  MouseToolTest() {
+    camera_.frame({}, 0.12f);
+    input_.x = 640, input_.y = 360;
+  }
+  void update(int times = 1) {
+    for (int i = 0; i < times; ++i)
+      tool_.update(input_, camera_.rays(size_), blob_.positions, blob_.triangles, 0.016f);
+  }
+  float depth() const {
+    const auto view = camera_.rays(size_);
+    return dot(tool_.current().world_from_tool.position - view.eye, view.forward);
+  }
+
+  Blob blob_;
+  render::OrbitCamera camera_;
+  render::Size size_{1280, 720};
+  device::PointerInput input_;
+  device::MouseTool tool_{scene::ToolShape{}};
+};
+
+TEST_F(MouseToolTest, HoversJustAboveTheSurfaceUnderThePointer) {
+  EXPECT_FALSE(tool_.take_due(1).has_value());
+  update();
+  const auto view = camera_.rays(size_);
+  const auto surface = device::pick(blob_.positions, blob_.triangles, view.eye,
+                                    view.ray_through(input_.x, input_.y));
+  ASSERT_TRUE(surface.has_value());
+  EXPECT_NEAR(depth(), *surface - 0.008f, 1e-4f);
+  EXPECT_EQ(tool_.current().verb, scene::Verb::None);
+  // The shaft leaves towards the person.
+  const Vec3f shaft = rotate(tool_.current().world_from_tool.orientation, {0, 0, 1});
+  EXPECT_LT(dot(shaft, view.forward), -0.5f);
+  EXPECT_GT(dot(shaft, view.up), 0.1f);
+}
+
+TEST_F(MouseToolTest, PushKeepsItsDepthUntilTheWheelTurns) {
+  update(10);
+  const float before = depth();
+  input_.left = true;
+  for (int i = 0; i < 30; ++i) {
+    input_.x += 5;
+    update();
+  }
+  EXPECT_EQ(tool_.current().verb, scene::Verb::Push);
+  EXPECT_NEAR(depth(), before, 1e-5f);
+  input_.wheel = 2;
+  update();
+  EXPECT_NEAR(depth(), before + 0.006f, 1e-5f);
+  input_.wheel = 0;
+  input_.left = false;
+  input_.grasp = true;
+  update();
+  EXPECT_EQ(tool_.current().verb, scene::Verb::Grasp);
+}
+
+TEST_F(MouseToolTest, TipStaysWhileTheCameraTurns) {
+  update(10);
+  const Vec3f tip = tool_.current().world_from_tool.position;
+  input_.right = true;
+  for (int i = 0; i < 20; ++i) {
+    input_.x += 10;
+    camera_.orbit(0.05f, 0);
+    update();
+  }
+  EXPECT_EQ(tool_.current().world_from_tool.position, tip);
+}
+
+TEST_F(MouseToolTest, SamplesAtMostEveryEightMillisecondsAndAtLeastEveryForty) {
+  std::uint64_t last = 0;
+  int moving = 0, still = 0;
+  for (std::uint64_t ms = 100; ms < 1100; ++ms) {
+    input_.x = 600 + static_cast<float>(ms % 100);
+    update();
+    if (tool_.take_due(ms * 1'000'000)) {
+      EXPECT_TRUE(last == 0 || ms - last >= 8);
+      last = ms;
+      ++moving;
+    }
+  }
+  EXPECT_NEAR(moving, 125, 2);
+  update(100);
+  for (std::uint64_t ms = 1100; ms < 2100; ++ms)
+    if (tool_.take_due(ms * 1'000'000)) {
+      EXPECT_LE(ms - last, 40u);
+      last = ms;
+      ++still;
+    }
+  EXPECT_NEAR(still, 25, 2);
+}
+
+TEST_F(MouseToolTest, NeverLeavesTheSpaceThatTheServerAccepts) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<float> any(-1, 1);
+  for (int i = 0; i < 3000; ++i) {
+    input_.x = 3000 * any(random), input_.y = 2000 * any(random);
+    input_.wheel = 20 * any(random);
+    input_.left = any(random) > 0, input_.grasp = any(random) > 0;
+    update();
+    const auto& sample = tool_.current();
+    ASSERT_LE(length(sample.world_from_tool.position), 2.0f);
+    ASSERT_NEAR(norm(sample.world_from_tool.orientation), 1.0f, 1e-3f);
+  }
+}
+
+TEST(SmoothSurface, KeepsTheServersVerticesAndRoundsWhatLiesBetween) {
+  const Blob blob;
+  render::SmoothSurface surface(blob.positions.size(), blob.triangles, 16 * blob.triangles.size());
+  surface.update(blob.positions);
+  EXPECT_EQ(surface.triangles().size(), 16 * blob.triangles.size());
+  // A closed surface of genus 0: V = F / 2 + 2.
+  EXPECT_EQ(surface.vertex_count(), surface.triangles().size() / 2 + 2);
+  for (std::size_t i = 0; i < blob.positions.size(); ++i)
+    ASSERT_EQ(surface.positions()[i], blob.positions[i]);
+  for (const Vec3f& n : surface.normals()) ASSERT_NEAR(length(n), 1.0f, 1e-4f);
+  for (const auto& triangle : surface.triangles())
+    for (const auto v : triangle) ASSERT_LT(v, surface.vertex_count());
+}
+
+TEST(SmoothSurface, MidpointsOfASphereLieNearerToItThanChords) {
+  std::vector<Vec3f> octahedron = {{1, 0, 0},  {-1, 0, 0}, {0, 1, 0},
+                                   {0, -1, 0}, {0, 0, 1},  {0, 0, -1}};
+  const std::vector<render::TriangleCorners> faces = {{0, 2, 4}, {2, 1, 4}, {1, 3, 4}, {3, 0, 4},
+                                                      {2, 0, 5}, {1, 2, 5}, {3, 1, 5}, {0, 3, 5}};
+  render::SmoothSurface surface(6, faces, 32);
+  surface.update(octahedron);
+  ASSERT_EQ(surface.vertex_count(), 18u);
+  for (std::size_t i = 6; i < 18; ++i) {
+    // The cubic through two unit normals a right angle apart; a chord's midpoint is at 0.707.
+    EXPECT_NEAR(length(surface.positions()[i]), 0.625f * std::sqrt(2.0f), 1e-5f);
+  }
+}
+
+}  // namespace
+}  // namespace trocar

@@ -1,0 +1,53 @@
+#!/bin/sh
+# run_conformance.sh WORK_FOLDER WRITER: writes journals with WRITER and reads them with @mcap/core.
+# Exit code 77: skipped, with the reason.
+set -eu
+source_folder=$(cd "$(dirname "$0")" && pwd)
+work_folder=$1
+writer=$2
+
+skip() {
+  echo "SKIPPED: $1"
+  echo "To run it: install Node.js 18 or newer with npm, and let npm reach a registry once"
+  echo "(it keeps the modules in $work_folder)."
+  exit 77
+}
+
+command -v node >/dev/null || skip "node is not installed"
+command -v npm >/dev/null || skip "npm is not installed"
+node -e 'process.exit(process.versions.node.split(".")[0] >= 18 ? 0 : 1)' || skip "node is older than 18"
+
+mkdir -p "$work_folder"
+cd "$work_folder"
+if ! cmp -s "$source_folder/package-lock.json" installed-lock.json; then
+  cp "$source_folder/package.json" "$source_folder/package-lock.json" "$source_folder/.npmrc" .
+  if ! npm ci --ignore-scripts --no-audit --no-fund >npm.log 2>&1; then
+    cat npm.log
+    if grep -qE 'ENOTFOUND|ECONN|ETIMEDOUT|EAI_AGAIN|ENETUNREACH|ENOTCACHED|network' npm.log; then
+      skip "npm cannot reach its registry"
+    fi
+    exit 1
+  fi
+  cp package-lock.json installed-lock.json
+fi
+
+rm -rf journals
+mkdir journals
+"$writer" journals
+for name in finished killed one_each empty; do
+  node "$source_folder/check_journal.mjs" "journals/$name.mcap" --modules .
+done
+
+# The check itself must be able to fail: one flipped bit in a chunk, one in the summary.
+size=$(wc -c <journals/finished.mcap)
+for at in 30000 $((size - 200)); do
+  node -e '
+    const fs = require("fs"), bytes = fs.readFileSync("journals/finished.mcap");
+    bytes[Number(process.argv[1])] ^= 1;
+    fs.writeFileSync("journals/damaged.mcap", bytes);' "$at"
+  if node "$source_folder/check_journal.mjs" journals/damaged.mcap --modules . 2>damaged.log; then
+    echo "a bit flipped at byte $at was not noticed"
+    exit 1
+  fi
+  echo "flipped bit noticed: $(cat damaged.log)"
+done

@@ -1,0 +1,241 @@
+// Who gets in, what a newcomer is given, and how refusals read.
+
+#include "common/base/version.h"
+#include "tests/network/session_fixture.h"
+
+namespace trocar::testing {
+namespace {
+
+using proto::Envelope;
+
+// Sends a Hello and returns the Goodbye that must come.
+proto::Goodbye refusal_of(LiveSession& session, const Envelope& hello) {
+  RawClient client(session.port());
+  EXPECT_TRUE(client.send(hello));
+  const auto goodbye = client.read_goodbye();
+  EXPECT_TRUE(goodbye.has_value());
+  return goodbye.value_or(proto::Goodbye());
+}
+
+TEST(Handshake, a_newcomer_gets_welcome_participants_topology_keyframe_then_deltas) {
+  LiveSession session;
+  session.publish(100);
+  const auto shown = session.publish(50);
+  RawClient client(session.port());
+  ASSERT_TRUE(client.send(make_hello("Anna", proto::ROLE_SURGEON)));
+
+  const auto welcome = client.receive();
+  ASSERT_TRUE(welcome && welcome->has_welcome());
+  EXPECT_EQ(welcome->welcome().protocol_major(), kProtocolMajor);
+  EXPECT_EQ(welcome->welcome().sim_version(), kSimVersion);
+  EXPECT_EQ(welcome->welcome().organ_hash(), 42u);
+  EXPECT_EQ(welcome->welcome().participant(), 0u);
+  EXPECT_EQ(welcome->welcome().tick_us(), 1000u);
+  EXPECT_EQ(welcome->welcome().ticks_per_frame(), 16u);
+
+  const auto participants = client.receive();
+  ASSERT_TRUE(participants && participants->has_participants());
+  ASSERT_EQ(participants->participants().participant_size(), 1);
+  EXPECT_EQ(participants->participants().participant(0).name(), "Anna");
+  EXPECT_EQ(participants->participants().participant(0).tool_size(), 1) << "one default tool";
+
+  const auto topology = client.receive();
+  ASSERT_TRUE(topology && topology->has_surface_topology());
+  const auto vertex_count = static_cast<int>(session.layout().vertex_count());
+  EXPECT_EQ(topology->surface_topology().rest_position_quanta_size(), 3 * vertex_count);
+  EXPECT_EQ(topology->surface_topology().triangle_size(),
+            3 * static_cast<int>(session.layout().triangles.size()));
+  EXPECT_EQ(topology->surface_topology().organ_name(), "lattice");
+
+  client.surface.resize(session.layout().vertex_count());
+  ASSERT_TRUE(client.follow());
+  EXPECT_TRUE(client.last_was_keyframe);
+  EXPECT_EQ(client.frame, shown->frame);
+  EXPECT_EQ(client.surface, shown->surface);
+  for (int i = 0; i < 20; ++i) {
+    const auto next = session.publish(30);
+    ASSERT_TRUE(client.follow());
+    EXPECT_FALSE(client.last_was_keyframe);
+    EXPECT_EQ(client.surface, next->surface);
+  }
+}
+
+TEST(Handshake, a_newcomer_before_the_first_frame_gets_a_keyframe_with_it) {
+  LiveSession session;
+  RawClient client(session.port());
+  ASSERT_TRUE(client.join("Anna", proto::ROLE_OBSERVER));
+  client.surface.resize(session.layout().vertex_count());
+  session.publish(10);
+  ASSERT_TRUE(client.follow());
+  EXPECT_TRUE(client.last_was_keyframe);
+}
+
+TEST(Handshake, another_major_version_is_refused_and_told_both) {
+  LiveSession session;
+  auto hello = make_hello("Anna", proto::ROLE_SURGEON);
+  hello.mutable_hello()->set_protocol_major(kProtocolMajor + 1);
+  const auto goodbye = refusal_of(session, hello);
+  EXPECT_EQ(goodbye.reason(), proto::GOODBYE_VERSION);
+  EXPECT_NE(goodbye.text().find("protocol 1.0"), std::string::npos) << goodbye.text();
+}
+
+TEST(Handshake, a_newer_minor_version_is_welcome_and_its_unknown_messages_ignored) {
+  LiveSession session;
+  session.publish(1);
+  auto hello = make_hello("Anna", proto::ROLE_SURGEON);
+  hello.mutable_hello()->set_protocol_minor(kProtocolMinor + 7);
+  RawClient client(session.port());
+  ASSERT_TRUE(client.send(hello));
+  ASSERT_TRUE(client.receive(Envelope::kSurfaceTopology));
+  // Field 99, length-delimited, 2 bytes: a message that does not exist yet.
+  const Bytes unknown{5, 0, 0, 0, 0x9a, 0x06, 2, 1, 2};
+  ASSERT_TRUE(client.send_bytes(unknown));
+  Envelope ping;
+  ping.mutable_ping()->set_client_time_us(77);
+  ASSERT_TRUE(client.send(ping));
+  const auto pong = client.receive(Envelope::kPong);
+  ASSERT_TRUE(pong);
+  EXPECT_EQ(pong->pong().client_time_us(), 77u);
+}
+
+TEST(Handshake, a_taken_name_is_refused_and_free_again_after_leaving) {
+  LiveSession session;
+  {
+    RawClient first(session.port());
+    ASSERT_TRUE(first.join("Anna", proto::ROLE_SURGEON));
+    const auto goodbye = refusal_of(session, make_hello("Anna", proto::ROLE_OBSERVER));
+    EXPECT_EQ(goodbye.reason(), proto::GOODBYE_NAME_TAKEN);
+    EXPECT_NE(goodbye.text().find("Anna"), std::string::npos);
+  }
+  ASSERT_TRUE(session.wait_for_sessions(0));
+  RawClient again(session.port());
+  EXPECT_TRUE(again.join("Anna", proto::ROLE_OBSERVER));
+}
+
+TEST(Handshake, roles_outside_the_list_and_watchers_with_tools_are_refused) {
+  LiveSession session;
+  for (const int role : {0, 5, 99, -1}) {
+    const auto goodbye = refusal_of(session, make_hello("Anna", static_cast<proto::Role>(role)));
+    EXPECT_EQ(goodbye.reason(), proto::GOODBYE_ROLE) << role;
+  }
+  auto hello = make_hello("Anna", proto::ROLE_OBSERVER);
+  hello.mutable_hello()->add_tool()->set_radius_m(0.005f);
+  EXPECT_EQ(refusal_of(session, hello).reason(), proto::GOODBYE_ROLE);
+}
+
+TEST(Handshake, names_that_are_not_1_to_32_bytes_of_printable_utf8_are_refused) {
+  LiveSession session;
+  const std::string override_rtl = "\xe2\x80\xae";
+  for (const std::string& name :
+       {std::string(), std::string(33, 'a'), std::string("a\nb"), std::string("a\0b", 3),
+        std::string("\x7f"), std::string("\xc2\x85"), override_rtl + "evil", std::string(" a"),
+        std::string("a "), std::string("\xef\xbb\xbf"), std::string("\xf4\x8f\xbf\xbf")})
+    EXPECT_EQ(refusal_of(session, make_hello(name, proto::ROLE_SURGEON)).reason(),
+              proto::GOODBYE_PROTOCOL_ERROR)
+        << ::testing::PrintToString(name);
+  for (const std::string& name :
+       {std::string(32, 'a'), std::string("\xc3\x96zlem \xe6\x9d\x8e"), std::string("x")}) {
+    RawClient client(session.port());
+    EXPECT_TRUE(client.join(name, proto::ROLE_OBSERVER)) << name;
+  }
+}
+
+TEST(Handshake, tools_out_of_range_or_too_many_are_refused) {
+  LiveSession session;
+  const auto with_tool = [](float radius, float length, float reach) {
+    auto hello = make_hello("Anna", proto::ROLE_SURGEON);
+    auto& tool = *hello.mutable_hello()->add_tool();
+    tool.set_radius_m(radius);
+    tool.set_length_m(length);
+    tool.set_reach_m(reach);
+    return hello;
+  };
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const float inf = std::numeric_limits<float>::infinity();
+  for (const auto& hello :
+       {with_tool(0, 0.3f, 0.01f), with_tool(0.06f, 0.3f, 0.01f), with_tool(nan, 0.3f, 0.01f),
+        with_tool(0.005f, inf, 0.01f), with_tool(0.005f, -1, 0.01f), with_tool(0.005f, 0.3f, nan),
+        with_tool(0.005f, 0.3f, 1)})
+    EXPECT_EQ(refusal_of(session, hello).reason(), proto::GOODBYE_PROTOCOL_ERROR);
+  auto three = with_tool(0.005f, 0.3f, 0.01f);
+  for (int i = 0; i < 2; ++i) *three.mutable_hello()->add_tool() = three.hello().tool(0);
+  EXPECT_EQ(refusal_of(session, three).reason(), proto::GOODBYE_PROTOCOL_ERROR);
+  RawClient client(session.port());
+  ASSERT_TRUE(client.send(with_tool(0.004f, 0.25f, 0.012f)));
+  EXPECT_TRUE(client.receive(Envelope::kWelcome));
+}
+
+TEST(Handshake, the_seventeenth_hand_is_told_full_and_may_still_watch) {
+  LiveSession session;
+  std::vector<std::unique_ptr<RawClient>> hands;
+  for (int i = 0; i < kMaxHands; ++i) {
+    hands.push_back(std::make_unique<RawClient>(session.port()));
+    ASSERT_TRUE(hands.back()->join("hand " + std::to_string(i),
+                                   i % 2 ? proto::ROLE_ASSISTANT : proto::ROLE_SURGEON));
+  }
+  EXPECT_EQ(refusal_of(session, make_hello("late", proto::ROLE_SURGEON)).reason(),
+            proto::GOODBYE_FULL);
+  RawClient watcher(session.port());
+  EXPECT_TRUE(watcher.join("late", proto::ROLE_OBSERVER));
+  session::TickInputs inputs;
+  session.inbox.drain(inputs);
+  EXPECT_EQ(inputs.joins.size(), static_cast<std::size_t>(kMaxHands));
+  EXPECT_TRUE(inputs.leaves.empty());
+}
+
+TEST(Handshake, connections_beyond_the_limit_are_closed_at_once_and_counted) {
+  net::TcpServerOptions tcp;
+  tcp.max_connections = 2;
+  LiveSession session(tcp);
+  RawClient first(session.port()), second(session.port());
+  ASSERT_TRUE(first.join("a", proto::ROLE_SURGEON));
+  ASSERT_TRUE(second.join("b", proto::ROLE_SURGEON));
+  RawClient third(session.port());
+  EXPECT_TRUE(third.reads_to_end());
+  EXPECT_EQ(session.on_io([&] { return session.tcp().counters().rejected_full; }), 1u);
+  EXPECT_EQ(session.sessions(), 2u);
+}
+
+TEST(Handshake, silence_ends_with_timeout_before_and_after_hello) {
+  net::TcpServerOptions tcp;
+  tcp.hello_deadline = std::chrono::milliseconds(200);
+  tcp.idle_deadline = std::chrono::milliseconds(400);
+  LiveSession session(tcp);
+  RawClient mute(session.port());
+  const auto first = mute.read_goodbye();
+  ASSERT_TRUE(first);
+  EXPECT_EQ(first->reason(), proto::GOODBYE_TIMEOUT);
+  RawClient sleepy(session.port());
+  ASSERT_TRUE(sleepy.join("sleepy", proto::ROLE_SURGEON));
+  const auto second = sleepy.read_goodbye();
+  ASSERT_TRUE(second);
+  EXPECT_EQ(second->reason(), proto::GOODBYE_TIMEOUT);
+}
+
+TEST(Handshake, everybody_learns_who_comes_and_goes) {
+  LiveSession session;
+  RawClient anna(session.port());
+  ASSERT_TRUE(anna.join("Anna", proto::ROLE_SURGEON));
+  {
+    RawClient ben(session.port());
+    ASSERT_TRUE(ben.join("Ben", proto::ROLE_ASSISTANT));
+    Envelope list;
+    do {
+      const auto next = anna.receive(Envelope::kParticipants);
+      ASSERT_TRUE(next);
+      list = *next;
+    } while (list.participants().participant_size() != 2);
+    EXPECT_EQ(list.participants().participant(1).name(), "Ben");
+    EXPECT_EQ(list.participants().participant(1).role(), proto::ROLE_ASSISTANT);
+    Envelope bye;
+    bye.mutable_bye()->set_reason("done");
+    ASSERT_TRUE(ben.send(bye));
+    EXPECT_TRUE(ben.reads_to_end());
+  }
+  const auto after = anna.receive(Envelope::kParticipants);
+  ASSERT_TRUE(after);
+  EXPECT_EQ(after->participants().participant_size(), 1);
+}
+
+}  // namespace
+}  // namespace trocar::testing

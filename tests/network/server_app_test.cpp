@@ -1,0 +1,305 @@
+// The server program's parts: pacing, the simulation loop's frames and records, the command line,
+// and one run of the whole program as a process.
+
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "server/app/options.h"
+#include "server/app/pacer.h"
+#include "server/app/simulation_loop.h"
+#include "tests/network/session_fixture.h"
+
+namespace trocar::testing {
+namespace {
+
+TEST(Pacer, on_time_ticks_are_a_millisecond_apart_and_never_slow) {
+  app::Pacer pacer(5'000'000);
+  for (std::uint64_t i = 0; i < 1000; ++i) {
+    EXPECT_EQ(pacer.due_ns(), 5'000'000 + i * kTickNanoseconds);
+    pacer.begin_tick(pacer.due_ns() + 100'000);
+  }
+  EXPECT_EQ(pacer.slow_ticks(), 0u);
+}
+
+TEST(Pacer, after_a_stall_two_ticks_run_back_to_back_and_the_rest_is_given_up) {
+  app::Pacer pacer(0);
+  pacer.begin_tick(0);
+  const std::uint64_t late = 50 * kTickNanoseconds;  // ticks 1 to 50 are due
+  int at_once = 0;
+  while (pacer.due_ns() <= late) {
+    pacer.begin_tick(late);
+    ++at_once;
+  }
+  EXPECT_EQ(at_once, 2);
+  EXPECT_EQ(pacer.slow_ticks(), 48u);
+  EXPECT_EQ(pacer.due_ns(), late + kTickNanoseconds);
+}
+
+TEST(Pacer, random_stalls_keep_the_books) {
+  for (unsigned seed = 0; seed < 100; ++seed) {
+    std::mt19937 random(seed);
+    app::Pacer pacer(0);
+    std::uint64_t now = 0, ticks = 0;
+    int burst = 0;
+    for (int i = 0; i < 2000; ++i) {
+      burst = now >= pacer.due_ns() && i > 0 ? burst : 0;
+      now = std::max(now, pacer.due_ns());
+      pacer.begin_tick(now);
+      ++ticks;
+      // Ticks and given-up ticks together are the milliseconds that have passed.
+      EXPECT_EQ(pacer.due_ns(), (ticks + pacer.slow_ticks()) * kTickNanoseconds);
+      EXPECT_LE(now, pacer.due_ns() + kTickNanoseconds) << "more than one tick left to catch up";
+      now += random() % 5 == 0 ? random() % (20 * kTickNanoseconds) : random() % 900'000;
+    }
+  }
+}
+
+TEST(DurationHistogram, quantiles_within_two_per_cent) {
+  std::mt19937 random(1);
+  std::vector<std::uint64_t> values;
+  replication::DurationHistogram histogram;
+  for (int i = 0; i < 20'000; ++i) {
+    const std::uint64_t value = (1ull << random() % 30) + random() % 1000;
+    values.push_back(value);
+    histogram.add(value);
+  }
+  std::sort(values.begin(), values.end());
+  for (const double share : {0.01, 0.5, 0.9, 0.99, 1.0}) {
+    const auto rank = static_cast<std::size_t>(share * 20'000) - 1;
+    const double exact_us = static_cast<double>(values[rank]) / 1e3;
+    EXPECT_NEAR(histogram.quantile_us(share), exact_us, 0.02 * exact_us) << share;
+  }
+  EXPECT_EQ(replication::DurationHistogram().quantile_us(0.5), 0.0);
+}
+
+// A journal that only keeps what it was given.
+struct KeepingSink final : app::JournalSink {
+  void take_frame(const step::SharedFrame& frame) override { frames.push_back(frame); }
+  void take_participants(const std::vector<session::Participant>&, Tick) override {}
+  Status close() override { return {}; }
+  std::vector<step::SharedFrame> frames;
+};
+
+TEST(SimulationLoop, its_records_and_snapshot_simulate_the_session_again) {
+  const auto organ = *scene::make_lattice({8, 5, 8, 0.01});
+  step::Simulation simulation(organ);
+  session::SimulationInbox inbox;
+  app::FrameHandover handover([] {});
+  KeepingSink sink;
+  app::SimulationLoop loop(simulation, inbox, handover, &sink, {.tick_count = 500}, [] {});
+  std::mt19937 random(3);
+  Tick tick = 0;
+  bool is_last = false;
+  while (!is_last) {
+    ++tick;
+    ASSERT_TRUE(tick != 5 || inbox.try_push_join({{0}, 1, {}}));
+    if (tick == 400) inbox.push_leave({0});
+    if (tick > 5 && tick < 400) {
+      session::ToolInput input{{0}, {}};
+      const auto sway = static_cast<float>(random() % 100) * 1e-5f;
+      input.sample.world_from_tool = {{0.005f + sway, 0.018f, 0.005f}, rotation_from_z({0, 1, 0})};
+      input.sample.verb = scene::Verb::Push;
+      inbox.push_sample(input);
+    }
+    is_last = loop.run_tick();
+  }
+  EXPECT_EQ(tick, 512u) << "ends with a published frame";
+  ASSERT_EQ(sink.frames.size(), 512u / kTicksPerFrame);
+  ASSERT_TRUE(sink.frames[0]->snapshot);
+  EXPECT_EQ(sink.frames[0]->snapshot_tick, 0u);
+  EXPECT_EQ(loop.report().last_frame, sink.frames.back());
+  EXPECT_GT(loop.report().max_active_nodes, 0u) << "the tool touched nothing";
+
+  step::Simulation again(organ);
+  ASSERT_TRUE(again.restore_snapshot(*sink.frames[0]->snapshot).ok());
+  Tick expected = 0;
+  for (const auto& frame : sink.frames) {
+    ASSERT_EQ(frame->records.size(), kTicksPerFrame);
+    for (const auto& record : frame->records) {
+      EXPECT_EQ(record.tick, ++expected);
+      ASSERT_EQ(again.tick(record.inputs, record.decisions).state_hash, record.state_hash)
+          << "tick " << record.tick;
+    }
+    EXPECT_EQ(frame->state_hash, frame->records.back().state_hash);
+    EXPECT_EQ(again.take_frame()->surface_crc, frame->surface_crc);
+  }
+  std::vector<step::SharedFrame> handed;
+  handover.take_all(handed);
+  EXPECT_EQ(handed, sink.frames);
+}
+
+TEST(SimulationLoop, a_later_snapshot_restores_to_the_hashes_that_follow) {
+  const auto organ = *scene::make_lattice({4, 3, 4, 0.01});
+  step::Simulation simulation(organ);
+  session::SimulationInbox inbox;
+  app::FrameHandover handover([] {});
+  KeepingSink sink;
+  app::SimulationLoop loop(simulation, inbox, handover, &sink, {.tick_count = 10'100}, [] {});
+  while (!loop.run_tick()) {
+  }
+  const step::PublishedFrame* with_snapshot = nullptr;
+  for (const auto& frame : sink.frames)
+    if (frame->snapshot) with_snapshot = frame.get();
+  ASSERT_TRUE(with_snapshot);
+  EXPECT_EQ(with_snapshot->snapshot_tick, 10'008u);
+  step::Simulation again(organ);
+  ASSERT_TRUE(again.restore_snapshot(*with_snapshot->snapshot).ok());
+  for (const auto& record : with_snapshot->records) {
+    if (record.tick < with_snapshot->snapshot_tick) continue;
+    const auto hash = record.tick == with_snapshot->snapshot_tick
+                          ? again.state_hash()
+                          : again.tick(record.inputs, record.decisions).state_hash;
+    EXPECT_EQ(hash, record.state_hash) << record.tick;
+  }
+}
+
+TEST(CommandLine, listen_addresses) {
+  app::ServerOptions options;
+  ASSERT_TRUE(app::parse_listen_address("0.0.0.0:0", options).ok());
+  EXPECT_EQ(options.address, "0.0.0.0");
+  EXPECT_EQ(options.port, 0);
+  ASSERT_TRUE(app::parse_listen_address("[::1]:7690", options).ok());
+  EXPECT_EQ(options.address, "::1");
+  for (const char* text : {"", "7690", ":7690", "127.0.0.1", "127.0.0.1:", "127.0.0.1:65536",
+                           "127.0.0.1:-1", "127.0.0.1:80x"})
+    EXPECT_FALSE(app::parse_listen_address(text, options).ok()) << text;
+}
+
+class ServerProcess : public ::testing::Test {
+ protected:
+  // Starts the program and waits for its port.
+  std::uint16_t start(std::vector<std::string> arguments) {
+    folder_ =
+        std::filesystem::temp_directory_path() / ("trocar_server_" + std::to_string(::getpid()));
+    std::filesystem::create_directories(folder_);
+    const auto ready = folder_ / "port";
+    for (const std::string& more :
+         {std::string("--listen"), std::string("127.0.0.1:0"), std::string("--journal"),
+          std::string("none"), std::string("--organ"), std::string("lattice"),
+          std::string("--log-level"), std::string("off"), std::string("--ready-file"),
+          ready.string(), std::string("--summary"), (folder_ / "summary.json").string()})
+      arguments.push_back(more);
+    std::vector<char*> argv;
+    const std::string program = TROCAR_BINARY_DIR "/trocar-server";
+    argv.push_back(const_cast<char*>(program.c_str()));
+    for (auto& argument : arguments) argv.push_back(argument.data());
+    argv.push_back(nullptr);
+    pid_ = ::fork();
+    if (pid_ == 0) {
+      ::execv(program.c_str(), argv.data());
+      ::_exit(127);
+    }
+    for (int i = 0; i < 2000 && !std::filesystem::exists(ready); ++i)
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    std::ifstream in(ready);
+    std::uint16_t port = 0;
+    in >> port;
+    return port;
+  }
+  int wait_for_exit() {
+    int status = 0;
+    ::waitpid(pid_, &status, 0);
+    pid_ = 0;
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  }
+  std::string summary() const {
+    std::ifstream in(folder_ / "summary.json");
+    std::stringstream text;
+    text << in.rdbuf();
+    return text.str();
+  }
+  void TearDown() override {
+    if (pid_ > 0) {
+      ::kill(pid_, SIGKILL);
+      ::waitpid(pid_, nullptr, 0);
+    }
+    std::filesystem::remove_all(folder_);
+  }
+
+  std::filesystem::path folder_;
+  pid_t pid_ = 0;
+};
+
+TEST_F(ServerProcess, sigterm_asks_for_the_crc_says_goodbye_and_exits_with_0) {
+  const auto port = start({});
+  ASSERT_NE(port, 0);
+  RawClient client(port);
+  ASSERT_TRUE(client.send(make_hello("Anna", proto::ROLE_SURGEON)));
+  const auto topology = client.receive(proto::Envelope::kSurfaceTopology);
+  ASSERT_TRUE(topology);
+  const auto vertices = topology->surface_topology().rest_position_quanta_size() / 3;
+  client.surface.resize(static_cast<std::size_t>(vertices));
+  // Press 4 mm into the top of the block (its top is at y = 70 mm) and follow for half a second.
+  for (std::uint32_t i = 1; i <= 30; ++i) {
+    auto sample = make_sample(i);
+    sample.mutable_tool_sample()->mutable_position_m()->set_x(0.005f);
+    sample.mutable_tool_sample()->mutable_position_m()->set_y(0.066f);
+    sample.mutable_tool_sample()->mutable_position_m()->set_z(0.005f);
+    *sample.mutable_tool_sample()->mutable_orientation() = [] {
+      proto::Quat along_y;  // the shaft's +z turned to +y
+      along_y.set_x(-0.70710678f);
+      along_y.set_w(0.70710678f);
+      return along_y;
+    }();
+    ASSERT_TRUE(client.send(sample));
+    ASSERT_TRUE(client.follow());
+  }
+  EXPECT_NE(client.surface, wire::QuantisedSurface(client.surface.size())) << "nothing moved";
+  ::kill(pid_, SIGTERM);
+  std::optional<proto::Goodbye> goodbye;
+  while (auto message = client.receive()) {
+    if (message->has_goodbye()) goodbye = message->goodbye();
+    if (!message->has_surface_frame() && !message->has_barrier()) continue;
+    if (message->has_barrier()) {
+      proto::Envelope ack;
+      ack.mutable_frame_ack()->set_frame(message->barrier().frame());
+      ack.mutable_frame_ack()->set_surface_crc(wire::surface_crc(client.surface));
+      ASSERT_TRUE(client.send(ack));
+    } else {
+      const auto& payload = message->surface_frame().payload();
+      ASSERT_TRUE(wire::decode_delta(
+                      {reinterpret_cast<const std::uint8_t*>(payload.data()), payload.size()},
+                      client.surface)
+                      .ok());
+    }
+  }
+  ASSERT_TRUE(goodbye);
+  EXPECT_EQ(goodbye->reason(), proto::GOODBYE_SERVER_CLOSING);
+  EXPECT_EQ(wait_for_exit(), 0);
+  EXPECT_NE(summary().find("\"all_replicas_equal\": true"), std::string::npos) << summary();
+  EXPECT_NE(summary().find("\"name\": \"Anna\""), std::string::npos) << summary();
+}
+
+TEST_F(ServerProcess, seconds_end_by_themselves_and_a_taken_port_is_exit_code_5) {
+  const auto port = start({"--seconds", "0.5"});
+  ASSERT_NE(port, 0);
+  const std::string second = TROCAR_BINARY_DIR
+                             "/trocar-server --organ lattice --journal none "
+                             "--listen 127.0.0.1:" +
+                             std::to_string(port) + " 2>/dev/null";
+  EXPECT_EQ(WEXITSTATUS(std::system(second.c_str())), 5);
+  EXPECT_EQ(wait_for_exit(), 0);
+  EXPECT_NE(summary().find("\"last_tick\": 512"), std::string::npos) << summary();
+}
+
+TEST(ServerProgram, wrong_options_are_2_and_unusable_organs_3) {
+  const auto exit_code_of = [](const std::string& arguments) {
+    const auto command = TROCAR_BINARY_DIR "/trocar-server " + arguments + " >/dev/null 2>&1";
+    return WEXITSTATUS(std::system(command.c_str()));
+  };
+  EXPECT_EQ(exit_code_of("--help"), 0);
+  EXPECT_EQ(exit_code_of("--version"), 0);
+  EXPECT_EQ(exit_code_of("--no-such-option"), 2);
+  EXPECT_EQ(exit_code_of("--omega 3"), 2);
+  EXPECT_EQ(exit_code_of("--listen nowhere"), 2);
+  EXPECT_EQ(exit_code_of("--log-level loud --organ lattice"), 2);
+  EXPECT_EQ(exit_code_of("--organ /no/such/file.organ"), 3);
+}
+
+}  // namespace
+}  // namespace trocar::testing
