@@ -1,5 +1,6 @@
 # ctest's JUnit report as lines "passed|failed|skipped <tab> name[: reason]".
-# A skipped GoogleTest prints the reason on the lines between "Skipped" and "[  SKIPPED ]".
+# A skipped GoogleTest prints the reason on the lines between "Skipped" and "[  SKIPPED ]"; a script
+# prints "SKIPPED: reason".
 function unescape(s) {
   gsub(/&lt;/, "<", s); gsub(/&gt;/, ">", s); gsub(/&quot;/, "\"", s); gsub(/&amp;/, "\\&", s)
   return s
@@ -17,6 +18,7 @@ function unescape(s) {
 /\[  SKIPPED \]/ { in_reason = 0 }
 in_reason && reason == "" && NF { reason = $0 }
 /: Skipped$/ { in_reason = 1 }
+/SKIPPED: / && reason == "" { reason = $0; sub(/.*SKIPPED: /, "", reason) }
 /<\/testcase>/ {
   if (kind == "skipped") why = reason == "" ? "no reason given" : reason
   printf "%s\t%s%s\n", kind, unescape(name), why == "" ? "" : ": " unescape(why)
