@@ -1,0 +1,65 @@
+#pragma once
+
+// The real programs as child processes, in a folder of their own.
+
+#include <sys/types.h>
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace trocar::e2e {
+
+// A running program; killed when it goes out of scope.
+class Program {
+ public:
+  // `name` in build/<preset>/bin; output goes to `log`.
+  Program(const std::string& name, const std::vector<std::string>& arguments,
+          const std::filesystem::path& log);
+  Program(Program&& other) noexcept;
+  Program& operator=(Program&&) = delete;
+  ~Program();
+
+  void signal(int number) const;
+  // Exit code, 128 + signal if one ended it, or -1 after `seconds`.
+  int wait(double seconds);
+  bool is_running();
+
+ private:
+  pid_t pid_ = -1;
+  int status_ = 0;
+  bool has_ended_ = false;
+};
+
+// A folder for one test, empty, named after it.
+std::filesystem::path test_folder();
+std::string read_text(const std::filesystem::path& file);
+// The value of `"key": value` in a JSON text: number, true/false or string without its quotes.
+std::string json_value(const std::string& json, const std::string& key);
+double json_number(const std::string& json, const std::string& key);
+bool wait_for_file(const std::filesystem::path& file, double seconds);
+
+// A server on a free port and clients of it, all logging into test_folder().
+class Session {
+ public:
+  explicit Session(const std::string& organ, const std::vector<std::string>& extra = {});
+
+  Program& server() { return server_; }
+  // Extra arguments are appended; every client writes <name>.json at its end.
+  Program client(const std::string& name, const std::string& role,
+                 const std::vector<std::string>& extra = {});
+  // A client that plays a script of deploy/scenes or of `folder`.
+  Program hand(const std::string& name, const std::filesystem::path& script);
+  std::string summary_of(const std::string& name) const {
+    return read_text(folder / (name + ".json"));
+  }
+
+  std::filesystem::path folder = test_folder();
+  std::filesystem::path journal = folder / "session.mcap";
+
+ private:
+  Program server_;
+  std::string address_;
+};
+
+}  // namespace trocar::e2e
