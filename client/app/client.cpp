@@ -104,7 +104,7 @@ Status Run::write_summary() const {
   if (options_.summary_file.empty()) return {};
   ClientSummary summary;
   summary.name = options_.name;
-  summary.role = replica::name_of(options_.role);
+  summary.role = source_.playback() != nullptr ? "replay" : replica::name_of(options_.role);
   summary.exit_reason = exit_reason_;
   summary.wall_seconds = static_cast<double>(monotonic_ns() - start_ns_) * 1e-9;
   summary.pictures = picture_ ? picture_->count() : 0;
