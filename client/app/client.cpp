@@ -9,6 +9,7 @@
 #include "client/app/client_summary.h"
 #include "client/app/picture.h"
 #include "client/net/net_source.h"
+#include "client/replay/replay_source.h"
 #include "common/base/log.h"
 #include "common/base/timing.h"
 #include "common/scene/script.h"
@@ -103,7 +104,7 @@ Status Run::write_summary() const {
   if (options_.summary_file.empty()) return {};
   ClientSummary summary;
   summary.name = options_.name;
-  summary.role = replica::name_of(options_.role);
+  summary.role = source_.playback() != nullptr ? "replay" : replica::name_of(options_.role);
   summary.exit_reason = exit_reason_;
   summary.wall_seconds = static_cast<double>(monotonic_ns() - start_ns_) * 1e-9;
   summary.pictures = picture_ ? picture_->count() : 0;
@@ -184,9 +185,12 @@ Result<ExitCode> run_with_source(const ClientOptions& options, replica::SessionS
 }
 
 Result<ExitCode> run_client(const ClientOptions& options) {
-  if (!options.replay_file.empty())
-    return Error{ErrorCode::Usage, "--replay: this build cannot read journals"};
   Hands hands;
+  if (!options.replay_file.empty()) {
+    auto source = replay::ReplaySource::open(options.replay_file);
+    if (!source) return source.error();
+    return run_with_source(options, **source, hands);
+  }
   if (!options.script_file.empty()) {
     auto script = scene::parse_script(options.script_file);
     if (!script) return script.error();

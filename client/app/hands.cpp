@@ -1,6 +1,6 @@
 #include "client/app/hands.h"
 
-#include "proto/wire.pb.h"
+#include "client/replica/tool_messages.h"
 
 namespace trocar::app {
 
@@ -24,20 +24,8 @@ std::vector<scene::ToolShape> Hands::shapes() const {
 
 void Hands::send(replica::SessionSource& source, std::uint32_t tool,
                  const scene::ToolSample& sample) {
-  proto::Envelope envelope;
-  auto& message = *envelope.mutable_tool_sample();
-  message.set_tool(tool);
-  message.set_sequence(++sequence_);
-  const Pose& pose = sample.world_from_tool;
-  message.mutable_position_m()->set_x(pose.position.x);
-  message.mutable_position_m()->set_y(pose.position.y);
-  message.mutable_position_m()->set_z(pose.position.z);
-  message.mutable_orientation()->set_x(pose.orientation.x);
-  message.mutable_orientation()->set_y(pose.orientation.y);
-  message.mutable_orientation()->set_z(pose.orientation.z);
-  message.mutable_orientation()->set_w(pose.orientation.w);
-  message.set_verb(static_cast<proto::Verb>(sample.verb));
-  source.send(envelope);  // dropped when the queue is full: the next sample says more
+  // Dropped when the queue is full: the next sample says more.
+  replica::send_tool_sample(source, tool, ++sequence_, sample);
 }
 
 Status Hands::send_due(const replica::Replica& replica, replica::SessionSource& source,

@@ -10,6 +10,8 @@
 namespace trocar::app {
 namespace {
 
+constexpr std::uint64_t kHelpNs = 20'000'000'000;  // at the start
+
 const replica::Participant* owner_of(const replica::Replica& replica, ToolSlot slot) {
   return replica.find_participant(slot.owner());
 }
@@ -200,7 +202,10 @@ ui::HudModel Picture::hud_model(const replica::Replica& replica, replica::Sessio
 
 void Picture::act(const ui::HudActions& actions, const replica::Replica& replica,
                   replica::SessionSource& source) {
-  if (actions.toggle_help) shows_help_ = !shows_help_;
+  if (actions.toggle_help) {
+    shows_help_ = !shows_help_;
+    help_until_ns_ = 0;
+  }
   if (actions.toggle_regions) shows_regions_ = !shows_regions_;
   if (actions.reset_camera) frame_camera(replica);
   if (actions.screenshot) wants_screenshot_ = true;
@@ -219,7 +224,14 @@ void Picture::draw(const replica::Replica& replica, replica::SessionSource& sour
   last_ns_ = now_ns;
   measure(replica, now_ns);
   surface_.update(replica, now_ns);
-  if (surface_.is_valid() && framed_topology_ != replica.topology_version()) frame_camera(replica);
+  if (surface_.is_valid() && framed_topology_ != replica.topology_version()) {
+    if (framed_topology_ == 0 && shows_help_) help_until_ns_ = now_ns + kHelpNs;
+    frame_camera(replica);
+  }
+  if (help_until_ns_ != 0 && now_ns > help_until_ns_) {
+    shows_help_ = false;
+    help_until_ns_ = 0;
+  }
   context_->poll_events();
   hud_.begin_frame(seconds);
   const device::PointerInput input = hud_.input();

@@ -52,6 +52,7 @@ class Picture {
   replica::InterpolatedSurface surface_;
   std::uint64_t framed_topology_ = 0;
   std::uint64_t last_ns_ = 0, count_ = 0;
+  std::uint64_t help_until_ns_ = 0;  // shown at first, then until asked for; 0: as the person wants
   bool shows_help_ = false, shows_regions_ = true, wants_screenshot_ = false;
   Rate rate_;
   render::SceneView scene_;  // of the last picture; its spans need the replica

@@ -92,7 +92,7 @@ void main() {
   vec4 fine = texture(noise, rest_position * 58.0 + 0.37);
 #else
   vec4 coarse = texture(noise, rest_position * 24.0);
-  vec4 fine = coarse;
+  vec4 fine = mix(vec4(0.5), coarse, 0.3);
 #endif
   vec3 n = normalize(world_normal);
   n = normalize(n + 0.10 * (coarse.rgb - 0.5) + 0.10 * (fine.rgb - 0.5));

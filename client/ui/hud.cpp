@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <utility>
 
 #include "client/render/gl.h"
 #include "client/ui/hud_panels.h"
@@ -18,6 +19,16 @@ namespace {
 constexpr const char* kFont = "/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf";
 constexpr const char* kBoldFont = "/usr/share/fonts/truetype/dejavu/DejaVuSans-Bold.ttf";
 constexpr float kFontPixels = 14.0f;
+
+// Keys that went down since the last picture. Dear ImGui samples keys once per picture and would
+// miss a short press at a low rate. GLFW callbacks carry no context of ours, and there is one Hud.
+std::vector<int>& pressed_keys() {
+  static std::vector<int> keys;
+  return keys;
+}
+void remember_key(GLFWwindow*, int key, int, int action, int) {
+  if (action == GLFW_PRESS) pressed_keys().push_back(key);
+}
 
 void set_style(float scale) {
   ImGui::StyleColorsDark();
@@ -57,6 +68,7 @@ Hud::Hud(render::GlContext& context) : context_(context) {
     float x = 1, y = 1;
     glfwGetWindowContentScale(window, &x, &y);
     scale_ = std::clamp(x, 1.0f, 3.0f);
+    glfwSetKeyCallback(window, remember_key);  // Dear ImGui's calls it in turn
     ImGui_ImplGlfw_InitForOpenGL(window, true);
   }
   const int height = context.size().height;
@@ -133,8 +145,9 @@ HudActions Hud::draw(const HudModel& model) {
   draw_help(model, scale_);
   draw_status(model, scale_);
   ImGui::Render();
-  if (context_.window() == nullptr || ImGui::GetIO().WantTextInput) return actions;
-  const auto pressed = [](int code) { return ImGui::IsKeyPressed(code, false); };
+  const std::vector<int> keys = std::exchange(pressed_keys(), {});
+  if (ImGui::GetIO().WantTextInput) return actions;
+  const auto pressed = [&](int code) { return std::ranges::find(keys, code) != keys.end(); };
   actions.toggle_help = pressed(GLFW_KEY_H) || pressed(GLFW_KEY_F1);
   actions.toggle_regions = pressed(GLFW_KEY_O);
   actions.reset_camera = pressed(GLFW_KEY_C);

@@ -85,6 +85,7 @@ std::string byte_rate(double bytes_per_second) {
 
 void draw_session_panel(const HudModel& model, float scale) {
   ImGui::SetNextWindowPos({kMargin * scale, kMargin * scale});
+  ImGui::SetNextWindowSizeConstraints({300 * scale, 0}, {600 * scale, 2000 * scale});
   ImGui::Begin("session", nullptr, kGlass);
   heading(model.title.c_str());
   ImGui::TextDisabled("%s", model.own_role.c_str());
@@ -229,7 +230,8 @@ void draw_timeline(const HudTimeline& timeline, float scale, HudActions& actions
 
 void draw_help(const HudModel& model, float scale) {
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
-  ImGui::SetNextWindowPos({kMargin * scale, screen.y - kMargin * scale}, 0, {0, 1});
+  const float bottom = screen.y - (model.timeline ? 70 : kMargin) * scale;
+  ImGui::SetNextWindowPos({kMargin * scale, bottom}, 0, {0, 1});
   ImGui::SetNextWindowBgAlpha(model.shows_help ? 0.86f : 0.45f);
   ImGui::Begin("help", nullptr, kGlass);
   if (!model.shows_help) {

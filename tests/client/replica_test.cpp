@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "client/replica/tool_messages.h"
 #include "common/wire/surface_codec.h"
 #include "proto/wire.pb.h"
 #include "tests/client/synthetic_source.h"
@@ -196,6 +197,17 @@ TEST_F(ReplicaTest, KeyframeMayGoBackInTime) {
   EXPECT_EQ(replica_.history().size(), 1u);
   EXPECT_GT(replica_.history_version(), version);
   EXPECT_EQ(replica_.newest()->surface, early);
+}
+
+TEST_F(ReplicaTest, ToolSamplesCarryPoseAndVerb) {
+  const scene::ToolSample sample{{{0.1f, -0.2f, 0.3f}, {0, 0.6f, 0, 0.8f}}, scene::Verb::Grasp};
+  ASSERT_TRUE(send_tool_sample(source_, 1, 7, sample));
+  const auto& message = source_.sent.back().tool_sample();
+  EXPECT_EQ(message.tool(), 1u);
+  EXPECT_EQ(message.sequence(), 7u);
+  EXPECT_EQ(message.position_m().y(), -0.2f);
+  EXPECT_EQ(message.orientation().w(), 0.8f);
+  EXPECT_EQ(message.verb(), proto::VERB_GRASP);
 }
 
 TEST_F(ReplicaTest, InvalidMessagesAreAFaultThatNamesTheField) {

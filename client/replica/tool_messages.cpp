@@ -1,0 +1,25 @@
+#include "client/replica/tool_messages.h"
+
+#include "proto/wire.pb.h"
+
+namespace trocar::replica {
+
+bool send_tool_sample(SessionSource& source, std::uint32_t tool, std::uint32_t sequence,
+                      const scene::ToolSample& sample) {
+  proto::Envelope envelope;
+  auto& message = *envelope.mutable_tool_sample();
+  message.set_tool(tool);
+  message.set_sequence(sequence);
+  const Pose& pose = sample.world_from_tool;
+  message.mutable_position_m()->set_x(pose.position.x);
+  message.mutable_position_m()->set_y(pose.position.y);
+  message.mutable_position_m()->set_z(pose.position.z);
+  message.mutable_orientation()->set_x(pose.orientation.x);
+  message.mutable_orientation()->set_y(pose.orientation.y);
+  message.mutable_orientation()->set_z(pose.orientation.z);
+  message.mutable_orientation()->set_w(pose.orientation.w);
+  message.set_verb(static_cast<proto::Verb>(sample.verb));
+  return source.send(envelope);
+}
+
+}  // namespace trocar::replica

@@ -1,0 +1,14 @@
+#pragma once
+
+// What a client says: a reading of one of its tools as a message.
+
+#include "client/replica/session_source.h"
+#include "common/scene/tool.h"
+
+namespace trocar::replica {
+
+// `tool` is 0 or 1; `sequence` counts up per client. False if the source dropped it.
+bool send_tool_sample(SessionSource& source, std::uint32_t tool, std::uint32_t sequence,
+                      const scene::ToolSample& sample);
+
+}  // namespace trocar::replica

@@ -1,0 +1,65 @@
+#include <gtest/gtest.h>
+
+#include "client/app/client_options.h"
+#include "client/app/client_summary.h"
+#include "tests/client/synthetic_source.h"
+
+namespace trocar::app {
+namespace {
+
+Result<std::optional<ClientOptions>> parse(std::vector<std::string> words) {
+  words.insert(words.begin(), "trocar-client");
+  std::vector<char*> arguments;
+  for (auto& word : words) arguments.push_back(word.data());
+  return parse_client_command_line(static_cast<int>(arguments.size()), arguments.data());
+}
+
+TEST(ClientOptions, DefaultsAreAWindowAndASurgeonOnThisMachine) {
+  const auto options = parse({});
+  ASSERT_TRUE(options.ok() && options->has_value());
+  EXPECT_EQ((*options)->server, "127.0.0.1:7690");
+  EXPECT_EQ((*options)->display, Display::Window);
+  EXPECT_EQ((*options)->role, replica::Role::Surgeon);
+  EXPECT_FALSE((*options)->name.empty());
+  EXPECT_LE((*options)->name.size(), 32u);
+}
+
+TEST(ClientOptions, EachWrongValueIsAUsageErrorThatNamesTheOption) {
+  const std::vector<std::pair<std::vector<std::string>, std::string>> cases = {
+      {{"--size", "5"}, "--size"},
+      {{"--size", "10x10"}, "--size"},
+      {{"--size", "640x480x3"}, "--size"},
+      {{"--role", "nurse"}, "--role"},
+      {{"--fps", "0"}, "--fps"},
+      {{"--screenshot-at", "-3"}, "--screenshot-at"},
+      {{"--role", "observer", "--script", "x.toml"}, "--script"},
+      {{"--replay", "x.mcap", "--script", "x.toml"}, "--replay"},
+      {{"--no-render", "--screenshot", "x.png"}, "--screenshot"},
+      {{"--no-such-option"}, "no-such-option"}};
+  for (const auto& [words, name] : cases) {
+    const auto options = parse(words);
+    ASSERT_FALSE(options.ok()) << name;
+    EXPECT_EQ(options.error().code, ErrorCode::Usage);
+    EXPECT_NE(options.error().message.find(name), std::string::npos) << options.error().message;
+    EXPECT_EQ(options.error().message.find('\n'), std::string::npos) << options.error().message;
+  }
+}
+
+TEST(ClientSummary, IsJsonWithTheReplicasFigures) {
+  testing::SyntheticSource source(testing::make_blob_layout(8, 12, 0.08), "a \"blob\"");
+  replica::Replica replica([&](const proto::Envelope& message) { return source.send(message); });
+  source.queue_start();
+  for (int i = 0; i < 40; ++i) source.queue_frame();
+  source.poll(replica);
+  const std::string json =
+      to_json({"Ada", "surgeon", "end of --seconds"}, replica, source.statistics());
+  EXPECT_NE(json.find("\"organ\": \"a \\\"blob\\\"\""), std::string::npos) << json;
+  EXPECT_NE(json.find("\"final_frame\": 40"), std::string::npos) << json;
+  EXPECT_NE(json.find("\"barrier\": null"), std::string::npos) << json;
+  char crc[16];
+  std::snprintf(crc, sizeof crc, "\"%08x\"", wire::surface_crc(source.surface()));
+  EXPECT_NE(json.find(crc), std::string::npos) << json;
+}
+
+}  // namespace
+}  // namespace trocar::app
