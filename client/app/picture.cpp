@@ -55,8 +55,7 @@ Picture::Picture(std::unique_ptr<render::GlContext> context, const ClientOptions
       context_(std::move(context)),
       renderer_(*context_),
       hud_(*context_),
-      shows_help_(options.display == Display::Window),
-      keeps_image_(!options.screenshot_file.empty()) {
+      shows_help_(options.display == Display::Window) {
   log::debug("drawing with {}", renderer_.description());
 }
 
@@ -228,11 +227,10 @@ void Picture::draw(const replica::Replica& replica, replica::SessionSource& sour
   if (device::MouseTool* mouse = hands.mouse_tool(); mouse != nullptr && surface_.is_valid())
     mouse->update(input, camera_.rays(context_->size()), surface_.positions(),
                   replica.topology().triangles, seconds);
-  const render::SceneView scene = scene_view(replica, hands, seconds);
-  act(hud_.draw(hud_model(replica, source, scene, hands, now_ns)), replica, source);
-  renderer_.draw(scene, camera_);
+  scene_ = scene_view(replica, hands, seconds);
+  act(hud_.draw(hud_model(replica, source, scene_, hands, now_ns)), replica, source);
+  renderer_.draw(scene_, camera_);
   hud_.render();
-  if (keeps_image_ || wants_screenshot_) last_ = context_->read_image();
   if (std::exchange(wants_screenshot_, false)) {
     const std::string file = "trocar-" + std::to_string(now_ns / 1'000'000) + ".png";
     if (const auto saved = save(file); !saved)
@@ -244,8 +242,15 @@ void Picture::draw(const replica::Replica& replica, replica::SessionSource& sour
   ++count_;
 }
 
-Status Picture::save(const std::string& file) const {
-  return render::write_png(last_, file);
+render::Image Picture::image() {
+  scene_.seconds = 0;
+  renderer_.draw(scene_, camera_, render::Quality::Best);
+  hud_.render();
+  return context_->read_image();
+}
+
+Status Picture::save(const std::string& file) {
+  return render::write_png(image(), file);
 }
 
 }  // namespace trocar::app

@@ -24,9 +24,9 @@ class Picture {
             std::uint64_t now_ns);
   bool should_close() const { return context_->should_close(); }
   std::uint64_t count() const { return count_; }
-  // The last picture; kept only with --screenshot.
-  const render::Image& image() const { return last_; }
-  Status save(const std::string& file) const;
+  // Draws once more what was drawn last, as finely as it goes, and returns it.
+  render::Image image();
+  Status save(const std::string& file);
 
  private:
   explicit Picture(std::unique_ptr<render::GlContext> context, const ClientOptions& options);
@@ -54,8 +54,7 @@ class Picture {
   std::uint64_t last_ns_ = 0, count_ = 0;
   bool shows_help_ = false, shows_regions_ = true, wants_screenshot_ = false;
   Rate rate_;
-  render::Image last_;
-  bool keeps_image_ = false;
+  render::SceneView scene_;  // of the last picture; its spans need the replica
 };
 
 }  // namespace trocar::app

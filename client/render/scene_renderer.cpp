@@ -15,7 +15,7 @@ namespace trocar::render {
 namespace {
 
 constexpr int kMaxShadows = 8;
-constexpr float kOverlayStrength = 0.85f;
+constexpr float kOverlayStrength = 0.80f;
 constexpr float kOverlayFadeSeconds = 0.12f;
 constexpr std::size_t kTriangleBudgetSoftware = 16'000, kTriangleBudget = 100'000;
 
@@ -69,8 +69,10 @@ struct Target {
   int samples = 0;
   GLuint framebuffer = 0, colour = 0, depth = 0;
 
-  void resize(Size wanted) {
-    if (framebuffer != 0 && wanted.width == size.width && wanted.height == size.height) return;
+  // True if it was made anew.
+  bool resize(Size wanted) {
+    if (framebuffer != 0 && wanted.width == size.width && wanted.height == size.height)
+      return false;
     release();
     size = wanted;
     glGenRenderbuffers(1, &colour);
@@ -84,6 +86,7 @@ struct Target {
     glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
     glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_RENDERBUFFER, colour);
     glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_RENDERBUFFER, depth);
+    return true;
   }
   void release() {
     glDeleteFramebuffers(1, &framebuffer);
@@ -92,6 +95,17 @@ struct Target {
     framebuffer = colour = depth = 0;
   }
 };
+
+std::string lit(const char* head, const char* fragment_source) {
+  return std::string(head) + kLightingSource + fragment_source;
+}
+
+void blit(GLuint from, GLuint to, Size size) {
+  glBindFramebuffer(GL_READ_FRAMEBUFFER, from);
+  glBindFramebuffer(GL_DRAW_FRAMEBUFFER, to);
+  glBlitFramebuffer(0, 0, size.width, size.height, 0, 0, size.width, size.height,
+                    GL_COLOR_BUFFER_BIT, GL_NEAREST);
+}
 
 }  // namespace
 
@@ -102,12 +116,15 @@ std::optional<Vec3f> arrow_end(const Vec3f& tip, const Vec3f& force_n) {
 }
 
 struct SceneRenderer::Parts {
-  Shader organ{kOrganVertexSource, (std::string(kLightingSource) + kOrganFragmentSource).c_str()};
-  Shader tool{kToolVertexSource, (std::string(kLightingSource) + kToolFragmentSource).c_str()};
+  Shader fine_organ{kOrganVertexSource, lit(kFineHead, kOrganFragmentSource).c_str()};
+  Shader plain_organ{kOrganVertexSource, lit(kPlainHead, kOrganFragmentSource).c_str()};
+  Shader tool{kToolVertexSource, lit(kFineHead, kToolFragmentSource).c_str()};
   Shader background{kBackgroundVertexSource, kBackgroundFragmentSource};
   VertexArray organ_array, tool_array, background_array;
   GLuint rest_buffer = 0, index_buffer = 0, noise = 0;
-  Target target;
+  Target sharp, plain;  // with and without samples
+  Target backdrop;      // the background alone, drawn when the size changes
+  Size size;
   bool is_software = false;
   std::string renderer_name;
 
@@ -122,7 +139,8 @@ struct SceneRenderer::Parts {
   void upload_organ(const SceneView& scene);
   void fade_tints(const SceneView& scene);
   void set_lights(const Shader& shader, const OrbitCamera& camera) const;
-  void draw_organ(const SceneView& scene, const OrbitCamera& camera);
+  void draw_background();
+  void draw_organ(const SceneView& scene, const OrbitCamera& camera, const Shader& organ);
   void draw_tools(const SceneView& scene, const OrbitCamera& camera);
   void draw_mesh(const MeshVertices& mesh, const Matrix4& world_from_model, float glow, float dim);
 };
@@ -131,7 +149,8 @@ SceneRenderer::Parts::Parts(const GlContext& context)
     : is_software(context.is_software()), renderer_name(context.renderer_name()) {
   GLint most = 0;
   glGetIntegerv(GL_MAX_SAMPLES, &most);
-  target.samples = std::min(4, static_cast<int>(most));
+  sharp.samples = std::min(4, static_cast<int>(most));
+  plain.samples = 0;
 
   glBindVertexArray(organ_array.array);
   glBindBuffer(GL_ARRAY_BUFFER, organ_array.buffer);
@@ -171,7 +190,7 @@ SceneRenderer::Parts::Parts(const GlContext& context)
 }
 
 SceneRenderer::Parts::~Parts() {
-  target.release();
+  for (Target* target : {&sharp, &plain, &backdrop}) target->release();
   glDeleteTextures(1, &noise);
   glDeleteBuffers(1, &rest_buffer);
   glDeleteBuffers(1, &index_buffer);
@@ -231,8 +250,8 @@ void SceneRenderer::Parts::upload_organ(const SceneView& scene) {
 }
 
 void SceneRenderer::Parts::set_lights(const Shader& shader, const OrbitCamera& camera) const {
-  const device::ViewRays view = camera.rays(target.size);
-  shader.set("clip_from_world", camera.clip_from_world(target.size));
+  const device::ViewRays view = camera.rays(size);
+  shader.set("clip_from_world", camera.clip_from_world(size));
   shader.set("eye", view.eye);
   const auto direction = [&](float right, float up, float back) {
     return normalized(view.right * right + view.up * up - view.forward * back, Vec3f{0, 1, 0});
@@ -241,7 +260,8 @@ void SceneRenderer::Parts::set_lights(const Shader& shader, const OrbitCamera& c
   shader.set("fill_direction", direction(-0.9f, 0.15f, 0.35f));
 }
 
-void SceneRenderer::Parts::draw_organ(const SceneView& scene, const OrbitCamera& camera) {
+void SceneRenderer::Parts::draw_organ(const SceneView& scene, const OrbitCamera& camera,
+                                      const Shader& organ) {
   if (scene.topology_version != topology_version) load_topology(scene);
   if (scene.positions.empty() || scene.positions.size() != surface.coarse_vertex_count()) return;
   upload_organ(scene);
@@ -325,36 +345,50 @@ SceneRenderer::SceneRenderer(const GlContext& context)
 
 SceneRenderer::~SceneRenderer() = default;
 
-void SceneRenderer::draw(const SceneView& scene, const OrbitCamera& camera) {
-  const Size size = context_.size();
-  if (size.width <= 0 || size.height <= 0) return;  // minimised
+void SceneRenderer::Parts::draw_background() {
+  if (backdrop.resize(size)) {
+    background.use();
+    glBindVertexArray(background_array.array);
+    glDrawArrays(GL_TRIANGLES, 0, 3);
+  }
+}
+
+void SceneRenderer::draw(const SceneView& scene, const OrbitCamera& camera, Quality quality) {
   Parts& parts = *parts_;
-  parts.target.resize(size);
-  glBindFramebuffer(GL_FRAMEBUFFER, parts.target.framebuffer);
-  glViewport(0, 0, size.width, size.height);
+  parts.size = context_.size();
+  const auto [width, height] = parts.size;
+  if (width <= 0 || height <= 0) return;  // minimised
   glDisable(GL_BLEND);
   glDisable(GL_SCISSOR_TEST);
-  glEnable(GL_MULTISAMPLE);
-  glClear(GL_DEPTH_BUFFER_BIT);
   glDisable(GL_DEPTH_TEST);
-  parts.background.use();
-  glBindVertexArray(parts.background_array.array);
-  glDrawArrays(GL_TRIANGLES, 0, 3);
+  glViewport(0, 0, width, height);
+  const bool is_sharp = quality == Quality::Best || !parts.is_software;
+  Target& target = is_sharp ? parts.sharp : parts.plain;
+  target.resize(parts.size);
+  if (is_sharp) {
+    glBindFramebuffer(GL_FRAMEBUFFER, target.framebuffer);
+    parts.background.use();
+    glBindVertexArray(parts.background_array.array);
+    glDrawArrays(GL_TRIANGLES, 0, 3);
+  } else {
+    parts.draw_background();
+    blit(parts.backdrop.framebuffer, target.framebuffer, parts.size);
+    glBindFramebuffer(GL_FRAMEBUFFER, target.framebuffer);
+  }
+  glClear(GL_DEPTH_BUFFER_BIT);
+  glEnable(GL_MULTISAMPLE);
   glEnable(GL_DEPTH_TEST);
-  parts.draw_organ(scene, camera);
+  parts.draw_organ(scene, camera, is_sharp ? parts.fine_organ : parts.plain_organ);
   parts.draw_tools(scene, camera);
   glDisable(GL_DEPTH_TEST);
   glBindVertexArray(0);
-
-  glBindFramebuffer(GL_READ_FRAMEBUFFER, parts.target.framebuffer);
-  glBindFramebuffer(GL_DRAW_FRAMEBUFFER, context_.framebuffer());
-  glBlitFramebuffer(0, 0, size.width, size.height, 0, 0, size.width, size.height,
-                    GL_COLOR_BUFFER_BIT, GL_NEAREST);
+  blit(target.framebuffer, context_.framebuffer(), parts.size);
   glBindFramebuffer(GL_FRAMEBUFFER, context_.framebuffer());
 }
 
 std::string SceneRenderer::description() const {
-  return parts_->renderer_name + ", " + std::to_string(parts_->target.samples) + " samples, " +
+  return parts_->renderer_name + ", " +
+         std::to_string(parts_->is_software ? 0 : parts_->sharp.samples) + " samples, " +
          std::to_string(parts_->surface.triangles().size()) + " triangles";
 }
 

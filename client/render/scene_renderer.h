@@ -1,8 +1,9 @@
 #pragma once
 
 // Draws one picture of the session: background, organ, tools, force arrows. Needs a current OpenGL
-// 3.3 core context for its whole life. Draws into a multisampled buffer of its own (plain on a
-// software rasteriser that cannot afford it) and resolves that into the context's framebuffer.
+// 3.3 core context for its whole life. Draws into a multisampled buffer of its own (a
+// software rasteriser gets a plain one, at half the time) and resolves that into the context's
+// framebuffer.
 // Thread: render thread.
 
 #include <memory>
@@ -43,12 +44,15 @@ struct SceneView {
   float seconds = 0;  // since the last picture
 };
 
+// Live: with samples only where a graphics processor does it. Best: always, for a picture to keep.
+enum class Quality : std::uint8_t { Live, Best };
+
 class SceneRenderer {
  public:
   explicit SceneRenderer(const GlContext& context);
   ~SceneRenderer();
 
-  void draw(const SceneView& scene, const OrbitCamera& camera);
+  void draw(const SceneView& scene, const OrbitCamera& camera, Quality quality = Quality::Live);
   // What limits the picture, for --log-level debug: renderer, samples, triangles drawn.
   std::string description() const;
 

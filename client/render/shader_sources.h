@@ -6,9 +6,11 @@
 namespace trocar::render {
 
 // Two lamps that move with the camera (a key light from above right, a cool one from the left), and
-// soft light from above. Prefixed to both lit shaders.
-inline constexpr const char* kLightingSource = R"(#version 330 core
-uniform vec3 eye;
+// soft light from above. Prefixed to both lit shaders, after one of the two heads. Powers are
+// written as products: on a software rasteriser they are most of the picture's time.
+inline constexpr const char* kFineHead = "#version 330 core\n#define FINE 1\n";
+inline constexpr const char* kPlainHead = "#version 330 core\n";
+inline constexpr const char* kLightingSource = R"(uniform vec3 eye;
 uniform vec3 key_direction;
 uniform vec3 fill_direction;
 const vec3 key_colour = vec3(2.55, 2.42, 2.25);
@@ -17,13 +19,20 @@ const vec3 sky_colour = vec3(0.34, 0.40, 0.48);
 const vec3 ground_colour = vec3(0.10, 0.075, 0.075);
 
 vec3 hemisphere(vec3 n) { return mix(ground_colour, sky_colour, 0.5 + 0.5 * n.y); }
-float highlight(vec3 n, vec3 view, vec3 light, float sharpness) {
-  return pow(max(dot(n, normalize(view + light)), 0.0), sharpness);
+// Blinn's highlight to the powers 32 and 256.
+vec2 highlights(vec3 n, vec3 view, vec3 light) {
+  float h = max(dot(n, normalize(view + light)), 0.0);
+  h *= h; h *= h; h *= h; h *= h; h *= h;
+  float sharp = h * h;
+  sharp *= sharp;
+  return vec2(h, sharp * sharp);
 }
-// Filmic curve (after Narkowicz 2015), then the sRGB transfer function as a power.
+float power5(float x) { return x * x * x * x * x; }
+// Filmic curve (after Narkowicz 2015), then the sRGB transfer function by square roots.
 vec4 encode(vec3 c) {
   c = clamp(c * (2.51 * c + 0.03) / (c * (2.43 * c + 0.59) + 0.14), 0.0, 1.0);
-  return vec4(pow(c, vec3(1.0 / 2.2)), 1.0);
+  vec3 a = sqrt(c), b = sqrt(a), d = sqrt(b);
+  return vec4(0.585122381 * a + 0.783140355 * b - 0.368262736 * d, 1.0);
 }
 )";
 
@@ -53,7 +62,7 @@ uniform int shadow_count;
 uniform vec4 shadow_tip[8];    // xyz tip, w radius
 uniform vec4 shadow_shaft[8];  // xyz direction, w length
 
-// Light that a tool takes away at p: the key lamp's shadow and a soft one where it touches.
+// Light that a tool takes away at p: the key lamp's shadow, and (fine) a soft one where it touches.
 float tool_shadow(vec3 p) {
   float light = 1.0;
   for (int i = 0; i < shadow_count; ++i) {
@@ -65,18 +74,26 @@ float tool_shadow(vec3 p) {
     float wl = dot(w, key_direction), wa = dot(w, a);
     float t = clamp((wa - along * wl) / max(1.0 - along * along, 0.02), 0.0, shadow_shaft[i].w);
     float s = max(t * along - wl, 0.0);
-    float gap = length(w + key_direction * s - a * t) / radius;
-    float soft = 1.3 + 12.0 * s;
-    light *= mix(1.0, smoothstep(0.4, 0.6 + soft, gap), 0.62 / (1.0 + 5.0 * s));
+    vec3 gap = w + key_direction * s - a * t;
+    float far = 1.0 / (1.0 + 5.0 * s);
+    float inside = clamp(1.25 - dot(gap, gap) / (radius * radius * (1.6 + 90.0 * s)), 0.0, 1.0);
+    light *= 1.0 - 0.66 * far * inside * inside;
+#ifdef FINE
     float touch = length(w - a * clamp(wa, 0.0, shadow_shaft[i].w)) / radius;
     light *= 0.62 + 0.38 * smoothstep(0.8, 2.6, touch);
+#endif
   }
   return light;
 }
 
 void main() {
+#ifdef FINE
   vec4 coarse = texture(noise, rest_position * 11.0);
   vec4 fine = texture(noise, rest_position * 58.0 + 0.37);
+#else
+  vec4 coarse = texture(noise, rest_position * 24.0);
+  vec4 fine = coarse;
+#endif
   vec3 n = normalize(world_normal);
   n = normalize(n + 0.10 * (coarse.rgb - 0.5) + 0.10 * (fine.rgb - 0.5));
   vec3 view = normalize(eye - world_position);
@@ -84,7 +101,7 @@ void main() {
 
   // Red-brown parenchyma, broad clouds with a fine grain under the capsule.
   float mottle = clamp(0.70 * coarse.a + 0.30 * fine.a, 0.0, 1.0);
-  vec3 albedo = mix(vec3(0.098, 0.0150, 0.0125), vec3(0.180, 0.0300, 0.0215), mottle);
+  vec3 albedo = mix(vec3(0.068, 0.0115, 0.0090), vec3(0.138, 0.0245, 0.0165), mottle);
   albedo *= 0.93 + 0.14 * fine.a;
 
   float shade = tool_shadow(world_position);
@@ -93,17 +110,17 @@ void main() {
   vec3 key = clamp((vec3(dot(n, key_direction)) + wrap) / (1.0 + wrap), 0.0, 1.0) * shade;
   vec3 fill = clamp((vec3(dot(n, fill_direction)) + wrap) / (1.0 + wrap), 0.0, 1.0);
   vec3 lit = albedo * (key_colour * key * key + fill_colour * fill + hemisphere(n) * (0.6 + 0.4 * shade));
-  lit += vec3(0.050, 0.007, 0.005) * pow(1.0 - facing, 3.0) * shade;  // thin at the rim
+  lit += vec3(0.050, 0.007, 0.005) * (1.0 - facing) * (1.0 - facing) * shade;  // thin at the rim
 
-  float fresnel = 0.035 + 0.965 * pow(1.0 - facing, 5.0);
+  float fresnel = 0.035 + 0.965 * power5(1.0 - facing);
   float wet = 0.75 + 0.5 * coarse.a;
-  float sharp = highlight(n, view, key_direction, 210.0), broad = highlight(n, view, key_direction, 26.0);
-  vec3 film = key_colour * shade * (0.80 * sharp + 0.038 * broad) * wet;
-  film += fill_colour * (0.30 * highlight(n, view, fill_direction, 90.0)) * wet;
+  vec2 key_film = highlights(n, view, key_direction);
+  vec3 film = key_colour * shade * (0.80 * key_film.y + 0.038 * key_film.x) * wet;
+  film += fill_colour * (0.26 * highlights(n, view, fill_direction).y + 0.06 * highlights(n, view, fill_direction).x) * wet;
   film += hemisphere(reflect(-view, n)) * fresnel * 0.55 * (0.5 + 0.5 * shade);
 
   // The overlay glows through: tissue darkens and takes the region's colour, the film stays.
-  lit = mix(lit, lit * 0.45 + tint.rgb * (0.07 + 0.16 * key.g + 0.10 * fill.g), tint.a);
+  lit = mix(lit, lit * 0.35 + tint.rgb * (0.035 + 0.11 * key.g + 0.07 * fill.g), tint.a);
   colour = encode(lit + film);
 }
 )";
@@ -134,9 +151,9 @@ uniform float dim;   // 1 as it is; less for a tool that has fallen silent
 void main() {
   vec3 n = normalize(world_normal);
   vec3 view = normalize(eye - world_position);
-  vec3 base = pow(surface.rgb, vec3(2.2)) * dim;
+  vec3 base = surface.rgb * surface.rgb * dim;
   float steel = surface.a;
-  float fresnel = pow(1.0 - max(dot(n, view), 0.0), 5.0);
+  float fresnel = power5(1.0 - max(dot(n, view), 0.0));
   vec3 diffuse = key_colour * max(dot(n, key_direction), 0.0) + fill_colour * max(dot(n, fill_direction), 0.0)
       + hemisphere(n);
   vec3 r = reflect(-view, n);
@@ -145,7 +162,8 @@ void main() {
   vec3 mirror = mix(vec3(0.05, 0.06, 0.075), vec3(0.95, 1.0, 1.05), band);
   vec3 lit = base * diffuse * mix(0.75, 0.22, steel) + mirror * mix(vec3(0.05), base * 0.9, steel)
       + mirror * fresnel * 0.5;
-  lit += key_colour * highlight(n, view, key_direction, mix(60.0, 130.0, steel)) * mix(0.25, 0.8, steel);
+  vec2 shine = highlights(n, view, key_direction);
+  lit += key_colour * mix(0.22 * shine.x, 0.30 * shine.x + 0.6 * shine.y, steel);
   colour = encode(mix(lit, base * 1.35, glow));
 }
 )";

@@ -80,12 +80,12 @@ Colour colour_of_slot(int slot) {
 }
 
 Colour colour_of_region(int region) {
-  static constexpr std::array<Colour, 6> kColours = {{{38, 208, 190},
-                                                      {250, 190, 60},
-                                                      {120, 150, 255},
-                                                      {236, 110, 190},
-                                                      {150, 220, 80},
-                                                      {255, 130, 80}}};
+  static constexpr std::array<Colour, 6> kColours = {{{0, 205, 255},
+                                                      {255, 170, 20},
+                                                      {120, 110, 255},
+                                                      {255, 70, 200},
+                                                      {120, 255, 60},
+                                                      {255, 255, 120}}};
   return kColours[static_cast<std::size_t>(std::max(region - 1, 0)) % kColours.size()];
 }
 

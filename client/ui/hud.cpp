@@ -132,6 +132,7 @@ HudActions Hud::draw(const HudModel& model) {
   if (model.timeline) draw_timeline(*model.timeline, scale_, actions);
   draw_help(model, scale_);
   draw_status(model, scale_);
+  ImGui::Render();
   if (context_.window() == nullptr || ImGui::GetIO().WantTextInput) return actions;
   const auto pressed = [](int code) { return ImGui::IsKeyPressed(code, false); };
   actions.toggle_help = pressed(GLFW_KEY_H) || pressed(GLFW_KEY_F1);
@@ -145,7 +146,6 @@ HudActions Hud::draw(const HudModel& model) {
 }
 
 void Hud::render() {
-  ImGui::Render();
   glBindFramebuffer(GL_FRAMEBUFFER, context_.framebuffer());
   const render::Size size = context_.size();
   glViewport(0, 0, size.width, size.height);

@@ -85,7 +85,7 @@ class Hud {
   void begin_frame(float seconds);
   device::PointerInput input() const;
   HudActions draw(const HudModel& model);
-  void render();
+  void render();  // may be repeated: the same again
 
  private:
   render::GlContext& context_;

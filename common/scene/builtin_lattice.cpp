@@ -1,3 +1,4 @@
+#include <cstdio>
 #include <string>
 
 #include "common/scene/builtin_organs.h"
@@ -59,9 +60,10 @@ Result<Organ> make_lattice(const LatticeSize& size) {
     return Error{ErrorCode::Usage, "lattice: spacing must be 0.5 to 1000 mm"};
   Organ organ;
   organ.name = "lattice";
-  organ.source = "lattice " + std::to_string(size.nx) + " x " + std::to_string(size.ny) + " x " +
-                 std::to_string(size.nz) + ", spacing " +
-                 std::to_string(static_cast<int>(size.spacing_m * 1e6 + 0.5)) + " um";
+  char source[80];
+  std::snprintf(source, sizeof source, "lattice %d x %d x %d, spacing %g mm", size.nx, size.ny,
+                size.nz, size.spacing_m * 1e3);
+  organ.source = source;
   add_nodes_and_links(size, organ.mesh);
   add_boundary(size, organ.mesh);
   organ.mesh.build_adjacency();

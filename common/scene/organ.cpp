@@ -145,6 +145,9 @@ Status validate(const Organ& organ) {
   if (organ.name.empty() || organ.name.size() > kMaxTextBytes ||
       organ.source.size() > kMaxTextBytes)
     return Error{ErrorCode::BadFile, "organ: name and source must have 1 to 4096 bytes"};
+  const auto is_control = [](char c) { return static_cast<unsigned char>(c) < 32 || c == 127; };
+  if (std::ranges::any_of(organ.name, is_control) || std::ranges::any_of(organ.source, is_control))
+    return Error{ErrorCode::BadFile, "organ: name and source must not hold control characters"};
   if (auto s = mesh::validate(organ.mesh); !s) return broken(organ, s.error().message);
   if (organ.mesh.tets.empty() && organ.mesh.links.empty())
     return broken(organ, "has neither tets nor links, nothing would hold it together");

@@ -31,11 +31,16 @@ std::string json_escaped(const std::string& text) {
 
 const char* role_name(proto::Role role) {
   switch (role) {
-    case proto::ROLE_SURGEON: return "surgeon";
-    case proto::ROLE_ASSISTANT: return "assistant";
-    case proto::ROLE_INSTRUCTOR: return "instructor";
-    case proto::ROLE_OBSERVER: return "observer";
-    default: return "?";
+    case proto::ROLE_SURGEON:
+      return "surgeon";
+    case proto::ROLE_ASSISTANT:
+      return "assistant";
+    case proto::ROLE_INSTRUCTOR:
+      return "instructor";
+    case proto::ROLE_OBSERVER:
+      return "observer";
+    default:
+      return "?";
   }
 }
 
@@ -64,7 +69,8 @@ int show_info(const std::string& path, bool as_json) {
   }
   std::printf("%s\n", path.c_str());
   std::printf("  %s\n", info.summary.c_str());
-  std::printf("  organ        %s (hash %016" PRIx64 ")\n", info.organ_name.c_str(), info.organ_hash);
+  std::printf("  organ        %s (hash %016" PRIx64 ")\n", info.organ_name.c_str(),
+              info.organ_hash);
   std::printf("  length       %.1f s, %" PRIu64 " ticks\n", seconds, info.last_tick);
   std::printf("  sim_version  %u%s, protocol %s\n", info.sim_version,
               info.sim_version == kSimVersion ? "" : " (this program has another)",
@@ -111,8 +117,8 @@ int verify(const std::string& path, bool as_json) {
     std::printf("%s: %s\n", path.c_str(), r.container.c_str());
     if (!r.is_resimulated)
       std::printf("recorded with another sim_version: cannot re-simulate, stored bytes checked\n");
-    std::printf("%" PRIu64 " ticks re-simulated to the same hash, %" PRIu64
-                " missing; %" PRIu64 " snapshots, %" PRIu64 " surfaces equal\n",
+    std::printf("%" PRIu64 " ticks re-simulated to the same hash, %" PRIu64 " missing; %" PRIu64
+                " snapshots, %" PRIu64 " surfaces equal\n",
                 r.ticks_verified, r.ticks_missing, r.snapshots_verified, r.surfaces_verified);
     if (r.ok())
       std::printf("verified to tick %" PRIu64 ", hash %016" PRIx64 "\n", r.last_tick, r.last_hash);

@@ -40,8 +40,12 @@ void add_constraint(const NodeConstraint& c, const Vec3f& x, const Vec3f& start,
 
 }  // namespace
 
-BlockDescent::BlockDescent(const world::World& world)
-    : first_constraint_(world.node_count()), constraint_stamp_(world.node_count()) {
+BlockDescent::BlockDescent(const world::World& world, const SpringNetwork& springs)
+    : springs_(springs),
+      inertia_(world.node_count()),
+      terms_(springs.batch_count()),
+      first_constraint_(world.node_count()),
+      constraint_stamp_(world.node_count()) {
   residuals_.reserve(world.node_count());
   next_constraint_.reserve(8 * contact::kMaxNodesPerTool);
   reset(world);
@@ -68,18 +72,29 @@ void BlockDescent::link_constraints(const contact::ContactList& contacts) {
   }
 }
 
-BlockDescent::NodeStep BlockDescent::linearise(const SpringNetwork& springs,
-                                               const contact::ContactList& contacts,
-                                               const world::World& world, NodeIndex node,
+void BlockDescent::prepare_step(std::span<const NodeIndex> active, float dt,
+                                const world::World& world) {
+  const float inverse_dt = 1.0f / dt;
+  for (const auto node : active) {
+    const auto n = node.value;
+    Inertia& inertia = inertia_[n];
+    inertia.inertia = world.masses[n] * inverse_dt * inverse_dt +
+                      world.masses[n] * springs_.node_damping_per_s() * inverse_dt;
+    inertia.momentum = world.velocities[n] * (world.masses[n] * inverse_dt);
+    inertia.block = springs_.prepare_step(node, start_, inverse_dt, terms_);
+    inertia.block.add_identity(inertia.inertia);
+    // Starting where inertia alone would lead makes rigid motion exact from the first sweep;
+    // starting at rest instead acts as a drag as long as sweeps are few.
+    x_[n] += world.velocities[n] * dt;
+  }
+}
+
+BlockDescent::NodeStep BlockDescent::linearise(const contact::ContactList& contacts, NodeIndex node,
                                                float inverse_dt) const {
   const auto n = node.value;
-  const float inertia = world.masses[n] * inverse_dt * inverse_dt;
-  const float damping = world.masses[n] * springs.node_damping_per_s() * inverse_dt;
-  const Vec3f moved = x_[n] - start_[n];
-  NodeStep step;
-  step.gradient = (moved - world.velocities[n] * (1.0f / inverse_dt)) * inertia + moved * damping;
-  step.block.add_identity(inertia + damping);
-  springs.add_gradient_and_block(node, x_, start_, inverse_dt, step.gradient, step.block);
+  const Inertia& inertia = inertia_[n];
+  NodeStep step{(x_[n] - start_[n]) * inertia.inertia - inertia.momentum, inertia.block};
+  springs_.add_gradient_and_block(node, x_, terms_, step.gradient, step.block);
   if (constraint_stamp_[n] == current_)
     for (auto i = first_constraint_[n]; i != kNone; i = next_constraint_[i])
       add_constraint(contacts.constraints[i], x_[n], start_[n], inverse_dt, step.gradient,
@@ -87,7 +102,7 @@ BlockDescent::NodeStep BlockDescent::linearise(const SpringNetwork& springs,
   return step;
 }
 
-SolveReport BlockDescent::solve(const SpringNetwork& springs, const contact::ContactList& contacts,
+SolveReport BlockDescent::solve(const contact::ContactList& contacts,
                                 std::span<const NodeIndex> active, const SolveSettings& settings,
                                 world::World& world) {
   SolveReport report;
@@ -95,9 +110,7 @@ SolveReport BlockDescent::solve(const SpringNetwork& springs, const contact::Con
   link_constraints(contacts);
   residuals_.resize(active.size());
   const float inverse_dt = 1.0f / settings.dt;
-  // Starting where inertia alone would lead makes rigid motion exact from the first sweep; starting
-  // at rest instead acts as a drag as long as sweeps are few.
-  for (const auto node : active) x_[node.value] += world.velocities[node.value] * settings.dt;
+  prepare_step(active, settings.dt, world);
   float omega = settings.sweeps < 3
                     ? std::min(settings.over_relaxation, kMaxOverRelaxationFewSweeps)
                     : settings.over_relaxation;
@@ -106,7 +119,7 @@ SolveReport BlockDescent::solve(const SpringNetwork& springs, const contact::Con
     float sum = 0;
     report.nodes_rejected = 0;
     for (std::size_t i = 0; i < active.size(); ++i) {
-      const auto step = linearise(springs, contacts, world, active[i], inverse_dt);
+      const auto step = linearise(contacts, active[i], inverse_dt);
       const float squared = length_squared(step.gradient);
       const Vec3f dx = solve_positive_definite(step.block, step.gradient) * -omega;
       if (!is_finite(dx) || !std::isfinite(squared)) {

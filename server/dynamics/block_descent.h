@@ -32,12 +32,11 @@ struct SolveReport {
 
 class BlockDescent {
  public:
-  explicit BlockDescent(const world::World& world);
+  BlockDescent(const world::World& world, const SpringNetwork& springs);
 
   // Advances displacements and velocities of `active` nodes by one step; all other nodes stay.
-  SolveReport solve(const SpringNetwork& springs, const contact::ContactList& contacts,
-                    std::span<const NodeIndex> active, const SolveSettings& settings,
-                    world::World& world);
+  SolveReport solve(const contact::ContactList& contacts, std::span<const NodeIndex> active,
+                    const SolveSettings& settings, world::World& world);
 
   // Force imbalance per entry of `active` in the last sweep, N.
   std::span<const float> residuals_n() const { return residuals_; }
@@ -54,11 +53,21 @@ class BlockDescent {
   };
   void reset(const world::World& world);
   void link_constraints(const contact::ContactList& contacts);
-  NodeStep linearise(const SpringNetwork& springs, const contact::ContactList& contacts,
-                     const world::World& world, NodeIndex node, float inverse_dt) const;
+  NodeStep linearise(const contact::ContactList& contacts, NodeIndex node, float inverse_dt) const;
+  void prepare_step(std::span<const NodeIndex> active, float dt, const world::World& world);
 
-  std::vector<Vec3f> x_;      // displacements being solved
-  std::vector<Vec3f> start_;  // displacements at the start of the step
+  const SpringNetwork& springs_;
+  // Inertia and damping of a node, constant in a step: the gradient is
+  // inertia (x - start) - momentum, plus the springs' damping.
+  struct Inertia {
+    SymMat3f block;
+    float inertia = 0;  // m/dt^2 + rate m/dt, N/m
+    Vec3f momentum;     // m/dt v, N
+  };
+  std::vector<Inertia> inertia_;                 // per node, valid for active ones
+  std::vector<SpringNetwork::StepTerms> terms_;  // per spring batch, likewise
+  std::vector<Vec3f> x_;                         // displacements being solved
+  std::vector<Vec3f> start_;                     // displacements at the start of the step
   std::vector<float> residuals_;
   // Constraints of a node as a linked list in contact order; valid where the stamp is current.
   std::vector<std::uint32_t> first_constraint_, constraint_stamp_, next_constraint_;

@@ -32,7 +32,8 @@ Result<std::unique_ptr<Recorder>> Recorder::create(const std::string& path,
   auto writer = journal::SessionJournalWriter::create(
       path, {.start_utc_ns = now, .organ_name = organ.name, .organ_hash = hash});
   if (!writer) return writer.error();
-  if (auto s = (*writer)->write(journal::JournalTopic::Organ, 0, now, scene::encode_organ(organ)); !s)
+  if (auto s = (*writer)->write(journal::JournalTopic::Organ, 0, now, scene::encode_organ(organ));
+      !s)
     return s.error();
   proto::SurfaceTopology topology;
   replication::describe(layout, 0, organ.name, topology);

@@ -6,9 +6,9 @@
 //   I/O thread:        take_participants -> [64 lists] -----+--> writer thread -> MCAP file
 //
 // Neither producer ever waits. When the frames' queue is full a frame is dropped, counted, and the
-// journal gets a JournalGap with the ticks that are missing; the surface goes on with a keyframe and
-// re-simulation from the next snapshot. A disk error ends the recording, is logged once, and close()
-// returns it.
+// journal gets a JournalGap with the ticks that are missing; the surface goes on with a keyframe
+// and re-simulation from the next snapshot. A disk error ends the recording, is logged once, and
+// close() returns it.
 
 #include <algorithm>
 #include <atomic>
@@ -79,7 +79,7 @@ class Recorder {
 
   // Writer thread, or the caller's after it has ended.
   std::unique_ptr<journal::SessionJournalWriter> writer_;
-  session::Roster roster_;  // names for claim events
+  session::Roster roster_;      // names for claim events
   step::SharedFrame baseline_;  // last surface written; null: a keyframe is due
   step::TickDecisions last_decisions_;
   bool has_decisions_ = false;

@@ -15,7 +15,9 @@ namespace {
 
 constexpr Tick kWindow = 1000;
 
-BytesView view(const std::string& bytes) { return bytes_of(std::string_view(bytes)); }
+BytesView view(const std::string& bytes) {
+  return bytes_of(std::string_view(bytes));
+}
 
 class Verifier {
  public:
@@ -114,8 +116,8 @@ class Verifier {
   VerifyReport& report_;
   step::TickRecord record_;
   bool is_in_step_ = false;
-  std::map<Tick, proto::WorldSnapshot> snapshots_;        // of the window
-  std::map<Tick, std::uint32_t> simulated_crcs_;          // of the window
+  std::map<Tick, proto::WorldSnapshot> snapshots_;  // of the window
+  std::map<Tick, std::uint32_t> simulated_crcs_;    // of the window
   wire::QuantisedSurface surface_;
   Frame surface_frame_ = 0;
   bool has_surface_ = false;

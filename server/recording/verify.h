@@ -1,11 +1,11 @@
 #pragma once
 
-// Simulates a recorded session again and compares: the state hash of every tick, every snapshot byte
-// for byte, and the surface stream as decoded, by its CRC.
+// Simulates a recorded session again and compares: the state hash of every tick, every snapshot
+// byte for byte, and the surface stream as decoded, by its CRC.
 //
-// With another sim_version the simulation cannot be repeated: then only the stored bytes are checked
-// (chunk CRCs, surface stream) and the report says so. Where ticks are missing (a marked gap, a
-// damaged chunk) re-simulation goes on from the next snapshot.
+// With another sim_version the simulation cannot be repeated: then only the stored bytes are
+// checked (chunk CRCs, surface stream) and the report says so. Where ticks are missing (a marked
+// gap, a damaged chunk) re-simulation goes on from the next snapshot.
 
 #include <functional>
 #include <optional>
@@ -22,7 +22,7 @@ struct Mismatch {
 };
 
 struct VerifyReport {
-  bool is_resimulated = false;   // false: other sim_version, bytes checked only
+  bool is_resimulated = false;  // false: other sim_version, bytes checked only
   Tick first_tick = 0, last_tick = 0;
   std::uint64_t ticks_verified = 0;
   std::uint64_t ticks_missing = 0;  // in gaps

@@ -23,7 +23,7 @@ StepContext::StepContext(const Scene& s, const world::World& world)
     : scene(s),
       queue(world.node_count()),
       active(world.node_count()),
-      solver(world),
+      solver(world, s.springs),
       surface_displacements(s.layout.vertex_count()) {
   // Enough for many tools in contact; beyond it a tick may allocate once more.
   contacts.constraints.reserve(8 * contact::kMaxNodesPerTool);

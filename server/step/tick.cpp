@@ -37,7 +37,7 @@ void fill_queue(State& state, StepContext& context) {
 
 void solve(State& state, StepContext& context) {
   const auto solved = context.solver.solve(
-      context.scene.springs, context.contacts, context.active.nodes(),
+      context.contacts, context.active.nodes(),
       {context.decisions.sweeps, context.decisions.over_relaxation, kTickSeconds}, state.world);
   context.active.freeze_quiet(context.queue, context.solver.residuals_n(), state.world);
   context.report.residual_n = solved.residual_n;

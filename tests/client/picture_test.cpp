@@ -34,7 +34,6 @@ class PictureTest : public ::testing::Test {
   void SetUp() override {
     options_.display = Display::Headless;
     options_.role = replica::Role::Surgeon;
-    options_.screenshot_file = "kept";
     auto picture = Picture::make(options_, "test");
     if (!picture) GTEST_SKIP() << picture.error().message;
     picture_ = std::move(*picture);
@@ -71,7 +70,7 @@ TEST_F(PictureTest, ShowsTissueInTheMiddleAndACalmBackground) {
   source_.queue_start();
   draw(90);
   keep("liver");
-  const render::Image& image = picture_->image();
+  const render::Image image = picture_->image();
   ASSERT_EQ(image.size.width, 1280);
   ASSERT_EQ(image.size.height, 720);
   const Pixel tissue = mean(image, 560, 300, 640, 360);

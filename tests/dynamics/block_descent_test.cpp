@@ -16,12 +16,12 @@ using contact::NodeConstraint;
 
 struct Bench {
   explicit Bench(scene::Organ o)
-      : organ(std::move(o)), world(organ), springs(organ), solver(world) {
+      : organ(std::move(o)), world(organ), springs(organ), solver(world, springs) {
     for (std::uint32_t i = 0; i < organ.mesh.node_count(); ++i)
       if (world.node_classes[i] != world::NodeClass::Fixed) free_nodes.push_back(NodeIndex(i));
   }
   SolveReport step(const SolveSettings& settings) {
-    return solver.solve(springs, contacts, free_nodes, settings, world);
+    return solver.solve(contacts, free_nodes, settings, world);
   }
   void tie(NodeIndex node, const Vec3f& target, float stiffness) {
     contacts.constraints.push_back({.node = node,

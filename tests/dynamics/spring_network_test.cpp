@@ -26,12 +26,23 @@ std::vector<Vec3f> random_displacements(std::size_t count, float amplitude, std:
   return u;
 }
 
+struct Linearised {
+  Vec3f gradient;
+  SymMat3f block;
+};
+
+Linearised linearise(const SpringNetwork& network, NodeIndex node, const std::vector<Vec3f>& u,
+                     const std::vector<Vec3f>& start, float inverse_dt) {
+  std::vector<SpringNetwork::StepTerms> terms(network.batch_count());
+  Linearised out;
+  out.block = network.prepare_step(node, start, inverse_dt, terms);
+  network.add_gradient_and_block(node, u, terms, out.gradient, out.block);
+  return out;
+}
+
 Vec3f gradient(const SpringNetwork& network, NodeIndex node, const std::vector<Vec3f>& u,
                const std::vector<Vec3f>& start, float inverse_dt) {
-  Vec3f g;
-  SymMat3f block;
-  network.add_gradient_and_block(node, u, start, inverse_dt, g, block);
-  return g;
+  return linearise(network, node, u, start, inverse_dt).gradient;
 }
 
 TEST(SpringNetwork, GradientIsTheDerivativeOfTheEnergy) {
@@ -67,9 +78,7 @@ TEST(SpringNetwork, BlockIsTheDerivativeOfTheGradientWhereSpringsAreStretched) {
   auto u = random_displacements(organ.mesh.node_count(), 0.0003f, 3);
   for (std::size_t i = 0; i < u.size(); ++i) u[i] += to_float(organ.mesh.rest_positions[i]) * 0.2f;
   for (std::uint32_t n = 0; n < organ.mesh.node_count(); n += 5) {
-    Vec3f g;
-    SymMat3f block;
-    network.add_gradient_and_block(NodeIndex(n), u, u, 0, g, block);
+    const SymMat3f block = linearise(network, NodeIndex(n), u, u, 0).block;
     const float h = 1e-4f;
     const auto column = [&](float Vec3f::*axis) {
       auto plus = u, minus = u;
@@ -96,9 +105,7 @@ TEST(SpringNetwork, BlocksArePositiveSemiDefiniteUnderAnyDeformation) {
   for (std::uint32_t seed = 1; seed <= 20; ++seed) {
     const auto u = random_displacements(organ.mesh.node_count(), 0.02f, seed);
     for (std::uint32_t n = 0; n < organ.mesh.node_count(); ++n) {
-      Vec3f g;
-      SymMat3f b;
-      network.add_gradient_and_block(NodeIndex(n), u, u, 1000.0f, g, b);
+      const SymMat3f b = linearise(network, NodeIndex(n), u, u, 1000.0f).block;
       const float scale = b.xx + b.yy + b.zz;
       EXPECT_GE(b.xx * b.yy - b.xy * b.xy, -1e-5f * scale * scale);
       const float determinant = b.xx * (b.yy * b.zz - b.yz * b.yz) -

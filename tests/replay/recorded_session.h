@@ -1,0 +1,78 @@
+#pragma once
+
+// A journal with a known truth: the synthetic session of tests/client, written the way a server
+// records it, and the CRC of every frame.
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "client/replay/replay_source.h"
+#include "client/replica/replica.h"
+#include "common/journal/session_journal_writer.h"
+
+namespace trocar::replay::testing {
+
+inline constexpr std::uint64_t kStartUtc = 1'732'200'000'000'000'000;
+inline constexpr Frame kFramesPerKey = 62;
+
+class TemporaryFolder {
+ public:
+  TemporaryFolder();
+  ~TemporaryFolder() { std::filesystem::remove_all(path_); }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  std::string file(const std::string& name) const { return (path_ / name).string(); }
+
+ private:
+  std::filesystem::path path_;
+};
+
+Bytes load_file(const std::string& path);
+void save_file(const std::string& path, BytesView bytes);
+
+struct RecordingOptions {
+  Frame frames = 400;
+  Frame cut_at = 0;    // from this frame on there is another epoch
+  Frame claim_at = 0;  // a refusal in this frame
+  Frame join_at = 0;   // from one participant to two
+  bool is_finished = true;
+  journal::McapWriterOptions container;
+  std::uint32_t protocol_major = kProtocolMajor;
+  // Changes a message before it is written; false drops it.
+  std::function<bool(journal::JournalTopic, Frame, Bytes&)> tamper;
+};
+
+struct Truth {
+  std::vector<std::uint32_t> crc;    // by frame; frame 0 was not published
+  std::vector<std::uint32_t> epoch;  // by frame
+  Frame first_frame = 1, last_frame = 0;
+};
+
+Truth record_session(const std::string& path, const RecordingOptions& options);
+
+// A source with a clock of its own and a replica that listens.
+struct Player {
+  explicit Player(const std::string& path);
+  // Advances the clock and polls.
+  void step(std::uint64_t milliseconds);
+  // The newest frame is the one of the source's position, and bit for bit the truth.
+  void expect_truth(const Truth& truth) const;
+  // The newest frame, whichever it is, is the truth.
+  void expect_honest(const Truth& truth) const;
+
+  std::uint64_t now_ns = 1'000'000'000;
+  Status opened;
+  std::unique_ptr<ReplaySource> source;
+  std::vector<proto::Envelope> sent;
+  replica::Replica replica{[this](const proto::Envelope& message) {
+    sent.push_back(message);
+    return source->send(message);
+  }};
+};
+
+}  // namespace trocar::replay::testing
