@@ -80,7 +80,8 @@ TEST_F(GraspRules, AGraspOnAHeldNodeIsRefusedByNameAndGrantedWhenTheHolderLeaves
   EXPECT_EQ(refused->holder_name(), "Anna");
   EXPECT_NE(refused->text().find("Anna"), std::string::npos);
   EXPECT_NE(find(events, 2, proto::CLAIM_GRANTED), nullptr);
-  EXPECT_EQ(find(events, 0, proto::CLAIM_TAKEN_OVER), nullptr) << "she left, nobody took it from her";
+  EXPECT_EQ(find(events, 0, proto::CLAIM_TAKEN_OVER), nullptr)
+      << "she left, nobody took it from her";
 }
 
 TEST_F(GraspRules, AHolderThatFallsSilentIsTakenOverAfterItsLease) {

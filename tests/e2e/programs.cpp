@@ -46,7 +46,9 @@ Program::~Program() {
   waitpid(pid_, nullptr, 0);
 }
 
-void Program::signal(int number) const { kill(pid_, number); }
+void Program::signal(int number) const {
+  kill(pid_, number);
+}
 
 bool Program::is_running() {
   if (!has_ended_ && waitpid(pid_, &status_, WNOHANG) == pid_) has_ended_ = true;
@@ -68,7 +70,6 @@ fs::path test_folder() {
   for (char& c : name)
     if (c == '/') c = '_';
   const fs::path folder = fs::temp_directory_path() / ("trocar-" + std::to_string(getpid())) / name;
-  fs::remove_all(folder);
   fs::create_directories(folder);
   return folder;
 }
@@ -108,12 +109,11 @@ namespace {
 std::vector<std::string> server_arguments(const fs::path& folder, const fs::path& journal,
                                           const std::string& organ,
                                           const std::vector<std::string>& extra) {
-  std::vector<std::string> arguments{
-      "--organ",   organ,
-      "--listen",  "127.0.0.1:0",
-      "--journal", journal.string(),
-      "--summary", (folder / "server.json").string(),
-      "--ready-file", (folder / "ready").string()};
+  std::vector<std::string> arguments{"--organ",      organ,
+                                     "--listen",     "127.0.0.1:0",
+                                     "--journal",    journal.string(),
+                                     "--summary",    (folder / "server.json").string(),
+                                     "--ready-file", (folder / "ready").string()};
   arguments.insert(arguments.end(), extra.begin(), extra.end());
   return arguments;
 }
@@ -131,9 +131,10 @@ Session::Session(const std::string& organ, const std::vector<std::string>& extra
 
 Program Session::client(const std::string& name, const std::string& role,
                         const std::vector<std::string>& extra) {
-  std::vector<std::string> arguments{"--server", address_,      "--name", name,
-                                     "--role",   role,          "--no-render",
-                                     "--summary", (folder / (name + ".json")).string()};
+  std::vector<std::string> arguments{
+      "--server",    address_,    "--name",
+      name,          "--role",    role,
+      "--no-render", "--summary", (folder / (name + ".json")).string()};
   arguments.insert(arguments.end(), extra.begin(), extra.end());
   return Program("trocar-client", arguments, folder / (name + ".log"));
 }

@@ -31,7 +31,7 @@ class Program {
   bool has_ended_ = false;
 };
 
-// A folder for one test, empty, named after it.
+// A folder of this run for the current test, named after it.
 std::filesystem::path test_folder();
 std::string read_text(const std::filesystem::path& file);
 // The value of `"key": value` in a JSON text: number, true/false or string without its quotes.
