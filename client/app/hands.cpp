@@ -1,5 +1,7 @@
 #include "client/app/hands.h"
 
+#include <algorithm>
+
 #include "client/replica/tool_messages.h"
 
 namespace trocar::app {
@@ -28,6 +30,17 @@ void Hands::send(replica::SessionSource& source, std::uint32_t tool,
   replica::send_tool_sample(source, tool, ++sequence_, sample);
 }
 
+double Hands::script_seconds(const replica::SessionFrame& newest, std::uint64_t now_ns) {
+  // Between frames the wall clock carries on, by at most the time to the next frame.
+  const std::uint64_t since = now_ns > newest.arrival_ns ? now_ns - newest.arrival_ns : 0;
+  const std::uint64_t next = kTicksPerFrame * kTickNanoseconds;
+  const double seconds =
+      static_cast<double>(newest.tick - std::min(newest.tick, script_start_tick_)) /
+          static_cast<double>(kTicksPerSecond) +
+      static_cast<double>(std::min(since, next)) * 1e-9;
+  return script_seconds_ = std::max(script_seconds_, seconds);
+}
+
 Status Hands::send_due(const replica::Replica& replica, replica::SessionSource& source,
                        std::uint64_t now_ns) {
   if (replica.newest() == nullptr || source.state() != replica::SourceState::Live) return {};
@@ -39,11 +52,11 @@ Status Hands::send_due(const replica::Replica& replica, replica::SessionSource& 
     script_.reset();
     if (!hand) return hand.error();
     script_hand_ = std::move(*hand);
-    script_start_ns_ = now_ns;
+    script_start_tick_ = replica.newest()->tick;
   }
   if (script_hand_ && now_ns - script_sent_ns_ >= device::kSampleIntervalNs) {
     script_sent_ns_ = now_ns;
-    const double seconds = static_cast<double>(now_ns - script_start_ns_) * 1e-9;
+    const double seconds = script_seconds(*replica.newest(), now_ns);
     for (std::size_t tool = 0; tool < script_hand_->tool_count(); ++tool)
       send(source, static_cast<std::uint32_t>(tool), script_hand_->sample(tool, seconds));
   }

@@ -23,12 +23,15 @@ class Hands {
   std::vector<scene::ToolShape> shapes() const;
   device::MouseTool* mouse_tool() { return mouse_ ? &*mouse_ : nullptr; }
 
-  // Sends what is due. A script begins with the first frame this client shows; an error means that
-  // it does not fit the organ.
+  // Sends what is due. A script begins with the first frame this client shows and runs in simulated
+  // time, so that it is the same script on a server that cannot keep up. An error means that it does
+  // not fit the organ.
   Status send_due(const replica::Replica& replica, replica::SessionSource& source,
                   std::uint64_t now_ns);
 
  private:
+  // Simulated seconds since the script began; never goes back.
+  double script_seconds(const replica::SessionFrame& newest, std::uint64_t now_ns);
   void send(replica::SessionSource& source, std::uint32_t tool, const scene::ToolSample& sample);
 
   std::optional<device::MouseTool> mouse_;
@@ -36,7 +39,9 @@ class Hands {
   std::optional<scene::Script> script_;  // until the surface is known
   std::optional<device::ScriptHand> script_hand_;
   std::vector<scene::ToolShape> script_shapes_;
-  std::uint64_t script_start_ns_ = 0, script_sent_ns_ = 0;
+  Tick script_start_tick_ = 0;
+  double script_seconds_ = 0;
+  std::uint64_t script_sent_ns_ = 0;
   std::uint32_t sequence_ = 0;
 };
 

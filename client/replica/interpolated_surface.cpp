@@ -6,6 +6,7 @@
 namespace trocar::replica {
 namespace {
 
+constexpr std::uint64_t kPauseNs = 250'000'000;
 constexpr std::size_t kArrivalWindow = 32;  // half a second
 constexpr double kJumpTicks = 250;
 constexpr double kSlewTicks = 120;  // an error of this size changes the speed by 100 %
@@ -18,6 +19,8 @@ void DisplayClock::restart() {
 }
 
 void DisplayClock::add_arrival(Tick tick, std::uint64_t arrival_ns) {
+  // A pause (of a replay, or of the server) says nothing about the rate after it.
+  if (!arrivals_.empty() && arrival_ns > arrivals_.back().ns + kPauseNs) arrivals_.clear();
   arrivals_.push_back({tick, arrival_ns});
   if (arrivals_.size() > kArrivalWindow) arrivals_.pop_front();
 }
