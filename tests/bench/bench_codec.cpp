@@ -1,4 +1,5 @@
-// bench_codec: bytes and thread CPU time of the surface codec on a synthetic stream of soft tissue.
+// bench_codec: bytes and thread CPU time of the surface codec on a synthetic stream of soft tissue,
+// and on the stream of a recorded session.
 //
 // 100 x 100 vertices on a jittered, curved patch, 1 mm apart. A tool follows a Lissajous path at 30
 // to 50 mm/s and indents the patch by 1 to 6 mm with drag and pinch, lifting off every 2.5 s. Each
@@ -18,6 +19,7 @@
 #include "common/base/cpu.h"
 #include "common/base/exit_code.h"
 #include "common/base/timing.h"
+#include "common/journal/session_journal.h"
 #include "common/wire/surface_codec.h"
 
 namespace {
@@ -146,16 +148,9 @@ struct Sums {
   std::uint32_t crc = 0;
 };
 
-bool measure(const Scenario& scenario) {
-  Tissue tissue;
-  std::vector<QuantisedSurface> frames(1, QuantisedSurface(kSide * kSide));
-  Times quantise_times, encode_times, decode_times, crc_times, key_encode_times, key_decode_times;
-  for (int i = 0; i < kFrames; ++i) {
-    const auto displacements = tissue.next_frame(scenario);
-    QuantisedSurface next = frames.back();
-    quantise_times.measure([&] { quantise(displacements, next); });
-    frames.push_back(std::move(next));
-  }
+bool measure(const Scenario& scenario, const std::vector<QuantisedSurface>& frames,
+             double quantise_us) {
+  Times encode_times, decode_times, crc_times, key_encode_times, key_decode_times;
   Sums sums;
   Bytes payload, key;
   QuantisedSurface decoded;
@@ -191,9 +186,61 @@ bool measure(const Scenario& scenario) {
       scenario.design_bytes, static_cast<double>(sums.bytes) / static_cast<double>(sums.vertices),
       sums.largest, encode_times.quantile(0.5), encode_times.quantile(0.99),
       scenario.design_encode_us, decode_times.quantile(0.5), decode_times.quantile(0.99),
-      scenario.design_decode_us, quantise_times.quantile(0.5), crc_times.quantile(0.5),
-      sums.key_bytes, key_encode_times.quantile(0.5), key_decode_times.quantile(0.5), sums.crc,
+      scenario.design_decode_us, quantise_us, crc_times.quantile(0.5), sums.key_bytes,
+      key_encode_times.quantile(0.5), key_decode_times.quantile(0.5), sums.crc,
       same ? "" : "  DECODED SURFACE DIFFERS");
+  return same;
+}
+
+bool measure_synthetic(const Scenario& scenario) {
+  Tissue tissue;
+  std::vector<QuantisedSurface> frames(1, QuantisedSurface(kSide * kSide));
+  Times quantise_times;
+  for (int i = 0; i < kFrames; ++i) {
+    const auto displacements = tissue.next_frame(scenario);
+    QuantisedSurface next = frames.back();
+    quantise_times.measure([&] { quantise(displacements, next); });
+    frames.push_back(std::move(next));
+  }
+  return measure(scenario, frames, quantise_times.quantile(0.5));
+}
+
+// The surface stream of a recorded session, as its clients saw it.
+Result<std::vector<QuantisedSurface>> read_stream(const std::string& path) {
+  auto journal = journal::SessionJournal::open(path);
+  if (!journal) return journal.error();
+  const Tick last = (*journal)->info().last_tick;
+  const auto topology = (*journal)->topology_before(last);
+  if (!topology) return topology.error();
+  const Error no_surface{ErrorCode::BadFile, path + ": holds no surface stream"};
+  if (!topology->has_value()) return no_surface;
+  const auto vertex_count = static_cast<std::size_t>((*topology)->rest_position_quanta_size()) / 3;
+  std::vector<QuantisedSurface> frames(1, QuantisedSurface(vertex_count));
+  const auto first_key = (*journal)->surface_key_before(kTicksPerFrame);
+  if (!first_key || !first_key->has_value() ||
+      !decode_keyframe(bytes_of(std::string_view((*first_key)->payload())), frames.front()))
+    return no_surface;
+  Status decoded;
+  const auto read =
+      (*journal)->read_surface_deltas(0, last, [&](Tick, const proto::SurfaceFrame& frame) {
+        QuantisedSurface next = frames.back();
+        decoded = decode_delta(bytes_of(std::string_view(frame.payload())), next);
+        frames.push_back(std::move(next));
+        return decoded.ok();
+      });
+  if (!read.ok()) return read.error();
+  if (!decoded.ok()) return Error{ErrorCode::BadFile, path + ": " + decoded.error().message};
+  return frames;
+}
+
+bool measure_recorded(const std::string& path) {
+  const auto frames = read_stream(path);
+  if (!frames) return report("bench_codec", frames.error()) == 0;
+  bool same = true;
+  for (const std::size_t lag : {1u, 4u, 12u}) {
+    const std::string name = "recorded, lag " + std::to_string(lag);
+    same &= measure({name.c_str(), 0, 0, lag, 0, 0, 0, 0}, *frames, 0);
+  }
   return same;
 }
 
@@ -204,10 +251,13 @@ int main(int argc, char** argv) {
   CLI::App app{
       "Bytes and time of the surface codec on a synthetic stream, beside the design's figures."};
   app.footer(
-      "Example:\n  bench_codec\n\nTimes are thread CPU microseconds per frame. 'page' columns are "
+      "Examples:\n  bench_codec\n  bench_codec out/demo/session.mcap\n\nTimes are thread CPU "
+      "microseconds per frame. 'page' columns are "
       "the "
       "design's figures, 0 where it\ngives none; its encode times leave out the scan for changes "
       "(30 us), ours hold it.");
+  std::string recording;
+  app.add_option("JOURNAL", recording, "a recorded session (.mcap) to measure too");
   CLI11_PARSE(app, argc, argv);
 
   std::printf("%-22s %11s %11s %5s %6s | %17s | %17s | %11s | %18s | chained\n", "", "changed",
@@ -217,6 +267,7 @@ int main(int argc, char** argv) {
       "10,000 vertices", "mean", "page", "mean", "page", "B/v", "peak", "p50", "p99", "page", "p50",
       "p99", "page", "quant", "CRC", "bytes", "enc", "dec");
   bool same = true;
-  for (const Scenario& scenario : kScenarios) same &= measure(scenario);
+  for (const Scenario& scenario : kScenarios) same &= measure_synthetic(scenario);
+  if (!recording.empty()) same &= measure_recorded(recording);
   return static_cast<int>(same ? ExitCode::Ok : ExitCode::Mismatch);
 }
