@@ -37,4 +37,25 @@ Organ make_lattice();
 inline constexpr int kMinLiverTets = 500, kMaxLiverTets = 200'000, kDefaultLiverTets = 18'500;
 Result<Organ> make_liver(int target_tets = kDefaultLiverTets);
 
+// The plate that Nakao 2003 cuts: 160 x 4 x 160 mm, y (up) through its thickness so that it lies
+// flat; 24 x 24 cells in one layer, six tets each in mirrored pairs, 32 of the cells with a node in
+// the middle and twelve tets. Nakao printed 1,274 nodes, 6,160 edges, 3,647 tets and 2,500
+// polygons, which no one closed solid has (nodes - edges + tets + half the polygons is 11, must be
+// 1); this one has 1,282, 6,177, 3,648 and 2,496 boundary triangles, all within 1 %. 900 kg/m^3;
+// springs 100 N/m, dampers along them 0.05 N s/m, and the nodes' own damping as in other organs;
+// Young's modulus 58 kPa, that of such springs on average over all directions. The rim (the four
+// thin sides) is fixed: free, the plate would shrink under tension instead of opening where it is
+// cut.
+Organ make_plate();
+
+// An adult's stomach (stomach_shape.h), a hollow sac with two openings: 198 x 220 x 125 mm, 0.8 l
+// inside, wall 7 mm, one surface of genus 1. Meshed by isosurface stuffing to within 5 % of
+// `target_tets`; no tet, not even an edge, goes from the outer face of the wall to the inner one,
+// so that the wall is two tets thick or more everywhere, which is why coarser ones are not made.
+// Young's modulus 4 kPa, 1060 kg/m^3; held 8 mm deep around both openings, free between them. The
+// default takes 1 s of CPU time, 200,000 tets 6 s.
+inline constexpr int kMinStomachTets = 50'000, kMaxStomachTets = 200'000,
+                     kDefaultStomachTets = 60'000;
+Result<Organ> make_stomach(int target_tets = kDefaultStomachTets);
+
 }  // namespace trocar::scene

@@ -47,6 +47,8 @@ Result<ImportedOrgan> import_organ(const std::filesystem::path& path,
 Result<Organ> load_organ(const std::string& spec) {
   if (spec == "liver") return make_liver();
   if (spec == "lattice") return make_lattice();
+  if (spec == "plate") return make_plate();
+  if (spec == "stomach") return make_stomach();
   const std::filesystem::path path(spec);
   if (path.extension() == ".organ") return read_organ(path);
   if (path.extension() == ".msh") {
@@ -56,7 +58,7 @@ Result<Organ> load_organ(const std::string& spec) {
     return std::move(imported->organ);
   }
   return Error{ErrorCode::BadFile, "organ '" + spec +
-                                       "' is neither liver nor lattice, nor an "
+                                       "' is neither liver, lattice, plate nor stomach, nor an "
                                        ".organ or .msh file"};
 }
 

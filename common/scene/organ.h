@@ -32,7 +32,7 @@ struct Material {
 };
 
 struct Organ {
-  std::string name;    // "liver", "lattice", or the file's stem
+  std::string name;    // "liver" or another built-in one's, or the file's stem
   std::string source;  // one line: generator and parameters, or the imported file's name
   mesh::TetMesh mesh;  // adjacency built; rest bounding box centred on the origin
   Material material;

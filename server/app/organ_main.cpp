@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <numeric>
+#include <optional>
 #include <string>
 
 #include "common/base/cpu.h"
@@ -29,9 +30,11 @@ Examples:
       the built-in liver with about 4,000 nodes, into liver.organ
   trocar-organ make liver --tets 100000 --out fine.organ
       the same liver, finer
-  trocar-organ import stomach.msh --unit mm --fix back:0.1
-      a mesh in millimetres, held at the hindmost tenth, into stomach.organ
-  trocar-organ inspect stomach.organ --json
+  trocar-organ make stomach
+      a hollow one, its wall two tets thick or more, into stomach.organ
+  trocar-organ import spleen.msh --unit mm --fix back:0.1
+      a mesh in millimetres, held at the hindmost tenth, into spleen.organ
+  trocar-organ inspect spleen.organ --json
       its figures, for other programs
 
 Exit codes: 0 ok, 2 command line, 3 bad file, 5 cannot write or processor too old.
@@ -40,7 +43,7 @@ Exit codes: 0 ok, 2 command line, 3 bad file, 5 cannot write or processor too ol
 struct Options {
   std::string log_level = "info";
   std::string made_name;
-  int tets = 0;  // 0: the default
+  std::optional<int> tets;
   std::string out;
   std::string import_file;
   std::string unit = "m";
@@ -199,16 +202,22 @@ Status save(const scene::Organ& organ, const std::string& path) {
   return {};
 }
 
-Result<scene::Organ> make_named(const std::string& name, int tets) {
+Result<scene::Organ> make_named(const std::string& name, const std::optional<int>& tets) {
   if (name == "lattice") {
-    if (tets != 0)
+    if (tets)
       return Error{ErrorCode::Usage, "make lattice: --tets does not apply, a lattice has none"};
     return scene::make_lattice();
   }
-  if (tets >= kManyTets)
-    std::fprintf(stderr, "%s: meshing a liver of about %s tets, this takes some seconds\n",
-                 kProgram, grouped(static_cast<std::size_t>(tets)).c_str());
-  return scene::make_liver(tets == 0 ? scene::kDefaultLiverTets : tets);
+  if (name == "plate") {
+    if (tets)
+      return Error{ErrorCode::Usage, "make plate: --tets does not apply, its mesh is given"};
+    return scene::make_plate();
+  }
+  if (tets.value_or(0) >= kManyTets)
+    std::fprintf(stderr, "%s: meshing a %s of about %s tets, this takes some seconds\n", kProgram,
+                 name.c_str(), grouped(static_cast<std::size_t>(*tets)).c_str());
+  if (name == "stomach") return scene::make_stomach(tets.value_or(scene::kDefaultStomachTets));
+  return scene::make_liver(tets.value_or(scene::kDefaultLiverTets));
 }
 
 Status run_make(const Options& options) {
@@ -255,14 +264,21 @@ std::string version_text() {
 
 void add_commands(CLI::App& app, Options& options) {
   auto* make = app.add_subcommand("make", "make a built-in organ");
-  make->add_option("NAME", options.made_name, "liver or lattice (Choi's 30 x 15 x 30 nodes)")
+  make->add_option(
+          "NAME", options.made_name,
+          "liver, stomach, lattice (Choi's 30 x 15 x 30 nodes) or plate (Nakao's 16 x 16 x 0.4 cm)")
       ->required()
-      ->check(CLI::IsMember({"liver", "lattice"}));
+      ->check(CLI::IsMember({"liver", "stomach", "lattice", "plate"}));
+  const auto range = [](int low, int high, int usual) {
+    return std::to_string(low) + " to " + std::to_string(high) + " [" + std::to_string(usual) + "]";
+  };
   make->add_option(
           "--tets", options.tets,
-          "tets of the liver, met within 5 % [" + std::to_string(scene::kDefaultLiverTets) + "]")
-      ->type_name("N")
-      ->check(CLI::Range(scene::kMinLiverTets, scene::kMaxLiverTets));
+          "how many tets, met within 5 %: liver " +
+              range(scene::kMinLiverTets, scene::kMaxLiverTets, scene::kDefaultLiverTets) +
+              ", stomach " +
+              range(scene::kMinStomachTets, scene::kMaxStomachTets, scene::kDefaultStomachTets))
+      ->type_name("N");
   make->add_option("--out", options.out, "file to write [NAME.organ]")->type_name("FILE");
 
   auto* import = app.add_subcommand("import", "turn a Gmsh 2.2 ASCII mesh into an organ");
@@ -282,7 +298,7 @@ void add_commands(CLI::App& app, Options& options) {
       ->type_name("FILE");
 
   auto* inspect = app.add_subcommand("inspect", "check an organ and print its figures");
-  inspect->add_option("FILE", options.inspected, ".organ or .msh file, liver or lattice")
+  inspect->add_option("FILE", options.inspected, ".organ or .msh file, or a built-in organ's name")
       ->required();
   inspect->add_flag("--json", options.json, "print JSON");
 }

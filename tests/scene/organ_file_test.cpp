@@ -214,6 +214,8 @@ TEST(FixRule, HoldsTheSurfaceOfOneSide) {
 TEST(LoadOrgan, KnowsTheBuiltInOnesAndRefusesTheRest) {
   EXPECT_EQ(load_organ("liver")->name, "liver");
   EXPECT_EQ(load_organ("lattice")->name, "lattice");
+  EXPECT_EQ(load_organ("plate")->name, "plate");
+  EXPECT_EQ(load_organ("stomach")->name, "stomach");
   for (const char* spec : {"", "kidney", "/nonexistent.organ", "/nonexistent.msh", "/etc/passwd"}) {
     const auto organ = load_organ(spec);
     ASSERT_FALSE(organ.ok()) << spec;
