@@ -16,8 +16,9 @@ class Resolver {
   explicit Resolver(const Scenario& scenario) : scenario_(scenario) {}
 
   Error wrong(const Place& place, const std::string& what) const {
-    return {ErrorCode::BadFile, scenario_.source.string() + ":" + std::to_string(place.line) +
-                                    ": key " + place.key + ": " + what};
+    const std::string line = place.line > 0 ? ":" + std::to_string(place.line) : "";
+    return {ErrorCode::BadFile,
+            scenario_.source.string() + line + ": key " + place.key + ": " + what};
   }
 
   Result<Organ> make_organ() const {
@@ -202,11 +203,18 @@ Status resolve_anchors(const Resolver& resolver, const Scenario& scenario,
     triangles.push_back({a.value, b.value, c.value});
   for (std::size_t i = 0; i < scenario.tools.size(); ++i) {
     result.anchors.emplace_back();
-    if (!scenario.tools[i].anchor) continue;
-    const auto anchor = find_anchor(*scenario.tools[i].anchor, rest, triangles);
-    if (!anchor)
-      return resolver.wrong({0, "tool[" + std::to_string(i) + "].anchor"}, anchor.error().message);
-    result.anchors.back() = *anchor;
+    const auto& tool = scenario.tools[i];
+    const std::string key = "tool[" + std::to_string(i) + "]";
+    if (tool.anchor) {
+      const auto anchor = find_anchor(*tool.anchor, rest, triangles);
+      if (!anchor) return resolver.wrong({0, key + ".anchor"}, anchor.error().message);
+      result.anchors.back() = *anchor;
+    }
+    for (std::size_t k = 0; k < tool.keys.size(); ++k)
+      if (!(length(sample(tool, tool.keys[k].time_s, result.anchors.back())
+                       .world_from_tool.position) <= kScriptReachLimit))
+        return resolver.wrong({0, key + ".key[" + std::to_string(k) + "].position_mm"},
+                              "is more than 2000 mm from the centre of this organ, move it nearer");
   }
   return {};
 }

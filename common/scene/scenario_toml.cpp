@@ -8,6 +8,8 @@ namespace {
 
 constexpr double kMaxCoordinate_mm = 10'000;
 constexpr double kMaxForce_n = 1e6;
+constexpr std::int64_t kMaxLatticeNodes = 2'000'000;
+constexpr std::size_t kMaxTables = 1000;  // [[displace]], [[force]], [[probe]] each
 
 std::string entry(const char* table, std::size_t i) {
   return std::string(table) + "[" + std::to_string(i) + "]";
@@ -15,6 +17,14 @@ std::string entry(const char* table, std::size_t i) {
 
 Place place_of(const TableReader& reader, std::string_view key) {
   return {reader.line(key), reader.path_of(key)};
+}
+
+std::vector<const toml::table*> limited_tables(TableReader& root, const char* name) {
+  auto tables = root.tables(name);
+  if (tables.size() > kMaxTables)
+    root.fail(name, "appears " + std::to_string(tables.size()) + " times, allowed are " +
+                        std::to_string(kMaxTables));
+  return tables;
 }
 
 ScenarioOrgan read_organ(TableReader& reader) {
@@ -30,6 +40,9 @@ ScenarioOrgan read_organ(TableReader& reader) {
     else if (nodes->size() != 3 ||
              !std::all_of(nodes->begin(), nodes->end(), [](auto n) { return n >= 2 && n <= 400; }))
       reader.fail("nodes", "is not three numbers from 2 to 400, write [nx, ny, nz]");
+    else if ((*nodes)[0] * (*nodes)[1] * (*nodes)[2] > kMaxLatticeNodes)
+      reader.fail("nodes", "makes " + std::to_string((*nodes)[0] * (*nodes)[1] * (*nodes)[2]) +
+                               " nodes, allowed are " + std::to_string(kMaxLatticeNodes));
     else
       organ.lattice_nodes = {static_cast<int>((*nodes)[0]), static_cast<int>((*nodes)[1]),
                              static_cast<int>((*nodes)[2])};
@@ -139,7 +152,7 @@ TimedVector read_over_time(Document& document, TableReader& reader, std::string_
 std::vector<LoadRule> read_loads(Document& document, TableReader& root, const char* table,
                                  std::string_view value_key, double scale, double most) {
   std::vector<LoadRule> loads;
-  const auto tables = root.tables(table);
+  const auto tables = limited_tables(root, table);
   for (std::size_t i = 0; i < tables.size() && document.ok(); ++i) {
     TableReader reader(document, *tables[i], entry(table, i));
     const auto set = read_set(reader);
@@ -153,7 +166,7 @@ std::vector<LoadRule> read_loads(Document& document, TableReader& root, const ch
 
 std::vector<ProbeRule> read_probes(Document& document, TableReader& root, std::size_t tool_count) {
   std::vector<ProbeRule> probes;
-  const auto tables = root.tables("probe");
+  const auto tables = limited_tables(root, "probe");
   for (std::size_t i = 0; i < tables.size() && document.ok(); ++i) {
     TableReader reader(document, *tables[i], entry("probe", i));
     ProbeRule probe;

@@ -2,6 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <random>
+
 #include "common/scene/scenario.h"
 
 namespace trocar::scene {
@@ -9,7 +14,7 @@ namespace {
 
 struct Bad {
   const char* name;
-  const char* text;  // wrong in its last line, unless `line` says otherwise
+  const char* text;  // wrong in its last line, unless `line` says otherwise (-1: none)
   const char* key;
   const char* says;
   int line = 0;
@@ -51,8 +56,9 @@ TEST_P(BadScenario, IsOneLineWithFileLineAndKey) {
   } else {
     message = parsed.error().message;
   }
-  const int line = bad.line > 0 ? bad.line : lines_of(text);
-  const std::string start = "bad.toml:" + std::to_string(line) + ": key " + bad.key + ": ";
+  const int line = bad.line != 0 ? bad.line : lines_of(text);
+  const std::string place = line < 0 ? "bad.toml" : "bad.toml:" + std::to_string(line);
+  const std::string start = place + ": key " + bad.key + ": ";
   EXPECT_TRUE(message.starts_with(start)) << message << "\nexpected " << start;
   EXPECT_NE(message.find(bad.says), std::string::npos) << message;
   EXPECT_EQ(message.find('\n'), std::string::npos);
@@ -121,6 +127,9 @@ INSTANTIATE_TEST_SUITE_P(
         Bad{"field_too_late", "[output]\nfields_s = [0.5, 1.5]", "output.fields_s",
             "from 0 to 1 s"},
         Bad{"fields_not_sorted", "[output]\nfields_s = [0.5, 0.25]", "output.fields_s", "order"},
+        Bad{"far_tool",
+            "[[tool]]\nanchor = [0, 1, 0]\n[[tool.key]]\ntime_s = 0\nposition_mm = [0, 1999, 0]",
+            "tool[0].key[0].position_mm", "more than 2000 mm", -1},
         Bad{"tool_key", "[[tool]]\n[[tool.key]]\ntime_s = 0\nposition_mm = [0, 0, nan]",
             "tool[0].key[0].position_mm", "not finite"}),
     [](const auto& test) { return std::string(test.param.name); });
@@ -199,6 +208,27 @@ TEST(ScenarioParse, TimedVectorsAreLinearBetweenKeysAndConstantOutside) {
   EXPECT_EQ(v.at(0), (Vec3d{0, 0, 0}));
   EXPECT_EQ(v.at(1.5), (Vec3d{1, 0, -2}));
   EXPECT_EQ(v.at(9), (Vec3d{2, 0, -4}));
+}
+
+// Whatever the bytes are, the answer is a scenario or an error of one line.
+TEST(ScenarioParse, TruncatedAndDamagedTextIsAnsweredWithoutCrash) {
+  std::ifstream file(std::filesystem::path(TROCAR_SOURCE_DIR) / "deploy/scenes/pull.toml");
+  const std::string good{std::istreambuf_iterator<char>(file), {}};
+  ASSERT_TRUE(parse_scenario_text(good, "pull.toml").ok());
+  const auto check = [](const std::string& text) {
+    const auto scenario = parse_scenario_text(text, "a.toml");
+    if (scenario.ok()) return;
+    EXPECT_TRUE(scenario.error().message.starts_with("a.toml")) << scenario.error().message;
+  };
+  for (std::size_t size = 0; size < good.size(); ++size) check(good.substr(0, size));
+  std::mt19937 random(5);
+  for (int i = 0; i < 2000; ++i) {
+    std::string text = good;
+    for (int j = 0; j < 3; ++j)
+      text[random() % text.size()] =
+          static_cast<char>(random() % 2 ? random() % 256 : "[]{}=\"'\n.,-1"[random() % 13]);
+    check(text);
+  }
 }
 
 }  // namespace
