@@ -24,8 +24,8 @@ class Hands {
   device::MouseTool* mouse_tool() { return mouse_ ? &*mouse_ : nullptr; }
 
   // Sends what is due. A script begins with the first frame this client shows and runs in simulated
-  // time, so that it is the same script on a server that cannot keep up. An error means that it does
-  // not fit the organ.
+  // time, so that it is the same script on a server that cannot keep up. An error means that it
+  // does not fit the organ.
   Status send_due(const replica::Replica& replica, replica::SessionSource& source,
                   std::uint64_t now_ns);
 

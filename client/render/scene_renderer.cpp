@@ -15,7 +15,7 @@ namespace trocar::render {
 namespace {
 
 constexpr int kMaxShadows = 8;
-constexpr float kOverlayStrength = 0.80f;
+constexpr float kOverlayStrength = 0.50f;
 constexpr float kOverlayFadeSeconds = 0.12f;
 constexpr std::size_t kTriangleBudgetSoftware = 16'000, kTriangleBudget = 100'000;
 

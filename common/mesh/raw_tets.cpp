@@ -95,9 +95,10 @@ class Builder {
       char text[160];
       const double in_file_unit = largest / metres_of(unit_);
       const bool may_be_mm = unit_ == Unit::Metre && in_file_unit <= kMaxSize_m * 1000;
-      std::snprintf(text, sizeof text, "is %.4g m wide, larger than 2 m: %s", largest,
-                    may_be_mm ? "if the file is in millimetres, give --unit mm"
-                              : "scale it, or give the unit with --unit m, cm or mm");
+      std::snprintf(
+          text, sizeof text, "is %.4g m wide, larger than 2 m: %s", largest,
+          may_be_mm ? "if the file is in millimetres, import it with trocar-organ import --unit mm"
+                    : "scale it, or give the unit with --unit m, cm or mm");
       return error(text);
     }
     if (largest == 0) return error("all nodes are at the same place");

@@ -42,7 +42,10 @@ constexpr Outcome kOutcomes[] = {
     {"face_shared_by_three.msh", "belongs to three tets (element 1072, 1558, 1559)", nullptr},
     {"unused_nodes.msh", nullptr, "dropped 30 nodes"},
     {"two_parts.msh", nullptr, "2 separate pieces"},
-    {"units_mm.msh", "larger than 2 m: if the file is in millimetres, give --unit mm", nullptr},
+    {"units_mm.msh",
+     "larger than 2 m: if the file is in millimetres, import it with "
+     "trocar-organ import --unit mm",
+     nullptr},
     {"all_nodes_equal.msh", "all nodes are at the same place", nullptr},
     {"far_from_origin.msh", nullptr, "far from the origin"},
     {"mesh_2d.msh", "no tetrahedra", nullptr},
