@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/assert.h"
+
 namespace trocar::dynamics {
 namespace {
 
@@ -72,15 +74,16 @@ void BlockDescent::link_constraints(const contact::ContactList& contacts) {
   }
 }
 
-void BlockDescent::prepare_step(std::span<const NodeIndex> active, float dt,
-                                const world::World& world) {
+void BlockDescent::prepare_step(std::span<const NodeIndex> nodes, float dt,
+                                const world::World& world, std::span<const Vec3f> forces) {
   const float inverse_dt = 1.0f / dt;
-  for (const auto node : active) {
+  for (const auto node : nodes) {
     const auto n = node.value;
     Inertia& inertia = inertia_[n];
     inertia.inertia = world.masses[n] * inverse_dt * inverse_dt +
                       world.masses[n] * springs_.node_damping_per_s() * inverse_dt;
     inertia.momentum = world.velocities[n] * (world.masses[n] * inverse_dt);
+    if (!forces.empty()) inertia.momentum += forces[n];
     inertia.block = springs_.prepare_step(node, start_, inverse_dt, terms_);
     inertia.block.add_identity(inertia.inertia);
     // Starting where inertia alone would lead makes rigid motion exact from the first sweep;
@@ -102,19 +105,36 @@ BlockDescent::NodeStep BlockDescent::linearise(const contact::ContactList& conta
   return step;
 }
 
+void BlockDescent::finish_step(std::span<const NodeIndex> nodes, float inverse_dt,
+                               world::World& world) const {
+  for (const auto node : nodes) {
+    const auto n = node.value;
+    world.velocities[n] = (x_[n] - start_[n]) * inverse_dt;
+    world.displacements[n] = x_[n];
+  }
+}
+
 SolveReport BlockDescent::solve(const contact::ContactList& contacts,
                                 std::span<const NodeIndex> active, const SolveSettings& settings,
-                                world::World& world) {
+                                world::World& world, const ExternalLoads& loads) {
+  TROCAR_ASSERT(loads.held.size() == loads.held_displacements.size());
+  TROCAR_ASSERT(loads.forces.empty() || loads.forces.size() == world.node_count());
   SolveReport report;
   reset(world);
   link_constraints(contacts);
   residuals_.resize(active.size());
   const float inverse_dt = 1.0f / settings.dt;
-  prepare_step(active, settings.dt, world);
+  prepare_step(active, settings.dt, world, loads.forces);
+  prepare_step(loads.held, settings.dt, world, loads.forces);
+  for (std::size_t i = 0; i < loads.held.size(); ++i)
+    x_[loads.held[i].value] = loads.held_displacements[i];
   float omega = settings.sweeps < 3
                     ? std::min(settings.over_relaxation, kMaxOverRelaxationFewSweeps)
                     : settings.over_relaxation;
   float last_sum = INFINITY;
+  const float tolerance = settings.residual_tolerance_n;
+  const float sum_tolerance =
+      tolerance > 0 ? tolerance * tolerance * static_cast<float>(active.size()) : -1.0f;
   for (std::uint32_t sweep = 0; sweep < settings.sweeps; ++sweep) {
     float sum = 0;
     report.nodes_rejected = 0;
@@ -136,12 +156,11 @@ SolveReport BlockDescent::solve(const contact::ContactList& contacts,
       report.is_stepped_down = true;
     }
     last_sum = sum;
+    report.sweeps = sweep + 1;
+    if (sum <= sum_tolerance && report.nodes_rejected == 0) break;
   }
-  for (const auto node : active) {
-    const auto n = node.value;
-    world.velocities[n] = (x_[n] - start_[n]) * inverse_dt;
-    world.displacements[n] = x_[n];
-  }
+  finish_step(active, inverse_dt, world);
+  finish_step(loads.held, inverse_dt, world);
   if (!active.empty()) report.residual_n = std::sqrt(last_sum / static_cast<float>(active.size()));
   return report;
 }

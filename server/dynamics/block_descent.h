@@ -22,12 +22,24 @@ struct SolveSettings {
   std::uint32_t sweeps = 4;
   float over_relaxation = 1.5f;  // below three sweeps at most 1.3 is used: more overshoots
   float dt = 1e-3f;              // s
+  // Sweeping ends before `sweeps` when a sweep's residual is at most this; 0: never.
+  float residual_tolerance_n = 0;
+};
+
+// What acts from outside besides tools. Default: nothing.
+struct ExternalLoads {
+  std::span<const Vec3f> forces;  // N, per node of the organ; empty: none
+  // Nodes put where `held_displacements` says at the end of the step, with whatever force that
+  // takes (holding_force). None of them is active.
+  std::span<const NodeIndex> held;
+  std::span<const Vec3f> held_displacements;  // m, per entry of `held`
 };
 
 struct SolveReport {
   float residual_n = 0;  // root mean square over active nodes, last sweep, before each node's step
   bool is_stepped_down = false;
   std::uint32_t nodes_rejected = 0;  // their step was not finite
+  std::uint32_t sweeps = 0;          // done
 };
 
 class BlockDescent {
@@ -36,7 +48,8 @@ class BlockDescent {
 
   // Advances displacements and velocities of `active` nodes by one step; all other nodes stay.
   SolveReport solve(const contact::ContactList& contacts, std::span<const NodeIndex> active,
-                    const SolveSettings& settings, world::World& world);
+                    const SolveSettings& settings, world::World& world,
+                    const ExternalLoads& loads = {});
 
   // Force imbalance per entry of `active` in the last sweep, N.
   std::span<const float> residuals_n() const { return residuals_; }
@@ -46,6 +59,12 @@ class BlockDescent {
   Vec3f reaction(const contact::ContactList& contacts, const contact::ToolContact& tool,
                  const world::World& world, float dt) const;
 
+  // Force on a node of the last solve's loads.held that put it where it is, N: what springs,
+  // damping, loads and tools leave of its mass times acceleration.
+  Vec3f holding_force(const contact::ContactList& contacts, NodeIndex node, float dt) const {
+    return linearise(contacts, node, 1.0f / dt).gradient;
+  }
+
  private:
   struct NodeStep {
     Vec3f gradient;
@@ -54,7 +73,9 @@ class BlockDescent {
   void reset(const world::World& world);
   void link_constraints(const contact::ContactList& contacts);
   NodeStep linearise(const contact::ContactList& contacts, NodeIndex node, float inverse_dt) const;
-  void prepare_step(std::span<const NodeIndex> active, float dt, const world::World& world);
+  void prepare_step(std::span<const NodeIndex> nodes, float dt, const world::World& world,
+                    std::span<const Vec3f> forces);
+  void finish_step(std::span<const NodeIndex> nodes, float inverse_dt, world::World& world) const;
 
   const SpringNetwork& springs_;
   // Inertia and damping of a node, constant in a step: the gradient is
@@ -62,7 +83,7 @@ class BlockDescent {
   struct Inertia {
     SymMat3f block;
     float inertia = 0;  // m/dt^2 + rate m/dt, N/m
-    Vec3f momentum;     // m/dt v, N
+    Vec3f momentum;     // m/dt v and loads, N
   };
   std::vector<Inertia> inertia_;                 // per node, valid for active ones
   std::vector<SpringNetwork::StepTerms> terms_;  // per spring batch, likewise

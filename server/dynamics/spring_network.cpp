@@ -34,7 +34,8 @@ Float8 dot8(const Vec8& a, const Vec8& b) {
 
 // (x, y, z, 0) without touching what lies behind z.
 __m128 load_vector(const Vec3f& v) {
-  const __m128 xy = _mm_castpd_ps(_mm_load_sd(reinterpret_cast<const double*>(&v.x)));
+  // Not _mm_load_sd: a Vec3f is aligned to four bytes, a double to eight.
+  const __m128 xy = _mm_castsi128_ps(_mm_loadu_si64(&v.x));
   return _mm_movelh_ps(xy, _mm_load_ss(&v.z));
 }
 

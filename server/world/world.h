@@ -4,8 +4,8 @@
 //
 // Displacements are float32 relative to rest (the rest pose stays in double in the organ), so a
 // micrometre is still exact a metre from the origin. Invariants: fixed nodes have zero displacement
-// and velocity; frozen nodes have zero velocity; everything is finite.
-// Owned by the simulation thread; nobody else sees it.
+// and velocity, except those that a scenario moves; frozen nodes have zero velocity; everything is
+// finite. Owned by the simulation thread; nobody else sees it.
 
 #include <vector>
 

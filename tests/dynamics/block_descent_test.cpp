@@ -152,5 +152,46 @@ TEST(BlockDescent, ANonFiniteNodeIsRejectedAndCounted) {
   for (const auto& u : bench.world.displacements) EXPECT_TRUE(is_finite(u));
 }
 
+TEST(BlockDescent, ForcesInProportionToMassMakeItFallFreely) {
+  auto organ = lattice(3, 3, 3);
+  organ.fixed_nodes.clear();
+  organ.material.node_damping_per_s = 0;
+  Bench bench(organ);
+  std::vector<Vec3f> forces;
+  for (const float mass : bench.world.masses) forces.push_back({0, -9.81f * mass, 0});
+  for (int tick = 0; tick < 100; ++tick)
+    bench.solver.solve(bench.contacts, bench.free_nodes, {.sweeps = 60}, bench.world,
+                       {.forces = forces});
+  for (const auto& v : bench.world.velocities) {
+    EXPECT_NEAR(v.y, -0.981, 1e-4);
+    EXPECT_NEAR(v.x, 0, 1e-5);
+  }
+}
+
+TEST(BlockDescent, HeldNodesGoWhereTheyArePutAndTheForceForThatIsKnown) {
+  Bench bench(lattice(2, 6, 2));
+  std::vector<NodeIndex> held = bench.organ.fixed_nodes;
+  const std::size_t fixed_count = held.size();
+  std::vector<NodeIndex> active;
+  for (const auto node : bench.free_nodes)
+    (bench.organ.mesh.rest_positions[node.value].y > 0.0249 ? held : active).push_back(node);
+  ASSERT_EQ(held.size(), 8u);
+  std::vector<Vec3f> places(held.size());
+  for (std::size_t i = fixed_count; i < held.size(); ++i) places[i] = {0, 0.010f, 0};
+  SolveReport report;
+  for (int tick = 0; tick < 3000; ++tick)
+    report =
+        bench.solver.solve(bench.contacts, active, {.sweeps = 500, .residual_tolerance_n = 1e-6f},
+                           bench.world, {.held = held, .held_displacements = places});
+  EXPECT_LT(report.sweeps, 500u) << "the tolerance ends the sweeps";
+  EXPECT_LE(report.residual_n, 1e-6f);
+  const double expected = 0.010 / 5 * bench.organ.material.spring_stiffness_n_m;
+  for (std::size_t i = 0; i < held.size(); ++i) {
+    EXPECT_EQ(bench.world.displacements[held[i].value], places[i]);
+    const Vec3f force = bench.solver.holding_force(bench.contacts, held[i], kTickSeconds);
+    EXPECT_NEAR(force.y, i < fixed_count ? -expected : expected, 1e-3 * expected);
+  }
+}
+
 }  // namespace
 }  // namespace trocar::dynamics

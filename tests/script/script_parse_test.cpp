@@ -188,6 +188,9 @@ TEST(ScriptParse, ScriptsOfTheRepositoryParse) {
   const auto folder = std::filesystem::path(TROCAR_SOURCE_DIR) / "deploy/scenes";
   int count = 0;
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    std::ifstream file(entry.path());
+    const std::string text{std::istreambuf_iterator<char>(file), {}};
+    if (text.find("\n[organ]") != std::string::npos) continue;  // a scenario
     const auto script = parse_script(entry.path());
     EXPECT_TRUE(script.ok()) << script.error().message;
     ++count;

@@ -1,0 +1,204 @@
+// trocar-sim: runs a scenario on the engine, without a network, and writes what its probes saw.
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cinttypes>
+#include <csignal>
+#include <cstdio>
+#include <filesystem>
+#include <string>
+
+#include "common/base/cpu.h"
+#include "common/base/log.h"
+#include "common/base/timing.h"
+#include "common/base/version.h"
+#include "server/scenario/field_files.h"
+#include "server/scenario/probe_file.h"
+#include "server/scenario/scenario_run.h"
+
+namespace trocar::app {
+namespace {
+
+constexpr const char* kProgram = "trocar-sim";
+constexpr std::uint64_t kProgressAfter_ns = 2'000'000'000, kProgressEvery_ns = 500'000'000;
+
+constexpr const char* kExamples = R"(
+Examples:
+  trocar-sim deploy/scenes/pull.toml
+      pulls at a block of tissue; results in out/pull
+  trocar-sim deploy/scenes/pull.toml --solver full --out /tmp/reference
+      the same with every step solved to the tolerance in [run]
+
+Writes probes.csv, and field_<ms>ms.csv and .vtu (ParaView) for the times in [output].
+Ctrl-C ends a run early; what was written until then is complete.
+
+Exit codes: 0 ok (also after Ctrl-C), 2 command line, 3 bad scenario or organ, 5 cannot write or
+processor too old.
+)";
+
+struct Options {
+  std::string scenario;
+  std::string out;
+  std::string solver = "live";
+  std::string log_level = "info";
+};
+
+volatile std::sig_atomic_t stop_requested = 0;
+extern "C" void request_stop(int) {
+  stop_requested = 1;
+}
+
+// A line on stderr that is rewritten, once a run has taken two seconds.
+class Progress {
+ public:
+  void show(const scenario::ScenarioRun& run) {
+    const std::uint64_t now = monotonic_ns();
+    if (now < next_) return;
+    next_ = now + kProgressEvery_ns;
+    is_shown_ = true;
+    std::fprintf(stderr, "\r%s: %.3f of %.3f s", kProgram, static_cast<double>(run.tick()) * 1e-3,
+                 static_cast<double>(run.last_tick()) * 1e-3);
+  }
+  void end() const {
+    if (is_shown_) std::fputc('\n', stderr);
+  }
+  bool is_shown() const { return is_shown_; }
+
+ private:
+  std::uint64_t next_ = monotonic_ns() + kProgressAfter_ns;
+  bool is_shown_ = false;
+};
+
+struct Totals {
+  std::uint64_t sweeps = 0, unconverged = 0, rejected = 0;
+  std::size_t most_active = 0;
+  float worst_residual_n = 0;
+  Tick first_rejected = 0;
+
+  void add(Tick tick, const scenario::StepReport& report) {
+    sweeps += report.solve.sweeps;
+    unconverged += report.is_converged ? 0 : 1;
+    if (rejected == 0) first_rejected = tick;
+    rejected += report.solve.nodes_rejected;
+    most_active = std::max(most_active, report.active_nodes);
+    worst_residual_n = std::max(worst_residual_n, report.solve.residual_n);
+  }
+};
+
+Status simulate(scenario::ScenarioRun& run, const std::filesystem::path& folder, Totals& totals) {
+  auto probes = scenario::ProbeFile::create(folder / "probes.csv", run.scenario());
+  if (!probes) return probes.error();
+  const auto& times = run.scenario().field_times_s;
+  std::size_t next_field = 0;
+  const auto write_due_field = [&]() -> Status {
+    const double now = static_cast<double>(run.tick()) * 1e-3;
+    bool is_due = false;
+    for (; next_field < times.size() && times[next_field] <= now + 0.5e-3; ++next_field)
+      is_due = true;
+    return is_due ? scenario::write_field(folder, run) : Status{};
+  };
+  Progress progress;
+  if (auto s = write_due_field(); !s) return s;
+  while (!run.is_finished() && stop_requested == 0) {
+    const auto report = run.step();
+    totals.add(run.tick(), report);
+    probes->add(run);
+    if (auto s = write_due_field(); !s) return s;
+    progress.show(run);
+    if (progress.is_shown()) probes->flush();
+  }
+  progress.end();
+  return probes->close();
+}
+
+void print_summary(const scenario::ScenarioRun& run, const Totals& totals,
+                   const std::filesystem::path& folder) {
+  const double seconds = static_cast<double>(run.tick()) * 1e-3;
+  if (!run.is_finished())
+    std::fprintf(stderr, "%s: stopped at %.3f of %.3f s\n", kProgram, seconds,
+                 static_cast<double>(run.last_tick()) * 1e-3);
+  if (totals.unconverged > 0)
+    std::fprintf(
+        stderr,
+        "%s: warning: %" PRIu64 " of %" PRIu64
+        " steps did not reach %g N in %u sweeps: raise max_sweeps or tolerance_n in [run]\n",
+        kProgram, totals.unconverged, run.tick(), run.scenario().run.tolerance_n,
+        run.scenario().run.max_sweeps);
+  if (totals.rejected > 0)
+    std::fprintf(stderr,
+                 "%s: warning: some nodes had no finite step, first at %.3f s: loads are too large "
+                 "for this material\n",
+                 kProgram, static_cast<double>(totals.first_rejected) * 1e-3);
+  std::printf(
+      "%s: %.3f s of %s, %zu nodes, at most %zu active, %.1f sweeps per step, residual at "
+      "most %.2g N\n",
+      run.scenario().source.c_str(), seconds, run.organ().name.c_str(), run.world().node_count(),
+      totals.most_active,
+      run.tick() == 0 ? 0.0 : static_cast<double>(totals.sweeps) / static_cast<double>(run.tick()),
+      static_cast<double>(totals.worst_residual_n));
+  std::printf("results in %s\n", folder.c_str());
+}
+
+Status run_scenario(const Options& options) {
+  auto parsed = scene::parse_scenario(options.scenario);
+  if (!parsed) return parsed.error();
+  const std::filesystem::path folder =
+      !options.out.empty()
+          ? options.out
+          : parsed->output_folder.value_or("out/" + parsed->source.stem().string());
+  auto resolved = scene::resolve(std::move(*parsed));
+  if (!resolved) return resolved.error();
+  std::error_code failed;
+  std::filesystem::create_directories(folder, failed);
+  if (failed)
+    return Error{ErrorCode::ResourceMissing,
+                 folder.string() + ": cannot be made (" + failed.message() + "), see --out"};
+  std::signal(SIGINT, request_stop);
+  std::signal(SIGTERM, request_stop);
+  scenario::ScenarioRun run(std::move(*resolved), options.solver == "full"
+                                                      ? scenario::Solver::Full
+                                                      : scenario::Solver::Live);
+  Totals totals;
+  if (auto s = simulate(run, folder, totals); !s) return s;
+  print_summary(run, totals, folder);
+  return {};
+}
+
+int run(int argc, char** argv) {
+  Options options;
+  CLI::App app(
+      "Runs a scenario: an organ, loads and scripted tools over time, without a network. README, "
+      "\"Scenarios\", describes the file.",
+      kProgram);
+  app.footer(kExamples);
+  app.set_version_flag("--version", std::string(kProgram) + " " + kVersion + ", sim_version " +
+                                        std::to_string(kSimVersion));
+  app.add_option("SCENARIO", options.scenario, "scenario file (.toml)")->required();
+  app.add_option("--out", options.out, "folder of the results [dir in [output], else out/<name>]")
+      ->type_name("DIR");
+  app.add_option("--solver", options.solver,
+                 "live: the sweeps of a session; full: every step to the tolerance in [run]")
+      ->type_name("SOLVER")
+      ->check(CLI::IsMember({"live", "full"}))
+      ->capture_default_str();
+  app.add_option("--log-level", options.log_level, "error, warn, info, debug or off")
+      ->capture_default_str();
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return app.exit(error);
+    return report(kProgram, {ErrorCode::Usage, std::string(error.what()) + " (see --help)"});
+  }
+  if (const auto set = log::configure(kProgram, options.log_level); !set)
+    return report(kProgram, set.error());
+  const auto status = run_scenario(options);
+  return status ? static_cast<int>(ExitCode::Ok) : report(kProgram, status.error());
+}
+
+}  // namespace
+}  // namespace trocar::app
+
+int main(int argc, char** argv) {
+  trocar::require_cpu_features("trocar-sim");
+  return trocar::app::run(argc, argv);
+}

@@ -1,0 +1,119 @@
+#include "server/scenario/field_files.h"
+
+#include <cerrno>
+#include <cinttypes>
+#include <cstdio>
+#include <cstring>
+#include <string>
+
+namespace trocar::scenario {
+namespace {
+
+constexpr int kVtkLine = 3, kVtkTetra = 10;
+
+template <typename Body>
+Status write_file(const std::filesystem::path& path, Body body) {
+  const std::filesystem::path part = path.string() + ".part";
+  const auto failed = [&] {
+    return Error{ErrorCode::ResourceMissing, path.string() + ": cannot be written (" +
+                                                 std::strerror(errno) + "), check the folder"};
+  };
+  std::FILE* file = std::fopen(part.c_str(), "wb");
+  if (file == nullptr) return failed();
+  body(file);
+  const bool is_good = std::ferror(file) == 0;
+  if (std::fclose(file) != 0 || !is_good || std::rename(part.c_str(), path.c_str()) != 0)
+    return failed();
+  return {};
+}
+
+// fixed, displaced or free: nothing else tells them apart in a file.
+bool is_held(const ScenarioRun& run, std::size_t node) {
+  return run.world().node_classes[node] == world::NodeClass::Fixed;
+}
+
+void write_csv(std::FILE* file, const ScenarioRun& run) {
+  std::fputs(
+      "node,rest_x_mm,rest_y_mm,rest_z_mm,displacement_x_mm,displacement_y_mm,"
+      "displacement_z_mm,velocity_x_mm_s,velocity_y_mm_s,velocity_z_mm_s,held\n",
+      file);
+  for (std::size_t i = 0; i < run.world().node_count(); ++i) {
+    const Vec3d p = run.organ().mesh.rest_positions[i] * 1e3;
+    const Vec3d u = to_double(run.world().displacements[i]) * 1e3;
+    const Vec3d v = to_double(run.world().velocities[i]) * 1e3;
+    std::fprintf(file, "%zu,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%d\n", i, p.x, p.y, p.z,
+                 u.x, u.y, u.z, v.x, v.y, v.z, is_held(run, i) ? 1 : 0);
+  }
+}
+
+template <typename Vectors>
+void write_vectors(std::FILE* file, const char* name, const Vectors& vectors) {
+  std::fprintf(file,
+               "        <DataArray type=\"Float64\" Name=\"%s\" NumberOfComponents=\"3\" "
+               "format=\"ascii\">\n",
+               name);
+  for (const auto& v : vectors)
+    std::fprintf(file, "%.9g %.9g %.9g\n", static_cast<double>(v.x), static_cast<double>(v.y),
+                 static_cast<double>(v.z));
+  std::fputs("        </DataArray>\n", file);
+}
+
+template <typename Cells>
+void write_cells(std::FILE* file, const Cells& cells, int type) {
+  std::fputs(
+      "      <Cells>\n        <DataArray type=\"Int64\" Name=\"connectivity\" format=\"ascii\">\n",
+      file);
+  for (const auto& cell : cells) {
+    for (const auto node : cell) std::fprintf(file, "%u ", node.value);
+    std::fputc('\n', file);
+  }
+  std::fputs(
+      "        </DataArray>\n        <DataArray type=\"Int64\" Name=\"offsets\" "
+      "format=\"ascii\">\n",
+      file);
+  std::size_t offset = 0;
+  for (const auto& cell : cells) std::fprintf(file, "%zu\n", offset += cell.size());
+  std::fputs(
+      "        </DataArray>\n        <DataArray type=\"UInt8\" Name=\"types\" format=\"ascii\">\n",
+      file);
+  for (std::size_t i = 0; i < cells.size(); ++i) std::fprintf(file, "%d\n", type);
+  std::fputs("        </DataArray>\n      </Cells>\n", file);
+}
+
+void write_vtu(std::FILE* file, const ScenarioRun& run) {
+  const auto& mesh = run.organ().mesh;
+  const std::size_t cell_count = mesh.tets.empty() ? mesh.links.size() : mesh.tets.size();
+  std::fprintf(file,
+               "<?xml version=\"1.0\"?>\n"
+               "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" "
+               "header_type=\"UInt64\">\n"
+               "  <UnstructuredGrid>\n"
+               "    <Piece NumberOfPoints=\"%zu\" NumberOfCells=\"%zu\">\n      <PointData>\n",
+               mesh.node_count(), cell_count);
+  write_vectors(file, "displacement_m", run.world().displacements);
+  write_vectors(file, "velocity_m_s", run.world().velocities);
+  std::fputs("        <DataArray type=\"UInt8\" Name=\"held\" format=\"ascii\">\n", file);
+  for (std::size_t i = 0; i < mesh.node_count(); ++i)
+    std::fprintf(file, "%d\n", is_held(run, i) ? 1 : 0);
+  std::fputs("        </DataArray>\n      </PointData>\n      <Points>\n", file);
+  write_vectors(file, "rest_m", mesh.rest_positions);
+  std::fputs("      </Points>\n", file);
+  if (mesh.tets.empty())
+    write_cells(file, mesh.links, kVtkLine);
+  else
+    write_cells(file, mesh.tets, kVtkTetra);
+  std::fputs("    </Piece>\n  </UnstructuredGrid>\n</VTKFile>\n", file);
+}
+
+}  // namespace
+
+Status write_field(const std::filesystem::path& folder, const ScenarioRun& run) {
+  char name[40];
+  std::snprintf(name, sizeof name, "field_%07" PRIu64 "ms", run.tick());
+  const auto csv = folder / (std::string(name) + ".csv");
+  if (auto s = write_file(csv, [&](std::FILE* f) { write_csv(f, run); }); !s) return s;
+  const auto vtu = folder / (std::string(name) + ".vtu");
+  return write_file(vtu, [&](std::FILE* f) { write_vtu(f, run); });
+}
+
+}  // namespace trocar::scenario

@@ -1,0 +1,37 @@
+#pragma once
+
+// probes.csv: one row per time at which a probe is due, one column per probe and axis with the unit
+// in its name; a probe that is not due leaves its cells empty. Numbers have nine digits, which name
+// a float exactly.
+
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+
+#include "common/base/result.h"
+#include "server/scenario/scenario_run.h"
+
+namespace trocar::scenario {
+
+class ProbeFile {
+ public:
+  // Writes the header.
+  static Result<ProbeFile> create(const std::filesystem::path& path,
+                                  const scene::Scenario& scenario);
+
+  // After a step: a row if a probe is due.
+  void add(const ScenarioRun& run);
+  // What was added is in the file, whatever happens to the program.
+  void flush() { std::fflush(file_.get()); }
+  // Error: a row could not be written.
+  Status close();
+
+ private:
+  struct Closer {
+    void operator()(std::FILE* file) const { std::fclose(file); }
+  };
+  std::filesystem::path path_;
+  std::unique_ptr<std::FILE, Closer> file_;
+};
+
+}  // namespace trocar::scenario

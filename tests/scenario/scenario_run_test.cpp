@@ -1,0 +1,340 @@
+// Scenarios on the engine: against closed forms, balance of forces, and the same bits twice.
+
+#include "server/scenario/scenario_run.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <sstream>
+
+#include "server/scenario/field_files.h"
+#include "server/scenario/probe_file.h"
+
+namespace trocar::scenario {
+namespace {
+
+// A column of 2 x 6 x 2 nodes: four chains of five springs of k = 40 N/m, joined by springs across.
+const std::string kColumn = R"([organ]
+source = "lattice"
+nodes = [2, 6, 2]
+spacing_mm = 10
+[material]
+spring_stiffness_n_m = 40
+node_damping_per_s = 20
+[[nodes]]
+name = "top"
+box_min_mm = [-5, 25, -5]
+box_max_mm = [5, 25, 5]
+)";
+constexpr double kStiffness = 40, kWeight = 9.81;
+
+std::unique_ptr<ScenarioRun> make(const std::string& text, Solver solver = Solver::Full) {
+  auto parsed = scene::parse_scenario_text(text, "test.toml");
+  EXPECT_TRUE(parsed.ok()) << (parsed.ok() ? "" : parsed.error().message);
+  if (!parsed) return nullptr;
+  auto resolved = scene::resolve(std::move(*parsed));
+  EXPECT_TRUE(resolved.ok()) << (resolved.ok() ? "" : resolved.error().message);
+  if (!resolved) return nullptr;
+  return std::make_unique<ScenarioRun>(std::move(*resolved), solver);
+}
+
+void finish(ScenarioRun& run) {
+  while (!run.is_finished()) run.step();
+}
+
+TEST(ScenarioRun, AColumnUnderAForceStretchesLikeSpringsInSeries) {
+  const auto run = make(kColumn + R"([[force]]
+set = "top"
+[[force.key]]
+time_s = 0
+force_n = [0, 0.4, 0]
+[run]
+seconds = 4
+[[probe]]
+set = "top"
+quantity = "displacement"
+[[probe]]
+set = "fixed"
+quantity = "reaction"
+)");
+  ASSERT_TRUE(run);
+  finish(*run);
+  const double expected = 0.4 / 4 * 5 / kStiffness;  // 12.5 mm
+  EXPECT_NEAR(run->probe(0).y, expected, 1e-3 * expected);
+  EXPECT_NEAR(run->probe(0).x, 0, 1e-6);
+  EXPECT_NEAR(run->probe(1).y, -0.4, 4e-4) << "the support pulls down what the force pulls up";
+}
+
+TEST(ScenarioRun, TheReactionOfADisplacedSetEqualsTheForceOfTheSameStretch) {
+  const auto run = make(kColumn + R"([[displace]]
+set = "top"
+[[displace.key]]
+time_s = 0
+displacement_mm = [0, 0, 0]
+[[displace.key]]
+time_s = 0.2
+displacement_mm = [0, 12.5, 0]
+[run]
+seconds = 3
+[[probe]]
+set = "top"
+quantity = "reaction"
+[[probe]]
+set = "fixed"
+quantity = "reaction"
+[[probe]]
+set = "top"
+quantity = "displacement"
+)");
+  ASSERT_TRUE(run);
+  finish(*run);
+  EXPECT_NEAR(run->probe(0).y, 0.4, 4e-4);
+  EXPECT_NEAR(run->probe(1).y, -0.4, 4e-4);
+  EXPECT_EQ(run->probe(2).y, static_cast<double>(0.0125f)) << "held exactly where it was put";
+}
+
+TEST(ScenarioRun, AHangingColumnSagsLikeItsClosedForm) {
+  // Gravity away from the support: a lattice has no shear stiffness, so a standing column falls
+  // over.
+  const auto run = make(kColumn + R"([gravity]
+m_s2 = [0, 9.81, 0]
+[run]
+seconds = 4
+[[probe]]
+set = "top"
+quantity = "displacement"
+[[probe]]
+set = "fixed"
+quantity = "reaction"
+)");
+  ASSERT_TRUE(run);
+  finish(*run);
+  // Spring j from the support carries the nodes j to 5 of its chain.
+  const auto& masses = run->organ().node_masses_kg;
+  double sag = 0, total = 0;
+  for (int j = 1; j <= 5; ++j)
+    for (int i = j; i <= 5; ++i)
+      sag += masses[static_cast<std::size_t>(2 * i)] * kWeight / kStiffness;
+  for (const double mass : masses) total += mass * kWeight;
+  EXPECT_GT(sag, 1e-4);
+  EXPECT_NEAR(run->probe(0).y, sag, 1e-3 * sag);
+  EXPECT_NEAR(run->probe(1).y, -total, 1e-3 * total) << "the support carries all of it";
+}
+
+TEST(ScenarioRun, AMovingColumnKeepsNewtonsLaw) {
+  // While it moves: forces from outside equal the change of momentum and what nodal damping takes.
+  const auto run = make(kColumn + R"([gravity]
+m_s2 = [0, -9.81, 0]
+[[displace]]
+set = "top"
+[[displace.key]]
+time_s = 0
+displacement_mm = [0, 0, 0]
+[[displace.key]]
+time_s = 0.05
+displacement_mm = [2, 5, 0]
+[run]
+seconds = 0.1
+tolerance_n = 1e-6
+[[probe]]
+set = "top"
+quantity = "reaction"
+[[probe]]
+set = "fixed"
+quantity = "reaction"
+)");
+  ASSERT_TRUE(run);
+  const auto& world = run->world();
+  Vec3d before;
+  while (!run->is_finished()) {
+    const auto report = run->step();
+    Vec3d momentum, weight;
+    for (std::size_t i = 0; i < world.node_count(); ++i) {
+      const double mass = static_cast<double>(world.masses[i]);
+      momentum += to_double(world.velocities[i]) * mass;
+      weight += Vec3d{0, -kWeight, 0} * mass;
+    }
+    const Vec3d outside = run->probe(0) + run->probe(1) + weight - momentum * 20.0;
+    const double bound = 2e-5 + 24 * static_cast<double>(report.solve.residual_n);
+    EXPECT_LT(length((momentum - before) * 1e3 - outside), bound) << "tick " << run->tick();
+    before = momentum;
+  }
+  EXPECT_GT(length(before), 0);
+}
+
+TEST(ScenarioRun, TheFullSolverReachesItsToleranceInEveryStep) {
+  const std::string text = R"([organ]
+source = "lattice"
+nodes = [5, 5, 5]
+[[nodes]]
+name = "corner"
+nearest_mm = [20, 20, 20]
+[[force]]
+set = "corner"
+[[force.key]]
+time_s = 0
+force_n = [0, 0, 0]
+[[force.key]]
+time_s = 0.1
+force_n = [0.05, 0.1, 0]
+[run]
+seconds = 0.2
+tolerance_n = 1e-6
+)";
+  const auto full = make(text), live = make(text, Solver::Live);
+  ASSERT_TRUE(full && live);
+  float worst_live = 0;
+  while (!full->is_finished()) {
+    const auto report = full->step();
+    EXPECT_LE(report.solve.residual_n, 1e-6f) << "tick " << full->tick();
+    EXPECT_TRUE(report.is_converged);
+    worst_live = std::max(worst_live, live->step().solve.residual_n);
+  }
+  EXPECT_GT(worst_live, 1e-6f) << "otherwise this test shows nothing";
+}
+
+TEST(ScenarioRun, AStepThatHitsTheCapSaysSo) {
+  const auto run = make(kColumn + R"([gravity]
+m_s2 = [0, -9.81, 0]
+[run]
+seconds = 0.01
+tolerance_n = 1e-9
+max_sweeps = 2
+)");
+  ASSERT_TRUE(run);
+  const auto report = run->step();
+  EXPECT_FALSE(report.is_converged);
+  EXPECT_EQ(report.solve.sweeps, 2u);
+}
+
+TEST(ScenarioRun, AToolPressesAndItsForceIsCarriedByTheSupport) {
+  // Short: pressed for longer, a lattice without shear stiffness buckles and slips off the tool.
+  const auto run = make(R"([organ]
+source = "lattice"
+nodes = [7, 5, 7]
+[[tool]]
+radius_mm = 15
+[[tool.key]]
+time_s = 0
+position_mm = [0, 25, 0]
+shaft = [0, 1, 0]
+verb = "push"
+[[tool.key]]
+time_s = 0.3
+position_mm = [0, 18, 0]
+[run]
+seconds = 0.45
+[[probe]]
+tool = 0
+quantity = "force"
+[[probe]]
+set = "fixed"
+quantity = "reaction"
+[[nodes]]
+name = "under"
+nearest_mm = [0, 20, 0]
+[[probe]]
+set = "under"
+quantity = "displacement"
+)");
+  ASSERT_TRUE(run);
+  finish(*run);
+  const double force = run->probe(0).y;
+  EXPECT_GT(force, 0.015) << "the tissue pushes the tool up";
+  EXPECT_NEAR(run->probe(1).y, force, 0.02 * force) << "the support carries it";
+  EXPECT_NEAR(force, -run->probe(2).y * 40 / 4, 0.01 * force) << "one chain of four springs";
+}
+
+TEST(ScenarioRun, WithADepthOnlyTheQueueMoves) {
+  const std::string text = R"([organ]
+source = "lattice"
+nodes = [3, 12, 3]
+[[nodes]]
+name = "top"
+box_min_mm = [-10, 55, -10]
+box_max_mm = [10, 55, 10]
+[[force]]
+set = "top"
+[[force.key]]
+time_s = 0
+force_n = [0, 0.1, 0]
+[run]
+seconds = 0.3
+depth = 2
+)";
+  const auto run = make(text, Solver::Live);
+  ASSERT_TRUE(run);
+  finish(*run);
+  const auto& u = run->world().displacements;
+  for (std::size_t i = 0; i < u.size(); ++i) {
+    const bool is_in_reach = run->organ().mesh.rest_positions[i].y > 0.034;
+    EXPECT_EQ(length(u[i]) > 0, is_in_reach) << "node " << i;
+  }
+}
+
+std::string read(const std::filesystem::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  std::ostringstream out;
+  out << in.rdbuf();
+  return out.str();
+}
+
+TEST(ScenarioRun, TheSameScenarioTwiceWritesTheSameBytes) {
+  const auto base =
+      std::filesystem::temp_directory_path() / ("trocar-scenario-" + std::to_string(::getpid()));
+  for (const char* name : {"a", "b"}) {
+    const auto folder = base / name;
+    std::filesystem::create_directories(folder);
+    const auto run = make(kColumn + R"([gravity]
+m_s2 = [0, -9.81, 0]
+[[displace]]
+set = "top"
+[[displace.key]]
+time_s = 0
+displacement_mm = [0, 0, 0]
+[[displace.key]]
+time_s = 0.1
+displacement_mm = [1, 2, 3]
+[run]
+seconds = 0.2
+[[probe]]
+set = "top"
+quantity = "reaction"
+rate_hz = 1000
+[[probe]]
+set = "all"
+quantity = "velocity"
+rate_hz = 100
+)",
+                          Solver::Live);
+    ASSERT_TRUE(run);
+    auto probes = ProbeFile::create(folder / "probes.csv", run->scenario());
+    ASSERT_TRUE(probes.ok());
+    while (!run->is_finished()) {
+      run->step();
+      probes->add(*run);
+    }
+    ASSERT_TRUE(probes->close().ok());
+    ASSERT_TRUE(write_field(folder, *run).ok());
+  }
+  for (const char* file : {"probes.csv", "field_0000200ms.csv", "field_0000200ms.vtu"}) {
+    const auto a = read(base / "a" / file);
+    EXPECT_EQ(a, read(base / "b" / file)) << file;
+    EXPECT_GT(a.size(), 500u) << file;
+  }
+  std::istringstream lines(read(base / "a" / "probes.csv"));
+  std::string line;
+  std::getline(lines, line);
+  EXPECT_EQ(line,
+            "time_s,top_reaction_x_n,top_reaction_y_n,top_reaction_z_n,all_velocity_x_mm_s,"
+            "all_velocity_y_mm_s,all_velocity_z_mm_s");
+  std::getline(lines, line);
+  EXPECT_TRUE(line.starts_with("0.001,") && line.ends_with(",,,")) << line;
+  std::filesystem::remove_all(base);
+}
+
+}  // namespace
+}  // namespace trocar::scenario

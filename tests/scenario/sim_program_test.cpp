@@ -1,0 +1,146 @@
+// trocar-sim as a process: exit codes, and what an interrupt leaves behind.
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <thread>
+
+extern char** environ;
+
+namespace trocar {
+namespace {
+
+namespace fs = std::filesystem;
+
+class SimProgram : public ::testing::Test {
+ protected:
+  SimProgram() { fs::create_directories(folder_); }
+  ~SimProgram() override {
+    if (pid_ > 0 && waitpid(pid_, nullptr, WNOHANG) == 0) {
+      kill(pid_, SIGKILL);
+      waitpid(pid_, nullptr, 0);
+    }
+    fs::remove_all(folder_);
+  }
+
+  void start(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), std::string(TROCAR_BINARY_DIR) + "/trocar-sim");
+    std::vector<char*> argv;
+    for (auto& argument : arguments) argv.push_back(argument.data());
+    argv.push_back(nullptr);
+    posix_spawn_file_actions_t actions;
+    posix_spawn_file_actions_init(&actions);
+    posix_spawn_file_actions_addopen(&actions, 1, (folder_ / "log").c_str(),
+                                     O_WRONLY | O_CREAT | O_TRUNC, 0644);
+    posix_spawn_file_actions_adddup2(&actions, 1, 2);
+    ASSERT_EQ(posix_spawn(&pid_, argv[0], &actions, nullptr, argv.data(), environ), 0);
+    posix_spawn_file_actions_destroy(&actions);
+  }
+  int wait() {
+    int status = 0;
+    waitpid(pid_, &status, 0);
+    pid_ = -1;
+    return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  }
+  int run(std::vector<std::string> arguments) {
+    start(std::move(arguments));
+    return wait();
+  }
+  static std::string read(const fs::path& path) {
+    std::ifstream in(path, std::ios::binary);
+    std::ostringstream out;
+    out << in.rdbuf();
+    return out.str();
+  }
+  std::string log() const { return read(folder_ / "log"); }
+  std::string write(const char* name, const std::string& text) const {
+    std::ofstream(folder_ / name) << text;
+    return (folder_ / name).string();
+  }
+
+  const fs::path folder_ =
+      fs::temp_directory_path() / ("trocar-sim-" + std::to_string(getpid()) + "-" +
+                                   ::testing::UnitTest::GetInstance()->current_test_info()->name());
+  pid_t pid_ = -1;
+};
+
+TEST_F(SimProgram, TheExampleRunsAndWritesTheSameBytesTwice) {
+  const std::string example = std::string(TROCAR_SOURCE_DIR) + "/deploy/scenes/pull.toml";
+  const auto a = folder_ / "a", b = folder_ / "b";
+  ASSERT_EQ(run({example, "--out", a.string()}), 0) << log();
+  ASSERT_EQ(run({example, "--out", b.string()}), 0) << log();
+  for (const char* file : {"probes.csv", "field_0000500ms.csv", "field_0001500ms.vtu"}) {
+    EXPECT_FALSE(read(a / file).empty()) << file;
+    EXPECT_EQ(read(a / file), read(b / file)) << file;
+  }
+}
+
+TEST_F(SimProgram, AnInterruptLeavesReadableFiles) {
+  const auto scenario = write("long.toml", R"([organ]
+source = "lattice"
+nodes = [8, 8, 8]
+[run]
+seconds = 3600
+[gravity]
+m_s2 = [0, -9.81, 0]
+[[probe]]
+set = "all"
+quantity = "displacement"
+rate_hz = 1000
+[output]
+fields_s = [0, 0.005]
+)");
+  const auto out = folder_ / "out";
+  start({scenario, "--out", out.string()});
+  // It is running once the second field is there; a simulated hour is not over by then.
+  for (int i = 0; i < 6000 && !fs::exists(out / "field_0000005ms.vtu"); ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  ASSERT_TRUE(fs::exists(out / "field_0000005ms.vtu")) << log();
+  kill(pid_, SIGINT);
+  ASSERT_EQ(wait(), 0) << log();
+  EXPECT_NE(log().find("stopped at "), std::string::npos) << log();
+
+  const std::string csv = read(out / "probes.csv");
+  ASSERT_FALSE(csv.empty());
+  EXPECT_EQ(csv.back(), '\n') << "the last row is whole";
+  std::istringstream lines(csv);
+  std::string line;
+  int rows = 0;
+  while (std::getline(lines, line)) {
+    EXPECT_EQ(std::count(line.begin(), line.end(), ','), 3) << line;
+    ++rows;
+  }
+  EXPECT_GE(rows, 6) << "header and the steps before the field";
+  const std::string vtu = read(out / "field_0000005ms.vtu");
+  EXPECT_NE(vtu.find("NumberOfPoints=\"512\" NumberOfCells=\"1344\""), std::string::npos);
+  EXPECT_TRUE(vtu.ends_with("</VTKFile>\n"));
+  for (const auto& entry : fs::directory_iterator(out))
+    EXPECT_NE(entry.path().extension(), ".part") << "half a file";
+}
+
+TEST_F(SimProgram, ExitCodesSayWhatWasWrong) {
+  EXPECT_EQ(run({"--version"}), 0);
+  EXPECT_EQ(run({"--help"}), 0);
+  EXPECT_NE(log().find("Examples:"), std::string::npos);
+  EXPECT_EQ(run({}), 2);
+  EXPECT_EQ(run({"a.toml", "--solver", "magic"}), 2);
+  EXPECT_EQ(run({(folder_ / "missing.toml").string()}), 3);
+  const auto bad = write("bad.toml", "[organ]\nsource = \"lattice\"\n[run]\nsecond = 1\n");
+  EXPECT_EQ(run({bad}), 3);
+  EXPECT_NE(log().find("bad.toml:"), std::string::npos) << log();
+  const auto good = write("good.toml", "[organ]\nsource = \"lattice\"\n[run]\nseconds = 0.001\n");
+  write("file", "");
+  EXPECT_EQ(run({good, "--out", (folder_ / "file" / "x").string()}), 5) << log();
+}
+
+}  // namespace
+}  // namespace trocar
