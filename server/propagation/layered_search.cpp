@@ -7,38 +7,42 @@ namespace trocar::propagation {
 void LayeredSearch::resize(std::size_t node_count) {
   labels_.resize(node_count, kNoLabel);
   previous_labels_.resize(node_count, kNoLabel);
-  is_marked_.resize(node_count);
-  is_in_layer_.resize(node_count);
+  flags_.resize(node_count);
   next_waiting_.resize(node_count);
   changed_.reserve(node_count);
+  contested_.reserve(node_count);
   layer_.reserve(node_count);
   next_layer_.reserve(node_count);
 }
 
 void LayeredSearch::clear(std::span<const NodeIndex> labelled) {
-  for (const auto node : labelled) labels_[node.value] = kNoLabel;
+  for (const auto node : labelled) labels_[node.value] = previous_labels_[node.value] = kNoLabel;
   // Labels that a broken-off retract() took away are among `labelled`, for it gives none.
   begin_update(0);
+  starts_anew_ = true;
   visited_ = 0;
   depth_ = 0;
   is_exhausted_ = true;
 }
 
 void LayeredSearch::begin_update(std::size_t layers_before) {
-  for (const auto node : changed_) is_marked_[node.value] = is_in_layer_[node.value] = 0;
+  for (const auto node : changed_) {
+    flags_[node.value] = 0;
+    previous_labels_[node.value] = labels_[node.value];
+  }
+  for (const auto node : contested_) flags_[node.value] = 0;
   changed_.clear();
+  contested_.clear();
   layer_.clear();
   next_layer_.clear();
   left_layer_.assign(layers_before, 0);
 }
 
 void LayeredSearch::mark(NodeIndex node) {
-  if (is_marked_[node.value] != 0) return;
-  is_marked_[node.value] = 1;
+  if ((flags_[node.value] & kMarked) != 0) return;
+  flags_[node.value] |= kMarked;
   changed_.push_back(node);
-  const Label label = labels_[node.value];
-  previous_labels_[node.value] = label;
-  if (label != kNoLabel) ++left_layer_[layer_of(label)];
+  if (const Label label = labels_[node.value]; label != kNoLabel) ++left_layer_[layer_of(label)];
 }
 
 void LayeredSearch::lose(NodeIndex node) {
@@ -58,8 +62,9 @@ bool LayeredSearch::is_supported(const Neighbours& neighbours, NodeIndex node) {
 bool LayeredSearch::retract(const Neighbours& neighbours, const SeedSet& seeds,
                             const LayerLists& before) {
   begin_update(before.layer_count());
+  starts_anew_ = false;
   visited_ = 0;
-  const std::size_t most = before.nodes().size() / 2;
+  const std::size_t most = before.nodes().size() / 3;
   for (const auto& change : seeds.changes())
     if (change.after > change.before) lose(change.node);
   if (2 * next_layer_.size() > before.layer(0).size()) return false;
@@ -73,7 +78,7 @@ bool LayeredSearch::retract(const Neighbours& neighbours, const SeedSet& seeds,
         if (labels_[neighbour.value] == supported && !is_supported(neighbours, neighbour))
           lose(neighbour);
     }
-    if (changed_.size() > most) return false;
+    if (visited_ > most) return false;
   }
   take_next_best(neighbours, seeds);
   return true;
@@ -100,26 +105,37 @@ void LayeredSearch::take_next_best(const Neighbours& neighbours, const SeedSet& 
 }
 
 void LayeredSearch::offer(NodeIndex node, Label label) {
-  if (labels_[node.value] <= label) return;
+  auto& flags = flags_[node.value];
+  const Label known = labels_[node.value];
+  if (known != kNoLabel && contact_of(known ^ label) != 0 && (flags & kContested) == 0) {
+    flags |= kContested;
+    contested_.push_back(node);
+  }
+  if (known <= label) return;
   mark(node);
   labels_[node.value] = label;
-  if (is_in_layer_[node.value] != 0) return;
-  is_in_layer_[node.value] = 1;
+  if ((flags & kSettled) != 0) return;
+  flags |= kSettled;
   next_layer_.push_back(node);
 }
 
 void LayeredSearch::expand(const Neighbours& neighbours, NodeIndex node) {
   ++visited_;
   const Label label = labels_[node.value] + kOneLayer;
-  for (const auto neighbour : neighbours[node]) offer(neighbour, label);
+  // Most neighbours have a better label, of the same contact, already.
+  const Label* const labels = labels_.data();
+  for (const auto neighbour : neighbours[node])
+    if (const Label known = labels[neighbour.value];
+        known > label || contact_of(known ^ label) != 0)
+      offer(neighbour, label);
 }
 
 void LayeredSearch::settle_waiting(std::uint32_t layer) {
   if (layer >= first_waiting_.size()) return;
   for (auto node = first_waiting_[layer]; node.is_valid(); node = next_waiting_[node.value]) {
     // One that a better label reached meanwhile has been settled with it.
-    if (is_in_layer_[node.value] != 0) continue;
-    is_in_layer_[node.value] = 1;
+    if ((flags_[node.value] & kSettled) != 0) continue;
+    flags_[node.value] |= kSettled;
     next_layer_.push_back(node);
   }
 }
@@ -151,12 +167,13 @@ void LayeredSearch::advance(const Neighbours& neighbours, const SeedSet& seeds,
     // The last layer before was never expanded; from there on everything is new.
     if (is_known && depth_ == previous_depth_ && !was_exhausted)
       for (const auto node : before.layer(depth_))
-        if (is_marked_[node.value] == 0) expand(neighbours, node);
+        if ((flags_[node.value] & kMarked) == 0) expand(neighbours, node);
   }
   cut_beyond_depth(before);
 }
 
 void LayeredSearch::cut_beyond_depth(const LayerLists& before) {
+  if (starts_anew_) return;
   for (std::size_t layer = depth_ + 1; layer < before.layer_count(); ++layer)
     for (const auto node : before.layer(layer)) mark(node);
   for (const auto node : changed_)
@@ -164,7 +181,7 @@ void LayeredSearch::cut_beyond_depth(const LayerLists& before) {
   std::fill(first_waiting_.begin(), first_waiting_.end(), NodeIndex());
   std::erase_if(changed_, [this](NodeIndex node) {
     if (labels_[node.value] != previous_labels_[node.value]) return false;
-    is_marked_[node.value] = is_in_layer_[node.value] = 0;
+    flags_[node.value] = 0;
     return true;
   });
 }

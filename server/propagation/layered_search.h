@@ -43,8 +43,9 @@ class LayeredSearch {
   // Forgets all labels; `labelled` names the nodes that had one when the last update ended.
   void clear(std::span<const NodeIndex> labelled);
 
-  // First half of an update. False, with the labels in disorder, as soon as more than half of them
-  // fall: to clear() and start anew is cheaper then.
+  // First half of an update. False, with the labels in disorder, as soon as it has read a third as
+  // many neighbour lists as there are labels, or if most seeds left: to clear() and start anew is
+  // cheaper then (measured: a repair that goes on to the end costs up to twice a new start).
   [[nodiscard]] bool retract(const Neighbours& neighbours, const SeedSet& seeds,
                              const LayerLists& before);
   // Second half. `before`: the labels of the last update (empty after clear()).
@@ -53,17 +54,24 @@ class LayeredSearch {
 
   Label label(NodeIndex node) const { return labels_[node.value]; }
   // Before the update.
-  Label previous_label(NodeIndex node) const {
-    return is_marked_[node.value] != 0 ? previous_labels_[node.value] : labels_[node.value];
-  }
+  Label previous_label(NodeIndex node) const { return previous_labels_[node.value]; }
   // Nodes whose label is another one than before, in no useful order.
   std::span<const NodeIndex> changed() const { return changed_; }
+  // After clear(), every label is new; then these are the nodes that more than one contact reaches
+  // within the depth. Each edge between nodes of two contacts, with an end that is not in the last
+  // layer, has an end among them.
+  bool starts_anew() const { return starts_anew_; }
+  std::span<const NodeIndex> contested() const { return contested_; }
+  bool is_contested(NodeIndex node) const { return (flags_[node.value] & kContested) != 0; }
+
   std::uint32_t depth() const { return depth_; }
   std::uint32_t previous_depth() const { return previous_depth_; }
   // Neighbour lists read by the update.
   std::size_t nodes_visited() const { return visited_; }
 
  private:
+  static constexpr std::uint8_t kMarked = 1, kSettled = 2, kContested = 4;
+
   void begin_update(std::size_t layers_before);
   void mark(NodeIndex node);
   void lose(NodeIndex node);
@@ -75,17 +83,18 @@ class LayeredSearch {
   void cut_beyond_depth(const LayerLists& before);
 
   std::vector<Label> labels_;
-  std::vector<Label> previous_labels_;     // where is_marked_
-  std::vector<std::uint8_t> is_marked_;    // the label was touched in this update
-  std::vector<std::uint8_t> is_in_layer_;  // settled in this update
-  std::vector<NodeIndex> next_waiting_;    // list of nodes that wait for the same layer
-  std::vector<NodeIndex> changed_;         // marked nodes; in the end those that differ
+  std::vector<Label> previous_labels_;   // outside an update: labels_ before the last one
+  std::vector<std::uint8_t> flags_;      // kMarked...: what this update did to the node
+  std::vector<NodeIndex> next_waiting_;  // list of nodes that wait for the same layer
+  std::vector<NodeIndex> changed_;       // marked nodes; in the end those that differ
+  std::vector<NodeIndex> contested_;
   std::vector<NodeIndex> layer_, next_layer_;
   std::vector<NodeIndex> first_waiting_;   // per layer; invalid: none
   std::vector<std::uint32_t> left_layer_;  // per layer before: marked nodes
   std::uint32_t depth_ = 0, previous_depth_ = 0;
   // No node lies beyond depth_: the whole component is labelled.
   bool is_exhausted_ = true;
+  bool starts_anew_ = true;
   std::size_t visited_ = 0;
 };
 

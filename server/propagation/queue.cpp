@@ -40,15 +40,19 @@ void PropagationQueue::fill(const Neighbours& neighbours, Seeds seeds, const Que
   if (is_repeated(neighbours, seeds, limits)) return;
   seeds_.replace(seeds);
   limits_ = limits;
-  const bool keeps = has_history_ && seeds.size() <= lists_.contact_capacity();
-  if (!keeps || !search_.retract(neighbours, seeds_, lists_)) start_anew(seeds.size());
+  if (!has_history_ || seeds.size() > lists_.contact_capacity()) {
+    start_anew(seeds.size());
+  } else if (!search_.retract(neighbours, seeds_, lists_)) {
+    visited_ = search_.nodes_visited();
+    start_anew(seeds.size());
+  }
   has_history_ = true;
   search_.advance(neighbours, seeds_, limits, lists_);
   borders_.update(neighbours, search_, lists_);
   borders_.number_regions(seeds, search_, region_of_contact_, region_count_);
   lists_.update(search_);
   order(seeds.size(), limits.nodes);
-  visited_ = search_.nodes_visited() + borders_.nodes_visited();
+  visited_ += search_.nodes_visited() + borders_.nodes_visited();
 }
 
 void PropagationQueue::order(std::size_t contact_count, std::uint32_t node_limit) {

@@ -4,6 +4,11 @@
 #include <numeric>
 
 namespace trocar::propagation {
+namespace {
+
+constexpr std::uint32_t kAdd = 1, kRemove = 0u - 1u;
+
+}  // namespace
 
 void RegionBorders::add(Label a, Label b, std::uint32_t depth, std::uint32_t step) {
   const std::uint32_t x = contact_of(a), y = contact_of(b);
@@ -19,38 +24,68 @@ void RegionBorders::add(Label a, Label b, std::uint32_t depth, std::uint32_t ste
 
 void RegionBorders::update(const Neighbours& neighbours, const LayeredSearch& search,
                            const LayerLists& before) {
-  constexpr std::uint32_t kAdd = 1, kRemove = 0u - 1u;
   visited_ = 0;
   // A single contact has no border.
   if (before.contact_capacity() < 2) return;
-  for (const auto node : search.changed()) {
+  if (search.starts_anew()) {
+    count_all(neighbours, search);
+    return;
+  }
+  count_changes(neighbours, search);
+  if (search.depth() != search.previous_depth())
+    count_last_layer(neighbours, search,
+                     before.layer(std::min(search.depth(), search.previous_depth())));
+  std::erase_if(borders_, [](const Border& border) { return border.edges == 0; });
+}
+
+void RegionBorders::count_all(const Neighbours& neighbours, const LayeredSearch& search) {
+  for (const auto node : search.contested()) {
     ++visited_;
+    for (const auto neighbour : neighbours[node])
+      if (node < neighbour || !search.is_contested(neighbour))
+        add(search.label(node), search.label(neighbour), search.depth(), kAdd);
+  }
+}
+
+void RegionBorders::count_changes(const Neighbours& neighbours, const LayeredSearch& search) {
+  // Above the last layer a node counts by its contact alone, whatever its layer.
+  const auto last_layer = std::min(search.depth(), search.previous_depth());
+  const auto counts_anew = [&](Label previous, Label label) {
+    return contact_of(previous) != contact_of(label) ||
+           (previous != label && std::max(layer_of(previous), layer_of(label)) >= last_layer);
+  };
+  for (const auto node : search.changed()) {
     const Label label = search.label(node), previous = search.previous_label(node);
+    if (!counts_anew(previous, label)) continue;
+    ++visited_;
     for (const auto neighbour : neighbours[node]) {
       const Label other = search.label(neighbour);
       const Label other_previous = search.previous_label(neighbour);
-      // An edge between two changed nodes is seen from both; the lower one counts it.
-      if (other != other_previous && neighbour < node) continue;
+      // Nearly all edges lie within a region, before and after.
+      if ((contact_of(label ^ other) | contact_of(previous ^ other_previous)) == 0) continue;
+      // An edge between two such nodes is seen from both; the lower one counts it.
+      if (neighbour < node && counts_anew(other_previous, other)) continue;
       add(previous, other_previous, search.previous_depth(), kRemove);
       add(label, other, search.depth(), kAdd);
     }
   }
-  // Edges within the layer that was the last one count from now on, or the other way round.
-  if (search.depth() != search.previous_depth()) {
-    const auto layer = std::min(search.depth(), search.previous_depth());
-    for (const auto node : before.layer(layer)) {
-      const Label label = search.label(node);
-      if (label != search.previous_label(node)) continue;
-      ++visited_;
-      for (const auto neighbour : neighbours[node]) {
-        const Label other = search.label(neighbour);
-        if (neighbour < node || other != search.previous_label(neighbour)) continue;
-        add(label, other, search.previous_depth(), kRemove);
-        add(label, other, search.depth(), kAdd);
-      }
+}
+
+// Edges within the layer that was the last one count from now on, or the other way round; those at
+// changed nodes are done.
+void RegionBorders::count_last_layer(const Neighbours& neighbours, const LayeredSearch& search,
+                                     std::span<const NodeIndex> layer) {
+  for (const auto node : layer) {
+    const Label label = search.label(node);
+    if (label != search.previous_label(node)) continue;
+    ++visited_;
+    for (const auto neighbour : neighbours[node]) {
+      const Label other = search.label(neighbour);
+      if (neighbour < node || other != search.previous_label(neighbour)) continue;
+      add(label, other, search.previous_depth(), kRemove);
+      add(label, other, search.depth(), kAdd);
     }
   }
-  std::erase_if(borders_, [](const Border& border) { return border.edges == 0; });
 }
 
 std::uint16_t RegionBorders::root(std::uint16_t contact) {

@@ -7,6 +7,7 @@
 // contacts is kept, and only edges at changed nodes are counted anew.
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "server/propagation/layered_search.h"
@@ -30,6 +31,10 @@ class RegionBorders {
     std::uint32_t edges = 0;
   };
 
+  void count_all(const Neighbours& neighbours, const LayeredSearch& search);
+  void count_changes(const Neighbours& neighbours, const LayeredSearch& search);
+  void count_last_layer(const Neighbours& neighbours, const LayeredSearch& search,
+                        std::span<const NodeIndex> layer);
   void add(Label a, Label b, std::uint32_t depth, std::uint32_t step);
   std::uint16_t root(std::uint16_t contact);
   void merge(std::uint16_t a, std::uint16_t b);

@@ -69,19 +69,27 @@ TEST_F(QueueWork, OfASurfaceNodeThatJoinsOrLeavesIsFarBelowTheRegion) {
   EXPECT_LT(queue.nodes_visited(), region / 5);
 }
 
-TEST_F(QueueWork, OfAContactThatMovesLeavesAnotherOneAlone) {
-  const auto resting = patch(2, 10, 2, 10);
-  fill({patch(24, 26, 24, 26), resting}, {5, 1'000'000});
-  const std::size_t own = queue.layer(0).size() + queue.nodes().size() / 2;
-  fill({patch(23, 25, 24, 26), resting}, {5, 1'000'000});
-  EXPECT_EQ(queue.region_count(), 2);
-  const std::size_t moving = queue.nodes_visited();
-  PropagationQueue alone(organ.mesh.node_count());
-  std::swap(queue, alone);
-  fill({patch(24, 26, 24, 26), {}}, {5, 1'000'000});
-  fill({patch(23, 25, 24, 26), {}}, {5, 1'000'000});
-  EXPECT_LE(moving, 4 * queue.nodes().size());
-  EXPECT_LT(queue.nodes().size(), own);
+TEST_F(QueueWork, OfAContactThatMovesDoesNotDependOnARestingOne) {
+  const QueueLimits limits{5, 1'000'000};
+  const auto before = patch(24, 26, 24, 26), after = patch(23, 25, 24, 26);
+  std::vector<std::size_t> moved, vanished, appeared, regions;
+  for (const int size : {14, 18}) {
+    const auto resting = patch(0, size, 0, size);
+    fill({before, resting}, limits);
+    regions.push_back(queue.nodes().size());
+    fill({after, resting}, limits);
+    EXPECT_EQ(queue.region_count(), 2);
+    moved.push_back(queue.nodes_visited());
+    fill({{}, resting}, limits);
+    vanished.push_back(queue.nodes_visited());
+    fill({before, resting}, limits);
+    appeared.push_back(queue.nodes_visited());
+  }
+  EXPECT_GT(regions[1], regions[0] + 400);
+  EXPECT_GT(moved[0], 0u);
+  EXPECT_EQ(moved[0], moved[1]);
+  EXPECT_EQ(vanished[0], vanished[1]);
+  EXPECT_EQ(appeared[0], appeared[1]);
 }
 
 TEST_F(QueueWork, GoesWithTheNodesThatChange) {
