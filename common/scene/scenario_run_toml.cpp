@@ -73,7 +73,10 @@ RunRule read_run(TableReader& reader) {
   const auto seconds = reader.number("seconds", 0.001, kScenarioTimeLimit);
   if (!seconds) reader.fail_missing("seconds", "write how long to simulate");
   run.seconds = seconds.value_or(1);
-  read_count(reader, "load_steps", 1, 100'000, run.load_steps);
+  std::uint32_t load_steps = 1;
+  read_count(reader, "load_steps", 1, 100'000, load_steps);
+  for (std::uint32_t i = 1; run.mode == RunMode::Static && i <= load_steps; ++i)
+    run.load_times_s.push_back(run.seconds * i / load_steps);
   const auto start = reader.choice<bool, 2>("start", {{{"rest", false}, {"equilibrium", true}}});
   run.starts_in_equilibrium = start.value_or(false);
   read_boundary(reader, run);

@@ -1,4 +1,4 @@
-// trocar-organ: makes, imports and inspects organs.
+// trocar-organ: makes, imports, inspects and settles organs, and fits their material.
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -15,6 +15,7 @@
 #include "common/scene/builtin_organs.h"
 #include "common/scene/load_organ.h"
 #include "common/scene/organ_file.h"
+#include "server/app/organ_experiments.h"
 
 namespace trocar::app {
 namespace {
@@ -36,6 +37,10 @@ Examples:
       a mesh in millimetres, held at the hindmost tenth, into spleen.organ
   trocar-organ inspect spleen.organ --json
       its figures, for other programs
+  trocar-organ settle spleen.organ --gravity 0,-9.81,0
+      its rest pose under gravity, in which it starts without sagging, into spleen-settled.organ
+  trocar-organ fit deploy/scenes/stretch.toml deploy/scenes/stretch.csv
+      Young's modulus from a measured force-displacement curve; results in out/fit-stretch
 
 Exit codes: 0 ok, 2 command line, 3 bad file, 5 cannot write or processor too old.
 )";
@@ -51,6 +56,8 @@ struct Options {
   std::string import_name;
   std::string inspected;
   bool json = false;
+  FitCommand fit;
+  SettleCommand settle;
 };
 
 struct EdgeLengths {
@@ -301,13 +308,15 @@ void add_commands(CLI::App& app, Options& options) {
   inspect->add_option("FILE", options.inspected, ".organ or .msh file, or a built-in organ's name")
       ->required();
   inspect->add_flag("--json", options.json, "print JSON");
+  add_fit_command(app, options.fit);
+  add_settle_command(app, options.settle);
 }
 
 int run(int argc, char** argv) {
   Options options;
   CLI::App app(
-      "Makes, imports and inspects organs: the meshes, materials and held nodes that a "
-      "session is about.",
+      "Makes, imports, inspects and settles organs, the meshes, materials and held nodes that a "
+      "session is about, and fits their material to a measurement.",
       kProgram);
   app.footer(kExamples);
   app.set_version_flag("--version", version_text());
@@ -329,6 +338,10 @@ int run(int argc, char** argv) {
     status = run_make(options);
   else if (app.got_subcommand("import"))
     status = run_import(options);
+  else if (app.got_subcommand("fit"))
+    status = run_fit(options.fit);
+  else if (app.got_subcommand("settle"))
+    status = run_settle(options.settle);
   else
     status = run_inspect(options);
   return status ? static_cast<int>(ExitCode::Ok) : report(kProgram, status.error());

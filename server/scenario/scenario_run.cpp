@@ -30,7 +30,7 @@ double seconds_of(Tick tick) {
 
 std::uint64_t steps_of(const scene::RunRule& run) {
   return run.mode == scene::RunMode::Static
-             ? run.load_steps
+             ? run.load_times_s.size()
              : static_cast<std::uint64_t>(
                    std::llround(run.seconds * static_cast<double>(kTicksPerSecond)));
 }
@@ -103,13 +103,12 @@ ScenarioRun::ScenarioRun(scene::ResolvedScenario resolved, Solver solver)
   }
   if (!scenario().run.starts_in_equilibrium) return;
   apply_gravity();
-  has_settled_ = relax().is_converged;
+  settling_ = relax();
 }
 
 double ScenarioRun::time_s() const {
   if (!is_static()) return seconds_of(steps_done_);
-  return scenario().run.seconds * static_cast<double>(steps_done_) /
-         static_cast<double>(step_count_);
+  return steps_done_ == 0 ? 0 : scenario().run.load_times_s[steps_done_ - 1];
 }
 
 bool ScenarioRun::is_due(std::size_t probe) const {
@@ -243,8 +242,7 @@ StepReport ScenarioRun::relax() {
 }
 
 StepReport ScenarioRun::step_static() {
-  const double now = scenario().run.seconds * static_cast<double>(steps_done_ + 1) /
-                     static_cast<double>(step_count_);
+  const double now = scenario().run.load_times_s[steps_done_];
   apply_loads(now);
   StepReport report;
   if (scenario().tools.empty()) return relax();

@@ -53,8 +53,8 @@ class ScenarioRun {
   std::uint64_t step_count() const { return step_count_; }
   bool is_finished() const { return steps_done_ >= step_count_; }
   double time_s() const;  // at the end of the last step
-  // Whether the starting equilibrium was reached; true without one.
-  bool has_settled() const { return has_settled_; }
+  // How the starting equilibrium was found; converged if there is none.
+  const StepReport& settling() const { return settling_; }
 
   const scene::ResolvedScenario& resolved() const { return resolved_; }
   const scene::Scenario& scenario() const { return resolved_.scenario; }
@@ -90,7 +90,7 @@ class ScenarioRun {
   const dynamics::SpringNetwork springs_;
 
   std::uint64_t steps_done_ = 0;
-  bool has_settled_ = true;
+  StepReport settling_;
   float solved_dt_ = kTickSeconds;  // of the last solve, s
 
   world::World world_;
