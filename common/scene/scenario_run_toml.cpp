@@ -83,6 +83,11 @@ RunRule read_run(TableReader& reader) {
   read_step(reader, run);
   read_count(reader, "sweeps", 1, 64, run.sweeps);
   run.over_relaxation = reader.number("over_relaxation", 1, 1.9).value_or(run.over_relaxation);
+  if (run.mode == RunMode::Static) {
+    // What is left out of balance adds up over all nodes, and nothing corrects it later.
+    run.tolerance_n = 1e-7;
+    run.max_sweeps = 50'000;
+  }
   run.tolerance_n = reader.number("tolerance_n", 1e-9, 1).value_or(run.tolerance_n);
   read_count(reader, "max_sweeps", 1, 1'000'000, run.max_sweeps);
   if (run.mode == RunMode::Static)
