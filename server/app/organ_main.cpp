@@ -107,15 +107,48 @@ std::string grouped(std::size_t number) {
   return digits;
 }
 
-void print_material(const scene::Organ& organ) {
-  const scene::Material& m = organ.material;
-  if (m.spring_law == scene::SpringLaw::Constant)
+const char* name_of(scene::ElasticLaw law) {
+  switch (law) {
+    case scene::ElasticLaw::Springs:
+      return "springs";
+    case scene::ElasticLaw::TensorMass:
+      return "tensor-mass";
+    case scene::ElasticLaw::NeoHookean:
+      return "neo-hookean";
+  }
+  return "";
+}
+
+void print_material(const scene::Material& m) {
+  if (m.elastic_law != scene::ElasticLaw::Springs)
+    std::printf("  elasticity          %s, Young's modulus %.4g kPa, Poisson's ratio %.4g%s\n",
+                name_of(m.elastic_law), m.young_modulus_pa / 1e3, m.poisson_ratio,
+                m.has_averaged_volume ? ", averaged volume" : "");
+  else if (m.spring_law == scene::SpringLaw::Constant)
     std::printf("  springs             constant, %.4g N/m\n", m.spring_stiffness_n_m);
   else
     std::printf("  springs             from Young's modulus %.4g kPa\n", m.young_modulus_pa / 1e3);
+  if (length(m.fibre_direction) > 0)
+    std::printf("  fibres              along %.3g %.3g %.3g, %.4g times as stiff, tension %.4g\n",
+                m.fibre_direction.x, m.fibre_direction.y, m.fibre_direction.z,
+                m.fibre_stiffness_ratio, m.fibre_tension);
+  if (m.tension > 0) std::printf("  tension             %.4g\n", m.tension);
   std::printf("  density             %.4g kg/m^3\n", m.density_kg_m3);
   std::printf("  damping             %.4g 1/s per node, %.4g ms along springs\n",
               m.node_damping_per_s, m.spring_damping_time_s * 1e3);
+}
+
+void print_materials(const scene::Organ& organ) {
+  print_material(organ.material);
+  for (const auto& region : organ.regions) {
+    std::printf("  region              %s, %s nodes:\n", region.name.c_str(),
+                grouped(region.nodes.size()).c_str());
+    print_material(region.material);
+  }
+  const Vec3d& g = organ.gravity_m_s2;
+  if (length(g) > 0) std::printf("  gravity             %.4g %.4g %.4g m/s^2\n", g.x, g.y, g.z);
+  if (!organ.stress_free_positions_m.empty())
+    std::printf("  rest pose           settled, in equilibrium\n");
 }
 
 void print_text(const scene::Organ& organ) {
@@ -140,7 +173,7 @@ void print_text(const scene::Organ& organ) {
     const auto angles = mesh::dihedral_range(mesh);
     std::printf("  dihedral angles     %.1f to %.1f degrees\n", angles.min_deg, angles.max_deg);
   }
-  print_material(organ);
+  print_materials(organ);
   std::printf("  fixed nodes         %s (%.1f %%)\n", grouped(organ.fixed_nodes.size()).c_str(),
               100.0 * static_cast<double>(organ.fixed_nodes.size()) /
                   static_cast<double>(mesh.node_count()));
@@ -187,6 +220,11 @@ void print_json(const scene::Organ& organ) {
     std::printf("  \"dihedral_deg\": {\"min\": %.6g, \"max\": %.6g},\n", angles.min_deg,
                 angles.max_deg);
   }
+  std::printf("  \"elastic_law\": \"%s\",\n  \"poisson_ratio\": %.9g,\n", name_of(m.elastic_law),
+              m.poisson_ratio);
+  std::printf("  \"regions\": %zu,\n  \"gravity_m_s2\": [%.9g, %.9g, %.9g],\n  \"settled\": %s,\n",
+              organ.regions.size(), organ.gravity_m_s2.x, organ.gravity_m_s2.y,
+              organ.gravity_m_s2.z, organ.stress_free_positions_m.empty() ? "false" : "true");
   std::printf("  \"spring_law\": \"%s\",\n  \"spring_stiffness_n_m\": %.9g,\n",
               m.spring_law == scene::SpringLaw::Constant ? "constant" : "volume_consistent",
               m.spring_stiffness_n_m);
