@@ -1,0 +1,20 @@
+#pragma once
+
+// Works that run whole ticks with tools, as the server does.
+
+#include "tests/bench/bench_run.h"
+#include "tests/bench/our_solver.h"
+
+namespace trocar::bench {
+
+// Surface places far from each other and from what is fixed, and outward normals there; the first
+// is the surface node farthest along `first`.
+std::vector<BenchTool> spread_tools(const scene::Organ& organ, std::size_t count,
+                                    const Vec3f& first);
+
+// `includes_rest`: the row's time is that of the whole tick; without, of contacts, queue and solve.
+Work run_session(scene::Organ organ, std::vector<BenchTool> tools, const SessionOptions& options,
+                 bool includes_rest);
+Row row_of(const scene::Organ& organ, std::string group, std::string object, std::string solver);
+
+}  // namespace trocar::bench
