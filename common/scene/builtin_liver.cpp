@@ -24,7 +24,7 @@ Result<Organ> make_liver(int target_tets) {
   for (const NodeIndex node : organ.mesh.surface_nodes)
     if (is_liver_held(organ.mesh.rest_positions[node.value])) organ.fixed_nodes.push_back(node);
   organ.source_offset_m = mesh::centre_on_origin(organ.mesh);
-  organ.node_masses_kg = lumped_masses(organ.mesh, organ.material.density_kg_m3);
+  organ.node_masses_kg = lumped_masses(organ);
   if (auto status = validate(organ); !status) return status.error();
   return organ;
 }

@@ -99,7 +99,7 @@ Organ make_plate() {
   organ.material.spring_stiffness_n_m = 100;
   organ.material.young_modulus_pa = 58'000;
   organ.material.spring_damping_time_s = 0.05 / 100;
-  organ.node_masses_kg = lumped_masses(organ.mesh, organ.material.density_kg_m3);
+  organ.node_masses_kg = lumped_masses(organ);
   for (std::size_t n = 0; n < organ.mesh.node_count(); ++n) {
     const Vec3d& p = organ.mesh.rest_positions[n];
     if (std::max(std::abs(p.x), std::abs(p.z)) > kSide_m / 2 - 1e-9)

@@ -93,7 +93,7 @@ Result<Organ> make_stomach(int target_tets) {
   for (std::size_t n = 0; n < organ.mesh.node_count(); ++n)
     if (is_stomach_held(organ.mesh.rest_positions[n])) organ.fixed_nodes.push_back(NodeIndex(n));
   organ.source_offset_m = mesh::centre_on_origin(organ.mesh);
-  organ.node_masses_kg = lumped_masses(organ.mesh, organ.material.density_kg_m3);
+  organ.node_masses_kg = lumped_masses(organ);
   if (auto status = validate(organ); !status) return status.error();
   return organ;
 }

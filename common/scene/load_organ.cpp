@@ -38,7 +38,7 @@ Result<ImportedOrgan> import_organ(const std::filesystem::path& path,
   organ.mesh = std::move(imported->mesh);
   organ.source_offset_m = imported->offset_m;
   organ.fixed_nodes = nodes_held_by(options.fix, organ.mesh);
-  organ.node_masses_kg = lumped_masses(organ.mesh, organ.material.density_kg_m3);
+  organ.node_masses_kg = lumped_masses(organ);
   if (auto status = validate(organ); !status)
     return Error{ErrorCode::BadFile, path.string() + ": " + status.error().message};
   return result;

@@ -12,6 +12,13 @@ namespace {
 constexpr double kMaxSize_m = 2.0;
 constexpr double kCentreTolerance_m = 1e-6;
 constexpr std::size_t kMaxTextBytes = 4096;
+constexpr std::size_t kMaxRegions = 1000;
+
+double stress_free_volume(const Organ& organ, std::size_t tet) {
+  const auto& p = organ.stress_free();
+  const auto& [a, b, c, d] = organ.mesh.tets[tet];
+  return dot(cross(p[b.value] - p[a.value], p[c.value] - p[a.value]), p[d.value] - p[a.value]) / 6;
+}
 
 Error broken(const Organ& organ, std::string what) {
   return {ErrorCode::BadFile, "organ '" + organ.name + "': " + std::move(what)};
@@ -24,24 +31,68 @@ Status check_number(const Organ& organ, const char* name, double value, double l
   return broken(organ, text);
 }
 
-Status check_material(const Organ& organ) {
-  const Material& m = organ.material;
-  if (auto s = check_number(organ, "density (kg/m^3)", m.density_kg_m3, 1, 30000); !s) return s;
-  if (m.spring_law != SpringLaw::Constant && m.spring_law != SpringLaw::VolumeConsistent)
+Status check_material(const Organ& organ, const Material& m) {
+  const auto number = [&](const char* name, double value, double low, double high) {
+    return check_number(organ, name, value, low, high);
+  };
+  if (auto s = number("density (kg/m^3)", m.density_kg_m3, 1, 30000); !s) return s;
+  if (m.elastic_law > ElasticLaw::NeoHookean)
+    return broken(organ, "unknown elastic law " + std::to_string(static_cast<int>(m.elastic_law)));
+  if (m.spring_law > SpringLaw::VolumeConsistent)
     return broken(organ, "unknown spring law " + std::to_string(static_cast<int>(m.spring_law)));
-  if (auto s = check_number(organ, "spring stiffness (N/m)", m.spring_stiffness_n_m, 0, 1e9); !s)
-    return s;
-  if (auto s = check_number(organ, "Young's modulus (Pa)", m.young_modulus_pa, 0, 1e12); !s)
-    return s;
-  if (auto s = check_number(organ, "node damping (1/s)", m.node_damping_per_s, 0, 1e6); !s)
-    return s;
-  if (auto s = check_number(organ, "spring damping time (s)", m.spring_damping_time_s, 0, 100); !s)
-    return s;
-  if (m.spring_law == SpringLaw::VolumeConsistent &&
-      (organ.mesh.tets.empty() || !organ.mesh.links.empty()))
+  for (const auto& s :
+       {number("spring stiffness (N/m)", m.spring_stiffness_n_m, 0, 1e9),
+        number("Young's modulus (Pa)", m.young_modulus_pa, 0, 1e12),
+        number("node damping (1/s)", m.node_damping_per_s, 0, 1e6),
+        number("spring damping time (s)", m.spring_damping_time_s, 0, 100),
+        number("Poisson's ratio", m.poisson_ratio, 0, 0.4999),
+        number("fibre stiffness ratio", m.fibre_stiffness_ratio, 0, 1000),
+        number("tension", m.tension, 0, 0.9), number("fibre tension", m.fibre_tension, 0, 0.9)})
+    if (!s) return s;
+  if (!is_finite(m.fibre_direction)) return broken(organ, "fibre direction is not finite");
+  const bool has_tet_springs = !organ.mesh.tets.empty() && organ.mesh.links.empty();
+  if (m.elastic_law != ElasticLaw::Springs)
+    return organ.mesh.tets.empty() ? Status(broken(organ, "has no tets, only springs fit it"))
+                                   : Status();
+  if (m.spring_law == SpringLaw::VolumeConsistent && !has_tet_springs)
     return broken(organ,
                   "the volume-consistent spring law needs springs on the edges of tets: use the "
                   "constant law where there are links");
+  return {};
+}
+
+Status check_regions(const Organ& organ) {
+  if (organ.regions.size() > kMaxRegions)
+    return broken(organ, "has more than " + std::to_string(kMaxRegions) + " material regions");
+  for (const auto& region : organ.regions) {
+    if (region.nodes.empty() || region.name.empty() || region.name.size() > kMaxTextBytes)
+      return broken(organ, "a material region needs a name and nodes");
+    for (std::size_t i = 0; i < region.nodes.size(); ++i)
+      if (region.nodes[i].value >= organ.mesh.node_count() ||
+          (i > 0 && !(region.nodes[i - 1] < region.nodes[i])))
+        return broken(organ, "nodes of region '" + region.name +
+                                 "' are not ascending nodes of the mesh at entry " +
+                                 std::to_string(i));
+    if (auto s = check_material(organ, region.material); !s) return s;
+  }
+  return {};
+}
+
+Status check_stress_free(const Organ& organ) {
+  if (!is_finite(organ.gravity_m_s2) || length(organ.gravity_m_s2) > 1000)
+    return broken(organ, "gravity must be finite and at most 1000 m/s^2");
+  const auto& free = organ.stress_free_positions_m;
+  if (free.empty()) return {};
+  if (free.size() != organ.mesh.node_count())
+    return broken(organ, "has " + std::to_string(free.size()) + " stress-free positions for " +
+                             std::to_string(organ.mesh.node_count()) + " nodes");
+  for (std::size_t i = 0; i < free.size(); ++i)
+    if (!(length(free[i] - organ.mesh.rest_positions[i]) <= kMaxSize_m))
+      return broken(organ, "stress-free position of node " + std::to_string(i) +
+                               " is not within 2 m of its rest position");
+  for (std::size_t t = 0; t < organ.mesh.tets.size(); ++t)
+    if (!(stress_free_volume(organ, t) > 0))
+      return broken(organ, "tet " + std::to_string(t) + " has no volume free of stress");
   return {};
 }
 
@@ -77,6 +128,24 @@ Status check_nodes(const Organ& organ) {
   return {};
 }
 
+std::vector<double> numbers_of(const Material& m) {
+  return {m.density_kg_m3,
+          static_cast<double>(m.spring_law),
+          m.spring_stiffness_n_m,
+          m.young_modulus_pa,
+          m.node_damping_per_s,
+          m.spring_damping_time_s,
+          static_cast<double>(m.elastic_law),
+          m.poisson_ratio,
+          m.has_averaged_volume ? 1.0 : 0.0,
+          m.fibre_direction.x,
+          m.fibre_direction.y,
+          m.fibre_direction.z,
+          m.fibre_stiffness_ratio,
+          m.tension,
+          m.fibre_tension};
+}
+
 template <typename T>
 void hash_array(StateHasher& hasher, const std::vector<T>& values) {
   const std::uint64_t count = values.size();
@@ -96,32 +165,79 @@ void hash_array(StateHasher& hasher, const std::vector<T>& values) {
 // makes S = c E 6, since a tet has six edges: c = 1. A mesh with directions that are not evenly
 // spread is stiffer along some axes (body-centred lattice: 7 % softer along the cube's axes), but
 // its average over all orientations, and its response to uniform compression, are exact.
-std::vector<double> spring_stiffnesses(const Organ& organ) {
+std::vector<Spring> springs_of(const Organ& organ) {
   const mesh::TetMesh& mesh = organ.mesh;
   const auto& pairs = mesh.spring_pairs();
-  if (organ.material.spring_law == SpringLaw::Constant)
-    return std::vector<double>(pairs.size(), organ.material.spring_stiffness_n_m);
-  TROCAR_ASSERT(mesh.links.empty());
-  std::vector<double> stiffnesses(pairs.size());
+  const auto& free = organ.stress_free();
+  const MaterialMap map = material_map(organ);
+  std::vector<Spring> springs(pairs.size());
   for (std::size_t e = 0; e < pairs.size(); ++e) {
     const auto [a, b] = pairs[e];
-    double volume = 0;
+    const Vec3d along = free[b.value] - free[a.value];
+    const double l_squared = length_squared(along);
+    const Material& own = material_at(organ, map.spring_pairs[e]);
+    const double fibre_squared = length_squared(own.fibre_direction);
+    const double d = dot(along, own.fibre_direction);
+    const double cos_squared = fibre_squared > 0 ? d * d / (l_squared * fibre_squared) : 0;
+    const double factor = 1 + (own.fibre_stiffness_ratio - 1) * cos_squared;
+    Spring& spring = springs[e];
+    spring.rest_length_m =
+        std::sqrt(l_squared) *
+        (1 - own.tension - (fibre_squared > 0 ? own.fibre_tension : 0) * cos_squared);
+    const auto add = [&](const Material& material, double stiffness) {
+      if (material.elastic_law == ElasticLaw::Springs) spring.stiffness_n_m += stiffness;
+      spring.damping_n_s_m += stiffness * material.spring_damping_time_s;
+    };
+    if (own.elastic_law == ElasticLaw::Springs && own.spring_law == SpringLaw::Constant) {
+      add(own, own.spring_stiffness_n_m * factor);
+      continue;
+    }
+    if (!mesh.links.empty()) continue;  // elastic tets with links beside: damped by the tets' edges
     for (const TetIndex t : mesh.node_tets[a]) {
       const auto& tet = mesh.tets[t.value];
-      if (std::find(tet.begin(), tet.end(), b) != tet.end()) volume += tet_volume(mesh, t);
+      if (std::find(tet.begin(), tet.end(), b) == tet.end()) continue;
+      const Material& material = material_at(organ, map.tets[t.value]);
+      add(material, material.young_modulus_pa * stress_free_volume(organ, t.value) / l_squared *
+                        (material.elastic_law == ElasticLaw::Springs ? factor : 1.0));
     }
-    const double l_squared =
-        length_squared(mesh.rest_positions[b.value] - mesh.rest_positions[a.value]);
-    stiffnesses[e] = organ.material.young_modulus_pa * volume / l_squared;
   }
-  return stiffnesses;
+  return springs;
 }
 
-std::vector<double> lumped_masses(const mesh::TetMesh& mesh, double density_kg_m3) {
-  std::vector<double> masses(mesh.node_count(), 0.0);
-  for (std::size_t t = 0; t < mesh.tets.size(); ++t) {
-    const double quarter = density_kg_m3 * tet_volume(mesh, TetIndex(t)) / 4;
-    for (const NodeIndex node : mesh.tets[t]) masses[node.value] += quarter;
+MaterialMap material_map(const Organ& organ) {
+  MaterialMap map{std::vector<std::uint16_t>(organ.mesh.tets.size()),
+                  std::vector<std::uint16_t>(organ.mesh.spring_pairs().size()),
+                  std::vector<std::uint16_t>(organ.mesh.node_count())};
+  std::vector<std::uint8_t> is_inside(organ.mesh.node_count());
+  for (std::size_t r = 0; r < organ.regions.size(); ++r) {
+    std::fill(is_inside.begin(), is_inside.end(), std::uint8_t{0});
+    const auto index = static_cast<std::uint16_t>(r + 1);
+    for (const auto node : organ.regions[r].nodes) {
+      is_inside[node.value] = 1;
+      map.nodes[node.value] = index;
+    }
+    const auto mark = [&](const auto& elements, std::vector<std::uint16_t>& out) {
+      for (std::size_t i = 0; i < elements.size(); ++i)
+        if (std::ranges::all_of(elements[i], [&](NodeIndex n) { return is_inside[n.value] != 0; }))
+          out[i] = index;
+    };
+    mark(organ.mesh.tets, map.tets);
+    mark(organ.mesh.spring_pairs(), map.spring_pairs);
+  }
+  return map;
+}
+
+const Material& material_at(const Organ& organ, std::uint16_t index) {
+  return index == 0 ? organ.material : organ.regions[index - 1u].material;
+}
+
+std::vector<double> lumped_masses(const Organ& organ) {
+  std::vector<double> masses(organ.mesh.node_count(), 0.0);
+  const MaterialMap map = material_map(organ);
+  for (std::size_t t = 0; t < organ.mesh.tets.size(); ++t) {
+    const double density = material_at(organ, map.tets[t]).density_kg_m3;
+    const double quarter = density * stress_free_volume(organ, t) / 4;
+    for (const NodeIndex node : organ.mesh.tets[t]) masses[node.value] += quarter;
   }
   return masses;
 }
@@ -134,10 +250,13 @@ std::uint64_t organ_hash(const Organ& organ) {
   hash_array(hasher, organ.mesh.boundary_triangles);
   hash_array(hasher, organ.fixed_nodes);
   hash_array(hasher, organ.node_masses_kg);
-  const Material& m = organ.material;
-  hash_array(hasher, std::vector<double>{m.density_kg_m3, static_cast<double>(m.spring_law),
-                                         m.spring_stiffness_n_m, m.young_modulus_pa,
-                                         m.node_damping_per_s, m.spring_damping_time_s});
+  hash_array(hasher, numbers_of(organ.material));
+  for (const auto& region : organ.regions) {
+    hash_array(hasher, numbers_of(region.material));
+    hash_array(hasher, region.nodes);
+  }
+  hash_array(hasher, std::vector<Vec3d>{organ.gravity_m_s2});
+  hash_array(hasher, organ.stress_free_positions_m);
   return hasher.digest();
 }
 
@@ -154,7 +273,9 @@ Status validate(const Organ& organ) {
   if (auto s = check_extent(organ); !s) return s;
   if (auto s = check_nodes(organ); !s) return s;
   if (!is_finite(organ.source_offset_m)) return broken(organ, "source offset is not finite");
-  return check_material(organ);
+  if (auto s = check_stress_free(organ); !s) return s;
+  if (auto s = check_regions(organ); !s) return s;
+  return check_material(organ, organ.material);
 }
 
 }  // namespace trocar::scene

@@ -14,7 +14,7 @@ namespace trocar::scene {
 namespace {
 
 constexpr std::string_view kMagic = "TROCARO1";
-constexpr std::uint32_t kVersion = 1;
+constexpr std::uint32_t kVersion = 2;
 constexpr std::size_t kHeaderBytes = 24;
 constexpr std::uint64_t kMaxBodyBytes = std::uint64_t{512} << 20;
 constexpr std::size_t kUnpackStepBytes = std::size_t{1} << 20;
@@ -46,6 +46,55 @@ Status take_elements(const char* what, const Field& field, std::size_t node_coun
                  std::to_string(node) + " of " + std::to_string(node_count));
     elements[i / kNodes][i % kNodes] = NodeIndex(node);
   }
+  return {};
+}
+
+using Numbers = google::protobuf::RepeatedField<double>;
+
+void put_vector(const Vec3d& v, Numbers* field) {
+  for (const double c : {v.x, v.y, v.z}) field->Add(c);
+}
+Vec3d vector_at(const Numbers& field, int first) {
+  return {field.Get(first), field.Get(first + 1), field.Get(first + 2)};
+}
+
+void put_material(const Material& m, proto::Material& out) {
+  out.set_density_kg_m3(m.density_kg_m3);
+  out.set_spring_law(static_cast<std::uint32_t>(m.spring_law));
+  out.set_spring_stiffness_n_m(m.spring_stiffness_n_m);
+  out.set_young_modulus_pa(m.young_modulus_pa);
+  out.set_node_damping_per_s(m.node_damping_per_s);
+  out.set_spring_damping_time_s(m.spring_damping_time_s);
+  out.set_elastic_law(static_cast<std::uint32_t>(m.elastic_law));
+  out.set_poisson_ratio(m.poisson_ratio);
+  out.set_has_averaged_volume(m.has_averaged_volume);
+  if (length(m.fibre_direction) > 0) put_vector(m.fibre_direction, out.mutable_fibre_direction());
+  out.set_fibre_stiffness_ratio(m.fibre_stiffness_ratio);
+  out.set_tension(m.tension);
+  out.set_fibre_tension(m.fibre_tension);
+}
+
+Status take_material(const proto::Material& in, Material& m) {
+  if (in.spring_law() > static_cast<std::uint32_t>(SpringLaw::VolumeConsistent))
+    return bad("organ: unknown spring law " + std::to_string(in.spring_law()));
+  if (in.elastic_law() > static_cast<std::uint32_t>(ElasticLaw::NeoHookean))
+    return bad("organ: unknown elastic law " + std::to_string(in.elastic_law()));
+  if (in.fibre_direction_size() != 0 && in.fibre_direction_size() != 3)
+    return bad("organ: fibre direction must be three numbers");
+  m = {.density_kg_m3 = in.density_kg_m3(),
+       .spring_law = static_cast<SpringLaw>(in.spring_law()),
+       .spring_stiffness_n_m = in.spring_stiffness_n_m(),
+       .young_modulus_pa = in.young_modulus_pa(),
+       .node_damping_per_s = in.node_damping_per_s(),
+       .spring_damping_time_s = in.spring_damping_time_s(),
+       .elastic_law = static_cast<ElasticLaw>(in.elastic_law()),
+       .poisson_ratio = in.poisson_ratio(),
+       .has_averaged_volume = in.has_averaged_volume(),
+       .fibre_direction = {},
+       .fibre_stiffness_ratio = in.fibre_stiffness_ratio(),
+       .tension = in.tension(),
+       .fibre_tension = in.fibre_tension()};
+  if (in.fibre_direction_size() == 3) m.fibre_direction = vector_at(in.fibre_direction(), 0);
   return {};
 }
 
@@ -104,23 +153,25 @@ Bytes encode_organ(const Organ& organ) {
   proto::Organ message;
   message.set_name(organ.name);
   message.set_source(organ.source);
-  for (const Vec3d& p : organ.mesh.rest_positions)
-    for (const double c : {p.x, p.y, p.z}) message.add_rest_position_m(c);
+  for (const Vec3d& p : organ.mesh.rest_positions) put_vector(p, message.mutable_rest_position_m());
   put_elements(organ.mesh.tets, message.mutable_tet());
   put_elements(organ.mesh.links, message.mutable_link());
   if (organ.mesh.tets.empty())
     put_elements(organ.mesh.boundary_triangles, message.mutable_boundary_triangle());
   for (const NodeIndex node : organ.fixed_nodes) message.add_fixed_node(node.value);
   for (const double mass : organ.node_masses_kg) message.add_node_mass_kg(mass);
-  const Vec3d& offset = organ.source_offset_m;
-  for (const double c : {offset.x, offset.y, offset.z}) message.add_source_offset_m(c);
-  proto::Material& material = *message.mutable_material();
-  material.set_density_kg_m3(organ.material.density_kg_m3);
-  material.set_spring_law(static_cast<std::uint32_t>(organ.material.spring_law));
-  material.set_spring_stiffness_n_m(organ.material.spring_stiffness_n_m);
-  material.set_young_modulus_pa(organ.material.young_modulus_pa);
-  material.set_node_damping_per_s(organ.material.node_damping_per_s);
-  material.set_spring_damping_time_s(organ.material.spring_damping_time_s);
+  put_vector(organ.source_offset_m, message.mutable_source_offset_m());
+  put_material(organ.material, *message.mutable_material());
+  for (const auto& region : organ.regions) {
+    auto& entry = *message.add_region();
+    entry.set_name(region.name);
+    put_material(region.material, *entry.mutable_material());
+    for (const NodeIndex node : region.nodes) entry.add_node(node.value);
+  }
+  if (length(organ.gravity_m_s2) > 0)
+    put_vector(organ.gravity_m_s2, message.mutable_gravity_m_s2());
+  for (const Vec3d& p : organ.stress_free_positions_m)
+    put_vector(p, message.mutable_stress_free_position_m());
   Bytes bytes(message.ByteSizeLong());
   TROCAR_ASSERT(message.SerializeToArray(bytes.data(), static_cast<int>(bytes.size())));
   return bytes;
@@ -138,15 +189,22 @@ Result<Organ> decode_organ(BytesView bytes) {
   for (const std::uint32_t node : message.fixed_node()) organ.fixed_nodes.emplace_back(node);
   organ.node_masses_kg.assign(message.node_mass_kg().begin(), message.node_mass_kg().end());
   if (message.source_offset_m_size() != 3) return bad("organ: source offset must be three numbers");
-  organ.source_offset_m = {message.source_offset_m(0), message.source_offset_m(1),
-                           message.source_offset_m(2)};
+  organ.source_offset_m = vector_at(message.source_offset_m(), 0);
   if (!message.has_material()) return bad("organ: has no material");
-  const proto::Material& material = message.material();
-  if (material.spring_law() > static_cast<std::uint32_t>(SpringLaw::VolumeConsistent))
-    return bad("organ: unknown spring law " + std::to_string(material.spring_law()));
-  organ.material = {material.density_kg_m3(),        static_cast<SpringLaw>(material.spring_law()),
-                    material.spring_stiffness_n_m(), material.young_modulus_pa(),
-                    material.node_damping_per_s(),   material.spring_damping_time_s()};
+  if (auto s = take_material(message.material(), organ.material); !s) return s.error();
+  for (const auto& entry : message.region()) {
+    auto& region = organ.regions.emplace_back();
+    region.name = entry.name();
+    if (auto s = take_material(entry.material(), region.material); !s) return s.error();
+    for (const std::uint32_t node : entry.node()) region.nodes.emplace_back(node);
+  }
+  if (message.gravity_m_s2_size() != 0 && message.gravity_m_s2_size() != 3)
+    return bad("organ: gravity must be three numbers");
+  if (message.gravity_m_s2_size() == 3) organ.gravity_m_s2 = vector_at(message.gravity_m_s2(), 0);
+  const auto& free = message.stress_free_position_m();
+  if (free.size() % 3 != 0) return bad("organ: stress-free positions must be three numbers a node");
+  for (int i = 0; i < free.size(); i += 3)
+    organ.stress_free_positions_m.push_back(vector_at(free, i));
   if (auto s = validate(organ); !s) return s.error();
   return organ;
 }

@@ -65,7 +65,7 @@ Float8 inverse_length(Float8 length) {
 SpringNetwork::SpringNetwork(const scene::Organ& organ)
     : node_damping_per_s_(static_cast<float>(organ.material.node_damping_per_s)) {
   const auto& pairs = organ.mesh.spring_pairs();
-  const auto stiffnesses = scene::spring_stiffnesses(organ);
+  const auto springs = scene::springs_of(organ);
   const auto node_count = organ.mesh.node_count();
   std::vector<std::vector<std::uint32_t>> springs_of(node_count);
   for (std::uint32_t s = 0; s < pairs.size(); ++s)
@@ -86,10 +86,9 @@ SpringNetwork::SpringNetwork(const scene::Organ& organ)
         batch.rx[lane] = static_cast<float>(r.x);
         batch.ry[lane] = static_cast<float>(r.y);
         batch.rz[lane] = static_cast<float>(r.z);
-        batch.rest_length[lane] = static_cast<float>(length(r));
-        batch.stiffness[lane] = static_cast<float>(stiffnesses[s]);
-        batch.damping[lane] =
-            static_cast<float>(stiffnesses[s] * organ.material.spring_damping_time_s);
+        batch.rest_length[lane] = static_cast<float>(springs[s].rest_length_m);
+        batch.stiffness[lane] = static_cast<float>(springs[s].stiffness_n_m);
+        batch.damping[lane] = static_cast<float>(springs[s].damping_n_s_m);
       }
     }
     offsets_.push_back(static_cast<std::uint32_t>(batches_.size()));

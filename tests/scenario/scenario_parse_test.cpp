@@ -200,7 +200,7 @@ TEST(ScenarioParse, MaterialChangesMassAndSprings) {
   double mass = 0;
   for (const double m : resolved->organ.node_masses_kg) mass += m;
   EXPECT_NEAR(mass, 2120 * 8e-6, 1e-9);
-  for (const double k : spring_stiffnesses(resolved->organ)) EXPECT_EQ(k, 7);
+  for (const auto& s : springs_of(resolved->organ)) EXPECT_EQ(s.stiffness_n_m, 7);
 }
 
 TEST(ScenarioParse, TimedVectorsAreLinearBetweenKeysAndConstantOutside) {

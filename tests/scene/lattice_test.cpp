@@ -20,7 +20,7 @@ TEST(Lattice, IsChoisByDefault) {
   EXPECT_EQ(organ.fixed_nodes.size(), 900u);
   for (const NodeIndex node : organ.fixed_nodes)
     EXPECT_NEAR(organ.mesh.rest_positions[node.value].y, -0.07, 1e-12);
-  for (const double k : spring_stiffnesses(organ)) EXPECT_DOUBLE_EQ(k, 40.0);
+  for (const auto& s : springs_of(organ)) EXPECT_DOUBLE_EQ(s.stiffness_n_m, 40.0);
   const double mass =
       std::accumulate(organ.node_masses_kg.begin(), organ.node_masses_kg.end(), 0.0);
   EXPECT_NEAR(mass, 1060 * 0.29 * 0.14 * 0.29, 1e-9);

@@ -16,7 +16,7 @@ Organ block_organ(int n = 4) {
   organ.name = "block";
   organ.source = "test";
   organ.mesh = trocar::testing::block_mesh(n, 0.01);
-  organ.node_masses_kg = lumped_masses(organ.mesh, organ.material.density_kg_m3);
+  organ.node_masses_kg = lumped_masses(organ);
   organ.fixed_nodes = {NodeIndex(0), NodeIndex(3)};
   return organ;
 }
@@ -24,7 +24,7 @@ Organ block_organ(int n = 4) {
 // Energy of the springs per volume under the small affine strain that stretches along `axis` by
 // `strain` and nothing across.
 double spring_energy_density(const Organ& organ, const Vec3d& axis, double strain) {
-  const auto stiffnesses = spring_stiffnesses(organ);
+  const auto springs = springs_of(organ);
   const auto& pairs = organ.mesh.spring_pairs();
   double energy = 0;
   for (std::size_t e = 0; e < pairs.size(); ++e) {
@@ -32,7 +32,7 @@ double spring_energy_density(const Organ& organ, const Vec3d& axis, double strai
         organ.mesh.rest_positions[pairs[e][1].value] - organ.mesh.rest_positions[pairs[e][0].value];
     const Vec3d stretched = edge + axis * (strain * dot(edge, axis));
     const double elongation = length(stretched) - length(edge);
-    energy += 0.5 * stiffnesses[e] * elongation * elongation;
+    energy += 0.5 * springs[e].stiffness_n_m * elongation * elongation;
   }
   return energy / mesh::total_volume(organ.mesh);
 }
@@ -57,13 +57,13 @@ TEST(SpringStiffness, UniformDilationIsExactOnAnyMesh) {
     p += Vec3d{double(i * 7 % 11) - 5, double(i * 5 % 13) - 6, double(i * 3 % 7) - 3} * 2e-4;
   }
   ASSERT_TRUE(mesh::validate(organ.mesh)) << mesh::validate(organ.mesh).error().message;
-  const auto k = spring_stiffnesses(organ);
+  const auto springs = springs_of(organ);
   double energy = 0;
   const double strain = 0.01;
-  for (std::size_t e = 0; e < k.size(); ++e) {
+  for (std::size_t e = 0; e < springs.size(); ++e) {
     const double l = length(organ.mesh.rest_positions[organ.mesh.edges[e][1].value] -
                             organ.mesh.rest_positions[organ.mesh.edges[e][0].value]);
-    energy += 0.5 * k[e] * strain * strain * l * l;
+    energy += 0.5 * springs[e].stiffness_n_m * strain * strain * l * l;
   }
   // W = 9/2 K e^2 with K = 2/3 E.
   EXPECT_NEAR(energy / mesh::total_volume(organ.mesh) / (3 * 4000 * strain * strain), 1.0, 1e-12);
@@ -73,9 +73,9 @@ TEST(SpringStiffness, ConstantLawGivesOneNumber) {
   Organ organ = block_organ();
   organ.material.spring_law = SpringLaw::Constant;
   organ.material.spring_stiffness_n_m = 12.5;
-  const auto k = spring_stiffnesses(organ);
-  ASSERT_EQ(k.size(), organ.mesh.edges.size());
-  for (const double value : k) EXPECT_EQ(value, 12.5);
+  const auto springs = springs_of(organ);
+  ASSERT_EQ(springs.size(), organ.mesh.edges.size());
+  for (const auto& spring : springs) EXPECT_EQ(spring.stiffness_n_m, 12.5);
 }
 
 TEST(Organ, MassesSumToDensityTimesVolume) {

@@ -1,0 +1,76 @@
+#pragma once
+
+// What tissue is made of. SI units. Which energies of server/dynamics a material becomes follows
+// from `elastic_law`.
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "common/base/index.h"
+#include "common/math/vec3.h"
+
+namespace trocar::scene {
+
+enum class ElasticLaw : std::uint8_t {
+  Springs = 0,     // along tet edges or links (Choi 2002, Nakao 2003)
+  TensorMass = 1,  // linear elasticity, matrices per node and edge (Cotin 2000); small rotations
+  NeoHookean = 2,  // tets: C10 (I1 - 3) - 2 C10 (J - 1) + K/2 (J - 1)^2
+};
+
+// How the stiffness of a spring follows from the material.
+enum class SpringLaw : std::uint8_t {
+  Constant = 0,          // the same k for every spring (Choi 2002, Nakao 2003)
+  VolumeConsistent = 1,  // k from Young's modulus, edge length and the volume of the tets around it
+};
+
+struct Material {
+  double density_kg_m3 = 1060;
+  SpringLaw spring_law = SpringLaw::VolumeConsistent;
+  double spring_stiffness_n_m = 100;  // SpringLaw::Constant
+  double young_modulus_pa = 4000;     // all but SpringLaw::Constant
+  // Damping of each node in proportion to its velocity: d_i = rate x m_i (Choi 2002 eq. 1).
+  double node_damping_per_s = 10;
+  // Damping of each edge's length: b = time x k (Kelvin-Voigt); k of the volume-consistent law
+  // where the elasticity is not of springs.
+  double spring_damping_time_s = 0.001;
+  ElasticLaw elastic_law = ElasticLaw::Springs;
+  double poisson_ratio = 0.45;  // TensorMass, NeoHookean; springs have 1/4 whatever is asked
+  // NeoHookean: volume averaged over each node's tets, against locking (Bonet & Burton 1998).
+  bool has_averaged_volume = false;
+  // Transverse isotropy and tension of springs: along a spring at the angle a to the fibres,
+  //   k = k0 (1 + (fibre_stiffness_ratio - 1) cos^2 a),
+  //   rest length = length (1 - tension - fibre_tension cos^2 a)    (Nakao 2003 eq. 3).
+  Vec3d fibre_direction{};  // of any length; zero: none
+  double fibre_stiffness_ratio = 1;
+  double tension = 0;
+  double fibre_tension = 0;
+
+  bool operator==(const Material&) const = default;
+};
+
+// Part of an organ with a material of its own. An element belongs to the last region that holds all
+// of its nodes, else to the organ's own material.
+struct MaterialRegion {
+  std::string name;
+  Material material;
+  std::vector<NodeIndex> nodes;  // ascending, distinct
+
+  bool operator==(const MaterialRegion&) const = default;
+};
+
+// Lame's first and second parameter of linear elasticity, Pa.
+struct LameParameters {
+  double lambda_pa = 0, mu_pa = 0;
+};
+LameParameters lame_parameters(const Material& material);
+
+// Constants of the neo-Hookean law whose response to small strains e is that of linear elasticity,
+// W = mu e:e + lambda/2 (tr e)^2: the bracket C10 (I1 - 3) - 2 C10 (J - 1) is
+// 2 C10 e:e - C10 (tr e)^2 to second order, so 2 C10 = mu and K = lambda + mu.
+struct NeoHookeanParameters {
+  double c10_pa = 0, bulk_modulus_pa = 0;
+};
+NeoHookeanParameters neo_hookean_parameters(const Material& material);
+
+}  // namespace trocar::scene
