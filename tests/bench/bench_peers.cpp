@@ -37,11 +37,10 @@ void add_box(Suite& suite, const Mesh& mesh) {
     add_work(suite, row, run,
              [=](Row&) { return pull_by_bullet(box, peer.law, peer.is_implicit, dt); });
   }
-  for (const Law law : {Law::Springs, Law::LinearTets, Law::NeoHookean})
+  for (const Law law : kLaws)
     for (const std::uint32_t threads : {1u, 2u}) {
       if (!has(law) || threads > max_threads()) continue;
-      const SolverOptions options{
-          .law = law, .poisson_ratio = box->material.poisson_ratio, .threads = threads};
+      const SolverOptions options{.law = law, .threads = threads};
       Row row = row_of(*box, "peers", title_of(law, options));
       row.threads = threads;
       add_work(suite, row, steps, [=](Row&) { return pull_by_us(box, options, true); });

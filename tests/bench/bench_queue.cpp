@@ -32,7 +32,7 @@ void add_queue(Suite& suite) {
                      "ours, springs, 4 sweeps");
     row.more["depth"] = depth;
     add_work(suite, row, suite.steps(20, 600, 2000), [organ = *organ, tool, depth](Row&) {
-      return run_session(organ, {tool}, {.depth = depth, .nodes = kAllNodes}, false);
+      return run_session(organ, {tool}, {{.depth = depth, .nodes = kAllNodes}});
     });
   }
 }

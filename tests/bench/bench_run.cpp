@@ -28,16 +28,17 @@ void Job::run(benchmark::State& state) const {
     wall.push_back(took.wall);
     state.SetIterationTime(took.thread_cpu);
   }
-  const auto warm_up =
-      static_cast<std::ptrdiff_t>(std::min<std::uint64_t>(kWarmUpSteps, thread.size() / 4));
-  for (auto* times : {&thread, &process, &wall})
-    times->erase(times->begin(), times->begin() + warm_up);
+  const auto warm_up = std::min<std::size_t>(kWarmUpSteps, thread.size() / 4);
+  const auto measured = [&](const std::vector<double>& times) {
+    return std::span(times).subspan(warm_up);
+  };
   row.steps = thread.size();
-  row.median_us = 1e6 * median(thread);
-  row.p90_us = 1e6 * percentile(thread, 0.9);
+  row.median_us = 1e6 * median(measured(thread));
+  row.p10_us = 1e6 * percentile(measured(thread), 0.1);
+  row.p90_us = 1e6 * percentile(measured(thread), 0.9);
   if (row.threads > 1) {
-    row.all_threads_us = 1e6 * median(process);
-    row.wall_us = 1e6 * median(wall);
+    row.all_threads_us = 1e6 * median(measured(process));
+    row.wall_us = 1e6 * median(measured(wall));
   }
   work.finish(row);
   state.counters["median_us"] = row.median_us;

@@ -10,6 +10,7 @@ namespace {
 
 constexpr std::uint32_t kAllNodes = 1'000'000;
 constexpr std::uint32_t kAllLayers = 1000;
+constexpr std::uint32_t kNearDepth = 2;  // layers around a contact that get all sweeps
 
 void add_lattice(Suite& suite) {
   const auto organ = scene::make_lattice();
@@ -22,9 +23,8 @@ void add_lattice(Suite& suite) {
   Row row = row_of(organ, "targets", "891 nodes, one contact, depth 10", "springs, 4 sweeps");
   row.paper_ms = "5 (Choi 2002)";
   row.target_ms = 0.08;
-  add_work(suite, row, suite.steps(20, 2000, 6000), [=](Row&) {
-    return run_session(organ, {tool}, {.depth = 10, .nodes = kAllNodes}, false);
-  });
+  add_work(suite, row, suite.steps(20, 2000, 6000),
+           [=](Row&) { return run_session(organ, {tool}, {{.depth = 10, .nodes = kAllNodes}}); });
 }
 
 void add_plate(Suite& suite) {
@@ -34,9 +34,8 @@ void add_plate(Suite& suite) {
   row.paper_ms = "4.1-13.7 (Nakao 2003)";
   row.target_ms = 0.10;
   row.note = "no topology changes in this run";
-  add_work(suite, row, suite.steps(20, 2000, 6000), [=](Row&) {
-    return run_session(organ, {tool}, {.depth = kAllLayers, .nodes = 480}, false);
-  });
+  add_work(suite, row, suite.steps(20, 2000, 6000),
+           [=](Row&) { return run_session(organ, {tool}, {{.depth = kAllLayers, .nodes = 480}}); });
 }
 
 struct WholeOrgan {
@@ -57,8 +56,7 @@ void add_whole_organs(Suite& suite) {
   };
   for (const auto& work : works) {
     if (!has(work.law) || work.threads > max_threads()) continue;
-    const SolverOptions options{
-        .law = work.law, .poisson_ratio = chest->material.poisson_ratio, .threads = work.threads};
+    const SolverOptions options{.law = work.law, .threads = work.threads};
     Row row = row_of(*chest, "targets", std::string(name_of(work.law)) + ", 4 sweeps");
     row.object = suite.is_smoke() ? "tiny box" : work.object;
     row.threads = work.threads;
@@ -69,12 +67,66 @@ void add_whole_organs(Suite& suite) {
   }
 }
 
+void add_whole_liver(Suite& suite) {
+  const auto liver = std::make_shared<const PulledBox>(
+      make_pulled_liver(suite.is_smoke() ? scene::kMinLiverTets : scene::kDefaultLiverTets));
+  for (const Law law : {Law::NeoHookean, Law::NeoHookeanAveraged}) {
+    if (!has(law)) continue;
+    const SolverOptions options{.law = law};
+    Row row = row_of(*liver, "targets", std::string(name_of(law)) + ", 4 sweeps");
+    row.object = suite.is_smoke() ? "tiny liver" : "whole 4k-node liver, pulled";
+    row.peer_ms = "25 (neo-Hookean)";
+    row.target_ms = 1.0;
+    add_work(suite, row, suite.steps(100, 400, 1000),
+             [=](Row&) { return pull_by_us(liver, options, true); });
+  }
+}
+
+struct GradedWork {
+  const char* object;
+  int tets;
+  std::size_t contacts;
+  Law law;
+  std::uint32_t threads;
+  double target_ms;
+};
+
+void add_graded(Suite& suite) {
+  if (!has_graded_mode()) return;
+  const GradedWork works[] = {
+      {"1 contact, graded, 4k-node liver", 18'500, 1, Law::NeoHookean, 1, 0.4},
+      {"2 contacts, graded, 4k-node liver", 18'500, 2, Law::NeoHookean, 1, 0.4},
+      {"8 contacts, graded, 17k-node liver", 88'000, 8, Law::Springs, 1, 1.0},
+      {"8 contacts, graded, 17k-node liver", 88'000, 8, Law::NeoHookean, 2, 1.0},
+  };
+  for (const auto& work : works) {
+    if (!has(work.law) || work.threads > max_threads()) continue;
+    auto organ = scene::make_liver(suite.is_smoke() ? scene::kMinLiverTets : work.tets);
+    TROCAR_ASSERT(organ.ok());
+    Row row = row_of(*organ, "targets", work.object, name_of(work.law));
+    row.threads = work.threads;
+    row.target_ms = work.target_ms;
+    const SessionCase graded{.options = {.law = work.law,
+                                         .mode = BoundaryMode::Graded,
+                                         .depth = kNearDepth,
+                                         .nodes = kAllNodes,
+                                         .threads = work.threads},
+                             .includes_rest = true,
+                             .is_judged = true};
+    add_work(suite, row, suite.steps(20, 300, 1000), [organ = *organ, work, graded](Row&) {
+      return run_session(organ, spread_tools(organ, work.contacts, {0, 1, 0.3f}), graded);
+    });
+  }
+}
+
 }  // namespace
 
 void add_targets(Suite& suite) {
   add_lattice(suite);
   add_plate(suite);
   add_whole_organs(suite);
+  add_whole_liver(suite);
+  add_graded(suite);
 }
 
 }  // namespace trocar::bench

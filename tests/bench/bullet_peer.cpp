@@ -10,8 +10,6 @@
 #include <BulletSoftBody/btSoftBody.h>
 #include <BulletSoftBody/btSoftBodyRigidBodyCollisionConfiguration.h>
 
-#include <numeric>
-
 #include "common/base/checksum.h"
 
 namespace trocar::bench {
@@ -84,9 +82,10 @@ std::unique_ptr<btDeformableLagrangianForce> make_elastic_force(const PulledBox&
     case BulletLaw::MassSpring:
       break;
   }
-  const auto stiffnesses = scene::spring_stiffnesses(box.organ);
-  const double mean = std::accumulate(stiffnesses.begin(), stiffnesses.end(), 0.0) /
-                      static_cast<double>(stiffnesses.size());
+  const auto springs = scene::springs_of(box.organ);
+  double mean = 0;
+  for (const auto& spring : springs)
+    mean += spring.stiffness_n_m / static_cast<double>(springs.size());
   return std::make_unique<btDeformableMassSpringForce>(static_cast<btScalar>(mean), btScalar(0));
 }
 

@@ -21,8 +21,19 @@ const char* name_of(Law law) {
       return "linear tets";
     case Law::NeoHookean:
       return "neo-Hookean tets";
+    case Law::NeoHookeanAveraged:
+      return "neo-Hookean tets, averaged volume";
   }
   return "?";
+}
+
+scene::Organ with_law(scene::Organ organ, Law law) {
+  auto& material = organ.material;
+  material.elastic_law = law == Law::Springs      ? scene::ElasticLaw::Springs
+                         : law == Law::LinearTets ? scene::ElasticLaw::TensorMass
+                                                  : scene::ElasticLaw::NeoHookean;
+  material.has_averaged_volume = law == Law::NeoHookeanAveraged;
+  return organ;
 }
 
 const char* name_of(BoundaryMode mode) {
@@ -130,6 +141,7 @@ struct OurSession::Engine {
   step::TickDecisions decisions;
   session::TickInputs inputs;
   step::TickReport report;
+  std::vector<Vec3f> forces;
 };
 
 OurSession::OurSession(scene::Organ organ, std::span<const BenchTool> tools,
@@ -147,7 +159,8 @@ TickTimes OurSession::tick() {
   if (e.simulation.current_tick() % kSampleTicks == 0) e.sample_tools(e.simulation.current_tick());
   e.report = e.simulation.tick(e.inputs, e.decisions);
   e.inputs.clear();
-  e.simulation.take_frame();
+  if (const auto frame = e.simulation.take_frame())
+    for (const auto& tool : frame->tools) e.forces.push_back(tool.force_n);
   const auto seconds = [&](step::Stage stage) {
     return 1e-9 * e.report.stage_cpu_ns[static_cast<std::size_t>(stage)];
   };
@@ -160,6 +173,14 @@ TickTimes OurSession::tick() {
 TickCounts OurSession::counts() const {
   const auto& r = engine_->report;
   return {r.queue_nodes, r.active_nodes, r.contact_nodes, r.faults};
+}
+
+const std::vector<Vec3f>& OurSession::published_forces() const {
+  return engine_->forces;
+}
+
+std::span<const Vec3f> OurSession::displacements() const {
+  return engine_->simulation.state().world.displacements;
 }
 
 std::uint64_t OurSession::state_hash() const {

@@ -12,17 +12,21 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "common/scene/organ.h"
 
 namespace trocar::bench {
 
-enum class Law { Springs, LinearTets, NeoHookean };
+enum class Law { Springs, LinearTets, NeoHookean, NeoHookeanAveraged };
+inline constexpr Law kLaws[] = {Law::Springs, Law::LinearTets, Law::NeoHookean,
+                                Law::NeoHookeanAveraged};
 const char* name_of(Law law);
+// The organ with this law instead of its own, the rest of its material as it is.
+scene::Organ with_law(scene::Organ organ, Law law);
 
 struct SolverOptions {
   Law law = Law::Springs;
-  double poisson_ratio = 0.4;  // laws of tets; springs have 1/4
   std::uint32_t sweeps = 4;
   float over_relaxation = 1.5f;
   std::uint32_t threads = 1;
@@ -92,6 +96,10 @@ class OurSession {
 
   TickTimes tick();
   TickCounts counts() const;
+  // Force of the tissue on each tool, N, at each publication so far (every 16th tick): tools of the
+  // first, then of the second, ...
+  const std::vector<Vec3f>& published_forces() const;
+  std::span<const Vec3f> displacements() const;
   std::uint64_t state_hash() const;
 
  private:

@@ -1,8 +1,10 @@
 #include "tests/bench/pulled_box.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "common/base/assert.h"
+#include "common/scene/builtin_organs.h"
 
 namespace trocar::bench {
 namespace {
@@ -99,13 +101,36 @@ PulledBox make_pulled_box(const BoxShape& shape, const PulledMaterial& material)
   organ.material.spring_law = scene::SpringLaw::VolumeConsistent;
   organ.material.young_modulus_pa = material.young_modulus_pa;
   organ.material.node_damping_per_s = material.node_damping_per_s;
+  organ.material.poisson_ratio = material.poisson_ratio;
   organ.material.spring_damping_time_s = 0;
-  organ.node_masses_kg = scene::lumped_masses(organ.mesh, material.density_kg_m3);
+  organ.node_masses_kg = scene::lumped_masses(organ);
   for (int j = 0; j <= shape.cells[1]; ++j)
     for (int k = 0; k <= shape.cells[2]; ++k) organ.fixed_nodes.push_back(grid.node(0, j, k));
   load_face(shape, box);
   const auto status = scene::validate(organ);
   TROCAR_ASSERT(status.ok());
+  return box;
+}
+
+PulledBox make_pulled_liver(int target_tets) {
+  constexpr double kRadius = 0.020, kForce = 0.4;
+  auto liver = scene::make_liver(target_tets);
+  TROCAR_ASSERT(liver.ok());
+  PulledBox box;
+  box.organ = std::move(*liver);
+  const auto& p = box.organ.mesh.rest_positions;
+  const auto farthest =
+      *std::max_element(p.begin(), p.end(), [](const auto& a, const auto& b) { return a.x < b.x; });
+  for (std::uint32_t n = 0; n < p.size(); ++n)
+    if (length(p[n] - farthest) <= kRadius &&
+        !std::binary_search(box.organ.fixed_nodes.begin(), box.organ.fixed_nodes.end(),
+                            NodeIndex(n)))
+      box.loaded_nodes.push_back(NodeIndex(n));
+  box.total_force_n = kForce;
+  box.forces_n.resize(p.size());
+  for (const auto node : box.loaded_nodes)
+    box.forces_n[node.value].x =
+        static_cast<float>(kForce / static_cast<double>(box.loaded_nodes.size()));
   return box;
 }
 

@@ -56,6 +56,10 @@ struct PulledBox {
 
 PulledBox make_pulled_box(const BoxShape& shape, const PulledMaterial& material = {});
 
+// The built-in liver with the same kind of load: nodes within 20 mm of the one farthest along x are
+// pulled along x by 0.4 N in all, each alike.
+PulledBox make_pulled_liver(int target_tets);
+
 // The three boxes on which other solvers were measured: a plate, a liver's and a chest wall's size.
 BoxShape plate_box();
 BoxShape liver_box();

@@ -29,9 +29,7 @@ double converged_mm(const PulledBox& box, Law law) {
   if (law == Law::LinearTets) {
     u = ReferenceFem(box).displacement_after(kCompareAtTick, kTickSecond);
   } else {
-    OurSolver solver(
-        box.organ,
-        {.law = law, .poisson_ratio = box.material.poisson_ratio, .sweeps = kConvergedSweeps});
+    OurSolver solver(box.organ, {.law = law, .sweeps = kConvergedSweeps});
     for (int i = 0; i < kCompareAtTick; ++i) solver.step(box.forces_n);
     u = face_of(box, solver);
   }

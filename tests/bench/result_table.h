@@ -22,9 +22,9 @@ struct Row {
   std::string solver;  // by what
   std::size_t nodes = 0, tets = 0, springs = 0;
   std::uint32_t threads = 1;
-  std::uint64_t steps = 0;  // measured, after warming up
+  std::uint64_t steps = 0;  // done; the first 50, or a quarter of fewer, are not in the times
   double dt_ms = 1;
-  double median_us = 0, p90_us = 0;
+  double median_us = 0, p10_us = 0, p90_us = 0;
   std::optional<double> wall_us, all_threads_us;  // medians
   // Displacement of the loaded face at 0.1 s, and the same mesh, law and step solved to
   // convergence.

@@ -1,6 +1,7 @@
 #include "tests/bench/session_work.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace trocar::bench {
 namespace {
@@ -21,6 +22,42 @@ struct Parts {
     faults |= c.faults;
   }
 };
+
+// Sweeps after which more change nothing that counts.
+constexpr std::uint32_t kConvergedSweeps = 30;
+
+void judge(Row& row, const scene::Organ& organ, std::span<const BenchTool> tools,
+           SessionOptions options, const OurSession& session) {
+  options.mode = BoundaryMode::Frozen;
+  options.depth = 1000;
+  options.nodes = 1'000'000;
+  options.sweeps = kConvergedSweeps;
+  OurSession full(organ, tools, options);
+  for (std::uint64_t i = 0; i < row.steps; ++i) full.tick();
+
+  const auto& forces = session.published_forces();
+  const auto& expected = full.published_forces();
+  double peak = 0, sum = 0, largest = 0;
+  for (const auto& force : expected) peak = std::max(peak, length(to_double(force)));
+  const auto count = std::min(forces.size(), expected.size());
+  for (std::size_t i = 0; i < count; ++i) {
+    const double error = length(to_double(forces[i]) - to_double(expected[i]));
+    sum += error;
+    largest = std::max(largest, error);
+  }
+  if (count == 0 || peak == 0) return;
+  row.error_percent = 100 * sum / static_cast<double>(count) / peak;
+  row.more["force_error_max_percent"] = 100 * largest / peak;
+  row.more["force_peak_n"] = peak;
+
+  double difference = 0, norm = 0;
+  for (std::size_t n = 0; n < full.displacements().size(); ++n) {
+    const Vec3d u = to_double(full.displacements()[n]);
+    difference += length_squared(to_double(session.displacements()[n]) - u);
+    norm += length_squared(u);
+  }
+  row.more["field_error_percent"] = 100 * std::sqrt(difference / norm);
+}
 
 }  // namespace
 
@@ -72,20 +109,20 @@ Row row_of(const scene::Organ& organ, std::string group, std::string object, std
   return row;
 }
 
-Work run_session(scene::Organ organ, std::vector<BenchTool> tools, const SessionOptions& options,
-                 bool includes_rest) {
-  auto session = std::make_shared<OurSession>(std::move(organ), tools, options);
+Work run_session(scene::Organ organ, std::vector<BenchTool> tools,
+                 const SessionCase& session_case) {
+  const auto& options = session_case.options;
+  auto session = std::make_shared<OurSession>(organ, tools, options);
   auto parts = std::make_shared<Parts>();
-  const double contacts = static_cast<double>(tools.size());
   return {[=] {
             TickTimes times;
             Duration took = timed([&] { times = session->tick(); });
             parts->add(times, session->counts());
-            took.thread_cpu = times.mechanics() + (includes_rest ? times.rest : 0);
+            took.thread_cpu = times.mechanics() + (session_case.includes_rest ? times.rest : 0);
             return took;
           },
-          [=](Row& row) {
-            row.more["contacts"] = contacts;
+          [=, organ = std::move(organ)](Row& row) {
+            row.more["contacts"] = static_cast<double>(tools.size());
             row.more["init_us"] = 1e6 * median(parts->init);
             row.more["queue_us"] = 1e6 * median(parts->queue);
             row.more["solve_us"] = 1e6 * median(parts->solve);
@@ -93,8 +130,9 @@ Work run_session(scene::Organ organ, std::vector<BenchTool> tools, const Session
             row.more["active_nodes"] = median(parts->active);
             row.more["queue_nodes"] = median(parts->queued);
             row.more["contact_nodes"] = median(parts->contacts);
-            row.state_hash = hex(session->state_hash());
             if (parts->faults != 0) row.more["fault_bits"] = parts->faults;
+            row.state_hash = hex(session->state_hash());
+            if (session_case.is_judged) judge(row, organ, tools, options, *session);
           }};
 }
 

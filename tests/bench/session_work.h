@@ -12,9 +12,15 @@ namespace trocar::bench {
 std::vector<BenchTool> spread_tools(const scene::Organ& organ, std::size_t count,
                                     const Vec3f& first);
 
-// `includes_rest`: the row's time is that of the whole tick; without, of contacts, queue and solve.
-Work run_session(scene::Organ organ, std::vector<BenchTool> tools, const SessionOptions& options,
-                 bool includes_rest);
+struct SessionCase {
+  SessionOptions options;
+  // The row's time is that of the whole tick; without, of contacts, queue and solve.
+  bool includes_rest = false;
+  // Forces at the tools, and the whole field at the end, against the same ticks with the whole
+  // organ swept to convergence. Takes its time.
+  bool is_judged = false;
+};
+Work run_session(scene::Organ organ, std::vector<BenchTool> tools, const SessionCase& session_case);
 Row row_of(const scene::Organ& organ, std::string group, std::string object, std::string solver);
 
 }  // namespace trocar::bench

@@ -6,8 +6,7 @@
 
 #include <time.h>
 
-#include <algorithm>
-#include <vector>
+#include <span>
 
 namespace trocar::bench {
 
@@ -33,15 +32,9 @@ Duration timed(F&& work) {
 }
 
 // The value below which `share` of the values lie; 0 for none.
-inline double percentile(std::vector<double> values, double share) {
-  if (values.empty()) return 0;
-  const auto at =
-      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
-}
-inline double median(std::vector<double> values) {
-  return percentile(std::move(values), 0.5);
+double percentile(std::span<const double> values, double share);
+inline double median(std::span<const double> values) {
+  return percentile(values, 0.5);
 }
 
 }  // namespace trocar::bench
