@@ -24,12 +24,11 @@ ScenarioRun::ScenarioRun(scene::ResolvedScenario resolved, Solver solver)
       solver_kind_(solver),
       has_limits_(scenario().run.depth || scenario().run.nodes),
       last_tick_(ticks_of(scenario().run.seconds)),
-      springs_(organ()),
       world_(organ()),
       claims_(world_.node_count()),
       queue_(world_.node_count()),
       active_set_(world_.node_count()),
-      solver_(world_, springs_) {
+      solver_(organ(), world_) {
   held_ = organ().fixed_nodes;
   for (const auto& load : resolved_.displacements)
     for (const auto node : load.nodes) {
@@ -44,6 +43,7 @@ ScenarioRun::ScenarioRun(scene::ResolvedScenario resolved, Solver solver)
     free_nodes_.push_back(NodeIndex(i));
     if (!has_limits_) world_.node_classes[i] = world::NodeClass::Active;
   }
+  solver_.take_state(world_);
 }
 
 void ScenarioRun::apply_loads() {

@@ -16,7 +16,6 @@
 #include "server/contact/contact_list.h"
 #include "server/contact/grasps.h"
 #include "server/dynamics/block_descent.h"
-#include "server/dynamics/spring_network.h"
 #include "server/input/tool_table.h"
 #include "server/locks/claims.h"
 #include "server/propagation/active_set.h"
@@ -65,7 +64,6 @@ class ScenarioRun {
   const Solver solver_kind_;
   const bool has_limits_;
   const Tick last_tick_;
-  const dynamics::SpringNetwork springs_;
 
   world::World world_;
   input::ToolTable tools_;
