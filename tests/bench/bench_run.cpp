@@ -39,6 +39,7 @@ void Job::run(benchmark::State& state) const {
   if (row.threads > 1) {
     row.all_threads_us = 1e6 * median(measured(process));
     row.wall_us = 1e6 * median(measured(wall));
+    row.wall_p10_us = 1e6 * percentile(measured(wall), 0.1);
   }
   work.finish(row);
   state.counters["median_us"] = row.median_us;

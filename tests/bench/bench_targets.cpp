@@ -20,7 +20,8 @@ void add_lattice(Suite& suite) {
                        .grasps = true,
                        .reach_m = 0.002f,
                        .amplitude_m = 0.008f};
-  Row row = row_of(organ, "targets", "891 nodes, one contact, depth 10", "springs, 4 sweeps");
+  Row row =
+      row_of(organ, "targets", "891 nodes, one contact, depth 10", title_of(Law::Springs, {}));
   row.paper_ms = "5 (Choi 2002)";
   row.target_ms = 0.08;
   add_work(suite, row, suite.steps(20, 2000, 6000),
@@ -30,7 +31,7 @@ void add_lattice(Suite& suite) {
 void add_plate(Suite& suite) {
   const auto organ = scene::make_plate();
   const BenchTool tool{.place = {0, 0.002f, 0}, .amplitude_m = 0.004f};
-  Row row = row_of(organ, "targets", "480 nodes of the plate, pressed", "springs, 4 sweeps");
+  Row row = row_of(organ, "targets", "480 nodes of the plate, pressed", title_of(Law::Springs, {}));
   row.paper_ms = "4.1-13.7 (Nakao 2003)";
   row.target_ms = 0.10;
   row.note = "no topology changes in this run";
@@ -57,11 +58,12 @@ void add_whole_organs(Suite& suite) {
   for (const auto& work : works) {
     if (!has(work.law) || work.threads > max_threads()) continue;
     const SolverOptions options{.law = work.law, .threads = work.threads};
-    Row row = row_of(*chest, "targets", std::string(name_of(work.law)) + ", 4 sweeps");
+    Row row = row_of(*chest, "targets", title_of(work.law, options));
     row.object = suite.is_smoke() ? "tiny box" : work.object;
     row.threads = work.threads;
     row.peer_ms = work.peer_ms;
     row.target_ms = work.target_ms;
+    row.error_limit_percent = 1;
     add_work(suite, row, suite.steps(100, 200, 600),
              [=](Row&) { return pull_by_us(chest, options, true); });
   }
@@ -73,10 +75,11 @@ void add_whole_liver(Suite& suite) {
   for (const Law law : {Law::NeoHookean, Law::NeoHookeanAveraged}) {
     if (!has(law)) continue;
     const SolverOptions options{.law = law};
-    Row row = row_of(*liver, "targets", std::string(name_of(law)) + ", 4 sweeps");
+    Row row = row_of(*liver, "targets", title_of(law, options));
     row.object = suite.is_smoke() ? "tiny liver" : "whole 4k-node liver, pulled";
     row.peer_ms = "25 (neo-Hookean)";
     row.target_ms = 1.0;
+    row.error_limit_percent = 1;
     add_work(suite, row, suite.steps(100, 400, 1000),
              [=](Row&) { return pull_by_us(liver, options, true); });
   }
@@ -103,9 +106,13 @@ void add_graded(Suite& suite) {
     if (!has(work.law) || work.threads > max_threads()) continue;
     auto organ = scene::make_liver(suite.is_smoke() ? scene::kMinLiverTets : work.tets);
     TROCAR_ASSERT(organ.ok());
-    Row row = row_of(*organ, "targets", work.object, name_of(work.law));
+    Row row = row_of(
+        *organ, "targets",
+        suite.is_smoke() ? "tiny graded liver, " + std::to_string(work.contacts) : work.object,
+        title_of(work.law, {.threads = work.threads}));
     row.threads = work.threads;
     row.target_ms = work.target_ms;
+    row.error_limit_percent = 3;
     const SessionCase graded{.options = {.law = work.law,
                                          .mode = BoundaryMode::Graded,
                                          .depth = kNearDepth,

@@ -68,7 +68,7 @@ Row row_of(const PulledBox& box, std::string group, std::string solver) {
 }
 
 std::string title_of(Law law, const SolverOptions& options) {
-  return std::string("ours, ") + name_of(law) + ", " + std::to_string(options.sweeps) + " sweeps" +
+  return std::string(name_of(law)) + ", " + std::to_string(options.sweeps) + " sweeps" +
          (options.threads > 1 ? ", " + std::to_string(options.threads) + " threads" : "");
 }
 

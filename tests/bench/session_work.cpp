@@ -29,8 +29,7 @@ constexpr std::uint32_t kConvergedSweeps = 30;
 void judge(Row& row, const scene::Organ& organ, std::span<const BenchTool> tools,
            SessionOptions options, const OurSession& session) {
   options.mode = BoundaryMode::Frozen;
-  options.depth = 1000;
-  options.nodes = 1'000'000;
+  options.is_whole = true;
   options.sweeps = kConvergedSweeps;
   OurSession full(organ, tools, options);
   for (std::uint64_t i = 0; i < row.steps; ++i) full.tick();

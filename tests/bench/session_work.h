@@ -3,7 +3,7 @@
 // Works that run whole ticks with tools, as the server does.
 
 #include "tests/bench/bench_run.h"
-#include "tests/bench/our_solver.h"
+#include "tests/bench/our_session.h"
 
 namespace trocar::bench {
 
