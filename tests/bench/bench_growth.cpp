@@ -44,7 +44,7 @@ void add_sizes(Suite& suite) {
         const SolverOptions options{.law = law, .threads = threads};
         Row row = row_of(*box, "nodes", "whole organ, " + title_of(law, options));
         row.threads = threads;
-        add_work(suite, row, suite.steps(10, 100, 300),
+        add_work(suite, row, suite.steps(10, 60, 300),
                  [=](Row&) { return pull_by_us(box, options, false); });
       }
     Row row = row_of(*box, "nodes", "one contact, frozen, depth 6, springs");

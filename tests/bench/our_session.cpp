@@ -1,5 +1,6 @@
 #include "tests/bench/our_session.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -13,6 +14,7 @@ namespace trocar::bench {
 namespace {
 
 constexpr Tick kSampleTicks = 8;
+constexpr float kRampTicks = 150;
 
 // The server's own tick.
 class SimulationEngine final : public OurSession::Engine {
@@ -213,18 +215,19 @@ OurSession::OurSession(scene::Organ organ, std::span<const BenchTool> tools,
 
 OurSession::~OurSession() = default;
 
-// A triangle wave between 0.4 and 1 of the amplitude, so that contact is kept; every tool at its
-// own phase.
+// A triangle wave between 0.4 and 1 of the amplitude, so that contact is kept, every tool at its
+// own phase; reached from rest in 0.15 s, so that no impact stands above the forces that are
+// compared.
 void OurSession::sample_tools() {
   const Tick tick = engine_->current_tick();
   if (tick % kSampleTicks != 0) return;
   for (std::size_t i = 0; i < tools_.size(); ++i) {
     const BenchTool& tool = tools_[i];
     const float t = static_cast<float>(tick + 37 * i) * 4e-3f;
-    const float swing = 1.0f - 0.6f * std::abs(std::fmod(t, 2.0f) - 1.0f);
-    // A grasp closes at rest and pulls later.
-    const float pulled = tick == 0 ? 0 : tool.amplitude_m * swing;
-    const float out = tool.grasps ? pulled : -tool.amplitude_m * swing;
+    const float wave = 1.0f - 0.6f * std::abs(std::fmod(t, 2.0f) - 1.0f);
+    const float moved =
+        tool.amplitude_m * wave * std::min(1.0f, static_cast<float>(tick) / kRampTicks);
+    const float out = tool.grasps ? moved : -moved;
     inputs_.samples.push_back({slot(i),
                                {{tool.place + tool.outward * out, rotation_from_z(tool.outward)},
                                 tool.grasps ? scene::Verb::Grasp : scene::Verb::Push}});

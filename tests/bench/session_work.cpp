@@ -36,18 +36,22 @@ void judge(Row& row, const scene::Organ& organ, std::span<const BenchTool> tools
 
   const auto& forces = session.published_forces();
   const auto& expected = full.published_forces();
-  double peak = 0, sum = 0, largest = 0;
+  double peak = 0, sum = 0, largest = 0, mean = 0, full_mean = 0;
   for (const auto& force : expected) peak = std::max(peak, length(to_double(force)));
   const auto count = std::min(forces.size(), expected.size());
   for (std::size_t i = 0; i < count; ++i) {
     const double error = length(to_double(forces[i]) - to_double(expected[i]));
     sum += error;
+    mean += length(to_double(forces[i])) / static_cast<double>(count);
+    full_mean += length(to_double(expected[i])) / static_cast<double>(count);
     largest = std::max(largest, error);
   }
   if (count == 0 || peak == 0) return;
   row.error_percent = 100 * sum / static_cast<double>(count) / peak;
   row.more["force_error_max_percent"] = 100 * largest / peak;
-  row.more["force_peak_n"] = peak;
+  row.more["force_mean_mn"] = 1e3 * mean;
+  row.more["full_force_mean_mn"] = 1e3 * full_mean;
+  row.more["full_force_peak_mn"] = 1e3 * peak;
 
   double difference = 0, norm = 0;
   for (std::size_t n = 0; n < full.displacements().size(); ++n) {
