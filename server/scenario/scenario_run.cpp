@@ -91,7 +91,7 @@ void ScenarioRun::collect_active() {
   constexpr auto kNoLimit = std::numeric_limits<std::uint32_t>::max();
   queue_.fill(organ().mesh.node_neighbours, seeds_,
               {run.depth.value_or(kNoLimit), run.nodes.value_or(kNoLimit)});
-  active_set_.collect(queue_, world_);
+  active_set_.collect(queue_, world::Boundary::Frozen, world_);
 }
 
 // As the tick of a session does it (server/step/tick.cpp).
@@ -129,7 +129,8 @@ StepReport ScenarioRun::step() {
   report.is_converged =
       solver_kind_ == Solver::Live || (report.solve.residual_n <= settings.residual_tolerance_n &&
                                        report.solve.nodes_rejected == 0);
-  if (has_limits_) active_set_.freeze_quiet(queue_, solver_.residuals_n(), world_);
+  if (has_limits_)
+    solver_.take_state(world_, active_set_.settle(queue_, solver_.residuals_n(), world_));
   update_claims();
   return report;
 }
