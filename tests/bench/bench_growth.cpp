@@ -60,18 +60,17 @@ void add_contacts(Suite& suite) {
   TROCAR_ASSERT(organ.ok());
   std::vector<std::size_t> counts{1, 2, 4, 8, 16};
   if (suite.is_smoke()) counts = {1, 4};
-  for (const BoundaryMode mode : {BoundaryMode::Frozen, BoundaryMode::Graded}) {
-    if (mode == BoundaryMode::Graded && !has_graded_mode()) continue;
+  for (const Boundary boundary : {Boundary::Frozen, Boundary::Graded}) {
     for (const auto count : counts) {
       Row row = row_of(*organ, "contacts", std::to_string(count) + " contacts on a liver",
-                       mode == BoundaryMode::Frozen ? "frozen, depth 6, springs"
+                       boundary == Boundary::Frozen ? "frozen, depth 6, springs"
                                                     : "graded, near depth 2, springs");
       const bool is_judged = count == 1 || count == 8;
       add_work(suite, row, suite.steps(20, 300, 1000),
-               [organ = *organ, count, mode, is_judged](Row&) {
+               [organ = *organ, count, boundary, is_judged](Row&) {
                  return run_session(organ, spread_tools(organ, count, {0, 1, 0.3f}),
-                                    {{.mode = mode,
-                                      .depth = mode == BoundaryMode::Frozen ? kDepth : kNearDepth,
+                                    {{.boundary = boundary,
+                                      .depth = boundary == Boundary::Frozen ? kDepth : kNearDepth,
                                       .nodes = kAllNodes},
                                      true,
                                      is_judged});

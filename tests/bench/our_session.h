@@ -1,27 +1,25 @@
 #pragma once
 
-// Ticks with tools, as the benchmarks use them. Frozen with one thread is the server's own tick
-// (server/step); what that does not offer, the engine's stages put together in the same order.
-// Publication, which only the server's tick has, every 16th tick. One caller.
+// The server's own ticks (server/step) with tools that move by themselves, as the benchmarks use
+// them. Everything of a tick is in it but input from outside. One caller.
 
 #include <cstdint>
-#include <memory>
 #include <span>
 #include <vector>
 
 #include "common/base/tick.h"
 #include "common/scene/organ.h"
 #include "server/session/inputs.h"
+#include "server/step/simulation.h"
 #include "tests/bench/our_solver.h"
 
 namespace trocar::bench {
 
-enum class BoundaryMode { Frozen, Graded };
-const char* name_of(BoundaryMode mode);
+using world::Boundary;
 
 struct SessionOptions {
   Law law = Law::Springs;
-  BoundaryMode mode = BoundaryMode::Frozen;
+  Boundary boundary = Boundary::Frozen;
   std::uint32_t depth = 6;
   std::uint32_t nodes = 1200;
   std::uint32_t sweeps = 4;
@@ -53,35 +51,25 @@ struct TickCounts {
 
 class OurSession {
  public:
-  // One way of running ticks.
-  class Engine {
-   public:
-    virtual ~Engine() = default;
-    virtual Tick current_tick() const = 0;
-    virtual TickTimes tick(const session::TickInputs& inputs, std::vector<Vec3f>& forces) = 0;
-    virtual TickCounts counts() const = 0;
-    virtual std::span<const Vec3f> displacements() const = 0;
-    virtual std::uint64_t state_hash() const = 0;
-  };
-
   OurSession(scene::Organ organ, std::span<const BenchTool> tools, const SessionOptions& options);
-  ~OurSession();
 
   TickTimes tick();
-  TickCounts counts() const { return engine_->counts(); }
+  TickCounts counts() const;
   // Force of the tissue on each tool, N, at each publication so far (every 16th tick): tools of the
   // first, then of the second, ...
   const std::vector<Vec3f>& published_forces() const { return forces_; }
-  std::span<const Vec3f> displacements() const { return engine_->displacements(); }
-  std::uint64_t state_hash() const { return engine_->state_hash(); }
+  std::span<const Vec3f> displacements() const { return simulation_.state().world.displacements; }
+  std::uint64_t state_hash() const { return simulation_.state_hash(); }
 
  private:
   void sample_tools();
 
+  step::Simulation simulation_;
+  step::TickDecisions decisions_;
+  step::TickReport report_;
   std::vector<BenchTool> tools_;
   session::TickInputs inputs_;
   std::vector<Vec3f> forces_;
-  std::unique_ptr<Engine> engine_;
 };
 
 }  // namespace trocar::bench

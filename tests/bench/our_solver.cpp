@@ -37,9 +37,6 @@ scene::Organ with_law(scene::Organ organ, Law law) {
 bool has(Law) {
   return true;
 }
-bool has_graded_mode() {
-  return true;
-}
 std::uint32_t max_threads() {
   return std::max(1u, std::thread::hardware_concurrency());
 }

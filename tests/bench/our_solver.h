@@ -32,7 +32,6 @@ struct SolverOptions {
 
 // What this build of the engine can do; what it cannot is left out of the results.
 bool has(Law law);
-bool has_graded_mode();
 std::uint32_t max_threads();
 
 class OurSolver {

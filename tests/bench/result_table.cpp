@@ -45,6 +45,7 @@ Json to_json(const Row& row) {
   maybe("error_percent", row.error_percent);
   if (!row.paper_ms.empty()) json["paper_ms"] = row.paper_ms;
   if (!row.peer_ms.empty()) json["peer_ms"] = row.peer_ms;
+  if (!row.peer_row.empty()) json["peer_row"] = row.peer_row;
   maybe("target_ms", row.target_ms);
   maybe("error_limit_percent", row.error_limit_percent);
   for (const auto& [key, value] : row.more) json[key] = value;
@@ -113,17 +114,23 @@ std::string peers_table(const std::vector<const Row*>& rows) {
   return table(lines);
 }
 
-std::string targets_table(const std::vector<const Row*>& rows) {
+std::string targets_table(const std::vector<const Row*>& rows, const std::vector<Row>& all) {
+  const auto peer_here = [&](const Row& row) -> std::string {
+    for (const auto& peer : all)
+      if (peer.name() == row.peer_row) return milliseconds(peer.median_us);
+    return "";
+  };
   std::vector<std::vector<std::string>> lines{
-      {"work", "solver", "threads", "paper ms", "best peer ms", "target ms", "ours CPU ms",
-       "fastest 10 %", "wall ms (fastest 10 %)", "error %", "reached", "hash"}};
+      {"work", "solver", "threads", "paper ms", "best peer ms", "Bullet here ms", "target ms",
+       "ours CPU ms", "fastest 10 %", "wall ms (fastest 10 %)", "error %", "reached", "hash"}};
   for (const Row* row : rows) {
     const double us = row->wall_us.value_or(row->median_us);
     const bool is_right = is_accurate(*row);
     const bool reached = row->target_ms && us * 1e-3 <= *row->target_ms && is_right;
     lines.push_back({row->object, row->solver, std::to_string(row->threads), row->paper_ms,
-                     row->peer_ms, number(row->target_ms, "%g"), milliseconds(row->median_us),
-                     milliseconds(row->p10_us), wall_words(*row), error_words(*row),
+                     row->peer_ms, peer_here(*row), number(row->target_ms, "%g"),
+                     milliseconds(row->median_us), milliseconds(row->p10_us), wall_words(*row),
+                     error_words(*row),
                      reached     ? "yes"
                      : !is_right ? "no: error"
                                  : "no",
@@ -163,7 +170,7 @@ std::string parts_table(const std::vector<const Row*>& rows, std::vector<Column>
 std::string growth_table(const std::vector<const Row*>& rows) {
   return parts_table(rows, {{"nodes", "nodes", "%.0f"},
                             {"tets", "tets", "%.0f"},
-                            {"moving", "active_nodes", "%.0f"},
+                            {"swept fully", "active_nodes", "%.0f"},
                             {"CPU us/step", "median_us", "%.1f"},
                             {"contacts us", "init_us", "%.1f"},
                             {"queue us", "queue_us", "%.1f"},
@@ -177,7 +184,7 @@ std::string growth_table(const std::vector<const Row*>& rows) {
 }
 
 std::string queue_table(const std::vector<const Row*>& rows) {
-  return parts_table(rows, {{"moving", "active_nodes", "%.0f"},
+  return parts_table(rows, {{"swept fully", "active_nodes", "%.0f"},
                             {"init us", "init_us", "%.1f"},
                             {"queue us", "queue_us", "%.1f"},
                             {"solve us", "solve_us", "%.1f"},
@@ -313,7 +320,7 @@ std::string ResultTable::markdown(const Machine& machine) const {
     if (rows.empty()) continue;
     out += "\n## " + std::string(title) + "\n\n";
     out += group == std::string_view("peers")     ? peers_table(rows)
-           : group == std::string_view("targets") ? targets_table(rows)
+           : group == std::string_view("targets") ? targets_table(rows, rows_)
            : group == std::string_view("queue")   ? queue_table(rows)
                                                   : growth_table(rows);
     std::set<std::string> notes;

@@ -35,6 +35,7 @@ struct Row {
   // Figures from elsewhere, ms per step: of the paper, of the best other library as measured
   // before, and what is aimed at.
   std::string paper_ms, peer_ms;
+  std::string peer_row;  // name of the peer's row that does like work, if it is in this run
   std::optional<double> target_ms;
   // A target is not reached with a larger error than this, however fast.
   std::optional<double> error_limit_percent;

@@ -28,7 +28,7 @@ constexpr std::uint32_t kConvergedSweeps = 30;
 
 void judge(Row& row, const scene::Organ& organ, std::span<const BenchTool> tools,
            SessionOptions options, const OurSession& session) {
-  options.mode = BoundaryMode::Frozen;
+  options.boundary = Boundary::Frozen;
   options.is_whole = true;
   options.sweeps = kConvergedSweeps;
   OurSession full(organ, tools, options);
