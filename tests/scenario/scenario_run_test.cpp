@@ -38,6 +38,9 @@ std::unique_ptr<ScenarioRun> make(const std::string& text, Solver solver = Solve
   auto resolved = scene::resolve(std::move(*parsed));
   EXPECT_TRUE(resolved.ok()) << (resolved.ok() ? "" : resolved.error().message);
   if (!resolved) return nullptr;
+  const auto supported = check_supported(*resolved);
+  EXPECT_TRUE(supported.ok()) << (supported.ok() ? "" : supported.error().message);
+  if (!supported) return nullptr;
   return std::make_unique<ScenarioRun>(std::move(*resolved), solver);
 }
 
@@ -124,6 +127,144 @@ quantity = "reaction"
   EXPECT_NEAR(run->probe(1).y, -total, 1e-3 * total) << "the support carries all of it";
 }
 
+TEST(ScenarioRun, AStaticRunIsInEquilibriumAtEachLoadStep) {
+  const auto run = make(kColumn + R"([[force]]
+set = "top"
+[[force.key]]
+time_s = 0
+force_n = [0, 0, 0]
+[[force.key]]
+time_s = 1
+force_n = [0, 0.4, 0]
+[run]
+mode = "static"
+seconds = 1
+load_steps = 2
+[[probe]]
+set = "top"
+quantity = "displacement"
+[[probe]]
+set = "fixed"
+quantity = "reaction"
+)");
+  ASSERT_TRUE(run);
+  const double expected = 0.4 / 4 * 5 / kStiffness;
+  for (const double share : {0.5, 1.0}) {
+    EXPECT_TRUE(run->step().is_converged);
+    EXPECT_EQ(run->time_s(), share);
+    EXPECT_NEAR(run->probe(0).y, share * expected, 1e-3 * expected);
+    EXPECT_NEAR(run->probe(1).y, -share * 0.4, 4e-4);
+  }
+  EXPECT_TRUE(run->is_finished());
+}
+
+TEST(ScenarioRun, AToolPressesInAStaticRun) {
+  const auto run = make(R"([organ]
+source = "liver"
+[[tool]]
+radius_mm = 15
+anchor = [0, 1, 0]
+[[tool.key]]
+time_s = 0
+position_mm = [0, 10, 0]
+shaft = [0, 1, 0]
+verb = "push"
+[[tool.key]]
+time_s = 1
+position_mm = [0, -5, 0]
+[run]
+mode = "static"
+seconds = 1
+load_steps = 2
+tolerance_n = 1e-5
+[[probe]]
+tool = 0
+quantity = "force"
+[[probe]]
+set = "fixed"
+quantity = "reaction"
+)");
+  ASSERT_TRUE(run);
+  run->step();
+  EXPECT_EQ(run->probe(0).y, 0) << "still above the tissue";
+  EXPECT_TRUE(run->step().is_converged);
+  EXPECT_GT(run->probe(0).y, 0.1);
+  EXPECT_NEAR(run->probe(1).y, run->probe(0).y, 0.01 * run->probe(0).y);
+}
+
+TEST(ScenarioRun, StartingInEquilibriumNothingMoves) {
+  const std::string text = kColumn + R"([gravity]
+m_s2 = [0, 9.81, 0]
+[run]
+seconds = 0.2
+start = "equilibrium"
+[[probe]]
+set = "top"
+quantity = "displacement"
+[[probe]]
+set = "top"
+quantity = "velocity"
+)";
+  const auto run = make(text);
+  ASSERT_TRUE(run && run->settling().is_converged);
+  run->step();
+  const Vec3d first = run->probe(0);
+  EXPECT_GT(first.y, 1e-4) << "it hangs";
+  double fastest = 0;
+  while (!run->is_finished()) {
+    run->step();
+    fastest = std::max(fastest, length(run->probe(1)));
+  }
+  EXPECT_LT(length(run->probe(0) - first), 0.01 * first.y);
+  EXPECT_LT(fastest, 1e-3);
+}
+
+TEST(ScenarioRun, TensionPullsAtWhatHoldsTheEnds) {
+  std::string text = kColumn + R"([[displace]]
+set = "top"
+[[displace.key]]
+time_s = 0
+displacement_mm = [0, 0, 0]
+[run]
+mode = "static"
+seconds = 1
+[[probe]]
+set = "top"
+quantity = "reaction"
+)";
+  text.insert(text.find("node_damping"), "tension = 0.1\n");
+  const auto run = make(text);
+  ASSERT_TRUE(run);
+  run->step();
+  // 1 % more, because the springs across shorten too and tilt the chains' ends.
+  EXPECT_NEAR(run->probe(0).y, 4 * kStiffness * 0.1 * 0.01, 0.015 * 0.16);
+}
+
+TEST(ScenarioRun, ShorterStepsAreMoreStepsOfTheSameTime) {
+  const auto text = [](const char* dt) {
+    return kColumn + R"([[force]]
+set = "top"
+[[force.key]]
+time_s = 0
+force_n = [0, 0.4, 0]
+[[probe]]
+set = "top"
+quantity = "displacement"
+[run]
+seconds = 0.05
+)" + dt;
+  };
+  const auto coarse = make(text(""), Solver::Live),
+             fine = make(text("dt_s = 0.0001\n"), Solver::Live),
+             finest = make(text("dt_s = 0.00002\n"), Solver::Live);
+  ASSERT_TRUE(coarse && fine && finest);
+  for (const auto& run : {coarse.get(), fine.get(), finest.get()}) finish(*run);
+  EXPECT_EQ(fine->time_s(), 0.05);
+  EXPECT_EQ(fine->steps_done(), 50u);
+  const double exact = finest->probe(0).y;
+  EXPECT_LT(std::abs(fine->probe(0).y - exact), 0.2 * std::abs(coarse->probe(0).y - exact));
+}
+
 TEST(ScenarioRun, AMovingColumnKeepsNewtonsLaw) {
   // While it moves: forces from outside equal the change of momentum and what nodal damping takes.
   const auto run = make(kColumn + R"([gravity]
@@ -159,7 +300,7 @@ quantity = "reaction"
     }
     const Vec3d outside = run->probe(0) + run->probe(1) + weight - momentum * 20.0;
     const double bound = 2e-5 + 24 * static_cast<double>(report.solve.residual_n);
-    EXPECT_LT(length((momentum - before) * 1e3 - outside), bound) << "tick " << run->tick();
+    EXPECT_LT(length((momentum - before) * 1e3 - outside), bound) << "tick " << run->steps_done();
     before = momentum;
   }
   EXPECT_GT(length(before), 0);
@@ -189,7 +330,7 @@ tolerance_n = 1e-6
   float worst_live = 0;
   while (!full->is_finished()) {
     const auto report = full->step();
-    EXPECT_LE(report.solve.residual_n, 1e-6f) << "tick " << full->tick();
+    EXPECT_LE(report.solve.residual_n, 1e-6f) << "tick " << full->steps_done();
     EXPECT_TRUE(report.is_converged);
     worst_live = std::max(worst_live, live->step().solve.residual_n);
   }
@@ -246,6 +387,95 @@ quantity = "displacement"
   EXPECT_GT(force, 0.015) << "the tissue pushes the tool up";
   EXPECT_NEAR(run->probe(1).y, force, 0.02 * force) << "the support carries it";
   EXPECT_NEAR(force, -run->probe(2).y * 40 / 4, 0.01 * force) << "one chain of four springs";
+}
+
+// A block of tets pulled at its top; `law` are lines of [material].
+std::string pulled_block(const std::string& law, const std::string& run) {
+  return R"([organ]
+source = "block"
+nodes = [3, 9, 3]
+spacing_mm = 5
+[[nodes]]
+name = "top"
+box_min_mm = [-5, 20, -5]
+box_max_mm = [5, 20, 5]
+[[traction]]
+set = "top"
+[[traction.key]]
+time_s = 0
+traction_pa = [0, 40, 0]
+[[probe]]
+set = "top"
+quantity = "displacement"
+[[probe]]
+set = "fixed"
+quantity = "reaction"
+[material]
+young_modulus_pa = 4000
+)" + law +
+         "[run]\nseconds = 1\n" + run;
+}
+
+TEST(ScenarioRun, EachLawStretchesLikeABar) {
+  for (const char* law :
+       {"", "elastic_law = \"tensor-mass\"\npoisson_ratio = 0.2\n",
+        "elastic_law = \"neo-hookean\"\npoisson_ratio = 0.2\n",
+        "elastic_law = \"neo-hookean\"\npoisson_ratio = 0.2\naveraged_volume = true\n"}) {
+    const auto run = make(pulled_block(law, "mode = \"static\"\n"));
+    ASSERT_TRUE(run);
+    EXPECT_TRUE(run->step().is_converged) << law;
+    // Stress / E x length; stiffer where the clamped base keeps it from getting thinner.
+    constexpr double kExpected = 40.0 / 4000 * 0.04;
+    EXPECT_NEAR(run->probe(0).y, kExpected, 0.06 * kExpected) << law;
+    EXPECT_NEAR(run->probe(1).y, -40 * 1e-4, 0.002 * 40 * 1e-4) << law;
+  }
+}
+
+TEST(ScenarioRun, AStiffRegionStretchesLess) {
+  const auto run = make(pulled_block("", "mode = \"static\"\n") + R"([[nodes]]
+name = "half"
+box_min_mm = [-5, 0, -5]
+box_max_mm = [5, 20, 5]
+[[region]]
+set = "half"
+young_modulus_pa = 16000
+)");
+  ASSERT_TRUE(run);
+  run->step();
+  constexpr double kExpected = 40.0 * 0.02 * (1.0 / 4000 + 1.0 / 16000);
+  EXPECT_NEAR(run->probe(0).y, kExpected, 0.06 * kExpected);
+}
+
+TEST(ScenarioRun, GradedMovesEverythingAndFrozenTheQueueOnly) {
+  const auto graded =
+      make(pulled_block("", "boundary = \"graded\"\ndepth = 1\nfar_sweeps = 2\n"), Solver::Live);
+  const auto frozen = make(pulled_block("", "boundary = \"frozen\"\ndepth = 1\n"), Solver::Live);
+  ASSERT_TRUE(graded && frozen);
+  finish(*graded);
+  finish(*frozen);
+  constexpr double kExpected = 40.0 / 4000 * 0.04;
+  EXPECT_NEAR(graded->probe(0).y, kExpected, 0.06 * kExpected);
+  EXPECT_LT(frozen->probe(0).y, 0.3 * kExpected) << "what does not move does not stretch";
+}
+
+TEST(ScenarioRun, WhatTheSolverCannotDoIsRefusedWithItsLine) {
+  const auto refusal = [](const std::string& text) {
+    auto parsed = scene::parse_scenario_text(text, "test.toml");
+    EXPECT_TRUE(parsed.ok()) << (parsed.ok() ? "" : parsed.error().message);
+    if (!parsed) return std::string();
+    const auto resolved = scene::resolve(std::move(*parsed));
+    EXPECT_TRUE(resolved.ok()) << (resolved.ok() ? "" : resolved.error().message);
+    if (!resolved) return std::string();
+    const auto supported = check_supported(*resolved);
+    return supported.ok() ? std::string("accepted") : supported.error().message;
+  };
+  EXPECT_EQ(refusal(pulled_block("", "integrator = \"explicit\"\n")),
+            "test.toml:24: key run.integrator: \"explicit\" is not simulated yet");
+  EXPECT_EQ(refusal(pulled_block("", "") + "[[nodes]]\nname = \"side\"\nids = [40]\n"
+                                           "[[displace]]\nset = \"side\"\naxes = \"x\"\n"),
+            "test.toml:28: key displace[0].set: a set that is held along some axes only is not "
+            "simulated yet");
+  EXPECT_EQ(refusal(pulled_block("", "")), "accepted");
 }
 
 TEST(ScenarioRun, WithADepthOnlyTheQueueMoves) {
