@@ -1,0 +1,199 @@
+// Random organs, materials, tools and decisions for 10,000 ticks: everything stays finite, fixed
+// nodes stay fixed, energy stays bounded by what tools put in, and a tool's force does not jump
+// when classes of nodes or decisions change.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "common/scene/builtin_organs.h"
+#include "server/step/simulation.h"
+
+namespace trocar::step {
+namespace {
+
+// Small and the same everywhere, so that a seed names a run.
+class Random {
+ public:
+  explicit Random(std::uint64_t seed) : state_(seed * 0x9e3779b97f4a7c15ull + 1) {}
+  std::uint32_t below(std::uint32_t n) { return static_cast<std::uint32_t>(next() % n); }
+  double between(double low, double high) {
+    return low + (high - low) * static_cast<double>(next() >> 11) / 9007199254740992.0;
+  }
+
+ private:
+  std::uint64_t next() {
+    state_ ^= state_ << 13, state_ ^= state_ >> 7, state_ ^= state_ << 17;
+    return state_;
+  }
+  std::uint64_t state_;
+};
+
+scene::Organ random_organ(Random& random) {
+  using scene::ElasticLaw;
+  scene::Organ organ;
+  if (random.below(3) == 0) {
+    const auto side = [&] { return 4 + static_cast<int>(random.below(6)); };
+    organ = *scene::make_lattice({.nx = side(), .ny = side(), .nz = side()});
+    organ.material.spring_stiffness_n_m = random.between(5, 200);
+  } else {
+    organ = *scene::make_liver(500 + static_cast<int>(random.below(2500)));
+    organ.material.elastic_law = static_cast<ElasticLaw>(random.below(3));
+    organ.material.young_modulus_pa = random.between(1500, 20000);
+    organ.material.poisson_ratio = random.between(0.1, 0.48);
+    organ.material.has_averaged_volume = random.below(2) == 0;
+  }
+  organ.material.node_damping_per_s = random.between(2, 40);
+  organ.material.spring_damping_time_s = random.below(2) == 0 ? 0 : random.between(0, 0.003);
+  return organ;
+}
+
+// Tools that walk from target to target above, on and in the organ.
+struct Walker {
+  Vec3f from, to;
+  Tick begin = 0, end = 1;
+  scene::Verb verb = scene::Verb::None;
+
+  Vec3f at(Tick tick) const {
+    const float s =
+        std::clamp(static_cast<float>(tick - begin) / static_cast<float>(end - begin), 0.0f, 1.0f);
+    return from + (to - from) * s;
+  }
+};
+
+void walk(Walker& walker, Tick tick, const world::World& world, Random& random) {
+  if (tick < walker.end) return;
+  walker.from = walker.at(tick);
+  const auto& surface = world.surface_nodes;
+  const auto node = surface[random.below(static_cast<std::uint32_t>(surface.size()))];
+  const Vec3f rest = world.rest_positions[node.value];
+  const Vec3f outward = normalized(rest, Vec3f{0, 1, 0});
+  walker.to = rest + outward * static_cast<float>(random.between(-0.012, 0.02));
+  walker.begin = tick;
+  walker.end = tick + 200 + random.below(600);
+  walker.verb = static_cast<scene::Verb>(random.below(3));
+}
+
+double energy_of(const Simulation& simulation) {
+  const auto& world = simulation.state().world;
+  double energy = simulation.context().solver.tissue().energy_j(world.displacements);
+  for (std::size_t n = 0; n < world.node_count(); ++n)
+    energy +=
+        0.5 * static_cast<double>(world.masses[n]) * length_squared(to_double(world.velocities[n]));
+  return energy;
+}
+
+class LongRun : public ::testing::TestWithParam<std::uint64_t> {};
+
+TEST_P(LongRun, StaysFiniteBoundedAndInPlace) {
+  Random random(GetParam());
+  Simulation simulation(random_organ(random));
+  const auto& world = simulation.state().world;
+  const double rest_energy = energy_of(simulation);
+  constexpr std::uint8_t kHands = 3;
+  std::array<Walker, kHands> walkers;
+  for (auto& walker : walkers) walker.from = walker.to = {0, 0.4f, 0};
+  TickDecisions decisions;
+  session::TickInputs inputs;
+  double largest_energy = 0;
+  for (Tick tick = 1; tick <= 10'000; ++tick) {
+    inputs.clear();
+    for (std::uint8_t hand = 0; hand < kHands; ++hand) {
+      if (tick == 1) {
+        session::HandJoin join{.slot = {hand}};
+        join.shapes[0] = {.radius_m = 0.008f, .length_m = 0.2f, .reach_m = 0.008f};
+        inputs.joins.push_back(join);
+      }
+      walk(walkers[hand], tick, world, random);
+      if (tick % 8 == 1)
+        inputs.samples.push_back(
+            {tool_slot({hand}, 0),
+             {{walkers[hand].at(tick), rotation_from_z({0, 1, 0})}, walkers[hand].verb}});
+    }
+    if (tick % 500 == 0) {
+      decisions.boundary = random.below(2) == 0 ? world::Boundary::Graded : world::Boundary::Frozen;
+      decisions.depth_limit = 1 + random.below(7);
+      decisions.node_limit = 50 + random.below(1500);
+      decisions.sweeps = 3 + random.below(4);
+    }
+    const auto& report = simulation.tick(inputs, decisions);
+    ASSERT_EQ(report.nodes_rejected, 0u) << "tick " << tick;
+    if (tick % 50 == 0) largest_energy = std::max(largest_energy, energy_of(simulation));
+  }
+  for (std::size_t n = 0; n < world.node_count(); ++n) {
+    ASSERT_TRUE(is_finite(world.displacements[n]) && is_finite(world.velocities[n]));
+    if (world.node_classes[n] != world::NodeClass::Fixed) continue;
+    ASSERT_EQ(world.displacements[n], Vec3f{});
+    ASSERT_EQ(world.velocities[n], Vec3f{});
+  }
+  // Three tools that press some millimetres can do a few joules at most in the stiffest organ.
+  EXPECT_LT(largest_energy - rest_energy, 20.0);
+  // And without tools it dies away.
+  inputs.clear();
+  inputs.leaves = {{0}, {1}, {2}};
+  const double before = energy_of(simulation) - rest_energy;
+  for (int tick = 0; tick < 3000; ++tick) {
+    simulation.tick(inputs, decisions);
+    inputs.clear();
+  }
+  EXPECT_LE(energy_of(simulation) - rest_energy, before * 1.001 + 1e-9);
+}
+
+INSTANTIATE_TEST_SUITE_P(Seeds, LongRun, ::testing::Range<std::uint64_t>(1, 9));
+
+// A tool holds still, pressed in; then decisions change. Its force may not step.
+class ForceAcrossDecisions : public ::testing::TestWithParam<scene::ElasticLaw> {};
+
+TEST_P(ForceAcrossDecisions, DoesNotStep) {
+  auto organ = *scene::make_liver(6000);
+  organ.material.elastic_law = GetParam();
+  Simulation simulation(organ);
+  const auto& world = simulation.state().world;
+  NodeIndex top = world.surface_nodes.front();
+  for (const auto node : world.surface_nodes)
+    if (world.rest_positions[node.value].y > world.rest_positions[top.value].y) top = node;
+  const Vec3f over = world.rest_positions[top.value];
+  session::TickInputs inputs;
+  session::HandJoin join{.slot = {0}};
+  join.shapes[0] = {.radius_m = 0.012f, .length_m = 0.2f, .reach_m = 0.008f};
+  inputs.joins.push_back(join);
+  TickDecisions decisions;
+  const auto force = [&]() -> double {
+    const auto& contacts = simulation.context().contacts;
+    if (contacts.tools.empty()) return 0;
+    return static_cast<double>(length(
+        simulation.context().solver.reaction(contacts, contacts.tools[0], world, kTickSeconds)));
+  };
+  double last = 0, worst = 0, peak = 0;
+  for (Tick tick = 1; tick <= 4000; ++tick) {
+    if (tick % 8 == 1) {
+      const float press = 0.010f * std::min(1.0f, static_cast<float>(tick) * 1e-3f) - 0.003f;
+      inputs.samples.push_back(
+          {tool_slot({0}, 0),
+           {{over - Vec3f{0, press, 0}, rotation_from_z({0, 1, 0})}, scene::Verb::Push}});
+    }
+    if (tick == 1800) decisions.sweeps = 3;
+    if (tick == 2000) decisions.depth_limit = 1;
+    if (tick == 2200) decisions.depth_limit = 6;
+    if (tick == 2400) decisions.node_limit = 100;
+    if (tick == 2600) decisions.boundary = world::Boundary::Frozen;
+    if (tick == 3000) decisions.node_limit = 1200;
+    if (tick == 3200) decisions.boundary = world::Boundary::Graded;
+    simulation.tick(inputs, decisions);
+    inputs.clear();
+    const double now = force();
+    peak = std::max(peak, now);
+    if (tick > 1790) worst = std::max(worst, std::abs(now - last));
+    last = now;
+  }
+  EXPECT_GT(peak, 0.03) << "the tool presses";
+  EXPECT_LT(worst, 0.02 * peak);
+}
+
+INSTANTIATE_TEST_SUITE_P(Laws, ForceAcrossDecisions,
+                         ::testing::Values(scene::ElasticLaw::Springs,
+                                           scene::ElasticLaw::TensorMass,
+                                           scene::ElasticLaw::NeoHookean));
+
+}  // namespace
+}  // namespace trocar::step
