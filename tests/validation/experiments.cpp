@@ -1,0 +1,22 @@
+#include "tests/validation/experiments.h"
+
+namespace trocar::validation {
+
+const std::vector<Experiment>& experiments() {
+  static const std::vector<Experiment> all{
+      {"choi2002/eq2", "How many nodes a force reaches", "Choi 2002, equation 2", run_eq2},
+      {"choi2002/fig2-several-users", "Three hands pull at once",
+       "Choi 2002, section 2.3, figure 2", run_fig2_users},
+      {"choi2002/fig4-hysteresis", "Hysteresis under cyclic load", "Choi 2002, figure 4",
+       run_fig4_hysteresis},
+      {"choi2002/creep", "Creep", "Choi 2002, section 4; Kelvin-Voigt in closed form", run_creep},
+      {"choi2002/relaxation", "Stress relaxation",
+       "Choi 2002, section 1; Kelvin-Voigt in closed form", run_relaxation},
+      {"choi2002/fig5-profiles", "Profile of the surface for several penetration depths",
+       "Choi 2002, figure 5", run_fig5_profiles},
+      {"choi2002/fig6-time-split", "Where the time goes", "Choi 2002, figure 6", run_fig6_times},
+  };
+  return all;
+}
+
+}  // namespace trocar::validation
