@@ -3,181 +3,119 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/scene/builtin_organs.h"
-#include "common/scene/load_organ.h"
+#include "common/scene/scenario_resolver.h"
 
 namespace trocar::scene {
 namespace {
 
-constexpr double kBoxMargin_m = 1e-6;
+// Who holds a node along which axes: bits as in DisplacementRule.
+struct Hold {
+  std::uint8_t fixed = 0, displaced = 0;
 
-class Resolver {
- public:
-  explicit Resolver(const Scenario& scenario) : scenario_(scenario) {}
-
-  Error wrong(const Place& place, const std::string& what) const {
-    const std::string line = place.line > 0 ? ":" + std::to_string(place.line) : "";
-    return {ErrorCode::BadFile,
-            scenario_.source.string() + line + ": key " + place.key + ": " + what};
-  }
-
-  Result<Organ> make_organ() const {
-    auto organ = source_organ();
-    if (!organ) return wrong(scenario_.organ.place, organ.error().message);
-    if (auto changed = change_material(*organ); !changed) return changed.error();
-    if (!scenario_.keeps_organ_fixed) organ->fixed_nodes.clear();
-    for (const auto& use : scenario_.fixes) {
-      const auto nodes = nodes_of(use, *organ);
-      if (!nodes) return nodes.error();
-      organ->fixed_nodes.insert(organ->fixed_nodes.end(), nodes->begin(), nodes->end());
-    }
-    auto& fixed = organ->fixed_nodes;
-    std::sort(fixed.begin(), fixed.end());
-    fixed.erase(std::unique(fixed.begin(), fixed.end()), fixed.end());
-    return organ;
-  }
-
-  Result<NodeList> nodes_of(const SetUse& use, const Organ& organ) const {
-    NodeList nodes;
-    if (use.name == "fixed") {
-      nodes = organ.fixed_nodes;
-    } else if (use.name == "all") {
-      for (std::size_t i = 0; i < organ.mesh.node_count(); ++i) nodes.push_back(NodeIndex(i));
-    } else {
-      const auto rule = std::find_if(scenario_.node_rules.begin(), scenario_.node_rules.end(),
-                                     [&](const NodeRule& r) { return r.name == use.name; });
-      if (rule == scenario_.node_rules.end())
-        return wrong(use.place, "there is no set \"" + use.name + "\", add it as [[nodes]]");
-      auto selected = select(*rule, organ);
-      if (!selected) return selected;
-      nodes = std::move(*selected);
-    }
-    if (nodes.empty()) return wrong(use.place, "set \"" + use.name + "\" has no nodes");
-    return nodes;
-  }
-
-  Result<NodeList> select(const NodeRule& rule, const Organ& organ) const {
-    const auto& rest = organ.mesh.rest_positions;
-    NodeList nodes;
-    if (rule.ids) {
-      for (const auto id : *rule.ids) {
-        if (id < 0 || static_cast<std::uint64_t>(id) >= rest.size())
-          return wrong(rule.place, "set \"" + rule.name + "\": node " + std::to_string(id) +
-                                       " does not exist, the organ has nodes 0 to " +
-                                       std::to_string(rest.size() - 1));
-        nodes.push_back(NodeIndex(static_cast<std::size_t>(id)));
-      }
-      std::sort(nodes.begin(), nodes.end());
-      nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
-    } else if (rule.box) {
-      const auto is_within = [](double x, double low, double high) {
-        return x >= low - kBoxMargin_m && x <= high + kBoxMargin_m;
-      };
-      const auto& [low, high] = *rule.box;
-      for (std::size_t i = 0; i < rest.size(); ++i)
-        if (is_within(rest[i].x, low.x, high.x) && is_within(rest[i].y, low.y, high.y) &&
-            is_within(rest[i].z, low.z, high.z))
-          nodes.push_back(NodeIndex(i));
-    } else if (rule.near) {
-      std::size_t nearest = 0;
-      for (std::size_t i = 0; i < rest.size(); ++i) {
-        const double distance = length(rest[i] - rule.near->point_m);
-        if (distance < length(rest[nearest] - rule.near->point_m)) nearest = i;
-        if (rule.near->radius_m && distance <= *rule.near->radius_m + kBoxMargin_m)
-          nodes.push_back(NodeIndex(i));
-      }
-      if (!rule.near->radius_m) nodes.push_back(NodeIndex(nearest));
-    }
-    if (nodes.empty())
-      return wrong(rule.place, "set \"" + rule.name +
-                                   "\" has no nodes; positions are in mm at rest, the origin is "
-                                   "the centre of the organ's bounding box");
-    return nodes;
-  }
-
- private:
-  Result<Organ> source_organ() const {
-    const auto& rule = scenario_.organ;
-    if (rule.source == "lattice") {
-      LatticeSize size;
-      if (rule.lattice_nodes)
-        size = {(*rule.lattice_nodes)[0], (*rule.lattice_nodes)[1], (*rule.lattice_nodes)[2],
-                size.spacing_m};
-      size.spacing_m = rule.lattice_spacing_m.value_or(size.spacing_m);
-      return make_lattice(size);
-    }
-    const std::filesystem::path path(rule.source);
-    if (!path.has_extension() || path.is_absolute()) return load_organ(rule.source);
-    return load_organ((scenario_.source.parent_path() / path).string());
-  }
-
-  Status change_material(Organ& organ) const {
-    const auto& change = scenario_.material;
-    Material& material = organ.material;
-    if (change.density_kg_m3) {
-      // Masses are in proportion to density whatever they were made from.
-      for (double& mass : organ.node_masses_kg)
-        mass *= *change.density_kg_m3 / material.density_kg_m3;
-      material.density_kg_m3 = *change.density_kg_m3;
-    }
-    if (change.young_modulus_pa) {
-      if (organ.mesh.tets.empty() || !organ.mesh.links.empty())
-        return wrong(change.place,
-                     "this organ's springs are no edges of tets, write spring_stiffness_n_m");
-      material.spring_law = SpringLaw::VolumeConsistent;
-      material.young_modulus_pa = *change.young_modulus_pa;
-    }
-    if (change.spring_stiffness_n_m) {
-      material.spring_law = SpringLaw::Constant;
-      material.spring_stiffness_n_m = *change.spring_stiffness_n_m;
-    }
-    material.node_damping_per_s = change.node_damping_per_s.value_or(material.node_damping_per_s);
-    material.spring_damping_time_s =
-        change.spring_damping_time_s.value_or(material.spring_damping_time_s);
-    if (auto status = validate(organ); !status) return wrong(change.place, status.error().message);
-    return {};
-  }
-
-  const Scenario& scenario_;
+  std::uint8_t held() const { return fixed | displaced; }
 };
 
-// Who holds a node.
-enum class Hold : std::uint8_t { Free, Fixed, Displaced };
+std::uint8_t axes_of(const TimedVector& over_time) {
+  std::uint8_t axes = 0;
+  for (const auto& [time, value] : over_time.keys)
+    axes = static_cast<std::uint8_t>(axes | (value.x != 0 ? 1 : 0) | (value.y != 0 ? 2 : 0) |
+                                     (value.z != 0 ? 4 : 0));
+  return axes;
+}
 
-Status resolve_loads(const Resolver& resolver, const Scenario& scenario, std::vector<Hold>& holds,
-                     ResolvedScenario& result) {
-  for (const auto& rule : scenario.displacements) {
+std::string node_of_set(NodeIndex node, const SetUse& set) {
+  return "node " + std::to_string(node.value) + " of set \"" + set.name + "\" is ";
+}
+
+Status resolve_displacements(const Resolver& resolver, std::vector<Hold>& holds,
+                             ResolvedScenario& result) {
+  for (const auto& rule : resolver.scenario().displacements) {
     auto nodes = resolver.nodes_of(rule.set, result.organ);
     if (!nodes) return nodes.error();
     for (const auto node : *nodes) {
-      if (holds[node.value] != Hold::Free)
+      Hold& hold = holds[node.value];
+      if (hold.fixed != 0)
+        return resolver.wrong(rule.set.place, node_of_set(node, rule.set) +
+                                                  "fixed: take it out of the set, or see [fix]");
+      if ((hold.displaced & rule.axes) != 0)
         return resolver.wrong(rule.set.place,
-                              "node " + std::to_string(node.value) + " of set \"" + rule.set.name +
-                                  (holds[node.value] == Hold::Fixed
-                                       ? "\" is fixed: take it out of the set, or see [fix]"
-                                       : "\" is displaced by another set too"));
-      holds[node.value] = Hold::Displaced;
+                              node_of_set(node, rule.set) + "displaced by another set too");
+      hold.displaced |= rule.axes;
     }
-    result.displacements.push_back({std::move(*nodes), rule.over_time});
-  }
-  for (const auto& rule : scenario.forces) {
-    auto nodes = resolver.nodes_of(rule.set, result.organ);
-    if (!nodes) return nodes.error();
-    for (const auto node : *nodes)
-      if (holds[node.value] != Hold::Free)
-        return resolver.wrong(
-            rule.set.place,
-            "node " + std::to_string(node.value) + " of set \"" + rule.set.name +
-                (holds[node.value] == Hold::Fixed ? "\" is fixed" : "\" is displaced") +
-                ", a force on it would do nothing: take it out of the set");
-    result.forces.push_back({std::move(*nodes), rule.over_time});
+    result.displacements.push_back({std::move(*nodes), rule.axes, rule.over_time});
   }
   return {};
 }
 
-Status resolve_probes(const Resolver& resolver, const Scenario& scenario,
-                      const std::vector<Hold>& holds, ResolvedScenario& result) {
-  for (const auto& probe : scenario.probes) {
+Status resolve_forces(const Resolver& resolver, const std::vector<Hold>& holds,
+                      ResolvedScenario& result) {
+  for (const auto& rule : resolver.scenario().forces) {
+    auto nodes = resolver.nodes_of(rule.set, result.organ);
+    if (!nodes) return nodes.error();
+    for (const auto node : *nodes) {
+      const Hold& hold = holds[node.value];
+      if (hold.fixed != 0 || (hold.displaced & axes_of(rule.over_time)) != 0)
+        return resolver.wrong(rule.set.place,
+                              node_of_set(node, rule.set) +
+                                  (hold.fixed != 0 ? "fixed" : "displaced") +
+                                  ", a force on it would do nothing: take it out of the set");
+    }
+    const double share = 1.0 / static_cast<double>(nodes->size());
+    std::vector<double> shares(nodes->size(), share);
+    result.forces.push_back({std::move(*nodes), rule.over_time, std::move(shares), {}});
+  }
+  return {};
+}
+
+// A constant traction on a linear triangle is a third of its force on each corner.
+Status resolve_tractions(const Resolver& resolver, const std::vector<Hold>& holds,
+                         ResolvedScenario& result) {
+  const auto& mesh = result.organ.mesh;
+  for (const auto& rule : resolver.scenario().tractions) {
+    const auto nodes = resolver.nodes_of(rule.set, result.organ);
+    if (!nodes) return nodes.error();
+    std::vector<std::uint8_t> is_inside(mesh.node_count());
+    for (const auto node : *nodes) is_inside[node.value] = 1;
+    std::vector<double> areas(mesh.node_count());
+    std::vector<Vec3d> normal_areas(mesh.node_count());
+    for (const auto& triangle : mesh.boundary_triangles) {
+      if (!std::ranges::all_of(triangle, [&](NodeIndex n) { return is_inside[n.value] != 0; }))
+        continue;
+      const auto& [a, b, c] = triangle;
+      const auto& p = mesh.rest_positions;
+      const Vec3d twice = cross(p[b.value] - p[a.value], p[c.value] - p[a.value]);
+      for (const auto node : triangle) {
+        areas[node.value] += length(twice) / 6;
+        normal_areas[node.value] += twice / 6;
+      }
+    }
+    ResolvedForce force{{}, rule.over_time, {}, {}};
+    bool moves = false;
+    for (const auto node : *nodes) {
+      if (areas[node.value] == 0) continue;
+      moves |= holds[node.value].held() != kAllAxes;
+      force.nodes.push_back(node);
+      if (rule.is_pressure)
+        force.normal_areas_m2.push_back(normal_areas[node.value]);
+      else
+        force.shares.push_back(areas[node.value]);
+    }
+    if (force.nodes.empty())
+      return resolver.wrong(rule.set.place, "set \"" + rule.set.name +
+                                                "\" holds no whole triangle of the surface, a "
+                                                "traction needs one: enlarge it");
+    if (!moves)
+      return resolver.wrong(rule.set.place,
+                            "all nodes of set \"" + rule.set.name +
+                                "\" are fixed or displaced, a traction on them would do nothing");
+    result.forces.push_back(std::move(force));
+  }
+  return {};
+}
+
+Status resolve_probes(const Resolver& resolver, const std::vector<Hold>& holds,
+                      ResolvedScenario& result) {
+  for (const auto& probe : resolver.scenario().probes) {
     auto& nodes = result.probe_nodes.emplace_back();
     if (!probe.set) continue;
     auto found = resolver.nodes_of(*probe.set, result.organ);
@@ -185,17 +123,17 @@ Status resolve_probes(const Resolver& resolver, const Scenario& scenario,
     nodes = std::move(*found);
     if (probe.quantity != ProbeQuantity::Reaction) continue;
     for (const auto node : nodes)
-      if (holds[node.value] == Hold::Free)
-        return resolver.wrong(probe.place, "node " + std::to_string(node.value) + " of set \"" +
-                                               probe.set->name +
-                                               "\" is neither fixed nor displaced, so nothing "
-                                               "holds it: a reaction needs a held set");
+      if (holds[node.value].held() == 0)
+        return resolver.wrong(probe.place,
+                              node_of_set(node, *probe.set) +
+                                  "neither fixed nor displaced, so nothing holds it: a reaction "
+                                  "needs a held set");
   }
   return {};
 }
 
-Status resolve_anchors(const Resolver& resolver, const Scenario& scenario,
-                       ResolvedScenario& result) {
+Status resolve_anchors(const Resolver& resolver, ResolvedScenario& result) {
+  const Scenario& scenario = resolver.scenario();
   std::vector<Vec3f> rest;
   std::vector<SurfaceTriangle> triangles;
   for (const auto& p : result.organ.mesh.rest_positions) rest.push_back(to_float(p));
@@ -219,7 +157,36 @@ Status resolve_anchors(const Resolver& resolver, const Scenario& scenario,
   return {};
 }
 
+// Far from the queue nothing moves: whatever acts there has to be in equilibrium already.
+Status check_gravity(const Resolver& resolver, const Organ& organ) {
+  const auto& scenario = resolver.scenario();
+  if (scenario.run.boundary != Boundary::Frozen || length(organ.gravity_m_s2) == 0) return {};
+  if (scenario.run.starts_in_equilibrium || !organ.stress_free_positions_m.empty()) return {};
+  return resolver.wrong(scenario.gravity_m_s2 ? scenario.gravity_place : scenario.organ.place,
+                        "acts on the whole organ, but boundary = \"frozen\" moves a part of it: "
+                        "add start = \"equilibrium\" to [run], or take another boundary");
+}
+
 }  // namespace
+
+const Place& place_of_key(const std::vector<Place>& places, std::string_view key,
+                          const Place& other) {
+  for (const auto& place : places) {
+    const auto dot = place.key.rfind('.');
+    if (std::string_view(place.key).substr(dot == std::string::npos ? 0 : dot + 1) == key)
+      return place;
+  }
+  return other;
+}
+
+const Place& MaterialChange::place_of(std::string_view key) const {
+  return place_of_key(given, key, place);
+}
+
+Error scenario_error(const Scenario& scenario, const Place& place, const std::string& what) {
+  const std::string line = place.line > 0 ? ":" + std::to_string(place.line) : "";
+  return {ErrorCode::BadFile, scenario.source.string() + line + ": key " + place.key + ": " + what};
+}
 
 Vec3d TimedVector::at(double time_s) const {
   if (time_s <= keys.front().time_s) return keys.front().value;
@@ -236,19 +203,19 @@ Result<ResolvedScenario> resolve(Scenario scenario) {
   const Resolver resolver(scenario);
   auto organ = resolver.make_organ();
   if (!organ) return organ.error();
-  if ((scenario.run.depth || scenario.run.nodes) && length(scenario.gravity_m_s2) > 0)
-    return resolver.wrong(scenario.gravity_place,
-                          "acts on the whole organ, remove depth and nodes from [run]");
+  if (auto s = check_gravity(resolver, *organ); !s) return s.error();
   ResolvedScenario result;
   result.organ = std::move(*organ);
   // Sets that nobody uses are checked too: a typing error in them is one all the same.
   for (const auto& rule : scenario.node_rules)
     if (auto nodes = resolver.select(rule, result.organ); !nodes) return nodes.error();
-  std::vector<Hold> holds(result.organ.mesh.node_count(), Hold::Free);
-  for (const auto node : result.organ.fixed_nodes) holds[node.value] = Hold::Fixed;
-  if (auto s = resolve_loads(resolver, scenario, holds, result); !s) return s.error();
-  if (auto s = resolve_probes(resolver, scenario, holds, result); !s) return s.error();
-  if (auto s = resolve_anchors(resolver, scenario, result); !s) return s.error();
+  std::vector<Hold> holds(result.organ.mesh.node_count());
+  for (const auto node : result.organ.fixed_nodes) holds[node.value].fixed = kAllAxes;
+  if (auto s = resolve_displacements(resolver, holds, result); !s) return s.error();
+  if (auto s = resolve_forces(resolver, holds, result); !s) return s.error();
+  if (auto s = resolve_tractions(resolver, holds, result); !s) return s.error();
+  if (auto s = resolve_probes(resolver, holds, result); !s) return s.error();
+  if (auto s = resolve_anchors(resolver, result); !s) return s.error();
   result.scenario = std::move(scenario);
   return result;
 }

@@ -41,19 +41,30 @@ struct ScenarioOrgan {
 
 // What is set replaces the organ's own.
 struct MaterialChange {
-  Place place;
+  Place place;               // of the table
+  std::vector<Place> given;  // of each key in it
   std::optional<double> density_kg_m3;
   std::optional<double> young_modulus_pa;
   std::optional<double> spring_stiffness_n_m;
   std::optional<double> node_damping_per_s;
   std::optional<double> spring_damping_time_s;
+  std::optional<ElasticLaw> elastic_law;
+  std::optional<double> poisson_ratio;
+  std::optional<bool> has_averaged_volume;
+  std::optional<Vec3d> fibre_direction;
+  std::optional<double> fibre_stiffness_ratio, tension, fibre_tension;
+
+  // Of the key with this name, or of the table if it is not in it.
+  const Place& place_of(std::string_view key) const;
 };
 
-// A named set: exactly one of ids, box and point is given.
+// A named set: exactly one of ids, csv, box and near is given, or else `is_on_surface` alone.
 struct NodeRule {
   Place place;
   std::string name;
   std::optional<std::vector<std::int64_t>> ids;
+  std::optional<std::string> csv;  // file of ids, relative to the scenario
+  Place csv_place;
   struct Box {
     Vec3d low_m, high_m;
   };
@@ -63,6 +74,7 @@ struct NodeRule {
     std::optional<double> radius_m;  // all within it; without: the nearest one
   };
   std::optional<Near> near;
+  bool is_on_surface = false;  // of what the rest selects, only nodes of the surface
 };
 
 // The name of a set where it is used.
@@ -82,9 +94,31 @@ struct TimedVector {
   Vec3d at(double time_s) const;
 };
 
-struct LoadRule {
+// A part of the organ with a material of its own.
+struct RegionRule {
+  std::string name;
+  std::optional<SetUse> set;  // without: the organ's own region of this name is changed
+  MaterialChange material;
+};
+
+inline constexpr std::uint8_t kAllAxes = 7;  // bit 0: x, bit 1: y, bit 2: z
+
+struct DisplacementRule {
   SetUse set;
-  TimedVector over_time;  // displacement in m, or total force in N
+  std::uint8_t axes = kAllAxes;  // held ones; the set is free along the others
+  TimedVector over_time;         // m
+};
+
+struct ForceRule {
+  SetUse set;
+  TimedVector over_time;  // total, N
+};
+
+// On the surface triangles whose three nodes are in the set. Areas and normals are those at rest.
+struct TractionRule {
+  SetUse set;
+  bool is_pressure = false;  // along the inward normal, value in x; otherwise a vector
+  TimedVector over_time;     // Pa
 };
 
 enum class ProbeQuantity : std::uint8_t {
@@ -103,14 +137,38 @@ struct ProbeRule {
   std::uint32_t every_ticks = 10;
 };
 
+enum class RunMode : std::uint8_t {
+  Dynamic,
+  Static,  // equilibrium at each load step
+};
+
+enum class Boundary : std::uint8_t {
+  Whole,   // every node moves, equally well solved
+  Frozen,  // only the queue around tools and loads moves
+  Graded,  // every node moves, the queue is swept more
+};
+
+enum class Integrator : std::uint8_t { Implicit, Explicit };
+
 struct RunRule {
+  RunMode mode = RunMode::Dynamic;
   double seconds = 0;
+  std::uint32_t load_steps = 1;  // of a static run
+  bool starts_in_equilibrium = false;
+  Integrator integrator = Integrator::Implicit;
+  std::uint32_t steps_per_tick = 1;  // 1 ms / dt
+  Boundary boundary = Boundary::Whole;
+  // Of the queue, as in a session; unlimited without.
+  std::optional<std::uint32_t> depth, nodes;
   std::uint32_t sweeps = 4;
   double over_relaxation = 1.5;
-  // Layers and nodes around tools and loads, as in a session; neither: the whole organ moves.
-  std::optional<std::uint32_t> depth, nodes;
+  std::uint32_t far_sweeps = 1;  // Graded: outside the queue
+  double far_over_relaxation = 1.3;
   double tolerance_n = 1e-5;        // of the full solver: residual at which a step is done
   std::uint32_t max_sweeps = 2000;  // of the full solver
+  std::vector<Place> given;         // of each key in [run]
+
+  double dt_s() const { return 1e-3 / steps_per_tick; }
 };
 
 struct Scenario {
@@ -120,8 +178,11 @@ struct Scenario {
   std::vector<NodeRule> node_rules;
   bool keeps_organ_fixed = true;
   std::vector<SetUse> fixes;
-  std::vector<LoadRule> displacements, forces;
-  Vec3d gravity_m_s2;
+  std::vector<RegionRule> regions;
+  std::vector<DisplacementRule> displacements;
+  std::vector<ForceRule> forces;
+  std::vector<TractionRule> tractions;
+  std::optional<Vec3d> gravity_m_s2;  // without: the organ's own
   Place gravity_place;
   std::vector<ScriptTool> tools;
   RunRule run;
@@ -137,20 +198,41 @@ Result<Scenario> parse_scenario_text(std::string_view text, std::string_view sou
 
 using NodeList = std::vector<NodeIndex>;  // ascending, distinct, not empty
 
-struct ResolvedLoad {
+struct ResolvedDisplacement {
   NodeList nodes;
-  TimedVector over_time;
+  std::uint8_t axes = kAllAxes;
+  TimedVector over_time;  // m
 };
 
-// A scenario on its organ. Fixed nodes (organ.fixed_nodes), displaced nodes and loaded nodes have
-// no node in common, except that forces may add up.
+// Of forces and tractions: the force on nodes[i] is value x shares[i], or minus value.x x
+// normal_areas_m2[i] for a pressure.
+struct ResolvedForce {
+  NodeList nodes;
+  TimedVector over_time;               // N or Pa
+  std::vector<double> shares;          // 1 or m^2
+  std::vector<Vec3d> normal_areas_m2;  // of a pressure, then shares is empty
+
+  Vec3d on_node(std::size_t i, const Vec3d& value) const {
+    return normal_areas_m2.empty() ? value * shares[i] : normal_areas_m2[i] * -value.x;
+  }
+};
+
+// A scenario on its organ. No node is held twice along an axis, and no force acts along an axis
+// along which its node is held; tractions may reach held nodes beside free ones.
 struct ResolvedScenario {
   Scenario scenario;
-  Organ organ;  // with the scenario's material and fixed nodes
-  std::vector<ResolvedLoad> displacements, forces;
+  Organ organ;  // with the scenario's materials, gravity and fixed nodes
+  std::vector<ResolvedDisplacement> displacements;
+  std::vector<ResolvedForce> forces;  // and tractions
   std::vector<NodeList> probe_nodes;  // per probe; empty for a tool's
   std::vector<AnchorPoint> anchors;   // per tool
 };
+
+// Of a key in a list of places, or of `other` if it is not in the list.
+const Place& place_of_key(const std::vector<Place>& places, std::string_view key,
+                          const Place& other);
+// "file:line: key k: what", for what is found out after reading.
+Error scenario_error(const Scenario& scenario, const Place& place, const std::string& what);
 
 Result<ResolvedScenario> resolve(Scenario scenario);
 

@@ -1,31 +1,12 @@
 // The TOML form of a scenario.
 
-#include "common/scene/scenario.h"
+#include "common/scene/scenario_tables.h"
 #include "common/scene/script_toml.h"
 
 namespace trocar::scene {
 namespace {
 
-constexpr double kMaxCoordinate_mm = 10'000;
-constexpr double kMaxForce_n = 1e6;
 constexpr std::int64_t kMaxLatticeNodes = 2'000'000;
-constexpr std::size_t kMaxTables = 1000;  // [[displace]], [[force]], [[probe]] each
-
-std::string entry(const char* table, std::size_t i) {
-  return std::string(table) + "[" + std::to_string(i) + "]";
-}
-
-Place place_of(const TableReader& reader, std::string_view key) {
-  return {reader.line(key), reader.path_of(key)};
-}
-
-std::vector<const toml::table*> limited_tables(TableReader& root, const char* name) {
-  auto tables = root.tables(name);
-  if (tables.size() > kMaxTables)
-    root.fail(name, "appears " + std::to_string(tables.size()) + " times, allowed are " +
-                        std::to_string(kMaxTables));
-  return tables;
-}
 
 ScenarioOrgan read_organ(TableReader& reader) {
   ScenarioOrgan organ;
@@ -56,119 +37,14 @@ ScenarioOrgan read_organ(TableReader& reader) {
   return organ;
 }
 
-MaterialChange read_material(TableReader& reader) {
-  MaterialChange material;
-  material.place = place_of(reader, "");
-  material.density_kg_m3 = reader.number("density_kg_m3", 1, 30000);
-  material.young_modulus_pa = reader.number("young_modulus_pa", 0, 1e12);
-  material.spring_stiffness_n_m = reader.number("spring_stiffness_n_m", 0, 1e9);
-  material.node_damping_per_s = reader.number("node_damping_per_s", 0, 1e6);
-  material.spring_damping_time_s = reader.number("spring_damping_time_s", 0, 100);
-  if (material.young_modulus_pa && material.spring_stiffness_n_m)
-    reader.fail("young_modulus_pa", "and spring_stiffness_n_m exclude each other, remove one");
-  material.place = place_of(reader, material.young_modulus_pa       ? "young_modulus_pa"
-                                    : material.spring_stiffness_n_m ? "spring_stiffness_n_m"
-                                                                    : "");
-  reader.finish();
-  return material;
-}
-
-std::optional<Vec3d> read_point(TableReader& reader, std::string_view key) {
-  const auto mm = reader.vector(key);
-  if (!mm) return std::nullopt;
-  if (std::max({std::abs(mm->x), std::abs(mm->y), std::abs(mm->z)}) > kMaxCoordinate_mm)
-    reader.fail(key, "is more than 10 m away: is it in millimetres?");
-  return *mm * 1e-3;
-}
-
-NodeRule read_node_rule(TableReader& reader, const std::vector<NodeRule>& before) {
-  NodeRule rule;
-  rule.place = place_of(reader, "name");
-  rule.name = reader.string("name").value_or("");
-  if (rule.name.empty()) reader.fail("name", "is missing, give the set a name");
-  const auto is_plain = [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' ||
-           c == '-';
-  };
-  if (!std::all_of(rule.name.begin(), rule.name.end(), is_plain) || rule.name.size() > 60)
-    reader.fail("name", "is not a plain name, use up to 60 letters, digits, _ and -");
-  if (rule.name == "fixed" || rule.name == "all")
-    reader.fail("name", "is taken: \"fixed\" and \"all\" exist in every scenario");
-  for (const auto& other : before)
-    if (other.name == rule.name)
-      reader.fail("name", "\"" + rule.name + "\" is taken by the set in line " +
-                              std::to_string(other.place.line));
-  rule.ids = reader.integers("ids");
-  const auto low = read_point(reader, "box_min_mm"), high = read_point(reader, "box_max_mm");
-  if (low.has_value() != high.has_value())
-    reader.fail(low ? "box_min_mm" : "box_max_mm", "needs the other corner too");
-  if (low && high) {
-    rule.box = NodeRule::Box{*low, *high};
-    if (low->x > high->x || low->y > high->y || low->z > high->z)
-      reader.fail("box_min_mm", "is above box_max_mm, exchange them");
-  }
-  const auto point = read_point(reader, "nearest_mm");
-  const auto radius_mm = reader.number("radius_mm", 0, kMaxCoordinate_mm);
-  if (radius_mm && !point) reader.fail("radius_mm", "needs nearest_mm = [x, y, z]");
-  if (point) rule.near = NodeRule::Near{*point, std::nullopt};
-  if (point && radius_mm) rule.near->radius_m = *radius_mm * 1e-3;
-  if (int(rule.ids.has_value()) + int(rule.box.has_value()) + int(rule.near.has_value()) != 1)
-    reader.fail("name", "needs exactly one of ids, box_min_mm with box_max_mm, or nearest_mm");
-  reader.finish();
-  return rule;
-}
-
-std::optional<SetUse> read_set(TableReader& reader) {
-  const auto name = reader.string("set");
-  if (!name) return std::nullopt;
-  return SetUse{place_of(reader, "set"), *name};
-}
-
-TimedVector read_over_time(Document& document, TableReader& reader, std::string_view value_key,
-                           double scale, double most) {
-  TimedVector result;
-  const auto keys = reader.tables("key");
-  if (keys.empty())
-    reader.fail("key", "is missing, add keys with time_s and " + std::string(value_key));
-  for (std::size_t i = 0; i < keys.size() && document.ok(); ++i) {
-    TableReader key(document, *keys[i], reader.path_of(entry("key", i)));
-    const auto time = key.number("time_s", 0, kScenarioTimeLimit);
-    if (!time)
-      key.fail("time_s", "is missing, write the seconds since the start");
-    else if (!result.keys.empty() && *time <= result.keys.back().time_s)
-      key.fail("time_s", "is " + shown(*time) + ", not after the key before (" +
-                             shown(result.keys.back().time_s) + "), put keys in order of time");
-    const auto value = key.vector(value_key);
-    if (!value)
-      key.fail(value_key, "is missing, write [x, y, z]");
-    else if (std::max({std::abs(value->x), std::abs(value->y), std::abs(value->z)}) > most)
-      key.fail(value_key, "has a part larger than " + shown(most) + ", is the unit right?");
-    key.finish();
-    if (document.ok()) result.keys.push_back({*time, *value * scale});
-  }
-  return result;
-}
-
-std::vector<LoadRule> read_loads(Document& document, TableReader& root, const char* table,
-                                 std::string_view value_key, double scale, double most) {
-  std::vector<LoadRule> loads;
-  const auto tables = limited_tables(root, table);
-  for (std::size_t i = 0; i < tables.size() && document.ok(); ++i) {
-    TableReader reader(document, *tables[i], entry(table, i));
-    const auto set = read_set(reader);
-    if (!set) reader.fail("set", "is missing, name a set of [[nodes]]");
-    auto over_time = read_over_time(document, reader, value_key, scale, most);
-    reader.finish();
-    if (document.ok()) loads.push_back({*set, std::move(over_time)});
-  }
-  return loads;
-}
-
-std::vector<ProbeRule> read_probes(Document& document, TableReader& root, std::size_t tool_count) {
+std::vector<ProbeRule> read_probes(Document& document, TableReader& root,
+                                   const Scenario& scenario) {
+  const auto tool_count = scenario.tools.size();
+  const bool is_static = scenario.run.mode == RunMode::Static;
   std::vector<ProbeRule> probes;
   const auto tables = limited_tables(root, "probe");
   for (std::size_t i = 0; i < tables.size() && document.ok(); ++i) {
-    TableReader reader(document, *tables[i], entry("probe", i));
+    TableReader reader(document, *tables[i], table_entry("probe", i));
     ProbeRule probe;
     probe.set = read_set(reader);
     const auto tool = reader.integer("tool", 0, kMaxTools - 1);
@@ -199,6 +75,10 @@ std::vector<ProbeRule> read_probes(Document& document, TableReader& root, std::s
         reader.fail("rate_hz", "is " + std::to_string(*rate) +
                                    ", which does not divide 1000, write 100 or 125 for example");
     }
+    if (is_static && reader.has("rate_hz"))
+      reader.fail("rate_hz", "is for mode = \"dynamic\", a static run has a row per load step");
+    if (is_static && probe.quantity == ProbeQuantity::Velocity)
+      reader.fail("quantity", "is zero in a static run, take another");
     constexpr std::array<const char*, 4> kNames{"displacement", "velocity", "reaction", "force"};
     probe.name = (probe.set ? probe.set->name : "tool" + std::to_string(tool.value_or(0))) + "_" +
                  kNames[static_cast<std::size_t>(probe.quantity)];
@@ -209,30 +89,6 @@ std::vector<ProbeRule> read_probes(Document& document, TableReader& root, std::s
     probes.push_back(std::move(probe));
   }
   return probes;
-}
-
-RunRule read_run(TableReader& reader) {
-  RunRule run;
-  const auto set = [&](std::string_view key, std::uint32_t& value, std::int64_t most) {
-    if (const auto number = reader.integer(key, 1, most))
-      value = static_cast<std::uint32_t>(*number);
-  };
-  if (const auto seconds = reader.number("seconds", 0.001, kScenarioTimeLimit))
-    run.seconds = *seconds;
-  else
-    reader.fail("seconds", "is missing, write how long to simulate");
-  set("sweeps", run.sweeps, 64);
-  run.over_relaxation = reader.number("over_relaxation", 1, 1.9).value_or(run.over_relaxation);
-  std::uint32_t limit = 0;
-  set("depth", limit, 1000);
-  if (limit > 0) run.depth = limit;
-  limit = 0;
-  set("nodes", limit, 10'000'000);
-  if (limit > 0) run.nodes = limit;
-  run.tolerance_n = reader.number("tolerance_n", 1e-9, 1).value_or(run.tolerance_n);
-  set("max_sweeps", run.max_sweeps, 1'000'000);
-  reader.finish();
-  return run;
 }
 
 void read_output(TableReader& reader, Scenario& scenario) {
@@ -261,40 +117,65 @@ void read_scenario(Document& document, TableReader& root, Scenario& scenario) {
   if (!with("organ", [&](TableReader& r) { scenario.organ = read_organ(r); }))
     root.fail("organ", "is missing, add [organ] with its source");
   with("material", [&](TableReader& r) { scenario.material = read_material(r); });
-  const auto node_tables = root.tables("nodes");
-  for (std::size_t i = 0; i < node_tables.size() && document.ok(); ++i) {
-    TableReader reader(document, *node_tables[i], entry("nodes", i));
-    scenario.node_rules.push_back(read_node_rule(reader, scenario.node_rules));
-  }
+  scenario.node_rules = read_node_rules(document, root);
+  scenario.regions = read_regions(document, root);
   with("fix", [&](TableReader& r) {
     scenario.keeps_organ_fixed = r.boolean("organ").value_or(true);
     for (const auto& name : r.strings("sets").value_or(std::vector<std::string>{}))
       scenario.fixes.push_back({place_of(r, "sets"), name});
     r.finish();
   });
-  scenario.displacements =
-      read_loads(document, root, "displace", "displacement_mm", 1e-3, kMaxCoordinate_mm);
-  scenario.forces = read_loads(document, root, "force", "force_n", 1, kMaxForce_n);
+  scenario.displacements = read_displacements(document, root);
+  scenario.forces = read_forces(document, root);
+  scenario.tractions = read_tractions(document, root);
   with("gravity", [&](TableReader& r) {
     scenario.gravity_place = place_of(r, "m_s2");
     const auto gravity = r.vector("m_s2");
     if (!gravity)
-      r.fail("m_s2", "is missing, write [0, -9.81, 0]");
+      r.fail_missing("m_s2", "write [0, -9.81, 0]");
     else if (!(length(*gravity) <= 1000))
       r.fail("m_s2", "is more than 1000 m/s^2, is the unit right?");
-    scenario.gravity_m_s2 = gravity.value_or(Vec3d{});
+    scenario.gravity_m_s2 = gravity;
     r.finish();
   });
   scenario.tools = read_tools(document, root, kMaxTools);
   if (!with("run", [&](TableReader& r) { scenario.run = read_run(r); }))
     root.fail("run", "is missing, add [run] with seconds");
   scenario.run_place = place_of(root, "run");
-  scenario.probes = read_probes(document, root, scenario.tools.size());
+  scenario.probes = read_probes(document, root, scenario);
   with("output", [&](TableReader& r) { read_output(r, scenario); });
   root.finish();
 }
 
 }  // namespace
+
+std::string table_entry(const char* table, std::size_t i) {
+  return std::string(table) + "[" + std::to_string(i) + "]";
+}
+
+Place place_of(const TableReader& reader, std::string_view key) {
+  return {reader.line(key), reader.path_of(key)};
+}
+
+std::vector<Place> places_of_keys(const TableReader& reader) {
+  std::vector<Place> places;
+  for (const auto& key : reader.keys()) places.push_back(place_of(reader, key));
+  return places;
+}
+
+std::vector<const toml::table*> limited_tables(TableReader& root, const char* name) {
+  auto tables = root.tables(name);
+  if (tables.size() > kMaxScenarioTables)
+    root.fail(name, "appears " + std::to_string(tables.size()) + " times, allowed are " +
+                        std::to_string(kMaxScenarioTables));
+  return tables;
+}
+
+std::optional<SetUse> read_set(TableReader& reader) {
+  const auto name = reader.string("set");
+  if (!name) return std::nullopt;
+  return SetUse{place_of(reader, "set"), *name};
+}
 
 Result<Scenario> parse_scenario_text(std::string_view text, std::string_view source) {
   Document document(source);

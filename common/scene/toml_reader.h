@@ -61,6 +61,11 @@ class Document {
 // A number as a person would write it.
 std::string shown(double value);
 
+// What to say of a key that is `known` with another unit in its name, or with none: nothing if it
+// is not.
+std::optional<std::string> unit_hint(std::string_view key, const toml::node& value,
+                                     std::string_view known);
+
 // Reads the keys of one table and, in finish(), refuses those nobody asked for.
 class TableReader {
  public:
@@ -79,6 +84,23 @@ class TableReader {
   void fail(std::string_view key, const std::string& what) {
     const toml::node* node = table_.get(key);
     document_.fail(node != nullptr ? node->source() : table_.source(), path_of(key), what);
+  }
+
+  // For a key that has to be there: if it is there in another unit, that is what is wrong.
+  void fail_missing(std::string_view key, const std::string& advice) {
+    for (const auto& [name, node] : table_)
+      if (const auto hint = unit_hint(name.str(), node, key)) {
+        document_.fail(name.source(), path_of(name.str()), *hint);
+        return;
+      }
+    fail(key, "is missing, " + advice);
+  }
+  bool has(std::string_view key) const { return table_.contains(key); }
+  // The keys that are there.
+  std::vector<std::string> keys() const {
+    std::vector<std::string> names;
+    for (const auto& [name, node] : table_) names.emplace_back(name.str());
+    return names;
   }
 
   std::optional<double> number(std::string_view key, double least, double most) {
@@ -211,6 +233,9 @@ class TableReader {
     for (const auto& [key, node] : table_) {
       const std::string_view name = key.str();
       if (std::find(known_.begin(), known_.end(), name) != known_.end()) continue;
+      for (const auto& known : known_)
+        if (const auto hint = unit_hint(name, node, known))
+          document_.fail(key.source(), path_of(name), *hint);
       std::string all;
       for (const auto& known : known_) all += (all.empty() ? "" : ", ") + known;
       document_.fail(key.source(), path_of(name), "is unknown, the keys here are " + all);

@@ -56,8 +56,8 @@ class Progress {
     if (now < next_) return;
     next_ = now + kProgressEvery_ns;
     is_shown_ = true;
-    std::fprintf(stderr, "\r%s: %.3f of %.3f s", kProgram, static_cast<double>(run.tick()) * 1e-3,
-                 static_cast<double>(run.last_tick()) * 1e-3);
+    std::fprintf(stderr, "\r%s: %.3f of %.3f s", kProgram, run.time_s(),
+                 run.scenario().run.seconds);
   }
   void end() const {
     if (is_shown_) std::fputc('\n', stderr);
@@ -73,12 +73,12 @@ struct Totals {
   std::uint64_t sweeps = 0, unconverged = 0, rejected = 0;
   std::size_t most_active = 0;
   float worst_residual_n = 0;
-  Tick first_rejected = 0;
+  double first_rejected_s = 0;
 
-  void add(Tick tick, const scenario::StepReport& report) {
+  void add(double time_s, const scenario::StepReport& report) {
     sweeps += report.solve.sweeps;
     unconverged += report.is_converged ? 0 : 1;
-    if (rejected == 0) first_rejected = tick;
+    if (rejected == 0) first_rejected_s = time_s;
     rejected += report.solve.nodes_rejected;
     most_active = std::max(most_active, report.active_nodes);
     worst_residual_n = std::max(worst_residual_n, report.solve.residual_n);
@@ -91,7 +91,7 @@ Status simulate(scenario::ScenarioRun& run, const std::filesystem::path& folder,
   const auto& times = run.scenario().field_times_s;
   std::size_t next_field = 0;
   const auto write_due_field = [&]() -> Status {
-    const double now = static_cast<double>(run.tick()) * 1e-3;
+    const double now = run.time_s();
     bool is_due = false;
     for (; next_field < times.size() && times[next_field] <= now + 0.5e-3; ++next_field)
       is_due = true;
@@ -101,7 +101,7 @@ Status simulate(scenario::ScenarioRun& run, const std::filesystem::path& folder,
   if (auto s = write_due_field(); !s) return s;
   while (!run.is_finished() && stop_requested == 0) {
     const auto report = run.step();
-    totals.add(run.tick(), report);
+    totals.add(run.time_s(), report);
     probes->add(run);
     if (auto s = write_due_field(); !s) return s;
     progress.show(run);
@@ -113,28 +113,33 @@ Status simulate(scenario::ScenarioRun& run, const std::filesystem::path& folder,
 
 void print_summary(const scenario::ScenarioRun& run, const Totals& totals,
                    const std::filesystem::path& folder) {
-  const double seconds = static_cast<double>(run.tick()) * 1e-3;
+  const auto steps = run.steps_done();
   if (!run.is_finished())
-    std::fprintf(stderr, "%s: stopped at %.3f of %.3f s\n", kProgram, seconds,
-                 static_cast<double>(run.last_tick()) * 1e-3);
+    std::fprintf(stderr, "%s: stopped at %.3f of %.3f s\n", kProgram, run.time_s(),
+                 run.scenario().run.seconds);
+  if (!run.has_settled())
+    std::fprintf(stderr,
+                 "%s: warning: the equilibrium at the start was not reached to %g N in %u sweeps: "
+                 "raise max_sweeps or tolerance_n in [run]\n",
+                 kProgram, run.scenario().run.tolerance_n, run.scenario().run.max_sweeps);
   if (totals.unconverged > 0)
     std::fprintf(
         stderr,
         "%s: warning: %" PRIu64 " of %" PRIu64
         " steps did not reach %g N in %u sweeps: raise max_sweeps or tolerance_n in [run]\n",
-        kProgram, totals.unconverged, run.tick(), run.scenario().run.tolerance_n,
+        kProgram, totals.unconverged, steps, run.scenario().run.tolerance_n,
         run.scenario().run.max_sweeps);
   if (totals.rejected > 0)
     std::fprintf(stderr,
                  "%s: warning: some nodes had no finite step, first at %.3f s: loads are too large "
                  "for this material\n",
-                 kProgram, static_cast<double>(totals.first_rejected) * 1e-3);
+                 kProgram, totals.first_rejected_s);
   std::printf(
       "%s: %.3f s of %s, %zu nodes, at most %zu active, %.1f sweeps per step, residual at "
       "most %.2g N\n",
-      run.scenario().source.c_str(), seconds, run.organ().name.c_str(), run.world().node_count(),
-      totals.most_active,
-      run.tick() == 0 ? 0.0 : static_cast<double>(totals.sweeps) / static_cast<double>(run.tick()),
+      run.scenario().source.c_str(), run.time_s(), run.organ().name.c_str(),
+      run.world().node_count(), totals.most_active,
+      steps == 0 ? 0.0 : static_cast<double>(totals.sweeps) / static_cast<double>(steps),
       static_cast<double>(totals.worst_residual_n));
   std::printf("results in %s\n", folder.c_str());
 }
@@ -148,6 +153,7 @@ Status run_scenario(const Options& options) {
           : parsed->output_folder.value_or("out/" + parsed->source.stem().string());
   auto resolved = scene::resolve(std::move(*parsed));
   if (!resolved) return resolved.error();
+  if (auto s = scenario::check_supported(*resolved); !s) return s;
   std::error_code failed;
   std::filesystem::create_directories(folder, failed);
   if (failed)

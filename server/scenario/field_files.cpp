@@ -1,7 +1,7 @@
 #include "server/scenario/field_files.h"
 
 #include <cerrno>
-#include <cinttypes>
+#include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <string>
@@ -109,7 +109,7 @@ void write_vtu(std::FILE* file, const ScenarioRun& run) {
 
 Status write_field(const std::filesystem::path& folder, const ScenarioRun& run) {
   char name[40];
-  std::snprintf(name, sizeof name, "field_%07" PRIu64 "ms", run.tick());
+  std::snprintf(name, sizeof name, "field_%07lldms", std::llround(run.time_s() * 1e3));
   const auto csv = folder / (std::string(name) + ".csv");
   if (auto s = write_file(csv, [&](std::FILE* f) { write_csv(f, run); }); !s) return s;
   const auto vtu = folder / (std::string(name) + ".vtu");

@@ -1,6 +1,5 @@
 #include "server/scenario/probe_file.h"
 
-#include <algorithm>
 #include <cerrno>
 #include <cstring>
 
@@ -51,12 +50,13 @@ Result<ProbeFile> ProbeFile::create(const std::filesystem::path& path,
 
 void ProbeFile::add(const ScenarioRun& run) {
   const auto& probes = run.scenario().probes;
-  const auto is_due = [&](const scene::ProbeRule& p) { return run.tick() % p.every_ticks == 0; };
-  if (std::none_of(probes.begin(), probes.end(), is_due)) return;
-  std::fprintf(file_.get(), "%.3f",
-               static_cast<double>(run.tick()) / static_cast<double>(kTicksPerSecond));
+  bool is_any_due = false;
+  for (std::size_t i = 0; i < probes.size(); ++i) is_any_due |= run.is_due(i);
+  if (!is_any_due) return;
+  std::fprintf(file_.get(), run.scenario().run.mode == scene::RunMode::Static ? "%.9g" : "%.3f",
+               run.time_s());
   for (std::size_t i = 0; i < probes.size(); ++i) {
-    if (!is_due(probes[i])) {
+    if (!run.is_due(i)) {
       std::fputs(",,,", file_.get());
       continue;
     }

@@ -1,29 +1,86 @@
 #include "server/scenario/scenario_run.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+
+#include "common/base/assert.h"
 
 namespace trocar::scenario {
 namespace {
 
+using scene::kAllAxes;
+
 // A hand reads its devices this often, in a session as here.
 constexpr Tick kSampleTicks = 8;
+// With a step of time this long inertia and damping are nothing, so that a step ends in
+// equilibrium.
+constexpr float kStaticStep_s = 100;
+// The over-relaxation, which a solve gives up when it overshoots, is tried again so often.
+constexpr std::uint32_t kSweepsPerRelaxation = 200;
+// A contact that is found changes the equilibrium, and that the contacts. First the tool walks to
+// its new place, as it does in a session, and its claim takes effect.
+constexpr int kMinContactRounds = static_cast<int>(input::kPoseTicks) + 2;
+constexpr int kMaxContactRounds = 60;
+constexpr float kContactChange_m = 1e-5f;
 
 double seconds_of(Tick tick) {
   return static_cast<double>(tick) / static_cast<double>(kTicksPerSecond);
 }
 
-Tick ticks_of(double seconds) {
-  return static_cast<Tick>(std::llround(seconds * static_cast<double>(kTicksPerSecond)));
+std::uint64_t steps_of(const scene::RunRule& run) {
+  return run.mode == scene::RunMode::Static
+             ? run.load_steps
+             : static_cast<std::uint64_t>(
+                   std::llround(run.seconds * static_cast<double>(kTicksPerSecond)));
+}
+
+const scene::Place& run_key(const scene::Scenario& scenario, std::string_view key) {
+  return scene::place_of_key(scenario.run.given, key, scenario.run_place);
 }
 
 }  // namespace
 
+Status check_supported(const scene::ResolvedScenario& resolved) {
+  const auto& scenario = resolved.scenario;
+  const auto refuse = [&](const scene::Place& place, const std::string& what) {
+    return scene::scenario_error(scenario, place, what + " is not simulated yet");
+  };
+  const auto& rule = scenario.run;
+  if (rule.boundary == scene::Boundary::Graded)
+    return refuse(run_key(scenario, "boundary"), "\"graded\"");
+  if (rule.integrator == scene::Integrator::Explicit)
+    return refuse(run_key(scenario, "integrator"), "\"explicit\"");
+  for (const auto& rule_of_set : scenario.displacements)
+    if (rule_of_set.axes != kAllAxes)
+      return refuse(rule_of_set.set.place, "a set that is held along some axes only");
+  const auto check_material = [&](const scene::Material& m,
+                                  const scene::MaterialChange& change) -> Status {
+    if (m.elastic_law != scene::ElasticLaw::Springs)
+      return refuse(change.place_of("elastic_law"), "this law");
+    if (m.node_damping_per_s != resolved.organ.material.node_damping_per_s)
+      return refuse(change.place_of("node_damping_per_s"), "nodal damping that differs by region");
+    return {};
+  };
+  if (auto s = check_material(resolved.organ.material, scenario.material); !s) return s;
+  for (const auto& region : resolved.organ.regions) {
+    const auto rule_of_region =
+        std::ranges::find(scenario.regions, region.name, &scene::RegionRule::name);
+    const bool is_changed = rule_of_region != scenario.regions.end();
+    scene::MaterialChange unchanged;
+    unchanged.place = scenario.organ.place;
+    if (auto s = check_material(region.material, is_changed ? rule_of_region->material : unchanged);
+        !s)
+      return s;
+  }
+  return {};
+}
+
 ScenarioRun::ScenarioRun(scene::ResolvedScenario resolved, Solver solver)
     : resolved_(std::move(resolved)),
       solver_kind_(solver),
-      has_limits_(scenario().run.depth || scenario().run.nodes),
-      last_tick_(ticks_of(scenario().run.seconds)),
+      is_frozen_(scenario().run.boundary == scene::Boundary::Frozen && !is_static()),
+      step_count_(steps_of(scenario().run)),
       springs_(organ()),
       world_(organ()),
       claims_(world_.node_count()),
@@ -37,32 +94,48 @@ ScenarioRun::ScenarioRun(scene::ResolvedScenario resolved, Solver solver)
       world_.node_classes[node.value] = world::NodeClass::Fixed;
     }
   held_displacements_.resize(held_.size());
-  if (!resolved_.forces.empty() || length(scenario().gravity_m_s2) > 0)
+  if (!resolved_.forces.empty() || length(organ().gravity_m_s2) > 0)
     forces_.resize(world_.node_count());
   for (std::uint32_t i = 0; i < world_.node_count(); ++i) {
     if (world_.node_classes[i] == world::NodeClass::Fixed) continue;
     free_nodes_.push_back(NodeIndex(i));
-    if (!has_limits_) world_.node_classes[i] = world::NodeClass::Active;
+    if (!is_frozen_) world_.node_classes[i] = world::NodeClass::Active;
   }
+  if (!scenario().run.starts_in_equilibrium) return;
+  apply_gravity();
+  has_settled_ = relax().is_converged;
 }
 
-void ScenarioRun::apply_loads() {
-  const double now = seconds_of(world_.tick);
+double ScenarioRun::time_s() const {
+  if (!is_static()) return seconds_of(steps_done_);
+  return scenario().run.seconds * static_cast<double>(steps_done_) /
+         static_cast<double>(step_count_);
+}
+
+bool ScenarioRun::is_due(std::size_t probe) const {
+  return is_static() || steps_done_ % scenario().probes[probe].every_ticks == 0;
+}
+
+void ScenarioRun::apply_gravity() {
+  const Vec3f gravity = to_float(organ().gravity_m_s2);
+  for (std::size_t i = 0; i < forces_.size(); ++i) forces_[i] = gravity * world_.masses[i];
+}
+
+void ScenarioRun::apply_loads(double time_s) {
   std::size_t entry = organ().fixed_nodes.size();
   for (const auto& load : resolved_.displacements) {
-    const Vec3f displacement = to_float(load.over_time.at(now));
+    const Vec3f displacement = to_float(load.over_time.at(time_s));
     for (std::size_t i = 0; i < load.nodes.size(); ++i) held_displacements_[entry++] = displacement;
   }
-  if (forces_.empty()) return;
-  const Vec3f gravity = to_float(scenario().gravity_m_s2);
-  for (std::size_t i = 0; i < forces_.size(); ++i) forces_[i] = gravity * world_.masses[i];
+  apply_gravity();
   for (const auto& load : resolved_.forces) {
-    const Vec3f share = to_float(load.over_time.at(now) / static_cast<double>(load.nodes.size()));
-    for (const auto node : load.nodes) forces_[node.value] += share;
+    const Vec3d value = load.over_time.at(time_s);
+    for (std::size_t i = 0; i < load.nodes.size(); ++i)
+      forces_[load.nodes[i].value] += to_float(load.on_node(i, value));
   }
 }
 
-void ScenarioRun::move_tools() {
+void ScenarioRun::move_tools(double time_s, bool takes_samples) {
   inputs_.clear();
   const auto& tools = scenario().tools;
   for (std::size_t i = 0; world_.tick == 1 && i < tools.size(); i += kToolsPerHand) {
@@ -74,10 +147,9 @@ void ScenarioRun::move_tools() {
     }
     inputs_.joins.push_back(join);
   }
-  for (std::size_t i = 0; (world_.tick - 1) % kSampleTicks == 0 && i < tools.size(); ++i)
-    inputs_.samples.push_back(
-        {ToolSlot{static_cast<std::uint8_t>(i)},
-         scene::sample(tools[i], seconds_of(world_.tick - 1), resolved_.anchors[i])});
+  for (std::size_t i = 0; takes_samples && i < tools.size(); ++i)
+    inputs_.samples.push_back({ToolSlot{static_cast<std::uint8_t>(i)},
+                               scene::sample(tools[i], time_s, resolved_.anchors[i])});
   tools_.admit(inputs_, world_.tick);
 }
 
@@ -107,30 +179,99 @@ void ScenarioRun::update_claims() {
   grasps_.follow_claims(world_, tools_, claims_, requests_);
 }
 
-StepReport ScenarioRun::step() {
+dynamics::SolveSettings ScenarioRun::settings() const {
+  const auto& run = scenario().run;
+  dynamics::SolveSettings result{run.sweeps, static_cast<float>(run.over_relaxation),
+                                 static_cast<float>(run.dt_s())};
+  if (solver_kind_ == Solver::Full || is_static()) {
+    result.sweeps = run.max_sweeps;
+    result.residual_tolerance_n = static_cast<float>(run.tolerance_n);
+  }
+  return result;
+}
+
+StepReport ScenarioRun::step_dynamic() {
   ++world_.tick;
-  apply_loads();
-  move_tools();
+  move_tools(seconds_of(world_.tick - 1), (world_.tick - 1) % kSampleTicks == 0);
   contact::find_contacts(world_, tools_, claims_, grasps_, world_.tick, contacts_);
-  if (has_limits_) collect_active();
-  const std::span<const NodeIndex> active = has_limits_ ? active_set_.nodes() : free_nodes_;
+  if (is_frozen_) collect_active();
+  const std::span<const NodeIndex> active = is_frozen_ ? active_set_.nodes() : free_nodes_;
 
   const auto& run = scenario().run;
-  dynamics::SolveSettings settings{run.sweeps, static_cast<float>(run.over_relaxation),
-                                   kTickSeconds};
-  if (solver_kind_ == Solver::Full) {
-    settings.sweeps = run.max_sweeps;
-    settings.residual_tolerance_n = static_cast<float>(run.tolerance_n);
-  }
+  const auto how = settings();
+  const std::uint32_t steps = run.steps_per_tick;
+  for (auto& constraint : contacts_.constraints)
+    constraint.tool_motion = constraint.tool_motion / static_cast<float>(steps);
   StepReport report;
-  report.solve =
-      solver_.solve(contacts_, active, settings, world_, {forces_, held_, held_displacements_});
   report.active_nodes = active.size();
-  report.is_converged =
-      solver_kind_ == Solver::Live || (report.solve.residual_n <= settings.residual_tolerance_n &&
-                                       report.solve.nodes_rejected == 0);
-  if (has_limits_) active_set_.freeze_quiet(queue_, solver_.residuals_n(), world_);
+  std::uint32_t sweeps = 0;
+  for (std::uint32_t i = 1; i <= steps; ++i) {
+    apply_loads(seconds_of(world_.tick - 1) + run.dt_s() * i);
+    report.solve =
+        solver_.solve(contacts_, active, how, world_, {forces_, held_, held_displacements_});
+    sweeps += report.solve.sweeps;
+    report.is_converged &=
+        solver_kind_ == Solver::Live ||
+        (report.solve.residual_n <= how.residual_tolerance_n && report.solve.nodes_rejected == 0);
+  }
+  report.solve.sweeps = sweeps;
+  solved_dt_ = how.dt;
+  if (is_frozen_) active_set_.freeze_quiet(queue_, solver_.residuals_n(), world_);
   update_claims();
+  return report;
+}
+
+StepReport ScenarioRun::relax() {
+  auto how = settings();
+  const std::uint32_t most = scenario().run.max_sweeps;
+  how.residual_tolerance_n = static_cast<float>(scenario().run.tolerance_n);
+  how.dt = solved_dt_ = kStaticStep_s;
+  StepReport report;
+  report.active_nodes = free_nodes_.size();
+  std::uint32_t sweeps = 0;
+  do {
+    how.sweeps = std::min(kSweepsPerRelaxation, most - sweeps);
+    report.solve =
+        solver_.solve(contacts_, free_nodes_, how, world_, {forces_, held_, held_displacements_});
+    std::ranges::fill(world_.velocities, Vec3f{});
+    sweeps += report.solve.sweeps;
+    report.is_converged =
+        report.solve.residual_n <= how.residual_tolerance_n && report.solve.nodes_rejected == 0;
+  } while (!report.is_converged && sweeps < most);
+  report.solve.sweeps = sweeps;
+  return report;
+}
+
+StepReport ScenarioRun::step_static() {
+  const double now = scenario().run.seconds * static_cast<double>(steps_done_ + 1) /
+                     static_cast<double>(step_count_);
+  apply_loads(now);
+  StepReport report;
+  if (scenario().tools.empty()) return relax();
+  std::uint32_t sweeps = 0;
+  float change = INFINITY;
+  for (int round = 0;
+       round < kMaxContactRounds && (round < kMinContactRounds || change > kContactChange_m);
+       ++round) {
+    ++world_.tick;
+    move_tools(now, round == 0);
+    contact::find_contacts(world_, tools_, claims_, grasps_, world_.tick, contacts_);
+    before_.assign(world_.displacements.begin(), world_.displacements.end());
+    report = relax();
+    sweeps += report.solve.sweeps;
+    change = 0;
+    for (std::size_t i = 0; i < before_.size(); ++i)
+      change = std::max(change, length(world_.displacements[i] - before_[i]));
+    update_claims();
+  }
+  report.is_converged &= change <= kContactChange_m;
+  report.solve.sweeps = sweeps;
+  return report;
+}
+
+StepReport ScenarioRun::step() {
+  const StepReport report = is_static() ? step_static() : step_dynamic();
+  ++steps_done_;
   return report;
 }
 
@@ -147,12 +288,12 @@ Vec3d ScenarioRun::probe(std::size_t index) const {
       return sum / static_cast<double>(nodes.size());
     case scene::ProbeQuantity::Reaction:
       for (const auto node : nodes)
-        sum += to_double(solver_.holding_force(contacts_, node, kTickSeconds));
+        sum += to_double(solver_.holding_force(contacts_, node, solved_dt_));
       return sum;
     case scene::ProbeQuantity::ToolForce:
       for (const auto& contact : contacts_.tools)
         if (contact.tool.value == *rule.tool)
-          sum = to_double(solver_.reaction(contacts_, contact, world_, kTickSeconds));
+          sum = to_double(solver_.reaction(contacts_, contact, world_, solved_dt_));
       return sum;
   }
   return sum;

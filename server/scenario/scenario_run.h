@@ -1,13 +1,14 @@
 #pragma once
 
-// A scenario running: the engine of a session without people, network and frames. Each step of 1 ms
-// moves what the scenario moves, loads what it loads, lets its tools act by the rules of a session,
-// and solves. The state belongs to the run; nothing here reads a clock, so equal scenarios give
-// equal results.
+// A scenario running: the engine of a session without people, network and frames. Each step moves
+// what the scenario moves, loads what it loads, lets its tools act by the rules of a session, and
+// solves. The state belongs to the run; nothing here reads a clock, so equal scenarios give equal
+// results.
 //
-// Without limits in [run] every free node is active in every step; with depth or nodes only the
-// queue around tools and loads is, as in a session. Values after a step are those at its end: step
-// n ends at n ms. One thread.
+// A step of a dynamic run is a tick of 1 ms, solved in one or several equal steps of time; with
+// boundary "frozen" only the queue around tools and loads is active, as in a session. A step of a
+// static run is a load step: time stands still until everything is in equilibrium with the loads
+// and tools of that time. Values after a step are those at its end. One thread.
 
 #include <memory>
 #include <vector>
@@ -31,41 +32,61 @@ enum class Solver : std::uint8_t {
 };
 
 struct StepReport {
-  dynamics::SolveReport solve;
+  dynamics::SolveReport solve;  // the last one's, with the sweeps of all
   std::size_t active_nodes = 0;
-  bool is_converged = true;  // Solver::Full: the tolerance was reached
+  bool is_converged = true;  // Solver::Full and static runs: the tolerance was reached
 };
+
+// Error: something in the scenario that is right but that the solver cannot do.
+Status check_supported(const scene::ResolvedScenario& resolved);
 
 class ScenarioRun {
  public:
+  // A scenario that check_supported() accepts. Settles it if it starts in equilibrium.
   ScenarioRun(scene::ResolvedScenario resolved, Solver solver);
   ScenarioRun(const ScenarioRun&) = delete;
   ScenarioRun& operator=(const ScenarioRun&) = delete;
 
   StepReport step();
 
-  Tick tick() const { return world_.tick; }
-  Tick last_tick() const { return last_tick_; }
-  bool is_finished() const { return world_.tick >= last_tick_; }
+  std::uint64_t steps_done() const { return steps_done_; }
+  std::uint64_t step_count() const { return step_count_; }
+  bool is_finished() const { return steps_done_ >= step_count_; }
+  double time_s() const;  // at the end of the last step
+  // Whether the starting equilibrium was reached; true without one.
+  bool has_settled() const { return has_settled_; }
 
   const scene::Scenario& scenario() const { return resolved_.scenario; }
   const scene::Organ& organ() const { return resolved_.organ; }
   const world::World& world() const { return world_; }
 
+  // Whether the probe has a value for the last step.
+  bool is_due(std::size_t probe) const;
   // After at least one step: m, m/s or N.
   Vec3d probe(std::size_t index) const;
 
  private:
-  void apply_loads();
-  void move_tools();
+  bool is_static() const { return scenario().run.mode == scene::RunMode::Static; }
+  void apply_loads(double time_s);
+  void apply_gravity();
+  void move_tools(double time_s, bool takes_samples);
   void collect_active();
   void update_claims();
+  dynamics::SolveSettings settings() const;
+  StepReport step_dynamic();
+  StepReport step_static();
+  // Sweeps until nothing is out of balance by more than the tolerance; everything is at rest then.
+  StepReport relax();
 
   const scene::ResolvedScenario resolved_;
   const Solver solver_kind_;
-  const bool has_limits_;
-  const Tick last_tick_;
+  const bool is_frozen_;
+  const std::uint64_t step_count_;
   const dynamics::SpringNetwork springs_;
+
+  std::uint64_t steps_done_ = 0;
+  bool has_settled_ = true;
+  float solved_dt_ = kTickSeconds;  // of the last solve, s
 
   world::World world_;
   input::ToolTable tools_;
@@ -81,7 +102,8 @@ class ScenarioRun {
   std::vector<Vec3f> forces_;              // per node; empty without loads
   std::vector<NodeIndex> held_;            // fixed, then displaced nodes
   std::vector<Vec3f> held_displacements_;  // per entry of held_
-  std::vector<NodeIndex> free_nodes_;      // what is active without limits
+  std::vector<NodeIndex> free_nodes_;      // what is active unless frozen
+  std::vector<Vec3f> before_;              // displacements before a round of contacts
   std::vector<std::span<const NodeIndex>> seeds_;
   std::vector<locks::ClaimRequest> requests_;
   std::vector<locks::ClaimEvent> claim_events_;

@@ -1,6 +1,7 @@
 // The TOML form of scenarios: what is wrong is one line with file, line and key.
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -70,7 +71,8 @@ INSTANTIATE_TEST_SUITE_P(
         Bad{"unknown_table", "[materials]", "materials", "unknown"},
         Bad{"unknown_key", "[material]\ndensity = 1000", "material.density", "unknown"},
         Bad{"wrong_unit", "[material]\nyoung_modulus_kpa = 4", "material.young_modulus_kpa",
-            "young_modulus_pa"},
+            "write young_modulus_pa = 4000"},
+        Bad{"no_unit", "[material]\ndensity = 1000", "material.density", "write density_kg_m3"},
         Bad{"negative_density", "[material]\ndensity_kg_m3 = -1060", "material.density_kg_m3",
             "allowed are 1"},
         Bad{"text_for_number", "[material]\ndensity_kg_m3 = \"1060\"", "material.density_kg_m3",
@@ -115,7 +117,7 @@ INSTANTIATE_TEST_SUITE_P(
         Bad{"two_numbers", "[gravity]\nm_s2 = [0, -9.81]", "gravity.m_s2", "three numbers"},
         Bad{"metres_for_mm",
             "[[displace]]\nset = \"top\"\n[[displace.key]]\ntime_s = 0\ndisplacement_m = [0, 1, 0]",
-            "displace[0].key[0].displacement_mm", "is missing", 13},
+            "displace[0].key[0].displacement_m", "write displacement_mm"},
         Bad{"reaction_of_free", "[[probe]]\nquantity = \"reaction\"\nset = \"top\"", "probe[0].set",
             "a reaction needs a held set"},
         Bad{"no_such_tool", "[[probe]]\nquantity = \"force\"\ntool = 0", "probe[0].tool",
@@ -130,8 +132,103 @@ INSTANTIATE_TEST_SUITE_P(
         Bad{"far_tool",
             "[[tool]]\nanchor = [0, 1, 0]\n[[tool.key]]\ntime_s = 0\nposition_mm = [0, 1999, 0]",
             "tool[0].key[0].position_mm", "more than 2000 mm", -1},
+        Bad{"law_without_tets", "[material]\nelastic_law = \"neo-hookean\"", "material.elastic_law",
+            "has no tets"},
+        Bad{"unknown_law", "[material]\nelastic_law = \"jelly\"", "material.elastic_law",
+            "\"tensor-mass\""},
+        Bad{"poisson_of_springs", "[material]\npoisson_ratio = 0.3", "material.poisson_ratio",
+            "springs have 1/4"},
+        Bad{"incompressible", "[material]\npoisson_ratio = 0.5", "material.poisson_ratio",
+            "0.4999"},
+        Bad{"fibres_without_direction", "[material]\nfibre_tension = 0.1", "material.fibre_tension",
+            "needs a fibre_direction"},
+        Bad{"no_direction", "[material]\nfibre_direction = [0, 0, 0]", "material.fibre_direction",
+            "has no direction"},
+        Bad{"region_without_set", "[[region]]\ntension = 0.1\n[[region]]\nset = \"top\"",
+            "region[0].set", "is missing", 11},
+        Bad{"region_of_nothing",
+            "[[nodes]]\nids = [0]\nname = \"x\"\n[[region]]\ntension = 0.1\nset = \"x\"",
+            "region[0].set", "holds no whole spring"},
+        Bad{"region_that_changes_nothing", "[[region]]\nset = \"top\"", "region[0]",
+            "changes nothing", 11},
+        Bad{"region_nobody_knows", "[[region]]\nname = \"tumour\"\ntension = 0.1", "region[0]",
+            "no region \"tumour\"", 11},
+        Bad{"region_twice", "[[region]]\nset = \"top\"\ntension = 0.1\n[[region]]\nset = \"top\"",
+            "region[1].set", "line 11"},
+        Bad{"region_with_negative_density", "[[region]]\nset = \"top\"\ndensity_kg_m3 = -1",
+            "region[0].density_kg_m3", "allowed are 1"},
+        Bad{"axes", "[[displace]]\nset = \"top\"\naxes = \"up\"", "displace[0].axes",
+            "no list of axes"},
+        Bad{"moved_along_a_free_axis",
+            "[[displace]]\nset = \"top\"\n[[displace.key]]\ntime_s = 0\n"
+            "displacement_mm = [1, 1, 0]\n[[displace]]\nset = \"top\"\naxes = \"y\"\n"
+            "[[displace.key]]\ntime_s = 0\ndisplacement_mm = [1, 1, 0]",
+            "displace[1].axes", "leaves an axis free", 18},
+        Bad{"axis_held_twice",
+            "[[displace]]\nset = \"top\"\naxes = \"xy\"\n[[displace]]\naxes = \"yz\"\nset = "
+            "\"top\"",
+            "displace[1].set", "displaced by another set"},
+        Bad{"force_along_a_held_axis",
+            "[[displace]]\nset = \"top\"\naxes = \"xy\"\n[[force]]\nset = \"top\"\n"
+            "[[force.key]]\ntime_s = 0\nforce_n = [0, 1, 1]",
+            "force[0].set", "is displaced", 15},
+        Bad{"traction_without_a_triangle",
+            "[[traction]]\nset = \"x\"\n[[traction.key]]\ntime_s = 0\npressure_pa = 10\n"
+            "[[nodes]]\nname = \"x\"\nnearest_mm = [0, 10, 0]",
+            "traction[0].set", "no whole triangle", 12},
+        Bad{"traction_on_fixed",
+            "[[traction]]\nset = \"fixed\"\n[[traction.key]]\ntime_s = 0\npressure_pa = 10",
+            "traction[0].set", "would do nothing", 12},
+        Bad{"pressure_with_directions",
+            "[[traction]]\nset = \"top\"\n[[traction.key]]\ntime_s = 0\n"
+            "pressure_pa = [0, 1, 0]",
+            "traction[0].key[0].pressure_pa", "not a number"},
+        Bad{"pressure_in_kpa",
+            "[[traction]]\nset = \"top\"\n[[traction.key]]\ntime_s = 0\ntraction_kpa = [0, 1, 0]",
+            "traction[0].key[0].traction_kpa", "write traction_pa"},
+        Bad{"no_csv", "[[nodes]]\nname = \"x\"\ncsv = \"none.csv\"", "nodes[1].csv",
+            "none.csv: cannot be opened"},
+        Bad{"surface_of_nothing", "[[nodes]]\nids = [13]\nsurface = true\nname = \"middle\"",
+            "nodes[1].name", "has no nodes"},
         Bad{"tool_key", "[[tool]]\n[[tool.key]]\ntime_s = 0\nposition_mm = [0, 0, nan]",
             "tool[0].key[0].position_mm", "not finite"}),
+    [](const auto& test) { return std::string(test.param.name); });
+
+class BadRun : public ::testing::TestWithParam<Bad> {};
+
+TEST_P(BadRun, IsOneLineWithFileLineAndKey) {
+  const std::string text =
+      std::string("[organ]\nsource = \"lattice\"\n[run]\nseconds = 1\n") + GetParam().text;
+  const auto parsed = parse_scenario_text(text, "bad.toml");
+  ASSERT_FALSE(parsed.ok());
+  const std::string start =
+      "bad.toml:" + std::to_string(lines_of(text)) + ": key " + GetParam().key + ": ";
+  EXPECT_TRUE(parsed.error().message.starts_with(start)) << parsed.error().message;
+  EXPECT_NE(parsed.error().message.find(GetParam().says), std::string::npos)
+      << parsed.error().message;
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Table, BadRun,
+    ::testing::Values(
+        Bad{"mode", "mode = \"quick\"", "run.mode", "\"static\""},
+        Bad{"static_depth", "mode = \"static\"\nnodes = 100", "run.nodes", "mode = \"dynamic\""},
+        Bad{"static_step", "mode = \"static\"\ndt_s = 0.001", "run.dt_s", "mode = \"dynamic\""},
+        Bad{"load_steps", "load_steps = 3", "run.load_steps", "mode = \"static\""},
+        Bad{"graded_without_limit", "boundary = \"graded\"", "run.boundary", "depth or nodes"},
+        Bad{"whole_with_limit", "boundary = \"whole\"\ndepth = 3", "run.depth", "\"frozen\""},
+        Bad{"far_of_frozen", "depth = 3\nfar_sweeps = 2", "run.far_sweeps", "\"graded\""},
+        Bad{"explicit_sweeps", "integrator = \"explicit\"\nsweeps = 2", "run.sweeps", "implicit"},
+        Bad{"explicit_frozen", "depth = 3\nintegrator = \"explicit\"", "run.integrator",
+            "whole organ"},
+        Bad{"long_step", "dt_s = 0.002", "run.dt_s", "0.001"},
+        Bad{"odd_step", "dt_s = 0.0003", "run.dt_s", "write 0.00025"},
+        Bad{"step_in_ms", "dt_ms = 0.5", "run.dt_ms", "write dt_s = 0.0005"},
+        Bad{"start", "start = \"settled\"", "run.start", "\"equilibrium\""},
+        Bad{"static_rate",
+            "mode = \"static\"\n[[probe]]\nset = \"all\"\nquantity = \"displacement\"\n"
+            "rate_hz = 100",
+            "probe[0].rate_hz", "load step"}),
     [](const auto& test) { return std::string(test.param.name); });
 
 std::string message_of(const std::string& text) {
@@ -201,6 +298,107 @@ TEST(ScenarioParse, MaterialChangesMassAndSprings) {
   for (const double m : resolved->organ.node_masses_kg) mass += m;
   EXPECT_NEAR(mass, 2120 * 8e-6, 1e-9);
   for (const auto& s : springs_of(resolved->organ)) EXPECT_EQ(s.stiffness_n_m, 7);
+}
+
+Result<ResolvedScenario> resolved_text(const std::string& text, const std::string& source) {
+  auto parsed = parse_scenario_text(text, source);
+  if (!parsed) return parsed.error();
+  return resolve(std::move(*parsed));
+}
+
+TEST(ScenarioParse, RegionsHaveTheirMaterialAndTheirMass) {
+  const auto resolved = resolved_text(
+      R"([organ]
+source = "plate"
+[material]
+density_kg_m3 = 1000
+young_modulus_pa = 5000
+[[nodes]]
+name = "half"
+box_min_mm = [-100, -100, -100]
+box_max_mm = [0, 100, 100]
+[[region]]
+set = "half"
+density_kg_m3 = 2000
+elastic_law = "neo-hookean"
+poisson_ratio = 0.4
+averaged_volume = true
+[run]
+seconds = 1
+)",
+      "a.toml");
+  ASSERT_TRUE(resolved.ok()) << resolved.error().message;
+  const Organ& organ = resolved->organ;
+  ASSERT_EQ(organ.regions.size(), 1u);
+  EXPECT_EQ(organ.regions[0].name, "half");
+  EXPECT_EQ(organ.regions[0].material.elastic_law, ElasticLaw::NeoHookean);
+  EXPECT_TRUE(organ.regions[0].material.has_averaged_volume);
+  EXPECT_EQ(organ.regions[0].material.young_modulus_pa, 5000) << "what is left out is the organ's";
+  EXPECT_EQ(organ.material.elastic_law, ElasticLaw::Springs);
+  double mass = 0, volume_inside = 0, volume = 0;
+  for (const double m : organ.node_masses_kg) mass += m;
+  const auto map = material_map(organ);
+  for (std::size_t t = 0; t < organ.mesh.tets.size(); ++t) {
+    const double v = mesh::tet_volume(organ.mesh, TetIndex(t));
+    volume += v;
+    if (map.tets[t] == 1) volume_inside += v;
+  }
+  EXPECT_GT(volume_inside, 0.4 * volume);
+  EXPECT_NEAR(mass, 1000 * (volume + volume_inside), 1e-9);
+}
+
+TEST(ScenarioParse, TractionsAreTheSurfaceIntegral) {
+  const auto resolved = resolved_text(
+      std::string(kGood) +
+          "[[traction]]\nset = \"top\"\n[[traction.key]]\ntime_s = 0\ntraction_pa = [50, 0, 100]\n"
+          "[[traction]]\nset = \"top\"\n[[traction.key]]\ntime_s = 0\npressure_pa = 100\n"
+          "[[nodes]]\nname = \"skin\"\nsurface = true\n"
+          "[[traction]]\nset = \"skin\"\n[[traction.key]]\ntime_s = 0\npressure_pa = 100\n",
+      "a.toml");
+  ASSERT_TRUE(resolved.ok()) << resolved.error().message;
+  const auto total = [&](std::size_t load) {
+    const auto& force = resolved->forces.at(load);
+    Vec3d sum;
+    for (std::size_t i = 0; i < force.nodes.size(); ++i)
+      sum += force.on_node(i, force.over_time.at(0));
+    return sum;
+  };
+  constexpr double kArea = 4e-4;  // 20 mm x 20 mm
+  EXPECT_LT(length(total(0) - Vec3d{50, 0, 100} * kArea), 1e-12);
+  EXPECT_LT(length(total(1) - Vec3d{0, -100, 0} * kArea), 1e-12) << "a pressure pushes inwards";
+  EXPECT_LT(length(total(2)), 1e-12) << "all around it cancels";
+  EXPECT_EQ(resolved->forces[2].nodes.size(), 26u);
+}
+
+TEST(ScenarioParse, SetsComeFromCsvFilesBesideTheScenario) {
+  const auto folder =
+      std::filesystem::temp_directory_path() / ("trocar-sets-" + std::to_string(::getpid()));
+  std::filesystem::create_directories(folder);
+  const auto resolve_with = [&](const std::string& csv) {
+    std::ofstream(folder / "ids.csv") << csv;
+    return resolved_text(std::string(kGood) + "[[nodes]]\nname = \"x\"\ncsv = \"ids.csv\"\n" +
+                             "[[probe]]\nset = \"x\"\nquantity = \"displacement\"\n",
+                         (folder / "a.toml").string());
+  };
+  const auto good = resolve_with("node,rest_x_mm\r\n26,1\n# a comment\n\n3, 2\n3\n");
+  ASSERT_TRUE(good.ok()) << good.error().message;
+  EXPECT_EQ(good->probe_nodes[0], (NodeList{NodeIndex(3), NodeIndex(26)}));
+  const auto word = resolve_with("node\n1\nmiddle\n");
+  ASSERT_FALSE(word.ok());
+  EXPECT_NE(word.error().message.find("a.toml:13: key nodes[1].csv: "), std::string::npos)
+      << word.error().message;
+  EXPECT_NE(word.error().message.find("ids.csv:3: "), std::string::npos) << word.error().message;
+  const auto far = resolve_with("27\n");
+  ASSERT_FALSE(far.ok());
+  EXPECT_NE(far.error().message.find("node 27 does not exist"), std::string::npos);
+  std::filesystem::remove_all(folder);
+}
+
+TEST(ScenarioParse, GravityReplacesTheOrgansOwn) {
+  const auto resolved =
+      resolved_text(std::string(kGood) + "[gravity]\nm_s2 = [0, -9.81, 0]\n", "a.toml");
+  ASSERT_TRUE(resolved.ok()) << resolved.error().message;
+  EXPECT_EQ(resolved->organ.gravity_m_s2, (Vec3d{0, -9.81, 0}));
 }
 
 TEST(ScenarioParse, TimedVectorsAreLinearBetweenKeysAndConstantOutside) {
