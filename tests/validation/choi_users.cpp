@@ -66,10 +66,10 @@ void run_fig2_users(const Lab& lab, Section& section) {
       three_tools() + run_text + fmt::format("depth = {}\n\n", kDepth) + probes, Solver::Full);
   std::vector<plot::Series> forces(3);
   for (int i = 0; i < 3; ++i) forces[static_cast<std::size_t>(i)].name = kNames[i];
-  lab.finish(*joint, [&](const scenario::StepReport&) {
-    if (joint->tick() % 5 != 0) return;
+  lab.finish(section, *joint, [&](const scenario::StepReport&) {
+    if (joint->steps_done() % 5 != 0) return;
     for (std::size_t i = 0; i < 3; ++i) {
-      forces[i].x.push_back(static_cast<double>(joint->tick()) * 1e-3);
+      forces[i].x.push_back(joint->time_s());
       forces[i].y.push_back(length(joint->probe(i)));
     }
   });
@@ -86,7 +86,7 @@ void run_fig2_users(const Lab& lab, Section& section) {
   auto& shown_text = section.scenes.back().text;
   if (const auto begin = shown_text.find("ids = ["); begin != std::string::npos)
     shown_text.replace(begin, shown_text.find(']', begin) - begin, "ids = [...");
-  lab.finish(*one);
+  lab.finish(section, *one);
 
   const Field ours = field_of(*joint), reference = field_of(*one);
   section.at_most("displacement", "one region that covers all",

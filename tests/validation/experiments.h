@@ -25,6 +25,7 @@ void run_fig5_profiles(const Lab& lab, Section& section);
 void run_fig6_times(const Lab& lab, Section& section);
 void run_fig7_fig8_organs(const Lab& lab, Section& section);
 void run_creep(const Lab& lab, Section& section);
+void run_palpation(const Lab& lab, Section& section);
 void run_relaxation(const Lab& lab, Section& section);
 
 }  // namespace trocar::validation

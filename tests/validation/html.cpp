@@ -34,6 +34,8 @@ th, td { text-align: left; padding: .38rem .7rem .38rem 0; border-bottom: 1px so
 th { color: var(--dim); font-weight: 600; white-space: nowrap; }
 td.number, th.number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
 tr:last-child td { border-bottom: 0; }
+table.data { width: auto; min-width: 40%; }
+table.data th, table.data td { padding-right: 1.6rem; }
 .pill { display: inline-block; border-radius: 99px; padding: 0 .65rem; font-size: .8rem;
   font-weight: 600; color: #fff; background: var(--kept); white-space: nowrap; }
 .pill.broken { background: var(--broken); }
@@ -112,7 +114,8 @@ std::string checks_table(const Section& section) {
 }
 
 std::string table(const Table& table) {
-  std::string out = "<h3>" + escaped(table.title) + "</h3><div class=\"table\"><table><tr>";
+  std::string out =
+      "<h3>" + escaped(table.title) + "</h3><div class=\"table\"><table class=\"data\"><tr>";
   for (std::size_t i = 0; i < table.head.size(); ++i) {
     const bool is_numeric = !table.rows.empty() && is_number(table.rows.front()[i]);
     out += is_numeric ? "<th class=\"number\">" : "<th>";
@@ -223,6 +226,9 @@ Result<std::string> to_html(const Report& report) {
         out += *svg;
       }
     }
+    if (section.unconverged_steps > 0)
+      out += fmt::format("<p>{} of {} steps did not reach their tolerance.</p>",
+                         section.unconverged_steps, section.steps);
     out += scenes(section) + "</section>";
   }
   return out + "</main></body></html>\n";

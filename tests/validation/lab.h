@@ -28,12 +28,18 @@ class Lab {
   // Makes scenarios/<name>.organ, to which scenarios refer as "<name>.organ".
   void keep_organ(const std::string& name, const scene::Organ& organ) const;
 
+  // Makes scenarios/<name>, a file to which scenarios refer.
+  void keep_file(const std::string& name, const std::string& text) const;
+
   // Keeps the text as scenarios/<name>.toml and in the section, and gets it ready to run.
   RunPtr start(Section& section, const std::string& family, const std::string& name,
                const std::string& text, Solver solver = Solver::Live) const;
-  // To the end, `each` after every step.
-  void finish(ScenarioRun& run, const std::function<void(const scenario::StepReport&)>& each) const;
-  void finish(ScenarioRun& run) const;
+  // As start(); null if the solver cannot do it yet, and then the section says so.
+  RunPtr try_start(Section& section, const std::string& family, const std::string& name,
+                   const std::string& text, Solver solver = Solver::Live) const;
+  // To the end, `each` after every step. The section counts steps that missed their tolerance.
+  void finish(Section& section, ScenarioRun& run,
+              const std::function<void(const scenario::StepReport&)>& each = {}) const;
 
  private:
   std::filesystem::path scenarios_;

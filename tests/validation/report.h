@@ -41,10 +41,11 @@ struct Scene {
 };
 
 struct Section {
-  std::string name;    // "choi2002/fig5-profiles"
-  std::string title;   // for people
-  std::string source;  // "Choi 2002, figure 5"
-  double seconds = 0;  // CPU time that it took
+  std::string name;                                // "choi2002/fig5-profiles"
+  std::string title;                               // for people
+  std::string source;                              // "Choi 2002, figure 5"
+  double seconds = 0;                              // CPU time that it took
+  std::uint64_t steps = 0, unconverged_steps = 0;  // of scenarios that are solved to a tolerance
   std::vector<Check> checks;
   using Part = std::variant<std::string, Table, plot::Plot>;  // a string is a paragraph
   std::vector<Part> parts;
