@@ -6,6 +6,7 @@
 #include <csignal>
 #include <cstdio>
 #include <filesystem>
+#include <optional>
 #include <string>
 
 #include "common/base/cpu.h"
@@ -14,6 +15,7 @@
 #include "common/base/version.h"
 #include "server/scenario/field_files.h"
 #include "server/scenario/probe_file.h"
+#include "server/scenario/probe_plots.h"
 #include "server/scenario/scenario_run.h"
 
 namespace trocar::app {
@@ -26,6 +28,8 @@ constexpr const char* kExamples = R"(
 Examples:
   trocar-sim deploy/scenes/pull.toml
       pulls at a block of tissue; results in out/pull
+  trocar-sim deploy/scenes/pull.toml --plot
+      the same, and draws what the probes saw (SVG)
   trocar-sim deploy/scenes/pull.toml --solver full --out /tmp/reference
       the same with every step solved to the tolerance in [run]
 
@@ -40,6 +44,7 @@ struct Options {
   std::string scenario;
   std::string out;
   std::string solver = "live";
+  bool is_plotted = false;
   std::string log_level = "info";
 };
 
@@ -85,7 +90,8 @@ struct Totals {
   }
 };
 
-Status simulate(scenario::ScenarioRun& run, const std::filesystem::path& folder, Totals& totals) {
+Status simulate(scenario::ScenarioRun& run, const std::filesystem::path& folder, bool is_plotted,
+                Totals& totals) {
   auto probes = scenario::ProbeFile::create(folder / "probes.csv", run.scenario());
   if (!probes) return probes.error();
   const auto& times = run.scenario().field_times_s;
@@ -97,18 +103,22 @@ Status simulate(scenario::ScenarioRun& run, const std::filesystem::path& folder,
       is_due = true;
     return is_due ? scenario::write_field(folder, run) : Status{};
   };
+  std::optional<scenario::ProbePlots> plots;
+  if (is_plotted) plots.emplace(run);
   Progress progress;
   if (auto s = write_due_field(); !s) return s;
   while (!run.is_finished() && stop_requested == 0) {
     const auto report = run.step();
     totals.add(run.time_s(), report);
     probes->add(run);
+    if (plots) plots->add(run);
     if (auto s = write_due_field(); !s) return s;
     progress.show(run);
     if (progress.is_shown()) probes->flush();
   }
   progress.end();
-  return probes->close();
+  if (auto s = probes->close(); !s) return s;
+  return plots ? plots->write(folder, run) : Status{};
 }
 
 void print_summary(const scenario::ScenarioRun& run, const Totals& totals,
@@ -165,7 +175,7 @@ Status run_scenario(const Options& options) {
                                                       ? scenario::Solver::Full
                                                       : scenario::Solver::Live);
   Totals totals;
-  if (auto s = simulate(run, folder, totals); !s) return s;
+  if (auto s = simulate(run, folder, options.is_plotted, totals); !s) return s;
   print_summary(run, totals, folder);
   return {};
 }
@@ -187,6 +197,9 @@ int run(int argc, char** argv) {
       ->type_name("SOLVER")
       ->check(CLI::IsMember({"live", "full"}))
       ->capture_default_str();
+  app.add_flag("--plot", options.is_plotted,
+               "also draw what each probe saw: probe_<name>.svg over time, and force_<name>.svg, "
+               "force against displacement, of what loads the tissue and is probed");
   app.add_option("--log-level", options.log_level, "error, warn, info, debug or off")
       ->capture_default_str();
   try {

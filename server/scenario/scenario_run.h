@@ -56,10 +56,15 @@ class ScenarioRun {
   // Whether the starting equilibrium was reached; true without one.
   bool has_settled() const { return has_settled_; }
 
+  const scene::ResolvedScenario& resolved() const { return resolved_; }
   const scene::Scenario& scenario() const { return resolved_.scenario; }
   const scene::Organ& organ() const { return resolved_.organ; }
   const world::World& world() const { return world_; }
 
+  // Where a tool's tip is after a step; at the origin before it has appeared.
+  Vec3d tool_tip(std::size_t tool) const {
+    return to_double(tools_[ToolSlot{static_cast<std::uint8_t>(tool)}].pose.position);
+  }
   // Whether the probe has a value for the last step.
   bool is_due(std::size_t probe) const;
   // After at least one step: m, m/s or N.

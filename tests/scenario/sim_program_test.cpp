@@ -84,6 +84,17 @@ TEST_F(SimProgram, TheExampleRunsAndWritesTheSameBytesTwice) {
   }
 }
 
+TEST_F(SimProgram, PlotsShowEachProbeAndForceAgainstDisplacement) {
+  const std::string example = std::string(TROCAR_SOURCE_DIR) + "/deploy/scenes/pull.toml";
+  const auto out = folder_ / "out";
+  ASSERT_EQ(run({example, "--out", out.string(), "--plot"}), 0) << log();
+  for (const char* file : {"probe_top_reaction.svg", "probe_fixed_reaction.svg",
+                           "probe_middle_displacement.svg", "force_top.svg"})
+    EXPECT_NE(read(out / file).find("</svg>"), std::string::npos) << file;
+  EXPECT_NE(read(out / "force_top.svg").find("displacement (mm)"), std::string::npos);
+  EXPECT_NE(read(out / "probe_top_reaction.svg").find("reaction (N)"), std::string::npos);
+}
+
 TEST_F(SimProgram, AnInterruptLeavesReadableFiles) {
   const auto scenario = write("long.toml", R"([organ]
 source = "lattice"
@@ -137,6 +148,11 @@ TEST_F(SimProgram, ExitCodesSayWhatWasWrong) {
   const auto bad = write("bad.toml", "[organ]\nsource = \"lattice\"\n[run]\nsecond = 1\n");
   EXPECT_EQ(run({bad}), 3);
   EXPECT_NE(log().find("bad.toml:"), std::string::npos) << log();
+  const auto early = write(
+      "early.toml",
+      "[organ]\nsource = \"lattice\"\n[run]\nseconds = 1\nnodes = 10\nboundary = \"magic\"\n");
+  EXPECT_EQ(run({early}), 3);
+  EXPECT_NE(log().find("early.toml:6: key run.boundary: "), std::string::npos) << log();
   const auto good = write("good.toml", "[organ]\nsource = \"lattice\"\n[run]\nseconds = 0.001\n");
   write("file", "");
   EXPECT_EQ(run({good, "--out", (folder_ / "file" / "x").string()}), 5) << log();
