@@ -21,6 +21,18 @@ const std::vector<Experiment>& experiments() {
        run_fig7_fig8_organs},
       {"choi2002/palpation-inclusion", "A stiff inclusion is felt",
        "Choi 2002, section 3, discussion", run_palpation},
+      {"ours/propagation-lattice", "What a limit of nodes costs: lattice", "full solve, our own",
+       run_propagation_lattice},
+      {"ours/propagation-liver-4k", "What a limit of nodes costs: liver of 4,000 nodes",
+       "full solve, our own", run_propagation_liver},
+      {"ours/propagation-liver-17k", "What a limit of nodes costs: liver of 17,000 nodes",
+       "full solve, our own", run_propagation_large_liver},
+      {"ours/propagation-stomach", "What a limit of nodes costs: stomach", "full solve, our own",
+       run_propagation_stomach},
+      {"ours/bar", "Bar in tension", "closed form: F L / (E A)", run_bar},
+      {"ours/cantilever", "Thick cantilever", "closed form: Timoshenko", run_cantilever},
+      {"ours/indentation", "Indentation of a half-space", "closed forms: Hertz; bonded flat punch",
+       run_indentation},
   };
   return all;
 }

@@ -28,4 +28,12 @@ void run_creep(const Lab& lab, Section& section);
 void run_palpation(const Lab& lab, Section& section);
 void run_relaxation(const Lab& lab, Section& section);
 
+void run_propagation_lattice(const Lab& lab, Section& section);
+void run_propagation_liver(const Lab& lab, Section& section);
+void run_propagation_large_liver(const Lab& lab, Section& section);
+void run_propagation_stomach(const Lab& lab, Section& section);
+void run_bar(const Lab& lab, Section& section);
+void run_cantilever(const Lab& lab, Section& section);
+void run_indentation(const Lab& lab, Section& section);
+
 }  // namespace trocar::validation
