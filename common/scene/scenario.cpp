@@ -185,7 +185,8 @@ const Place& MaterialChange::place_of(std::string_view key) const {
 
 Error scenario_error(const Scenario& scenario, const Place& place, const std::string& what) {
   const std::string line = place.line > 0 ? ":" + std::to_string(place.line) : "";
-  return {ErrorCode::BadFile, scenario.source.string() + line + ": key " + place.key + ": " + what};
+  const std::string key = place.key.empty() ? "" : "key " + place.key + ": ";
+  return {ErrorCode::BadFile, scenario.source.string() + line + ": " + key + what};
 }
 
 Vec3d TimedVector::at(double time_s) const {

@@ -34,8 +34,9 @@ struct Place {
 
 struct ScenarioOrgan {
   Place place;
-  std::string source;  // as load_organ() takes it; files are relative to the scenario
-  std::optional<std::array<int, 3>> lattice_nodes;
+  // As load_organ() takes it, or "block"; files are relative to the scenario.
+  std::string source;
+  std::optional<std::array<int, 3>> lattice_nodes;  // of a lattice or block
   std::optional<double> lattice_spacing_m;
 };
 
@@ -153,7 +154,7 @@ enum class Integrator : std::uint8_t { Implicit, Explicit };
 struct RunRule {
   RunMode mode = RunMode::Dynamic;
   double seconds = 0;
-  std::uint32_t load_steps = 1;  // of a static run
+  std::vector<double> load_times_s;  // of the steps of a static run, increasing
   bool starts_in_equilibrium = false;
   Integrator integrator = Integrator::Implicit;
   std::uint32_t steps_per_tick = 1;  // 1 ms / dt

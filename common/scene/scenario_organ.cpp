@@ -4,6 +4,7 @@
 
 #include "common/scene/builtin_organs.h"
 #include "common/scene/load_organ.h"
+#include "common/scene/scenario_block.h"
 #include "common/scene/scenario_resolver.h"
 
 namespace trocar::scene {
@@ -54,13 +55,13 @@ bool applies(const LawKey& key, ElasticLaw law) {
 
 Result<Organ> Resolver::source_organ() const {
   const auto& rule = scenario_.organ;
-  if (rule.source == "lattice") {
+  if (rule.source == "lattice" || rule.source == "block") {
     LatticeSize size;
     if (rule.lattice_nodes)
       size = {(*rule.lattice_nodes)[0], (*rule.lattice_nodes)[1], (*rule.lattice_nodes)[2],
               size.spacing_m};
     size.spacing_m = rule.lattice_spacing_m.value_or(size.spacing_m);
-    return make_lattice(size);
+    return rule.source == "block" ? make_block(size) : make_lattice(size);
   }
   const std::filesystem::path path(rule.source);
   if (!path.has_extension() || path.is_absolute()) return load_organ(rule.source);

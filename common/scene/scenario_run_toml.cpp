@@ -73,13 +73,21 @@ RunRule read_run(TableReader& reader) {
   const auto seconds = reader.number("seconds", 0.001, kScenarioTimeLimit);
   if (!seconds) reader.fail_missing("seconds", "write how long to simulate");
   run.seconds = seconds.value_or(1);
-  read_count(reader, "load_steps", 1, 100'000, run.load_steps);
+  std::uint32_t load_steps = 1;
+  read_count(reader, "load_steps", 1, 100'000, load_steps);
+  for (std::uint32_t i = 1; run.mode == RunMode::Static && i <= load_steps; ++i)
+    run.load_times_s.push_back(run.seconds * i / load_steps);
   const auto start = reader.choice<bool, 2>("start", {{{"rest", false}, {"equilibrium", true}}});
   run.starts_in_equilibrium = start.value_or(false);
   read_boundary(reader, run);
   read_step(reader, run);
   read_count(reader, "sweeps", 1, 64, run.sweeps);
   run.over_relaxation = reader.number("over_relaxation", 1, 1.9).value_or(run.over_relaxation);
+  if (run.mode == RunMode::Static) {
+    // What is left out of balance adds up over all nodes, and nothing corrects it later.
+    run.tolerance_n = 1e-7;
+    run.max_sweeps = 50'000;
+  }
   run.tolerance_n = reader.number("tolerance_n", 1e-9, 1).value_or(run.tolerance_n);
   read_count(reader, "max_sweeps", 1, 1'000'000, run.max_sweeps);
   if (run.mode == RunMode::Static)

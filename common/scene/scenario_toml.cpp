@@ -14,10 +14,11 @@ ScenarioOrgan read_organ(TableReader& reader) {
   if (const auto source = reader.string("source"))
     organ.source = *source;
   else
-    reader.fail("source", "is missing, write \"lattice\", \"liver\" or a file");
+    reader.fail("source", "is missing, write \"liver\", \"block\" or a file");
+  const bool is_grid = organ.source == "lattice" || organ.source == "block";
   if (const auto nodes = reader.integers("nodes")) {
-    if (organ.source != "lattice")
-      reader.fail("nodes", "is for source = \"lattice\" only, remove it");
+    if (!is_grid)
+      reader.fail("nodes", "is for source = \"lattice\" or \"block\" only, remove it");
     else if (nodes->size() != 3 ||
              !std::all_of(nodes->begin(), nodes->end(), [](auto n) { return n >= 2 && n <= 400; }))
       reader.fail("nodes", "is not three numbers from 2 to 400, write [nx, ny, nz]");
@@ -29,8 +30,8 @@ ScenarioOrgan read_organ(TableReader& reader) {
                              static_cast<int>((*nodes)[2])};
   }
   if (const auto spacing_mm = reader.number("spacing_mm", 0.5, 1000)) {
-    if (organ.source != "lattice")
-      reader.fail("spacing_mm", "is for source = \"lattice\" only, remove it");
+    if (!is_grid)
+      reader.fail("spacing_mm", "is for source = \"lattice\" or \"block\" only, remove it");
     organ.lattice_spacing_m = *spacing_mm * 1e-3;
   }
   reader.finish();

@@ -1,4 +1,4 @@
-// trocar-organ: makes, imports and inspects organs.
+// trocar-organ: makes, imports, inspects and settles organs, and fits their material.
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -15,6 +15,7 @@
 #include "common/scene/builtin_organs.h"
 #include "common/scene/load_organ.h"
 #include "common/scene/organ_file.h"
+#include "server/app/organ_experiments.h"
 
 namespace trocar::app {
 namespace {
@@ -36,6 +37,10 @@ Examples:
       a mesh in millimetres, held at the hindmost tenth, into spleen.organ
   trocar-organ inspect spleen.organ --json
       its figures, for other programs
+  trocar-organ settle spleen.organ --gravity 0,-9.81,0
+      its rest pose under gravity, in which it starts without sagging, into spleen-settled.organ
+  trocar-organ fit deploy/scenes/stretch.toml deploy/scenes/stretch.csv
+      Young's modulus from a measured force-displacement curve; results in out/fit-stretch
 
 Exit codes: 0 ok, 2 command line, 3 bad file, 5 cannot write or processor too old.
 )";
@@ -51,6 +56,8 @@ struct Options {
   std::string import_name;
   std::string inspected;
   bool json = false;
+  FitCommand fit;
+  SettleCommand settle;
 };
 
 struct EdgeLengths {
@@ -100,15 +107,48 @@ std::string grouped(std::size_t number) {
   return digits;
 }
 
-void print_material(const scene::Organ& organ) {
-  const scene::Material& m = organ.material;
-  if (m.spring_law == scene::SpringLaw::Constant)
+const char* name_of(scene::ElasticLaw law) {
+  switch (law) {
+    case scene::ElasticLaw::Springs:
+      return "springs";
+    case scene::ElasticLaw::TensorMass:
+      return "tensor-mass";
+    case scene::ElasticLaw::NeoHookean:
+      return "neo-hookean";
+  }
+  return "";
+}
+
+void print_material(const scene::Material& m) {
+  if (m.elastic_law != scene::ElasticLaw::Springs)
+    std::printf("  elasticity          %s, Young's modulus %.4g kPa, Poisson's ratio %.4g%s\n",
+                name_of(m.elastic_law), m.young_modulus_pa / 1e3, m.poisson_ratio,
+                m.has_averaged_volume ? ", averaged volume" : "");
+  else if (m.spring_law == scene::SpringLaw::Constant)
     std::printf("  springs             constant, %.4g N/m\n", m.spring_stiffness_n_m);
   else
     std::printf("  springs             from Young's modulus %.4g kPa\n", m.young_modulus_pa / 1e3);
+  if (length(m.fibre_direction) > 0)
+    std::printf("  fibres              along %.3g %.3g %.3g, %.4g times as stiff, tension %.4g\n",
+                m.fibre_direction.x, m.fibre_direction.y, m.fibre_direction.z,
+                m.fibre_stiffness_ratio, m.fibre_tension);
+  if (m.tension > 0) std::printf("  tension             %.4g\n", m.tension);
   std::printf("  density             %.4g kg/m^3\n", m.density_kg_m3);
   std::printf("  damping             %.4g 1/s per node, %.4g ms along springs\n",
               m.node_damping_per_s, m.spring_damping_time_s * 1e3);
+}
+
+void print_materials(const scene::Organ& organ) {
+  print_material(organ.material);
+  for (const auto& region : organ.regions) {
+    std::printf("  region              %s, %s nodes:\n", region.name.c_str(),
+                grouped(region.nodes.size()).c_str());
+    print_material(region.material);
+  }
+  const Vec3d& g = organ.gravity_m_s2;
+  if (length(g) > 0) std::printf("  gravity             %.4g %.4g %.4g m/s^2\n", g.x, g.y, g.z);
+  if (!organ.stress_free_positions_m.empty())
+    std::printf("  rest pose           settled, in equilibrium\n");
 }
 
 void print_text(const scene::Organ& organ) {
@@ -133,7 +173,7 @@ void print_text(const scene::Organ& organ) {
     const auto angles = mesh::dihedral_range(mesh);
     std::printf("  dihedral angles     %.1f to %.1f degrees\n", angles.min_deg, angles.max_deg);
   }
-  print_material(organ);
+  print_materials(organ);
   std::printf("  fixed nodes         %s (%.1f %%)\n", grouped(organ.fixed_nodes.size()).c_str(),
               100.0 * static_cast<double>(organ.fixed_nodes.size()) /
                   static_cast<double>(mesh.node_count()));
@@ -180,6 +220,11 @@ void print_json(const scene::Organ& organ) {
     std::printf("  \"dihedral_deg\": {\"min\": %.6g, \"max\": %.6g},\n", angles.min_deg,
                 angles.max_deg);
   }
+  std::printf("  \"elastic_law\": \"%s\",\n  \"poisson_ratio\": %.9g,\n", name_of(m.elastic_law),
+              m.poisson_ratio);
+  std::printf("  \"regions\": %zu,\n  \"gravity_m_s2\": [%.9g, %.9g, %.9g],\n  \"settled\": %s,\n",
+              organ.regions.size(), organ.gravity_m_s2.x, organ.gravity_m_s2.y,
+              organ.gravity_m_s2.z, organ.stress_free_positions_m.empty() ? "false" : "true");
   std::printf("  \"spring_law\": \"%s\",\n  \"spring_stiffness_n_m\": %.9g,\n",
               m.spring_law == scene::SpringLaw::Constant ? "constant" : "volume_consistent",
               m.spring_stiffness_n_m);
@@ -301,13 +346,15 @@ void add_commands(CLI::App& app, Options& options) {
   inspect->add_option("FILE", options.inspected, ".organ or .msh file, or a built-in organ's name")
       ->required();
   inspect->add_flag("--json", options.json, "print JSON");
+  add_fit_command(app, options.fit);
+  add_settle_command(app, options.settle);
 }
 
 int run(int argc, char** argv) {
   Options options;
   CLI::App app(
-      "Makes, imports and inspects organs: the meshes, materials and held nodes that a "
-      "session is about.",
+      "Makes, imports, inspects and settles organs, the meshes, materials and held nodes that a "
+      "session is about, and fits their material to a measurement.",
       kProgram);
   app.footer(kExamples);
   app.set_version_flag("--version", version_text());
@@ -329,6 +376,10 @@ int run(int argc, char** argv) {
     status = run_make(options);
   else if (app.got_subcommand("import"))
     status = run_import(options);
+  else if (app.got_subcommand("fit"))
+    status = run_fit(options.fit);
+  else if (app.got_subcommand("settle"))
+    status = run_settle(options.settle);
   else
     status = run_inspect(options);
   return status ? static_cast<int>(ExitCode::Ok) : report(kProgram, status.error());

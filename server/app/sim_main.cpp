@@ -127,7 +127,7 @@ void print_summary(const scenario::ScenarioRun& run, const Totals& totals,
   if (!run.is_finished())
     std::fprintf(stderr, "%s: stopped at %.3f of %.3f s\n", kProgram, run.time_s(),
                  run.scenario().run.seconds);
-  if (!run.has_settled())
+  if (!run.settling().is_converged)
     std::fprintf(stderr,
                  "%s: warning: the equilibrium at the start was not reached to %g N in %u sweeps: "
                  "raise max_sweeps or tolerance_n in [run]\n",

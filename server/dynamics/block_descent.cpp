@@ -10,6 +10,13 @@ namespace {
 
 constexpr std::uint32_t kNone = 0xffffffffu;
 constexpr float kMaxOverRelaxationFewSweeps = 1.3f;
+// One far sweep is stable up to omega = 4/3 (stiff limit), two up to 1.58: 1 + 3^(-1/k).
+constexpr float kMaxFarOverRelaxationOneSweep = 1.33f;
+constexpr float kMaxFarOverRelaxationTwoSweeps = 1.5f;
+// A step of one node beyond this, m, is as broken as one that is not finite.
+constexpr float kMaxNodeStep = 1.0f;
+// What goes back with a node whose step was not finite: the nodes within so many layers.
+constexpr int kRestoredLayers = 3;
 
 using contact::NodeConstraint;
 
@@ -40,129 +47,367 @@ void add_constraint(const NodeConstraint& c, const Vec3f& x, const Vec3f& start,
   }
 }
 
-}  // namespace
-
-BlockDescent::BlockDescent(const world::World& world, const SpringNetwork& springs)
-    : springs_(springs),
-      inertia_(world.node_count()),
-      terms_(springs.batch_count()),
-      first_constraint_(world.node_count()),
-      constraint_stamp_(world.node_count()) {
-  residuals_.reserve(world.node_count());
-  next_constraint_.reserve(8 * contact::kMaxNodesPerTool);
-  reset(world);
+float sum(const Lanes& a) {
+  return ((a.v[0] + a.v[4]) + (a.v[2] + a.v[6])) + ((a.v[1] + a.v[5]) + (a.v[3] + a.v[7]));
 }
 
-void BlockDescent::reset(const world::World& world) {
-  x_.assign(world.displacements.begin(), world.displacements.end());
-  start_.assign(world.displacements.begin(), world.displacements.end());
+}  // namespace
+
+BlockDescent::BlockDescent(const scene::Organ& organ, const world::World& world, unsigned workers)
+    : organ_(organ),
+      tissue_(organ),
+      workers_(workers),
+      scratches_(workers_.count()),
+      gravity_(to_float(organ.gravity_m_s2)) {
+  const auto& groups = tissue_.groups();
+  const auto group_count = groups.group_count(), slot_count = groups.slot_count();
+  constants_.resize(group_count);
+  free_.resize(group_count);
+  x_.resize(slot_count);
+  start_.resize(slot_count);
+  inertia_.resize(group_count);
+  squares_.resize(group_count);
+  group_squares_.resize(group_count);
+  rejected_.resize(group_count);
+  begun_stamp_.resize(group_count);
+  group_stamp_.resize(group_count);
+  slot_stamp_.resize(slot_count);
+  first_constraint_.resize(slot_count);
+  next_constraint_.reserve(8 * contact::kMaxNodesPerTool);
+  residuals_.reserve(world.node_count());
+  for (auto* plan : {&near_, &far_, &begun_}) {
+    plan->lanes.resize(group_count);
+    plan->groups.reserve(group_count);
+    plan->colour_begins.resize(groups.colour_count() + 1);
+  }
+  const auto map = scene::material_map(organ);
+  for (Group g = 0; g < group_count; ++g) {
+    all_groups_.push_back(g);
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      const auto node = groups.nodes_of(g)[lane];
+      if (!node.is_valid()) continue;
+      const float mass = world.masses[node.value];
+      const auto rate =
+          static_cast<float>(scene::material_at(organ, map.nodes[node.value]).node_damping_per_s);
+      constants_[g].mass.v[lane] = mass;
+      constants_[g].damping.v[lane] = mass * rate;
+    }
+  }
+  take_state(world);
+}
+
+void BlockDescent::take_state(const world::World& world) {
+  const auto& groups = tissue_.groups();
+  for (Group g = 0; g < groups.group_count(); ++g) {
+    free_[g] = 0;
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      const auto node = groups.nodes_of(g)[lane];
+      if (!node.is_valid()) continue;
+      if (world.node_classes[node.value] != world::NodeClass::Fixed)
+        free_[g] = static_cast<std::uint8_t>(free_[g] | 1u << lane);
+      x_[g * kLanes + lane] = to_float4(world.displacements[node.value]);
+    }
+  }
+}
+
+void BlockDescent::take_state(const world::World& world, std::span<const NodeIndex> nodes) {
+  for (const auto node : nodes)
+    x_[tissue_.groups().slot_of(node)] = to_float4(world.displacements[node.value]);
+}
+
+// --- Which groups and lanes ---
+
+void BlockDescent::clear(Plan& plan) const {
+  for (const auto g : plan.groups) plan.lanes[g] = 0;
+  plan.groups.clear();
+  plan.node_count = 0;
+}
+
+void BlockDescent::mark(Plan& plan, NodeIndex node) const {
+  const Slot slot = tissue_.groups().slot_of(node);
+  const Group g = slot / kLanes;
+  if (plan.lanes[g] == 0) plan.groups.push_back(g);
+  plan.lanes[g] = static_cast<std::uint8_t>(plan.lanes[g] | 1u << slot % kLanes);
+  ++plan.node_count;
+}
+
+void BlockDescent::finish(Plan& plan) const {
+  std::ranges::sort(plan.groups);
+  std::size_t i = 0;
+  for (std::size_t colour = 0; colour < tissue_.groups().colour_count(); ++colour) {
+    plan.colour_begins[colour] = static_cast<std::uint32_t>(i);
+    while (i < plan.groups.size() && plan.groups[i] < tissue_.groups().last_group(colour)) ++i;
+  }
+  plan.colour_begins.back() = static_cast<std::uint32_t>(i);
+}
+
+void BlockDescent::plan_step(std::span<const NodeIndex> near, bool has_far,
+                             std::span<const NodeIndex> held) {
+  for (auto* plan : {&near_, &far_, &begun_}) clear(*plan);
+  for (const auto node : near) mark(near_, node);
+  finish(near_);
+  if (has_far)
+    for (Group g = 0; g < free_.size(); ++g) {
+      far_.lanes[g] = static_cast<std::uint8_t>(free_[g] & ~near_.lanes[g]);
+      if (far_.lanes[g] == 0) continue;
+      far_.groups.push_back(g);
+      far_.node_count += static_cast<unsigned>(__builtin_popcount(far_.lanes[g]));
+    }
+  finish(far_);
+  const auto begin = [&](Group g) {
+    if (begun_.lanes[g] == 0) begun_.groups.push_back(g);
+    begun_.lanes[g] = 0xff;
+    begun_stamp_[g] = current_;
+  };
+  for (const auto g : near_.groups) begin(g);
+  for (const auto g : far_.groups) begin(g);
+  for (const auto node : held) begin(tissue_.groups().slot_of(node) / kLanes);
 }
 
 void BlockDescent::link_constraints(const contact::ContactList& contacts) {
-  if (++current_ == 0) {
-    std::fill(constraint_stamp_.begin(), constraint_stamp_.end(), 0u);
-    current_ = 1;
-  }
   next_constraint_.resize(contacts.constraints.size());
   for (auto i = static_cast<std::uint32_t>(contacts.constraints.size()); i-- > 0;) {
     const auto& c = contacts.constraints[i];
     if (!c.moves_node) continue;
-    const auto node = c.node.value;
-    next_constraint_[i] = constraint_stamp_[node] == current_ ? first_constraint_[node] : kNone;
-    constraint_stamp_[node] = current_;
-    first_constraint_[node] = i;
+    const Slot slot = tissue_.groups().slot_of(c.node);
+    next_constraint_[i] = slot_stamp_[slot] == current_ ? first_constraint_[slot] : kNone;
+    slot_stamp_[slot] = group_stamp_[slot / kLanes] = current_;
+    first_constraint_[slot] = i;
   }
 }
 
-void BlockDescent::prepare_step(std::span<const NodeIndex> nodes, float dt,
-                                const world::World& world, std::span<const Vec3f> forces) {
-  const float inverse_dt = 1.0f / dt;
-  for (const auto node : nodes) {
-    const auto n = node.value;
-    Inertia& inertia = inertia_[n];
-    inertia.inertia = world.masses[n] * inverse_dt * inverse_dt +
-                      world.masses[n] * springs_.node_damping_per_s() * inverse_dt;
-    inertia.momentum = world.velocities[n] * (world.masses[n] * inverse_dt);
-    if (!forces.empty()) inertia.momentum += forces[n];
-    inertia.block = springs_.prepare_step(node, start_, inverse_dt, terms_);
-    inertia.block.add_identity(inertia.inertia);
-    // Starting where inertia alone would lead makes rigid motion exact from the first sweep;
-    // starting at rest instead acts as a drag as long as sweeps are few.
-    x_[n] += world.velocities[n] * dt;
-  }
+template <typename Task>
+void BlockDescent::for_each_group(std::span<const Group> groups, Task&& task) {
+  workers_.run([&](unsigned w) {
+    const auto n = groups.size(), count = std::size_t{workers_.count()};
+    for (auto i = n * w / count; i < n * (w + 1) / count; ++i) task(groups[i]);
+  });
 }
 
-BlockDescent::NodeStep BlockDescent::linearise(const contact::ContactList& contacts, NodeIndex node,
-                                               float inverse_dt) const {
-  const auto n = node.value;
-  const Inertia& inertia = inertia_[n];
-  NodeStep step{(x_[n] - start_[n]) * inertia.inertia - inertia.momentum, inertia.block};
-  springs_.add_gradient_and_block(node, x_, terms_, step.gradient, step.block);
-  if (constraint_stamp_[n] == current_)
-    for (auto i = first_constraint_[n]; i != kNone; i = next_constraint_[i])
-      add_constraint(contacts.constraints[i], x_[n], start_[n], inverse_dt, step.gradient,
-                     &step.block);
+// --- The step ---
+
+void BlockDescent::begin_inertia(Group group, const world::World& world, float inverse_dt,
+                                 std::span<const Vec3f> forces) {
+  const auto nodes = tissue_.groups().nodes_of(group);
+  Vec3Lanes velocity, load_n;
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    if (!nodes[lane].is_valid()) continue;
+    velocity.set(lane, world.velocities[nodes[lane].value]);
+    if (!forces.empty()) load_n.set(lane, forces[nodes[lane].value]);
+  }
+  const Float8 mass = load(constants_[group].mass), rate = all(inverse_dt);
+  const Vec8 v = load(velocity), gravity{all(gravity_.x), all(gravity_.y), all(gravity_.z)};
+  store(inertia_[group].inertia, (mass * rate + load(constants_[group].damping)) * rate);
+  store(inertia_[group].momentum, fma8(gravity, mass, fma8(v, mass * rate, load(load_n))));
+  Float4* const x = &x_[group * kLanes];
+  const Vec8 start = load_group(x);
+  store_group(&start_[group * kLanes], start);
+  // Starting where inertia alone would lead makes rigid motion exact from the first sweep; starting
+  // at rest instead acts as a drag as long as sweeps are few.
+  const Float8 moves = mask_of(static_cast<std::uint8_t>(near_.lanes[group] | far_.lanes[group]));
+  const Float8 dt = where(moves, all(1.0f) / rate);
+  store_group(x, fma8(v, dt, start));
+}
+
+void BlockDescent::begin_groups(const world::World& world, const SolveSettings& settings,
+                                const ExternalLoads& loads) {
+  const float inverse_dt = 1.0f / settings.dt;
+  tissue_.begin_step(inverse_dt);
+  for_each_group(begun_.groups, [&](Group g) { tissue_.begin_group(g, x_.data()); });
+  for_each_group(begun_.groups,
+                 [&](Group g) { begin_inertia(g, world, inverse_dt, loads.forces); });
+  for (std::size_t i = 0; i < loads.held.size(); ++i)
+    x_[tissue_.groups().slot_of(loads.held[i])] = to_float4(loads.held_displacements[i]);
+  if (tissue_.follows_moves())
+    for_each_group(all_groups_, [&](Group g) { tissue_.restart_group(g, x_.data()); });
+  for (const auto g : begun_.groups) rejected_[g] = 0;
+}
+
+NodeStep8 BlockDescent::linearise(Group group, const Vec8& own, Scratch& scratch) const {
+  const Inertia& inertia = inertia_[group];
+  const Float8 m = load(inertia.inertia);
+  const Vec8 moved = own - load_group(&start_[group * kLanes]);
+  NodeStep8 step{moved * m - load(inertia.momentum), zero_sym_mat8()};
+  step.block.add_identity(m);
+  tissue_.add(group, x_.data(), own, step, scratch);
   return step;
 }
 
-void BlockDescent::finish_step(std::span<const NodeIndex> nodes, float inverse_dt,
-                               world::World& world) const {
-  for (const auto node : nodes) {
-    const auto n = node.value;
-    world.velocities[n] = (x_[n] - start_[n]) * inverse_dt;
-    world.displacements[n] = x_[n];
+void BlockDescent::add_constraints(const contact::ContactList& contacts, Group group,
+                                   float inverse_dt, NodeStep8& step, Lanes& omega) const {
+  Vec3Lanes gradients;
+  SymMat3Lanes blocks;
+  store(gradients, step.gradient);
+  store(blocks, step.block);
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    const Slot slot = static_cast<Slot>(group * kLanes + lane);
+    if (slot_stamp_[slot] != current_) continue;
+    // No over-relaxation across a contact's kink: it would cycle for ever.
+    omega.v[lane] = 1.0f;
+    Vec3f gradient = gradients.at(lane);
+    SymMat3f block = blocks.at(lane);
+    for (auto i = first_constraint_[slot]; i != kNone; i = next_constraint_[i])
+      add_constraint(contacts.constraints[i], to_vec3(x_[slot]), start_of(slot), inverse_dt,
+                     gradient, &block);
+    gradients.set(lane, gradient);
+    blocks.set(lane, block);
   }
+  step.gradient = load(gradients);
+  step.block = load(blocks);
+}
+
+void BlockDescent::relax(Group group, std::uint8_t lanes, const contact::ContactList& contacts,
+                         float inverse_dt, float omega, Scratch& scratch) {
+  Float4* const x = &x_[group * kLanes];
+  const Vec8 own = load_group(x);
+  NodeStep8 step = linearise(group, own, scratch);
+  Float8 factor = all(-omega);
+  if (group_stamp_[group] == current_) {
+    Lanes factors;
+    store(factors, all(omega));
+    add_constraints(contacts, group, inverse_dt, step, factors);
+    factor = all(0) - load(factors);
+  }
+  const Vec8 dx = solve_positive_definite(step.block, step.gradient) * factor;
+  const Float8 squared = dot8(step.gradient, step.gradient);
+  const Float8 swept = mask_of(lanes);
+  const Float8 is_sound =
+      _mm256_and_ps(is_below(squared, 3e38f), is_below(dot8(dx, dx), kMaxNodeStep * kMaxNodeStep));
+  const Float8 moves = _mm256_and_ps(swept, is_sound);
+  const Vec8 moved{where(moves, dx.x), where(moves, dx.y), where(moves, dx.z)};
+  store_group(x, own + moved);
+  if (tissue_.follows_moves()) tissue_.after_move(group, moved, scratch);
+  store(squares_[group], where(moves, squared));
+  group_squares_[group] = sum(squares_[group]);
+  const auto bad = static_cast<std::uint8_t>(lanes & ~bits_of(is_sound));
+  rejected_[group] = static_cast<std::uint8_t>(rejected_[group] | bad);
+}
+
+void BlockDescent::sweep(const Plan& plan, const contact::ContactList& contacts, float inverse_dt,
+                         float omega) {
+  workers_.run([&](unsigned w) {
+    for (std::size_t colour = 0; colour + 1 < plan.colour_begins.size(); ++colour) {
+      const auto begin = plan.colour_begins[colour];
+      const auto n = std::size_t{plan.colour_begins[colour + 1]} - begin;
+      const auto count = std::size_t{workers_.count()};
+      for (auto i = n * w / count; i < n * (w + 1) / count; ++i) {
+        const Group g = plan.groups[begin + i];
+        relax(g, plan.lanes[g], contacts, inverse_dt, omega, scratches_[w]);
+      }
+      if (n > 0) workers_.barrier();
+    }
+  });
+}
+
+double BlockDescent::sum_of_squares(const Plan& plan) const {
+  double total = 0;
+  for (const auto g : plan.groups) total += static_cast<double>(group_squares_[g]);
+  return total;
+}
+
+void BlockDescent::write_back(const Plan& plan, float inverse_dt, world::World& world) {
+  for_each_group(plan.groups, [&](Group g) {
+    const auto nodes = tissue_.groups().nodes_of(g);
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      if ((plan.lanes[g] >> lane & 1) == 0) continue;
+      const Vec3f x = to_vec3(x_[g * kLanes + lane]), start = to_vec3(start_[g * kLanes + lane]);
+      world.velocities[nodes[lane].value] = (x - start) * inverse_dt;
+      world.displacements[nodes[lane].value] = x;
+    }
+  });
+}
+
+std::uint32_t BlockDescent::restore_rejected(world::World& world) {
+  std::vector<NodeIndex> nodes;  // allocates: this is not a tick like others
+  std::vector<std::uint8_t> is_in(world.node_count());
+  const auto add = [&](NodeIndex node) {
+    if (is_in[node.value] || world.node_classes[node.value] == world::NodeClass::Fixed) return;
+    is_in[node.value] = 1;
+    nodes.push_back(node);
+  };
+  for (const auto g : begun_.groups)
+    for (std::size_t lane = 0; lane < kLanes; ++lane)
+      if (rejected_[g] >> lane & 1) add(tissue_.groups().nodes_of(g)[lane]);
+  for (std::size_t layer = 0, i = 0; layer < kRestoredLayers; ++layer)
+    for (const auto end = nodes.size(); i < end; ++i)
+      for (const auto neighbour : organ_.mesh.node_neighbours[nodes[i]]) add(neighbour);
+  for (const auto node : nodes) {
+    const Slot slot = tissue_.groups().slot_of(node);
+    x_[slot] = to_float4(start_of(slot));
+    world.displacements[node.value] = to_vec3(x_[slot]);
+    world.velocities[node.value] = {};
+  }
+  return static_cast<std::uint32_t>(nodes.size());
 }
 
 SolveReport BlockDescent::solve(const contact::ContactList& contacts,
-                                std::span<const NodeIndex> active, const SolveSettings& settings,
+                                std::span<const NodeIndex> near, const SolveSettings& settings,
                                 world::World& world, const ExternalLoads& loads) {
   TROCAR_ASSERT(loads.held.size() == loads.held_displacements.size());
   TROCAR_ASSERT(loads.forces.empty() || loads.forces.size() == world.node_count());
-  SolveReport report;
-  reset(world);
-  link_constraints(contacts);
-  residuals_.resize(active.size());
+  if (++current_ == 0) {
+    for (auto* stamps : {&slot_stamp_, &group_stamp_, &begun_stamp_})
+      std::ranges::fill(*stamps, 0u);
+    current_ = 1;
+  }
   const float inverse_dt = 1.0f / settings.dt;
-  prepare_step(active, settings.dt, world, loads.forces);
-  prepare_step(loads.held, settings.dt, world, loads.forces);
-  for (std::size_t i = 0; i < loads.held.size(); ++i)
-    x_[loads.held[i].value] = loads.held_displacements[i];
+  plan_step(near, settings.far_sweeps > 0, loads.held);
+  link_constraints(contacts);
+  begin_groups(world, settings, loads);
+
+  SolveReport report;
   float omega = settings.sweeps < 3
                     ? std::min(settings.over_relaxation, kMaxOverRelaxationFewSweeps)
                     : settings.over_relaxation;
-  float last_sum = INFINITY;
-  const float tolerance = settings.residual_tolerance_n;
-  const float sum_tolerance =
-      tolerance > 0 ? tolerance * tolerance * static_cast<float>(active.size()) : -1.0f;
-  for (std::uint32_t sweep = 0; sweep < settings.sweeps; ++sweep) {
-    float sum = 0;
-    report.nodes_rejected = 0;
-    for (std::size_t i = 0; i < active.size(); ++i) {
-      const auto step = linearise(contacts, active[i], inverse_dt);
-      const float squared = length_squared(step.gradient);
-      const Vec3f dx = solve_positive_definite(step.block, step.gradient) * -omega;
-      if (!is_finite(dx) || !std::isfinite(squared)) {
-        ++report.nodes_rejected;
-        residuals_[i] = 0;
-        continue;
+  double squares = 0, last_squares = INFINITY;
+  const auto tolerance = static_cast<double>(settings.residual_tolerance_n);
+  for (std::uint32_t i = 0; i < settings.sweeps; ++i) {
+    if (i + 1 == std::max(settings.sweeps, 2u))
+      for (std::uint32_t far = 0; far < settings.far_sweeps; ++far) {
+        sweep(far_, contacts, inverse_dt, settings.far_over_relaxation);
+        report.node_sweeps += far_.node_count;
       }
-      sum += squared;
-      residuals_[i] = std::sqrt(squared);
-      x_[active[i].value] += dx;
-    }
-    if (sum > last_sum && omega > 1.0f) {
+    sweep(near_, contacts, inverse_dt, omega);
+    report.node_sweeps += near_.node_count;
+    ++report.sweeps;
+    squares = sum_of_squares(near_);
+    if (squares > last_squares && omega > 1.0f) {
       omega = 1.0f;
       report.is_stepped_down = true;
     }
-    last_sum = sum;
-    report.sweeps = sweep + 1;
-    if (sum <= sum_tolerance && report.nodes_rejected == 0) break;
+    last_squares = squares;
+    if (tolerance > 0 && squares <= tolerance * tolerance * static_cast<double>(near.size())) break;
   }
-  finish_step(active, inverse_dt, world);
-  finish_step(loads.held, inverse_dt, world);
-  if (!active.empty()) report.residual_n = std::sqrt(last_sum / static_cast<float>(active.size()));
+  if (settings.sweeps < 2)
+    for (std::uint32_t far = 0; far < settings.far_sweeps; ++far) {
+      sweep(far_, contacts, inverse_dt, settings.far_over_relaxation);
+      report.node_sweeps += far_.node_count;
+    }
+
+  write_back(near_, inverse_dt, world);
+  write_back(far_, inverse_dt, world);
+  for (const auto node : loads.held) {
+    const Slot slot = tissue_.groups().slot_of(node);
+    world.displacements[node.value] = to_vec3(x_[slot]);
+    world.velocities[node.value] = (to_vec3(x_[slot]) - start_of(slot)) * inverse_dt;
+  }
+  for (const auto g : begun_.groups)
+    report.nodes_rejected += static_cast<unsigned>(__builtin_popcount(rejected_[g]));
+  if (report.nodes_rejected > 0) report.nodes_restored = restore_rejected(world);
+  residuals_.clear();
+  for (const auto node : near) {
+    const Slot slot = tissue_.groups().slot_of(node);
+    residuals_.push_back(std::sqrt(squares_[slot / kLanes].v[slot % kLanes]));
+  }
+  if (!near.empty())
+    report.residual_n = static_cast<float>(std::sqrt(squares / static_cast<double>(near.size())));
   return report;
+}
+
+// --- What others ask ---
+
+Vec3f BlockDescent::start_of(Slot slot) const {
+  return to_vec3(begun_stamp_[slot / kLanes] == current_ ? start_[slot] : x_[slot]);
 }
 
 Vec3f BlockDescent::reaction(const contact::ContactList& contacts, const contact::ToolContact& tool,
@@ -171,10 +416,51 @@ Vec3f BlockDescent::reaction(const contact::ContactList& contacts, const contact
   Vec3f force;
   for (auto i = tool.begin; i < tool.end; ++i) {
     const auto& c = contacts.constraints[i];
-    add_constraint(c, world.displacements[c.node.value], start_[c.node.value], 1.0f / dt, force,
-                   nullptr);
+    add_constraint(c, world.displacements[c.node.value], start_of(tissue_.groups().slot_of(c.node)),
+                   1.0f / dt, force, nullptr);
   }
   return force;
+}
+
+Vec3f BlockDescent::holding_force(const contact::ContactList& contacts, NodeIndex node,
+                                  float dt) const {
+  const Slot slot = tissue_.groups().slot_of(node);
+  const Group group = slot / kLanes;
+  TROCAR_ASSERT_HOT(begun_stamp_[group] == current_);
+  Scratch scratch;
+  NodeStep8 step = linearise(group, load_group(&x_[group * kLanes]), scratch);
+  Lanes omega;
+  if (group_stamp_[group] == current_) add_constraints(contacts, group, 1.0f / dt, step, omega);
+  Vec3Lanes gradients;
+  store(gradients, step.gradient);
+  return gradients.at(slot % kLanes);
+}
+
+FarPlan BlockDescent::far_plan(float dt) const {
+  const std::vector<Float4> rest(x_.size());
+  double stiffness = 0, mass = 0;
+  Scratch scratch;
+  for (const auto g : all_groups_) {
+    NodeStep8 step{zero_vec8(), zero_sym_mat8()};
+    tissue_.add(g, rest.data(), zero_vec8(), step, scratch);
+    Lanes trace;
+    store(trace, step.block.xx + step.block.yy + step.block.zz);
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      if ((free_[g] >> lane & 1) == 0) continue;
+      stiffness += static_cast<double>(trace.v[lane]) / 3;
+      mass += static_cast<double>(constants_[g].mass.v[lane]);
+    }
+  }
+  FarPlan plan;
+  if (!(mass > 0)) return plan;
+  const auto step = static_cast<double>(dt);
+  const double kappa = step * step * stiffness / mass;
+  const auto best = static_cast<float>(2 * (1 + kappa) / (2 + kappa));
+  plan.kappa = static_cast<float>(kappa);
+  plan.sweeps = kappa <= 1 ? 1 : 2;
+  plan.over_relaxation = std::min(
+      best, plan.sweeps == 1 ? kMaxFarOverRelaxationOneSweep : kMaxFarOverRelaxationTwoSweeps);
+  return plan;
 }
 
 }  // namespace trocar::dynamics

@@ -1,19 +1,26 @@
 #pragma once
 
-// Implicit Euler by block descent (vertex block descent, Chen et al. 2024): for each node in turn
-// one Newton step on the node's own 3x3 block of the incremental potential
-//   sum_i m_i/(2 dt^2) |x_i - u_i - dt v_i|^2 + springs + damping + contacts,
-// several sweeps per step, over-relaxed. Over-relaxation is stepped down to 1 for the rest of the
-// tick when a sweep's residual grew against the sweep before. Plain scalar form in the order of the
-// active set. Order was measured to be irrelevant to convergence. O(sweeps x active nodes x springs
-// per node); no allocation after construction.
+// Implicit Euler by block descent (vertex block descent, Chen et al. 2024): for each node one
+// Newton step on the node's own 3x3 block of the incremental potential
+//   sum_i m_i/(2 dt^2) |x_i - u_i - dt v_i|^2 + energies + damping + contacts,
+// colour after colour, several sweeps per step, over-relaxed. Over-relaxation is stepped down to 1
+// for the rest of the step when a sweep's residual grew against the sweep before.
+//
+// Two classes of nodes (graded-exterior scheme): the near ones get `sweeps`; with far_sweeps > 0
+// all other free nodes get that many, with an over-relaxation of their own, between the last two
+// near sweeps. With far_sweeps = 0 the others stand still.
+//
+// Results do not depend on the number of workers. Work: sweeps x groups with a swept node x rows;
+// no allocation after the first steps. One caller at a time.
 
+#include <array>
 #include <span>
 #include <vector>
 
 #include "common/base/index.h"
 #include "server/contact/contact_list.h"
-#include "server/dynamics/spring_network.h"
+#include "server/dynamics/tissue.h"
+#include "server/dynamics/workers.h"
 #include "server/world/world.h"
 
 namespace trocar::dynamics {
@@ -24,74 +31,127 @@ struct SolveSettings {
   float dt = 1e-3f;              // s
   // Sweeping ends before `sweeps` when a sweep's residual is at most this; 0: never.
   float residual_tolerance_n = 0;
+  std::uint32_t far_sweeps = 0;
+  float far_over_relaxation = 1.3f;
 };
 
 // What acts from outside besides tools. Default: nothing.
 struct ExternalLoads {
   std::span<const Vec3f> forces;  // N, per node of the organ; empty: none
   // Nodes put where `held_displacements` says at the end of the step, with whatever force that
-  // takes (holding_force). None of them is active.
+  // takes (holding_force). None of them is free.
   std::span<const NodeIndex> held;
   std::span<const Vec3f> held_displacements;  // m, per entry of `held`
 };
 
 struct SolveReport {
-  float residual_n = 0;  // root mean square over active nodes, last sweep, before each node's step
+  float residual_n = 0;  // root mean square over near nodes, last sweep, before each node's step
   bool is_stepped_down = false;
-  std::uint32_t nodes_rejected = 0;  // their step was not finite
-  std::uint32_t sweeps = 0;          // done
+  std::uint32_t sweeps = 0;          // of near nodes, done
+  std::uint64_t node_sweeps = 0;     // nodes stepped, all sweeps together
+  std::uint32_t nodes_rejected = 0;  // their step was not finite in some sweep
+  std::uint32_t nodes_restored = 0;  // put back to the start of the step, at rest, for that reason
+};
+
+// How the far field of an organ wants to be swept at a step dt, from kappa = dt^2 D/m with D the
+// mean stiffness of a node's block and m its mean mass: one sweep with omega* = 2 (1 + kappa) /
+// (2 + kappa), for which a region that moves as a whole has its own inertia, while that is stable;
+// else two.
+struct FarPlan {
+  float kappa = 0;
+  std::uint32_t sweeps = 1;
+  float over_relaxation = 1.3f;
 };
 
 class BlockDescent {
  public:
-  BlockDescent(const world::World& world, const SpringNetwork& springs);
+  BlockDescent(const scene::Organ& organ, const world::World& world, unsigned workers = 1);
 
-  // Advances displacements and velocities of `active` nodes by one step; all other nodes stay.
-  SolveReport solve(const contact::ContactList& contacts, std::span<const NodeIndex> active,
+  // Takes displacements and classes anew: after a restored state, or whenever somebody else than
+  // solve() changed displacements of more than single nodes.
+  void take_state(const world::World& world);
+  // The same for some nodes.
+  void take_state(const world::World& world, std::span<const NodeIndex> nodes);
+
+  // Advances displacements and velocities by one step. near: distinct nodes that are not fixed.
+  SolveReport solve(const contact::ContactList& contacts, std::span<const NodeIndex> near,
                     const SolveSettings& settings, world::World& world,
                     const ExternalLoads& loads = {});
 
-  // Force imbalance per entry of `active` in the last sweep, N.
+  // Force imbalance per entry of `near` in the last sweep, N.
   std::span<const float> residuals_n() const { return residuals_; }
 
   // Force of the tissue on each tool, N, per entry of contacts.tools, from the state just solved.
-  // `start` of the drag is the state before the solve, which is kept from it.
   Vec3f reaction(const contact::ContactList& contacts, const contact::ToolContact& tool,
                  const world::World& world, float dt) const;
 
-  // Force on a node of the last solve's loads.held that put it where it is, N: what springs,
+  // Force on a node of the last solve's loads.held that put it where it is, N: what energies,
   // damping, loads and tools leave of its mass times acceleration.
-  Vec3f holding_force(const contact::ContactList& contacts, NodeIndex node, float dt) const {
-    return linearise(contacts, node, 1.0f / dt).gradient;
-  }
+  Vec3f holding_force(const contact::ContactList& contacts, NodeIndex node, float dt) const;
+
+  FarPlan far_plan(float dt) const;
+  const Tissue& tissue() const { return tissue_; }
 
  private:
-  struct NodeStep {
-    Vec3f gradient;
-    SymMat3f block;
-  };
-  void reset(const world::World& world);
-  void link_constraints(const contact::ContactList& contacts);
-  NodeStep linearise(const contact::ContactList& contacts, NodeIndex node, float inverse_dt) const;
-  void prepare_step(std::span<const NodeIndex> nodes, float dt, const world::World& world,
-                    std::span<const Vec3f> forces);
-  void finish_step(std::span<const NodeIndex> nodes, float inverse_dt, world::World& world) const;
-
-  const SpringNetwork& springs_;
-  // Inertia and damping of a node, constant in a step: the gradient is
-  // inertia (x - start) - momentum, plus the springs' damping.
   struct Inertia {
-    SymMat3f block;
-    float inertia = 0;  // m/dt^2 + rate m/dt, N/m
-    Vec3f momentum;     // m/dt v and loads, N
+    Lanes inertia;       // m/dt^2 + rate m/dt, N/m
+    Vec3Lanes momentum;  // m v/dt and loads, N
   };
-  std::vector<Inertia> inertia_;                 // per node, valid for active ones
-  std::vector<SpringNetwork::StepTerms> terms_;  // per spring batch, likewise
-  std::vector<Vec3f> x_;                         // displacements being solved
-  std::vector<Vec3f> start_;                     // displacements at the start of the step
+  struct Constants {
+    Lanes mass;     // kg; 0 for padding
+    Lanes damping;  // rate m, kg/s
+  };
+  // Groups with the lanes to sweep in them, by colour.
+  struct Plan {
+    std::vector<std::uint8_t> lanes;           // per group of the tissue
+    std::vector<Group> groups;                 // ascending, hence by colour
+    std::vector<std::uint32_t> colour_begins;  // into groups, colour_count + 1
+    std::uint64_t node_count = 0;
+  };
+
+  void clear(Plan& plan) const;
+  void mark(Plan& plan, NodeIndex node) const;
+  void finish(Plan& plan) const;
+  void plan_step(std::span<const NodeIndex> near, bool has_far, std::span<const NodeIndex> held);
+  void link_constraints(const contact::ContactList& contacts);
+  void begin_groups(const world::World& world, const SolveSettings& settings,
+                    const ExternalLoads& loads);
+  void begin_inertia(Group group, const world::World& world, float inverse_dt,
+                     std::span<const Vec3f> forces);
+  NodeStep8 linearise(Group group, const Vec8& own, Scratch& scratch) const;
+  void add_constraints(const contact::ContactList& contacts, Group group, float inverse_dt,
+                       NodeStep8& step, Lanes& omega) const;
+  void sweep(const Plan& plan, const contact::ContactList& contacts, float inverse_dt, float omega);
+  void relax(Group group, std::uint8_t lanes, const contact::ContactList& contacts,
+             float inverse_dt, float omega, Scratch& scratch);
+  double sum_of_squares(const Plan& plan) const;
+  void write_back(const Plan& plan, float inverse_dt, world::World& world);
+  std::uint32_t restore_rejected(world::World& world);
+  Vec3f start_of(Slot slot) const;
+  template <typename Task>
+  void for_each_group(std::span<const Group> groups, Task&& task);
+
+  const scene::Organ& organ_;
+  Tissue tissue_;
+  Workers workers_;
+  std::vector<Scratch> scratches_;  // per worker
+  Vec3f gravity_;
+
+  std::vector<Constants> constants_;    // per group
+  std::vector<std::uint8_t> free_;      // per group: lanes of nodes that are not fixed
+  std::vector<Float4> x_;               // per slot: displacements being solved, else the world's
+  std::vector<Float4> start_;           // per slot: at the start of the step; begun groups
+  std::vector<Inertia> inertia_;        // per group; begun groups
+  std::vector<Lanes> squares_;          // per group: squared residuals of the last sweep
+  std::vector<float> group_squares_;    // their sum over swept lanes
+  std::vector<std::uint8_t> rejected_;  // per group: lanes with a step that was not finite
+  std::vector<Group> all_groups_;
+  Plan near_, far_, begun_;
+  std::vector<std::uint32_t> begun_stamp_;  // per group
   std::vector<float> residuals_;
   // Constraints of a node as a linked list in contact order; valid where the stamp is current.
-  std::vector<std::uint32_t> first_constraint_, constraint_stamp_, next_constraint_;
+  std::vector<std::uint32_t> first_constraint_, next_constraint_;  // per slot; per constraint
+  std::vector<std::uint32_t> slot_stamp_, group_stamp_;
   std::uint32_t current_ = 0;
 };
 

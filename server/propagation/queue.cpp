@@ -1,103 +1,92 @@
 #include "server/propagation/queue.h"
 
 #include <algorithm>
-#include <numeric>
 
 namespace trocar::propagation {
 
-PropagationQueue::PropagationQueue(std::size_t node_count)
-    : stamp_(node_count), offered_stamp_(node_count), contact_(node_count) {
+PropagationQueue::PropagationQueue(std::size_t node_count) {
+  resize(node_count);
+}
+
+void PropagationQueue::resize(std::size_t node_count) {
+  node_capacity_ = node_count;
+  seeds_.resize(node_count);
+  search_.resize(node_count);
+  lists_.resize(node_count);
   nodes_.reserve(node_count);
-  offered_.reserve(node_count);
-  keys_.reserve(node_count);
 }
 
-std::uint16_t PropagationQueue::root(std::uint16_t contact) {
-  while (parent_[contact] != contact) contact = parent_[contact] = parent_[parent_[contact]];
-  return contact;
-}
-
-void PropagationQueue::merge(std::uint16_t a, std::uint16_t b) {
-  a = root(a);
-  b = root(b);
-  parent_[std::max(a, b)] = std::min(a, b);
-}
-
-void PropagationQueue::offer(NodeIndex node, std::uint16_t contact) {
-  auto& owner = contact_[node.value];
-  if (offered_stamp_[node.value] != current_) {
-    offered_stamp_[node.value] = current_;
-    owner = contact;
-    offered_.push_back(node);
-  } else if (owner != contact) {
-    // Reached by two contacts: the node lies in both regions. One that has already entered keeps
-    // its contact; one of the coming layer goes to the lowest.
-    merge(owner, contact);
-    if (!contains(node)) owner = std::min(owner, contact);
+bool PropagationQueue::is_repeated(const Neighbours& neighbours, Seeds seeds,
+                                   const QueueLimits& limits) {
+  if (neighbours.items.data() != table_ || neighbours.items.size() != table_items_ ||
+      neighbours.row_count() != table_rows_) {
+    table_ = neighbours.items.data();
+    table_items_ = neighbours.items.size();
+    table_rows_ = neighbours.row_count();
+    if (table_rows_ > node_capacity_) resize(table_rows_);
+    has_history_ = false;
   }
+  return has_history_ && limits == limits_ && seeds_.equals(seeds);
 }
 
-void PropagationQueue::enter_layer(std::uint32_t node_limit) {
-  keys_.clear();
-  for (const auto node : offered_)
-    keys_.push_back(std::uint64_t{contact_[node.value]} << 32 | node.value);
-  std::sort(keys_.begin(), keys_.end());
-  offered_.clear();
-  std::fill(cursors_.begin(), cursors_.end(), 0u);
-  // cursors_[c] .. cursors_[c + 1]: keys of contact c; the lower end moves as nodes enter.
-  for (const auto key : keys_) ++cursors_[(key >> 32) + 1];
-  std::partial_sum(cursors_.begin(), cursors_.end(), cursors_.begin());
-  const auto contact_count = cursors_.size() - 1;
-  for (std::size_t rank = 0, entered = 0; entered < keys_.size(); ++rank) {
-    std::uint32_t begin = 0;
-    for (std::size_t c = 0; c < contact_count; ++c) {
-      const std::uint32_t end = cursors_[c + 1];
-      if (begin + rank < end) {
-        ++entered;
-        if (nodes_.size() >= node_limit) break;
-        const NodeIndex node(static_cast<std::uint32_t>(keys_[begin + rank] & 0xffffffffu));
-        stamp_[node.value] = current_;
-        nodes_.push_back(node);
-      }
-      begin = end;
-    }
-    if (nodes_.size() >= node_limit) break;
-  }
-  layer_offsets_.push_back(static_cast<std::uint32_t>(nodes_.size()));
+void PropagationQueue::start_anew(std::size_t contact_count) {
+  search_.clear(lists_.nodes());
+  lists_.clear(contact_count);
+  borders_.clear();
 }
 
-void PropagationQueue::fill(const Neighbours& neighbours,
-                            std::span<const std::span<const NodeIndex>> seeds,
-                            const QueueLimits& limits) {
-  if (++current_ == 0) {
-    std::fill(stamp_.begin(), stamp_.end(), 0u);
-    std::fill(offered_stamp_.begin(), offered_stamp_.end(), 0u);
-    current_ = 1;
+void PropagationQueue::fill(const Neighbours& neighbours, Seeds seeds, const QueueLimits& limits) {
+  visited_ = 0;
+  if (is_repeated(neighbours, seeds, limits)) return;
+  seeds_.replace(seeds);
+  limits_ = limits;
+  if (!has_history_ || seeds.size() > lists_.contact_capacity()) {
+    start_anew(seeds.size());
+  } else if (!search_.retract(neighbours, seeds_, lists_)) {
+    visited_ = search_.nodes_visited();
+    start_anew(seeds.size());
   }
+  has_history_ = true;
+  search_.advance(neighbours, seeds_, limits, lists_);
+  borders_.update(neighbours, search_, lists_);
+  borders_.number_regions(seeds, search_, region_of_contact_, region_count_);
+  lists_.update(search_);
+  order(seeds.size(), limits.nodes);
+  visited_ += search_.nodes_visited() + borders_.nodes_visited();
+}
+
+void PropagationQueue::order(std::size_t contact_count, std::uint32_t node_limit) {
   nodes_.clear();
   layer_offsets_.assign(1, 0);
-  cursors_.resize(seeds.size() + 1);
-  parent_.resize(seeds.size());
-  std::iota(parent_.begin(), parent_.end(), std::uint16_t{0});
-
-  for (std::size_t c = 0; c < seeds.size(); ++c)
-    for (const auto node : seeds[c]) offer(node, static_cast<std::uint16_t>(c));
-  enter_layer(limits.nodes);
-  for (std::uint32_t depth = 0; depth < limits.depth && nodes_.size() < limits.nodes; ++depth) {
-    for (std::uint32_t i = layer_offsets_[depth]; i < layer_offsets_[depth + 1]; ++i)
-      for (const auto neighbour : neighbours[nodes_[i]])
-        offer(neighbour, contact_[nodes_[i].value]);
-    if (offered_.empty()) break;
-    enter_layer(limits.nodes);
+  share_ends_.assign(contact_count, 0xffffffffu);
+  for (std::size_t layer = 0; layer < lists_.layer_count(); ++layer) {
+    take_turns(layer, contact_count, node_limit - nodes_.size());
+    layer_offsets_.push_back(static_cast<std::uint32_t>(nodes_.size()));
   }
+  const bool is_cut = nodes_.size() < lists_.nodes().size();
+  whole_end_ = kOneLayer * (is_cut ? search_.depth() : search_.depth() + 1);
+}
 
-  region_of_contact_.assign(seeds.size(), 0);
-  region_count_ = 0;
-  for (std::uint16_t c = 0; c < seeds.size(); ++c) {
-    if (seeds[c].empty()) continue;
-    const auto r = root(c);
-    if (region_of_contact_[r] == 0) region_of_contact_[r] = ++region_count_;
-    region_of_contact_[c] = region_of_contact_[r];
+void PropagationQueue::take_turns(std::size_t layer, std::size_t contact_count, std::size_t room) {
+  turns_.clear();
+  for (std::size_t c = 0; c < contact_count; ++c)
+    if (const auto share = lists_.share(layer, c); !share.empty())
+      turns_.push_back({share, static_cast<std::uint16_t>(c)});
+  while (turns_.size() > 1 && room >= turns_.size()) {
+    for (auto& turn : turns_) {
+      nodes_.push_back(turn.nodes.front());
+      turn.nodes = turn.nodes.subspan(1);
+    }
+    room -= turns_.size();
+    std::erase_if(turns_, [](const Turn& turn) { return turn.nodes.empty(); });
+  }
+  // A single contact gives all its nodes at once; of several, the room is not for one each.
+  for (auto& turn : turns_) {
+    const std::size_t count =
+        turns_.size() == 1 ? std::min(room, turn.nodes.size()) : std::min<std::size_t>(room, 1);
+    nodes_.insert(nodes_.end(), turn.nodes.begin(), turn.nodes.begin() + count);
+    room -= count;
+    if (count < turn.nodes.size()) share_ends_[turn.contact] = turn.nodes[count].value;
   }
 }
 

@@ -30,9 +30,17 @@ double seconds_of(Tick tick) {
 
 std::uint64_t steps_of(const scene::RunRule& run) {
   return run.mode == scene::RunMode::Static
-             ? run.load_steps
+             ? run.load_times_s.size()
              : static_cast<std::uint64_t>(
                    std::llround(run.seconds * static_cast<double>(kTicksPerSecond)));
+}
+
+// To solve every node to a tolerance makes graded sweeps pointless.
+scene::Boundary boundary_of(const scene::RunRule& run, Solver solver) {
+  const bool is_graded = run.boundary == scene::Boundary::Graded;
+  return run.mode == scene::RunMode::Static || (is_graded && solver == Solver::Full)
+             ? scene::Boundary::Whole
+             : run.boundary;
 }
 
 const scene::Place& run_key(const scene::Scenario& scenario, std::string_view key) {
@@ -47,46 +55,24 @@ Status check_supported(const scene::ResolvedScenario& resolved) {
     return scene::scenario_error(scenario, place, what + " is not simulated yet");
   };
   const auto& rule = scenario.run;
-  if (rule.boundary == scene::Boundary::Graded)
-    return refuse(run_key(scenario, "boundary"), "\"graded\"");
   if (rule.integrator == scene::Integrator::Explicit)
     return refuse(run_key(scenario, "integrator"), "\"explicit\"");
   for (const auto& rule_of_set : scenario.displacements)
     if (rule_of_set.axes != kAllAxes)
       return refuse(rule_of_set.set.place, "a set that is held along some axes only");
-  const auto check_material = [&](const scene::Material& m,
-                                  const scene::MaterialChange& change) -> Status {
-    if (m.elastic_law != scene::ElasticLaw::Springs)
-      return refuse(change.place_of("elastic_law"), "this law");
-    if (m.node_damping_per_s != resolved.organ.material.node_damping_per_s)
-      return refuse(change.place_of("node_damping_per_s"), "nodal damping that differs by region");
-    return {};
-  };
-  if (auto s = check_material(resolved.organ.material, scenario.material); !s) return s;
-  for (const auto& region : resolved.organ.regions) {
-    const auto rule_of_region =
-        std::ranges::find(scenario.regions, region.name, &scene::RegionRule::name);
-    const bool is_changed = rule_of_region != scenario.regions.end();
-    scene::MaterialChange unchanged;
-    unchanged.place = scenario.organ.place;
-    if (auto s = check_material(region.material, is_changed ? rule_of_region->material : unchanged);
-        !s)
-      return s;
-  }
   return {};
 }
 
 ScenarioRun::ScenarioRun(scene::ResolvedScenario resolved, Solver solver)
     : resolved_(std::move(resolved)),
       solver_kind_(solver),
-      is_frozen_(scenario().run.boundary == scene::Boundary::Frozen && !is_static()),
+      boundary_(boundary_of(scenario().run, solver)),
       step_count_(steps_of(scenario().run)),
-      springs_(organ()),
       world_(organ()),
       claims_(world_.node_count()),
       queue_(world_.node_count()),
       active_set_(world_.node_count()),
-      solver_(world_, springs_) {
+      solver_(organ(), world_) {
   held_ = organ().fixed_nodes;
   for (const auto& load : resolved_.displacements)
     for (const auto node : load.nodes) {
@@ -94,31 +80,23 @@ ScenarioRun::ScenarioRun(scene::ResolvedScenario resolved, Solver solver)
       world_.node_classes[node.value] = world::NodeClass::Fixed;
     }
   held_displacements_.resize(held_.size());
-  if (!resolved_.forces.empty() || length(organ().gravity_m_s2) > 0)
-    forces_.resize(world_.node_count());
+  if (!resolved_.forces.empty()) forces_.resize(world_.node_count());
   for (std::uint32_t i = 0; i < world_.node_count(); ++i) {
     if (world_.node_classes[i] == world::NodeClass::Fixed) continue;
     free_nodes_.push_back(NodeIndex(i));
-    if (!is_frozen_) world_.node_classes[i] = world::NodeClass::Active;
+    if (boundary_ != scene::Boundary::Frozen) world_.node_classes[i] = world::NodeClass::Active;
   }
-  if (!scenario().run.starts_in_equilibrium) return;
-  apply_gravity();
-  has_settled_ = relax().is_converged;
+  solver_.take_state(world_);
+  if (scenario().run.starts_in_equilibrium) settling_ = relax();
 }
 
 double ScenarioRun::time_s() const {
   if (!is_static()) return seconds_of(steps_done_);
-  return scenario().run.seconds * static_cast<double>(steps_done_) /
-         static_cast<double>(step_count_);
+  return steps_done_ == 0 ? 0 : scenario().run.load_times_s[steps_done_ - 1];
 }
 
 bool ScenarioRun::is_due(std::size_t probe) const {
   return is_static() || steps_done_ % scenario().probes[probe].every_ticks == 0;
-}
-
-void ScenarioRun::apply_gravity() {
-  const Vec3f gravity = to_float(organ().gravity_m_s2);
-  for (std::size_t i = 0; i < forces_.size(); ++i) forces_[i] = gravity * world_.masses[i];
 }
 
 void ScenarioRun::apply_loads(double time_s) {
@@ -127,7 +105,7 @@ void ScenarioRun::apply_loads(double time_s) {
     const Vec3f displacement = to_float(load.over_time.at(time_s));
     for (std::size_t i = 0; i < load.nodes.size(); ++i) held_displacements_[entry++] = displacement;
   }
-  apply_gravity();
+  std::ranges::fill(forces_, Vec3f{});
   for (const auto& load : resolved_.forces) {
     const Vec3d value = load.over_time.at(time_s);
     for (std::size_t i = 0; i < load.nodes.size(); ++i)
@@ -153,17 +131,26 @@ void ScenarioRun::move_tools(double time_s, bool takes_samples) {
   tools_.admit(inputs_, world_.tick);
 }
 
-void ScenarioRun::collect_active() {
-  seeds_.clear();
-  for (const auto& tool : contacts_.tools) seeds_.push_back(contacts_.seeds_of(tool));
-  // What is moved or loaded from outside is where a force enters, like a contact.
+std::span<const NodeIndex> ScenarioRun::collect_active() {
+  if (boundary_ == scene::Boundary::Whole) return free_nodes_;
+  // Each has its place in every step, as the queue wants it. What is moved or loaded from outside
+  // is where a force enters, like a contact.
+  seeds_.assign(scenario().tools.size(), {});
+  for (const auto& tool : contacts_.tools) seeds_[tool.tool.value] = contacts_.seeds_of(tool);
   for (const auto& load : resolved_.displacements) seeds_.push_back(load.nodes);
   for (const auto& load : resolved_.forces) seeds_.push_back(load.nodes);
   const auto& run = scenario().run;
   constexpr auto kNoLimit = std::numeric_limits<std::uint32_t>::max();
   queue_.fill(organ().mesh.node_neighbours, seeds_,
               {run.depth.value_or(kNoLimit), run.nodes.value_or(kNoLimit)});
-  active_set_.collect(queue_, world_);
+  if (boundary_ == scene::Boundary::Frozen) {
+    active_set_.collect(queue_, world_);
+    return active_set_.nodes();
+  }
+  near_nodes_.clear();
+  for (const auto node : queue_.nodes())
+    if (world_.node_classes[node.value] != world::NodeClass::Fixed) near_nodes_.push_back(node);
+  return near_nodes_;
 }
 
 // As the tick of a session does it (server/step/tick.cpp).
@@ -183,6 +170,10 @@ dynamics::SolveSettings ScenarioRun::settings() const {
   const auto& run = scenario().run;
   dynamics::SolveSettings result{run.sweeps, static_cast<float>(run.over_relaxation),
                                  static_cast<float>(run.dt_s())};
+  if (boundary_ == scene::Boundary::Graded) {
+    result.far_sweeps = run.far_sweeps;
+    result.far_over_relaxation = static_cast<float>(run.far_over_relaxation);
+  }
   if (solver_kind_ == Solver::Full || is_static()) {
     result.sweeps = run.max_sweeps;
     result.residual_tolerance_n = static_cast<float>(run.tolerance_n);
@@ -194,8 +185,7 @@ StepReport ScenarioRun::step_dynamic() {
   ++world_.tick;
   move_tools(seconds_of(world_.tick - 1), (world_.tick - 1) % kSampleTicks == 0);
   contact::find_contacts(world_, tools_, claims_, grasps_, world_.tick, contacts_);
-  if (is_frozen_) collect_active();
-  const std::span<const NodeIndex> active = is_frozen_ ? active_set_.nodes() : free_nodes_;
+  const auto active = collect_active();
 
   const auto& run = scenario().run;
   const auto how = settings();
@@ -216,7 +206,8 @@ StepReport ScenarioRun::step_dynamic() {
   }
   report.solve.sweeps = sweeps;
   solved_dt_ = how.dt;
-  if (is_frozen_) active_set_.freeze_quiet(queue_, solver_.residuals_n(), world_);
+  if (boundary_ == scene::Boundary::Frozen)
+    active_set_.freeze_quiet(queue_, solver_.residuals_n(), world_);
   update_claims();
   return report;
 }
@@ -226,6 +217,7 @@ StepReport ScenarioRun::relax() {
   const std::uint32_t most = scenario().run.max_sweeps;
   how.residual_tolerance_n = static_cast<float>(scenario().run.tolerance_n);
   how.dt = solved_dt_ = kStaticStep_s;
+  how.far_sweeps = 0;
   StepReport report;
   report.active_nodes = free_nodes_.size();
   std::uint32_t sweeps = 0;
@@ -243,8 +235,7 @@ StepReport ScenarioRun::relax() {
 }
 
 StepReport ScenarioRun::step_static() {
-  const double now = scenario().run.seconds * static_cast<double>(steps_done_ + 1) /
-                     static_cast<double>(step_count_);
+  const double now = scenario().run.load_times_s[steps_done_];
   apply_loads(now);
   StepReport report;
   if (scenario().tools.empty()) return relax();

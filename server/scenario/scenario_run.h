@@ -17,7 +17,6 @@
 #include "server/contact/contact_list.h"
 #include "server/contact/grasps.h"
 #include "server/dynamics/block_descent.h"
-#include "server/dynamics/spring_network.h"
 #include "server/input/tool_table.h"
 #include "server/locks/claims.h"
 #include "server/propagation/active_set.h"
@@ -53,8 +52,8 @@ class ScenarioRun {
   std::uint64_t step_count() const { return step_count_; }
   bool is_finished() const { return steps_done_ >= step_count_; }
   double time_s() const;  // at the end of the last step
-  // Whether the starting equilibrium was reached; true without one.
-  bool has_settled() const { return has_settled_; }
+  // How the starting equilibrium was found; converged if there is none.
+  const StepReport& settling() const { return settling_; }
 
   const scene::ResolvedScenario& resolved() const { return resolved_; }
   const scene::Scenario& scenario() const { return resolved_.scenario; }
@@ -73,9 +72,9 @@ class ScenarioRun {
  private:
   bool is_static() const { return scenario().run.mode == scene::RunMode::Static; }
   void apply_loads(double time_s);
-  void apply_gravity();
   void move_tools(double time_s, bool takes_samples);
-  void collect_active();
+  // What is swept this step, most of all in a graded one.
+  std::span<const NodeIndex> collect_active();
   void update_claims();
   dynamics::SolveSettings settings() const;
   StepReport step_dynamic();
@@ -85,12 +84,11 @@ class ScenarioRun {
 
   const scene::ResolvedScenario resolved_;
   const Solver solver_kind_;
-  const bool is_frozen_;
+  const scene::Boundary boundary_;
   const std::uint64_t step_count_;
-  const dynamics::SpringNetwork springs_;
 
   std::uint64_t steps_done_ = 0;
-  bool has_settled_ = true;
+  StepReport settling_;
   float solved_dt_ = kTickSeconds;  // of the last solve, s
 
   world::World world_;
@@ -108,6 +106,7 @@ class ScenarioRun {
   std::vector<NodeIndex> held_;            // fixed, then displaced nodes
   std::vector<Vec3f> held_displacements_;  // per entry of held_
   std::vector<NodeIndex> free_nodes_;      // what is active unless frozen
+  std::vector<NodeIndex> near_nodes_;      // graded: the queue without held nodes
   std::vector<Vec3f> before_;              // displacements before a round of contacts
   std::vector<std::span<const NodeIndex>> seeds_;
   std::vector<locks::ClaimRequest> requests_;

@@ -16,14 +16,13 @@ void State::visit(world::StateArchive& archive) {
   archive.fixed_array(quantised);
 }
 
-Scene::Scene(scene::Organ o)
-    : organ(std::move(o)), layout(wire::make_surface_layout(organ)), springs(organ) {}
+Scene::Scene(scene::Organ o) : organ(std::move(o)), layout(wire::make_surface_layout(organ)) {}
 
 StepContext::StepContext(const Scene& s, const world::World& world)
     : scene(s),
       queue(world.node_count()),
       active(world.node_count()),
-      solver(world, s.springs),
+      solver(s.organ, world),
       surface_displacements(s.layout.vertex_count()) {
   // Enough for many tools in contact; beyond it a tick may allocate once more.
   contacts.constraints.reserve(8 * contact::kMaxNodesPerTool);

@@ -10,7 +10,6 @@
 #include "server/contact/contact_list.h"
 #include "server/contact/grasps.h"
 #include "server/dynamics/block_descent.h"
-#include "server/dynamics/spring_network.h"
 #include "server/input/tool_table.h"
 #include "server/locks/claims.h"
 #include "server/propagation/active_set.h"
@@ -42,7 +41,6 @@ struct Scene {
 
   scene::Organ organ;
   wire::SurfaceLayout layout;
-  dynamics::SpringNetwork springs;
 };
 
 // Laid out as input, scratch and output of a tick. Scratch keeps its capacity, so that a tick does

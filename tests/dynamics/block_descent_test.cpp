@@ -15,8 +15,7 @@ using contact::ContactList;
 using contact::NodeConstraint;
 
 struct Bench {
-  explicit Bench(scene::Organ o)
-      : organ(std::move(o)), world(organ), springs(organ), solver(world, springs) {
+  explicit Bench(scene::Organ o) : organ(std::move(o)), world(organ), solver(organ, world) {
     for (std::uint32_t i = 0; i < organ.mesh.node_count(); ++i)
       if (world.node_classes[i] != world::NodeClass::Fixed) free_nodes.push_back(NodeIndex(i));
   }
@@ -34,7 +33,6 @@ struct Bench {
 
   scene::Organ organ;
   world::World world;
-  SpringNetwork springs;
   BlockDescent solver;
   ContactList contacts;
   std::vector<NodeIndex> free_nodes;
@@ -116,7 +114,7 @@ TEST(BlockDescent, EnergyNeverGrowsWithoutATool) {
     if (bench.world.node_classes[i] != world::NodeClass::Fixed)
       bench.world.velocities[i] = {0.3f * static_cast<float>(i % 3), -0.2f, 0.1f};
   const auto energy = [&] {
-    double e = bench.springs.elastic_energy(bench.world.displacements);
+    double e = bench.solver.tissue().energy_j(bench.world.displacements);
     for (std::size_t i = 0; i < bench.world.node_count(); ++i)
       e += 0.5 * static_cast<double>(bench.world.masses[i]) *
            length_squared(to_double(bench.world.velocities[i]));

@@ -1,0 +1,56 @@
+#pragma once
+
+// The one interface of everything that resists deformation: per node, the gradient of an energy
+// over the node's displacement and the 3x3 block of its second derivative, eight nodes at a time.
+//
+// Contract: gradients are exact derivatives of energy_j() (plus, in a step, of the damping's
+// potential); blocks are symmetric, positive semi-definite and at least close to the second
+// derivative; rows of padding contribute nothing. An energy over a node's whole star keeps
+// quantities of nodes (the averaged volume ratio) and is told of each move; nodes must then have
+// colours by Coupling::Stars.
+
+#include <span>
+
+#include "server/dynamics/groups.h"
+
+namespace trocar::dynamics {
+
+struct NodeStep8 {
+  Vec8 gradient;  // N
+  SymMat8 block;  // N/m
+};
+
+// What add() leaves for after_move() of the same group: of one worker.
+struct Scratch {
+  std::vector<Vec3Lanes> rows;
+};
+
+class Energy {
+ public:
+  Energy() = default;
+  Energy(const Energy&) = delete;
+  Energy& operator=(const Energy&) = delete;
+  virtual ~Energy() = default;
+
+  // Once per step, before begin_group. inverse_dt: 1/dt, or 0 for no damping.
+  virtual void begin_step(float /*inverse_dt*/) {}
+  // Once per step for every group that will be swept: what stays constant in the step, from the
+  // displacements at its start (per slot). Several workers at once, each with its own groups.
+  virtual void begin_group(Group, const Float4* /*start*/) {}
+
+  // Adds the group's gradients and blocks at displacements x (per slot). own: those of the group.
+  virtual void add(Group group, const Float4* x, const Vec8& own, NodeStep8& step,
+                   Scratch& scratch) const = 0;
+
+  // For energies over stars. restart_group(), for every group: displacements are new everywhere;
+  // after_move(): the group's nodes have moved by dx since add(), by one worker a group, groups of
+  // one colour at once.
+  virtual bool follows_moves() const { return false; }
+  virtual void restart_group(Group, const Float4* /*x*/) {}
+  virtual void after_move(Group, const Vec8& /*dx*/, const Scratch&) {}
+
+  // In double from the same stored data, J; displacements per slot.
+  virtual double energy_j(std::span<const Vec3d> displacements) const = 0;
+};
+
+}  // namespace trocar::dynamics

@@ -1,0 +1,388 @@
+#include "server/dynamics/hyperelastic.h"
+
+#include <algorithm>
+#include <cmath>
+#include <type_traits>
+
+#include "server/dynamics/tet_shape.h"
+
+namespace trocar::dynamics {
+namespace {
+
+// Nodes of a tet with `first` in front, in an order of positive volume.
+mesh::Tet seen_from(const mesh::Tet& tet, NodeIndex first) {
+  const auto [a, b, c, d] = tet;
+  if (first == a) return {a, b, c, d};
+  if (first == b) return {b, a, d, c};
+  if (first == c) return {c, d, a, b};
+  return {d, c, b, a};
+}
+
+Vec3d opposite_area(std::span<const Vec3d> p, const mesh::Tet& tet) {
+  return cross(p[tet[3].value] - p[tet[1].value], p[tet[2].value] - p[tet[1].value]);
+}
+
+struct Tets {
+  std::vector<mesh::Tet> tets;
+  std::vector<double> c10, bulk;               // Pa
+  std::vector<std::vector<std::uint32_t>> at;  // per node, ascending
+};
+
+Tets collect(const scene::Organ& organ) {
+  Tets result;
+  result.at.resize(organ.mesh.node_count());
+  const auto map = scene::material_map(organ);
+  for (std::size_t t = 0; t < organ.mesh.tets.size(); ++t) {
+    const auto& material = scene::material_at(organ, map.tets[t]);
+    if (material.elastic_law != scene::ElasticLaw::NeoHookean) continue;
+    const auto [c10, bulk] = scene::neo_hookean_parameters(material);
+    for (const auto node : organ.mesh.tets[t])
+      result.at[node.value].push_back(static_cast<std::uint32_t>(result.tets.size()));
+    result.tets.push_back(organ.mesh.tets[t]);
+    result.c10.push_back(c10);
+    result.bulk.push_back(bulk);
+  }
+  return result;
+}
+
+using Matrix = std::array<std::array<double, 3>, 3>;
+
+void add_outer(Matrix& m, const Vec3d& a, double s) {
+  const std::array<double, 3> v{a.x, a.y, a.z};
+  for (std::size_t i = 0; i < 3; ++i)
+    for (std::size_t j = 0; j < 3; ++j) m[i][j] += s * v[i] * v[j];
+}
+
+// A number t <= 1 with exact <= t full as quadratic forms, both positive semi-definite: the largest
+// eigenvalue of the pencil, by power iteration with a margin.
+double bound_of(const Matrix& exact, const Matrix& full) {
+  const double trace = full[0][0] + full[1][1] + full[2][2];
+  if (!(trace > 0)) return 1;
+  SymMat3<double> b{full[0][0] + 1e-9 * trace, full[0][1], full[0][2],
+                    full[1][1] + 1e-9 * trace, full[1][2], full[2][2] + 1e-9 * trace};
+  Vec3d v{0.6, 0.5, 0.4};
+  double largest = 0;
+  for (int i = 0; i < 60; ++i) {
+    const auto line = [&](std::size_t k) {
+      return exact[k][0] * v.x + exact[k][1] * v.y + exact[k][2] * v.z;
+    };
+    const Vec3d next = solve_positive_definite(b, Vec3d{line(0), line(1), line(2)});
+    largest = length(next);
+    if (!(largest > 0)) return 0;
+    v = next / largest;
+  }
+  return std::min(1.0, 1.05 * largest);
+}
+
+// Theta of every node: how much smaller the block of the averaged volume is than the plain one.
+std::vector<double> averaging_bounds(const Tets& tets, std::span<const Vec3d> p,
+                                     std::span<const double> star_volume,
+                                     std::span<const double> star_bulk) {
+  std::vector<double> bounds(star_volume.size(), 1);
+  for (std::uint32_t n = 0; n < bounds.size(); ++n) {
+    std::vector<std::pair<NodeIndex, Vec3d>> change;  // of each star's volume per motion of n
+    Matrix full{}, exact{};
+    for (const auto t : tets.at[n]) {
+      const auto tet = seen_from(tets.tets[t], NodeIndex(n));
+      const Vec3d area = opposite_area(p, tet) / 6;
+      add_outer(full, area, tets.bulk[t] / tet_shape(p, tet).volume);
+      for (const auto node : tet) {
+        auto found = std::ranges::find(change, node, &std::pair<NodeIndex, Vec3d>::first);
+        if (found == change.end()) found = change.insert(change.end(), {node, Vec3d{}});
+        found->second += area;
+      }
+    }
+    for (const auto& [node, area] : change)
+      add_outer(exact, area, star_bulk[node.value] / (4 * star_volume[node.value]));
+    bounds[n] = bound_of(exact, full);
+  }
+  return bounds;
+}
+
+}  // namespace
+
+template <typename Law>
+struct Hyperelastic<Law>::RowShape {
+  Vec8 db, rb, ec, ed, area;  // displacement and vector a to b, vectors b to c and d, m; 2 x area
+  Vec8 dc, dd;                // displacements of c and d from a's
+};
+
+template <typename Law>
+Hyperelastic<Law>::Hyperelastic(const scene::Organ& organ, const Groups& groups,
+                                bool has_averaged_volume, const Law& law)
+    : law_(law),
+      has_averaged_volume_(has_averaged_volume),
+      constant_gradient_(groups.group_count()),
+      constant_block_(groups.group_count()) {
+  const Tets tets = collect(organ);
+  const auto& rest = organ.mesh.rest_positions;
+  const auto& free = organ.stress_free();
+  const auto node_count = organ.mesh.node_count();
+  std::vector<std::uint32_t> counts;
+  for (const auto& list : tets.at) counts.push_back(static_cast<std::uint32_t>(list.size()));
+
+  std::vector<double> star_volume(node_count), star_bulk(node_count), star_change(node_count);
+  std::vector<double> theta(node_count, 1.0);
+  if (has_averaged_volume) {
+    for (std::size_t t = 0; t < tets.tets.size(); ++t) {
+      const double volume = tet_shape(free, tets.tets[t]).volume;
+      const double change = tet_shape(rest, tets.tets[t]).volume - volume;
+      for (const auto node : tets.tets[t]) {
+        star_volume[node.value] += volume;
+        star_bulk[node.value] += volume * tets.bulk[t];
+        star_change[node.value] += change;
+      }
+    }
+    for (std::size_t n = 0; n < node_count; ++n)
+      if (star_volume[n] > 0) star_bulk[n] /= star_volume[n];
+    theta = averaging_bounds(tets, free, star_volume, star_bulk);
+    star_change_.resize(groups.slot_count());
+    star_stiffness_.resize(groups.slot_count());
+    star_offset_.resize(groups.slot_count());
+    for (std::uint32_t n = 0; n < node_count; ++n) {
+      if (!(star_volume[n] > 0)) continue;
+      const Slot slot = groups.slot_of(NodeIndex(n));
+      star_stiffness_[slot] = static_cast<float>(star_bulk[n] / star_volume[n]);
+      star_offset_[slot] = star_change[n];
+      star_change_[slot] = static_cast<float>(star_change[n]);
+    }
+  }
+
+  std::vector<Vec3d> constant_gradient(node_count);
+  std::vector<double> constant_block(node_count);
+  rows_ = make_rows<Row>(
+      groups, counts, [&](Row& row, std::size_t lane, NodeIndex node, std::uint32_t i) {
+        const auto t = tets.at[node.value][i];
+        const auto tet = seen_from(tets.tets[t], node);
+        const auto shape = tet_shape(free, tet);
+        const double scale = 2 * tets.c10[t] * shape.volume;
+        std::array<double, 4> w{};
+        for (std::size_t k = 1; k < 4; ++k) {
+          w[k] = scale * dot(shape.gradients[0], shape.gradients[k]);
+          constant_gradient[node.value] += (rest[tet[k].value] - rest[node.value]) * w[k];
+          constant_block[node.value] -= w[k];
+        }
+        row.b.v[lane] = groups.slot_of(tet[1]);
+        row.c.v[lane] = groups.slot_of(tet[2]);
+        row.d.v[lane] = groups.slot_of(tet[3]);
+        row.wb.v[lane] = static_cast<float>(w[1]);
+        row.wc.v[lane] = static_cast<float>(w[2]);
+        row.wd.v[lane] = static_cast<float>(w[3]);
+        row.ab.set(lane, to_float(rest[tet[1].value] - rest[tet[0].value]));
+        row.bc.set(lane, to_float(rest[tet[2].value] - rest[tet[1].value]));
+        row.bd.set(lane, to_float(rest[tet[3].value] - rest[tet[1].value]));
+        row.volumetric.v[lane] =
+            static_cast<float>(theta[node.value] * tets.bulk[t] / (36 * shape.volume));
+        row.pressure.v[lane] =
+            static_cast<float>(tets.c10[t] / 3 + (has_averaged_volume ? 0.0 : tets.bulk[t] / 6));
+      });
+  if constexpr (Law::kIsLinear) {
+    for (std::uint32_t n = 0; n < node_count; ++n) {
+      const Slot slot = groups.slot_of(NodeIndex(n));
+      constant_gradient_[slot / kLanes].set(slot % kLanes, to_float(constant_gradient[n]));
+      constant_block_[slot / kLanes].v[slot % kLanes] = static_cast<float>(constant_block[n]);
+    }
+  } else {
+    invariant_rows_ = make_rows<InvariantRow>(
+        groups, counts, [&](InvariantRow& row, std::size_t lane, NodeIndex node, std::uint32_t i) {
+          const auto t = tets.at[node.value][i];
+          const auto tet = seen_from(tets.tets[t], node);
+          const auto shape = tet_shape(free, tet);
+          const auto& g = shape.gradients;
+          const double scale = 2 * tets.c10[t] * shape.volume;
+          row.wbc.v[lane] = static_cast<float>(scale * dot(g[1], g[2]));
+          row.wbd.v[lane] = static_cast<float>(scale * dot(g[1], g[3]));
+          row.wcd.v[lane] = static_cast<float>(scale * dot(g[2], g[3]));
+          row.inverse_c10_v2.v[lane] = static_cast<float>(1 / scale);
+        });
+  }
+}
+
+template <typename Law>
+typename Hyperelastic<Law>::RowShape Hyperelastic<Law>::shape(const Row& row, const Float4* x,
+                                                              const Vec8& own) {
+  const Vec8 ub = gather(x, row.b), uc = gather(x, row.c), ud = gather(x, row.d);
+  RowShape s;
+  s.db = ub - own;
+  s.dc = uc - own;
+  s.dd = ud - own;
+  s.rb = load(row.ab) + s.db;
+  s.ec = load(row.bc) + (uc - ub);
+  s.ed = load(row.bd) + (ud - ub);
+  s.area = cross8(s.ed, s.ec);  // dV/dx_a = area / 6
+  return s;
+}
+
+template <typename Law>
+template <bool kAveraged>
+void Hyperelastic<Law>::add_rows(Group group, const Float4* x, const Vec8& own, NodeStep8& step,
+                                 Scratch& scratch) const {
+  const auto rows = rows_[group];
+  if constexpr (kAveraged)
+    if (scratch.rows.size() < rows.size()) scratch.rows.resize(rows.size());
+  Vec8 gradient = zero_vec8();
+  [[maybe_unused]] Float8 identity = all(0);
+  [[maybe_unused]] Float8 own_pressure = all(0);
+  if constexpr (kAveraged) {
+    const Float8 change = _mm256_loadu_ps(&star_change_[group * kLanes]);
+    own_pressure = change * _mm256_loadu_ps(&star_stiffness_[group * kLanes]);
+  }
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const Row& row = rows[i];
+    const RowShape s = shape(row, x, own);
+    if constexpr (Law::kIsLinear) {
+      gradient = fma8(s.db, load(row.wb), gradient);
+      gradient = fma8(s.dc, load(row.wc), gradient);
+      gradient = fma8(s.dd, load(row.wd), gradient);
+    } else {
+      const InvariantRow& extra = invariant_rows_[group][i];
+      const Vec8 rc = s.rb + s.ec, rd = s.rb + s.ed, cd = s.ed - s.ec;
+      const Float8 wb = load(row.wb), wc = load(row.wc), wd = load(row.wd);
+      const Float8 sum =
+          fma8(wb, dot8(s.rb, s.rb), fma8(wc, dot8(rc, rc), wd * dot8(rd, rd))) +
+          fma8(load(extra.wbc), dot8(s.ec, s.ec),
+               fma8(load(extra.wbd), dot8(s.ed, s.ed), load(extra.wcd) * dot8(cd, cd)));
+      const Float8 inverse = load(extra.inverse_c10_v2);
+      Float8 first, second;
+      law_.derivatives(fnma8(sum, inverse, all(-3.0f)), first, second);
+      const Vec8 half_di1 = fma8(s.rb, wb, fma8(rc, wc, rd * wd));  // C10 V dI1
+      gradient = fma8(half_di1, first, gradient);
+      identity = fnma8(wb + wc + wd, first, identity);
+      // C10 V Psi''/C10 dI1 dI1^T with dI1 = half_di1 / (C10 V)
+      step.block.add_outer(half_di1, second * (inverse + inverse));
+    }
+    const Float8 volumetric = load(row.volumetric);
+    step.block.add_outer(s.area, volumetric);
+    Float8 pressure;  // a sixth of K (J - 1) - 2 C10
+    if constexpr (kAveraged) {
+      store(scratch.rows[i], s.area);
+      const auto nodal = [&](const SlotLanes& slots) {
+        return gather(star_change_.data(), slots) * gather(star_stiffness_.data(), slots);
+      };
+      const Float8 mean = (own_pressure + nodal(row.b)) + (nodal(row.c) + nodal(row.d));
+      pressure = fma8(mean, all(1.0f / 24), all(0) - load(row.pressure));
+    } else {
+      // V = area . (a - b) / 6
+      pressure = fnma8(volumetric, dot8(s.area, s.rb), all(0) - load(row.pressure));
+    }
+    gradient = fma8(s.area, pressure, gradient);
+  }
+  step.gradient = step.gradient + gradient;
+  if constexpr (Law::kIsLinear) {
+    step.gradient = step.gradient + load(constant_gradient_[group]);
+    step.block.add_identity(load(constant_block_[group]));
+  } else {
+    step.block.add_identity(identity);
+  }
+}
+
+template <typename Law>
+void Hyperelastic<Law>::add(Group group, const Float4* x, const Vec8& own, NodeStep8& step,
+                            Scratch& scratch) const {
+  if (has_averaged_volume_)
+    add_rows<true>(group, x, own, step, scratch);
+  else
+    add_rows<false>(group, x, own, step, scratch);
+}
+
+template <typename Law>
+void Hyperelastic<Law>::restart_group(Group group, const Float4* x) {
+  // A star's volume is the sum over its tets of (area of the face opposite a) . (a - b) / 6.
+  const Vec8 own = load_group(x + group * kLanes);
+  Float8 six_changes = all(0);
+  for (const Row& row : rows_[group]) {
+    const RowShape s = shape(row, x, own);
+    const Vec8 rest_area = cross8(load(row.bd), load(row.bc));
+    six_changes = six_changes - (dot8(s.area, s.rb) - dot8(rest_area, load(row.ab)));
+  }
+  Lanes changes;
+  store(changes, six_changes * all(1.0f / 6));
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    const std::size_t slot = group * kLanes + lane;
+    star_change_[slot] = changes.v[lane] + static_cast<float>(star_offset_[slot]);
+  }
+}
+
+template <typename Law>
+void Hyperelastic<Law>::after_move(Group group, const Vec8& dx, const Scratch& scratch) {
+  const auto rows = rows_[group];
+  Lanes own_change;
+  Float8 sum = all(0);
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const Float8 change = dot8(load(scratch.rows[i]), dx) * all(1.0f / 6);
+    sum = sum + change;
+    Lanes changes;
+    store(changes, change);
+    const Row& row = rows[i];
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      if (row.b.v[lane] == group * kLanes + lane) continue;  // padding
+      star_change_[row.b.v[lane]] += changes.v[lane];
+      star_change_[row.c.v[lane]] += changes.v[lane];
+      star_change_[row.d.v[lane]] += changes.v[lane];
+    }
+  }
+  store(own_change, sum);
+  for (std::size_t lane = 0; lane < kLanes; ++lane)
+    star_change_[group * kLanes + lane] += own_change.v[lane];
+}
+
+template <typename Law>
+double Hyperelastic<Law>::row_energy(const Row& row, const InvariantRow* extra, std::size_t lane,
+                                     Slot own, std::span<const Vec3d> u,
+                                     std::span<double> star_changes) const {
+  const auto at = [&](const Lanes& l) { return static_cast<double>(l.v[lane]); };
+  const Vec3d ub = u[row.b.v[lane]], uc = u[row.c.v[lane]], ud = u[row.d.v[lane]];
+  const Vec3d ab0 = to_double(row.ab.at(lane)), bc0 = to_double(row.bc.at(lane)),
+              bd0 = to_double(row.bd.at(lane));
+  const Vec3d ab = ab0 + (ub - u[own]), bc = bc0 + (uc - ub), bd = bd0 + (ud - ub);
+  const double six_volumes = -dot(cross(bd, bc), ab);
+  if (has_averaged_volume_) {
+    const double change = (six_volumes + dot(cross(bd0, bc0), ab0)) / 6;
+    star_changes[own] += change;
+  }
+  // Every tet is stored at four nodes; the edges at this one are stored at two.
+  double energy = 0;
+  const Vec3d ac = ab + bc, ad = ab + bd;
+  if constexpr (Law::kIsLinear) {
+    static_cast<void>(extra);
+    // C10 V I1 = -1/2 sum over edges of (2 C10 V w) |.|^2, half of each edge from each end.
+    energy -= 0.25 * (at(row.wb) * length_squared(ab) + at(row.wc) * length_squared(ac) +
+                      at(row.wd) * length_squared(ad));
+  } else {
+    const double inverse = at(extra->inverse_c10_v2);
+    const double sum = at(row.wb) * length_squared(ab) + at(row.wc) * length_squared(ac) +
+                       at(row.wd) * length_squared(ad) + at(extra->wbc) * length_squared(bc) +
+                       at(extra->wbd) * length_squared(bd) +
+                       at(extra->wcd) * length_squared(bd - bc);
+    energy += 0.25 * law_.energy(-sum * inverse - 3) / (2 * inverse);
+  }
+  // -2 C10 V (J - 1) and K/2 V (J - 1)^2 without constants: with p = pressure, v = volumetric,
+  // 6 V_now = s: d/ds of the sum is (v s - p) / 6.
+  energy -= 0.25 * at(row.pressure) * six_volumes;
+  if (!has_averaged_volume_) energy += 0.25 * 0.5 * at(row.volumetric) * six_volumes * six_volumes;
+  return energy;
+}
+
+template <typename Law>
+double Hyperelastic<Law>::energy_j(std::span<const Vec3d> displacements) const {
+  std::vector<double> changes(star_offset_);
+  double energy = 0;
+  for (Group g = 0; g + 1 < rows_.offsets.size(); ++g)
+    for (std::size_t i = 0; i < rows_[g].size(); ++i)
+      for (std::size_t lane = 0; lane < kLanes; ++lane) {
+        const Row& row = rows_[g][i];
+        const Slot own = static_cast<Slot>(g * kLanes + lane);
+        if (row.b.v[lane] == own) continue;  // padding
+        const InvariantRow* extra = nullptr;
+        if constexpr (!Law::kIsLinear) extra = &invariant_rows_[g][i];
+        energy += row_energy(row, extra, lane, own, displacements, changes);
+      }
+  for (std::size_t slot = 0; slot < changes.size(); ++slot)
+    energy += 0.125 * static_cast<double>(star_stiffness_[slot]) * changes[slot] * changes[slot];
+  return energy;
+}
+
+template class Hyperelastic<NeoHookeanLaw>;
+template class Hyperelastic<ReducedPolynomialLaw>;
+
+}  // namespace trocar::dynamics

@@ -1,0 +1,78 @@
+#pragma once
+
+// Hyperelastic tets in edge-length form: with shape gradients g and w_ab = g_a . g_b,
+//   W = Psi(I1) - 2 C10 (J - 1) + K/2 (J - 1)^2,   I1 = - sum over edges of w_ab |x_a - x_b|^2,
+// I1 unsplit and J affine in each node, so that a node's block
+//   V [2 Psi' w_aa I + Psi'' (dI1)(dI1)^T + K (dJ)(dJ)^T]
+// is exact and positive definite and an inverted tet is no special case. Both brackets are free of
+// stress at rest.
+//
+// Averaged volume (against locking; after Bonet and Burton 1998): the volumetric term is taken per
+// node, W_vol = sum_a V_a K_a/2 (J_a - 1)^2, with J_a the ratio of current to rest volume of a's
+// tets and V_a a quarter of that rest volume; J_a is affine in each node of the star. Its exact
+// block is bounded by theta times the unaveraged one, theta found at rest; nodes need colours by
+// Coupling::Stars. Volumes are summed as nodes move and anew at each step.
+
+#include "server/dynamics/energy.h"
+#include "server/dynamics/psi.h"
+
+namespace trocar::dynamics {
+
+template <typename Law>
+class Hyperelastic final : public Energy {
+ public:
+  // Of the organ's tets with ElasticLaw::NeoHookean; `law` replaces Psi, with the material's C10.
+  Hyperelastic(const scene::Organ& organ, const Groups& groups, bool has_averaged_volume,
+               const Law& law = {});
+
+  void add(Group group, const Float4* x, const Vec8& own, NodeStep8& step,
+           Scratch& scratch) const override;
+  bool follows_moves() const override { return has_averaged_volume_; }
+  void restart_group(Group group, const Float4* x) override;
+  void after_move(Group group, const Vec8& dx, const Scratch& scratch) override;
+  double energy_j(std::span<const Vec3d> displacements) const override;
+
+ private:
+  // A tet seen from its node a; b, c, d complete it to positive volume.
+  struct Row {
+    SlotLanes b, c, d;
+    Lanes wb, wc, wd;      // 2 C10 V w_ab, ..., N/m
+    Vec3Lanes ab, bc, bd;  // rest pose, m
+    Lanes volumetric;      // theta K / (36 V), Pa/m^3
+    Lanes pressure;        // C10 / 3; K / 6 more if the volume is not averaged, Pa
+
+    void pad(std::size_t lane, Slot own) { b.v[lane] = c.v[lane] = d.v[lane] = own; }
+  };
+  // What only laws that need I1 read.
+  struct InvariantRow {
+    Lanes wbc, wbd, wcd;   // 2 C10 V w_bc, ..., N/m
+    Lanes inverse_c10_v2;  // 1 / (2 C10 V), 1/J
+
+    void pad(std::size_t, Slot) {}
+  };
+  struct RowShape;
+  static RowShape shape(const Row& row, const Float4* x, const Vec8& own);
+  template <bool kAveraged>
+  void add_rows(Group group, const Float4* x, const Vec8& own, NodeStep8& step,
+                Scratch& scratch) const;
+  double row_energy(const Row& row, const InvariantRow* extra, std::size_t lane, Slot own,
+                    std::span<const Vec3d> u, std::span<double> star_changes) const;
+
+  const Law law_;
+  const bool has_averaged_volume_;
+  GroupRows<Row> rows_;
+  GroupRows<InvariantRow> invariant_rows_;    // empty for a linear law
+  std::vector<Vec3Lanes> constant_gradient_;  // N per group; linear laws
+  std::vector<Lanes> constant_block_;         // N/m per group; linear laws
+  // Averaged volume, per slot: change of the star's volume since free of stress (m^3), and K_a over
+  // the star's stress-free volume (Pa/m^3).
+  std::vector<float> star_change_, star_stiffness_;
+  std::vector<double> star_offset_;  // change at zero displacement
+};
+
+using NeoHookean = Hyperelastic<NeoHookeanLaw>;
+
+extern template class Hyperelastic<NeoHookeanLaw>;
+extern template class Hyperelastic<ReducedPolynomialLaw>;
+
+}  // namespace trocar::dynamics

@@ -1,0 +1,50 @@
+#pragma once
+
+// Springs with dashpots beside them (Choi 2002 eq. 1), between nodes i and j at r = x_j - x_i.
+//
+// Elastic energy k/2 (|r| - l0)^2. (Eq. 1 as printed has the spring repel; here it attracts.) The
+// dashpot resists the rate of the length (Kelvin-Voigt), implicit over a step dt from the length
+// l_s at its start: potential b/(2 dt) (|r| - l_s)^2. The two together are one spring of stiffness
+// k + b/dt, so damping costs a sweep nothing. The stiffness across a compressed spring is negative;
+// it counts as zero in the block, which therefore is positive semi-definite; gradients are exact.
+// Two nodes in one place have no direction between them: that spring is silent.
+
+#include "server/dynamics/energy.h"
+
+namespace trocar::dynamics {
+
+class Springs final : public Energy {
+ public:
+  Springs(const scene::Organ& organ, const Groups& groups);
+  // False: the organ's material needs none.
+  bool has_any() const { return has_any_; }
+
+  void begin_step(float inverse_dt) override;
+  void begin_group(Group group, const Float4* start) override;
+  void add(Group group, const Float4* x, const Vec8& own, NodeStep8& step,
+           Scratch& scratch) const override;
+  double energy_j(std::span<const Vec3d> displacements) const override;
+
+ private:
+  struct Row {
+    SlotLanes neighbour;
+    Vec3Lanes rest;   // m, to the neighbour at rest
+    Lanes stiffness;  // k + b/dt, N/m
+    Lanes pull;       // k l0 + b/dt l_s, N
+
+    void pad(std::size_t lane, Slot own) { neighbour.v[lane] = own; }
+  };
+  struct Constants {
+    Lanes stiffness;    // k, N/m
+    Lanes damping;      // b, N s/m
+    Lanes rest_length;  // l0, m
+
+    void pad(std::size_t, Slot) {}
+  };
+  GroupRows<Row> rows_;
+  GroupRows<Constants> constants_;
+  float inverse_dt_ = 0;
+  bool has_any_ = false, has_damping_ = false;
+};
+
+}  // namespace trocar::dynamics

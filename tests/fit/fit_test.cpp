@@ -1,0 +1,237 @@
+// A fit finds the numbers from which a curve was made, noise and all, and says what it cannot do.
+
+#include "server/fit/fit.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <numbers>
+
+#include "server/scenario/scenario_run.h"
+
+namespace trocar::fit {
+namespace {
+
+// A cube on a plate, pulled up by 4 mm.
+std::string pulled(const std::string& material, const std::string& run) {
+  return R"([organ]
+source = "block"
+nodes = [4, 4, 4]
+spacing_mm = 8
+[[nodes]]
+name = "plate"
+box_min_mm = [-12, 12, -12]
+box_max_mm = [12, 12, 12]
+[[displace]]
+set = "plate"
+[[displace.key]]
+time_s = 0
+displacement_mm = [0, 0, 0]
+[[displace.key]]
+time_s = 0.1
+displacement_mm = [0, 4, 0]
+[[probe]]
+set = "plate"
+quantity = "reaction"
+rate_hz = 1000
+[material]
+)" + material +
+         "[run]\nseconds = 0.2\n" + run;
+}
+
+std::string pulled_static(const std::string& material) {
+  std::string text = pulled(material, "mode = \"static\"\nload_steps = 20\n");
+  text.erase(text.find("rate_hz = 1000\n"), 15);
+  return text;
+}
+
+scene::ResolvedScenario resolve(const std::string& text) {
+  auto parsed = scene::parse_scenario_text(text, "test.toml");
+  EXPECT_TRUE(parsed.ok()) << (parsed.ok() ? "" : parsed.error().message);
+  if (!parsed) return {};
+  auto resolved = scene::resolve(std::move(*parsed));
+  EXPECT_TRUE(resolved.ok()) << (resolved.ok() ? "" : resolved.error().message);
+  return resolved.ok() ? std::move(*resolved) : scene::ResolvedScenario{};
+}
+
+// What a machine would record of a scenario: `noise` of the largest force, of no special form.
+MeasuredCurve recorded(const std::string& text, double noise) {
+  const auto resolved = resolve(text);
+  const auto curve = scenario::load_curves(resolved).at(0);
+  scenario::ScenarioRun run(resolved, scenario::Solver::Full);
+  MeasuredCurve measured;
+  measured.source = "measured.csv";
+  measured.has_times = resolved.scenario.run.mode == scene::RunMode::Dynamic;
+  double largest = 0;
+  while (!run.is_finished()) {
+    run.step();
+    const auto [displacement, force] = scenario::load_point(run, curve);
+    largest = std::max(largest, force);
+    if (measured.has_times && run.steps_done() % 4 != 0) continue;
+    measured.points.push_back(
+        {displacement, force, run.time_s(), static_cast<int>(measured.points.size()) + 2});
+  }
+  double phase = 0;
+  for (auto& point : measured.points) {
+    phase += std::numbers::phi;  // evenly spread, never periodic
+    const double uniform = 2 * (phase - std::floor(phase)) - 1;
+    point.force_n += noise * largest * uniform * std::numbers::sqrt3;
+  }
+  return measured;
+}
+
+TEST(Fit, FindsTheModulusFromANoisyCurve) {
+  const auto measured = recorded(pulled_static("young_modulus_pa = 6000\n"), 0.02);
+  const auto fitted = fit(resolve(pulled_static("young_modulus_pa = 1000\n")), measured, {});
+  ASSERT_TRUE(fitted.ok()) << fitted.error().message;
+  ASSERT_EQ(fitted->parameters.size(), 1u);
+  const auto& modulus = fitted->parameters[0];
+  EXPECT_EQ(modulus.key, "young_modulus_pa");
+  EXPECT_EQ(modulus.start, 1000);
+  EXPECT_NEAR(modulus.value, 6000, 0.02 * 6000);
+  ASSERT_TRUE(modulus.standard_error);
+  EXPECT_LT(std::abs(modulus.value - 6000), 4 * *modulus.standard_error);
+  EXPECT_GT(*modulus.standard_error, 5);
+  EXPECT_NEAR(fitted->rms_percent, 2, 0.7) << "what is left is the noise";
+  EXPECT_TRUE(fitted->is_converged);
+  EXPECT_EQ(fitted->organ.material.young_modulus_pa, modulus.value);
+  EXPECT_LT(fitted->runs, 15);
+}
+
+TEST(Fit, TheOrderOfMeasurementsDoesNotMatterInAStaticRun) {
+  auto measured = recorded(pulled_static("young_modulus_pa = 6000\n"), 0);
+  std::ranges::reverse(measured.points);
+  measured.points.push_back(measured.points.front());
+  const auto fitted = fit(resolve(pulled_static("young_modulus_pa = 4000\n")), measured, {});
+  ASSERT_TRUE(fitted.ok()) << fitted.error().message;
+  EXPECT_NEAR(fitted->parameters[0].value, 6000, 6);
+  EXPECT_LT(fitted->rms_percent, 0.1);
+}
+
+TEST(Fit, FindsStiffnessAndDampingFromACurveInTime) {
+  const auto text = [](const char* modulus, const char* damping) {
+    return pulled(std::string("node_damping_per_s = 2\nyoung_modulus_pa = ") + modulus +
+                      "\nspring_damping_time_s = " + damping + "\n",
+                  "tolerance_n = 1e-4\n");
+  };
+  const auto measured = recorded(text("6000", "0.02"), 0.01);
+  FitOptions options;
+  options.parameters = {"young_modulus_pa", "spring_damping_time_s"};
+  const auto fitted = fit(resolve(text("3000", "0.005")), measured, options);
+  ASSERT_TRUE(fitted.ok()) << fitted.error().message;
+  EXPECT_NEAR(fitted->parameters[0].value, 6000, 0.03 * 6000);
+  EXPECT_NEAR(fitted->parameters[1].value, 0.02, 0.05 * 0.02);
+  const std::string toml = to_toml(*fitted, options);
+  EXPECT_TRUE(toml.starts_with("[material]\nyoung_modulus_pa = ")) << toml;
+  EXPECT_NE(toml.find("\nspring_damping_time_s = 0.0"), std::string::npos) << toml;
+}
+
+TEST(Fit, AToolCanBeTheMachine) {
+  const auto text = [](const char* modulus) {
+    return std::string(R"([organ]
+source = "block"
+nodes = [6, 4, 6]
+spacing_mm = 8
+[[tool]]
+radius_mm = 12
+ease = "linear"
+[[tool.key]]
+time_s = 0
+position_mm = [0, 12, 0]
+shaft = [0, 1, 0]
+verb = "push"
+[[tool.key]]
+time_s = 1
+position_mm = [0, 10, 0]
+[run]
+mode = "static"
+seconds = 1
+load_steps = 4
+tolerance_n = 1e-5
+[[probe]]
+tool = 0
+quantity = "force"
+[material]
+young_modulus_pa = )") +
+           modulus + "\n";
+  };
+  const auto measured = recorded(text("6000"), 0);
+  EXPECT_GT(measured.points.back().force_n, 0.02) << "pressing is positive";
+  EXPECT_NEAR(measured.points.back().displacement_m, 0.002, 1e-5);
+  const auto fitted = fit(resolve(text("4000")), measured, {});
+  ASSERT_TRUE(fitted.ok()) << fitted.error().message;
+  EXPECT_NEAR(fitted->parameters[0].value, 6000, 0.02 * 6000);
+}
+
+TEST(Fit, WhatCannotBeFittedIsSaid) {
+  const auto resolved = resolve(pulled_static("young_modulus_pa = 1000\n"));
+  const auto measured = recorded(pulled_static("young_modulus_pa = 6000\n"), 0);
+  const auto message = [&](const MeasuredCurve& curve, std::vector<std::string> parameters) {
+    FitOptions options;
+    options.parameters = std::move(parameters);
+    const auto fitted = fit(resolved, curve, options);
+    return fitted.ok() ? "" : fitted.error().message;
+  };
+  EXPECT_NE(message(measured, {"stiffness"}).find("young_modulus_pa, spring_stiffness_n_m"),
+            std::string::npos);
+  EXPECT_NE(message(measured, {"poisson_ratio"}).find("springs have 1/4"), std::string::npos);
+  EXPECT_NE(message(measured, {"spring_damping_time_s"}).find("no damping"), std::string::npos);
+  EXPECT_NE(message(measured, {"spring_stiffness_n_m"}).find("fit that"), std::string::npos);
+  auto far = measured;
+  far.points.push_back({0.009, 1, 0, 99});
+  EXPECT_TRUE(message(far, {}).starts_with("measured.csv:99: displacement 9 mm is not among"))
+      << message(far, {});
+  FitOptions options;
+  options.region = "tumour";
+  const auto no_region = fit(resolved, measured, options);
+  ASSERT_FALSE(no_region.ok());
+  EXPECT_NE(no_region.error().message.find("no region \"tumour\""), std::string::npos);
+  const auto no_curve = fit(resolve("[organ]\nsource = \"block\"\nnodes = [2, 2, 2]\n[run]\n"
+                                    "seconds = 1\n"),
+                            measured, {});
+  ASSERT_FALSE(no_curve.ok());
+  EXPECT_NE(no_curve.error().message.find("test.toml: has no force-displacement curve"),
+            std::string::npos);
+}
+
+class Csv : public ::testing::Test {
+ protected:
+  Result<MeasuredCurve> read(const std::string& text) {
+    std::ofstream(path_) << text;
+    return read_measurements(path_);
+  }
+  ~Csv() override { std::filesystem::remove(path_); }
+
+  const std::filesystem::path path_ =
+      std::filesystem::temp_directory_path() / ("trocar-fit-" + std::to_string(getpid()) + ".csv");
+};
+
+TEST_F(Csv, ColumnsAreFoundByName) {
+  const auto curve =
+      read("# by hand\nforce_n,note,displacement_mm\r\n0.5, a ,2\r\n\r\n\"1\";b;4\n");
+  ASSERT_TRUE(curve.ok()) << curve.error().message;
+  ASSERT_EQ(curve->points.size(), 2u);
+  EXPECT_DOUBLE_EQ(curve->points[0].displacement_m, 0.002);
+  EXPECT_EQ(curve->points[1].force_n, 1);
+  EXPECT_EQ(curve->points[1].line, 5);
+  EXPECT_FALSE(curve->has_times);
+}
+
+TEST_F(Csv, WhatIsWrongIsOneLineWithItsPlace) {
+  const auto says = [&](const std::string& text) {
+    const auto curve = read(text);
+    return curve.ok() ? "" : curve.error().message.substr(path_.string().size());
+  };
+  EXPECT_TRUE(says("1,2\n").starts_with(":1: is no header")) << says("1,2\n");
+  EXPECT_TRUE(says("displacement_mm,force_n\n1,nan\n").starts_with(":2: "));
+  EXPECT_TRUE(says("displacement_mm,force_n\n1\n").starts_with(":2: "));
+  EXPECT_TRUE(says("displacement_mm,force_n,time_s\n1,1,1\n1,1,1\n").starts_with(":3: time_s"));
+  EXPECT_EQ(says("displacement_mm,force_n\n"), ": has no measurements");
+  EXPECT_FALSE(read_measurements("/nowhere/x.csv").ok());
+}
+
+}  // namespace
+}  // namespace trocar::fit
