@@ -35,7 +35,7 @@ std::vector<Law> laws() {
                        is_averaged ? "averaged_volume = true\n" : "");
   };
   return {
-      {"springs", "springs", "", std::nullopt, 0.01, 0.06},
+      {"springs", "springs", "", std::nullopt, 0.015, 0.06},
       {"tensor-mass", "tensor-mass, nu = 0.25", tets("tensor-mass", 0.25, false), 0.25, 0.01, 0.10},
       {"neo-hookean", "neo-Hookean, nu = 0.4756", tets("neo-hookean", kLiverPoisson, false),
        kLiverPoisson, 0.03, 0.80},

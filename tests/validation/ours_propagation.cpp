@@ -10,6 +10,7 @@
 #include "common/scene/builtin_organs.h"
 #include "tests/validation/experiments.h"
 #include "tests/validation/measure.h"
+#include "tests/validation/organs.h"
 #include "tests/validation/scenario_text.h"
 
 namespace trocar::validation {
@@ -24,7 +25,8 @@ struct Press {
   const char* anchor;
   double radius_mm;  // more than three elements
   double depth_mm;
-  double frozen_mean;  // bounds at the default limit of nodes: mean error of the contact force
+  // Bounds of the contact force's error, the latter three at the default limit of nodes.
+  double whole_mean = 0.01, frozen_mean = 0.2, graded_mean = 0.03, graded_peak = 0.05;
 };
 
 std::string press_scene(const Press& press, const std::string& run) {
@@ -160,7 +162,8 @@ void study_press(const Lab& lab, Section& section, const Press& press) {
   const Course live = follow(lab, section, *whole);
   const Errors live_errors = compare(live, reference);
   add_row(study, "whole", "all", live, live_errors);
-  section.at_most(fmt::format("{}-whole", press.organ), "full solve", live_errors.mean, 0.01,
+  section.at_most(fmt::format("{}-whole", press.organ), "full solve", live_errors.mean,
+                  press.whole_mean,
                   "Every node, four sweeps per tick: mean error of the contact force.");
 
   Errors frozen, graded;
@@ -171,12 +174,13 @@ void study_press(const Lab& lab, Section& section, const Press& press) {
                               "bound is what this mode is known to do, not what is wanted.",
                               kDefaultNodes, shown_percent(frozen.peak)));
   if (sweep_limits(lab, section, press, reference, "graded", study, graded)) {
-    section.at_most(fmt::format("{}-graded", press.organ), "full solve", graded.mean, 0.03,
+    section.at_most(fmt::format("{}-graded", press.organ), "full solve", graded.mean,
+                    press.graded_mean,
                     fmt::format("{} nodes swept more, the rest less: mean error of the contact "
                                 "force.",
                                 kDefaultNodes));
-    section.at_most(fmt::format("{}-graded-peak", press.organ), "full solve", graded.peak, 0.05,
-                    "The same: largest error over the largest force.");
+    section.at_most(fmt::format("{}-graded-peak", press.organ), "full solve", graded.peak,
+                    press.graded_peak, "The same: largest error over the largest force.");
   }
   section.add(std::move(study.forces));
   if (!lab.is_short()) section.add(std::move(study.errors));
@@ -197,16 +201,41 @@ void introduce(Section& section, double radius_mm, double depth_mm) {
 
 void run_propagation_lattice(const Lab& lab, Section& section) {
   introduce(section, 32, 10);
+  section.say(
+      "The lattice of the paper has no shear stiffness; its columns buckle under a push, so its "
+      "bounds are wider, and four sweeps of every node are a few per cent off themselves. With "
+      "springs along the diagonals it behaves like tissue.");
+  lab.keep_organ("lattice-with-diagonals", lattice_with_diagonals({}));
   study_press(lab, section,
-              {"lattice", lattice_organ(30, 15, 30, 10), "[0.03, 1, 0.03]", 32, 10, 0.5});
+              {.organ = "lattice-with-diagonals",
+               .source = organ_source("lattice-with-diagonals.organ"),
+               .anchor = "[0.03, 1, 0.03]",
+               .radius_mm = 32,
+               .depth_mm = 10});
+  if (lab.is_short()) return;
+  study_press(lab, section,
+              {.organ = "lattice",
+               .source = lattice_organ(30, 15, 30, 10),
+               .anchor = "[0.03, 1, 0.03]",
+               .radius_mm = 32,
+               .depth_mm = 10,
+               .whole_mean = 0.03,
+               .graded_mean = 0.03,
+               .graded_peak = 0.08});
 }
 
 void run_propagation_liver(const Lab& lab, Section& section) {
   introduce(section, 28, 10);
-  study_press(lab, section, {"liver-4k", organ_source("liver"), "[0.2, 0.1, 1]", 28, 10, 0.6});
-  if (!lab.is_short())
-    study_press(lab, section,
-                {"liver-4k-below", organ_source("liver"), "[-0.5, -0.6, 1]", 28, 10, 0.6});
+  Press press{.organ = "liver-4k",
+              .source = organ_source("liver"),
+              .anchor = "[0.2, 0.1, 1]",
+              .radius_mm = 28,
+              .depth_mm = 10};
+  study_press(lab, section, press);
+  if (lab.is_short()) return;
+  press.organ = "liver-4k-left";
+  press.anchor = "[-0.5, -0.6, 1]";
+  study_press(lab, section, press);
 }
 
 void run_propagation_large_liver(const Lab& lab, Section& section) {
@@ -215,12 +244,23 @@ void run_propagation_large_liver(const Lab& lab, Section& section) {
   TROCAR_ASSERT(liver.ok());
   lab.keep_organ("liver-17k", *liver);
   study_press(lab, section,
-              {"liver-17k", organ_source("liver-17k.organ"), "[0.2, 0.1, 1]", 18, 10, 0.8});
+              {.organ = "liver-17k",
+               .source = organ_source("liver-17k.organ"),
+               .anchor = "[0.2, 0.1, 1]",
+               .radius_mm = 18,
+               .depth_mm = 10,
+               .frozen_mean = 0.4});
 }
 
 void run_propagation_stomach(const Lab& lab, Section& section) {
   introduce(section, 14, 10);
-  study_press(lab, section, {"stomach", organ_source("stomach"), "[0.3, 0.2, 1]", 14, 10, 0.8});
+  study_press(lab, section,
+              {.organ = "stomach",
+               .source = organ_source("stomach"),
+               .anchor = "[0.3, 0.2, 1]",
+               .radius_mm = 14,
+               .depth_mm = 10,
+               .frozen_mean = 0.8});
 }
 
 }  // namespace trocar::validation
