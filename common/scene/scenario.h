@@ -163,8 +163,9 @@ struct RunRule {
   std::optional<std::uint32_t> depth, nodes;
   std::uint32_t sweeps = 4;
   double over_relaxation = 1.5;
-  std::uint32_t far_sweeps = 1;  // Graded: outside the queue
-  double far_over_relaxation = 1.3;
+  // Graded, outside the queue; without: what the organ needs.
+  std::optional<std::uint32_t> far_sweeps;
+  std::optional<double> far_over_relaxation;
   double tolerance_n = 1e-5;        // of the full solver: residual at which a step is done
   std::uint32_t max_sweeps = 2000;  // of the full solver
   std::vector<Place> given;         // of each key in [run]

@@ -34,9 +34,10 @@ void read_boundary(TableReader& reader, RunRule& run) {
     refuse_keys(reader, {"depth", "nodes"}, "limits boundary \"frozen\" or \"graded\"");
   else if (!is_limited)
     reader.fail("boundary", "\"frozen\" and \"graded\" need depth or nodes or both beside it");
-  read_count(reader, "far_sweeps", 1, 64, run.far_sweeps);
-  run.far_over_relaxation =
-      reader.number("far_over_relaxation", 0.5, 1.9).value_or(run.far_over_relaxation);
+  limit = 0;
+  read_count(reader, "far_sweeps", 1, 16, limit);
+  if (limit > 0) run.far_sweeps = limit;
+  run.far_over_relaxation = reader.number("far_over_relaxation", 0.5, 1.9);
   if (run.boundary != Boundary::Graded)
     refuse_keys(reader, {"far_sweeps", "far_over_relaxation"}, "is for boundary = \"graded\"");
 }

@@ -4,6 +4,7 @@
 #include <charconv>
 
 #include "common/base/version.h"
+#include "common/base/workers.h"
 #include "server/app/journal_sink.h"
 #include "server/step/simulation.h"
 
@@ -73,13 +74,23 @@ Result<std::optional<ServerOptions>> parse_command_line(int argc, char** argv) {
       ->type_name("FILE");
   app.add_option("--ready-file", options.ready_file, "write the port to this file when listening")
       ->type_name("FILE");
-  app.add_option("--depth", options.decisions.depth_limit, "layers that a force propagates")
-      ->capture_default_str();
+  bool is_frozen = false;
+  app.add_flag("--frozen", is_frozen,
+               "tissue beyond the limits stands still, as in the papers, instead of moving with "
+               "fewer sweeps");
+  auto* depth = app.add_option("--depth", options.decisions.depth_limit,
+                               "layers around each contact that get all sweeps [3, frozen: 6]");
   app.add_option("--nodes", options.decisions.node_limit, "nodes that all forces together reach")
       ->capture_default_str();
   app.add_option("--sweeps", options.decisions.sweeps, "passes of the solver per tick")
       ->capture_default_str();
   app.add_option("--omega", options.decisions.over_relaxation, "over-relaxation, 1 to 1.9")
+      ->capture_default_str();
+  app.add_option("--far-sweeps", options.decisions.far_sweeps,
+                 "passes per tick for the rest of the organ, 0: as many as the organ needs")
+      ->capture_default_str();
+  app.add_option("--workers", options.workers, "threads that share a tick's work")
+      ->check(CLI::Range(1u, kMaxWorkers))
       ->capture_default_str();
   app.add_option("--log-level", options.log_level, "error, warn, info, debug or off")
       ->capture_default_str();
@@ -91,6 +102,10 @@ Result<std::optional<ServerOptions>> parse_command_line(int argc, char** argv) {
       return std::optional<ServerOptions>();
     }
     return Error{ErrorCode::Usage, std::string(error.what()) + " (see --help)"};
+  }
+  if (is_frozen) {
+    options.decisions.boundary = world::Boundary::Frozen;
+    if (depth->count() == 0) options.decisions.depth_limit = step::kFrozenDepthLimit;
   }
   if (const auto parsed = parse_listen_address(listen, options); !parsed) return parsed.error();
   if (const auto valid = step::validate(options.decisions); !valid) return valid.error();

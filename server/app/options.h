@@ -19,6 +19,7 @@ struct ServerOptions {
   std::string summary_file;  // empty: none
   std::string ready_file;    // empty: none
   step::TickDecisions decisions;
+  unsigned workers = 1;
   std::string log_level = "info";
 };
 

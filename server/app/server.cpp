@@ -37,7 +37,7 @@ Tick ticks_of(double seconds) {
 class Server {
  public:
   Server(const ServerOptions& options, scene::Organ organ)
-      : options_(options), simulation_(std::move(organ)) {}
+      : options_(options), simulation_(std::move(organ), options.workers) {}
 
   // Binds the port and opens the journal.
   Status open();

@@ -45,6 +45,7 @@ struct Options {
   std::string out;
   std::string solver = "live";
   bool is_plotted = false;
+  unsigned threads = 1;
   std::string log_level = "info";
 };
 
@@ -151,6 +152,9 @@ void print_summary(const scenario::ScenarioRun& run, const Totals& totals,
       run.world().node_count(), totals.most_active,
       steps == 0 ? 0.0 : static_cast<double>(totals.sweeps) / static_cast<double>(steps),
       static_cast<double>(totals.worst_residual_n));
+  if (run.stable_dt_s())
+    std::printf("explicit steps of %.4g s, stable up to %.4g s\n", run.scenario().run.dt_s(),
+                *run.stable_dt_s());
   std::printf("results in %s\n", folder.c_str());
 }
 
@@ -171,9 +175,9 @@ Status run_scenario(const Options& options) {
                  folder.string() + ": cannot be made (" + failed.message() + "), see --out"};
   std::signal(SIGINT, request_stop);
   std::signal(SIGTERM, request_stop);
-  scenario::ScenarioRun run(std::move(*resolved), options.solver == "full"
-                                                      ? scenario::Solver::Full
-                                                      : scenario::Solver::Live);
+  scenario::ScenarioRun run(
+      std::move(*resolved),
+      options.solver == "full" ? scenario::Solver::Full : scenario::Solver::Live, options.threads);
   Totals totals;
   if (auto s = simulate(run, folder, options.is_plotted, totals); !s) return s;
   print_summary(run, totals, folder);
@@ -200,6 +204,10 @@ int run(int argc, char** argv) {
   app.add_flag("--plot", options.is_plotted,
                "also draw what each probe saw: probe_<name>.svg over time, and force_<name>.svg, "
                "force against displacement, of what loads the tissue and is probed");
+  app.add_option("--threads", options.threads, "of the solver; results are the same")
+      ->type_name("N")
+      ->check(CLI::Range(1, 64))
+      ->capture_default_str();
   app.add_option("--log-level", options.log_level, "error, warn, info, debug or off")
       ->capture_default_str();
   try {

@@ -455,11 +455,17 @@ FarPlan BlockDescent::far_plan(float dt) const {
   if (!(mass > 0)) return plan;
   const auto step = static_cast<double>(dt);
   const double kappa = step * step * stiffness / mass;
-  const auto best = static_cast<float>(2 * (1 + kappa) / (2 + kappa));
   plan.kappa = static_cast<float>(kappa);
-  plan.sweeps = kappa <= 1 ? 1 : 2;
-  plan.over_relaxation = std::min(
-      best, plan.sweeps == 1 ? kMaxFarOverRelaxationOneSweep : kMaxFarOverRelaxationTwoSweeps);
+  return plan.with_sweeps(kappa <= 1 ? 1 : 2);
+}
+
+FarPlan FarPlan::with_sweeps(std::uint32_t count) const {
+  FarPlan plan = *this;
+  if (count == 0) return plan;
+  plan.sweeps = count;
+  const float best = 2 * (1 + kappa) / (2 + kappa);
+  plan.over_relaxation =
+      std::min(best, count == 1 ? kMaxFarOverRelaxationOneSweep : kMaxFarOverRelaxationTwoSweeps);
   return plan;
 }
 

@@ -18,9 +18,9 @@
 #include <vector>
 
 #include "common/base/index.h"
+#include "common/base/workers.h"
 #include "server/contact/contact_list.h"
 #include "server/dynamics/tissue.h"
-#include "server/dynamics/workers.h"
 #include "server/world/world.h"
 
 namespace trocar::dynamics {
@@ -61,6 +61,9 @@ struct FarPlan {
   float kappa = 0;
   std::uint32_t sweeps = 1;
   float over_relaxation = 1.3f;
+
+  // The same organ with another number of sweeps, 0: this one.
+  FarPlan with_sweeps(std::uint32_t count) const;
 };
 
 class BlockDescent {

@@ -136,7 +136,7 @@ Hyperelastic<Law>::Hyperelastic(const scene::Organ& organ, const Groups& groups,
     for (std::size_t n = 0; n < node_count; ++n)
       if (star_volume[n] > 0) star_bulk[n] /= star_volume[n];
     theta = averaging_bounds(tets, free, star_volume, star_bulk);
-    star_change_.resize(groups.slot_count());
+    star_pressure_.resize(groups.slot_count());
     star_stiffness_.resize(groups.slot_count());
     star_offset_.resize(groups.slot_count());
     for (std::uint32_t n = 0; n < node_count; ++n) {
@@ -144,7 +144,7 @@ Hyperelastic<Law>::Hyperelastic(const scene::Organ& organ, const Groups& groups,
       const Slot slot = groups.slot_of(NodeIndex(n));
       star_stiffness_[slot] = static_cast<float>(star_bulk[n] / star_volume[n]);
       star_offset_[slot] = star_change[n];
-      star_change_[slot] = static_cast<float>(star_change[n]);
+      star_pressure_[slot] = star_stiffness_[slot] * static_cast<float>(star_change[n]);
     }
   }
 
@@ -224,8 +224,7 @@ void Hyperelastic<Law>::add_rows(Group group, const Float4* x, const Vec8& own, 
   [[maybe_unused]] Float8 identity = all(0);
   [[maybe_unused]] Float8 own_pressure = all(0);
   if constexpr (kAveraged) {
-    const Float8 change = _mm256_loadu_ps(&star_change_[group * kLanes]);
-    own_pressure = change * _mm256_loadu_ps(&star_stiffness_[group * kLanes]);
+    own_pressure = _mm256_loadu_ps(&star_pressure_[group * kLanes]);
   }
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const Row& row = rows[i];
@@ -257,7 +256,7 @@ void Hyperelastic<Law>::add_rows(Group group, const Float4* x, const Vec8& own, 
     if constexpr (kAveraged) {
       store(scratch.rows[i], s.area);
       const auto nodal = [&](const SlotLanes& slots) {
-        return gather(star_change_.data(), slots) * gather(star_stiffness_.data(), slots);
+        return gather(star_pressure_.data(), slots);
       };
       const Float8 mean = (own_pressure + nodal(row.b)) + (nodal(row.c) + nodal(row.d));
       pressure = fma8(mean, all(1.0f / 24), all(0) - load(row.pressure));
@@ -299,15 +298,18 @@ void Hyperelastic<Law>::restart_group(Group group, const Float4* x) {
   store(changes, six_changes * all(1.0f / 6));
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     const std::size_t slot = group * kLanes + lane;
-    star_change_[slot] = changes.v[lane] + static_cast<float>(star_offset_[slot]);
+    star_pressure_[slot] =
+        star_stiffness_[slot] * (changes.v[lane] + static_cast<float>(star_offset_[slot]));
   }
 }
 
 template <typename Law>
 void Hyperelastic<Law>::after_move(Group group, const Vec8& dx, const Scratch& scratch) {
   const auto rows = rows_[group];
-  Lanes own_change;
   Float8 sum = all(0);
+  const auto push = [&](Slot slot, float change) {
+    star_pressure_[slot] += change * star_stiffness_[slot];
+  };
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const Float8 change = dot8(load(scratch.rows[i]), dx) * all(1.0f / 6);
     sum = sum + change;
@@ -316,14 +318,15 @@ void Hyperelastic<Law>::after_move(Group group, const Vec8& dx, const Scratch& s
     const Row& row = rows[i];
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
       if (row.b.v[lane] == group * kLanes + lane) continue;  // padding
-      star_change_[row.b.v[lane]] += changes.v[lane];
-      star_change_[row.c.v[lane]] += changes.v[lane];
-      star_change_[row.d.v[lane]] += changes.v[lane];
+      push(row.b.v[lane], changes.v[lane]);
+      push(row.c.v[lane], changes.v[lane]);
+      push(row.d.v[lane], changes.v[lane]);
     }
   }
-  store(own_change, sum);
+  Lanes own;
+  store(own, sum);
   for (std::size_t lane = 0; lane < kLanes; ++lane)
-    star_change_[group * kLanes + lane] += own_change.v[lane];
+    push(static_cast<Slot>(group * kLanes + lane), own.v[lane]);
 }
 
 template <typename Law>

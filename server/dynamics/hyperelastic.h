@@ -64,9 +64,9 @@ class Hyperelastic final : public Energy {
   GroupRows<InvariantRow> invariant_rows_;    // empty for a linear law
   std::vector<Vec3Lanes> constant_gradient_;  // N per group; linear laws
   std::vector<Lanes> constant_block_;         // N/m per group; linear laws
-  // Averaged volume, per slot: change of the star's volume since free of stress (m^3), and K_a over
-  // the star's stress-free volume (Pa/m^3).
-  std::vector<float> star_change_, star_stiffness_;
+  // Averaged volume, per slot: K_a over the star's stress-free volume (Pa/m^3), and that times the
+  // change of the star's volume since free of stress (Pa).
+  std::vector<float> star_stiffness_, star_pressure_;
   std::vector<double> star_offset_;  // change at zero displacement
 };
 

@@ -34,6 +34,8 @@ void to_message(const step::TickRecord& record, const step::TickDecisions* previ
     decisions.set_node_limit(d.node_limit);
     decisions.set_sweeps(d.sweeps);
     decisions.set_over_relaxation(d.over_relaxation);
+    decisions.set_boundary(static_cast<std::uint32_t>(d.boundary));
+    decisions.set_far_sweeps(d.far_sweeps);
   }
   for (const auto slot : record.inputs.leaves) message.add_leave()->set_slot(slot.value);
   for (const auto& join : record.inputs.joins) {
@@ -68,7 +70,14 @@ Status from_message(const proto::TickRecord& message, step::TickRecord& record) 
   record.inputs.clear();
   if (message.has_decisions()) {
     const auto& d = message.decisions();
-    record.decisions = {d.depth_limit(), d.node_limit(), d.sweeps(), d.over_relaxation()};
+    if (d.boundary() > static_cast<std::uint32_t>(world::Boundary::Graded))
+      return bad(record.tick, "unknown boundary mode");
+    record.decisions = {.depth_limit = d.depth_limit(),
+                        .node_limit = d.node_limit(),
+                        .sweeps = d.sweeps(),
+                        .over_relaxation = d.over_relaxation(),
+                        .boundary = static_cast<world::Boundary>(d.boundary()),
+                        .far_sweeps = d.far_sweeps()};
     if (auto valid = step::validate(record.decisions); !valid)
       return bad(record.tick, valid.error().message.c_str());
   }

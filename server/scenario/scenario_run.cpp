@@ -47,6 +47,39 @@ const scene::Place& run_key(const scene::Scenario& scenario, std::string_view ke
   return scene::place_of_key(scenario.run.given, key, scenario.run_place);
 }
 
+// The world of a scenario, with what it displaces held.
+world::World world_of(const scene::ResolvedScenario& resolved) {
+  world::World world(resolved.organ);
+  for (const auto& load : resolved.displacements)
+    for (const auto node : load.nodes)
+      if (load.axes == kAllAxes) world.node_classes[node.value] = world::NodeClass::Fixed;
+  return world;
+}
+
+Status check_explicit(const scene::ResolvedScenario& resolved) {
+  const auto& scenario = resolved.scenario;
+  const auto& place = run_key(scenario, "integrator");
+  if (!scenario.tools.empty())
+    return scene::scenario_error(scenario, place,
+                                 "\"explicit\" has no tools: take \"implicit\", or displace a set");
+  for (const auto& probe : scenario.probes)
+    if (probe.quantity == scene::ProbeQuantity::Reaction)
+      return scene::scenario_error(scenario, probe.place,
+                                   "a reaction needs integrator = \"implicit\" in [run]");
+  const double stable = dynamics::ExplicitEuler(resolved.organ, world_of(resolved)).stable_dt_s();
+  if (scenario.run.dt_s() <= stable) return {};
+  char text[160];
+  const double most = 1e-3 / std::ceil(1e-3 / stable);
+  if (most < 1e-6)
+    std::snprintf(text, sizeof text,
+                  "\"explicit\" is stable up to %.3g s here, which would take too long", stable);
+  else
+    std::snprintf(text, sizeof text, "is %g, \"explicit\" is stable up to %.3g here: write %.6g",
+                  scenario.run.dt_s(), stable, most);
+  return scene::scenario_error(
+      scenario, most < 1e-6 ? place : scene::place_of_key(scenario.run.given, "dt_s", place), text);
+}
+
 }  // namespace
 
 Status check_supported(const scene::ResolvedScenario& resolved) {
@@ -55,30 +88,25 @@ Status check_supported(const scene::ResolvedScenario& resolved) {
     return scene::scenario_error(scenario, place, what + " is not simulated yet");
   };
   const auto& rule = scenario.run;
-  if (rule.integrator == scene::Integrator::Explicit)
-    return refuse(run_key(scenario, "integrator"), "\"explicit\"");
   for (const auto& rule_of_set : scenario.displacements)
     if (rule_of_set.axes != kAllAxes)
       return refuse(rule_of_set.set.place, "a set that is held along some axes only");
-  return {};
+  return rule.integrator == scene::Integrator::Explicit ? check_explicit(resolved) : Status{};
 }
 
-ScenarioRun::ScenarioRun(scene::ResolvedScenario resolved, Solver solver)
+ScenarioRun::ScenarioRun(scene::ResolvedScenario resolved, Solver solver, unsigned threads)
     : resolved_(std::move(resolved)),
       solver_kind_(solver),
       boundary_(boundary_of(scenario().run, solver)),
       step_count_(steps_of(scenario().run)),
-      world_(organ()),
+      world_(world_of(resolved_)),
       claims_(world_.node_count()),
       queue_(world_.node_count()),
       active_set_(world_.node_count()),
-      solver_(organ(), world_) {
+      solver_(organ(), world_, threads) {
   held_ = organ().fixed_nodes;
   for (const auto& load : resolved_.displacements)
-    for (const auto node : load.nodes) {
-      held_.push_back(node);
-      world_.node_classes[node.value] = world::NodeClass::Fixed;
-    }
+    held_.insert(held_.end(), load.nodes.begin(), load.nodes.end());
   held_displacements_.resize(held_.size());
   if (!resolved_.forces.empty()) forces_.resize(world_.node_count());
   for (std::uint32_t i = 0; i < world_.node_count(); ++i) {
@@ -87,6 +115,8 @@ ScenarioRun::ScenarioRun(scene::ResolvedScenario resolved, Solver solver)
     if (boundary_ != scene::Boundary::Frozen) world_.node_classes[i] = world::NodeClass::Active;
   }
   solver_.take_state(world_);
+  if (scenario().run.integrator == scene::Integrator::Explicit) explicit_.emplace(organ(), world_);
+  if (boundary_ == scene::Boundary::Graded) far_plan_ = solver_.far_plan(settings().dt);
   if (scenario().run.starts_in_equilibrium) settling_ = relax();
 }
 
@@ -143,14 +173,11 @@ std::span<const NodeIndex> ScenarioRun::collect_active() {
   constexpr auto kNoLimit = std::numeric_limits<std::uint32_t>::max();
   queue_.fill(organ().mesh.node_neighbours, seeds_,
               {run.depth.value_or(kNoLimit), run.nodes.value_or(kNoLimit)});
-  if (boundary_ == scene::Boundary::Frozen) {
-    active_set_.collect(queue_, world_);
-    return active_set_.nodes();
-  }
-  near_nodes_.clear();
-  for (const auto node : queue_.nodes())
-    if (world_.node_classes[node.value] != world::NodeClass::Fixed) near_nodes_.push_back(node);
-  return near_nodes_;
+  active_set_.collect(
+      queue_,
+      boundary_ == scene::Boundary::Graded ? world::Boundary::Graded : world::Boundary::Frozen,
+      world_);
+  return active_set_.nodes();
 }
 
 // As the tick of a session does it (server/step/tick.cpp).
@@ -171,8 +198,10 @@ dynamics::SolveSettings ScenarioRun::settings() const {
   dynamics::SolveSettings result{run.sweeps, static_cast<float>(run.over_relaxation),
                                  static_cast<float>(run.dt_s())};
   if (boundary_ == scene::Boundary::Graded) {
-    result.far_sweeps = run.far_sweeps;
-    result.far_over_relaxation = static_cast<float>(run.far_over_relaxation);
+    const auto plan = far_plan_.with_sweeps(run.far_sweeps.value_or(0));
+    result.far_sweeps = plan.sweeps;
+    result.far_over_relaxation =
+        static_cast<float>(run.far_over_relaxation.value_or(plan.over_relaxation));
   }
   if (solver_kind_ == Solver::Full || is_static()) {
     result.sweeps = run.max_sweeps;
@@ -197,8 +226,12 @@ StepReport ScenarioRun::step_dynamic() {
   std::uint32_t sweeps = 0;
   for (std::uint32_t i = 1; i <= steps; ++i) {
     apply_loads(seconds_of(world_.tick - 1) + run.dt_s() * i);
-    report.solve =
-        solver_.solve(contacts_, active, how, world_, {forces_, held_, held_displacements_});
+    const dynamics::ExternalLoads loads{forces_, held_, held_displacements_};
+    if (explicit_) {
+      explicit_->step(run.dt_s(), world_, loads);
+      continue;
+    }
+    report.solve = solver_.solve(contacts_, active, how, world_, loads);
     sweeps += report.solve.sweeps;
     report.is_converged &=
         solver_kind_ == Solver::Live ||
@@ -206,8 +239,10 @@ StepReport ScenarioRun::step_dynamic() {
   }
   report.solve.sweeps = sweeps;
   solved_dt_ = how.dt;
-  if (boundary_ == scene::Boundary::Frozen)
-    active_set_.freeze_quiet(queue_, solver_.residuals_n(), world_);
+  if (explicit_)
+    for (const auto& u : world_.displacements) report.solve.nodes_rejected += is_finite(u) ? 0 : 1;
+  if (boundary_ != scene::Boundary::Whole)
+    solver_.take_state(world_, active_set_.settle(queue_, solver_.residuals_n(), world_));
   update_claims();
   return report;
 }

@@ -10,13 +10,14 @@
 // static run is a load step: time stands still until everything is in equilibrium with the loads
 // and tools of that time. Values after a step are those at its end. One thread.
 
-#include <memory>
+#include <optional>
 #include <vector>
 
 #include "common/scene/scenario.h"
 #include "server/contact/contact_list.h"
 #include "server/contact/grasps.h"
 #include "server/dynamics/block_descent.h"
+#include "server/dynamics/explicit_euler.h"
 #include "server/input/tool_table.h"
 #include "server/locks/claims.h"
 #include "server/propagation/active_set.h"
@@ -42,7 +43,8 @@ Status check_supported(const scene::ResolvedScenario& resolved);
 class ScenarioRun {
  public:
   // A scenario that check_supported() accepts. Settles it if it starts in equilibrium.
-  ScenarioRun(scene::ResolvedScenario resolved, Solver solver);
+  // Results do not depend on the number of threads.
+  ScenarioRun(scene::ResolvedScenario resolved, Solver solver, unsigned threads = 1);
   ScenarioRun(const ScenarioRun&) = delete;
   ScenarioRun& operator=(const ScenarioRun&) = delete;
 
@@ -60,6 +62,10 @@ class ScenarioRun {
   const scene::Organ& organ() const { return resolved_.organ; }
   const world::World& world() const { return world_; }
 
+  // The longest step of the explicit integrator, s; nothing without it.
+  std::optional<double> stable_dt_s() const {
+    return explicit_ ? std::optional(explicit_->stable_dt_s()) : std::nullopt;
+  }
   // Where a tool's tip is after a step; at the origin before it has appeared.
   Vec3d tool_tip(std::size_t tool) const {
     return to_double(tools_[ToolSlot{static_cast<std::uint8_t>(tool)}].pose.position);
@@ -102,11 +108,12 @@ class ScenarioRun {
   propagation::PropagationQueue queue_;
   propagation::ActiveSet active_set_;
   dynamics::BlockDescent solver_;
+  std::optional<dynamics::ExplicitEuler> explicit_;
+  dynamics::FarPlan far_plan_;             // graded
   std::vector<Vec3f> forces_;              // per node; empty without loads
   std::vector<NodeIndex> held_;            // fixed, then displaced nodes
   std::vector<Vec3f> held_displacements_;  // per entry of held_
   std::vector<NodeIndex> free_nodes_;      // what is active unless frozen
-  std::vector<NodeIndex> near_nodes_;      // graded: the queue without held nodes
   std::vector<Vec3f> before_;              // displacements before a round of contacts
   std::vector<std::span<const NodeIndex>> seeds_;
   std::vector<locks::ClaimRequest> requests_;

@@ -16,20 +16,21 @@ void State::visit(world::StateArchive& archive) {
   archive.fixed_array(quantised);
 }
 
-Scene::Scene(scene::Organ o) : organ(std::move(o)), layout(wire::make_surface_layout(organ)) {}
+Scene::Scene(scene::Organ o, unsigned worker_count)
+    : organ(std::move(o)), layout(wire::make_surface_layout(organ)), workers(worker_count) {}
 
 StepContext::StepContext(const Scene& s, const world::World& world)
     : scene(s),
       queue(world.node_count()),
       active(world.node_count()),
-      solver(s.organ, world),
+      solver(s.organ, world, s.workers),
+      far_plan(solver.far_plan(kTickSeconds)),
       surface_displacements(s.layout.vertex_count()) {
   // Enough for many tools in contact; beyond it a tick may allocate once more.
   contacts.constraints.reserve(8 * contact::kMaxNodesPerTool);
   contacts.seeds.reserve(8 * contact::kMaxNodesPerTool);
   contacts.reach_nodes.reserve(8 * contact::kMaxNodesPerTool);
   contacts.tools.reserve(kMaxTools);
-  seeds.reserve(kMaxTools);
   requests.reserve(kMaxTools);
   claim_events.reserve(4 * kMaxTools);
 }
@@ -44,13 +45,17 @@ Status validate(const TickDecisions& d) {
   if (d.node_limit < 1 || d.node_limit > kMaxNodeLimit)
     return out_of_range("node_limit", d.node_limit, "1 to 10000000 nodes");
   if (d.sweeps < 1 || d.sweeps > kMaxSweeps) return out_of_range("sweeps", d.sweeps, "1 to 64");
+  if (d.boundary > world::Boundary::Graded)
+    return out_of_range("boundary", static_cast<int>(d.boundary), "0 (frozen) to 1 (graded)");
+  if (d.far_sweeps > kMaxFarSweeps)
+    return out_of_range("far_sweeps", d.far_sweeps, "0 (as the organ needs) to 16");
   if (!(d.over_relaxation >= 1.0f && d.over_relaxation <= 1.9f))
     return out_of_range("over_relaxation", d.over_relaxation, "1 to 1.9");
   return {};
 }
 
-Simulation::Simulation(scene::Organ organ)
-    : scene_(std::make_unique<Scene>(std::move(organ))),
+Simulation::Simulation(scene::Organ organ, unsigned workers)
+    : scene_(std::make_unique<Scene>(std::move(organ), workers)),
       state_(std::make_unique<State>(scene_->organ, scene_->layout)),
       context_(std::make_unique<StepContext>(*scene_, state_->world)) {}
 

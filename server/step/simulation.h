@@ -15,7 +15,8 @@ Status validate(const TickDecisions& decisions);
 
 class Simulation {
  public:
-  explicit Simulation(scene::Organ organ);
+  // workers: threads that share the solver's work; results do not depend on it.
+  explicit Simulation(scene::Organ organ, unsigned workers = 1);
 
   // Simulates one tick. After a tick that publishes, take_frame() has the frame.
   const TickReport& tick(const session::TickInputs& inputs, const TickDecisions& decisions);

@@ -24,24 +24,33 @@ void find_contacts(const State& state, StepContext& context) {
 }
 
 void fill_queue(State& state, StepContext& context) {
-  context.seeds.clear();
+  context.seeds.fill({});
   for (const auto& tool : context.contacts.tools)
-    context.seeds.push_back(context.contacts.seeds_of(tool));
+    context.seeds[tool.tool.value] = context.contacts.seeds_of(tool);
   context.queue.fill(context.scene.organ.mesh.node_neighbours, context.seeds,
                      {context.decisions.depth_limit, context.decisions.node_limit});
-  context.active.collect(context.queue, state.world);
+  context.active.collect(context.queue, context.decisions.boundary, state.world);
   context.report.queue_nodes = static_cast<std::uint32_t>(context.queue.nodes().size());
   context.report.active_nodes = static_cast<std::uint32_t>(context.active.nodes().size());
   context.report.region_count = context.queue.region_count();
 }
 
 void solve(State& state, StepContext& context) {
-  const auto solved = context.solver.solve(
-      context.contacts, context.active.nodes(),
-      {context.decisions.sweeps, context.decisions.over_relaxation, kTickSeconds}, state.world);
-  context.active.freeze_quiet(context.queue, context.solver.residuals_n(), state.world);
+  const auto& decisions = context.decisions;
+  dynamics::SolveSettings settings{decisions.sweeps, decisions.over_relaxation, kTickSeconds};
+  if (decisions.boundary == world::Boundary::Graded) {
+    const auto plan = context.far_plan.with_sweeps(decisions.far_sweeps);
+    settings.far_sweeps = plan.sweeps;
+    settings.far_over_relaxation = plan.over_relaxation;
+  }
+  const auto solved =
+      context.solver.solve(context.contacts, context.active.nodes(), settings, state.world);
+  context.solver.take_state(
+      state.world, context.active.settle(context.queue, context.solver.residuals_n(), state.world));
   context.report.residual_n = solved.residual_n;
+  context.report.node_sweeps = solved.node_sweeps;
   context.report.nodes_rejected = solved.nodes_rejected;
+  context.report.nodes_restored = solved.nodes_restored;
   if (solved.is_stepped_down) context.report.faults |= kFaultOverRelaxation;
   if (solved.nodes_rejected > 0) context.report.faults |= kFaultNonFinite;
 }

@@ -37,10 +37,11 @@ struct State {
 
 // Constant in a session: follows from the organ.
 struct Scene {
-  explicit Scene(scene::Organ o);
+  Scene(scene::Organ o, unsigned worker_count);
 
   scene::Organ organ;
   wire::SurfaceLayout layout;
+  unsigned workers = 1;
 };
 
 // Laid out as input, scratch and output of a tick. Scratch keeps its capacity, so that a tick does
@@ -58,7 +59,8 @@ struct StepContext {
   propagation::PropagationQueue queue;
   propagation::ActiveSet active;
   dynamics::BlockDescent solver;
-  std::vector<std::span<const NodeIndex>> seeds;
+  dynamics::FarPlan far_plan;
+  std::array<std::span<const NodeIndex>, kMaxTools> seeds;  // by tool, empty without contact
   std::vector<locks::ClaimRequest> requests;
   std::vector<Vec3f> surface_displacements;
   StateHasher hasher;

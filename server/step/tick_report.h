@@ -6,21 +6,28 @@
 #include <cstdint>
 
 #include "common/base/tick.h"
+#include "server/world/world.h"
 
 namespace trocar::step {
 
 // Decided between ticks, recorded in the journal. Defaults: decisions that everything shares.
 struct TickDecisions {
-  std::uint32_t depth_limit = 6;    // propagation layers
+  std::uint32_t depth_limit = 3;    // propagation layers
   std::uint32_t node_limit = 1200;  // nodes in the queue; may end inside a layer
   std::uint32_t sweeps = 4;
   float over_relaxation = 1.5f;  // 1 to 1.9; for fewer than 3 sweeps at most 1.3 is used
+
+  world::Boundary boundary = world::Boundary::Graded;
+  std::uint32_t far_sweeps = 0;  // Graded: of nodes outside the queue; 0: as the organ needs
 
   bool operator==(const TickDecisions&) const = default;
 };
 inline constexpr std::uint32_t kMaxDepthLimit = 1000;
 inline constexpr std::uint32_t kMaxNodeLimit = 10'000'000;
 inline constexpr std::uint32_t kMaxSweeps = 64;
+inline constexpr std::uint32_t kMaxFarSweeps = 16;
+// Layers where nodes outside the queue stand still: shallower ones feel stiff.
+inline constexpr std::uint32_t kFrozenDepthLimit = 6;
 
 enum class Stage { Admit, Contacts, Queue, Solve, Claims, Hash, Publish };
 inline constexpr int kStageCount = 7;
@@ -31,7 +38,7 @@ enum TickFault : std::uint32_t {
   kFaultInputDropped = 1u << 0,    // an input did not fit the state (empty slot, no such tool)
   kFaultContactLimit = 1u << 1,    // more contact nodes than the contact list holds
   kFaultOverRelaxation = 1u << 2,  // residual grew: the tick went on without over-relaxation
-  kFaultNonFinite = 1u << 3,       // a node's update was not finite: the node kept its last state
+  kFaultNonFinite = 1u << 3,       // a node's step was not finite: its region went back a tick
 };
 
 struct TickReport {
@@ -43,6 +50,8 @@ struct TickReport {
   std::uint32_t region_count = 0;
   std::uint32_t inputs_dropped = 0;
   std::uint32_t nodes_rejected = 0;  // see kFaultNonFinite
+  std::uint32_t nodes_restored = 0;  // likewise: put back, at rest
+  std::uint64_t node_sweeps = 0;     // nodes stepped by the solver, all sweeps together
   std::uint32_t faults = 0;          // TickFault bits
   float residual_n = 0;              // root mean square nodal force imbalance in the last sweep
   std::uint64_t state_hash = 0;

@@ -6,7 +6,7 @@ World::World(const scene::Organ& organ)
     : surface_nodes(organ.mesh.surface_nodes),
       displacements(organ.mesh.node_count()),
       velocities(organ.mesh.node_count()),
-      node_classes(organ.mesh.node_count(), NodeClass::Frozen),
+      node_classes(organ.mesh.node_count(), NodeClass::Outer),
       quiet_ticks(organ.mesh.node_count()) {
   const auto& mesh = organ.mesh;
   rest_positions.reserve(mesh.node_count());
@@ -26,11 +26,13 @@ World::World(const scene::Organ& organ)
 void World::visit_state(StateArchive& archive) {
   archive.value(tick);
   archive.value(topology_epoch);
+  archive.value(boundary);
   archive.fixed_array(displacements);
   archive.fixed_array(velocities);
   archive.fixed_array(node_classes);
   archive.fixed_array(quiet_ticks);
   if (!archive.is_reading()) return;
+  if (boundary > Boundary::Graded) archive.fail();
   for (std::size_t i = 0; i < node_count(); ++i)
     if (node_classes[i] > NodeClass::Active || !is_finite(displacements[i]) ||
         !is_finite(velocities[i]))

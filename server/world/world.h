@@ -4,8 +4,8 @@
 //
 // Displacements are float32 relative to rest (the rest pose stays in double in the organ), so a
 // micrometre is still exact a metre from the origin. Invariants: fixed nodes have zero displacement
-// and velocity, except those that a scenario moves; frozen nodes have zero velocity; everything is
-// finite. Owned by the simulation thread; nobody else sees it.
+// and velocity, except those that a scenario moves; everything is finite. Owned by the simulation
+// thread; nobody else sees it.
 
 #include <vector>
 
@@ -18,8 +18,14 @@ namespace trocar::world {
 
 enum class NodeClass : std::uint8_t {
   Fixed = 0,   // held by ligaments: never moves
-  Frozen = 1,  // at rest: not swept
-  Active = 2,  // swept this tick, or not yet come to rest
+  Outer = 1,   // away from all contacts: at rest (Frozen), or swept less (Graded)
+  Active = 2,  // in the queue, or not long ago
+};
+
+// What nodes outside the queue do.
+enum class Boundary : std::uint8_t {
+  Frozen = 0,  // stand still (Choi 2002, Nakao 2003)
+  Graded = 1,  // move every tick, with fewer sweeps
 };
 
 struct World {
@@ -39,8 +45,9 @@ struct World {
   // State, in snapshot and hash.
   Tick tick = 0;  // ticks done
   std::uint32_t topology_epoch = 0;
-  std::vector<Vec3f> displacements;  // m, from rest
-  std::vector<Vec3f> velocities;     // m/s
+  Boundary boundary = Boundary::Frozen;  // of the last tick
+  std::vector<Vec3f> displacements;      // m, from rest
+  std::vector<Vec3f> velocities;         // m/s
   std::vector<NodeClass> node_classes;
   std::vector<std::uint16_t> quiet_ticks;  // ticks in a row below the freezing thresholds
 

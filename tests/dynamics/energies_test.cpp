@@ -25,6 +25,10 @@ struct Case {
   bool has_bounding_block = false;  // the block is at least the second derivative, not equal to it
 };
 
+void PrintTo(const Case& c, std::ostream* out) {
+  *out << c.name;
+}
+
 scene::Organ block_organ(const Case& c) {
   scene::Organ organ;
   organ.name = "block";

@@ -7,46 +7,14 @@
 
 #include <filesystem>
 #include <fstream>
-#include <memory>
 #include <sstream>
 
 #include "server/scenario/field_files.h"
 #include "server/scenario/probe_file.h"
+#include "tests/scenario/scenario_texts.h"
 
 namespace trocar::scenario {
 namespace {
-
-// A column of 2 x 6 x 2 nodes: four chains of five springs of k = 40 N/m, joined by springs across.
-const std::string kColumn = R"([organ]
-source = "lattice"
-nodes = [2, 6, 2]
-spacing_mm = 10
-[material]
-spring_stiffness_n_m = 40
-node_damping_per_s = 20
-[[nodes]]
-name = "top"
-box_min_mm = [-5, 25, -5]
-box_max_mm = [5, 25, 5]
-)";
-constexpr double kStiffness = 40, kWeight = 9.81;
-
-std::unique_ptr<ScenarioRun> make(const std::string& text, Solver solver = Solver::Full) {
-  auto parsed = scene::parse_scenario_text(text, "test.toml");
-  EXPECT_TRUE(parsed.ok()) << (parsed.ok() ? "" : parsed.error().message);
-  if (!parsed) return nullptr;
-  auto resolved = scene::resolve(std::move(*parsed));
-  EXPECT_TRUE(resolved.ok()) << (resolved.ok() ? "" : resolved.error().message);
-  if (!resolved) return nullptr;
-  const auto supported = check_supported(*resolved);
-  EXPECT_TRUE(supported.ok()) << (supported.ok() ? "" : supported.error().message);
-  if (!supported) return nullptr;
-  return std::make_unique<ScenarioRun>(std::move(*resolved), solver);
-}
-
-void finish(ScenarioRun& run) {
-  while (!run.is_finished()) run.step();
-}
 
 TEST(ScenarioRun, AColumnUnderAForceStretchesLikeSpringsInSeries) {
   const auto run = make(kColumn + R"([[force]]
@@ -387,95 +355,6 @@ quantity = "displacement"
   EXPECT_GT(force, 0.015) << "the tissue pushes the tool up";
   EXPECT_NEAR(run->probe(1).y, force, 0.02 * force) << "the support carries it";
   EXPECT_NEAR(force, -run->probe(2).y * 40 / 4, 0.01 * force) << "one chain of four springs";
-}
-
-// A block of tets pulled at its top; `law` are lines of [material].
-std::string pulled_block(const std::string& law, const std::string& run) {
-  return R"([organ]
-source = "block"
-nodes = [3, 9, 3]
-spacing_mm = 5
-[[nodes]]
-name = "top"
-box_min_mm = [-5, 20, -5]
-box_max_mm = [5, 20, 5]
-[[traction]]
-set = "top"
-[[traction.key]]
-time_s = 0
-traction_pa = [0, 40, 0]
-[[probe]]
-set = "top"
-quantity = "displacement"
-[[probe]]
-set = "fixed"
-quantity = "reaction"
-[material]
-young_modulus_pa = 4000
-)" + law +
-         "[run]\nseconds = 1\n" + run;
-}
-
-TEST(ScenarioRun, EachLawStretchesLikeABar) {
-  for (const char* law :
-       {"", "elastic_law = \"tensor-mass\"\npoisson_ratio = 0.2\n",
-        "elastic_law = \"neo-hookean\"\npoisson_ratio = 0.2\n",
-        "elastic_law = \"neo-hookean\"\npoisson_ratio = 0.2\naveraged_volume = true\n"}) {
-    const auto run = make(pulled_block(law, "mode = \"static\"\n"));
-    ASSERT_TRUE(run);
-    EXPECT_TRUE(run->step().is_converged) << law;
-    // Stress / E x length; stiffer where the clamped base keeps it from getting thinner.
-    constexpr double kExpected = 40.0 / 4000 * 0.04;
-    EXPECT_NEAR(run->probe(0).y, kExpected, 0.06 * kExpected) << law;
-    EXPECT_NEAR(run->probe(1).y, -40 * 1e-4, 0.002 * 40 * 1e-4) << law;
-  }
-}
-
-TEST(ScenarioRun, AStiffRegionStretchesLess) {
-  const auto run = make(pulled_block("", "mode = \"static\"\n") + R"([[nodes]]
-name = "half"
-box_min_mm = [-5, 0, -5]
-box_max_mm = [5, 20, 5]
-[[region]]
-set = "half"
-young_modulus_pa = 16000
-)");
-  ASSERT_TRUE(run);
-  run->step();
-  constexpr double kExpected = 40.0 * 0.02 * (1.0 / 4000 + 1.0 / 16000);
-  EXPECT_NEAR(run->probe(0).y, kExpected, 0.06 * kExpected);
-}
-
-TEST(ScenarioRun, GradedMovesEverythingAndFrozenTheQueueOnly) {
-  const auto graded =
-      make(pulled_block("", "boundary = \"graded\"\ndepth = 1\nfar_sweeps = 2\n"), Solver::Live);
-  const auto frozen = make(pulled_block("", "boundary = \"frozen\"\ndepth = 1\n"), Solver::Live);
-  ASSERT_TRUE(graded && frozen);
-  finish(*graded);
-  finish(*frozen);
-  constexpr double kExpected = 40.0 / 4000 * 0.04;
-  EXPECT_NEAR(graded->probe(0).y, kExpected, 0.06 * kExpected);
-  EXPECT_LT(frozen->probe(0).y, 0.3 * kExpected) << "what does not move does not stretch";
-}
-
-TEST(ScenarioRun, WhatTheSolverCannotDoIsRefusedWithItsLine) {
-  const auto refusal = [](const std::string& text) {
-    auto parsed = scene::parse_scenario_text(text, "test.toml");
-    EXPECT_TRUE(parsed.ok()) << (parsed.ok() ? "" : parsed.error().message);
-    if (!parsed) return std::string();
-    const auto resolved = scene::resolve(std::move(*parsed));
-    EXPECT_TRUE(resolved.ok()) << (resolved.ok() ? "" : resolved.error().message);
-    if (!resolved) return std::string();
-    const auto supported = check_supported(*resolved);
-    return supported.ok() ? std::string("accepted") : supported.error().message;
-  };
-  EXPECT_EQ(refusal(pulled_block("", "integrator = \"explicit\"\n")),
-            "test.toml:24: key run.integrator: \"explicit\" is not simulated yet");
-  EXPECT_EQ(refusal(pulled_block("", "") + "[[nodes]]\nname = \"side\"\nids = [40]\n"
-                                           "[[displace]]\nset = \"side\"\naxes = \"x\"\n"),
-            "test.toml:28: key displace[0].set: a set that is held along some axes only is not "
-            "simulated yet");
-  EXPECT_EQ(refusal(pulled_block("", "")), "accepted");
 }
 
 TEST(ScenarioRun, WithADepthOnlyTheQueueMoves) {

@@ -17,10 +17,12 @@ using testing::top_of;
 
 class TwoHands : public ::testing::Test {
  protected:
-  static TickReport run_tick(Simulation& simulation) {
+  static constexpr TickDecisions kFrozen{.depth_limit = kFrozenDepthLimit,
+                                         .boundary = world::Boundary::Frozen};
+  static TickReport run_tick(Simulation& simulation, const TickDecisions& decisions = {}) {
     session::TickInputs inputs;
     add_two_hands(simulation.current_tick() + 1, top_of(simulation.organ()), inputs);
-    return simulation.tick(inputs, {});
+    return simulation.tick(inputs, decisions);
   }
 };
 
@@ -32,9 +34,27 @@ TEST_F(TwoHands, SameInputsGiveSameHashes) {
 // Equal on gcc and clang, debug, release and sanitized builds: see README, "Determinism". A change
 // of results changes this number, and raises kSimVersion in the same commit.
 TEST_F(TwoHands, TheHashIsTheSameOnEveryBuild) {
-  Simulation simulation(scene::make_lattice());
-  for (int i = 0; i < 400; ++i) run_tick(simulation);
-  EXPECT_EQ(simulation.state_hash(), 10254298132320432309u);
+  const auto hash_after = [](scene::Organ organ, const TickDecisions& decisions, unsigned workers) {
+    Simulation simulation(std::move(organ), workers);
+    for (int i = 0; i < 300; ++i) run_tick(simulation, decisions);
+    return simulation.state_hash();
+  };
+  const auto liver = [](scene::ElasticLaw law, bool has_averaged_volume) {
+    auto organ = *scene::make_liver(6000);
+    organ.material.elastic_law = law;
+    organ.material.has_averaged_volume = has_averaged_volume;
+    organ.material.poisson_ratio = 0.47;
+    organ.gravity_m_s2 = {0, -9.81, 0};
+    return organ;
+  };
+  using enum scene::ElasticLaw;
+  for (const unsigned workers : {1u, 2u, 3u}) {
+    EXPECT_EQ(hash_after(scene::make_lattice(), kFrozen, workers), 9008539878612087329u);
+    EXPECT_EQ(hash_after(scene::make_lattice(), {}, workers), 1511222070707765924u);
+    EXPECT_EQ(hash_after(liver(TensorMass, false), {}, workers), 1485557139430726140u);
+    EXPECT_EQ(hash_after(liver(NeoHookean, false), {}, workers), 12008212155505217414u);
+    EXPECT_EQ(hash_after(liver(NeoHookean, true), {}, workers), 6414536132474874213u);
+  }
 }
 
 TEST_F(TwoHands, AnyInputChangesTheHash) {
@@ -97,7 +117,7 @@ TEST_F(TwoHands, RegionsMergeAndTissueComesToRestAgain) {
   Simulation simulation(scene::make_lattice());
   bool was_apart = false, was_merged = false;
   for (int i = 0; i < 1500; ++i) {
-    const auto report = run_tick(simulation);
+    const auto report = run_tick(simulation, kFrozen);
     was_apart |= report.region_count == 2;
     was_merged |= report.region_count == 1 && report.contact_nodes > 6;
   }
@@ -105,10 +125,10 @@ TEST_F(TwoHands, RegionsMergeAndTissueComesToRestAgain) {
   EXPECT_TRUE(was_merged);
   session::TickInputs leave;
   leave.leaves = {{0}, {1}};
-  simulation.tick(leave, {});
+  simulation.tick(leave, kFrozen);
   int ticks = 0;
   while (simulation.context().report.active_nodes > 0 && ticks < 20'000) {
-    simulation.tick({}, {});
+    simulation.tick({}, kFrozen);
     ++ticks;
   }
   EXPECT_LT(ticks, 20'000) << "nothing stays active for ever";
@@ -188,6 +208,7 @@ TEST(Simulation, RandomInputsNeverBreakIt) {
             static_cast<scene::Verb>(pick(3))}});
     TickDecisions decisions{
         .depth_limit = pick(8), .node_limit = 1 + pick(400), .sweeps = 1 + pick(6)};
+    decisions.boundary = pick(100) < 50 ? world::Boundary::Frozen : world::Boundary::Graded;
     const auto report = simulation.tick(inputs, decisions);
     ASSERT_EQ(report.nodes_rejected, 0u);
   }

@@ -11,7 +11,7 @@
 #include <type_traits>
 #include <vector>
 
-namespace trocar::dynamics {
+namespace trocar {
 
 inline constexpr unsigned kMaxWorkers = 64;
 
@@ -50,4 +50,4 @@ class Workers {
   std::atomic<bool> is_stopping_{false};
 };
 
-}  // namespace trocar::dynamics
+}  // namespace trocar

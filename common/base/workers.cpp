@@ -1,10 +1,10 @@
-#include "server/dynamics/workers.h"
+#include "common/base/workers.h"
 
 #include <immintrin.h>
 
 #include <algorithm>
 
-namespace trocar::dynamics {
+namespace trocar {
 namespace {
 
 constexpr int kSpins = 4000;  // some 20 us: longer than a colour takes
@@ -63,4 +63,4 @@ void Workers::barrier() {
   wait_for_change(phase_, phase);
 }
 
-}  // namespace trocar::dynamics
+}  // namespace trocar
