@@ -286,6 +286,9 @@ void Replica::apply_state(const proto::FrameState& message) {
   frame.figures.active_nodes = message.active_nodes();
   frame.figures.queue_nodes = message.queue_nodes();
   frame.figures.region_count = message.region_count();
+  frame.figures.sweeps = message.sweeps();
+  frame.figures.far_sweeps = message.far_sweeps();
+  frame.figures.residual_n = message.residual_n();
   frame.figures.tick_median_us = message.tick_cpu_us();
   frame.figures.tick_p99_us = message.tick_cpu_p99_us();
   frame.figures.stage_median_us.assign(message.stage_cpu_us().begin(),

@@ -56,6 +56,8 @@ struct Topology {
 // What the server says about itself with each frame.
 struct FrameFigures {
   std::uint32_t active_nodes = 0, queue_nodes = 0, region_count = 0;
+  std::uint32_t sweeps = 0, far_sweeps = 0;  // of active nodes and of all others
+  float residual_n = 0;
   float tick_median_us = 0, tick_p99_us = 0;
   std::vector<float> stage_median_us;  // order of Stage in server/step
   std::uint64_t slow_ticks = 0;

@@ -98,6 +98,9 @@ void draw_session_panel(const HudModel& model, float scale) {
     row("slow ticks", with_thousands(f.slow_ticks));
     row("active nodes", format("%s, queue %s", with_thousands(f.active_nodes).c_str(),
                                with_thousands(f.queue_nodes).c_str()));
+    row("sweeps", f.far_sweeps > 0 ? format("%u, all other nodes %u", f.sweeps, f.far_sweeps)
+                                   : format("%u, all other nodes rest", f.sweeps));
+    row("residual", format("%.2g mN", static_cast<double>(f.residual_n) * 1e3));
     row("regions", std::to_string(f.region_count));
     if (!model.timeline) row("round trip", format("%.1f ms", model.round_trip_ms));
     row("stream", format("%.1f frames/s, %s", model.frames_per_second,

@@ -18,6 +18,10 @@ endif()
 if(TROCAR_TESTS)
   find_package(GTest REQUIRED)
   include(GoogleTest)
+  # Benchmarks, and the library they compare with (single precision).
+  find_package(benchmark REQUIRED)
+  find_package(nlohmann_json REQUIRED)
+  pkg_check_modules(bullet REQUIRED IMPORTED_TARGET bullet)
 endif()
 
 # Asio compiled once (common/base) instead of in every file that includes it.

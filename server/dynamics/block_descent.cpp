@@ -216,11 +216,26 @@ void BlockDescent::begin_groups(const world::World& world, const SolveSettings& 
   for_each_group(begun_.groups, [&](Group g) { tissue_.begin_group(g, x_.data()); });
   for_each_group(begun_.groups,
                  [&](Group g) { begin_inertia(g, world, inverse_dt, loads.forces); });
-  for (std::size_t i = 0; i < loads.held.size(); ++i)
-    x_[tissue_.groups().slot_of(loads.held[i])] = to_float4(loads.held_displacements[i]);
+  place_held(loads);
   if (tissue_.follows_moves())
     for_each_group(all_groups_, [&](Group g) { tissue_.restart_group(g, x_.data()); });
   for (const auto g : begun_.groups) rejected_[g] = 0;
+}
+
+void BlockDescent::place_held(const ExternalLoads& loads) {
+  const auto& groups = tissue_.groups();
+  for (std::size_t i = 0; i < loads.held.size(); ++i)
+    x_[groups.slot_of(loads.held[i])] = to_float4(loads.held_displacements[i]);
+  held_axes_.clear();
+  if (loads.axis_holds.empty()) return;
+  held_axes_.resize(groups.slot_count());
+  for (const auto& hold : loads.axis_holds) {
+    const Slot slot = groups.slot_of(hold.node);
+    held_axes_[slot] = hold.axes;
+    if (hold.axes & 1) x_[slot].x = hold.displacement.x;
+    if (hold.axes & 2) x_[slot].y = hold.displacement.y;
+    if (hold.axes & 4) x_[slot].z = hold.displacement.z;
+  }
 }
 
 NodeStep8 BlockDescent::linearise(Group group, const Vec8& own, Scratch& scratch) const {
@@ -256,6 +271,22 @@ void BlockDescent::add_constraints(const contact::ContactList& contacts, Group g
   step.block = load(blocks);
 }
 
+// Along a held axis nothing pushes and nothing couples, so that the step has no part there.
+void BlockDescent::hold_axes(Group group, NodeStep8& step) const {
+  Vec3Lanes gradients;
+  SymMat3Lanes blocks;
+  store(gradients, step.gradient);
+  store(blocks, step.block);
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    const auto axes = held_axes_[group * kLanes + lane];
+    if (axes & 1) gradients.x.v[lane] = 0, blocks.xy.v[lane] = 0, blocks.xz.v[lane] = 0;
+    if (axes & 2) gradients.y.v[lane] = 0, blocks.xy.v[lane] = 0, blocks.yz.v[lane] = 0;
+    if (axes & 4) gradients.z.v[lane] = 0, blocks.xz.v[lane] = 0, blocks.yz.v[lane] = 0;
+  }
+  step.gradient = load(gradients);
+  step.block = load(blocks);
+}
+
 void BlockDescent::relax(Group group, std::uint8_t lanes, const contact::ContactList& contacts,
                          float inverse_dt, float omega, Scratch& scratch) {
   Float4* const x = &x_[group * kLanes];
@@ -268,6 +299,7 @@ void BlockDescent::relax(Group group, std::uint8_t lanes, const contact::Contact
     add_constraints(contacts, group, inverse_dt, step, factors);
     factor = all(0) - load(factors);
   }
+  if (!held_axes_.empty()) hold_axes(group, step);
   const Vec8 dx = solve_positive_definite(step.block, step.gradient) * factor;
   const Float8 squared = dot8(step.gradient, step.gradient);
   const Float8 swept = mask_of(lanes);

@@ -35,6 +35,13 @@ struct SolveSettings {
   float far_over_relaxation = 1.3f;
 };
 
+// A node that is held along some of the world's axes and free along the others.
+struct AxisHold {
+  NodeIndex node;
+  std::uint8_t axes = 0;  // bits: 1 x, 2 y, 4 z
+  Vec3f displacement;     // m; of held axes
+};
+
 // What acts from outside besides tools. Default: nothing.
 struct ExternalLoads {
   std::span<const Vec3f> forces;  // N, per node of the organ; empty: none
@@ -42,6 +49,8 @@ struct ExternalLoads {
   // takes (holding_force). None of them is free.
   std::span<const NodeIndex> held;
   std::span<const Vec3f> held_displacements;  // m, per entry of `held`
+  // Free nodes, swept near or far, that are free along some axes alone.
+  std::span<const AxisHold> axis_holds;
 };
 
 struct SolveReport {
@@ -88,8 +97,8 @@ class BlockDescent {
   Vec3f reaction(const contact::ContactList& contacts, const contact::ToolContact& tool,
                  const world::World& world, float dt) const;
 
-  // Force on a node of the last solve's loads.held that put it where it is, N: what energies,
-  // damping, loads and tools leave of its mass times acceleration.
+  // Force on a node of the last solve's loads.held or axis_holds that put it where it is, N: what
+  // energies, damping, loads and tools leave of its mass times acceleration.
   Vec3f holding_force(const contact::ContactList& contacts, NodeIndex node, float dt) const;
 
   FarPlan far_plan(float dt) const;
@@ -124,6 +133,8 @@ class BlockDescent {
   NodeStep8 linearise(Group group, const Vec8& own, Scratch& scratch) const;
   void add_constraints(const contact::ContactList& contacts, Group group, float inverse_dt,
                        NodeStep8& step, Lanes& omega) const;
+  void hold_axes(Group group, NodeStep8& step) const;
+  void place_held(const ExternalLoads& loads);
   void sweep(const Plan& plan, const contact::ContactList& contacts, float inverse_dt, float omega);
   void relax(Group group, std::uint8_t lanes, const contact::ContactList& contacts,
              float inverse_dt, float omega, Scratch& scratch);
@@ -155,6 +166,7 @@ class BlockDescent {
   // Constraints of a node as a linked list in contact order; valid where the stamp is current.
   std::vector<std::uint32_t> first_constraint_, next_constraint_;  // per slot; per constraint
   std::vector<std::uint32_t> slot_stamp_, group_stamp_;
+  std::vector<std::uint8_t> held_axes_;  // per slot, of this step; empty if there are none
   std::uint32_t current_ = 0;
 };
 

@@ -112,7 +112,7 @@ ScenarioRun::ScenarioRun(scene::ResolvedScenario resolved, Solver solver, unsign
   for (std::uint32_t i = 0; i < world_.node_count(); ++i) {
     if (world_.node_classes[i] == world::NodeClass::Fixed) continue;
     free_nodes_.push_back(NodeIndex(i));
-    if (boundary_ != scene::Boundary::Frozen) world_.node_classes[i] = world::NodeClass::Active;
+    if (boundary_ == scene::Boundary::Whole) world_.node_classes[i] = world::NodeClass::Active;
   }
   solver_.take_state(world_);
   if (scenario().run.integrator == scene::Integrator::Explicit) explicit_.emplace(organ(), world_);

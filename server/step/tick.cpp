@@ -48,6 +48,8 @@ void solve(State& state, StepContext& context) {
   context.solver.take_state(
       state.world, context.active.settle(context.queue, context.solver.residuals_n(), state.world));
   context.report.residual_n = solved.residual_n;
+  context.report.sweeps = solved.sweeps;
+  context.report.far_sweeps = settings.far_sweeps;
   context.report.node_sweeps = solved.node_sweeps;
   context.report.nodes_rejected = solved.nodes_rejected;
   context.report.nodes_restored = solved.nodes_restored;
@@ -109,6 +111,9 @@ void quantise_and_publish(State& state, StepContext& context) {
   frame->active_nodes = context.report.active_nodes;
   frame->queue_nodes = context.report.queue_nodes;
   frame->region_count = context.report.region_count;
+  frame->sweeps = context.report.sweeps;
+  frame->far_sweeps = context.report.far_sweeps;
+  frame->residual_n = context.report.residual_n;
   context.frame = std::move(frame);
 }
 

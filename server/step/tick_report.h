@@ -49,11 +49,12 @@ struct TickReport {
   std::uint32_t active_nodes = 0;  // queue plus nodes that have not come to rest
   std::uint32_t region_count = 0;
   std::uint32_t inputs_dropped = 0;
-  std::uint32_t nodes_rejected = 0;  // see kFaultNonFinite
-  std::uint32_t nodes_restored = 0;  // likewise: put back, at rest
-  std::uint64_t node_sweeps = 0;     // nodes stepped by the solver, all sweeps together
-  std::uint32_t faults = 0;          // TickFault bits
-  float residual_n = 0;              // root mean square nodal force imbalance in the last sweep
+  std::uint32_t nodes_rejected = 0;          // see kFaultNonFinite
+  std::uint32_t nodes_restored = 0;          // likewise: put back, at rest
+  std::uint32_t sweeps = 0, far_sweeps = 0;  // of active nodes and of all others
+  std::uint64_t node_sweeps = 0;             // nodes stepped by the solver, all sweeps together
+  std::uint32_t faults = 0;                  // TickFault bits
+  float residual_n = 0;  // root mean square nodal force imbalance in the last sweep
   std::uint64_t state_hash = 0;
 };
 

@@ -191,5 +191,50 @@ TEST(BlockDescent, HeldNodesGoWhereTheyArePutAndTheForceForThatIsKnown) {
   }
 }
 
+TEST(BlockDescent, ANodeHeldAlongOneAxisSlidesAlongTheOthers) {
+  auto organ = lattice(2, 6, 2);
+  Bench bench(organ);
+  std::vector<AxisHold> holds;
+  std::vector<Vec3f> forces(organ.mesh.node_count());
+  for (const auto node : bench.free_nodes)
+    if (organ.mesh.rest_positions[node.value].y > 0.0249) {
+      holds.push_back({.node = node, .axes = 2, .displacement = {0, 0.005f, 0}});
+      forces[node.value] = {0.0005f, 0.3f, 0};
+    }
+  ASSERT_EQ(holds.size(), 4u);
+  for (int tick = 0; tick < 2000; ++tick)
+    bench.solver.solve(bench.contacts, bench.free_nodes, {.sweeps = 20}, bench.world,
+                       {.forces = forces, .axis_holds = holds});
+  const double pull = 0.005 / 5 * organ.material.spring_stiffness_n_m;
+  for (const auto& hold : holds) {
+    EXPECT_EQ(bench.world.displacements[hold.node.value].y, 0.005f);
+    EXPECT_GT(bench.world.displacements[hold.node.value].x, 1e-4f);
+    const Vec3f force = bench.solver.holding_force(bench.contacts, hold.node, kTickSeconds);
+    EXPECT_NEAR(force.y, pull - 0.3, 0.05 * pull) << "what the load leaves of it";
+    EXPECT_NEAR(force.x, 0, 1e-3);
+  }
+}
+
+TEST(BlockDescent, WhatIsNotFiniteSendsItsRegionBackToTheStartOfTheStep) {
+  Bench bench(lattice(6, 6, 6));
+  for (int tick = 0; tick < 20; ++tick) {  // something moves everywhere
+    std::vector<Vec3f> forces(bench.world.node_count(), Vec3f{0, 0.01f, 0});
+    bench.solver.solve(bench.contacts, bench.free_nodes, {}, bench.world, {.forces = forces});
+  }
+  const auto before = bench.world.displacements;
+  const NodeIndex broken = scene::lattice_node({.nx = 6, .ny = 6, .nz = 6}, 3, 5, 3);
+  bench.tie(broken, {NAN, 0, 0}, 2000.0f);
+  const auto report = bench.step({});
+  EXPECT_EQ(report.nodes_rejected, 1u);
+  EXPECT_GT(report.nodes_restored, 20u);
+  EXPECT_LT(report.nodes_restored, 150u) << "a region, not the organ";
+  EXPECT_EQ(bench.world.displacements[broken.value], before[broken.value]);
+  EXPECT_EQ(bench.world.velocities[broken.value], Vec3f{});
+  bench.contacts = {};
+  for (int tick = 0; tick < 2000; ++tick) EXPECT_EQ(bench.step({}).nodes_rejected, 0u);
+  EXPECT_LT(bench.step({}).residual_n, 1e-4f) << "goes on, and comes to rest";
+  for (const auto& u : bench.world.displacements) EXPECT_TRUE(is_finite(u));
+}
+
 }  // namespace
 }  // namespace trocar::dynamics

@@ -1,0 +1,26 @@
+#pragma once
+
+// Works that run whole ticks with tools, as the server does.
+
+#include "tests/bench/bench_run.h"
+#include "tests/bench/our_session.h"
+
+namespace trocar::bench {
+
+// Surface places far from each other and from what is fixed, and outward normals there; the first
+// is the surface node farthest along `first`.
+std::vector<BenchTool> spread_tools(const scene::Organ& organ, std::size_t count,
+                                    const Vec3f& first);
+
+struct SessionCase {
+  SessionOptions options;
+  // The row's time is that of the whole tick; without, of contacts, queue and solve.
+  bool includes_rest = false;
+  // Forces at the tools, and the whole field at the end, against the same ticks with the whole
+  // organ swept to convergence. Takes its time.
+  bool is_judged = false;
+};
+Work run_session(scene::Organ organ, std::vector<BenchTool> tools, const SessionCase& session_case);
+Row row_of(const scene::Organ& organ, std::string group, std::string object, std::string solver);
+
+}  // namespace trocar::bench
