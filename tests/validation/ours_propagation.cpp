@@ -152,7 +152,7 @@ void study_press(const Lab& lab, Section& section, const Press& press) {
        .y = {"error, %", true},
        .series = {}},
       {title,
-       {"mode", "limit", "nodes swept, mean", "contact force, mean", "peak", "field at the hold",
+       {"mode", "limit", "near nodes, mean", "contact force, mean", "peak", "field at the hold",
         "largest after release, mm", "CPU per tick, ms"},
        {}}};
   study.forces.series.push_back(curve("full", reference, plot::Style::Dashed));
