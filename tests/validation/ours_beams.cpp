@@ -4,6 +4,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <cmath>
+#include <map>
 #include <optional>
 
 #include "tests/validation/experiments.h"
@@ -38,9 +39,9 @@ std::vector<Law> laws() {
       {"springs", "springs", "", std::nullopt, 0.015, 0.06},
       {"tensor-mass", "tensor-mass, nu = 0.25", tets("tensor-mass", 0.25, false), 0.25, 0.01, 0.10},
       {"neo-hookean", "neo-Hookean, nu = 0.4756", tets("neo-hookean", kLiverPoisson, false),
-       kLiverPoisson, 0.03, 0.80},
+       kLiverPoisson, 0.03, 0.25},
       {"neo-hookean-averaged", "neo-Hookean, averaged volume, nu = 0.4756",
-       tets("neo-hookean", kLiverPoisson, true), kLiverPoisson, 0.03, 0.10},
+       tets("neo-hookean", kLiverPoisson, true), kLiverPoisson, 0.03, 0.15},
   };
 }
 
@@ -94,15 +95,17 @@ std::string displacement_probe(const char* set) {
 
 using Refine = std::optional<double> (*)(const Lab&, Section&, const Law&, int, double&);
 
-// A law over mesh sizes: ours and the closed form, mm.
-void refine(const Lab& lab, Section& section, const char* unit_title, bool is_beam,
-            const std::vector<int>& sizes, Refine measure) {
+// A law over mesh sizes: ours and the closed form, mm. Returns ours over the closed form on the
+// finest mesh, by law.
+std::map<std::string, double> refine(const Lab& lab, Section& section, const char* unit_title,
+                                     bool is_beam, const std::vector<int>& sizes, Refine measure) {
   plot::Series closed{"closed form", {}, {}, plot::Style::Dashed, {}};
   plot::Plot plot{.title = unit_title,
                   .x = {"elements across the section"},
                   .y = {"ours / closed form"},
                   .series = {}};
   Table table{unit_title, {"law", "elements across", "closed form, mm", "ours, mm", "error"}, {}};
+  std::map<std::string, double> finest;
   for (const auto& law : laws()) {
     plot::Series series{law.title, {}, {}, plot::Style::LineAndPoints, {}};
     double error = 0, expected = 0;
@@ -120,6 +123,7 @@ void refine(const Lab& lab, Section& section, const char* unit_title, bool is_be
     section.at_most(law.name, fmt::format("{} mm", shown(expected)), error, bound,
                     fmt::format("{}, {} elements across: {} of the closed form.", law.title,
                                 sizes.back(), shown(series.y.back())));
+    finest[law.name] = series.y.back();
     plot.series.push_back(std::move(series));
   }
   closed.x = {static_cast<double>(sizes.front()), static_cast<double>(sizes.back())};
@@ -127,6 +131,7 @@ void refine(const Lab& lab, Section& section, const char* unit_title, bool is_be
   plot.series.push_back(std::move(closed));
   section.add(std::move(plot));
   section.add(std::move(table));
+  return finest;
 }
 
 std::optional<double> stretch_bar(const Lab& lab, Section& section, const Law& law, int across,
@@ -187,8 +192,18 @@ void run_cantilever(const Lab& lab, Section& section) {
       "(kappa G A). Linear tets are too stiff in bending and converge as they get smaller; nearly "
       "incompressible ones (K = 40 C10) lock, and averaging the volume over each node's tets is "
       "there to undo that.");
-  refine(lab, section, "Deflection of the end", true,
-         lab.is_short() ? std::vector<int>{2, 4} : std::vector<int>{2, 4, 6}, bend_beam);
+  const auto finest =
+      refine(lab, section, "Deflection of the end", true,
+             lab.is_short() ? std::vector<int>{2, 4} : std::vector<int>{2, 4, 6}, bend_beam);
+  if (finest.contains("neo-hookean") && finest.contains("neo-hookean-averaged"))
+    section.at_least("averaging-against-locking", "softer than without",
+                     finest.at("neo-hookean-averaged") / finest.at("neo-hookean"), 1.02,
+                     "Deflection with averaged volume over that without, finest mesh.");
+  section.say(
+      "What is left with averaged volume is about what these tets show at nu = 0.25 and more: "
+      "linear tets are stiff in bending whatever their volume does, and averaging takes away only "
+      "the part that comes "
+      "from incompressibility.");
 }
 
 }  // namespace trocar::validation
