@@ -65,7 +65,7 @@ struct NodeRule {
   std::string name;
   std::optional<std::vector<std::int64_t>> ids;
   std::optional<std::string> csv;  // file of ids, relative to the scenario
-  Place csv_place;
+  Place ids_place;                 // of either
   struct Box {
     Vec3d low_m, high_m;
   };

@@ -36,7 +36,7 @@ NodeRule read_node_rule(TableReader& reader, const std::vector<NodeRule>& before
                               std::to_string(other.place.line));
   rule.ids = reader.integers("ids");
   rule.csv = reader.string("csv");
-  rule.csv_place = place_of(reader, "csv");
+  rule.ids_place = place_of(reader, rule.csv ? "csv" : "ids");
   rule.is_on_surface = reader.boolean("surface").value_or(false);
   const auto low = read_point(reader, "box_min_mm"), high = read_point(reader, "box_max_mm");
   if (low.has_value() != high.has_value())

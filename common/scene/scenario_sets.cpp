@@ -109,16 +109,15 @@ Result<NodeList> Resolver::read_ids(const NodeRule& rule, std::size_t node_count
   if (rule.csv) {
     const std::filesystem::path path(*rule.csv);
     auto read = ids_of_csv(path.is_absolute() ? path : scenario_.source.parent_path() / path);
-    if (!read) return wrong(rule.csv_place, read.error().message);
+    if (!read) return wrong(rule.ids_place, read.error().message);
     ids = std::move(*read);
   }
   NodeList nodes;
   for (const auto id : ids) {
     if (id < 0 || static_cast<std::uint64_t>(id) >= node_count)
-      return wrong(rule.csv ? rule.csv_place : rule.place,
-                   "set \"" + rule.name + "\": node " + std::to_string(id) +
-                       " does not exist, the organ has nodes 0 to " +
-                       std::to_string(node_count - 1));
+      return wrong(rule.ids_place, "set \"" + rule.name + "\": node " + std::to_string(id) +
+                                       " does not exist, the organ has nodes 0 to " +
+                                       std::to_string(node_count - 1));
     nodes.push_back(NodeIndex(static_cast<std::size_t>(id)));
   }
   sort_distinct(nodes);

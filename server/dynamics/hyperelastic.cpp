@@ -220,7 +220,9 @@ void Hyperelastic<Law>::add_rows(Group group, const Float4* x, const Vec8& own, 
   const auto rows = rows_[group];
   if constexpr (kAveraged)
     if (scratch.rows.size() < rows.size()) scratch.rows.resize(rows.size());
-  Vec8 gradient = zero_vec8();
+  // Sums live in registers: in `step` they would be stored and loaded again row after row.
+  Vec8 gradient = step.gradient;
+  SymMat8 block = step.block;
   [[maybe_unused]] Float8 identity = all(0);
   [[maybe_unused]] Float8 own_pressure = all(0);
   if constexpr (kAveraged) {
@@ -248,10 +250,10 @@ void Hyperelastic<Law>::add_rows(Group group, const Float4* x, const Vec8& own, 
       gradient = fma8(half_di1, first, gradient);
       identity = fnma8(wb + wc + wd, first, identity);
       // C10 V Psi''/C10 dI1 dI1^T with dI1 = half_di1 / (C10 V)
-      step.block.add_outer(half_di1, second * (inverse + inverse));
+      block.add_outer(half_di1, second * (inverse + inverse));
     }
     const Float8 volumetric = load(row.volumetric);
-    step.block.add_outer(s.area, volumetric);
+    block.add_outer(s.area, volumetric);
     Float8 pressure;  // a sixth of K (J - 1) - 2 C10
     if constexpr (kAveraged) {
       store(scratch.rows[i], s.area);
@@ -266,13 +268,12 @@ void Hyperelastic<Law>::add_rows(Group group, const Float4* x, const Vec8& own, 
     }
     gradient = fma8(s.area, pressure, gradient);
   }
-  step.gradient = step.gradient + gradient;
   if constexpr (Law::kIsLinear) {
-    step.gradient = step.gradient + load(constant_gradient_[group]);
-    step.block.add_identity(load(constant_block_[group]));
-  } else {
-    step.block.add_identity(identity);
+    gradient = gradient + load(constant_gradient_[group]);
+    identity = load(constant_block_[group]);
   }
+  block.add_identity(identity);
+  step = {gradient, block};
 }
 
 template <typename Law>

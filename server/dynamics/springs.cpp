@@ -72,7 +72,9 @@ void Springs::begin_group(Group group, const Float4* start) {
 }
 
 void Springs::add(Group group, const Float4* x, const Vec8& own, NodeStep8& step, Scratch&) const {
+  // Sums live in registers: in `step` they would be stored and loaded again row after row.
   Vec8 pull = zero_vec8();
+  SymMat8 block = step.block;
   Float8 identity = all(0);
   for (const Row& row : rows_[group]) {
     const Vec8 r = load(row.rest) + (gather(x, row.neighbour) - own);
@@ -83,10 +85,11 @@ void Springs::add(Group group, const Float4* x, const Vec8& own, NodeStep8& step
     pull = fma8(r, ratio, pull);
     const Float8 across = _mm256_max_ps(ratio, all(0));
     identity = identity + across;
-    step.block.add_outer(r, (stiffness - across) * (inverse * inverse));
+    block.add_outer(r, (stiffness - across) * (inverse * inverse));
   }
   step.gradient = step.gradient - pull;
-  step.block.add_identity(identity);
+  block.add_identity(identity);
+  step.block = block;
 }
 
 double Springs::energy_j(std::span<const Vec3d> displacements) const {

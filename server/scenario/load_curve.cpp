@@ -27,11 +27,15 @@ Vec3d way_of(const scene::ResolvedScenario& resolved, std::size_t tool) {
   return result;
 }
 
+// Of several for one set, along an axis each for example, the one with the largest value.
 template <typename Rules>
 std::optional<std::size_t> about(const Rules& rules, const std::string& set) {
+  std::optional<std::size_t> found;
   for (std::size_t i = 0; i < rules.size(); ++i)
-    if (rules[i].set.name == set) return i;
-  return std::nullopt;
+    if (rules[i].set.name == set &&
+        (!found || length(largest(rules[i].over_time)) > length(largest(rules[*found].over_time))))
+      found = i;
+  return found;
 }
 
 std::optional<LoadCurve> curve_of(const scene::ResolvedScenario& resolved, std::size_t index) {

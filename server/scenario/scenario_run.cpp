@@ -84,13 +84,14 @@ Status check_explicit(const scene::ResolvedScenario& resolved) {
 
 Status check_supported(const scene::ResolvedScenario& resolved) {
   const auto& scenario = resolved.scenario;
-  const auto refuse = [&](const scene::Place& place, const std::string& what) {
-    return scene::scenario_error(scenario, place, what + " is not simulated yet");
-  };
   const auto& rule = scenario.run;
-  for (const auto& rule_of_set : scenario.displacements)
-    if (rule_of_set.axes != kAllAxes)
-      return refuse(rule_of_set.set.place, "a set that is held along some axes only");
+  for (const auto& load : scenario.displacements)
+    if (load.axes != kAllAxes && (rule.boundary == scene::Boundary::Frozen ||
+                                  rule.integrator == scene::Integrator::Explicit))
+      return scene::scenario_error(
+          scenario, load.set.place,
+          "is held along some axes only, which needs boundary = \"whole\" or \"graded\" and the "
+          "implicit integrator: see [run]");
   return rule.integrator == scene::Integrator::Explicit ? check_explicit(resolved) : Status{};
 }
 
@@ -106,7 +107,8 @@ ScenarioRun::ScenarioRun(scene::ResolvedScenario resolved, Solver solver, unsign
       solver_(organ(), world_, threads) {
   held_ = organ().fixed_nodes;
   for (const auto& load : resolved_.displacements)
-    held_.insert(held_.end(), load.nodes.begin(), load.nodes.end());
+    if (load.axes == kAllAxes) held_.insert(held_.end(), load.nodes.begin(), load.nodes.end());
+  list_axis_holds();
   held_displacements_.resize(held_.size());
   if (!resolved_.forces.empty()) forces_.resize(world_.node_count());
   for (std::uint32_t i = 0; i < world_.node_count(); ++i) {
@@ -129,11 +131,39 @@ bool ScenarioRun::is_due(std::size_t probe) const {
   return is_static() || steps_done_ % scenario().probes[probe].every_ticks == 0;
 }
 
+// One per node, though several sets may hold it along an axis each.
+void ScenarioRun::list_axis_holds() {
+  for (const auto& load : resolved_.displacements) {
+    if (load.axes == kAllAxes) continue;
+    for (const auto node : load.nodes) axis_holds_.push_back({node, 0, {}});
+  }
+  std::ranges::sort(axis_holds_, {}, &dynamics::AxisHold::node);
+  const auto twice = std::ranges::unique(axis_holds_, {}, &dynamics::AxisHold::node);
+  axis_holds_.erase(twice.begin(), twice.end());
+  for (const auto& load : resolved_.displacements)
+    if (load.axes != kAllAxes)
+      for (const auto node : load.nodes) axis_hold_of(node)->axes |= load.axes;
+}
+
+dynamics::AxisHold* ScenarioRun::axis_hold_of(NodeIndex node) {
+  const auto found = std::ranges::lower_bound(axis_holds_, node, {}, &dynamics::AxisHold::node);
+  return found != axis_holds_.end() && found->node == node ? &*found : nullptr;
+}
+
 void ScenarioRun::apply_loads(double time_s) {
   std::size_t entry = organ().fixed_nodes.size();
   for (const auto& load : resolved_.displacements) {
     const Vec3f displacement = to_float(load.over_time.at(time_s));
-    for (std::size_t i = 0; i < load.nodes.size(); ++i) held_displacements_[entry++] = displacement;
+    for (const auto node : load.nodes) {
+      if (load.axes == kAllAxes) {
+        held_displacements_[entry++] = displacement;
+        continue;
+      }
+      Vec3f& held = axis_hold_of(node)->displacement;
+      if (load.axes & 1) held.x = displacement.x;
+      if (load.axes & 2) held.y = displacement.y;
+      if (load.axes & 4) held.z = displacement.z;
+    }
   }
   std::ranges::fill(forces_, Vec3f{});
   for (const auto& load : resolved_.forces) {
@@ -167,7 +197,9 @@ std::span<const NodeIndex> ScenarioRun::collect_active() {
   // is where a force enters, like a contact.
   seeds_.assign(scenario().tools.size(), {});
   for (const auto& tool : contacts_.tools) seeds_[tool.tool.value] = contacts_.seeds_of(tool);
-  for (const auto& load : resolved_.displacements) seeds_.push_back(load.nodes);
+  const auto moves = [](const auto& key) { return length(key.value) > 0; };
+  for (const auto& load : resolved_.displacements)
+    if (std::ranges::any_of(load.over_time.keys, moves)) seeds_.push_back(load.nodes);
   for (const auto& load : resolved_.forces) seeds_.push_back(load.nodes);
   const auto& run = scenario().run;
   constexpr auto kNoLimit = std::numeric_limits<std::uint32_t>::max();
@@ -175,7 +207,7 @@ std::span<const NodeIndex> ScenarioRun::collect_active() {
               {run.depth.value_or(kNoLimit), run.nodes.value_or(kNoLimit)});
   active_set_.collect(
       queue_,
-      boundary_ == scene::Boundary::Graded ? world::Boundary::Graded : world::Boundary::Frozen,
+      boundary_ == scene::Boundary::Frozen ? world::Boundary::Frozen : world::Boundary::Graded,
       world_);
   return active_set_.nodes();
 }
@@ -226,7 +258,7 @@ StepReport ScenarioRun::step_dynamic() {
   std::uint32_t sweeps = 0;
   for (std::uint32_t i = 1; i <= steps; ++i) {
     apply_loads(seconds_of(world_.tick - 1) + run.dt_s() * i);
-    const dynamics::ExternalLoads loads{forces_, held_, held_displacements_};
+    const dynamics::ExternalLoads loads{forces_, held_, held_displacements_, axis_holds_};
     if (explicit_) {
       explicit_->step(run.dt_s(), world_, loads);
       continue;
@@ -258,8 +290,8 @@ StepReport ScenarioRun::relax() {
   std::uint32_t sweeps = 0;
   do {
     how.sweeps = std::min(kSweepsPerRelaxation, most - sweeps);
-    report.solve =
-        solver_.solve(contacts_, free_nodes_, how, world_, {forces_, held_, held_displacements_});
+    report.solve = solver_.solve(contacts_, free_nodes_, how, world_,
+                                 {forces_, held_, held_displacements_, axis_holds_});
     std::ranges::fill(world_.velocities, Vec3f{});
     sweeps += report.solve.sweeps;
     report.is_converged =
@@ -301,6 +333,17 @@ StepReport ScenarioRun::step() {
   return report;
 }
 
+Vec3d ScenarioRun::holding_force(NodeIndex node) const {
+  Vec3d force = to_double(solver_.holding_force(contacts_, node, solved_dt_));
+  const auto hold = std::ranges::lower_bound(axis_holds_, node, {}, &dynamics::AxisHold::node);
+  if (hold == axis_holds_.end() || hold->node != node) return force;
+  // Along the others it is what the solver left out of balance.
+  if (!(hold->axes & 1)) force.x = 0;
+  if (!(hold->axes & 2)) force.y = 0;
+  if (!(hold->axes & 4)) force.z = 0;
+  return force;
+}
+
 Vec3d ScenarioRun::probe(std::size_t index) const {
   const auto& rule = scenario().probes[index];
   const auto& nodes = resolved_.probe_nodes[index];
@@ -313,8 +356,7 @@ Vec3d ScenarioRun::probe(std::size_t index) const {
       for (const auto node : nodes) sum += to_double(world_.velocities[node.value]);
       return sum / static_cast<double>(nodes.size());
     case scene::ProbeQuantity::Reaction:
-      for (const auto node : nodes)
-        sum += to_double(solver_.holding_force(contacts_, node, solved_dt_));
+      for (const auto node : nodes) sum += holding_force(node);
       return sum;
     case scene::ProbeQuantity::ToolForce:
       for (const auto& contact : contacts_.tools)

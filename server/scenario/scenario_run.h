@@ -77,7 +77,10 @@ class ScenarioRun {
 
  private:
   bool is_static() const { return scenario().run.mode == scene::RunMode::Static; }
+  void list_axis_holds();
+  dynamics::AxisHold* axis_hold_of(NodeIndex node);
   void apply_loads(double time_s);
+  Vec3d holding_force(NodeIndex node) const;
   void move_tools(double time_s, bool takes_samples);
   // What is swept this step, most of all in a graded one.
   std::span<const NodeIndex> collect_active();
@@ -109,12 +112,13 @@ class ScenarioRun {
   propagation::ActiveSet active_set_;
   dynamics::BlockDescent solver_;
   std::optional<dynamics::ExplicitEuler> explicit_;
-  dynamics::FarPlan far_plan_;             // graded
-  std::vector<Vec3f> forces_;              // per node; empty without loads
-  std::vector<NodeIndex> held_;            // fixed, then displaced nodes
-  std::vector<Vec3f> held_displacements_;  // per entry of held_
-  std::vector<NodeIndex> free_nodes_;      // what is active unless frozen
-  std::vector<Vec3f> before_;              // displacements before a round of contacts
+  dynamics::FarPlan far_plan_;                  // graded
+  std::vector<Vec3f> forces_;                   // per node; empty without loads
+  std::vector<NodeIndex> held_;                 // fixed, then displaced nodes
+  std::vector<Vec3f> held_displacements_;       // per entry of held_
+  std::vector<dynamics::AxisHold> axis_holds_;  // by node
+  std::vector<NodeIndex> free_nodes_;           // what is active unless frozen
+  std::vector<Vec3f> before_;                   // displacements before a round of contacts
   std::vector<std::span<const NodeIndex>> seeds_;
   std::vector<locks::ClaimRequest> requests_;
   std::vector<locks::ClaimEvent> claim_events_;

@@ -1,5 +1,5 @@
 // Measures the solver: beside another library, against the targets, how it grows, and what a tick's
-// parts cost. README, "Benchmarks".
+// parts cost. deploy/bench runs it.
 
 #include <benchmark/benchmark.h>
 

@@ -349,7 +349,8 @@ Status ResultTable::write(const std::filesystem::path& folder, const Machine& ma
   const auto select = [&](const char* group) {
     std::vector<const Row*> rows;
     for (const auto& row : rows_)
-      if (row.group == group) rows.push_back(&row);
+      // The figures of several threads are wall times: another axis.
+      if (row.group == group && row.threads == 1) rows.push_back(&row);
     return rows;
   };
   std::error_code error;

@@ -166,6 +166,19 @@ young_modulus_pa = )") +
   EXPECT_NEAR(fitted->parameters[0].value, 6000, 0.02 * 6000);
 }
 
+TEST(Fit, TheExampleFindsWhatItsCurveWasMadeWith) {
+  const std::filesystem::path folder = std::filesystem::path(TROCAR_SOURCE_DIR) / "deploy/scenes";
+  auto parsed = scene::parse_scenario(folder / "stretch.toml");
+  ASSERT_TRUE(parsed.ok()) << parsed.error().message;
+  const auto resolved = scene::resolve(std::move(*parsed));
+  ASSERT_TRUE(resolved.ok()) << resolved.error().message;
+  const auto measured = read_measurements(folder / "stretch.csv");
+  ASSERT_TRUE(measured.ok()) << measured.error().message;
+  const auto fitted = fit(*resolved, *measured, {});
+  ASSERT_TRUE(fitted.ok()) << fitted.error().message;
+  EXPECT_NEAR(fitted->parameters[0].value, 6000, 60);
+}
+
 TEST(Fit, WhatCannotBeFittedIsSaid) {
   const auto resolved = resolve(pulled_static("young_modulus_pa = 1000\n"));
   const auto measured = recorded(pulled_static("young_modulus_pa = 6000\n"), 0);
