@@ -30,7 +30,7 @@ double protrusion(const Lab& lab, Section& section, const std::string& organ,
       organ + "[material]\nspring_stiffness_n_m = 10\n" +
           (is_transverse ? "fibre_direction = [0, 1, 0]\nfibre_stiffness_ratio = 0.1\n" : "") +
           "\n" + near_set("patch", {5, 70, 5}, 14.2) +
-          force("patch", {{0, {}}, {1, {0, force_n, 0}}}) + static_run(3, 1e-6) +
+          force("patch", {{0, {}}, {1, {0, force_n, 0}}}) + static_run(3, 4e-6) +
           "[[probe]]\nset = \"patch\"\nquantity = \"displacement\"\n");
   lab.finish(section, *run);
   for (int layer = -14; layer <= 14; ++layer) {

@@ -33,6 +33,7 @@ th, td { text-align: left; padding: .38rem .7rem .38rem 0; border-bottom: 1px so
   vertical-align: top; }
 th { color: var(--dim); font-weight: 600; white-space: nowrap; }
 td.number, th.number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
+td.short { white-space: nowrap; }
 tr:last-child td { border-bottom: 0; }
 table.data { width: auto; min-width: 40%; }
 table.data th, table.data td { padding-right: 1.6rem; }
@@ -97,6 +98,13 @@ std::string size_of(double value, bool is_relative) {
   return is_relative ? shown_percent(value) : shown(value);
 }
 
+// A value of one or two words stays on one line.
+std::string short_cell(const std::string& text) {
+  constexpr std::size_t kShort = 18;
+  return fmt::format("<td{}>{}</td>", text.size() <= kShort ? " class=\"short\"" : "",
+                     escaped(text));
+}
+
 std::string checks_table(const Section& section) {
   std::string out =
       "<div class=\"table\"><table><tr><th>check</th><th>paper or reference</th><th>ours</th>"
@@ -104,9 +112,9 @@ std::string checks_table(const Section& section) {
   for (const auto& check : section.checks) {
     const auto what = check.name.substr(section.name.size() + 1);
     out += fmt::format(
-        "<tr><td><code>{}</code><br><span class=\"small dim\">{}</span></td><td>{}</td><td>{}</td>"
+        "<tr><td><code>{}</code><br><span class=\"small dim\">{}</span></td>{}{}"
         "<td class=\"number\">{}</td><td class=\"number\">{}</td><td>{}</td></tr>",
-        escaped(what), escaped(check.note), escaped(check.expected), escaped(check.ours),
+        escaped(what), escaped(check.note), short_cell(check.expected), short_cell(check.ours),
         size_of(check.error, check.is_relative), size_of(check.bound, check.is_relative),
         pill(check.is_kept()));
   }
