@@ -403,7 +403,7 @@ SolveReport BlockDescent::solve(const contact::ContactList& contacts,
     report.node_sweeps += near_.node_count;
     ++report.sweeps;
     squares = sum_of_squares(near_);
-    if (squares > last_squares && omega > 1.0f) {
+    if (settings.has_safeguard && squares > last_squares && omega > 1.0f) {
       omega = 1.0f;
       report.is_stepped_down = true;
     }

@@ -33,6 +33,8 @@ struct SolveSettings {
   float residual_tolerance_n = 0;
   std::uint32_t far_sweeps = 0;
   float far_over_relaxation = 1.3f;
+  // False: the caller watches the residual over many sweeps. Near an optimum it grows at first.
+  bool has_safeguard = true;
 };
 
 // A node that is held along some of the world's axes and free along the others.

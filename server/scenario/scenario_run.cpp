@@ -16,8 +16,11 @@ constexpr Tick kSampleTicks = 8;
 // With a step of time this long inertia and damping are nothing, so that a step ends in
 // equilibrium.
 constexpr float kStaticStep_s = 100;
-// The over-relaxation, which a solve gives up when it overshoots, is tried again so often.
-constexpr std::uint32_t kSweepsPerRelaxation = 200;
+// Without inertia the best over-relaxation is high, and the residual grows before it falls: it is
+// judged from stretch to stretch of sweeps, and lowered where a stretch brought nothing.
+constexpr float kStaticOverRelaxation = 1.85f;
+constexpr float kOverRelaxationStepDown = 0.8f;
+constexpr std::uint32_t kSweepsPerRelaxation = 100;
 // A contact that is found changes the equilibrium, and that the contacts. First the tool walks to
 // its new place, as it does in a session, and its claim takes effect.
 constexpr int kMinContactRounds = static_cast<int>(input::kPoseTicks) + 2;
@@ -285,9 +288,12 @@ StepReport ScenarioRun::relax() {
   how.residual_tolerance_n = static_cast<float>(scenario().run.tolerance_n);
   how.dt = solved_dt_ = kStaticStep_s;
   how.far_sweeps = 0;
+  how.over_relaxation = kStaticOverRelaxation;
+  how.has_safeguard = false;
   StepReport report;
   report.active_nodes = free_nodes_.size();
   std::uint32_t sweeps = 0;
+  float last_residual = INFINITY;
   do {
     how.sweeps = std::min(kSweepsPerRelaxation, most - sweeps);
     report.solve = solver_.solve(contacts_, free_nodes_, how, world_,
@@ -296,6 +302,9 @@ StepReport ScenarioRun::relax() {
     sweeps += report.solve.sweeps;
     report.is_converged =
         report.solve.residual_n <= how.residual_tolerance_n && report.solve.nodes_rejected == 0;
+    if (!(report.solve.residual_n < last_residual))
+      how.over_relaxation = 1 + (how.over_relaxation - 1) * kOverRelaxationStepDown;
+    last_residual = report.solve.residual_n;
   } while (!report.is_converged && sweeps < most);
   report.solve.sweeps = sweeps;
   return report;
