@@ -1,0 +1,40 @@
+#include "tests/validation/experiments.h"
+
+namespace trocar::validation {
+
+const std::vector<Experiment>& experiments() {
+  static const std::vector<Experiment> all{
+      {"choi2002/eq2", "How many nodes a force reaches", "Choi 2002, equation 2", run_eq2},
+      {"choi2002/fig2-several-users", "Three hands pull at once",
+       "Choi 2002, section 2.3, figure 2", run_fig2_users},
+      {"choi2002/fig3-transverse-isotropy", "Transversely isotropic against isotropic tissue",
+       "Choi 2002, figure 3", run_fig3_transverse},
+      {"choi2002/fig4-hysteresis", "Hysteresis under cyclic load", "Choi 2002, figure 4",
+       run_fig4_hysteresis},
+      {"choi2002/creep", "Creep", "Choi 2002, section 4; Kelvin-Voigt in closed form", run_creep},
+      {"choi2002/relaxation", "Stress relaxation",
+       "Choi 2002, section 1; Kelvin-Voigt in closed form", run_relaxation},
+      {"choi2002/fig5-profiles", "Profile of the surface for several penetration depths",
+       "Choi 2002, figure 5", run_fig5_profiles},
+      {"choi2002/fig6-time-split", "Where the time goes", "Choi 2002, figure 6", run_fig6_times},
+      {"choi2002/fig7-fig8-organs", "Hollow stomach and liver deform", "Choi 2002, figures 7 and 8",
+       run_fig7_fig8_organs},
+      {"choi2002/palpation-inclusion", "A stiff inclusion is felt",
+       "Choi 2002, section 3, discussion", run_palpation},
+      {"ours/propagation-lattice", "What a limit of nodes costs: lattice", "full solve, our own",
+       run_propagation_lattice},
+      {"ours/propagation-liver-4k", "What a limit of nodes costs: liver of 4,000 nodes",
+       "full solve, our own", run_propagation_liver},
+      {"ours/propagation-liver-17k", "What a limit of nodes costs: liver of 17,000 nodes",
+       "full solve, our own", run_propagation_large_liver},
+      {"ours/propagation-stomach", "What a limit of nodes costs: stomach", "full solve, our own",
+       run_propagation_stomach},
+      {"ours/bar", "Bar in tension", "closed form: F L / (E A)", run_bar},
+      {"ours/cantilever", "Thick cantilever", "closed form: Timoshenko", run_cantilever},
+      {"ours/indentation", "Indentation of a half-space", "closed forms: Hertz; bonded flat punch",
+       run_indentation},
+  };
+  return all;
+}
+
+}  // namespace trocar::validation

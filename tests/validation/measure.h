@@ -1,0 +1,27 @@
+#pragma once
+
+// What experiments read off a run.
+
+#include <span>
+#include <vector>
+
+#include "server/scenario/scenario_run.h"
+
+namespace trocar::validation {
+
+// Displacements of all nodes, m.
+using Field = std::vector<Vec3d>;
+Field field_of(const scenario::ScenarioRun& run);
+
+// |a - b| / |b| over all nodes (root of the sums of squares).
+double field_error(const Field& a, const Field& b);
+double largest(const Field& field);
+double largest_difference(const Field& a, const Field& b);
+
+// Work done along a closed curve of displacement and force by the trapezoidal rule, J.
+double loop_area(std::span<const double> displacement_m, std::span<const double> force_n);
+
+// The surface node at rest nearest to a point (all nodes if the organ has no such).
+NodeIndex node_nearest(const scene::Organ& organ, const Vec3d& point_m);
+
+}  // namespace trocar::validation

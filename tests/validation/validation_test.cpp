@@ -1,0 +1,124 @@
+// The validation report in its short form, as a process: the files are well formed and the bounds
+// of the quick experiments are kept.
+
+#include <google/protobuf/struct.pb.h>
+#include <google/protobuf/util/json_util.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <set>
+#include <sstream>
+
+namespace trocar {
+namespace {
+
+namespace fs = std::filesystem;
+using google::protobuf::ListValue;
+using google::protobuf::Value;
+
+std::string read(const fs::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  std::ostringstream out;
+  out << in.rdbuf();
+  return out.str();
+}
+
+class Validation : public ::testing::Test {
+ protected:
+  ~Validation() override { fs::remove_all(folder_); }
+
+  int run(const std::string& arguments) {
+    fs::create_directories(folder_);
+    const std::string command = std::string(TROCAR_BINARY_DIR) + "/trocar-validate --out '" +
+                                (folder_ / "out").string() + "' " + arguments + " >'" +
+                                (folder_ / "log").string() + "' 2>&1";
+    const int status = std::system(command.c_str());
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  }
+  std::string log() const { return read(folder_ / "log"); }
+  fs::path out() const { return folder_ / "out"; }
+
+  // Checks the form of results.json and that every bound is kept; names of the checks.
+  std::set<std::string> kept_checks() const {
+    std::set<std::string> names;
+    ListValue list;
+    const auto status =
+        google::protobuf::util::JsonStringToMessage(read(out() / "results.json"), &list);
+    EXPECT_TRUE(status.ok()) << status.ToString();
+    for (const auto& entry : list.values()) {
+      const auto& fields = entry.struct_value().fields();
+      for (const char* key : {"name", "paper", "ours", "error", "bound", "kept", "note"})
+        EXPECT_TRUE(fields.contains(key)) << key;
+      EXPECT_EQ(fields.size(), 7u);
+      if (fields.size() != 7u) continue;
+      const std::string name = fields.at("name").string_value();
+      EXPECT_TRUE(names.insert(name).second) << name << " twice";
+      EXPECT_EQ(fields.at("error").kind_case(), Value::kNumberValue) << name;
+      EXPECT_EQ(fields.at("bound").kind_case(), Value::kNumberValue) << name;
+      EXPECT_EQ(fields.at("kept").bool_value(),
+                fields.at("error").number_value() <= fields.at("bound").number_value())
+          << name;
+      EXPECT_TRUE(fields.at("kept").bool_value())
+          << name << ": error " << fields.at("error").number_value() << ", bound "
+          << fields.at("bound").number_value();
+    }
+    return names;
+  }
+
+ private:
+  const fs::path folder_ =
+      fs::temp_directory_path() / ("trocar-validation-" + std::to_string(getpid()) + "-" +
+                                   ::testing::UnitTest::GetInstance()->current_test_info()->name());
+};
+
+TEST_F(Validation, CountsAreThoseOfThePaper) {
+  ASSERT_EQ(run("--short --only choi2002/eq2"), 0) << log();
+  const auto names = kept_checks();
+  EXPECT_TRUE(names.contains("choi2002/eq2/depth-10"));
+  EXPECT_EQ(names.size(), 3u);
+
+  const std::string html = read(out() / "report.html");
+  EXPECT_TRUE(html.starts_with("<!doctype html>"));
+  EXPECT_TRUE(html.ends_with("</html>\n"));
+  EXPECT_NE(html.find("3 of 3 bounds kept"), std::string::npos);
+  EXPECT_NE(html.find("[[force]]"), std::string::npos) << "the scenario is in the report";
+  EXPECT_EQ(html.find("http-equiv"), std::string::npos);
+  EXPECT_EQ(html.find("<script"), std::string::npos);
+  EXPECT_EQ(html.find("<link"), std::string::npos) << "self-contained";
+  EXPECT_TRUE(fs::exists(out() / "scenarios" / "eq2-surface-10.toml"));
+}
+
+TEST_F(Validation, MaterialsFollowTheirClosedForms) {
+  ASSERT_EQ(run("--short --only choi2002/fig4"), 0) << log();
+  EXPECT_EQ(kept_checks().size(), 3u);
+  EXPECT_NE(read(out() / "report.html").find("<svg"), std::string::npos);
+  ASSERT_EQ(run("--short --only choi2002/relaxation"), 0) << log();
+  EXPECT_EQ(kept_checks().size(), 3u);
+}
+
+TEST_F(Validation, JointRegionsActAsOne) {
+  ASSERT_EQ(run("--short --only choi2002/fig2"), 0) << log();
+  EXPECT_EQ(kept_checks().size(), 3u);
+}
+
+TEST_F(Validation, BarInTensionHasItsClosedForm) {
+  ASSERT_EQ(run("--short --only ours/bar"), 0) << log();
+  EXPECT_TRUE(kept_checks().contains("ours/bar/springs"));
+}
+
+TEST_F(Validation, CommandLine) {
+  EXPECT_EQ(run("--help"), 0);
+  EXPECT_NE(log().find("Examples:"), std::string::npos);
+  EXPECT_EQ(run("--list"), 0);
+  EXPECT_NE(log().find("choi2002/fig5-profiles"), std::string::npos);
+  EXPECT_EQ(run("--only nothing/like-this"), 2);
+  EXPECT_NE(log().find("--list"), std::string::npos);
+  EXPECT_EQ(run("--unknown"), 2);
+}
+
+}  // namespace
+}  // namespace trocar
