@@ -1,5 +1,6 @@
 #include "common/journal/session_journal.h"
 
+#include "common/base/version.h"
 #include "tests/journal/mcap_files.h"
 #include "tests/journal/session_samples.h"
 
@@ -32,7 +33,7 @@ TEST_F(session_journal, info_of_a_finished_session) {
   const SessionInfo& info = journal->info();
   EXPECT_EQ(info.start_utc_ns, kSessionStart);
   EXPECT_EQ(info.sim_version, kSimVersion);
-  EXPECT_EQ(info.protocol, "1.0");
+  EXPECT_EQ(info.protocol, std::to_string(kProtocolMajor) + "." + std::to_string(kProtocolMinor));
   EXPECT_EQ(info.organ_name, "liver");
   EXPECT_EQ(info.organ_hash, 0x0123456789abcdefu);
   EXPECT_EQ(info.last_tick, 4000u);
