@@ -15,7 +15,7 @@
 
 namespace trocar::dynamics {
 
-inline constexpr std::size_t kLanes = 8;
+inline constexpr std::uint32_t kLanes = 8;
 
 using Float8 = __m256;
 
