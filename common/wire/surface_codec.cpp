@@ -32,9 +32,9 @@ std::int32_t unzigzag(std::uint64_t v) {
 }
 bool in_range(const QuantisedVertex& v) {
   const auto outside = [](std::int32_t c) {
-    return static_cast<std::uint32_t>(c + kMaxQuanta) > 2u * kMaxQuanta;
+    return int{static_cast<std::uint32_t>(c + kMaxQuanta) > 2u * kMaxQuanta};
   };
-  return !(outside(v.x) | outside(v.y) | outside(v.z));
+  return (outside(v.x) | outside(v.y) | outside(v.z)) == 0;
 }
 std::size_t block_count_of(std::size_t vertices) {
   return (vertices + kBlockVertices - 1) / kBlockVertices;
@@ -120,7 +120,8 @@ void encode_group(BitWriter& writer, const QuantisedVertex* baseline,
   for (std::size_t i = 0; i < slots.size(); ++i) {
     const QuantisedVertex& value = current[slots[i]];
     const QuantisedVertex& base = baseline[slots[i]];
-    valid &= in_range(value) & in_range(base);
+    valid &= in_range(value);
+    valid &= in_range(base);
     const QuantisedVertex difference = value - base;
     residuals[kTemporal][i] = residual(value, base);
     residuals[kTemporalSpatial][i] = residual(difference, predictor.difference);
