@@ -377,6 +377,8 @@ SolveReport BlockDescent::solve(const contact::ContactList& contacts,
                                 world::World& world, const ExternalLoads& loads) {
   TROCAR_ASSERT(loads.held.size() == loads.held_displacements.size());
   TROCAR_ASSERT(loads.forces.empty() || loads.forces.size() == world.node_count());
+  // A tolerance ends the sweeps early, before the far ones.
+  TROCAR_ASSERT(settings.far_sweeps == 0 || settings.residual_tolerance_n == 0);
   if (++current_ == 0) {
     for (auto* stamps : {&slot_stamp_, &group_stamp_, &begun_stamp_})
       std::ranges::fill(*stamps, 0u);
@@ -394,11 +396,11 @@ SolveReport BlockDescent::solve(const contact::ContactList& contacts,
   double squares = 0, last_squares = INFINITY;
   const auto tolerance = static_cast<double>(settings.residual_tolerance_n);
   for (std::uint32_t i = 0; i < settings.sweeps; ++i) {
-    if (i + 1 == std::max(settings.sweeps, 2u))
-      for (std::uint32_t far = 0; far < settings.far_sweeps; ++far) {
-        sweep(far_, contacts, inverse_dt, settings.far_over_relaxation);
-        report.node_sweeps += far_.node_count;
-      }
+    // Far nodes go before the last near sweep, so that near residuals are those of the end.
+    for (std::uint32_t far = 0; i + 1 == settings.sweeps && far < settings.far_sweeps; ++far) {
+      sweep(far_, contacts, inverse_dt, settings.far_over_relaxation);
+      report.node_sweeps += far_.node_count;
+    }
     sweep(near_, contacts, inverse_dt, omega);
     report.node_sweeps += near_.node_count;
     ++report.sweeps;
@@ -410,11 +412,6 @@ SolveReport BlockDescent::solve(const contact::ContactList& contacts,
     last_squares = squares;
     if (tolerance > 0 && squares <= tolerance * tolerance * static_cast<double>(near.size())) break;
   }
-  if (settings.sweeps < 2)
-    for (std::uint32_t far = 0; far < settings.far_sweeps; ++far) {
-      sweep(far_, contacts, inverse_dt, settings.far_over_relaxation);
-      report.node_sweeps += far_.node_count;
-    }
 
   write_back(near_, inverse_dt, world);
   write_back(far_, inverse_dt, world);

@@ -7,8 +7,8 @@
 // for the rest of the step when a sweep's residual grew against the sweep before.
 //
 // Two classes of nodes (graded-exterior scheme): the near ones get `sweeps`; with far_sweeps > 0
-// all other free nodes get that many, with an over-relaxation of their own, between the last two
-// near sweeps. With far_sweeps = 0 the others stand still.
+// all other free nodes get that many, with an over-relaxation of their own, before the last near
+// sweep; there is no residual tolerance then. With far_sweeps = 0 the others stand still.
 //
 // Results do not depend on the number of workers. Work: sweeps x groups with a swept node x rows;
 // no allocation after the first steps. One caller at a time.
