@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "common/base/version.h"
+#include "common/wire/tool_shape.h"
 #include "proto/wire.pb.h"
 
 namespace trocar::replication {
@@ -40,7 +41,7 @@ Result<HelloRequest> check_hello(const proto::Hello& hello, EndReason& reason) {
   request.name = hello.name();
   request.role = static_cast<session::Role>(hello.role());
   for (const auto& tool : hello.tool())
-    request.tools.push_back({tool.radius_m(), tool.length_m(), tool.reach_m()});
+    request.tools.push_back(wire::read(tool));
   return request;
 }
 
