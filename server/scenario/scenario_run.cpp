@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "common/base/assert.h"
+#include "server/contact/update_claims.h"
 
 namespace trocar::scenario {
 namespace {
@@ -217,19 +218,10 @@ std::span<const NodeIndex> ScenarioRun::collect_active() {
   return active_set_.nodes();
 }
 
-// As the tick of a session does it (server/step/tick.cpp).
 void ScenarioRun::follow_contacts() {
   proxies_.follow(contacts_, world_, tools_);
-  grasps_.follow_slip(contacts_, world_, claims_, claim_events_);
-  requests_.clear();
-  for (std::uint8_t i = 0; i < scenario().tools.size(); ++i) {
-    const auto& tool = tools_[ToolSlot{i}];
-    requests_.push_back(
-        {ToolSlot{i}, tool.verb, tool.last_sample_tick, contacts_.reach_of(ToolSlot{i})});
-  }
   claim_events_.clear();
-  claims_.update(world_.tick, requests_, claim_events_);
-  grasps_.follow_claims(world_, tools_, claims_, requests_);
+  contact::update_claims(world_, tools_, contacts_, requests_, claims_, grasps_, claim_events_);
 }
 
 dynamics::SolveSettings ScenarioRun::settings() const {
@@ -326,7 +318,8 @@ StepReport ScenarioRun::step_static() {
     ++world_.tick;
     move_tools(now, round == 0);
     // Without time a tool has no speed either.
-    finder_.find({world_, tools_, claims_, grasps_, proxies_, world_.tick, kNoLimit_m, kNoLimit_m}, contacts_);
+    finder_.find({world_, tools_, claims_, grasps_, proxies_, world_.tick, kNoLimit_m, kNoLimit_m},
+                 contacts_);
     before_.assign(world_.displacements.begin(), world_.displacements.end());
     report = relax();
     sweeps += report.solve.sweeps;
