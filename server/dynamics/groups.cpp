@@ -10,6 +10,10 @@ namespace {
 
 // Stretch of the Morton curve within which nodes are sorted by valence: 8 groups.
 constexpr std::size_t kSortStretch = 8 * kLanes;
+// A colour with at most so many nodes is one to leave.
+constexpr std::uint32_t kFewNodes = 2 * kLanes;
+// Vacant lanes that any colour may have, and as a part of its lanes.
+constexpr std::uint32_t kVacantLanes = kLanes, kVacantPart = 4;
 
 // Bits of x spread to every third place.
 std::uint64_t spread(std::uint64_t x) {
@@ -89,10 +93,10 @@ Groups::Groups(const Topology& topology, Coupling coupling, std::span<const Colo
     if (!topology.has_node(node)) continue;
     if (colours[i] >= of_colour.size()) of_colour.resize(colours[i] + 1);
     of_colour[colours[i]].push_back(i);
-    ++node_count_;
   }
   slot_of_node_.assign(topology.node_count(), kNoSlot);
   vacancies_.resize(of_colour.size());
+  members_.resize(of_colour.size());
   for (Colour colour = 0; colour < of_colour.size(); ++colour) {
     auto& nodes = of_colour[colour];
     std::ranges::sort(nodes, {}, [&](std::uint32_t i) { return std::pair(codes[i], i); });
@@ -106,7 +110,9 @@ Groups::Groups(const Topology& topology, Coupling coupling, std::span<const Colo
       if (node_of_slot_.size() % kLanes == 0) {
         colour_of_group_.push_back(colour);
         code_of_group_.push_back(codes[i]);
+        ++members_[colour].groups;
       }
+      ++members_[colour].nodes;
       slot_of_node_[i] = static_cast<Slot>(node_of_slot_.size());
       node_of_slot_.push_back(NodeIndex(i));
     }
@@ -118,7 +124,9 @@ Groups::Groups(const Topology& topology, Coupling coupling, std::span<const Colo
 }
 
 double Groups::fill() const {
-  return static_cast<double>(node_count_) / static_cast<double>(node_of_slot_.size());
+  std::size_t nodes = 0, groups = 0;
+  for (const auto& members : members_) nodes += members.nodes, groups += members.groups;
+  return static_cast<double>(nodes) / static_cast<double>(groups * kLanes);
 }
 
 void Groups::order_by_colour(std::vector<Group>& groups,
@@ -147,13 +155,20 @@ void Groups::update(const Topology& topology, std::span<const NodeIndex> changed
     if (!topology.has_node(node) && slot_of(node) != kNoSlot) vacate(node);
   for (const auto node : changed) {
     if (!topology.has_node(node)) continue;
-    if (slot_of(node) != kNoSlot && !has_conflict(topology, node)) continue;
+    const Colour own = colour_of(node);
+    const bool is_to_leave = own != kNoColour && members_[own].nodes <= kFewNodes;
+    if (own != kNoColour && !is_to_leave && !has_conflict(topology, node)) continue;
     const Colour colour =
         smallest_free_colour(topology, node, [&](NodeIndex j) { return colour_of(j); });
-    if (slot_of(node) != kNoSlot) vacate(node);
+    if (is_to_leave && colour >= own && !has_conflict(topology, node)) continue;
+    if (own != kNoColour) vacate(node);
     place(node, colour, morton_code(topology.rest()[node.value]));
     moved_.push_back(node);
   }
+  part_emptiest_groups(topology);
+  while (!members_.empty() && members_.back().nodes == 0) members_.pop_back();
+  std::ranges::sort(moved_);
+  moved_.erase(std::unique(moved_.begin(), moved_.end()), moved_.end());
 }
 
 bool Groups::has_conflict(const Topology& topology, NodeIndex node) {
@@ -169,24 +184,61 @@ std::uint32_t Groups::nodes_in(Group group) const {
   return count;
 }
 
-void Groups::vacate(NodeIndex node) {
+void Groups::take_out(NodeIndex node) {
   const Slot slot = slot_of(node);
-  const Group group = slot / kLanes;
-  auto& vacancies = vacancies_[colour_of_group_[group]];
-  const Vacancy own{code_of_group_[group], group};
-  if (nodes_in(group) == kLanes) vacancies.insert(std::ranges::lower_bound(vacancies, own), own);
   node_of_slot_[slot] = {};
   slot_of_node_[node.value] = kNoSlot;
   vacated_.push_back(slot);
-  --node_count_;
-  if (nodes_in(group) > 0) return;
-  vacancies.erase(std::ranges::lower_bound(vacancies, own));
+  --members_[colour_of_group_[slot / kLanes]].nodes;
+}
+
+void Groups::give_up(Group group) {
+  --members_[colour_of_group_[group]].groups;
   colour_of_group_[group] = kNoColour;
   empty_groups_.insert(std::ranges::lower_bound(empty_groups_, group, std::greater{}), group);
 }
 
+void Groups::vacate(NodeIndex node) {
+  const Group group = slot_of(node) / kLanes;
+  auto& vacancies = vacancies_[colour_of_group_[group]];
+  const Vacancy own{code_of_group_[group], group};
+  if (nodes_in(group) == kLanes) vacancies.insert(std::ranges::lower_bound(vacancies, own), own);
+  take_out(node);
+  if (nodes_in(group) > 0) return;
+  vacancies.erase(std::ranges::lower_bound(vacancies, own));
+  give_up(group);
+}
+
+// Of colours that lost a node. Each removed node brings at most about one other to a new lane.
+void Groups::part_emptiest_groups(const Topology& topology) {
+  for (std::size_t i = 0, count = vacated_.size(); i < count; ++i) {
+    const Colour colour = colour_of_group_[vacated_[i] / kLanes];
+    if (colour == kNoColour) continue;
+    const auto is_loose = [&] {
+      const auto lanes = members_[colour].groups * kLanes;
+      return lanes - members_[colour].nodes > kVacantLanes + lanes / kVacantPart;
+    };
+    while (is_loose()) {
+      auto& vacancies = vacancies_[colour];
+      const auto emptiest = std::ranges::min_element(
+          vacancies, {}, [&](const Vacancy& v) { return nodes_in(v.group); });
+      const Group group = emptiest->group;
+      vacancies.erase(emptiest);
+      for (std::size_t lane = 0; lane < kLanes; ++lane) {
+        const auto node = nodes_of(group)[lane];
+        if (!node.is_valid()) continue;
+        take_out(node);
+        place(node, colour, morton_code(topology.rest()[node.value]));
+        moved_.push_back(node);
+      }
+      give_up(group);
+    }
+  }
+}
+
 Group Groups::group_with_room(Colour colour, std::uint64_t code) {
   if (colour >= vacancies_.size()) vacancies_.resize(colour + 1);
+  if (colour >= members_.size()) members_.resize(colour + 1);
   auto& vacancies = vacancies_[colour];
   if (!vacancies.empty()) {
     auto nearest = std::ranges::lower_bound(vacancies, Vacancy{code, 0});
@@ -208,6 +260,7 @@ Group Groups::group_with_room(Colour colour, std::uint64_t code) {
     code_of_group_[group] = code;
   }
   is_in_order_ = false;
+  ++members_[colour].groups;
   vacancies.push_back({code, group});
   return group;
 }
@@ -218,7 +271,7 @@ void Groups::place(NodeIndex node, Colour colour, std::uint64_t code) {
   const auto at = std::find(first, first + kLanes, NodeIndex());
   *at = node;
   slot_of_node_[node.value] = static_cast<Slot>(at - node_of_slot_.begin());
-  ++node_count_;
+  ++members_[colour].nodes;
   if (nodes_in(group) < kLanes) return;
   auto& vacancies = vacancies_[colour];
   vacancies.erase(std::ranges::lower_bound(vacancies, Vacancy{code_of_group_[group], group}));

@@ -14,8 +14,11 @@
 // and the vacant lane of that colour that is nearest along the curve; a colour without one takes an
 // empty group, or a new one at the end. A colour's groups therefore are a list, in ascending order:
 // order_by_colour(). A lane whose node is removed is vacant; a group without nodes belongs to no
-// colour until one takes it. Work is in proportion to what meets at the changed nodes, not to the
-// organ, and nothing is allocated while capacities suffice.
+// colour until one takes it. So that groups stay full and colours few when an organ shrinks again,
+// a changed node leaves a colour of few nodes for a smaller one that is free, and a colour with
+// vacant lanes beyond a quarter parts its emptiest group among the others. Work is in proportion to
+// what meets at the changed nodes, not to the organ, and nothing is allocated while capacities
+// suffice.
 //
 // A node's result is a function of the colours: which nodes share a group matters only to speed.
 // After a change colours are a function of the history of changes, so whoever stores a state stores
@@ -57,7 +60,8 @@ class Groups {
   // colours: per place of a node, valid for the coupling; empty: greedy.
   Groups(const Topology& topology, Coupling coupling, std::span<const Colour> colours = {});
 
-  std::size_t colour_count() const { return vacancies_.size(); }
+  // The last one has nodes; others need not.
+  std::size_t colour_count() const { return members_.size(); }
   std::size_t group_count() const { return node_of_slot_.size() / kLanes; }
   std::size_t slot_count() const { return node_of_slot_.size(); }
   // kNoColour: no node is in it.
@@ -75,7 +79,7 @@ class Groups {
   std::span<const NodeIndex> nodes_of(Group group) const {
     return std::span(node_of_slot_).subspan(group * kLanes, kLanes);
   }
-  // Share of lanes that hold a node.
+  // Share of lanes that hold a node, in groups of a colour.
   double fill() const;
 
   // Sorts groups that have nodes by colour, and within one in ascending order. colour_begins gets
@@ -97,6 +101,10 @@ class Groups {
     auto operator<=>(const Vacancy&) const = default;
   };
 
+  struct Members {
+    std::uint32_t nodes = 0, groups = 0;
+  };
+
   template <typename Visit>
   void for_each_coupled(const Topology& topology, NodeIndex node, Visit&& visit);
   template <typename ColourOf>
@@ -106,6 +114,9 @@ class Groups {
   void vacate(NodeIndex node);
   void place(NodeIndex node, Colour colour, std::uint64_t code);
   Group group_with_room(Colour colour, std::uint64_t code);
+  void take_out(NodeIndex node);
+  void give_up(Group group);
+  void part_emptiest_groups(const Topology& topology);
   std::uint32_t nodes_in(Group group) const;
 
   const Coupling coupling_;
@@ -113,10 +124,10 @@ class Groups {
   std::vector<Slot> slot_of_node_;
   std::vector<Colour> colour_of_group_;
   std::vector<std::uint64_t> code_of_group_;     // of the node that was first in it
-  std::vector<std::vector<Vacancy>> vacancies_;  // per colour, ascending
+  std::vector<Members> members_;                 // per colour
+  std::vector<std::vector<Vacancy>> vacancies_;  // per colour, ascending; may be longer
   std::vector<Group> empty_groups_;              // descending
-  std::size_t node_count_ = 0;
-  bool is_in_order_ = true;  // ascending groups have ascending colours
+  bool is_in_order_ = true;                      // ascending groups have ascending colours
   std::vector<NodeIndex> moved_;
   std::vector<Slot> vacated_;
   // Marks of searches.

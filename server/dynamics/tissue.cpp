@@ -65,7 +65,10 @@ FollowReport Tissue::follow_topology(const Topology& topology) {
   for (const auto node : changed_)
     if (topology.has_node(node)) touch_node(node);
   // Rows hold the slots of neighbours.
-  for (const auto node : groups_.moved()) topology.for_each_neighbour(node, touch_node);
+  for (const auto node : groups_.moved()) {
+    touch_node(node);
+    topology.for_each_neighbour(node, touch_node);
+  }
   list_touched(touched_);
   wide_.clear();
   if (follows_moves_) {
