@@ -21,6 +21,7 @@ Result<Organ> make_liver(int target_tets) {
   organ.name = "liver";
   organ.source = "liver, " + std::to_string(target_tets) + " tets asked for";
   organ.mesh = std::move(*mesh);
+  organ.material.elastic_law = ElasticLaw::NeoHookean;
   for (const NodeIndex node : organ.mesh.surface_nodes)
     if (is_liver_held(organ.mesh.rest_positions[node.value])) organ.fixed_nodes.push_back(node);
   organ.source_offset_m = mesh::centre_on_origin(organ.mesh);

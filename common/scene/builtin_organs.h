@@ -31,7 +31,8 @@ Result<Organ> make_lattice(const LatticeSize& size);
 Organ make_lattice();
 
 // An adult liver (liver_shape.h), meshed by isosurface stuffing to within 5 % of `target_tets`; the
-// default gives about 4,000 nodes. 241 mm wide, 1.6 l, Young's modulus 4 kPa, 1060 kg/m^3; held at
+// default gives about 4,000 nodes. 241 mm wide, 1.6 l, neo-Hookean with Young's modulus 4 kPa and
+// Poisson's ratio 0.45 (springs stay crumpled once they were pressed flat), 1060 kg/m^3; held at
 // the bare area, the vena cava and the falciform ligament, free everywhere else, so that the front
 // edge can be lifted. 200,000 tets take 3 s of CPU time, the default 0.3 s.
 inline constexpr int kMinLiverTets = 500, kMaxLiverTets = 200'000, kDefaultLiverTets = 18'500;
@@ -52,7 +53,7 @@ Organ make_plate();
 // inside, wall 7 mm, one surface of genus 1. Meshed by isosurface stuffing to within 5 % of
 // `target_tets`; no tet, not even an edge, goes from the outer face of the wall to the inner one,
 // so that the wall is two tets thick or more everywhere, which is why coarser ones are not made.
-// Young's modulus 4 kPa, 1060 kg/m^3; held 8 mm deep around both openings, free between them. The
+// Material as the liver's; held 8 mm deep around both openings, free between them. The
 // default takes 1 s of CPU time, 200,000 tets 6 s.
 inline constexpr int kMinStomachTets = 50'000, kMaxStomachTets = 200'000,
                      kDefaultStomachTets = 60'000;

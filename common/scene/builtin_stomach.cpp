@@ -90,6 +90,7 @@ Result<Organ> make_stomach(int target_tets) {
   organ.name = "stomach";
   organ.source = "stomach, " + std::to_string(target_tets) + " tets asked for";
   organ.mesh = std::move(*mesh);
+  organ.material.elastic_law = ElasticLaw::NeoHookean;
   for (std::size_t n = 0; n < organ.mesh.node_count(); ++n)
     if (is_stomach_held(organ.mesh.rest_positions[n])) organ.fixed_nodes.push_back(NodeIndex(n));
   organ.source_offset_m = mesh::centre_on_origin(organ.mesh);

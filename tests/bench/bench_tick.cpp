@@ -40,9 +40,10 @@ float percentile(std::vector<std::uint32_t>& ns, double share) {
   return static_cast<float>(*at) * 1e-3f;
 }
 
-int run(const char* title, const step::TickDecisions& decisions) {
+int run(const char* title, scene::ElasticLaw law, const step::TickDecisions& decisions) {
   auto liver = scene::make_liver();
   if (!liver) return report("bench_tick", liver.error());
+  liver->material.elastic_law = law;
   step::Simulation simulation(std::move(*liver));
   const std::array<Vec3f, kHands> directions{
       Vec3f{0, -1, 0.9f}, {-0.5f, -0.4f, 1}, {0.6f, -0.2f, 1}};
@@ -110,6 +111,11 @@ int main() {
   using trocar::world::Boundary;
   const trocar::step::TickDecisions frozen{
       .depth_limit = 40, .node_limit = 1200, .boundary = Boundary::Frozen};
-  const int code = trocar::run("frozen", frozen);
-  return code != 0 ? code : trocar::run("graded", {});
+  using enum trocar::scene::ElasticLaw;
+  for (const auto& [law, name] : {std::pair{Springs, "springs"}, {NeoHookean, "neo-Hookean"}})
+    for (const auto& [decisions, mode] : {std::pair{frozen, "frozen"}, {{}, "graded"}}) {
+      const auto title = std::string(name) + ", " + mode;
+      if (const int code = trocar::run(title.c_str(), law, decisions); code != 0) return code;
+    }
+  return 0;
 }
