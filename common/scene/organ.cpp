@@ -165,41 +165,49 @@ void hash_array(StateHasher& hasher, const std::vector<T>& values) {
 // makes S = c E 6, since a tet has six edges: c = 1. A mesh with directions that are not evenly
 // spread is stiffer along some axes (body-centred lattice: 7 % softer along the cube's axes), but
 // its average over all orientations, and its response to uniform compression, are exact.
+Spring spring_along(const Vec3d& along, const Material& own, std::span<const SpringTet> tets) {
+  const double l_squared = length_squared(along);
+  const double fibre_squared = length_squared(own.fibre_direction);
+  const double d = dot(along, own.fibre_direction);
+  const double cos_squared = fibre_squared > 0 ? d * d / (l_squared * fibre_squared) : 0;
+  const double factor = 1 + (own.fibre_stiffness_ratio - 1) * cos_squared;
+  Spring spring;
+  spring.rest_length_m =
+      std::sqrt(l_squared) *
+      (1 - own.tension - (fibre_squared > 0 ? own.fibre_tension : 0) * cos_squared);
+  const auto add = [&](const Material& material, double stiffness) {
+    if (material.elastic_law == ElasticLaw::Springs) spring.stiffness_n_m += stiffness;
+    spring.damping_n_s_m += stiffness * material.spring_damping_time_s;
+  };
+  if (own.elastic_law == ElasticLaw::Springs && own.spring_law == SpringLaw::Constant) {
+    add(own, own.spring_stiffness_n_m * factor);
+    return spring;
+  }
+  for (const auto& [material, volume] : tets)
+    add(*material, material->young_modulus_pa * volume / l_squared *
+                       (material->elastic_law == ElasticLaw::Springs ? factor : 1.0));
+  return spring;
+}
+
 std::vector<Spring> springs_of(const Organ& organ) {
   const mesh::TetMesh& mesh = organ.mesh;
   const auto& pairs = mesh.spring_pairs();
   const auto& free = organ.stress_free();
   const MaterialMap map = material_map(organ);
-  std::vector<Spring> springs(pairs.size());
+  std::vector<Spring> springs;
+  springs.reserve(pairs.size());
+  std::vector<SpringTet> tets;
   for (std::size_t e = 0; e < pairs.size(); ++e) {
     const auto [a, b] = pairs[e];
-    const Vec3d along = free[b.value] - free[a.value];
-    const double l_squared = length_squared(along);
-    const Material& own = material_at(organ, map.spring_pairs[e]);
-    const double fibre_squared = length_squared(own.fibre_direction);
-    const double d = dot(along, own.fibre_direction);
-    const double cos_squared = fibre_squared > 0 ? d * d / (l_squared * fibre_squared) : 0;
-    const double factor = 1 + (own.fibre_stiffness_ratio - 1) * cos_squared;
-    Spring& spring = springs[e];
-    spring.rest_length_m =
-        std::sqrt(l_squared) *
-        (1 - own.tension - (fibre_squared > 0 ? own.fibre_tension : 0) * cos_squared);
-    const auto add = [&](const Material& material, double stiffness) {
-      if (material.elastic_law == ElasticLaw::Springs) spring.stiffness_n_m += stiffness;
-      spring.damping_n_s_m += stiffness * material.spring_damping_time_s;
-    };
-    if (own.elastic_law == ElasticLaw::Springs && own.spring_law == SpringLaw::Constant) {
-      add(own, own.spring_stiffness_n_m * factor);
-      continue;
-    }
-    if (!mesh.links.empty()) continue;  // elastic tets with links beside: damped by the tets' edges
-    for (const TetIndex t : mesh.node_tets[a]) {
-      const auto& tet = mesh.tets[t.value];
-      if (std::find(tet.begin(), tet.end(), b) == tet.end()) continue;
-      const Material& material = material_at(organ, map.tets[t.value]);
-      add(material, material.young_modulus_pa * stress_free_volume(organ, t.value) / l_squared *
-                        (material.elastic_law == ElasticLaw::Springs ? factor : 1.0));
-    }
+    tets.clear();
+    // Elastic tets with links beside are damped by the tets' edges, not by the links.
+    if (mesh.links.empty())
+      for (const TetIndex t : mesh.node_tets[a])
+        if (std::ranges::find(mesh.tets[t.value], b) != mesh.tets[t.value].end())
+          tets.push_back(
+              {&material_at(organ, map.tets[t.value]), stress_free_volume(organ, t.value)});
+    springs.push_back(
+        spring_along(free[b.value] - free[a.value], material_at(organ, map.spring_pairs[e]), tets));
   }
   return springs;
 }

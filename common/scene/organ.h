@@ -4,6 +4,7 @@
 // and what the server is started with.
 
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -53,6 +54,13 @@ struct Spring {
   double rest_length_m = 0;
 };
 std::vector<Spring> springs_of(const Organ& organ);
+// One of them. along: from the end with the lower index to the other, free of stress, m; own: the
+// material of the pair; tets: those at the edge in ascending order, none where links carry springs.
+struct SpringTet {
+  const Material* material = nullptr;
+  double volume_m3 = 0;  // free of stress
+};
+Spring spring_along(const Vec3d& along, const Material& own, std::span<const SpringTet> tets);
 
 // m_i = sum over tets k at node i of rho_k V_k / 4 (Nakao 2003 eq. 4). Needs tets.
 std::vector<double> lumped_masses(const Organ& organ);

@@ -105,13 +105,7 @@ void BlockDescent::mark(Plan& plan, NodeIndex node) const {
 }
 
 void BlockDescent::finish(Plan& plan) const {
-  std::ranges::sort(plan.groups);
-  std::size_t i = 0;
-  for (std::size_t colour = 0; colour < tissue_.groups().colour_count(); ++colour) {
-    plan.colour_begins[colour] = static_cast<std::uint32_t>(i);
-    while (i < plan.groups.size() && plan.groups[i] < tissue_.groups().last_group(colour)) ++i;
-  }
-  plan.colour_begins.back() = static_cast<std::uint32_t>(i);
+  tissue_.groups().order_by_colour(plan.groups, plan.colour_begins);
 }
 
 void BlockDescent::plan_step(std::span<const NodeIndex> near, bool has_far,
@@ -481,6 +475,42 @@ FarPlan FarPlan::with_sweeps(std::uint32_t count) const {
   plan.over_relaxation =
       std::min(best, count == 1 ? kMaxFarOverRelaxationOneSweep : kMaxFarOverRelaxationTwoSweeps);
   return plan;
+}
+
+// --- Another topology ---
+
+FollowReport BlockDescent::follow_topology(const Topology& topology, const world::World& world) {
+  const auto report = tissue_.follow_topology(topology);
+  const auto& groups = tissue_.groups();
+  const auto group_count = groups.group_count(), slot_count = groups.slot_count();
+  while (all_groups_.size() < group_count)
+    all_groups_.push_back(static_cast<Group>(all_groups_.size()));
+  constants_.resize(group_count);
+  inertia_.resize(group_count);
+  squares_.resize(group_count);
+  group_squares_.resize(group_count);
+  for (auto* lanes : {&free_, &rejected_, &near_.lanes, &far_.lanes, &begun_.lanes})
+    lanes->resize(group_count);
+  for (auto* stamps : {&begun_stamp_, &group_stamp_}) stamps->resize(group_count);
+  for (auto* values : {&x_, &start_}) values->resize(slot_count);
+  slot_stamp_.resize(slot_count);
+  first_constraint_.resize(slot_count);
+  for (const auto lanes : tissue_.touched())
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      if (!lanes.has(lane)) continue;
+      const auto g = lanes.group;
+      const auto node = groups.nodes_of(g)[lane];
+      const bool has_node = node.is_valid();
+      const auto& material =
+          scene::material_at(organ_, has_node ? topology.material_of(node) : std::uint16_t{0});
+      const float mass = has_node ? world.masses[node.value] : 0;
+      constants_[g].mass.v[lane] = mass;
+      constants_[g].damping.v[lane] = mass * static_cast<float>(material.node_damping_per_s);
+      const bool is_free = has_node && world.node_classes[node.value] != world::NodeClass::Fixed;
+      free_[g] = static_cast<std::uint8_t>((free_[g] & ~(1u << lane)) | unsigned{is_free} << lane);
+      x_[g * kLanes + lane] = has_node ? to_float4(world.displacements[node.value]) : Float4{};
+    }
+  return report;
 }
 
 }  // namespace trocar::dynamics

@@ -103,6 +103,10 @@ class BlockDescent {
   FarPlan far_plan(float dt) const;
   const Tissue& tissue() const { return tissue_; }
 
+  // Between steps: follows topology.changed(). The world already has its nodes, their masses,
+  // classes and displacements; arrays over nodes have an entry for every place of one.
+  FollowReport follow_topology(const Topology& topology, const world::World& world);
+
  private:
   struct Inertia {
     Lanes inertia;       // m/dt^2 + rate m/dt, N/m

@@ -7,7 +7,8 @@
 // potential); blocks are symmetric, positive semi-definite and at least close to the second
 // derivative; rows of padding contribute nothing. An energy over a node's whole star keeps
 // quantities of nodes (the averaged volume ratio) and is told of each move; nodes must then have
-// colours by Coupling::Stars.
+// colours by Coupling::Stars. A change of topology is followed lane by lane, bit for bit as if
+// built anew.
 
 #include <span>
 
@@ -49,8 +50,17 @@ class Energy {
   virtual void restart_group(Group, const Float4* /*x*/) {}
   virtual void after_move(Group, const Vec8& /*dx*/, const Scratch&) {}
 
-  // In double from the same stored data, J; displacements per slot.
-  virtual double energy_j(std::span<const Vec3d> displacements) const = 0;
+  // Adds each node's share, per slot, in double from the same stored data, J; displacements per
+  // slot. A node's share is a function of displacements alone, not of what shares its group.
+  virtual void add_energies_j(std::span<const Vec3d> displacements,
+                              std::span<double> energies) const = 0;
+
+  // The topology has changed and the groups have followed: these lanes anew, ascending groups. They
+  // are those with another node than before, with a node that has changed, and with a neighbour of
+  // a node in a new slot; for energies over stars also those with a neighbour of a node that has
+  // changed. Returns rows written, counted per lane.
+  virtual std::size_t rebuild(const Topology& topology, const Groups& groups,
+                              std::span<const GroupLanes> lanes) = 0;
 };
 
 }  // namespace trocar::dynamics

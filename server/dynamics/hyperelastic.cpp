@@ -22,29 +22,6 @@ Vec3d opposite_area(std::span<const Vec3d> p, const mesh::Tet& tet) {
   return cross(p[tet[3].value] - p[tet[1].value], p[tet[2].value] - p[tet[1].value]);
 }
 
-struct Tets {
-  std::vector<mesh::Tet> tets;
-  std::vector<double> c10, bulk;               // Pa
-  std::vector<std::vector<std::uint32_t>> at;  // per node, ascending
-};
-
-Tets collect(const scene::Organ& organ) {
-  Tets result;
-  result.at.resize(organ.mesh.node_count());
-  const auto map = scene::material_map(organ);
-  for (std::size_t t = 0; t < organ.mesh.tets.size(); ++t) {
-    const auto& material = scene::material_at(organ, map.tets[t]);
-    if (material.elastic_law != scene::ElasticLaw::NeoHookean) continue;
-    const auto [c10, bulk] = scene::neo_hookean_parameters(material);
-    for (const auto node : organ.mesh.tets[t])
-      result.at[node.value].push_back(static_cast<std::uint32_t>(result.tets.size()));
-    result.tets.push_back(organ.mesh.tets[t]);
-    result.c10.push_back(c10);
-    result.bulk.push_back(bulk);
-  }
-  return result;
-}
-
 using Matrix = std::array<std::array<double, 3>, 3>;
 
 void add_outer(Matrix& m, const Vec3d& a, double s) {
@@ -74,31 +51,6 @@ double bound_of(const Matrix& exact, const Matrix& full) {
   return std::min(1.0, 1.05 * largest);
 }
 
-// Theta of every node: how much smaller the block of the averaged volume is than the plain one.
-std::vector<double> averaging_bounds(const Tets& tets, std::span<const Vec3d> p,
-                                     std::span<const double> star_volume,
-                                     std::span<const double> star_bulk) {
-  std::vector<double> bounds(star_volume.size(), 1);
-  for (std::uint32_t n = 0; n < bounds.size(); ++n) {
-    std::vector<std::pair<NodeIndex, Vec3d>> change;  // of each star's volume per motion of n
-    Matrix full{}, exact{};
-    for (const auto t : tets.at[n]) {
-      const auto tet = seen_from(tets.tets[t], NodeIndex(n));
-      const Vec3d area = opposite_area(p, tet) / 6;
-      add_outer(full, area, tets.bulk[t] / tet_shape(p, tet).volume);
-      for (const auto node : tet) {
-        auto found = std::ranges::find(change, node, &std::pair<NodeIndex, Vec3d>::first);
-        if (found == change.end()) found = change.insert(change.end(), {node, Vec3d{}});
-        found->second += area;
-      }
-    }
-    for (const auto& [node, area] : change)
-      add_outer(exact, area, star_bulk[node.value] / (4 * star_volume[node.value]));
-    bounds[n] = bound_of(exact, full);
-  }
-  return bounds;
-}
-
 }  // namespace
 
 template <typename Law>
@@ -108,93 +60,175 @@ struct Hyperelastic<Law>::RowShape {
 };
 
 template <typename Law>
-Hyperelastic<Law>::Hyperelastic(const scene::Organ& organ, const Groups& groups,
+Hyperelastic<Law>::Hyperelastic(const Topology& topology, const Groups& groups,
                                 bool has_averaged_volume, const Law& law)
-    : law_(law),
-      has_averaged_volume_(has_averaged_volume),
-      constant_gradient_(groups.group_count()),
-      constant_block_(groups.group_count()) {
-  const Tets tets = collect(organ);
-  const auto& rest = organ.mesh.rest_positions;
-  const auto& free = organ.stress_free();
-  const auto node_count = organ.mesh.node_count();
-  std::vector<std::uint32_t> counts;
-  for (const auto& list : tets.at) counts.push_back(static_cast<std::uint32_t>(list.size()));
+    : law_(law), has_averaged_volume_(has_averaged_volume) {
+  const auto& organ = topology.organ();
+  for (std::size_t m = 0; m <= organ.regions.size(); ++m) {
+    const auto& material = scene::material_at(organ, static_cast<std::uint16_t>(m));
+    is_ours_.push_back(material.elastic_law == scene::ElasticLaw::NeoHookean);
+    parameters_.push_back(scene::neo_hookean_parameters(material));
+  }
+  const auto bound = [&](NodeIndex node) { return topology.tets_of(node).size(); };
+  rows_.reserve(groups, bound);
+  if constexpr (!Law::kIsLinear) invariant_rows_.reserve(groups, bound);
+  extend(groups);
+  if (has_averaged_volume_)
+    for (Slot slot = 0; slot < groups.slot_count(); ++slot)
+      set_star(topology, groups.node_at(slot), slot);
+  for (Group g = 0; g < groups.group_count(); ++g) fill(topology, groups, {g, 0xff});
+  rows_.end_building();
+  invariant_rows_.end_building();
+}
 
-  std::vector<double> star_volume(node_count), star_bulk(node_count), star_change(node_count);
-  std::vector<double> theta(node_count, 1.0);
-  if (has_averaged_volume) {
-    for (std::size_t t = 0; t < tets.tets.size(); ++t) {
-      const double volume = tet_shape(free, tets.tets[t]).volume;
-      const double change = tet_shape(rest, tets.tets[t]).volume - volume;
-      for (const auto node : tets.tets[t]) {
-        star_volume[node.value] += volume;
-        star_bulk[node.value] += volume * tets.bulk[t];
-        star_change[node.value] += change;
+template <typename Law>
+void Hyperelastic<Law>::extend(const Groups& groups) {
+  rows_.extend(groups);
+  if constexpr (Law::kIsLinear) {
+    constant_gradient_.resize(groups.group_count());
+    constant_block_.resize(groups.group_count());
+  } else {
+    invariant_rows_.extend(groups);
+  }
+  if (!has_averaged_volume_) return;
+  for (auto* quantity : {&star_stiffness_, &star_pressure_}) quantity->resize(groups.slot_count());
+  for (auto* quantity : {&star_offset_, &star_weight_}) quantity->resize(groups.slot_count());
+}
+
+template <typename Law>
+std::size_t Hyperelastic<Law>::rebuild(const Topology& topology, const Groups& groups,
+                                       std::span<const GroupLanes> lanes) {
+  extend(groups);
+  // Bounds of a node need the stars of its neighbours.
+  if (has_averaged_volume_)
+    for (const auto group_lanes : lanes)
+      for (std::size_t lane = 0; lane < kLanes; ++lane) {
+        const auto slot = static_cast<Slot>(group_lanes.group * kLanes + lane);
+        if (group_lanes.has(lane)) set_star(topology, groups.node_at(slot), slot);
       }
+  std::size_t written = 0;
+  for (const auto group_lanes : lanes) written += fill(topology, groups, group_lanes);
+  rows_.tidy();
+  invariant_rows_.tidy();
+  return written;
+}
+
+template <typename Law>
+void Hyperelastic<Law>::find_tets(const Topology& topology, NodeIndex node,
+                                  std::vector<At>& out) const {
+  out.clear();
+  for (const auto t : topology.tets_of(node)) {
+    const auto material = topology.material_of(t);
+    if (!is_ours_[material]) continue;
+    const auto [c10, bulk] = parameters_[material];
+    out.push_back({seen_from(topology.tet(t), node), c10, bulk});
+  }
+}
+
+// Of the star of a node, at its slot: zero where there is none.
+template <typename Law>
+void Hyperelastic<Law>::set_star(const Topology& topology, NodeIndex node, Slot slot) {
+  double volume = 0, bulk = 0, change = 0;
+  if (node.is_valid())
+    for (const auto t : topology.tets_of(node)) {
+      const auto material = topology.material_of(t);
+      if (!is_ours_[material]) continue;
+      const double v = tet_shape(topology.stress_free(), topology.tet(t)).volume;
+      volume += v;
+      bulk += v * parameters_[material].bulk_modulus_pa;
+      change += tet_shape(topology.rest(), topology.tet(t)).volume - v;
     }
-    for (std::size_t n = 0; n < node_count; ++n)
-      if (star_volume[n] > 0) star_bulk[n] /= star_volume[n];
-    theta = averaging_bounds(tets, free, star_volume, star_bulk);
-    star_pressure_.resize(groups.slot_count());
-    star_stiffness_.resize(groups.slot_count());
-    star_offset_.resize(groups.slot_count());
-    for (std::uint32_t n = 0; n < node_count; ++n) {
-      if (!(star_volume[n] > 0)) continue;
-      const Slot slot = groups.slot_of(NodeIndex(n));
-      star_stiffness_[slot] = static_cast<float>(star_bulk[n] / star_volume[n]);
-      star_offset_[slot] = star_change[n];
-      star_pressure_[slot] = star_stiffness_[slot] * static_cast<float>(star_change[n]);
+  if (volume > 0) bulk /= volume;
+  star_weight_[slot] = volume > 0 ? bulk / (4 * volume) : 0;
+  star_stiffness_[slot] = volume > 0 ? static_cast<float>(bulk / volume) : 0;
+  star_offset_[slot] = change;
+  star_pressure_[slot] = star_stiffness_[slot] * static_cast<float>(change);
+}
+
+// Theta of a node: how much smaller the block of the averaged volume is than the plain one.
+template <typename Law>
+double Hyperelastic<Law>::averaging_bound(const Topology& topology, const Groups& groups,
+                                          std::span<const At> tets) const {
+  if (tets.empty()) return 1;
+  star_motion_.clear();  // change of each star's volume per motion of the node
+  Matrix full{}, exact{};
+  for (const At& at : tets) {
+    const Vec3d area = opposite_area(topology.stress_free(), at.tet) / 6;
+    add_outer(full, area, at.bulk / tet_shape(topology.stress_free(), at.tet).volume);
+    for (const auto node : at.tet) {
+      auto found = std::ranges::find(star_motion_, node, &std::pair<NodeIndex, Vec3d>::first);
+      if (found == star_motion_.end())
+        found = star_motion_.insert(star_motion_.end(), {node, Vec3d{}});
+      found->second += area;
     }
   }
+  for (const auto& [node, area] : star_motion_)
+    add_outer(exact, area, star_weight_[groups.slot_of(node)]);
+  return bound_of(exact, full);
+}
 
-  std::vector<Vec3d> constant_gradient(node_count);
-  std::vector<double> constant_block(node_count);
-  rows_ = make_rows<Row>(
-      groups, counts, [&](Row& row, std::size_t lane, NodeIndex node, std::uint32_t i) {
-        const auto t = tets.at[node.value][i];
-        const auto tet = seen_from(tets.tets[t], node);
-        const auto shape = tet_shape(free, tet);
-        const double scale = 2 * tets.c10[t] * shape.volume;
-        std::array<double, 4> w{};
-        for (std::size_t k = 1; k < 4; ++k) {
-          w[k] = scale * dot(shape.gradients[0], shape.gradients[k]);
-          constant_gradient[node.value] += (rest[tet[k].value] - rest[node.value]) * w[k];
-          constant_block[node.value] -= w[k];
-        }
-        row.b.v[lane] = groups.slot_of(tet[1]);
-        row.c.v[lane] = groups.slot_of(tet[2]);
-        row.d.v[lane] = groups.slot_of(tet[3]);
-        row.wb.v[lane] = static_cast<float>(w[1]);
-        row.wc.v[lane] = static_cast<float>(w[2]);
-        row.wd.v[lane] = static_cast<float>(w[3]);
-        row.ab.set(lane, to_float(rest[tet[1].value] - rest[tet[0].value]));
-        row.bc.set(lane, to_float(rest[tet[2].value] - rest[tet[1].value]));
-        row.bd.set(lane, to_float(rest[tet[3].value] - rest[tet[1].value]));
-        row.volumetric.v[lane] =
-            static_cast<float>(theta[node.value] * tets.bulk[t] / (36 * shape.volume));
-        row.pressure.v[lane] =
-            static_cast<float>(tets.c10[t] / 3 + (has_averaged_volume ? 0.0 : tets.bulk[t] / 6));
-      });
-  if constexpr (Law::kIsLinear) {
-    for (std::uint32_t n = 0; n < node_count; ++n) {
-      const Slot slot = groups.slot_of(NodeIndex(n));
-      constant_gradient_[slot / kLanes].set(slot % kLanes, to_float(constant_gradient[n]));
-      constant_block_[slot / kLanes].v[slot % kLanes] = static_cast<float>(constant_block[n]);
+template <typename Law>
+std::size_t Hyperelastic<Law>::fill(const Topology& topology, const Groups& groups,
+                                    GroupLanes lanes) {
+  const auto nodes = groups.nodes_of(lanes.group);
+  std::array<std::uint32_t, kLanes> counts{};
+  std::size_t written = 0;
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    if (!lanes.has(lane)) continue;
+    tets_[lane].clear();
+    if (nodes[lane].is_valid()) find_tets(topology, nodes[lane], tets_[lane]);
+    counts[lane] = static_cast<std::uint32_t>(tets_[lane].size());
+    written += counts[lane];
+  }
+  rows_.reshape(lanes, counts);
+  if constexpr (!Law::kIsLinear) invariant_rows_.reshape(lanes, counts);
+  for (std::size_t lane = 0; lane < kLanes; ++lane)
+    if (lanes.has(lane)) fill_lane(topology, groups, tets_[lane], lanes.group, lane);
+  return written;
+}
+
+template <typename Law>
+void Hyperelastic<Law>::fill_lane(const Topology& topology, const Groups& groups,
+                                  std::span<const At> tets, Group group, std::size_t lane) {
+  const auto rest = topology.rest();
+  const double theta = has_averaged_volume_ ? averaging_bound(topology, groups, tets) : 1.0;
+  const auto rows = rows_[group];
+  Vec3d constant_gradient;
+  double constant_block = 0;
+  for (std::size_t i = 0; i < tets.size(); ++i) {
+    const auto& [tet, c10, bulk] = tets[i];
+    const auto shape = tet_shape(topology.stress_free(), tet);
+    const auto& g = shape.gradients;
+    const double scale = 2 * c10 * shape.volume;
+    std::array<double, 4> w{};
+    for (std::size_t k = 1; k < 4; ++k) {
+      w[k] = scale * dot(g[0], g[k]);
+      constant_gradient += (rest[tet[k].value] - rest[tet[0].value]) * w[k];
+      constant_block -= w[k];
     }
-  } else {
-    invariant_rows_ = make_rows<InvariantRow>(
-        groups, counts, [&](InvariantRow& row, std::size_t lane, NodeIndex node, std::uint32_t i) {
-          const auto t = tets.at[node.value][i];
-          const auto tet = seen_from(tets.tets[t], node);
-          const auto shape = tet_shape(free, tet);
-          const auto& g = shape.gradients;
-          const double scale = 2 * tets.c10[t] * shape.volume;
-          row.wbc.v[lane] = static_cast<float>(scale * dot(g[1], g[2]));
-          row.wbd.v[lane] = static_cast<float>(scale * dot(g[1], g[3]));
-          row.wcd.v[lane] = static_cast<float>(scale * dot(g[2], g[3]));
-          row.inverse_c10_v2.v[lane] = static_cast<float>(1 / scale);
-        });
+    Row& row = rows[i];
+    row.b.v[lane] = groups.slot_of(tet[1]);
+    row.c.v[lane] = groups.slot_of(tet[2]);
+    row.d.v[lane] = groups.slot_of(tet[3]);
+    row.wb.v[lane] = static_cast<float>(w[1]);
+    row.wc.v[lane] = static_cast<float>(w[2]);
+    row.wd.v[lane] = static_cast<float>(w[3]);
+    row.ab.set(lane, to_float(rest[tet[1].value] - rest[tet[0].value]));
+    row.bc.set(lane, to_float(rest[tet[2].value] - rest[tet[1].value]));
+    row.bd.set(lane, to_float(rest[tet[3].value] - rest[tet[1].value]));
+    row.volumetric.v[lane] = static_cast<float>(theta * bulk / (36 * shape.volume));
+    row.pressure.v[lane] = static_cast<float>(c10 / 3 + (has_averaged_volume_ ? 0.0 : bulk / 6));
+    if constexpr (!Law::kIsLinear) {
+      InvariantRow& extra = invariant_rows_[group][i];
+      extra.wbc.v[lane] = static_cast<float>(scale * dot(g[1], g[2]));
+      extra.wbd.v[lane] = static_cast<float>(scale * dot(g[1], g[3]));
+      extra.wcd.v[lane] = static_cast<float>(scale * dot(g[2], g[3]));
+      extra.inverse_c10_v2.v[lane] = static_cast<float>(1 / scale);
+    }
+  }
+  if constexpr (Law::kIsLinear) {
+    constant_gradient_[group].set(lane, to_float(constant_gradient));
+    constant_block_[group].v[lane] = static_cast<float>(constant_block);
   }
 }
 
@@ -218,6 +252,8 @@ template <bool kAveraged>
 void Hyperelastic<Law>::add_rows(Group group, const Float4* x, const Vec8& own, NodeStep8& step,
                                  Scratch& scratch) const {
   const auto rows = rows_[group];
+  [[maybe_unused]] std::span<const InvariantRow> invariant_rows;
+  if constexpr (!Law::kIsLinear) invariant_rows = invariant_rows_[group];
   if constexpr (kAveraged)
     if (scratch.rows.size() < rows.size()) scratch.rows.resize(rows.size());
   // Sums live in registers: in `step` they would be stored and loaded again row after row.
@@ -236,7 +272,7 @@ void Hyperelastic<Law>::add_rows(Group group, const Float4* x, const Vec8& own, 
       gradient = fma8(s.dc, load(row.wc), gradient);
       gradient = fma8(s.dd, load(row.wd), gradient);
     } else {
-      const InvariantRow& extra = invariant_rows_[group][i];
+      const InvariantRow& extra = invariant_rows[i];
       const Vec8 rc = s.rb + s.ec, rd = s.rb + s.ed, cd = s.ed - s.ec;
       const Float8 wb = load(row.wb), wc = load(row.wc), wd = load(row.wd);
       const Float8 sum =
@@ -333,7 +369,7 @@ void Hyperelastic<Law>::after_move(Group group, const Vec8& dx, const Scratch& s
 template <typename Law>
 double Hyperelastic<Law>::row_energy(const Row& row, const InvariantRow* extra, std::size_t lane,
                                      Slot own, std::span<const Vec3d> u,
-                                     std::span<double> star_changes) const {
+                                     double& star_change) const {
   const auto at = [&](const Lanes& l) { return static_cast<double>(l.v[lane]); };
   const Vec3d ub = u[row.b.v[lane]], uc = u[row.c.v[lane]], ud = u[row.d.v[lane]];
   const Vec3d ab0 = to_double(row.ab.at(lane)), bc0 = to_double(row.bc.at(lane)),
@@ -342,7 +378,7 @@ double Hyperelastic<Law>::row_energy(const Row& row, const InvariantRow* extra, 
   const double six_volumes = -dot(cross(bd, bc), ab);
   if (has_averaged_volume_) {
     const double change = (six_volumes + dot(cross(bd0, bc0), ab0)) / 6;
-    star_changes[own] += change;
+    star_change += change;
   }
   // Every tet is stored at four nodes; the edges at this one are stored at two.
   double energy = 0;
@@ -368,22 +404,23 @@ double Hyperelastic<Law>::row_energy(const Row& row, const InvariantRow* extra, 
 }
 
 template <typename Law>
-double Hyperelastic<Law>::energy_j(std::span<const Vec3d> displacements) const {
-  std::vector<double> changes(star_offset_);
-  double energy = 0;
-  for (Group g = 0; g + 1 < rows_.offsets.size(); ++g)
-    for (std::size_t i = 0; i < rows_[g].size(); ++i)
-      for (std::size_t lane = 0; lane < kLanes; ++lane) {
+void Hyperelastic<Law>::add_energies_j(std::span<const Vec3d> displacements,
+                                       std::span<double> energies) const {
+  for (Group g = 0; g < rows_.group_count(); ++g)
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      const auto own = static_cast<Slot>(g * kLanes + lane);
+      double energy = 0, change = has_averaged_volume_ ? star_offset_[own] : 0;
+      for (std::size_t i = 0; i < rows_[g].size(); ++i) {
         const Row& row = rows_[g][i];
-        const Slot own = static_cast<Slot>(g * kLanes + lane);
-        if (row.b.v[lane] == own) continue;  // padding
+        if (row.b.v[lane] == own) break;  // padding
         const InvariantRow* extra = nullptr;
         if constexpr (!Law::kIsLinear) extra = &invariant_rows_[g][i];
-        energy += row_energy(row, extra, lane, own, displacements, changes);
+        energy += row_energy(row, extra, lane, own, displacements, change);
       }
-  for (std::size_t slot = 0; slot < changes.size(); ++slot)
-    energy += 0.125 * static_cast<double>(star_stiffness_[slot]) * changes[slot] * changes[slot];
-  return energy;
+      if (has_averaged_volume_)
+        energy += 0.125 * static_cast<double>(star_stiffness_[own]) * change * change;
+      energies[own] += energy;
+    }
 }
 
 template class Hyperelastic<NeoHookeanLaw>;

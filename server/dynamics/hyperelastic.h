@@ -22,7 +22,7 @@ template <typename Law>
 class Hyperelastic final : public Energy {
  public:
   // Of the organ's tets with ElasticLaw::NeoHookean; `law` replaces Psi, with the material's C10.
-  Hyperelastic(const scene::Organ& organ, const Groups& groups, bool has_averaged_volume,
+  Hyperelastic(const Topology& topology, const Groups& groups, bool has_averaged_volume,
                const Law& law = {});
 
   void add(Group group, const Float4* x, const Vec8& own, NodeStep8& step,
@@ -30,7 +30,10 @@ class Hyperelastic final : public Energy {
   bool follows_moves() const override { return has_averaged_volume_; }
   void restart_group(Group group, const Float4* x) override;
   void after_move(Group group, const Vec8& dx, const Scratch& scratch) override;
-  double energy_j(std::span<const Vec3d> displacements) const override;
+  void add_energies_j(std::span<const Vec3d> displacements,
+                      std::span<double> energies) const override;
+  std::size_t rebuild(const Topology& topology, const Groups& groups,
+                      std::span<const GroupLanes> lanes) override;
 
  private:
   // A tet seen from its node a; b, c, d complete it to positive volume.
@@ -58,10 +61,26 @@ class Hyperelastic final : public Energy {
   void add_rows(Group group, const Float4* x, const Vec8& own, NodeStep8& step,
                 Scratch& scratch) const;
   double row_energy(const Row& row, const InvariantRow* extra, std::size_t lane, Slot own,
-                    std::span<const Vec3d> u, std::span<double> star_changes) const;
+                    std::span<const Vec3d> u, double& star_change) const;
+
+  // A tet at a node, seen from it.
+  struct At {
+    mesh::Tet tet;
+    double c10 = 0, bulk = 0;  // Pa
+  };
+  void find_tets(const Topology& topology, NodeIndex node, std::vector<At>& out) const;
+  void extend(const Groups& groups);
+  void set_star(const Topology& topology, NodeIndex node, Slot slot);
+  double averaging_bound(const Topology& topology, const Groups& groups,
+                         std::span<const At> tets) const;
+  std::size_t fill(const Topology& topology, const Groups& groups, GroupLanes lanes);
+  void fill_lane(const Topology& topology, const Groups& groups, std::span<const At> tets,
+                 Group group, std::size_t lane);
 
   const Law law_;
   const bool has_averaged_volume_;
+  std::vector<scene::NeoHookeanParameters> parameters_;  // as scene::material_at() counts
+  std::vector<std::uint8_t> is_ours_;                    // whether the material has this law
   GroupRows<Row> rows_;
   GroupRows<InvariantRow> invariant_rows_;    // empty for a linear law
   std::vector<Vec3Lanes> constant_gradient_;  // N per group; linear laws
@@ -70,6 +89,10 @@ class Hyperelastic final : public Energy {
   // change of the star's volume since free of stress (Pa).
   std::vector<float> star_stiffness_, star_pressure_;
   std::vector<double> star_offset_;  // change at zero displacement
+  std::vector<double> star_weight_;  // K_a / (4 V_a), Pa/m^3
+  // While rows are filled.
+  std::array<std::vector<At>, kLanes> tets_;
+  mutable std::vector<std::pair<NodeIndex, Vec3d>> star_motion_;
 };
 
 using NeoHookean = Hyperelastic<NeoHookeanLaw>;

@@ -1,6 +1,9 @@
 #include "server/dynamics/springs.h"
 
+#include <algorithm>
 #include <cmath>
+
+#include "server/dynamics/tet_shape.h"
 
 namespace trocar::dynamics {
 namespace {
@@ -13,48 +16,124 @@ Float8 inverse_length(Float8 length_squared) {
   return where(is_long, all(1.0f) / _mm256_sqrt_ps(length_squared));
 }
 
+bool has_damping(const scene::Organ& organ) {
+  const auto is_damped = [](const scene::Material& m) { return m.spring_damping_time_s > 0; };
+  return is_damped(organ.material) ||
+         std::ranges::any_of(organ.regions, [&](const auto& r) { return is_damped(r.material); });
+}
+
 }  // namespace
 
-Springs::Springs(const scene::Organ& organ, const Groups& groups) {
-  const auto springs = scene::springs_of(organ);
-  const auto& pairs = organ.mesh.spring_pairs();
-  const auto& positions = organ.mesh.rest_positions;
-  std::vector<std::vector<std::uint32_t>> springs_at(organ.mesh.node_count());
-  std::vector<std::uint32_t> counts(organ.mesh.node_count());
-  for (std::uint32_t s = 0; s < pairs.size(); ++s) {
-    if (springs[s].stiffness_n_m == 0 && springs[s].damping_n_s_m == 0) continue;
-    has_any_ = true;
-    has_damping_ = has_damping_ || springs[s].damping_n_s_m > 0;
-    for (const auto node : pairs[s]) {
-      springs_at[node.value].push_back(s);
-      ++counts[node.value];
-    }
+bool Springs::are_needed(const scene::Organ& organ) {
+  const auto has_springs = [](const scene::Material& m) {
+    return m.elastic_law == scene::ElasticLaw::Springs;
+  };
+  return has_damping(organ) || has_springs(organ.material) ||
+         std::ranges::any_of(organ.regions, [&](const auto& r) { return has_springs(r.material); });
+}
+
+Springs::Springs(const Topology& topology, const Groups& groups)
+    : has_damping_(has_damping(topology.organ())) {
+  std::vector<NodeIndex> neighbours;
+  std::vector<std::uint32_t> bounds(topology.node_count());
+  for (std::uint32_t n = 0; n < bounds.size(); ++n) {
+    topology.neighbours_of(NodeIndex(n), neighbours);
+    bounds[n] = static_cast<std::uint32_t>(neighbours.size());
   }
-  rows_ = make_rows<Row>(
-      groups, counts, [&](Row& row, std::size_t lane, NodeIndex node, std::uint32_t i) {
-        const auto s = springs_at[node.value][i];
-        const auto other = pairs[s][0] == node ? pairs[s][1] : pairs[s][0];
-        row.neighbour.v[lane] = groups.slot_of(other);
-        row.rest.set(lane, to_float(positions[other.value] - positions[node.value]));
-        row.stiffness.v[lane] = static_cast<float>(springs[s].stiffness_n_m);
-        row.pull.v[lane] = static_cast<float>(springs[s].stiffness_n_m * springs[s].rest_length_m);
-      });
-  constants_ = make_rows<Constants>(
-      groups, counts, [&](Constants& row, std::size_t lane, NodeIndex node, std::uint32_t i) {
-        const auto& spring = springs[springs_at[node.value][i]];
-        row.stiffness.v[lane] = static_cast<float>(spring.stiffness_n_m);
-        row.damping.v[lane] = static_cast<float>(spring.damping_n_s_m);
-        row.rest_length.v[lane] = static_cast<float>(spring.rest_length_m);
-      });
+  const auto bound = [&](NodeIndex node) { return bounds[node.value]; };
+  rows_.reserve(groups, bound);
+  constants_.reserve(groups, bound);
+  for (Group g = 0; g < groups.group_count(); ++g) fill(topology, groups, {g, 0xff});
+  rows_.end_building();
+  constants_.end_building();
+}
+
+// Those that do something, by ascending other end.
+void Springs::find_springs(const Topology& topology, NodeIndex node, std::vector<End>& out) {
+  out.clear();
+  const auto& organ = topology.organ();
+  const auto free = topology.stress_free();
+  const auto add = [&](NodeIndex other) {
+    const auto [a, b] = std::minmax(node, other);
+    const auto spring =
+        scene::spring_along(free[b.value] - free[a.value],
+                            scene::material_at(organ, topology.material_of(a, b)), tets_);
+    if (spring.stiffness_n_m != 0 || spring.damping_n_s_m != 0) out.push_back({other, spring});
+  };
+  tets_.clear();
+  if (topology.has_links()) {
+    for (const auto other : topology.links_of(node)) add(other);
+    return;
+  }
+  tets_beside_.clear();
+  for (const auto t : topology.tets_of(node))
+    for (const auto other : topology.tet(t))
+      if (other != node) tets_beside_.emplace_back(other, t);
+  std::ranges::sort(tets_beside_);
+  for (std::size_t i = 0; i < tets_beside_.size(); ++i) {
+    const auto [other, t] = tets_beside_[i];
+    tets_.push_back({&scene::material_at(organ, topology.material_of(t)),
+                     tet_shape(free, topology.tet(t)).volume});
+    if (i + 1 < tets_beside_.size() && tets_beside_[i + 1].first == other) continue;
+    add(other);
+    tets_.clear();
+  }
+}
+
+std::size_t Springs::fill(const Topology& topology, const Groups& groups, GroupLanes lanes) {
+  const auto nodes = groups.nodes_of(lanes.group);
+  std::array<std::uint32_t, kLanes> counts{};
+  std::size_t written = 0;
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    if (!lanes.has(lane) || !nodes[lane].is_valid()) continue;
+    find_springs(topology, nodes[lane], ends_[lane]);
+    counts[lane] = static_cast<std::uint32_t>(ends_[lane].size());
+    written += counts[lane];
+  }
+  const auto rows = rows_.reshape(lanes, counts);
+  const auto constants = constants_.reshape(lanes, counts);
+  const auto positions = topology.rest();
+  for (std::size_t lane = 0; lane < kLanes; ++lane)
+    for (std::size_t i = 0; i < counts[lane]; ++i) {
+      const auto& [other, spring] = ends_[lane][i];
+      Row& row = rows[i];
+      row.neighbour.v[lane] = groups.slot_of(other);
+      row.rest.set(lane, to_float(positions[other.value] - positions[nodes[lane].value]));
+      row.stiffness.v[lane] = static_cast<float>(spring.stiffness_n_m);
+      row.pull.v[lane] = static_cast<float>(spring.stiffness_n_m * spring.rest_length_m);
+      constants[i].stiffness.v[lane] = row.stiffness.v[lane];
+      constants[i].damping.v[lane] = static_cast<float>(spring.damping_n_s_m);
+      constants[i].rest_length.v[lane] = static_cast<float>(spring.rest_length_m);
+    }
+  return written;
+}
+
+std::size_t Springs::rebuild(const Topology& topology, const Groups& groups,
+                             std::span<const GroupLanes> lanes) {
+  rows_.extend(groups);
+  constants_.extend(groups);
+  std::size_t written = 0;
+  for (const auto group_lanes : lanes) {
+    written += fill(topology, groups, group_lanes);
+    if (has_damping_ && inverse_dt_ != 0) take_step_length(group_lanes.group);
+  }
+  rows_.tidy();
+  constants_.tidy();
+  return written;
 }
 
 void Springs::begin_step(float inverse_dt) {
   if (!has_damping_ || inverse_dt == inverse_dt_) return;
   inverse_dt_ = inverse_dt;
-  for (std::size_t i = 0; i < rows_.rows.size(); ++i) {
-    const Constants& c = constants_.rows[i];
-    store(rows_.rows[i].stiffness, fma8(load(c.damping), all(inverse_dt), load(c.stiffness)));
-    store(rows_.rows[i].pull, load(c.stiffness) * load(c.rest_length));
+  for (Group g = 0; g < rows_.group_count(); ++g) take_step_length(g);
+}
+
+void Springs::take_step_length(Group group) {
+  auto constants = constants_[group].begin();
+  for (Row& row : rows_[group]) {
+    const Constants& c = *constants++;
+    store(row.stiffness, fma8(load(c.damping), all(inverse_dt_), load(c.stiffness)));
+    store(row.pull, load(c.stiffness) * load(c.rest_length));
   }
 }
 
@@ -92,9 +171,10 @@ void Springs::add(Group group, const Float4* x, const Vec8& own, NodeStep8& step
   step.block = block;
 }
 
-double Springs::energy_j(std::span<const Vec3d> displacements) const {
-  double twice = 0;  // every spring is stored at both ends
-  for (Group g = 0; g + 1 < rows_.offsets.size(); ++g)
+void Springs::add_energies_j(std::span<const Vec3d> displacements,
+                             std::span<double> energies) const {
+  // Every spring is stored at both ends: half of it belongs to each.
+  for (Group g = 0; g < rows_.group_count(); ++g)
     for (std::size_t i = 0; i < rows_[g].size(); ++i)
       for (std::size_t lane = 0; lane < kLanes; ++lane) {
         const Row& row = rows_[g][i];
@@ -102,9 +182,9 @@ double Springs::energy_j(std::span<const Vec3d> displacements) const {
         const Vec3d r = to_double(row.rest.at(lane)) + displacements[row.neighbour.v[lane]] -
                         displacements[g * kLanes + lane];
         const double stretch = length(r) - static_cast<double>(c.rest_length.v[lane]);
-        twice += 0.5 * static_cast<double>(c.stiffness.v[lane]) * stretch * stretch;
+        energies[g * kLanes + lane] +=
+            0.25 * static_cast<double>(c.stiffness.v[lane]) * stretch * stretch;
       }
-  return 0.5 * twice;
 }
 
 }  // namespace trocar::dynamics

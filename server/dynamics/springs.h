@@ -15,15 +15,18 @@ namespace trocar::dynamics {
 
 class Springs final : public Energy {
  public:
-  Springs(const scene::Organ& organ, const Groups& groups);
-  // False: the organ's material needs none.
-  bool has_any() const { return has_any_; }
+  Springs(const Topology& topology, const Groups& groups);
+  // False: no material of the organ can have any.
+  static bool are_needed(const scene::Organ& organ);
 
   void begin_step(float inverse_dt) override;
   void begin_group(Group group, const Float4* start) override;
   void add(Group group, const Float4* x, const Vec8& own, NodeStep8& step,
            Scratch& scratch) const override;
-  double energy_j(std::span<const Vec3d> displacements) const override;
+  void add_energies_j(std::span<const Vec3d> displacements,
+                      std::span<double> energies) const override;
+  std::size_t rebuild(const Topology& topology, const Groups& groups,
+                      std::span<const GroupLanes> lanes) override;
 
  private:
   struct Row {
@@ -41,10 +44,24 @@ class Springs final : public Energy {
 
     void pad(std::size_t, Slot) {}
   };
+  // A spring at a node.
+  struct End {
+    NodeIndex other;
+    scene::Spring spring;
+  };
+
+  void find_springs(const Topology& topology, NodeIndex node, std::vector<End>& out);
+  std::size_t fill(const Topology& topology, const Groups& groups, GroupLanes lanes);
+  void take_step_length(Group group);
+
   GroupRows<Row> rows_;
   GroupRows<Constants> constants_;
+  const bool has_damping_;
   float inverse_dt_ = 0;
-  bool has_any_ = false, has_damping_ = false;
+  // While rows are filled.
+  std::array<std::vector<End>, kLanes> ends_;
+  std::vector<std::pair<NodeIndex, TetIndex>> tets_beside_;
+  std::vector<scene::SpringTet> tets_;
 };
 
 }  // namespace trocar::dynamics

@@ -5,23 +5,19 @@
 #include "server/dynamics/tet_shape.h"
 
 namespace trocar::dynamics {
-namespace {
 
-struct Matrix {
-  std::array<std::array<double, 3>, 3> m{};
+Vec3d TensorMass::Matrix::operator*(const Vec3d& v) const {
+  const auto row = [&](std::size_t i) { return m[i][0] * v.x + m[i][1] * v.y + m[i][2] * v.z; };
+  return {row(0), row(1), row(2)};
+}
 
-  Vec3d operator*(const Vec3d& v) const {
-    const auto row = [&](std::size_t i) { return m[i][0] * v.x + m[i][1] * v.y + m[i][2] * v.z; };
-    return {row(0), row(1), row(2)};
-  }
-  void add(const Matrix& b, double sign) {
-    for (std::size_t i = 0; i < 3; ++i)
-      for (std::size_t j = 0; j < 3; ++j) m[i][j] += sign * b.m[i][j];
-  }
-};
+void TensorMass::Matrix::add(const Matrix& b, double sign) {
+  for (std::size_t i = 0; i < 3; ++i)
+    for (std::size_t j = 0; j < 3; ++j) m[i][j] += sign * b.m[i][j];
+}
 
-Matrix edge_matrix(const Vec3d& gi, const Vec3d& gj, double volume,
-                   const scene::LameParameters& lame) {
+TensorMass::Matrix TensorMass::edge_matrix(const Vec3d& gi, const Vec3d& gj, double volume,
+                                           const scene::LameParameters& lame) {
   const std::array<double, 3> a{gi.x, gi.y, gi.z}, b{gj.x, gj.y, gj.z};
   const double trace = lame.mu_pa * dot(gi, gj);
   Matrix k;
@@ -32,63 +28,93 @@ Matrix edge_matrix(const Vec3d& gi, const Vec3d& gj, double volume,
   return k;
 }
 
-struct Edge {
-  NodeIndex other;
-  Matrix k;
-};
-
-}  // namespace
-
-TensorMass::TensorMass(const scene::Organ& organ, const Groups& groups) {
-  const auto& mesh = organ.mesh;
-  const auto map = scene::material_map(organ);
-  std::vector<std::vector<Edge>> edges(mesh.node_count());
-  for (std::size_t t = 0; t < mesh.tets.size(); ++t) {
-    const auto& material = scene::material_at(organ, map.tets[t]);
-    if (material.elastic_law != scene::ElasticLaw::TensorMass) continue;
-    const auto lame = scene::lame_parameters(material);
-    const auto shape = tet_shape(organ.stress_free(), mesh.tets[t]);
-    for (std::size_t i = 0; i < 4; ++i)
-      for (std::size_t j = 0; j < 4; ++j) {
-        if (i == j) continue;
-        auto& row = edges[mesh.tets[t][i].value];
-        auto found = std::ranges::find(row, mesh.tets[t][j], &Edge::other);
-        if (found == row.end()) found = row.insert(row.end(), {mesh.tets[t][j], {}});
-        found->k.add(edge_matrix(shape.gradients[i], shape.gradients[j], shape.volume, lame), 1);
-      }
+TensorMass::TensorMass(const Topology& topology, const Groups& groups) {
+  std::vector<NodeIndex> neighbours;
+  std::vector<std::uint32_t> bounds(topology.node_count());
+  for (std::uint32_t n = 0; n < bounds.size(); ++n) {
+    topology.neighbours_of(NodeIndex(n), neighbours);
+    bounds[n] = static_cast<std::uint32_t>(neighbours.size());
   }
-  std::vector<std::uint32_t> counts;
-  for (auto& row : edges) {
-    std::ranges::sort(row, {}, &Edge::other);
-    counts.push_back(static_cast<std::uint32_t>(row.size()));
-  }
-  rows_ = make_rows<Row>(groups, counts,
-                         [&](Row& row, std::size_t lane, NodeIndex node, std::uint32_t e) {
-                           const Edge& edge = edges[node.value][e];
-                           row.neighbour.v[lane] = groups.slot_of(edge.other);
-                           for (std::size_t i = 0; i < 3; ++i)
-                             for (std::size_t j = 0; j < 3; ++j)
-                               row.k[i][j].v[lane] = static_cast<float>(edge.k.m[i][j]);
-                         });
+  rows_.reserve(groups, [&](NodeIndex node) { return bounds[node.value]; });
   blocks_.resize(groups.group_count());
   rest_gradient_.resize(groups.group_count());
-  const auto strain_of_rest = [&](std::uint32_t n) {
-    return mesh.rest_positions[n] - organ.stress_free()[n];
-  };
-  for (std::uint32_t n = 0; n < mesh.node_count(); ++n) {
-    const Slot slot = groups.slot_of(NodeIndex(n));
-    Matrix own;
-    Vec3d gradient;
-    for (const Edge& edge : edges[n]) {
-      own.add(edge.k, -1);
-      gradient += edge.k * (strain_of_rest(edge.other.value) - strain_of_rest(n));
+  rest_energies_j_.resize(groups.slot_count());
+  for (Group g = 0; g < groups.group_count(); ++g) fill(topology, groups, {g, 0xff});
+  rows_.end_building();
+}
+
+// By ascending other end; each a sum over ascending tets.
+void TensorMass::find_edges(const Topology& topology, NodeIndex node, std::vector<Edge>& out) {
+  out.clear();
+  for (const auto t : topology.tets_of(node)) {
+    const auto& material = scene::material_at(topology.organ(), topology.material_of(t));
+    if (material.elastic_law != scene::ElasticLaw::TensorMass) continue;
+    const auto lame = scene::lame_parameters(material);
+    const auto& tet = topology.tet(t);
+    const auto shape = tet_shape(topology.stress_free(), tet);
+    const auto i = static_cast<std::size_t>(std::ranges::find(tet, node) - tet.begin());
+    for (std::size_t j = 0; j < 4; ++j) {
+      if (i == j) continue;
+      auto found = std::ranges::find(out, tet[j], &Edge::other);
+      if (found == out.end()) found = out.insert(out.end(), {tet[j], {}});
+      found->k.add(edge_matrix(shape.gradients[i], shape.gradients[j], shape.volume, lame), 1);
     }
-    const auto f = [&](std::size_t i, std::size_t j) { return static_cast<float>(own.m[i][j]); };
-    blocks_[slot / kLanes].set(slot % kLanes,
-                               {f(0, 0), f(0, 1), f(0, 2), f(1, 1), f(1, 2), f(2, 2)});
-    rest_gradient_[slot / kLanes].set(slot % kLanes, to_float(gradient));
-    rest_energy_j_ += 0.5 * dot(strain_of_rest(n), gradient);
   }
+  std::ranges::sort(out, {}, &Edge::other);
+}
+
+std::size_t TensorMass::fill(const Topology& topology, const Groups& groups, GroupLanes lanes) {
+  const auto nodes = groups.nodes_of(lanes.group);
+  std::array<std::uint32_t, kLanes> counts{};
+  std::size_t written = 0;
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    if (!lanes.has(lane)) continue;
+    edges_[lane].clear();
+    if (nodes[lane].is_valid()) find_edges(topology, nodes[lane], edges_[lane]);
+    counts[lane] = static_cast<std::uint32_t>(edges_[lane].size());
+    written += counts[lane];
+    set_node(topology, nodes[lane], static_cast<Slot>(lanes.group * kLanes + lane), edges_[lane]);
+  }
+  const auto rows = rows_.reshape(lanes, counts);
+  for (std::size_t lane = 0; lane < kLanes; ++lane)
+    for (std::size_t e = 0; e < counts[lane]; ++e) {
+      const Edge& edge = edges_[lane][e];
+      rows[e].neighbour.v[lane] = groups.slot_of(edge.other);
+      for (std::size_t i = 0; i < 3; ++i)
+        for (std::size_t j = 0; j < 3; ++j)
+          rows[e].k[i][j].v[lane] = static_cast<float>(edge.k.m[i][j]);
+    }
+  return written;
+}
+
+// Quantities of the node itself: zero where there is none.
+void TensorMass::set_node(const Topology& topology, NodeIndex node, Slot slot,
+                          std::span<const Edge> edges) {
+  const auto strain_of_rest = [&](NodeIndex n) {
+    return topology.rest()[n.value] - topology.stress_free()[n.value];
+  };
+  Matrix own;
+  Vec3d gradient;
+  for (const Edge& edge : edges) {
+    own.add(edge.k, -1);
+    gradient += edge.k * (strain_of_rest(edge.other) - strain_of_rest(node));
+  }
+  const auto f = [&](std::size_t i, std::size_t j) { return static_cast<float>(own.m[i][j]); };
+  blocks_[slot / kLanes].set(slot % kLanes, {f(0, 0), f(0, 1), f(0, 2), f(1, 1), f(1, 2), f(2, 2)});
+  rest_gradient_[slot / kLanes].set(slot % kLanes, to_float(gradient));
+  rest_energies_j_[slot] = edges.empty() ? 0 : 0.5 * dot(strain_of_rest(node), gradient);
+}
+
+std::size_t TensorMass::rebuild(const Topology& topology, const Groups& groups,
+                                std::span<const GroupLanes> lanes) {
+  rows_.extend(groups);
+  blocks_.resize(groups.group_count());
+  rest_gradient_.resize(groups.group_count());
+  rest_energies_j_.resize(groups.slot_count());
+  std::size_t written = 0;
+  for (const auto group_lanes : lanes) written += fill(topology, groups, group_lanes);
+  rows_.tidy();
+  return written;
 }
 
 void TensorMass::add(Group group, const Float4* x, const Vec8& own, NodeStep8& step,
@@ -109,8 +135,8 @@ void TensorMass::add(Group group, const Float4* x, const Vec8& own, NodeStep8& s
                 step.block.yz + own_block.yz, step.block.zz + own_block.zz};
 }
 
-double TensorMass::energy_j(std::span<const Vec3d> displacements) const {
-  double energy = rest_energy_j_;
+void TensorMass::add_energies_j(std::span<const Vec3d> displacements,
+                                std::span<double> energies) const {
   for (Group g = 0; g < blocks_.size(); ++g)
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
       const Vec3d own = displacements[g * kLanes + lane];
@@ -123,9 +149,10 @@ double TensorMass::energy_j(std::span<const Vec3d> displacements) const {
         };
         gradient += {line(0), line(1), line(2)};
       }
-      energy += dot(own, gradient * 0.5 + to_double(rest_gradient_[g].at(lane)));
+      energies[g * kLanes + lane] +=
+          rest_energies_j_[g * kLanes + lane] +
+          dot(own, gradient * 0.5 + to_double(rest_gradient_[g].at(lane)));
     }
-  return energy;
 }
 
 }  // namespace trocar::dynamics

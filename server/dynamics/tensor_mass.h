@@ -12,11 +12,14 @@ namespace trocar::dynamics {
 
 class TensorMass final : public Energy {
  public:
-  TensorMass(const scene::Organ& organ, const Groups& groups);
+  TensorMass(const Topology& topology, const Groups& groups);
 
   void add(Group group, const Float4* x, const Vec8& own, NodeStep8& step,
            Scratch& scratch) const override;
-  double energy_j(std::span<const Vec3d> displacements) const override;
+  void add_energies_j(std::span<const Vec3d> displacements,
+                      std::span<double> energies) const override;
+  std::size_t rebuild(const Topology& topology, const Groups& groups,
+                      std::span<const GroupLanes> lanes) override;
 
  private:
   struct Row {
@@ -25,11 +28,29 @@ class TensorMass final : public Energy {
 
     void pad(std::size_t lane, Slot own) { neighbour.v[lane] = own; }
   };
+  struct Matrix {
+    std::array<std::array<double, 3>, 3> m{};
+
+    Vec3d operator*(const Vec3d& v) const;
+    void add(const Matrix& b, double sign);
+  };
+  struct Edge {
+    NodeIndex other;
+    Matrix k;
+  };
+
+  static Matrix edge_matrix(const Vec3d& gi, const Vec3d& gj, double volume,
+                            const scene::LameParameters& lame);
+  static void find_edges(const Topology& topology, NodeIndex node, std::vector<Edge>& out);
+  std::size_t fill(const Topology& topology, const Groups& groups, GroupLanes lanes);
+  void set_node(const Topology& topology, NodeIndex node, Slot slot, std::span<const Edge> edges);
+
   GroupRows<Row> rows_;
   std::vector<SymMat3Lanes> blocks_;  // K_ii per group
-  std::vector<Vec3Lanes>
-      rest_gradient_;  // N per group: of the rest pose against the stress-free one
-  double rest_energy_j_ = 0;
+  // N per group: of the rest pose against the stress-free one
+  std::vector<Vec3Lanes> rest_gradient_;
+  std::vector<double> rest_energies_j_;          // per slot
+  std::array<std::vector<Edge>, kLanes> edges_;  // while rows are filled
 };
 
 }  // namespace trocar::dynamics

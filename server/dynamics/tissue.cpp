@@ -29,15 +29,64 @@ bool averages_volume(const scene::Organ& organ) {
 
 }  // namespace
 
-Tissue::Tissue(const scene::Organ& organ)
-    : groups_(organ, averages_volume(organ) ? Coupling::Stars : Coupling::Elements),
-      follows_moves_(averages_volume(organ)) {
-  auto springs = std::make_unique<Springs>(organ, groups_);
-  if (springs->has_any()) energies_.push_back(std::move(springs));
+Tissue::Tissue(const scene::Organ& organ) : Tissue(Topology(organ)) {}
+
+Tissue::Tissue(const Topology& topology, std::span<const Colour> colours)
+    : groups_(topology, averages_volume(topology.organ()) ? Coupling::Stars : Coupling::Elements,
+              colours),
+      follows_moves_(averages_volume(topology.organ())) {
+  const auto& organ = topology.organ();
+  if (Springs::are_needed(organ)) energies_.push_back(std::make_unique<Springs>(topology, groups_));
   if (has_law(organ, ElasticLaw::TensorMass))
-    energies_.push_back(std::make_unique<TensorMass>(organ, groups_));
+    energies_.push_back(std::make_unique<TensorMass>(topology, groups_));
   if (has_law(organ, ElasticLaw::NeoHookean))
-    energies_.push_back(std::make_unique<NeoHookean>(organ, groups_, follows_moves_));
+    energies_.push_back(std::make_unique<NeoHookean>(topology, groups_, follows_moves_));
+}
+
+void Tissue::touch(Slot slot) {
+  auto& lanes = lanes_[slot / kLanes];
+  if (lanes == 0) touched_groups_.push_back(slot / kLanes);
+  lanes = static_cast<std::uint8_t>(lanes | 1u << slot % kLanes);
+}
+
+void Tissue::list_touched(std::vector<GroupLanes>& out) {
+  std::ranges::sort(touched_groups_);
+  out.clear();
+  for (const auto g : touched_groups_) out.push_back({g, lanes_[g]});
+}
+
+FollowReport Tissue::follow_topology(const Topology& topology) {
+  changed_.assign(topology.changed().begin(), topology.changed().end());
+  std::ranges::sort(changed_);
+  groups_.update(topology, changed_);
+  lanes_.resize(groups_.group_count());
+  const auto touch_node = [&](NodeIndex node) { touch(groups_.slot_of(node)); };
+  for (const auto slot : groups_.vacated()) touch(slot);
+  for (const auto node : changed_)
+    if (topology.has_node(node)) touch_node(node);
+  // Rows hold the slots of neighbours.
+  for (const auto node : groups_.moved()) {
+    touch_node(node);
+    topology.for_each_neighbour(node, touch_node);
+  }
+  list_touched(touched_);
+  wide_.clear();
+  if (follows_moves_) {
+    for (const auto node : changed_) topology.for_each_neighbour(node, touch_node);
+    list_touched(wide_);
+  }
+
+  FollowReport report{.nodes_changed = changed_.size(),
+                      .nodes_moved = groups_.moved().size(),
+                      .groups = touched_groups_.size()};
+  for (const auto g : touched_groups_) {
+    report.lanes += static_cast<unsigned>(__builtin_popcount(lanes_[g]));
+    lanes_[g] = 0;
+  }
+  touched_groups_.clear();
+  for (const auto& energy : energies_)
+    report.rows += energy->rebuild(topology, groups_, energy->follows_moves() ? wide_ : touched_);
+  return report;
 }
 
 void Tissue::begin_step(float inverse_dt) {
@@ -57,10 +106,14 @@ void Tissue::after_move(Group group, const Vec8& dx, const Scratch& scratch) {
 
 double Tissue::energy_j(std::span<const Vec3f> displacements) const {
   std::vector<Vec3d> per_slot(groups_.slot_count());
+  std::vector<double> energies(groups_.slot_count());
   for (std::uint32_t n = 0; n < displacements.size(); ++n)
-    per_slot[groups_.slot_of(NodeIndex(n))] = to_double(displacements[n]);
-  double energy = 0;
-  for (const auto& e : energies_) energy += e->energy_j(per_slot);
+    if (const Slot slot = groups_.slot_of(NodeIndex(n)); slot != kNoSlot)
+      per_slot[slot] = to_double(displacements[n]);
+  for (const auto& e : energies_) e->add_energies_j(per_slot, energies);
+  double energy = 0;  // in the order of nodes, whatever their slots
+  for (std::uint32_t n = 0; n < displacements.size(); ++n)
+    if (const Slot slot = groups_.slot_of(NodeIndex(n)); slot != kNoSlot) energy += energies[slot];
   return energy;
 }
 

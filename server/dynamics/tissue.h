@@ -1,6 +1,10 @@
 #pragma once
 
 // The energies of one organ, on its nodes' colours: what a solver or integrator asks for gradients.
+//
+// After an edit of the topology, between steps, follow_topology() brings colours, groups and rows
+// up to date in time that is proportional to what meets at the changed nodes. Results are bit for
+// bit those of a tissue built anew from the changed organ with the colours of this one.
 
 #include <memory>
 #include <vector>
@@ -9,9 +13,20 @@
 
 namespace trocar::dynamics {
 
+// What following a change has cost.
+struct FollowReport {
+  std::size_t nodes_changed = 0;  // whose existence, place or elements have changed
+  std::size_t nodes_moved = 0;    // to another slot
+  std::size_t groups = 0;         // with lanes written
+  std::size_t lanes = 0;          // written, by the energy that writes most
+  std::size_t rows = 0;           // written, per lane, all energies together
+};
+
 class Tissue {
  public:
   explicit Tissue(const scene::Organ& organ);
+  // colours: per place of a node, those of a tissue stored before; empty: greedy.
+  explicit Tissue(const Topology& topology, std::span<const Colour> colours = {});
 
   const Groups& groups() const { return groups_; }
   bool follows_moves() const { return follows_moves_; }
@@ -24,7 +39,13 @@ class Tissue {
     for (const auto& energy : energies_) energy->add(group, x, own, step, scratch);
   }
 
-  // Elastic energy in double, J; displacements per node of the organ.
+  // Follows topology.changed(). The topology is the one this tissue was made from, or another of
+  // the same organ with the same edits.
+  FollowReport follow_topology(const Topology& topology);
+  // Lanes whose node, or what meets at it, the last follow_topology() found changed; ascending.
+  std::span<const GroupLanes> touched() const { return touched_; }
+
+  // Elastic energy in double, J; displacements per place of a node.
   double energy_j(std::span<const Vec3f> displacements) const;
   std::size_t energy_count() const { return energies_.size(); }
   const Energy& energy(std::size_t i) const { return *energies_[i]; }
@@ -33,6 +54,14 @@ class Tissue {
   Groups groups_;
   std::vector<std::unique_ptr<Energy>> energies_;
   bool follows_moves_ = false;
+
+  void touch(Slot slot);
+  void list_touched(std::vector<GroupLanes>& out);
+
+  std::vector<NodeIndex> changed_;          // ascending
+  std::vector<std::uint8_t> lanes_;         // per group, while lanes are collected
+  std::vector<Group> touched_groups_;       // of these
+  std::vector<GroupLanes> touched_, wide_;  // wide: with neighbours of changed nodes
 };
 
 }  // namespace trocar::dynamics

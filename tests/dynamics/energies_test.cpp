@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numeric>
 #include <random>
 
 #include "common/math/frame.h"
@@ -356,8 +357,14 @@ TEST(ReducedPolynomial, TetsHaveItsGradientAndBlock) {
   const auto organ = block_organ({.name = "", .change = [](scene::Organ& o) {
                                     o.material.elastic_law = ElasticLaw::NeoHookean;
                                   }});
-  const Groups groups(organ, Coupling::Elements);
-  const Hyperelastic<ReducedPolynomialLaw> energy(organ, groups, false, kLiverLaw);
+  const Topology topology(organ);
+  const Groups groups(topology, Coupling::Elements);
+  const Hyperelastic<ReducedPolynomialLaw> energy(topology, groups, false, kLiverLaw);
+  const auto energy_j = [&](std::span<const Vec3d> displacements) {
+    std::vector<double> shares(groups.slot_count());
+    energy.add_energies_j(displacements, shares);
+    return std::accumulate(shares.begin(), shares.end(), 0.0);
+  };
   std::vector<Float4> x(groups.slot_count());
   std::vector<Vec3d> u(groups.slot_count());
   const auto random = random_displacements(organ.mesh.node_count(), 0.0015f, 12);
@@ -381,9 +388,9 @@ TEST(ReducedPolynomial, TetsHaveItsGradientAndBlock) {
     const double h = 1e-6;
     const double kept = u[slot].x;
     u[slot].x = kept + h;
-    const double plus = energy.energy_j(u);
+    const double plus = energy_j(u);
     u[slot].x = kept - h;
-    const double minus = energy.energy_j(u);
+    const double minus = energy_j(u);
     u[slot].x = kept;
     EXPECT_NEAR((plus - minus) / (2 * h), g.x, 2e-4 * (length(g) + 1e-2));
     const float kept_x = x[slot].x;

@@ -1,0 +1,96 @@
+#pragma once
+
+// An organ whose topology changes: nodes, tets and links as they are now, what meets at each node,
+// and which nodes a change has touched. Whoever cuts edits it between ticks; the solver follows.
+//
+// Places of nodes and tets are chosen by the caller: an unused one, or the next at the end. Unused
+// places keep their numbers, so nobody else's change. Everything is in canonical order, tets at a
+// node by their number and links by the other node's: what is computed from it is bit for bit what
+// the same organ without unused places gives, built anew.
+//
+// Every edit costs in proportion to what meets at its nodes. A node has changed when its existence,
+// its place in space, or the elements at it have. Regions of materials are those of the organ the
+// topology was made from, which must outlive it; new nodes say which they belong to. One writer.
+
+#include <span>
+#include <vector>
+
+#include "common/scene/organ.h"
+#include "server/dynamics/blocks.h"
+
+namespace trocar::dynamics {
+
+class Topology {
+ public:
+  explicit Topology(const scene::Organ& organ);
+
+  const scene::Organ& organ() const { return organ_; }
+  // Places, used or not.
+  std::size_t node_count() const { return rest_.size(); }
+  std::size_t tet_count() const { return tets_.size(); }
+  bool has_node(NodeIndex node) const { return has_node_[node.value] != 0; }
+  bool has_tet(TetIndex tet) const { return tets_[tet.value][0].is_valid(); }
+  // Whether springs are along links, else along edges of tets: as in the organ at the start.
+  bool has_links() const { return has_links_; }
+
+  std::span<const Vec3d> rest() const { return rest_; }                // m, per node
+  std::span<const Vec3d> stress_free() const { return stress_free_; }  // m, per node
+  const mesh::Tet& tet(TetIndex tet) const { return tets_[tet.value]; }
+  std::span<const TetIndex> tets_of(NodeIndex node) const { return node_tets_[node.value]; }
+  // The other ends, ascending.
+  std::span<const NodeIndex> links_of(NodeIndex node) const { return node_links_[node.value]; }
+  // Indices into organ().regions, ascending.
+  std::span<const std::uint16_t> regions_of(NodeIndex node) const {
+    return node_regions_[node.value];
+  }
+  // Nodes that share a tet or a link with this one, ascending, distinct.
+  void neighbours_of(NodeIndex node, std::vector<NodeIndex>& out) const;
+  // Calls visit(j) for each of these; some more than once.
+  template <typename Visit>
+  void for_each_neighbour(NodeIndex node, Visit&& visit) const {
+    for (const auto t : tets_of(node))
+      for (const auto j : tet(t))
+        if (j != node) visit(j);
+    for (const auto j : links_of(node)) visit(j);
+  }
+
+  // As scene::material_at() counts.
+  std::uint16_t material_of(TetIndex tet) const { return tet_materials_[tet.value]; }
+  std::uint16_t material_of(NodeIndex node) const;
+  std::uint16_t material_of(NodeIndex a, NodeIndex b) const;
+  // Nakao 2003 eq. 4, kg.
+  double lumped_mass(NodeIndex node) const;
+
+  // A node at a place without one. Nothing meets at it yet.
+  void put_node(NodeIndex place, const Vec3d& rest, const Vec3d& stress_free,
+                std::span<const std::uint16_t> regions);
+  // Nothing meets at it any more.
+  void remove_node(NodeIndex node);
+  void move_node(NodeIndex node, const Vec3d& rest, const Vec3d& stress_free);
+  // A tet at a place without one; its volume is positive.
+  void put_tet(TetIndex place, const mesh::Tet& tet);
+  void remove_tet(TetIndex tet);
+  void put_link(NodeIndex a, NodeIndex b);
+  void remove_link(NodeIndex a, NodeIndex b);
+
+  // Since the last clear_changes(): distinct, in the order of their first change.
+  std::span<const NodeIndex> changed() const { return changed_; }
+  void clear_changes();
+
+ private:
+  std::uint16_t material_of_all(std::span<const NodeIndex> nodes) const;
+  void mark(NodeIndex node);
+
+  const scene::Organ& organ_;
+  const bool has_links_;
+  std::vector<Vec3d> rest_, stress_free_;
+  std::vector<mesh::Tet> tets_;  // invalid nodes where there is none
+  std::vector<std::uint16_t> tet_materials_;
+  std::vector<std::uint8_t> has_node_, is_changed_;
+  Blocks<TetIndex> node_tets_;
+  Blocks<NodeIndex> node_links_;
+  Blocks<std::uint16_t> node_regions_;
+  std::vector<NodeIndex> changed_;
+};
+
+}  // namespace trocar::dynamics
