@@ -44,6 +44,7 @@ BlockDescent::BlockDescent(const scene::Organ& organ, const world::World& world,
   rejected_.resize(group_count);
   begun_stamp_.resize(group_count);
   group_stamp_.resize(group_count);
+  serial_stamp_.resize(group_count);
   slot_stamp_.resize(slot_count);
   first_link_.resize(slot_count);
   links_.reserve(8 * contact::kMaxPointsPerTool);
@@ -133,6 +134,7 @@ void BlockDescent::plan_step(std::span<const NodeIndex> near, bool has_far,
 
 void BlockDescent::link_contacts(const contact::ContactList& contacts) {
   const auto& groups = tissue_.groups();
+  has_serial_ = false;
   links_.resize(contacts.points.size());
   for (auto i = static_cast<std::uint32_t>(contacts.points.size()); i-- > 0;) {
     const auto& point = contacts.points[i];
@@ -144,6 +146,13 @@ void BlockDescent::link_contacts(const contact::ContactList& contacts) {
       slot_stamp_[slot] = group_stamp_[slot / kLanes] = current_;
       first_link_[slot] = i * contact::kMaxPointNodes + corner;
     }
+    for (std::uint32_t a = 1; a < point.node_count; ++a)
+      for (std::uint32_t b = 0; b < a; ++b) {
+        const Group g = links.slots[a] / kLanes, h = links.slots[b] / kLanes;
+        if (groups.colour_of(g) != groups.colour_of(h)) continue;
+        serial_stamp_[g] = serial_stamp_[h] = current_;
+        has_serial_ = true;
+      }
   }
 }
 
@@ -219,7 +228,6 @@ NodeStep8 BlockDescent::linearise(Group group, const Vec8& own, Scratch& scratch
   return step;
 }
 
-// The nodes of a point are in different groups of different colours, or in no group being swept.
 Vec3f BlockDescent::displacement_of(const contact::ContactPoint& point,
                                     const PointLinks& links) const {
   Vec3f sum;
@@ -308,9 +316,17 @@ void BlockDescent::sweep(const Plan& plan, const contact::ContactList& contacts,
       const auto count = std::size_t{workers_.count()};
       for (auto i = n * w / count; i < n * (w + 1) / count; ++i) {
         const Group g = plan.groups[begin + i];
+        if (has_serial_ && serial_stamp_[g] == current_) continue;
         relax(g, plan.lanes[g], contacts, omega, scratches_[w]);
       }
       if (n > 0) workers_.barrier();
+      if (!has_serial_ || n == 0) continue;
+      if (w == 0)
+        for (std::size_t i = 0; i < n; ++i) {
+          const Group g = plan.groups[begin + i];
+          if (serial_stamp_[g] == current_) relax(g, plan.lanes[g], contacts, omega, scratches_[w]);
+        }
+      workers_.barrier();
     }
   });
 }
@@ -366,7 +382,7 @@ SolveReport BlockDescent::solve(const contact::ContactList& contacts,
   // A tolerance ends the sweeps early, before the far ones.
   TROCAR_ASSERT(settings.far_sweeps == 0 || settings.residual_tolerance_n == 0);
   if (++current_ == 0) {
-    for (auto* stamps : {&slot_stamp_, &group_stamp_, &begun_stamp_})
+    for (auto* stamps : {&slot_stamp_, &group_stamp_, &begun_stamp_, &serial_stamp_})
       std::ranges::fill(*stamps, 0u);
     current_ = 1;
   }
@@ -491,10 +507,11 @@ FollowReport BlockDescent::follow_topology(const Topology& topology, const world
   group_squares_.resize(group_count);
   for (auto* lanes : {&free_, &rejected_, &near_.lanes, &far_.lanes, &begun_.lanes})
     lanes->resize(group_count);
-  for (auto* stamps : {&begun_stamp_, &group_stamp_}) stamps->resize(group_count);
+  for (auto* stamps : {&begun_stamp_, &group_stamp_, &serial_stamp_}) stamps->resize(group_count);
   for (auto* values : {&x_, &start_}) values->resize(slot_count);
   slot_stamp_.resize(slot_count);
-  first_constraint_.resize(slot_count);
+  squared_moves_.resize(group_count);
+  first_link_.resize(slot_count);
   for (const auto lanes : tissue_.touched())
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
       if (!lanes.has(lane)) continue;

@@ -176,6 +176,10 @@ class BlockDescent {
   // A link is kMaxPointNodes x point + corner.
   std::vector<std::uint32_t> first_link_;  // per slot
   std::vector<PointLinks> links_;          // per contact point
+  // Groups with a node of a point that another node of their colour is in, too: one worker sweeps
+  // them, after the others of the colour.
+  std::vector<std::uint32_t> serial_stamp_;
+  bool has_serial_ = false;
   std::vector<std::uint32_t> slot_stamp_, group_stamp_;
   std::vector<std::uint8_t> held_axes_;  // per slot, of this step; empty if there are none
   std::uint32_t current_ = 0;
