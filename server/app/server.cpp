@@ -2,6 +2,8 @@
 
 #include "common/base/asio.h"  // before Boost: see there
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/post.hpp>
@@ -31,6 +33,7 @@ constexpr milliseconds kGoodbyeDeadline{2500};  // a little more than the flush 
 constexpr milliseconds kPollPeriod{5};
 // Slower than this is said in the log, once in a while.
 constexpr float kSlowTimeRate = 0.98f;
+constexpr float kLongTickMs = 0.9f;
 constexpr Tick kWarningPeriod = 10 * kTicksPerSecond;
 
 Tick ticks_of(double seconds) {
@@ -158,11 +161,12 @@ void Server::warn_if_slow() {
   const auto& rate = frame.statistics.rate;
   if (rate.time_rate > kSlowTimeRate || frame.tick < next_warning_) return;
   next_warning_ = frame.tick + kWarningPeriod;
-  log::warn("simulated time runs at {:.0f} % of real time: {}", 100 * rate.time_rate,
-            rate.level == step::RateLevel::Overloaded
-                ? "this machine is too slow for so much contact on this organ, even at the least "
-                  "(a smaller organ, or --workers, helps)"
-                : "ticks are held up, perhaps by other programs");
+  const auto tick_ms = frame.statistics.tick_median_us * 1e-3f;
+  log::warn(
+      "simulated time runs at {:.0f} % of real time: {}", 100 * rate.time_rate,
+      tick_ms > kLongTickMs
+          ? fmt::format("a tick takes {:.2f} ms (a smaller organ or --workers helps)", tick_ms)
+          : std::string("ticks are held up, perhaps by other programs"));
 }
 
 void Server::begin_end() {

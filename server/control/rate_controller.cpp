@@ -47,14 +47,15 @@ void RateController::observe(const step::TickReport& report, const TickTiming& t
   const double work_us = static_cast<double>(timing.work_ns) * 1e-3;
   const auto node_sweeps = static_cast<double>(report.node_sweeps);
   model_.add(node_sweeps, work_us, solve_share(report));
-  watch_load(timing);
   remember_peaks(report);
   since_lower_ = std::min(since_lower_ + 1, kLongAgo);
   since_raise_ = std::min(since_raise_ + 1, kLongAgo);
   if (since_lower_ > kForget) hold_ = kHold;
   if (!model_.is_ready()) return;
   predicted_us_ = model_.predict_us(node_sweeps);
-  is_too_much_ = predicted_us_ > budget_us() && !next_lower(report).is_any;
+  const bool can_lower = next_lower(report).is_any;
+  watch_load(timing, can_lower);
+  is_too_much_ = predicted_us_ > budget_us() && !can_lower;
   if (predicted_us_ > budget_us()) {
     room_ticks_ = 0;
     lower(report);
@@ -73,12 +74,13 @@ void RateController::remember_peaks(const step::TickReport& report) {
   remember(peak_queue_nodes_, report.queue_nodes);
 }
 
-void RateController::watch_load(const TickTiming& timing) {
+void RateController::watch_load(const TickTiming& timing, bool can_lower) {
   const double work = static_cast<double>(timing.work_ns) * 1e-3 / kTickUs;
   load_ += kLoadGain * (std::min(work, kMaxWorkTicks) - load_);
   const double is_late = timing.lateness_ns > kTickNanoseconds ? 1 : 0;
   late_share_ += kLateGain * (is_late - late_share_);
-  if (load_ > kHighLoad || late_share_ > kHighLateShare)
+  const bool is_pressed = load_ > kHighLoad || late_share_ > kHighLateShare;
+  if (is_pressed && can_lower && predicted_us_ <= budget_us())
     budget_share_ = std::max(kMinBudgetShare, budget_share_ - kShrink);
   else if (load_ < kLowLoad)
     budget_share_ = std::min(1.0, budget_share_ + kGrow);
@@ -86,7 +88,8 @@ void RateController::watch_load(const TickTiming& timing) {
 
 // The deepest layer that has sweeps to give, then nodes.
 RateController::Step RateController::next_lower(const step::TickReport& report) const {
-  Step step{sweeps_, nodes_, 0, true};
+  Step step{sweeps_, nodes_, 0, report.active_nodes > 0};
+  if (!step.is_any) return step;
   for (std::size_t layer = step::kSweepLayers; layer-- > 0;) {
     if (sweeps_[layer] == lowest_sweeps_[layer]) continue;
     --step.sweeps[layer];

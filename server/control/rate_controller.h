@@ -18,11 +18,12 @@
 //          peak, forgotten with a time constant of about 2 s), so that a hand that lifts for a
 //          moment changes nothing. hold is 200; it doubles up to 3,200 when a step down follows
 //          within 500 ticks of a step up, and is 200 again after 5,000 ticks without one.
-//   budget shrinks by 1/512 of the given one per tick, down to half, while the mean load of about a
-//          quarter of a second is above 0.95 or a fifth of the ticks begin more than a tick late:
-//          medians alone would not see many long spikes. It grows back four times slower, below a
-//          load of 0.85. A stall counts as 4 ticks, however long it is.
-// A step that changes no node sweeps, since its layer is empty, is free and takes no turn.
+//   budget shrinks by 1/512 of the given one per tick, down to half, when by the prediction all is
+//          well and yet the mean load of about a quarter of a second is above 0.95 or a fifth of
+//          the ticks begin more than a tick late: medians do not see many long spikes. It grows
+//          back four times slower, below a load of 0.85. A stall counts as 4 ticks, however long.
+// A step that changes no node sweeps, since its layer is empty, is free and takes no turn. While no
+// node is active there is nothing to give up: the rest of the organ is swept as it must be.
 
 #include <cstdint>
 
@@ -69,7 +70,7 @@ class RateController {
     bool is_any = false;
   };
 
-  void watch_load(const TickTiming& timing);
+  void watch_load(const TickTiming& timing, bool can_lower);
   void remember_peaks(const step::TickReport& report);
   Step next_lower(const step::TickReport& report) const;
   Step next_higher() const;

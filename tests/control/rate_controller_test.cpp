@@ -106,6 +106,23 @@ TEST(RateController, WithSpikesTheRegularPartKeepsItsBudget) {
   EXPECT_LE(direction_changes(with, 0, 20'000), 4);
 }
 
+// A quarter of the ticks are spikes: the median says that all is well, the clock that it is not.
+TEST(RateController, SpikesThatAreTooManyForTheClockMakeRoomForThemselves) {
+  Machine machine;
+  machine.per_sweep_us = 0.044;
+  const Load load{
+      .contacts = [](Tick) { return 5; },
+      .spike_us = [](Tick tick) { return tick < 15'000 && tick % 4 == 1 ? 1300.0 : 0.0; }};
+  const auto limits = roomy_limits();
+  const auto with = run_virtual(machine, load, 30'000, limits);
+  const auto without = run_virtual(machine, load, 30'000, limits, false);
+  expect_rules(with, limits);
+  EXPECT_GT(without.back().slow_ticks, 500u);
+  EXPECT_LT(with.back().slow_ticks, without.back().slow_ticks / 3);
+  EXPECT_EQ(with.back().decisions, limits.highest) << "they are over";
+  EXPECT_LE(direction_changes(with, 0, 30'000), 12);
+}
+
 TEST(RateController, AMachineThatGetsTwiceAsSlowInTenSecondsIsFollowedDownAndUp) {
   Machine machine;
   machine.per_sweep_us = 0.032;

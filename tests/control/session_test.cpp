@@ -163,6 +163,27 @@ TEST(ControlledSession, EveryStepDownAndUpIsRecordedAndSimulatesAgain) {
   expect_verifies(file);
 }
 
+TEST(RecordedDecisions, OfABrokenJournalAreRefusedByName) {
+  const auto read = [](std::initializer_list<std::uint32_t> layers) {
+    proto::TickRecord message;
+    message.set_tick(7);
+    auto& decisions = *message.mutable_decisions();
+    decisions.set_depth_limit(3);
+    decisions.set_node_limit(100);
+    decisions.set_sweeps(4);
+    decisions.set_over_relaxation(1.5f);
+    for (const auto sweeps : layers) decisions.add_layer_sweeps(sweeps);
+    step::TickRecord record;
+    const auto status = recording::from_message(message, record);
+    return status.ok() ? std::string() : status.error().message;
+  };
+  EXPECT_EQ(read({}), "");
+  EXPECT_EQ(read({3, 2}), "");
+  EXPECT_NE(read({3, 2, 1, 1}).find("layer_sweeps"), std::string::npos);
+  EXPECT_NE(read({5}).find("layer_sweeps"), std::string::npos);
+  EXPECT_NE(read({4'000'000'000u}).find("layer_sweeps"), std::string::npos);
+}
+
 TEST(ControlledSession, FixedDecisionsStay) {
   auto session = start({"--fixed-decisions", "--budget", "0.05"});
   const auto rate = press(session.port);

@@ -22,6 +22,7 @@ step::TickReport report_of(const Machine& machine, int contacts, const step::Tic
     far -= nodes;
     report.layer_nodes[layer] = nodes;
     report.queue_nodes += nodes;
+    report.active_nodes += nodes;
     report.node_sweeps += std::uint64_t{nodes} * sweeps[layer];
   }
   report.node_sweeps += far;
