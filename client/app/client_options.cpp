@@ -9,6 +9,7 @@
 #include <map>
 
 #include "common/base/version.h"
+#include "common/wire/role.h"
 
 namespace trocar::app {
 namespace {
@@ -73,10 +74,8 @@ Result<std::optional<ClientOptions>> parse_client_command_line(int argc, char** 
   ClientOptions options;
   std::string size;
   bool is_headless = false, draws_nothing = false;
-  const std::map<std::string, replica::Role> roles = {{"surgeon", replica::Role::Surgeon},
-                                                      {"assistant", replica::Role::Assistant},
-                                                      {"instructor", replica::Role::Instructor},
-                                                      {"observer", replica::Role::Observer}};
+  std::map<std::string, replica::Role> roles;
+  for (const auto& known : wire::kRoles) roles[known.name] = known.role;
   CLI::App app("Takes part in a session, watches one, or plays a recorded one.", "trocar-client");
   app.footer(kExamples);
   app.set_version_flag("--version", version_text());

@@ -55,22 +55,6 @@ bool expand_regions(const proto::FrameState& message, std::vector<std::uint16_t>
 
 }  // namespace
 
-const char* name_of(Role role) {
-  switch (role) {
-    case Role::Surgeon:
-      return "surgeon";
-    case Role::Assistant:
-      return "assistant";
-    case Role::Instructor:
-      return "instructor";
-    case Role::Observer:
-      return "observer";
-    case Role::Unknown:
-      break;
-  }
-  return "unknown role";
-}
-
 Replica::Replica(Send send) : send_(std::move(send)) {}
 
 void Replica::fail(std::string what) {
@@ -305,7 +289,7 @@ void Replica::apply_participants(const proto::Participants& message) {
     Participant participant;
     participant.slot.value = static_cast<std::uint8_t>(entry.slot());
     participant.name = entry.name();
-    if (entry.role() >= 0 && entry.role() <= 4) participant.role = static_cast<Role>(entry.role());
+    participant.role = wire::role_of(entry.role());
     for (const auto& shape : entry.tool())
       participant.tools.push_back({shape.radius_m(), shape.length_m(), shape.reach_m()});
     participants_.push_back(std::move(participant));

@@ -11,20 +11,13 @@
 #include "common/base/tick.h"
 #include "common/scene/tool.h"
 #include "common/wire/quantise.h"
+#include "common/wire/role.h"
 
 namespace trocar::replica {
 
-enum class Role : std::uint8_t {
-  Unknown = 0,
-  Surgeon = 1,
-  Assistant = 2,
-  Instructor = 3,
-  Observer = 4
-};
-inline bool has_tools(Role role) {
-  return role == Role::Surgeon || role == Role::Assistant;
-}
-const char* name_of(Role role);
+using wire::has_tools;
+using wire::name_of;
+using wire::Role;
 
 struct Participant {
   ParticipantSlot slot;

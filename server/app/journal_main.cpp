@@ -10,6 +10,7 @@
 #include "common/base/timing.h"
 #include "common/base/version.h"
 #include "common/journal/session_journal.h"
+#include "common/wire/role.h"
 #include "server/recording/verify.h"
 
 namespace trocar::app {
@@ -27,21 +28,6 @@ std::string json_escaped(const std::string& text) {
       out += c;
   }
   return out;
-}
-
-const char* role_name(proto::Role role) {
-  switch (role) {
-    case proto::ROLE_SURGEON:
-      return "surgeon";
-    case proto::ROLE_ASSISTANT:
-      return "assistant";
-    case proto::ROLE_INSTRUCTOR:
-      return "instructor";
-    case proto::ROLE_OBSERVER:
-      return "observer";
-    default:
-      return "?";
-  }
 }
 
 int show_info(const std::string& path, bool as_json) {
@@ -77,7 +63,8 @@ int show_info(const std::string& path, bool as_json) {
               info.protocol.c_str());
   std::printf("  participants %zu\n", info.participants.size());
   for (const auto& participant : info.participants)
-    std::printf("    %-24s %s\n", participant.name().c_str(), role_name(participant.role()));
+    std::printf("    %-24s %s\n", participant.name().c_str(),
+                wire::name_of(wire::role_of(participant.role())));
   std::printf("  channels\n");
   for (const auto& [id, channel] : mcap.channels()) {
     const auto count = mcap.statistics().channel_message_counts.find(id);

@@ -9,7 +9,6 @@ namespace trocar::replication {
 namespace {
 
 static_assert(static_cast<int>(EndReason::Timeout) == proto::GOODBYE_TIMEOUT);
-static_assert(static_cast<int>(session::Role::Observer) == proto::ROLE_OBSERVER);
 static_assert(static_cast<int>(scene::Verb::Grasp) == proto::VERB_GRASP);
 static_assert(scene::kVerbCount == proto::Verb_ARRAYSIZE);
 
@@ -27,10 +26,10 @@ Result<HelloRequest> check_hello(const proto::Hello& hello, EndReason& reason) {
                ", you speak " + std::to_string(hello.protocol_major()) + "." +
                std::to_string(hello.protocol_minor()) + ": use client and server of one release");
   }
-  if (hello.role() < proto::ROLE_SURGEON || hello.role() > proto::ROLE_OBSERVER) {
+  if (wire::role_of(hello.role()) == wire::Role::Unknown) {
     reason = EndReason::Role;
-    return bad("Hello.role: " + std::to_string(static_cast<int>(hello.role())) +
-               " is none of surgeon (1), assistant (2), instructor (3), observer (4)");
+    return bad("Hello.role: " + std::to_string(static_cast<int>(hello.role())) + " is none of " +
+               wire::list_roles());
   }
   reason = EndReason::ProtocolError;
   if (hello.tool_size() > kToolsPerHand)
@@ -38,7 +37,7 @@ Result<HelloRequest> check_hello(const proto::Hello& hello, EndReason& reason) {
   HelloRequest request;
   request.protocol_minor = hello.protocol_minor();
   request.name = hello.name();
-  request.role = static_cast<session::Role>(hello.role());
+  request.role = wire::role_of(hello.role());
   for (const auto& tool : hello.tool())
     request.tools.push_back({tool.radius_m(), tool.length_m(), tool.reach_m()});
   return request;

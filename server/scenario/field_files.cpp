@@ -32,17 +32,17 @@ bool is_held(const ScenarioRun& run, std::size_t node) {
   return run.world().node_classes[node] == world::NodeClass::Fixed;
 }
 
-void write_csv(std::FILE* file, const ScenarioRun& run) {
+void write_csv(std::FILE* file, const ScenarioRun& run, const scene::MaterialMap& regions) {
   std::fputs(
       "node,rest_x_mm,rest_y_mm,rest_z_mm,displacement_x_mm,displacement_y_mm,"
-      "displacement_z_mm,velocity_x_mm_s,velocity_y_mm_s,velocity_z_mm_s,held\n",
+      "displacement_z_mm,velocity_x_mm_s,velocity_y_mm_s,velocity_z_mm_s,held,region\n",
       file);
   for (std::size_t i = 0; i < run.world().node_count(); ++i) {
     const Vec3d p = run.organ().mesh.rest_positions[i] * 1e3;
     const Vec3d u = to_double(run.world().displacements[i]) * 1e3;
     const Vec3d v = to_double(run.world().velocities[i]) * 1e3;
-    std::fprintf(file, "%zu,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%d\n", i, p.x, p.y, p.z,
-                 u.x, u.y, u.z, v.x, v.y, v.z, is_held(run, i) ? 1 : 0);
+    std::fprintf(file, "%zu,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%d,%u\n", i, p.x, p.y, p.z,
+                 u.x, u.y, u.z, v.x, v.y, v.z, is_held(run, i) ? 1 : 0, regions.nodes[i]);
   }
 }
 
@@ -56,6 +56,28 @@ void write_vectors(std::FILE* file, const char* name, const Vectors& vectors) {
     std::fprintf(file, "%.9g %.9g %.9g\n", static_cast<double>(v.x), static_cast<double>(v.y),
                  static_cast<double>(v.z));
   std::fputs("        </DataArray>\n", file);
+}
+
+void write_regions(std::FILE* file, const std::vector<std::uint16_t>& regions) {
+  std::fputs("        <DataArray type=\"UInt16\" Name=\"region\" format=\"ascii\">\n", file);
+  for (const auto region : regions) std::fprintf(file, "%u\n", region);
+  std::fputs("        </DataArray>\n", file);
+}
+
+// VTK wants the bytes of a string as numbers, and 0 after each string.
+void write_region_names(std::FILE* file, const scene::Organ& organ) {
+  std::fprintf(file,
+               "    <FieldData>\n"
+               "      <DataArray type=\"String\" Name=\"region_names\" NumberOfTuples=\"%zu\" "
+               "format=\"ascii\">\n",
+               organ.regions.size() + 1);
+  const auto write = [file](const std::string& name) {
+    for (const char c : name) std::fprintf(file, "%d ", static_cast<unsigned char>(c));
+    std::fputs("0\n", file);
+  };
+  write(organ.name);
+  for (const auto& region : organ.regions) write(region.name);
+  std::fputs("      </DataArray>\n    </FieldData>\n", file);
 }
 
 template <typename Cells>
@@ -80,14 +102,17 @@ void write_cells(std::FILE* file, const Cells& cells, int type) {
   std::fputs("        </DataArray>\n      </Cells>\n", file);
 }
 
-void write_vtu(std::FILE* file, const ScenarioRun& run) {
+void write_vtu(std::FILE* file, const ScenarioRun& run, const scene::MaterialMap& regions) {
   const auto& mesh = run.organ().mesh;
   const std::size_t cell_count = mesh.tets.empty() ? mesh.links.size() : mesh.tets.size();
+  std::fputs(
+      "<?xml version=\"1.0\"?>\n"
+      "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" "
+      "header_type=\"UInt64\">\n"
+      "  <UnstructuredGrid>\n",
+      file);
+  write_region_names(file, run.organ());
   std::fprintf(file,
-               "<?xml version=\"1.0\"?>\n"
-               "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" "
-               "header_type=\"UInt64\">\n"
-               "  <UnstructuredGrid>\n"
                "    <Piece NumberOfPoints=\"%zu\" NumberOfCells=\"%zu\">\n      <PointData>\n",
                mesh.node_count(), cell_count);
   write_vectors(file, "displacement_m", run.world().displacements);
@@ -95,7 +120,11 @@ void write_vtu(std::FILE* file, const ScenarioRun& run) {
   std::fputs("        <DataArray type=\"UInt8\" Name=\"held\" format=\"ascii\">\n", file);
   for (std::size_t i = 0; i < mesh.node_count(); ++i)
     std::fprintf(file, "%d\n", is_held(run, i) ? 1 : 0);
-  std::fputs("        </DataArray>\n      </PointData>\n      <Points>\n", file);
+  std::fputs("        </DataArray>\n", file);
+  write_regions(file, regions.nodes);
+  std::fputs("      </PointData>\n      <CellData>\n", file);
+  write_regions(file, mesh.tets.empty() ? regions.spring_pairs : regions.tets);
+  std::fputs("      </CellData>\n      <Points>\n", file);
   write_vectors(file, "rest_m", mesh.rest_positions);
   std::fputs("      </Points>\n", file);
   if (mesh.tets.empty())
@@ -110,10 +139,11 @@ void write_vtu(std::FILE* file, const ScenarioRun& run) {
 Status write_field(const std::filesystem::path& folder, const ScenarioRun& run) {
   char name[40];
   std::snprintf(name, sizeof name, "field_%07lldms", std::llround(run.time_s() * 1e3));
+  const auto regions = scene::material_map(run.organ());
   const auto csv = folder / (std::string(name) + ".csv");
-  if (auto s = write_file(csv, [&](std::FILE* f) { write_csv(f, run); }); !s) return s;
+  if (auto s = write_file(csv, [&](std::FILE* f) { write_csv(f, run, regions); }); !s) return s;
   const auto vtu = folder / (std::string(name) + ".vtu");
-  return write_file(vtu, [&](std::FILE* f) { write_vtu(f, run); });
+  return write_file(vtu, [&](std::FILE* f) { write_vtu(f, run, regions); });
 }
 
 }  // namespace trocar::scenario

@@ -3,7 +3,9 @@
 // The whole organ at one time: field_<ms>ms.csv, one row per node, in mm; and field_<ms>ms.vtu, a
 // VTK UnstructuredGrid (ASCII XML) at rest with displacement and velocity as point data, in metres,
 // as ParaView wants it for "Warp By Vector". Cells are the tets, or the springs of an organ without
-// tets. Each file appears complete or not at all.
+// tets. `region` is 0 for the organ's own material and r + 1 for organ.regions[r]: of a cell that
+// of its material, of a node the last that lists it; the string array `region_names` has the
+// organ's name, then the regions', in that order. Each file appears complete or not at all.
 
 #include <filesystem>
 

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "common/base/assert.h"
+#include "server/contact/update_claims.h"
 
 namespace trocar::scenario {
 namespace {
@@ -215,17 +216,9 @@ std::span<const NodeIndex> ScenarioRun::collect_active() {
   return active_set_.nodes();
 }
 
-// As the tick of a session does it (server/step/tick.cpp).
 void ScenarioRun::update_claims() {
-  requests_.clear();
-  for (std::uint8_t i = 0; i < scenario().tools.size(); ++i) {
-    const auto& tool = tools_[ToolSlot{i}];
-    requests_.push_back(
-        {ToolSlot{i}, tool.verb, tool.last_sample_tick, contacts_.reach_of(ToolSlot{i})});
-  }
   claim_events_.clear();
-  claims_.update(world_.tick, requests_, claim_events_);
-  grasps_.follow_claims(world_, tools_, claims_, requests_);
+  contact::update_claims(world_, tools_, contacts_, requests_, claims_, grasps_, claim_events_);
 }
 
 dynamics::SolveSettings ScenarioRun::settings() const {

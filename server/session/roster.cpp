@@ -60,20 +60,6 @@ bool is_valid_name(std::string_view name) {
 
 }  // namespace
 
-const char* name_of(Role role) {
-  switch (role) {
-    case Role::Surgeon:
-      return "surgeon";
-    case Role::Assistant:
-      return "assistant";
-    case Role::Instructor:
-      return "instructor";
-    case Role::Observer:
-      return "observer";
-  }
-  return "unknown";
-}
-
 Roster::Roster(const std::vector<Participant>& present) {
   for (const auto& participant : present)
     if (participant.slot.is_valid()) slots_[participant.slot.value] = participant;

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "common/base/timing.h"
+#include "server/contact/update_claims.h"
 
 namespace trocar::step {
 namespace {
@@ -82,15 +83,8 @@ void solve(State& state, StepContext& context) {
 }
 
 void update_claims(State& state, StepContext& context) {
-  context.requests.clear();
-  for (std::uint8_t i = 0; i < kMaxTools; ++i) {
-    const auto& tool = state.tools[ToolSlot{i}];
-    if (!tool.has_sample) continue;
-    context.requests.push_back(
-        {ToolSlot{i}, tool.verb, tool.last_sample_tick, context.contacts.reach_of(ToolSlot{i})});
-  }
-  state.claims.update(state.world.tick, context.requests, context.claim_events);
-  state.grasps.follow_claims(state.world, state.tools, state.claims, context.requests);
+  contact::update_claims(state.world, state.tools, context.contacts, context.requests, state.claims,
+                         state.grasps, context.claim_events);
 }
 
 ToolFrame describe_tool(const State& state, const StepContext& context, ToolSlot slot) {

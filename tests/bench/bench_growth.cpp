@@ -1,5 +1,5 @@
 // How a step's time grows: with the organ's nodes, when all of it moves and when one contact moves
-// its surroundings; and with the number of contacts on one organ.
+// its surroundings, frozen or graded; and with the number of contacts on one organ.
 
 #include "common/scene/builtin_organs.h"
 #include "tests/bench/pulled_work.h"
@@ -55,6 +55,24 @@ void add_sizes(Suite& suite) {
   }
 }
 
+// The queue is as large in each organ, so that what grows is the organ alone.
+void add_graded_sizes(Suite& suite) {
+  std::vector<int> sizes{80'000, 175'760, 466'560};
+  if (suite.is_smoke()) sizes = {300, 1'000};
+  const std::uint32_t queue_nodes = suite.is_smoke() ? 50 : 1200;
+  for (const int tets : sizes) {
+    const auto box = std::make_shared<const PulledBox>(make_pulled_box(growing_box(tets)));
+    for (const Law law : {Law::Springs, Law::NeoHookean}) {
+      Row row = row_of(*box, "graded", name_of(law));
+      add_work(suite, row, suite.steps(10, 100, 300), [=](Row&) {
+        return run_graded_session(
+            box->organ, {pull_top_centre(box->organ)},
+            {.law = law, .depth = step::kMaxDepthLimit, .nodes = queue_nodes});
+      });
+    }
+  }
+}
+
 void add_contacts(Suite& suite) {
   const auto organ = scene::make_liver(suite.is_smoke() ? scene::kMinLiverTets : 88'000);
   TROCAR_ASSERT(organ.ok());
@@ -83,6 +101,7 @@ void add_contacts(Suite& suite) {
 
 void add_growth(Suite& suite) {
   add_sizes(suite);
+  add_graded_sizes(suite);
   add_contacts(suite);
 }
 

@@ -49,7 +49,8 @@ TEST(bench_program, every_row_has_a_figure_and_a_hash) {
     EXPECT_EQ(hash.size(), 16u) << name;
     EXPECT_NE(hash, "0000000000000000") << name;
   }
-  EXPECT_EQ(groups, (std::set<std::string>{"contacts", "nodes", "peers", "queue", "targets"}));
+  EXPECT_EQ(groups,
+            (std::set<std::string>{"contacts", "graded", "nodes", "peers", "queue", "targets"}));
   // Each law of ours beside each of Bullet's.
   for (const char* peer : {"Bullet linear, implicit", "Bullet mass-spring, explicit"})
     EXPECT_TRUE(names.contains(std::string("peers/small box/") + peer));

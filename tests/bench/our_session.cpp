@@ -76,6 +76,12 @@ TickTimes OurSession::tick() {
       seconds(step::Stage::Claims) + seconds(step::Stage::Hash) + seconds(step::Stage::Publish)};
 }
 
+std::size_t OurSession::state_bytes() const {
+  Bytes snapshot;
+  simulation_.write_snapshot(snapshot);
+  return snapshot.size();
+}
+
 TickCounts OurSession::counts() const {
   return {report_.queue_nodes, report_.active_nodes, report_.contact_nodes, report_.faults};
 }

@@ -60,6 +60,8 @@ class OurSession {
   const std::vector<Vec3f>& published_forces() const { return forces_; }
   std::span<const Vec3f> displacements() const { return simulation_.state().world.displacements; }
   std::uint64_t state_hash() const { return simulation_.state_hash(); }
+  std::size_t state_bytes() const;  // of a snapshot: what a later tick depends on
+  std::uint32_t far_sweeps() const { return report_.far_sweeps; }  // of the last tick
 
  private:
   void sample_tools();

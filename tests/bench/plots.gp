@@ -33,6 +33,14 @@ if (is_there(file)) {
 }
 unset logscale
 set yrange [0:*]
+file = data("graded")
+if (is_there(file)) {
+  set output picture("graded")
+  set title "A graded tick's solve against nodes, one contact (CPU, one thread; dashed: near)"
+  set xlabel "nodes"; set ylabel "ms per 1 ms tick"
+  plot for [i=0:count(file)-1] file index i using 2:(ms($4)) with linespoints lw 2 title columnheader(1).", far", \
+    for [i=0:count(file)-1] file index i using 2:(ms($3)) with linespoints lw 2 dashtype 2 title columnheader(1).", near"
+}
 file = data("contacts")
 if (is_there(file)) {
   set output picture("contacts")

@@ -183,6 +183,20 @@ std::string growth_table(const std::vector<const Row*>& rows) {
                             {"field error %", "field_error_percent", "%.2f"}});
 }
 
+std::string graded_table(const std::vector<const Row*>& rows) {
+  return parts_table(rows, {{"nodes", "nodes", "%.0f"},
+                            {"near", "active_nodes", "%.0f"},
+                            {"CPU us/tick", "median_us", "%.0f"},
+                            {"contacts us", "init_us", "%.1f"},
+                            {"queue us", "queue_us", "%.1f"},
+                            {"near us", "near_us", "%.0f"},
+                            {"far us", "far_us", "%.0f"},
+                            {"far sweeps", "far_sweeps", "%.0f"},
+                            {"far ns/node", "far_ns_per_node", "%.0f"},
+                            {"rest us", "rest_us", "%.0f"},
+                            {"state bytes", "state_bytes", "%.0f"}});
+}
+
 std::string queue_table(const std::vector<const Row*>& rows) {
   return parts_table(rows, {{"swept fully", "active_nodes", "%.0f"},
                             {"init us", "init_us", "%.1f"},
@@ -309,6 +323,7 @@ std::string ResultTable::markdown(const Machine& machine) const {
       {"peers", "The same box, load and material, solved by others and by us"},
       {"targets", "Targets"},
       {"nodes", "Growth with the organ's nodes"},
+      {"graded", "Growth of a graded tick with the organ's nodes: one contact, the same queue"},
       {"contacts", "Growth with contacts, in a liver"},
       {"queue",
        "A tick's parts against propagation depth, lattice of 30 x 15 x 30 (Choi 2002, "
@@ -322,6 +337,7 @@ std::string ResultTable::markdown(const Machine& machine) const {
     out += group == std::string_view("peers")     ? peers_table(rows)
            : group == std::string_view("targets") ? targets_table(rows, rows_)
            : group == std::string_view("queue")   ? queue_table(rows)
+           : group == std::string_view("graded")  ? graded_table(rows)
                                                   : growth_table(rows);
     std::set<std::string> notes;
     for (const Row* row : rows)
@@ -362,6 +378,8 @@ Status ResultTable::write(const std::filesystem::path& folder, const Machine& ma
       {folder / "bench.md", markdown(machine)},
       {plots / "peers.dat", blocks(select("peers"), {"nodes", "median_us", "dt_ms", "u_mm"})},
       {plots / "nodes.dat", blocks(select("nodes"), {"nodes", "tets", "median_us"})},
+      {plots / "graded.dat",
+       blocks(select("graded"), {"nodes", "near_us", "far_us", "rest_us", "median_us"})},
       {plots / "contacts.dat",
        blocks(select("contacts"), {"contacts", "active_nodes", "median_us"})},
       {plots / "queue.dat", blocks(select("queue"), {"active_nodes", "init_us", "queue_us",

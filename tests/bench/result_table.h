@@ -17,7 +17,7 @@ namespace trocar::bench {
 
 // Times are CPU time of one thread per step, unless the name says otherwise.
 struct Row {
-  std::string group;   // peers, targets, queue, nodes, contacts
+  std::string group;   // peers, targets, queue, nodes, graded, contacts
   std::string object;  // what is simulated: mesh or experiment
   std::string solver;  // by what
   std::size_t nodes = 0, tets = 0, springs = 0;

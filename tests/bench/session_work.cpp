@@ -62,6 +62,27 @@ void judge(Row& row, const scene::Organ& organ, std::span<const BenchTool> tools
   row.more["field_error_percent"] = 100 * std::sqrt(difference / norm);
 }
 
+void describe(Row& row, const Parts& parts, std::size_t contacts) {
+  row.more["contacts"] = static_cast<double>(contacts);
+  row.more["init_us"] = 1e6 * median(parts.init);
+  row.more["queue_us"] = 1e6 * median(parts.queue);
+  row.more["solve_us"] = 1e6 * median(parts.solve);
+  row.more["rest_us"] = 1e6 * median(parts.rest);
+  row.more["active_nodes"] = median(parts.active);
+  row.more["queue_nodes"] = median(parts.queued);
+  row.more["contact_nodes"] = median(parts.contacts);
+  if (parts.faults != 0) row.more["fault_bits"] = parts.faults;
+}
+
+double median_frozen_solve(const scene::Organ& organ, std::span<const BenchTool> tools,
+                           SessionOptions options, std::uint64_t steps) {
+  options.boundary = Boundary::Frozen;
+  OurSession frozen(organ, tools, options);
+  std::vector<double> solve;
+  for (std::uint64_t i = 0; i < steps; ++i) solve.push_back(frozen.tick().solve);
+  return median(std::move(solve));
+}
+
 }  // namespace
 
 std::vector<BenchTool> spread_tools(const scene::Organ& organ, std::size_t count,
@@ -125,18 +146,27 @@ Work run_session(scene::Organ organ, std::vector<BenchTool> tools,
             return took;
           },
           [=, organ = std::move(organ)](Row& row) {
-            row.more["contacts"] = static_cast<double>(tools.size());
-            row.more["init_us"] = 1e6 * median(parts->init);
-            row.more["queue_us"] = 1e6 * median(parts->queue);
-            row.more["solve_us"] = 1e6 * median(parts->solve);
-            row.more["rest_us"] = 1e6 * median(parts->rest);
-            row.more["active_nodes"] = median(parts->active);
-            row.more["queue_nodes"] = median(parts->queued);
-            row.more["contact_nodes"] = median(parts->contacts);
-            if (parts->faults != 0) row.more["fault_bits"] = parts->faults;
+            describe(row, *parts, tools.size());
+            row.more["state_bytes"] = static_cast<double>(session->state_bytes());
+            row.more["far_sweeps"] = session->far_sweeps();
             row.state_hash = hex(session->state_hash());
             if (session_case.is_judged) judge(row, organ, tools, options, *session);
           }};
+}
+
+Work run_graded_session(scene::Organ organ, std::vector<BenchTool> tools, SessionOptions options) {
+  options.boundary = Boundary::Graded;
+  Work work = run_session(organ, tools, {options, true});
+  work.finish = [=, finish = std::move(work.finish), organ = std::move(organ)](Row& row) {
+    finish(row);
+    const double near_us = 1e6 * median_frozen_solve(organ, tools, options, row.steps);
+    const double far_us = row.more["solve_us"] - near_us;
+    row.more["near_us"] = near_us;
+    row.more["far_us"] = far_us;
+    row.more["far_ns_per_node"] =
+        1e3 * far_us / (static_cast<double>(row.nodes) - row.more["active_nodes"]);
+  };
+  return work;
 }
 
 }  // namespace trocar::bench

@@ -21,6 +21,9 @@ struct SessionCase {
   bool is_judged = false;
 };
 Work run_session(scene::Organ organ, std::vector<BenchTool> tools, const SessionCase& session_case);
+// Whole graded ticks, with the solve told apart into near and far: near is what the same ticks cost
+// with everything outside the queue frozen, far is the rest. Needs as many steps again at the end.
+Work run_graded_session(scene::Organ organ, std::vector<BenchTool> tools, SessionOptions options);
 Row row_of(const scene::Organ& organ, std::string group, std::string object, std::string solver);
 
 }  // namespace trocar::bench

@@ -1,76 +1,21 @@
 // trocar-sim as a process: exit codes, and what an interrupt leaves behind.
 
-#include <fcntl.h>
 #include <gtest/gtest.h>
-#include <signal.h>
-#include <spawn.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
-#include <filesystem>
-#include <fstream>
-#include <sstream>
 #include <thread>
 
-extern char** environ;
+#include "tests/support/program_fixture.h"
 
 namespace trocar {
 namespace {
 
 namespace fs = std::filesystem;
 
-class SimProgram : public ::testing::Test {
+class SimProgram : public testing::ProgramFixture {
  protected:
-  SimProgram() { fs::create_directories(folder_); }
-  ~SimProgram() override {
-    if (pid_ > 0 && waitpid(pid_, nullptr, WNOHANG) == 0) {
-      kill(pid_, SIGKILL);
-      waitpid(pid_, nullptr, 0);
-    }
-    fs::remove_all(folder_);
-  }
-
-  void start(std::vector<std::string> arguments) {
-    arguments.insert(arguments.begin(), std::string(TROCAR_BINARY_DIR) + "/trocar-sim");
-    std::vector<char*> argv;
-    for (auto& argument : arguments) argv.push_back(argument.data());
-    argv.push_back(nullptr);
-    posix_spawn_file_actions_t actions;
-    posix_spawn_file_actions_init(&actions);
-    posix_spawn_file_actions_addopen(&actions, 1, (folder_ / "log").c_str(),
-                                     O_WRONLY | O_CREAT | O_TRUNC, 0644);
-    posix_spawn_file_actions_adddup2(&actions, 1, 2);
-    ASSERT_EQ(posix_spawn(&pid_, argv[0], &actions, nullptr, argv.data(), environ), 0);
-    posix_spawn_file_actions_destroy(&actions);
-  }
-  int wait() {
-    int status = 0;
-    waitpid(pid_, &status, 0);
-    pid_ = -1;
-    return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-  }
-  int run(std::vector<std::string> arguments) {
-    start(std::move(arguments));
-    return wait();
-  }
-  static std::string read(const fs::path& path) {
-    std::ifstream in(path, std::ios::binary);
-    std::ostringstream out;
-    out << in.rdbuf();
-    return out.str();
-  }
-  std::string log() const { return read(folder_ / "log"); }
-  std::string write(const char* name, const std::string& text) const {
-    std::ofstream(folder_ / name) << text;
-    return (folder_ / name).string();
-  }
-
-  const fs::path folder_ =
-      fs::temp_directory_path() / ("trocar-sim-" + std::to_string(getpid()) + "-" +
-                                   ::testing::UnitTest::GetInstance()->current_test_info()->name());
-  pid_t pid_ = -1;
+  SimProgram() : ProgramFixture("trocar-sim") {}
 };
 
 TEST_F(SimProgram, TheExampleRunsAndWritesTheSameBytesTwice) {

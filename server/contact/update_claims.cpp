@@ -1,0 +1,20 @@
+#include "server/contact/update_claims.h"
+
+namespace trocar::contact {
+
+void update_claims(const world::World& world, const input::ToolTable& tools,
+                   const ContactList& contacts, std::vector<locks::ClaimRequest>& requests,
+                   locks::ClaimTable& claims, GraspTable& grasps,
+                   std::vector<locks::ClaimEvent>& events) {
+  requests.clear();
+  for (std::uint8_t i = 0; i < kMaxTools; ++i) {
+    const auto& tool = tools[ToolSlot{i}];
+    if (!tool.has_sample) continue;
+    requests.push_back(
+        {ToolSlot{i}, tool.verb, tool.last_sample_tick, contacts.reach_of(ToolSlot{i})});
+  }
+  claims.update(world.tick, requests, events);
+  grasps.follow_claims(world, tools, claims, requests);
+}
+
+}  // namespace trocar::contact

@@ -1,0 +1,19 @@
+#pragma once
+
+// The end of a tick's mechanics, in sessions and scenarios alike: each tool asks for what its verb
+// needs, the claims are decided, and grasps follow what was granted. Valid from the next tick.
+
+#include <vector>
+
+#include "server/contact/contact_list.h"
+
+namespace trocar::contact {
+
+// Tools that have not shown themselves ask for nothing. `requests` is scratch: its cores point into
+// `contacts`. What a person should hear of is appended to `events`.
+void update_claims(const world::World& world, const input::ToolTable& tools,
+                   const ContactList& contacts, std::vector<locks::ClaimRequest>& requests,
+                   locks::ClaimTable& claims, GraspTable& grasps,
+                   std::vector<locks::ClaimEvent>& events);
+
+}  // namespace trocar::contact
