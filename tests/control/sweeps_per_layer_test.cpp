@@ -14,7 +14,7 @@ namespace {
 // A tool that presses into the top of a liver and leaves it again after `release`.
 class Press {
  public:
-  explicit Press(scene::ElasticLaw law, unsigned workers = 1, Tick release = 1000)
+  explicit Press(scene::ElasticLaw law, unsigned workers = 1, Tick release = 700)
       : simulation_(organ_of(law), workers), release_(release) {
     const auto& world = simulation_.state().world;
     for (const auto node : world.surface_nodes)
@@ -110,14 +110,14 @@ TEST(SweepsPerLayer, DoNotDependOnTheNumberOfWorkers) {
 TEST(SweepsPerLayer, AreStable) {
   for (const auto law : {scene::ElasticLaw::Springs, scene::ElasticLaw::NeoHookean}) {
     double usual = 0;
-    for (const auto& decisions : {with_layers(4, 4, 4, 4), with_layers(4, 1, 1, 1),
-                                  with_layers(3, 2, 1, 1), with_layers(2, 1, 1, 1)}) {
+    for (const auto& decisions :
+         {with_layers(4, 4, 4, 4), with_layers(4, 1, 1, 1), with_layers(2, 1, 1, 1)}) {
       Press press(law);
       double most = 0;
-      for (int i = 0; i < 3000; ++i) {
+      for (int i = 0; i < 2000; ++i) {
         const auto& report = press.tick(decisions);
         ASSERT_EQ(report.nodes_rejected, 0u);
-        if (i < 1000) most = std::max(most, press.kinetic_energy_j());
+        if (i < 700) most = std::max(most, press.kinetic_energy_j());
       }
       const double left = press.kinetic_energy_j();
       EXPECT_LT(left, 0.05 * most) << decisions.sweeps << ' ' << decisions.layer_sweeps[0];
