@@ -17,6 +17,8 @@ Examples:
       the built-in liver at 127.0.0.1:7690, for programs on this machine
   trocar-server --organ lattice --listen 0.0.0.0:7690
       a block of springs, for everybody on the network (there is no access control yet)
+  trocar-server --organ liver.organ --sweeps 6 --budget 0.6
+      up to six passes, as long as a tick takes no more than 0.6 ms
   trocar-server --seconds 20 --summary out/summary.json --journal out/session.mcap
       20 simulated seconds, then the replicas are compared, and the figures written
 
@@ -78,6 +80,13 @@ Result<std::optional<ServerOptions>> parse_command_line(int argc, char** argv) {
   app.add_flag("--frozen", is_frozen,
                "tissue beyond the limits stands still, as in the papers, instead of moving with "
                "fewer sweeps");
+  app.add_flag("--fixed-decisions", options.has_fixed_decisions,
+               "always do as --nodes and --sweeps say; otherwise they are the most, and less is "
+               "done when a tick would take longer than --budget");
+  app.add_option("--budget", options.budget_ms, "of each millisecond, how much the tick may take")
+      ->type_name("MS")
+      ->check(CLI::Range(0.05, 1.0))
+      ->capture_default_str();
   auto* depth = app.add_option("--depth", options.decisions.depth_limit,
                                "layers around each contact that get all sweeps [3, frozen: 6]");
   app.add_option("--nodes", options.decisions.node_limit, "nodes that all forces together reach")

@@ -14,11 +14,13 @@ struct ServerOptions {
   std::string organ = "liver";
   std::string address = "127.0.0.1";
   std::uint16_t port = 7690;
-  std::string journal;       // a file, or "none"
-  double seconds = 0;        // simulated; 0: until told to end
-  std::string summary_file;  // empty: none
-  std::string ready_file;    // empty: none
-  step::TickDecisions decisions;
+  std::string journal;            // a file, or "none"
+  double seconds = 0;             // simulated; 0: until told to end
+  std::string summary_file;       // empty: none
+  std::string ready_file;         // empty: none
+  step::TickDecisions decisions;  // fixed, or the most that the rate controller decides
+  bool has_fixed_decisions = false;
+  double budget_ms = 0.8;  // of a tick's millisecond for its work
   unsigned workers = 1;
   std::string log_level = "info";
 };

@@ -2,6 +2,8 @@
 
 #include "common/base/asio.h"  // before Boost: see there
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/post.hpp>
@@ -29,6 +31,10 @@ using std::chrono::milliseconds;
 constexpr milliseconds kBarrierDeadline{2000};
 constexpr milliseconds kGoodbyeDeadline{2500};  // a little more than the flush deadline
 constexpr milliseconds kPollPeriod{5};
+// Slower than this is said in the log, once in a while.
+constexpr float kSlowTimeRate = 0.98f;
+constexpr float kLongTickMs = 0.9f;
+constexpr Tick kWarningPeriod = 10 * kTicksPerSecond;
 
 Tick ticks_of(double seconds) {
   return static_cast<Tick>(std::llround(seconds * static_cast<double>(kTicksPerSecond)));
@@ -45,7 +51,9 @@ class Server {
   Status run();
 
  private:
+  LoopOptions loop_options() const;
   void take_frames();
+  void warn_if_slow();
   void on_signal(int signal);
   void begin_end();
   // Calls `then` when `is_done` holds, at the latest after `deadline`.
@@ -66,6 +74,7 @@ class Server {
   std::vector<step::SharedFrame> frames_;
   std::vector<replication::BarrierResult> barrier_;
   bool is_ending_ = false;
+  Tick next_warning_ = 0;
   double wall_seconds_ = 0;
   std::unique_ptr<SimulationLoop> loop_;  // last: its thread uses what stands above
 };
@@ -92,11 +101,22 @@ Status Server::open() {
     };
   replicator_ = std::make_unique<replication::Replicator>(
       *tcp_, inbox_, layout, organ.name, scene::organ_hash(organ), std::move(replication));
-  loop_ =
-      std::make_unique<SimulationLoop>(simulation_, inbox_, handover_, journal_.get(),
-                                       LoopOptions{options_.decisions, ticks_of(options_.seconds)},
-                                       [this] { asio::post(io_, [this] { begin_end(); }); });
+  loop_ = std::make_unique<SimulationLoop>(simulation_, inbox_, handover_, journal_.get(),
+                                           loop_options(),
+                                           [this] { asio::post(io_, [this] { begin_end(); }); });
   return {};
+}
+
+LoopOptions Server::loop_options() const {
+  const auto& decisions = options_.decisions;
+  LoopOptions loop{.decisions = decisions, .tick_count = ticks_of(options_.seconds)};
+  if (options_.has_fixed_decisions) return loop;
+  control::RateLimits rate{.highest = decisions, .budget_us = options_.budget_ms * 1e3};
+  // Nodes of the queue are not swept less than those outside it.
+  if (decisions.boundary == world::Boundary::Graded)
+    rate.layer_sweeps = simulation_.context().far_plan.with_sweeps(decisions.far_sweeps).sweeps;
+  loop.rate = rate;
+  return loop;
 }
 
 Status Server::run() {
@@ -132,6 +152,21 @@ void Server::take_frames() {
   if (is_ending_) return;
   handover_.take_all(frames_);
   replicator_->publish(frames_);
+  warn_if_slow();
+}
+
+void Server::warn_if_slow() {
+  if (frames_.empty()) return;
+  const auto& frame = *frames_.back();
+  const auto& rate = frame.statistics.rate;
+  if (rate.time_rate > kSlowTimeRate || frame.tick < next_warning_) return;
+  next_warning_ = frame.tick + kWarningPeriod;
+  const auto tick_ms = frame.statistics.tick_median_us * 1e-3f;
+  log::warn(
+      "simulated time runs at {:.0f} % of real time: {}", 100 * rate.time_rate,
+      tick_ms > kLongTickMs
+          ? fmt::format("a tick takes {:.2f} ms (a smaller organ or --workers helps)", tick_ms)
+          : std::string("ticks are held up, perhaps by other programs"));
 }
 
 void Server::begin_end() {

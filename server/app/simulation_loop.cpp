@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <ctime>
 
-#include "common/base/timing.h"
-
 namespace trocar::app {
 namespace {
 
@@ -52,6 +50,22 @@ step::StageStatistics StageTimes::statistics() const {
   return result;
 }
 
+void RateReport::add(const step::TickDecisions& decisions, bool has_contact,
+                     step::RateLevel level) {
+  ++ticks_at[static_cast<std::size_t>(level)];
+  const auto sweeps_now = step::sweeps_of_layers(decisions);
+  if (least_node_limit == 0) {
+    least_sweeps = sweeps_now;
+    least_node_limit = decisions.node_limit;
+  }
+  least_node_limit = std::min(least_node_limit, decisions.node_limit);
+  for (std::size_t layer = 0; layer < step::kSweepLayers; ++layer) {
+    least_sweeps[layer] = std::min(least_sweeps[layer], sweeps_now[layer]);
+    if (has_contact) sweeps[layer] += sweeps_now[layer];
+  }
+  contact_ticks += has_contact;
+}
+
 SimulationLoop::SimulationLoop(step::Simulation& simulation, session::SimulationInbox& inbox,
                                FrameHandover& handover, JournalSink* journal, LoopOptions options,
                                std::function<void()> ended)
@@ -62,6 +76,7 @@ SimulationLoop::SimulationLoop(step::Simulation& simulation, session::Simulation
       options_(options),
       ended_(std::move(ended)) {
   records_.reserve(kTicksPerFrame);
+  if (options_.rate) controller_.emplace(*options_.rate);
   take_snapshot();
 }
 
@@ -81,7 +96,9 @@ void SimulationLoop::run() {
   bool is_last = false;
   while (!is_last) {
     sleep_until(pacer.due_ns());
-    pacer.begin_tick(monotonic_ns());
+    const auto now = monotonic_ns();
+    lateness_ns_ = now - pacer.due_ns();
+    pacer.begin_tick(now);
     slow_ticks_ = pacer.slow_ticks();
     is_last = run_tick();
   }
@@ -90,8 +107,14 @@ void SimulationLoop::run() {
 
 bool SimulationLoop::run_tick() {
   inbox_.drain(inputs_);
-  const auto& report = simulation_.tick(inputs_, options_.decisions);
-  records_.push_back({report.tick, options_.decisions, inputs_, report.state_hash});
+  const auto decisions = controller_ ? controller_->decisions() : options_.decisions;
+  const auto begin = options_.clock_ns();
+  const auto& report = simulation_.tick(inputs_, decisions);
+  if (controller_) controller_->observe(report, {options_.clock_ns() - begin, lateness_ns_});
+  const auto level = controller_ ? controller_->figures().level : step::RateLevel::Fixed;
+  report_.rate.add(decisions, report.contact_nodes > 0, level);
+  report_.rate.late_ticks += lateness_ns_ > kTickNanoseconds;
+  records_.push_back({report.tick, decisions, inputs_, report.state_hash});
   second_.add(report);
   report_.times.add(report);
   report_.ticks = report.tick;
@@ -102,6 +125,9 @@ bool SimulationLoop::run_tick() {
   if (report.tick % kTicksPerSecond == 0) {
     statistics_ = second_.statistics();
     second_.clear();
+    const auto ticks = static_cast<float>(kTicksPerSecond);
+    time_rate_ = ticks / (ticks + static_cast<float>(slow_ticks_ - slow_ticks_before_));
+    slow_ticks_before_ = slow_ticks_;
   }
   if (report.tick % kSnapshotPeriod == kSnapshotPhase && report.tick > kSnapshotPeriod)
     take_snapshot();
@@ -120,6 +146,8 @@ void SimulationLoop::finish_frame(std::shared_ptr<step::PublishedFrame> frame) {
   frame->snapshot_tick = snapshot_tick_;
   frame->statistics = statistics_;
   frame->statistics.slow_ticks = slow_ticks_;
+  if (controller_) frame->statistics.rate = controller_->figures();
+  frame->statistics.rate.time_rate = time_rate_;
   report_.slow_ticks = slow_ticks_;
   report_.last_frame = frame;
   if (journal_) journal_->take_frame(report_.last_frame);

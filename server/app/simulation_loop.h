@@ -2,8 +2,9 @@
 
 // The simulation thread: 1 kHz by absolute time, inputs in, frames out.
 //
-//   inbox.drain -> Simulation::tick -> record; every 16th tick: complete the frame (records, hash,
-//   statistics, snapshot), journal.take_frame, handover.push
+//   inbox.drain -> Simulation::tick -> record -> RateController::observe, which decides the next
+//   tick; every 16th tick: complete the frame (records, hash, statistics, snapshot),
+//   journal.take_frame, handover.push
 //
 // It never waits for the I/O thread or the journal. It ends after a published frame, so the last
 // frame shows the last tick.
@@ -11,12 +12,15 @@
 #include <atomic>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <thread>
 #include <vector>
 
+#include "common/base/timing.h"
 #include "server/app/frame_handover.h"
 #include "server/app/journal_sink.h"
 #include "server/app/pacer.h"
+#include "server/control/rate_controller.h"
 #include "server/replication/duration_histogram.h"
 #include "server/session/inbox.h"
 #include "server/step/simulation.h"
@@ -33,19 +37,34 @@ struct StageTimes {
   step::StageStatistics statistics() const;  // slow_ticks stays 0
 };
 
+// What the rate controller decided, over the whole run.
+struct RateReport {
+  std::array<Tick, 4> ticks_at{};                          // by step::RateLevel
+  std::array<std::uint64_t, step::kSweepLayers> sweeps{};  // sums over ticks in contact, by layer
+  Tick contact_ticks = 0;
+  step::LayerCounts least_sweeps{};
+  std::uint32_t least_node_limit = 0;
+  std::uint64_t late_ticks = 0;  // began more than a tick after they were due
+
+  void add(const step::TickDecisions& decisions, bool has_contact, step::RateLevel level);
+};
+
 struct LoopReport {
   Tick ticks = 0;
   std::uint64_t slow_ticks = 0;
   std::uint64_t inputs_dropped = 0, nodes_rejected = 0;
   std::uint32_t faults = 0;  // TickFault bits of all ticks
   std::uint32_t max_active_nodes = 0;
+  RateReport rate;
   step::SharedFrame last_frame;
   StageTimes times;  // of the whole run
 };
 
 struct LoopOptions {
-  step::TickDecisions decisions;
+  step::TickDecisions decisions;  // without a rate controller
+  std::optional<control::RateLimits> rate;
   Tick tick_count = 0;  // end at the first frame at or after this; 0: when told to
+  std::function<std::uint64_t()> clock_ns = monotonic_ns;  // of what ticks take; tests have others
 };
 
 class SimulationLoop {
@@ -79,6 +98,10 @@ class SimulationLoop {
   std::atomic<bool> is_stop_requested_{false};
 
   // Simulation thread.
+  std::optional<control::RateController> controller_;
+  std::uint64_t lateness_ns_ = 0;        // of the tick about to run
+  std::uint64_t slow_ticks_before_ = 0;  // until the last full second
+  float time_rate_ = 1;                  // in it
   session::TickInputs inputs_;
   std::vector<step::TickRecord> records_;  // since the last frame
   std::shared_ptr<const Bytes> snapshot_;  // waits for the next frame

@@ -1,7 +1,10 @@
 #include "server/app/summary.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
+#include <array>
 #include <cstdio>
 #include <filesystem>
 
@@ -67,6 +70,27 @@ std::string replication_figures(const Summary& s) {
       times(e.delta_cpu), times(e.keyframe_cpu));
 }
 
+std::string rate_figures(const Summary& s) {
+  const auto& rate = s.loop.rate;
+  const auto& last = s.loop.last_frame->statistics.rate;
+  const auto list = [](const auto& values) { return fmt::format("[{}]", fmt::join(values, ", ")); };
+  std::array<double, step::kSweepLayers> mean_sweeps{};
+  for (std::size_t i = 0; i < mean_sweeps.size(); ++i)
+    mean_sweeps[i] = static_cast<double>(rate.sweeps[i]) /
+                     static_cast<double>(std::max<Tick>(1, rate.contact_ticks));
+  std::string ticks;
+  for (std::size_t i = 0; i < rate.ticks_at.size(); ++i)
+    ticks += fmt::format("{}\"{}\": {}", i == 0 ? "" : ", ",
+                         step::name_of(static_cast<step::RateLevel>(i)), rate.ticks_at[i]);
+  return fmt::format(
+      R"({{
+    "ticks": {{{}}}, "late_ticks": {}, "lowered": {}, "raised": {}, "budget_us": {:.1f},
+    "contact_ticks": {}, "mean_sweeps_in_contact": {}, "least_sweeps": {}, "least_node_limit": {}
+  }})",
+      ticks, rate.late_ticks, last.lowered, last.raised, last.budget_us, rate.contact_ticks,
+      list(mean_sweeps), list(rate.least_sweeps), rate.least_node_limit);
+}
+
 }  // namespace
 
 std::string to_json(const Summary& s) {
@@ -83,6 +107,7 @@ std::string to_json(const Summary& s) {
   "participants": [{}
   ],
   "max_active_nodes": {}, "faults": {}, "inputs_dropped": {}, "nodes_rejected": {},
+  "rate": {},
   "tick_cpu_us": {},
   "stage_cpu_us": {{{}
   }},
@@ -96,7 +121,7 @@ std::string to_json(const Summary& s) {
       static_cast<double>(s.loop.ticks) / static_cast<double>(kTicksPerSecond), s.wall_seconds,
       s.loop.slow_ticks, last.tick, last.frame, last.state_hash, last.surface_crc, all_equal,
       participants(s.barrier), s.loop.max_active_nodes, s.loop.faults, s.loop.inputs_dropped,
-      s.loop.nodes_rejected, times(s.loop.times.tick), stages(s.loop.times),
+      s.loop.nodes_rejected, rate_figures(s), times(s.loop.times.tick), stages(s.loop.times),
       replication_figures(s));
 }
 

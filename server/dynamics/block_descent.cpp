@@ -49,7 +49,7 @@ BlockDescent::BlockDescent(const scene::Organ& organ, const world::World& world,
   first_link_.resize(slot_count);
   links_.reserve(8 * contact::kMaxPointsPerTool);
   residuals_.reserve(world.node_count());
-  for (auto* plan : {&near_, &far_, &begun_}) {
+  for (auto* plan : {&near_, &far_, &begun_, &bands_[0], &bands_[1], &bands_[2], &bands_[3]}) {
     plan->lanes.resize(group_count);
     plan->groups.reserve(group_count);
     plan->colour_begins.resize(groups.colour_count() + 1);
@@ -130,6 +130,22 @@ void BlockDescent::plan_step(std::span<const NodeIndex> near, bool has_far,
   for (const auto g : near_.groups) begin(g);
   for (const auto g : far_.groups) begin(g);
   for (const auto node : held) begin(tissue_.groups().slot_of(node) / kLanes);
+}
+
+void BlockDescent::plan_bands(std::span<const NodeIndex> near, std::span<const SweepBand> bands) {
+  TROCAR_ASSERT(bands.size() <= kMaxSweepBands);
+  for (std::size_t b = 0; b + 1 < bands.size(); ++b) {
+    clear(bands_[b]);
+    for (const auto node : near.first(bands[b].end)) mark(bands_[b], node);
+    finish(bands_[b]);
+  }
+}
+
+const BlockDescent::Plan& BlockDescent::plan_of(std::uint32_t left,
+                                                std::span<const SweepBand> bands) const {
+  for (std::size_t b = 0; b + 1 < bands.size(); ++b)
+    if (bands[b + 1].sweeps < left) return bands_[b];
+  return near_;
 }
 
 void BlockDescent::link_contacts(const contact::ContactList& contacts) {
@@ -337,6 +353,16 @@ double BlockDescent::sum_of_squares(const Plan& plan) const {
   return total;
 }
 
+double BlockDescent::sum_of_squares_within(const Plan& core) const {
+  double total = 0;
+  for (const auto g : core.groups) {
+    Lanes squares;
+    store(squares, where(mask_of(core.lanes[g]), load(squares_[g])));
+    total += static_cast<double>(sum(squares));
+  }
+  return total;
+}
+
 void BlockDescent::write_back(const Plan& plan, float inverse_dt, world::World& world) {
   for_each_group(plan.groups, [&](Group g) {
     const auto nodes = tissue_.groups().nodes_of(g);
@@ -380,7 +406,8 @@ SolveReport BlockDescent::solve(const contact::ContactList& contacts,
   TROCAR_ASSERT(loads.held.size() == loads.held_displacements.size());
   TROCAR_ASSERT(loads.forces.empty() || loads.forces.size() == world.node_count());
   // A tolerance ends the sweeps early, before the far ones.
-  TROCAR_ASSERT(settings.far_sweeps == 0 || settings.residual_tolerance_n == 0);
+  TROCAR_ASSERT((settings.far_sweeps == 0 && settings.bands.empty()) ||
+                settings.residual_tolerance_n == 0);
   if (++current_ == 0) {
     for (auto* stamps : {&slot_stamp_, &group_stamp_, &begun_stamp_, &serial_stamp_})
       std::ranges::fill(*stamps, 0u);
@@ -388,6 +415,7 @@ SolveReport BlockDescent::solve(const contact::ContactList& contacts,
   }
   const float inverse_dt = 1.0f / settings.dt;
   plan_step(near, settings.far_sweeps > 0, loads.held);
+  plan_bands(near, settings.bands);
   link_contacts(contacts);
   begin_groups(world, settings, loads);
 
@@ -403,10 +431,18 @@ SolveReport BlockDescent::solve(const contact::ContactList& contacts,
       sweep(far_, contacts, settings.far_over_relaxation);
       report.node_sweeps += far_.node_count;
     }
-    sweep(near_, contacts, omega);
-    report.node_sweeps += near_.node_count;
+    const auto left = settings.sweeps - i;
+    const bool has_few = std::ranges::any_of(settings.bands, [left](const SweepBand& band) {
+      return band.sweeps >= left && band.sweeps < 3;
+    });
+    const Plan& plan = plan_of(left, settings.bands);
+    sweep(plan, contacts, has_few ? std::min(omega, kMaxOverRelaxationFewSweeps) : omega);
+    report.node_sweeps += plan.node_count;
     ++report.sweeps;
-    squares = sum_of_squares(near_);
+    // Growth is judged by the nodes that every sweep has.
+    squares = settings.bands.empty()
+                  ? sum_of_squares(near_)
+                  : sum_of_squares_within(plan_of(settings.sweeps, settings.bands));
     if (settings.has_safeguard && squares > last_squares && omega > 1.0f) {
       omega = 1.0f;
       report.is_stepped_down = true;
@@ -415,6 +451,7 @@ SolveReport BlockDescent::solve(const contact::ContactList& contacts,
     if (tolerance > 0 && squares <= tolerance * tolerance * static_cast<double>(near.size())) break;
   }
 
+  if (!settings.bands.empty()) squares = sum_of_squares(near_);
   write_back(near_, inverse_dt, world);
   write_back(far_, inverse_dt, world);
   float squared_move = 0;
@@ -507,6 +544,7 @@ FollowReport BlockDescent::follow_topology(const Topology& topology, const world
   group_squares_.resize(group_count);
   for (auto* lanes : {&free_, &rejected_, &near_.lanes, &far_.lanes, &begun_.lanes})
     lanes->resize(group_count);
+  for (auto& band : bands_) band.lanes.resize(group_count);
   for (auto* stamps : {&begun_stamp_, &group_stamp_, &serial_stamp_}) stamps->resize(group_count);
   for (auto* values : {&x_, &start_}) values->resize(slot_count);
   slot_stamp_.resize(slot_count);

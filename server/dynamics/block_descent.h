@@ -8,7 +8,8 @@
 //
 // Two classes of nodes (graded-exterior scheme): the near ones get `sweeps`; with far_sweeps > 0
 // all other free nodes get that many, with an over-relaxation of their own, before the last near
-// sweep; there is no residual tolerance then. With far_sweeps = 0 the others stand still.
+// sweep; there is no residual tolerance then. With far_sweeps = 0 the others stand still. Near
+// nodes may come in bands with fewer sweeps each (SweepBand): these take part in the last ones.
 //
 // Results do not depend on the number of workers. Work: sweeps x groups with a swept node x rows;
 // no allocation after the first steps. One caller at a time.
@@ -25,6 +26,13 @@
 
 namespace trocar::dynamics {
 
+// A run of near nodes, up to `end`, with the sweeps it gets.
+struct SweepBand {
+  std::size_t end = 0;
+  std::uint32_t sweeps = 1;
+};
+inline constexpr std::size_t kMaxSweepBands = 4;
+
 struct SolveSettings {
   std::uint32_t sweeps = 4;
   float over_relaxation = 1.5f;  // below three sweeps at most 1.3 is used: more overshoots
@@ -35,6 +43,9 @@ struct SolveSettings {
   float far_over_relaxation = 1.3f;
   // False: the caller watches the residual over many sweeps. Near an optimum it grows at first.
   bool has_safeguard = true;
+  // At most kMaxSweepBands, ends ascending up to the last near node, sweeps from `sweeps` down to 1
+  // and not ascending; empty: all near nodes get `sweeps`. No tolerance then.
+  std::span<const SweepBand> bands;
 };
 
 // A node that is held along some of the world's axes and free along the others.
@@ -132,6 +143,9 @@ class BlockDescent {
   void mark(Plan& plan, NodeIndex node) const;
   void finish(Plan& plan) const;
   void plan_step(std::span<const NodeIndex> near, bool has_far, std::span<const NodeIndex> held);
+  void plan_bands(std::span<const NodeIndex> near, std::span<const SweepBand> bands);
+  // What takes part when `left` sweeps are left, this one included.
+  const Plan& plan_of(std::uint32_t left, std::span<const SweepBand> bands) const;
   void link_contacts(const contact::ContactList& contacts);
   void begin_groups(const world::World& world, const SolveSettings& settings,
                     const ExternalLoads& loads);
@@ -147,6 +161,7 @@ class BlockDescent {
   void relax(Group group, std::uint8_t lanes, const contact::ContactList& contacts, float omega,
              Scratch& scratch);
   double sum_of_squares(const Plan& plan) const;
+  double sum_of_squares_within(const Plan& core) const;
   void write_back(const Plan& plan, float inverse_dt, world::World& world);
   std::uint32_t restore_rejected(world::World& world);
   Vec3f start_of(Slot slot) const;
@@ -170,6 +185,7 @@ class BlockDescent {
   std::vector<std::uint8_t> rejected_;  // per group: lanes with a step that was not finite
   std::vector<Group> all_groups_;
   Plan near_, far_, begun_;
+  std::array<Plan, kMaxSweepBands> bands_;  // [b]: near nodes of bands 0 to b; the last is near_
   std::vector<std::uint32_t> begun_stamp_;  // per group
   std::vector<float> residuals_;
   // Contact points of a node as a linked list in contact order; valid where the stamp is current.

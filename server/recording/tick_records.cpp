@@ -1,5 +1,6 @@
 #include "server/recording/tick_records.h"
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -37,6 +38,8 @@ void to_message(const step::TickRecord& record, const step::TickDecisions* previ
     decisions.set_over_relaxation(d.over_relaxation);
     decisions.set_boundary(static_cast<std::uint32_t>(d.boundary));
     decisions.set_far_sweeps(d.far_sweeps);
+    if (d.layer_sweeps != step::TickDecisions{}.layer_sweeps)
+      decisions.mutable_layer_sweeps()->Assign(d.layer_sweeps.begin(), d.layer_sweeps.end());
   }
   for (const auto slot : record.inputs.leaves) message.add_leave()->set_slot(slot.value);
   for (const auto& join : record.inputs.joins) {
@@ -76,6 +79,10 @@ Status from_message(const proto::TickRecord& message, step::TickRecord& record) 
                         .over_relaxation = d.over_relaxation(),
                         .boundary = static_cast<world::Boundary>(d.boundary()),
                         .far_sweeps = d.far_sweeps()};
+    auto& layers = record.decisions.layer_sweeps;
+    if (d.layer_sweeps_size() > static_cast<int>(layers.size()))
+      return bad(record.tick, "layer_sweeps: more than three layers");
+    std::ranges::copy(d.layer_sweeps(), layers.begin());
     if (auto valid = step::validate(record.decisions); !valid)
       return bad(record.tick, valid.error().message.c_str());
   }

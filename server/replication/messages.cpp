@@ -10,6 +10,7 @@ namespace trocar::replication {
 namespace {
 
 static_assert(static_cast<int>(locks::ClaimOutcome::Slipped) == proto::CLAIM_SLIPPED);
+static_assert(static_cast<int>(step::RateLevel::Overloaded) == proto::RATE_OVERLOADED);
 
 void write(const Vec3f& from, proto::Vec3& to) {
   to.set_x(from.x);
@@ -128,6 +129,16 @@ void describe(const step::PublishedFrame& frame, proto::FrameState& state) {
   for (const float median : frame.statistics.median_us) state.add_stage_cpu_us(median);
   state.set_slow_ticks(frame.statistics.slow_ticks);
   state.set_state_hash(frame.state_hash);
+  const auto& figures = frame.statistics.rate;
+  auto& rate = *state.mutable_rate();
+  rate.set_level(static_cast<proto::RateLevel>(figures.level));
+  for (const auto sweeps : frame.layer_sweeps) rate.add_layer_sweeps(sweeps);
+  rate.set_node_limit(frame.node_limit);
+  rate.set_budget_us(figures.budget_us);
+  rate.set_predicted_us(figures.predicted_us);
+  rate.set_lowered(figures.lowered);
+  rate.set_raised(figures.raised);
+  rate.set_time_rate(figures.time_rate);
 }
 
 wire::SharedBytes encode_frame_state(const step::PublishedFrame& frame) {

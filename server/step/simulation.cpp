@@ -43,6 +43,13 @@ Status validate(const TickDecisions& d) {
   if (d.node_limit < 1 || d.node_limit > kMaxNodeLimit)
     return out_of_range("node_limit", d.node_limit, "1 to 10000000 nodes");
   if (d.sweeps < 1 || d.sweeps > kMaxSweeps) return out_of_range("sweeps", d.sweeps, "1 to 64");
+  const auto sweeps = sweeps_of_layers(d);
+  for (std::size_t layer = 1; layer < kSweepLayers; ++layer)
+    if (sweeps[layer] > sweeps[layer - 1])
+      return Error{ErrorCode::Usage, "layer_sweeps: layer " + std::to_string(layer) + " has " +
+                                         std::to_string(sweeps[layer]) +
+                                         " sweeps, more than the layer before: give at most " +
+                                         std::to_string(sweeps[layer - 1])};
   if (d.boundary > world::Boundary::Graded)
     return out_of_range("boundary", static_cast<int>(d.boundary), "0 (frozen) to 1 (graded)");
   if (d.far_sweeps > kMaxFarSweeps)

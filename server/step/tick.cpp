@@ -1,5 +1,7 @@
 #include "server/step/tick.h"
 
+#include <algorithm>
+
 #include "common/base/timing.h"
 #include "server/contact/update_claims.h"
 
@@ -29,12 +31,33 @@ void fill_queue(State& state, StepContext& context) {
   context.seeds.fill({});
   for (const auto& tool : context.contacts.tools)
     context.seeds[tool.tool.value] = context.contacts.seeds_of(tool);
+  // However little else there is room for, every touched node is in the queue.
+  std::size_t touched = 0;
+  for (const auto& seeds : context.seeds) touched += seeds.size();
+  const auto node_limit =
+      std::max(context.decisions.node_limit, static_cast<std::uint32_t>(touched));
   context.queue.fill(context.scene.organ.mesh.node_neighbours, context.seeds,
-                     {context.decisions.depth_limit, context.decisions.node_limit});
+                     {context.decisions.depth_limit, node_limit});
   context.active.collect(context.queue, context.decisions.boundary, state.world);
   context.report.queue_nodes = static_cast<std::uint32_t>(context.queue.nodes().size());
   context.report.active_nodes = static_cast<std::uint32_t>(context.active.nodes().size());
   context.report.region_count = context.queue.region_count();
+
+  // Active nodes stand by layer, those that have left the queue last.
+  const auto nodes = context.active.nodes();
+  const auto layer_of = [&context](NodeIndex node) { return context.queue.layer_of(node); };
+  const auto sweeps = sweeps_of_layers(context.decisions);
+  std::size_t begin = 0;
+  for (std::size_t layer = 0; layer < kSweepLayers; ++layer) {
+    const bool is_last = layer + 1 == kSweepLayers;
+    const auto end =
+        is_last ? nodes.size()
+                : static_cast<std::size_t>(std::ranges::upper_bound(nodes, layer, {}, layer_of) -
+                                           nodes.begin());
+    context.sweep_bands[layer] = {end, sweeps[layer]};
+    context.report.layer_nodes[layer] = static_cast<std::uint32_t>(end - begin);
+    begin = end;
+  }
 }
 
 void solve(State& state, StepContext& context) {
@@ -45,6 +68,7 @@ void solve(State& state, StepContext& context) {
     settings.far_sweeps = plan.sweeps;
     settings.far_over_relaxation = plan.over_relaxation;
   }
+  if (context.sweep_bands.back().sweeps < decisions.sweeps) settings.bands = context.sweep_bands;
   const auto solved =
       context.solver.solve(context.contacts, context.active.nodes(), settings, state.world);
   context.solver.take_state(
@@ -110,6 +134,8 @@ void quantise_and_publish(State& state, StepContext& context) {
   frame->queue_nodes = context.report.queue_nodes;
   frame->region_count = context.report.region_count;
   frame->sweeps = context.report.sweeps;
+  frame->layer_sweeps = sweeps_of_layers(context.decisions);
+  frame->node_limit = context.decisions.node_limit;
   frame->far_sweeps = context.report.far_sweeps;
   frame->residual_n = context.report.residual_n;
   context.frame = std::move(frame);

@@ -19,6 +19,8 @@
 
 namespace trocar::step {
 
+static_assert(kSweepLayers <= dynamics::kMaxSweepBands);
+
 // Everything a later tick depends on. Each member names its arrays in visit_state; these bytes are
 // the snapshot and what the tick hash covers.
 struct State {
@@ -59,6 +61,7 @@ struct StepContext {
   contact::ContactList contacts;
   propagation::PropagationQueue queue;
   propagation::ActiveSet active;
+  std::array<dynamics::SweepBand, kSweepLayers> sweep_bands{};  // of active nodes, by layer
   dynamics::BlockDescent solver;
   dynamics::FarPlan far_plan;
   std::array<std::span<const NodeIndex>, kMaxTools> seeds;  // by tool, empty without contact

@@ -20,8 +20,17 @@ struct TickDecisions {
   world::Boundary boundary = world::Boundary::Graded;
   std::uint32_t far_sweeps = 0;  // Graded: of nodes outside the queue; 0: as the organ needs
 
+  // Of layer 1, of layer 2, and of layer 3 and deeper with nodes that have left the queue; never
+  // more than the layer before. 0: as the layer before. `sweeps` is of the touched nodes then.
+  std::array<std::uint32_t, 3> layer_sweeps{};
+
   bool operator==(const TickDecisions&) const = default;
 };
+// Layers that have sweeps of their own: touched nodes, layer 1, layer 2, all beyond.
+inline constexpr std::size_t kSweepLayers = 4;
+using LayerCounts = std::array<std::uint32_t, kSweepLayers>;
+LayerCounts sweeps_of_layers(const TickDecisions& decisions);
+
 inline constexpr std::uint32_t kMaxDepthLimit = 1000;
 inline constexpr std::uint32_t kMaxNodeLimit = 10'000'000;
 inline constexpr std::uint32_t kMaxSweeps = 64;
@@ -47,6 +56,7 @@ struct TickReport {
   std::uint32_t contact_nodes = 0;
   std::uint32_t queue_nodes = 0;   // nodes the propagation reached
   std::uint32_t active_nodes = 0;  // queue plus nodes that have not come to rest
+  LayerCounts layer_nodes{};       // active nodes that are not fixed, as in sweeps_of_layers()
   std::uint32_t region_count = 0;
   std::uint32_t inputs_dropped = 0;
   std::uint32_t nodes_rejected = 0;          // see kFaultNonFinite
@@ -58,11 +68,28 @@ struct TickReport {
   std::uint64_t state_hash = 0;
 };
 
+// What the rate controller has to say (server/control); for people, never an input of a tick.
+enum class RateLevel : std::uint8_t {
+  Fixed,       // decisions are fixed: there is no controller
+  Full,        // all that was asked for
+  Reduced,     // less, within its limits
+  Overloaded,  // the least, and still too much: simulated time slows
+};
+const char* name_of(RateLevel level);
+
+struct RateFigures {
+  RateLevel level = RateLevel::Fixed;
+  float budget_us = 0, predicted_us = 0;  // of a tick's time; what the next one will take
+  std::uint64_t lowered = 0, raised = 0;  // steps in the whole session
+  float time_rate = 1;                    // simulated time over real time, last second
+};
+
 struct StageStatistics {
   std::array<float, kStageCount> median_us{};
   std::array<float, kStageCount> p99_us{};
   float tick_median_us = 0, tick_p99_us = 0;
   std::uint64_t slow_ticks = 0;  // ticks by which simulated time fell behind real time
+  RateFigures rate;
 };
 
 }  // namespace trocar::step

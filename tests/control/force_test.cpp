@@ -1,0 +1,153 @@
+// Decisions go down to the least and up again, step by step as the controller takes them, while a
+// tool is held in real tissue and while it moves: its force does not step.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <utility>
+
+#include "common/scene/builtin_organs.h"
+#include "server/control/rate_controller.h"
+#include "server/step/simulation.h"
+
+namespace trocar::control {
+namespace {
+
+struct Case {
+  scene::ElasticLaw law = scene::ElasticLaw::Springs;
+  bool is_moving = false;
+  world::Boundary boundary = world::Boundary::Graded;
+};
+
+constexpr Tick kHeavyFrom = 1300, kHeavyTo = 1700;
+
+// The tick's cost as injected: free, then far too much, then free.
+std::uint64_t work_ns(Tick tick) {
+  return tick >= kHeavyFrom && tick < kHeavyTo ? 3'000'000 : 100'000;
+}
+
+// A simulation with one tool.
+struct Pressed {
+  explicit Pressed(const scene::Organ& organ) : simulation(organ) {}
+
+  void tick(const Vec3f& tip, const step::TickDecisions& decisions) {
+    session::TickInputs inputs;
+    if (simulation.current_tick() == 0) {
+      session::HandJoin join{.slot = {0}};
+      join.shapes[0] = {.radius_m = 0.03f, .length_m = 0.2f, .reach_m = 0.008f};
+      inputs.joins.push_back(join);
+    }
+    // Every tick: a tool that stands still between samples steps by itself.
+    inputs.samples.push_back(
+        {tool_slot({0}, 0), {{tip, rotation_from_z({0, 1, 0})}, scene::Verb::Push}});
+    simulation.tick(inputs, decisions);
+    const auto& contacts = simulation.context().contacts;
+    force_n = contacts.tools.empty()
+                  ? 0
+                  : static_cast<double>(length(simulation.context().solver.reaction(
+                        contacts, contacts.tools[0], simulation.state().world, kTickSeconds)));
+  }
+  const step::TickReport& report() const { return simulation.context().report; }
+
+  step::Simulation simulation;
+  double force_n = 0;
+};
+
+Vec3f place_of(const Vec3f& over, Tick tick, bool is_moving) {
+  const float t = static_cast<float>(tick) * 1e-3f;
+  const float press = 0.010f * std::min(1.0f, t) - 0.003f;
+  if (!is_moving) return over - Vec3f{0, press, 0};
+  // Once the press is complete: 40 mm/s to and fro, and up to 4 mm deeper on the way.
+  const float phase = std::fmod(std::max(0.0f, t - 1.1f), 1.0f);
+  const float slide = 0.04f * std::min(phase, 1.0f - phase);
+  return over + Vec3f{slide, -press - 0.2f * slide, 0};
+}
+
+Vec3f top_of(const world::World& world) {
+  NodeIndex top = world.surface_nodes.front();
+  for (const auto node : world.surface_nodes)
+    if (world.rest_positions[node.value].y > world.rest_positions[top.value].y) top = node;
+  return world.rest_positions[top.value];
+}
+
+class ForceUnderControl : public ::testing::TestWithParam<Case> {};
+
+// At every change of decisions a copy of the state goes on with the old ones. The two forces part
+// from there; how much more they part from one tick to the next is the decision's part in the
+// force's change. (Over a longer time a moving tool meets nodes a tick earlier or later in one of
+// the two, which is no step that anybody decided.)
+TEST_P(ForceUnderControl, DoesNotStep) {
+  auto organ = *scene::make_liver(6000);
+  organ.material.elastic_law = GetParam().law;
+  Pressed pressed(organ), copy(organ);
+  const Vec3f over = top_of(pressed.simulation.state().world);
+  RateLimits limits;
+  limits.highest.boundary = GetParam().boundary;
+  if (GetParam().boundary == world::Boundary::Frozen)
+    limits.highest.depth_limit = step::kFrozenDepthLimit;
+  else
+    limits.layer_sweeps = pressed.simulation.context().far_plan.sweeps;
+  RateController controller(limits);
+
+  step::TickDecisions now = limits.highest, before = now;
+  Bytes snapshot;
+  Tick changed = 0;
+  int changes = 0;
+  step::LayerCounts least = step::sweeps_of_layers(now);
+  std::uint32_t touched = 0;
+  double peak = 0, apart = 0, worst = 0, farthest = 0;
+  // Nodes, which only this boundary gives up one step after the other, take their time to come
+  // back.
+  const Tick ticks = GetParam().boundary == world::Boundary::Frozen ? 3300 : 2500;
+  for (Tick tick = 1; tick <= ticks; ++tick) {
+    if (controller.decisions() != now) {
+      before = std::exchange(now, controller.decisions());
+      snapshot.clear();
+      pressed.simulation.write_snapshot(snapshot);
+      ASSERT_TRUE(copy.simulation.restore_snapshot(snapshot).ok());
+      changed = tick;
+      apart = 0;
+      ++changes;
+      const auto sweeps = step::sweeps_of_layers(now);
+      std::ranges::transform(sweeps, least, least.begin(),
+                             [](auto a, auto b) { return std::min(a, b); });
+    }
+    const Vec3f tip = place_of(over, tick, GetParam().is_moving);
+    pressed.tick(tip, now);
+    const auto& report = pressed.report();
+    controller.observe(report, {work_ns(tick), 0});
+    ASSERT_GE(report.queue_nodes, report.contact_nodes);
+    ASSERT_TRUE(tick <= 1000 || report.layer_nodes[0] > 0) << tick;
+    touched = std::max(touched, report.contact_nodes);
+    peak = std::max(peak, pressed.force_n);
+    if (changed == 0 || tick >= changed + RateController::kLowerEvery) continue;
+    copy.tick(tip, before);
+    const double difference = (pressed.force_n - copy.force_n) / peak;
+    worst = std::max(worst, std::abs(difference - apart));
+    farthest = std::max(farthest, std::abs(difference));
+    apart = difference;
+  }
+  std::printf(
+      "%d changes, %u nodes touched, force %.3f N at most, step by decisions at most %.3f %%, "
+      "apart %.3f %%\n",
+      changes, touched, peak, 100 * worst, 100 * farthest);
+  EXPECT_GE(changes, 12);
+  EXPECT_LE(least[0], 2u);
+  EXPECT_LE(least[3], 2u);
+  EXPECT_EQ(now, limits.highest) << "all is taken back";
+  EXPECT_GT(peak, 0.03) << "the tool presses";
+  EXPECT_LT(worst, 0.02);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Tissue, ForceUnderControl,
+    ::testing::Values(Case{scene::ElasticLaw::Springs}, Case{scene::ElasticLaw::Springs, true},
+                      Case{scene::ElasticLaw::NeoHookean},
+                      Case{scene::ElasticLaw::NeoHookean, true},
+                      Case{scene::ElasticLaw::Springs, true, world::Boundary::Frozen},
+                      Case{scene::ElasticLaw::NeoHookean, true, world::Boundary::Frozen}));
+
+}  // namespace
+}  // namespace trocar::control
