@@ -298,8 +298,7 @@ void Replica::apply_participants(const proto::Participants& message) {
     participant.slot.value = static_cast<std::uint8_t>(entry.slot());
     participant.name = entry.name();
     participant.role = wire::role_of(entry.role());
-    for (const auto& shape : entry.tool())
-      participant.tools.push_back(wire::read(shape));
+    for (const auto& shape : entry.tool()) participant.tools.push_back(wire::read(shape));
     participants_.push_back(std::move(participant));
   }
   std::ranges::sort(participants_, {}, &Participant::slot);
