@@ -182,7 +182,8 @@ ui::HudModel Picture::hud_model(const replica::Replica& replica, replica::Sessio
     const bool is_news = replica::is_refusal(notice.outcome)
                              ? is_own
                              : notice.outcome == replica::ClaimOutcome::TakenOver ||
-                                   notice.outcome == replica::ClaimOutcome::Expired;
+                                   notice.outcome == replica::ClaimOutcome::Expired ||
+                                   notice.outcome == replica::ClaimOutcome::Slipped;
     if (age > 5 || notice.text.empty() || !is_news) continue;
     // A claim is retried while the verb is held: the same words once.
     if (!model.messages.empty() && model.messages.back().text == notice.text)

@@ -11,6 +11,7 @@
 
 #include "common/base/timing.h"
 #include "common/base/version.h"
+#include "common/wire/tool_shape.h"
 
 namespace trocar::net {
 namespace {
@@ -118,10 +119,7 @@ wire::SharedBytes NetSource::Session::encode_hello() const {
   hello.set_name(options_.participant_name);
   hello.set_role(static_cast<proto::Role>(options_.role));
   for (const auto& shape : options_.tools) {
-    auto& tool = *hello.add_tool();
-    tool.set_radius_m(shape.radius_m);
-    tool.set_length_m(shape.length_m);
-    tool.set_reach_m(shape.reach_m);
+    wire::write(shape, *hello.add_tool());
   }
   return wire::encode_envelope(envelope);
 }

@@ -5,6 +5,7 @@
 
 #include "common/base/version.h"
 #include "common/wire/surface_codec.h"
+#include "common/wire/tool_shape.h"
 #include "proto/wire.pb.h"
 
 namespace trocar::replica {
@@ -261,6 +262,13 @@ void Replica::apply_state(const proto::FrameState& message) {
     tool.penetration_m = state.penetration_m();
     tool.has_claim = state.has_claim();
     tool.is_silent = state.is_silent();
+    tool.is_inside = state.is_inside();
+    tool.torque_nm = to_vec3(state.torque_nm());
+    tool.world_from_proxy = state.has_proxy_position_m()
+                                ? to_pose(state.proxy_position_m(), state.proxy_orientation())
+                                : tool.world_from_tool;
+    if (!is_finite(tool.torque_nm) || !is_finite(tool.world_from_proxy.position))
+      return fail("FrameState.tool: torque or proxy is not finite");
     frame.tools.push_back(tool);
   }
   std::ranges::sort(frame.tools, {}, &Tool::slot);
@@ -290,8 +298,7 @@ void Replica::apply_participants(const proto::Participants& message) {
     participant.slot.value = static_cast<std::uint8_t>(entry.slot());
     participant.name = entry.name();
     participant.role = wire::role_of(entry.role());
-    for (const auto& shape : entry.tool())
-      participant.tools.push_back({shape.radius_m(), shape.length_m(), shape.reach_m()});
+    for (const auto& shape : entry.tool()) participant.tools.push_back(wire::read(shape));
     participants_.push_back(std::move(participant));
   }
   std::ranges::sort(participants_, {}, &Participant::slot);
@@ -303,7 +310,7 @@ void Replica::apply_claim(const proto::ClaimEvent& message, std::uint64_t arriva
   notice.tick = message.tick();
   notice.tool.value = static_cast<std::uint8_t>(message.tool());
   notice.verb = to_verb(message.verb());
-  if (message.outcome() >= 0 && message.outcome() <= 5)
+  if (message.outcome() >= 0 && message.outcome() <= 6)
     notice.outcome = static_cast<ClaimOutcome>(message.outcome());
   notice.text = message.text();
   notice.arrival_ns = arrival_ns;

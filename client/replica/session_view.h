@@ -29,11 +29,13 @@ struct Participant {
 struct Tool {
   ToolSlot slot;
   Pose world_from_tool;
+  Pose world_from_proxy;  // where the tissue lets it be
   scene::Verb verb = scene::Verb::None;
-  Vec3f force_n;  // of the tissue on the tool
+  Vec3f force_n, torque_nm;  // of the tissue on the tool, torque about its tip
   std::uint32_t contact_nodes = 0;
   float penetration_m = 0;  // deepest contact
   bool has_claim = false;   // its push or grasp is in effect
+  bool is_inside = false;   // appeared inside tissue: touches nothing until it has come out
   bool is_silent = false;   // no sample for 250 ticks
 };
 
@@ -76,6 +78,7 @@ enum class ClaimOutcome : std::uint8_t {
   Released = 3,
   TakenOver = 4,
   Expired = 5,
+  Slipped = 6,
 };
 inline bool is_refusal(ClaimOutcome outcome) {
   return outcome == ClaimOutcome::RefusedHeld || outcome == ClaimOutcome::RefusedNothingInReach;

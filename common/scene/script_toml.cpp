@@ -20,6 +20,11 @@ void read_shape(TableReader& reader, ToolShape& shape) {
   set("radius_mm", shape.radius_m, 0.5, 50);
   set("length_mm", shape.length_m, 10, 1000);
   set("reach_mm", shape.reach_m, 1, 50);
+  if (const auto width = reader.number("width_mm", 0, 100))
+    shape.half_width_m = static_cast<float>(*width * 0.5e-3);
+  if (const auto friction = reader.number("friction", 0, 2))
+    shape.friction = static_cast<float>(*friction);
+  if (const auto grip = reader.number("grip_n", 0.1, 100)) shape.grip_n = static_cast<float>(*grip);
 }
 
 std::optional<ScriptAnchor> read_anchor(TableReader& reader) {

@@ -1,10 +1,8 @@
 #include "common/wire/quantise.h"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstring>
-#include <numeric>
 
 #include "common/base/assert.h"
 #include "common/base/checksum.h"
@@ -41,17 +39,6 @@ void quantise_batch(const Vec3f* displacements_m, QuantisedVertex* quantised) {
   std::memcpy(static_cast<void*>(quantised), quanta.data(), sizeof quanta);
 }
 
-// Spreads the low 21 bits of `v` to every third bit.
-std::uint64_t spread_bits(std::uint64_t v) {
-  v &= 0x1fffff;
-  v = (v | v << 32) & 0x1f00000000ffff;
-  v = (v | v << 16) & 0x1f0000ff0000ff;
-  v = (v | v << 8) & 0x100f00f00f00f00f;
-  v = (v | v << 4) & 0x10c30c30c30c30c3;
-  v = (v | v << 2) & 0x1249249249249249;
-  return v;
-}
-
 }  // namespace
 
 void quantise(std::span<const Vec3f> displacements_m, std::span<QuantisedVertex> quantised) {
@@ -75,34 +62,6 @@ std::vector<QuantisedVertex> quantise_rest(std::span<const Vec3d> rest_positions
 
 std::uint32_t surface_crc(std::span<const QuantisedVertex> surface) {
   return crc32(bytes_of(surface));
-}
-
-std::vector<std::uint32_t> morton_order(std::span<const Vec3d> rest_positions_m) {
-  std::vector<std::uint32_t> order(rest_positions_m.size());
-  std::iota(order.begin(), order.end(), 0u);
-  if (order.empty()) return order;
-
-  Vec3d low = rest_positions_m[0], high = low;
-  for (const Vec3d& p : rest_positions_m) {
-    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
-    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
-  }
-  // One scale for all axes: cells of the curve are cubes.
-  const Vec3d extent = high - low;
-  const double largest = std::max({extent.x, extent.y, extent.z});
-  const double scale = largest > 0 ? double{0x1fffff} / largest : 0.0;
-  const auto cell = [scale](double offset) { return static_cast<std::uint64_t>(offset * scale); };
-
-  std::vector<std::uint64_t> codes(order.size());
-  for (std::size_t i = 0; i < codes.size(); ++i) {
-    const Vec3d offset = rest_positions_m[i] - low;
-    codes[i] = spread_bits(cell(offset.x)) | spread_bits(cell(offset.y)) << 1 |
-               spread_bits(cell(offset.z)) << 2;
-  }
-  std::sort(order.begin(), order.end(), [&codes](std::uint32_t a, std::uint32_t b) {
-    return codes[a] != codes[b] ? codes[a] < codes[b] : a < b;
-  });
-  return order;
 }
 
 }  // namespace trocar::wire

@@ -35,9 +35,4 @@ std::vector<QuantisedVertex> quantise_rest(std::span<const Vec3d> rest_positions
 // CRC-32 over the integers as they lie in memory (little-endian int32 x, y, z per vertex).
 std::uint32_t surface_crc(std::span<const QuantisedVertex> surface);
 
-// Order of nodes along a Morton curve through their rest positions; ties by index. Returns for each
-// slot the index into `rest_positions_m`. Neighbours in space become neighbours in slots, which
-// halves the bytes of a delta.
-std::vector<std::uint32_t> morton_order(std::span<const Vec3d> rest_positions_m);
-
 }  // namespace trocar::wire

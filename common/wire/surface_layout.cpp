@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "common/base/assert.h"
+#include "common/math/morton.h"
 
 namespace trocar::wire {
 

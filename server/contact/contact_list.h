@@ -1,70 +1,96 @@
 #pragma once
 
-// What touches what in this tick.
+// What touches what in this tick, as the solver sees it: points of the surface, each a fixed
+// combination of a triangle's nodes, and what acts on them.
 //
-// A push is a capsule against surface nodes: every surface node in the capsule, or within a margin
-// of it, gets a half-space whose plane touches the capsule at the point nearest to the node; the
-// solver lets nodes leave it freely and resists entering it (stiffness per area), with a viscous
-// drag along it. A grasp ties its nodes to places in the tool's frame. Both are constraints on
-// single nodes, so the solver's 3x3 blocks stay exact. Only claims in effect act. Nodes that
-// another tool holds exclusively are immovable for a push: the pusher feels them, they do not move
-// for it. Order: ascending tool slot, then ascending node. O(surface nodes) per pushing tool.
+// Push: the point may not enter the tool. The tool's face there is a plane; the point leaves it
+//   freely and is resisted behind it, in proportion to depth and to the surface that the point
+//   stands for, up to the greatest pressure that a hand exerts; friction holds it to the tool's
+//   frame up to the Coulomb limit.
+// Grip: a node between a grasp's jaws is held to a place in their frame in all directions, up to
+//   the force at which it slips.
+// Nodes that another tool holds exclusively do not move for a push: the pusher feels them.
+//
+// Order: ascending tool slot, then ascending triangle and place (a grip: node).
 
+#include <array>
 #include <span>
 #include <vector>
 
+#include "common/base/ids.h"
 #include "common/base/index.h"
-#include "server/contact/grasps.h"
-#include "server/input/tool_table.h"
-#include "server/locks/claims.h"
+#include "common/math/frame.h"
+#include "common/scene/tool.h"
 #include "server/world/world.h"
 
 namespace trocar::contact {
 
-// Contact stiffness per surface area, Pa/m, for push and grasp alike. At the 1 cm^2 of a node of a
-// 4,000-node liver this is 2.5 kN/m, a hundred times the tissue's own: 0.1 N indents 0.04 mm. Ten
-// times less is visibly soft; ten times more slows the solver's convergence. The value of the
-// paraboloid tool in graded-exterior's measurements.
-inline constexpr float kStiffnessPaPerM = 2.5e7f;
-// Drag along the tool's surface while pressed, Pa s/m: keeps nodes from squirting past a tip.
-inline constexpr float kDragPaSPerM = 2000.0f;
-// The drag rises with the penetration at the start of the tick up to this depth. It stays constant
-// in the tick: a drag that switched on inside the solve would make the answer depend on rounding.
-inline constexpr float kFullDragMetres = 1e-4f;
-// Nodes this near to a tool get a constraint before they touch, so that none slips in during a
-// tick.
-inline constexpr float kMarginMetres = 0.002f;
-inline constexpr std::size_t kMaxNodesPerTool = 1024;
+inline constexpr std::size_t kMaxPointsPerTool = 1024;
+inline constexpr int kMaxPointNodes = 3;
 
-struct NodeConstraint {
-  enum class Kind : std::uint8_t { HalfSpace, Tie };
+struct ContactPoint {
+  enum class Kind : std::uint8_t { Push, Grip };
 
-  NodeIndex node;
-  Kind kind = Kind::HalfSpace;
-  bool moves_node = true;  // false: held by another tool; only the reaction counts
-  float stiffness = 0;     // N/m
-  float drag = 0;          // N s/m, tangential; HalfSpace only
-  Vec3f normal;            // HalfSpace: out of the tool
-  Vec3f target;            // displacement: a point of the plane, or where the tie wants the node
-  Vec3f tool_motion;       // m in this tick, for the drag
+  std::array<NodeIndex, kMaxPointNodes> nodes;
+  std::array<float, kMaxPointNodes> weights{};  // sum 1
+  Kind kind = Kind::Push;
+  std::uint8_t node_count = kMaxPointNodes;
+  std::uint8_t moved = 0b111;  // bit i: nodes[i] moves for it
+  std::uint32_t place = 0;     // which point of the surface, see ContactFinder; a grip: its entry
+  float stiffness = 0;         // N/m, along the normal; a grip: in all directions
+  float hold_stiffness = 0;    // N/m, of friction across the normal
+  float friction = 0;          // Coulomb's coefficient
+  float limit_n = 0;           // a push presses no harder; a grip slips above it
+  Vec3f normal;                // out of the tool
+  Vec3f plane;                 // displacement of the point when it touches the tool's face
+  Vec3f anchor;                // displacement at which friction or grip does not pull
 };
 
+// Displacement of a point: the combination of its nodes'.
+inline Vec3f displacement_of(const ContactPoint& point, const world::World& world) {
+  Vec3f sum;
+  for (int i = 0; i < point.node_count; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    sum += world.displacements[point.nodes[k].value] * point.weights[k];
+  }
+  return sum;
+}
+inline Vec3f rest_position_of(const ContactPoint& point, const world::World& world) {
+  Vec3f sum;
+  for (int i = 0; i < point.node_count; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    sum += world.rest_positions[point.nodes[k].value] * point.weights[k];
+  }
+  return sum;
+}
+
+// A tool whose claim is in effect, whether or not it touches anything.
 struct ToolContact {
   ToolSlot tool;
-  std::uint32_t begin = 0, end = 0;              // its constraints
+  scene::Verb verb = scene::Verb::None;
+  bool is_placed = false;                        // a push: its proxy is outside the tissue
+  Pose start, goal;                              // world_from_tool; this tick's planes are of goal
+  float softness_m = 0;                          // how deep a push's pressure grows
+  std::uint32_t begin = 0, end = 0;              // its points
   std::uint32_t seeds_begin = 0, seeds_end = 0;  // nodes from which propagation starts
 };
 
 struct ContactList {
-  std::vector<ToolContact> tools;  // tools whose claim is in effect and that touch a node
-  std::vector<NodeConstraint> constraints;
-  std::vector<NodeIndex> seeds;
+  std::vector<ToolContact> tools;
+  std::vector<ContactPoint> points;
+  std::vector<NodeIndex> seeds;  // per tool ascending, each once
   // Surface nodes within reach of each tool that wants to grasp and does not hold: core of its
   // request. Range into `reach_nodes` per tool slot.
   std::vector<NodeIndex> reach_nodes;
   std::array<std::pair<std::uint32_t, std::uint32_t>, kMaxTools> reach;
-  std::uint32_t dropped = 0;  // nodes beyond kMaxNodesPerTool
+  std::uint32_t tools_inside = 0;  // that appeared inside tissue and have not come out
+  std::uint32_t dropped = 0;       // points or nodes beyond kMaxPointsPerTool
 
+  void reserve();
+  void clear();
+  std::span<const ContactPoint> points_of(const ToolContact& contact) const {
+    return std::span(points).subspan(contact.begin, contact.end - contact.begin);
+  }
   std::span<const NodeIndex> seeds_of(const ToolContact& contact) const {
     return std::span(seeds).subspan(contact.seeds_begin, contact.seeds_end - contact.seeds_begin);
   }
@@ -73,9 +99,5 @@ struct ContactList {
     return std::span(reach_nodes).subspan(begin, end - begin);
   }
 };
-
-void find_contacts(const world::World& world, const input::ToolTable& tools,
-                   const locks::ClaimTable& claims, const GraspTable& grasps, Tick tick,
-                   ContactList& out);
 
 }  // namespace trocar::contact

@@ -1,6 +1,6 @@
 #include "server/contact/grasps.h"
 
-#include "server/contact/contact_list.h"
+#include "server/contact/contact_law.h"
 
 namespace trocar::contact {
 
@@ -22,6 +22,7 @@ void GraspTable::follow_claims(const world::World& world, const input::ToolTable
     if (!grips) {
       grasp.nodes.clear();
       grasp.offsets.clear();
+      grasp.grip_n = grasp.reach_m = 0;
       grasp.is_anchored = false;
       grasp.anchor = {};
     } else if (claim.phase == locks::ClaimPhase::Ramping) {
@@ -34,6 +35,8 @@ void GraspTable::follow_claims(const world::World& world, const input::ToolTable
     const bool is_new = claim.phase == locks::ClaimPhase::Held &&
                         claim.verb == scene::Verb::Grasp && grasp.nodes.empty();
     if (!is_new) continue;
+    grasp.grip_n = tools[request.tool].shape.grip_n;
+    grasp.reach_m = tools[request.tool].shape.reach_m;
     for (const auto node : request.core) {
       grasp.nodes.push_back(node);
       grasp.offsets.push_back(tools[request.tool].pose.apply_inverse(world.position(node)));
@@ -41,10 +44,47 @@ void GraspTable::follow_claims(const world::World& world, const input::ToolTable
   }
 }
 
+void GraspTable::follow_slip(const ContactList& contacts, const world::World& world,
+                             locks::ClaimTable& claims, std::vector<locks::ClaimEvent>& events) {
+  // A place is lost this much beyond the reach within which jaws take hold, so that a hold that has
+  // just begun does not end at its rim.
+  constexpr float kLostBeyond = 1.25f;
+  for (const auto& tool : contacts.tools) {
+    if (tool.verb != scene::Verb::Grasp) continue;
+    Grasp& grasp = grasps_[tool.tool.value];
+    const float lost = kLostBeyond * grasp.reach_m;
+    bool has_lost = false;
+    for (const auto& point : contacts.points_of(tool)) {
+      const Vec3f d = displacement_of(point, world);
+      const auto load = load_at(point, d);
+      if (!load.slides) continue;
+      const Vec3f held = d - load.slip * (load.rigidity / point.stiffness);
+      Vec3f& offset = grasp.offsets[point.place];
+      offset = tool.goal.apply_inverse(rest_position_of(point, world) + held);
+      if (!(length_squared(offset) > lost * lost)) continue;
+      claims.release_node(tool.tool, grasp.nodes[point.place]);
+      grasp.nodes[point.place] = NodeIndex();
+      has_lost = true;
+    }
+    if (!has_lost) continue;
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < grasp.nodes.size(); ++i) {
+      if (!grasp.nodes[i].is_valid()) continue;
+      grasp.nodes[kept] = grasp.nodes[i];
+      grasp.offsets[kept++] = grasp.offsets[i];
+    }
+    grasp.nodes.resize(kept);
+    grasp.offsets.resize(kept);
+    if (kept == 0) claims.slip_off(tool.tool, world.tick, events);
+  }
+}
+
 void GraspTable::visit_state(world::StateArchive& archive, std::size_t node_count) {
   for (auto& grasp : grasps_) {
-    archive.sized_array(grasp.nodes, kMaxNodesPerTool);
-    archive.sized_array(grasp.offsets, kMaxNodesPerTool);
+    archive.sized_array(grasp.nodes, kMaxPointsPerTool);
+    archive.sized_array(grasp.offsets, kMaxPointsPerTool);
+    archive.value(grasp.grip_n);
+    archive.value(grasp.reach_m);
     archive.flag(grasp.is_anchored);
     archive.value(grasp.anchor);
     if (!archive.is_reading()) continue;

@@ -1,13 +1,16 @@
 #pragma once
 
 // Which nodes each grasping tool holds, and where in its frame. Created when a claim is granted,
-// dropped when it ends. While a claim fades out (its holder left, fell silent or was taken over)
-// the grasp stays where it last was, whatever becomes of the tool's slot.
+// dropped when it ends. Each node is held with its share, by surface area, of the grip: pulled
+// harder it slips between the jaws, and is lost where it leaves them; a grasp that has lost all of
+// its nodes has slipped off. While a claim fades out (its holder left, fell silent or was taken
+// over) the grasp stays where it last was, whatever becomes of the tool's slot.
 
 #include <array>
 #include <span>
 #include <vector>
 
+#include "server/contact/contact_list.h"
 #include "server/input/tool_table.h"
 #include "server/locks/claims.h"
 #include "server/world/world.h"
@@ -17,6 +20,8 @@ namespace trocar::contact {
 struct Grasp {
   std::vector<NodeIndex> nodes;  // ascending; empty: nothing held
   std::vector<Vec3f> offsets;    // m, tool frame
+  float grip_n = 0;              // of all nodes together
+  float reach_m = 0;             // how far the jaws hold
   bool is_anchored = false;      // fading out: `anchor` replaces the tool's pose
   Pose anchor;                   // world_from_tool
 };
@@ -35,6 +40,11 @@ class GraspTable {
   void follow_claims(const world::World& world, const input::ToolTable& tools,
                      const locks::ClaimTable& claims,
                      std::span<const locks::ClaimRequest> requests);
+
+  // After the solve: nodes that were pulled beyond their share of the grip have slipped. Lost nodes
+  // are free; a grasp without nodes ends its claim.
+  void follow_slip(const ContactList& contacts, const world::World& world,
+                   locks::ClaimTable& claims, std::vector<locks::ClaimEvent>& events);
 
   void visit_state(world::StateArchive& archive, std::size_t node_count);
 

@@ -1,11 +1,13 @@
 #pragma once
 
-// The end of a tick's mechanics, in sessions and scenarios alike: each tool asks for what its verb
-// needs, the claims are decided, and grasps follow what was granted. Valid from the next tick.
+// The end of a tick's mechanics, in sessions and scenarios alike: grasps lose what slipped, each
+// tool asks for what its verb needs, the claims are decided, and grasps follow what was granted.
+// Valid from the next tick.
 
 #include <vector>
 
 #include "server/contact/contact_list.h"
+#include "server/contact/grasps.h"
 
 namespace trocar::contact {
 

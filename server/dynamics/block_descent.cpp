@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "common/base/assert.h"
+#include "server/contact/contact_law.h"
 
 namespace trocar::dynamics {
 namespace {
@@ -17,35 +18,6 @@ constexpr float kMaxFarOverRelaxationTwoSweeps = 1.5f;
 constexpr float kMaxNodeStep = 1.0f;
 // What goes back with a node whose step was not finite: the nodes within so many layers.
 constexpr int kRestoredLayers = 3;
-
-using contact::NodeConstraint;
-
-// Energy of a constraint at displacement x, as gradient and block.
-//   tie:        k/2 |x - target|^2
-//   half-space: k/2 min(0, g)^2 with gap g = n . (x - target), and a drag
-//               c/(2 dt) |T (x - start - tool_motion)|^2 with T = I - n n^T
-void add_constraint(const NodeConstraint& c, const Vec3f& x, const Vec3f& start, float inverse_dt,
-                    Vec3f& gradient, SymMat3f* block) {
-  const Vec3f from_target = x - c.target;
-  if (c.kind == NodeConstraint::Kind::Tie) {
-    gradient += from_target * c.stiffness;
-    if (block) block->add_identity(c.stiffness);
-    return;
-  }
-  const float gap = dot(c.normal, from_target);
-  if (gap < 0) {
-    gradient += c.normal * (c.stiffness * gap);
-    if (block) block->add_outer(c.normal, c.stiffness);
-  }
-  if (c.drag == 0) return;
-  const Vec3f slip = x - start - c.tool_motion;
-  const float drag = c.drag * inverse_dt;
-  gradient += (slip - c.normal * dot(c.normal, slip)) * drag;
-  if (block) {
-    block->add_identity(drag);
-    block->add_outer(c.normal, -drag);
-  }
-}
 
 float sum(const Lanes& a) {
   return ((a.v[0] + a.v[4]) + (a.v[2] + a.v[6])) + ((a.v[1] + a.v[5]) + (a.v[3] + a.v[7]));
@@ -68,12 +40,14 @@ BlockDescent::BlockDescent(const scene::Organ& organ, const world::World& world,
   inertia_.resize(group_count);
   squares_.resize(group_count);
   group_squares_.resize(group_count);
+  squared_moves_.resize(group_count);
   rejected_.resize(group_count);
   begun_stamp_.resize(group_count);
   group_stamp_.resize(group_count);
+  serial_stamp_.resize(group_count);
   slot_stamp_.resize(slot_count);
-  first_constraint_.resize(slot_count);
-  next_constraint_.reserve(8 * contact::kMaxNodesPerTool);
+  first_link_.resize(slot_count);
+  links_.reserve(8 * contact::kMaxPointsPerTool);
   residuals_.reserve(world.node_count());
   for (auto* plan : {&near_, &far_, &begun_, &bands_[0], &bands_[1], &bands_[2], &bands_[3]}) {
     plan->lanes.resize(group_count);
@@ -174,15 +148,27 @@ const BlockDescent::Plan& BlockDescent::plan_of(std::uint32_t left,
   return near_;
 }
 
-void BlockDescent::link_constraints(const contact::ContactList& contacts) {
-  next_constraint_.resize(contacts.constraints.size());
-  for (auto i = static_cast<std::uint32_t>(contacts.constraints.size()); i-- > 0;) {
-    const auto& c = contacts.constraints[i];
-    if (!c.moves_node) continue;
-    const Slot slot = tissue_.groups().slot_of(c.node);
-    next_constraint_[i] = slot_stamp_[slot] == current_ ? first_constraint_[slot] : kNone;
-    slot_stamp_[slot] = group_stamp_[slot / kLanes] = current_;
-    first_constraint_[slot] = i;
+void BlockDescent::link_contacts(const contact::ContactList& contacts) {
+  const auto& groups = tissue_.groups();
+  has_serial_ = false;
+  links_.resize(contacts.points.size());
+  for (auto i = static_cast<std::uint32_t>(contacts.points.size()); i-- > 0;) {
+    const auto& point = contacts.points[i];
+    PointLinks& links = links_[i];
+    for (std::uint32_t corner = 0; corner < point.node_count; ++corner) {
+      const Slot slot = links.slots[corner] = groups.slot_of(point.nodes[corner]);
+      if ((point.moved >> corner & 1) == 0) continue;
+      links.next[corner] = slot_stamp_[slot] == current_ ? first_link_[slot] : kNone;
+      slot_stamp_[slot] = group_stamp_[slot / kLanes] = current_;
+      first_link_[slot] = i * contact::kMaxPointNodes + corner;
+    }
+    for (std::uint32_t a = 1; a < point.node_count; ++a)
+      for (std::uint32_t b = 0; b < a; ++b) {
+        const Group g = links.slots[a] / kLanes, h = links.slots[b] / kLanes;
+        if (groups.colour_of(g) != groups.colour_of(h)) continue;
+        serial_stamp_[g] = serial_stamp_[h] = current_;
+        has_serial_ = true;
+      }
   }
 }
 
@@ -258,8 +244,16 @@ NodeStep8 BlockDescent::linearise(Group group, const Vec8& own, Scratch& scratch
   return step;
 }
 
-void BlockDescent::add_constraints(const contact::ContactList& contacts, Group group,
-                                   float inverse_dt, NodeStep8& step, Lanes& omega) const {
+Vec3f BlockDescent::displacement_of(const contact::ContactPoint& point,
+                                    const PointLinks& links) const {
+  Vec3f sum;
+  for (std::size_t i = 0; i < point.node_count; ++i)
+    sum += to_vec3(x_[links.slots[i]]) * point.weights[i];
+  return sum;
+}
+
+void BlockDescent::add_contacts(const contact::ContactList& contacts, Group group, NodeStep8& step,
+                                Lanes& omega) const {
   Vec3Lanes gradients;
   SymMat3Lanes blocks;
   store(gradients, step.gradient);
@@ -271,9 +265,14 @@ void BlockDescent::add_constraints(const contact::ContactList& contacts, Group g
     omega.v[lane] = 1.0f;
     Vec3f gradient = gradients.at(lane);
     SymMat3f block = blocks.at(lane);
-    for (auto i = first_constraint_[slot]; i != kNone; i = next_constraint_[i])
-      add_constraint(contacts.constraints[i], to_vec3(x_[slot]), start_of(slot), inverse_dt,
-                     gradient, &block);
+    for (auto link = first_link_[slot]; link != kNone;) {
+      const auto i = link / contact::kMaxPointNodes, corner = link % contact::kMaxPointNodes;
+      const auto& point = contacts.points[i];
+      const auto load = contact::load_at(point, displacement_of(point, links_[i]));
+      gradient += load.gradient * point.weights[corner];
+      contact::add_block(point, load, point.weights[corner], block);
+      link = links_[i].next[corner];
+    }
     gradients.set(lane, gradient);
     blocks.set(lane, block);
   }
@@ -298,7 +297,7 @@ void BlockDescent::hold_axes(Group group, NodeStep8& step) const {
 }
 
 void BlockDescent::relax(Group group, std::uint8_t lanes, const contact::ContactList& contacts,
-                         float inverse_dt, float omega, Scratch& scratch) {
+                         float omega, Scratch& scratch) {
   Float4* const x = &x_[group * kLanes];
   const Vec8 own = load_group(x);
   NodeStep8 step = linearise(group, own, scratch);
@@ -306,7 +305,7 @@ void BlockDescent::relax(Group group, std::uint8_t lanes, const contact::Contact
   if (group_stamp_[group] == current_) {
     Lanes factors;
     store(factors, all(omega));
-    add_constraints(contacts, group, inverse_dt, step, factors);
+    add_contacts(contacts, group, step, factors);
     factor = all(0) - load(factors);
   }
   if (!held_axes_.empty()) hold_axes(group, step);
@@ -325,8 +324,7 @@ void BlockDescent::relax(Group group, std::uint8_t lanes, const contact::Contact
   rejected_[group] = static_cast<std::uint8_t>(rejected_[group] | bad);
 }
 
-void BlockDescent::sweep(const Plan& plan, const contact::ContactList& contacts, float inverse_dt,
-                         float omega) {
+void BlockDescent::sweep(const Plan& plan, const contact::ContactList& contacts, float omega) {
   workers_.run([&](unsigned w) {
     for (std::size_t colour = 0; colour + 1 < plan.colour_begins.size(); ++colour) {
       const auto begin = plan.colour_begins[colour];
@@ -334,9 +332,17 @@ void BlockDescent::sweep(const Plan& plan, const contact::ContactList& contacts,
       const auto count = std::size_t{workers_.count()};
       for (auto i = n * w / count; i < n * (w + 1) / count; ++i) {
         const Group g = plan.groups[begin + i];
-        relax(g, plan.lanes[g], contacts, inverse_dt, omega, scratches_[w]);
+        if (has_serial_ && serial_stamp_[g] == current_) continue;
+        relax(g, plan.lanes[g], contacts, omega, scratches_[w]);
       }
       if (n > 0) workers_.barrier();
+      if (!has_serial_ || n == 0) continue;
+      if (w == 0)
+        for (std::size_t i = 0; i < n; ++i) {
+          const Group g = plan.groups[begin + i];
+          if (serial_stamp_[g] == current_) relax(g, plan.lanes[g], contacts, omega, scratches_[w]);
+        }
+      workers_.barrier();
     }
   });
 }
@@ -360,10 +366,12 @@ double BlockDescent::sum_of_squares_within(const Plan& core) const {
 void BlockDescent::write_back(const Plan& plan, float inverse_dt, world::World& world) {
   for_each_group(plan.groups, [&](Group g) {
     const auto nodes = tissue_.groups().nodes_of(g);
+    squared_moves_[g] = 0;
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
       if ((plan.lanes[g] >> lane & 1) == 0) continue;
-      const Vec3f x = to_vec3(x_[g * kLanes + lane]), start = to_vec3(start_[g * kLanes + lane]);
-      world.velocities[nodes[lane].value] = (x - start) * inverse_dt;
+      const Vec3f x = to_vec3(x_[g * kLanes + lane]), move = x - to_vec3(start_[g * kLanes + lane]);
+      squared_moves_[g] = std::max(squared_moves_[g], length_squared(move));
+      world.velocities[nodes[lane].value] = move * inverse_dt;
       world.displacements[nodes[lane].value] = x;
     }
   });
@@ -401,14 +409,14 @@ SolveReport BlockDescent::solve(const contact::ContactList& contacts,
   TROCAR_ASSERT((settings.far_sweeps == 0 && settings.bands.empty()) ||
                 settings.residual_tolerance_n == 0);
   if (++current_ == 0) {
-    for (auto* stamps : {&slot_stamp_, &group_stamp_, &begun_stamp_})
+    for (auto* stamps : {&slot_stamp_, &group_stamp_, &begun_stamp_, &serial_stamp_})
       std::ranges::fill(*stamps, 0u);
     current_ = 1;
   }
   const float inverse_dt = 1.0f / settings.dt;
   plan_step(near, settings.far_sweeps > 0, loads.held);
   plan_bands(near, settings.bands);
-  link_constraints(contacts);
+  link_contacts(contacts);
   begin_groups(world, settings, loads);
 
   SolveReport report;
@@ -420,7 +428,7 @@ SolveReport BlockDescent::solve(const contact::ContactList& contacts,
   for (std::uint32_t i = 0; i < settings.sweeps; ++i) {
     // Far nodes go before the last near sweep, so that near residuals are those of the end.
     for (std::uint32_t far = 0; i + 1 == settings.sweeps && far < settings.far_sweeps; ++far) {
-      sweep(far_, contacts, inverse_dt, settings.far_over_relaxation);
+      sweep(far_, contacts, settings.far_over_relaxation);
       report.node_sweeps += far_.node_count;
     }
     const auto left = settings.sweeps - i;
@@ -428,8 +436,7 @@ SolveReport BlockDescent::solve(const contact::ContactList& contacts,
       return band.sweeps >= left && band.sweeps < 3;
     });
     const Plan& plan = plan_of(left, settings.bands);
-    sweep(plan, contacts, inverse_dt,
-          has_few ? std::min(omega, kMaxOverRelaxationFewSweeps) : omega);
+    sweep(plan, contacts, has_few ? std::min(omega, kMaxOverRelaxationFewSweeps) : omega);
     report.node_sweeps += plan.node_count;
     ++report.sweeps;
     // Growth is judged by the nodes that every sweep has.
@@ -447,11 +454,17 @@ SolveReport BlockDescent::solve(const contact::ContactList& contacts,
   if (!settings.bands.empty()) squares = sum_of_squares(near_);
   write_back(near_, inverse_dt, world);
   write_back(far_, inverse_dt, world);
+  float squared_move = 0;
+  for (const auto* plan : {&near_, &far_})
+    for (const auto g : plan->groups) squared_move = std::max(squared_move, squared_moves_[g]);
   for (const auto node : loads.held) {
     const Slot slot = tissue_.groups().slot_of(node);
+    const Vec3f move = to_vec3(x_[slot]) - start_of(slot);
+    squared_move = std::max(squared_move, length_squared(move));
     world.displacements[node.value] = to_vec3(x_[slot]);
-    world.velocities[node.value] = (to_vec3(x_[slot]) - start_of(slot)) * inverse_dt;
+    world.velocities[node.value] = move * inverse_dt;
   }
+  report.largest_move_m = std::sqrt(squared_move);
   for (const auto g : begun_.groups)
     report.nodes_rejected += static_cast<unsigned>(__builtin_popcount(rejected_[g]));
   if (report.nodes_rejected > 0) report.nodes_restored = restore_rejected(world);
@@ -471,27 +484,14 @@ Vec3f BlockDescent::start_of(Slot slot) const {
   return to_vec3(begun_stamp_[slot / kLanes] == current_ ? start_[slot] : x_[slot]);
 }
 
-Vec3f BlockDescent::reaction(const contact::ContactList& contacts, const contact::ToolContact& tool,
-                             const world::World& world, float dt) const {
-  // The constraint's energy gradient is minus the force on the node, hence the force on the tool.
-  Vec3f force;
-  for (auto i = tool.begin; i < tool.end; ++i) {
-    const auto& c = contacts.constraints[i];
-    add_constraint(c, world.displacements[c.node.value], start_of(tissue_.groups().slot_of(c.node)),
-                   1.0f / dt, force, nullptr);
-  }
-  return force;
-}
-
-Vec3f BlockDescent::holding_force(const contact::ContactList& contacts, NodeIndex node,
-                                  float dt) const {
+Vec3f BlockDescent::holding_force(const contact::ContactList& contacts, NodeIndex node) const {
   const Slot slot = tissue_.groups().slot_of(node);
   const Group group = slot / kLanes;
   TROCAR_ASSERT_HOT(begun_stamp_[group] == current_);
   Scratch scratch;
   NodeStep8 step = linearise(group, load_group(&x_[group * kLanes]), scratch);
   Lanes omega;
-  if (group_stamp_[group] == current_) add_constraints(contacts, group, 1.0f / dt, step, omega);
+  if (group_stamp_[group] == current_) add_contacts(contacts, group, step, omega);
   Vec3Lanes gradients;
   store(gradients, step.gradient);
   return gradients.at(slot % kLanes);
@@ -544,10 +544,12 @@ FollowReport BlockDescent::follow_topology(const Topology& topology, const world
   group_squares_.resize(group_count);
   for (auto* lanes : {&free_, &rejected_, &near_.lanes, &far_.lanes, &begun_.lanes})
     lanes->resize(group_count);
-  for (auto* stamps : {&begun_stamp_, &group_stamp_}) stamps->resize(group_count);
+  for (auto& band : bands_) band.lanes.resize(group_count);
+  for (auto* stamps : {&begun_stamp_, &group_stamp_, &serial_stamp_}) stamps->resize(group_count);
   for (auto* values : {&x_, &start_}) values->resize(slot_count);
   slot_stamp_.resize(slot_count);
-  first_constraint_.resize(slot_count);
+  squared_moves_.resize(group_count);
+  first_link_.resize(slot_count);
   for (const auto lanes : tissue_.touched())
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
       if (!lanes.has(lane)) continue;

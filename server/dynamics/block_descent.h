@@ -72,6 +72,7 @@ struct SolveReport {
   std::uint32_t sweeps = 0;          // of near nodes, done
   std::uint64_t node_sweeps = 0;     // nodes stepped, all sweeps together
   std::uint32_t nodes_rejected = 0;  // their step was not finite in some sweep
+  float largest_move_m = 0;          // of a node in this step
   std::uint32_t nodes_restored = 0;  // put back to the start of the step, at rest, for that reason
 };
 
@@ -106,13 +107,9 @@ class BlockDescent {
   // Force imbalance per entry of `near` in the last sweep, N.
   std::span<const float> residuals_n() const { return residuals_; }
 
-  // Force of the tissue on each tool, N, per entry of contacts.tools, from the state just solved.
-  Vec3f reaction(const contact::ContactList& contacts, const contact::ToolContact& tool,
-                 const world::World& world, float dt) const;
-
   // Force on a node of the last solve's loads.held or axis_holds that put it where it is, N: what
   // energies, damping, loads and tools leave of its mass times acceleration.
-  Vec3f holding_force(const contact::ContactList& contacts, NodeIndex node, float dt) const;
+  Vec3f holding_force(const contact::ContactList& contacts, NodeIndex node) const;
 
   FarPlan far_plan(float dt) const;
   const Tissue& tissue() const { return tissue_; }
@@ -130,6 +127,10 @@ class BlockDescent {
     Lanes mass;     // kg; 0 for padding
     Lanes damping;  // rate m, kg/s
   };
+  struct PointLinks {
+    std::array<Slot, contact::kMaxPointNodes> slots;
+    std::array<std::uint32_t, contact::kMaxPointNodes> next;  // of the same slot's links
+  };
   // Groups with the lanes to sweep in them, by colour.
   struct Plan {
     std::vector<std::uint8_t> lanes;           // per group of the tissue
@@ -145,19 +146,20 @@ class BlockDescent {
   void plan_bands(std::span<const NodeIndex> near, std::span<const SweepBand> bands);
   // What takes part when `left` sweeps are left, this one included.
   const Plan& plan_of(std::uint32_t left, std::span<const SweepBand> bands) const;
-  void link_constraints(const contact::ContactList& contacts);
+  void link_contacts(const contact::ContactList& contacts);
   void begin_groups(const world::World& world, const SolveSettings& settings,
                     const ExternalLoads& loads);
   void begin_inertia(Group group, const world::World& world, float inverse_dt,
                      std::span<const Vec3f> forces);
   NodeStep8 linearise(Group group, const Vec8& own, Scratch& scratch) const;
-  void add_constraints(const contact::ContactList& contacts, Group group, float inverse_dt,
-                       NodeStep8& step, Lanes& omega) const;
+  Vec3f displacement_of(const contact::ContactPoint& point, const PointLinks& links) const;
+  void add_contacts(const contact::ContactList& contacts, Group group, NodeStep8& step,
+                    Lanes& omega) const;
   void hold_axes(Group group, NodeStep8& step) const;
   void place_held(const ExternalLoads& loads);
-  void sweep(const Plan& plan, const contact::ContactList& contacts, float inverse_dt, float omega);
-  void relax(Group group, std::uint8_t lanes, const contact::ContactList& contacts,
-             float inverse_dt, float omega, Scratch& scratch);
+  void sweep(const Plan& plan, const contact::ContactList& contacts, float omega);
+  void relax(Group group, std::uint8_t lanes, const contact::ContactList& contacts, float omega,
+             Scratch& scratch);
   double sum_of_squares(const Plan& plan) const;
   double sum_of_squares_within(const Plan& core) const;
   void write_back(const Plan& plan, float inverse_dt, world::World& world);
@@ -179,14 +181,21 @@ class BlockDescent {
   std::vector<Inertia> inertia_;        // per group; begun groups
   std::vector<Lanes> squares_;          // per group: squared residuals of the last sweep
   std::vector<float> group_squares_;    // their sum over swept lanes
+  std::vector<float> squared_moves_;    // per group: largest of a node in this step, m^2
   std::vector<std::uint8_t> rejected_;  // per group: lanes with a step that was not finite
   std::vector<Group> all_groups_;
   Plan near_, far_, begun_;
   std::array<Plan, kMaxSweepBands> bands_;  // [b]: near nodes of bands 0 to b; the last is near_
   std::vector<std::uint32_t> begun_stamp_;  // per group
   std::vector<float> residuals_;
-  // Constraints of a node as a linked list in contact order; valid where the stamp is current.
-  std::vector<std::uint32_t> first_constraint_, next_constraint_;  // per slot; per constraint
+  // Contact points of a node as a linked list in contact order; valid where the stamp is current.
+  // A link is kMaxPointNodes x point + corner.
+  std::vector<std::uint32_t> first_link_;  // per slot
+  std::vector<PointLinks> links_;          // per contact point
+  // Groups with a node of a point that another node of their colour is in, too: one worker sweeps
+  // them, after the others of the colour.
+  std::vector<std::uint32_t> serial_stamp_;
+  bool has_serial_ = false;
   std::vector<std::uint32_t> slot_stamp_, group_stamp_;
   std::vector<std::uint8_t> held_axes_;  // per slot, of this step; empty if there are none
   std::uint32_t current_ = 0;

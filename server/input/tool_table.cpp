@@ -19,17 +19,14 @@ std::uint32_t ToolTable::admit(const session::TickInputs& inputs, Tick tick) {
   for (const auto& sample : inputs.samples) dropped += admit_sample(sample, tick) ? 0 : 1;
 
   for (auto& tool : tools_) {
-    tool.tip_motion = {};
     if (tool.steps_left == 0) continue;
     const float t = 1.0f / static_cast<float>(tool.steps_left);
-    const Vec3f before = tool.pose.position;
     if (--tool.steps_left == 0) {
       tool.pose = tool.target;
     } else {
       tool.pose.position += (tool.target.position - tool.pose.position) * t;
       tool.pose.orientation = interpolate(tool.pose.orientation, tool.target.orientation, t);
     }
-    tool.tip_motion = tool.pose.position - before;
   }
   return dropped;
 }
@@ -69,11 +66,13 @@ void ToolTable::visit_state(world::StateArchive& archive) {
     archive.value(tool.shape.radius_m);
     archive.value(tool.shape.length_m);
     archive.value(tool.shape.reach_m);
+    archive.value(tool.shape.half_width_m);
+    archive.value(tool.shape.friction);
+    archive.value(tool.shape.grip_n);
     archive.value(tool.verb);
     archive.value(tool.pose);
     archive.value(tool.target);
     archive.value(tool.steps_left);
-    archive.value(tool.tip_motion);
     archive.value(tool.last_sample_tick);
     if (archive.is_reading() && tool.is_present &&
         (!scene::is_valid(tool.shape) || tool.verb > scene::Verb::Grasp))

@@ -27,7 +27,6 @@ struct Tool {
   Pose pose;                     // world_from_tool, this tick
   Pose target;                   // of the newest sample
   std::uint32_t steps_left = 0;  // until pose reaches target
-  Vec3f tip_motion;              // of this tick, m
   Tick last_sample_tick = 0;
 };
 

@@ -25,6 +25,18 @@ void ClaimTable::release_core(ToolSlot tool) {
   std::replace(owners_.begin(), owners_.end(), tool, ToolSlot{});
 }
 
+void ClaimTable::release_node(ToolSlot tool, NodeIndex node) {
+  if (owners_[node.value] == tool) owners_[node.value] = ToolSlot{};
+}
+
+void ClaimTable::slip_off(ToolSlot tool, Tick tick, std::vector<ClaimEvent>& events) {
+  Claim& c = claims_[tool.value];
+  const bool was_held = c.phase == ClaimPhase::Held;
+  if (was_held) events.push_back({tick, tool, c.verb, ClaimOutcome::Slipped, {}});
+  release_core(tool);
+  c = was_held ? Claim{.phase = ClaimPhase::Spent, .verb = c.verb} : Claim{};
+}
+
 void ClaimTable::start_ramp(ToolSlot tool, Tick tick, Tick ramp_ticks) {
   release_core(tool);
   Claim& c = claims_[tool.value];
@@ -56,7 +68,7 @@ void ClaimTable::update(Tick tick, std::span<const ClaimRequest> requests,
       events.push_back({tick, request.tool, c.verb, ClaimOutcome::Released, {}});
       release_core(request.tool);
       c = Claim{};
-    } else if (c.phase == ClaimPhase::Wanted && verb_ended) {
+    } else if ((c.phase == ClaimPhase::Wanted || c.phase == ClaimPhase::Spent) && verb_ended) {
       c = Claim{};
     } else if (c.phase == ClaimPhase::Held && c.verb == Verb::Grasp && silent > kAbandonTicks) {
       events.push_back({tick, request.tool, c.verb, ClaimOutcome::Expired, {}});
@@ -130,7 +142,7 @@ void ClaimTable::visit_state(world::StateArchive& archive) {
     archive.value(c.first_refusal_tick);
     archive.value(c.ramp_start_tick);
     archive.value(c.ramp_ticks);
-    if (archive.is_reading() && (c.phase > ClaimPhase::Ramping || c.verb > Verb::Grasp))
+    if (archive.is_reading() && (c.phase > ClaimPhase::Spent || c.verb > Verb::Grasp))
       archive.fail();
   }
   if (!archive.is_reading()) return;

@@ -5,7 +5,8 @@
 // next, in the order (tick of the first refusal, tool slot), so arrival order inside a tick cannot
 // matter. All of the core or nothing; no hold and wait, so no deadlock.
 //
-// Life of a grasp:  wanted -> (refused, retried while the verb is held)* -> held -> released.
+// Life of a grasp:  wanted -> (refused, retried while the verb is held)* -> held -> released, or
+// slipped off.
 // A silent holder (no sample for 250 ticks) keeps its grasp, but others may take the core over;
 // then its force ramps to zero in 100 ticks. If nobody does, it is held for 2,000 ticks and then
 // ramped down over 500. A holder that leaves frees its core at once.
@@ -34,6 +35,7 @@ enum class ClaimOutcome : std::uint8_t {
   Released = 3,
   TakenOver = 4,
   Expired = 5,
+  Slipped = 6,  // the tissue was pulled out of the grasp
 };
 
 struct ClaimEvent {
@@ -57,6 +59,7 @@ enum class ClaimPhase : std::uint8_t {
   Wanted = 1,   // refused, and retried while the verb is held
   Held = 2,     // in effect from the tick after the grant
   Ramping = 3,  // taken over, left or abandoned: core is free, force fades out
+  Spent = 4,    // slipped off: takes no hold until the verb ends, as jaws must open first
 };
 
 struct Claim {
@@ -85,6 +88,10 @@ class ClaimTable {
 
   // A hand left: its grasps free their core now and fade out; its other claims end.
   void leave(ToolSlot tool, Tick tick);
+
+  // A grasp lost one of its nodes, or the last of them.
+  void release_node(ToolSlot tool, NodeIndex node);
+  void slip_off(ToolSlot tool, Tick tick, std::vector<ClaimEvent>& events);
 
   // Decides all requests (ascending tool slots, occupied tools only) at the end of `tick`. Appends
   // to `events` what a person should hear of, once per change, not once per retry.

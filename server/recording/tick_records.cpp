@@ -4,6 +4,7 @@
 #include <cmath>
 #include <string>
 
+#include "common/wire/tool_shape.h"
 #include "proto/journal.pb.h"
 #include "server/step/simulation.h"
 
@@ -46,10 +47,7 @@ void to_message(const step::TickRecord& record, const step::TickDecisions* previ
     entry.set_slot(join.slot.value);
     for (int i = 0; i < join.tool_count; ++i) {
       const auto& shape = join.shapes[static_cast<std::size_t>(i)];
-      auto& tool = *entry.add_tool();
-      tool.set_radius_m(shape.radius_m);
-      tool.set_length_m(shape.length_m);
-      tool.set_reach_m(shape.reach_m);
+      wire::write(shape, *entry.add_tool());
     }
   }
   for (const auto& sample : record.inputs.samples) {
@@ -99,8 +97,7 @@ Status from_message(const proto::TickRecord& message, step::TickRecord& record) 
     if (join.tool_count < 1 || join.tool_count > kToolsPerHand)
       return bad(record.tick, "join: a hand has 1 or 2 tools");
     for (int i = 0; i < join.tool_count; ++i) {
-      const auto& tool = entry.tool(i);
-      join.shapes[static_cast<std::size_t>(i)] = {tool.radius_m(), tool.length_m(), tool.reach_m()};
+      join.shapes[static_cast<std::size_t>(i)] = wire::read(entry.tool(i));
     }
     record.inputs.joins.push_back(join);
   }

@@ -3,12 +3,13 @@
 #include <cmath>
 
 #include "common/base/version.h"
+#include "common/wire/tool_shape.h"
 #include "proto/wire.pb.h"
 
 namespace trocar::replication {
 namespace {
 
-static_assert(static_cast<int>(locks::ClaimOutcome::Expired) == proto::CLAIM_EXPIRED);
+static_assert(static_cast<int>(locks::ClaimOutcome::Slipped) == proto::CLAIM_SLIPPED);
 static_assert(static_cast<int>(step::RateLevel::Overloaded) == proto::RATE_OVERLOADED);
 
 void write(const Vec3f& from, proto::Vec3& to) {
@@ -57,10 +58,7 @@ void describe(const std::vector<session::Participant>& present, proto::Participa
     entry.set_name(participant.name);
     entry.set_role(static_cast<proto::Role>(participant.role));
     for (const auto& shape : participant.tools) {
-      auto& tool = *entry.add_tool();
-      tool.set_radius_m(shape.radius_m);
-      tool.set_length_m(shape.length_m);
-      tool.set_reach_m(shape.reach_m);
+      wire::write(shape, *entry.add_tool());
     }
   }
 }
@@ -107,6 +105,12 @@ void describe(const step::PublishedFrame& frame, proto::FrameState& state) {
     entry.set_has_claim(tool.has_claim);
     entry.set_penetration_m(tool.penetration_m);
     entry.set_is_silent(tool.is_silent);
+    entry.set_is_inside(tool.is_inside);
+    write(tool.torque_nm, *entry.mutable_torque_nm());
+    if (tool.world_from_proxy != tool.world_from_tool) {
+      write(tool.world_from_proxy.position, *entry.mutable_proxy_position_m());
+      write(tool.world_from_proxy.orientation, *entry.mutable_proxy_orientation());
+    }
   }
   for (std::size_t begin = 0; begin < frame.regions.size();) {
     std::size_t end = begin + 1;
@@ -166,6 +170,8 @@ std::string describe(const locks::ClaimEvent& event, const session::Roster& rost
     case locks::ClaimOutcome::Expired:
       return who + " was silent for " + std::to_string(locks::kAbandonTicks / kTicksPerSecond) +
              " s: the grasp was let go";
+    case locks::ClaimOutcome::Slipped:
+      return who + " lost the grasp: the tissue was pulled out of the jaws";
   }
   return {};
 }

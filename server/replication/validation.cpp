@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "common/base/version.h"
+#include "common/wire/tool_shape.h"
 #include "proto/wire.pb.h"
 
 namespace trocar::replication {
@@ -38,8 +39,7 @@ Result<HelloRequest> check_hello(const proto::Hello& hello, EndReason& reason) {
   request.protocol_minor = hello.protocol_minor();
   request.name = hello.name();
   request.role = wire::role_of(hello.role());
-  for (const auto& tool : hello.tool())
-    request.tools.push_back({tool.radius_m(), tool.length_m(), tool.reach_m()});
+  for (const auto& tool : hello.tool()) request.tools.push_back(wire::read(tool));
   return request;
 }
 

@@ -27,6 +27,7 @@ constexpr std::uint32_t kSweepsPerRelaxation = 100;
 constexpr int kMinContactRounds = static_cast<int>(input::kPoseTicks) + 2;
 constexpr int kMaxContactRounds = 60;
 constexpr float kContactChange_m = 1e-5f;
+constexpr float kNoLimit_m = 10;
 
 double seconds_of(Tick tick) {
   return static_cast<double>(tick) / static_cast<double>(kTicksPerSecond);
@@ -106,6 +107,7 @@ ScenarioRun::ScenarioRun(scene::ResolvedScenario resolved, Solver solver, unsign
       step_count_(steps_of(scenario().run)),
       world_(world_of(resolved_)),
       claims_(world_.node_count()),
+      finder_(organ()),
       queue_(world_.node_count()),
       active_set_(world_.node_count()),
       solver_(organ(), world_, threads) {
@@ -216,7 +218,8 @@ std::span<const NodeIndex> ScenarioRun::collect_active() {
   return active_set_.nodes();
 }
 
-void ScenarioRun::update_claims() {
+void ScenarioRun::follow_contacts() {
+  proxies_.follow(contacts_, world_, tools_);
   claim_events_.clear();
   contact::update_claims(world_, tools_, contacts_, requests_, claims_, grasps_, claim_events_);
 }
@@ -241,14 +244,12 @@ dynamics::SolveSettings ScenarioRun::settings() const {
 StepReport ScenarioRun::step_dynamic() {
   ++world_.tick;
   move_tools(seconds_of(world_.tick - 1), (world_.tick - 1) % kSampleTicks == 0);
-  contact::find_contacts(world_, tools_, claims_, grasps_, world_.tick, contacts_);
+  finder_.find({world_, tools_, claims_, grasps_, proxies_, world_.tick}, contacts_);
   const auto active = collect_active();
 
   const auto& run = scenario().run;
   const auto how = settings();
   const std::uint32_t steps = run.steps_per_tick;
-  for (auto& constraint : contacts_.constraints)
-    constraint.tool_motion = constraint.tool_motion / static_cast<float>(steps);
   StepReport report;
   report.active_nodes = active.size();
   std::uint32_t sweeps = 0;
@@ -256,22 +257,22 @@ StepReport ScenarioRun::step_dynamic() {
     apply_loads(seconds_of(world_.tick - 1) + run.dt_s() * i);
     const dynamics::ExternalLoads loads{forces_, held_, held_displacements_, axis_holds_};
     if (explicit_) {
-      explicit_->step(run.dt_s(), world_, loads);
+      explicit_->step(run.dt_s(), world_, loads);  // without tools: no contacts to keep
       continue;
     }
     report.solve = solver_.solve(contacts_, active, how, world_, loads);
+    finder_.surface_moved(report.solve.largest_move_m);
     sweeps += report.solve.sweeps;
     report.is_converged &=
         solver_kind_ == Solver::Live ||
         (report.solve.residual_n <= how.residual_tolerance_n && report.solve.nodes_rejected == 0);
   }
   report.solve.sweeps = sweeps;
-  solved_dt_ = how.dt;
   if (explicit_)
     for (const auto& u : world_.displacements) report.solve.nodes_rejected += is_finite(u) ? 0 : 1;
   if (boundary_ != scene::Boundary::Whole)
     solver_.take_state(world_, active_set_.settle(queue_, solver_.residuals_n(), world_));
-  update_claims();
+  follow_contacts();
   return report;
 }
 
@@ -279,7 +280,7 @@ StepReport ScenarioRun::relax() {
   auto how = settings();
   const std::uint32_t most = scenario().run.max_sweeps;
   how.residual_tolerance_n = static_cast<float>(scenario().run.tolerance_n);
-  how.dt = solved_dt_ = kStaticStep_s;
+  how.dt = kStaticStep_s;
   how.far_sweeps = 0;
   how.over_relaxation = kStaticOverRelaxation;
   how.has_safeguard = false;
@@ -291,6 +292,7 @@ StepReport ScenarioRun::relax() {
     how.sweeps = std::min(kSweepsPerRelaxation, most - sweeps);
     report.solve = solver_.solve(contacts_, free_nodes_, how, world_,
                                  {forces_, held_, held_displacements_, axis_holds_});
+    finder_.surface_moved(report.solve.largest_move_m);
     std::ranges::fill(world_.velocities, Vec3f{});
     sweeps += report.solve.sweeps;
     report.is_converged =
@@ -315,14 +317,16 @@ StepReport ScenarioRun::step_static() {
        ++round) {
     ++world_.tick;
     move_tools(now, round == 0);
-    contact::find_contacts(world_, tools_, claims_, grasps_, world_.tick, contacts_);
+    // Without time a tool has no speed either.
+    finder_.find({world_, tools_, claims_, grasps_, proxies_, world_.tick, kNoLimit_m, kNoLimit_m},
+                 contacts_);
     before_.assign(world_.displacements.begin(), world_.displacements.end());
     report = relax();
     sweeps += report.solve.sweeps;
     change = 0;
     for (std::size_t i = 0; i < before_.size(); ++i)
       change = std::max(change, length(world_.displacements[i] - before_[i]));
-    update_claims();
+    follow_contacts();
   }
   report.is_converged &= change <= kContactChange_m;
   report.solve.sweeps = sweeps;
@@ -336,7 +340,7 @@ StepReport ScenarioRun::step() {
 }
 
 Vec3d ScenarioRun::holding_force(NodeIndex node) const {
-  Vec3d force = to_double(solver_.holding_force(contacts_, node, solved_dt_));
+  Vec3d force = to_double(solver_.holding_force(contacts_, node));
   const auto hold = std::ranges::lower_bound(axis_holds_, node, {}, &dynamics::AxisHold::node);
   if (hold == axis_holds_.end() || hold->node != node) return force;
   // Along the others it is what the solver left out of balance.
@@ -363,7 +367,7 @@ Vec3d ScenarioRun::probe(std::size_t index) const {
     case scene::ProbeQuantity::ToolForce:
       for (const auto& contact : contacts_.tools)
         if (contact.tool.value == *rule.tool)
-          sum = to_double(solver_.reaction(contacts_, contact, world_, solved_dt_));
+          sum = to_double(contact::reaction_on(contacts_, contact, world_).force_n);
       return sum;
   }
   return sum;

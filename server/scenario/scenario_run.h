@@ -14,8 +14,7 @@
 #include <vector>
 
 #include "common/scene/scenario.h"
-#include "server/contact/contact_list.h"
-#include "server/contact/grasps.h"
+#include "server/contact/contact_finder.h"
 #include "server/dynamics/block_descent.h"
 #include "server/dynamics/explicit_euler.h"
 #include "server/input/tool_table.h"
@@ -84,7 +83,7 @@ class ScenarioRun {
   void move_tools(double time_s, bool takes_samples);
   // What is swept this step, most of all in a graded one.
   std::span<const NodeIndex> collect_active();
-  void update_claims();
+  void follow_contacts();
   dynamics::SolveSettings settings() const;
   StepReport step_dynamic();
   StepReport step_static();
@@ -98,15 +97,16 @@ class ScenarioRun {
 
   std::uint64_t steps_done_ = 0;
   StepReport settling_;
-  float solved_dt_ = kTickSeconds;  // of the last solve, s
 
   world::World world_;
   input::ToolTable tools_;
   locks::ClaimTable claims_;
   contact::GraspTable grasps_;
+  contact::ProxyTable proxies_;
 
   // Scratch of a step.
   session::TickInputs inputs_;
+  contact::ContactFinder finder_;
   contact::ContactList contacts_;
   propagation::PropagationQueue queue_;
   propagation::ActiveSet active_set_;

@@ -21,11 +21,13 @@ namespace trocar::step {
 struct ToolFrame {
   ToolSlot tool;
   Pose world_from_tool;
+  Pose world_from_proxy;  // where the tissue lets it be
   scene::Verb verb = scene::Verb::None;
-  Vec3f force_n;  // of the tissue on the tool, world frame
+  Vec3f force_n, torque_nm;  // of the tissue on the tool, world frame; torque about the tip
   std::uint32_t contact_nodes = 0;
   float penetration_m = 0;  // deepest contact, >= 0
   bool has_claim = false;   // its push or grasp is in effect
+  bool is_inside = false;   // appeared inside tissue: touches nothing until it has come out
   bool is_silent = false;   // lease no longer fresh
 };
 

@@ -13,6 +13,7 @@ void State::visit(world::StateArchive& archive) {
   tools.visit_state(archive);
   claims.visit_state(archive);
   grasps.visit_state(archive, world.node_count());
+  proxies.visit_state(archive);
   archive.fixed_array(quantised);
 }
 
@@ -21,16 +22,13 @@ Scene::Scene(scene::Organ o, unsigned worker_count)
 
 StepContext::StepContext(const Scene& s, const world::World& world)
     : scene(s),
+      finder(s.organ),
       queue(world.node_count()),
       active(world.node_count()),
       solver(s.organ, world, s.workers),
       far_plan(solver.far_plan(kTickSeconds)),
       surface_displacements(s.layout.vertex_count()) {
-  // Enough for many tools in contact; beyond it a tick may allocate once more.
-  contacts.constraints.reserve(8 * contact::kMaxNodesPerTool);
-  contacts.seeds.reserve(8 * contact::kMaxNodesPerTool);
-  contacts.reach_nodes.reserve(8 * contact::kMaxNodesPerTool);
-  contacts.tools.reserve(kMaxTools);
+  contacts.reserve();
   requests.reserve(kMaxTools);
   claim_events.reserve(4 * kMaxTools);
 }
@@ -97,6 +95,7 @@ Status Simulation::restore_snapshot(BytesView snapshot) {
                                          std::to_string(scene_->organ.mesh.node_count()) +
                                          " nodes)"};
   state_ = std::move(restored);
+  context_->finder.forget();
   context_ = std::make_unique<StepContext>(*scene_, state_->world);
   return {};
 }

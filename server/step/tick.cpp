@@ -20,10 +20,12 @@ void admit_inputs(State& state, StepContext& context) {
 }
 
 void find_contacts(const State& state, StepContext& context) {
-  contact::find_contacts(state.world, state.tools, state.claims, state.grasps, state.world.tick,
-                         context.contacts);
+  context.finder.find(
+      {state.world, state.tools, state.claims, state.grasps, state.proxies, state.world.tick},
+      context.contacts);
   context.report.contact_nodes = static_cast<std::uint32_t>(context.contacts.seeds.size());
   if (context.contacts.dropped > 0) context.report.faults |= kFaultContactLimit;
+  if (context.contacts.tools_inside > 0) context.report.faults |= kFaultToolInside;
 }
 
 void fill_queue(State& state, StepContext& context) {
@@ -72,6 +74,7 @@ void solve(State& state, StepContext& context) {
       context.solver.solve(context.contacts, context.active.nodes(), settings, state.world);
   context.solver.take_state(
       state.world, context.active.settle(context.queue, context.solver.residuals_n(), state.world));
+  context.finder.surface_moved(solved.largest_move_m);
   context.report.residual_n = solved.residual_n;
   context.report.sweeps = solved.sweeps;
   context.report.far_sweeps = settings.far_sweeps;
@@ -80,6 +83,10 @@ void solve(State& state, StepContext& context) {
   context.report.nodes_restored = solved.nodes_restored;
   if (solved.is_stepped_down) context.report.faults |= kFaultOverRelaxation;
   if (solved.nodes_rejected > 0) context.report.faults |= kFaultNonFinite;
+}
+
+void follow_contacts(State& state, StepContext& context) {
+  state.proxies.follow(context.contacts, state.world, state.tools);
 }
 
 void update_claims(State& state, StepContext& context) {
@@ -91,17 +98,16 @@ ToolFrame describe_tool(const State& state, const StepContext& context, ToolSlot
   const auto& tool = state.tools[slot];
   ToolFrame frame{.tool = slot, .world_from_tool = tool.pose, .verb = tool.verb};
   frame.has_claim = state.claims.is_in_effect(slot);
+  frame.world_from_proxy = state.proxies[slot].is_placed ? state.proxies[slot].pose : tool.pose;
   frame.is_silent = state.world.tick - tool.last_sample_tick > locks::kLeaseTicks;
   for (const auto& contact : context.contacts.tools) {
     if (contact.tool != slot) continue;
+    frame.is_inside = contact.verb == scene::Verb::Push && !contact.is_placed;
     frame.contact_nodes = contact.seeds_end - contact.seeds_begin;
-    frame.force_n = context.solver.reaction(context.contacts, contact, state.world, kTickSeconds);
-    for (auto i = contact.begin; i < contact.end; ++i) {
-      const auto& c = context.contacts.constraints[i];
-      if (c.kind != contact::NodeConstraint::Kind::HalfSpace) continue;
-      const float gap = dot(c.normal, state.world.displacements[c.node.value] - c.target);
-      frame.penetration_m = std::max(frame.penetration_m, -gap);
-    }
+    const auto reaction = contact::reaction_on(context.contacts, contact, state.world);
+    frame.force_n = reaction.force_n;
+    frame.torque_nm = reaction.torque_nm;
+    frame.penetration_m = reaction.penetration_m;
   }
   return frame;
 }
@@ -154,7 +160,7 @@ void run_tick(State& state, StepContext& context) {
   const auto stage = [&](Stage name, auto&& body) {
     body(state, context);
     const std::uint64_t now = thread_cpu_ns();
-    report.stage_cpu_ns[static_cast<std::size_t>(name)] = static_cast<std::uint32_t>(now - before);
+    report.stage_cpu_ns[static_cast<std::size_t>(name)] += static_cast<std::uint32_t>(now - before);
     before = now;
   };
 
@@ -163,6 +169,7 @@ void run_tick(State& state, StepContext& context) {
   stage(Stage::Contacts, find_contacts);
   stage(Stage::Queue, fill_queue);
   stage(Stage::Solve, solve);
+  stage(Stage::Contacts, follow_contacts);
   stage(Stage::Claims, update_claims);
   stage(Stage::Hash, hash_state);
   if (publishes_frame(state.world.tick)) stage(Stage::Publish, quantise_and_publish);

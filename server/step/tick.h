@@ -7,8 +7,7 @@
 
 #include "common/base/checksum.h"
 #include "common/wire/surface_layout.h"
-#include "server/contact/contact_list.h"
-#include "server/contact/grasps.h"
+#include "server/contact/contact_finder.h"
 #include "server/dynamics/block_descent.h"
 #include "server/input/tool_table.h"
 #include "server/locks/claims.h"
@@ -31,6 +30,7 @@ struct State {
   input::ToolTable tools;
   locks::ClaimTable claims;
   contact::GraspTable grasps;
+  contact::ProxyTable proxies;
   // Last published integers: quantisation has hysteresis, so they are state.
   wire::QuantisedSurface quantised;
 
@@ -57,6 +57,7 @@ struct StepContext {
   TickDecisions decisions;
 
   // Scratch and stage results, valid from their stage to the end of the tick.
+  contact::ContactFinder finder;
   contact::ContactList contacts;
   propagation::PropagationQueue queue;
   propagation::ActiveSet active;

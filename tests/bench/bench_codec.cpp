@@ -20,6 +20,7 @@
 #include "common/base/exit_code.h"
 #include "common/base/timing.h"
 #include "common/journal/session_journal.h"
+#include "common/math/morton.h"
 #include "common/wire/surface_codec.h"
 
 namespace {

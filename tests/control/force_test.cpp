@@ -46,8 +46,9 @@ struct Pressed {
     const auto& contacts = simulation.context().contacts;
     force_n = contacts.tools.empty()
                   ? 0
-                  : static_cast<double>(length(simulation.context().solver.reaction(
-                        contacts, contacts.tools[0], simulation.state().world, kTickSeconds)));
+                  : static_cast<double>(length(
+                        contact::reaction_on(contacts, contacts.tools[0], simulation.state().world)
+                            .force_n));
   }
   const step::TickReport& report() const { return simulation.context().report; }
 

@@ -7,12 +7,13 @@
 #include <numeric>
 
 #include "common/scene/builtin_organs.h"
+#include "server/contact/proxies.h"
 
 namespace trocar::dynamics {
 namespace {
 
 using contact::ContactList;
-using contact::NodeConstraint;
+using contact::ContactPoint;
 
 struct Bench {
   explicit Bench(scene::Organ o) : organ(std::move(o)), world(organ), solver(organ, world) {
@@ -23,12 +24,16 @@ struct Bench {
     return solver.solve(contacts, free_nodes, settings, world);
   }
   void tie(NodeIndex node, const Vec3f& target, float stiffness) {
-    contacts.constraints.push_back({.node = node,
-                                    .kind = NodeConstraint::Kind::Tie,
-                                    .stiffness = stiffness,
-                                    .target = target});
+    contacts.points.push_back({.nodes = {node, node, node},
+                               .weights = {1, 0, 0},
+                               .kind = ContactPoint::Kind::Grip,
+                               .node_count = 1,
+                               .moved = 1,
+                               .stiffness = stiffness,
+                               .limit_n = 1e6f,
+                               .anchor = target});
     contacts.tools = {
-        {.tool = ToolSlot{0}, .end = static_cast<std::uint32_t>(contacts.constraints.size())}};
+        {.tool = ToolSlot{0}, .end = static_cast<std::uint32_t>(contacts.points.size())}};
   }
 
   scene::Organ organ;
@@ -61,7 +66,7 @@ TEST(BlockDescent, AColumnUnderAPullStretchesLikeSpringsInSeries) {
       EXPECT_NEAR(bench.world.displacements[i].y, expected, 1e-3 * expected);
     }
   const Vec3f reaction =
-      bench.solver.reaction(bench.contacts, bench.contacts.tools[0], bench.world, kTickSeconds);
+      contact::reaction_on(bench.contacts, bench.contacts.tools[0], bench.world).force_n;
   EXPECT_NEAR(reaction.y, -4 * force, 4e-3 * force) << "the tissue pulls the tool down";
 }
 
@@ -97,7 +102,7 @@ TEST(BlockDescent, MomentumChangesByTheForcesOfToolsAndDampingAlone) {
     const Vec3d before = momentum();
     const auto report = bench.step({.sweeps = 60, .over_relaxation = 1.2f});
     const Vec3d on_tool = to_double(
-        bench.solver.reaction(bench.contacts, bench.contacts.tools[0], bench.world, kTickSeconds));
+        contact::reaction_on(bench.contacts, bench.contacts.tools[0], bench.world).force_n);
     const Vec3d change = momentum() - before;
     // Each node's imbalance enters the sum: the residual bounds the error of the balance.
     const double bound = 1e-3 * (static_cast<double>(report.residual_n) *
@@ -186,7 +191,7 @@ TEST(BlockDescent, HeldNodesGoWhereTheyArePutAndTheForceForThatIsKnown) {
   const double expected = 0.010 / 5 * bench.organ.material.spring_stiffness_n_m;
   for (std::size_t i = 0; i < held.size(); ++i) {
     EXPECT_EQ(bench.world.displacements[held[i].value], places[i]);
-    const Vec3f force = bench.solver.holding_force(bench.contacts, held[i], kTickSeconds);
+    const Vec3f force = bench.solver.holding_force(bench.contacts, held[i]);
     EXPECT_NEAR(force.y, i < fixed_count ? -expected : expected, 1e-3 * expected);
   }
 }
@@ -209,7 +214,7 @@ TEST(BlockDescent, ANodeHeldAlongOneAxisSlidesAlongTheOthers) {
   for (const auto& hold : holds) {
     EXPECT_EQ(bench.world.displacements[hold.node.value].y, 0.005f);
     EXPECT_GT(bench.world.displacements[hold.node.value].x, 1e-4f);
-    const Vec3f force = bench.solver.holding_force(bench.contacts, hold.node, kTickSeconds);
+    const Vec3f force = bench.solver.holding_force(bench.contacts, hold.node);
     EXPECT_NEAR(force.y, pull - 0.3, 0.05 * pull) << "what the load leaves of it";
     EXPECT_NEAR(force.x, 0, 1e-3);
   }

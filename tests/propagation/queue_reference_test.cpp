@@ -96,8 +96,10 @@ class ReferenceSolver {
             std::uint32_t sweeps) {
     const double dt = 1e-3;
     const auto start = u;
-    std::map<std::uint32_t, std::vector<const contact::NodeConstraint*>> constraints;
-    for (const auto& c : contacts.constraints) constraints[c.node.value].push_back(&c);
+    std::map<std::uint32_t, std::vector<std::pair<const contact::ContactPoint*, int>>> points;
+    for (const auto& point : contacts.points)
+      for (std::size_t k = 0; k < point.nodes.size(); ++k)
+        points[point.nodes[k].value].emplace_back(&point, k);
     for (const auto i : order) u[i] += v[i] * dt;
     for (std::uint32_t sweep = 0; sweep < sweeps; ++sweep)
       for (const auto i : order) {
@@ -122,13 +124,23 @@ class ReferenceSolver {
           add_block(k, k * std::max(0.0, 1 - l0 / length(r)), e);
           add_block(b, 0, e0);
         }
-        for (const auto* c : constraints[i]) {
-          const Vec3d n = to_double(c->normal);
-          const double gap = dot(n, u[i] - to_double(c->target));
-          const Vec3d slip = u[i] - start[i] - to_double(c->tool_motion);
-          const double k = static_cast<double>(c->stiffness), d = static_cast<double>(c->drag) / dt;
-          g += n * (k * std::min(0.0, gap)) + (slip - n * dot(n, slip)) * d;
-          add_block(gap < 0 ? k : 0.0, d, n);
+        for (const auto& [point, corner] : points[i]) {
+          Vec3d d;
+          for (std::size_t k = 0; k < 3; ++k)
+            d += u[point->nodes[k].value] * static_cast<double>(point->weights[k]);
+          const Vec3d n = to_double(point->normal);
+          const double gap = dot(n, d - to_double(point->plane));
+          if (gap >= 0) continue;
+          Vec3d slip = d - to_double(point->anchor);
+          slip -= n * dot(n, slip);
+          const double k = static_cast<double>(point->stiffness);
+          const double weight =
+              static_cast<double>(point->weights[static_cast<std::size_t>(corner)]);
+          const double hold =
+              std::min(static_cast<double>(point->hold_stiffness),
+                       static_cast<double>(point->friction) * k * -gap / length(slip));
+          g += (n * (k * gap) + slip * hold) * weight;
+          add_block(k * weight * weight, hold * weight * weight, n);
         }
         u[i] -= solve(h, g);
       }

@@ -8,26 +8,12 @@
 
 #include "common/scene/builtin_organs.h"
 #include "server/step/simulation.h"
+#include "tests/support/random.h"
 
 namespace trocar::step {
 namespace {
 
-// Small and the same everywhere, so that a seed names a run.
-class Random {
- public:
-  explicit Random(std::uint64_t seed) : state_(seed * 0x9e3779b97f4a7c15ull + 1) {}
-  std::uint32_t below(std::uint32_t n) { return static_cast<std::uint32_t>(next() % n); }
-  double between(double low, double high) {
-    return low + (high - low) * static_cast<double>(next() >> 11) / 9007199254740992.0;
-  }
-
- private:
-  std::uint64_t next() {
-    state_ ^= state_ << 13, state_ ^= state_ >> 7, state_ ^= state_ << 17;
-    return state_;
-  }
-  std::uint64_t state_;
-};
+using testing::Random;
 
 scene::Organ random_organ(Random& random) {
   using scene::ElasticLaw;
@@ -120,13 +106,15 @@ TEST_P(LongRun, StaysFiniteBoundedAndInPlace) {
     const auto& report = simulation.tick(inputs, decisions);
     ASSERT_EQ(report.nodes_rejected, 0u) << "tick " << tick;
     for (const auto& contact : simulation.context().contacts.tools) {
-      const Vec3f tip = simulation.state().tools[contact.tool].pose.position;
-      const Vec3f force = simulation.context().solver.reaction(simulation.context().contacts,
-                                                               contact, world, kTickSeconds);
+      const Vec3f tip = contact.goal.position;
+      const Vec3f force =
+          contact::reaction_on(simulation.context().contacts, contact, world).force_n;
       work += std::max(0.0, -dot(to_double(force), to_double(tip - tips[contact.tool.value])));
     }
     for (std::uint8_t i = 0; i < kMaxTools; ++i)
       tips[i] = simulation.state().tools[ToolSlot{i}].pose.position;
+    for (const auto& contact : simulation.context().contacts.tools)
+      tips[contact.tool.value] = contact.goal.position;
     if (tick % 50 != 0) continue;
     const double energy = energy_of(simulation) - rest_energy;
     largest_excess = std::max(largest_excess, energy - work);
@@ -173,8 +161,8 @@ TEST_P(ForceAcrossDecisions, DoesNotStep) {
   const auto force = [&]() -> double {
     const auto& contacts = simulation.context().contacts;
     if (contacts.tools.empty()) return 0;
-    return static_cast<double>(length(
-        simulation.context().solver.reaction(contacts, contacts.tools[0], world, kTickSeconds)));
+    return static_cast<double>(
+        length(contact::reaction_on(contacts, contacts.tools[0], world).force_n));
   };
   double last = 0, worst = 0, peak = 0;
   for (Tick tick = 1; tick <= 4000; ++tick) {

@@ -7,6 +7,7 @@
 
 #include "common/base/bytes.h"
 #include "common/base/checksum.h"
+#include "common/math/morton.h"
 #include "tests/wire/surface_states.h"
 
 namespace trocar::wire {

@@ -1,0 +1,109 @@
+#pragma once
+
+// Finds what the tools of a tick touch.
+//
+// Push. A tool moves from its proxy to the hand, in steps of at most half its radius. A place of
+// the surface that it meets on the way is carried ahead of it; the plane that holds the place out
+// is the tool's face at the end of the way, on the side from which it was met. So a tool passes
+// through nothing, however thin and however fast it is, and a surface is met from outside only: a
+// tool that appears inside tissue, deeper than kBack_m along its shaft, touches nothing until it
+// has come out. Places within kMargin_m
+// get a plane before they touch, so that none slips in during a tick.
+//
+// Grasp. Nodes held by the jaws are gripped where they are in the jaws' frame.
+//
+// Work: triangles near a tool, listed with some slack and listed again when the tool and the
+// surface together have moved that far; O(surface nodes) then. Results do not depend on when.
+
+#include <span>
+#include <vector>
+
+#include "server/contact/contact_list.h"
+#include "server/contact/grasps.h"
+#include "server/contact/proxies.h"
+#include "server/contact/surface.h"
+#include "server/contact/tool_solid.h"
+
+namespace trocar::contact {
+
+// Stiffness of contact per surface area, Pa/m, for tools of 8 mm radius and more: at the 1 cm^2 of
+// a node of a 4,000-node liver this is 2.5 kN/m, a hundred times the tissue's own: 0.1 N indents
+// 0.04 mm. Ten times less is visibly soft; ten times more slows the solver's convergence. It is the
+// value of the paraboloid tool in graded-exterior's measurements. What a thinner tool touches is
+// smaller in proportion to the square of its radius, and its face is stiffer by that much.
+inline constexpr float kStiffnessPaPerM = 2.5e7f;
+inline constexpr float kStiffnessRadius_m = 0.008f;
+// Friction's elastic range: how stiff it is beside the face.
+inline constexpr float kHoldRatio = 0.5f;
+inline constexpr float kMargin_m = 0.001f;
+// A tool presses no harder than this many times the greatest Young's modulus in the organ, whatever
+// the hand does: tissue is moved aside, or the tool stops; it is not crushed.
+inline constexpr float kGreatestPressure = 5;
+// A hand that moves farther than this in a tick, 10 m/s, has not moved but appeared.
+inline constexpr float kJump_m = 0.01f;
+// A hand at 5 m/s; a faster one is followed at that speed.
+inline constexpr float kMaxStep_m = 0.005f;
+// What appears inside by no more than this is taken to have come from outside.
+inline constexpr float kBack_m = 0.012f;
+// Places of a tool are this many radii apart, at most: between them it enters by 1/20 of a radius.
+inline constexpr float kPlaceSpacing = 0.6f;
+
+struct ContactScene {
+  const world::World& world;
+  const input::ToolTable& tools;
+  const locks::ClaimTable& claims;
+  const GraspTable& grasps;
+  const ProxyTable& proxies;
+  Tick tick = 0;
+  // Per tick, of any point of a tool's core: how far a proxy walks, and beyond what a hand has
+  // appeared.
+  float max_step_m = kMaxStep_m, jump_m = kJump_m;
+};
+
+class ContactFinder {
+ public:
+  explicit ContactFinder(const scene::Organ& organ);
+
+  void find(const ContactScene& scene, ContactList& out);
+
+  // No node has moved by more than this since the last call.
+  void surface_moved(float at_most_m) { surface_travel_ += at_most_m; }
+  // Nodes are anywhere: a restored state.
+  void forget();
+
+  const Surface& surface() const { return surface_; }
+  // Triangles looked at by the last find(), all tools together.
+  std::size_t triangles_visited() const { return triangles_visited_; }
+
+ private:
+  // Triangles that a tool can meet while its core's corners and the surface, together, have moved
+  // by less than kSlack_m.
+  struct Nearby {
+    bool is_known = false;
+    std::array<Vec3f, 4> corners;
+    float range = 0;
+    double surface_travel = 0;
+    std::vector<TriangleIndex> triangles;
+  };
+
+  void plan_way(const ContactScene& scene, ToolContact& contact);
+  void lay_path(const trocar::scene::ToolShape& shape, const ToolContact& contact, float way);
+  bool comes_from_outside(const ContactScene& scene, ToolContact& contact);
+  void find_push(const ContactScene& scene, float strength, ContactList& out);
+  ContactPoint point_of(const ContactScene& scene, ToolSlot tool, TriangleIndex triangle,
+                        const std::array<float, 3>& place) const;
+  void add_grips(const ContactScene& scene, ToolSlot slot, float strength, ContactList& out) const;
+  void find_reach(const ContactScene& scene, ToolSlot slot, ContactList& out) const;
+  bool is_inside_tissue(std::span<const TriangleIndex> triangles, const world::World& world) const;
+  std::span<const TriangleIndex> triangles_near(const world::World& world, ToolSlot slot);
+
+  Surface surface_;
+  float greatest_pressure_ = 0;   // Pa
+  double surface_travel_ = 0;     // m, sum over ticks
+  double refreshed_travel_ = -1;  // at the surface's last refresh
+  std::array<Nearby, kMaxTools> nearby_;
+  std::vector<ToolSolid> path_;  // of the tool in work: start, ..., goal
+  std::size_t triangles_visited_ = 0;
+};
+
+}  // namespace trocar::contact

@@ -1,0 +1,118 @@
+#include "server/contact/proxies.h"
+
+#include "server/contact/contact_law.h"
+
+namespace trocar::contact {
+namespace {
+
+constexpr int kMaxPushesOut = 24;
+constexpr float kOutside_m = 1e-6f;
+// What may be left inside, in radii, of a tool that the surface holds from all sides; with more it
+// rather stays where it was.
+constexpr float kLeftInside = 0.1f;
+// A tool that presses walks at most by what it walked in the tick before and a fifth, and as deep
+// as its force still grows.
+constexpr float kFaster = 1.2f, kDeeper = 1.5f;
+
+struct WayOut {
+  Vec3f moved;      // m, of the tool
+  float depth = 0;  // m, of the point that is still deepest inside
+};
+// Out of the deepest point first, then out of what is deepest then.
+WayOut way_out(std::span<const ContactPoint> points, const world::World& world, const Vec3f& from) {
+  WayOut result{from};
+  for (int i = 0; i <= kMaxPushesOut; ++i) {
+    const ContactPoint* deepest = nullptr;
+    result.depth = kOutside_m;
+    for (const auto& point : points) {
+      const float depth =
+          -dot(point.normal, displacement_of(point, world) - point.plane - result.moved);
+      if (depth > result.depth) deepest = &point, result.depth = depth;
+    }
+    if (deepest == nullptr || i == kMaxPushesOut) break;
+    result.moved -= deepest->normal * result.depth;
+  }
+  return result;
+}
+
+void follow_push(const ContactList& contacts, const ToolContact& tool, const world::World& world,
+                 const input::Tool& hand, Proxy& proxy) {
+  proxy.is_placed = tool.is_placed;
+  proxy.pose = tool.goal;
+  proxy.hand = hand.pose;
+  proxy.places.clear();
+  proxy.anchors.clear();
+  const auto points = contacts.points_of(tool);
+  for (const auto& point : points) {
+    const Vec3f d = displacement_of(point, world);
+    const auto load = load_at(point, d);
+    if (!(load.pressed_n > 0)) continue;
+    // Across the face it is where the slip ends that friction can hold; along the normal it is of
+    // no account, and stays with the point.
+    const Vec3f held =
+        load.slides ? d - load.slip * (load.rigidity / point.hold_stiffness) : d - load.slip;
+    proxy.places.push_back(point.place);
+    proxy.anchors.push_back(tool.goal.apply_inverse(rest_position_of(point, world) + held));
+  }
+  auto out = way_out(points, world, {});
+  if (out.depth > kLeftInside * hand.shape.radius_m) {
+    const auto back = way_out(points, world, tool.start.position - tool.goal.position);
+    if (back.depth < out.depth) {
+      out = back;
+      proxy.pose.orientation = tool.start.orientation;
+    }
+  }
+  proxy.pose.position += out.moved;
+  const float walked = length(proxy.pose.position - tool.start.position);
+  proxy.step_m = proxy.places.empty() ? 1e3f : kFaster * walked + kDeeper * tool.softness_m;
+}
+
+}  // namespace
+
+Reaction reaction_on(const ContactList& contacts, const ToolContact& tool,
+                     const world::World& world) {
+  Reaction reaction;
+  for (const auto& point : contacts.points_of(tool)) {
+    const Vec3f d = displacement_of(point, world);
+    const auto load = load_at(point, d);
+    reaction.force_n += load.gradient;
+    const Vec3f arm = rest_position_of(point, world) + d - tool.goal.position;
+    reaction.torque_nm += cross(arm, load.gradient);
+    if (point.kind == ContactPoint::Kind::Push)
+      reaction.penetration_m =
+          std::max(reaction.penetration_m, -dot(point.normal, d - point.plane));
+  }
+  return reaction;
+}
+
+void ProxyTable::follow(const ContactList& contacts, const world::World& world,
+                        const input::ToolTable& tools) {
+  std::array<bool, kMaxTools> pushes{};
+  for (const auto& tool : contacts.tools) {
+    if (tool.verb != scene::Verb::Push) continue;
+    pushes[tool.tool.value] = true;
+    follow_push(contacts, tool, world, tools[tool.tool], proxies_[tool.tool.value]);
+  }
+  for (std::size_t i = 0; i < proxies_.size(); ++i) {
+    if (pushes[i] || !proxies_[i].is_placed) continue;
+    proxies_[i].is_placed = false;
+    proxies_[i].pose = proxies_[i].hand = {};
+    proxies_[i].step_m = 0;
+    proxies_[i].places.clear();
+    proxies_[i].anchors.clear();
+  }
+}
+
+void ProxyTable::visit_state(world::StateArchive& archive) {
+  for (auto& proxy : proxies_) {
+    archive.flag(proxy.is_placed);
+    archive.value(proxy.pose);
+    archive.value(proxy.hand);
+    archive.value(proxy.step_m);
+    archive.sized_array(proxy.places, kMaxPointsPerTool);
+    archive.sized_array(proxy.anchors, kMaxPointsPerTool);
+    if (archive.is_reading() && proxy.places.size() != proxy.anchors.size()) archive.fail();
+  }
+}
+
+}  // namespace trocar::contact

@@ -1,0 +1,54 @@
+#pragma once
+
+// A pushing tool's proxy: the tool as the tissue sees it (the god-object of Zilles & Salisbury
+// 1995, for a tool with a volume as in Ruspini 1997, on tissue that yields). It walks to where the
+// hand is, at most so far per tick, and never through a face it has not pushed ahead of it. After
+// each tick it stands as near to the hand as the surface then lets it: outside. What a hand feels
+// is `force_n` and `torque_nm`, the sum of what the surface does to the tool on its way there.
+//
+// The proxy also keeps where friction holds each touched point: an anchor in the tool's frame,
+// dragged along where the point slides.
+
+#include <array>
+#include <vector>
+
+#include "server/contact/contact_list.h"
+#include "server/input/tool_table.h"
+#include "server/world/state_archive.h"
+
+namespace trocar::contact {
+
+struct Proxy {
+  bool is_placed = false;  // false: the tool pushes nothing, and will appear where the hand is
+  Pose pose;               // world_from_tool
+  Pose hand;               // where the hand was in the last tick
+  float step_m = 0;        // how far it may walk in the next
+  std::vector<std::uint32_t> places;  // pressed points of the surface, ascending
+  std::vector<Vec3f> anchors;         // m, tool frame; per place
+};
+
+// Of the tissue on the tool, world frame.
+struct Reaction {
+  Vec3f force_n;
+  Vec3f torque_nm;          // about the tip
+  float penetration_m = 0;  // deepest that a point is inside the tool; 0 for a grasp
+};
+Reaction reaction_on(const ContactList& contacts, const ToolContact& tool,
+                     const world::World& world);
+
+class ProxyTable {
+ public:
+  const Proxy& operator[](ToolSlot slot) const { return proxies_[slot.value]; }
+
+  // After the solve: proxies go where the surface lets them, anchors follow what slid. Tools that
+  // do not push lose theirs.
+  void follow(const ContactList& contacts, const world::World& world,
+              const input::ToolTable& tools);
+
+  void visit_state(world::StateArchive& archive);
+
+ private:
+  std::array<Proxy, kMaxTools> proxies_;
+};
+
+}  // namespace trocar::contact

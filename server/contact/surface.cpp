@@ -1,0 +1,98 @@
+#include "server/contact/surface.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "common/math/morton.h"
+
+namespace trocar::contact {
+namespace {
+
+constexpr std::size_t kBundleTriangles = 16;
+
+using Places = std::vector<std::array<float, 3>>;
+
+// The rows of a triangle cut into n^2: upright parts at (i, j) with i + j < n, and between them
+// those that stand on their tip.
+Places centres(std::uint32_t n) {
+  Places result;
+  const float part = 1.0f / static_cast<float>(n);
+  const auto add = [&](std::uint32_t i, std::uint32_t j, float offset) {
+    const float a = (static_cast<float>(i) + offset) * part;
+    const float b = (static_cast<float>(j) + offset) * part;
+    result.push_back({a, b, 1.0f - a - b});
+  };
+  for (std::uint32_t i = 0; i < n; ++i)
+    for (std::uint32_t j = 0; i + j < n; ++j) {
+      add(i, j, 1.0f / 3.0f);
+      if (i + j + 1 < n) add(i, j, 2.0f / 3.0f);
+    }
+  return result;
+}
+
+std::array<Places, kMaxDivisions> all_centres() {
+  std::array<Places, kMaxDivisions> result;
+  for (std::uint32_t n = 1; n <= kMaxDivisions; ++n) result[n - 1] = centres(n);
+  return result;
+}
+
+}  // namespace
+
+std::span<const std::array<float, 3>> places_on_triangle(std::uint32_t divisions) {
+  static const auto places = all_centres();
+  return places[divisions - 1];
+}
+
+Surface::Surface(const scene::Organ& organ) {
+  const auto& mesh = organ.mesh;
+  std::vector<Vec3d> centroids;
+  for (const auto& nodes : mesh.boundary_triangles) {
+    const Vec3d a = mesh.rest_positions[nodes[0].value], b = mesh.rest_positions[nodes[1].value],
+                c = mesh.rest_positions[nodes[2].value];
+    const double longest = std::max({length(b - a), length(c - b), length(a - c)});
+    triangles_.push_back(
+        {nodes, static_cast<float>(length(cross(b - a, c - a)) / 2), static_cast<float>(longest)});
+    centroids.push_back((a + b + c) / 3);
+  }
+  for (const auto t : morton_order(centroids)) order_.push_back(TriangleIndex(t));
+  for (std::size_t first = 0; first < order_.size(); first += kBundleTriangles) {
+    const auto last = std::min(first + kBundleTriangles, order_.size());
+    Bundle bundle{static_cast<std::uint32_t>(first),
+                  static_cast<std::uint32_t>(last),
+                  static_cast<std::uint32_t>(nodes_.size()),
+                  0,
+                  {}};
+    for (auto i = first; i < last; ++i)
+      for (const auto node : triangles_[order_[i].value].nodes) nodes_.push_back(node);
+    const auto begin = nodes_.begin() + bundle.first_node;
+    std::sort(begin, nodes_.end());
+    nodes_.erase(std::unique(begin, nodes_.end()), nodes_.end());
+    bundle.last_node = static_cast<std::uint32_t>(nodes_.size());
+    bundles_.push_back(bundle);
+  }
+}
+
+void Surface::refresh(const world::World& world) {
+  for (auto& bundle : bundles_) {
+    bundle.box = {};
+    for (auto i = bundle.first_node; i < bundle.last_node; ++i)
+      bundle.box.include(world.position(nodes_[i]));
+  }
+}
+
+void Surface::collect(const Box& box, const world::World& world,
+                      std::vector<TriangleIndex>& found) const {
+  found.clear();
+  for (const auto& bundle : bundles_) {
+    if (!bundle.box.overlaps(box)) continue;
+    for (auto i = bundle.first_triangle; i < bundle.last_triangle; ++i) {
+      Box own;
+      for (const auto node : triangles_[order_[i].value].nodes) own.include(world.position(node));
+      if (own.overlaps(box)) found.push_back(order_[i]);
+    }
+  }
+  std::ranges::sort(found);
+}
+
+}  // namespace trocar::contact

@@ -1,0 +1,90 @@
+#pragma once
+
+// The boundary triangles as contact sees them: where they are now, which of them are near a box,
+// and the places on each at which contact acts.
+//
+// A triangle whose longest edge is e is cut into n^2 equal parts, n = ceil(e / spacing), at most
+// kMaxDivisions; the centre of each part is a place that stands for its share of the area. So the
+// pressure of a tool is an integral over the surface, and two meshes of one surface agree about it
+// (nodes alone were seen to give two answers 15 % apart). Divisions follow from the rest shape,
+// unless a triangle is stretched far.
+//
+// Triangles are kept in bundles along a Morton curve, each with the box around its nodes as they
+// were at the last refresh(). refresh(): O(surface nodes). collect(): O(bundles + found).
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <span>
+#include <vector>
+
+#include "common/base/index.h"
+#include "common/scene/organ.h"
+#include "server/world/world.h"
+
+namespace trocar::contact {
+
+struct Box {
+  Vec3f least{1e30f, 1e30f, 1e30f}, most{-1e30f, -1e30f, -1e30f};
+
+  void include(const Vec3f& p) {
+    least = {std::min(least.x, p.x), std::min(least.y, p.y), std::min(least.z, p.z)};
+    most = {std::max(most.x, p.x), std::max(most.y, p.y), std::max(most.z, p.z)};
+  }
+  void grow(float by) {
+    least -= Vec3f{by, by, by};
+    most += Vec3f{by, by, by};
+  }
+  bool overlaps(const Box& b) const {
+    return least.x <= b.most.x && b.least.x <= most.x && least.y <= b.most.y &&
+           b.least.y <= most.y && least.z <= b.most.z && b.least.z <= most.z;
+  }
+};
+
+inline constexpr std::uint32_t kMaxDivisions = 8;
+
+struct SurfaceTriangle {
+  std::array<NodeIndex, 3> nodes;  // counter-clockwise seen from outside
+  float area = 0;                  // m^2, at rest
+  float longest_edge = 0;          // m, at rest
+
+  // width_m: as it is now. A triangle that is stretched has more places, but not before a quarter
+  // more, so that their number does not flutter.
+  std::uint32_t divisions(float spacing_m, float width_m) const {
+    const float edge = std::max(longest_edge, 0.8f * width_m);
+    return std::clamp(static_cast<std::uint32_t>(std::ceil(edge / spacing_m)), 1u, kMaxDivisions);
+  }
+};
+
+// Barycentric centres of the n^2 parts of a triangle; sum of each is 1.
+std::span<const std::array<float, 3>> places_on_triangle(std::uint32_t divisions);
+
+class Surface {
+ public:
+  explicit Surface(const scene::Organ& organ);
+
+  // By boundary triangle of the mesh.
+  const SurfaceTriangle& operator[](TriangleIndex triangle) const {
+    return triangles_[triangle.value];
+  }
+  std::size_t triangle_count() const { return triangles_.size(); }
+
+  // Takes the boxes from where the nodes are now.
+  void refresh(const world::World& world);
+  // Triangles whose bundle overlaps the box and whose own box, now, does too; ascending.
+  void collect(const Box& box, const world::World& world, std::vector<TriangleIndex>& found) const;
+
+ private:
+  struct Bundle {
+    std::uint32_t first_triangle = 0, last_triangle = 0;  // into order_
+    std::uint32_t first_node = 0, last_node = 0;          // into nodes_
+    Box box;
+  };
+
+  std::vector<SurfaceTriangle> triangles_;
+  std::vector<TriangleIndex> order_;
+  std::vector<NodeIndex> nodes_;
+  std::vector<Bundle> bundles_;
+};
+
+}  // namespace trocar::contact

@@ -1,0 +1,40 @@
+#pragma once
+
+// The solid of a tool: all points within its radius of a core. The core is a rectangle that holds
+// the shaft's axis, `2 half_width` across (the tool's x) and as long as the shaft less both end
+// caps (the tool's z). With half_width = 0 that is a capsule, with a shaft of two radii a sphere,
+// with a small radius a blade with round edges. The tip of the shaft is the tool frame's origin.
+
+#include <algorithm>
+#include <array>
+
+#include "common/math/frame.h"
+#include "common/scene/tool.h"
+
+namespace trocar::contact {
+
+struct ToolSolid {
+  Vec3f begin, across, along;  // of the core, world frame; across and along are unit vectors
+  float half_width = 0, length = 0, radius = 0;  // m
+
+  ToolSolid(const Pose& pose, const scene::ToolShape& shape)
+      : across(rotate(pose.orientation, {1, 0, 0})),
+        along(rotate(pose.orientation, {0, 0, 1})),
+        half_width(shape.half_width_m),
+        length(std::max(0.0f, shape.length_m - 2 * shape.radius_m)),
+        radius(shape.radius_m) {
+    begin = pose.position + along * radius;
+  }
+
+  Vec3f nearest_on_core(const Vec3f& p) const {
+    const Vec3f d = p - begin;
+    return begin + across * std::clamp(dot(d, across), -half_width, half_width) +
+           along * std::clamp(dot(d, along), 0.0f, length);
+  }
+  std::array<Vec3f, 4> core_corners() const {
+    const Vec3f a = across * half_width, b = along * length;
+    return {begin - a, begin + a, begin - a + b, begin + a + b};
+  }
+};
+
+}  // namespace trocar::contact
