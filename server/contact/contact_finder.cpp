@@ -292,8 +292,8 @@ void ContactFinder::add_grips(const ContactScene& scene, ToolSlot slot, float st
          .moved = 1,
          .place = static_cast<std::uint32_t>(i),
          .stiffness = kStiffnessPaPerM * own * strength,
-         .limit_n = grasp.grip_n * (own / area) * strength,
-         .anchor = contact.goal.apply(grasp.offsets[i]) - world.rest_positions[node.value]});
+         .limit_n = grasp.grip_n * (own / area) * grasp.closed * strength,
+         .anchor = contact.goal.apply(held_offset(grasp, i)) - world.rest_positions[node.value]});
     out.seeds.push_back(node);
   }
 }

@@ -1,5 +1,7 @@
 #include "server/contact/grasps.h"
 
+#include <algorithm>
+
 #include "server/contact/contact_law.h"
 
 namespace trocar::contact {
@@ -22,11 +24,13 @@ void GraspTable::follow_claims(const world::World& world, const input::ToolTable
     if (!grips) {
       grasp.nodes.clear();
       grasp.offsets.clear();
-      grasp.grip_n = grasp.reach_m = 0;
+      grasp.grip_n = grasp.reach_m = grasp.closed = 0;
       grasp.is_anchored = false;
       grasp.anchor = {};
     } else if (claim.phase == locks::ClaimPhase::Ramping) {
       anchor(slot, tools[slot].pose);
+    } else {
+      grasp.closed = std::min(1.0f, grasp.closed + 1 / kClosingTicks);
     }
   }
   for (const auto& request : requests) {
@@ -61,6 +65,7 @@ void GraspTable::follow_slip(const ContactList& contacts, const world::World& wo
       const Vec3f held = d - load.slip * (load.rigidity / point.stiffness);
       Vec3f& offset = grasp.offsets[point.place];
       offset = tool.goal.apply_inverse(rest_position_of(point, world) + held);
+      offset.x /= 1 - kSqueeze * grasp.closed;
       if (!(length_squared(offset) > lost * lost)) continue;
       claims.release_node(tool.tool, grasp.nodes[point.place]);
       grasp.nodes[point.place] = NodeIndex();
@@ -85,6 +90,7 @@ void GraspTable::visit_state(world::StateArchive& archive, std::size_t node_coun
     archive.sized_array(grasp.offsets, kMaxPointsPerTool);
     archive.value(grasp.grip_n);
     archive.value(grasp.reach_m);
+    archive.value(grasp.closed);
     archive.flag(grasp.is_anchored);
     archive.value(grasp.anchor);
     if (!archive.is_reading()) continue;

@@ -3,8 +3,9 @@
 // Which nodes each grasping tool holds, and where in its frame. Created when a claim is granted,
 // dropped when it ends. Each node is held with its share, by surface area, of the grip: pulled
 // harder it slips between the jaws, and is lost where it leaves them; a grasp that has lost all of
-// its nodes has slipped off. While a claim fades out (its holder left, fell silent or was taken
-// over) the grasp stays where it last was, whatever becomes of the tool's slot.
+// its nodes has slipped off. Jaws close in kClosingTicks, along the tool's x: what lies between
+// them is squeezed, and the grip grows with it. While a claim fades out (its holder left, fell
+// silent or was taken over) the grasp stays where it last was, whatever becomes of the tool's slot.
 
 #include <array>
 #include <span>
@@ -17,14 +18,25 @@
 
 namespace trocar::contact {
 
+inline constexpr float kClosingTicks = 100;
+// How much thinner tissue is between closed jaws.
+inline constexpr float kSqueeze = 0.4f;
+
 struct Grasp {
   std::vector<NodeIndex> nodes;  // ascending; empty: nothing held
-  std::vector<Vec3f> offsets;    // m, tool frame
+  std::vector<Vec3f> offsets;    // m, tool frame, with the jaws still open
   float grip_n = 0;              // of all nodes together
   float reach_m = 0;             // how far the jaws hold
+  float closed = 0;              // 0: jaws open, 1: closed
   bool is_anchored = false;      // fading out: `anchor` replaces the tool's pose
   Pose anchor;                   // world_from_tool
 };
+
+// Where the jaws hold a node, tool frame.
+inline Vec3f held_offset(const Grasp& grasp, std::size_t i) {
+  const Vec3f& offset = grasp.offsets[i];
+  return {offset.x * (1 - kSqueeze * grasp.closed), offset.y, offset.z};
+}
 
 class GraspTable {
  public:

@@ -65,6 +65,29 @@ TEST(Grasp, AFirmGripHoldsAsFarAsTheHandGoes) {
   EXPECT_EQ(scene.simulation.state().grasps[ToolSlot{0}].nodes.size(), pulled.taken);
 }
 
+TEST(Grasp, JawsCloseAndSqueezeWhatLiesBetweenThem) {
+  const auto organ = block(6, 4, 6, 0.008);
+  const float top = top_of(organ);
+  HandScene scene(organ);
+  scene.join(0, {.radius_m = 0.004f, .reach_m = 0.012f});
+  const Pose pose = upright({0, top, 0});
+  scene.hold(0, pose, 16, Verb::Grasp);
+  const auto& grasp = scene.simulation.state().grasps[ToolSlot{0}];
+  ASSERT_FALSE(grasp.nodes.empty());
+  const auto width = [&] {
+    float least = 1, most = -1;
+    for (const auto node : grasp.nodes) {
+      const float x = pose.apply_inverse(scene.world().position(node)).x;
+      least = std::min(least, x), most = std::max(most, x);
+    }
+    return most - least;
+  };
+  const float open = width();
+  scene.hold(0, pose, 400, Verb::Grasp);
+  EXPECT_EQ(grasp.closed, 1);
+  EXPECT_NEAR(width(), (1 - kSqueeze) * open, 0.05f * open);
+}
+
 TEST(Grasp, TwoHandsPullOneFlapAndTheirForcesBalanceWhatHoldsIt) {
   // A strip fixed at its far end: the pull of both arrives there.
   auto organ = block(4, 13, 4, 0.008);
