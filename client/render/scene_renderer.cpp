@@ -291,7 +291,9 @@ void SceneRenderer::Parts::draw_organ(const SceneView& scene, const OrbitCamera&
     const SceneTool& caster = scene.tools[static_cast<std::size_t>(i)];
     const Vec3f p = caster.world_from_tool.position;
     const Vec3f a = rotate(caster.world_from_tool.orientation, {0, 0, 1});
-    tips.insert(tips.end(), {p.x, p.y, p.z, caster.shape.radius_m});
+    // A flat tool's shadow is that of a rod of about its width.
+    const float width = caster.shape.radius_m + 0.5f * caster.shape.half_width_m;
+    tips.insert(tips.end(), {p.x, p.y, p.z, width});
     shafts.insert(shafts.end(), {a.x, a.y, a.z, caster.shape.length_m});
   }
   organ.set("shadow_count", shadow_count);

@@ -61,7 +61,7 @@ void revolve(std::span<const ProfilePoint> profile, int segments, float from, fl
 
 Colour colour_of_slot(int slot) {
   static constexpr std::array<Colour, 16> kColours = {{{64, 186, 255},
-                                                       {255, 176, 46},
+                                                       {255, 136, 26},
                                                        {112, 224, 112},
                                                        {232, 116, 236},
                                                        {255, 112, 98},
@@ -183,7 +183,7 @@ MeshVertices make_blade(const scene::ToolShape& shape, Colour colour) {
       out.insert(out.end(), {p, q, s, p, s, t});
   }
   // A round neck and grip beyond the blade, for the eye only.
-  const float neck = std::max(0.5f * w, 1.2f * r), end = far_end + r;
+  const float neck = std::clamp(0.3f * w, 0.0025f, 0.006f), end = far_end + r;
   const Material ring = plastic(colour);
   const ProfilePoint profile[] = {
       {end - 0.4f * r, 0, kSteel},         {end - 0.4f * r, neck, kSteel},

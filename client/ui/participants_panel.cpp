@@ -66,11 +66,13 @@ void draw_plot(const HudParticipant& p, float greatest_n, float scale) {
 
 void draw_figures(const HudParticipant& p) {
   if (!p.has_tool || (p.contact_nodes == 0 && p.force_n < 0.005f)) return;
-  ImGui::Text("%5.2f N", static_cast<double>(p.force_n));
+  ImGui::Text("%.2f N", static_cast<double>(p.force_n));
+  ImGui::SameLine();
   if (p.is_self && p.torque_nm >= 0.5e-3f) {
+    ImGui::Text("%.0f mN m", static_cast<double>(p.torque_nm) * 1e3);
     ImGui::SameLine();
-    ImGui::TextDisabled("%.0f mN m", static_cast<double>(p.torque_nm) * 1e3);
   }
+  ImGui::TextDisabled("%u nodes", p.contact_nodes);
 }
 
 }  // namespace

@@ -37,7 +37,7 @@ RateText describe(const replica::RateFigures& rate) {
       text.level = "full detail";
       break;
     case replica::RateLevel::Reduced:
-      text.level = "less detail away from the tools";
+      text.level = "less detail, to keep pace";
       text.tone = RateTone::Notice;
       break;
     case replica::RateLevel::Overloaded:

@@ -91,9 +91,12 @@ class PictureTest : public ::testing::Test {
   }
 
   static wire::SurfaceLayout liver() {
-    auto organ = scene::make_liver();
-    EXPECT_TRUE(organ.ok());
-    return wire::make_surface_layout(*organ);
+    static const wire::SurfaceLayout kLayout = [] {
+      auto organ = scene::make_liver();
+      EXPECT_TRUE(organ.ok());
+      return wire::make_surface_layout(*organ);
+    }();
+    return kLayout;
   }
 
   ClientOptions options_;

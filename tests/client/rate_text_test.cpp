@@ -21,7 +21,7 @@ replica::RateFigures figures(replica::RateLevel level) {
 
 TEST(RateText, SaysWhatIsDecidedInWordsAndFigures) {
   const auto text = describe(figures(replica::RateLevel::Reduced));
-  EXPECT_EQ(text.level, "less detail away from the tools");
+  EXPECT_EQ(text.level, "less detail, to keep pace");
   EXPECT_EQ(text.sweeps, "4 at the tools, then 3, 2, 1");
   EXPECT_EQ(text.load, "612 of 800 us planned (77 %)");
   EXPECT_EQ(text.changes, "1,234 down, 7 up");
