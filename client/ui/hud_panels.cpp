@@ -116,13 +116,16 @@ void draw_session_panel(const HudModel& model, float scale) {
 void draw_slow_time(const HudModel& model, float scale) {
   // A recording plays at its own speed, however slow the session was.
   if (model.timeline || !model.status.empty()) return;
-  std::string banner = describe(model.figures.rate).banner;
-  if (banner.empty()) return;
-  if (model.has_own_tool) banner += " Move slowly.";
+  const RateText text = describe(model.figures.rate);
+  if (text.banner.empty()) return;
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
-  ImGui::SetNextWindowPos({screen.x / 2, screen.y - kMargin * scale}, 0, {0.5f, 1});
+  ImGui::SetNextWindowPos({screen.x / 2, kMargin * scale}, 0, {0.5f, 0});
   ImGui::Begin("slow", nullptr, kGlass);
-  ImGui::TextColored(kTrouble, "%s", banner.c_str());
+  ImGui::PushFont(bold());
+  ImGui::TextColored(kTrouble, "%s", text.banner.c_str());
+  ImGui::PopFont();
+  ImGui::TextDisabled("%s", model.has_own_tool ? "the server cannot keep up: move slowly"
+                                               : "the server cannot keep up");
   ImGui::End();
 }
 
@@ -145,7 +148,6 @@ void draw_labels(const HudModel& model, float scale) {
 void draw_messages(const HudModel& model, float scale) {
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
   float y = screen.y - (model.timeline ? 92 : 40) * scale;
-  if (!model.timeline && model.figures.rate.time_rate < kSlowTimeRate) y -= 36 * scale;
   ImDrawList* list = ImGui::GetForegroundDrawList();
   for (auto message = model.messages.rbegin(); message != model.messages.rend(); ++message) {
     const float alpha = std::clamp(5.0f - message->age_seconds, 0.0f, 1.0f);
@@ -198,7 +200,11 @@ void draw_timeline(const HudTimeline& timeline, float scale, HudActions& actions
 void draw_help(const HudModel& model, float scale) {
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
   const float bottom = screen.y - (model.timeline ? 70 : kMargin) * scale;
-  ImGui::SetNextWindowPos({kMargin * scale, bottom}, 0, {0, 1});
+  // The hint is at the left; the whole list, which is tall, under the shorter panel.
+  if (model.shows_help)
+    ImGui::SetNextWindowPos({screen.x - kMargin * scale, bottom}, 0, {1, 1});
+  else
+    ImGui::SetNextWindowPos({kMargin * scale, bottom}, 0, {0, 1});
   ImGui::SetNextWindowBgAlpha(model.shows_help ? 0.86f : 0.45f);
   ImGui::Begin("help", nullptr, kGlass);
   if (!model.shows_help) {

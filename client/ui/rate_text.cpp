@@ -53,8 +53,7 @@ RateText describe(const replica::RateFigures& rate) {
     text.changes = with_thousands(rate.lowered) + " down, " + with_thousands(rate.raised) + " up";
   if (rate.time_rate < kSlowTimeRate) {
     text.tone = RateTone::Warning;
-    text.banner = "Slow motion: tissue moves at " + whole(100 * rate.time_rate) +
-                  " % of its real speed, because the server cannot keep up.";
+    text.banner = "Slow motion: " + whole(100 * rate.time_rate) + " % of real speed";
   }
   return text;
 }

@@ -18,7 +18,7 @@ struct RateText {
   std::string sweeps;   // "4 near the tools, then 3, 2, 1"; empty: not told
   std::string load;     // "612 of 800 us planned (77 %)"; empty: no budget is kept
   std::string changes;  // "12 down, 11 up"; empty: no controller
-  std::string banner;   // empty unless time is slowed: one line, for the middle of the screen
+  std::string banner;   // empty unless time is slowed: one line, for a banner
   RateTone tone = RateTone::Calm;
 };
 RateText describe(const replica::RateFigures& rate);
