@@ -64,6 +64,17 @@ void draw_plot(const HudParticipant& p, float greatest_n, float scale) {
                     ImGui::GetColorU32(to_imgui(p.colour, 0.95f)), 0, 1.4f * scale);
 }
 
+// As wide as they get, so that the panel does not breathe with them. 0: as they are.
+float width_of_figures(const HudModel& model) {
+  float width = 0;
+  for (const HudParticipant& p : model.participants)
+    if (p.has_tool)
+      width = std::max(
+          width,
+          ImGui::CalcTextSize(p.is_self ? "00.00 N  000 mN m  000 nodes" : "00.00 N  000 nodes").x);
+  return width;
+}
+
 void draw_figures(const HudParticipant& p) {
   if (!p.has_tool || (p.contact_nodes == 0 && p.force_n < 0.005f)) return;
   ImGui::Text("%.2f N", static_cast<double>(p.force_n));
@@ -90,6 +101,8 @@ void draw_participants_panel(const HudModel& model, float scale) {
   }
   ImGui::Separator();
   if (ImGui::BeginTable("list", 5, ImGuiTableFlags_SizingFixedFit)) {
+    for (int column = 0; column < 4; ++column) ImGui::TableSetupColumn("");
+    ImGui::TableSetupColumn("", 0, width_of_figures(model));
     for (const HudParticipant& p : model.participants) {
       ImGui::TableNextRow();
       ImGui::TableNextColumn();

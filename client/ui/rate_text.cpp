@@ -51,10 +51,8 @@ RateText describe(const replica::RateFigures& rate) {
                 whole(100 * rate.predicted_us / rate.budget_us) + " %)";
   if (rate.level != replica::RateLevel::Fixed)
     text.changes = with_thousands(rate.lowered) + " down, " + with_thousands(rate.raised) + " up";
-  if (rate.time_rate < kSlowTimeRate) {
-    text.tone = RateTone::Warning;
+  if (rate.time_rate < kSlowTimeRate)
     text.banner = "Slow motion: " + whole(100 * rate.time_rate) + " % of real speed";
-  }
   return text;
 }
 

@@ -14,12 +14,12 @@ inline constexpr float kSlowTimeRate = 0.98f;  // below this a person is told
 enum class RateTone : std::uint8_t { Calm, Notice, Warning };
 
 struct RateText {
-  std::string level;    // "full detail", "less detail far from the tools", ...
-  std::string sweeps;   // "4 near the tools, then 3, 2, 1"; empty: not told
-  std::string load;     // "612 of 800 us planned (77 %)"; empty: no budget is kept
-  std::string changes;  // "12 down, 11 up"; empty: no controller
-  std::string banner;   // empty unless time is slowed: one line, for a banner
-  RateTone tone = RateTone::Calm;
+  std::string level;               // "full detail", "less detail far from the tools", ...
+  std::string sweeps;              // "4 near the tools, then 3, 2, 1"; empty: not told
+  std::string load;                // "612 of 800 us planned (77 %)"; empty: no budget is kept
+  std::string changes;             // "12 down, 11 up"; empty: no controller
+  std::string banner;              // empty unless time is slowed: one line, for a banner
+  RateTone tone = RateTone::Calm;  // of the level
 };
 RateText describe(const replica::RateFigures& rate);
 
