@@ -55,7 +55,7 @@ void rate_rows(const HudModel& model) {
                       ? text.sweeps + format("; others %u", model.figures.far_sweeps)
                       : text.sweeps + "; others rest");
   if (rate.node_limit > 0) row("queue limit", with_thousands(rate.node_limit) + " nodes");
-  if (!text.load.empty()) row("next tick", text.load);
+  if (!text.load.empty()) row("next tick", text.load + " allowed");
   if (!text.changes.empty()) row("changes", text.changes);
   row("time", format("%.0f %% of real time", 100 * static_cast<double>(rate.time_rate)));
 }

@@ -60,8 +60,11 @@ void draw_plot(const HudParticipant& p, float greatest_n, float scale) {
     points[i] = {at.x + width * static_cast<float>(i) / static_cast<float>(count - 1),
                  base - share * (height - 2 * scale)};
   }
+  // A joint of a steep peak would stick out above the row.
+  list->PushClipRect(at, {at.x + width, at.y + height}, true);
   list->AddPolyline(points.data(), static_cast<int>(count),
                     ImGui::GetColorU32(to_imgui(p.colour, 0.95f)), 0, 1.4f * scale);
+  list->PopClipRect();
 }
 
 // As wide as they get, so that the panel does not breathe with them. 0: as they are.

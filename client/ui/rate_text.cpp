@@ -47,8 +47,7 @@ RateText describe(const replica::RateFigures& rate) {
   }
   text.sweeps = sweeps_text(rate.layer_sweeps);
   if (rate.budget_us > 0)
-    text.load = whole(rate.predicted_us) + " of " + whole(rate.budget_us) + " us planned (" +
-                whole(100 * rate.predicted_us / rate.budget_us) + " %)";
+    text.load = whole(rate.predicted_us) + " of " + whole(rate.budget_us) + " us";
   if (rate.level != replica::RateLevel::Fixed)
     text.changes = with_thousands(rate.lowered) + " down, " + with_thousands(rate.raised) + " up";
   if (rate.time_rate < kSlowTimeRate)

@@ -16,7 +16,7 @@ enum class RateTone : std::uint8_t { Calm, Notice, Warning };
 struct RateText {
   std::string level;               // "full detail", "less detail far from the tools", ...
   std::string sweeps;              // "4 near the tools, then 3, 2, 1"; empty: not told
-  std::string load;                // "612 of 800 us planned (77 %)"; empty: no budget is kept
+  std::string load;                // "612 of 800 us": planned and allowed; empty: no budget is kept
   std::string changes;             // "12 down, 11 up"; empty: no controller
   std::string banner;              // empty unless time is slowed: one line, for a banner
   RateTone tone = RateTone::Calm;  // of the level
