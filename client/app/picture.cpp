@@ -163,6 +163,7 @@ void Picture::add_participants(const replica::Replica& replica, bool is_replay,
       if (tool.slot.owner() != participant.slot) continue;
       shown.has_tool = true;
       shown.is_silent = tool.is_silent;
+      shown.is_inside = shown.is_inside || tool.is_inside;
       if (tool.verb != scene::Verb::None) shown.verb = tool.verb, shown.has_claim = tool.has_claim;
       shown.force_n += length(tool.force_n);
       shown.torque_nm += length(tool.torque_nm);

@@ -294,6 +294,7 @@ void Replica::apply_state(const proto::FrameState& message) {
     tool.penetration_m = state.penetration_m();
     tool.has_claim = state.has_claim();
     tool.is_silent = state.is_silent();
+    tool.is_inside = state.is_inside();
     tool.torque_nm = to_vec3(state.torque_nm());
     tool.world_from_proxy = state.has_proxy_position_m()
                                 ? to_pose(state.proxy_position_m(), state.proxy_orientation())

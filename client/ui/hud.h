@@ -27,6 +27,7 @@ struct HudParticipant {
   render::Colour colour;
   scene::Verb verb = scene::Verb::None;
   bool has_claim = false, is_silent = false;
+  bool is_inside = false;  // it appeared inside tissue and touches nothing
   float force_n = 0, torque_nm = 0;
   std::uint32_t contact_nodes = 0;
   std::vector<float> forces_n;  // over the last seconds, oldest first, evenly spaced

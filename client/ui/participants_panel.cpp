@@ -33,11 +33,13 @@ void draw_doing(const HudParticipant& p) {
   const char* doing = p.is_silent                    ? "silent"
                       : p.verb == scene::Verb::None  ? replica::name_of(p.role)
                       : !p.has_claim                 ? "refused"
+                      : p.is_inside                  ? "inside tissue"
                       : p.verb == scene::Verb::Grasp ? "grasps"
                                                      : "pushes";
   if (p.has_tool && p.verb != scene::Verb::None && !p.is_silent)
-    ImGui::TextColored(p.has_claim ? ImGui::GetStyle().Colors[ImGuiCol_Text] : kTrouble, "%s",
-                       doing);
+    ImGui::TextColored(
+        p.has_claim && !p.is_inside ? ImGui::GetStyle().Colors[ImGuiCol_Text] : kTrouble, "%s",
+        doing);
   else
     ImGui::TextDisabled("%s", doing);
 }
