@@ -68,6 +68,7 @@ Status Run::step(std::uint64_t now_ns) {
               replica_.topology().rest_positions.size());
   }
   if (const auto sent = hands_.send_due(replica_, source_, now_ns); !sent) return sent.error();
+  if (picture_) picture_->observe(replica_);
   if (picture_ && now_ns >= next_picture_ns_) {
     next_picture_ns_ = std::max(next_picture_ns_ + picture_interval_ns_, now_ns);
     picture_->draw(replica_, source_, hands_, now_ns);

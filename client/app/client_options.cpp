@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 #include <charconv>
+#include <cmath>
 #include <cstdlib>
 #include <iostream>
 #include <map>
@@ -48,6 +49,36 @@ Status parse_size(const std::string& text, render::Size& size) {
       height.ptr != end || size.width < 64 || size.height < 64 || size.width > 7680 ||
       size.height > 4320)
     return bad;
+  return {};
+}
+
+Status parse_overlays(const std::vector<std::string>& names, Overlays& overlays) {
+  if (names.empty()) return {};
+  overlays = {.regions = false, .holds = false, .arrows = false, .rate = false};
+  const std::map<std::string, bool Overlays::*> known = {{"regions", &Overlays::regions},
+                                                         {"holds", &Overlays::holds},
+                                                         {"arrows", &Overlays::arrows},
+                                                         {"rate", &Overlays::rate}};
+  for (const std::string& name : names) {
+    if (name == "nothing" && names.size() == 1) continue;
+    const auto found = known.find(name);
+    if (found == known.end())
+      return Error{
+          ErrorCode::Usage,
+          "--show: '" + name + "' is not one of regions, holds, arrows, rate (or nothing, alone)"};
+    overlays.*found->second = true;
+  }
+  return {};
+}
+
+Status parse_view(const std::vector<double>& numbers, StartView& view) {
+  if (numbers.empty()) return {};
+  if (numbers.size() != 3 || !(std::abs(numbers[0]) <= 360) || !(std::abs(numbers[1]) <= 90) ||
+      !(numbers[2] >= 0.2 && numbers[2] <= 5))
+    return Error{ErrorCode::Usage,
+                 "--view: give YAW,PITCH,ZOOM: degrees to turn (up to 360 and 90) and how much "
+                 "nearer, 0.2 to 5, such as 30,-10,1.5"};
+  view = {numbers[0], numbers[1], numbers[2]};
   return {};
 }
 
@@ -96,6 +127,16 @@ Result<std::optional<ClientOptions>> parse_client_command_line(int argc, char** 
                  "pictures per second [window 60, headless 15]")
       ->type_name("N")
       ->check(CLI::Range(1.0, 240.0));
+  std::vector<std::string> overlays;
+  app.add_option("--show", overlays,
+                 "what is drawn over the picture: regions, holds, arrows, rate, or nothing; keys "
+                 "change it [regions,arrows]")
+      ->type_name("A,B")
+      ->delimiter(',');
+  std::vector<double> view;
+  app.add_option("--view", view, "turn the camera at first, degrees, and go nearer [0,0,1]")
+      ->type_name("YAW,PITCH,ZOOM")
+      ->delimiter(',');
   app.add_option("--screenshot", options.screenshot_file, "write a picture (PNG)")
       ->type_name("FILE");
   app.add_option("--screenshot-at", options.screenshot_at,
@@ -130,6 +171,9 @@ Result<std::optional<ClientOptions>> parse_client_command_line(int argc, char** 
   if (options.name.empty()) options.name = default_name();
   if (!size.empty())
     if (const auto parsed = parse_size(size, options.size); !parsed) return parsed.error();
+  if (const auto parsed = parse_overlays(overlays, options.overlays); !parsed)
+    return parsed.error();
+  if (const auto parsed = parse_view(view, options.view); !parsed) return parsed.error();
   if (const auto checked = check(options); !checked) return checked.error();
   return std::optional<ClientOptions>(std::move(options));
 }

@@ -13,6 +13,17 @@ namespace trocar::app {
 
 enum class Display : std::uint8_t { Window, Headless, None };
 
+// What is drawn over the picture; keys change it.
+struct Overlays {
+  bool regions = true, holds = false, arrows = true, rate = false;
+
+  bool operator==(const Overlays&) const = default;
+};
+// How the camera first stands: turned from the front, and nearer (zoom above 1) than usual.
+struct StartView {
+  double yaw_deg = 0, pitch_deg = 0, zoom = 1;
+};
+
 struct ClientOptions {
   std::string server = "127.0.0.1:7690";
   std::string name;  // empty: made from the login name and the process
@@ -20,6 +31,8 @@ struct ClientOptions {
   Display display = Display::Window;
   render::Size size{1280, 720};
   double pictures_per_second = 0;  // 0: 60 in a window, 15 headless
+  Overlays overlays;
+  StartView view;
   std::string screenshot_file;
   double screenshot_at = -1;  // seconds after joining; < 0: the last picture
   double seconds = 0;         // 0: until the session ends

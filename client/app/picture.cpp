@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <numbers>
 
 #include "client/ui/hud_panels.h"
 #include "common/base/log.h"
@@ -57,7 +58,9 @@ Picture::Picture(std::unique_ptr<render::GlContext> context, const ClientOptions
       context_(std::move(context)),
       renderer_(*context_),
       hud_(*context_),
-      shows_help_(options.display == Display::Window) {
+      shows_help_(options.display == Display::Window),
+      overlays_(options.overlays),
+      view_(options.view) {
   log::debug("drawing with {}", renderer_.description());
 }
 
@@ -70,6 +73,10 @@ void Picture::frame_camera(const replica::Replica& replica) {
     high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
   }
   camera_.frame((low + high) * 0.5f, length(high - low) * 0.5f);
+  constexpr float kRadians = std::numbers::pi_v<float> / 180;
+  camera_.orbit(static_cast<float>(view_.yaw_deg) * kRadians,
+                static_cast<float>(view_.pitch_deg) * kRadians);
+  camera_.zoom(static_cast<float>(1 / view_.zoom));
   framed_topology_ = replica.topology_version();
 }
 
@@ -88,30 +95,122 @@ void Picture::measure(const replica::Replica& replica, std::uint64_t now_ns) {
   rate_.bytes = counters.bytes;
 }
 
+render::SceneTool Picture::scene_tool(const replica::Replica& replica, const replica::Tool& tool,
+                                      Hands& hands) const {
+  render::SceneTool shown;
+  shown.slot = tool.slot;
+  shown.world_from_tool = tool.world_from_proxy;
+  shown.hand_position = tool.world_from_tool.position;
+  shown.shape = shape_of(replica, tool.slot);
+  shown.verb = tool.verb;
+  shown.has_claim = tool.has_claim;
+  shown.is_silent = tool.is_silent;
+  shown.force_n = tool.force_n;
+  // A person sees the own hand where it is, not where it was a round trip ago, and the tool as far
+  // from it as tissue last kept it.
+  const device::MouseTool* mouse = hands.mouse_tool();
+  if (mouse != nullptr && mouse->is_valid() && tool.slot.owner() == replica.own_slot()) {
+    const Pose hand = mouse->current().world_from_tool;
+    const Vec3f held_back = tool.world_from_proxy.position - tool.world_from_tool.position;
+    shown.world_from_tool = {hand.position + held_back, hand.orientation};
+    shown.hand_position = hand.position;
+    shown.verb = mouse->current().verb;
+  }
+  return shown;
+}
+
+std::vector<render::Hold> Picture::holds(const replica::Replica& replica) {
+  if (held_topology_ != replica.topology_version()) held_.clear();
+  held_topology_ = replica.topology_version();
+  std::vector<scene::ToolShape> shapes;
+  for (const auto& tool : surface_.tools()) shapes.push_back(shape_of(replica, tool.slot));
+  // Kept up to date while hidden too: which tissue a grasp took is seen when it takes it.
+  held_.update(surface_.positions(), surface_.tools(), shapes);
+  std::vector<render::Hold> holds;
+  if (!overlays_.holds) return holds;
+  for (const auto& holding : held_.holdings()) holds.push_back({holding.owner, holding.is_grasp});
+  return holds;
+}
+
 render::SceneView Picture::scene_view(const replica::Replica& replica, Hands& hands,
-                                      float seconds) const {
+                                      float seconds) {
   render::SceneView scene;
   scene.seconds = seconds;
-  scene.shows_regions = shows_regions_;
+  scene.shows_regions = overlays_.regions;
+  scene.shows_arrows = overlays_.arrows;
   if (!surface_.is_valid()) return scene;
   scene.topology_version = replica.topology_version();
   scene.rest_positions = replica.topology().rest_positions;
   scene.triangles = replica.topology().triangles;
   scene.positions = surface_.positions();
   scene.regions = surface_.regions();
-  for (const replica::Tool& tool : surface_.tools()) {
-    render::SceneTool shown{tool.slot,   tool.world_from_tool, shape_of(replica, tool.slot),
-                            tool.verb,   tool.has_claim,       tool.is_silent,
-                            tool.force_n};
-    // A person sees the own tool where the hand is, not where it was a round trip ago.
-    device::MouseTool* mouse = hands.mouse_tool();
-    if (mouse != nullptr && mouse->is_valid() && tool.slot.owner() == replica.own_slot()) {
-      shown.world_from_tool = mouse->current().world_from_tool;
-      shown.verb = mouse->current().verb;
-    }
-    scene.tools.push_back(shown);
-  }
+  scene.holds = holds(replica);
+  for (const replica::Tool& tool : surface_.tools())
+    scene.tools.push_back(scene_tool(replica, tool, hands));
   return scene;
+}
+
+void Picture::add_participants(const replica::Replica& replica, bool is_replay,
+                               ui::HudModel& model) const {
+  model.greatest_force_n = forces_.greatest();
+  for (const auto& participant : replica.participants()) {
+    ui::HudParticipant shown;
+    shown.name = participant.name;
+    shown.role = participant.role;
+    shown.is_self = !is_replay && participant.slot == replica.own_slot();
+    shown.colour = render::colour_of_slot(participant.slot.value);
+    for (const replica::Tool& tool : surface_.tools()) {
+      if (tool.slot.owner() != participant.slot) continue;
+      shown.has_tool = true;
+      shown.is_silent = tool.is_silent;
+      shown.is_inside = shown.is_inside || tool.is_inside;
+      if (tool.verb != scene::Verb::None) shown.verb = tool.verb, shown.has_claim = tool.has_claim;
+      shown.force_n += length(tool.force_n);
+      shown.torque_nm += length(tool.torque_nm);
+      shown.contact_nodes += tool.contact_nodes;
+    }
+    if (shown.has_tool) {
+      const auto forces = forces_.forces(participant.slot);
+      shown.forces_n.assign(forces.begin(), forces.end());
+    }
+    model.participants.push_back(std::move(shown));
+  }
+}
+
+void Picture::add_labels(const replica::Replica& replica, const render::SceneView& scene,
+                         ui::HudModel& model) const {
+  for (const render::SceneTool& tool : scene.tools) {
+    const auto* owner = owner_of(replica, tool.slot);
+    const Vec3f collar = tool.world_from_tool.apply({0, 0, tool.shape.radius_m * 7});
+    const auto at = camera_.project(collar, context_->size());
+    if (owner == nullptr || !at) continue;
+    char force[32] = "";
+    if (length(tool.force_n) >= render::kMinArrowNewton)
+      std::snprintf(force, sizeof force, "  %.2f N", length(tool.force_n));
+    model.labels.push_back(
+        {at->x, at->y, owner->name + force, render::colour_of_slot(tool.slot.owner().value)});
+  }
+}
+
+void Picture::add_messages(const replica::Replica& replica, std::uint64_t now_ns,
+                           ui::HudModel& model) {
+  for (const auto& notice : replica.notices()) {
+    const double age =
+        now_ns > notice.arrival_ns ? static_cast<double>(now_ns - notice.arrival_ns) * 1e-9 : 0.0;
+    const bool is_own = notice.tool.owner() == replica.own_slot();
+    const bool is_news = replica::is_refusal(notice.outcome)
+                             ? is_own
+                             : notice.outcome == replica::ClaimOutcome::TakenOver ||
+                                   notice.outcome == replica::ClaimOutcome::Expired ||
+                                   notice.outcome == replica::ClaimOutcome::Slipped;
+    if (age > 5 || notice.text.empty() || !is_news) continue;
+    // A claim is retried while the verb is held: the same words once.
+    if (!model.messages.empty() && model.messages.back().text == notice.text)
+      model.messages.pop_back();
+    model.messages.push_back({notice.text, static_cast<float>(age), true});
+  }
+  if (model.messages.size() > 3)
+    model.messages.erase(model.messages.begin(), model.messages.end() - 3);
 }
 
 ui::HudModel Picture::hud_model(const replica::Replica& replica, replica::SessionSource& source,
@@ -144,54 +243,16 @@ ui::HudModel Picture::hud_model(const replica::Replica& replica, replica::Sessio
   model.bytes_per_second = rate_.bytes_per_second;
   model.sync_text = sync_text(replica);
   model.is_in_step = replica.sync_state() == replica::SyncState::InStep;
-  model.shows_regions = shows_regions_;
+  model.shows_regions = overlays_.regions;
   model.shows_help = shows_help_;
   model.has_own_tool = hands.mouse_tool() != nullptr;
 
-  for (const auto& participant : replica.participants()) {
-    ui::HudParticipant shown;
-    shown.name = participant.name;
-    shown.role = participant.role;
-    shown.is_self = !is_replay && participant.slot == replica.own_slot();
-    shown.colour = render::colour_of_slot(participant.slot.value);
-    for (const replica::Tool& tool : surface_.tools()) {
-      if (tool.slot.owner() != participant.slot) continue;
-      shown.has_tool = true;
-      shown.is_silent = tool.is_silent;
-      if (tool.verb != scene::Verb::None) shown.verb = tool.verb, shown.has_claim = tool.has_claim;
-      shown.force_n += length(tool.force_n);
-      shown.contact_nodes += tool.contact_nodes;
-    }
-    model.participants.push_back(std::move(shown));
-  }
-  for (const render::SceneTool& tool : scene.tools) {
-    const auto* owner = owner_of(replica, tool.slot);
-    const Vec3f collar = tool.world_from_tool.apply({0, 0, tool.shape.radius_m * 7});
-    const auto at = camera_.project(collar, context_->size());
-    if (owner == nullptr || !at) continue;
-    char force[32] = "";
-    if (length(tool.force_n) >= render::kMinArrowNewton)
-      std::snprintf(force, sizeof force, "  %.2f N", length(tool.force_n));
-    model.labels.push_back(
-        {at->x, at->y, owner->name + force, render::colour_of_slot(tool.slot.owner().value)});
-  }
-  for (const auto& notice : replica.notices()) {
-    const double age =
-        now_ns > notice.arrival_ns ? static_cast<double>(now_ns - notice.arrival_ns) * 1e-9 : 0.0;
-    const bool is_own = notice.tool.owner() == replica.own_slot();
-    const bool is_news = replica::is_refusal(notice.outcome)
-                             ? is_own
-                             : notice.outcome == replica::ClaimOutcome::TakenOver ||
-                                   notice.outcome == replica::ClaimOutcome::Expired ||
-                                   notice.outcome == replica::ClaimOutcome::Slipped;
-    if (age > 5 || notice.text.empty() || !is_news) continue;
-    // A claim is retried while the verb is held: the same words once.
-    if (!model.messages.empty() && model.messages.back().text == notice.text)
-      model.messages.pop_back();
-    model.messages.push_back({notice.text, static_cast<float>(age), true});
-  }
-  if (model.messages.size() > 3)
-    model.messages.erase(model.messages.begin(), model.messages.end() - 3);
+  model.shows_holds = overlays_.holds;
+  model.shows_arrows = overlays_.arrows;
+  model.shows_rate = overlays_.rate;
+  add_participants(replica, is_replay, model);
+  add_labels(replica, scene, model);
+  add_messages(replica, now_ns, model);
   if (const auto* playback = source.playback()) {
     const auto seconds = [](Tick tick) { return static_cast<double>(tick) * 1e-3; };
     model.timeline =
@@ -207,7 +268,10 @@ void Picture::act(const ui::HudActions& actions, const replica::Replica& replica
     shows_help_ = !shows_help_;
     help_until_ns_ = 0;
   }
-  if (actions.toggle_regions) shows_regions_ = !shows_regions_;
+  if (actions.toggle_regions) overlays_.regions = !overlays_.regions;
+  if (actions.toggle_holds) overlays_.holds = !overlays_.holds;
+  if (actions.toggle_arrows) overlays_.arrows = !overlays_.arrows;
+  if (actions.toggle_rate) overlays_.rate = !overlays_.rate;
   if (actions.reset_camera) frame_camera(replica);
   if (actions.screenshot) wants_screenshot_ = true;
   replica::PlaybackControl* playback = source.playback();
@@ -225,6 +289,7 @@ void Picture::draw(const replica::Replica& replica, replica::SessionSource& sour
   last_ns_ = now_ns;
   measure(replica, now_ns);
   surface_.update(replica, now_ns);
+  observe(replica);
   if (surface_.is_valid() && framed_topology_ != replica.topology_version()) {
     if (framed_topology_ == 0 && shows_help_) help_until_ns_ = now_ns + kHelpNs;
     frame_camera(replica);

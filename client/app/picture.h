@@ -9,6 +9,8 @@
 #include "client/app/client_options.h"
 #include "client/app/hands.h"
 #include "client/render/scene_renderer.h"
+#include "client/replica/force_history.h"
+#include "client/replica/held_tissue.h"
 #include "client/replica/interpolated_surface.h"
 #include "client/ui/hud.h"
 
@@ -22,6 +24,8 @@ class Picture {
   // Draws the session as it is at `now_ns` and acts on what the person does.
   void draw(const replica::Replica& replica, replica::SessionSource& source, Hands& hands,
             std::uint64_t now_ns);
+  // To be called often: frames pass faster than pictures are drawn.
+  void observe(const replica::Replica& replica) { forces_.update(replica); }
   bool should_close() const { return context_->should_close(); }
   std::uint64_t count() const { return count_; }
   // Draws once more what was drawn last, as finely as it goes, and returns it.
@@ -32,7 +36,15 @@ class Picture {
   explicit Picture(std::unique_ptr<render::GlContext> context, const ClientOptions& options);
 
   void measure(const replica::Replica& replica, std::uint64_t now_ns);
-  render::SceneView scene_view(const replica::Replica& replica, Hands& hands, float seconds) const;
+  render::SceneView scene_view(const replica::Replica& replica, Hands& hands, float seconds);
+  render::SceneTool scene_tool(const replica::Replica& replica, const replica::Tool& tool,
+                               Hands& hands) const;
+  std::vector<render::Hold> holds(const replica::Replica& replica);
+  void add_participants(const replica::Replica& replica, bool is_replay, ui::HudModel& model) const;
+  void add_labels(const replica::Replica& replica, const render::SceneView& scene,
+                  ui::HudModel& model) const;
+  static void add_messages(const replica::Replica& replica, std::uint64_t now_ns,
+                           ui::HudModel& model);
   ui::HudModel hud_model(const replica::Replica& replica, replica::SessionSource& source,
                          const render::SceneView& scene, Hands& hands, std::uint64_t now_ns) const;
   void act(const ui::HudActions& actions, const replica::Replica& replica,
@@ -53,7 +65,12 @@ class Picture {
   std::uint64_t framed_topology_ = 0;
   std::uint64_t last_ns_ = 0, count_ = 0;
   std::uint64_t help_until_ns_ = 0;  // shown at first, then until asked for; 0: as the person wants
-  bool shows_help_ = false, shows_regions_ = true, wants_screenshot_ = false;
+  bool shows_help_ = false, wants_screenshot_ = false;
+  Overlays overlays_;
+  StartView view_;
+  replica::ForceHistory forces_;
+  replica::HeldTissue held_;
+  std::uint64_t held_topology_ = 0;
   Rate rate_;
   render::SceneView scene_;  // of the last picture; its spans need the replica
 };

@@ -16,7 +16,10 @@ namespace {
 
 constexpr int kMaxShadows = 8;
 constexpr float kOverlayStrength = 0.50f;
+constexpr float kFirmHoldStrength = 0.95f, kTouchStrength = 0.60f;
 constexpr float kOverlayFadeSeconds = 0.12f;
+// Jaws: open while a grasp looks for tissue, parted by what it holds, else closed. Radians.
+constexpr float kOpenJaws = 0.34f, kHoldingJaws = 0.12f, kJawSeconds = 0.08f;
 constexpr std::size_t kTriangleBudgetSoftware = 16'000, kTriangleBudget = 100'000;
 
 struct Tint {
@@ -24,6 +27,14 @@ struct Tint {
   Tint operator+(const Tint& o) const { return {r + o.r, g + o.g, b + o.b, a + o.a}; }
   Tint operator*(float s) const { return {r * s, g * s, b * s, a * s}; }
 };
+
+Tint tint_of(Colour c) {
+  const auto linear = [](std::uint8_t v) {
+    const float x = static_cast<float>(v) / 255;
+    return x * x;
+  };
+  return {linear(c.r), linear(c.g), linear(c.b), 1};
+}
 
 struct OrganVertex {
   Vec3f position, normal;
@@ -132,6 +143,7 @@ struct SceneRenderer::Parts {
   SmoothSurface surface;
   std::vector<Tint> tints;  // coarse vertices keep their fading state, midpoints follow
   std::vector<OrganVertex> vertices;
+  std::array<float, kMaxTools> jaw_openings{};
 
   explicit Parts(const GlContext& context);
   ~Parts();
@@ -142,6 +154,12 @@ struct SceneRenderer::Parts {
   void draw_background();
   void draw_organ(const SceneView& scene, const OrbitCamera& camera, const Shader& organ);
   void draw_tools(const SceneView& scene, const OrbitCamera& camera);
+  void draw_tool(const SceneTool& shown, float seconds);
+  void draw_ghost(const SceneTool& shown);
+  void draw_arrow(const SceneTool& shown);
+  // First faintly without the depth test, so that it shows through tissue, then where in front.
+  void draw_through(const MeshVertices& mesh, const Matrix4& world_from_model, float faint,
+                    float dim);
   void draw_mesh(const MeshVertices& mesh, const Matrix4& world_from_model, float glow, float dim);
 };
 
@@ -218,14 +236,11 @@ void SceneRenderer::Parts::fade_tints(const SceneView& scene) {
   const float share = 1 - std::exp(-scene.seconds / kOverlayFadeSeconds);
   for (std::size_t i = 0; i < surface.coarse_vertex_count(); ++i) {
     Tint wanted;
-    if (scene.shows_regions && i < scene.regions.size() && scene.regions[i] != 0) {
-      const Colour c = colour_of_region(scene.regions[i]);
-      const auto linear = [](std::uint8_t v) {
-        const float x = static_cast<float>(v) / 255;
-        return x * x;
-      };
-      wanted = Tint{linear(c.r), linear(c.g), linear(c.b), 1} * kOverlayStrength;
-    }
+    if (i < scene.holds.size() && scene.holds[i].owner != kNoHolder)
+      wanted = tint_of(colour_of_slot(scene.holds[i].owner)) *
+               (scene.holds[i].is_firm ? kFirmHoldStrength : kTouchStrength);
+    else if (scene.shows_regions && i < scene.regions.size() && scene.regions[i] != 0)
+      wanted = tint_of(colour_of_region(scene.regions[i])) * kOverlayStrength;
     tints[i] = tints[i] * (1 - share) + wanted * share;
   }
   surface.average_midpoints(tints);
@@ -276,7 +291,9 @@ void SceneRenderer::Parts::draw_organ(const SceneView& scene, const OrbitCamera&
     const SceneTool& caster = scene.tools[static_cast<std::size_t>(i)];
     const Vec3f p = caster.world_from_tool.position;
     const Vec3f a = rotate(caster.world_from_tool.orientation, {0, 0, 1});
-    tips.insert(tips.end(), {p.x, p.y, p.z, caster.shape.radius_m});
+    // A flat tool's shadow is that of a rod of about its width.
+    const float width = caster.shape.radius_m + 0.5f * caster.shape.half_width_m;
+    tips.insert(tips.end(), {p.x, p.y, p.z, width});
     shafts.insert(shafts.end(), {a.x, a.y, a.z, caster.shape.length_m});
   }
   organ.set("shadow_count", shadow_count);
@@ -299,45 +316,70 @@ void SceneRenderer::Parts::draw_mesh(const MeshVertices& mesh, const Matrix4& wo
   glDrawArrays(GL_TRIANGLES, 0, static_cast<GLsizei>(mesh.size()));
 }
 
+void SceneRenderer::Parts::draw_tool(const SceneTool& shown, float seconds) {
+  const Colour colour = colour_of_slot(shown.slot.owner().value);
+  const Matrix4 world = matrix_of(shown.world_from_tool);
+  const float dim = shown.is_silent ? 0.45f : 1.0f;
+  if (shown.shape.half_width_m > 0) {
+    draw_mesh(make_blade(shown.shape, colour), world, 0, dim);
+    return;
+  }
+  draw_mesh(make_shaft(shown.shape, colour), world, 0, dim);
+  const float wanted = shown.verb != scene::Verb::Grasp ? 0.0f
+                       : shown.has_claim                ? kHoldingJaws
+                                                        : kOpenJaws;
+  float& opening = jaw_openings[shown.slot.value % kMaxTools];
+  opening += (wanted - opening) * (1 - std::exp(-seconds / kJawSeconds));
+  const MeshVertices jaw = make_jaw(shown.shape);
+  for (const bool is_lower : {false, true})
+    draw_mesh(jaw, multiply(world, jaw_matrix(jaw_length(shown.shape), opening, is_lower)), 0, dim);
+}
+
+void SceneRenderer::Parts::draw_through(const MeshVertices& mesh, const Matrix4& world_from_model,
+                                        float faint, float dim) {
+  glDepthFunc(GL_ALWAYS);
+  glEnable(GL_BLEND);
+  glBlendColor(0, 0, 0, faint);
+  glBlendFunc(GL_CONSTANT_ALPHA, GL_ONE_MINUS_CONSTANT_ALPHA);
+  glEnable(GL_CULL_FACE);
+  glDepthMask(GL_FALSE);
+  draw_mesh(mesh, world_from_model, 1, dim);
+  glDepthMask(GL_TRUE);
+  glDisable(GL_CULL_FACE);
+  glDisable(GL_BLEND);
+  glDepthFunc(GL_LESS);
+  draw_mesh(mesh, world_from_model, 0.55f, dim);
+}
+
+void SceneRenderer::Parts::draw_ghost(const SceneTool& shown) {
+  const Vec3f tip = shown.world_from_tool.position;
+  const Vec3f to_hand = shown.hand_position - tip;
+  const float apart = length(to_hand);
+  if (!(apart > kGhostMetres)) return;
+  const Pose pose{tip, rotation_from_z(to_hand * (1 / apart))};
+  const Colour colour = colour_of_slot(shown.slot.owner().value);
+  draw_through(make_ghost(apart, colour), matrix_of(pose), 0.45f, 0.8f);
+}
+
+void SceneRenderer::Parts::draw_arrow(const SceneTool& shown) {
+  const Vec3f tip = shown.world_from_tool.position;
+  const auto end = arrow_end(tip, shown.force_n);
+  if (!end) return;
+  const Vec3f along = *end - tip;
+  const Pose pose{tip, rotation_from_z(normalized(along, Vec3f{0, 0, 1}))};
+  const Colour colour = colour_of_slot(shown.slot.owner().value);
+  draw_through(make_arrow(length(along), 0.0016f, colour), matrix_of(pose), 0.35f, 1);
+}
+
 void SceneRenderer::Parts::draw_tools(const SceneView& scene, const OrbitCamera& camera) {
   tool.use();
   set_lights(tool, camera);
   glBindVertexArray(tool_array.array);
   glBindBuffer(GL_ARRAY_BUFFER, tool_array.buffer);
-  for (const SceneTool& shown : scene.tools) {
-    const Colour colour = colour_of_slot(shown.slot.owner().value);
-    const Matrix4 world = matrix_of(shown.world_from_tool);
-    const float dim = shown.is_silent ? 0.45f : 1.0f;
-    draw_mesh(make_shaft(shown.shape, colour), world, 0, dim);
-    // Open while a grasp looks for tissue, parted by what it holds, else closed.
-    const float opening = shown.verb != scene::Verb::Grasp ? 0.0f : shown.has_claim ? 0.12f : 0.34f;
-    const MeshVertices jaw = make_jaw(shown.shape);
-    for (const bool is_lower : {false, true})
-      draw_mesh(jaw, multiply(world, jaw_matrix(jaw_length(shown.shape), opening, is_lower)), 0,
-                dim);
-  }
-  // Arrows show through tissue: first faintly without the depth test, then solid where in front.
-  for (const SceneTool& shown : scene.tools) {
-    const Vec3f tip = shown.world_from_tool.position;
-    const auto end = arrow_end(tip, shown.force_n);
-    if (!end) continue;
-    const Vec3f along = *end - tip;
-    const Pose pose{tip, rotation_from_z(normalized(along, Vec3f{0, 0, 1}))};
-    const Colour colour = colour_of_slot(shown.slot.owner().value);
-    const MeshVertices arrow = make_arrow(length(along), 0.0016f, colour);
-    glDepthFunc(GL_ALWAYS);
-    glEnable(GL_BLEND);
-    glBlendColor(0, 0, 0, 0.35f);
-    glBlendFunc(GL_CONSTANT_ALPHA, GL_ONE_MINUS_CONSTANT_ALPHA);
-    glEnable(GL_CULL_FACE);
-    glDepthMask(GL_FALSE);
-    draw_mesh(arrow, matrix_of(pose), 1, 1);
-    glDepthMask(GL_TRUE);
-    glDisable(GL_CULL_FACE);
-    glDisable(GL_BLEND);
-    glDepthFunc(GL_LESS);
-    draw_mesh(arrow, matrix_of(pose), 0.55f, 1);
-  }
+  for (const SceneTool& shown : scene.tools) draw_tool(shown, scene.seconds);
+  for (const SceneTool& shown : scene.tools) draw_ghost(shown);
+  if (!scene.shows_arrows) return;
+  for (const SceneTool& shown : scene.tools) draw_arrow(shown);
 }
 
 SceneRenderer::SceneRenderer(const GlContext& context)

@@ -23,14 +23,24 @@ inline constexpr float kArrowMetresPerNewton = 0.020f;  // 20 mm per N
 inline constexpr float kMaxArrowMetres = 0.10f;
 inline constexpr float kMinArrowNewton = 0.05f;  // smaller forces are not drawn
 
+inline constexpr float kGhostMetres = 0.001f;  // hand and tool farther apart are joined by a line
+
 struct SceneTool {
   ToolSlot slot;
-  Pose world_from_tool;
+  Pose world_from_tool;  // where it is drawn: where the tissue lets it be
+  Vec3f hand_position;   // where the hand has its tip
   scene::ToolShape shape;
   scene::Verb verb = scene::Verb::None;
   bool has_claim = false;
   bool is_silent = false;
   Vec3f force_n;  // of the tissue on the tool
+};
+
+// A part of the surface that a participant holds (or, fainter, touches); nobody: kNoHolder.
+inline constexpr std::uint8_t kNoHolder = 0xff;
+struct Hold {
+  std::uint8_t owner = kNoHolder;
+  bool is_firm = false;
 };
 
 struct SceneView {
@@ -39,7 +49,8 @@ struct SceneView {
   std::span<const std::array<std::uint32_t, 3>> triangles;
   std::span<const Vec3f> positions;        // m, as many as rest_positions; empty: no organ yet
   std::span<const std::uint16_t> regions;  // per vertex; may be empty
-  bool shows_regions = true;
+  std::vector<Hold> holds;                 // per vertex; empty: not shown
+  bool shows_regions = true, shows_arrows = true;
   std::vector<SceneTool> tools;
   float seconds = 0;  // since the last picture
 };

@@ -121,6 +121,7 @@ void main() {
 
   // The overlay glows through: tissue darkens and takes the region's colour, the film stays.
   lit = mix(lit, lit * 0.35 + tint.rgb * (0.035 + 0.11 * key.g + 0.07 * fill.g), tint.a);
+  lit += tint.rgb * 0.13 * smoothstep(0.55, 0.9, tint.a);  // what is held firmly shines by itself
   colour = encode(lit + film);
 }
 )";

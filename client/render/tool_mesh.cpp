@@ -61,7 +61,7 @@ void revolve(std::span<const ProfilePoint> profile, int segments, float from, fl
 
 Colour colour_of_slot(int slot) {
   static constexpr std::array<Colour, 16> kColours = {{{64, 186, 255},
-                                                       {255, 176, 46},
+                                                       {255, 136, 26},
                                                        {112, 224, 112},
                                                        {232, 116, 236},
                                                        {255, 112, 98},
@@ -137,6 +137,75 @@ MeshVertices make_jaw(const scene::ToolShape& shape) {
     const MeshVertex s{{b.radius, 0, b.z}, down, material}, t{{-b.radius, 0, b.z}, down, material};
     out.insert(out.end(), {p, q, s, p, s, t});
   }
+  return out;
+}
+
+MeshVertices make_blade(const scene::ToolShape& shape, Colour colour) {
+  const float r = shape.radius_m, w = shape.half_width_m;
+  const float far_end = std::max(shape.length_m - r, r + 1e-4f);
+  // Outline of the core with, at each point, its outward direction in the (x, z) plane.
+  struct Edge {
+    float x, z, nx, nz;
+  };
+  std::vector<Edge> outline;
+  constexpr int kCornerSteps = 6, kRings = 8;
+  const std::array<Edge, 4> corners = {
+      {{w, r, 1, -1}, {w, far_end, 1, 1}, {-w, far_end, -1, 1}, {-w, r, -1, -1}}};
+  for (std::size_t i = 0; i < corners.size(); ++i)
+    for (int step = 0; step <= kCornerSteps; ++step) {
+      const float angle =
+          kPi / 2 *
+          (static_cast<float>(i) - 1 + static_cast<float>(step) / static_cast<float>(kCornerSteps));
+      outline.push_back({corners[i].x, corners[i].z, std::cos(angle), std::sin(angle)});
+    }
+  // Around the rim from the lower face to the upper one.
+  const auto vertex = [&](const Edge& e, int ring) {
+    const float a = kPi * (static_cast<float>(ring) / kRings - 0.5f);
+    const Vec3f n{e.nx * std::cos(a), std::sin(a), e.nz * std::cos(a)};
+    return MeshVertex{Vec3f{e.x, 0, e.z} + n * r, n, kSteel};
+  };
+  MeshVertices out;
+  for (std::size_t i = 0; i < outline.size(); ++i) {
+    const Edge &a = outline[i], &b = outline[(i + 1) % outline.size()];
+    for (int ring = 0; ring < kRings; ++ring) {
+      const auto p = vertex(a, ring), q = vertex(a, ring + 1);
+      const auto s = vertex(b, ring + 1), t = vertex(b, ring);
+      out.insert(out.end(), {p, q, s, p, s, t});
+    }
+  }
+  for (const float side : {-1.0f, 1.0f}) {
+    const Vec3f n{0, side, 0};
+    const MeshVertex p{{-w, side * r, r}, n, kSteel}, q{{w, side * r, r}, n, kSteel};
+    const MeshVertex s{{w, side * r, far_end}, n, kSteel}, t{{-w, side * r, far_end}, n, kSteel};
+    if (side > 0)
+      out.insert(out.end(), {p, s, q, p, t, s});
+    else
+      out.insert(out.end(), {p, q, s, p, s, t});
+  }
+  // A round neck and grip beyond the blade, for the eye only.
+  const float neck = std::clamp(0.3f * w, 0.0025f, 0.006f), end = far_end + r;
+  const Material ring = plastic(colour);
+  const ProfilePoint profile[] = {
+      {end - 0.4f * r, 0, kSteel},         {end - 0.4f * r, neck, kSteel},
+      {end + 0.010f, 0.7f * neck, kSteel}, {end + 0.012f, 0.9f * neck, ring},
+      {end + 0.030f, 0.9f * neck, ring},   {end + 0.032f, 0.7f * neck, kSteel},
+      {end + 0.080f, 0.7f * neck, kSteel}, {end + 0.084f, 1.1f * neck, ring},
+      {end + 0.150f, 1.2f * neck, kGrip},  {end + 0.150f, 0, kGrip}};
+  revolve(profile, 20, 0, 2 * kPi, out);
+  return out;
+}
+
+MeshVertices make_ghost(float length, Colour colour) {
+  constexpr float kThread = 0.0005f, kBall = 0.0022f;
+  const Material m = plastic(colour);
+  std::vector<ProfilePoint> profile = {{0, 0, m}, {0, kThread, m}, {length, kThread, m}};
+  constexpr int kRings = 8;
+  for (int i = 0; i <= kRings; ++i) {
+    const float a = kPi * (static_cast<float>(i) / kRings - 0.5f);
+    profile.push_back({length + kBall * std::sin(a), kBall * std::cos(a), m, true});
+  }
+  MeshVertices out;
+  revolve(profile, 12, 0, 2 * kPi, out);
   return out;
 }
 

@@ -32,6 +32,11 @@ MeshVertices make_shaft(const scene::ToolShape& shape, Colour colour);
 // outline that the simulation uses. The hinge is at z = jaw_length().
 MeshVertices make_jaw(const scene::ToolShape& shape);
 float jaw_length(const scene::ToolShape& shape);
+// A flat tool: the solid that the simulation uses (half width across x, round edges), then a grip
+// in `colour`.
+MeshVertices make_blade(const scene::ToolShape& shape, Colour colour);
+// A thread along +z that ends, `length` on, in a small ball: from a tool to the hand that moves it.
+MeshVertices make_ghost(float length, Colour colour);
 // Along +z from the origin, `length` long including its head.
 MeshVertices make_arrow(float length, float radius, Colour colour);
 

@@ -11,6 +11,11 @@ constexpr std::size_t kArrivalWindow = 32;  // half a second
 constexpr double kJumpTicks = 250;
 constexpr double kSlewTicks = 120;  // an error of this size changes the speed by 100 %
 
+Pose between(const Pose& a, const Pose& b, float t) {
+  return {a.position * (1 - t) + b.position * t,
+          ::trocar::interpolate(a.orientation, b.orientation, t)};
+}
+
 }  // namespace
 
 void DisplayClock::restart() {
@@ -107,11 +112,10 @@ void InterpolatedSurface::interpolate(const Topology& topology, const SessionFra
   for (Tool& tool : tools_) {
     const auto earlier = std::ranges::find(before.tools, tool.slot, &Tool::slot);
     if (earlier == before.tools.end()) continue;
-    tool.world_from_tool.position =
-        earlier->world_from_tool.position * (1 - t) + tool.world_from_tool.position * t;
-    tool.world_from_tool.orientation = ::trocar::interpolate(earlier->world_from_tool.orientation,
-                                                             tool.world_from_tool.orientation, t);
+    tool.world_from_tool = between(earlier->world_from_tool, tool.world_from_tool, t);
+    tool.world_from_proxy = between(earlier->world_from_proxy, tool.world_from_proxy, t);
     tool.force_n = earlier->force_n * (1 - t) + tool.force_n * t;
+    tool.torque_nm = earlier->torque_nm * (1 - t) + tool.torque_nm * t;
   }
 }
 

@@ -54,6 +54,38 @@ bool expand_regions(const proto::FrameState& message, std::vector<std::uint16_t>
   return true;
 }
 
+// False if a number in it cannot be.
+bool read_rate(const proto::FrameState& message, RateFigures& figures) {
+  figures = {};
+  if (!message.has_rate()) return true;  // a server before 1.2
+  const proto::RateState& rate = message.rate();
+  const auto is_sane = [](float value) { return std::isfinite(value) && value >= 0; };
+  if (!is_sane(rate.budget_us()) || !is_sane(rate.predicted_us()) || !is_sane(rate.time_rate()) ||
+      rate.layer_sweeps_size() > static_cast<int>(kMaxSweepLayers))
+    return false;
+  switch (rate.level()) {
+    case proto::RATE_FULL:
+      figures.level = RateLevel::Full;
+      break;
+    case proto::RATE_REDUCED:
+      figures.level = RateLevel::Reduced;
+      break;
+    case proto::RATE_OVERLOADED:
+      figures.level = RateLevel::Overloaded;
+      break;
+    default:  // a newer server's, of which nothing is known
+      break;
+  }
+  figures.layer_sweeps.assign(rate.layer_sweeps().begin(), rate.layer_sweeps().end());
+  figures.node_limit = rate.node_limit();
+  figures.budget_us = rate.budget_us();
+  figures.predicted_us = rate.predicted_us();
+  figures.lowered = rate.lowered();
+  figures.raised = rate.raised();
+  figures.time_rate = rate.time_rate();
+  return true;
+}
+
 }  // namespace
 
 Replica::Replica(Send send) : send_(std::move(send)) {}
@@ -287,6 +319,8 @@ void Replica::apply_state(const proto::FrameState& message) {
                                        message.stage_cpu_us().end());
   frame.figures.slow_ticks = message.slow_ticks();
   frame.figures.state_hash = message.state_hash();
+  if (!read_rate(message, frame.figures.rate))
+    return fail("FrameState.rate: a time is negative or not finite, or there are over 16 layers");
   frame.has_state = true;
 }
 

@@ -48,6 +48,27 @@ struct Topology {
   std::vector<std::uint32_t> fixed_vertices;
 };
 
+// What the server's rate controller decided for a frame's tick.
+enum class RateLevel : std::uint8_t {
+  Fixed = 0,       // there is no controller
+  Full = 1,        // all that was asked for
+  Reduced = 2,     // less, so that the tick keeps its time
+  Overloaded = 3,  // the least, and still too much: simulated time slows
+};
+inline constexpr std::size_t kMaxSweepLayers = 16;
+
+struct RateFigures {
+  RateLevel level = RateLevel::Fixed;
+  std::vector<std::uint32_t> layer_sweeps;  // of touched nodes, layer 1, layer 2, all beyond
+  std::uint32_t node_limit = 0;             // 0: the server did not say
+  float budget_us = 0;                      // of a tick's time for its work; 0: none is kept
+  float predicted_us = 0;                   // what the next tick will take
+  std::uint64_t lowered = 0, raised = 0;    // steps in the whole session
+  float time_rate = 1;                      // simulated time over real time, last second
+
+  bool operator==(const RateFigures&) const = default;
+};
+
 // What the server says about itself with each frame.
 struct FrameFigures {
   std::uint32_t active_nodes = 0, queue_nodes = 0, region_count = 0;
@@ -57,6 +78,7 @@ struct FrameFigures {
   std::vector<float> stage_median_us;  // order of Stage in server/step
   std::uint64_t slow_ticks = 0;
   std::uint64_t state_hash = 0;
+  RateFigures rate;
 };
 
 // One frame as the server published it.

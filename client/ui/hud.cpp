@@ -140,6 +140,7 @@ HudActions Hud::draw(const HudModel& model) {
   draw_labels(model, scale_);
   draw_session_panel(model, scale_);
   draw_participants_panel(model, scale_);
+  draw_slow_time(model, scale_);
   draw_messages(model, scale_);
   if (model.timeline) draw_timeline(*model.timeline, scale_, actions);
   draw_help(model, scale_);
@@ -150,6 +151,9 @@ HudActions Hud::draw(const HudModel& model) {
   const auto pressed = [&](int code) { return std::ranges::find(keys, code) != keys.end(); };
   actions.toggle_help = pressed(GLFW_KEY_H) || pressed(GLFW_KEY_F1);
   actions.toggle_regions = pressed(GLFW_KEY_O);
+  actions.toggle_holds = pressed(GLFW_KEY_L);
+  actions.toggle_arrows = pressed(GLFW_KEY_A);
+  actions.toggle_rate = pressed(GLFW_KEY_R);
   actions.reset_camera = pressed(GLFW_KEY_C);
   actions.screenshot = pressed(GLFW_KEY_F12);
   if (model.timeline && pressed(GLFW_KEY_SPACE)) actions.toggle_play = true;

@@ -27,8 +27,10 @@ struct HudParticipant {
   render::Colour colour;
   scene::Verb verb = scene::Verb::None;
   bool has_claim = false, is_silent = false;
-  float force_n = 0;
+  bool is_inside = false;  // it appeared inside tissue and touches nothing
+  float force_n = 0, torque_nm = 0;
   std::uint32_t contact_nodes = 0;
+  std::vector<float> forces_n;  // over the last seconds, oldest first, evenly spaced
 };
 
 struct HudLabel {
@@ -63,13 +65,15 @@ struct HudModel {
   std::vector<HudLabel> labels;
   std::vector<HudMessage> messages;
   std::optional<HudTimeline> timeline;
-  bool shows_regions = true;
+  float greatest_force_n = 0;  // of all participants' `forces_n`: their common scale
+  bool shows_regions = true, shows_holds = false, shows_arrows = true, shows_rate = false;
   bool shows_help = false;
   bool has_own_tool = false;
 };
 
 struct HudActions {
-  bool toggle_help = false, toggle_regions = false, reset_camera = false, screenshot = false;
+  bool toggle_help = false, toggle_regions = false, toggle_holds = false, toggle_arrows = false;
+  bool toggle_rate = false, reset_camera = false, screenshot = false;
   bool toggle_play = false;
   std::optional<double> seek_seconds;
   std::optional<float> speed;

@@ -6,29 +6,10 @@
 #include <cstdarg>
 #include <cstdio>
 
+#include "client/ui/panel_style.h"
+
 namespace trocar::ui {
 namespace {
-
-constexpr ImGuiWindowFlags kPanel = ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove |
-                                    ImGuiWindowFlags_NoSavedSettings |
-                                    ImGuiWindowFlags_AlwaysAutoResize |
-                                    ImGuiWindowFlags_NoFocusOnAppearing | ImGuiWindowFlags_NoNav;
-// A panel that only informs lets the pointer through to the scene.
-constexpr ImGuiWindowFlags kGlass = kPanel | ImGuiWindowFlags_NoInputs;
-constexpr float kMargin = 14;
-
-const ImVec4 kGood = {0.42f, 0.86f, 0.58f, 1};
-const ImVec4 kTrouble = {1.0f, 0.66f, 0.30f, 1};
-
-ImVec4 to_imgui(render::Colour c, float alpha = 1) {
-  return {static_cast<float>(c.r) / 255, static_cast<float>(c.g) / 255,
-          static_cast<float>(c.b) / 255, alpha};
-}
-
-ImFont* bold() {
-  const auto& fonts = ImGui::GetIO().Fonts->Fonts;
-  return fonts[fonts.Size - 1];
-}
 
 std::string format(const char* pattern, ...) __attribute__((format(printf, 1, 2)));
 std::string format(const char* pattern, ...) {
@@ -48,15 +29,35 @@ void row(const char* name, const std::string& value) {
   ImGui::TextUnformatted(value.c_str());
 }
 
-void heading(const char* text) {
-  ImGui::PushFont(bold());
-  ImGui::TextUnformatted(text);
-  ImGui::PopFont();
-}
-
 std::string clock_text(double seconds) {
   const int whole = static_cast<int>(seconds);
   return format("%d:%04.1f", whole / 60, seconds - whole / 60 * 60);
+}
+
+ImVec4 colour_of(RateTone tone) {
+  return tone == RateTone::Calm ? kGood : tone == RateTone::Notice ? kNotice : kTrouble;
+}
+
+void rate_rows(const HudModel& model) {
+  const replica::RateFigures& rate = model.figures.rate;
+  const RateText text = describe(rate);
+  ImGui::TableNextRow();
+  ImGui::TableNextColumn();
+  ImGui::TextDisabled("detail");
+  ImGui::TableNextColumn();
+  if (rate.level == replica::RateLevel::Fixed)
+    ImGui::TextUnformatted(text.level.c_str());
+  else
+    ImGui::TextColored(colour_of(text.tone), "%s", text.level.c_str());
+  if (!model.shows_rate) return;
+  if (!text.sweeps.empty())
+    row("sweeps", model.figures.far_sweeps > 0
+                      ? text.sweeps + format("; others %u", model.figures.far_sweeps)
+                      : text.sweeps + "; others rest");
+  if (rate.node_limit > 0) row("queue limit", with_thousands(rate.node_limit) + " nodes");
+  if (!text.load.empty()) row("next tick", text.load + " allowed");
+  if (!text.changes.empty()) row("changes", text.changes);
+  row("time", format("%.0f %% of real time", 100 * static_cast<double>(rate.time_rate)));
 }
 
 void help_row(const char* key, const char* what) {
@@ -70,13 +71,6 @@ void help_row(const char* key, const char* what) {
 }
 
 }  // namespace
-
-std::string with_thousands(std::uint64_t value) {
-  std::string text = std::to_string(value);
-  for (int at = static_cast<int>(text.size()) - 3; at > 0; at -= 3)
-    text.insert(static_cast<std::size_t>(at), ",");
-  return text;
-}
 
 std::string byte_rate(double bytes_per_second) {
   if (bytes_per_second < 1e6) return format("%.1f kB/s", bytes_per_second / 1e3);
@@ -98,8 +92,11 @@ void draw_session_panel(const HudModel& model, float scale) {
     row("slow ticks", with_thousands(f.slow_ticks));
     row("active nodes", format("%s, queue %s", with_thousands(f.active_nodes).c_str(),
                                with_thousands(f.queue_nodes).c_str()));
-    row("sweeps", f.far_sweeps > 0 ? format("%u, all other nodes %u", f.sweeps, f.far_sweeps)
-                                   : format("%u, all other nodes rest", f.sweeps));
+    // With the controller's decisions open, its line says more.
+    if (!model.shows_rate || f.rate.layer_sweeps.empty())
+      row("sweeps", f.far_sweeps > 0 ? format("%u, all other nodes %u", f.sweeps, f.far_sweeps)
+                                     : format("%u, all other nodes rest", f.sweeps));
+    rate_rows(model);
     row("residual", format("%.2g mN", static_cast<double>(f.residual_n) * 1e3));
     row("regions", std::to_string(f.region_count));
     if (!model.timeline) row("round trip", format("%.1f ms", model.round_trip_ms));
@@ -116,50 +113,19 @@ void draw_session_panel(const HudModel& model, float scale) {
   ImGui::End();
 }
 
-void draw_participants_panel(const HudModel& model, float scale) {
-  if (model.participants.empty()) return;
+void draw_slow_time(const HudModel& model, float scale) {
+  // A recording plays at its own speed, however slow the session was.
+  if (model.timeline || !model.status.empty()) return;
+  const RateText text = describe(model.figures.rate);
+  if (text.banner.empty()) return;
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
-  ImGui::SetNextWindowPos({screen.x - kMargin * scale, kMargin * scale}, 0, {1, 0});
-  ImGui::Begin("participants", nullptr, kGlass);
-  heading("Participants");
-  ImGui::Separator();
-  if (ImGui::BeginTable("list", 4, ImGuiTableFlags_SizingFixedFit)) {
-    for (const HudParticipant& p : model.participants) {
-      ImGui::TableNextRow();
-      ImGui::TableNextColumn();
-      const ImVec2 at = ImGui::GetCursorScreenPos();
-      const float side = ImGui::GetTextLineHeight();
-      const ImU32 colour =
-          ImGui::GetColorU32(p.has_tool ? to_imgui(p.colour, p.is_silent ? 0.4f : 1.0f)
-                                        : ImVec4{0.4f, 0.47f, 0.53f, 1});
-      if (p.has_tool)
-        ImGui::GetWindowDrawList()->AddCircleFilled({at.x + side / 2, at.y + side / 2},
-                                                    side * 0.36f, colour, 20);
-      else
-        ImGui::GetWindowDrawList()->AddCircle({at.x + side / 2, at.y + side / 2}, side * 0.30f,
-                                              colour, 20, 1.5f * scale);
-      ImGui::Dummy({side, side});
-      ImGui::TableNextColumn();
-      if (p.is_self) ImGui::PushFont(bold());
-      ImGui::TextUnformatted((p.is_self ? p.name + " (you)" : p.name).c_str());
-      if (p.is_self) ImGui::PopFont();
-      ImGui::TableNextColumn();
-      const char* doing = p.is_silent                    ? "silent"
-                          : p.verb == scene::Verb::None  ? replica::name_of(p.role)
-                          : !p.has_claim                 ? "refused"
-                          : p.verb == scene::Verb::Grasp ? "grasps"
-                                                         : "pushes";
-      if (p.has_tool && p.verb != scene::Verb::None && !p.is_silent)
-        ImGui::TextColored(p.has_claim ? ImGui::GetStyle().Colors[ImGuiCol_Text] : kTrouble, "%s",
-                           doing);
-      else
-        ImGui::TextDisabled("%s", doing);
-      ImGui::TableNextColumn();
-      if (p.has_tool && (p.contact_nodes > 0 || p.force_n >= 0.005f))
-        ImGui::Text("%.2f N, %u nodes", p.force_n, p.contact_nodes);
-    }
-    ImGui::EndTable();
-  }
+  ImGui::SetNextWindowPos({screen.x / 2, kMargin * scale}, 0, {0.5f, 0});
+  ImGui::Begin("slow", nullptr, kGlass);
+  ImGui::PushFont(bold());
+  ImGui::TextColored(kTrouble, "%s", text.banner.c_str());
+  ImGui::PopFont();
+  ImGui::TextDisabled("%s", model.has_own_tool ? "the server cannot keep up: move slowly"
+                                               : "the server cannot keep up");
   ImGui::End();
 }
 
@@ -234,7 +200,11 @@ void draw_timeline(const HudTimeline& timeline, float scale, HudActions& actions
 void draw_help(const HudModel& model, float scale) {
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
   const float bottom = screen.y - (model.timeline ? 70 : kMargin) * scale;
-  ImGui::SetNextWindowPos({kMargin * scale, bottom}, 0, {0, 1});
+  // The hint is at the left; the whole list, which is tall, under the shorter panel.
+  if (model.shows_help)
+    ImGui::SetNextWindowPos({screen.x - kMargin * scale, bottom}, 0, {1, 1});
+  else
+    ImGui::SetNextWindowPos({kMargin * scale, bottom}, 0, {0, 1});
   ImGui::SetNextWindowBgAlpha(model.shows_help ? 0.86f : 0.45f);
   ImGui::Begin("help", nullptr, kGlass);
   if (!model.shows_help) {
@@ -261,11 +231,17 @@ void draw_help(const HudModel& model, float scale) {
     help_row("Ctrl+wheel, + -", "zoom");
     help_row("C", "view as at the start");
     help_row("O", model.shows_regions ? "hide active regions" : "show active regions");
+    help_row("L", model.shows_holds ? "hide who holds what" : "show who holds what");
+    help_row("A", model.shows_arrows ? "hide force arrows" : "show force arrows");
+    help_row("R",
+             model.shows_rate ? "hide what the server decides" : "show what the server decides");
     help_row("F12", "screenshot into the current folder");
     help_row("H, F1", "hide this");
     ImGui::EndTable();
   }
   ImGui::TextDisabled("Arrows: force of the tissue on a tool, 20 mm per N.");
+  ImGui::TextDisabled("A line from a tool to a small ball: where the hand is, when");
+  ImGui::TextDisabled("tissue keeps the tool from it.");
   ImGui::End();
 }
 

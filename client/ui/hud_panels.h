@@ -4,19 +4,20 @@
 // per design pixel.
 
 #include "client/ui/hud.h"
+#include "client/ui/rate_text.h"
 
 namespace trocar::ui {
 
 void draw_session_panel(const HudModel& model, float scale);
 void draw_participants_panel(const HudModel& model, float scale);
+// A banner while simulated time runs slower than real time.
+void draw_slow_time(const HudModel& model, float scale);
 void draw_labels(const HudModel& model, float scale);
 void draw_messages(const HudModel& model, float scale);
 void draw_timeline(const HudTimeline& timeline, float scale, HudActions& actions);
 void draw_help(const HudModel& model, float scale);
 void draw_status(const HudModel& model, float scale);
 
-// "1,553"
-std::string with_thousands(std::uint64_t value);
 // "12.3 kB/s"
 std::string byte_rate(double bytes_per_second);
 

@@ -24,6 +24,20 @@ TEST(ClientOptions, DefaultsAreAWindowAndASurgeonOnThisMachine) {
   EXPECT_LE((*options)->name.size(), 32u);
 }
 
+TEST(ClientOptions, OverlaysAndViewAreAsAskedFor) {
+  const auto plain = parse({});
+  EXPECT_EQ((*plain)->overlays, Overlays{});
+  const auto some = parse({"--show", "holds,rate", "--view", "30,-10,1.5"});
+  ASSERT_TRUE(some.ok()) << some.error().message;
+  EXPECT_EQ((*some)->overlays,
+            (Overlays{.regions = false, .holds = true, .arrows = false, .rate = true}));
+  EXPECT_EQ((*some)->view.yaw_deg, 30);
+  EXPECT_EQ((*some)->view.zoom, 1.5);
+  const auto none = parse({"--show", "nothing"});
+  ASSERT_TRUE(none.ok()) << none.error().message;
+  EXPECT_FALSE((*none)->overlays.regions || (*none)->overlays.arrows);
+}
+
 TEST(ClientOptions, EachWrongValueIsAUsageErrorThatNamesTheOption) {
   const std::vector<std::pair<std::vector<std::string>, std::string>> cases = {
       {{"--size", "5"}, "--size"},
@@ -35,6 +49,11 @@ TEST(ClientOptions, EachWrongValueIsAUsageErrorThatNamesTheOption) {
       {{"--role", "observer", "--script", "x.toml"}, "--script"},
       {{"--replay", "x.mcap", "--script", "x.toml"}, "--replay"},
       {{"--no-render", "--screenshot", "x.png"}, "--screenshot"},
+      {{"--show", "regions,shadows"}, "--show"},
+      {{"--show", "nothing,arrows"}, "--show"},
+      {{"--view", "10,20"}, "--view"},
+      {{"--view", "10,20,0"}, "--view"},
+      {{"--view", "nan,0,1"}, "--view"},
       {{"--no-such-option"}, "no-such-option"}};
   for (const auto& [words, name] : cases) {
     const auto options = parse(words);

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdlib>
+#include <functional>
 #include <string>
 
 #include "common/base/timing.h"
@@ -46,6 +48,41 @@ class PictureTest : public ::testing::Test {
       picture_->draw(replica_, source_, hands_, now_ += 16'000'000);
     }
   }
+  // How many pixels differ clearly between two pictures of the same size.
+  static int difference(const render::Image& a, const render::Image& b) {
+    int count = 0;
+    for (std::size_t i = 0; i + 2 < a.rgb.size(); i += 3) {
+      int most = 0;
+      for (std::size_t k = 0; k < 3; ++k)
+        most = std::max(most, std::abs(int{a.rgb[i + k]} - int{b.rgb[i + k]}));
+      count += most > 24;
+    }
+    return count;
+  }
+  // The last of four pictures of the same 40 frames with these options, messages changed by
+  // `tamper`.
+  render::Image picture_of(const Overlays& overlays,
+                           std::function<bool(proto::Envelope&)> tamper = {},
+                           const char* name = nullptr) {
+    options_.overlays = overlays;
+    picture_.reset();  // Dear ImGui keeps one context
+    auto picture = Picture::make(options_, "test");
+    EXPECT_TRUE(picture.ok());
+    picture_ = std::move(*picture);
+    testing::SyntheticSource source(liver(), "liver");
+    source.tamper = std::move(tamper);
+    replica::Replica replica([&](const proto::Envelope& m) { return source.send(m); });
+    source.queue_start();
+    for (int i = 0; i < 40; ++i) {
+      source.queue_frame();
+      source.poll(replica);
+      now_ += 16'000'000;
+      if (i % 10 == 9) picture_->draw(replica, source, hands_, now_);
+    }
+    EXPECT_TRUE(replica.fault().ok());
+    if (name != nullptr) keep(name);
+    return picture_->image();
+  }
   void keep(const char* name) {
     if (const char* folder = std::getenv("TROCAR_PICTURES")) {
       const auto saved = picture_->save(std::string(folder) + "/" + name + ".png");
@@ -54,9 +91,12 @@ class PictureTest : public ::testing::Test {
   }
 
   static wire::SurfaceLayout liver() {
-    auto organ = scene::make_liver();
-    EXPECT_TRUE(organ.ok());
-    return wire::make_surface_layout(*organ);
+    static const wire::SurfaceLayout kLayout = [] {
+      auto organ = scene::make_liver();
+      EXPECT_TRUE(organ.ok());
+      return wire::make_surface_layout(*organ);
+    }();
+    return kLayout;
   }
 
   ClientOptions options_;
@@ -93,6 +133,60 @@ TEST_F(PictureTest, FiguresAndParticipantsAreDrawnWithoutAWindow) {
   EXPECT_GT(after.g, before.g + 1);  // more text in the panel
   const Pixel participants = mean(picture_->image(), 1000, 20, 1260, 110);
   EXPECT_GT(participants.g, 12);
+}
+
+TEST_F(PictureTest, OverlaysChangeWhatTheyAreFor) {
+  const Overlays nothing{.regions = false, .holds = false, .arrows = false, .rate = false};
+  const auto with = [&](bool Overlays::*overlay) {
+    Overlays overlays = nothing;
+    overlays.*overlay = true;
+    return overlays;
+  };
+  const render::Image plain = picture_of(nothing);
+  EXPECT_EQ(difference(plain, plain), 0);
+  EXPECT_GT(difference(plain, picture_of(with(&Overlays::regions))), 2000);
+  EXPECT_GT(difference(plain, picture_of(with(&Overlays::holds), {}, "holds")), 300);
+  EXPECT_GT(difference(plain, picture_of(with(&Overlays::arrows))), 100);
+  EXPECT_GT(difference(plain, picture_of(with(&Overlays::rate), {}, "rate")), 500);
+}
+
+TEST_F(PictureTest, SlowTimeIsSaidInWords) {
+  const Overlays overlays;
+  const render::Image plain = picture_of(overlays);
+  const render::Image slow = picture_of(
+      overlays,
+      [](proto::Envelope& m) {
+        if (!m.has_frame_state()) return true;
+        m.mutable_frame_state()->mutable_rate()->set_level(proto::RATE_OVERLOADED);
+        m.mutable_frame_state()->mutable_rate()->set_time_rate(0.62f);
+        return true;
+      },
+      "slow");
+  const Pixel before = mean(plain, 540, 15, 740, 65), after = mean(slow, 540, 15, 740, 65);
+  EXPECT_GT(after.r, before.r + 5);  // orange words in the banner
+}
+
+TEST_F(PictureTest, ABladeIsDrawnWhereTissueLetsItBeWithALineToTheHand) {
+  const Overlays overlays{.regions = false, .holds = false, .arrows = false, .rate = false};
+  const auto blade = [](bool is_held_back) {
+    return [is_held_back](proto::Envelope& m) {
+      if (m.has_participants()) {
+        auto& shape = *m.mutable_participants()->mutable_participant(1)->mutable_tool(0);
+        shape.set_radius_m(0.002f), shape.set_half_width_m(0.016f), shape.set_length_m(0.07f);
+      }
+      if (!m.has_frame_state()) return true;
+      auto& tool = *m.mutable_frame_state()->mutable_tool(1);
+      if (is_held_back) {
+        *tool.mutable_proxy_position_m() = tool.position_m();
+        *tool.mutable_proxy_orientation() = tool.orientation();
+        tool.mutable_proxy_position_m()->set_y(tool.position_m().y() + 0.02f);
+      }
+      return true;
+    };
+  };
+  const render::Image straight = picture_of(overlays, blade(false), "blade");
+  const render::Image held_back = picture_of(overlays, blade(true), "blade-held-back");
+  EXPECT_GT(difference(straight, held_back), 1000);
 }
 
 TEST_F(PictureTest, CpuTimeOfAPictureIsReported) {

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <utility>
 
 #include "client/replica/tool_messages.h"
@@ -210,6 +212,37 @@ TEST_F(ReplicaTest, ToolSamplesCarryPoseAndVerb) {
   EXPECT_EQ(message.verb(), proto::VERB_GRASP);
 }
 
+TEST_F(ReplicaTest, WhatTheRateControllerDecidedIsKept) {
+  start();
+  RateFigures expected;
+  expected.level = RateLevel::Reduced;
+  expected.layer_sweeps = {4, 3, 2, 1};
+  expected.node_limit = 1050;
+  expected.budget_us = 800;
+  expected.predicted_us = 742;
+  expected.lowered = 12;
+  expected.raised = 7;
+  EXPECT_EQ(replica_.newest()->figures.rate, expected);
+
+  // A level of a newer server is as if nothing were known of it; the rest counts.
+  source_.tamper = [](proto::Envelope& m) {
+    if (m.has_frame_state())
+      m.mutable_frame_state()->mutable_rate()->set_level(static_cast<proto::RateLevel>(9));
+    return true;
+  };
+  advance(1);
+  expected.level = RateLevel::Fixed;
+  EXPECT_EQ(replica_.newest()->figures.rate, expected);
+
+  source_.tamper = [](proto::Envelope& m) {
+    if (m.has_frame_state()) m.mutable_frame_state()->clear_rate();
+    return true;
+  };
+  advance(1);
+  EXPECT_EQ(replica_.newest()->figures.rate, RateFigures{});  // a server before 1.2
+  EXPECT_TRUE(replica_.fault().ok());
+}
+
 TEST_F(ReplicaTest, InvalidMessagesAreAFaultThatNamesTheField) {
   const auto fault_of = [&](auto change) {
     testing::SyntheticSource source(testing::make_blob_layout(6, 8, 0.08));
@@ -241,6 +274,22 @@ TEST_F(ReplicaTest, InvalidMessagesAreAFaultThatNamesTheField) {
   EXPECT_NE(fault_of([](proto::Envelope& m) {
               if (m.has_frame_state()) m.mutable_frame_state()->mutable_tool(0)->set_tool(77);
             }).find("FrameState.tool"),
+            std::string::npos);
+  const auto rate_fault = [&](auto change) {
+    return fault_of([&](proto::Envelope& m) {
+      if (m.has_frame_state()) change(*m.mutable_frame_state()->mutable_rate());
+    });
+  };
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  for (const float bad : {std::nanf(""), kInfinity, -1.0f}) {
+    for (const auto& fault : {rate_fault([&](proto::RateState& r) { r.set_time_rate(bad); }),
+                              rate_fault([&](proto::RateState& r) { r.set_budget_us(bad); }),
+                              rate_fault([&](proto::RateState& r) { r.set_predicted_us(bad); })})
+      EXPECT_NE(fault.find("FrameState.rate"), std::string::npos) << bad;
+  }
+  EXPECT_NE(rate_fault([](proto::RateState& r) {
+              for (int i = 0; i < 20; ++i) r.add_layer_sweeps(1);
+            }).find("FrameState.rate"),
             std::string::npos);
   EXPECT_NE(fault_of([](proto::Envelope& m) {
               if (m.has_welcome()) m.mutable_welcome()->set_protocol_major(9);

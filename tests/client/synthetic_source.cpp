@@ -169,6 +169,15 @@ proto::Envelope SyntheticSource::make_state() const {
   state.set_tick_cpu_us(412);
   state.set_tick_cpu_p99_us(688);
   state.set_slow_ticks(3);
+  auto& rate = *state.mutable_rate();
+  rate.set_level(proto::RATE_REDUCED);
+  for (const std::uint32_t sweeps : {4u, 3u, 2u, 1u}) rate.add_layer_sweeps(sweeps);
+  rate.set_node_limit(1050);
+  rate.set_budget_us(800);
+  rate.set_predicted_us(742);
+  rate.set_lowered(12);
+  rate.set_raised(7);
+  rate.set_time_rate(1);
   return envelope;
 }
 

@@ -1,0 +1,40 @@
+#pragma once
+
+// What the parts of the HUD share: window flags, colours, the bold font. Only for client/ui's own
+// .cpp files, after <imgui.h>.
+
+#include <imgui.h>
+
+#include "client/render/tool_mesh.h"
+
+namespace trocar::ui {
+
+inline constexpr ImGuiWindowFlags kPanel =
+    ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
+    ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoFocusOnAppearing |
+    ImGuiWindowFlags_NoNav;
+// A panel that only informs lets the pointer through to the scene.
+inline constexpr ImGuiWindowFlags kGlass = kPanel | ImGuiWindowFlags_NoInputs;
+inline constexpr float kMargin = 14;
+
+inline const ImVec4 kGood = {0.42f, 0.86f, 0.58f, 1};
+inline const ImVec4 kNotice = {0.95f, 0.86f, 0.45f, 1};
+inline const ImVec4 kTrouble = {1.0f, 0.66f, 0.30f, 1};
+
+inline ImVec4 to_imgui(render::Colour c, float alpha = 1) {
+  return {static_cast<float>(c.r) / 255, static_cast<float>(c.g) / 255,
+          static_cast<float>(c.b) / 255, alpha};
+}
+
+inline ImFont* bold() {
+  const auto& fonts = ImGui::GetIO().Fonts->Fonts;
+  return fonts[fonts.Size - 1];
+}
+
+inline void heading(const char* text) {
+  ImGui::PushFont(bold());
+  ImGui::TextUnformatted(text);
+  ImGui::PopFont();
+}
+
+}  // namespace trocar::ui

@@ -1,0 +1,58 @@
+#include "client/ui/rate_text.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace trocar::ui {
+namespace {
+
+std::string whole(float value) {
+  return with_thousands(static_cast<std::uint64_t>(std::lround(std::min(value, 1e9f))));
+}
+
+std::string sweeps_text(const std::vector<std::uint32_t>& sweeps) {
+  if (sweeps.empty()) return {};
+  std::string text = std::to_string(sweeps.front()) + " at the tools";
+  for (std::size_t i = 1; i < sweeps.size(); ++i)
+    text += (i == 1 ? ", then " : ", ") + std::to_string(sweeps[i]);
+  return text;
+}
+
+}  // namespace
+
+std::string with_thousands(std::uint64_t value) {
+  std::string text = std::to_string(value);
+  for (int at = static_cast<int>(text.size()) - 3; at > 0; at -= 3)
+    text.insert(static_cast<std::size_t>(at), ",");
+  return text;
+}
+
+RateText describe(const replica::RateFigures& rate) {
+  RateText text;
+  switch (rate.level) {
+    case replica::RateLevel::Fixed:
+      text.level = "fixed detail";
+      break;
+    case replica::RateLevel::Full:
+      text.level = "full detail";
+      break;
+    case replica::RateLevel::Reduced:
+      text.level = "less detail, to keep pace";
+      text.tone = RateTone::Notice;
+      break;
+    case replica::RateLevel::Overloaded:
+      text.level = "least detail, and still too slow";
+      text.tone = RateTone::Warning;
+      break;
+  }
+  text.sweeps = sweeps_text(rate.layer_sweeps);
+  if (rate.budget_us > 0)
+    text.load = whole(rate.predicted_us) + " of " + whole(rate.budget_us) + " us";
+  if (rate.level != replica::RateLevel::Fixed)
+    text.changes = with_thousands(rate.lowered) + " down, " + with_thousands(rate.raised) + " up";
+  if (rate.time_rate < kSlowTimeRate)
+    text.banner = "Slow motion: " + whole(100 * rate.time_rate) + " % of real speed";
+  return text;
+}
+
+}  // namespace trocar::ui
