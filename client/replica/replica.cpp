@@ -262,6 +262,7 @@ void Replica::apply_state(const proto::FrameState& message) {
     tool.penetration_m = state.penetration_m();
     tool.has_claim = state.has_claim();
     tool.is_silent = state.is_silent();
+    tool.is_inside = state.is_inside();
     tool.torque_nm = to_vec3(state.torque_nm());
     tool.world_from_proxy = state.has_proxy_position_m()
                                 ? to_pose(state.proxy_position_m(), state.proxy_orientation())
@@ -297,8 +298,7 @@ void Replica::apply_participants(const proto::Participants& message) {
     participant.slot.value = static_cast<std::uint8_t>(entry.slot());
     participant.name = entry.name();
     participant.role = wire::role_of(entry.role());
-    for (const auto& shape : entry.tool())
-      participant.tools.push_back(wire::read(shape));
+    for (const auto& shape : entry.tool()) participant.tools.push_back(wire::read(shape));
     participants_.push_back(std::move(participant));
   }
   std::ranges::sort(participants_, {}, &Participant::slot);

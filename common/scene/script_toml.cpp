@@ -24,8 +24,7 @@ void read_shape(TableReader& reader, ToolShape& shape) {
     shape.half_width_m = static_cast<float>(*width * 0.5e-3);
   if (const auto friction = reader.number("friction", 0, 2))
     shape.friction = static_cast<float>(*friction);
-  if (const auto grip = reader.number("grip_n", 0.1, 100))
-    shape.grip_n = static_cast<float>(*grip);
+  if (const auto grip = reader.number("grip_n", 0.1, 100)) shape.grip_n = static_cast<float>(*grip);
 }
 
 std::optional<ScriptAnchor> read_anchor(TableReader& reader) {

@@ -154,17 +154,23 @@ void ContactFinder::plan_way(const ContactScene& scene, ToolContact& contact) {
   contact.softness_m = greatest_pressure_ / stiffness_of(tool.shape.radius_m);
   contact.start = has_appeared ? tool.pose : proxy.pose;
   const float way = distance(contact.start, tool.pose);
-  const float most = has_appeared ? scene.max_step_m : std::min(scene.max_step_m, proxy.step_m);
+  const float most = std::min(scene.max_step_m, has_appeared ? contact.softness_m : proxy.step_m);
   const float part = way > most ? most / way : 1.0f;
   contact.goal = between(contact.start, tool.pose, part);
-  const float step = 0.5f * tool.shape.radius_m;
-  const auto steps = std::clamp<std::size_t>(static_cast<std::size_t>(std::ceil(way * part / step)),
-                                             1, kMaxPathSteps);
+  lay_path(tool.shape, contact, way * part);
+}
+
+// Steps of at most half a radius.
+void ContactFinder::lay_path(const trocar::scene::ToolShape& shape, const ToolContact& contact,
+                             float way) {
+  const float step = 0.5f * shape.radius_m;
+  const auto steps =
+      std::clamp<std::size_t>(static_cast<std::size_t>(std::ceil(way / step)), 1, kMaxPathSteps);
   path_.clear();
   for (std::size_t i = 0; i <= steps; ++i)
     path_.emplace_back(
         between(contact.start, contact.goal, static_cast<float>(i) / static_cast<float>(steps)),
-        tool.shape);
+        shape);
 }
 
 // Whether the tool at the start of its way holds a place of the surface deeper than one that it
@@ -183,13 +189,30 @@ bool ContactFinder::is_inside_tissue(std::span<const TriangleIndex> triangles,
   });
 }
 
+// A tool that has appeared a little inside comes from where it is just outside along its shaft, as
+// instruments do.
+bool ContactFinder::comes_from_outside(const ContactScene& scene, ToolContact& contact) {
+  const auto& shape = scene.tools[contact.tool].shape;
+  const Vec3f back = path_.front().along * (0.5f * shape.radius_m);
+  for (float gone = 0; gone <= kBack_m; gone += 0.5f * shape.radius_m) {
+    if (!is_inside_tissue(triangles_near(scene.world, contact.tool), scene.world)) return true;
+    contact.start.position += back;
+    contact.goal = contact.start;
+    lay_path(shape, contact, 0);
+  }
+  return false;
+}
+
 void ContactFinder::find_push(const ContactScene& scene, float strength, ContactList& out) {
   ToolContact& contact = out.tools.back();
   plan_way(scene, contact);
+  if (!contact.is_placed && !comes_from_outside(scene, contact)) {
+    ++out.tools_inside;
+    return;
+  }
+  const bool has_walked = std::exchange(contact.is_placed, true);
   const auto triangles = triangles_near(scene.world, contact.tool);
   triangles_visited_ += triangles.size();
-  if (!contact.is_placed && is_inside_tissue(triangles, scene.world)) return;
-  const bool has_walked = std::exchange(contact.is_placed, true);
 
   const auto& proxy = scene.proxies[contact.tool];
   const float radius = path_.front().radius;

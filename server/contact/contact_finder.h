@@ -6,7 +6,8 @@
 // the surface that it meets on the way is carried ahead of it; the plane that holds the place out
 // is the tool's face at the end of the way, on the side from which it was met. So a tool passes
 // through nothing, however thin and however fast it is, and a surface is met from outside only: a
-// tool that appears inside tissue touches nothing until it has come out. Places within kMargin_m
+// tool that appears inside tissue, deeper than kBack_m along its shaft, touches nothing until it
+// has come out. Places within kMargin_m
 // get a plane before they touch, so that none slips in during a tick.
 //
 // Grasp. Nodes held by the jaws are gripped where they are in the jaws' frame.
@@ -42,6 +43,8 @@ inline constexpr float kGreatestPressure = 5;
 inline constexpr float kJump_m = 0.01f;
 // A hand at 5 m/s; a faster one is followed at that speed.
 inline constexpr float kMaxStep_m = 0.005f;
+// What appears inside by no more than this is taken to have come from outside.
+inline constexpr float kBack_m = 0.012f;
 // Places of a tool are this many radii apart, at most: between them it enters by 1/20 of a radius.
 inline constexpr float kPlaceSpacing = 0.6f;
 
@@ -84,6 +87,8 @@ class ContactFinder {
   };
 
   void plan_way(const ContactScene& scene, ToolContact& contact);
+  void lay_path(const trocar::scene::ToolShape& shape, const ToolContact& contact, float way);
+  bool comes_from_outside(const ContactScene& scene, ToolContact& contact);
   void find_push(const ContactScene& scene, float strength, ContactList& out);
   ContactPoint point_of(const ContactScene& scene, ToolSlot tool, TriangleIndex triangle,
                         const std::array<float, 3>& place) const;

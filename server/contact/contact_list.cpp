@@ -16,7 +16,7 @@ void ContactList::clear() {
   seeds.clear();
   reach_nodes.clear();
   reach.fill({0, 0});
-  dropped = 0;
+  tools_inside = dropped = 0;
 }
 
 }  // namespace trocar::contact

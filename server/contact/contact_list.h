@@ -83,7 +83,8 @@ struct ContactList {
   // request. Range into `reach_nodes` per tool slot.
   std::vector<NodeIndex> reach_nodes;
   std::array<std::pair<std::uint32_t, std::uint32_t>, kMaxTools> reach;
-  std::uint32_t dropped = 0;  // points or nodes beyond kMaxPointsPerTool
+  std::uint32_t tools_inside = 0;  // that appeared inside tissue and have not come out
+  std::uint32_t dropped = 0;       // points or nodes beyond kMaxPointsPerTool
 
   void reserve();
   void clear();

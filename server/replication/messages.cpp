@@ -105,6 +105,7 @@ void describe(const step::PublishedFrame& frame, proto::FrameState& state) {
     entry.set_has_claim(tool.has_claim);
     entry.set_penetration_m(tool.penetration_m);
     entry.set_is_silent(tool.is_silent);
+    entry.set_is_inside(tool.is_inside);
     write(tool.torque_nm, *entry.mutable_torque_nm());
     if (tool.world_from_proxy != tool.world_from_tool) {
       write(tool.world_from_proxy.position, *entry.mutable_proxy_position_m());

@@ -39,8 +39,7 @@ Result<HelloRequest> check_hello(const proto::Hello& hello, EndReason& reason) {
   request.protocol_minor = hello.protocol_minor();
   request.name = hello.name();
   request.role = wire::role_of(hello.role());
-  for (const auto& tool : hello.tool())
-    request.tools.push_back(wire::read(tool));
+  for (const auto& tool : hello.tool()) request.tools.push_back(wire::read(tool));
   return request;
 }
 

@@ -27,6 +27,7 @@ struct ToolFrame {
   std::uint32_t contact_nodes = 0;
   float penetration_m = 0;  // deepest contact, >= 0
   bool has_claim = false;   // its push or grasp is in effect
+  bool is_inside = false;   // appeared inside tissue: touches nothing until it has come out
   bool is_silent = false;   // lease no longer fresh
 };
 

@@ -25,6 +25,7 @@ void find_contacts(const State& state, StepContext& context) {
       context.contacts);
   context.report.contact_nodes = static_cast<std::uint32_t>(context.contacts.seeds.size());
   if (context.contacts.dropped > 0) context.report.faults |= kFaultContactLimit;
+  if (context.contacts.tools_inside > 0) context.report.faults |= kFaultToolInside;
 }
 
 void fill_queue(State& state, StepContext& context) {
@@ -101,6 +102,7 @@ ToolFrame describe_tool(const State& state, const StepContext& context, ToolSlot
   frame.is_silent = state.world.tick - tool.last_sample_tick > locks::kLeaseTicks;
   for (const auto& contact : context.contacts.tools) {
     if (contact.tool != slot) continue;
+    frame.is_inside = contact.verb == scene::Verb::Push && !contact.is_placed;
     frame.contact_nodes = contact.seeds_end - contact.seeds_begin;
     const auto reaction = contact::reaction_on(context.contacts, contact, state.world);
     frame.force_n = reaction.force_n;

@@ -47,6 +47,7 @@ enum TickFault : std::uint32_t {
   kFaultInputDropped = 1u << 0,    // an input did not fit the state (empty slot, no such tool)
   kFaultContactLimit = 1u << 1,    // more contact nodes than the contact list holds
   kFaultOverRelaxation = 1u << 2,  // residual grew: the tick went on without over-relaxation
+  kFaultToolInside = 1u << 4,      // a tool appeared inside tissue: draw it back to touch
   kFaultNonFinite = 1u << 3,       // a node's step was not finite: its region went back a tick
 };
 

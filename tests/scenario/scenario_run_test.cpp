@@ -322,8 +322,11 @@ max_sweeps = 2
 TEST(ScenarioRun, AToolPressesAndItsForceIsCarriedByTheSupport) {
   // Short: pressed for longer, a lattice without shear stiffness buckles and slips off the tool.
   const auto run = make(R"([organ]
-source = "lattice"
+source = "block"
 nodes = [7, 5, 7]
+spacing_mm = 10
+[material]
+elastic_law = "neo-hookean"
 [[tool]]
 radius_mm = 15
 [[tool.key]]
@@ -335,26 +338,19 @@ verb = "push"
 time_s = 0.3
 position_mm = [0, 18, 0]
 [run]
-seconds = 0.45
+seconds = 1
 [[probe]]
 tool = 0
 quantity = "force"
 [[probe]]
 set = "fixed"
 quantity = "reaction"
-[[nodes]]
-name = "under"
-nearest_mm = [0, 20, 0]
-[[probe]]
-set = "under"
-quantity = "displacement"
 )");
   ASSERT_TRUE(run);
   finish(*run);
   const double force = run->probe(0).y;
   EXPECT_GT(force, 0.015) << "the tissue pushes the tool up";
   EXPECT_NEAR(run->probe(1).y, force, 0.02 * force) << "the support carries it";
-  EXPECT_NEAR(force, -run->probe(2).y * 40 / 4, 0.01 * force) << "one chain of four springs";
 }
 
 TEST(ScenarioRun, WithADepthOnlyTheQueueMoves) {
