@@ -283,6 +283,7 @@ Status validate(const Organ& organ) {
   if (!is_finite(organ.source_offset_m)) return broken(organ, "source offset is not finite");
   if (auto s = check_stress_free(organ); !s) return s;
   if (auto s = check_regions(organ); !s) return s;
+  if (auto s = validate(organ.depth_table); !s) return broken(organ, s.error().message);
   return check_material(organ, organ.material);
 }
 

@@ -10,6 +10,7 @@
 
 #include "common/math/vec3.h"
 #include "common/mesh/tet_mesh.h"
+#include "common/scene/depth_table.h"
 #include "common/scene/material.h"
 
 namespace trocar::scene {
@@ -27,6 +28,7 @@ struct Organ {
   // Where every node would be without gravity and tension, if the rest pose is in equilibrium with
   // them: then the organ does not sag when a session starts. Empty: the rest pose itself.
   std::vector<Vec3d> stress_free_positions_m;
+  DepthTable depth_table;  // empty: not calibrated
 
   // Geometry from which energies measure strain.
   const std::vector<Vec3d>& stress_free() const {
@@ -68,8 +70,8 @@ std::vector<double> lumped_masses(const Organ& organ);
 // XXH3-64 over the organ's arrays (not over a file's bytes): names a mesh and material for files
 // and sessions that depend on it. Each array is preceded by its length (u64); in order: rest
 // positions, tets, links, boundary triangles, fixed nodes, node masses, the numbers of the
-// material, of each region with its nodes, gravity, stress-free positions. Name, source and source
-// offset are left out: they change no result.
+// material, of each region with its nodes, gravity, stress-free positions. Name, source, source
+// offset and depth table are left out: they change no result.
 std::uint64_t organ_hash(const Organ& organ);
 
 // Validates mesh, sizes and ranges; the rest bounding box is centred on the origin and at most 2 m.

@@ -98,6 +98,33 @@ Status take_material(const proto::Material& in, Material& m) {
   return {};
 }
 
+void put_depth_table(const DepthTable& table, proto::DepthTable& out) {
+  out.set_error(table.error);
+  out.set_tool_radius_m(table.tool_radius_m);
+  out.set_places(table.places);
+  for (const auto& row : table.rows) {
+    auto& entry = *out.add_row();
+    entry.set_force_n(row.force_n);
+    if (row.frozen_nodes) entry.set_frozen_nodes(*row.frozen_nodes);
+    if (row.graded_depth) entry.set_graded_depth(*row.graded_depth);
+    entry.set_frozen_error(row.frozen_error);
+    entry.set_graded_error(row.graded_error);
+  }
+}
+
+DepthTable take_depth_table(const proto::DepthTable& in) {
+  DepthTable table{in.error(), in.tool_radius_m(), in.places(), {}};
+  for (const auto& entry : in.row()) {
+    auto& row = table.rows.emplace_back();
+    row.force_n = entry.force_n();
+    if (entry.has_frozen_nodes()) row.frozen_nodes = entry.frozen_nodes();
+    if (entry.has_graded_depth()) row.graded_depth = entry.graded_depth();
+    row.frozen_error = entry.frozen_error();
+    row.graded_error = entry.graded_error();
+  }
+  return table;
+}
+
 Status take_mesh(const proto::Organ& message, mesh::TetMesh& mesh) {
   const auto& positions = message.rest_position_m();
   if (positions.empty() || positions.size() % 3 != 0)
@@ -172,6 +199,8 @@ Bytes encode_organ(const Organ& organ) {
     put_vector(organ.gravity_m_s2, message.mutable_gravity_m_s2());
   for (const Vec3d& p : organ.stress_free_positions_m)
     put_vector(p, message.mutable_stress_free_position_m());
+  if (!organ.depth_table.empty())
+    put_depth_table(organ.depth_table, *message.mutable_depth_table());
   Bytes bytes(message.ByteSizeLong());
   TROCAR_ASSERT(message.SerializeToArray(bytes.data(), static_cast<int>(bytes.size())));
   return bytes;
@@ -205,6 +234,7 @@ Result<Organ> decode_organ(BytesView bytes) {
   if (free.size() % 3 != 0) return bad("organ: stress-free positions must be three numbers a node");
   for (int i = 0; i < free.size(); i += 3)
     organ.stress_free_positions_m.push_back(vector_at(free, i));
+  if (message.has_depth_table()) organ.depth_table = take_depth_table(message.depth_table());
   if (auto s = validate(organ); !s) return s.error();
   return organ;
 }

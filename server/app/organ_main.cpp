@@ -15,6 +15,7 @@
 #include "common/scene/builtin_organs.h"
 #include "common/scene/load_organ.h"
 #include "common/scene/organ_file.h"
+#include "server/app/organ_calibrate.h"
 #include "server/app/organ_experiments.h"
 
 namespace trocar::app {
@@ -41,6 +42,8 @@ Examples:
       its rest pose under gravity, in which it starts without sagging, into spleen-settled.organ
   trocar-organ fit deploy/scenes/stretch.toml deploy/scenes/stretch.csv
       Young's modulus from a measured force-displacement curve; results in out/fit-stretch
+  trocar-organ calibrate liver --error 3
+      how much must move for a contact of a given force, into liver-calibrated.organ
 
 Exit codes: 0 ok, 2 command line, 3 bad file, 5 cannot write or processor too old.
 )";
@@ -58,6 +61,7 @@ struct Options {
   bool json = false;
   FitCommand fit;
   SettleCommand settle;
+  CalibrateCommand calibrate;
 };
 
 struct EdgeLengths {
@@ -348,6 +352,7 @@ void add_commands(CLI::App& app, Options& options) {
   inspect->add_flag("--json", options.json, "print JSON");
   add_fit_command(app, options.fit);
   add_settle_command(app, options.settle);
+  add_calibrate_command(app, options.calibrate);
 }
 
 int run(int argc, char** argv) {
@@ -380,6 +385,8 @@ int run(int argc, char** argv) {
     status = run_fit(options.fit);
   else if (app.got_subcommand("settle"))
     status = run_settle(options.settle);
+  else if (app.got_subcommand("calibrate"))
+    status = run_calibrate(options.calibrate);
   else
     status = run_inspect(options);
   return status ? static_cast<int>(ExitCode::Ok) : report(kProgram, status.error());

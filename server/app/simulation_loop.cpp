@@ -74,7 +74,9 @@ SimulationLoop::SimulationLoop(step::Simulation& simulation, session::Simulation
       handover_(handover),
       journal_(journal),
       options_(options),
-      ended_(std::move(ended)) {
+      ended_(std::move(ended)),
+      chooser_(options_.rate ? simulation.organ().depth_table : scene::DepthTable{},
+               options_.rate ? options_.rate->nodes : 0) {
   records_.reserve(kTicksPerFrame);
   if (options_.rate) controller_.emplace(*options_.rate);
   take_snapshot();
@@ -107,7 +109,9 @@ void SimulationLoop::run() {
 
 bool SimulationLoop::run_tick() {
   inbox_.drain(inputs_);
-  const auto decisions = controller_ ? controller_->decisions() : options_.decisions;
+  if (chooser_.is_in_use()) control::read_forces(simulation_, forces_n_);
+  const auto decisions =
+      chooser_.choose(controller_ ? controller_->decisions() : options_.decisions, forces_n_);
   const auto begin = options_.clock_ns();
   const auto& report = simulation_.tick(inputs_, decisions);
   if (controller_) controller_->observe(report, {options_.clock_ns() - begin, lateness_ns_});

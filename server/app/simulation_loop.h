@@ -20,6 +20,7 @@
 #include "server/app/frame_handover.h"
 #include "server/app/journal_sink.h"
 #include "server/app/pacer.h"
+#include "server/control/depth_chooser.h"
 #include "server/control/rate_controller.h"
 #include "server/replication/duration_histogram.h"
 #include "server/session/inbox.h"
@@ -99,6 +100,8 @@ class SimulationLoop {
 
   // Simulation thread.
   std::optional<control::RateController> controller_;
+  control::DepthChooser chooser_;        // of a calibrated organ, unless decisions are fixed
+  std::vector<double> forces_n_;         // of the tools that touched in the last tick
   std::uint64_t lateness_ns_ = 0;        // of the tick about to run
   std::uint64_t slow_ticks_before_ = 0;  // until the last full second
   float time_rate_ = 1;                  // in it

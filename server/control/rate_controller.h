@@ -55,7 +55,7 @@ class RateController {
 
   // Of the next tick.
   const step::TickDecisions& decisions() const { return decisions_; }
-  // After every tick, with decisions() as they were in it.
+  // After every tick, with decisions() as they were in it, or less of the queue (DepthChooser).
   void observe(const step::TickReport& report, const TickTiming& timing);
 
   step::RateFigures figures() const;
