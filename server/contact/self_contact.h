@@ -31,7 +31,7 @@
 namespace trocar::contact {
 
 // Pa/m, of both sides together: twice a tool's (contact_finder.h), for there is no hand that could
-// back off. 10 kPa press walls 0.2 mm into each other; a 7 mm wall that arrives with 0.1 m/s, 0.04.
+// back off. 10 kPa press walls 0.2 mm into each other.
 inline constexpr float kSelfStiffnessPaPerM = 5e7f;
 // Pairs are made when this near, or so many ticks before they touch at their present speed, but
 // never from farther than kSelfMaxMargin_m: enough for 1.3 m/s.
