@@ -166,6 +166,7 @@ struct RunRule {
   // Graded, outside the queue; without: what the organ needs.
   std::optional<std::uint32_t> far_sweeps;
   std::optional<double> far_over_relaxation;
+  bool self_contact = true;         // tissue does not pass through tissue; dynamic runs
   double tolerance_n = 1e-5;        // of the full solver: residual at which a step is done
   std::uint32_t max_sweeps = 2000;  // of the full solver
   std::vector<Place> given;         // of each key in [run]

@@ -58,7 +58,7 @@ void read_step(TableReader& reader, RunRule& run) {
   if (run.boundary != Boundary::Whole)
     reader.fail("integrator",
                 "\"explicit\" moves the whole organ, remove boundary, depth and nodes");
-  refuse_keys(reader, {"sweeps", "over_relaxation", "tolerance_n", "max_sweeps"},
+  refuse_keys(reader, {"sweeps", "over_relaxation", "tolerance_n", "max_sweeps", "self_contact"},
               "is of the implicit integrator");
 }
 
@@ -84,6 +84,7 @@ RunRule read_run(TableReader& reader) {
   read_step(reader, run);
   read_count(reader, "sweeps", 1, 64, run.sweeps);
   run.over_relaxation = reader.number("over_relaxation", 1, 1.9).value_or(run.over_relaxation);
+  run.self_contact = reader.boolean("self_contact").value_or(true);
   if (run.mode == RunMode::Static) {
     // What is left out of balance adds up over all nodes, and nothing corrects it later.
     run.tolerance_n = 1e-7;
@@ -92,8 +93,10 @@ RunRule read_run(TableReader& reader) {
   run.tolerance_n = reader.number("tolerance_n", 1e-9, 1).value_or(run.tolerance_n);
   read_count(reader, "max_sweeps", 1, 1'000'000, run.max_sweeps);
   if (run.mode == RunMode::Static)
-    refuse_keys(reader, {"start", "boundary", "depth", "nodes", "integrator", "dt_s", "sweeps"},
-                "is for mode = \"dynamic\"");
+    refuse_keys(
+        reader,
+        {"start", "boundary", "depth", "nodes", "integrator", "dt_s", "sweeps", "self_contact"},
+        "is for mode = \"dynamic\"");
   else
     refuse_keys(reader, {"load_steps"}, "is for mode = \"static\"");
   reader.finish();

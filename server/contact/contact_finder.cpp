@@ -262,10 +262,10 @@ void ContactFinder::find_push(const ContactScene& scene, float strength, Contact
 ContactPoint ContactFinder::point_of(const ContactScene& scene, ToolSlot tool,
                                      TriangleIndex triangle,
                                      const std::array<float, 3>& place) const {
-  ContactPoint point{.nodes = surface_[triangle].nodes,
-                     .weights = place,
-                     .friction = scene.tools[tool].shape.friction};
-  for (std::size_t k = 0; k < point.nodes.size(); ++k) {
+  ContactPoint point{.friction = scene.tools[tool].shape.friction};
+  for (std::size_t k = 0; k < 3; ++k) {
+    point.nodes[k] = surface_[triangle].nodes[k];
+    point.weights[k] = place[k];
     const auto owner = scene.claims.owner(point.nodes[k]);
     if (owner.is_valid() && owner != tool)
       point.moved = static_cast<std::uint8_t>(point.moved & ~(1u << k));
@@ -285,8 +285,8 @@ void ContactFinder::add_grips(const ContactScene& scene, ToolSlot slot, float st
     const auto node = grasp.nodes[i];
     const float own = world.surface_areas[node.value];
     out.points.push_back(
-        {.nodes = {node, node, node},
-         .weights = {1, 0, 0},
+        {.nodes = {node},
+         .weights = {1},
          .kind = ContactPoint::Kind::Grip,
          .node_count = 1,
          .moved = 1,
@@ -340,6 +340,7 @@ void ContactFinder::find(const ContactScene& scene, ContactList& out) {
       out.reach[i] = {begin, static_cast<std::uint32_t>(out.reach_nodes.size())};
     }
   }
+  out.self_begin = static_cast<std::uint32_t>(out.points.size());
 }
 
 }  // namespace trocar::contact

@@ -10,8 +10,11 @@
 // Grip: a node between a grasp's jaws is held to a place in their frame in all directions, up to
 //   the force at which it slips.
 // Nodes that another tool holds exclusively do not move for a push: the pusher feels them.
+// Tissue on tissue (self_contact.h): a Push whose point is a node's displacement less that of a
+//   place on the triangle across, so that it acts on both alike and nothing is added to the whole.
 //
-// Order: ascending tool slot, then ascending triangle and place (a grip: node).
+// Order: ascending tool slot, then ascending triangle and place (a grip: node); tissue on tissue
+// last, by node.
 
 #include <array>
 #include <span>
@@ -26,24 +29,25 @@
 namespace trocar::contact {
 
 inline constexpr std::size_t kMaxPointsPerTool = 1024;
-inline constexpr int kMaxPointNodes = 3;
+inline constexpr std::size_t kMaxSelfPoints = 4096;
+inline constexpr int kMaxPointNodes = 4;
 
 struct ContactPoint {
   enum class Kind : std::uint8_t { Push, Grip };
 
   std::array<NodeIndex, kMaxPointNodes> nodes;
-  std::array<float, kMaxPointNodes> weights{};  // sum 1
+  std::array<float, kMaxPointNodes> weights{};  // sum 1; of tissue on tissue: 1, then sum -1
   Kind kind = Kind::Push;
-  std::uint8_t node_count = kMaxPointNodes;
-  std::uint8_t moved = 0b111;  // bit i: nodes[i] moves for it
-  std::uint32_t place = 0;     // which point of the surface, see ContactFinder; a grip: its entry
-  float stiffness = 0;         // N/m, along the normal; a grip: in all directions
-  float hold_stiffness = 0;    // N/m, of friction across the normal
-  float friction = 0;          // Coulomb's coefficient
-  float limit_n = 0;           // a push presses no harder; a grip slips above it
-  Vec3f normal;                // out of the tool
-  Vec3f plane;                 // displacement of the point when it touches the tool's face
-  Vec3f anchor;                // displacement at which friction or grip does not pull
+  std::uint8_t node_count = 3;
+  std::uint8_t moved = 0b1111;  // bit i: nodes[i] moves for it
+  std::uint32_t place = 0;      // which point of the surface, see ContactFinder; a grip: its entry
+  float stiffness = 0;          // N/m, along the normal; a grip: in all directions
+  float hold_stiffness = 0;     // N/m, of friction across the normal
+  float friction = 0;           // Coulomb's coefficient
+  float limit_n = 0;            // a push presses no harder; a grip slips above it
+  Vec3f normal;                 // out of the tool
+  Vec3f plane;                  // displacement of the point when it touches the tool's face
+  Vec3f anchor;                 // displacement at which friction or grip does not pull
 };
 
 // Displacement of a point: the combination of its nodes'.
@@ -78,18 +82,24 @@ struct ToolContact {
 struct ContactList {
   std::vector<ToolContact> tools;
   std::vector<ContactPoint> points;
-  std::vector<NodeIndex> seeds;  // per tool ascending, each once
+  std::vector<NodeIndex> seeds;  // per tool ascending, each once; what is below has its own
+  // Tissue on tissue: points from here on, and the nodes of those that press.
+  std::uint32_t self_begin = 0;
+  std::vector<NodeIndex> self_seeds;  // ascending, each once
   // Surface nodes within reach of each tool that wants to grasp and does not hold: core of its
   // request. Range into `reach_nodes` per tool slot.
   std::vector<NodeIndex> reach_nodes;
   std::array<std::pair<std::uint32_t, std::uint32_t>, kMaxTools> reach;
   std::uint32_t tools_inside = 0;  // that appeared inside tissue and have not come out
-  std::uint32_t dropped = 0;       // points or nodes beyond kMaxPointsPerTool
+  std::uint32_t dropped = 0;       // points or nodes beyond kMaxPointsPerTool or kMaxSelfPoints
 
   void reserve();
   void clear();
   std::span<const ContactPoint> points_of(const ToolContact& contact) const {
     return std::span(points).subspan(contact.begin, contact.end - contact.begin);
+  }
+  std::span<const ContactPoint> self_points() const {
+    return std::span(points).subspan(self_begin);
   }
   std::span<const NodeIndex> seeds_of(const ToolContact& contact) const {
     return std::span(seeds).subspan(contact.seeds_begin, contact.seeds_end - contact.seeds_begin);

@@ -47,7 +47,7 @@ BlockDescent::BlockDescent(const scene::Organ& organ, const world::World& world,
   serial_stamp_.resize(group_count);
   slot_stamp_.resize(slot_count);
   first_link_.resize(slot_count);
-  links_.reserve(8 * contact::kMaxPointsPerTool);
+  links_.reserve(8 * contact::kMaxPointsPerTool + contact::kMaxSelfPoints);
   residuals_.reserve(world.node_count());
   for (auto* plan : {&near_, &far_, &begun_, &bands_[0], &bands_[1], &bands_[2], &bands_[3]}) {
     plan->lanes.resize(group_count);

@@ -107,6 +107,7 @@ ScenarioRun::ScenarioRun(scene::ResolvedScenario resolved, Solver solver, unsign
       step_count_(steps_of(scenario().run)),
       world_(world_of(resolved_)),
       claims_(world_.node_count()),
+      self_contacts_(organ()),
       finder_(organ()),
       queue_(world_.node_count()),
       active_set_(world_.node_count()),
@@ -123,7 +124,10 @@ ScenarioRun::ScenarioRun(scene::ResolvedScenario resolved, Solver solver, unsign
     if (boundary_ == scene::Boundary::Whole) world_.node_classes[i] = world::NodeClass::Active;
   }
   solver_.take_state(world_);
-  if (scenario().run.integrator == scene::Integrator::Explicit) explicit_.emplace(organ(), world_);
+  if (scenario().run.integrator == scene::Integrator::Explicit)
+    explicit_.emplace(organ(), world_);
+  else if (scenario().run.self_contact && !is_static())
+    self_finder_.emplace(organ());
   if (boundary_ == scene::Boundary::Graded) far_plan_ = solver_.far_plan(settings().dt);
   if (scenario().run.starts_in_equilibrium) settling_ = relax();
 }
@@ -201,8 +205,9 @@ std::span<const NodeIndex> ScenarioRun::collect_active() {
   if (boundary_ == scene::Boundary::Whole) return free_nodes_;
   // Each has its place in every step, as the queue wants it. What is moved or loaded from outside
   // is where a force enters, like a contact.
-  seeds_.assign(scenario().tools.size(), {});
+  seeds_.assign(scenario().tools.size() + 1, {});
   for (const auto& tool : contacts_.tools) seeds_[tool.tool.value] = contacts_.seeds_of(tool);
+  seeds_.back() = contacts_.self_seeds;
   const auto moves = [](const auto& key) { return length(key.value) > 0; };
   for (const auto& load : resolved_.displacements)
     if (std::ranges::any_of(load.over_time.keys, moves)) seeds_.push_back(load.nodes);
@@ -245,6 +250,7 @@ StepReport ScenarioRun::step_dynamic() {
   ++world_.tick;
   move_tools(seconds_of(world_.tick - 1), (world_.tick - 1) % kSampleTicks == 0);
   finder_.find({world_, tools_, claims_, grasps_, proxies_, world_.tick}, contacts_);
+  if (self_finder_) self_finder_->find(world_, self_contacts_, contacts_);
   const auto active = collect_active();
 
   const auto& run = scenario().run;
@@ -262,6 +268,7 @@ StepReport ScenarioRun::step_dynamic() {
     }
     report.solve = solver_.solve(contacts_, active, how, world_, loads);
     finder_.surface_moved(report.solve.largest_move_m);
+    if (self_finder_) self_finder_->surface_moved(report.solve.largest_move_m);
     sweeps += report.solve.sweeps;
     report.is_converged &=
         solver_kind_ == Solver::Live ||

@@ -15,6 +15,7 @@
 
 #include "common/scene/scenario.h"
 #include "server/contact/contact_finder.h"
+#include "server/contact/self_contact.h"
 #include "server/dynamics/block_descent.h"
 #include "server/dynamics/explicit_euler.h"
 #include "server/input/tool_table.h"
@@ -103,10 +104,12 @@ class ScenarioRun {
   locks::ClaimTable claims_;
   contact::GraspTable grasps_;
   contact::ProxyTable proxies_;
+  contact::SelfContactTable self_contacts_;
 
   // Scratch of a step.
   session::TickInputs inputs_;
   contact::ContactFinder finder_;
+  std::optional<contact::SelfContactFinder> self_finder_;  // where tissue is kept from tissue
   contact::ContactList contacts_;
   propagation::PropagationQueue queue_;
   propagation::ActiveSet active_set_;

@@ -6,7 +6,10 @@
 namespace trocar::step {
 
 State::State(const scene::Organ& organ, const wire::SurfaceLayout& layout)
-    : world(organ), claims(organ.mesh.node_count()), quantised(layout.vertex_count()) {}
+    : world(organ),
+      claims(organ.mesh.node_count()),
+      quantised(layout.vertex_count()),
+      self_contacts(organ) {}
 
 void State::visit(world::StateArchive& archive) {
   world.visit_state(archive);
@@ -15,6 +18,7 @@ void State::visit(world::StateArchive& archive) {
   grasps.visit_state(archive, world.node_count());
   proxies.visit_state(archive);
   archive.fixed_array(quantised);
+  self_contacts.visit_state(archive);
 }
 
 Scene::Scene(scene::Organ o, unsigned worker_count)
@@ -23,6 +27,7 @@ Scene::Scene(scene::Organ o, unsigned worker_count)
 StepContext::StepContext(const Scene& s, const world::World& world)
     : scene(s),
       finder(s.organ),
+      self_finder(s.organ),
       queue(world.node_count()),
       active(world.node_count()),
       solver(s.organ, world, s.workers),

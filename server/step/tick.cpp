@@ -19,10 +19,12 @@ void admit_inputs(State& state, StepContext& context) {
   if (context.report.inputs_dropped > 0) context.report.faults |= kFaultInputDropped;
 }
 
-void find_contacts(const State& state, StepContext& context) {
+void find_contacts(State& state, StepContext& context) {
   context.finder.find(
       {state.world, state.tools, state.claims, state.grasps, state.proxies, state.world.tick},
       context.contacts);
+  context.self_finder.find(state.world, state.self_contacts, context.contacts);
+  context.report.self_pairs = static_cast<std::uint32_t>(context.contacts.self_points().size());
   context.report.contact_nodes = static_cast<std::uint32_t>(context.contacts.seeds.size());
   if (context.contacts.dropped > 0) context.report.faults |= kFaultContactLimit;
   if (context.contacts.tools_inside > 0) context.report.faults |= kFaultToolInside;
@@ -32,6 +34,7 @@ void fill_queue(State& state, StepContext& context) {
   context.seeds.fill({});
   for (const auto& tool : context.contacts.tools)
     context.seeds[tool.tool.value] = context.contacts.seeds_of(tool);
+  context.seeds.back() = context.contacts.self_seeds;
   // However little else there is room for, every touched node is in the queue.
   std::size_t touched = 0;
   for (const auto& seeds : context.seeds) touched += seeds.size();
@@ -75,6 +78,7 @@ void solve(State& state, StepContext& context) {
   context.solver.take_state(
       state.world, context.active.settle(context.queue, context.solver.residuals_n(), state.world));
   context.finder.surface_moved(solved.largest_move_m);
+  context.self_finder.surface_moved(solved.largest_move_m);
   context.report.residual_n = solved.residual_n;
   context.report.sweeps = solved.sweeps;
   context.report.far_sweeps = settings.far_sweeps;

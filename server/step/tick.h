@@ -8,6 +8,7 @@
 #include "common/base/checksum.h"
 #include "common/wire/surface_layout.h"
 #include "server/contact/contact_finder.h"
+#include "server/contact/self_contact.h"
 #include "server/dynamics/block_descent.h"
 #include "server/input/tool_table.h"
 #include "server/locks/claims.h"
@@ -33,6 +34,7 @@ struct State {
   contact::ProxyTable proxies;
   // Last published integers: quantisation has hysteresis, so they are state.
   wire::QuantisedSurface quantised;
+  contact::SelfContactTable self_contacts;
 
   void visit(world::StateArchive& archive);
 };
@@ -58,13 +60,15 @@ struct StepContext {
 
   // Scratch and stage results, valid from their stage to the end of the tick.
   contact::ContactFinder finder;
+  contact::SelfContactFinder self_finder;
   contact::ContactList contacts;
   propagation::PropagationQueue queue;
   propagation::ActiveSet active;
   std::array<dynamics::SweepBand, kSweepLayers> sweep_bands{};  // of active nodes, by layer
   dynamics::BlockDescent solver;
   dynamics::FarPlan far_plan;
-  std::array<std::span<const NodeIndex>, kMaxTools> seeds;  // by tool, empty without contact
+  // By tool, empty without contact; last, tissue on tissue.
+  std::array<std::span<const NodeIndex>, kMaxTools + 1> seeds;
   std::vector<locks::ClaimRequest> requests;
   std::vector<Vec3f> surface_displacements;
   StateHasher hasher;

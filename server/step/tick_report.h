@@ -55,6 +55,7 @@ struct TickReport {
   Tick tick = 0;
   std::array<std::uint32_t, kStageCount> stage_cpu_ns{};
   std::uint32_t contact_nodes = 0;
+  std::uint32_t self_pairs = 0;    // of tissue near tissue, see server/contact/self_contact.h
   std::uint32_t queue_nodes = 0;   // nodes the propagation reached
   std::uint32_t active_nodes = 0;  // queue plus nodes that have not come to rest
   LayerCounts layer_nodes{};       // active nodes that are not fixed, as in sweeps_of_layers()

@@ -218,6 +218,8 @@ INSTANTIATE_TEST_SUITE_P(
         Bad{"graded_without_limit", "boundary = \"graded\"", "run.boundary", "depth or nodes"},
         Bad{"whole_with_limit", "boundary = \"whole\"\ndepth = 3", "run.depth", "\"frozen\""},
         Bad{"far_of_frozen", "depth = 3\nfar_sweeps = 2", "run.far_sweeps", "\"graded\""},
+        Bad{"self_contact_static", "mode = \"static\"\nself_contact = false", "run.self_contact",
+            "\"dynamic\""},
         Bad{"explicit_sweeps", "integrator = \"explicit\"\nsweeps = 2", "run.sweeps", "implicit"},
         Bad{"explicit_frozen", "depth = 3\nintegrator = \"explicit\"", "run.integrator",
             "whole organ"},

@@ -1,0 +1,170 @@
+#pragma once
+
+// Tissue against tissue of one organ: the walls of a hollow one, a fold, a flap laid on its base.
+//
+// A node of the surface does not pass through a triangle across from it. What holds them apart is a
+// Push (contact_list.h) of the node against the place of the triangle nearest to it: displacement
+// of the node less that of the place, so that the force on one is minus that on the other, along a
+// normal that is the mean of both sides' and changes smoothly over edges. It starts at touch, has
+// no friction (wet serosa slips) and no limit. Nodes of both sides meet the other's triangles, each
+// for half of its surface.
+//
+// A node meets a triangle from outside only: in front of it, facing it, within the margin of the
+// tick's motion. That node and triangle then stay a pair while the node is near, however deep it is
+// pressed and wherever it slides, so that nothing flips: pairs are state. What lies within
+// kNearLayers, or so many edges' length, of a node in the tissue never meets it: its neighbourhood,
+// and the other face of a thin wall. What touches or overlaps at rest may stay as it is.
+//
+// Work: pairs of nodes that can come near are listed with slack, and again for those nodes that
+// have moved a part of it: O(surface nodes + these x their surroundings), over several ticks. Every
+// tick: O(pairs of nodes listed), nothing where nothing is near.
+// Pairs are a function of the state: results do not depend on when lists were made.
+
+#include <span>
+#include <vector>
+
+#include "common/mesh/csr.h"
+#include "server/contact/contact_list.h"
+#include "server/contact/point_grid.h"
+#include "server/world/state_archive.h"
+
+namespace trocar::contact {
+
+// Pa/m, of both sides together: twice a tool's (contact_finder.h), for there is no hand that could
+// back off. 10 kPa press walls 0.2 mm into each other.
+inline constexpr float kSelfStiffnessPaPerM = 5e7f;
+// Pairs are made when this near, or so many ticks before they touch at their present speed, but
+// never from farther than kSelfMaxMargin_m: enough for 1.3 m/s.
+inline constexpr float kSelfMargin_m = 0.001f, kSelfMaxMargin_m = 0.003f;
+inline constexpr float kSelfTicksAhead = 1.5f;
+inline constexpr std::uint32_t kNearLayers = 3;
+
+// The pairs: state.
+class SelfContactTable {
+ public:
+  explicit SelfContactTable(const scene::Organ& organ);
+
+  std::span<const NodeIndex> nodes() const { return nodes_; }  // ascending, each once
+  std::span<const TriangleIndex> triangles() const { return triangles_; }
+  void clear() { nodes_.clear(), triangles_.clear(); }
+  void add(NodeIndex node, TriangleIndex triangle) {
+    nodes_.push_back(node);
+    triangles_.push_back(triangle);
+  }
+
+  // Takes no bytes without pairs. Last in a state.
+  void visit_state(world::StateArchive& archive);
+
+ private:
+  std::vector<NodeIndex> nodes_;
+  std::vector<TriangleIndex> triangles_;
+  std::vector<std::uint8_t> is_surface_;  // per node of the organ
+  std::uint32_t triangle_count_ = 0;
+};
+
+class SelfContactFinder {
+ public:
+  explicit SelfContactFinder(const scene::Organ& organ);
+
+  // After ContactFinder::find(): brings the pairs up to date and adds their points to `out`.
+  void find(const world::World& world, SelfContactTable& pairs, ContactList& out);
+
+  // No node has moved by more than this since the last call.
+  void surface_moved(float at_most_m) {
+    travel_ += static_cast<double>(at_most_m);
+    last_move_m_ = at_most_m;
+  }
+
+  // Lists made, and pairs of nodes in the last one.
+  std::uint64_t lists_made() const { return lists_made_; }
+  std::size_t pairs_listed() const { return list_.pairs.size(); }
+
+ private:
+  using Site = std::uint32_t;  // of a surface node, ascending like these
+  struct SiteIndex {
+    std::uint32_t value = 0;
+  };
+  struct NodePair {
+    Site node = 0, across = 0;
+    auto operator<=>(const NodePair&) const = default;
+  };
+  struct Place {
+    TriangleIndex triangle;
+    Vec3f weights;
+    Vec3f from;  // m, from the place to the node
+    float squared = 0;
+  };
+  struct Touch {
+    Vec3f normal;                   // from the triangle's side to the node's
+    Vec3f at_rest;                  // m, from the place to the node
+    float shift = 0;                // m, the gap from which on it presses
+    float gap = 0;                  // m, beyond that
+    float aside = 0;                // m, across the normal
+    float facing = 0, closing = 0;  // cosine of both normals; m/s
+  };
+
+  void list_near_sites(const scene::Organ& organ, double near_m);
+  bool faced_at_rest(Site site, Site across) const;
+  void keep_list(const world::World& world);
+  void begin_list(const world::World& world);
+  void go_on_listing(std::size_t sites);
+  void list_around(Site site);
+  bool has_moved(Site site, float by_m, const world::World& world) const;
+  Vec3f position(Site site, const world::World& world) const {
+    return world.position(sites_[site]);
+  }
+  const Vec3f& normal(Site site, const world::World& world);
+  bool is_near(Site site, TriangleIndex triangle) const;
+  Place place_on(Site site, TriangleIndex triangle, const world::World& world) const;
+  Place nearest_place(Site site, std::span<const Site> around, const world::World& world) const;
+  Touch touch_at(Site site, const Place& place, const world::World& world);
+  bool meets(Site site, std::span<const NodePair> listed, const world::World& world, Place& place,
+             Touch& touch);
+  bool stays(Site site, TriangleIndex triangle, const world::World& world, Place& place,
+             Touch& touch);
+  void add_point(Site site, const Place& place, const Touch& touch, const world::World& world,
+                 SelfContactTable& pairs, ContactList& out) const;
+
+  // Constant.
+  std::vector<NodeIndex> sites_;
+  std::vector<Site> site_of_node_;
+  std::vector<std::array<Site, 3>> triangles_;
+  mesh::Csr<SiteIndex, TriangleIndex> site_triangles_;
+  mesh::Csr<SiteIndex, Site> near_sites_;             // ascending
+  std::vector<Vec3f> rest_positions_, rest_normals_;  // per site
+  std::vector<std::uint8_t> is_close_at_rest_;        // per site: something faces it there
+  float slack_m_ = 0, corner_reach_m_ = 0;            // see begin_list()
+  float reach_m_ = 0;                                 // with the greatest margin
+
+  // What is listed, and when it began to be.
+  struct List {
+    std::vector<NodePair> pairs;  // ascending
+    double travel = 0;
+    float least_distance = 0;  // m, of a pair, when it began
+  };
+  bool has_list_ = false;
+  double travel_ = 0;
+  float last_move_m_ = 1;  // of any node, in the last tick
+  std::uint64_t lists_made_ = 0;
+  List list_;
+  // The next one, made over several ticks.
+  bool is_listing_ = false;
+  List next_list_;
+  std::size_t sites_listed_ = 0;  // of due_
+  PointGrid grid_;                // of references_
+  // Per site, see begin_list(); has_left_: the reference is not where it was at rest.
+  std::vector<Vec3f> references_;
+  std::vector<std::uint8_t> has_left_, is_due_;
+  std::vector<Site> due_;
+
+  // Scratch.
+  std::vector<std::uint32_t> near_stamp_;  // per site
+  std::uint32_t near_current_ = 0;
+  std::vector<Vec3f> normals_;  // per site, where the stamp is current
+  std::vector<std::uint32_t> normal_stamp_;
+  std::uint32_t normal_current_ = 0;
+  std::vector<NodeIndex> old_nodes_;
+  std::vector<TriangleIndex> old_triangles_;
+};
+
+}  // namespace trocar::contact
