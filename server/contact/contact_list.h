@@ -28,7 +28,7 @@
 
 namespace trocar::contact {
 
-inline constexpr std::size_t kMaxPointsPerTool = 1024;
+inline constexpr std::size_t kMaxPointsPerTool = 2048;
 inline constexpr std::size_t kMaxSelfPoints = 4096;
 inline constexpr int kMaxPointNodes = 4;
 
