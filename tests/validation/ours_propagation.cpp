@@ -23,6 +23,8 @@ constexpr int kDefaultNodes = 1200;
 // are compressible, it was 12 to 16 %. Measured: 32 and 31 % of 4,000 nodes, 83 % of 17,000, where
 // 1,200 nodes are a smaller piece of the organ.
 constexpr double kFrozenLiver4k = 0.4, kFrozenLiver17k = 1;
+// Of the same material: 83 %.
+constexpr double kFrozenStomach = 1;
 
 struct Press {
   const char* organ;   // in names
@@ -268,7 +270,7 @@ void run_propagation_stomach(const Lab& lab, Section& section) {
                .anchor = "[0.3, 0.2, 1]",
                .radius_mm = 14,
                .depth_mm = 10,
-               .frozen_mean = 0.8});
+               .frozen_mean = kFrozenStomach});
 }
 
 }  // namespace trocar::validation
