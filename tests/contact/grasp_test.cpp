@@ -85,7 +85,8 @@ TEST(Grasp, JawsCloseAndSqueezeWhatLiesBetweenThem) {
   const float open = width();
   scene.hold(0, pose, 400, Verb::Grasp);
   EXPECT_EQ(grasp.closed, 1);
-  EXPECT_NEAR(width(), (1 - kSqueeze) * open, 0.05f * open);
+  // While they close, what is pulled hardest slips a little.
+  EXPECT_NEAR(width(), (1 - kSqueeze) * open, 0.1f * open);
 }
 
 TEST(Grasp, TwoHandsPullOneFlapAndTheirForcesBalanceWhatHoldsIt) {
