@@ -248,8 +248,8 @@ void SelfContactFinder::go_on_listing(std::size_t sites) {
   if (end < due_.size()) return;
   if (!due_.empty()) std::ranges::sort(next_list_.pairs);
   // A pair of two that were due, or none of which looked, was found from both sides or one.
-  const auto twice = std::ranges::unique(next_list_.pairs);
-  next_list_.pairs.erase(twice.begin(), twice.end());
+  auto& pairs = next_list_.pairs;
+  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
   std::swap(list_, next_list_);
   is_listing_ = false;
   has_list_ = true;
@@ -487,8 +487,8 @@ void SelfContactFinder::find(const world::World& world, SelfContactTable& pairs,
     first = end;
   }
   std::ranges::sort(out.self_seeds);
-  const auto twice = std::ranges::unique(out.self_seeds);
-  out.self_seeds.erase(twice.begin(), twice.end());
+  out.self_seeds.erase(std::unique(out.self_seeds.begin(), out.self_seeds.end()),
+                       out.self_seeds.end());
 }
 
 }  // namespace trocar::contact
