@@ -19,6 +19,10 @@ std::uint64_t spread_bits(std::uint64_t v) {
 
 }  // namespace
 
+std::uint64_t morton_code(std::uint64_t x, std::uint64_t y, std::uint64_t z) {
+  return spread_bits(x) | spread_bits(y) << 1 | spread_bits(z) << 2;
+}
+
 std::vector<std::uint32_t> morton_order(std::span<const Vec3d> points) {
   std::vector<std::uint32_t> order(points.size());
   std::iota(order.begin(), order.end(), 0u);
@@ -38,8 +42,7 @@ std::vector<std::uint32_t> morton_order(std::span<const Vec3d> points) {
   std::vector<std::uint64_t> codes(order.size());
   for (std::size_t i = 0; i < codes.size(); ++i) {
     const Vec3d offset = points[i] - low;
-    codes[i] = spread_bits(cell(offset.x)) | spread_bits(cell(offset.y)) << 1 |
-               spread_bits(cell(offset.z)) << 2;
+    codes[i] = morton_code(cell(offset.x), cell(offset.y), cell(offset.z));
   }
   std::sort(order.begin(), order.end(), [&codes](std::uint32_t a, std::uint32_t b) {
     return codes[a] != codes[b] ? codes[a] < codes[b] : a < b;

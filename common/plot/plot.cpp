@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
 
 #include "common/base/assert.h"
+#include "common/base/text_file.h"
 #include "common/plot/gnuplot.h"
 
 namespace trocar::plot {
@@ -111,17 +111,7 @@ Result<std::string> to_svg(const Plot& plot, const std::string& gnuplot) {
 Status write_svg(const std::filesystem::path& path, const Plot& plot) {
   const auto svg = to_svg(plot);
   if (!svg) return svg.error();
-  const std::string part = path.string() + ".part";
-  std::FILE* file = std::fopen(part.c_str(), "wb");
-  bool is_good = file != nullptr;
-  if (is_good) {
-    is_good = std::fwrite(svg->data(), 1, svg->size(), file) == svg->size();
-    is_good = std::fclose(file) == 0 && is_good;
-    is_good = is_good && std::rename(part.c_str(), path.c_str()) == 0;
-  }
-  if (is_good) return {};
-  return Error{ErrorCode::ResourceMissing, path.string() + ": cannot be written (" +
-                                               std::strerror(errno) + "), check the folder"};
+  return write_text_file(path, *svg);
 }
 
 }  // namespace trocar::plot

@@ -3,13 +3,12 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cstdio>
-#include <cstring>
 #include <filesystem>
 #include <map>
 
 #include "common/base/cpu.h"
+#include "common/base/text_file.h"
 #include "common/base/timing.h"
 #include "common/plot/plot.h"
 #include "common/scene/load_organ.h"
@@ -19,18 +18,6 @@ namespace trocar::app {
 namespace {
 
 constexpr const char* kProgram = "trocar-organ";
-
-Status write_text(const std::filesystem::path& path, const std::string& text) {
-  std::FILE* file = std::fopen(path.c_str(), "wb");
-  bool is_good = file != nullptr;
-  if (is_good) {
-    is_good = std::fwrite(text.data(), 1, text.size(), file) == text.size();
-    is_good = std::fclose(file) == 0 && is_good;
-  }
-  if (is_good) return {};
-  return Error{ErrorCode::ResourceMissing, path.string() + ": cannot be written (" +
-                                               std::strerror(errno) + "), check the folder"};
-}
 
 calibration::Progress progress_of(const char* what) {
   const bool is_terminal = ::isatty(STDERR_FILENO) != 0;
@@ -200,14 +187,14 @@ Status run_calibrate(CalibrateCommand command) {
               organ->name.c_str(), found.table.places, command.depth_mm,
               found.table.tool_radius_m * 1e3, found.places_left_out);
   print_table(found);
-  if (auto s = write_text(folder / "table.csv", table_csv(found.table)); !s) return s;
-  if (auto s = write_text(folder / "places.csv", calibration::to_csv(found)); !s) return s;
+  if (auto s = write_text_file(folder / "table.csv", table_csv(found.table)); !s) return s;
+  if (auto s = write_text_file(folder / "places.csv", calibration::to_csv(found)); !s) return s;
   if (auto s = plot::write_svg(folder / "errors.svg", to_plot(found, settings.error)); !s) return s;
   if (command.check_places > 0) {
     const auto checks = calibration::check(*organ, found.table, settings, command.check_places,
                                            progress_of("checking"));
     print_check(checks);
-    if (auto s = write_text(folder / "check.csv", check_csv(checks)); !s) return s;
+    if (auto s = write_text_file(folder / "check.csv", check_csv(checks)); !s) return s;
   }
   std::printf("%.0f s (%.0f s of CPU time of one thread) for %llu ticks; %zu bytes more in %s\n",
               wall_s, cpu_s, static_cast<unsigned long long>(found.ticks),

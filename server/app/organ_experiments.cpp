@@ -1,11 +1,10 @@
 #include "server/app/organ_experiments.h"
 
-#include <cerrno>
 #include <cmath>
 #include <cstdio>
-#include <cstring>
 #include <filesystem>
 
+#include "common/base/text_file.h"
 #include "common/plot/plot.h"
 #include "common/scene/load_organ.h"
 #include "common/scene/organ_file.h"
@@ -16,18 +15,6 @@ namespace trocar::app {
 namespace {
 
 constexpr const char* kProgram = "trocar-organ";
-
-Status write_text(const std::filesystem::path& path, const std::string& text) {
-  std::FILE* file = std::fopen(path.c_str(), "wb");
-  bool is_good = file != nullptr;
-  if (is_good) {
-    is_good = std::fwrite(text.data(), 1, text.size(), file) == text.size();
-    is_good = std::fclose(file) == 0 && is_good;
-  }
-  if (is_good) return {};
-  return Error{ErrorCode::ResourceMissing, path.string() + ": cannot be written (" +
-                                               std::strerror(errno) + "), check the folder"};
-}
 
 std::string to_csv(const fit::MeasuredCurve& measured, const fit::Fit& fit) {
   std::string text = "displacement_mm,measured_force_n,fitted_force_n\n";
@@ -139,8 +126,9 @@ Status run_fit(const FitCommand& command) {
   const auto fitted = fit::fit(*resolved, *measured, options, print_progress);
   if (!fitted) return fitted.error();
   print_fit(*fitted);
-  if (auto s = write_text(folder / "material.toml", fit::to_toml(*fitted, options)); !s) return s;
-  if (auto s = write_text(folder / "fit.csv", to_csv(*measured, *fitted)); !s) return s;
+  if (auto s = write_text_file(folder / "material.toml", fit::to_toml(*fitted, options)); !s)
+    return s;
+  if (auto s = write_text_file(folder / "fit.csv", to_csv(*measured, *fitted)); !s) return s;
   if (!command.organ.empty())
     if (auto s = scene::write_organ(command.organ, fitted->organ); !s) return s;
   if (auto s = plot::write_svg(folder / "fit.svg", to_plot(*measured, *fitted)); !s) return s;

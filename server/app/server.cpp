@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "common/base/log.h"
+#include "common/base/text_file.h"
 #include "common/base/timing.h"
 #include "common/scene/load_organ.h"
 #include "server/app/simulation_loop.h"

@@ -5,8 +5,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cstdio>
-#include <filesystem>
 
 #include "common/base/version.h"
 
@@ -123,23 +121,6 @@ std::string to_json(const Summary& s) {
       participants(s.barrier), s.loop.max_active_nodes, s.loop.faults, s.loop.inputs_dropped,
       s.loop.nodes_rejected, rate_figures(s), times(s.loop.times.tick), stages(s.loop.times),
       replication_figures(s));
-}
-
-Status write_text_file(const std::string& path, const std::string& text) {
-  // Written beside and renamed: whoever waits for the file never sees half of it.
-  const std::string partial = path + ".part";
-  const auto fail = [&path] {
-    return Error{ErrorCode::ResourceMissing,
-                 path + ": cannot be written: check that the folder exists and has room"};
-  };
-  std::FILE* file = std::fopen(partial.c_str(), "wb");
-  if (!file) return fail();
-  const bool is_written = std::fwrite(text.data(), 1, text.size(), file) == text.size();
-  const bool is_closed = std::fclose(file) == 0;
-  std::error_code error;
-  if (is_written && is_closed) std::filesystem::rename(partial, path, error);
-  if (!is_written || !is_closed || error) return fail();
-  return {};
 }
 
 }  // namespace trocar::app

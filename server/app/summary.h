@@ -26,6 +26,5 @@ struct Summary {
 };
 
 std::string to_json(const Summary& summary);
-Status write_text_file(const std::string& path, const std::string& text);
 
 }  // namespace trocar::app

@@ -10,12 +10,6 @@ namespace {
 constexpr float kSlack_m = 0.005f;
 constexpr std::size_t kMaxPathSteps = 64;
 
-float greatest_distance(const std::array<Vec3f, 4>& a, const std::array<Vec3f, 4>& b) {
-  float most = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) most = std::max(most, length(a[i] - b[i]));
-  return most;
-}
-
 // Part t of the way from a to b.
 Pose between(const Pose& a, const Pose& b, float t) {
   if (t >= 1) return b;
@@ -112,11 +106,6 @@ ContactFinder::ContactFinder(const scene::Organ& organ)
   for (auto& nearby : nearby_) nearby.triangles.reserve(256);
 }
 
-void ContactFinder::forget() {
-  for (auto& nearby : nearby_) nearby.is_known = false;
-  refreshed_travel_ = -1;
-}
-
 std::span<const TriangleIndex> ContactFinder::triangles_near(const world::World& world,
                                                              ToolSlot slot) {
   Nearby& nearby = nearby_[slot.value];
@@ -145,15 +134,12 @@ std::span<const TriangleIndex> ContactFinder::triangles_near(const world::World&
 void ContactFinder::plan_way(const ContactScene& scene, ToolContact& contact) {
   const auto& tool = scene.tools[contact.tool];
   const auto& proxy = scene.proxies[contact.tool];
-  const auto distance = [&](const Pose& a, const Pose& b) {
-    return greatest_distance(ToolSolid(a, tool.shape).core_corners(),
-                             ToolSolid(b, tool.shape).core_corners());
-  };
-  const bool has_appeared = !proxy.is_placed || distance(proxy.hand, tool.pose) > scene.jump_m;
+  const bool has_appeared =
+      !proxy.is_placed || way_between(proxy.hand, tool.pose, tool.shape) > scene.jump_m;
   contact.is_placed = !has_appeared;
   contact.softness_m = greatest_pressure_ / stiffness_of(tool.shape.radius_m);
   contact.start = has_appeared ? tool.pose : proxy.pose;
-  const float way = distance(contact.start, tool.pose);
+  const float way = way_between(contact.start, tool.pose, tool.shape);
   const float most = std::min(scene.max_step_m, has_appeared ? contact.softness_m : proxy.step_m);
   const float part = way > most ? most / way : 1.0f;
   contact.goal = between(contact.start, tool.pose, part);

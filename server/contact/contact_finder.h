@@ -7,8 +7,8 @@
 // is the tool's face at the end of the way, on the side from which it was met. So a tool passes
 // through nothing, however thin and however fast it is, and a surface is met from outside only: a
 // tool that appears inside tissue, deeper than kBack_m along its shaft, touches nothing until it
-// has come out. Places within kMargin_m
-// get a plane before they touch, so that none slips in during a tick.
+// has come out. Places within kMargin_m get a plane before they touch, so that none slips in during
+// a tick.
 //
 // Grasp. Nodes held by the jaws are gripped where they are in the jaws' frame.
 //
@@ -68,8 +68,6 @@ class ContactFinder {
 
   // No node has moved by more than this since the last call.
   void surface_moved(float at_most_m) { surface_travel_ += at_most_m; }
-  // Nodes are anywhere: a restored state.
-  void forget();
 
   const Surface& surface() const { return surface_; }
   // Triangles looked at by the last find(), all tools together.

@@ -50,22 +50,18 @@ struct ContactPoint {
   Vec3f anchor;                 // displacement at which friction or grip does not pull
 };
 
-// Displacement of a point: the combination of its nodes'.
-inline Vec3f displacement_of(const ContactPoint& point, const world::World& world) {
+// The combination of its nodes' values; of_nodes: per node of the organ.
+inline Vec3f value_at(const ContactPoint& point, std::span<const Vec3f> of_nodes) {
   Vec3f sum;
-  for (int i = 0; i < point.node_count; ++i) {
-    const auto k = static_cast<std::size_t>(i);
-    sum += world.displacements[point.nodes[k].value] * point.weights[k];
-  }
+  for (std::size_t k = 0; k < point.node_count; ++k)
+    sum += of_nodes[point.nodes[k].value] * point.weights[k];
   return sum;
 }
+inline Vec3f displacement_of(const ContactPoint& point, const world::World& world) {
+  return value_at(point, world.displacements);
+}
 inline Vec3f rest_position_of(const ContactPoint& point, const world::World& world) {
-  Vec3f sum;
-  for (int i = 0; i < point.node_count; ++i) {
-    const auto k = static_cast<std::size_t>(i);
-    sum += world.rest_positions[point.nodes[k].value] * point.weights[k];
-  }
-  return sum;
+  return value_at(point, world.rest_positions);
 }
 
 // A tool whose claim is in effect, whether or not it touches anything.

@@ -1,6 +1,7 @@
 #include "server/contact/proxies.h"
 
 #include "server/contact/contact_law.h"
+#include "server/contact/tool_solid.h"
 
 namespace trocar::contact {
 namespace {
@@ -10,9 +11,10 @@ constexpr float kOutside_m = 1e-6f;
 // What may be left inside, in radii, of a tool that the surface holds from all sides; with more it
 // rather stays where it was.
 constexpr float kLeftInside = 0.1f;
-// A tool that presses walks at most by what it walked in the tick before and a fifth, and as deep
-// as its force still grows.
-constexpr float kFaster = 1.2f, kDeeper = 1.5f;
+// A tool walks at most by what it walked in the tick before and a fifth, and, where it presses, as
+// deep as its force still grows; else, so that one that is far behind its hand does not leap into
+// what it meets, by kFree_m, 500 m/s^2.
+constexpr float kFaster = 1.2f, kDeeper = 1.5f, kFree_m = 0.0005f;
 
 struct WayOut {
   Vec3f moved;      // m, of the tool
@@ -63,8 +65,8 @@ void follow_push(const ContactList& contacts, const ToolContact& tool, const wor
     }
   }
   proxy.pose.position += out.moved;
-  const float walked = length(proxy.pose.position - tool.start.position);
-  proxy.step_m = proxy.places.empty() ? 1e3f : kFaster * walked + kDeeper * tool.softness_m;
+  const float walked = way_between(tool.start, proxy.pose, hand.shape);
+  proxy.step_m = kFaster * walked + (proxy.places.empty() ? kFree_m : kDeeper * tool.softness_m);
 }
 
 }  // namespace

@@ -37,4 +37,15 @@ struct ToolSolid {
   }
 };
 
+// The farthest that corners, hence points of a core, are from one another.
+inline float greatest_distance(const std::array<Vec3f, 4>& a, const std::array<Vec3f, 4>& b) {
+  float most = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) most = std::max(most, length(a[i] - b[i]));
+  return most;
+}
+// How far a motion of the tool takes a point of its core.
+inline float way_between(const Pose& a, const Pose& b, const scene::ToolShape& shape) {
+  return greatest_distance(ToolSolid(a, shape).core_corners(), ToolSolid(b, shape).core_corners());
+}
+
 }  // namespace trocar::contact

@@ -4,6 +4,7 @@
 #include <functional>
 
 #include "common/base/assert.h"
+#include "common/math/morton.h"
 
 namespace trocar::dynamics {
 namespace {
@@ -15,21 +16,12 @@ constexpr std::uint32_t kFewNodes = 2 * kLanes;
 // Vacant lanes that any colour may have, and as a part of its lanes.
 constexpr std::uint32_t kVacantLanes = kLanes, kVacantPart = 4;
 
-// Bits of x spread to every third place.
-std::uint64_t spread(std::uint64_t x) {
-  x = (x | x << 32) & 0x001f00000000ffffull;
-  x = (x | x << 16) & 0x001f0000ff0000ffull;
-  x = (x | x << 8) & 0x100f00f00f00f00full;
-  x = (x | x << 4) & 0x10c30c30c30c30c3ull;
-  return (x | x << 2) & 0x1249249249249249ull;
-}
-
 // Organs lie within 2 m of the origin: 21 bits an axis resolve 2 um.
-std::uint64_t morton_code(const Vec3d& p) {
+std::uint64_t code_of(const Vec3d& p) {
   const auto cell = [](double v) {
     return static_cast<std::uint64_t>(std::clamp((v + 2.0) * 0.25, 0.0, 1.0) * 2097151.0);
   };
-  return spread(cell(p.x)) | spread(cell(p.y)) << 1 | spread(cell(p.z)) << 2;
+  return morton_code(cell(p.x), cell(p.y), cell(p.z));
 }
 
 }  // namespace
@@ -86,7 +78,7 @@ Groups::Groups(const Topology& topology, Coupling coupling, std::span<const Colo
   std::vector<NodeIndex> neighbours;
   for (std::uint32_t i = 0; i < colours.size(); ++i) {
     const NodeIndex node(i);
-    codes.push_back(morton_code(topology.rest()[i]));
+    codes.push_back(code_of(topology.rest()[i]));
     topology.neighbours_of(node, neighbours);
     valences.push_back(topology.tets_of(node).size() * 2 +
                        (topology.has_links() ? topology.links_of(node).size() : neighbours.size()));
@@ -162,7 +154,7 @@ void Groups::update(const Topology& topology, std::span<const NodeIndex> changed
         smallest_free_colour(topology, node, [&](NodeIndex j) { return colour_of(j); });
     if (is_to_leave && colour >= own && !has_conflict(topology, node)) continue;
     if (own != kNoColour) vacate(node);
-    place(node, colour, morton_code(topology.rest()[node.value]));
+    place(node, colour, code_of(topology.rest()[node.value]));
     moved_.push_back(node);
   }
   part_emptiest_groups(topology);
@@ -228,7 +220,7 @@ void Groups::part_emptiest_groups(const Topology& topology) {
         const auto node = nodes_of(group)[lane];
         if (!node.is_valid()) continue;
         take_out(node);
-        place(node, colour, morton_code(topology.rest()[node.value]));
+        place(node, colour, code_of(topology.rest()[node.value]));
         moved_.push_back(node);
       }
       give_up(group);

@@ -259,6 +259,7 @@ StepReport ScenarioRun::step_dynamic() {
   StepReport report;
   report.active_nodes = active.size();
   std::uint32_t sweeps = 0;
+  float largest_move = 0;
   for (std::uint32_t i = 1; i <= steps; ++i) {
     apply_loads(seconds_of(world_.tick - 1) + run.dt_s() * i);
     const dynamics::ExternalLoads loads{forces_, held_, held_displacements_, axis_holds_};
@@ -267,8 +268,7 @@ StepReport ScenarioRun::step_dynamic() {
       continue;
     }
     report.solve = solver_.solve(contacts_, active, how, world_, loads);
-    finder_.surface_moved(report.solve.largest_move_m);
-    if (self_finder_) self_finder_->surface_moved(report.solve.largest_move_m);
+    largest_move += report.solve.largest_move_m;
     sweeps += report.solve.sweeps;
     report.is_converged &=
         solver_kind_ == Solver::Live ||
@@ -277,8 +277,13 @@ StepReport ScenarioRun::step_dynamic() {
   report.solve.sweeps = sweeps;
   if (explicit_)
     for (const auto& u : world_.displacements) report.solve.nodes_rejected += is_finite(u) ? 0 : 1;
-  if (boundary_ != scene::Boundary::Whole)
-    solver_.take_state(world_, active_set_.settle(queue_, solver_.residuals_n(), world_));
+  if (boundary_ != scene::Boundary::Whole) {
+    const auto settled = active_set_.settle(queue_, solver_.residuals_n(), world_);
+    solver_.take_state(world_, settled);
+    if (!settled.empty()) largest_move += propagation::kQuietDisplacementMetres;
+  }
+  finder_.surface_moved(largest_move);
+  if (self_finder_) self_finder_->surface_moved(largest_move);
   follow_contacts();
   return report;
 }

@@ -100,7 +100,6 @@ Status Simulation::restore_snapshot(BytesView snapshot) {
                                          std::to_string(scene_->organ.mesh.node_count()) +
                                          " nodes)"};
   state_ = std::move(restored);
-  context_->finder.forget();
   context_ = std::make_unique<StepContext>(*scene_, state_->world);
   return {};
 }

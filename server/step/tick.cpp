@@ -75,10 +75,13 @@ void solve(State& state, StepContext& context) {
   if (context.sweep_bands.back().sweeps < decisions.sweeps) settings.bands = context.sweep_bands;
   const auto solved =
       context.solver.solve(context.contacts, context.active.nodes(), settings, state.world);
-  context.solver.take_state(
-      state.world, context.active.settle(context.queue, context.solver.residuals_n(), state.world));
-  context.finder.surface_moved(solved.largest_move_m);
-  context.self_finder.surface_moved(solved.largest_move_m);
+  const auto settled =
+      context.active.settle(context.queue, context.solver.residuals_n(), state.world);
+  context.solver.take_state(state.world, settled);
+  const float largest_move =
+      solved.largest_move_m + (settled.empty() ? 0 : propagation::kQuietDisplacementMetres);
+  context.finder.surface_moved(largest_move);
+  context.self_finder.surface_moved(largest_move);
   context.report.residual_n = solved.residual_n;
   context.report.sweeps = solved.sweeps;
   context.report.far_sweeps = settings.far_sweeps;

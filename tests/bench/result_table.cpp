@@ -9,6 +9,8 @@
 #include <sstream>
 #include <thread>
 
+#include "common/base/text_file.h"
+
 namespace trocar::bench {
 namespace {
 
@@ -237,15 +239,6 @@ std::string csv(const std::vector<Row>& rows) {
   return out;
 }
 
-Status write_text(const std::filesystem::path& path, const std::string& text) {
-  std::ofstream file(path, std::ios::binary);
-  file << text;
-  if (!file.flush())
-    return Error{ErrorCode::ResourceMissing,
-                 path.string() + ": cannot be written, name another folder with --out"};
-  return {};
-}
-
 // gnuplot's own form: one block per solver, two empty lines between blocks, the solver's name
 // first.
 std::string blocks(const std::vector<const Row*>& rows, const std::vector<std::string>& columns) {
@@ -386,7 +379,7 @@ Status ResultTable::write(const std::filesystem::path& folder, const Machine& ma
                                                      "solve_us", "median_us", "depth"})},
   };
   for (const auto& [path, text] : files)
-    if (auto status = write_text(path, text); !status) return status;
+    if (auto status = write_text_file(path, text); !status) return status;
   return {};
 }
 
