@@ -312,6 +312,7 @@ void Replica::apply_state(const proto::FrameState& message) {
   frame.figures.region_count = message.region_count();
   frame.figures.sweeps = message.sweeps();
   frame.figures.far_sweeps = message.far_sweeps();
+  frame.figures.far_interval = std::max(1u, message.far_interval());
   frame.figures.residual_n = message.residual_n();
   frame.figures.tick_median_us = message.tick_cpu_us();
   frame.figures.tick_p99_us = message.tick_cpu_p99_us();

@@ -73,6 +73,7 @@ struct RateFigures {
 struct FrameFigures {
   std::uint32_t active_nodes = 0, queue_nodes = 0, region_count = 0;
   std::uint32_t sweeps = 0, far_sweeps = 0;  // of active nodes and of all others
+  std::uint32_t far_interval = 1;            // ticks for which these far sweeps are
   float residual_n = 0;
   float tick_median_us = 0, tick_p99_us = 0;
   std::vector<float> stage_median_us;  // order of Stage in server/step

@@ -38,6 +38,13 @@ ImVec4 colour_of(RateTone tone) {
   return tone == RateTone::Calm ? kGood : tone == RateTone::Notice ? kNotice : kTrouble;
 }
 
+std::string far_sweeps(const replica::FrameFigures& figures) {
+  if (figures.far_sweeps == 0) return "rest";
+  if (figures.far_interval > 1)
+    return format("%u in %u ticks", figures.far_sweeps, figures.far_interval);
+  return std::to_string(figures.far_sweeps);
+}
+
 void rate_rows(const HudModel& model) {
   const replica::RateFigures& rate = model.figures.rate;
   const RateText text = describe(rate);
@@ -50,10 +57,7 @@ void rate_rows(const HudModel& model) {
   else
     ImGui::TextColored(colour_of(text.tone), "%s", text.level.c_str());
   if (!model.shows_rate) return;
-  if (!text.sweeps.empty())
-    row("sweeps", model.figures.far_sweeps > 0
-                      ? text.sweeps + format("; others %u", model.figures.far_sweeps)
-                      : text.sweeps + "; others rest");
+  if (!text.sweeps.empty()) row("sweeps", text.sweeps + "; others " + far_sweeps(model.figures));
   if (rate.node_limit > 0) row("queue limit", with_thousands(rate.node_limit) + " nodes");
   if (!text.load.empty()) row("next tick", text.load + " allowed");
   if (!text.changes.empty()) row("changes", text.changes);
@@ -94,8 +98,7 @@ void draw_session_panel(const HudModel& model, float scale) {
                                with_thousands(f.queue_nodes).c_str()));
     // With the controller's decisions open, its line says more.
     if (!model.shows_rate || f.rate.layer_sweeps.empty())
-      row("sweeps", f.far_sweeps > 0 ? format("%u, all other nodes %u", f.sweeps, f.far_sweeps)
-                                     : format("%u, all other nodes rest", f.sweeps));
+      row("sweeps", format("%u, all other nodes %s", f.sweeps, far_sweeps(f).c_str()));
     rate_rows(model);
     row("residual", format("%.2g mN", static_cast<double>(f.residual_n) * 1e3));
     row("regions", std::to_string(f.region_count));

@@ -98,6 +98,9 @@ Result<std::optional<ServerOptions>> parse_command_line(int argc, char** argv) {
   app.add_option("--far-sweeps", options.decisions.far_sweeps,
                  "passes per tick for the rest of the organ, 0: as many as the organ needs")
       ->capture_default_str();
+  app.add_flag("--exact-far", options.decisions.is_far_exact,
+               "forces in the rest of the organ from its material law, not from matrices that are "
+               "renewed every 64 ticks");
   app.add_option("--workers", options.workers, "threads that share a tick's work")
       ->check(CLI::Range(1u, kMaxWorkers))
       ->capture_default_str();

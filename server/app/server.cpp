@@ -114,8 +114,10 @@ LoopOptions Server::loop_options() const {
   if (options_.has_fixed_decisions) return loop;
   control::RateLimits rate{.highest = decisions, .budget_us = options_.budget_ms * 1e3};
   // Nodes of the queue are not swept less than those outside it.
-  if (decisions.boundary == world::Boundary::Graded)
+  if (decisions.boundary == world::Boundary::Graded) {
     rate.layer_sweeps = simulation_.context().far_plan.with_sweeps(decisions.far_sweeps).sweeps;
+    rate.far_interval = control::kLongestFarInterval;
+  }
   loop.rate = rate;
   return loop;
 }

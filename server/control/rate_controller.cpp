@@ -27,14 +27,25 @@ double solve_share(const step::TickReport& report) {
   return total > 0 ? solve / total : 0;
 }
 
+// In node sweeps by energies.
+double far_work(const step::TickReport& report) {
+  return static_cast<double>(report.far_node_sweeps) *
+         (report.is_far_linear ? RateController::kLinearWork : 1.0);
+}
+double work_of(const step::TickReport& report) {
+  return static_cast<double>(report.node_sweeps - report.far_node_sweeps) + far_work(report);
+}
+
 }  // namespace
 
 RateController::RateController(const RateLimits& limits)
     : limits_(limits),
       highest_sweeps_(step::sweeps_of_layers(limits.highest)),
       lowest_nodes_(std::min(limits.nodes, limits.highest.node_limit)),
+      longest_interval_(std::max(limits.far_interval, limits.highest.far_interval)),
       sweeps_(highest_sweeps_),
       nodes_(limits.highest.node_limit),
+      far_interval_(limits.highest.far_interval),
       decisions_(limits.highest) {
   for (std::size_t layer = 0; layer < step::kSweepLayers; ++layer)
     lowest_sweeps_[layer] =
@@ -45,7 +56,7 @@ RateController::RateController(const RateLimits& limits)
 
 void RateController::observe(const step::TickReport& report, const TickTiming& timing) {
   const double work_us = static_cast<double>(timing.work_ns) * 1e-3;
-  const auto node_sweeps = static_cast<double>(report.node_sweeps);
+  const double node_sweeps = work_of(report);
   model_.add(node_sweeps, work_us, solve_share(report));
   remember_peaks(report);
   since_lower_ = std::min(since_lower_ + 1, kLongAgo);
@@ -72,6 +83,7 @@ void RateController::remember_peaks(const step::TickReport& report) {
   for (std::size_t layer = 0; layer < step::kSweepLayers; ++layer)
     remember(peak_layer_nodes_[layer], report.layer_nodes[layer]);
   remember(peak_queue_nodes_, report.queue_nodes);
+  far_work_ = far_work(report) * report.far_interval;
 }
 
 void RateController::watch_load(const TickTiming& timing, bool can_lower) {
@@ -88,12 +100,17 @@ void RateController::watch_load(const TickTiming& timing, bool can_lower) {
 
 // The deepest layer that has sweeps to give, then nodes.
 RateController::Step RateController::next_lower(const step::TickReport& report) const {
-  Step step{sweeps_, nodes_, 0, report.active_nodes > 0};
+  Step step{sweeps_, far_interval_, nodes_, 0, report.active_nodes > 0};
   if (!step.is_any) return step;
   for (std::size_t layer = step::kSweepLayers; layer-- > 0;) {
     if (sweeps_[layer] == lowest_sweeps_[layer]) continue;
     --step.sweeps[layer];
     step.change = -static_cast<double>(report.layer_nodes[layer]);
+    return step;
+  }
+  if (far_interval_ < longest_interval_) {
+    ++step.far_interval;
+    step.change = -far_work_ / (far_interval_ * step.far_interval);
     return step;
   }
   // A limit above what the queue holds limits nothing.
@@ -110,7 +127,7 @@ RateController::Step RateController::next_lower(const step::TickReport& report) 
 }
 
 RateController::Step RateController::next_higher() const {
-  Step step{sweeps_, nodes_, 0, true};
+  Step step{sweeps_, far_interval_, nodes_, 0, true};
   if (nodes_ < limits_.highest.node_limit) {
     if (peak_queue_nodes_ < nodes_) {
       step.nodes = limits_.highest.node_limit;  // there are no more
@@ -118,6 +135,11 @@ RateController::Step RateController::next_higher() const {
       step.nodes = std::min(limits_.highest.node_limit, nodes_ + std::max(1u, nodes_ / kNodeShare));
       step.change = static_cast<double>(step.nodes - nodes_) * sweeps_.back();
     }
+    return step;
+  }
+  if (far_interval_ > limits_.highest.far_interval) {
+    --step.far_interval;
+    step.change = far_work_ / (far_interval_ * step.far_interval);
     return step;
   }
   for (std::size_t layer = 0; layer < step::kSweepLayers; ++layer) {
@@ -145,7 +167,7 @@ void RateController::lower(const step::TickReport& report) {
 }
 
 void RateController::raise(const step::TickReport& report) {
-  auto node_sweeps = static_cast<double>(report.node_sweeps);
+  double node_sweeps = work_of(report);
   for (std::size_t layer = 0; layer < step::kSweepLayers; ++layer)
     node_sweeps += (peak_layer_nodes_[layer] - report.layer_nodes[layer]) * sweeps_[layer];
   const auto has_room = [&](const Step& step) {
@@ -170,7 +192,9 @@ void RateController::raise(const step::TickReport& report) {
 void RateController::take(const Step& step) {
   sweeps_ = step.sweeps;
   nodes_ = step.nodes;
+  far_interval_ = step.far_interval;
   decisions_ = limits_.highest;
+  decisions_.far_interval = far_interval_;
   decisions_.node_limit = nodes_;
   if (sweeps_ == highest_sweeps_) return;
   decisions_.sweeps = sweeps_[0];

@@ -7,11 +7,13 @@
 // What is given up, in this order, one step at a time, and taken back in reverse:
 //   1. sweeps of layer 3 and deeper down to RateLimits::layer_sweeps, then of layer 2, then of
 //      layer 1, then of the touched nodes down to RateLimits::touched_sweeps;
-//   2. nodes of the queue, by a sixteenth at a time, down to RateLimits::nodes.
+//   2. how often far nodes are swept, up to once in RateLimits::far_interval ticks;
+//   3. nodes of the queue, by a sixteenth at a time, down to RateLimits::nodes.
 // Touched nodes stay in the queue whatever is decided (server/step does that). When the least is
 // still too much, simulated time slows: the Pacer counts it, and `level` says so.
 //
-// Laws, with the cost model's prediction p(x) at the node sweeps x of the tick just done:
+// Laws, with the cost model's prediction p(x) at the node sweeps x of the tick just done, of which
+// those by matrices count kLinearWork each:
 //   lower  when p(x) > budget, a step every kLowerEvery ticks at most;
 //   raise  when p(y + what the step adds) < 0.9 budget for `hold` ticks without a break, further
 //          steps every kRaiseEvery ticks; y is x with layers as large as they lately were (their
@@ -32,10 +34,14 @@
 
 namespace trocar::control {
 
+// Beyond this, contact forces of fast hands are off by more than 3 %.
+inline constexpr std::uint32_t kLongestFarInterval = 2;
+
 struct RateLimits {
   step::TickDecisions highest;  // when there is room for all
   // The least. A layer's sweeps should not be fewer than those of the far nodes.
   std::uint32_t touched_sweeps = 2, layer_sweeps = 1, nodes = 200;
+  std::uint32_t far_interval = 1;
   double budget_us = 800;  // of a tick's time for its work
 };
 
@@ -49,6 +55,7 @@ class RateController {
  public:
   static constexpr int kLowerEvery = 8, kRaiseEvery = 32;
   static constexpr int kHold = 200, kMaxHold = 3200;
+  static constexpr double kLinearWork = 0.3;
 
   // `highest` passes step::validate.
   explicit RateController(const RateLimits& limits);
@@ -65,6 +72,7 @@ class RateController {
   // A step up or down from what is decided, and the node sweeps that it adds or takes away.
   struct Step {
     step::LayerCounts sweeps{};
+    std::uint32_t far_interval = 1;
     std::uint32_t nodes = 0;
     double change = 0;
     bool is_any = false;
@@ -82,15 +90,16 @@ class RateController {
   const RateLimits limits_;
   const step::LayerCounts highest_sweeps_;
   step::LayerCounts lowest_sweeps_{};
-  std::uint32_t lowest_nodes_ = 0;
+  std::uint32_t lowest_nodes_ = 0, longest_interval_ = 1;
 
   CostModel model_;
   step::LayerCounts sweeps_{};
-  std::uint32_t nodes_ = 0;
+  std::uint32_t nodes_ = 0, far_interval_ = 1;
   step::TickDecisions decisions_;
   double predicted_us_ = 0;
   std::array<double, step::kSweepLayers> peak_layer_nodes_{};
   double peak_queue_nodes_ = 0;
+  double far_work_ = 0;               // of all far nodes once, in node sweeps
   double load_ = 0, late_share_ = 0;  // means over about 256 and 64 ticks
   double budget_share_ = 1;
   int since_lower_ = 1'000'000, since_raise_ = 1'000'000;  // ticks

@@ -36,6 +36,7 @@ BlockDescent::BlockDescent(const scene::Organ& organ, const world::World& world,
   constants_.resize(group_count);
   free_.resize(group_count);
   x_.resize(slot_count);
+  v_.resize(slot_count);
   start_.resize(slot_count);
   inertia_.resize(group_count);
   squares_.resize(group_count);
@@ -44,16 +45,14 @@ BlockDescent::BlockDescent(const scene::Organ& organ, const world::World& world,
   rejected_.resize(group_count);
   begun_stamp_.resize(group_count);
   group_stamp_.resize(group_count);
+  asked_stamp_.resize(group_count);
   serial_stamp_.resize(group_count);
   slot_stamp_.resize(slot_count);
   first_link_.resize(slot_count);
   links_.reserve(8 * contact::kMaxPointsPerTool + contact::kMaxSelfPoints);
   residuals_.reserve(world.node_count());
-  for (auto* plan : {&near_, &far_, &begun_, &bands_[0], &bands_[1], &bands_[2], &bands_[3]}) {
-    plan->lanes.resize(group_count);
-    plan->groups.reserve(group_count);
-    plan->colour_begins.resize(groups.colour_count() + 1);
-  }
+  for (auto* plan : {&near_, &far_, &far_swept_, &begun_}) plan->reserve(groups);
+  for (auto& band : bands_) band.reserve(groups);
   const auto map = scene::material_map(organ);
   for (Group g = 0; g < group_count; ++g) {
     all_groups_.push_back(g);
@@ -80,69 +79,61 @@ void BlockDescent::take_state(const world::World& world) {
       if (world.node_classes[node.value] != world::NodeClass::Fixed)
         free_[g] = static_cast<std::uint8_t>(free_[g] | 1u << lane);
       x_[g * kLanes + lane] = to_float4(world.displacements[node.value]);
+      v_[g * kLanes + lane] = to_float4(world.velocities[node.value]);
     }
   }
+  if (far_field_) far_field_->take_state(x_.data(), world);
+}
+
+bool BlockDescent::use_linear_far_field(const world::World& world) {
+  if (tissue_.follows_moves()) return false;
+  far_field_ = std::make_unique<FarField>(tissue_, world);
+  far_field_->take_state(x_.data(), world);
+  takings_.resize(workers_.count());
+  due_.reserve(all_groups_.size());
+  return true;
 }
 
 void BlockDescent::take_state(const world::World& world, std::span<const NodeIndex> nodes) {
-  for (const auto node : nodes)
-    x_[tissue_.groups().slot_of(node)] = to_float4(world.displacements[node.value]);
+  for (const auto node : nodes) {
+    const Slot slot = tissue_.groups().slot_of(node);
+    x_[slot] = to_float4(world.displacements[node.value]);
+    v_[slot] = to_float4(world.velocities[node.value]);
+  }
 }
 
 // --- Which groups and lanes ---
 
-void BlockDescent::clear(Plan& plan) const {
-  for (const auto g : plan.groups) plan.lanes[g] = 0;
-  plan.groups.clear();
-  plan.node_count = 0;
-}
-
-void BlockDescent::mark(Plan& plan, NodeIndex node) const {
-  const Slot slot = tissue_.groups().slot_of(node);
-  const Group g = slot / kLanes;
-  if (plan.lanes[g] == 0) plan.groups.push_back(g);
-  plan.lanes[g] = static_cast<std::uint8_t>(plan.lanes[g] | 1u << slot % kLanes);
-  ++plan.node_count;
-}
-
-void BlockDescent::finish(Plan& plan) const {
-  tissue_.groups().order_by_colour(plan.groups, plan.colour_begins);
-}
-
-void BlockDescent::plan_step(std::span<const NodeIndex> near, bool has_far,
-                             std::span<const NodeIndex> held) {
-  for (auto* plan : {&near_, &far_, &begun_}) clear(*plan);
-  for (const auto node : near) mark(near_, node);
-  finish(near_);
-  if (has_far)
+void BlockDescent::plan_step(std::span<const NodeIndex> near, const SolveSettings& settings,
+                             Tick tick, std::span<const NodeIndex> held) {
+  const auto& groups = tissue_.groups();
+  for (auto* plan : {&near_, &far_, &far_swept_, &begun_}) plan->clear();
+  for (const auto node : near) near_.add(groups, node);
+  near_.finish(groups);
+  far_interval_ = settings.far_interval;
+  if (settings.far_sweeps > 0)
     for (Group g = 0; g < free_.size(); ++g) {
-      far_.lanes[g] = static_cast<std::uint8_t>(free_[g] & ~near_.lanes[g]);
-      if (far_.lanes[g] == 0) continue;
-      far_.groups.push_back(g);
-      far_.node_count += static_cast<unsigned>(__builtin_popcount(far_.lanes[g]));
+      const auto lanes = static_cast<std::uint8_t>(free_[g] & ~near_.lanes[g]);
+      far_.add(g, lanes);
+      if (!is_slow(g) || (g + tick) % far_interval_ == 0) far_swept_.add(g, lanes);
     }
-  finish(far_);
-  const auto begin = [&](Group g) {
-    if (begun_.lanes[g] == 0) begun_.groups.push_back(g);
-    begun_.lanes[g] = 0xff;
-    begun_stamp_[g] = current_;
-  };
-  for (const auto g : near_.groups) begin(g);
-  for (const auto g : far_.groups) begin(g);
-  for (const auto node : held) begin(tissue_.groups().slot_of(node) / kLanes);
+  far_swept_.finish(groups);
+  for (const auto g : near_.groups) begun_.add(g, 0xff);
+  for (const auto g : is_far_linear_ ? all_groups_ : far_.groups) begun_.add(g, 0xff);
+  for (const auto node : held) begun_.add(groups.slot_of(node) / kLanes, 0xff);
+  for (const auto g : begun_.groups) begun_stamp_[g] = current_;
 }
 
 void BlockDescent::plan_bands(std::span<const NodeIndex> near, std::span<const SweepBand> bands) {
   TROCAR_ASSERT(bands.size() <= kMaxSweepBands);
   for (std::size_t b = 0; b + 1 < bands.size(); ++b) {
-    clear(bands_[b]);
-    for (const auto node : near.first(bands[b].end)) mark(bands_[b], node);
-    finish(bands_[b]);
+    bands_[b].clear();
+    for (const auto node : near.first(bands[b].end)) bands_[b].add(tissue_.groups(), node);
+    bands_[b].finish(tissue_.groups());
   }
 }
 
-const BlockDescent::Plan& BlockDescent::plan_of(std::uint32_t left,
-                                                std::span<const SweepBand> bands) const {
+const SweepPlan& BlockDescent::plan_of(std::uint32_t left, std::span<const SweepBand> bands) const {
   for (std::size_t b = 0; b + 1 < bands.size(); ++b)
     if (bands[b + 1].sweeps < left) return bands_[b];
   return near_;
@@ -182,37 +173,68 @@ void BlockDescent::for_each_group(std::span<const Group> groups, Task&& task) {
 
 // --- The step ---
 
-void BlockDescent::begin_inertia(Group group, const world::World& world, float inverse_dt,
-                                 std::span<const Vec3f> forces) {
-  const auto nodes = tissue_.groups().nodes_of(group);
-  Vec3Lanes velocity, load_n;
-  for (std::size_t lane = 0; lane < kLanes; ++lane) {
-    if (!nodes[lane].is_valid()) continue;
-    velocity.set(lane, world.velocities[nodes[lane].value]);
-    if (!forces.empty()) load_n.set(lane, forces[nodes[lane].value]);
-  }
-  const Float8 mass = load(constants_[group].mass), rate = all(inverse_dt);
-  const Vec8 v = load(velocity), gravity{all(gravity_.x), all(gravity_.y), all(gravity_.z)};
-  store(inertia_[group].inertia, (mass * rate + load(constants_[group].damping)) * rate);
-  store(inertia_[group].momentum, fma8(gravity, mass, fma8(v, mass * rate, load(load_n))));
-  Float4* const x = &x_[group * kLanes];
-  const Vec8 start = load_group(x);
-  store_group(&start_[group * kLanes], start);
+void BlockDescent::begin_inertia(Group group, std::span<const Vec3f> forces) {
   // Starting where inertia alone would lead makes rigid motion exact from the first sweep; starting
   // at rest instead acts as a drag as long as sweeps are few.
+  Float4* const x = &x_[group * kLanes];
+  const Vec8 v = load_group(&v_[group * kLanes]), before = load_group(x);
   const Float8 moves = mask_of(static_cast<std::uint8_t>(near_.lanes[group] | far_.lanes[group]));
-  const Float8 dt = where(moves, all(1.0f) / rate);
-  store_group(x, fma8(v, dt, start));
+  const Vec8 ahead = fma8(v, where(moves, all(1.0f / inverse_dt_)), before);
+  store_group(x, ahead);
+  Vec8 start = before;
+  if (is_slow(group) && !coasts(group)) {
+    // It has coasted to here for the steps before; a sweep is for them, too.
+    const Float8 passed = all(static_cast<float>(far_interval_) / inverse_dt_);
+    start = ahead - v * where(moves, passed);
+  }
+  store_group(&start_[group * kLanes], start);
+  if (coasts(group)) return;
+  const Float8 mass = load(constants_[group].mass), rate = all(inverse_dt_of(group));
+  const Vec8 gravity{all(gravity_.x), all(gravity_.y), all(gravity_.z)};
+  Vec8 momentum = fma8(gravity, mass, v * (mass * rate));
+  if (!forces.empty()) {
+    const auto nodes = tissue_.groups().nodes_of(group);
+    Vec3Lanes load_n;
+    for (std::size_t lane = 0; lane < kLanes; ++lane)
+      if (nodes[lane].is_valid()) load_n.set(lane, forces[nodes[lane].value]);
+    momentum = momentum + load(load_n);
+  }
+  store(inertia_[group].inertia, (mass * rate + load(constants_[group].damping)) * rate);
+  store(inertia_[group].momentum, momentum);
 }
 
-void BlockDescent::begin_groups(const world::World& world, const SolveSettings& settings,
-                                const ExternalLoads& loads) {
-  const float inverse_dt = 1.0f / settings.dt;
-  tissue_.begin_step(inverse_dt);
-  for_each_group(begun_.groups, [&](Group g) { tissue_.begin_group(g, x_.data()); });
-  for_each_group(begun_.groups,
-                 [&](Group g) { begin_inertia(g, world, inverse_dt, loads.forces); });
+// What energies keep for a step, from displacements at its start.
+void BlockDescent::ask_energies(Group group, const Float4* start) {
+  if (asked_stamp_[group] == current_) return;
+  asked_stamp_[group] = current_;
+  tissue_.begin_group(group, start, inverse_dt_of(group));
+}
+
+void BlockDescent::begin_groups(world::World& world, const ExternalLoads& loads) {
+  if (is_far_linear_) {
+    far_field_->begin_step(x_.data(), world);
+    due_.clear();
+    for (const auto g : all_groups_)
+      if (far_field_->is_due(g)) due_.push_back(g);
+    workers_.run([&](unsigned w) {
+      const auto n = due_.size(), count = std::size_t{workers_.count()};
+      for (auto i = n * w / count; i < n * (w + 1) / count; ++i)
+        far_field_->renew(due_[i], takings_[w]);
+    });
+  } else {
+    for_each_group(far_swept_.groups, [&](Group g) { ask_energies(g, x_.data()); });
+  }
+  // Linear groups ask when their forces do not do, which is rare.
+  for_each_group(near_.groups, [&](Group g) { ask_energies(g, x_.data()); });
+  for (const auto node : loads.held)
+    ask_energies(tissue_.groups().slot_of(node) / kLanes, x_.data());
+  for_each_group(begun_.groups, [&](Group g) { begin_inertia(g, loads.forces); });
   place_held(loads);
+  if (is_far_linear_)
+    for_each_group(begun_.groups, [&](Group g) {
+      far_field_->begin_group(g, x_.data(), start_.data(),
+                              coasts(g) ? inverse_dt_ : inverse_dt_of(g));
+    });
   if (tissue_.follows_moves())
     for_each_group(all_groups_, [&](Group g) { tissue_.restart_group(g, x_.data()); });
   for (const auto g : begun_.groups) rejected_[g] = 0;
@@ -234,12 +256,17 @@ void BlockDescent::place_held(const ExternalLoads& loads) {
   }
 }
 
-NodeStep8 BlockDescent::linearise(Group group, const Vec8& own, Scratch& scratch) const {
+NodeStep8 BlockDescent::inertia_of(Group group, const Vec8& own) const {
   const Inertia& inertia = inertia_[group];
   const Float8 m = load(inertia.inertia);
   const Vec8 moved = own - load_group(&start_[group * kLanes]);
   NodeStep8 step{moved * m - load(inertia.momentum), zero_sym_mat8()};
   step.block.add_identity(m);
+  return step;
+}
+
+NodeStep8 BlockDescent::linearise(Group group, const Vec8& own, Scratch& scratch) const {
+  NodeStep8 step = inertia_of(group, own);
   tissue_.add(group, x_.data(), own, step, scratch);
   return step;
 }
@@ -296,11 +323,19 @@ void BlockDescent::hold_axes(Group group, NodeStep8& step) const {
   step.block = load(blocks);
 }
 
-void BlockDescent::relax(Group group, std::uint8_t lanes, const contact::ContactList& contacts,
-                         float omega, Scratch& scratch) {
+void BlockDescent::relax(const SweepPlan& plan, Group group, const contact::ContactList& contacts,
+                         float omega, unsigned worker) {
+  const auto lanes = plan.lanes[group];
   Float4* const x = &x_[group * kLanes];
   const Vec8 own = load_group(x);
-  NodeStep8 step = linearise(group, own, scratch);
+  NodeStep8 step = inertia_of(group, own);
+  const bool is_linear = is_far_linear_ && &plan == &far_swept_ &&
+                         group_stamp_[group] != current_ &&
+                         far_field_->add(group, lanes, inverse_dt_of(group), step);
+  if (!is_linear) {
+    ask_energies(group, start_.data());
+    tissue_.add(group, x_.data(), own, step, scratches_[worker]);
+  }
   Float8 factor = all(-omega);
   if (group_stamp_[group] == current_) {
     Lanes factors;
@@ -317,14 +352,15 @@ void BlockDescent::relax(Group group, std::uint8_t lanes, const contact::Contact
   const Float8 moves = _mm256_and_ps(swept, is_sound);
   const Vec8 moved{where(moves, dx.x), where(moves, dx.y), where(moves, dx.z)};
   store_group(x, own + moved);
-  if (tissue_.follows_moves()) tissue_.after_move(group, moved, scratch);
+  if (tissue_.follows_moves()) tissue_.after_move(group, moved, scratches_[worker]);
+  if (is_far_linear_) far_field_->after_move(group, moved, inverse_dt_of(group));
   store(squares_[group], where(moves, squared));
   group_squares_[group] = sum(squares_[group]);
   const auto bad = static_cast<std::uint8_t>(lanes & ~bits_of(is_sound));
   rejected_[group] = static_cast<std::uint8_t>(rejected_[group] | bad);
 }
 
-void BlockDescent::sweep(const Plan& plan, const contact::ContactList& contacts, float omega) {
+void BlockDescent::sweep(const SweepPlan& plan, const contact::ContactList& contacts, float omega) {
   workers_.run([&](unsigned w) {
     for (std::size_t colour = 0; colour + 1 < plan.colour_begins.size(); ++colour) {
       const auto begin = plan.colour_begins[colour];
@@ -333,27 +369,27 @@ void BlockDescent::sweep(const Plan& plan, const contact::ContactList& contacts,
       for (auto i = n * w / count; i < n * (w + 1) / count; ++i) {
         const Group g = plan.groups[begin + i];
         if (has_serial_ && serial_stamp_[g] == current_) continue;
-        relax(g, plan.lanes[g], contacts, omega, scratches_[w]);
+        relax(plan, g, contacts, omega, w);
       }
       if (n > 0) workers_.barrier();
       if (!has_serial_ || n == 0) continue;
       if (w == 0)
         for (std::size_t i = 0; i < n; ++i) {
           const Group g = plan.groups[begin + i];
-          if (serial_stamp_[g] == current_) relax(g, plan.lanes[g], contacts, omega, scratches_[w]);
+          if (serial_stamp_[g] == current_) relax(plan, g, contacts, omega, w);
         }
       workers_.barrier();
     }
   });
 }
 
-double BlockDescent::sum_of_squares(const Plan& plan) const {
+double BlockDescent::sum_of_squares(const SweepPlan& plan) const {
   double total = 0;
   for (const auto g : plan.groups) total += static_cast<double>(group_squares_[g]);
   return total;
 }
 
-double BlockDescent::sum_of_squares_within(const Plan& core) const {
+double BlockDescent::sum_of_squares_within(const SweepPlan& core) const {
   double total = 0;
   for (const auto g : core.groups) {
     Lanes squares;
@@ -363,17 +399,32 @@ double BlockDescent::sum_of_squares_within(const Plan& core) const {
   return total;
 }
 
-void BlockDescent::write_back(const Plan& plan, float inverse_dt, world::World& world) {
+void BlockDescent::write_back(const SweepPlan& plan, world::World& world) {
   for_each_group(plan.groups, [&](Group g) {
-    const auto nodes = tissue_.groups().nodes_of(g);
-    squared_moves_[g] = 0;
+    const auto first = g * kLanes;
+    const auto* const nodes = tissue_.groups().nodes_of(g).data();
+    const bool is_swept = !coasts(g);
+    const Vec8 x = load_group(&x_[first]);
+    Vec8 v = load_group(&v_[first]);
+    if (is_swept) {
+      const Float8 moved = mask_of(plan.lanes[g]),
+                   stays = mask_of(static_cast<std::uint8_t>(~plan.lanes[g]));
+      const Vec8 next = (x - load_group(&start_[first])) * all(inverse_dt_of(g));
+      v = {_mm256_or_ps(where(moved, next.x), where(stays, v.x)),
+           _mm256_or_ps(where(moved, next.y), where(stays, v.y)),
+           _mm256_or_ps(where(moved, next.z), where(stays, v.z))};
+      store_group(&v_[first], v);
+    }
+    float most = 0;
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
       if ((plan.lanes[g] >> lane & 1) == 0) continue;
-      const Vec3f x = to_vec3(x_[g * kLanes + lane]), move = x - to_vec3(start_[g * kLanes + lane]);
-      squared_moves_[g] = std::max(squared_moves_[g], length_squared(move));
-      world.velocities[nodes[lane].value] = move * inverse_dt;
-      world.displacements[nodes[lane].value] = x;
+      const Vec3f now = to_vec3(x_[first + lane]);
+      Vec3f& displacement = world.displacements[nodes[lane].value];
+      most = std::max(most, length_squared(now - displacement));
+      displacement = now;
+      if (is_swept) world.velocities[nodes[lane].value] = to_vec3(v_[first + lane]);
     }
+    squared_moves_[g] = most;
   });
 }
 
@@ -396,6 +447,7 @@ std::uint32_t BlockDescent::restore_rejected(world::World& world) {
     x_[slot] = to_float4(start_of(slot));
     world.displacements[node.value] = to_vec3(x_[slot]);
     world.velocities[node.value] = {};
+    v_[slot] = {};
   }
   return static_cast<std::uint32_t>(nodes.size());
 }
@@ -409,15 +461,19 @@ SolveReport BlockDescent::solve(const contact::ContactList& contacts,
   TROCAR_ASSERT((settings.far_sweeps == 0 && settings.bands.empty()) ||
                 settings.residual_tolerance_n == 0);
   if (++current_ == 0) {
-    for (auto* stamps : {&slot_stamp_, &group_stamp_, &begun_stamp_, &serial_stamp_})
+    for (auto* stamps : {&slot_stamp_, &group_stamp_, &begun_stamp_, &serial_stamp_, &asked_stamp_})
       std::ranges::fill(*stamps, 0u);
     current_ = 1;
   }
-  const float inverse_dt = 1.0f / settings.dt;
-  plan_step(near, settings.far_sweeps > 0, loads.held);
+  inverse_dt_ = 1.0f / settings.dt;
+  // A node that is held along an axis alone has no linear form.
+  is_far_linear_ =
+      settings.far_sweeps > 0 && settings.has_linear_far_field && loads.axis_holds.empty();
+  TROCAR_ASSERT(!is_far_linear_ || far_field_);
+  plan_step(near, settings, world.tick, loads.held);
   plan_bands(near, settings.bands);
   link_contacts(contacts);
-  begin_groups(world, settings, loads);
+  begin_groups(world, loads);
 
   SolveReport report;
   float omega = settings.sweeps < 3
@@ -428,14 +484,14 @@ SolveReport BlockDescent::solve(const contact::ContactList& contacts,
   for (std::uint32_t i = 0; i < settings.sweeps; ++i) {
     // Far nodes go before the last near sweep, so that near residuals are those of the end.
     for (std::uint32_t far = 0; i + 1 == settings.sweeps && far < settings.far_sweeps; ++far) {
-      sweep(far_, contacts, settings.far_over_relaxation);
-      report.node_sweeps += far_.node_count;
+      sweep(far_swept_, contacts, settings.far_over_relaxation);
+      report.far_node_sweeps += far_swept_.node_count;
     }
     const auto left = settings.sweeps - i;
     const bool has_few = std::ranges::any_of(settings.bands, [left](const SweepBand& band) {
       return band.sweeps >= left && band.sweeps < 3;
     });
-    const Plan& plan = plan_of(left, settings.bands);
+    const SweepPlan& plan = plan_of(left, settings.bands);
     sweep(plan, contacts, has_few ? std::min(omega, kMaxOverRelaxationFewSweeps) : omega);
     report.node_sweeps += plan.node_count;
     ++report.sweeps;
@@ -451,9 +507,10 @@ SolveReport BlockDescent::solve(const contact::ContactList& contacts,
     if (tolerance > 0 && squares <= tolerance * tolerance * static_cast<double>(near.size())) break;
   }
 
+  report.node_sweeps += report.far_node_sweeps;
   if (!settings.bands.empty()) squares = sum_of_squares(near_);
-  write_back(near_, inverse_dt, world);
-  write_back(far_, inverse_dt, world);
+  write_back(near_, world);
+  write_back(far_, world);
   float squared_move = 0;
   for (const auto* plan : {&near_, &far_})
     for (const auto g : plan->groups) squared_move = std::max(squared_move, squared_moves_[g]);
@@ -462,7 +519,8 @@ SolveReport BlockDescent::solve(const contact::ContactList& contacts,
     const Vec3f move = to_vec3(x_[slot]) - start_of(slot);
     squared_move = std::max(squared_move, length_squared(move));
     world.displacements[node.value] = to_vec3(x_[slot]);
-    world.velocities[node.value] = move * inverse_dt;
+    world.velocities[node.value] = move * inverse_dt_;
+    v_[slot] = to_float4(world.velocities[node.value]);
   }
   report.largest_move_m = std::sqrt(squared_move);
   for (const auto g : begun_.groups)
@@ -520,6 +578,13 @@ FarPlan BlockDescent::far_plan(float dt) const {
   return plan.with_sweeps(kappa <= 1 ? 1 : 2);
 }
 
+FarPlan FarPlan::with_interval(std::uint32_t steps) const {
+  FarPlan plan = *this;
+  if (steps == 1) return plan;
+  plan.kappa *= static_cast<float>(steps * steps);
+  return plan.with_sweeps(sweeps);
+}
+
 FarPlan FarPlan::with_sweeps(std::uint32_t count) const {
   FarPlan plan = *this;
   if (count == 0) return plan;
@@ -542,11 +607,13 @@ FollowReport BlockDescent::follow_topology(const Topology& topology, const world
   inertia_.resize(group_count);
   squares_.resize(group_count);
   group_squares_.resize(group_count);
-  for (auto* lanes : {&free_, &rejected_, &near_.lanes, &far_.lanes, &begun_.lanes})
+  for (auto* lanes :
+       {&free_, &rejected_, &near_.lanes, &far_.lanes, &far_swept_.lanes, &begun_.lanes})
     lanes->resize(group_count);
   for (auto& band : bands_) band.lanes.resize(group_count);
-  for (auto* stamps : {&begun_stamp_, &group_stamp_, &serial_stamp_}) stamps->resize(group_count);
-  for (auto* values : {&x_, &start_}) values->resize(slot_count);
+  for (auto* stamps : {&begun_stamp_, &group_stamp_, &serial_stamp_, &asked_stamp_})
+    stamps->resize(group_count);
+  for (auto* values : {&x_, &v_, &start_}) values->resize(slot_count);
   slot_stamp_.resize(slot_count);
   squared_moves_.resize(group_count);
   first_link_.resize(slot_count);
@@ -564,6 +631,7 @@ FollowReport BlockDescent::follow_topology(const Topology& topology, const world
       const bool is_free = has_node && world.node_classes[node.value] != world::NodeClass::Fixed;
       free_[g] = static_cast<std::uint8_t>((free_[g] & ~(1u << lane)) | unsigned{is_free} << lane);
       x_[g * kLanes + lane] = has_node ? to_float4(world.displacements[node.value]) : Float4{};
+      v_[g * kLanes + lane] = has_node ? to_float4(world.velocities[node.value]) : Float4{};
     }
   return report;
 }

@@ -15,12 +15,15 @@
 // no allocation after the first steps. One caller at a time.
 
 #include <array>
+#include <memory>
 #include <span>
 #include <vector>
 
 #include "common/base/index.h"
 #include "common/base/workers.h"
 #include "server/contact/contact_list.h"
+#include "server/dynamics/far_field.h"
+#include "server/dynamics/sweep_plan.h"
 #include "server/dynamics/tissue.h"
 #include "server/world/world.h"
 
@@ -41,6 +44,11 @@ struct SolveSettings {
   float residual_tolerance_n = 0;
   std::uint32_t far_sweeps = 0;
   float far_over_relaxation = 1.3f;
+  // Far nodes are swept in every so many steps, one group of eight after another, each then for all
+  // the time since; in between they coast. Solve once per world.tick, then.
+  std::uint32_t far_interval = 1;
+  // Far nodes are linear about a pose of not long ago (FarField), after use_linear_far_field().
+  bool has_linear_far_field = false;
   // False: the caller watches the residual over many sweeps. Near an optimum it grows at first.
   bool has_safeguard = true;
   // At most kMaxSweepBands, ends ascending up to the last near node, sweeps from `sweeps` down to 1
@@ -69,11 +77,12 @@ struct ExternalLoads {
 struct SolveReport {
   float residual_n = 0;  // root mean square over near nodes, last sweep, before each node's step
   bool is_stepped_down = false;
-  std::uint32_t sweeps = 0;          // of near nodes, done
-  std::uint64_t node_sweeps = 0;     // nodes stepped, all sweeps together
-  std::uint32_t nodes_rejected = 0;  // their step was not finite in some sweep
-  float largest_move_m = 0;          // of a node in this step
-  std::uint32_t nodes_restored = 0;  // put back to the start of the step, at rest, for that reason
+  std::uint32_t sweeps = 0;           // of near nodes, done
+  std::uint64_t node_sweeps = 0;      // nodes stepped, all sweeps together
+  std::uint64_t far_node_sweeps = 0;  // far ones of these
+  std::uint32_t nodes_rejected = 0;   // their step was not finite in some sweep
+  float largest_move_m = 0;           // of a node in this step
+  std::uint32_t nodes_restored = 0;   // put back to the start of the step, at rest, for that reason
 };
 
 // How the far field of an organ wants to be swept at a step dt, from kappa = dt^2 D/m with D the
@@ -87,17 +96,23 @@ struct FarPlan {
 
   // The same organ with another number of sweeps, 0: this one.
   FarPlan with_sweeps(std::uint32_t count) const;
+  // For sweeps in every so many steps.
+  FarPlan with_interval(std::uint32_t steps) const;
 };
 
 class BlockDescent {
  public:
   BlockDescent(const scene::Organ& organ, const world::World& world, unsigned workers = 1);
 
-  // Takes displacements and classes anew: after a restored state, or whenever somebody else than
-  // solve() changed displacements of more than single nodes.
+  // Takes displacements, velocities and classes anew: after a restored state, or whenever somebody
+  // else than solve() changed them for more than single nodes.
   void take_state(const world::World& world);
   // The same for some nodes.
   void take_state(const world::World& world, std::span<const NodeIndex> nodes);
+
+  // Makes ready for SolveSettings::has_linear_far_field, from the world as it is; false: these
+  // energies cannot be linearised node by node (averaged volume).
+  bool use_linear_far_field(const world::World& world);
 
   // Advances displacements and velocities by one step. near: distinct nodes that are not fixed.
   SolveReport solve(const contact::ContactList& contacts, std::span<const NodeIndex> near,
@@ -131,38 +146,37 @@ class BlockDescent {
     std::array<Slot, contact::kMaxPointNodes> slots;
     std::array<std::uint32_t, contact::kMaxPointNodes> next;  // of the same slot's links
   };
-  // Groups with the lanes to sweep in them, by colour.
-  struct Plan {
-    std::vector<std::uint8_t> lanes;           // per group of the tissue
-    std::vector<Group> groups;                 // ascending, hence by colour
-    std::vector<std::uint32_t> colour_begins;  // into groups, colour_count + 1
-    std::uint64_t node_count = 0;
-  };
 
-  void clear(Plan& plan) const;
-  void mark(Plan& plan, NodeIndex node) const;
-  void finish(Plan& plan) const;
-  void plan_step(std::span<const NodeIndex> near, bool has_far, std::span<const NodeIndex> held);
+  void plan_step(std::span<const NodeIndex> near, const SolveSettings& settings, Tick tick,
+                 std::span<const NodeIndex> held);
   void plan_bands(std::span<const NodeIndex> near, std::span<const SweepBand> bands);
   // What takes part when `left` sweeps are left, this one included.
-  const Plan& plan_of(std::uint32_t left, std::span<const SweepBand> bands) const;
+  const SweepPlan& plan_of(std::uint32_t left, std::span<const SweepBand> bands) const;
   void link_contacts(const contact::ContactList& contacts);
-  void begin_groups(const world::World& world, const SolveSettings& settings,
-                    const ExternalLoads& loads);
-  void begin_inertia(Group group, const world::World& world, float inverse_dt,
-                     std::span<const Vec3f> forces);
+  void begin_groups(world::World& world, const ExternalLoads& loads);
+  void begin_inertia(Group group, std::span<const Vec3f> forces);
+  bool coasts(Group group) const { return is_slow(group) && far_swept_.lanes[group] == 0; }
+  // A group of far nodes alone goes by far_interval_, others by single steps.
+  bool is_slow(Group group) const {
+    return far_interval_ > 1 && near_.lanes[group] == 0 && far_.lanes[group] != 0;
+  }
+  float inverse_dt_of(Group group) const {
+    return is_slow(group) ? inverse_dt_ / static_cast<float>(far_interval_) : inverse_dt_;
+  }
+  [[gnu::always_inline]] inline NodeStep8 inertia_of(Group group, const Vec8& own) const;
   NodeStep8 linearise(Group group, const Vec8& own, Scratch& scratch) const;
   Vec3f displacement_of(const contact::ContactPoint& point, const PointLinks& links) const;
   void add_contacts(const contact::ContactList& contacts, Group group, NodeStep8& step,
                     Lanes& omega) const;
+  void ask_energies(Group group, const Float4* start);
   void hold_axes(Group group, NodeStep8& step) const;
   void place_held(const ExternalLoads& loads);
-  void sweep(const Plan& plan, const contact::ContactList& contacts, float omega);
-  void relax(Group group, std::uint8_t lanes, const contact::ContactList& contacts, float omega,
-             Scratch& scratch);
-  double sum_of_squares(const Plan& plan) const;
-  double sum_of_squares_within(const Plan& core) const;
-  void write_back(const Plan& plan, float inverse_dt, world::World& world);
+  void sweep(const SweepPlan& plan, const contact::ContactList& contacts, float omega);
+  void relax(const SweepPlan& plan, Group group, const contact::ContactList& contacts, float omega,
+             unsigned worker);
+  double sum_of_squares(const SweepPlan& plan) const;
+  double sum_of_squares_within(const SweepPlan& core) const;
+  void write_back(const SweepPlan& plan, world::World& world);
   std::uint32_t restore_rejected(world::World& world);
   Vec3f start_of(Slot slot) const;
   template <typename Task>
@@ -171,12 +185,14 @@ class BlockDescent {
   const scene::Organ& organ_;
   Tissue tissue_;
   Workers workers_;
-  std::vector<Scratch> scratches_;  // per worker
+  std::vector<Scratch> scratches_;              // per worker
+  std::vector<Linearisation::Taking> takings_;  // per worker
   Vec3f gravity_;
 
   std::vector<Constants> constants_;    // per group
   std::vector<std::uint8_t> free_;      // per group: lanes of nodes that are not fixed
   std::vector<Float4> x_;               // per slot: displacements being solved, else the world's
+  std::vector<Float4> v_;               // per slot: the world's velocities
   std::vector<Float4> start_;           // per slot: at the start of the step; begun groups
   std::vector<Inertia> inertia_;        // per group; begun groups
   std::vector<Lanes> squares_;          // per group: squared residuals of the last sweep
@@ -184,8 +200,16 @@ class BlockDescent {
   std::vector<float> squared_moves_;    // per group: largest of a node in this step, m^2
   std::vector<std::uint8_t> rejected_;  // per group: lanes with a step that was not finite
   std::vector<Group> all_groups_;
-  Plan near_, far_, begun_;
-  std::array<Plan, kMaxSweepBands> bands_;  // [b]: near nodes of bands 0 to b; the last is near_
+  SweepPlan near_, far_, begun_;
+  SweepPlan far_swept_;                     // of far_, in this step; the others coast
+  std::unique_ptr<FarField> far_field_;     // null: not used
+  bool is_far_linear_ = false;              // in this step
+  std::uint32_t far_interval_ = 1;          // of this step
+  float inverse_dt_ = 0;                    // of this step
+  std::vector<std::uint32_t> asked_stamp_;  // per group: energies have begun it
+  std::vector<Group> due_;                  // to be linearised anew
+  std::array<SweepPlan, kMaxSweepBands>
+      bands_;                               // [b]: near nodes of bands 0 to b; the last is near_
   std::vector<std::uint32_t> begun_stamp_;  // per group
   std::vector<float> residuals_;
   // Contact points of a node as a linked list in contact order; valid where the stamp is current.

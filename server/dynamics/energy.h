@@ -26,6 +26,18 @@ struct Scratch {
   std::vector<Vec3Lanes> rows;
 };
 
+// Takes the second derivatives of a group's nodes with one other node per lane: d gradient / d
+// other, N/m, to be summed where the same other node comes again. In lanes without one, others
+// holds the lane's own slot.
+class StiffnessSink {
+ public:
+  StiffnessSink() = default;
+  StiffnessSink(const StiffnessSink&) = delete;
+  StiffnessSink& operator=(const StiffnessSink&) = delete;
+  virtual ~StiffnessSink() = default;
+  virtual void add(const SlotLanes& others, const Mat8& stiffness) = 0;
+};
+
 class Energy {
  public:
   Energy() = default;
@@ -33,15 +45,20 @@ class Energy {
   Energy& operator=(const Energy&) = delete;
   virtual ~Energy() = default;
 
-  // Once per step, before begin_group. inverse_dt: 1/dt, or 0 for no damping.
-  virtual void begin_step(float /*inverse_dt*/) {}
   // Once per step for every group that will be swept: what stays constant in the step, from the
-  // displacements at its start (per slot). Several workers at once, each with its own groups.
-  virtual void begin_group(Group, const Float4* /*start*/) {}
+  // displacements at its start (per slot). inverse_dt: 1/dt of the group's step, or 0 for no
+  // damping. Several workers at once, each with its own groups.
+  virtual void begin_group(Group, const Float4* /*start*/, float /*inverse_dt*/) {}
 
   // Adds the group's gradients and blocks at displacements x (per slot). own: those of the group.
   virtual void add(Group group, const Float4* x, const Vec8& own, NodeStep8& step,
                    Scratch& scratch) const = 0;
+
+  // The elastic part (no damping) at displacements x: adds gradient and block as add() would, and
+  // gives the derivatives over all other nodes, always in the same order. Not for energies over
+  // stars.
+  virtual void linearise(Group group, const Float4* x, const Vec8& own, NodeStep8& step,
+                         StiffnessSink& sink) const = 0;
 
   // For energies over stars. restart_group(), for every group: displacements are new everywhere;
   // after_move(): the group's nodes have moved by dx since add(), by one worker a group, groups of

@@ -61,7 +61,7 @@ std::vector<Vec3f> ExplicitEuler::gradients(std::span<const Float4> x) {
 double ExplicitEuler::find_highest_frequency() {
   const auto& groups = tissue_.groups();
   const auto count = static_cast<std::uint32_t>(masses_.size());
-  tissue_.begin_step(0);
+  for (Group g = 0; g < groups.group_count(); ++g) tissue_.begin_group(g, x_.data(), 0);
   const auto at_rest = gradients(std::vector<Float4>(x_.size()));
   // Any start that is not smooth has a share in the stiffest mode.
   std::vector<Vec3d> v(count);
@@ -101,8 +101,7 @@ void ExplicitEuler::step(double dt, world::World& world, const ExternalLoads& lo
     x_[slot] = to_float4(world.displacements[n]);
     start_[slot] = to_float4(world.displacements[n] - world.velocities[n] * h);
   }
-  tissue_.begin_step(1.0f / h);
-  for (Group g = 0; g < groups.group_count(); ++g) tissue_.begin_group(g, start_.data());
+  for (Group g = 0; g < groups.group_count(); ++g) tissue_.begin_group(g, start_.data(), 1.0f / h);
   const auto gradient = gradients(x_);
   for (std::uint32_t n = 0; n < masses_.size(); ++n) {
     if (!is_free_[n]) continue;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <type_traits>
 
+#include "common/base/assert.h"
 #include "server/dynamics/tet_shape.h"
 
 namespace trocar::dynamics {
@@ -319,6 +320,49 @@ void Hyperelastic<Law>::add(Group group, const Float4* x, const Vec8& own, NodeS
     add_rows<true>(group, x, own, step, scratch);
   else
     add_rows<false>(group, x, own, step, scratch);
+}
+
+template <typename Law>
+void Hyperelastic<Law>::linearise(Group group, const Float4* x, const Vec8& own, NodeStep8& step,
+                                  StiffnessSink& sink) const {
+  TROCAR_ASSERT(!has_averaged_volume_);
+  Scratch none;
+  add_rows<false>(group, x, own, step, none);
+  const auto rows = rows_[group];
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const Row& row = rows[i];
+    const RowShape s = shape(row, x, own);
+    const Float8 volumetric = load(row.volumetric);
+    const Float8 pressure = fnma8(volumetric, dot8(s.area, s.rb), all(0) - load(row.pressure));
+    // Six times the derivatives of the volume.
+    const Vec8 of_c = cross8(s.ed, s.rb), of_d = cross8(s.rb, s.ec);
+    const Vec8 of_b = zero_vec8() - (s.area + of_c + of_d);
+    const Vec8 stiff_area = s.area * volumetric;
+    Mat8 b = zero_mat8(), c = b, d = b;
+    b.add_outer(stiff_area, of_b), b.add_cross((s.ec - s.ed) * pressure);
+    c.add_outer(stiff_area, of_c), c.add_cross(s.ed * pressure);
+    d.add_outer(stiff_area, of_d), d.add_cross(s.ec * (all(0) - pressure));
+    const Float8 wb = load(row.wb), wc = load(row.wc), wd = load(row.wd);
+    Float8 first = all(1);
+    if constexpr (!Law::kIsLinear) {
+      const InvariantRow& extra = invariant_rows_[group][i];
+      const Float8 wbc = load(extra.wbc), wbd = load(extra.wbd), wcd = load(extra.wcd);
+      const Vec8 rc = s.rb + s.ec, rd = s.rb + s.ed, cd = s.ed - s.ec;
+      const Float8 sum =
+          fma8(wb, dot8(s.rb, s.rb), fma8(wc, dot8(rc, rc), wd * dot8(rd, rd))) +
+          fma8(wbc, dot8(s.ec, s.ec), fma8(wbd, dot8(s.ed, s.ed), wcd * dot8(cd, cd)));
+      const Float8 inverse = load(extra.inverse_c10_v2);
+      Float8 second;
+      law_.derivatives(fnma8(sum, inverse, all(-3.0f)), first, second);
+      const Vec8 toward_b = s.rb * wb, toward_c = rc * wc, toward_d = rd * wd;
+      const Vec8 half = (toward_b + toward_c + toward_d) * (second * (inverse + inverse));
+      b.add_outer(half, fma8(s.ec, wbc, s.ed * wbd) - toward_b);
+      c.add_outer(half, fma8(cd, wcd, zero_vec8() - s.ec * wbc) - toward_c);
+      d.add_outer(half, zero_vec8() - (fma8(cd, wcd, s.ed * wbd) + toward_d));
+    }
+    b.add_identity(wb * first), c.add_identity(wc * first), d.add_identity(wd * first);
+    sink.add(row.b, b), sink.add(row.c, c), sink.add(row.d, d);
+  }
 }
 
 template <typename Law>

@@ -27,6 +27,8 @@ class Hyperelastic final : public Energy {
 
   void add(Group group, const Float4* x, const Vec8& own, NodeStep8& step,
            Scratch& scratch) const override;
+  void linearise(Group group, const Float4* x, const Vec8& own, NodeStep8& step,
+                 StiffnessSink& sink) const override;
   bool follows_moves() const override { return has_averaged_volume_; }
   void restart_group(Group group, const Float4* x) override;
   void after_move(Group group, const Vec8& dx, const Scratch& scratch) override;

@@ -102,6 +102,25 @@ inline SymMat8 zero_sym_mat8() {
   return {all(0), all(0), all(0), all(0), all(0), all(0)};
 }
 
+struct Mat8 {
+  Vec8 x, y, z;  // rows
+
+  void add_identity(Float8 s) { x.x = x.x + s, y.y = y.y + s, z.z = z.z + s; }
+  // Adds a b^T.
+  void add_outer(const Vec8& a, const Vec8& b) {
+    x = fma8(b, a.x, x), y = fma8(b, a.y, y), z = fma8(b, a.z, z);
+  }
+  // Adds the matrix of v x.
+  void add_cross(const Vec8& v) {
+    x.y = x.y - v.z, x.z = x.z + v.y;
+    y.x = y.x + v.z, y.z = y.z - v.x;
+    z.x = z.x - v.y, z.y = z.y + v.x;
+  }
+};
+inline Mat8 zero_mat8() {
+  return {zero_vec8(), zero_vec8(), zero_vec8()};
+}
+
 struct SymMat3Lanes {
   Lanes xx, xy, xz, yy, yz, zz;
 

@@ -22,18 +22,23 @@ bool has_damping(const scene::Organ& organ) {
          std::ranges::any_of(organ.regions, [&](const auto& r) { return is_damped(r.material); });
 }
 
-}  // namespace
-
-bool Springs::are_needed(const scene::Organ& organ) {
+bool has_elasticity(const scene::Organ& organ) {
   const auto has_springs = [](const scene::Material& m) {
     return m.elastic_law == scene::ElasticLaw::Springs;
   };
-  return has_damping(organ) || has_springs(organ.material) ||
+  return has_springs(organ.material) ||
          std::ranges::any_of(organ.regions, [&](const auto& r) { return has_springs(r.material); });
 }
 
+}  // namespace
+
+bool Springs::are_needed(const scene::Organ& organ) {
+  return has_damping(organ) || has_elasticity(organ);
+}
+
 Springs::Springs(const Topology& topology, const Groups& groups)
-    : has_damping_(has_damping(topology.organ())) {
+    : has_damping_(has_damping(topology.organ())),
+      has_elasticity_(has_elasticity(topology.organ())) {
   std::vector<NodeIndex> neighbours;
   std::vector<std::uint32_t> bounds(topology.node_count());
   for (std::uint32_t n = 0; n < bounds.size(); ++n) {
@@ -43,6 +48,7 @@ Springs::Springs(const Topology& topology, const Groups& groups)
   const auto bound = [&](NodeIndex node) { return bounds[node.value]; };
   rows_.reserve(groups, bound);
   constants_.reserve(groups, bound);
+  inverse_dts_.resize(groups.group_count());
   for (Group g = 0; g < groups.group_count(); ++g) fill(topology, groups, {g, 0xff});
   rows_.end_building();
   constants_.end_building();
@@ -112,41 +118,41 @@ std::size_t Springs::rebuild(const Topology& topology, const Groups& groups,
                              std::span<const GroupLanes> lanes) {
   rows_.extend(groups);
   constants_.extend(groups);
+  inverse_dts_.resize(groups.group_count());
   std::size_t written = 0;
   for (const auto group_lanes : lanes) {
     written += fill(topology, groups, group_lanes);
-    if (has_damping_ && inverse_dt_ != 0) take_step_length(group_lanes.group);
+    if (inverse_dts_[group_lanes.group] != 0) take_step_length(group_lanes.group);
   }
   rows_.tidy();
   constants_.tidy();
   return written;
 }
 
-void Springs::begin_step(float inverse_dt) {
-  if (!has_damping_ || inverse_dt == inverse_dt_) return;
-  inverse_dt_ = inverse_dt;
-  for (Group g = 0; g < rows_.group_count(); ++g) take_step_length(g);
-}
-
 void Springs::take_step_length(Group group) {
   auto constants = constants_[group].begin();
   for (Row& row : rows_[group]) {
     const Constants& c = *constants++;
-    store(row.stiffness, fma8(load(c.damping), all(inverse_dt_), load(c.stiffness)));
+    store(row.stiffness, fma8(load(c.damping), all(inverse_dts_[group]), load(c.stiffness)));
     store(row.pull, load(c.stiffness) * load(c.rest_length));
   }
 }
 
-void Springs::begin_group(Group group, const Float4* start) {
-  if (!has_damping_ || inverse_dt_ == 0) return;
+void Springs::begin_group(Group group, const Float4* start, float inverse_dt) {
+  if (!has_damping_) return;
+  if (inverse_dts_[group] != inverse_dt) {
+    inverse_dts_[group] = inverse_dt;
+    take_step_length(group);
+  }
+  if (inverse_dt == 0) return;
   const Vec8 own = load_group(start + group * kLanes);
   auto constants = constants_[group].begin();
   for (Row& row : rows_[group]) {
     const Constants& c = *constants++;
     const Vec8 r = load(row.rest) + (gather(start, row.neighbour) - own);
     const Float8 length = _mm256_sqrt_ps(dot8(r, r));
-    store(row.pull, fma8(load(c.damping) * all(inverse_dt_), length,
-                         load(c.stiffness) * load(c.rest_length)));
+    store(row.pull,
+          fma8(load(c.damping) * all(inverse_dt), length, load(c.stiffness) * load(c.rest_length)));
   }
 }
 
@@ -169,6 +175,27 @@ void Springs::add(Group group, const Float4* x, const Vec8& own, NodeStep8& step
   step.gradient = step.gradient - pull;
   block.add_identity(identity);
   step.block = block;
+}
+
+void Springs::linearise(Group group, const Float4* x, const Vec8& own, NodeStep8& step,
+                        StiffnessSink& sink) const {
+  if (!has_elasticity_) return;
+  auto constants = constants_[group].begin();
+  for (const Row& row : rows_[group]) {
+    const Constants& c = *constants++;
+    const Vec8 r = load(row.rest) + (gather(x, row.neighbour) - own);
+    const Float8 stiffness = load(c.stiffness);
+    const Float8 inverse = inverse_length(dot8(r, r));
+    const Float8 ratio = fnma8(stiffness * load(c.rest_length), inverse, stiffness);
+    const Float8 across = _mm256_max_ps(ratio, all(0));
+    step.gradient = step.gradient - r * ratio;
+    step.block.add_outer(r, (stiffness - across) * (inverse * inverse));
+    step.block.add_identity(across);
+    Mat8 other = zero_mat8();
+    other.add_identity(all(0) - ratio);
+    other.add_outer(r * ((ratio - stiffness) * (inverse * inverse)), r);
+    sink.add(row.neighbour, other);
+  }
 }
 
 void Springs::add_energies_j(std::span<const Vec3d> displacements,

@@ -19,10 +19,11 @@ class Springs final : public Energy {
   // False: no material of the organ can have any.
   static bool are_needed(const scene::Organ& organ);
 
-  void begin_step(float inverse_dt) override;
-  void begin_group(Group group, const Float4* start) override;
+  void begin_group(Group group, const Float4* start, float inverse_dt) override;
   void add(Group group, const Float4* x, const Vec8& own, NodeStep8& step,
            Scratch& scratch) const override;
+  void linearise(Group group, const Float4* x, const Vec8& own, NodeStep8& step,
+                 StiffnessSink& sink) const override;
   void add_energies_j(std::span<const Vec3d> displacements,
                       std::span<double> energies) const override;
   std::size_t rebuild(const Topology& topology, const Groups& groups,
@@ -56,8 +57,8 @@ class Springs final : public Energy {
 
   GroupRows<Row> rows_;
   GroupRows<Constants> constants_;
-  const bool has_damping_;
-  float inverse_dt_ = 0;
+  const bool has_damping_, has_elasticity_;
+  std::vector<float> inverse_dts_;  // per group: in the stiffness of its rows
   // While rows are filled.
   std::array<std::vector<End>, kLanes> ends_;
   std::vector<std::pair<NodeIndex, TetIndex>> tets_beside_;

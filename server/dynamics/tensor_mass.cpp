@@ -135,6 +135,18 @@ void TensorMass::add(Group group, const Float4* x, const Vec8& own, NodeStep8& s
                 step.block.yz + own_block.yz, step.block.zz + own_block.zz};
 }
 
+void TensorMass::linearise(Group group, const Float4* x, const Vec8& own, NodeStep8& step,
+                           StiffnessSink& sink) const {
+  Scratch none;
+  add(group, x, own, step, none);
+  for (const Row& row : rows_[group]) {
+    const auto line = [&](std::size_t i) {
+      return Vec8{load(row.k[i][0]), load(row.k[i][1]), load(row.k[i][2])};
+    };
+    sink.add(row.neighbour, {line(0), line(1), line(2)});
+  }
+}
+
 void TensorMass::add_energies_j(std::span<const Vec3d> displacements,
                                 std::span<double> energies) const {
   for (Group g = 0; g < blocks_.size(); ++g)

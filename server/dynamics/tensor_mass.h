@@ -16,6 +16,8 @@ class TensorMass final : public Energy {
 
   void add(Group group, const Float4* x, const Vec8& own, NodeStep8& step,
            Scratch& scratch) const override;
+  void linearise(Group group, const Float4* x, const Vec8& own, NodeStep8& step,
+                 StiffnessSink& sink) const override;
   void add_energies_j(std::span<const Vec3d> displacements,
                       std::span<double> energies) const override;
   std::size_t rebuild(const Topology& topology, const Groups& groups,

@@ -89,11 +89,8 @@ FollowReport Tissue::follow_topology(const Topology& topology) {
   return report;
 }
 
-void Tissue::begin_step(float inverse_dt) {
-  for (const auto& energy : energies_) energy->begin_step(inverse_dt);
-}
-void Tissue::begin_group(Group group, const Float4* start) {
-  for (const auto& energy : energies_) energy->begin_group(group, start);
+void Tissue::begin_group(Group group, const Float4* start, float inverse_dt) {
+  for (const auto& energy : energies_) energy->begin_group(group, start, inverse_dt);
 }
 void Tissue::restart_group(Group group, const Float4* x) {
   for (const auto& energy : energies_)

@@ -31,12 +31,17 @@ class Tissue {
   const Groups& groups() const { return groups_; }
   bool follows_moves() const { return follows_moves_; }
 
-  void begin_step(float inverse_dt);
-  void begin_group(Group group, const Float4* start);
+  void begin_group(Group group, const Float4* start, float inverse_dt);
   void restart_group(Group group, const Float4* x);
   void after_move(Group group, const Vec8& dx, const Scratch& scratch);
   void add(Group group, const Float4* x, const Vec8& own, NodeStep8& step, Scratch& scratch) const {
     for (const auto& energy : energies_) energy->add(group, x, own, step, scratch);
+  }
+
+  // The elastic part at displacements x, see Energy::linearise(). Not if it follows moves.
+  void linearise(Group group, const Float4* x, const Vec8& own, NodeStep8& step,
+                 StiffnessSink& sink) const {
+    for (const auto& energy : energies_) energy->linearise(group, x, own, step, sink);
   }
 
   // Follows topology.changed(). The topology is the one this tissue was made from, or another of

@@ -38,6 +38,8 @@ void to_message(const step::TickRecord& record, const step::TickDecisions* previ
     decisions.set_over_relaxation(d.over_relaxation);
     decisions.set_boundary(static_cast<std::uint32_t>(d.boundary));
     decisions.set_far_sweeps(d.far_sweeps);
+    decisions.set_is_far_exact(d.is_far_exact);
+    if (d.far_interval != 1) decisions.set_far_interval(d.far_interval);
     if (d.layer_sweeps != step::TickDecisions{}.layer_sweeps)
       decisions.mutable_layer_sweeps()->Assign(d.layer_sweeps.begin(), d.layer_sweeps.end());
   }
@@ -78,7 +80,9 @@ Status from_message(const proto::TickRecord& message, step::TickRecord& record) 
                         .sweeps = d.sweeps(),
                         .over_relaxation = d.over_relaxation(),
                         .boundary = static_cast<world::Boundary>(d.boundary()),
-                        .far_sweeps = d.far_sweeps()};
+                        .far_sweeps = d.far_sweeps(),
+                        .is_far_exact = d.is_far_exact(),
+                        .far_interval = std::max(1u, d.far_interval())};
     auto& layers = record.decisions.layer_sweeps;
     if (d.layer_sweeps_size() > static_cast<int>(layers.size()))
       return bad(record.tick, "layer_sweeps: more than three layers");

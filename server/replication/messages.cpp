@@ -124,6 +124,7 @@ void describe(const step::PublishedFrame& frame, proto::FrameState& state) {
   state.set_region_count(frame.region_count);
   state.set_sweeps(frame.sweeps);
   state.set_far_sweeps(frame.far_sweeps);
+  state.set_far_interval(frame.far_interval);
   state.set_residual_n(frame.residual_n);
   state.set_tick_cpu_us(frame.statistics.tick_median_us);
   state.set_tick_cpu_p99_us(frame.statistics.tick_p99_us);

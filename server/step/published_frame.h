@@ -57,6 +57,7 @@ struct PublishedFrame {
   std::uint64_t state_hash = 0;
   std::uint32_t active_nodes = 0, queue_nodes = 0, region_count = 0;
   std::uint32_t sweeps = 0, far_sweeps = 0;  // of active nodes and of all others
+  std::uint32_t far_interval = 1;            // ticks for which these far sweeps are
   LayerCounts layer_sweeps{};                // of active nodes by layer
   std::uint32_t node_limit = 0;
   float residual_n = 0;

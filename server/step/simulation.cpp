@@ -32,6 +32,7 @@ StepContext::StepContext(const Scene& s, const world::World& world)
       active(world.node_count()),
       solver(s.organ, world, s.workers),
       far_plan(solver.far_plan(kTickSeconds)),
+      has_linear_far_field(solver.use_linear_far_field(world)),
       surface_displacements(s.layout.vertex_count()) {
   contacts.reserve();
   requests.reserve(kMaxTools);
@@ -57,6 +58,8 @@ Status validate(const TickDecisions& d) {
                                          std::to_string(sweeps[layer - 1])};
   if (d.boundary > world::Boundary::Graded)
     return out_of_range("boundary", static_cast<int>(d.boundary), "0 (frozen) to 1 (graded)");
+  if (d.far_interval < 1 || d.far_interval > kMaxFarInterval)
+    return out_of_range("far_interval", d.far_interval, "1 to 4 ticks");
   if (d.far_sweeps > kMaxFarSweeps)
     return out_of_range("far_sweeps", d.far_sweeps, "0 (as the organ needs) to 16");
   if (!(d.over_relaxation >= 1.0f && d.over_relaxation <= 1.9f))

@@ -68,9 +68,12 @@ void solve(State& state, StepContext& context) {
   const auto& decisions = context.decisions;
   dynamics::SolveSettings settings{decisions.sweeps, decisions.over_relaxation, kTickSeconds};
   if (decisions.boundary == world::Boundary::Graded) {
-    const auto plan = context.far_plan.with_sweeps(decisions.far_sweeps);
+    const auto plan =
+        context.far_plan.with_sweeps(decisions.far_sweeps).with_interval(decisions.far_interval);
+    settings.far_interval = decisions.far_interval;
     settings.far_sweeps = plan.sweeps;
     settings.far_over_relaxation = plan.over_relaxation;
+    settings.has_linear_far_field = context.has_linear_far_field && !decisions.is_far_exact;
   }
   if (context.sweep_bands.back().sweeps < decisions.sweeps) settings.bands = context.sweep_bands;
   const auto solved =
@@ -86,6 +89,9 @@ void solve(State& state, StepContext& context) {
   context.report.sweeps = solved.sweeps;
   context.report.far_sweeps = settings.far_sweeps;
   context.report.node_sweeps = solved.node_sweeps;
+  context.report.far_node_sweeps = solved.far_node_sweeps;
+  context.report.is_far_linear = settings.has_linear_far_field;
+  context.report.far_interval = settings.far_interval;
   context.report.nodes_rejected = solved.nodes_rejected;
   context.report.nodes_restored = solved.nodes_restored;
   if (solved.is_stepped_down) context.report.faults |= kFaultOverRelaxation;
@@ -146,6 +152,7 @@ void quantise_and_publish(State& state, StepContext& context) {
   frame->layer_sweeps = sweeps_of_layers(context.decisions);
   frame->node_limit = context.decisions.node_limit;
   frame->far_sweeps = context.report.far_sweeps;
+  frame->far_interval = context.report.far_interval;
   frame->residual_n = context.report.residual_n;
   context.frame = std::move(frame);
 }

@@ -67,6 +67,7 @@ struct StepContext {
   std::array<dynamics::SweepBand, kSweepLayers> sweep_bands{};  // of active nodes, by layer
   dynamics::BlockDescent solver;
   dynamics::FarPlan far_plan;
+  bool has_linear_far_field;
   // By tool, empty without contact; last, tissue on tissue.
   std::array<std::span<const NodeIndex>, kMaxTools + 1> seeds;
   std::vector<locks::ClaimRequest> requests;

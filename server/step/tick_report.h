@@ -24,6 +24,10 @@ struct TickDecisions {
   // more than the layer before. 0: as the layer before. `sweeps` is of the touched nodes then.
   std::array<std::uint32_t, 3> layer_sweeps{};
 
+  // Graded: forces in the far field from the energies, not from matrices about a recent pose.
+  bool is_far_exact = false;
+  std::uint32_t far_interval = 1;  // Graded: ticks from one sweep of a far node to the next
+
   bool operator==(const TickDecisions&) const = default;
 };
 // Layers that have sweeps of their own: touched nodes, layer 1, layer 2, all beyond.
@@ -35,6 +39,7 @@ inline constexpr std::uint32_t kMaxDepthLimit = 1000;
 inline constexpr std::uint32_t kMaxNodeLimit = 10'000'000;
 inline constexpr std::uint32_t kMaxSweeps = 64;
 inline constexpr std::uint32_t kMaxFarSweeps = 16;
+inline constexpr std::uint32_t kMaxFarInterval = 4;
 // Layers where nodes outside the queue stand still: shallower ones feel stiff.
 inline constexpr std::uint32_t kFrozenDepthLimit = 6;
 
@@ -65,6 +70,9 @@ struct TickReport {
   std::uint32_t nodes_restored = 0;          // likewise: put back, at rest
   std::uint32_t sweeps = 0, far_sweeps = 0;  // of active nodes and of all others
   std::uint64_t node_sweeps = 0;             // nodes stepped by the solver, all sweeps together
+  std::uint64_t far_node_sweeps = 0;         // of these, nodes outside the queue
+  bool is_far_linear = false;                // these were stepped by matrices
+  std::uint32_t far_interval = 1;            // in every so many ticks
   std::uint32_t faults = 0;                  // TickFault bits
   float residual_n = 0;  // root mean square nodal force imbalance in the last sweep
   std::uint64_t state_hash = 0;

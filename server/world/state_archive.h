@@ -1,8 +1,9 @@
 #pragma once
 
 // One walk over the state serves three ends: hashing it, writing it, and reading it back. Each
-// stage has one function that names its arrays to an archive, so a snapshot holds exactly the bytes
-// that the tick hash covers, and a field that is forgotten is forgotten by all three alike.
+// stage has one function that names its arrays to an archive, so a snapshot holds exactly what the
+// tick hash covers, and a field that is forgotten is forgotten by all three alike. (An array that
+// changes rarely may be hashed when it does: the tick hash then covers its hash.)
 //
 // Reading treats the bytes as untrusted: sizes are checked before use, and after the first failure
 // every later field reads as zero and `ok()` stays false.
@@ -43,6 +44,7 @@ class StateArchive {
   static StateArchive reading(BytesView bytes);
 
   bool is_reading() const { return mode_ == Mode::Read; }
+  bool is_hashing() const { return mode_ == Mode::Hash; }
   bool ok() const { return ok_; }
   bool at_end() const { return reader_.remaining() == 0; }
   // For checks beyond size and type, e.g. an index out of range.

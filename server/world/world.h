@@ -12,6 +12,7 @@
 #include "common/base/tick.h"
 #include "common/math/vec3.h"
 #include "common/scene/organ.h"
+#include "server/world/far_poses.h"
 #include "server/world/state_archive.h"
 
 namespace trocar::world {
@@ -50,6 +51,7 @@ struct World {
   std::vector<Vec3f> velocities;         // m/s
   std::vector<NodeClass> node_classes;
   std::vector<std::uint16_t> quiet_ticks;  // ticks in a row below the freezing thresholds
+  FarPoses far_poses;                      // about which the far field is linear
 
   void visit_state(StateArchive& archive);
 };

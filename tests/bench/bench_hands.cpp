@@ -39,7 +39,8 @@ struct Options {
   int hands = 8;
   double seconds = 60, budget_ms = 0.8;
   unsigned workers = 1;
-  bool is_frozen = false, is_fixed = false, has_no_errors = false;
+  std::uint32_t far_interval = 1;
+  bool is_frozen = false, is_fixed = false, is_exact = false, has_no_errors = false;
   std::uint32_t nodes = 1200, depth = 0;
   Tick reference_ticks = 64;
 };
@@ -126,13 +127,19 @@ class Session {
       join.shapes[0] = {.radius_m = 0.008f, .length_m = 0.3f, .reach_m = 0.012f};
       inputs_.joins.push_back(join);
     }
-    decisions_ = {.depth_limit = options.depth, .node_limit = options.nodes};
+    decisions_ = {.depth_limit = options.depth,
+                  .node_limit = options.nodes,
+                  .is_far_exact = options.is_exact,
+                  .far_interval = options.far_interval};
     if (options.is_frozen) decisions_.boundary = world::Boundary::Frozen;
     if (options.depth == 0)
       decisions_.depth_limit =
           options.is_frozen ? step::kFrozenDepthLimit : step::TickDecisions{}.depth_limit;
     control::RateLimits limits{.highest = decisions_, .budget_us = options.budget_ms * 1e3};
-    if (!options.is_frozen) limits.layer_sweeps = simulation_.context().far_plan.sweeps;
+    if (!options.is_frozen) {
+      limits.layer_sweeps = simulation_.context().far_plan.sweeps;
+      limits.far_interval = control::kLongestFarInterval;
+    }
     if (!options.is_fixed) controller_.emplace(limits);
     chooser_.emplace(organ.depth_table, limits.nodes);
   }
@@ -189,6 +196,10 @@ void Session::note_change(const step::TickDecisions& decisions) {
     if (after[layer] < before[layer])
       changes_.emplace_back(tick, "layer " + std::to_string(layer) + " to " +
                                       std::to_string(after[layer]) + " sweeps");
+  if (decisions.far_interval > least_.far_interval)
+    changes_.emplace_back(tick,
+                          "far nodes every " + std::to_string(decisions.far_interval) + " ticks");
+  least_.far_interval = std::max(least_.far_interval, decisions.far_interval);
   if (decisions.node_limit < least_.node_limit)
     changes_.emplace_back(tick, "queue to " + std::to_string(decisions.node_limit) + " nodes");
   auto least = before;
@@ -386,6 +397,11 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(0u, 1000u))
       ->capture_default_str();
   app.add_flag("--frozen", options.is_frozen, "tissue beyond the limits stands still");
+  app.add_flag("--exact-far", options.is_exact, "the far field is not linearised");
+  app.add_option("--far-interval", options.far_interval,
+                 "ticks from one sweep of a far node to the next")
+      ->check(CLI::Range(1u, step::kMaxFarInterval))
+      ->capture_default_str();
   app.add_flag("--fixed", options.is_fixed, "without the rate controller");
   app.add_flag("--no-errors", options.has_no_errors, "only times");
   app.add_option("--out", options.out, "CSV with a line per second");

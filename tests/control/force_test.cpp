@@ -86,10 +86,12 @@ TEST_P(ForceUnderControl, DoesNotStep) {
   const Vec3f over = top_of(pressed.simulation.state().world);
   RateLimits limits;
   limits.highest.boundary = GetParam().boundary;
-  if (GetParam().boundary == world::Boundary::Frozen)
+  if (GetParam().boundary == world::Boundary::Frozen) {
     limits.highest.depth_limit = step::kFrozenDepthLimit;
-  else
+  } else {
     limits.layer_sweeps = pressed.simulation.context().far_plan.sweeps;
+    limits.far_interval = kLongestFarInterval;
+  }
   RateController controller(limits);
 
   step::TickDecisions now = limits.highest, before = now;
@@ -97,6 +99,7 @@ TEST_P(ForceUnderControl, DoesNotStep) {
   Tick changed = 0;
   int changes = 0;
   step::LayerCounts least = step::sweeps_of_layers(now);
+  std::uint32_t longest_interval = 1;
   std::uint32_t touched = 0;
   double peak = 0, apart = 0, worst = 0, farthest = 0;
   // Nodes, which only this boundary gives up one step after the other, take their time to come
@@ -111,6 +114,7 @@ TEST_P(ForceUnderControl, DoesNotStep) {
       changed = tick;
       apart = 0;
       ++changes;
+      longest_interval = std::max(longest_interval, now.far_interval);
       const auto sweeps = step::sweeps_of_layers(now);
       std::ranges::transform(sweeps, least, least.begin(),
                              [](auto a, auto b) { return std::min(a, b); });
@@ -137,6 +141,7 @@ TEST_P(ForceUnderControl, DoesNotStep) {
   EXPECT_GE(changes, 12);
   EXPECT_LE(least[0], 2u);
   EXPECT_LE(least[3], 2u);
+  EXPECT_EQ(longest_interval, limits.far_interval);
   EXPECT_EQ(now, limits.highest) << "all is taken back";
   EXPECT_GT(peak, 0.03) << "the tool presses";
   EXPECT_LT(worst, 0.02);

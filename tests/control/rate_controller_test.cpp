@@ -223,6 +223,24 @@ TEST(RateController, TheOrderIsDeepLayersThenTouchedNodesThenTheNodeLimit) {
   EXPECT_EQ(rows.back().node_limit, limits.nodes);
 }
 
+// How often far nodes are swept is given up between the sweeps of the queue and its nodes, and
+// taken back between them, too.
+TEST(RateController, FarNodesAreSweptLessOftenBeforeTheQueueLosesNodes) {
+  Machine machine;
+  machine.per_sweep_us = 0.3;
+  auto limits = roomy_limits();
+  limits.far_interval = 3;
+  const Load load{.contacts = [](Tick tick) { return tick < 3000 ? 8 : 0; },
+                  .slowness = [](Tick tick) { return tick < 3000 ? 1.0 : 0.05; }};
+  const auto rows = run_virtual(machine, load, 40'000, limits);
+  for (const auto& row : rows) {
+    ASSERT_TRUE(row.decisions.far_interval == 1 || row.sweeps == kLeast) << row.tick;
+    ASSERT_TRUE(row.node_limit >= row.queue_nodes || row.decisions.far_interval == 3) << row.tick;
+  }
+  EXPECT_EQ(rows[2999].decisions.far_interval, 3u);
+  EXPECT_EQ(rows.back().decisions, limits.highest) << "all is taken back";
+}
+
 TEST(RateController, MinimaAboveWhatIsAskedForAreWhatIsAskedFor) {
   const RateLimits limits{.highest = {.node_limit = 50, .sweeps = 1},
                           .touched_sweeps = 3,

@@ -25,7 +25,9 @@ step::TickReport report_of(const Machine& machine, int contacts, const step::Tic
     report.active_nodes += nodes;
     report.node_sweeps += std::uint64_t{nodes} * sweeps[layer];
   }
-  report.node_sweeps += far;
+  report.far_interval = d.far_interval;
+  report.far_node_sweeps = far / d.far_interval;
+  report.node_sweeps += report.far_node_sweeps;
   return report;
 }
 

@@ -146,8 +146,7 @@ Evaluated evaluate(Tissue& tissue, const std::vector<Vec3f>& u) {
     if (groups.colour_of(g) != kNoColour) order.push_back(g);
   groups.order_by_colour(order, begins);
   const std::vector<Float4> start(x.size());
-  tissue.begin_step(1000);
-  for (const auto g : order) tissue.begin_group(g, start.data());
+  for (const auto g : order) tissue.begin_group(g, start.data(), 1000);
   for (Group g = 0; g < groups.group_count(); ++g) tissue.restart_group(g, x.data());
   Evaluated result;
   result.nodes.resize(u.size());
@@ -214,7 +213,6 @@ TEST_P(FollowTopology, EveryEditGivesWhatBuildingAnewGives) {
     EditedOrgan edited(GetParam().make(), seed);
     auto& topology = edited.topology();
     Tissue tissue(edited.topology());
-    tissue.begin_step(1000);
     const auto coupling = tissue.follows_moves() ? Coupling::Stars : Coupling::Elements;
     std::size_t moved = 0;
     for (int edit = 0; edit < 40; ++edit) {
@@ -397,7 +395,10 @@ TEST(FollowTopology, TheSolverFollowsWithAnyNumberOfWorkers) {
         std::vector<NodeIndex> near;
         for (std::uint32_t n = 0; n < topology.node_count(); ++n)
           if (topology.has_node(NodeIndex(n)) && world.masses[n] > 0) near.emplace_back(n);
-        if (edit == 0) world.velocities[near[30].value] = {0.5f, 0.2f, 0};
+        if (edit == 0) {
+          world.velocities[near[30].value] = {0.5f, 0.2f, 0};
+          solver.take_state(world, std::span(near).subspan(30, 1));
+        }
         const auto report = solver.solve({}, near, {}, world);
         ASSERT_EQ(report.nodes_rejected, 0u);
       }

@@ -1,0 +1,64 @@
+#include "server/world/far_poses.h"
+
+#include <algorithm>
+
+#include "common/base/checksum.h"
+
+namespace trocar::world {
+namespace {
+
+constexpr float kPerMetre = 16384, kMost = 32767;
+
+std::int16_t to_grid(float metres) {
+  const float v = std::clamp(metres * kPerMetre, -kMost, kMost);
+  return static_cast<std::int16_t>(v < 0 ? v - 0.5f : v + 0.5f);
+}
+
+}  // namespace
+
+Vec3f displacement_of(const GridPoint& point) {
+  return Vec3f{static_cast<float>(point.x), static_cast<float>(point.y),
+               static_cast<float>(point.z)} *
+         (1 / kPerMetre);
+}
+
+FarPoses::FarPoses(std::size_t node_count) {
+  for (std::uint32_t i = 0; i < 2; ++i) {
+    poses_[i].resize(node_count);
+    hashes_[i] = hash_of(i);
+  }
+}
+
+bool FarPoses::begin_step(std::span<const Vec3f> displacements) {
+  age_ = (age_ + 1) % kInterval;
+  if (age_ == 0) take(displacements);
+  return age_ == 0;
+}
+
+void FarPoses::take(std::span<const Vec3f> displacements) {
+  const auto i = ++newest_ % 2;
+  std::ranges::transform(displacements, poses_[i].begin(), [](const Vec3f& u) {
+    return GridPoint{to_grid(u.x), to_grid(u.y), to_grid(u.z)};
+  });
+  hashes_[i] = hash_of(i);
+}
+
+std::uint64_t FarPoses::hash_of(std::uint32_t number) const {
+  const auto& pose = poses_[number % 2];
+  return xxh3_64(
+      {reinterpret_cast<const std::uint8_t*>(pose.data()), pose.size() * sizeof(GridPoint)});
+}
+
+void FarPoses::visit_state(StateArchive& archive) {
+  archive.value(newest_);
+  archive.value(age_);
+  if (archive.is_reading() && age_ >= kInterval) archive.fail();
+  for (std::uint32_t i = 0; i < 2; ++i) {
+    archive.value(hashes_[i]);
+    if (archive.is_hashing()) continue;
+    archive.fixed_array(poses_[i]);
+    if (archive.is_reading() && hashes_[i] != hash_of(i)) archive.fail();
+  }
+}
+
+}  // namespace trocar::world
