@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "common/base/tick.h"
 
@@ -27,8 +28,11 @@ constexpr double kNearEdges = 3.5;
 constexpr std::uint32_t kMostNearLayers = 8;
 constexpr float kDeepest_m = 0.008f;
 // Of a list, per tick, at least.
-constexpr std::size_t kSitesPerTick = 32;
+constexpr std::size_t kReferencesPerTick = 512, kSitesPerTick = 32;
+// Of the work on a list, the part that taking references is.
+constexpr double kReferencesShare = 0.3;
 constexpr std::size_t kReservedPairs = 1u << 15;
+constexpr float kRounding_m = 1e-5f;
 constexpr float kNoLimit_n = 1e6f;
 
 // Barycentric weights of the place of a triangle nearest to p (Ericson, Real-Time Collision
@@ -140,6 +144,8 @@ SelfContactFinder::SelfContactFinder(const scene::Organ& organ)
   due_.reserve(sites_.size());
   list_.pairs.reserve(kReservedPairs);
   next_list_.pairs.reserve(kReservedPairs);
+  list_.far_until.reserve(kReservedPairs);
+  next_list_.far_until.reserve(kReservedPairs);
   references_.resize(sites_.size());
   has_left_.resize(sites_.size());
   old_nodes_.reserve(kMaxSelfPoints);
@@ -156,9 +162,8 @@ SelfContactFinder::SelfContactFinder(const scene::Organ& organ)
   grid_.build(sites_.size(), [&](std::size_t s) { return rest_positions_[s]; });
   is_close_at_rest_.resize(sites_.size());
   for (Site s = 0; s < sites_.size(); ++s)
-    grid_.visit(rest_positions_[s], [&](Site other, const Vec3f& p) {
-      if (length_squared(p - rest_positions_[s]) <= range * range && faced_at_rest(s, other) &&
-          !std::ranges::binary_search(near_sites_[SiteIndex{s}], other))
+    grid_.visit(rest_positions_[s], range, [&](Site other, float) {
+      if (faced_at_rest(s, other) && !std::ranges::binary_search(near_sites_[SiteIndex{s}], other))
         is_close_at_rest_[s] = 1;
     });
   grid_ = PointGrid(reach_m_ + slack_m_, sites_.size());
@@ -216,24 +221,40 @@ bool SelfContactFinder::has_moved(Site site, float by_m, const world::World& wor
 // least is kListedSlacks from rest. A reference is where the node was when its surroundings were
 // last looked through; it is never farther than slack_m_ / 2 from where the node is now. So each
 // pair that is within reach_m_ is on the list, and only what moves is looked through again.
-void SelfContactFinder::begin_list(const world::World& world) {
+void SelfContactFinder::begin_list() {
   is_listing_ = true;
   next_list_.travel = travel_;
   next_list_.least_distance = 1;
-  due_.clear();
-  sites_listed_ = 0;
+  next_list_.pairs.clear();
+  sites_seen_ = sites_listed_ = due_count_ = 0;
+}
+
+void SelfContactFinder::take_references(std::size_t end, const world::World& world) {
   const float far = kReferenceSlacks * slack_m_;
-  for (Site s = 0; s < sites_.size(); ++s) {
+  for (; sites_seen_ < end; ++sites_seen_) {
+    const auto s = static_cast<Site>(sites_seen_);
     const Vec3f p = position(s, world);
     is_due_[s] = !has_list_ || length_squared(p - references_[s]) > far * far ? 1 : 0;
     if (is_due_[s] == 0) continue;
     references_[s] = p;
     has_left_[s] = has_moved(s, kListedSlacks * slack_m_, world) ? 1 : 0;
-    // At first, whoever stays where nothing faces it has nothing to look for.
-    if (has_list_ || has_left_[s] == 1 || is_close_at_rest_[s] == 1) due_.push_back(s);
+    ++due_count_;
   }
-  if (!due_.empty()) grid_.build(sites_.size(), [&](std::size_t s) { return references_[s]; });
-  next_list_.pairs.clear();
+}
+
+// Neighbours after one another, which look through the same cells.
+void SelfContactFinder::order_due() {
+  due_.clear();
+  if (due_count_ == 0) return;
+  grid_.build(sites_.size(), [&](std::size_t s) { return references_[s]; });
+  for (const Site s : grid_.entries())
+    // At first, whoever stays where nothing faces it has nothing to look for.
+    if (is_due_[s] == 1 && (has_list_ || has_left_[s] == 1 || is_close_at_rest_[s] == 1))
+      due_.push_back(s);
+}
+
+// Of the list that there is, what has not moved.
+void SelfContactFinder::keep_pairs() {
   for (const auto& pair : list_.pairs) {
     if (is_due_[pair.node] == 1 || is_due_[pair.across] == 1) continue;
     next_list_.pairs.push_back(pair);
@@ -242,32 +263,54 @@ void SelfContactFinder::begin_list(const world::World& world) {
   }
 }
 
-void SelfContactFinder::go_on_listing(std::size_t sites) {
-  const auto end = std::min(due_.size(), sites_listed_ + sites);
-  for (; sites_listed_ < end; ++sites_listed_) list_around(due_[sites_listed_]);
-  if (end < due_.size()) return;
-  if (!due_.empty()) std::ranges::sort(next_list_.pairs);
-  // A pair of two that were due, or none of which looked, was found from both sides or one.
+void SelfContactFinder::end_list() {
   auto& pairs = next_list_.pairs;
+  if (due_count_ > 0) std::ranges::sort(pairs);
+  // A pair of two that were due, or none of which looked, was found from both sides or one.
   pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+  next_list_.far_until.assign(pairs.size(), 0);
   std::swap(list_, next_list_);
   is_listing_ = false;
   has_list_ = true;
   ++lists_made_;
 }
 
-void SelfContactFinder::list_around(Site site) {
-  if (++near_current_ == 0) {
-    std::ranges::fill(near_stamp_, 0u);
-    near_current_ = 1;
+// share: how much of the work shall be done by now. All of it is done at once; else each tick does
+// a little of one kind.
+void SelfContactFinder::go_on_listing(double share, const world::World& world) {
+  const auto part = [](double of_it, std::size_t all) {
+    return static_cast<std::size_t>(std::clamp(of_it, 0.0, 1.0) * static_cast<double>(all));
+  };
+  if (sites_seen_ < sites_.size()) {
+    const auto end =
+        std::max(part(share / kReferencesShare, sites_.size()), sites_seen_ + kReferencesPerTick);
+    take_references(std::min(end, sites_.size()), world);
+    if (sites_seen_ < sites_.size()) return;
+    keep_pairs();
+    order_due();
+    if (share < 1) return;
   }
-  for (const auto s : near_sites_[SiteIndex{site}]) near_stamp_[s] = near_current_;
-  const Vec3f p = references_[site];
-  const float range = reach_m_ + slack_m_;
-  grid_.visit(p, [&](Site other, const Vec3f& q) {
-    const float squared = length_squared(q - p);
-    if (squared > range * range || near_stamp_[other] == near_current_) return;
-    if (has_left_[site] == 0 && has_left_[other] == 0 && !faced_at_rest(site, other)) return;
+  const auto end = std::max(part((share - kReferencesShare) / (1 - kReferencesShare), due_.size()),
+                            sites_listed_ + kSitesPerTick);
+  for (; sites_listed_ < std::min(end, due_.size()); ++sites_listed_)
+    list_around(due_[sites_listed_]);
+  if (sites_listed_ == due_.size()) end_list();
+}
+
+void SelfContactFinder::list_around(Site site) {
+  const auto stamp_near_sites = [&] {
+    if (++near_current_ == 0) {
+      std::ranges::fill(near_stamp_, 0u);
+      near_current_ = 1;
+    }
+    for (const auto s : near_sites_[SiteIndex{site}]) near_stamp_[s] = near_current_;
+  };
+  bool is_stamped = false;
+  const bool has_left = has_left_[site] == 1, is_close = is_close_at_rest_[site] == 1;
+  grid_.visit(references_[site], reach_m_ + slack_m_, [&](Site other, float squared) {
+    if (!has_left && has_left_[other] == 0 && !(is_close && faced_at_rest(site, other))) return;
+    if (!std::exchange(is_stamped, true)) stamp_near_sites();
+    if (near_stamp_[other] == near_current_) return;
     next_list_.pairs.push_back({site, other});
     next_list_.pairs.push_back({other, site});
     next_list_.least_distance = std::min(next_list_.least_distance, std::sqrt(squared));
@@ -281,18 +324,15 @@ void SelfContactFinder::keep_list(const world::World& world) {
   const auto used = [this] {
     return (travel_ - list_.travel) / static_cast<double>(kReferenceSlacks * slack_m_);
   };
-  if (!is_listing_ && (!has_list_ || used() > 0.5)) begin_list(world);
-  if (!is_listing_) return;
-  const auto count = static_cast<double>(due_.size());
-  const double due = has_list_ ? std::clamp(3 * (used() - 0.5), 0.0, 1.0) * count : count;
-  const auto done = static_cast<double>(sites_listed_);
-  go_on_listing(std::max(kSitesPerTick, static_cast<std::size_t>(std::max(0.0, due - done)) + 1));
+  if (!is_listing_ && has_list_ && used() <= 0.5) return;
+  if (!is_listing_) begin_list();
+  go_on_listing(has_list_ ? 3 * (used() - 0.5) : 1, world);
   if (used() <= 1) return;
-  if (is_listing_) go_on_listing(due_.size());
+  if (is_listing_) go_on_listing(1, world);
   if (used() <= 1) return;
   // It moved farther than that since it began.
-  begin_list(world);
-  go_on_listing(due_.size());
+  begin_list();
+  go_on_listing(1, world);
 }
 
 // --- A node and a triangle ---
@@ -379,17 +419,24 @@ bool lies_along(float aside, float gap) {
 }  // namespace
 
 // Whether a node without a pair meets the surface across from it.
-bool SelfContactFinder::meets(Site site, std::span<const NodePair> listed,
+bool SelfContactFinder::meets(Site site, std::size_t first, std::size_t end,
                               const world::World& world, Place& place, Touch& touch) {
+  const auto passed = static_cast<float>(travel_ - list_.travel);
+  while (first < end && list_.far_until[first] > passed) ++first;
+  if (first == end) return false;
   const Vec3f p = position(site, world);
   const float moved = kMovedSlacks * slack_m_;
   const bool is_moved = has_moved(site, moved, world);
   float least = reach_m_ * reach_m_;
   Site nearest = 0;
   bool is_found = false;
-  for (const auto& pair : listed) {
+  for (auto i = first; i < end; ++i) {
+    if (list_.far_until[i] > passed) continue;
+    const auto& pair = list_.pairs[i];
     const Vec3f way = position(pair.across, world) - p;
     const float squared = length_squared(way);
+    if (squared > reach_m_ * reach_m_)
+      list_.far_until[i] = passed + 0.5f * (std::sqrt(squared) - reach_m_) - kRounding_m;
     if (!(squared < least) ||
         !(is_moved || has_moved(pair.across, moved, world) || faced_at_rest(site, pair.across)))
       continue;
@@ -480,8 +527,7 @@ void SelfContactFinder::find(const world::World& world, SelfContactTable& pairs,
     Place place;
     Touch touch;
     bool is_pair = site == of_old && stays(site, old_triangles_[old], world, place, touch);
-    if (!is_pair)
-      is_pair = meets(site, std::span(listed).subspan(first, end - first), world, place, touch);
+    if (!is_pair) is_pair = meets(site, first, end, world, place, touch);
     if (is_pair) add_point(site, place, touch, world, pairs, out);
     if (site == of_old) ++old;
     first = end;

@@ -106,8 +106,12 @@ class SelfContactFinder {
   void list_near_sites(const scene::Organ& organ, double near_m);
   bool faced_at_rest(Site site, Site across) const;
   void keep_list(const world::World& world);
-  void begin_list(const world::World& world);
-  void go_on_listing(std::size_t sites);
+  void begin_list();
+  void go_on_listing(double share, const world::World& world);
+  void take_references(std::size_t end, const world::World& world);
+  void keep_pairs();
+  void order_due();
+  void end_list();
   void list_around(Site site);
   bool has_moved(Site site, float by_m, const world::World& world) const;
   Vec3f position(Site site, const world::World& world) const {
@@ -118,7 +122,8 @@ class SelfContactFinder {
   Place place_on(Site site, TriangleIndex triangle, const world::World& world) const;
   Place nearest_place(Site site, std::span<const Site> around, const world::World& world) const;
   Touch touch_at(Site site, const Place& place, const world::World& world);
-  bool meets(Site site, std::span<const NodePair> listed, const world::World& world, Place& place,
+  // Of list_.pairs.
+  bool meets(Site site, std::size_t first, std::size_t end, const world::World& world, Place& place,
              Touch& touch);
   bool stays(Site site, TriangleIndex triangle, const world::World& world, Place& place,
              Touch& touch);
@@ -138,7 +143,8 @@ class SelfContactFinder {
 
   // What is listed, and when it began to be.
   struct List {
-    std::vector<NodePair> pairs;  // ascending
+    std::vector<NodePair> pairs;   // ascending
+    std::vector<float> far_until;  // per pair: beyond reach_m_ before so much more travel, m
     double travel = 0;
     float least_distance = 0;  // m, of a pair, when it began
   };
@@ -150,6 +156,8 @@ class SelfContactFinder {
   // The next one, made over several ticks.
   bool is_listing_ = false;
   List next_list_;
+  std::size_t sites_seen_ = 0;    // whose references are taken
+  std::size_t due_count_ = 0;     // of these
   std::size_t sites_listed_ = 0;  // of due_
   PointGrid grid_;                // of references_
   // Per site, see begin_list(); has_left_: the reference is not where it was at rest.
