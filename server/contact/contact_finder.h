@@ -13,7 +13,7 @@
 // Grasp. Nodes held by the jaws are gripped where they are in the jaws' frame.
 //
 // Work: triangles near a tool, listed with some slack and listed again when the tool and the
-// surface together have moved that far; O(surface nodes) then. Results do not depend on when.
+// surface together have moved that far. Results do not depend on when.
 
 #include <span>
 #include <vector>
@@ -60,6 +60,12 @@ struct ContactScene {
   float max_step_m = kMaxStep_m, jump_m = kJump_m;
 };
 
+struct NearTriangle {
+  TriangleIndex index;
+  SurfaceTriangle surface;
+  std::array<std::uint32_t, 3> corners;  // into the nodes near the tool
+};
+
 class ContactFinder {
  public:
   explicit ContactFinder(const scene::Organ& organ);
@@ -74,33 +80,40 @@ class ContactFinder {
   std::size_t triangles_visited() const { return triangles_visited_; }
 
  private:
-  // Triangles that a tool can meet while its core's corners and the surface, together, have moved
-  // by less than kSlack_m.
+  // What a tool can meet while nothing has come nearer to it by more than the slack.
   struct Nearby {
     bool is_known = false;
     std::array<Vec3f, 4> corners;
-    float range = 0;
+    float slack = 0;
     double surface_travel = 0;
-    std::vector<TriangleIndex> triangles;
+    std::vector<NearTriangle> triangles;  // ascending
+    std::vector<float> gaps;  // per triangle: how much nearer it must come for the tool to meet it
+    std::vector<NodeIndex> nodes;       // of these
+    std::vector<Vec3f> rest_positions;  // per node
   };
 
   void plan_way(const ContactScene& scene, ToolContact& contact);
   void lay_path(const trocar::scene::ToolShape& shape, const ToolContact& contact, float way);
   bool comes_from_outside(const ContactScene& scene, ToolContact& contact);
   void find_push(const ContactScene& scene, float strength, ContactList& out);
-  ContactPoint point_of(const ContactScene& scene, ToolSlot tool, TriangleIndex triangle,
-                        const std::array<float, 3>& place) const;
   void add_grips(const ContactScene& scene, ToolSlot slot, float strength, ContactList& out) const;
   void find_reach(const ContactScene& scene, ToolSlot slot, ContactList& out) const;
-  bool is_inside_tissue(std::span<const TriangleIndex> triangles, const world::World& world) const;
-  std::span<const TriangleIndex> triangles_near(const world::World& world, ToolSlot slot);
+  bool is_inside_tissue(const Nearby& nearby) const;
+  // Also takes positions_.
+  const Nearby& look_near(const world::World& world, ToolSlot slot);
+  float nearer_by(const Nearby& nearby) const;
+  void list_near(const world::World& world, Nearby& nearby);
 
   Surface surface_;
-  float greatest_pressure_ = 0;   // Pa
-  double surface_travel_ = 0;     // m, sum over ticks
-  double refreshed_travel_ = -1;  // at the surface's last refresh
+  float greatest_pressure_ = 0;  // Pa
+  double surface_travel_ = 0;    // m, sum over ticks
   std::array<Nearby, kMaxTools> nearby_;
-  std::vector<ToolSolid> path_;  // of the tool in work: start, ..., goal
+  // Of the tool in work: start, ..., goal; and where the nodes near it are.
+  std::vector<ToolSolid> path_;
+  std::vector<Vec3f> positions_;
+  // Scratch of list_near().
+  std::vector<TriangleIndex> found_;
+  std::vector<std::uint32_t> near_of_node_;  // per node of the organ
   std::size_t triangles_visited_ = 0;
 };
 

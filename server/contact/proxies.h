@@ -36,6 +36,33 @@ struct Reaction {
 Reaction reaction_on(const ContactList& contacts, const ToolContact& tool,
                      const world::World& world);
 
+// Planes with points behind them, as arrays for a quick look at the deepest. No allocation once it
+// has had as many.
+class PlaneArrays {
+ public:
+  static constexpr std::size_t kNone = ~std::size_t{0};
+  struct Deepest {
+    std::size_t point = kNone;
+    float depth = 0;
+  };
+
+  void clear() { count_ = 0; }
+  // at: of the point, from its plane.
+  void add(const Vec3f& normal, const Vec3f& at);
+  Vec3f normal(std::size_t point) const;
+  // When all planes have moved; the first of equals, kNone where none is deeper than at_least.
+  Deepest deepest(const Vec3f& moved, float at_least) const;
+
+ private:
+  static constexpr std::size_t kAtOnce = 8;
+  struct Block {
+    std::array<float, kAtOnce> normal_x{}, normal_y{}, normal_z{}, x{}, y{}, z{};
+  };
+
+  std::size_t count_ = 0;
+  std::vector<Block> blocks_;
+};
+
 class ProxyTable {
  public:
   const Proxy& operator[](ToolSlot slot) const { return proxies_[slot.value]; }
@@ -49,6 +76,7 @@ class ProxyTable {
 
  private:
   std::array<Proxy, kMaxTools> proxies_;
+  PlaneArrays planes_;  // scratch
 };
 
 }  // namespace trocar::contact

@@ -10,7 +10,8 @@
 // unless a triangle is stretched far.
 //
 // Triangles are kept in bundles along a Morton curve, each with the box around its nodes as they
-// were at the last refresh(). refresh(): O(surface nodes). collect(): O(bundles + found).
+// were when it was last looked into, which holds to as far as the surface has moved since.
+// collect(): O(bundles + those that may be near).
 
 #include <algorithm>
 #include <array>
@@ -69,16 +70,18 @@ class Surface {
   }
   std::size_t triangle_count() const { return triangles_.size(); }
 
-  // Takes the boxes from where the nodes are now.
-  void refresh(const world::World& world);
-  // Triangles whose bundle overlaps the box and whose own box, now, does too; ascending.
-  void collect(const Box& box, const world::World& world, std::vector<TriangleIndex>& found) const;
+  // Triangles whose box, now, overlaps the given one; ascending. travel_m: a sum over ticks of the
+  // farthest that any node has moved.
+  void collect(const Box& box, const world::World& world, double travel_m,
+               std::vector<TriangleIndex>& found);
 
  private:
   struct Bundle {
     std::uint32_t first_triangle = 0, last_triangle = 0;  // into order_
     std::uint32_t first_node = 0, last_node = 0;          // into nodes_
     Box box;
+    bool has_box = false;
+    double travel_m = 0;  // when the box was taken
   };
 
   std::vector<SurfaceTriangle> triangles_;
