@@ -41,13 +41,13 @@ struct Triangle {
     for (const auto& corner : corners) squared = std::max(squared, length_squared(corner - centre));
     radius = std::sqrt(squared);
   }
-  Vec3f at(const std::array<float, 3>& place) const {
-    return corners[0] * place[0] + corners[1] * place[1] + corners[2] * place[2];
+  Vec3f at(const std::array<float, 3>& weights) const {
+    return corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2];
   }
   Vec3f outward() const { return cross(corners[1] - corners[0], corners[2] - corners[0]); }
 };
 
-// A place this far inside the tool, in radii, at the start of its way was not met from outside.
+// A point this far inside the tool, in radii, at the start of its way was not met from outside.
 constexpr float kMet = 0.7f;
 
 // A combination of a triangle's corners' values.
@@ -58,7 +58,7 @@ Vec3f combine(std::span<const Vec3f> values, const std::array<std::uint32_t, 3>&
   return sum;
 }
 
-// Where a place that is at `p` meets the tool on its way. is_held: the tool pressed it in the last
+// Where a point that is at `p` meets the tool on its way. is_held: the tool pressed it in the last
 // tick, so that it was met from outside whatever it looks like now.
 struct Meeting {
   bool is_near = false;     // within the margin at the end of the way
@@ -112,11 +112,11 @@ Meeting meet(std::span<const ToolSolid> path, float reach_m, const Vec3f& p, con
   return result;
 }
 
-// Places keep their names while their triangle keeps its divisions.
-std::uint32_t place_id(TriangleIndex triangle, std::uint32_t divisions, std::size_t place) {
-  constexpr std::uint32_t kPlaces = kMaxDivisions * kMaxDivisions;
-  return (triangle.value * kMaxDivisions + divisions - 1) * kPlaces +
-         static_cast<std::uint32_t>(place);
+// Points keep their ids while their triangle keeps its divisions.
+std::uint32_t point_id(TriangleIndex triangle, std::uint32_t divisions, std::size_t point) {
+  constexpr std::uint32_t kPoints = kMaxDivisions * kMaxDivisions;
+  return (triangle.value * kMaxDivisions + divisions - 1) * kPoints +
+         static_cast<std::uint32_t>(point);
 }
 
 // The points of one pushing tool, triangle by triangle in ascending order.
@@ -143,26 +143,26 @@ class PushPoints {
     reach_m_ += path.front().radius + kMargin_m + kRounding_m;
   }
 
-  // Whether it holds a place of this triangle; ascending, as add().
+  // Whether it holds a point of this triangle; ascending, as add().
   bool holds(TriangleIndex triangle) {
-    const auto& held = proxy_.places;
-    const auto first = place_id(triangle, 1, 0);
+    const auto& held = proxy_.point_ids;
+    const auto first = point_id(triangle, 1, 0);
     while (next_held_ < held.size() && held[next_held_] < first) ++next_held_;
     return next_held_ < held.size() &&
-           held[next_held_] <= place_id(triangle, kMaxDivisions, kMaxDivisions * kMaxDivisions - 1);
+           held[next_held_] <= point_id(triangle, kMaxDivisions, kMaxDivisions * kMaxDivisions - 1);
   }
   // Whether the tool touches the triangle.
   bool add(const NearTriangle& near, const Triangle& triangle, ContactList& out) {
-    const auto& held = proxy_.places;
+    const auto& held = proxy_.point_ids;
     const auto divisions =
-        near.surface.divisions(kPlaceSpacing * path_.front().radius, 2 * triangle.radius);
-    const auto places = places_on_triangle(divisions);
+        near.surface.divisions(kPointSpacing * path_.front().radius, 2 * triangle.radius);
+    const auto quadrature = quadrature_points(divisions);
     const Vec3f outward = triangle.outward();
-    const float area = near.surface.area / static_cast<float>(places.size()) * push_.strength;
+    const float area = near.surface.area / static_cast<float>(quadrature.size()) * push_.strength;
     bool is_touched = false;
-    for (std::size_t i = 0; i < places.size(); ++i) {
-      const Vec3f p = triangle.at(places[i]);
-      const auto id = place_id(near.index, divisions, i);
+    for (std::size_t i = 0; i < quadrature.size(); ++i) {
+      const Vec3f p = triangle.at(quadrature[i]);
+      const auto id = point_id(near.index, divisions, i);
       while (next_held_ < held.size() && held[next_held_] < id) ++next_held_;
       const bool is_held = push_.has_walked && next_held_ < held.size() && held[next_held_] == id;
       const Meeting meeting = meet(path_, reach_m_, p, outward, is_held);
@@ -173,7 +173,7 @@ class PushPoints {
       }
       is_touched |= meeting.is_touched;
       const auto& nodes = near.surface.nodes;
-      const auto& weights = places[i];
+      const auto& weights = quadrature[i];
       const float stiffness = stiffness_ * area;
       const Vec3f at_rest = combine(rest_positions_, near.corners, weights);
       const Vec3f anchor = is_held ? proxy_.anchors[next_held_] : contact_.start.apply_inverse(p);
@@ -182,7 +182,7 @@ class PushPoints {
                             .kind = ContactPoint::Kind::Push,
                             .node_count = 3,
                             .moved = moved_nodes(nodes),
-                            .place = id,
+                            .id = id,
                             .stiffness = stiffness,
                             .hold_stiffness = kHoldRatio * stiffness,
                             .friction = friction_,
@@ -213,7 +213,7 @@ class PushPoints {
   Push push_;
   float stiffness_, friction_;
   float reach_m_ = 0;          // of the core at the start, beyond which nothing is near on the way
-  std::size_t next_held_ = 0;  // into the proxy's places
+  std::size_t next_held_ = 0;  // into the proxy's points
 };
 
 float greatest_modulus_pa(const scene::Organ& organ) {
@@ -254,8 +254,8 @@ const ContactFinder::Nearby& ContactFinder::look_near(const world::World& world,
   return nearby;
 }
 
-// How much nearer any place can have come to the tool's core, until the end of its way, than it was
-// when the list was made.
+// How much nearer any point of the surface can have come to the tool's core, until the end of its
+// way, than it was when the list was made.
 float ContactFinder::nearer_by(const Nearby& nearby) const {
   const auto start = path_.front().core_corners(), goal = path_.back().core_corners();
   return greatest_distance(start, nearby.corners) +
@@ -323,7 +323,7 @@ void ContactFinder::lay_path(const trocar::scene::ToolShape& shape, const ToolCo
         shape);
 }
 
-// Whether the tool at the start of its way holds a place of the surface deeper than one that it
+// Whether the tool at the start of its way holds a quadrature point deeper than one that it
 // could have met.
 bool ContactFinder::is_inside_tissue(const Nearby& nearby) const {
   const ToolSolid& solid = path_.front();
@@ -332,9 +332,9 @@ bool ContactFinder::is_inside_tissue(const Nearby& nearby) const {
     const Triangle triangle(near, positions_);
     if (distance_to(solid, triangle.centre) > deep + triangle.radius) return false;
     const auto divisions =
-        near.surface.divisions(kPlaceSpacing * solid.radius, 2 * triangle.radius);
-    return std::ranges::any_of(places_on_triangle(divisions), [&](const auto& place) {
-      return distance_to(solid, triangle.at(place)) < deep;
+        near.surface.divisions(kPointSpacing * solid.radius, 2 * triangle.radius);
+    return std::ranges::any_of(quadrature_points(divisions), [&](const auto& weights) {
+      return distance_to(solid, triangle.at(weights)) < deep;
     });
   });
 }
@@ -400,7 +400,7 @@ void ContactFinder::add_grips(const ContactScene& scene, ToolSlot slot, float st
          .kind = ContactPoint::Kind::Grip,
          .node_count = 1,
          .moved = 1,
-         .place = static_cast<std::uint32_t>(i),
+         .id = static_cast<std::uint32_t>(i),
          .stiffness = kStiffnessPaPerM * own * strength,
          .limit_n = grasp.grip_n * (own / area) * grasp.closed * strength,
          .anchor = contact.goal.apply(held_offset(grasp, i)) - world.rest_positions[node.value]});

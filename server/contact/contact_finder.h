@@ -2,13 +2,13 @@
 
 // Finds what the tools of a tick touch.
 //
-// Push. A tool moves from its proxy to the hand, in steps of at most half its radius. A place of
-// the surface that it meets on the way is carried ahead of it; the plane that holds the place out
-// is the tool's face at the end of the way, on the side from which it was met. So a tool passes
-// through nothing, however thin and however fast it is, and a surface is met from outside only: a
-// tool that appears inside tissue, deeper than kBack_m along its shaft, touches nothing until it
-// has come out. Places within kMargin_m get a plane before they touch, so that none slips in during
-// a tick.
+// Push. A tool moves from its proxy to the hand, in steps of at most half its radius. A
+// quadrature point of the surface (surface.h) that it meets on the way is carried ahead of it; the
+// plane that holds the point out is the tool's face at the end of the way, on the side from which
+// it was met. So a tool passes through nothing, however thin and however fast it is, and a surface
+// is met from outside only: a tool that appears inside tissue, deeper than kBack_m along its shaft,
+// touches nothing until it has come out. Points within kMargin_m get a plane before they touch, so
+// that none slips in during a tick.
 //
 // Grasp. Nodes held by the jaws are gripped where they are in the jaws' frame.
 //
@@ -45,8 +45,9 @@ inline constexpr float kJump_m = 0.01f;
 inline constexpr float kMaxStep_m = 0.005f;
 // What appears inside by no more than this is taken to have come from outside.
 inline constexpr float kBack_m = 0.012f;
-// Places of a tool are this many radii apart, at most: between them it enters by 1/20 of a radius.
-inline constexpr float kPlaceSpacing = 0.6f;
+// Quadrature points for a tool are this many radii apart, at most: between them it enters by 1/20
+// of a radius.
+inline constexpr float kPointSpacing = 0.6f;
 
 struct ContactScene {
   const world::World& world;

@@ -37,7 +37,7 @@ void follow_push(const ContactList& contacts, const ToolContact& tool, const wor
   proxy.is_placed = tool.is_placed;
   proxy.pose = tool.goal;
   proxy.hand = hand.pose;
-  proxy.places.clear();
+  proxy.point_ids.clear();
   proxy.anchors.clear();
   const auto points = contacts.points_of(tool);
   planes.clear();
@@ -49,9 +49,9 @@ void follow_push(const ContactList& contacts, const ToolContact& tool, const wor
     if (!(load.pressed_n > 0)) continue;
     // Across the face it is where the slip ends that friction can hold; along the normal it is of
     // no account, and stays with the point.
-    const Vec3f held =
-        load.slides ? d - load.slip * (load.rigidity / point.hold_stiffness) : d - load.slip;
-    proxy.places.push_back(point.place);
+    const Vec3f held = load.slides ? d - load.slip * (load.tangential_secant / point.hold_stiffness)
+                                   : d - load.slip;
+    proxy.point_ids.push_back(point.id);
     proxy.anchors.push_back(tool.goal.apply_inverse(rest_position_of(point, world) + held));
   }
   auto out = depenetrate(planes, {});
@@ -64,7 +64,7 @@ void follow_push(const ContactList& contacts, const ToolContact& tool, const wor
   }
   proxy.pose.position += out.moved;
   const float walked = way_between(tool.start, proxy.pose, hand.shape);
-  proxy.step_m = kFaster * walked + (proxy.places.empty() ? kFree_m : kDeeper * tool.softness_m);
+  proxy.step_m = kFaster * walked + (proxy.point_ids.empty() ? kFree_m : kDeeper * tool.softness_m);
 }
 
 }  // namespace
@@ -128,7 +128,7 @@ void ProxyTable::follow(const ContactList& contacts, const world::World& world,
     proxies_[i].is_placed = false;
     proxies_[i].pose = proxies_[i].hand = {};
     proxies_[i].step_m = 0;
-    proxies_[i].places.clear();
+    proxies_[i].point_ids.clear();
     proxies_[i].anchors.clear();
   }
 }
@@ -139,9 +139,9 @@ void ProxyTable::visit_state(world::StateArchive& archive) {
     archive.value(proxy.pose);
     archive.value(proxy.hand);
     archive.value(proxy.step_m);
-    archive.sized_array(proxy.places, kMaxPointsPerTool);
+    archive.sized_array(proxy.point_ids, kMaxPointsPerTool);
     archive.sized_array(proxy.anchors, kMaxPointsPerTool);
-    if (archive.is_reading() && proxy.places.size() != proxy.anchors.size()) archive.fail();
+    if (archive.is_reading() && proxy.point_ids.size() != proxy.anchors.size()) archive.fail();
   }
 }
 

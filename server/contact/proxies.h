@@ -23,8 +23,8 @@ struct Proxy {
   Pose pose;               // world_from_tool
   Pose hand;               // where the hand was in the last tick
   float step_m = 0;        // how far it may walk in the next
-  std::vector<std::uint32_t> places;  // pressed points of the surface, ascending
-  std::vector<Vec3f> anchors;         // m, tool frame; per place
+  std::vector<std::uint32_t> point_ids;  // quadrature points pressed, ascending
+  std::vector<Vec3f> anchors;            // m, tool frame; per point
 };
 
 // Of the tissue on the tool, world frame.

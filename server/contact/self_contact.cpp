@@ -15,14 +15,14 @@ constexpr float kSlackEdges = 1, kMaxSlack_m = 0.006f;
 // kListedSlacks + 1/2, unless it faced something this near at rest.
 constexpr float kReferenceSlacks = 0.25f;
 constexpr float kListedSlacks = 0.5f, kMovedSlacks = kListedSlacks + 0.5f;
-// The nearest corner of a triangle, from any place on it, in longest edges.
+// The nearest corner of a triangle, from any point on it, in longest edges.
 constexpr float kCornerReach = 0.6f;
 // Faces that touch at rest may do so for ever: a force begins this far beyond.
 constexpr float kTouch_m = 2e-6f;
 constexpr float kOverlapAtRest_m = 0.001f;
 // Cosine of the normals: of a pair that begins, and of one that goes on.
 constexpr float kBeginsFacing = -0.1f, kStaysFacing = 0.2f;
-// The place lies along the normal, within so many gaps and a little.
+// The closest point lies along the normal, within so many gaps and a little.
 constexpr float kAsidePerGap = 1, kAside_m = 0.0005f;
 constexpr double kNearEdges = 3.5;
 constexpr std::uint32_t kMostNearLayers = 8;
@@ -35,7 +35,7 @@ constexpr std::size_t kReservedPairs = 1u << 15;
 constexpr float kRounding_m = 1e-5f;
 constexpr float kNoLimit_n = 1e6f;
 
-// Barycentric weights of the place of a triangle nearest to p (Ericson, Real-Time Collision
+// Barycentric weights of the point of a triangle closest to p (Ericson, Real-Time Collision
 // Detection, 5.1.5).
 Vec3f nearest_weights(const Vec3f& p, const Vec3f& a, const Vec3f& b, const Vec3f& c) {
   const Vec3f ab = b - a, ac = c - a, ap = p - a;
@@ -354,8 +354,8 @@ bool SelfContactFinder::is_near(Site site, TriangleIndex triangle) const {
                              [&](Site corner) { return std::ranges::binary_search(near, corner); });
 }
 
-SelfContactFinder::Place SelfContactFinder::place_on(Site site, TriangleIndex triangle,
-                                                     const world::World& world) const {
+SelfContactFinder::ClosestPoint SelfContactFinder::closest_point(Site site, TriangleIndex triangle,
+                                                                 const world::World& world) const {
   const auto& sites = triangles_[triangle.value];
   const Vec3f p = position(site, world), a = position(sites[0], world),
               b = position(sites[1], world), c = position(sites[2], world);
@@ -365,23 +365,23 @@ SelfContactFinder::Place SelfContactFinder::place_on(Site site, TriangleIndex tr
 }
 
 // Of the triangles at some nodes; the first of equals.
-SelfContactFinder::Place SelfContactFinder::nearest_place(Site site, std::span<const Site> around,
-                                                          const world::World& world) const {
-  Place best;
+SelfContactFinder::ClosestPoint SelfContactFinder::closest_point_around(
+    Site site, std::span<const Site> around, const world::World& world) const {
+  ClosestPoint best;
   for (const auto corner : around)
     for (const auto t : site_triangles_[SiteIndex{corner}]) {
-      const Place place = place_on(site, t, world);
-      const bool is_better = !best.triangle.is_valid() || place.squared < best.squared ||
-                             (place.squared == best.squared && place.triangle < best.triangle);
-      if (is_better && !is_near(site, t)) best = place;
+      const ClosestPoint closest = closest_point(site, t, world);
+      const bool is_better = !best.triangle.is_valid() || closest.squared < best.squared ||
+                             (closest.squared == best.squared && closest.triangle < best.triangle);
+      if (is_better && !is_near(site, t)) best = closest;
     }
   return best;
 }
 
-SelfContactFinder::Touch SelfContactFinder::touch_at(Site site, const Place& place,
+SelfContactFinder::Touch SelfContactFinder::touch_at(Site site, const ClosestPoint& closest,
                                                      const world::World& world) {
-  const auto& sites = triangles_[place.triangle.value];
-  const float weights[] = {place.weights.x, place.weights.y, place.weights.z};
+  const auto& sites = triangles_[closest.triangle.value];
+  const float weights[] = {closest.weights.x, closest.weights.y, closest.weights.z};
   Vec3f theirs, velocity = world.velocities[sites_[site].value], rest[3];
   Touch touch;
   touch.at_rest = world.rest_positions[sites_[site].value];
@@ -401,9 +401,9 @@ SelfContactFinder::Touch SelfContactFinder::touch_at(Site site, const Place& pla
     const Vec3f up = normalized(area_vector(rest[0], rest[1], rest[2]), touch.normal);
     touch.shift += std::min(0.0f, dot(up, touch.at_rest));
   }
-  const float along = dot(touch.normal, place.from);
+  const float along = dot(touch.normal, closest.from);
   touch.gap = along - touch.shift;
-  touch.aside = std::sqrt(std::max(0.0f, place.squared - along * along));
+  touch.aside = std::sqrt(std::max(0.0f, closest.squared - along * along));
   touch.closing = -dot(touch.normal, velocity);
   return touch;
 }
@@ -420,7 +420,7 @@ bool lies_along(float aside, float gap) {
 
 // Whether a node without a pair meets the surface across from it.
 bool SelfContactFinder::meets(Site site, std::size_t first, std::size_t end,
-                              const world::World& world, Place& place, Touch& touch) {
+                              const world::World& world, ClosestPoint& closest, Touch& touch) {
   const auto passed = static_cast<float>(travel_ - list_.travel);
   while (first < end && list_.far_until[first] > passed) ++first;
   if (first == end) return false;
@@ -446,49 +446,49 @@ bool SelfContactFinder::meets(Site site, std::size_t first, std::size_t end,
     is_found = true;
   }
   if (!is_found) return false;
-  place = nearest_place(site, std::span(&nearest, 1), world);
-  if (!place.triangle.is_valid()) return false;
-  touch = touch_at(site, place, world);
-  const auto& [a, b, c] = triangles_[place.triangle.value];
+  closest = closest_point_around(site, std::span(&nearest, 1), world);
+  if (!closest.triangle.is_valid()) return false;
+  touch = touch_at(site, closest, world);
+  const auto& [a, b, c] = triangles_[closest.triangle.value];
   const Vec3f up = area_vector(position(a, world), position(b, world), position(c, world));
   // Nothing here may let in what find() or a list would not have looked at.
   const float margin = margin_of(touch.closing), reach = corner_reach_m_ + margin;
-  return touch.facing < kBeginsFacing && touch.gap >= 0 && place.squared < margin * margin &&
+  return touch.facing < kBeginsFacing && touch.gap >= 0 && closest.squared < margin * margin &&
          least < reach * reach && lies_along(touch.aside, touch.gap) &&
-         dot(place.from, normalized(up, touch.normal)) >= touch.shift &&
-         dot(place.from, normal(site, world)) <= -touch.shift;
+         dot(closest.from, normalized(up, touch.normal)) >= touch.shift &&
+         dot(closest.from, normal(site, world)) <= -touch.shift;
 }
 
 // Where a pair is now; false when it has come apart.
 bool SelfContactFinder::stays(Site site, TriangleIndex triangle, const world::World& world,
-                              Place& place, Touch& touch) {
+                              ClosestPoint& closest, Touch& touch) {
   if (is_near(site, triangle)) return false;
-  place = place_on(site, triangle, world);
-  const Vec3f& w = place.weights;
+  closest = closest_point(site, triangle, world);
+  const Vec3f& w = closest.weights;
   if (!(w.x > 0 && w.y > 0 && w.z > 0))
-    place = nearest_place(site, triangles_[triangle.value], world);
-  touch = touch_at(site, place, world);
+    closest = closest_point_around(site, triangles_[triangle.value], world);
+  touch = touch_at(site, closest, world);
   // A little farther than where it began, so that it does not flutter.
   return touch.facing < kStaysFacing &&
          touch.gap < margin_of(touch.closing) + 0.5f * kSelfMargin_m && touch.gap > -kDeepest_m &&
          lies_along(touch.aside, touch.gap);
 }
 
-void SelfContactFinder::add_point(Site site, const Place& place, const Touch& touch,
+void SelfContactFinder::add_point(Site site, const ClosestPoint& closest, const Touch& touch,
                                   const world::World& world, SelfContactTable& pairs,
                                   ContactList& out) const {
   if (pairs.nodes().size() >= kMaxSelfPoints) {
     ++out.dropped;
     return;
   }
-  const auto& sites = triangles_[place.triangle.value];
+  const auto& sites = triangles_[closest.triangle.value];
   const auto node = sites_[site];
-  pairs.add(node, place.triangle);
+  pairs.add(node, closest.triangle);
   ContactPoint point{
       .nodes = {node, sites_[sites[0]], sites_[sites[1]], sites_[sites[2]]},
-      .weights = {1, -place.weights.x, -place.weights.y, -place.weights.z},
+      .weights = {1, -closest.weights.x, -closest.weights.y, -closest.weights.z},
       .node_count = 4,
-      .place = static_cast<std::uint32_t>(pairs.nodes().size() - 1),
+      .id = static_cast<std::uint32_t>(pairs.nodes().size() - 1),
       .stiffness = 0.5f * kSelfStiffnessPaPerM * world.surface_areas[node.value],
       .limit_n = kNoLimit_n,
       .normal = touch.normal,
@@ -524,11 +524,11 @@ void SelfContactFinder::find(const world::World& world, SelfContactTable& pairs,
     const Site site = std::min(of_old, of_listed);
     std::size_t end = first;
     while (end < listed.size() && listed[end].node == site) ++end;
-    Place place;
+    ClosestPoint closest;
     Touch touch;
-    bool is_pair = site == of_old && stays(site, old_triangles_[old], world, place, touch);
-    if (!is_pair) is_pair = meets(site, first, end, world, place, touch);
-    if (is_pair) add_point(site, place, touch, world, pairs, out);
+    bool is_pair = site == of_old && stays(site, old_triangles_[old], world, closest, touch);
+    if (!is_pair) is_pair = meets(site, first, end, world, closest, touch);
+    if (is_pair) add_point(site, closest, touch, world, pairs, out);
     if (site == of_old) ++old;
     first = end;
   }

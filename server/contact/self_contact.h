@@ -3,8 +3,8 @@
 // Tissue against tissue of one organ: the walls of a hollow one, a fold, a flap laid on its base.
 //
 // A node of the surface does not pass through a triangle across from it. What holds them apart is a
-// Push (contact_list.h) of the node against the place of the triangle nearest to it: displacement
-// of the node less that of the place, so that the force on one is minus that on the other, along a
+// Push (contact_list.h) of the node against the closest point of a triangle: displacement of the
+// node less that of the point, so that the force on one is minus that on the other, along a
 // normal that is the mean of both sides' and changes smoothly over edges. It starts at touch, has
 // no friction (wet serosa slips) and no limit. Nodes of both sides meet the other's triangles, each
 // for half of its surface.
@@ -88,15 +88,15 @@ class SelfContactFinder {
     Site node = 0, across = 0;
     auto operator<=>(const NodePair&) const = default;
   };
-  struct Place {
+  struct ClosestPoint {
     TriangleIndex triangle;
     Vec3f weights;
-    Vec3f from;  // m, from the place to the node
+    Vec3f from;  // m, from the point to the node
     float squared = 0;
   };
   struct Touch {
     Vec3f normal;                   // from the triangle's side to the node's
-    Vec3f at_rest;                  // m, from the place to the node
+    Vec3f at_rest;                  // m, from the point to the node
     float shift = 0;                // m, the gap from which on it presses
     float gap = 0;                  // m, beyond that
     float aside = 0;                // m, across the normal
@@ -119,16 +119,17 @@ class SelfContactFinder {
   }
   const Vec3f& normal(Site site, const world::World& world);
   bool is_near(Site site, TriangleIndex triangle) const;
-  Place place_on(Site site, TriangleIndex triangle, const world::World& world) const;
-  Place nearest_place(Site site, std::span<const Site> around, const world::World& world) const;
-  Touch touch_at(Site site, const Place& place, const world::World& world);
+  ClosestPoint closest_point(Site site, TriangleIndex triangle, const world::World& world) const;
+  ClosestPoint closest_point_around(Site site, std::span<const Site> around,
+                                    const world::World& world) const;
+  Touch touch_at(Site site, const ClosestPoint& closest, const world::World& world);
   // Of list_.pairs.
-  bool meets(Site site, std::size_t first, std::size_t end, const world::World& world, Place& place,
+  bool meets(Site site, std::size_t first, std::size_t end, const world::World& world,
+             ClosestPoint& closest, Touch& touch);
+  bool stays(Site site, TriangleIndex triangle, const world::World& world, ClosestPoint& closest,
              Touch& touch);
-  bool stays(Site site, TriangleIndex triangle, const world::World& world, Place& place,
-             Touch& touch);
-  void add_point(Site site, const Place& place, const Touch& touch, const world::World& world,
-                 SelfContactTable& pairs, ContactList& out) const;
+  void add_point(Site site, const ClosestPoint& closest, const Touch& touch,
+                 const world::World& world, SelfContactTable& pairs, ContactList& out) const;
 
   // Constant.
   std::vector<NodeIndex> sites_;

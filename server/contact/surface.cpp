@@ -11,12 +11,12 @@ namespace {
 
 constexpr std::size_t kBundleTriangles = 16;
 
-using Places = std::vector<std::array<float, 3>>;
+using QuadraturePoints = std::vector<std::array<float, 3>>;
 
 // The rows of a triangle cut into n^2: upright parts at (i, j) with i + j < n, and between them
 // those that stand on their tip.
-Places centres(std::uint32_t n) {
-  Places result;
+QuadraturePoints centres(std::uint32_t n) {
+  QuadraturePoints result;
   const float part = 1.0f / static_cast<float>(n);
   const auto add = [&](std::uint32_t i, std::uint32_t j, float offset) {
     const float a = (static_cast<float>(i) + offset) * part;
@@ -31,17 +31,17 @@ Places centres(std::uint32_t n) {
   return result;
 }
 
-std::array<Places, kMaxDivisions> all_centres() {
-  std::array<Places, kMaxDivisions> result;
+std::array<QuadraturePoints, kMaxDivisions> all_centres() {
+  std::array<QuadraturePoints, kMaxDivisions> result;
   for (std::uint32_t n = 1; n <= kMaxDivisions; ++n) result[n - 1] = centres(n);
   return result;
 }
 
 }  // namespace
 
-std::span<const std::array<float, 3>> places_on_triangle(std::uint32_t divisions) {
-  static const auto places = all_centres();
-  return places[divisions - 1];
+std::span<const std::array<float, 3>> quadrature_points(std::uint32_t divisions) {
+  static const auto points = all_centres();
+  return points[divisions - 1];
 }
 
 Surface::Surface(const scene::Organ& organ) {
