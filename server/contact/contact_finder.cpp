@@ -22,9 +22,11 @@ float distance_to(const ToolSolid& solid, const Vec3f& p) {
   return length(p - solid.nearest_on_core(p));
 }
 
-float stiffness_of(float radius_m) {
-  const float thinness = kStiffnessRadius_m / radius_m;
-  return kStiffnessPaPerM * std::max(1.0f, thinness * thinness);
+// What a tool touches is as wide as its radius one way, and its half width more the other.
+float stiffness_of(const trocar::scene::ToolShape& shape) {
+  const auto thinness = [](float half_m) { return std::max(1.0f, kStiffnessRadius_m / half_m); };
+  return kStiffnessPaPerM *
+         (thinness(shape.radius_m) * thinness(shape.radius_m + shape.half_width_m));
 }
 
 struct Triangle {
@@ -135,7 +137,7 @@ class PushPoints {
         path_(path),
         rest_positions_(rest_positions),
         push_(push),
-        stiffness_(stiffness_of(path.front().radius)),
+        stiffness_(stiffness_of(scene.tools[contact.tool].shape)),
         friction_(scene.tools[contact.tool].shape.friction) {
     const auto start = path.front().core_corners();
     for (const auto& solid : path)
@@ -301,7 +303,7 @@ void ContactFinder::plan_way(const ContactScene& scene, ToolContact& contact) {
   const bool has_appeared =
       !proxy.is_placed || way_between(proxy.hand, tool.pose, tool.shape) > scene.jump_m;
   contact.is_placed = !has_appeared;
-  contact.softness_m = greatest_pressure_ / stiffness_of(tool.shape.radius_m);
+  contact.softness_m = greatest_pressure_ / stiffness_of(tool.shape);
   contact.start = has_appeared ? tool.pose : proxy.pose;
   const float way = way_between(contact.start, tool.pose, tool.shape);
   const float most = std::min(scene.max_step_m, has_appeared ? contact.softness_m : proxy.step_m);

@@ -29,7 +29,7 @@
 
 namespace trocar::contact {
 
-inline constexpr std::size_t kMaxPointsPerTool = 2048;
+inline constexpr std::size_t kMaxPointsPerTool = 8192;
 inline constexpr std::size_t kMaxSelfPoints = 4096;
 inline constexpr int kMaxPointNodes = 4;
 
