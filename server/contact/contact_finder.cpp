@@ -9,6 +9,8 @@ namespace {
 
 constexpr float kSlack_m = 0.005f;
 constexpr std::size_t kMaxPathSteps = 64;
+constexpr float kRounding_m = 1e-5f;
+constexpr std::uint32_t kNotNear = 0xffffffffu;
 
 // Part t of the way from a to b.
 Pose between(const Pose& a, const Pose& b, float t) {
@@ -20,9 +22,11 @@ float distance_to(const ToolSolid& solid, const Vec3f& p) {
   return length(p - solid.nearest_on_core(p));
 }
 
-float stiffness_of(float radius_m) {
-  const float thinness = kStiffnessRadius_m / radius_m;
-  return kStiffnessPaPerM * std::max(1.0f, thinness * thinness);
+// What a tool touches is as wide as its radius one way, and its half width more the other.
+float stiffness_of(const trocar::scene::ToolShape& shape) {
+  const auto thinness = [](float half_m) { return std::max(1.0f, kStiffnessRadius_m / half_m); };
+  return kStiffnessPaPerM *
+         (thinness(shape.radius_m) * thinness(shape.radius_m + shape.half_width_m));
 }
 
 struct Triangle {
@@ -30,67 +34,189 @@ struct Triangle {
   Vec3f centre;
   float radius = 0;  // of a ball around the centre that holds it
 
-  Triangle(const SurfaceTriangle& triangle, const world::World& world) {
-    for (std::size_t i = 0; i < 3; ++i) corners[i] = world.position(triangle.nodes[i]);
+  Triangle(const NearTriangle& near, std::span<const Vec3f> positions)
+      : Triangle(positions[near.corners[0]], positions[near.corners[1]],
+                 positions[near.corners[2]]) {}
+  Triangle(const Vec3f& a, const Vec3f& b, const Vec3f& c) : corners{a, b, c} {
     centre = (corners[0] + corners[1] + corners[2]) * (1.0f / 3.0f);
     float squared = 0;
     for (const auto& corner : corners) squared = std::max(squared, length_squared(corner - centre));
     radius = std::sqrt(squared);
   }
-  Vec3f at(const std::array<float, 3>& place) const {
-    return corners[0] * place[0] + corners[1] * place[1] + corners[2] * place[2];
+  Vec3f at(const std::array<float, 3>& weights) const {
+    return corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2];
   }
   Vec3f outward() const { return cross(corners[1] - corners[0], corners[2] - corners[0]); }
 };
 
-// A place this far inside the tool, in radii, at the start of its way was not met from outside.
+// A point this far inside the tool, in radii, at the start of its way was not met from outside.
 constexpr float kMet = 0.7f;
 
-// Where a place that is at `p` meets the tool on its way. is_held: the tool pressed it in the last
+// A combination of a triangle's corners' values.
+Vec3f combine(std::span<const Vec3f> values, const std::array<std::uint32_t, 3>& corners,
+              const std::array<float, 3>& weights) {
+  Vec3f sum;
+  for (std::size_t k = 0; k < 3; ++k) sum += values[corners[k]] * weights[k];
+  return sum;
+}
+
+// Where a point that is at `p` meets the tool on its way. is_held: the tool pressed it in the last
 // tick, so that it was met from outside whatever it looks like now.
 struct Meeting {
   bool is_near = false;     // within the margin at the end of the way
   bool is_touched = false;  // inside the tool somewhere on the way
   Vec3f normal, on_face;    // of the tool at the end of the way
 };
-Meeting meet(std::span<const ToolSolid> path, const Vec3f& p, const Vec3f& outward, bool is_held) {
+// reach_m: what is farther than that from the core at the start is not near on the way.
+Meeting meet(std::span<const ToolSolid> path, float reach_m, const Vec3f& p, const Vec3f& outward,
+             bool is_held) {
   Meeting result;
-  const Vec3f core_at_start = path.front().nearest_on_core(p);
-  const Vec3f from_start = p - core_at_start;
   const float radius = path.front().radius;
-  const bool is_behind = dot(from_start, outward) > 0;
-  const bool is_deep = length_squared(from_start) < kMet * kMet * radius * radius;
+  Vec3f carried = p, core = path.front().nearest_on_core(p), from_core = p - core;
+  const float squared = length_squared(from_core);
+  if (!is_held && squared > reach_m * reach_m) return result;
+  const bool is_behind = dot(from_core, outward) > 0;
+  const bool is_deep = squared < kMet * kMet * radius * radius;
   if (!is_held && (is_behind || is_deep)) return result;
-  Vec3f carried = p, normal = normalized(from_start, normalized(-outward, {0, 1, 0}));
+  float distance = std::sqrt(squared);
+  // The normal, undivided: the last way from the core that had a length.
+  Vec3f along = from_core;
+  float along_length = distance;
+  if (!(distance > 1e-30f)) along = normalized(-outward, {0, 1, 0}), along_length = 1;
+  const auto look = [&](const ToolSolid& solid) {
+    core = solid.nearest_on_core(carried);
+    from_core = carried - core;
+    distance = length(from_core);
+    if (distance > 1e-9f) along = from_core, along_length = distance;
+  };
+  const auto carry = [&] {
+    if (distance > radius) return false;
+    result.is_touched = true;
+    carried += along / along_length * (radius - distance);
+    return true;
+  };
   if (is_behind) {  // pressed through the tool's core: back to the side on which it was met
-    normal = -normal;
-    carried = core_at_start + normal * radius;
+    along = -along;
+    carried = core + along / along_length * radius;
     result.is_touched = true;
+    look(path.front());
   }
-  for (const auto& solid : path) {
-    const Vec3f from_core = carried - solid.nearest_on_core(carried);
-    const float distance = length(from_core);
-    if (distance > 1e-9f) normal = from_core / distance;
-    if (distance > radius) continue;
-    result.is_touched = true;
-    carried += normal * (radius - distance);
+  bool is_carried = carry();
+  for (const auto& solid : path.subspan(1)) {
+    look(solid);
+    is_carried = carry();
   }
-  const Vec3f core = path.back().nearest_on_core(carried);
-  const Vec3f from_core = carried - core;
-  const float distance = length(from_core);
-  if (distance > 1e-9f) normal = from_core / distance;
+  if (is_carried) look(path.back());
   result.is_near = result.is_touched || distance <= radius + kMargin_m;
-  result.normal = normal;
-  result.on_face = core + normal * radius;
+  if (!result.is_near) return result;
+  result.normal = along / along_length;
+  result.on_face = core + result.normal * radius;
   return result;
 }
 
-// Places keep their names while their triangle keeps its divisions.
-std::uint32_t place_id(TriangleIndex triangle, std::uint32_t divisions, std::size_t place) {
-  constexpr std::uint32_t kPlaces = kMaxDivisions * kMaxDivisions;
-  return (triangle.value * kMaxDivisions + divisions - 1) * kPlaces +
-         static_cast<std::uint32_t>(place);
+// Points keep their ids while their triangle keeps its divisions.
+std::uint32_t point_id(TriangleIndex triangle, std::uint32_t divisions, std::size_t point) {
+  constexpr std::uint32_t kPoints = kMaxDivisions * kMaxDivisions;
+  return (triangle.value * kMaxDivisions + divisions - 1) * kPoints +
+         static_cast<std::uint32_t>(point);
 }
+
+// The points of one pushing tool, triangle by triangle in ascending order.
+class PushPoints {
+ public:
+  struct Push {
+    float strength = 0, greatest_pressure = 0;
+    bool has_walked = false;  // from where it was: it holds what it pressed there
+  };
+
+  PushPoints(const ContactScene& scene, const ToolContact& contact, std::span<const ToolSolid> path,
+             std::span<const Vec3f> rest_positions, const Push& push)
+      : scene_(scene),
+        proxy_(scene.proxies[contact.tool]),
+        contact_(contact),
+        path_(path),
+        rest_positions_(rest_positions),
+        push_(push),
+        stiffness_(stiffness_of(scene.tools[contact.tool].shape)),
+        friction_(scene.tools[contact.tool].shape.friction) {
+    const auto start = path.front().core_corners();
+    for (const auto& solid : path)
+      reach_m_ = std::max(reach_m_, greatest_distance(start, solid.core_corners()));
+    reach_m_ += path.front().radius + kMargin_m + kRounding_m;
+  }
+
+  // Whether it holds a point of this triangle; ascending, as add().
+  bool holds(TriangleIndex triangle) {
+    const auto& held = proxy_.point_ids;
+    const auto first = point_id(triangle, 1, 0);
+    while (next_held_ < held.size() && held[next_held_] < first) ++next_held_;
+    return next_held_ < held.size() &&
+           held[next_held_] <= point_id(triangle, kMaxDivisions, kMaxDivisions * kMaxDivisions - 1);
+  }
+  // Whether the tool touches the triangle.
+  bool add(const NearTriangle& near, const Triangle& triangle, ContactList& out) {
+    const auto& held = proxy_.point_ids;
+    const auto divisions =
+        near.surface.divisions(kPointSpacing * path_.front().radius, 2 * triangle.radius);
+    const auto quadrature = quadrature_points(divisions);
+    const Vec3f outward = triangle.outward();
+    const float area = near.surface.area / static_cast<float>(quadrature.size()) * push_.strength;
+    bool is_touched = false;
+    for (std::size_t i = 0; i < quadrature.size(); ++i) {
+      const Vec3f p = triangle.at(quadrature[i]);
+      const auto id = point_id(near.index, divisions, i);
+      while (next_held_ < held.size() && held[next_held_] < id) ++next_held_;
+      const bool is_held = push_.has_walked && next_held_ < held.size() && held[next_held_] == id;
+      const Meeting meeting = meet(path_, reach_m_, p, outward, is_held);
+      if (!meeting.is_near) continue;
+      if (out.points.size() - contact_.begin >= kMaxPointsPerTool) {
+        ++out.dropped;
+        continue;
+      }
+      is_touched |= meeting.is_touched;
+      const auto& nodes = near.surface.nodes;
+      const auto& weights = quadrature[i];
+      const float stiffness = stiffness_ * area;
+      const Vec3f at_rest = combine(rest_positions_, near.corners, weights);
+      const Vec3f anchor = is_held ? proxy_.anchors[next_held_] : contact_.start.apply_inverse(p);
+      out.points.push_back({.nodes = {nodes[0], nodes[1], nodes[2], {}},
+                            .weights = {weights[0], weights[1], weights[2], 0},
+                            .kind = ContactPoint::Kind::Push,
+                            .node_count = 3,
+                            .moved = moved_nodes(nodes),
+                            .id = id,
+                            .stiffness = stiffness,
+                            .hold_stiffness = kHoldRatio * stiffness,
+                            .friction = friction_,
+                            .limit_n = push_.greatest_pressure * area,
+                            .normal = meeting.normal,
+                            .plane = meeting.on_face - at_rest,
+                            .anchor = contact_.goal.apply(anchor) - at_rest});
+    }
+    return is_touched;
+  }
+
+ private:
+  std::uint8_t moved_nodes(const std::array<NodeIndex, 3>& nodes) const {
+    std::uint8_t moved = 0b1111;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto owner = scene_.claims.owner(nodes[k]);
+      if (owner.is_valid() && owner != contact_.tool)
+        moved = static_cast<std::uint8_t>(moved & ~(1u << k));
+    }
+    return moved;
+  }
+
+  const ContactScene& scene_;
+  const Proxy& proxy_;
+  const ToolContact& contact_;
+  std::span<const ToolSolid> path_;
+  std::span<const Vec3f> rest_positions_;  // by NearTriangle::corners
+  Push push_;
+  float stiffness_, friction_;
+  float reach_m_ = 0;          // of the core at the start, beyond which nothing is near on the way
+  std::size_t next_held_ = 0;  // into the proxy's points
+};
 
 float greatest_modulus_pa(const scene::Organ& organ) {
   double most = organ.material.young_modulus_pa;
@@ -101,33 +227,73 @@ float greatest_modulus_pa(const scene::Organ& organ) {
 }  // namespace
 
 ContactFinder::ContactFinder(const scene::Organ& organ)
-    : surface_(organ), greatest_pressure_(kGreatestPressure * greatest_modulus_pa(organ)) {
+    : surface_(organ),
+      greatest_pressure_(kGreatestPressure * greatest_modulus_pa(organ)),
+      near_of_node_(organ.mesh.node_count(), kNotNear) {
   path_.reserve(kMaxPathSteps + 1);
-  for (auto& nearby : nearby_) nearby.triangles.reserve(256);
+  found_.reserve(1024);
+  positions_.reserve(1024);
+  for (auto& nearby : nearby_) {
+    nearby.triangles.reserve(256);
+    nearby.gaps.reserve(256);
+    nearby.nodes.reserve(256);
+    nearby.rest_positions.reserve(256);
+  }
 }
 
-std::span<const TriangleIndex> ContactFinder::triangles_near(const world::World& world,
-                                                             ToolSlot slot) {
+const ContactFinder::Nearby& ContactFinder::look_near(const world::World& world, ToolSlot slot) {
   Nearby& nearby = nearby_[slot.value];
-  const auto start = path_.front().core_corners(), goal = path_.back().core_corners();
-  const float reach = path_.front().radius + kMargin_m + greatest_distance(start, goal);
-  const auto moved = static_cast<float>(surface_travel_ - nearby.surface_travel);
-  if (nearby.is_known && greatest_distance(start, nearby.corners) + moved + reach <= nearby.range)
-    return nearby.triangles;
-  if (refreshed_travel_ != surface_travel_) {
-    surface_.refresh(world);
-    refreshed_travel_ = surface_travel_;
+  if (!nearby.is_known || nearer_by(nearby) > nearby.slack) {
+    nearby.is_known = true;
+    nearby.corners = path_.front().core_corners();
+    nearby.surface_travel = surface_travel_;
+    nearby.slack = kSlack_m + nearer_by(nearby);
+    list_near(world, nearby);
   }
-  nearby = {true, start, reach + kSlack_m, surface_travel_, std::move(nearby.triangles)};
+  positions_.resize(nearby.nodes.size());
+  for (std::size_t i = 0; i < positions_.size(); ++i)
+    positions_[i] = nearby.rest_positions[i] + world.displacements[nearby.nodes[i].value];
+  return nearby;
+}
+
+// How much nearer any point of the surface can have come to the tool's core, until the end of its
+// way, than it was when the list was made.
+float ContactFinder::nearer_by(const Nearby& nearby) const {
+  const auto start = path_.front().core_corners(), goal = path_.back().core_corners();
+  return greatest_distance(start, nearby.corners) +
+         static_cast<float>(surface_travel_ - nearby.surface_travel) +
+         greatest_distance(start, goal);
+}
+
+void ContactFinder::list_near(const world::World& world, Nearby& nearby) {
   Box box;
-  for (const auto& corner : start) box.include(corner);
-  box.grow(nearby.range);
-  surface_.collect(box, world, nearby.triangles);
-  std::erase_if(nearby.triangles, [&](TriangleIndex t) {
-    const Triangle triangle(surface_[t], world);
-    return distance_to(path_.front(), triangle.centre) > nearby.range + triangle.radius;
-  });
-  return nearby.triangles;
+  for (const auto& corner : nearby.corners) box.include(corner);
+  const float reach = path_.front().radius + kMargin_m;
+  box.grow(reach + nearby.slack);
+  surface_.collect(box, world, surface_travel_, found_);
+  nearby.triangles.clear();
+  nearby.gaps.clear();
+  nearby.nodes.clear();
+  nearby.rest_positions.clear();
+  for (const auto t : found_) {
+    const auto& nodes = surface_[t].nodes;
+    const Triangle now(world.position(nodes[0]), world.position(nodes[1]),
+                       world.position(nodes[2]));
+    const float gap = distance_to(path_.front(), now.centre) - now.radius - reach;
+    if (gap > nearby.slack) continue;
+    nearby.gaps.push_back(gap);
+    auto& triangle = nearby.triangles.emplace_back(NearTriangle{t, surface_[t], {}});
+    for (std::size_t k = 0; k < 3; ++k) {
+      auto& near = near_of_node_[nodes[k].value];
+      if (near == kNotNear) {
+        near = static_cast<std::uint32_t>(nearby.nodes.size());
+        nearby.nodes.push_back(nodes[k]);
+        nearby.rest_positions.push_back(world.rest_positions[nodes[k].value]);
+      }
+      triangle.corners[k] = near;
+    }
+  }
+  for (const auto node : nearby.nodes) near_of_node_[node.value] = kNotNear;
 }
 
 // From the proxy towards the hand.
@@ -137,7 +303,7 @@ void ContactFinder::plan_way(const ContactScene& scene, ToolContact& contact) {
   const bool has_appeared =
       !proxy.is_placed || way_between(proxy.hand, tool.pose, tool.shape) > scene.jump_m;
   contact.is_placed = !has_appeared;
-  contact.softness_m = greatest_pressure_ / stiffness_of(tool.shape.radius_m);
+  contact.softness_m = greatest_pressure_ / stiffness_of(tool.shape);
   contact.start = has_appeared ? tool.pose : proxy.pose;
   const float way = way_between(contact.start, tool.pose, tool.shape);
   const float most = std::min(scene.max_step_m, has_appeared ? contact.softness_m : proxy.step_m);
@@ -159,18 +325,18 @@ void ContactFinder::lay_path(const trocar::scene::ToolShape& shape, const ToolCo
         shape);
 }
 
-// Whether the tool at the start of its way holds a place of the surface deeper than one that it
+// Whether the tool at the start of its way holds a quadrature point deeper than one that it
 // could have met.
-bool ContactFinder::is_inside_tissue(std::span<const TriangleIndex> triangles,
-                                     const world::World& world) const {
+bool ContactFinder::is_inside_tissue(const Nearby& nearby) const {
   const ToolSolid& solid = path_.front();
   const float deep = kMet * solid.radius;
-  return std::ranges::any_of(triangles, [&](TriangleIndex t) {
-    const Triangle triangle(surface_[t], world);
+  return std::ranges::any_of(nearby.triangles, [&](const NearTriangle& near) {
+    const Triangle triangle(near, positions_);
     if (distance_to(solid, triangle.centre) > deep + triangle.radius) return false;
-    const auto divisions = surface_[t].divisions(kPlaceSpacing * solid.radius, 2 * triangle.radius);
-    return std::ranges::any_of(places_on_triangle(divisions), [&](const auto& place) {
-      return distance_to(solid, triangle.at(place)) < deep;
+    const auto divisions =
+        near.surface.divisions(kPointSpacing * solid.radius, 2 * triangle.radius);
+    return std::ranges::any_of(quadrature_points(divisions), [&](const auto& weights) {
+      return distance_to(solid, triangle.at(weights)) < deep;
     });
   });
 }
@@ -181,7 +347,7 @@ bool ContactFinder::comes_from_outside(const ContactScene& scene, ToolContact& c
   const auto& shape = scene.tools[contact.tool].shape;
   const Vec3f back = path_.front().along * (0.5f * shape.radius_m);
   for (float gone = 0; gone <= kBack_m; gone += 0.5f * shape.radius_m) {
-    if (!is_inside_tissue(triangles_near(scene.world, contact.tool), scene.world)) return true;
+    if (!is_inside_tissue(look_near(scene.world, contact.tool))) return true;
     contact.start.position += back;
     contact.goal = contact.start;
     lay_path(shape, contact, 0);
@@ -197,66 +363,26 @@ void ContactFinder::find_push(const ContactScene& scene, float strength, Contact
     return;
   }
   const bool has_walked = std::exchange(contact.is_placed, true);
-  const auto triangles = triangles_near(scene.world, contact.tool);
-  triangles_visited_ += triangles.size();
+  const Nearby& nearby = look_near(scene.world, contact.tool);
+  triangles_visited_ += nearby.triangles.size();
 
-  const auto& proxy = scene.proxies[contact.tool];
   const float radius = path_.front().radius;
   const float range = radius + kMargin_m +
                       greatest_distance(path_.front().core_corners(), path_.back().core_corners());
-  std::size_t held = 0;  // into the proxy's places
-  for (const auto t : triangles) {
-    const Triangle triangle(surface_[t], scene.world);
+  PushPoints points(scene, contact, path_, nearby.rest_positions,
+                    {strength, greatest_pressure_, has_walked});
+  const float nearer = nearer_by(nearby) + kRounding_m;
+  for (std::size_t i = 0; i < nearby.triangles.size(); ++i) {
+    const auto& near = nearby.triangles[i];
+    if (nearby.gaps[i] > nearer && !points.holds(near.index)) continue;
+    const Triangle triangle(near, positions_);
     if (distance_to(path_.front(), triangle.centre) > range + triangle.radius) continue;
-    const auto divisions = surface_[t].divisions(kPlaceSpacing * radius, 2 * triangle.radius);
-    const auto places = places_on_triangle(divisions);
-    const Vec3f outward = triangle.outward();
-    bool is_touched = false;
-    for (std::size_t i = 0; i < places.size(); ++i) {
-      const Vec3f p = triangle.at(places[i]);
-      const auto id = place_id(t, divisions, i);
-      while (held < proxy.places.size() && proxy.places[held] < id) ++held;
-      const bool is_held = has_walked && held < proxy.places.size() && proxy.places[held] == id;
-      const Meeting meeting = meet(path_, p, outward, is_held);
-      if (!meeting.is_near) continue;
-      if (out.points.size() - contact.begin >= kMaxPointsPerTool) {
-        ++out.dropped;
-        continue;
-      }
-      is_touched |= meeting.is_touched;
-      ContactPoint point = point_of(scene, contact.tool, t, places[i]);
-      const float area = surface_[t].area / static_cast<float>(places.size()) * strength;
-      point.place = id;
-      point.stiffness = stiffness_of(radius) * area;
-      point.hold_stiffness = kHoldRatio * point.stiffness;
-      point.limit_n = greatest_pressure_ * area;
-      point.normal = meeting.normal;
-      const Vec3f at_rest = rest_position_of(point, scene.world);
-      point.plane = meeting.on_face - at_rest;
-      const Vec3f anchor = is_held ? proxy.anchors[held] : contact.start.apply_inverse(p);
-      point.anchor = contact.goal.apply(anchor) - at_rest;
-      out.points.push_back(point);
-    }
-    const auto& nodes = surface_[t].nodes;
-    if (is_touched) out.seeds.insert(out.seeds.end(), nodes.begin(), nodes.end());
+    if (points.add(near, triangle, out))
+      out.seeds.insert(out.seeds.end(), near.surface.nodes.begin(), near.surface.nodes.end());
   }
   const auto seeds = out.seeds.begin() + contact.seeds_begin;
   std::sort(seeds, out.seeds.end());
   out.seeds.erase(std::unique(seeds, out.seeds.end()), out.seeds.end());
-}
-
-ContactPoint ContactFinder::point_of(const ContactScene& scene, ToolSlot tool,
-                                     TriangleIndex triangle,
-                                     const std::array<float, 3>& place) const {
-  ContactPoint point{.friction = scene.tools[tool].shape.friction};
-  for (std::size_t k = 0; k < 3; ++k) {
-    point.nodes[k] = surface_[triangle].nodes[k];
-    point.weights[k] = place[k];
-    const auto owner = scene.claims.owner(point.nodes[k]);
-    if (owner.is_valid() && owner != tool)
-      point.moved = static_cast<std::uint8_t>(point.moved & ~(1u << k));
-  }
-  return point;
 }
 
 void ContactFinder::add_grips(const ContactScene& scene, ToolSlot slot, float strength,
@@ -276,7 +402,7 @@ void ContactFinder::add_grips(const ContactScene& scene, ToolSlot slot, float st
          .kind = ContactPoint::Kind::Grip,
          .node_count = 1,
          .moved = 1,
-         .place = static_cast<std::uint32_t>(i),
+         .id = static_cast<std::uint32_t>(i),
          .stiffness = kStiffnessPaPerM * own * strength,
          .limit_n = grasp.grip_n * (own / area) * grasp.closed * strength,
          .anchor = contact.goal.apply(held_offset(grasp, i)) - world.rest_positions[node.value]});

@@ -2,18 +2,18 @@
 
 // Finds what the tools of a tick touch.
 //
-// Push. A tool moves from its proxy to the hand, in steps of at most half its radius. A place of
-// the surface that it meets on the way is carried ahead of it; the plane that holds the place out
-// is the tool's face at the end of the way, on the side from which it was met. So a tool passes
-// through nothing, however thin and however fast it is, and a surface is met from outside only: a
-// tool that appears inside tissue, deeper than kBack_m along its shaft, touches nothing until it
-// has come out. Places within kMargin_m get a plane before they touch, so that none slips in during
-// a tick.
+// Push. A tool moves from its proxy to the hand, in steps of at most half its radius. A
+// quadrature point of the surface (surface.h) that it meets on the way is carried ahead of it; the
+// plane that holds the point out is the tool's face at the end of the way, on the side from which
+// it was met. So a tool passes through nothing, however thin and however fast it is, and a surface
+// is met from outside only: a tool that appears inside tissue, deeper than kBack_m along its shaft,
+// touches nothing until it has come out. Points within kMargin_m get a plane before they touch, so
+// that none slips in during a tick.
 //
 // Grasp. Nodes held by the jaws are gripped where they are in the jaws' frame.
 //
 // Work: triangles near a tool, listed with some slack and listed again when the tool and the
-// surface together have moved that far; O(surface nodes) then. Results do not depend on when.
+// surface together have moved that far. Results do not depend on when.
 
 #include <span>
 #include <vector>
@@ -30,7 +30,8 @@ namespace trocar::contact {
 // a node of a 4,000-node liver this is 2.5 kN/m, a hundred times the tissue's own: 0.1 N indents
 // 0.04 mm. Ten times less is visibly soft; ten times more slows the solver's convergence. It is the
 // value of the paraboloid tool in graded-exterior's measurements. What a thinner tool touches is
-// smaller in proportion to the square of its radius, and its face is stiffer by that much.
+// smaller in proportion to the square of its radius, and its face is stiffer by that much; of a
+// blade, in proportion to its radius and to its half width.
 inline constexpr float kStiffnessPaPerM = 2.5e7f;
 inline constexpr float kStiffnessRadius_m = 0.008f;
 // Friction's elastic range: how stiff it is beside the face.
@@ -45,8 +46,9 @@ inline constexpr float kJump_m = 0.01f;
 inline constexpr float kMaxStep_m = 0.005f;
 // What appears inside by no more than this is taken to have come from outside.
 inline constexpr float kBack_m = 0.012f;
-// Places of a tool are this many radii apart, at most: between them it enters by 1/20 of a radius.
-inline constexpr float kPlaceSpacing = 0.6f;
+// Quadrature points for a tool are this many radii apart, at most: between them it enters by 1/20
+// of a radius.
+inline constexpr float kPointSpacing = 0.6f;
 
 struct ContactScene {
   const world::World& world;
@@ -58,6 +60,12 @@ struct ContactScene {
   // Per tick, of any point of a tool's core: how far a proxy walks, and beyond what a hand has
   // appeared.
   float max_step_m = kMaxStep_m, jump_m = kJump_m;
+};
+
+struct NearTriangle {
+  TriangleIndex index;
+  SurfaceTriangle surface;
+  std::array<std::uint32_t, 3> corners;  // into the nodes near the tool
 };
 
 class ContactFinder {
@@ -74,33 +82,40 @@ class ContactFinder {
   std::size_t triangles_visited() const { return triangles_visited_; }
 
  private:
-  // Triangles that a tool can meet while its core's corners and the surface, together, have moved
-  // by less than kSlack_m.
+  // What a tool can meet while nothing has come nearer to it by more than the slack.
   struct Nearby {
     bool is_known = false;
     std::array<Vec3f, 4> corners;
-    float range = 0;
+    float slack = 0;
     double surface_travel = 0;
-    std::vector<TriangleIndex> triangles;
+    std::vector<NearTriangle> triangles;  // ascending
+    std::vector<float> gaps;  // per triangle: how much nearer it must come for the tool to meet it
+    std::vector<NodeIndex> nodes;       // of these
+    std::vector<Vec3f> rest_positions;  // per node
   };
 
   void plan_way(const ContactScene& scene, ToolContact& contact);
   void lay_path(const trocar::scene::ToolShape& shape, const ToolContact& contact, float way);
   bool comes_from_outside(const ContactScene& scene, ToolContact& contact);
   void find_push(const ContactScene& scene, float strength, ContactList& out);
-  ContactPoint point_of(const ContactScene& scene, ToolSlot tool, TriangleIndex triangle,
-                        const std::array<float, 3>& place) const;
   void add_grips(const ContactScene& scene, ToolSlot slot, float strength, ContactList& out) const;
   void find_reach(const ContactScene& scene, ToolSlot slot, ContactList& out) const;
-  bool is_inside_tissue(std::span<const TriangleIndex> triangles, const world::World& world) const;
-  std::span<const TriangleIndex> triangles_near(const world::World& world, ToolSlot slot);
+  bool is_inside_tissue(const Nearby& nearby) const;
+  // Also takes positions_.
+  const Nearby& look_near(const world::World& world, ToolSlot slot);
+  float nearer_by(const Nearby& nearby) const;
+  void list_near(const world::World& world, Nearby& nearby);
 
   Surface surface_;
-  float greatest_pressure_ = 0;   // Pa
-  double surface_travel_ = 0;     // m, sum over ticks
-  double refreshed_travel_ = -1;  // at the surface's last refresh
+  float greatest_pressure_ = 0;  // Pa
+  double surface_travel_ = 0;    // m, sum over ticks
   std::array<Nearby, kMaxTools> nearby_;
-  std::vector<ToolSolid> path_;  // of the tool in work: start, ..., goal
+  // Of the tool in work: start, ..., goal; and where the nodes near it are.
+  std::vector<ToolSolid> path_;
+  std::vector<Vec3f> positions_;
+  // Scratch of list_near().
+  std::vector<TriangleIndex> found_;
+  std::vector<std::uint32_t> near_of_node_;  // per node of the organ
   std::size_t triangles_visited_ = 0;
 };
 

@@ -19,11 +19,11 @@
 namespace trocar::contact {
 
 struct PointLoad {
-  Vec3f gradient;       // N; minus the force on the tissue, hence the force on the tool
-  float pressed_n = 0;  // N, a push's normal force
-  float rigidity = 0;   // N/m, t above
-  float support = 0;    // N/m, N / |g|
-  Vec3f slip;           // m, s above
+  Vec3f gradient;               // N; minus the force on the tissue, hence the force on the tool
+  float pressed_n = 0;          // N, a push's normal force
+  float tangential_secant = 0;  // N/m, secant stiffness across the face, t above
+  float normal_secant = 0;      // N/m, secant stiffness along the normal, N / |g|
+  Vec3f slip;                   // m, s above
   bool slides = false;
 };
 
@@ -38,7 +38,7 @@ inline PointLoad load_at(const ContactPoint& point, const Vec3f& d) {
       return load;
     }
     load.pressed_n = std::min(-point.stiffness * gap, point.limit_n);
-    load.support = load.pressed_n / -gap;
+    load.normal_secant = load.pressed_n / -gap;
     load.gradient = point.normal * -load.pressed_n;
     load.slip -= point.normal * dot(point.normal, load.slip);
     hold = point.hold_stiffness;
@@ -46,8 +46,8 @@ inline PointLoad load_at(const ContactPoint& point, const Vec3f& d) {
   }
   const float distance = length(load.slip);
   load.slides = hold * distance > limit;
-  load.rigidity = load.slides ? limit / distance : hold;
-  load.gradient += load.slip * load.rigidity;
+  load.tangential_secant = load.slides ? limit / distance : hold;
+  load.gradient += load.slip * load.tangential_secant;
   return load;
 }
 
@@ -55,9 +55,9 @@ inline PointLoad load_at(const ContactPoint& point, const Vec3f& d) {
 inline void add_block(const ContactPoint& point, const PointLoad& load, float weight,
                       SymMat3f& block) {
   const float share = weight * weight;
-  block.add_identity(share * load.rigidity);
+  block.add_identity(share * load.tangential_secant);
   if (point.kind == ContactPoint::Kind::Push && load.pressed_n > 0)
-    block.add_outer(point.normal, share * (load.support - load.rigidity));
+    block.add_outer(point.normal, share * (load.normal_secant - load.tangential_secant));
 }
 
 }  // namespace trocar::contact

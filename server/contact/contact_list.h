@@ -1,19 +1,20 @@
 #pragma once
 
-// What touches what in this tick, as the solver sees it: points of the surface, each a fixed
-// combination of a triangle's nodes, and what acts on them.
+// What touches what in this tick, as the solver sees it: quadrature points of the surface
+// (surface.h), each a fixed combination of a triangle's nodes, and what acts on them.
 //
 // Push: the point may not enter the tool. The tool's face there is a plane; the point leaves it
 //   freely and is resisted behind it, in proportion to depth and to the surface that the point
 //   stands for, up to the greatest pressure that a hand exerts; friction holds it to the tool's
 //   frame up to the Coulomb limit.
-// Grip: a node between a grasp's jaws is held to a place in their frame in all directions, up to
+// Grip: a node between a grasp's jaws is held to a point of their frame in all directions, up to
 //   the force at which it slips.
 // Nodes that another tool holds exclusively do not move for a push: the pusher feels them.
-// Tissue on tissue (self_contact.h): a Push whose point is a node's displacement less that of a
-//   place on the triangle across, so that it acts on both alike and nothing is added to the whole.
+// Tissue on tissue (self_contact.h): a Push whose point is a node's displacement less that of the
+//   closest point of the triangle across, so that it acts on both alike and nothing is added to the
+//   whole.
 //
-// Order: ascending tool slot, then ascending triangle and place (a grip: node); tissue on tissue
+// Order: ascending tool slot, then ascending triangle and point (a grip: node); tissue on tissue
 // last, by node.
 
 #include <array>
@@ -28,7 +29,7 @@
 
 namespace trocar::contact {
 
-inline constexpr std::size_t kMaxPointsPerTool = 2048;
+inline constexpr std::size_t kMaxPointsPerTool = 8192;
 inline constexpr std::size_t kMaxSelfPoints = 4096;
 inline constexpr int kMaxPointNodes = 4;
 
@@ -40,7 +41,7 @@ struct ContactPoint {
   Kind kind = Kind::Push;
   std::uint8_t node_count = 3;
   std::uint8_t moved = 0b1111;  // bit i: nodes[i] moves for it
-  std::uint32_t place = 0;      // which point of the surface, see ContactFinder; a grip: its entry
+  std::uint32_t id = 0;         // which point of the surface, see ContactFinder; a grip: its entry
   float stiffness = 0;          // N/m, along the normal; a grip: in all directions
   float hold_stiffness = 0;     // N/m, of friction across the normal
   float friction = 0;           // Coulomb's coefficient

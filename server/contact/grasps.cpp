@@ -50,7 +50,7 @@ void GraspTable::follow_claims(const world::World& world, const input::ToolTable
 
 void GraspTable::follow_slip(const ContactList& contacts, const world::World& world,
                              locks::ClaimTable& claims, std::vector<locks::ClaimEvent>& events) {
-  // A place is lost this much beyond the reach within which jaws take hold, so that a hold that has
+  // A node is lost this much beyond the reach within which jaws take hold, so that a hold that has
   // just begun does not end at its rim.
   constexpr float kLostBeyond = 1.25f;
   for (const auto& tool : contacts.tools) {
@@ -62,13 +62,13 @@ void GraspTable::follow_slip(const ContactList& contacts, const world::World& wo
       const Vec3f d = displacement_of(point, world);
       const auto load = load_at(point, d);
       if (!load.slides) continue;
-      const Vec3f held = d - load.slip * (load.rigidity / point.stiffness);
-      Vec3f& offset = grasp.offsets[point.place];
+      const Vec3f held = d - load.slip * (load.tangential_secant / point.stiffness);
+      Vec3f& offset = grasp.offsets[point.id];
       offset = tool.goal.apply_inverse(rest_position_of(point, world) + held);
       offset.x /= 1 - kSqueeze * grasp.closed;
       if (!(length_squared(offset) > lost * lost)) continue;
-      claims.release_node(tool.tool, grasp.nodes[point.place]);
-      grasp.nodes[point.place] = NodeIndex();
+      claims.release_node(tool.tool, grasp.nodes[point.id]);
+      grasp.nodes[point.id] = NodeIndex();
       has_lost = true;
     }
     if (!has_lost) continue;

@@ -1,11 +1,18 @@
 #pragma once
 
-// Points in cubic cells, for "which are near here": a hash table of cells over a counting sort.
-// build(): O(points + buckets), no allocation once it has had as many points. The order in which
-// visit() names points follows from the positions alone.
+// Points in cubic cells, for "which are within a range of here": a counting sort over the points'
+// bounding box, in rows along z, so that a look around reads nine runs of memory. The box has at
+// most kMostCells^3 cells; what lies beyond counts to the cells at its rim, so that it is found as
+// well, only with more looking.
+//
+// build(): O(points + cells), no allocation once it has had as many points. visit(): O(points in
+// the 27 cells around).
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "common/math/vec3.h"
@@ -14,74 +21,104 @@ namespace trocar::contact {
 
 class PointGrid {
  public:
-  PointGrid(float cell_m, std::size_t most_points) : per_m_(1 / cell_m) {
-    std::size_t buckets = 16;
-    while (buckets < 2 * most_points) buckets *= 2;
-    begins_.resize(buckets + 1);
-    points_.reserve(most_points);
-    keys_.reserve(most_points);
+  PointGrid(float cell_m, std::size_t most_points) : cell_m_(cell_m), per_m_(1 / cell_m) {
+    begins_.reserve(std::size_t{kMostCells} * kMostCells * kMostCells + 1);
+    for (auto& coordinates : positions_) coordinates.reserve(most_points + kAtOnce);
+    entries_.reserve(most_points);
+    cells_.reserve(most_points);
   }
 
   // position(i) of entries 0 to count - 1.
   template <typename Position>
   void build(std::size_t count, Position&& position) {
-    begins_.assign(begins_.size(), 0);
-    keys_.resize(count);
-    points_.resize(count);
+    lay_cells(count, position);
+    begins_.assign(std::size_t{counts_[0]} * counts_[1] * counts_[2] + 1, 0);
+    cells_.resize(count);
+    entries_.resize(count);
+    for (auto& coordinates : positions_) coordinates.resize(count + kAtOnce);
     for (std::size_t i = 0; i < count; ++i) {
-      keys_[i] = key_of(cell_of(position(i)));
-      ++begins_[bucket_of(keys_[i]) + 1];
+      const auto at = cell_of(position(i));
+      cells_[i] = (at[0] * counts_[1] + at[1]) * counts_[2] + at[2];
+      ++begins_[cells_[i]];
     }
-    for (std::size_t b = 1; b < begins_.size(); ++b) begins_[b] += begins_[b - 1];
-    for (std::size_t i = count; i-- > 0;)
-      points_[--begins_[bucket_of(keys_[i]) + 1]] = {keys_[i], position(i),
-                                                     static_cast<std::uint32_t>(i)};
-    // begins_[b + 1] is now where bucket b begins.
+    for (std::size_t c = 1; c < begins_.size(); ++c) begins_[c] += begins_[c - 1];
+    for (std::size_t i = count; i-- > 0;) {
+      const auto at = --begins_[cells_[i]];
+      const Vec3f p = position(i);
+      positions_[0][at] = p.x, positions_[1][at] = p.y, positions_[2][at] = p.z;
+      entries_[at] = static_cast<std::uint32_t>(i);
+    }
   }
-  // Entries in the cell of p and the 26 around it: all within a cell's width of p, and others.
+  // All entries, those of a cell together.
+  std::span<const std::uint32_t> entries() const { return entries_; }
+  // visit(entry, squared distance) of all within range_m of p; range_m at most a cell's width.
   template <typename Visit>
-  void visit(const Vec3f& p, Visit&& visit) const {
-    const auto centre = cell_of(p);
-    for (std::int32_t x = -1; x <= 1; ++x)
-      for (std::int32_t y = -1; y <= 1; ++y)
-        for (std::int32_t z = -1; z <= 1; ++z) {
-          const auto key = key_of({centre[0] + x, centre[1] + y, centre[2] + z});
-          const auto b = bucket_of(key);
-          const auto end = b + 2 < begins_.size() ? begins_[b + 2] : points_.size();
-          for (std::size_t i = begins_[b + 1]; i < end; ++i)
-            if (points_[i].key == key) visit(points_[i].entry, points_[i].position);
-        }
+  void visit(const Vec3f& p, float range_m, Visit&& visit) const {
+    const auto at = cell_of(p);
+    const auto before = [](std::uint32_t cell) { return cell > 0 ? cell - 1 : 0; };
+    const auto after = [&](std::size_t axis) { return std::min(at[axis] + 1, counts_[axis] - 1); };
+    for (auto x = before(at[0]); x <= after(0); ++x)
+      for (auto y = before(at[1]); y <= after(1); ++y) {
+        const auto row = (x * counts_[1] + y) * counts_[2];
+        visit_run(begins_[row + before(at[2])], begins_[row + after(2) + 1], p, range_m * range_m,
+                  visit);
+      }
   }
 
  private:
-  struct Point {
-    std::uint64_t key = 0;
-    Vec3f position;
-    std::uint32_t entry = 0;
-  };
+  static constexpr std::uint32_t kMostCells = 32;  // per axis
+  // A fixed number, so that the compiler takes them in one vector; the arrays are so much longer.
+  static constexpr std::uint32_t kAtOnce = 8;
 
-  std::array<std::int32_t, 3> cell_of(const Vec3f& p) const {
-    const auto cell = [this](float c) {
-      constexpr float kMost = 1e6f;
-      const float scaled = std::floor(c * per_m_);
-      return static_cast<std::int32_t>(scaled < -kMost ? -kMost : scaled > kMost ? kMost : scaled);
+  template <typename Position>
+  void lay_cells(std::size_t count, Position&& position) {
+    Vec3f least{1e30f, 1e30f, 1e30f}, most = -least;
+    for (std::size_t i = 0; i < count; ++i) {
+      const Vec3f p = position(i);
+      least = {std::min(least.x, p.x), std::min(least.y, p.y), std::min(least.z, p.z)};
+      most = {std::max(most.x, p.x), std::max(most.y, p.y), std::max(most.z, p.z)};
+    }
+    const auto lay = [this](float from, float to, std::uint32_t& cells, float& origin) {
+      const float width = std::ceil((to - from) * per_m_);
+      cells = width > 1
+                  ? static_cast<std::uint32_t>(std::min(width, static_cast<float>(kMostCells)))
+                  : 1;
+      origin = 0.5f * (from + to) - 0.5f * static_cast<float>(cells) * cell_m_;
     };
-    return {cell(p.x), cell(p.y), cell(p.z)};
+    lay(least.x, most.x, counts_[0], origin_.x);
+    lay(least.y, most.y, counts_[1], origin_.y);
+    lay(least.z, most.z, counts_[2], origin_.z);
   }
-  static std::uint64_t key_of(const std::array<std::int32_t, 3>& cell) {
-    std::uint64_t key = 0;
-    for (const auto c : cell) key = key << 21 | (static_cast<std::uint32_t>(c) & 0x1fffffu);
-    return key;
+  std::array<std::uint32_t, 3> cell_of(const Vec3f& p) const {
+    const auto cell = [this](float offset_m, std::uint32_t cells) {
+      const float scaled = offset_m * per_m_;
+      return scaled > 0
+                 ? static_cast<std::uint32_t>(std::min(scaled, static_cast<float>(cells - 1)))
+                 : 0u;
+    };
+    const Vec3f offset = p - origin_;
+    return {cell(offset.x, counts_[0]), cell(offset.y, counts_[1]), cell(offset.z, counts_[2])};
   }
-  std::size_t bucket_of(std::uint64_t key) const {
-    key *= 0x9e3779b97f4a7c15u;
-    return static_cast<std::size_t>(key >> 20) & (begins_.size() - 2);
+  template <typename Visit>
+  void visit_run(std::uint32_t begin, std::uint32_t end, const Vec3f& p, float most_squared,
+                 Visit&& visit) const {
+    std::array<float, kAtOnce> squared;
+    for (auto first = begin; first < end; first += kAtOnce) {
+      const float *x = &positions_[0][first], *y = &positions_[1][first],
+                  *z = &positions_[2][first];
+      for (std::uint32_t i = 0; i < kAtOnce; ++i)
+        squared[i] = length_squared(Vec3f{x[i] - p.x, y[i] - p.y, z[i] - p.z});
+      for (std::uint32_t i = 0; i < std::min(kAtOnce, end - first); ++i)
+        if (squared[i] <= most_squared) visit(entries_[first + i], squared[i]);
+    }
   }
 
-  float per_m_;
-  std::vector<std::uint32_t> begins_;  // per bucket, one to the right
-  std::vector<Point> points_;          // by bucket
-  std::vector<std::uint64_t> keys_;
+  float cell_m_, per_m_;
+  Vec3f origin_;
+  std::array<std::uint32_t, 3> counts_{1, 1, 1};  // cells per axis
+  std::vector<std::uint32_t> begins_;             // per cell, and the end
+  std::array<std::vector<float>, 3> positions_;   // by cell
+  std::vector<std::uint32_t> entries_, cells_;    // by cell; per entry
 };
 
 }  // namespace trocar::contact

@@ -16,49 +16,47 @@ constexpr float kLeftInside = 0.1f;
 // what it meets, by kFree_m, 500 m/s^2.
 constexpr float kFaster = 1.2f, kDeeper = 1.5f, kFree_m = 0.0005f;
 
-struct WayOut {
+struct Depenetration {
   Vec3f moved;      // m, of the tool
   float depth = 0;  // m, of the point that is still deepest inside
 };
 // Out of the deepest point first, then out of what is deepest then.
-WayOut way_out(std::span<const ContactPoint> points, const world::World& world, const Vec3f& from) {
-  WayOut result{from};
+Depenetration depenetrate(const PlaneArrays& planes, const Vec3f& from) {
+  Depenetration result{from};
   for (int i = 0; i <= kMaxPushesOut; ++i) {
-    const ContactPoint* deepest = nullptr;
-    result.depth = kOutside_m;
-    for (const auto& point : points) {
-      const float depth =
-          -dot(point.normal, displacement_of(point, world) - point.plane - result.moved);
-      if (depth > result.depth) deepest = &point, result.depth = depth;
-    }
-    if (deepest == nullptr || i == kMaxPushesOut) break;
-    result.moved -= deepest->normal * result.depth;
+    const auto deepest = planes.deepest(result.moved, kOutside_m);
+    result.depth = deepest.depth;
+    if (deepest.point == PlaneArrays::kNone || i == kMaxPushesOut) break;
+    result.moved -= planes.normal(deepest.point) * result.depth;
   }
   return result;
 }
 
 void follow_push(const ContactList& contacts, const ToolContact& tool, const world::World& world,
-                 const input::Tool& hand, Proxy& proxy) {
+                 const input::Tool& hand, PlaneArrays& planes, Proxy& proxy) {
   proxy.is_placed = tool.is_placed;
   proxy.pose = tool.goal;
   proxy.hand = hand.pose;
-  proxy.places.clear();
+  proxy.point_ids.clear();
   proxy.anchors.clear();
   const auto points = contacts.points_of(tool);
+  planes.clear();
+  for (const auto& point : points)
+    planes.add(point.normal, displacement_of(point, world) - point.plane);
   for (const auto& point : points) {
     const Vec3f d = displacement_of(point, world);
     const auto load = load_at(point, d);
     if (!(load.pressed_n > 0)) continue;
     // Across the face it is where the slip ends that friction can hold; along the normal it is of
     // no account, and stays with the point.
-    const Vec3f held =
-        load.slides ? d - load.slip * (load.rigidity / point.hold_stiffness) : d - load.slip;
-    proxy.places.push_back(point.place);
+    const Vec3f held = load.slides ? d - load.slip * (load.tangential_secant / point.hold_stiffness)
+                                   : d - load.slip;
+    proxy.point_ids.push_back(point.id);
     proxy.anchors.push_back(tool.goal.apply_inverse(rest_position_of(point, world) + held));
   }
-  auto out = way_out(points, world, {});
+  auto out = depenetrate(planes, {});
   if (out.depth > kLeftInside * hand.shape.radius_m) {
-    const auto back = way_out(points, world, tool.start.position - tool.goal.position);
+    const auto back = depenetrate(planes, tool.start.position - tool.goal.position);
     if (back.depth < out.depth) {
       out = back;
       proxy.pose.orientation = tool.start.orientation;
@@ -66,10 +64,40 @@ void follow_push(const ContactList& contacts, const ToolContact& tool, const wor
   }
   proxy.pose.position += out.moved;
   const float walked = way_between(tool.start, proxy.pose, hand.shape);
-  proxy.step_m = kFaster * walked + (proxy.places.empty() ? kFree_m : kDeeper * tool.softness_m);
+  proxy.step_m = kFaster * walked + (proxy.point_ids.empty() ? kFree_m : kDeeper * tool.softness_m);
 }
 
 }  // namespace
+
+void PlaneArrays::add(const Vec3f& normal, const Vec3f& at) {
+  const auto block = count_ / kAtOnce, i = count_ % kAtOnce;
+  if (block == blocks_.size()) blocks_.emplace_back();
+  Block& b = blocks_[block];
+  if (i == 0) b = {};  // planes without a normal: nothing is deep behind them
+  b.normal_x[i] = normal.x, b.normal_y[i] = normal.y, b.normal_z[i] = normal.z;
+  b.x[i] = at.x, b.y[i] = at.y, b.z[i] = at.z;
+  ++count_;
+}
+
+Vec3f PlaneArrays::normal(std::size_t point) const {
+  const Block& b = blocks_[point / kAtOnce];
+  const auto i = point % kAtOnce;
+  return {b.normal_x[i], b.normal_y[i], b.normal_z[i]};
+}
+
+PlaneArrays::Deepest PlaneArrays::deepest(const Vec3f& moved, float at_least) const {
+  Deepest result{kNone, at_least};
+  for (std::size_t block = 0; block * kAtOnce < count_; ++block) {
+    const Block& b = blocks_[block];
+    std::array<float, kAtOnce> depths;
+    for (std::size_t i = 0; i < kAtOnce; ++i)
+      depths[i] = -dot({b.normal_x[i], b.normal_y[i], b.normal_z[i]},
+                       Vec3f{b.x[i], b.y[i], b.z[i]} - moved);
+    for (std::size_t i = 0; i < kAtOnce; ++i)
+      if (depths[i] > result.depth) result = {block * kAtOnce + i, depths[i]};
+  }
+  return result;
+}
 
 Reaction reaction_on(const ContactList& contacts, const ToolContact& tool,
                      const world::World& world) {
@@ -93,14 +121,14 @@ void ProxyTable::follow(const ContactList& contacts, const world::World& world,
   for (const auto& tool : contacts.tools) {
     if (tool.verb != scene::Verb::Push) continue;
     pushes[tool.tool.value] = true;
-    follow_push(contacts, tool, world, tools[tool.tool], proxies_[tool.tool.value]);
+    follow_push(contacts, tool, world, tools[tool.tool], planes_, proxies_[tool.tool.value]);
   }
   for (std::size_t i = 0; i < proxies_.size(); ++i) {
     if (pushes[i] || !proxies_[i].is_placed) continue;
     proxies_[i].is_placed = false;
     proxies_[i].pose = proxies_[i].hand = {};
     proxies_[i].step_m = 0;
-    proxies_[i].places.clear();
+    proxies_[i].point_ids.clear();
     proxies_[i].anchors.clear();
   }
 }
@@ -111,9 +139,9 @@ void ProxyTable::visit_state(world::StateArchive& archive) {
     archive.value(proxy.pose);
     archive.value(proxy.hand);
     archive.value(proxy.step_m);
-    archive.sized_array(proxy.places, kMaxPointsPerTool);
+    archive.sized_array(proxy.point_ids, kMaxPointsPerTool);
     archive.sized_array(proxy.anchors, kMaxPointsPerTool);
-    if (archive.is_reading() && proxy.places.size() != proxy.anchors.size()) archive.fail();
+    if (archive.is_reading() && proxy.point_ids.size() != proxy.anchors.size()) archive.fail();
   }
 }
 

@@ -23,8 +23,8 @@ struct Proxy {
   Pose pose;               // world_from_tool
   Pose hand;               // where the hand was in the last tick
   float step_m = 0;        // how far it may walk in the next
-  std::vector<std::uint32_t> places;  // pressed points of the surface, ascending
-  std::vector<Vec3f> anchors;         // m, tool frame; per place
+  std::vector<std::uint32_t> point_ids;  // quadrature points pressed, ascending
+  std::vector<Vec3f> anchors;            // m, tool frame; per point
 };
 
 // Of the tissue on the tool, world frame.
@@ -35,6 +35,33 @@ struct Reaction {
 };
 Reaction reaction_on(const ContactList& contacts, const ToolContact& tool,
                      const world::World& world);
+
+// Planes with points behind them, as arrays for a quick look at the deepest. No allocation once it
+// has had as many.
+class PlaneArrays {
+ public:
+  static constexpr std::size_t kNone = ~std::size_t{0};
+  struct Deepest {
+    std::size_t point = kNone;
+    float depth = 0;
+  };
+
+  void clear() { count_ = 0; }
+  // at: of the point, from its plane.
+  void add(const Vec3f& normal, const Vec3f& at);
+  Vec3f normal(std::size_t point) const;
+  // When all planes have moved; the first of equals, kNone where none is deeper than at_least.
+  Deepest deepest(const Vec3f& moved, float at_least) const;
+
+ private:
+  static constexpr std::size_t kAtOnce = 8;
+  struct Block {
+    std::array<float, kAtOnce> normal_x{}, normal_y{}, normal_z{}, x{}, y{}, z{};
+  };
+
+  std::size_t count_ = 0;
+  std::vector<Block> blocks_;
+};
 
 class ProxyTable {
  public:
@@ -49,6 +76,7 @@ class ProxyTable {
 
  private:
   std::array<Proxy, kMaxTools> proxies_;
+  PlaneArrays planes_;  // scratch
 };
 
 }  // namespace trocar::contact

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "common/base/tick.h"
 
@@ -14,24 +15,27 @@ constexpr float kSlackEdges = 1, kMaxSlack_m = 0.006f;
 // kListedSlacks + 1/2, unless it faced something this near at rest.
 constexpr float kReferenceSlacks = 0.25f;
 constexpr float kListedSlacks = 0.5f, kMovedSlacks = kListedSlacks + 0.5f;
-// The nearest corner of a triangle, from any place on it, in longest edges.
+// The nearest corner of a triangle, from any point on it, in longest edges.
 constexpr float kCornerReach = 0.6f;
 // Faces that touch at rest may do so for ever: a force begins this far beyond.
 constexpr float kTouch_m = 2e-6f;
 constexpr float kOverlapAtRest_m = 0.001f;
 // Cosine of the normals: of a pair that begins, and of one that goes on.
 constexpr float kBeginsFacing = -0.1f, kStaysFacing = 0.2f;
-// The place lies along the normal, within so many gaps and a little.
+// The closest point lies along the normal, within so many gaps and a little.
 constexpr float kAsidePerGap = 1, kAside_m = 0.0005f;
 constexpr double kNearEdges = 3.5;
 constexpr std::uint32_t kMostNearLayers = 8;
 constexpr float kDeepest_m = 0.008f;
 // Of a list, per tick, at least.
-constexpr std::size_t kSitesPerTick = 32;
+constexpr std::size_t kReferencesPerTick = 512, kSitesPerTick = 32;
+// Of the work on a list, the part that taking references is.
+constexpr double kReferencesShare = 0.3;
 constexpr std::size_t kReservedPairs = 1u << 15;
+constexpr float kRounding_m = 1e-5f;
 constexpr float kNoLimit_n = 1e6f;
 
-// Barycentric weights of the place of a triangle nearest to p (Ericson, Real-Time Collision
+// Barycentric weights of the point of a triangle closest to p (Ericson, Real-Time Collision
 // Detection, 5.1.5).
 Vec3f nearest_weights(const Vec3f& p, const Vec3f& a, const Vec3f& b, const Vec3f& c) {
   const Vec3f ab = b - a, ac = c - a, ap = p - a;
@@ -140,6 +144,8 @@ SelfContactFinder::SelfContactFinder(const scene::Organ& organ)
   due_.reserve(sites_.size());
   list_.pairs.reserve(kReservedPairs);
   next_list_.pairs.reserve(kReservedPairs);
+  list_.far_until.reserve(kReservedPairs);
+  next_list_.far_until.reserve(kReservedPairs);
   references_.resize(sites_.size());
   has_left_.resize(sites_.size());
   old_nodes_.reserve(kMaxSelfPoints);
@@ -156,9 +162,8 @@ SelfContactFinder::SelfContactFinder(const scene::Organ& organ)
   grid_.build(sites_.size(), [&](std::size_t s) { return rest_positions_[s]; });
   is_close_at_rest_.resize(sites_.size());
   for (Site s = 0; s < sites_.size(); ++s)
-    grid_.visit(rest_positions_[s], [&](Site other, const Vec3f& p) {
-      if (length_squared(p - rest_positions_[s]) <= range * range && faced_at_rest(s, other) &&
-          !std::ranges::binary_search(near_sites_[SiteIndex{s}], other))
+    grid_.visit(rest_positions_[s], range, [&](Site other, float) {
+      if (faced_at_rest(s, other) && !std::ranges::binary_search(near_sites_[SiteIndex{s}], other))
         is_close_at_rest_[s] = 1;
     });
   grid_ = PointGrid(reach_m_ + slack_m_, sites_.size());
@@ -216,24 +221,40 @@ bool SelfContactFinder::has_moved(Site site, float by_m, const world::World& wor
 // least is kListedSlacks from rest. A reference is where the node was when its surroundings were
 // last looked through; it is never farther than slack_m_ / 2 from where the node is now. So each
 // pair that is within reach_m_ is on the list, and only what moves is looked through again.
-void SelfContactFinder::begin_list(const world::World& world) {
+void SelfContactFinder::begin_list() {
   is_listing_ = true;
   next_list_.travel = travel_;
   next_list_.least_distance = 1;
-  due_.clear();
-  sites_listed_ = 0;
+  next_list_.pairs.clear();
+  sites_seen_ = sites_listed_ = due_count_ = 0;
+}
+
+void SelfContactFinder::take_references(std::size_t end, const world::World& world) {
   const float far = kReferenceSlacks * slack_m_;
-  for (Site s = 0; s < sites_.size(); ++s) {
+  for (; sites_seen_ < end; ++sites_seen_) {
+    const auto s = static_cast<Site>(sites_seen_);
     const Vec3f p = position(s, world);
     is_due_[s] = !has_list_ || length_squared(p - references_[s]) > far * far ? 1 : 0;
     if (is_due_[s] == 0) continue;
     references_[s] = p;
     has_left_[s] = has_moved(s, kListedSlacks * slack_m_, world) ? 1 : 0;
-    // At first, whoever stays where nothing faces it has nothing to look for.
-    if (has_list_ || has_left_[s] == 1 || is_close_at_rest_[s] == 1) due_.push_back(s);
+    ++due_count_;
   }
-  if (!due_.empty()) grid_.build(sites_.size(), [&](std::size_t s) { return references_[s]; });
-  next_list_.pairs.clear();
+}
+
+// Neighbours after one another, which look through the same cells.
+void SelfContactFinder::order_due() {
+  due_.clear();
+  if (due_count_ == 0) return;
+  grid_.build(sites_.size(), [&](std::size_t s) { return references_[s]; });
+  for (const Site s : grid_.entries())
+    // At first, whoever stays where nothing faces it has nothing to look for.
+    if (is_due_[s] == 1 && (has_list_ || has_left_[s] == 1 || is_close_at_rest_[s] == 1))
+      due_.push_back(s);
+}
+
+// Of the list that there is, what has not moved.
+void SelfContactFinder::keep_pairs() {
   for (const auto& pair : list_.pairs) {
     if (is_due_[pair.node] == 1 || is_due_[pair.across] == 1) continue;
     next_list_.pairs.push_back(pair);
@@ -242,32 +263,54 @@ void SelfContactFinder::begin_list(const world::World& world) {
   }
 }
 
-void SelfContactFinder::go_on_listing(std::size_t sites) {
-  const auto end = std::min(due_.size(), sites_listed_ + sites);
-  for (; sites_listed_ < end; ++sites_listed_) list_around(due_[sites_listed_]);
-  if (end < due_.size()) return;
-  if (!due_.empty()) std::ranges::sort(next_list_.pairs);
-  // A pair of two that were due, or none of which looked, was found from both sides or one.
+void SelfContactFinder::end_list() {
   auto& pairs = next_list_.pairs;
+  if (due_count_ > 0) std::ranges::sort(pairs);
+  // A pair of two that were due, or none of which looked, was found from both sides or one.
   pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+  next_list_.far_until.assign(pairs.size(), 0);
   std::swap(list_, next_list_);
   is_listing_ = false;
   has_list_ = true;
   ++lists_made_;
 }
 
-void SelfContactFinder::list_around(Site site) {
-  if (++near_current_ == 0) {
-    std::ranges::fill(near_stamp_, 0u);
-    near_current_ = 1;
+// share: how much of the work shall be done by now. All of it is done at once; else each tick does
+// a little of one kind.
+void SelfContactFinder::go_on_listing(double share, const world::World& world) {
+  const auto part = [](double of_it, std::size_t all) {
+    return static_cast<std::size_t>(std::clamp(of_it, 0.0, 1.0) * static_cast<double>(all));
+  };
+  if (sites_seen_ < sites_.size()) {
+    const auto end =
+        std::max(part(share / kReferencesShare, sites_.size()), sites_seen_ + kReferencesPerTick);
+    take_references(std::min(end, sites_.size()), world);
+    if (sites_seen_ < sites_.size()) return;
+    keep_pairs();
+    order_due();
+    if (share < 1) return;
   }
-  for (const auto s : near_sites_[SiteIndex{site}]) near_stamp_[s] = near_current_;
-  const Vec3f p = references_[site];
-  const float range = reach_m_ + slack_m_;
-  grid_.visit(p, [&](Site other, const Vec3f& q) {
-    const float squared = length_squared(q - p);
-    if (squared > range * range || near_stamp_[other] == near_current_) return;
-    if (has_left_[site] == 0 && has_left_[other] == 0 && !faced_at_rest(site, other)) return;
+  const auto end = std::max(part((share - kReferencesShare) / (1 - kReferencesShare), due_.size()),
+                            sites_listed_ + kSitesPerTick);
+  for (; sites_listed_ < std::min(end, due_.size()); ++sites_listed_)
+    list_around(due_[sites_listed_]);
+  if (sites_listed_ == due_.size()) end_list();
+}
+
+void SelfContactFinder::list_around(Site site) {
+  const auto stamp_near_sites = [&] {
+    if (++near_current_ == 0) {
+      std::ranges::fill(near_stamp_, 0u);
+      near_current_ = 1;
+    }
+    for (const auto s : near_sites_[SiteIndex{site}]) near_stamp_[s] = near_current_;
+  };
+  bool is_stamped = false;
+  const bool has_left = has_left_[site] == 1, is_close = is_close_at_rest_[site] == 1;
+  grid_.visit(references_[site], reach_m_ + slack_m_, [&](Site other, float squared) {
+    if (!has_left && has_left_[other] == 0 && !(is_close && faced_at_rest(site, other))) return;
+    if (!std::exchange(is_stamped, true)) stamp_near_sites();
+    if (near_stamp_[other] == near_current_) return;
     next_list_.pairs.push_back({site, other});
     next_list_.pairs.push_back({other, site});
     next_list_.least_distance = std::min(next_list_.least_distance, std::sqrt(squared));
@@ -281,18 +324,15 @@ void SelfContactFinder::keep_list(const world::World& world) {
   const auto used = [this] {
     return (travel_ - list_.travel) / static_cast<double>(kReferenceSlacks * slack_m_);
   };
-  if (!is_listing_ && (!has_list_ || used() > 0.5)) begin_list(world);
-  if (!is_listing_) return;
-  const auto count = static_cast<double>(due_.size());
-  const double due = has_list_ ? std::clamp(3 * (used() - 0.5), 0.0, 1.0) * count : count;
-  const auto done = static_cast<double>(sites_listed_);
-  go_on_listing(std::max(kSitesPerTick, static_cast<std::size_t>(std::max(0.0, due - done)) + 1));
+  if (!is_listing_ && has_list_ && used() <= 0.5) return;
+  if (!is_listing_) begin_list();
+  go_on_listing(has_list_ ? 3 * (used() - 0.5) : 1, world);
   if (used() <= 1) return;
-  if (is_listing_) go_on_listing(due_.size());
+  if (is_listing_) go_on_listing(1, world);
   if (used() <= 1) return;
   // It moved farther than that since it began.
-  begin_list(world);
-  go_on_listing(due_.size());
+  begin_list();
+  go_on_listing(1, world);
 }
 
 // --- A node and a triangle ---
@@ -314,8 +354,8 @@ bool SelfContactFinder::is_near(Site site, TriangleIndex triangle) const {
                              [&](Site corner) { return std::ranges::binary_search(near, corner); });
 }
 
-SelfContactFinder::Place SelfContactFinder::place_on(Site site, TriangleIndex triangle,
-                                                     const world::World& world) const {
+SelfContactFinder::ClosestPoint SelfContactFinder::closest_point(Site site, TriangleIndex triangle,
+                                                                 const world::World& world) const {
   const auto& sites = triangles_[triangle.value];
   const Vec3f p = position(site, world), a = position(sites[0], world),
               b = position(sites[1], world), c = position(sites[2], world);
@@ -325,23 +365,23 @@ SelfContactFinder::Place SelfContactFinder::place_on(Site site, TriangleIndex tr
 }
 
 // Of the triangles at some nodes; the first of equals.
-SelfContactFinder::Place SelfContactFinder::nearest_place(Site site, std::span<const Site> around,
-                                                          const world::World& world) const {
-  Place best;
+SelfContactFinder::ClosestPoint SelfContactFinder::closest_point_around(
+    Site site, std::span<const Site> around, const world::World& world) const {
+  ClosestPoint best;
   for (const auto corner : around)
     for (const auto t : site_triangles_[SiteIndex{corner}]) {
-      const Place place = place_on(site, t, world);
-      const bool is_better = !best.triangle.is_valid() || place.squared < best.squared ||
-                             (place.squared == best.squared && place.triangle < best.triangle);
-      if (is_better && !is_near(site, t)) best = place;
+      const ClosestPoint closest = closest_point(site, t, world);
+      const bool is_better = !best.triangle.is_valid() || closest.squared < best.squared ||
+                             (closest.squared == best.squared && closest.triangle < best.triangle);
+      if (is_better && !is_near(site, t)) best = closest;
     }
   return best;
 }
 
-SelfContactFinder::Touch SelfContactFinder::touch_at(Site site, const Place& place,
+SelfContactFinder::Touch SelfContactFinder::touch_at(Site site, const ClosestPoint& closest,
                                                      const world::World& world) {
-  const auto& sites = triangles_[place.triangle.value];
-  const float weights[] = {place.weights.x, place.weights.y, place.weights.z};
+  const auto& sites = triangles_[closest.triangle.value];
+  const float weights[] = {closest.weights.x, closest.weights.y, closest.weights.z};
   Vec3f theirs, velocity = world.velocities[sites_[site].value], rest[3];
   Touch touch;
   touch.at_rest = world.rest_positions[sites_[site].value];
@@ -361,9 +401,9 @@ SelfContactFinder::Touch SelfContactFinder::touch_at(Site site, const Place& pla
     const Vec3f up = normalized(area_vector(rest[0], rest[1], rest[2]), touch.normal);
     touch.shift += std::min(0.0f, dot(up, touch.at_rest));
   }
-  const float along = dot(touch.normal, place.from);
+  const float along = dot(touch.normal, closest.from);
   touch.gap = along - touch.shift;
-  touch.aside = std::sqrt(std::max(0.0f, place.squared - along * along));
+  touch.aside = std::sqrt(std::max(0.0f, closest.squared - along * along));
   touch.closing = -dot(touch.normal, velocity);
   return touch;
 }
@@ -379,17 +419,24 @@ bool lies_along(float aside, float gap) {
 }  // namespace
 
 // Whether a node without a pair meets the surface across from it.
-bool SelfContactFinder::meets(Site site, std::span<const NodePair> listed,
-                              const world::World& world, Place& place, Touch& touch) {
+bool SelfContactFinder::meets(Site site, std::size_t first, std::size_t end,
+                              const world::World& world, ClosestPoint& closest, Touch& touch) {
+  const auto passed = static_cast<float>(travel_ - list_.travel);
+  while (first < end && list_.far_until[first] > passed) ++first;
+  if (first == end) return false;
   const Vec3f p = position(site, world);
   const float moved = kMovedSlacks * slack_m_;
   const bool is_moved = has_moved(site, moved, world);
   float least = reach_m_ * reach_m_;
   Site nearest = 0;
   bool is_found = false;
-  for (const auto& pair : listed) {
+  for (auto i = first; i < end; ++i) {
+    if (list_.far_until[i] > passed) continue;
+    const auto& pair = list_.pairs[i];
     const Vec3f way = position(pair.across, world) - p;
     const float squared = length_squared(way);
+    if (squared > reach_m_ * reach_m_)
+      list_.far_until[i] = passed + 0.5f * (std::sqrt(squared) - reach_m_) - kRounding_m;
     if (!(squared < least) ||
         !(is_moved || has_moved(pair.across, moved, world) || faced_at_rest(site, pair.across)))
       continue;
@@ -399,49 +446,49 @@ bool SelfContactFinder::meets(Site site, std::span<const NodePair> listed,
     is_found = true;
   }
   if (!is_found) return false;
-  place = nearest_place(site, std::span(&nearest, 1), world);
-  if (!place.triangle.is_valid()) return false;
-  touch = touch_at(site, place, world);
-  const auto& [a, b, c] = triangles_[place.triangle.value];
+  closest = closest_point_around(site, std::span(&nearest, 1), world);
+  if (!closest.triangle.is_valid()) return false;
+  touch = touch_at(site, closest, world);
+  const auto& [a, b, c] = triangles_[closest.triangle.value];
   const Vec3f up = area_vector(position(a, world), position(b, world), position(c, world));
   // Nothing here may let in what find() or a list would not have looked at.
   const float margin = margin_of(touch.closing), reach = corner_reach_m_ + margin;
-  return touch.facing < kBeginsFacing && touch.gap >= 0 && place.squared < margin * margin &&
+  return touch.facing < kBeginsFacing && touch.gap >= 0 && closest.squared < margin * margin &&
          least < reach * reach && lies_along(touch.aside, touch.gap) &&
-         dot(place.from, normalized(up, touch.normal)) >= touch.shift &&
-         dot(place.from, normal(site, world)) <= -touch.shift;
+         dot(closest.from, normalized(up, touch.normal)) >= touch.shift &&
+         dot(closest.from, normal(site, world)) <= -touch.shift;
 }
 
 // Where a pair is now; false when it has come apart.
 bool SelfContactFinder::stays(Site site, TriangleIndex triangle, const world::World& world,
-                              Place& place, Touch& touch) {
+                              ClosestPoint& closest, Touch& touch) {
   if (is_near(site, triangle)) return false;
-  place = place_on(site, triangle, world);
-  const Vec3f& w = place.weights;
+  closest = closest_point(site, triangle, world);
+  const Vec3f& w = closest.weights;
   if (!(w.x > 0 && w.y > 0 && w.z > 0))
-    place = nearest_place(site, triangles_[triangle.value], world);
-  touch = touch_at(site, place, world);
+    closest = closest_point_around(site, triangles_[triangle.value], world);
+  touch = touch_at(site, closest, world);
   // A little farther than where it began, so that it does not flutter.
   return touch.facing < kStaysFacing &&
          touch.gap < margin_of(touch.closing) + 0.5f * kSelfMargin_m && touch.gap > -kDeepest_m &&
          lies_along(touch.aside, touch.gap);
 }
 
-void SelfContactFinder::add_point(Site site, const Place& place, const Touch& touch,
+void SelfContactFinder::add_point(Site site, const ClosestPoint& closest, const Touch& touch,
                                   const world::World& world, SelfContactTable& pairs,
                                   ContactList& out) const {
   if (pairs.nodes().size() >= kMaxSelfPoints) {
     ++out.dropped;
     return;
   }
-  const auto& sites = triangles_[place.triangle.value];
+  const auto& sites = triangles_[closest.triangle.value];
   const auto node = sites_[site];
-  pairs.add(node, place.triangle);
+  pairs.add(node, closest.triangle);
   ContactPoint point{
       .nodes = {node, sites_[sites[0]], sites_[sites[1]], sites_[sites[2]]},
-      .weights = {1, -place.weights.x, -place.weights.y, -place.weights.z},
+      .weights = {1, -closest.weights.x, -closest.weights.y, -closest.weights.z},
       .node_count = 4,
-      .place = static_cast<std::uint32_t>(pairs.nodes().size() - 1),
+      .id = static_cast<std::uint32_t>(pairs.nodes().size() - 1),
       .stiffness = 0.5f * kSelfStiffnessPaPerM * world.surface_areas[node.value],
       .limit_n = kNoLimit_n,
       .normal = touch.normal,
@@ -477,12 +524,11 @@ void SelfContactFinder::find(const world::World& world, SelfContactTable& pairs,
     const Site site = std::min(of_old, of_listed);
     std::size_t end = first;
     while (end < listed.size() && listed[end].node == site) ++end;
-    Place place;
+    ClosestPoint closest;
     Touch touch;
-    bool is_pair = site == of_old && stays(site, old_triangles_[old], world, place, touch);
-    if (!is_pair)
-      is_pair = meets(site, std::span(listed).subspan(first, end - first), world, place, touch);
-    if (is_pair) add_point(site, place, touch, world, pairs, out);
+    bool is_pair = site == of_old && stays(site, old_triangles_[old], world, closest, touch);
+    if (!is_pair) is_pair = meets(site, first, end, world, closest, touch);
+    if (is_pair) add_point(site, closest, touch, world, pairs, out);
     if (site == of_old) ++old;
     first = end;
   }

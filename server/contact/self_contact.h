@@ -3,8 +3,8 @@
 // Tissue against tissue of one organ: the walls of a hollow one, a fold, a flap laid on its base.
 //
 // A node of the surface does not pass through a triangle across from it. What holds them apart is a
-// Push (contact_list.h) of the node against the place of the triangle nearest to it: displacement
-// of the node less that of the place, so that the force on one is minus that on the other, along a
+// Push (contact_list.h) of the node against the closest point of a triangle: displacement of the
+// node less that of the point, so that the force on one is minus that on the other, along a
 // normal that is the mean of both sides' and changes smoothly over edges. It starts at touch, has
 // no friction (wet serosa slips) and no limit. Nodes of both sides meet the other's triangles, each
 // for half of its surface.
@@ -88,15 +88,15 @@ class SelfContactFinder {
     Site node = 0, across = 0;
     auto operator<=>(const NodePair&) const = default;
   };
-  struct Place {
+  struct ClosestPoint {
     TriangleIndex triangle;
     Vec3f weights;
-    Vec3f from;  // m, from the place to the node
+    Vec3f from;  // m, from the point to the node
     float squared = 0;
   };
   struct Touch {
     Vec3f normal;                   // from the triangle's side to the node's
-    Vec3f at_rest;                  // m, from the place to the node
+    Vec3f at_rest;                  // m, from the point to the node
     float shift = 0;                // m, the gap from which on it presses
     float gap = 0;                  // m, beyond that
     float aside = 0;                // m, across the normal
@@ -106,8 +106,12 @@ class SelfContactFinder {
   void list_near_sites(const scene::Organ& organ, double near_m);
   bool faced_at_rest(Site site, Site across) const;
   void keep_list(const world::World& world);
-  void begin_list(const world::World& world);
-  void go_on_listing(std::size_t sites);
+  void begin_list();
+  void go_on_listing(double share, const world::World& world);
+  void take_references(std::size_t end, const world::World& world);
+  void keep_pairs();
+  void order_due();
+  void end_list();
   void list_around(Site site);
   bool has_moved(Site site, float by_m, const world::World& world) const;
   Vec3f position(Site site, const world::World& world) const {
@@ -115,15 +119,17 @@ class SelfContactFinder {
   }
   const Vec3f& normal(Site site, const world::World& world);
   bool is_near(Site site, TriangleIndex triangle) const;
-  Place place_on(Site site, TriangleIndex triangle, const world::World& world) const;
-  Place nearest_place(Site site, std::span<const Site> around, const world::World& world) const;
-  Touch touch_at(Site site, const Place& place, const world::World& world);
-  bool meets(Site site, std::span<const NodePair> listed, const world::World& world, Place& place,
+  ClosestPoint closest_point(Site site, TriangleIndex triangle, const world::World& world) const;
+  ClosestPoint closest_point_around(Site site, std::span<const Site> around,
+                                    const world::World& world) const;
+  Touch touch_at(Site site, const ClosestPoint& closest, const world::World& world);
+  // Of list_.pairs.
+  bool meets(Site site, std::size_t first, std::size_t end, const world::World& world,
+             ClosestPoint& closest, Touch& touch);
+  bool stays(Site site, TriangleIndex triangle, const world::World& world, ClosestPoint& closest,
              Touch& touch);
-  bool stays(Site site, TriangleIndex triangle, const world::World& world, Place& place,
-             Touch& touch);
-  void add_point(Site site, const Place& place, const Touch& touch, const world::World& world,
-                 SelfContactTable& pairs, ContactList& out) const;
+  void add_point(Site site, const ClosestPoint& closest, const Touch& touch,
+                 const world::World& world, SelfContactTable& pairs, ContactList& out) const;
 
   // Constant.
   std::vector<NodeIndex> sites_;
@@ -138,7 +144,8 @@ class SelfContactFinder {
 
   // What is listed, and when it began to be.
   struct List {
-    std::vector<NodePair> pairs;  // ascending
+    std::vector<NodePair> pairs;   // ascending
+    std::vector<float> far_until;  // per pair: beyond reach_m_ before so much more travel, m
     double travel = 0;
     float least_distance = 0;  // m, of a pair, when it began
   };
@@ -150,6 +157,8 @@ class SelfContactFinder {
   // The next one, made over several ticks.
   bool is_listing_ = false;
   List next_list_;
+  std::size_t sites_seen_ = 0;    // whose references are taken
+  std::size_t due_count_ = 0;     // of these
   std::size_t sites_listed_ = 0;  // of due_
   PointGrid grid_;                // of references_
   // Per site, see begin_list(); has_left_: the reference is not where it was at rest.

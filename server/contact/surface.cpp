@@ -11,12 +11,12 @@ namespace {
 
 constexpr std::size_t kBundleTriangles = 16;
 
-using Places = std::vector<std::array<float, 3>>;
+using QuadraturePoints = std::vector<std::array<float, 3>>;
 
 // The rows of a triangle cut into n^2: upright parts at (i, j) with i + j < n, and between them
 // those that stand on their tip.
-Places centres(std::uint32_t n) {
-  Places result;
+QuadraturePoints centres(std::uint32_t n) {
+  QuadraturePoints result;
   const float part = 1.0f / static_cast<float>(n);
   const auto add = [&](std::uint32_t i, std::uint32_t j, float offset) {
     const float a = (static_cast<float>(i) + offset) * part;
@@ -31,17 +31,17 @@ Places centres(std::uint32_t n) {
   return result;
 }
 
-std::array<Places, kMaxDivisions> all_centres() {
-  std::array<Places, kMaxDivisions> result;
+std::array<QuadraturePoints, kMaxDivisions> all_centres() {
+  std::array<QuadraturePoints, kMaxDivisions> result;
   for (std::uint32_t n = 1; n <= kMaxDivisions; ++n) result[n - 1] = centres(n);
   return result;
 }
 
 }  // namespace
 
-std::span<const std::array<float, 3>> places_on_triangle(std::uint32_t divisions) {
-  static const auto places = all_centres();
-  return places[divisions - 1];
+std::span<const std::array<float, 3>> quadrature_points(std::uint32_t divisions) {
+  static const auto points = all_centres();
+  return points[divisions - 1];
 }
 
 Surface::Surface(const scene::Organ& organ) {
@@ -58,11 +58,9 @@ Surface::Surface(const scene::Organ& organ) {
   for (const auto t : morton_order(centroids)) order_.push_back(TriangleIndex(t));
   for (std::size_t first = 0; first < order_.size(); first += kBundleTriangles) {
     const auto last = std::min(first + kBundleTriangles, order_.size());
-    Bundle bundle{static_cast<std::uint32_t>(first),
-                  static_cast<std::uint32_t>(last),
-                  static_cast<std::uint32_t>(nodes_.size()),
-                  0,
-                  {}};
+    Bundle bundle{.first_triangle = static_cast<std::uint32_t>(first),
+                  .last_triangle = static_cast<std::uint32_t>(last),
+                  .first_node = static_cast<std::uint32_t>(nodes_.size())};
     for (auto i = first; i < last; ++i)
       for (const auto node : triangles_[order_[i].value].nodes) nodes_.push_back(node);
     const auto begin = nodes_.begin() + bundle.first_node;
@@ -73,18 +71,19 @@ Surface::Surface(const scene::Organ& organ) {
   }
 }
 
-void Surface::refresh(const world::World& world) {
+void Surface::collect(const Box& box, const world::World& world, double travel_m,
+                      std::vector<TriangleIndex>& found) {
+  constexpr float kRounding_m = 1e-5f;
+  found.clear();
   for (auto& bundle : bundles_) {
+    Box reached = bundle.box;
+    reached.grow(static_cast<float>(travel_m - bundle.travel_m) + kRounding_m);
+    if (bundle.has_box && !reached.overlaps(box)) continue;
+    bundle.has_box = true;
+    bundle.travel_m = travel_m;
     bundle.box = {};
     for (auto i = bundle.first_node; i < bundle.last_node; ++i)
       bundle.box.include(world.position(nodes_[i]));
-  }
-}
-
-void Surface::collect(const Box& box, const world::World& world,
-                      std::vector<TriangleIndex>& found) const {
-  found.clear();
-  for (const auto& bundle : bundles_) {
     if (!bundle.box.overlaps(box)) continue;
     for (auto i = bundle.first_triangle; i < bundle.last_triangle; ++i) {
       Box own;

@@ -1,16 +1,17 @@
 #pragma once
 
 // The boundary triangles as contact sees them: where they are now, which of them are near a box,
-// and the places on each at which contact acts.
+// and the quadrature points on each at which contact acts.
 //
 // A triangle whose longest edge is e is cut into n^2 equal parts, n = ceil(e / spacing), at most
-// kMaxDivisions; the centre of each part is a place that stands for its share of the area. So the
-// pressure of a tool is an integral over the surface, and two meshes of one surface agree about it
-// (nodes alone were seen to give two answers 15 % apart). Divisions follow from the rest shape,
-// unless a triangle is stretched far.
+// kMaxDivisions; the centre of each part is a quadrature point that stands for its share of the
+// area. So the pressure of a tool is an integral over the surface, and two meshes of one surface
+// agree about it (nodes alone were seen to give two answers 15 % apart). Divisions follow from the
+// rest shape, unless a triangle is stretched far.
 //
 // Triangles are kept in bundles along a Morton curve, each with the box around its nodes as they
-// were at the last refresh(). refresh(): O(surface nodes). collect(): O(bundles + found).
+// were when it was last looked into, which holds to as far as the surface has moved since.
+// collect(): O(bundles + those that may be near).
 
 #include <algorithm>
 #include <array>
@@ -48,7 +49,7 @@ struct SurfaceTriangle {
   float area = 0;                  // m^2, at rest
   float longest_edge = 0;          // m, at rest
 
-  // width_m: as it is now. A triangle that is stretched has more places, but not before a quarter
+  // width_m: as it is now. A triangle that is stretched has more points, but not before a quarter
   // more, so that their number does not flutter.
   std::uint32_t divisions(float spacing_m, float width_m) const {
     const float edge = std::max(longest_edge, 0.8f * width_m);
@@ -57,7 +58,7 @@ struct SurfaceTriangle {
 };
 
 // Barycentric centres of the n^2 parts of a triangle; sum of each is 1.
-std::span<const std::array<float, 3>> places_on_triangle(std::uint32_t divisions);
+std::span<const std::array<float, 3>> quadrature_points(std::uint32_t divisions);
 
 class Surface {
  public:
@@ -69,16 +70,18 @@ class Surface {
   }
   std::size_t triangle_count() const { return triangles_.size(); }
 
-  // Takes the boxes from where the nodes are now.
-  void refresh(const world::World& world);
-  // Triangles whose bundle overlaps the box and whose own box, now, does too; ascending.
-  void collect(const Box& box, const world::World& world, std::vector<TriangleIndex>& found) const;
+  // Triangles whose box, now, overlaps the given one; ascending. travel_m: a sum over ticks of the
+  // farthest that any node has moved.
+  void collect(const Box& box, const world::World& world, double travel_m,
+               std::vector<TriangleIndex>& found);
 
  private:
   struct Bundle {
     std::uint32_t first_triangle = 0, last_triangle = 0;  // into order_
     std::uint32_t first_node = 0, last_node = 0;          // into nodes_
     Box box;
+    bool has_box = false;
+    double travel_m = 0;  // when the box was taken
   };
 
   std::vector<SurfaceTriangle> triangles_;

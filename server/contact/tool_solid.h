@@ -1,9 +1,10 @@
 #pragma once
 
-// The solid of a tool: all points within its radius of a core. The core is a rectangle that holds
-// the shaft's axis, `2 half_width` across (the tool's x) and as long as the shaft less both end
-// caps (the tool's z). With half_width = 0 that is a capsule, with a shaft of two radii a sphere,
-// with a small radius a blade with round edges. The tip of the shaft is the tool frame's origin.
+// The solid of a tool: a sphere-swept rectangle, capsule or sphere, all points within its radius of
+// a core. The core is a rectangle that holds the shaft's axis, `2 half_width` across (the tool's x)
+// and as long as the shaft less both end caps (the tool's z). With half_width = 0 it is a segment
+// and the solid a capsule, with a shaft of two radii a point and a sphere; with a small radius the
+// solid is a blade with round edges. The tip of the shaft is the tool frame's origin.
 
 #include <algorithm>
 #include <array>

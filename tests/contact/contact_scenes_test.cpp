@@ -44,7 +44,7 @@ TEST(Friction, ABlockStaysBelowTheSlipAngleAndSlidesAboveIt) {
   EXPECT_NEAR(reached, acceleration * 0.4, 0.08 * acceleration * 0.4);
 }
 
-// Pressed by a frictionless ball into a block, at a place `offset_m` beside a node.
+// Pressed by a frictionless ball into a block, at a point `offset_m` beside a node.
 double press_force(double spacing_m, int half_cells, const Vec3f& offset_m) {
   const int n = 2 * half_cells + 1;
   auto organ = block(n, half_cells + 1, n, spacing_m);
