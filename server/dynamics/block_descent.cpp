@@ -11,9 +11,6 @@ namespace {
 
 constexpr std::uint32_t kNone = 0xffffffffu;
 constexpr float kMaxOverRelaxationFewSweeps = 1.3f;
-// One far sweep is stable up to omega = 4/3 (stiff limit), two up to 1.58: 1 + 3^(-1/k).
-constexpr float kMaxFarOverRelaxationOneSweep = 1.33f;
-constexpr float kMaxFarOverRelaxationTwoSweeps = 1.5f;
 // A step of one node beyond this, m, is as broken as one that is not finite.
 constexpr float kMaxNodeStep = 1.0f;
 // What goes back with a node whose step was not finite: the nodes within so many layers.
@@ -570,70 +567,7 @@ FarPlan BlockDescent::far_plan(float dt) const {
       mass += static_cast<double>(constants_[g].mass.v[lane]);
     }
   }
-  FarPlan plan;
-  if (!(mass > 0)) return plan;
-  const auto step = static_cast<double>(dt);
-  const double kappa = step * step * stiffness / mass;
-  plan.kappa = static_cast<float>(kappa);
-  return plan.with_sweeps(kappa <= 1 ? 1 : 2);
-}
-
-FarPlan FarPlan::with_interval(std::uint32_t steps) const {
-  FarPlan plan = *this;
-  if (steps == 1) return plan;
-  plan.kappa *= static_cast<float>(steps * steps);
-  return plan.with_sweeps(sweeps);
-}
-
-FarPlan FarPlan::with_sweeps(std::uint32_t count) const {
-  FarPlan plan = *this;
-  if (count == 0) return plan;
-  plan.sweeps = count;
-  const float best = 2 * (1 + kappa) / (2 + kappa);
-  plan.over_relaxation =
-      std::min(best, count == 1 ? kMaxFarOverRelaxationOneSweep : kMaxFarOverRelaxationTwoSweeps);
-  return plan;
-}
-
-// --- Another topology ---
-
-FollowReport BlockDescent::follow_topology(const Topology& topology, const world::World& world) {
-  const auto report = tissue_.follow_topology(topology);
-  const auto& groups = tissue_.groups();
-  const auto group_count = groups.group_count(), slot_count = groups.slot_count();
-  while (all_groups_.size() < group_count)
-    all_groups_.push_back(static_cast<Group>(all_groups_.size()));
-  constants_.resize(group_count);
-  inertia_.resize(group_count);
-  squares_.resize(group_count);
-  group_squares_.resize(group_count);
-  for (auto* lanes :
-       {&free_, &rejected_, &near_.lanes, &far_.lanes, &far_swept_.lanes, &begun_.lanes})
-    lanes->resize(group_count);
-  for (auto& band : bands_) band.lanes.resize(group_count);
-  for (auto* stamps : {&begun_stamp_, &group_stamp_, &serial_stamp_, &asked_stamp_})
-    stamps->resize(group_count);
-  for (auto* values : {&x_, &v_, &start_}) values->resize(slot_count);
-  slot_stamp_.resize(slot_count);
-  squared_moves_.resize(group_count);
-  first_link_.resize(slot_count);
-  for (const auto lanes : tissue_.touched())
-    for (std::size_t lane = 0; lane < kLanes; ++lane) {
-      if (!lanes.has(lane)) continue;
-      const auto g = lanes.group;
-      const auto node = groups.nodes_of(g)[lane];
-      const bool has_node = node.is_valid();
-      const auto& material =
-          scene::material_at(organ_, has_node ? topology.material_of(node) : std::uint16_t{0});
-      const float mass = has_node ? world.masses[node.value] : 0;
-      constants_[g].mass.v[lane] = mass;
-      constants_[g].damping.v[lane] = mass * static_cast<float>(material.node_damping_per_s);
-      const bool is_free = has_node && world.node_classes[node.value] != world::NodeClass::Fixed;
-      free_[g] = static_cast<std::uint8_t>((free_[g] & ~(1u << lane)) | unsigned{is_free} << lane);
-      x_[g * kLanes + lane] = has_node ? to_float4(world.displacements[node.value]) : Float4{};
-      v_[g * kLanes + lane] = has_node ? to_float4(world.velocities[node.value]) : Float4{};
-    }
-  return report;
+  return FarPlan::of(stiffness, mass, static_cast<double>(dt));
 }
 
 }  // namespace trocar::dynamics

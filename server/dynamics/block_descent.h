@@ -23,6 +23,7 @@
 #include "common/base/workers.h"
 #include "server/contact/contact_list.h"
 #include "server/dynamics/far_field.h"
+#include "server/dynamics/far_plan.h"
 #include "server/dynamics/sweep_plan.h"
 #include "server/dynamics/tissue.h"
 #include "server/world/world.h"
@@ -85,21 +86,6 @@ struct SolveReport {
   std::uint32_t nodes_restored = 0;   // put back to the start of the step, at rest, for that reason
 };
 
-// How the far field of an organ wants to be swept at a step dt, from kappa = dt^2 D/m with D the
-// mean stiffness of a node's block and m its mean mass: one sweep with omega* = 2 (1 + kappa) /
-// (2 + kappa), for which a region that moves as a whole has its own inertia, while that is stable;
-// else two.
-struct FarPlan {
-  float kappa = 0;
-  std::uint32_t sweeps = 1;
-  float over_relaxation = 1.3f;
-
-  // The same organ with another number of sweeps, 0: this one.
-  FarPlan with_sweeps(std::uint32_t count) const;
-  // For sweeps in every so many steps.
-  FarPlan with_interval(std::uint32_t steps) const;
-};
-
 class BlockDescent {
  public:
   BlockDescent(const scene::Organ& organ, const world::World& world, unsigned workers = 1);
@@ -130,7 +116,8 @@ class BlockDescent {
   const Tissue& tissue() const { return tissue_; }
 
   // Between steps: follows topology.changed(). The world already has its nodes, their masses,
-  // classes and displacements; arrays over nodes have an entry for every place of one.
+  // classes and displacements; arrays over nodes have an entry for every place of one. Not after
+  // use_linear_far_field(): its matrices do not follow.
   FollowReport follow_topology(const Topology& topology, const world::World& world);
 
  private:
