@@ -1,0 +1,24 @@
+#pragma once
+
+// When a stroke is over: cures what keeps faces waiting. A pinched edge, two fans of which would
+// stay in the same two components, gets a node in its middle, which is then parted instead, with
+// half of the floors; at a pinched node one tet is tried on the other side. What cannot be cured
+// stays closed. Cost: a few passes over the waiting faces.
+
+#include "server/cutting/opening.h"
+
+namespace trocar::cutting {
+
+class Repair {
+ public:
+  void run(CutMesh& mesh, Stroke& stroke, Opening& opening);
+
+ private:
+  bool split_pinched_edges(CutMesh& mesh, Stroke& stroke);
+  bool turn_pinched_nodes(CutMesh& mesh, Stroke& stroke, Opening& opening);
+
+  std::vector<Opening::Breach> breaches_;
+  std::vector<TetIndex> ring_;
+};
+
+}  // namespace trocar::cutting

@@ -1,0 +1,23 @@
+// A blade straight through.
+
+#include <gtest/gtest.h>
+
+#include "tests/cutting/cut_organ.h"
+
+namespace trocar::cutting::testing {
+namespace {
+
+TEST(StraightCut, PartsABoxInTwo) {
+  CutOrgan box(box_organ(8, 8, 8, 0.01));
+  const Vec3d from[] = {{0.003, -0.06, -0.06}, {0.003, -0.06, 0.06}};
+  const Vec3d to[] = {{0.003, 0.06, -0.06}, {0.003, 0.06, 0.06}};
+  box.stroke(from, to, 0.0005);
+  box.check();
+  const auto pieces = find_pieces(box.topology());
+  EXPECT_EQ(pieces.count, 2u);
+  EXPECT_NEAR(box.total().opened_area_m2, 0.08 * 0.08, 0.05 * 0.08 * 0.08);
+  EXPECT_EQ(box.total().waiting_area_m2, 0);
+}
+
+}  // namespace
+}  // namespace trocar::cutting::testing
