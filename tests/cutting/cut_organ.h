@@ -3,6 +3,7 @@
 // Organs to cut, blades to cut them with, and what must hold after every cut.
 
 #include <memory>
+#include <string>
 
 #include "server/cutting/cutter.h"
 #include "server/cutting/validate.h"
@@ -21,6 +22,12 @@ double total_mass(const dynamics::Topology& topology);
 // Over everything: places, tets, positions.
 std::uint64_t topology_hash(const dynamics::Topology& topology);
 
+// Places of a blade's edge, one per tick.
+using Edge = std::vector<Vec3d>;
+using Path = std::vector<Edge>;
+// In steps of at most step_m.
+Path straight_path(const Edge& from, const Edge& to, double step_m);
+
 // An organ, its cutter, and a copy that repeats every edit.
 class CutOrgan {
  public:
@@ -29,16 +36,17 @@ class CutOrgan {
   const dynamics::Topology& topology() const { return topology_; }
   const scene::Organ& organ() const { return *organ_; }
   Cutter& cutter() { return cutter_; }
+  // CPU time of the last call of Cutter::cut().
+  std::uint64_t last_ns() const { return last_ns_; }
   // Sums over all calls.
   const CutOutput& total() const { return total_; }
 
-  // One tick; afterwards check() holds.
-  void tick(bool is_checked = false);
+  void tick();
   void run_until_idle();
-  // The blade from one place to another, in steps of at most step_m, then lifted.
-  void stroke(std::span<const Vec3d> from, std::span<const Vec3d> to, double step_m);
-  // Validity, volume, mass, floor, and the copy's equality; failures name what.
-  void check();
+  // A blade along a path, a place per tick, then lifted and all its work done.
+  void stroke(const Path& path, std::uint32_t blade = 0);
+  // Validity, volume, mass, floor, and the copy's equality: what is wrong, or nothing.
+  std::string check() const;
 
   std::vector<Vec3f> displacements;  // none: at rest
 
@@ -48,6 +56,8 @@ class CutOrgan {
   Places copy_places_;
   Cutter cutter_;
   CutOutput output_, total_;
+  std::string failure_;
+  std::uint64_t last_ns_ = 0;
   const double volume_, mass_;
 };
 

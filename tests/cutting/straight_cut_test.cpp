@@ -9,10 +9,10 @@ namespace {
 
 TEST(StraightCut, PartsABoxInTwo) {
   CutOrgan box(box_organ(8, 8, 8, 0.01));
-  const Vec3d from[] = {{0.003, -0.06, -0.06}, {0.003, -0.06, 0.06}};
-  const Vec3d to[] = {{0.003, 0.06, -0.06}, {0.003, 0.06, 0.06}};
-  box.stroke(from, to, 0.0005);
-  box.check();
+  const Edge from = {{0.003, -0.06, -0.06}, {0.003, -0.06, 0.06}};
+  const Edge to = {{0.003, 0.06, -0.06}, {0.003, 0.06, 0.06}};
+  box.stroke(straight_path(from, to, 0.0005));
+  EXPECT_EQ(box.check(), "");
   const auto pieces = find_pieces(box.topology());
   EXPECT_EQ(pieces.count, 2u);
   EXPECT_NEAR(box.total().opened_area_m2, 0.08 * 0.08, 0.05 * 0.08 * 0.08);
