@@ -8,7 +8,7 @@ namespace trocar::cutting {
 
 struct Settings {
   double snap = 0.15;        // share of an edge: a crossing nearer to an end labels that end
-  double extension_h = 0.4;  // how far the patch goes ahead of the blade and past its ends
+  double extension_h = 0.3;  // how far the patch goes ahead of the blade and past its ends
   // Sine of 8 degrees. A mesh whose own worst angle is below it gets 0.9 of that instead.
   double floor_sine = 0.13917310096006544;
   double length_floor_h = 0.2;
