@@ -109,10 +109,6 @@ std::size_t Opening::star_index(NodeIndex node) const {
   return static_cast<std::size_t>(at - nodes_.begin());
 }
 
-const Star& Opening::star(NodeIndex node) const {
-  return stars_[star_index(node)];
-}
-
 void Opening::cut_all(const CutMesh& mesh) {
   if (!cuts_) cuts_.emplace(mesh.topology());
   cuts_->clear();
@@ -162,7 +158,7 @@ std::uint32_t Opening::parted_nodes(const Proposal& proposal) const {
   return count;
 }
 
-// Fans of one edge that are in the same components at both ends: visit(other end, component).
+// Fans of one edge that are in the same components at both ends: visit(other end).
 template <typename Visit>
 void Opening::for_each_twin_breach(const Star& star, Visit&& visit) const {
   const auto& fans = star.twin_fans;
@@ -174,7 +170,7 @@ void Opening::for_each_twin_breach(const Star& star, Visit&& visit) const {
       if (at == nodes_.end() || *at != fans[i].other) continue;
       const auto& end = stars_[static_cast<std::size_t>(at - nodes_.begin())];
       if (end.component_of(fans[i].tet) != end.component_of(fans[k].tet)) continue;
-      visit(fans[i].other, fans[i].component);
+      visit(fans[i].other);
     }
 }
 
@@ -204,7 +200,7 @@ void Opening::find_offenders() {
       offend(s, [&](const Proposal& p) {
         return star.component_of(p.face.tet) == c || star.component_of(p.other) == c;
       });
-    for_each_twin_breach(star, [&](NodeIndex other, std::uint16_t) {
+    for_each_twin_breach(star, [&](NodeIndex other) {
       offend(s,
              [&](const Proposal& p) { return std::ranges::find(p.nodes, other) != p.nodes.end(); });
     });
@@ -290,9 +286,13 @@ std::span<const Opening::Breach> Opening::breaches_of_all(CutMesh& mesh, Stroke&
   analyse_all(mesh);
   breaches_.clear();
   for (std::size_t s = 0; s < nodes_.size(); ++s) {
-    for (const auto c : stars_[s].bad_components) breaches_.push_back({nodes_[s], {}, c});
-    for_each_twin_breach(stars_[s], [&](NodeIndex other, std::uint16_t c) {
-      if (nodes_[s] < other) breaches_.push_back({nodes_[s], other, c});
+    for (const auto c : stars_[s].bad_components) {
+      const auto at = std::ranges::find(stars_[s].components, c) - stars_[s].components.begin();
+      const auto tet = stars_[s].tets[static_cast<std::size_t>(at)];
+      breaches_.push_back({nodes_[s], {}, side(mesh, stroke, tet)});
+    }
+    for_each_twin_breach(stars_[s], [&](NodeIndex other) {
+      if (nodes_[s] < other) breaches_.push_back({nodes_[s], other, 0});
     });
   }
   cuts_->clear();

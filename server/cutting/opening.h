@@ -17,16 +17,17 @@ class Opening {
  public:
   void run(CutMesh& mesh, Stroke& stroke);
 
+  // Of the path on which a tet lies, -1 or 1; decides it for a tet all of whose nodes are labelled.
+  int side(const CutMesh& mesh, Stroke& stroke, TetIndex tet);
+
   // Faces of waiting tets that are proposed again and again; and what would be wrong if all of them
   // were opened.
   struct Breach {
     NodeIndex node, other;  // other: the edge's other end, or invalid: the node's link is wrong
-    std::uint16_t component = 0;
+    int side = 0;           // of the component with the wrong link
   };
   double waiting_area(CutMesh& mesh, Stroke& stroke);
   std::span<const Breach> breaches_of_all(CutMesh& mesh, Stroke& stroke);
-  // In the state of the last breaches_of_all(): tets at a node, and their components there.
-  const Star& star(NodeIndex node) const;
 
  private:
   struct Proposal {
@@ -36,7 +37,6 @@ class Opening {
     bool is_open = true;
   };
 
-  int side(const CutMesh& mesh, Stroke& stroke, TetIndex tet);
   int side_of_flat(const CutMesh& mesh, Stroke& stroke, TetIndex tet);
   void gather(const CutMesh& mesh, const Stroke& stroke);
   void propose(const CutMesh& mesh, Stroke& stroke);

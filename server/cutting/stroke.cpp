@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "common/base/assert.h"
+
 namespace trocar::cutting {
 namespace {
 
@@ -82,6 +84,26 @@ void Stroke::label(NodeIndex node) {
   label = 1;
   labelled_.push_back(node);
   fresh.push_back(node);
+}
+
+void Stroke::unlabel_last(NodeIndex node) {
+  TROCAR_ASSERT(!labelled_.empty() && labelled_.back() == node && fresh.back() == node);
+  labels_[node.value] = 0;
+  labelled_.pop_back();
+  fresh.pop_back();
+}
+
+void Stroke::take_off_wound(NodeIndex node, int side) {
+  labels_[node.value] = 0;
+  std::erase(labelled_, node);
+  forget_height(node);
+  measure(node, {0, static_cast<double>(side)});
+}
+
+void Stroke::forget_height(NodeIndex node) {
+  if (height(node).nearest_squared < 0) return;
+  heights_[node.value] = {};
+  std::erase(measured_, node);
 }
 
 bool Stroke::measure(NodeIndex node, const Height& height) {

@@ -43,6 +43,10 @@ class Stroke {
  public:
   bool is_labelled(NodeIndex n) const { return n.value < labels_.size() && labels_[n.value] != 0; }
   void label(NodeIndex node);
+  // Of the node that was labelled last.
+  void unlabel_last(NodeIndex node);
+  // A labelled node belongs to one side after all.
+  void take_off_wound(NodeIndex node, int side);
 
   struct Height {
     double nearest_squared = -1;  // m^2, distance from the path; negative: never measured
@@ -56,7 +60,7 @@ class Stroke {
 
   // -1, 1, or 0 if not decided.
   int side(TetIndex t) const { return t.value < sides_.size() ? sides_[t.value] : 0; }
-  void decide(TetIndex tet, int side);
+  void decide(TetIndex tet, int side);  // 0: undecided again
 
   // The new node lies on the wound if its ends were parted by it: the caller labels it.
   void inherit(TetIndex parent, TetIndex child);
@@ -88,6 +92,8 @@ class Stroke {
   std::vector<NodeIndex> fresh;      // labelled or changed sides since the last opening
 
  private:
+  void forget_height(NodeIndex node);
+
   std::vector<std::uint8_t> labels_;
   std::vector<NodeIndex> labelled_;
   std::vector<Height> heights_;
