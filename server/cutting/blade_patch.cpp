@@ -31,11 +31,13 @@ void add_triangle(const Vec3d& a, const Vec3d& b, const Vec3d& c, Vec3d& side,
       std::max({length_squared(b - a), length_squared(c - b), length_squared(a - c)});
   if (!(length(doubled_area) > kLeastSine * longest_squared)) return;
   const Vec3d normal = normalized(doubled_area, Vec3d{});
-  if (dot(normal, side) < 0) {
-    out.push_back({{a, c, b}, -normal});
-  } else {
-    out.push_back({{a, b, c}, normal});
+  PatchTriangle triangle{{a, b, c}, normal, {}};
+  if (dot(normal, side) < 0) triangle = {{a, c, b}, -normal, {}};
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Vec3d edge = triangle.corners[(i + 1) % 3] - triangle.corners[i];
+    triangle.inward[i] = normalized(cross(triangle.normal, edge), Vec3d{});
   }
+  out.push_back(triangle);
   side = out.back().normal;
 }
 
@@ -73,11 +75,8 @@ double signed_distance(const PatchTriangle& triangle, const Vec3d& p) {
 }
 
 bool is_inside(const PatchTriangle& triangle, const Vec3d& p, double slack) {
-  for (std::size_t i = 0; i < 3; ++i) {
-    const auto &a = triangle.corners[i], &b = triangle.corners[(i + 1) % 3];
-    const Vec3d inward = cross(triangle.normal, b - a);
-    if (!(dot(inward, p - a) >= -slack * length(b - a))) return false;
-  }
+  for (std::size_t i = 0; i < 3; ++i)
+    if (!(dot(triangle.inward[i], p - triangle.corners[i]) >= -slack)) return false;
   return true;
 }
 

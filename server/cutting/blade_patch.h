@@ -31,12 +31,13 @@ BladeEdge between(const BladeEdge& from, const BladeEdge& to, double t);
 
 struct PatchTriangle {
   std::array<Vec3d, 3> corners;
-  Vec3d normal;  // unit, counter-clockwise
+  Vec3d normal;                 // unit, counter-clockwise
+  std::array<Vec3d, 3> inward;  // unit, in the plane, across the edge from each corner to the next
 };
 
 double signed_distance(const PatchTriangle& triangle, const Vec3d& p);  // to its plane
 double distance_squared(const PatchTriangle& triangle, const Vec3d& p);
-// Of a point in its plane, or outside by less than `slack` (m).
+// Of a point above or below it, or outside by less than `slack` (m).
 bool is_inside(const PatchTriangle& triangle, const Vec3d& p, double slack);
 
 struct Strip {

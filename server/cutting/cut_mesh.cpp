@@ -71,11 +71,10 @@ void CutMesh::begin(std::span<const Vec3f> displacements, CutOutput& out) {
     positions_[n] += to_double(displacements[n]);
 }
 
-double CutMesh::sine_after_split(NodeIndex a, NodeIndex b, std::uint16_t t, double length_share) {
+double CutMesh::sine_after_split(NodeIndex a, NodeIndex b, std::uint16_t t) {
   const auto rest = topology_.rest();
   const double edge = length(rest[b.value] - rest[a.value]), share = t / 65536.0;
-  const double least_length =
-      length_share * settings_.length_floor_h * (h_[a.value] + h_[b.value]) / 2;
+  const double least_length = settings_.length_floor_h * (h_[a.value] + h_[b.value]) / 2;
   if (t == 0 || edge * std::min(share, 1 - share) < least_length) return -1;
   const Vec3d middle = along(rest[a.value], rest[b.value], t);
   ring_of(topology_, a, b, ring_);
@@ -97,7 +96,10 @@ void CutMesh::add_node(const NewNode& made) {
   const auto n = made.node.value, a = made.a.value, b = made.b.value;
   positions_[n] = along(positions_[a], positions_[b], made.t);
   h_[n] = h_[a] + (h_[b] - h_[a]) * (made.t / 65536.0);
-  reach_[n] = std::max(reach_[a], reach_[b]);
+  reach_[n] = 0;
+  topology_.for_each_neighbour(made.node, [&](NodeIndex j) {
+    reach_[n] = std::max(reach_[n], length(topology_.rest()[j.value] - topology_.rest()[n]));
+  });
   out_->new_nodes.push_back(made);
 }
 

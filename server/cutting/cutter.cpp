@@ -63,10 +63,8 @@ void Cutter::cut(std::span<const Vec3f> displacements, CutOutput& out) {
       1, mesh_.settings().edits_per_call / static_cast<std::uint32_t>(order_.size()));
   for (const auto s : order_) {
     auto budget = share;
-    if (!work(strokes_[s], budget))
+    if (!work(strokes_[s], budget) || (strokes_[s].has_ended && !end(strokes_[s])))
       out.is_behind = true;
-    else if (strokes_[s].has_ended)
-      end(strokes_[s]);
   }
 }
 
@@ -83,16 +81,16 @@ bool Cutter::work(Stroke& stroke, std::uint32_t& budget) {
     stroke.side_normals = sides;
     stroke.motion.pop();
     forget(stroke);
-    // A strip costs something even where there is nothing to cut.
-    budget -= std::min(budget, kStripCost);
   }
   return true;
 }
 
-void Cutter::end(Stroke& stroke) {
-  repair_.run(mesh_, stroke, opening_);
+// Returns whether the stroke is over.
+bool Cutter::end(Stroke& stroke) {
+  if (!repair_.run(mesh_, stroke, opening_)) return false;
   mesh_.out().waiting_area_m2 += opening_.waiting_area(mesh_, stroke);
   stroke.clear();
+  return true;
 }
 
 void Cutter::forget(Stroke& stroke) {

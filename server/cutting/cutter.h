@@ -48,11 +48,10 @@ class Cutter {
 
  private:
   static constexpr std::uint32_t kNone = 0xffffffffu;
-  static constexpr std::uint32_t kStripCost = 8;  // in edits
 
   Stroke* begin_stroke(std::uint32_t blade);
   bool work(Stroke& stroke, std::uint32_t& budget);
-  void end(Stroke& stroke);
+  bool end(Stroke& stroke);
   void forget(Stroke& stroke);
 
   std::vector<Stroke> strokes_;

@@ -10,6 +10,8 @@ namespace {
 // An edge may be stretched to this many times its length at rest.
 constexpr double kMostStretch = 1.5;
 constexpr double kSlack_h = 1e-6;
+// A patch costs something even where there is nothing to cut; in edits.
+constexpr std::uint32_t kPatchCost = 8, kNearPerEdit = 8;
 
 std::uint16_t quantised(double t) {
   return static_cast<std::uint16_t>(std::clamp(std::floor(t * 65536 + 0.5), 0.0, 65535.0));
@@ -37,8 +39,7 @@ void Splitter::find_near(const CutMesh& mesh, std::span<const PatchTriangle> pat
     const double reach = kMostStretch * mesh.reach(NodeIndex(n));
     if (mesh.topology().has_node(NodeIndex(n)) &&
         std::ranges::any_of(patch, [&](const PatchTriangle& triangle) {
-          return std::abs(signed_distance(triangle, p)) <= reach &&
-                 distance_squared(triangle, p) <= reach * reach;
+          return std::abs(signed_distance(triangle, p)) <= reach && is_inside(triangle, p, reach);
         })) {
       near_.emplace_back(n);
       rank_[n] = static_cast<std::uint32_t>(near_.size());
@@ -80,6 +81,15 @@ void Splitter::cross(const CutMesh& mesh, std::span<const PatchTriangle> patch, 
   }
 }
 
+// By the plane of a triangle.
+bool Splitter::are_parted(NodeIndex a, NodeIndex b, std::size_t triangles) const {
+  const auto *heights_a = &heights_[(rank_[a.value] - 1) * triangles],
+             *heights_b = &heights_[(rank_[b.value] - 1) * triangles];
+  for (std::size_t k = 0; k < triangles; ++k)
+    if (!(heights_a[k] * heights_b[k] > 0)) return true;
+  return false;
+}
+
 void Splitter::find_crossings(const CutMesh& mesh, const Stroke& stroke,
                               std::span<const PatchTriangle> patch) {
   crossings_.clear();
@@ -87,7 +97,8 @@ void Splitter::find_crossings(const CutMesh& mesh, const Stroke& stroke,
     if (stroke.is_labelled(a)) continue;
     others_.clear();
     mesh.topology().for_each_neighbour(a, [&](NodeIndex b) {
-      if (a < b && rank_[b.value] > 0 && !stroke.is_labelled(b)) others_.push_back(b);
+      if (a < b && rank_[b.value] > 0 && are_parted(a, b, patch.size()) && !stroke.is_labelled(b))
+        others_.push_back(b);
     });
     std::sort(others_.begin(), others_.end());
     others_.erase(std::unique(others_.begin(), others_.end()), others_.end());
@@ -159,7 +170,9 @@ bool Splitter::run(CutMesh& mesh, Stroke& stroke, std::span<const PatchTriangle>
   find_crossings(mesh, stroke, patch);
   for (const auto node : near_) rank_[node.value] = 0;
   count_crossed_tets(mesh);
-  return snap(mesh, stroke, budget) && split(mesh, stroke, budget);
+  const bool is_finished = snap(mesh, stroke, budget) && split(mesh, stroke, budget);
+  budget -= std::min(budget, kPatchCost + static_cast<std::uint32_t>(near_.size()) / kNearPerEdit);
+  return is_finished;
 }
 
 }  // namespace trocar::cutting

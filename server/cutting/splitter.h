@@ -36,6 +36,7 @@ class Splitter {
   void measure(const CutMesh& mesh, Stroke& stroke, std::span<const PatchTriangle> patch) const;
   void find_crossings(const CutMesh& mesh, const Stroke& stroke,
                       std::span<const PatchTriangle> patch);
+  bool are_parted(NodeIndex a, NodeIndex b, std::size_t triangles) const;
   void cross(const CutMesh& mesh, std::span<const PatchTriangle> patch, NodeIndex a, NodeIndex b);
   void count_crossed_tets(CutMesh& mesh);
   bool snap(CutMesh& mesh, Stroke& stroke, std::uint32_t& budget);

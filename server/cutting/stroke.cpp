@@ -2,8 +2,6 @@
 
 #include <algorithm>
 
-#include "common/base/assert.h"
-
 namespace trocar::cutting {
 namespace {
 
@@ -86,13 +84,6 @@ void Stroke::label(NodeIndex node) {
   fresh.push_back(node);
 }
 
-void Stroke::unlabel_last(NodeIndex node) {
-  TROCAR_ASSERT(!labelled_.empty() && labelled_.back() == node && fresh.back() == node);
-  labels_[node.value] = 0;
-  labelled_.pop_back();
-  fresh.pop_back();
-}
-
 void Stroke::take_off_wound(NodeIndex node, int side) {
   labels_[node.value] = 0;
   std::erase(labelled_, node);
@@ -144,6 +135,7 @@ void Stroke::clear() {
   patch.clear();
   motion.clear();
   side_normals = {};
+  repairs = 0;
   is_active = has_ended = false;
 }
 

@@ -43,8 +43,6 @@ class Stroke {
  public:
   bool is_labelled(NodeIndex n) const { return n.value < labels_.size() && labels_[n.value] != 0; }
   void label(NodeIndex node);
-  // Of the node that was labelled last.
-  void unlabel_last(NodeIndex node);
   // A labelled node belongs to one side after all.
   void take_off_wound(NodeIndex node, int side);
 
@@ -85,6 +83,7 @@ class Stroke {
   std::uint32_t id = 0;
   bool is_active = false, has_ended = false;
   BladeMotion motion;
+  std::uint32_t repairs = 0;  // rounds done
   SideNormals side_normals{};
   std::vector<PatchTriangle> patch;  // the last one
   double h = 0;                      // m, mean of the mesh where the blade cut last
