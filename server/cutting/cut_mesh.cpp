@@ -71,10 +71,11 @@ void CutMesh::begin(std::span<const Vec3f> displacements, CutOutput& out) {
     positions_[n] += to_double(displacements[n]);
 }
 
-double CutMesh::sine_after_split(NodeIndex a, NodeIndex b, std::uint16_t t) {
+double CutMesh::sine_after_split(NodeIndex a, NodeIndex b, std::uint16_t t, double length_share) {
   const auto rest = topology_.rest();
   const double edge = length(rest[b.value] - rest[a.value]), share = t / 65536.0;
-  const double least_length = settings_.length_floor_h * (h_[a.value] + h_[b.value]) / 2;
+  const double least_length =
+      length_share * settings_.length_floor_h * (h_[a.value] + h_[b.value]) / 2;
   if (t == 0 || edge * std::min(share, 1 - share) < least_length) return -1;
   const Vec3d middle = along(rest[a.value], rest[b.value], t);
   ring_of(topology_, a, b, ring_);

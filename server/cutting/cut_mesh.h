@@ -51,7 +51,7 @@ class CutMesh {
 
   // The smallest sine of all tets that a split would make, or -1 if a part would be shorter than
   // this share of the floor.
-  double sine_after_split(NodeIndex a, NodeIndex b, std::uint16_t t);
+  double sine_after_split(NodeIndex a, NodeIndex b, std::uint16_t t, double length_share = 1);
   NodeIndex split(NodeIndex a, NodeIndex b, std::uint16_t t);
   bool move(NodeIndex node, const Vec3d& rest);
   // Faces from the side of the lower tet, ascending; their nodes, ascending.

@@ -120,18 +120,31 @@ void Opening::cut_all(const CutMesh& mesh) {
   sort_unique(nodes_);
 }
 
-// Whether the tet belongs to a part, cut off as proposed, of fewer tets than debris has: debris_.
+// Whether the tet belongs to a part, cut off as proposed, that is debris: debris_.
 bool Opening::find_debris(const CutMesh& mesh, TetIndex start) {
+  const auto& settings = mesh.settings();
+  const auto& topology = mesh.topology();
+  const double h = mesh.h(topology.tet(start)[0]);
+  const auto volume_of = [&](TetIndex t) {
+    return six_volumes(rest_corners(topology, topology.tet(t))) / 6;
+  };
+  const auto is_more = [&](double volume) {
+    return debris_.size() >= settings.debris_tets &&
+           (debris_.size() > 4 * settings.debris_tets ||
+            volume >= settings.debris_volume_h3 * h * h * h);
+  };
   debris_.assign(1, start);
+  double volume = volume_of(start);
   for (std::size_t i = 0; i < debris_.size(); ++i)
     for (std::uint8_t corner = 0; corner < 4; ++corner) {
+      if (is_more(volume)) return false;
       if (cuts_->is_cut({debris_[i], corner})) continue;
-      const auto other = across(mesh.topology(), {debris_[i], corner});
+      const auto other = across(topology, {debris_[i], corner});
       if (!other || std::ranges::find(debris_, other->tet) != debris_.end()) continue;
-      if (debris_.size() + 1 >= mesh.settings().debris_tets) return false;
       debris_.push_back(other->tet);
+      volume += volume_of(other->tet);
     }
-  return debris_.size() < mesh.settings().debris_tets;
+  return !is_more(volume);
 }
 
 bool Opening::turn_debris(const CutMesh& mesh, Stroke& stroke) {

@@ -17,8 +17,8 @@ bool Repair::split_pinched_edges(CutMesh& mesh, Stroke& stroke) {
   for (const auto& breach : breaches_) {
     if (!breach.other.is_valid()) continue;
     ring_of(mesh.topology(), breach.node, breach.other, ring_);
-    if (ring_.empty() ||
-        mesh.sine_after_split(breach.node, breach.other, kMiddle) < kFloorShare * mesh.floor_sine())
+    if (ring_.empty() || mesh.sine_after_split(breach.node, breach.other, kMiddle, kFloorShare) <
+                             kFloorShare * mesh.floor_sine())
       continue;
     stroke.label(mesh.split(breach.node, breach.other, kMiddle));
     ++mesh.out().pinch_splits;
@@ -39,10 +39,12 @@ bool Repair::pull_back(CutMesh& mesh, Stroke& stroke, Opening& opening,
   std::sort(others_.begin(), others_.end());
   others_.erase(std::unique(others_.begin(), others_.end()), others_.end());
   for (const auto other : others_)
-    if (mesh.sine_after_split(breach.node, other, kMiddle) < kFloorShare * mesh.floor_sine())
+    if (mesh.sine_after_split(breach.node, other, kMiddle, kFloorShare) <
+        kFloorShare * mesh.floor_sine())
       return false;
   for (const auto other : others_) {
-    if (mesh.sine_after_split(breach.node, other, kMiddle) < kFloorShare * mesh.floor_sine())
+    if (mesh.sine_after_split(breach.node, other, kMiddle, kFloorShare) <
+        kFloorShare * mesh.floor_sine())
       return true;
     stroke.label(mesh.split(breach.node, other, kMiddle));
     ++mesh.out().pinch_splits;

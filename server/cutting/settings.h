@@ -18,8 +18,10 @@ struct Settings {
   double piece_h = 0.5;  // longer motion is cut piece by piece
   // A blade that has gone farther at once has not moved but appeared.
   std::uint32_t most_pieces_of_motion = 64;
-  // A part cut off that has fewer tets stays with the other side.
+  // A part cut off stays with the other side if it has fewer tets, or at most four times as many
+  // and less volume (in h^3; a regular tet has 0.12).
   std::uint32_t debris_tets = 4;
+  double debris_volume_h3 = 0.25;
   // Splits and labels per call, all strokes together; what is left over is done in later calls.
   std::uint32_t edits_per_call = 400;
   // Waiting faces this far from the blade are repaired.

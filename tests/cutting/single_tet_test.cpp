@@ -14,6 +14,7 @@ Settings exact() {
   settings.length_floor_h = 0.01;
   settings.floor_sine = 0.001;
   settings.debris_tets = 0;
+  settings.debris_volume_h3 = 0;
   return settings;
 }
 
@@ -87,7 +88,7 @@ TEST(SingleTet, SawingDoesNotGoOnAddingTets) {
   // 1 mm to and fro at 5 Hz, with a noise of 0.05 mm across, inside one tet of a box.
   CutOrgan box(box_organ(4, 4, 4, 0.01));
   trocar::testing::Random random(7);
-  std::vector<std::uint32_t> splits;
+  std::uint32_t soon = 0;
   for (int tick = 0; tick < 10'000; ++tick) {
     const int phase = tick % 200;
     const double along = (phase < 100 ? phase : 200 - phase) * 1e-5 - 0.0005;
@@ -95,12 +96,13 @@ TEST(SingleTet, SawingDoesNotGoOnAddingTets) {
     const Edge edge = {{0.003 + along, 0.002 + aside, -0.02}, {0.003 + along, 0.002 + aside, 0.02}};
     ASSERT_TRUE(box.cutter().move(0, edge));
     box.tick();
-    if (tick == 999) splits.push_back(box.total().splits);
+    if (tick == 999) soon = box.total().splits;
   }
   box.cutter().lift(0);
   box.run_until_idle();
   EXPECT_EQ(box.check(), "");
-  EXPECT_LE(box.total().splits, splits[0] + 8);
+  // Besides: repairs when the blade has gone.
+  EXPECT_LE(box.total().splits - box.total().pinch_splits, soon + 8);
   EXPECT_LE(box.total().splits, 60u);
 }
 
