@@ -125,8 +125,7 @@ bool CutMesh::move(NodeIndex node, const Vec3d& rest) {
   return true;
 }
 
-void CutMesh::open(std::span<const TetFace> faces, std::span<const NodeIndex> nodes,
-                   const CutFaces& cuts) {
+void CutMesh::open(std::span<const TetFace> faces, std::span<const Star> stars) {
   auto& events = out_->events;
   events.events.push_back(Open{static_cast<std::uint32_t>(events.faces.size()),
                                static_cast<std::uint32_t>(faces.size())});
@@ -135,7 +134,7 @@ void CutMesh::open(std::span<const TetFace> faces, std::span<const NodeIndex> no
     out_->opened_area_m2 += face_area(topology_, face);
   }
   copies_.clear();
-  opener_.open(topology_, places_, cuts, nodes, copies_);
+  part(topology_, places_, stars, copies_);
   for (const auto& copy : copies_) {
     events.events.push_back(copy);
     add_node({copy.copy, copy.node, copy.node, 0});

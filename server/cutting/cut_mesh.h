@@ -54,8 +54,9 @@ class CutMesh {
   double sine_after_split(NodeIndex a, NodeIndex b, std::uint16_t t, double length_share = 1);
   NodeIndex split(NodeIndex a, NodeIndex b, std::uint16_t t);
   bool move(NodeIndex node, const Vec3d& rest);
-  // Faces from the side of the lower tet, ascending; their nodes, ascending.
-  void open(std::span<const TetFace> faces, std::span<const NodeIndex> nodes, const CutFaces& cuts);
+  // Faces from the side of the lower tet, ascending; the stars of their nodes, ascending, with
+  // these faces cut.
+  void open(std::span<const TetFace> faces, std::span<const Star> stars);
   // Tets bisected by the last split().
   std::size_t last_ring() const { return children_.size(); }
 
@@ -67,7 +68,6 @@ class CutMesh {
   const Settings settings_;
   const std::span<Stroke> strokes_;
   Places places_;
-  Opener opener_;
   std::vector<Vec3d> positions_;
   std::vector<double> h_, reach_;  // m, per node
   double mean_h_ = 0, longest_reach_ = 0, floor_sine_ = 0;

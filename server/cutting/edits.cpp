@@ -80,7 +80,10 @@ class Replay {
     }
     std::sort(nodes_.begin(), nodes_.end());
     nodes_.erase(std::unique(nodes_.begin(), nodes_.end()), nodes_.end());
-    opener_.open(topology_, places_, cuts_, nodes_, copies_);
+    std::vector<Star> stars(nodes_.size());
+    for (std::size_t i = 0; i < nodes_.size(); ++i)
+      analysis_.run(topology_, cuts_, nodes_[i], stars[i]);
+    part(topology_, places_, stars, copies_);
     return {};
   }
   Status repeat(const Duplicate& copy) {
@@ -94,7 +97,7 @@ class Replay {
   dynamics::Topology& topology_;
   Places& places_;
   CutFaces cuts_;
-  Opener opener_;
+  StarAnalysis analysis_;
   std::vector<NodeIndex> nodes_;
   std::vector<Duplicate> copies_;
   std::size_t at_ = 0, copied_ = 0;
@@ -132,12 +135,9 @@ NodeIndex split_edge(dynamics::Topology& topology, Places& places, NodeIndex a, 
   return node;
 }
 
-void Opener::open(dynamics::Topology& topology, Places& places, const CutFaces& cuts,
-                  std::span<const NodeIndex> nodes, std::vector<Duplicate>& copies) {
-  if (stars_.size() < nodes.size()) stars_.resize(nodes.size());
-  for (std::size_t i = 0; i < nodes.size(); ++i) analysis_.run(topology, cuts, nodes[i], stars_[i]);
-  for (std::size_t i = 0; i < nodes.size(); ++i) {
-    const auto& star = stars_[i];
+void part(dynamics::Topology& topology, Places& places, std::span<const Star> stars,
+          std::vector<Duplicate>& copies) {
+  for (const auto& star : stars)
     for (std::uint16_t c = 1; c < star.component_count; ++c) {
       const auto copy = places.take_node(topology);
       const auto regions = topology.regions_of(star.node);
@@ -149,7 +149,6 @@ void Opener::open(dynamics::Topology& topology, Places& places, const CutFaces& 
         if (star.components[k] == c) replace_node(topology, star.tets[k], star.node, copy);
       copies.push_back({star.node, copy});
     }
-  }
 }
 
 Status apply(const CutEvents& events, dynamics::Topology& topology, Places& places) {

@@ -62,16 +62,9 @@ struct TetChild {
 NodeIndex split_edge(dynamics::Topology& topology, Places& places, NodeIndex a, NodeIndex b,
                      std::uint16_t t, std::vector<TetChild>& children);
 
-// Parts nodes at cut faces. The nodes: those of the faces, ascending and distinct.
-class Opener {
- public:
-  void open(dynamics::Topology& topology, Places& places, const CutFaces& cuts,
-            std::span<const NodeIndex> nodes, std::vector<Duplicate>& copies);
-
- private:
-  StarAnalysis analysis_;
-  std::vector<Star> stars_;
-};
+// Gives every component of the stars but the first a copy of its node.
+void part(dynamics::Topology& topology, Places& places, std::span<const Star> stars,
+          std::vector<Duplicate>& copies);
 
 // Repeats a cut. Everything is checked before it is done; after an error the edits before it have
 // been done.

@@ -237,20 +237,17 @@ bool Opening::close_offenders(const CutMesh& mesh) {
 
 void Opening::commit(CutMesh& mesh, Stroke& stroke) {
   faces_.clear();
-  opened_nodes_.clear();
   stroke.waiting.clear();
   for (const auto& proposal : proposals_) {
     if (proposal.is_open) {
       faces_.push_back(proposal.face);
-      opened_nodes_.insert(opened_nodes_.end(), proposal.nodes.begin(), proposal.nodes.end());
     } else {
       stroke.waiting.push_back(proposal.face.tet);
       stroke.waiting.push_back(proposal.other);
     }
   }
   sort_unique(stroke.waiting);
-  sort_unique(opened_nodes_);
-  if (!faces_.empty()) mesh.open(faces_, opened_nodes_, *cuts_);
+  if (!faces_.empty()) mesh.open(faces_, std::span(stars_).first(nodes_.size()));
 }
 
 void Opening::run(CutMesh& mesh, Stroke& stroke) {

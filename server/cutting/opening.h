@@ -65,7 +65,6 @@ class Opening {
   std::vector<std::uint32_t> offenders_;
   std::vector<TetIndex> debris_;
   std::vector<TetFace> faces_;
-  std::vector<NodeIndex> opened_nodes_;
   std::vector<Breach> breaches_;
 };
 

@@ -7,7 +7,7 @@ namespace {
 
 constexpr std::uint32_t kRounds = 6;
 constexpr std::size_t kMostBreaches = 64;
-constexpr double kFloorShare = 0.5;
+constexpr double kFloorShare = 0.5, kLengthShare = 0.75;
 constexpr std::uint16_t kMiddle = 32768;
 
 }  // namespace
@@ -17,7 +17,7 @@ bool Repair::split_pinched_edges(CutMesh& mesh, Stroke& stroke) {
   for (const auto& breach : breaches_) {
     if (!breach.other.is_valid()) continue;
     ring_of(mesh.topology(), breach.node, breach.other, ring_);
-    if (ring_.empty() || mesh.sine_after_split(breach.node, breach.other, kMiddle, kFloorShare) <
+    if (ring_.empty() || mesh.sine_after_split(breach.node, breach.other, kMiddle, kLengthShare) <
                              kFloorShare * mesh.floor_sine())
       continue;
     stroke.label(mesh.split(breach.node, breach.other, kMiddle));
@@ -39,11 +39,11 @@ bool Repair::pull_back(CutMesh& mesh, Stroke& stroke, Opening& opening,
   std::sort(others_.begin(), others_.end());
   others_.erase(std::unique(others_.begin(), others_.end()), others_.end());
   for (const auto other : others_)
-    if (mesh.sine_after_split(breach.node, other, kMiddle, kFloorShare) <
+    if (mesh.sine_after_split(breach.node, other, kMiddle, kLengthShare) <
         kFloorShare * mesh.floor_sine())
       return false;
   for (const auto other : others_) {
-    if (mesh.sine_after_split(breach.node, other, kMiddle, kFloorShare) <
+    if (mesh.sine_after_split(breach.node, other, kMiddle, kLengthShare) <
         kFloorShare * mesh.floor_sine())
       return true;
     stroke.label(mesh.split(breach.node, other, kMiddle));

@@ -21,6 +21,7 @@ std::uint16_t quantised(double t) {
 
 void Splitter::find_near(const CutMesh& mesh, std::span<const PatchTriangle> patch) {
   near_.clear();
+  is_close_.clear();
   rank_.resize(std::max(rank_.size(), mesh.topology().node_count()));
   Vec3d low = patch[0].corners[0], high = low;
   for (const auto& triangle : patch)
@@ -43,6 +44,10 @@ void Splitter::find_near(const CutMesh& mesh, std::span<const PatchTriangle> pat
         })) {
       near_.emplace_back(n);
       rank_[n] = static_cast<std::uint32_t>(near_.size());
+      is_close_.push_back(std::ranges::any_of(patch, [&](const PatchTriangle& triangle) {
+        return std::abs(signed_distance(triangle, p)) <= reach / 2 &&
+               is_inside(triangle, p, reach / 2);
+      }));
     }
   }
   heights_.resize(near_.size() * patch.size());
@@ -81,6 +86,11 @@ void Splitter::cross(const CutMesh& mesh, std::span<const PatchTriangle> patch, 
   }
 }
 
+// A crossed edge has an end that is no farther from the patch than half its length.
+bool Splitter::is_close(NodeIndex n) const {
+  return is_close_[rank_[n.value] - 1] != 0;
+}
+
 // By the plane of a triangle.
 bool Splitter::are_parted(NodeIndex a, NodeIndex b, std::size_t triangles) const {
   const auto *heights_a = &heights_[(rank_[a.value] - 1) * triangles],
@@ -94,15 +104,16 @@ void Splitter::find_crossings(const CutMesh& mesh, const Stroke& stroke,
                               std::span<const PatchTriangle> patch) {
   crossings_.clear();
   for (const auto a : near_) {
-    if (stroke.is_labelled(a)) continue;
+    if (!is_close(a) || stroke.is_labelled(a)) continue;
     others_.clear();
     mesh.topology().for_each_neighbour(a, [&](NodeIndex b) {
-      if (a < b && rank_[b.value] > 0 && are_parted(a, b, patch.size()) && !stroke.is_labelled(b))
+      if (rank_[b.value] > 0 && (a < b || !is_close(b)) && are_parted(a, b, patch.size()) &&
+          !stroke.is_labelled(b))
         others_.push_back(b);
     });
     std::sort(others_.begin(), others_.end());
     others_.erase(std::unique(others_.begin(), others_.end()), others_.end());
-    for (const auto b : others_) cross(mesh, patch, a, b);
+    for (const auto b : others_) cross(mesh, patch, std::min(a, b), std::max(a, b));
   }
 }
 

@@ -36,6 +36,7 @@ class Splitter {
   void measure(const CutMesh& mesh, Stroke& stroke, std::span<const PatchTriangle> patch) const;
   void find_crossings(const CutMesh& mesh, const Stroke& stroke,
                       std::span<const PatchTriangle> patch);
+  bool is_close(NodeIndex n) const;
   bool are_parted(NodeIndex a, NodeIndex b, std::size_t triangles) const;
   void cross(const CutMesh& mesh, std::span<const PatchTriangle> patch, NodeIndex a, NodeIndex b);
   void count_crossed_tets(CutMesh& mesh);
@@ -43,8 +44,9 @@ class Splitter {
   bool split(CutMesh& mesh, Stroke& stroke, std::uint32_t& budget);
 
   std::vector<NodeIndex> near_;
-  std::vector<std::uint32_t> rank_;  // per node: 1 + its place in near_, or 0
-  std::vector<double> heights_;      // near_ x patch
+  std::vector<std::uint32_t> rank_;     // per node: 1 + its place in near_, or 0
+  std::vector<std::uint8_t> is_close_;  // as near_
+  std::vector<double> heights_;         // near_ x patch
   std::vector<NodeIndex> others_;
   std::vector<Crossing> crossings_;
   std::vector<Snap> snaps_;
