@@ -79,7 +79,12 @@ bool Cutter::work(Stroke& stroke, std::uint32_t& budget) {
     opening_.run(mesh_, stroke);
     if (!is_finished) return false;
     stroke.side_normals = sides;
+    stroke.way += longest_motion(stroke.motion.strip().from, stroke.motion.strip().to);
     stroke.motion.pop();
+    if (stroke.way > mesh_.settings().repair_h * stroke.h) {
+      stroke.way = 0;
+      if (!stroke.waiting.empty()) repair_.run_behind(mesh_, stroke, opening_);
+    }
     forget(stroke);
   }
   return true;
@@ -87,7 +92,7 @@ bool Cutter::work(Stroke& stroke, std::uint32_t& budget) {
 
 // Returns whether the stroke is over.
 bool Cutter::end(Stroke& stroke) {
-  if (!repair_.run(mesh_, stroke, opening_)) return false;
+  if (!repair_.finish(mesh_, stroke, opening_)) return false;
   mesh_.out().waiting_area_m2 += opening_.waiting_area(mesh_, stroke);
   stroke.clear();
   return true;

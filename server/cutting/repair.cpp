@@ -62,14 +62,33 @@ bool Repair::pull_back_all(CutMesh& mesh, Stroke& stroke, Opening& opening) {
   return has_changed;
 }
 
+// Those farther than `beyond` (m) from the last patch.
+void Repair::find_breaches(CutMesh& mesh, Stroke& stroke, Opening& opening, double beyond) {
+  breaches_.clear();
+  for (const auto& breach : opening.breaches_of_all(mesh, stroke)) {
+    const auto& p = mesh.positions()[breach.node.value];
+    const bool is_near = std::ranges::any_of(stroke.patch, [&](const PatchTriangle& triangle) {
+      return distance_squared(triangle, p) < beyond * beyond;
+    });
+    if (!is_near && breaches_.size() < kMostBreaches) breaches_.push_back(breach);
+  }
+}
+
 bool Repair::run(CutMesh& mesh, Stroke& stroke, Opening& opening) {
-  if (stroke.waiting.empty() || stroke.repairs++ >= kRounds) return true;
-  const auto breaches = opening.breaches_of_all(mesh, stroke);
-  const auto count = static_cast<std::ptrdiff_t>(std::min(breaches.size(), kMostBreaches));
-  breaches_.assign(breaches.begin(), breaches.begin() + count);
-  if (!split_pinched_edges(mesh, stroke) && !pull_back_all(mesh, stroke, opening)) return true;
+  if (!split_pinched_edges(mesh, stroke) && !pull_back_all(mesh, stroke, opening)) return false;
   opening.run(mesh, stroke);
-  return stroke.waiting.empty();
+  return true;
+}
+
+bool Repair::finish(CutMesh& mesh, Stroke& stroke, Opening& opening) {
+  if (stroke.waiting.empty() || stroke.repairs++ >= kRounds) return true;
+  find_breaches(mesh, stroke, opening, 0);
+  return !run(mesh, stroke, opening) || stroke.waiting.empty();
+}
+
+void Repair::run_behind(CutMesh& mesh, Stroke& stroke, Opening& opening) {
+  find_breaches(mesh, stroke, opening, mesh.settings().repair_h * stroke.h);
+  run(mesh, stroke, opening);
 }
 
 }  // namespace trocar::cutting

@@ -136,6 +136,7 @@ void Stroke::clear() {
   motion.clear();
   side_normals = {};
   repairs = 0;
+  way = 0;
   is_active = has_ended = false;
 }
 

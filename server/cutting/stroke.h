@@ -83,7 +83,8 @@ class Stroke {
   std::uint32_t id = 0;
   bool is_active = false, has_ended = false;
   BladeMotion motion;
-  std::uint32_t repairs = 0;  // rounds done
+  std::uint32_t repairs = 0;  // rounds done since the end
+  double way = 0;             // m, of the blade since the last repair behind it
   SideNormals side_normals{};
   std::vector<PatchTriangle> patch;  // the last one
   double h = 0;                      // m, mean of the mesh where the blade cut last
