@@ -48,6 +48,7 @@ class CutMesh {
   double longest_reach() const { return longest_reach_; }
   double floor_sine() const { return floor_sine_; }
   CutOutput& out() { return *out_; }
+  Places& places() { return places_; }
 
   // The smallest sine of all tets that a split would make, or -1 if a part would be shorter than
   // this share of the floor.

@@ -18,7 +18,7 @@
 //
 // Deterministic: the same calls give the same topology. Strokes are done in the order in which they
 // began. Not for organs with links. One writer; the topology is edited by nobody else between
-// construction and destruction.
+// construction and destruction, except that tets and nodes may be removed while no stroke is on.
 
 #include "server/cutting/opening.h"
 #include "server/cutting/repair.h"
@@ -40,6 +40,9 @@ class Cutter {
 
   // displacements: of the nodes from rest, m, node_count of them; none: everything is at rest.
   void cut(std::span<const Vec3f> displacements, CutOutput& out);
+
+  // To be told of what others remove between calls.
+  Places& places() { return mesh_.places(); }
 
   // Nothing to do until a blade moves.
   bool is_idle() const;

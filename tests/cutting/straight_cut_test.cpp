@@ -180,6 +180,40 @@ TEST(StraightCut, WorkIsBoundedAndNothingIsLost) {
   EXPECT_EQ(find_pieces(box.topology()).count, 2u);
 }
 
+// What a removed corner leaves unused is used again, by the copy alike.
+TEST(StraightCut, UsesUnusedPlacesFirst) {
+  const auto organ = box_organ(4, 4, 4, 0.01);
+  dynamics::Topology topology(organ), copy(organ);
+  Cutter cutter(topology);
+  const auto remove_corner = [](dynamics::Topology& from, Places& places) {
+    const NodeIndex corner(0u);
+    const auto at = from.tets_of(corner);
+    for (const auto tet : std::vector<TetIndex>(at.begin(), at.end())) {
+      from.remove_tet(tet);
+      places.give_back(tet);
+    }
+    from.remove_node(corner);
+    places.give_back(corner);
+  };
+  remove_corner(topology, cutter.places());
+  Places places(copy);
+  remove_corner(copy, places);
+  const auto before = topology.tet_count();
+  CutOutput out;
+  std::uint32_t splits = 0;
+  for (const auto& edge : through_x(0.003, 0.002)) {
+    ASSERT_TRUE(cutter.move(0, edge));
+    cutter.cut({}, out);
+    splits += out.splits;
+    ASSERT_TRUE(apply(out.events, copy, places).ok());
+  }
+  EXPECT_GT(splits, 0u);
+  EXPECT_TRUE(topology.has_node(NodeIndex(0u)));
+  EXPECT_GT(topology.tet_count(), before);
+  EXPECT_TRUE(validate(topology).ok());
+  EXPECT_EQ(topology_hash(topology), topology_hash(copy));
+}
+
 TEST(StraightCut, SameInputSameTopology) {
   std::uint64_t hashes[2];
   for (auto& hash : hashes) {
