@@ -115,16 +115,6 @@ NodeIndex CutMesh::split(NodeIndex a, NodeIndex b, std::uint16_t t) {
   return node;
 }
 
-bool CutMesh::move(NodeIndex node, const Vec3d& rest) {
-  const auto by = rest - topology_.rest()[node.value];
-  const auto stress_free = topology_.stress_free()[node.value] + by;
-  positions_[node.value] += by;
-  topology_.move_node(node, rest, stress_free);
-  out_->events.events.push_back(Move{node, rest, stress_free});
-  ++out_->moves;
-  return true;
-}
-
 void CutMesh::open(std::span<const TetFace> faces, std::span<const Star> stars) {
   auto& events = out_->events;
   events.events.push_back(Open{static_cast<std::uint32_t>(events.faces.size()),

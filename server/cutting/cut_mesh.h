@@ -24,8 +24,7 @@ struct CutOutput {
   std::vector<NewNode> new_nodes;  // in order: a parent may be new, too
   double opened_area_m2 = 0;       // one side of the wound, at rest
   double waiting_area_m2 = 0;      // of strokes that ended: faces that could not be opened
-  std::uint32_t crossed_tets = 0, splits = 0, labels = 0, refused_splits = 0, pinch_splits = 0,
-                moves = 0;
+  std::uint32_t crossed_tets = 0, splits = 0, labels = 0, refused_splits = 0, pinch_splits = 0;
   bool is_behind = false;  // work is left for the next call
 
   void clear();
@@ -54,7 +53,6 @@ class CutMesh {
   // this share of the floor.
   double sine_after_split(NodeIndex a, NodeIndex b, std::uint16_t t, double length_share = 1);
   NodeIndex split(NodeIndex a, NodeIndex b, std::uint16_t t);
-  bool move(NodeIndex node, const Vec3d& rest);
   // Faces from the side of the lower tet, ascending; the stars of their nodes, ascending, with
   // these faces cut.
   void open(std::span<const TetFace> faces, std::span<const Star> stars);

@@ -47,23 +47,6 @@ class Replay {
       return mismatch(at_, "the new node has another number here");
     return {};
   }
-  Status repeat(const Move& move) {
-    if (!has(move.node) || !is_finite(move.rest) || !is_finite(move.stress_free))
-      return mismatch(at_, "no such node to move");
-    for (const auto t : topology_.tets_of(move.node)) {
-      const auto& tet = topology_.tet(t);
-      std::array<Vec3d, 4> rest, stress_free;
-      for (std::size_t i = 0; i < 4; ++i) {
-        rest[i] = tet[i] == move.node ? move.rest : topology_.rest()[tet[i].value];
-        stress_free[i] =
-            tet[i] == move.node ? move.stress_free : topology_.stress_free()[tet[i].value];
-      }
-      if (!(six_volumes(rest) > 0) || !(six_volumes(stress_free) > 0))
-        return mismatch(at_, "the move turns a tet inside out");
-    }
-    topology_.move_node(move.node, move.rest, move.stress_free);
-    return {};
-  }
   Status repeat(const Open& open) {
     if (open.first_face > events_.faces.size() ||
         open.face_count > events_.faces.size() - open.first_face)

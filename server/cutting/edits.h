@@ -1,12 +1,11 @@
 #pragma once
 
 // The edits that a cut consists of, and the list of them by which whoever holds the same topology
-// repeats it: integers only, apart from moved nodes. The order is that in which they were done.
+// repeats it: integers only. The order is that in which they were done.
 //
 //   Split      an edge gets a node at t/65536 from a to b; each tet at it becomes two: the old one
 //              keeps a, a new one gets b. The new node is in the regions that both ends are in, so
 //              no tet changes its material.
-//   Move       a node gets another rest place.
 //   Open       inner faces become surface, and nodes are parted as far as that parts their stars:
 //              the component with the lowest tet keeps the node, the others get copies.
 //   Duplicate  one such copy; says what Open did, and does nothing itself.
@@ -31,11 +30,6 @@ struct Split {
   NodeIndex node;  // the new one
   bool operator==(const Split&) const = default;
 };
-struct Move {
-  NodeIndex node;
-  Vec3d rest, stress_free;  // m
-  bool operator==(const Move&) const = default;
-};
 struct Open {
   std::uint32_t first_face = 0, face_count = 0;  // in CutEvents::faces
   bool operator==(const Open&) const = default;
@@ -44,7 +38,7 @@ struct Duplicate {
   NodeIndex node, copy;
   bool operator==(const Duplicate&) const = default;
 };
-using CutEvent = std::variant<Split, Move, Open, Duplicate>;
+using CutEvent = std::variant<Split, Open, Duplicate>;
 
 struct CutEvents {
   std::vector<CutEvent> events;

@@ -28,8 +28,6 @@ struct Settings {
   double repair_h = 1;
   // Labels farther from the blade are forgotten.
   double forget_h = 2;
-  // Snapped nodes move onto the blade's path where nothing gets worse.
-  bool moves_nodes = false;
 };
 
 }  // namespace trocar::cutting

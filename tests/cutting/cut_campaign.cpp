@@ -178,7 +178,6 @@ int main(int argc, char** argv) {
   app.add_option("--length-floor", options.settings.length_floor_h);
   app.add_option("--debris", options.settings.debris_tets);
   app.add_option("--edits", options.settings.edits_per_call);
-  app.add_flag("--moves", options.settings.moves_nodes);
   CLI11_PARSE(app, argc, argv);
   int bad = 0;
   for (const auto& name : options.organs) bad += run(name, options);

@@ -144,7 +144,6 @@ void CutOrgan::tick() {
   total_.labels += output_.labels;
   total_.refused_splits += output_.refused_splits;
   total_.pinch_splits += output_.pinch_splits;
-  total_.moves += output_.moves;
   total_.is_behind = output_.is_behind;
 }
 

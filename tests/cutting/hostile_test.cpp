@@ -109,8 +109,6 @@ TEST(HostileEvents, AreRefused) {
   EXPECT_TRUE(refused({{Open{0, 1}}, {{TetIndex(0u), 4}}}));
   EXPECT_TRUE(refused({{Open{0, 2}}, {{TetIndex(4u), 0}, {TetIndex(4u), 0}}}));
   EXPECT_TRUE(refused({{Duplicate{a, b}}, {}}));
-  EXPECT_TRUE(refused({{Move{a, {1, 1, 1}, {1, 1, 1}}}, {}}));
-  EXPECT_TRUE(refused({{Move{a, {kNan, 1, 1}, {1, 1, 1}}}, {}}));
 }
 
 }  // namespace
