@@ -63,7 +63,9 @@ void Cutter::cut(std::span<const Vec3f> displacements, CutOutput& out) {
       1, mesh_.settings().edits_per_call / static_cast<std::uint32_t>(order_.size()));
   for (const auto s : order_) {
     auto budget = share;
-    if (!work(strokes_[s], budget) || (strokes_[s].has_ended && !end(strokes_[s])))
+    const bool is_done = work(strokes_[s], budget);
+    // What comes at the end of a stroke is done in calls of its own.
+    if (!is_done || (strokes_[s].has_ended && (budget < share || !end(strokes_[s]))))
       out.is_behind = true;
   }
 }

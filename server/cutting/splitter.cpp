@@ -81,7 +81,7 @@ void Splitter::cross(const CutMesh& mesh, std::span<const PatchTriangle> patch, 
     const auto &pa = mesh.positions()[a.value], &pb = mesh.positions()[b.value];
     if (!is_inside(patch[k], pa + (pb - pa) * t, kSlack_h * mesh.h(a))) continue;
     const auto rest = mesh.topology().rest();
-    crossings_.push_back({a, b, t, da, db, k, length_squared(rest[a.value] - rest[b.value])});
+    crossings_.push_back({a, b, t, da, db, length_squared(rest[a.value] - rest[b.value])});
     return;
   }
 }
@@ -132,8 +132,8 @@ bool Splitter::snap(CutMesh& mesh, Stroke& stroke, std::uint32_t& budget) {
   snaps_.clear();
   const double share = mesh.settings().snap;
   for (const auto& c : crossings_) {
-    if (c.t < share) snaps_.push_back({std::abs(c.height_a), c.a, c.b, c.triangle});
-    if (1 - c.t < share) snaps_.push_back({std::abs(c.height_b), c.b, c.a, c.triangle});
+    if (c.t < share) snaps_.push_back({std::abs(c.height_a), c.a, c.b});
+    if (1 - c.t < share) snaps_.push_back({std::abs(c.height_b), c.b, c.a});
   }
   std::sort(snaps_.begin(), snaps_.end(), [](const Snap& x, const Snap& y) {
     return std::tie(x.height, x.node, x.other) < std::tie(y.height, y.node, y.other);

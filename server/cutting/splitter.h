@@ -23,13 +23,11 @@ class Splitter {
   struct Crossing {
     NodeIndex a, b;  // a < b
     double t = 0, height_a = 0, height_b = 0;
-    std::size_t triangle = 0;
     double length_squared = 0;  // at rest
   };
   struct Snap {
     double height;
     NodeIndex node, other;
-    std::size_t triangle;
   };
 
   void find_near(const CutMesh& mesh, std::span<const PatchTriangle> patch);

@@ -26,8 +26,6 @@ class BladeMotion {
   bool has_strip() const { return next_ < strips_.size(); }
   const Strip& strip() const { return strips_[next_]; }
   void pop();
-  // The blade's last place, if it has one.
-  const BladeEdge& edge() const { return now_; }
 
  private:
   void add_strips(double h, const Settings& settings);
@@ -60,7 +58,7 @@ class Stroke {
   int side(TetIndex t) const { return t.value < sides_.size() ? sides_[t.value] : 0; }
   void decide(TetIndex tet, int side);  // 0: undecided again
 
-  // The new node lies on the wound if its ends were parted by it: the caller labels it.
+  // What is known of a tet that was split, of a node that was copied, holds for the new one.
   void inherit(TetIndex parent, TetIndex child);
   void inherit(NodeIndex original, NodeIndex copy);
 

@@ -110,7 +110,8 @@ CutOrgan::CutOrgan(scene::Organ organ, const Settings& settings)
       copy_places_(copy_),
       cutter_(topology_, settings),
       volume_(total_volume(topology_)),
-      mass_(total_mass(topology_)) {}
+      mass_(total_mass(topology_)),
+      surface_(surface_area(topology_)) {}
 
 Path straight_path(const Edge& from, const Edge& to, double step_m) {
   double motion = 0;
@@ -166,6 +167,9 @@ std::string CutOrgan::check() const {
   if (const auto status = validate(topology_); !status) return status.error().message;
   if (!(std::abs(total_volume(topology_) - volume_) <= 1e-12 * volume_)) return "volume not kept";
   if (!(std::abs(total_mass(topology_) - mass_) <= 1e-12 * mass_)) return "mass not kept";
+  const double surface = surface_ + 2 * total_.opened_area_m2;
+  if (!(std::abs(surface_area(topology_) - surface) <= 1e-9 * surface))
+    return "not the wound's area";
   const double floor = cutter_.floor_sine() * (total_.pinch_splits > 0 ? 0.5 : 1);
   if (!(least_dihedral_sine(topology_) >= floor * (1 - 1e-9))) return "angle below the floor";
   if (topology_hash(topology_) != topology_hash(copy_)) return "the copy differs";

@@ -45,7 +45,7 @@ class CutOrgan {
   void run_until_idle();
   // A blade along a path, a place per tick, then lifted and all its work done.
   void stroke(const Path& path, std::uint32_t blade = 0);
-  // Validity, volume, mass, floor, and the copy's equality: what is wrong, or nothing.
+  // Validity, volume, mass, surface, floor, and the copy's equality: what is wrong, or nothing.
   std::string check() const;
 
   std::vector<Vec3f> displacements;  // none: at rest
@@ -58,7 +58,7 @@ class CutOrgan {
   CutOutput output_, total_;
   std::string failure_;
   std::uint64_t last_ns_ = 0;
-  const double volume_, mass_;
+  const double volume_, mass_, surface_;
 };
 
 }  // namespace trocar::cutting::testing

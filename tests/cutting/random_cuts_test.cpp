@@ -23,7 +23,7 @@ void cut_and_check(CutOrgan& organ, int cuts, std::uint64_t seed) {
 
 TEST(RandomCuts, OfABox) {
   CutOrgan box(box_organ(6, 6, 6, 0.01));
-  cut_and_check(box, 100, 1);
+  cut_and_check(box, 60, 1);
 }
 TEST(RandomCuts, OfARegularBox) {
   CutOrgan box(box_organ(6, 6, 6, 0.01, 0));
@@ -32,7 +32,7 @@ TEST(RandomCuts, OfARegularBox) {
 TEST(RandomCuts, OfASmallLiver) {
   TROCAR_SKIP_WITHOUT_SHARED("organs/liver_tiny.msh");
   CutOrgan liver(load("liver_tiny.msh"));
-  cut_and_check(liver, 100, 3);
+  cut_and_check(liver, 60, 3);
 }
 TEST(RandomCuts, OfAGallbladder) {
   TROCAR_SKIP_WITHOUT_SHARED("organs/gallbladder_wall.msh");

@@ -141,6 +141,28 @@ TEST(StraightCut, MeetsTissueWhereItIs) {
   EXPECT_NEAR(box.total().opened_area_m2, area, 0.05 * area);
 }
 
+// Tissue sways by more than h while it is cut; what is cut is where it is at each tick.
+TEST(StraightCut, FollowsTissueThatMoves) {
+  CutOrgan box(box_organ(8, 8, 8, 0.01));
+  const auto path = through_x(0.003);
+  for (std::size_t tick = 0; tick < path.size(); ++tick) {
+    const double sway = std::sin(0.03 * static_cast<double>(tick));
+    box.displacements.clear();
+    for (const auto& p : box.topology().rest())
+      box.displacements.push_back(to_float(Vec3d{0.0, 0.1 * p.z * sway, 0.2 * p.y * sway}));
+    ASSERT_TRUE(box.cutter().move(0, path[tick]));
+    box.tick();
+    if (tick % 40 == 0) {
+      ASSERT_EQ(box.check(), "") << tick;
+    }
+  }
+  box.cutter().lift(0);
+  box.run_until_idle();
+  EXPECT_EQ(box.check(), "");
+  EXPECT_EQ(find_pieces(box.topology()).count, 2u);
+  EXPECT_NEAR(box.total().opened_area_m2, kSide * kSide, 0.05 * kSide * kSide);
+}
+
 TEST(StraightCut, KeepsMaterialsAndStressFreeShape) {
   auto organ = box_organ(6, 6, 6, 0.01);
   auto heavy = organ.material;
