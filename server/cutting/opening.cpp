@@ -72,12 +72,30 @@ int Opening::side_of_flat(const CutMesh& mesh, Stroke& stroke, TetIndex t) {
   return own;
 }
 
+// Tets at fresh nodes, and waiting ones that hang together with them: the others would only be
+// refused again.
 void Opening::gather(const CutMesh& mesh, const Stroke& stroke) {
-  tets_ = stroke.waiting;
-  for (const auto node : stroke.fresh) {
-    const auto tets = mesh.topology().tets_of(node);
-    tets_.insert(tets_.end(), tets.begin(), tets.end());
+  const auto& topology = mesh.topology();
+  tets_.clear();
+  is_reached_.resize(std::max(is_reached_.size(), topology.node_count()));
+  const auto reach = [&](TetIndex t) {
+    tets_.push_back(t);
+    for (const auto node : topology.tet(t)) is_reached_[node.value] = 1;
+  };
+  for (const auto node : stroke.fresh)
+    for (const auto t : topology.tets_of(node)) reach(t);
+  still_waiting_ = stroke.waiting;
+  for (std::size_t before = 0; before != still_waiting_.size();) {
+    before = still_waiting_.size();
+    std::erase_if(still_waiting_, [&](TetIndex t) {
+      const bool is_taken = std::ranges::any_of(
+          topology.tet(t), [&](NodeIndex node) { return is_reached_[node.value] != 0; });
+      if (is_taken) reach(t);
+      return is_taken;
+    });
   }
+  for (const auto t : tets_)
+    for (const auto node : topology.tet(t)) is_reached_[node.value] = 0;
   sort_unique(tets_);
 }
 
@@ -237,7 +255,7 @@ bool Opening::close_offenders(const CutMesh& mesh) {
 
 void Opening::commit(CutMesh& mesh, Stroke& stroke) {
   faces_.clear();
-  stroke.waiting.clear();
+  stroke.waiting = still_waiting_;
   for (const auto& proposal : proposals_) {
     if (proposal.is_open) {
       faces_.push_back(proposal.face);

@@ -7,7 +7,7 @@
 // every opened face must part at least one of its nodes, or later edits would make four wound faces
 // meet at one edge. For every breach the weakest face of those that cause it is closed again, until
 // none is left: the empty proposal is valid, so this ends. Closed faces wait, and are proposed
-// again whenever the stroke goes on.
+// again when something changes beside them.
 
 #include "server/cutting/cut_mesh.h"
 
@@ -54,7 +54,9 @@ class Opening {
   bool close_offenders(const CutMesh& mesh);
   void commit(CutMesh& mesh, Stroke& stroke);
 
-  std::vector<TetIndex> tets_;  // whose faces are looked at
+  std::vector<TetIndex> tets_;            // whose faces are looked at
+  std::vector<TetIndex> still_waiting_;   // not looked at this time
+  std::vector<std::uint8_t> is_reached_;  // per node
   std::vector<Proposal> proposals_;
   std::optional<CutFaces> cuts_;
   StarAnalysis analysis_;
