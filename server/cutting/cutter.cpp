@@ -110,7 +110,8 @@ void Cutter::forget(Stroke& stroke) {
     const auto& p = mesh_.positions()[node.value];
     return std::ranges::none_of(stroke.patch,
                                 [&](const PatchTriangle& triangle) {
-                                  return distance_squared(triangle, p) <= range * range;
+                                  return std::abs(signed_distance(triangle, p)) <= range &&
+                                         is_inside(triangle, p, range);
                                 }) &&
            !std::binary_search(kept_.begin(), kept_.end(), node);
   };

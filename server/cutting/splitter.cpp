@@ -60,11 +60,13 @@ void Splitter::measure(const CutMesh& mesh, Stroke& stroke,
                        std::span<const PatchTriangle> patch) const {
   for (std::size_t i = 0; i < near_.size(); ++i) {
     if (stroke.is_labelled(near_[i])) continue;
-    Stroke::Height best;
+    const auto& p = mesh.positions()[near_[i].value];
+    auto best = stroke.height(near_[i]);
     for (std::size_t k = 0; k < patch.size(); ++k) {
-      const double nearest = distance_squared(patch[k], mesh.positions()[near_[i].value]);
-      if (best.nearest_squared < 0 || nearest < best.nearest_squared)
-        best = {nearest, heights_[i * patch.size() + k]};
+      const double height = heights_[i * patch.size() + k];
+      if (best.nearest_squared >= 0 && best.nearest_squared <= height * height) continue;
+      const double nearest = distance_squared(patch[k], p);
+      if (best.nearest_squared < 0 || nearest < best.nearest_squared) best = {nearest, height};
     }
     stroke.measure(near_[i], best);
   }
