@@ -220,12 +220,22 @@ void Opening::offend(std::size_t star, Causes&& causes) {
   if (least < 4) offenders_.push_back(weakest);
 }
 
+// Only where something has changed since the last time.
 void Opening::find_offenders() {
   offenders_.clear();
-  for (std::uint32_t p = 0; p < proposals_.size(); ++p)
-    if (proposals_[p].is_open && parted_nodes(proposals_[p]) == 0) offenders_.push_back(p);
+  for (std::size_t s = 0; s < nodes_.size(); ++s) {
+    if ((stale_[s] & kFacesStale) == 0) continue;
+    stale_[s] &= kBreachesStale;
+    for (auto i = first_face_at_[s]; i < first_face_at_[s + 1]; ++i) {
+      const auto p = faces_at_[i].second;
+      if (proposals_[p].is_open && parted_nodes(proposals_[p]) == 0) offenders_.push_back(p);
+    }
+  }
+  sort_unique(offenders_);
   if (!offenders_.empty()) return;
   for (std::size_t s = 0; s < nodes_.size(); ++s) {
+    if (stale_[s] == 0) continue;
+    stale_[s] = 0;
     const auto& star = stars_[s];
     for (const auto c : star.bad_components)
       offend(s, [&](const Proposal& p) {
@@ -241,15 +251,22 @@ void Opening::find_offenders() {
 
 bool Opening::close_offenders(const CutMesh& mesh) {
   find_offenders();
-  std::vector<std::uint32_t> stale;
+  changed_.clear();
   for (const auto p : offenders_) {
     proposals_[p].is_open = false;
     cuts_->mend(proposals_[p].face);
     for (const auto node : proposals_[p].nodes)
-      stale.push_back(static_cast<std::uint32_t>(star_index(node)));
+      changed_.push_back(static_cast<std::uint32_t>(star_index(node)));
   }
-  sort_unique(stale);
-  for (const auto s : stale) analysis_.run(mesh.topology(), *cuts_, nodes_[s], stars_[s]);
+  sort_unique(changed_);
+  for (const auto s : changed_) {
+    analysis_.run(mesh.topology(), *cuts_, nodes_[s], stars_[s]);
+    stale_[s] = kFacesStale | kBreachesStale;
+    // Whether fans are twins is decided at both ends of an edge.
+    for (auto i = first_face_at_[s]; i < first_face_at_[s + 1]; ++i)
+      for (const auto node : proposals_[faces_at_[i].second].nodes)
+        stale_[star_index(node)] |= kBreachesStale;
+  }
   return !offenders_.empty();
 }
 
@@ -294,6 +311,7 @@ void Opening::analyse_all(const CutMesh& mesh) {
     for (const auto node : proposals_[p].nodes)
       faces_at_.emplace_back(static_cast<std::uint32_t>(star_index(node)), p);
   std::sort(faces_at_.begin(), faces_at_.end());
+  stale_.assign(nodes_.size(), kFacesStale | kBreachesStale);
   first_face_at_.assign(nodes_.size() + 1, 0);
   for (const auto& [star, proposal] : faces_at_) ++first_face_at_[star + 1];
   for (std::size_t s = 0; s < nodes_.size(); ++s) first_face_at_[s + 1] += first_face_at_[s];

@@ -64,7 +64,9 @@ class Opening {
   std::vector<Star> stars_;                                        // one per node
   std::vector<std::pair<std::uint32_t, std::uint32_t>> faces_at_;  // (star, proposal), ascending
   std::vector<std::uint32_t> first_face_at_;                       // per star, into faces_at_
-  std::vector<std::uint32_t> offenders_;
+  static constexpr std::uint8_t kFacesStale = 1, kBreachesStale = 2;
+  std::vector<std::uint8_t> stale_;  // per star: what is to be checked again
+  std::vector<std::uint32_t> offenders_, changed_;
   std::vector<TetIndex> debris_;
   std::vector<TetFace> faces_;
   std::vector<Breach> breaches_;

@@ -23,7 +23,7 @@ struct Settings {
   std::uint32_t debris_tets = 4;
   double debris_volume_h3 = 0.25;
   // Splits and labels per call, all strokes together; what is left over is done in later calls.
-  std::uint32_t edits_per_call = 400;
+  std::uint32_t edits_per_call = 128;
   // Waiting faces this far from the blade are repaired.
   double repair_h = 1;
   // Labels farther from the blade are forgotten.
