@@ -21,7 +21,7 @@ TEST(Architecture, TheTreeIsRead) {
   EXPECT_GE(tree().layers.size(), 20u);
   EXPECT_GE(tree().layer_of("common/base"), 0);
   EXPECT_LT(tree().layer_of("common/base"), tree().layer_of("common/math"));
-  EXPECT_EQ(tree().layer_of("server/step"), tree().layer_of("server/dynamics") + 1);
+  EXPECT_EQ(tree().layer_of("server/cutting"), tree().layer_of("server/dynamics") + 1);
   EXPECT_TRUE(tree().closure_of("server/step").contains("common/math"));
   EXPECT_TRUE(tree().has_file("server/step/tick.cpp"));
   EXPECT_TRUE(tree().has_file("README.md"));

@@ -17,9 +17,10 @@ const std::set<std::string> kProtobufFolders{
     "server/session", "server/replication", "server/recording", "client/net",
     "client/replica", "client/replay"};
 const std::set<std::string> kGraphicsFolders{"client/render", "client/ui", "client/app"};
-const std::set<std::string> kStateFolders{
-    "common/math",        "server/world",    "server/locks", "server/input",    "server/contact",
-    "server/propagation", "server/dynamics", "server/step",  "server/scenario", "server/control"};
+const std::set<std::string> kStateFolders{"common/math",     "server/world",   "server/locks",
+                                          "server/input",    "server/contact", "server/propagation",
+                                          "server/dynamics", "server/cutting", "server/step",
+                                          "server/scenario", "server/control"};
 
 bool is_library_code(const SourceFile& file) {
   return file.path.starts_with("common/") || file.path.starts_with("server/") ||

@@ -1,0 +1,136 @@
+#include "server/cutting/cut_mesh.h"
+
+#include <algorithm>
+
+#include "common/base/assert.h"
+
+namespace trocar::cutting {
+namespace {
+
+constexpr double kShareOfWorst = 0.9;
+
+// sin(share asin(sine)) by series; for small angles, where floors are.
+double sine_of_share(double sine, double share) {
+  const double s2 = sine * sine;
+  const double angle = share * sine * (1 + s2 * (1.0 / 6 + s2 * (3.0 / 40 + s2 * (15.0 / 336))));
+  const double a2 = angle * angle;
+  return angle * (1 - a2 * (1.0 / 6 - a2 * (1.0 / 120 - a2 / 5040)));
+}
+
+}  // namespace
+
+void CutOutput::clear() {
+  auto kept_events = std::move(events);
+  auto kept_nodes = std::move(new_nodes);
+  kept_events.clear();
+  kept_nodes.clear();
+  *this = {};
+  events = std::move(kept_events);
+  new_nodes = std::move(kept_nodes);
+}
+
+CutMesh::CutMesh(dynamics::Topology& topology, const Settings& settings, std::span<Stroke> strokes)
+    : topology_(topology), settings_(settings), strokes_(strokes), places_(topology) {
+  TROCAR_ASSERT(!topology.has_links());
+  measure_scale();
+}
+
+void CutMesh::measure_scale() {
+  h_.assign(topology_.node_count(), 0);
+  reach_.assign(topology_.node_count(), 0);
+  std::vector<NodeIndex> neighbours;
+  double total = 0, worst = 1;
+  std::size_t nodes = 0;
+  for (std::uint32_t n = 0; n < topology_.node_count(); ++n) {
+    topology_.neighbours_of(NodeIndex(n), neighbours);
+    if (neighbours.empty()) continue;
+    for (const auto j : neighbours) {
+      const double edge = length(topology_.rest()[j.value] - topology_.rest()[n]);
+      h_[n] += edge;
+      reach_[n] = std::max(reach_[n], edge);
+    }
+    h_[n] /= static_cast<double>(neighbours.size());
+    longest_reach_ = std::max(longest_reach_, reach_[n]);
+    total += h_[n];
+    ++nodes;
+  }
+  mean_h_ = nodes > 0 ? total / static_cast<double>(nodes) : 0;
+  for (std::uint32_t t = 0; t < topology_.tet_count(); ++t)
+    if (topology_.has_tet(TetIndex(t)))
+      worst = std::min(worst, least_sine(rest_corners(topology_, topology_.tet(TetIndex(t)))));
+  floor_sine_ = settings_.floor_sine;
+  if (worst * kShareOfWorst < floor_sine_)
+    floor_sine_ = std::min(floor_sine_, sine_of_share(worst, kShareOfWorst));
+}
+
+void CutMesh::begin(std::span<const Vec3f> displacements, CutOutput& out) {
+  TROCAR_ASSERT(displacements.empty() || displacements.size() >= topology_.node_count());
+  out_ = &out;
+  positions_.assign(topology_.rest().begin(), topology_.rest().end());
+  for (std::size_t n = 0; n < std::min(displacements.size(), positions_.size()); ++n)
+    positions_[n] += to_double(displacements[n]);
+}
+
+double CutMesh::sine_after_split(NodeIndex a, NodeIndex b, std::uint16_t t, double length_share) {
+  const auto rest = topology_.rest();
+  const double edge = length(rest[b.value] - rest[a.value]), share = t / 65536.0;
+  const double least_length =
+      length_share * settings_.length_floor_h * (h_[a.value] + h_[b.value]) / 2;
+  if (t == 0 || edge * std::min(share, 1 - share) < least_length) return -1;
+  const Vec3d middle = along(rest[a.value], rest[b.value], t);
+  ring_of(topology_, a, b, ring_);
+  double least = 1;
+  for (const auto tet : ring_)
+    for (const auto end : {a, b}) {
+      auto corners = rest_corners(topology_, topology_.tet(tet));
+      corners[corner_of(topology_.tet(tet), end)] = middle;
+      least = std::min(least, least_sine(corners));
+    }
+  return least;
+}
+
+void CutMesh::add_node(const NewNode& made) {
+  const auto needed = topology_.node_count();
+  positions_.resize(needed);
+  h_.resize(needed);
+  reach_.resize(needed);
+  const auto n = made.node.value, a = made.a.value, b = made.b.value;
+  positions_[n] = along(positions_[a], positions_[b], made.t);
+  h_[n] = h_[a] + (h_[b] - h_[a]) * (made.t / 65536.0);
+  reach_[n] = 0;
+  topology_.for_each_neighbour(made.node, [&](NodeIndex j) {
+    reach_[n] = std::max(reach_[n], length(topology_.rest()[j.value] - topology_.rest()[n]));
+  });
+  out_->new_nodes.push_back(made);
+}
+
+NodeIndex CutMesh::split(NodeIndex a, NodeIndex b, std::uint16_t t) {
+  const auto node = split_edge(topology_, places_, a, b, t, children_);
+  add_node({node, a, b, t});
+  for (auto& stroke : strokes_)
+    if (stroke.is_active)
+      for (const auto& [parent, child] : children_) stroke.inherit(parent, child);
+  out_->events.events.push_back(Split{a, b, t, node});
+  ++out_->splits;
+  return node;
+}
+
+void CutMesh::open(std::span<const TetFace> faces, std::span<const Star> stars) {
+  auto& events = out_->events;
+  events.events.push_back(Open{static_cast<std::uint32_t>(events.faces.size()),
+                               static_cast<std::uint32_t>(faces.size())});
+  for (const auto& face : faces) {
+    events.faces.push_back(face);
+    out_->opened_area_m2 += face_area(topology_, face);
+  }
+  copies_.clear();
+  part(topology_, places_, stars, copies_);
+  for (const auto& copy : copies_) {
+    events.events.push_back(copy);
+    add_node({copy.copy, copy.node, copy.node, 0});
+    for (auto& stroke : strokes_)
+      if (stroke.is_active) stroke.inherit(copy.node, copy.copy);
+  }
+}
+
+}  // namespace trocar::cutting

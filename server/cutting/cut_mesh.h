@@ -1,0 +1,79 @@
+#pragma once
+
+// The topology under the knives: where its nodes are now, its local scale, and every edit of it,
+// told to all strokes and to whoever repeats it.
+
+#include <span>
+#include <vector>
+
+#include "server/cutting/edits.h"
+#include "server/cutting/settings.h"
+#include "server/cutting/stroke.h"
+
+namespace trocar::cutting {
+
+// displacement(node) = a + (b - a) t/65536 of the displacements at its parents; velocity likewise.
+// A copy has its original as both.
+struct NewNode {
+  NodeIndex node, a, b;
+  std::uint16_t t = 0;
+};
+
+struct CutOutput {
+  CutEvents events;
+  std::vector<NewNode> new_nodes;  // in order: a parent may be new, too
+  double opened_area_m2 = 0;       // one side of the wound, at rest
+  double waiting_area_m2 = 0;      // of strokes that ended: faces that could not be opened
+  std::uint32_t crossed_tets = 0, splits = 0, labels = 0, refused_splits = 0, pinch_splits = 0;
+  bool is_behind = false;  // work is left for the next call
+
+  void clear();
+};
+
+class CutMesh {
+ public:
+  CutMesh(dynamics::Topology& topology, const Settings& settings, std::span<Stroke> strokes);
+
+  // displacements: m, per node; none: at rest.
+  void begin(std::span<const Vec3f> displacements, CutOutput& out);
+
+  const dynamics::Topology& topology() const { return topology_; }
+  const Settings& settings() const { return settings_; }
+  std::span<const Vec3d> positions() const { return positions_; }  // now, m
+  double h(NodeIndex n) const { return h_[n.value]; }
+  double mean_h() const { return mean_h_; }
+  // Longest edge at the node in the uncut mesh, m.
+  double reach(NodeIndex n) const { return reach_[n.value]; }
+  double longest_reach() const { return longest_reach_; }
+  double floor_sine() const { return floor_sine_; }
+  CutOutput& out() { return *out_; }
+  Places& places() { return places_; }
+
+  // The smallest sine of all tets that a split would make, or -1 if a part would be shorter than
+  // this share of the floor.
+  double sine_after_split(NodeIndex a, NodeIndex b, std::uint16_t t, double length_share = 1);
+  NodeIndex split(NodeIndex a, NodeIndex b, std::uint16_t t);
+  // Faces from the side of the lower tet, ascending; the stars of their nodes, ascending, with
+  // these faces cut.
+  void open(std::span<const TetFace> faces, std::span<const Star> stars);
+  // Tets bisected by the last split().
+  std::size_t last_ring() const { return children_.size(); }
+
+ private:
+  void measure_scale();
+  void add_node(const NewNode& node);
+
+  dynamics::Topology& topology_;
+  const Settings settings_;
+  const std::span<Stroke> strokes_;
+  Places places_;
+  std::vector<Vec3d> positions_;
+  std::vector<double> h_, reach_;  // m, per node
+  double mean_h_ = 0, longest_reach_ = 0, floor_sine_ = 0;
+  CutOutput* out_ = nullptr;
+  std::vector<TetChild> children_;
+  std::vector<TetIndex> ring_;
+  std::vector<Duplicate> copies_;
+};
+
+}  // namespace trocar::cutting

@@ -1,0 +1,121 @@
+#include "server/cutting/cutter.h"
+
+#include <algorithm>
+
+namespace trocar::cutting {
+
+Cutter::Cutter(dynamics::Topology& topology, const Settings& settings)
+    : strokes_(kMaxStrokes), mesh_(topology, settings, strokes_) {
+  stroke_of_.fill(kNone);
+}
+
+Stroke* Cutter::begin_stroke(std::uint32_t blade) {
+  for (std::uint32_t s = 0; s < strokes_.size(); ++s) {
+    if (strokes_[s].is_active) continue;
+    auto& stroke = strokes_[s];
+    stroke.is_active = true;
+    stroke.id = next_id_++;
+    stroke.h = mesh_.mean_h();
+    stroke_of_[blade] = s;
+    return &stroke;
+  }
+  return nullptr;
+}
+
+bool Cutter::move(std::uint32_t blade, std::span<const Vec3d> edge) {
+  if (blade >= kMaxBlades || !is_blade(edge)) return false;
+  if (stroke_of_[blade] != kNone) {
+    auto& stroke = strokes_[stroke_of_[blade]];
+    if (stroke.motion.move(edge, stroke.h, mesh_.settings()) == BladeMotion::Verdict::Accepted)
+      return true;
+    lift(blade);
+  }
+  auto* const stroke = begin_stroke(blade);
+  if (stroke == nullptr) return false;
+  return stroke->motion.move(edge, stroke->h, mesh_.settings()) == BladeMotion::Verdict::Accepted;
+}
+
+void Cutter::lift(std::uint32_t blade) {
+  if (blade >= kMaxBlades || stroke_of_[blade] == kNone) return;
+  auto& stroke = strokes_[stroke_of_[blade]];
+  stroke.motion.finish(stroke.h, mesh_.settings());
+  stroke.has_ended = true;
+  stroke_of_[blade] = kNone;
+}
+
+bool Cutter::is_idle() const {
+  return std::ranges::none_of(strokes_, [](const Stroke& stroke) {
+    return stroke.is_active && (stroke.has_ended || stroke.motion.has_strip());
+  });
+}
+
+void Cutter::cut(std::span<const Vec3f> displacements, CutOutput& out) {
+  out.clear();
+  if (is_idle()) return;
+  mesh_.begin(displacements, out);
+  order_.clear();
+  for (std::uint32_t s = 0; s < strokes_.size(); ++s)
+    if (strokes_[s].is_active && (strokes_[s].has_ended || strokes_[s].motion.has_strip()))
+      order_.push_back(s);
+  std::sort(order_.begin(), order_.end(),
+            [&](auto a, auto b) { return strokes_[a].id < strokes_[b].id; });
+  const auto share = std::max<std::uint32_t>(
+      1, mesh_.settings().edits_per_call / static_cast<std::uint32_t>(order_.size()));
+  for (const auto s : order_) {
+    auto budget = share;
+    const bool is_done = work(strokes_[s], budget);
+    // What comes at the end of a stroke is done in calls of its own.
+    if (!is_done || (strokes_[s].has_ended && (budget < share || !end(strokes_[s]))))
+      out.is_behind = true;
+  }
+}
+
+// Returns whether nothing is left.
+bool Cutter::work(Stroke& stroke, std::uint32_t& budget) {
+  while (stroke.motion.has_strip()) {
+    if (budget == 0) return false;
+    const double extension = mesh_.settings().extension_h * stroke.h;
+    auto sides = stroke.side_normals;
+    make_patch(stroke.motion.strip(), extension, sides, stroke.patch);
+    const bool is_finished = splitter_.run(mesh_, stroke, stroke.patch, budget);
+    opening_.run(mesh_, stroke);
+    if (!is_finished) return false;
+    stroke.side_normals = sides;
+    stroke.way += longest_motion(stroke.motion.strip().from, stroke.motion.strip().to);
+    stroke.motion.pop();
+    if (stroke.way > mesh_.settings().repair_h * stroke.h) {
+      stroke.way = 0;
+      if (!stroke.waiting.empty()) repair_.run_behind(mesh_, stroke, opening_);
+    }
+    forget(stroke);
+  }
+  return true;
+}
+
+// Returns whether the stroke is over.
+bool Cutter::end(Stroke& stroke) {
+  if (!repair_.finish(mesh_, stroke, opening_)) return false;
+  mesh_.out().waiting_area_m2 += opening_.waiting_area(mesh_, stroke);
+  stroke.clear();
+  return true;
+}
+
+void Cutter::forget(Stroke& stroke) {
+  kept_.clear();
+  for (const auto t : stroke.waiting)
+    for (const auto node : mesh_.topology().tet(t)) kept_.push_back(node);
+  std::sort(kept_.begin(), kept_.end());
+  const double range = mesh_.settings().forget_h * stroke.h;
+  const auto is_far = [&](NodeIndex node) {
+    const auto& p = mesh_.positions()[node.value];
+    return std::ranges::none_of(stroke.patch,
+                                [&](const PatchTriangle& triangle) {
+                                  return std::abs(signed_distance(triangle, p)) <= range &&
+                                         is_inside(triangle, p, range);
+                                }) &&
+           !std::binary_search(kept_.begin(), kept_.end(), node);
+  };
+  stroke.forget_if(is_far, mesh_.topology());
+}
+
+}  // namespace trocar::cutting

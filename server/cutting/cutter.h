@@ -1,0 +1,71 @@
+#pragma once
+
+// Cuts an organ's tets along the paths of blades, progressively: the wound follows the blade.
+//
+// Each tick says where blades are (move) and which have left (lift); cut() then does the work. An
+// edge that a blade's path crosses is bisected or one of its ends is taken to lie on the wound
+// (splitter.h); wound faces are opened as far as the surface stays manifold (opening.h); nodes are
+// parted by topology alone (star.h). So at every return of cut():
+//   - every tet has a positive volume; its dihedral angles keep the floor, half of it where a
+//     pinch was repaired (Settings);
+//   - every piece is a closed manifold solid; volume and mass are those of before, to rounding;
+//   - the edits listed in CutOutput, applied to a topology as it was before, make the one it is.
+// Paths are in the world and meet tissue where it is now; floors are of the shape at rest.
+//
+// From outside: nothing is believed. A blade that is not finite, has no length or too many points
+// is refused; one that jumps begins a new stroke. Work per call is bounded by
+// Settings::edits_per_call; what is left over follows in later calls, in order.
+//
+// Deterministic: the same calls give the same topology. Strokes are done in the order in which they
+// began. Not for organs with links. One writer; the topology is edited by nobody else between
+// construction and destruction, except that tets and nodes may be removed while no stroke is on.
+
+#include "server/cutting/opening.h"
+#include "server/cutting/repair.h"
+#include "server/cutting/splitter.h"
+
+namespace trocar::cutting {
+
+inline constexpr std::uint32_t kMaxBlades = 32;
+inline constexpr std::uint32_t kMaxStrokes = 2 * kMaxBlades;
+
+class Cutter {
+ public:
+  explicit Cutter(dynamics::Topology& topology, const Settings& settings = {});
+
+  // Where a blade's edge is now, m, two to kMaxEdgePoints points. False: refused; the stroke, if
+  // there is one, waits where it was.
+  bool move(std::uint32_t blade, std::span<const Vec3d> edge);
+  void lift(std::uint32_t blade);
+
+  // displacements: of the nodes from rest, m, node_count of them; none: everything is at rest.
+  void cut(std::span<const Vec3f> displacements, CutOutput& out);
+
+  // To be told of what others remove between calls.
+  Places& places() { return mesh_.places(); }
+
+  // Nothing to do until a blade moves.
+  bool is_idle() const;
+  double floor_sine() const { return mesh_.floor_sine(); }
+  double mean_h() const { return mesh_.mean_h(); }
+
+ private:
+  static constexpr std::uint32_t kNone = 0xffffffffu;
+
+  Stroke* begin_stroke(std::uint32_t blade);
+  bool work(Stroke& stroke, std::uint32_t& budget);
+  bool end(Stroke& stroke);
+  void forget(Stroke& stroke);
+
+  std::vector<Stroke> strokes_;
+  CutMesh mesh_;
+  Splitter splitter_;
+  Opening opening_;
+  Repair repair_;
+  std::array<std::uint32_t, kMaxBlades> stroke_of_;  // place in strokes_, or kNone
+  std::uint32_t next_id_ = 0;
+  std::vector<std::uint32_t> order_;  // places in strokes_ of active ones, by id
+  std::vector<NodeIndex> kept_;
+};
+
+}  // namespace trocar::cutting

@@ -1,0 +1,141 @@
+#include "server/cutting/edits.h"
+
+#include <algorithm>
+
+#include "common/base/assert.h"
+
+namespace trocar::cutting {
+namespace {
+
+Error mismatch(std::size_t event, const char* what) {
+  return {ErrorCode::BadMessage, "cut event " + std::to_string(event) + ": " + what};
+}
+
+void replace_node(dynamics::Topology& topology, TetIndex place, NodeIndex old, NodeIndex node) {
+  auto tet = topology.tet(place);
+  tet[corner_of(tet, old)] = node;
+  topology.remove_tet(place);
+  topology.put_tet(place, tet);
+}
+
+// One event after another on a topology.
+class Replay {
+ public:
+  Replay(const CutEvents& events, dynamics::Topology& topology, Places& places)
+      : events_(events), topology_(topology), places_(places), cuts_(topology) {}
+
+  Status run() {
+    for (at_ = 0; at_ < events_.events.size(); ++at_)
+      if (auto status = std::visit([&](const auto& e) { return repeat(e); }, events_.events[at_]);
+          !status)
+        return status;
+    if (copied_ != copies_.size()) return mismatch(at_, "fewer copies of nodes than here");
+    return {};
+  }
+
+ private:
+  bool has(NodeIndex n) const { return n.value < topology_.node_count() && topology_.has_node(n); }
+
+  Status repeat(const Split& split) {
+    if (!has(split.a) || !has(split.b) || split.a == split.b || split.t == 0)
+      return mismatch(at_, "no such edge to split");
+    std::vector<TetIndex> ring;
+    ring_of(topology_, split.a, split.b, ring);
+    if (ring.empty()) return mismatch(at_, "no such edge to split");
+    std::vector<TetChild> children;
+    if (split_edge(topology_, places_, split.a, split.b, split.t, children) != split.node)
+      return mismatch(at_, "the new node has another number here");
+    return {};
+  }
+  Status repeat(const Open& open) {
+    if (open.first_face > events_.faces.size() ||
+        open.face_count > events_.faces.size() - open.first_face)
+      return mismatch(at_, "faces out of range");
+    nodes_.clear();
+    cuts_.clear();
+    for (const auto& face : std::span(events_.faces).subspan(open.first_face, open.face_count)) {
+      if (face.tet.value >= topology_.tet_count() || !topology_.has_tet(face.tet) ||
+          face.corner > 3 || cuts_.is_cut(face) || !across(topology_, face))
+        return mismatch(at_, "no such face to open");
+      cuts_.cut(face);
+      for (const auto node : face_nodes(topology_.tet(face.tet), face.corner))
+        nodes_.push_back(node);
+    }
+    std::sort(nodes_.begin(), nodes_.end());
+    nodes_.erase(std::unique(nodes_.begin(), nodes_.end()), nodes_.end());
+    std::vector<Star> stars(nodes_.size());
+    for (std::size_t i = 0; i < nodes_.size(); ++i)
+      analysis_.run(topology_, cuts_, nodes_[i], stars[i]);
+    part(topology_, places_, stars, copies_);
+    return {};
+  }
+  Status repeat(const Duplicate& copy) {
+    if (copied_ >= copies_.size() || copies_[copied_] != copy)
+      return mismatch(at_, "another node was copied here");
+    ++copied_;
+    return {};
+  }
+
+  const CutEvents& events_;
+  dynamics::Topology& topology_;
+  Places& places_;
+  CutFaces cuts_;
+  StarAnalysis analysis_;
+  std::vector<NodeIndex> nodes_;
+  std::vector<Duplicate> copies_;
+  std::size_t at_ = 0, copied_ = 0;
+};
+
+}  // namespace
+
+void CutEvents::clear() {
+  events.clear();
+  faces.clear();
+}
+
+NodeIndex split_edge(dynamics::Topology& topology, Places& places, NodeIndex a, NodeIndex b,
+                     std::uint16_t t, std::vector<TetChild>& children) {
+  TROCAR_ASSERT(t > 0);
+  std::vector<TetIndex> ring;
+  ring_of(topology, a, b, ring);
+  std::vector<std::uint16_t> regions;
+  std::ranges::set_intersection(topology.regions_of(a), topology.regions_of(b),
+                                std::back_inserter(regions));
+  const auto node = places.take_node(topology);
+  const auto middle = [&](std::span<const Vec3d> positions) {
+    return along(positions[a.value], positions[b.value], t);
+  };
+  topology.put_node(node, middle(topology.rest()), middle(topology.stress_free()), regions);
+  children.clear();
+  for (const auto parent : ring) {
+    auto child = topology.tet(parent);
+    child[corner_of(child, a)] = node;
+    replace_node(topology, parent, b, node);
+    const auto place = places.take_tet(topology);
+    topology.put_tet(place, child);
+    children.push_back({parent, place});
+  }
+  return node;
+}
+
+void part(dynamics::Topology& topology, Places& places, std::span<const Star> stars,
+          std::vector<Duplicate>& copies) {
+  for (const auto& star : stars)
+    for (std::uint16_t c = 1; c < star.component_count; ++c) {
+      const auto copy = places.take_node(topology);
+      const auto regions = topology.regions_of(star.node);
+      const std::vector<std::uint16_t> own(regions.begin(), regions.end());
+      const auto rest = topology.rest()[star.node.value];
+      const auto stress_free = topology.stress_free()[star.node.value];
+      topology.put_node(copy, rest, stress_free, own);
+      for (std::size_t k = 0; k < star.tets.size(); ++k)
+        if (star.components[k] == c) replace_node(topology, star.tets[k], star.node, copy);
+      copies.push_back({star.node, copy});
+    }
+}
+
+Status apply(const CutEvents& events, dynamics::Topology& topology, Places& places) {
+  return Replay(events, topology, places).run();
+}
+
+}  // namespace trocar::cutting

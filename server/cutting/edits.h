@@ -1,0 +1,67 @@
+#pragma once
+
+// The edits that a cut consists of, and the list of them by which whoever holds the same topology
+// repeats it: integers only. The order is that in which they were done.
+//
+//   Split      an edge gets a node at t/65536 from a to b; each tet at it becomes two: the old one
+//              keeps a, a new one gets b. The new node is in the regions that both ends are in, so
+//              no tet changes its material.
+//   Open       inner faces become surface, and nodes are parted as far as that parts their stars:
+//              the component with the lowest tet keeps the node, the others get copies.
+//   Duplicate  one such copy; says what Open did, and does nothing itself.
+//
+// What physics needs for a new node is here too: between which nodes it is, and where, so that its
+// displacement and velocity follow. Masses are the topology's.
+
+#include <cstdint>
+#include <span>
+#include <variant>
+#include <vector>
+
+#include "common/base/result.h"
+#include "server/cutting/places.h"
+#include "server/cutting/star.h"
+
+namespace trocar::cutting {
+
+struct Split {
+  NodeIndex a, b;
+  std::uint16_t t = 0;
+  NodeIndex node;  // the new one
+  bool operator==(const Split&) const = default;
+};
+struct Open {
+  std::uint32_t first_face = 0, face_count = 0;  // in CutEvents::faces
+  bool operator==(const Open&) const = default;
+};
+struct Duplicate {
+  NodeIndex node, copy;
+  bool operator==(const Duplicate&) const = default;
+};
+using CutEvent = std::variant<Split, Open, Duplicate>;
+
+struct CutEvents {
+  std::vector<CutEvent> events;
+  std::vector<TetFace> faces;  // from the side of the lower tet
+
+  void clear();
+  bool operator==(const CutEvents&) const = default;
+};
+
+struct TetChild {
+  TetIndex parent, child;
+};
+
+// Of an edge of a tet, 0 < t. Returns the new node; children: the tet that keeps a, the new one.
+NodeIndex split_edge(dynamics::Topology& topology, Places& places, NodeIndex a, NodeIndex b,
+                     std::uint16_t t, std::vector<TetChild>& children);
+
+// Gives every component of the stars but the first a copy of its node.
+void part(dynamics::Topology& topology, Places& places, std::span<const Star> stars,
+          std::vector<Duplicate>& copies);
+
+// Repeats a cut. Everything is checked before it is done; after an error the edits before it have
+// been done.
+Status apply(const CutEvents& events, dynamics::Topology& topology, Places& places);
+
+}  // namespace trocar::cutting

@@ -1,0 +1,33 @@
+#pragma once
+
+// What a cut may do to the mesh. Lengths are in h, the local mean edge length of the uncut mesh.
+
+#include <cstdint>
+
+namespace trocar::cutting {
+
+struct Settings {
+  double snap = 0.15;        // share of an edge: a crossing nearer to an end labels that end
+  double extension_h = 0.3;  // how far the patch goes ahead of the blade and past its ends
+  // Sine of 8 degrees. A mesh whose own worst angle is below it gets 0.9 of that instead.
+  double floor_sine = 0.13917310096006544;
+  double length_floor_h = 0.2;
+  // Motion is collected until it is so long, or so many ticks old.
+  double collect_h = 0.1;
+  std::uint32_t collect_ticks = 8;
+  double piece_h = 0.5;  // longer motion is cut piece by piece
+  // A blade that has gone farther at once has not moved but appeared.
+  std::uint32_t most_pieces_of_motion = 64;
+  // A part cut off stays with the other side if it has fewer tets, or at most four times as many
+  // and less volume (in h^3; a regular tet has 0.12).
+  std::uint32_t debris_tets = 4;
+  double debris_volume_h3 = 0.25;
+  // Splits and labels per call, all strokes together; what is left over is done in later calls.
+  std::uint32_t edits_per_call = 128;
+  // Waiting faces this far from the blade are repaired.
+  double repair_h = 1;
+  // Labels farther from the blade are forgotten.
+  double forget_h = 2;
+};
+
+}  // namespace trocar::cutting

@@ -1,0 +1,191 @@
+#include "server/cutting/splitter.h"
+
+#include <algorithm>
+#include <limits>
+#include <tuple>
+
+namespace trocar::cutting {
+namespace {
+
+// An edge may be stretched to this many times its length at rest.
+constexpr double kMostStretch = 1.5;
+constexpr double kSlack_h = 1e-6;
+// A patch costs something even where there is nothing to cut; in edits.
+constexpr std::uint32_t kPatchCost = 8, kNearPerEdit = 8;
+
+std::uint16_t quantised(double t) {
+  return static_cast<std::uint16_t>(std::clamp(std::floor(t * 65536 + 0.5), 0.0, 65535.0));
+}
+
+}  // namespace
+
+void Splitter::find_near(const CutMesh& mesh, std::span<const PatchTriangle> patch) {
+  near_.clear();
+  is_close_.clear();
+  rank_.resize(std::max(rank_.size(), mesh.topology().node_count()));
+  Vec3d low = patch[0].corners[0], high = low;
+  for (const auto& triangle : patch)
+    for (const auto& p : triangle.corners) {
+      low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
+      high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+    }
+  const double margin = kMostStretch * mesh.longest_reach();
+  low = low - Vec3d{margin, margin, margin};
+  high += {margin, margin, margin};
+  const auto positions = mesh.positions();
+  for (std::uint32_t n = 0; n < positions.size(); ++n) {
+    const auto& p = positions[n];
+    if (p.x < low.x || p.y < low.y || p.z < low.z || p.x > high.x || p.y > high.y || p.z > high.z)
+      continue;
+    const double reach = kMostStretch * mesh.reach(NodeIndex(n));
+    if (mesh.topology().has_node(NodeIndex(n)) &&
+        std::ranges::any_of(patch, [&](const PatchTriangle& triangle) {
+          return std::abs(signed_distance(triangle, p)) <= reach && is_inside(triangle, p, reach);
+        })) {
+      near_.emplace_back(n);
+      rank_[n] = static_cast<std::uint32_t>(near_.size());
+      is_close_.push_back(std::ranges::any_of(patch, [&](const PatchTriangle& triangle) {
+        return std::abs(signed_distance(triangle, p)) <= reach / 2 &&
+               is_inside(triangle, p, reach / 2);
+      }));
+    }
+  }
+  heights_.resize(near_.size() * patch.size());
+  for (std::size_t i = 0; i < near_.size(); ++i)
+    for (std::size_t k = 0; k < patch.size(); ++k)
+      heights_[i * patch.size() + k] = signed_distance(patch[k], positions[near_[i].value]);
+}
+
+void Splitter::measure(const CutMesh& mesh, Stroke& stroke,
+                       std::span<const PatchTriangle> patch) const {
+  for (std::size_t i = 0; i < near_.size(); ++i) {
+    if (stroke.is_labelled(near_[i])) continue;
+    const auto& p = mesh.positions()[near_[i].value];
+    auto best = stroke.height(near_[i]);
+    for (std::size_t k = 0; k < patch.size(); ++k) {
+      const double height = heights_[i * patch.size() + k];
+      if (best.nearest_squared >= 0 && best.nearest_squared <= height * height) continue;
+      const double nearest = distance_squared(patch[k], p);
+      if (best.nearest_squared < 0 || nearest < best.nearest_squared) best = {nearest, height};
+    }
+    stroke.measure(near_[i], best);
+  }
+}
+
+void Splitter::cross(const CutMesh& mesh, std::span<const PatchTriangle> patch, NodeIndex a,
+                     NodeIndex b) {
+  const auto *heights_a = &heights_[(rank_[a.value] - 1) * patch.size()],
+             *heights_b = &heights_[(rank_[b.value] - 1) * patch.size()];
+  for (std::size_t k = 0; k < patch.size(); ++k) {
+    const double da = heights_a[k], db = heights_b[k];
+    if (da * db > 0 || da == db) continue;
+    const double t = da / (da - db);
+    const auto &pa = mesh.positions()[a.value], &pb = mesh.positions()[b.value];
+    if (!is_inside(patch[k], pa + (pb - pa) * t, kSlack_h * mesh.h(a))) continue;
+    const auto rest = mesh.topology().rest();
+    crossings_.push_back({a, b, t, da, db, length_squared(rest[a.value] - rest[b.value])});
+    return;
+  }
+}
+
+// A crossed edge has an end that is no farther from the patch than half its length.
+bool Splitter::is_close(NodeIndex n) const {
+  return is_close_[rank_[n.value] - 1] != 0;
+}
+
+// By the plane of a triangle.
+bool Splitter::are_parted(NodeIndex a, NodeIndex b, std::size_t triangles) const {
+  const auto *heights_a = &heights_[(rank_[a.value] - 1) * triangles],
+             *heights_b = &heights_[(rank_[b.value] - 1) * triangles];
+  for (std::size_t k = 0; k < triangles; ++k)
+    if (!(heights_a[k] * heights_b[k] > 0)) return true;
+  return false;
+}
+
+void Splitter::find_crossings(const CutMesh& mesh, const Stroke& stroke,
+                              std::span<const PatchTriangle> patch) {
+  crossings_.clear();
+  for (const auto a : near_) {
+    if (!is_close(a) || stroke.is_labelled(a)) continue;
+    others_.clear();
+    mesh.topology().for_each_neighbour(a, [&](NodeIndex b) {
+      if (rank_[b.value] > 0 && (a < b || !is_close(b)) && are_parted(a, b, patch.size()) &&
+          !stroke.is_labelled(b))
+        others_.push_back(b);
+    });
+    std::sort(others_.begin(), others_.end());
+    others_.erase(std::unique(others_.begin(), others_.end()), others_.end());
+    for (const auto b : others_) cross(mesh, patch, std::min(a, b), std::max(a, b));
+  }
+}
+
+void Splitter::count_crossed_tets(CutMesh& mesh) {
+  crossed_.clear();
+  for (const auto& crossing : crossings_) {
+    ring_of(mesh.topology(), crossing.a, crossing.b, ring_);
+    crossed_.insert(crossed_.end(), ring_.begin(), ring_.end());
+  }
+  std::sort(crossed_.begin(), crossed_.end());
+  crossed_.erase(std::unique(crossed_.begin(), crossed_.end()), crossed_.end());
+  mesh.out().crossed_tets += static_cast<std::uint32_t>(crossed_.size());
+}
+
+bool Splitter::snap(CutMesh& mesh, Stroke& stroke, std::uint32_t& budget) {
+  snaps_.clear();
+  const double share = mesh.settings().snap;
+  for (const auto& c : crossings_) {
+    if (c.t < share) snaps_.push_back({std::abs(c.height_a), c.a, c.b});
+    if (1 - c.t < share) snaps_.push_back({std::abs(c.height_b), c.b, c.a});
+  }
+  std::sort(snaps_.begin(), snaps_.end(), [](const Snap& x, const Snap& y) {
+    return std::tie(x.height, x.node, x.other) < std::tie(y.height, y.node, y.other);
+  });
+  for (const auto& snap : snaps_) {
+    if (stroke.is_labelled(snap.node) || stroke.is_labelled(snap.other)) continue;
+    if (budget == 0) return false;
+    --budget;
+    stroke.label(snap.node);
+    ++mesh.out().labels;
+  }
+  return true;
+}
+
+bool Splitter::split(CutMesh& mesh, Stroke& stroke, std::uint32_t& budget) {
+  std::sort(crossings_.begin(), crossings_.end(), [](const Crossing& x, const Crossing& y) {
+    return std::tuple(-x.length_squared, x.a, x.b) < std::tuple(-y.length_squared, y.a, y.b);
+  });
+  for (const auto& crossing : crossings_) {
+    if (stroke.is_labelled(crossing.a) || stroke.is_labelled(crossing.b)) continue;
+    if (budget == 0) return false;
+    const auto t = quantised(crossing.t);
+    if (mesh.sine_after_split(crossing.a, crossing.b, t) >= mesh.floor_sine()) {
+      stroke.label(mesh.split(crossing.a, crossing.b, t));
+      budget -= std::min(budget, static_cast<std::uint32_t>(mesh.last_ring()));
+    } else {
+      stroke.label(crossing.t <= 0.5 ? crossing.a : crossing.b);
+      ++mesh.out().labels;
+      ++mesh.out().refused_splits;
+      --budget;
+    }
+  }
+  return true;
+}
+
+bool Splitter::run(CutMesh& mesh, Stroke& stroke, std::span<const PatchTriangle> patch,
+                   std::uint32_t& budget) {
+  if (patch.empty()) return true;
+  find_near(mesh, patch);
+  if (!near_.empty()) {
+    stroke.h = 0;
+    for (const auto node : near_) stroke.h += mesh.h(node) / static_cast<double>(near_.size());
+  }
+  measure(mesh, stroke, patch);
+  find_crossings(mesh, stroke, patch);
+  for (const auto node : near_) rank_[node.value] = 0;
+  count_crossed_tets(mesh);
+  const bool is_finished = snap(mesh, stroke, budget) && split(mesh, stroke, budget);
+  budget -= std::min(budget, kPatchCost + static_cast<std::uint32_t>(near_.size()) / kNearPerEdit);
+  return is_finished;
+}
+
+}  // namespace trocar::cutting

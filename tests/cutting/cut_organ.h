@@ -1,0 +1,64 @@
+#pragma once
+
+// Organs to cut, blades to cut them with, and what must hold after every cut.
+
+#include <memory>
+#include <string>
+
+#include "server/cutting/cutter.h"
+#include "server/cutting/validate.h"
+#include "tests/support/random.h"
+
+namespace trocar::cutting::testing {
+
+// Cells of five tets each, mirrored in turn; nodes moved by up to `jitter` cells, on the outside
+// along it only. Centred on the origin.
+scene::Organ box_organ(int nx, int ny, int nz, double cell_m, double jitter = 0.2,
+                       std::uint64_t seed = 1);
+scene::Organ tet_organ();  // one tet, edges about 0.1 m
+
+double least_dihedral_sine(const dynamics::Topology& topology);
+double total_mass(const dynamics::Topology& topology);
+// Over everything: places, tets, positions.
+std::uint64_t topology_hash(const dynamics::Topology& topology);
+
+// Places of a blade's edge, one per tick.
+using Edge = std::vector<Vec3d>;
+using Path = std::vector<Edge>;
+// In steps of at most step_m.
+Path straight_path(const Edge& from, const Edge& to, double step_m);
+
+// An organ, its cutter, and a copy that repeats every edit.
+class CutOrgan {
+ public:
+  explicit CutOrgan(scene::Organ organ, const Settings& settings = {});
+
+  const dynamics::Topology& topology() const { return topology_; }
+  const scene::Organ& organ() const { return *organ_; }
+  Cutter& cutter() { return cutter_; }
+  // CPU time of the last call of Cutter::cut().
+  std::uint64_t last_ns() const { return last_ns_; }
+  // Sums over all calls.
+  const CutOutput& total() const { return total_; }
+
+  void tick();
+  void run_until_idle();
+  // A blade along a path, a place per tick, then lifted and all its work done.
+  void stroke(const Path& path, std::uint32_t blade = 0);
+  // Validity, volume, mass, surface, floor, and the copy's equality: what is wrong, or nothing.
+  std::string check() const;
+
+  std::vector<Vec3f> displacements;  // none: at rest
+
+ private:
+  std::unique_ptr<const scene::Organ> organ_;
+  dynamics::Topology topology_, copy_;
+  Places copy_places_;
+  Cutter cutter_;
+  CutOutput output_, total_;
+  std::string failure_;
+  std::uint64_t last_ns_ = 0;
+  const double volume_, mass_, surface_;
+};
+
+}  // namespace trocar::cutting::testing

@@ -1,0 +1,58 @@
+#pragma once
+
+// Strokes for campaigns and property tests: what hands do, and what they hardly do. And what of a
+// stroke lies inside the organ, to compare the wound with.
+
+#include "tests/cutting/cut_organ.h"
+
+namespace trocar::cutting::testing {
+
+enum class StrokeKind { Straight, Curved, Sawing, Short, Knife, Through };
+
+class RandomStrokes {
+ public:
+  RandomStrokes(const scene::Organ& organ, double h, std::uint64_t seed);
+
+  // Sizes follow h. Knife: one end outside, the tip inside, moved sideways; Through: a plane across
+  // everything; the others somewhere inside.
+  Path next(StrokeKind kind);
+  StrokeKind any_kind();  // not Through
+  trocar::testing::Random& random() { return random_; }
+  // Of the last path of kind Through.
+  Vec3d plane_point() const { return plane_point_; }
+  Vec3d plane_normal() const { return plane_normal_; }
+
+ private:
+  Vec3d direction();
+  Path sweep(const Vec3d& start, Vec3d edge, Vec3d motion, double length, double width,
+             double bend);
+  Path knife();
+  Path through();
+  Path sawing(const Vec3d& centre);
+
+  const mesh::TetMesh& mesh_;
+  const double h_;
+  const std::vector<Vec3d> normals_;
+  trocar::testing::Random random_;
+  Vec3d plane_point_, plane_normal_;
+};
+
+// Point in organ, at rest: through a grid of its tets.
+class InsideTest {
+ public:
+  explicit InsideTest(const mesh::TetMesh& mesh);
+  bool contains(const Vec3d& p) const;
+  // m^2, by samples `spacing` apart. Swept twice counts twice.
+  double swept_area(const Path& path, double spacing) const;
+
+ private:
+  std::size_t cell_of(const Vec3d& p) const;
+
+  const mesh::TetMesh& mesh_;
+  Vec3d low_;
+  double cell_;
+  std::array<std::size_t, 3> size_;
+  std::vector<std::vector<TetIndex>> cells_;
+};
+
+}  // namespace trocar::cutting::testing
