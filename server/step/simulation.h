@@ -25,7 +25,7 @@ class Simulation {
   // simulation: statistics, a snapshot for the journal. Frame f shows the state after tick 16 f.
   std::shared_ptr<PublishedFrame> take_frame() { return std::move(context_->frame); }
 
-  // Full state: exactly the bytes that the tick hash covers.
+  // Full state: all that the tick hash covers.
   void write_snapshot(Bytes& out) const;
   // Replaces the state, or leaves it as it was and says what is wrong with the bytes.
   Status restore_snapshot(BytesView snapshot);
