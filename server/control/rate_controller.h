@@ -34,8 +34,8 @@
 
 namespace trocar::control {
 
-// Beyond this, contact forces of fast hands are off by more than 3 %.
-inline constexpr std::uint32_t kLongestFarInterval = 2;
+// Beyond this, contact forces of fast hands are off by 3 % and more.
+inline constexpr std::uint32_t kLongestFarInterval = 3;
 
 struct RateLimits {
   step::TickDecisions highest;  // when there is room for all

@@ -10,6 +10,8 @@ namespace trocar::dynamics {
 namespace {
 
 constexpr std::uint32_t kNone = 0xffffffffu;
+// Groups next to one another that take turns together, so that memory is read in runs.
+constexpr std::uint32_t kPhaseGroups = 16;
 constexpr float kMaxOverRelaxationFewSweeps = 1.3f;
 // A step of one node beyond this, m, is as broken as one that is not finite.
 constexpr float kMaxNodeStep = 1.0f;
@@ -48,7 +50,7 @@ BlockDescent::BlockDescent(const scene::Organ& organ, const world::World& world,
   first_link_.resize(slot_count);
   links_.reserve(8 * contact::kMaxPointsPerTool + contact::kMaxSelfPoints);
   residuals_.reserve(world.node_count());
-  for (auto* plan : {&near_, &far_, &far_swept_, &begun_}) plan->reserve(groups);
+  for (auto* plan : {&near_, &far_, &far_swept_, &last_, &begun_}) plan->reserve(groups);
   for (auto& band : bands_) band.reserve(groups);
   const auto map = scene::material_map(organ);
   for (Group g = 0; g < group_count; ++g) {
@@ -104,7 +106,7 @@ void BlockDescent::take_state(const world::World& world, std::span<const NodeInd
 void BlockDescent::plan_step(std::span<const NodeIndex> near, const SolveSettings& settings,
                              Tick tick, std::span<const NodeIndex> held) {
   const auto& groups = tissue_.groups();
-  for (auto* plan : {&near_, &far_, &far_swept_, &begun_}) plan->clear();
+  for (auto* plan : {&near_, &far_, &far_swept_, &last_, &begun_}) plan->clear();
   for (const auto node : near) near_.add(groups, node);
   near_.finish(groups);
   far_interval_ = settings.far_interval;
@@ -112,9 +114,14 @@ void BlockDescent::plan_step(std::span<const NodeIndex> near, const SolveSetting
     for (Group g = 0; g < free_.size(); ++g) {
       const auto lanes = static_cast<std::uint8_t>(free_[g] & ~near_.lanes[g]);
       far_.add(g, lanes);
-      if (!is_slow(g) || (g + tick) % far_interval_ == 0) far_swept_.add(g, lanes);
+      if (!is_slow(g) || (g / kPhaseGroups + tick) % far_interval_ == 0) far_swept_.add(g, lanes);
     }
   far_swept_.finish(groups);
+  if (settings.far_sweeps > 0) {
+    for (const auto g : near_.groups) last_.add(g, near_.lanes[g]);
+    for (const auto g : far_swept_.groups) last_.add(g, far_swept_.lanes[g]);
+    last_.finish(groups);
+  }
   for (const auto g : near_.groups) begun_.add(g, 0xff);
   for (const auto g : is_far_linear_ ? all_groups_ : far_.groups) begun_.add(g, 0xff);
   for (const auto node : held) begun_.add(groups.slot_of(node) / kLanes, 0xff);
@@ -234,7 +241,7 @@ void BlockDescent::begin_groups(world::World& world, const ExternalLoads& loads)
     });
   if (tissue_.follows_moves())
     for_each_group(all_groups_, [&](Group g) { tissue_.restart_group(g, x_.data()); });
-  for (const auto g : begun_.groups) rejected_[g] = 0;
+  for (const auto g : begun_.groups) rejected_[g] = 0, squared_moves_[g] = 0;
 }
 
 void BlockDescent::place_held(const ExternalLoads& loads) {
@@ -321,22 +328,22 @@ void BlockDescent::hold_axes(Group group, NodeStep8& step) const {
 }
 
 void BlockDescent::relax(const SweepPlan& plan, Group group, const contact::ContactList& contacts,
-                         float omega, unsigned worker) {
+                         Relaxation omega, unsigned worker) {
   const auto lanes = plan.lanes[group];
   Float4* const x = &x_[group * kLanes];
   const Vec8 own = load_group(x);
   NodeStep8 step = inertia_of(group, own);
-  const bool is_linear = is_far_linear_ && &plan == &far_swept_ &&
+  const bool is_linear = is_far_linear_ && near_.lanes[group] == 0 &&
                          group_stamp_[group] != current_ &&
                          far_field_->add(group, lanes, inverse_dt_of(group), step);
   if (!is_linear) {
     ask_energies(group, start_.data());
     tissue_.add(group, x_.data(), own, step, scratches_[worker]);
   }
-  Float8 factor = all(-omega);
+  Float8 factor = _mm256_blendv_ps(all(-omega.far), all(-omega.near), mask_of(near_.lanes[group]));
   if (group_stamp_[group] == current_) {
     Lanes factors;
-    store(factors, all(omega));
+    store(factors, all(0) - factor);
     add_contacts(contacts, group, step, factors);
     factor = all(0) - load(factors);
   }
@@ -357,7 +364,8 @@ void BlockDescent::relax(const SweepPlan& plan, Group group, const contact::Cont
   rejected_[group] = static_cast<std::uint8_t>(rejected_[group] | bad);
 }
 
-void BlockDescent::sweep(const SweepPlan& plan, const contact::ContactList& contacts, float omega) {
+void BlockDescent::sweep(const SweepPlan& plan, const contact::ContactList& contacts,
+                         Relaxation omega) {
   workers_.run([&](unsigned w) {
     for (std::size_t colour = 0; colour + 1 < plan.colour_begins.size(); ++colour) {
       const auto begin = plan.colour_begins[colour];
@@ -421,7 +429,7 @@ void BlockDescent::write_back(const SweepPlan& plan, world::World& world) {
       displacement = now;
       if (is_swept) world.velocities[nodes[lane].value] = to_vec3(v_[first + lane]);
     }
-    squared_moves_[g] = most;
+    squared_moves_[g] = std::max(squared_moves_[g], most);
   });
 }
 
@@ -479,21 +487,22 @@ SolveReport BlockDescent::solve(const contact::ContactList& contacts,
   double squares = 0, last_squares = INFINITY;
   const auto tolerance = static_cast<double>(settings.residual_tolerance_n);
   for (std::uint32_t i = 0; i < settings.sweeps; ++i) {
-    // Far nodes go before the last near sweep, so that near residuals are those of the end.
-    for (std::uint32_t far = 0; i + 1 == settings.sweeps && far < settings.far_sweeps; ++far) {
-      sweep(far_swept_, contacts, settings.far_over_relaxation);
-      report.far_node_sweeps += far_swept_.node_count;
-    }
+    const bool has_far = i + 1 == settings.sweeps && settings.far_sweeps > 0;
+    for (std::uint32_t far = 1; has_far && far < settings.far_sweeps; ++far)
+      sweep(far_swept_, contacts, {1, settings.far_over_relaxation});
     const auto left = settings.sweeps - i;
     const bool has_few = std::ranges::any_of(settings.bands, [left](const SweepBand& band) {
       return band.sweeps >= left && band.sweeps < 3;
     });
     const SweepPlan& plan = plan_of(left, settings.bands);
-    sweep(plan, contacts, has_few ? std::min(omega, kMaxOverRelaxationFewSweeps) : omega);
+    // The last is one for all: a group with near and far nodes costs no more than near ones.
+    sweep(has_far ? last_ : plan, contacts,
+          {has_few ? std::min(omega, kMaxOverRelaxationFewSweeps) : omega,
+           settings.far_over_relaxation});
     report.node_sweeps += plan.node_count;
     ++report.sweeps;
     // Growth is judged by the nodes that every sweep has.
-    squares = settings.bands.empty()
+    squares = settings.bands.empty() && !has_far
                   ? sum_of_squares(near_)
                   : sum_of_squares_within(plan_of(settings.sweeps, settings.bands));
     if (settings.has_safeguard && squares > last_squares && omega > 1.0f) {
@@ -504,8 +513,9 @@ SolveReport BlockDescent::solve(const contact::ContactList& contacts,
     if (tolerance > 0 && squares <= tolerance * tolerance * static_cast<double>(near.size())) break;
   }
 
+  report.far_node_sweeps = settings.far_sweeps * far_swept_.node_count;
   report.node_sweeps += report.far_node_sweeps;
-  if (!settings.bands.empty()) squares = sum_of_squares(near_);
+  if (!settings.bands.empty()) squares = sum_of_squares_within(near_);
   write_back(near_, world);
   write_back(far_, world);
   float squared_move = 0;

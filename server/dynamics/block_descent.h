@@ -7,9 +7,10 @@
 // for the rest of the step when a sweep's residual grew against the sweep before.
 //
 // Two classes of nodes (graded-exterior scheme): the near ones get `sweeps`; with far_sweeps > 0
-// all other free nodes get that many, with an over-relaxation of their own, before the last near
-// sweep; there is no residual tolerance then. With far_sweeps = 0 the others stand still. Near
-// nodes may come in bands with fewer sweeps each (SweepBand): these take part in the last ones.
+// all other free nodes get that many, with an over-relaxation of their own, the last one together
+// with the near nodes' last; there is no residual tolerance then. With far_sweeps = 0 the others
+// stand still. Near nodes may come in bands with fewer sweeps each (SweepBand): these take part in
+// the last ones.
 //
 // Results do not depend on the number of workers. Work: sweeps x groups with a swept node x rows;
 // no allocation after the first steps. One caller at a time.
@@ -158,9 +159,13 @@ class BlockDescent {
   void ask_energies(Group group, const Float4* start);
   void hold_axes(Group group, NodeStep8& step) const;
   void place_held(const ExternalLoads& loads);
-  void sweep(const SweepPlan& plan, const contact::ContactList& contacts, float omega);
-  void relax(const SweepPlan& plan, Group group, const contact::ContactList& contacts, float omega,
-             unsigned worker);
+  // Over-relaxation of near and of far nodes.
+  struct Relaxation {
+    float near = 1, far = 1;
+  };
+  void sweep(const SweepPlan& plan, const contact::ContactList& contacts, Relaxation omega);
+  void relax(const SweepPlan& plan, Group group, const contact::ContactList& contacts,
+             Relaxation omega, unsigned worker);
   double sum_of_squares(const SweepPlan& plan) const;
   double sum_of_squares_within(const SweepPlan& core) const;
   void write_back(const SweepPlan& plan, world::World& world);
@@ -189,6 +194,7 @@ class BlockDescent {
   std::vector<Group> all_groups_;
   SweepPlan near_, far_, begun_;
   SweepPlan far_swept_;                     // of far_, in this step; the others coast
+  SweepPlan last_;                          // the last sweep: of near_ and far_swept_
   std::unique_ptr<FarField> far_field_;     // null: not used
   bool is_far_linear_ = false;              // in this step
   std::uint32_t far_interval_ = 1;          // of this step

@@ -16,8 +16,8 @@ FollowReport BlockDescent::follow_topology(const Topology& topology, const world
   inertia_.resize(group_count);
   squares_.resize(group_count);
   group_squares_.resize(group_count);
-  for (auto* lanes :
-       {&free_, &rejected_, &near_.lanes, &far_.lanes, &far_swept_.lanes, &begun_.lanes})
+  for (auto* lanes : {&free_, &rejected_, &near_.lanes, &far_.lanes, &far_swept_.lanes,
+                      &last_.lanes, &begun_.lanes})
     lanes->resize(group_count);
   for (auto& band : bands_) band.lanes.resize(group_count);
   for (auto* stamps : {&begun_stamp_, &group_stamp_, &serial_stamp_, &asked_stamp_})

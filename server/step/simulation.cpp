@@ -1,5 +1,6 @@
 #include "server/step/simulation.h"
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -24,6 +25,19 @@ void State::visit(world::StateArchive& archive) {
 Scene::Scene(scene::Organ o, unsigned worker_count)
     : organ(std::move(o)), layout(wire::make_surface_layout(organ)), workers(worker_count) {}
 
+namespace {
+
+// Springs and linear tets cost no more than the matrices of a linear far field.
+bool is_costly(const scene::Organ& organ) {
+  const auto has_energy = [](const scene::Material& m) {
+    return m.elastic_law == scene::ElasticLaw::NeoHookean;
+  };
+  return has_energy(organ.material) ||
+         std::ranges::any_of(organ.regions, [&](const auto& r) { return has_energy(r.material); });
+}
+
+}  // namespace
+
 StepContext::StepContext(const Scene& s, const world::World& world)
     : scene(s),
       finder(s.organ),
@@ -32,7 +46,7 @@ StepContext::StepContext(const Scene& s, const world::World& world)
       active(world.node_count()),
       solver(s.organ, world, s.workers),
       far_plan(solver.far_plan(kTickSeconds)),
-      has_linear_far_field(solver.use_linear_far_field(world)),
+      has_linear_far_field(is_costly(s.organ) && solver.use_linear_far_field(world)),
       surface_displacements(s.layout.vertex_count()) {
   contacts.reserve();
   requests.reserve(kMaxTools);
