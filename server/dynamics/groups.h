@@ -20,9 +20,10 @@
 // what meets at the changed nodes, not to the organ, and nothing is allocated while capacities
 // suffice.
 //
-// A node's result is a function of the colours: which nodes share a group matters only to speed.
-// After a change colours are a function of the history of changes, so whoever stores a state stores
-// the colour of every node beside the topology; groups are made anew from these.
+// What a sweep does to a node is a function of the colours: which nodes share a group matters only
+// to speed. But far nodes take turns by groups (SolveSettings::far_interval, FarField), and after a
+// change colours and groups are a function of the history of changes: whoever stores a state then
+// stores the slot of every node beside the topology.
 
 #include <algorithm>
 #include <array>
