@@ -433,7 +433,7 @@ void BlockDescent::write_back(const SweepPlan& plan, world::World& world) {
   });
 }
 
-std::uint32_t BlockDescent::restore_rejected(world::World& world) {
+BlockDescent::Restored BlockDescent::restore_rejected(world::World& world) {
   std::vector<NodeIndex> nodes;  // allocates: this is not a tick like others
   std::vector<std::uint8_t> is_in(world.node_count());
   const auto add = [&](NodeIndex node) {
@@ -447,14 +447,19 @@ std::uint32_t BlockDescent::restore_rejected(world::World& world) {
   for (std::size_t layer = 0, i = 0; layer < kRestoredLayers; ++layer)
     for (const auto end = nodes.size(); i < end; ++i)
       for (const auto neighbour : organ_.mesh.node_neighbours[nodes[i]]) add(neighbour);
+  Restored restored;
   for (const auto node : nodes) {
     const Slot slot = tissue_.groups().slot_of(node);
     x_[slot] = to_float4(start_of(slot));
-    world.displacements[node.value] = to_vec3(x_[slot]);
+    Vec3f& displacement = world.displacements[node.value];
+    restored.largest_move_m =
+        std::max(restored.largest_move_m, length(to_vec3(x_[slot]) - displacement));
+    displacement = to_vec3(x_[slot]);
     world.velocities[node.value] = {};
     v_[slot] = {};
   }
-  return static_cast<std::uint32_t>(nodes.size());
+  restored.nodes = static_cast<std::uint32_t>(nodes.size());
+  return restored;
 }
 
 SolveReport BlockDescent::solve(const contact::ContactList& contacts,
@@ -532,7 +537,12 @@ SolveReport BlockDescent::solve(const contact::ContactList& contacts,
   report.largest_move_m = std::sqrt(squared_move);
   for (const auto g : begun_.groups)
     report.nodes_rejected += static_cast<unsigned>(__builtin_popcount(rejected_[g]));
-  if (report.nodes_rejected > 0) report.nodes_restored = restore_rejected(world);
+  if (report.nodes_rejected > 0) {
+    // The start of a slow group's step is not where the last tick left its nodes.
+    const auto restored = restore_rejected(world);
+    report.nodes_restored = restored.nodes;
+    report.largest_move_m += restored.largest_move_m;
+  }
   residuals_.clear();
   for (const auto node : near) {
     const Slot slot = tissue_.groups().slot_of(node);
@@ -562,20 +572,14 @@ Vec3f BlockDescent::holding_force(const contact::ContactList& contacts, NodeInde
   return gradients.at(slot % kLanes);
 }
 
-FarPlan BlockDescent::far_plan(float dt) const {
-  const std::vector<Float4> rest(x_.size());
+FarPlan BlockDescent::far_plan(float dt) {
+  const auto traces = tissue_.traces_at_rest(0);
   double stiffness = 0, mass = 0;
-  Scratch scratch;
-  for (const auto g : all_groups_) {
-    NodeStep8 step{zero_vec8(), zero_sym_mat8()};
-    tissue_.add(g, rest.data(), zero_vec8(), step, scratch);
-    Lanes trace;
-    store(trace, step.block.xx + step.block.yy + step.block.zz);
-    for (std::size_t lane = 0; lane < kLanes; ++lane) {
-      if ((free_[g] >> lane & 1) == 0) continue;
-      stiffness += static_cast<double>(trace.v[lane]) / 3;
-      mass += static_cast<double>(constants_[g].mass.v[lane]);
-    }
+  for (std::size_t slot = 0; slot < traces.size(); ++slot) {
+    const std::size_t group = slot / kLanes, lane = slot % kLanes;
+    if ((free_[group] >> lane & 1) == 0) continue;
+    stiffness += static_cast<double>(traces[slot]) / 3;
+    mass += static_cast<double>(constants_[group].mass.v[lane]);
   }
   return FarPlan::of(stiffness, mass, static_cast<double>(dt));
 }

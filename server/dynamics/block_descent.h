@@ -113,7 +113,7 @@ class BlockDescent {
   // energies, damping, loads and tools leave of its mass times acceleration.
   Vec3f holding_force(const contact::ContactList& contacts, NodeIndex node) const;
 
-  FarPlan far_plan(float dt) const;
+  FarPlan far_plan(float dt);
   const Tissue& tissue() const { return tissue_; }
 
   // Between steps: follows topology.changed(). The world already has its nodes, their masses,
@@ -169,7 +169,11 @@ class BlockDescent {
   double sum_of_squares(const SweepPlan& plan) const;
   double sum_of_squares_within(const SweepPlan& core) const;
   void write_back(const SweepPlan& plan, world::World& world);
-  std::uint32_t restore_rejected(world::World& world);
+  struct Restored {
+    std::uint32_t nodes = 0;
+    float largest_move_m = 0;  // from where the step had put a node
+  };
+  Restored restore_rejected(world::World& world);
   Vec3f start_of(Slot slot) const;
   template <typename Task>
   void for_each_group(std::span<const Group> groups, Task&& task);

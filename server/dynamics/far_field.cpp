@@ -3,27 +3,17 @@
 namespace trocar::dynamics {
 namespace {
 
-double trace_at_rest(Tissue& tissue, float inverse_dt) {
-  const auto& groups = tissue.groups();
-  const std::vector<Float4> rest(groups.slot_count());
-  double trace = 0;
-  Scratch scratch;
-  for (Group g = 0; g < groups.group_count(); ++g) {
-    NodeStep8 step{zero_vec8(), zero_sym_mat8()};
-    tissue.begin_group(g, rest.data(), inverse_dt);
-    tissue.add(g, rest.data(), zero_vec8(), step, scratch);
-    Lanes lanes;
-    store(lanes, step.block.xx + step.block.yy + step.block.zz);
-    for (const float v : lanes.v) trace += static_cast<double>(v);
-  }
-  return trace;
+double sum(const std::vector<float>& values) {
+  double total = 0;
+  for (const float value : values) total += static_cast<double>(value);
+  return total;
 }
 
 }  // namespace
 
 FarField::FarField(Tissue& tissue, const world::World& world) : tissue_(tissue), linear_(tissue) {
   const auto group_count = tissue.groups().group_count(), slots = tissue.groups().slot_count();
-  const double elastic = trace_at_rest(tissue, 0), damped = trace_at_rest(tissue, 1);
+  const double elastic = sum(tissue.traces_at_rest(0)), damped = sum(tissue.traces_at_rest(1));
   if (elastic > 0) damping_time_s_ = static_cast<float>((damped - elastic) / elastic);
   inverse_square_edges_.resize(group_count);
   taken_at_.resize(group_count);

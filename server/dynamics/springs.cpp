@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/scene/any_material.h"
 #include "server/dynamics/tet_shape.h"
 
 namespace trocar::dynamics {
@@ -17,17 +18,13 @@ Float8 inverse_length(Float8 length_squared) {
 }
 
 bool has_damping(const scene::Organ& organ) {
-  const auto is_damped = [](const scene::Material& m) { return m.spring_damping_time_s > 0; };
-  return is_damped(organ.material) ||
-         std::ranges::any_of(organ.regions, [&](const auto& r) { return is_damped(r.material); });
+  return scene::any_material(organ,
+                             [](const scene::Material& m) { return m.spring_damping_time_s > 0; });
 }
 
 bool has_elasticity(const scene::Organ& organ) {
-  const auto has_springs = [](const scene::Material& m) {
-    return m.elastic_law == scene::ElasticLaw::Springs;
-  };
-  return has_springs(organ.material) ||
-         std::ranges::any_of(organ.regions, [&](const auto& r) { return has_springs(r.material); });
+  return scene::any_material(
+      organ, [](const scene::Material& m) { return m.elastic_law == scene::ElasticLaw::Springs; });
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "common/scene/any_material.h"
 #include "server/dynamics/hyperelastic.h"
 #include "server/dynamics/springs.h"
 #include "server/dynamics/tensor_mass.h"
@@ -11,18 +12,12 @@ namespace {
 
 using scene::ElasticLaw;
 
-template <typename Predicate>
-bool any_material(const scene::Organ& organ, Predicate&& is) {
-  return is(organ.material) ||
-         std::ranges::any_of(organ.regions, [&](const auto& r) { return is(r.material); });
-}
-
 bool has_law(const scene::Organ& organ, ElasticLaw law) {
-  return any_material(organ, [&](const scene::Material& m) { return m.elastic_law == law; });
+  return scene::any_material(organ, [&](const scene::Material& m) { return m.elastic_law == law; });
 }
 
 bool averages_volume(const scene::Organ& organ) {
-  return any_material(organ, [](const scene::Material& m) {
+  return scene::any_material(organ, [](const scene::Material& m) {
     return m.elastic_law == ElasticLaw::NeoHookean && m.has_averaged_volume;
   });
 }
@@ -53,6 +48,22 @@ void Tissue::list_touched(std::vector<GroupLanes>& out) {
   std::ranges::sort(touched_groups_);
   out.clear();
   for (const auto g : touched_groups_) out.push_back({g, lanes_[g]});
+}
+
+std::vector<float> Tissue::traces_at_rest(float inverse_dt) {
+  const std::vector<Float4> rest(groups_.slot_count());
+  std::vector<float> traces;
+  traces.reserve(rest.size());
+  Scratch scratch;
+  for (Group g = 0; g < groups_.group_count(); ++g) {
+    NodeStep8 step{zero_vec8(), zero_sym_mat8()};
+    begin_group(g, rest.data(), inverse_dt);
+    add(g, rest.data(), zero_vec8(), step, scratch);
+    Lanes lanes;
+    store(lanes, step.block.xx + step.block.yy + step.block.zz);
+    traces.insert(traces.end(), std::begin(lanes.v), std::end(lanes.v));
+  }
+  return traces;
 }
 
 FollowReport Tissue::follow_topology(const Topology& topology) {

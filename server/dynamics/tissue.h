@@ -44,6 +44,10 @@ class Tissue {
     for (const auto& energy : energies_) energy->linearise(group, x, own, step, sink);
   }
 
+  // Per slot, of the node's block of second derivatives with everything at rest, damping for steps
+  // of this length included; N/m.
+  std::vector<float> traces_at_rest(float inverse_dt);
+
   // Follows topology.changed(). The topology is the one this tissue was made from, or another of
   // the same organ with the same edits.
   FollowReport follow_topology(const Topology& topology);

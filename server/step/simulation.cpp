@@ -4,6 +4,8 @@
 #include <cmath>
 #include <string>
 
+#include "common/scene/any_material.h"
+
 namespace trocar::step {
 
 State::State(const scene::Organ& organ, const wire::SurfaceLayout& layout)
@@ -29,11 +31,9 @@ namespace {
 
 // Springs and linear tets cost no more than the matrices of a linear far field.
 bool is_costly(const scene::Organ& organ) {
-  const auto has_energy = [](const scene::Material& m) {
+  return scene::any_material(organ, [](const scene::Material& m) {
     return m.elastic_law == scene::ElasticLaw::NeoHookean;
-  };
-  return has_energy(organ.material) ||
-         std::ranges::any_of(organ.regions, [&](const auto& r) { return has_energy(r.material); });
+  });
 }
 
 }  // namespace

@@ -93,6 +93,52 @@ TEST(Reaction, AnOffAxisPushTurnsTheToolByForceTimesArm) {
   EXPECT_NEAR(reaction.torque_nm.x, 0, 0.02f * arm * reaction.force_n.y);
 }
 
+// Momenta of a free block about the origin, kg m/s and kg m^2/s.
+struct Momenta {
+  Vec3d linear, angular;
+};
+Momenta momenta_of(const world::World& world) {
+  Momenta sum;
+  for (std::uint32_t n = 0; n < world.node_count(); ++n) {
+    const Vec3d p = to_double(world.velocities[n]) * static_cast<double>(world.masses[n]);
+    sum.linear += p;
+    sum.angular += cross(to_double(world.position(NodeIndex(n))), p);
+  }
+  return sum;
+}
+
+// What the tool gives is what the block gets: the sums of the forces and torques felt over time are
+// its momenta, with a push beside its centre that sets it spinning.
+TEST(Reaction, OfAnOffAxisPushIsAllTheMomentumThatAFreeBlockGets) {
+  auto organ = block(5, 3, 5, 0.010, [](scene::Organ& o) {
+    o.fixed_nodes.clear();
+    o.material.young_modulus_pa = 20'000;
+    o.material.node_damping_per_s = 0;
+  });
+  const float top = top_of(organ);
+  HandScene scene(std::move(organ));
+  scene.decisions.sweeps = 40;
+  scene.decisions.depth_limit = 20;
+  scene.join(0, {.radius_m = 0.008f, .length_m = 0.2f, .friction = 0.3f});
+  Momenta given;
+  for (int tick = 0; tick < 120; ++tick) {
+    const float depth = 0.004f * static_cast<float>(tick) / 40 - 0.001f;
+    const Pose pose = upright({0.012f, top - depth, 0.005f});
+    scene.put(0, pose);
+    scene.tick();
+    const auto reaction = scene.reaction(0);
+    const Vec3d force = -to_double(reaction.force_n);
+    given.linear += force * static_cast<double>(kTickSeconds);
+    given.angular += (cross(to_double(pose.position), force) - to_double(reaction.torque_nm)) *
+                     static_cast<double>(kTickSeconds);
+  }
+  const auto got = momenta_of(scene.world());
+  ASSERT_GT(length(given.linear), 1e-4);
+  ASSERT_GT(length(given.angular), 1e-6);
+  EXPECT_LT(length(got.linear - given.linear), 0.02 * length(given.linear));
+  EXPECT_LT(length(got.angular - given.angular), 0.02 * length(given.angular));
+}
+
 TEST(Rest, AHeldContactGainsNoEnergyAndItsForceStaysForAMinute) {
   auto organ = block(5, 4, 5, 0.010);
   const float top = top_of(organ);

@@ -11,6 +11,7 @@
 #include "server/dynamics/hyperelastic.h"
 #include "server/dynamics/tissue.h"
 #include "tests/mesh/block_mesh.h"
+#include "tests/support/random.h"
 
 namespace trocar::dynamics {
 namespace {
@@ -84,16 +85,6 @@ class Probe {
   Scratch scratch_;
 };
 
-std::vector<Vec3f> random_displacements(std::size_t count, float amplitude, std::uint32_t seed) {
-  std::mt19937 random(seed);
-  const auto uniform = [&] {
-    return amplitude * (static_cast<float>(random()) / 2147483648.0f - 1.0f);
-  };
-  std::vector<Vec3f> u(count);
-  for (auto& v : u) v = {uniform(), uniform(), uniform()};
-  return u;
-}
-
 constexpr float Vec3f::*kAxes[3] = {&Vec3f::x, &Vec3f::y, &Vec3f::z};
 
 class Energies : public ::testing::TestWithParam<Case> {};
@@ -102,7 +93,7 @@ TEST_P(Energies, GradientIsTheDerivativeOfTheEnergy) {
   const auto organ = block_organ(GetParam());
   Probe probe(organ);
   for (std::uint32_t seed = 1; seed <= 4; ++seed) {
-    auto u = random_displacements(organ.mesh.node_count(), 0.0015f, seed);
+    auto u = testing::random_vectors(organ.mesh.node_count(), 0.0015f, seed);
     double largest = 0, worst = 0;
     for (std::uint32_t n = seed % 3; n < organ.mesh.node_count(); n += 3) {
       const Vec3d g = probe.at(NodeIndex(n), u).gradient;
@@ -127,7 +118,7 @@ TEST_P(Energies, BlockIsTheDerivativeOfTheGradient) {
   const auto organ = block_organ(GetParam());
   Probe probe(organ);
   // Stretched as a whole, so that springs pull and their blocks are not clamped.
-  auto u = random_displacements(organ.mesh.node_count(), 2e-4f, 9);
+  auto u = testing::random_vectors(organ.mesh.node_count(), 2e-4f, 9);
   for (std::uint32_t n = 0; n < u.size(); ++n)
     u[n] += to_float(organ.mesh.rest_positions[n] * 0.15);
   for (std::uint32_t n = 0; n < organ.mesh.node_count(); n += 5) {
@@ -174,7 +165,7 @@ TEST_P(Energies, BlocksArePositiveSemiDefiniteUnderAnyDeformation) {
   const auto organ = block_organ(GetParam());
   Probe probe(organ);
   for (const float amplitude : {0.001f, 0.004f, 0.02f}) {  // the last one inverts tets
-    const auto u = random_displacements(organ.mesh.node_count(), amplitude, 77);
+    const auto u = testing::random_vectors(organ.mesh.node_count(), amplitude, 77);
     for (std::uint32_t n = 0; n < organ.mesh.node_count(); n += 4) {
       const auto b = probe.at(NodeIndex(n), u).block;
       const double trace = b[0][0] + b[1][1] + b[2][2];
@@ -192,7 +183,7 @@ TEST_P(Energies, BlocksArePositiveSemiDefiniteUnderAnyDeformation) {
 TEST_P(Energies, InternalForcesHaveNoNetForceAndNoNetTorque) {
   const auto organ = block_organ(GetParam());
   Probe probe(organ);
-  const auto u = random_displacements(organ.mesh.node_count(), 0.003f, 5);
+  const auto u = testing::random_vectors(organ.mesh.node_count(), 0.003f, 5);
   Vec3d force, torque;
   double size = 0;
   for (std::uint32_t n = 0; n < organ.mesh.node_count(); ++n) {
@@ -212,7 +203,7 @@ TEST_P(Energies, RigidMotionCostsNothing) {
   Probe probe(organ);
   const std::vector<Vec3f> rest(organ.mesh.node_count());
   const double at_rest = probe.energy(rest);
-  const double strained = probe.energy(random_displacements(rest.size(), 0.001f, 3)) - at_rest;
+  const double strained = probe.energy(testing::random_vectors(rest.size(), 0.001f, 3)) - at_rest;
   ASSERT_GT(strained, 0);
   const double angle = GetParam().is_linear ? 1e-4 : 1.1;
   const Vec3d axis = normalized(Vec3d{1, 2, -0.5}, Vec3d{});
@@ -225,7 +216,7 @@ TEST_P(Energies, RigidMotionCostsNothing) {
   EXPECT_NEAR(probe.energy(turned), at_rest, 1e-6 * std::max(strained, std::abs(at_rest)));
   // And a deformed body that is turned has the energy it had.
   if (GetParam().is_linear) return;
-  const auto u = random_displacements(rest.size(), 0.002f, 4);
+  const auto u = testing::random_vectors(rest.size(), 0.002f, 4);
   std::vector<Vec3f> both;
   for (std::size_t n = 0; n < u.size(); ++n) {
     const Vec3d p = organ.mesh.rest_positions[n] + to_double(u[n]);
@@ -365,7 +356,8 @@ TEST(ReducedPolynomial, TetsHaveItsGradientAndBlock) {
   };
   std::vector<Float4> x(groups.slot_count());
   std::vector<Vec3d> u(groups.slot_count());
-  const auto random = random_displacements(organ.mesh.node_count(), 0.0015f, 12);
+  // In this pose no tet is near I1 = 3, where the law's second derivative jumps.
+  const auto random = testing::random_vectors(organ.mesh.node_count(), 0.0015f, 1);
   for (std::uint32_t n = 0; n < random.size(); ++n) {
     x[groups.slot_of(NodeIndex(n))] = to_float4(random[n]);
     u[groups.slot_of(NodeIndex(n))] = to_double(random[n]);

@@ -5,10 +5,9 @@
 
 #include <gtest/gtest.h>
 
-#include <random>
-
 #include "common/scene/builtin_organs.h"
 #include "server/dynamics/block_descent.h"
+#include "tests/support/random.h"
 
 namespace trocar::dynamics {
 namespace {
@@ -21,13 +20,11 @@ scene::Organ liver_of(ElasticLaw law) {
   return organ;
 }
 
-std::vector<Float4> random_pose(std::size_t count, float amplitude, std::uint32_t seed) {
-  std::mt19937 random(seed);
-  const auto uniform = [&] {
-    return amplitude * (static_cast<float>(random()) / 2147483648.0f - 1.0f);
-  };
-  std::vector<Float4> pose(count);
-  for (auto& p : pose) p = {uniform(), uniform(), uniform(), 0};
+std::vector<Float4> random_pose(std::size_t count, float amplitude, std::uint64_t seed) {
+  std::vector<Float4> pose;
+  pose.reserve(count);
+  for (const auto& v : testing::random_vectors(count, amplitude, seed))
+    pose.push_back(to_float4(v));
   return pose;
 }
 

@@ -30,7 +30,7 @@ namespace {
 
 TEST(Tick, DoesNotAllocateAfterWarmUp) {
   Simulation simulation(scene::make_lattice());
-  const float top = testing::top_of(simulation.organ());
+  const Vec3f place = testing::place_on(simulation.organ());
   // Warm-up and measurement replay the same motion: the second run finds its capacity ready.
   Bytes start;
   simulation.write_snapshot(start);
@@ -39,7 +39,7 @@ TEST(Tick, DoesNotAllocateAfterWarmUp) {
   std::size_t between = 0, publishing = 0, largest_publish = 0;
   for (Tick tick = 1; tick <= 1600; ++tick) {
     inputs.clear();
-    testing::add_two_hands(tick, top, inputs);
+    testing::add_two_hands(tick, place, inputs);
     const std::size_t before = allocations;
     simulation.tick(inputs, {});
     const std::size_t count = allocations - before;

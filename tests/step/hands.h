@@ -1,7 +1,7 @@
 #pragma once
 
-// Two scripted hands on Choi's lattice for tests: one presses and slides, the other grasps and
-// lifts.
+// Two scripted hands for tests: one presses and slides, the other grasps and lifts. On Choi's
+// lattice both find tissue; elsewhere the first does.
 
 #include <algorithm>
 
@@ -10,14 +10,21 @@
 
 namespace trocar::step::testing {
 
-inline float top_of(const scene::Organ& organ) {
-  double top = 0;
-  for (const auto& p : organ.mesh.rest_positions) top = std::max(top, p.y);
-  return static_cast<float>(top);
+// Where the first hand presses, from the place that is given to both.
+inline constexpr Vec3f kPressedAt{-0.105f, 0, 0.004f};
+
+// That place for an organ: over the middle of the lattice's flat top, else such that the first hand
+// comes down on the highest node.
+inline Vec3f place_on(const scene::Organ& organ) {
+  Vec3d highest{0, -1, 0};
+  for (const auto& p : organ.mesh.rest_positions)
+    if (p.y > highest.y) highest = p;
+  if (organ.name == "lattice") return {0, static_cast<float>(highest.y), 0};
+  return to_float(highest) - kPressedAt;
 }
 
 // Inputs of tick `tick` (1, 2, ...): joins first, then samples every 8 ticks.
-inline void add_two_hands(Tick tick, float top, session::TickInputs& inputs) {
+inline void add_two_hands(Tick tick, const Vec3f& place, session::TickInputs& inputs) {
   if (tick == 1)
     for (std::uint8_t hand = 0; hand < 2; ++hand) {
       session::HandJoin join{.slot = {hand}};
@@ -27,11 +34,11 @@ inline void add_two_hands(Tick tick, float top, session::TickInputs& inputs) {
   if (tick % 8 != 1) return;
   const float t = static_cast<float>(tick) * 1e-3f;
   const auto add = [&](std::uint8_t hand, const Vec3f& tip, scene::Verb verb) {
-    inputs.samples.push_back({tool_slot({hand}, 0), {{tip, rotation_from_z({0, 1, 0})}, verb}});
+    inputs.samples.push_back({tool_slot({hand}, 0), {{place + tip, rotation_from_z({0, 1, 0})}, verb}});
   };
   const float press = std::min(0.01f, 0.05f * t);
-  add(0, {-0.105f + 0.06f * t, top - press, 0.004f}, scene::Verb::Push);
-  add(1, {0.04f, top + std::min(0.02f, 0.04f * t), 0.003f},
+  add(0, kPressedAt + Vec3f{0.06f * t, -press, 0}, scene::Verb::Push);
+  add(1, {0.04f, std::min(0.02f, 0.04f * t), 0.003f},
       t < 1.2f ? scene::Verb::Grasp : scene::Verb::None);
 }
 

@@ -13,7 +13,7 @@ namespace trocar::step {
 namespace {
 
 using testing::add_two_hands;
-using testing::top_of;
+using testing::place_on;
 
 class TwoHands : public ::testing::Test {
  protected:
@@ -21,7 +21,7 @@ class TwoHands : public ::testing::Test {
                                          .boundary = world::Boundary::Frozen};
   static TickReport run_tick(Simulation& simulation, const TickDecisions& decisions = {}) {
     session::TickInputs inputs;
-    add_two_hands(simulation.current_tick() + 1, top_of(simulation.organ()), inputs);
+    add_two_hands(simulation.current_tick() + 1, place_on(simulation.organ()), inputs);
     return simulation.tick(inputs, decisions);
   }
 };
@@ -36,7 +36,10 @@ TEST_F(TwoHands, SameInputsGiveSameHashes) {
 TEST_F(TwoHands, TheHashIsTheSameOnEveryBuild) {
   const auto hash_after = [](scene::Organ organ, const TickDecisions& decisions, unsigned workers) {
     Simulation simulation(std::move(organ), workers);
-    for (int i = 0; i < 300; ++i) run_tick(simulation, decisions);
+    std::uint32_t most_touched = 0;
+    for (int i = 0; i < 300; ++i)
+      most_touched = std::max(most_touched, run_tick(simulation, decisions).contact_nodes);
+    EXPECT_GT(most_touched, 0u);
     return simulation.state_hash();
   };
   const auto liver = [](scene::ElasticLaw law, bool has_averaged_volume) {
@@ -44,16 +47,16 @@ TEST_F(TwoHands, TheHashIsTheSameOnEveryBuild) {
     organ.material.elastic_law = law;
     organ.material.has_averaged_volume = has_averaged_volume;
     organ.material.poisson_ratio = 0.47;
-    organ.gravity_m_s2 = {0, -9.81, 0};
+    organ.gravity_m_s2 = {0, -0.5, 0};  // more, and it sags away from the tools
     return organ;
   };
   using enum scene::ElasticLaw;
   for (const unsigned workers : {1u, 2u, 3u}) {
     EXPECT_EQ(hash_after(scene::make_lattice(), kFrozen, workers), 12233567439601788847u);
     EXPECT_EQ(hash_after(scene::make_lattice(), {}, workers), 4393291335765070689u);
-    EXPECT_EQ(hash_after(liver(TensorMass, false), {}, workers), 10708362327054751571u);
-    EXPECT_EQ(hash_after(liver(NeoHookean, false), {}, workers), 14394848127021260595u);
-    EXPECT_EQ(hash_after(liver(NeoHookean, true), {}, workers), 16380965777305394872u);
+    EXPECT_EQ(hash_after(liver(TensorMass, false), {}, workers), 1470348701715332809u);
+    EXPECT_EQ(hash_after(liver(NeoHookean, false), {}, workers), 219061077895763068u);
+    EXPECT_EQ(hash_after(liver(NeoHookean, true), {}, workers), 18096034981295097873u);
   }
 }
 
@@ -61,7 +64,7 @@ TEST_F(TwoHands, AnyInputChangesTheHash) {
   Simulation a(scene::make_lattice()), b(scene::make_lattice());
   for (int i = 0; i < 50; ++i) run_tick(a), run_tick(b);
   session::TickInputs inputs;
-  add_two_hands(57, top_of(a.organ()), inputs);
+  add_two_hands(57, place_on(a.organ()), inputs);
   a.tick(inputs, {});
   inputs.samples[0].sample.world_from_tool.position.x += 1e-6f;
   b.tick(inputs, {});
@@ -158,7 +161,7 @@ TEST_F(TwoHands, FramesCarryTheQuantisedSurfaceAndItsCrc) {
 
 TEST(Simulation, APushOnAHeldNodeIsFeltButDoesNotMoveIt) {
   Simulation simulation(scene::make_lattice());
-  const float top = testing::top_of(simulation.organ());
+  const float top = testing::place_on(simulation.organ()).y;
   session::TickInputs inputs;
   for (std::uint8_t hand = 0; hand < 2; ++hand) {
     session::HandJoin join{.slot = {hand}};

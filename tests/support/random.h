@@ -1,6 +1,9 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
+
+#include "common/math/vec3.h"
 
 namespace trocar::testing {
 
@@ -19,5 +22,14 @@ class Random {
   }
   std::uint64_t state_;
 };
+
+// Each component between -amplitude and +amplitude.
+inline std::vector<Vec3f> random_vectors(std::size_t count, float amplitude, std::uint64_t seed) {
+  Random random(seed);
+  const auto component = [&] { return amplitude * static_cast<float>(random.between(-1, 1)); };
+  std::vector<Vec3f> vectors(count);
+  for (auto& v : vectors) v = {component(), component(), component()};
+  return vectors;
+}
 
 }  // namespace trocar::testing
