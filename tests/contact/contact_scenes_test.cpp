@@ -45,10 +45,10 @@ TEST(Friction, ABlockStaysBelowTheSlipAngleAndSlidesAboveIt) {
 }
 
 // Pressed by a frictionless ball into a block, at a point `offset_m` beside a node.
-double press_force(double spacing_m, int half_cells, const Vec3f& offset_m) {
+double press_force(double spacing_m, int half_cells, const Vec3f& offset_m, float depth = 0.005f) {
   const int n = 2 * half_cells + 1;
   auto organ = block(n, half_cells + 1, n, spacing_m);
-  const float top = top_of(organ), depth = 0.005f;
+  const float top = top_of(organ);
   HandScene scene(std::move(organ));
   scene.decisions.depth_limit = 40;
   scene.decisions.node_limit = 100'000;
@@ -77,6 +77,18 @@ TEST(Indentation, FinerMeshesOfOneBlockAreSofterByLessAndLess) {
   EXPECT_GT(coarse, middle);
   EXPECT_GT(middle, fine);
   EXPECT_LT(middle / fine - 1, 0.6 * (coarse / fine - 1));
+}
+
+// F = 4/3 E / (1 - nu^2) sqrt(R) d^(3/2) on a half-space. This block, four contact radii wide and
+// deep and held below, is stiffer, and the mesh adds to that; the power of the depth is Hertz's.
+TEST(Indentation, GrowsWithTheDepthAsHertzSays) {
+  const float depth = 0.003f;
+  const double once = press_force(0.006, 8, {}, depth),
+               twice = press_force(0.006, 8, {}, 2 * depth);
+  const double hertz = 4.0 / 3 * 4000 / (1 - 0.3 * 0.3) * std::sqrt(0.024) * std::pow(0.003, 1.5);
+  EXPECT_GT(once, hertz);
+  EXPECT_LT(once, 1.5 * hertz);
+  EXPECT_NEAR(std::log2(twice / once), 1.5, 0.15);
 }
 
 TEST(Reaction, AnOffAxisPushTurnsTheToolByForceTimesArm) {
