@@ -241,6 +241,12 @@ ContactFinder::ContactFinder(const scene::Organ& organ)
   }
 }
 
+void ContactFinder::follow(const world::SurfaceEdit& edit, const world::World& world) {
+  surface_.follow(edit, world);
+  near_of_node_.resize(world.node_count(), kNotNear);
+  for (auto& nearby : nearby_) nearby.is_known = false;
+}
+
 const ContactFinder::Nearby& ContactFinder::look_near(const world::World& world, ToolSlot slot) {
   Nearby& nearby = nearby_[slot.value];
   if (!nearby.is_known || nearer_by(nearby) > nearby.slack) {

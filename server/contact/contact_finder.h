@@ -77,6 +77,9 @@ class ContactFinder {
   // No node has moved by more than this since the last call.
   void surface_moved(float at_most_m) { surface_travel_ += at_most_m; }
 
+  // The world has its new nodes.
+  void follow(const world::SurfaceEdit& edit, const world::World& world);
+
   const Surface& surface() const { return surface_; }
   // Triangles looked at by the last find(), all tools together.
   std::size_t triangles_visited() const { return triangles_visited_; }

@@ -101,6 +101,17 @@ void SelfContactTable::visit_state(world::StateArchive& archive) {
   clear();
 }
 
+void SelfContactTable::follow(const world::SurfaceEdit& edit) {
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < nodes_.size(); ++i) {
+    if (std::ranges::binary_search(edit.removed, triangles_[i])) continue;
+    nodes_[kept] = nodes_[i];
+    triangles_[kept++] = triangles_[i];
+  }
+  nodes_.resize(kept);
+  triangles_.resize(kept);
+}
+
 SelfContactFinder::SelfContactFinder(const scene::Organ& organ)
     : sites_(organ.mesh.surface_nodes), grid_(1, 1) {
   std::ranges::sort(sites_);
@@ -131,6 +142,7 @@ SelfContactFinder::SelfContactFinder(const scene::Organ& organ)
   for (std::size_t t = 0; t < triangles_.size(); ++t)
     for (const auto site : triangles_[t]) site_triangles_.items[next[site]++] = TriangleIndex(t);
 
+  is_gone_.resize(triangles_.size());
   const auto corners = static_cast<double>(std::max<std::size_t>(1, 3 * triangles_.size()));
   const auto mean_edge = static_cast<float>(edges / corners);
   slack_m_ = std::clamp(kSlackEdges * mean_edge, 1e-4f, kMaxSlack_m);
@@ -202,6 +214,11 @@ void SelfContactFinder::list_near_sites(const scene::Organ& organ, double near_m
     std::sort(near_sites_.items.begin() + begin, near_sites_.items.end());
     near_sites_.offsets.push_back(static_cast<std::uint32_t>(near_sites_.items.size()));
   }
+}
+
+void SelfContactFinder::follow(const world::SurfaceEdit& edit) {
+  for (const auto triangle : edit.removed)
+    if (triangle.value < is_gone_.size()) is_gone_[triangle.value] = 1;
 }
 
 bool SelfContactFinder::faced_at_rest(Site site, Site across) const {
@@ -342,6 +359,7 @@ const Vec3f& SelfContactFinder::normal(Site site, const world::World& world) {
   normal_stamp_[site] = normal_current_;
   Vec3f sum;
   for (const auto t : site_triangles_[SiteIndex{site}]) {
+    if (is_gone_[t.value] != 0) continue;
     const auto& [a, b, c] = triangles_[t.value];
     sum += area_vector(position(a, world), position(b, world), position(c, world));
   }
@@ -370,6 +388,7 @@ SelfContactFinder::ClosestPoint SelfContactFinder::closest_point_around(
   ClosestPoint best;
   for (const auto corner : around)
     for (const auto t : site_triangles_[SiteIndex{corner}]) {
+      if (is_gone_[t.value] != 0) continue;
       const ClosestPoint closest = closest_point(site, t, world);
       const bool is_better = !best.triangle.is_valid() || closest.squared < best.squared ||
                              (closest.squared == best.squared && closest.triangle < best.triangle);
@@ -467,6 +486,7 @@ bool SelfContactFinder::stays(Site site, TriangleIndex triangle, const world::Wo
   const Vec3f& w = closest.weights;
   if (!(w.x > 0 && w.y > 0 && w.z > 0))
     closest = closest_point_around(site, triangles_[triangle.value], world);
+  if (!closest.triangle.is_valid()) return false;
   touch = touch_at(site, closest, world);
   // A little farther than where it began, so that it does not flutter.
   return touch.facing < kStaysFacing &&

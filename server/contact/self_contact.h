@@ -19,6 +19,8 @@
 // have moved a part of it: O(surface nodes + these x their surroundings), over several ticks. Every
 // tick: O(pairs of nodes listed), nothing where nothing is near.
 // Pairs are a function of the state: results do not depend on when lists were made.
+//
+// After cuts, what is left of the surface as it was at first takes part; the wound does not.
 
 #include <span>
 #include <vector>
@@ -27,6 +29,7 @@
 #include "server/contact/contact_list.h"
 #include "server/contact/point_grid.h"
 #include "server/world/state_archive.h"
+#include "server/world/surface_edit.h"
 
 namespace trocar::contact {
 
@@ -52,6 +55,9 @@ class SelfContactTable {
     triangles_.push_back(triangle);
   }
 
+  // Pairs with triangles that are gone end.
+  void follow(const world::SurfaceEdit& edit);
+
   // Takes no bytes without pairs. Last in a state.
   void visit_state(world::StateArchive& archive);
 
@@ -74,6 +80,9 @@ class SelfContactFinder {
     travel_ += static_cast<double>(at_most_m);
     last_move_m_ = at_most_m;
   }
+
+  // What is gone meets nothing any more. What is new is not seen.
+  void follow(const world::SurfaceEdit& edit);
 
   // Lists made, and pairs of nodes in the last one.
   std::uint64_t lists_made() const { return lists_made_; }
@@ -136,6 +145,7 @@ class SelfContactFinder {
   std::vector<Site> site_of_node_;
   std::vector<std::array<Site, 3>> triangles_;
   mesh::Csr<SiteIndex, TriangleIndex> site_triangles_;
+  std::vector<std::uint8_t> is_gone_;                 // per triangle
   mesh::Csr<SiteIndex, Site> near_sites_;             // ascending
   std::vector<Vec3f> rest_positions_, rest_normals_;  // per site
   std::vector<std::uint8_t> is_close_at_rest_;        // per site: something faces it there

@@ -10,7 +10,8 @@
 // rest shape, unless a triangle is stretched far.
 //
 // Triangles are kept in bundles along a Morton curve, each with the box around its nodes as they
-// were when it was last looked into, which holds to as far as the surface has moved since.
+// were when it was last looked into, which holds to as far as the surface has moved since. What an
+// edit adds gets bundles of its own, in its order.
 // collect(): O(bundles + those that may be near).
 
 #include <algorithm>
@@ -21,6 +22,7 @@
 
 #include "common/base/index.h"
 #include "common/scene/organ.h"
+#include "server/world/surface_edit.h"
 #include "server/world/world.h"
 
 namespace trocar::contact {
@@ -70,6 +72,9 @@ class Surface {
   }
   std::size_t triangle_count() const { return triangles_.size(); }
 
+  // O(the edit).
+  void follow(const world::SurfaceEdit& edit, const world::World& world);
+
   // Triangles whose box, now, overlaps the given one; ascending. travel_m: a sum over ticks of the
   // farthest that any node has moved.
   void collect(const Box& box, const world::World& world, double travel_m,
@@ -79,12 +84,16 @@ class Surface {
   struct Bundle {
     std::uint32_t first_triangle = 0, last_triangle = 0;  // into order_
     std::uint32_t first_node = 0, last_node = 0;          // into nodes_
+    std::uint32_t triangles = 0;                          // that are left
     Box box;
     bool has_box = false;
     double travel_m = 0;  // when the box was taken
   };
 
-  std::vector<SurfaceTriangle> triangles_;
+  void add_bundle(std::size_t first, std::size_t last);
+
+  std::vector<SurfaceTriangle> triangles_;  // invalid nodes where one is gone
+  std::vector<std::uint32_t> bundle_of_;    // per triangle
   std::vector<TriangleIndex> order_;
   std::vector<NodeIndex> nodes_;
   std::vector<Bundle> bundles_;

@@ -445,8 +445,12 @@ BlockDescent::Restored BlockDescent::restore_rejected(world::World& world) {
     for (std::size_t lane = 0; lane < kLanes; ++lane)
       if (rejected_[g] >> lane & 1) add(tissue_.groups().nodes_of(g)[lane]);
   for (std::size_t layer = 0, i = 0; layer < kRestoredLayers; ++layer)
-    for (const auto end = nodes.size(); i < end; ++i)
-      for (const auto neighbour : organ_.mesh.node_neighbours[nodes[i]]) add(neighbour);
+    for (const auto end = nodes.size(); i < end; ++i) {
+      if (topology_ != nullptr)
+        topology_->for_each_neighbour(nodes[i], add);
+      else
+        for (const auto neighbour : organ_.mesh.node_neighbours[nodes[i]]) add(neighbour);
+    }
   Restored restored;
   for (const auto node : nodes) {
     const Slot slot = tissue_.groups().slot_of(node);

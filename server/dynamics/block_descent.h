@@ -117,8 +117,8 @@ class BlockDescent {
   const Tissue& tissue() const { return tissue_; }
 
   // Between steps: follows topology.changed(). The world already has its nodes, their masses,
-  // classes and displacements; arrays over nodes have an entry for every place of one. Not after
-  // use_linear_far_field(): its matrices do not follow.
+  // classes and displacements; arrays over nodes have an entry for every place of one. The
+  // topology must outlive the solver.
   FollowReport follow_topology(const Topology& topology, const world::World& world);
 
  private:
@@ -179,6 +179,7 @@ class BlockDescent {
   void for_each_group(std::span<const Group> groups, Task&& task);
 
   const scene::Organ& organ_;
+  const Topology* topology_ = nullptr;  // once there was an edit
   Tissue tissue_;
   Workers workers_;
   std::vector<Scratch> scratches_;              // per worker

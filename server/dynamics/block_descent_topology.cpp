@@ -1,12 +1,11 @@
 // The solver after an edit of the topology.
 
-#include "common/base/assert.h"
 #include "server/dynamics/block_descent.h"
 
 namespace trocar::dynamics {
 
 FollowReport BlockDescent::follow_topology(const Topology& topology, const world::World& world) {
-  TROCAR_ASSERT(!far_field_);
+  topology_ = &topology;
   const auto report = tissue_.follow_topology(topology);
   const auto& groups = tissue_.groups();
   const auto group_count = groups.group_count(), slot_count = groups.slot_count();
@@ -42,6 +41,8 @@ FollowReport BlockDescent::follow_topology(const Topology& topology, const world
       x_[g * kLanes + lane] = has_node ? to_float4(world.displacements[node.value]) : Float4{};
       v_[g * kLanes + lane] = has_node ? to_float4(world.velocities[node.value]) : Float4{};
     }
+  if (far_field_) far_field_->follow_topology(x_.data(), world);
+  due_.reserve(group_count);
   return report;
 }
 

@@ -64,6 +64,33 @@ void FarField::begin_step(const Float4* x, world::World& world) {
   for (Group g = 0; g < linear_.group_count(); ++g) begin_group(g, x, x, 0);
 }
 
+void FarField::follow_topology(const Float4* x, const world::World& world) {
+  const auto& groups = tissue_.groups();
+  const auto group_count = groups.group_count();
+  inverse_square_edges_.resize(group_count);
+  taken_at_.resize(group_count);
+  for (auto* values : {&poses_[0], &poses_[1], &away_[0], &away_[1]})
+    values->resize(groups.slot_count());
+  for (const auto number : {newest_, newest_ - 1}) {
+    const auto pose = world.far_poses.pose(number);
+    auto& copy = poses_[number % 2];
+    for (const auto lanes : tissue_.touched())
+      for (std::uint32_t lane = 0; lane < kLanes; ++lane) {
+        const auto node = groups.nodes_of(lanes.group)[lane];
+        copy[lanes.group * kLanes + lane] =
+            node.is_valid() ? to_float4(world::displacement_of(pose[node.value])) : Float4{};
+      }
+  }
+  Linearisation::Taking taking;
+  for (const auto lanes : tissue_.touched()) {
+    linear_.index(lanes.group);
+    measure_edges(lanes.group, world);
+    renew(lanes.group, taking);
+    begin_group(lanes.group, x, x, 0);
+  }
+  linear_.tidy();
+}
+
 void FarField::renew(Group group, Linearisation::Taking& taking) {
   taken_at_[group] = pose_of(group);
   linear_.take(group, poses_[taken_at_[group] % 2].data(), taking);

@@ -32,6 +32,10 @@ class FarField {
   // Displacements, per slot, are new everywhere.
   void take_state(const Float4* x, const world::World& world);
 
+  // The tissue has followed an edit of the topology, with displacements per slot; world.far_poses
+  // has its new nodes.
+  void follow_topology(const Float4* x, const world::World& world);
+
   // Before a step, in this order: begin_step(); renew() for groups that are due; begin_group() for
   // those with a node that moves, with displacements where sweeping starts and at the start of the
   // group's own step, 1/inverse_dt long.

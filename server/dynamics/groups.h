@@ -33,8 +33,8 @@
 #include <type_traits>
 #include <vector>
 
+#include "common/base/blocks.h"
 #include "common/base/index.h"
-#include "server/dynamics/blocks.h"
 #include "server/dynamics/lanes.h"
 #include "server/dynamics/topology.h"
 

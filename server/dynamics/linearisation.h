@@ -32,6 +32,11 @@ class Linearisation {
 
   // Neighbours of the group's nodes anew; matrices are zero until take(). Between steps.
   void index(Group group);
+  // After some calls of index().
+  void tidy() {
+    rows_.tidy();
+    targets_.tidy();
+  }
   // Neighbours of a lane.
   template <typename Visit>
   void for_each_neighbour(Slot slot, Visit&& visit) const {

@@ -44,6 +44,7 @@ Topology::Topology(const scene::Organ& organ)
       stress_free_(organ.stress_free()),
       tets_(organ.mesh.tets),
       tet_materials_(scene::material_map(organ).tets),
+      wound_faces_(organ.mesh.tets.size()),
       has_node_(organ.mesh.node_count(), 1),
       is_changed_(organ.mesh.node_count()) {
   const auto& mesh = organ.mesh;
@@ -143,10 +144,12 @@ void Topology::put_tet(TetIndex place, const mesh::Tet& tet) {
   if (place.value == tet_count()) {
     tets_.emplace_back();
     tet_materials_.push_back(0);
+    wound_faces_.push_back(0);
   }
   TROCAR_ASSERT(!has_tet(place));
   tets_[place.value] = tet;
   tet_materials_[place.value] = material_of_all(tet);
+  wound_faces_[place.value] = 0;
   for (const auto node : tet) {
     TROCAR_ASSERT(has_node(node));
     insert(node_tets_, node, place);

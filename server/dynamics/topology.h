@@ -15,8 +15,8 @@
 #include <span>
 #include <vector>
 
+#include "common/base/blocks.h"
 #include "common/scene/organ.h"
-#include "server/dynamics/blocks.h"
 
 namespace trocar::dynamics {
 
@@ -73,6 +73,11 @@ class Topology {
   void put_link(NodeIndex a, NodeIndex b);
   void remove_link(NodeIndex a, NodeIndex b);
 
+  // Bits by corner: the face opposite to it was opened by a cut, or comes from one that was. None
+  // for a tet that has just been put.
+  std::uint8_t wound_faces(TetIndex tet) const { return wound_faces_[tet.value]; }
+  void mark_wound_faces(TetIndex tet, std::uint8_t faces) { wound_faces_[tet.value] = faces; }
+
   // Since the last clear_changes(): distinct, in the order of their first change.
   std::span<const NodeIndex> changed() const { return changed_; }
   void clear_changes();
@@ -86,6 +91,7 @@ class Topology {
   std::vector<Vec3d> rest_, stress_free_;
   std::vector<mesh::Tet> tets_;  // invalid nodes where there is none
   std::vector<std::uint16_t> tet_materials_;
+  std::vector<std::uint8_t> wound_faces_;  // per tet
   std::vector<std::uint8_t> has_node_, is_changed_;
   Blocks<TetIndex> node_tets_;
   Blocks<NodeIndex> node_links_;

@@ -19,13 +19,11 @@
 #include <vector>
 
 #include "common/base/index.h"
-#include "common/mesh/csr.h"
 #include "server/propagation/layer_lists.h"
+#include "server/propagation/neighbours.h"
 #include "server/propagation/seed_set.h"
 
 namespace trocar::propagation {
-
-using Neighbours = mesh::Csr<NodeIndex, NodeIndex>;
 
 struct QueueLimits {
   std::uint32_t depth = 6;

@@ -18,10 +18,11 @@ void PropagationQueue::resize(std::size_t node_count) {
 
 bool PropagationQueue::is_repeated(const Neighbours& neighbours, Seeds seeds,
                                    const QueueLimits& limits) {
-  if (neighbours.items.data() != table_ || neighbours.items.size() != table_items_ ||
+  const auto& items = neighbours.table().items;
+  if (items.data() != table_ || items.size() != table_items_ ||
       neighbours.row_count() != table_rows_) {
-    table_ = neighbours.items.data();
-    table_items_ = neighbours.items.size();
+    table_ = items.data();
+    table_items_ = items.size();
     table_rows_ = neighbours.row_count();
     if (table_rows_ > node_capacity_) resize(table_rows_);
     has_history_ = false;

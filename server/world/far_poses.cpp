@@ -29,6 +29,20 @@ FarPoses::FarPoses(std::size_t node_count) {
   }
 }
 
+void FarPoses::add_node(NodeIndex a, NodeIndex b, std::uint16_t t) {
+  for (auto& pose : poses_) {
+    const auto between = [t](std::int16_t from, std::int16_t to) {
+      return static_cast<std::int16_t>(from + ((to - from) * std::int64_t{t} >> 16));
+    };
+    const GridPoint p = pose[a.value], q = pose[b.value];
+    pose.push_back({between(p.x, q.x), between(p.y, q.y), between(p.z, q.z)});
+  }
+}
+
+void FarPoses::refresh_hashes() {
+  for (std::uint32_t i = 0; i < 2; ++i) hashes_[i] = hash_of(i);
+}
+
 bool FarPoses::begin_step(std::span<const Vec3f> displacements) {
   age_ = (age_ + 1) % kInterval;
   if (age_ == 0) take(displacements);

@@ -11,6 +11,7 @@
 #include <span>
 #include <vector>
 
+#include "common/base/index.h"
 #include "common/math/vec3.h"
 #include "server/world/state_archive.h"
 
@@ -27,6 +28,11 @@ class FarPoses {
   static constexpr std::uint32_t kInterval = 64;
 
   explicit FarPoses(std::size_t node_count);
+
+  // New nodes are where they would have been between a and b of those before, t/65536 of the way.
+  // refresh_hashes() after the last of them.
+  void add_node(NodeIndex a, NodeIndex b, std::uint16_t t);
+  void refresh_hashes();
 
   // Before a step of the solver; true: a pose was taken.
   bool begin_step(std::span<const Vec3f> displacements);

@@ -24,6 +24,23 @@ World::World(const scene::Organ& organ)
   for (const auto node : organ.fixed_nodes) node_classes[node.value] = NodeClass::Fixed;
 }
 
+void World::add_node(const Vec3d& rest_position, NodeIndex a, NodeIndex b, std::uint16_t t) {
+  const auto between = [&](const std::vector<Vec3f>& values) {
+    const Vec3f from = values[a.value], to = values[b.value];
+    return from + (to - from) * (static_cast<float>(t) / 65536.0f);
+  };
+  rest_positions.push_back(to_float(rest_position));
+  masses.push_back(0);
+  surface_areas.push_back(0);
+  displacements.push_back(between(displacements));
+  velocities.push_back(between(velocities));
+  const bool is_fixed =
+      node_classes[a.value] == NodeClass::Fixed && node_classes[b.value] == NodeClass::Fixed;
+  node_classes.push_back(is_fixed ? NodeClass::Fixed : NodeClass::Active);
+  quiet_ticks.push_back(0);
+  far_poses.add_node(a, b, t);
+}
+
 void World::visit_state(StateArchive& archive) {
   archive.value(tick);
   archive.value(topology_epoch);

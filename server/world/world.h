@@ -53,6 +53,10 @@ struct World {
   std::vector<std::uint16_t> quiet_ticks;  // ticks in a row below the freezing thresholds
   FarPoses far_poses;                      // about which the far field is linear
 
+  // A node between a and b, t/65536 of the way from a; a copy of a where b is a. Moves with them,
+  // fixed where both are, with no mass and no surface yet. Then far_poses.refresh_hashes().
+  void add_node(const Vec3d& rest_position, NodeIndex a, NodeIndex b, std::uint16_t t);
+
   void visit_state(StateArchive& archive);
 };
 

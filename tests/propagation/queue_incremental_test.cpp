@@ -121,7 +121,7 @@ Answer reference(const Neighbours& neighbours, const Contacts& contacts, QueueLi
 // Contacts and limits that change a little or a lot from step to step.
 class Walk {
  public:
-  Walk(const Neighbours& graph, unsigned seed) : graph_(graph), random_(seed) {}
+  Walk(const Neighbours::Table& graph, unsigned seed) : graph_(graph), random_(seed) {}
 
   Contacts contacts;
   QueueLimits limits;
@@ -182,11 +182,11 @@ class Walk {
     if (what != 1 && contact.size() > 1) contact.erase(contact.begin() + below(contact.size()));
   }
 
-  const Neighbours& graph_;
+  const Neighbours::Table& graph_;
   std::mt19937 random_;
 };
 
-Neighbours random_graph(std::uint32_t node_count, std::uint32_t edge_count, unsigned seed) {
+Neighbours::Table random_graph(std::uint32_t node_count, std::uint32_t edge_count, unsigned seed) {
   std::mt19937 random(seed);
   std::vector<std::set<std::uint32_t>> rows(node_count);
   for (std::uint32_t i = 0; i < edge_count; ++i) {
@@ -196,7 +196,7 @@ Neighbours random_graph(std::uint32_t node_count, std::uint32_t edge_count, unsi
     rows[a].insert(b);
     rows[b].insert(a);
   }
-  Neighbours out;
+  Neighbours::Table out;
   out.offsets.push_back(0);
   for (const auto& row : rows) {
     for (const auto node : row) out.items.emplace_back(node);
@@ -205,7 +205,7 @@ Neighbours random_graph(std::uint32_t node_count, std::uint32_t edge_count, unsi
   return out;
 }
 
-void expect_history_has_no_effect(const Neighbours& graph, unsigned seed, int steps) {
+void expect_history_has_no_effect(const Neighbours::Table& graph, unsigned seed, int steps) {
   PropagationQueue queue(graph.row_count());
   Walk walk(graph, seed);
   int merges = 0, cuts = 0, cheap = 0;

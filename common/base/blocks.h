@@ -20,7 +20,7 @@
 #include <type_traits>
 #include <vector>
 
-namespace trocar::dynamics {
+namespace trocar {
 
 template <typename T>
 class Blocks {
@@ -162,4 +162,4 @@ class Blocks {
   bool is_building_ = true;
 };
 
-}  // namespace trocar::dynamics
+}  // namespace trocar
