@@ -130,13 +130,9 @@ Status read_triangles(const proto::SurfaceTopology& message, SurfaceLayout& layo
 
 constexpr const char* kChange = "SurfaceChange";
 
-void write_vertices(const SurfaceChange& change, const SurfaceLayout& before,
+void write_vertices(const SurfaceChange& change, const SurfaceLayout& layout,
                     proto::SurfaceChange& message) {
-  const std::size_t first = before.vertex_count();
-  const auto rest = [&](VertexIndex v) {
-    return v.value < first ? before.rest_quanta[v.value]
-                           : change.new_vertices[v.value - first].rest_quanta;
-  };
+  const auto rest = [&](VertexIndex v) { return layout.rest_quanta[v.value]; };
   VertexIndex last_a(0);
   QuantisedVertex last_rest;
   std::uint32_t last_fixed = 0;
@@ -263,11 +259,11 @@ Result<SurfaceLayout> read(const proto::SurfaceTopology& message) {
   return layout;
 }
 
-void write(const SurfaceChange& change, const SurfaceLayout& before,
+void write(const SurfaceChange& change, const SurfaceLayout& layout,
            proto::SurfaceChange& message) {
   message.set_from_epoch(change.from_epoch);
   message.set_epoch(change.epoch);
-  write_vertices(change, before, message);
+  write_vertices(change, layout, message);
   TriangleIndex last_removed(0);
   for (const TriangleIndex number : change.removed) {
     message.add_removed(number.value - last_removed.value);

@@ -22,8 +22,8 @@ void write(const SurfaceLayout& layout, const std::string& organ_name,
 // Nodes are invalid. A message from before 1.3 has no gaps, no wounds and no sum.
 Result<SurfaceLayout> read(const proto::SurfaceTopology& message);
 
-// `before`: the layout that the change leads from. `message` is empty on entry.
-void write(const SurfaceChange& change, const SurfaceLayout& before, proto::SurfaceChange& message);
+// `layout`: the one that the change was applied to. `message` is empty on entry.
+void write(const SurfaceChange& change, const SurfaceLayout& layout, proto::SurfaceChange& message);
 // Only what it takes to understand the message is checked, the rest by apply().
 Result<SurfaceChange> read(const proto::SurfaceChange& message, const SurfaceLayout& before);
 

@@ -107,12 +107,12 @@ TEST(surface_change, both_sides_agree_over_random_cuts) {
     for (int i = 0; i < 60; ++i) {
       SurfaceChange change = random_change(server, random);
       for (NewVertex& v : change.new_vertices) v.is_fixed = random.below(5) == 0;
+      ASSERT_TRUE(apply(change, server).ok());
       proto::SurfaceChange message;
       write(change, server, message);
       const auto received = read(message, client);
       ASSERT_TRUE(received.ok()) << received.error().message;
       ASSERT_EQ(*received, without_nodes(change));
-      ASSERT_TRUE(apply(change, server).ok());
       const Status applied = apply(*received, client);
       ASSERT_TRUE(applied.ok()) << applied.error().message;
       ASSERT_EQ(client, without_nodes(server)) << "seed " << seed << ", change " << i;
@@ -166,10 +166,12 @@ TEST(surface_change, what_is_wrong_is_named_and_changes_nothing) {
 // Flips bits of, or cuts short, the encoding of a message. What still reads and applies has the
 // right sum; nothing else leaves a trace.
 TEST(surface_change, damaged_messages_never_harm) {
-  const SurfaceLayout server = box();
+  SurfaceLayout server = box();
   const SurfaceLayout client = without_nodes(server);
+  const SurfaceChange change = slit(server);
+  ASSERT_TRUE(apply(change, server).ok());
   proto::SurfaceChange message;
-  write(slit(server), server, message);
+  write(change, server, message);
   const std::string good = message.SerializeAsString();
   Random random(3);
   int refused = 0;
@@ -182,8 +184,8 @@ TEST(surface_change, damaged_messages_never_harm) {
     proto::SurfaceChange damaged;
     if (!damaged.ParseFromString(bytes)) continue;
     SurfaceLayout layout = client;
-    const auto change = read(damaged, layout);
-    const bool is_applied = change.ok() && apply(*change, layout).ok();
+    const auto received = read(damaged, layout);
+    const bool is_applied = received.ok() && apply(*received, layout).ok();
     if (is_applied) {
       ASSERT_EQ(layout.triangle_sum, layout.compute_triangle_sum());
     } else {
@@ -252,12 +254,12 @@ TEST(surface_change, costs_few_bytes) {
   std::size_t bytes = 0, triangles = 0, vertices = 0;
   for (int i = 0; i < 40; ++i) {
     const SurfaceChange change = random_change(layout, random);
+    ASSERT_TRUE(apply(change, layout).ok());
     proto::SurfaceChange message;
     write(change, layout, message);
     bytes += message.ByteSizeLong();
     triangles += change.added.size();
     vertices += change.new_vertices.size();
-    ASSERT_TRUE(apply(change, layout).ok());
   }
   std::printf("%zu vertices: %zu bytes for %zu new vertices and %zu added triangles, %.1f each\n",
               layout.vertex_count(), bytes, vertices, triangles,
