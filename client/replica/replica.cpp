@@ -3,19 +3,24 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/log.h"
 #include "common/base/version.h"
 #include "common/wire/surface_codec.h"
+#include "common/wire/surface_messages.h"
 #include "common/wire/tool_shape.h"
 #include "proto/wire.pb.h"
 
 namespace trocar::replica {
 namespace {
 
-constexpr int kMaxVertices = 4'000'000;
 // 1 mm in quanta, squared.
 constexpr std::int64_t kMovedQuantaSquared = 976;  // (1 mm / 32 um)^2 = 976.6
 // A jump in time this large is a seek, not a late frame.
 constexpr Tick kSeekTicks = 1000;
+
+std::array<std::uint32_t, 3> indices_of(const wire::Corners& corners) {
+  return {corners[0].value, corners[1].value, corners[2].value};
+}
 
 Vec3f to_vec3(const proto::Vec3& v) {
   return {v.x(), v.y(), v.z()};
@@ -103,6 +108,8 @@ void Replica::on_message(const proto::Envelope& message, std::uint64_t arrival_n
       return apply_welcome(message.welcome());
     case proto::Envelope::kSurfaceTopology:
       return apply_topology(message.surface_topology());
+    case proto::Envelope::kSurfaceChange:
+      return apply_change(message.surface_change(), bytes);
     case proto::Envelope::kSurfaceFrame:
       return apply_surface(message.surface_frame(), arrival_ns);
     case proto::Envelope::kFrameState:
@@ -134,41 +141,85 @@ void Replica::apply_welcome(const proto::Welcome& message) {
 }
 
 void Replica::apply_topology(const proto::SurfaceTopology& message) {
-  const int coordinates = message.rest_position_quanta_size();
-  const int corners = message.triangle_size();
-  if (coordinates == 0 || coordinates % 3 != 0 || coordinates / 3 > kMaxVertices)
-    return fail("SurfaceTopology.rest_position_quanta: " + std::to_string(coordinates) +
-                " numbers are not 1 to 4,000,000 vertices of three");
-  if (corners % 3 != 0) return fail("SurfaceTopology.triangle: not three corners each");
-  if (message.quantum_m() != wire::kQuantumMetres)
-    return fail("SurfaceTopology.quantum_m: this client knows a grid of 32 um only");
-  const auto vertex_count = static_cast<std::uint32_t>(coordinates / 3);
-  for (const std::uint32_t v : message.triangle())
-    if (v >= vertex_count) return fail("SurfaceTopology.triangle: vertex out of range");
-  for (const std::uint32_t v : message.fixed_vertex())
-    if (v >= vertex_count) return fail("SurfaceTopology.fixed_vertex: vertex out of range");
+  auto layout = wire::read(message);
+  if (!layout.ok()) return fail(layout.error().message);
+  layout_ = std::move(*layout);
+  organ_name_ = message.organ_name();
+  is_layout_new_ = true;
+  to_show_.clear();
+  request_pending_ = false;
+  if (sync_state_ == SyncState::WaitingForTopology) show_layout();
+  if (sync_state_ != SyncState::Healing) sync_state_ = SyncState::WaitingForKeyframe;
+}
 
-  Topology next;
-  next.epoch = message.epoch();
-  next.organ_name = message.organ_name();
-  next.rest_positions.reserve(vertex_count);
-  for (int i = 0; i < coordinates; i += 3)
-    next.rest_positions.push_back(
-        wire::to_metres({message.rest_position_quanta(i), message.rest_position_quanta(i + 1),
-                         message.rest_position_quanta(i + 2)}));
-  next.triangles.reserve(static_cast<std::size_t>(corners / 3));
-  for (int i = 0; i < corners; i += 3)
-    next.triangles.push_back(
-        {message.triangle(i), message.triangle(i + 1), message.triangle(i + 2)});
-  next.fixed_vertices.assign(message.fixed_vertex().begin(), message.fixed_vertex().end());
+void Replica::apply_change(const proto::SurfaceChange& message, std::size_t bytes) {
+  if (sync_state_ == SyncState::WaitingForTopology) return;
+  auto change = wire::read(message, layout_);
+  const Status applied = change.ok() ? wire::apply(*change, layout_) : Status(change.error());
+  if (!applied.ok()) {
+    if (sync_state_ == SyncState::Healing) return;  // the topology is on its way
+    ++counters_.change_mismatches;
+    log::warn("{}; asking for the whole surface", applied.error().message);
+    return need_keyframe(history_.empty() ? 0 : history_.back().frame);
+  }
+  ++counters_.surface_changes;
+  counters_.change_bytes += bytes;
+  if (!is_layout_new_) to_show_.push_back(std::move(*change));
+}
 
-  topology_ = std::move(next);
+void Replica::show_layout() {
+  topology_.epoch = layout_.epoch;
+  topology_.organ_name = organ_name_;
+  topology_.rest_positions.clear();
+  for (const auto& rest : layout_.rest_quanta)
+    topology_.rest_positions.push_back(wire::to_metres(rest));
+  topology_.triangles.clear();
+  for (std::size_t i = 0; i < layout_.triangles.size(); ++i)
+    topology_.triangles.push_back(layout_.has_triangle(TriangleIndex(i))
+                                      ? indices_of(layout_.triangles[i])
+                                      : std::array<std::uint32_t, 3>{});
+  topology_.is_wound = layout_.is_wound;
+  topology_.fixed_vertices.clear();
+  for (const VertexIndex v : layout_.fixed_vertices) topology_.fixed_vertices.push_back(v.value);
   ++topology_version_;
   history_.clear();
   ++history_version_;
-  if (has_moved_.size() < vertex_count) has_moved_.resize(vertex_count, 0);
-  request_pending_ = false;
-  if (sync_state_ != SyncState::Healing) sync_state_ = SyncState::WaitingForKeyframe;
+  has_moved_.resize(std::max(has_moved_.size(), layout_.vertex_count()), 0);
+  is_layout_new_ = false;
+}
+
+void Replica::show_changes() {
+  for (const wire::SurfaceChange& change : to_show_) {
+    for (const wire::NewVertex& vertex : change.new_vertices) {
+      if (vertex.is_fixed)
+        topology_.fixed_vertices.push_back(
+            static_cast<std::uint32_t>(topology_.rest_positions.size()));
+      topology_.rest_positions.push_back(wire::to_metres(vertex.rest_quanta));
+    }
+    for (const TriangleIndex number : change.removed) {
+      topology_.triangles[number.value] = {};
+      topology_.is_wound[number.value] = 0;
+    }
+    for (const wire::NewTriangle& triangle : change.added) {
+      topology_.triangles.push_back(indices_of(triangle.corners));
+      topology_.is_wound.push_back(triangle.is_wound);
+    }
+    topology_.epoch = change.epoch;
+  }
+  ++topology_version_;
+  has_moved_.resize(std::max(has_moved_.size(), layout_.vertex_count()), 0);
+  to_show_.clear();
+}
+
+void Replica::extend_history(const wire::QuantisedSurface& surface) {
+  for (SessionFrame& frame : history_) {
+    auto& known = frame.surface;
+    for (const wire::SurfaceChange& change : to_show_)
+      for (const wire::NewVertex& vertex : change.new_vertices)
+        known.push_back(vertex.has_parents() ? wire::between(known[vertex.a.value],
+                                                             known[vertex.b.value], vertex.t)
+                                             : surface[known.size()]);
+  }
 }
 
 bool Replica::decode_surface(const proto::SurfaceFrame& message) {
@@ -176,10 +227,11 @@ bool Replica::decode_surface(const proto::SurfaceFrame& message) {
   if (!message.is_keyframe() && ++deltas_seen_ == corrupt_at_ && !payload.empty())
     payload[payload.size() / 2] ^= 0x10u;
   if (message.is_keyframe()) {
-    scratch_.assign(topology_.rest_positions.size(), {});
+    scratch_.assign(layout_.vertex_count(), {});
     if (!wire::decode_keyframe(payload, scratch_).ok()) return false;
   } else {
     scratch_ = history_.back().surface;
+    scratch_.resize(layout_.vertex_count());  // zeros, as on the server
     if (!wire::decode_delta(payload, scratch_).ok()) return false;
   }
   return wire::surface_crc(scratch_) == message.surface_crc();
@@ -188,18 +240,15 @@ bool Replica::decode_surface(const proto::SurfaceFrame& message) {
 void Replica::apply_surface(const proto::SurfaceFrame& message, std::uint64_t arrival_ns) {
   if (sync_state_ == SyncState::WaitingForTopology) return;
   if (request_pending_) need_keyframe(message.frame());
-  if (!message.is_keyframe()) {
-    if (sync_state_ != SyncState::InStep) {
-      ++counters_.deltas_ignored;
-      return;
-    }
-    if (message.base_frame() != history_.back().frame || message.epoch() != topology_.epoch) {
-      ++counters_.base_mismatches;
-      return need_keyframe(message.frame());
-    }
-  } else if (message.epoch() != topology_.epoch) {
-    return fail("SurfaceFrame: keyframe of epoch " + std::to_string(message.epoch()) +
-                " without its SurfaceTopology");
+  if (!message.is_keyframe() && sync_state_ != SyncState::InStep) {
+    ++counters_.deltas_ignored;
+    return;
+  }
+  // A keyframe of an unknown epoch is as good as none: its topology has to come first.
+  if (message.epoch() != layout_.epoch ||
+      (!message.is_keyframe() && message.base_frame() != history_.back().frame)) {
+    ++counters_.base_mismatches;
+    return need_keyframe(message.frame());
   }
   if (!decode_surface(message)) {
     ++counters_.crc_mismatches;
@@ -208,7 +257,23 @@ void Replica::apply_surface(const proto::SurfaceFrame& message, std::uint64_t ar
   accept_frame(message, arrival_ns);
 }
 
+void Replica::count_moved() {
+  for (std::size_t i = 0; i < scratch_.size(); ++i) {
+    const std::int64_t x = scratch_[i].x, y = scratch_[i].y, z = scratch_[i].z;
+    if (has_moved_[i] == 0 && x * x + y * y + z * z > kMovedQuantaSquared) {
+      has_moved_[i] = 1;
+      ++moved_count_;
+    }
+  }
+}
+
 void Replica::accept_frame(const proto::SurfaceFrame& message, std::uint64_t arrival_ns) {
+  if (is_layout_new_) {
+    show_layout();
+  } else if (!to_show_.empty()) {
+    extend_history(scratch_);
+    show_changes();
+  }
   ++counters_.frames;
   if (message.is_keyframe()) {
     ++counters_.keyframes;
@@ -222,16 +287,11 @@ void Replica::accept_frame(const proto::SurfaceFrame& message, std::uint64_t arr
     }
   } else {
     counters_.delta_bytes += message.payload().size();
+    const auto& before = history_.back().surface;
+    for (std::size_t i = 0; i < scratch_.size(); ++i)
+      counters_.changed_vertices += !(scratch_[i] == before[i]);
   }
-  for (std::size_t i = 0; i < scratch_.size(); ++i) {
-    const auto& v = scratch_[i];
-    if (!message.is_keyframe() && !(v == history_.back().surface[i])) ++counters_.changed_vertices;
-    const std::int64_t x = v.x, y = v.y, z = v.z;
-    if (has_moved_[i] == 0 && x * x + y * y + z * z > kMovedQuantaSquared) {
-      has_moved_[i] = 1;
-      ++moved_count_;
-    }
-  }
+  count_moved();
   SessionFrame next;
   if (history_.size() >= kHistoryFrames) {
     next = std::move(history_.front());  // its buffers are used again

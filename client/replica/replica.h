@@ -5,9 +5,14 @@
 // The surface is the server's own integers. Every delta names the frame it starts from and carries
 // the CRC of what must come out:
 //
-//   in step --(CRC differs, base or epoch unknown, payload malformed)--> needs keyframe
-//      ^                                                                     | one KeyframeRequest,
-//      +---------------------- keyframe with right CRC <---------------------+ deltas ignored
+//   in step --(CRC differs, base or epoch unknown, payload malformed,--> needs keyframe
+//      ^        a SurfaceChange that does not follow or whose sum differs)   | one KeyframeRequest,
+//      +---- (SurfaceTopology,) keyframe with right CRC <--------------------+ deltas ignored
+//
+// What SurfaceTopology and SurfaceChange say is shown from the first frame of their epoch on, never
+// before: then every frame of the history has every vertex. A vertex that an earlier frame did not
+// have lies there between those it was made from, or without parents as in the next frame that has
+// it; so no vertex is seen to jump because it is new.
 //
 // A frame that does not check out is never shown: the last good one stays. A keyframe may go back
 // in time (a replay that seeks), which clears the history. Barrier is answered with FrameAck for
@@ -22,12 +27,14 @@
 #include "client/replica/session_source.h"
 #include "client/replica/session_view.h"
 #include "common/base/result.h"
+#include "common/wire/surface_layout.h"
 
 namespace trocar::proto {
 class Barrier;
 class ClaimEvent;
 class FrameState;
 class Participants;
+class SurfaceChange;
 class SurfaceFrame;
 class SurfaceTopology;
 class Welcome;
@@ -52,6 +59,9 @@ struct ReplicaCounters {
   std::uint64_t deltas_ignored = 0;  // while healing
   std::uint64_t crc_mismatches = 0;  // also payloads that do not decode
   std::uint64_t base_mismatches = 0;
+  std::uint64_t surface_changes = 0;     // applied
+  std::uint64_t change_mismatches = 0;   // changes that did not follow, malformed ones included
+  std::uint64_t change_bytes = 0;        // of applied changes
   std::uint64_t healed = 0;            // returned to InStep after a mismatch of either kind
   std::uint64_t bytes = 0;             // all messages, on the wire
   std::uint64_t delta_bytes = 0;       // payloads of applied deltas
@@ -83,7 +93,8 @@ class Replica final : public MessageSink {
   const Status& fault() const { return fault_; }
   // Invalid until Welcome.
   ParticipantSlot own_slot() const { return own_slot_; }
-  // Valid once sync_state() is past WaitingForTopology; `topology_version` counts replacements.
+  // Valid once sync_state() is past WaitingForTopology; `topology_version` counts its changes, the
+  // large and the small. It only grows between two values of `history_version`.
   const Topology& topology() const { return topology_; }
   std::uint64_t topology_version() const { return topology_version_; }
   // Ascending by tick, at most kHistoryFrames; `history_version` counts restarts (seek, topology).
@@ -108,12 +119,19 @@ class Replica final : public MessageSink {
  private:
   void apply_welcome(const proto::Welcome& message);
   void apply_topology(const proto::SurfaceTopology& message);
+  void apply_change(const proto::SurfaceChange& message, std::size_t bytes);
   void apply_surface(const proto::SurfaceFrame& message, std::uint64_t arrival_ns);
   void apply_state(const proto::FrameState& message);
   void apply_participants(const proto::Participants& message);
   void apply_claim(const proto::ClaimEvent& message, std::uint64_t arrival_ns);
   bool decode_surface(const proto::SurfaceFrame& message);
   void accept_frame(const proto::SurfaceFrame& message, std::uint64_t arrival_ns);
+  // Of the stream, to be shown: all of it, or what changed.
+  void show_layout();
+  void show_changes();
+  // Gives the history's frames the new vertices, `surface` being the next frame after them.
+  void extend_history(const wire::QuantisedSurface& surface);
+  void count_moved();
   void need_keyframe(Frame frame);
   void answer_barrier();
   void fail(std::string what);
@@ -122,6 +140,10 @@ class Replica final : public MessageSink {
   Status fault_;
   SyncState sync_state_ = SyncState::WaitingForTopology;
   ParticipantSlot own_slot_;
+  wire::SurfaceLayout layout_;  // of the stream; ahead of topology_ until the next frame
+  std::string organ_name_;
+  bool is_layout_new_ = false;                  // topology_ is to be replaced by it
+  std::vector<wire::SurfaceChange> to_show_;    // else topology_ lacks these
   Topology topology_;
   std::uint64_t topology_version_ = 0;
   std::deque<SessionFrame> history_;

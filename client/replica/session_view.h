@@ -39,12 +39,14 @@ struct Tool {
   bool is_silent = false;   // no sample for 250 ticks
 };
 
-// The surface at rest, per vertex slot.
+// The surface at rest, per vertex slot and triangle number. Both only grow within a session.
 struct Topology {
   std::uint32_t epoch = 0;
   std::string organ_name;
   std::vector<Vec3f> rest_positions;
-  std::vector<std::array<std::uint32_t, 3>> triangles;  // outward, indices into rest_positions
+  // Outward, indices into rest_positions; a removed one is 0, 0, 0: it has no area.
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+  std::vector<std::uint8_t> is_wound;  // per triangle: made by a blade
   std::vector<std::uint32_t> fixed_vertices;
 };
 
@@ -87,7 +89,7 @@ struct SessionFrame {
   Frame frame = 0;
   Tick tick = 0;
   std::uint64_t arrival_ns = 0;        // monotonic
-  wire::QuantisedSurface surface;      // displacements from rest
+  wire::QuantisedSurface surface;      // displacements from rest, of every vertex of the topology
   bool has_state = false;              // the rest is valid: its FrameState has arrived
   std::vector<Tool> tools;             // by slot
   std::vector<std::uint16_t> regions;  // per vertex slot: 0 not active, else merged region

@@ -142,6 +142,10 @@ Status SessionJournal::read_surface_deltas(Tick from, Tick to,
                                            const TickVisitor<proto::SurfaceFrame>& visitor) {
   return read_topic(JournalTopic::SurfaceDelta, from, to, visitor);
 }
+Status SessionJournal::read_topology_changes(Tick from, Tick to,
+                                             const TickVisitor<proto::SurfaceChange>& visitor) {
+  return read_topic(JournalTopic::TopologyChange, from, to, visitor);
+}
 Status SessionJournal::read_frame_states(Tick from, Tick to,
                                          const TickVisitor<proto::FrameState>& visitor) {
   return read_topic(JournalTopic::FrameState, from, to, visitor);

@@ -47,6 +47,8 @@ class SessionJournal {
   Status read_tick_records(Tick from, Tick to, const TickVisitor<proto::TickRecord>& visitor);
   // Deltas of frames with tick in [from, to], in order.
   Status read_surface_deltas(Tick from, Tick to, const TickVisitor<proto::SurfaceFrame>& visitor);
+  Status read_topology_changes(Tick from, Tick to,
+                               const TickVisitor<proto::SurfaceChange>& visitor);
   Status read_frame_states(Tick from, Tick to, const TickVisitor<proto::FrameState>& visitor);
   Status read_claims(Tick from, Tick to, const TickVisitor<proto::ClaimLog>& visitor);
   Status read_snapshots(Tick from, Tick to, const TickVisitor<proto::WorldSnapshot>& visitor);

@@ -61,6 +61,10 @@ class SessionJournalWriter {
                                       const proto::SurfaceTopology& topology) {
     return write(JournalTopic::Topology, tick, now_ns, topology);
   }
+  [[nodiscard]] Status write_topology_change(Tick tick, std::uint64_t now_ns,
+                                             const proto::SurfaceChange& change) {
+    return write(JournalTopic::TopologyChange, tick, now_ns, change);
+  }
   [[nodiscard]] Status write_participants(Tick tick, std::uint64_t now_ns,
                                           const proto::Participants& participants) {
     return write(JournalTopic::Participants, tick, now_ns, participants);

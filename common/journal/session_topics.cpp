@@ -25,6 +25,7 @@ const TopicEntry& entry_of(JournalTopic topic) {
       {"/claims", proto::ClaimLog::descriptor()},
       {"/frame_state", proto::FrameState::descriptor()},
       {"/gap", proto::JournalGap::descriptor()},
+      {"/topology/change", proto::SurfaceChange::descriptor()},
   }};
   return kEntries[static_cast<std::size_t>(topic)];
 }

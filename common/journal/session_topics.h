@@ -7,7 +7,8 @@
 //   /tick_batch      TickBatch        one per frame: inputs, decisions, hashes of its ticks
 //   /surface/key     SurfaceFrame     1 Hz
 //   /surface/delta   SurfaceFrame     every frame, against the frame before
-//   /topology        SurfaceTopology  at start and at every cut
+//   /topology        SurfaceTopology  at start; once cut, before each keyframe
+//   /topology/change SurfaceChange    frames that begin an epoch
 //   /participants    Participants     on change
 //   /claims          ClaimLog         frames that have claim events
 //   /frame_state     FrameState       tools, regions and figures of a frame, as a client got them
@@ -38,8 +39,9 @@ enum class JournalTopic : std::uint8_t {
   Claims,
   FrameState,
   Gap,
+  TopologyChange,
 };
-inline constexpr int kJournalTopicCount = 10;
+inline constexpr int kJournalTopicCount = 11;
 
 inline constexpr const char* kJournalProfile = "trocar";
 inline constexpr const char* kSessionMetadataName = "trocar.session";

@@ -7,6 +7,14 @@
 
 namespace trocar::wire {
 
+std::uint64_t SurfaceLayout::compute_triangle_sum() const {
+  std::uint64_t sum = 0;
+  for (std::size_t i = 0; i < triangles.size(); ++i)
+    if (has_triangle(TriangleIndex(i)))
+      sum += triangle_hash(TriangleIndex(i), triangles[i], is_wound[i] != 0);
+  return sum;
+}
+
 SurfaceLayout make_surface_layout(const scene::Organ& organ) {
   const mesh::TetMesh& mesh = organ.mesh;
   std::vector<Vec3d> positions;
@@ -34,6 +42,8 @@ SurfaceLayout make_surface_layout(const scene::Organ& organ) {
       TROCAR_ASSERT(slots[corner].is_valid());
     }
   }
+  layout.is_wound.resize(layout.triangles.size());
+  layout.triangle_sum = layout.compute_triangle_sum();
   for (const NodeIndex node : organ.fixed_nodes)
     if (const VertexIndex vertex = layout.vertex_of_node[node.value]; vertex.is_valid())
       layout.fixed_vertices.push_back(vertex);

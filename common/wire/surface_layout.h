@@ -1,25 +1,36 @@
 #pragma once
 
 // Which nodes of an organ its surface stream carries, and in which slots. Server, journal and tests
-// build it from the organ; clients receive it as a SurfaceTopology message.
+// build it from the organ; clients receive it as a SurfaceTopology message. Cuts change it by
+// SurfaceChange (surface_change.h) only.
 
-#include <array>
 #include <vector>
 
 #include "common/base/index.h"
 #include "common/scene/organ.h"
 #include "common/wire/quantise.h"
+#include "common/wire/surface_change.h"
 
 namespace trocar::wire {
 
 struct SurfaceLayout {
-  std::vector<NodeIndex> node_of_vertex;              // per slot, Morton order of rest positions
-  std::vector<VertexIndex> vertex_of_node;            // per node; invalid for interior nodes
-  std::vector<std::array<VertexIndex, 3>> triangles;  // outward, in the organ's triangle order
-  std::vector<QuantisedVertex> rest_quanta;           // per slot
-  std::vector<VertexIndex> fixed_vertices;            // ascending slots
+  std::uint32_t epoch = 0;
+  // Per slot: at first in Morton order of the rest positions, then in the order of appearance.
+  // Invalid where only the server knows nodes.
+  std::vector<NodeIndex> node_of_vertex;
+  std::vector<VertexIndex> vertex_of_node;   // per node; invalid for interior nodes
+  std::vector<Corners> triangles;            // by number; three invalid corners: removed
+  std::vector<std::uint8_t> is_wound;        // per triangle: made by a blade
+  std::vector<QuantisedVertex> rest_quanta;  // per slot
+  std::vector<VertexIndex> fixed_vertices;   // ascending slots
+  std::uint64_t triangle_sum = 0;            // see SurfaceChange::sum
 
-  std::size_t vertex_count() const { return node_of_vertex.size(); }
+  std::size_t vertex_count() const { return rest_quanta.size(); }
+  bool has_triangle(TriangleIndex number) const { return triangles[number.value][0].is_valid(); }
+  // From the first triangle on.
+  std::uint64_t compute_triangle_sum() const;
+
+  bool operator==(const SurfaceLayout&) const = default;
 };
 
 SurfaceLayout make_surface_layout(const scene::Organ& organ);

@@ -1,10 +1,12 @@
 #pragma once
 
 // Published frames from the simulation thread to the I/O thread: a bounded queue and a wake-up.
-// 512 frames are 8 s. If the I/O thread is stuck for longer, frames are dropped and counted; the
-// journal has its own way (journal_sink.h) and misses nothing.
+// 512 frames are 8 s. If the I/O thread is stuck for longer, frames are dropped and counted, but for
+// those that change the surface: without one of them no later frame can be understood. The journal
+// has its own way (journal_sink.h).
 
 #include <atomic>
+#include <deque>
 #include <functional>
 #include <vector>
 
@@ -22,7 +24,13 @@ class FrameHandover {
 
   // Simulation thread.
   void push(step::SharedFrame frame) {
-    if (!queue_.try_push(std::move(frame))) dropped_.fetch_add(1, std::memory_order_relaxed);
+    while (!kept_.empty() && queue_.try_push(kept_.front())) kept_.pop_front();
+    if (!kept_.empty() || !queue_.try_push(frame)) {
+      if (frame->change)
+        kept_.push_back(std::move(frame));
+      else
+        dropped_.fetch_add(1, std::memory_order_relaxed);
+    }
     if (!is_woken_.exchange(true)) wake_();
   }
 
@@ -42,6 +50,7 @@ class FrameHandover {
  private:
   std::function<void()> wake_;
   SpscQueue<step::SharedFrame> queue_{kCapacity};
+  std::deque<step::SharedFrame> kept_;  // simulation thread: did not fit, come next
   std::atomic<bool> is_woken_{false};
   std::atomic<std::uint64_t> dropped_{0};
 };

@@ -85,7 +85,7 @@ Status Server::open() {
   const auto& layout = simulation_.layout();
   net::TcpServerOptions tcp{.address = options_.address, .port = options_.port};
   // Topology and a keyframe of about that size must fit at once for somebody who joins.
-  const auto topology_bytes = replication::encode_topology(layout, 0, organ.name)->size();
+  const auto topology_bytes = replication::encode_topology(layout, organ.name)->size();
   tcp.outbox_bytes = std::max(tcp.outbox_bytes, 3 * topology_bytes);
   auto listening = net::TcpServer::listen(io_, tcp);
   if (!listening) return listening.error();

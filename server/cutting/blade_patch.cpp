@@ -6,7 +6,6 @@
 namespace trocar::cutting {
 namespace {
 
-constexpr double kFarAway = 10;         // m
 constexpr double kLeastSegment = 1e-6;  // m
 constexpr double kLeastSine = 1e-6;     // of the angle between the edges of a triangle
 
@@ -26,19 +25,12 @@ void extend_ends(BladeEdge& edge, double extension) {
 
 void add_triangle(const Vec3d& a, const Vec3d& b, const Vec3d& c, Vec3d& side,
                   std::vector<PatchTriangle>& out) {
-  const Vec3d doubled_area = cross(b - a, c - a);
-  const double longest_squared =
-      std::max({length_squared(b - a), length_squared(c - b), length_squared(a - c)});
-  if (!(length(doubled_area) > kLeastSine * longest_squared)) return;
-  const Vec3d normal = normalized(doubled_area, Vec3d{});
-  PatchTriangle triangle{{a, b, c}, normal, {}};
-  if (dot(normal, side) < 0) triangle = {{a, c, b}, -normal, {}};
-  for (std::size_t i = 0; i < 3; ++i) {
-    const Vec3d edge = triangle.corners[(i + 1) % 3] - triangle.corners[i];
-    triangle.inward[i] = normalized(cross(triangle.normal, edge), Vec3d{});
-  }
-  out.push_back(triangle);
-  side = out.back().normal;
+  auto triangle = make_triangle({a, b, c});
+  if (!triangle) return;
+  if (dot(triangle->normal, side) < 0) triangle = make_triangle({a, c, b});
+  if (!triangle) return;
+  out.push_back(*triangle);
+  side = triangle->normal;
 }
 
 }  // namespace
@@ -47,7 +39,8 @@ bool is_blade(std::span<const Vec3d> points) {
   if (points.size() < 2 || points.size() > kMaxEdgePoints) return false;
   double total = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    if (!is_finite(points[i]) || !(length_squared(points[i]) < kFarAway * kFarAway)) return false;
+    if (!is_finite(points[i]) || !(length_squared(points[i]) < kMaxFromOrigin * kMaxFromOrigin))
+      return false;
     if (i == 0) continue;
     const double segment = length(points[i] - points[i - 1]);
     if (!(segment > kLeastSegment)) return false;
@@ -68,6 +61,20 @@ BladeEdge between(const BladeEdge& from, const BladeEdge& to, double t) {
   for (std::uint32_t i = 0; i < to.count; ++i)
     edge.points[i] = from.points[i] + (to.points[i] - from.points[i]) * t;
   return edge;
+}
+
+std::optional<PatchTriangle> make_triangle(const std::array<Vec3d, 3>& corners) {
+  const auto& [a, b, c] = corners;
+  const Vec3d doubled_area = cross(b - a, c - a);
+  const double longest_squared =
+      std::max({length_squared(b - a), length_squared(c - b), length_squared(a - c)});
+  if (!(length(doubled_area) > kLeastSine * longest_squared)) return std::nullopt;
+  PatchTriangle triangle{corners, normalized(doubled_area, Vec3d{}), {}};
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Vec3d edge = corners[(i + 1) % 3] - corners[i];
+    triangle.inward[i] = normalized(cross(triangle.normal, edge), Vec3d{});
+  }
+  return triangle;
 }
 
 double signed_distance(const PatchTriangle& triangle, const Vec3d& p) {

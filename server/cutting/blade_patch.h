@@ -7,6 +7,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -17,6 +18,7 @@ namespace trocar::cutting {
 inline constexpr std::size_t kMaxEdgePoints = 8;
 // m; a longer edge is no blade.
 inline constexpr double kMaxEdgeLength = 1;
+inline constexpr double kMaxFromOrigin = 10;  // m
 
 struct BladeEdge {
   std::array<Vec3d, kMaxEdgePoints> points;
@@ -35,6 +37,8 @@ struct PatchTriangle {
   std::array<Vec3d, 3> inward;  // unit, in the plane, across the edge from each corner to the next
 };
 
+// Nothing if it has no area.
+std::optional<PatchTriangle> make_triangle(const std::array<Vec3d, 3>& corners);
 double signed_distance(const PatchTriangle& triangle, const Vec3d& p);  // to its plane
 double distance_squared(const PatchTriangle& triangle, const Vec3d& p);
 // Of a point above or below it, or outside by less than `slack` (m).

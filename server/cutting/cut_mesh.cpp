@@ -89,19 +89,26 @@ double CutMesh::sine_after_split(NodeIndex a, NodeIndex b, std::uint16_t t, doub
   return least;
 }
 
-void CutMesh::add_node(const NewNode& made) {
-  const auto needed = topology_.node_count();
-  positions_.resize(needed);
-  h_.resize(needed);
-  reach_.resize(needed);
+void CutMesh::measure_scale_of(const NewNode& made) {
+  h_.resize(topology_.node_count());
+  reach_.resize(topology_.node_count());
   const auto n = made.node.value, a = made.a.value, b = made.b.value;
-  positions_[n] = along(positions_[a], positions_[b], made.t);
   h_[n] = h_[a] + (h_[b] - h_[a]) * (made.t / 65536.0);
   reach_[n] = 0;
   topology_.for_each_neighbour(made.node, [&](NodeIndex j) {
     reach_[n] = std::max(reach_[n], length(topology_.rest()[j.value] - topology_.rest()[n]));
   });
+}
+
+void CutMesh::add_node(const NewNode& made) {
+  measure_scale_of(made);
+  positions_.resize(topology_.node_count());
+  positions_[made.node.value] = along(positions_[made.a.value], positions_[made.b.value], made.t);
   out_->new_nodes.push_back(made);
+}
+
+Status CutMesh::repeat(const CutEvents& events) {
+  return apply(events, topology_, places_, [this](const NewNode& made) { measure_scale_of(made); });
 }
 
 NodeIndex CutMesh::split(NodeIndex a, NodeIndex b, std::uint16_t t) {

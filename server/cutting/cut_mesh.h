@@ -12,13 +12,6 @@
 
 namespace trocar::cutting {
 
-// displacement(node) = a + (b - a) t/65536 of the displacements at its parents; velocity likewise.
-// A copy has its original as both.
-struct NewNode {
-  NodeIndex node, a, b;
-  std::uint16_t t = 0;
-};
-
 struct CutOutput {
   CutEvents events;
   std::vector<NewNode> new_nodes;  // in order: a parent may be new, too
@@ -56,11 +49,14 @@ class CutMesh {
   // Faces from the side of the lower tet, ascending; the stars of their nodes, ascending, with
   // these faces cut.
   void open(std::span<const TetFace> faces, std::span<const Star> stars);
+  // Does what another cutter of the same topology did.
+  Status repeat(const CutEvents& events);
   // Tets bisected by the last split().
   std::size_t last_ring() const { return children_.size(); }
 
  private:
   void measure_scale();
+  void measure_scale_of(const NewNode& node);
   void add_node(const NewNode& node);
 
   dynamics::Topology& topology_;

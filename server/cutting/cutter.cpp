@@ -1,6 +1,7 @@
 #include "server/cutting/cutter.h"
 
 #include <algorithm>
+#include <numeric>
 
 namespace trocar::cutting {
 
@@ -49,6 +50,58 @@ bool Cutter::is_idle() const {
   });
 }
 
+Status Cutter::repeat(const CutEvents& events) {
+  if (std::ranges::any_of(strokes_, &Stroke::is_active))
+    return Error{ErrorCode::Refused, "cut events cannot be repeated while a blade cuts"};
+  return mesh_.repeat(events);
+}
+
+void Cutter::clear_strokes() {
+  for (auto& stroke : strokes_) stroke.clear();
+  stroke_of_.fill(kNone);
+  next_id_ = 0;
+}
+
+// Strokes in their order, each with its blade, or kMaxBlades for one that has ended. Their places
+// and numbers change nothing.
+void Cutter::visit_state(world::StateArchive& archive) {
+  order_.clear();
+  for (std::uint32_t s = 0; s < strokes_.size(); ++s)
+    if (strokes_[s].is_active) order_.push_back(s);
+  order_strokes();
+  auto count = static_cast<std::uint8_t>(order_.size());
+  archive.value(count);
+  if (archive.is_reading()) {
+    clear_strokes();
+    if (count > kMaxStrokes) archive.fail();
+    order_.resize(archive.ok() ? count : 0);
+    std::iota(order_.begin(), order_.end(), 0u);
+  }
+  for (const auto s : order_) visit_stroke(archive, s);
+  if (!archive.ok()) clear_strokes();
+}
+
+void Cutter::visit_stroke(world::StateArchive& archive, std::uint32_t place) {
+  auto& stroke = strokes_[place];
+  const auto at = std::ranges::find(stroke_of_, place);
+  auto blade = static_cast<std::uint8_t>(at - stroke_of_.begin());
+  archive.value(blade);
+  if (archive.is_reading()) {
+    if (blade > kMaxBlades || (blade < kMaxBlades && stroke_of_[blade] != kNone)) archive.fail();
+    if (!archive.ok()) return;
+    stroke.id = next_id_++;
+    stroke.is_active = true;
+    stroke.has_ended = blade == kMaxBlades;
+    if (!stroke.has_ended) stroke_of_[blade] = place;
+  }
+  stroke.visit_state(archive, mesh_.topology());
+}
+
+void Cutter::order_strokes() {
+  std::sort(order_.begin(), order_.end(),
+            [&](auto a, auto b) { return strokes_[a].id < strokes_[b].id; });
+}
+
 void Cutter::cut(std::span<const Vec3f> displacements, CutOutput& out) {
   out.clear();
   if (is_idle()) return;
@@ -57,8 +110,7 @@ void Cutter::cut(std::span<const Vec3f> displacements, CutOutput& out) {
   for (std::uint32_t s = 0; s < strokes_.size(); ++s)
     if (strokes_[s].is_active && (strokes_[s].has_ended || strokes_[s].motion.has_strip()))
       order_.push_back(s);
-  std::sort(order_.begin(), order_.end(),
-            [&](auto a, auto b) { return strokes_[a].id < strokes_[b].id; });
+  order_strokes();
   const auto share = std::max<std::uint32_t>(
       1, mesh_.settings().edits_per_call / static_cast<std::uint32_t>(order_.size()));
   for (const auto s : order_) {

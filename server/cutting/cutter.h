@@ -41,6 +41,15 @@ class Cutter {
   // displacements: of the nodes from rest, m, node_count of them; none: everything is at rest.
   void cut(std::span<const Vec3f> displacements, CutOutput& out);
 
+  // Does what another cutter did to the same topology: all its events, of all its calls, in order;
+  // with no stroke on. What is wrong is refused; what comes before it has been done.
+  Status repeat(const CutEvents& events);
+
+  // Everything that later calls depend on besides topology and settings: the same bytes, the same
+  // future. One byte while no stroke is on. To be read by a cutter whose topology has had the same
+  // events and repeated them.
+  void visit_state(world::StateArchive& archive);
+
   // To be told of what others remove between calls.
   Places& places() { return mesh_.places(); }
 
@@ -53,6 +62,9 @@ class Cutter {
   static constexpr std::uint32_t kNone = 0xffffffffu;
 
   Stroke* begin_stroke(std::uint32_t blade);
+  void visit_stroke(world::StateArchive& archive, std::uint32_t place);
+  void clear_strokes();
+  void order_strokes();
   bool work(Stroke& stroke, std::uint32_t& budget);
   bool end(Stroke& stroke);
   void forget(Stroke& stroke);
@@ -64,7 +76,7 @@ class Cutter {
   Repair repair_;
   std::array<std::uint32_t, kMaxBlades> stroke_of_;  // place in strokes_, or kNone
   std::uint32_t next_id_ = 0;
-  std::vector<std::uint32_t> order_;  // places in strokes_ of active ones, by id
+  std::vector<std::uint32_t> order_;  // places in strokes_ of some, by id
   std::vector<NodeIndex> kept_;
 };
 

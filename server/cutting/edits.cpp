@@ -21,33 +21,43 @@ void replace_node(dynamics::Topology& topology, TetIndex place, NodeIndex old, N
 // One event after another on a topology.
 class Replay {
  public:
-  Replay(const CutEvents& events, dynamics::Topology& topology, Places& places)
-      : events_(events), topology_(topology), places_(places), cuts_(topology) {}
+  Replay(const CutEvents& events, dynamics::Topology& topology, Places& places,
+         const std::function<void(const NewNode&)>& on_new_node)
+      : events_(events),
+        topology_(topology),
+        places_(places),
+        on_new_node_(on_new_node),
+        cuts_(topology) {}
 
   Status run() {
     for (at_ = 0; at_ < events_.events.size(); ++at_)
       if (auto status = std::visit([&](const auto& e) { return repeat(e); }, events_.events[at_]);
           !status)
         return status;
-    if (copied_ != copies_.size()) return mismatch(at_, "fewer copies of nodes than here");
-    return {};
+    return check_copies();
   }
 
  private:
   bool has(NodeIndex n) const { return n.value < topology_.node_count() && topology_.has_node(n); }
 
+  Status check_copies() const {
+    return copied_ == copies_.size() ? Status() : mismatch(at_, "fewer copies of nodes than here");
+  }
+
   Status repeat(const Split& split) {
+    if (auto status = check_copies(); !status) return status;
     if (!has(split.a) || !has(split.b) || split.a == split.b || split.t == 0)
       return mismatch(at_, "no such edge to split");
-    std::vector<TetIndex> ring;
-    ring_of(topology_, split.a, split.b, ring);
-    if (ring.empty()) return mismatch(at_, "no such edge to split");
-    std::vector<TetChild> children;
-    if (split_edge(topology_, places_, split.a, split.b, split.t, children) != split.node)
+    ring_of(topology_, split.a, split.b, ring_);
+    if (ring_.empty()) return mismatch(at_, "no such edge to split");
+    if (places_.next_node(topology_) != split.node)
       return mismatch(at_, "the new node has another number here");
+    split_edge(topology_, places_, split.a, split.b, split.t, children_);
+    on_new_node_({split.node, split.a, split.b, split.t});
     return {};
   }
   Status repeat(const Open& open) {
+    if (auto status = check_copies(); !status) return status;
     if (open.first_face > events_.faces.size() ||
         open.face_count > events_.faces.size() - open.first_face)
       return mismatch(at_, "faces out of range");
@@ -66,7 +76,10 @@ class Replay {
     std::vector<Star> stars(nodes_.size());
     for (std::size_t i = 0; i < nodes_.size(); ++i)
       analysis_.run(topology_, cuts_, nodes_[i], stars[i]);
+    copies_.clear();
+    copied_ = 0;
     part(topology_, places_, stars, copies_);
+    for (const auto& copy : copies_) on_new_node_({copy.copy, copy.node, copy.node, 0});
     return {};
   }
   Status repeat(const Duplicate& copy) {
@@ -79,9 +92,12 @@ class Replay {
   const CutEvents& events_;
   dynamics::Topology& topology_;
   Places& places_;
+  const std::function<void(const NewNode&)>& on_new_node_;
   CutFaces cuts_;
   StarAnalysis analysis_;
   std::vector<NodeIndex> nodes_;
+  std::vector<TetIndex> ring_;
+  std::vector<TetChild> children_;
   std::vector<Duplicate> copies_;
   std::size_t at_ = 0, copied_ = 0;
 };
@@ -91,6 +107,15 @@ class Replay {
 void CutEvents::clear() {
   events.clear();
   faces.clear();
+}
+
+void CutEvents::append(const CutEvents& later) {
+  const auto offset = static_cast<std::uint32_t>(faces.size());
+  faces.insert(faces.end(), later.faces.begin(), later.faces.end());
+  for (auto event : later.events) {
+    if (auto* const open = std::get_if<Open>(&event)) open->first_face += offset;
+    events.push_back(event);
+  }
 }
 
 NodeIndex split_edge(dynamics::Topology& topology, Places& places, NodeIndex a, NodeIndex b,
@@ -134,8 +159,9 @@ void part(dynamics::Topology& topology, Places& places, std::span<const Star> st
     }
 }
 
-Status apply(const CutEvents& events, dynamics::Topology& topology, Places& places) {
-  return Replay(events, topology, places).run();
+Status apply(const CutEvents& events, dynamics::Topology& topology, Places& places,
+             const std::function<void(const NewNode&)>& on_new_node) {
+  return Replay(events, topology, places, on_new_node).run();
 }
 
 }  // namespace trocar::cutting

@@ -14,6 +14,7 @@
 // displacement and velocity follow. Masses are the topology's.
 
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <variant>
 #include <vector>
@@ -40,11 +41,19 @@ struct Duplicate {
 };
 using CutEvent = std::variant<Split, Open, Duplicate>;
 
+// displacement(node) = a + (b - a) t/65536 of the displacements at its parents; velocity likewise.
+// A copy has its original as both.
+struct NewNode {
+  NodeIndex node, a, b;
+  std::uint16_t t = 0;
+};
+
 struct CutEvents {
   std::vector<CutEvent> events;
   std::vector<TetFace> faces;  // from the side of the lower tet
 
   void clear();
+  void append(const CutEvents& later);
   bool operator==(const CutEvents&) const = default;
 };
 
@@ -61,7 +70,9 @@ void part(dynamics::Topology& topology, Places& places, std::span<const Star> st
           std::vector<Duplicate>& copies);
 
 // Repeats a cut. Everything is checked before it is done; after an error the edits before it have
-// been done.
-Status apply(const CutEvents& events, dynamics::Topology& topology, Places& places);
+// been done. on_new_node is told of each new node once all is in place that its edit changes.
+Status apply(
+    const CutEvents& events, dynamics::Topology& topology, Places& places,
+    const std::function<void(const NewNode&)>& on_new_node = [](const NewNode&) {});
 
 }  // namespace trocar::cutting

@@ -27,6 +27,9 @@ Places::Places(const dynamics::Topology& topology) {
     if (!topology.has_tet(TetIndex(t))) tets_.emplace_back(t);
 }
 
+NodeIndex Places::next_node(const dynamics::Topology& topology) const {
+  return nodes_.empty() ? NodeIndex(topology.node_count()) : nodes_.back();
+}
 NodeIndex Places::take_node(const dynamics::Topology& topology) {
   return take(nodes_, topology.node_count());
 }

@@ -13,6 +13,7 @@ class Places {
  public:
   explicit Places(const dynamics::Topology& topology);
 
+  NodeIndex next_node(const dynamics::Topology& topology) const;
   NodeIndex take_node(const dynamics::Topology& topology);
   TetIndex take_tet(const dynamics::Topology& topology);
   void give_back(NodeIndex node);

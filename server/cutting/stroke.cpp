@@ -36,10 +36,10 @@ BladeMotion::Verdict BladeMotion::move(std::span<const Vec3d> points, double h,
       longest_motion(anchor_, edge) > settings.most_pieces_of_motion * settings.piece_h * h)
     return Verdict::Appeared;
   now_ = edge;
-  ++ticks_;
+  ticks_ = std::min(ticks_ + 1, settings.collect_ticks);
   const double motion = longest_motion(anchor_, now_);
   const bool is_due =
-      motion > settings.collect_h * h || (ticks_ >= settings.collect_ticks && motion > kRest_h * h);
+      motion > settings.collect_h * h || (ticks_ == settings.collect_ticks && motion > kRest_h * h);
   // A blade too far ahead of the cutting goes on collecting.
   if (is_due && strips_.size() - next_ + settings.most_pieces_of_motion <= kMaxStrips)
     add_strips(h, settings);
@@ -51,8 +51,10 @@ void BladeMotion::finish(double h, const Settings& settings) {
 }
 
 void BladeMotion::add_strips(double h, const Settings& settings) {
+  // h may have become smaller since the blade moved.
   const double pieces =
-      std::max(1.0, std::ceil(longest_motion(anchor_, now_) / (settings.piece_h * h)));
+      std::clamp(std::ceil(longest_motion(anchor_, now_) / (settings.piece_h * h)), 1.0,
+                 static_cast<double>(settings.most_pieces_of_motion));
   for (double i = 0; i < pieces; ++i) {
     strips_.push_back(
         {between(anchor_, now_, i / pieces), between(anchor_, now_, (i + 1) / pieces), is_first_});
@@ -110,7 +112,9 @@ bool Stroke::measure(NodeIndex node, const Height& height) {
 
 void Stroke::decide(TetIndex tet, int side) {
   auto& own = at(sides_, tet.value);
+  if (own == side) return;
   if (own == 0) sided_.push_back(tet);
+  if (side == 0) std::erase(sided_, tet);
   own = static_cast<std::int8_t>(side);
 }
 

@@ -9,6 +9,7 @@
 #include "server/cutting/blade_patch.h"
 #include "server/cutting/faces.h"
 #include "server/cutting/settings.h"
+#include "server/world/state_archive.h"
 
 namespace trocar::cutting {
 
@@ -23,15 +24,20 @@ class BladeMotion {
   void finish(double h, const Settings& settings);
   void clear();
 
+  // Without the places of a blade that has left.
+  void visit_state(world::StateArchive& archive, bool has_left);
+
+  std::uint32_t points() const { return now_.count; }  // of the edge
   bool has_strip() const { return next_ < strips_.size(); }
   const Strip& strip() const { return strips_[next_]; }
   void pop();
 
  private:
   void add_strips(double h, const Settings& settings);
+  void visit_strips(world::StateArchive& archive);
 
-  BladeEdge anchor_, now_;  // where collecting began; the last place
-  std::uint32_t ticks_ = 0;
+  BladeEdge anchor_, now_;   // where collecting began; the last place
+  std::uint32_t ticks_ = 0;  // since then; counts no further than is asked
   bool is_first_ = true;
   std::vector<Strip> strips_;
   std::size_t next_ = 0;
@@ -78,6 +84,10 @@ class Stroke {
   }
   void clear();
 
+  // All but the id. What is read must fit the topology and be what a stroke can be; if it does
+  // not, archive.fail(), and what is left is good for clear() only.
+  void visit_state(world::StateArchive& archive, const dynamics::Topology& topology);
+
   std::uint32_t id = 0;
   bool is_active = false, has_ended = false;
   BladeMotion motion;
@@ -91,6 +101,9 @@ class Stroke {
 
  private:
   void forget_height(NodeIndex node);
+  void visit_patch(world::StateArchive& archive);
+  void visit_nodes(world::StateArchive& archive, const dynamics::Topology& topology);
+  void visit_tets(world::StateArchive& archive, const dynamics::Topology& topology);
 
   std::vector<std::uint8_t> labels_;
   std::vector<NodeIndex> labelled_;

@@ -5,6 +5,7 @@
 #include "common/base/version.h"
 #include "common/scene/organ_file.h"
 #include "common/wire/surface_codec.h"
+#include "common/wire/surface_messages.h"
 #include "server/recording/tick_records.h"
 #include "server/replication/messages.h"
 
@@ -17,6 +18,10 @@ std::size_t estimated_bytes(const step::PublishedFrame& frame) {
   std::size_t bytes = sizeof frame + frame.surface.size() * sizeof(wire::QuantisedVertex) +
                       frame.regions.size() * sizeof(std::uint16_t);
   if (frame.snapshot) bytes += frame.snapshot->size();
+  if (frame.change)
+    bytes += frame.change->new_vertices.size() * sizeof(wire::NewVertex) +
+             frame.change->removed.size() * sizeof(TriangleIndex) +
+             frame.change->added.size() * sizeof(wire::NewTriangle);
   for (const auto& record : frame.records)
     bytes += sizeof record + record.inputs.samples.size() * sizeof(session::ToolInput);
   return bytes;
@@ -36,14 +41,19 @@ Result<std::unique_ptr<Recorder>> Recorder::create(const std::string& path,
       !s)
     return s.error();
   proto::SurfaceTopology topology;
-  replication::describe(layout, 0, organ.name, topology);
+  wire::write(layout, organ.name, topology);
   if (auto s = (*writer)->write_topology(0, now, topology); !s) return s.error();
   if (auto s = (*writer)->flush(); !s) return s.error();
-  return std::unique_ptr<Recorder>(new Recorder(std::move(*writer), hash));
+  return std::unique_ptr<Recorder>(new Recorder(std::move(*writer), organ, hash, layout));
 }
 
-Recorder::Recorder(std::unique_ptr<journal::SessionJournalWriter> writer, std::uint64_t organ_hash)
-    : writer_(std::move(writer)), organ_hash_(organ_hash), thread_([this] { run(); }) {}
+Recorder::Recorder(std::unique_ptr<journal::SessionJournalWriter> writer, const scene::Organ& organ,
+                   std::uint64_t organ_hash, const wire::SurfaceLayout& layout)
+    : writer_(std::move(writer)),
+      layout_(layout),
+      organ_name_(organ.name),
+      organ_hash_(organ_hash),
+      thread_([this] { run(); }) {}
 
 Recorder::~Recorder() {
   if (thread_.joinable()) static_cast<void>(close());
@@ -63,6 +73,7 @@ void Recorder::take_frame(const step::SharedFrame& frame) {
   } else {
     if (open_gap_.frames++ == 0) open_gap_.first_tick = first;
     open_gap_.last_tick = frame->tick;
+    if (frame->change) open_gap_.changes.push_back(frame->change);
   }
   wake_ups_.fetch_add(1);
   wake_ups_.notify_one();
@@ -117,8 +128,10 @@ Status Recorder::write_presence(const Presence& presence) {
 }
 
 Status Recorder::write_gap(const Gap& gap) {
-  baseline_ = nullptr;
+  has_baseline_ = false;
   has_decisions_ = false;
+  for (const auto& change : gap.changes)
+    if (auto s = wire::apply(*change, layout_); !s) return s;
   counters_.frames_dropped += gap.frames;
   log::warn("recording: the disk was too slow, ticks {} to {} are missing", gap.first_tick,
             gap.last_tick);
@@ -150,12 +163,13 @@ Status Recorder::write_frame(const step::PublishedFrame& frame) {
   }
   if (auto s = writer_->write_tick_batch(tick, now, batch); !s) return s;
 
-  if (baseline_) {
+  if (auto s = write_change(frame); !s) return s;
+  const bool has_key = !has_baseline_ || frame.tick - last_key_tick_ >= kKeyPeriod;
+  if (has_baseline_) {
     if (auto s = write_surface(frame, false); !s) return s;
   }
-  if (!baseline_ || frame.tick - last_key_tick_ >= kKeyPeriod) {
-    last_key_tick_ = frame.tick;
-    if (auto s = write_surface(frame, true); !s) return s;
+  if (has_key) {
+    if (auto s = write_keyframe(frame); !s) return s;
   }
   if (!frame.claim_events.empty()) {
     proto::ClaimLog claims;
@@ -172,6 +186,24 @@ Status Recorder::write_frame(const step::PublishedFrame& frame) {
   return writer_->write_frame_state(tick, now, state);
 }
 
+Status Recorder::write_change(const step::PublishedFrame& frame) {
+  if (!frame.change) return {};
+  if (auto s = wire::apply(*frame.change, layout_); !s) return s;
+  proto::SurfaceChange message;
+  wire::write(*frame.change, layout_, message);
+  return writer_->write_topology_change(last_tick_, utc_ns(), message);
+}
+
+Status Recorder::write_keyframe(const step::PublishedFrame& frame) {
+  last_key_tick_ = frame.tick;
+  if (layout_.epoch > 0) {
+    proto::SurfaceTopology topology;
+    wire::write(layout_, organ_name_, topology);
+    if (auto s = writer_->write_topology(last_tick_, utc_ns(), topology); !s) return s;
+  }
+  return write_surface(frame, true);
+}
+
 Status Recorder::write_surface(const step::PublishedFrame& frame, bool is_keyframe) {
   proto::SurfaceFrame message;
   message.set_frame(frame.frame);
@@ -183,12 +215,14 @@ Status Recorder::write_surface(const step::PublishedFrame& frame, bool is_keyfra
   if (is_keyframe) {
     wire::encode_keyframe(frame.surface, payload);
   } else {
-    message.set_base_frame(baseline_->frame);
-    wire::encode_delta(baseline_->surface, frame.surface, payload);
+    message.set_base_frame(baseline_frame_);
+    baseline_.resize(frame.surface.size());  // zeros for new vertices
+    wire::encode_delta(baseline_, frame.surface, payload);
   }
   message.set_payload(payload.data(), payload.size());
-  // The writer thread is the only one that keeps the frame beyond its publication.
-  baseline_ = std::make_shared<step::PublishedFrame>(frame);
+  baseline_.assign(frame.surface.begin(), frame.surface.end());
+  baseline_frame_ = frame.frame;
+  has_baseline_ = true;
   return writer_->write_surface(not_before_last(frame.tick), utc_ns(), message);
 }
 

@@ -6,15 +6,19 @@
 //   I/O thread:        take_participants -> [64 lists] -----+--> writer thread -> MCAP file
 //
 // Neither producer ever waits. When the frames' queue is full a frame is dropped, counted, and the
-// journal gets a JournalGap with the ticks that are missing; the surface goes on with a keyframe
-// and re-simulation from the next snapshot. A disk error ends the recording, is logged once, and
-// close() returns it.
+// journal gets a JournalGap with the ticks that are missing; the surface goes on with topology and
+// keyframe (what a dropped frame changed of it is kept) and re-simulation from the next snapshot. A
+// disk error ends the recording, is logged once, and close() returns it.
+//
+// Changes of the surface are written with their frame. From epoch 1 on each keyframe (1 Hz) follows
+// a full SurfaceTopology of its tick, so that a seek, or what comes after damage, starts right.
 
 #include <algorithm>
 #include <atomic>
 #include <memory>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "common/base/spsc_queue.h"
 #include "common/journal/session_journal_writer.h"
@@ -35,8 +39,8 @@ class Recorder {
   static constexpr std::size_t kQueueFrames = 1024;
   static constexpr std::size_t kQueueParticipants = 64;
 
-  // Creates the file with organ and topology; `organ` and `layout` are not kept. Fails if the file
-  // exists or cannot be written.
+  // Creates the file with organ and topology; copies what it keeps. Fails if the file exists or
+  // cannot be written.
   static Result<std::unique_ptr<Recorder>> create(const std::string& path,
                                                   const scene::Organ& organ,
                                                   const wire::SurfaceLayout& layout);
@@ -59,6 +63,7 @@ class Recorder {
   struct Gap {
     Tick first_tick = 0, last_tick = 0;
     std::uint64_t frames = 0;
+    std::vector<std::shared_ptr<const wire::SurfaceChange>> changes;
   };
   struct QueuedFrame {
     step::SharedFrame frame;
@@ -66,13 +71,16 @@ class Recorder {
     Gap gap_before;  // frames dropped just before this one
   };
 
-  Recorder(std::unique_ptr<journal::SessionJournalWriter> writer, std::uint64_t organ_hash);
+  Recorder(std::unique_ptr<journal::SessionJournalWriter> writer, const scene::Organ& organ,
+           std::uint64_t organ_hash, const wire::SurfaceLayout& layout);
   void run();
   // Writes everything queued; false when both queues were empty.
   bool write_queued();
   Status write_presence(const Presence& presence);
   Status write_gap(const Gap& gap);
   Status write_frame(const step::PublishedFrame& frame);
+  Status write_change(const step::PublishedFrame& frame);
+  Status write_keyframe(const step::PublishedFrame& frame);
   Status write_surface(const step::PublishedFrame& frame, bool is_keyframe);
   void fail_with(const Error& error);
   Tick not_before_last(Tick tick) { return last_tick_ = std::max(last_tick_, tick); }
@@ -80,7 +88,11 @@ class Recorder {
   // Writer thread, or the caller's after it has ended.
   std::unique_ptr<journal::SessionJournalWriter> writer_;
   session::Roster roster_;      // names for claim events
-  step::SharedFrame baseline_;  // last surface written; null: a keyframe is due
+  wire::SurfaceLayout layout_;  // of the last frame written
+  std::string organ_name_;
+  wire::QuantisedSurface baseline_;  // last surface written
+  Frame baseline_frame_ = 0;
+  bool has_baseline_ = false;  // else a keyframe is due
   step::TickDecisions last_decisions_;
   bool has_decisions_ = false;
   Tick last_key_tick_ = 0, last_tick_ = 0;

@@ -7,6 +7,7 @@
 #include "common/journal/session_journal.h"
 #include "common/scene/organ_file.h"
 #include "common/wire/surface_codec.h"
+#include "common/wire/surface_messages.h"
 #include "server/recording/tick_records.h"
 #include "server/step/simulation.h"
 
@@ -22,8 +23,13 @@ BytesView view(const std::string& bytes) {
 class Verifier {
  public:
   Verifier(journal::SessionJournal& journal, scene::Organ organ, VerifyReport& report)
-      : journal_(journal), simulation_(std::move(organ)), report_(report) {
-    surface_.resize(simulation_.layout().vertex_count());
+      : journal_(journal),
+        simulation_(std::move(organ)),
+        report_(report),
+        layout_(simulation_.layout()) {
+    // Messages name no nodes.
+    layout_.vertex_of_node.clear();
+    surface_.resize(layout_.vertex_count());
   }
 
   // Ticks [from, to].
@@ -40,11 +46,17 @@ class Verifier {
         return report_.ok();
       }));
     }
+    changes_.clear();
+    note(journal_.read_topology_changes(from, to, [&](Tick tick, const proto::SurfaceChange& c) {
+      changes_[tick] = c;
+      return true;
+    }));
     note(journal_.read_surface_deltas(from, to, [&](Tick, const proto::SurfaceFrame& frame) {
       verify_surface(frame);
       return report_.ok();
     }));
     simulated_crcs_.clear();
+    simulated_sums_.clear();
   }
 
  private:
@@ -84,7 +96,10 @@ class Verifier {
     if (done.state_hash != record_.state_hash) return mismatch(tick, "state hash");
     ++report_.ticks_verified;
     report_.last_hash = done.state_hash;
-    if (auto frame = simulation_.take_frame()) simulated_crcs_[tick] = frame->surface_crc;
+    if (auto frame = simulation_.take_frame()) {
+      simulated_crcs_[tick] = frame->surface_crc;
+      if (frame->change) simulated_sums_[tick] = frame->change->sum;
+    }
     if (const auto it = snapshots_.find(tick); it != snapshots_.end()) {
       Bytes state;
       simulation_.write_snapshot(state);
@@ -93,13 +108,43 @@ class Verifier {
     }
   }
 
+  // Brings the layout to the epoch of a frame: by its change, or after a gap by the last topology.
+  // False if the journal lacks both, or they contradict each other.
+  bool follow_epoch(Tick tick, std::uint32_t epoch) {
+    if (epoch == layout_.epoch) return true;
+    if (const auto found = changes_.find(tick);
+        found != changes_.end() && found->second.from_epoch() == layout_.epoch) {
+      const auto change = wire::read(found->second, layout_);
+      if (!change.ok() || !wire::apply(*change, layout_).ok()) {
+        mismatch(tick, "surface change");
+        return false;
+      }
+      const auto simulated = simulated_sums_.find(tick);
+      if (simulated != simulated_sums_.end() && simulated->second != change->sum)
+        mismatch(tick, "triangles of the surface");
+      return layout_.epoch == epoch;
+    }
+    const auto topology = journal_.topology_before(tick);
+    if (!topology.ok() || !topology->has_value() || (*topology)->epoch() != epoch) return false;
+    auto layout = wire::read(**topology);
+    if (!layout.ok()) mismatch(tick, "topology");
+    if (layout.ok()) layout_ = std::move(*layout);
+    return layout.ok();
+  }
+
   void verify_surface(const proto::SurfaceFrame& frame) {
     if (frame.base_frame() != surface_frame_ || !has_surface_) {
       const auto key = journal_.surface_key_before(Tick{frame.base_frame()} * kTicksPerFrame);
       has_surface_ = key.ok() && key->has_value() && (*key)->frame() == frame.base_frame() &&
-                     wire::decode_keyframe(view((*key)->payload()), surface_).ok();
+                     follow_epoch((*key)->tick(), (*key)->epoch());
       if (!has_surface_) return;  // in a gap: the next keyframe starts again
+      surface_.resize(layout_.vertex_count());
+      has_surface_ = wire::decode_keyframe(view((*key)->payload()), surface_).ok();
+      if (!has_surface_) return;
     }
+    has_surface_ = follow_epoch(frame.tick(), frame.epoch());
+    if (!has_surface_) return;
+    surface_.resize(layout_.vertex_count());  // new vertices count as zero in the baseline
     if (!wire::decode_delta(view(frame.payload()), surface_).ok())
       return mismatch(frame.tick(), "surface delta");
     surface_frame_ = frame.frame();
@@ -118,6 +163,9 @@ class Verifier {
   bool is_in_step_ = false;
   std::map<Tick, proto::WorldSnapshot> snapshots_;  // of the window
   std::map<Tick, std::uint32_t> simulated_crcs_;    // of the window
+  std::map<Tick, std::uint64_t> simulated_sums_;    // of triangles, where they changed
+  std::map<Tick, proto::SurfaceChange> changes_;    // of the window
+  wire::SurfaceLayout layout_;
   wire::QuantisedSurface surface_;
   Frame surface_frame_ = 0;
   bool has_surface_ = false;

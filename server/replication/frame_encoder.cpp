@@ -47,7 +47,7 @@ wire::SharedBytes FrameEncoder::keyframe() {
 }
 
 wire::SharedBytes FrameEncoder::delta_from(const step::PublishedFrame& baseline) {
-  TROCAR_ASSERT(current_ && baseline.epoch == current_->epoch);
+  TROCAR_ASSERT(current_ && baseline.surface.size() <= current_->surface.size());
   auto& cached = deltas_[baseline.frame];
   if (cached) {
     ++statistics_.shared;
@@ -55,7 +55,13 @@ wire::SharedBytes FrameEncoder::delta_from(const step::PublishedFrame& baseline)
   }
   const auto begin = thread_cpu_ns();
   Bytes payload;
-  const auto report = wire::encode_delta(baseline.surface, current_->surface, payload);
+  std::span<const wire::QuantisedVertex> from = baseline.surface;
+  if (from.size() < current_->surface.size()) {
+    extended_.assign(from.begin(), from.end());
+    extended_.resize(current_->surface.size());
+    from = extended_;
+  }
+  const auto report = wire::encode_delta(from, current_->surface, payload);
   statistics_.delta_cpu.add(thread_cpu_ns() - begin);
   cached = wrap(*current_, &baseline, payload);
   if (baseline.frame + 1 == current_->frame) {

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "common/base/version.h"
+#include "common/wire/surface_messages.h"
 #include "common/wire/tool_shape.h"
 #include "proto/wire.pb.h"
 
@@ -69,25 +70,17 @@ wire::SharedBytes encode_participants(const std::vector<session::Participant>& p
   return wire::encode_envelope(envelope);
 }
 
-void describe(const wire::SurfaceLayout& layout, std::uint32_t epoch, const std::string& organ_name,
-              proto::SurfaceTopology& topology) {
-  topology.set_epoch(epoch);
-  topology.set_quantum_m(wire::kQuantumMetres);
-  topology.set_organ_name(organ_name);
-  for (const auto& vertex : layout.rest_quanta) {
-    topology.add_rest_position_quanta(vertex.x);
-    topology.add_rest_position_quanta(vertex.y);
-    topology.add_rest_position_quanta(vertex.z);
-  }
-  for (const auto& triangle : layout.triangles)
-    for (const auto vertex : triangle) topology.add_triangle(vertex.value);
-  for (const auto vertex : layout.fixed_vertices) topology.add_fixed_vertex(vertex.value);
-}
-
-wire::SharedBytes encode_topology(const wire::SurfaceLayout& layout, std::uint32_t epoch,
+wire::SharedBytes encode_topology(const wire::SurfaceLayout& layout,
                                   const std::string& organ_name) {
   proto::Envelope envelope;
-  describe(layout, epoch, organ_name, *envelope.mutable_surface_topology());
+  wire::write(layout, organ_name, *envelope.mutable_surface_topology());
+  return wire::encode_envelope(envelope);
+}
+
+wire::SharedBytes encode_surface_change(const wire::SurfaceChange& change,
+                                        const wire::SurfaceLayout& layout) {
+  proto::Envelope envelope;
+  wire::write(change, layout, *envelope.mutable_surface_change());
   return wire::encode_envelope(envelope);
 }
 

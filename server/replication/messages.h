@@ -18,23 +18,22 @@ namespace trocar::proto {
 class ClaimEvent;
 class FrameState;
 class Participants;
-class SurfaceTopology;
 }  // namespace trocar::proto
 
 namespace trocar::replication {
 
 // Messages that clients and journal get alike.
 void describe(const std::vector<session::Participant>& present, proto::Participants& message);
-void describe(const wire::SurfaceLayout& layout, std::uint32_t epoch, const std::string& organ_name,
-              proto::SurfaceTopology& message);
 void describe(const step::PublishedFrame& frame, proto::FrameState& message);
 void describe(const locks::ClaimEvent& event, const session::Roster& roster,
               proto::ClaimEvent& message);
 
 wire::SharedBytes encode_welcome(ParticipantSlot slot, std::uint64_t organ_hash);
 wire::SharedBytes encode_participants(const std::vector<session::Participant>& present);
-wire::SharedBytes encode_topology(const wire::SurfaceLayout& layout, std::uint32_t epoch,
-                                  const std::string& organ_name);
+wire::SharedBytes encode_topology(const wire::SurfaceLayout& layout, const std::string& organ_name);
+// `layout`: the one that the change was applied to.
+wire::SharedBytes encode_surface_change(const wire::SurfaceChange& change,
+                                        const wire::SurfaceLayout& layout);
 wire::SharedBytes encode_frame_state(const step::PublishedFrame& frame);
 wire::SharedBytes encode_claim_event(const locks::ClaimEvent& event, const session::Roster& roster);
 wire::SharedBytes encode_barrier(const step::PublishedFrame& frame);

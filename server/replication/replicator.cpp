@@ -44,13 +44,14 @@ struct Replicator::Client {
 };
 
 Replicator::Replicator(net::Connections& connections, session::SimulationInbox& inbox,
-                       const wire::SurfaceLayout& layout, std::string organ_name,
+                       wire::SurfaceLayout layout, std::string organ_name,
                        std::uint64_t organ_hash, ReplicatorOptions options)
     : connections_(connections),
       inbox_(inbox),
       options_(std::move(options)),
       organ_hash_(organ_hash),
-      topology_(encode_topology(layout, 0, organ_name)) {}
+      organ_name_(std::move(organ_name)),
+      layout_(std::move(layout)) {}
 
 Replicator::~Replicator() = default;
 
@@ -207,7 +208,7 @@ std::optional<Replicator::Ending> Replicator::admit(Client& client, const proto:
   ++counters_.sessions;
   const Ending too_slow{EndReason::TooSlow, "the outbox is too small for the first messages"};
   if (!send(client, encode_welcome(participant.slot, organ_hash_)) ||
-      !send(client, encode_participants(roster_.list())) || !send(client, topology_))
+      !send(client, encode_participants(roster_.list())) || !send(client, topology()))
     return too_slow;
   if (encoder_.current() && !give_frame(client, true)) return too_slow;
   // The others; the newcomer has it already, a second copy does no harm.
@@ -253,6 +254,21 @@ std::optional<Replicator::Ending> Replicator::take_ack(Client& client, Frame fra
 
 // ---- what they are given ----
 
+const wire::SharedBytes& Replicator::topology() {
+  if (!topology_) topology_ = encode_topology(layout_, organ_name_);
+  return topology_;
+}
+
+Status Replicator::change_surface(const wire::SurfaceChange& change) {
+  if (Status applied = wire::apply(change, layout_); !applied.ok()) return applied;
+  const auto bytes = encode_surface_change(change, layout_);
+  topology_.reset();
+  ++counters_.surface_changes;
+  counters_.surface_change_bytes += bytes->size();
+  broadcast(bytes);
+  return {};
+}
+
 bool Replicator::send(Client& client, const wire::SharedBytes& bytes) {
   if (!connections_.send(client.id, bytes)) return false;
   counters_.bytes_queued += bytes->size();
@@ -284,9 +300,12 @@ bool Replicator::give_frame(Client& client, bool is_required) {
     ++counters_.frames_skipped;
     return false;
   }
-  const bool is_keyframe = is_requested || !baseline || baseline->epoch != frame.epoch ||
+  const bool is_keyframe = is_requested || !baseline ||
                            frame.frame - baseline->frame > options_.keyframe_after_frames;
-  if (!send(client, is_keyframe ? encoder_.keyframe() : encoder_.delta_from(*baseline))) {
+  // Who asks may have lost count of the surface's changes, too.
+  const bool is_lost = is_requested && frame.epoch > 0;
+  if ((is_lost && !send(client, topology())) ||
+      !send(client, is_keyframe ? encoder_.keyframe() : encoder_.delta_from(*baseline))) {
     ++counters_.frames_skipped;
     return false;
   }
@@ -304,8 +323,18 @@ bool Replicator::give_frame(Client& client, bool is_required) {
 void Replicator::publish(std::span<const step::SharedFrame> frames) {
   if (frames.empty()) return;
   TROCAR_ASSERT(!barrier_);
-  for (const auto& frame : frames)
+  Status followed;
+  for (const auto& frame : frames) {
     for (const auto& event : frame->claim_events) broadcast(encode_claim_event(event, roster_));
+    if (frame->change && followed.ok()) followed = change_surface(*frame->change);
+  }
+  const auto& newest = *frames.back();
+  if (newest.epoch != layout_.epoch || newest.surface.size() != layout_.vertex_count()) {
+    // Nothing that is sent from here on could be understood.
+    log::error("frame {}: no way to epoch {} of the surface; {}", newest.frame, newest.epoch,
+               followed.ok() ? "a change is missing" : followed.error().message);
+    return end_all(EndReason::Unspecified, "the server lost track of the surface: start it again");
+  }
   counters_.frames_published += frames.size();
   counters_.frames_conflated += frames.size() - 1;
   encoder_.set_current(frames.back());

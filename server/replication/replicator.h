@@ -3,7 +3,8 @@
 // The sessions of all clients: who they are, what they may say, and what each was given last.
 //
 //   Hello -> Welcome, Participants, SurfaceTopology, keyframe -> then per published frame
-//            SurfaceFrame (delta against the last frame this client was given), FrameState
+//            SurfaceChange (where it begins an epoch), SurfaceFrame (delta against the last frame
+//            this client was given, whichever epoch that was), FrameState
 //
 // Inbound: every message is checked by role and range (validation.h); samples, joins and leaves go
 // to the simulation through the SimulationInbox. Anything malformed, oversized, too frequent or not
@@ -11,14 +12,15 @@
 //
 // Outbound: when a client's outbox holds more than max(64 KiB, 2 frames), the frame is skipped for
 // it; the next delta is encoded against the last frame it was given, so nothing queues up and
-// nothing is lost. It gets a keyframe instead when it asks (at most 4 per second), when its
-// baseline is older than 63 frames (1 s), and across an epoch. Participants, claim events, barrier
-// and topology cannot be skipped: if one does not fit, the session ends as too slow.
+// nothing is lost. It gets a keyframe instead when it asks (at most 4 per second; from epoch 1 on
+// with the topology before it) and when its baseline is older than 63 frames (1 s). Participants,
+// claim events, surface changes, topology and barrier cannot be skipped: if one does not fit, the
+// session ends as too slow.
 //
 // Barrier: publishes a last frame, asks each participant for the CRC of what it shows, and collects
 // the answers.
 //
-// Thread: every call on the I/O thread. `connections`, `inbox` and the layout outlive this.
+// Thread: every call on the I/O thread. `connections` and `inbox` outlive this.
 
 #include <array>
 #include <functional>
@@ -74,18 +76,19 @@ struct ReplicatorCounters {
   std::uint64_t frames_conflated = 0;  // overtaken by a newer one before this thread saw them
   std::uint64_t frames_given = 0, frames_skipped = 0;  // summed over clients
   std::uint64_t keyframes_given = 0;
+  std::uint64_t surface_changes = 0, surface_change_bytes = 0;  // each counted once
   std::uint64_t bytes_queued = 0;
 };
 
 class Replicator final : public net::ConnectionHandler {
  public:
   Replicator(net::Connections& connections, session::SimulationInbox& inbox,
-             const wire::SurfaceLayout& layout, std::string organ_name, std::uint64_t organ_hash,
+             wire::SurfaceLayout layout, std::string organ_name, std::uint64_t organ_hash,
              ReplicatorOptions options = {});
   ~Replicator() override;
 
-  // Frames since the last call, oldest first. Claim events of all of them are delivered, the
-  // surface only of the newest.
+  // Frames since the last call, oldest first, none left out. Claim events and surface changes of all
+  // of them are delivered, the displacements only of the newest.
   void publish(std::span<const step::SharedFrame> frames);
 
   // `last` has been or is now published; no further publish(). New Hellos are refused.
@@ -120,6 +123,10 @@ class Replicator final : public net::ConnectionHandler {
   std::optional<Ending> take_ack(Client& client, Frame frame, std::uint32_t crc);
   bool exceeds_rate(Client& client);
 
+  // Tells everybody what begins an epoch and keeps it; an error if it does not follow.
+  Status change_surface(const wire::SurfaceChange& change);
+  // Of the surface as it is now.
+  const wire::SharedBytes& topology();
   bool send(Client& client, const wire::SharedBytes& bytes);
   void broadcast(const wire::SharedBytes& bytes);
   // True if the client has the newest frame afterwards. `is_required`: do not skip.
@@ -134,7 +141,9 @@ class Replicator final : public net::ConnectionHandler {
   session::SimulationInbox& inbox_;
   const ReplicatorOptions options_;
   const std::uint64_t organ_hash_;
-  const wire::SharedBytes topology_;
+  const std::string organ_name_;
+  wire::SurfaceLayout layout_;   // of the newest frame
+  wire::SharedBytes topology_;   // its encoding; null: not since the last change
   session::Roster roster_;
   std::map<net::ConnectionId, std::unique_ptr<Client>> clients_;
   bool participants_changed_ = false;

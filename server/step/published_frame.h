@@ -12,6 +12,7 @@
 #include "common/base/tick.h"
 #include "common/scene/tool.h"
 #include "common/wire/quantise.h"
+#include "common/wire/surface_change.h"
 #include "server/locks/claims.h"
 #include "server/session/inputs.h"
 #include "server/step/tick_report.h"
@@ -42,7 +43,9 @@ struct TickRecord {
 struct PublishedFrame {
   Frame frame = 0;
   Tick tick = 0;
-  std::uint32_t epoch = 0;
+  std::uint32_t epoch = 0;  // after `change`
+  // Of the surface since the frame before; null: none.
+  std::shared_ptr<const wire::SurfaceChange> change;
   wire::QuantisedSurface surface;  // displacements from rest, per vertex slot
   std::uint32_t surface_crc = 0;
   std::vector<std::uint16_t>

@@ -4,9 +4,11 @@
 #include <cmath>
 #include <numbers>
 
+#include "common/base/assert.h"
 #include "common/base/timing.h"
 #include "common/base/version.h"
 #include "common/wire/surface_codec.h"
+#include "common/wire/surface_messages.h"
 
 namespace trocar::testing {
 namespace {
@@ -52,15 +54,40 @@ wire::SurfaceLayout make_blob_layout(int rings, int segments, double radius_m) {
     layout.triangles.push_back({at(rings - 1, j), at(rings - 1, j + 1), south});
   }
   layout.rest_quanta = wire::quantise_rest(rest);
+  layout.is_wound.resize(layout.triangles.size());
+  layout.triangle_sum = layout.compute_triangle_sum();
   for (std::size_t i = 0; i < rest.size(); ++i) layout.node_of_vertex.push_back(NodeIndex(i));
   return layout;
 }
 
 SyntheticSource::SyntheticSource(wire::SurfaceLayout layout, std::string organ_name)
     : layout_(std::move(layout)), organ_name_(std::move(organ_name)) {
-  for (const auto& q : layout_.rest_quanta) rest_.push_back(wire::to_metres(q));
+  layout_.epoch = 1;
+  follow_layout();
+}
+
+void SyntheticSource::follow_layout() {
+  for (std::size_t i = rest_.size(); i < layout_.vertex_count(); ++i)
+    rest_.push_back(wire::to_metres(layout_.rest_quanta[i]));
   surface_.resize(rest_.size());
   regions_.resize(rest_.size());
+}
+
+void SyntheticSource::queue_change(const wire::SurfaceChange& change) {
+  const Status applied = wire::apply(change, layout_);
+  TROCAR_ASSERT(applied.ok());
+  follow_layout();
+  proto::Envelope envelope;
+  wire::write(change, layout_, *envelope.mutable_surface_change());
+  queue(std::move(envelope));
+}
+
+void SyntheticSource::queue_topology() {
+  proto::Envelope topology;
+  wire::write(layout_, organ_name_, *topology.mutable_surface_topology());
+  queue(std::move(topology));
+  wants_keyframe_ = true;
+  wants_topology_ = false;
 }
 
 void SyntheticSource::queue_start() {
@@ -71,19 +98,7 @@ void SyntheticSource::queue_start() {
   welcome.mutable_welcome()->set_participant(2);
   queue(std::move(welcome));
 
-  proto::Envelope topology;
-  auto& t = *topology.mutable_surface_topology();
-  t.set_epoch(1);
-  t.set_quantum_m(wire::kQuantumMetres);
-  t.set_organ_name(organ_name_);
-  for (const auto& q : layout_.rest_quanta) {
-    t.add_rest_position_quanta(q.x);
-    t.add_rest_position_quanta(q.y);
-    t.add_rest_position_quanta(q.z);
-  }
-  for (const auto& triangle : layout_.triangles)
-    for (const VertexIndex v : triangle) t.add_triangle(v.value);
-  queue(std::move(topology));
+  queue_topology();
 
   proto::Envelope participants;
   const char* names[] = {"Dr. Ada", "Dr. Brook", "You", "Prof. Chen"};
@@ -182,6 +197,7 @@ proto::Envelope SyntheticSource::make_state() const {
 }
 
 void SyntheticSource::queue_frame(bool as_keyframe) {
+  if (wants_topology_) queue_topology();
   ++frame_;
   const auto baseline = surface_;
   deform();
@@ -189,7 +205,7 @@ void SyntheticSource::queue_frame(bool as_keyframe) {
   auto& frame = *envelope.mutable_surface_frame();
   frame.set_frame(frame_);
   frame.set_tick(frame_ * kTicksPerFrame);
-  frame.set_epoch(1);
+  frame.set_epoch(layout_.epoch);
   frame.set_surface_crc(wire::surface_crc(surface_));
   Bytes payload;
   if (as_keyframe || wants_keyframe_) {
@@ -243,7 +259,8 @@ void SyntheticSource::poll(replica::MessageSink& sink) {
 }
 
 bool SyntheticSource::send(const proto::Envelope& message) {
-  if (message.has_keyframe_request() && answer_requests) wants_keyframe_ = true;
+  if (message.has_keyframe_request() && answer_requests)
+    wants_keyframe_ = wants_topology_ = true;
   if (message.has_tool_sample()) {
     const auto& sample = message.tool_sample();
     mouse_pose_ = {{sample.position_m().x(), sample.position_m().y(), sample.position_m().z()},

@@ -25,6 +25,11 @@ class SyntheticSource final : public replica::SessionSource {
   // Messages of the next frame, as the server would send them; poll() delivers them.
   void queue_start();
   void queue_frame(bool as_keyframe = false);
+  // Begins an epoch: the change goes out now, as the server sends it, its first frame is the next.
+  void queue_change(const wire::SurfaceChange& change);
+  // What a server gives who has lost count: topology now, keyframe next.
+  void queue_topology();
+  const wire::SurfaceLayout& layout() const { return layout_; }
   void queue(proto::Envelope message) { queued_.push_back(std::move(message)); }
   // In real time: poll() queues the frames that have fallen due since the first poll.
   void run_in_real_time() { is_real_time_ = true; }
@@ -34,7 +39,7 @@ class SyntheticSource final : public replica::SessionSource {
   // Changes a message just before delivery; false drops it.
   std::function<bool(proto::Envelope&)> tamper;
   std::vector<proto::Envelope> sent;  // by the client, in order
-  bool answer_requests = true;        // KeyframeRequest gets a keyframe with the next frame
+  bool answer_requests = true;        // KeyframeRequest gets topology and keyframe with the next frame
 
   void poll(replica::MessageSink& sink) override;
   bool send(const proto::Envelope& message) override;
@@ -46,6 +51,7 @@ class SyntheticSource final : public replica::SessionSource {
 
  private:
   void deform();
+  void follow_layout();
   proto::Envelope make_state() const;
 
   wire::SurfaceLayout layout_;
@@ -54,7 +60,7 @@ class SyntheticSource final : public replica::SessionSource {
   wire::QuantisedSurface surface_;
   std::vector<std::uint16_t> regions_;
   Frame frame_ = 0;
-  bool wants_keyframe_ = false, is_real_time_ = false, has_started_ = false;
+  bool wants_keyframe_ = false, wants_topology_ = false, is_real_time_ = false, has_started_ = false;
   std::uint64_t start_ns_ = 0;
   std::vector<proto::Envelope> queued_;
   replica::SourceState state_ = replica::SourceState::Live;

@@ -131,6 +131,7 @@ void CutOrgan::tick() {
   last_ns_ = thread_cpu_ns() - start;
   if (const auto status = apply(output_.events, copy_, copy_places_); !status && failure_.empty())
     failure_ = "replay: " + status.error().message;
+  history_.append(output_.events);
   if (!displacements.empty()) {
     displacements.resize(topology_.node_count());
     for (const auto& made : output_.new_nodes) {
@@ -146,6 +147,27 @@ void CutOrgan::tick() {
   total_.refused_splits += output_.refused_splits;
   total_.pinch_splits += output_.pinch_splits;
   total_.is_behind = output_.is_behind;
+}
+
+Bytes CutOrgan::state() {
+  Bytes bytes;
+  auto archive = world::StateArchive::writing(bytes);
+  cutter_.visit_state(archive);
+  return bytes;
+}
+
+std::string CutOrgan::resume(CutOrgan& other) {
+  if (const auto status = cutter_.repeat(other.history_); !status) return status.error().message;
+  if (const auto status = apply(other.history_, copy_, copy_places_); !status)
+    return status.error().message;
+  const auto bytes = other.state();
+  auto archive = world::StateArchive::reading(bytes);
+  cutter_.visit_state(archive);
+  if (!archive.ok() || !archive.at_end()) return "its state cannot be read";
+  history_ = other.history_;
+  total_ = other.total_;
+  displacements = other.displacements;
+  return {};
 }
 
 void CutOrgan::run_until_idle() {

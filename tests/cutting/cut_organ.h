@@ -40,6 +40,12 @@ class CutOrgan {
   std::uint64_t last_ns() const { return last_ns_; }
   // Sums over all calls.
   const CutOutput& total() const { return total_; }
+  const CutOutput& last() const { return output_; }
+  const CutEvents& history() const { return history_; }
+  Bytes state();
+  // Becomes what the other one is, from its history and its state. It must be fresh itself. Returns
+  // what is wrong, or nothing.
+  std::string resume(CutOrgan& other);
 
   void tick();
   void run_until_idle();
@@ -56,6 +62,7 @@ class CutOrgan {
   Places copy_places_;
   Cutter cutter_;
   CutOutput output_, total_;
+  CutEvents history_;
   std::string failure_;
   std::uint64_t last_ns_ = 0;
   const double volume_, mass_, surface_;
