@@ -32,6 +32,8 @@ scene::Verb to_verb(proto::Verb verb) {
       return scene::Verb::Push;
     case proto::VERB_GRASP:
       return scene::Verb::Grasp;
+    case proto::VERB_CUT:
+      return scene::Verb::Cut;
     default:
       return scene::Verb::None;
   }
@@ -216,9 +218,9 @@ void Replica::extend_history(const wire::QuantisedSurface& surface) {
     auto& known = frame.surface;
     for (const wire::SurfaceChange& change : to_show_)
       for (const wire::NewVertex& vertex : change.new_vertices)
-        known.push_back(vertex.has_parents() ? wire::between(known[vertex.a.value],
-                                                             known[vertex.b.value], vertex.t)
-                                             : surface[known.size()]);
+        known.push_back(vertex.has_parents()
+                            ? wire::between(known[vertex.a.value], known[vertex.b.value], vertex.t)
+                            : surface[known.size()]);
   }
 }
 

@@ -35,6 +35,7 @@ void draw_doing(const HudParticipant& p) {
                       : !p.has_claim                 ? "refused"
                       : p.is_inside                  ? "inside tissue"
                       : p.verb == scene::Verb::Grasp ? "grasps"
+                      : p.verb == scene::Verb::Cut   ? "cuts"
                                                      : "pushes";
   if (p.has_tool && p.verb != scene::Verb::None && !p.is_silent)
     ImGui::TextColored(

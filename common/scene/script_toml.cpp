@@ -24,6 +24,7 @@ void read_shape(TableReader& reader, ToolShape& shape) {
     shape.half_width_m = static_cast<float>(*width * 0.5e-3);
   if (const auto friction = reader.number("friction", 0, 2))
     shape.friction = static_cast<float>(*friction);
+  set("edge_mm", shape.edge_m, 1, 200);
   if (const auto grip = reader.number("grip_n", 0.1, 100)) shape.grip_n = static_cast<float>(*grip);
 }
 
@@ -63,8 +64,10 @@ ScriptKey read_key(TableReader& reader, const ScriptKey* before) {
     reader.fail("position_mm", "is missing, write [x, y, z]");
   }
   if (const auto shaft = reader.direction("shaft")) key.shaft = *shaft;
-  if (const auto verb = reader.choice<Verb, 3>(
-          "verb", {{{"none", Verb::None}, {"push", Verb::Push}, {"grasp", Verb::Grasp}}}))
+  if (const auto verb = reader.choice<Verb, 4>("verb", {{{"none", Verb::None},
+                                                         {"push", Verb::Push},
+                                                         {"grasp", Verb::Grasp},
+                                                         {"cut", Verb::Cut}}}))
     key.verb = *verb;
   reader.finish();
   return key;

@@ -9,8 +9,8 @@
 namespace trocar::scene {
 
 // What the holder wants the tool to do, as long as the sample says so.
-enum class Verb : std::uint8_t { None = 0, Push = 1, Grasp = 2 };
-inline constexpr int kVerbCount = 3;
+enum class Verb : std::uint8_t { None = 0, Push = 1, Grasp = 2, Cut = 3 };
+inline constexpr int kVerbCount = 4;
 const char* name_of(Verb verb);
 
 // A capsule: tip at the tool frame's origin, shaft along +z. With a half width it is a flat blade
@@ -22,6 +22,7 @@ struct ToolShape {
   float half_width_m = 0;   // 0 to 0.05
   float friction = 0.2f;    // Coulomb's coefficient on tissue, 0 to 2
   float grip_n = 8;         // pulled harder than this, tissue slips out of the jaws; 0.1 to 100
+  float edge_m = 0.020f;    // sharp from the tip up along the shaft, when it cuts; 0.001 to 0.2
 
   bool operator==(const ToolShape&) const = default;
 };

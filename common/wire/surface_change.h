@@ -1,7 +1,8 @@
 #pragma once
 
-// What one epoch changes about the organ's surface: new vertices, triangles that are gone, triangles
-// that are new. Server, journal and clients apply the same changes to the same SurfaceLayout.
+// What one epoch changes about the organ's surface: new vertices, triangles that are gone,
+// triangles that are new. Server, journal and clients apply the same changes to the same
+// SurfaceLayout.
 //
 // Numbers are never used again: new vertices take the next slots, new triangles the next numbers, a
 // removed triangle leaves a gap. So what is older than an epoch stays right after it.
@@ -45,6 +46,11 @@ struct NewTriangle {
   Corners corners;
   bool is_wound = false;  // a face that a blade made
 
+  // Three invalid corners: a number that is not used, of a triangle that came and went between two
+  // frames. Not a wound.
+  bool is_gap() const {
+    return !corners[0].is_valid() && !corners[1].is_valid() && !corners[2].is_valid() && !is_wound;
+  }
   bool operator==(const NewTriangle&) const = default;
 };
 

@@ -15,6 +15,7 @@ inline void write(const scene::ToolShape& shape, proto::ToolShape& message) {
   message.set_half_width_m(shape.half_width_m);
   message.set_friction(shape.friction);
   message.set_grip_n(shape.grip_n);
+  message.set_edge_m(shape.edge_m);
 }
 
 inline scene::ToolShape read(const proto::ToolShape& message) {
@@ -22,6 +23,7 @@ inline scene::ToolShape read(const proto::ToolShape& message) {
   if (message.has_half_width_m()) shape.half_width_m = message.half_width_m();
   if (message.has_friction()) shape.friction = message.friction();
   if (message.has_grip_n()) shape.grip_n = message.grip_n();
+  if (message.has_edge_m()) shape.edge_m = message.edge_m();
   return shape;
 }
 

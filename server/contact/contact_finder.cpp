@@ -418,11 +418,16 @@ void ContactFinder::add_grips(const ContactScene& scene, ToolSlot slot, float st
 
 void ContactFinder::find_reach(const ContactScene& scene, ToolSlot slot, ContactList& out) const {
   const auto& tool = scene.tools[slot];
-  const float reach = tool.shape.reach_m;
+  const bool cuts = tool.verb == trocar::scene::Verb::Cut;
+  const float reach = cuts ? kCutCore_m : tool.shape.reach_m;
+  const Vec3f edge = cuts ? rotate(tool.pose.orientation, {0, 0, tool.shape.edge_m}) : Vec3f{};
+  const float edge_squared = std::max(length_squared(edge), 1e-12f);
   const std::size_t first = out.reach_nodes.size();
   for (const auto node : scene.world.surface_nodes) {
     if (scene.world.node_classes[node.value] == world::NodeClass::Fixed) continue;
-    if (length_squared(scene.world.position(node) - tool.pose.position) > reach * reach) continue;
+    const Vec3f from_tip = scene.world.position(node) - tool.pose.position;
+    const float along = std::clamp(dot(from_tip, edge) / edge_squared, 0.0f, 1.0f);
+    if (length_squared(from_tip - edge * along) > reach * reach) continue;
     if (out.reach_nodes.size() - first >= kMaxPointsPerTool) {
       ++out.dropped;
       continue;
@@ -439,7 +444,7 @@ void ContactFinder::find(const ContactScene& scene, ContactList& out) {
     const auto& tool = scene.tools[slot];
     const auto& claim = scene.claims.claim(slot);
     const bool grasps = claim.verb == trocar::scene::Verb::Grasp;
-    if (scene.claims.is_in_effect(slot)) {
+    if (scene.claims.is_in_effect(slot) && claim.verb != trocar::scene::Verb::Cut) {
       if (!grasps && !tool.has_sample) continue;
       const float strength = scene.claims.strength(slot, scene.tick);
       out.tools.push_back({.tool = slot,
@@ -452,7 +457,8 @@ void ContactFinder::find(const ContactScene& scene, ContactList& out) {
         find_push(scene, strength, out);
       out.tools.back().end = static_cast<std::uint32_t>(out.points.size());
       out.tools.back().seeds_end = static_cast<std::uint32_t>(out.seeds.size());
-    } else if (tool.has_sample && tool.verb == trocar::scene::Verb::Grasp) {
+    } else if (tool.has_sample &&
+               (tool.verb == trocar::scene::Verb::Grasp || tool.verb == trocar::scene::Verb::Cut)) {
       const auto begin = static_cast<std::uint32_t>(out.reach_nodes.size());
       find_reach(scene, slot, out);
       out.reach[i] = {begin, static_cast<std::uint32_t>(out.reach_nodes.size())};

@@ -10,6 +10,8 @@
 // touches nothing until it has come out. Points within kMargin_m get a plane before they touch, so
 // that none slips in during a tick.
 //
+// Cut. A blade that cuts presses nothing; what it claims is listed.
+//
 // Grasp. Nodes held by the jaws are gripped where they are in the jaws' frame.
 //
 // Work: triangles near a tool, listed with some slack and listed again when the tool and the
@@ -44,6 +46,8 @@ inline constexpr float kGreatestPressure = 5;
 inline constexpr float kJump_m = 0.01f;
 // A hand at 5 m/s; a faster one is followed at that speed.
 inline constexpr float kMaxStep_m = 0.005f;
+// A blade claims the surface this near to its edge, ahead of its motion.
+inline constexpr float kCutCore_m = 0.004f;
 // What appears inside by no more than this is taken to have come from outside.
 inline constexpr float kBack_m = 0.012f;
 // Quadrature points for a tool are this many radii apart, at most: between them it enters by 1/20

@@ -84,6 +84,17 @@ void GraspTable::follow_slip(const ContactList& contacts, const world::World& wo
   }
 }
 
+void GraspTable::add_copy(NodeIndex node, NodeIndex copy) {
+  for (auto& grasp : grasps_) {
+    const auto at = std::ranges::lower_bound(grasp.nodes, node);
+    if (at == grasp.nodes.end() || *at != node || grasp.nodes.size() >= kMaxPointsPerTool) continue;
+    const Vec3f offset = grasp.offsets[static_cast<std::size_t>(at - grasp.nodes.begin())];
+    const auto place = std::ranges::lower_bound(grasp.nodes, copy) - grasp.nodes.begin();
+    grasp.nodes.insert(grasp.nodes.begin() + place, copy);
+    grasp.offsets.insert(grasp.offsets.begin() + place, offset);
+  }
+}
+
 void GraspTable::visit_state(world::StateArchive& archive, std::size_t node_count) {
   for (auto& grasp : grasps_) {
     archive.sized_array(grasp.nodes, kMaxPointsPerTool);

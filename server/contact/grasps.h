@@ -58,6 +58,9 @@ class GraspTable {
   void follow_slip(const ContactList& contacts, const world::World& world,
                    locks::ClaimTable& claims, std::vector<locks::ClaimEvent>& events);
 
+  // What holds a node holds its copy, too.
+  void add_copy(NodeIndex node, NodeIndex copy);
+
   void visit_state(world::StateArchive& archive, std::size_t node_count);
 
  private:

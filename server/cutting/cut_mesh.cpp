@@ -131,6 +131,7 @@ void CutMesh::open(std::span<const TetFace> faces, std::span<const Star> stars) 
     out_->opened_area_m2 += face_area(topology_, face);
   }
   copies_.clear();
+  mark_wound(topology_, faces);
   part(topology_, places_, stars, copies_);
   for (const auto& copy : copies_) {
     events.events.push_back(copy);

@@ -13,9 +13,19 @@ Error mismatch(std::size_t event, const char* what) {
 
 void replace_node(dynamics::Topology& topology, TetIndex place, NodeIndex old, NodeIndex node) {
   auto tet = topology.tet(place);
+  const auto wound = topology.wound_faces(place);
   tet[corner_of(tet, old)] = node;
   topology.remove_tet(place);
   topology.put_tet(place, tet);
+  topology.mark_wound_faces(place, wound);
+}
+
+std::uint8_t bit(std::uint8_t corner) {
+  return static_cast<std::uint8_t>(1u << corner);
+}
+void clear_wound(dynamics::Topology& topology, TetIndex tet, std::uint8_t corner) {
+  topology.mark_wound_faces(tet,
+                            static_cast<std::uint8_t>(topology.wound_faces(tet) & ~bit(corner)));
 }
 
 // One event after another on a topology.
@@ -78,6 +88,7 @@ class Replay {
       analysis_.run(topology_, cuts_, nodes_[i], stars[i]);
     copies_.clear();
     copied_ = 0;
+    mark_wound(topology_, std::span(events_.faces).subspan(open.first_face, open.face_count));
     part(topology_, places_, stars, copies_);
     for (const auto& copy : copies_) on_new_node_({copy.copy, copy.node, copy.node, 0});
     return {};
@@ -133,14 +144,30 @@ NodeIndex split_edge(dynamics::Topology& topology, Places& places, NodeIndex a, 
   topology.put_node(node, middle(topology.rest()), middle(topology.stress_free()), regions);
   children.clear();
   for (const auto parent : ring) {
+    // The face between the two is inside: of the old one opposite to a, of the new one to b.
     auto child = topology.tet(parent);
-    child[corner_of(child, a)] = node;
+    const auto wound = topology.wound_faces(parent);
+    const auto corner_a = corner_of(child, a), corner_b = corner_of(child, b);
+    child[corner_a] = node;
     replace_node(topology, parent, b, node);
+    clear_wound(topology, parent, corner_a);
     const auto place = places.take_tet(topology);
     topology.put_tet(place, child);
+    topology.mark_wound_faces(place, wound);
+    clear_wound(topology, place, corner_b);
     children.push_back({parent, place});
   }
   return node;
+}
+
+void mark_wound(dynamics::Topology& topology, std::span<const TetFace> faces) {
+  for (const auto& face : faces) {
+    const auto other = across(topology, face);
+    TROCAR_ASSERT(other);
+    for (const auto& side : {face, *other})
+      topology.mark_wound_faces(
+          side.tet, static_cast<std::uint8_t>(topology.wound_faces(side.tet) | bit(side.corner)));
+  }
 }
 
 void part(dynamics::Topology& topology, Places& places, std::span<const Star> stars,

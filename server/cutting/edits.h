@@ -65,6 +65,9 @@ struct TetChild {
 NodeIndex split_edge(dynamics::Topology& topology, Places& places, NodeIndex a, NodeIndex b,
                      std::uint16_t t, std::vector<TetChild>& children);
 
+// Both sides of inner faces become wound (Topology::wound_faces()); before part().
+void mark_wound(dynamics::Topology& topology, std::span<const TetFace> faces);
+
 // Gives every component of the stars but the first a copy of its node.
 void part(dynamics::Topology& topology, Places& places, std::span<const Star> stars,
           std::vector<Duplicate>& copies);

@@ -69,13 +69,14 @@ void ToolTable::visit_state(world::StateArchive& archive) {
     archive.value(tool.shape.half_width_m);
     archive.value(tool.shape.friction);
     archive.value(tool.shape.grip_n);
+    archive.value(tool.shape.edge_m);
     archive.value(tool.verb);
     archive.value(tool.pose);
     archive.value(tool.target);
     archive.value(tool.steps_left);
     archive.value(tool.last_sample_tick);
     if (archive.is_reading() && tool.is_present &&
-        (!scene::is_valid(tool.shape) || tool.verb > scene::Verb::Grasp))
+        (!scene::is_valid(tool.shape) || tool.verb > scene::Verb::Cut))
       archive.fail();
   }
 }

@@ -50,6 +50,7 @@ void ClaimTable::leave(ToolSlot tool, Tick tick) {
   if (c.phase == ClaimPhase::Held && c.verb == Verb::Grasp) {
     start_ramp(tool, tick, kTakeoverRampTicks);
   } else if (c.phase != ClaimPhase::Ramping) {
+    if (c.verb == Verb::Cut) release_core(tool);
     c = Claim{};
   }
 }
@@ -73,7 +74,7 @@ void ClaimTable::update(Tick tick, std::span<const ClaimRequest> requests,
     } else if (c.phase == ClaimPhase::Held && c.verb == Verb::Grasp && silent > kAbandonTicks) {
       events.push_back({tick, request.tool, c.verb, ClaimOutcome::Expired, {}});
       start_ramp(request.tool, tick, kAbandonRampTicks);
-    } else if (c.phase == ClaimPhase::Held && c.verb == Verb::Push && silent > kLeaseTicks) {
+    } else if (c.phase == ClaimPhase::Held && c.verb != Verb::Grasp && silent > kLeaseTicks) {
       events.push_back({tick, request.tool, c.verb, ClaimOutcome::Expired, {}});
       start_ramp(request.tool, tick, kTakeoverRampTicks);
     }
@@ -82,15 +83,16 @@ void ClaimTable::update(Tick tick, std::span<const ClaimRequest> requests,
   waiting_.clear();
   for (const auto& request : requests) {
     Claim& c = claims_[request.tool.value];
-    const bool is_open = c.phase == ClaimPhase::None || c.phase == ClaimPhase::Wanted;
+    const bool is_open = c.phase == ClaimPhase::None || c.phase == ClaimPhase::Wanted ||
+                         (c.phase == ClaimPhase::Held && c.verb == Verb::Cut);
     // A tool that has fallen silent asks for nothing: its last word is too old.
     if (!is_open || tick - request.last_sample_tick > kLeaseTicks) continue;
     if (request.verb == Verb::Push) {
       c = Claim{.phase = ClaimPhase::Held, .verb = Verb::Push};
       events.push_back({tick, request.tool, Verb::Push, ClaimOutcome::Granted, {}});
-    } else if (request.verb == Verb::Grasp) {
+    } else if (request.verb != Verb::None) {
       if (c.phase == ClaimPhase::None)
-        c = Claim{.phase = ClaimPhase::Wanted, .verb = Verb::Grasp, .first_refusal_tick = tick};
+        c = Claim{.phase = ClaimPhase::Wanted, .verb = request.verb, .first_refusal_tick = tick};
       waiting_.push_back(&request);
     }
   }
@@ -98,38 +100,74 @@ void ClaimTable::update(Tick tick, std::span<const ClaimRequest> requests,
     const Tick ta = claim(a->tool).first_refusal_tick, tb = claim(b->tool).first_refusal_tick;
     return ta != tb ? ta < tb : a->tool < b->tool;
   });
-  for (const auto* request : waiting_) decide_grasp(tick, *request, requests, events);
+  for (const auto* request : waiting_) {
+    if (request->verb == Verb::Grasp)
+      decide_grasp(tick, *request, requests, events);
+    else
+      decide_cut(tick, *request, requests, events);
+  }
+}
+
+// All of the core or nothing: every holder must have fallen silent before any is taken over.
+ToolSlot ClaimTable::holder_of(Tick tick, const ClaimRequest& request,
+                               std::span<const ClaimRequest> requests) const {
+  for (const auto node : request.core) {
+    const auto holder = owner(node);
+    if (!holder.is_valid() || holder == request.tool) continue;
+    const auto it = std::ranges::find(requests, holder, &ClaimRequest::tool);
+    const bool is_silent = it == requests.end() || tick - it->last_sample_tick > kLeaseTicks;
+    if (!is_silent) return holder;
+  }
+  return {};
+}
+
+void ClaimTable::take_over(Tick tick, const ClaimRequest& request,
+                           std::vector<ClaimEvent>& events) {
+  for (const auto node : request.core) {
+    const auto holder = owner(node);
+    if (!holder.is_valid() || holder == request.tool) continue;
+    events.push_back({tick, holder, claim(holder).verb, ClaimOutcome::TakenOver, request.tool});
+    start_ramp(holder, tick, kTakeoverRampTicks);
+  }
+  for (const auto node : request.core) owners_[node.value] = request.tool;
 }
 
 void ClaimTable::decide_grasp(Tick tick, const ClaimRequest& request,
                               std::span<const ClaimRequest> requests,
                               std::vector<ClaimEvent>& events) {
-  Claim& c = claims_[request.tool.value];
-  const auto refuse = [&](ClaimOutcome outcome, ToolSlot holder) {
-    if (c.last_refusal != outcome || c.last_holder != holder)
-      events.push_back({tick, request.tool, Verb::Grasp, outcome, holder});
-    c.last_refusal = outcome;
-    c.last_holder = holder;
-  };
-  if (request.core.empty()) return refuse(ClaimOutcome::RefusedNothingInReach, {});
-
-  // All of the core or nothing: every holder must have fallen silent before any is taken over.
-  const auto is_silent = [&](ToolSlot holder) {
-    const auto it = std::find_if(requests.begin(), requests.end(),
-                                 [&](const auto& r) { return r.tool == holder; });
-    return it == requests.end() || tick - it->last_sample_tick > kLeaseTicks;
-  };
-  for (const auto node : request.core)
-    if (const auto holder = owner(node); holder.is_valid() && !is_silent(holder))
-      return refuse(ClaimOutcome::RefusedHeld, holder);
-  for (const auto node : request.core)
-    if (const auto holder = owner(node); holder.is_valid()) {
-      events.push_back({tick, holder, Verb::Grasp, ClaimOutcome::TakenOver, request.tool});
-      start_ramp(holder, tick, kTakeoverRampTicks);
-    }
-  for (const auto node : request.core) owners_[node.value] = request.tool;
-  c = Claim{.phase = ClaimPhase::Held, .verb = Verb::Grasp};
+  if (request.core.empty())
+    return refuse(tick, request, ClaimOutcome::RefusedNothingInReach, {}, events);
+  if (const auto holder = holder_of(tick, request, requests); holder.is_valid())
+    return refuse(tick, request, ClaimOutcome::RefusedHeld, holder, events);
+  take_over(tick, request, events);
+  claims_[request.tool.value] = Claim{.phase = ClaimPhase::Held, .verb = Verb::Grasp};
   events.push_back({tick, request.tool, Verb::Grasp, ClaimOutcome::Granted, {}});
+}
+
+// The core is that of this tick. A blade in the air has none and may go on.
+void ClaimTable::decide_cut(Tick tick, const ClaimRequest& request,
+                            std::span<const ClaimRequest> requests,
+                            std::vector<ClaimEvent>& events) {
+  Claim& c = claims_[request.tool.value];
+  release_core(request.tool);
+  if (const auto holder = holder_of(tick, request, requests); holder.is_valid()) {
+    if (c.phase == ClaimPhase::Held)
+      c = Claim{.phase = ClaimPhase::Wanted, .verb = Verb::Cut, .first_refusal_tick = tick};
+    return refuse(tick, request, ClaimOutcome::RefusedHeld, holder, events);
+  }
+  take_over(tick, request, events);
+  if (c.phase == ClaimPhase::Held) return;
+  c = Claim{.phase = ClaimPhase::Held, .verb = Verb::Cut};
+  events.push_back({tick, request.tool, Verb::Cut, ClaimOutcome::Granted, {}});
+}
+
+void ClaimTable::refuse(Tick tick, const ClaimRequest& request, ClaimOutcome outcome,
+                        ToolSlot holder, std::vector<ClaimEvent>& events) {
+  Claim& c = claims_[request.tool.value];
+  if (c.last_refusal != outcome || c.last_holder != holder)
+    events.push_back({tick, request.tool, request.verb, outcome, holder});
+  c.last_refusal = outcome;
+  c.last_holder = holder;
 }
 
 void ClaimTable::visit_state(world::StateArchive& archive) {
@@ -142,8 +180,7 @@ void ClaimTable::visit_state(world::StateArchive& archive) {
     archive.value(c.first_refusal_tick);
     archive.value(c.ramp_start_tick);
     archive.value(c.ramp_ticks);
-    if (archive.is_reading() && (c.phase > ClaimPhase::Spent || c.verb > Verb::Grasp))
-      archive.fail();
+    if (archive.is_reading() && (c.phase > ClaimPhase::Spent || c.verb > Verb::Cut)) archive.fail();
   }
   if (!archive.is_reading()) return;
   for (const auto owner : owners_)

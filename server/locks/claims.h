@@ -1,9 +1,11 @@
 #pragma once
 
 // Claims: who may act on which nodes. A claim is a lease in ticks on a core of nodes: exclusive for
-// a grasp, shared for a push. Requests are decided together at the end of a tick and valid from the
-// next, in the order (tick of the first refusal, tool slot), so arrival order inside a tick cannot
-// matter. All of the core or nothing; no hold and wait, so no deadlock.
+// a grasp and for a cut, shared for a push. The core of a grasp stays, that of a cut is what is
+// near the blade: it is asked for in every tick, and the blade stops where it meets what another
+// holds. Requests are decided together at the end of a tick and valid from the next, in the order
+// (tick of the first refusal, tool slot), so arrival order inside a tick cannot matter. All of the
+// core or nothing; no hold and wait, so no deadlock.
 //
 // Life of a grasp:  wanted -> (refused, retried while the verb is held)* -> held -> released, or
 // slipped off.
@@ -51,7 +53,7 @@ struct ClaimRequest {
   ToolSlot tool;
   scene::Verb verb = scene::Verb::None;
   Tick last_sample_tick = 0;
-  std::span<const NodeIndex> core;  // of a grasp: the nodes in reach, ascending
+  std::span<const NodeIndex> core;  // of a grasp, a cut: the nodes in reach, ascending
 };
 
 enum class ClaimPhase : std::uint8_t {
@@ -76,7 +78,7 @@ class ClaimTable {
  public:
   explicit ClaimTable(std::size_t node_count);
 
-  // The tool whose grasp holds the node exclusively; invalid if none.
+  // The tool whose grasp or cut holds the node exclusively; invalid if none.
   ToolSlot owner(NodeIndex node) const { return owners_[node.value]; }
   const Claim& claim(ToolSlot tool) const { return claims_[tool.value]; }
   // In effect this tick: granted in an earlier one.
@@ -85,6 +87,14 @@ class ClaimTable {
   }
   // 1 while held, then down to 0 along the ramp: scales the force of the claim's verb.
   float strength(ToolSlot tool, Tick tick) const;
+
+  // For so many nodes, to be read.
+  void resize(std::size_t node_count) { owners_.resize(node_count); }
+  // A node that is a copy of another, or between two: held by whoever holds both.
+  void add_node(NodeIndex a, NodeIndex b) {
+    const auto holder = owners_[a.value];
+    owners_.push_back(holder == owners_[b.value] ? holder : ToolSlot{});
+  }
 
   // A hand left: its grasps free their core now and fade out; its other claims end.
   void leave(ToolSlot tool, Tick tick);
@@ -102,6 +112,15 @@ class ClaimTable {
  private:
   void release_core(ToolSlot tool);
   void start_ramp(ToolSlot tool, Tick tick, Tick ramp_ticks);
+  // Who holds a node of the core and has not fallen silent; invalid: nobody.
+  ToolSlot holder_of(Tick tick, const ClaimRequest& request,
+                     std::span<const ClaimRequest> requests) const;
+  void take_over(Tick tick, const ClaimRequest& request, std::vector<ClaimEvent>& events);
+  // Tells of it when it is another than the last.
+  void refuse(Tick tick, const ClaimRequest& request, ClaimOutcome outcome, ToolSlot holder,
+              std::vector<ClaimEvent>& events);
+  void decide_cut(Tick tick, const ClaimRequest& request, std::span<const ClaimRequest> requests,
+                  std::vector<ClaimEvent>& events);
   void decide_grasp(Tick tick, const ClaimRequest& request, std::span<const ClaimRequest> requests,
                     std::vector<ClaimEvent>& events);
 

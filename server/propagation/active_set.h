@@ -31,6 +31,9 @@ class ActiveSet {
     settled_.reserve(node_count);
   }
 
+  // Classes were changed by somebody else.
+  void forget() { has_history_ = false; }
+
   // Sets classes of queued nodes to Active. Sweep order: queue order, then lingering nodes
   // ascending; fixed nodes are left out.
   void collect(const PropagationQueue& queue, world::Boundary boundary, world::World& world);

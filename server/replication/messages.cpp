@@ -145,12 +145,13 @@ wire::SharedBytes encode_frame_state(const step::PublishedFrame& frame) {
 std::string describe(const locks::ClaimEvent& event, const session::Roster& roster) {
   const std::string who = name_of_holder(event.tool, roster);
   const std::string holder = name_of_holder(event.holder, roster);
-  const bool is_grasp = event.verb == scene::Verb::Grasp;
+  const bool is_grasp = event.verb == scene::Verb::Grasp, is_cut = event.verb == scene::Verb::Cut;
   switch (event.outcome) {
     case locks::ClaimOutcome::Granted:
-      return who + (is_grasp ? " has a grasp" : " pushes");
+      return who + (is_grasp ? " has a grasp" : is_cut ? " cuts" : " pushes");
     case locks::ClaimOutcome::RefusedHeld:
-      return "held by " + holder + " (grasp): wait, or ask " + holder + " to let go";
+      return (is_cut ? "the blade is stopped: tissue ahead is held by " : "held by ") + holder +
+             ": wait, or ask " + holder + " to let go";
     case locks::ClaimOutcome::RefusedNothingInReach: {
       const auto* shape = find_shape(event.tool, roster);
       const auto reach_mm = std::lround((shape ? *shape : scene::ToolShape{}).reach_m * 1000);
@@ -158,7 +159,7 @@ std::string describe(const locks::ClaimEvent& event, const session::Roster& rost
              " mm of the surface";
     }
     case locks::ClaimOutcome::Released:
-      return who + (is_grasp ? " let go" : " stopped pushing");
+      return who + (is_grasp ? " let go" : is_cut ? " stopped cutting" : " stopped pushing");
     case locks::ClaimOutcome::TakenOver:
       return who + " was silent: " + holder + " took over";
     case locks::ClaimOutcome::Expired:

@@ -11,6 +11,7 @@ namespace {
 
 static_assert(static_cast<int>(EndReason::Timeout) == proto::GOODBYE_TIMEOUT);
 static_assert(static_cast<int>(scene::Verb::Grasp) == proto::VERB_GRASP);
+static_assert(static_cast<int>(scene::Verb::Cut) == proto::VERB_CUT);
 static_assert(scene::kVerbCount == proto::Verb_ARRAYSIZE);
 
 Error bad(std::string message) {

@@ -4,17 +4,24 @@
 #include <cmath>
 #include <string>
 
+#include "common/base/assert.h"
 #include "common/scene/any_material.h"
 
 namespace trocar::step {
 
-State::State(const scene::Organ& organ, const wire::SurfaceLayout& layout)
-    : world(organ),
+State::State(const scene::Organ& organ)
+    : cuts(organ),
+      world(organ),
       claims(organ.mesh.node_count()),
-      quantised(layout.vertex_count()),
+      quantised(cuts.layout().vertex_count()),
       self_contacts(organ) {}
 
 void State::visit(world::StateArchive& archive) {
+  cuts.visit_state(archive, world);
+  if (archive.is_reading()) {
+    claims.resize(world.node_count());
+    quantised.resize(cuts.layout().vertex_count());
+  }
   world.visit_state(archive);
   tools.visit_state(archive);
   claims.visit_state(archive);
@@ -23,9 +30,6 @@ void State::visit(world::StateArchive& archive) {
   archive.fixed_array(quantised);
   self_contacts.visit_state(archive);
 }
-
-Scene::Scene(scene::Organ o, unsigned worker_count)
-    : organ(std::move(o)), layout(wire::make_surface_layout(organ)), workers(worker_count) {}
 
 namespace {
 
@@ -38,19 +42,49 @@ bool is_costly(const scene::Organ& organ) {
 
 }  // namespace
 
-StepContext::StepContext(const Scene& s, const world::World& world)
+// The solver begins with the organ as it was, whatever the state: plans and places follow from that
+// and from the edits since.
+StepContext::StepContext(const Scene& s, const State& state)
+    : StepContext(s, world::World(s.organ), state) {}
+
+StepContext::StepContext(const Scene& s, const world::World& uncut, const State& state)
     : scene(s),
       finder(s.organ),
       self_finder(s.organ),
-      queue(world.node_count()),
-      active(world.node_count()),
-      solver(s.organ, world, s.workers),
+      neighbours(s.organ.mesh.node_neighbours),
+      queue(state.world.node_count()),
+      active(state.world.node_count()),
+      solver(s.organ, uncut, s.workers),
       far_plan(solver.far_plan(kTickSeconds)),
-      has_linear_far_field(is_costly(s.organ) && solver.use_linear_far_field(world)),
-      surface_displacements(s.layout.vertex_count()) {
+      has_linear_far_field(is_costly(s.organ) && solver.use_linear_far_field(uncut)),
+      surface_displacements(state.cuts.layout().vertex_count()) {
   contacts.reserve();
   requests.reserve(kMaxTools);
   claim_events.reserve(4 * kMaxTools);
+  dynamics::Topology topology(s.organ);
+  cutting::Places places(topology);
+  cutting::SurfaceMesh surface(s.organ);
+  for (const auto& events : state.cuts.history()) {
+    const auto applied = cutting::apply(events, topology, places);
+    TROCAR_ASSERT(applied.ok());
+    follow_edit(topology, surface.follow(topology), state.world);
+    topology.clear_changes();
+  }
+  if (!state.cuts.history().empty()) follow_edit(state.cuts.topology(), {}, state.world);
+  solver.take_state(state.world);
+}
+
+void StepContext::follow_edit(const dynamics::Topology& topology, const world::SurfaceEdit& edit,
+                              const world::World& world) {
+  for (const auto node : topology.changed()) {
+    topology.neighbours_of(node, changed_neighbours);
+    neighbours.set(node, changed_neighbours);
+  }
+  queue.forget();
+  active.forget();
+  finder.follow(edit, world);
+  self_finder.follow(edit);
+  solver.follow_topology(topology, world);
 }
 
 Status validate(const TickDecisions& d) {
@@ -82,9 +116,9 @@ Status validate(const TickDecisions& d) {
 }
 
 Simulation::Simulation(scene::Organ organ, unsigned workers)
-    : scene_(std::make_unique<Scene>(std::move(organ), workers)),
-      state_(std::make_unique<State>(scene_->organ, scene_->layout)),
-      context_(std::make_unique<StepContext>(*scene_, state_->world)) {}
+    : scene_(std::make_unique<Scene>(Scene{std::move(organ), workers})),
+      state_(std::make_unique<State>(scene_->organ)),
+      context_(std::make_unique<StepContext>(*scene_, *state_)) {}
 
 const TickReport& Simulation::tick(const session::TickInputs& inputs,
                                    const TickDecisions& decisions) {
@@ -108,7 +142,7 @@ std::uint64_t Simulation::state_hash() const {
 }
 
 Status Simulation::restore_snapshot(BytesView snapshot) {
-  auto restored = std::make_unique<State>(scene_->organ, scene_->layout);
+  auto restored = std::make_unique<State>(scene_->organ);
   auto archive = world::StateArchive::reading(snapshot);
   restored->visit(archive);
   if (!archive.ok() || !archive.at_end())
@@ -117,7 +151,7 @@ Status Simulation::restore_snapshot(BytesView snapshot) {
                                          std::to_string(scene_->organ.mesh.node_count()) +
                                          " nodes)"};
   state_ = std::move(restored);
-  context_ = std::make_unique<StepContext>(*scene_, state_->world);
+  context_ = std::make_unique<StepContext>(*scene_, *state_);
   return {};
 }
 

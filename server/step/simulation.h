@@ -32,7 +32,7 @@ class Simulation {
   std::uint64_t state_hash() const;
 
   Tick current_tick() const { return state_->world.tick; }
-  const wire::SurfaceLayout& layout() const { return scene_->layout; }
+  const wire::SurfaceLayout& layout() const { return state_->cuts.layout(); }
   const scene::Organ& organ() const { return scene_->organ; }
   const State& state() const { return *state_; }
   const StepContext& context() const { return *context_; }

@@ -40,7 +40,7 @@ void fill_queue(State& state, StepContext& context) {
   for (const auto& seeds : context.seeds) touched += seeds.size();
   const auto node_limit =
       std::max(context.decisions.node_limit, static_cast<std::uint32_t>(touched));
-  context.queue.fill(context.scene.organ.mesh.node_neighbours, context.seeds,
+  context.queue.fill(context.neighbours, context.seeds,
                      {context.decisions.depth_limit, node_limit});
   context.active.collect(context.queue, context.decisions.boundary, state.world);
   context.report.queue_nodes = static_cast<std::uint32_t>(context.queue.nodes().size());
@@ -102,6 +102,20 @@ void follow_contacts(State& state, StepContext& context) {
   state.proxies.follow(context.contacts, state.world, state.tools);
 }
 
+void cut_tissue(State& state, StepContext& context) {
+  auto& cuts = state.cuts;
+  if (!cuts.cut(state.tools, state.claims, state.world, context.report.cut)) return;
+  const auto& edit = cuts.follow(state.world);
+  for (const auto& made : cuts.new_nodes()) {
+    state.claims.add_node(made.a, made.b);
+    if (made.a == made.b) state.grasps.add_copy(made.a, made.node);
+  }
+  state.self_contacts.follow(edit);
+  state.quantised.resize(cuts.layout().vertex_count());
+  context.follow_edit(cuts.topology(), edit, state.world);
+  cuts.clear_changes();
+}
+
 void update_claims(State& state, StepContext& context) {
   contact::update_claims(state.world, state.tools, context.contacts, context.requests, state.claims,
                          state.grasps, context.claim_events);
@@ -122,11 +136,14 @@ ToolFrame describe_tool(const State& state, const StepContext& context, ToolSlot
     frame.torque_nm = reaction.torque_nm;
     frame.penetration_m = reaction.penetration_m;
   }
+  if (state.claims.claim(slot).verb == scene::Verb::Cut) frame.force_n = state.cuts.force_n(slot);
   return frame;
 }
 
 void quantise_and_publish(State& state, StepContext& context) {
-  const auto& layout = context.scene.layout;
+  const auto change = state.cuts.take_change();
+  const auto& layout = state.cuts.layout();
+  context.surface_displacements.resize(layout.vertex_count());
   for (std::size_t v = 0; v < layout.vertex_count(); ++v)
     context.surface_displacements[v] = state.world.displacements[layout.node_of_vertex[v].value];
   wire::quantise(context.surface_displacements, state.quantised);
@@ -134,7 +151,8 @@ void quantise_and_publish(State& state, StepContext& context) {
   auto frame = std::make_shared<PublishedFrame>();
   frame->frame = frame_of(state.world.tick);
   frame->tick = state.world.tick;
-  frame->epoch = state.world.topology_epoch;
+  frame->epoch = layout.epoch;
+  frame->change = change;
   frame->surface = state.quantised;
   frame->surface_crc = wire::surface_crc(state.quantised);
   frame->regions.reserve(layout.vertex_count());
@@ -184,6 +202,7 @@ void run_tick(State& state, StepContext& context) {
   stage(Stage::Queue, fill_queue);
   stage(Stage::Solve, solve);
   stage(Stage::Contacts, follow_contacts);
+  stage(Stage::Cut, cut_tissue);
   stage(Stage::Claims, update_claims);
   stage(Stage::Hash, hash_state);
   if (publishes_frame(state.world.tick)) stage(Stage::Publish, quantise_and_publish);

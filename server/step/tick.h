@@ -6,7 +6,6 @@
 #include <memory>
 
 #include "common/base/checksum.h"
-#include "common/wire/surface_layout.h"
 #include "server/contact/contact_finder.h"
 #include "server/contact/self_contact.h"
 #include "server/dynamics/block_descent.h"
@@ -16,6 +15,7 @@
 #include "server/propagation/queue.h"
 #include "server/step/published_frame.h"
 #include "server/step/tick_report.h"
+#include "server/step/tissue_cuts.h"
 #include "server/world/world.h"
 
 namespace trocar::step {
@@ -25,8 +25,9 @@ static_assert(kSweepLayers <= dynamics::kMaxSweepBands);
 // Everything a later tick depends on. Each member names its arrays in visit_state; these bytes are
 // the snapshot and what the tick hash covers.
 struct State {
-  explicit State(const scene::Organ& organ, const wire::SurfaceLayout& layout);
+  explicit State(const scene::Organ& organ);
 
+  TissueCuts cuts;
   world::World world;
   input::ToolTable tools;
   locks::ClaimTable claims;
@@ -41,17 +42,20 @@ struct State {
 
 // Constant in a session: follows from the organ.
 struct Scene {
-  Scene(scene::Organ o, unsigned worker_count);
-
   scene::Organ organ;
-  wire::SurfaceLayout layout;
   unsigned workers = 1;
 };
 
 // Laid out as input, scratch and output of a tick. Scratch keeps its capacity, so that a tick does
 // not allocate after warm-up; nothing in it outlives a tick's meaning.
 struct StepContext {
-  StepContext(const Scene& scene, const world::World& world);
+  StepContext(const Scene& scene, const State& state);
+  // uncut: the world of the organ as it was at first.
+  StepContext(const Scene& scene, const world::World& uncut, const State& state);
+
+  // After an edit of the topology, which the world has followed.
+  void follow_edit(const dynamics::Topology& topology, const world::SurfaceEdit& edit,
+                   const world::World& world);
 
   // Input.
   const Scene& scene;
@@ -62,6 +66,7 @@ struct StepContext {
   contact::ContactFinder finder;
   contact::SelfContactFinder self_finder;
   contact::ContactList contacts;
+  propagation::Neighbours neighbours;
   propagation::PropagationQueue queue;
   propagation::ActiveSet active;
   std::array<dynamics::SweepBand, kSweepLayers> sweep_bands{};  // of active nodes, by layer
@@ -72,6 +77,7 @@ struct StepContext {
   std::array<std::span<const NodeIndex>, kMaxTools + 1> seeds;
   std::vector<locks::ClaimRequest> requests;
   std::vector<Vec3f> surface_displacements;
+  std::vector<NodeIndex> changed_neighbours;
   StateHasher hasher;
 
   // Output.

@@ -35,6 +35,8 @@ const char* name_of(Stage stage) {
       return "queue";
     case Stage::Solve:
       return "solve";
+    case Stage::Cut:
+      return "cut";
     case Stage::Claims:
       return "claims";
     case Stage::Hash:

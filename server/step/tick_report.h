@@ -43,8 +43,8 @@ inline constexpr std::uint32_t kMaxFarInterval = 4;
 // Layers where nodes outside the queue stand still: shallower ones feel stiff.
 inline constexpr std::uint32_t kFrozenDepthLimit = 6;
 
-enum class Stage { Admit, Contacts, Queue, Solve, Claims, Hash, Publish };
-inline constexpr int kStageCount = 7;
+enum class Stage { Admit, Contacts, Queue, Solve, Cut, Claims, Hash, Publish };
+inline constexpr int kStageCount = 8;
 const char* name_of(Stage stage);
 
 // Error bits: what was dropped or degraded, and which limit to raise.
@@ -54,6 +54,13 @@ enum TickFault : std::uint32_t {
   kFaultOverRelaxation = 1u << 2,  // residual grew: the tick went on without over-relaxation
   kFaultToolInside = 1u << 4,      // a tool appeared inside tissue: draw it back to touch
   kFaultNonFinite = 1u << 3,       // a node's step was not finite: its region went back a tick
+};
+
+// What blades did in one tick.
+struct CutReport {
+  std::uint32_t crossed_tets = 0, splits = 0, new_nodes = 0;
+  double opened_area_m2 = 0;  // one side of the wound
+  bool is_behind = false;     // work is left for later ticks
 };
 
 struct TickReport {
@@ -73,8 +80,9 @@ struct TickReport {
   std::uint64_t far_node_sweeps = 0;         // of these, nodes outside the queue
   bool is_far_linear = false;                // these were stepped by matrices
   std::uint32_t far_interval = 1;            // in every so many ticks
-  std::uint32_t faults = 0;                  // TickFault bits
-  float residual_n = 0;  // root mean square nodal force imbalance in the last sweep
+  CutReport cut;
+  std::uint32_t faults = 0;  // TickFault bits
+  float residual_n = 0;      // root mean square nodal force imbalance in the last sweep
   std::uint64_t state_hash = 0;
 };
 

@@ -43,7 +43,6 @@ void World::add_node(const Vec3d& rest_position, NodeIndex a, NodeIndex b, std::
 
 void World::visit_state(StateArchive& archive) {
   archive.value(tick);
-  archive.value(topology_epoch);
   archive.value(boundary);
   archive.fixed_array(displacements);
   archive.fixed_array(velocities);

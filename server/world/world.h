@@ -44,8 +44,7 @@ struct World {
   std::vector<NodeIndex> surface_nodes;
 
   // State, in snapshot and hash.
-  Tick tick = 0;  // ticks done
-  std::uint32_t topology_epoch = 0;
+  Tick tick = 0;                         // ticks done
   Boundary boundary = Boundary::Frozen;  // of the last tick
   std::vector<Vec3f> displacements;      // m, from rest
   std::vector<Vec3f> velocities;         // m/s

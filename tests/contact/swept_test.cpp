@@ -116,6 +116,10 @@ TEST(Swept, RandomMotionsAcrossTheStomachNeverEnterItsWall) {
                                   now.begin + now.along * (now.length * static_cast<float>(k) / 8));
       ++checked;
       inside += is_inside;
+      if (is_inside && i == 0)
+        std::printf("motion %d: inside, %.2f mm from the hand\n", motion,
+                    1e3 * static_cast<double>(way_between(
+                              proxy.pose, proxy.hand, {.radius_m = 0.004f, .length_m = 0.03f})));
     }
     touched += has_touched;
   }

@@ -1,0 +1,248 @@
+#include "server/step/tissue_cuts.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "common/base/assert.h"
+#include "common/base/checksum.h"
+#include "server/cutting/event_codec.h"
+
+namespace trocar::step {
+namespace {
+
+// Share of the newest tick in what a blade feels: about 30 ms.
+constexpr double kNewest = 1.0 / 30;
+constexpr float kMostForce_n = 30;
+
+cutting::NewNode made_by(const cutting::Split& split) {
+  return {split.node, split.a, split.b, split.t};
+}
+cutting::NewNode made_by(const cutting::Duplicate& copy) {
+  return {copy.copy, copy.node, copy.node, 0};
+}
+
+std::vector<cutting::NewNode> nodes_made_by(const cutting::CutEvents& events) {
+  std::vector<cutting::NewNode> nodes;
+  for (const auto& event : events.events) {
+    if (const auto* split = std::get_if<cutting::Split>(&event)) nodes.push_back(made_by(*split));
+    if (const auto* copy = std::get_if<cutting::Duplicate>(&event)) nodes.push_back(made_by(*copy));
+  }
+  return nodes;
+}
+
+}  // namespace
+
+TissueCuts::TissueCuts(const scene::Organ& organ)
+    : topology_(organ), surface_(organ), layout_(wire::make_surface_layout(organ)) {
+  if (!organ.mesh.tets.empty() && !topology_.has_links())
+    cutter_ = std::make_unique<cutting::Cutter>(topology_);
+  first_pending_ = static_cast<std::uint32_t>(layout_.triangles.size());
+}
+
+bool TissueCuts::cut(const input::ToolTable& tools, const locks::ClaimTable& claims,
+                     const world::World& world, CutReport& report) {
+  report = {};
+  if (!can_cut()) return false;
+  for (std::uint8_t i = 0; i < kMaxTools; ++i) {
+    const auto& tool = tools[ToolSlot{i}];
+    const auto& claim = claims.claim(ToolSlot{i});
+    Blade& blade = blades_[i];
+    const bool cuts =
+        tool.has_sample && claim.verb == scene::Verb::Cut && claim.phase == locks::ClaimPhase::Held;
+    if (cuts) {
+      const std::array<Vec3d, 2> edge{to_double(tool.pose.position),
+                                      to_double(tool.pose.apply({0, 0, tool.shape.edge_m}))};
+      cutter_->move(i, edge);
+    } else if (blade.is_cutting) {
+      cutter_->lift(i);
+    }
+    if (cuts && !blade.is_cutting) blade.tip = tool.pose.position;
+    blade.is_cutting = cuts;
+  }
+  double opened = 0;
+  if (!cutter_->is_idle()) {
+    output_.clear();
+    cutter_->cut(world.displacements, output_);
+    opened = output_.opened_area_m2;
+    report = {output_.crossed_tets, output_.splits,
+              static_cast<std::uint32_t>(output_.new_nodes.size()), opened, output_.is_behind};
+  } else {
+    output_.clear();
+  }
+  feel(tools, opened);
+  if (output_.events.events.empty()) return false;
+  new_nodes_.assign(output_.new_nodes.begin(), output_.new_nodes.end());
+  record(output_.events);
+  return true;
+}
+
+// The work of opening a wound is its area times kCutEnergy: over the way that the blade went, a
+// force against it. Wounds open in steps, so both are smoothed. Of several blades each feels its
+// share by how far it went.
+void TissueCuts::feel(const input::ToolTable& tools, double opened_area_m2) {
+  float total = 0;
+  for (std::uint8_t i = 0; i < kMaxTools; ++i)
+    if (blades_[i].is_cutting) total += length(tools[ToolSlot{i}].pose.position - blades_[i].tip);
+  for (std::uint8_t i = 0; i < kMaxTools; ++i) {
+    Blade& blade = blades_[i];
+    if (!blade.is_cutting) {
+      blade = {};
+      continue;
+    }
+    const Vec3f moved = tools[ToolSlot{i}].pose.position - blade.tip;
+    blade.tip = tools[ToolSlot{i}].pose.position;
+    const double share = total > 0 ? static_cast<double>(length(moved) / total) : 0;
+    blade.motion_m += (moved - blade.motion_m) * static_cast<float>(kNewest);
+    blade.area_m2 += (opened_area_m2 * share - blade.area_m2) * kNewest;
+    const float way = length(blade.motion_m);
+    const float force =
+        way > 1e-7f ? static_cast<float>(blade.area_m2) * kCutEnergy_j_m2 / way : 0.0f;
+    blade.force_n = blade.motion_m * (-std::min(force, kMostForce_n) / std::max(way, 1e-7f));
+  }
+}
+
+void TissueCuts::record(cutting::CutEvents events) {
+  Bytes bytes(sizeof history_hash_);
+  std::memcpy(bytes.data(), &history_hash_, sizeof history_hash_);
+  cutting::encode(events, bytes);
+  history_hash_ = xxh3_64(bytes);
+  history_.push_back(std::move(events));
+}
+
+const world::SurfaceEdit& TissueCuts::follow(world::World& world) {
+  for (const auto& made : new_nodes_) {
+    TROCAR_ASSERT(made.node.value == world.node_count());
+    world.add_node(topology_.rest()[made.node.value], made.a, made.b, made.t);
+  }
+  for (const auto node : topology_.changed()) {
+    world.masses[node.value] = static_cast<float>(topology_.lumped_mass(node));
+    auto& node_class = world.node_classes[node.value];
+    if (node_class == world::NodeClass::Fixed) continue;
+    // What a wound sets free is swept like what is touched, for a while.
+    node_class = world::NodeClass::Active;
+    world.quiet_ticks[node.value] = 0;
+  }
+  world.far_poses.refresh_hashes();
+  const auto& edit = surface_.follow(topology_);
+  for (const auto node : edit.touched)
+    world.surface_areas[node.value] = static_cast<float>(surface_.area_of(topology_, node));
+  const auto middle = static_cast<std::ptrdiff_t>(world.surface_nodes.size());
+  world.surface_nodes.insert(world.surface_nodes.end(), edit.surfaced.begin(), edit.surfaced.end());
+  std::inplace_merge(world.surface_nodes.begin(), world.surface_nodes.begin() + middle,
+                     world.surface_nodes.end());
+  extend_layout(world, edit);
+  return edit;
+}
+
+void TissueCuts::extend_layout(const world::World& world, const world::SurfaceEdit& edit) {
+  layout_.vertex_of_node.resize(topology_.node_count());
+  for (const auto node : edit.surfaced) {
+    const VertexIndex slot(layout_.vertex_count());
+    wire::NewVertex vertex{.node = node};
+    vertex.rest_quanta = wire::quantise_rest(topology_.rest().subspan(node.value, 1)).front();
+    vertex.is_fixed = world.node_classes[node.value] == world::NodeClass::Fixed;
+    const auto made = std::ranges::find(new_nodes_, node, &cutting::NewNode::node);
+    if (made != new_nodes_.end()) {
+      const auto a = layout_.vertex_of_node[made->a.value],
+                 b = layout_.vertex_of_node[made->b.value];
+      if (a.is_valid() && b.is_valid()) vertex.a = a, vertex.b = b, vertex.t = made->t;
+    }
+    layout_.node_of_vertex.push_back(node);
+    layout_.vertex_of_node[node.value] = slot;
+    layout_.rest_quanta.push_back(vertex.rest_quanta);
+    if (vertex.is_fixed) layout_.fixed_vertices.push_back(slot);
+    pending_.new_vertices.push_back(vertex);
+  }
+  for (const auto triangle : edit.removed) {
+    auto& corners = layout_.triangles[triangle.value];
+    auto& is_wound = layout_.is_wound[triangle.value];
+    layout_.triangle_sum -= wire::triangle_hash(triangle, corners, is_wound != 0);
+    corners = {};
+    is_wound = 0;
+    if (triangle.value < first_pending_)
+      pending_.removed.push_back(triangle);
+    else
+      pending_.added[triangle.value - first_pending_] = {};
+  }
+  for (const auto& added : edit.added) {
+    const TriangleIndex number(layout_.triangles.size());
+    wire::NewTriangle triangle{.is_wound = added.is_wound};
+    for (std::size_t k = 0; k < 3; ++k)
+      triangle.corners[k] = layout_.vertex_of_node[added.nodes[k].value];
+    layout_.triangles.push_back(triangle.corners);
+    layout_.is_wound.push_back(triangle.is_wound);
+    layout_.triangle_sum += wire::triangle_hash(number, triangle.corners, triangle.is_wound);
+    pending_.added.push_back(triangle);
+  }
+}
+
+std::shared_ptr<const wire::SurfaceChange> TissueCuts::take_change() {
+  published_ = static_cast<std::uint32_t>(history_.size());
+  if (pending_.new_vertices.empty() && pending_.removed.empty() && pending_.added.empty())
+    return nullptr;
+  std::ranges::sort(pending_.removed);
+  pending_.from_epoch = layout_.epoch;
+  pending_.epoch = ++layout_.epoch;
+  pending_.sum = layout_.triangle_sum;
+  auto change = std::make_shared<const wire::SurfaceChange>(std::move(pending_));
+  forget_pending();
+  return change;
+}
+
+void TissueCuts::forget_pending() {
+  pending_ = {};
+  first_pending_ = static_cast<std::uint32_t>(layout_.triangles.size());
+}
+
+void TissueCuts::visit_state(world::StateArchive& archive, world::World& world) {
+  archive.value(history_hash_);
+  archive.value(published_);
+  archive.value(layout_.epoch);
+  if (archive.is_reading())
+    read_history(archive, world);
+  else if (!archive.is_hashing())
+    for (auto& events : history_) {
+      bool has_more = true;
+      archive.flag(has_more);
+      cutting::visit_state(archive, events);
+    }
+  if (!archive.is_hashing() && !archive.is_reading()) {
+    bool has_more = false;
+    archive.flag(has_more);
+  }
+  if (!archive.ok()) return;
+  if (can_cut()) cutter_->visit_state(archive);
+  for (auto& blade : blades_) {
+    archive.flag(blade.is_cutting);
+    if (!blade.is_cutting) continue;
+    archive.value(blade.tip);
+    archive.value(blade.motion_m);
+    archive.value(blade.area_m2);
+    archive.value(blade.force_n);
+    if (archive.is_reading() && !(is_finite(blade.tip) && is_finite(blade.motion_m) &&
+                                  is_finite(blade.force_n) && std::isfinite(blade.area_m2)))
+      archive.fail();
+  }
+}
+
+void TissueCuts::read_history(world::StateArchive& archive, world::World& world) {
+  const auto wanted = history_hash_;
+  history_hash_ = 0;
+  while (archive.ok()) {
+    bool has_more = false;
+    archive.flag(has_more);
+    if (!has_more) break;
+    cutting::CutEvents events;
+    cutting::visit_state(archive, events);
+    if (!archive.ok() || !can_cut() || !cutter_->repeat(events)) return archive.fail();
+    new_nodes_ = nodes_made_by(events);
+    record(std::move(events));
+    follow(world);
+    clear_changes();
+    if (history_.size() == published_) forget_pending();
+  }
+  if (history_hash_ != wanted || published_ > history_.size()) archive.fail();
+}
+
+}  // namespace trocar::step

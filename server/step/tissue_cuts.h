@@ -1,0 +1,88 @@
+#pragma once
+
+// The organ as it has been cut: its topology, the knives at work in it, the surface that follows,
+// and the list of all edits. That list is the state: who applies it to the organ has the same
+// topology, surface and slots again. The tick hash covers a hash of it.
+//
+// An organ with links, or without tets, cannot be cut: claims to cut it are granted and do nothing.
+
+#include <array>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "common/base/ids.h"
+#include "common/base/tick.h"
+#include "common/wire/surface_layout.h"
+#include "server/cutting/cutter.h"
+#include "server/cutting/surface_mesh.h"
+#include "server/input/tool_table.h"
+#include "server/locks/claims.h"
+#include "server/step/tick_report.h"
+#include "server/world/world.h"
+
+namespace trocar::step {
+
+// What a blade costs per area of wound, J/m^2; about that of liver (Azar and Hayward 2008).
+inline constexpr float kCutEnergy_j_m2 = 150;
+
+class TissueCuts {
+ public:
+  explicit TissueCuts(const scene::Organ& organ);
+
+  bool can_cut() const { return cutter_ != nullptr; }
+  const dynamics::Topology& topology() const { return topology_; }
+  const wire::SurfaceLayout& layout() const { return layout_; }
+  // Of the tissue on a blade, N, world frame.
+  Vec3f force_n(ToolSlot tool) const { return blades_[tool.value].force_n; }
+
+  // Blades of claims in effect go where their tools are; then what they cross is cut. True if the
+  // topology has changed: then follow() is due, then clear_changes().
+  bool cut(const input::ToolTable& tools, const locks::ClaimTable& claims,
+           const world::World& world, CutReport& report);
+  // Nodes that the last edit made, in order.
+  std::span<const cutting::NewNode> new_nodes() const { return new_nodes_; }
+  // Brings the world's arrays, the surface and its slots up to date with the topology.
+  const world::SurfaceEdit& follow(world::World& world);
+  void clear_changes() { topology_.clear_changes(); }
+
+  // All edits, oldest first.
+  std::span<const cutting::CutEvents> history() const { return history_; }
+
+  // What has changed since the last call, for clients, or null. Before a frame is published.
+  std::shared_ptr<const wire::SurfaceChange> take_change();
+
+  // History, strokes and forces; the world gets the nodes of the edits read, without their state.
+  void visit_state(world::StateArchive& archive, world::World& world);
+
+ private:
+  struct Blade {
+    Vec3f tip;           // m, in the tick before
+    Vec3f motion_m;      // of the last moment, smoothed
+    double area_m2 = 0;  // wound of that moment
+    Vec3f force_n;
+    bool is_cutting = false;
+  };
+
+  void forget_pending();
+  void record(cutting::CutEvents events);
+  void extend_layout(const world::World& world, const world::SurfaceEdit& edit);
+  void feel(const input::ToolTable& tools, double opened_area_m2);
+  void read_history(world::StateArchive& archive, world::World& world);
+
+  dynamics::Topology topology_;
+  std::unique_ptr<cutting::Cutter> cutter_;
+  cutting::SurfaceMesh surface_;
+  wire::SurfaceLayout layout_;
+  std::vector<cutting::CutEvents> history_;
+  std::uint32_t published_ = 0;  // edits of history_ that clients know
+  std::uint64_t history_hash_ = 0;
+  std::array<Blade, kMaxTools> blades_;
+  wire::SurfaceChange pending_;
+  std::uint32_t first_pending_ = 0;  // number of pending_.added[0]
+  // Scratch.
+  cutting::CutOutput output_;
+  std::vector<cutting::NewNode> new_nodes_;
+};
+
+}  // namespace trocar::step

@@ -1,0 +1,136 @@
+// Blades in a session's own tick: what they cut, and that everything else follows.
+
+#include <gtest/gtest.h>
+
+#include "server/cutting/validate.h"
+#include "server/step/simulation.h"
+#include "tests/step/hands.h"
+
+namespace trocar::step {
+namespace {
+
+// Blades come down into the liver from above and slice along it at 10 cm/s, side by side.
+class Blades : public ::testing::Test {
+ protected:
+  static scene::Organ liver(scene::ElasticLaw law, bool has_averaged_volume = false) {
+    auto organ = *scene::make_liver(6000);
+    organ.material.elastic_law = law;
+    organ.material.has_averaged_volume = has_averaged_volume;
+    return organ;
+  }
+  static void add_blades(const Simulation& simulation, session::TickInputs& inputs,
+                         std::uint8_t count = 1) {
+    const Tick tick = simulation.current_tick() + 1;
+    Vec3f top{0, -1, 0};
+    for (const auto& p : simulation.organ().mesh.rest_positions)
+      if (static_cast<float>(p.y) > top.y) top = to_float(p);
+    for (std::uint8_t hand = 0; hand < count; ++hand) {
+      if (tick == 1) {
+        session::HandJoin join{.slot = {hand}};
+        join.shapes[0] = {.radius_m = 0.002f, .length_m = 0.3f, .edge_m = 0.06f};
+        inputs.joins.push_back(join);
+      }
+      if (tick % 4 != 1) continue;
+      const float t = static_cast<float>(tick) * 1e-3f;
+      const float depth = std::min(0.02f, 0.1f * t - 0.005f);
+      const float along = 0.1f * std::max(0.0f, t - 0.25f);
+      const Vec3f tip = top + Vec3f{-0.03f + along, -depth, 0.02f * static_cast<float>(hand)};
+      inputs.samples.push_back(
+          {tool_slot({hand}, 0), {{tip, rotation_from_z({0, 1, 0})}, scene::Verb::Cut}});
+    }
+  }
+  static TickReport run_tick(Simulation& simulation, std::uint8_t count = 1) {
+    session::TickInputs inputs;
+    add_blades(simulation, inputs, count);
+    return simulation.tick(inputs, {});
+  }
+};
+
+TEST_F(Blades, OpenAWoundInEveryKindOfTissue) {
+  using enum scene::ElasticLaw;
+  for (const auto& [law, is_averaged] :
+       {std::pair{Springs, false}, {TensorMass, false}, {NeoHookean, false}, {NeoHookean, true}}) {
+    Simulation simulation(liver(law, is_averaged));
+    const double mass = [&] {
+      double sum = 0;
+      for (const double m : simulation.organ().node_masses_kg) sum += m;
+      return sum;
+    }();
+    double opened = 0;
+    Vec3f force{};
+    for (int i = 0; i < 700; ++i) {
+      const auto report = run_tick(simulation);
+      ASSERT_EQ(report.nodes_rejected, 0u) << "tick " << i;
+      opened += report.cut.opened_area_m2;
+      if (i == 500) force = simulation.state().cuts.force_n(ToolSlot{0});
+    }
+    const auto& state = simulation.state();
+    EXPECT_GT(opened, 3e-4);
+    EXPECT_LT(force.x, -0.1f) << "the tissue holds the blade back";
+    const auto valid = cutting::validate(state.cuts.topology());
+    EXPECT_TRUE(valid.ok()) << valid.error().message;
+    double sum = 0;
+    float farthest = 0;
+    for (std::size_t n = 0; n < state.world.node_count(); ++n) {
+      sum += static_cast<double>(state.world.masses[n]);
+      farthest = std::max(farthest, length(state.world.displacements[n]));
+    }
+    EXPECT_NEAR(sum, mass, 1e-5 * mass);
+    EXPECT_LT(farthest, 0.02f);
+  }
+}
+
+TEST_F(Blades, WorkersDoNotChangeTheHash) {
+  Simulation one(liver(scene::ElasticLaw::NeoHookean)),
+      two(liver(scene::ElasticLaw::NeoHookean), 2);
+  for (int i = 0; i < 500; ++i)
+    ASSERT_EQ(run_tick(one, 2).state_hash, run_tick(two, 2).state_hash) << "tick " << i;
+}
+
+TEST_F(Blades, ARestoredStateGoesOnBitForBit) {
+  using enum scene::ElasticLaw;
+  for (const auto& [law, is_averaged] :
+       {std::pair{Springs, false}, {NeoHookean, false}, {NeoHookean, true}}) {
+    Simulation a(liver(law, is_averaged)), b(liver(law, is_averaged));
+    for (int i = 0; i < 421; ++i) run_tick(a, 2);
+    Bytes snapshot;
+    a.write_snapshot(snapshot);
+    const auto restored = b.restore_snapshot(snapshot);
+    ASSERT_TRUE(restored.ok()) << restored.error().message;
+    EXPECT_EQ(a.state_hash(), b.state_hash());
+    EXPECT_EQ(a.layout(), b.layout());
+    for (int i = 0; i < 200; ++i) {
+      ASSERT_EQ(run_tick(a, 2).state_hash, run_tick(b, 2).state_hash) << "tick " << i;
+      const auto frame_a = a.take_frame(), frame_b = b.take_frame();
+      ASSERT_EQ(frame_a == nullptr, frame_b == nullptr);
+      if (!frame_a) continue;
+      ASSERT_EQ(frame_a->change == nullptr, frame_b->change == nullptr);
+      if (frame_a->change) {
+        ASSERT_EQ(*frame_a->change, *frame_b->change);
+      }
+      ASSERT_EQ(frame_a->surface_crc, frame_b->surface_crc);
+    }
+  }
+}
+
+// What clients are told, applied to the surface they began with, is the surface.
+TEST_F(Blades, ChangesLeadFromSurfaceToSurface) {
+  Simulation simulation(liver(scene::ElasticLaw::Springs));
+  auto followed = simulation.layout();
+  for (int i = 0; i < 700; ++i) {
+    run_tick(simulation, 2);
+    const auto frame = simulation.take_frame();
+    if (!frame) continue;
+    EXPECT_EQ(frame->surface.size(), simulation.layout().vertex_count());
+    if (!frame->change) continue;
+    const auto applied = wire::apply(*frame->change, followed);
+    ASSERT_TRUE(applied.ok()) << applied.error().message;
+    followed.vertex_of_node.resize(simulation.state().world.node_count());
+    ASSERT_EQ(followed, simulation.layout());
+    ASSERT_EQ(followed.compute_triangle_sum(), followed.triangle_sum);
+  }
+  EXPECT_GT(followed.epoch, 10u);
+}
+
+}  // namespace
+}  // namespace trocar::step
