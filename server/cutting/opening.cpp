@@ -47,8 +47,7 @@ int Opening::side(const CutMesh& mesh, Stroke& stroke, TetIndex t) {
     if (stroke.is_labelled(node)) continue;
     is_flat = false;
     const auto height = stroke.height(node);
-    sum += height.nearest_squared >= 0 ? height.height
-                                       : height_above(stroke, mesh.positions()[node.value]);
+    sum += height.nearest_squared >= 0 ? height.height : height_above(stroke, mesh.position(node));
   }
   if (is_flat) return side_of_flat(mesh, stroke, t);
   return sum < 0 ? -1 : 1;
@@ -64,7 +63,7 @@ int Opening::side_of_flat(const CutMesh& mesh, Stroke& stroke, TetIndex t) {
   }
   if (sum == 0) {
     Vec3d centre;
-    for (const auto node : mesh.topology().tet(t)) centre += mesh.positions()[node.value] / 4;
+    for (const auto node : mesh.topology().tet(t)) centre += mesh.position(node) / 4;
     sum = height_above(stroke, centre);
   }
   const int own = sum < 0 ? -1 : 1;
