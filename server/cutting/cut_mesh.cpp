@@ -30,13 +30,10 @@ void CutOutput::clear() {
 }
 
 CutMesh::CutMesh(dynamics::Topology& topology, const Settings& settings, std::span<Stroke> strokes)
-    : topology_(topology),
-      settings_(settings),
-      strokes_(strokes),
-      places_(topology),
-      bundles_(topology.rest()) {
+    : topology_(topology), settings_(settings), strokes_(strokes), places_(topology) {
   TROCAR_ASSERT(!topology.has_links());
   measure_scale();
+  bundles_.emplace(topology.rest(), reach_);
 }
 
 void CutMesh::measure_scale() {
@@ -72,7 +69,7 @@ void CutMesh::begin(std::span<const Vec3f> displacements, double travel_m, CutOu
   out_ = &out;
   displacements_ = displacements;
   travel_m_ = travel_m < kUnknownTravel ? travel_m : 0;
-  if (!(travel_m < kUnknownTravel)) bundles_.forget();
+  if (!(travel_m < kUnknownTravel)) bundles_->forget();
 }
 
 void CutMesh::end() {
@@ -87,10 +84,18 @@ Vec3d CutMesh::position(NodeIndex n) const {
   return n.value < displacements_.size() ? rest + to_double(displacements_[n.value]) : rest;
 }
 
-void CutMesh::collect(const Box& box, std::vector<NodeIndex>& out) {
+void CutMesh::collect(const Box& box, std::span<const PatchTriangle> patch, double reaches,
+                      std::vector<NodeIndex>& out) {
   out.clear();
-  bundles_.collect(
-      box, travel_m_, [this](NodeIndex n) { return position(n); }, out);
+  const auto place = [this](NodeIndex n) { return position(n); };
+  const auto may_hold = [&](const Vec3d& centre, double radius, double reach) {
+    const double slack = radius + reaches * reach;
+    return std::ranges::any_of(patch, [&](const PatchTriangle& triangle) {
+      return std::abs(signed_distance(triangle, centre)) <= slack &&
+             is_inside(triangle, centre, slack);
+    });
+  };
+  bundles_->collect(box, travel_m_, place, may_hold, out);
   std::erase_if(out, [this](NodeIndex n) { return !topology_.has_node(n); });
   std::sort(out.begin(), out.end());
 }
@@ -130,7 +135,8 @@ void CutMesh::add_node(const NewNode& made) {
   is_made_.resize(topology_.node_count());
   made_[made.node.value] = along(position(made.a), position(made.b), made.t);
   is_made_[made.node.value] = 1;
-  bundles_.add(made.node, made.a, travel_m_, [this](NodeIndex n) { return position(n); });
+  bundles_->add(made.node, made.a, reach(made.node), travel_m_,
+                [this](NodeIndex n) { return position(n); });
   out_->new_nodes.push_back(made);
 }
 
@@ -138,9 +144,9 @@ Status CutMesh::repeat(const CutEvents& events) {
   const auto place = [this](NodeIndex n) { return topology_.rest()[n.value]; };
   auto status = apply(events, topology_, places_, [&](const NewNode& made) {
     measure_scale_of(made);
-    bundles_.add(made.node, made.a, 0, place);
+    bundles_->add(made.node, made.a, reach(made.node), 0, place);
   });
-  bundles_.forget();
+  bundles_->forget();
   return status;
 }
 

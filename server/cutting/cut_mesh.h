@@ -38,10 +38,12 @@ class CutMesh {
   const dynamics::Topology& topology() const { return topology_; }
   const Settings& settings() const { return settings_; }
   Vec3d position(NodeIndex n) const;  // now, m
-  // Nodes whose position is in the box, ascending.
-  void collect(const Box& box, std::vector<NodeIndex>& out);
+  // Nodes whose position is in the box, ascending; some of those may be left out whose distance
+  // from all triangles is more than `reaches` times their reach.
+  void collect(const Box& box, std::span<const PatchTriangle> patch, double reaches,
+               std::vector<NodeIndex>& out);
   // Nodes may have moved farther than the next call will say.
-  void forget_places() { bundles_.forget(); }
+  void forget_places() { bundles_->forget(); }
   double h(NodeIndex n) const { return h_[n.value]; }
   double mean_h() const { return mean_h_; }
   // Longest edge at the node in the uncut mesh, m.
@@ -72,7 +74,7 @@ class CutMesh {
   const Settings settings_;
   const std::span<Stroke> strokes_;
   Places places_;
-  NodeBundles bundles_;
+  std::optional<NodeBundles> bundles_;
   std::span<const Vec3f> displacements_;
   double travel_m_ = 0;
   std::vector<Vec3d> made_;  // positions, by node, of those that this call made

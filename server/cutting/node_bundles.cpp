@@ -8,7 +8,8 @@ constexpr std::uint32_t kNone = 0xffffffffu;
 }  // namespace
 
 // Halves until the bundles are small enough; half full, for the nodes that cuts make.
-NodeBundles::NodeBundles(std::span<const Vec3d> places) : bundle_of_(places.size(), kNone) {
+NodeBundles::NodeBundles(std::span<const Vec3d> places, std::span<const double> reaches)
+    : bundle_of_(places.size(), kNone) {
   open_bundle();
   for (std::uint32_t n = 0; n < places.size(); ++n) put_in(NodeIndex(n), 0);
   const auto place = [&](NodeIndex n) { return places[n.value]; };
@@ -20,6 +21,8 @@ NodeBundles::NodeBundles(std::span<const Vec3d> places) : bundle_of_(places.size
         return along(place(a), axis) < along(place(c), axis);
       });
     }
+  for (auto& bundle : bundles_)
+    for (const auto node : bundle.nodes) bundle.reach = std::max(bundle.reach, reaches[node.value]);
   forget();
 }
 

@@ -42,27 +42,32 @@ struct Box {
 
 class NodeBundles {
  public:
-  // Places at rest.
-  explicit NodeBundles(std::span<const Vec3d> places);
+  // Per node: its place at rest, and its reach, any number.
+  NodeBundles(std::span<const Vec3d> places, std::span<const double> reaches);
 
-  // Adds to `out`, in no order, the nodes whose place(node) is in the box. travel_m: a sum over
+  // Adds to `out`, in no order, nodes whose place(node) is in the box: all but those in a ball
+  // (centre, radius) with a greatest reach for which may_hold() is false. travel_m: a sum over
   // ticks of the farthest that any node has moved.
-  template <typename Place>
-  void collect(const Box& box, double travel_m, Place&& place, std::vector<NodeIndex>& out) {
+  template <typename Place, typename MayHold>
+  void collect(const Box& box, double travel_m, Place&& place, MayHold&& may_hold,
+               std::vector<NodeIndex>& out) {
     for (auto& bundle : bundles_) {
       if (!bundle.box.is_within(box, slack(bundle, travel_m))) continue;
       if (bundle.travel_m != travel_m) look_into(bundle, travel_m, place);
       if (!bundle.box.is_within(box, 0)) continue;
+      const auto half = (bundle.box.most - bundle.box.least) / 2;
+      if (!may_hold(bundle.box.least + half, length(half) + kRounding_m, bundle.reach)) continue;
       for (const auto node : bundle.nodes)
         if (box.contains(place(node))) out.push_back(node);
     }
   }
   // The place may have belonged to another node.
   template <typename Place>
-  void add(NodeIndex node, NodeIndex parent, double travel_m, Place&& place) {
+  void add(NodeIndex node, NodeIndex parent, double reach, double travel_m, Place&& place) {
     take_out(node);
     const auto b = bundle_of_[parent.value];
     put_in(node, b);
+    bundles_[b].reach = std::max(bundles_[b].reach, reach);
     bundles_[b].box.include(place(node));
     if (bundles_[b].nodes.size() <= kMost) return;
     look_into(bundles_[b], travel_m, place);
@@ -83,6 +88,7 @@ class NodeBundles {
   struct Bundle {
     Box box;
     double travel_m = -std::numeric_limits<double>::infinity();  // when it was looked into
+    double reach = 0;
     std::vector<NodeIndex> nodes;
   };
 
@@ -108,6 +114,7 @@ class NodeBundles {
     const std::vector<NodeIndex> upper(middle, old.end());
     old.erase(middle, old.end());
     const auto next = open_bundle();
+    bundles_[next].reach = bundles_[b].reach;
     for (const auto node : upper) put_in(node, next);
   }
   std::uint32_t open_bundle();

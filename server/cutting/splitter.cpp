@@ -42,7 +42,7 @@ void Splitter::find_near(CutMesh& mesh, std::span<const PatchTriangle> patch) {
   const double margin = kMostStretch * mesh.longest_reach();
   box.least = box.least - Vec3d{margin, margin, margin};
   box.most += {margin, margin, margin};
-  mesh.collect(box, near_);
+  mesh.collect(box, patch, kMostStretch, near_);
   rank_.resize(std::max(rank_.size(), mesh.topology().node_count()));
   heights_.clear();
   positions_.clear();
