@@ -78,12 +78,6 @@ void CutMesh::end() {
   out_ = nullptr;
 }
 
-Vec3d CutMesh::position(NodeIndex n) const {
-  if (n.value < is_made_.size() && is_made_[n.value] != 0) return made_[n.value];
-  const auto& rest = topology_.rest()[n.value];
-  return n.value < displacements_.size() ? rest + to_double(displacements_[n.value]) : rest;
-}
-
 void CutMesh::collect(const Box& box, std::span<const PatchTriangle> patch, double reaches,
                       std::vector<NodeIndex>& out) {
   out.clear();

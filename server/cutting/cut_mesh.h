@@ -37,7 +37,11 @@ class CutMesh {
 
   const dynamics::Topology& topology() const { return topology_; }
   const Settings& settings() const { return settings_; }
-  Vec3d position(NodeIndex n) const;  // now, m
+  Vec3d position(NodeIndex n) const {  // now, m
+    if (n.value < is_made_.size() && is_made_[n.value] != 0) return made_[n.value];
+    const auto& rest = topology_.rest()[n.value];
+    return n.value < displacements_.size() ? rest + to_double(displacements_[n.value]) : rest;
+  }
   // Nodes whose position is in the box, ascending; some of those may be left out whose distance
   // from all triangles is more than `reaches` times their reach.
   void collect(const Box& box, std::span<const PatchTriangle> patch, double reaches,

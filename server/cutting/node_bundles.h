@@ -52,11 +52,12 @@ class NodeBundles {
   void collect(const Box& box, double travel_m, Place&& place, MayHold&& may_hold,
                std::vector<NodeIndex>& out) {
     for (auto& bundle : bundles_) {
-      if (!bundle.box.is_within(box, slack(bundle, travel_m))) continue;
-      if (bundle.travel_m != travel_m) look_into(bundle, travel_m, place);
-      if (!bundle.box.is_within(box, 0)) continue;
-      const auto half = (bundle.box.most - bundle.box.least) / 2;
-      if (!may_hold(bundle.box.least + half, length(half) + kRounding_m, bundle.reach)) continue;
+      if (!may_reach(bundle, box, travel_m, may_hold)) continue;
+      if (const double far = slack(bundle, travel_m);
+          far > kMost_m || far > kLoose * bundle.radius()) {
+        look_into(bundle, travel_m, place);
+        if (!may_reach(bundle, box, travel_m, may_hold)) continue;
+      }
       for (const auto node : bundle.nodes)
         if (box.contains(place(node))) out.push_back(node);
     }
@@ -82,6 +83,9 @@ class NodeBundles {
 
  private:
   static constexpr std::size_t kMost = 48;
+  // A bundle is looked into again when nodes may be so many of its radii outside; and what is
+  // slack enough for a bundle to be anywhere, m.
+  static constexpr double kLoose = 0.1, kMost_m = 1;
   // m; of floats, and of sums of them.
   static constexpr double kRounding_m = 1e-6, kRounding = 1e-5;
 
@@ -90,8 +94,17 @@ class NodeBundles {
     double travel_m = -std::numeric_limits<double>::infinity();  // when it was looked into
     double reach = 0;
     std::vector<NodeIndex> nodes;
+
+    double radius() const { return length(box.most - box.least) / 2; }
   };
 
+  template <typename MayHold>
+  static bool may_reach(const Bundle& bundle, const Box& box, double travel_m, MayHold&& may_hold) {
+    const double far = slack(bundle, travel_m);
+    if (!bundle.box.is_within(box, far)) return false;
+    return far > kMost_m || bundle.nodes.empty() ||
+           may_hold((bundle.box.least + bundle.box.most) / 2, bundle.radius() + far, bundle.reach);
+  }
   static double slack(const Bundle& bundle, double travel_m) {
     const double travel = travel_m - bundle.travel_m;
     return travel >= 0 ? travel * (1 + kRounding) + kRounding_m
