@@ -3,6 +3,8 @@
 // The topology under the knives: where its nodes are now, its local scale, and every edit of it,
 // told to all strokes and to whoever repeats it.
 
+#include <limits>
+#include <optional>
 #include <span>
 #include <vector>
 

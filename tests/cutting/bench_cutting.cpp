@@ -105,6 +105,10 @@ class Bench {
   void call() {
     ++tick_;
     displacements_.resize(topology_.node_count());
+    for (const auto& made : output_.new_nodes) {
+      const auto a = displacements_[made.a.value], b = displacements_[made.b.value];
+      displacements_[made.node.value] = a + (b - a) * (made.t / 65536.f);
+    }
     const double phase = 0.006 * tick_;
     double farthest = 0;
     const Vec3d sway = Vec3d{std::sin(phase), std::cos(phase), 0} * options_.sway_m;
