@@ -33,6 +33,7 @@ CutMesh::CutMesh(dynamics::Topology& topology, const Settings& settings, std::sp
     : topology_(topology), settings_(settings), strokes_(strokes), places_(topology) {
   TROCAR_ASSERT(!topology.has_links());
   measure_scale();
+  bundles_.emplace(topology.rest(), reach_);
 }
 
 void CutMesh::measure_scale() {
@@ -63,12 +64,34 @@ void CutMesh::measure_scale() {
     floor_sine_ = std::min(floor_sine_, sine_of_share(worst, kShareOfWorst));
 }
 
-void CutMesh::begin(std::span<const Vec3f> displacements, CutOutput& out) {
+void CutMesh::begin(std::span<const Vec3f> displacements, double travel_m, CutOutput& out) {
   TROCAR_ASSERT(displacements.empty() || displacements.size() >= topology_.node_count());
   out_ = &out;
-  positions_.assign(topology_.rest().begin(), topology_.rest().end());
-  for (std::size_t n = 0; n < std::min(displacements.size(), positions_.size()); ++n)
-    positions_[n] += to_double(displacements[n]);
+  displacements_ = displacements;
+  travel_m_ = travel_m < kUnknownTravel ? travel_m : 0;
+  if (!(travel_m < kUnknownTravel)) bundles_->forget();
+}
+
+void CutMesh::end() {
+  for (const auto& made : out_->new_nodes) is_made_[made.node.value] = 0;
+  displacements_ = {};
+  out_ = nullptr;
+}
+
+void CutMesh::collect(const Box& box, std::span<const PatchTriangle> patch, double reaches,
+                      std::vector<NodeIndex>& out) {
+  out.clear();
+  const auto place = [this](NodeIndex n) { return position(n); };
+  const auto may_hold = [&](const Vec3d& centre, double radius, double reach) {
+    const double slack = radius + reaches * reach;
+    return std::ranges::any_of(patch, [&](const PatchTriangle& triangle) {
+      return std::abs(signed_distance(triangle, centre)) <= slack &&
+             is_inside(triangle, centre, slack);
+    });
+  };
+  bundles_->collect(box, travel_m_, place, may_hold, out);
+  std::erase_if(out, [this](NodeIndex n) { return !topology_.has_node(n); });
+  std::sort(out.begin(), out.end());
 }
 
 double CutMesh::sine_after_split(NodeIndex a, NodeIndex b, std::uint16_t t, double length_share) {
@@ -102,13 +125,23 @@ void CutMesh::measure_scale_of(const NewNode& made) {
 
 void CutMesh::add_node(const NewNode& made) {
   measure_scale_of(made);
-  positions_.resize(topology_.node_count());
-  positions_[made.node.value] = along(positions_[made.a.value], positions_[made.b.value], made.t);
+  made_.resize(topology_.node_count());
+  is_made_.resize(topology_.node_count());
+  made_[made.node.value] = along(position(made.a), position(made.b), made.t);
+  is_made_[made.node.value] = 1;
+  bundles_->add(made.node, made.a, reach(made.node), travel_m_,
+                [this](NodeIndex n) { return position(n); });
   out_->new_nodes.push_back(made);
 }
 
 Status CutMesh::repeat(const CutEvents& events) {
-  return apply(events, topology_, places_, [this](const NewNode& made) { measure_scale_of(made); });
+  const auto place = [this](NodeIndex n) { return topology_.rest()[n.value]; };
+  auto status = apply(events, topology_, places_, [&](const NewNode& made) {
+    measure_scale_of(made);
+    bundles_->add(made.node, made.a, reach(made.node), 0, place);
+  });
+  bundles_->forget();
+  return status;
 }
 
 NodeIndex CutMesh::split(NodeIndex a, NodeIndex b, std::uint16_t t) {

@@ -3,14 +3,20 @@
 // The topology under the knives: where its nodes are now, its local scale, and every edit of it,
 // told to all strokes and to whoever repeats it.
 
+#include <limits>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "server/cutting/edits.h"
+#include "server/cutting/node_bundles.h"
 #include "server/cutting/settings.h"
 #include "server/cutting/stroke.h"
 
 namespace trocar::cutting {
+
+// Of nodes, where nobody has added it up: all of them are looked at.
+inline constexpr double kUnknownTravel = std::numeric_limits<double>::infinity();
 
 struct CutOutput {
   CutEvents events;
@@ -27,12 +33,23 @@ class CutMesh {
  public:
   CutMesh(dynamics::Topology& topology, const Settings& settings, std::span<Stroke> strokes);
 
-  // displacements: m, per node; none: at rest.
-  void begin(std::span<const Vec3f> displacements, CutOutput& out);
+  // A call: displacements as in Cutter::cut(), until end().
+  void begin(std::span<const Vec3f> displacements, double travel_m, CutOutput& out);
+  void end();
 
   const dynamics::Topology& topology() const { return topology_; }
   const Settings& settings() const { return settings_; }
-  std::span<const Vec3d> positions() const { return positions_; }  // now, m
+  Vec3d position(NodeIndex n) const {  // now, m
+    if (n.value < is_made_.size() && is_made_[n.value] != 0) return made_[n.value];
+    const auto& rest = topology_.rest()[n.value];
+    return n.value < displacements_.size() ? rest + to_double(displacements_[n.value]) : rest;
+  }
+  // Nodes whose position is in the box, ascending; some of those may be left out whose distance
+  // from all triangles is more than `reaches` times their reach.
+  void collect(const Box& box, std::span<const PatchTriangle> patch, double reaches,
+               std::vector<NodeIndex>& out);
+  // Nodes may have moved farther than the next call will say.
+  void forget_places() { bundles_->forget(); }
   double h(NodeIndex n) const { return h_[n.value]; }
   double mean_h() const { return mean_h_; }
   // Longest edge at the node in the uncut mesh, m.
@@ -63,7 +80,11 @@ class CutMesh {
   const Settings settings_;
   const std::span<Stroke> strokes_;
   Places places_;
-  std::vector<Vec3d> positions_;
+  std::optional<NodeBundles> bundles_;
+  std::span<const Vec3f> displacements_;
+  double travel_m_ = 0;
+  std::vector<Vec3d> made_;  // positions, by node, of those that this call made
+  std::vector<std::uint8_t> is_made_;
   std::vector<double> h_, reach_;  // m, per node
   double mean_h_ = 0, longest_reach_ = 0, floor_sine_ = 0;
   CutOutput* out_ = nullptr;

@@ -50,6 +50,11 @@ bool Cutter::is_idle() const {
   });
 }
 
+double Cutter::behind_m(std::uint32_t blade) const {
+  if (blade >= kMaxBlades || stroke_of_[blade] == kNone) return 0;
+  return strokes_[stroke_of_[blade]].motion.behind();
+}
+
 Status Cutter::repeat(const CutEvents& events) {
   if (std::ranges::any_of(strokes_, &Stroke::is_active))
     return Error{ErrorCode::Refused, "cut events cannot be repeated while a blade cuts"};
@@ -73,6 +78,7 @@ void Cutter::visit_state(world::StateArchive& archive) {
   archive.value(count);
   if (archive.is_reading()) {
     clear_strokes();
+    mesh_.forget_places();
     if (count > kMaxStrokes) archive.fail();
     order_.resize(archive.ok() ? count : 0);
     std::iota(order_.begin(), order_.end(), 0u);
@@ -102,10 +108,10 @@ void Cutter::order_strokes() {
             [&](auto a, auto b) { return strokes_[a].id < strokes_[b].id; });
 }
 
-void Cutter::cut(std::span<const Vec3f> displacements, CutOutput& out) {
+void Cutter::cut(std::span<const Vec3f> displacements, CutOutput& out, double travel_m) {
   out.clear();
   if (is_idle()) return;
-  mesh_.begin(displacements, out);
+  mesh_.begin(displacements, travel_m, out);
   order_.clear();
   for (std::uint32_t s = 0; s < strokes_.size(); ++s)
     if (strokes_[s].is_active && (strokes_[s].has_ended || strokes_[s].motion.has_strip()))
@@ -120,6 +126,7 @@ void Cutter::cut(std::span<const Vec3f> displacements, CutOutput& out) {
     if (!is_done || (strokes_[s].has_ended && (budget < share || !end(strokes_[s]))))
       out.is_behind = true;
   }
+  mesh_.end();
 }
 
 // Returns whether nothing is left.
@@ -159,7 +166,7 @@ void Cutter::forget(Stroke& stroke) {
   std::sort(kept_.begin(), kept_.end());
   const double range = mesh_.settings().forget_h * stroke.h;
   const auto is_far = [&](NodeIndex node) {
-    const auto& p = mesh_.positions()[node.value];
+    const auto p = mesh_.position(node);
     return std::ranges::none_of(stroke.patch,
                                 [&](const PatchTriangle& triangle) {
                                   return std::abs(signed_distance(triangle, p)) <= range &&

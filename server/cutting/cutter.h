@@ -39,7 +39,9 @@ class Cutter {
   void lift(std::uint32_t blade);
 
   // displacements: of the nodes from rest, m, node_count of them; none: everything is at rest.
-  void cut(std::span<const Vec3f> displacements, CutOutput& out);
+  // travel_m: a sum over ticks of the farthest that any node has moved, by which only what is near
+  // the blades is looked at; the edits are the same without it.
+  void cut(std::span<const Vec3f> displacements, CutOutput& out, double travel_m = kUnknownTravel);
 
   // Does what another cutter did to the same topology: all its events, of all its calls, in order;
   // with no stroke on. What is wrong is refused; what comes before it has been done.
@@ -55,6 +57,8 @@ class Cutter {
 
   // Nothing to do until a blade moves.
   bool is_idle() const;
+  // How far the blade has gone since the place up to which all is cut, m.
+  double behind_m(std::uint32_t blade) const;
   double floor_sine() const { return mesh_.floor_sine(); }
   double mean_h() const { return mesh_.mean_h(); }
 

@@ -47,8 +47,7 @@ int Opening::side(const CutMesh& mesh, Stroke& stroke, TetIndex t) {
     if (stroke.is_labelled(node)) continue;
     is_flat = false;
     const auto height = stroke.height(node);
-    sum += height.nearest_squared >= 0 ? height.height
-                                       : height_above(stroke, mesh.positions()[node.value]);
+    sum += height.nearest_squared >= 0 ? height.height : height_above(stroke, mesh.position(node));
   }
   if (is_flat) return side_of_flat(mesh, stroke, t);
   return sum < 0 ? -1 : 1;
@@ -64,7 +63,7 @@ int Opening::side_of_flat(const CutMesh& mesh, Stroke& stroke, TetIndex t) {
   }
   if (sum == 0) {
     Vec3d centre;
-    for (const auto node : mesh.topology().tet(t)) centre += mesh.positions()[node.value] / 4;
+    for (const auto node : mesh.topology().tet(t)) centre += mesh.position(node) / 4;
     sum = height_above(stroke, centre);
   }
   const int own = sum < 0 ? -1 : 1;
@@ -78,9 +77,16 @@ void Opening::gather(const CutMesh& mesh, const Stroke& stroke) {
   const auto& topology = mesh.topology();
   tets_.clear();
   is_reached_.resize(std::max(is_reached_.size(), topology.node_count()));
+  reached_.clear();
   const auto reach = [&](TetIndex t) {
-    tets_.push_back(t);
-    for (const auto node : topology.tet(t)) is_reached_[node.value] = 1;
+    int labelled = 0;
+    for (const auto node : topology.tet(t)) {
+      labelled += stroke.is_labelled(node);
+      if (is_reached_[node.value] != 0) continue;
+      is_reached_[node.value] = 1;
+      reached_.push_back(node);
+    }
+    if (labelled > 2) tets_.push_back(t);
   };
   for (const auto node : stroke.fresh)
     for (const auto t : topology.tets_of(node)) reach(t);
@@ -94,8 +100,7 @@ void Opening::gather(const CutMesh& mesh, const Stroke& stroke) {
       return is_taken;
     });
   }
-  for (const auto t : tets_)
-    for (const auto node : topology.tet(t)) is_reached_[node.value] = 0;
+  for (const auto node : reached_) is_reached_[node.value] = 0;
   sort_unique(tets_);
 }
 
@@ -166,8 +171,11 @@ bool Opening::find_debris(const CutMesh& mesh, TetIndex start) {
 }
 
 bool Opening::turn_debris(const CutMesh& mesh, Stroke& stroke) {
+  debris_starts_.clear();
   for (const auto& proposal : proposals_)
     for (const auto start : {proposal.face.tet, proposal.other}) {
+      if (std::ranges::find(debris_starts_, start) != debris_starts_.end()) continue;
+      debris_starts_.push_back(start);
       if (!find_debris(mesh, start)) continue;
       const int other_side = -side(mesh, stroke, start);
       for (const auto t : debris_) {

@@ -54,9 +54,10 @@ class Opening {
   bool close_offenders(const CutMesh& mesh);
   void commit(CutMesh& mesh, Stroke& stroke);
 
-  std::vector<TetIndex> tets_;            // whose faces are looked at
+  std::vector<TetIndex> tets_;            // with faces that may be proposed
   std::vector<TetIndex> still_waiting_;   // not looked at this time
   std::vector<std::uint8_t> is_reached_;  // per node
+  std::vector<NodeIndex> reached_;
   std::vector<Proposal> proposals_;
   std::optional<CutFaces> cuts_;
   StarAnalysis analysis_;
@@ -67,7 +68,7 @@ class Opening {
   static constexpr std::uint8_t kFacesStale = 1, kBreachesStale = 2;
   std::vector<std::uint8_t> stale_;  // per star: what is to be checked again
   std::vector<std::uint32_t> offenders_, changed_;
-  std::vector<TetIndex> debris_;
+  std::vector<TetIndex> debris_, debris_starts_;
   std::vector<TetFace> faces_;
   std::vector<Breach> breaches_;
 };

@@ -66,7 +66,7 @@ bool Repair::pull_back_all(CutMesh& mesh, Stroke& stroke, Opening& opening) {
 void Repair::find_breaches(CutMesh& mesh, Stroke& stroke, Opening& opening, double beyond) {
   breaches_.clear();
   for (const auto& breach : opening.breaches_of_all(mesh, stroke)) {
-    const auto& p = mesh.positions()[breach.node.value];
+    const auto p = mesh.position(breach.node);
     const bool is_near = std::ranges::any_of(stroke.patch, [&](const PatchTriangle& triangle) {
       return distance_squared(triangle, p) < beyond * beyond;
     });

@@ -19,48 +19,52 @@ std::uint16_t quantised(double t) {
 
 }  // namespace
 
-void Splitter::find_near(const CutMesh& mesh, std::span<const PatchTriangle> patch) {
-  near_.clear();
-  is_close_.clear();
-  rank_.resize(std::max(rank_.size(), mesh.topology().node_count()));
-  Vec3d low = patch[0].corners[0], high = low;
-  for (const auto& triangle : patch)
-    for (const auto& p : triangle.corners) {
-      low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
-      high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
-    }
-  const double margin = kMostStretch * mesh.longest_reach();
-  low = low - Vec3d{margin, margin, margin};
-  high += {margin, margin, margin};
-  const auto positions = mesh.positions();
-  for (std::uint32_t n = 0; n < positions.size(); ++n) {
-    const auto& p = positions[n];
-    if (p.x < low.x || p.y < low.y || p.z < low.z || p.x > high.x || p.y > high.y || p.z > high.z)
-      continue;
-    const double reach = kMostStretch * mesh.reach(NodeIndex(n));
-    if (mesh.topology().has_node(NodeIndex(n)) &&
-        std::ranges::any_of(patch, [&](const PatchTriangle& triangle) {
-          return std::abs(signed_distance(triangle, p)) <= reach && is_inside(triangle, p, reach);
-        })) {
-      near_.emplace_back(n);
-      rank_[n] = static_cast<std::uint32_t>(near_.size());
-      is_close_.push_back(std::ranges::any_of(patch, [&](const PatchTriangle& triangle) {
-        return std::abs(signed_distance(triangle, p)) <= reach / 2 &&
-               is_inside(triangle, p, reach / 2);
-      }));
-    }
+// Heights of p above the patch, at the end of heights_. Returns how near it is.
+Splitter::Nearness Splitter::look_at(std::span<const PatchTriangle> patch, const Vec3d& p,
+                                     double reach) {
+  auto nearness = Nearness::Far;
+  for (const auto& triangle : patch) {
+    const double height = signed_distance(triangle, p);
+    heights_.push_back(height);
+    if (nearness == Nearness::Close || !(std::abs(height) <= reach)) continue;
+    if (std::abs(height) <= reach / 2 && is_inside(triangle, p, reach / 2))
+      nearness = Nearness::Close;
+    else if (nearness == Nearness::Far && is_inside(triangle, p, reach))
+      nearness = Nearness::Near;
   }
-  heights_.resize(near_.size() * patch.size());
-  for (std::size_t i = 0; i < near_.size(); ++i)
-    for (std::size_t k = 0; k < patch.size(); ++k)
-      heights_[i * patch.size() + k] = signed_distance(patch[k], positions[near_[i].value]);
+  return nearness;
 }
 
-void Splitter::measure(const CutMesh& mesh, Stroke& stroke,
-                       std::span<const PatchTriangle> patch) const {
+void Splitter::find_near(CutMesh& mesh, std::span<const PatchTriangle> patch) {
+  Box box;
+  for (const auto& triangle : patch)
+    for (const auto& p : triangle.corners) box.include(p);
+  const double margin = kMostStretch * mesh.longest_reach();
+  box.least = box.least - Vec3d{margin, margin, margin};
+  box.most += {margin, margin, margin};
+  mesh.collect(box, patch, kMostStretch, near_);
+  rank_.resize(std::max(rank_.size(), mesh.topology().node_count()));
+  heights_.clear();
+  positions_.clear();
+  is_close_.clear();
+  std::erase_if(near_, [&](NodeIndex n) {
+    const auto p = mesh.position(n);
+    const auto nearness = look_at(patch, p, kMostStretch * mesh.reach(n));
+    if (nearness == Nearness::Far) {
+      heights_.resize(heights_.size() - patch.size());
+      return true;
+    }
+    positions_.push_back(p);
+    is_close_.push_back(nearness == Nearness::Close);
+    rank_[n.value] = static_cast<std::uint32_t>(positions_.size());
+    return false;
+  });
+}
+
+void Splitter::measure(Stroke& stroke, std::span<const PatchTriangle> patch) const {
   for (std::size_t i = 0; i < near_.size(); ++i) {
     if (stroke.is_labelled(near_[i])) continue;
-    const auto& p = mesh.positions()[near_[i].value];
+    const auto& p = positions_[i];
     auto best = stroke.height(near_[i]);
     for (std::size_t k = 0; k < patch.size(); ++k) {
       const double height = heights_[i * patch.size() + k];
@@ -80,7 +84,7 @@ void Splitter::cross(const CutMesh& mesh, std::span<const PatchTriangle> patch, 
     const double da = heights_a[k], db = heights_b[k];
     if (da * db > 0 || da == db) continue;
     const double t = da / (da - db);
-    const auto &pa = mesh.positions()[a.value], &pb = mesh.positions()[b.value];
+    const auto &pa = positions_[rank_[a.value] - 1], &pb = positions_[rank_[b.value] - 1];
     if (!is_inside(patch[k], pa + (pb - pa) * t, kSlack_h * mesh.h(a))) continue;
     const auto rest = mesh.topology().rest();
     crossings_.push_back({a, b, t, da, db, length_squared(rest[a.value] - rest[b.value])});
@@ -105,16 +109,18 @@ bool Splitter::are_parted(NodeIndex a, NodeIndex b, std::size_t triangles) const
 void Splitter::find_crossings(const CutMesh& mesh, const Stroke& stroke,
                               std::span<const PatchTriangle> patch) {
   crossings_.clear();
+  seen_from_.assign(near_.size(), 0);
   for (const auto a : near_) {
     if (!is_close(a) || stroke.is_labelled(a)) continue;
     others_.clear();
     mesh.topology().for_each_neighbour(a, [&](NodeIndex b) {
-      if (rank_[b.value] > 0 && (a < b || !is_close(b)) && are_parted(a, b, patch.size()) &&
-          !stroke.is_labelled(b))
-        others_.push_back(b);
+      if (rank_[b.value] == 0 || (b < a && is_close(b))) return;
+      auto& seen_from = seen_from_[rank_[b.value] - 1];
+      if (seen_from == rank_[a.value]) return;
+      seen_from = rank_[a.value];
+      if (!stroke.is_labelled(b) && are_parted(a, b, patch.size())) others_.push_back(b);
     });
     std::sort(others_.begin(), others_.end());
-    others_.erase(std::unique(others_.begin(), others_.end()), others_.end());
     for (const auto b : others_) cross(mesh, patch, std::min(a, b), std::max(a, b));
   }
 }
@@ -179,7 +185,7 @@ bool Splitter::run(CutMesh& mesh, Stroke& stroke, std::span<const PatchTriangle>
     stroke.h = 0;
     for (const auto node : near_) stroke.h += mesh.h(node) / static_cast<double>(near_.size());
   }
-  measure(mesh, stroke, patch);
+  measure(stroke, patch);
   find_crossings(mesh, stroke, patch);
   for (const auto node : near_) rank_[node.value] = 0;
   count_crossed_tets(mesh);

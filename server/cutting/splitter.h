@@ -30,8 +30,11 @@ class Splitter {
     NodeIndex node, other;
   };
 
-  void find_near(const CutMesh& mesh, std::span<const PatchTriangle> patch);
-  void measure(const CutMesh& mesh, Stroke& stroke, std::span<const PatchTriangle> patch) const;
+  enum class Nearness { Far, Near, Close };  // Close: within half of the reach
+
+  Nearness look_at(std::span<const PatchTriangle> patch, const Vec3d& p, double reach);
+  void find_near(CutMesh& mesh, std::span<const PatchTriangle> patch);
+  void measure(Stroke& stroke, std::span<const PatchTriangle> patch) const;
   void find_crossings(const CutMesh& mesh, const Stroke& stroke,
                       std::span<const PatchTriangle> patch);
   bool is_close(NodeIndex n) const;
@@ -42,9 +45,11 @@ class Splitter {
   bool split(CutMesh& mesh, Stroke& stroke, std::uint32_t& budget);
 
   std::vector<NodeIndex> near_;
-  std::vector<std::uint32_t> rank_;     // per node: 1 + its place in near_, or 0
-  std::vector<std::uint8_t> is_close_;  // as near_
-  std::vector<double> heights_;         // near_ x patch
+  std::vector<std::uint32_t> rank_;       // per node: 1 + its place in near_, or 0
+  std::vector<std::uint8_t> is_close_;    // as near_
+  std::vector<Vec3d> positions_;          // as near_
+  std::vector<std::uint32_t> seen_from_;  // as near_: rank of the last node it was a neighbour of
+  std::vector<double> heights_;           // near_ x patch
   std::vector<NodeIndex> others_;
   std::vector<Crossing> crossings_;
   std::vector<Snap> snaps_;

@@ -27,6 +27,8 @@ class BladeMotion {
   // Without the places of a blade that has left.
   void visit_state(world::StateArchive& archive, bool has_left);
 
+  // How far the blade has gone since the place up to which all is cut, m.
+  double behind() const { return longest_motion(has_strip() ? strip().from : anchor_, now_); }
   std::uint32_t points() const { return now_.count; }  // of the edge
   bool has_strip() const { return next_ < strips_.size(); }
   const Strip& strip() const { return strips_[next_]; }

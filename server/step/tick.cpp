@@ -85,6 +85,7 @@ void solve(State& state, StepContext& context) {
       solved.largest_move_m + (settled.empty() ? 0 : propagation::kQuietDisplacementMetres);
   context.finder.surface_moved(largest_move);
   context.self_finder.surface_moved(largest_move);
+  context.travel_m += static_cast<double>(largest_move);
   context.report.residual_n = solved.residual_n;
   context.report.sweeps = solved.sweeps;
   context.report.far_sweeps = settings.far_sweeps;
@@ -104,7 +105,7 @@ void follow_contacts(State& state, StepContext& context) {
 
 void cut_tissue(State& state, StepContext& context) {
   auto& cuts = state.cuts;
-  if (!cuts.cut(state.tools, state.claims, state.world, context.report.cut)) return;
+  if (!cuts.cut(state.tools, state.claims, state.world, context.travel_m, context.report.cut)) return;
   const auto& edit = cuts.follow(state.world);
   for (const auto& made : cuts.new_nodes()) {
     state.claims.add_node(made.a, made.b);

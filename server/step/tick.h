@@ -78,6 +78,7 @@ struct StepContext {
   std::vector<locks::ClaimRequest> requests;
   std::vector<Vec3f> surface_displacements;
   std::vector<NodeIndex> changed_neighbours;
+  double travel_m = 0;  // sum over ticks of the farthest that any node has moved
   StateHasher hasher;
 
   // Output.

@@ -41,7 +41,7 @@ TissueCuts::TissueCuts(const scene::Organ& organ)
 }
 
 bool TissueCuts::cut(const input::ToolTable& tools, const locks::ClaimTable& claims,
-                     const world::World& world, CutReport& report) {
+                     const world::World& world, double travel_m, CutReport& report) {
   report = {};
   if (!can_cut()) return false;
   for (std::uint8_t i = 0; i < kMaxTools; ++i) {
@@ -63,7 +63,7 @@ bool TissueCuts::cut(const input::ToolTable& tools, const locks::ClaimTable& cla
   double opened = 0;
   if (!cutter_->is_idle()) {
     output_.clear();
-    cutter_->cut(world.displacements, output_);
+    cutter_->cut(world.displacements, output_, travel_m);
     opened = output_.opened_area_m2;
     report = {output_.crossed_tets, output_.splits,
               static_cast<std::uint32_t>(output_.new_nodes.size()), opened, output_.is_behind};

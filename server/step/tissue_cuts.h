@@ -38,8 +38,9 @@ class TissueCuts {
 
   // Blades of claims in effect go where their tools are; then what they cross is cut. True if the
   // topology has changed: then follow() is due, then clear_changes().
+  // travel_m: a sum over ticks of the farthest that any node has moved.
   bool cut(const input::ToolTable& tools, const locks::ClaimTable& claims,
-           const world::World& world, CutReport& report);
+           const world::World& world, double travel_m, CutReport& report);
   // Nodes that the last edit made, in order.
   std::span<const cutting::NewNode> new_nodes() const { return new_nodes_; }
   // Brings the world's arrays, the surface and its slots up to date with the topology.

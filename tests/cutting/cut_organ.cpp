@@ -127,7 +127,7 @@ Path straight_path(const Edge& from, const Edge& to, double step_m) {
 
 void CutOrgan::tick() {
   const auto start = thread_cpu_ns();
-  cutter_.cut(displacements, output_);
+  cutter_.cut(displacements, output_, travel_m);
   last_ns_ = thread_cpu_ns() - start;
   if (const auto status = apply(output_.events, copy_, copy_places_); !status && failure_.empty())
     failure_ = "replay: " + status.error().message;

@@ -55,6 +55,7 @@ class CutOrgan {
   std::string check() const;
 
   std::vector<Vec3f> displacements;  // none: at rest
+  double travel_m = kUnknownTravel;
 
  private:
   std::unique_ptr<const scene::Organ> organ_;
