@@ -38,6 +38,8 @@ class SyntheticSource final : public replica::SessionSource {
   const wire::QuantisedSurface& surface() const { return surface_; }
   // Changes a message just before delivery; false drops it.
   std::function<bool(proto::Envelope&)> tamper;
+  // Displacement of a vertex on top of that by the two tools, m.
+  std::function<Vec3f(std::size_t slot, const Vec3f& rest)> also_move;
   std::vector<proto::Envelope> sent;  // by the client, in order
   bool answer_requests = true;        // KeyframeRequest gets topology and keyframe with the next frame
 
