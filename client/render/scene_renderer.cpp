@@ -223,9 +223,9 @@ SceneRenderer::Parts::~Parts() {
 
 void SceneRenderer::Parts::load_topology(const SceneView& scene) {
   // At every change of a surface that is being cut: linear, in memory that is there already.
-  const std::size_t known = topology_version == 0
-                                ? scene.rest_positions.size()
-                                : std::min(surface.coarse_vertex_count(), scene.rest_positions.size());
+  const std::size_t known =
+      topology_version == 0 ? scene.rest_positions.size()
+                            : std::min(surface.coarse_vertex_count(), scene.rest_positions.size());
   topology_version = scene.topology_version;
   surface.build(scene.rest_positions.size(), scene.triangles, scene.is_wound,
                 is_software ? kTriangleBudgetSoftware : kTriangleBudget);

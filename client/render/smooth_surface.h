@@ -62,8 +62,8 @@ class SmoothSurface {
   static constexpr std::uint32_t kNone = 0xffffffffu;
 
   struct Midpoint {
-    std::uint32_t a = 0, b = 0;         // parents
-    std::uint32_t same_as = kNone;      // on the rim: the outside's midpoint
+    std::uint32_t a = 0, b = 0;     // parents
+    std::uint32_t same_as = kNone;  // on the rim: the outside's midpoint
   };
   // Edges to midpoints, open addressing.
   class EdgeTable {
@@ -82,7 +82,8 @@ class SmoothSurface {
     unsigned shift_ = 0;
   };
 
-  void split_rim(std::span<const TriangleCorners> triangles, std::span<const std::uint8_t> is_wound);
+  void split_rim(std::span<const TriangleCorners> triangles,
+                 std::span<const std::uint8_t> is_wound);
   void halve_edges();
   std::uint32_t midpoint(std::uint32_t a, std::uint32_t b);
 

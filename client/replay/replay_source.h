@@ -8,10 +8,10 @@
 // Start and seek deliver: Welcome (once), Participants as of then, SurfaceTopology if the epoch
 // differs, the last keyframe at or before the target, every delta up to it, FrameState of the last
 // 128 ms and in any case of the last frame. Claims that a seek passes over are not repeated. Then
-// each tick's messages follow as they fall due: surface changes, deltas, and the 1 Hz keyframes only
-// where a delta's baseline is missing (the recorder fell behind, a chunk is damaged) or the sink sent
-// a KeyframeRequest; then the topology goes before it. Until such a keyframe the picture stands
-// still.
+// each tick's messages follow as they fall due: surface changes, deltas, and the 1 Hz keyframes
+// only where a delta's baseline is missing (the recorder fell behind, a chunk is damaged) or the
+// sink sent a KeyframeRequest; then the topology goes before it. Until such a keyframe the picture
+// stands still.
 //
 // The file is outside data. A message that does not parse, or contradicts its own topic or tick,
 // closes the source: CloseKind::Lost, one line that names file, topic and tick. What the numbers

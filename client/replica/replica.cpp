@@ -216,9 +216,9 @@ void Replica::extend_history(const wire::QuantisedSurface& surface) {
     auto& known = frame.surface;
     for (const wire::SurfaceChange& change : to_show_)
       for (const wire::NewVertex& vertex : change.new_vertices)
-        known.push_back(vertex.has_parents() ? wire::between(known[vertex.a.value],
-                                                             known[vertex.b.value], vertex.t)
-                                             : surface[known.size()]);
+        known.push_back(vertex.has_parents()
+                            ? wire::between(known[vertex.a.value], known[vertex.b.value], vertex.t)
+                            : surface[known.size()]);
   }
 }
 

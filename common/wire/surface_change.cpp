@@ -59,7 +59,8 @@ Status check_triangles(const SurfaceChange& change, const SurfaceLayout& layout)
   const std::size_t vertices = layout.vertex_count() + change.new_vertices.size();
   for (const NewTriangle& triangle : change.added) {
     const auto& [a, b, c] = triangle.corners;
-    if (std::max({a, b, c}).value >= vertices) return bad("corner of an added triangle out of range");
+    if (std::max({a, b, c}).value >= vertices)
+      return bad("corner of an added triangle out of range");
     if (a == b || b == c || c == a) return bad("an added triangle has a corner twice");
   }
   return {};
@@ -77,8 +78,8 @@ std::uint64_t triangle_hash(TriangleIndex number, const Corners& corners, bool i
 std::uint64_t sum_after(const SurfaceChange& change, const SurfaceLayout& layout) {
   std::uint64_t sum = layout.triangle_sum;
   for (const TriangleIndex number : change.removed)
-    sum -= triangle_hash(number, layout.triangles[number.value],
-                         layout.is_wound[number.value] != 0);
+    sum -=
+        triangle_hash(number, layout.triangles[number.value], layout.is_wound[number.value] != 0);
   for (std::size_t i = 0; i < change.added.size(); ++i)
     sum += triangle_hash(TriangleIndex(layout.triangles.size() + i), change.added[i].corners,
                          change.added[i].is_wound);

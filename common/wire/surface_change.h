@@ -1,7 +1,8 @@
 #pragma once
 
-// What one epoch changes about the organ's surface: new vertices, triangles that are gone, triangles
-// that are new. Server, journal and clients apply the same changes to the same SurfaceLayout.
+// What one epoch changes about the organ's surface: new vertices, triangles that are gone,
+// triangles that are new. Server, journal and clients apply the same changes to the same
+// SurfaceLayout.
 //
 // Numbers are never used again: new vertices take the next slots, new triangles the next numbers, a
 // removed triangle leaves a gap. So what is older than an epoch stays right after it.

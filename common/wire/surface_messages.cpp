@@ -56,13 +56,14 @@ class RunWriter {
 };
 
 // Flags of `count` from runs; those past the last run are false. Nothing if the runs exceed it.
-Result<std::vector<std::uint8_t>> read_runs(const Runs& runs, std::size_t count, const char* message,
-                                            const char* field) {
+Result<std::vector<std::uint8_t>> read_runs(const Runs& runs, std::size_t count,
+                                            const char* message, const char* field) {
   std::vector<std::uint8_t> flags(count);
   std::size_t at = 0;
   bool value = false;
   for (const std::uint32_t length : runs) {
-    if (length > count - at) return bad(message, std::string(field) + ": runs exceed the triangles");
+    if (length > count - at)
+      return bad(message, std::string(field) + ": runs exceed the triangles");
     std::fill_n(flags.begin() + static_cast<std::ptrdiff_t>(at), length, std::uint8_t{value});
     at += length;
     value = !value;
@@ -116,8 +117,7 @@ Status read_triangles(const proto::SurfaceTopology& message, SurfaceLayout& layo
   int next = 0;
   for (std::size_t i = 0; i < count; ++i) {
     if ((*gaps)[i] != 0) continue;
-    for (VertexIndex& corner : layout.triangles[i])
-      corner = VertexIndex(message.triangle(next++));
+    for (VertexIndex& corner : layout.triangles[i]) corner = VertexIndex(message.triangle(next++));
     layout.is_wound[i] = (*wounds)[static_cast<std::size_t>(next / 3 - 1)];
   }
   layout.triangle_sum = layout.compute_triangle_sum();
@@ -150,8 +150,7 @@ void write_vertices(const SurfaceChange& change, const SurfaceLayout& layout,
       message.add_origin(0);
     }
     if (has_offset || !v.has_parents())
-      for (const std::int32_t c : {offset.x, offset.y, offset.z})
-        message.add_rest_offset_quanta(c);
+      for (const std::int32_t c : {offset.x, offset.y, offset.z}) message.add_rest_offset_quanta(c);
     last_rest = v.rest_quanta;
     if (!v.is_fixed) continue;
     message.add_fixed(static_cast<std::uint32_t>(i) - last_fixed);
@@ -232,8 +231,7 @@ void write(const SurfaceLayout& layout, const std::string& organ_name,
   message.set_organ_name(organ_name);
   message.mutable_rest_position_quanta()->Reserve(static_cast<int>(3 * layout.vertex_count()));
   for (const auto& vertex : layout.rest_quanta)
-    for (const std::int32_t c : {vertex.x, vertex.y, vertex.z})
-      message.add_rest_position_quanta(c);
+    for (const std::int32_t c : {vertex.x, vertex.y, vertex.z}) message.add_rest_position_quanta(c);
   RunWriter gaps(*message.mutable_gap_runs()), wounds(*message.mutable_wound_runs());
   message.mutable_triangle()->Reserve(static_cast<int>(3 * layout.triangles.size()));
   for (std::size_t i = 0; i < layout.triangles.size(); ++i) {
@@ -306,8 +304,7 @@ Result<SurfaceChange> read(const proto::SurfaceChange& message, const SurfaceLay
   FieldReader corners(message.corner());
   change.added.resize(added);
   for (std::size_t i = 0; i < added; ++i) {
-    for (VertexIndex& slot : change.added[i].corners)
-      slot = corner = moved(corner, corners.take());
+    for (VertexIndex& slot : change.added[i].corners) slot = corner = moved(corner, corners.take());
     change.added[i].is_wound = (*wounds)[i] != 0;
   }
   return change;

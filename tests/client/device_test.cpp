@@ -173,8 +173,8 @@ TEST(SmoothSurface, KeepsTheServersVerticesAndRoundsWhatLiesBetween) {
     for (const auto v : triangle) ASSERT_LT(v, surface.vertex_count());
 }
 
-// Drawn finely, a surface with slits is as closed as it came: along the rim both sides have the same
-// points, with normals of their own.
+// Drawn finely, a surface with slits is as closed as it came: along the rim both sides have the
+// same points, with normals of their own.
 TEST(SmoothSurface, TheRimOfAWoundIsSharpAndHasNoCrack) {
   auto layout = testing::make_blob_layout(16, 24, 0.08);
   testing::Random random(2);

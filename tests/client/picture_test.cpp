@@ -201,12 +201,12 @@ class Slit {
         return p.z > 0 ? (p.x - x) * (p.x - x) + (p.y - y) * (p.y - y) : 1.0f;
       };
       return VertexIndex(static_cast<std::size_t>(
-          std::ranges::min_element(layout.rest_quanta, {}, distance) -
-          layout.rest_quanta.begin()));
+          std::ranges::min_element(layout.rest_quanta, {}, distance) - layout.rest_quanta.begin()));
     };
     path_ = testing::path_between(layout, front(-0.05f, 0.026f), front(0.035f, 0.022f));
     first_new_ = layout.vertex_count();
-    for (const VertexIndex v : path_) points_.push_back(wire::to_metres(layout.rest_quanta[v.value]));
+    for (const VertexIndex v : path_)
+      points_.push_back(wire::to_metres(layout.rest_quanta[v.value]));
     source.queue_change(testing::open_slit(layout, path_, {0, 0, -700}));
     source.also_move = [this](std::size_t slot, const Vec3f& rest) { return move(slot, rest); };
   }
@@ -216,8 +216,10 @@ class Slit {
     for (std::size_t i = 1; i < points_.size(); ++i)
       if (length(points_[i] - rest) < length(points_[near] - rest)) near = i;
     float side = rest.y > points_[near].y ? 1.0f : -1.0f;
-    if (slot >= first_new_) side = (slot - first_new_) % 2 == 0 ? -1.0f : 0.0f;
-    else if (path_[near].value == slot) side = 1;
+    if (slot >= first_new_)
+      side = (slot - first_new_) % 2 == 0 ? -1.0f : 0.0f;
+    else if (path_[near].value == slot)
+      side = 1;
     const float along = static_cast<float>(near) / static_cast<float>(points_.size() - 1);
     const float away = std::max(0.0f, 1 - length(points_[near] - rest) / 0.035f);
     return Vec3f{0, 0.9f, 0.3f} * (side * away * away * 4 * along * (1 - along) * open_m_);

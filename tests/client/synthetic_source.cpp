@@ -260,8 +260,7 @@ void SyntheticSource::poll(replica::MessageSink& sink) {
 }
 
 bool SyntheticSource::send(const proto::Envelope& message) {
-  if (message.has_keyframe_request() && answer_requests)
-    wants_keyframe_ = wants_topology_ = true;
+  if (message.has_keyframe_request() && answer_requests) wants_keyframe_ = wants_topology_ = true;
   if (message.has_tool_sample()) {
     const auto& sample = message.tool_sample();
     mouse_pose_ = {{sample.position_m().x(), sample.position_m().y(), sample.position_m().z()},

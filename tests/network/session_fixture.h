@@ -61,8 +61,8 @@ class RawClient {
   bool last_was_keyframe = false;
   int frames_followed = 0;
   enum class Expect { RightCrc, WrongCrc };
-  // Reads up to the next SurfaceFrame and applies it, with the topology and changes before it; fails
-  // the test on a wrong baseline or epoch, or a CRC that is not as expected.
+  // Reads up to the next SurfaceFrame and applies it, with the topology and changes before it;
+  // fails the test on a wrong baseline or epoch, or a CRC that is not as expected.
   bool follow(Expect expect = Expect::RightCrc);
 
  private:

@@ -76,7 +76,8 @@ TEST(SurfaceChanges, reach_a_slow_reader_that_skips_frames_over_several_epochs) 
     last = session.make_frame(6000, i % 4 == 0);
     session.publish_all({last});
   }
-  const auto skipped = session.on_io([&] { return session.replicator().counters().frames_skipped; });
+  const auto skipped =
+      session.on_io([&] { return session.replicator().counters().frames_skipped; });
   ASSERT_GT(skipped, 10u) << "nothing was skipped: the test does not stall";
   const auto given = session.on_io([&] { return session.replicator().counters().frames_given; });
   // What lies in the stream already: its frames stop where skipping began, its changes do not.

@@ -18,7 +18,8 @@ using trocar::testing::Random;
 
 class RecordedCuts : public ::testing::Test {
  protected:
-  // `frames` frames, the surface cut in every third; those in `dropped` are too large for the queue.
+  // `frames` frames, the surface cut in every third; those in `dropped` are too large for the
+  // queue.
   void record(Frame frames, const std::vector<Frame>& dropped = {}) {
     const scene::Organ organ = *scene::make_lattice({6, 4, 6, 0.01});
     wire::SurfaceLayout layout = wire::make_surface_layout(organ);
