@@ -77,7 +77,6 @@ void Picture::frame_camera(const replica::Replica& replica) {
   camera_.orbit(static_cast<float>(view_.yaw_deg) * kRadians,
                 static_cast<float>(view_.pitch_deg) * kRadians);
   camera_.zoom(static_cast<float>(1 / view_.zoom));
-  framed_topology_ = replica.topology_version();
 }
 
 void Picture::measure(const replica::Replica& replica, std::uint64_t now_ns) {
@@ -120,8 +119,8 @@ render::SceneTool Picture::scene_tool(const replica::Replica& replica, const rep
 }
 
 std::vector<render::Hold> Picture::holds(const replica::Replica& replica) {
-  if (held_topology_ != replica.topology_version()) held_.clear();
-  held_topology_ = replica.topology_version();
+  if (held_history_ != replica.history_version()) held_.clear();
+  held_history_ = replica.history_version();
   std::vector<scene::ToolShape> shapes;
   for (const auto& tool : surface_.tools()) shapes.push_back(shape_of(replica, tool.slot));
   // Kept up to date while hidden too: which tissue a grasp took is seen when it takes it.
@@ -142,6 +141,7 @@ render::SceneView Picture::scene_view(const replica::Replica& replica, Hands& ha
   scene.topology_version = replica.topology_version();
   scene.rest_positions = replica.topology().rest_positions;
   scene.triangles = replica.topology().triangles;
+  scene.is_wound = replica.topology().is_wound;
   scene.positions = surface_.positions();
   scene.regions = surface_.regions();
   scene.holds = holds(replica);
@@ -290,9 +290,10 @@ void Picture::draw(const replica::Replica& replica, replica::SessionSource& sour
   measure(replica, now_ns);
   surface_.update(replica, now_ns);
   observe(replica);
-  if (surface_.is_valid() && framed_topology_ != replica.topology_version()) {
-    if (framed_topology_ == 0 && shows_help_) help_until_ns_ = now_ns + kHelpNs;
+  if (surface_.is_valid() && !is_framed_) {
+    if (shows_help_) help_until_ns_ = now_ns + kHelpNs;
     frame_camera(replica);
+    is_framed_ = true;
   }
   if (help_until_ns_ != 0 && now_ns > help_until_ns_) {
     shows_help_ = false;

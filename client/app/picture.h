@@ -62,7 +62,7 @@ class Picture {
   ui::Hud hud_;
   render::OrbitCamera camera_;
   replica::InterpolatedSurface surface_;
-  std::uint64_t framed_topology_ = 0;
+  bool is_framed_ = false;  // the camera, when there is an organ
   std::uint64_t last_ns_ = 0, count_ = 0;
   std::uint64_t help_until_ns_ = 0;  // shown at first, then until asked for; 0: as the person wants
   bool shows_help_ = false, wants_screenshot_ = false;
@@ -70,7 +70,7 @@ class Picture {
   StartView view_;
   replica::ForceHistory forces_;
   replica::HeldTissue held_;
-  std::uint64_t held_topology_ = 0;
+  std::uint64_t held_history_ = 0;
   Rate rate_;
   render::SceneView scene_;  // of the last picture; its spans need the replica
 };

@@ -41,6 +41,11 @@ struct OrganVertex {
   std::array<std::uint8_t, 4> tint;
 };
 
+struct RestVertex {
+  Vec3f position;
+  float is_wound = 0;
+};
+
 Matrix4 matrix_of(const Pose& pose) {
   const Vec3f x = rotate(pose.orientation, {1, 0, 0}), y = rotate(pose.orientation, {0, 1, 0}),
               z = rotate(pose.orientation, {0, 0, 1}), p = pose.position;
@@ -141,7 +146,9 @@ struct SceneRenderer::Parts {
 
   std::uint64_t topology_version = 0;
   SmoothSurface surface;
-  std::vector<Tint> tints;  // coarse vertices keep their fading state, midpoints follow
+  std::vector<Tint> tints;  // coarse vertices keep their fading state, the others follow
+  std::size_t tinted = 0;   // coarse vertices from here on are new: they do not fade in
+  std::vector<RestVertex> rest_vertices;
   std::vector<OrganVertex> vertices;
   std::array<float, kMaxTools> jaw_openings{};
 
@@ -179,7 +186,7 @@ SceneRenderer::Parts::Parts(const GlContext& context)
                         offset(offsetof(OrganVertex, tint)));
   glGenBuffers(1, &rest_buffer);
   glBindBuffer(GL_ARRAY_BUFFER, rest_buffer);
-  glVertexAttribPointer(3, 3, GL_FLOAT, GL_FALSE, sizeof(Vec3f), offset(0));
+  glVertexAttribPointer(3, 4, GL_FLOAT, GL_FALSE, sizeof(RestVertex), offset(0));
   for (GLuint i = 0; i < 4; ++i) glEnableVertexAttribArray(i);
   glGenBuffers(1, &index_buffer);
   glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, index_buffer);
@@ -215,21 +222,30 @@ SceneRenderer::Parts::~Parts() {
 }
 
 void SceneRenderer::Parts::load_topology(const SceneView& scene) {
+  // At every change of a surface that is being cut: linear, in memory that is there already.
+  const std::size_t known =
+      topology_version == 0 ? scene.rest_positions.size()
+                            : std::min(surface.coarse_vertex_count(), scene.rest_positions.size());
   topology_version = scene.topology_version;
-  surface = SmoothSurface(scene.rest_positions.size(), scene.triangles,
-                          is_software ? kTriangleBudgetSoftware : kTriangleBudget);
+  surface.build(scene.rest_positions.size(), scene.triangles, scene.is_wound,
+                is_software ? kTriangleBudgetSoftware : kTriangleBudget);
   surface.update(scene.rest_positions);
-  tints.assign(surface.vertex_count(), Tint{});
-  vertices.assign(surface.vertex_count(), OrganVertex{});
+  tints.resize(known);
+  tints.resize(surface.vertex_count());
+  tinted = known;
+  vertices.resize(surface.vertex_count());
+  rest_vertices.resize(surface.vertex_count());
+  for (std::size_t i = 0; i < rest_vertices.size(); ++i)
+    rest_vertices[i] = {surface.positions()[i], static_cast<float>(surface.is_wound()[i])};
   const auto bytes = [](std::size_t count, std::size_t each) {
     return static_cast<GLsizeiptr>(count * each);
   };
   glBindBuffer(GL_ARRAY_BUFFER, rest_buffer);
-  glBufferData(GL_ARRAY_BUFFER, bytes(surface.vertex_count(), sizeof(Vec3f)),
-               surface.positions().data(), GL_STATIC_DRAW);
+  glBufferData(GL_ARRAY_BUFFER, bytes(rest_vertices.size(), sizeof(RestVertex)),
+               rest_vertices.data(), GL_DYNAMIC_DRAW);
   glBindVertexArray(organ_array.array);
   glBufferData(GL_ELEMENT_ARRAY_BUFFER, bytes(surface.triangles().size(), sizeof(TriangleCorners)),
-               surface.triangles().data(), GL_STATIC_DRAW);
+               surface.triangles().data(), GL_DYNAMIC_DRAW);
 }
 
 void SceneRenderer::Parts::fade_tints(const SceneView& scene) {
@@ -241,9 +257,10 @@ void SceneRenderer::Parts::fade_tints(const SceneView& scene) {
                (scene.holds[i].is_firm ? kFirmHoldStrength : kTouchStrength);
     else if (scene.shows_regions && i < scene.regions.size() && scene.regions[i] != 0)
       wanted = tint_of(colour_of_region(scene.regions[i])) * kOverlayStrength;
-    tints[i] = tints[i] * (1 - share) + wanted * share;
+    tints[i] = i < tinted ? tints[i] * (1 - share) + wanted * share : wanted;
   }
-  surface.average_midpoints(tints);
+  tinted = surface.coarse_vertex_count();
+  surface.extend_values(tints);
 }
 
 void SceneRenderer::Parts::upload_organ(const SceneView& scene) {

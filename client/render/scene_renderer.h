@@ -46,7 +46,9 @@ struct Hold {
 struct SceneView {
   std::uint64_t topology_version = 0;  // changes when rest positions and triangles do
   std::span<const Vec3f> rest_positions;
-  std::span<const std::array<std::uint32_t, 3>> triangles;
+  std::span<const std::array<std::uint32_t, 3>>
+      triangles;                           // those with equal corners are not drawn
+  std::span<const std::uint8_t> is_wound;  // per triangle: shows the inside; may be empty
   std::span<const Vec3f> positions;        // m, as many as rest_positions; empty: no organ yet
   std::span<const std::uint16_t> regions;  // per vertex; may be empty
   std::vector<Hold> holds;                 // per vertex; empty: not shown

@@ -40,14 +40,16 @@ inline constexpr const char* kOrganVertexSource = R"(#version 330 core
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec3 normal;
 layout(location = 2) in vec4 overlay;
-layout(location = 3) in vec3 rest;
+layout(location = 3) in vec4 rest;  // w: 1 on faces that a blade made
 uniform mat4 clip_from_world;
 out vec3 world_position, world_normal, rest_position;
+out float wound;
 out vec4 tint;
 void main() {
   world_position = position;
   world_normal = normal;
-  rest_position = rest;
+  rest_position = rest.xyz;
+  wound = rest.w;
   tint = overlay;
   gl_Position = clip_from_world * vec4(position, 1.0);
 }
@@ -55,6 +57,7 @@ void main() {
 
 inline constexpr const char* kOrganFragmentSource = R"(
 in vec3 world_position, world_normal, rest_position;
+in float wound;  // 0 outside, 1 where a blade has opened it; no triangle has both
 in vec4 tint;
 out vec4 colour;
 uniform sampler3D noise;       // rgb: slope of the relief, a: its height
@@ -88,14 +91,14 @@ float tool_shadow(vec3 p) {
 
 void main() {
 #ifdef FINE
-  vec4 coarse = texture(noise, rest_position * 11.0);
-  vec4 fine = texture(noise, rest_position * 58.0 + 0.37);
+  vec4 coarse = texture(noise, rest_position * mix(11.0, 33.0, wound));
+  vec4 fine = texture(noise, rest_position * mix(58.0, 131.0, wound) + 0.37);
 #else
-  vec4 coarse = texture(noise, rest_position * 24.0);
-  vec4 fine = mix(vec4(0.5), coarse, 0.3);
+  vec4 coarse = texture(noise, rest_position * mix(24.0, 61.0, wound));
+  vec4 fine = mix(vec4(0.5), coarse, mix(0.3, 0.7, wound));
 #endif
   vec3 n = normalize(world_normal);
-  n = normalize(n + 0.10 * (coarse.rgb - 0.5) + 0.10 * (fine.rgb - 0.5));
+  n = normalize(n + mix(0.10, 0.24, wound) * (coarse.rgb + fine.rgb - 1.0));
   vec3 view = normalize(eye - world_position);
   float facing = max(dot(n, view), 0.0);
 
@@ -103,6 +106,9 @@ void main() {
   float mottle = clamp(0.70 * coarse.a + 0.30 * fine.a, 0.0, 1.0);
   vec3 albedo = mix(vec3(0.068, 0.0115, 0.0090), vec3(0.138, 0.0245, 0.0165), mottle);
   albedo *= 0.93 + 0.14 * fine.a;
+  // Inside no capsule: darker and of a purer red, grained by lobules, under a film of blood.
+  float grain = clamp(0.55 * abs(2.0 * coarse.a - 1.0) + 0.6 * fine.a, 0.0, 1.0);
+  albedo = mix(albedo, mix(vec3(0.026, 0.0012, 0.0013), vec3(0.080, 0.0052, 0.0042), grain), wound);
 
   float shade = tool_shadow(world_position);
   // Light wraps around the edge of the shadow, red farthest: it has been under the surface.
@@ -110,10 +116,11 @@ void main() {
   vec3 key = clamp((vec3(dot(n, key_direction)) + wrap) / (1.0 + wrap), 0.0, 1.0) * shade;
   vec3 fill = clamp((vec3(dot(n, fill_direction)) + wrap) / (1.0 + wrap), 0.0, 1.0);
   vec3 lit = albedo * (key_colour * key * key + fill_colour * fill + hemisphere(n) * (0.6 + 0.4 * shade));
-  lit += vec3(0.050, 0.007, 0.005) * (1.0 - facing) * (1.0 - facing) * shade;  // thin at the rim
+  lit += vec3(0.050, 0.007, 0.005) * (1.0 - wound) * (1.0 - facing) * (1.0 - facing) * shade;  // thin at the rim
 
   float fresnel = 0.035 + 0.965 * power5(1.0 - facing);
-  float wet = 0.75 + 0.5 * coarse.a;
+  // Outside a film with broad highlights, inside many small glints of blood.
+  float wet = mix(0.75 + 0.5 * coarse.a, 0.25 + 1.1 * coarse.a * fine.a, wound);
   vec2 key_film = highlights(n, view, key_direction);
   vec3 film = key_colour * shade * (0.80 * key_film.y + 0.038 * key_film.x) * wet;
   film += fill_colour * (0.26 * highlights(n, view, fill_direction).y + 0.06 * highlights(n, view, fill_direction).x) * wet;

@@ -4,7 +4,15 @@
 // triangles, then each edge halved once or twice with a midpoint that bulges as the normals say
 // (curved PN triangles, Vlachos et al. 2001, evaluated at edge midpoints). The vertices that the
 // server sent stay exactly where they are; only what lies between them is drawn rounder.
-// Thread: render thread.
+//
+// Wound faces are smooth among each other and meet the outside at a sharp rim: a vertex of both is
+// drawn twice, with a normal for either side. Along the rim the outside decides where midpoints
+// lie, the wound takes them over, so that there is no crack.
+//
+//   vertices: [coarse, as given][rim vertices again, for the wound][midpoints, level by level]
+//
+// build() keeps its memory: cost linear in the triangles, no allocation once they have ceased to
+// grow. Thread: render thread.
 
 #include <array>
 #include <cstdint>
@@ -23,33 +31,70 @@ void compute_normals(std::span<const Vec3f> positions, std::span<const TriangleC
 
 class SmoothSurface {
  public:
-  // Halves edges while the result has at most `triangle_budget` triangles, at most twice.
-  SmoothSurface() = default;
-  SmoothSurface(std::size_t vertex_count, std::span<const TriangleCorners> triangles,
-                std::size_t triangle_budget);
+  // Halves edges while the result has at most `triangle_budget` triangles, at most twice. Triangles
+  // with equal corners are left out. `is_wound` per triangle; empty: none.
+  void build(std::size_t vertex_count, std::span<const TriangleCorners> triangles,
+             std::span<const std::uint8_t> is_wound, std::size_t triangle_budget);
 
   const std::vector<TriangleCorners>& triangles() const { return fine_triangles_; }
   std::size_t coarse_vertex_count() const { return coarse_vertex_count_; }
-  std::size_t vertex_count() const { return coarse_vertex_count_ + midpoints_.size(); }
+  std::size_t vertex_count() const {
+    return coarse_vertex_count_ + rim_.size() + midpoints_.size();
+  }
+  // Per vertex: 1 if it is drawn on wound faces.
+  const std::vector<std::uint8_t>& is_wound() const { return vertex_is_wound_; }
 
   // Fills positions() and normals() from the coarse positions.
   void update(std::span<const Vec3f> coarse_positions);
   const std::vector<Vec3f>& positions() const { return positions_; }
   const std::vector<Vec3f>& normals() const { return normals_; }
 
-  // Extends per-vertex values to the midpoints by averaging; `values` has vertex_count() entries of
-  // which the coarse ones are set.
+  // Extends per-vertex values to rim and midpoints, these by averaging; `values` has vertex_count()
+  // entries of which the coarse ones are set.
   template <typename T>
-  void average_midpoints(std::vector<T>& values) const {
-    for (std::size_t i = 0; i < midpoints_.size(); ++i)
-      values[coarse_vertex_count_ + i] =
-          (values[midpoints_[i][0]] + values[midpoints_[i][1]]) * 0.5f;
+  void extend_values(std::vector<T>& values) const {
+    std::size_t next = coarse_vertex_count_;
+    for (const std::uint32_t vertex : rim_) values[next++] = values[vertex];
+    for (const Midpoint& m : midpoints_) values[next++] = (values[m.a] + values[m.b]) * 0.5f;
   }
 
  private:
+  static constexpr std::uint32_t kNone = 0xffffffffu;
+
+  struct Midpoint {
+    std::uint32_t a = 0, b = 0;     // parents
+    std::uint32_t same_as = kNone;  // on the rim: the outside's midpoint
+  };
+  // Edges to midpoints, open addressing.
+  class EdgeTable {
+   public:
+    void clear(std::size_t most_edges);
+    // The value of an edge, in either direction; kNone where it is new, to be set.
+    std::uint32_t& at(std::uint32_t a, std::uint32_t b);
+
+   private:
+    struct Slot {
+      std::uint64_t key = kEmpty;
+      std::uint32_t value = kNone;
+    };
+    static constexpr std::uint64_t kEmpty = ~std::uint64_t{0};
+    std::vector<Slot> slots_;
+    unsigned shift_ = 0;
+  };
+
+  void split_rim(std::span<const TriangleCorners> triangles,
+                 std::span<const std::uint8_t> is_wound);
+  void halve_edges();
+  std::uint32_t midpoint(std::uint32_t a, std::uint32_t b);
+
   std::size_t coarse_vertex_count_ = 0;
-  std::vector<TriangleCorners> coarse_triangles_, fine_triangles_;
-  std::vector<std::array<std::uint32_t, 2>> midpoints_;  // parents; level by level
+  std::vector<TriangleCorners> coarse_triangles_, fine_triangles_, finer_;  // outer ones first
+  std::vector<std::uint32_t> rim_;       // coarse vertices that are drawn again
+  std::vector<std::uint32_t> wound_of_;  // per coarse vertex: as which it is drawn on wound faces
+  std::vector<std::uint32_t> outer_of_;  // per vertex: its place on the outside, kNone: not there
+  std::vector<Midpoint> midpoints_;      // level by level
+  std::vector<std::uint8_t> vertex_is_wound_;
+  EdgeTable edges_;
   std::vector<Vec3f> positions_, normals_;
 };
 

@@ -86,8 +86,11 @@ void ReplaySource::poll(replica::MessageSink& sink) {
 }
 
 bool ReplaySource::send(const proto::Envelope& message) {
-  // The recording's own keyframes are all there is to heal with.
-  if (message.has_keyframe_request()) needs_key_ = true;
+  // The recording's own keyframes are all there is to heal with, and once cut its topologies.
+  if (message.has_keyframe_request()) {
+    needs_key_ = true;
+    if (epoch_ > 0u) epoch_.reset();
+  }
   return true;
 }
 
@@ -222,9 +225,12 @@ Status ReplaySource::deliver_tick(Entries entries, replica::MessageSink& sink) {
     });
     if (!done.ok()) return done;
   }
-  Status done = each(JournalTopic::Topology, [&](const auto& entry) {
-    return deliver_topology(entry.tick, stream_->bytes_of(entry), sink);
-  });
+  Status done = each(JournalTopic::TopologyChange,
+                     [&](const auto& entry) { return deliver_change(entry, sink); });
+  if (done.ok())
+    done = each(JournalTopic::Topology, [&](const auto& entry) {
+      return deliver_topology(entry.tick, stream_->bytes_of(entry), sink);
+    });
   if (done.ok()) done = deliver_surface(entries, sink);
   if (done.ok())
     done = each(JournalTopic::FrameState,
@@ -246,6 +252,19 @@ Status ReplaySource::deliver_topology(Tick tick, BytesView data, replica::Messag
   return {};
 }
 
+// If it leads on from what the sink has. What a gap lacks, the next topology brings.
+Status ReplaySource::deliver_change(const JournalStream::Entry& entry, replica::MessageSink& sink) {
+  proto::SurfaceChange& change = *other_.mutable_surface_change();
+  if (Status parsed = parse(entry.topic, entry.tick, stream_->bytes_of(entry), change);
+      !parsed.ok())
+    return parsed;
+  if (epoch_ != change.from_epoch()) return {};
+  // Before the sink sees it: its answer may be that it does not follow.
+  epoch_ = change.epoch();
+  deliver(other_, entry.tick, sink);
+  return {};
+}
+
 // The delta if its baseline is what the sink has, else the keyframe, else nothing.
 Status ReplaySource::deliver_surface(Entries entries, replica::MessageSink& sink) {
   proto::SurfaceFrame& frame = *surface_.mutable_surface_frame();
@@ -257,6 +276,10 @@ Status ReplaySource::deliver_surface(Entries entries, replica::MessageSink& sink
         return parsed;
       if (frame.tick() != entry.tick || frame.is_keyframe() != is_key)
         return stream_->malformed(topic, entry.tick, "is a frame of another kind or tick");
+      if (is_key && needs_key_ && frame.epoch() != epoch_)
+        if (const auto topology = stream_->last_before(JournalTopic::Topology, entry.tick))
+          if (Status done = deliver_topology(topology->tick, topology->data, sink); !done.ok())
+            return done;
       if (frame.epoch() != epoch_) continue;
       if (is_key ? !needs_key_ && frame.frame() <= frame_
                  : needs_key_ || frame.base_frame() != frame_)

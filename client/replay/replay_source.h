@@ -8,9 +8,10 @@
 // Start and seek deliver: Welcome (once), Participants as of then, SurfaceTopology if the epoch
 // differs, the last keyframe at or before the target, every delta up to it, FrameState of the last
 // 128 ms and in any case of the last frame. Claims that a seek passes over are not repeated. Then
-// each tick's messages follow as they fall due: deltas, and the 1 Hz keyframes only where a delta's
-// baseline is missing (the recorder fell behind, a chunk is damaged) or the sink sent a
-// KeyframeRequest. Until such a keyframe the picture stands still.
+// each tick's messages follow as they fall due: surface changes, deltas, and the 1 Hz keyframes
+// only where a delta's baseline is missing (the recorder fell behind, a chunk is damaged) or the
+// sink sent a KeyframeRequest; then the topology goes before it. Until such a keyframe the picture
+// stands still.
 //
 // The file is outside data. A message that does not parse, or contradicts its own topic or tick,
 // closes the source: CloseKind::Lost, one line that names file, topic and tick. What the numbers
@@ -76,6 +77,7 @@ class ReplaySource final : public replica::SessionSource, public replica::Playba
   Status start_from_key(Tick target, replica::MessageSink& sink);
   Status deliver_tick(Entries entries, replica::MessageSink& sink);
   Status deliver_topology(Tick tick, BytesView data, replica::MessageSink& sink);
+  Status deliver_change(const JournalStream::Entry& entry, replica::MessageSink& sink);
   Status deliver_surface(Entries entries, replica::MessageSink& sink);
   Status deliver_state(const JournalStream::Entry& entry, replica::MessageSink& sink);
   Status deliver_claims(const JournalStream::Entry& entry, replica::MessageSink& sink);
@@ -98,7 +100,7 @@ class ReplaySource final : public replica::SessionSource, public replica::Playba
 
   // What the sink holds.
   bool has_welcomed_ = false;
-  std::optional<std::uint32_t> epoch_;
+  std::optional<std::uint32_t> epoch_;  // none: it needs a topology, too
   Frame frame_ = 0;
   bool needs_key_ = true;
 

@@ -23,7 +23,7 @@ void HeldTissue::clear() {
 
 void HeldTissue::update(std::span<const Vec3f> positions, std::span<const Tool> tools,
                         std::span<const scene::ToolShape> shapes) {
-  if (holdings_.size() != positions.size()) clear();
+  if (holdings_.size() > positions.size()) clear();  // where a blade cuts it only grows
   holdings_.assign(positions.size(), Holding{});
   std::array<bool, kMaxTools> is_grasping{};
   for (std::size_t t = 0; t < tools.size() && t < shapes.size(); ++t) {

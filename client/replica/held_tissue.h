@@ -35,7 +35,7 @@ class HeldTissue {
   // `positions` m, per vertex slot; `shapes` per tool, as in `tools`.
   void update(std::span<const Vec3f> positions, std::span<const Tool> tools,
               std::span<const scene::ToolShape> shapes);
-  // After the surface was replaced.
+  // After the surface was replaced or time went back.
   void clear();
 
   const std::vector<Holding>& holdings() const { return holdings_; }  // per vertex slot

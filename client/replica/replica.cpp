@@ -203,7 +203,8 @@ void Replica::show_changes() {
       topology_.is_wound[number.value] = 0;
     }
     for (const wire::NewTriangle& triangle : change.added) {
-      topology_.triangles.push_back(indices_of(triangle.corners));
+      topology_.triangles.push_back(triangle.is_gap() ? decltype(indices_of(triangle.corners)){}
+                                                      : indices_of(triangle.corners));
       topology_.is_wound.push_back(triangle.is_wound);
     }
     topology_.epoch = change.epoch;

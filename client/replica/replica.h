@@ -59,13 +59,13 @@ struct ReplicaCounters {
   std::uint64_t deltas_ignored = 0;  // while healing
   std::uint64_t crc_mismatches = 0;  // also payloads that do not decode
   std::uint64_t base_mismatches = 0;
-  std::uint64_t surface_changes = 0;     // applied
-  std::uint64_t change_mismatches = 0;   // changes that did not follow, malformed ones included
-  std::uint64_t change_bytes = 0;        // of applied changes
-  std::uint64_t healed = 0;            // returned to InStep after a mismatch of either kind
-  std::uint64_t bytes = 0;             // all messages, on the wire
-  std::uint64_t delta_bytes = 0;       // payloads of applied deltas
-  std::uint64_t changed_vertices = 0;  // by applied deltas
+  std::uint64_t surface_changes = 0;    // applied
+  std::uint64_t change_mismatches = 0;  // changes that did not follow, malformed ones included
+  std::uint64_t change_bytes = 0;       // of applied changes
+  std::uint64_t healed = 0;             // returned to InStep after a mismatch of either kind
+  std::uint64_t bytes = 0;              // all messages, on the wire
+  std::uint64_t delta_bytes = 0;        // payloads of applied deltas
+  std::uint64_t changed_vertices = 0;   // by applied deltas
   double bytes_per_changed_vertex() const {
     return changed_vertices == 0
                ? 0.0
@@ -142,8 +142,8 @@ class Replica final : public MessageSink {
   ParticipantSlot own_slot_;
   wire::SurfaceLayout layout_;  // of the stream; ahead of topology_ until the next frame
   std::string organ_name_;
-  bool is_layout_new_ = false;                  // topology_ is to be replaced by it
-  std::vector<wire::SurfaceChange> to_show_;    // else topology_ lacks these
+  bool is_layout_new_ = false;                // topology_ is to be replaced by it
+  std::vector<wire::SurfaceChange> to_show_;  // else topology_ lacks these
   Topology topology_;
   std::uint64_t topology_version_ = 0;
   std::deque<SessionFrame> history_;

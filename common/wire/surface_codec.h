@@ -13,8 +13,8 @@
 //     temporal+spatial: d - d(prev). 2 absolute+spatial: value - value(prev).
 //   The bit stream is padded with zeros to a whole byte; the payload must be consumed exactly.
 // The encoder takes the mode with the fewest bits per group, the lowest where they tie.
-// For keyframes only mode 2 is allowed and all vertices are listed. Across an epoch both sides extend
-// the baseline by zeros for the new slots: slots are append-only, so all modes stay right.
+// For keyframes only mode 2 is allowed and all vertices are listed. Across an epoch both sides
+// extend the baseline by zeros for the new slots: slots are append-only, so all modes stay right.
 // Values lie within +-kMaxQuanta: quantise() clamps, the encoder asserts, the decoder rejects.
 // Lossless; 0.95-1.25 bytes per changed vertex on smooth tissue at 62.5 Hz.
 

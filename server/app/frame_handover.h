@@ -1,9 +1,9 @@
 #pragma once
 
 // Published frames from the simulation thread to the I/O thread: a bounded queue and a wake-up.
-// 512 frames are 8 s. If the I/O thread is stuck for longer, frames are dropped and counted, but for
-// those that change the surface: without one of them no later frame can be understood. The journal
-// has its own way (journal_sink.h).
+// 512 frames are 8 s. If the I/O thread is stuck for longer, frames are dropped and counted, but
+// for those that change the surface: without one of them no later frame can be understood. The
+// journal has its own way (journal_sink.h).
 
 #include <atomic>
 #include <deque>

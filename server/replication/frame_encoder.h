@@ -27,8 +27,8 @@ class FrameEncoder {
   void set_current(step::SharedFrame frame);
   const step::SharedFrame& current() const { return current_; }
 
-  // Only with a current frame. `baseline`: of this or an earlier epoch; vertices that it lacks count
-  // as zero in it.
+  // Only with a current frame. `baseline`: of this or an earlier epoch; vertices that it lacks
+  // count as zero in it.
   wire::SharedBytes keyframe();
   wire::SharedBytes delta_from(const step::PublishedFrame& baseline);
   wire::SharedBytes state();
@@ -40,7 +40,7 @@ class FrameEncoder {
  private:
   step::SharedFrame current_;
   wire::SharedBytes keyframe_, state_;
-  wire::QuantisedSurface extended_;  // a baseline of an earlier epoch
+  wire::QuantisedSurface extended_;            // a baseline of an earlier epoch
   std::map<Frame, wire::SharedBytes> deltas_;  // by baseline frame
   std::size_t typical_frame_bytes_ = 0;
   EncodeStatistics statistics_;

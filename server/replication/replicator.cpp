@@ -44,8 +44,8 @@ struct Replicator::Client {
 };
 
 Replicator::Replicator(net::Connections& connections, session::SimulationInbox& inbox,
-                       wire::SurfaceLayout layout, std::string organ_name,
-                       std::uint64_t organ_hash, ReplicatorOptions options)
+                       wire::SurfaceLayout layout, std::string organ_name, std::uint64_t organ_hash,
+                       ReplicatorOptions options)
     : connections_(connections),
       inbox_(inbox),
       options_(std::move(options)),
@@ -300,8 +300,8 @@ bool Replicator::give_frame(Client& client, bool is_required) {
     ++counters_.frames_skipped;
     return false;
   }
-  const bool is_keyframe = is_requested || !baseline ||
-                           frame.frame - baseline->frame > options_.keyframe_after_frames;
+  const bool is_keyframe =
+      is_requested || !baseline || frame.frame - baseline->frame > options_.keyframe_after_frames;
   // Who asks may have lost count of the surface's changes, too.
   const bool is_lost = is_requested && frame.epoch > 0;
   if ((is_lost && !send(client, topology())) ||

@@ -87,8 +87,8 @@ class Replicator final : public net::ConnectionHandler {
              ReplicatorOptions options = {});
   ~Replicator() override;
 
-  // Frames since the last call, oldest first, none left out. Claim events and surface changes of all
-  // of them are delivered, the displacements only of the newest.
+  // Frames since the last call, oldest first, none left out. Claim events and surface changes of
+  // all of them are delivered, the displacements only of the newest.
   void publish(std::span<const step::SharedFrame> frames);
 
   // `last` has been or is now published; no further publish(). New Hellos are refused.
@@ -142,8 +142,8 @@ class Replicator final : public net::ConnectionHandler {
   const ReplicatorOptions options_;
   const std::uint64_t organ_hash_;
   const std::string organ_name_;
-  wire::SurfaceLayout layout_;   // of the newest frame
-  wire::SharedBytes topology_;   // its encoding; null: not since the last change
+  wire::SurfaceLayout layout_;  // of the newest frame
+  wire::SharedBytes topology_;  // its encoding; null: not since the last change
   session::Roster roster_;
   std::map<net::ConnectionId, std::unique_ptr<Client>> clients_;
   bool participants_changed_ = false;

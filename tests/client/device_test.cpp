@@ -1,12 +1,14 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
 #include <random>
 
 #include "client/device/mouse_tool.h"
 #include "client/render/camera.h"
 #include "client/render/smooth_surface.h"
 #include "tests/client/synthetic_source.h"
+#include "tests/support/surface_edits.h"
 
 namespace trocar {
 namespace {
@@ -158,7 +160,8 @@ TEST_F(MouseToolTest, NeverLeavesTheSpaceThatTheServerAccepts) {
 
 TEST(SmoothSurface, KeepsTheServersVerticesAndRoundsWhatLiesBetween) {
   const Blob blob;
-  render::SmoothSurface surface(blob.positions.size(), blob.triangles, 16 * blob.triangles.size());
+  render::SmoothSurface surface;
+  surface.build(blob.positions.size(), blob.triangles, {}, 16 * blob.triangles.size());
   surface.update(blob.positions);
   EXPECT_EQ(surface.triangles().size(), 16 * blob.triangles.size());
   // A closed surface of genus 0: V = F / 2 + 2.
@@ -170,12 +173,64 @@ TEST(SmoothSurface, KeepsTheServersVerticesAndRoundsWhatLiesBetween) {
     for (const auto v : triangle) ASSERT_LT(v, surface.vertex_count());
 }
 
+// Drawn finely, a surface with slits is as closed as it came: along the rim both sides have the
+// same points, with normals of their own.
+TEST(SmoothSurface, TheRimOfAWoundIsSharpAndHasNoCrack) {
+  auto layout = testing::make_blob_layout(16, 24, 0.08);
+  testing::Random random(2);
+  for (int i = 0; i < 25; ++i)
+    ASSERT_TRUE(wire::apply(testing::random_change(layout, random), layout).ok());
+  std::vector<Vec3f> positions;
+  for (const auto& q : layout.rest_quanta)
+    positions.push_back(wire::to_metres(q) +
+                        Vec3f{0, 0, static_cast<float>(random.between(-1e-3, 1e-3))});
+  std::vector<render::TriangleCorners> triangles;
+  for (std::size_t i = 0; i < layout.triangles.size(); ++i) {
+    const auto& t = layout.triangles[i];
+    triangles.push_back({});
+    if (layout.has_triangle(TriangleIndex(i)))
+      triangles.back() = {t[0].value, t[1].value, t[2].value};
+  }
+  render::SmoothSurface surface;
+  for (const std::size_t budget : {std::size_t{0}, 4 * triangles.size(), 16 * triangles.size()}) {
+    surface.build(positions.size(), triangles, layout.is_wound, budget);
+    surface.update(positions);
+    ASSERT_EQ(surface.positions().size(), surface.vertex_count());
+    ASSERT_EQ(surface.normals().size(), surface.vertex_count());
+    ASSERT_EQ(surface.is_wound().size(), surface.vertex_count());
+    const auto point = [&](std::uint32_t v) {
+      const Vec3f& p = surface.positions()[v];
+      return std::array{p.x, p.y, p.z};
+    };
+    std::map<std::pair<std::array<float, 3>, std::array<float, 3>>, int> edges;
+    for (const auto& t : surface.triangles()) {
+      ASSERT_EQ(surface.is_wound()[t[0]], surface.is_wound()[t[1]]);
+      ASSERT_EQ(surface.is_wound()[t[0]], surface.is_wound()[t[2]]);
+      for (std::size_t k = 0; k < 3; ++k) {
+        const auto a = point(t[k]), b = point(t[(k + 1) % 3]);
+        ++edges[{a, b}];
+        --edges[{b, a}];
+      }
+    }
+    for (const auto& [ends, sum] : edges) ASSERT_EQ(sum, 0) << "a crack, budget " << budget;
+    std::map<std::array<float, 3>, std::uint32_t> outer;
+    int sharp = 0;
+    for (std::uint32_t v = 0; v < surface.vertex_count(); ++v)
+      if (surface.is_wound()[v] == 0) outer.emplace(point(v), v);
+    for (std::uint32_t v = 0; v < surface.vertex_count(); ++v)
+      if (const auto rim = outer.find(point(v)); surface.is_wound()[v] != 0 && rim != outer.end())
+        sharp += dot(surface.normals()[v], surface.normals()[rim->second]) < 0.8f;
+    EXPECT_GT(sharp, 40);
+  }
+}
+
 TEST(SmoothSurface, MidpointsOfASphereLieNearerToItThanChords) {
   std::vector<Vec3f> octahedron = {{1, 0, 0},  {-1, 0, 0}, {0, 1, 0},
                                    {0, -1, 0}, {0, 0, 1},  {0, 0, -1}};
   const std::vector<render::TriangleCorners> faces = {{0, 2, 4}, {2, 1, 4}, {1, 3, 4}, {3, 0, 4},
                                                       {2, 0, 5}, {1, 2, 5}, {3, 1, 5}, {0, 3, 5}};
-  render::SmoothSurface surface(6, faces, 32);
+  render::SmoothSurface surface;
+  surface.build(6, faces, {}, 32);
   surface.update(octahedron);
   ASSERT_EQ(surface.vertex_count(), 18u);
   for (std::size_t i = 6; i < 18; ++i) {

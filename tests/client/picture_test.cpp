@@ -10,6 +10,7 @@
 #include "common/base/timing.h"
 #include "common/scene/builtin_organs.h"
 #include "tests/client/synthetic_source.h"
+#include "tests/support/surface_edits.h"
 
 // Draws without a display. Set TROCAR_PICTURES to a folder to keep the pictures and look at them.
 
@@ -187,6 +188,90 @@ TEST_F(PictureTest, ABladeIsDrawnWhereTissueLetsItBeWithALineToTheHand) {
   const render::Image straight = picture_of(overlays, blade(false), "blade");
   const render::Image held_back = picture_of(overlays, blade(true), "blade-held-back");
   EXPECT_GT(difference(straight, held_back), 1000);
+}
+
+// A slit across the front of the liver, its lips held apart by up to `open_m`.
+class Slit {
+ public:
+  Slit(testing::SyntheticSource& source, float open_m) : open_m_(open_m) {
+    const auto& layout = source.layout();
+    const auto front = [&](float x, float y) {
+      const auto distance = [&](const wire::QuantisedVertex& q) {
+        const Vec3f p = wire::to_metres(q);
+        return p.z > 0 ? (p.x - x) * (p.x - x) + (p.y - y) * (p.y - y) : 1.0f;
+      };
+      return VertexIndex(static_cast<std::size_t>(
+          std::ranges::min_element(layout.rest_quanta, {}, distance) - layout.rest_quanta.begin()));
+    };
+    path_ = testing::path_between(layout, front(-0.05f, 0.026f), front(0.035f, 0.022f));
+    first_new_ = layout.vertex_count();
+    for (const VertexIndex v : path_)
+      points_.push_back(wire::to_metres(layout.rest_quanta[v.value]));
+    source.queue_change(testing::open_slit(layout, path_, {0, 0, -700}));
+    source.also_move = [this](std::size_t slot, const Vec3f& rest) { return move(slot, rest); };
+  }
+  // The upper lip is the old one.
+  Vec3f move(std::size_t slot, const Vec3f& rest) const {
+    std::size_t near = 0;
+    for (std::size_t i = 1; i < points_.size(); ++i)
+      if (length(points_[i] - rest) < length(points_[near] - rest)) near = i;
+    float side = rest.y > points_[near].y ? 1.0f : -1.0f;
+    if (slot >= first_new_)
+      side = (slot - first_new_) % 2 == 0 ? -1.0f : 0.0f;
+    else if (path_[near].value == slot)
+      side = 1;
+    const float along = static_cast<float>(near) / static_cast<float>(points_.size() - 1);
+    const float away = std::max(0.0f, 1 - length(points_[near] - rest) / 0.035f);
+    return Vec3f{0, 0.9f, 0.3f} * (side * away * away * 4 * along * (1 - along) * open_m_);
+  }
+  const std::vector<Vec3f>& points() const { return points_; }
+
+ private:
+  float open_m_;
+  std::vector<VertexIndex> path_;
+  std::vector<Vec3f> points_;
+  std::size_t first_new_ = 0;
+};
+
+TEST_F(PictureTest, ASlitShowsDarkFlesh) {
+  options_.overlays = {.regions = false, .holds = false, .arrows = false, .rate = false};
+  options_.view = {.yaw_deg = 0, .pitch_deg = 10, .zoom = 2};
+  picture_.reset();
+  picture_ = std::move(*Picture::make(options_, "test"));
+  source_.queue_start();
+  draw(3);
+  const Slit slit(source_, 0.011f);
+  draw(6);
+  picture_->draw(replica_, source_, hands_, now_ += 1'000'000'000);  // the newest frame itself
+  keep("slit");
+  const render::Image image = picture_->image();
+  const Pixel inside = mean(image, 450, 475, 650, 495), outside = mean(image, 450, 400, 650, 440);
+  EXPECT_LT(inside.r, 0.7 * outside.r);
+  EXPECT_LT(inside.g / inside.r, 0.6 * outside.g / outside.r) << "a purer red";
+  int background = 0;  // seen through a crack it would be: dark and bluish
+  for (int y = 380; y < 560; ++y)
+    for (int x = 300; x < 800; ++x) {
+      const Pixel p = mean(image, x, y, x + 1, y + 1);
+      background += p.r < 40 && p.b >= p.r;
+    }
+  EXPECT_EQ(background, 0);
+}
+
+TEST_F(PictureTest, CuttingAtEveryFrameKeepsCameraAndPicture) {
+  options_.overlays = {.regions = true, .holds = true, .arrows = false, .rate = false};
+  source_.queue_start();
+  draw(20);
+  const render::Image before = picture_->image();
+  testing::Random random(1);
+  for (int i = 0; i < 12; ++i) {
+    source_.queue_change(testing::random_change(source_.layout(), random));
+    draw(1);
+  }
+  keep("cuts");
+  EXPECT_EQ(replica_.counters().surface_changes, 12u);
+  // Slits are closed as long as nobody pulls them open: the picture changes along some lines only.
+  const int pixels = before.size.width * before.size.height;
+  EXPECT_LT(difference(before, picture_->image()), pixels / 20);
 }
 
 TEST_F(PictureTest, CpuTimeOfAPictureIsReported) {

@@ -46,9 +46,8 @@ class SurfaceChangeTest : public ::testing::Test {
     ASSERT_EQ(shown.triangles.size(), layout.triangles.size());
     for (std::size_t i = 0; i < layout.triangles.size(); ++i)
       for (std::size_t k = 0; k < 3; ++k)
-        ASSERT_EQ(shown.triangles[i][k], layout.has_triangle(TriangleIndex(i))
-                                             ? layout.triangles[i][k].value
-                                             : 0u);
+        ASSERT_EQ(shown.triangles[i][k],
+                  layout.has_triangle(TriangleIndex(i)) ? layout.triangles[i][k].value : 0u);
     for (const SessionFrame& frame : replica_.history())
       ASSERT_EQ(frame.surface.size(), layout.vertex_count());
   }

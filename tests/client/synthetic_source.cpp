@@ -140,6 +140,7 @@ void SyntheticSource::deform() {
   for (std::size_t i = 0; i < rest_.size(); ++i) {
     const float up = bump(rest_[i], lift_at, 0.055f), down = bump(rest_[i], press_at, 0.045f);
     displacement[i] = Vec3f{0.2f, 0.9f, 0.6f} * (lift * up) + Vec3f{0, -1, -0.2f} * (press * down);
+    if (also_move) displacement[i] += also_move(i, rest_[i]);
     regions_[i] = up > 0.01f ? 1 : down > 0.01f ? 2 : 0;
   }
   wire::quantise(displacement, surface_);
@@ -259,8 +260,7 @@ void SyntheticSource::poll(replica::MessageSink& sink) {
 }
 
 bool SyntheticSource::send(const proto::Envelope& message) {
-  if (message.has_keyframe_request() && answer_requests)
-    wants_keyframe_ = wants_topology_ = true;
+  if (message.has_keyframe_request() && answer_requests) wants_keyframe_ = wants_topology_ = true;
   if (message.has_tool_sample()) {
     const auto& sample = message.tool_sample();
     mouse_pose_ = {{sample.position_m().x(), sample.position_m().y(), sample.position_m().z()},

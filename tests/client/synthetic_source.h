@@ -38,8 +38,10 @@ class SyntheticSource final : public replica::SessionSource {
   const wire::QuantisedSurface& surface() const { return surface_; }
   // Changes a message just before delivery; false drops it.
   std::function<bool(proto::Envelope&)> tamper;
+  // Displacement of a vertex on top of that by the two tools, m.
+  std::function<Vec3f(std::size_t slot, const Vec3f& rest)> also_move;
   std::vector<proto::Envelope> sent;  // by the client, in order
-  bool answer_requests = true;        // KeyframeRequest gets topology and keyframe with the next frame
+  bool answer_requests = true;  // KeyframeRequest gets topology and keyframe with the next frame
 
   void poll(replica::MessageSink& sink) override;
   bool send(const proto::Envelope& message) override;
@@ -60,7 +62,8 @@ class SyntheticSource final : public replica::SessionSource {
   wire::QuantisedSurface surface_;
   std::vector<std::uint16_t> regions_;
   Frame frame_ = 0;
-  bool wants_keyframe_ = false, wants_topology_ = false, is_real_time_ = false, has_started_ = false;
+  bool wants_keyframe_ = false, wants_topology_ = false, is_real_time_ = false,
+       has_started_ = false;
   std::uint64_t start_ns_ = 0;
   std::vector<proto::Envelope> queued_;
   replica::SourceState state_ = replica::SourceState::Live;

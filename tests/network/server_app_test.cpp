@@ -9,6 +9,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "server/app/frame_handover.h"
 #include "server/app/options.h"
 #include "server/app/pacer.h"
 #include "server/app/simulation_loop.h"
@@ -57,6 +58,32 @@ TEST(Pacer, random_stalls_keep_the_books) {
       now += random() % 5 == 0 ? random() % (20 * kTickNanoseconds) : random() % 900'000;
     }
   }
+}
+
+TEST(FrameHandover, keeps_frames_that_change_the_surface_when_it_is_full) {
+  app::FrameHandover handover([] {});
+  std::vector<step::SharedFrame> taken;
+  std::vector<Frame> changed;
+  Frame number = 0;
+  const auto push = [&](bool is_cut) {
+    auto frame = std::make_shared<step::PublishedFrame>();
+    frame->frame = ++number;
+    if (is_cut) frame->change = std::make_shared<wire::SurfaceChange>();
+    handover.push(frame);
+  };
+  for (std::size_t i = 0; i < app::FrameHandover::kCapacity + 100; ++i) push(i % 7 == 0);
+  std::vector<Frame> order, cuts;
+  for (int round = 0; round < 3; ++round) {
+    handover.take_all(taken);
+    for (const auto& frame : taken) {
+      order.push_back(frame->frame);
+      if (frame->change) cuts.push_back(frame->frame);
+    }
+    push(false);
+  }
+  EXPECT_TRUE(std::ranges::is_sorted(order));
+  EXPECT_EQ(cuts.size(), (app::FrameHandover::kCapacity + 100 + 6) / 7);
+  EXPECT_GT(handover.dropped(), 50u);
 }
 
 TEST(DurationHistogram, quantiles_within_two_per_cent) {

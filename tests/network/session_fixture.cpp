@@ -1,5 +1,8 @@
 #include "tests/network/session_fixture.h"
 
+#include "common/wire/surface_messages.h"
+#include "tests/support/surface_edits.h"
+
 #include <arpa/inet.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
@@ -101,10 +104,29 @@ bool RawClient::join(const std::string& name, proto::Role role) {
   return send(make_hello(name, role)) && receive(proto::Envelope::kWelcome).has_value();
 }
 
+void RawClient::take_layout_message(const proto::Envelope& message) {
+  if (message.has_surface_topology()) {
+    auto read = wire::read(message.surface_topology());
+    EXPECT_TRUE(read.ok());
+    layout = std::move(*read);
+    ++topologies;
+  } else if (message.has_surface_change() && layout) {
+    const auto change = wire::read(message.surface_change(), *layout);
+    EXPECT_TRUE(change.ok() && wire::apply(*change, *layout).ok());
+    ++changes;
+  }
+}
+
 bool RawClient::follow(Expect expect) {
-  const auto message = receive(proto::Envelope::kSurfaceFrame);
+  auto message = receive();
+  for (; message && !message->has_surface_frame(); message = receive())
+    take_layout_message(*message);
   if (!message) return false;
   const auto& update = message->surface_frame();
+  if (layout) {
+    EXPECT_EQ(update.epoch(), layout->epoch);
+    surface.resize(layout->vertex_count());
+  }
   const BytesView payload{reinterpret_cast<const std::uint8_t*>(update.payload().data()),
                           update.payload().size()};
   last_was_keyframe = update.is_keyframe();
@@ -164,14 +186,20 @@ LiveSession::~LiveSession() {
   thread_.join();
 }
 
-step::SharedFrame LiveSession::make_frame(std::size_t changes) {
+step::SharedFrame LiveSession::make_frame(std::size_t changes, bool is_cut) {
+  auto frame = std::make_shared<step::PublishedFrame>();
+  if (is_cut) {
+    frame->change = std::make_shared<wire::SurfaceChange>(random_change(layout_, cuts_));
+    EXPECT_TRUE(wire::apply(*frame->change, layout_).ok());
+    surface_.resize(layout_.vertex_count(), {100, -50, 25});
+  }
   for (std::size_t i = 0; i < changes; ++i) {
     auto& vertex = surface_[random_() % surface_.size()];
     const auto step = [this] { return static_cast<std::int32_t>(random_() % 401) - 200; };
     vertex += {step(), step(), step()};
   }
-  auto frame = std::make_shared<step::PublishedFrame>();
   frame->frame = ++frame_;
+  frame->epoch = layout_.epoch;
   frame->tick = frame_ * kTicksPerFrame;
   frame->surface = surface_;
   frame->surface_crc = wire::surface_crc(surface_);
@@ -185,6 +213,10 @@ step::SharedFrame LiveSession::publish(std::size_t changes, std::vector<locks::C
   const step::SharedFrame shared = std::move(frame);
   on_io([&] { replicator_->publish({&shared, 1}); });
   return shared;
+}
+
+void LiveSession::publish_all(const std::vector<step::SharedFrame>& frames) {
+  on_io([&] { replicator_->publish(frames); });
 }
 
 std::size_t LiveSession::sessions() {

@@ -23,6 +23,7 @@
 #include "server/net/tcp_server.h"
 #include "server/replication/replicator.h"
 #include "server/session/inbox.h"
+#include "tests/support/random.h"
 
 namespace trocar::testing {
 
@@ -53,16 +54,19 @@ class RawClient {
 
   // What this client shows, kept up to date by follow().
   wire::QuantisedSurface surface;
+  std::optional<wire::SurfaceLayout> layout;  // from the first topology that follow() met
+  int topologies = 0, changes = 0;
   std::uint32_t frame = 0;
   std::uint32_t last_base = 0;  // of the last delta
   bool last_was_keyframe = false;
   int frames_followed = 0;
   enum class Expect { RightCrc, WrongCrc };
-  // Reads up to the next SurfaceFrame and applies it; fails the test on a wrong baseline, or a CRC
-  // that is not as expected.
+  // Reads up to the next SurfaceFrame and applies it, with the topology and changes before it;
+  // fails the test on a wrong baseline or epoch, or a CRC that is not as expected.
   bool follow(Expect expect = Expect::RightCrc);
 
  private:
+  void take_layout_message(const proto::Envelope& message);
   bool receive_exactly(std::uint8_t* to, std::size_t count);
 
   int socket_ = -1;
@@ -78,7 +82,7 @@ class LiveSession {
   ~LiveSession();
 
   std::uint16_t port() const { return port_; }
-  const wire::SurfaceLayout& layout() const { return layout_; }
+  const wire::SurfaceLayout& layout() const { return layout_; }  // of the last frame made
 
   // Runs `call` on the I/O thread and waits for it.
   template <typename Call>
@@ -92,8 +96,9 @@ class LiveSession {
 
   // Publishes the next frame: the last surface with `changes` vertices moved.
   step::SharedFrame publish(std::size_t changes, std::vector<locks::ClaimEvent> events = {});
-  // Makes the next frame without publishing it.
-  step::SharedFrame make_frame(std::size_t changes);
+  // Makes the next frame without publishing it; `is_cut`: with a change of the surface.
+  step::SharedFrame make_frame(std::size_t changes, bool is_cut = false);
+  void publish_all(const std::vector<step::SharedFrame>& frames);
   std::size_t sessions();
   // Waits until there are this many connections (joined or not); false after 10 s.
   bool wait_for_sessions(std::size_t count);
@@ -111,6 +116,7 @@ class LiveSession {
   std::unique_ptr<replication::Replicator> replicator_;
   std::uint16_t port_ = 0;
   std::mt19937 random_{7};
+  Random cuts_{7};
   wire::QuantisedSurface surface_;
   Frame frame_ = 0;
   std::thread thread_;

@@ -7,7 +7,9 @@
 
 #include "common/base/assert.h"
 #include "common/wire/surface_codec.h"
+#include "common/wire/surface_messages.h"
 #include "tests/client/synthetic_source.h"
+#include "tests/support/surface_edits.h"
 
 namespace trocar::replay::testing {
 namespace {
@@ -72,6 +74,14 @@ class Recorder {
   std::unique_ptr<journal::SessionJournalWriter> writer_;
 };
 
+Truth::Triangles triangles_of(const wire::SurfaceLayout& layout) {
+  Truth::Triangles triangles(layout.triangles.size());
+  for (std::size_t i = 0; i < triangles.size(); ++i)
+    for (std::size_t k = 0; k < 3 && layout.has_triangle(TriangleIndex(i)); ++k)
+      triangles[i][k] = layout.triangles[i][k].value;
+  return triangles;
+}
+
 }  // namespace
 
 TemporaryFolder::TemporaryFolder() {
@@ -101,9 +111,11 @@ Truth record_session(const std::string& path, const RecordingOptions& options) {
   recorder.write(JournalTopic::Topology, 0, topology);
   recorder.write_participants(0, 1);
 
+  trocar::testing::Random random(9);
   Truth truth;
   truth.crc.push_back(0);
   truth.epoch.push_back(1);
+  truth.triangles.emplace_back();
   for (Frame frame = 1; frame <= options.frames; ++frame) {
     const bool is_cut = frame == options.cut_at;
     if (is_cut) {
@@ -112,9 +124,16 @@ Truth record_session(const std::string& path, const RecordingOptions& options) {
     }
     if (frame == options.join_at) recorder.write_participants(frame, 2);
     Collector now;
+    if (options.cut_every > 0 && frame % options.cut_every == 0)
+      session.queue_change(trocar::testing::random_change(session.layout(), random));
     session.queue_frame();
     session.poll(now);
     for (auto& message : now.messages) {
+      if (message.has_surface_change()) {
+        topology.Clear();
+        wire::write(session.layout(), "blob", topology);
+        recorder.write(JournalTopic::TopologyChange, frame, message.surface_change());
+      }
       if (message.has_frame_state())
         recorder.write(JournalTopic::FrameState, frame, message.frame_state());
       if (!message.has_surface_frame()) continue;
@@ -127,6 +146,8 @@ Truth record_session(const std::string& path, const RecordingOptions& options) {
       if (!has_key) continue;
       Bytes payload;
       wire::encode_keyframe(session.surface(), payload);
+      if (options.cut_every > 0 && topology.epoch() > 1)
+        recorder.write(JournalTopic::Topology, frame, topology);
       surface.set_is_keyframe(true);
       surface.clear_base_frame();
       surface.set_payload(payload.data(), payload.size());
@@ -135,6 +156,7 @@ Truth record_session(const std::string& path, const RecordingOptions& options) {
     if (frame == options.claim_at) recorder.write_claim(frame);
     truth.crc.push_back(wire::surface_crc(session.surface()));
     truth.epoch.push_back(topology.epoch());
+    truth.triangles.push_back(triangles_of(session.layout()));
   }
   truth.last_frame = options.frames;
   recorder.finish();
@@ -170,6 +192,7 @@ void Player::expect_honest(const Truth& truth) const {
   ASSERT_LT(frame, truth.crc.size());
   ASSERT_EQ(wire::surface_crc(replica.newest()->surface), truth.crc[frame]) << "frame " << frame;
   ASSERT_EQ(replica.topology().epoch, truth.epoch[frame]) << "frame " << frame;
+  ASSERT_EQ(replica.topology().triangles, truth.triangles[frame]) << "frame " << frame;
 }
 
 }  // namespace trocar::replay::testing

@@ -37,9 +37,10 @@ void save_file(const std::string& path, BytesView bytes);
 
 struct RecordingOptions {
   Frame frames = 400;
-  Frame cut_at = 0;    // from this frame on there is another epoch
-  Frame claim_at = 0;  // a refusal in this frame
-  Frame join_at = 0;   // from one participant to two
+  Frame cut_at = 0;     // from this frame on there is another epoch: keyframe with topology
+  Frame cut_every = 0;  // every so many frames a blade changes the surface, as a server records it
+  Frame claim_at = 0;   // a refusal in this frame
+  Frame join_at = 0;    // from one participant to two
   bool is_finished = true;
   journal::McapWriterOptions container;
   std::uint32_t protocol_major = kProtocolMajor;
@@ -48,8 +49,10 @@ struct RecordingOptions {
 };
 
 struct Truth {
+  using Triangles = std::vector<std::array<std::uint32_t, 3>>;  // removed ones 0, 0, 0
   std::vector<std::uint32_t> crc;    // by frame; frame 0 was not published
   std::vector<std::uint32_t> epoch;  // by frame
+  std::vector<Triangles> triangles;  // by frame
   Frame first_frame = 1, last_frame = 0;
 };
 

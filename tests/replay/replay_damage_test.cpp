@@ -172,7 +172,8 @@ TEST_F(ReplayDamageTest, ChangedMessagesNeverCrashNorShowAWrongSurface) {
   for (std::uint32_t seed = 1; seed <= 60; ++seed) {
     const std::string file = folder_.file("fuzz" + std::to_string(seed) + ".mcap");
     std::mt19937 random(seed);
-    RecordingOptions options{.frames = 130, .cut_at = 80, .claim_at = 30, .join_at = 40};
+    RecordingOptions options{.frames = 130, .claim_at = 30, .join_at = 40};
+    (seed % 2 ? options.cut_at : options.cut_every) = seed % 2 ? 80 : 9;
     options.tamper = [&random](JournalTopic, Frame, Bytes& bytes) {
       if (random() % 60 == 0 && !bytes.empty())
         for (int k = 0; k < 3; ++k)

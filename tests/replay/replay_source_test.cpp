@@ -84,6 +84,68 @@ TEST_F(ReplaySourceTest, SeeksToAnyTickForwardAndBack) {
   EXPECT_EQ(counters.crc_mismatches + counters.base_mismatches + counters.deltas_ignored, 0u);
 }
 
+TEST_F(ReplaySourceTest, PlaysASurfaceThatIsCutAllTheTime) {
+  const Truth truth = record({.frames = 300, .cut_every = 1});
+  Player player(path_);
+  for (Frame frame = 1; frame <= 300; ++frame) {
+    player.step(frame == 1 ? 0 : 16);
+    ASSERT_NO_FATAL_FAILURE(player.expect_truth(truth)) << frame;
+  }
+  const auto& counters = player.replica.counters();
+  EXPECT_EQ(counters.keyframes, 1u);
+  EXPECT_EQ(counters.surface_changes, 299u) << "the first comes with the topology";
+  EXPECT_EQ(counters.change_mismatches + counters.base_mismatches + counters.deltas_ignored, 0u);
+}
+
+TEST_F(ReplaySourceTest, SeeksToTheRightTopologyForwardAndBack) {
+  const Truth truth = record({.frames = 500, .cut_every = 7});
+  Player player(path_);
+  player.step(0);
+  player.source->pause();
+  std::mt19937 random(2);
+  for (int i = 0; i < 200; ++i) {
+    const Tick target = 16 + random() % (499 * 16 + 1);
+    player.source->seek(target);
+    player.step(3);
+    ASSERT_EQ(player.source->position(), target);
+    ASSERT_NO_FATAL_FAILURE(player.expect_truth(truth)) << "seek " << i << " to " << target;
+    if (i % 4 != 0) continue;
+    player.source->play();
+    for (int k = 0; k < 12; ++k) {
+      player.step(16);
+      ASSERT_NO_FATAL_FAILURE(player.expect_truth(truth)) << "after " << target;
+    }
+    player.source->pause();
+  }
+  const auto& counters = player.replica.counters();
+  EXPECT_EQ(counters.change_mismatches + counters.base_mismatches + counters.deltas_ignored, 0u);
+}
+
+// A change that is lost or does not add up costs the picture until the next keyframe, no more.
+TEST_F(ReplaySourceTest, ALostOrDamagedChangeHealsAtTheNextKeyframe) {
+  for (const bool is_lost : {true, false}) {
+    const std::string path = folder_.file(is_lost ? "lost.mcap" : "damaged.mcap");
+    const Truth truth = record_session(
+        path, {.frames = 200, .cut_every = 10, .tamper = [&](auto topic, Frame frame, Bytes& b) {
+                 if (topic != journal::JournalTopic::TopologyChange || frame != 80) return true;
+                 b.back() ^= 0x40;  // of the sum
+                 return !is_lost;
+               }});
+    Player player(path);
+    for (Frame frame = 1; frame <= 200; ++frame) {
+      player.step(frame == 1 ? 0 : 16);
+      ASSERT_NO_FATAL_FAILURE(player.expect_honest(truth)) << frame;
+      const Frame expected = frame < 80 || frame >= 125 ? frame : 79;
+      ASSERT_EQ(player.replica.newest()->frame, expected) << is_lost;
+    }
+    ASSERT_NO_FATAL_FAILURE(player.expect_truth(truth));
+    // Seeking past it finds nothing wrong.
+    player.source->seek(130 * 16);
+    player.step(0);
+    ASSERT_NO_FATAL_FAILURE(player.expect_truth(truth));
+  }
+}
+
 TEST_F(ReplaySourceTest, SeekDeliversOneKeyframeAndNoClaims) {
   const Truth truth = record({.frames = 300, .claim_at = 250});
   Player player(path_);

@@ -147,7 +147,8 @@ inline std::vector<VertexIndex> path_between(const wire::SurfaceLayout& layout, 
 // A split edge or a slit somewhere on the surface.
 inline wire::SurfaceChange random_change(const wire::SurfaceLayout& layout, Random& random) {
   const DirectedEdges edges = directed_edges(layout);
-  const auto edge = std::next(edges.begin(), random.below(static_cast<std::uint32_t>(edges.size())));
+  const auto edge =
+      std::next(edges.begin(), random.below(static_cast<std::uint32_t>(edges.size())));
   const auto [a, b] = edge->first;
   if (random.below(2) == 0)
     return split_edge(layout, a, b, static_cast<std::uint16_t>(random.below(65536)));

@@ -34,8 +34,8 @@ VertexIndex nearest(const SurfaceLayout& layout, const QuantisedVertex& at) {
 }
 // A slit along the top of the box.
 SurfaceChange slit(const SurfaceLayout& layout) {
-  const auto path = path_between(layout, nearest(layout, {-800, 625, 0}),
-                                 nearest(layout, {800, 625, 0}));
+  const auto path =
+      path_between(layout, nearest(layout, {-800, 625, 0}), nearest(layout, {800, 625, 0}));
   return open_slit(layout, path, {0, -300, 0});
 }
 // What a client has of it.
@@ -85,8 +85,8 @@ TEST(surface_change, the_hash_is_as_stated) {
   EXPECT_EQ(triangle_hash(TriangleIndex(7), corners, true), ~outer);
   EXPECT_NE(outer, triangle_hash(TriangleIndex(8), corners, false));
   EXPECT_NE(outer, triangle_hash(TriangleIndex(7), {corners[1], corners[2], corners[0]}, false));
-  EXPECT_EQ(triangle_hash(TriangleIndex(0), {VertexIndex(0), VertexIndex(0), VertexIndex(0)}, false),
-            0u);
+  EXPECT_EQ(
+      triangle_hash(TriangleIndex(0), {VertexIndex(0), VertexIndex(0), VertexIndex(0)}, false), 0u);
 }
 
 TEST(surface_change, between_rounds_to_the_nearest_on_either_side_of_zero) {
@@ -229,8 +229,7 @@ TEST(surface_topology, what_is_wrong_is_named) {
     spoil(message);
     const auto read_back = read(message);
     ASSERT_FALSE(read_back.ok()) << text;
-    EXPECT_NE(read_back.error().message.find(text), std::string::npos)
-        << read_back.error().message;
+    EXPECT_NE(read_back.error().message.find(text), std::string::npos) << read_back.error().message;
   };
   expect("rest_position_quanta: 0", [](auto& m) { m.clear_rest_position_quanta(); });
   expect("2 m", [](auto& m) { m.set_rest_position_quanta(4, -62'501); });
