@@ -43,7 +43,7 @@ struct OrganVertex {
 
 struct RestVertex {
   Vec3f position;
-  float is_wound = 0;
+  float is_wound = 0;  // -1: on its rim, outside
 };
 
 Matrix4 matrix_of(const Pose& pose) {
@@ -236,7 +236,8 @@ void SceneRenderer::Parts::load_topology(const SceneView& scene) {
   vertices.resize(surface.vertex_count());
   rest_vertices.resize(surface.vertex_count());
   for (std::size_t i = 0; i < rest_vertices.size(); ++i)
-    rest_vertices[i] = {surface.positions()[i], static_cast<float>(surface.is_wound()[i])};
+    rest_vertices[i] = {surface.positions()[i], static_cast<float>(surface.is_wound()[i]) -
+                                                    static_cast<float>(surface.is_rim()[i])};
   const auto bytes = [](std::size_t count, std::size_t each) {
     return static_cast<GLsizeiptr>(count * each);
   };

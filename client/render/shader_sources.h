@@ -40,16 +40,17 @@ inline constexpr const char* kOrganVertexSource = R"(#version 330 core
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec3 normal;
 layout(location = 2) in vec4 overlay;
-layout(location = 3) in vec4 rest;  // w: 1 on faces that a blade made
+layout(location = 3) in vec4 rest;  // w: 1 on faces that a blade made, -1 on their rim outside
 uniform mat4 clip_from_world;
 out vec3 world_position, world_normal, rest_position;
-out float wound;
+out float wound, seam;
 out vec4 tint;
 void main() {
   world_position = position;
   world_normal = normal;
   rest_position = rest.xyz;
-  wound = rest.w;
+  wound = max(rest.w, 0.0);
+  seam = max(-rest.w, 0.0);
   tint = overlay;
   gl_Position = clip_from_world * vec4(position, 1.0);
 }
@@ -58,6 +59,7 @@ void main() {
 inline constexpr const char* kOrganFragmentSource = R"(
 in vec3 world_position, world_normal, rest_position;
 in float wound;  // 0 outside, 1 where a blade has opened it; no triangle has both
+in float seam;   // 1 outside on the rim of a wound, where blood seeps out
 in vec4 tint;
 out vec4 colour;
 uniform sampler3D noise;       // rgb: slope of the relief, a: its height
@@ -108,6 +110,7 @@ void main() {
   albedo *= 0.93 + 0.14 * fine.a;
   // Inside no capsule: darker and of a purer red, grained by lobules, under a film of blood.
   float grain = clamp(0.55 * abs(2.0 * coarse.a - 1.0) + 0.6 * fine.a, 0.0, 1.0);
+  albedo = mix(albedo, vec3(0.012, 0.0006, 0.0006), seam * seam * (0.65 + 0.35 * coarse.a));
   albedo = mix(albedo, mix(vec3(0.026, 0.0012, 0.0013), vec3(0.080, 0.0052, 0.0042), grain), wound);
 
   float shade = tool_shadow(world_position);

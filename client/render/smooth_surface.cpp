@@ -105,6 +105,10 @@ void SmoothSurface::build(std::size_t vertex_count, std::span<const TriangleCorn
   fine_triangles_ = coarse_triangles_;
   for (int level = 0; level < 2 && fine_triangles_.size() * 4 <= triangle_budget; ++level)
     halve_edges();
+  is_rim_.assign(this->vertex_count(), 0);
+  for (const std::uint32_t v : rim_) is_rim_[v] = 1;
+  for (const Midpoint& m : midpoints_)
+    if (m.same_as != kNone) is_rim_[m.same_as] = 1;
 }
 
 void SmoothSurface::update(std::span<const Vec3f> coarse_positions) {

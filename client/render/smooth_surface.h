@@ -43,6 +43,8 @@ class SmoothSurface {
   }
   // Per vertex: 1 if it is drawn on wound faces.
   const std::vector<std::uint8_t>& is_wound() const { return vertex_is_wound_; }
+  // Per vertex: 1 if it is drawn on the outside and lies on a wound's rim.
+  const std::vector<std::uint8_t>& is_rim() const { return is_rim_; }
 
   // Fills positions() and normals() from the coarse positions.
   void update(std::span<const Vec3f> coarse_positions);
@@ -93,7 +95,7 @@ class SmoothSurface {
   std::vector<std::uint32_t> wound_of_;  // per coarse vertex: as which it is drawn on wound faces
   std::vector<std::uint32_t> outer_of_;  // per vertex: its place on the outside, kNone: not there
   std::vector<Midpoint> midpoints_;      // level by level
-  std::vector<std::uint8_t> vertex_is_wound_;
+  std::vector<std::uint8_t> vertex_is_wound_, is_rim_;
   EdgeTable edges_;
   std::vector<Vec3f> positions_, normals_;
 };

@@ -11,8 +11,11 @@
 namespace trocar::step {
 namespace {
 
-// Share of the newest tick in what a blade feels: about 30 ms.
-constexpr double kNewest = 1.0 / 30;
+// Of a blade: the way over which the wound's area is counted, and how much of its direction is that
+// of the newest tick.
+constexpr float kWay_m = 0.005f, kNewest = 0.05f;
+// A blade this slow or slower feels in proportion less: one that stands feels nothing.
+constexpr float kSlow_m_s = 0.002f;
 constexpr float kMostForce_n = 30;
 
 cutting::NewNode made_by(const cutting::Split& split) {
@@ -77,9 +80,9 @@ bool TissueCuts::cut(const input::ToolTable& tools, const locks::ClaimTable& cla
   return true;
 }
 
-// The work of opening a wound is its area times kCutEnergy: over the way that the blade went, a
-// force against it. Wounds open in steps, so both are smoothed. Of several blades each feels its
-// share by how far it went.
+// The work of opening a wound is its area times kCutEnergy: per way that the blade goes, a force
+// against it. Wounds open in steps of a part of an element, so the area per way is that of the last
+// few millimetres. Of several blades each gets its share by how far it went.
 void TissueCuts::feel(const input::ToolTable& tools, double opened_area_m2) {
   float total = 0;
   for (std::uint8_t i = 0; i < kMaxTools; ++i)
@@ -92,13 +95,15 @@ void TissueCuts::feel(const input::ToolTable& tools, double opened_area_m2) {
     }
     const Vec3f moved = tools[ToolSlot{i}].pose.position - blade.tip;
     blade.tip = tools[ToolSlot{i}].pose.position;
-    const double share = total > 0 ? static_cast<double>(length(moved) / total) : 0;
-    blade.motion_m += (moved - blade.motion_m) * static_cast<float>(kNewest);
-    blade.area_m2 += (opened_area_m2 * share - blade.area_m2) * kNewest;
-    const float way = length(blade.motion_m);
-    const float force =
-        way > 1e-7f ? static_cast<float>(blade.area_m2) * kCutEnergy_j_m2 / way : 0.0f;
-    blade.force_n = blade.motion_m * (-std::min(force, kMostForce_n) / std::max(way, 1e-7f));
+    const float way = length(moved), share = total > 0 ? way / total : 0;
+    blade.area_per_m +=
+        (static_cast<float>(opened_area_m2) * share - blade.area_per_m * way) / kWay_m;
+    blade.area_per_m = std::max(0.0f, blade.area_per_m);
+    blade.velocity += (moved / kTickSeconds - blade.velocity) * kNewest;
+    const float speed = length(blade.velocity);
+    const float force = std::min(kCutEnergy_j_m2 * blade.area_per_m, kMostForce_n) *
+                        std::min(1.0f, speed / kSlow_m_s);
+    blade.force_n = speed > 0 ? blade.velocity * (-force / speed) : Vec3f{};
   }
 }
 
@@ -217,11 +222,11 @@ void TissueCuts::visit_state(world::StateArchive& archive, world::World& world) 
     archive.flag(blade.is_cutting);
     if (!blade.is_cutting) continue;
     archive.value(blade.tip);
-    archive.value(blade.motion_m);
-    archive.value(blade.area_m2);
+    archive.value(blade.velocity);
+    archive.value(blade.area_per_m);
     archive.value(blade.force_n);
-    if (archive.is_reading() && !(is_finite(blade.tip) && is_finite(blade.motion_m) &&
-                                  is_finite(blade.force_n) && std::isfinite(blade.area_m2)))
+    if (archive.is_reading() && !(is_finite(blade.tip) && is_finite(blade.velocity) &&
+                                  is_finite(blade.force_n) && std::isfinite(blade.area_per_m)))
       archive.fail();
   }
 }

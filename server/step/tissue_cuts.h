@@ -58,9 +58,9 @@ class TissueCuts {
 
  private:
   struct Blade {
-    Vec3f tip;           // m, in the tick before
-    Vec3f motion_m;      // of the last moment, smoothed
-    double area_m2 = 0;  // wound of that moment
+    Vec3f tip;             // m, in the tick before
+    Vec3f velocity;        // m/s, smoothed
+    float area_per_m = 0;  // of wound per way
     Vec3f force_n;
     bool is_cutting = false;
   };
