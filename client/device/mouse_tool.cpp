@@ -10,6 +10,7 @@ constexpr float kWheelMetres = 0.003f;  // per notch
 constexpr float kKeyMetresPerSecond = 0.05f;
 constexpr float kFineFactor = 0.25f;     // with Shift
 constexpr float kSettleSeconds = 0.06f;  // hovering follows the relief this softly
+constexpr float kCutDepth = 0.012f;      // below the surface, where a cut begins
 constexpr float kMinDepth = 0.02f, kMaxDepth = 1.8f;
 
 }  // namespace
@@ -18,7 +19,9 @@ void MouseTool::update(const PointerInput& input, const ViewRays& view,
                        std::span<const Vec3f> positions, Triangles triangles, float seconds) {
   const bool is_camera = input.right || input.middle;
   scene::Verb verb = scene::Verb::None;
-  if (input.grasp)
+  if (input.cut)
+    verb = scene::Verb::Cut;
+  else if (input.grasp)
     verb = scene::Verb::Grasp;
   else if (input.push || (input.left && (input.is_over_scene || sample_.verb == scene::Verb::Push)))
     verb = scene::Verb::Push;
@@ -44,6 +47,8 @@ void MouseTool::update(const PointerInput& input, const ViewRays& view,
       depth_ = std::max(-dot(view.eye, view.forward), kMinDepth);  // the organ's centre
     }
   } else {
+    const bool begins = sample_.verb == scene::Verb::None;
+    if (begins && verb == scene::Verb::Cut) depth_ += hover_ + kCutDepth;
     depth_ += advance;
   }
   depth_ = std::clamp(depth_, kMinDepth, kMaxDepth);

@@ -7,6 +7,7 @@
 //                    the height
 //   left button, F   push: the tip moves in the view plane, wheel or W/S press in and draw back
 //   Space            grasp, with the same motions: lift by moving the mouse
+//   X                cut: the blade goes in 12 mm and follows the pointer, wheel or W/S change that
 //   right or middle  the camera's; the tip stays where it is
 //
 // Depth is measured along the view direction. The shaft runs from the tip towards a fixed port

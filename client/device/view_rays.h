@@ -29,7 +29,7 @@ struct PointerInput {
   bool is_over_scene = true;                         // not over a panel, inside the window
   bool left = false, right = false, middle = false;  // buttons held
   bool control = false, shift = false;
-  bool push = false, grasp = false;  // keys held
+  bool push = false, grasp = false, cut = false;  // keys held
   bool deeper = false, nearer = false;
   bool zoom_in = false, zoom_out = false;
 };

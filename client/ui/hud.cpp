@@ -128,6 +128,7 @@ device::PointerInput Hud::input() const {
   if (io.WantTextInput) return input;
   input.push = key(GLFW_KEY_F);
   input.grasp = key(GLFW_KEY_SPACE);
+  input.cut = key(GLFW_KEY_X);
   input.deeper = key(GLFW_KEY_W);
   input.nearer = key(GLFW_KEY_S);
   input.zoom_in = key(GLFW_KEY_EQUAL) || key(GLFW_KEY_KP_ADD);

@@ -211,7 +211,7 @@ void draw_help(const HudModel& model, float scale) {
   ImGui::SetNextWindowBgAlpha(model.shows_help ? 0.86f : 0.45f);
   ImGui::Begin("help", nullptr, kGlass);
   if (!model.shows_help) {
-    ImGui::TextDisabled(model.has_own_tool ? "left button push   Space grasp   wheel depth   H help"
+    ImGui::TextDisabled(model.has_own_tool ? "left button push   Space grasp   X cut   wheel depth   H help"
                                            : "right drag turn   Ctrl+wheel zoom   H help");
     ImGui::End();
     return;
@@ -223,6 +223,7 @@ void draw_help(const HudModel& model, float scale) {
       help_row("move", "the tip follows the pointer, just above the tissue");
       help_row("left button, F", "push: hold, then wheel or W / S for depth");
       help_row("Space", "grasp: hold near the surface, lift by moving");
+      help_row("X", "cut: hold and draw the blade along, wheel or W / S for depth");
       help_row("wheel, W / S", "depth along the view; Shift: finer");
     }
     if (model.timeline) {

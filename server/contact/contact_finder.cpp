@@ -232,6 +232,7 @@ ContactFinder::ContactFinder(const scene::Organ& organ)
       near_of_node_(organ.mesh.node_count(), kNotNear) {
   path_.reserve(kMaxPathSteps + 1);
   found_.reserve(1024);
+  near_nodes_.reserve(3 * 1024);
   positions_.reserve(1024);
   for (auto& nearby : nearby_) {
     nearby.triangles.reserve(256);
@@ -416,14 +417,24 @@ void ContactFinder::add_grips(const ContactScene& scene, ToolSlot slot, float st
   }
 }
 
-void ContactFinder::find_reach(const ContactScene& scene, ToolSlot slot, ContactList& out) const {
+void ContactFinder::find_reach(const ContactScene& scene, ToolSlot slot, ContactList& out) {
   const auto& tool = scene.tools[slot];
   const bool cuts = tool.verb == trocar::scene::Verb::Cut;
   const float reach = cuts ? kCutCore_m : tool.shape.reach_m;
   const Vec3f edge = cuts ? rotate(tool.pose.orientation, {0, 0, tool.shape.edge_m}) : Vec3f{};
   const float edge_squared = std::max(length_squared(edge), 1e-12f);
+  Box box;
+  box.include(tool.pose.position);
+  box.include(tool.pose.position + edge);
+  box.grow(reach);
+  surface_.collect(box, scene.world, surface_travel_, found_);
+  near_nodes_.clear();
+  for (const auto triangle : found_)
+    for (const auto node : surface_[triangle].nodes) near_nodes_.push_back(node);
+  std::ranges::sort(near_nodes_);
+  near_nodes_.erase(std::unique(near_nodes_.begin(), near_nodes_.end()), near_nodes_.end());
   const std::size_t first = out.reach_nodes.size();
-  for (const auto node : scene.world.surface_nodes) {
+  for (const auto node : near_nodes_) {
     if (scene.world.node_classes[node.value] == world::NodeClass::Fixed) continue;
     const Vec3f from_tip = scene.world.position(node) - tool.pose.position;
     const float along = std::clamp(dot(from_tip, edge) / edge_squared, 0.0f, 1.0f);

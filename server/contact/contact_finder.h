@@ -106,7 +106,7 @@ class ContactFinder {
   bool comes_from_outside(const ContactScene& scene, ToolContact& contact);
   void find_push(const ContactScene& scene, float strength, ContactList& out);
   void add_grips(const ContactScene& scene, ToolSlot slot, float strength, ContactList& out) const;
-  void find_reach(const ContactScene& scene, ToolSlot slot, ContactList& out) const;
+  void find_reach(const ContactScene& scene, ToolSlot slot, ContactList& out);
   bool is_inside_tissue(const Nearby& nearby) const;
   // Also takes positions_.
   const Nearby& look_near(const world::World& world, ToolSlot slot);
@@ -120,8 +120,9 @@ class ContactFinder {
   // Of the tool in work: start, ..., goal; and where the nodes near it are.
   std::vector<ToolSolid> path_;
   std::vector<Vec3f> positions_;
-  // Scratch of list_near().
+  // Scratch of list_near() and find_reach().
   std::vector<TriangleIndex> found_;
+  std::vector<NodeIndex> near_nodes_;
   std::vector<std::uint32_t> near_of_node_;  // per node of the organ
   std::size_t triangles_visited_ = 0;
 };

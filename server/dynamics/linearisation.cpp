@@ -28,7 +28,11 @@ int exponent_of(float v) {
 // Learns the distinct neighbours of each lane and which call is for which.
 class Linearisation::Indexing final : public StiffnessSink {
  public:
-  explicit Indexing(Group group) : first_(static_cast<Slot>(group * kLanes)) {}
+  void begin(Group group) {
+    first_ = static_cast<Slot>(group * kLanes);
+    for (auto& list : neighbours) list.clear();
+    calls.clear();
+  }
 
   void add(const SlotLanes& others, const Mat8&) override {
     Targets targets{};
@@ -49,7 +53,7 @@ class Linearisation::Indexing final : public StiffnessSink {
   std::vector<Targets> calls;
 
  private:
-  const Slot first_;
+  Slot first_ = 0;
 };
 
 class Linearisation::Summing final : public StiffnessSink {
@@ -78,7 +82,10 @@ class Linearisation::Summing final : public StiffnessSink {
   std::vector<std::array<Lanes, 9>>& rows_;
 };
 
-Linearisation::Linearisation(const Tissue& tissue) : tissue_(tissue) {
+Linearisation::~Linearisation() = default;
+
+Linearisation::Linearisation(const Tissue& tissue)
+    : tissue_(tissue), indexing_(std::make_unique<Indexing>()) {
   TROCAR_ASSERT(!tissue.follows_moves());
   for (Group g = 0; g < tissue.groups().group_count(); ++g) index(g);
   rows_.end_building();
@@ -91,7 +98,8 @@ void Linearisation::index(Group group) {
   rows_.extend(count);
   targets_.extend(count);
   rest_.resize(tissue_.groups().slot_count());
-  Indexing found(group);
+  Indexing& found = *indexing_;
+  found.begin(group);
   NodeStep8 step{zero_vec8(), zero_sym_mat8()};
   tissue_.linearise(group, rest_.data(), zero_vec8(), step, found);
 

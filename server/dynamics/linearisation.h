@@ -14,6 +14,7 @@
 #include <immintrin.h>
 
 #include <array>
+#include <memory>
 #include <vector>
 
 #include "server/dynamics/tissue.h"
@@ -29,6 +30,7 @@ class Linearisation {
 
   // The tissue must outlive it, and not follow moves.
   explicit Linearisation(const Tissue& tissue);
+  ~Linearisation();
 
   // Neighbours of the group's nodes anew; matrices are zero until take(). Between steps.
   void index(Group group);
@@ -79,8 +81,9 @@ class Linearisation {
   const Tissue& tissue_;
   std::vector<Node> nodes_;  // per group
   Blocks<Row> rows_;
-  Blocks<Targets> targets_;   // per group and call, in order
-  std::vector<Float4> rest_;  // zeros, per slot
+  Blocks<Targets> targets_;             // per group and call, in order
+  std::vector<Float4> rest_;            // zeros, per slot
+  std::unique_ptr<Indexing> indexing_;  // scratch
 };
 
 inline Float8 Linearisation::add(Group group, const Float4* away, const Vec8& own,

@@ -128,7 +128,6 @@ const world::SurfaceEdit& TissueCuts::follow(world::World& world) {
     node_class = world::NodeClass::Active;
     world.quiet_ticks[node.value] = 0;
   }
-  world.far_poses.refresh_hashes();
   const auto& edit = surface_.follow(topology_);
   for (const auto node : edit.touched)
     world.surface_areas[node.value] = static_cast<float>(surface_.area_of(topology_, node));

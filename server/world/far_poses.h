@@ -30,9 +30,7 @@ class FarPoses {
   explicit FarPoses(std::size_t node_count);
 
   // New nodes are where they would have been between a and b of those before, t/65536 of the way.
-  // refresh_hashes() after the last of them.
   void add_node(NodeIndex a, NodeIndex b, std::uint16_t t);
-  void refresh_hashes();
 
   // Before a step of the solver; true: a pose was taken.
   bool begin_step(std::span<const Vec3f> displacements);
@@ -46,11 +44,13 @@ class FarPoses {
 
  private:
   void take(std::span<const Vec3f> displacements);
+  // Of the nodes that there were when the pose was taken, then of each that was added since.
   std::uint64_t hash_of(std::uint32_t number) const;
 
   std::uint32_t newest_ = 0, age_ = kInterval - 1;
   std::array<std::vector<GridPoint>, 2> poses_;
   std::array<std::uint64_t, 2> hashes_{};
+  std::array<std::uint32_t, 2> taken_nodes_{};  // nodes when it was taken
 };
 
 // m

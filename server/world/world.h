@@ -53,7 +53,7 @@ struct World {
   FarPoses far_poses;                      // about which the far field is linear
 
   // A node between a and b, t/65536 of the way from a; a copy of a where b is a. Moves with them,
-  // fixed where both are, with no mass and no surface yet. Then far_poses.refresh_hashes().
+  // fixed where both are, with no mass and no surface yet.
   void add_node(const Vec3d& rest_position, NodeIndex a, NodeIndex b, std::uint16_t t);
 
   void visit_state(StateArchive& archive);

@@ -119,6 +119,38 @@ TEST(SharedSession, OnAnImportedLiverEveryReplicaAndTheJournalAgree) {
   run_shared_session(organ.string());
 }
 
+// Two blades at two places, an assistant who draws one wound open, somebody who comes in the
+// middle, and a watcher whose picture breaks once and heals.
+TEST(SharedSession, CutsAreTheSameForEverybodyAndInTheRecording) {
+  Session session("liver", {"--seconds", "9"});
+  auto incise = session.hand("Incise", kScenes / "incise.toml");
+  auto retract = session.hand("Retract", kScenes / "retract.toml");
+  auto slices = session.hand("Slices", kScenes / "slices.toml");
+  auto watcher = session.client("Watcher", "observer", {"--corrupt-frame", "200"});
+  std::this_thread::sleep_for(std::chrono::seconds(4));
+  auto late = session.client("Late", "instructor");
+
+  ASSERT_EQ(session.server().wait(300), 0) << read_text(session.folder / "server.log");
+  for (auto* client : {&incise, &retract, &slices, &watcher, &late}) EXPECT_EQ(client->wait(20), 0);
+  const auto server = read_text(session.folder / "server.json");
+  EXPECT_EQ(json_value(server, "all_replicas_equal"), "true") << server;
+  for (const char* name : {"Incise", "Retract", "Slices", "Watcher", "Late"}) {
+    const auto summary = session.summary_of(name);
+    EXPECT_EQ(json_value(summary, "own_crc"), json_value(server, "surface_crc")) << name;
+    EXPECT_EQ(json_number(summary, "change_mismatches"), 0) << name;
+    EXPECT_EQ(json_number(summary, "surface_vertices"), json_number(server, "surface_vertices"));
+  }
+  EXPECT_GT(json_number(session.summary_of("Watcher"), "surface_changes"), 50);
+  EXPECT_GT(json_number(server, "surface_vertices"), 1700);
+
+  const auto verified = recording::verify_journal(session.journal.string());
+  ASSERT_TRUE(verified.ok()) << verified.error().message;
+  EXPECT_TRUE(verified->ok()) << "tick " << verified->first_mismatch->tick << ": "
+                              << verified->first_mismatch->what;
+  EXPECT_EQ(verified->ticks_verified, 9'000u);
+  expect_replay_equals(session.journal, simulate_again(session.journal));
+}
+
 TEST(SharedSession, AKilledServerLosesAtMostHalfASecondOfItsRecording) {
   Session session("liver");
   auto lift = session.hand("Lift", kScenes / "lift.toml");

@@ -202,5 +202,50 @@ TEST_F(Claims, StateRoundTripsThroughAnArchive) {
   EXPECT_EQ(bytes, again);
 }
 
+TEST_F(Claims, ACutHoldsWhatIsNearTheBladeAndStopsAtWhatAnotherHolds) {
+  set(0, Verb::Grasp, {5, 6});
+  set(2, Verb::Cut, {1, 2});
+  advance();
+  ASSERT_TRUE(holds(0));
+  ASSERT_TRUE(holds(2));
+  EXPECT_EQ(owner(1), 2);
+  set(2, Verb::Cut, {3, 4});
+  advance();
+  EXPECT_TRUE(holds(2));
+  EXPECT_EQ(owner(1), 0xff) << "what the blade has left is free";
+  EXPECT_EQ(owner(4), 2);
+  const auto told = events.size();
+  set(2, Verb::Cut, {4, 5});
+  advance(20);
+  EXPECT_FALSE(holds(2));
+  EXPECT_EQ(owner(4), 0xff);
+  ASSERT_EQ(events.size(), told + 1) << "told once";
+  EXPECT_EQ(events.back().outcome, ClaimOutcome::RefusedHeld);
+  EXPECT_EQ(events.back().holder.value, 0);
+  set(0, Verb::None);
+  advance(2);
+  EXPECT_TRUE(holds(2)) << "free again, the blade goes on";
+  EXPECT_EQ(owner(5), 2);
+}
+
+TEST_F(Claims, OfTwoBladesOnOneCoreTheSecondIsStopped) {
+  set(0, Verb::Cut, {1, 2});
+  set(2, Verb::Cut, {2, 3});
+  advance();
+  EXPECT_TRUE(holds(0));
+  EXPECT_FALSE(holds(2));
+  EXPECT_EQ(events.back().holder.value, 0);
+  set(0, Verb::Cut, {});
+  advance();
+  EXPECT_TRUE(holds(0)) << "in the air it may go on";
+  EXPECT_TRUE(holds(2));
+  set(0, Verb::Cut, {2});
+  advance();
+  EXPECT_FALSE(holds(0));
+  fall_silent(2);
+  advance(kLeaseTicks + 2);
+  EXPECT_TRUE(holds(0)) << "nobody waits for a silent blade";
+}
+
 }  // namespace
 }  // namespace trocar::locks
