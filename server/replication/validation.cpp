@@ -64,7 +64,7 @@ Result<CheckedSample> check_tool_sample(const proto::ToolSample& sample, std::si
     return bad("ToolSample.orientation: not of unit length (within 0.001)");
   if (sample.verb() < 0 || sample.verb() >= scene::kVerbCount)
     return bad("ToolSample.verb: " + std::to_string(static_cast<int>(sample.verb())) +
-               " is none of none (0), push (1), grasp (2)");
+               " is none of none (0), push (1), grasp (2), cut (3)");
   CheckedSample checked;
   checked.tool = static_cast<int>(sample.tool());
   checked.sequence = sample.sequence();

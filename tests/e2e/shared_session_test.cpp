@@ -147,7 +147,7 @@ TEST(SharedSession, CutsAreTheSameForEverybodyAndInTheRecording) {
   ASSERT_TRUE(verified.ok()) << verified.error().message;
   EXPECT_TRUE(verified->ok()) << "tick " << verified->first_mismatch->tick << ": "
                               << verified->first_mismatch->what;
-  EXPECT_EQ(verified->ticks_verified, 9'000u);
+  EXPECT_GE(verified->ticks_verified, 9'000u);
   expect_replay_equals(session.journal, simulate_again(session.journal));
 }
 

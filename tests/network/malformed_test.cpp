@@ -67,7 +67,7 @@ TEST_F(Malformed, every_field_of_a_tool_sample_out_of_range_ends_the_session_wit
       [](auto& s) { s.set_tool(1); },  // has one tool only
       [](auto& s) { s.set_tool(7); },
       [](auto& s) { s.set_tool(0xffffffffu); },
-      [](auto& s) { s.set_verb(static_cast<proto::Verb>(3)); },
+      [](auto& s) { s.set_verb(static_cast<proto::Verb>(4)); },
       [](auto& s) { s.set_verb(static_cast<proto::Verb>(99)); },
       [](auto& s) { s.set_verb(static_cast<proto::Verb>(-1)); },
   };

@@ -188,7 +188,7 @@ TEST(Replication, claim_events_of_skipped_frames_arrive_with_names) {
     const auto refused = client->receive(Envelope::kClaimEvent);
     ASSERT_TRUE(refused);
     EXPECT_EQ(refused->claim_event().holder_name(), "Anna");
-    EXPECT_EQ(refused->claim_event().text(), "held by Anna (grasp): wait, or ask Anna to let go");
+    EXPECT_EQ(refused->claim_event().text(), "held by Anna: wait, or ask Anna to let go");
     const auto surface = client->receive(Envelope::kSurfaceFrame);
     ASSERT_TRUE(surface);
     EXPECT_EQ(surface->surface_frame().frame(), frames.back()->frame) << "only the newest surface";

@@ -34,7 +34,8 @@ inline void add_two_hands(Tick tick, const Vec3f& place, session::TickInputs& in
   if (tick % 8 != 1) return;
   const float t = static_cast<float>(tick) * 1e-3f;
   const auto add = [&](std::uint8_t hand, const Vec3f& tip, scene::Verb verb) {
-    inputs.samples.push_back({tool_slot({hand}, 0), {{place + tip, rotation_from_z({0, 1, 0})}, verb}});
+    inputs.samples.push_back(
+        {tool_slot({hand}, 0), {{place + tip, rotation_from_z({0, 1, 0})}, verb}});
   };
   const float press = std::min(0.01f, 0.05f * t);
   add(0, kPressedAt + Vec3f{0.06f * t, -press, 0}, scene::Verb::Push);
