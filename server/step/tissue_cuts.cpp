@@ -6,6 +6,7 @@
 
 #include "common/base/assert.h"
 #include "common/base/checksum.h"
+#include "server/contact/contact_finder.h"
 #include "server/cutting/event_codec.h"
 
 namespace trocar::step {
@@ -53,14 +54,16 @@ bool TissueCuts::cut(const input::ToolTable& tools, const locks::ClaimTable& cla
     Blade& blade = blades_[i];
     const bool cuts =
         tool.has_sample && claim.verb == scene::Verb::Cut && claim.phase == locks::ClaimPhase::Held;
+    // Nobody's hand goes that fast: it has appeared there, and what lies between is not cut.
+    const bool has_jumped =
+        blade.is_cutting && length(tool.pose.position - blade.tip) > contact::kJump_m;
+    if (blade.is_cutting && (!cuts || has_jumped)) cutter_->lift(i);
     if (cuts) {
       const std::array<Vec3d, 2> edge{to_double(tool.pose.position),
                                       to_double(tool.pose.apply({0, 0, tool.shape.edge_m}))};
       cutter_->move(i, edge);
-    } else if (blade.is_cutting) {
-      cutter_->lift(i);
     }
-    if (cuts && !blade.is_cutting) blade.tip = tool.pose.position;
+    if (cuts && (!blade.is_cutting || has_jumped)) blade.tip = tool.pose.position;
     blade.is_cutting = cuts;
   }
   double opened = 0;

@@ -5,6 +5,7 @@
 #include "server/cutting/validate.h"
 #include "server/step/simulation.h"
 #include "tests/step/hands.h"
+#include "tests/support/random.h"
 
 namespace trocar::step {
 namespace {
@@ -130,6 +131,110 @@ TEST_F(Blades, ChangesLeadFromSurfaceToSurface) {
     ASSERT_EQ(followed.compute_triangle_sum(), followed.triangle_sum);
   }
   EXPECT_GT(followed.epoch, 10u);
+}
+
+// What has been parted moves by itself: a through cut, and the free end drawn away.
+TEST_F(Blades, APieceThatIsCutOffCanBeCarriedAway) {
+  Simulation simulation(liver(scene::ElasticLaw::NeoHookean));
+  Vec3f end{-1, 0, 0};
+  for (const auto& p : simulation.organ().mesh.rest_positions)
+    if (static_cast<float>(p.x) > end.x) end = to_float(p);
+  session::TickInputs inputs;
+  for (std::uint8_t hand = 0; hand < 2; ++hand) {
+    session::HandJoin join{.slot = {hand}};
+    join.shapes[0] = {.radius_m = 0.002f, .length_m = 0.3f, .reach_m = 0.02f, .edge_m = 0.2f};
+    inputs.joins.push_back(join);
+  }
+  for (int tick = 1; tick <= 1400; ++tick) {
+    if (tick % 4 == 1) {
+      const float t = static_cast<float>(tick) * 1e-3f;
+      const Vec3f tip = end + Vec3f{-0.035f, 0.08f - 0.2f * t, -0.1f};
+      inputs.samples.push_back(
+          {tool_slot({0}, 0),
+           {{tip, rotation_from_z({0, 0, 1})}, t < 0.9f ? scene::Verb::Cut : scene::Verb::None}});
+      const Vec3f drawn{0.1f * std::max(0.0f, t - 1), 0, 0};
+      inputs.samples.push_back(
+          {tool_slot({1}, 0), {{end + drawn, rotation_from_z({1, 0, 0})}, scene::Verb::Grasp}});
+    }
+    ASSERT_EQ(simulation.tick(inputs, {}).nodes_rejected, 0u) << "tick " << tick;
+    inputs.clear();
+  }
+  const auto& state = simulation.state();
+  const auto pieces = cutting::find_pieces(state.cuts.topology());
+  ASSERT_EQ(pieces.count, 2u);
+  // Each piece moves as one: the smaller one by what the hand has gone, the other hardly.
+  double moved[2] = {0, 0};
+  int nodes[2] = {0, 0};
+  for (std::uint32_t n = 0; n < state.world.node_count(); ++n) {
+    const auto tets = state.cuts.topology().tets_of(NodeIndex(n));
+    if (tets.empty()) continue;
+    const auto piece = pieces.piece_of_tet[tets[0].value];
+    moved[piece] += static_cast<double>(state.world.displacements[n].x);
+    ++nodes[piece];
+  }
+  const int small = nodes[0] < nodes[1] ? 0 : 1;
+  EXPECT_NEAR(moved[small] / nodes[small], 0.04, 0.012);
+  EXPECT_NEAR(moved[1 - small] / nodes[1 - small], 0, 0.002);
+}
+
+TEST_F(Blades, StopAtWhatAnotherHolds) {
+  Simulation simulation(liver(scene::ElasticLaw::Springs));
+  session::TickInputs inputs;
+  Vec3f top{0, -1, 0};
+  for (const auto& p : simulation.organ().mesh.rest_positions)
+    if (static_cast<float>(p.y) > top.y) top = to_float(p);
+  session::HandJoin join{.slot = {1}};
+  join.shapes[0] = {.reach_m = 0.012f};
+  inputs.joins.push_back(join);
+  int refused = 0, granted = 0;
+  for (int tick = 1; tick <= 700; ++tick) {
+    if (tick % 8 == 1)
+      inputs.samples.push_back(
+          {tool_slot({1}, 0), {{top, rotation_from_z({0, 1, 0})}, scene::Verb::Grasp}});
+    add_blades(simulation, inputs);
+    simulation.tick(inputs, {});
+    inputs.clear();
+    if (const auto frame = simulation.take_frame())
+      for (const auto& event : frame->claim_events) {
+        if (event.verb != scene::Verb::Cut) continue;
+        refused += event.outcome == locks::ClaimOutcome::RefusedHeld;
+        granted += event.outcome == locks::ClaimOutcome::Granted;
+      }
+    const auto& state = simulation.state();
+    for (const auto node : state.grasps[tool_slot({1}, 0)].nodes)
+      ASSERT_NE(state.claims.owner(node), tool_slot({0}, 0));
+  }
+  EXPECT_GE(granted, 1);
+  EXPECT_GE(refused, 1);
+  EXPECT_FALSE(simulation.state().grasps[tool_slot({1}, 0)].nodes.empty());
+}
+
+TEST_F(Blades, ThatAreEverywhereAtOnceAreBoundedWork) {
+  Simulation simulation(liver(scene::ElasticLaw::Springs));
+  trocar::testing::Random random(3);
+  session::TickInputs inputs;
+  for (std::uint8_t hand = 0; hand < 4; ++hand) {
+    session::HandJoin join{.slot = {hand}};
+    join.shapes[0] = {.radius_m = 0.002f, .length_m = 0.3f, .edge_m = 0.05f};
+    inputs.joins.push_back(join);
+  }
+  const auto unit = [&] { return static_cast<float>(random.between(-1, 1)); };
+  for (int tick = 1; tick <= 400; ++tick) {
+    for (std::uint8_t hand = 0; hand < 4; ++hand) {
+      const float far = tick % 7 == 0 ? 1.0f : 0.08f;
+      const Vec3f tip{far * unit(), far * unit(), far * unit()};
+      const Vec3f shaft = normalized(Vec3f{unit(), unit(), unit()}, {0, 1, 0});
+      inputs.samples.push_back({tool_slot({hand}, 0),
+                                {{tip, rotation_from_z(shaft)},
+                                 random.below(5) == 0 ? scene::Verb::None : scene::Verb::Cut}});
+    }
+    const auto& report = simulation.tick(inputs, {});
+    inputs.clear();
+    ASSERT_LE(report.cut.splits, 512u) << "tick " << tick;
+    for (const auto& u : simulation.state().world.displacements) ASSERT_TRUE(is_finite(u));
+  }
+  const auto valid = cutting::validate(simulation.state().cuts.topology());
+  EXPECT_TRUE(valid.ok()) << valid.error().message;
 }
 
 }  // namespace
