@@ -1,6 +1,7 @@
 #include "server/cutting/nakao_splitter.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <numeric>
 #include <tuple>

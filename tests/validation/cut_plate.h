@@ -33,8 +33,10 @@ class CutPlate {
   // Of faces that cuts have opened, both sides, as they are now and as they were at rest, m^2.
   double wound_area() const;
   double wound_area_at_rest() const;
+  double worst_dihedral_rad() const;  // smallest angle, or what is left of pi to the largest
   // As printed: elastic energy before and after cut(), J.
   const std::array<double, 2>& energies_j() const { return energies_j_; }
+  const RemodelledSprings* springs() const { return springs_.get(); }  // null: live
   // The farthest that two nodes are apart that were one, m.
   double opening() const;
   // Ends of edges of the upper face; of the wound or of the others; m.

@@ -34,7 +34,9 @@ class RemodelledSprings {
   std::span<const Vec3d> positions() const { return positions_; }  // m, per node
   const dynamics::Topology& topology() const { return topology_; }
   double energy_j() const;
-  double stable_step_s() const;
+  double stable_step_s() const { return stable_step_s_; }
+  // By which the lightest nodes were made heavier for the sake of the step, share of all mass.
+  double added_mass() const { return added_mass_; }
 
  private:
   struct Spring {
@@ -62,7 +64,8 @@ class RemodelledSprings {
   cutting::Places places_;
   std::map<Edge, Spring> springs_;
   std::vector<Vec3d> positions_, velocities_, forces_;
-  std::vector<double> masses_;          // kg
+  std::vector<double> masses_;  // kg
+  double stable_step_s_ = 0, added_mass_ = 0;
   std::vector<std::uint8_t> is_fixed_;  // per node
   std::vector<Pull> pulls_;
 };
