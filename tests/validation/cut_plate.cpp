@@ -167,13 +167,14 @@ double CutPlate::wound_area_at_rest() const {
   return wound_area([&](NodeIndex n) { return topology_.rest()[n.value]; });
 }
 
-double CutPlate::worst_dihedral_rad() const {
-  double least = 1;
+std::vector<double> CutPlate::dihedrals_rad() const {
+  std::vector<double> angles;
   for (std::uint32_t t = 0; t < topology_.tet_count(); ++t)
     if (topology_.has_tet(TetIndex(t)))
-      least = std::min(
-          least, cutting::least_sine(cutting::rest_corners(topology_, topology_.tet(TetIndex(t)))));
-  return std::asin(least);
+      angles.push_back(std::asin(
+          cutting::least_sine(cutting::rest_corners(topology_, topology_.tet(TetIndex(t))))));
+  std::sort(angles.begin(), angles.end());
+  return angles;
 }
 
 double CutPlate::opening() const {

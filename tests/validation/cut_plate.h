@@ -33,7 +33,9 @@ class CutPlate {
   // Of faces that cuts have opened, both sides, as they are now and as they were at rest, m^2.
   double wound_area() const;
   double wound_area_at_rest() const;
-  double worst_dihedral_rad() const;  // smallest angle, or what is left of pi to the largest
+  // Per tet its smallest dihedral angle, or what is left of pi to its largest if that is less;
+  // ascending.
+  std::vector<double> dihedrals_rad() const;
   // As printed: elastic energy before and after cut(), J.
   const std::array<double, 2>& energies_j() const { return energies_j_; }
   const RemodelledSprings* springs() const { return springs_.get(); }  // null: live
