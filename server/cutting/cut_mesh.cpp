@@ -137,6 +137,7 @@ void CutMesh::add_node(const NewNode& made) {
 Status CutMesh::repeat(const CutEvents& events) {
   const auto place = [this](NodeIndex n) { return topology_.rest()[n.value]; };
   auto status = apply(events, topology_, places_, [&](const NewNode& made) {
+    if (made.has_moved()) return follow_move(made);
     measure_scale_of(made);
     bundles_->add(made.node, made.a, reach(made.node), 0, place);
   });
@@ -153,6 +154,30 @@ NodeIndex CutMesh::split(NodeIndex a, NodeIndex b, std::uint16_t t) {
   out_->events.events.push_back(Split{a, b, t, node});
   ++out_->splits;
   return node;
+}
+
+void CutMesh::move(const Move& move) {
+  const Vec3d now = along(position(move.node), position(move.toward), move.t);
+  move_node(topology_, move);
+  made_.resize(topology_.node_count());
+  is_made_.resize(topology_.node_count());
+  made_[move.node.value] = now;
+  is_made_[move.node.value] = 1;
+  const NewNode moved{move.node, move.node, move.toward, move.t};
+  follow_move(moved);
+  out_->new_nodes.push_back(moved);
+  out_->events.events.emplace_back(move);
+}
+
+// Its neighbours may reach farther now, and bundles hold for nodes that move with the tissue.
+void CutMesh::follow_move(const NewNode& moved) {
+  measure_scale_of(moved);
+  topology_.for_each_neighbour(moved.node, [&](NodeIndex j) {
+    const double edge = length(topology_.rest()[j.value] - topology_.rest()[moved.node.value]);
+    reach_[j.value] = std::max(reach_[j.value], edge);
+    longest_reach_ = std::max(longest_reach_, edge);
+  });
+  bundles_->forget();
 }
 
 void CutMesh::open(std::span<const TetFace> faces, std::span<const Star> stars) {

@@ -20,10 +20,15 @@ inline constexpr double kUnknownTravel = std::numeric_limits<double>::infinity()
 
 struct CutOutput {
   CutEvents events;
-  std::vector<NewNode> new_nodes;  // in order: a parent may be new, too
-  double opened_area_m2 = 0;       // one side of the wound, at rest
-  double waiting_area_m2 = 0;      // of strokes that ended: faces that could not be opened
+  std::vector<NewNode>
+      new_nodes;               // in order: a parent may be new, too; those that moved among them
+  double opened_area_m2 = 0;   // one side of the wound, at rest
+  double waiting_area_m2 = 0;  // of strokes that ended: faces that could not be opened
   std::uint32_t crossed_tets = 0, splits = 0, labels = 0, refused_splits = 0, pinch_splits = 0;
+  // Method::Nakao: tets of the paper's two patterns and other crossed ones; nodes outside the patch
+  // that came to its border and that could not.
+  std::uint32_t four_tets = 0, six_tets = 0, other_tets = 0, moved_nodes = 0, refused_moves = 0;
+  std::uint32_t smoothed_nodes = 0;
   bool is_behind = false;  // work is left for the next call
 
   void clear();
@@ -63,6 +68,8 @@ class CutMesh {
   // this share of the floor.
   double sine_after_split(NodeIndex a, NodeIndex b, std::uint16_t t, double length_share = 1);
   NodeIndex split(NodeIndex a, NodeIndex b, std::uint16_t t);
+  // As can_move() says.
+  void move(const Move& move);
   // Faces from the side of the lower tet, ascending; the stars of their nodes, ascending, with
   // these faces cut.
   void open(std::span<const TetFace> faces, std::span<const Star> stars);
@@ -75,6 +82,7 @@ class CutMesh {
   void measure_scale();
   void measure_scale_of(const NewNode& node);
   void add_node(const NewNode& node);
+  void follow_move(const NewNode& moved);
 
   dynamics::Topology& topology_;
   const Settings settings_;

@@ -133,10 +133,12 @@ void Cutter::cut(std::span<const Vec3f> displacements, CutOutput& out, double tr
 bool Cutter::work(Stroke& stroke, std::uint32_t& budget) {
   while (stroke.motion.has_strip()) {
     if (budget == 0) return false;
-    const double extension = mesh_.settings().extension_h * stroke.h;
+    const bool is_robust = mesh_.settings().method == Method::Robust;
+    const double extension = is_robust ? mesh_.settings().extension_h * stroke.h : 0;
     auto sides = stroke.side_normals;
     make_patch(stroke.motion.strip(), extension, sides, stroke.patch);
-    const bool is_finished = splitter_.run(mesh_, stroke, stroke.patch, budget);
+    const bool is_finished = is_robust ? splitter_.run(mesh_, stroke, stroke.patch, budget)
+                                       : nakao_splitter_.run(mesh_, stroke, stroke.patch, budget);
     opening_.run(mesh_, stroke);
     if (!is_finished) return false;
     stroke.side_normals = sides;

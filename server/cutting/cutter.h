@@ -7,7 +7,7 @@
 // (splitter.h); wound faces are opened as far as the surface stays manifold (opening.h); nodes are
 // parted by topology alone (star.h). So at every return of cut():
 //   - every tet has a positive volume; its dihedral angles keep the floor, half of it where a
-//     pinch was repaired (Settings);
+//     pinch was repaired (Settings); Nakao's methods know no floor;
 //   - every piece is a closed manifold solid; volume and mass are those of before, to rounding;
 //   - the edits listed in CutOutput, applied to a topology as it was before, make the one it is.
 // Paths are in the world and meet tissue where it is now; floors are of the shape at rest.
@@ -20,6 +20,7 @@
 // began. Not for organs with links. One writer; the topology is edited by nobody else between
 // construction and destruction, except that tets and nodes may be removed while no stroke is on.
 
+#include "server/cutting/nakao_splitter.h"
 #include "server/cutting/opening.h"
 #include "server/cutting/repair.h"
 #include "server/cutting/splitter.h"
@@ -76,6 +77,7 @@ class Cutter {
   std::vector<Stroke> strokes_;
   CutMesh mesh_;
   Splitter splitter_;
+  NakaoSplitter nakao_splitter_;
   Opening opening_;
   Repair repair_;
   std::array<std::uint32_t, kMaxBlades> stroke_of_;  // place in strokes_, or kNone

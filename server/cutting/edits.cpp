@@ -1,6 +1,7 @@
 #include "server/cutting/edits.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "common/base/assert.h"
 
@@ -27,6 +28,11 @@ void clear_wound(dynamics::Topology& topology, TetIndex tet, std::uint8_t corner
   topology.mark_wound_faces(tet,
                             static_cast<std::uint8_t>(topology.wound_faces(tet) & ~bit(corner)));
 }
+
+// Of the sum of the volumes at a node that moves: rounding.
+constexpr double kVolumeSlack = 1e-11;
+// Of a tet that a node moves in, against before: no more than that may go.
+constexpr double kLeastVolumeLeft = 1e-4;
 
 // One event after another on a topology.
 class Replay {
@@ -97,6 +103,14 @@ class Replay {
     if (copied_ >= copies_.size() || copies_[copied_] != copy)
       return mismatch(at_, "another node was copied here");
     ++copied_;
+    return {};
+  }
+  Status repeat(const Move& move) {
+    if (auto status = check_copies(); !status) return status;
+    if (!has(move.node) || !has(move.toward) || !can_move(topology_, move))
+      return mismatch(at_, "no such way for a node to move");
+    move_node(topology_, move);
+    on_new_node_({move.node, move.node, move.toward, move.t});
     return {};
   }
 
@@ -184,6 +198,44 @@ void part(dynamics::Topology& topology, Places& places, std::span<const Star> st
         if (star.components[k] == c) replace_node(topology, star.tets[k], star.node, copy);
       copies.push_back({star.node, copy});
     }
+}
+
+bool can_move(const dynamics::Topology& topology, const Move& move) {
+  const auto [node, toward, t] = move;
+  const auto rest = topology.rest();
+  const auto is_end = [&, node = node](NodeIndex n) { return n == node; };
+  if (node == toward || t == 0 || topology.tets_of(node).empty() ||
+      std::ranges::any_of(topology.organ().fixed_nodes, is_end))
+    return false;
+  const Vec3d place = along(rest[node.value], rest[toward.value], t);
+  const auto material = topology.material_of(topology.tets_of(node).front());
+  double before = 0, after = 0;
+  bool is_edge = false;
+  for (const auto place_of_tet : topology.tets_of(node)) {
+    const auto& tet = topology.tet(place_of_tet);
+    if (topology.material_of(place_of_tet) != material) return false;
+    for (const auto n : tet)
+      if (rest[n.value] != topology.stress_free()[n.value]) return false;
+    const auto own_corner = corner_of(tet, node);
+    if ((topology.wound_faces(place_of_tet) & ~bit(own_corner)) != 0) return false;
+    is_edge = is_edge || corner_of(tet, toward) < 4;
+    auto corners = rest_corners(topology, tet);
+    const double old = six_volumes(corners);
+    corners[own_corner] = place;
+    const double changed = six_volumes(corners);
+    if (!(changed > kLeastVolumeLeft * old)) return false;
+    before += old;
+    after += changed;
+  }
+  return is_edge && std::abs(after - before) <= kVolumeSlack * before;
+}
+
+void move_node(dynamics::Topology& topology, const Move& move) {
+  const auto [node, toward, t] = move;
+  const auto middle = [&, node = node, toward = toward, t = t](std::span<const Vec3d> positions) {
+    return along(positions[node.value], positions[toward.value], t);
+  };
+  topology.move_node(node, middle(topology.rest()), middle(topology.stress_free()));
 }
 
 Status apply(const CutEvents& events, dynamics::Topology& topology, Places& places,

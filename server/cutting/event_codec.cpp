@@ -8,14 +8,14 @@ namespace trocar::cutting {
 namespace {
 
 // Kinds of events, in the two low bits of a number; the length of the run of that kind is above.
-enum Kind : std::uint64_t { kSplit, kOpen, kDuplicate };
+enum Kind : std::uint64_t { kSplit, kOpen, kDuplicate, kMove };
 
 constexpr std::int64_t kMost = 0xffffffff;
 
 // What the next numbers are differences from.
 struct Last {
   std::int64_t made = 0;  // node
-  std::int64_t a = 0, original = 0, face = 0;
+  std::int64_t a = 0, original = 0, face = 0, moved = 0;
 };
 
 Kind kind_of(const CutEvent& event) {
@@ -45,8 +45,7 @@ class Encoder {
     put_difference(split.a.value, last_.a, out_);
     auto near = last_.a;
     put_difference(split.b.value, near, out_);
-    out_.push_back(static_cast<std::uint8_t>(split.t));
-    out_.push_back(static_cast<std::uint8_t>(split.t >> 8));
+    put_share(split.t);
     put_difference(split.node.value, last_.made, out_);
   }
   void put_event(const Open& open) {
@@ -60,8 +59,19 @@ class Encoder {
     put_difference(duplicate.node.value, last_.original, out_);
     put_difference(duplicate.copy.value, last_.made, out_);
   }
+  void put_event(const Move& move) {
+    put_difference(move.node.value, last_.moved, out_);
+    auto near = last_.moved;
+    put_difference(move.toward.value, near, out_);
+    put_share(move.t);
+  }
 
  private:
+  void put_share(std::uint16_t t) {
+    out_.push_back(static_cast<std::uint8_t>(t));
+    out_.push_back(static_cast<std::uint8_t>(t >> 8));
+  }
+
   const CutEvents& events_;
   Bytes& out_;
   Last last_;
@@ -75,7 +85,6 @@ class Decoder {
     while (ok() && reader_.remaining() > 0) {
       const auto run = number();
       const auto kind = run & 3;
-      if (kind > kDuplicate) return std::nullopt;
       for (auto left = run >> 2; ok() && left > 0; --left) take_event(kind);
     }
     if (!ok()) return std::nullopt;
@@ -120,9 +129,16 @@ class Decoder {
       events_.events.emplace_back(split);
     } else if (kind == kOpen) {
       take_open();
-    } else {
+    } else if (kind == kDuplicate) {
       const auto original = node_after(last_.original);
       events_.events.emplace_back(Duplicate{original, node_after(last_.made)});
+    } else {
+      Move move;
+      move.node = node_after(last_.moved);
+      auto near = last_.moved;
+      move.toward = node_after(near);
+      move.t = reader_.take<std::uint16_t>();
+      events_.events.emplace_back(move);
     }
   }
   void take_open() {

@@ -26,6 +26,13 @@ cutting::NewNode made_by(const cutting::Duplicate& copy) {
   return {copy.copy, copy.node, copy.node, 0};
 }
 
+// No blade of a session moves nodes: clients hold rest positions to be constant.
+bool moves_nodes(const cutting::CutEvents& events) {
+  return std::ranges::any_of(events.events, [](const cutting::CutEvent& event) {
+    return std::holds_alternative<cutting::Move>(event);
+  });
+}
+
 std::vector<cutting::NewNode> nodes_made_by(const cutting::CutEvents& events) {
   std::vector<cutting::NewNode> nodes;
   for (const auto& event : events.events) {
@@ -242,7 +249,8 @@ void TissueCuts::read_history(world::StateArchive& archive, world::World& world)
     if (!has_more) break;
     cutting::CutEvents events;
     cutting::visit_state(archive, events);
-    if (!archive.ok() || !can_cut() || !cutter_->repeat(events)) return archive.fail();
+    if (!archive.ok() || !can_cut() || moves_nodes(events) || !cutter_->repeat(events))
+      return archive.fail();
     new_nodes_ = nodes_made_by(events);
     record(std::move(events));
     follow(world);

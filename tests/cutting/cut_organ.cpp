@@ -109,6 +109,7 @@ CutOrgan::CutOrgan(scene::Organ organ, const Settings& settings)
       copy_(*organ_),
       copy_places_(copy_),
       cutter_(topology_, settings),
+      has_floor_(settings.method == Method::Robust),
       volume_(total_volume(topology_)),
       mass_(total_mass(topology_)),
       surface_(surface_area(topology_)) {}
@@ -146,6 +147,12 @@ void CutOrgan::tick() {
   total_.labels += output_.labels;
   total_.refused_splits += output_.refused_splits;
   total_.pinch_splits += output_.pinch_splits;
+  total_.four_tets += output_.four_tets;
+  total_.six_tets += output_.six_tets;
+  total_.other_tets += output_.other_tets;
+  total_.moved_nodes += output_.moved_nodes;
+  total_.refused_moves += output_.refused_moves;
+  total_.smoothed_nodes += output_.smoothed_nodes;
   total_.is_behind = output_.is_behind;
 }
 
@@ -192,7 +199,8 @@ std::string CutOrgan::check() const {
   const double surface = surface_ + 2 * total_.opened_area_m2;
   if (!(std::abs(surface_area(topology_) - surface) <= 1e-9 * surface))
     return "not the wound's area";
-  const double floor = cutter_.floor_sine() * (total_.pinch_splits > 0 ? 0.5 : 1);
+  const double floor =
+      has_floor_ ? cutter_.floor_sine() * (total_.pinch_splits > 0 ? 0.5 : 1) : 1e-12;
   if (!(least_dihedral_sine(topology_) >= floor * (1 - 1e-9))) return "angle below the floor";
   if (topology_hash(topology_) != topology_hash(copy_)) return "the copy differs";
   return {};

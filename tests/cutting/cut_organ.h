@@ -51,7 +51,8 @@ class CutOrgan {
   void run_until_idle();
   // A blade along a path, a place per tick, then lifted and all its work done.
   void stroke(const Path& path, std::uint32_t blade = 0);
-  // Validity, volume, mass, surface, floor, and the copy's equality: what is wrong, or nothing.
+  // Validity, volume, mass, surface, floor (if the method knows one), and the copy's equality: what
+  // is wrong, or nothing.
   std::string check() const;
 
   std::vector<Vec3f> displacements;  // none: at rest
@@ -66,6 +67,7 @@ class CutOrgan {
   CutEvents history_;
   std::string failure_;
   std::uint64_t last_ns_ = 0;
+  const bool has_floor_;
   const double volume_, mass_, surface_;
 };
 

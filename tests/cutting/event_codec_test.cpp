@@ -12,14 +12,16 @@ namespace trocar::cutting::testing {
 namespace {
 
 TEST(EventCodec, BytesOfEachKind) {
-  const CutEvents events{{Split{NodeIndex(300u), NodeIndex(298u), 0x1234, NodeIndex(1000u)},
-                          Open{0, 2}, Duplicate{NodeIndex(298u), NodeIndex(1001u)}},
-                         {{TetIndex(5u), 1}, {TetIndex(6u), 0}}};
+  const CutEvents events{
+      {Split{NodeIndex(300u), NodeIndex(298u), 0x1234, NodeIndex(1000u)}, Open{0, 2},
+       Duplicate{NodeIndex(298u), NodeIndex(1001u)}, Move{NodeIndex(70u), NodeIndex(72u), 0x0105}},
+      {{TetIndex(5u), 1}, {TetIndex(6u), 0}}};
   Bytes bytes;
   encode(events, bytes);
   const Bytes expected{1 << 2 | 0, 0xd8, 0x04, 3, 0x34, 0x12, 0xd0, 0x0f,  //
                        1 << 2 | 1, 2,    42,   6,                          //
-                       1 << 2 | 2, 0xd4, 0x04, 2};
+                       1 << 2 | 2, 0xd4, 0x04, 2,                          //
+                       1 << 2 | 3, 0x8c, 0x01, 4, 5,    1};
   EXPECT_EQ(bytes, expected);
   EXPECT_EQ(decode(bytes), events);
   EXPECT_EQ(decode({}), CutEvents{});
@@ -56,7 +58,7 @@ TEST(EventCodec, WhatIsNoEncodingIsRefusedAndNoneBreaksATopology) {
     const auto part = decode(BytesView(bytes).first(size));
     EXPECT_TRUE(!part || part->events.size() < box.history().events.size());
   }
-  EXPECT_FALSE(decode(Bytes{3}));
+  EXPECT_FALSE(decode(Bytes{1 << 2 | 3}));                                     // and no more
   EXPECT_FALSE(decode(Bytes{1 << 2, 1, 0, 0, 0, 0}));                          // node -1
   EXPECT_FALSE(decode(Bytes{1 << 2, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 1}));  // too long
   EXPECT_FALSE(decode(Bytes{0xfe, 0xff, 0xff, 0xff, 0xff, 0x7f}));             // longer than it is

@@ -21,6 +21,8 @@ const std::vector<Experiment>& experiments() {
        run_fig7_fig8_organs},
       {"choi2002/palpation-inclusion", "A stiff inclusion is felt",
        "Choi 2002, section 3, discussion", run_palpation},
+      {"nakao2003/plate", "A straight cut in a plate under tension",
+       "Nakao 2003, section 5.1, figures 10 to 12", run_plate},
       {"nakao2003/fig15-fig17-refresh", "Time per cycle, with and without a controller",
        "Nakao 2003, figures 15 to 17", run_refresh_rate},
       {"ours/propagation-lattice", "What a limit of nodes costs: lattice", "full solve, our own",

@@ -28,6 +28,7 @@ void run_creep(const Lab& lab, Section& section);
 void run_palpation(const Lab& lab, Section& section);
 void run_relaxation(const Lab& lab, Section& section);
 
+void run_plate(const Lab& lab, Section& section);
 void run_refresh_rate(const Lab& lab, Section& section);
 
 void run_propagation_lattice(const Lab& lab, Section& section);

@@ -110,6 +110,13 @@ TEST_F(Validation, BarInTensionHasItsClosedForm) {
   EXPECT_TRUE(kept_checks().contains("ours/bar/springs"));
 }
 
+TEST_F(Validation, ACutPlateGapesAsInThePaper) {
+  ASSERT_EQ(run("--short --only nakao2003/plate"), 0) << log();
+  const auto names = kept_checks();
+  EXPECT_TRUE(names.contains("nakao2003/plate/adaptive-below-plain-6"));
+  EXPECT_TRUE(names.contains("nakao2003/plate/energy-plain"));
+}
+
 TEST_F(Validation, CommandLine) {
   EXPECT_EQ(run("--help"), 0);
   EXPECT_NE(log().find("Examples:"), std::string::npos);
