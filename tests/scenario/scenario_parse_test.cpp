@@ -120,6 +120,8 @@ INSTANTIATE_TEST_SUITE_P(
             "displace[0].key[0].displacement_m", "write displacement_mm"},
         Bad{"reaction_of_free", "[[probe]]\nquantity = \"reaction\"\nset = \"top\"", "probe[0].set",
             "a reaction needs a held set"},
+        Bad{"cuts", "[[tool]]\n[[tool.key]]\ntime_s = 0\nposition_mm = [0, 0, 0]\nverb = \"cut\"",
+            "tool", "only sessions cut", 11},
         Bad{"no_such_tool", "[[probe]]\nquantity = \"force\"\ntool = 0", "probe[0].tool",
             "there are 0"},
         Bad{"odd_rate", "[[probe]]\nset = \"top\"\nquantity = \"velocity\"\nrate_hz = 300",
