@@ -117,7 +117,6 @@ void CutPlate::follow() {
     world_.rest_positions[node.value] = to_float(topology_.rest()[node.value]);
     world_.masses[node.value] = static_cast<float>(topology_.lumped_mass(node));
   }
-  world_.far_poses.refresh_hashes();
   solver_.follow_topology(topology_, world_);
   topology_.clear_changes();
   solver_.take_state(world_);
