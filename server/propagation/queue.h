@@ -43,8 +43,12 @@ class PropagationQueue {
   // first. `neighbours` is symmetric. A table other than in the last call is noticed, and may have
   // more nodes; after a change inside it, call forget() first.
   void fill(const Neighbours& neighbours, Seeds seeds, const QueueLimits& limits);
-  // The topology changed: the next fill starts anew.
+  // The topology changed: the next fill starts anew. New nodes are not in the queue until then.
   void forget() { has_history_ = false; }
+  void forget(std::size_t node_count) {
+    forget();
+    if (node_count > node_capacity_) resize(node_count);
+  }
 
   // In queue order.
   std::span<const NodeIndex> nodes() const { return nodes_; }

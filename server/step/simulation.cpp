@@ -80,7 +80,7 @@ void StepContext::follow_edit(const dynamics::Topology& topology, const world::S
     topology.neighbours_of(node, changed_neighbours);
     neighbours.set(node, changed_neighbours);
   }
-  queue.forget();
+  queue.forget(world.node_count());
   active.forget();
   finder.follow(edit, world);
   self_finder.follow(edit);
