@@ -7,6 +7,7 @@
 #include <string>
 
 #include "common/base/assert.h"
+#include "common/base/varint.h"
 
 namespace trocar::wire {
 namespace {
@@ -74,11 +75,6 @@ class BitWriter {
   std::uint64_t pending_ = 0;
   unsigned pending_bits_ = 0;
 };
-
-void put_varint(Bytes& out, std::uint32_t value) {
-  for (; value >= 0x80; value >>= 7) out.push_back(static_cast<std::uint8_t>(value | 0x80));
-  out.push_back(static_cast<std::uint8_t>(value));
-}
 
 using Residuals = std::array<std::array<std::uint32_t, 3>, kGroupVertices>;  // zig-zag, x y z
 
@@ -177,32 +173,20 @@ Error bad_payload(const char* what) {
   return {ErrorCode::BadMessage, std::string("surface payload: ") + what + "; ask for a keyframe"};
 }
 
-std::optional<std::uint32_t> take_varint(ByteReader& reader) {
-  std::uint64_t value = 0;
-  for (unsigned shift = 0; shift < 35; shift += 7) {
-    const auto byte = reader.take<std::uint8_t>();
-    value |= std::uint64_t{byte & 0x7fu} << shift;
-    if (byte < 0x80)
-      return reader.ok() && value <= 0xffffffffu ? std::optional(static_cast<std::uint32_t>(value))
-                                                 : std::nullopt;
-  }
-  return std::nullopt;
-}
-
 // Walks the list of changed blocks at the front of a payload.
 class BlockList {
  public:
   BlockList(BytesView payload, std::size_t vertices) : reader_(payload), vertices_(vertices) {
-    const auto count = take_varint(reader_);
+    const auto count = take_varint(reader_, 0xffffffffu);
     ok_ = count && *count <= block_count_of(vertices);
-    left_ = ok_ ? *count : 0;
+    left_ = ok_ ? static_cast<std::uint32_t>(*count) : 0;
   }
 
   // Next block and its mask of changed slots; false at the end or when the list is malformed.
   bool next(std::size_t& block, std::uint64_t& mask) {
     if (left_ == 0) return false;
     --left_;
-    const auto header = take_varint(reader_);
+    const auto header = take_varint(reader_, 0xffffffffu);
     if (!header) return fail();
     const std::uint64_t at = next_block_ + (*header >> 1);
     if (at >= block_count_of(vertices_)) return fail();

@@ -21,28 +21,14 @@
 #include <vector>
 
 #include "common/base/index.h"
+#include "common/math/box.h"
 #include "common/scene/organ.h"
 #include "server/world/surface_edit.h"
 #include "server/world/world.h"
 
 namespace trocar::contact {
 
-struct Box {
-  Vec3f least{1e30f, 1e30f, 1e30f}, most{-1e30f, -1e30f, -1e30f};
-
-  void include(const Vec3f& p) {
-    least = {std::min(least.x, p.x), std::min(least.y, p.y), std::min(least.z, p.z)};
-    most = {std::max(most.x, p.x), std::max(most.y, p.y), std::max(most.z, p.z)};
-  }
-  void grow(float by) {
-    least -= Vec3f{by, by, by};
-    most += Vec3f{by, by, by};
-  }
-  bool overlaps(const Box& b) const {
-    return least.x <= b.most.x && b.least.x <= most.x && least.y <= b.most.y &&
-           b.least.y <= most.y && least.z <= b.most.z && b.least.z <= most.z;
-  }
-};
+using Box = trocar::Box<float>;
 
 inline constexpr std::uint32_t kMaxDivisions = 8;
 

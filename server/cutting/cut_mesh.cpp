@@ -78,9 +78,13 @@ void CutMesh::end() {
   out_ = nullptr;
 }
 
-void CutMesh::collect(const Box& box, std::span<const PatchTriangle> patch, double reaches,
+void CutMesh::collect(std::span<const PatchTriangle> patch, double reaches,
                       std::vector<NodeIndex>& out) {
   out.clear();
+  Box box;
+  for (const auto& triangle : patch)
+    for (const auto& p : triangle.corners) box.include(p);
+  box.grow(reaches * longest_reach_);
   const auto place = [this](NodeIndex n) { return position(n); };
   const auto may_hold = [&](const Vec3d& centre, double radius, double reach) {
     const double slack = radius + reaches * reach;

@@ -49,10 +49,9 @@ class CutMesh {
     const auto& rest = topology_.rest()[n.value];
     return n.value < displacements_.size() ? rest + to_double(displacements_[n.value]) : rest;
   }
-  // Nodes whose position is in the box, ascending; some of those may be left out whose distance
-  // from all triangles is more than `reaches` times their reach.
-  void collect(const Box& box, std::span<const PatchTriangle> patch, double reaches,
-               std::vector<NodeIndex>& out);
+  // Nodes no farther from a patch than `reaches` times their reach, ascending, and some others near
+  // by.
+  void collect(std::span<const PatchTriangle> patch, double reaches, std::vector<NodeIndex>& out);
   // Nodes may have moved farther than the next call will say.
   void forget_places() { bundles_->forget(); }
   double h(NodeIndex n) const { return h_[n.value]; }

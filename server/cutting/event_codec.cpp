@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "common/base/assert.h"
+#include "common/base/varint.h"
 
 namespace trocar::cutting {
 namespace {
@@ -11,6 +12,7 @@ namespace {
 enum Kind : std::uint64_t { kSplit, kOpen, kDuplicate, kMove };
 
 constexpr std::int64_t kMost = 0xffffffff;
+constexpr std::uint64_t kMostNumber = (std::uint64_t{1} << 42) - 1;
 
 // What the next numbers are differences from.
 struct Last {
@@ -25,15 +27,11 @@ std::int64_t number_of(const TetFace& face) {
   return static_cast<std::int64_t>(face.tet.value) * 4 + face.corner;
 }
 
-// Seven bits per byte.
-void put(std::uint64_t number, Bytes& out) {
-  for (; number >= 128; number >>= 7) out.push_back(static_cast<std::uint8_t>(number | 128));
-  out.push_back(static_cast<std::uint8_t>(number));
-}
 // The sign in the lowest bit.
 void put_difference(std::int64_t number, std::int64_t& last, Bytes& out) {
   const auto difference = number - last;
-  put(static_cast<std::uint64_t>(difference < 0 ? -2 * difference - 1 : 2 * difference), out);
+  put_varint(out,
+             static_cast<std::uint64_t>(difference < 0 ? -2 * difference - 1 : 2 * difference));
   last = number;
 }
 
@@ -49,7 +47,7 @@ class Encoder {
     put_difference(split.node.value, last_.made, out_);
   }
   void put_event(const Open& open) {
-    put(open.face_count, out_);
+    put_varint(out_, open.face_count);
     for (const auto& face : std::span(events_.faces).subspan(open.first_face, open.face_count)) {
       TROCAR_ASSERT(face.corner < 4);
       put_difference(number_of(face), last_.face, out_);
@@ -95,14 +93,9 @@ class Decoder {
   bool ok() const { return ok_ && reader_.ok(); }
 
   std::uint64_t number() {
-    std::uint64_t number = 0;
-    for (int shift = 0; shift < 42; shift += 7) {
-      const auto byte = reader_.take<std::uint8_t>();
-      number |= static_cast<std::uint64_t>(byte & 127) << shift;
-      if (byte < 128) return number;
-    }
-    ok_ = false;
-    return 0;
+    const auto number = take_varint(reader_, kMostNumber);
+    if (!number) ok_ = false;
+    return number.value_or(0);
   }
   std::int64_t after(std::int64_t& last, std::int64_t most = kMost) {
     const auto coded = number();
@@ -165,7 +158,7 @@ void encode(const CutEvents& events, Bytes& out) {
     const auto kind = kind_of(*at);
     const auto end = std::find_if(at, events.events.end(),
                                   [&](const CutEvent& event) { return kind_of(event) != kind; });
-    put(static_cast<std::uint64_t>(end - at) << 2 | kind, out);
+    put_varint(out, static_cast<std::uint64_t>(end - at) << 2 | kind);
     for (; at != end; ++at) std::visit([&](const auto& event) { encoder.put_event(event); }, *at);
   }
 }

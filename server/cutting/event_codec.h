@@ -2,7 +2,7 @@
 
 // Cut events as bytes, for snapshots that hold the whole history of a topology: small numbers,
 // because edits of a wound are near each other, each number as a difference from the last of its
-// kind in seven bits per byte. About five bytes per cut tet.
+// kind, as a varint. Two to three bytes per cut tet.
 //
 // Reading treats the bytes as untrusted: numbers beyond their range and what is cut short fail.
 // Whether the events fit a topology, apply() checks.

@@ -70,4 +70,8 @@ std::array<Vec3d, 4> rest_corners(const dynamics::Topology& topology, const mesh
   return corners;
 }
 
+std::uint16_t quantised_share(double share) {
+  return static_cast<std::uint16_t>(std::clamp(std::floor(share * 65536 + 0.5), 0.0, 65535.0));
+}
+
 }  // namespace trocar::cutting

@@ -50,6 +50,8 @@ double six_volumes(const std::array<Vec3d, 4>& corners);
 double least_sine(const std::array<Vec3d, 4>& corners);
 std::array<Vec3d, 4> rest_corners(const dynamics::Topology& topology, const mesh::Tet& tet);
 
+// A share from 0 to 1 of an edge in 1/65536, an end short of the whole.
+std::uint16_t quantised_share(double share);
 // t of 1/65536 from a to b.
 inline Vec3d along(const Vec3d& a, const Vec3d& b, std::uint16_t t) {
   return a + (b - a) * (t / 65536.0);

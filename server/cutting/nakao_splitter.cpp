@@ -15,8 +15,9 @@ constexpr double kOnPlane = 1.0 / 64;  // share of an edge
 constexpr double kSmoothing = 0.5;     // of the way to the mean of the neighbours
 constexpr int kBisections = 30;
 
-std::uint16_t quantised(double t) {
-  return static_cast<std::uint16_t>(std::clamp(std::floor(t * 65536 + 0.5), 1.0, 65535.0));
+// Never nothing.
+std::uint16_t quantised(double share) {
+  return std::max<std::uint16_t>(1, quantised_share(share));
 }
 
 template <typename T>
@@ -68,13 +69,7 @@ double NakaoSplitter::height(const CutMesh& mesh, std::span<const PatchTriangle>
 }
 
 void NakaoSplitter::measure(CutMesh& mesh, Stroke& stroke, std::span<const PatchTriangle> patch) {
-  Box box;
-  for (const auto& triangle : patch)
-    for (const auto& p : triangle.corners) box.include(p);
-  const double margin = kMostStretch * mesh.longest_reach();
-  box.least = box.least - Vec3d{margin, margin, margin};
-  box.most += {margin, margin, margin};
-  mesh.collect(box, patch, kMostStretch, near_);
+  mesh.collect(patch, kMostStretch, near_);
   stroke.h = near_.empty() ? stroke.h : 0;
   for (const auto node : near_) {
     stroke.h += mesh.h(node) / static_cast<double>(near_.size());

@@ -15,30 +15,11 @@
 #include <vector>
 
 #include "common/base/index.h"
-#include "common/math/vec3.h"
+#include "common/math/box.h"
 
 namespace trocar::cutting {
 
-struct Box {
-  Vec3d least{kFar, kFar, kFar}, most{-kFar, -kFar, -kFar};
-
-  void include(const Vec3d& p) {
-    least = {std::min(least.x, p.x), std::min(least.y, p.y), std::min(least.z, p.z)};
-    most = {std::max(most.x, p.x), std::max(most.y, p.y), std::max(most.z, p.z)};
-  }
-  bool contains(const Vec3d& p) const {
-    return p.x >= least.x && p.y >= least.y && p.z >= least.z && p.x <= most.x && p.y <= most.y &&
-           p.z <= most.z;
-  }
-  bool is_within(const Box& b, double slack) const {
-    return least.x <= b.most.x + slack && b.least.x <= most.x + slack &&
-           least.y <= b.most.y + slack && b.least.y <= most.y + slack &&
-           least.z <= b.most.z + slack && b.least.z <= most.z + slack;
-  }
-
- private:
-  static constexpr double kFar = std::numeric_limits<double>::max();  // finite: takes any slack
-};
+using Box = trocar::Box<double>;
 
 class NodeBundles {
  public:
@@ -101,7 +82,7 @@ class NodeBundles {
   template <typename MayHold>
   static bool may_reach(const Bundle& bundle, const Box& box, double travel_m, MayHold&& may_hold) {
     const double far = slack(bundle, travel_m);
-    if (!bundle.box.is_within(box, far)) return false;
+    if (!bundle.box.overlaps(box, far)) return false;
     return far > kMost_m || bundle.nodes.empty() ||
            may_hold((bundle.box.least + bundle.box.most) / 2, bundle.radius() + far, bundle.reach);
   }

@@ -13,10 +13,6 @@ constexpr double kSlack_h = 1e-6;
 // A patch costs something even where there is nothing to cut; in edits.
 constexpr std::uint32_t kPatchCost = 8, kNearPerEdit = 8;
 
-std::uint16_t quantised(double t) {
-  return static_cast<std::uint16_t>(std::clamp(std::floor(t * 65536 + 0.5), 0.0, 65535.0));
-}
-
 }  // namespace
 
 // Heights of p above the patch, at the end of heights_. Returns how near it is.
@@ -36,13 +32,7 @@ Splitter::Nearness Splitter::look_at(std::span<const PatchTriangle> patch, const
 }
 
 void Splitter::find_near(CutMesh& mesh, std::span<const PatchTriangle> patch) {
-  Box box;
-  for (const auto& triangle : patch)
-    for (const auto& p : triangle.corners) box.include(p);
-  const double margin = kMostStretch * mesh.longest_reach();
-  box.least = box.least - Vec3d{margin, margin, margin};
-  box.most += {margin, margin, margin};
-  mesh.collect(box, patch, kMostStretch, near_);
+  mesh.collect(patch, kMostStretch, near_);
   rank_.resize(std::max(rank_.size(), mesh.topology().node_count()));
   heights_.clear();
   positions_.clear();
@@ -163,7 +153,7 @@ bool Splitter::split(CutMesh& mesh, Stroke& stroke, std::uint32_t& budget) {
   for (const auto& crossing : crossings_) {
     if (stroke.is_labelled(crossing.a) || stroke.is_labelled(crossing.b)) continue;
     if (budget == 0) return false;
-    const auto t = quantised(crossing.t);
+    const auto t = quantised_share(crossing.t);
     if (mesh.sine_after_split(crossing.a, crossing.b, t) >= mesh.floor_sine()) {
       stroke.label(mesh.split(crossing.a, crossing.b, t));
       budget -= std::min(budget, static_cast<std::uint32_t>(mesh.last_ring()));

@@ -8,6 +8,7 @@
 #include <cstdio>
 
 #include "common/base/cpu.h"
+#include "common/math/box.h"
 #include "common/scene/builtin_organs.h"
 #include "common/scene/load_organ.h"
 #include "server/step/simulation.h"
@@ -26,22 +27,14 @@ struct Options {
   unsigned workers = 1;
 };
 
-struct Box {
-  Vec3f least{1e9f, 1e9f, 1e9f}, most{-1e9f, -1e9f, -1e9f};
-};
-
-Box box_of(const scene::Organ& organ) {
-  Box box;
-  for (const auto& q : organ.mesh.rest_positions) {
-    const Vec3f p = to_float(q);
-    box.least = {std::min(box.least.x, p.x), std::min(box.least.y, p.y),
-                 std::min(box.least.z, p.z)};
-    box.most = {std::max(box.most.x, p.x), std::max(box.most.y, p.y), std::max(box.most.z, p.z)};
-  }
+Box<float> box_of(const scene::Organ& organ) {
+  Box<float> box;
+  for (const auto& p : organ.mesh.rest_positions) box.include(to_float(p));
   return box;
 }
 
-scene::ToolSample sample_of(const Box& box, const Options& options, std::uint8_t blade, Tick tick) {
+scene::ToolSample sample_of(const Box<float>& box, const Options& options, std::uint8_t blade,
+                            Tick tick) {
   const float length = box.most.x - box.least.x + 2 * kBeyond_m;
   const float gone = static_cast<float>(tick) * 1e-3f * static_cast<float>(options.speed) +
                      0.3f * length * static_cast<float>(blade);
@@ -63,7 +56,7 @@ double part(const std::vector<double>& sorted, double share) {
 }
 
 void run(scene::Organ organ, const Options& options) {
-  const Box box = box_of(organ);
+  const Box<float> box = box_of(organ);
   const std::string name = organ.name;
   step::Simulation simulation(std::move(organ), options.workers);
   const auto nodes_before = simulation.state().cuts.topology().node_count(),
