@@ -138,9 +138,11 @@ void CutMesh::add_node(const NewNode& made) {
   out_->new_nodes.push_back(made);
 }
 
-Status CutMesh::repeat(const CutEvents& events) {
+Status CutMesh::repeat(const CutEvents& events, std::vector<NewNode>& made_nodes) {
   const auto place = [this](NodeIndex n) { return topology_.rest()[n.value]; };
+  made_nodes.clear();
   auto status = apply(events, topology_, places_, [&](const NewNode& made) {
+    made_nodes.push_back(made);
     if (made.has_moved()) return follow_move(made);
     measure_scale_of(made);
     bundles_->add(made.node, made.a, reach(made.node), 0, place);

@@ -72,8 +72,8 @@ class CutMesh {
   // Faces from the side of the lower tet, ascending; the stars of their nodes, ascending, with
   // these faces cut.
   void open(std::span<const TetFace> faces, std::span<const Star> stars);
-  // Does what another cutter of the same topology did.
-  Status repeat(const CutEvents& events);
+  // Does what another cutter of the same topology did; made: its nodes.
+  Status repeat(const CutEvents& events, std::vector<NewNode>& made);
   // Tets bisected by the last split().
   std::size_t last_ring() const { return children_.size(); }
 

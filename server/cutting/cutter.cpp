@@ -55,10 +55,10 @@ double Cutter::behind_m(std::uint32_t blade) const {
   return strokes_[stroke_of_[blade]].motion.behind();
 }
 
-Status Cutter::repeat(const CutEvents& events) {
+Status Cutter::repeat(const CutEvents& events, std::vector<NewNode>& made) {
   if (std::ranges::any_of(strokes_, &Stroke::is_active))
     return Error{ErrorCode::Refused, "cut events cannot be repeated while a blade cuts"};
-  return mesh_.repeat(events);
+  return mesh_.repeat(events, made);
 }
 
 void Cutter::clear_strokes() {

@@ -45,8 +45,9 @@ class Cutter {
   void cut(std::span<const Vec3f> displacements, CutOutput& out, double travel_m = kUnknownTravel);
 
   // Does what another cutter did to the same topology: all its events, of all its calls, in order;
-  // with no stroke on. What is wrong is refused; what comes before it has been done.
-  Status repeat(const CutEvents& events);
+  // with no stroke on. What is wrong is refused; what comes before it has been done. made: the
+  // nodes, as in CutOutput.
+  Status repeat(const CutEvents& events, std::vector<NewNode>& made);
 
   // Everything that later calls depend on besides topology and settings: the same bytes, the same
   // future. One byte while no stroke is on. To be read by a cutter whose topology has had the same

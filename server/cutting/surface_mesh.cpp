@@ -102,7 +102,6 @@ void SurfaceMesh::add(const Face& face) {
 
 const world::SurfaceEdit& SurfaceMesh::follow(const dynamics::Topology& topology) {
   edit_.clear();
-  edit_.first_added = static_cast<std::uint32_t>(triangles_.size());
   is_changed_.resize(topology.node_count());
   triangles_of_.extend(topology.node_count());
   for (const auto node : topology.changed()) is_changed_[node.value] = 1;

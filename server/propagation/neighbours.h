@@ -14,7 +14,9 @@ class Neighbours {
   using Table = mesh::Csr<NodeIndex, NodeIndex>;
 
   // The table must outlive it. Implicit: a table is what most have.
-  Neighbours(const Table& table) : table_(&table), row_count_(table.row_count()) {}
+  Neighbours(const Table& table) : table_(&table), row_count_(table.row_count()) {
+    rows_.end_building();
+  }
 
   std::size_t row_count() const { return row_count_; }
   const Table& table() const { return *table_; }
@@ -26,6 +28,8 @@ class Neighbours {
 
   // Of a node of the table, or a new one. O(row), and O(nodes) the first time.
   void set(NodeIndex node, std::span<const NodeIndex> neighbours);
+  // To be called after a number of set(): frees memory that rows have left.
+  void tidy() { rows_.tidy(); }
 
  private:
   const Table* table_;

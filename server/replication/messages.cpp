@@ -164,7 +164,7 @@ std::string describe(const locks::ClaimEvent& event, const session::Roster& rost
       return who + " was silent: " + holder + " took over";
     case locks::ClaimOutcome::Expired:
       return who + " was silent for " + std::to_string(locks::kAbandonTicks / kTicksPerSecond) +
-             " s: the grasp was let go";
+             (is_grasp ? " s: the grasp was let go" : " s: the claim has ended");
     case locks::ClaimOutcome::Slipped:
       return who + " lost the grasp: the tissue was pulled out of the jaws";
   }

@@ -80,6 +80,7 @@ void StepContext::follow_edit(const dynamics::Topology& topology, const world::S
     topology.neighbours_of(node, changed_neighbours);
     neighbours.set(node, changed_neighbours);
   }
+  neighbours.tidy();
   queue.forget(world.node_count());
   active.forget();
   finder.follow(edit, world);

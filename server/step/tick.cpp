@@ -105,8 +105,10 @@ void follow_contacts(State& state, StepContext& context) {
 
 void cut_tissue(State& state, StepContext& context) {
   auto& cuts = state.cuts;
-  if (!cuts.cut(state.tools, state.claims, state.world, context.travel_m, context.report.cut))
-    return;
+  const bool has_cut =
+      cuts.cut(state.tools, state.claims, state.world, context.travel_m, context.report.cut);
+  if (context.report.cut.is_full) context.report.faults |= kFaultCutLimit;
+  if (!has_cut) return;
   const auto& edit = cuts.follow(state.world);
   for (const auto& made : cuts.new_nodes()) {
     state.claims.add_node(made.a, made.b);

@@ -54,13 +54,15 @@ enum TickFault : std::uint32_t {
   kFaultOverRelaxation = 1u << 2,  // residual grew: the tick went on without over-relaxation
   kFaultToolInside = 1u << 4,      // a tool appeared inside tissue: draw it back to touch
   kFaultNonFinite = 1u << 3,       // a node's step was not finite: its region went back a tick
+  kFaultCutLimit = 1u << 5,        // the surface has as many triangles as may be: blades are blunt
 };
 
 // What blades did in one tick.
 struct CutReport {
-  std::uint32_t crossed_tets = 0, splits = 0, new_nodes = 0;
+  std::uint32_t crossed_tets = 0, splits = 0;
   double opened_area_m2 = 0;  // one side of the wound
   bool is_behind = false;     // work is left for later ticks
+  bool is_full = false;       // see kFaultCutLimit
 };
 
 struct TickReport {

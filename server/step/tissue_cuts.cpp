@@ -19,27 +19,14 @@ constexpr float kWay_m = 0.005f, kNewest = 0.05f;
 constexpr float kSlow_m_s = 0.002f;
 constexpr float kMostForce_n = 30;
 
-cutting::NewNode made_by(const cutting::Split& split) {
-  return {split.node, split.a, split.b, split.t};
-}
-cutting::NewNode made_by(const cutting::Duplicate& copy) {
-  return {copy.copy, copy.node, copy.node, 0};
-}
+// Numbers of triangles are used once. What is left is for the ticks up to the next frame.
+constexpr std::size_t kMostTriangles = wire::kMaxSurfaceTriangles - 500'000;
 
 // No blade of a session moves nodes: clients hold rest positions to be constant.
 bool moves_nodes(const cutting::CutEvents& events) {
   return std::ranges::any_of(events.events, [](const cutting::CutEvent& event) {
     return std::holds_alternative<cutting::Move>(event);
   });
-}
-
-std::vector<cutting::NewNode> nodes_made_by(const cutting::CutEvents& events) {
-  std::vector<cutting::NewNode> nodes;
-  for (const auto& event : events.events) {
-    if (const auto* split = std::get_if<cutting::Split>(&event)) nodes.push_back(made_by(*split));
-    if (const auto* copy = std::get_if<cutting::Duplicate>(&event)) nodes.push_back(made_by(*copy));
-  }
-  return nodes;
 }
 
 }  // namespace
@@ -55,12 +42,13 @@ bool TissueCuts::cut(const input::ToolTable& tools, const locks::ClaimTable& cla
                      const world::World& world, double travel_m, CutReport& report) {
   report = {};
   if (!can_cut()) return false;
+  report.is_full = layout_.triangles.size() >= kMostTriangles;
   for (std::uint8_t i = 0; i < kMaxTools; ++i) {
     const auto& tool = tools[ToolSlot{i}];
     const auto& claim = claims.claim(ToolSlot{i});
     Blade& blade = blades_[i];
-    const bool cuts =
-        tool.has_sample && claim.verb == scene::Verb::Cut && claim.phase == locks::ClaimPhase::Held;
+    const bool cuts = tool.has_sample && claim.verb == scene::Verb::Cut &&
+                      claim.phase == locks::ClaimPhase::Held && !report.is_full;
     // Nobody's hand goes that fast: it has appeared there, and what lies between is not cut.
     const bool has_jumped =
         blade.is_cutting && length(tool.pose.position - blade.tip) > contact::kJump_m;
@@ -73,17 +61,12 @@ bool TissueCuts::cut(const input::ToolTable& tools, const locks::ClaimTable& cla
     if (cuts && (!blade.is_cutting || has_jumped)) blade.tip = tool.pose.position;
     blade.is_cutting = cuts;
   }
-  double opened = 0;
-  if (!cutter_->is_idle()) {
-    output_.clear();
-    cutter_->cut(world.displacements, output_, travel_m);
-    opened = output_.opened_area_m2;
-    report = {output_.crossed_tets, output_.splits,
-              static_cast<std::uint32_t>(output_.new_nodes.size()), opened, output_.is_behind};
-  } else {
-    output_.clear();
-  }
-  feel(tools, opened);
+  cutter_->cut(world.displacements, output_, travel_m);
+  report.crossed_tets = output_.crossed_tets;
+  report.splits = output_.splits;
+  report.opened_area_m2 = output_.opened_area_m2;
+  report.is_behind = output_.is_behind;
+  resist(tools, output_.opened_area_m2);
   if (output_.events.events.empty()) return false;
   new_nodes_.assign(output_.new_nodes.begin(), output_.new_nodes.end());
   record(output_.events);
@@ -93,7 +76,7 @@ bool TissueCuts::cut(const input::ToolTable& tools, const locks::ClaimTable& cla
 // The work of opening a wound is its area times kCutEnergy: per way that the blade goes, a force
 // against it. Wounds open in steps of a part of an element, so the area per way is that of the last
 // few millimetres. Of several blades each gets its share by how far it went.
-void TissueCuts::feel(const input::ToolTable& tools, double opened_area_m2) {
+void TissueCuts::resist(const input::ToolTable& tools, double opened_area_m2) {
   float total = 0;
   for (std::uint8_t i = 0; i < kMaxTools; ++i)
     if (blades_[i].is_cutting) total += length(tools[ToolSlot{i}].pose.position - blades_[i].tip);
@@ -156,8 +139,8 @@ void TissueCuts::extend_layout(const world::World& world, const world::SurfaceEd
     wire::NewVertex vertex{.node = node};
     vertex.rest_quanta = wire::quantise_rest(topology_.rest().subspan(node.value, 1)).front();
     vertex.is_fixed = world.node_classes[node.value] == world::NodeClass::Fixed;
-    const auto made = std::ranges::find(new_nodes_, node, &cutting::NewNode::node);
-    if (made != new_nodes_.end()) {
+    const auto made = std::ranges::lower_bound(new_nodes_, node, {}, &cutting::NewNode::node);
+    if (made != new_nodes_.end() && made->node == node) {
       const auto a = layout_.vertex_of_node[made->a.value],
                  b = layout_.vertex_of_node[made->b.value];
       if (a.is_valid() && b.is_valid()) vertex.a = a, vertex.b = b, vertex.t = made->t;
@@ -213,17 +196,13 @@ void TissueCuts::visit_state(world::StateArchive& archive, world::World& world) 
   archive.value(history_hash_);
   archive.value(published_);
   archive.value(layout_.epoch);
-  if (archive.is_reading())
-    read_history(archive, world);
-  else if (!archive.is_hashing())
-    for (auto& events : history_) {
-      bool has_more = true;
-      archive.flag(has_more);
-      cutting::visit_state(archive, events);
-    }
-  if (!archive.is_hashing() && !archive.is_reading()) {
-    bool has_more = false;
-    archive.flag(has_more);
+  if (!archive.is_hashing()) {  // history_hash_ stands for it
+    auto count = static_cast<std::uint32_t>(history_.size());
+    archive.value(count);
+    if (archive.is_reading())
+      read_history(archive, count, world);
+    else
+      for (auto& events : history_) cutting::visit_state(archive, events);
   }
   if (!archive.ok()) return;
   if (can_cut()) cutter_->visit_state(archive);
@@ -240,18 +219,15 @@ void TissueCuts::visit_state(world::StateArchive& archive, world::World& world) 
   }
 }
 
-void TissueCuts::read_history(world::StateArchive& archive, world::World& world) {
+void TissueCuts::read_history(world::StateArchive& archive, std::uint32_t count,
+                              world::World& world) {
   const auto wanted = history_hash_;
   history_hash_ = 0;
-  while (archive.ok()) {
-    bool has_more = false;
-    archive.flag(has_more);
-    if (!has_more) break;
+  for (std::uint32_t i = 0; i < count; ++i) {
     cutting::CutEvents events;
     cutting::visit_state(archive, events);
-    if (!archive.ok() || !can_cut() || moves_nodes(events) || !cutter_->repeat(events))
+    if (!archive.ok() || !can_cut() || moves_nodes(events) || !cutter_->repeat(events, new_nodes_))
       return archive.fail();
-    new_nodes_ = nodes_made_by(events);
     record(std::move(events));
     follow(world);
     clear_changes();

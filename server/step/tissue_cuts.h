@@ -68,8 +68,8 @@ class TissueCuts {
   void forget_pending();
   void record(cutting::CutEvents events);
   void extend_layout(const world::World& world, const world::SurfaceEdit& edit);
-  void feel(const input::ToolTable& tools, double opened_area_m2);
-  void read_history(world::StateArchive& archive, world::World& world);
+  void resist(const input::ToolTable& tools, double opened_area_m2);
+  void read_history(world::StateArchive& archive, std::uint32_t count, world::World& world);
 
   dynamics::Topology topology_;
   std::unique_ptr<cutting::Cutter> cutter_;

@@ -17,10 +17,9 @@ struct SurfaceEdit {
   };
 
   std::vector<TriangleIndex> removed;  // ascending
-  std::vector<Triangle> added;         // numbers from first_added on
-  std::uint32_t first_added = 0;
-  std::vector<NodeIndex> surfaced;  // nodes that were not on the surface, ascending
-  std::vector<NodeIndex> touched;   // nodes of what was removed and added, ascending
+  std::vector<Triangle> added;         // the next numbers, in order
+  std::vector<NodeIndex> surfaced;     // nodes that were not on the surface, ascending
+  std::vector<NodeIndex> touched;      // nodes of what was removed and added, ascending
 
   void clear() { removed.clear(), added.clear(), surfaced.clear(), touched.clear(); }
 };

@@ -164,7 +164,9 @@ Bytes CutOrgan::state() {
 }
 
 std::string CutOrgan::resume(CutOrgan& other) {
-  if (const auto status = cutter_.repeat(other.history_); !status) return status.error().message;
+  std::vector<NewNode> made;
+  if (const auto status = cutter_.repeat(other.history_, made); !status)
+    return status.error().message;
   if (const auto status = apply(other.history_, copy_, copy_places_); !status)
     return status.error().message;
   const auto bytes = other.state();

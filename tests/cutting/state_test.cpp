@@ -144,11 +144,14 @@ TEST(CutterState, RepeatsOnlyWhatFitsAndOnlyWhenNoBladeIsOn) {
   CutEvents events;
   events.events = {Split{NodeIndex(0u), NodeIndex(1u), 32768, NodeIndex(64u)}};
   EXPECT_TRUE(box.cutter().move(0, Edge{{0, 0, 0}, {0, 0, 0.01}}));
-  EXPECT_FALSE(box.cutter().repeat(events).ok());
+  std::vector<NewNode> made;
+  EXPECT_FALSE(box.cutter().repeat(events, made).ok());
   box.cutter().lift(0);
   box.run_until_idle();
-  EXPECT_TRUE(box.cutter().repeat(events).ok());
-  EXPECT_FALSE(box.cutter().repeat(events).ok());
+  ASSERT_TRUE(box.cutter().repeat(events, made).ok());
+  ASSERT_EQ(made.size(), 1u);
+  EXPECT_EQ(made.front().node, NodeIndex(64u));
+  EXPECT_FALSE(box.cutter().repeat(events, made).ok());
   EXPECT_EQ(box.topology().node_count(), 65u);
 }
 
