@@ -24,6 +24,8 @@ enum class SpringLaw : std::uint8_t {
   VolumeConsistent = 1,  // k from Young's modulus, edge length and the volume of the tets around it
 };
 
+inline constexpr double kLeastTearStretch = 1.05;
+
 struct Material {
   double density_kg_m3 = 1060;
   SpringLaw spring_law = SpringLaw::VolumeConsistent;
@@ -38,13 +40,19 @@ struct Material {
   double poisson_ratio = 0.45;  // TensorMass, NeoHookean; springs have 1/4 whatever is asked
   // NeoHookean: volume averaged over each node's tets, against locking (Bonet & Burton 1998).
   bool has_averaged_volume = false;
-  // Transverse isotropy and tension of springs: along a spring at the angle a to the fibres,
+  // Transverse isotropy (springs) and tension (all laws): along a spring at the angle a to the
+  // fibres,
   //   k = k0 (1 + (fibre_stiffness_ratio - 1) cos^2 a),
-  //   rest length = length (1 - tension - fibre_tension cos^2 a)    (Nakao 2003 eq. 3).
+  //   rest length = length (1 - tension - fibre_tension cos^2 a)    (Nakao 2003 eq. 3);
+  // tets accordingly (dynamics::stress_free_shape).
   Vec3d fibre_direction{};  // of any length; zero: none
   double fibre_stiffness_ratio = 1;
   double tension = 0;
   double fibre_tension = 0;
+  // A blade's work per area of wound, one side, J/m^2; about that of liver (Azar & Hayward 2008).
+  double cut_energy_j_m2 = 150;
+  // How far it can be stretched, length over length at rest, before it tears; 0: it never does.
+  double tear_stretch = 0;
 
   bool operator==(const Material&) const = default;
 };

@@ -47,7 +47,10 @@ Status check_material(const Organ& organ, const Material& m) {
         number("spring damping time (s)", m.spring_damping_time_s, 0, 100),
         number("Poisson's ratio", m.poisson_ratio, 0, 0.4999),
         number("fibre stiffness ratio", m.fibre_stiffness_ratio, 0, 1000),
-        number("tension", m.tension, 0, 0.9), number("fibre tension", m.fibre_tension, 0, 0.9)})
+        number("tension", m.tension, 0, 0.9), number("fibre tension", m.fibre_tension, 0, 0.9),
+        number("cut energy (J/m^2)", m.cut_energy_j_m2, 0, 1e6),
+        m.tear_stretch == 0 ? Status()
+                            : number("tear stretch", m.tear_stretch, kLeastTearStretch, 100)})
     if (!s) return s;
   if (!is_finite(m.fibre_direction)) return broken(organ, "fibre direction is not finite");
   const bool has_tet_springs = !organ.mesh.tets.empty() && organ.mesh.links.empty();
@@ -143,7 +146,9 @@ std::vector<double> numbers_of(const Material& m) {
           m.fibre_direction.z,
           m.fibre_stiffness_ratio,
           m.tension,
-          m.fibre_tension};
+          m.fibre_tension,
+          m.cut_energy_j_m2,
+          m.tear_stretch};
 }
 
 template <typename T>

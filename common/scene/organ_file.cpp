@@ -72,6 +72,8 @@ void put_material(const Material& m, proto::Material& out) {
   out.set_fibre_stiffness_ratio(m.fibre_stiffness_ratio);
   out.set_tension(m.tension);
   out.set_fibre_tension(m.fibre_tension);
+  out.set_cut_energy_j_m2(m.cut_energy_j_m2);
+  out.set_tear_stretch(m.tear_stretch);
 }
 
 Status take_material(const proto::Material& in, Material& m) {
@@ -93,7 +95,9 @@ Status take_material(const proto::Material& in, Material& m) {
        .fibre_direction = {},
        .fibre_stiffness_ratio = in.fibre_stiffness_ratio(),
        .tension = in.tension(),
-       .fibre_tension = in.fibre_tension()};
+       .fibre_tension = in.fibre_tension(),
+       .tear_stretch = in.tear_stretch()};
+  if (in.has_cut_energy_j_m2()) m.cut_energy_j_m2 = in.cut_energy_j_m2();
   if (in.fibre_direction_size() == 3) m.fibre_direction = vector_at(in.fibre_direction(), 0);
   return {};
 }

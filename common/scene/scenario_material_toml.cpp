@@ -24,6 +24,8 @@ void read_material_keys(TableReader& reader, MaterialChange& material) {
   material.fibre_stiffness_ratio = reader.number("fibre_stiffness_ratio", 0, 1000);
   material.tension = reader.number("tension", 0, 0.9);
   material.fibre_tension = reader.number("fibre_tension", 0, 0.9);
+  material.cut_energy_j_m2 = reader.number("cut_energy_j_m2", 0, 1e6);
+  material.tear_stretch = reader.number("tear_stretch", 0, 100);
   if (material.young_modulus_pa && material.spring_stiffness_n_m)
     reader.fail("young_modulus_pa", "and spring_stiffness_n_m exclude each other, remove one");
 }

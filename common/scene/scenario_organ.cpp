@@ -40,10 +40,7 @@ constexpr std::array kLawKeys{
     LawKey{"poisson_ratio", false, true, true,
            "is of tets: springs have 1/4 whatever is asked, see elastic_law"},
     LawKey{"averaged_volume", false, false, true, "is of elastic_law = \"neo-hookean\""},
-    LawKey{"fibre_direction", true, false, false, "is of springs"},
-    LawKey{"fibre_stiffness_ratio", true, false, false, "is of springs"},
-    LawKey{"tension", true, false, false, "is of springs"},
-    LawKey{"fibre_tension", true, false, false, "is of springs"}};
+    LawKey{"fibre_stiffness_ratio", true, false, false, "is of springs"}};
 
 bool applies(const LawKey& key, ElasticLaw law) {
   return law == ElasticLaw::Springs      ? key.springs
@@ -101,6 +98,12 @@ Status Resolver::change_material(const MaterialChange& change, const Organ& orga
   set(change.fibre_stiffness_ratio, m.fibre_stiffness_ratio);
   set(change.tension, m.tension);
   set(change.fibre_tension, m.fibre_tension);
+  set(change.cut_energy_j_m2, m.cut_energy_j_m2);
+  set(change.tear_stretch, m.tear_stretch);
+  if (m.tear_stretch > 0 && m.tear_stretch < scene::kLeastTearStretch)
+    return wrong(change.place_of("tear_stretch"),
+                 "is a length over a length at rest: write at least 1.05, or 0 for tissue that "
+                 "never tears");
   for (const char* key : {"fibre_stiffness_ratio", "fibre_tension"}) {
     const Place& place = change.place_of(key);
     if (&place != &change.place && length(m.fibre_direction) == 0)
@@ -108,7 +111,7 @@ Status Resolver::change_material(const MaterialChange& change, const Organ& orga
   }
   if (m.tension + m.fibre_tension > 0.9)
     return wrong(change.place_of(change.fibre_tension ? "fibre_tension" : "tension"),
-                 "shortens springs by more than 0.9 of their length, write less");
+                 "shorten tissue by more than 0.9 of its length, write less");
   return {};
 }
 

@@ -137,6 +137,9 @@ void print_material(const scene::Material& m) {
                 m.fibre_direction.x, m.fibre_direction.y, m.fibre_direction.z,
                 m.fibre_stiffness_ratio, m.fibre_tension);
   if (m.tension > 0) std::printf("  tension             %.4g\n", m.tension);
+  std::printf("  cutting             %.4g J/m^2 of wound\n", m.cut_energy_j_m2);
+  if (m.tear_stretch > 0)
+    std::printf("  tears               at %.4g times its length\n", m.tear_stretch);
   std::printf("  density             %.4g kg/m^3\n", m.density_kg_m3);
   std::printf("  damping             %.4g 1/s per node, %.4g ms along springs\n",
               m.node_damping_per_s, m.spring_damping_time_s * 1e3);

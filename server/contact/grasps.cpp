@@ -84,6 +84,12 @@ void GraspTable::follow_slip(const ContactList& contacts, const world::World& wo
   }
 }
 
+bool GraspTable::holds(NodeIndex node) const {
+  return std::ranges::any_of(grasps_, [node](const Grasp& grasp) {
+    return std::ranges::binary_search(grasp.nodes, node);
+  });
+}
+
 void GraspTable::add_copy(NodeIndex node, NodeIndex copy) {
   for (auto& grasp : grasps_) {
     const auto at = std::ranges::lower_bound(grasp.nodes, node);

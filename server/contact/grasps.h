@@ -46,6 +46,9 @@ class GraspTable {
     return grasps_[slot.value].is_anchored ? grasps_[slot.value].anchor : tool.pose;
   }
 
+  // O(tools x log(nodes held)).
+  bool holds(NodeIndex node) const;
+
   // Before inputs change a tool: keeps the last pose of grasps that are going to fade.
   void anchor(ToolSlot slot, const Pose& pose);
   // After the claims were decided: takes hold of what was granted, lets go of what ended.

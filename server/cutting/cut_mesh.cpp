@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "common/base/assert.h"
+#include "common/scene/organ.h"
 
 namespace trocar::cutting {
 namespace {
@@ -192,7 +193,11 @@ void CutMesh::open(std::span<const TetFace> faces, std::span<const Star> stars) 
                                static_cast<std::uint32_t>(faces.size())});
   for (const auto& face : faces) {
     events.faces.push_back(face);
-    out_->opened_area_m2 += face_area(topology_, face);
+    const double area = face_area(topology_, face);
+    out_->opened_area_m2 += area;
+    out_->work_j +=
+        area *
+        scene::material_at(topology_.organ(), topology_.material_of(face.tet)).cut_energy_j_m2;
   }
   copies_.clear();
   mark_wound(topology_, faces);

@@ -23,6 +23,8 @@ struct CutOutput {
   std::vector<NewNode>
       new_nodes;               // in order: a parent may be new, too; those that moved among them
   double opened_area_m2 = 0;   // one side of the wound, at rest
+  double torn_area_m2 = 0;     // part of it
+  double work_j = 0;           // of blades, by the materials' energy per area
   double waiting_area_m2 = 0;  // of strokes that ended: faces that could not be opened
   std::uint32_t crossed_tets = 0, splits = 0, labels = 0, refused_splits = 0, pinch_splits = 0;
   // Method::Nakao: tets of the paper's two patterns and other crossed ones; nodes outside the patch

@@ -45,9 +45,9 @@ void Cutter::lift(std::uint32_t blade) {
 }
 
 bool Cutter::is_idle() const {
-  return std::ranges::none_of(strokes_, [](const Stroke& stroke) {
-    return stroke.is_active && (stroke.has_ended || stroke.motion.has_strip());
-  });
+  return torn_.empty() && std::ranges::none_of(strokes_, [](const Stroke& stroke) {
+           return stroke.is_active && (stroke.has_ended || stroke.motion.has_strip());
+         });
 }
 
 double Cutter::behind_m(std::uint32_t blade) const {
@@ -112,13 +112,19 @@ void Cutter::cut(std::span<const Vec3f> displacements, CutOutput& out, double tr
   out.clear();
   if (is_idle()) return;
   mesh_.begin(displacements, travel_m, out);
+  if (!torn_.empty()) {
+    opening_.open(mesh_, torn_);
+    torn_.clear();
+    out.torn_area_m2 = out.opened_area_m2;
+    out.work_j = 0;
+  }
   order_.clear();
   for (std::uint32_t s = 0; s < strokes_.size(); ++s)
     if (strokes_[s].is_active && (strokes_[s].has_ended || strokes_[s].motion.has_strip()))
       order_.push_back(s);
   order_strokes();
-  const auto share = std::max<std::uint32_t>(
-      1, mesh_.settings().edits_per_call / static_cast<std::uint32_t>(order_.size()));
+  const auto share =
+      mesh_.settings().edits_per_call / std::max(1u, static_cast<std::uint32_t>(order_.size()));
   for (const auto s : order_) {
     auto budget = share;
     const bool is_done = work(strokes_[s], budget);

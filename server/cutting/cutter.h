@@ -39,6 +39,9 @@ class Cutter {
   bool move(std::uint32_t blade, std::span<const Vec3d> edge);
   void lift(std::uint32_t blade);
 
+  // Inner faces, each from the side of the lower tet, ascending, that the next cut() opens first.
+  void tear(std::span<const TetFace> faces) { torn_.assign(faces.begin(), faces.end()); }
+
   // displacements: of the nodes from rest, m, node_count of them; none: everything is at rest.
   // travel_m: a sum over ticks of the farthest that any node has moved, by which only what is near
   // the blades is looked at; the edits are the same without it.
@@ -57,7 +60,7 @@ class Cutter {
   // To be told of what others remove between calls.
   Places& places() { return mesh_.places(); }
 
-  // Nothing to do until a blade moves.
+  // Nothing to do until a blade moves or something tears.
   bool is_idle() const;
   // How far the blade has gone since the place up to which all is cut, m.
   double behind_m(std::uint32_t blade) const;
@@ -85,6 +88,7 @@ class Cutter {
   std::uint32_t next_id_ = 0;
   std::vector<std::uint32_t> order_;  // places in strokes_ of some, by id
   std::vector<NodeIndex> kept_;
+  std::vector<TetFace> torn_;
 };
 
 }  // namespace trocar::cutting

@@ -302,12 +302,33 @@ void Opening::run(CutMesh& mesh, Stroke& stroke) {
     propose(mesh, stroke);
     cut_all(mesh);
   }
-  analyse_all(mesh);
-  while (close_offenders(mesh)) {
-  }
+  check_all(mesh);
   commit(mesh, stroke);
   cuts_->clear();
   stroke.fresh.clear();
+}
+
+void Opening::check_all(const CutMesh& mesh) {
+  analyse_all(mesh);
+  while (close_offenders(mesh)) {
+  }
+}
+
+void Opening::open(CutMesh& mesh, std::span<const TetFace> faces) {
+  proposals_.clear();
+  for (const auto& face : faces) {
+    const auto other = across(mesh.topology(), face);
+    TROCAR_ASSERT(other && face.tet < other->tet);
+    proposals_.push_back(
+        {face, other->tet, face_nodes(mesh.topology().tet(face.tet), face.corner)});
+  }
+  cut_all(mesh);
+  check_all(mesh);
+  faces_.clear();
+  for (const auto& proposal : proposals_)
+    if (proposal.is_open) faces_.push_back(proposal.face);
+  if (!faces_.empty()) mesh.open(faces_, std::span(stars_).first(nodes_.size()));
+  cuts_->clear();
 }
 
 void Opening::analyse_all(const CutMesh& mesh) {

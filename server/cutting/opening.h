@@ -16,6 +16,8 @@ namespace trocar::cutting {
 class Opening {
  public:
   void run(CutMesh& mesh, Stroke& stroke);
+  // Opens inner faces, whatever asks for it; those that would leave the surface not manifold stay.
+  void open(CutMesh& mesh, std::span<const TetFace> faces);
 
   // Of the path on which a tet lies, -1 or 1; decides it for a tet all of whose nodes are labelled.
   int side(const CutMesh& mesh, Stroke& stroke, TetIndex tet);
@@ -52,6 +54,7 @@ class Opening {
   template <typename Causes>
   void offend(std::size_t star, Causes&& causes);
   bool close_offenders(const CutMesh& mesh);
+  void check_all(const CutMesh& mesh);
   void commit(CutMesh& mesh, Stroke& stroke);
 
   std::vector<TetIndex> tets_;            // with faces that may be proposed

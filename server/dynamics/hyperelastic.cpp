@@ -19,10 +19,6 @@ mesh::Tet seen_from(const mesh::Tet& tet, NodeIndex first) {
   return {d, c, b, a};
 }
 
-Vec3d opposite_area(std::span<const Vec3d> p, const mesh::Tet& tet) {
-  return cross(p[tet[3].value] - p[tet[1].value], p[tet[2].value] - p[tet[1].value]);
-}
-
 using Matrix = std::array<std::array<double, 3>, 3>;
 
 void add_outer(Matrix& m, const Vec3d& a, double s) {
@@ -122,7 +118,8 @@ void Hyperelastic<Law>::find_tets(const Topology& topology, NodeIndex node,
     const auto material = topology.material_of(t);
     if (!is_ours_[material]) continue;
     const auto [c10, bulk] = parameters_[material];
-    out.push_back({seen_from(topology.tet(t), node), c10, bulk});
+    const auto tet = seen_from(topology.tet(t), node);
+    out.push_back({tet, c10, bulk, stress_free_shape(topology, tet, material)});
   }
 }
 
@@ -134,7 +131,7 @@ void Hyperelastic<Law>::set_star(const Topology& topology, NodeIndex node, Slot 
     for (const auto t : topology.tets_of(node)) {
       const auto material = topology.material_of(t);
       if (!is_ours_[material]) continue;
-      const double v = tet_shape(topology.stress_free(), topology.tet(t)).volume;
+      const double v = stress_free_shape(topology, topology.tet(t), material).volume;
       volume += v;
       bulk += v * parameters_[material].bulk_modulus_pa;
       change += tet_shape(topology.rest(), topology.tet(t)).volume - v;
@@ -148,14 +145,13 @@ void Hyperelastic<Law>::set_star(const Topology& topology, NodeIndex node, Slot 
 
 // Theta of a node: how much smaller the block of the averaged volume is than the plain one.
 template <typename Law>
-double Hyperelastic<Law>::averaging_bound(const Topology& topology, const Groups& groups,
-                                          std::span<const At> tets) const {
+double Hyperelastic<Law>::averaging_bound(const Groups& groups, std::span<const At> tets) const {
   if (tets.empty()) return 1;
   star_motion_.clear();  // change of each star's volume per motion of the node
   Matrix full{}, exact{};
   for (const At& at : tets) {
-    const Vec3d area = opposite_area(topology.stress_free(), at.tet) / 6;
-    add_outer(full, area, at.bulk / tet_shape(topology.stress_free(), at.tet).volume);
+    const Vec3d area = at.shape.gradients[0] * at.shape.volume;  // dV/dx_a
+    add_outer(full, area, at.bulk / at.shape.volume);
     for (const auto node : at.tet) {
       auto found = std::ranges::find(star_motion_, node, &std::pair<NodeIndex, Vec3d>::first);
       if (found == star_motion_.end())
@@ -192,13 +188,12 @@ template <typename Law>
 void Hyperelastic<Law>::fill_lane(const Topology& topology, const Groups& groups,
                                   std::span<const At> tets, Group group, std::size_t lane) {
   const auto rest = topology.rest();
-  const double theta = has_averaged_volume_ ? averaging_bound(topology, groups, tets) : 1.0;
+  const double theta = has_averaged_volume_ ? averaging_bound(groups, tets) : 1.0;
   const auto rows = rows_[group];
   Vec3d constant_gradient;
   double constant_block = 0;
   for (std::size_t i = 0; i < tets.size(); ++i) {
-    const auto& [tet, c10, bulk] = tets[i];
-    const auto shape = tet_shape(topology.stress_free(), tet);
+    const auto& [tet, c10, bulk, shape] = tets[i];
     const auto& g = shape.gradients;
     const double scale = 2 * c10 * shape.volume;
     std::array<double, 4> w{};

@@ -15,6 +15,7 @@
 
 #include "server/dynamics/energy.h"
 #include "server/dynamics/psi.h"
+#include "server/dynamics/tet_shape.h"
 
 namespace trocar::dynamics {
 
@@ -69,12 +70,12 @@ class Hyperelastic final : public Energy {
   struct At {
     mesh::Tet tet;
     double c10 = 0, bulk = 0;  // Pa
+    TetShape shape;            // free of stress, of `tet`
   };
   void find_tets(const Topology& topology, NodeIndex node, std::vector<At>& out) const;
   void extend(const Groups& groups);
   void set_star(const Topology& topology, NodeIndex node, Slot slot);
-  double averaging_bound(const Topology& topology, const Groups& groups,
-                         std::span<const At> tets) const;
+  double averaging_bound(const Groups& groups, std::span<const At> tets) const;
   std::size_t fill(const Topology& topology, const Groups& groups, GroupLanes lanes);
   void fill_lane(const Topology& topology, const Groups& groups, std::span<const At> tets,
                  Group group, std::size_t lane);

@@ -28,6 +28,30 @@ TensorMass::Matrix TensorMass::edge_matrix(const Vec3d& gi, const Vec3d& gj, dou
   return k;
 }
 
+namespace {
+
+// Stress of tissue under tension, sigma = lambda tr(e) I + 2 mu e for the strain e = I - A that is
+// missing (A: stress_free_shape()), and its energy per volume.
+struct Tension {
+  double isotropic_pa = 0, mu_pa = 0, energy_pa = 0;
+  const scene::Material& material;
+
+  Vec3d stress_on(const Vec3d& v) const {
+    return v * isotropic_pa + (v - relaxed(material, v)) * (2 * mu_pa);
+  }
+};
+
+Tension tension_of(const scene::Material& material, const scene::LameParameters& lame) {
+  const double all = material.tension;
+  const double fibres = length_squared(material.fibre_direction) > 0 ? material.fibre_tension : 0;
+  const double trace = 3 * all + fibres;
+  const double squared = 3 * all * all + 2 * all * fibres + fibres * fibres;
+  return {lame.lambda_pa * trace, lame.mu_pa,
+          0.5 * lame.lambda_pa * trace * trace + lame.mu_pa * squared, material};
+}
+
+}  // namespace
+
 TensorMass::TensorMass(const Topology& topology, const Groups& groups) {
   std::vector<NodeIndex> neighbours;
   std::vector<std::uint32_t> bounds(topology.node_count());
@@ -44,8 +68,13 @@ TensorMass::TensorMass(const Topology& topology, const Groups& groups) {
 }
 
 // By ascending other end; each a sum over ascending tets.
-void TensorMass::find_edges(const Topology& topology, NodeIndex node, std::vector<Edge>& out) {
-  out.clear();
+void TensorMass::find_edges(const Topology& topology, NodeIndex node, Node& out) {
+  out.edges.clear();
+  out.gradient_n = {};
+  out.energy_j = 0;
+  const auto strain_of_rest = [&](NodeIndex n) {
+    return topology.rest()[n.value] - topology.stress_free()[n.value];
+  };
   for (const auto t : topology.tets_of(node)) {
     const auto& material = scene::material_at(topology.organ(), topology.material_of(t));
     if (material.elastic_law != scene::ElasticLaw::TensorMass) continue;
@@ -53,14 +82,22 @@ void TensorMass::find_edges(const Topology& topology, NodeIndex node, std::vecto
     const auto& tet = topology.tet(t);
     const auto shape = tet_shape(topology.stress_free(), tet);
     const auto i = static_cast<std::size_t>(std::ranges::find(tet, node) - tet.begin());
+    Vec3d gradient;
     for (std::size_t j = 0; j < 4; ++j) {
       if (i == j) continue;
-      auto found = std::ranges::find(out, tet[j], &Edge::other);
-      if (found == out.end()) found = out.insert(out.end(), {tet[j], {}});
-      found->k.add(edge_matrix(shape.gradients[i], shape.gradients[j], shape.volume, lame), 1);
+      auto found = std::ranges::find(out.edges, tet[j], &Edge::other);
+      if (found == out.edges.end()) found = out.edges.insert(out.edges.end(), {tet[j], {}});
+      const auto k = edge_matrix(shape.gradients[i], shape.gradients[j], shape.volume, lame);
+      found->k.add(k, 1);
+      gradient += k * (strain_of_rest(tet[j]) - strain_of_rest(node));
     }
+    const auto tension = tension_of(material, lame);
+    const Vec3d pull = tension.stress_on(shape.gradients[i]) * shape.volume;
+    out.gradient_n += gradient + pull;
+    out.energy_j += 0.5 * dot(strain_of_rest(node), gradient) + dot(strain_of_rest(node), pull) +
+                    shape.volume / 4 * tension.energy_pa;
   }
-  std::ranges::sort(out, {}, &Edge::other);
+  std::ranges::sort(out.edges, {}, &Edge::other);
 }
 
 std::size_t TensorMass::fill(const Topology& topology, const Groups& groups, GroupLanes lanes) {
@@ -69,16 +106,17 @@ std::size_t TensorMass::fill(const Topology& topology, const Groups& groups, Gro
   std::size_t written = 0;
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     if (!lanes.has(lane)) continue;
-    edges_[lane].clear();
-    if (nodes[lane].is_valid()) find_edges(topology, nodes[lane], edges_[lane]);
-    counts[lane] = static_cast<std::uint32_t>(edges_[lane].size());
+    Node& node = lane_nodes_[lane];
+    node.edges.clear();
+    if (nodes[lane].is_valid()) find_edges(topology, nodes[lane], node);
+    counts[lane] = static_cast<std::uint32_t>(node.edges.size());
     written += counts[lane];
-    set_node(topology, nodes[lane], static_cast<Slot>(lanes.group * kLanes + lane), edges_[lane]);
+    set_node(node, static_cast<Slot>(lanes.group * kLanes + lane));
   }
   const auto rows = rows_.reshape(lanes, counts);
   for (std::size_t lane = 0; lane < kLanes; ++lane)
     for (std::size_t e = 0; e < counts[lane]; ++e) {
-      const Edge& edge = edges_[lane][e];
+      const Edge& edge = lane_nodes_[lane].edges[e];
       rows[e].neighbour.v[lane] = groups.slot_of(edge.other);
       for (std::size_t i = 0; i < 3; ++i)
         for (std::size_t j = 0; j < 3; ++j)
@@ -88,21 +126,14 @@ std::size_t TensorMass::fill(const Topology& topology, const Groups& groups, Gro
 }
 
 // Quantities of the node itself: zero where there is none.
-void TensorMass::set_node(const Topology& topology, NodeIndex node, Slot slot,
-                          std::span<const Edge> edges) {
-  const auto strain_of_rest = [&](NodeIndex n) {
-    return topology.rest()[n.value] - topology.stress_free()[n.value];
-  };
+void TensorMass::set_node(const Node& node, Slot slot) {
   Matrix own;
-  Vec3d gradient;
-  for (const Edge& edge : edges) {
-    own.add(edge.k, -1);
-    gradient += edge.k * (strain_of_rest(edge.other) - strain_of_rest(node));
-  }
+  for (const Edge& edge : node.edges) own.add(edge.k, -1);
   const auto f = [&](std::size_t i, std::size_t j) { return static_cast<float>(own.m[i][j]); };
   blocks_[slot / kLanes].set(slot % kLanes, {f(0, 0), f(0, 1), f(0, 2), f(1, 1), f(1, 2), f(2, 2)});
-  rest_gradient_[slot / kLanes].set(slot % kLanes, to_float(gradient));
-  rest_energies_j_[slot] = edges.empty() ? 0 : 0.5 * dot(strain_of_rest(node), gradient);
+  const bool is_empty = node.edges.empty();
+  rest_gradient_[slot / kLanes].set(slot % kLanes, is_empty ? Vec3f{} : to_float(node.gradient_n));
+  rest_energies_j_[slot] = is_empty ? 0 : node.energy_j;
 }
 
 std::size_t TensorMass::rebuild(const Topology& topology, const Groups& groups,

@@ -40,19 +40,24 @@ class TensorMass final : public Energy {
     NodeIndex other;
     Matrix k;
   };
+  struct Node {
+    std::vector<Edge> edges;  // ascending
+    Vec3d gradient_n;         // at rest, of tension and of the stress-free pose
+    double energy_j = 0;      // likewise, its share
+  };
 
   static Matrix edge_matrix(const Vec3d& gi, const Vec3d& gj, double volume,
                             const scene::LameParameters& lame);
-  static void find_edges(const Topology& topology, NodeIndex node, std::vector<Edge>& out);
+  static void find_edges(const Topology& topology, NodeIndex node, Node& out);
   std::size_t fill(const Topology& topology, const Groups& groups, GroupLanes lanes);
-  void set_node(const Topology& topology, NodeIndex node, Slot slot, std::span<const Edge> edges);
+  void set_node(const Node& node, Slot slot);
 
   GroupRows<Row> rows_;
   std::vector<SymMat3Lanes> blocks_;  // K_ii per group
   // N per group: of the rest pose against the stress-free one
   std::vector<Vec3Lanes> rest_gradient_;
-  std::vector<double> rest_energies_j_;          // per slot
-  std::array<std::vector<Edge>, kLanes> edges_;  // while rows are filled
+  std::vector<double> rest_energies_j_;  // per slot
+  std::array<Node, kLanes> lane_nodes_;  // while rows are filled
 };
 
 }  // namespace trocar::dynamics

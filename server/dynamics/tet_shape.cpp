@@ -15,4 +15,31 @@ TetShape tet_shape(std::span<const Vec3d> positions, const mesh::Tet& tet) {
   return shape;
 }
 
+namespace {
+
+// f (f . v), for fibres of any length.
+Vec3d along_fibres(const scene::Material& material, const Vec3d& v) {
+  const auto& f = material.fibre_direction;
+  const double squared = length_squared(f);
+  return squared > 0 ? f * (dot(f, v) / squared) : Vec3d{};
+}
+
+}  // namespace
+
+Vec3d relaxed(const scene::Material& material, const Vec3d& vector) {
+  return vector * (1 - material.tension) - along_fibres(material, vector) * material.fibre_tension;
+}
+
+// Gradients go by the inverse of the stretch (Sherman and Morrison's formula).
+TetShape stress_free_shape(const Topology& topology, const mesh::Tet& tet, std::uint16_t material) {
+  auto shape = tet_shape(topology.stress_free(), tet);
+  const auto& m = scene::material_at(topology.organ(), material);
+  const double fibre_tension = length_squared(m.fibre_direction) > 0 ? m.fibre_tension : 0;
+  if (m.tension == 0 && fibre_tension == 0) return shape;
+  const double across = 1 - m.tension, along = across - fibre_tension;
+  shape.volume *= across * across * along;
+  for (auto& g : shape.gradients) g = (g + along_fibres(m, g) * (fibre_tension / along)) / across;
+  return shape;
+}
+
 }  // namespace trocar::dynamics

@@ -35,8 +35,7 @@ std::string why_not(const Tunable& tunable, const Material& m, bool is_static) {
     return "its stiffness comes from young_modulus_pa, fit that";
   if (tunable.key == "poisson_ratio" && is_springs)
     return "springs have 1/4 whatever is asked, see elastic_law";
-  if ((tunable.key == "tension" || tunable.key == "fibre_stiffness_ratio") && !is_springs)
-    return "it is of springs";
+  if (tunable.key == "fibre_stiffness_ratio" && !is_springs) return "it is of springs";
   if (tunable.key == "fibre_stiffness_ratio" && length(m.fibre_direction) == 0)
     return "it needs a fibre_direction in [material]";
   if (is_static && tunable.key.find("damping") != std::string_view::npos)

@@ -103,8 +103,20 @@ void follow_contacts(State& state, StepContext& context) {
   state.proxies.follow(context.contacts, state.world, state.tools);
 }
 
+// Each active node once a frame: what has been stretched for that long tears. Not where it is held:
+// there it would find no relief.
+void find_tears(State& state, StepContext& context) {
+  if (!state.cuts.can_tear()) return;
+  context.may_tear.clear();
+  const auto nodes = context.active.nodes();
+  for (auto i = state.world.tick % kTicksPerFrame; i < nodes.size(); i += kTicksPerFrame)
+    if (!state.grasps.holds(nodes[i])) context.may_tear.push_back(nodes[i]);
+  state.cuts.tear(state.world, context.may_tear);
+}
+
 void cut_tissue(State& state, StepContext& context) {
   auto& cuts = state.cuts;
+  find_tears(state, context);
   const bool has_cut =
       cuts.cut(state.tools, state.claims, state.world, context.travel_m, context.report.cut);
   if (context.report.cut.is_full) context.report.faults |= kFaultCutLimit;

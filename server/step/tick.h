@@ -77,7 +77,7 @@ struct StepContext {
   std::array<std::span<const NodeIndex>, kMaxTools + 1> seeds;
   std::vector<locks::ClaimRequest> requests;
   std::vector<Vec3f> surface_displacements;
-  std::vector<NodeIndex> changed_neighbours;
+  std::vector<NodeIndex> changed_neighbours, may_tear;
   double travel_m = 0;  // sum over ticks of the farthest that any node has moved
   StateHasher hasher;
 

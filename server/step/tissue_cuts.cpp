@@ -32,10 +32,17 @@ bool moves_nodes(const cutting::CutEvents& events) {
 }  // namespace
 
 TissueCuts::TissueCuts(const scene::Organ& organ)
-    : topology_(organ), surface_(organ), layout_(wire::make_surface_layout(organ)) {
+    : topology_(organ),
+      tearing_(organ),
+      surface_(organ),
+      layout_(wire::make_surface_layout(organ)) {
   if (!organ.mesh.tets.empty() && !topology_.has_links())
     cutter_ = std::make_unique<cutting::Cutter>(topology_);
   first_pending_ = static_cast<std::uint32_t>(layout_.triangles.size());
+}
+
+void TissueCuts::tear(const world::World& world, std::span<const NodeIndex> nodes) {
+  if (can_tear()) cutter_->tear(tearing_.find(topology_, world.displacements, nodes));
 }
 
 bool TissueCuts::cut(const input::ToolTable& tools, const locks::ClaimTable& claims,
@@ -65,18 +72,19 @@ bool TissueCuts::cut(const input::ToolTable& tools, const locks::ClaimTable& cla
   report.crossed_tets = output_.crossed_tets;
   report.splits = output_.splits;
   report.opened_area_m2 = output_.opened_area_m2;
+  report.torn_area_m2 = output_.torn_area_m2;
   report.is_behind = output_.is_behind;
-  resist(tools, output_.opened_area_m2);
+  resist(tools, output_.work_j);
   if (output_.events.events.empty()) return false;
   new_nodes_.assign(output_.new_nodes.begin(), output_.new_nodes.end());
   record(output_.events);
   return true;
 }
 
-// The work of opening a wound is its area times kCutEnergy: per way that the blade goes, a force
-// against it. Wounds open in steps of a part of an element, so the area per way is that of the last
-// few millimetres. Of several blades each gets its share by how far it went.
-void TissueCuts::resist(const input::ToolTable& tools, double opened_area_m2) {
+// The work of opening a wound, per way that the blade goes, is a force against it. Wounds open in
+// steps of a part of an element, so it is that of the last few millimetres. Of several blades each
+// gets its share by how far it went.
+void TissueCuts::resist(const input::ToolTable& tools, double work_j) {
   float total = 0;
   for (std::uint8_t i = 0; i < kMaxTools; ++i)
     if (blades_[i].is_cutting) total += length(tools[ToolSlot{i}].pose.position - blades_[i].tip);
@@ -89,13 +97,12 @@ void TissueCuts::resist(const input::ToolTable& tools, double opened_area_m2) {
     const Vec3f moved = tools[ToolSlot{i}].pose.position - blade.tip;
     blade.tip = tools[ToolSlot{i}].pose.position;
     const float way = length(moved), share = total > 0 ? way / total : 0;
-    blade.area_per_m +=
-        (static_cast<float>(opened_area_m2) * share - blade.area_per_m * way) / kWay_m;
-    blade.area_per_m = std::max(0.0f, blade.area_per_m);
+    blade.work_per_m += (static_cast<float>(work_j) * share - blade.work_per_m * way) / kWay_m;
+    blade.work_per_m = std::max(0.0f, blade.work_per_m);
     blade.velocity += (moved / kTickSeconds - blade.velocity) * kNewest;
     const float speed = length(blade.velocity);
-    const float force = std::min(kCutEnergy_j_m2 * blade.area_per_m, kMostForce_n) *
-                        std::min(1.0f, speed / kSlow_m_s);
+    const float force =
+        std::min(blade.work_per_m, kMostForce_n) * std::min(1.0f, speed / kSlow_m_s);
     blade.force_n = speed > 0 ? blade.velocity * (-force / speed) : Vec3f{};
   }
 }
@@ -211,10 +218,10 @@ void TissueCuts::visit_state(world::StateArchive& archive, world::World& world) 
     if (!blade.is_cutting) continue;
     archive.value(blade.tip);
     archive.value(blade.velocity);
-    archive.value(blade.area_per_m);
+    archive.value(blade.work_per_m);
     archive.value(blade.force_n);
     if (archive.is_reading() && !(is_finite(blade.tip) && is_finite(blade.velocity) &&
-                                  is_finite(blade.force_n) && std::isfinite(blade.area_per_m)))
+                                  is_finite(blade.force_n) && std::isfinite(blade.work_per_m)))
       archive.fail();
   }
 }

@@ -1,6 +1,7 @@
 #pragma once
 
-// The organ as it has been cut: its topology, the knives at work in it, the surface that follows,
+// The organ as it has been cut and torn: its topology, the knives at work in it, the surface that
+// follows,
 // and the list of all edits. That list is the state: who applies it to the organ has the same
 // topology, surface and slots again. The tick hash covers a hash of it.
 //
@@ -16,15 +17,13 @@
 #include "common/wire/surface_layout.h"
 #include "server/cutting/cutter.h"
 #include "server/cutting/surface_mesh.h"
+#include "server/cutting/tearing.h"
 #include "server/input/tool_table.h"
 #include "server/locks/claims.h"
 #include "server/step/tick_report.h"
 #include "server/world/world.h"
 
 namespace trocar::step {
-
-// What a blade costs per area of wound, J/m^2; about that of liver (Azar and Hayward 2008).
-inline constexpr float kCutEnergy_j_m2 = 150;
 
 class TissueCuts {
  public:
@@ -35,6 +34,10 @@ class TissueCuts {
   const wire::SurfaceLayout& layout() const { return layout_; }
   // Of the tissue on a blade, N, world frame.
   Vec3f force_n(ToolSlot tool) const { return blades_[tool.value].force_n; }
+
+  // What is stretched too far around these nodes tears in the next cut().
+  void tear(const world::World& world, std::span<const NodeIndex> nodes);
+  bool can_tear() const { return can_cut() && tearing_.is_possible(); }
 
   // Blades of claims in effect go where their tools are; then what they cross is cut. True if the
   // topology has changed: then follow() is due, then clear_changes().
@@ -60,7 +63,7 @@ class TissueCuts {
   struct Blade {
     Vec3f tip;             // m, in the tick before
     Vec3f velocity;        // m/s, smoothed
-    float area_per_m = 0;  // of wound per way
+    float work_per_m = 0;  // N: of cutting, per way
     Vec3f force_n;
     bool is_cutting = false;
   };
@@ -68,11 +71,12 @@ class TissueCuts {
   void forget_pending();
   void record(cutting::CutEvents events);
   void extend_layout(const world::World& world, const world::SurfaceEdit& edit);
-  void resist(const input::ToolTable& tools, double opened_area_m2);
+  void resist(const input::ToolTable& tools, double work_j);
   void read_history(world::StateArchive& archive, std::uint32_t count, world::World& world);
 
   dynamics::Topology topology_;
   std::unique_ptr<cutting::Cutter> cutter_;
+  cutting::Tearing tearing_;
   cutting::SurfaceMesh surface_;
   wire::SurfaceLayout layout_;
   std::vector<cutting::CutEvents> history_;

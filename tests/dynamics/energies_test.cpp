@@ -299,6 +299,25 @@ const auto kOthers =
                                  o.material.fibre_tension = 0.02;
                                },
                            .has_stress_at_rest = true},
+                      Case{.name = "TensorMassUnderTension",
+                           .change =
+                               [](scene::Organ& o) {
+                                 o.material.elastic_law = ElasticLaw::TensorMass;
+                                 o.material.tension = 0.04;
+                                 o.material.fibre_direction = {1, 0, 1};
+                                 o.material.fibre_tension = 0.02;
+                               },
+                           .is_linear = true,
+                           .has_stress_at_rest = true},
+                      Case{.name = "NeoHookeanUnderTension",
+                           .change =
+                               [](scene::Organ& o) {
+                                 o.material.elastic_law = ElasticLaw::NeoHookean;
+                                 o.material.tension = 0.04;
+                                 o.material.fibre_direction = {1, 0, 1};
+                                 o.material.fibre_tension = 0.02;
+                               },
+                           .has_stress_at_rest = true},
                       Case{.name = "NeoHookeanStiffInclusion", .change = [](scene::Organ& o) {
                              o.material.elastic_law = ElasticLaw::NeoHookean;
                              auto stiff = o.material;

@@ -56,6 +56,7 @@ scene::Organ block_of_many_materials(bool has_averaged_volume) {
       if (is_in(organ.mesh.rest_positions[n])) nodes.emplace_back(n);
     return nodes;
   };
+  organ.material.tension = 0.02;
   auto springs = organ.material, stiff = organ.material;
   springs.elastic_law = ElasticLaw::Springs;
   springs.fibre_direction = {1, 0, 1};
@@ -64,6 +65,8 @@ scene::Organ block_of_many_materials(bool has_averaged_volume) {
   stiff.elastic_law = ElasticLaw::NeoHookean;
   stiff.young_modulus_pa *= 10;
   stiff.has_averaged_volume = has_averaged_volume;
+  stiff.fibre_direction = {0, 1, 2};
+  stiff.fibre_tension = 0.04;
   organ.regions = {{"right", springs, half([](const Vec3d& p) { return p.x > -0.005; })},
                    {"top", stiff, half([](const Vec3d& p) { return p.y > -0.006; })}};
   for (const auto& p : organ.mesh.rest_positions)

@@ -1,0 +1,67 @@
+#pragma once
+
+// Symmetric 3 x 3 matrices: principal values and directions by Jacobi's rotations. Square roots
+// only, so the same bits everywhere that decisions are made from them.
+
+#include <array>
+#include <cmath>
+
+#include "common/math/vec3.h"
+
+namespace trocar {
+
+struct SymMat3d {
+  double xx = 0, yy = 0, zz = 0, xy = 0, xz = 0, yz = 0;
+
+  // Adds weight v v^T.
+  void add_outer(const Vec3d& v, double weight) {
+    xx += weight * v.x * v.x;
+    yy += weight * v.y * v.y;
+    zz += weight * v.z * v.z;
+    xy += weight * v.x * v.y;
+    xz += weight * v.x * v.z;
+    yz += weight * v.y * v.z;
+  }
+};
+
+struct Principal {
+  double value = 0;
+  Vec3d direction;  // of length 1
+};
+
+// The largest principal value. Relative error below 1e-12 for finite matrices.
+inline Principal largest_principal(const SymMat3d& matrix) {
+  std::array<std::array<double, 3>, 3> a{{{matrix.xx, matrix.xy, matrix.xz},
+                                          {matrix.xy, matrix.yy, matrix.yz},
+                                          {matrix.xz, matrix.yz, matrix.zz}}};
+  std::array<std::array<double, 3>, 3> v{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+  constexpr int kRounds = 8;  // it converges quadratically
+  for (int round = 0; round < kRounds; ++round)
+    for (std::size_t p = 0; p < 2; ++p)
+      for (std::size_t q = p + 1; q < 3; ++q) {
+        if (a[p][q] == 0) continue;
+        const double theta = (a[q][q] - a[p][p]) / (2 * a[p][q]);
+        const double t =
+            (theta < 0 ? -1.0 : 1.0) / (std::abs(theta) + std::sqrt(theta * theta + 1));
+        const double c = 1 / std::sqrt(t * t + 1), s = t * c;
+        for (std::size_t k = 0; k < 3; ++k) {
+          const double kp = a[k][p], kq = a[k][q];
+          a[k][p] = c * kp - s * kq;
+          a[k][q] = s * kp + c * kq;
+        }
+        for (std::size_t k = 0; k < 3; ++k) {
+          const double pk = a[p][k], qk = a[q][k];
+          a[p][k] = c * pk - s * qk;
+          a[q][k] = s * pk + c * qk;
+          const double kp = v[k][p], kq = v[k][q];
+          v[k][p] = c * kp - s * kq;
+          v[k][q] = s * kp + c * kq;
+        }
+      }
+  std::size_t largest = 0;
+  for (std::size_t i = 1; i < 3; ++i)
+    if (a[i][i] > a[largest][largest]) largest = i;
+  return {a[largest][largest], {v[0][largest], v[1][largest], v[2][largest]}};
+}
+
+}  // namespace trocar

@@ -1,0 +1,77 @@
+// A hand that pulls too hard: the tissue tears, not the server.
+
+#include <gtest/gtest.h>
+
+#include "common/scene/builtin_organs.h"
+#include "server/cutting/validate.h"
+#include "server/step/simulation.h"
+
+namespace trocar::step {
+namespace {
+
+scene::Organ liver(scene::ElasticLaw law, double tear_stretch) {
+  auto organ = *scene::make_liver(4000);
+  organ.material.elastic_law = law;
+  organ.material.tear_stretch = tear_stretch;
+  return organ;
+}
+
+// Takes hold of the end of the left lobe and draws it away, 10 cm/s.
+TickReport pull(Simulation& simulation) {
+  const Tick tick = simulation.current_tick() + 1;
+  Vec3f end{-1, 0, 0};
+  for (const auto& p : simulation.organ().mesh.rest_positions)
+    if (static_cast<float>(p.x) > end.x) end = to_float(p);
+  session::TickInputs inputs;
+  if (tick == 1) {
+    session::HandJoin join{.slot = {0}};
+    join.shapes[0] = {.radius_m = 0.002f, .length_m = 0.3f, .reach_m = 0.02f};
+    inputs.joins.push_back(join);
+  }
+  if (tick % 4 == 1) {
+    const float t = static_cast<float>(tick) * 1e-3f;
+    const Vec3f drawn{0.1f * std::max(0.0f, t - 0.2f), 0, 0};
+    inputs.samples.push_back(
+        {tool_slot({0}, 0), {{end + drawn, rotation_from_z({1, 0, 0})}, scene::Verb::Grasp}});
+  }
+  return simulation.tick(inputs, {});
+}
+
+TEST(Tears, AFlapPulledFarEnoughTearsOff) {
+  using enum scene::ElasticLaw;
+  for (const auto law : {Springs, TensorMass, NeoHookean}) {
+    Simulation simulation(liver(law, 1.4));
+    double torn = 0;
+    for (int i = 0; i < 1500; ++i) {
+      const auto report = pull(simulation);
+      ASSERT_EQ(report.nodes_rejected, 0u) << "tick " << report.tick;
+      torn += report.cut.torn_area_m2;
+    }
+    const auto& state = simulation.state();
+    const auto valid = cutting::validate(state.cuts.topology());
+    EXPECT_TRUE(valid.ok()) << valid.error().message;
+    EXPECT_GT(torn, 1e-5) << static_cast<int>(law);
+    EXPECT_GT(cutting::find_pieces(state.cuts.topology()).count, 1u) << static_cast<int>(law);
+    EXPECT_FALSE(state.grasps[tool_slot({0}, 0)].nodes.empty()) << "the hand still holds its part";
+  }
+}
+
+TEST(Tears, NothingTearsThatIsNotSaidTo) {
+  Simulation simulation(liver(scene::ElasticLaw::Springs, 0));
+  for (int i = 0; i < 600; ++i) ASSERT_EQ(pull(simulation).cut.torn_area_m2, 0);
+}
+
+TEST(Tears, ARestoredStateTearsOnBitForBit) {
+  Simulation a(liver(scene::ElasticLaw::NeoHookean, 1.3)),
+      b(liver(scene::ElasticLaw::NeoHookean, 1.3));
+  double torn = 0;
+  for (int i = 0; i < 2000 && torn == 0; ++i) torn += pull(a).cut.torn_area_m2;
+  ASSERT_GT(torn, 0);
+  Bytes snapshot;
+  a.write_snapshot(snapshot);
+  ASSERT_TRUE(b.restore_snapshot(snapshot).ok());
+  for (int i = 0; i < 150; ++i) ASSERT_EQ(pull(a).state_hash, pull(b).state_hash) << "tick " << i;
+}
+
+}  // namespace
+}  // namespace trocar::step
