@@ -10,6 +10,7 @@
 #include "client/app/picture.h"
 #include "client/net/net_source.h"
 #include "client/replay/replay_source.h"
+#include "client/replica/tool_messages.h"
 #include "common/base/log.h"
 #include "common/base/timing.h"
 #include "common/scene/script.h"
@@ -40,6 +41,7 @@ class Run {
 
  private:
   Status step(std::uint64_t now_ns);
+  void use_marks(std::uint64_t now_ns);
   bool is_over(std::uint64_t now_ns);
   Status take_screenshot(std::uint64_t now_ns, bool is_last);
   Status write_summary() const;
@@ -53,7 +55,7 @@ class Run {
   std::uint64_t picture_interval_ns_ = 0, next_picture_ns_ = 0;
   std::uint64_t start_ns_ = 0;
   std::uint64_t live_ns_ = 0;  // when the first frame was there
-  bool has_screenshot_ = false;
+  bool has_screenshot_ = false, has_marked_ = false, has_returned_ = false;
   std::string exit_reason_;
 };
 
@@ -68,6 +70,7 @@ Status Run::step(std::uint64_t now_ns) {
               replica_.topology().rest_positions.size());
   }
   if (const auto sent = hands_.send_due(replica_, source_, now_ns); !sent) return sent.error();
+  use_marks(now_ns);
   if (picture_) picture_->observe(replica_);
   if (picture_ && now_ns >= next_picture_ns_) {
     next_picture_ns_ = std::max(next_picture_ns_ + picture_interval_ns_, now_ns);
@@ -75,6 +78,16 @@ Status Run::step(std::uint64_t now_ns) {
     if (const auto taken = take_screenshot(now_ns, false); !taken) return taken.error();
   }
   return {};
+}
+
+void Run::use_marks(std::uint64_t now_ns) {
+  if (live_ns_ == 0) return;
+  const auto ask_at = [&](double seconds, bool& has_asked, bool is_return) {
+    if (has_asked || seconds < 0 || static_cast<double>(now_ns - live_ns_) * 1e-9 < seconds) return;
+    has_asked = replica::ask_for_mark(source_, is_return);
+  };
+  ask_at(options_.mark_at, has_marked_, false);
+  ask_at(options_.return_at, has_returned_, true);
 }
 
 bool Run::is_over(std::uint64_t now_ns) {

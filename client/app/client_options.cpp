@@ -94,6 +94,9 @@ Status check(const ClientOptions& options) {
   if (!options.script_file.empty() && !replica::has_tools(options.role))
     return Error{ErrorCode::Usage, "--script: an " + std::string(replica::name_of(options.role)) +
                                        " has no tools; use --role surgeon or assistant"};
+  if ((options.mark_at >= 0 || options.return_at >= 0) && options.role != replica::Role::Instructor)
+    return Error{ErrorCode::Usage,
+                 "--mark-at, --return-at: marks are an instructor's; use --role instructor"};
   if (options.display == Display::None && !options.screenshot_file.empty())
     return Error{ErrorCode::Usage, "--screenshot: --no-render draws nothing; use --headless"};
   return {};
@@ -146,6 +149,13 @@ Result<std::optional<ClientOptions>> parse_client_command_line(int argc, char** 
   app.add_option("--seconds", options.seconds, "leave after this many seconds")
       ->type_name("N")
       ->check(CLI::Range(0.0, 1e9));
+  app.add_option("--mark-at", options.mark_at,
+                 "as instructor: mark the organ so many seconds after joining")
+      ->type_name("S")
+      ->check(CLI::Range(0.0, 1e6));
+  app.add_option("--return-at", options.return_at, "as instructor: return it to the mark then")
+      ->type_name("S")
+      ->check(CLI::Range(0.0, 1e6));
   app.add_option("--script", options.script_file, "scripted hand instead of the mouse (TOML)")
       ->type_name("FILE");
   app.add_option("--replay", options.replay_file, "play a recorded session (.mcap)")

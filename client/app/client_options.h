@@ -34,8 +34,9 @@ struct ClientOptions {
   Overlays overlays;
   StartView view;
   std::string screenshot_file;
-  double screenshot_at = -1;  // seconds after joining; < 0: the last picture
-  double seconds = 0;         // 0: until the session ends
+  double screenshot_at = -1;            // seconds after joining; < 0: the last picture
+  double seconds = 0;                   // 0: until the session ends
+  double mark_at = -1, return_at = -1;  // instructor: seconds after joining; < 0: not
   std::string script_file, replay_file, summary_file;
   std::uint64_t corrupt_frame = 0;  // hidden: damages the n-th delta, to prove healing
   std::string log_level = "info";

@@ -75,6 +75,7 @@ std::string to_json(const ClientSummary& summary, const replica::Replica& replic
   json.add_count("crc_mismatches", counters.crc_mismatches);
   json.add_count("base_mismatches", counters.base_mismatches);
   json.add_count("surface_changes", counters.surface_changes);
+  json.add_count("marks", counters.marks);
   json.add_count("surface_change_bytes", counters.change_bytes);
   json.add_count("change_mismatches", counters.change_mismatches);
   json.add_count("healed", counters.healed);

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <numbers>
 
+#include "client/replica/tool_messages.h"
 #include "client/ui/hud_panels.h"
 #include "common/base/log.h"
 
@@ -198,7 +199,8 @@ void Picture::add_messages(const replica::Replica& replica, std::uint64_t now_ns
     const double age =
         now_ns > notice.arrival_ns ? static_cast<double>(now_ns - notice.arrival_ns) * 1e-9 : 0.0;
     const bool is_own = notice.tool.owner() == replica.own_slot();
-    const bool is_news = replica::is_refusal(notice.outcome)
+    const bool is_news = notice.is_for_all ? true
+                         : replica::is_refusal(notice.outcome)
                              ? is_own
                              : notice.outcome == replica::ClaimOutcome::TakenOver ||
                                    notice.outcome == replica::ClaimOutcome::Expired ||
@@ -245,6 +247,7 @@ ui::HudModel Picture::hud_model(const replica::Replica& replica, replica::Sessio
   model.is_in_step = replica.sync_state() == replica::SyncState::InStep;
   model.shows_regions = overlays_.regions;
   model.shows_help = shows_help_;
+  model.can_mark = source.playback() == nullptr && role_ == replica::Role::Instructor;
   model.has_own_tool = hands.mouse_tool() != nullptr;
 
   model.shows_holds = overlays_.holds;
@@ -274,6 +277,9 @@ void Picture::act(const ui::HudActions& actions, const replica::Replica& replica
   if (actions.toggle_rate) overlays_.rate = !overlays_.rate;
   if (actions.reset_camera) frame_camera(replica);
   if (actions.screenshot) wants_screenshot_ = true;
+  // What cannot be sent is asked for again by whoever presses the key.
+  if (actions.set_mark) replica::ask_for_mark(source, false);
+  if (actions.return_to_mark) replica::ask_for_mark(source, true);
   replica::PlaybackControl* playback = source.playback();
   if (playback == nullptr) return;
   if (actions.toggle_play) playback->is_playing() ? playback->pause() : playback->play();

@@ -120,6 +120,8 @@ void Replica::on_message(const proto::Envelope& message, std::uint64_t arrival_n
       return apply_participants(message.participants());
     case proto::Envelope::kClaimEvent:
       return apply_claim(message.claim_event(), arrival_ns);
+    case proto::Envelope::kMarkEvent:
+      return apply_mark(message.mark_event(), arrival_ns);
     case proto::Envelope::kBarrier:
       barrier_ = BarrierOutcome{message.barrier().frame(), message.barrier().surface_crc(), 0};
       barrier_answered_ = false;
@@ -412,6 +414,20 @@ void Replica::apply_claim(const proto::ClaimEvent& message, std::uint64_t arriva
     notice.outcome = static_cast<ClaimOutcome>(message.outcome());
   notice.text = message.text();
   notice.arrival_ns = arrival_ns;
+  add_notice(std::move(notice));
+}
+
+void Replica::apply_mark(const proto::MarkEvent& message, std::uint64_t arrival_ns) {
+  ClaimNotice notice;
+  notice.tick = message.tick();
+  notice.text = message.text();
+  notice.arrival_ns = arrival_ns;
+  notice.is_for_all = true;
+  counters_.marks += message.is_done() ? 1 : 0;
+  add_notice(std::move(notice));
+}
+
+void Replica::add_notice(ClaimNotice notice) {
   notices_.push_back(std::move(notice));
   if (notices_.size() > kMaxNotices) notices_.pop_front();
   ++notice_count_;

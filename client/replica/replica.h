@@ -33,6 +33,7 @@ namespace trocar::proto {
 class Barrier;
 class ClaimEvent;
 class FrameState;
+class MarkEvent;
 class Participants;
 class SurfaceChange;
 class SurfaceFrame;
@@ -60,6 +61,7 @@ struct ReplicaCounters {
   std::uint64_t crc_mismatches = 0;  // also payloads that do not decode
   std::uint64_t base_mismatches = 0;
   std::uint64_t surface_changes = 0;    // applied
+  std::uint64_t marks = 0;              // set by the instructor, or returned to
   std::uint64_t change_mismatches = 0;  // changes that did not follow, malformed ones included
   std::uint64_t change_bytes = 0;       // of applied changes
   std::uint64_t healed = 0;             // returned to InStep after a mismatch of either kind
@@ -123,6 +125,8 @@ class Replica final : public MessageSink {
   void apply_surface(const proto::SurfaceFrame& message, std::uint64_t arrival_ns);
   void apply_state(const proto::FrameState& message);
   void apply_participants(const proto::Participants& message);
+  void apply_mark(const proto::MarkEvent& message, std::uint64_t arrival_ns);
+  void add_notice(ClaimNotice notice);
   void apply_claim(const proto::ClaimEvent& message, std::uint64_t arrival_ns);
   bool decode_surface(const proto::SurfaceFrame& message);
   void accept_frame(const proto::SurfaceFrame& message, std::uint64_t arrival_ns);

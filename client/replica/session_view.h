@@ -116,6 +116,7 @@ struct ClaimNotice {
   ClaimOutcome outcome = ClaimOutcome::Granted;
   std::string text;  // one line for the person
   std::uint64_t arrival_ns = 0;
+  bool is_for_all = false;  // not of a tool: what the instructor has done
 };
 
 }  // namespace trocar::replica

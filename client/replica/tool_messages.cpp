@@ -22,4 +22,10 @@ bool send_tool_sample(SessionSource& source, std::uint32_t tool, std::uint32_t s
   return source.send(envelope);
 }
 
+bool ask_for_mark(SessionSource& source, bool is_return) {
+  proto::Envelope envelope;
+  envelope.mutable_mark_request()->set_action(is_return ? proto::MARK_RETURN : proto::MARK_SET);
+  return source.send(envelope);
+}
+
 }  // namespace trocar::replica

@@ -1,6 +1,6 @@
 #pragma once
 
-// What a client says: a reading of one of its tools as a message.
+// What a client says: a reading of one of its tools, an instructor's wish.
 
 #include "client/replica/session_source.h"
 #include "common/scene/tool.h"
@@ -10,5 +10,7 @@ namespace trocar::replica {
 // `tool` is 0 or 1; `sequence` counts up per client. False if the source dropped it.
 bool send_tool_sample(SessionSource& source, std::uint32_t tool, std::uint32_t sequence,
                       const scene::ToolSample& sample);
+// To mark the organ as it is, or to return it to the mark. False if the source dropped it.
+bool ask_for_mark(SessionSource& source, bool is_return);
 
 }  // namespace trocar::replica

@@ -157,6 +157,8 @@ HudActions Hud::draw(const HudModel& model) {
   actions.toggle_rate = pressed(GLFW_KEY_R);
   actions.reset_camera = pressed(GLFW_KEY_C);
   actions.screenshot = pressed(GLFW_KEY_F12);
+  actions.set_mark = model.can_mark && pressed(GLFW_KEY_M);
+  actions.return_to_mark = model.can_mark && pressed(GLFW_KEY_BACKSPACE);
   if (model.timeline && pressed(GLFW_KEY_SPACE)) actions.toggle_play = true;
   if (model.timeline && (pressed(GLFW_KEY_LEFT) || pressed(GLFW_KEY_RIGHT)))
     actions.seek_seconds = model.timeline->position_seconds + (pressed(GLFW_KEY_LEFT) ? -2.0 : 2.0);

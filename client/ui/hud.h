@@ -69,12 +69,14 @@ struct HudModel {
   bool shows_regions = true, shows_holds = false, shows_arrows = true, shows_rate = false;
   bool shows_help = false;
   bool has_own_tool = false;
+  bool can_mark = false;  // an instructor's: he may mark the organ and return it to the mark
 };
 
 struct HudActions {
   bool toggle_help = false, toggle_regions = false, toggle_holds = false, toggle_arrows = false;
   bool toggle_rate = false, reset_camera = false, screenshot = false;
   bool toggle_play = false;
+  bool set_mark = false, return_to_mark = false;
   std::optional<double> seek_seconds;
   std::optional<float> speed;
 };

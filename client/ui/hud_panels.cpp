@@ -227,6 +227,10 @@ void draw_help(const HudModel& model, float scale) {
       help_row("X", "cut: hold and draw the blade along, wheel or W / S for depth");
       help_row("wheel, W / S", "depth along the view; Shift: finer");
     }
+    if (model.can_mark) {
+      help_row("M", "mark the organ as it is");
+      help_row("Backspace", "return it to the mark, for everybody");
+    }
     if (model.timeline) {
       help_row("Space", "play or pause");
       help_row("left, right", "two seconds back or on");

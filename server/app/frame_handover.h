@@ -2,8 +2,8 @@
 
 // Published frames from the simulation thread to the I/O thread: a bounded queue and a wake-up.
 // 512 frames are 8 s. If the I/O thread is stuck for longer, frames are dropped and counted, but
-// for those that change the surface: without one of them no later frame can be understood. The
-// journal has its own way (journal_sink.h).
+// for those that change the surface, or tell of a mark: without one of them no later frame can be
+// understood. The journal has its own way (journal_sink.h).
 
 #include <atomic>
 #include <deque>
@@ -26,7 +26,7 @@ class FrameHandover {
   void push(step::SharedFrame frame) {
     while (!kept_.empty() && queue_.try_push(kept_.front())) kept_.pop_front();
     if (!kept_.empty() || !queue_.try_push(frame)) {
-      if (frame->change)
+      if (frame->change || frame->new_layout || !frame->mark_events.empty())
         kept_.push_back(std::move(frame));
       else
         dropped_.fetch_add(1, std::memory_order_relaxed);

@@ -121,6 +121,17 @@ ToolSlot ClaimTable::holder_of(Tick tick, const ClaimRequest& request,
   return {};
 }
 
+void ClaimTable::let_go(const ClaimTable& before) {
+  std::ranges::fill(owners_, ToolSlot{});
+  for (std::size_t tool = 0; tool < claims_.size(); ++tool) {
+    const Claim& c = before.claims_[tool];
+    const bool has_worked = c.phase == ClaimPhase::Held || c.phase == ClaimPhase::Spent;
+    claims_[tool] = has_worked && c.verb != Verb::Push
+                        ? Claim{.phase = ClaimPhase::Spent, .verb = c.verb}
+                        : Claim{};
+  }
+}
+
 void ClaimTable::take_over(Tick tick, const ClaimRequest& request,
                            std::vector<ClaimEvent>& events) {
   for (const auto node : request.core) {

@@ -107,6 +107,10 @@ class ClaimTable {
   // to `events` what a person should hear of, once per change, not once per retry.
   void update(Tick tick, std::span<const ClaimRequest> requests, std::vector<ClaimEvent>& events);
 
+  // For another state of the tissue, whose nodes nobody holds: who held something in `before` opens
+  // his jaws, or lifts his blade, first.
+  void let_go(const ClaimTable& before);
+
   void visit_state(world::StateArchive& archive);
 
  private:

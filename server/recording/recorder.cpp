@@ -73,6 +73,10 @@ void Recorder::take_frame(const step::SharedFrame& frame) {
   } else {
     if (open_gap_.frames++ == 0) open_gap_.first_tick = first;
     open_gap_.last_tick = frame->tick;
+    if (frame->new_layout) {
+      open_gap_.new_layout = frame->new_layout;
+      open_gap_.changes.clear();
+    }
     if (frame->change) open_gap_.changes.push_back(frame->change);
   }
   wake_ups_.fetch_add(1);
@@ -130,6 +134,7 @@ Status Recorder::write_presence(const Presence& presence) {
 Status Recorder::write_gap(const Gap& gap) {
   has_baseline_ = false;
   has_decisions_ = false;
+  if (gap.new_layout) layout_ = *gap.new_layout;
   for (const auto& change : gap.changes)
     if (auto s = wire::apply(*change, layout_); !s) return s;
   counters_.frames_dropped += gap.frames;
@@ -163,6 +168,10 @@ Status Recorder::write_frame(const step::PublishedFrame& frame) {
   }
   if (auto s = writer_->write_tick_batch(tick, now, batch); !s) return s;
 
+  if (frame.new_layout) {
+    layout_ = *frame.new_layout;
+    has_baseline_ = false;
+  }
   if (auto s = write_change(frame); !s) return s;
   const bool has_key = !has_baseline_ || frame.tick - last_key_tick_ >= kKeyPeriod;
   if (has_baseline_) {

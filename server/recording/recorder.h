@@ -63,6 +63,7 @@ class Recorder {
   struct Gap {
     Tick first_tick = 0, last_tick = 0;
     std::uint64_t frames = 0;
+    std::shared_ptr<const wire::SurfaceLayout> new_layout;  // before `changes`
     std::vector<std::shared_ptr<const wire::SurfaceChange>> changes;
   };
   struct QueuedFrame {

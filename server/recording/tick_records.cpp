@@ -43,6 +43,7 @@ void to_message(const step::TickRecord& record, const step::TickDecisions* previ
     if (d.layer_sweeps != step::TickDecisions{}.layer_sweeps)
       decisions.mutable_layer_sweeps()->Assign(d.layer_sweeps.begin(), d.layer_sweeps.end());
   }
+  message.set_mark(static_cast<proto::MarkAction>(record.inputs.mark));
   for (const auto slot : record.inputs.leaves) message.add_leave()->set_slot(slot.value);
   for (const auto& join : record.inputs.joins) {
     auto& entry = *message.add_join();
@@ -90,6 +91,9 @@ Status from_message(const proto::TickRecord& message, step::TickRecord& record) 
     if (auto valid = step::validate(record.decisions); !valid)
       return bad(record.tick, valid.error().message.c_str());
   }
+  if (message.mark() < 0 || message.mark() > proto::MARK_RETURN)
+    return bad(record.tick, "unknown mark");
+  record.inputs.mark = static_cast<session::MarkAction>(message.mark());
   for (const auto& leave : message.leave()) {
     if (leave.slot() >= kMaxHands) return bad(record.tick, "leave: slot out of range");
     record.inputs.leaves.push_back({static_cast<std::uint8_t>(leave.slot())});

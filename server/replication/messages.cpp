@@ -191,6 +191,19 @@ wire::SharedBytes encode_claim_event(const locks::ClaimEvent& event,
   return wire::encode_envelope(envelope);
 }
 
+wire::SharedBytes encode_mark_event(const step::MarkEvent& event) {
+  const bool is_return = event.action == session::MarkAction::Return;
+  proto::Envelope envelope;
+  auto& message = *envelope.mutable_mark_event();
+  message.set_tick(event.tick);
+  message.set_action(static_cast<proto::MarkAction>(event.action));
+  message.set_is_done(event.is_done);
+  message.set_text(!event.is_done ? "there is no mark to return to: set one first"
+                   : is_return    ? "the instructor has returned the organ to the mark"
+                                  : "the instructor has marked the organ as it is");
+  return wire::encode_envelope(envelope);
+}
+
 wire::SharedBytes encode_barrier(const step::PublishedFrame& frame) {
   proto::Envelope envelope;
   envelope.mutable_barrier()->set_frame(frame.frame);

@@ -36,6 +36,7 @@ wire::SharedBytes encode_surface_change(const wire::SurfaceChange& change,
                                         const wire::SurfaceLayout& layout);
 wire::SharedBytes encode_frame_state(const step::PublishedFrame& frame);
 wire::SharedBytes encode_claim_event(const locks::ClaimEvent& event, const session::Roster& roster);
+wire::SharedBytes encode_mark_event(const step::MarkEvent& event);
 wire::SharedBytes encode_barrier(const step::PublishedFrame& frame);
 wire::SharedBytes encode_pong(std::uint64_t client_time_us, Tick tick);
 wire::SharedBytes encode_goodbye(EndReason reason, const std::string& text);

@@ -35,6 +35,7 @@ EndReason reason_of(session::JoinRefusal refusal, session::Role role) {
 struct Replicator::Client {
   net::ConnectionId id = 0;
   std::optional<session::Participant> participant;  // set by Hello
+  bool has_old_surface = false;                     // so that no delta helps
   step::SharedFrame baseline;                       // the last frame this client was given
   bool wants_keyframe = false;
   std::uint64_t last_requested_keyframe_ns = 0;
@@ -160,6 +161,8 @@ std::optional<Replicator::Ending> Replicator::take_message(Client& client, Bytes
       return take_sample(client, envelope.tool_sample());
     case proto::Envelope::kFrameAck:
       return take_ack(client, envelope.frame_ack().frame(), envelope.frame_ack().surface_crc());
+    case proto::Envelope::kMarkRequest:
+      return take_mark(client, envelope.mark_request().action());
     case proto::Envelope::kKeyframeRequest:
       client.wants_keyframe = true;
       if (encoder_.current() && may_have_requested_keyframe(client)) give_frame(client, false);
@@ -235,6 +238,22 @@ std::optional<Replicator::Ending> Replicator::take_sample(Client& client,
   return std::nullopt;
 }
 
+std::optional<Replicator::Ending> Replicator::take_mark(const Client& client, int action) {
+  const auto role = client.participant->role;
+  if (role != session::Role::Instructor)
+    return Ending{EndReason::Role,
+                  "MarkRequest: marks are the instructor's, not of an " + text_of_role(role)};
+  if (action != proto::MARK_SET && action != proto::MARK_RETURN)
+    return Ending{EndReason::ProtocolError, "MarkRequest.action: " + std::to_string(action) +
+                                                " is not 1 (set) or 2 (return)"};
+  // Returning takes the simulation as long as beginning: what comes too soon is left out.
+  const auto now = options_.clock_ns();
+  if (last_mark_ns_ && now - *last_mark_ns_ < kSecondNs) return std::nullopt;
+  last_mark_ns_ = now;
+  inbox_.push_mark(static_cast<session::MarkAction>(action));
+  return std::nullopt;
+}
+
 std::optional<Replicator::Ending> Replicator::take_ack(Client& client, Frame frame,
                                                        std::uint32_t crc) {
   if (!client.baseline || frame > client.baseline->frame)
@@ -269,6 +288,13 @@ Status Replicator::change_surface(const wire::SurfaceChange& change) {
   return {};
 }
 
+void Replicator::replace_surface(const wire::SurfaceLayout& layout) {
+  layout_ = layout;
+  topology_.reset();
+  broadcast(topology());
+  for (const auto& [id, client] : clients_) client->has_old_surface = true;
+}
+
 bool Replicator::send(Client& client, const wire::SharedBytes& bytes) {
   if (!connections_.send(client.id, bytes)) return false;
   counters_.bytes_queued += bytes->size();
@@ -300,8 +326,8 @@ bool Replicator::give_frame(Client& client, bool is_required) {
     ++counters_.frames_skipped;
     return false;
   }
-  const bool is_keyframe =
-      is_requested || !baseline || frame.frame - baseline->frame > options_.keyframe_after_frames;
+  const bool is_keyframe = is_requested || !baseline || client.has_old_surface ||
+                           frame.frame - baseline->frame > options_.keyframe_after_frames;
   // Who asks may have lost count of the surface's changes, too.
   const bool is_lost = is_requested && frame.epoch > 0;
   if ((is_lost && !send(client, topology())) ||
@@ -310,6 +336,7 @@ bool Replicator::give_frame(Client& client, bool is_required) {
     return false;
   }
   client.baseline = encoder_.current();
+  client.has_old_surface = false;
   ++counters_.frames_given;
   if (is_keyframe) ++counters_.keyframes_given;
   if (is_requested) {
@@ -325,6 +352,8 @@ void Replicator::publish(std::span<const step::SharedFrame> frames) {
   TROCAR_ASSERT(!barrier_);
   Status followed;
   for (const auto& frame : frames) {
+    for (const auto& event : frame->mark_events) broadcast(encode_mark_event(event));
+    if (frame->new_layout) replace_surface(*frame->new_layout);
     for (const auto& event : frame->claim_events) broadcast(encode_claim_event(event, roster_));
     if (frame->change && followed.ok()) followed = change_surface(*frame->change);
   }

@@ -120,11 +120,14 @@ class Replicator final : public net::ConnectionHandler {
   std::optional<Ending> take_message(Client& client, BytesView bytes);
   std::optional<Ending> admit(Client& client, const proto::Hello& hello);
   std::optional<Ending> take_sample(Client& client, const proto::ToolSample& sample);
+  std::optional<Ending> take_mark(const Client& client, int action);
   std::optional<Ending> take_ack(Client& client, Frame frame, std::uint32_t crc);
   bool exceeds_rate(Client& client);
 
   // Tells everybody what begins an epoch and keeps it; an error if it does not follow.
   Status change_surface(const wire::SurfaceChange& change);
+  // Another one, to which no change leads: everybody gets it and a keyframe.
+  void replace_surface(const wire::SurfaceLayout& layout);
   // Of the surface as it is now.
   const wire::SharedBytes& topology();
   bool send(Client& client, const wire::SharedBytes& bytes);
@@ -147,6 +150,7 @@ class Replicator final : public net::ConnectionHandler {
   session::Roster roster_;
   std::map<net::ConnectionId, std::unique_ptr<Client>> clients_;
   bool participants_changed_ = false;
+  std::optional<std::uint64_t> last_mark_ns_;
   FrameEncoder encoder_;
   step::SharedFrame barrier_;
   std::vector<BarrierResult> barrier_results_;

@@ -37,6 +37,7 @@ void SimulationInbox::push_sample(const ToolInput& input) {
 
 void SimulationInbox::drain(TickInputs& inputs) {
   inputs.clear();
+  inputs.mark = mark_.exchange(MarkAction::None, std::memory_order_relaxed);
   for (std::size_t taken = 0; taken < kCapacity; ++taken) {
     const auto item = queue_.try_pop();
     if (!item) break;

@@ -35,6 +35,8 @@ class SimulationInbox {
   [[nodiscard]] bool try_push_join(const HandJoin& join);  // false: no room, refuse the join
   void push_leave(ParticipantSlot slot);                   // of a slot that has joined
   void push_sample(const ToolInput& input);
+  // The newest counts; none is lost.
+  void push_mark(MarkAction action) { mark_.store(action, std::memory_order_relaxed); }
   const Counters& counters() const { return counters_; }
 
   // Simulation thread. Replaces the content of `inputs`; at most kCapacity items per call.
@@ -47,8 +49,9 @@ class SimulationInbox {
 
   SpscQueue<Item> queue_{kCapacity};
   std::atomic<std::size_t> pending_{0};  // never less than what is in queue_
-  std::size_t joined_hands_ = 0;         // I/O thread
-  Counters counters_;                    // I/O thread
+  std::atomic<MarkAction> mark_{MarkAction::None};
+  std::size_t joined_hands_ = 0;  // I/O thread
+  Counters counters_;             // I/O thread
 
   // Simulation thread: what this drain has seen, by slot.
   struct SlotChange {

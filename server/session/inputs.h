@@ -17,21 +17,33 @@ struct HandJoin {
   std::array<scene::ToolShape, kToolsPerHand> shapes;
 };
 
+// What an instructor may do to the organ as a whole.
+enum class MarkAction : std::uint8_t {
+  None = 0,
+  Set = 1,     // marks it as it is, instead of the mark before
+  Return = 2,  // makes it what it was when it was marked
+};
+
 struct ToolInput {
   ToolSlot tool;
   scene::ToolSample sample;
 };
 
-// Admitted in this order: leaves, joins, samples. Several samples of one tool: the last one counts.
+// Admitted in this order: mark, leaves, joins, samples. Several samples of one tool: the last one
+// counts.
 // Everything is validated before (server/replication); the tick drops what does not fit its state,
 // such as a sample for an empty slot, and counts it.
 struct TickInputs {
+  MarkAction mark = MarkAction::None;
   std::vector<ParticipantSlot> leaves;
   std::vector<HandJoin> joins;
   std::vector<ToolInput> samples;
 
-  bool empty() const { return leaves.empty() && joins.empty() && samples.empty(); }
+  bool empty() const {
+    return mark == MarkAction::None && leaves.empty() && joins.empty() && samples.empty();
+  }
   void clear() {
+    mark = MarkAction::None;
     leaves.clear();
     joins.clear();
     samples.clear();

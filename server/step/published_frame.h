@@ -32,6 +32,13 @@ struct ToolFrame {
   bool is_silent = false;   // lease no longer fresh
 };
 
+// What became of what an instructor asked for.
+struct MarkEvent {
+  Tick tick = 0;
+  session::MarkAction action = session::MarkAction::None;
+  bool is_done = false;  // false: there is no mark to return to
+};
+
 // What the journal needs to simulate one tick again.
 struct TickRecord {
   Tick tick = 0;
@@ -46,12 +53,15 @@ struct PublishedFrame {
   std::uint32_t epoch = 0;  // after `change`
   // Of the surface since the frame before; null: none.
   std::shared_ptr<const wire::SurfaceChange> change;
+  // Another surface than that of the frame before, from which no change leads to it; null: none.
+  std::shared_ptr<const wire::SurfaceLayout> new_layout;
   wire::QuantisedSurface surface;  // displacements from rest, per vertex slot
   std::uint32_t surface_crc = 0;
   std::vector<std::uint16_t>
       regions;                   // per vertex slot: 0 not active, else merged region 1, 2, ...
   std::vector<ToolFrame> tools;  // occupied tools, by slot
   std::vector<locks::ClaimEvent> claim_events;  // of the ticks since the frame before
+  std::vector<MarkEvent> mark_events;           // likewise
   std::vector<TickRecord> records;              // of the ticks since the frame before
   // Full state after `snapshot_tick`, at the start and every 10 s, else null. Taken between
   // publications: publishing changes the quantisation's hysteresis after the tick's hash.

@@ -17,6 +17,34 @@ State::State(const scene::Organ& organ)
       self_contacts(organ) {}
 
 void State::visit(world::StateArchive& archive) {
+  visit_without_mark(archive);
+  mark.visit_state(archive);
+}
+
+void State::set_mark() {
+  Bytes bytes;
+  auto archive = world::StateArchive::writing(bytes);
+  visit_without_mark(archive);
+  mark.set(std::move(bytes));
+}
+
+std::unique_ptr<State> State::returned_to_mark(const scene::Organ& organ) const {
+  if (!mark.is_set()) return nullptr;
+  auto marked = std::make_unique<State>(organ);
+  auto archive = world::StateArchive::reading(mark.state());
+  marked->visit_without_mark(archive);
+  if (!archive.ok() || !archive.at_end()) return nullptr;
+  marked->cuts.follow_on(cuts);
+  marked->world.tick = world.tick;
+  marked->tools = tools;
+  marked->claims.let_go(claims);
+  marked->grasps = {};
+  marked->proxies = {};
+  marked->mark = mark;
+  return marked;
+}
+
+void State::visit_without_mark(world::StateArchive& archive) {
   cuts.visit_state(archive, world);
   if (archive.is_reading()) {
     claims.resize(world.node_count());
@@ -123,11 +151,28 @@ Simulation::Simulation(scene::Organ organ, unsigned workers)
 
 const TickReport& Simulation::tick(const session::TickInputs& inputs,
                                    const TickDecisions& decisions) {
+  if (inputs.mark != session::MarkAction::None) use_mark(inputs.mark);
   context_->inputs = &inputs;
   context_->decisions = decisions;
   run_tick(*state_, *context_);
   context_->inputs = nullptr;
   return context_->report;
+}
+
+void Simulation::use_mark(session::MarkAction action) {
+  MarkEvent event{state_->world.tick + 1, action, true};
+  if (action == session::MarkAction::Set) {
+    state_->set_mark();
+  } else if (auto marked = state_->returned_to_mark(scene_->organ)) {
+    state_ = std::move(marked);
+    auto context = std::make_unique<StepContext>(*scene_, *state_);
+    context->claim_events = std::move(context_->claim_events);
+    context->mark_events = std::move(context_->mark_events);
+    context_ = std::move(context);
+  } else {
+    event.is_done = false;
+  }
+  context_->mark_events.push_back(event);
 }
 
 void Simulation::write_snapshot(Bytes& out) const {

@@ -18,7 +18,8 @@ class Simulation {
   // workers: threads that share the solver's work; results do not depend on it.
   explicit Simulation(scene::Organ organ, unsigned workers = 1);
 
-  // Simulates one tick. After a tick that publishes, take_frame() has the frame.
+  // Simulates one tick. After a tick that publishes, take_frame() has the frame. Returning to a
+  // mark costs as much as beginning a session.
   const TickReport& tick(const session::TickInputs& inputs, const TickDecisions& decisions);
 
   // The frame of the last tick, or null. Not yet shared, so the caller may add what is not
@@ -38,6 +39,8 @@ class Simulation {
   const StepContext& context() const { return *context_; }
 
  private:
+  void use_mark(session::MarkAction action);
+
   std::unique_ptr<Scene> scene_;
   std::unique_ptr<State> state_;
   std::unique_ptr<StepContext> context_;

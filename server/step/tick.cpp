@@ -1,6 +1,7 @@
 #include "server/step/tick.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "common/base/timing.h"
 #include "server/contact/update_claims.h"
@@ -157,6 +158,7 @@ ToolFrame describe_tool(const State& state, const StepContext& context, ToolSlot
 }
 
 void quantise_and_publish(State& state, StepContext& context) {
+  const auto new_layout = state.cuts.take_new_layout();
   const auto change = state.cuts.take_change();
   const auto& layout = state.cuts.layout();
   context.surface_displacements.resize(layout.vertex_count());
@@ -169,6 +171,7 @@ void quantise_and_publish(State& state, StepContext& context) {
   frame->tick = state.world.tick;
   frame->epoch = layout.epoch;
   frame->change = change;
+  frame->new_layout = new_layout;
   frame->surface = state.quantised;
   frame->surface_crc = wire::surface_crc(state.quantised);
   frame->regions.reserve(layout.vertex_count());
@@ -179,6 +182,7 @@ void quantise_and_publish(State& state, StepContext& context) {
       frame->tools.push_back(describe_tool(state, context, ToolSlot{i}));
   frame->claim_events = context.claim_events;
   context.claim_events.clear();
+  frame->mark_events = std::exchange(context.mark_events, {});
   frame->active_nodes = context.report.active_nodes;
   frame->queue_nodes = context.report.queue_nodes;
   frame->region_count = context.report.region_count;

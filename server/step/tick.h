@@ -13,6 +13,7 @@
 #include "server/locks/claims.h"
 #include "server/propagation/active_set.h"
 #include "server/propagation/queue.h"
+#include "server/step/mark.h"
 #include "server/step/published_frame.h"
 #include "server/step/tick_report.h"
 #include "server/step/tissue_cuts.h"
@@ -36,8 +37,17 @@ struct State {
   // Last published integers: quantisation has hysteresis, so they are state.
   wire::QuantisedSurface quantised;
   contact::SelfContactTable self_contacts;
+  Mark mark;
 
   void visit(world::StateArchive& archive);
+
+  void set_mark();
+  // The organ as it was marked, with the tools as they are now, which hold nothing; time goes on.
+  // Null: there is no mark.
+  std::unique_ptr<State> returned_to_mark(const scene::Organ& organ) const;
+
+ private:
+  void visit_without_mark(world::StateArchive& archive);
 };
 
 // Constant in a session: follows from the organ.
@@ -83,6 +93,7 @@ struct StepContext {
 
   // Output.
   std::vector<locks::ClaimEvent> claim_events;  // gathered until published
+  std::vector<MarkEvent> mark_events;           // likewise
   std::shared_ptr<PublishedFrame> frame;        // set by the publish stage
   TickReport report;
 };

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <utility>
 
 #include "common/base/assert.h"
 #include "common/base/checksum.h"
@@ -194,6 +195,23 @@ std::shared_ptr<const wire::SurfaceChange> TissueCuts::take_change() {
   return change;
 }
 
+void TissueCuts::follow_on(const TissueCuts& before) {
+  layout_.epoch = before.layout_.epoch;
+  is_new_to_clients_ = true;
+  for (std::uint8_t i = 0; i < kMaxTools; ++i) {
+    if (blades_[i].is_cutting) cutter_->lift(i);
+    blades_[i] = {};
+  }
+}
+
+std::shared_ptr<const wire::SurfaceLayout> TissueCuts::take_new_layout() {
+  if (!std::exchange(is_new_to_clients_, false)) return nullptr;
+  published_ = static_cast<std::uint32_t>(history_.size());
+  forget_pending();
+  ++layout_.epoch;
+  return std::make_shared<const wire::SurfaceLayout>(layout_);
+}
+
 void TissueCuts::forget_pending() {
   pending_ = {};
   first_pending_ = static_cast<std::uint32_t>(layout_.triangles.size());
@@ -203,6 +221,7 @@ void TissueCuts::visit_state(world::StateArchive& archive, world::World& world) 
   archive.value(history_hash_);
   archive.value(published_);
   archive.value(layout_.epoch);
+  archive.flag(is_new_to_clients_);
   if (!archive.is_hashing()) {  // history_hash_ stands for it
     auto count = static_cast<std::uint32_t>(history_.size());
     archive.value(count);

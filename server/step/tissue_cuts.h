@@ -53,6 +53,12 @@ class TissueCuts {
   // All edits, oldest first.
   std::span<const cutting::CutEvents> history() const { return history_; }
 
+  // Takes the place of another state of the same organ: clients know that one's surface. Blades are
+  // lifted.
+  void follow_on(const TissueCuts& before);
+
+  // After that, once: the surface as it is, which no change leads to; else null.
+  std::shared_ptr<const wire::SurfaceLayout> take_new_layout();
   // What has changed since the last call, for clients, or null. Before a frame is published.
   std::shared_ptr<const wire::SurfaceChange> take_change();
 
@@ -81,6 +87,7 @@ class TissueCuts {
   wire::SurfaceLayout layout_;
   std::vector<cutting::CutEvents> history_;
   std::uint32_t published_ = 0;  // edits of history_ that clients know
+  bool is_new_to_clients_ = false;
   std::uint64_t history_hash_ = 0;
   std::array<Blade, kMaxTools> blades_;
   wire::SurfaceChange pending_;

@@ -151,6 +151,31 @@ TEST(SharedSession, CutsAreTheSameForEverybodyAndInTheRecording) {
   expect_replay_equals(session.journal, simulate_again(session.journal));
 }
 
+// The instructor marks the organ, two hands cut it, and he returns it to the mark.
+TEST(SharedSession, AReturnToTheMarkIsTheSameForEverybodyAndInTheRecording) {
+  Session session("liver", {"--seconds", "9"});
+  auto instructor = session.client("Teacher", "instructor", {"--mark-at", "1", "--return-at", "5"});
+  auto incise = session.hand("Incise", kScenes / "incise.toml");
+  auto watcher = session.client("Watcher", "observer");
+  ASSERT_EQ(session.server().wait(300), 0) << read_text(session.folder / "server.log");
+  for (auto* client : {&instructor, &incise, &watcher}) EXPECT_EQ(client->wait(20), 0);
+  const auto server = read_text(session.folder / "server.json");
+  EXPECT_EQ(json_value(server, "all_replicas_equal"), "true") << server;
+  for (const char* name : {"Teacher", "Incise", "Watcher"}) {
+    const auto summary = session.summary_of(name);
+    EXPECT_EQ(json_value(summary, "own_crc"), json_value(server, "surface_crc")) << name;
+    EXPECT_EQ(json_number(summary, "marks"), 2) << name;
+    EXPECT_EQ(json_number(summary, "change_mismatches"), 0) << name;
+    EXPECT_GT(json_number(summary, "surface_changes"), 10) << name;
+  }
+  const auto verified = recording::verify_journal(session.journal.string());
+  ASSERT_TRUE(verified.ok()) << verified.error().message;
+  EXPECT_TRUE(verified->ok()) << "tick " << verified->first_mismatch->tick << ": "
+                              << verified->first_mismatch->what;
+  EXPECT_GE(verified->ticks_verified, 9'000u);
+  expect_replay_equals(session.journal, simulate_again(session.journal));
+}
+
 TEST(SharedSession, AKilledServerLosesAtMostHalfASecondOfItsRecording) {
   Session session("liver");
   auto lift = session.hand("Lift", kScenes / "lift.toml");
