@@ -1,24 +1,15 @@
 #include "server/step/tissue_cuts.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstring>
 #include <utility>
 
 #include "common/base/assert.h"
 #include "common/base/checksum.h"
-#include "server/contact/contact_finder.h"
 #include "server/cutting/event_codec.h"
 
 namespace trocar::step {
 namespace {
-
-// Of a blade: the way over which the wound's area is counted, and how much of its direction is that
-// of the newest tick.
-constexpr float kWay_m = 0.005f, kNewest = 0.05f;
-// A blade this slow or slower feels in proportion less: one that stands feels nothing.
-constexpr float kSlow_m_s = 0.002f;
-constexpr float kMostForce_n = 30;
 
 // Numbers of triangles are used once. What is left is for the ticks up to the next frame.
 constexpr std::size_t kMostTriangles = wire::kMaxSurfaceTriangles - 500'000;
@@ -51,23 +42,14 @@ bool TissueCuts::cut(const input::ToolTable& tools, const locks::ClaimTable& cla
   report = {};
   if (!can_cut()) return false;
   report.is_full = layout_.triangles.size() >= kMostTriangles;
+  blades_.begin_tick(tools, claims, !report.is_full,
+                     [this](ToolSlot tool) { cutter_->lift(tool.value); });
   for (std::uint8_t i = 0; i < kMaxTools; ++i) {
+    if (!blades_[ToolSlot{i}].is_cutting) continue;
     const auto& tool = tools[ToolSlot{i}];
-    const auto& claim = claims.claim(ToolSlot{i});
-    Blade& blade = blades_[i];
-    const bool cuts = tool.has_sample && claim.verb == scene::Verb::Cut &&
-                      claim.phase == locks::ClaimPhase::Held && !report.is_full;
-    // Nobody's hand goes that fast: it has appeared there, and what lies between is not cut.
-    const bool has_jumped =
-        blade.is_cutting && length(tool.pose.position - blade.tip) > contact::kJump_m;
-    if (blade.is_cutting && (!cuts || has_jumped)) cutter_->lift(i);
-    if (cuts) {
-      const std::array<Vec3d, 2> edge{to_double(tool.pose.position),
-                                      to_double(tool.pose.apply({0, 0, tool.shape.edge_m}))};
-      cutter_->move(i, edge);
-    }
-    if (cuts && (!blade.is_cutting || has_jumped)) blade.tip = tool.pose.position;
-    blade.is_cutting = cuts;
+    const std::array<Vec3d, 2> edge{to_double(tool.pose.position),
+                                    to_double(tool.pose.apply({0, 0, tool.shape.edge_m}))};
+    cutter_->move(i, edge);
   }
   cutter_->cut(world.displacements, output_, travel_m);
   report.crossed_tets = output_.crossed_tets;
@@ -75,37 +57,11 @@ bool TissueCuts::cut(const input::ToolTable& tools, const locks::ClaimTable& cla
   report.opened_area_m2 = output_.opened_area_m2;
   report.torn_area_m2 = output_.torn_area_m2;
   report.is_behind = output_.is_behind;
-  resist(tools, output_.work_j);
+  blades_.end_tick(tools, output_.work_j);
   if (output_.events.events.empty()) return false;
   new_nodes_.assign(output_.new_nodes.begin(), output_.new_nodes.end());
   record(output_.events);
   return true;
-}
-
-// The work of opening a wound, per way that the blade goes, is a force against it. Wounds open in
-// steps of a part of an element, so it is that of the last few millimetres. Of several blades each
-// gets its share by how far it went.
-void TissueCuts::resist(const input::ToolTable& tools, double work_j) {
-  float total = 0;
-  for (std::uint8_t i = 0; i < kMaxTools; ++i)
-    if (blades_[i].is_cutting) total += length(tools[ToolSlot{i}].pose.position - blades_[i].tip);
-  for (std::uint8_t i = 0; i < kMaxTools; ++i) {
-    Blade& blade = blades_[i];
-    if (!blade.is_cutting) {
-      blade = {};
-      continue;
-    }
-    const Vec3f moved = tools[ToolSlot{i}].pose.position - blade.tip;
-    blade.tip = tools[ToolSlot{i}].pose.position;
-    const float way = length(moved), share = total > 0 ? way / total : 0;
-    blade.work_per_m += (static_cast<float>(work_j) * share - blade.work_per_m * way) / kWay_m;
-    blade.work_per_m = std::max(0.0f, blade.work_per_m);
-    blade.velocity += (moved / kTickSeconds - blade.velocity) * kNewest;
-    const float speed = length(blade.velocity);
-    const float force =
-        std::min(blade.work_per_m, kMostForce_n) * std::min(1.0f, speed / kSlow_m_s);
-    blade.force_n = speed > 0 ? blade.velocity * (-force / speed) : Vec3f{};
-  }
 }
 
 void TissueCuts::record(cutting::CutEvents events) {
@@ -198,10 +154,9 @@ std::shared_ptr<const wire::SurfaceChange> TissueCuts::take_change() {
 void TissueCuts::follow_on(const TissueCuts& before) {
   layout_.epoch = before.layout_.epoch;
   is_new_to_clients_ = true;
-  for (std::uint8_t i = 0; i < kMaxTools; ++i) {
-    if (blades_[i].is_cutting) cutter_->lift(i);
-    blades_[i] = {};
-  }
+  for (std::uint8_t i = 0; i < kMaxTools; ++i)
+    if (blades_[ToolSlot{i}].is_cutting) cutter_->lift(i);
+  blades_.clear();
 }
 
 std::shared_ptr<const wire::SurfaceLayout> TissueCuts::take_new_layout() {
@@ -232,17 +187,7 @@ void TissueCuts::visit_state(world::StateArchive& archive, world::World& world) 
   }
   if (!archive.ok()) return;
   if (can_cut()) cutter_->visit_state(archive);
-  for (auto& blade : blades_) {
-    archive.flag(blade.is_cutting);
-    if (!blade.is_cutting) continue;
-    archive.value(blade.tip);
-    archive.value(blade.velocity);
-    archive.value(blade.work_per_m);
-    archive.value(blade.force_n);
-    if (archive.is_reading() && !(is_finite(blade.tip) && is_finite(blade.velocity) &&
-                                  is_finite(blade.force_n) && std::isfinite(blade.work_per_m)))
-      archive.fail();
-  }
+  blades_.visit_state(archive);
 }
 
 void TissueCuts::read_history(world::StateArchive& archive, std::uint32_t count,

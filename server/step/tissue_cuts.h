@@ -7,7 +7,6 @@
 //
 // An organ with links, or without tets, cannot be cut: claims to cut it are granted and do nothing.
 
-#include <array>
 #include <memory>
 #include <span>
 #include <vector>
@@ -20,6 +19,7 @@
 #include "server/cutting/tearing.h"
 #include "server/input/tool_table.h"
 #include "server/locks/claims.h"
+#include "server/step/blades.h"
 #include "server/step/tick_report.h"
 #include "server/world/world.h"
 
@@ -33,7 +33,7 @@ class TissueCuts {
   const dynamics::Topology& topology() const { return topology_; }
   const wire::SurfaceLayout& layout() const { return layout_; }
   // Of the tissue on a blade, N, world frame.
-  Vec3f force_n(ToolSlot tool) const { return blades_[tool.value].force_n; }
+  Vec3f force_n(ToolSlot tool) const { return blades_[tool].force_n; }
 
   // What is stretched too far around these nodes tears in the next cut().
   void tear(const world::World& world, std::span<const NodeIndex> nodes);
@@ -66,18 +66,9 @@ class TissueCuts {
   void visit_state(world::StateArchive& archive, world::World& world);
 
  private:
-  struct Blade {
-    Vec3f tip;             // m, in the tick before
-    Vec3f velocity;        // m/s, smoothed
-    float work_per_m = 0;  // N: of cutting, per way
-    Vec3f force_n;
-    bool is_cutting = false;
-  };
-
   void forget_pending();
   void record(cutting::CutEvents events);
   void extend_layout(const world::World& world, const world::SurfaceEdit& edit);
-  void resist(const input::ToolTable& tools, double work_j);
   void read_history(world::StateArchive& archive, std::uint32_t count, world::World& world);
 
   dynamics::Topology topology_;
@@ -89,7 +80,7 @@ class TissueCuts {
   std::uint32_t published_ = 0;  // edits of history_ that clients know
   bool is_new_to_clients_ = false;
   std::uint64_t history_hash_ = 0;
-  std::array<Blade, kMaxTools> blades_;
+  BladeTable blades_;
   wire::SurfaceChange pending_;
   std::uint32_t first_pending_ = 0;  // number of pending_.added[0]
   // Scratch.

@@ -120,6 +120,11 @@ TEST_F(Malformed, a_sequence_that_does_not_grow_ends_the_session) {
 TEST_F(Malformed, messages_of_another_role_or_direction_end_the_session) {
   EXPECT_EQ(answer_to(make_sample(1), proto::ROLE_OBSERVER).reason(), proto::GOODBYE_ROLE);
   EXPECT_EQ(answer_to(make_sample(1), proto::ROLE_INSTRUCTOR).reason(), proto::GOODBYE_ROLE);
+  Envelope mark;
+  mark.mutable_mark_request()->set_action(proto::MARK_SET);
+  EXPECT_EQ(answer_to(mark, proto::ROLE_SURGEON).reason(), proto::GOODBYE_ROLE);
+  mark.mutable_mark_request()->set_action(static_cast<proto::MarkAction>(3));
+  EXPECT_EQ(answer_to(mark, proto::ROLE_INSTRUCTOR).reason(), proto::GOODBYE_PROTOCOL_ERROR);
   std::vector<Envelope> wrong(9);
   wrong[0].mutable_welcome();
   wrong[1].mutable_surface_topology();

@@ -187,6 +187,7 @@ TEST_F(Blades, StopAtWhatAnotherHolds) {
   join.shapes[0] = {.reach_m = 0.012f};
   inputs.joins.push_back(join);
   int refused = 0, granted = 0;
+  float stop_n = 0;
   for (int tick = 1; tick <= 700; ++tick) {
     if (tick % 8 == 1)
       inputs.samples.push_back(
@@ -194,18 +195,23 @@ TEST_F(Blades, StopAtWhatAnotherHolds) {
     add_blades(simulation, inputs);
     simulation.tick(inputs, {});
     inputs.clear();
-    if (const auto frame = simulation.take_frame())
+    if (const auto frame = simulation.take_frame()) {
       for (const auto& event : frame->claim_events) {
         if (event.verb != scene::Verb::Cut) continue;
         refused += event.outcome == locks::ClaimOutcome::RefusedHeld;
         granted += event.outcome == locks::ClaimOutcome::Granted;
       }
+      for (const auto& tool : frame->tools)
+        if (refused > 0 && tool.tool == tool_slot({0}, 0))
+          stop_n = std::max(stop_n, -tool.force_n.x);
+    }
     const auto& state = simulation.state();
     for (const auto node : state.grasps[tool_slot({1}, 0)].nodes)
       ASSERT_NE(state.claims.owner(node), tool_slot({0}, 0));
   }
   EXPECT_GE(granted, 1);
   EXPECT_GE(refused, 1);
+  EXPECT_GT(stop_n, 2) << "against the blade, which goes on along x";
   EXPECT_FALSE(simulation.state().grasps[tool_slot({1}, 0)].nodes.empty());
 }
 
