@@ -13,6 +13,7 @@
 
 #include <array>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "common/base/index.h"
@@ -26,6 +27,7 @@ struct SurfaceLayout;
 inline constexpr std::size_t kMaxSurfaceVertices = 4'000'000;
 inline constexpr std::size_t kMaxSurfaceTriangles = 8'000'000;  // numbers, gaps included
 inline constexpr std::int32_t kMaxRestQuanta = 62'500;          // 2 m from the origin
+inline constexpr int kMaxChangeRegions = 1000;                  // names in a change
 
 using Corners = std::array<VertexIndex, 3>;  // outward
 
@@ -59,7 +61,8 @@ struct SurfaceChange {
   std::vector<NewVertex> new_vertices;
   std::vector<TriangleIndex> removed;  // ascending
   std::vector<NewTriangle> added;
-  std::uint64_t sum = 0;  // after the change
+  std::vector<std::string> regions;  // names of those whose tissue is laid open here, ascending
+  std::uint64_t sum = 0;             // after the change
 
   bool operator==(const SurfaceChange&) const = default;
 };

@@ -277,6 +277,7 @@ void write(const SurfaceChange& change, const SurfaceLayout& layout,
     wounds.add(triangle.is_wound);
   }
   wounds.finish();
+  for (const auto& name : change.regions) message.add_region(name);
   message.set_triangle_sum(change.sum);
 }
 
@@ -289,6 +290,9 @@ Result<SurfaceChange> read(const proto::SurfaceChange& message, const SurfaceLay
     return bad(kChange, "from_epoch: is " + std::to_string(change.from_epoch) +
                             ", the surface has " + std::to_string(before.epoch));
   if (Status done = read_vertices(message, before, change); !done.ok()) return done.error();
+  if (message.region_size() > kMaxChangeRegions)
+    return bad(kChange, "region: more than " + std::to_string(kMaxChangeRegions) + " names");
+  change.regions.assign(message.region().begin(), message.region().end());
   std::uint64_t number = 0;
   change.removed.reserve(static_cast<std::size_t>(message.removed_size()));
   for (const std::uint32_t by : message.removed()) {

@@ -34,6 +34,8 @@ Examples:
       the same liver, finer
   trocar-organ make stomach
       a hollow one, its wall two tets thick or more, into stomach.organ
+  trocar-organ make liver --tension 0.05 --tear-stretch 1.5 --out friable.organ
+      one whose wounds gape, and which tears when it is pulled half as long again
   trocar-organ import spleen.msh --unit mm --fix back:0.1
       a mesh in millimetres, held at the hindmost tenth, into spleen.organ
   trocar-organ inspect spleen.organ --json
@@ -52,6 +54,7 @@ struct Options {
   std::string log_level = "info";
   std::string made_name;
   std::optional<int> tets;
+  std::optional<double> tension, tear_stretch, cut_energy_j_m2;
   std::string out;
   std::string import_file;
   std::string unit = "m";
@@ -272,9 +275,18 @@ Result<scene::Organ> make_named(const std::string& name, const std::optional<int
   return scene::make_liver(tets.value_or(scene::kDefaultLiverTets));
 }
 
+Status change_material(const Options& options, scene::Organ& organ) {
+  auto& material = organ.material;
+  material.tension = options.tension.value_or(material.tension);
+  material.tear_stretch = options.tear_stretch.value_or(material.tear_stretch);
+  material.cut_energy_j_m2 = options.cut_energy_j_m2.value_or(material.cut_energy_j_m2);
+  return scene::validate(organ);
+}
+
 Status run_make(const Options& options) {
-  const auto organ = make_named(options.made_name, options.tets);
+  auto organ = make_named(options.made_name, options.tets);
   if (!organ) return organ.error();
+  if (auto changed = change_material(options, *organ); !changed) return changed;
   return save(*organ, options.out.empty() ? options.made_name + ".organ" : options.out);
 }
 
@@ -291,8 +303,9 @@ Status run_import(const Options& options) {
       !missing && bytes >= kLargeFileBytes)
     std::fprintf(stderr, "%s: reading %s, %s MB, this takes some seconds\n", kProgram,
                  options.import_file.c_str(), grouped(bytes / 1'000'000).c_str());
-  const auto imported = scene::import_organ(path, import_options);
+  auto imported = scene::import_organ(path, import_options);
   if (!imported) return imported.error();
+  if (auto changed = change_material(options, imported->organ); !changed) return changed;
   for (const std::string& warning : imported->warnings)
     std::fprintf(stderr, "%s: warning: %s: %s\n", kProgram, options.import_file.c_str(),
                  warning.c_str());
@@ -353,6 +366,16 @@ void add_commands(CLI::App& app, Options& options) {
   inspect->add_option("FILE", options.inspected, ".organ or .msh file, or a built-in organ's name")
       ->required();
   inspect->add_flag("--json", options.json, "print JSON");
+  for (auto* command : {make, import}) {
+    command->add_option("--tension", options.tension, "tissue would be shorter by this part [0]")
+        ->type_name("PART");
+    command
+        ->add_option("--tear-stretch", options.tear_stretch,
+                     "it tears when so many times as long; 0: never [0]")
+        ->type_name("RATIO");
+    command->add_option("--cut-energy", options.cut_energy_j_m2, "of a wound, J/m^2 [150]")
+        ->type_name("E");
+  }
   add_fit_command(app, options.fit);
   add_settle_command(app, options.settle);
   add_calibrate_command(app, options.calibrate);

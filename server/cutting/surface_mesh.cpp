@@ -61,7 +61,8 @@ void SurfaceMesh::gather_faces(const dynamics::Topology& topology) {
           has_changed |= is_changed_[nodes[i].value] != 0;
         }
         if (has_changed)
-          faces_.push_back({key_of(nodes), nodes, (topology.wound_faces(t) >> corner & 1) != 0});
+          faces_.push_back({key_of(nodes), nodes, (topology.wound_faces(t) >> corner & 1) != 0,
+                            topology.material_of(t)});
       }
     }
   }
@@ -97,7 +98,7 @@ void SurfaceMesh::add(const Face& face) {
     triangles_of_.resize(node.value, count + 1).back() = triangle;
     edit_.touched.push_back(node);
   }
-  edit_.added.push_back({face.nodes, face.is_wound});
+  edit_.added.push_back({face.nodes, face.is_wound, face.material});
 }
 
 const world::SurfaceEdit& SurfaceMesh::follow(const dynamics::Topology& topology) {

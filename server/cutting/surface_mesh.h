@@ -36,6 +36,7 @@ class SurfaceMesh {
     std::array<NodeIndex, 3> key;  // ascending
     mesh::Triangle nodes;          // outward
     bool is_wound = false;
+    std::uint16_t material = 0;
   };
 
   void gather_faces(const dynamics::Topology& topology);

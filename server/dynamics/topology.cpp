@@ -75,9 +75,11 @@ Topology::Topology(const scene::Organ& organ)
 
 void Topology::neighbours_of(NodeIndex node, std::vector<NodeIndex>& out) const {
   out.clear();
-  for_each_neighbour(node, [&](NodeIndex j) { out.push_back(j); });
+  // A neighbour shares about five tets: fewer to sort if each is taken once.
+  for_each_neighbour(node, [&](NodeIndex j) {
+    if (std::ranges::find(out, j) == out.end()) out.push_back(j);
+  });
   std::ranges::sort(out);
-  out.erase(std::unique(out.begin(), out.end()), out.end());
 }
 
 std::uint16_t Topology::material_of_all(std::span<const NodeIndex> nodes) const {

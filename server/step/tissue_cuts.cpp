@@ -135,7 +135,16 @@ void TissueCuts::extend_layout(const world::World& world, const world::SurfaceEd
     layout_.is_wound.push_back(triangle.is_wound);
     layout_.triangle_sum += wire::triangle_hash(number, triangle.corners, triangle.is_wound);
     pending_.added.push_back(triangle);
+    if (added.is_wound && added.material > 0) name_region(added.material);
   }
+}
+
+void TissueCuts::name_region(std::uint16_t material) {
+  const auto& name = topology_.organ().regions[material - 1u].name;
+  const auto at = std::ranges::lower_bound(pending_.regions, name);
+  if (pending_.regions.size() < wire::kMaxChangeRegions &&
+      (at == pending_.regions.end() || *at != name))
+    pending_.regions.insert(at, name);
 }
 
 std::shared_ptr<const wire::SurfaceChange> TissueCuts::take_change() {

@@ -69,6 +69,7 @@ class TissueCuts {
   void forget_pending();
   void record(cutting::CutEvents events);
   void extend_layout(const world::World& world, const world::SurfaceEdit& edit);
+  void name_region(std::uint16_t material);
   void read_history(world::StateArchive& archive, std::uint32_t count, world::World& world);
 
   dynamics::Topology topology_;

@@ -4,6 +4,7 @@
 // boundary triangles, then the next ones; that of a triangle which is gone is never used again.
 
 #include <array>
+#include <cstdint>
 #include <vector>
 
 #include "common/base/index.h"
@@ -14,6 +15,7 @@ struct SurfaceEdit {
   struct Triangle {
     std::array<NodeIndex, 3> nodes;  // counter-clockwise seen from outside
     bool is_wound = false;           // where tissue was inside before a cut
+    std::uint16_t material = 0;      // of the tet behind it, as scene::material_at() counts
   };
 
   std::vector<TriangleIndex> removed;  // ascending

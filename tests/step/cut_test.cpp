@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <set>
+#include <string>
+
 #include "server/cutting/validate.h"
 #include "server/step/simulation.h"
 #include "tests/step/hands.h"
@@ -131,6 +134,30 @@ TEST_F(Blades, ChangesLeadFromSurfaceToSurface) {
     ASSERT_EQ(followed.compute_triangle_sum(), followed.triangle_sum);
   }
   EXPECT_GT(followed.epoch, 10u);
+}
+
+// Vessels will bleed, some day: who follows a session hears what has been laid open.
+TEST_F(Blades, ChangesNameTheRegionsThatAreCut) {
+  auto organ = liver(scene::ElasticLaw::Springs);
+  Vec3f top{0, -1, 0};
+  for (const auto& p : organ.mesh.rest_positions)
+    if (static_cast<float>(p.y) > top.y) top = to_float(p);
+  const auto region = [&](const char* name, auto&& holds) {
+    std::vector<NodeIndex> nodes;
+    for (std::uint32_t n = 0; n < organ.mesh.node_count(); ++n)
+      if (holds(organ.mesh.rest_positions[n])) nodes.emplace_back(n);
+    organ.regions.push_back({name, organ.material, nodes});
+  };
+  region("vessel", [&](const Vec3d& p) { return std::abs(p.x - double(top.x)) < 0.02; });
+  region("far away", [&](const Vec3d& p) { return p.x < double(top.x) - 0.06; });
+  Simulation simulation(organ);
+  std::set<std::string> named;
+  for (int i = 0; i < 800; ++i) {
+    run_tick(simulation);
+    if (const auto frame = simulation.take_frame(); frame && frame->change)
+      named.insert(frame->change->regions.begin(), frame->change->regions.end());
+  }
+  EXPECT_EQ(named, std::set<std::string>{"vessel"});
 }
 
 // What has been parted moves by itself: a through cut, and the free end drawn away.

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "common/scene/builtin_organs.h"
 #include "server/cutting/validate.h"
 #include "server/step/simulation.h"
 

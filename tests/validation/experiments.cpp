@@ -25,6 +25,8 @@ const std::vector<Experiment>& experiments() {
        "Nakao 2003, section 5.1, figures 10 to 12", run_plate},
       {"nakao2003/fig15-fig17-refresh", "Time per cycle, with and without a controller",
        "Nakao 2003, figures 15 to 17", run_refresh_rate},
+      {"nakao2003/fig15-fig17-cutting", "Time per cycle while a blade cuts",
+       "Nakao 2003, figures 15 to 17", run_refresh_cutting},
       {"ours/propagation-lattice", "What a limit of nodes costs: lattice", "full solve, our own",
        run_propagation_lattice},
       {"ours/propagation-liver-4k", "What a limit of nodes costs: liver of 4,000 nodes",

@@ -30,6 +30,7 @@ void run_relaxation(const Lab& lab, Section& section);
 
 void run_plate(const Lab& lab, Section& section);
 void run_refresh_rate(const Lab& lab, Section& section);
+void run_refresh_cutting(const Lab& lab, Section& section);
 
 void run_propagation_lattice(const Lab& lab, Section& section);
 void run_propagation_liver(const Lab& lab, Section& section);

@@ -54,6 +54,24 @@ proto::SurfaceTopology message_of(const SurfaceLayout& layout) {
   return message;
 }
 
+TEST(surface_change, gaps_and_names_of_regions_go_over_the_wire) {
+  const SurfaceLayout before = box();
+  SurfaceChange change = slit(before);
+  change.added.insert(change.added.begin() + 1, NewTriangle{});
+  change.regions = {"gall bladder", "vessel"};
+  change.sum = sum_after(change, before);
+  SurfaceLayout after = before;
+  ASSERT_TRUE(apply(change, after).ok());
+  proto::SurfaceChange message;
+  write(change, after, message);
+  const auto known = without_nodes(before);
+  const auto read_back = read(message, known);
+  ASSERT_TRUE(read_back.ok()) << read_back.error().message;
+  EXPECT_EQ(*read_back, without_nodes(change));
+  for (int i = 0; i <= kMaxChangeRegions; ++i) message.add_region("x");
+  EXPECT_FALSE(read(message, known).ok());
+}
+
 TEST(surface_change, a_slit_keeps_the_surface_closed_and_numbers_in_place) {
   SurfaceLayout layout = box();
   ASSERT_TRUE(is_closed(layout));
