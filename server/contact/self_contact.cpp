@@ -251,6 +251,20 @@ bool SelfContactFinder::meets(Site site, std::size_t first, std::size_t end,
          (nearest != kNoSite && begins(site, nearest, least, false, world, closest, touch));
 }
 
+// Where to look on from the closest point of a triangle: at its corners. What is nearer than a
+// point on an edge or corner is there: lips that have not moved are corner on corner.
+std::span<const SelfSurface::Site> SelfContactFinder::around(TriangleIndex triangle,
+                                                             const Vec3f& weights,
+                                                             bool is_there_only) {
+  const auto& corners = surface_[triangle];
+  if (!is_there_only) return corners;
+  const float of_corner[] = {weights.x, weights.y, weights.z};
+  corners_.clear();
+  for (std::size_t k = 0; k < 3; ++k)
+    if (of_corner[k] > 0) corners_.push_back(corners[k]);
+  return corners_;
+}
+
 // Where a pair is now; false when it has come apart.
 bool SelfContactFinder::stays(Site site, TriangleIndex triangle, const world::World& world,
                               ClosestPoint& closest, Touch& touch) {
@@ -260,7 +274,8 @@ bool SelfContactFinder::stays(Site site, TriangleIndex triangle, const world::Wo
   if (is_there) closest = closest_point(site, triangle, world);
   const Vec3f& w = closest.weights;
   if (!is_there || !(w.x > 0 && w.y > 0 && w.z > 0))
-    closest = closest_point_around(site, surface_[triangle], is_of_lips, world);
+    closest =
+        closest_point_around(site, around(triangle, w, is_there && is_of_lips), is_of_lips, world);
   if (!closest.triangle.is_valid()) return false;
   touch = touch_at(site, closest, world);
   // A little farther than where it began, so that it does not flutter.

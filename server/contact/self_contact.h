@@ -151,6 +151,7 @@ class SelfContactFinder {
   }
   bool can_meet(Site site, TriangleIndex triangle, const world::World& world);
   ClosestPoint closest_point(Site site, TriangleIndex triangle, const world::World& world) const;
+  std::span<const Site> around(TriangleIndex triangle, const Vec3f& weights, bool is_there_only);
   ClosestPoint closest_point_around(Site site, std::span<const Site> around, bool is_of_lips,
                                     const world::World& world);
   Touch touch_at(Site site, const ClosestPoint& closest, const world::World& world);
@@ -203,7 +204,7 @@ class SelfContactFinder {
   std::uint32_t normal_current_ = 0;
   std::vector<NodeIndex> old_nodes_;
   std::vector<TriangleIndex> old_triangles_;
-  std::vector<Site> around_;
+  std::vector<Site> around_, corners_;
 };
 
 }  // namespace trocar::contact
