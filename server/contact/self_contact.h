@@ -204,7 +204,7 @@ class SelfContactFinder {
   std::uint32_t normal_current_ = 0;
   std::vector<NodeIndex> old_nodes_;
   std::vector<TriangleIndex> old_triangles_;
-  std::vector<Site> around_, corners_;
+  std::vector<Site> around_, looking_, corners_;
 };
 
 }  // namespace trocar::contact

@@ -74,7 +74,7 @@ void SelfContactFinder::follow(const world::SurfaceEdit& edit, const world::Worl
   list_edit();
 }
 
-// Whether it has anything to look for beside what looks for it.
+// Whether it may meet what does not look around itself.
 bool SelfContactFinder::looks_around(Site site) const {
   return has_left_[site] == 1 || is_close_at_rest_[site] == 1 || surface_.is_of(site, Sort::Wound);
 }
@@ -85,18 +85,20 @@ void SelfContactFinder::list_edit() {
   for (const Site s : surface_.followed()) box.include(references_[s]);
   box.grow(range);
   around_.clear();
-  for (const Site s : surface_.sites())
-    if (box.contains(references_[s])) around_.push_back(s);
+  looking_.clear();
+  for (const Site s : surface_.sites()) {
+    if (!box.contains(references_[s])) continue;
+    around_.push_back(s);
+    if (looks_around(s)) looking_.push_back(s);
+  }
   next_list_.pairs.clear();
   next_list_.least_distance = list_.least_distance;
-  for (const Site s : surface_.followed()) {
-    const bool looks = looks_around(s);
-    for (const Site other : around_) {
+  for (const Site s : surface_.followed())
+    for (const Site other : looks_around(s) ? around_ : looking_) {
       const float squared = length_squared(references_[s] - references_[other]);
-      if (squared > range * range || other == s || !(looks || looks_around(other))) continue;
-      if (may_meet(s, other)) list_pair(s, other, squared);
+      if (squared <= range * range && other != s && may_meet(s, other))
+        list_pair(s, other, squared);
     }
-  }
   merge_list();
 }
 
