@@ -11,25 +11,29 @@
 //
 // A node meets a triangle from outside only: in front of it, facing it, within the margin of the
 // tick's motion. That node and triangle then stay a pair while the node is near, however deep it is
-// pressed and wherever it slides, so that nothing flips: pairs are state. What lies within
-// kNearLayers, or so many edges' length, of a node in the tissue never meets it: its neighbourhood,
-// and the other face of a thin wall. What touches or overlaps at rest may stay as it is.
+// pressed and wherever it slides, so that nothing flips: pairs are state. What is near a node in
+// the tissue (self_surface.h) never meets it: its neighbourhood, and the other face of a thin wall.
+// What touches or overlaps at rest may stay as it is.
+//
+// Cuts: the two sides of a wound are face to face from the start, and pairs like any others, which
+// press once they overlap: cutting adds no force and no energy. Wounds and skin are surfaces of
+// their own: a node at the rim has a normal of each, and a node on a wound meets the other side of
+// wounds first. A pair whose triangle an edit has replaced goes on with what is there now.
 //
 // Work: pairs of nodes that can come near are listed with slack, and again for those nodes that
 // have moved a part of it: O(surface nodes + these x their surroundings), over several ticks. Every
 // tick: O(pairs of nodes listed), nothing where nothing is near.
+// An edit adds the pairs around it to the list: O(what is within reach of it), and a look at each
+// surface node's place.
 // Pairs are a function of the state: results do not depend on when lists were made.
-//
-// After cuts, what is left of the surface as it was at first takes part; the wound does not.
 
 #include <span>
 #include <vector>
 
-#include "common/mesh/csr.h"
 #include "server/contact/contact_list.h"
 #include "server/contact/point_grid.h"
+#include "server/contact/self_surface.h"
 #include "server/world/state_archive.h"
-#include "server/world/surface_edit.h"
 
 namespace trocar::contact {
 
@@ -40,12 +44,11 @@ inline constexpr float kSelfStiffnessPaPerM = 5e7f;
 // never from farther than kSelfMaxMargin_m: enough for 1.3 m/s.
 inline constexpr float kSelfMargin_m = 0.001f, kSelfMaxMargin_m = 0.003f;
 inline constexpr float kSelfTicksAhead = 1.5f;
-inline constexpr std::uint32_t kNearLayers = 3;
 
 // The pairs: state.
 class SelfContactTable {
  public:
-  explicit SelfContactTable(const scene::Organ& organ);
+  SelfContactTable();
 
   std::span<const NodeIndex> nodes() const { return nodes_; }  // ascending, each once
   std::span<const TriangleIndex> triangles() const { return triangles_; }
@@ -55,17 +58,14 @@ class SelfContactTable {
     triangles_.push_back(triangle);
   }
 
-  // Pairs with triangles that are gone end.
-  void follow(const world::SurfaceEdit& edit);
-
-  // Takes no bytes without pairs. Last in a state.
-  void visit_state(world::StateArchive& archive);
+  // Takes no bytes without pairs. Last in a state. surface_nodes: ascending; triangle_count:
+  // numbers given so far.
+  void visit_state(world::StateArchive& archive, std::span<const NodeIndex> surface_nodes,
+                   std::size_t triangle_count);
 
  private:
   std::vector<NodeIndex> nodes_;
   std::vector<TriangleIndex> triangles_;
-  std::vector<std::uint8_t> is_surface_;  // per node of the organ
-  std::uint32_t triangle_count_ = 0;
 };
 
 class SelfContactFinder {
@@ -81,18 +81,21 @@ class SelfContactFinder {
     last_move_m_ = at_most_m;
   }
 
-  // What is gone meets nothing any more. What is new is not seen.
-  void follow(const world::SurfaceEdit& edit);
+  // The world has its new nodes.
+  void follow(const world::SurfaceEdit& edit, const world::World& world);
 
   // Lists made, and pairs of nodes in the last one.
   std::uint64_t lists_made() const { return lists_made_; }
   std::size_t pairs_listed() const { return list_.pairs.size(); }
 
  private:
-  using Site = std::uint32_t;  // of a surface node, ascending like these
-  struct SiteIndex {
-    std::uint32_t value = 0;
-  };
+  using Site = SelfSurface::Site;
+  using Sort = SelfSurface::Sort;
+  // Nodes this far from rest, in slacks, are listed; a pair needs one that is farther than
+  // kListedSlacks + 1/2, unless it faced something this near at rest.
+  static constexpr float kReferenceSlacks = 0.25f;
+  static constexpr float kListedSlacks = 0.5f, kMovedSlacks = kListedSlacks + 0.5f;
+
   struct NodePair {
     Site node = 0, across = 0;
     auto operator<=>(const NodePair&) const = default;
@@ -104,7 +107,7 @@ class SelfContactFinder {
     float squared = 0;
   };
   struct Touch {
-    Vec3f normal;                   // from the triangle's side to the node's
+    Vec3f normal, own;              // from the triangle's side to the node's; the node's
     Vec3f at_rest;                  // m, from the point to the node
     float shift = 0;                // m, the gap from which on it presses
     float gap = 0;                  // m, beyond that
@@ -112,8 +115,6 @@ class SelfContactFinder {
     float facing = 0, closing = 0;  // cosine of both normals; m/s
   };
 
-  void list_near_sites(const scene::Organ& organ, double near_m);
-  bool faced_at_rest(Site site, Site across) const;
   void keep_list(const world::World& world);
   void begin_list();
   void go_on_listing(double share, const world::World& world);
@@ -122,16 +123,42 @@ class SelfContactFinder {
   void order_due();
   void end_list();
   void list_around(Site site);
-  bool has_moved(Site site, float by_m, const world::World& world) const;
-  Vec3f position(Site site, const world::World& world) const {
-    return world.position(sites_[site]);
+  void extend();
+  void list_edit();
+  void merge_list();
+  bool looks_around(Site site) const;
+  bool may_meet(Site site, Site other) const;
+  void list_pair(Site site, Site other, float squared);
+  bool has_moved(Site site, float by_m, const world::World& world) const {
+    return length_squared(world.displacements[site]) > by_m * by_m;
   }
-  const Vec3f& normal(Site site, const world::World& world);
-  bool is_near(Site site, TriangleIndex triangle) const;
+  // When its surroundings were last looked through.
+  bool was_moved(Site site, float by_m) const {
+    return length_squared(references_[site] - surface_.rest_position(site)) > by_m * by_m;
+  }
+  static Vec3f position(Site site, const world::World& world) {
+    return world.position(NodeIndex(site));
+  }
+  const Vec3f& normal(Site site, Sort sort, const world::World& world);
+  const Vec3f& main_normal(Site site, const world::World& world) {
+    return normal(site, surface_.is_of(site, Sort::Skin) ? Sort::Skin : Sort::Wound, world);
+  }
+  Vec3f normal_towards(Site site, const Vec3f& theirs, const world::World& world);
+  Vec3f up(TriangleIndex triangle, const world::World& world) const;
+  // The wound of the triangle is one that the node is on a lip of.
+  bool is_of_lips(Site site, TriangleIndex triangle) const {
+    return surface_.sort_of(triangle) == Sort::Wound && surface_.is_on_lip(site);
+  }
+  bool can_meet(Site site, TriangleIndex triangle, const world::World& world);
   ClosestPoint closest_point(Site site, TriangleIndex triangle, const world::World& world) const;
-  ClosestPoint closest_point_around(Site site, std::span<const Site> around,
-                                    const world::World& world) const;
+  std::span<const Site> around(TriangleIndex triangle, const Vec3f& weights, bool is_there_only);
+  ClosestPoint closest_point_around(Site site, std::span<const Site> around, bool is_of_lips,
+                                    const world::World& world);
   Touch touch_at(Site site, const ClosestPoint& closest, const world::World& world);
+  bool can_meet_lip(Site site, Site across, const world::World& world) const;
+  bool can_meet_other(Site site, Site across, bool is_moved, const world::World& world);
+  bool begins(Site site, Site nearest, float squared, bool is_of_lips, const world::World& world,
+              ClosestPoint& closest, Touch& touch);
   // Of list_.pairs.
   bool meets(Site site, std::size_t first, std::size_t end, const world::World& world,
              ClosestPoint& closest, Touch& touch);
@@ -140,17 +167,10 @@ class SelfContactFinder {
   void add_point(Site site, const ClosestPoint& closest, const Touch& touch,
                  const world::World& world, SelfContactTable& pairs, ContactList& out) const;
 
-  // Constant.
-  std::vector<NodeIndex> sites_;
-  std::vector<Site> site_of_node_;
-  std::vector<std::array<Site, 3>> triangles_;
-  mesh::Csr<SiteIndex, TriangleIndex> site_triangles_;
-  std::vector<std::uint8_t> is_gone_;                 // per triangle
-  mesh::Csr<SiteIndex, Site> near_sites_;             // ascending
-  std::vector<Vec3f> rest_positions_, rest_normals_;  // per site
-  std::vector<std::uint8_t> is_close_at_rest_;        // per site: something faces it there
-  float slack_m_ = 0, corner_reach_m_ = 0;            // see begin_list()
-  float reach_m_ = 0;                                 // with the greatest margin
+  SelfSurface surface_;
+  std::vector<std::uint8_t> is_close_at_rest_;  // per node: something may face it there
+  float slack_m_ = 0, corner_reach_m_ = 0;      // see begin_list()
+  float reach_m_ = 0;                           // with the greatest margin
 
   // What is listed, and when it began to be.
   struct List {
@@ -171,19 +191,20 @@ class SelfContactFinder {
   std::size_t due_count_ = 0;     // of these
   std::size_t sites_listed_ = 0;  // of due_
   PointGrid grid_;                // of references_
-  // Per site, see begin_list(); has_left_: the reference is not where it was at rest.
+  // Per node, see begin_list(); has_left_: the reference is not where it was at rest.
   std::vector<Vec3f> references_;
   std::vector<std::uint8_t> has_left_, is_due_;
   std::vector<Site> due_;
 
   // Scratch.
-  std::vector<std::uint32_t> near_stamp_;  // per site
+  std::vector<std::uint32_t> near_stamp_;  // per node
   std::uint32_t near_current_ = 0;
-  std::vector<Vec3f> normals_;  // per site, where the stamp is current
+  std::vector<Vec3f> normals_;  // per node and sort, where the stamp is current
   std::vector<std::uint32_t> normal_stamp_;
   std::uint32_t normal_current_ = 0;
   std::vector<NodeIndex> old_nodes_;
   std::vector<TriangleIndex> old_triangles_;
+  std::vector<Site> around_, looking_, corners_;
 };
 
 }  // namespace trocar::contact

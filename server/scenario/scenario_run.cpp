@@ -107,7 +107,6 @@ ScenarioRun::ScenarioRun(scene::ResolvedScenario resolved, Solver solver, unsign
       step_count_(steps_of(scenario().run)),
       world_(world_of(resolved_)),
       claims_(world_.node_count()),
-      self_contacts_(organ()),
       finder_(organ()),
       queue_(world_.node_count()),
       active_set_(world_.node_count()),

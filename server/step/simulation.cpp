@@ -13,8 +13,7 @@ State::State(const scene::Organ& organ)
     : cuts(organ),
       world(organ),
       claims(organ.mesh.node_count()),
-      quantised(cuts.layout().vertex_count()),
-      self_contacts(organ) {}
+      quantised(cuts.layout().vertex_count()) {}
 
 void State::visit(world::StateArchive& archive) {
   visit_without_mark(archive);
@@ -56,7 +55,7 @@ void State::visit_without_mark(world::StateArchive& archive) {
   grasps.visit_state(archive, world.node_count());
   proxies.visit_state(archive);
   archive.fixed_array(quantised);
-  self_contacts.visit_state(archive);
+  self_contacts.visit_state(archive, world.surface_nodes, cuts.layout().triangles.size());
 }
 
 namespace {
@@ -112,7 +111,7 @@ void StepContext::follow_edit(const dynamics::Topology& topology, const world::S
   queue.forget(world.node_count());
   active.forget();
   finder.follow(edit, world);
-  self_finder.follow(edit);
+  self_finder.follow(edit, world);
   solver.follow_topology(topology, world);
 }
 

@@ -127,7 +127,6 @@ void cut_tissue(State& state, StepContext& context) {
     state.claims.add_node(made.a, made.b);
     if (made.a == made.b) state.grasps.add_copy(made.a, made.node);
   }
-  state.self_contacts.follow(edit);
   state.quantised.resize(cuts.layout().vertex_count());
   context.follow_edit(cuts.topology(), edit, state.world);
   cuts.clear_changes();

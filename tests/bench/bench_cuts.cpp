@@ -1,6 +1,7 @@
 // Blades in the session's own tick, without a network: each goes through the organ from end to end
 // with its edge upright, lifts, and goes through it again beside that. CPU time of the tick's cut
-// stage (cutting, and everything that follows the new topology), in ticks that changed it.
+// stage (cutting, and everything that follows the new topology), in ticks that changed it, and of
+// finding contacts.
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -67,7 +68,8 @@ void run(scene::Organ organ, const Options& options) {
     join.shapes[0] = {.radius_m = 0.001f, .length_m = 0.3f, .edge_m = 0.12f};
     inputs.joins.push_back(join);
   }
-  std::vector<double> cut_us, tick_us;
+  std::vector<double> cut_us, tick_us, contacts_us;
+  std::uint32_t most_pairs = 0;
   double all_cut_us = 0, area_m2 = 0;
   std::uint64_t crossed = 0, splits = 0, behind = 0;
   for (Tick tick = 1; tick <= static_cast<Tick>(options.seconds * 1000); ++tick) {
@@ -80,6 +82,9 @@ void run(scene::Organ organ, const Options& options) {
     double all = 0;
     for (const auto ns : report.stage_cpu_ns) all += ns * 1e-3;
     tick_us.push_back(all);
+    contacts_us.push_back(report.stage_cpu_ns[static_cast<std::size_t>(step::Stage::Contacts)] *
+                          1e-3);
+    most_pairs = std::max(most_pairs, report.self_pairs);
     all_cut_us += us;
     if (report.cut.splits > 0 || report.cut.opened_area_m2 > 0) cut_us.push_back(us);
     area_m2 += report.cut.opened_area_m2;
@@ -89,6 +94,7 @@ void run(scene::Organ organ, const Options& options) {
   }
   std::ranges::sort(cut_us);
   std::ranges::sort(tick_us);
+  std::ranges::sort(contacts_us);
   const auto& topology = simulation.state().cuts.topology();
   std::printf("%s, %d blade(s) at %.0f cm/s, %.0f s, hash %016" PRIx64 "\n", name.c_str(),
               options.blades, 100 * options.speed, options.seconds, simulation.state_hash());
@@ -101,6 +107,8 @@ void run(scene::Organ organ, const Options& options) {
       "crossed tet\n",
       cut_us.size(), part(cut_us, 0.5), part(cut_us, 0.99), part(cut_us, 1),
       all_cut_us / static_cast<double>(std::max<std::uint64_t>(1, crossed)));
+  std::printf("  contacts: median %.0f, p99 %.0f, worst %.0f us, up to %u pairs of tissue\n",
+              part(contacts_us, 0.5), part(contacts_us, 0.99), part(contacts_us, 1), most_pairs);
   std::printf("  whole tick: median %.0f, p99 %.0f, worst %.0f us\n", part(tick_us, 0.5),
               part(tick_us, 0.99), part(tick_us, 1));
 }

@@ -18,7 +18,7 @@ namespace {
 // An organ and the solver alone, so that a test can start with any velocity.
 struct Bodies {
   explicit Bodies(scene::Organ o)
-      : organ(std::move(o)), world(organ), solver(organ, world), finder(organ), pairs(organ) {
+      : organ(std::move(o)), world(organ), solver(organ, world), finder(organ) {
     for (std::uint32_t i = 0; i < world.node_count(); ++i)
       if (world.node_classes[i] != world::NodeClass::Fixed) near.push_back(NodeIndex(i));
   }
@@ -183,7 +183,7 @@ TEST(Rest, BuiltInOrgansDoNotTouchThemselves) {
   for (const auto& organ : organs) {
     world::World world(organ);
     SelfContactFinder finder(organ);
-    SelfContactTable pairs(organ);
+    SelfContactTable pairs;
     ContactList contacts;
     finder.find(world, pairs, contacts);
     std::size_t pressing = contacts.self_seeds.size();

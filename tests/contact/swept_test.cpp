@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
+#include <utility>
 
 #include "tests/contact/scene_fixture.h"
 #include "tests/support/random.h"
@@ -105,7 +106,7 @@ TEST(Swept, RandomMotionsAcrossTheStomachNeverEnterItsWall) {
     scene->put(0, {begin, turned});
     scene->ticks(2);
     if (!scene->proxy(0).is_placed) continue;  // it holds a piece of the surface already
-    bool has_touched = false;
+    bool has_touched = false, has_entered = false;
     for (float gone = 0; gone < 0.060f; gone += speed) {
       scene->put(0, {begin + way * gone, turned});
       scene->tick();
@@ -121,8 +122,8 @@ TEST(Swept, RandomMotionsAcrossTheStomachNeverEnterItsWall) {
                                   now.begin + now.along * (now.length * static_cast<float>(k) / 8));
       ++checked;
       inside += is_inside;
-      if (is_inside && i == 0)
-        std::printf("motion %d: inside, %.2f mm from the hand\n", motion,
+      if (is_inside && !std::exchange(has_entered, true))
+        std::printf("motion %d: inside after %d ticks, %.2f mm from the hand\n", motion, i,
                     1e3 * static_cast<double>(way_between(
                               proxy.pose, proxy.hand, {.radius_m = 0.004f, .length_m = 0.03f})));
     }
