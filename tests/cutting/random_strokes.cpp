@@ -86,19 +86,55 @@ Path RandomStrokes::sawing(const Vec3d& centre) {
                      side * (0.005 * h_ * random_.between(-1, 1));
     path.push_back({at - edge * (1.5 * h_), at + edge * (1.5 * h_)});
   }
+  const Vec3d low = centre - motion * h_, high = centre + motion * h_, half = edge * (1.5 * h_);
+  swept_once_ = straight_path({low - half, low + half}, {high - half, high + half}, 0.1 * h_);
   return path;
 }
 
+Path RandomStrokes::aligned() {
+  const auto& tet = mesh_.tets[random_.below(static_cast<std::uint32_t>(mesh_.tets.size()))];
+  const auto first = random_.below(4);
+  const auto place = [&](std::uint32_t corner) {
+    return mesh_.rest_positions[tet[(first + corner) % 4].value];
+  };
+  const Vec3d a = place(0), b = place(1), edge = normalized(b - a, {1, 0, 0});
+  const Vec3d motion = across_of(edge, place(2) - a);
+  const Vec3d from = a - edge * (random_.between(1, 3) * h_);
+  const Vec3d to = b + edge * (random_.between(1, 3) * h_);
+  const double step = 0.1 * h_;
+  Path path;
+  // One of these is on the edge itself.
+  for (int s = -20; s <= 30; ++s) {
+    const Vec3d by = motion * (step * s);
+    path.push_back({from + by, a + by, to + by});
+  }
+  return path;
+}
+
+Path RandomStrokes::crossing() {
+  if (knife_.empty()) return knife();
+  const auto& middle = knife_[knife_.size() / 2];
+  const Vec3d edge = normalized(middle.back() - middle.front(), {1, 0, 0});
+  const Vec3d along = across_of(edge, knife_.back().front() - knife_.front().front());
+  const double turn = random_.between(1, 2) * (random_.below(2) == 0 ? 1 : -1);
+  const Vec3d motion = rotated(along, edge, turn);
+  const double size = random_.between(3, 6) * h_;
+  return sweep(middle.front() - motion * (size / 2), edge, motion, size,
+               length(middle.back() - middle.front()), 0);
+}
+
 Path RandomStrokes::next(StrokeKind kind) {
-  if (kind == StrokeKind::Knife) return knife();
-  if (kind == StrokeKind::Through) return through();
+  if (kind == StrokeKind::Knife || kind == StrokeKind::Crossing)
+    return swept_once_ = knife_ = kind == StrokeKind::Knife ? knife() : crossing();
+  if (kind == StrokeKind::Through) return swept_once_ = through();
+  if (kind == StrokeKind::Aligned) return swept_once_ = aligned();
   const auto node = random_.below(static_cast<std::uint32_t>(mesh_.node_count()));
   const Vec3d centre = mesh_.rest_positions[node];
   if (kind == StrokeKind::Sawing) return sawing(centre);
   const Vec3d edge = direction(), motion = across_of(edge, direction());
   const double size = (kind == StrokeKind::Short ? 1 : 3) * h_;
   const double bend = kind == StrokeKind::Curved ? random_.between(-1.5, 1.5) : 0;
-  return sweep(centre - (edge + motion) * (size / 2), edge, motion, size, size, bend);
+  return swept_once_ = sweep(centre - (edge + motion) * (size / 2), edge, motion, size, size, bend);
 }
 
 InsideTest::InsideTest(const mesh::TetMesh& mesh) : mesh_(mesh) {
@@ -169,6 +205,25 @@ double InsideTest::swept_area(const Path& path, double spacing) const {
       area += quad * inside / n;
     }
   return area;
+}
+
+double InsideTest::length_inside(const Vec3d& a, const Vec3d& b, double spacing) const {
+  const int n = std::max(1, static_cast<int>(std::ceil(length(b - a) / spacing)));
+  int inside = 0;
+  for (int k = 0; k < n; ++k) inside += contains(a + (b - a) * ((k + 0.5) / n));
+  return length(b - a) * inside / n;
+}
+
+double InsideTest::rim(const Path& path, double spacing) const {
+  double rim = 0;
+  for (const auto* const edge : {&path.front(), &path.back()})
+    for (std::size_t i = 0; i + 1 < edge->size(); ++i)
+      rim += length_inside((*edge)[i], (*edge)[i + 1], spacing);
+  for (std::size_t s = 0; s + 1 < path.size(); ++s) {
+    rim += length_inside(path[s].front(), path[s + 1].front(), spacing);
+    rim += length_inside(path[s].back(), path[s + 1].back(), spacing);
+  }
+  return rim;
 }
 
 }  // namespace trocar::cutting::testing
