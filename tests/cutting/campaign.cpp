@@ -23,7 +23,6 @@ constexpr StrokeKind kStrokes[kCutKinds] = {
 constexpr std::uint32_t kCrumb = 8;          // tets
 constexpr std::uint32_t kHalfASecond = 500;  // ticks
 constexpr double kDrift = 1e-6;
-constexpr double kBridge_h = 1.5;  // farther than a wound is rough
 
 double degrees(double sine) {
   return std::asin(sine) * 180 / M_PI;
@@ -38,6 +37,16 @@ Settings generic() {
   settings.debris_tets = 0;
   settings.debris_volume_h3 = 0;
   return settings;
+}
+
+double longest_edge(const mesh::TetMesh& mesh) {
+  double longest = 0;
+  for (const auto& tet : mesh.tets)
+    for (std::size_t i = 0; i < 4; ++i)
+      for (std::size_t k = 0; k < i; ++k)
+        longest = std::max(
+            longest, length(mesh.rest_positions[tet[i].value] - mesh.rest_positions[tet[k].value]));
+  return longest;
 }
 
 double drift(double now, double before) {
@@ -97,6 +106,7 @@ Series::Series(const scene::Organ& organ, std::string name, std::uint64_t number
       inside_(organ_.organ().mesh),
       strokes_(organ_.organ(), organ_.cutter().mean_h(), number),
       h_(organ_.cutter().mean_h()),
+      longest_edge_(longest_edge(organ_.organ().mesh)),
       volume_(total_volume(organ_.topology())),
       mass_(total_mass(organ_.topology())),
       length_(series_length(number, options)) {
@@ -146,6 +156,7 @@ void Series::stroke(const std::vector<Path>& paths, CutRecord& record) {
   for (; !cutter.is_idle() && record.ticks_to_rest < 100'000; ++record.ticks_to_rest) tick(record);
 }
 
+// A piece that reaches farther than a wound is rough on both sides of the last plane.
 bool Series::has_bridge(const Pieces& pieces) const {
   std::vector<int> sides(pieces.count);
   const auto& topology = organ_.topology();
@@ -154,7 +165,7 @@ bool Series::has_bridge(const Pieces& pieces) const {
     for (const auto n : topology.tet(TetIndex(t))) {
       const double d =
           dot(strokes_.plane_normal(), topology.rest()[n.value] - strokes_.plane_point());
-      if (std::abs(d) > kBridge_h * h_) sides[pieces.piece_of_tet[t]] |= d > 0 ? 1 : 2;
+      if (std::abs(d) > longest_edge_) sides[pieces.piece_of_tet[t]] |= d > 0 ? 1 : 2;
     }
   }
   return std::ranges::any_of(sides, [](int side) { return side == 3; });
@@ -205,8 +216,8 @@ void Series::measure(const CutOutput& before, CutRecord& record) {
   for (std::uint32_t n = 0; n < topology.node_count(); ++n)
     record.nodes += topology.has_node(NodeIndex(n));
   record.bytes = bytes_of(organ_);
-  record.is_through = record.kind == static_cast<std::uint32_t>(CutKind::Through);
-  record.leaves_bridge = record.is_through && has_bridge(pieces);
+  record.leaves_bridge =
+      record.kind == static_cast<std::uint32_t>(CutKind::Through) && has_bridge(pieces);
   record.angle = degrees(least_dihedral_sine(topology));
   record.floor = degrees(organ_.cutter().floor_sine());
   record.volume_drift = drift(total_volume(topology), volume_);
@@ -222,7 +233,7 @@ CutRecord Series::next() {
   const auto paths = paths_of(kind);
   for (const auto& path : swept_) {
     record.swept += inside_.swept_area(path, h_ / 8);
-    record.rim += inside_.rim(path, h_ / 8);
+    record.perimeter += inside_.perimeter(path, h_ / 8);
   }
   const bool is_first = cut_ == 0 && options_.compares;
   const SweptSurface surface(swept_);
@@ -239,6 +250,7 @@ CutRecord Series::next() {
   if (is_first) count_split_tets(crossed, record);
   ++cut_;
   if (cut_ % options_.check_every == 0 || is_over()) record.broken = broken_law(record);
+  std::ranges::replace(record.broken, ',', ';');
   return record;
 }
 

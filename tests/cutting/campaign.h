@@ -28,12 +28,12 @@ std::optional<CutKind> cut_kind_of(const std::string& name);
 struct CutRecord {
   std::string organ;
   std::uint64_t series = 0;
-  std::uint32_t length = 0, cut = 0;  // of the series; in it, from 0
-  std::uint32_t kind = 0;             // CutKind
-  double h = 0, swept = 0, rim = 0;   // m, m^2, m: what the paths sweep inside the organ
-  double wound = 0, waiting = 0;      // m^2, opened; never opened
-  std::uint32_t ticks_to_rest = 0;    // after the last blade has left
-  bool crosses_ten = false, is_through = false, leaves_bridge = false;
+  std::uint32_t length = 0, cut = 0;       // of the series; in it, from 0
+  std::uint32_t kind = 0;                  // CutKind
+  double h = 0, swept = 0, perimeter = 0;  // m, m^2, m: what paths sweep inside the organ
+  double wound = 0, waiting = 0;           // m^2, opened; never opened
+  std::uint32_t ticks_to_rest = 0;         // after the last blade has left
+  bool crosses_ten = false, leaves_bridge = false;
   std::uint64_t tets = 0, nodes = 0, bytes = 0;  // bytes: of topology and edits
   std::uint32_t pieces = 0, crumbs = 0;          // pieces; with fewer than eight tets
   std::uint32_t splits = 0, labels = 0, refused = 0, pinches = 0;
@@ -82,7 +82,7 @@ class Series {
   CutOrgan organ_;
   const InsideTest inside_;
   RandomStrokes strokes_;
-  const double h_, volume_, mass_;
+  const double h_, longest_edge_, volume_, mass_;
   std::vector<Path> swept_;  // what the paths of this cut sweep, once
   std::uint32_t length_ = 0, cut_ = 0;
 };

@@ -68,7 +68,7 @@ Path RandomStrokes::through() {
     low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
     high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
   }
-  const double reach = length(high - low) / 2 + h_;
+  const double reach = 0.65 * length(high - low) + h_;
   plane_normal_ = direction();
   plane_point_ = (high - low) * random_.between(-0.15, 0.15);
   const Vec3d edge = across_of(plane_normal_, direction()), motion = cross(plane_normal_, edge);
@@ -214,16 +214,34 @@ double InsideTest::length_inside(const Vec3d& a, const Vec3d& b, double spacing)
   return length(b - a) * inside / n;
 }
 
-double InsideTest::rim(const Path& path, double spacing) const {
-  double rim = 0;
+double InsideTest::perimeter(const Path& path, double spacing) const {
+  double border = 0, steps = 0;
   for (const auto* const edge : {&path.front(), &path.back()})
     for (std::size_t i = 0; i + 1 < edge->size(); ++i)
-      rim += length_inside((*edge)[i], (*edge)[i + 1], spacing);
-  for (std::size_t s = 0; s + 1 < path.size(); ++s) {
-    rim += length_inside(path[s].front(), path[s + 1].front(), spacing);
-    rim += length_inside(path[s].back(), path[s + 1].back(), spacing);
+      border += length_inside((*edge)[i], (*edge)[i + 1], spacing);
+  std::vector<char> before, now;
+  for (std::size_t s = 0; s < path.size(); ++s) {
+    now.clear();
+    const auto& edge = path[s];
+    double motion = 0;
+    if (s > 0) {
+      motion = length(edge.front() - path[s - 1].front());
+      border += length_inside(path[s - 1].front(), edge.front(), spacing);
+      border += length_inside(path[s - 1].back(), edge.back(), spacing);
+    }
+    for (std::size_t i = 0; i + 1 < edge.size(); ++i) {
+      // As many for every edge of the path.
+      const double segment = length(path[0][i + 1] - path[0][i]);
+      const int n = std::max(1, static_cast<int>(std::ceil(segment / spacing)));
+      for (int k = 0; k < n; ++k) {
+        now.push_back(contains(edge[i] + (edge[i + 1] - edge[i]) * ((k + 0.5) / n)));
+        if (now.size() > 1 && now.back() != now[now.size() - 2]) steps += motion;
+        if (s > 0 && now.back() != before[now.size() - 1]) steps += segment / n;
+      }
+    }
+    before = now;
   }
-  return rim;
+  return border + M_PI / 4 * steps;
 }
 
 }  // namespace trocar::cutting::testing

@@ -51,8 +51,9 @@ class InsideTest {
   bool contains(const Vec3d& p) const;
   // m^2, by samples `spacing` apart. Swept twice counts twice.
   double swept_area(const Path& path, double spacing) const;
-  // m, of the border of what is swept, where that is inside: there the wound ends in tissue.
-  double rim(const Path& path, double spacing) const;
+  // m, of what is swept inside: the path's own border, and by the samples where it meets the
+  // surface, whose direction is taken to be any (Cauchy and Crofton: pi/4 of the steps).
+  double perimeter(const Path& path, double spacing) const;
 
  private:
   double length_inside(const Vec3d& a, const Vec3d& b, double spacing) const;
