@@ -9,8 +9,8 @@ constexpr std::uint32_t kRounds = 12;
 constexpr std::size_t kMostBreaches = 64;
 constexpr double kFloorShare = 0.5, kLengthShare = 0.4;
 constexpr std::uint16_t kMiddle = 32768;
-// Of tets that change sides: trials per call, tets at once.
-constexpr std::uint32_t kTrials = 48;
+// Of tets that change sides: trials per call, and times waiting tets; tets at once.
+constexpr std::uint32_t kTrials = 48, kTrialsAndWaiting = 2048;
 constexpr std::size_t kMostTurned = 32;
 constexpr double kLeastGain = 1e-4;  // h^2
 
@@ -154,7 +154,8 @@ bool Repair::turn_best(CutMesh& mesh, Stroke& stroke, Opening& opening,
 }
 
 bool Repair::turn_any(CutMesh& mesh, Stroke& stroke, Opening& opening) {
-  trials_ = kTrials;
+  const auto waiting = static_cast<std::uint32_t>(stroke.waiting.size());
+  trials_ = std::clamp(kTrialsAndWaiting / std::max(1u, waiting), 1u, kTrials);
   bool has_changed = false;
   for (const auto& breach : breaches_)
     has_changed = turn_best(mesh, stroke, opening, breach) || has_changed;

@@ -36,6 +36,7 @@ Settings generic() {
   settings.length_floor_h = 0;
   settings.debris_tets = 0;
   settings.debris_volume_h3 = 0;
+  settings.whole_volume_h3 = 0;
   return settings;
 }
 

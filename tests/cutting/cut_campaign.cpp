@@ -144,6 +144,7 @@ int main(int argc, char** argv) {
   run->add_option("--length-floor", settings.length_floor_h);
   run->add_option("--debris", settings.debris_tets);
   run->add_option("--debris-volume", settings.debris_volume_h3);
+  run->add_option("--whole-volume", settings.whole_volume_h3);
   auto* const table_command = app.add_subcommand("table", "reads what all parts of a run did");
   table_command->add_option("files", options.tables)->required();
   CLI11_PARSE(app, argc, argv);
