@@ -157,19 +157,22 @@ void Series::stroke(const std::vector<Path>& paths, CutRecord& record) {
   for (; !cutter.is_idle() && record.ticks_to_rest < 100'000; ++record.ticks_to_rest) tick(record);
 }
 
-// A piece that reaches farther than a wound is rough on both sides of the last plane.
+// A piece with more than a chip on both sides of the last plane, farther away than a wound is
+// rough. Chips stay with the other side (Settings::debris_volume_h3).
 bool Series::has_bridge(const Pieces& pieces) const {
-  std::vector<int> sides(pieces.count);
+  std::vector<std::array<double, 2>> volumes(pieces.count);
   const auto& topology = organ_.topology();
   for (std::uint32_t t = 0; t < topology.tet_count(); ++t) {
     if (!topology.has_tet(TetIndex(t))) continue;
-    for (const auto n : topology.tet(TetIndex(t))) {
-      const double d =
-          dot(strokes_.plane_normal(), topology.rest()[n.value] - strokes_.plane_point());
-      if (std::abs(d) > longest_edge_) sides[pieces.piece_of_tet[t]] |= d > 0 ? 1 : 2;
-    }
+    const auto corners = rest_corners(topology, topology.tet(TetIndex(t)));
+    const Vec3d centre = (corners[0] + corners[1] + corners[2] + corners[3]) / 4;
+    const double d = dot(strokes_.plane_normal(), centre - strokes_.plane_point());
+    if (std::abs(d) > longest_edge_ / 2)
+      volumes[pieces.piece_of_tet[t]][d > 0] += six_volumes(corners) / 6;
   }
-  return std::ranges::any_of(sides, [](int side) { return side == 3; });
+  const double chip = options_.settings.debris_volume_h3 * h_ * h_ * h_;
+  return std::ranges::any_of(
+      volumes, [&](const auto& sides) { return sides[0] >= chip && sides[1] >= chip; });
 }
 
 std::string Series::broken_law(const CutRecord& record) const {

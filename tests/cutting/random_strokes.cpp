@@ -91,9 +91,18 @@ Path RandomStrokes::sawing(const Vec3d& centre) {
   return path;
 }
 
+// An inner face: along the surface there is nothing to cut.
 Path RandomStrokes::aligned() {
-  const auto& tet = mesh_.tets[random_.below(static_cast<std::uint32_t>(mesh_.tets.size()))];
-  const auto first = random_.below(4);
+  mesh::Tet tet;
+  std::uint32_t first = 0;
+  do {
+    tet = mesh_.tets[random_.below(static_cast<std::uint32_t>(mesh_.tets.size()))];
+    first = random_.below(4);
+  } while (std::ranges::any_of(mesh_.boundary_triangles, [&](const mesh::Triangle& triangle) {
+    return std::ranges::find(triangle, tet[(first + 3) % 4]) == triangle.end() &&
+           std::ranges::all_of(triangle,
+                               [&](NodeIndex n) { return std::ranges::find(tet, n) != tet.end(); });
+  }));
   const auto place = [&](std::uint32_t corner) {
     return mesh_.rest_positions[tet[(first + corner) % 4].value];
   };
