@@ -354,6 +354,22 @@ double Opening::waiting_area(CutMesh& mesh, Stroke& stroke) {
   return area;
 }
 
+double Opening::closed_area(const CutMesh& mesh, Stroke& stroke, std::span<const TetIndex> others) {
+  tets_ = stroke.waiting;
+  tets_.insert(tets_.end(), others.begin(), others.end());
+  sort_unique(tets_);
+  propose(mesh, stroke);
+  cut_all(mesh);
+  analyse_all(mesh);
+  while (close_offenders(mesh)) {
+  }
+  cuts_->clear();
+  double area = 0;
+  for (const auto& proposal : proposals_)
+    if (!proposal.is_open) area += face_area(mesh.topology(), proposal.face);
+  return area;
+}
+
 std::span<const Opening::Breach> Opening::breaches_of_all(CutMesh& mesh, Stroke& stroke) {
   tets_ = stroke.waiting;
   propose(mesh, stroke);

@@ -29,6 +29,8 @@ class Opening {
     int side = 0;           // of the component with the wrong link
   };
   double waiting_area(CutMesh& mesh, Stroke& stroke);
+  // m^2, what would stay closed if waiting tets and these were proposed now.
+  double closed_area(const CutMesh& mesh, Stroke& stroke, std::span<const TetIndex> others);
   std::span<const Breach> breaches_of_all(CutMesh& mesh, Stroke& stroke);
 
  private:

@@ -30,6 +30,8 @@ struct Settings {
   // and less volume (in h^3; a regular tet has 0.12).
   std::uint32_t debris_tets = 4;
   double debris_volume_h3 = 0.25;
+  // A piece of less volume is not cut any further.
+  double whole_volume_h3 = 0.5;
   // Splits and labels per call, all strokes together; what is left over is done in later calls.
   std::uint32_t edits_per_call = 128;
   // Waiting faces this far from the blade are repaired.

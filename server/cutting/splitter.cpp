@@ -115,6 +115,14 @@ void Splitter::find_crossings(const CutMesh& mesh, const Stroke& stroke,
   }
 }
 
+void Splitter::leave_out_small_pieces(const CutMesh& mesh) {
+  if (!(mesh.settings().whole_volume_h3 > 0)) return;
+  std::erase_if(crossings_, [&](const Crossing& crossing) {
+    return small_pieces_.has(mesh, mesh.topology().tets_of(crossing.a).front());
+  });
+  small_pieces_.clear();
+}
+
 void Splitter::count_crossed_tets(CutMesh& mesh) {
   crossed_.clear();
   for (const auto& crossing : crossings_) {
@@ -178,6 +186,7 @@ bool Splitter::run(CutMesh& mesh, Stroke& stroke, std::span<const PatchTriangle>
   measure(stroke, patch);
   find_crossings(mesh, stroke, patch);
   for (const auto node : near_) rank_[node.value] = 0;
+  leave_out_small_pieces(mesh);
   count_crossed_tets(mesh);
   const bool is_finished = snap(mesh, stroke, budget) && split(mesh, stroke, budget);
   budget -= std::min(budget, kPatchCost + static_cast<std::uint32_t>(near_.size()) / kNearPerEdit);

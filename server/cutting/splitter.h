@@ -9,7 +9,7 @@
 // Repeating a patch changes nothing, because an edge with a labelled end is settled; so one that
 // could not be finished within a budget is simply begun again.
 
-#include "server/cutting/cut_mesh.h"
+#include "server/cutting/small_pieces.h"
 
 namespace trocar::cutting {
 
@@ -40,6 +40,7 @@ class Splitter {
   bool is_close(NodeIndex n) const;
   bool are_parted(NodeIndex a, NodeIndex b, std::size_t triangles) const;
   void cross(const CutMesh& mesh, std::span<const PatchTriangle> patch, NodeIndex a, NodeIndex b);
+  void leave_out_small_pieces(const CutMesh& mesh);
   void count_crossed_tets(CutMesh& mesh);
   bool snap(CutMesh& mesh, Stroke& stroke, std::uint32_t& budget);
   bool split(CutMesh& mesh, Stroke& stroke, std::uint32_t& budget);
@@ -54,6 +55,7 @@ class Splitter {
   std::vector<Crossing> crossings_;
   std::vector<Snap> snaps_;
   std::vector<TetIndex> ring_, crossed_;
+  SmallPieces small_pieces_;
 };
 
 }  // namespace trocar::cutting

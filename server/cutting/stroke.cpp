@@ -86,6 +86,12 @@ void Stroke::label(NodeIndex node) {
   fresh.push_back(node);
 }
 
+void Stroke::take_label_back(NodeIndex node) {
+  labels_[node.value] = 0;
+  std::erase(labelled_, node);
+  std::erase(fresh, node);
+}
+
 void Stroke::take_off_wound(NodeIndex node, int side) {
   labels_[node.value] = 0;
   std::erase(labelled_, node);

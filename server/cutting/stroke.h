@@ -49,6 +49,7 @@ class Stroke {
  public:
   bool is_labelled(NodeIndex n) const { return n.value < labels_.size() && labels_[n.value] != 0; }
   void label(NodeIndex node);
+  void take_label_back(NodeIndex node);  // as if it had never been labelled
   // A labelled node belongs to one side after all.
   void take_off_wound(NodeIndex node, int side);
 

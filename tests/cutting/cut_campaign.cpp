@@ -1,187 +1,159 @@
-// Many random cuts of one organ, or of a fresh one each: what becomes of its tets. A row per
-// organ: cuts, tets before and after, nodes, pieces (and how many have fewer than eight tets),
-// worst and first percentile of the dihedral angles, share of the wound that waits, wound over
-// swept area, through cuts that left a bridge, edits refused, worst and mean CPU time. Everything
-// that has to hold is checked after every cut, or after every --check cuts.
+// Random cuts in fresh series, with a table of what became of the mesh and of what has to hold.
+//
+//   cut_campaign run ORGAN... --cuts 2000 --csv FILE [--part 0 --parts 2]
+//   cut_campaign table FILE...
+//
+// `run` does so many cuts of each organ and adds a line per cut to FILE; series that are there
+// already are left out, so that it can go on where it was stopped. `table` reads what all parts
+// did. Exit codes: 0, or 1 if something does not hold, 3 if a file cannot be used. An organ is
+// what trocar-server takes, or box, regular (a box without jitter), slab.
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
-#include <cmath>
 #include <cstdio>
-#include <map>
+#include <fstream>
 
 #include "common/base/timing.h"
 #include "common/scene/load_organ.h"
-#include "tests/cutting/random_strokes.h"
+#include "tests/cutting/campaign_table.h"
 
 namespace trocar::cutting::testing {
 namespace {
 
 struct Options {
-  std::vector<std::string> organs;
-  std::string kind = "mixed";
-  int cuts = 100, check = 1;
-  std::uint64_t seed = 1;
-  bool is_fresh = false, is_verbose = false;
-  Settings settings;
+  std::vector<std::string> organs, tables;
+  std::string csv, kind;
+  std::uint64_t first = 1, part = 0, parts = 1;
+  std::uint64_t cuts = 2000;
+  std::uint32_t length = 0;
+  bool is_verbose = false;
+  CampaignOptions campaign;
 };
 
-struct Row {
-  double swept = 0, wound = 0, waiting = 0;
-  int bridges = 0, bad = 0;
-  std::uint64_t crossed = 0, refused = 0, splits = 0, labels = 0, pinches = 0;
-  std::uint64_t cpu_ns = 0, worst_ns = 0;
-  std::vector<double> ratios;
-};
+[[noreturn]] void fail(int code, const std::string& what) {
+  std::fprintf(stderr, "cut_campaign: %s\n", what.c_str());
+  std::exit(code);
+}
 
 scene::Organ load(const std::string& spec) {
   if (spec == "box") return box_organ(12, 12, 12, 0.005);
   if (spec == "regular") return box_organ(12, 12, 12, 0.005, 0);
+  if (spec == "slab") return box_organ(24, 2, 24, 0.004);
   auto organ = scene::load_organ(spec);
-  if (!organ) {
-    std::fprintf(stderr, "cut_campaign: %s\n", organ.error().message.c_str());
-    std::exit(3);
-  }
+  if (!organ) fail(3, organ.error().message);
   return *organ;
 }
 
-// A piece on both sides of a plane, farther than the wound is rough.
-bool has_bridge(const CutOrgan& organ, const RandomStrokes& strokes, double h) {
-  const auto pieces = find_pieces(organ.topology());
-  std::vector<int> sides(pieces.count);
-  for (std::uint32_t t = 0; t < organ.topology().tet_count(); ++t) {
-    if (!organ.topology().has_tet(TetIndex(t))) continue;
-    for (const auto n : organ.topology().tet(TetIndex(t))) {
-      const double d =
-          dot(strokes.plane_normal(), organ.topology().rest()[n.value] - strokes.plane_point());
-      if (std::abs(d) > 1.5 * h) sides[pieces.piece_of_tet[t]] |= d > 0 ? 1 : 2;
+std::string name_of_organ(const std::string& spec) {
+  return std::filesystem::path(spec).stem().string();
+}
+
+void print(const CutRecord& r) {
+  std::printf(
+      "%s %llu/%u %s: swept %.2f h2, wound %.3f, waiting %.3f, tets %llu, nodes %llu, "
+      "pieces %u (%u crumbs), %.0f kB, %.1f deg%s %s\n",
+      r.organ.c_str(), static_cast<unsigned long long>(r.series), r.cut,
+      name_of(static_cast<CutKind>(r.kind)), r.swept / r.h / r.h,
+      r.swept > 0 ? r.wound / r.swept : 0, r.waiting / r.h / r.h,
+      static_cast<unsigned long long>(r.tets), static_cast<unsigned long long>(r.nodes), r.pieces,
+      r.crumbs, double(r.bytes) / 1e3, r.angle, r.leaves_bridge ? ", a bridge" : "",
+      r.broken.c_str());
+}
+
+class Campaign {
+ public:
+  explicit Campaign(const Options& options) : options_(options) {
+    if (options.csv.empty()) return;
+    if (std::filesystem::exists(options.csv))
+      if (const auto status = table_.read(options.csv); !status) fail(3, status.error().message);
+    const bool is_new = table_.cuts() == 0;
+    csv_.open(options.csv, is_new ? std::ios::out : std::ios::app);
+    if (!csv_) fail(3, options.csv + ": cannot be written");
+    if (is_new) csv_ << csv_header() << std::flush;
+  }
+
+  int run() {
+    for (const auto& organ : options_.organs) run(organ);
+    return finish(table_);
+  }
+
+  static int finish(const CampaignTable& table) {
+    std::printf("%s", table.text().c_str());
+    const auto broken = table.broken_laws();
+    for (const auto& law : broken) std::printf("does not hold: %s\n", law.c_str());
+    return broken.empty() ? 0 : 1;
+  }
+
+ private:
+  void run(const std::string& spec) {
+    const auto organ = load(spec);
+    const auto name = name_of_organ(spec);
+    std::uint64_t cuts = 0;
+    for (auto number = options_.first; cuts < options_.cuts; ++number) {
+      cuts += series_length(number, options_.campaign);
+      if (number % options_.parts == options_.part && !table_.has_series(name, number))
+        run(organ, name, number);
+      std::fprintf(stderr, "%s: %llu of %llu cuts\n", name.c_str(),
+                   static_cast<unsigned long long>(cuts),
+                   static_cast<unsigned long long>(options_.cuts));
     }
   }
-  return std::ranges::any_of(sides, [](int side) { return side == 3; });
-}
 
-StrokeKind kind_of(const std::string& name, RandomStrokes& strokes) {
-  static const std::map<std::string, StrokeKind> kKinds{
-      {"straight", StrokeKind::Straight}, {"curved", StrokeKind::Curved},
-      {"sawing", StrokeKind::Sawing},     {"short", StrokeKind::Short},
-      {"knife", StrokeKind::Knife},       {"through", StrokeKind::Through}};
-  const auto found = kKinds.find(name);
-  return found != kKinds.end() ? found->second : strokes.any_kind();
-}
-
-void print(const std::string& name, const Options& options, const Row& row, std::size_t before,
-           const CutOrgan& organ) {
-  std::vector<double> sines;
-  for (std::uint32_t t = 0; t < organ.topology().tet_count(); ++t)
-    if (organ.topology().has_tet(TetIndex(t)))
-      sines.push_back(
-          least_sine(rest_corners(organ.topology(), organ.topology().tet(TetIndex(t)))));
-  std::sort(sines.begin(), sines.end());
-  const auto degrees = [](double sine) { return std::asin(sine) * 180 / M_PI; };
-  const auto pieces = find_pieces(organ.topology());
-  const auto small = std::ranges::count_if(pieces.tets, [](auto n) { return n < 8; });
-  std::printf(
-      "%s %s: %d cuts, crossed tets %llu, tets %zu -> %zu, nodes %zu, pieces %u (%td small), "
-      "dihedral %.2f / %.2f, waiting %.1f %%, area ratio %.3f, bridges %d, bad %d\n",
-      name.c_str(), options.kind.c_str(), options.cuts,
-      static_cast<unsigned long long>(row.crossed), before, sines.size(),
-      organ.topology().node_count(), pieces.count, small, degrees(sines.front()),
-      degrees(sines[sines.size() / 100]), 100 * row.waiting / (row.waiting + row.wound),
-      row.wound / row.swept, row.bridges, row.bad);
-  auto ratios = row.ratios;
-  std::sort(ratios.begin(), ratios.end());
-  const auto within = [&](double share) {
-    return std::ranges::count_if(ratios, [&](double r) { return std::abs(r - 1) <= share; });
-  };
-  std::printf(
-      "  single strokes %.2f .. %.2f .. %.2f, within 5 %% %td, 10 %% %td of %zu; splits %llu, "
-      "labels %llu, refused %llu, pinch splits %llu; CPU %.1f us per crossed tet, worst call "
-      "%.2f ms\n",
-      ratios.empty() ? 0 : ratios.front(), ratios.empty() ? 0 : ratios[ratios.size() / 2],
-      ratios.empty() ? 0 : ratios.back(), within(0.05), within(0.1), ratios.size(),
-      static_cast<unsigned long long>(row.splits), static_cast<unsigned long long>(row.labels),
-      static_cast<unsigned long long>(row.refused), static_cast<unsigned long long>(row.pinches),
-      row.crossed ? double(row.cpu_ns) / 1e3 / double(row.crossed) : 0, double(row.worst_ns) / 1e6);
-}
-
-void cut_once(const Path& path, CutOrgan& organ, Row& row) {
-  for (const auto& edge : path) {
-    organ.cutter().move(0, edge);
-    organ.tick();
-    row.cpu_ns += organ.last_ns();
-    row.worst_ns = std::max(row.worst_ns, organ.last_ns());
+  void run(const scene::Organ& organ, const std::string& name, std::uint64_t number) {
+    Series series(organ, name, number, options_.campaign);
+    std::string lines;
+    while (!series.is_over()) {
+      const auto record = series.next();
+      if (options_.is_verbose || !record.broken.empty()) print(record);
+      lines += csv_line(record);
+      table_.add(record);
+    }
+    if (csv_.is_open()) csv_ << lines << std::flush;
   }
-  organ.cutter().lift(0);
-  while (!organ.cutter().is_idle()) {
-    organ.tick();
-    row.cpu_ns += organ.last_ns();
-    row.worst_ns = std::max(row.worst_ns, organ.last_ns());
-  }
-}
 
-void add(Row& row, const CutOutput& before, const CutOutput& after) {
-  row.wound += after.opened_area_m2 - before.opened_area_m2;
-  row.waiting += after.waiting_area_m2 - before.waiting_area_m2;
-  row.crossed += after.crossed_tets - before.crossed_tets;
-  row.splits += after.splits - before.splits;
-  row.labels += after.labels - before.labels;
-  row.refused += after.refused_splits - before.refused_splits;
-  row.pinches += after.pinch_splits - before.pinch_splits;
-}
+  const Options& options_;
+  CampaignTable table_;
+  std::ofstream csv_;
+};
 
-int run(const std::string& name, const Options& options) {
-  const auto fresh = load(name);
-  auto organ = std::make_unique<CutOrgan>(fresh, options.settings);
-  const InsideTest inside(fresh.mesh);
-  const double h = organ->cutter().mean_h();
-  RandomStrokes strokes(fresh, h, options.seed);
-  const auto before = fresh.mesh.tets.size();
-  Row row;
-  for (int cut = 0; cut < options.cuts; ++cut) {
-    if (options.is_fresh && cut > 0) organ = std::make_unique<CutOrgan>(fresh, options.settings);
-    const auto path = strokes.next(kind_of(options.kind, strokes));
-    const auto had = organ->total();
-    cut_once(path, *organ, row);
-    add(row, had, organ->total());
-    const double swept = inside.swept_area(path, h / 8);
-    const double wound = organ->total().opened_area_m2 - had.opened_area_m2;
-    row.swept += swept;
-    if (swept > 0) row.ratios.push_back(wound / swept);
-    const bool bridge = options.kind == "through" && has_bridge(*organ, strokes, h);
-    row.bridges += bridge;
-    std::string failure;
-    if (cut % options.check == 0 || cut + 1 == options.cuts) failure = organ->check();
-    row.bad += !failure.empty();
-    if (options.is_verbose || !failure.empty())
-      std::printf("cut %d: swept %.3f h2, ratio %.3f, waiting %.2f h2, pieces %u%s %s\n", cut,
-                  swept / h / h, wound / swept,
-                  (organ->total().waiting_area_m2 - had.waiting_area_m2) / h / h,
-                  find_pieces(organ->topology()).count, bridge ? ", bridge" : "", failure.c_str());
-    if (!failure.empty()) break;
-  }
-  print(name, options, row, before, *organ);
-  return row.bad;
+int table(const Options& options) {
+  CampaignTable table;
+  for (const auto& file : options.tables)
+    if (const auto status = table.read(file); !status) fail(3, status.error().message);
+  return Campaign::finish(table);
 }
 
 int main(int argc, char** argv) {
   Options options;
+  auto& settings = options.campaign.settings;
   CLI::App app("Random cuts and what becomes of the mesh");
-  app.add_option("organs", options.organs, "liver, box, regular, or files")->required();
-  app.add_option("--kind", options.kind, "mixed, straight, curved, sawing, short, knife, through");
-  app.add_option("--cuts", options.cuts);
-  app.add_option("--check", options.check, "check after every so many cuts");
-  app.add_option("--seed", options.seed);
-  app.add_flag("--fresh", options.is_fresh, "a fresh organ for every cut");
-  app.add_flag("--verbose", options.is_verbose, "a line per cut");
-  app.add_option("--snap", options.settings.snap);
-  app.add_option("--extension", options.settings.extension_h);
-  app.add_option("--length-floor", options.settings.length_floor_h);
-  app.add_option("--debris", options.settings.debris_tets);
-  app.add_option("--edits", options.settings.edits_per_call);
+  app.require_subcommand(1);
+  auto* const run = app.add_subcommand("run", "cuts organs");
+  run->add_option("organs", options.organs, "liver, box, regular, slab, or files")->required();
+  run->add_option("--cuts", options.cuts, "of each organ, or a few more");
+  run->add_option("--csv", options.csv, "a line per cut; goes on where it ends");
+  run->add_option("--first", options.first, "number of the first series");
+  run->add_option("--part", options.part, "only every so manyth series");
+  run->add_option("--parts", options.parts)->check(CLI::PositiveNumber);
+  run->add_option("--length", options.length, "cuts of every series; else 1 to 100");
+  run->add_option("--kind", options.kind, "only cuts of this kind");
+  run->add_option("--check", options.campaign.check_every, "the laws after every so many cuts")
+      ->check(CLI::PositiveNumber);
+  run->add_flag("--verbose", options.is_verbose, "print a line per cut");
+  run->add_option("--snap", settings.snap);
+  run->add_option("--extension", settings.extension_h);
+  run->add_option("--length-floor", settings.length_floor_h);
+  run->add_option("--debris", settings.debris_tets);
+  run->add_option("--debris-volume", settings.debris_volume_h3);
+  run->add_option("--whole-volume", settings.whole_volume_h3);
+  auto* const table_command = app.add_subcommand("table", "reads what all parts of a run did");
+  table_command->add_option("files", options.tables)->required();
   CLI11_PARSE(app, argc, argv);
-  int bad = 0;
-  for (const auto& name : options.organs) bad += run(name, options);
-  return bad > 0 ? 1 : 0;
+  if (options.length > 0) options.campaign.shortest = options.campaign.longest = options.length;
+  if (!options.kind.empty()) {
+    options.campaign.only = cut_kind_of(options.kind);
+    if (!options.campaign.only) fail(2, options.kind + ": no such kind of cut");
+  }
+  return *run ? Campaign(options).run() : table(options);
 }
 
 }  // namespace

@@ -68,7 +68,7 @@ Path RandomStrokes::through() {
     low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
     high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
   }
-  const double reach = length(high - low) / 2 + h_;
+  const double reach = 0.65 * length(high - low) + h_;
   plane_normal_ = direction();
   plane_point_ = (high - low) * random_.between(-0.15, 0.15);
   const Vec3d edge = across_of(plane_normal_, direction()), motion = cross(plane_normal_, edge);
@@ -86,19 +86,64 @@ Path RandomStrokes::sawing(const Vec3d& centre) {
                      side * (0.005 * h_ * random_.between(-1, 1));
     path.push_back({at - edge * (1.5 * h_), at + edge * (1.5 * h_)});
   }
+  const Vec3d low = centre - motion * h_, high = centre + motion * h_, half = edge * (1.5 * h_);
+  swept_once_ = straight_path({low - half, low + half}, {high - half, high + half}, 0.1 * h_);
   return path;
 }
 
+// An inner face: along the surface there is nothing to cut.
+Path RandomStrokes::aligned() {
+  mesh::Tet tet;
+  std::uint32_t first = 0;
+  do {
+    tet = mesh_.tets[random_.below(static_cast<std::uint32_t>(mesh_.tets.size()))];
+    first = random_.below(4);
+  } while (std::ranges::any_of(mesh_.boundary_triangles, [&](const mesh::Triangle& triangle) {
+    return std::ranges::find(triangle, tet[(first + 3) % 4]) == triangle.end() &&
+           std::ranges::all_of(triangle,
+                               [&](NodeIndex n) { return std::ranges::find(tet, n) != tet.end(); });
+  }));
+  const auto place = [&](std::uint32_t corner) {
+    return mesh_.rest_positions[tet[(first + corner) % 4].value];
+  };
+  const Vec3d a = place(0), b = place(1), edge = normalized(b - a, {1, 0, 0});
+  const Vec3d motion = across_of(edge, place(2) - a);
+  const Vec3d from = a - edge * (random_.between(1, 3) * h_);
+  const Vec3d to = b + edge * (random_.between(1, 3) * h_);
+  const double step = 0.1 * h_;
+  Path path;
+  // One of these is on the edge itself.
+  for (int s = -20; s <= 30; ++s) {
+    const Vec3d by = motion * (step * s);
+    path.push_back({from + by, a + by, to + by});
+  }
+  return path;
+}
+
+Path RandomStrokes::crossing() {
+  if (knife_.empty()) return knife();
+  const auto& middle = knife_[knife_.size() / 2];
+  const Vec3d edge = normalized(middle.back() - middle.front(), {1, 0, 0});
+  const Vec3d along = across_of(edge, knife_.back().front() - knife_.front().front());
+  const double turn = random_.between(1, 2) * (random_.below(2) == 0 ? 1 : -1);
+  const Vec3d motion = rotated(along, edge, turn);
+  const double size = random_.between(3, 6) * h_;
+  return sweep(middle.front() - motion * (size / 2), edge, motion, size,
+               length(middle.back() - middle.front()), 0);
+}
+
 Path RandomStrokes::next(StrokeKind kind) {
-  if (kind == StrokeKind::Knife) return knife();
-  if (kind == StrokeKind::Through) return through();
+  if (kind == StrokeKind::Knife || kind == StrokeKind::Crossing)
+    return swept_once_ = knife_ = kind == StrokeKind::Knife ? knife() : crossing();
+  if (kind == StrokeKind::Through) return swept_once_ = through();
+  if (kind == StrokeKind::Aligned) return swept_once_ = aligned();
   const auto node = random_.below(static_cast<std::uint32_t>(mesh_.node_count()));
   const Vec3d centre = mesh_.rest_positions[node];
   if (kind == StrokeKind::Sawing) return sawing(centre);
   const Vec3d edge = direction(), motion = across_of(edge, direction());
   const double size = (kind == StrokeKind::Short ? 1 : 3) * h_;
   const double bend = kind == StrokeKind::Curved ? random_.between(-1.5, 1.5) : 0;
-  return sweep(centre - (edge + motion) * (size / 2), edge, motion, size, size, bend);
+  return swept_once_ = sweep(centre - (edge + motion) * (size / 2), edge, motion, size, size, bend);
 }
 
 InsideTest::InsideTest(const mesh::TetMesh& mesh) : mesh_(mesh) {
@@ -169,6 +214,43 @@ double InsideTest::swept_area(const Path& path, double spacing) const {
       area += quad * inside / n;
     }
   return area;
+}
+
+double InsideTest::length_inside(const Vec3d& a, const Vec3d& b, double spacing) const {
+  const int n = std::max(1, static_cast<int>(std::ceil(length(b - a) / spacing)));
+  int inside = 0;
+  for (int k = 0; k < n; ++k) inside += contains(a + (b - a) * ((k + 0.5) / n));
+  return length(b - a) * inside / n;
+}
+
+double InsideTest::perimeter(const Path& path, double spacing) const {
+  double border = 0, steps = 0;
+  for (const auto* const edge : {&path.front(), &path.back()})
+    for (std::size_t i = 0; i + 1 < edge->size(); ++i)
+      border += length_inside((*edge)[i], (*edge)[i + 1], spacing);
+  std::vector<char> before, now;
+  for (std::size_t s = 0; s < path.size(); ++s) {
+    now.clear();
+    const auto& edge = path[s];
+    double motion = 0;
+    if (s > 0) {
+      motion = length(edge.front() - path[s - 1].front());
+      border += length_inside(path[s - 1].front(), edge.front(), spacing);
+      border += length_inside(path[s - 1].back(), edge.back(), spacing);
+    }
+    for (std::size_t i = 0; i + 1 < edge.size(); ++i) {
+      // As many for every edge of the path.
+      const double segment = length(path[0][i + 1] - path[0][i]);
+      const int n = std::max(1, static_cast<int>(std::ceil(segment / spacing)));
+      for (int k = 0; k < n; ++k) {
+        now.push_back(contains(edge[i] + (edge[i + 1] - edge[i]) * ((k + 0.5) / n)));
+        if (now.size() > 1 && now.back() != now[now.size() - 2]) steps += motion;
+        if (s > 0 && now.back() != before[now.size() - 1]) steps += segment / n;
+      }
+    }
+    before = now;
+  }
+  return border + M_PI / 4 * steps;
 }
 
 }  // namespace trocar::cutting::testing

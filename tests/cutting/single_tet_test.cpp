@@ -15,6 +15,7 @@ Settings exact() {
   settings.floor_sine = 0.001;
   settings.debris_tets = 0;
   settings.debris_volume_h3 = 0;
+  settings.whole_volume_h3 = 0;
   return settings;
 }
 
