@@ -33,15 +33,19 @@ TissueCuts::TissueCuts(const scene::Organ& organ)
   first_pending_ = static_cast<std::uint32_t>(layout_.triangles.size());
 }
 
+bool TissueCuts::is_full() const {
+  return layout_.triangles.size() >= kMostTriangles;
+}
+
 void TissueCuts::tear(const world::World& world, std::span<const NodeIndex> nodes) {
-  if (can_tear()) cutter_->tear(tearing_.find(topology_, world.displacements, nodes));
+  if (can_tear() && !is_full()) cutter_->tear(tearing_.find(topology_, world.displacements, nodes));
 }
 
 bool TissueCuts::cut(const input::ToolTable& tools, const locks::ClaimTable& claims,
                      const world::World& world, double travel_m, CutReport& report) {
   report = {};
   if (!can_cut()) return false;
-  report.is_full = layout_.triangles.size() >= kMostTriangles;
+  report.is_full = is_full();
   blades_.begin_tick(tools, claims, !report.is_full,
                      [this](ToolSlot tool) { cutter_->lift(tool.value); });
   for (std::uint8_t i = 0; i < kMaxTools; ++i) {

@@ -66,6 +66,7 @@ class TissueCuts {
   void visit_state(world::StateArchive& archive, world::World& world);
 
  private:
+  bool is_full() const;
   void forget_pending();
   void record(cutting::CutEvents events);
   void extend_layout(const world::World& world, const world::SurfaceEdit& edit);
