@@ -4,7 +4,7 @@
 // another is split there and the new node labelled, unless a tet or an edge would become too thin
 // or short: then the nearer end is labelled instead, which is always possible and costs no quality.
 // After every split the mesh is conforming, so no case table is needed: 1 + 3 gives four tets and
-// 2 + 2 six by themselves.
+// 2 + 2 six by themselves. A piece too small to give two is left as it is (small_pieces.h).
 //
 // Repeating a patch changes nothing, because an edge with a labelled end is settled; so one that
 // could not be finished within a budget is simply begun again.

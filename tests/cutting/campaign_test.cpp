@@ -126,8 +126,8 @@ TEST(Sawing, OneMillimetreInOneTetForTenSecondsAddsFewTets) {
 
 TEST(WildStrokes, WithoutEndLevelOff) {
   CampaignOptions options;
-  options.shortest = options.longest = 300;
-  options.check_every = 50;
+  options.shortest = options.longest = 600;
+  options.check_every = 100;
   options.compares = false;
   Series series(box_organ(2, 2, 2, 0.01), "box", 1, options);
   std::vector<CutRecord> records;
@@ -135,7 +135,7 @@ TEST(WildStrokes, WithoutEndLevelOff) {
     records.push_back(series.next());
     ASSERT_EQ(records.back().broken, "") << records.back().cut;
   }
-  const auto &half = records[149], &all = records[299];
+  const auto &half = records[299], &all = records[599];
   EXPECT_LE(double(all.tets), 1.1 * double(half.tets));
   EXPECT_LE(double(all.nodes), 1.1 * double(half.nodes));
   EXPECT_LE(double(all.bytes), 1.1 * double(half.bytes));
