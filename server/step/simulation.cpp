@@ -16,8 +16,8 @@ State::State(const scene::Organ& organ)
       quantised(cuts.layout().vertex_count()) {}
 
 void State::visit(world::StateArchive& archive) {
-  visit_without_mark(archive);
   mark.visit_state(archive);
+  visit_without_mark(archive);  // ends with what may take no bytes
 }
 
 void State::set_mark() {
