@@ -132,23 +132,26 @@ Status check_nodes(const Organ& organ) {
 }
 
 std::vector<double> numbers_of(const Material& m) {
-  return {m.density_kg_m3,
-          static_cast<double>(m.spring_law),
-          m.spring_stiffness_n_m,
-          m.young_modulus_pa,
-          m.node_damping_per_s,
-          m.spring_damping_time_s,
-          static_cast<double>(m.elastic_law),
-          m.poisson_ratio,
-          m.has_averaged_volume ? 1.0 : 0.0,
-          m.fibre_direction.x,
-          m.fibre_direction.y,
-          m.fibre_direction.z,
-          m.fibre_stiffness_ratio,
-          m.tension,
-          m.fibre_tension,
-          m.cut_energy_j_m2,
-          m.tear_stretch};
+  std::vector<double> numbers{m.density_kg_m3,
+                              static_cast<double>(m.spring_law),
+                              m.spring_stiffness_n_m,
+                              m.young_modulus_pa,
+                              m.node_damping_per_s,
+                              m.spring_damping_time_s,
+                              static_cast<double>(m.elastic_law),
+                              m.poisson_ratio,
+                              m.has_averaged_volume ? 1.0 : 0.0,
+                              m.fibre_direction.x,
+                              m.fibre_direction.y,
+                              m.fibre_direction.z,
+                              m.fibre_stiffness_ratio,
+                              m.tension,
+                              m.fibre_tension};
+  // Organs from before there were these keep their hash.
+  const Material usual;
+  if (m.cut_energy_j_m2 != usual.cut_energy_j_m2 || m.tear_stretch != usual.tear_stretch)
+    numbers.insert(numbers.end(), {m.cut_energy_j_m2, m.tear_stretch});
+  return numbers;
 }
 
 template <typename T>
