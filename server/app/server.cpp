@@ -84,9 +84,10 @@ Status Server::open() {
   const auto& organ = simulation_.organ();
   const auto& layout = simulation_.layout();
   net::TcpServerOptions tcp{.address = options_.address, .port = options_.port};
-  // Topology and a keyframe of about that size must fit at once for somebody who joins.
+  // Topology and a keyframe of about that size must fit at once for somebody who joins, and for
+  // everybody after a return to a mark; cuts make the surface larger.
   const auto topology_bytes = replication::encode_topology(layout, organ.name)->size();
-  tcp.outbox_bytes = std::max(tcp.outbox_bytes, 3 * topology_bytes);
+  tcp.outbox_bytes = std::max(tcp.outbox_bytes, 8 * topology_bytes);
   auto listening = net::TcpServer::listen(io_, tcp);
   if (!listening) return listening.error();
   tcp_ = std::move(*listening);
