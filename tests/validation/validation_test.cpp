@@ -117,6 +117,11 @@ TEST_F(Validation, ACutPlateGapesAsInThePaper) {
   EXPECT_TRUE(names.contains("nakao2003/plate/energy-plain"));
 }
 
+TEST_F(Validation, TheLargeCaseStaysSoundWhileABladeCuts) {
+  ASSERT_EQ(run("--short --only nakao2003/fig15-fig17-cutting"), 0) << log();
+  EXPECT_EQ(kept_checks().size(), 6u);
+}
+
 TEST_F(Validation, CommandLine) {
   EXPECT_EQ(run("--help"), 0);
   EXPECT_NE(log().find("Examples:"), std::string::npos);
