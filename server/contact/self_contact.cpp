@@ -9,9 +9,6 @@
 namespace trocar::contact {
 namespace {
 
-// Deeper than that a pair presses as much as what touches it has to follow; lips that lie on each
-// other as they were cut do not.
-constexpr float kPressed_m = 1e-6f;
 // Faces that touch at rest may do so for ever: a force begins this far beyond.
 constexpr float kTouch_m = 2e-6f;
 constexpr float kOverlapAtRest_m = 0.001f;
@@ -308,7 +305,7 @@ void SelfContactFinder::add_point(Site site, const ClosestPoint& closest, const 
       .plane = touch.normal * touch.shift - touch.at_rest,
   };
   out.points.push_back(point);
-  if (touch.gap > -kPressed_m) return;
+  if (touch.gap > 0) return;
   out.self_seeds.insert(out.self_seeds.end(), point.nodes.begin(), point.nodes.end());
 }
 
