@@ -199,12 +199,12 @@ void Picture::add_messages(const replica::Replica& replica, std::uint64_t now_ns
     const double age =
         now_ns > notice.arrival_ns ? static_cast<double>(now_ns - notice.arrival_ns) * 1e-9 : 0.0;
     const bool is_own = notice.tool.owner() == replica.own_slot();
-    const bool is_news = notice.is_for_all ? true
-                         : replica::is_refusal(notice.outcome)
-                             ? is_own
-                             : notice.outcome == replica::ClaimOutcome::TakenOver ||
-                                   notice.outcome == replica::ClaimOutcome::Expired ||
-                                   notice.outcome == replica::ClaimOutcome::Slipped;
+    const bool is_news =
+        notice.is_for_all || (replica::is_refusal(notice.outcome)
+                                  ? is_own
+                                  : notice.outcome == replica::ClaimOutcome::TakenOver ||
+                                        notice.outcome == replica::ClaimOutcome::Expired ||
+                                        notice.outcome == replica::ClaimOutcome::Slipped);
     if (age > 5 || notice.text.empty() || !is_news) continue;
     // A claim is retried while the verb is held: the same words once.
     if (!model.messages.empty() && model.messages.back().text == notice.text)

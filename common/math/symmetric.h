@@ -1,7 +1,7 @@
 #pragma once
 
-// Symmetric 3 x 3 matrices: principal values and directions by Jacobi's rotations. Square roots
-// only, so the same bits everywhere that decisions are made from them.
+// Principal values and directions of symmetric matrices, by Jacobi's rotations. Square roots only,
+// so the same bits everywhere that decisions are made from them.
 
 #include <array>
 #include <cmath>
@@ -10,27 +10,13 @@
 
 namespace trocar {
 
-struct SymMat3d {
-  double xx = 0, yy = 0, zz = 0, xy = 0, xz = 0, yz = 0;
-
-  // Adds weight v v^T.
-  void add_outer(const Vec3d& v, double weight) {
-    xx += weight * v.x * v.x;
-    yy += weight * v.y * v.y;
-    zz += weight * v.z * v.z;
-    xy += weight * v.x * v.y;
-    xz += weight * v.x * v.z;
-    yz += weight * v.y * v.z;
-  }
-};
-
 struct Principal {
   double value = 0;
   Vec3d direction;  // of length 1
 };
 
 // The largest principal value. Relative error below 1e-12 for finite matrices.
-inline Principal largest_principal(const SymMat3d& matrix) {
+inline Principal largest_principal(const SymMat3<double>& matrix) {
   std::array<std::array<double, 3>, 3> a{{{matrix.xx, matrix.xy, matrix.xz},
                                           {matrix.xy, matrix.yy, matrix.yz},
                                           {matrix.xz, matrix.yz, matrix.zz}}};

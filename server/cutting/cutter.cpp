@@ -123,8 +123,8 @@ void Cutter::cut(std::span<const Vec3f> displacements, CutOutput& out, double tr
     if (strokes_[s].is_active && (strokes_[s].has_ended || strokes_[s].motion.has_strip()))
       order_.push_back(s);
   order_strokes();
-  const auto share =
-      mesh_.settings().edits_per_call / std::max(1u, static_cast<std::uint32_t>(order_.size()));
+  const auto strokes = std::max(1u, static_cast<std::uint32_t>(order_.size()));
+  const auto share = std::max(1u, mesh_.settings().edits_per_call / strokes);
   for (const auto s : order_) {
     auto budget = share;
     const bool is_done = work(strokes_[s], budget);

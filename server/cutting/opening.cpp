@@ -360,9 +360,7 @@ double Opening::closed_area(const CutMesh& mesh, Stroke& stroke, std::span<const
   sort_unique(tets_);
   propose(mesh, stroke);
   cut_all(mesh);
-  analyse_all(mesh);
-  while (close_offenders(mesh)) {
-  }
+  check_all(mesh);
   cuts_->clear();
   double area = 0;
   for (const auto& proposal : proposals_)

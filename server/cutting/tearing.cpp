@@ -10,13 +10,13 @@
 namespace trocar::cutting {
 namespace {
 
-// F - I is made of changes of edges over their lengths; in tets as flat as cuts leave them by at
-// most so many times these.
-constexpr double kMostAmplified = 4;
+// Of the change of length that tears: a node is looked into if an edge at it has changed by that
+// part of its length. In a well-shaped tet F - I is at most about twice the largest of its edges'.
+constexpr double kNoticed = 0.25;
 
 Principal stretch_at(const dynamics::Topology& topology, std::span<const Vec3f> displacements,
                      NodeIndex node) {
-  SymMat3d sum;
+  SymMat3<double> sum;
   double volume = 0;
   for (const auto t : topology.tets_of(node)) {
     const auto& tet = topology.tet(t);
@@ -48,7 +48,7 @@ Tearing::Tearing(const scene::Organ& organ) {
 
 bool Tearing::is_near_rest(const dynamics::Topology& topology, std::span<const Vec3f> displacements,
                            NodeIndex node) const {
-  const double most = (least_stretch_ - 1) / kMostAmplified;
+  const double most = (least_stretch_ - 1) * kNoticed;
   const Vec3f own = displacements[node.value];
   const Vec3d& rest = topology.rest()[node.value];
   bool is_near = true;

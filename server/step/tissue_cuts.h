@@ -1,7 +1,6 @@
 #pragma once
 
-// The organ as it has been cut and torn: its topology, the knives at work in it, the surface that
-// follows,
+// The organ as it has been cut and torn: topology, blades at work in it, the surface that follows,
 // and the list of all edits. That list is the state: who applies it to the organ has the same
 // topology, surface and slots again. The tick hash covers a hash of it.
 //

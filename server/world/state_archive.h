@@ -69,7 +69,8 @@ class StateArchive {
     auto count = static_cast<std::uint32_t>(values.size());
     value(count);
     if (is_reading()) {
-      if (count > limit) fail();
+      // Before memory is asked for: a few wrong bytes must not take gigabytes.
+      if (count > limit || count * sizeof(T) > reader_.remaining()) fail();
       values.resize(ok_ ? count : 0);
     }
     fixed_array(values);

@@ -111,5 +111,23 @@ TEST(HostileEvents, AreRefused) {
   EXPECT_TRUE(refused({{Duplicate{a, b}}, {}}));
 }
 
+// As little as may be done in a call, and more strokes than that: each gets on.
+TEST(HostileBlade, StrokesEndHoweverFewEditsACallMayMake) {
+  Settings settings;
+  settings.edits_per_call = 1;
+  CutOrgan box(box_organ(4, 4, 4, 0.01), settings);
+  for (int tick = 0; tick <= 100; ++tick) {
+    const double y = 0.03 - 0.0006 * tick;
+    EXPECT_TRUE(box.cutter().move(0, Edge{{-0.004, y, -0.03}, {-0.004, y, 0.03}}));
+    EXPECT_TRUE(box.cutter().move(1, Edge{{-0.03, y, 0.003}, {0.03, y, 0.003}}));
+    box.tick();
+  }
+  box.cutter().lift(0);
+  box.cutter().lift(1);
+  for (int tick = 0; tick < 5000 && !box.cutter().is_idle(); ++tick) box.tick();
+  EXPECT_TRUE(box.cutter().is_idle());
+  EXPECT_EQ(box.check(), "");
+}
+
 }  // namespace
 }  // namespace trocar::cutting::testing

@@ -284,6 +284,12 @@ const auto kIsotropic = ::testing::Values(
              },
          .has_bounding_block = true});
 
+void put_under_tension(scene::Organ& organ) {
+  organ.material.tension = 0.04;
+  organ.material.fibre_direction = {1, 0, 1};
+  organ.material.fibre_tension = 0.02;
+}
+
 const auto kOthers =
     ::testing::Values(Case{.name = "SpringsAlongFibres",
                            .change =
@@ -292,20 +298,13 @@ const auto kOthers =
                                  o.material.fibre_stiffness_ratio = 0.1;
                                }},
                       Case{.name = "SpringsUnderTension",
-                           .change =
-                               [](scene::Organ& o) {
-                                 o.material.tension = 0.04;
-                                 o.material.fibre_direction = {1, 0, 1};
-                                 o.material.fibre_tension = 0.02;
-                               },
+                           .change = [](scene::Organ& o) { put_under_tension(o); },
                            .has_stress_at_rest = true},
                       Case{.name = "TensorMassUnderTension",
                            .change =
                                [](scene::Organ& o) {
                                  o.material.elastic_law = ElasticLaw::TensorMass;
-                                 o.material.tension = 0.04;
-                                 o.material.fibre_direction = {1, 0, 1};
-                                 o.material.fibre_tension = 0.02;
+                                 put_under_tension(o);
                                },
                            .is_linear = true,
                            .has_stress_at_rest = true},
@@ -313,9 +312,7 @@ const auto kOthers =
                            .change =
                                [](scene::Organ& o) {
                                  o.material.elastic_law = ElasticLaw::NeoHookean;
-                                 o.material.tension = 0.04;
-                                 o.material.fibre_direction = {1, 0, 1};
-                                 o.material.fibre_tension = 0.02;
+                                 put_under_tension(o);
                                },
                            .has_stress_at_rest = true},
                       Case{.name = "NeoHookeanStiffInclusion", .change = [](scene::Organ& o) {

@@ -119,6 +119,15 @@ TEST(SharedSession, OnAnImportedLiverEveryReplicaAndTheJournalAgree) {
   run_shared_session(organ.string());
 }
 
+void expect_verified(const std::filesystem::path& journal, std::uint64_t least_ticks) {
+  const auto verified = recording::verify_journal(journal.string());
+  ASSERT_TRUE(verified.ok()) << verified.error().message;
+  EXPECT_TRUE(verified->ok()) << "tick " << verified->first_mismatch->tick << ": "
+                              << verified->first_mismatch->what;
+  EXPECT_GE(verified->ticks_verified, least_ticks);
+  expect_replay_equals(journal, simulate_again(journal));
+}
+
 // Two blades at two places, an assistant who draws one wound open, somebody who comes in the
 // middle, and a watcher whose picture breaks once and heals.
 TEST(SharedSession, CutsAreTheSameForEverybodyAndInTheRecording) {
@@ -143,12 +152,7 @@ TEST(SharedSession, CutsAreTheSameForEverybodyAndInTheRecording) {
   EXPECT_GT(json_number(session.summary_of("Watcher"), "surface_changes"), 25);
   EXPECT_GT(json_number(server, "surface_vertices"), 1700);
 
-  const auto verified = recording::verify_journal(session.journal.string());
-  ASSERT_TRUE(verified.ok()) << verified.error().message;
-  EXPECT_TRUE(verified->ok()) << "tick " << verified->first_mismatch->tick << ": "
-                              << verified->first_mismatch->what;
-  EXPECT_GE(verified->ticks_verified, 9'000u);
-  expect_replay_equals(session.journal, simulate_again(session.journal));
+  expect_verified(session.journal, 9'000);
 }
 
 // The instructor marks the organ, two hands cut it, and he returns it to the mark.
@@ -168,12 +172,7 @@ TEST(SharedSession, AReturnToTheMarkIsTheSameForEverybodyAndInTheRecording) {
     EXPECT_EQ(json_number(summary, "change_mismatches"), 0) << name;
     EXPECT_GT(json_number(summary, "surface_changes"), 10) << name;
   }
-  const auto verified = recording::verify_journal(session.journal.string());
-  ASSERT_TRUE(verified.ok()) << verified.error().message;
-  EXPECT_TRUE(verified->ok()) << "tick " << verified->first_mismatch->tick << ": "
-                              << verified->first_mismatch->what;
-  EXPECT_GE(verified->ticks_verified, 9'000u);
-  expect_replay_equals(session.journal, simulate_again(session.journal));
+  expect_verified(session.journal, 9'000);
 }
 
 TEST(SharedSession, AKilledServerLosesAtMostHalfASecondOfItsRecording) {
