@@ -23,8 +23,8 @@
 // Work: pairs of nodes that can come near are listed with slack, and again for those nodes that
 // have moved a part of it: O(surface nodes + these x their surroundings), over several ticks. Every
 // tick: O(pairs of nodes listed), nothing where nothing is near.
-// An edit adds the pairs around it to the list: O(what is within reach of it), and a look at each
-// surface node's place.
+// An edit adds the pairs around it to the list, and to the one that is being made: O(what is within
+// reach of it), and a look at each surface node's place.
 // Pairs are a function of the state: results do not depend on when lists were made.
 
 #include <span>
@@ -115,6 +115,17 @@ class SelfContactFinder {
     float facing = 0, closing = 0;  // cosine of both normals; m/s
   };
 
+  // What is listed, when it began to be, and where from. Per node: a reference, see begin_list(),
+  // and whether that is not where the node was at rest.
+  struct List {
+    std::vector<NodePair> pairs;   // ascending
+    std::vector<float> far_until;  // per pair: beyond reach_m_ before so much more travel, m
+    double travel = 0;
+    float least_distance = 1;  // m, of a pair, when it began
+    std::vector<Vec3f> references;
+    std::vector<std::uint8_t> has_left;
+  };
+
   void keep_list(const world::World& world);
   void begin_list();
   void go_on_listing(double share, const world::World& world);
@@ -124,17 +135,17 @@ class SelfContactFinder {
   void end_list();
   void list_around(Site site);
   void extend();
-  void list_edit();
-  void merge_list();
-  bool looks_around(Site site) const;
-  bool may_meet(Site site, Site other) const;
-  void list_pair(Site site, Site other, float squared);
+  void take_reference(Site site, const world::World& world, List& list) const;
+  void list_edit(List& list);
+  static void add_to_list(std::vector<NodePair>& found, List& list);
+  bool looks_around(Site site, const List& list) const;
+  bool may_meet(Site site, Site other, const List& list) const;
   bool has_moved(Site site, float by_m, const world::World& world) const {
     return length_squared(world.displacements[site]) > by_m * by_m;
   }
   // When its surroundings were last looked through.
-  bool was_moved(Site site, float by_m) const {
-    return length_squared(references_[site] - surface_.rest_position(site)) > by_m * by_m;
+  bool was_moved(Site site, float by_m, const List& list) const {
+    return length_squared(list.references[site] - surface_.rest_position(site)) > by_m * by_m;
   }
   static Vec3f position(Site site, const world::World& world) {
     return world.position(NodeIndex(site));
@@ -172,29 +183,22 @@ class SelfContactFinder {
   float slack_m_ = 0, corner_reach_m_ = 0;      // see begin_list()
   float reach_m_ = 0;                           // with the greatest margin
 
-  // What is listed, and when it began to be.
-  struct List {
-    std::vector<NodePair> pairs;   // ascending
-    std::vector<float> far_until;  // per pair: beyond reach_m_ before so much more travel, m
-    double travel = 0;
-    float least_distance = 0;  // m, of a pair, when it began
-  };
   bool has_list_ = false;
   double travel_ = 0;
   float last_move_m_ = 1;  // of any node, in the last tick
   std::uint64_t lists_made_ = 0;
   List list_;
-  // The next one, made over several ticks.
+  // The next one, made over several ticks: first references, then the surroundings of due nodes.
   bool is_listing_ = false;
-  List next_list_;
-  std::size_t sites_seen_ = 0;    // whose references are taken
-  std::size_t due_count_ = 0;     // of these
-  std::size_t sites_listed_ = 0;  // of due_
-  PointGrid grid_;                // of references_
-  // Per node, see begin_list(); has_left_: the reference is not where it was at rest.
-  std::vector<Vec3f> references_;
-  std::vector<std::uint8_t> has_left_, is_due_;
-  std::vector<Site> due_;
+  List next_list_;                    // with the pairs that are kept
+  std::vector<NodePair> next_found_;  // and these, to be added
+  std::size_t sites_seen_ = 0;        // whose references are taken
+  std::size_t due_count_ = 0;         // of these
+  std::vector<std::uint8_t> is_due_;  // per node
+  std::vector<Site> due_;             // in the order in which they look around
+  std::size_t sites_listed_ = 0;      // of due_
+  PointGrid grid_;                    // of references
+  std::vector<Site> grid_sites_;      // what it numbers
 
   // Scratch.
   std::vector<std::uint32_t> near_stamp_;  // per node
@@ -204,6 +208,7 @@ class SelfContactFinder {
   std::uint32_t normal_current_ = 0;
   std::vector<NodeIndex> old_nodes_;
   std::vector<TriangleIndex> old_triangles_;
+  std::vector<NodePair> found_;  // of an edit
   std::vector<Site> around_, looking_, corners_;
 };
 

@@ -29,10 +29,13 @@ SelfContactFinder::SelfContactFinder(const scene::Organ& organ) : surface_(organ
   reach_m_ = kSelfMaxMargin_m + corner_reach_m_;
   const auto sites = surface_.sites();
   due_.reserve(sites.size());
-  list_.pairs.reserve(kReservedPairs);
-  next_list_.pairs.reserve(kReservedPairs);
-  list_.far_until.reserve(kReservedPairs);
-  next_list_.far_until.reserve(kReservedPairs);
+  grid_sites_.reserve(sites.size());
+  for (auto* list : {&list_, &next_list_}) {
+    list->pairs.reserve(kReservedPairs);
+    list->far_until.reserve(kReservedPairs);
+  }
+  found_.reserve(kReservedPairs);
+  next_found_.reserve(kReservedPairs);
   old_nodes_.reserve(kMaxSelfPoints);
   old_triangles_.reserve(kMaxSelfPoints);
   extend();
@@ -52,78 +55,102 @@ SelfContactFinder::SelfContactFinder(const scene::Organ& organ) : surface_(organ
 void SelfContactFinder::extend() {
   const auto count = surface_.node_count();
   is_close_at_rest_.resize(count);
-  references_.resize(count);
-  has_left_.resize(count);
+  for (auto* list : {&list_, &next_list_}) {
+    list->references.resize(count);
+    list->has_left.resize(count);
+  }
   is_due_.resize(count);
   near_stamp_.resize(count);
   normals_.resize(2 * count);
   normal_stamp_.resize(2 * count);
 }
 
-// The surface follows once the list is done; then what the edit has changed looks around.
+void SelfContactFinder::take_reference(Site site, const world::World& world, List& list) const {
+  list.references[site] = position(site, world);
+  list.has_left[site] = has_moved(site, kListedSlacks * slack_m_, world) ? 1 : 0;
+}
+
+// What the edit has changed looks around, in the list that there is and in the one to come: what
+// that has kept or found is found there once more.
 void SelfContactFinder::follow(const world::SurfaceEdit& edit, const world::World& world) {
-  if (is_listing_) go_on_listing(1, world);
+  const auto before = surface_.sites();
+  const bool has_references = is_listing_ && sites_seen_ == before.size();
+  // The first site whose reference the next list lacks.
+  const Site unseen = !has_references && is_listing_ ? before[sites_seen_] : Site{0};
   surface_.follow(edit, world);
   extend();
   for (const auto node : edit.touched) is_close_at_rest_[node.value] = 1;
-  if (!has_list_) return;
   for (const auto node : edit.surfaced) {
-    references_[node.value] = position(node.value, world);
-    has_left_[node.value] = has_moved(node.value, kListedSlacks * slack_m_, world) ? 1 : 0;
+    const Site s = node.value;
+    take_reference(s, world, list_);
+    is_due_[s] = 0;
+    if (has_references || s < unseen) take_reference(s, world, next_list_);
   }
-  list_edit();
+  if (has_list_) list_edit(list_), add_to_list(found_, list_);
+  if (!is_listing_) return;
+  const auto sites = surface_.sites();
+  if (!has_references) {
+    sites_seen_ = static_cast<std::size_t>(std::ranges::lower_bound(sites, unseen) - sites.begin());
+    return;
+  }
+  sites_seen_ = sites.size();
+  list_edit(next_list_);
+  next_found_.insert(next_found_.end(), found_.begin(), found_.end());
 }
 
 // Whether it may meet what does not look around itself.
-bool SelfContactFinder::looks_around(Site site) const {
-  return has_left_[site] == 1 || is_close_at_rest_[site] == 1 || surface_.is_of(site, Sort::Wound);
+bool SelfContactFinder::looks_around(Site site, const List& list) const {
+  return list.has_left[site] == 1 || is_close_at_rest_[site] == 1 ||
+         surface_.is_of(site, Sort::Wound);
 }
 
-void SelfContactFinder::list_edit() {
+// The pairs of a list that nodes of the last edit are in, into found_.
+void SelfContactFinder::list_edit(List& list) {
   const float range = reach_m_ + slack_m_;
+  const auto& references = list.references;
   trocar::Box<float> box;
-  for (const Site s : surface_.followed()) box.include(references_[s]);
+  for (const Site s : surface_.followed()) box.include(references[s]);
   box.grow(range);
   around_.clear();
   looking_.clear();
   for (const Site s : surface_.sites()) {
-    if (!box.contains(references_[s])) continue;
+    if (!box.contains(references[s])) continue;
     around_.push_back(s);
-    if (looks_around(s)) looking_.push_back(s);
+    if (looks_around(s, list)) looking_.push_back(s);
   }
-  next_list_.pairs.clear();
-  next_list_.least_distance = list_.least_distance;
+  found_.clear();
+  float least_squared = list.least_distance * list.least_distance;
   for (const Site s : surface_.followed())
-    for (const Site other : looks_around(s) ? around_ : looking_) {
-      const float squared = length_squared(references_[s] - references_[other]);
-      if (squared <= range * range && other != s && may_meet(s, other))
-        list_pair(s, other, squared);
+    for (const Site other : looks_around(s, list) ? around_ : looking_) {
+      const float squared = length_squared(references[s] - references[other]);
+      if (squared > range * range || other == s || !may_meet(s, other, list)) continue;
+      found_.push_back({s, other});
+      found_.push_back({other, s});
+      least_squared = std::min(least_squared, squared);
     }
-  merge_list();
+  list.least_distance = std::min(list.least_distance, std::sqrt(least_squared));
 }
 
-// list_ and next_list_, without what both have.
-void SelfContactFinder::merge_list() {
-  auto& added = next_list_.pairs;
-  std::ranges::sort(added);
-  added.erase(std::unique(added.begin(), added.end()), added.end());
-  auto& pairs = list_.pairs;
+// What was found, some of it from both sides, and what the list has as well.
+void SelfContactFinder::add_to_list(std::vector<NodePair>& found, List& list) {
+  std::ranges::sort(found);
+  found.erase(std::unique(found.begin(), found.end()), found.end());
+  auto& pairs = list.pairs;
   const auto is_known = [&](const NodePair& pair) {
     return std::ranges::binary_search(pairs, pair);
   };
-  added.erase(std::remove_if(added.begin(), added.end(), is_known), added.end());
+  found.erase(std::remove_if(found.begin(), found.end(), is_known), found.end());
   // From behind, each to its place.
-  auto old = pairs.size(), fresh = added.size();
+  auto old = pairs.size(), fresh = found.size();
   pairs.resize(old + fresh);
-  list_.far_until.resize(old + fresh);
+  list.far_until.resize(old + fresh);
   while (fresh > 0) {
     const auto place = old + fresh - 1;
-    const bool is_old = old > 0 && added[fresh - 1] < pairs[old - 1];
-    pairs[place] = is_old ? pairs[old - 1] : added[fresh - 1];
-    list_.far_until[place] = is_old ? list_.far_until[old - 1] : 0;
+    const bool is_old = old > 0 && found[fresh - 1] < pairs[old - 1];
+    pairs[place] = is_old ? pairs[old - 1] : found[fresh - 1];
+    list.far_until[place] = is_old ? list.far_until[old - 1] : 0;
     --(is_old ? old : fresh);
   }
-  list_.least_distance = next_list_.least_distance;
 }
 
 // The list has all pairs of nodes whose references are within reach_m_ + slack_m_ and that may
@@ -138,6 +165,8 @@ void SelfContactFinder::begin_list() {
   next_list_.travel = travel_;
   next_list_.least_distance = 1;
   next_list_.pairs.clear();
+  next_list_.far_until.clear();
+  next_found_.clear();
   sites_seen_ = sites_listed_ = due_count_ = 0;
 }
 
@@ -145,11 +174,14 @@ void SelfContactFinder::take_references(std::size_t end, const world::World& wor
   const float far = kReferenceSlacks * slack_m_;
   for (; sites_seen_ < end; ++sites_seen_) {
     const Site s = surface_.sites()[sites_seen_];
-    const Vec3f p = position(s, world);
-    is_due_[s] = !has_list_ || length_squared(p - references_[s]) > far * far ? 1 : 0;
-    if (is_due_[s] == 0) continue;
-    references_[s] = p;
-    has_left_[s] = has_moved(s, kListedSlacks * slack_m_, world) ? 1 : 0;
+    const Vec3f& old = list_.references[s];
+    is_due_[s] = !has_list_ || length_squared(position(s, world) - old) > far * far ? 1 : 0;
+    if (is_due_[s] == 0) {
+      next_list_.references[s] = old;
+      next_list_.has_left[s] = list_.has_left[s];
+      continue;
+    }
+    take_reference(s, world, next_list_);
     ++due_count_;
   }
 }
@@ -158,32 +190,33 @@ void SelfContactFinder::take_references(std::size_t end, const world::World& wor
 void SelfContactFinder::order_due() {
   due_.clear();
   if (due_count_ == 0) return;
-  const auto sites = surface_.sites();
-  grid_.build(sites.size(), [&](std::size_t i) { return references_[sites[i]]; });
+  grid_sites_.assign(surface_.sites().begin(), surface_.sites().end());
+  grid_.build(grid_sites_.size(),
+              [&](std::size_t i) { return next_list_.references[grid_sites_[i]]; });
   for (const auto i : grid_.entries()) {
-    const Site s = sites[i];
+    const Site s = grid_sites_[i];
     // At first, whoever stays where nothing faces it has nothing to look for.
-    if (is_due_[s] == 1 && (has_list_ || has_left_[s] == 1 || is_close_at_rest_[s] == 1))
+    if (is_due_[s] == 1 && (has_list_ || next_list_.has_left[s] == 1 || is_close_at_rest_[s] == 1))
       due_.push_back(s);
   }
 }
 
 // Of the list that there is, what has not moved.
 void SelfContactFinder::keep_pairs() {
+  const auto& references = next_list_.references;
+  float least_squared = next_list_.least_distance * next_list_.least_distance;
   for (const auto& pair : list_.pairs) {
     if (is_due_[pair.node] == 1 || is_due_[pair.across] == 1) continue;
     next_list_.pairs.push_back(pair);
-    next_list_.least_distance = std::min(next_list_.least_distance,
-                                         length(references_[pair.node] - references_[pair.across]));
+    next_list_.far_until.push_back(0);
+    least_squared =
+        std::min(least_squared, length_squared(references[pair.node] - references[pair.across]));
   }
+  next_list_.least_distance = std::min(next_list_.least_distance, std::sqrt(least_squared));
 }
 
 void SelfContactFinder::end_list() {
-  auto& pairs = next_list_.pairs;
-  if (due_count_ > 0) std::ranges::sort(pairs);
-  // A pair of two that were due, or none of which looked, was found from both sides or one.
-  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
-  next_list_.far_until.assign(pairs.size(), 0);
+  add_to_list(next_found_, next_list_);
   std::swap(list_, next_list_);
   is_listing_ = false;
   has_list_ = true;
@@ -212,21 +245,16 @@ void SelfContactFinder::go_on_listing(double share, const world::World& world) {
   if (sites_listed_ == due_.size()) end_list();
 }
 
-bool SelfContactFinder::may_meet(Site site, Site other) const {
+bool SelfContactFinder::may_meet(Site site, Site other, const List& list) const {
   if (surface_.is_of(site, Sort::Wound) && surface_.is_of(other, Sort::Wound)) {
     const float far = surface_.near_m() - 0.5f * slack_m_;
-    if (!surface_.share_lip_at_rest(site, other) || was_moved(site, far) || was_moved(other, far))
+    if (!surface_.share_lip_at_rest(site, other) || was_moved(site, far, list) ||
+        was_moved(other, far, list))
       return true;
   }
-  return has_left_[site] == 1 || has_left_[other] == 1 ||
+  return list.has_left[site] == 1 || list.has_left[other] == 1 ||
          ((is_close_at_rest_[site] == 1 || is_close_at_rest_[other] == 1) &&
           surface_.faced_at_rest(site, other));
-}
-
-void SelfContactFinder::list_pair(Site site, Site other, float squared) {
-  next_list_.pairs.push_back({site, other});
-  next_list_.pairs.push_back({other, site});
-  next_list_.least_distance = std::min(next_list_.least_distance, std::sqrt(squared));
 }
 
 void SelfContactFinder::list_around(Site site) {
@@ -239,15 +267,20 @@ void SelfContactFinder::list_around(Site site) {
   };
   bool is_stamped = false;
   const bool was_cut = surface_.was_cut(site);
-  grid_.visit(references_[site], reach_m_ + slack_m_, [&](std::uint32_t place, float squared) {
-    const Site other = surface_.sites()[place];
-    if (other == site || !may_meet(site, other)) return;
-    if (!was_cut && !surface_.was_cut(other)) {
-      if (!std::exchange(is_stamped, true)) stamp_near_sites();
-      if (near_stamp_[other] == near_current_) return;
-    }
-    list_pair(site, other, squared);
-  });
+  float least_squared = next_list_.least_distance * next_list_.least_distance;
+  grid_.visit(next_list_.references[site], reach_m_ + slack_m_,
+              [&](std::uint32_t place, float squared) {
+                const Site other = grid_sites_[place];
+                if (other == site || !may_meet(site, other, next_list_)) return;
+                if (!was_cut && !surface_.was_cut(other)) {
+                  if (!std::exchange(is_stamped, true)) stamp_near_sites();
+                  if (near_stamp_[other] == near_current_) return;
+                }
+                next_found_.push_back({site, other});
+                next_found_.push_back({other, site});
+                least_squared = std::min(least_squared, squared);
+              });
+  next_list_.least_distance = std::min(next_list_.least_distance, std::sqrt(least_squared));
 }
 
 // Made anew when the surface has moved by an eighth of the slack since it was last begun, and done
