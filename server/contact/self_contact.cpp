@@ -59,7 +59,17 @@ Vec3f nearest_weights(const Vec3f& p, const Vec3f& a, const Vec3f& b, const Vec3
 SelfContactTable::SelfContactTable() {
   nodes_.reserve(kMaxSelfPoints);
   triangles_.reserve(kMaxSelfPoints);
+  places_.reserve(kMaxSelfPoints);
 }
+
+namespace {
+bool is_place(const SelfContactPlace& place) {
+  const auto& w = place.weights;
+  return w.x >= 0 && w.y >= 0 && w.z >= 0 && std::abs(w.x + w.y + w.z - 1) < 1e-4f &&
+         std::abs(length_squared(place.normal) - 1) < 1e-3f &&
+         std::abs(place.shift) <= 2 * kOverlapAtRest_m;
+}
+}  // namespace
 
 void SelfContactTable::visit_state(world::StateArchive& archive,
                                    std::span<const NodeIndex> surface_nodes,
@@ -72,8 +82,10 @@ void SelfContactTable::visit_state(world::StateArchive& archive,
   }
   archive.sized_array(nodes_, kMaxSelfPoints);
   archive.sized_array(triangles_, kMaxSelfPoints);
+  archive.sized_array(places_, kMaxSelfPoints);
   if (!archive.is_reading()) return;
-  bool is_good = !nodes_.empty() && nodes_.size() == triangles_.size();
+  bool is_good = !nodes_.empty() && nodes_.size() == triangles_.size() &&
+                 nodes_.size() == places_.size() && std::ranges::all_of(places_, is_place);
   for (std::size_t i = 0; is_good && i < nodes_.size(); ++i)
     is_good = std::ranges::binary_search(surface_nodes, nodes_[i]) &&
               triangles_[i].value < triangle_count && (i == 0 || nodes_[i - 1] < nodes_[i]);
@@ -84,9 +96,10 @@ void SelfContactTable::visit_state(world::StateArchive& archive,
 
 const Vec3f& SelfContactFinder::normal(Site site, Sort sort, const world::World& world) {
   const std::size_t place = 2 * std::size_t{site} + static_cast<std::size_t>(sort);
-  if (normal_stamp_[place] == normal_current_) return normals_[place];
-  normal_stamp_[place] = normal_current_;
-  return normals_[place] = surface_.normal(site, sort, [&](Site s) { return position(s, world); });
+  if (normal_stamp_[place] == tick_current_) return normals_[place];
+  normal_stamp_[place] = tick_current_;
+  return normals_[place] =
+             surface_.normal(site, sort, [&](TriangleIndex t) { return up(t, world); });
 }
 
 // Of what the node is of, that which looks most against them.
@@ -100,10 +113,11 @@ Vec3f SelfContactFinder::normal_towards(Site site, const Vec3f& theirs, const wo
   return is_wound ? of_wound : of_skin;
 }
 
-Vec3f SelfContactFinder::up(TriangleIndex triangle, const world::World& world) const {
-  const auto& [a, b, c] = surface_[triangle];
-  const Vec3f p = position(a, world);
-  return cross(position(b, world) - p, position(c, world) - p);
+const Vec3f& SelfContactFinder::up(TriangleIndex triangle, const world::World& world) {
+  auto& up = ups_[triangle.value];
+  if (std::exchange(up_stamp_[triangle.value], tick_current_) != tick_current_)
+    up = surface_.up(triangle, [&](Site s) { return position(s, world); });
+  return up;
 }
 
 bool SelfContactFinder::can_meet(Site site, TriangleIndex triangle, const world::World& world) {
@@ -284,63 +298,88 @@ bool SelfContactFinder::stays(Site site, TriangleIndex triangle, const world::Wo
          lies_along(touch.aside, touch.gap);
 }
 
-void SelfContactFinder::add_point(Site site, const ClosestPoint& closest, const Touch& touch,
+// What it was when it was last looked at holds.
+bool SelfContactFinder::lies_still(Site site, TriangleIndex triangle,
+                                   const world::World& world) const {
+  if ((world.tick + site) % kLookEvery == 0 || surface_.is_gone(triangle)) return false;
+  const auto is_still = [&](Site s) {
+    return length_squared(world.velocities[s]) < kStill_m_s * kStill_m_s;
+  };
+  const auto& [a, b, c] = surface_[triangle];
+  return is_still(site) && is_still(a) && is_still(b) && is_still(c);
+}
+
+void SelfContactFinder::add_point(Site site, TriangleIndex triangle, const Place& place,
                                   const world::World& world, SelfContactTable& pairs,
                                   ContactList& out) const {
   if (pairs.nodes().size() >= kMaxSelfPoints) {
     ++out.dropped;
     return;
   }
-  const auto& sites = surface_[closest.triangle];
+  const auto& [a, b, c] = surface_[triangle];
+  const auto& w = place.weights;
+  const auto between = [&](const auto& at) {
+    return at(site) - (at(a) * w.x + at(b) * w.y + at(c) * w.z);
+  };
+  const Vec3f from = between([&](Site s) { return position(s, world); });
+  const Vec3f at_rest = between([&](Site s) -> const Vec3f& { return world.rest_positions[s]; });
   const NodeIndex node(site);
-  pairs.add(node, closest.triangle);
+  pairs.add(node, triangle, place);
   ContactPoint point{
-      .nodes = {node, NodeIndex(sites[0]), NodeIndex(sites[1]), NodeIndex(sites[2])},
-      .weights = {1, -closest.weights.x, -closest.weights.y, -closest.weights.z},
+      .nodes = {node, NodeIndex(a), NodeIndex(b), NodeIndex(c)},
+      .weights = {1, -w.x, -w.y, -w.z},
       .node_count = 4,
       .id = static_cast<std::uint32_t>(pairs.nodes().size() - 1),
       .stiffness = 0.5f * kSelfStiffnessPaPerM * world.surface_areas[node.value],
       .limit_n = kNoLimit_n,
-      .normal = touch.normal,
-      .plane = touch.normal * touch.shift - touch.at_rest,
+      .normal = place.normal,
+      .plane = place.normal * place.shift - at_rest,
   };
   out.points.push_back(point);
-  if (touch.gap > 0) return;
+  if (dot(place.normal, from) > place.shift) return;
   out.self_seeds.insert(out.self_seeds.end(), point.nodes.begin(), point.nodes.end());
 }
 
 void SelfContactFinder::find(const world::World& world, SelfContactTable& pairs, ContactList& out) {
   keep_list(world);
-  const auto& listed = list_.pairs;
+  pairs_looked_at_ = 0;
+  const auto& runs = list_.runs;
   // No two are nearer to each other than their references by more than that.
   const float moved =
       2 * (kReferenceSlacks * slack_m_ + static_cast<float>(travel_ - list_.travel));
   // What the fastest pair could reach.
   const float reach = corner_reach_m_ + margin_of(2 * last_move_m_ / kTickSeconds);
-  const bool is_far = listed.empty() || list_.least_distance - moved > reach;
+  const bool is_far = runs.empty() || list_.least_distance - moved > reach;
   if (is_far && pairs.nodes().empty()) return;
-  if (++normal_current_ == 0) {
+  if (++tick_current_ == 0) {
     std::ranges::fill(normal_stamp_, 0u);
-    normal_current_ = 1;
+    std::ranges::fill(up_stamp_, 0u);
+    tick_current_ = 1;
   }
-  old_nodes_.assign(pairs.nodes().begin(), pairs.nodes().end());
-  old_triangles_.assign(pairs.triangles().begin(), pairs.triangles().end());
+  std::swap(old_pairs_, pairs);
   pairs.clear();
   // Nodes with a pair and nodes with something listed, together ascending.
-  std::size_t old = 0, first = 0;
-  while (old < old_nodes_.size() || first < listed.size()) {
-    const Site of_old = old < old_nodes_.size() ? old_nodes_[old].value : kNoSite;
-    const Site of_listed = first < listed.size() ? listed[first].node : kNoSite;
-    const Site site = std::min(of_old, of_listed);
-    std::size_t end = first;
-    while (end < listed.size() && listed[end].node == site) ++end;
+  const auto nodes = old_pairs_.nodes();
+  std::size_t old = 0, run = 0;
+  while (old < nodes.size() || run < runs.size()) {
+    const Site of_old = old < nodes.size() ? nodes[old].value : kNoSite;
+    const Site of_run = run < runs.size() ? runs[run].node : kNoSite;
+    const Site site = std::min(of_old, of_run);
+    const bool is_old = site == of_old, is_listed = site == of_run;
+    const auto i = is_old ? old++ : old;
+    const auto r = is_listed ? run++ : run;
+    if (is_old && lies_still(site, old_pairs_.triangles()[i], world)) {
+      add_point(site, old_pairs_.triangles()[i], old_pairs_.places()[i], world, pairs, out);
+      continue;
+    }
     ClosestPoint closest;
     Touch touch;
-    bool is_pair = site == of_old && stays(site, old_triangles_[old], world, closest, touch);
-    if (!is_pair) is_pair = meets(site, first, end, world, closest, touch);
-    if (is_pair) add_point(site, closest, touch, world, pairs, out);
-    if (site == of_old) ++old;
-    first = end;
+    if ((is_old && stays(site, old_pairs_.triangles()[i], world, closest, touch)) ||
+        (is_listed && meets(site, runs[r].first, end_of_run(r), world, closest, touch))) {
+      ++pairs_looked_at_;
+      add_point(site, closest.triangle, {closest.weights, touch.normal, touch.shift}, world, pairs,
+                out);
+    }
   }
   std::ranges::sort(out.self_seeds);
   out.self_seeds.erase(std::unique(out.self_seeds.begin(), out.self_seeds.end()),

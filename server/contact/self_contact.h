@@ -20,6 +20,9 @@
 // their own: a node at the rim has a normal of each, and a node on a wound meets the other side of
 // wounds first. A pair whose triangle an edit has replaced goes on with what is there now.
 //
+// A pair that hardly moves stays where it lies for up to kLookEvery ticks: a node slower than
+// kStill_m_s gets less than a micrometre away from there. Where it lies is state, too.
+//
 // Work: pairs of nodes that can come near are listed with slack, and again for those nodes that
 // have moved a part of it: O(surface nodes + these x their surroundings), over several ticks. Every
 // tick: O(pairs of nodes listed), nothing where nothing is near.
@@ -44,6 +47,22 @@ inline constexpr float kSelfStiffnessPaPerM = 5e7f;
 // never from farther than kSelfMaxMargin_m: enough for 1.3 m/s.
 inline constexpr float kSelfMargin_m = 0.001f, kSelfMaxMargin_m = 0.003f;
 inline constexpr float kSelfTicksAhead = 1.5f;
+inline constexpr float kStill_m_s = 1e-4f;
+inline constexpr Tick kLookEvery = 8;
+
+// Where on its triangle a node lies, when that was last looked at.
+struct SelfContactPlace {
+  Vec3f weights;    // of the corners
+  Vec3f normal;     // from the triangle to the node
+  float shift = 0;  // m, the gap from which on it presses
+};
+
+}  // namespace trocar::contact
+
+template <>
+struct trocar::world::IsPaddingFree<trocar::contact::SelfContactPlace> : std::true_type {};
+
+namespace trocar::contact {
 
 // The pairs: state.
 class SelfContactTable {
@@ -52,10 +71,14 @@ class SelfContactTable {
 
   std::span<const NodeIndex> nodes() const { return nodes_; }  // ascending, each once
   std::span<const TriangleIndex> triangles() const { return triangles_; }
-  void clear() { nodes_.clear(), triangles_.clear(); }
-  void add(NodeIndex node, TriangleIndex triangle) {
+
+  std::span<const SelfContactPlace> places() const { return places_; }
+
+  void clear() { nodes_.clear(), triangles_.clear(), places_.clear(); }
+  void add(NodeIndex node, TriangleIndex triangle, const SelfContactPlace& place) {
     nodes_.push_back(node);
     triangles_.push_back(triangle);
+    places_.push_back(place);
   }
 
   // Takes no bytes without pairs. Last in a state. surface_nodes: ascending; triangle_count:
@@ -66,6 +89,7 @@ class SelfContactTable {
  private:
   std::vector<NodeIndex> nodes_;
   std::vector<TriangleIndex> triangles_;
+  std::vector<SelfContactPlace> places_;
 };
 
 class SelfContactFinder {
@@ -87,10 +111,13 @@ class SelfContactFinder {
   // Lists made, and pairs of nodes in the last one.
   std::uint64_t lists_made() const { return lists_made_; }
   std::size_t pairs_listed() const { return list_.pairs.size(); }
+  // Pairs of the last find() that were looked at anew.
+  std::size_t pairs_looked_at() const { return pairs_looked_at_; }
 
  private:
   using Site = SelfSurface::Site;
   using Sort = SelfSurface::Sort;
+  using Place = SelfContactPlace;
   // Nodes this far from rest, in slacks, are listed; a pair needs one that is farther than
   // kListedSlacks + 1/2, unless it faced something this near at rest.
   static constexpr float kReferenceSlacks = 0.25f;
@@ -99,6 +126,11 @@ class SelfContactFinder {
   struct NodePair {
     Site node = 0, across = 0;
     auto operator<=>(const NodePair&) const = default;
+  };
+  // Pairs of one node, up to where the next run begins.
+  struct Run {
+    Site node = 0;
+    std::uint32_t first = 0;
   };
   struct ClosestPoint {
     TriangleIndex triangle;
@@ -119,6 +151,7 @@ class SelfContactFinder {
   // and whether that is not where the node was at rest.
   struct List {
     std::vector<NodePair> pairs;   // ascending
+    std::vector<Run> runs;         // of pairs, per node that has some; ascending
     std::vector<float> far_until;  // per pair: beyond reach_m_ before so much more travel, m
     double travel = 0;
     float least_distance = 1;  // m, of a pair, when it began
@@ -155,7 +188,7 @@ class SelfContactFinder {
     return normal(site, surface_.is_of(site, Sort::Skin) ? Sort::Skin : Sort::Wound, world);
   }
   Vec3f normal_towards(Site site, const Vec3f& theirs, const world::World& world);
-  Vec3f up(TriangleIndex triangle, const world::World& world) const;
+  const Vec3f& up(TriangleIndex triangle, const world::World& world);
   // The wound of the triangle is one that the node is on a lip of.
   bool is_of_lips(Site site, TriangleIndex triangle) const {
     return surface_.sort_of(triangle) == Sort::Wound && surface_.is_on_lip(site);
@@ -170,13 +203,17 @@ class SelfContactFinder {
   bool can_meet_other(Site site, Site across, bool is_moved, const world::World& world);
   bool begins(Site site, Site nearest, float squared, bool is_of_lips, const world::World& world,
               ClosestPoint& closest, Touch& touch);
+  std::size_t end_of_run(std::size_t run) const {
+    return run + 1 < list_.runs.size() ? list_.runs[run + 1].first : list_.pairs.size();
+  }
   // Of list_.pairs.
   bool meets(Site site, std::size_t first, std::size_t end, const world::World& world,
              ClosestPoint& closest, Touch& touch);
   bool stays(Site site, TriangleIndex triangle, const world::World& world, ClosestPoint& closest,
              Touch& touch);
-  void add_point(Site site, const ClosestPoint& closest, const Touch& touch,
-                 const world::World& world, SelfContactTable& pairs, ContactList& out) const;
+  bool lies_still(Site site, TriangleIndex triangle, const world::World& world) const;
+  void add_point(Site site, TriangleIndex triangle, const Place& place, const world::World& world,
+                 SelfContactTable& pairs, ContactList& out) const;
 
   SelfSurface surface_;
   std::vector<std::uint8_t> is_close_at_rest_;  // per node: something may face it there
@@ -187,6 +224,7 @@ class SelfContactFinder {
   double travel_ = 0;
   float last_move_m_ = 1;  // of any node, in the last tick
   std::uint64_t lists_made_ = 0;
+  std::size_t pairs_looked_at_ = 0;
   List list_;
   // The next one, made over several ticks: first references, then the surroundings of due nodes.
   bool is_listing_ = false;
@@ -203,11 +241,11 @@ class SelfContactFinder {
   // Scratch.
   std::vector<std::uint32_t> near_stamp_;  // per node
   std::uint32_t near_current_ = 0;
-  std::vector<Vec3f> normals_;  // per node and sort, where the stamp is current
-  std::vector<std::uint32_t> normal_stamp_;
-  std::uint32_t normal_current_ = 0;
-  std::vector<NodeIndex> old_nodes_;
-  std::vector<TriangleIndex> old_triangles_;
+  // Of this tick, where the stamp is current: per node and sort, and per triangle.
+  std::vector<Vec3f> normals_, ups_;
+  std::vector<std::uint32_t> normal_stamp_, up_stamp_;
+  std::uint32_t tick_current_ = 0;
+  SelfContactTable old_pairs_;
   std::vector<NodePair> found_;  // of an edit
   std::vector<Site> around_, looking_, corners_;
 };

@@ -36,8 +36,6 @@ SelfContactFinder::SelfContactFinder(const scene::Organ& organ) : surface_(organ
   }
   found_.reserve(kReservedPairs);
   next_found_.reserve(kReservedPairs);
-  old_nodes_.reserve(kMaxSelfPoints);
-  old_triangles_.reserve(kMaxSelfPoints);
   extend();
   // Two nodes that have both moved by kMovedSlacks come this much nearer.
   const float range = reach_m_ + 2 * kMovedSlacks * slack_m_;
@@ -63,6 +61,8 @@ void SelfContactFinder::extend() {
   near_stamp_.resize(count);
   normals_.resize(2 * count);
   normal_stamp_.resize(2 * count);
+  ups_.resize(surface_.triangle_count());
+  up_stamp_.resize(surface_.triangle_count());
 }
 
 void SelfContactFinder::take_reference(Site site, const world::World& world, List& list) const {
@@ -104,7 +104,8 @@ bool SelfContactFinder::looks_around(Site site, const List& list) const {
          surface_.is_of(site, Sort::Wound);
 }
 
-// The pairs of a list that nodes of the last edit are in, into found_.
+// The pairs that nodes of the last edit are in and that the list lacks, into found_. A list has
+// each pair from both sides or not at all.
 void SelfContactFinder::list_edit(List& list) {
   const float range = reach_m_ + slack_m_;
   const auto& references = list.references;
@@ -120,26 +121,27 @@ void SelfContactFinder::list_edit(List& list) {
   }
   found_.clear();
   float least_squared = list.least_distance * list.least_distance;
-  for (const Site s : surface_.followed())
+  for (const Site s : surface_.followed()) {
+    auto known = std::ranges::lower_bound(list.pairs, NodePair{s, 0});
     for (const Site other : looks_around(s, list) ? around_ : looking_) {
       const float squared = length_squared(references[s] - references[other]);
-      if (squared > range * range || other == s || !may_meet(s, other, list)) continue;
+      if (squared > range * range || other == s) continue;
+      while (known != list.pairs.end() && *known < NodePair{s, other}) ++known;
+      const bool is_known = known != list.pairs.end() && *known == NodePair{s, other};
+      if (is_known || !may_meet(s, other, list)) continue;
       found_.push_back({s, other});
       found_.push_back({other, s});
       least_squared = std::min(least_squared, squared);
     }
+  }
   list.least_distance = std::min(list.least_distance, std::sqrt(least_squared));
 }
 
-// What was found, some of it from both sides, and what the list has as well.
+// What was found and the list lacks; found from both sides, some of it twice.
 void SelfContactFinder::add_to_list(std::vector<NodePair>& found, List& list) {
   std::ranges::sort(found);
   found.erase(std::unique(found.begin(), found.end()), found.end());
   auto& pairs = list.pairs;
-  const auto is_known = [&](const NodePair& pair) {
-    return std::ranges::binary_search(pairs, pair);
-  };
-  found.erase(std::remove_if(found.begin(), found.end(), is_known), found.end());
   // From behind, each to its place.
   auto old = pairs.size(), fresh = found.size();
   pairs.resize(old + fresh);
@@ -151,6 +153,9 @@ void SelfContactFinder::add_to_list(std::vector<NodePair>& found, List& list) {
     list.far_until[place] = is_old ? list.far_until[old - 1] : 0;
     --(is_old ? old : fresh);
   }
+  list.runs.clear();
+  for (std::uint32_t i = 0; i < pairs.size(); ++i)
+    if (i == 0 || pairs[i].node != pairs[i - 1].node) list.runs.push_back({pairs[i].node, i});
 }
 
 // The list has all pairs of nodes whose references are within reach_m_ + slack_m_ and that may

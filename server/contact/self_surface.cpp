@@ -64,7 +64,9 @@ void SelfSurface::add_triangle(const std::array<Site, 3>& sites, Sort sort) {
 
 // What follows from its triangles. Skin that was there at first faces what it faced then.
 void SelfSurface::take_rest(Site site) {
-  const auto at_rest = [this](Site s) { return rest_positions_[s]; };
+  const auto at_rest = [this](TriangleIndex t) {
+    return up(t, [this](Site s) { return rest_positions_[s]; });
+  };
   site_sorts_[site] = 0;
   for (const auto t : site_triangles_[site])
     site_sorts_[site] =

@@ -53,22 +53,29 @@ class SelfSurface {
   // Of a wound, and on one side of it.
   bool is_on_lip(Site site) const { return length_squared(rest_wound_normals_[site]) > 0; }
 
-  // Area-weighted, of one sort; zero where a wound's two sides cancel.
-  template <typename Position>
-  Vec3f normal(Site site, Sort sort, Position&& position) const {
+  // Area-weighted, of one sort; zero where a wound's two sides cancel. up_of(triangle): along its
+  // normal, twice its area long.
+  template <typename UpOf>
+  Vec3f normal(Site site, Sort sort, UpOf&& up_of) const {
     Vec3f sum;
     float all = 0;
     for (const auto t : site_triangles_[site]) {
       if (sorts_[t.value] != sort) continue;
-      const auto& [a, b, c] = triangles_[t.value];
-      const Vec3f p = position(a), area = cross(position(b) - p, position(c) - p);
-      sum += area;
-      if (sort == Sort::Wound) all += length(area);
+      const Vec3f up = up_of(t);
+      sum += up;
+      if (sort == Sort::Wound) all += length(up);
     }
     if (sort == Sort::Wound && !(length_squared(sum) > kOneSided * kOneSided * all * all))
       return {};
     return normalized(sum, {0, 1, 0});
   }
+  template <typename Position>
+  Vec3f up(TriangleIndex triangle, Position&& position) const {
+    const auto& [a, b, c] = triangles_[triangle.value];
+    const Vec3f p = position(a);
+    return cross(position(b) - p, position(c) - p);
+  }
+  std::size_t triangle_count() const { return triangles_.size(); }  // with those that are gone
 
   const Vec3f& rest_position(Site site) const { return rest_positions_[site]; }
   // Of the skin.

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <bit>
 #include <cmath>
 
 #include "common/base/bytes.h"
@@ -352,7 +353,8 @@ TEST(Squeeze, DamagedPairsAreRefused) {
   ASSERT_GT(count, 4u);
   Bytes good;
   squeezed.simulation->write_snapshot(good);
-  const std::size_t triangles = good.size() - 4 * count, nodes = triangles - 4 - 4 * count;
+  const std::size_t places = good.size() - sizeof(SelfContactPlace) * count,
+                    triangles = places - 4 - 4 * count, nodes = triangles - 4 - 4 * count;
   const auto refuses = [&](std::size_t at, std::uint32_t value) {
     Bytes bad = good;
     for (std::size_t i = 0; i < 4; ++i) bad[at + i] = static_cast<std::uint8_t>(value >> 8 * i);
@@ -361,9 +363,44 @@ TEST(Squeeze, DamagedPairsAreRefused) {
   EXPECT_TRUE(refuses(triangles, 1'000'000)) << "no such triangle";
   EXPECT_TRUE(refuses(nodes, 1'000'000)) << "no such node";
   EXPECT_TRUE(refuses(nodes + 4, pairs.nodes()[0].value)) << "a node twice";
+  const std::uint32_t not_a_number = 0x7fc00000;
+  for (std::size_t i = 0; i < sizeof(SelfContactPlace) / 4; ++i)
+    EXPECT_TRUE(refuses(places + 4 * i, not_a_number)) << i;
+  EXPECT_TRUE(refuses(places, std::bit_cast<std::uint32_t>(2.0f))) << "beside its triangle";
+  EXPECT_TRUE(refuses(places - 4, 3)) << "places for some";
   EXPECT_TRUE(refuses(nodes - 4, 0)) << "no pairs";
   EXPECT_TRUE(refuses(nodes - 4, 0xffffffff)) << "too many";
   EXPECT_TRUE(squeezed.simulation->restore_snapshot(good).ok());
+}
+
+// What lies still is looked at every kLookEvery ticks, and found where it was.
+TEST(Squeeze, PairsThatLieStillAreSeldomLookedAt) {
+  Squeezed squeezed;
+  squeezed.close(kPressed, 100);
+  squeezed.hold(2000);
+  world::World world = squeezed.simulation->state().world;
+  SelfContactTable pairs = squeezed.simulation->state().self_contacts;
+  const auto count = pairs.nodes().size();
+  ASSERT_GT(count, 20u);
+  for (auto& velocity : world.velocities)
+    ASSERT_LT(length(velocity), kStill_m_s) << "the fold has come to rest";
+  SelfContactFinder finder(squeezed.simulation->organ());
+  ContactList list;
+  std::size_t looked_at = 0;
+  for (Tick i = 0; i < kLookEvery; ++i, ++world.tick) {
+    const auto before = pairs;
+    list.points.clear();
+    finder.find(world, pairs, list);
+    finder.surface_moved(0);
+    looked_at += finder.pairs_looked_at();
+    ASSERT_EQ(pairs.nodes().size(), count);
+    for (std::size_t k = 0; k < count; ++k) {
+      EXPECT_EQ(pairs.triangles()[k], before.triangles()[k]);
+      EXPECT_LT(length(pairs.places()[k].weights - before.places()[k].weights), 1e-3f);
+      EXPECT_LT(length(pairs.places()[k].normal - before.places()[k].normal), 1e-3f);
+    }
+  }
+  EXPECT_EQ(looked_at, count);
 }
 
 TEST(Squeeze, AHeldFoldGainsNoEnergyInTenSeconds) {
