@@ -7,8 +7,8 @@ namespace {
 
 constexpr double kNearEdges = 3.5;
 constexpr std::uint32_t kMostNearLayers = 8;
-constexpr double kAnyPath = 1e9;
 constexpr float kFacing_m = 2e-6f;
+constexpr double kRounding = 1e-12;  // of lengths added up from the other end
 
 }  // namespace
 
@@ -77,8 +77,8 @@ void SelfSurface::take_rest(Site site) {
       is_of(site, Sort::Wound) ? normal(site, Sort::Wound, at_rest) : Vec3f{};
 }
 
-// From `from` along edges, layer by layer, as long as the way is near_m or within kNearLayers, into
-// reached_: neighbours(node, visit), length_between(a, b).
+// From `from` along edges, into reached_: within kNearLayers of them, or along kMostNearLayers that
+// are together near_m long at most. neighbours(node, visit), length_between(a, b).
 template <typename Neighbours, typename Length>
 void SelfSurface::reach(std::span<const Site> from, double near_m, Neighbours&& neighbours,
                         Length&& length_between) {
@@ -88,20 +88,22 @@ void SelfSurface::reach(std::span<const Site> from, double near_m, Neighbours&& 
     seen_current_ = 1;
   }
   for (const Site s : from) seen_[s] = seen_current_, paths_[s] = 0;
-  std::size_t i = 0;
-  for (std::uint32_t layer = 1; i < reached_.size() && layer <= kMostNearLayers; ++layer)
-    for (const auto end = reached_.size(); i < end; ++i) {
-      const Site at = reached_[i];
+  rim_ = reached_;
+  for (std::uint32_t layer = 1; !rim_.empty() && layer <= kMostNearLayers; ++layer) {
+    next_rim_.clear();
+    for (const Site at : rim_)
       neighbours(at, [&](Site next) {
         const double path = paths_[at] + length_between(at, next);
         const bool is_new = seen_[next] != seen_current_;
-        if (is_new && layer > kNearLayers && path > near_m) return;
-        paths_[next] = is_new ? path : std::min(path, paths_[next]);
+        if ((layer > kNearLayers && path > near_m) || !(is_new || path < paths_[next])) return;
+        paths_[next] = path;
+        next_rim_.push_back(next);
         if (!is_new) return;
         seen_[next] = seen_current_;
         reached_.push_back(next);
       });
-    }
+    std::swap(rim_, next_rim_);
+  }
   std::ranges::sort(reached_);
 }
 
@@ -189,8 +191,9 @@ void SelfSurface::follow(const world::SurfaceEdit& edit, const world::World& wor
     take_rest(node.value);
     followed_.push_back(node.value);
   }
-  // Whoever could have had one of them near, or can have now.
-  reach_along_surface(followed_, kAnyPath);
+  // Whoever had one of them near, or has now: a way that has changed leads through them, and is as
+  // it was up to the first.
+  reach_along_surface(followed_, near_m_ * (1 + kRounding));
   for (const Site s : reached_) {
     if (near_states_[s] == NearState::AsAtFirst) followed_.push_back(s);
     near_states_[s] = NearState::Unknown;

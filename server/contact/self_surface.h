@@ -134,7 +134,7 @@ class SelfSurface {
   std::vector<std::uint32_t> seen_;
   std::uint32_t seen_current_ = 0;
   std::vector<double> paths_;
-  std::vector<Site> reached_;
+  std::vector<Site> reached_, rim_, next_rim_;
 };
 
 }  // namespace trocar::contact
