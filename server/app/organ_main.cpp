@@ -293,10 +293,10 @@ Result<scene::Organ> make_named(const std::string& name, const std::optional<int
       return Error{ErrorCode::Usage, "make lattice: --tets does not apply, a lattice has none"};
     return scene::make_lattice();
   }
-  if (name == "plate") {
+  if (name == "plate" || name == "chest") {
     if (tets)
-      return Error{ErrorCode::Usage, "make plate: --tets does not apply, its mesh is given"};
-    return scene::make_plate();
+      return Error{ErrorCode::Usage, "make " + name + ": --tets does not apply, its mesh is given"};
+    return name == "plate" ? scene::make_plate() : scene::make_chest();
   }
   if (tets.value_or(0) >= kManyTets)
     std::fprintf(stderr, "%s: meshing a %s of about %s tets, this takes some seconds\n", kProgram,
@@ -387,11 +387,12 @@ std::string version_text() {
 
 void add_commands(CLI::App& app, Options& options) {
   auto* make = app.add_subcommand("make", "make a built-in organ");
-  make->add_option(
-          "NAME", options.made_name,
-          "liver, stomach, lattice (Choi's 30 x 15 x 30 nodes) or plate (Nakao's 16 x 16 x 0.4 cm)")
+  make->add_option("NAME", options.made_name,
+                   "liver, stomach, lattice (Choi's 30 x 15 x 30 nodes), plate (Nakao's 16 x 16 x "
+                   "0.4 cm) or "
+                   "chest (wall and heart, the size of Nakao's)")
       ->required()
-      ->check(CLI::IsMember({"liver", "stomach", "lattice", "plate"}));
+      ->check(CLI::IsMember({"liver", "stomach", "lattice", "plate", "chest"}));
   const auto range = [](int low, int high, int usual) {
     return std::to_string(low) + " to " + std::to_string(high) + " [" + std::to_string(usual) + "]";
   };
