@@ -10,7 +10,7 @@
 #include "client/app/picture.h"
 #include "client/net/net_source.h"
 #include "client/replay/replay_source.h"
-#include "client/replica/tool_messages.h"
+#include "client/replica/client_messages.h"
 #include "common/base/log.h"
 #include "common/base/timing.h"
 #include "common/scene/script.h"

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "client/replica/tool_messages.h"
+#include "client/replica/client_messages.h"
 
 namespace trocar::app {
 

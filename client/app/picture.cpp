@@ -5,7 +5,7 @@
 #include <cstdio>
 #include <numbers>
 
-#include "client/replica/tool_messages.h"
+#include "client/replica/client_messages.h"
 #include "client/ui/hud_panels.h"
 #include "common/base/log.h"
 

@@ -406,7 +406,7 @@ void Replica::apply_participants(const proto::Participants& message) {
 
 void Replica::apply_claim(const proto::ClaimEvent& message, std::uint64_t arrival_ns) {
   if (message.tool() >= kMaxTools) return fail("ClaimEvent.tool: slot out of range");
-  ClaimNotice notice;
+  Notice notice;
   notice.tick = message.tick();
   notice.tool.value = static_cast<std::uint8_t>(message.tool());
   notice.verb = to_verb(message.verb());
@@ -418,7 +418,7 @@ void Replica::apply_claim(const proto::ClaimEvent& message, std::uint64_t arriva
 }
 
 void Replica::apply_mark(const proto::MarkEvent& message, std::uint64_t arrival_ns) {
-  ClaimNotice notice;
+  Notice notice;
   notice.tick = message.tick();
   notice.text = message.text();
   notice.arrival_ns = arrival_ns;
@@ -427,7 +427,7 @@ void Replica::apply_mark(const proto::MarkEvent& message, std::uint64_t arrival_
   add_notice(std::move(notice));
 }
 
-void Replica::add_notice(ClaimNotice notice) {
+void Replica::add_notice(Notice notice) {
   notices_.push_back(std::move(notice));
   if (notices_.size() > kMaxNotices) notices_.pop_front();
   ++notice_count_;

@@ -107,7 +107,7 @@ class Replica final : public MessageSink {
   const std::vector<Participant>& participants() const { return participants_; }
   const Participant* find_participant(ParticipantSlot slot) const;
   // Latest last; `notice_count` counts all that ever came.
-  const std::deque<ClaimNotice>& notices() const { return notices_; }
+  const std::deque<Notice>& notices() const { return notices_; }
   std::uint64_t notice_count() const { return notice_count_; }
   const std::optional<BarrierOutcome>& barrier() const { return barrier_; }
   const std::string& goodbye_text() const { return goodbye_text_; }
@@ -126,7 +126,7 @@ class Replica final : public MessageSink {
   void apply_state(const proto::FrameState& message);
   void apply_participants(const proto::Participants& message);
   void apply_mark(const proto::MarkEvent& message, std::uint64_t arrival_ns);
-  void add_notice(ClaimNotice notice);
+  void add_notice(Notice notice);
   void apply_claim(const proto::ClaimEvent& message, std::uint64_t arrival_ns);
   bool decode_surface(const proto::SurfaceFrame& message);
   void accept_frame(const proto::SurfaceFrame& message, std::uint64_t arrival_ns);
@@ -156,7 +156,7 @@ class Replica final : public MessageSink {
   std::uint32_t surface_crc_ = 0;
   bool request_pending_ = false;  // a KeyframeRequest that could not be queued yet
   std::vector<Participant> participants_;
-  std::deque<ClaimNotice> notices_;
+  std::deque<Notice> notices_;
   std::uint64_t notice_count_ = 0;
   std::optional<BarrierOutcome> barrier_;
   bool barrier_answered_ = false;

@@ -109,7 +109,7 @@ inline bool is_refusal(ClaimOutcome outcome) {
   return outcome == ClaimOutcome::RefusedHeld || outcome == ClaimOutcome::RefusedNothingInReach;
 }
 
-struct ClaimNotice {
+struct Notice {
   Tick tick = 0;
   ToolSlot tool;
   scene::Verb verb = scene::Verb::None;

@@ -49,6 +49,7 @@ Result<Organ> load_organ(const std::string& spec) {
   if (spec == "lattice") return make_lattice();
   if (spec == "plate") return make_plate();
   if (spec == "stomach") return make_stomach();
+  if (spec == "chest") return make_chest();
   const std::filesystem::path path(spec);
   if (path.extension() == ".organ") return read_organ(path);
   if (path.extension() == ".msh") {
@@ -57,9 +58,10 @@ Result<Organ> load_organ(const std::string& spec) {
     for (const std::string& warning : imported->warnings) log::warn("{}: {}", spec, warning);
     return std::move(imported->organ);
   }
-  return Error{ErrorCode::BadFile, "organ '" + spec +
-                                       "' is neither liver, lattice, plate nor stomach, nor an "
-                                       ".organ or .msh file"};
+  return Error{ErrorCode::BadFile,
+               "organ '" + spec +
+                   "' is neither liver, lattice, plate, stomach nor chest, nor an "
+                   ".organ or .msh file"};
 }
 
 }  // namespace trocar::scene

@@ -45,12 +45,16 @@ struct Material {
   //   k = k0 (1 + (fibre_stiffness_ratio - 1) cos^2 a),
   //   rest length = length (1 - tension - fibre_tension cos^2 a)    (Nakao 2003 eq. 3);
   // tets accordingly (dynamics::stress_free_shape).
-  Vec3d fibre_direction{};  // of any length; zero: none
+  // Of any length; zero: none. Organ::fibre_directions go before it.
+  Vec3d fibre_direction{};
   double fibre_stiffness_ratio = 1;
   double tension = 0;
   double fibre_tension = 0;
   // A blade's work per area of wound, one side, J/m^2; about that of liver (Azar & Hayward 2008).
   double cut_energy_j_m2 = 150;
+  // Shear stress on each side of a blade that slides in it, Pa; of the order at which needles slide
+  // in liver (Okamura 2004: some 10 N per metre of one 1.65 mm thick).
+  double blade_friction_pa = 2000;
   // How far it can be stretched, length over length at rest, before it tears; 0: it never does.
   double tear_stretch = 0;
 

@@ -1,6 +1,7 @@
 #include "common/scene/organ.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "common/base/bytes.h"
@@ -11,6 +12,7 @@ namespace {
 
 constexpr double kMaxSize_m = 2.0;
 constexpr double kCentreTolerance_m = 1e-6;
+constexpr double kUnitTolerance = 1e-6;
 constexpr std::size_t kMaxTextBytes = 4096;
 constexpr std::size_t kMaxRegions = 1000;
 
@@ -48,7 +50,9 @@ Status check_material(const Organ& organ, const Material& m) {
         number("Poisson's ratio", m.poisson_ratio, 0, 0.4999),
         number("fibre stiffness ratio", m.fibre_stiffness_ratio, 0, 1000),
         number("tension", m.tension, 0, 0.9), number("fibre tension", m.fibre_tension, 0, 0.9),
+        number("tension and fibre tension together", m.tension + m.fibre_tension, 0, 0.9),
         number("cut energy (J/m^2)", m.cut_energy_j_m2, 0, 1e6),
+        number("blade friction (Pa)", m.blade_friction_pa, 0, 1e6),
         m.tear_stretch == 0 ? Status()
                             : number("tear stretch", m.tear_stretch, kLeastTearStretch, 100)})
     if (!s) return s;
@@ -96,6 +100,20 @@ Status check_stress_free(const Organ& organ) {
   for (std::size_t t = 0; t < organ.mesh.tets.size(); ++t)
     if (!(stress_free_volume(organ, t) > 0))
       return broken(organ, "tet " + std::to_string(t) + " has no volume free of stress");
+  return {};
+}
+
+Status check_fibres(const Organ& organ) {
+  const auto& fibres = organ.fibre_directions;
+  if (fibres.empty()) return {};
+  if (fibres.size() != organ.mesh.node_count())
+    return broken(organ, "has " + std::to_string(fibres.size()) + " directions of fibres for " +
+                             std::to_string(organ.mesh.node_count()) + " nodes");
+  for (std::size_t i = 0; i < fibres.size(); ++i)
+    if (!(length_squared(fibres[i]) == 0 ||
+          std::abs(length_squared(fibres[i]) - 1) <= 2 * kUnitTolerance))
+      return broken(organ, "direction of fibres of node " + std::to_string(i) +
+                               " is neither of length 1 nor zero");
   return {};
 }
 
@@ -149,8 +167,10 @@ std::vector<double> numbers_of(const Material& m) {
                               m.fibre_tension};
   // Organs from before there were these keep their hash.
   const Material usual;
-  if (m.cut_energy_j_m2 != usual.cut_energy_j_m2 || m.tear_stretch != usual.tear_stretch)
+  if (m.cut_energy_j_m2 != usual.cut_energy_j_m2 || m.tear_stretch != usual.tear_stretch ||
+      m.blade_friction_pa != usual.blade_friction_pa)
     numbers.insert(numbers.end(), {m.cut_energy_j_m2, m.tear_stretch});
+  if (m.blade_friction_pa != usual.blade_friction_pa) numbers.push_back(m.blade_friction_pa);
   return numbers;
 }
 
@@ -163,6 +183,21 @@ void hash_array(StateHasher& hasher, const std::vector<T>& values) {
 
 }  // namespace
 
+Vec3d sum_of_axes(std::span<const Vec3d> axes) {
+  const auto first =
+      std::ranges::find_if(axes, [](const Vec3d& a) { return length_squared(a) > 0; });
+  if (first == axes.end()) return {};
+  // Two sums: of four equal ones, three would be rounded.
+  std::array<Vec3d, 2> sums{};
+  for (std::size_t i = 0; i < axes.size(); ++i)
+    sums[i % 2] += dot(axes[i], *first) < 0 ? -axes[i] : axes[i];
+  return sums[0] + sums[1];
+}
+
+const Vec3d& fibres_in(const Material& material, const Vec3d& axis) {
+  return length_squared(axis) > 0 ? axis : material.fibre_direction;
+}
+
 // Isotropic spring network: with unit directions n spread evenly over the sphere, springs of total
 // k l^2 = S per unit volume store, under the affine strain e,
 //   W = 1/2 S <(n.e.n)^2> = 1/2 S/15 ((tr e)^2 + 2 e:e),
@@ -173,10 +208,12 @@ void hash_array(StateHasher& hasher, const std::vector<T>& values) {
 // makes S = c E 6, since a tet has six edges: c = 1. A mesh with directions that are not evenly
 // spread is stiffer along some axes (body-centred lattice: 7 % softer along the cube's axes), but
 // its average over all orientations, and its response to uniform compression, are exact.
-Spring spring_along(const Vec3d& along, const Material& own, std::span<const SpringTet> tets) {
+Spring spring_along(const Vec3d& along, const Material& own, const Vec3d& axis,
+                    std::span<const SpringTet> tets) {
   const double l_squared = length_squared(along);
-  const double fibre_squared = length_squared(own.fibre_direction);
-  const double d = dot(along, own.fibre_direction);
+  const Vec3d& fibres = fibres_in(own, axis);
+  const double fibre_squared = length_squared(fibres);
+  const double d = dot(along, fibres);
   const double cos_squared = fibre_squared > 0 ? d * d / (l_squared * fibre_squared) : 0;
   const double factor = 1 + (own.fibre_stiffness_ratio - 1) * cos_squared;
   Spring spring;
@@ -214,8 +251,11 @@ std::vector<Spring> springs_of(const Organ& organ) {
         if (std::ranges::find(mesh.tets[t.value], b) != mesh.tets[t.value].end())
           tets.push_back(
               {&material_at(organ, map.tets[t.value]), stress_free_volume(organ, t.value)});
-    springs.push_back(
-        spring_along(free[b.value] - free[a.value], material_at(organ, map.spring_pairs[e]), tets));
+    const auto& fibres = organ.fibre_directions;
+    const Vec3d axis =
+        fibres.empty() ? Vec3d{} : sum_of_axes(std::array{fibres[a.value], fibres[b.value]});
+    springs.push_back(spring_along(free[b.value] - free[a.value],
+                                   material_at(organ, map.spring_pairs[e]), axis, tets));
   }
   return springs;
 }
@@ -273,6 +313,7 @@ std::uint64_t organ_hash(const Organ& organ) {
   }
   hash_array(hasher, std::vector<Vec3d>{organ.gravity_m_s2});
   hash_array(hasher, organ.stress_free_positions_m);
+  if (!organ.fibre_directions.empty()) hash_array(hasher, organ.fibre_directions);
   return hasher.digest();
 }
 
@@ -290,6 +331,7 @@ Status validate(const Organ& organ) {
   if (auto s = check_nodes(organ); !s) return s;
   if (!is_finite(organ.source_offset_m)) return broken(organ, "source offset is not finite");
   if (auto s = check_stress_free(organ); !s) return s;
+  if (auto s = check_fibres(organ); !s) return s;
   if (auto s = check_regions(organ); !s) return s;
   if (auto s = validate(organ.depth_table); !s) return broken(organ, s.error().message);
   return check_material(organ, organ.material);

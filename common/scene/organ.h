@@ -28,6 +28,9 @@ struct Organ {
   // Where every node would be without gravity and tension, if the rest pose is in equilibrium with
   // them: then the organ does not sag when a session starts. Empty: the rest pose itself.
   std::vector<Vec3d> stress_free_positions_m;
+  // Per node the direction of its fibres, such as Langer's lines of skin: of length 1, either sign,
+  // or zero where Material::fibre_direction holds. Empty: it holds everywhere.
+  std::vector<Vec3d> fibre_directions;
   DepthTable depth_table;  // empty: not calibrated
 
   // Geometry from which energies measure strain.
@@ -46,6 +49,14 @@ struct MaterialMap {
 MaterialMap material_map(const Organ& organ);
 const Material& material_at(const Organ& organ, std::uint16_t index);
 
+// What an element's fibres are from those of its nodes: the sum of the axes, each with the sign
+// that is nearer to the first of them; zeros are left out. Nothing can cancel, for no part is
+// turned by more than a right angle from the first. Of equal ones exactly a multiple by a power of
+// two.
+Vec3d sum_of_axes(std::span<const Vec3d> axes);
+// `axis`, or the material's own direction where it is zero; of any length.
+const Vec3d& fibres_in(const Material& material, const Vec3d& axis);
+
 // Of one pair of mesh.spring_pairs(). SpringLaw::VolumeConsistent: k = sum over the tets at the
 // edge of E V / length^2, derived in the source; it gives Young's modulus E on average over
 // orientations, and Poisson's ratio 1/4, as every network of springs does. Edges of tets whose law
@@ -57,12 +68,14 @@ struct Spring {
 };
 std::vector<Spring> springs_of(const Organ& organ);
 // One of them. along: from the end with the lower index to the other, free of stress, m; own: the
-// material of the pair; tets: those at the edge in ascending order, none where links carry springs.
+// material of the pair; axis: the sum of its ends' fibres, or zero; tets: those at the edge in
+// ascending order, none where links carry springs.
 struct SpringTet {
   const Material* material = nullptr;
   double volume_m3 = 0;  // free of stress
 };
-Spring spring_along(const Vec3d& along, const Material& own, std::span<const SpringTet> tets);
+Spring spring_along(const Vec3d& along, const Material& own, const Vec3d& axis,
+                    std::span<const SpringTet> tets);
 
 // m_i = sum over tets k at node i of rho_k V_k / 4 (Nakao 2003 eq. 4). Needs tets.
 std::vector<double> lumped_masses(const Organ& organ);
@@ -70,8 +83,8 @@ std::vector<double> lumped_masses(const Organ& organ);
 // XXH3-64 over the organ's arrays (not over a file's bytes): names a mesh and material for files
 // and sessions that depend on it. Each array is preceded by its length (u64); in order: rest
 // positions, tets, links, boundary triangles, fixed nodes, node masses, the numbers of the
-// material, of each region with its nodes, gravity, stress-free positions. Name, source, source
-// offset and depth table are left out: they change no result.
+// material, of each region with its nodes, gravity, stress-free positions, directions of fibres if
+// there are any. Name, source, source offset and depth table are left out: they change no result.
 std::uint64_t organ_hash(const Organ& organ);
 
 // Validates mesh, sizes and ranges; the rest bounding box is centred on the origin and at most 2 m.

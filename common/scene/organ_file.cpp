@@ -14,11 +14,16 @@ namespace trocar::scene {
 namespace {
 
 constexpr std::string_view kMagic = "TROCARO1";
-constexpr std::uint32_t kVersion = 2;
+// An organ with directions of fibres is of a version that programs which would ignore them refuse.
+constexpr std::uint32_t kVersion = 3, kVersionWithoutFibres = 2;
 constexpr std::size_t kHeaderBytes = 24;
 constexpr std::uint64_t kMaxBodyBytes = std::uint64_t{512} << 20;
 constexpr std::size_t kUnpackStepBytes = std::size_t{1} << 20;
 constexpr int kCompressionLevel = 9;
+
+std::uint32_t version_of(const Organ& organ) {
+  return organ.fibre_directions.empty() ? kVersionWithoutFibres : kVersion;
+}
 
 Error bad(const std::string& what) {
   return {ErrorCode::BadFile, what};
@@ -58,6 +63,13 @@ Vec3d vector_at(const Numbers& field, int first) {
   return {field.Get(first), field.Get(first + 1), field.Get(first + 2)};
 }
 
+Status take_vectors(const char* what, const Numbers& field, std::vector<Vec3d>& out) {
+  if (field.size() % 3 != 0)
+    return bad("organ: " + std::string(what) + " must be three numbers a node");
+  for (int i = 0; i < field.size(); i += 3) out.push_back(vector_at(field, i));
+  return {};
+}
+
 void put_material(const Material& m, proto::Material& out) {
   out.set_density_kg_m3(m.density_kg_m3);
   out.set_spring_law(static_cast<std::uint32_t>(m.spring_law));
@@ -74,6 +86,7 @@ void put_material(const Material& m, proto::Material& out) {
   out.set_fibre_tension(m.fibre_tension);
   out.set_cut_energy_j_m2(m.cut_energy_j_m2);
   out.set_tear_stretch(m.tear_stretch);
+  out.set_blade_friction_pa(m.blade_friction_pa);
 }
 
 Status take_material(const proto::Material& in, Material& m) {
@@ -98,6 +111,7 @@ Status take_material(const proto::Material& in, Material& m) {
        .fibre_tension = in.fibre_tension(),
        .tear_stretch = in.tear_stretch()};
   if (in.has_cut_energy_j_m2()) m.cut_energy_j_m2 = in.cut_energy_j_m2();
+  if (in.has_blade_friction_pa()) m.blade_friction_pa = in.blade_friction_pa();
   if (in.fibre_direction_size() == 3) m.fibre_direction = vector_at(in.fibre_direction(), 0);
   return {};
 }
@@ -203,6 +217,7 @@ Bytes encode_organ(const Organ& organ) {
     put_vector(organ.gravity_m_s2, message.mutable_gravity_m_s2());
   for (const Vec3d& p : organ.stress_free_positions_m)
     put_vector(p, message.mutable_stress_free_position_m());
+  for (const Vec3d& f : organ.fibre_directions) put_vector(f, message.mutable_fibre_direction());
   if (!organ.depth_table.empty())
     put_depth_table(organ.depth_table, *message.mutable_depth_table());
   Bytes bytes(message.ByteSizeLong());
@@ -234,10 +249,14 @@ Result<Organ> decode_organ(BytesView bytes) {
   if (message.gravity_m_s2_size() != 0 && message.gravity_m_s2_size() != 3)
     return bad("organ: gravity must be three numbers");
   if (message.gravity_m_s2_size() == 3) organ.gravity_m_s2 = vector_at(message.gravity_m_s2(), 0);
-  const auto& free = message.stress_free_position_m();
-  if (free.size() % 3 != 0) return bad("organ: stress-free positions must be three numbers a node");
-  for (int i = 0; i < free.size(); i += 3)
-    organ.stress_free_positions_m.push_back(vector_at(free, i));
+  if (auto s = take_vectors("stress-free positions", message.stress_free_position_m(),
+                            organ.stress_free_positions_m);
+      !s)
+    return s.error();
+  if (auto s =
+          take_vectors("directions of fibres", message.fibre_direction(), organ.fibre_directions);
+      !s)
+    return s.error();
   if (message.has_depth_table()) organ.depth_table = take_depth_table(message.depth_table());
   if (auto s = validate(organ); !s) return s.error();
   return organ;
@@ -249,7 +268,7 @@ Bytes pack_organ(const Organ& organ) {
   Bytes header;
   ByteWriter writer(header);
   writer.put_bytes(bytes_of(kMagic));
-  writer.put(kVersion);
+  writer.put(version_of(organ));
   writer.put(static_cast<std::uint64_t>(body.size()));
   writer.put(crc32(body));
   TROCAR_ASSERT(header.size() == kHeaderBytes);
@@ -271,14 +290,19 @@ Result<Organ> unpack_organ(BytesView file) {
   if (magic.empty() || !std::ranges::equal(magic, bytes_of(kMagic)))
     return bad("is not an .organ file: make one with trocar-organ import");
   if (!reader.ok()) return bad("is cut off in its header");
-  if (version != kVersion)
-    return bad("has version " + std::to_string(version) + ", this program reads version " +
-               std::to_string(kVersion) + ": make or import it again");
+  if (version != kVersion && version != kVersionWithoutFibres)
+    return bad("has version " + std::to_string(version) + ", this program reads versions " +
+               std::to_string(kVersionWithoutFibres) + " and " + std::to_string(kVersion) +
+               ": make or import it again");
   if (length > kMaxBodyBytes) return bad("announces more than 512 MiB");
   const auto body = unpack(file.subspan(kHeaderBytes), length);
   if (!body) return body.error();
   if (crc32(*body) != crc) return bad("is damaged, its checksum does not fit");
-  return decode_organ(*body);
+  auto organ = decode_organ(*body);
+  if (organ.ok() && version_of(*organ) != version)
+    return bad("says version " + std::to_string(version) + ", but holds version " +
+               std::to_string(version_of(*organ)) + ": it is damaged");
+  return organ;
 }
 
 Status write_organ(const std::filesystem::path& path, const Organ& organ) {

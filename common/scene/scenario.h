@@ -54,7 +54,7 @@ struct MaterialChange {
   std::optional<bool> has_averaged_volume;
   std::optional<Vec3d> fibre_direction;
   std::optional<double> fibre_stiffness_ratio, tension, fibre_tension;
-  std::optional<double> cut_energy_j_m2, tear_stretch;
+  std::optional<double> cut_energy_j_m2, blade_friction_pa, tear_stretch;
 
   // Of the key with this name, or of the table if it is not in it.
   const Place& place_of(std::string_view key) const;

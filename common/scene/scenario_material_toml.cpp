@@ -25,6 +25,7 @@ void read_material_keys(TableReader& reader, MaterialChange& material) {
   material.tension = reader.number("tension", 0, 0.9);
   material.fibre_tension = reader.number("fibre_tension", 0, 0.9);
   material.cut_energy_j_m2 = reader.number("cut_energy_j_m2", 0, 1e6);
+  material.blade_friction_pa = reader.number("blade_friction_pa", 0, 1e6);
   material.tear_stretch = reader.number("tear_stretch", 0, 100);
   if (material.young_modulus_pa && material.spring_stiffness_n_m)
     reader.fail("young_modulus_pa", "and spring_stiffness_n_m exclude each other, remove one");

@@ -99,6 +99,7 @@ Status Resolver::change_material(const MaterialChange& change, const Organ& orga
   set(change.tension, m.tension);
   set(change.fibre_tension, m.fibre_tension);
   set(change.cut_energy_j_m2, m.cut_energy_j_m2);
+  set(change.blade_friction_pa, m.blade_friction_pa);
   set(change.tear_stretch, m.tear_stretch);
   if (m.tear_stretch > 0 && m.tear_stretch < scene::kLeastTearStretch)
     return wrong(change.place_of("tear_stretch"),
@@ -106,7 +107,7 @@ Status Resolver::change_material(const MaterialChange& change, const Organ& orga
                  "never tears");
   for (const char* key : {"fibre_stiffness_ratio", "fibre_tension"}) {
     const Place& place = change.place_of(key);
-    if (&place != &change.place && length(m.fibre_direction) == 0)
+    if (&place != &change.place && length(m.fibre_direction) == 0 && organ.fibre_directions.empty())
       return wrong(place, "needs a fibre_direction");
   }
   if (m.tension + m.fibre_tension > 0.9)

@@ -60,7 +60,8 @@ Result<std::optional<ServerOptions>> parse_command_line(int argc, char** argv) {
   app.footer(kExamples);
   app.set_version_flag("--version", version_text());
   app.add_option("--organ", options.organ,
-                 "built-in organ (liver, lattice, plate, stomach), an .organ file or a .msh mesh")
+                 "built-in organ (liver, lattice, plate, stomach, chest), an .organ file or a .msh "
+                 "mesh")
       ->type_name("NAME|FILE")
       ->capture_default_str();
   app.add_option("--listen", listen, "where to listen; port 0 takes any free one")

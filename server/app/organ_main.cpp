@@ -13,6 +13,7 @@
 #include "common/base/log.h"
 #include "common/base/version.h"
 #include "common/scene/builtin_organs.h"
+#include "common/scene/fibre_rule.h"
 #include "common/scene/load_organ.h"
 #include "common/scene/organ_file.h"
 #include "server/app/organ_calibrate.h"
@@ -36,6 +37,8 @@ Examples:
       a hollow one, its wall two tets thick or more, into stomach.organ
   trocar-organ make liver --tension 0.05 --tear-stretch 1.5 --out friable.organ
       one whose wounds gape, and which tears when it is pulled half as long again
+  trocar-organ make stomach --fibres around:y --fibre-tension 0.08
+      fibres around its height: a wound along its length gapes, one around it hardly
   trocar-organ import spleen.msh --unit mm --fix back:0.1
       a mesh in millimetres, held at the hindmost tenth, into spleen.organ
   trocar-organ inspect spleen.organ --json
@@ -54,7 +57,9 @@ struct Options {
   std::string log_level = "info";
   std::string made_name;
   std::optional<int> tets;
-  std::optional<double> tension, tear_stretch, cut_energy_j_m2;
+  std::optional<double> tension, tear_stretch, cut_energy_j_m2, blade_friction_pa;
+  std::optional<double> fibre_tension, fibre_stiffness_ratio;
+  std::string fibres;
   std::string out;
   std::string import_file;
   std::string unit = "m";
@@ -126,6 +131,20 @@ const char* name_of(scene::ElasticLaw law) {
   return "";
 }
 
+std::size_t nodes_with_fibres(const scene::Organ& organ) {
+  return static_cast<std::size_t>(
+      std::ranges::count_if(organ.fibre_directions, [](const Vec3d& f) { return f != Vec3d{}; }));
+}
+
+void print_fibres(const scene::Material& m) {
+  if (length(m.fibre_direction) > 0)
+    std::printf("  fibres              along %.3g %.3g %.3g\n", m.fibre_direction.x,
+                m.fibre_direction.y, m.fibre_direction.z);
+  if (m.fibre_stiffness_ratio != 1 || m.fibre_tension != 0)
+    std::printf("  along fibres        %.4g times as stiff, tension %.4g\n",
+                m.fibre_stiffness_ratio, m.fibre_tension);
+}
+
 void print_material(const scene::Material& m) {
   if (m.elastic_law != scene::ElasticLaw::Springs)
     std::printf("  elasticity          %s, Young's modulus %.4g kPa, Poisson's ratio %.4g%s\n",
@@ -135,12 +154,10 @@ void print_material(const scene::Material& m) {
     std::printf("  springs             constant, %.4g N/m\n", m.spring_stiffness_n_m);
   else
     std::printf("  springs             from Young's modulus %.4g kPa\n", m.young_modulus_pa / 1e3);
-  if (length(m.fibre_direction) > 0)
-    std::printf("  fibres              along %.3g %.3g %.3g, %.4g times as stiff, tension %.4g\n",
-                m.fibre_direction.x, m.fibre_direction.y, m.fibre_direction.z,
-                m.fibre_stiffness_ratio, m.fibre_tension);
+  print_fibres(m);
   if (m.tension > 0) std::printf("  tension             %.4g\n", m.tension);
-  std::printf("  cutting             %.4g J/m^2 of wound\n", m.cut_energy_j_m2);
+  std::printf("  cutting             %.4g J/m^2 of wound, %.4g kPa on the blade's sides\n",
+              m.cut_energy_j_m2, m.blade_friction_pa / 1e3);
   if (m.tear_stretch > 0)
     std::printf("  tears               at %.4g times its length\n", m.tear_stretch);
   std::printf("  density             %.4g kg/m^3\n", m.density_kg_m3);
@@ -150,6 +167,8 @@ void print_material(const scene::Material& m) {
 
 void print_materials(const scene::Organ& organ) {
   print_material(organ.material);
+  if (!organ.fibre_directions.empty())
+    std::printf("  directed fibres     at %s nodes\n", grouped(nodes_with_fibres(organ)).c_str());
   for (const auto& region : organ.regions) {
     std::printf("  region              %s, %s nodes:\n", region.name.c_str(),
                 grouped(region.nodes.size()).c_str());
@@ -208,11 +227,29 @@ std::string quoted(const std::string& text) {
   return out + "\"";
 }
 
+void print_json(const scene::Material& m) {
+  std::printf("  \"elastic_law\": \"%s\",\n  \"poisson_ratio\": %.9g,\n", name_of(m.elastic_law),
+              m.poisson_ratio);
+  std::printf("  \"spring_law\": \"%s\",\n  \"spring_stiffness_n_m\": %.9g,\n",
+              m.spring_law == scene::SpringLaw::Constant ? "constant" : "volume_consistent",
+              m.spring_stiffness_n_m);
+  std::printf("  \"young_modulus_pa\": %.9g,\n  \"density_kg_m3\": %.9g,\n", m.young_modulus_pa,
+              m.density_kg_m3);
+  std::printf("  \"node_damping_per_s\": %.9g,\n  \"spring_damping_time_s\": %.9g,\n",
+              m.node_damping_per_s, m.spring_damping_time_s);
+  std::printf("  \"fibre_direction\": [%.9g, %.9g, %.9g],\n  \"fibre_stiffness_ratio\": %.9g,\n",
+              m.fibre_direction.x, m.fibre_direction.y, m.fibre_direction.z,
+              m.fibre_stiffness_ratio);
+  std::printf("  \"fibre_tension\": %.9g,\n  \"tension\": %.9g,\n", m.fibre_tension, m.tension);
+  std::printf(
+      "  \"cut_energy_j_m2\": %.9g,\n  \"blade_friction_pa\": %.9g,\n  \"tear_stretch\": %.9g,\n",
+      m.cut_energy_j_m2, m.blade_friction_pa, m.tear_stretch);
+}
+
 void print_json(const scene::Organ& organ) {
   const mesh::TetMesh& mesh = organ.mesh;
   const Vec3d size = size_mm(mesh);
   const EdgeLengths edges = edge_lengths(mesh);
-  const scene::Material& m = organ.material;
   std::printf("{\n  \"name\": %s,\n  \"source\": %s,\n", quoted(organ.name).c_str(),
               quoted(organ.source).c_str());
   std::printf("  \"nodes\": %zu,\n  \"surface_nodes\": %zu,\n  \"tets\": %zu,\n", mesh.node_count(),
@@ -230,18 +267,11 @@ void print_json(const scene::Organ& organ) {
     std::printf("  \"dihedral_deg\": {\"min\": %.6g, \"max\": %.6g},\n", angles.min_deg,
                 angles.max_deg);
   }
-  std::printf("  \"elastic_law\": \"%s\",\n  \"poisson_ratio\": %.9g,\n", name_of(m.elastic_law),
-              m.poisson_ratio);
+  print_json(organ.material);
+  std::printf("  \"fibre_nodes\": %zu,\n", nodes_with_fibres(organ));
   std::printf("  \"regions\": %zu,\n  \"gravity_m_s2\": [%.9g, %.9g, %.9g],\n  \"settled\": %s,\n",
               organ.regions.size(), organ.gravity_m_s2.x, organ.gravity_m_s2.y,
               organ.gravity_m_s2.z, organ.stress_free_positions_m.empty() ? "false" : "true");
-  std::printf("  \"spring_law\": \"%s\",\n  \"spring_stiffness_n_m\": %.9g,\n",
-              m.spring_law == scene::SpringLaw::Constant ? "constant" : "volume_consistent",
-              m.spring_stiffness_n_m);
-  std::printf("  \"young_modulus_pa\": %.9g,\n  \"density_kg_m3\": %.9g,\n", m.young_modulus_pa,
-              m.density_kg_m3);
-  std::printf("  \"node_damping_per_s\": %.9g,\n  \"spring_damping_time_s\": %.9g,\n",
-              m.node_damping_per_s, m.spring_damping_time_s);
   std::printf("  \"source_offset_m\": [%.9g, %.9g, %.9g],\n", organ.source_offset_m.x,
               organ.source_offset_m.y, organ.source_offset_m.z);
   std::printf("  \"fixed_nodes\": %zu,\n  \"hash\": \"%016" PRIx64 "\"\n}\n",
@@ -263,10 +293,10 @@ Result<scene::Organ> make_named(const std::string& name, const std::optional<int
       return Error{ErrorCode::Usage, "make lattice: --tets does not apply, a lattice has none"};
     return scene::make_lattice();
   }
-  if (name == "plate") {
+  if (name == "plate" || name == "chest") {
     if (tets)
-      return Error{ErrorCode::Usage, "make plate: --tets does not apply, its mesh is given"};
-    return scene::make_plate();
+      return Error{ErrorCode::Usage, "make " + name + ": --tets does not apply, its mesh is given"};
+    return name == "plate" ? scene::make_plate() : scene::make_chest();
   }
   if (tets.value_or(0) >= kManyTets)
     std::fprintf(stderr, "%s: meshing a %s of about %s tets, this takes some seconds\n", kProgram,
@@ -275,18 +305,46 @@ Result<scene::Organ> make_named(const std::string& name, const std::optional<int
   return scene::make_liver(tets.value_or(scene::kDefaultLiverTets));
 }
 
-Status change_material(const Options& options, scene::Organ& organ) {
+Status add_fibres(const Options& options, scene::Organ& organ) {
+  if (!options.fibres.empty()) {
+    const auto rule = scene::parse_fibre_rule(options.fibres);
+    if (!rule) return rule.error();
+    auto directions = scene::fibre_directions_by(*rule, organ.mesh);
+    if (!directions) return directions.error();
+    organ.fibre_directions = std::move(*directions);
+  } else if (options.fibre_tension || options.fibre_stiffness_ratio) {
+    return Error{ErrorCode::Usage,
+                 "--fibre-tension, --fibre-stiffness: need --fibres, which says "
+                 "where the fibres run"};
+  }
+  if (options.fibre_stiffness_ratio && organ.material.elastic_law != scene::ElasticLaw::Springs)
+    return Error{ErrorCode::Usage, "--fibre-stiffness: is of springs, this organ is of " +
+                                       std::string(name_of(organ.material.elastic_law)) + " tets"};
+  return {};
+}
+
+Status change_organ(const Options& options, scene::Organ& organ) {
+  if (auto added = add_fibres(options, organ); !added) return added;
+  if (options.tear_stretch.value_or(0) > 0 &&
+      (organ.mesh.tets.empty() || !organ.mesh.links.empty()))
+    return Error{ErrorCode::Usage,
+                 "--tear-stretch: does not apply, organs of links do not tear, "
+                 "only those of tets alone"};
   auto& material = organ.material;
-  material.tension = options.tension.value_or(material.tension);
-  material.tear_stretch = options.tear_stretch.value_or(material.tear_stretch);
-  material.cut_energy_j_m2 = options.cut_energy_j_m2.value_or(material.cut_energy_j_m2);
+  const auto set = [](const std::optional<double>& from, double& to) { to = from.value_or(to); };
+  set(options.tension, material.tension);
+  set(options.fibre_tension, material.fibre_tension);
+  set(options.fibre_stiffness_ratio, material.fibre_stiffness_ratio);
+  set(options.tear_stretch, material.tear_stretch);
+  set(options.cut_energy_j_m2, material.cut_energy_j_m2);
+  set(options.blade_friction_pa, material.blade_friction_pa);
   return scene::validate(organ);
 }
 
 Status run_make(const Options& options) {
   auto organ = make_named(options.made_name, options.tets);
   if (!organ) return organ.error();
-  if (auto changed = change_material(options, *organ); !changed) return changed;
+  if (auto changed = change_organ(options, *organ); !changed) return changed;
   return save(*organ, options.out.empty() ? options.made_name + ".organ" : options.out);
 }
 
@@ -305,7 +363,7 @@ Status run_import(const Options& options) {
                  options.import_file.c_str(), grouped(bytes / 1'000'000).c_str());
   auto imported = scene::import_organ(path, import_options);
   if (!imported) return imported.error();
-  if (auto changed = change_material(options, imported->organ); !changed) return changed;
+  if (auto changed = change_organ(options, imported->organ); !changed) return changed;
   for (const std::string& warning : imported->warnings)
     std::fprintf(stderr, "%s: warning: %s: %s\n", kProgram, options.import_file.c_str(),
                  warning.c_str());
@@ -329,11 +387,12 @@ std::string version_text() {
 
 void add_commands(CLI::App& app, Options& options) {
   auto* make = app.add_subcommand("make", "make a built-in organ");
-  make->add_option(
-          "NAME", options.made_name,
-          "liver, stomach, lattice (Choi's 30 x 15 x 30 nodes) or plate (Nakao's 16 x 16 x 0.4 cm)")
+  make->add_option("NAME", options.made_name,
+                   "liver, stomach, lattice (Choi's 30 x 15 x 30 nodes), plate (Nakao's 16 x 16 x "
+                   "0.4 cm) or "
+                   "chest (wall and heart, the size of Nakao's)")
       ->required()
-      ->check(CLI::IsMember({"liver", "stomach", "lattice", "plate"}));
+      ->check(CLI::IsMember({"liver", "stomach", "lattice", "plate", "chest"}));
   const auto range = [](int low, int high, int usual) {
     return std::to_string(low) + " to " + std::to_string(high) + " [" + std::to_string(usual) + "]";
   };
@@ -375,6 +434,23 @@ void add_commands(CLI::App& app, Options& options) {
         ->type_name("RATIO");
     command->add_option("--cut-energy", options.cut_energy_j_m2, "of a wound, J/m^2 [150]")
         ->type_name("E");
+    command
+        ->add_option("--blade-friction", options.blade_friction_pa,
+                     "shear stress on each side of a blade, Pa [2000]")
+        ->type_name("TAU");
+    command
+        ->add_option("--fibres", options.fibres,
+                     "where fibres run: x, y or z; around:x, around:y or around:z; or a .csv file "
+                     "with id,x,y,z for every node")
+        ->type_name("RULE");
+    command
+        ->add_option("--fibre-tension", options.fibre_tension,
+                     "tissue would be shorter along its fibres by this part, too [0]")
+        ->type_name("PART");
+    command
+        ->add_option("--fibre-stiffness", options.fibre_stiffness_ratio,
+                     "springs are so many times as stiff along the fibres [1]")
+        ->type_name("RATIO");
   }
   add_fit_command(app, options.fit);
   add_settle_command(app, options.settle);

@@ -13,6 +13,7 @@
 #include "common/base/log.h"
 #include "common/base/timing.h"
 #include "common/base/version.h"
+#include "common/scene/any_material.h"
 #include "server/scenario/field_files.h"
 #include "server/scenario/probe_file.h"
 #include "server/scenario/probe_plots.h"
@@ -168,6 +169,11 @@ Status run_scenario(const Options& options) {
   auto resolved = scene::resolve(std::move(*parsed));
   if (!resolved) return resolved.error();
   if (auto s = scenario::check_supported(*resolved); !s) return s;
+  if (scene::any_material(resolved->organ,
+                          [](const scene::Material& m) { return m.tear_stretch > 0; }))
+    std::fprintf(
+        stderr, "%s: warning: %s: tear_stretch is left out, so far tissue tears in sessions only\n",
+        kProgram, resolved->scenario.source.c_str());
   std::error_code failed;
   std::filesystem::create_directories(folder, failed);
   if (failed)

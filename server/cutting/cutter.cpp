@@ -135,6 +135,14 @@ void Cutter::cut(std::span<const Vec3f> displacements, CutOutput& out, double tr
   mesh_.end();
 }
 
+double Cutter::friction_along(std::span<const Vec3f> displacements, double travel_m,
+                              const Vec3d& from, const Vec3d& to) {
+  mesh_.begin(displacements, travel_m, unchanged_);
+  const double friction = friction_.along(mesh_, from, to);
+  mesh_.end();
+  return friction;
+}
+
 // Returns whether nothing is left.
 bool Cutter::work(Stroke& stroke, std::uint32_t& budget) {
   while (stroke.motion.has_strip()) {

@@ -20,6 +20,7 @@
 // began. Not for organs with links. One writer; the topology is edited by nobody else between
 // construction and destruction, except that tets and nodes may be removed while no stroke is on.
 
+#include "server/cutting/blade_friction.h"
 #include "server/cutting/nakao_splitter.h"
 #include "server/cutting/opening.h"
 #include "server/cutting/repair.h"
@@ -46,6 +47,10 @@ class Cutter {
   // travel_m: a sum over ticks of the farthest that any node has moved, by which only what is near
   // the blades is looked at; the edits are the same without it.
   void cut(std::span<const Vec3f> displacements, CutOutput& out, double travel_m = kUnknownTravel);
+
+  // What BladeFriction says of a line in tissue as it is now, N/m; as cut(), which it may precede.
+  double friction_along(std::span<const Vec3f> displacements, double travel_m, const Vec3d& from,
+                        const Vec3d& to);
 
   // Does what another cutter did to the same topology: all its events, of all its calls, in order;
   // with no stroke on. What is wrong is refused; what comes before it has been done. made: the
@@ -84,6 +89,8 @@ class Cutter {
   NakaoSplitter nakao_splitter_;
   Opening opening_;
   Repair repair_;
+  BladeFriction friction_;
+  CutOutput unchanged_;                              // of calls that cut nothing
   std::array<std::uint32_t, kMaxBlades> stroke_of_;  // place in strokes_, or kNone
   std::uint32_t next_id_ = 0;
   std::vector<std::uint32_t> order_;  // places in strokes_ of some, by id

@@ -15,10 +15,19 @@ Error mismatch(std::size_t event, const char* what) {
 void replace_node(dynamics::Topology& topology, TetIndex place, NodeIndex old, NodeIndex node) {
   auto tet = topology.tet(place);
   const auto wound = topology.wound_faces(place);
+  const auto axis = topology.fibre_axis(place);
   tet[corner_of(tet, old)] = node;
   topology.remove_tet(place);
   topology.put_tet(place, tet);
+  topology.set_fibre_axis(place, axis);
   topology.mark_wound_faces(place, wound);
+}
+
+// Where one end has none, that of the other. Not made as long as they are: it is exactly theirs
+// where they are equal.
+Vec3d axis_along(const Vec3d& a, const Vec3d& b, std::uint16_t t) {
+  if (length_squared(a) == 0 || length_squared(b) == 0) return a + b;
+  return along(a, dot(a, b) < 0 ? -b : b, t);
 }
 
 std::uint8_t bit(std::uint8_t corner) {
@@ -156,6 +165,7 @@ NodeIndex split_edge(dynamics::Topology& topology, Places& places, NodeIndex a, 
     return along(positions[a.value], positions[b.value], t);
   };
   topology.put_node(node, middle(topology.rest()), middle(topology.stress_free()), regions);
+  topology.set_fibre_axis(node, axis_along(topology.fibre_axis(a), topology.fibre_axis(b), t));
   children.clear();
   for (const auto parent : ring) {
     // The face between the two is inside: of the old one opposite to a, of the new one to b.
@@ -167,6 +177,7 @@ NodeIndex split_edge(dynamics::Topology& topology, Places& places, NodeIndex a, 
     clear_wound(topology, parent, corner_a);
     const auto place = places.take_tet(topology);
     topology.put_tet(place, child);
+    topology.set_fibre_axis(place, topology.fibre_axis(parent));
     topology.mark_wound_faces(place, wound);
     clear_wound(topology, place, corner_b);
     children.push_back({parent, place});
@@ -194,6 +205,7 @@ void part(dynamics::Topology& topology, Places& places, std::span<const Star> st
       const auto rest = topology.rest()[star.node.value];
       const auto stress_free = topology.stress_free()[star.node.value];
       topology.put_node(copy, rest, stress_free, own);
+      topology.set_fibre_axis(copy, topology.fibre_axis(star.node));
       for (std::size_t k = 0; k < star.tets.size(); ++k)
         if (star.components[k] == c) replace_node(topology, star.tets[k], star.node, copy);
       copies.push_back({star.node, copy});

@@ -119,7 +119,7 @@ void Hyperelastic<Law>::find_tets(const Topology& topology, NodeIndex node,
     if (!is_ours_[material]) continue;
     const auto [c10, bulk] = parameters_[material];
     const auto tet = seen_from(topology.tet(t), node);
-    out.push_back({tet, c10, bulk, stress_free_shape(topology, tet, material)});
+    out.push_back({tet, c10, bulk, stress_free_shape(topology, t, tet)});
   }
 }
 
@@ -131,7 +131,7 @@ void Hyperelastic<Law>::set_star(const Topology& topology, NodeIndex node, Slot 
     for (const auto t : topology.tets_of(node)) {
       const auto material = topology.material_of(t);
       if (!is_ours_[material]) continue;
-      const double v = stress_free_shape(topology, topology.tet(t), material).volume;
+      const double v = stress_free_shape(topology, t, topology.tet(t)).volume;
       volume += v;
       bulk += v * parameters_[material].bulk_modulus_pa;
       change += tet_shape(topology.rest(), topology.tet(t)).volume - v;

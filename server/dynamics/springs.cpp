@@ -58,9 +58,9 @@ void Springs::find_springs(const Topology& topology, NodeIndex node, std::vector
   const auto free = topology.stress_free();
   const auto add = [&](NodeIndex other) {
     const auto [a, b] = std::minmax(node, other);
-    const auto spring =
-        scene::spring_along(free[b.value] - free[a.value],
-                            scene::material_at(organ, topology.material_of(a, b)), tets_);
+    const auto spring = scene::spring_along(free[b.value] - free[a.value],
+                                            scene::material_at(organ, topology.material_of(a, b)),
+                                            topology.fibre_axis(a, b), tets_);
     if (spring.stiffness_n_m != 0 || spring.damping_n_s_m != 0) out.push_back({other, spring});
   };
   tets_.clear();

@@ -35,19 +35,21 @@ namespace {
 struct Tension {
   double isotropic_pa = 0, mu_pa = 0, energy_pa = 0;
   const scene::Material& material;
+  Vec3d fibres;
 
   Vec3d stress_on(const Vec3d& v) const {
-    return v * isotropic_pa + (v - relaxed(material, v)) * (2 * mu_pa);
+    return v * isotropic_pa + (v - relaxed(material, fibres, v)) * (2 * mu_pa);
   }
 };
 
-Tension tension_of(const scene::Material& material, const scene::LameParameters& lame) {
+Tension tension_of(const scene::Material& material, const Vec3d& fibres,
+                   const scene::LameParameters& lame) {
   const double all = material.tension;
-  const double fibres = length_squared(material.fibre_direction) > 0 ? material.fibre_tension : 0;
-  const double trace = 3 * all + fibres;
-  const double squared = 3 * all * all + 2 * all * fibres + fibres * fibres;
+  const double along = length_squared(fibres) > 0 ? material.fibre_tension : 0;
+  const double trace = 3 * all + along;
+  const double squared = 3 * all * all + 2 * all * along + along * along;
   return {lame.lambda_pa * trace, lame.mu_pa,
-          0.5 * lame.lambda_pa * trace * trace + lame.mu_pa * squared, material};
+          0.5 * lame.lambda_pa * trace * trace + lame.mu_pa * squared, material, fibres};
 }
 
 }  // namespace
@@ -91,7 +93,8 @@ void TensorMass::find_edges(const Topology& topology, NodeIndex node, Node& out)
       found->k.add(k, 1);
       gradient += k * (strain_of_rest(tet[j]) - strain_of_rest(node));
     }
-    const auto tension = tension_of(material, lame);
+    const auto tension =
+        tension_of(material, scene::fibres_in(material, topology.fibre_axis(t)), lame);
     const Vec3d pull = tension.stress_on(shape.gradients[i]) * shape.volume;
     out.gradient_n += gradient + pull;
     out.energy_j += 0.5 * dot(strain_of_rest(node), gradient) + dot(strain_of_rest(node), pull) +

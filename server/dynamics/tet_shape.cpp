@@ -17,28 +17,29 @@ TetShape tet_shape(std::span<const Vec3d> positions, const mesh::Tet& tet) {
 
 namespace {
 
-// f (f . v), for fibres of any length.
-Vec3d along_fibres(const scene::Material& material, const Vec3d& v) {
-  const auto& f = material.fibre_direction;
-  const double squared = length_squared(f);
-  return squared > 0 ? f * (dot(f, v) / squared) : Vec3d{};
+// f (f . v) for f of length 1; fibres: of any.
+Vec3d along_fibres(const Vec3d& fibres, const Vec3d& v) {
+  const double squared = length_squared(fibres);
+  return squared > 0 ? fibres * (dot(fibres, v) / squared) : Vec3d{};
 }
 
 }  // namespace
 
-Vec3d relaxed(const scene::Material& material, const Vec3d& vector) {
-  return vector * (1 - material.tension) - along_fibres(material, vector) * material.fibre_tension;
+Vec3d relaxed(const scene::Material& material, const Vec3d& fibres, const Vec3d& vector) {
+  return vector * (1 - material.tension) - along_fibres(fibres, vector) * material.fibre_tension;
 }
 
 // Gradients go by the inverse of the stretch (Sherman and Morrison's formula).
-TetShape stress_free_shape(const Topology& topology, const mesh::Tet& tet, std::uint16_t material) {
-  auto shape = tet_shape(topology.stress_free(), tet);
-  const auto& m = scene::material_at(topology.organ(), material);
-  const double fibre_tension = length_squared(m.fibre_direction) > 0 ? m.fibre_tension : 0;
+TetShape stress_free_shape(const Topology& topology, TetIndex tet, const mesh::Tet& corners) {
+  auto shape = tet_shape(topology.stress_free(), corners);
+  const auto& m = scene::material_at(topology.organ(), topology.material_of(tet));
+  const Vec3d fibres = scene::fibres_in(m, topology.fibre_axis(tet));
+  const double fibre_tension = length_squared(fibres) > 0 ? m.fibre_tension : 0;
   if (m.tension == 0 && fibre_tension == 0) return shape;
   const double across = 1 - m.tension, along = across - fibre_tension;
   shape.volume *= across * across * along;
-  for (auto& g : shape.gradients) g = (g + along_fibres(m, g) * (fibre_tension / along)) / across;
+  for (auto& g : shape.gradients)
+    g = (g + along_fibres(fibres, g) * (fibre_tension / along)) / across;
   return shape;
 }
 

@@ -14,12 +14,13 @@ struct TetShape {
 };
 TetShape tet_shape(std::span<const Vec3d> positions, const mesh::Tet& tet);
 
-// Of the shape in which tissue of a material, as scene::material_at() counts, is free of stress
-// once a tet is on its own: the topology's, stretched by
+// Of the shape in which tissue is free of stress once a tet is on its own: the topology's,
+// stretched by
 //   A = (1 - tension) I - fibre_tension f f^T,   f the fibres' direction,
 // so that lengths are to first order those of springs under the same tension (Nakao 2003 eq. 3).
-TetShape stress_free_shape(const Topology& topology, const mesh::Tet& tet, std::uint16_t material);
-// A times a vector.
-Vec3d relaxed(const scene::Material& material, const Vec3d& vector);
+// corners: the tet's nodes in any order of the same orientation, that of the gradients.
+TetShape stress_free_shape(const Topology& topology, TetIndex tet, const mesh::Tet& corners);
+// A times a vector; fibres: of any length, zero: none.
+Vec3d relaxed(const scene::Material& material, const Vec3d& fibres, const Vec3d& vector);
 
 }  // namespace trocar::dynamics

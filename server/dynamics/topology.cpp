@@ -40,8 +40,10 @@ void assign(Blocks<T>& lists, NodeIndex node, std::span<const T> items) {
 Topology::Topology(const scene::Organ& organ)
     : organ_(organ),
       has_links_(!organ.mesh.links.empty()),
+      has_fibre_axes_(!organ.fibre_directions.empty()),
       rest_(organ.mesh.rest_positions),
       stress_free_(organ.stress_free()),
+      node_axes_(organ.fibre_directions),
       tets_(organ.mesh.tets),
       tet_materials_(scene::material_map(organ).tets),
       wound_faces_(organ.mesh.tets.size()),
@@ -68,6 +70,8 @@ Topology::Topology(const scene::Organ& organ)
   node_tets_.end_building();
   node_links_.end_building();
   node_regions_.end_building();
+  if (has_fibre_axes_)
+    for (const auto& tet : tets_) tet_axes_.push_back(sum_of_axes(tet));
   for (std::size_t r = 0; r < organ.regions.size(); ++r)
     for (const auto node : organ.regions[r].nodes)
       insert(node_regions_, node, static_cast<std::uint16_t>(r));
@@ -98,6 +102,24 @@ std::uint16_t Topology::material_of(NodeIndex a, NodeIndex b) const {
   return material_of_all(std::array{a, b});
 }
 
+Vec3d Topology::sum_of_axes(const mesh::Tet& tet) const {
+  std::array<Vec3d, 4> axes;
+  for (std::size_t i = 0; i < 4; ++i) axes[i] = node_axes_[tet[i].value];
+  return scene::sum_of_axes(axes);
+}
+
+Vec3d Topology::fibre_axis(NodeIndex a, NodeIndex b) const {
+  return has_fibre_axes_ ? scene::sum_of_axes(std::array{node_axes_[a.value], node_axes_[b.value]})
+                         : Vec3d{};
+}
+
+void Topology::set_fibre_axis(NodeIndex node, const Vec3d& axis) {
+  if (has_fibre_axes_) node_axes_[node.value] = axis;
+}
+void Topology::set_fibre_axis(TetIndex tet, const Vec3d& axis) {
+  if (has_fibre_axes_) tet_axes_[tet.value] = axis;
+}
+
 double Topology::lumped_mass(NodeIndex node) const {
   double mass = 0;
   for (const auto t : tets_of(node))
@@ -112,6 +134,7 @@ void Topology::put_node(NodeIndex place, const Vec3d& rest, const Vec3d& stress_
   if (place.value == node_count()) {
     rest_.emplace_back();
     stress_free_.emplace_back();
+    if (has_fibre_axes_) node_axes_.emplace_back();
     has_node_.push_back(0);
     is_changed_.push_back(0);
     node_tets_.extend(node_count());
@@ -121,6 +144,7 @@ void Topology::put_node(NodeIndex place, const Vec3d& rest, const Vec3d& stress_
   TROCAR_ASSERT(!has_node(place));
   rest_[place.value] = rest;
   stress_free_[place.value] = stress_free;
+  set_fibre_axis(place, {});
   has_node_[place.value] = 1;
   assign(node_regions_, place, regions);
   mark(place);
@@ -147,11 +171,13 @@ void Topology::put_tet(TetIndex place, const mesh::Tet& tet) {
     tets_.emplace_back();
     tet_materials_.push_back(0);
     wound_faces_.push_back(0);
+    if (has_fibre_axes_) tet_axes_.emplace_back();
   }
   TROCAR_ASSERT(!has_tet(place));
   tets_[place.value] = tet;
   tet_materials_[place.value] = material_of_all(tet);
   wound_faces_[place.value] = 0;
+  if (has_fibre_axes_) tet_axes_[place.value] = sum_of_axes(tet);
   for (const auto node : tet) {
     TROCAR_ASSERT(has_node(node));
     insert(node_tets_, node, place);

@@ -61,6 +61,16 @@ class Topology {
   // Nakao 2003 eq. 4, kg.
   double lumped_mass(NodeIndex node) const;
 
+  // Directions of fibres as scene::Organ::fibre_directions, of a node; of a tet or a spring the
+  // sum of its nodes' (scene::sum_of_axes), or what the tet was given. Zero: the material's.
+  Vec3d fibre_axis(NodeIndex node) const { return axis_at(node_axes_, node.value); }
+  Vec3d fibre_axis(TetIndex tet) const { return axis_at(tet_axes_, tet.value); }
+  Vec3d fibre_axis(NodeIndex a, NodeIndex b) const;
+  // After put_node() and put_tet(): a part of a tet keeps the direction of the whole, so that a
+  // split changes neither forces nor energy. Nothing where the organ has no directions.
+  void set_fibre_axis(NodeIndex node, const Vec3d& axis);
+  void set_fibre_axis(TetIndex tet, const Vec3d& axis);
+
   // A node at a place without one. Nothing meets at it yet.
   void put_node(NodeIndex place, const Vec3d& rest, const Vec3d& stress_free,
                 std::span<const std::uint16_t> regions);
@@ -83,13 +93,19 @@ class Topology {
   void clear_changes();
 
  private:
+  static Vec3d axis_at(const std::vector<Vec3d>& axes, std::uint32_t place) {
+    return axes.empty() ? Vec3d{} : axes[place];
+  }
+  Vec3d sum_of_axes(const mesh::Tet& tet) const;
   std::uint16_t material_of_all(std::span<const NodeIndex> nodes) const;
   void mark(NodeIndex node);
 
   const scene::Organ& organ_;
   const bool has_links_;
+  const bool has_fibre_axes_;
   std::vector<Vec3d> rest_, stress_free_;
-  std::vector<mesh::Tet> tets_;  // invalid nodes where there is none
+  std::vector<Vec3d> node_axes_, tet_axes_;  // empty unless has_fibre_axes_
+  std::vector<mesh::Tet> tets_;              // invalid nodes where there is none
   std::vector<std::uint16_t> tet_materials_;
   std::vector<std::uint8_t> wound_faces_;  // per tet
   std::vector<std::uint8_t> has_node_, is_changed_;

@@ -26,7 +26,7 @@ Error wrong(const scene::ResolvedScenario& resolved, const std::string& what) {
 }
 
 // A key that changes nothing cannot be fitted.
-std::string why_not(const Tunable& tunable, const Material& m, bool is_static) {
+std::string why_not(const Tunable& tunable, const Material& m, bool has_fibres, bool is_static) {
   const bool is_springs = m.elastic_law == ElasticLaw::Springs;
   const bool is_constant = is_springs && m.spring_law == scene::SpringLaw::Constant;
   if (tunable.key == "young_modulus_pa" && is_constant)
@@ -36,7 +36,7 @@ std::string why_not(const Tunable& tunable, const Material& m, bool is_static) {
   if (tunable.key == "poisson_ratio" && is_springs)
     return "springs have 1/4 whatever is asked, see elastic_law";
   if (tunable.key == "fibre_stiffness_ratio" && !is_springs) return "it is of springs";
-  if (tunable.key == "fibre_stiffness_ratio" && length(m.fibre_direction) == 0)
+  if (tunable.key == "fibre_stiffness_ratio" && !has_fibres)
     return "it needs a fibre_direction in [material]";
   if (is_static && tunable.key.find("damping") != std::string_view::npos)
     return "a static run has no damping, make it dynamic";
@@ -105,10 +105,12 @@ Status FitModel::choose_parameters(const FitOptions& options) {
   }
   const bool is_static = resolved_.scenario.run.mode == scene::RunMode::Static;
   const Material& m = material();
+  const bool has_fibres =
+      length(m.fibre_direction) > 0 || !resolved_.organ.fibre_directions.empty();
   std::vector<std::string> keys = options.parameters;
   if (keys.empty())
-    keys = {why_not(kTunables[0], m, is_static).empty() ? "young_modulus_pa"
-                                                        : "spring_stiffness_n_m"};
+    keys = {why_not(kTunables[0], m, has_fibres, is_static).empty() ? "young_modulus_pa"
+                                                                    : "spring_stiffness_n_m"};
   for (const auto& key : keys) {
     const auto found = std::ranges::find(kTunables, key, &Tunable::key);
     if (found == kTunables.end())
@@ -116,7 +118,7 @@ Status FitModel::choose_parameters(const FitOptions& options) {
                    "parameter '" + key + "' cannot be fitted, write one of " + fit_keys()};
     if (std::ranges::find(parameters_, found->key, &Tunable::key) != parameters_.end())
       return Error{ErrorCode::Usage, "parameter '" + key + "' is there twice, remove one"};
-    if (const auto why = why_not(*found, m, is_static); !why.empty())
+    if (const auto why = why_not(*found, m, has_fibres, is_static); !why.empty())
       return wrong(resolved_, key + " cannot be fitted here: " + why);
     if (!(m.*found->member > 0) && !found->is_bounded)
       return wrong(resolved_, key + " is 0, give it a value to start from");

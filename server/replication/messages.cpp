@@ -191,17 +191,34 @@ wire::SharedBytes encode_claim_event(const locks::ClaimEvent& event,
   return wire::encode_envelope(envelope);
 }
 
-wire::SharedBytes encode_mark_event(const step::MarkEvent& event) {
-  const bool is_return = event.action == session::MarkAction::Return;
+namespace {
+
+wire::SharedBytes encode_mark_event(const step::MarkEvent& event, const char* text) {
   proto::Envelope envelope;
   auto& message = *envelope.mutable_mark_event();
   message.set_tick(event.tick);
   message.set_action(static_cast<proto::MarkAction>(event.action));
   message.set_is_done(event.is_done);
-  message.set_text(!event.is_done ? "there is no mark to return to: set one first"
-                   : is_return    ? "the instructor has returned the organ to the mark"
-                                  : "the instructor has marked the organ as it is");
+  message.set_text(text);
   return wire::encode_envelope(envelope);
+}
+
+}  // namespace
+
+wire::SharedBytes encode_mark_event(const step::MarkEvent& event) {
+  const bool is_return = event.action == session::MarkAction::Return;
+  return encode_mark_event(event, !event.is_done ? "there is no mark to return to: set one first"
+                                  : is_return ? "the instructor has returned the organ to the mark"
+                                              : "the instructor has marked the organ as it is");
+}
+
+wire::SharedBytes encode_early_mark(session::MarkAction action, Tick tick) {
+  return encode_mark_event(
+      {tick, action, false},
+      action == session::MarkAction::Return
+          ? "not returned to the mark: less than a second after the last "
+            "request, ask again"
+          : "not marked: less than a second after the last request, ask again");
 }
 
 wire::SharedBytes encode_barrier(const step::PublishedFrame& frame) {

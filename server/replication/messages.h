@@ -37,6 +37,8 @@ wire::SharedBytes encode_surface_change(const wire::SurfaceChange& change,
 wire::SharedBytes encode_frame_state(const step::PublishedFrame& frame);
 wire::SharedBytes encode_claim_event(const locks::ClaimEvent& event, const session::Roster& roster);
 wire::SharedBytes encode_mark_event(const step::MarkEvent& event);
+// To who asked too soon after another request; nothing has been done.
+wire::SharedBytes encode_early_mark(session::MarkAction action, Tick tick);
 wire::SharedBytes encode_barrier(const step::PublishedFrame& frame);
 wire::SharedBytes encode_pong(std::uint64_t client_time_us, Tick tick);
 wire::SharedBytes encode_goodbye(EndReason reason, const std::string& text);

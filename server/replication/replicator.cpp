@@ -238,7 +238,7 @@ std::optional<Replicator::Ending> Replicator::take_sample(Client& client,
   return std::nullopt;
 }
 
-std::optional<Replicator::Ending> Replicator::take_mark(const Client& client, int action) {
+std::optional<Replicator::Ending> Replicator::take_mark(Client& client, int action) {
   const auto role = client.participant->role;
   if (role != session::Role::Instructor)
     return Ending{EndReason::Role,
@@ -246,11 +246,15 @@ std::optional<Replicator::Ending> Replicator::take_mark(const Client& client, in
   if (action != proto::MARK_SET && action != proto::MARK_RETURN)
     return Ending{EndReason::ProtocolError, "MarkRequest.action: " + std::to_string(action) +
                                                 " is not 1 (set) or 2 (return)"};
-  // Returning takes the simulation as long as beginning: what comes too soon is left out.
+  const auto wanted = static_cast<session::MarkAction>(action);
+  // Returning takes the simulation as long as beginning: what comes too soon is refused.
   const auto now = options_.clock_ns();
-  if (last_mark_ns_ && now - *last_mark_ns_ < kSecondNs) return std::nullopt;
+  if (last_mark_ns_ && now - *last_mark_ns_ < kSecondNs) {
+    send(client, encode_early_mark(wanted, encoder_.current() ? encoder_.current()->tick : 0));
+    return std::nullopt;
+  }
   last_mark_ns_ = now;
-  inbox_.push_mark(static_cast<session::MarkAction>(action));
+  inbox_.push_mark(wanted);
   return std::nullopt;
 }
 

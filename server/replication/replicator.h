@@ -120,7 +120,7 @@ class Replicator final : public net::ConnectionHandler {
   std::optional<Ending> take_message(Client& client, BytesView bytes);
   std::optional<Ending> admit(Client& client, const proto::Hello& hello);
   std::optional<Ending> take_sample(Client& client, const proto::ToolSample& sample);
-  std::optional<Ending> take_mark(const Client& client, int action);
+  std::optional<Ending> take_mark(Client& client, int action);
   std::optional<Ending> take_ack(Client& client, Frame frame, std::uint32_t crc);
   bool exceeds_rate(Client& client);
 

@@ -14,6 +14,9 @@ namespace {
 // Numbers of triangles are used once. What is left is for the ticks up to the next frame.
 constexpr std::size_t kMostTriangles = wire::kMaxSurfaceTriangles - 500'000;
 
+// Ticks between two looks at what lies against a blade; blades take turns.
+constexpr Tick kFrictionEvery = 8;
+
 // No blade of a session moves nodes: clients hold rest positions to be constant.
 bool moves_nodes(const cutting::CutEvents& events) {
   return std::ranges::any_of(events.events, [](const cutting::CutEvent& event) {
@@ -46,15 +49,16 @@ bool TissueCuts::cut(const input::ToolTable& tools, const locks::ClaimTable& cla
   report = {};
   if (!can_cut()) return false;
   report.is_full = is_full();
-  blades_.begin_tick(tools, claims, !report.is_full,
-                     [this](ToolSlot tool) { cutter_->lift(tool.value); });
+  const auto lifted = blades_.begin_tick(tools, claims, !report.is_full);
   for (std::uint8_t i = 0; i < kMaxTools; ++i) {
+    if ((lifted >> i & 1) != 0) cutter_->lift(i);
     if (!blades_[ToolSlot{i}].is_cutting) continue;
     const auto& tool = tools[ToolSlot{i}];
     const std::array<Vec3d, 2> edge{to_double(tool.pose.position),
                                     to_double(tool.pose.apply({0, 0, tool.shape.edge_m}))};
     cutter_->move(i, edge);
   }
+  measure_friction(tools, world, travel_m);
   cutter_->cut(world.displacements, output_, travel_m);
   report.crossed_tets = output_.crossed_tets;
   report.splits = output_.splits;
@@ -66,6 +70,22 @@ bool TissueCuts::cut(const input::ToolTable& tools, const locks::ClaimTable& cla
   new_nodes_.assign(output_.new_nodes.begin(), output_.new_nodes.end());
   record(output_.events);
   return true;
+}
+
+// On both sides of a blade that is as broad as the tool.
+void TissueCuts::measure_friction(const input::ToolTable& tools, const world::World& world,
+                                  double travel_m) {
+  for (std::uint8_t i = 0; i < kMaxTools; ++i) {
+    const ToolSlot slot{i};
+    if (!blades_[slot].is_cutting || (world.tick + i) % kFrictionEvery != 0) continue;
+    const auto& pose = tools[slot].pose;
+    const auto& shape = tools[slot].shape;
+    const auto breadth = 2 * static_cast<double>(shape.radius_m + shape.half_width_m);
+    const double along =
+        cutter_->friction_along(world.displacements, travel_m, to_double(pose.position),
+                                to_double(pose.apply({0, 0, shape.edge_m})));
+    blades_.set_friction(slot, 2 * breadth * along);
+  }
 }
 
 void TissueCuts::record(cutting::CutEvents events) {

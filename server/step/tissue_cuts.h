@@ -66,6 +66,7 @@ class TissueCuts {
 
  private:
   bool is_full() const;
+  void measure_friction(const input::ToolTable& tools, const world::World& world, double travel_m);
   void forget_pending();
   void record(cutting::CutEvents events);
   void extend_layout(const world::World& world, const world::SurfaceEdit& edit);

@@ -7,7 +7,7 @@
 #include <limits>
 #include <utility>
 
-#include "client/replica/tool_messages.h"
+#include "client/replica/client_messages.h"
 #include "common/wire/surface_codec.h"
 #include "proto/wire.pb.h"
 #include "tests/client/synthetic_source.h"

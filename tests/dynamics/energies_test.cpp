@@ -290,6 +290,17 @@ void put_under_tension(scene::Organ& organ) {
   organ.material.fibre_tension = 0.02;
 }
 
+// A direction at most nodes, turning from one to the next, of either sign; another one elsewhere.
+void give_directions(scene::Organ& organ) {
+  organ.material.fibre_direction = {0, 0, 1};
+  organ.material.fibre_tension = 0.05;
+  for (std::size_t n = 0; n < organ.mesh.node_count(); ++n) {
+    const auto& p = organ.mesh.rest_positions[n];
+    const Vec3d axis = normalized(Vec3d{1, 30 * p.x, 20 * p.z - 40 * p.y}, {});
+    organ.fibre_directions.push_back(n % 7 == 0 ? Vec3d{} : n % 2 == 0 ? axis : -axis);
+  }
+}
+
 const auto kOthers =
     ::testing::Values(Case{.name = "SpringsAlongFibres",
                            .change =
@@ -315,6 +326,28 @@ const auto kOthers =
                                  put_under_tension(o);
                                },
                            .has_stress_at_rest = true},
+                      Case{.name = "SpringsAlongDirections",
+                           .change =
+                               [](scene::Organ& o) {
+                                 o.material.fibre_stiffness_ratio = 3;
+                                 give_directions(o);
+                               },
+                           .has_stress_at_rest = true},
+                      Case{.name = "TensorMassAlongDirections",
+                           .change =
+                               [](scene::Organ& o) {
+                                 o.material.elastic_law = ElasticLaw::TensorMass;
+                                 give_directions(o);
+                               },
+                           .is_linear = true,
+                           .has_stress_at_rest = true},
+                      Case{.name = "NeoHookeanAlongDirections",
+                           .change =
+                               [](scene::Organ& o) {
+                                 o.material.elastic_law = ElasticLaw::NeoHookean;
+                                 give_directions(o);
+                               },
+                           .has_stress_at_rest = true},
                       Case{.name = "NeoHookeanStiffInclusion", .change = [](scene::Organ& o) {
                              o.material.elastic_law = ElasticLaw::NeoHookean;
                              auto stiff = o.material;
@@ -328,6 +361,36 @@ const auto kOthers =
 INSTANTIATE_TEST_SUITE_P(Isotropic, Energies, kIsotropic, name_of);
 INSTANTIATE_TEST_SUITE_P(Others, Energies, kOthers, name_of);
 INSTANTIATE_TEST_SUITE_P(All, IsotropicEnergies, kIsotropic, name_of);
+
+// The same direction everywhere, of whatever sign, is the material's own to the bit.
+TEST(FibreDirections, OfOneDirectionAreTheMaterials) {
+  const Vec3d axis = normalized(Vec3d{0.3, -0.7, 0.45}, {});
+  for (const auto law : {ElasticLaw::Springs, ElasticLaw::TensorMass, ElasticLaw::NeoHookean}) {
+    auto change = [](scene::Organ& o) {
+      o.material.fibre_tension = 0.05;
+      o.material.tension = 0.02;
+      o.material.fibre_stiffness_ratio = 3;
+    };
+    auto own = block_organ({.name = "own", .change = change});
+    own.material.elastic_law = law;
+    auto field = own;
+    own.material.fibre_direction = axis;
+    field.material.fibre_direction = {1, 0, 0};
+    for (std::size_t n = 0; n < field.mesh.node_count(); ++n)
+      field.fibre_directions.push_back(n % 3 == 0 ? -axis : axis);
+    ASSERT_TRUE(scene::validate(field));
+    std::vector<Vec3f> u;
+    for (std::size_t n = 0; n < own.mesh.node_count(); ++n)
+      u.push_back(Vec3f{float(n * 7 % 11), float(n * 5 % 13), float(n * 3 % 7)} * 3e-4f);
+    Probe a(own), b(field);
+    EXPECT_EQ(a.energy(u), b.energy(u)) << static_cast<int>(law);
+    for (std::uint32_t n = 0; n < u.size(); ++n) {
+      const auto at_a = a.at(NodeIndex(n), u), at_b = b.at(NodeIndex(n), u);
+      ASSERT_EQ(at_a.gradient, at_b.gradient) << static_cast<int>(law) << " node " << n;
+      ASSERT_EQ(at_a.block, at_b.block) << static_cast<int>(law) << " node " << n;
+    }
+  }
+}
 
 // --- Laws of Psi ---
 

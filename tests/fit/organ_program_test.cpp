@@ -45,6 +45,46 @@ class OrganProgram : public testing::ProgramFixture {
   const std::string scenario_ = scene("stretch.toml"), curve_ = scene("stretch.csv");
 };
 
+TEST_F(OrganProgram, MakesOrgansWithFibresAndShowsThem) {
+  ASSERT_EQ(
+      run({"make", "plate", "--fibres", "around:y", "--fibre-tension", "0.08", "--fibre-stiffness",
+           "3", "--blade-friction", "900", "--tear-stretch", "1.5", "--out", at("a.organ")}),
+      0)
+      << log();
+  const auto organ = scene::read_organ(at("a.organ"));
+  ASSERT_TRUE(organ.ok());
+  EXPECT_EQ(organ->fibre_directions.size(), organ->mesh.node_count());
+  EXPECT_EQ(organ->material.fibre_tension, 0.08);
+  ASSERT_EQ(run({"inspect", at("a.organ"), "--json"}), 0);
+  const auto json = log();
+  EXPECT_GT(number_after(json, "\"fibre_nodes\": "), 100);
+  EXPECT_EQ(number_after(json, "\"fibre_tension\": "), 0.08);
+  EXPECT_EQ(number_after(json, "\"fibre_stiffness_ratio\": "), 3);
+  EXPECT_EQ(number_after(json, "\"tension\": "), 0);
+  EXPECT_EQ(number_after(json, "\"cut_energy_j_m2\": "), 150);
+  EXPECT_EQ(number_after(json, "\"blade_friction_pa\": "), 900);
+  EXPECT_EQ(number_after(json, "\"tear_stretch\": "), 1.5);
+  ASSERT_EQ(run({"inspect", at("a.organ")}), 0);
+  EXPECT_NE(log().find("directed fibres     at "), std::string::npos) << log();
+}
+
+TEST_F(OrganProgram, RefusesFibresAndTearsThatCannotBe) {
+  const auto refused = [&](std::vector<std::string> arguments, int code, const char* says) {
+    arguments.insert(arguments.end(), {"--out", at("b.organ")});
+    EXPECT_EQ(run(arguments), code) << log();
+    expect_line(says);
+    EXPECT_FALSE(std::filesystem::exists(at("b.organ")));
+  };
+  refused({"make", "lattice", "--tear-stretch", "1.5"}, 2, "organs of links do not tear");
+  refused({"make", "plate", "--fibres", "around"}, 2, "--fibres: 'around' is not");
+  refused({"make", "plate", "--fibre-tension", "0.1"}, 2, "need --fibres");
+  refused({"make", "plate", "--tension", "0.5", "--fibres", "x", "--fibre-tension", "0.5"}, 3,
+          "tension and fibre tension together is 1");
+  refused({"make", "liver", "--fibres", "x", "--fibre-stiffness", "3"}, 2, "is of springs");
+  const auto table = write("f.csv", "id,x,y,z\n0,1,0,0\n1,0,0,0\n");
+  refused({"make", "plate", "--fibres", table}, 3, "f.csv:3: the direction has no length");
+}
+
 TEST_F(OrganProgram, FitFindsTheStiffnessFromWhichTheExamplesCurveWasMade) {
   ASSERT_EQ(fit(scenario_, curve_, {"--organ", at("fitted.organ")}), 0) << log();
   const double printed = number_after(log(), "young_modulus_pa       ");

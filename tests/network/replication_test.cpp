@@ -116,6 +116,46 @@ TEST(Replication, equal_lag_shares_one_buffer) {
   EXPECT_EQ(after - before, 10u) << "one delta per frame, whoever gets it";
 }
 
+TEST(Replication, a_mark_too_soon_after_another_is_refused_with_a_reason) {
+  std::atomic<std::uint64_t> now_ns{1'000'000'000'000};
+  replication::ReplicatorOptions options;
+  options.clock_ns = [&now_ns] { return now_ns.load(); };
+  LiveSession session({}, options);
+  session.publish(10);
+  RawClient teacher(session.port()), other(session.port()), watcher(session.port());
+  ASSERT_TRUE(teacher.join("Teacher", proto::ROLE_INSTRUCTOR));
+  ASSERT_TRUE(other.join("Other", proto::ROLE_INSTRUCTOR));
+  ASSERT_TRUE(watcher.join("Watcher", proto::ROLE_OBSERVER));
+  // Taken, or refused to this client alone.
+  const auto ask = [&](RawClient& client, proto::MarkAction action) -> std::string {
+    Envelope request, ping;
+    request.mutable_mark_request()->set_action(action);
+    ping.mutable_ping();
+    EXPECT_TRUE(client.send(request) && client.send(ping));
+    std::string refusal;
+    for (auto message = client.receive(); message && !message->has_pong();
+         message = client.receive())
+      if (message->has_mark_event()) {
+        EXPECT_FALSE(message->mark_event().is_done());
+        EXPECT_EQ(message->mark_event().action(), action);
+        refusal = message->mark_event().text();
+      }
+    return refusal;
+  };
+  EXPECT_EQ(ask(teacher, proto::MARK_SET), "");
+  now_ns += 999'000'000;
+  EXPECT_NE(ask(teacher, proto::MARK_SET).find("not marked"), std::string::npos);
+  EXPECT_NE(ask(other, proto::MARK_RETURN).find("less than a second"), std::string::npos);
+  now_ns += 2'000'000;
+  EXPECT_EQ(ask(other, proto::MARK_RETURN), "");
+  Envelope ping;
+  ping.mutable_ping();
+  ASSERT_TRUE(watcher.send(ping));
+  for (auto message = watcher.receive(); message && !message->has_pong();
+       message = watcher.receive())
+    EXPECT_FALSE(message->has_mark_event()) << "it is nobody else's business";
+}
+
 TEST(Replication, a_keyframe_comes_on_request_and_at_most_four_times_per_second) {
   std::atomic<std::uint64_t> now_ns{1'000'000'000'000};
   replication::ReplicatorOptions options;

@@ -83,6 +83,21 @@ fields_s = [0, 0.005]
     EXPECT_NE(entry.path().extension(), ".part") << "half a file";
 }
 
+TEST_F(SimProgram, WhatOnlySessionsDoIsSaidInOneLine) {
+  const auto tears = write("tears.toml",
+                           "[organ]\nsource = \"block\"\nnodes = [3, 3, 3]\n[material]\n"
+                           "tear_stretch = 1.3\n[run]\nseconds = 0.01\n");
+  ASSERT_EQ(run({tears, "--out", at("tears")}), 0) << log();
+  EXPECT_NE(log().find("tears.toml: tear_stretch is left out"), std::string::npos) << log();
+  const auto cuts = write("cuts.toml",
+                          "[organ]\nsource = \"block\"\n[run]\nseconds = 0.01\n[[tool]]\n"
+                          "[[tool.key]]\ntime_s = 0\nposition_mm = [0, 0, 0]\nverb = \"cut\"\n");
+  EXPECT_EQ(run({cuts, "--out", at("cuts")}), 3);
+  EXPECT_NE(log().find("only sessions cut"), std::string::npos) << log();
+  const std::string line = log();
+  EXPECT_EQ(std::count(line.begin(), line.end(), '\n'), 1) << line;
+}
+
 TEST_F(SimProgram, ExitCodesSayWhatWasWrong) {
   EXPECT_EQ(run({"--version"}), 0);
   EXPECT_EQ(run({"--help"}), 0);

@@ -43,6 +43,70 @@ TEST(OrganFile, RoundTripKeepsEverything) {
   }
 }
 
+Organ organ_with_fibres() {
+  Organ organ = small_liver();
+  organ.material.fibre_tension = 0.05;
+  organ.material.blade_friction_pa = 700;
+  organ.regions = {{"part", organ.material, {NodeIndex(1u), NodeIndex(2u)}}};
+  for (std::size_t n = 0; n < organ.mesh.node_count(); ++n)
+    organ.fibre_directions.push_back(n % 5 == 0 ? Vec3d{} : Vec3d{0, 0.6, n % 2 == 0 ? 0.8 : -0.8});
+  return organ;
+}
+
+TEST(OrganFile, KeepsDirectionsOfFibres) {
+  const Organ organ = organ_with_fibres();
+  const Bytes file = pack_organ(organ);
+  const auto unpacked = unpack_organ(file);
+  ASSERT_TRUE(unpacked.ok()) << unpacked.error().message;
+  EXPECT_EQ(*unpacked, organ);
+  Organ without = organ;
+  without.fibre_directions.clear();
+  EXPECT_NE(organ_hash(organ), organ_hash(without));
+  Organ turned = organ;
+  turned.fibre_directions[1] = {1, 0, 0};
+  EXPECT_NE(organ_hash(organ), organ_hash(turned));
+  // Programs that know no directions refuse the one file and read the other.
+  EXPECT_EQ(file[8], 3);
+  EXPECT_EQ(pack_organ(without)[8], 2);
+}
+
+TEST(OrganFile, WrongDirectionsOfFibresAreNamed) {
+  const auto message_for = [](auto&& damage) {
+    Organ organ = organ_with_fibres();
+    damage(organ.fibre_directions);
+    const auto decoded = decode_organ(encode_organ(organ));
+    return decoded.ok() ? std::string() : decoded.error().message;
+  };
+  const auto expect = [](const std::string& message, const char* what) {
+    EXPECT_NE(message.find(what), std::string::npos) << message;
+    EXPECT_EQ(message.find('\n'), std::string::npos) << message;
+  };
+  expect(message_for([](auto& f) { f.pop_back(); }), "directions of fibres for");
+  expect(message_for([](auto& f) { f[3] = {0, 2, 0}; }), "node 3 is neither of length 1 nor zero");
+  expect(message_for([](auto& f) { f[4].x = std::nan(""); }), "node 4 is neither");
+  expect(message_for([](auto& f) { f[6] = {INFINITY, 0, 0}; }), "node 6 is neither");
+  proto::Organ message;
+  const Bytes bytes = encode_organ(organ_with_fibres());
+  ASSERT_TRUE(message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())));
+  message.mutable_fibre_direction()->RemoveLast();
+  const std::string text = message.SerializeAsString();
+  const auto decoded = decode_organ(bytes_of(std::span(text.data(), text.size())));
+  ASSERT_FALSE(decoded.ok());
+  expect(decoded.error().message, "three numbers a node");
+}
+
+TEST(OrganFile, WithoutBladeFrictionHasTheUsualOne) {
+  proto::Organ message;
+  const Organ organ = small_liver();
+  const Bytes bytes = encode_organ(organ);
+  ASSERT_TRUE(message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())));
+  message.mutable_material()->clear_blade_friction_pa();
+  const std::string text = message.SerializeAsString();
+  const auto decoded = decode_organ(bytes_of(std::span(text.data(), text.size())));
+  ASSERT_TRUE(decoded.ok());
+  EXPECT_EQ(*decoded, organ);
+}
+
 TEST(OrganFile, WritesAndReadsAFile) {
   const auto path = scratch_folder() / "liver.organ";
   const Organ organ = small_liver();
@@ -179,8 +243,10 @@ TEST(OrganFile, AnnouncedLengthsTakeNoMemory) {
 
 TEST(OrganFile, OtherVersionsAreNamed) {
   Bytes file = pack_organ(*make_lattice(LatticeSize{3, 3, 3, 0.02}));
-  file[8] = 3;
+  file[8] = 3;  // of organs with directions of fibres
   EXPECT_NE(unpack_organ(file).error().message.find("version 3"), std::string::npos);
+  file[8] = 4;
+  EXPECT_NE(unpack_organ(file).error().message.find("version 4"), std::string::npos);
 }
 
 TEST(FixRule, ParsesAndRefuses) {

@@ -5,8 +5,10 @@
 #include <set>
 #include <string>
 
+#include "server/cutting/event_codec.h"
 #include "server/cutting/validate.h"
 #include "server/step/simulation.h"
+#include "tests/cutting/cut_organ.h"
 #include "tests/step/hands.h"
 #include "tests/support/random.h"
 
@@ -240,6 +242,43 @@ TEST_F(Blades, StopAtWhatAnotherHolds) {
   EXPECT_GE(refused, 1);
   EXPECT_GT(stop_n, 2) << "against the blade, which goes on along x";
   EXPECT_FALSE(simulation.state().grasps[tool_slot({1}, 0)].nodes.empty());
+}
+
+// Clients hold rest positions to be constant: a history that moves nodes is no session's.
+TEST(Snapshots, ThatMoveNodesAreRefused) {
+  const auto organ = cutting::testing::box_organ(3, 3, 3, 0.01, 0);
+  const auto read = [&](const cutting::CutEvent& event) {
+    const cutting::CutEvents events{{event}, {}};
+    Bytes hashed(sizeof(std::uint64_t)), bytes;
+    cutting::encode(events, hashed);
+    auto writing = world::StateArchive::writing(bytes);
+    std::uint64_t hash = xxh3_64(hashed);
+    std::uint32_t published = 0, epoch = 0, count = 1;
+    bool is_new = false;
+    writing.value(hash);
+    writing.value(published);
+    writing.value(epoch);
+    writing.flag(is_new);
+    writing.value(count);
+    auto written = events;
+    cutting::visit_state(writing, written);
+    Bytes idle;  // an uncut organ's, without its history
+    TissueCuts uncut(organ);
+    world::World world(organ);
+    auto writing_idle = world::StateArchive::writing(idle);
+    uncut.visit_state(writing_idle, world);
+    bytes.insert(bytes.end(), idle.begin() + 21, idle.end());
+    TissueCuts cuts(organ);
+    auto reading = world::StateArchive::reading(bytes);
+    cuts.visit_state(reading, world);
+    return reading.ok() && reading.at_end();
+  };
+  const dynamics::Topology topology(organ);
+  const NodeIndex inner(21u), beside(22u);  // (1, 1, 1) and (2, 1, 1)
+  ASSERT_TRUE(cutting::can_move(topology, {inner, beside, 6000}));
+  EXPECT_FALSE(read(cutting::Move{inner, beside, 6000}));
+  EXPECT_TRUE(read(cutting::Split{inner, beside, 32768, NodeIndex(64u)}))
+      << "another event in its place is taken";
 }
 
 TEST_F(Blades, ThatAreEverywhereAtOnceAreBoundedWork) {

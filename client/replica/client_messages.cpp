@@ -1,4 +1,4 @@
-#include "client/replica/tool_messages.h"
+#include "client/replica/client_messages.h"
 
 #include "proto/wire.pb.h"
 
