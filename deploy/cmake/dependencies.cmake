@@ -7,6 +7,7 @@ find_package(spdlog REQUIRED)
 find_package(CLI11 REQUIRED)
 find_package(tomlplusplus REQUIRED)
 find_package(Ceres REQUIRED)
+find_package(Eigen3 REQUIRED)
 find_package(ZLIB REQUIRED)
 pkg_check_modules(zstd REQUIRED IMPORTED_TARGET libzstd)
 pkg_check_modules(xxhash REQUIRED IMPORTED_TARGET libxxhash)
@@ -29,3 +30,10 @@ add_library(trocar_boost INTERFACE)
 target_include_directories(trocar_boost SYSTEM INTERFACE ${Boost_INCLUDE_DIRS})
 target_compile_definitions(trocar_boost INTERFACE
   BOOST_ASIO_SEPARATE_COMPILATION BOOST_ASIO_NO_DEPRECATED BOOST_ALL_NO_LIB)
+
+# CHOLMOD of SuiteSparse, which has no CMake package in Debian 12: Cholesky factors of sparse matrices.
+find_path(CHOLMOD_INCLUDE cholmod.h PATH_SUFFIXES suitesparse REQUIRED)
+find_library(CHOLMOD_LIBRARY cholmod REQUIRED)
+add_library(trocar_cholmod INTERFACE)
+target_include_directories(trocar_cholmod SYSTEM INTERFACE ${CHOLMOD_INCLUDE})
+target_link_libraries(trocar_cholmod INTERFACE Eigen3::Eigen ${CHOLMOD_LIBRARY})

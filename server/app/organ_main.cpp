@@ -18,6 +18,7 @@
 #include "common/scene/organ_file.h"
 #include "server/app/organ_calibrate.h"
 #include "server/app/organ_experiments.h"
+#include "server/app/organ_identify.h"
 
 namespace trocar::app {
 namespace {
@@ -49,6 +50,8 @@ Examples:
       Young's modulus from a measured force-displacement curve; results in out/fit-stretch
   trocar-organ calibrate liver --error 3
       how much must move for a contact of a given force, into liver-calibrated.organ
+  trocar-organ identify deploy/scenes/relax.csv --length-mm 20 --area-mm2 100
+      C_i0, g_k and tau_k from curves of specimens; results in out/identify-relax
 
 Exit codes: 0 ok, 2 command line, 3 bad file, 5 cannot write or processor too old.
 )";
@@ -70,6 +73,7 @@ struct Options {
   FitCommand fit;
   SettleCommand settle;
   CalibrateCommand calibrate;
+  IdentifyCommand identify;
 };
 
 struct EdgeLengths {
@@ -455,6 +459,7 @@ void add_commands(CLI::App& app, Options& options) {
   add_fit_command(app, options.fit);
   add_settle_command(app, options.settle);
   add_calibrate_command(app, options.calibrate);
+  add_identify_command(app, options.identify);
 }
 
 int run(int argc, char** argv) {
@@ -489,6 +494,8 @@ int run(int argc, char** argv) {
     status = run_settle(options.settle);
   else if (app.got_subcommand("calibrate"))
     status = run_calibrate(options.calibrate);
+  else if (app.got_subcommand("identify"))
+    status = run_identify(options.identify);
   else
     status = run_inspect(options);
   return status ? static_cast<int>(ExitCode::Ok) : report(kProgram, status.error());

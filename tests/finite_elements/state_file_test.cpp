@@ -1,0 +1,81 @@
+// A calculation that is saved and goes on is the one that was never stopped; bad files are refused.
+
+#include "server/finite_elements/state_file.h"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "tests/finite_elements/specimens.h"
+
+namespace trocar::finite_elements::testing {
+namespace {
+
+Specimen pulled_block(double pull_pa = 300) {
+  Specimen block({2, 2, 2}, 0.005, ElementOrder::Quadratic, liver());
+  block.hold_all_axes(plane(1, 0));
+  block.pull(plane(1, 0.01), {0, pull_pa, 0});
+  return block;
+}
+
+void advance(Solver& solver, const Specimen& block, int from, int to) {
+  for (int i = from; i < to; ++i)
+    ASSERT_TRUE(
+        solver
+            .step(block.loads(std::min(1.0, (i + 1) * 0.25)), {.dt_s = 0.01, .has_inertia = i >= 2})
+            .is_converged);
+}
+
+TEST(StateFile, GoesOnToTheBit) {
+  const auto block = pulled_block();
+  Solver whole(block.problem()), first(block.problem(), {.threads = 1}), second(block.problem());
+  advance(whole, block, 0, 8);
+  advance(first, block, 0, 4);
+  const auto state = to_state(to_bytes(first.state(), hash_of(first.problem())), second.problem());
+  ASSERT_TRUE(state.ok()) << state.error().message;
+  second.restore(*state);
+  advance(second, block, 4, 8);
+  EXPECT_EQ(whole.displacements(), second.displacements())
+      << "neither the file nor the number of threads changes a result";
+  EXPECT_EQ(whole.velocities(), second.velocities());
+  EXPECT_EQ(whole.time_s(), second.time_s());
+  EXPECT_EQ(whole.reactions(), second.reactions());
+}
+
+TEST(StateFile, RefusesWhatIsCutShortChangedOrOfAnotherProblem) {
+  const auto block = pulled_block();
+  Solver solver(block.problem());
+  advance(solver, block, 0, 1);
+  const Bytes good = to_bytes(solver.state(), hash_of(solver.problem()));
+  ASSERT_TRUE(to_state(good, solver.problem()).ok());
+  for (std::size_t length = 0; length < good.size(); length += 1 + good.size() / 200)
+    EXPECT_FALSE(to_state(BytesView(good).first(length), solver.problem()).ok()) << length;
+  for (std::size_t at = 0; at < good.size(); at += 1 + good.size() / 200) {
+    Bytes changed = good;
+    changed[at] ^= 0x10;
+    EXPECT_FALSE(to_state(changed, solver.problem()).ok()) << at;
+  }
+  Problem other = block.problem();
+  other.materials[0].coefficients_pa[0] *= 2;
+  const auto refused = to_state(good, other);
+  ASSERT_FALSE(refused.ok());
+  EXPECT_NE(refused.error().message.find("another organ, material"), std::string::npos);
+}
+
+TEST(StateFile, IsWrittenAndReadByItsPath) {
+  const auto path = std::filesystem::temp_directory_path() / "trocar-state-file-test.state";
+  const auto block = pulled_block();
+  Solver solver(block.problem());
+  advance(solver, block, 0, 1);
+  ASSERT_TRUE(write_state(path, solver).ok());
+  const auto state = read_state(path, solver.problem());
+  ASSERT_TRUE(state.ok()) << state.error().message;
+  EXPECT_EQ(state->u, solver.displacements());
+  std::filesystem::remove(path);
+  const auto missing = read_state(path, solver.problem());
+  ASSERT_FALSE(missing.ok());
+  EXPECT_NE(missing.error().message.find("cannot be opened"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace trocar::finite_elements::testing
