@@ -9,6 +9,7 @@
 
 #include "common/base/index.h"
 #include "common/math/vec3.h"
+#include "common/scene/hyperelastic_material.h"
 
 namespace trocar::scene {
 
@@ -16,6 +17,7 @@ enum class ElasticLaw : std::uint8_t {
   Springs = 0,     // along tet edges or links (Choi 2002, Nakao 2003)
   TensorMass = 1,  // linear elasticity, matrices per node and edge (Cotin 2000); small rotations
   NeoHookean = 2,  // tets: C10 (I1 - 3) - 2 C10 (J - 1) + K/2 (J - 1)^2
+  Measured = 3,    // tets: Material::measured
 };
 
 // How the stiffness of a spring follows from the material.
@@ -38,7 +40,11 @@ struct Material {
   double spring_damping_time_s = 0.001;
   ElasticLaw elastic_law = ElasticLaw::Springs;
   double poisson_ratio = 0.45;  // TensorMass, NeoHookean; springs have 1/4 whatever is asked
-  // NeoHookean: volume averaged over each node's tets, against locking (Bonet & Burton 1998).
+  // Measured: a reduced polynomial, not split; young_modulus_pa and poisson_ratio say what it is to
+  // small strains at first (use_measured).
+  HyperelasticMaterial measured{};
+  // NeoHookean, Measured: volume averaged over each node's tets, against locking (Bonet & Burton
+  // 1998).
   bool has_averaged_volume = false;
   // Transverse isotropy (springs) and tension (all laws): along a spring at the angle a to the
   // fibres,
@@ -71,6 +77,13 @@ struct MaterialRegion {
   bool operator==(const MaterialRegion&) const = default;
 };
 
+inline bool is_hyperelastic(const Material& material) {
+  return material.elastic_law == ElasticLaw::NeoHookean ||
+         material.elastic_law == ElasticLaw::Measured;
+}
+// Makes tissue of a measured law, with its density, damping and what it is to blades as before.
+void use_measured(const HyperelasticMaterial& measured, Material& material);
+
 // Lame's first and second parameter of linear elasticity, Pa.
 struct LameParameters {
   double lambda_pa = 0, mu_pa = 0;
@@ -79,7 +92,8 @@ LameParameters lame_parameters(const Material& material);
 
 // Constants of the neo-Hookean law whose response to small strains e is that of linear elasticity,
 // W = mu e:e + lambda/2 (tr e)^2: the bracket C10 (I1 - 3) - 2 C10 (J - 1) is
-// 2 C10 e:e - C10 (tr e)^2 to second order, so 2 C10 = mu and K = lambda + mu.
+// 2 C10 e:e - C10 (tr e)^2 to second order, so 2 C10 = mu and K = lambda + mu. Of a measured law
+// its own.
 struct NeoHookeanParameters {
   double c10_pa = 0, bulk_modulus_pa = 0;
 };

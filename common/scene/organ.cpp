@@ -33,12 +33,23 @@ Status check_number(const Organ& organ, const char* name, double value, double l
   return broken(organ, text);
 }
 
+Status check_measured(const HyperelasticMaterial& m) {
+  if (auto s = validate(m); !s) return s;
+  const auto cannot = [&m](const char* what) {
+    return Error{ErrorCode::BadFile,
+                 "material " + m.name + " " + what + ", which only the off-line solver knows"};
+  };
+  if (m.split != VolumeSplit::Unsplit) return cannot("is split into volume and shape");
+  if (m.energy != StrainEnergy::ReducedPolynomial) return cannot("is exponential");
+  return {};
+}
+
 Status check_material(const Organ& organ, const Material& m) {
   const auto number = [&](const char* name, double value, double low, double high) {
     return check_number(organ, name, value, low, high);
   };
   if (auto s = number("density (kg/m^3)", m.density_kg_m3, 1, 30000); !s) return s;
-  if (m.elastic_law > ElasticLaw::NeoHookean)
+  if (m.elastic_law > ElasticLaw::Measured)
     return broken(organ, "unknown elastic law " + std::to_string(static_cast<int>(m.elastic_law)));
   if (m.spring_law > SpringLaw::VolumeConsistent)
     return broken(organ, "unknown spring law " + std::to_string(static_cast<int>(m.spring_law)));
@@ -56,6 +67,8 @@ Status check_material(const Organ& organ, const Material& m) {
         m.tear_stretch == 0 ? Status()
                             : number("tear stretch", m.tear_stretch, kLeastTearStretch, 100)})
     if (!s) return s;
+  if (m.elastic_law == ElasticLaw::Measured)
+    if (auto s = check_measured(m.measured); !s) return broken(organ, s.error().message);
   if (!is_finite(m.fibre_direction)) return broken(organ, "fibre direction is not finite");
   const bool has_tet_springs = !organ.mesh.tets.empty() && organ.mesh.links.empty();
   if (m.elastic_law != ElasticLaw::Springs)
@@ -171,6 +184,12 @@ std::vector<double> numbers_of(const Material& m) {
       m.blade_friction_pa != usual.blade_friction_pa)
     numbers.insert(numbers.end(), {m.cut_energy_j_m2, m.tear_stretch});
   if (m.blade_friction_pa != usual.blade_friction_pa) numbers.push_back(m.blade_friction_pa);
+  if (m.elastic_law != ElasticLaw::Measured) return numbers;
+  numbers.insert(numbers.end(), m.measured.coefficients_pa.begin(),
+                 m.measured.coefficients_pa.end());
+  numbers.push_back(m.measured.bulk_modulus_pa);
+  for (const auto& [weight, time_s] : m.measured.relaxation)
+    numbers.insert(numbers.end(), {weight, time_s});
   return numbers;
 }
 

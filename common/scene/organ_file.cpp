@@ -70,6 +70,17 @@ Status take_vectors(const char* what, const Numbers& field, std::vector<Vec3d>& 
   return {};
 }
 
+void put_measured(const HyperelasticMaterial& m, proto::MeasuredMaterial& out) {
+  out.set_name(m.name);
+  out.set_source(m.source);
+  for (const double c : m.coefficients_pa) out.add_coefficient_pa(c);
+  out.set_bulk_modulus_pa(m.bulk_modulus_pa);
+  for (const auto& [weight, time_s] : m.relaxation) {
+    out.add_relaxation(weight);
+    out.add_relaxation(time_s);
+  }
+}
+
 void put_material(const Material& m, proto::Material& out) {
   out.set_density_kg_m3(m.density_kg_m3);
   out.set_spring_law(static_cast<std::uint32_t>(m.spring_law));
@@ -87,12 +98,28 @@ void put_material(const Material& m, proto::Material& out) {
   out.set_cut_energy_j_m2(m.cut_energy_j_m2);
   out.set_tear_stretch(m.tear_stretch);
   out.set_blade_friction_pa(m.blade_friction_pa);
+  if (m.elastic_law == ElasticLaw::Measured) put_measured(m.measured, *out.mutable_measured());
+}
+
+Status take_measured(const proto::MeasuredMaterial& in, HyperelasticMaterial& m) {
+  const auto coefficients = static_cast<std::size_t>(in.coefficient_pa_size());
+  if (coefficients == 0 || coefficients > kMaxPolynomialOrder)
+    return bad("organ: a measured material has " + std::to_string(coefficients) +
+               " coefficients, must have 1 to " + std::to_string(kMaxPolynomialOrder));
+  if (in.relaxation_size() % 2 != 0 || in.relaxation_size() > 2 * static_cast<int>(kMaxPronyTerms))
+    return bad("organ: relaxation of a measured material must be two numbers a term, at most " +
+               std::to_string(kMaxPronyTerms) + " terms");
+  m = {.name = in.name(), .source = in.source(), .bulk_modulus_pa = in.bulk_modulus_pa()};
+  std::ranges::copy(in.coefficient_pa(), m.coefficients_pa.begin());
+  for (int i = 0; i < in.relaxation_size(); i += 2)
+    m.relaxation.push_back({in.relaxation(i), in.relaxation(i + 1)});
+  return {};
 }
 
 Status take_material(const proto::Material& in, Material& m) {
   if (in.spring_law() > static_cast<std::uint32_t>(SpringLaw::VolumeConsistent))
     return bad("organ: unknown spring law " + std::to_string(in.spring_law()));
-  if (in.elastic_law() > static_cast<std::uint32_t>(ElasticLaw::NeoHookean))
+  if (in.elastic_law() > static_cast<std::uint32_t>(ElasticLaw::Measured))
     return bad("organ: unknown elastic law " + std::to_string(in.elastic_law()));
   if (in.fibre_direction_size() != 0 && in.fibre_direction_size() != 3)
     return bad("organ: fibre direction must be three numbers");
@@ -104,6 +131,7 @@ Status take_material(const proto::Material& in, Material& m) {
        .spring_damping_time_s = in.spring_damping_time_s(),
        .elastic_law = static_cast<ElasticLaw>(in.elastic_law()),
        .poisson_ratio = in.poisson_ratio(),
+       .measured = {},
        .has_averaged_volume = in.has_averaged_volume(),
        .fibre_direction = {},
        .fibre_stiffness_ratio = in.fibre_stiffness_ratio(),
@@ -112,6 +140,8 @@ Status take_material(const proto::Material& in, Material& m) {
        .tear_stretch = in.tear_stretch()};
   if (in.has_cut_energy_j_m2()) m.cut_energy_j_m2 = in.cut_energy_j_m2();
   if (in.has_blade_friction_pa()) m.blade_friction_pa = in.blade_friction_pa();
+  if (m.elastic_law == ElasticLaw::Measured)
+    if (auto s = take_measured(in.measured(), m.measured); !s) return s;
   if (in.fibre_direction_size() == 3) m.fibre_direction = vector_at(in.fibre_direction(), 0);
   return {};
 }

@@ -51,6 +51,7 @@ struct MaterialChange {
   std::optional<double> spring_damping_time_s;
   std::optional<ElasticLaw> elastic_law;
   std::optional<double> poisson_ratio;
+  std::optional<std::string> measured;  // name of a measured material
   std::optional<bool> has_averaged_volume;
   std::optional<Vec3d> fibre_direction;
   std::optional<double> fibre_stiffness_ratio, tension, fibre_tension;

@@ -14,9 +14,11 @@ void read_material_keys(TableReader& reader, MaterialChange& material) {
   material.node_damping_per_s = reader.number("node_damping_per_s", 0, 1e6);
   material.spring_damping_time_s = reader.number("spring_damping_time_s", 0, 100);
   material.elastic_law =
-      reader.choice<ElasticLaw, 3>("elastic_law", {{{"springs", ElasticLaw::Springs},
+      reader.choice<ElasticLaw, 4>("elastic_law", {{{"springs", ElasticLaw::Springs},
                                                     {"tensor-mass", ElasticLaw::TensorMass},
-                                                    {"neo-hookean", ElasticLaw::NeoHookean}}});
+                                                    {"neo-hookean", ElasticLaw::NeoHookean},
+                                                    {"measured", ElasticLaw::Measured}}});
+  material.measured = reader.string("measured");
   material.poisson_ratio = reader.number("poisson_ratio", 0, 0.4999);
   material.has_averaged_volume = reader.boolean("averaged_volume");
   if (const auto direction = reader.direction("fibre_direction"))

@@ -32,20 +32,32 @@ std::vector<double> mass_weights(const Organ& organ) {
 // Keys that mean something with some laws only.
 struct LawKey {
   std::string_view key;
-  bool springs, tensor_mass, neo_hookean;
+  bool springs, tensor_mass, neo_hookean, measured;
   const char* why;
 };
 constexpr std::array kLawKeys{
-    LawKey{"spring_stiffness_n_m", true, false, false, "is of springs"},
-    LawKey{"poisson_ratio", false, true, true,
-           "is of tets: springs have 1/4 whatever is asked, see elastic_law"},
-    LawKey{"averaged_volume", false, false, true, "is of elastic_law = \"neo-hookean\""},
-    LawKey{"fibre_stiffness_ratio", true, false, false, "is of springs"}};
+    LawKey{"spring_stiffness_n_m", true, false, false, false, "is of springs"},
+    LawKey{"young_modulus_pa", true, true, true, false, "is what a measured material has"},
+    LawKey{"poisson_ratio", false, true, true, false,
+           "is of tets with elastic_law = \"tensor-mass\" or \"neo-hookean\": springs have 1/4 "
+           "whatever is asked"},
+    LawKey{"measured", false, false, false, true, "is of elastic_law = \"measured\""},
+    LawKey{"averaged_volume", false, false, true, true,
+           "is of elastic_law = \"neo-hookean\" or \"measured\""},
+    LawKey{"fibre_stiffness_ratio", true, false, false, false, "is of springs"}};
 
 bool applies(const LawKey& key, ElasticLaw law) {
-  return law == ElasticLaw::Springs      ? key.springs
-         : law == ElasticLaw::TensorMass ? key.tensor_mass
-                                         : key.neo_hookean;
+  switch (law) {
+    case ElasticLaw::Springs:
+      return key.springs;
+    case ElasticLaw::TensorMass:
+      return key.tensor_mass;
+    case ElasticLaw::NeoHookean:
+      return key.neo_hookean;
+    case ElasticLaw::Measured:
+      return key.measured;
+  }
+  return false;
 }
 
 }  // namespace
@@ -77,6 +89,16 @@ Status Resolver::change_material(const MaterialChange& change, const Organ& orga
     const Place& place = change.place_of(key.key);
     if (&place != &change.place && !applies(key, m.elastic_law))
       return wrong(place, std::string(key.why) + ", remove it");
+  }
+  if (change.measured) {
+    const auto* measured = find_measured_material(*change.measured);
+    if (measured == nullptr)
+      return wrong(change.place_of("measured"), "is none of " + measured_material_names());
+    use_measured(*measured, m);
+  } else if (m.elastic_law == ElasticLaw::Measured && m.measured.name.empty()) {
+    return wrong(change.place_of("elastic_law"),
+                 "needs a measured material, write measured = \"NAME\", one of " +
+                     measured_material_names());
   }
   set(change.density_kg_m3, m.density_kg_m3);
   if (change.young_modulus_pa) {

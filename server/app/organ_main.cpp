@@ -62,7 +62,7 @@ struct Options {
   std::optional<int> tets;
   std::optional<double> tension, tear_stretch, cut_energy_j_m2, blade_friction_pa;
   std::optional<double> fibre_tension, fibre_stiffness_ratio;
-  std::string fibres;
+  std::string fibres, material;
   std::string out;
   std::string import_file;
   std::string unit = "m";
@@ -131,6 +131,8 @@ const char* name_of(scene::ElasticLaw law) {
       return "tensor-mass";
     case scene::ElasticLaw::NeoHookean:
       return "neo-hookean";
+    case scene::ElasticLaw::Measured:
+      return "measured";
   }
   return "";
 }
@@ -149,8 +151,19 @@ void print_fibres(const scene::Material& m) {
                 m.fibre_stiffness_ratio, m.fibre_tension);
 }
 
+void print_measured(const scene::HyperelasticMaterial& m) {
+  std::printf("  elasticity          measured, %s (%s)\n", m.name.c_str(), m.source.c_str());
+  std::printf("  C10 to C50         ");
+  for (const double c : m.coefficients_pa) std::printf(" %.4g", c / 1e3);
+  std::printf(" kPa, bulk modulus %.4g kPa\n", m.bulk_modulus_pa / 1e3);
+  for (const auto& [weight, time_s] : m.relaxation)
+    std::printf("  relaxes             by %.4g in %.4g s\n", weight, time_s);
+}
+
 void print_material(const scene::Material& m) {
-  if (m.elastic_law != scene::ElasticLaw::Springs)
+  if (m.elastic_law == scene::ElasticLaw::Measured)
+    print_measured(m.measured);
+  else if (m.elastic_law != scene::ElasticLaw::Springs)
     std::printf("  elasticity          %s, Young's modulus %.4g kPa, Poisson's ratio %.4g%s\n",
                 name_of(m.elastic_law), m.young_modulus_pa / 1e3, m.poisson_ratio,
                 m.has_averaged_volume ? ", averaged volume" : "");
@@ -234,6 +247,8 @@ std::string quoted(const std::string& text) {
 void print_json(const scene::Material& m) {
   std::printf("  \"elastic_law\": \"%s\",\n  \"poisson_ratio\": %.9g,\n", name_of(m.elastic_law),
               m.poisson_ratio);
+  if (m.elastic_law == scene::ElasticLaw::Measured)
+    std::printf("  \"measured\": %s,\n", quoted(m.measured.name).c_str());
   std::printf("  \"spring_law\": \"%s\",\n  \"spring_stiffness_n_m\": %.9g,\n",
               m.spring_law == scene::SpringLaw::Constant ? "constant" : "volume_consistent",
               m.spring_stiffness_n_m);
@@ -335,6 +350,13 @@ Status change_organ(const Options& options, scene::Organ& organ) {
                  "--tear-stretch: does not apply, organs of links do not tear, "
                  "only those of tets alone"};
   auto& material = organ.material;
+  if (!options.material.empty()) {
+    const auto* measured = scene::find_measured_material(options.material);
+    if (measured == nullptr)
+      return Error{ErrorCode::Usage, "--material: " + options.material + " is none of " +
+                                         scene::measured_material_names()};
+    scene::use_measured(*measured, material);
+  }
   const auto set = [](const std::optional<double>& from, double& to) { to = from.value_or(to); };
   set(options.tension, material.tension);
   set(options.fibre_tension, material.fibre_tension);
@@ -430,6 +452,10 @@ void add_commands(CLI::App& app, Options& options) {
       ->required();
   inspect->add_flag("--json", options.json, "print JSON");
   for (auto* command : {make, import}) {
+    command
+        ->add_option("--material", options.material,
+                     "measured material of its tets: " + scene::measured_material_names())
+        ->type_name("NAME");
     command->add_option("--tension", options.tension, "tissue would be shorter by this part [0]")
         ->type_name("PART");
     command

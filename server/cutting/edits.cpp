@@ -178,6 +178,7 @@ NodeIndex split_edge(dynamics::Topology& topology, Places& places, NodeIndex a, 
     const auto place = places.take_tet(topology);
     topology.put_tet(place, child);
     topology.set_fibre_axis(place, topology.fibre_axis(parent));
+    topology.add_part(place, parent);
     topology.mark_wound_faces(place, wound);
     clear_wound(topology, place, corner_b);
     children.push_back({parent, place});

@@ -82,6 +82,7 @@ void BlockDescent::take_state(const world::World& world) {
     }
   }
   if (far_field_) far_field_->take_state(x_.data(), world);
+  if (auto* const relaxation = tissue_.relaxation()) relaxation->take_state();
 }
 
 bool BlockDescent::use_linear_far_field(const world::World& world) {
@@ -487,6 +488,8 @@ SolveReport BlockDescent::solve(const contact::ContactList& contacts,
   plan_step(near, settings, world.tick, loads.held);
   plan_bands(near, settings.bands);
   link_contacts(contacts);
+  if (auto* const relaxation = tissue_.relaxation())
+    relaxation->begin_step(settings.dt, world.relaxation, workers_);
   begin_groups(world, loads);
 
   SolveReport report;
@@ -547,6 +550,8 @@ SolveReport BlockDescent::solve(const contact::ContactList& contacts,
     report.nodes_restored = restored.nodes;
     report.largest_move_m += restored.largest_move_m;
   }
+  if (auto* const relaxation = tissue_.relaxation())
+    relaxation->end_step(x_.data(), world.relaxation, workers_);
   residuals_.clear();
   for (const auto node : near) {
     const Slot slot = tissue_.groups().slot_of(node);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <type_traits>
+#include <utility>
 
 #include "common/base/assert.h"
 #include "server/dynamics/tet_shape.h"
@@ -58,14 +59,9 @@ struct Hyperelastic<Law>::RowShape {
 
 template <typename Law>
 Hyperelastic<Law>::Hyperelastic(const Topology& topology, const Groups& groups,
-                                bool has_averaged_volume, const Law& law)
-    : law_(law), has_averaged_volume_(has_averaged_volume) {
-  const auto& organ = topology.organ();
-  for (std::size_t m = 0; m <= organ.regions.size(); ++m) {
-    const auto& material = scene::material_at(organ, static_cast<std::uint16_t>(m));
-    is_ours_.push_back(material.elastic_law == scene::ElasticLaw::NeoHookean);
-    parameters_.push_back(scene::neo_hookean_parameters(material));
-  }
+                                bool has_averaged_volume, HyperelasticParameters parameters,
+                                const Law& law)
+    : law_(law), has_averaged_volume_(has_averaged_volume), parameters_(std::move(parameters)) {
   const auto bound = [&](NodeIndex node) { return topology.tets_of(node).size(); };
   rows_.reserve(groups, bound);
   if constexpr (!Law::kIsLinear) invariant_rows_.reserve(groups, bound);
@@ -116,8 +112,8 @@ void Hyperelastic<Law>::find_tets(const Topology& topology, NodeIndex node,
   out.clear();
   for (const auto t : topology.tets_of(node)) {
     const auto material = topology.material_of(t);
-    if (!is_ours_[material]) continue;
-    const auto [c10, bulk] = parameters_[material];
+    if (!parameters_[material]) continue;
+    const auto [c10, bulk] = *parameters_[material];
     const auto tet = seen_from(topology.tet(t), node);
     out.push_back({tet, c10, bulk, stress_free_shape(topology, t, tet)});
   }
@@ -130,10 +126,10 @@ void Hyperelastic<Law>::set_star(const Topology& topology, NodeIndex node, Slot 
   if (node.is_valid())
     for (const auto t : topology.tets_of(node)) {
       const auto material = topology.material_of(t);
-      if (!is_ours_[material]) continue;
+      if (!parameters_[material]) continue;
       const double v = stress_free_shape(topology, t, topology.tet(t)).volume;
       volume += v;
-      bulk += v * parameters_[material].bulk_modulus_pa;
+      bulk += v * parameters_[material]->bulk_modulus_pa;
       change += tet_shape(topology.rest(), topology.tet(t)).volume - v;
     }
   if (volume > 0) bulk /= volume;

@@ -13,18 +13,33 @@
 // block is bounded by theta times the unaveraged one, theta found at rest; nodes need colours by
 // Coupling::Stars. Volumes are summed as nodes move and anew at each step.
 
+#include <optional>
+
 #include "server/dynamics/energy.h"
 #include "server/dynamics/psi.h"
 #include "server/dynamics/tet_shape.h"
 
 namespace trocar::dynamics {
 
+// Per material, as scene::material_at() counts; nothing where it has another law.
+using HyperelasticParameters = std::vector<std::optional<scene::NeoHookeanParameters>>;
+
+template <typename Is>
+HyperelasticParameters hyperelastic_parameters(const scene::Organ& organ, Is&& is) {
+  HyperelasticParameters parameters(organ.regions.size() + 1);
+  for (std::size_t m = 0; m < parameters.size(); ++m) {
+    const auto& material = scene::material_at(organ, static_cast<std::uint16_t>(m));
+    if (is(material)) parameters[m] = scene::neo_hookean_parameters(material);
+  }
+  return parameters;
+}
+
 template <typename Law>
 class Hyperelastic final : public Energy {
  public:
-  // Of the organ's tets with ElasticLaw::NeoHookean; `law` replaces Psi, with the material's C10.
+  // Of the tets whose material has parameters here.
   Hyperelastic(const Topology& topology, const Groups& groups, bool has_averaged_volume,
-               const Law& law = {});
+               HyperelasticParameters parameters, const Law& law = {});
 
   void add(Group group, const Float4* x, const Vec8& own, NodeStep8& step,
            Scratch& scratch) const override;
@@ -82,8 +97,7 @@ class Hyperelastic final : public Energy {
 
   const Law law_;
   const bool has_averaged_volume_;
-  std::vector<scene::NeoHookeanParameters> parameters_;  // as scene::material_at() counts
-  std::vector<std::uint8_t> is_ours_;                    // whether the material has this law
+  const HyperelasticParameters parameters_;
   GroupRows<Row> rows_;
   GroupRows<InvariantRow> invariant_rows_;    // empty for a linear law
   std::vector<Vec3Lanes> constant_gradient_;  // N per group; linear laws

@@ -18,6 +18,8 @@ struct ReducedPolynomialLaw {
   static constexpr bool kIsLinear = false;
   std::array<float, 4> ratios{};  // C20 .. C50 over C10
 
+  bool operator==(const ReducedPolynomialLaw&) const = default;
+
   // First and second derivative over C10 at e = I1 - 3.
   void derivatives(Float8 e, Float8& first, Float8& second) const {
     const Float8 is_curved = _mm256_cmp_ps(e, all(0), _CMP_GT_OQ);

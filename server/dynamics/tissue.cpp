@@ -4,6 +4,7 @@
 
 #include "common/scene/any_material.h"
 #include "server/dynamics/hyperelastic.h"
+#include "server/dynamics/relaxed_stress.h"
 #include "server/dynamics/springs.h"
 #include "server/dynamics/tensor_mass.h"
 
@@ -18,8 +19,16 @@ bool has_law(const scene::Organ& organ, ElasticLaw law) {
 
 bool averages_volume(const scene::Organ& organ) {
   return scene::any_material(organ, [](const scene::Material& m) {
-    return m.elastic_law == ElasticLaw::NeoHookean && m.has_averaged_volume;
+    return scene::is_hyperelastic(m) && m.has_averaged_volume;
   });
+}
+
+ReducedPolynomialLaw polynomial_of(const scene::HyperelasticMaterial& measured) {
+  ReducedPolynomialLaw law;
+  const auto& c = measured.coefficients_pa;
+  for (std::size_t i = 0; i < law.ratios.size(); ++i)
+    law.ratios[i] = static_cast<float>(c[i + 1] / c[0]);
+  return law;
 }
 
 }  // namespace
@@ -35,7 +44,36 @@ Tissue::Tissue(const Topology& topology, std::span<const Colour> colours)
   if (has_law(organ, ElasticLaw::TensorMass))
     energies_.push_back(std::make_unique<TensorMass>(topology, groups_));
   if (has_law(organ, ElasticLaw::NeoHookean))
-    energies_.push_back(std::make_unique<NeoHookean>(topology, groups_, follows_moves_));
+    energies_.push_back(
+        std::make_unique<NeoHookean>(topology, groups_, follows_moves_,
+                                     hyperelastic_parameters(organ, [](const scene::Material& m) {
+                                       return m.elastic_law == ElasticLaw::NeoHookean;
+                                     })));
+  add_measured(topology);
+}
+
+// One energy for all materials whose polynomials are multiples of each other.
+void Tissue::add_measured(const Topology& topology) {
+  const auto& organ = topology.organ();
+  std::vector<ReducedPolynomialLaw> laws;
+  for (std::size_t i = 0; i <= organ.regions.size(); ++i) {
+    const auto& material = scene::material_at(organ, static_cast<std::uint16_t>(i));
+    if (material.elastic_law != ElasticLaw::Measured) continue;
+    const auto law = polynomial_of(material.measured);
+    if (std::ranges::find(laws, law) == laws.end()) laws.push_back(law);
+  }
+  for (const auto& law : laws)
+    energies_.push_back(std::make_unique<Hyperelastic<ReducedPolynomialLaw>>(
+        topology, groups_, follows_moves_,
+        hyperelastic_parameters(organ,
+                                [&](const scene::Material& m) {
+                                  return m.elastic_law == ElasticLaw::Measured &&
+                                         polynomial_of(m.measured) == law;
+                                }),
+        law));
+  if (!Relaxation::is_needed(organ)) return;
+  relaxation_ = std::make_unique<Relaxation>(topology, groups_);
+  energies_.push_back(std::make_unique<RelaxedStress>(topology, groups_, *relaxation_));
 }
 
 void Tissue::touch(Slot slot) {
@@ -95,6 +133,7 @@ FollowReport Tissue::follow_topology(const Topology& topology) {
     lanes_[g] = 0;
   }
   touched_groups_.clear();
+  if (relaxation_) relaxation_->follow(topology, groups_, touched_);
   for (const auto& energy : energies_)
     report.rows += energy->rebuild(topology, groups_, energy->follows_moves() ? wide_ : touched_);
   return report;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "server/dynamics/energy.h"
+#include "server/dynamics/relaxation.h"
 
 namespace trocar::dynamics {
 
@@ -54,6 +55,9 @@ class Tissue {
   // Lanes whose node, or what meets at it, the last follow_topology() found changed; ascending.
   std::span<const GroupLanes> touched() const { return touched_; }
 
+  // What remembers stresses; null where nothing relaxes.
+  Relaxation* relaxation() { return relaxation_.get(); }
+
   // Elastic energy in double, J; displacements per place of a node.
   double energy_j(std::span<const Vec3f> displacements) const;
   std::size_t energy_count() const { return energies_.size(); }
@@ -62,8 +66,10 @@ class Tissue {
  private:
   Groups groups_;
   std::vector<std::unique_ptr<Energy>> energies_;
+  std::unique_ptr<Relaxation> relaxation_;
   bool follows_moves_ = false;
 
+  void add_measured(const Topology& topology);
   void touch(Slot slot);
   void list_touched(std::vector<GroupLanes>& out);
 

@@ -218,6 +218,7 @@ void Topology::mark(NodeIndex node) {
 void Topology::clear_changes() {
   for (const auto node : changed_) is_changed_[node.value] = 0;
   changed_.clear();
+  parts_.clear();
   node_tets_.tidy();
   node_links_.tidy();
   node_regions_.tidy();

@@ -79,6 +79,13 @@ class Topology {
   void move_node(NodeIndex node, const Vec3d& rest, const Vec3d& stress_free);
   // A tet at a place without one; its volume is positive.
   void put_tet(TetIndex place, const mesh::Tet& tet);
+  // After put_tet(): the new tet is a part of what the parent was.
+  void add_part(TetIndex part, TetIndex parent) { parts_.push_back({part, parent}); }
+  struct Part {
+    TetIndex part, parent;
+  };
+  // Since clear_changes(), in their order.
+  std::span<const Part> parts() const { return parts_; }
   void remove_tet(TetIndex tet);
   void put_link(NodeIndex a, NodeIndex b);
   void remove_link(NodeIndex a, NodeIndex b);
@@ -108,6 +115,7 @@ class Topology {
   std::vector<mesh::Tet> tets_;              // invalid nodes where there is none
   std::vector<std::uint16_t> tet_materials_;
   std::vector<std::uint8_t> wound_faces_;  // per tet
+  std::vector<Part> parts_;
   std::vector<std::uint8_t> has_node_, is_changed_;
   Blocks<TetIndex> node_tets_;
   Blocks<NodeIndex> node_links_;

@@ -55,6 +55,7 @@ const scene::Place& run_key(const scene::Scenario& scenario, std::string_view ke
 // The world of a scenario, with what it displaces held.
 world::World world_of(const scene::ResolvedScenario& resolved) {
   world::World world(resolved.organ);
+  dynamics::start_relaxed(resolved.organ, world);
   for (const auto& load : resolved.displacements)
     for (const auto node : load.nodes)
       if (load.axes == kAllAxes) world.node_classes[node.value] = world::NodeClass::Fixed;
@@ -71,6 +72,10 @@ Status check_explicit(const scene::ResolvedScenario& resolved) {
     if (probe.quantity == scene::ProbeQuantity::Reaction)
       return scene::scenario_error(scenario, probe.place,
                                    "a reaction needs integrator = \"implicit\" in [run]");
+  if (dynamics::Relaxation::is_needed(resolved.organ))
+    return scene::scenario_error(scenario, place,
+                                 "\"explicit\" knows no relaxation, which this material has: take "
+                                 "\"implicit\"");
   const double stable = dynamics::ExplicitEuler(resolved.organ, world_of(resolved)).stable_dt_s();
   if (scenario.run.dt_s() <= stable) return {};
   char text[160];

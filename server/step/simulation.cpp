@@ -6,6 +6,7 @@
 
 #include "common/base/assert.h"
 #include "common/scene/any_material.h"
+#include "server/dynamics/relaxation.h"
 
 namespace trocar::step {
 
@@ -13,7 +14,9 @@ State::State(const scene::Organ& organ)
     : cuts(organ),
       world(organ),
       claims(organ.mesh.node_count()),
-      quantised(cuts.layout().vertex_count()) {}
+      quantised(cuts.layout().vertex_count()) {
+  dynamics::start_relaxed(organ, world);
+}
 
 void State::visit(world::StateArchive& archive) {
   mark.visit_state(archive);
@@ -62,9 +65,7 @@ namespace {
 
 // Springs and linear tets cost no more than the matrices of a linear far field.
 bool is_costly(const scene::Organ& organ) {
-  return scene::any_material(organ, [](const scene::Material& m) {
-    return m.elastic_law == scene::ElasticLaw::NeoHookean;
-  });
+  return scene::any_material(organ, scene::is_hyperelastic);
 }
 
 }  // namespace

@@ -8,7 +8,8 @@ World::World(const scene::Organ& organ)
       velocities(organ.mesh.node_count()),
       node_classes(organ.mesh.node_count(), NodeClass::Outer),
       quiet_ticks(organ.mesh.node_count()),
-      far_poses(organ.mesh.node_count()) {
+      far_poses(organ.mesh.node_count()),
+      relaxation(organ) {
   const auto& mesh = organ.mesh;
   rest_positions.reserve(mesh.node_count());
   masses.reserve(mesh.node_count());
@@ -49,6 +50,7 @@ void World::visit_state(StateArchive& archive) {
   archive.fixed_array(node_classes);
   archive.fixed_array(quiet_ticks);
   far_poses.visit_state(archive);
+  relaxation.visit_state(archive);
   if (!archive.is_reading()) return;
   if (boundary > Boundary::Graded) archive.fail();
   for (std::size_t i = 0; i < node_count(); ++i)

@@ -13,6 +13,7 @@
 #include "common/math/vec3.h"
 #include "common/scene/organ.h"
 #include "server/world/far_poses.h"
+#include "server/world/relaxation_state.h"
 #include "server/world/state_archive.h"
 
 namespace trocar::world {
@@ -51,6 +52,7 @@ struct World {
   std::vector<NodeClass> node_classes;
   std::vector<std::uint16_t> quiet_ticks;  // ticks in a row below the freezing thresholds
   FarPoses far_poses;                      // about which the far field is linear
+  RelaxationState relaxation;              // of stresses, per tet
 
   // A node between a and b, t/65536 of the way from a; a copy of a where b is a. Moves with them,
   // fixed where both are, with no mass and no surface yet.

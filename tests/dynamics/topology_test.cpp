@@ -289,7 +289,8 @@ TEST(FollowTopology, LawsThatNeedTheInvariantFollowToo) {
   auto& topology = edited.topology();
   Tissue tissue(topology);
   const ReducedPolynomialLaw law{{1.9f, 1.6f, 3.0f, 2.0f}};
-  Hyperelastic<ReducedPolynomialLaw> energy(topology, tissue.groups(), false, law);
+  const auto parameters = hyperelastic_parameters(topology.organ(), scene::is_hyperelastic);
+  Hyperelastic<ReducedPolynomialLaw> energy(topology, tissue.groups(), false, parameters, law);
   for (int edit = 0; edit < 30; ++edit) {
     edited.edit();
     tissue.follow_topology(topology);
@@ -297,7 +298,7 @@ TEST(FollowTopology, LawsThatNeedTheInvariantFollowToo) {
     topology.clear_changes();
   }
   const auto& groups = tissue.groups();
-  const Hyperelastic<ReducedPolynomialLaw> fresh(topology, groups, false, law);
+  const Hyperelastic<ReducedPolynomialLaw> fresh(topology, groups, false, parameters, law);
   const auto u = some_displacements(groups.slot_count(), 1);
   std::vector<Float4> x;
   for (const auto& v : u) x.push_back(to_float4(v));
