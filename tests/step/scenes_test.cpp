@@ -69,6 +69,20 @@ class Operation {
     for (const auto node : nodes) sum += state().world.displacements[node.value];
     return nodes.empty() ? Vec3f{} : sum / static_cast<float>(nodes.size());
   }
+  // How far that node has gone which has gone least, of the piece that the second tool holds.
+  float piece_has_moved() const {
+    const auto& topology = state().cuts.topology();
+    const auto found = cutting::find_pieces(topology);
+    const auto piece_of = [&](NodeIndex node) {
+      return found.piece_of_tet[topology.tets_of(node).front().value];
+    };
+    const auto held = piece_of(state().grasps[ToolSlot{1}].nodes.front());
+    float least = 1;
+    for (std::uint32_t n = 0; n < topology.node_count(); ++n)
+      if (!topology.tets_of(NodeIndex(n)).empty() && piece_of(NodeIndex(n)) == held)
+        least = std::min(least, length(state().world.displacements[n]));
+    return least;
+  }
   bool is_valid() const { return cutting::validate(state().cuts.topology()).ok(); }
 
   double opened_m2 = 0, torn_m2 = 0;
@@ -96,7 +110,9 @@ TEST(Scenes, AFlapIsCutOnThreeSidesLiftedAndTornOff) {
   const auto pieces = flap.pieces();
   ASSERT_GE(pieces.size(), 2u);
   EXPECT_GT(pieces[1], 150u) << "the flap in one piece, or nearly";
+  ASSERT_FALSE(flap.state().grasps[ToolSlot{1}].nodes.empty());
   EXPECT_GT(flap.held_has_moved().y, 0.09f);
+  EXPECT_GT(flap.piece_has_moved(), 0.05f);
 }
 
 TEST(Scenes, AWedgeIsCutOutAndRemoved) {
@@ -110,8 +126,9 @@ TEST(Scenes, AWedgeIsCutOutAndRemoved) {
   wedge.run_to(7.5);
   EXPECT_TRUE(wedge.is_valid());
   EXPECT_EQ(wedge.torn_m2, 0);
-  EXPECT_FALSE(wedge.state().grasps[ToolSlot{1}].nodes.empty());
+  ASSERT_FALSE(wedge.state().grasps[ToolSlot{1}].nodes.empty());
   EXPECT_GT(wedge.held_has_moved().z, 0.04f);
+  EXPECT_GT(wedge.piece_has_moved(), 0.03f);
 }
 
 }  // namespace
