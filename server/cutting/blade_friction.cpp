@@ -49,7 +49,9 @@ void BladeFriction::find_tets(CutMesh& mesh, const Vec3d& from, const Vec3d& to)
   if (!strip) return;
   mesh.collect({&*strip, 1}, 1, nodes_);
   for (const auto node : nodes_) {
-    // Of what collect() finds besides, nothing may follow: it is no state.
+    // A point in a tet is no farther than 0.62 of its longest edge from a corner (Jung), so none is
+    // missed in tissue up to 1.6 times as long as at rest. Of what collect() finds besides nothing
+    // may follow: it is no state.
     const double reach = mesh.reach(node);
     if (distance_squared_to_segment(from, to, mesh.position(node)) > reach * reach) continue;
     const auto tets = mesh.topology().tets_of(node);

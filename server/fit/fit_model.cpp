@@ -184,8 +184,8 @@ Status FitModel::place_measurements() {
   if (run.mode != scene::RunMode::Static) return {};
   run.load_times_s = times;
   std::ranges::sort(run.load_times_s);
-  const auto twice = std::ranges::unique(run.load_times_s);
-  run.load_times_s.erase(twice.begin(), twice.end());
+  run.load_times_s.erase(std::unique(run.load_times_s.begin(), run.load_times_s.end()),
+                         run.load_times_s.end());
   for (const double time : times)
     steps_.push_back(static_cast<std::size_t>(std::ranges::lower_bound(run.load_times_s, time) -
                                               run.load_times_s.begin()));

@@ -152,8 +152,11 @@ void ScenarioRun::list_axis_holds() {
     for (const auto node : load.nodes) axis_holds_.push_back({node, 0, {}});
   }
   std::ranges::sort(axis_holds_, {}, &dynamics::AxisHold::node);
-  const auto twice = std::ranges::unique(axis_holds_, {}, &dynamics::AxisHold::node);
-  axis_holds_.erase(twice.begin(), twice.end());
+  const auto is_same = [](const dynamics::AxisHold& a, const dynamics::AxisHold& b) {
+    return a.node == b.node;
+  };
+  axis_holds_.erase(std::unique(axis_holds_.begin(), axis_holds_.end(), is_same),
+                    axis_holds_.end());
   for (const auto& load : resolved_.displacements)
     if (load.axes != kAllAxes)
       for (const auto node : load.nodes) axis_hold_of(node)->axes |= load.axes;
