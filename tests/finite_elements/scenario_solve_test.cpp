@@ -93,16 +93,17 @@ TEST(ScenarioSolve, MeetsTheLiveSolverUnderPressureAndForce) {
       "[[force]]\nset = \"corner\"\n[[force.key]]\ntime_s = 0\nforce_n = [0, 0.02, 0.02]\n");
 }
 
-// What holds the column carries its load, whatever the elements.
+// What holds the column carries its load, whatever the elements. (Under the whole of the earth's
+// gravity so soft a column falls over.)
 TEST(ScenarioSolve, ReactionsBalanceLoads) {
   const std::string text = kColumn + kStatic +
-                           "[gravity]\nm_s2 = [0, -9.81, 0]\n[[force]]\nset = \"top\"\n"
-                           "[[force.key]]\ntime_s = 0\nforce_n = [0.05, 0, 0]\n";
+                           "[gravity]\nm_s2 = [0, -2, 0]\n[[force]]\nset = \"top\"\n"
+                           "[[force.key]]\ntime_s = 0\nforce_n = [0.02, 0, 0]\n";
   for (const auto order : {ElementOrder::Linear, ElementOrder::Quadratic}) {
     const auto solve = solve_of(text, {.order = order});
     while (!solve->is_finished()) ASSERT_TRUE(solve->step().is_converged);
-    const double weight = 1060 * 0.02 * 0.06 * 0.02 * 9.81;
-    EXPECT_NEAR(solve->probe(1).x, -0.05, 1e-7);
+    const double weight = 1060 * 0.02 * 0.06 * 0.02 * 2;
+    EXPECT_NEAR(solve->probe(1).x, -0.02, 1e-7);
     EXPECT_NEAR(solve->probe(1).y, weight, 1e-7 * weight);
   }
 }
