@@ -14,6 +14,7 @@
 #include "common/base/timing.h"
 #include "common/base/version.h"
 #include "common/scene/any_material.h"
+#include "server/app/sim_fem.h"
 #include "server/scenario/field_files.h"
 #include "server/scenario/probe_file.h"
 #include "server/scenario/probe_plots.h"
@@ -33,6 +34,8 @@ Examples:
       the same, and draws what the probes saw (SVG)
   trocar-sim deploy/scenes/pull.toml --solver full --out /tmp/reference
       the same with every step solved to the tolerance in [run]
+  trocar-sim deploy/scenes/stretch.toml --solver fem --material human_liver_nava2008
+      a measured material on quadratic finite elements, which do not lock
 
 Writes probes.csv, and field_<ms>ms.csv and .vtu (ParaView) for the times in [output].
 Ctrl-C ends a run early; what was written until then is complete.
@@ -42,6 +45,7 @@ processor too old.
 )";
 
 struct Options {
+  FemCommand fem;
   std::string scenario;
   std::string out;
   std::string solver = "live";
@@ -168,7 +172,9 @@ Status run_scenario(const Options& options) {
           : parsed->output_folder.value_or("out/" + parsed->source.stem().string());
   auto resolved = scene::resolve(std::move(*parsed));
   if (!resolved) return resolved.error();
-  if (auto s = scenario::check_supported(*resolved); !s) return s;
+  const bool is_fem = options.solver == "fem";
+  if (!is_fem)
+    if (auto s = scenario::check_supported(*resolved); !s) return s;
   if (scene::any_material(resolved->organ,
                           [](const scene::Material& m) { return m.tear_stretch > 0; }))
     std::fprintf(
@@ -181,6 +187,8 @@ Status run_scenario(const Options& options) {
                  folder.string() + ": cannot be made (" + failed.message() + "), see --out"};
   std::signal(SIGINT, request_stop);
   std::signal(SIGTERM, request_stop);
+  if (is_fem)
+    return run_fem(options.fem, std::move(*resolved), folder, options.threads, stop_requested);
   scenario::ScenarioRun run(
       std::move(*resolved),
       options.solver == "full" ? scenario::Solver::Full : scenario::Solver::Live, options.threads);
@@ -203,9 +211,10 @@ int run(int argc, char** argv) {
   app.add_option("--out", options.out, "folder of the results [dir in [output], else out/<name>]")
       ->type_name("DIR");
   app.add_option("--solver", options.solver,
-                 "live: the sweeps of a session; full: every step to the tolerance in [run]")
+                 "live: the sweeps of a session; full: every step to the tolerance in [run]; fem: "
+                 "the off-line finite elements, for reference")
       ->type_name("SOLVER")
-      ->check(CLI::IsMember({"live", "full"}))
+      ->check(CLI::IsMember({"live", "full", "fem"}))
       ->capture_default_str();
   app.add_flag("--plot", options.is_plotted,
                "also draw what each probe saw: probe_<name>.svg over time, and force_<name>.svg, "
@@ -214,6 +223,7 @@ int run(int argc, char** argv) {
       ->type_name("N")
       ->check(CLI::Range(1, 64))
       ->capture_default_str();
+  add_fem_options(app, options.fem);
   app.add_option("--log-level", options.log_level, "error, warn, info, debug or off")
       ->capture_default_str();
   try {

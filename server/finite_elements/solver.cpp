@@ -254,6 +254,7 @@ StepReport Solver::step(const Loads& loads, const StepSettings& settings) {
     part_settings.dt_s *= std::isfinite(settings.dt_s) ? size : 1;
     if (solve_part({target, part_settings}, done, report)) {
       done += size;
+      size = std::min(2 * size, 1 - done);
       ++report.parts;
       continue;
     }

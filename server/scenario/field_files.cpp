@@ -27,34 +27,26 @@ Status write_file(const std::filesystem::path& path, Body body) {
   return {};
 }
 
-// fixed, displaced or free: nothing else tells them apart in a file.
-bool is_held(const ScenarioRun& run, std::size_t node) {
-  return run.world().node_classes[node] == world::NodeClass::Fixed;
-}
-
-void write_csv(std::FILE* file, const ScenarioRun& run, const scene::MaterialMap& regions) {
+void write_csv(std::FILE* file, const Field& field, const scene::MaterialMap& regions) {
   std::fputs(
       "node,rest_x_mm,rest_y_mm,rest_z_mm,displacement_x_mm,displacement_y_mm,"
       "displacement_z_mm,velocity_x_mm_s,velocity_y_mm_s,velocity_z_mm_s,held,region\n",
       file);
-  for (std::size_t i = 0; i < run.world().node_count(); ++i) {
-    const Vec3d p = run.organ().mesh.rest_positions[i] * 1e3;
-    const Vec3d u = to_double(run.world().displacements[i]) * 1e3;
-    const Vec3d v = to_double(run.world().velocities[i]) * 1e3;
+  for (std::size_t i = 0; i < field.organ.mesh.node_count(); ++i) {
+    const Vec3d p = field.organ.mesh.rest_positions[i] * 1e3;
+    const Vec3d u = field.displacements_m[i] * 1e3;
+    const Vec3d v = field.velocities_m_s[i] * 1e3;
     std::fprintf(file, "%zu,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%d,%u\n", i, p.x, p.y, p.z,
-                 u.x, u.y, u.z, v.x, v.y, v.z, is_held(run, i) ? 1 : 0, regions.nodes[i]);
+                 u.x, u.y, u.z, v.x, v.y, v.z, field.is_held[i], regions.nodes[i]);
   }
 }
 
-template <typename Vectors>
-void write_vectors(std::FILE* file, const char* name, const Vectors& vectors) {
+void write_vectors(std::FILE* file, const char* name, const std::vector<Vec3d>& vectors) {
   std::fprintf(file,
                "        <DataArray type=\"Float64\" Name=\"%s\" NumberOfComponents=\"3\" "
                "format=\"ascii\">\n",
                name);
-  for (const auto& v : vectors)
-    std::fprintf(file, "%.9g %.9g %.9g\n", static_cast<double>(v.x), static_cast<double>(v.y),
-                 static_cast<double>(v.z));
+  for (const auto& v : vectors) std::fprintf(file, "%.9g %.9g %.9g\n", v.x, v.y, v.z);
   std::fputs("        </DataArray>\n", file);
 }
 
@@ -102,8 +94,8 @@ void write_cells(std::FILE* file, const Cells& cells, int type) {
   std::fputs("        </DataArray>\n      </Cells>\n", file);
 }
 
-void write_vtu(std::FILE* file, const ScenarioRun& run, const scene::MaterialMap& regions) {
-  const auto& mesh = run.organ().mesh;
+void write_vtu(std::FILE* file, const Field& field, const scene::MaterialMap& regions) {
+  const auto& mesh = field.organ.mesh;
   const std::size_t cell_count = mesh.tets.empty() ? mesh.links.size() : mesh.tets.size();
   std::fputs(
       "<?xml version=\"1.0\"?>\n"
@@ -111,15 +103,14 @@ void write_vtu(std::FILE* file, const ScenarioRun& run, const scene::MaterialMap
       "header_type=\"UInt64\">\n"
       "  <UnstructuredGrid>\n",
       file);
-  write_region_names(file, run.organ());
+  write_region_names(file, field.organ);
   std::fprintf(file,
                "    <Piece NumberOfPoints=\"%zu\" NumberOfCells=\"%zu\">\n      <PointData>\n",
                mesh.node_count(), cell_count);
-  write_vectors(file, "displacement_m", run.world().displacements);
-  write_vectors(file, "velocity_m_s", run.world().velocities);
+  write_vectors(file, "displacement_m", field.displacements_m);
+  write_vectors(file, "velocity_m_s", field.velocities_m_s);
   std::fputs("        <DataArray type=\"UInt8\" Name=\"held\" format=\"ascii\">\n", file);
-  for (std::size_t i = 0; i < mesh.node_count(); ++i)
-    std::fprintf(file, "%d\n", is_held(run, i) ? 1 : 0);
+  for (std::size_t i = 0; i < mesh.node_count(); ++i) std::fprintf(file, "%d\n", field.is_held[i]);
   std::fputs("        </DataArray>\n", file);
   write_regions(file, regions.nodes);
   std::fputs("      </PointData>\n      <CellData>\n", file);
@@ -136,14 +127,25 @@ void write_vtu(std::FILE* file, const ScenarioRun& run, const scene::MaterialMap
 
 }  // namespace
 
-Status write_field(const std::filesystem::path& folder, const ScenarioRun& run) {
+Field field_of(const ScenarioRun& run) {
+  const auto& world = run.world();
+  Field field{run.organ(), run.time_s(), {}, {}, {}};
+  for (std::size_t i = 0; i < world.node_count(); ++i) {
+    field.displacements_m.push_back(to_double(world.displacements[i]));
+    field.velocities_m_s.push_back(to_double(world.velocities[i]));
+    field.is_held.push_back(world.node_classes[i] == world::NodeClass::Fixed ? 1 : 0);
+  }
+  return field;
+}
+
+Status write_field(const std::filesystem::path& folder, const Field& field) {
   char name[40];
-  std::snprintf(name, sizeof name, "field_%07lldms", std::llround(run.time_s() * 1e3));
-  const auto regions = scene::material_map(run.organ());
+  std::snprintf(name, sizeof name, "field_%07lldms", std::llround(field.time_s * 1e3));
+  const auto regions = scene::material_map(field.organ);
   const auto csv = folder / (std::string(name) + ".csv");
-  if (auto s = write_file(csv, [&](std::FILE* f) { write_csv(f, run, regions); }); !s) return s;
+  if (auto s = write_file(csv, [&](std::FILE* f) { write_csv(f, field, regions); }); !s) return s;
   const auto vtu = folder / (std::string(name) + ".vtu");
-  return write_file(vtu, [&](std::FILE* f) { write_vtu(f, run, regions); });
+  return write_file(vtu, [&](std::FILE* f) { write_vtu(f, field, regions); });
 }
 
 }  // namespace trocar::scenario

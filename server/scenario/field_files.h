@@ -14,6 +14,17 @@
 
 namespace trocar::scenario {
 
-Status write_field(const std::filesystem::path& folder, const ScenarioRun& run);
+struct Field {
+  const scene::Organ& organ;
+  double time_s = 0;
+  std::vector<Vec3d> displacements_m, velocities_m_s;  // per node
+  std::vector<std::uint8_t> is_held;                   // fixed or displaced
+};
+Field field_of(const ScenarioRun& run);
+
+Status write_field(const std::filesystem::path& folder, const Field& field);
+inline Status write_field(const std::filesystem::path& folder, const ScenarioRun& run) {
+  return write_field(folder, field_of(run));
+}
 
 }  // namespace trocar::scenario

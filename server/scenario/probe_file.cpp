@@ -1,5 +1,6 @@
 #include "server/scenario/probe_file.h"
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 
@@ -39,6 +40,9 @@ Result<ProbeFile> ProbeFile::create(const std::filesystem::path& path,
   result.path_ = path;
   result.file_.reset(std::fopen(path.c_str(), "wb"));
   if (!result.file_) return cannot_write(path);
+  result.is_static_ = scenario.run.mode == scene::RunMode::Static;
+  for (const auto& probe : scenario.probes)
+    result.per_si_.push_back(unit_of(probe.quantity).per_si);
   std::fputs("time_s", result.file_.get());
   for (const auto& probe : scenario.probes)
     for (const char axis : {'x', 'y', 'z'})
@@ -49,18 +53,22 @@ Result<ProbeFile> ProbeFile::create(const std::filesystem::path& path,
 }
 
 void ProbeFile::add(const ScenarioRun& run) {
-  const auto& probes = run.scenario().probes;
-  bool is_any_due = false;
-  for (std::size_t i = 0; i < probes.size(); ++i) is_any_due |= run.is_due(i);
-  if (!is_any_due) return;
-  std::fprintf(file_.get(), run.scenario().run.mode == scene::RunMode::Static ? "%.9g" : "%.3f",
-               run.time_s());
-  for (std::size_t i = 0; i < probes.size(); ++i) {
-    if (!run.is_due(i)) {
+  std::vector<std::optional<Vec3d>> values(run.scenario().probes.size());
+  for (std::size_t i = 0; i < values.size(); ++i)
+    if (run.is_due(i)) values[i] = run.probe(i);
+  add(run.time_s(), values);
+}
+
+void ProbeFile::add(double time_s, std::span<const std::optional<Vec3d>> values) {
+  const auto is_due = [](const auto& value) { return value.has_value(); };
+  if (std::none_of(values.begin(), values.end(), is_due)) return;
+  std::fprintf(file_.get(), is_static_ ? "%.9g" : "%.3f", time_s);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (!values[i]) {
       std::fputs(",,,", file_.get());
       continue;
     }
-    const Vec3d value = run.probe(i) * unit_of(probes[i].quantity).per_si;
+    const Vec3d value = *values[i] * per_si_[i];
     std::fprintf(file_.get(), ",%.9g,%.9g,%.9g", value.x, value.y, value.z);
   }
   std::fputc('\n', file_.get());

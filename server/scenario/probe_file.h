@@ -7,6 +7,9 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <optional>
+#include <span>
+#include <vector>
 
 #include "common/base/result.h"
 #include "server/scenario/scenario_run.h"
@@ -21,6 +24,8 @@ class ProbeFile {
 
   // After a step: a row if a probe is due.
   void add(const ScenarioRun& run);
+  // A row of one value per probe, SI; nothing for one that is not due.
+  void add(double time_s, std::span<const std::optional<Vec3d>> values);
   // What was added is in the file, whatever happens to the program.
   void flush() { std::fflush(file_.get()); }
   // Error: a row could not be written.
@@ -31,6 +36,8 @@ class ProbeFile {
     void operator()(std::FILE* file) const { std::fclose(file); }
   };
   std::filesystem::path path_;
+  bool is_static_ = false;
+  std::vector<double> per_si_;  // per probe
   std::unique_ptr<std::FILE, Closer> file_;
 };
 

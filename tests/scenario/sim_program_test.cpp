@@ -29,6 +29,27 @@ TEST_F(SimProgram, TheExampleRunsAndWritesTheSameBytesTwice) {
   }
 }
 
+TEST_F(SimProgram, TheOffLineSolverLeavesAStateFromWhichItGoesOn) {
+  const std::string example = std::string(TROCAR_SOURCE_DIR) + "/deploy/scenes/stretch.toml";
+  const auto out = folder_ / "out";
+  const std::vector<std::string> fem{
+      example, "--solver", "fem", "--out", out.string(), "--material", "human_liver_nava2008"};
+  ASSERT_EQ(run(fem), 0) << log();
+  EXPECT_NE(log().find("750 quadratic elements"), std::string::npos) << log();
+  const auto probes = read(out / "probes.csv");
+  EXPECT_EQ(std::count(probes.begin(), probes.end(), '\n'), 9) << "a row per load step";
+  auto again = fem;
+  again.insert(again.end(), {"--resume", (out / "fem.state").string()});
+  ASSERT_EQ(run(again), 0) << log();
+  again.insert(again.end(), {"--elements", "linear"});
+  EXPECT_EQ(run(again), 3);
+  EXPECT_NE(log().find("fem.state: is of another organ, material"), std::string::npos) << log();
+  auto unknown = fem;
+  unknown.back() = "rubber";
+  EXPECT_EQ(run(unknown), 2);
+  EXPECT_NE(log().find("write human_liver_nava2008"), std::string::npos) << log();
+}
+
 TEST_F(SimProgram, PlotsShowEachProbeAndForceAgainstDisplacement) {
   const std::string example = std::string(TROCAR_SOURCE_DIR) + "/deploy/scenes/pull.toml";
   const auto out = folder_ / "out";

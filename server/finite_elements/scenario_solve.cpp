@@ -1,0 +1,291 @@
+#include "server/finite_elements/scenario_solve.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+
+#include "server/finite_elements/state_file.h"
+#include "server/finite_elements/surface_traction.h"
+
+namespace trocar::finite_elements {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+Eigen::Index first_dof(std::uint32_t node) {
+  return 3 * static_cast<Eigen::Index>(node);
+}
+
+void add_at(Vector& all, std::uint32_t node, const Vec3d& value) {
+  all.segment<3>(first_dof(node)) += Eigen::Vector3d(value.x, value.y, value.z);
+}
+Vec3d at_node(const Vector& all, std::uint32_t node) {
+  const auto v = all.segment<3>(first_dof(node));
+  return {v[0], v[1], v[2]};
+}
+
+double component(const Vec3d& v, std::uint32_t axis) {
+  return axis == 0 ? v.x : axis == 1 ? v.y : v.z;
+}
+
+// The live solver's neo-Hookean law of linear elastic constants.
+scene::HyperelasticMaterial hyperelastic_of(const scene::Material& material,
+                                            const std::string& name) {
+  const auto [c10_pa, bulk_modulus_pa] = scene::neo_hookean_parameters(material);
+  scene::HyperelasticMaterial m;
+  m.name = name;
+  m.coefficients_pa[0] = c10_pa;
+  m.bulk_modulus_pa = bulk_modulus_pa;
+  return m;
+}
+
+// Weights of all nodes, N.
+Vector weight_of(const Problem& problem, const Vec3d& gravity) {
+  Vector weight = Vector::Zero(static_cast<Eigen::Index>(problem.dof_count()));
+  const auto& mesh = problem.mesh;
+  for (std::size_t e = 0; e < mesh.element_count(); ++e) {
+    const double mass = mesh.volumes[e] * problem.densities_kg_m3[problem.element_materials[e]];
+    const auto nodes = mesh.nodes_of(e);
+    for (std::size_t a = 0; a < nodes.size(); ++a) {
+      double share = 0;
+      for (std::size_t b = 0; b < nodes.size(); ++b) share += mass_share(mesh.order, a, b);
+      add_at(weight, nodes[a], gravity * (mass * share));
+    }
+  }
+  return weight;
+}
+
+Status check_organ(const scene::ResolvedScenario& resolved) {
+  const auto& scenario = resolved.scenario;
+  const auto wrong = [&](const scene::Place& place, const char* what) {
+    return scene::scenario_error(scenario, place, what);
+  };
+  if (resolved.organ.mesh.tets.empty())
+    return wrong(scenario.organ.place, "has no tets, which the solver \"fem\" needs");
+  if (!resolved.organ.stress_free_positions_m.empty())
+    return wrong(scenario.organ.place,
+                 "is settled; the solver \"fem\" takes organs free of stress");
+  if (!scenario.tools.empty())
+    return wrong(scenario.run_place, "the solver \"fem\" has no tools: displace a set instead");
+  for (const auto& probe : scenario.probes)
+    if (probe.quantity == scene::ProbeQuantity::ToolForce)
+      return wrong(probe.place, "the solver \"fem\" has no tools");
+  return {};
+}
+
+}  // namespace
+
+ScenarioSolve::ScenarioSolve(scene::ResolvedScenario resolved, const ScenarioSettings& settings)
+    : resolved_(std::move(resolved)), settings_(settings) {
+  const auto& run = resolved_.scenario.run;
+  step_count_ = is_static() ? run.load_times_s.size()
+                            : static_cast<std::uint64_t>(std::llround(run.seconds / settings.dt_s));
+}
+
+Result<std::unique_ptr<ScenarioSolve>> ScenarioSolve::create(scene::ResolvedScenario resolved,
+                                                             const ScenarioSettings& settings) {
+  if (auto s = check_organ(resolved); !s) return s.error();
+  std::unique_ptr<ScenarioSolve> solve(new ScenarioSolve(std::move(resolved), settings));
+  Problem problem;
+  if (auto s = solve->make_problem_of(problem); !s) return s.error();
+  solve->add_forces(problem);
+  for (const auto& nodes : solve->resolved_.probe_nodes)
+    solve->probe_nodes_.push_back(solve->with_middles(nodes, problem.mesh));
+  solve->solver_ = std::make_unique<Solver>(std::move(problem), settings.solver);
+  return solve;
+}
+
+Status ScenarioSolve::make_problem_of(Problem& problem) {
+  const auto& mesh = resolved_.organ.mesh;
+  problem.mesh = make_elements(mesh, mesh.rest_positions, settings_.order);
+  problem.damping_per_s = resolved_.organ.material.node_damping_per_s;
+  if (auto s = add_materials(problem); !s) return s;
+  add_holds(problem);
+  return validate(problem);
+}
+
+Status ScenarioSolve::add_materials(Problem& problem) const {
+  const auto& organ = resolved_.organ;
+  problem.element_materials = scene::material_map(organ).tets;
+  for (std::size_t i = 0; i <= organ.regions.size(); ++i) {
+    const auto& material = scene::material_at(organ, static_cast<std::uint16_t>(i));
+    const std::string name = i == 0 ? organ.name : organ.regions[i - 1].name;
+    problem.densities_kg_m3.push_back(material.density_kg_m3);
+    if (i == 0 && settings_.material) {
+      problem.materials.push_back(*settings_.material);
+      continue;
+    }
+    if (material.elastic_law != scene::ElasticLaw::NeoHookean)
+      return scene::scenario_error(
+          resolved_.scenario, resolved_.scenario.material.place,
+          "the solver \"fem\" needs elastic_law = \"neo-hookean\" or a measured material for " +
+              name + ", see --material");
+    if (material.tension != 0 || material.fibre_tension != 0)
+      return scene::scenario_error(resolved_.scenario, resolved_.scenario.material.place,
+                                   "the solver \"fem\" has no tension, set it to 0");
+    problem.materials.push_back(hyperelastic_of(material, name));
+  }
+  return {};
+}
+
+std::vector<std::uint32_t> ScenarioSolve::with_middles(const scene::NodeList& nodes,
+                                                       const ElementMesh& mesh) const {
+  std::vector<std::uint8_t> is_in(mesh.corner_count, 0);
+  std::vector<std::uint32_t> all;
+  for (const auto node : nodes) {
+    is_in[node.value] = 1;
+    all.push_back(node.value);
+  }
+  for (std::size_t i = 0; i < mesh.edge_ends.size(); ++i)
+    if (is_in[mesh.edge_ends[i][0]] != 0 && is_in[mesh.edge_ends[i][1]] != 0)
+      all.push_back(static_cast<std::uint32_t>(mesh.corner_count + i));
+  return all;
+}
+
+void ScenarioSolve::add_holds(Problem& problem) {
+  std::map<std::uint32_t, std::int32_t> rules;  // by degree of freedom
+  for (const auto node : with_middles(resolved_.organ.fixed_nodes, problem.mesh))
+    for (std::uint32_t axis = 0; axis < 3; ++axis) rules.emplace(3 * node + axis, -1);
+  for (std::size_t i = 0; i < resolved_.displacements.size(); ++i)
+    for (const auto node : with_middles(resolved_.displacements[i].nodes, problem.mesh))
+      for (std::uint32_t axis = 0; axis < 3; ++axis)
+        if ((resolved_.displacements[i].axes >> axis & 1) != 0)
+          rules.emplace(3 * node + axis, static_cast<std::int32_t>(i));
+  for (const auto& [dof, rule] : rules) {
+    problem.held_dofs.push_back(dof);
+    held_rules_.push_back(rule);
+  }
+}
+
+void ScenarioSolve::add_forces(const Problem& problem) {
+  weight_ = weight_of(problem, resolved_.organ.gravity_m_s2);
+  const auto& mesh = resolved_.organ.mesh;
+  for (std::size_t i = 0; i < resolved_.forces.size(); ++i) {
+    const auto& force = resolved_.forces[i];
+    area_shares_.emplace_back();
+    normal_shares_.emplace_back();
+    if (i < resolved_.scenario.forces.size()) continue;  // on the nodes themselves
+    std::vector<std::uint8_t> is_in(mesh.node_count(), 0);
+    for (const auto node : force.nodes) is_in[node.value] = 1;
+    if (force.normal_areas_m2.empty())
+      area_shares_.back() = area_shares(mesh, problem.mesh, is_in);
+    else
+      normal_shares_.back() = normal_area_shares(mesh, problem.mesh, is_in);
+  }
+}
+
+Loads ScenarioSolve::loads_at(double time_s) const {
+  const Problem& problem = solver_->problem();
+  Loads loads{weight_, std::vector<double>(held_rules_.size(), 0.0)};
+  for (std::size_t i = 0; i < resolved_.forces.size(); ++i) {
+    const auto& force = resolved_.forces[i];
+    const Vec3d value = force.over_time.at(time_s);
+    for (std::uint32_t n = 0; n < area_shares_[i].size(); ++n)
+      add_at(loads.forces, n, value * area_shares_[i][n]);
+    for (std::uint32_t n = 0; n < normal_shares_[i].size(); ++n)
+      add_at(loads.forces, n, normal_shares_[i][n] * -value.x);
+    if (i < resolved_.scenario.forces.size())
+      for (std::size_t k = 0; k < force.nodes.size(); ++k)
+        add_at(loads.forces, force.nodes[k].value, force.on_node(k, value));
+  }
+  for (std::size_t i = 0; i < held_rules_.size(); ++i) {
+    if (held_rules_[i] < 0) continue;
+    const auto& rule = resolved_.displacements[static_cast<std::size_t>(held_rules_[i])];
+    loads.held_moves[i] = component(rule.over_time.at(time_s), problem.held_dofs[i] % 3);
+  }
+  return loads;
+}
+
+double ScenarioSolve::time_s() const {
+  if (!is_static()) return static_cast<double>(steps_done_) * settings_.dt_s;
+  return steps_done_ == 0 ? 0 : resolved_.scenario.run.load_times_s[steps_done_ - 1];
+}
+
+StepReport ScenarioSolve::step() {
+  if (steps_done_ == 0 && !is_static())
+    settling_ = solver_->step(
+        loads_at(0), {resolved_.scenario.run.starts_in_equilibrium ? kInfinity : 0.0, false});
+  ++steps_done_;
+  const Loads loads = loads_at(time_s());
+  if (is_static()) return solver_->step(loads, {settings_.is_equilibrium ? kInfinity : 0.0, false});
+  return solver_->step(loads, {settings_.dt_s, true});
+}
+
+bool ScenarioSolve::is_due(std::size_t probe) const {
+  if (is_static()) return true;
+  const double period_s = 1e-3 * resolved_.scenario.probes[probe].every_ticks;
+  const double now = time_s() + 1e-9, before = now - settings_.dt_s;
+  return std::floor(now / period_s) > std::floor(before / period_s);
+}
+
+Vec3d ScenarioSolve::probe(std::size_t index) const {
+  const auto& nodes = resolved_.probe_nodes[index];
+  const auto mean = [&](const Vector& all) {
+    Vec3d sum;
+    for (const auto node : nodes) sum += at_node(all, node.value);
+    return sum / static_cast<double>(nodes.size());
+  };
+  switch (resolved_.scenario.probes[index].quantity) {
+    case scene::ProbeQuantity::Displacement:
+      return mean(solver_->displacements());
+    case scene::ProbeQuantity::Velocity:
+      return mean(solver_->velocities());
+    case scene::ProbeQuantity::Reaction:
+    case scene::ProbeQuantity::ToolForce:
+      break;
+  }
+  const Vector holding = solver_->reactions() - loads_at(time_s()).forces;
+  const auto& held = solver_->problem().held_dofs;
+  Vec3d sum;
+  for (const auto node : probe_nodes_[index]) {
+    Vec3d force = at_node(holding, node);
+    const auto is_held = [&](std::uint32_t axis) {
+      return std::binary_search(held.begin(), held.end(), 3 * node + axis);
+    };
+    if (!is_held(0)) force.x = 0;
+    if (!is_held(1)) force.y = 0;
+    if (!is_held(2)) force.z = 0;
+    sum += force;
+  }
+  return sum;
+}
+
+std::vector<Vec3d> ScenarioSolve::displacements() const {
+  std::vector<Vec3d> all;
+  for (std::uint32_t n = 0; n < resolved_.organ.mesh.node_count(); ++n)
+    all.push_back(at_node(solver_->displacements(), n));
+  return all;
+}
+
+std::vector<Vec3d> ScenarioSolve::velocities() const {
+  std::vector<Vec3d> all;
+  for (std::uint32_t n = 0; n < resolved_.organ.mesh.node_count(); ++n)
+    all.push_back(at_node(solver_->velocities(), n));
+  return all;
+}
+
+std::vector<std::uint8_t> ScenarioSolve::held_nodes() const {
+  std::vector<std::uint8_t> axes(resolved_.organ.mesh.node_count(), 0);
+  for (const auto dof : solver_->problem().held_dofs)
+    if (dof / 3 < axes.size()) ++axes[dof / 3];
+  for (auto& count : axes) count = count == 3 ? 1 : 0;
+  return axes;
+}
+
+Status ScenarioSolve::save(const std::filesystem::path& path) const {
+  return write_state(path, *solver_);
+}
+
+Status ScenarioSolve::resume(const std::filesystem::path& path) {
+  const auto state = read_state(path, solver_->problem());
+  if (!state) return state.error();
+  const std::uint64_t first = is_static() ? 0 : 1;  // the step to the loads at the start
+  if (state->steps < first || state->steps - first > step_count_)
+    return Error{ErrorCode::BadFile, path.string() + ": is not at a step of this scenario"};
+  solver_->restore(*state);
+  steps_done_ = state->steps - first;
+  return {};
+}
+
+}  // namespace trocar::finite_elements

@@ -1,0 +1,165 @@
+// Scenarios on the off-line solver: where both can, it and the live solver find the same
+// equilibrium; what it cannot do is refused; a stopped run goes on.
+
+#include "server/finite_elements/scenario_solve.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "server/scenario/scenario_run.h"
+
+namespace trocar::finite_elements {
+namespace {
+
+// A column of 20 x 60 x 20 mm that stands on its lowest layer.
+const std::string kColumn = R"([organ]
+source = "block"
+nodes = [3, 7, 3]
+spacing_mm = 10
+[material]
+young_modulus_pa = 4000
+elastic_law = "neo-hookean"
+poisson_ratio = 0.3
+[[nodes]]
+name = "top"
+box_min_mm = [-10, 30, -10]
+box_max_mm = [10, 30, 10]
+[[nodes]]
+name = "side"
+box_min_mm = [10, -10, -10]
+box_max_mm = [10, 20, 10]
+[[nodes]]
+name = "corner"
+nearest_mm = [10, 30, 10]
+)";
+const std::string kStatic = R"([run]
+mode = "static"
+seconds = 1
+load_steps = 2
+tolerance_n = 1e-7
+max_sweeps = 20000
+[[probe]]
+set = "top"
+quantity = "displacement"
+[[probe]]
+set = "fixed"
+quantity = "reaction"
+)";
+
+scene::ResolvedScenario resolved(const std::string& text) {
+  auto parsed = scene::parse_scenario_text(text, "test.toml");
+  EXPECT_TRUE(parsed.ok()) << (parsed.ok() ? "" : parsed.error().message);
+  auto resolved = scene::resolve(std::move(*parsed));
+  EXPECT_TRUE(resolved.ok()) << (resolved.ok() ? "" : resolved.error().message);
+  return std::move(*resolved);
+}
+
+std::unique_ptr<ScenarioSolve> solve_of(const std::string& text,
+                                        const ScenarioSettings& settings = {}) {
+  auto solve = ScenarioSolve::create(resolved(text), settings);
+  EXPECT_TRUE(solve.ok()) << (solve.ok() ? "" : solve.error().message);
+  return std::move(*solve);
+}
+
+void expect_same(const std::string& text) {
+  const auto ours = solve_of(text, {.order = ElementOrder::Linear});
+  scenario::ScenarioRun live(resolved(text), scenario::Solver::Full);
+  while (!ours->is_finished()) {
+    EXPECT_TRUE(ours->step().is_converged);
+    EXPECT_TRUE(live.step().is_converged);
+    for (std::size_t i = 0; i < 2; ++i) {
+      const Vec3d a = ours->probe(i), b = live.probe(i);
+      EXPECT_LT(length(a - b), 2e-3 * length(b) + 2e-6) << i << " at " << live.time_s();
+    }
+  }
+  EXPECT_GT(length(ours->probe(0)), 1e-3) << "it moved";
+}
+
+TEST(ScenarioSolve, MeetsTheLiveSolverUnderDisplacement) {
+  expect_same(kColumn + kStatic +
+              "[[displace]]\nset = \"top\"\n[[displace.key]]\ntime_s = 0\ndisplacement_mm = [0, 0, "
+              "0]\n[[displace.key]]\ntime_s = 1\ndisplacement_mm = [8, -6, 3]\n");
+}
+TEST(ScenarioSolve, MeetsTheLiveSolverUnderGravityAndTraction) {
+  expect_same(kColumn + kStatic +
+              "[gravity]\nm_s2 = [0, -9.81, 0]\n[[traction]]\nset = \"top\"\n[[traction.key]]\n"
+              "time_s = 0\ntraction_pa = [60, 200, 0]\n");
+}
+TEST(ScenarioSolve, MeetsTheLiveSolverUnderPressureAndForce) {
+  expect_same(
+      kColumn + kStatic +
+      "[[traction]]\nset = \"side\"\n[[traction.key]]\ntime_s = 0\npressure_pa = 40\n"
+      "[[force]]\nset = \"corner\"\n[[force.key]]\ntime_s = 0\nforce_n = [0, 0.02, 0.02]\n");
+}
+
+// What holds the column carries its load, whatever the elements. (Under the whole of the earth's
+// gravity so soft a column falls over.)
+TEST(ScenarioSolve, ReactionsBalanceLoads) {
+  const std::string text = kColumn + kStatic +
+                           "[gravity]\nm_s2 = [0, -2, 0]\n[[force]]\nset = \"top\"\n"
+                           "[[force.key]]\ntime_s = 0\nforce_n = [0.02, 0, 0]\n";
+  for (const auto order : {ElementOrder::Linear, ElementOrder::Quadratic}) {
+    const auto solve = solve_of(text, {.order = order});
+    while (!solve->is_finished()) ASSERT_TRUE(solve->step().is_converged);
+    const double weight = 1060 * 0.02 * 0.06 * 0.02 * 2;
+    EXPECT_NEAR(solve->probe(1).x, -0.02, 1e-7);
+    EXPECT_NEAR(solve->probe(1).y, weight, 1e-7 * weight);
+  }
+}
+
+TEST(ScenarioSolve, AMeasuredMaterialRelaxesToItsEquilibrium) {
+  const std::string text =
+      kColumn + kStatic +
+      "[[displace]]\nset = \"top\"\n[[displace.key]]\ntime_s = 0\ndisplacement_mm = [2, 0, 0]\n";
+  ScenarioSettings settings{.material = *scene::find_measured_material("human_liver_nava2008")};
+  const auto at_once = solve_of(text, settings);
+  settings.is_equilibrium = true;
+  const auto at_last = solve_of(text, settings);
+  while (!at_once->is_finished()) ASSERT_TRUE(at_once->step().is_converged);
+  while (!at_last->is_finished()) ASSERT_TRUE(at_last->step().is_converged);
+  const double share = at_last->probe(1).x / at_once->probe(1).x;
+  EXPECT_GT(share, 0.3461) << "volume does not relax";
+  EXPECT_LT(share, 0.40);
+}
+
+TEST(ScenarioSolve, DynamicRunsGoOnFromTheirState) {
+  const std::string text = kColumn +
+                           "[run]\nseconds = 0.02\n[[probe]]\nset = \"top\"\nquantity = "
+                           "\"velocity\"\nrate_hz = 500\n[[force]]\nset = \"top\"\n[[force.key]]\n"
+                           "time_s = 0\nforce_n = [0.1, 0, 0]\n";
+  const ScenarioSettings settings{.order = ElementOrder::Linear, .dt_s = 2e-3};
+  const auto path = std::filesystem::temp_directory_path() / "trocar-scenario-solve-test.state";
+  const auto whole = solve_of(text, settings), first = solve_of(text, settings),
+             second = solve_of(text, settings);
+  EXPECT_EQ(whole->step_count(), 10u);
+  while (!whole->is_finished()) ASSERT_TRUE(whole->step().is_converged);
+  for (int i = 0; i < 4; ++i) ASSERT_TRUE(first->step().is_converged);
+  ASSERT_TRUE(first->save(path).ok());
+  ASSERT_TRUE(second->resume(path).ok());
+  EXPECT_EQ(second->steps_done(), 4u);
+  while (!second->is_finished()) ASSERT_TRUE(second->step().is_converged);
+  EXPECT_EQ(whole->probe(0), second->probe(0));
+  const auto other = solve_of(text, {.order = ElementOrder::Quadratic, .dt_s = 2e-3});
+  EXPECT_FALSE(other->resume(path).ok());
+  std::filesystem::remove(path);
+}
+
+TEST(ScenarioSolve, RefusesWhatItCannotDo) {
+  const auto refused = [](const std::string& text, const std::string& says) {
+    const auto solve = ScenarioSolve::create(resolved(text), {});
+    ASSERT_FALSE(solve.ok()) << says;
+    EXPECT_NE(solve.error().message.find(says), std::string::npos) << solve.error().message;
+  };
+  refused("[organ]\nsource = \"lattice\"\nnodes = [3, 3, 3]\nspacing_mm = 10\n[run]\nseconds = 1\n",
+          "has no tets");
+  refused("[organ]\nsource = \"block\"\nnodes = [3, 3, 3]\nspacing_mm = 10\n[run]\nseconds = 1\n",
+          "neo-hookean");
+  refused(kColumn +
+              "[run]\nseconds = 1\n[[tool]]\nradius_mm = 5\nreach_mm = 10\n[[tool.key]]\n"
+              "time_s = 0\nposition_mm = [0, 60, 0]\nverb = \"push\"\n",
+          "has no tools");
+}
+
+}  // namespace
+}  // namespace trocar::finite_elements
