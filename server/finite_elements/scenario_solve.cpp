@@ -116,15 +116,17 @@ Status ScenarioSolve::add_materials(Problem& problem) const {
       problem.materials.push_back(*settings_.material);
       continue;
     }
-    if (material.elastic_law != scene::ElasticLaw::NeoHookean)
+    if (!scene::is_hyperelastic(material))
       return scene::scenario_error(
           resolved_.scenario, resolved_.scenario.material.place,
-          "the solver \"fem\" needs elastic_law = \"neo-hookean\" or a measured material for " +
-              name + ", see --material");
+          "the solver \"fem\" needs elastic_law = \"neo-hookean\" or \"measured\" for " + name +
+              ", see --material");
     if (material.tension != 0 || material.fibre_tension != 0)
       return scene::scenario_error(resolved_.scenario, resolved_.scenario.material.place,
                                    "the solver \"fem\" has no tension, set it to 0");
-    problem.materials.push_back(hyperelastic_of(material, name));
+    problem.materials.push_back(material.elastic_law == scene::ElasticLaw::Measured
+                                    ? material.measured
+                                    : hyperelastic_of(material, name));
   }
   return {};
 }

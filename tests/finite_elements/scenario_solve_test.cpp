@@ -62,8 +62,9 @@ std::unique_ptr<ScenarioSolve> solve_of(const std::string& text,
   return std::move(*solve);
 }
 
-void expect_same(const std::string& text) {
-  const auto ours = solve_of(text, {.order = ElementOrder::Linear});
+void expect_same(const std::string& text,
+                 const ScenarioSettings& settings = {.order = ElementOrder::Linear}) {
+  const auto ours = solve_of(text, settings);
   scenario::ScenarioRun live(resolved(text), scenario::Solver::Full);
   while (!ours->is_finished()) {
     EXPECT_TRUE(ours->step().is_converged);
@@ -91,6 +92,46 @@ TEST(ScenarioSolve, MeetsTheLiveSolverUnderPressureAndForce) {
       kColumn + kStatic +
       "[[traction]]\nset = \"side\"\n[[traction.key]]\ntime_s = 0\npressure_pa = 40\n"
       "[[force]]\nset = \"corner\"\n[[force.key]]\ntime_s = 0\nforce_n = [0, 0.02, 0.02]\n");
+}
+
+// The column of measured liver.
+std::string liver_column() {
+  const std::string own =
+      "young_modulus_pa = 4000\nelastic_law = \"neo-hookean\"\npoisson_ratio = 0.3\n";
+  std::string text = kColumn;
+  return text.replace(text.find(own), own.size(),
+                      "elastic_law = \"measured\"\nmeasured = \"human_liver_nava2008\"\n");
+}
+
+// In the end: a static run of the live solver is one of tissue that has relaxed.
+TEST(ScenarioSolve, MeetsTheLiveSolverWithMeasuredLiver) {
+  expect_same(liver_column() + kStatic +
+                  "[[displace]]\nset = \"top\"\n[[displace.key]]\ntime_s = 0\ndisplacement_mm = "
+                  "[0, 0, 0]\n[[displace.key]]\ntime_s = 1\ndisplacement_mm = [8, -6, 3]\n",
+              {.order = ElementOrder::Linear, .is_equilibrium = true});
+}
+
+// On the way there: the force that holds a column which was bent in 50 ms.
+TEST(ScenarioSolve, MeasuredLiverRelaxesAsInTheLiveSolver) {
+  const std::string text =
+      liver_column() +
+      "[run]\nseconds = 0.6\ntolerance_n = 1e-6\nmax_sweeps = 2000\nboundary = \"whole\"\n"
+      "[[probe]]\nset = \"top\"\nquantity = \"displacement\"\nrate_hz = 100\n"
+      "[[probe]]\nset = \"fixed\"\nquantity = \"reaction\"\nrate_hz = 100\n"
+      "[[displace]]\nset = \"top\"\n[[displace.key]]\ntime_s = 0\ndisplacement_mm = [0, 0, 0]\n"
+      "[[displace.key]]\ntime_s = 0.05\ndisplacement_mm = [6, 0, 0]\n";
+  const auto ours = solve_of(text, {.order = ElementOrder::Linear});
+  scenario::ScenarioRun live(resolved(text), scenario::Solver::Full);
+  double early = 0;
+  for (int i = 0; !ours->is_finished(); ++i) {
+    ASSERT_TRUE(ours->step().is_converged);
+    live.step();
+    if (i == 250) early = length(ours->probe(1));
+  }
+  const Vec3d a = ours->probe(1), b = live.probe(1);
+  std::printf("%.4f N at 0.25 s, %.4f at the end, live %.4f\n", early, length(a), length(b));
+  EXPECT_LT(length(a), 0.85 * early);
+  EXPECT_LT(length(a - b), 0.01 * length(a));
 }
 
 // What holds the column carries its load, whatever the elements. (Under the whole of the earth's

@@ -1,0 +1,107 @@
+// Tissue that remembers stresses: what a cut does to them.
+
+#include <gtest/gtest.h>
+
+#include "common/base/workers.h"
+#include "server/dynamics/tissue.h"
+#include "server/world/relaxation_state.h"
+#include "tests/cutting/cut_organ.h"
+
+namespace trocar::cutting::testing {
+namespace {
+
+scene::Organ measured_box() {
+  auto organ = box_organ(3, 3, 3, 0.01);
+  scene::use_measured(*scene::find_measured_material("human_liver_nava2008"), organ.material);
+  organ.material.spring_damping_time_s = 0;
+  return organ;
+}
+
+Vec3f displacement_at(const Vec3d& p) {
+  return to_float(Vec3d{3 * p.y * p.x, -2 * p.z * p.z + 0.1 * p.x, 4 * p.x * p.y});
+}
+
+// What forces of tissue are at displacements, per node.
+std::vector<Vec3d> gradients(dynamics::Tissue& tissue, const std::vector<Vec3f>& u,
+                             world::RelaxationState& state, int steps) {
+  using namespace dynamics;
+  const auto& groups = tissue.groups();
+  std::vector<Float4> x(groups.slot_count());
+  for (std::uint32_t n = 0; n < u.size(); ++n) x[groups.slot_of(NodeIndex(n))] = to_float4(u[n]);
+  Workers workers(1);
+  tissue.relaxation()->take_state();
+  for (int i = 0; i < steps; ++i) {
+    tissue.relaxation()->begin_step(0.01f, state, workers);
+    tissue.relaxation()->end_step(x.data(), state, workers);
+  }
+  tissue.relaxation()->begin_step(0.01f, state, workers);
+  std::vector<Vec3d> out(u.size());
+  Scratch scratch;
+  for (Group g = 0; g < groups.group_count(); ++g) {
+    NodeStep8 step{zero_vec8(), zero_sym_mat8()};
+    tissue.begin_group(g, x.data(), 0);
+    tissue.add(g, x.data(), load_group(&x[g * kLanes]), step, scratch);
+    Vec3Lanes lanes;
+    store(lanes, step.gradient);
+    for (std::size_t lane = 0; lane < kLanes; ++lane)
+      if (const auto node = groups.nodes_of(g)[lane]; node.is_valid())
+        out[node.value] = to_double(lanes.at(lane));
+  }
+  return out;
+}
+
+// Through hundreds of splits: what a new node bears is what its ends no longer do.
+TEST(CutRelaxation, PartsRememberWhatTheWholeDid) {
+  const auto organ = measured_box();
+  dynamics::Topology topology(organ);
+  Places places(topology);
+  dynamics::Tissue tissue(topology);
+  world::RelaxationState state(organ);
+  std::vector<Vec3f> u;
+  for (const auto& p : topology.rest()) u.push_back(displacement_at(p));
+  const auto before = gradients(tissue, u, state, 40);
+  double largest = 0, forgotten = 0;
+  {
+    world::RelaxationState nothing(organ);
+    const auto at_once = gradients(tissue, u, nothing, 0);
+    for (std::size_t n = 0; n < before.size(); ++n) {
+      largest = std::max(largest, length(before[n]));
+      forgotten = std::max(forgotten, length(before[n] - at_once[n]));
+    }
+  }
+  ASSERT_GT(forgotten, 0.1 * largest);
+
+  trocar::testing::Random random(5);
+  std::vector<TetChild> children;
+  struct Made {
+    NodeIndex a, b;
+    double t;
+  };
+  std::vector<Made> made;
+  while (made.size() < 200) {
+    const auto& tet =
+        topology.tet(TetIndex(random.below(static_cast<std::uint32_t>(topology.tet_count()))));
+    const auto a = tet[random.below(4)], b = tet[random.below(4)];
+    if (a == b || length(topology.rest()[a.value] - topology.rest()[b.value]) < 0.004) continue;
+    split_edge(topology, places, a, b, 32768, children);
+    made.push_back({a, b, 0.5});
+    u.push_back((u[a.value] + u[b.value]) * 0.5f);
+    for (const auto& [part, parent] : topology.parts()) state.inherit(part, parent);
+    tissue.follow_topology(topology);
+    topology.clear_changes();
+  }
+  dynamics::Tissue fresh(topology);
+  for (auto* const each : {&tissue, &fresh}) {
+    auto after = gradients(*each, u, state, 0);
+    for (std::size_t i = made.size(); i-- > 0;) {
+      const auto& bears = after[before.size() + i];
+      after[made[i].a.value] += bears * (1 - made[i].t);
+      after[made[i].b.value] += bears * made[i].t;
+    }
+    for (std::size_t n = 0; n < before.size(); ++n)
+      ASSERT_LT(length(after[n] - before[n]), 2e-3 * largest) << n;
+  }
+}
+
+}  // namespace
+}  // namespace trocar::cutting::testing
