@@ -116,7 +116,7 @@ TEST(Scenes, AFlapIsCutOnThreeSidesLiftedAndTornOff) {
 }
 
 TEST(Scenes, AWedgeIsCutOutAndRemoved) {
-  Operation wedge(*scene::make_liver(), "wedge.toml");
+  Operation wedge(*scene::make_liver(8000), "wedge.toml");
   wedge.run_to(2.5);
   EXPECT_EQ(wedge.pieces().size(), 1u) << "one side of two";
   wedge.run_to(5.3);
