@@ -33,6 +33,7 @@ SelfContactFinder::SelfContactFinder(const scene::Organ& organ) : surface_(organ
   for (auto* list : {&list_, &next_list_}) {
     list->pairs.reserve(kReservedPairs);
     list->far_until.reserve(kReservedPairs);
+    list->runs.reserve(sites.size());
   }
   found_.reserve(kReservedPairs);
   next_found_.reserve(kReservedPairs);

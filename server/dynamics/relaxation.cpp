@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/assert.h"
+#include "common/scene/any_material.h"
 #include "server/dynamics/tet_shape.h"
 
 namespace trocar::dynamics {
@@ -10,6 +12,9 @@ namespace {
 
 // A tet squeezed flatter than this has the stress of one that is as flat.
 constexpr float kLeastVolumeRatio = 0.05f;
+// Values of a block's tensors in the state.
+constexpr std::size_t kTensor = world::RelaxationState::kComponents * kLanes;
+static_assert(world::RelaxationState::kTets == kLanes);
 
 // exp(-x), the same on every machine.
 double decay_in(double x) {
@@ -54,14 +59,13 @@ std::size_t most_terms(const scene::Organ& organ) {
 
 }  // namespace
 
+bool relaxes(const scene::Material& material) {
+  return material.elastic_law == scene::ElasticLaw::Measured &&
+         !material.measured.relaxation.empty();
+}
+
 bool Relaxation::is_needed(const scene::Organ& organ) {
-  for (std::size_t m = 0; m <= organ.regions.size(); ++m) {
-    const auto& material = scene::material_at(organ, static_cast<std::uint16_t>(m));
-    if (material.elastic_law == scene::ElasticLaw::Measured &&
-        !material.measured.relaxation.empty())
-      return true;
-  }
-  return false;
+  return scene::any_material(organ, relaxes);
 }
 
 Relaxation::Relaxation(const Topology& topology, const Groups& groups)
@@ -95,9 +99,6 @@ void Relaxation::set_lane(const Topology& topology, const Groups& groups, TetInd
   block.materials[lane] = material;
   block.is_uniform = std::ranges::all_of(block.materials,
                                          [&](std::uint16_t m) { return m == block.materials[0]; });
-  const auto& m = scene::material_at(organ_, material);
-  const bool relaxes =
-      m.elastic_law == scene::ElasticLaw::Measured && !m.measured.relaxation.empty();
   const auto& corners = topology.tet(tet);
   const auto shape = stress_free_shape(topology, tet, corners);
   std::array<Vec3d, 3> columns{};
@@ -109,7 +110,8 @@ void Relaxation::set_lane(const Topology& topology, const Groups& groups, TetInd
   }
   for (std::size_t k = 0; k < 3; ++k) block.rest[k].set(lane, to_float(columns[k]));
   for (std::size_t k = 0; k < 4; ++k) block.nodes[k].v[lane] = groups.slot_of(corners[k]);
-  if (relaxes) block.volume.v[lane] = static_cast<float>(shape.volume);
+  if (relaxes(scene::material_at(organ_, material)))
+    block.volume.v[lane] = static_cast<float>(shape.volume);
 }
 
 void Relaxation::follow(const Topology& topology, const Groups& groups,
@@ -219,7 +221,7 @@ void Relaxation::begin_block(std::size_t index, const world::RelaxationState& st
   const SymMat8 stress = load_tensor(values);
   SymMat8 forgotten = zero_sym_mat8();
   for (std::size_t k = 0; k < terms_; ++k) {
-    forgotten = fma_tensor(load_tensor(values + (k + 1) * kBlockLoads), load(c.terms[k].decay),
+    forgotten = fma_tensor(load_tensor(values + (k + 1) * kTensor), load(c.terms[k].decay),
                            fma_tensor(stress, load(c.terms[k].ahead), forgotten));
   }
   set_loads(block, index, forgotten);
@@ -235,7 +237,7 @@ void Relaxation::end_block(std::size_t index, const Float4* x, world::Relaxation
   SymMat8 forgotten = zero_sym_mat8();
   for (std::size_t k = 0; k < terms_; ++k) {
     const Term& term = c.terms[k];
-    float* const own = values + (k + 1) * kBlockLoads;
+    float* const own = values + (k + 1) * kTensor;
     const SymMat8 added = fma_tensor(before, load(term.of_before),
                                      fma_tensor(now, load(term.of_now), zero_sym_mat8()));
     const SymMat8 q = fma_tensor(load_tensor(own), load(term.decay), added);
@@ -259,8 +261,7 @@ void Relaxation::settle(const Float4* x, world::RelaxationState& state) {
         weights.v[lane] =
             k < law.relaxation.size() ? static_cast<float>(law.relaxation[k].weight) : 0;
       }
-      store_tensor(values + (k + 1) * kBlockLoads,
-                   fma_tensor(stress, load(weights), zero_sym_mat8()));
+      store_tensor(values + (k + 1) * kTensor, fma_tensor(stress, load(weights), zero_sym_mat8()));
     }
   }
   is_stale_ = true;
@@ -278,6 +279,7 @@ void start_relaxed(const scene::Organ& organ, world::World& world) {
 }
 
 void Relaxation::begin_step(float dt, const world::RelaxationState& state, Workers& workers) {
+  TROCAR_ASSERT(state.block_count() >= blocks_.size());
   if (dt != dt_) set_dt(dt);
   scratch_.resize(workers.count());
   if (!is_stale_) {

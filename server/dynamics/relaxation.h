@@ -24,6 +24,8 @@
 
 namespace trocar::dynamics {
 
+bool relaxes(const scene::Material& material);
+
 class Relaxation {
  public:
   static constexpr std::size_t kEdges = 6;  // of a tet: ab, ac, ad, bc, bd, cd

@@ -5,11 +5,6 @@
 namespace trocar::dynamics {
 namespace {
 
-bool relaxes(const scene::Material& material) {
-  return material.elastic_law == scene::ElasticLaw::Measured &&
-         !material.measured.relaxation.empty();
-}
-
 Float8 loads_at(const float* loads, const SlotLanes& places) {
   return _mm256_i32gather_ps(loads, _mm256_load_si256(reinterpret_cast<const __m256i*>(places.v)),
                              sizeof(float));

@@ -7,7 +7,7 @@
 //
 // which over a step of dt in which S changes linearly is, with x = dt / tau_k, exactly
 //
-//   h_k <- exp(-x) h_k + g_k (1 - exp(-x)) / x (S_new - S_old)      (Taylor et al. 1970).
+//   h_k <- exp(-x) h_k + g_k (1 - exp(-x)) / x (S_new - S_old)      (Taylor 1970).
 //
 // Stresses are of the second Piola-Kirchhoff kind: rotations leave them alone, and an organ that
 // is free of stress stays so. dt = 0 is a sudden change, dt = infinity the wait for equilibrium.

@@ -136,12 +136,12 @@ bool Solver::factor(StepReport& report) {
 // How much of the change to take: where the forces have no more than a share of their first slope
 // along it (Matthies & Strang 1979). 0: nowhere admissible.
 double Solver::line_search(const Vector& u, const Vector& change, const Part& part,
-                           const Residual& before, Residual& after) {
+                           const Residual& before) {
   const double slope_before = before.values.dot(change);
   double low = 0, slope_low = slope_before, high = 1, way = 1;
   bool is_bracketed = false;
   for (int i = 0; i < kMaxTries; ++i) {
-    after = residual_at(u + way * change, part);
+    const auto after = residual_at(u + way * change, part);
     const double slope = after.is_admissible ? after.values.dot(change) : 0;
     if (after.is_admissible && std::abs(slope) <= kSlopeShare * std::abs(slope_before)) return way;
     if (!after.is_admissible) {
@@ -161,8 +161,7 @@ double Solver::line_search(const Vector& u, const Vector& change, const Part& pa
                                                                              : (low + high) / 2;
   }
   if (way < kShortestWay) way = kShortestWay;
-  after = residual_at(u + way * change, part);
-  return after.is_admissible ? way : 0;
+  return residual_at(u + way * change, part).is_admissible ? way : 0;
 }
 
 bool Solver::solve_part(const Part& part, double part_done, StepReport& report) {
@@ -184,7 +183,7 @@ bool Solver::solve_part(const Part& part, double part_done, StepReport& report) 
     if (!assembler_.add_forces_and_tangent(u, part.settings.dt_s, {stiffness, mass}, held, internal,
                                            product, tangent_))
       return false;
-    auto residual = residual_of(u, part, internal);
+    const auto residual = residual_of(u, part, internal);
     report.residual_n = norm_of_free(residual.values);
     const double tolerance = settings_.tolerance * residual.scale + least_force_n_;
     if (on_progress) on_progress({part_done, i, report.residual_n, tolerance});
@@ -199,9 +198,8 @@ bool Solver::solve_part(const Part& part, double part_done, StepReport& report) 
     const Vector right = free_part(residual.values + product);
     Vector change = held;
     add_free(-factors_.solve(right), change);
-    Residual after;
     // What is held moves all the way at once.
-    const double way = held.isZero(0) ? line_search(u, change, part, residual, after) : 1;
+    const double way = held.isZero(0) ? line_search(u, change, part, residual) : 1;
     if (way == 0) return false;
     u += way * change;
     held.setZero();

@@ -114,7 +114,7 @@ class Solver {
   Residual residual_at(const Vector& u, const Part& part);
   bool factor(StepReport& report);
   double line_search(const Vector& u, const Vector& change, const Part& part,
-                     const Residual& before, Residual& after);
+                     const Residual& before);
   void accept(const Vector& u, const Part& part);
   Vector free_part(const Vector& all) const;
   void add_free(const Vector& free, Vector& all) const;

@@ -95,6 +95,11 @@ Status check_explicit(const scene::ResolvedScenario& resolved) {
 Status check_supported(const scene::ResolvedScenario& resolved) {
   const auto& scenario = resolved.scenario;
   const auto& rule = scenario.run;
+  if (dynamics::Relaxation::is_needed(resolved.organ) &&
+      (rule.mode == scene::RunMode::Static || rule.starts_in_equilibrium))
+    return scene::scenario_error(
+        scenario, run_key(scenario, rule.starts_in_equilibrium ? "start" : "mode"),
+        "tissue that relaxes has its equilibrium with --solver fem, see --response");
   for (const auto& load : scenario.displacements)
     if (load.axes != kAllAxes && (rule.boundary == scene::Boundary::Frozen ||
                                   rule.integrator == scene::Integrator::Explicit))

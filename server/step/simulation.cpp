@@ -63,9 +63,11 @@ void State::visit_without_mark(world::StateArchive& archive) {
 
 namespace {
 
-// Springs and linear tets cost no more than the matrices of a linear far field.
+// Springs and linear tets cost no more than the matrices of a linear far field. What tissue has
+// forgotten of its stress is no function of the poses that these are taken at.
 bool is_costly(const scene::Organ& organ) {
-  return scene::any_material(organ, scene::is_hyperelastic);
+  return scene::any_material(organ, scene::is_hyperelastic) &&
+         !dynamics::Relaxation::is_needed(organ);
 }
 
 }  // namespace

@@ -27,6 +27,7 @@ class RelaxationState {
   // Of any material.
   std::size_t terms() const { return tensors_ - 1; }
   std::size_t block_size() const { return tensors_ * kComponents * kTets; }
+  std::size_t block_count() const { return is_empty() ? 0 : values_.size() / block_size(); }
   std::span<float> block(std::size_t index) {
     return std::span(values_).subspan(index * block_size(), block_size());
   }

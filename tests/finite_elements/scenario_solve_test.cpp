@@ -62,9 +62,8 @@ std::unique_ptr<ScenarioSolve> solve_of(const std::string& text,
   return std::move(*solve);
 }
 
-void expect_same(const std::string& text,
-                 const ScenarioSettings& settings = {.order = ElementOrder::Linear}) {
-  const auto ours = solve_of(text, settings);
+void expect_same(const std::string& text) {
+  const auto ours = solve_of(text, {.order = ElementOrder::Linear});
   scenario::ScenarioRun live(resolved(text), scenario::Solver::Full);
   while (!ours->is_finished()) {
     EXPECT_TRUE(ours->step().is_converged);
@@ -100,18 +99,17 @@ std::string liver_column() {
       "young_modulus_pa = 4000\nelastic_law = \"neo-hookean\"\npoisson_ratio = 0.3\n";
   std::string text = kColumn;
   return text.replace(text.find(own), own.size(),
-                      "elastic_law = \"measured\"\nmeasured = \"human_liver_nava2008\"\n");
+                      "elastic_law = \"measured\"\nmeasured = \"human_liver_nava2008\"\n"
+                      "node_damping_per_s = 100\n");
 }
 
-// In the end: a static run of the live solver is one of tissue that has relaxed.
-TEST(ScenarioSolve, MeetsTheLiveSolverWithMeasuredLiver) {
-  expect_same(liver_column() + kStatic +
-                  "[[displace]]\nset = \"top\"\n[[displace.key]]\ntime_s = 0\ndisplacement_mm = "
-                  "[0, 0, 0]\n[[displace.key]]\ntime_s = 1\ndisplacement_mm = [8, -6, 3]\n",
-              {.order = ElementOrder::Linear, .is_equilibrium = true});
+TEST(ScenarioSolve, TheLiveSolverSendsEquilibriaOfTissueThatRelaxesHere) {
+  const auto status = scenario::check_supported(resolved(liver_column() + kStatic));
+  ASSERT_FALSE(status.ok());
+  EXPECT_NE(status.error().message.find("--solver fem"), std::string::npos);
 }
 
-// On the way there: the force that holds a column which was bent in 50 ms.
+// The force that holds a column which was bent in 50 ms, damped so that it does not ring.
 TEST(ScenarioSolve, MeasuredLiverRelaxesAsInTheLiveSolver) {
   const std::string text =
       liver_column() +

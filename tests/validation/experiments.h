@@ -32,6 +32,9 @@ void run_plate(const Lab& lab, Section& section);
 void run_refresh_rate(const Lab& lab, Section& section);
 void run_refresh_cutting(const Lab& lab, Section& section);
 
+void run_calculix_comparison(const Lab& lab, Section& section);
+void run_locking(const Lab& lab, Section& section);
+
 void run_propagation_lattice(const Lab& lab, Section& section);
 void run_propagation_liver(const Lab& lab, Section& section);
 void run_propagation_large_liver(const Lab& lab, Section& section);

@@ -25,6 +25,9 @@ class Lab {
   // Seconds instead of minutes: coarser meshes, fewer points.
   bool is_short() const { return is_short_; }
 
+  // The folder of scenarios and of what other programs are given.
+  const std::filesystem::path& scenarios() const { return scenarios_; }
+
   // Makes scenarios/<name>.organ, to which scenarios refer as "<name>.organ".
   void keep_organ(const std::string& name, const scene::Organ& organ) const;
 

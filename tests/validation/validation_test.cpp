@@ -122,6 +122,14 @@ TEST_F(Validation, TheLargeCaseStaysSoundWhileABladeCuts) {
   EXPECT_EQ(kept_checks().size(), 6u);
 }
 
+TEST_F(Validation, TheOffLineSolverMeetsCalculix) {
+  ASSERT_EQ(run("--short --only dogan2011/calculix"), 0) << log();
+  const auto names = kept_checks();
+  if (read(out() / "report.html").find("LEFT OUT: ccx is not installed") != std::string::npos)
+    GTEST_SKIP() << "ccx is not installed (package calculix-ccx)";
+  EXPECT_EQ(names.size(), 4u);
+}
+
 TEST_F(Validation, CommandLine) {
   EXPECT_EQ(run("--help"), 0);
   EXPECT_NE(log().find("Examples:"), std::string::npos);
