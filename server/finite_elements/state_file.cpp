@@ -1,5 +1,6 @@
 #include "server/finite_elements/state_file.h"
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 

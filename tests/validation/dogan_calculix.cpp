@@ -3,6 +3,9 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "server/finite_elements/surface_traction.h"
 #include "tests/validation/calculix.h"
 #include "tests/validation/experiments.h"
