@@ -15,8 +15,9 @@ Result<Settled> settle(scene::Organ organ, const Vec3d& gravity_m_s2,
                                          ": nothing holds it, so it has no equilibrium: import "
                                          "the mesh with a --fix rule"};
   if (dynamics::Relaxation::is_needed(organ))
-    return Error{ErrorCode::BadFile,
-                 name + ": relaxes, settling knows tissue only that does not: take another material"};
+    return Error{
+        ErrorCode::BadFile,
+        name + ": relaxes, settling knows tissue only that does not: take another material"};
   organ.gravity_m_s2 = gravity_m_s2;
   scene::ResolvedScenario resolved;
   resolved.scenario.source = name;
