@@ -204,6 +204,7 @@ void BlockDescent::begin_inertia(Group group, std::span<const Vec3f> forces) {
       if (nodes[lane].is_valid()) load_n.set(lane, forces[nodes[lane].value]);
     momentum = momentum + load(load_n);
   }
+  if (tissue_.relaxed_stress() != nullptr) momentum = momentum + load(forgotten_[group]);
   store(inertia_[group].inertia, (mass * rate + load(constants_[group].damping)) * rate);
   store(inertia_[group].momentum, momentum);
 }
@@ -233,6 +234,11 @@ void BlockDescent::begin_groups(world::World& world, const ExternalLoads& loads)
   for_each_group(near_.groups, [&](Group g) { ask_energies(g, x_.data()); });
   for (const auto node : loads.held)
     ask_energies(tissue_.groups().slot_of(node) / kLanes, x_.data());
+  if (const auto* const stress = tissue_.relaxed_stress()) {
+    forgotten_.resize(all_groups_.size());
+    for_each_group(begun_.groups,
+                   [&](Group g) { store(forgotten_[g], stress->forces(g, x_.data())); });
+  }
   for_each_group(begun_.groups, [&](Group g) { begin_inertia(g, loads.forces); });
   place_held(loads);
   if (is_far_linear_)

@@ -192,6 +192,7 @@ class BlockDescent {
   std::vector<Float4> v_;               // per slot: the world's velocities
   std::vector<Float4> start_;           // per slot: at the start of the step; begun groups
   std::vector<Inertia> inertia_;        // per group; begun groups
+  std::vector<Vec3Lanes> forgotten_;    // N per group, of relaxed stress
   std::vector<Lanes> squares_;          // per group: squared residuals of the last sweep
   std::vector<float> group_squares_;    // their sum over swept lanes
   std::vector<float> squared_moves_;    // per group: largest of a node in this step, m^2

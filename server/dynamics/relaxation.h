@@ -9,8 +9,8 @@
 //
 // A solver that seeks S' takes b (S' - S) to be zero, an error of g dt/(2 tau) times the change in
 // one step (4e-4 of it for liver at 1 ms) that is gone after it: what tissue has forgotten by then
-// is a stress that stays the same in the step, and pulls along the edges of each tet with loads
-// that do not depend on where its nodes go (relaxed_stress.h).
+// is a stress that stays the same in the step, and with it the forces on nodes
+// (relaxed_stress.h).
 //
 // Between steps the state is world::RelaxationState. One step costs O(tets).
 

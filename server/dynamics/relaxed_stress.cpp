@@ -59,51 +59,17 @@ std::size_t RelaxedStress::fill(const Topology& topology, const Groups& groups, 
   return written;
 }
 
-void RelaxedStress::add(Group group, const Float4* x, const Vec8& own, NodeStep8& step,
-                        Scratch&) const {
+// Along an edge a stress pulls its ends together; what has been forgotten of it lets them go.
+Vec8 RelaxedStress::forces(Group group, const Float4* x) const {
   const float* const loads = relaxation_.loads();
-  Vec8 gradient = step.gradient;
-  Float8 identity = all(0);
-  for (const Row& row : rows_[group]) {
-    Float8 sum = all(0);
-    for (std::size_t k = 0; k < 3; ++k) {
-      const Float8 load_n_m = loads_at(loads, row.loads[k]);
-      const Vec8 edge = load(row.edges[k]) + (gather(x, row.others[k]) - own);
-      gradient = fma8(edge, all(0) - load_n_m, gradient);
-      sum = sum + load_n_m;
-    }
-    identity = identity + _mm256_max_ps(sum, all(0));
-  }
-  step.gradient = gradient;
-  step.block.add_identity(identity);
-}
-
-void RelaxedStress::linearise(Group group, const Float4* x, const Vec8& own, NodeStep8& step,
-                              StiffnessSink& sink) const {
-  Scratch none;
-  add(group, x, own, step, none);
+  const Vec8 own = load_group(x + group * kLanes);
+  Vec8 sum = zero_vec8();
   for (const Row& row : rows_[group])
     for (std::size_t k = 0; k < 3; ++k) {
-      Mat8 stiffness = zero_mat8();
-      stiffness.add_identity(all(0) - loads_at(relaxation_.loads(), row.loads[k]));
-      sink.add(row.others[k], stiffness);
+      const Vec8 edge = load(row.edges[k]) + (gather(x, row.others[k]) - own);
+      sum = fma8(edge, loads_at(loads, row.loads[k]), sum);
     }
-}
-
-void RelaxedStress::add_energies_j(std::span<const Vec3d> displacements,
-                                   std::span<double> energies) const {
-  for (Group g = 0; g < rows_.group_count(); ++g)
-    for (std::size_t lane = 0; lane < kLanes; ++lane) {
-      const auto own = static_cast<Slot>(g * kLanes + lane);
-      for (const Row& row : rows_[g])
-        for (std::size_t k = 0; k < 3; ++k) {
-          const Vec3d rest = to_double(row.edges[k].at(lane));
-          const Vec3d now = rest + (displacements[row.others[k].v[lane]] - displacements[own]);
-          const auto load_n_m = static_cast<double>(relaxation_.loads()[row.loads[k].v[lane]]);
-          // Half of each edge from each end.
-          energies[own] += 0.25 * load_n_m * (length_squared(now) - length_squared(rest));
-        }
-    }
+  return sum;
 }
 
 }  // namespace trocar::dynamics

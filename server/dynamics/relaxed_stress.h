@@ -1,28 +1,25 @@
 #pragma once
 
-// What measured tissue has forgotten of its stress (relaxation.h), as forces against it: along each
-// edge of a tet that relaxes a load that is constant in a step, in N per m of the edge as it is. A
-// quadratic energy; its blocks leave out what would make them smaller.
+// What measured tissue has forgotten of its stress (relaxation.h), as forces on nodes: each edge of
+// a tet that relaxes bears a load that is constant in a step, in N per m of the edge. They are
+// taken where the tissue is at the start of a step, so that they are constant, too; among
+// themselves they balance, in force and torque. O(tets at the nodes) a step.
 
-#include "server/dynamics/energy.h"
+#include "server/dynamics/lanes.h"
 #include "server/dynamics/relaxation.h"
 
 namespace trocar::dynamics {
 
-class RelaxedStress final : public Energy {
+class RelaxedStress {
  public:
   // The relaxation must outlive it.
   RelaxedStress(const Topology& topology, const Groups& groups, const Relaxation& relaxation);
 
-  void add(Group group, const Float4* x, const Vec8& own, NodeStep8& step,
-           Scratch& scratch) const override;
-  void linearise(Group group, const Float4* x, const Vec8& own, NodeStep8& step,
-                 StiffnessSink& sink) const override;
-  // Of the loads as they are: not stored energy.
-  void add_energies_j(std::span<const Vec3d> displacements,
-                      std::span<double> energies) const override;
+  // On the group's nodes, N; x: displacements per slot.
+  Vec8 forces(Group group, const Float4* x) const;
+  // As energies follow edits, see Energy::rebuild().
   std::size_t rebuild(const Topology& topology, const Groups& groups,
-                      std::span<const GroupLanes> lanes) override;
+                      std::span<const GroupLanes> lanes);
 
  private:
   // A tet seen from one of its nodes: the other three, the edges there, and where their loads are.

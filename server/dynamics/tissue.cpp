@@ -4,7 +4,6 @@
 
 #include "common/scene/any_material.h"
 #include "server/dynamics/hyperelastic.h"
-#include "server/dynamics/relaxed_stress.h"
 #include "server/dynamics/springs.h"
 #include "server/dynamics/tensor_mass.h"
 
@@ -73,7 +72,7 @@ void Tissue::add_measured(const Topology& topology) {
         law));
   if (!Relaxation::is_needed(organ)) return;
   relaxation_ = std::make_unique<Relaxation>(topology, groups_);
-  energies_.push_back(std::make_unique<RelaxedStress>(topology, groups_, *relaxation_));
+  relaxed_stress_ = std::make_unique<RelaxedStress>(topology, groups_, *relaxation_);
 }
 
 void Tissue::touch(Slot slot) {
@@ -133,7 +132,10 @@ FollowReport Tissue::follow_topology(const Topology& topology) {
     lanes_[g] = 0;
   }
   touched_groups_.clear();
-  if (relaxation_) relaxation_->follow(topology, groups_, touched_);
+  if (relaxation_) {
+    relaxation_->follow(topology, groups_, touched_);
+    relaxed_stress_->rebuild(topology, groups_, touched_);
+  }
   for (const auto& energy : energies_)
     report.rows += energy->rebuild(topology, groups_, energy->follows_moves() ? wide_ : touched_);
   return report;

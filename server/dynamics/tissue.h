@@ -11,6 +11,7 @@
 
 #include "server/dynamics/energy.h"
 #include "server/dynamics/relaxation.h"
+#include "server/dynamics/relaxed_stress.h"
 
 namespace trocar::dynamics {
 
@@ -55,8 +56,10 @@ class Tissue {
   // Lanes whose node, or what meets at it, the last follow_topology() found changed; ascending.
   std::span<const GroupLanes> touched() const { return touched_; }
 
-  // What remembers stresses; null where nothing relaxes.
+  // What remembers stresses, and the forces of what has been forgotten, which no energy has; null
+  // where nothing relaxes.
   Relaxation* relaxation() { return relaxation_.get(); }
+  const RelaxedStress* relaxed_stress() const { return relaxed_stress_.get(); }
 
   // Elastic energy in double, J; displacements per place of a node.
   double energy_j(std::span<const Vec3f> displacements) const;
@@ -67,6 +70,7 @@ class Tissue {
   Groups groups_;
   std::vector<std::unique_ptr<Energy>> energies_;
   std::unique_ptr<Relaxation> relaxation_;
+  std::unique_ptr<RelaxedStress> relaxed_stress_;
   bool follows_moves_ = false;
 
   void add_measured(const Topology& topology);

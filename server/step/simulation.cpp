@@ -63,11 +63,9 @@ void State::visit_without_mark(world::StateArchive& archive) {
 
 namespace {
 
-// Springs and linear tets cost no more than the matrices of a linear far field. What tissue has
-// forgotten of its stress is no function of the poses that these are taken at.
+// Springs and linear tets cost no more than the matrices of a linear far field.
 bool is_costly(const scene::Organ& organ) {
-  return scene::any_material(organ, scene::is_hyperelastic) &&
-         !dynamics::Relaxation::is_needed(organ);
+  return scene::any_material(organ, scene::is_hyperelastic);
 }
 
 }  // namespace

@@ -42,7 +42,7 @@ std::vector<Vec3d> gradients(dynamics::Tissue& tissue, const std::vector<Vec3f>&
     tissue.begin_group(g, x.data(), 0);
     tissue.add(g, x.data(), load_group(&x[g * kLanes]), step, scratch);
     Vec3Lanes lanes;
-    store(lanes, step.gradient);
+    store(lanes, step.gradient - tissue.relaxed_stress()->forces(g, x.data()));
     for (std::size_t lane = 0; lane < kLanes; ++lane)
       if (const auto node = groups.nodes_of(g)[lane]; node.is_valid())
         out[node.value] = to_double(lanes.at(lane));
