@@ -2,20 +2,10 @@
 
 #include <cstdio>
 
+#include "common/base/quote.h"
+
 namespace trocar::app {
 namespace {
-
-std::string quoted(const std::string& text) {
-  std::string out = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') out += '\\';
-    if (static_cast<unsigned char>(c) < 0x20)
-      out += ' ';
-    else
-      out += c;
-  }
-  return out + '"';
-}
 
 class JsonObject {
  public:
@@ -24,7 +14,7 @@ class JsonObject {
     text_ += text_.empty() ? "{\n" : ",\n";
     text_ += indent_ + "  \"" + key + "\": " + raw;
   }
-  void add_text(const char* key, const std::string& text) { add(key, quoted(text)); }
+  void add_text(const char* key, const std::string& text) { add(key, quote(text)); }
   void add_count(const char* key, std::uint64_t value) { add(key, std::to_string(value)); }
   void add_number(const char* key, double value) {
     char text[40];

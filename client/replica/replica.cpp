@@ -93,6 +93,18 @@ bool read_rate(const proto::FrameState& message, RateFigures& figures) {
   return true;
 }
 
+// False if a number in it is not finite.
+bool read_relaxation(const proto::FrameState& message, std::optional<RelaxationFigures>& figures) {
+  figures.reset();
+  if (!message.has_relaxation()) return true;  // a server before 1.5, or nothing relaxes
+  const proto::RelaxationState& r = message.relaxation();
+  if (!std::isfinite(r.energy_j()) || !std::isfinite(r.volume_change()) ||
+      !std::isfinite(r.relaxed_share()))
+    return false;
+  figures = {r.energy_j(), r.volume_change(), r.relaxed_share()};
+  return true;
+}
+
 }  // namespace
 
 Replica::Replica(Send send) : send_(std::move(send)) {}
@@ -385,6 +397,8 @@ void Replica::apply_state(const proto::FrameState& message) {
                                        message.stage_cpu_us().end());
   frame.figures.slow_ticks = message.slow_ticks();
   frame.figures.state_hash = message.state_hash();
+  if (!read_relaxation(message, frame.figures.relaxation))
+    return fail("FrameState.relaxation: a number is not finite");
   if (!read_rate(message, frame.figures.rate))
     return fail("FrameState.rate: a time is negative or not finite, or there are over 16 layers");
   frame.has_state = true;

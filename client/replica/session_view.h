@@ -4,6 +4,7 @@
 // message. Metres, world frame.
 
 #include <array>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -71,6 +72,15 @@ struct RateFigures {
   bool operator==(const RateFigures&) const = default;
 };
 
+// Of all measured tissue that relaxes.
+struct RelaxationFigures {
+  double energy_j = 0;      // elastic, as if nothing had relaxed
+  float volume_change = 0;  // of the whole, over its volume without stress
+  float relaxed_share = 0;  // of the stress that there would be at once, 0 to 1
+
+  bool operator==(const RelaxationFigures&) const = default;
+};
+
 // What the server says about itself with each frame.
 struct FrameFigures {
   std::uint32_t active_nodes = 0, queue_nodes = 0, region_count = 0;
@@ -82,6 +92,7 @@ struct FrameFigures {
   std::uint64_t slow_ticks = 0;
   std::uint64_t state_hash = 0;
   RateFigures rate;
+  std::optional<RelaxationFigures> relaxation;
 };
 
 // One frame as the server published it.

@@ -102,6 +102,12 @@ void draw_session_panel(const HudModel& model, float scale) {
     rate_rows(model);
     row("residual", format("%.2g mN", static_cast<double>(f.residual_n) * 1e3));
     row("regions", std::to_string(f.region_count));
+    if (f.relaxation) {
+      row("elastic energy", format("%.3g mJ", f.relaxation->energy_j * 1e3));
+      row("volume", format("%+.3f %%", 100 * static_cast<double>(f.relaxation->volume_change)));
+      row("relaxed",
+          format("%.0f %% of the stress", 100 * static_cast<double>(f.relaxation->relaxed_share)));
+    }
     if (!model.timeline) row("round trip", format("%.1f ms", model.round_trip_ms));
     row("stream", format("%.1f frames/s, %s", model.frames_per_second,
                          byte_rate(model.bytes_per_second).c_str()));

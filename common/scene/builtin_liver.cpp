@@ -3,6 +3,7 @@
 #include "common/mesh/stuffing.h"
 #include "common/scene/builtin_organs.h"
 #include "common/scene/builtin_search.h"
+#include "common/scene/hyperelastic_material.h"
 #include "common/scene/liver_shape.h"
 
 namespace trocar::scene {
@@ -27,6 +28,12 @@ Result<Organ> make_liver(int target_tets) {
   organ.source_offset_m = mesh::centre_on_origin(organ.mesh);
   organ.node_masses_kg = lumped_masses(organ);
   if (auto status = validate(organ); !status) return status.error();
+  return organ;
+}
+
+Result<Organ> make_measured_liver(int target_tets) {
+  auto organ = make_liver(target_tets);
+  if (organ) use_measured(*find_measured_material("human_liver_nava2008"), organ->material);
   return organ;
 }
 

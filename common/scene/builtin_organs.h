@@ -37,6 +37,8 @@ Organ make_lattice();
 // edge can be lifted. 200,000 tets take 3 s of CPU time, the default 0.3 s.
 inline constexpr int kMinLiverTets = 500, kMaxLiverTets = 200'000, kDefaultLiverTets = 18'500;
 Result<Organ> make_liver(int target_tets = kDefaultLiverTets);
+// The same of "human_liver_nava2008", which is measured, and relaxes.
+Result<Organ> make_measured_liver(int target_tets = kDefaultLiverTets);
 
 // The plate that Nakao 2003 cuts: 160 x 4 x 160 mm, y (up) through its thickness so that it lies
 // flat; 24 x 24 cells in one layer, six tets each in mirrored pairs, 32 of the cells with a node in

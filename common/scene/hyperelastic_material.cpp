@@ -183,7 +183,7 @@ Status validate(const HyperelasticMaterial& material, const StabilityRange& rang
   return wrong(material, std::string("is unstable: in ") + name_of(failure->mode) +
                              (is_shear ? " the stress falls from a shear of "
                                        : " the stress does not grow beyond a stretch of ") +
-                             number(failure->stretch) + " on: use other coefficients");
+                             number(failure->stretch) + " on: use other coefficients, or fewer");
 }
 
 std::span<const HyperelasticMaterial> measured_materials() {

@@ -45,7 +45,8 @@ Result<ImportedOrgan> import_organ(const std::filesystem::path& path,
 }
 
 Result<Organ> load_organ(const std::string& spec) {
-  if (spec == "liver") return make_liver();
+  if (spec == "liver") return make_measured_liver();
+  if (spec == "elastic-liver") return make_liver();
   if (spec == "lattice") return make_lattice();
   if (spec == "plate") return make_plate();
   if (spec == "stomach") return make_stomach();
@@ -60,7 +61,7 @@ Result<Organ> load_organ(const std::string& spec) {
   }
   return Error{ErrorCode::BadFile,
                "organ '" + spec +
-                   "' is neither liver, lattice, plate, stomach nor chest, nor an "
+                   "' is neither liver, elastic-liver, lattice, plate, stomach nor chest, nor an "
                    ".organ or .msh file"};
 }
 

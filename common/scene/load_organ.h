@@ -28,8 +28,8 @@ struct ImportedOrgan {
 // A mesh file (.msh, Gmsh 2.2 ASCII) with the default material.
 Result<ImportedOrgan> import_organ(const std::filesystem::path& path, const ImportOptions& options);
 
-// "liver", "lattice", "plate", "stomach", "chest", or the path of an .organ or .msh file. A mesh is
-// imported with the default options, and its warnings are logged.
+// "liver" (measured), "elastic-liver", "lattice", "plate", "stomach", "chest", or the path of an
+// .organ or .msh file. A mesh is imported with the default options, and its warnings are logged.
 Result<Organ> load_organ(const std::string& spec);
 
 }  // namespace trocar::scene

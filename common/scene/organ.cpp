@@ -35,12 +35,10 @@ Status check_number(const Organ& organ, const char* name, double value, double l
 
 Status check_measured(const HyperelasticMaterial& m) {
   if (auto s = validate(m); !s) return s;
-  const auto cannot = [&m](const char* what) {
-    return Error{ErrorCode::BadFile,
-                 "material " + m.name + " " + what + ", which only the off-line solver knows"};
-  };
-  if (m.split != VolumeSplit::Unsplit) return cannot("is split into volume and shape");
-  if (m.energy != StrainEnergy::ReducedPolynomial) return cannot("is exponential");
+  if (m.split != VolumeSplit::Unsplit)
+    return Error{ErrorCode::BadFile, "material " + m.name +
+                                         " is split into volume and shape, which only the off-line "
+                                         "solver knows"};
   return {};
 }
 
@@ -188,6 +186,7 @@ std::vector<double> numbers_of(const Material& m) {
   numbers.insert(numbers.end(), m.measured.coefficients_pa.begin(),
                  m.measured.coefficients_pa.end());
   numbers.push_back(m.measured.bulk_modulus_pa);
+  if (m.measured.energy == StrainEnergy::Exponential) numbers.push_back(m.measured.exponent);
   for (const auto& [weight, time_s] : m.measured.relaxation)
     numbers.insert(numbers.end(), {weight, time_s});
   return numbers;

@@ -75,6 +75,7 @@ void put_measured(const HyperelasticMaterial& m, proto::MeasuredMaterial& out) {
   out.set_source(m.source);
   for (const double c : m.coefficients_pa) out.add_coefficient_pa(c);
   out.set_bulk_modulus_pa(m.bulk_modulus_pa);
+  if (m.energy == StrainEnergy::Exponential) out.set_exponent(m.exponent);
   for (const auto& [weight, time_s] : m.relaxation) {
     out.add_relaxation(weight);
     out.add_relaxation(time_s);
@@ -111,6 +112,10 @@ Status take_measured(const proto::MeasuredMaterial& in, HyperelasticMaterial& m)
                std::to_string(kMaxPronyTerms) + " terms");
   m = {.name = in.name(), .source = in.source(), .bulk_modulus_pa = in.bulk_modulus_pa()};
   std::ranges::copy(in.coefficient_pa(), m.coefficients_pa.begin());
+  if (in.has_exponent()) {
+    m.energy = StrainEnergy::Exponential;
+    m.exponent = in.exponent();
+  }
   for (int i = 0; i < in.relaxation_size(); i += 2)
     m.relaxation.push_back({in.relaxation(i), in.relaxation(i + 1)});
   return {};

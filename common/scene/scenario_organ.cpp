@@ -3,7 +3,9 @@
 #include <algorithm>
 
 #include "common/scene/builtin_organs.h"
+#include "common/scene/law_keys.h"
 #include "common/scene/load_organ.h"
+#include "common/scene/material_file.h"
 #include "common/scene/scenario_block.h"
 #include "common/scene/scenario_resolver.h"
 
@@ -27,37 +29,6 @@ std::vector<double> mass_weights(const Organ& organ) {
   for (const auto index : material_map(organ).nodes)
     densities.push_back(material_at(organ, index).density_kg_m3);
   return densities;
-}
-
-// Keys that mean something with some laws only.
-struct LawKey {
-  std::string_view key;
-  bool springs, tensor_mass, neo_hookean, measured;
-  const char* why;
-};
-constexpr std::array kLawKeys{
-    LawKey{"spring_stiffness_n_m", true, false, false, false, "is of springs"},
-    LawKey{"young_modulus_pa", true, true, true, false, "is what a measured material has"},
-    LawKey{"poisson_ratio", false, true, true, false,
-           "is of tets with elastic_law = \"tensor-mass\" or \"neo-hookean\": springs have 1/4 "
-           "whatever is asked"},
-    LawKey{"measured", false, false, false, true, "is of elastic_law = \"measured\""},
-    LawKey{"averaged_volume", false, false, true, true,
-           "is of elastic_law = \"neo-hookean\" or \"measured\""},
-    LawKey{"fibre_stiffness_ratio", true, false, false, false, "is of springs"}};
-
-bool applies(const LawKey& key, ElasticLaw law) {
-  switch (law) {
-    case ElasticLaw::Springs:
-      return key.springs;
-    case ElasticLaw::TensorMass:
-      return key.tensor_mass;
-    case ElasticLaw::NeoHookean:
-      return key.neo_hookean;
-    case ElasticLaw::Measured:
-      return key.measured;
-  }
-  return false;
 }
 
 }  // namespace
@@ -91,10 +62,17 @@ Status Resolver::change_material(const MaterialChange& change, const Organ& orga
       return wrong(place, std::string(key.why) + ", remove it");
   }
   if (change.measured) {
-    const auto* measured = find_measured_material(*change.measured);
-    if (measured == nullptr)
-      return wrong(change.place_of("measured"), "is none of " + measured_material_names());
-    use_measured(*measured, m);
+    const std::filesystem::path file(*change.measured);
+    if (file.extension() == ".toml") {
+      const auto measured = read_material_file(scenario_.source.parent_path() / file);
+      if (!measured) return measured.error();
+      use_measured(*measured, m);
+    } else if (const auto* measured = find_measured_material(*change.measured)) {
+      use_measured(*measured, m);
+    } else {
+      return wrong(change.place_of("measured"),
+                   "is none of " + measured_material_names() + ", nor the name of a .toml file");
+    }
   } else if (m.elastic_law == ElasticLaw::Measured && m.measured.name.empty()) {
     return wrong(change.place_of("elastic_law"),
                  "needs a measured material, write measured = \"NAME\", one of " +

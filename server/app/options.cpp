@@ -60,7 +60,8 @@ Result<std::optional<ServerOptions>> parse_command_line(int argc, char** argv) {
   app.footer(kExamples);
   app.set_version_flag("--version", version_text());
   app.add_option("--organ", options.organ,
-                 "built-in organ (liver, lattice, plate, stomach, chest), an .organ file or a .msh "
+                 "built-in organ (liver, elastic-liver, lattice, plate, stomach, chest), an .organ "
+                 "file or a .msh "
                  "mesh")
       ->type_name("NAME|FILE")
       ->capture_default_str();

@@ -4,7 +4,7 @@
 #include <filesystem>
 
 #include "common/base/text_file.h"
-#include "server/fit/csv_row.h"
+#include "server/fit/csv_table.h"
 #include "server/fit/identify_report.h"
 
 namespace trocar::app {
@@ -103,6 +103,7 @@ Status run_identify(IdentifyCommand command) {
   const auto curves = fit::read_test_curves(command.curves, command.size);
   if (!curves) return curves.error();
   const auto found = fit::identify(*curves, command.options, print_progress);
+  if (!found && found.error().code == ErrorCode::Usage) return found.error();
   if (!found) return Error{found.error().code, command.curves + ": " + found.error().message};
   std::fputs(to_text(*found).c_str(), stdout);
   std::fflush(stdout);
@@ -112,7 +113,7 @@ Status run_identify(IdentifyCommand command) {
     std::fprintf(stderr, "%s: warning: %s\n", kProgram, remark.c_str());
   if (!found->stability)
     return Error{found->stability.error().code,
-                 found->stability.error().message + ", or ask for a lower --order"};
+                 command.curves + ": " + found->stability.error().message + ", see --order"};
   const std::filesystem::path folder =
       command.out.empty() ? "out/identify-" + std::filesystem::path(command.curves).stem().string()
                           : command.out;

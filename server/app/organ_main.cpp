@@ -11,10 +11,12 @@
 
 #include "common/base/cpu.h"
 #include "common/base/log.h"
+#include "common/base/quote.h"
 #include "common/base/version.h"
 #include "common/scene/builtin_organs.h"
 #include "common/scene/fibre_rule.h"
 #include "common/scene/load_organ.h"
+#include "common/scene/material_file.h"
 #include "common/scene/organ_file.h"
 #include "server/app/organ_calibrate.h"
 #include "server/app/organ_experiments.h"
@@ -153,9 +155,14 @@ void print_fibres(const scene::Material& m) {
 
 void print_measured(const scene::HyperelasticMaterial& m) {
   std::printf("  elasticity          measured, %s (%s)\n", m.name.c_str(), m.source.c_str());
-  std::printf("  C10 to C50         ");
-  for (const double c : m.coefficients_pa) std::printf(" %.4g", c / 1e3);
-  std::printf(" kPa, bulk modulus %.4g kPa\n", m.bulk_modulus_pa / 1e3);
+  if (m.energy == scene::StrainEnergy::Exponential) {
+    std::printf("  C10, exponent       %.4g kPa, %.4g", m.coefficients_pa[0] / 1e3, m.exponent);
+  } else {
+    std::printf("  C10 to C50         ");
+    for (const double c : m.coefficients_pa) std::printf(" %.4g", c / 1e3);
+    std::printf(" kPa");
+  }
+  std::printf("; bulk modulus %.4g kPa\n", m.bulk_modulus_pa / 1e3);
   for (const auto& [weight, time_s] : m.relaxation)
     std::printf("  relaxes             by %.4g in %.4g s\n", weight, time_s);
 }
@@ -227,28 +234,11 @@ void print_text(const scene::Organ& organ) {
 }
 
 // A JSON string. Names in files may hold any UTF-8, so only what JSON forbids is escaped.
-std::string quoted(const std::string& text) {
-  std::string out = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') {
-      out += '\\';
-      out += c;
-    } else if (static_cast<unsigned char>(c) < 32) {
-      char escaped[8];
-      std::snprintf(escaped, sizeof escaped, "\\u%04x", static_cast<unsigned>(c));
-      out += escaped;
-    } else {
-      out += c;
-    }
-  }
-  return out + "\"";
-}
-
 void print_json(const scene::Material& m) {
   std::printf("  \"elastic_law\": \"%s\",\n  \"poisson_ratio\": %.9g,\n", name_of(m.elastic_law),
               m.poisson_ratio);
   if (m.elastic_law == scene::ElasticLaw::Measured)
-    std::printf("  \"measured\": %s,\n", quoted(m.measured.name).c_str());
+    std::printf("  \"measured\": %s,\n", quote(m.measured.name).c_str());
   std::printf("  \"spring_law\": \"%s\",\n  \"spring_stiffness_n_m\": %.9g,\n",
               m.spring_law == scene::SpringLaw::Constant ? "constant" : "volume_consistent",
               m.spring_stiffness_n_m);
@@ -269,8 +259,8 @@ void print_json(const scene::Organ& organ) {
   const mesh::TetMesh& mesh = organ.mesh;
   const Vec3d size = size_mm(mesh);
   const EdgeLengths edges = edge_lengths(mesh);
-  std::printf("{\n  \"name\": %s,\n  \"source\": %s,\n", quoted(organ.name).c_str(),
-              quoted(organ.source).c_str());
+  std::printf("{\n  \"name\": %s,\n  \"source\": %s,\n", quote(organ.name).c_str(),
+              quote(organ.source).c_str());
   std::printf("  \"nodes\": %zu,\n  \"surface_nodes\": %zu,\n  \"tets\": %zu,\n", mesh.node_count(),
               mesh.surface_nodes.size(), mesh.tets.size());
   std::printf("  \"edges\": %zu,\n  \"links\": %zu,\n  \"surface_triangles\": %zu,\n",
@@ -321,7 +311,8 @@ Result<scene::Organ> make_named(const std::string& name, const std::optional<int
     std::fprintf(stderr, "%s: meshing a %s of about %s tets, this takes some seconds\n", kProgram,
                  name.c_str(), grouped(static_cast<std::size_t>(*tets)).c_str());
   if (name == "stomach") return scene::make_stomach(tets.value_or(scene::kDefaultStomachTets));
-  return scene::make_liver(tets.value_or(scene::kDefaultLiverTets));
+  const int count = tets.value_or(scene::kDefaultLiverTets);
+  return name == "liver" ? scene::make_measured_liver(count) : scene::make_liver(count);
 }
 
 Status add_fibres(const Options& options, scene::Organ& organ) {
@@ -351,10 +342,8 @@ Status change_organ(const Options& options, scene::Organ& organ) {
                  "only those of tets alone"};
   auto& material = organ.material;
   if (!options.material.empty()) {
-    const auto* measured = scene::find_measured_material(options.material);
-    if (measured == nullptr)
-      return Error{ErrorCode::Usage, "--material: " + options.material + " is none of " +
-                                         scene::measured_material_names()};
+    const auto measured = scene::measured_material(options.material);
+    if (!measured) return measured.error();
     scene::use_measured(*measured, material);
   }
   const auto set = [](const std::optional<double>& from, double& to) { to = from.value_or(to); };
@@ -414,11 +403,12 @@ std::string version_text() {
 void add_commands(CLI::App& app, Options& options) {
   auto* make = app.add_subcommand("make", "make a built-in organ");
   make->add_option("NAME", options.made_name,
-                   "liver, stomach, lattice (Choi's 30 x 15 x 30 nodes), plate (Nakao's 16 x 16 x "
+                   "liver (human_liver_nava2008), elastic-liver (neo-Hookean), stomach, lattice "
+                   "(Choi's 30 x 15 x 30 nodes), plate (Nakao's 16 x 16 x "
                    "0.4 cm) or "
                    "chest (wall and heart, the size of Nakao's)")
       ->required()
-      ->check(CLI::IsMember({"liver", "stomach", "lattice", "plate", "chest"}));
+      ->check(CLI::IsMember({"liver", "elastic-liver", "stomach", "lattice", "plate", "chest"}));
   const auto range = [](int low, int high, int usual) {
     return std::to_string(low) + " to " + std::to_string(high) + " [" + std::to_string(usual) + "]";
   };
@@ -454,7 +444,8 @@ void add_commands(CLI::App& app, Options& options) {
   for (auto* command : {make, import}) {
     command
         ->add_option("--material", options.material,
-                     "measured material of its tets: " + scene::measured_material_names())
+                     "measured material of its tets: " + scene::measured_material_names() +
+                         ", or a .toml file as identify leaves it")
         ->type_name("NAME");
     command->add_option("--tension", options.tension, "tissue would be shorter by this part [0]")
         ->type_name("PART");

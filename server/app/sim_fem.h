@@ -1,11 +1,13 @@
 #pragma once
 
 // trocar-sim --solver fem: a scenario on the off-line finite elements, with progress, and with a
-// state after each step from which a stopped run goes on.
+// state after each step from which a stopped run goes on; its probes then go to a file of their
+// own, named after the step.
 
 #include <CLI/CLI.hpp>
 #include <csignal>
 #include <filesystem>
+#include <optional>
 #include <string>
 
 #include "common/base/result.h"
@@ -14,10 +16,13 @@
 namespace trocar::app {
 
 struct FemCommand {
-  std::string elements = "quadratic", material, response = "instantaneous", resume;
-  double step_ms = 1, bulk_ratio = 0;
+  std::string material, resume;
+  std::optional<std::string> elements, response;
+  std::optional<double> step_ms, bulk_ratio;
 };
 void add_fem_options(CLI::App& app, FemCommand& command);
+// Error: one is given that would do nothing.
+Status check_fem_options(const FemCommand& command, bool is_fem);
 
 // Ends early, complete, when `stop_requested` is set.
 Status run_fem(const FemCommand& command, scene::ResolvedScenario resolved,

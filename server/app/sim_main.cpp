@@ -16,6 +16,7 @@
 #include "common/scene/any_material.h"
 #include "server/app/sim_fem.h"
 #include "server/scenario/field_files.h"
+#include "server/scenario/field_times.h"
 #include "server/scenario/probe_file.h"
 #include "server/scenario/probe_plots.h"
 #include "server/scenario/scenario_run.h"
@@ -24,6 +25,7 @@ namespace trocar::app {
 namespace {
 
 constexpr const char* kProgram = "trocar-sim";
+constexpr double kTick_s = 1e-3;
 constexpr std::uint64_t kProgressAfter_ns = 2'000'000'000, kProgressEvery_ns = 500'000'000;
 
 constexpr const char* kExamples = R"(
@@ -40,8 +42,8 @@ Examples:
 Writes probes.csv, and field_<ms>ms.csv and .vtu (ParaView) for the times in [output].
 Ctrl-C ends a run early; what was written until then is complete.
 
-Exit codes: 0 ok (also after Ctrl-C), 2 command line, 3 bad scenario or organ, 5 cannot write or
-processor too old.
+Exit codes: 0 ok (also after Ctrl-C), 1 no equilibrium found (--solver fem), 2 command line, 3 bad
+scenario or organ, 5 cannot write or processor too old.
 )";
 
 struct Options {
@@ -100,14 +102,9 @@ Status simulate(scenario::ScenarioRun& run, const std::filesystem::path& folder,
                 Totals& totals) {
   auto probes = scenario::ProbeFile::create(folder / "probes.csv", run.scenario());
   if (!probes) return probes.error();
-  const auto& times = run.scenario().field_times_s;
-  std::size_t next_field = 0;
+  scenario::FieldTimes field_times(run.scenario().field_times_s, kTick_s);
   const auto write_due_field = [&]() -> Status {
-    const double now = run.time_s();
-    bool is_due = false;
-    for (; next_field < times.size() && times[next_field] <= now + 0.5e-3; ++next_field)
-      is_due = true;
-    return is_due ? scenario::write_field(folder, run) : Status{};
+    return field_times.take_due(run.time_s()) ? scenario::write_field(folder, run) : Status{};
   };
   std::optional<scenario::ProbePlots> plots;
   if (is_plotted) plots.emplace(run);
@@ -164,6 +161,10 @@ void print_summary(const scenario::ScenarioRun& run, const Totals& totals,
 }
 
 Status run_scenario(const Options& options) {
+  const bool is_fem = options.solver == "fem";
+  if (auto s = check_fem_options(options.fem, is_fem); !s) return s;
+  if (is_fem && options.is_plotted)
+    return Error{ErrorCode::Usage, "--plot: --solver fem draws nothing, remove it"};
   auto parsed = scene::parse_scenario(options.scenario);
   if (!parsed) return parsed.error();
   const std::filesystem::path folder =
@@ -172,7 +173,6 @@ Status run_scenario(const Options& options) {
           : parsed->output_folder.value_or("out/" + parsed->source.stem().string());
   auto resolved = scene::resolve(std::move(*parsed));
   if (!resolved) return resolved.error();
-  const bool is_fem = options.solver == "fem";
   if (!is_fem)
     if (auto s = scenario::check_supported(*resolved); !s) return s;
   if (scene::any_material(resolved->organ,

@@ -6,23 +6,11 @@
 #include <algorithm>
 #include <array>
 
+#include "common/base/quote.h"
 #include "common/base/version.h"
 
 namespace trocar::app {
 namespace {
-
-std::string quoted(const std::string& text) {
-  std::string out = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\')
-      out += {'\\', c};
-    else if (static_cast<unsigned char>(c) < 0x20)
-      out += fmt::format("\\u{:04x}", static_cast<unsigned>(c));
-    else
-      out += c;
-  }
-  return out + "\"";
-}
 
 std::string times(const replication::DurationHistogram& histogram) {
   return fmt::format(R"({{"count": {}, "median": {:.3f}, "p99": {:.3f}}})", histogram.count(),
@@ -35,7 +23,7 @@ std::string participants(const std::vector<replication::BarrierResult>& results)
     out += fmt::format(
         "{}\n    {{\"slot\": {}, \"name\": {}, \"role\": \"{}\", \"answered\": {}, \"frame\": {}, "
         "\"surface_crc\": \"{:08x}\", \"equal\": {}}}",
-        out.empty() ? "" : ",", result.slot.value, quoted(result.name),
+        out.empty() ? "" : ",", result.slot.value, quote(result.name),
         session::name_of(result.role), result.has_answered, result.frame, result.surface_crc,
         result.is_equal);
   return out;
@@ -114,8 +102,8 @@ std::string to_json(const Summary& s) {
   }}
 }}
 )",
-      kVersion, kSimVersion, kProtocolMajor, kProtocolMinor, quoted(s.organ), s.node_count,
-      s.surface_vertex_count, quoted(s.journal), s.loop.ticks,
+      kVersion, kSimVersion, kProtocolMajor, kProtocolMinor, quote(s.organ), s.node_count,
+      s.surface_vertex_count, quote(s.journal), s.loop.ticks,
       static_cast<double>(s.loop.ticks) / static_cast<double>(kTicksPerSecond), s.wall_seconds,
       s.loop.slow_ticks, last.tick, last.frame, last.state_hash, last.surface_crc, all_equal,
       participants(s.barrier), s.loop.max_active_nodes, s.loop.faults, s.loop.inputs_dropped,

@@ -88,16 +88,17 @@ void SelfSurface::reach(std::span<const Site> from, double near_m, Neighbours&& 
     seen_current_ = 1;
   }
   for (const Site s : from) seen_[s] = seen_current_, paths_[s] = 0;
-  rim_ = reached_;
+  rim_.clear();
+  for (const Site s : from) rim_.push_back({s, 0});
   for (std::uint32_t layer = 1; !rim_.empty() && layer <= kMostNearLayers; ++layer) {
     next_rim_.clear();
-    for (const Site at : rim_)
-      neighbours(at, [&](Site next) {
-        const double path = paths_[at] + length_between(at, next);
+    for (const Step& step : rim_)
+      neighbours(step.site, [&](Site next) {
+        const double path = step.path + length_between(step.site, next);
         const bool is_new = seen_[next] != seen_current_;
         if ((layer > kNearLayers && path > near_m) || !(is_new || path < paths_[next])) return;
         paths_[next] = path;
-        next_rim_.push_back(next);
+        next_rim_.push_back({next, path});
         if (!is_new) return;
         seen_[next] = seen_current_;
         reached_.push_back(next);

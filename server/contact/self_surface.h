@@ -134,7 +134,13 @@ class SelfSurface {
   std::vector<std::uint32_t> seen_;
   std::uint32_t seen_current_ = 0;
   std::vector<double> paths_;
-  std::vector<Site> reached_, rim_, next_rim_;
+  std::vector<Site> reached_;
+  // The path is that of so many edges, whatever a longer chain of shorter ones comes to.
+  struct Step {
+    Site site = 0;
+    double path = 0;
+  };
+  std::vector<Step> rim_, next_rim_;
 };
 
 }  // namespace trocar::contact

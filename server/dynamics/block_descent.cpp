@@ -50,7 +50,8 @@ BlockDescent::BlockDescent(const scene::Organ& organ, const world::World& world,
   first_link_.resize(slot_count);
   links_.reserve(8 * contact::kMaxPointsPerTool + contact::kMaxSelfPoints);
   residuals_.reserve(world.node_count());
-  for (auto* plan : {&near_, &far_, &far_swept_, &last_, &begun_}) plan->reserve(groups);
+  relaxed_lanes_.reserve(group_count);
+  for (auto* plan : {&near_, &far_, &far_swept_, &last_, &begun_, &relaxed_}) plan->reserve(groups);
   for (auto& band : bands_) band.reserve(groups);
   const auto map = scene::material_map(organ);
   for (Group g = 0; g < group_count; ++g) {
@@ -82,7 +83,7 @@ void BlockDescent::take_state(const world::World& world) {
     }
   }
   if (far_field_) far_field_->take_state(x_.data(), world);
-  if (auto* const relaxation = tissue_.relaxation()) relaxation->take_state();
+  take_relaxation(world);
 }
 
 bool BlockDescent::use_linear_far_field(const world::World& world) {
@@ -168,14 +169,6 @@ void BlockDescent::link_contacts(const contact::ContactList& contacts) {
   }
 }
 
-template <typename Task>
-void BlockDescent::for_each_group(std::span<const Group> groups, Task&& task) {
-  workers_.run([&](unsigned w) {
-    const auto n = groups.size(), count = std::size_t{workers_.count()};
-    for (auto i = n * w / count; i < n * (w + 1) / count; ++i) task(groups[i]);
-  });
-}
-
 // --- The step ---
 
 void BlockDescent::begin_inertia(Group group, std::span<const Vec3f> forces) {
@@ -204,7 +197,8 @@ void BlockDescent::begin_inertia(Group group, std::span<const Vec3f> forces) {
       if (nodes[lane].is_valid()) load_n.set(lane, forces[nodes[lane].value]);
     momentum = momentum + load(load_n);
   }
-  if (tissue_.relaxed_stress() != nullptr) momentum = momentum + load(forgotten_[group]);
+  if (const auto* const stress = tissue_.relaxed_stress())
+    momentum = momentum + stress->forces(group);
   store(inertia_[group].inertia, (mass * rate + load(constants_[group].damping)) * rate);
   store(inertia_[group].momentum, momentum);
 }
@@ -234,11 +228,6 @@ void BlockDescent::begin_groups(world::World& world, const ExternalLoads& loads)
   for_each_group(near_.groups, [&](Group g) { ask_energies(g, x_.data()); });
   for (const auto node : loads.held)
     ask_energies(tissue_.groups().slot_of(node) / kLanes, x_.data());
-  if (const auto* const stress = tissue_.relaxed_stress()) {
-    forgotten_.resize(all_groups_.size());
-    for_each_group(begun_.groups,
-                   [&](Group g) { store(forgotten_[g], stress->forces(g, x_.data())); });
-  }
   for_each_group(begun_.groups, [&](Group g) { begin_inertia(g, loads.forces); });
   place_held(loads);
   if (is_far_linear_)
@@ -556,8 +545,7 @@ SolveReport BlockDescent::solve(const contact::ContactList& contacts,
     report.nodes_restored = restored.nodes;
     report.largest_move_m += restored.largest_move_m;
   }
-  if (auto* const relaxation = tissue_.relaxation())
-    relaxation->end_step(x_.data(), world.relaxation, workers_);
+  end_relaxation(world, loads.held);
   residuals_.clear();
   for (const auto node : near) {
     const Slot slot = tissue_.groups().slot_of(node);

@@ -120,6 +120,9 @@ class BlockDescent {
   // classes and displacements; arrays over nodes have an entry for every place of one. The
   // topology must outlive the solver.
   FollowReport follow_topology(const Topology& topology, const world::World& world);
+  // After it, once there have been steps: the world's forces of stress that has relaxed, where the
+  // topology changed.
+  void refresh_relaxed_forces(world::World& world);
 
  private:
   struct Inertia {
@@ -142,6 +145,9 @@ class BlockDescent {
   const SweepPlan& plan_of(std::uint32_t left, std::span<const SweepBand> bands) const;
   void link_contacts(const contact::ContactList& contacts);
   void begin_groups(world::World& world, const ExternalLoads& loads);
+  // Stress that has relaxed, where something relaxes.
+  void take_relaxation(const world::World& world);
+  void end_relaxation(world::World& world, std::span<const NodeIndex> held);
   void begin_inertia(Group group, std::span<const Vec3f> forces);
   bool coasts(Group group) const { return is_slow(group) && far_swept_.lanes[group] == 0; }
   // A group of far nodes alone goes by far_interval_, others by single steps.
@@ -176,7 +182,12 @@ class BlockDescent {
   Restored restore_rejected(world::World& world);
   Vec3f start_of(Slot slot) const;
   template <typename Task>
-  void for_each_group(std::span<const Group> groups, Task&& task);
+  void for_each_group(std::span<const Group> groups, Task&& task) {
+    workers_.run([&](unsigned w) {
+      const auto n = groups.size(), count = std::size_t{workers_.count()};
+      for (auto i = n * w / count; i < n * (w + 1) / count; ++i) task(groups[i]);
+    });
+  }
 
   const scene::Organ& organ_;
   const Topology* topology_ = nullptr;  // once there was an edit
@@ -192,13 +203,14 @@ class BlockDescent {
   std::vector<Float4> v_;               // per slot: the world's velocities
   std::vector<Float4> start_;           // per slot: at the start of the step; begun groups
   std::vector<Inertia> inertia_;        // per group; begun groups
-  std::vector<Vec3Lanes> forgotten_;    // N per group, of relaxed stress
   std::vector<Lanes> squares_;          // per group: squared residuals of the last sweep
   std::vector<float> group_squares_;    // their sum over swept lanes
   std::vector<float> squared_moves_;    // per group: largest of a node in this step, m^2
   std::vector<std::uint8_t> rejected_;  // per group: lanes with a step that was not finite
   std::vector<Group> all_groups_;
   SweepPlan near_, far_, begun_;
+  std::vector<GroupLanes> relaxed_lanes_;
+  SweepPlan relaxed_;                       // whose forces of relaxed stress a step takes anew
   SweepPlan far_swept_;                     // of far_, in this step; the others coast
   SweepPlan last_;                          // the last sweep: of near_ and far_swept_
   std::unique_ptr<FarField> far_field_;     // null: not used

@@ -16,7 +16,7 @@ FollowReport BlockDescent::follow_topology(const Topology& topology, const world
   squares_.resize(group_count);
   group_squares_.resize(group_count);
   for (auto* lanes : {&free_, &rejected_, &near_.lanes, &far_.lanes, &far_swept_.lanes,
-                      &last_.lanes, &begun_.lanes})
+                      &last_.lanes, &begun_.lanes, &relaxed_.lanes})
     lanes->resize(group_count);
   for (auto& band : bands_) band.lanes.resize(group_count);
   for (auto* stamps : {&begun_stamp_, &group_stamp_, &serial_stamp_, &asked_stamp_})

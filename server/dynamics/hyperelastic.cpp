@@ -460,5 +460,6 @@ void Hyperelastic<Law>::add_energies_j(std::span<const Vec3d> displacements,
 
 template class Hyperelastic<NeoHookeanLaw>;
 template class Hyperelastic<ReducedPolynomialLaw>;
+template class Hyperelastic<ExponentialLaw>;
 
 }  // namespace trocar::dynamics

@@ -116,5 +116,6 @@ using NeoHookean = Hyperelastic<NeoHookeanLaw>;
 
 extern template class Hyperelastic<NeoHookeanLaw>;
 extern template class Hyperelastic<ReducedPolynomialLaw>;
+extern template class Hyperelastic<ExponentialLaw>;
 
 }  // namespace trocar::dynamics

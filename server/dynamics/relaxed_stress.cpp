@@ -5,6 +5,8 @@
 namespace trocar::dynamics {
 namespace {
 
+constexpr int kFewLanes = 3;
+
 Float8 loads_at(const float* loads, const SlotLanes& places) {
   return _mm256_i32gather_ps(loads, _mm256_load_si256(reinterpret_cast<const __m256i*>(places.v)),
                              sizeof(float));
@@ -14,25 +16,23 @@ Float8 loads_at(const float* loads, const SlotLanes& places) {
 
 RelaxedStress::RelaxedStress(const Topology& topology, const Groups& groups,
                              const Relaxation& relaxation)
-    : relaxation_(relaxation) {
+    : groups_(groups), relaxation_(relaxation), forces_(groups.group_count()) {
   rows_.reserve(groups, [&](NodeIndex node) { return topology.tets_of(node).size(); });
   for (Group g = 0; g < groups.group_count(); ++g) fill(topology, groups, {g, 0xff});
   rows_.end_building();
 }
 
-std::size_t RelaxedStress::rebuild(const Topology& topology, const Groups& groups,
-                                   std::span<const GroupLanes> lanes) {
+void RelaxedStress::rebuild(const Topology& topology, const Groups& groups,
+                            std::span<const GroupLanes> lanes) {
   rows_.extend(groups);
-  std::size_t written = 0;
-  for (const auto group_lanes : lanes) written += fill(topology, groups, group_lanes);
+  forces_.resize(groups.group_count());
+  for (const auto group_lanes : lanes) fill(topology, groups, group_lanes);
   rows_.tidy();
-  return written;
 }
 
-std::size_t RelaxedStress::fill(const Topology& topology, const Groups& groups, GroupLanes lanes) {
+void RelaxedStress::fill(const Topology& topology, const Groups& groups, GroupLanes lanes) {
   const auto nodes = groups.nodes_of(lanes.group);
   std::array<std::uint32_t, kLanes> counts{};
-  std::size_t written = 0;
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     tets_[lane].clear();
     if (!lanes.has(lane) || !nodes[lane].is_valid()) continue;
@@ -40,7 +40,6 @@ std::size_t RelaxedStress::fill(const Topology& topology, const Groups& groups, 
       if (relaxes(scene::material_at(topology.organ(), topology.material_of(t))))
         tets_[lane].push_back(t);
     counts[lane] = static_cast<std::uint32_t>(tets_[lane].size());
-    written += counts[lane];
   }
   const auto rows = rows_.reshape(lanes, counts);
   const auto rest = topology.rest();
@@ -56,11 +55,10 @@ std::size_t RelaxedStress::fill(const Topology& topology, const Groups& groups, 
         rows[i].edges[k].set(lane, to_float(rest[tet[other].value] - rest[tet[own].value]));
       }
     }
-  return written;
 }
 
-// Along an edge a stress pulls its ends together; what has been forgotten of it lets them go.
-Vec8 RelaxedStress::forces(Group group, const Float4* x) const {
+// Along an edge a stress pulls its ends together; what has relaxed of it lets them go.
+Vec8 RelaxedStress::forces_at(Group group, const Float4* x) const {
   const float* const loads = relaxation_.loads();
   const Vec8 own = load_group(x + group * kLanes);
   Vec8 sum = zero_vec8();
@@ -70,6 +68,63 @@ Vec8 RelaxedStress::forces(Group group, const Float4* x) const {
       sum = fma8(edge, loads_at(loads, row.loads[k]), sum);
     }
   return sum;
+}
+
+// The same to the bit: where few lanes are asked for, one after another is quicker.
+Vec3f RelaxedStress::force_at(Group group, std::size_t lane, const Float4* x) const {
+  const float* const loads = relaxation_.loads();
+  const auto displacement = [x](Slot slot) { return _mm_load_ps(&x[slot].x); };
+  const __m128 own = displacement(static_cast<Slot>(group * kLanes + lane));
+  __m128 sum = _mm_setzero_ps();
+  for (const Row& row : rows_[group])
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto& edges = row.edges[k];
+      const __m128 rest = _mm_setr_ps(edges.x.v[lane], edges.y.v[lane], edges.z.v[lane], 0);
+      const __m128 edge = _mm_add_ps(rest, _mm_sub_ps(displacement(row.others[k].v[lane]), own));
+      sum = _mm_fmadd_ps(edge, _mm_set1_ps(loads[row.loads[k].v[lane]]), sum);
+    }
+  Float4 force;
+  _mm_store_ps(&force.x, sum);
+  return to_vec3(force);
+}
+
+void RelaxedStress::refresh(GroupLanes lanes, const Float4* x, world::RelaxationState& state) {
+  const auto group = lanes.group;
+  const bool are_few = __builtin_popcount(lanes.lanes) <= kFewLanes;
+  Vec3Lanes all;
+  if (!are_few) store(all, forces_at(group, x));
+  const auto nodes = groups_.nodes_of(group);
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    if (!lanes.has(lane)) continue;
+    const Vec3f force = are_few ? force_at(group, lane, x) : all.at(lane);
+    forces_[group].set(lane, force);
+    if (nodes[lane].is_valid()) state.set_force(nodes[lane], force);
+  }
+}
+
+void RelaxedStress::take_state(const world::RelaxationState& state) {
+  for (Group g = 0; g < groups_.group_count(); ++g)
+    for (std::size_t lane = 0; lane < kLanes; ++lane)
+      if (const auto node = groups_.nodes_of(g)[lane]; node.is_valid())
+        forces_[g].set(lane, state.forces()[node.value]);
+}
+
+void start_relaxed(const scene::Organ& organ, world::World& world) {
+  if (!Relaxation::is_needed(organ)) return;
+  const Topology topology(organ);
+  const Groups groups(topology, Coupling::Elements);
+  std::vector<Float4> x(groups.slot_count());
+  for (Slot slot = 0; slot < x.size(); ++slot)
+    if (const auto node = groups.node_at(slot); node.is_valid())
+      x[slot] = to_float4(world.displacements[node.value]);
+  Relaxation relaxation(topology, groups);
+  relaxation.settle(x.data(), world.relaxation);
+  // Of tissue that stays as it is the loads do not depend on the step.
+  Workers alone(1);
+  relaxation.begin_step(1, world.relaxation, alone);
+  RelaxedStress stress(topology, groups, relaxation);
+  for (Group g = 0; g < groups.group_count(); ++g)
+    stress.refresh({g, 0xff}, x.data(), world.relaxation);
 }
 
 }  // namespace trocar::dynamics

@@ -1,9 +1,9 @@
 #pragma once
 
-// What measured tissue has forgotten of its stress (relaxation.h), as forces on nodes: each edge of
-// a tet that relaxes bears a load that is constant in a step, in N per m of the edge. They are
-// taken where the tissue is at the start of a step, so that they are constant, too; among
-// themselves they balance, in force and torque. O(tets at the nodes) a step.
+// What has relaxed of the stress of measured tissue (relaxation.h), as forces on nodes: each edge
+// of a tet that relaxes bears a load that is constant in a step, in N per m of the edge. Forces are
+// taken where the tissue is between two steps, and are constant in the next; those of all nodes,
+// taken at once, balance in force and torque. O(tets at the nodes) each time.
 
 #include "server/dynamics/lanes.h"
 #include "server/dynamics/relaxation.h"
@@ -12,14 +12,18 @@ namespace trocar::dynamics {
 
 class RelaxedStress {
  public:
-  // The relaxation must outlive it.
+  // Groups and the relaxation must outlive it.
   RelaxedStress(const Topology& topology, const Groups& groups, const Relaxation& relaxation);
 
-  // On the group's nodes, N; x: displacements per slot.
-  Vec8 forces(Group group, const Float4* x) const;
+  // Forces on these nodes anew, in the state too; x: displacements per slot. Different groups at
+  // once: allowed.
+  void refresh(GroupLanes lanes, const Float4* x, world::RelaxationState& state);
+  // As they were taken last, N.
+  Vec8 forces(Group group) const { return load(forces_[group]); }
+  // All of them from the state.
+  void take_state(const world::RelaxationState& state);
   // As energies follow edits, see Energy::rebuild().
-  std::size_t rebuild(const Topology& topology, const Groups& groups,
-                      std::span<const GroupLanes> lanes);
+  void rebuild(const Topology& topology, const Groups& groups, std::span<const GroupLanes> lanes);
 
  private:
   // A tet seen from one of its nodes: the other three, the edges there, and where their loads are.
@@ -35,11 +39,19 @@ class RelaxedStress {
     }
   };
 
-  std::size_t fill(const Topology& topology, const Groups& groups, GroupLanes lanes);
+  void fill(const Topology& topology, const Groups& groups, GroupLanes lanes);
 
+  Vec8 forces_at(Group group, const Float4* x) const;
+  Vec3f force_at(Group group, std::size_t lane, const Float4* x) const;
+
+  const Groups& groups_;
   const Relaxation& relaxation_;
   GroupRows<Row> rows_;
+  std::vector<Vec3Lanes> forces_;
   std::array<std::vector<TetIndex>, kLanes> tets_;  // while rows are filled
 };
+
+// A world that begins: its tissue has been where it is for long. Measured organs under tension.
+void start_relaxed(const scene::Organ& organ, world::World& world);
 
 }  // namespace trocar::dynamics

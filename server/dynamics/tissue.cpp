@@ -22,11 +22,22 @@ bool averages_volume(const scene::Organ& organ) {
   });
 }
 
-ReducedPolynomialLaw polynomial_of(const scene::HyperelasticMaterial& measured) {
-  ReducedPolynomialLaw law;
-  const auto& c = measured.coefficients_pa;
+// Nothing where the material has another energy.
+std::optional<ReducedPolynomialLaw> law_of(const scene::Material& material,
+                                           ReducedPolynomialLaw law) {
+  if (material.elastic_law != ElasticLaw::Measured ||
+      material.measured.energy != scene::StrainEnergy::ReducedPolynomial)
+    return {};
+  const auto& c = material.measured.coefficients_pa;
   for (std::size_t i = 0; i < law.ratios.size(); ++i)
     law.ratios[i] = static_cast<float>(c[i + 1] / c[0]);
+  return law;
+}
+std::optional<ExponentialLaw> law_of(const scene::Material& material, ExponentialLaw law) {
+  if (material.elastic_law != ElasticLaw::Measured ||
+      material.measured.energy != scene::StrainEnergy::Exponential)
+    return {};
+  law.exponent = static_cast<float>(material.measured.exponent);
   return law;
 }
 
@@ -48,29 +59,30 @@ Tissue::Tissue(const Topology& topology, std::span<const Colour> colours)
                                      hyperelastic_parameters(organ, [](const scene::Material& m) {
                                        return m.elastic_law == ElasticLaw::NeoHookean;
                                      })));
-  add_measured(topology);
+  add_measured<ReducedPolynomialLaw>(topology);
+  add_measured<ExponentialLaw>(topology);
+  add_relaxation(topology);
 }
 
-// One energy for all materials whose polynomials are multiples of each other.
+// One energy for all materials whose laws are multiples of each other.
+template <typename Law>
 void Tissue::add_measured(const Topology& topology) {
   const auto& organ = topology.organ();
-  std::vector<ReducedPolynomialLaw> laws;
+  std::vector<Law> laws;
   for (std::size_t i = 0; i <= organ.regions.size(); ++i) {
-    const auto& material = scene::material_at(organ, static_cast<std::uint16_t>(i));
-    if (material.elastic_law != ElasticLaw::Measured) continue;
-    const auto law = polynomial_of(material.measured);
-    if (std::ranges::find(laws, law) == laws.end()) laws.push_back(law);
+    const auto law = law_of(scene::material_at(organ, static_cast<std::uint16_t>(i)), Law{});
+    if (law && std::ranges::find(laws, *law) == laws.end()) laws.push_back(*law);
   }
   for (const auto& law : laws)
-    energies_.push_back(std::make_unique<Hyperelastic<ReducedPolynomialLaw>>(
+    energies_.push_back(std::make_unique<Hyperelastic<Law>>(
         topology, groups_, follows_moves_,
         hyperelastic_parameters(organ,
-                                [&](const scene::Material& m) {
-                                  return m.elastic_law == ElasticLaw::Measured &&
-                                         polynomial_of(m.measured) == law;
-                                }),
+                                [&](const scene::Material& m) { return law_of(m, Law{}) == law; }),
         law));
-  if (!Relaxation::is_needed(organ)) return;
+}
+
+void Tissue::add_relaxation(const Topology& topology) {
+  if (!Relaxation::is_needed(topology.organ())) return;
   relaxation_ = std::make_unique<Relaxation>(topology, groups_);
   relaxed_stress_ = std::make_unique<RelaxedStress>(topology, groups_, *relaxation_);
 }

@@ -7,6 +7,7 @@
 // bit those of a tissue built anew from the changed organ with the colours of this one.
 
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "server/dynamics/energy.h"
@@ -56,10 +57,14 @@ class Tissue {
   // Lanes whose node, or what meets at it, the last follow_topology() found changed; ascending.
   std::span<const GroupLanes> touched() const { return touched_; }
 
-  // What remembers stresses, and the forces of what has been forgotten, which no energy has; null
+  // What remembers stresses, and the forces of stress that has relaxed, which no energy has; null
   // where nothing relaxes.
   Relaxation* relaxation() { return relaxation_.get(); }
+  RelaxedStress* relaxed_stress() { return relaxed_stress_.get(); }
   const RelaxedStress* relaxed_stress() const { return relaxed_stress_.get(); }
+  std::optional<RelaxationFigures> relaxation_figures() const {
+    return relaxation_ ? std::optional(relaxation_->figures()) : std::nullopt;
+  }
 
   // Elastic energy in double, J; displacements per place of a node.
   double energy_j(std::span<const Vec3f> displacements) const;
@@ -73,7 +78,9 @@ class Tissue {
   std::unique_ptr<RelaxedStress> relaxed_stress_;
   bool follows_moves_ = false;
 
+  template <typename Law>
   void add_measured(const Topology& topology);
+  void add_relaxation(const Topology& topology);
   void touch(Slot slot);
   void list_touched(std::vector<GroupLanes>& out);
 

@@ -41,12 +41,24 @@ void add_mass(Eigen::Matrix<double, 3 * Nodes, 3 * Nodes>& k, ElementOrder order
 
 }  // namespace
 
-Assembler::Assembler(const Problem& problem, unsigned threads)
-    : problem_(problem), pattern_(problem), workers_(threads) {
+std::size_t history_stride(const Problem& problem) {
+  std::size_t stride = 0;
   for (const auto& material : problem.materials)
-    stride_ = std::max(stride_, history_size(material.relaxation.size()));
+    stride = std::max(stride, history_size(material.relaxation.size()));
+  return stride;
+}
+
+std::size_t history_length(const Problem& problem) {
+  return history_stride(problem) * problem.mesh.points_per_element() * problem.mesh.element_count();
+}
+
+Assembler::Assembler(const Problem& problem, unsigned threads)
+    : problem_(problem),
+      pattern_(problem),
+      workers_(threads),
+      stride_(history_stride(problem)),
+      history_(history_length(problem), 0.0) {
   const auto& mesh = problem.mesh;
-  history_.assign(mesh.element_count() * mesh.points_per_element() * stride_, 0.0);
   const std::size_t dofs = 3 * mesh.nodes_per_element();
   block_.forces.resize(kBlockElements * dofs);
   block_.products.resize(kBlockElements * dofs);

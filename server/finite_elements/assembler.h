@@ -17,6 +17,10 @@ struct TangentFactors {
   double stiffness = 1, mass = 0;
 };
 
+// Numbers that relaxation remembers, per quadrature point and of all elements.
+std::size_t history_stride(const Problem& problem);
+std::size_t history_length(const Problem& problem);
+
 class Assembler {
  public:
   // The problem must stay where it is.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 #include <map>
 
@@ -12,6 +13,8 @@ namespace trocar::finite_elements {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+// Of a number of steps, from decimal fractions: 3,600 s of 1 us are wrong by less.
+constexpr double kStepRounding = 1e-5;
 
 Eigen::Index first_dof(std::uint32_t node) {
   return 3 * static_cast<Eigen::Index>(node);
@@ -40,22 +43,6 @@ scene::HyperelasticMaterial hyperelastic_of(const scene::Material& material,
   return m;
 }
 
-// Weights of all nodes, N.
-Vector weight_of(const Problem& problem, const Vec3d& gravity) {
-  Vector weight = Vector::Zero(static_cast<Eigen::Index>(problem.dof_count()));
-  const auto& mesh = problem.mesh;
-  for (std::size_t e = 0; e < mesh.element_count(); ++e) {
-    const double mass = mesh.volumes[e] * problem.densities_kg_m3[problem.element_materials[e]];
-    const auto nodes = mesh.nodes_of(e);
-    for (std::size_t a = 0; a < nodes.size(); ++a) {
-      double share = 0;
-      for (std::size_t b = 0; b < nodes.size(); ++b) share += mass_share(mesh.order, a, b);
-      add_at(weight, nodes[a], gravity * (mass * share));
-    }
-  }
-  return weight;
-}
-
 Status check_organ(const scene::ResolvedScenario& resolved) {
   const auto& scenario = resolved.scenario;
   const auto wrong = [&](const scene::Place& place, const char* what) {
@@ -74,6 +61,18 @@ Status check_organ(const scene::ResolvedScenario& resolved) {
   return {};
 }
 
+// Of a dynamic run; a part of a step that is left over would silently change its length.
+Status check_steps(double seconds, double dt_s) {
+  const double steps = seconds / dt_s;
+  if (dt_s > 0 && steps > 0.5 && std::abs(steps - std::round(steps)) <= kStepRounding) return {};
+  char text[160];
+  std::snprintf(text, sizeof text,
+                "--step-ms: %g s are %.6g steps of %g ms, choose a step of which they are a whole "
+                "number",
+                seconds, steps, dt_s * 1e3);
+  return Error{ErrorCode::Usage, text};
+}
+
 }  // namespace
 
 ScenarioSolve::ScenarioSolve(scene::ResolvedScenario resolved, const ScenarioSettings& settings)
@@ -86,13 +85,15 @@ ScenarioSolve::ScenarioSolve(scene::ResolvedScenario resolved, const ScenarioSet
 Result<std::unique_ptr<ScenarioSolve>> ScenarioSolve::create(scene::ResolvedScenario resolved,
                                                              const ScenarioSettings& settings) {
   if (auto s = check_organ(resolved); !s) return s.error();
+  if (const auto& run = resolved.scenario.run; run.mode == scene::RunMode::Dynamic)
+    if (auto s = check_steps(run.seconds, settings.dt_s); !s) return s.error();
   std::unique_ptr<ScenarioSolve> solve(new ScenarioSolve(std::move(resolved), settings));
   Problem problem;
   if (auto s = solve->make_problem_of(problem); !s) return s.error();
-  solve->add_forces(problem);
   for (const auto& nodes : solve->resolved_.probe_nodes)
     solve->probe_nodes_.push_back(solve->with_middles(nodes, problem.mesh));
   solve->solver_ = std::make_unique<Solver>(std::move(problem), settings.solver);
+  solve->add_forces();
   return solve;
 }
 
@@ -112,6 +113,9 @@ Status ScenarioSolve::add_materials(Problem& problem) const {
     const auto& material = scene::material_at(organ, static_cast<std::uint16_t>(i));
     const std::string name = i == 0 ? organ.name : organ.regions[i - 1].name;
     problem.densities_kg_m3.push_back(material.density_kg_m3);
+    if (material.tension != 0 || material.fibre_tension != 0)
+      return scene::scenario_error(resolved_.scenario, resolved_.scenario.material.place,
+                                   "the solver \"fem\" has no tension, set it to 0 for " + name);
     if (i == 0 && settings_.material) {
       problem.materials.push_back(*settings_.material);
       continue;
@@ -121,9 +125,6 @@ Status ScenarioSolve::add_materials(Problem& problem) const {
           resolved_.scenario, resolved_.scenario.material.place,
           "the solver \"fem\" needs elastic_law = \"neo-hookean\" or \"measured\" for " + name +
               ", see --material");
-    if (material.tension != 0 || material.fibre_tension != 0)
-      return scene::scenario_error(resolved_.scenario, resolved_.scenario.material.place,
-                                   "the solver \"fem\" has no tension, set it to 0");
     problem.materials.push_back(material.elastic_law == scene::ElasticLaw::Measured
                                     ? material.measured
                                     : hyperelastic_of(material, name));
@@ -160,8 +161,9 @@ void ScenarioSolve::add_holds(Problem& problem) {
   }
 }
 
-void ScenarioSolve::add_forces(const Problem& problem) {
-  weight_ = weight_of(problem, resolved_.organ.gravity_m_s2);
+void ScenarioSolve::add_forces() {
+  const Problem& problem = solver_->problem();
+  weight_ = solver_->weights(resolved_.organ.gravity_m_s2);
   const auto& mesh = resolved_.organ.mesh;
   for (std::size_t i = 0; i < resolved_.forces.size(); ++i) {
     const auto& force = resolved_.forces[i];
@@ -199,19 +201,43 @@ Loads ScenarioSolve::loads_at(double time_s) const {
   return loads;
 }
 
-double ScenarioSolve::time_s() const {
-  if (!is_static()) return static_cast<double>(steps_done_) * settings_.dt_s;
-  return steps_done_ == 0 ? 0 : resolved_.scenario.run.load_times_s[steps_done_ - 1];
+double ScenarioSolve::time_after(std::uint64_t steps) const {
+  if (!is_static()) return static_cast<double>(steps) * settings_.dt_s;
+  return steps == 0 ? 0 : resolved_.scenario.run.load_times_s[steps - 1];
+}
+
+bool ScenarioSolve::starts_in_equilibrium() const {
+  return resolved_.scenario.run.starts_in_equilibrium;
+}
+
+// Of the state at time 0: in equilibrium with all, or at rest, with nothing moved but what is held.
+Loads ScenarioSolve::start_loads() const {
+  Loads loads = loads_at(0);
+  if (!starts_in_equilibrium()) loads.forces.setZero();
+  return loads;
+}
+
+StepSettings ScenarioSolve::start_settings() const {
+  return {starts_in_equilibrium() ? kInfinity : 0.0, false};
+}
+
+StepSettings ScenarioSolve::step_settings() const {
+  if (is_static()) return {settings_.is_equilibrium ? kInfinity : 0.0, false};
+  return {settings_.dt_s, true};
+}
+
+const StepReport& ScenarioSolve::start() {
+  if (is_started_ || is_static()) return settling_;
+  is_started_ = true;
+  settling_ = solver_->step(start_loads(), start_settings());
+  if (!starts_in_equilibrium()) solver_->set_forces(loads_at(0).forces);
+  return settling_;
 }
 
 StepReport ScenarioSolve::step() {
-  if (steps_done_ == 0 && !is_static())
-    settling_ = solver_->step(
-        loads_at(0), {resolved_.scenario.run.starts_in_equilibrium ? kInfinity : 0.0, false});
+  start();
   ++steps_done_;
-  const Loads loads = loads_at(time_s());
-  if (is_static()) return solver_->step(loads, {settings_.is_equilibrium ? kInfinity : 0.0, false});
-  return solver_->step(loads, {settings_.dt_s, true});
+  return solver_->step(loads_at(time_s()), step_settings());
 }
 
 bool ScenarioSolve::is_due(std::size_t probe) const {
@@ -285,9 +311,31 @@ Status ScenarioSolve::resume(const std::filesystem::path& path) {
   const std::uint64_t first = is_static() ? 0 : 1;  // the step to the loads at the start
   if (state->steps < first || state->steps - first > step_count_)
     return Error{ErrorCode::BadFile, path.string() + ": is not at a step of this scenario"};
+  const std::uint64_t steps = state->steps - first;
+  const double time = time_after(steps);
+  if (!is_static() && std::abs(state->time_s - time) > kStepRounding * time)
+    return Error{ErrorCode::BadFile,
+                 path.string() + ": has other steps of time, resume with the same --step-ms"};
+  if (state->path != path_to(steps))
+    return Error{ErrorCode::BadFile, path.string() +
+                                         ": was come to with other loads, another start or "
+                                         "--response: resume with those of its run"};
   solver_->restore(*state);
-  steps_done_ = state->steps - first;
+  steps_done_ = steps;
+  is_started_ = true;
   return {};
+}
+
+// Of the solver when these steps are done.
+std::uint64_t ScenarioSolve::path_to(std::uint64_t steps) const {
+  std::uint64_t path = 0;
+  if (!is_static()) {
+    path = path_after(path, start_loads(), start_settings());
+    if (!starts_in_equilibrium()) path = path_after(path, loads_at(0), {});
+  }
+  for (std::uint64_t i = 1; i <= steps; ++i)
+    path = path_after(path, loads_at(time_after(i)), step_settings());
+  return path;
 }
 
 }  // namespace trocar::finite_elements

@@ -38,9 +38,10 @@ class ScenarioSolve {
   std::uint64_t steps_done() const { return steps_done_; }
   std::uint64_t step_count() const { return step_count_; }
   bool is_finished() const { return steps_done_ >= step_count_; }
-  double time_s() const;  // of the scenario, at the end of the last step
-  // How the starting equilibrium was found.
-  const StepReport& settling() const { return settling_; }
+  // Of the scenario, at the end of the last step.
+  double time_s() const { return time_after(steps_done_); }
+  // The state at time 0, which the first step makes if nobody has: how its equilibrium was found.
+  const StepReport& start();
 
   // Whether the probe has a value for the last step.
   bool is_due(std::size_t probe) const;
@@ -54,7 +55,8 @@ class ScenarioSolve {
   Solver& solver() { return *solver_; }
   const Solver& solver() const { return *solver_; }
 
-  // Goes on from a state of the same problem; refuses one that is not at a step of this scenario.
+  // Goes on from a state of the same problem; refuses one that is not at a step of this scenario,
+  // or that other loads or steps have led to. Time: that of the loads of all steps done.
   Status resume(const std::filesystem::path& path);
   Status save(const std::filesystem::path& path) const;
 
@@ -63,8 +65,14 @@ class ScenarioSolve {
   Status make_problem_of(Problem& problem);
   Status add_materials(Problem& problem) const;
   void add_holds(Problem& problem);
-  void add_forces(const Problem& problem);
+  void add_forces();
   Loads loads_at(double time_s) const;
+  double time_after(std::uint64_t steps) const;
+  bool starts_in_equilibrium() const;
+  Loads start_loads() const;
+  StepSettings start_settings() const;
+  StepSettings step_settings() const;
+  std::uint64_t path_to(std::uint64_t steps) const;
   bool is_static() const { return resolved_.scenario.run.mode == scene::RunMode::Static; }
   // The nodes and the middles of edges between them.
   std::vector<std::uint32_t> with_middles(const scene::NodeList& nodes,
@@ -75,6 +83,7 @@ class ScenarioSolve {
   std::uint64_t step_count_ = 0, steps_done_ = 0;
   std::unique_ptr<Solver> solver_;
   StepReport settling_;
+  bool is_started_ = false;
   std::vector<std::int32_t> held_rules_;           // per held dof: displacement, or -1: stays
   Vector weight_;                                  // of gravity
   std::vector<std::vector<double>> area_shares_;   // per entry of forces, if a traction

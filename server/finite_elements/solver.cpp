@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/checksum.h"
+
 namespace trocar::finite_elements {
 namespace {
 
@@ -40,6 +42,18 @@ double least_force(const Problem& problem) {
 
 Loads no_loads(const Problem& problem) {
   return {zeros(problem), std::vector<double>(problem.held_dofs.size(), 0.0)};
+}
+
+std::uint64_t path_after(std::uint64_t path, const Loads& loads, const StepSettings& settings) {
+  StateHasher hasher;
+  hasher.update(bytes_of(std::span(&std::as_const(path), 1)));
+  hasher.update(
+      bytes_of(std::span(loads.forces.data(), static_cast<std::size_t>(loads.forces.size()))));
+  hasher.update(bytes_of(loads.held_moves));
+  hasher.update(bytes_of(std::span(&settings.dt_s, 1)));
+  const std::uint8_t has_inertia = settings.has_inertia ? 1 : 0;
+  hasher.update(bytes_of(std::span(&has_inertia, 1)));
+  return hasher.digest();
 }
 
 Solver::Solver(Problem problem, const SolverSettings& settings)
@@ -263,7 +277,15 @@ StepReport Solver::step(const Loads& loads, const StepSettings& settings) {
     }
   }
   ++steps_;
+  path_ = path_after(path_, loads, settings);
   return report;
+}
+
+void Solver::set_forces(const Vector& forces) {
+  TROCAR_ASSERT(forces.size() == u_.size());
+  loads_.forces = forces;
+  is_moving_ = false;
+  path_ = path_after(path_, loads_, {});
 }
 
 Vector Solver::reactions() const {
@@ -271,15 +293,23 @@ Vector Solver::reactions() const {
   return internal_ + assembler_.mass_times(acceleration_ + problem_.damping_per_s * velocity_);
 }
 
+Vector Solver::weights(const Vec3d& gravity_m_s2) const {
+  Vector everywhere = zeros(problem_);
+  for (Eigen::Index dof = 0; dof < everywhere.size(); dof += 3)
+    everywhere.segment<3>(dof) << gravity_m_s2.x, gravity_m_s2.y, gravity_m_s2.z;
+  return assembler_.mass_times(everywhere);
+}
+
 State Solver::state() const {
-  return {time_s_,   steps_, is_moving_,          u_, velocity_, acceleration_,
-          internal_, loads_, assembler_.history()};
+  return {time_s_,   steps_,        path_,     is_moving_, u_,
+          velocity_, acceleration_, internal_, loads_,     assembler_.history()};
 }
 
 void Solver::restore(const State& state) {
   TROCAR_ASSERT(state.u.size() == u_.size());
   TROCAR_ASSERT(state.history.size() == assembler_.history().size());
-  time_s_ = state.time_s, steps_ = state.steps, is_moving_ = state.is_moving;
+  time_s_ = state.time_s, steps_ = state.steps, path_ = state.path;
+  is_moving_ = state.is_moving;
   u_ = state.u, velocity_ = state.velocity, acceleration_ = state.acceleration;
   internal_ = state.internal;
   loads_ = state.loads;

@@ -47,6 +47,9 @@ struct SolverSettings {
   double high_frequency_radius = 0.8;
 };
 
+// How a state was come to: a hash of every step's loads and settings, from 0 before the first.
+std::uint64_t path_after(std::uint64_t path, const Loads& loads, const StepSettings& settings);
+
 struct StepReport {
   bool is_converged = true;
   int parts = 0, iterations = 0, shifted_factors = 0;
@@ -64,6 +67,7 @@ struct NewtonProgress {
 struct State {
   double time_s = 0;  // of finite steps
   std::uint64_t steps = 0;
+  std::uint64_t path = 0;                      // path_after() all steps so far
   bool is_moving = false;                      // the last step had inertia
   Vector u, velocity, acceleration, internal;  // 3 per node; forces of the tissue
   Loads loads;                                 // at the end of the last step
@@ -80,6 +84,9 @@ class Solver {
   // From the last loads to these, linearly in the step.
   StepReport step(const Loads& loads, const StepSettings& settings);
 
+  // From now on these forces act, and nothing has moved yet: a step with inertia starts with them.
+  void set_forces(const Vector& forces);
+
   const Problem& problem() const { return problem_; }
   const Vector& displacements() const { return u_; }
   const Vector& velocities() const { return velocity_; }
@@ -87,6 +94,8 @@ class Solver {
   // What holds and loads the tissue, 3 per node, N: at held degrees of freedom the reactions on the
   // tissue, inertia and damping included; at free ones the loads.
   Vector reactions() const;
+  // Weights of all nodes, 3 per node, N.
+  Vector weights(const Vec3d& gravity_m_s2) const;
 
   State state() const;
   // A state of the same problem.
@@ -128,7 +137,7 @@ class Solver {
   double least_force_n_ = 0;  // rounding errors of forces are below
 
   double time_s_ = 0;
-  std::uint64_t steps_ = 0;
+  std::uint64_t steps_ = 0, path_ = 0;
   Vector u_, velocity_, acceleration_;
   Vector internal_;  // forces at the end of the last step
   Loads loads_;

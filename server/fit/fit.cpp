@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "common/base/quote.h"
 #include "server/fit/fit_model.h"
 
 namespace trocar::fit {
@@ -172,7 +173,7 @@ Result<Fit> fit(const scene::ResolvedScenario& resolved, const MeasuredCurve& me
 
 std::string to_toml(const Fit& fit, const FitOptions& options) {
   std::string text = options.region.empty() ? "[material]\n" : "[[region]]\n";
-  if (!options.region.empty()) text += "name = \"" + options.region + "\"\n";
+  if (!options.region.empty()) text += "name = " + quote(options.region) + "\n";
   for (const auto& p : fit.parameters) {
     char line[120];
     std::snprintf(line, sizeof line, "%s = %.6g", p.key.c_str(), p.value);

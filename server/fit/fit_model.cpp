@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "common/scene/law_keys.h"
 #include "server/scenario/scenario_run.h"
 
 namespace trocar::fit {
@@ -31,11 +32,12 @@ std::string why_not(const Tunable& tunable, const Material& m, bool has_fibres, 
   const bool is_constant = is_springs && m.spring_law == scene::SpringLaw::Constant;
   if (tunable.key == "young_modulus_pa" && is_constant)
     return "its springs have a given stiffness, fit spring_stiffness_n_m";
+  if (const auto why = scene::why_not_with(tunable.key, m.elastic_law); !why.empty())
+    return m.elastic_law == ElasticLaw::Measured
+               ? "a measured material has constants of its own, see trocar-organ identify"
+               : "it " + std::string(why);
   if (tunable.key == "spring_stiffness_n_m" && !is_constant)
     return "its stiffness comes from young_modulus_pa, fit that";
-  if (tunable.key == "poisson_ratio" && is_springs)
-    return "springs have 1/4 whatever is asked, see elastic_law";
-  if (tunable.key == "fibre_stiffness_ratio" && !is_springs) return "it is of springs";
   if (tunable.key == "fibre_stiffness_ratio" && !has_fibres)
     return "it needs a fibre_direction in [material]";
   if (is_static && tunable.key.find("damping") != std::string_view::npos)
@@ -108,9 +110,11 @@ Status FitModel::choose_parameters(const FitOptions& options) {
   const bool has_fibres =
       length(m.fibre_direction) > 0 || !resolved_.organ.fibre_directions.empty();
   std::vector<std::string> keys = options.parameters;
-  if (keys.empty())
-    keys = {why_not(kTunables[0], m, has_fibres, is_static).empty() ? "young_modulus_pa"
-                                                                    : "spring_stiffness_n_m"};
+  if (keys.empty()) {
+    const bool is_constant =
+        m.elastic_law == ElasticLaw::Springs && m.spring_law == scene::SpringLaw::Constant;
+    keys = {is_constant ? "spring_stiffness_n_m" : "young_modulus_pa"};
+  }
   for (const auto& key : keys) {
     const auto found = std::ranges::find(kTunables, key, &Tunable::key);
     if (found == kTunables.end())
@@ -123,6 +127,10 @@ Status FitModel::choose_parameters(const FitOptions& options) {
     if (!(m.*found->member > 0) && !found->is_bounded)
       return wrong(resolved_, key + " is 0, give it a value to start from");
     parameters_.push_back(*found);
+    // Both shorten tissue along its fibres, by at most this together.
+    if (key == "tension") parameters_.back().high -= m.fibre_tension;
+    if (parameters_.back().high - parameters_.back().low < found->step)
+      return wrong(resolved_, key + " cannot be fitted here: fibre_tension leaves it no room");
   }
   if (measured_->points.size() < parameters_.size())
     return Error{ErrorCode::BadFile, measured_->source.string() +

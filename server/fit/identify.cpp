@@ -4,6 +4,7 @@
 
 #include <Eigen/SVD>
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "server/finite_elements/material_point.h"
@@ -18,6 +19,8 @@ constexpr double kLargestWeightSum = 0.995;
 // Of the central differences, in parameters that are about 1.
 constexpr double kDifference = 1e-5;
 constexpr double kZ95 = 1.959963985;
+// Student's t of 95 % from one degree of freedom on, where the expansion does not hold yet.
+constexpr std::array kStudent95{12.7062, 4.3027, 3.1824, 2.7764};
 // Beyond it two constants make up for each other.
 constexpr double kStrongCorrelation = 0.9;
 // Singular values below this share of the largest are rounding errors of the differences.
@@ -52,11 +55,17 @@ class Model {
     return m;
   }
 
+  // Something must carry the load in the end, with room for the differences of the Jacobian.
+  bool is_possible(const double* x) const {
+    const auto m = material(x);
+    return m.coefficients_pa[0] > 0 && m.equilibrium_share() >= 1 - kLargestWeightSum;
+  }
+
   // Differences over each curve's largest stress; false where the material makes no sense.
   bool residuals(const double* x, double* out) const {
     ++evaluations_;
     const auto m = material(x);
-    if (!(m.coefficients_pa[0] > 0) || m.equilibrium_share() < 1 - kLargestWeightSum) return false;
+    if (!(m.coefficients_pa[0] > 0) || !(m.equilibrium_share() > 0)) return false;
     for (const auto& curve : curves_) {
       const auto stresses = predicted_stresses(m, curve);
       if (stresses.empty()) return false;
@@ -97,7 +106,7 @@ class Cost final : public ceres::CostFunction {
     mutable_parameter_block_sizes()->push_back(static_cast<int>(model.size()));
   }
   bool Evaluate(double const* const* x, double* residuals, double** jacobians) const override {
-    if (!model_.residuals(x[0], residuals)) return false;
+    if (!model_.is_possible(x[0]) || !model_.residuals(x[0], residuals)) return false;
     return jacobians == nullptr || jacobians[0] == nullptr || model_.jacobian(x[0], jacobians[0]);
   }
 
@@ -121,6 +130,7 @@ class Reporter final : public ceres::IterationCallback {
 
 Status check(const IdentifyOptions& options) {
   const auto wrong = [](const char* what) { return Error{ErrorCode::Usage, what}; };
+  if (options.name.empty()) return wrong("the material needs a name");
   if (options.order < 1 || options.order > scene::kMaxPolynomialOrder)
     return wrong("the order must be from 1 to 5");
   if (options.start.size() > scene::kMaxPronyTerms || options.term_count > scene::kMaxPronyTerms)
@@ -134,6 +144,8 @@ Status check(const IdentifyOptions& options) {
   m.bulk_modulus_pa = 1000 * options.bulk_ratio;
   m.relaxation = options.start;
   if (auto s = scene::validate(m); !s) return Error{ErrorCode::Usage, s.error().message};
+  if (m.equilibrium_share() < 1 - kLargestWeightSum)
+    return wrong("the weights to start from add up to more than 0.995, start from smaller ones");
   return {};
 }
 
@@ -192,19 +204,22 @@ std::optional<Start> scaled(Model& model, const std::vector<TestCurve>& curves,
   return Start{std::move(x), 1000 * both / own, measured - both * both / own};
 }
 
+// Of a whole number of degrees of freedom; right to 1 %.
 double student_95(double freedom) {
+  if (freedom <= static_cast<double>(kStudent95.size()))
+    return kStudent95[static_cast<std::size_t>(freedom) - 1];
   const double z = kZ95, z3 = z * z * z, z5 = z3 * z * z;
   return z + (z3 + z) / (4 * freedom) + (5 * z5 + 16 * z3 + 3 * z) / (96 * freedom * freedom);
 }
 
-// Covariance of the parameters over the residuals' variance; rows and columns of what no data
-// touch are infinite on the diagonal.
+// Covariance of the parameters over the residuals' variance: very large for what no data touch, and
+// infinite on the diagonal where there are no derivatives.
 Eigen::MatrixXd covariance_of(const Model& model, const std::vector<double>& x) {
   const auto rows = static_cast<Eigen::Index>(model.row_count());
   const auto columns = static_cast<Eigen::Index>(model.size());
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> j(rows, columns);
   if (!model.jacobian(x.data(), j.data()))
-    return Eigen::MatrixXd::Identity(columns, columns) * INFINITY;
+    return Eigen::VectorXd::Constant(columns, INFINITY).asDiagonal();
   Eigen::VectorXd lengths = j.colwise().norm().transpose();
   for (auto& l : lengths) l = l > 0 ? l : 1;
   const Eigen::MatrixXd scaled = j * lengths.cwiseInverse().asDiagonal();
@@ -268,8 +283,12 @@ void sort_terms(std::vector<double>& x, std::size_t order, std::size_t terms) {
     x[order + terms + k] = pairs[k].first, x[order + k] = pairs[k].second;
 }
 
-bool minimise(const Model& model, const IdentifyProgress& progress, double longest_s,
-              std::vector<double>& x, double& cost) {
+struct Minimum {
+  double cost = 0;
+  bool is_usable = false, is_converged = false;
+};
+Minimum minimise(const Model& model, const IdentifyProgress& progress, double longest_s,
+                 std::vector<double>& x) {
   Cost function(model);
   ceres::Problem::Options ownership;
   ownership.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
@@ -295,8 +314,8 @@ bool minimise(const Model& model, const IdentifyProgress& progress, double longe
   how.callbacks.push_back(&reporter);
   ceres::Solver::Summary summary;
   ceres::Solve(how, &problem, &summary);
-  cost = summary.final_cost;
-  return summary.termination_type == ceres::CONVERGENCE;
+  return {summary.final_cost, summary.IsSolutionUsable() && std::isfinite(summary.final_cost),
+          summary.termination_type == ceres::CONVERGENCE};
 }
 
 }  // namespace
@@ -354,15 +373,19 @@ Result<Identification> identify(const std::vector<TestCurve>& curves,
                  "deformation: check signs, test and units"};
   model.set_scale(best->scale_pa);
   Identification result;
-  double cost = 0;
   auto& x = best->x;
-  result.is_converged = minimise(model, progress, duration(curves), x, cost);
+  const auto minimum = minimise(model, progress, duration(curves), x);
+  if (!minimum.is_usable)
+    return Error{ErrorCode::BadFile,
+                 "no material was found whose forces are near these: start from other weights and "
+                 "times, or ask for a lower order or fewer terms"};
+  result.is_converged = minimum.is_converged;
   sort_terms(x, options.order, model.term_count());
   result.material = model.material(x.data());
   for (const auto& curve : curves)
     result.stresses_pa.push_back(predicted_stresses(result.material, curve));
-  result.rms_percent = 100 * std::sqrt(2 * cost / static_cast<double>(model.row_count()));
-  add_constants(result, model, options, x, cost);
+  result.rms_percent = 100 * std::sqrt(2 * minimum.cost / static_cast<double>(model.row_count()));
+  add_constants(result, model, options, x, minimum.cost);
   result.evaluations = model.evaluations();
   result.stability = scene::validate(result.material);
   return result;

@@ -31,7 +31,7 @@ struct IdentifiedConstant {
   std::string unit;           // "Pa", "", "s"
   double value = 0;           // SI
   double low = 0, high = 0;   // of the interval, if it is determined
-  bool is_determined = true;  // the interval is narrower than the value
+  bool is_determined = true;  // half the interval is narrower than the value
   std::string coupled_with;   // another constant that can make up for it; empty: none
   double correlation = 0;     // with that one
 };

@@ -3,6 +3,9 @@
 #include <cstdarg>
 #include <cstdio>
 
+#include "common/base/quote.h"
+#include "server/fit/csv_table.h"
+
 namespace trocar::fit {
 namespace {
 
@@ -49,7 +52,7 @@ std::string to_text(const Identification& found) {
 
 std::string to_toml(const Identification& found) {
   const auto& m = found.material;
-  std::string text = "[hyperelastic]\nname = \"" + m.name + "\"\n";
+  std::string text = "[hyperelastic]\nname = " + quote(m.name) + "\n";
   text +=
       m.split == scene::VolumeSplit::Isochoric ? "form = \"isochoric\"\n" : "form = \"unsplit\"\n";
   text += "c_i0_pa = [";
@@ -68,7 +71,7 @@ std::string to_csv(const std::vector<TestCurve>& curves, const Identification& f
   std::string text = "curve,test,time_s,stretch,measured_stress_pa,identified_stress_pa\n";
   for (std::size_t i = 0; i < curves.size(); ++i)
     for (std::size_t row = 0; row < curves[i].times_s.size(); ++row)
-      text += curves[i].name + "," + curves[i].test +
+      text += csv_cell(curves[i].name) + "," + curves[i].test +
               format(",%.9g,%.9g,%.9g,%.9g\n", curves[i].times_s[row], curves[i].stretches[row],
                      curves[i].stresses_pa[row], found.stresses_pa[i][row]);
   return text;

@@ -3,16 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <fstream>
-#include <optional>
-#include <sstream>
 
-#include "server/fit/csv_row.h"
+#include "server/fit/csv_table.h"
 
 namespace trocar::fit {
 namespace {
 
-constexpr std::uintmax_t kLimitBytes = 64u << 20;
 constexpr std::size_t kMinRows = 5;
 // Beyond these a number was given in another unit.
 constexpr double kLeastStretch = 0.1, kMostStretch = 5;
@@ -36,35 +32,17 @@ const Test* test_of(std::string_view name) {
   return found == std::end(kTests) ? nullptr : found;
 }
 
-struct Columns {
-  std::optional<std::size_t> time, displacement, force, test, curve;
-};
-
-Columns columns_of(const std::vector<std::string_view>& names) {
-  Columns columns;
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    if (names[i] == "time_s") columns.time = i;
-    if (names[i] == "displacement_mm") columns.displacement = i;
-    if (names[i] == "force_n") columns.force = i;
-    if (names[i] == "test") columns.test = i;
-    if (names[i] == "curve") columns.curve = i;
-  }
-  return columns;
-}
-
-class Parser {
+class Reader {
  public:
-  Parser(const std::string& source, const SpecimenSize& size) : source_(source), size_(size) {}
+  Reader(CsvTable table, const SpecimenSize& size) : table_(std::move(table)), size_(size) {}
 
-  Result<std::vector<TestCurve>> parse(std::string_view text) {
-    std::istringstream lines{std::string(text)};
-    std::string row;
-    for (line_ = 1; std::getline(lines, row); ++line_) {
-      const auto cells = cells_of(row);
-      if ((cells.size() == 1 && cells[0].empty()) || row.starts_with("#")) continue;
-      if (auto s = columns_ ? take_row(cells) : take_header(cells); !s) return s.error();
+  Result<std::vector<TestCurve>> read() {
+    for (;;) {
+      const auto is_row = table_.next();
+      if (!is_row) return is_row.error();
+      if (!*is_row) break;
+      if (auto s = take_row(); !s) return s.error();
     }
-    line_ = 0;
     if (curves_.empty()) return wrong("has no measurements");
     for (const auto& curve : curves_)
       if (auto s = check(curve); !s) return s.error();
@@ -72,37 +50,18 @@ class Parser {
   }
 
  private:
-  Error wrong(const std::string& what) const {
-    return {ErrorCode::BadFile,
-            source_ + (line_ > 0 ? ":" + std::to_string(line_) : "") + ": " + what};
-  }
+  Error wrong(const std::string& what) const { return table_.wrong(what); }
 
-  Status take_header(const std::vector<std::string_view>& cells) {
-    columns_ = columns_of(cells);
-    if (columns_->time && columns_->displacement && columns_->force) return {};
-    return wrong(
-        "is no header with the columns time_s, displacement_mm and force_n, write "
-        "\"time_s,displacement_mm,force_n\" above the numbers");
-  }
-
-  static std::string text_at(const std::vector<std::string_view>& cells,
-                             std::optional<std::size_t> column) {
-    return column && *column < cells.size() ? std::string(cells[*column]) : "";
-  }
-  static std::optional<double> number_at(const std::vector<std::string_view>& cells,
-                                         std::optional<std::size_t> column) {
-    return column && *column < cells.size() ? number_of(cells[*column]) : std::nullopt;
-  }
-
-  Status take_row(const std::vector<std::string_view>& cells) {
-    const auto time = number_at(cells, columns_->time);
-    const auto displacement = number_at(cells, columns_->displacement);
-    const auto force = number_at(cells, columns_->force);
+  Status take_row() {
+    const auto time = table_.number("time_s");
+    const auto displacement = table_.number("displacement_mm");
+    const auto force = table_.number("force_n");
     if (!time || !displacement || !force)
-      return wrong("time_s, displacement_mm and force_n are not all numbers");
-    const std::string name = text_at(cells, columns_->curve);
-    const std::string test =
-        columns_->test ? text_at(cells, columns_->test) : std::string(size_.test);
+      return wrong(
+          "time_s, displacement_mm and force_n are not all numbers, write them with a decimal "
+          "point");
+    const std::string name(table_.text("curve"));
+    const std::string test = table_.has("test") ? std::string(table_.text("test")) : size_.test;
     const Test* kind = test_of(test);
     if (kind == nullptr)
       return wrong("test '" + test +
@@ -159,12 +118,20 @@ class Parser {
     return {};
   }
 
-  const std::string& source_;
+  CsvTable table_;
   const SpecimenSize& size_;
-  int line_ = 0;
-  std::optional<Columns> columns_;
   std::vector<TestCurve> curves_;
 };
+
+const CsvTable::Columns kColumns{{"time_s", "displacement_mm", "force_n"}, {"test", "curve"}};
+
+Result<std::vector<TestCurve>> curves_of(Result<CsvTable> table, const SpecimenSize& size) {
+  if (!(size.length_m > 1e-6 && size.length_m < 10) || !(size.area_m2 > 1e-10 && size.area_m2 < 10))
+    return Error{ErrorCode::Usage,
+                 "the specimen's length and area must be above 0, in mm and mm2, and below 10 m"};
+  if (!table) return table.error();
+  return Reader(std::move(*table), size).read();
+}
 
 }  // namespace
 
@@ -176,25 +143,12 @@ double TestCurve::largest_stress_pa() const {
 
 Result<std::vector<TestCurve>> parse_test_curves(std::string_view text, const std::string& source,
                                                  const SpecimenSize& size) {
-  if (!(size.length_m > 1e-6 && size.length_m < 10) || !(size.area_m2 > 1e-10 && size.area_m2 < 10))
-    return Error{ErrorCode::Usage,
-                 "the specimen's length and area must be above 0, in mm and mm2, and below 10 m"};
-  return Parser(source, size).parse(text);
+  return curves_of(CsvTable::parse(std::string(text), source, kColumns), size);
 }
 
 Result<std::vector<TestCurve>> read_test_curves(const std::filesystem::path& path,
                                                 const SpecimenSize& size) {
-  const auto wrong = [&](const std::string& what) {
-    return Error{ErrorCode::BadFile, path.string() + ": " + what};
-  };
-  std::error_code missing;
-  const auto bytes = std::filesystem::file_size(path, missing);
-  std::ifstream file(path, std::ios::binary);
-  if (missing || !file) return wrong("cannot be opened, check name and rights");
-  if (bytes > kLimitBytes) return wrong("is larger than 64 MiB, measured curves are not");
-  std::ostringstream text;
-  text << file.rdbuf();
-  return parse_test_curves(text.str(), path.string(), size);
+  return curves_of(CsvTable::read(path, kColumns), size);
 }
 
 }  // namespace trocar::fit

@@ -119,6 +119,12 @@ void describe(const step::PublishedFrame& frame, proto::FrameState& state) {
   state.set_far_sweeps(frame.far_sweeps);
   state.set_far_interval(frame.far_interval);
   state.set_residual_n(frame.residual_n);
+  if (frame.relaxation) {
+    auto& relaxation = *state.mutable_relaxation();
+    relaxation.set_energy_j(frame.relaxation->energy_j);
+    relaxation.set_volume_change(static_cast<float>(frame.relaxation->volume_change));
+    relaxation.set_relaxed_share(static_cast<float>(frame.relaxation->relaxed_share));
+  }
   state.set_tick_cpu_us(frame.statistics.tick_median_us);
   state.set_tick_cpu_p99_us(frame.statistics.tick_p99_us);
   for (const float median : frame.statistics.median_us) state.add_stage_cpu_us(median);

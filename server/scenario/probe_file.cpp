@@ -56,13 +56,22 @@ void ProbeFile::add(const ScenarioRun& run) {
   std::vector<std::optional<Vec3d>> values(run.scenario().probes.size());
   for (std::size_t i = 0; i < values.size(); ++i)
     if (run.is_due(i)) values[i] = run.probe(i);
-  add(run.time_s(), values);
+  if (is_static_) return add(run.time_s(), values);
+  char time[40];
+  std::snprintf(time, sizeof time, "%.3f", run.time_s());
+  add_row(time, values);
 }
 
 void ProbeFile::add(double time_s, std::span<const std::optional<Vec3d>> values) {
+  char time[40];
+  std::snprintf(time, sizeof time, "%.9g", time_s);
+  add_row(time, values);
+}
+
+void ProbeFile::add_row(const char* time, Values values) {
   const auto is_due = [](const auto& value) { return value.has_value(); };
   if (std::none_of(values.begin(), values.end(), is_due)) return;
-  std::fprintf(file_.get(), is_static_ ? "%.9g" : "%.3f", time_s);
+  std::fputs(time, file_.get());
   for (std::size_t i = 0; i < values.size(); ++i) {
     if (!values[i]) {
       std::fputs(",,,", file_.get());

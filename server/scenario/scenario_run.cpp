@@ -62,6 +62,14 @@ world::World world_of(const scene::ResolvedScenario& resolved) {
   return world;
 }
 
+// A static run has no time in which to relax: measured tissue responds as at once.
+scene::ResolvedScenario with_response(scene::ResolvedScenario resolved) {
+  if (resolved.scenario.run.mode != scene::RunMode::Static) return resolved;
+  resolved.organ.material.measured.relaxation.clear();
+  for (auto& region : resolved.organ.regions) region.material.measured.relaxation.clear();
+  return resolved;
+}
+
 Status check_explicit(const scene::ResolvedScenario& resolved) {
   const auto& scenario = resolved.scenario;
   const auto& place = run_key(scenario, "integrator");
@@ -95,11 +103,10 @@ Status check_explicit(const scene::ResolvedScenario& resolved) {
 Status check_supported(const scene::ResolvedScenario& resolved) {
   const auto& scenario = resolved.scenario;
   const auto& rule = scenario.run;
-  if (dynamics::Relaxation::is_needed(resolved.organ) &&
-      (rule.mode == scene::RunMode::Static || rule.starts_in_equilibrium))
-    return scene::scenario_error(
-        scenario, run_key(scenario, rule.starts_in_equilibrium ? "start" : "mode"),
-        "tissue that relaxes has its equilibrium with --solver fem, see --response");
+  if (dynamics::Relaxation::is_needed(resolved.organ) && rule.starts_in_equilibrium)
+    return scene::scenario_error(scenario, run_key(scenario, "start"),
+                                 "tissue that relaxes begins without load: its equilibrium is what "
+                                 "--solver fem --response equilibrium finds");
   for (const auto& load : scenario.displacements)
     if (load.axes != kAllAxes && (rule.boundary == scene::Boundary::Frozen ||
                                   rule.integrator == scene::Integrator::Explicit))
@@ -111,7 +118,7 @@ Status check_supported(const scene::ResolvedScenario& resolved) {
 }
 
 ScenarioRun::ScenarioRun(scene::ResolvedScenario resolved, Solver solver, unsigned threads)
-    : resolved_(std::move(resolved)),
+    : resolved_(with_response(std::move(resolved))),
       solver_kind_(solver),
       boundary_(boundary_of(scenario().run, solver)),
       step_count_(steps_of(scenario().run)),

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "common/base/bytes.h"
@@ -13,6 +14,7 @@
 #include "common/scene/tool.h"
 #include "common/wire/quantise.h"
 #include "common/wire/surface_change.h"
+#include "server/dynamics/relaxation_figures.h"
 #include "server/locks/claims.h"
 #include "server/session/inputs.h"
 #include "server/step/tick_report.h"
@@ -74,6 +76,7 @@ struct PublishedFrame {
   LayerCounts layer_sweeps{};                // of active nodes by layer
   std::uint32_t node_limit = 0;
   float residual_n = 0;
+  std::optional<dynamics::RelaxationFigures> relaxation;  // of tissue that relaxes
   StageStatistics statistics;  // of the last second; for people, never an input
 };
 

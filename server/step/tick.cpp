@@ -129,6 +129,7 @@ void cut_tissue(State& state, StepContext& context) {
   }
   state.quantised.resize(cuts.layout().vertex_count());
   context.follow_edit(cuts.topology(), edit, state.world);
+  context.solver.refresh_relaxed_forces(state.world);
   cuts.clear_changes();
 }
 
@@ -191,6 +192,7 @@ void quantise_and_publish(State& state, StepContext& context) {
   frame->far_sweeps = context.report.far_sweeps;
   frame->far_interval = context.report.far_interval;
   frame->residual_n = context.report.residual_n;
+  frame->relaxation = context.solver.tissue().relaxation_figures();
   context.frame = std::move(frame);
 }
 

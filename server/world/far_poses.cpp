@@ -7,17 +7,17 @@
 namespace trocar::world {
 namespace {
 
-constexpr float kPerMetre = 16384, kMost = 32767;
+constexpr float kPerMetre = 1 << 20, kMost = 1 << 30;
 
-std::int16_t to_grid(float metres) {
+std::int32_t to_grid(float metres) {
   const float v = std::clamp(metres * kPerMetre, -kMost, kMost);
-  return static_cast<std::int16_t>(v < 0 ? v - 0.5f : v + 0.5f);
+  return static_cast<std::int32_t>(v < 0 ? v - 0.5f : v + 0.5f);
 }
 
 // Of what was added, one after another (FNV-1a over its three numbers).
 std::uint64_t folded(std::uint64_t hash, const GridPoint& point) {
   for (const auto v : {point.x, point.y, point.z})
-    hash = (hash ^ static_cast<std::uint16_t>(v)) * 0x100000001b3u;
+    hash = (hash ^ static_cast<std::uint32_t>(v)) * 0x100000001b3u;
   return hash;
 }
 
@@ -40,8 +40,9 @@ FarPoses::FarPoses(std::size_t node_count) {
 void FarPoses::add_node(NodeIndex a, NodeIndex b, std::uint16_t t) {
   for (std::uint32_t i = 0; i < 2; ++i) {
     auto& pose = poses_[i];
-    const auto between = [t](std::int16_t from, std::int16_t to) {
-      return static_cast<std::int16_t>(from + ((to - from) * std::int64_t{t} >> 16));
+    const auto between = [t](std::int32_t from, std::int32_t to) {
+      const auto way = std::int64_t{to} - from;
+      return static_cast<std::int32_t>(from + (way * std::int64_t{t} >> 16));
     };
     const GridPoint p = pose[a.value], q = pose[b.value];
     pose.push_back({between(p.x, q.x), between(p.y, q.y), between(p.z, q.z)});
@@ -85,7 +86,10 @@ void FarPoses::visit_state(StateArchive& archive) {
       taken_nodes_[i] = 0;
       archive.fail();
     }
-    archive.fixed_array(poses_[i]);
+    if (newest_ > 0)
+      archive.fixed_array(poses_[i]);
+    else if (archive.is_reading())
+      std::ranges::fill(poses_[i], GridPoint{});
     if (archive.is_reading() && hashes_[i] != hash_of(i)) archive.fail();
   }
 }

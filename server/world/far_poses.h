@@ -4,8 +4,9 @@
 // linear: one is taken every kInterval steps and two are kept, so that the solver can go over from
 // the older to the newer bit by bit.
 //
-// They only have to be near the displacements, so they are stored on a grid of 61 um, within 2 m.
-// A pose changes as a whole and rarely: the tick hash covers its hash.
+// They only have to be near the displacements, and are stored on a grid of 1 um (on one of 61 um
+// noise alone makes forces of measured liver 3 % wrong). A pose changes as a whole and rarely: the
+// tick hash covers its hash. Where none was ever taken a snapshot holds none.
 
 #include <array>
 #include <span>
@@ -18,7 +19,7 @@
 namespace trocar::world {
 
 struct GridPoint {
-  std::int16_t x = 0, y = 0, z = 0;
+  std::int32_t x = 0, y = 0, z = 0;
 };
 template <>
 struct IsPaddingFree<GridPoint> : std::true_type {};

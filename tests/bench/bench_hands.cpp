@@ -294,6 +294,7 @@ void Session::print() const {
   std::printf("%s, %zu nodes, %s, %d hands, %s, %u %s, %.0f s\n", organ.name.c_str(),
               organ.mesh.node_count(),
               organ.material.elastic_law == scene::ElasticLaw::NeoHookean ? "neo-Hookean"
+              : organ.material.elastic_law == scene::ElasticLaw::Measured ? "measured"
                                                                           : "springs or linear",
               options_.hands, options_.is_frozen ? "frozen" : "graded", options_.workers,
               options_.workers == 1 ? "thread" : "threads", options_.seconds);

@@ -243,6 +243,25 @@ TEST_F(ReplicaTest, WhatTheRateControllerDecidedIsKept) {
   EXPECT_TRUE(replica_.fault().ok());
 }
 
+TEST_F(ReplicaTest, WhatHasRelaxedIsKept) {
+  start();
+  EXPECT_FALSE(replica_.newest()->figures.relaxation) << "nothing relaxes";
+  source_.tamper = [](proto::Envelope& m) {
+    if (!m.has_frame_state()) return true;
+    auto& relaxation = *m.mutable_frame_state()->mutable_relaxation();
+    relaxation.set_energy_j(0.0125);
+    relaxation.set_volume_change(-0.002f);
+    relaxation.set_relaxed_share(0.4f);
+    return true;
+  };
+  advance(1);
+  EXPECT_EQ(replica_.newest()->figures.relaxation, (RelaxationFigures{0.0125, -0.002f, 0.4f}));
+  source_.tamper = nullptr;
+  advance(1);
+  EXPECT_FALSE(replica_.newest()->figures.relaxation);
+  EXPECT_TRUE(replica_.fault().ok());
+}
+
 TEST_F(ReplicaTest, InvalidMessagesAreAFaultThatNamesTheField) {
   const auto fault_of = [&](auto change) {
     testing::SyntheticSource source(testing::make_blob_layout(6, 8, 0.08));
@@ -290,6 +309,11 @@ TEST_F(ReplicaTest, InvalidMessagesAreAFaultThatNamesTheField) {
   EXPECT_NE(rate_fault([](proto::RateState& r) {
               for (int i = 0; i < 20; ++i) r.add_layer_sweeps(1);
             }).find("FrameState.rate"),
+            std::string::npos);
+  EXPECT_NE(fault_of([&](proto::Envelope& m) {
+              if (m.has_frame_state())
+                m.mutable_frame_state()->mutable_relaxation()->set_volume_change(kInfinity);
+            }).find("FrameState.relaxation"),
             std::string::npos);
   EXPECT_NE(fault_of([](proto::Envelope& m) {
               if (m.has_welcome()) m.mutable_welcome()->set_protocol_major(9);

@@ -302,67 +302,76 @@ void give_directions(scene::Organ& organ) {
 }
 
 // A measured law is not with the isotropic ones: its C20 resists growth beside the bulk modulus.
-const auto kOthers = ::testing::Values(
-    Case{.name = "Measured",
-         .change =
-             [](scene::Organ& o) {
-               scene::use_measured(*scene::find_measured_material("human_liver_nava2008"),
-                                   o.material);
-             }},
-    Case{.name = "SpringsAlongFibres",
-         .change =
-             [](scene::Organ& o) {
-               o.material.fibre_direction = {0, 2, 0};
-               o.material.fibre_stiffness_ratio = 0.1;
-             }},
-    Case{.name = "SpringsUnderTension",
-         .change = [](scene::Organ& o) { put_under_tension(o); },
-         .has_stress_at_rest = true},
-    Case{.name = "TensorMassUnderTension",
-         .change =
-             [](scene::Organ& o) {
-               o.material.elastic_law = ElasticLaw::TensorMass;
-               put_under_tension(o);
-             },
-         .is_linear = true,
-         .has_stress_at_rest = true},
-    Case{.name = "NeoHookeanUnderTension",
-         .change =
-             [](scene::Organ& o) {
+const auto kOthers =
+    ::testing::Values(
+        Case{.name = "Measured",
+             .change =
+                 [](scene::Organ& o) {
+                   scene::use_measured(*scene::find_measured_material("human_liver_nava2008"),
+                                       o.material);
+                 }},
+        Case{.name = "MeasuredExponential",
+             .change =
+                 [](scene::Organ& o) {
+                   auto material = *scene::find_measured_material("human_liver_nava2008");
+                   material.energy = scene::StrainEnergy::Exponential;
+                   material.exponent = 3;
+                   scene::use_measured(material, o.material);
+                 }},
+        Case{.name = "SpringsAlongFibres",
+             .change =
+                 [](scene::Organ& o) {
+                   o.material.fibre_direction = {0, 2, 0};
+                   o.material.fibre_stiffness_ratio = 0.1;
+                 }},
+        Case{.name = "SpringsUnderTension",
+             .change = [](scene::Organ& o) { put_under_tension(o); },
+             .has_stress_at_rest = true},
+        Case{.name = "TensorMassUnderTension",
+             .change =
+                 [](scene::Organ& o) {
+                   o.material.elastic_law = ElasticLaw::TensorMass;
+                   put_under_tension(o);
+                 },
+             .is_linear = true,
+             .has_stress_at_rest = true},
+        Case{.name = "NeoHookeanUnderTension",
+             .change =
+                 [](scene::Organ& o) {
+                   o.material.elastic_law = ElasticLaw::NeoHookean;
+                   put_under_tension(o);
+                 },
+             .has_stress_at_rest = true},
+        Case{.name = "SpringsAlongDirections",
+             .change =
+                 [](scene::Organ& o) {
+                   o.material.fibre_stiffness_ratio = 3;
+                   give_directions(o);
+                 },
+             .has_stress_at_rest = true},
+        Case{.name = "TensorMassAlongDirections",
+             .change =
+                 [](scene::Organ& o) {
+                   o.material.elastic_law = ElasticLaw::TensorMass;
+                   give_directions(o);
+                 },
+             .is_linear = true,
+             .has_stress_at_rest = true},
+        Case{.name = "NeoHookeanAlongDirections",
+             .change =
+                 [](scene::Organ& o) {
+                   o.material.elastic_law = ElasticLaw::NeoHookean;
+                   give_directions(o);
+                 },
+             .has_stress_at_rest = true},
+        Case{.name = "NeoHookeanStiffInclusion", .change = [](scene::Organ& o) {
                o.material.elastic_law = ElasticLaw::NeoHookean;
-               put_under_tension(o);
-             },
-         .has_stress_at_rest = true},
-    Case{.name = "SpringsAlongDirections",
-         .change =
-             [](scene::Organ& o) {
-               o.material.fibre_stiffness_ratio = 3;
-               give_directions(o);
-             },
-         .has_stress_at_rest = true},
-    Case{.name = "TensorMassAlongDirections",
-         .change =
-             [](scene::Organ& o) {
-               o.material.elastic_law = ElasticLaw::TensorMass;
-               give_directions(o);
-             },
-         .is_linear = true,
-         .has_stress_at_rest = true},
-    Case{.name = "NeoHookeanAlongDirections",
-         .change =
-             [](scene::Organ& o) {
-               o.material.elastic_law = ElasticLaw::NeoHookean;
-               give_directions(o);
-             },
-         .has_stress_at_rest = true},
-    Case{.name = "NeoHookeanStiffInclusion", .change = [](scene::Organ& o) {
-           o.material.elastic_law = ElasticLaw::NeoHookean;
-           auto stiff = o.material;
-           stiff.young_modulus_pa *= 10;
-           std::vector<NodeIndex> nodes;
-           for (std::uint32_t n = 0; n < o.mesh.node_count() / 2; ++n) nodes.emplace_back(n);
-           o.regions = {{"half", stiff, nodes}};
-         }});
+               auto stiff = o.material;
+               stiff.young_modulus_pa *= 10;
+               std::vector<NodeIndex> nodes;
+               for (std::uint32_t n = 0; n < o.mesh.node_count() / 2; ++n) nodes.emplace_back(n);
+               o.regions = {{"half", stiff, nodes}};
+             }});
 
 INSTANTIATE_TEST_SUITE_P(Isotropic, Energies, kIsotropic, name_of);
 INSTANTIATE_TEST_SUITE_P(Others, Energies, kOthers, name_of);
@@ -404,22 +413,24 @@ TEST(FibreDirections, OfOneDirectionAreTheMaterials) {
 constexpr ReducedPolynomialLaw kLiverLaw{
     {1.7079f / 0.8838f, 1.4499f / 0.8838f, 2.6918f / 0.8838f, 1.7575f / 0.8838f}};
 
-TEST(ReducedPolynomial, DerivativesAreThoseOfTheEnergy) {
+constexpr ExponentialLaw kFungLaw{2.5f};
+
+template <typename Law>
+void expect_derivatives_of_energy(const Law& law) {
   for (const double e : {0.01, 0.3, 1.0}) {
     Float8 first, second;
-    kLiverLaw.derivatives(all(static_cast<float>(e)), first, second);
+    law.derivatives(all(static_cast<float>(e)), first, second);
     Lanes f, s;
     store(f, first);
     store(s, second);
     const double h = 1e-4;
-    const double slope = (kLiverLaw.energy(e + h) - kLiverLaw.energy(e - h)) / (2 * h);
-    const double curvature =
-        (kLiverLaw.energy(e + h) - 2 * kLiverLaw.energy(e) + kLiverLaw.energy(e - h)) / (h * h);
+    const double slope = (law.energy(e + h) - law.energy(e - h)) / (2 * h);
+    const double curvature = (law.energy(e + h) - 2 * law.energy(e) + law.energy(e - h)) / (h * h);
     EXPECT_NEAR(static_cast<double>(f.v[0]) / slope, 1, 1e-5);
     EXPECT_NEAR(static_cast<double>(s.v[0]) / curvature, 1, 1e-3);
   }
   Float8 first, second;
-  kLiverLaw.derivatives(all(-0.5f), first, second);
+  law.derivatives(all(-0.5f), first, second);
   Lanes f, s;
   store(f, first);
   store(s, second);
@@ -427,14 +438,40 @@ TEST(ReducedPolynomial, DerivativesAreThoseOfTheEnergy) {
   EXPECT_EQ(s.v[0], 0.0f);
 }
 
-TEST(ReducedPolynomial, TetsHaveItsGradientAndBlock) {
+TEST(ReducedPolynomial, DerivativesAreThoseOfTheEnergy) {
+  expect_derivatives_of_energy(kLiverLaw);
+}
+
+TEST(Exponential, DerivativesAreThoseOfTheEnergy) {
+  expect_derivatives_of_energy(kFungLaw);
+  const double e = 0.7, b = static_cast<double>(kFungLaw.exponent);
+  EXPECT_NEAR(kFungLaw.energy(e), std::expm1(b * e) / b, 1e-12);
+}
+
+TEST(Exponential, IsExpToSinglePrecisionAndFiniteHoweverFarTissueIsStretched) {
+  for (float x = 0; x <= 80; x += 0.0137f) {
+    Lanes values;
+    store(values, exp8(all(x)));
+    ASSERT_NEAR(static_cast<double>(values.v[3]) / std::exp(static_cast<double>(x)), 1, 3e-7) << x;
+  }
+  Float8 first, second;
+  kFungLaw.derivatives(all(1e30f), first, second);
+  Lanes f, s;
+  store(f, first);
+  store(s, second);
+  EXPECT_TRUE(std::isfinite(f.v[0]));
+  EXPECT_EQ(s.v[0], 0.0f);
+}
+
+template <typename Law>
+void expect_gradient_and_block(const Law& law) {
   const auto organ = block_organ({.name = "", .change = [](scene::Organ& o) {
                                     o.material.elastic_law = ElasticLaw::NeoHookean;
                                   }});
   const Topology topology(organ);
   const Groups groups(topology, Coupling::Elements);
-  const Hyperelastic<ReducedPolynomialLaw> energy(
-      topology, groups, false, hyperelastic_parameters(organ, scene::is_hyperelastic), kLiverLaw);
+  const Hyperelastic<Law> energy(topology, groups, false,
+                                 hyperelastic_parameters(organ, scene::is_hyperelastic), law);
   const auto energy_j = [&](std::span<const Vec3d> displacements) {
     std::vector<double> shares(groups.slot_count());
     energy.add_energies_j(displacements, shares);
@@ -522,6 +559,13 @@ TEST(ReducedPolynomial, TetsHaveItsGradientAndBlock) {
     EXPECT_GT(length(slope), 0.1);
     EXPECT_LT(length(slope - column.sum), 3e-3 * length(slope)) << n;
   }
+}
+
+TEST(ReducedPolynomial, TetsHaveItsGradientAndBlock) {
+  expect_gradient_and_block(kLiverLaw);
+}
+TEST(Exponential, TetsHaveItsGradientAndBlock) {
+  expect_gradient_and_block(kFungLaw);
 }
 
 }  // namespace

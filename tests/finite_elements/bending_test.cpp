@@ -78,7 +78,7 @@ TEST(Bending, QuadraticElementsConvergeOnCooksMembrane) {
   EXPECT_LT(linear / finest, 0.8) << "linear tets lock";
 }
 
-// Half a turn of rotation without strain needs no force: a bar that is bent far.
+// Large rotations with small strains: a bar that is bent far.
 TEST(Bending, LargeDeflectionsConverge) {
   Specimen beam({1, 8, 1}, 0.01, ElementOrder::Quadratic, liver_without_relaxation());
   beam.hold_all_axes(plane(1, 0));

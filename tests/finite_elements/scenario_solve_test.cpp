@@ -4,8 +4,11 @@
 #include "server/finite_elements/scenario_solve.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 
 #include "server/scenario/scenario_run.h"
 
@@ -103,8 +106,32 @@ std::string liver_column() {
                       "node_damping_per_s = 100\n");
 }
 
+TEST(ScenarioSolve, MeetsTheLiveSolverInMeasuredTissueThatHasNoTimeToRelax) {
+  // Ten times as coarse: single precision under this bulk modulus.
+  std::string run = kStatic;
+  run.replace(run.find("1e-7"), 4, "1e-6");
+  expect_same(liver_column() + run +
+              "[[displace]]\nset = \"top\"\n[[displace.key]]\ntime_s = 0\ndisplacement_mm = [0, 0, "
+              "0]\n[[displace.key]]\ntime_s = 1\ndisplacement_mm = [6, -3, 2]\n");
+}
+
+TEST(ScenarioSolve, MeetsTheLiveSolverUnderAnExponentialLaw) {
+  const auto file = std::filesystem::temp_directory_path() /
+                    ("trocar_exponential_" + std::to_string(::getpid()) + ".toml");
+  std::ofstream(file) << "[hyperelastic]\nname = \"x\"\nc_i0_pa = [800]\nexponent = 3\n"
+                         "bulk_modulus_pa = 8000\n";
+  std::string text = liver_column();
+  const std::string name = "human_liver_nava2008";
+  text.replace(text.find(name), name.size(), file.string());
+  expect_same(text + kStatic +
+              "[[displace]]\nset = \"top\"\n[[displace.key]]\ntime_s = 0\ndisplacement_mm = [0, 0, "
+              "0]\n[[displace.key]]\ntime_s = 1\ndisplacement_mm = [8, -6, 3]\n");
+  std::filesystem::remove(file);
+}
+
 TEST(ScenarioSolve, TheLiveSolverSendsEquilibriaOfTissueThatRelaxesHere) {
-  const auto status = scenario::check_supported(resolved(liver_column() + kStatic));
+  const auto status = scenario::check_supported(
+      resolved(liver_column() + "[run]\nseconds = 1\nstart = \"equilibrium\"\n"));
   ASSERT_FALSE(status.ok());
   EXPECT_NE(status.error().message.find("--solver fem"), std::string::npos);
 }
@@ -184,9 +211,106 @@ TEST(ScenarioSolve, DynamicRunsGoOnFromTheirState) {
   std::filesystem::remove(path);
 }
 
+// A sudden load on a column at rest sets it in motion, as it does in the live solver with steps so
+// short that they damp little; one that it stands in equilibrium with leaves it where it is.
+TEST(ScenarioSolve, MotionStartsAtRestOrInEquilibrium) {
+  const auto text = [](const std::string& start) {
+    return kColumn + "[run]\nseconds = 0.02\ndt_s = 0.0001\ntolerance_n = 1e-6\n" + start +
+           "[[probe]]\nset = \"top\"\nquantity = \"displacement\"\nrate_hz = 1000\n" +
+           "[[force]]\nset = \"top\"\n[[force.key]]\ntime_s = 0\nforce_n = [0.02, 0, 0]\n";
+  };
+  const ScenarioSettings settings{.order = ElementOrder::Linear, .dt_s = 1e-4};
+  const auto ours = solve_of(text(""), settings);
+  EXPECT_EQ(length(ours->probe(0)), 0) << "before the first step";
+  scenario::ScenarioRun live(resolved(text("")), scenario::Solver::Full);
+  while (!live.is_finished()) {
+    for (int i = 0; i < 10; ++i) ASSERT_TRUE(ours->step().is_converged);
+    live.step();
+    const Vec3d a = ours->probe(0), b = live.probe(0);
+    EXPECT_NEAR(a.x, b.x, 0.05 * b.x + 1e-6) << live.time_s();
+  }
+  const auto still = solve_of(text("start = \"equilibrium\"\n"), settings);
+  ASSERT_TRUE(still->start().is_converged);
+  const Vec3d at_first = still->probe(0);
+  EXPECT_GT(at_first.x, 2 * ours->probe(0).x) << "it is still on its way";
+  for (int i = 0; i < 10; ++i) ASSERT_TRUE(still->step().is_converged);
+  EXPECT_LT(length(still->probe(0) - at_first), 1e-6 * length(at_first));
+}
+
+// A column that a force of 0.1 N sways, which is there from the start or comes in 20 ms.
+std::string swayed(const std::string& force, const std::string& more_run = "") {
+  return kColumn + "[run]\nseconds = 0.02\n" + more_run +
+         "[[force]]\nset = \"top\"\n[[force.key]]\ntime_s = 0\nforce_n = " + force +
+         "\n[[force.key]]\ntime_s = 0.02\nforce_n = [0.1, 0, 0]\n";
+}
+
+TEST(ScenarioSolve, AStateOfAnotherRunIsRefused) {
+  const std::string text = swayed("[0.1, 0, 0]");
+  const ScenarioSettings settings{.order = ElementOrder::Linear};
+  const auto path = std::filesystem::temp_directory_path() / "trocar-another-run-test.state";
+  const auto first = solve_of(text, settings);
+  for (int i = 0; i < 10; ++i) ASSERT_TRUE(first->step().is_converged);
+  ASSERT_TRUE(first->save(path).ok());
+  EXPECT_TRUE(solve_of(text, settings)->resume(path).ok());
+  const auto refused = [&](const std::string& other, const ScenarioSettings& with,
+                           const std::string& says) {
+    const auto solve = solve_of(other, with);
+    const auto status = solve->resume(path);
+    ASSERT_FALSE(status.ok()) << says;
+    EXPECT_NE(status.error().message.find(says), std::string::npos) << status.error().message;
+    EXPECT_EQ(solve->steps_done(), 0u);
+  };
+  refused(text, {.order = ElementOrder::Linear, .dt_s = 2e-3}, "resume with the same --step-ms");
+  refused(swayed("[0, 0, 0]"), settings, "other loads");
+  refused(text + "[gravity]\nm_s2 = [0, -1, 0]\n", settings, "other loads");
+  refused(swayed("[0.1, 0, 0]", "start = \"equilibrium\"\n"), settings, "another start");
+  refused(swayed("[0.1, 0, 0]", "mode = \"static\"\nload_steps = 20\n"), settings, "other loads");
+  std::filesystem::remove(path);
+}
+
+TEST(ScenarioSolve, AStaticStateIsOfOneResponse) {
+  const std::string text =
+      kColumn + kStatic +
+      "[[displace]]\nset = \"top\"\n[[displace.key]]\ntime_s = 0\ndisplacement_mm = [0, 0, 0]\n"
+      "[[displace.key]]\ntime_s = 1\ndisplacement_mm = [2, 0, 0]\n";
+  ScenarioSettings settings{.order = ElementOrder::Linear};
+  const auto path = std::filesystem::temp_directory_path() / "trocar-one-response-test.state";
+  const auto first = solve_of(text, settings), second = solve_of(text, settings);
+  ASSERT_TRUE(first->step().is_converged);
+  ASSERT_TRUE(first->save(path).ok());
+  ASSERT_TRUE(second->resume(path).ok());
+  EXPECT_EQ(second->steps_done(), 1u);
+  settings.is_equilibrium = true;
+  const auto status = solve_of(text, settings)->resume(path);
+  ASSERT_FALSE(status.ok());
+  EXPECT_NE(status.error().message.find("--response"), std::string::npos);
+  std::filesystem::remove(path);
+}
+
+TEST(ScenarioSolve, StepsThatDoNotFillTheRunAreRefused) {
+  const auto steps = [](double dt_s) {
+    const auto solve = ScenarioSolve::create(resolved(swayed("[0, 0, 0]")),
+                                             {.order = ElementOrder::Linear, .dt_s = dt_s});
+    if (solve.ok()) return static_cast<int>((*solve)->step_count());
+    EXPECT_EQ(solve.error().code, ErrorCode::Usage);
+    EXPECT_NE(solve.error().message.find("--step-ms: 0.02 s are"), std::string::npos)
+        << solve.error().message;
+    return 0;
+  };
+  EXPECT_EQ(steps(1e-6), 20'000);
+  EXPECT_EQ(steps(2e-3), 10);
+  EXPECT_EQ(steps(0.02), 1);
+  EXPECT_EQ(steps(0.02 / 3), 3);
+  EXPECT_EQ(steps(0.04), 0) << "longer than the run";
+  EXPECT_EQ(steps(1), 0);
+  EXPECT_EQ(steps(0.015), 0);
+  EXPECT_EQ(steps(3e-3), 0);
+}
+
 TEST(ScenarioSolve, RefusesWhatItCannotDo) {
-  const auto refused = [](const std::string& text, const std::string& says) {
-    const auto solve = ScenarioSolve::create(resolved(text), {});
+  const auto refused = [](const std::string& text, const std::string& says,
+                          const ScenarioSettings& settings = {}) {
+    const auto solve = ScenarioSolve::create(resolved(text), settings);
     ASSERT_FALSE(solve.ok()) << says;
     EXPECT_NE(solve.error().message.find(says), std::string::npos) << solve.error().message;
   };
@@ -194,6 +318,11 @@ TEST(ScenarioSolve, RefusesWhatItCannotDo) {
           "has no tets");
   refused("[organ]\nsource = \"block\"\nnodes = [3, 3, 3]\nspacing_mm = 10\n[run]\nseconds = 1\n",
           "neo-hookean");
+  std::string tense = kColumn + kStatic;
+  tense.insert(tense.find("young_modulus_pa"), "tension = 0.1\n");
+  refused(tense, "has no tension");
+  refused(tense, "has no tension",
+          {.material = *scene::find_measured_material("human_liver_nava2008")});
   refused(kColumn +
               "[run]\nseconds = 1\n[[tool]]\nradius_mm = 5\nreach_mm = 10\n[[tool.key]]\n"
               "time_s = 0\nposition_mm = [0, 60, 0]\nverb = \"push\"\n",

@@ -4,8 +4,11 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <cstring>
 #include <fstream>
 
+#include "common/base/checksum.h"
 #include "tests/finite_elements/specimens.h"
 
 namespace trocar::finite_elements::testing {
@@ -60,6 +63,65 @@ TEST(StateFile, RefusesWhatIsCutShortChangedOrOfAnotherProblem) {
   const auto refused = to_state(good, other);
   ASSERT_FALSE(refused.ok());
   EXPECT_NE(refused.error().message.find("another organ, material"), std::string::npos);
+}
+
+// What a program other than this one could have written: the checksum is right.
+TEST(StateFile, RefusesEachFieldThatIsWrong) {
+  const auto block = pulled_block();
+  Solver solver(block.problem());
+  advance(solver, block, 0, 1);
+  const Bytes good = to_bytes(solver.state(), hash_of(solver.problem()));
+  const auto refused = [&](Bytes bytes, const std::string& says) {
+    bytes.resize(bytes.size() - sizeof(std::uint32_t));
+    const auto sum = crc32(bytes);
+    ByteWriter(bytes).put(sum);
+    const auto state = to_state(bytes, solver.problem());
+    ASSERT_FALSE(state.ok()) << says;
+    EXPECT_NE(state.error().message.find(says), std::string::npos) << state.error().message;
+  };
+  const auto with = [&](std::size_t at, auto value) {
+    Bytes bytes = good;
+    std::memcpy(&bytes.at(at), &value, sizeof value);
+    return bytes;
+  };
+  constexpr std::size_t kVersionAt = 8, kProblemAt = 12, kTimeAt = 20, kFirstArrayAt = 45;
+  refused(with(0, 'X'), "is no state");
+  refused(with(kVersionAt, std::uint32_t{1}), "another version");
+  refused(with(kProblemAt, std::uint64_t{1}), "another organ, material");
+  refused(with(kTimeAt, double{NAN}), "not finite");
+  refused(with(kFirstArrayAt, std::uint64_t{3}), "arrays of the wrong length");
+  refused(with(kFirstArrayAt, ~std::uint64_t{0}), "arrays of the wrong length");
+  refused(with(kFirstArrayAt + 8, double{INFINITY}), "not finite");
+  Bytes longer = good;
+  longer.insert(longer.end(), 8, 0);
+  refused(longer, "arrays of the wrong length");
+  Bytes shorter = good;
+  shorter.resize(shorter.size() - 8);
+  refused(shorter, "arrays of the wrong length");
+}
+
+// A file that claims to be large is refused by its head and its length, before it is read.
+TEST(StateFile, IsNotReadBeyondItsHeadIfItsLengthIsWrong) {
+  const auto path = std::filesystem::temp_directory_path() / "trocar-state-length-test.state";
+  const auto block = pulled_block();
+  Solver solver(block.problem());
+  ASSERT_TRUE(write_state(path, solver).ok());
+  const auto size = std::filesystem::file_size(path);
+  const auto says = [&] {
+    const auto state = read_state(path, solver.problem());
+    return state.ok() ? "" : state.error().message.substr(path.string().size());
+  };
+  std::filesystem::resize_file(path, std::uintmax_t{1} << 40);  // sparse
+  EXPECT_EQ(says(), ": is damaged, its length does not fit: start again without it");
+  std::filesystem::resize_file(path, size - 1);
+  EXPECT_EQ(says(), ": is damaged, its length does not fit: start again without it");
+  std::ofstream(path) << "TROCARFE";
+  EXPECT_EQ(says(), ": is of another version of this program");
+  std::ofstream(path) << "no state";
+  EXPECT_EQ(says(), ": is no state of the off-line solver");
+  std::ofstream(path) << "";
+  EXPECT_EQ(says(), ": is no state of the off-line solver");
+  std::filesystem::remove(path);
 }
 
 TEST(StateFile, IsWrittenAndReadByItsPath) {

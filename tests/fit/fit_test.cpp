@@ -10,6 +10,7 @@
 #include <fstream>
 #include <numbers>
 
+#include "server/fit/fit_model.h"
 #include "server/scenario/scenario_run.h"
 
 namespace trocar::fit {
@@ -129,6 +130,15 @@ TEST(Fit, FindsStiffnessAndDampingFromACurveInTime) {
   EXPECT_NE(toml.find("\nspring_damping_time_s = 0.0"), std::string::npos) << toml;
 }
 
+TEST(Fit, RegionNamesAreQuotedAsTomlWantsThem) {
+  Fit fitted;
+  fitted.parameters = {{"young_modulus_pa", 1000, 6000, std::nullopt}};
+  FitOptions options;
+  options.region = "hard \"core\" \\ 2";
+  EXPECT_EQ(to_toml(fitted, options),
+            "[[region]]\nname = \"hard \\\"core\\\" \\\\ 2\"\nyoung_modulus_pa = 6000\n");
+}
+
 TEST(Fit, AToolCanBeTheMachine) {
   const auto text = [](const char* modulus) {
     return std::string(R"([organ]
@@ -210,6 +220,44 @@ TEST(Fit, WhatCannotBeFittedIsSaid) {
             std::string::npos);
 }
 
+// Constants of a measured material are not moduli that a scenario could have.
+TEST(Fit, AMeasuredMaterialIsLeftToItsOwnIdentification) {
+  const MeasuredCurve measured{"measured.csv", false, {{0.001, 0.1, 0, 2}, {0.002, 0.2, 0, 3}}};
+  const auto resolved =
+      resolve(pulled("elastic_law = \"measured\"\nmeasured = \"human_liver_nava2008\"\n", ""));
+  for (const std::vector<std::string>& keys :
+       {std::vector<std::string>{}, {"young_modulus_pa"}, {"poisson_ratio"}}) {
+    FitOptions options;
+    options.parameters = keys;
+    const auto fitted = fit(resolved, measured, options);
+    ASSERT_FALSE(fitted.ok());
+    EXPECT_NE(fitted.error().message.find("see trocar-organ identify"), std::string::npos)
+        << fitted.error().message;
+    EXPECT_NE(fitted.error().message.find(keys.empty() ? "young_modulus_pa" : keys[0]),
+              std::string::npos);
+  }
+}
+
+// Tension and fibre tension shorten tissue by at most 0.9 together.
+TEST(Fit, TensionStaysWhatAScenarioTakes) {
+  const MeasuredCurve measured{"measured.csv", false, {{0.001, 0.1, 0, 2}, {0.002, 0.2, 0, 3}}};
+  FitOptions options;
+  options.parameters = {"tension"};
+  const auto model = [&](const char* fibre_tension) {
+    return FitModel::create(
+        resolve(pulled_static(
+            std::string("young_modulus_pa = 6000\nfibre_direction = [0, 1, 0]\nfibre_tension = ") +
+            fibre_tension + "\n")),
+        measured, options);
+  };
+  ASSERT_TRUE(model("0").ok());
+  EXPECT_EQ(model("0")->parameters()[0].high, 0.9);
+  EXPECT_NEAR(model("0.6")->parameters()[0].high, 0.3, 1e-12);
+  const auto none = model("0.9");
+  ASSERT_FALSE(none.ok());
+  EXPECT_NE(none.error().message.find("leaves it no room"), std::string::npos);
+}
+
 class Csv : public ::testing::Test {
  protected:
   Result<MeasuredCurve> read(const std::string& text) {
@@ -224,13 +272,39 @@ class Csv : public ::testing::Test {
 
 TEST_F(Csv, ColumnsAreFoundByName) {
   const auto curve =
-      read("# by hand\nforce_n,note,displacement_mm\r\n0.5, a ,2\r\n\r\n\"1\";b;4\n");
+      read("# by hand\nforce_n,note,displacement_mm\r\n0.5, a ,2\r\n\r\n\"1\",\"b, c\",+4\n");
   ASSERT_TRUE(curve.ok()) << curve.error().message;
   ASSERT_EQ(curve->points.size(), 2u);
   EXPECT_DOUBLE_EQ(curve->points[0].displacement_m, 0.002);
   EXPECT_EQ(curve->points[1].force_n, 1);
   EXPECT_EQ(curve->points[1].line, 5);
   EXPECT_FALSE(curve->has_times);
+}
+
+TEST_F(Csv, TheHeaderSaysWhatSeparates) {
+  for (const std::string text :
+       {"displacement_mm;force_n\n1.5;0.5\n", "displacement_mm\tforce_n\n1.5\t0.5\n",
+        "\xEF\xBB\xBF\"displacement_mm\";\"force_n\"\n1.5;0.5\n"}) {
+    const auto curve = read(text);
+    ASSERT_TRUE(curve.ok()) << curve.error().message;
+    EXPECT_DOUBLE_EQ(curve->points[0].displacement_m, 1.5e-3);
+    EXPECT_EQ(curve->points[0].force_n, 0.5);
+  }
+}
+
+// Never two numbers where one was meant.
+TEST_F(Csv, DecimalCommasAreRefused) {
+  const auto says = [&](const std::string& text) {
+    const auto curve = read(text);
+    return curve.ok() ? "" : curve.error().message.substr(path_.string().size());
+  };
+  for (const std::string text :
+       {"displacement_mm;force_n\n0;0\n1,5;0,1\n", "displacement_mm;force_n\n0;0\n1.5;0,1\n",
+        "displacement_mm,force_n\n0,0\n1,5,0,1\n", "displacement_mm,force_n\n0,0\n1,5,0\n",
+        "displacement_mm,force_n\n0,0\n\"1,5\",\"0,1\"\n"}) {
+    EXPECT_TRUE(says(text).starts_with(":3: ")) << text << says(text);
+    EXPECT_NE(says(text).find("decimal point"), std::string::npos) << says(text);
+  }
 }
 
 TEST_F(Csv, WhatIsWrongIsOneLineWithItsPlace) {
@@ -243,6 +317,7 @@ TEST_F(Csv, WhatIsWrongIsOneLineWithItsPlace) {
   EXPECT_TRUE(says("displacement_mm,force_n\n1\n").starts_with(":2: "));
   EXPECT_TRUE(says("displacement_mm,force_n,time_s\n1,1,1\n1,1,1\n").starts_with(":3: time_s"));
   EXPECT_EQ(says("displacement_mm,force_n\n"), ": has no measurements");
+  EXPECT_TRUE(says("displacement_mm,force_n,force_n\n1,1,1\n").starts_with(":1: has two columns"));
   EXPECT_FALSE(read_measurements("/nowhere/x.csv").ok());
 }
 

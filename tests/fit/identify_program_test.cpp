@@ -42,6 +42,22 @@ TEST_F(IdentifyProgram, FindsTheConstantsFromWhichTheExampleWasMade) {
     EXPECT_GT(read(folder_ / "out" / name).size(), 1000u) << name;
 }
 
+TEST_F(IdentifyProgram, LeavesAMaterialThatOrgansAreMadeOf) {
+  ASSERT_EQ(identify(curves_, {"--name", "the \"soft\" one"}), 0) << log();
+  const auto material = (folder_ / "out" / "material.toml").string();
+  ASSERT_EQ(run({"make", "liver", "--tets", "2000", "--material", material, "--out",
+                 at("measured.organ")}),
+            0)
+      << log();
+  EXPECT_NE(log().find("measured, the \"soft\" one (" + material + ")"), std::string::npos)
+      << log();
+  const auto wrong = write("wrong.toml", "[hyperelastic]\nname = \"x\"\nc_i0_pa = [-3]\n");
+  EXPECT_EQ(run({"make", "liver", "--tets", "2000", "--material", wrong, "--out", at("no.organ")}),
+            3);
+  expect_line("wrong.toml:1: key hyperelastic.bulk_modulus_pa: is missing");
+  EXPECT_FALSE(std::filesystem::exists(at("no.organ")));
+}
+
 TEST_F(IdentifyProgram, SaysEachMistakeInOneLine) {
   EXPECT_EQ(identify(write("empty.csv", "")), 3);
   expect_line("empty.csv: has no measurements");
@@ -52,7 +68,10 @@ TEST_F(IdentifyProgram, SaysEachMistakeInOneLine) {
   EXPECT_EQ(identify(curves_, {"--start", "0.7"}), 2);
   expect_line("write 0.5:0.6");
   EXPECT_EQ(identify(curves_, {"--order", "9"}), 2);
-  expect_line("from 1 to 5");
+  expect_line("trocar-organ: the order must be from 1 to 5");
+  EXPECT_EQ(identify(curves_, {"--start", "0.999:1"}), 2);
+  expect_line("add up to more than 0.995");
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "out"));
 }
 
 }  // namespace

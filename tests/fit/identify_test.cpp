@@ -11,6 +11,7 @@
 #include <map>
 #include <numbers>
 
+#include "common/scene/material_file.h"
 #include "server/finite_elements/material_point.h"
 #include "server/fit/identify_report.h"
 #include "tests/support/random.h"
@@ -106,6 +107,7 @@ TEST(Identify, IntervalsHoldTheTruthUnderTwoPercentNoise) {
   const char* asked = std::getenv("TROCAR_IDENTIFY_TRIALS");
   const int trials = asked != nullptr ? std::atoi(asked) : 6;
   std::map<std::string, int> held;
+  std::map<std::string, double> widths;
   for (int trial = 0; trial < trials; ++trial) {
     const auto found = identify(noisy_curves(0.02, 100 + static_cast<std::uint64_t>(trial)), {});
     ASSERT_TRUE(found.ok()) << found.error().message;
@@ -113,6 +115,7 @@ TEST(Identify, IntervalsHoldTheTruthUnderTwoPercentNoise) {
     for (const auto& c : found->constants) {
       const double truth = true_value(c.name);
       held[c.name] += c.low <= truth && truth <= c.high ? 1 : 0;
+      widths[c.name] += (c.high - c.low) / truth / trials;
     }
   }
   int all = 0;
@@ -124,6 +127,59 @@ TEST(Identify, IntervalsHoldTheTruthUnderTwoPercentNoise) {
     }
   }
   EXPECT_GE(all, 85 * 9 * trials / 100);
+  // And they say something: a third more than the mean widths, over the values, of six trials.
+  const std::map<std::string, double> widest{{"C10", 0.018}, {"C20", 0.83}, {"C30", 4.5},
+                                             {"C40", 4.1},   {"C50", 3.3},  {"g1", 0.16},
+                                             {"g2", 0.49},   {"tau1", 0.3}, {"tau2", 1.15}};
+  for (const auto& [name, width] : widths) EXPECT_LT(width, widest.at(name)) << name;
+}
+
+// Where nearly nothing carries the load in the end, the search stays at its limit.
+TEST(Identify, TissueThatRelaxesAlmostWhollyIsIdentified) {
+  auto material = table_one();
+  material.coefficients_pa = {883.8};
+  material.relaxation = {{0.9949, 0.5}};
+  const std::vector<TestCurve> curves{
+      generated("tension", scene::TestMode::Uniaxial, 1.3, 40, material)};
+  for (const double start : {0.5, 0.994995, 0.995}) {
+    const auto found = identify(curves, {.order = 1, .start = {{start, 1}}});
+    ASSERT_TRUE(found.ok()) << found.error().message;
+    EXPECT_NEAR(constant(*found, "C10").value, 883.8, 9);
+    EXPECT_NEAR(constant(*found, "g1").value, 0.9949, 1e-3);
+    EXPECT_LT(found->rms_percent, 1);
+  }
+}
+
+// One modulus of few rows is linear regression, whose interval has a closed form.
+TEST(Identify, IntervalsOfFewRowsAreStudents) {
+  const std::map<std::size_t, double> student{{1, 12.706}, {2, 4.303}, {3, 3.182},
+                                              {4, 2.776},  {5, 2.571}, {8, 2.306}};
+  trocar::testing::Random random(5);
+  for (const auto& [freedom, t] : student) {
+    TestCurve curve{"", "tension", scene::TestMode::Uniaxial, 0.02, 1e-4, {}, {}, {}};
+    for (std::size_t i = 0; i <= freedom; ++i) {
+      curve.times_s.push_back(static_cast<double>(i));
+      curve.stretches.push_back(1.01 + 0.01 * static_cast<double>(i));
+    }
+    scene::HyperelasticMaterial unit;
+    unit.coefficients_pa[0] = 1;
+    unit.bulk_modulus_pa = 40;
+    const auto slopes = predicted_stresses(unit, curve);
+    for (const double slope : slopes)
+      curve.stresses_pa.push_back(900 * slope * random.between(0.9, 1.1));
+    const auto found = identify({curve}, {.order = 1, .term_count = 0});
+    ASSERT_TRUE(found.ok()) << found.error().message;
+    double both = 0, own = 0, scatter = 0;
+    for (std::size_t i = 0; i < slopes.size(); ++i)
+      both += slopes[i] * curve.stresses_pa[i], own += slopes[i] * slopes[i];
+    for (std::size_t i = 0; i < slopes.size(); ++i)
+      scatter += std::pow(curve.stresses_pa[i] - both / own * slopes[i], 2);
+    const double half = t * std::sqrt(scatter / static_cast<double>(freedom) / own);
+    const auto& c10 = constant(*found, "C10");
+    EXPECT_NEAR(c10.value, both / own, 1e-3 * c10.value);
+    EXPECT_NEAR(c10.high - c10.value, half, 0.01 * half) << freedom;
+    EXPECT_NEAR(c10.value - c10.low, half, 0.01 * half) << freedom;
+  }
 }
 
 TEST(Identify, SaysWhatTheDataCannotTell) {
@@ -173,6 +229,9 @@ TEST(Identify, RefusesOptionsThatMakeNoMaterial) {
   refused({.start = {{-0.1, 1}}}, "g1 = -0.1 is negative");
   refused({.start = {{0.6, 1}, {0.5, 2}}}, "add up to 1.1");
   refused({.start = {{0.6, -1}}}, "tau1 = -1 s is not above 0");
+  refused({.start = {{0.999, 1}}}, "add up to more than 0.995");
+  refused({.start = {{0.5, 1}, {0.496, 10}}}, "add up to more than 0.995");
+  refused({.name = ""}, "needs a name");
 }
 
 TEST(IdentifyReport, HasEachConstantAndRow) {
@@ -186,6 +245,24 @@ TEST(IdentifyReport, HasEachConstantAndRow) {
   for (const auto& curve : clean_curves()) rows += curve.times_s.size();
   EXPECT_EQ(static_cast<std::size_t>(std::count(csv.begin(), csv.end(), '\n')), rows);
   EXPECT_EQ(plot_over_time(clean_curves(), *found).series.size(), 6u);
+}
+
+TEST(IdentifyReport, WhatItLeavesIsRead) {
+  IdentifyOptions options{.name = "a \"\\ b\t\x7f \xC3\xA4", .order = 2, .term_count = 1};
+  for (const auto split : {scene::VolumeSplit::Unsplit, scene::VolumeSplit::Isochoric}) {
+    options.split = split;
+    const auto found = identify(clean_curves(), options);
+    ASSERT_TRUE(found.ok()) << found.error().message;
+    const auto read = scene::parse_material_text(to_toml(*found), "material.toml");
+    ASSERT_TRUE(read.ok()) << read.error().message << to_toml(*found);
+    EXPECT_EQ(read->name, options.name);
+    EXPECT_EQ(read->split, split);
+    EXPECT_NEAR(read->bulk_modulus_pa, found->material.bulk_modulus_pa, 1e-3);
+    ASSERT_EQ(read->relaxation.size(), 1u);
+    EXPECT_NEAR(read->relaxation[0].weight, found->material.relaxation[0].weight, 1e-8);
+    for (std::size_t i = 0; i < 5; ++i)
+      EXPECT_NEAR(read->coefficients_pa[i], found->material.coefficients_pa[i], 1e-3);
+  }
 }
 
 }  // namespace

@@ -25,6 +25,18 @@ TEST(TestCurves, AreReadWithTheirUnitsAndTests) {
   EXPECT_NEAR((*curves)[1].stresses_pa[2], -4000, 1e-9);
 }
 
+TEST(TestCurves, AreReadAsSpreadsheetsWriteThem) {
+  const auto curves = parse_test_curves(
+      "\xEF\xBB\xBFtime_s;curve;displacement_mm;force_n\r\n0;\"left; upper\";0;+0\r\n"
+      "1;\"left; upper\";+1;+0.1\r\n2;\"left; upper\";2;0.2\r\n3;\"left; upper\";3;0.3\r\n"
+      "4;\"left; upper\";4;.4\r\n",
+      "x.csv", {"tension", 0.02, 1e-4});
+  ASSERT_TRUE(curves.ok()) << curves.error().message;
+  ASSERT_EQ(curves->size(), 1u);
+  EXPECT_EQ((*curves)[0].name, "left; upper");
+  EXPECT_NEAR((*curves)[0].stresses_pa[4], 4000, 1e-9);
+}
+
 TEST(TestCurves, BadOnesAreRefusedInOneLine) {
   const std::string header = "time_s,displacement_mm,force_n\n";
   const std::string good = "0,0,0\n1,1,0.1\n2,2,0.2\n3,3,0.3\n4,4,0.4\n";
@@ -41,6 +53,11 @@ TEST(TestCurves, BadOnesAreRefusedInOneLine) {
   refused("1,2,3\n", "x.csv:1: is no header");
   refused(header + "0,0\n", "x.csv:2: time_s, displacement_mm and force_n are not all numbers");
   refused(header + "0,0,nan\n", "not all numbers");
+  refused(header + "0,0,+-1\n", "not all numbers");
+  // Decimal commas.
+  refused(header + good + "5,5,0,5\n",
+          "x.csv:7: has 4 cells under 3 columns: write numbers with a");
+  refused("time_s;displacement_mm;force_n\n0;0;0\n1;1;0,1\n", "x.csv:3: time_s, displacement_mm");
   refused(header + "0,0,0\n", "fewer than 5");
   refused(header + good + "3.5,4,0.4\n", "x.csv:7: time_s is not above the one before");
   refused(header + "0,0,0\n1,1000,0.1\n", "x.csv:3: a displacement of 1000 mm");

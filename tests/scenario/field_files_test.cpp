@@ -9,6 +9,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "server/scenario/field_times.h"
 #include "tests/scenario/scenario_texts.h"
 
 namespace trocar::scenario {
@@ -151,6 +152,25 @@ TEST_F(FieldFiles, AnOrganWithoutRegionsIsAllRegionZero) {
   write(kColumn + "[run]\nseconds = 0.001\n");
   EXPECT_EQ(region_names(), std::vector<std::string>{run_->organ().name});
   for (const int region : numbers<int>("PointData", "region")) EXPECT_EQ(region, 0);
+}
+
+// The steps at which a field is written, of `count` steps and the start.
+std::vector<int> field_steps(const std::vector<double>& times_s, double step_s, int count) {
+  FieldTimes times(times_s, step_s);
+  std::vector<int> steps;
+  for (int i = 0; i <= count; ++i)
+    if (times.take_due(i * step_s)) steps.push_back(i);
+  return steps;
+}
+
+TEST(FieldTimes, AreDueAtTheFirstStepThatReachesThem) {
+  using Steps = std::vector<int>;
+  EXPECT_EQ(field_steps({0, 0.0021, 0.0026, 0.005}, 1e-3, 5), (Steps{0, 2, 3, 5}))
+      << "a tick is within half of one";
+  EXPECT_EQ(field_steps({0, 0.0004, 0.001}, 1e-5, 100), (Steps{0, 40, 100}))
+      << "short steps are told apart";
+  EXPECT_EQ(field_steps({0.5, 1}, 1, 1), (Steps{1})) << "a long step is no step before its time";
+  EXPECT_EQ(field_steps({}, 1, 3), Steps{});
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <thread>
 
 #include "tests/support/program_fixture.h"
@@ -29,25 +30,118 @@ TEST_F(SimProgram, TheExampleRunsAndWritesTheSameBytesTwice) {
   }
 }
 
-TEST_F(SimProgram, TheOffLineSolverLeavesAStateFromWhichItGoesOn) {
+TEST_F(SimProgram, TheOffLineSolverRunsTheExampleOfAMeasuredMaterial) {
   const std::string example = std::string(TROCAR_SOURCE_DIR) + "/deploy/scenes/stretch.toml";
   const auto out = folder_ / "out";
-  const std::vector<std::string> fem{
+  std::vector<std::string> fem{
       example, "--solver", "fem", "--out", out.string(), "--material", "human_liver_nava2008"};
   ASSERT_EQ(run(fem), 0) << log();
   EXPECT_NE(log().find("750 quadratic elements"), std::string::npos) << log();
   const auto probes = read(out / "probes.csv");
   EXPECT_EQ(std::count(probes.begin(), probes.end(), '\n'), 9) << "a row per load step";
-  auto again = fem;
-  again.insert(again.end(), {"--resume", (out / "fem.state").string()});
-  ASSERT_EQ(run(again), 0) << log();
-  again.insert(again.end(), {"--elements", "linear"});
-  EXPECT_EQ(run(again), 3);
-  EXPECT_NE(log().find("fem.state: is of another organ, material"), std::string::npos) << log();
-  auto unknown = fem;
-  unknown.back() = "rubber";
-  EXPECT_EQ(run(unknown), 2);
+  fem.back() = "rubber";
+  EXPECT_EQ(run(fem), 2);
   EXPECT_NE(log().find("write human_liver_nava2008"), std::string::npos) << log();
+  fem.back() = write("soft.toml",
+                     "[hyperelastic]\nname = \"soft\"\nc_i0_pa = [500]\nbulk_modulus_pa = 2e4\n");
+  fem.insert(fem.end(), {"--elements", "linear"});
+  ASSERT_EQ(run(fem), 0) << log();
+  EXPECT_NE(read(out / "probes.csv"), probes);
+  fem[6] = write("wrong.toml", "[hyperelastic]\nname = \"x\"\nc_i0_pa = [500]\n");
+  EXPECT_EQ(run(fem), 3);
+  EXPECT_NE(log().find("wrong.toml:1: key hyperelastic.bulk_modulus_pa: is missing"),
+            std::string::npos)
+      << log();
+}
+
+// A block under a force that grows, for the off-line solver; `half` of it ends in the middle.
+std::string swayed_block(bool is_half, const std::string& force = "[0.02, 0, 0]") {
+  return std::string("[organ]\nsource = \"block\"\nnodes = [3, 3, 3]\nspacing_mm = 8\n") +
+         "[material]\nelastic_law = \"neo-hookean\"\npoisson_ratio = 0.4\n" +
+         "young_modulus_pa = 6000\n" +
+         "[[nodes]]\nname = \"top\"\nbox_min_mm = [-9, 7, -9]\nbox_max_mm = [9, 9, 9]\n" +
+         "[run]\nseconds = " + (is_half ? "0.01" : "0.02") +
+         "\n[[force]]\nset = \"top\"\n[[force.key]]\ntime_s = 0\nforce_n = [0, 0, 0]\n" +
+         "[[force.key]]\ntime_s = 0.01\nforce_n = " + force +
+         "\n[[probe]]\nset = \"top\"\nquantity = \"displacement\"\nrate_hz = 1000\n" +
+         "[output]\nfields_s = [0, 0.005" + (is_half ? "" : ", 0.015") + "]\n";
+}
+
+TEST_F(SimProgram, AStoppedOffLineRunGoesOnAsIfItHadNot) {
+  const auto whole = write("whole.toml", swayed_block(false)),
+             half = write("half.toml", swayed_block(true));
+  const auto fem = [&](const std::string& scenario, const char* out,
+                       const std::vector<std::string>& more = {}) {
+    std::vector<std::string> all{scenario, "--solver", "fem",  "--elements",
+                                 "linear", "--out",    at(out)};
+    all.insert(all.end(), more.begin(), more.end());
+    return run(all);
+  };
+  ASSERT_EQ(fem(whole, "a"), 0) << log();
+  ASSERT_EQ(fem(half, "b"), 0) << log();
+  const auto state = write("half.state", read(folder_ / "b" / "fem.state"));
+  const std::vector<std::string> resume{"--resume", state};
+  ASSERT_EQ(fem(whole, "b", resume), 0) << log();
+  const auto rows = read(folder_ / "b" / "probes-from-step-11.csv");
+  EXPECT_EQ(std::count(rows.begin(), rows.end(), '\n'), 11) << rows;
+  EXPECT_EQ(read(folder_ / "a" / "probes.csv"),
+            read(folder_ / "b" / "probes.csv") + rows.substr(rows.find('\n') + 1));
+  for (const char* field : {"field_0000000ms.csv", "field_0000005ms.csv", "field_0000015ms.csv"})
+    EXPECT_EQ(read(folder_ / "a" / field), read(folder_ / "b" / field)) << field;
+  EXPECT_EQ(read(folder_ / "a" / "fem.state"), read(folder_ / "b" / "fem.state"));
+
+  const auto refused = [&](const std::string& scenario, std::vector<std::string> more,
+                           const char* says) {
+    more.insert(more.end(), resume.begin(), resume.end());
+    EXPECT_EQ(fem(scenario, "b", more), 3) << log();
+    EXPECT_NE(log().find(says), std::string::npos) << log();
+    const std::string line = log();
+    EXPECT_EQ(std::count(line.begin(), line.end(), '\n'), 1) << line;
+    EXPECT_EQ(read(folder_ / "b" / "probes-from-step-11.csv"), rows) << "nothing is lost";
+  };
+  refused(whole, {"--step-ms", "2"}, "half.state: has other steps of time");
+  refused(write("other.toml", swayed_block(false, "[0.03, 0, 0]")), {}, "other loads");
+  refused(whole, {"--material", "human_liver_nava2008"}, "is of another organ, material");
+}
+
+TEST_F(SimProgram, TimesOfShortStepsAreWritten) {
+  const auto scenario = write("short.toml", swayed_block(true));
+  ASSERT_EQ(run({scenario, "--solver", "fem", "--elements", "linear", "--step-ms", "0.4", "--out",
+                 at("out")}),
+            0)
+      << log();
+  std::istringstream lines(read(folder_ / "out" / "probes.csv"));
+  std::string line;
+  std::getline(lines, line);
+  double before = 0;
+  for (int row = 1; std::getline(lines, line); ++row, before = std::stod(line)) {
+    const double steps = std::stod(line) / 0.4e-3;
+    EXPECT_NEAR(steps, std::round(steps), 1e-6) << line;
+    EXPECT_GT(std::stod(line), before);
+  }
+  EXPECT_NEAR(before, 0.01, 1e-12);
+}
+
+TEST_F(SimProgram, OptionsThatWouldDoNothingAreRefused) {
+  const auto dynamic = write("dynamic.toml", swayed_block(true));
+  const std::string still = std::string(TROCAR_SOURCE_DIR) + "/deploy/scenes/stretch.toml";
+  const auto refused = [&](std::vector<std::string> arguments, const char* says) {
+    arguments.insert(arguments.end(), {"--out", at("out")});
+    EXPECT_EQ(run(arguments), 2) << log();
+    const std::string line = log();
+    EXPECT_NE(line.find(says), std::string::npos) << line;
+    EXPECT_EQ(std::count(line.begin(), line.end(), '\n'), 1) << line;
+  };
+  for (const auto& [option, value] :
+       {std::pair{"--material", "human_liver_nava2008"}, std::pair{"--elements", "linear"},
+        std::pair{"--resume", "fem.state"}, std::pair{"--bulk-ratio", "40"},
+        std::pair{"--response", "equilibrium"}, std::pair{"--step-ms", "1"}})
+    refused({dynamic, option, value}, (std::string(option) + ": is of --solver fem").c_str());
+  refused({dynamic, "--solver", "fem", "--plot"}, "--plot: ");
+  refused({dynamic, "--solver", "fem", "--bulk-ratio", "40"}, "--bulk-ratio: ");
+  refused({dynamic, "--solver", "fem", "--response", "equilibrium"}, "--response: ");
+  refused({still, "--solver", "fem", "--step-ms", "1"}, "--step-ms: this run is static");
+  refused({dynamic, "--solver", "fem", "--step-ms", "20"}, "--step-ms: 0.01 s are 0.5 steps");
 }
 
 TEST_F(SimProgram, PlotsShowEachProbeAndForceAgainstDisplacement) {

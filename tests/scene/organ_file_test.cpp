@@ -31,8 +31,19 @@ std::filesystem::path scratch_folder() {
   return folder;
 }
 
+Organ measured_organ(StrainEnergy energy) {
+  auto material = *find_measured_material("human_liver_nava2008");
+  material.energy = energy;
+  if (energy == StrainEnergy::Exponential) material.exponent = 2.5;
+  auto organ = small_liver();
+  use_measured(material, organ.material);
+  return organ;
+}
+
 TEST(OrganFile, RoundTripKeepsEverything) {
-  for (const Organ& organ : {small_liver(), *make_lattice(LatticeSize{5, 4, 3, 0.02})}) {
+  for (const Organ& organ : {small_liver(), *make_lattice(LatticeSize{5, 4, 3, 0.02}),
+                             measured_organ(StrainEnergy::ReducedPolynomial),
+                             measured_organ(StrainEnergy::Exponential)}) {
     const auto decoded = decode_organ(encode_organ(organ));
     ASSERT_TRUE(decoded.ok()) << decoded.error().message;
     EXPECT_EQ(*decoded, organ);
@@ -51,6 +62,11 @@ Organ organ_with_fibres() {
   for (std::size_t n = 0; n < organ.mesh.node_count(); ++n)
     organ.fibre_directions.push_back(n % 5 == 0 ? Vec3d{} : Vec3d{0, 0.6, n % 2 == 0 ? 0.8 : -0.8});
   return organ;
+}
+
+TEST(OrganFile, LawsOfMeasuredMaterialsAreOthers) {
+  EXPECT_NE(organ_hash(measured_organ(StrainEnergy::ReducedPolynomial)),
+            organ_hash(measured_organ(StrainEnergy::Exponential)));
 }
 
 TEST(OrganFile, KeepsDirectionsOfFibres) {

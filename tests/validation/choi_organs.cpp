@@ -194,9 +194,9 @@ void run_fig7_fig8_organs(const Lab& lab, Section& section) {
       "each, and a grasping tool pulls the liver out. Live solver, four sweeps per tick, every "
       "node "
       "free. The paper shows pictures without values, so the bounds ask what a picture shows.");
-  show_organ(lab, section, "liver", {"dented", "push", "[0.2, 0.1, 1]", 12, -14});
+  show_organ(lab, section, "elastic-liver", {"dented", "push", "[0.2, 0.1, 1]", 12, -14});
   if (lab.is_short()) return;
-  show_organ(lab, section, "liver", {"protruded", "grasp", "[0.2, 0.1, 1]", 14, 16});
+  show_organ(lab, section, "elastic-liver", {"protruded", "grasp", "[0.2, 0.1, 1]", 14, 16});
   const Hand hand{"dented", "push", "[0.3, 0.2, 1]", 12, -14};
   show_organ(lab, section, "stomach", hand);
   const auto run = lab.start(section, "fig7-fig8-stomach-dented", "fig7-fig8-stomach-dented",

@@ -41,6 +41,16 @@ double loop_area(std::span<const double> displacement_m, std::span<const double>
   return area;
 }
 
+plot::Series force_curve(const std::string& name, std::span<const Vec3d> forces_n,
+                         plot::Style style) {
+  plot::Series series{name, {}, {}, style, {}};
+  for (std::size_t i = 0; i < forces_n.size(); i += 4) {
+    series.x.push_back(static_cast<double>(i + 1) * 1e-3);
+    series.y.push_back(length(forces_n[i]));
+  }
+  return series;
+}
+
 NodeIndex node_nearest(const scene::Organ& organ, const Vec3d& point_m) {
   NodeIndex best;
   double nearest = std::numeric_limits<double>::infinity();

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "common/plot/plot.h"
 #include "server/scenario/scenario_run.h"
 
 namespace trocar::validation {
@@ -20,6 +21,10 @@ double largest_difference(const Field& a, const Field& b);
 
 // Work done along a closed curve of displacement and force by the trapezoidal rule, J.
 double loop_area(std::span<const double> displacement_m, std::span<const double> force_n);
+
+// Lengths of forces over time, from one force per tick, every fourth.
+plot::Series force_curve(const std::string& name, std::span<const Vec3d> forces_n,
+                         plot::Style style);
 
 // The surface node at rest nearest to a point (all nodes if the organ has no such).
 NodeIndex node_nearest(const scene::Organ& organ, const Vec3d& point_m);

@@ -96,15 +96,6 @@ Errors compare(const Course& course, const Course& reference) {
   return errors;
 }
 
-plot::Series curve(const std::string& name, const Course& course, plot::Style style) {
-  plot::Series series{name, {}, {}, style, {}};
-  for (std::size_t i = 0; i < course.forces_n.size(); i += 4) {
-    series.x.push_back(static_cast<double>(i + 1) * 1e-3);
-    series.y.push_back(length(course.forces_n[i]));
-  }
-  return series;
-}
-
 struct Study {
   plot::Plot forces, errors;
   Table table;
@@ -135,8 +126,8 @@ bool sweep_limits(const Lab& lab, Section& section, const Press& press, const Co
     const Errors errors = compare(course, reference);
     if (nodes == kDefaultNodes) {
       at_default = errors;
-      study.forces.series.push_back(
-          curve(fmt::format("{}, {} nodes", mode, nodes), course, plot::Style::Line));
+      study.forces.series.push_back(force_curve(fmt::format("{}, {} nodes", mode, nodes),
+                                                course.forces_n, plot::Style::Line));
     }
     for (auto* series : {&mean, &field}) series->x.push_back(nodes);
     mean.y.push_back(100 * errors.mean);
@@ -191,7 +182,7 @@ void study_press(const Lab& lab, Section& section, const Press& press) {
                     press.graded_peak, "The same: largest error over the largest force.");
   }
   // Last, so that it is seen on top of what agrees with it.
-  study.forces.series.push_back(curve("full", reference, plot::Style::Dashed));
+  study.forces.series.push_back(force_curve("full", reference.forces_n, plot::Style::Dashed));
   section.add(std::move(study.forces));
   if (!lab.is_short()) section.add(std::move(study.errors));
   section.add(std::move(study.table));
@@ -236,7 +227,7 @@ void run_propagation_lattice(const Lab& lab, Section& section) {
 void run_propagation_liver(const Lab& lab, Section& section) {
   introduce(section, 28, 10);
   Press press{.organ = "liver-4k",
-              .source = organ_source("liver"),
+              .source = organ_source("elastic-liver"),
               .anchor = "[0.2, 0.1, 1]",
               .radius_mm = 28,
               .depth_mm = 10,

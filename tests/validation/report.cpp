@@ -7,20 +7,10 @@
 #include <fstream>
 #include <limits>
 
+#include "common/base/quote.h"
+
 namespace trocar::validation {
 namespace {
-
-std::string quoted(const std::string& text) {
-  std::string out = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') out += '\\';
-    if (static_cast<unsigned char>(c) < 32)
-      out += fmt::format("\\u{:04x}", static_cast<unsigned char>(c));
-    else
-      out += c;
-  }
-  return out + "\"";
-}
 
 // JSON has no infinity and no NaN.
 std::string number(double value) {
@@ -32,7 +22,7 @@ std::string value_of(const std::string& text) {
   if (text.empty()) return "null";
   char* end = nullptr;
   const double value = std::strtod(text.c_str(), &end);
-  return *end == '\0' && std::isfinite(value) ? number(value) : quoted(text);
+  return *end == '\0' && std::isfinite(value) ? number(value) : quote(text);
 }
 
 }  // namespace
@@ -80,8 +70,8 @@ std::string to_json(const std::vector<Section>& sections) {
       out += fmt::format(
           "{{\"name\": {}, \"paper\": {}, \"ours\": {}, \"error\": {}, \"bound\": {}, \"kept\": "
           "{}, \"note\": {}}}",
-          quoted(check.name), value_of(check.expected), value_of(check.ours), number(check.error),
-          number(check.bound), check.is_kept(), quoted(check.note));
+          quote(check.name), value_of(check.expected), value_of(check.ours), number(check.error),
+          number(check.bound), check.is_kept(), quote(check.note));
     }
   return out + "\n]\n";
 }

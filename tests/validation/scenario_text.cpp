@@ -33,10 +33,12 @@ std::string box_set(const std::string& name, const Vec3d& low_mm, const Vec3d& h
                      vector(low_mm), vector(high_mm));
 }
 
-std::string near_set(const std::string& name, const Vec3d& point_mm, double radius_mm) {
+std::string near_set(const std::string& name, const Vec3d& point_mm, double radius_mm,
+                     bool is_on_surface) {
   std::string text =
       fmt::format("[[nodes]]\nname = \"{}\"\nnearest_mm = {}\n", name, vector(point_mm));
   if (radius_mm > 0) text += fmt::format("radius_mm = {:.9g}\n", radius_mm);
+  if (is_on_surface) text += "surface = true\n";
   return text + "\n";
 }
 

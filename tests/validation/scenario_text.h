@@ -13,8 +13,9 @@ namespace trocar::validation {
 std::string lattice_organ(int nx, int ny, int nz, double spacing_mm);
 std::string organ_source(const std::string& source);
 std::string box_set(const std::string& name, const Vec3d& low_mm, const Vec3d& high_mm);
-// All nodes within the radius; radius 0: the nearest one.
-std::string near_set(const std::string& name, const Vec3d& point_mm, double radius_mm);
+// All nodes within the radius, or only those of the surface; radius 0: the nearest one.
+std::string near_set(const std::string& name, const Vec3d& point_mm, double radius_mm,
+                     bool is_on_surface = false);
 
 using TimedValue = std::pair<double, Vec3d>;  // s, value
 std::string displace(const std::string& set, const std::vector<TimedValue>& keys_mm);

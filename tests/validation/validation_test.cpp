@@ -130,6 +130,27 @@ TEST_F(Validation, TheOffLineSolverMeetsCalculix) {
   EXPECT_EQ(names.size(), 4u);
 }
 
+TEST_F(Validation, AveragedVolumeLosesLessThanPlainTets) {
+  ASSERT_EQ(run("--short --only dogan2011/locking"), 0) << log();
+  const auto names = kept_checks();
+  EXPECT_TRUE(names.contains("dogan2011/locking/cook-plain-locks"));
+  EXPECT_EQ(names.size(), 9u);
+}
+
+TEST_F(Validation, AMeasuredLiverCreepsLiveAsOffLine) {
+  ASSERT_EQ(run("--short --only dogan2011/creep"), 0) << log();
+  const auto names = kept_checks();
+  EXPECT_TRUE(names.contains("dogan2011/creep/liver-live"));
+  EXPECT_EQ(names.size(), 8u);
+}
+
+TEST_F(Validation, AMeasuredLiverPressedLiveIsNearItsConvergedSolution) {
+  ASSERT_EQ(run("--short --only dogan2011/live"), 0) << log();
+  const auto names = kept_checks();
+  EXPECT_TRUE(names.contains("dogan2011/live/liver-averaged-force"));
+  EXPECT_EQ(names.size(), 4u);
+}
+
 TEST_F(Validation, CommandLine) {
   EXPECT_EQ(run("--help"), 0);
   EXPECT_NE(log().find("Examples:"), std::string::npos);
