@@ -23,7 +23,7 @@ inline constexpr std::array kLawKeys{
            "is of tets with elastic_law = \"tensor-mass\" or \"neo-hookean\": springs have 1/4 "
            "whatever is asked"},
     LawKey{"measured", false, false, false, true, "is of elastic_law = \"measured\""},
-    LawKey{"averaged_volume", false, false, true, true,
+    LawKey{"averaged_strain", false, false, true, true,
            "is of elastic_law = \"neo-hookean\" or \"measured\""},
     LawKey{"fibre_stiffness_ratio", true, false, false, false, "is of springs"}};
 

@@ -45,7 +45,7 @@ struct Material {
   HyperelasticMaterial measured{};
   // NeoHookean, Measured: volume averaged over each node's tets, against locking (Bonet & Burton
   // 1998).
-  bool has_averaged_volume = false;
+  bool has_averaged_strain = false;
   // Transverse isotropy (springs) and tension (all laws): along a spring at the angle a to the
   // fibres,
   //   k = k0 (1 + (fibre_stiffness_ratio - 1) cos^2 a),

@@ -169,7 +169,7 @@ std::vector<double> numbers_of(const Material& m) {
                               m.spring_damping_time_s,
                               static_cast<double>(m.elastic_law),
                               m.poisson_ratio,
-                              m.has_averaged_volume ? 1.0 : 0.0,
+                              m.has_averaged_strain ? 1.0 : 0.0,
                               m.fibre_direction.x,
                               m.fibre_direction.y,
                               m.fibre_direction.z,

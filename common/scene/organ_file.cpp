@@ -91,7 +91,7 @@ void put_material(const Material& m, proto::Material& out) {
   out.set_spring_damping_time_s(m.spring_damping_time_s);
   out.set_elastic_law(static_cast<std::uint32_t>(m.elastic_law));
   out.set_poisson_ratio(m.poisson_ratio);
-  out.set_has_averaged_volume(m.has_averaged_volume);
+  out.set_has_averaged_strain(m.has_averaged_strain);
   if (length(m.fibre_direction) > 0) put_vector(m.fibre_direction, out.mutable_fibre_direction());
   out.set_fibre_stiffness_ratio(m.fibre_stiffness_ratio);
   out.set_tension(m.tension);
@@ -137,7 +137,7 @@ Status take_material(const proto::Material& in, Material& m) {
        .elastic_law = static_cast<ElasticLaw>(in.elastic_law()),
        .poisson_ratio = in.poisson_ratio(),
        .measured = {},
-       .has_averaged_volume = in.has_averaged_volume(),
+       .has_averaged_strain = in.has_averaged_strain(),
        .fibre_direction = {},
        .fibre_stiffness_ratio = in.fibre_stiffness_ratio(),
        .tension = in.tension(),

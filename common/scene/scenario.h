@@ -52,7 +52,7 @@ struct MaterialChange {
   std::optional<ElasticLaw> elastic_law;
   std::optional<double> poisson_ratio;
   std::optional<std::string> measured;  // name of a measured material
-  std::optional<bool> has_averaged_volume;
+  std::optional<bool> has_averaged_strain;
   std::optional<Vec3d> fibre_direction;
   std::optional<double> fibre_stiffness_ratio, tension, fibre_tension;
   std::optional<double> cut_energy_j_m2, blade_friction_pa, tear_stretch;

@@ -20,7 +20,7 @@ void read_material_keys(TableReader& reader, MaterialChange& material) {
                                                     {"measured", ElasticLaw::Measured}}});
   material.measured = reader.string("measured");
   material.poisson_ratio = reader.number("poisson_ratio", 0, 0.4999);
-  material.has_averaged_volume = reader.boolean("averaged_volume");
+  material.has_averaged_strain = reader.boolean("averaged_strain");
   if (const auto direction = reader.direction("fibre_direction"))
     material.fibre_direction = reader.vector("fibre_direction");
   material.fibre_stiffness_ratio = reader.number("fibre_stiffness_ratio", 0, 1000);

@@ -93,7 +93,7 @@ Status Resolver::change_material(const MaterialChange& change, const Organ& orga
   set(change.node_damping_per_s, m.node_damping_per_s);
   set(change.spring_damping_time_s, m.spring_damping_time_s);
   set(change.poisson_ratio, m.poisson_ratio);
-  set(change.has_averaged_volume, m.has_averaged_volume);
+  set(change.has_averaged_strain, m.has_averaged_strain);
   set(change.fibre_direction, m.fibre_direction);
   set(change.fibre_stiffness_ratio, m.fibre_stiffness_ratio);
   set(change.tension, m.tension);

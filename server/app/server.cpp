@@ -18,6 +18,7 @@
 #include "common/base/log.h"
 #include "common/base/text_file.h"
 #include "common/base/timing.h"
+#include "common/scene/average_strain.h"
 #include "common/scene/load_organ.h"
 #include "server/app/simulation_loop.h"
 #include "server/app/summary.h"
@@ -233,6 +234,8 @@ Status Server::finish() {
 Status run_server(const ServerOptions& options) {
   auto organ = scene::load_organ(options.organ);
   if (!organ) return organ.error();
+  if (options.has_averaged_strain)
+    if (const auto averaged = scene::average_strain(*organ); !averaged) return averaged;
   const auto server = std::make_unique<Server>(options, std::move(*organ));
   if (const auto opened = server->open(); !opened) return opened;
   return server->run();

@@ -25,11 +25,7 @@ float sum(const Lanes& a) {
 }  // namespace
 
 BlockDescent::BlockDescent(const scene::Organ& organ, const world::World& world, unsigned workers)
-    : organ_(organ),
-      tissue_(organ),
-      workers_(workers),
-      scratches_(workers_.count()),
-      gravity_(to_float(organ.gravity_m_s2)) {
+    : organ_(organ), tissue_(organ), workers_(workers), gravity_(to_float(organ.gravity_m_s2)) {
   const auto& groups = tissue_.groups();
   const auto group_count = groups.group_count(), slot_count = groups.slot_count();
   constants_.resize(group_count);
@@ -86,13 +82,11 @@ void BlockDescent::take_state(const world::World& world) {
   take_relaxation(world);
 }
 
-bool BlockDescent::use_linear_far_field(const world::World& world) {
-  if (tissue_.follows_moves()) return false;
+void BlockDescent::use_linear_far_field(const world::World& world) {
   far_field_ = std::make_unique<FarField>(tissue_, world);
   far_field_->take_state(x_.data(), world);
   takings_.resize(workers_.count());
   due_.reserve(all_groups_.size());
-  return true;
 }
 
 void BlockDescent::take_state(const world::World& world, std::span<const NodeIndex> nodes) {
@@ -235,9 +229,13 @@ void BlockDescent::begin_groups(world::World& world, const ExternalLoads& loads)
       far_field_->begin_group(g, x_.data(), start_.data(),
                               coasts(g) ? inverse_dt_ : inverse_dt_of(g));
     });
-  if (tissue_.follows_moves())
-    for_each_group(all_groups_, [&](Group g) { tissue_.restart_group(g, x_.data()); });
+  restart_stars();
   for (const auto g : begun_.groups) rejected_[g] = 0, squared_moves_[g] = 0;
+}
+
+void BlockDescent::restart_stars() {
+  if (auto* const stars = tissue_.stars())
+    for_each_group(all_groups_, [&](Group g) { stars->restart_group(g, x_.data()); });
 }
 
 void BlockDescent::place_held(const ExternalLoads& loads) {
@@ -265,9 +263,9 @@ NodeStep8 BlockDescent::inertia_of(Group group, const Vec8& own) const {
   return step;
 }
 
-NodeStep8 BlockDescent::linearise(Group group, const Vec8& own, Scratch& scratch) const {
+NodeStep8 BlockDescent::linearise(Group group, const Vec8& own) const {
   NodeStep8 step = inertia_of(group, own);
-  tissue_.add(group, x_.data(), own, step, scratch);
+  tissue_.add(group, x_.data(), own, step);
   return step;
 }
 
@@ -324,7 +322,7 @@ void BlockDescent::hold_axes(Group group, NodeStep8& step) const {
 }
 
 void BlockDescent::relax(const SweepPlan& plan, Group group, const contact::ContactList& contacts,
-                         Relaxation omega, unsigned worker) {
+                         Relaxation omega) {
   const auto lanes = plan.lanes[group];
   Float4* const x = &x_[group * kLanes];
   const Vec8 own = load_group(x);
@@ -332,9 +330,11 @@ void BlockDescent::relax(const SweepPlan& plan, Group group, const contact::Cont
   const bool is_linear = is_far_linear_ && near_.lanes[group] == 0 &&
                          group_stamp_[group] != current_ &&
                          far_field_->add(group, lanes, inverse_dt_of(group), step);
-  if (!is_linear) {
+  if (is_linear) {
+    tissue_.add_averaged(group, step);
+  } else {
     ask_energies(group, start_.data());
-    tissue_.add(group, x_.data(), own, step, scratches_[worker]);
+    tissue_.add(group, x_.data(), own, step);
   }
   Float8 factor = _mm256_blendv_ps(all(-omega.far), all(-omega.near), mask_of(near_.lanes[group]));
   if (group_stamp_[group] == current_) {
@@ -352,7 +352,7 @@ void BlockDescent::relax(const SweepPlan& plan, Group group, const contact::Cont
   const Float8 moves = _mm256_and_ps(swept, is_sound);
   const Vec8 moved{where(moves, dx.x), where(moves, dx.y), where(moves, dx.z)};
   store_group(x, own + moved);
-  if (tissue_.follows_moves()) tissue_.after_move(group, moved, scratches_[worker]);
+  if (auto* const stars = tissue_.stars()) stars->after_move(group, moved, lanes);
   if (is_far_linear_) far_field_->after_move(group, moved, inverse_dt_of(group));
   store(squares_[group], where(moves, squared));
   group_squares_[group] = sum(squares_[group]);
@@ -370,14 +370,14 @@ void BlockDescent::sweep(const SweepPlan& plan, const contact::ContactList& cont
       for (auto i = n * w / count; i < n * (w + 1) / count; ++i) {
         const Group g = plan.groups[begin + i];
         if (has_serial_ && serial_stamp_[g] == current_) continue;
-        relax(plan, g, contacts, omega, w);
+        relax(plan, g, contacts, omega);
       }
       if (n > 0) workers_.barrier();
       if (!has_serial_ || n == 0) continue;
       if (w == 0)
         for (std::size_t i = 0; i < n; ++i) {
           const Group g = plan.groups[begin + i];
-          if (serial_stamp_[g] == current_) relax(plan, g, contacts, omega, w);
+          if (serial_stamp_[g] == current_) relax(plan, g, contacts, omega);
         }
       workers_.barrier();
     }
@@ -544,6 +544,7 @@ SolveReport BlockDescent::solve(const contact::ContactList& contacts,
     const auto restored = restore_rejected(world);
     report.nodes_restored = restored.nodes;
     report.largest_move_m += restored.largest_move_m;
+    restart_stars();
   }
   end_relaxation(world, loads.held);
   residuals_.clear();

@@ -97,9 +97,8 @@ class BlockDescent {
   // The same for some nodes.
   void take_state(const world::World& world, std::span<const NodeIndex> nodes);
 
-  // Makes ready for SolveSettings::has_linear_far_field, from the world as it is; false: these
-  // energies cannot be linearised node by node (averaged volume).
-  bool use_linear_far_field(const world::World& world);
+  // Makes ready for SolveSettings::has_linear_far_field, from the world as it is.
+  void use_linear_far_field(const world::World& world);
 
   // Advances displacements and velocities by one step. near: distinct nodes that are not fixed.
   SolveReport solve(const contact::ContactList& contacts, std::span<const NodeIndex> near,
@@ -158,12 +157,13 @@ class BlockDescent {
     return is_slow(group) ? inverse_dt_ / static_cast<float>(far_interval_) : inverse_dt_;
   }
   [[gnu::always_inline]] inline NodeStep8 inertia_of(Group group, const Vec8& own) const;
-  NodeStep8 linearise(Group group, const Vec8& own, Scratch& scratch) const;
+  NodeStep8 linearise(Group group, const Vec8& own) const;
   Vec3f displacement_of(const contact::ContactPoint& point, const PointLinks& links) const;
   void add_contacts(const contact::ContactList& contacts, Group group, NodeStep8& step,
                     Lanes& omega) const;
   void ask_energies(Group group, const Float4* start);
   void hold_axes(Group group, NodeStep8& step) const;
+  void restart_stars();
   void place_held(const ExternalLoads& loads);
   // Over-relaxation of near and of far nodes.
   struct Relaxation {
@@ -171,7 +171,7 @@ class BlockDescent {
   };
   void sweep(const SweepPlan& plan, const contact::ContactList& contacts, Relaxation omega);
   void relax(const SweepPlan& plan, Group group, const contact::ContactList& contacts,
-             Relaxation omega, unsigned worker);
+             Relaxation omega);
   double sum_of_squares(const SweepPlan& plan) const;
   double sum_of_squares_within(const SweepPlan& core) const;
   void write_back(const SweepPlan& plan, world::World& world);
@@ -193,7 +193,6 @@ class BlockDescent {
   const Topology* topology_ = nullptr;  // once there was an edit
   Tissue tissue_;
   Workers workers_;
-  std::vector<Scratch> scratches_;              // per worker
   std::vector<Linearisation::Taking> takings_;  // per worker
   Vec3f gravity_;
 

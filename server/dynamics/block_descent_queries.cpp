@@ -9,8 +9,7 @@ Vec3f BlockDescent::holding_force(const contact::ContactList& contacts, NodeInde
   const Slot slot = tissue_.groups().slot_of(node);
   const Group group = slot / kLanes;
   TROCAR_ASSERT_HOT(begun_stamp_[group] == current_);
-  Scratch scratch;
-  NodeStep8 step = linearise(group, load_group(&x_[group * kLanes]), scratch);
+  NodeStep8 step = linearise(group, load_group(&x_[group * kLanes]));
   Lanes omega;
   if (group_stamp_[group] == current_) add_contacts(contacts, group, step, omega);
   Vec3Lanes gradients;
@@ -19,7 +18,7 @@ Vec3f BlockDescent::holding_force(const contact::ContactList& contacts, NodeInde
 }
 
 FarPlan BlockDescent::far_plan(float dt) {
-  const auto traces = tissue_.traces_at_rest(0);
+  const auto traces = tissue_.traces_at_rest(0, true);
   double stiffness = 0, mass = 0;
   for (std::size_t slot = 0; slot < traces.size(); ++slot) {
     const std::size_t group = slot / kLanes, lane = slot % kLanes;

@@ -12,8 +12,10 @@ void BlockDescent::take_relaxation(const world::World& world) {
 
 void BlockDescent::refresh_relaxed_forces(world::World& world) {
   if (tissue_.relaxation() == nullptr) return;
+  if (auto* const stars = tissue_.stars())
+    for (const auto lanes : tissue_.rebuilt()) stars->restart_group(lanes.group, x_.data());
   tissue_.relaxation()->refresh(world.relaxation);
-  for (const auto lanes : tissue_.touched())
+  for (const auto lanes : tissue_.rebuilt())
     tissue_.relaxed_stress()->refresh(lanes, x_.data(), world.relaxation);
 }
 

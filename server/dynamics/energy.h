@@ -6,7 +6,7 @@
 // Contract: gradients are exact derivatives of energy_j() (plus, in a step, of the damping's
 // potential); blocks are symmetric, positive semi-definite and at least close to the second
 // derivative; rows of padding contribute nothing. An energy over a node's whole star keeps
-// quantities of nodes (the averaged volume ratio) and is told of each move; nodes must then have
+// quantities of stars (their deformation gradients) and is told of each move; nodes must then have
 // colours by Coupling::Stars. A change of topology is followed lane by lane, bit for bit as if
 // built anew.
 
@@ -19,11 +19,6 @@ namespace trocar::dynamics {
 struct NodeStep8 {
   Vec8 gradient;  // N
   SymMat8 block;  // N/m
-};
-
-// What add() leaves for after_move() of the same group: of one worker.
-struct Scratch {
-  std::vector<Vec3Lanes> rows;
 };
 
 // Takes the second derivatives of a group's nodes with one other node per lane: d gradient / d
@@ -51,21 +46,13 @@ class Energy {
   virtual void begin_group(Group, const Float4* /*start*/, float /*inverse_dt*/) {}
 
   // Adds the group's gradients and blocks at displacements x (per slot). own: those of the group.
-  virtual void add(Group group, const Float4* x, const Vec8& own, NodeStep8& step,
-                   Scratch& scratch) const = 0;
+  virtual void add(Group group, const Float4* x, const Vec8& own, NodeStep8& step) const = 0;
 
   // The elastic part (no damping) at displacements x: adds gradient and block as add() would, and
   // gives the derivatives over all other nodes, always in the same order. Not for energies over
   // stars.
   virtual void linearise(Group group, const Float4* x, const Vec8& own, NodeStep8& step,
                          StiffnessSink& sink) const = 0;
-
-  // For energies over stars. restart_group(), for every group: displacements are new everywhere;
-  // after_move(): the group's nodes have moved by dx since add(), by one worker a group, groups of
-  // one colour at once.
-  virtual bool follows_moves() const { return false; }
-  virtual void restart_group(Group, const Float4* /*x*/) {}
-  virtual void after_move(Group, const Vec8& /*dx*/, const Scratch&) {}
 
   // Adds each node's share, per slot, in double from the same stored data, J; displacements per
   // slot. A node's share is a function of displacements alone, not of what shares its group.

@@ -44,11 +44,11 @@ ExplicitEuler::ExplicitEuler(const scene::Organ& organ, const world::World& worl
 std::vector<Vec3f> ExplicitEuler::gradients(std::span<const Float4> x) {
   const auto& groups = tissue_.groups();
   std::vector<Vec3f> result(masses_.size());
-  if (tissue_.follows_moves())
-    for (Group g = 0; g < groups.group_count(); ++g) tissue_.restart_group(g, x.data());
+  if (auto* const stars = tissue_.stars())
+    for (Group g = 0; g < groups.group_count(); ++g) stars->restart_group(g, x.data());
   for (Group g = 0; g < groups.group_count(); ++g) {
     NodeStep8 step{zero_vec8(), zero_sym_mat8()};
-    tissue_.add(g, x.data(), load_group(x.data() + g * kLanes), step, scratch_);
+    tissue_.add(g, x.data(), load_group(x.data() + g * kLanes), step);
     Vec3Lanes gradient;
     store(gradient, step.gradient);
     for (std::size_t lane = 0; lane < kLanes; ++lane)

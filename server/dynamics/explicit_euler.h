@@ -32,7 +32,6 @@ class ExplicitEuler {
   std::vector<float> masses_, damping_rates_;
   std::vector<std::uint8_t> is_free_;
   std::vector<Float4> x_, start_;
-  Scratch scratch_;
   double highest_frequency_ = 0, stable_dt_s_ = 0;
 };
 

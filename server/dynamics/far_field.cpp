@@ -13,7 +13,8 @@ double sum(const std::vector<float>& values) {
 
 FarField::FarField(Tissue& tissue, const world::World& world) : tissue_(tissue), linear_(tissue) {
   const auto group_count = tissue.groups().group_count(), slots = tissue.groups().slot_count();
-  const double elastic = sum(tissue.traces_at_rest(0)), damped = sum(tissue.traces_at_rest(1));
+  const double elastic = sum(tissue.traces_at_rest(0, false)),
+               damped = sum(tissue.traces_at_rest(1, false));
   if (elastic > 0) damping_time_s_ = static_cast<float>((damped - elastic) / elastic);
   inverse_square_edges_.resize(group_count);
   taken_at_.resize(group_count);
@@ -74,7 +75,7 @@ void FarField::follow_topology(const Float4* x, const world::World& world) {
   for (const auto number : {newest_, newest_ - 1}) {
     const auto pose = world.far_poses.pose(number);
     auto& copy = poses_[number % 2];
-    for (const auto lanes : tissue_.touched())
+    for (const auto lanes : tissue_.rebuilt())
       for (std::uint32_t lane = 0; lane < kLanes; ++lane) {
         const auto node = groups.nodes_of(lanes.group)[lane];
         copy[lanes.group * kLanes + lane] =
@@ -82,7 +83,7 @@ void FarField::follow_topology(const Float4* x, const world::World& world) {
       }
   }
   Linearisation::Taking taking;
-  for (const auto lanes : tissue_.touched()) {
+  for (const auto lanes : tissue_.rebuilt()) {
     linear_.index(lanes.group);
     measure_edges(lanes.group, world);
     renew(lanes.group, taking);

@@ -3,7 +3,8 @@
 // The far field of a solver, linear about poses that follow the tissue: nodes far from all tools
 // are swept every step, but from step to step they move little against their neighbours, so their
 // forces come from matrices (Linearisation) that are renewed group after group, each every
-// FarPoses::kInterval steps. Where neighbours have moved apart by more than kMaxSpread of their
+// FarPoses::kInterval steps. Energies over stars, which couple nodes that are no neighbours, are
+// asked as ever. Where neighbours have moved apart by more than kMaxSpread of their
 // distance since, add() declines and the energies have to be asked.
 //
 // Damping is proportional to stiffness, with one time for the whole organ: that with which it takes
@@ -26,7 +27,7 @@ class FarField {
   // that is taken to be linear: errors are of its square.
   static constexpr float kMaxSpread = 0.05f;
 
-  // Neither may move; the tissue does not follow moves. All groups are taken.
+  // Neither may move. All groups are taken.
   FarField(Tissue& tissue, const world::World& world);
 
   // Displacements, per slot, are new everywhere.

@@ -20,35 +20,6 @@ mesh::Tet seen_from(const mesh::Tet& tet, NodeIndex first) {
   return {d, c, b, a};
 }
 
-using Matrix = std::array<std::array<double, 3>, 3>;
-
-void add_outer(Matrix& m, const Vec3d& a, double s) {
-  const std::array<double, 3> v{a.x, a.y, a.z};
-  for (std::size_t i = 0; i < 3; ++i)
-    for (std::size_t j = 0; j < 3; ++j) m[i][j] += s * v[i] * v[j];
-}
-
-// A number t <= 1 with exact <= t full as quadratic forms, both positive semi-definite: the largest
-// eigenvalue of the pencil, by power iteration with a margin.
-double bound_of(const Matrix& exact, const Matrix& full) {
-  const double trace = full[0][0] + full[1][1] + full[2][2];
-  if (!(trace > 0)) return 1;
-  SymMat3<double> b{full[0][0] + 1e-9 * trace, full[0][1], full[0][2],
-                    full[1][1] + 1e-9 * trace, full[1][2], full[2][2] + 1e-9 * trace};
-  Vec3d v{0.6, 0.5, 0.4};
-  double largest = 0;
-  for (int i = 0; i < 60; ++i) {
-    const auto line = [&](std::size_t k) {
-      return exact[k][0] * v.x + exact[k][1] * v.y + exact[k][2] * v.z;
-    };
-    const Vec3d next = solve_positive_definite(b, Vec3d{line(0), line(1), line(2)});
-    largest = length(next);
-    if (!(largest > 0)) return 0;
-    v = next / largest;
-  }
-  return std::min(1.0, 1.05 * largest);
-}
-
 }  // namespace
 
 template <typename Law>
@@ -58,17 +29,13 @@ struct Hyperelastic<Law>::RowShape {
 };
 
 template <typename Law>
-Hyperelastic<Law>::Hyperelastic(const Topology& topology, const Groups& groups,
-                                bool has_averaged_volume, HyperelasticParameters parameters,
-                                const Law& law)
-    : law_(law), has_averaged_volume_(has_averaged_volume), parameters_(std::move(parameters)) {
+Hyperelastic<Law>::Hyperelastic(const Topology& topology, const Groups& groups, const Stars* stars,
+                                HyperelasticParameters parameters, const Law& law)
+    : law_(law), stars_(stars), parameters_(std::move(parameters)) {
   const auto bound = [&](NodeIndex node) { return topology.tets_of(node).size(); };
   rows_.reserve(groups, bound);
   if constexpr (!Law::kIsLinear) invariant_rows_.reserve(groups, bound);
   extend(groups);
-  if (has_averaged_volume_)
-    for (Slot slot = 0; slot < groups.slot_count(); ++slot)
-      set_star(topology, groups.node_at(slot), slot);
   for (Group g = 0; g < groups.group_count(); ++g) fill(topology, groups, {g, 0xff});
   rows_.end_building();
   invariant_rows_.end_building();
@@ -83,22 +50,12 @@ void Hyperelastic<Law>::extend(const Groups& groups) {
   } else {
     invariant_rows_.extend(groups);
   }
-  if (!has_averaged_volume_) return;
-  for (auto* quantity : {&star_stiffness_, &star_pressure_}) quantity->resize(groups.slot_count());
-  for (auto* quantity : {&star_offset_, &star_weight_}) quantity->resize(groups.slot_count());
 }
 
 template <typename Law>
 std::size_t Hyperelastic<Law>::rebuild(const Topology& topology, const Groups& groups,
                                        std::span<const GroupLanes> lanes) {
   extend(groups);
-  // Bounds of a node need the stars of its neighbours.
-  if (has_averaged_volume_)
-    for (const auto group_lanes : lanes)
-      for (std::size_t lane = 0; lane < kLanes; ++lane) {
-        const auto slot = static_cast<Slot>(group_lanes.group * kLanes + lane);
-        if (group_lanes.has(lane)) set_star(topology, groups.node_at(slot), slot);
-      }
   std::size_t written = 0;
   for (const auto group_lanes : lanes) written += fill(topology, groups, group_lanes);
   rows_.tidy();
@@ -115,49 +72,10 @@ void Hyperelastic<Law>::find_tets(const Topology& topology, NodeIndex node,
     if (!parameters_[material]) continue;
     const auto [c10, bulk] = *parameters_[material];
     const auto tet = seen_from(topology.tet(t), node);
-    out.push_back({tet, c10, bulk, stress_free_shape(topology, t, tet)});
+    const auto left = stars_ == nullptr ? Stars::Left{} : stars_->left_to(topology, t);
+    out.push_back(
+        {tet, c10 * left.bracket, bulk * left.volumetric, stress_free_shape(topology, t, tet)});
   }
-}
-
-// Of the star of a node, at its slot: zero where there is none.
-template <typename Law>
-void Hyperelastic<Law>::set_star(const Topology& topology, NodeIndex node, Slot slot) {
-  double volume = 0, bulk = 0, change = 0;
-  if (node.is_valid())
-    for (const auto t : topology.tets_of(node)) {
-      const auto material = topology.material_of(t);
-      if (!parameters_[material]) continue;
-      const double v = stress_free_shape(topology, t, topology.tet(t)).volume;
-      volume += v;
-      bulk += v * parameters_[material]->bulk_modulus_pa;
-      change += tet_shape(topology.rest(), topology.tet(t)).volume - v;
-    }
-  if (volume > 0) bulk /= volume;
-  star_weight_[slot] = volume > 0 ? bulk / (4 * volume) : 0;
-  star_stiffness_[slot] = volume > 0 ? static_cast<float>(bulk / volume) : 0;
-  star_offset_[slot] = change;
-  star_pressure_[slot] = star_stiffness_[slot] * static_cast<float>(change);
-}
-
-// Theta of a node: how much smaller the block of the averaged volume is than the plain one.
-template <typename Law>
-double Hyperelastic<Law>::averaging_bound(const Groups& groups, std::span<const At> tets) const {
-  if (tets.empty()) return 1;
-  star_motion_.clear();  // change of each star's volume per motion of the node
-  Matrix full{}, exact{};
-  for (const At& at : tets) {
-    const Vec3d area = at.shape.gradients[0] * at.shape.volume;  // dV/dx_a
-    add_outer(full, area, at.bulk / at.shape.volume);
-    for (const auto node : at.tet) {
-      auto found = std::ranges::find(star_motion_, node, &std::pair<NodeIndex, Vec3d>::first);
-      if (found == star_motion_.end())
-        found = star_motion_.insert(star_motion_.end(), {node, Vec3d{}});
-      found->second += area;
-    }
-  }
-  for (const auto& [node, area] : star_motion_)
-    add_outer(exact, area, star_weight_[groups.slot_of(node)]);
-  return bound_of(exact, full);
 }
 
 template <typename Law>
@@ -184,7 +102,6 @@ template <typename Law>
 void Hyperelastic<Law>::fill_lane(const Topology& topology, const Groups& groups,
                                   std::span<const At> tets, Group group, std::size_t lane) {
   const auto rest = topology.rest();
-  const double theta = has_averaged_volume_ ? averaging_bound(groups, tets) : 1.0;
   const auto rows = rows_[group];
   Vec3d constant_gradient;
   double constant_block = 0;
@@ -208,8 +125,8 @@ void Hyperelastic<Law>::fill_lane(const Topology& topology, const Groups& groups
     row.ab.set(lane, to_float(rest[tet[1].value] - rest[tet[0].value]));
     row.bc.set(lane, to_float(rest[tet[2].value] - rest[tet[1].value]));
     row.bd.set(lane, to_float(rest[tet[3].value] - rest[tet[1].value]));
-    row.volumetric.v[lane] = static_cast<float>(theta * bulk / (36 * shape.volume));
-    row.pressure.v[lane] = static_cast<float>(c10 / 3 + (has_averaged_volume_ ? 0.0 : bulk / 6));
+    row.volumetric.v[lane] = static_cast<float>(bulk / (36 * shape.volume));
+    row.pressure.v[lane] = static_cast<float>(c10 / 3 + bulk / 6);
     if constexpr (!Law::kIsLinear) {
       InvariantRow& extra = invariant_rows_[group][i];
       extra.wbc.v[lane] = static_cast<float>(scale * dot(g[1], g[2]));
@@ -240,22 +157,14 @@ typename Hyperelastic<Law>::RowShape Hyperelastic<Law>::shape(const Row& row, co
 }
 
 template <typename Law>
-template <bool kAveraged>
-void Hyperelastic<Law>::add_rows(Group group, const Float4* x, const Vec8& own, NodeStep8& step,
-                                 Scratch& scratch) const {
+void Hyperelastic<Law>::add(Group group, const Float4* x, const Vec8& own, NodeStep8& step) const {
   const auto rows = rows_[group];
   [[maybe_unused]] std::span<const InvariantRow> invariant_rows;
   if constexpr (!Law::kIsLinear) invariant_rows = invariant_rows_[group];
-  if constexpr (kAveraged)
-    if (scratch.rows.size() < rows.size()) scratch.rows.resize(rows.size());
   // Sums live in registers: in `step` they would be stored and loaded again row after row.
   Vec8 gradient = step.gradient;
   SymMat8 block = step.block;
   [[maybe_unused]] Float8 identity = all(0);
-  [[maybe_unused]] Float8 own_pressure = all(0);
-  if constexpr (kAveraged) {
-    own_pressure = _mm256_loadu_ps(&star_pressure_[group * kLanes]);
-  }
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const Row& row = rows[i];
     const RowShape s = shape(row, x, own);
@@ -282,18 +191,8 @@ void Hyperelastic<Law>::add_rows(Group group, const Float4* x, const Vec8& own, 
     }
     const Float8 volumetric = load(row.volumetric);
     block.add_outer(s.area, volumetric);
-    Float8 pressure;  // a sixth of K (J - 1) - 2 C10
-    if constexpr (kAveraged) {
-      store(scratch.rows[i], s.area);
-      const auto nodal = [&](const SlotLanes& slots) {
-        return gather(star_pressure_.data(), slots);
-      };
-      const Float8 mean = (own_pressure + nodal(row.b)) + (nodal(row.c) + nodal(row.d));
-      pressure = fma8(mean, all(1.0f / 24), all(0) - load(row.pressure));
-    } else {
-      // V = area . (a - b) / 6
-      pressure = fnma8(volumetric, dot8(s.area, s.rb), all(0) - load(row.pressure));
-    }
+    // A sixth of K (J - 1) - 2 C10; V = area . (a - b) / 6
+    const Float8 pressure = fnma8(volumetric, dot8(s.area, s.rb), all(0) - load(row.pressure));
     gradient = fma8(s.area, pressure, gradient);
   }
   if constexpr (Law::kIsLinear) {
@@ -305,20 +204,9 @@ void Hyperelastic<Law>::add_rows(Group group, const Float4* x, const Vec8& own, 
 }
 
 template <typename Law>
-void Hyperelastic<Law>::add(Group group, const Float4* x, const Vec8& own, NodeStep8& step,
-                            Scratch& scratch) const {
-  if (has_averaged_volume_)
-    add_rows<true>(group, x, own, step, scratch);
-  else
-    add_rows<false>(group, x, own, step, scratch);
-}
-
-template <typename Law>
 void Hyperelastic<Law>::linearise(Group group, const Float4* x, const Vec8& own, NodeStep8& step,
                                   StiffnessSink& sink) const {
-  TROCAR_ASSERT(!has_averaged_volume_);
-  Scratch none;
-  add_rows<false>(group, x, own, step, none);
+  add(group, x, own, step);
   const auto rows = rows_[group];
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const Row& row = rows[i];
@@ -357,64 +245,14 @@ void Hyperelastic<Law>::linearise(Group group, const Float4* x, const Vec8& own,
 }
 
 template <typename Law>
-void Hyperelastic<Law>::restart_group(Group group, const Float4* x) {
-  // A star's volume is the sum over its tets of (area of the face opposite a) . (a - b) / 6.
-  const Vec8 own = load_group(x + group * kLanes);
-  Float8 six_changes = all(0);
-  for (const Row& row : rows_[group]) {
-    const RowShape s = shape(row, x, own);
-    const Vec8 rest_area = cross8(load(row.bd), load(row.bc));
-    six_changes = six_changes - (dot8(s.area, s.rb) - dot8(rest_area, load(row.ab)));
-  }
-  Lanes changes;
-  store(changes, six_changes * all(1.0f / 6));
-  for (std::size_t lane = 0; lane < kLanes; ++lane) {
-    const std::size_t slot = group * kLanes + lane;
-    star_pressure_[slot] =
-        star_stiffness_[slot] * (changes.v[lane] + static_cast<float>(star_offset_[slot]));
-  }
-}
-
-template <typename Law>
-void Hyperelastic<Law>::after_move(Group group, const Vec8& dx, const Scratch& scratch) {
-  const auto rows = rows_[group];
-  Float8 sum = all(0);
-  const auto push = [&](Slot slot, float change) {
-    star_pressure_[slot] += change * star_stiffness_[slot];
-  };
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    const Float8 change = dot8(load(scratch.rows[i]), dx) * all(1.0f / 6);
-    sum = sum + change;
-    Lanes changes;
-    store(changes, change);
-    const Row& row = rows[i];
-    for (std::size_t lane = 0; lane < kLanes; ++lane) {
-      if (row.b.v[lane] == group * kLanes + lane) continue;  // padding
-      push(row.b.v[lane], changes.v[lane]);
-      push(row.c.v[lane], changes.v[lane]);
-      push(row.d.v[lane], changes.v[lane]);
-    }
-  }
-  Lanes own;
-  store(own, sum);
-  for (std::size_t lane = 0; lane < kLanes; ++lane)
-    push(static_cast<Slot>(group * kLanes + lane), own.v[lane]);
-}
-
-template <typename Law>
 double Hyperelastic<Law>::row_energy(const Row& row, const InvariantRow* extra, std::size_t lane,
-                                     Slot own, std::span<const Vec3d> u,
-                                     double& star_change) const {
+                                     Slot own, std::span<const Vec3d> u) const {
   const auto at = [&](const Lanes& l) { return static_cast<double>(l.v[lane]); };
   const Vec3d ub = u[row.b.v[lane]], uc = u[row.c.v[lane]], ud = u[row.d.v[lane]];
   const Vec3d ab0 = to_double(row.ab.at(lane)), bc0 = to_double(row.bc.at(lane)),
               bd0 = to_double(row.bd.at(lane));
   const Vec3d ab = ab0 + (ub - u[own]), bc = bc0 + (uc - ub), bd = bd0 + (ud - ub);
   const double six_volumes = -dot(cross(bd, bc), ab);
-  if (has_averaged_volume_) {
-    const double change = (six_volumes + dot(cross(bd0, bc0), ab0)) / 6;
-    star_change += change;
-  }
   // Every tet is stored at four nodes; the edges at this one are stored at two.
   double energy = 0;
   const Vec3d ac = ab + bc, ad = ab + bd;
@@ -434,7 +272,7 @@ double Hyperelastic<Law>::row_energy(const Row& row, const InvariantRow* extra, 
   // -2 C10 V (J - 1) and K/2 V (J - 1)^2 without constants: with p = pressure, v = volumetric,
   // 6 V_now = s: d/ds of the sum is (v s - p) / 6.
   energy -= 0.25 * at(row.pressure) * six_volumes;
-  if (!has_averaged_volume_) energy += 0.25 * 0.5 * at(row.volumetric) * six_volumes * six_volumes;
+  energy += 0.25 * 0.5 * at(row.volumetric) * six_volumes * six_volumes;
   return energy;
 }
 
@@ -444,16 +282,14 @@ void Hyperelastic<Law>::add_energies_j(std::span<const Vec3d> displacements,
   for (Group g = 0; g < rows_.group_count(); ++g)
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
       const auto own = static_cast<Slot>(g * kLanes + lane);
-      double energy = 0, change = has_averaged_volume_ ? star_offset_[own] : 0;
+      double energy = 0;
       for (std::size_t i = 0; i < rows_[g].size(); ++i) {
         const Row& row = rows_[g][i];
         if (row.b.v[lane] == own) break;  // padding
         const InvariantRow* extra = nullptr;
         if constexpr (!Law::kIsLinear) extra = &invariant_rows_[g][i];
-        energy += row_energy(row, extra, lane, own, displacements, change);
+        energy += row_energy(row, extra, lane, own, displacements);
       }
-      if (has_averaged_volume_)
-        energy += 0.125 * static_cast<double>(star_stiffness_[own]) * change * change;
       energies[own] += energy;
     }
 }

@@ -155,6 +155,16 @@ inline Vec8 gather(const Float4* values, const SlotLanes& slots) {
   };
   return transpose4(pair(0), pair(1), pair(2), pair(3));
 }
+// The same with what lies beside the vectors.
+inline Vec8 gather(const Float4* values, const SlotLanes& slots, Float8& w) {
+  const auto pair = [&](std::size_t lane) {
+    return _mm256_insertf128_ps(_mm256_castps128_ps256(_mm_load_ps(&values[slots.v[lane]].x)),
+                                _mm_load_ps(&values[slots.v[lane + 4]].x), 1);
+  };
+  const Float8 v0 = pair(0), v1 = pair(1), v2 = pair(2), v3 = pair(3);
+  w = _mm256_shuffle_ps(_mm256_unpackhi_ps(v0, v1), _mm256_unpackhi_ps(v2, v3), 0xee);
+  return transpose4(v0, v1, v2, v3);
+}
 // Vectors at the eight slots of one group.
 inline Vec8 load_group(const Float4* first) {
   const auto pair = [&](std::size_t lane) {

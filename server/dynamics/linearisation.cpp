@@ -86,7 +86,6 @@ Linearisation::~Linearisation() = default;
 
 Linearisation::Linearisation(const Tissue& tissue)
     : tissue_(tissue), indexing_(std::make_unique<Indexing>()) {
-  TROCAR_ASSERT(!tissue.follows_moves());
   for (Group g = 0; g < tissue.groups().group_count(); ++g) index(g);
   rows_.end_building();
   targets_.end_building();

@@ -16,20 +16,18 @@
 // where the rest is solved roughly, once in kNearTime_s; elsewhere once in kFarTime_s. In 4 ms
 // liver relaxes by 0.35 % of its stress at most. A step costs O(tets whose turn it is).
 //
-// Between steps the state is world::RelaxationState.
+// Stars, where strain is averaged, relax as tets do (star_relaxation.h). Between steps the state is
+// world::RelaxationState.
 
 #include <memory>
 #include <vector>
 
 #include "common/base/workers.h"
-#include "server/dynamics/groups.h"
 #include "server/dynamics/relaxation_figures.h"
-#include "server/dynamics/topology.h"
+#include "server/dynamics/star_relaxation.h"
 #include "server/world/world.h"
 
 namespace trocar::dynamics {
-
-bool relaxes(const scene::Material& material);
 
 class Relaxation {
  public:
@@ -38,10 +36,11 @@ class Relaxation {
 
   static bool is_needed(const scene::Organ& organ);
 
-  // The topology's organ must outlive it.
-  Relaxation(const Topology& topology, const Groups& groups);
+  // The topology's organ and the stars must outlive it. Stars: null if nothing is averaged; they
+  // are to be where the tissue is in settle() and end_step().
+  Relaxation(const Topology& topology, const Groups& groups, const Stars* stars);
 
-  // Tets at nodes in these lanes anew.
+  // Tets and stars at nodes in these lanes anew; with stars, lanes as for Stars::rebuild().
   void follow(const Topology& topology, const Groups& groups, std::span<const GroupLanes> lanes);
 
   // The state is new everywhere.
@@ -70,6 +69,8 @@ class Relaxation {
   const float* loads() const { return loads_.data(); }
   static std::uint32_t load_index(TetIndex tet, std::size_t corner, std::size_t other);
   static constexpr std::uint32_t kNoLoad = 0;
+  // Of stars; null if none relaxes.
+  const StarRelaxation* stars() const { return star_relaxation_.get(); }
 
  private:
   static constexpr std::size_t kBlockLoads = kEdges * kLanes;
@@ -79,65 +80,43 @@ class Relaxation {
     std::array<Vec3Lanes, 3> gradients;  // of b, c and d, 1/m
     std::array<Vec3Lanes, 3> rest;       // columns of the stretch of the rest pose
     Lanes volume;                        // m^3, 0: no tet that relaxes
-    std::array<std::uint16_t, kLanes> materials{};
-    bool is_uniform = true;
-  };
-  struct Term {
-    Lanes decay, of_before, of_now;  // e, g (1 - e - b), g b; over the steps since the last
-    Lanes next_decay, ahead;         // e, g (1 - e); over one step
-  };
-  struct Constants {
-    Lanes two_c10, bulk;          // Pa
-    std::array<Lanes, 4> slopes;  // 2 C20 / C10, 3 C30 / C10, ...
-    Lanes exponent;               // of an exponential law, else 0
-    bool is_exponential = false;  // in some lane
-    std::vector<Term> terms;
+    Lanes bracket, volumetric;           // shares of it that are not of stars
+    LaneMaterials materials;
   };
 
   void set_lane(const Topology& topology, const Groups& groups, TetIndex tet);
   void set_dt(float dt);
-  Constants constants_of(const scene::Material& material, std::size_t steps) const;
-  const Constants& constants_of(const Block& block, const world::RelaxationState::Steps& age,
-                                Constants& scratch) const;
-  struct Response {
-    SymMat8 stress;                       // Pa
-    Float8 energy_density, volume_ratio;  // Pa, 1
-  };
-  // What a block adds to figures().
-  struct BlockFigures {
-    float energy_j = 0, volume_m3 = 0, growth_m3 = 0;
-    float stress_squared = 0, relaxed = 0;  // volume times stress by stress, by what has relaxed
-  };
-  static Response response_of(const Block& block, const Constants& c, const Float4* x);
-  void set_figures(std::size_t index, const Response& response, const SymMat8& relaxed_stress);
+  static RelaxationTerms::Response response_of(const Block& block,
+                                               const RelaxationTerms::Constants& c,
+                                               const Float4* x);
+  void set_shares(std::size_t index, const RelaxationTerms::Response& response,
+                  const SymMat8& relaxed_stress);
   void set_loads(const Block& block, std::size_t index, const SymMat8& relaxed_stress);
-  void begin_block(std::size_t index, const world::RelaxationState& state, Constants& scratch);
+  void begin_block(std::size_t index, const world::StressHistory& history,
+                   RelaxationTerms::Constants& scratch);
   // The hash's difference.
-  std::uint64_t end_block(std::size_t index, const Float4* x, world::RelaxationState& state,
-                          Constants& scratch);
+  std::uint64_t end_block(std::size_t index, const Float4* x, world::StressHistory& history,
+                          RelaxationTerms::Constants& scratch);
   void list_blocks_of(const Topology& topology, const Groups& groups, Slot slot);
   void list_due(std::span<const GroupLanes> near, std::uint32_t near_turns, std::uint8_t step);
 
   const scene::Organ& organ_;
-  const std::size_t terms_;
+  const Stars* const stars_;
+  RelaxationTerms terms_;
+  std::unique_ptr<StarRelaxation> star_relaxation_;
   std::vector<Block> blocks_;
-  std::vector<BlockFigures> figures_;
-  // Longest time that a tet can wait, in steps: its turn, and once more where a part of a tet that
-  // was cut came to be among others.
-  static constexpr std::size_t kMostSteps = 16;
+  std::vector<RelaxationShares> shares_;
   static constexpr std::uint32_t kRun = 4;  // blocks, or groups, whose turn comes together
-  std::vector<Constants> constants_;        // [steps - 1][material as scene::material_at() counts]
-  float dt_ = 0;
   std::uint32_t near_turns_ = 1, far_turns_ = 1;
   std::vector<std::vector<std::uint32_t>> blocks_of_;  // per slot: of tets at its node
-  std::vector<std::uint32_t> due_, due_stamp_;         // blocks; per block
+  std::vector<std::uint32_t> due_, due_stamp_;         // blocks of tets, then of stars; per block
   std::uint32_t current_ = 0;
   std::vector<float> loads_;  // [block][edge][tet], after one block of zeros
   bool is_stale_ = true;
-  std::vector<std::uint32_t> stale_;  // blocks, unless is_stale_
-  std::vector<TetIndex> tets_;        // while it follows
-  std::vector<Constants> scratch_;    // per worker
-  std::vector<std::uint64_t> differences_;
+  std::vector<std::uint32_t> stale_;                       // blocks, unless is_stale_
+  std::vector<TetIndex> tets_;                             // while it follows
+  std::vector<RelaxationTerms::Constants> scratch_;        // per worker
+  std::vector<std::array<std::uint64_t, 2>> differences_;  // of tets and stars
 };
 
 }  // namespace trocar::dynamics

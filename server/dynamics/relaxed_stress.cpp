@@ -15,8 +15,8 @@ Float8 loads_at(const float* loads, const SlotLanes& places) {
 }  // namespace
 
 RelaxedStress::RelaxedStress(const Topology& topology, const Groups& groups,
-                             const Relaxation& relaxation)
-    : groups_(groups), relaxation_(relaxation), forces_(groups.group_count()) {
+                             const Relaxation& relaxation, const Stars* stars)
+    : groups_(groups), relaxation_(relaxation), stars_(stars), forces_(groups.group_count()) {
   rows_.reserve(groups, [&](NodeIndex node) { return topology.tets_of(node).size(); });
   for (Group g = 0; g < groups.group_count(); ++g) fill(topology, groups, {g, 0xff});
   rows_.end_building();
@@ -57,6 +57,19 @@ void RelaxedStress::fill(const Topology& topology, const Groups& groups, GroupLa
     }
 }
 
+Vec8 RelaxedStress::forces_of_stars(Group group) const {
+  Vec8 sum = zero_vec8();
+  const Float4* const q = relaxation_.stars()->relaxed();
+  for (const auto& row : stars_->rows(group)) {
+    const Vec8 b = load(row.part);
+    const Vec8 qb{dot8(gather(q, row.star), b), dot8(gather(q + 1, row.star), b),
+                  dot8(gather(q + 2, row.star), b)};
+    const auto f = stars_->gradient_at(row.star);
+    sum = sum + Vec8{dot8(f.rows[0], qb), dot8(f.rows[1], qb), dot8(f.rows[2], qb)};
+  }
+  return sum;
+}
+
 // Along an edge a stress pulls its ends together; what has relaxed of it lets them go.
 Vec8 RelaxedStress::forces_at(Group group, const Float4* x) const {
   const float* const loads = relaxation_.loads();
@@ -93,10 +106,12 @@ void RelaxedStress::refresh(GroupLanes lanes, const Float4* x, world::Relaxation
   const bool are_few = __builtin_popcount(lanes.lanes) <= kFewLanes;
   Vec3Lanes all;
   if (!are_few) store(all, forces_at(group, x));
+  Vec3Lanes of_stars;
+  if (relaxation_.stars() != nullptr) store(of_stars, forces_of_stars(group));
   const auto nodes = groups_.nodes_of(group);
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     if (!lanes.has(lane)) continue;
-    const Vec3f force = are_few ? force_at(group, lane, x) : all.at(lane);
+    const Vec3f force = (are_few ? force_at(group, lane, x) : all.at(lane)) + of_stars.at(lane);
     forces_[group].set(lane, force);
     if (nodes[lane].is_valid()) state.set_force(nodes[lane], force);
   }
@@ -113,16 +128,20 @@ void start_relaxed(const scene::Organ& organ, world::World& world) {
   if (!Relaxation::is_needed(organ)) return;
   const Topology topology(organ);
   const Groups groups(topology, Coupling::Elements);
+  std::optional<Stars> stars;
+  if (Stars::are_needed(organ)) stars.emplace(topology, groups);
   std::vector<Float4> x(groups.slot_count());
   for (Slot slot = 0; slot < x.size(); ++slot)
     if (const auto node = groups.node_at(slot); node.is_valid())
       x[slot] = to_float4(world.displacements[node.value]);
-  Relaxation relaxation(topology, groups);
+  const Stars* const averaged = stars ? &*stars : nullptr;
+  for (Group g = 0; stars && g < groups.group_count(); ++g) stars->restart_group(g, x.data());
+  Relaxation relaxation(topology, groups, averaged);
   relaxation.settle(x.data(), world.relaxation);
   // Of tissue that stays as it is the loads do not depend on the step.
   Workers alone(1);
   relaxation.begin_step(1, world.relaxation, alone);
-  RelaxedStress stress(topology, groups, relaxation);
+  RelaxedStress stress(topology, groups, relaxation, averaged);
   for (Group g = 0; g < groups.group_count(); ++g)
     stress.refresh({g, 0xff}, x.data(), world.relaxation);
 }

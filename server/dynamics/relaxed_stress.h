@@ -3,7 +3,8 @@
 // What has relaxed of the stress of measured tissue (relaxation.h), as forces on nodes: each edge
 // of a tet that relaxes bears a load that is constant in a step, in N per m of the edge. Forces are
 // taken where the tissue is between two steps, and are constant in the next; those of all nodes,
-// taken at once, balance in force and torque. O(tets at the nodes) each time.
+// taken at once, balance in force and torque. Where strain is averaged, stars have their part: F Q
+// b with F as Stars keeps it. O(tets and stars at the nodes) each time.
 
 #include "server/dynamics/lanes.h"
 #include "server/dynamics/relaxation.h"
@@ -12,8 +13,9 @@ namespace trocar::dynamics {
 
 class RelaxedStress {
  public:
-  // Groups and the relaxation must outlive it.
-  RelaxedStress(const Topology& topology, const Groups& groups, const Relaxation& relaxation);
+  // Groups, the relaxation and the stars, null if nothing is averaged, must outlive it.
+  RelaxedStress(const Topology& topology, const Groups& groups, const Relaxation& relaxation,
+                const Stars* stars);
 
   // Forces on these nodes anew, in the state too; x: displacements per slot. Different groups at
   // once: allowed.
@@ -41,11 +43,13 @@ class RelaxedStress {
 
   void fill(const Topology& topology, const Groups& groups, GroupLanes lanes);
 
+  Vec8 forces_of_stars(Group group) const;
   Vec8 forces_at(Group group, const Float4* x) const;
   Vec3f force_at(Group group, std::size_t lane, const Float4* x) const;
 
   const Groups& groups_;
   const Relaxation& relaxation_;
+  const Stars* const stars_;
   GroupRows<Row> rows_;
   std::vector<Vec3Lanes> forces_;
   std::array<std::vector<TetIndex>, kLanes> tets_;  // while rows are filled

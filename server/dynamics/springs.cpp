@@ -153,7 +153,7 @@ void Springs::begin_group(Group group, const Float4* start, float inverse_dt) {
   }
 }
 
-void Springs::add(Group group, const Float4* x, const Vec8& own, NodeStep8& step, Scratch&) const {
+void Springs::add(Group group, const Float4* x, const Vec8& own, NodeStep8& step) const {
   // Sums live in registers: in `step` they would be stored and loaded again row after row.
   Vec8 pull = zero_vec8();
   SymMat8 block = step.block;

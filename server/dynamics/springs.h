@@ -20,8 +20,7 @@ class Springs final : public Energy {
   static bool are_needed(const scene::Organ& organ);
 
   void begin_group(Group group, const Float4* start, float inverse_dt) override;
-  void add(Group group, const Float4* x, const Vec8& own, NodeStep8& step,
-           Scratch& scratch) const override;
+  void add(Group group, const Float4* x, const Vec8& own, NodeStep8& step) const override;
   void linearise(Group group, const Float4* x, const Vec8& own, NodeStep8& step,
                  StiffnessSink& sink) const override;
   void add_energies_j(std::span<const Vec3d> displacements,

@@ -151,8 +151,7 @@ std::size_t TensorMass::rebuild(const Topology& topology, const Groups& groups,
   return written;
 }
 
-void TensorMass::add(Group group, const Float4* x, const Vec8& own, NodeStep8& step,
-                     Scratch&) const {
+void TensorMass::add(Group group, const Float4* x, const Vec8& own, NodeStep8& step) const {
   Vec8 g = step.gradient + load(rest_gradient_[group]);
   for (const Row& row : rows_[group]) {
     const Vec8 d = gather(x, row.neighbour) - own;
@@ -171,8 +170,7 @@ void TensorMass::add(Group group, const Float4* x, const Vec8& own, NodeStep8& s
 
 void TensorMass::linearise(Group group, const Float4* x, const Vec8& own, NodeStep8& step,
                            StiffnessSink& sink) const {
-  Scratch none;
-  add(group, x, own, step, none);
+  add(group, x, own, step);
   for (const Row& row : rows_[group]) {
     const auto line = [&](std::size_t i) {
       return Vec8{load(row.k[i][0]), load(row.k[i][1]), load(row.k[i][2])};

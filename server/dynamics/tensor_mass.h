@@ -14,8 +14,7 @@ class TensorMass final : public Energy {
  public:
   TensorMass(const Topology& topology, const Groups& groups);
 
-  void add(Group group, const Float4* x, const Vec8& own, NodeStep8& step,
-           Scratch& scratch) const override;
+  void add(Group group, const Float4* x, const Vec8& own, NodeStep8& step) const override;
   void linearise(Group group, const Float4* x, const Vec8& own, NodeStep8& step,
                  StiffnessSink& sink) const override;
   void add_energies_j(std::span<const Vec3d> displacements,

@@ -16,12 +16,6 @@ bool has_law(const scene::Organ& organ, ElasticLaw law) {
   return scene::any_material(organ, [&](const scene::Material& m) { return m.elastic_law == law; });
 }
 
-bool averages_volume(const scene::Organ& organ) {
-  return scene::any_material(organ, [](const scene::Material& m) {
-    return scene::is_hyperelastic(m) && m.has_averaged_volume;
-  });
-}
-
 // Nothing where the material has another energy.
 std::optional<ReducedPolynomialLaw> law_of(const scene::Material& material,
                                            ReducedPolynomialLaw law) {
@@ -46,22 +40,38 @@ std::optional<ExponentialLaw> law_of(const scene::Material& material, Exponentia
 Tissue::Tissue(const scene::Organ& organ) : Tissue(Topology(organ)) {}
 
 Tissue::Tissue(const Topology& topology, std::span<const Colour> colours)
-    : groups_(topology, averages_volume(topology.organ()) ? Coupling::Stars : Coupling::Elements,
-              colours),
-      follows_moves_(averages_volume(topology.organ())) {
+    : groups_(topology, Stars::are_needed(topology.organ()) ? Coupling::Stars : Coupling::Elements,
+              colours) {
   const auto& organ = topology.organ();
+  if (Stars::are_needed(organ)) stars_ = std::make_unique<Stars>(topology, groups_);
   if (Springs::are_needed(organ)) energies_.push_back(std::make_unique<Springs>(topology, groups_));
   if (has_law(organ, ElasticLaw::TensorMass))
     energies_.push_back(std::make_unique<TensorMass>(topology, groups_));
   if (has_law(organ, ElasticLaw::NeoHookean))
-    energies_.push_back(
-        std::make_unique<NeoHookean>(topology, groups_, follows_moves_,
-                                     hyperelastic_parameters(organ, [](const scene::Material& m) {
-                                       return m.elastic_law == ElasticLaw::NeoHookean;
-                                     })));
+    add_hyperelastic<NeoHookeanLaw>(topology,
+                                    hyperelastic_parameters(organ, [](const scene::Material& m) {
+                                      return m.elastic_law == ElasticLaw::NeoHookean;
+                                    }));
   add_measured<ReducedPolynomialLaw>(topology);
   add_measured<ExponentialLaw>(topology);
   add_relaxation(topology);
+}
+
+template <typename Law>
+void Tissue::add_hyperelastic(const Topology& topology, const HyperelasticParameters& parameters,
+                              const Law& law) {
+  energies_.push_back(
+      std::make_unique<Hyperelastic<Law>>(topology, groups_, stars_.get(), parameters, law));
+  const auto is_averaged = [&](std::size_t i) {
+    const auto& material = scene::material_at(topology.organ(), static_cast<std::uint16_t>(i));
+    return parameters[i] && material.has_averaged_strain;
+  };
+  for (std::size_t i = 0; i < parameters.size(); ++i)
+    if (is_averaged(i)) {
+      averaged_.push_back(
+          std::make_unique<AveragedStrain<Law>>(topology, groups_, *stars_, parameters, law));
+      return;
+    }
 }
 
 // One energy for all materials whose laws are multiples of each other.
@@ -74,17 +84,17 @@ void Tissue::add_measured(const Topology& topology) {
     if (law && std::ranges::find(laws, *law) == laws.end()) laws.push_back(*law);
   }
   for (const auto& law : laws)
-    energies_.push_back(std::make_unique<Hyperelastic<Law>>(
-        topology, groups_, follows_moves_,
+    add_hyperelastic<Law>(
+        topology,
         hyperelastic_parameters(organ,
                                 [&](const scene::Material& m) { return law_of(m, Law{}) == law; }),
-        law));
+        law);
 }
 
 void Tissue::add_relaxation(const Topology& topology) {
   if (!Relaxation::is_needed(topology.organ())) return;
-  relaxation_ = std::make_unique<Relaxation>(topology, groups_);
-  relaxed_stress_ = std::make_unique<RelaxedStress>(topology, groups_, *relaxation_);
+  relaxation_ = std::make_unique<Relaxation>(topology, groups_, stars_.get());
+  relaxed_stress_ = std::make_unique<RelaxedStress>(topology, groups_, *relaxation_, stars_.get());
 }
 
 void Tissue::touch(Slot slot) {
@@ -99,15 +109,15 @@ void Tissue::list_touched(std::vector<GroupLanes>& out) {
   for (const auto g : touched_groups_) out.push_back({g, lanes_[g]});
 }
 
-std::vector<float> Tissue::traces_at_rest(float inverse_dt) {
+std::vector<float> Tissue::traces_at_rest(float inverse_dt, bool has_averaged) {
   const std::vector<Float4> rest(groups_.slot_count());
   std::vector<float> traces;
   traces.reserve(rest.size());
-  Scratch scratch;
   for (Group g = 0; g < groups_.group_count(); ++g) {
     NodeStep8 step{zero_vec8(), zero_sym_mat8()};
     begin_group(g, rest.data(), inverse_dt);
-    add(g, rest.data(), zero_vec8(), step, scratch);
+    for (const auto& energy : energies_) energy->add(g, rest.data(), zero_vec8(), step);
+    if (has_averaged) add_averaged(g, step);
     Lanes lanes;
     store(lanes, step.block.xx + step.block.yy + step.block.zz);
     traces.insert(traces.end(), std::begin(lanes.v), std::end(lanes.v));
@@ -131,7 +141,8 @@ FollowReport Tissue::follow_topology(const Topology& topology) {
   }
   list_touched(touched_);
   wide_.clear();
-  if (follows_moves_) {
+  if (stars_) {
+    stars_->follow(topology, changed_);
     for (const auto node : changed_) topology.for_each_neighbour(node, touch_node);
     list_touched(wide_);
   }
@@ -144,27 +155,20 @@ FollowReport Tissue::follow_topology(const Topology& topology) {
     lanes_[g] = 0;
   }
   touched_groups_.clear();
+  const auto lanes = rebuilt();
+  if (stars_) report.rows += stars_->rebuild(topology, groups_, lanes);
   if (relaxation_) {
-    relaxation_->follow(topology, groups_, touched_);
-    relaxed_stress_->rebuild(topology, groups_, touched_);
+    relaxation_->follow(topology, groups_, lanes);
+    relaxed_stress_->rebuild(topology, groups_, lanes);
   }
-  for (const auto& energy : energies_)
-    report.rows += energy->rebuild(topology, groups_, energy->follows_moves() ? wide_ : touched_);
+  for (const auto& energy : energies_) report.rows += energy->rebuild(topology, groups_, lanes);
+  for (const auto& energy : averaged_) energy->rebuild(groups_, lanes);
   return report;
 }
 
 void Tissue::begin_group(Group group, const Float4* start, float inverse_dt) {
   for (const auto& energy : energies_) energy->begin_group(group, start, inverse_dt);
 }
-void Tissue::restart_group(Group group, const Float4* x) {
-  for (const auto& energy : energies_)
-    if (energy->follows_moves()) energy->restart_group(group, x);
-}
-void Tissue::after_move(Group group, const Vec8& dx, const Scratch& scratch) {
-  for (const auto& energy : energies_)
-    if (energy->follows_moves()) energy->after_move(group, dx, scratch);
-}
-
 double Tissue::energy_j(std::span<const Vec3f> displacements) const {
   std::vector<Vec3d> per_slot(groups_.slot_count());
   std::vector<double> energies(groups_.slot_count());
@@ -172,6 +176,7 @@ double Tissue::energy_j(std::span<const Vec3f> displacements) const {
     if (const Slot slot = groups_.slot_of(NodeIndex(n)); slot != kNoSlot)
       per_slot[slot] = to_double(displacements[n]);
   for (const auto& e : energies_) e->add_energies_j(per_slot, energies);
+  for (const auto& e : averaged_) e->add_energies_j(per_slot, energies);
   double energy = 0;  // in the order of nodes, whatever their slots
   for (std::uint32_t n = 0; n < displacements.size(); ++n)
     if (const Slot slot = groups_.slot_of(NodeIndex(n)); slot != kNoSlot) energy += energies[slot];

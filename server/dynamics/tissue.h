@@ -10,6 +10,7 @@
 #include <optional>
 #include <vector>
 
+#include "server/dynamics/averaged_strain.h"
 #include "server/dynamics/energy.h"
 #include "server/dynamics/relaxation.h"
 #include "server/dynamics/relaxed_stress.h"
@@ -32,30 +33,38 @@ class Tissue {
   explicit Tissue(const Topology& topology, std::span<const Colour> colours = {});
 
   const Groups& groups() const { return groups_; }
-  bool follows_moves() const { return follows_moves_; }
+  // What strain is averaged over, to be told of moves; null: nothing.
+  Stars* stars() { return stars_.get(); }
+  const Stars* stars() const { return stars_.get(); }
 
   void begin_group(Group group, const Float4* start, float inverse_dt);
-  void restart_group(Group group, const Float4* x);
-  void after_move(Group group, const Vec8& dx, const Scratch& scratch);
-  void add(Group group, const Float4* x, const Vec8& own, NodeStep8& step, Scratch& scratch) const {
-    for (const auto& energy : energies_) energy->add(group, x, own, step, scratch);
+  void add(Group group, const Float4* x, const Vec8& own, NodeStep8& step) const {
+    for (const auto& energy : energies_) energy->add(group, x, own, step);
+    add_averaged(group, step);
+  }
+  // Of these, energies over stars alone.
+  void add_averaged(Group group, NodeStep8& step) const {
+    for (const auto& energy : averaged_) energy->add(group, step);
   }
 
-  // The elastic part at displacements x, see Energy::linearise(). Not if it follows moves.
+  // The elastic part at displacements x but for energies over stars, see Energy::linearise().
   void linearise(Group group, const Float4* x, const Vec8& own, NodeStep8& step,
                  StiffnessSink& sink) const {
     for (const auto& energy : energies_) energy->linearise(group, x, own, step, sink);
   }
 
   // Per slot, of the node's block of second derivatives with everything at rest, damping for steps
-  // of this length included; N/m.
-  std::vector<float> traces_at_rest(float inverse_dt);
+  // of this length included, energies over stars if asked for; N/m.
+  std::vector<float> traces_at_rest(float inverse_dt, bool has_averaged);
 
   // Follows topology.changed(). The topology is the one this tissue was made from, or another of
   // the same organ with the same edits.
   FollowReport follow_topology(const Topology& topology);
   // Lanes whose node, or what meets at it, the last follow_topology() found changed; ascending.
   std::span<const GroupLanes> touched() const { return touched_; }
+  // Lanes that energies had to rebuild: with averaged strain also those with a neighbour of a node
+  // that changed.
+  std::span<const GroupLanes> rebuilt() const { return stars_ ? wide_ : touched_; }
 
   // What remembers stresses, and the forces of stress that has relaxed, which no energy has; null
   // where nothing relaxes.
@@ -68,16 +77,18 @@ class Tissue {
 
   // Elastic energy in double, J; displacements per place of a node.
   double energy_j(std::span<const Vec3f> displacements) const;
-  std::size_t energy_count() const { return energies_.size(); }
-  const Energy& energy(std::size_t i) const { return *energies_[i]; }
 
  private:
   Groups groups_;
+  std::unique_ptr<Stars> stars_;  // null: nothing is averaged
   std::vector<std::unique_ptr<Energy>> energies_;
+  std::vector<std::unique_ptr<StarEnergy>> averaged_;
   std::unique_ptr<Relaxation> relaxation_;
   std::unique_ptr<RelaxedStress> relaxed_stress_;
-  bool follows_moves_ = false;
 
+  template <typename Law>
+  void add_hyperelastic(const Topology& topology, const HyperelasticParameters& parameters,
+                        const Law& law = {});
   template <typename Law>
   void add_measured(const Topology& topology);
   void add_relaxation(const Topology& topology);

@@ -84,8 +84,9 @@ StepContext::StepContext(const Scene& s, const world::World& uncut, const State&
       active(state.world.node_count()),
       solver(s.organ, uncut, s.workers),
       far_plan(solver.far_plan(kTickSeconds)),
-      has_linear_far_field(is_costly(s.organ) && solver.use_linear_far_field(uncut)),
+      has_linear_far_field(is_costly(s.organ)),
       surface_displacements(state.cuts.layout().vertex_count()) {
+  if (has_linear_far_field) solver.use_linear_far_field(uncut);
   contacts.reserve();
   requests.reserve(kMaxTools);
   claim_events.reserve(4 * kMaxTools);

@@ -101,7 +101,8 @@ const world::SurfaceEdit& TissueCuts::follow(world::World& world) {
     TROCAR_ASSERT(made.node.value == world.node_count());
     world.add_node(topology_.rest()[made.node.value], made.a, made.b, made.t);
   }
-  for (const auto& [part, parent] : topology_.parts()) world.relaxation.inherit(part, parent);
+  for (const auto& [part, parent] : topology_.parts())
+    world.relaxation.tets().inherit(part.value, parent.value);
   for (const auto node : topology_.changed()) {
     world.masses[node.value] = static_cast<float>(topology_.lumped_mass(node));
     auto& node_class = world.node_classes[node.value];

@@ -40,7 +40,7 @@ void World::add_node(const Vec3d& rest_position, NodeIndex a, NodeIndex b, std::
   node_classes.push_back(is_fixed ? NodeClass::Fixed : NodeClass::Active);
   quiet_ticks.push_back(0);
   far_poses.add_node(a, b, t);
-  relaxation.add_node();
+  relaxation.add_node(a);
 }
 
 void World::visit_state(StateArchive& archive) {

@@ -41,6 +41,7 @@ struct Options {
   unsigned workers = 1;
   std::uint32_t far_interval = 1;
   bool is_frozen = false, is_fixed = false, is_exact = false, has_no_errors = false;
+  bool is_averaged = false;
   std::uint32_t nodes = 1200, depth = 0;
   Tick reference_ticks = 64;
 };
@@ -365,6 +366,7 @@ Status run(const Options& options) {
   if (!organ) return organ.error();
   if (options.law == "springs") organ->material.elastic_law = scene::ElasticLaw::Springs;
   if (options.law == "neo-hookean") organ->material.elastic_law = scene::ElasticLaw::NeoHookean;
+  if (options.is_averaged) organ->material.has_averaged_strain = true;
   Session session(*organ, options);
   session.run();
   session.print();
@@ -385,6 +387,7 @@ int main(int argc, char** argv) {
   app.add_option("--organ", options.organ, "as trocar-server's [a liver of 88,000 tets]");
   app.add_option("--law", options.law, "instead of the organ's own")
       ->check(CLI::IsMember({"springs", "neo-hookean"}));
+  app.add_flag("--averaged", options.is_averaged, "strain averaged over nodes, against locking");
   app.add_option("--hands", options.hands)->check(CLI::Range(1, 16))->capture_default_str();
   app.add_option("--seconds", options.seconds, "simulated")->capture_default_str();
   app.add_option("--workers", options.workers)

@@ -20,7 +20,7 @@ const char* name_of(Law law) {
     case Law::NeoHookean:
       return "neo-Hookean tets";
     case Law::NeoHookeanAveraged:
-      return "neo-Hookean tets, averaged volume";
+      return "neo-Hookean tets, averaged strain";
   }
   return "?";
 }
@@ -30,7 +30,7 @@ scene::Organ with_law(scene::Organ organ, Law law) {
   material.elastic_law = law == Law::Springs      ? scene::ElasticLaw::Springs
                          : law == Law::LinearTets ? scene::ElasticLaw::TensorMass
                                                   : scene::ElasticLaw::NeoHookean;
-  material.has_averaged_volume = law == Law::NeoHookeanAveraged;
+  material.has_averaged_strain = law == Law::NeoHookeanAveraged;
   return organ;
 }
 

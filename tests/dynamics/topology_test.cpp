@@ -41,14 +41,14 @@ scene::Organ block(int n) {
   return organ;
 }
 
-scene::Organ block_of(ElasticLaw law, bool has_averaged_volume = false, int n = 4) {
+scene::Organ block_of(ElasticLaw law, bool has_averaged_strain = false, int n = 4) {
   auto organ = block(n);
   organ.material.elastic_law = law;
-  organ.material.has_averaged_volume = has_averaged_volume;
+  organ.material.has_averaged_strain = has_averaged_strain;
   return organ;
 }
 
-scene::Organ block_of_many_materials(bool has_averaged_volume) {
+scene::Organ block_of_many_materials(bool has_averaged_strain) {
   auto organ = block_of(ElasticLaw::TensorMass);
   const auto half = [&](auto&& is_in) {
     std::vector<NodeIndex> nodes;
@@ -64,7 +64,7 @@ scene::Organ block_of_many_materials(bool has_averaged_volume) {
   springs.tension = 0.03;
   stiff.elastic_law = ElasticLaw::NeoHookean;
   stiff.young_modulus_pa *= 10;
-  stiff.has_averaged_volume = has_averaged_volume;
+  stiff.has_averaged_strain = has_averaged_strain;
   stiff.fibre_direction = {0, 1, 2};
   stiff.fibre_tension = 0.04;
   organ.regions = {{"right", springs, half([](const Vec3d& p) { return p.x > -0.005; })},
@@ -74,10 +74,10 @@ scene::Organ block_of_many_materials(bool has_averaged_volume) {
   return organ;
 }
 
-scene::Organ small_liver(bool has_averaged_volume) {
+scene::Organ small_liver(bool has_averaged_strain) {
   auto organ = scene::make_liver(1500);
   organ->material.elastic_law = ElasticLaw::NeoHookean;
-  organ->material.has_averaged_volume = has_averaged_volume;
+  organ->material.has_averaged_strain = has_averaged_strain;
   return *organ;
 }
 
@@ -150,18 +150,18 @@ Evaluated evaluate(Tissue& tissue, const std::vector<Vec3f>& u) {
   groups.order_by_colour(order, begins);
   const std::vector<Float4> start(x.size());
   for (const auto g : order) tissue.begin_group(g, start.data(), 1000);
-  for (Group g = 0; g < groups.group_count(); ++g) tissue.restart_group(g, x.data());
+  for (Group g = 0; g < groups.group_count(); ++g)
+    if (auto* const stars = tissue.stars()) stars->restart_group(g, x.data());
   Evaluated result;
   result.nodes.resize(u.size());
   result.swept.resize(u.size());
   result.energy = tissue.energy_j(u);
-  Scratch scratch;
   for (int sweep = 0; sweep < 3; ++sweep)
     for (const auto g : order) {
       NodeStep8 step{zero_vec8(), zero_sym_mat8()};
       if (sweep > 0) step.block.add_identity(all(5.0f));
       const Vec8 own = load_group(&x[g * kLanes]);
-      tissue.add(g, x.data(), own, step, scratch);
+      tissue.add(g, x.data(), own, step);
       if (sweep == 0) {  // nothing moves yet
         Vec3Lanes gradient;
         SymMat3Lanes block;
@@ -174,7 +174,7 @@ Evaluated evaluate(Tissue& tissue, const std::vector<Vec3f>& u) {
       }
       const Vec8 dx = solve_positive_definite(step.block, step.gradient) * all(-1.0f);
       store_group(&x[g * kLanes], own + dx);
-      tissue.after_move(g, dx, scratch);
+      if (auto* const stars = tissue.stars()) stars->after_move(g, dx, 0xff);
     }
   each_node([&](std::uint32_t n, Slot slot) { result.swept[n] = to_vec3(x[slot]); });
   return result;
@@ -216,7 +216,7 @@ TEST_P(FollowTopology, EveryEditGivesWhatBuildingAnewGives) {
     EditedOrgan edited(GetParam().make(), seed);
     auto& topology = edited.topology();
     Tissue tissue(edited.topology());
-    const auto coupling = tissue.follows_moves() ? Coupling::Stars : Coupling::Elements;
+    const auto coupling = tissue.stars() != nullptr ? Coupling::Stars : Coupling::Elements;
     std::size_t moved = 0;
     for (int edit = 0; edit < 40; ++edit) {
       SCOPED_TRACE("seed " + std::to_string(seed) + " edit " + std::to_string(edit));
@@ -248,7 +248,7 @@ TEST_P(FollowTopology, WorkIsInProportionToTheChange) {
         if (has_neighbours) expected.insert(neighbours.begin(), neighbours.end());
       }
     };
-    expect(topology.changed(), tissue.follows_moves());
+    expect(topology.changed(), tissue.stars() != nullptr);
     expect(tissue.groups().moved(), true);
     EXPECT_EQ(report.nodes_changed, topology.changed().size());
     EXPECT_LE(report.lanes, expected.size() + tissue.groups().vacated().size());
@@ -290,7 +290,7 @@ TEST(FollowTopology, LawsThatNeedTheInvariantFollowToo) {
   Tissue tissue(topology);
   const ReducedPolynomialLaw law{{1.9f, 1.6f, 3.0f, 2.0f}};
   const auto parameters = hyperelastic_parameters(topology.organ(), scene::is_hyperelastic);
-  Hyperelastic<ReducedPolynomialLaw> energy(topology, tissue.groups(), false, parameters, law);
+  Hyperelastic<ReducedPolynomialLaw> energy(topology, tissue.groups(), nullptr, parameters, law);
   for (int edit = 0; edit < 30; ++edit) {
     edited.edit();
     tissue.follow_topology(topology);
@@ -298,17 +298,16 @@ TEST(FollowTopology, LawsThatNeedTheInvariantFollowToo) {
     topology.clear_changes();
   }
   const auto& groups = tissue.groups();
-  const Hyperelastic<ReducedPolynomialLaw> fresh(topology, groups, false, parameters, law);
+  const Hyperelastic<ReducedPolynomialLaw> fresh(topology, groups, nullptr, parameters, law);
   const auto u = some_displacements(groups.slot_count(), 1);
   std::vector<Float4> x;
   for (const auto& v : u) x.push_back(to_float4(v));
-  Scratch scratch;
   for (Group g = 0; g < groups.group_count(); ++g) {
     Vec3Lanes gradients[2];
     for (const auto* e :
          {&fresh, static_cast<const Hyperelastic<ReducedPolynomialLaw>*>(&energy)}) {
       NodeStep8 step{zero_vec8(), zero_sym_mat8()};
-      e->add(g, x.data(), load_group(&x[g * kLanes]), step, scratch);
+      e->add(g, x.data(), load_group(&x[g * kLanes]), step);
       store(gradients[e == &fresh], step.gradient);
     }
     ASSERT_EQ(std::memcmp(&gradients[0], &gradients[1], sizeof gradients[0]), 0) << "group " << g;
@@ -331,8 +330,8 @@ TEST(FollowTopology, ALargeOrganIsTouchedWhereItIsEdited) {
 }
 
 TEST(FollowTopology, FillAndMemoryStayBoundedOverThousandsOfEdits) {
-  for (const bool has_averaged_volume : {false, true}) {
-    EditedOrgan edited(block_of(ElasticLaw::NeoHookean, has_averaged_volume, 7), 11);
+  for (const bool has_averaged_strain : {false, true}) {
+    EditedOrgan edited(block_of(ElasticLaw::NeoHookean, has_averaged_strain, 7), 11);
     auto& topology = edited.topology();
     Tissue tissue(topology);
     const double fill_before = tissue.groups().fill();

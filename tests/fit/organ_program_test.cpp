@@ -81,8 +81,18 @@ TEST_F(OrganProgram, RefusesFibresAndTearsThatCannotBe) {
   refused({"make", "plate", "--tension", "0.5", "--fibres", "x", "--fibre-tension", "0.5"}, 3,
           "tension and fibre tension together is 1");
   refused({"make", "liver", "--fibres", "x", "--fibre-stiffness", "3"}, 2, "is of springs");
+  refused({"make", "plate", "--averaged-strain"}, 2, "is of neo-hookean and measured tets");
   const auto table = write("f.csv", "id,x,y,z\n0,1,0,0\n1,0,0,0\n");
   refused({"make", "plate", "--fibres", table}, 3, "f.csv:3: the direction has no length");
+}
+
+TEST_F(OrganProgram, MakesOrgansWhoseStrainIsAveraged) {
+  ASSERT_EQ(run({"make", "liver", "--tets", "2000", "--averaged-strain", "--out", at("a.organ")}),
+            0)
+      << log();
+  EXPECT_NE(log().find("strain              averaged over nodes"), std::string::npos) << log();
+  ASSERT_EQ(run({"inspect", at("a.organ"), "--json"}), 0);
+  EXPECT_NE(log().find("\"averaged_strain\": true"), std::string::npos) << log();
 }
 
 TEST_F(OrganProgram, FitFindsTheStiffnessFromWhichTheExamplesCurveWasMade) {

@@ -326,7 +326,7 @@ set = "half"
 density_kg_m3 = 2000
 elastic_law = "neo-hookean"
 poisson_ratio = 0.4
-averaged_volume = true
+averaged_strain = true
 [run]
 seconds = 1
 )",
@@ -336,7 +336,7 @@ seconds = 1
   ASSERT_EQ(organ.regions.size(), 1u);
   EXPECT_EQ(organ.regions[0].name, "half");
   EXPECT_EQ(organ.regions[0].material.elastic_law, ElasticLaw::NeoHookean);
-  EXPECT_TRUE(organ.regions[0].material.has_averaged_volume);
+  EXPECT_TRUE(organ.regions[0].material.has_averaged_strain);
   EXPECT_EQ(organ.regions[0].material.young_modulus_pa, 5000) << "what is left out is the organ's";
   EXPECT_EQ(organ.material.elastic_law, ElasticLaw::Springs);
   double mass = 0, volume_inside = 0, volume = 0;

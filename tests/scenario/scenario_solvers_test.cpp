@@ -36,7 +36,7 @@ TEST(ScenarioRun, EachLawStretchesLikeABar) {
   for (const char* law :
        {"", "elastic_law = \"tensor-mass\"\npoisson_ratio = 0.2\n",
         "elastic_law = \"neo-hookean\"\npoisson_ratio = 0.2\n",
-        "elastic_law = \"neo-hookean\"\npoisson_ratio = 0.2\naveraged_volume = true\n"}) {
+        "elastic_law = \"neo-hookean\"\npoisson_ratio = 0.2\naveraged_strain = true\n"}) {
     const auto run = make(pulled_block(law, "mode = \"static\"\n"));
     ASSERT_TRUE(run);
     EXPECT_TRUE(run->step().is_converged) << law;
@@ -214,7 +214,7 @@ TEST(ScenarioRun, AnUnstableExplicitStepIsRefusedWithTheOneToWrite) {
 }
 
 TEST(ScenarioRun, ThreadsChangeNothing) {
-  const auto text = pulled_block("elastic_law = \"neo-hookean\"\naveraged_volume = true\n", "");
+  const auto text = pulled_block("elastic_law = \"neo-hookean\"\naveraged_strain = true\n", "");
   auto resolved = scene::resolve(*scene::parse_scenario_text(text, "test.toml"));
   ASSERT_TRUE(resolved.ok());
   ScenarioRun one(*resolved, Solver::Live, 1), two(*resolved, Solver::Live, 2);

@@ -18,10 +18,10 @@ namespace {
 // Blades come down into the liver from above and slice along it at 10 cm/s, side by side.
 class Blades : public ::testing::Test {
  protected:
-  static scene::Organ liver(scene::ElasticLaw law, bool has_averaged_volume = false) {
+  static scene::Organ liver(scene::ElasticLaw law, bool has_averaged_strain = false) {
     auto organ = *scene::make_liver(6000);
     organ.material.elastic_law = law;
-    organ.material.has_averaged_volume = has_averaged_volume;
+    organ.material.has_averaged_strain = has_averaged_strain;
     if (law != scene::ElasticLaw::Measured) return organ;
     scene::use_measured(*scene::find_measured_material("human_liver_nava2008"), organ.material);
     organ.material.tension = 0.03;  // so that there are stresses to remember
@@ -103,8 +103,11 @@ TEST_F(Blades, WorkersDoNotChangeTheHash) {
 
 TEST_F(Blades, ARestoredStateGoesOnBitForBit) {
   using enum scene::ElasticLaw;
-  for (const auto& [law, is_averaged] :
-       {std::pair{Springs, false}, {NeoHookean, false}, {NeoHookean, true}, {Measured, false}}) {
+  for (const auto& [law, is_averaged] : {std::pair{Springs, false},
+                                         {NeoHookean, false},
+                                         {NeoHookean, true},
+                                         {Measured, false},
+                                         {Measured, true}}) {
     Simulation a(liver(law, is_averaged)), b(liver(law, is_averaged));
     for (int i = 0; i < 421; ++i) run_tick(a, 2);
     Bytes snapshot;

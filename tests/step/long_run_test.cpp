@@ -27,7 +27,7 @@ scene::Organ random_organ(Random& random) {
     organ.material.elastic_law = static_cast<ElasticLaw>(random.below(3));
     organ.material.young_modulus_pa = random.between(1500, 20000);
     organ.material.poisson_ratio = random.between(0.1, 0.48);
-    organ.material.has_averaged_volume = random.below(2) == 0;
+    organ.material.has_averaged_strain = random.below(2) == 0;
   }
   organ.material.node_damping_per_s = random.between(2, 40);
   organ.material.spring_damping_time_s = random.below(2) == 0 ? 0 : random.between(0, 0.003);

@@ -33,7 +33,7 @@ struct Law {
 std::vector<Law> laws() {
   const auto tets = [](const char* law, double poisson, bool is_averaged) {
     return fmt::format("elastic_law = \"{}\"\npoisson_ratio = {}\n{}", law, poisson,
-                       is_averaged ? "averaged_volume = true\n" : "");
+                       is_averaged ? "averaged_strain = true\n" : "");
   };
   return {
       {"springs", "springs", "", std::nullopt, 0.015, 0.06},
