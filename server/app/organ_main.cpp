@@ -2,12 +2,14 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <cinttypes>
 #include <cstdio>
 #include <filesystem>
 #include <numeric>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "common/base/cpu.h"
 #include "common/base/log.h"
@@ -19,6 +21,7 @@
 #include "common/scene/load_organ.h"
 #include "common/scene/material_file.h"
 #include "common/scene/organ_file.h"
+#include "common/scene/scenario.h"
 #include "server/app/organ_calibrate.h"
 #include "server/app/organ_experiments.h"
 #include "server/app/organ_identify.h"
@@ -43,6 +46,8 @@ Examples:
       one whose wounds gape, and which tears when it is pulled half as long again
   trocar-organ make stomach --fibres around:y --fibre-tension 0.08
       fibres around its height: a wound along its length gapes, one around it hardly
+  trocar-organ make deploy/scenes/tumour.toml
+      the organ of a scenario, here of several materials, into tumour.organ
   trocar-organ import spleen.msh --unit mm --fix back:0.1
       a mesh in millimetres, held at the hindmost tenth, into spleen.organ
   trocar-organ inspect spleen.organ --json
@@ -299,7 +304,22 @@ Status save(const scene::Organ& organ, const std::string& path) {
   return {};
 }
 
+// That of a scenario, with its materials, regions and held nodes.
+Result<scene::Organ> make_from_scenario(const std::string& path, const std::optional<int>& tets) {
+  if (tets)
+    return Error{ErrorCode::Usage, "make " + path +
+                                       ": --tets does not apply, the scenario says "
+                                       "what its organ is"};
+  auto parsed = scene::parse_scenario(path);
+  if (!parsed) return parsed.error();
+  auto resolved = scene::resolve(std::move(*parsed));
+  if (!resolved) return resolved.error();
+  resolved->organ.name = std::filesystem::path(path).stem().string();
+  return std::move(resolved->organ);
+}
+
 Result<scene::Organ> make_named(const std::string& name, const std::optional<int>& tets) {
+  if (std::filesystem::path(name).extension() == ".toml") return make_from_scenario(name, tets);
   if (name == "lattice") {
     if (tets)
       return Error{ErrorCode::Usage, "make lattice: --tets does not apply, a lattice has none"};
@@ -365,7 +385,8 @@ Status run_make(const Options& options) {
   auto organ = make_named(options.made_name, options.tets);
   if (!organ) return organ.error();
   if (auto changed = change_organ(options, *organ); !changed) return changed;
-  return save(*organ, options.out.empty() ? options.made_name + ".organ" : options.out);
+  const auto stem = std::filesystem::path(options.made_name).stem().string();
+  return save(*organ, options.out.empty() ? stem + ".organ" : options.out);
 }
 
 Status run_import(const Options& options) {
@@ -406,14 +427,22 @@ std::string version_text() {
 }
 
 void add_commands(CLI::App& app, Options& options) {
-  auto* make = app.add_subcommand("make", "make a built-in organ");
+  auto* make = app.add_subcommand("make", "make a built-in organ, or that of a scenario");
   make->add_option("NAME", options.made_name,
                    "liver (human_liver_nava2008), elastic-liver (neo-Hookean), stomach, lattice "
                    "(Choi's 30 x 15 x 30 nodes), plate (Nakao's 16 x 16 x "
                    "0.4 cm) or "
-                   "chest (wall and heart, the size of Nakao's)")
+                   "chest (wall and heart, the size of Nakao's); or a scenario's .toml file: its "
+                   "organ with its materials, regions and held nodes")
       ->required()
-      ->check(CLI::IsMember({"liver", "elastic-liver", "stomach", "lattice", "plate", "chest"}));
+      ->check([](const std::string& name) -> std::string {
+        static constexpr std::array<std::string_view, 6> kNames{
+            "liver", "elastic-liver", "stomach", "lattice", "plate", "chest"};
+        if (name.ends_with(".toml") || std::ranges::find(kNames, name) != kNames.end()) return {};
+        return name +
+               ": is neither liver, elastic-liver, stomach, lattice, plate or chest nor a "
+               ".toml file of a scenario";
+      });
   const auto range = [](int low, int high, int usual) {
     return std::to_string(low) + " to " + std::to_string(high) + " [" + std::to_string(usual) + "]";
   };

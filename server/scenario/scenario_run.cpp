@@ -6,6 +6,7 @@
 
 #include "common/base/assert.h"
 #include "server/contact/update_claims.h"
+#include "server/scenario/relaxed_organ.h"
 
 namespace trocar::scenario {
 namespace {
@@ -103,10 +104,12 @@ Status check_explicit(const scene::ResolvedScenario& resolved) {
 Status check_supported(const scene::ResolvedScenario& resolved) {
   const auto& scenario = resolved.scenario;
   const auto& rule = scenario.run;
-  if (dynamics::Relaxation::is_needed(resolved.organ) && rule.starts_in_equilibrium)
+  if (dynamics::Relaxation::is_needed(resolved.organ) && rule.starts_in_equilibrium &&
+      rule.mode == scene::RunMode::Static)
     return scene::scenario_error(scenario, run_key(scenario, "start"),
-                                 "tissue that relaxes begins without load: its equilibrium is what "
-                                 "--solver fem --response equilibrium finds");
+                                 "a static run answers as at once, tissue that relaxes is in "
+                                 "equilibrium after long: take a dynamic run, or --solver fem "
+                                 "--response equilibrium");
   for (const auto& load : scenario.displacements)
     if (load.axes != kAllAxes && (rule.boundary == scene::Boundary::Frozen ||
                                   rule.integrator == scene::Integrator::Explicit))
@@ -145,7 +148,19 @@ ScenarioRun::ScenarioRun(scene::ResolvedScenario resolved, Solver solver, unsign
   else if (scenario().run.self_contact && !is_static())
     self_finder_.emplace(organ());
   if (boundary_ == scene::Boundary::Graded) far_plan_ = solver_.far_plan(settings().dt);
-  if (scenario().run.starts_in_equilibrium) settling_ = relax();
+  if (!scenario().run.starts_in_equilibrium) return;
+  settling_ = dynamics::Relaxation::is_needed(organ()) ? relax_for_long(threads) : relax();
+}
+
+// Where tissue is that has nothing left to relax; then its stresses are those of having been there.
+StepReport ScenarioRun::relax_for_long(unsigned threads) {
+  auto relaxed = resolved_;
+  relaxed.organ = relaxed_organ(std::move(relaxed.organ));
+  const ScenarioRun run(std::move(relaxed), solver_kind_, threads);
+  world_.displacements = run.world().displacements;
+  dynamics::start_relaxed(organ(), world_);
+  solver_.take_state(world_);
+  return run.settling();
 }
 
 double ScenarioRun::time_s() const {

@@ -90,6 +90,7 @@ class ScenarioRun {
   StepReport step_static();
   // Sweeps until nothing is out of balance by more than the tolerance; everything is at rest then.
   StepReport relax();
+  StepReport relax_for_long(unsigned threads);
 
   const scene::ResolvedScenario resolved_;
   const Solver solver_kind_;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "server/scenario/relaxed_organ.h"
 #include "server/scenario/scenario_run.h"
 
 namespace trocar::scenario {
@@ -14,17 +15,13 @@ Result<Settled> settle(scene::Organ organ, const Vec3d& gravity_m_s2,
     return Error{ErrorCode::BadFile, name +
                                          ": nothing holds it, so it has no equilibrium: import "
                                          "the mesh with a --fix rule"};
-  if (dynamics::Relaxation::is_needed(organ))
-    return Error{
-        ErrorCode::BadFile,
-        name + ": relaxes, settling knows tissue only that does not: take another material"};
   organ.gravity_m_s2 = gravity_m_s2;
   scene::ResolvedScenario resolved;
   resolved.scenario.source = name;
   resolved.scenario.run.starts_in_equilibrium = true;
   resolved.scenario.run.tolerance_n = options.tolerance_n;
   resolved.scenario.run.max_sweeps = options.max_sweeps;
-  resolved.organ = organ;
+  resolved.organ = relaxed_organ(organ);
   if (auto s = check_supported(resolved); !s) return s.error();
   const ScenarioRun run(std::move(resolved), Solver::Full);
   Settled result;

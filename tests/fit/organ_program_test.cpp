@@ -86,6 +86,21 @@ TEST_F(OrganProgram, RefusesFibresAndTearsThatCannotBe) {
   refused({"make", "plate", "--fibres", table}, 3, "f.csv:3: the direction has no length");
 }
 
+TEST_F(OrganProgram, MakesTheOrganOfAScenario) {
+  const auto scene = std::filesystem::path(TROCAR_SOURCE_DIR) / "deploy/scenes/tumour.toml";
+  ASSERT_EQ(run({"make", scene.string(), "--averaged-strain", "--out", at("a.organ")}), 0) << log();
+  const auto organ = scene::read_organ(at("a.organ"));
+  ASSERT_TRUE(organ.ok());
+  EXPECT_EQ(organ->name, "tumour");
+  ASSERT_EQ(organ->regions.size(), 2u);
+  for (const auto& region : organ->regions) EXPECT_TRUE(region.material.has_averaged_strain);
+  EXPECT_EQ(organ->material.elastic_law, scene::ElasticLaw::Measured);
+  EXPECT_EQ(run({"make", scene.string(), "--tets", "2000", "--out", at("b.organ")}), 2);
+  expect_line("--tets does not apply");
+  EXPECT_EQ(run({"make", at("none.toml"), "--out", at("b.organ")}), 3);
+  expect_line("cannot be opened");
+}
+
 TEST_F(OrganProgram, MakesOrgansWhoseStrainIsAveraged) {
   ASSERT_EQ(run({"make", "liver", "--tets", "2000", "--averaged-strain", "--out", at("a.organ")}),
             0)

@@ -187,6 +187,40 @@ quantity = "velocity"
   EXPECT_LT(fastest, 1e-3);
 }
 
+TEST(ScenarioRun, TissueThatRelaxesStartsWhereItHasHungForLong) {
+  for (const char* strain : {"false", "true"}) {
+    const std::string text = std::string(R"([organ]
+source = "block"
+nodes = [4, 6, 4]
+spacing_mm = 8
+[material]
+elastic_law = "measured"
+measured = "human_liver_nava2008"
+averaged_strain = )") + strain +
+                             R"(
+[[nodes]]
+name = "top"
+box_min_mm = [-20, 19, -20]
+box_max_mm = [20, 21, 20]
+[gravity]
+m_s2 = [0, -9.81, 0]
+[run]
+seconds = 0.3
+start = "equilibrium"
+[[probe]]
+set = "top"
+quantity = "displacement"
+)";
+    const auto run = make(text);
+    ASSERT_TRUE(run && run->settling().is_converged);
+    run->step();
+    const Vec3d first = run->probe(0);
+    EXPECT_LT(first.y, -1e-4) << "it sags";
+    while (!run->is_finished()) run->step();
+    EXPECT_LT(length(run->probe(0) - first), 0.01 * length(first));
+  }
+}
+
 TEST(ScenarioRun, TensionPullsAtWhatHoldsTheEnds) {
   std::string text = kColumn + R"([[displace]]
 set = "top"

@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+
 #include "common/scene/scenario_block.h"
 #include "server/scenario/scenario_run.h"
 
@@ -18,8 +20,20 @@ scene::Organ block() {
   return std::move(*organ);
 }
 
-TEST(Settle, TheRestPoseIsInEquilibriumAndTheOldOneIsFreeOfStress) {
-  const auto organ = block();
+// Tissue that relaxes, when it has hung for long.
+scene::Organ measured_block(bool is_averaged) {
+  auto organ = block();
+  auto material = *scene::find_measured_material("human_liver_nava2008");
+  material.relaxation = {{0.5, 0.05}, {0.2, 0.5}};  // soon
+  scene::use_measured(material, organ.material);
+  organ.material.has_averaged_strain = is_averaged;
+  return organ;
+}
+
+class SettleAny : public ::testing::TestWithParam<scene::Organ (*)()> {};
+
+TEST_P(SettleAny, TheRestPoseIsInEquilibriumAndTheOldOneIsFreeOfStress) {
+  const auto organ = GetParam()();
   const auto settled = settle(organ, kGravity);
   ASSERT_TRUE(settled.ok()) << settled.error().message;
   EXPECT_GT(settled->largest_move_m, 0.5e-3) << "otherwise this test shows nothing";
@@ -48,6 +62,39 @@ TEST(Settle, TheRestPoseIsInEquilibriumAndTheOldOneIsFreeOfStress) {
   float farthest = 0;
   for (const auto& u : run.world().displacements) farthest = std::max(farthest, length(u));
   EXPECT_LT(farthest, 0.01 * settled->largest_move_m);
+}
+
+std::string name_of(const ::testing::TestParamInfo<scene::Organ (*)()>& tested) {
+  constexpr std::array<const char*, 3> kNames{"Springs", "Measured", "MeasuredAveraged"};
+  return kNames[tested.index];
+}
+
+INSTANTIATE_TEST_SUITE_P(, SettleAny,
+                         ::testing::Values(
+                             block, +[] { return measured_block(false); },
+                             +[] { return measured_block(true); }),
+                         name_of);
+
+// What settling finds is where tissue creeps to.
+TEST(Settle, TissueThatRelaxesIsWhereItCreepsTo) {
+  const auto organ = measured_block(false);
+  const auto settled = settle(organ, kGravity);
+  ASSERT_TRUE(settled.ok()) << settled.error().message;
+  scene::ResolvedScenario resolved;
+  resolved.organ = organ;
+  resolved.organ.gravity_m_s2 = kGravity;
+  resolved.scenario.run.seconds = 12;
+  ScenarioRun run(std::move(resolved), Solver::Live);
+  float soon = 0;
+  while (!run.is_finished()) {
+    run.step();
+    if (run.steps_done() == 50)
+      for (const auto& u : run.world().displacements) soon = std::max(soon, length(u));
+  }
+  float late = 0;
+  for (const auto& u : run.world().displacements) late = std::max(late, length(u));
+  EXPECT_NEAR(late, settled->largest_move_m, 0.01 * settled->largest_move_m);
+  EXPECT_LT(soon, 0.8f * late);
 }
 
 TEST(Settle, SettlingTwiceKeepsTheFirstStressFreePose) {

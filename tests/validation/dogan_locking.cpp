@@ -186,7 +186,7 @@ class Study {
   RunPtr run_live(int cells) const {
     auto run =
         lab_.start(section_, geometry_.title, fmt::format("locking-{}-{}", geometry_.name, cells),
-                   text(cells, true, 4));
+                   text(cells, true, 2));
     lab_.finish(section_, *run);
     return run;
   }
@@ -199,7 +199,7 @@ class Study {
                "[material]\nelastic_law = \"neo-hookean\"\nyoung_modulus_pa = {:.9g}\n"
                "poisson_ratio = {:.9g}\n{}\n[run]\nmode = \"static\"\nseconds = 1\nload_steps = "
                "{}\n"
-               "over_relaxation = 1.8\ntolerance_n = 5e-6\nmax_sweeps = 20000\n\n",
+               "over_relaxation = 1.9\ntolerance_n = 3e-7\nmax_sweeps = 200000\n\n",
                young_pa, poisson, is_averaged ? "averaged_strain = true\n" : "", load_steps) +
            geometry_.text();
   }
