@@ -43,8 +43,8 @@ struct Material {
   // Measured: a reduced polynomial, not split; young_modulus_pa and poisson_ratio say what it is to
   // small strains at first (use_measured).
   HyperelasticMaterial measured{};
-  // NeoHookean, Measured: volume averaged over each node's tets, against locking (Bonet & Burton
-  // 1998).
+  // NeoHookean, Measured: strain averaged over each node's tets, against locking
+  // (dynamics::Stars).
   bool has_averaged_strain = false;
   // Transverse isotropy (springs) and tension (all laws): along a spring at the angle a to the
   // fibres,

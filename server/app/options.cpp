@@ -67,7 +67,7 @@ Result<std::optional<ServerOptions>> parse_command_line(int argc, char** argv) {
       ->capture_default_str();
   app.add_flag("--averaged-strain", options.has_averaged_strain,
                "average the strain of its tets over nodes: forces near those of refined elements "
-               "instead of up to 40 % too stiff, at two to three times the time of a tick");
+               "instead of up to 40 % too stiff, at three times the time of a tick");
   app.add_option("--listen", listen, "where to listen; port 0 takes any free one")
       ->type_name("ADDR:PORT")
       ->capture_default_str();

@@ -483,7 +483,7 @@ void add_commands(CLI::App& app, Options& options) {
         ->type_name("NAME");
     command->add_flag("--averaged-strain", options.has_averaged_strain,
                       "average strain over nodes: tets that lock are up to 40 % too stiff; a tick "
-                      "takes two to three times as long");
+                      "takes three times as long");
     command->add_option("--tension", options.tension, "tissue would be shorter by this part [0]")
         ->type_name("PART");
     command

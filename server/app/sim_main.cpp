@@ -180,6 +180,12 @@ Status run_scenario(const Options& options) {
     std::fprintf(
         stderr, "%s: warning: %s: tear_stretch is left out, so far tissue tears in sessions only\n",
         kProgram, resolved->scenario.source.c_str());
+  if (is_fem && scene::any_material(resolved->organ,
+                                    [](const scene::Material& m) { return m.has_averaged_strain; }))
+    std::fprintf(stderr,
+                 "%s: warning: %s: averaged_strain is of the live solver, here quadratic elements "
+                 "do not lock\n",
+                 kProgram, resolved->scenario.source.c_str());
   std::error_code failed;
   std::filesystem::create_directories(folder, failed);
   if (failed)

@@ -5,10 +5,9 @@
 //
 // Contract: gradients are exact derivatives of energy_j() (plus, in a step, of the damping's
 // potential); blocks are symmetric, positive semi-definite and at least close to the second
-// derivative; rows of padding contribute nothing. An energy over a node's whole star keeps
-// quantities of stars (their deformation gradients) and is told of each move; nodes must then have
-// colours by Coupling::Stars. A change of topology is followed lane by lane, bit for bit as if
-// built anew.
+// derivative; rows of padding contribute nothing. A change of topology is followed lane by lane,
+// bit for bit as if built anew. Energies over a node's whole star have an interface of their own,
+// StarEnergy (averaged_strain.h).
 
 #include <span>
 
@@ -49,8 +48,7 @@ class Energy {
   virtual void add(Group group, const Float4* x, const Vec8& own, NodeStep8& step) const = 0;
 
   // The elastic part (no damping) at displacements x: adds gradient and block as add() would, and
-  // gives the derivatives over all other nodes, always in the same order. Not for energies over
-  // stars.
+  // gives the derivatives over all other nodes, always in the same order.
   virtual void linearise(Group group, const Float4* x, const Vec8& own, NodeStep8& step,
                          StiffnessSink& sink) const = 0;
 
@@ -61,7 +59,7 @@ class Energy {
 
   // The topology has changed and the groups have followed: these lanes anew, ascending groups. They
   // are those with another node than before, with a node that has changed, and with a neighbour of
-  // a node in a new slot; for energies over stars also those with a neighbour of a node that has
+  // a node in a new slot; where strain is averaged also those with a neighbour of a node that has
   // changed. Returns rows written, counted per lane.
   virtual std::size_t rebuild(const Topology& topology, const Groups& groups,
                               std::span<const GroupLanes> lanes) = 0;

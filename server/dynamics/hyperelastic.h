@@ -19,8 +19,8 @@ namespace trocar::dynamics {
 template <typename Law>
 class Hyperelastic final : public Energy {
  public:
-  // Of the tets whose material has parameters here.
-  // Stars, which must outlive it: null if nothing is averaged.
+  // Of the tets whose material has parameters here. Stars, which must outlive it: null if nothing
+  // is averaged.
   Hyperelastic(const Topology& topology, const Groups& groups, const Stars* stars,
                HyperelasticParameters parameters, const Law& law = {});
 

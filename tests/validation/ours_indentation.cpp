@@ -36,7 +36,7 @@ std::vector<Law> laws() {
   return {{"springs", "springs (nu = 0.25)", "", 0.25, 0.25},
           {"tensor-mass", "tensor-mass, nu = 0.25",
            "elastic_law = \"tensor-mass\"\npoisson_ratio = 0.25\n", 0.25, 0.1},
-          {"neo-hookean-averaged", "neo-Hookean, averaged volume, nu = 0.4756",
+          {"neo-hookean-averaged", "neo-Hookean, averaged strain, nu = 0.4756",
            "elastic_law = \"neo-hookean\"\npoisson_ratio = 0.4756\naveraged_strain = true\n",
            0.4756, 0.08}};
 }
