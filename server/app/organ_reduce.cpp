@@ -2,6 +2,8 @@
 
 #include <unistd.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 
@@ -27,14 +29,15 @@ What is done (Dogan 2011, sections on model reduction and results):
   1. The full model (off-line solver, linear tets) is pressed at --places of the surface, in
      --directions, with forces up to --force. Each solution is a snapshot.
   2. The snapshots' first --modes Karhunen-Loeve modes B are the reduced model's unknowns.
-  3. B^T K B xi = B^T f is what runs live: K is the tissue's tangent at rest or, of the tangents at
-     --tangents of the snapshots, the one whose solution errs least over the training.
-  4. For creep, --creep-nodes of the surface are held under --force for --creep-seconds; a live
-     displacement is scaled by the growth around the nearest of them.
+  3. B^T K B xi = B^T f is the reduced model: K is the tissue's tangent at rest or, of the tangents
+     at --tangents of the snapshots, the one whose solution errs least over the training.
+  4. For creep, --creep-nodes of the surface are held under --force for --creep-seconds; the
+     displacement at once is scaled by the growth around the nearest of them.
   5. The result is compared with the full model on loads outside the training.
 
-Expect errors of tens of per cent: the reduced model is linear, tissue is not, and a press is
-local. More modes do not cure it. What this method costs live is microseconds.
+Expect errors of tens of per cent, and more at the loaded node: the reduced model is linear, tissue
+is not, and a press is local. More modes do not cure it. A solution costs microseconds. The server
+does not load these files.
 
 Examples:
   trocar-organ reduce liver
@@ -104,9 +107,21 @@ double time_solve_us(const scene::Reduction& reduced, const scene::Organ& organ,
   return std::isfinite(sum) ? ns * 1e-3 / kTimes : 0;
 }
 
+// How much there is to do, before it is begun.
+void announce(const ReduceCommand& command) {
+  const auto& s = command.settings;
+  const std::size_t times = reduction::creep_times(s.creep_s).size();
+  std::fprintf(stderr,
+               "%s: up to %zu full solutions for snapshots, %zu for creep, %zu to check the "
+               "result\n",
+               kProgram, s.places * s.directions * s.magnitudes, s.creep_nodes * times,
+               2 * command.check_places + command.check_creep * times);
+}
+
 Result<Outcome> reduce(const scene::Organ& organ, const ReduceCommand& command) {
   auto model = reduction::FullModel::create(organ, command.settings.threads);
   if (!model) return model.error();
+  announce(command);
   const auto progress = make_progress();
   Outcome outcome;
   const auto begin = thread_cpu_ns();
@@ -348,6 +363,11 @@ Status run_reduce(ReduceCommand command) {
   if (failed)
     return Error{ErrorCode::ResourceMissing,
                  folder.string() + ": cannot be made (" + failed.message() + "), see --results"};
+  // Not after minutes of work.
+  if (const auto parent = std::filesystem::path(out).parent_path();
+      !parent.empty() && !std::filesystem::is_directory(parent, failed))
+    return Error{ErrorCode::ResourceMissing,
+                 out + ": cannot be written, its folder is not there, see --out"};
   const auto outcome = reduce(*organ, command);
   if (!outcome) return outcome.error();
   if (auto s = scene::write_reduction(out, outcome->built.reduction); !s) return s;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
+#include <limits>
 #include <numbers>
 
 #include "server/reduction/reduced_model.h"
@@ -50,6 +52,16 @@ struct ReducedTraining {
     return sum / static_cast<double>(forces.cols());
   }
 };
+
+std::string source_of(const scene::Organ& organ, const Training& training,
+                      const Settings& settings) {
+  char text[120];
+  std::snprintf(text, sizeof text,
+                ", %zu snapshots at %zu places, up to %g N on patches of %g mm, seed %llu",
+                training.snapshots.size(), training.places.size(), settings.force_n,
+                1e3 * settings.radius_m, static_cast<unsigned long long>(settings.seed));
+  return organ.name + text;
+}
 
 std::vector<double> numbers_of(const Matrix& matrix) {
   return {matrix.data(), matrix.data() + matrix.size()};
@@ -179,7 +191,7 @@ Result<Built> reduce(FullModel& model, const Training& training, const Settings&
     if (progress) progress(Stage::Tangents, i + 1, count);
   }
   auto& r = built.reduction;
-  r.source = model.organ().name + ", " + std::to_string(training.places.size()) + " places";
+  r.source = source_of(model.organ(), training, settings);
   r.mesh_hash = scene::mesh_hash(model.organ());
   r.elasticity_hash = scene::elasticity_hash(model.organ());
   r.node_count = static_cast<std::uint32_t>(model.organ().mesh.node_count());

@@ -72,6 +72,9 @@ TEST_F(ReduceProgram, SaysEachMistakeInOneLine) {
   says({"liver", "--check", "1"}, 2, "--check-creep: at most as many as --check");
   says({at("none.organ")}, 3, "none.organ");
   EXPECT_FALSE(std::filesystem::is_regular_file(at("nothing")));
+  EXPECT_EQ(run({"reduce", "liver", "--results", at("out"), "--out", at("none/liver.reduction")}),
+            5);
+  expect_line("none/liver.reduction: cannot be written, its folder is not there");
 }
 
 TEST_F(ReduceProgram, HelpTeachesTheMethod) {

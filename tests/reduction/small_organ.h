@@ -3,7 +3,6 @@
 // Organs of few nodes for tests of reduced models.
 
 #include "common/scene/reduction.h"
-#include "server/reduction/full_model.h"
 
 namespace trocar::reduction::testing {
 
