@@ -165,6 +165,19 @@ TEST(Build, TheBestTangentErrsNoMoreThanTheInitialOnTheTraining) {
   EXPECT_GE(quality.initial.field.worst, quality.initial.field.high);
 }
 
+TEST(Build, LoadsWithoutAnEquilibriumAreCountedAndLeftOut) {
+  const auto organ = testing::block(3, 3, 3);
+  const auto model = full(organ);
+  const Settings settings{
+      .places = 2, .directions = 1, .magnitudes = 1, .force_n = 100, .radius_m = 0};
+  const auto training = train(*model, settings);
+  EXPECT_EQ(training.failed + training.snapshots.size(), 2u);
+  EXPECT_GE(training.failed, 1u);
+  const auto none = reduce(*model, {}, settings);
+  ASSERT_FALSE(none.ok());
+  EXPECT_NE(none.error().message.find("try another --force or --radius"), std::string::npos);
+}
+
 TEST(Build, CreepGrowsToTheShareThatRemains) {
   const auto organ = testing::block(3, 4, 3);
   const auto model = full(organ);
