@@ -1,25 +1,21 @@
 #include "common/scene/organ_file.h"
 
-#include <unistd.h>
-#include <zstd.h>
-
 #include <algorithm>
-#include <fstream>
-#include <memory>
 
-#include "common/base/checksum.h"
+#include "common/scene/packed_file.h"
 #include "proto/organ.pb.h"
 
 namespace trocar::scene {
 namespace {
 
-constexpr std::string_view kMagic = "TROCARO1";
 // An organ with directions of fibres is of a version that programs which would ignore them refuse.
 constexpr std::uint32_t kVersion = 3, kVersionWithoutFibres = 2;
-constexpr std::size_t kHeaderBytes = 24;
-constexpr std::uint64_t kMaxBodyBytes = std::uint64_t{512} << 20;
-constexpr std::size_t kUnpackStepBytes = std::size_t{1} << 20;
-constexpr int kCompressionLevel = 9;
+constexpr PackedKind kKind{"TROCARO1",
+                           "an .organ file",
+                           "make one with trocar-organ import",
+                           "make or import it again",
+                           kVersionWithoutFibres,
+                           kVersion};
 
 std::uint32_t version_of(const Organ& organ) {
   return organ.fibre_directions.empty() ? kVersionWithoutFibres : kVersion;
@@ -198,35 +194,6 @@ Status take_mesh(const proto::Organ& message, mesh::TetMesh& mesh) {
   return {};
 }
 
-struct FreeZstd {
-  void operator()(ZSTD_DCtx* context) const { ZSTD_freeDCtx(context); }
-};
-
-// Grows with what is really there: a short file that announces 512 MiB takes no such memory.
-Result<Bytes> unpack(BytesView packed, std::uint64_t announced) {
-  const std::unique_ptr<ZSTD_DCtx, FreeZstd> context(ZSTD_createDCtx());
-  TROCAR_ASSERT(context != nullptr);
-  Bytes body;
-  ZSTD_inBuffer in{packed.data(), packed.size(), 0};
-  std::size_t wanted = 1;
-  while (wanted != 0) {
-    const std::size_t before = body.size();
-    // One byte more than announced, to notice a body that is longer.
-    const auto room = std::min<std::uint64_t>(kUnpackStepBytes, announced + 1 - before);
-    if (room == 0) return bad("body is longer than announced");
-    body.resize(before + static_cast<std::size_t>(room));
-    ZSTD_outBuffer out{body.data() + before, body.size() - before, 0};
-    const std::size_t read_before = in.pos;
-    wanted = ZSTD_decompressStream(context.get(), &out, &in);
-    body.resize(before + out.pos);
-    if (ZSTD_isError(wanted)) return bad("body cannot be unpacked, the file is damaged");
-    if (out.pos == 0 && in.pos == read_before) return bad("body is cut off");
-  }
-  if (body.size() != announced) return bad("body has another length than announced");
-  if (in.pos != packed.size()) return bad("has bytes behind its body");
-  return body;
-}
-
 }  // namespace
 
 Bytes encode_organ(const Organ& organ) {
@@ -262,7 +229,7 @@ Bytes encode_organ(const Organ& organ) {
 
 Result<Organ> decode_organ(BytesView bytes) {
   proto::Organ message;
-  if (bytes.size() > kMaxBodyBytes ||
+  if (bytes.size() > kMaxPackedBodyBytes ||
       !message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())))
     return bad("organ: is not an organ message");
   Organ organ;
@@ -298,78 +265,28 @@ Result<Organ> decode_organ(BytesView bytes) {
 }
 
 Bytes pack_organ(const Organ& organ) {
-  const Bytes body = encode_organ(organ);
-  TROCAR_ASSERT(body.size() <= kMaxBodyBytes);
-  Bytes header;
-  ByteWriter writer(header);
-  writer.put_bytes(bytes_of(kMagic));
-  writer.put(version_of(organ));
-  writer.put(static_cast<std::uint64_t>(body.size()));
-  writer.put(crc32(body));
-  TROCAR_ASSERT(header.size() == kHeaderBytes);
-  Bytes file(kHeaderBytes + ZSTD_compressBound(body.size()));
-  std::copy(header.begin(), header.end(), file.begin());
-  const std::size_t packed = ZSTD_compress(file.data() + kHeaderBytes, file.size() - kHeaderBytes,
-                                           body.data(), body.size(), kCompressionLevel);
-  TROCAR_ASSERT(!ZSTD_isError(packed));
-  file.resize(kHeaderBytes + packed);
-  return file;
+  return pack(kKind, version_of(organ), encode_organ(organ));
 }
 
 Result<Organ> unpack_organ(BytesView file) {
-  ByteReader reader(file);
-  const auto magic = reader.take_bytes(kMagic.size());
-  const auto version = reader.take<std::uint32_t>();
-  const auto length = reader.take<std::uint64_t>();
-  const auto crc = reader.take<std::uint32_t>();
-  if (magic.empty() || !std::ranges::equal(magic, bytes_of(kMagic)))
-    return bad("is not an .organ file: make one with trocar-organ import");
-  if (!reader.ok()) return bad("is cut off in its header");
-  if (version != kVersion && version != kVersionWithoutFibres)
-    return bad("has version " + std::to_string(version) + ", this program reads versions " +
-               std::to_string(kVersionWithoutFibres) + " and " + std::to_string(kVersion) +
-               ": make or import it again");
-  if (length > kMaxBodyBytes) return bad("announces more than 512 MiB");
-  const auto body = unpack(file.subspan(kHeaderBytes), length);
-  if (!body) return body.error();
-  if (crc32(*body) != crc) return bad("is damaged, its checksum does not fit");
-  auto organ = decode_organ(*body);
-  if (organ.ok() && version_of(*organ) != version)
-    return bad("says version " + std::to_string(version) + ", but holds version " +
+  const auto unpacked = unpack(kKind, file);
+  if (!unpacked) return unpacked.error();
+  auto organ = decode_organ(unpacked->body);
+  if (organ.ok() && version_of(*organ) != unpacked->version)
+    return bad("says version " + std::to_string(unpacked->version) + ", but holds version " +
                std::to_string(version_of(*organ)) + ": it is damaged");
   return organ;
 }
 
 Status write_organ(const std::filesystem::path& path, const Organ& organ) {
   if (auto s = validate(organ); !s) return s;
-  const Bytes file = pack_organ(organ);
-  auto temporary = path;
-  temporary += "." + std::to_string(::getpid()) + ".tmp";
-  std::ofstream out(temporary, std::ios::binary | std::ios::trunc);
-  out.write(reinterpret_cast<const char*>(file.data()), static_cast<std::streamsize>(file.size()));
-  out.close();
-  std::error_code failure;
-  if (out) std::filesystem::rename(temporary, path, failure);
-  if (out && !failure) return {};
-  std::error_code ignored;
-  std::filesystem::remove(temporary, ignored);
-  return Error{ErrorCode::ResourceMissing,
-               path.string() +
-                   ": cannot be written: check that the folder exists, may be written "
-                   "to and has " +
-                   std::to_string((file.size() >> 20) + 1) + " MiB left"};
+  return write_packed(path, pack_organ(organ));
 }
 
 Result<Organ> read_organ(const std::filesystem::path& path) {
-  std::error_code failure;
-  const auto size = std::filesystem::file_size(path, failure);
-  if (failure) return bad(path.string() + ": cannot be opened: " + failure.message());
-  if (size > kMaxBodyBytes) return bad(path.string() + ": is larger than 512 MiB");
-  Bytes file(static_cast<std::size_t>(size));
-  std::ifstream in(path, std::ios::binary);
-  in.read(reinterpret_cast<char*>(file.data()), static_cast<std::streamsize>(file.size()));
-  if (!in) return bad(path.string() + ": cannot be read");
-  auto organ = unpack_organ(file);
+  const auto file = read_packed(path);
+  if (!file) return file.error();
+  auto organ = unpack_organ(*file);
   if (!organ) return bad(path.string() + ": " + organ.error().message);
   return organ;
 }

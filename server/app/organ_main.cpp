@@ -25,6 +25,7 @@
 #include "server/app/organ_calibrate.h"
 #include "server/app/organ_experiments.h"
 #include "server/app/organ_identify.h"
+#include "server/app/organ_reduce.h"
 
 namespace trocar::app {
 namespace {
@@ -60,6 +61,8 @@ Examples:
       how much must move for a contact of a given force, into liver-calibrated.organ
   trocar-organ identify deploy/scenes/relax.csv --length-mm 20 --area-mm2 100
       C_i0, g_k and tau_k from curves of specimens; results in out/identify-relax
+  trocar-organ reduce liver --modes 8
+      a reduced model of eight unknowns, into liver.reduction; how far it is off in out/reduce-liver
 
 Exit codes: 0 ok, 2 command line, 3 bad file, 5 cannot write or processor too old.
 )";
@@ -83,6 +86,7 @@ struct Options {
   SettleCommand settle;
   CalibrateCommand calibrate;
   IdentifyCommand identify;
+  ReduceCommand reduce;
 };
 
 struct EdgeLengths {
@@ -514,6 +518,7 @@ void add_commands(CLI::App& app, Options& options) {
   add_settle_command(app, options.settle);
   add_calibrate_command(app, options.calibrate);
   add_identify_command(app, options.identify);
+  add_reduce_command(app, options.reduce);
 }
 
 int run(int argc, char** argv) {
@@ -550,6 +555,8 @@ int run(int argc, char** argv) {
     status = run_calibrate(options.calibrate);
   else if (app.got_subcommand("identify"))
     status = run_identify(options.identify);
+  else if (app.got_subcommand("reduce"))
+    status = run_reduce(options.reduce);
   else
     status = run_inspect(options);
   return status ? static_cast<int>(ExitCode::Ok) : report(kProgram, status.error());

@@ -35,6 +35,8 @@ const std::vector<Experiment>& experiments() {
        "Dogan 2011, figures 2, 6 and 7", run_dogan_creep},
       {"dogan2011/live", "A hand presses the measured liver live", "converged solution, our own",
        run_dogan_live},
+      {"dogan2011/reduction", "A reduced liver beside the full one",
+       "Dogan 2011, equations 6 to 14, figures 3 to 7", run_dogan_reduction},
       {"ours/propagation-lattice", "What a limit of nodes costs: lattice", "full solve, our own",
        run_propagation_lattice},
       {"ours/propagation-liver-4k", "What a limit of nodes costs: liver of 4,000 nodes",

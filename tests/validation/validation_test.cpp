@@ -152,6 +152,13 @@ TEST_F(Validation, AMeasuredLiverPressedLiveIsNearItsConvergedSolution) {
   EXPECT_EQ(names.size(), 4u);
 }
 
+TEST_F(Validation, AReducedLiverErrsAsThePaperSays) {
+  ASSERT_EQ(run("--short --only dogan2011/reduction"), 0) << log();
+  const auto names = kept_checks();
+  EXPECT_TRUE(names.contains("dogan2011/reduction/liver-own-load-best"));
+  EXPECT_EQ(names.size(), 7u);
+}
+
 TEST_F(Validation, CommandLine) {
   EXPECT_EQ(run("--help"), 0);
   EXPECT_NE(log().find("Examples:"), std::string::npos);
