@@ -64,7 +64,8 @@ TEST_F(TwoHands, TheHashIsTheSameOnEveryBuild) {
   using enum scene::StrainEnergy;
   for (const unsigned workers : {1u, 2u, 3u}) {
     EXPECT_EQ(hash_after(measured_liver(ReducedPolynomial), {}, workers), 1880254100034935329u);
-    EXPECT_EQ(hash_after(measured_liver(ReducedPolynomial, true), {}, workers), 15096250750826707144u);
+    EXPECT_EQ(hash_after(measured_liver(ReducedPolynomial, true), {}, workers),
+              15096250750826707144u);
     EXPECT_EQ(hash_after(measured_liver(Exponential), {}, workers), 5925352596361239379u);
     EXPECT_EQ(hash_after(scene::make_lattice(), kFrozen, workers), 10457354252157771903u);
     EXPECT_EQ(hash_after(scene::make_lattice(), {}, workers), 14081088538421466169u);
