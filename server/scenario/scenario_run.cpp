@@ -104,12 +104,6 @@ Status check_explicit(const scene::ResolvedScenario& resolved) {
 Status check_supported(const scene::ResolvedScenario& resolved) {
   const auto& scenario = resolved.scenario;
   const auto& rule = scenario.run;
-  if (dynamics::Relaxation::is_needed(resolved.organ) && rule.starts_in_equilibrium &&
-      rule.mode == scene::RunMode::Static)
-    return scene::scenario_error(scenario, run_key(scenario, "start"),
-                                 "a static run answers as at once, tissue that relaxes is in "
-                                 "equilibrium after long: take a dynamic run, or --solver fem "
-                                 "--response equilibrium");
   for (const auto& load : scenario.displacements)
     if (load.axes != kAllAxes && (rule.boundary == scene::Boundary::Frozen ||
                                   rule.integrator == scene::Integrator::Explicit))
