@@ -76,7 +76,8 @@ struct RateFigures {
 struct RelaxationFigures {
   double energy_j = 0;      // elastic, as if nothing had relaxed
   float volume_change = 0;  // of the whole, over its volume without stress
-  float relaxed_share = 0;  // of the stress that there would be at once, 0 to 1
+  float relaxed_share =
+      0;  // of the stress that there would be at once; over 1 just after a load has gone
 
   bool operator==(const RelaxationFigures&) const = default;
 };

@@ -6,7 +6,9 @@ namespace trocar::dynamics {
 struct RelaxationFigures {
   double energy_j = 0;       // elastic, as if nothing had relaxed
   double volume_change = 0;  // of the whole, over its volume without stress
-  double relaxed_share = 0;  // of the stress that there would be at once, 0 to 1
+  // Of the stress that there would be at once; over 1 where tissue remembers more stress than it
+  // has, as when it has just been let go.
+  double relaxed_share = 0;
 };
 
 }  // namespace trocar::dynamics

@@ -28,6 +28,16 @@ std::vector<double> numbers_of(const scene::HyperelasticMaterial& m) {
 
 }  // namespace
 
+scene::HyperelasticMaterial law_of(const scene::Material& material, const std::string& name) {
+  if (material.elastic_law == scene::ElasticLaw::Measured) return material.measured;
+  const auto [c10_pa, bulk_modulus_pa] = scene::neo_hookean_parameters(material);
+  scene::HyperelasticMaterial law;
+  law.name = name;
+  law.coefficients_pa[0] = c10_pa;
+  law.bulk_modulus_pa = bulk_modulus_pa;
+  return law;
+}
+
 Problem make_problem(ElementMesh mesh, const scene::HyperelasticMaterial& material,
                      double density_kg_m3) {
   Problem problem;

@@ -4,9 +4,10 @@
 // 3 node + axis. SI units.
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
-#include "common/scene/hyperelastic_material.h"
+#include "common/scene/organ.h"
 #include "server/finite_elements/element_mesh.h"
 
 namespace trocar::finite_elements {
@@ -30,6 +31,10 @@ struct Problem {
 // One material everywhere, nothing held.
 Problem make_problem(ElementMesh mesh, const scene::HyperelasticMaterial& material,
                      double density_kg_m3 = 1060);
+
+// What hyperelastic tissue is to this solver: the measured law, or as one the live solver's
+// neo-Hookean law of linear elastic constants.
+scene::HyperelasticMaterial law_of(const scene::Material& material, const std::string& name);
 
 // Error names the first number that is out of range; every material is validated.
 Status validate(const Problem& problem);

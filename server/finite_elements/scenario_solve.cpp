@@ -32,17 +32,6 @@ double component(const Vec3d& v, std::uint32_t axis) {
   return axis == 0 ? v.x : axis == 1 ? v.y : v.z;
 }
 
-// The live solver's neo-Hookean law of linear elastic constants.
-scene::HyperelasticMaterial hyperelastic_of(const scene::Material& material,
-                                            const std::string& name) {
-  const auto [c10_pa, bulk_modulus_pa] = scene::neo_hookean_parameters(material);
-  scene::HyperelasticMaterial m;
-  m.name = name;
-  m.coefficients_pa[0] = c10_pa;
-  m.bulk_modulus_pa = bulk_modulus_pa;
-  return m;
-}
-
 Status check_organ(const scene::ResolvedScenario& resolved) {
   const auto& scenario = resolved.scenario;
   const auto wrong = [&](const scene::Place& place, const char* what) {
@@ -125,9 +114,7 @@ Status ScenarioSolve::add_materials(Problem& problem) const {
           resolved_.scenario, resolved_.scenario.material.place,
           "the solver \"fem\" needs elastic_law = \"neo-hookean\" or \"measured\" for " + name +
               ", see --material");
-    problem.materials.push_back(material.elastic_law == scene::ElasticLaw::Measured
-                                    ? material.measured
-                                    : hyperelastic_of(material, name));
+    problem.materials.push_back(law_of(material, name));
   }
   return {};
 }

@@ -34,16 +34,6 @@ Status check(const scene::Organ& organ) {
   return {};
 }
 
-scene::HyperelasticMaterial law_of(const scene::Material& material, const std::string& name) {
-  if (material.elastic_law == scene::ElasticLaw::Measured) return material.measured;
-  const auto [c10_pa, bulk_modulus_pa] = scene::neo_hookean_parameters(material);
-  scene::HyperelasticMaterial law;
-  law.name = name;
-  law.coefficients_pa[0] = c10_pa;
-  law.bulk_modulus_pa = bulk_modulus_pa;
-  return law;
-}
-
 Problem problem_of(const scene::Organ& organ) {
   Problem problem;
   problem.mesh = finite_elements::make_elements(organ.mesh, organ.mesh.rest_positions,
@@ -51,7 +41,7 @@ Problem problem_of(const scene::Organ& organ) {
   problem.element_materials = scene::material_map(organ).tets;
   for (std::size_t i = 0; i <= organ.regions.size(); ++i) {
     const auto& material = scene::material_at(organ, static_cast<std::uint16_t>(i));
-    problem.materials.push_back(law_of(material, organ.name));
+    problem.materials.push_back(finite_elements::law_of(material, organ.name));
     problem.densities_kg_m3.push_back(material.density_kg_m3);
   }
   for (const auto node : organ.fixed_nodes)

@@ -200,8 +200,9 @@ void run_cantilever(const Lab& lab, Section& section) {
                      finest.at("neo-hookean-averaged") / finest.at("neo-hookean"), 1.02,
                      "Deflection with averaged strain over that without, finest mesh.");
   section.say(
-      "Averaged strain takes away most of what plain tets are too stiff by: what comes of "
-      "incompressibility, and what linear tets are too stiff in bending whatever their volume "
+      "Averaged strain takes away more than half of what plain tets are too stiff by: of what "
+      "comes of "
+      "incompressibility, and of what linear tets are too stiff in bending whatever their volume "
       "does.");
 }
 
