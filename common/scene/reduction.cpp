@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "common/base/checksum.h"
+#include "common/math/cholesky.h"
 
 namespace trocar::scene {
 namespace {
@@ -43,22 +44,16 @@ bool are_finite(const std::vector<double>& values) {
   return std::ranges::all_of(values, [](double v) { return std::isfinite(v); });
 }
 
-// Symmetric, and every pivot of its Cholesky factors above 0.
 bool is_stiffness(const std::vector<double>& matrix, std::size_t n) {
-  std::vector<double> l = matrix;
+  std::vector<double> lower;
   for (std::size_t i = 0; i < n; ++i)
-    for (std::size_t j = 0; j < i; ++j)
+    for (std::size_t j = 0; j <= i; ++j) {
       if (std::abs(matrix[i * n + j] - matrix[j * n + i]) >
           kSymmetry * std::sqrt(std::abs(matrix[i * n + i] * matrix[j * n + j])))
         return false;
-  for (std::size_t i = 0; i < n; ++i)
-    for (std::size_t j = 0; j <= i; ++j) {
-      double sum = matrix[i * n + j];
-      for (std::size_t k = 0; k < j; ++k) sum -= l[i * n + k] * l[j * n + k];
-      if (i == j && !(sum > 0)) return false;
-      l[i * n + j] = i == j ? std::sqrt(sum) : sum / l[j * n + j];
+      lower.push_back(matrix[i * n + j]);
     }
-  return true;
+  return is_positive_definite(lower, n);
 }
 
 Status check_modes(const Reduction& r) {
@@ -155,18 +150,22 @@ Status validate(const Reduction& r) {
   return check_creep(r);
 }
 
-Status check_organ(const Reduction& r, const Organ& organ) {
-  if (r.node_count != organ.mesh.node_count())
-    return bad("is of another mesh: it has " + std::to_string(r.node_count) + " nodes, " +
+Status check_organ(const ReducedOrgan& of, const Organ& organ) {
+  if (of.node_count != organ.mesh.node_count())
+    return bad("is of another mesh: it has " + std::to_string(of.node_count) + " nodes, " +
                organ.name + " has " + std::to_string(organ.mesh.node_count()) +
                ": make it again with trocar-organ reduce");
-  if (r.mesh_hash != mesh_hash(organ))
+  if (of.mesh_hash != mesh_hash(organ))
     return bad("is of another mesh than " + organ.name +
                ", or one that is held elsewhere: make it again with trocar-organ reduce");
-  if (r.elasticity_hash != elasticity_hash(organ))
+  if (of.elasticity_hash != elasticity_hash(organ))
     return bad("is of another material than that of " + organ.name +
                ": make it again with trocar-organ reduce");
   return {};
+}
+
+Status check_organ(const Reduction& r, const Organ& organ) {
+  return check_organ(ReducedOrgan{r.node_count, r.mesh_hash, r.elasticity_hash}, organ);
 }
 
 }  // namespace trocar::scene

@@ -61,6 +61,14 @@ struct Reduction {
 std::uint64_t mesh_hash(const Organ& organ);
 std::uint64_t elasticity_hash(const Organ& organ);
 
+// What a reduction, of whichever method, says of its organ.
+struct ReducedOrgan {
+  std::uint32_t node_count = 0;
+  std::uint64_t mesh_hash = 0, elasticity_hash = 0;
+};
+// Whether it is this one.
+Status check_organ(const ReducedOrgan& of, const Organ& organ);
+
 // Error: one line that says what is wrong. O(modes^2 nodes).
 Status validate(const Reduction& reduction);
 // Whether it is of this organ.
