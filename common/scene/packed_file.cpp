@@ -69,13 +69,18 @@ Bytes pack(const PackedKind& kind, std::uint32_t version, const Bytes& body) {
   return file;
 }
 
+bool has_magic(BytesView file, std::string_view magic) {
+  return file.size() >= magic.size() &&
+         std::ranges::equal(file.first(magic.size()), bytes_of(magic));
+}
+
 Result<PackedBody> unpack(const PackedKind& kind, BytesView file) {
   ByteReader reader(file);
-  const auto magic = reader.take_bytes(kind.magic.size());
+  reader.take_bytes(kind.magic.size());
   const auto version = reader.take<std::uint32_t>();
   const auto length = reader.take<std::uint64_t>();
   const auto crc = reader.take<std::uint32_t>();
-  if (magic.empty() || !std::ranges::equal(magic, bytes_of(kind.magic)))
+  if (!has_magic(file, kind.magic))
     return bad("is not " + std::string(kind.name) + ": " + std::string(kind.remedy));
   if (!reader.ok()) return bad("is cut off in its header");
   if (version < kind.first_version || version > kind.last_version)

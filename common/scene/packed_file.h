@@ -33,6 +33,9 @@ Bytes pack(const PackedKind& kind, std::uint32_t version, const Bytes& body);
 // Error: another kind or version, cut off, or damaged. Does not name a file.
 Result<PackedBody> unpack(const PackedKind& kind, BytesView file);
 
+// Whether it is of that kind, sound or not.
+bool has_magic(BytesView file, std::string_view magic);
+
 // Writes beside the path and renames, so that a file is whole or not there.
 Status write_packed(const std::filesystem::path& path, BytesView file);
 // Error: missing, unreadable or too large; names the file.

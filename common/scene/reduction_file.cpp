@@ -1,5 +1,6 @@
 #include "common/scene/reduction_file.h"
 
+#include "common/scene/local_reduction_file.h"
 #include "common/scene/packed_file.h"
 #include "proto/reduction.pb.h"
 
@@ -7,7 +8,7 @@ namespace trocar::scene {
 namespace {
 
 constexpr std::uint32_t kVersion = 1;
-constexpr PackedKind kKind{"TROCARR1",
+constexpr PackedKind kKind{kReductionMagic,
                            "a .reduction file",
                            "make one with trocar-organ reduce",
                            "make it again with trocar-organ reduce",
@@ -93,6 +94,10 @@ Bytes pack_reduction(const Reduction& reduction) {
 }
 
 Result<Reduction> unpack_reduction(BytesView file) {
+  if (has_magic(file, kLocalReductionMagic))
+    return Error{ErrorCode::BadFile,
+                 "is a reduction by --method local, which only sessions use: make one with "
+                 "trocar-organ reduce --method dogan"};
   const auto unpacked = unpack(kKind, file);
   if (!unpacked) return unpacked.error();
   return decode(unpacked->body);

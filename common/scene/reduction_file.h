@@ -1,15 +1,19 @@
 #pragma once
 
-// `.reduction` files: a packed file (packed_file.h) with the magic "TROCARR1" and one proto
-// Reduction message (proto/reduction.proto). Nothing in a file is trusted: any bytes give a
+// `.reduction` files of the method dogan: a packed file (packed_file.h) with the magic "TROCARR1"
+// and one proto Reduction message (proto/reduction.proto). Those of the method local are in
+// local_reduction_file.h. Nothing in a file is trusted: any bytes give a
 // reduction that validate() accepts, or an error of one line.
 
 #include <filesystem>
+#include <string_view>
 
 #include "common/base/bytes.h"
 #include "common/scene/reduction.h"
 
 namespace trocar::scene {
+
+inline constexpr std::string_view kReductionMagic = "TROCARR1";
 
 Status write_reduction(const std::filesystem::path& path, const Reduction& reduction);
 // Refuses one of another organ, too.

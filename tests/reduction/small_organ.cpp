@@ -1,8 +1,85 @@
 #include "tests/reduction/small_organ.h"
 
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
 #include "common/scene/scenario_block.h"
 
 namespace trocar::reduction::testing {
+namespace {
+
+using Field = std::vector<double>;
+
+double product(const Field& a, const Field& b) {
+  return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
+}
+
+// Waves over the nodes' numbers: any of them are independent.
+Field wave(std::size_t length, std::size_t k) {
+  Field field;
+  for (std::size_t i = 0; i < length; ++i)
+    field.push_back(std::cos((static_cast<double>(i) + 0.5) * static_cast<double>(k) * 3.14 /
+                             static_cast<double>(length)));
+  return field;
+}
+
+std::vector<Field> orthonormal(std::size_t length, std::size_t first, std::size_t count) {
+  std::vector<Field> fields;
+  for (std::size_t k = 0; k < count; ++k) {
+    auto field = wave(length, first + k);
+    for (const auto& other : fields) {
+      const double along = product(field, other);
+      for (std::size_t i = 0; i < length; ++i) field[i] -= along * other[i];
+    }
+    const double norm = std::sqrt(product(field, field));
+    for (double& value : field) value /= norm;
+    fields.push_back(std::move(field));
+  }
+  return fields;
+}
+
+Field unpacked(const scene::PackedField& field) {
+  Field values;
+  for (const auto value : field.values)
+    values.push_back(static_cast<double>(value) * static_cast<double>(field.step));
+  return values;
+}
+
+// B^T B of the patch's fields.
+std::vector<double> gram(const scene::LocalReduction& r, const scene::LocalPatch& patch) {
+  std::vector<Field> basis;
+  for (const auto& mode : patch.modes) basis.push_back(unpacked(mode));
+  for (const auto node : patch.reach)
+    for (const auto& field :
+         std::ranges::lower_bound(r.greens, node, {}, &scene::GreensFunction::node)->fields)
+      basis.push_back(unpacked(field));
+  std::vector<double> lower;
+  for (std::size_t i = 0; i < basis.size(); ++i)
+    for (std::size_t j = 0; j <= i; ++j) lower.push_back(product(basis[i], basis[j]));
+  return lower;
+}
+
+scene::LocalPatch patch_at(const scene::Organ& organ, NodeIndex node) {
+  scene::LocalPatch patch;
+  patch.centre = node;
+  patch.members = patch.reach = {node};
+  for (const auto other : organ.mesh.node_neighbours[node]) {
+    if (organ.mesh.is_surface_node[other.value] == 0 || patch.reach.size() == 3) continue;
+    patch.reach.push_back(other);
+  }
+  std::ranges::sort(patch.reach);
+  for (std::uint32_t t = 0; t < organ.mesh.tets.size(); ++t) {
+    const auto& tet = organ.mesh.tets[t];
+    if (std::ranges::find(tet, node) != tet.end())
+      patch.inner_tets.push_back(TetIndex(t));
+    else if (patch.cubature.size() < 3)
+      patch.cubature.push_back({TetIndex(t), 1.5F + static_cast<float>(t)});
+  }
+  return patch;
+}
+
+}  // namespace
 
 scene::Organ block(int nx, int ny, int nz) {
   auto organ = scene::make_block({nx, ny, nz, 0.01});
@@ -35,6 +112,44 @@ scene::Reduction synthetic_reduction(const scene::Organ& organ, std::size_t mode
              {NodeIndex(7),
               {1, 1.25, 2.25},
               {{NodeIndex(5), {1, 1.125, 2}}, {NodeIndex(7), {1, 1.5, 3}}}}};
+  return r;
+}
+
+scene::LocalReduction synthetic_local_reduction(const scene::Organ& organ) {
+  scene::LocalReduction r;
+  r.source = "synthetic";
+  r.mesh_hash = scene::mesh_hash(organ);
+  r.elasticity_hash = scene::elasticity_hash(organ);
+  r.node_count = static_cast<std::uint32_t>(organ.mesh.node_count());
+  r.force_n = 0.4;
+  r.free_layers = 1;
+  const std::size_t length = 3 * organ.mesh.node_count();
+  r.patches = {patch_at(organ, organ.mesh.surface_nodes.front()),
+               patch_at(organ, organ.mesh.surface_nodes.back())};
+  std::vector<NodeIndex> nodes;
+  for (const auto& patch : r.patches)
+    nodes.insert(nodes.end(), patch.reach.begin(), patch.reach.end());
+  std::ranges::sort(nodes);
+  nodes.erase(std::ranges::unique(nodes).begin(), nodes.end());
+  constexpr std::size_t kModes = 4;
+  std::size_t next = kModes + 2;
+  for (const auto node : nodes) {
+    auto& greens = r.greens.emplace_back();
+    greens.node = node;
+    for (auto& field : greens.fields) {
+      auto values = wave(length, next++);
+      for (double& value : values) value *= 0.01;
+      field = scene::pack_field(values);
+    }
+  }
+  for (std::size_t p = 0; p < r.patches.size(); ++p) {
+    auto& patch = r.patches[p];
+    for (const auto& mode : orthonormal(length, 1 + p, kModes))
+      patch.modes.push_back(scene::pack_field(mode));
+    patch.mass = gram(r, patch);
+    patch.outer_stiffness = patch.mass;
+    for (double& value : patch.outer_stiffness) value *= 100;
+  }
   return r;
 }
 

@@ -2,7 +2,7 @@
 
 // Organs of few nodes for tests of reduced models.
 
-#include "common/scene/reduction.h"
+#include "common/scene/local_reduction.h"
 
 namespace trocar::reduction::testing {
 
@@ -11,5 +11,9 @@ scene::Organ block(int nx, int ny, int nz);
 
 // A reduction of the block that validate() accepts, with modes and creep of no meaning.
 scene::Reduction synthetic_reduction(const scene::Organ& organ, std::size_t modes);
+
+// A local one of the block, of two patches at opposite corners of its upper side; modes, Green's
+// functions and matrices of no meaning. Needs a block of 18 nodes or more.
+scene::LocalReduction synthetic_local_reduction(const scene::Organ& organ);
 
 }  // namespace trocar::reduction::testing
