@@ -12,6 +12,7 @@
 #include "common/plot/plot.h"
 #include "common/scene/load_organ.h"
 #include "common/scene/reduction_file.h"
+#include "server/app/organ_reduce_local.h"
 #include "server/reduction/quality.h"
 
 namespace trocar::app {
@@ -25,7 +26,11 @@ constexpr std::size_t kMaxCheckPlaces = 500;
 constexpr std::uint64_t kProgressEvery_ns = 5'000'000'000;
 
 constexpr const char* kHelp = R"(
-What is done (Dogan 2011, sections on model reduction and results):
+Methods:
+  dogan  Dogan 2011: a few Karhunen-Loeve modes of the whole organ and a constant tangent
+  local  a model that stays close to a contact, wherever it is on the surface
+
+What dogan does (sections on model reduction and results):
   1. The full model (off-line solver, linear tets) is pressed at --places of the surface, in
      --directions, with forces up to --force. Each solution is a snapshot.
   2. The snapshots' first --modes Karhunen-Loeve modes B are the reduced model's unknowns.
@@ -33,11 +38,22 @@ What is done (Dogan 2011, sections on model reduction and results):
      at --tangents of the snapshots, the one whose solution errs least over the training.
   4. For creep, --creep-nodes of the surface are held under --force for --creep-seconds; the
      displacement at once is scaled by the growth around the nearest of them.
-  5. The result is compared with the full model on loads outside the training.
+  Expect errors of tens of per cent, and more at the loaded node: the reduced model is linear,
+  tissue is not, and a press is local. More modes do not cure it.
 
-Expect errors of tens of per cent, and more at the loaded node: the reduced model is linear, tissue
-is not, and a press is local. More modes do not cure it. A solution costs microseconds. The server
-does not load these files.
+What local does:
+  1. The surface is covered with patches of --patch-radius. For each of their nodes the organ's
+     displacements under unit forces there are found, and kept.
+  2. Each patch's centre is pressed in --directions with forces up to --force.
+  3. A patch gets --modes: the first Karhunen-Loeve modes of these presses, of the unit forces'
+     fields and of fields of second order around it.
+  4. Where a node is touched, the unknowns are the modes, its own fields, and the displacements of
+     nodes within --free-layers of it. Tets around a patch stay as they are; what is not linear in
+     the others is summed over a few, with weights that leave --residual.
+  Expect errors of a few per cent anywhere, at once; creep is not in it yet.
+
+Both are compared with the full model on loads outside the training. The server does not load these
+files.
 
 Examples:
   trocar-organ reduce liver
@@ -46,6 +62,10 @@ Examples:
       more modes, a denser training
   trocar-organ reduce liver --places 6 --directions 1 --creep-nodes 0
       a quick try without creep
+  trocar-organ reduce liver --method local --threads 2
+      the whole surface; half an hour
+  trocar-organ reduce liver --method local --patches 4 -o try.reduction
+      a quick try: some patches beside each other
 )";
 
 const char* name_of(Stage stage) {
@@ -310,6 +330,20 @@ Status validate(const ReduceCommand& command) {
 
 }  // namespace
 
+Status check_outputs(const std::filesystem::path& folder, const std::string& out) {
+  std::error_code failed;
+  std::filesystem::create_directories(folder, failed);
+  if (failed)
+    return Error{ErrorCode::ResourceMissing,
+                 folder.string() + ": cannot be made (" + failed.message() + "), see --results"};
+  // Not after minutes of work.
+  if (const auto parent = std::filesystem::path(out).parent_path();
+      !parent.empty() && !std::filesystem::is_directory(parent, failed))
+    return Error{ErrorCode::ResourceMissing,
+                 out + ": cannot be written, its folder is not there, see --out"};
+  return {};
+}
+
 void add_reduce_command(CLI::App& app, ReduceCommand& command) {
   auto* sub = app.add_subcommand(
       "reduce",
@@ -317,14 +351,16 @@ void add_reduce_command(CLI::App& app, ReduceCommand& command) {
   sub->footer(kHelp);
   sub->add_option("ORGAN", command.organ, ".organ or .msh file, or a built-in organ's name")
       ->required();
-  sub->add_option("--method", command.method, "dogan: constant tangent, creep by scaling")
-      ->check(CLI::IsMember({"dogan"}))
+  command.app = sub;
+  sub->add_option("--method", command.method,
+                  "dogan: constant tangent, creep by scaling; local: close to contacts, see below")
+      ->check(CLI::IsMember({"dogan", "local"}))
       ->capture_default_str();
   auto& s = command.settings;
   const auto number = [&](const char* name, auto& value, const char* what, const char* unit) {
     sub->add_option(name, value, what)->type_name(unit)->capture_default_str();
   };
-  number("--modes", s.modes, "unknowns of the reduced model, 1 to 64", "N");
+  number("--modes", s.modes, "unknowns of the reduced model, 1 to 64; local: of a patch [24]", "N");
   sub->add_option("-o,--out", command.out, "file to write [<organ>.reduction, here]")
       ->type_name("FILE");
   sub->add_option("--results", command.folder,
@@ -332,7 +368,7 @@ void add_reduce_command(CLI::App& app, ReduceCommand& command) {
       ->type_name("DIR");
   number("--places", s.places, "of the surface that are pressed", "N");
   number("--directions", s.directions,
-         "of the force at each place: straight, aslant, every fifth pulls", "N");
+         "of the force at each place: straight, aslant, every fifth pulls; local: [5]", "N");
   number("--magnitudes", s.magnitudes, "of the force in each direction, equal parts", "N");
   number("--force", s.force_n, "the largest", "NEWTON");
   number("--radius", command.radius_mm, "of the patch that is pressed; 0: single nodes", "MM");
@@ -344,11 +380,23 @@ void add_reduce_command(CLI::App& app, ReduceCommand& command) {
   number("--check", command.check_places,
          "places outside the training at which the result is compared; 0: none", "N");
   number("--check-creep", command.check_creep, "of these at which creep is compared, too", "N");
+  auto& l = command.local;
+  number("--patch-radius", command.patch_radius_mm, "local: of the patches of the surface", "MM");
+  number("--free-layers", l.free_layers, "local: of nodes around a touched one, 0 to 3", "N");
+  number("--field-nodes", l.field_nodes, "local: whose fields a patch's modes are of", "N");
+  number("--residual", l.residual, "local: what weighted tets may leave of the forces; 0: all tets",
+         "SHARE");
+  number("--patches", l.patches, "local: made at most, from the first outwards; 0: all", "N");
   number("--seed", s.seed, "chooses the first place", "S");
   number("--threads", s.threads, "of the full model", "N");
 }
 
 Status run_reduce(ReduceCommand command) {
+  if (command.method == "local") return run_reduce_local(std::move(command));
+  for (const char* option :
+       {"--patch-radius", "--free-layers", "--field-nodes", "--residual", "--patches"})
+    if (command.app->count(option) > 0)
+      return Error{ErrorCode::Usage, std::string(option) + ": is of --method local"};
   command.settings.radius_m = command.radius_mm * 1e-3;
   command.settings.influence_m = command.influence_mm * 1e-3;
   if (auto s = validate(command); !s) return s;
@@ -358,16 +406,7 @@ Status run_reduce(ReduceCommand command) {
   const std::filesystem::path folder =
       command.folder.empty() ? "out/reduce-" + stem : command.folder;
   const std::string out = command.out.empty() ? stem + ".reduction" : command.out;
-  std::error_code failed;
-  std::filesystem::create_directories(folder, failed);
-  if (failed)
-    return Error{ErrorCode::ResourceMissing,
-                 folder.string() + ": cannot be made (" + failed.message() + "), see --results"};
-  // Not after minutes of work.
-  if (const auto parent = std::filesystem::path(out).parent_path();
-      !parent.empty() && !std::filesystem::is_directory(parent, failed))
-    return Error{ErrorCode::ResourceMissing,
-                 out + ": cannot be written, its folder is not there, see --out"};
+  if (auto c = check_outputs(folder, out); !c) return c;
   const auto outcome = reduce(*organ, command);
   if (!outcome) return outcome.error();
   if (auto s = scene::write_reduction(out, outcome->built.reduction); !s) return s;

@@ -34,6 +34,19 @@ Status check(const scene::Organ& organ) {
   return {};
 }
 
+// To first order, for I1 from 3 up: what Psi'' adds to the resistance against growth of volume, 4
+// Psi''(3), is the bulk modulus's there.
+scene::HyperelasticMaterial near_rest(scene::HyperelasticMaterial material) {
+  if (material.split == scene::VolumeSplit::Unsplit)
+    material.bulk_modulus_pa += 4 * (material.energy == scene::StrainEnergy::Exponential
+                                         ? material.coefficients_pa[0] * material.exponent
+                                         : 2 * material.coefficients_pa[1]);
+  material.energy = scene::StrainEnergy::ReducedPolynomial;
+  material.exponent = 0;
+  std::fill(material.coefficients_pa.begin() + 1, material.coefficients_pa.end(), 0.0);
+  return material;
+}
+
 Problem problem_of(const scene::Organ& organ) {
   Problem problem;
   problem.mesh = finite_elements::make_elements(organ.mesh, organ.mesh.rest_positions,
@@ -52,6 +65,12 @@ Problem problem_of(const scene::Organ& organ) {
 
 }  // namespace
 
+struct FullModel::RestFactors {
+  Eigen::CholmodSupernodalLLT<finite_elements::SparseMatrix, Eigen::Lower> llt;
+};
+
+FullModel::~FullModel() = default;
+
 Result<std::unique_ptr<FullModel>> FullModel::create(const scene::Organ& organ, unsigned threads) {
   if (auto s = check(organ); !s) return s.error();
   auto problem = problem_of(organ);
@@ -68,7 +87,10 @@ FullModel::FullModel(const scene::Organ& organ, Problem problem, unsigned thread
       std::move(elastic),
       finite_elements::SolverSettings{.threads = threads, .tolerance = kTolerance});
   elastic_rest_ = elastic_->state();
+  rest_problem_ = elastic_->problem();
+  for (auto& material : rest_problem_.materials) material = near_rest(material);
   assembler_ = std::make_unique<finite_elements::Assembler>(elastic_->problem(), threads);
+  rest_assembler_ = std::make_unique<finite_elements::Assembler>(rest_problem_, threads);
   tangent_ = assembler_->pattern().zeros();
 }
 
@@ -96,24 +118,38 @@ bool FullModel::assemble(const Vector& displacements) {
   Vector forces = Vector::Zero(displacements.size()), product = forces;
   const Vector direction = forces;
   std::fill_n(tangent_.valuePtr(), tangent_.nonZeros(), 0.0);
-  return assembler_->add_forces_and_tangent(displacements, 0, {}, direction, forces, product,
-                                            tangent_);
+  auto& assembler = displacements.isZero(0) ? *rest_assembler_ : *assembler_;
+  return assembler.add_forces_and_tangent(displacements, 0, {}, direction, forces, product,
+                                          tangent_);
 }
 
-Vector FullModel::linear_displacements(const Vector& forces) {
-  const bool is_admissible = assemble(Vector::Zero(forces.size()));
+finite_elements::SparseMatrix FullModel::rest_tangent() {
+  const bool is_admissible = assemble(Vector::Zero(static_cast<Eigen::Index>(dof_count())));
   TROCAR_ASSERT(is_admissible);
-  const auto& numbers = assembler_->pattern().free_of_dof();
-  Vector free(static_cast<Eigen::Index>(assembler_->pattern().free_count()));
+  return tangent_;
+}
+
+Matrix FullModel::linear_displacements(const Matrix& forces) {
+  if (rest_factors_ == nullptr) {
+    rest_factors_ = std::make_unique<RestFactors>();
+    rest_factors_->llt.compute(rest_tangent());
+    TROCAR_ASSERT(rest_factors_->llt.info() == Eigen::Success);
+  }
+  const auto& numbers = free_of_dof();
+  Matrix free(static_cast<Eigen::Index>(assembler_->pattern().free_count()), forces.cols());
   for (std::size_t dof = 0; dof < numbers.size(); ++dof)
-    if (numbers[dof] >= 0) free[numbers[dof]] = forces[static_cast<Eigen::Index>(dof)];
-  Eigen::CholmodSupernodalLLT<finite_elements::SparseMatrix, Eigen::Lower> factors(tangent_);
-  TROCAR_ASSERT(factors.info() == Eigen::Success);
-  const Vector solution = factors.solve(free);
-  Vector all = Vector::Zero(forces.size());
+    if (numbers[dof] >= 0) free.row(numbers[dof]) = forces.row(static_cast<Eigen::Index>(dof));
+  const Matrix solution = rest_factors_->llt.solve(free);
+  Matrix all = Matrix::Zero(forces.rows(), forces.cols());
   for (std::size_t dof = 0; dof < numbers.size(); ++dof)
-    if (numbers[dof] >= 0) all[static_cast<Eigen::Index>(dof)] = solution[numbers[dof]];
+    if (numbers[dof] >= 0) all.row(static_cast<Eigen::Index>(dof)) = solution.row(numbers[dof]);
   return all;
+}
+
+std::optional<Vector> FullModel::resistance(const Vector& displacements) {
+  Vector forces = Vector::Zero(displacements.size());
+  if (!assembler_->add_forces(displacements, 0, forces)) return std::nullopt;
+  return forces;
 }
 
 std::optional<Matrix> FullModel::reduced_tangent(const Vector& displacements, const Matrix& modes) {

@@ -37,6 +37,7 @@ void run_locking(const Lab& lab, Section& section);
 void run_dogan_creep(const Lab& lab, Section& section);
 void run_dogan_live(const Lab& lab, Section& section);
 void run_dogan_reduction(const Lab& lab, Section& section);
+void run_local_reduction(const Lab& lab, Section& section);
 
 void run_propagation_lattice(const Lab& lab, Section& section);
 void run_propagation_liver(const Lab& lab, Section& section);

@@ -1,0 +1,407 @@
+#include "server/reduction/local_build.h"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <limits>
+#include <mutex>
+#include <numbers>
+#include <thread>
+
+#include "common/scene/any_material.h"
+#include "server/reduction/cubature.h"
+#include "server/reduction/patch_fields.h"
+#include "server/reduction/presses.h"
+
+namespace trocar::reduction {
+namespace {
+
+using scene::LocalPatch;
+
+constexpr double kSlant = 40 * std::numbers::pi / 180;
+constexpr std::array kShares{0.5, 1.0};
+// Fields of nodes a little beyond a patch count for its modes, too.
+constexpr double kFieldMargin_m = 0.008;
+// Presses at centres within so many radii count for a patch's modes, and for its cubature.
+constexpr double kModeRadii = 3, kCubatureRadii = 1.7;
+constexpr std::size_t kMaxCubatureTets = 800;
+// The equations of a cubature, one per field and state, are added up with random signs to so many,
+// in which residuals are those of all within a few per cent.
+constexpr std::size_t kCubatureRows = 2048;
+
+Eigen::Index index(std::size_t i) {
+  return static_cast<Eigen::Index>(i);
+}
+
+// splitmix64
+std::uint64_t mixed(std::uint64_t x) {
+  x += 0x9e3779b97f4a7c15;
+  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9;
+  x = (x ^ (x >> 27)) * 0x94d049bb133111eb;
+  return x ^ (x >> 31);
+}
+
+// All presses at one centre.
+struct Pressed {
+  std::vector<Vector> fields;
+  std::size_t failed = 0;
+};
+
+class Builder {
+ public:
+  Builder(const scene::Organ& organ, const LocalSettings& settings, const LocalProgress& progress,
+          std::vector<std::unique_ptr<FullModel>> models)
+      : organ_(organ),
+        settings_(settings),
+        progress_(progress),
+        normals_(mesh::surface_normals(organ.mesh)),
+        models_(std::move(models)),
+        accessible_(accessible_nodes(organ, settings.patch_radius_m)) {
+    std::ranges::sort(accessible_);
+    masses_.assign(organ_.mesh.node_count(), 0.0);
+    const auto materials = scene::material_map(organ_).tets;
+    for (std::uint32_t t = 0; t < organ_.mesh.tets.size(); ++t)
+      for (const auto n : organ_.mesh.tets[t])
+        masses_[n.value] += mesh::tet_volume(organ_.mesh, TetIndex(t)) / 4 *
+                            scene::material_at(organ_, materials[t]).density_kg_m3;
+  }
+
+  bool has_work() const { return !accessible_.empty(); }
+  LocalBuilt build() {
+    auto& r = built_.reduction;
+    r.source = organ_.name + ", " + std::to_string(settings_.modes) + " modes, patches of " +
+               std::to_string(std::lround(settings_.patch_radius_m * 1e3)) + " mm, seed " +
+               std::to_string(settings_.seed);
+    r.mesh_hash = scene::mesh_hash(organ_);
+    r.elasticity_hash = scene::elasticity_hash(organ_);
+    r.node_count = static_cast<std::uint32_t>(organ_.mesh.node_count());
+    r.force_n = settings_.force_n;
+    r.free_layers = settings_.free_layers;
+    choose_patches();
+    find_greens();
+    press_centres();
+    auto& patches = r.patches;
+    built_.nonlinear.resize(patches.size());
+    built_.residuals.resize(patches.size());
+    for_each(LocalStage::Patches, patches.size(),
+             [&](FullModel& model, std::size_t i) { make(model, i); });
+    return std::move(built_);
+  }
+
+ private:
+  const Vec3d& at(NodeIndex node) const { return organ_.mesh.rest_positions[node.value]; }
+  double distance(NodeIndex a, NodeIndex b) const { return length(at(a) - at(b)); }
+  bool is_accessible(NodeIndex node) const { return std::ranges::binary_search(accessible_, node); }
+
+  // Items in any order, each by one thread with its model.
+  template <typename Work>
+  void for_each(LocalStage stage, std::size_t count, Work&& work) {
+    std::atomic<std::size_t> next{0};
+    std::size_t done = 0;
+    std::mutex mutex;
+    const auto run = [&](FullModel& model) {
+      for (std::size_t i = next++; i < count; i = next++) {
+        work(model, i);
+        const std::scoped_lock lock(mutex);
+        ++done;
+        if (progress_) progress_(stage, done, count);
+      }
+    };
+    std::vector<std::jthread> others;
+    for (std::size_t i = 1; i < models_.size(); ++i)
+      others.emplace_back([&, i] { run(*models_[i]); });
+    run(*models_[0]);
+  }
+
+  void choose_patches() {
+    // Farthest first, until every node is within the radius of a centre.
+    std::vector<double> far(accessible_.size(), std::numeric_limits<double>::infinity());
+    std::vector<NodeIndex> centres, owner(accessible_.size());
+    std::size_t next = settings_.seed % accessible_.size();
+    do {
+      const auto centre = accessible_[next];
+      centres.push_back(centre);
+      for (std::size_t i = 0; i < accessible_.size(); ++i)
+        if (const double d = distance(accessible_[i], centre); d < far[i])
+          far[i] = d, owner[i] = centre;
+      next = static_cast<std::size_t>(std::ranges::max_element(far) - far.begin());
+    } while (far[next] > settings_.patch_radius_m);
+    const auto first = centres.front();
+    std::ranges::stable_sort(centres, {}, [&](NodeIndex c) { return distance(c, first); });
+    if (settings_.patches > 0 && settings_.patches < centres.size())
+      centres.resize(settings_.patches);
+    for (const auto centre : centres) {
+      auto& patch = built_.reduction.patches.emplace_back();
+      patch.centre = centre;
+      for (std::size_t i = 0; i < accessible_.size(); ++i)
+        if (owner[i] == centre) patch.members.push_back(accessible_[i]);
+      patch.reach = patch.members;
+      for (const auto node : patch.members)
+        for (const auto other : organ_.mesh.node_neighbours[node])
+          if (is_accessible(other)) patch.reach.push_back(other);
+      std::ranges::sort(patch.reach);
+      patch.reach.erase(std::ranges::unique(patch.reach).begin(), patch.reach.end());
+    }
+  }
+
+  // The centre, and nodes spread around it.
+  std::vector<NodeIndex> field_nodes(const LocalPatch& patch) const {
+    std::vector<NodeIndex> near;
+    for (const auto node : accessible_)
+      if (node != patch.centre &&
+          distance(node, patch.centre) <= settings_.patch_radius_m + kFieldMargin_m)
+        near.push_back(node);
+    const std::array taken{patch.centre};
+    auto nodes = spread_nodes(organ_, near, settings_.field_nodes - 1, 0, taken);
+    nodes.push_back(patch.centre);
+    return nodes;
+  }
+
+  void find_greens() {
+    std::vector<NodeIndex> nodes;
+    for (const auto& patch : built_.reduction.patches) {
+      nodes.insert(nodes.end(), patch.reach.begin(), patch.reach.end());
+      const auto fields = field_nodes(patch);
+      nodes.insert(nodes.end(), fields.begin(), fields.end());
+    }
+    std::ranges::sort(nodes);
+    nodes.erase(std::ranges::unique(nodes).begin(), nodes.end());
+    auto& greens = built_.reduction.greens;
+    greens.resize(nodes.size());
+    for_each(LocalStage::Greens, nodes.size(), [&](FullModel& model, std::size_t i) {
+      const auto length = model.dof_count();
+      Matrix unit = Matrix::Zero(index(length), 3);
+      unit.middleRows<3>(3 * static_cast<Eigen::Index>(nodes[i].value)).setIdentity();
+      const Matrix found = model.linear_displacements(unit);
+      greens[i].node = nodes[i];
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        greens[i].fields[axis] = scene::pack_field({found.data() + axis * length, length});
+    });
+  }
+
+  Matrix greens_of(NodeIndex node) const {
+    const auto& greens = built_.reduction.greens;
+    const auto found = std::ranges::lower_bound(greens, node, {}, &scene::GreensFunction::node);
+    TROCAR_ASSERT(found != greens.end() && found->node == node);
+    Matrix fields(3 * index(organ_.mesh.node_count()), 3);
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      unpack(found->fields[axis], fields.col(index(axis)));
+    return fields;
+  }
+
+  void press_centres() {
+    const auto& patches = built_.reduction.patches;
+    pressed_.resize(patches.size());
+    if (settings_.directions == 0) return;
+    for_each(LocalStage::Presses, patches.size(), [&](FullModel& model, std::size_t i) {
+      const auto node = patches[i].centre;
+      for (const Vec3d& direction : press_directions(normals_[node.value], i * settings_.directions,
+                                                     settings_.directions, kSlant)) {
+        auto found =
+            model.displacements(model.forces_of({node, direction * settings_.force_n}), kShares);
+        pressed_[i].failed += kShares.size() - found.size();
+        std::ranges::move(found, std::back_inserter(pressed_[i].fields));
+      }
+    });
+    for (std::size_t i = 0; i < patches.size(); ++i) {
+      built_.pressed.push_back(patches[i].centre);
+      built_.failed += pressed_[i].failed;
+    }
+  }
+
+  // Fields of presses at centres within a distance.
+  std::vector<Vector> presses_near(const LocalPatch& patch, double radius_m) const {
+    std::vector<Vector> near;
+    const auto& patches = built_.reduction.patches;
+    for (std::size_t i = 0; i < patches.size(); ++i)
+      if (distance(patches[i].centre, patch.centre) <= radius_m)
+        near.insert(near.end(), pressed_[i].fields.begin(), pressed_[i].fields.end());
+    return near;
+  }
+
+  void make(FullModel& model, std::size_t number) {
+    auto& patch = built_.reduction.patches[number];
+    const auto nodes = field_nodes(patch);
+    const auto presses = presses_near(patch, kModeRadii * settings_.patch_radius_m);
+    auto states = presses_near(patch, kCubatureRadii * settings_.patch_radius_m);
+    Matrix fields(index(model.dof_count()), index(9 * nodes.size() + presses.size()));
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+      const Matrix series = series_of(model, greens_of(nodes[i]), settings_.force_n);
+      fields.middleCols(index(9 * i), 9) = series;
+      const Vec3d& n = normals_[nodes[i].value];
+      if (auto state = state_of(model, series, {-n.x, -n.y, -n.z}))
+        states.push_back(std::move(*state));
+    }
+    for (std::size_t i = 0; i < presses.size(); ++i)
+      fields.col(index(9 * nodes.size() + i)) = presses[i];
+    const Matrix modes = karhunen_loeve(fields, settings_.modes).modes;
+    for (Eigen::Index i = 0; i < modes.cols(); ++i)
+      patch.modes.push_back(
+          scene::pack_field({modes.col(i).data(), static_cast<std::size_t>(modes.rows())}));
+    // As they will be read.
+    Matrix basis(modes.rows(), index(patch.field_count()));
+    for (std::size_t i = 0; i < patch.modes.size(); ++i)
+      unpack(patch.modes[i], basis.col(index(i)));
+    for (std::size_t i = 0; i < patch.reach.size(); ++i)
+      basis.middleCols(index(patch.modes.size() + 3 * i), 3) = greens_of(patch.reach[i]);
+    find_inner_tets(patch);
+    patch.outer_stiffness = lower(outer_stiffness(model, patch, basis));
+    Matrix weighted = basis;
+    for (Eigen::Index i = 0; i < basis.rows(); ++i)
+      weighted.row(i) *= masses_[static_cast<std::size_t>(i / 3)];
+    patch.mass = lower(basis.transpose() * weighted);
+    find_patch_cubature(model, number, basis, states);
+  }
+
+  // All tets of nodes that can be free.
+  void find_inner_tets(LocalPatch& patch) const {
+    const auto& mesh = organ_.mesh;
+    std::vector<std::uint8_t> is_near(mesh.node_count(), 0);
+    for (const auto node : patch.members) is_near[node.value] = 1;
+    for (std::uint32_t layer = 0; layer < settings_.free_layers; ++layer) {
+      const auto before = is_near;
+      for (std::uint32_t n = 0; n < before.size(); ++n)
+        if (before[n] != 0)
+          for (const auto other : mesh.node_neighbours[NodeIndex(n)]) is_near[other.value] = 1;
+    }
+    for (std::uint32_t t = 0; t < mesh.tets.size(); ++t)
+      if (std::ranges::any_of(mesh.tets[t], [&](NodeIndex n) { return is_near[n.value] != 0; }))
+        patch.inner_tets.push_back(TetIndex(t));
+  }
+
+  static std::vector<double> lower(const Matrix& m) {
+    std::vector<double> rows;
+    for (Eigen::Index i = 0; i < m.rows(); ++i)
+      for (Eigen::Index j = 0; j <= i; ++j) rows.push_back((m(i, j) + m(j, i)) / 2);
+    return rows;
+  }
+
+  static Matrix outer_stiffness(FullModel& model, const LocalPatch& patch, const Matrix& basis) {
+    const auto& numbers = model.free_of_dof();
+    const auto tangent = model.rest_tangent();
+    Matrix free(tangent.rows(), basis.cols());
+    for (std::size_t dof = 0; dof < numbers.size(); ++dof)
+      if (numbers[dof] >= 0) free.row(numbers[dof]) = basis.row(index(dof));
+    const Matrix product = tangent.selfadjointView<Eigen::Lower>() * free;
+    Matrix k = free.transpose() * product;
+    for (const auto tet : patch.inner_tets) {
+      const TetForces forces(model, tet);
+      const Matrix gradients = forces.gradients(basis);
+      Matrix stresses(9, basis.cols());
+      for (Eigen::Index c = 0; c < basis.cols(); ++c)
+        Eigen::Map<Matrix3>(stresses.col(c).data()) =
+            forces.linear_stress(Eigen::Map<const Matrix3>(gradients.col(c).data()));
+      k.noalias() -= forces.volume() * gradients.transpose() * stresses;
+    }
+    return k;
+  }
+
+  void find_patch_cubature(FullModel& model, std::size_t number, const Matrix& basis,
+                           const std::vector<Vector>& states) {
+    auto& patch = built_.reduction.patches[number];
+    std::vector<TetIndex> outer;
+    for (std::uint32_t t = 0; t < organ_.mesh.tets.size(); ++t)
+      if (!std::ranges::binary_search(patch.inner_tets, TetIndex(t))) outer.push_back(TetIndex(t));
+    if (settings_.residual == 0) {
+      for (const auto tet : outer) patch.cubature.push_back({tet, 1});
+      return;
+    }
+    const auto fields = basis.cols();
+    // Every field in units of the forces that it bears in these states.
+    Matrix whole(fields, index(states.size()));
+    for (std::size_t s = 0; s < states.size(); ++s) {
+      const auto forces = model.resistance(states[s]);
+      TROCAR_ASSERT(forces.has_value());
+      whole.col(index(s)) = basis.transpose() * *forces;
+    }
+    Vector scale = whole.rowwise().norm();
+    const double least = 1e-3 * scale.maxCoeff();
+    scale = scale.cwiseMax(least).cwiseInverse();
+    const double norm = (scale.asDiagonal() * whole).norm();
+    const auto rows = std::min(kCubatureRows, static_cast<std::size_t>(fields) * states.size());
+    Eigen::MatrixXf a = Eigen::MatrixXf::Zero(index(rows), index(outer.size()));
+    Vector sums = Vector::Zero(index(rows));
+    for (std::size_t o = 0; o < outer.size(); ++o) {
+      const TetForces forces(model, outer[o]);
+      const Matrix gradients = forces.gradients(basis);
+      Vector column = Vector::Zero(index(rows));
+      for (std::size_t s = 0; s < states.size(); ++s) {
+        const auto stress = forces.nonlinear_stress(forces.gradient(states[s]));
+        if (!stress) continue;
+        const Eigen::Map<const Eigen::Matrix<double, 9, 1>> p(stress->data());
+        const Vector part = scale.cwiseProduct(forces.volume() * (gradients.transpose() * p));
+        for (Eigen::Index c = 0; c < fields; ++c) {
+          const auto hash =
+              mixed(s * static_cast<std::size_t>(fields) + static_cast<std::size_t>(c));
+          const double sign = (hash & 1) != 0 ? 1 : -1;
+          column[index((hash >> 1) % rows)] += sign * part[c];
+        }
+      }
+      a.col(index(o)) = column.cast<float>();
+      sums += column;
+    }
+    built_.nonlinear[number] = sums.norm() / norm;
+    if (sums.isZero(0)) return;
+    const auto found =
+        find_cubature(a, sums, settings_.residual * norm / sums.norm(), kMaxCubatureTets);
+    for (std::size_t i = 0; i < found.columns.size(); ++i)
+      patch.cubature.push_back({outer[found.columns[i]], static_cast<float>(found.weights[i])});
+    built_.residuals[number] = found.residual * sums.norm() / norm;
+  }
+
+  const scene::Organ& organ_;
+  const LocalSettings& settings_;
+  const LocalProgress& progress_;
+  const std::vector<Vec3d> normals_;
+  const std::vector<std::unique_ptr<FullModel>> models_;  // one per thread
+  std::vector<NodeIndex> accessible_;                     // ascending
+  std::vector<double> masses_;                            // kg, per node
+  std::vector<Pressed> pressed_;                          // per patch
+  LocalBuilt built_;
+};
+
+}  // namespace
+
+Status validate(const LocalSettings& s) {
+  const auto wrong = [](const std::string& what) { return Error{ErrorCode::Usage, what}; };
+  const auto count = [&](const char* option, std::size_t value, std::size_t low,
+                         std::size_t high) -> Status {
+    if (value >= low && value <= high) return {};
+    return wrong(std::string(option) + ": " + std::to_string(value) + " is not from " +
+                 std::to_string(low) + " to " + std::to_string(high));
+  };
+  if (auto c = count("--modes", s.modes, 1, scene::kMaxReducedModes); !c) return c;
+  if (auto c = count("--free-layers", s.free_layers, 0, 3); !c) return c;
+  if (auto c = count("--directions", s.directions, 0, 20); !c) return c;
+  if (auto c = count("--field-nodes", s.field_nodes, 1, 100); !c) return c;
+  if (auto c = count("--patches", s.patches, 0, 4096); !c) return c;
+  if (auto c = count("--threads", s.threads, 1, kMaxWorkers); !c) return c;
+  if (!(s.force_n > 0 && s.force_n <= 100)) return wrong("--force: must be above 0, at most 100 N");
+  if (!(s.patch_radius_m >= 1e-3 && s.patch_radius_m <= 0.2))
+    return wrong("--patch-radius: must be from 1 to 200 mm");
+  if (!(s.residual >= 0 && s.residual <= 0.1)) return wrong("--residual: must be from 0 to 0.1");
+  return {};
+}
+
+Result<LocalBuilt> build_local(const scene::Organ& organ, const LocalSettings& settings,
+                               const LocalProgress& progress) {
+  if (scene::any_material(organ, [](const scene::Material& m) {
+        return m.elastic_law == scene::ElasticLaw::Measured &&
+               m.measured.split != scene::VolumeSplit::Unsplit;
+      }))
+    return Error{ErrorCode::BadFile,
+                 organ.name + ": has a measured law that is split, which sessions do not have"};
+  std::vector<std::unique_ptr<FullModel>> models;
+  for (unsigned i = 0; i < settings.threads; ++i) {
+    auto model = FullModel::create(organ);
+    if (!model) return model.error();
+    models.push_back(std::move(*model));
+  }
+  Builder builder(organ, settings, progress, std::move(models));
+  if (!builder.has_work())
+    return Error{ErrorCode::BadFile, organ.name + ": has no surface that is not held"};
+  return builder.build();
+}
+
+}  // namespace trocar::reduction

@@ -1,0 +1,313 @@
+#include "server/reduction/local_solver.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "server/reduction/element_set.h"
+#include "server/reduction/karhunen_loeve.h"
+
+namespace trocar::reduction {
+namespace {
+
+using RowMatrixF = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+using VectorF = Eigen::VectorXf;
+
+constexpr int kMaxIterations = 60, kMaxHalvings = 10;
+// A step that moves no node near the contact by more than this part of the farthest one's way was
+// the last: single precision is not far below.
+constexpr float kSettled = 1e-4F;
+// A tangent is made anew when an iteration with it leaves more than this part of the residual.
+constexpr double kSlow = 0.35;
+
+Eigen::Index index(std::size_t i) {
+  return static_cast<Eigen::Index>(i);
+}
+double entry(const std::vector<double>& lower, std::size_t i, std::size_t j) {
+  return i >= j ? lower[i * (i + 1) / 2 + j] : lower[j * (j + 1) / 2 + i];
+}
+
+}  // namespace
+
+struct LocalSolver::Contact {
+  // A field of the basis and where it stands among the patch's.
+  struct Field {
+    const scene::PackedField* packed;
+    std::size_t at;
+  };
+
+  Contact(const scene::LocalReduction& reduction, const scene::Organ& organ,
+          const scene::LocalPatch& of, std::span<const NodeIndex> touched)
+      : patch(of) {
+    choose_fields(reduction, touched);
+    choose_nodes(organ, touched, reduction.free_layers);
+    inner = ElementSet(organ, patch.inner_tets, {}, nodes);
+    std::vector<TetIndex> tets;
+    std::vector<float> weights;
+    for (const auto& [tet, weight] : patch.cubature) tets.push_back(tet), weights.push_back(weight);
+    outer = ElementSet(organ, tets, weights, nodes);
+    std::vector<BlockMatrix::Pair> pairs;
+    inner.add_pairs(pairs);
+    for (std::uint32_t n = 0; n < nodes.size(); ++n) pairs.push_back({n, n});
+    tangent = BlockMatrix(nodes.size(), std::move(pairs));
+    phi.resize(index(3 * nodes.size()), index(fields.size()));
+    for (std::size_t n = 0; n < nodes.size(); ++n)
+      for (std::size_t k = 0; k < 3; ++k)
+        for (std::size_t c = 0; c < fields.size(); ++c)
+          phi(index(3 * n + k), index(c)) =
+              static_cast<float>(fields[c].packed->values[3 * nodes[n].value + k]) *
+              fields[c].packed->step;
+    stiffness.resize(index(fields.size()), index(fields.size()));
+    for (std::size_t i = 0; i < fields.size(); ++i)
+      for (std::size_t j = 0; j < fields.size(); ++j)
+        stiffness(index(i), index(j)) = entry(patch.outer_stiffness, fields[i].at, fields[j].at);
+    q = Vector::Zero(index(fields.size()));
+    a = Vector::Zero(index(3 * free.size()));
+    u.assign(3 * nodes.size(), 0);
+  }
+
+  void choose_fields(const scene::LocalReduction& reduction, std::span<const NodeIndex> touched) {
+    for (std::size_t i = 0; i < patch.modes.size(); ++i) fields.push_back({&patch.modes[i], i});
+    for (const auto node : touched) {
+      const auto at = static_cast<std::size_t>(std::ranges::lower_bound(patch.reach, node) -
+                                               patch.reach.begin());
+      const auto greens =
+          std::ranges::lower_bound(reduction.greens, node, {}, &scene::GreensFunction::node);
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        fields.push_back({&greens->fields[axis], patch.modes.size() + 3 * at + axis});
+    }
+  }
+
+  void choose_nodes(const scene::Organ& organ, std::span<const NodeIndex> touched,
+                    std::uint32_t layers) {
+    const auto add = [&](TetIndex tet) {
+      for (const auto node : organ.mesh.tets[tet.value]) nodes.push_back(node);
+    };
+    for (const auto tet : patch.inner_tets) add(tet);
+    for (const auto& [tet, weight] : patch.cubature) add(tet);
+    std::ranges::sort(nodes);
+    nodes.erase(std::ranges::unique(nodes).begin(), nodes.end());
+    std::vector<NodeIndex> near(touched.begin(), touched.end());
+    for (std::uint32_t layer = 0; layer < layers; ++layer) {
+      const std::size_t count = near.size();
+      for (std::size_t i = 0; i < count; ++i)
+        for (const auto other : organ.mesh.node_neighbours[near[i]]) near.push_back(other);
+      std::ranges::sort(near);
+      near.erase(std::ranges::unique(near).begin(), near.end());
+    }
+    // A free node's tets are all there as they are.
+    const auto is_inner = [&](TetIndex tet) {
+      return std::ranges::binary_search(patch.inner_tets, tet);
+    };
+    for (const auto node : near)
+      if (!std::ranges::binary_search(organ.fixed_nodes, node) &&
+          std::ranges::all_of(organ.mesh.node_tets[node], is_inner))
+        free.push_back(local(node));
+  }
+
+  std::uint32_t local(NodeIndex node) const {
+    const auto found = std::ranges::lower_bound(nodes, node);
+    TROCAR_ASSERT(found != nodes.end() && *found == node);
+    return static_cast<std::uint32_t>(found - nodes.begin());
+  }
+
+  std::size_t unknowns() const { return fields.size() + 3 * free.size(); }
+
+  void place(const Vector& at_q, const Vector& at_a) {
+    Eigen::Map<VectorF> all(u.data(), index(u.size()));
+    all.noalias() = phi * at_q.cast<float>();
+    for (std::size_t i = 0; i < free.size(); ++i)
+      for (std::size_t k = 0; k < 3; ++k)
+        u[3 * free[i] + k] += static_cast<float>(at_a[index(3 * i + k)]);
+  }
+
+  // What is left of the loads, per unknown.
+  Vector residual(std::span<const NodeForce> forces, std::span<const NodeSpring> springs) {
+    place(q, a);
+    f.assign(u.size(), 0);
+    inner.add_forces(ForcePart::Whole, u, f);
+    const auto push = [&](NodeIndex node, const Vec3d& force) {
+      float* at = f.data() + 3 * local(node);
+      at[0] -= static_cast<float>(force.x);
+      at[1] -= static_cast<float>(force.y);
+      at[2] -= static_cast<float>(force.z);
+    };
+    for (const auto& [node, force] : forces) push(node, force);
+    for (const auto& spring : springs)
+      push(spring.node, (spring.target_m - displacement(spring.node)) * spring.stiffness_n_m);
+    Vector r(index(unknowns()));
+    for (std::size_t i = 0; i < free.size(); ++i)
+      for (std::size_t k = 0; k < 3; ++k)
+        r[index(fields.size() + 3 * i + k)] = -static_cast<double>(f[3 * free[i] + k]);
+    outer.add_forces(ForcePart::Nonlinear, u, f);
+    const VectorF along = phi.transpose() * Eigen::Map<const VectorF>(f.data(), index(f.size()));
+    r.head(index(fields.size())) = -(along.cast<double>() + stiffness * q);
+    return r;
+  }
+
+  void make_factors(std::span<const NodeSpring> springs) {
+    for (const bool with_stress : {true, false}) {
+      tangent.clear();
+      inner.add_tangent(u, with_stress, tangent);
+      for (const auto& spring : springs) {
+        auto& block = tangent.at(local(spring.node), local(spring.node));
+        for (const std::size_t i : {0, 4, 8}) block[i] += static_cast<float>(spring.stiffness_n_m);
+      }
+      const auto m = index(fields.size());
+      RowMatrixF product = RowMatrixF::Zero(phi.rows(), m);
+      for (std::size_t row = 0; row < nodes.size(); ++row) {
+        const auto columns = tangent.columns(row);
+        const auto blocks = tangent.blocks(row);
+        for (std::size_t i = 0; i < columns.size(); ++i)
+          product.middleRows<3>(index(3 * row)).noalias() +=
+              Eigen::Map<const Eigen::Matrix<float, 3, 3, Eigen::RowMajor>>(blocks[i].data()) *
+              phi.middleRows<3>(index(3 * columns[i]));
+      }
+      Matrix h = Matrix::Zero(index(unknowns()), index(unknowns()));
+      const Eigen::MatrixXf of_fields = phi.transpose() * product;
+      h.topLeftCorner(m, m) = stiffness + of_fields.cast<double>();
+      for (std::size_t i = 0; i < free.size(); ++i) {
+        h.block(m + index(3 * i), 0, 3, m) =
+            product.middleRows<3>(index(3 * free[i])).cast<double>();
+        for (std::size_t j = 0; j < free.size(); ++j) {
+          const auto columns = tangent.columns(free[i]);
+          const auto found = std::ranges::lower_bound(columns, free[j]);
+          if (found == columns.end() || *found != free[j]) continue;
+          const auto& block =
+              tangent.blocks(free[i])[static_cast<std::size_t>(found - columns.begin())];
+          h.block<3, 3>(m + index(3 * i), m + index(3 * j)) =
+              Eigen::Map<const Eigen::Matrix<float, 3, 3, Eigen::RowMajor>>(block.data())
+                  .cast<double>();
+        }
+      }
+      factors.compute(h);
+      if (factors.info() == Eigen::Success) return;
+    }
+  }
+
+  float farthest_from(const std::vector<float>& other) const {
+    float most = 0;
+    for (std::size_t i = 0; i < u.size(); ++i) most = std::max(most, std::abs(u[i] - other[i]));
+    return most;
+  }
+  float farthest() const {
+    float most = 0;
+    for (const float part : u) most = std::max(most, std::abs(part));
+    return most;
+  }
+  Vec3d displacement(NodeIndex node) const {
+    const float* at = u.data() + 3 * local(node);
+    return {static_cast<double>(at[0]), static_cast<double>(at[1]), static_cast<double>(at[2])};
+  }
+
+  const scene::LocalPatch& patch;
+  std::vector<Field> fields;
+  std::vector<NodeIndex> nodes;     // of the tets; ascending
+  std::vector<std::uint32_t> free;  // local
+  ElementSet inner, outer;
+  RowMatrixF phi;    // of the fields at the nodes
+  Matrix stiffness;  // of the outer tets at rest
+  BlockMatrix tangent;
+  Eigen::LLT<Matrix> factors;
+  bool has_factors = false;
+  Vector q, a;
+  std::vector<float> u, f;
+};
+
+LocalSolver::LocalSolver(const scene::LocalReduction& reduction, const scene::Organ& organ)
+    : reduction_(reduction), organ_(organ) {}
+LocalSolver::~LocalSolver() = default;
+
+bool LocalSolver::touch(std::span<const NodeIndex> nodes) {
+  const auto reaches = [&](const scene::LocalPatch& patch) {
+    return std::ranges::all_of(
+        nodes, [&](NodeIndex n) { return std::ranges::binary_search(patch.reach, n); });
+  };
+  // The patch that the first node belongs to, if it reaches the others.
+  const scene::LocalPatch* best = nullptr;
+  for (const auto& patch : reduction_.patches) {
+    if (!reaches(patch)) continue;
+    const bool is_home = std::ranges::binary_search(patch.members, nodes.front());
+    if (best == nullptr || is_home) best = &patch;
+    if (is_home) break;
+  }
+  if (best == nullptr) return false;
+  contact_ = std::make_unique<Contact>(reduction_, organ_, *best, nodes);
+  return true;
+}
+
+LocalSolver::Sizes LocalSolver::sizes() const {
+  if (contact_ == nullptr) return {};
+  const auto& c = *contact_;
+  return {c.patch.modes.size(), c.fields.size() - c.patch.modes.size(), c.free.size(),
+          c.inner.tet_count(), c.outer.tet_count()};
+}
+
+LocalSolver::Report LocalSolver::solve(std::span<const NodeForce> forces,
+                                       std::span<const NodeSpring> springs) {
+  TROCAR_ASSERT(contact_ != nullptr);
+  auto& c = *contact_;
+  Report report;
+  Vector r = c.residual(forces, springs);
+  double before = r.norm();
+  std::vector<float> from;
+  while (!report.is_converged && before > 0 && report.iterations < kMaxIterations) {
+    const bool is_fresh = !c.has_factors;
+    if (is_fresh) {
+      c.make_factors(springs);
+      c.has_factors = true;
+      ++report.factors;
+    }
+    const Vector step = c.factors.solve(r);
+    const Vector q = c.q, a = c.a;
+    from = c.u;
+    double part = 1, after = 0;
+    for (int halvings = 0; halvings <= kMaxHalvings; ++halvings, part /= 2) {
+      c.q = q + part * step.head(q.size());
+      c.a = a + part * step.tail(a.size());
+      r = c.residual(forces, springs);
+      after = r.norm();
+      if (after < before) break;
+    }
+    ++report.iterations;
+    const float moved = c.farthest_from(from), far = c.farthest();
+    if (moved <= kSettled * far * static_cast<float>(part)) {
+      report.is_converged = true;
+    } else if (after >= before) {
+      c.q = q, c.a = a;
+      r = c.residual(forces, springs);
+      if (is_fresh) break;
+      c.has_factors = false;
+      continue;
+    }
+    if (part < 1 || after > kSlow * before) c.has_factors = false;
+    before = after;
+  }
+  report.is_converged = report.is_converged || before == 0;
+  report.residual_n = before;
+  return report;
+}
+
+Vec3d LocalSolver::displacement(NodeIndex node) const {
+  return contact_->displacement(node);
+}
+
+std::vector<Vec3d> LocalSolver::displacements() const {
+  const auto& c = *contact_;
+  std::vector<Vec3d> all(organ_.mesh.node_count());
+  for (std::size_t i = 0; i < c.fields.size(); ++i) {
+    const auto& field = *c.fields[i].packed;
+    const double step = c.q[index(i)] * static_cast<double>(field.step);
+    for (std::size_t n = 0; n < all.size(); ++n) {
+      all[n].x += step * field.values[3 * n];
+      all[n].y += step * field.values[3 * n + 1];
+      all[n].z += step * field.values[3 * n + 2];
+    }
+  }
+  for (std::size_t i = 0; i < c.free.size(); ++i)
+    all[c.nodes[c.free[i]].value] +=
+        Vec3d{c.a[index(3 * i)], c.a[index(3 * i + 1)], c.a[index(3 * i + 2)]};
+  return all;
+}
+
+}  // namespace trocar::reduction

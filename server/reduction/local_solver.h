@@ -1,0 +1,65 @@
+#pragma once
+
+// A local reduction at work: where some surface nodes are touched, the displacements of the whole
+// organ as those of a few unknowns, u = Phi q + E a: q of the patch's modes and the Green's
+// functions of the touched nodes, a of the nodes around them, each free on its own. Newton's method
+// with a tangent that is kept for as long as it is good.
+//
+// Time per iteration: the patch's tets and fields, whatever the mesh. Displacements of all nodes
+// are computed when they are asked for. One caller; deterministic.
+
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "common/scene/local_reduction.h"
+#include "common/scene/organ.h"
+#include "server/reduction/presses.h"
+
+namespace trocar::reduction {
+
+// Holds a node where something is: force = stiffness (target - displacement).
+struct NodeSpring {
+  NodeIndex node;
+  Vec3d target_m;
+  double stiffness_n_m = 0;
+};
+
+class LocalSolver {
+ public:
+  // A reduction of this organ; both must outlive the solver.
+  LocalSolver(const scene::LocalReduction& reduction, const scene::Organ& organ);
+  ~LocalSolver();
+
+  // From now on these nodes are touched; the displacements are 0. False, and nothing has changed,
+  // if no patch reaches all of them.
+  bool touch(std::span<const NodeIndex> nodes);
+
+  struct Sizes {
+    std::size_t modes = 0, greens = 0, free_nodes = 0, inner_tets = 0, cubature_tets = 0;
+    std::size_t unknowns() const { return modes + greens + 3 * free_nodes; }
+  };
+  Sizes sizes() const;
+
+  struct Report {
+    bool is_converged = false;
+    int iterations = 0, factors = 0;
+    double residual_n = 0;  // norm over the unknowns' forces
+  };
+  // Equilibrium with forces on touched or free nodes and springs there, from where it is.
+  Report solve(std::span<const NodeForce> forces, std::span<const NodeSpring> springs = {});
+
+  // Of a node near the contact.
+  Vec3d displacement(NodeIndex node) const;
+  // Of all.
+  std::vector<Vec3d> displacements() const;
+
+ private:
+  struct Contact;
+  const scene::LocalReduction& reduction_;
+  const scene::Organ& organ_;
+  std::unique_ptr<Contact> contact_;
+};
+
+}  // namespace trocar::reduction
