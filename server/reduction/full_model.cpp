@@ -107,8 +107,10 @@ Vector FullModel::linear_displacements(const Vector& forces) {
   Vector free(static_cast<Eigen::Index>(assembler_->pattern().free_count()));
   for (std::size_t dof = 0; dof < numbers.size(); ++dof)
     if (numbers[dof] >= 0) free[numbers[dof]] = forces[static_cast<Eigen::Index>(dof)];
-  Eigen::CholmodSupernodalLLT<finite_elements::SparseMatrix, Eigen::Lower> factors(tangent_);
-  TROCAR_ASSERT(factors.info() == Eigen::Success);
+  finite_elements::SparseFactors factors;
+  factors.analyze(tangent_);
+  const bool is_positive_definite = factors.factor(tangent_);
+  TROCAR_ASSERT(is_positive_definite);
   const Vector solution = factors.solve(free);
   Vector all = Vector::Zero(forces.size());
   for (std::size_t dof = 0; dof < numbers.size(); ++dof)
