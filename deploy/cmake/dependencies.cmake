@@ -36,4 +36,6 @@ find_path(CHOLMOD_INCLUDE cholmod.h PATH_SUFFIXES suitesparse REQUIRED)
 find_library(CHOLMOD_LIBRARY cholmod REQUIRED)
 add_library(trocar_cholmod INTERFACE)
 target_include_directories(trocar_cholmod SYSTEM INTERFACE ${CHOLMOD_INCLUDE})
-target_link_libraries(trocar_cholmod INTERFACE Eigen3::Eigen ${CHOLMOD_LIBRARY})
+# gomp: the OpenMP runtime of GCC that CHOLMOD runs on, by name because FindOpenMP gives clang another
+# one; server/finite_elements/sparse_factors.cpp has to tell it something.
+target_link_libraries(trocar_cholmod INTERFACE Eigen3::Eigen ${CHOLMOD_LIBRARY} gomp)

@@ -67,8 +67,7 @@ Solver::Solver(Problem problem, const SolverSettings& settings)
       acceleration_(u_),
       internal_(u_),
       loads_(no_loads(problem_)) {
-  factors_.cholmod().print = 0;
-  factors_.analyzePattern(tangent_);
+  factors_.analyze(tangent_);
 }
 
 Vector Solver::free_part(const Vector& all) const {
@@ -134,16 +133,11 @@ Solver::Residual Solver::residual_at(const Vector& u, const Part& part) {
 
 // Factors of the tangent, with a growing diagonal until it is positive definite.
 bool Solver::factor(StepReport& report) {
-  factors_.setShift(0);
-  factors_.factorize(tangent_);
-  if (factors_.info() == Eigen::Success) return true;
+  if (factors_.factor(tangent_)) return true;
   ++report.shifted_factors;
   double shift = kFirstShift * tangent_.diagonal().cwiseAbs().mean();
-  for (int i = 0; i < kMaxShifts; ++i, shift *= kShiftGrowth) {
-    factors_.setShift(shift);
-    factors_.factorize(tangent_);
-    if (factors_.info() == Eigen::Success) return true;
-  }
+  for (int i = 0; i < kMaxShifts; ++i, shift *= kShiftGrowth)
+    if (factors_.factor(tangent_, shift)) return true;
   return false;
 }
 

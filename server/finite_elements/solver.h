@@ -18,11 +18,11 @@
 // Errors: none thrown; a report that has not converged leaves the state of the last part that did.
 // One caller; elements are assembled on `threads`.
 
-#include <Eigen/CholmodSupport>
 #include <functional>
 #include <memory>
 
 #include "server/finite_elements/assembler.h"
+#include "server/finite_elements/sparse_factors.h"
 
 namespace trocar::finite_elements {
 
@@ -133,7 +133,7 @@ class Solver {
   const SolverSettings settings_;
   Assembler assembler_;
   SparseMatrix tangent_;
-  Eigen::CholmodSupernodalLLT<SparseMatrix, Eigen::Lower> factors_;
+  SparseFactors factors_;
   double least_force_n_ = 0;  // rounding errors of forces are below
 
   double time_s_ = 0;

@@ -65,12 +65,6 @@ Problem problem_of(const scene::Organ& organ) {
 
 }  // namespace
 
-struct FullModel::RestFactors {
-  Eigen::CholmodSupernodalLLT<finite_elements::SparseMatrix, Eigen::Lower> llt;
-};
-
-FullModel::~FullModel() = default;
-
 Result<std::unique_ptr<FullModel>> FullModel::create(const scene::Organ& organ, unsigned threads) {
   if (auto s = check(organ); !s) return s.error();
   auto problem = problem_of(organ);
@@ -131,15 +125,17 @@ finite_elements::SparseMatrix FullModel::rest_tangent() {
 
 Matrix FullModel::linear_displacements(const Matrix& forces) {
   if (rest_factors_ == nullptr) {
-    rest_factors_ = std::make_unique<RestFactors>();
-    rest_factors_->llt.compute(rest_tangent());
-    TROCAR_ASSERT(rest_factors_->llt.info() == Eigen::Success);
+    rest_factors_ = std::make_unique<finite_elements::SparseFactors>();
+    const auto tangent = rest_tangent();
+    rest_factors_->analyze(tangent);
+    const bool is_positive_definite = rest_factors_->factor(tangent);
+    TROCAR_ASSERT(is_positive_definite);
   }
   const auto& numbers = free_of_dof();
   Matrix free(static_cast<Eigen::Index>(assembler_->pattern().free_count()), forces.cols());
   for (std::size_t dof = 0; dof < numbers.size(); ++dof)
     if (numbers[dof] >= 0) free.row(numbers[dof]) = forces.row(static_cast<Eigen::Index>(dof));
-  const Matrix solution = rest_factors_->llt.solve(free);
+  const Matrix solution = rest_factors_->solve(free);
   Matrix all = Matrix::Zero(forces.rows(), forces.cols());
   for (std::size_t dof = 0; dof < numbers.size(); ++dof)
     if (numbers[dof] >= 0) all.row(static_cast<Eigen::Index>(dof)) = solution.row(numbers[dof]);

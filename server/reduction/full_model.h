@@ -21,7 +21,6 @@ class FullModel {
  public:
   // Error: an organ without tets, of springs or tensor-mass, settled, or under gravity or tension.
   static Result<std::unique_ptr<FullModel>> create(const scene::Organ& organ, unsigned threads = 1);
-  ~FullModel();
 
   // 3 per node, N.
   Vector forces_of(const Press& press) const;
@@ -54,7 +53,6 @@ class FullModel {
   std::size_t dof_count() const { return elastic_->problem().dof_count(); }
 
  private:
-  struct RestFactors;
   FullModel(const scene::Organ& organ, finite_elements::Problem problem, unsigned threads);
   // Fills tangent_ at the displacements. At rest unsplit laws have two tangents, one for each sign
   // of I1 - 3; what shears is on the upper side, so that one is taken.
@@ -67,7 +65,7 @@ class FullModel {
   finite_elements::State elastic_rest_, relaxing_rest_;
   std::unique_ptr<finite_elements::Assembler> assembler_, rest_assembler_;
   finite_elements::SparseMatrix tangent_;
-  std::unique_ptr<RestFactors> rest_factors_;  // made when they are needed
+  std::unique_ptr<finite_elements::SparseFactors> rest_factors_;  // made when they are needed
   const unsigned threads_;
 };
 
