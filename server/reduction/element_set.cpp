@@ -207,9 +207,6 @@ void ElementSet::add_tangent(const Psi& law, const Group& group, std::span<const
     fg[k] = product(f, g[k]);
     area[k] = product(s.cofactors, g[k]);
   }
-  struct alignas(32) Stored {
-    Lanes v[9];
-  };
   for (std::size_t a = 0; a < 4; ++a)
     for (std::size_t b = a; b < 4; ++b) {
       Mat8 block = dynamics::zero_mat8();
@@ -218,19 +215,42 @@ void ElementSet::add_tangent(const Psi& law, const Group& group, std::span<const
       block.add_outer(area[a] * bulk, area[b]);
       if (with_stress && a != b)
         block.add_cross(product(f, cross8(g[a], g[b])) * (all(0) - pressure));
-      Stored stored;
-      const Float8 entries[9]{block.x.x, block.x.y, block.x.z, block.y.x, block.y.y,
-                              block.y.z, block.z.x, block.z.y, block.z.z};
-      for (std::size_t i = 0; i < 9; ++i) store(stored.v[i], entries[i]);
-      for (std::size_t lane = 0; lane < group.used; ++lane) {
-        auto& at = tangent.at(group.nodes[a].v[lane], group.nodes[b].v[lane]);
-        for (std::size_t i = 0; i < 9; ++i) at[i] += stored.v[i].v[lane];
-        if (a == b) continue;
-        auto& across = tangent.at(group.nodes[b].v[lane], group.nodes[a].v[lane]);
-        for (std::size_t i = 0; i < 3; ++i)
-          for (std::size_t j = 0; j < 3; ++j) across[3 * i + j] += stored.v[3 * j + i].v[lane];
-      }
+      add_block(group, a, b, block, tangent);
     }
+}
+
+void ElementSet::add_block(const Group& group, std::size_t a, std::size_t b, const Mat8& block,
+                           BlockMatrix& tangent) {
+  std::array<Lanes, 9> entries;
+  store(entries[0], block.x.x), store(entries[1], block.x.y), store(entries[2], block.x.z);
+  store(entries[3], block.y.x), store(entries[4], block.y.y), store(entries[5], block.y.z);
+  store(entries[6], block.z.x), store(entries[7], block.z.y), store(entries[8], block.z.z);
+  for (std::size_t lane = 0; lane < group.used; ++lane) {
+    auto& at = tangent.at(group.nodes[a].v[lane], group.nodes[b].v[lane]);
+    for (std::size_t i = 0; i < 9; ++i) at[i] += entries[i].v[lane];
+    if (a == b) continue;
+    auto& across = tangent.at(group.nodes[b].v[lane], group.nodes[a].v[lane]);
+    for (std::size_t i = 0; i < 3; ++i)
+      for (std::size_t j = 0; j < 3; ++j) across[3 * i + j] += entries[3 * j + i].v[lane];
+  }
+}
+
+void ElementSet::add_rest_tangent(BlockMatrix& tangent) const {
+  for (const auto& group : groups_) {
+    const Float8 c = load(group.twice_c10_v);
+    const Float8 volumetric = load(group.bulk_v) + load(group.curvature_v) - c;
+    std::array<Vec8, 4> g;
+    for (std::size_t k = 1; k < 4; ++k) g[k] = load(group.gradients[k - 1]);
+    g[0] = dynamics::zero_vec8() - (g[1] + g[2] + g[3]);
+    for (std::size_t a = 0; a < 4; ++a)
+      for (std::size_t b = a; b < 4; ++b) {
+        Mat8 block = dynamics::zero_mat8();
+        block.add_identity(dot8(g[a], g[b]) * c);
+        block.add_outer(g[b] * c, g[a]);
+        block.add_outer(g[a] * volumetric, g[b]);
+        add_block(group, a, b, block, tangent);
+      }
+  }
 }
 
 void ElementSet::add_tangent(std::span<const float> u, bool with_stress,

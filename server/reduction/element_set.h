@@ -31,6 +31,8 @@ class ElementSet {
   void add_forces(ForcePart part, std::span<const float> u, std::span<float> f) const;
   // Pairs of nodes that share a tet.
   void add_pairs(std::vector<BlockMatrix::Pair>& pairs) const;
+  // Adds the tangent at rest, which ForcePart::Nonlinear leaves out.
+  void add_rest_tangent(BlockMatrix& tangent) const;
   // Adds the tangent of the whole forces. Without `with_stress` what stress adds to it is left out:
   // then it is positive semidefinite whatever the strain.
   void add_tangent(std::span<const float> u, bool with_stress, BlockMatrix& tangent) const;
@@ -45,6 +47,8 @@ class ElementSet {
     std::uint32_t used = 0;  // lanes
   };
   struct Strain;
+  static void add_block(const Group& group, std::size_t a, std::size_t b, const dynamics::Mat8& block,
+                        BlockMatrix& tangent);
   static Strain strain_of(const Group& group, std::span<const float> u);
   template <typename Psi>
   void add_forces(const Psi& law, const Group& group, ForcePart part, std::span<const float> u,

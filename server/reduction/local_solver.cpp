@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "server/reduction/element_set.h"
 #include "server/reduction/karhunen_loeve.h"
@@ -27,25 +28,46 @@ double entry(const std::vector<double>& lower, std::size_t i, std::size_t j) {
   return i >= j ? lower[i * (i + 1) / 2 + j] : lower[j * (j + 1) / 2 + i];
 }
 
+template <typename T>
+void sort_once(std::vector<T>& values) {
+  std::ranges::sort(values);
+  values.erase(std::ranges::unique(values).begin(), values.end());
+}
+
 }  // namespace
 
+// Where one patch's nodes are touched.
+struct LocalSolver::Place {
+  const scene::LocalPatch* patch;
+  std::vector<NodeIndex> touched;
+};
+
 struct LocalSolver::Contact {
-  // A field of the basis and where it stands among the patch's.
+  // A field of the basis and where it stands among its patch's.
   struct Field {
     const scene::PackedField* packed;
     std::size_t at;
   };
+  // A patch with its fields, which are beside each other.
+  struct Part {
+    const scene::LocalPatch* patch;
+    Eigen::Index begin = 0, count = 0;
+    ElementSet outer;
+  };
 
+  // rest: the tangent at rest of all tets over all nodes, for contacts of several patches.
   Contact(const scene::LocalReduction& reduction, const scene::Organ& organ,
-          const scene::LocalPatch& of, std::span<const NodeIndex> touched)
-      : patch(of) {
-    choose_fields(reduction, touched);
-    choose_nodes(organ, touched, reduction.free_layers);
-    inner = ElementSet(organ, patch.inner_tets, {}, nodes);
-    std::vector<TetIndex> tets;
-    std::vector<float> weights;
-    for (const auto& [tet, weight] : patch.cubature) tets.push_back(tet), weights.push_back(weight);
-    outer = ElementSet(organ, tets, weights, nodes);
+          std::span<const Place> places, const std::function<const BlockMatrix&()>& rest) {
+    choose_fields(reduction, places);
+    choose_nodes(organ, places, reduction.free_layers);
+    inner = ElementSet(organ, inner_tets, {}, nodes);
+    for (auto& part : parts) {
+      std::vector<TetIndex> tets;
+      std::vector<float> weights;
+      for (const auto& [tet, weight] : part.patch->cubature)
+        tets.push_back(tet), weights.push_back(weight);
+      part.outer = ElementSet(organ, tets, weights, nodes);
+    }
     std::vector<BlockMatrix::Pair> pairs;
     inner.add_pairs(pairs);
     for (std::uint32_t n = 0; n < nodes.size(); ++n) pairs.push_back({n, n});
@@ -57,52 +79,95 @@ struct LocalSolver::Contact {
           phi(index(3 * n + k), index(c)) =
               static_cast<float>(fields[c].packed->values[3 * nodes[n].value + k]) *
               fields[c].packed->step;
-    stiffness.resize(index(fields.size()), index(fields.size()));
-    for (std::size_t i = 0; i < fields.size(); ++i)
-      for (std::size_t j = 0; j < fields.size(); ++j)
-        stiffness(index(i), index(j)) = entry(patch.outer_stiffness, fields[i].at, fields[j].at);
+    if (parts.size() == 1)
+      stiffness = stored_stiffness();
+    else
+      stiffness = stiffness_of_several(rest());
     q = Vector::Zero(index(fields.size()));
     a = Vector::Zero(index(3 * free.size()));
     u.assign(3 * nodes.size(), 0);
+    own_u = u;
   }
 
-  void choose_fields(const scene::LocalReduction& reduction, std::span<const NodeIndex> touched) {
-    for (std::size_t i = 0; i < patch.modes.size(); ++i) fields.push_back({&patch.modes[i], i});
-    for (const auto node : touched) {
-      const auto at = static_cast<std::size_t>(std::ranges::lower_bound(patch.reach, node) -
-                                               patch.reach.begin());
-      const auto greens =
-          std::ranges::lower_bound(reduction.greens, node, {}, &scene::GreensFunction::node);
-      for (std::size_t axis = 0; axis < 3; ++axis)
-        fields.push_back({&greens->fields[axis], patch.modes.size() + 3 * at + axis});
+  void choose_fields(const scene::LocalReduction& reduction, std::span<const Place> places) {
+    for (const auto& [patch, touched] : places) {
+      const std::size_t begin = fields.size();
+      for (std::size_t i = 0; i < patch->modes.size(); ++i) fields.push_back({&patch->modes[i], i});
+      for (const auto node : touched) {
+        const auto at = static_cast<std::size_t>(std::ranges::lower_bound(patch->reach, node) -
+                                                 patch->reach.begin());
+        const auto greens =
+            std::ranges::lower_bound(reduction.greens, node, {}, &scene::GreensFunction::node);
+        for (std::size_t axis = 0; axis < 3; ++axis)
+          fields.push_back({&greens->fields[axis], patch->modes.size() + 3 * at + axis});
+      }
+      parts.push_back({patch, index(begin), index(fields.size() - begin), {}});
     }
   }
 
-  void choose_nodes(const scene::Organ& organ, std::span<const NodeIndex> touched,
+  void choose_nodes(const scene::Organ& organ, std::span<const Place> places,
                     std::uint32_t layers) {
     const auto add = [&](TetIndex tet) {
       for (const auto node : organ.mesh.tets[tet.value]) nodes.push_back(node);
     };
-    for (const auto tet : patch.inner_tets) add(tet);
-    for (const auto& [tet, weight] : patch.cubature) add(tet);
-    std::ranges::sort(nodes);
-    nodes.erase(std::ranges::unique(nodes).begin(), nodes.end());
-    std::vector<NodeIndex> near(touched.begin(), touched.end());
+    std::vector<NodeIndex> near;
+    for (const auto& [patch, touched] : places) {
+      near.insert(near.end(), touched.begin(), touched.end());
+      inner_tets.insert(inner_tets.end(), patch->inner_tets.begin(), patch->inner_tets.end());
+      for (const auto& [tet, weight] : patch->cubature) add(tet);
+    }
+    sort_once(inner_tets);
+    for (const auto tet : inner_tets) add(tet);
+    sort_once(nodes);
     for (std::uint32_t layer = 0; layer < layers; ++layer) {
       const std::size_t count = near.size();
       for (std::size_t i = 0; i < count; ++i)
         for (const auto other : organ.mesh.node_neighbours[near[i]]) near.push_back(other);
-      std::ranges::sort(near);
-      near.erase(std::ranges::unique(near).begin(), near.end());
+      sort_once(near);
     }
     // A free node's tets are all there as they are.
     const auto is_inner = [&](TetIndex tet) {
-      return std::ranges::binary_search(patch.inner_tets, tet);
+      return std::ranges::binary_search(inner_tets, tet);
     };
     for (const auto node : near)
       if (!std::ranges::binary_search(organ.fixed_nodes, node) &&
           std::ranges::all_of(organ.mesh.node_tets[node], is_inner))
         free.push_back(local(node));
+  }
+
+  Matrix stored_stiffness() const {
+    Matrix k(index(fields.size()), index(fields.size()));
+    const auto& lower = parts[0].patch->outer_stiffness;
+    for (std::size_t i = 0; i < fields.size(); ++i)
+      for (std::size_t j = 0; j < fields.size(); ++j)
+        k(index(i), index(j)) = entry(lower, fields[i].at, fields[j].at);
+    return k;
+  }
+
+  // Of all tets at rest less that of the inner ones.
+  Matrix stiffness_of_several(const BlockMatrix& rest) {
+    RowMatrixF all(index(3 * rest.node_count()), index(fields.size()));
+    for (std::size_t c = 0; c < fields.size(); ++c)
+      for (std::size_t i = 0; i < fields[c].packed->values.size(); ++i)
+        all(index(i), index(c)) =
+            static_cast<float>(fields[c].packed->values[i]) * fields[c].packed->step;
+    tangent.clear();
+    inner.add_rest_tangent(tangent);
+    return (all.transpose() * product(rest, all)).cast<double>() -
+           (phi.transpose() * product(tangent, phi)).cast<double>();
+  }
+
+  static RowMatrixF product(const BlockMatrix& k, const RowMatrixF& b) {
+    RowMatrixF kb = RowMatrixF::Zero(b.rows(), b.cols());
+    for (std::size_t row = 0; row < k.node_count(); ++row) {
+      const auto columns = k.columns(row);
+      const auto blocks = k.blocks(row);
+      for (std::size_t i = 0; i < columns.size(); ++i)
+        kb.middleRows<3>(index(3 * row)).noalias() +=
+            Eigen::Map<const Eigen::Matrix<float, 3, 3, Eigen::RowMajor>>(blocks[i].data()) *
+            b.middleRows<3>(index(3 * columns[i]));
+    }
+    return kb;
   }
 
   std::uint32_t local(NodeIndex node) const {
@@ -139,9 +204,18 @@ struct LocalSolver::Contact {
     for (std::size_t i = 0; i < free.size(); ++i)
       for (std::size_t k = 0; k < 3; ++k)
         r[index(fields.size() + 3 * i + k)] = -static_cast<double>(f[3 * free[i] + k]);
-    outer.add_forces(ForcePart::Nonlinear, u, f);
     const VectorF along = phi.transpose() * Eigen::Map<const VectorF>(f.data(), index(f.size()));
     r.head(index(fields.size())) = -(along.cast<double>() + stiffness * q);
+    // What is not linear farther off: of each patch's fields on its own.
+    for (const auto& part : parts) {
+      const auto own = phi.middleCols(part.begin, part.count);
+      Eigen::Map<VectorF>(own_u.data(), index(own_u.size())).noalias() =
+          own * q.segment(part.begin, part.count).cast<float>();
+      std::ranges::fill(f, 0.0F);
+      part.outer.add_forces(ForcePart::Nonlinear, own_u, f);
+      const VectorF beyond = own.transpose() * Eigen::Map<const VectorF>(f.data(), index(f.size()));
+      r.segment(part.begin, part.count) -= beyond.cast<double>();
+    }
     return r;
   }
 
@@ -154,21 +228,13 @@ struct LocalSolver::Contact {
         for (const std::size_t i : {0, 4, 8}) block[i] += static_cast<float>(spring.stiffness_n_m);
       }
       const auto m = index(fields.size());
-      RowMatrixF product = RowMatrixF::Zero(phi.rows(), m);
-      for (std::size_t row = 0; row < nodes.size(); ++row) {
-        const auto columns = tangent.columns(row);
-        const auto blocks = tangent.blocks(row);
-        for (std::size_t i = 0; i < columns.size(); ++i)
-          product.middleRows<3>(index(3 * row)).noalias() +=
-              Eigen::Map<const Eigen::Matrix<float, 3, 3, Eigen::RowMajor>>(blocks[i].data()) *
-              phi.middleRows<3>(index(3 * columns[i]));
-      }
+      const RowMatrixF stiff = product(tangent, phi);
       Matrix h = Matrix::Zero(index(unknowns()), index(unknowns()));
-      const Eigen::MatrixXf of_fields = phi.transpose() * product;
+      const Eigen::MatrixXf of_fields = phi.transpose() * stiff;
       h.topLeftCorner(m, m) = stiffness + of_fields.cast<double>();
       for (std::size_t i = 0; i < free.size(); ++i) {
         h.block(m + index(3 * i), 0, 3, m) =
-            product.middleRows<3>(index(3 * free[i])).cast<double>();
+            stiff.middleRows<3>(index(3 * free[i])).cast<double>();
         for (std::size_t j = 0; j < free.size(); ++j) {
           const auto columns = tangent.columns(free[i]);
           const auto found = std::ranges::lower_bound(columns, free[j]);
@@ -200,18 +266,19 @@ struct LocalSolver::Contact {
     return {static_cast<double>(at[0]), static_cast<double>(at[1]), static_cast<double>(at[2])};
   }
 
-  const scene::LocalPatch& patch;
+  std::vector<Part> parts;
   std::vector<Field> fields;
+  std::vector<TetIndex> inner_tets;  // of all parts; ascending
   std::vector<NodeIndex> nodes;     // of the tets; ascending
   std::vector<std::uint32_t> free;  // local
-  ElementSet inner, outer;
+  ElementSet inner;
   RowMatrixF phi;    // of the fields at the nodes
   Matrix stiffness;  // of the outer tets at rest
   BlockMatrix tangent;
   Eigen::LLT<Matrix> factors;
   bool has_factors = false;
   Vector q, a;
-  std::vector<float> u, f;
+  std::vector<float> u, own_u, f;
 };
 
 LocalSolver::LocalSolver(const scene::LocalReduction& reduction, const scene::Organ& organ)
@@ -219,28 +286,62 @@ LocalSolver::LocalSolver(const scene::LocalReduction& reduction, const scene::Or
 LocalSolver::~LocalSolver() = default;
 
 bool LocalSolver::touch(std::span<const NodeIndex> nodes) {
-  const auto reaches = [&](const scene::LocalPatch& patch) {
-    return std::ranges::all_of(
-        nodes, [&](NodeIndex n) { return std::ranges::binary_search(patch.reach, n); });
-  };
-  // The patch that the first node belongs to, if it reaches the others.
-  const scene::LocalPatch* best = nullptr;
-  for (const auto& patch : reduction_.patches) {
-    if (!reaches(patch)) continue;
-    const bool is_home = std::ranges::binary_search(patch.members, nodes.front());
-    if (best == nullptr || is_home) best = &patch;
-    if (is_home) break;
+  std::vector<Place> places;
+  if (const auto* patch = patch_of(nodes)) {
+    places.push_back({patch, {nodes.begin(), nodes.end()}});
+  } else {
+    for (const auto node : nodes) {
+      const auto* home = patch_of(std::span(&node, 1));
+      if (home == nullptr) return false;
+      auto place = std::ranges::find(places, home, &Place::patch);
+      if (place == places.end()) place = places.insert(places.end(), {home, {}});
+      place->touched.push_back(node);
+    }
+    if (places.size() > kMaxPatches) return false;
   }
-  if (best == nullptr) return false;
-  contact_ = std::make_unique<Contact>(reduction_, organ_, *best, nodes);
+  contact_ = std::make_unique<Contact>(reduction_, organ_, places,
+                                       [this]() -> const BlockMatrix& { return rest_tangent(); });
   return true;
+}
+
+// The patch that the first node belongs to, if it reaches the others; else any that does.
+const scene::LocalPatch* LocalSolver::patch_of(std::span<const NodeIndex> nodes) const {
+  const scene::LocalPatch* found = nullptr;
+  for (const auto& patch : reduction_.patches) {
+    if (!std::ranges::all_of(
+            nodes, [&](NodeIndex n) { return std::ranges::binary_search(patch.reach, n); }))
+      continue;
+    if (std::ranges::binary_search(patch.members, nodes.front())) return &patch;
+    if (found == nullptr) found = &patch;
+  }
+  return found;
+}
+
+const BlockMatrix& LocalSolver::rest_tangent() {
+  if (rest_tangent_.node_count() > 0) return rest_tangent_;
+  std::vector<TetIndex> tets;
+  std::vector<NodeIndex> nodes;
+  for (std::uint32_t t = 0; t < organ_.mesh.tets.size(); ++t) tets.push_back(TetIndex(t));
+  for (std::uint32_t n = 0; n < organ_.mesh.node_count(); ++n) nodes.push_back(NodeIndex(n));
+  const ElementSet all(organ_, tets, {}, nodes);
+  std::vector<BlockMatrix::Pair> pairs;
+  all.add_pairs(pairs);
+  rest_tangent_ = BlockMatrix(nodes.size(), std::move(pairs));
+  all.add_rest_tangent(rest_tangent_);
+  return rest_tangent_;
 }
 
 LocalSolver::Sizes LocalSolver::sizes() const {
   if (contact_ == nullptr) return {};
   const auto& c = *contact_;
-  return {c.patch.modes.size(), c.fields.size() - c.patch.modes.size(), c.free.size(),
-          c.inner.tet_count(), c.outer.tet_count()};
+  Sizes sizes{.patches = c.parts.size(), .free_nodes = c.free.size(),
+              .inner_tets = c.inner.tet_count()};
+  for (const auto& part : c.parts) {
+    sizes.modes += part.patch->modes.size();
+    sizes.cubature_tets += part.outer.tet_count();
+  }
+  sizes.greens = c.fields.size() - sizes.modes;
+  return sizes;
 }
 
 LocalSolver::Report LocalSolver::solve(std::span<const NodeForce> forces,

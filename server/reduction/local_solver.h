@@ -15,6 +15,7 @@
 
 #include "common/scene/local_reduction.h"
 #include "common/scene/organ.h"
+#include "server/reduction/block_matrix.h"
 #include "server/reduction/presses.h"
 
 namespace trocar::reduction {
@@ -28,16 +29,20 @@ struct NodeSpring {
 
 class LocalSolver {
  public:
+  static constexpr std::size_t kMaxPatches = 4;
+
   // A reduction of this organ; both must outlive the solver.
   LocalSolver(const scene::LocalReduction& reduction, const scene::Organ& organ);
   ~LocalSolver();
 
-  // From now on these nodes are touched; the displacements are 0. False, and nothing has changed,
-  // if no patch reaches all of them.
+  // From now on these nodes are touched; the displacements are 0. What one patch does not reach is
+  // done by several together, to first order exactly, beyond it each patch for its own part; that
+  // costs a product over the whole mesh. False, and nothing has changed, if a node is in no patch,
+  // or they are of more than kMaxPatches.
   bool touch(std::span<const NodeIndex> nodes);
 
   struct Sizes {
-    std::size_t modes = 0, greens = 0, free_nodes = 0, inner_tets = 0, cubature_tets = 0;
+    std::size_t patches = 0, modes = 0, greens = 0, free_nodes = 0, inner_tets = 0, cubature_tets = 0;
     std::size_t unknowns() const { return modes + greens + 3 * free_nodes; }
   };
   Sizes sizes() const;
@@ -56,10 +61,15 @@ class LocalSolver {
   std::vector<Vec3d> displacements() const;
 
  private:
+  struct Place;
   struct Contact;
+  const scene::LocalPatch* patch_of(std::span<const NodeIndex> nodes) const;
+  const BlockMatrix& rest_tangent();
+
   const scene::LocalReduction& reduction_;
   const scene::Organ& organ_;
   std::unique_ptr<Contact> contact_;
+  BlockMatrix rest_tangent_;  // made when it is needed
 };
 
 }  // namespace trocar::reduction

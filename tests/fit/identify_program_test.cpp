@@ -19,13 +19,6 @@ class IdentifyProgram : public testing::ProgramFixture {
     arguments.insert(arguments.end(), more.begin(), more.end());
     return run(arguments);
   }
-  void expect_line(const std::string& says) const {
-    const std::string line = log();
-    EXPECT_TRUE(line.starts_with("trocar-organ: ")) << line;
-    EXPECT_EQ(std::count(line.begin(), line.end(), '\n'), 1) << line;
-    EXPECT_NE(line.find(says), std::string::npos) << line;
-  }
-
   const std::string curves_ = std::string(TROCAR_SOURCE_DIR) + "/deploy/scenes/relax.csv";
 };
 

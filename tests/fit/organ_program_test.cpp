@@ -35,13 +35,6 @@ class OrganProgram : public testing::ProgramFixture {
     return found == std::string::npos ? NAN : std::strtod(&text[found + word.size()], nullptr);
   }
   // The log is one line of the program's, and `says` is in it.
-  void expect_line(const std::string& says) const {
-    const std::string line = log();
-    EXPECT_TRUE(line.starts_with("trocar-organ: ")) << line;
-    EXPECT_EQ(std::count(line.begin(), line.end(), '\n'), 1) << line;
-    EXPECT_NE(line.find(says), std::string::npos) << line;
-  }
-
   const std::string scenario_ = scene("stretch.toml"), curve_ = scene("stretch.csv");
 };
 

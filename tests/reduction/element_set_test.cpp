@@ -140,6 +140,22 @@ TEST_P(ElementSetOfLaw, TheTangentIsTheDerivativeOfTheForces) {
   EXPECT_LT(worst, 1e-4 * largest);
 }
 
+TEST_P(ElementSetOfLaw, TheRestTangentIsTheLinearPart) {
+  tangent_.clear();
+  set_.add_rest_tangent(tangent_);
+  const auto u = moves(0.1);
+  const Vector expected =
+      to_vector(forces(ForcePart::Whole, u)) - to_vector(forces(ForcePart::Nonlinear, u));
+  Vector is = Vector::Zero(expected.size());
+  for (std::size_t row = 0; row < nodes_.size(); ++row)
+    for (std::size_t i = 0; i < tangent_.columns(row).size(); ++i)
+      for (std::size_t k = 0; k < 9; ++k)
+        is[static_cast<Eigen::Index>(3 * row + k / 3)] +=
+            static_cast<double>(tangent_.blocks(row)[i][k]) *
+            static_cast<double>(u[3 * tangent_.columns(row)[i] + k % 3]);
+  EXPECT_LT((is - expected).norm(), 1e-5 * expected.norm());
+}
+
 TEST_P(ElementSetOfLaw, WeightsMultiplyATetsForces) {
   const std::vector<TetIndex> tets{TetIndex(2), TetIndex(5), TetIndex(7)};
   const std::vector<float> weights{2, 3, 0.5F};

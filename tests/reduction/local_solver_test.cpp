@@ -167,6 +167,38 @@ TEST_F(LocalBlock, SeveralNodesAreTouchedTogether) {
   EXPECT_LT(std::sqrt(off), 0.05 * full[1].norm());
 }
 
+// Two tools, each on a patch of its own.
+TEST_F(LocalBlock, PatchesCombine) {
+  auto s = settings();
+  s.patches = 0;
+  const auto built = build(s);
+  const auto normals = mesh::surface_normals(organ_.mesh);
+  const auto& patches = built.reduction.patches;
+  LocalSolver solver(built.reduction, organ_);
+  for (const std::size_t other : {std::size_t{1}, patches.size() / 2, patches.size() - 1}) {
+    const std::array touched{patches[0].centre, patches[other].centre};
+    std::vector<NodeForce> forces;
+    Vector all = Vector::Zero(static_cast<Eigen::Index>(model_->dof_count()));
+    for (const auto node : touched) {
+      const Vec3d force = normals[node.value] * -0.15;
+      forces.push_back({node, force});
+      all.segment<3>(3 * static_cast<Eigen::Index>(node.value)) =
+          Eigen::Vector3d(force.x, force.y, force.z);
+    }
+    const auto full = model_->displacements(all, std::array{0.5, 1.0});
+    ASSERT_EQ(full.size(), 2u);
+    ASSERT_TRUE(solver.touch(touched));
+    EXPECT_EQ(solver.sizes().greens, 6u);
+    ASSERT_TRUE(solver.solve(forces).is_converged);
+    const auto moves = solver.displacements();
+    double off = 0;
+    for (std::uint32_t n = 0; n < moves.size(); ++n)
+      off +=
+          length_squared(moves[n] - Vec3d{full[1][3 * n], full[1][3 * n + 1], full[1][3 * n + 2]});
+    EXPECT_LT(std::sqrt(off), 0.05 * full[1].norm()) << other;
+  }
+}
+
 TEST_F(LocalBlock, HasNothingWhereNoPatchReaches) {
   auto s = settings();
   s.patches = 1;

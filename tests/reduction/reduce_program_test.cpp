@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "common/scene/local_reduction_file.h"
 #include "common/scene/organ_file.h"
 #include "common/scene/reduction_file.h"
 #include "tests/support/program_fixture.h"
@@ -22,12 +23,6 @@ class ReduceProgram : public testing::ProgramFixture {
         "--out",   at(out), "--results",     at("out")};
     arguments.insert(arguments.end(), more.begin(), more.end());
     return run(arguments);
-  }
-  void expect_line(const std::string& says) const {
-    const std::string line = log();
-    EXPECT_TRUE(line.starts_with("trocar-organ: ")) << line;
-    EXPECT_EQ(std::count(line.begin(), line.end(), '\n'), 1) << line;
-    EXPECT_NE(line.find(says), std::string::npos) << line;
   }
 };
 
@@ -75,6 +70,38 @@ TEST_F(ReduceProgram, SaysEachMistakeInOneLine) {
   EXPECT_EQ(run({"reduce", "liver", "--results", at("out"), "--out", at("none/liver.reduction")}),
             5);
   expect_line("none/liver.reduction: cannot be written, its folder is not there");
+}
+
+TEST_F(ReduceProgram, LeavesALocalReductionAndHowFarItIsOff) {
+  ASSERT_EQ(run({"make", "liver", "--tets", "1000", "--out", at("small.organ")}), 0) << log();
+  const auto make = [&](const char* threads, const char* out) {
+    return run({"reduce", at("small.organ"), "--method", "local", "--patches", "2",
+                "--patch-radius", "25", "--modes", "12", "--directions", "2", "--field-nodes", "4",
+                "--force", "0.2", "--check", "2", "--threads", threads, "--out", at(out),
+                "--results", at("out")});
+  };
+  ASSERT_EQ(make("1", "small.reduction"), 0) << log();
+  const auto text = log();
+  EXPECT_NE(text.find("2 patches of "), std::string::npos) << text;
+  EXPECT_NE(text.find("loads at places at least 8 mm from all of these"), std::string::npos)
+      << text;
+  const auto organ = scene::read_organ(folder_ / "small.organ");
+  ASSERT_TRUE(organ.ok());
+  const auto reduction = scene::read_local_reduction(folder_ / "small.reduction", *organ);
+  ASSERT_TRUE(reduction.ok()) << reduction.error().message;
+  EXPECT_EQ(reduction->patches.size(), 2u);
+  EXPECT_EQ(reduction->patches[0].modes.size(), 12u);
+  EXPECT_EQ(reduction->force_n, 0.2);
+  EXPECT_GT(read(folder_ / "out" / "local.csv").size(), 100u);
+  ASSERT_EQ(make("2", "again.reduction"), 0) << log();
+  EXPECT_EQ(read(folder_ / "again.reduction"), read(folder_ / "small.reduction"));
+  // What is of one method is not of the other.
+  EXPECT_EQ(run({"reduce", "liver", "--method", "local", "--tangents", "3"}), 2);
+  expect_line("--tangents: is of --method dogan");
+  EXPECT_EQ(run({"reduce", "liver", "--patches", "3"}), 2);
+  expect_line("--patches: is of --method local");
+  EXPECT_EQ(run({"reduce", "liver", "--method", "local", "--residual", "0.5"}), 2);
+  expect_line("--residual: must be from 0 to 0.1");
 }
 
 TEST_F(ReduceProgram, HelpTeachesTheMethod) {

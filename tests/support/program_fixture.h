@@ -10,6 +10,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
@@ -68,6 +69,13 @@ class ProgramFixture : public ::testing::Test {
   }
   std::string at(const char* name) const { return (folder_ / name).string(); }
   std::string log() const { return read(folder_ / "log"); }
+  // The log is one line, which begins with the program's name.
+  void expect_line(const std::string& says) const {
+    const std::string line = log();
+    EXPECT_TRUE(line.starts_with(program_ + ": ")) << line;
+    EXPECT_EQ(std::count(line.begin(), line.end(), '\n'), 1) << line;
+    EXPECT_NE(line.find(says), std::string::npos) << line;
+  }
 
   const std::string program_;
   const std::filesystem::path folder_ =

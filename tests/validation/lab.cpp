@@ -12,7 +12,7 @@
 namespace trocar::validation {
 namespace {
 
-constexpr std::uint64_t kProgressEvery_ns = 300'000'000;
+constexpr std::uint64_t kProgressEvery_ns = 300'000'000, kLogEvery_ns = 10'000'000'000;
 
 template <typename T>
 T must(Result<T> result, const std::string& name) {
@@ -28,7 +28,16 @@ T must(Result<T> result, const std::string& name) {
 
 void show_progress(const std::string& text) {
   static const bool is_terminal = isatty(STDERR_FILENO) != 0;
-  if (is_terminal) std::fprintf(stderr, "\r\033[K  %s", text.c_str());
+  if (is_terminal) {
+    std::fprintf(stderr, "\r\033[K  %s", text.c_str());
+    return;
+  }
+  // A log gets a line now and then.
+  static std::uint64_t shown = monotonic_ns();
+  const auto now = monotonic_ns();
+  if (text.empty() || now - shown < kLogEvery_ns) return;
+  shown = now;
+  std::fprintf(stderr, "  %s\n", text.c_str());
 }
 
 Lab::Lab(std::filesystem::path folder, bool is_short)
