@@ -47,8 +47,8 @@ class ElementSet {
     std::uint32_t used = 0;  // lanes
   };
   struct Strain;
-  static void add_block(const Group& group, std::size_t a, std::size_t b, const dynamics::Mat8& block,
-                        BlockMatrix& tangent);
+  static void add_block(const Group& group, std::size_t a, std::size_t b,
+                        const dynamics::Mat8& block, BlockMatrix& tangent);
   static Strain strain_of(const Group& group, std::span<const float> u);
   template <typename Psi>
   void add_forces(const Psi& law, const Group& group, ForcePart part, std::span<const float> u,

@@ -67,8 +67,9 @@ class Builder {
                             scene::material_at(organ_, materials[t]).density_kg_m3;
   }
 
-  bool has_work() const { return !accessible_.empty(); }
-  LocalBuilt build() {
+  Result<LocalBuilt> build() {
+    if (accessible_.empty())
+      return Error{ErrorCode::BadFile, organ_.name + ": has no surface that is not held"};
     auto& r = built_.reduction;
     r.source = organ_.name + ", " + std::to_string(settings_.modes) + " modes, patches of " +
                std::to_string(std::lround(settings_.patch_radius_m * 1e3)) + " mm, seed " +
@@ -79,6 +80,13 @@ class Builder {
     r.force_n = settings_.force_n;
     r.free_layers = settings_.free_layers;
     choose_patches();
+    for (const auto& patch : r.patches)
+      if (const auto count = settings_.modes + 3 * patch.reach.size();
+          count > scene::kMaxLocalFields)
+        return Error{ErrorCode::Usage, "--patch-radius: a patch would have " +
+                                           std::to_string(count) + " fields, at most " +
+                                           std::to_string(scene::kMaxLocalFields) +
+                                           " are possible: make it smaller"};
     find_greens();
     press_centres();
     auto& patches = r.patches;
@@ -398,10 +406,7 @@ Result<LocalBuilt> build_local(const scene::Organ& organ, const LocalSettings& s
     if (!model) return model.error();
     models.push_back(std::move(*model));
   }
-  Builder builder(organ, settings, progress, std::move(models));
-  if (!builder.has_work())
-    return Error{ErrorCode::BadFile, organ.name + ": has no surface that is not held"};
-  return builder.build();
+  return Builder(organ, settings, progress, std::move(models)).build();
 }
 
 }  // namespace trocar::reduction

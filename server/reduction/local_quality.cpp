@@ -15,10 +15,18 @@ constexpr std::array kShares{0.3, 0.85};
 constexpr std::size_t kFirst = 1001;
 constexpr double kHold_n_m = 1e4;  // some hundred times as stiff as tissue
 constexpr int kRateSteps = 100;
+constexpr std::array kPairSteps{0.5, 1.0};
 
 Vec3d at(const Vector& field, NodeIndex node) {
   const auto i = 3 * static_cast<Eigen::Index>(node.value);
   return {field[i], field[i + 1], field[i + 2]};
+}
+
+double field_error(std::span<const Vec3d> moves, const Vector& full) {
+  double wrong = 0;
+  for (std::uint32_t n = 0; n < moves.size(); ++n)
+    wrong += length_squared(moves[n] - at(full, NodeIndex(n)));
+  return std::sqrt(wrong) / full.norm();
 }
 
 std::vector<NodeIndex> unseen_nodes(const scene::Organ& organ, const LocalBuilt& built) {
@@ -73,10 +81,7 @@ LocalErrors errors_of_local(const scene::LocalReduction& reduction, const scene:
     }
     if (solver.sizes().unknowns() > errors.largest.unknowns()) errors.largest = solver.sizes();
     const auto moves = solver.displacements();
-    double wrong = 0;
-    for (std::uint32_t n = 0; n < moves.size(); ++n)
-      wrong += length_squared(moves[n] - at(full, NodeIndex(n)));
-    errors.field.push_back(std::sqrt(wrong) / full.norm());
+    errors.field.push_back(field_error(moves, full));
     const Vec3d there = at(full, press.node);
     errors.contact.push_back(length(moves[press.node.value] - there) / length(there));
     const NodeSpring hold{press.node, there, kHold_n_m};
@@ -86,6 +91,39 @@ LocalErrors errors_of_local(const scene::LocalReduction& reduction, const scene:
     }
     const Vec3d force = (there - solver.displacement(press.node)) * kHold_n_m;
     errors.force.push_back(length(force - press.force_n) / length(press.force_n));
+  }
+  return errors;
+}
+
+LocalErrors errors_of_pairs(FullModel& model, const scene::LocalReduction& reduction,
+                            std::span<const LocalLoad> loads, std::size_t pairs) {
+  std::vector<const Press*> presses;
+  for (const auto& load : loads)
+    if (presses.empty() || presses.back()->node != load.press.node)
+      presses.push_back(&load.press);
+    else
+      presses.back() = &load.press;
+  LocalErrors errors;
+  LocalSolver solver(reduction, model.organ());
+  for (std::size_t i = 0; i + 1 < presses.size() && i < pairs; ++i) {
+    const Press &a = *presses[i], &b = *presses[i + 1];
+    const Vector forces = model.forces_of(a) + model.forces_of(b);
+    const auto found = model.displacements(forces, kPairSteps);
+    if (found.size() != kPairSteps.size()) continue;
+    const auto& full = found.back();
+    const std::array touched{a.node, b.node};
+    const std::array pushes{NodeForce{a.node, a.force_n}, NodeForce{b.node, b.force_n}};
+    if (!solver.touch(touched) || !solver.solve(pushes).is_converged) {
+      ++errors.unsolved;
+      continue;
+    }
+    if (solver.sizes().unknowns() > errors.largest.unknowns()) errors.largest = solver.sizes();
+    const auto moves = solver.displacements();
+    errors.field.push_back(field_error(moves, full));
+    double contact = 0;
+    for (const auto node : touched)
+      contact += length(moves[node.value] - at(full, node)) / length(at(full, node)) / 2;
+    errors.contact.push_back(contact);
   }
   return errors;
 }

@@ -33,6 +33,11 @@ struct LocalErrors {
 LocalErrors errors_of_local(const scene::LocalReduction& reduction, const scene::Organ& organ,
                             std::span<const LocalLoad> loads, bool trained);
 
+// Two presses at once, on the second loads of places in turn: mean of the two contacts. Loads
+// without an equilibrium of the full model are left out.
+LocalErrors errors_of_pairs(FullModel& model, const scene::LocalReduction& reduction,
+                            std::span<const LocalLoad> loads, std::size_t pairs);
+
 // A press that grows from nothing in 100 steps, each from the one before.
 struct LocalRate {
   double median_us = 0, worst_us = 0;  // thread CPU time per step

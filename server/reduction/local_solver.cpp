@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 
@@ -18,6 +19,8 @@ constexpr int kMaxIterations = 60, kMaxHalvings = 10;
 // A step that moves no node near the contact by more than this part of the farthest one's way was
 // the last: single precision is not far below.
 constexpr float kSettled = 1e-4F;
+// Part of the loads that may be left where no step makes it less.
+constexpr double kNearlySettled = 1e-3;
 // A tangent is made anew when an iteration with it leaves more than this part of the residual.
 constexpr double kSlow = 0.35;
 
@@ -27,6 +30,14 @@ Eigen::Index index(std::size_t i) {
 double entry(const std::vector<double>& lower, std::size_t i, std::size_t j) {
   return i >= j ? lower[i * (i + 1) / 2 + j] : lower[j * (j + 1) / 2 + i];
 }
+
+// On the diagonal where a tangent is not positive definite, the last of which makes any so that is
+// without its stress.
+constexpr std::array kShifts{1e-9, 1e-6, 1e-3};
+// Several patches' fields may cancel: not by large amounts.
+constexpr double kLeastShiftOfSeveral = 1e-6;
+// Of a later patch's mode, beside what is there already.
+constexpr float kNewInField = 0.1F;
 
 template <typename T>
 void sort_once(std::vector<T>& values) {
@@ -47,25 +58,30 @@ struct LocalSolver::Contact {
   struct Field {
     const scene::PackedField* packed;
     std::size_t at;
+    bool is_greens = false;
   };
   // A patch with its fields, which are beside each other.
   struct Part {
     const scene::LocalPatch* patch;
     Eigen::Index begin = 0, count = 0;
     ElementSet outer;
+    BlockMatrix tangent;  // of the outer tets
+    Matrix at_rest;       // among the fields
   };
 
   // rest: the tangent at rest of all tets over all nodes, for contacts of several patches.
   Contact(const scene::LocalReduction& reduction, const scene::Organ& organ,
           std::span<const Place> places, const std::function<const BlockMatrix&()>& rest) {
     choose_fields(reduction, places);
+    if (parts.size() > 1) drop_repeated_fields();
     choose_nodes(organ, places, reduction.free_layers);
     inner = ElementSet(organ, inner_tets, {}, nodes);
     for (auto& part : parts) {
       std::vector<TetIndex> tets;
       std::vector<float> weights;
       for (const auto& [tet, weight] : part.patch->cubature)
-        tets.push_back(tet), weights.push_back(weight);
+        if (!std::ranges::binary_search(inner_tets, tet))
+          tets.push_back(tet), weights.push_back(weight);
       part.outer = ElementSet(organ, tets, weights, nodes);
     }
     std::vector<BlockMatrix::Pair> pairs;
@@ -79,6 +95,13 @@ struct LocalSolver::Contact {
           phi(index(3 * n + k), index(c)) =
               static_cast<float>(fields[c].packed->values[3 * nodes[n].value + k]) *
               fields[c].packed->step;
+    for (auto& part : parts) {
+      std::vector<BlockMatrix::Pair> pairs_of_outer;
+      part.outer.add_pairs(pairs_of_outer);
+      part.tangent = BlockMatrix(nodes.size(), std::move(pairs_of_outer));
+      part.outer.add_rest_tangent(part.tangent);
+      part.at_rest = among_fields(part);
+    }
     if (parts.size() == 1)
       stiffness = stored_stiffness();
     else
@@ -86,7 +109,6 @@ struct LocalSolver::Contact {
     q = Vector::Zero(index(fields.size()));
     a = Vector::Zero(index(3 * free.size()));
     u.assign(3 * nodes.size(), 0);
-    own_u = u;
   }
 
   void choose_fields(const scene::LocalReduction& reduction, std::span<const Place> places) {
@@ -99,10 +121,52 @@ struct LocalSolver::Contact {
         const auto greens =
             std::ranges::lower_bound(reduction.greens, node, {}, &scene::GreensFunction::node);
         for (std::size_t axis = 0; axis < 3; ++axis)
-          fields.push_back({&greens->fields[axis], patch->modes.size() + 3 * at + axis});
+          fields.push_back({&greens->fields[axis], patch->modes.size() + 3 * at + axis, true});
       }
-      parts.push_back({patch, index(begin), index(fields.size() - begin), {}});
+      parts.push_back({patch, index(begin), index(fields.size() - begin), {}, {}, {}});
     }
+  }
+
+  // Patches beside each other have modes that are nearly the same, and cubatures that differ: only
+  // what is new in a later patch's modes stays.
+  void drop_repeated_fields() {
+    const Eigen::MatrixXf all = all_fields();
+    Eigen::MatrixXf kept(all.rows(), all.cols());
+    Eigen::Index count = 0;
+    std::vector<std::uint8_t> stays(fields.size(), 0);
+    const auto look_at = [&](Eigen::Index i, float least) {
+      VectorF left = all.col(i).normalized();
+      for (int twice = 0; twice < 2; ++twice)
+        left -= kept.leftCols(count) * (kept.leftCols(count).transpose() * left);
+      if (left.norm() < least) return;
+      kept.col(count++) = left.normalized();
+      stays[static_cast<std::size_t>(i)] = 1;
+    };
+    for (const auto& part : parts)
+      for (Eigen::Index i = part.begin + index(part.patch->modes.size());
+           i < part.begin + part.count; ++i)
+        look_at(i, 0);
+    for (const auto& part : parts)
+      for (std::size_t i = 0; i < part.patch->modes.size(); ++i)
+        look_at(part.begin + index(i), kNewInField);
+    std::vector<Field> left;
+    for (auto& part : parts) {
+      const auto begin = index(left.size());
+      for (Eigen::Index i = part.begin; i < part.begin + part.count; ++i)
+        if (stays[static_cast<std::size_t>(i)] != 0)
+          left.push_back(fields[static_cast<std::size_t>(i)]);
+      part.begin = begin;
+      part.count = index(left.size()) - begin;
+    }
+    fields = std::move(left);
+  }
+  RowMatrixF all_fields() const {
+    RowMatrixF all(index(fields.front().packed->values.size()), index(fields.size()));
+    for (std::size_t c = 0; c < fields.size(); ++c)
+      for (std::size_t i = 0; i < fields[c].packed->values.size(); ++i)
+        all(index(i), index(c)) =
+            static_cast<float>(fields[c].packed->values[i]) * fields[c].packed->step;
+    return all;
   }
 
   void choose_nodes(const scene::Organ& organ, std::span<const Place> places,
@@ -126,9 +190,7 @@ struct LocalSolver::Contact {
       sort_once(near);
     }
     // A free node's tets are all there as they are.
-    const auto is_inner = [&](TetIndex tet) {
-      return std::ranges::binary_search(inner_tets, tet);
-    };
+    const auto is_inner = [&](TetIndex tet) { return std::ranges::binary_search(inner_tets, tet); };
     for (const auto node : near)
       if (!std::ranges::binary_search(organ.fixed_nodes, node) &&
           std::ranges::all_of(organ.mesh.node_tets[node], is_inner))
@@ -146,15 +208,20 @@ struct LocalSolver::Contact {
 
   // Of all tets at rest less that of the inner ones.
   Matrix stiffness_of_several(const BlockMatrix& rest) {
-    RowMatrixF all(index(3 * rest.node_count()), index(fields.size()));
-    for (std::size_t c = 0; c < fields.size(); ++c)
-      for (std::size_t i = 0; i < fields[c].packed->values.size(); ++i)
-        all(index(i), index(c)) =
-            static_cast<float>(fields[c].packed->values[i]) * fields[c].packed->step;
+    const RowMatrixF all = all_fields();
     tangent.clear();
     inner.add_rest_tangent(tangent);
-    return (all.transpose() * product(rest, all)).cast<double>() -
-           (phi.transpose() * product(tangent, phi)).cast<double>();
+    // What is left is small beside the two.
+    const auto quadratic = [](const BlockMatrix& k, const RowMatrixF& b) {
+      return Matrix(b.cast<double>().transpose() * product(k, b).cast<double>());
+    };
+    return quadratic(rest, all) - quadratic(tangent, phi);
+  }
+
+  // Of a part's outer tets between its fields and all.
+  Matrix among_fields(const Part& part) const {
+    return (phi.middleCols(part.begin, part.count).transpose() * product(part.tangent, phi))
+        .cast<double>();
   }
 
   static RowMatrixF product(const BlockMatrix& k, const RowMatrixF& b) {
@@ -206,17 +273,34 @@ struct LocalSolver::Contact {
         r[index(fields.size() + 3 * i + k)] = -static_cast<double>(f[3 * free[i] + k]);
     const VectorF along = phi.transpose() * Eigen::Map<const VectorF>(f.data(), index(f.size()));
     r.head(index(fields.size())) = -(along.cast<double>() + stiffness * q);
-    // What is not linear farther off: of each patch's fields on its own.
+    // What is not linear farther off: by each patch's cubature for its own fields.
     for (const auto& part : parts) {
-      const auto own = phi.middleCols(part.begin, part.count);
-      Eigen::Map<VectorF>(own_u.data(), index(own_u.size())).noalias() =
-          own * q.segment(part.begin, part.count).cast<float>();
       std::ranges::fill(f, 0.0F);
-      part.outer.add_forces(ForcePart::Nonlinear, own_u, f);
-      const VectorF beyond = own.transpose() * Eigen::Map<const VectorF>(f.data(), index(f.size()));
+      part.outer.add_forces(ForcePart::Nonlinear, u, f);
+      const VectorF beyond = phi.middleCols(part.begin, part.count).transpose() *
+                             Eigen::Map<const VectorF>(f.data(), index(f.size()));
       r.segment(part.begin, part.count) -= beyond.cast<double>();
     }
     return r;
+  }
+
+  // Of the loads over the unknowns.
+  double norm_of(std::span<const NodeForce> forces, std::span<const NodeSpring> springs) const {
+    Vector loads = Vector::Zero(index(unknowns()));
+    const auto add = [&](NodeIndex node, const Vec3d& force) {
+      const auto at = local(node);
+      const Eigen::Vector3d load(force.x, force.y, force.z);
+      loads.head(index(fields.size())) +=
+          phi.middleRows<3>(index(3 * at)).cast<double>().transpose() * load;
+      const auto found = std::ranges::find(free, at);
+      if (found != free.end())
+        loads.segment<3>(
+            index(fields.size() + 3 * static_cast<std::size_t>(found - free.begin()))) += load;
+    };
+    for (const auto& [node, force] : forces) add(node, force);
+    for (const auto& spring : springs)
+      add(spring.node, (spring.target_m - displacement(spring.node)) * spring.stiffness_n_m);
+    return loads.norm();
   }
 
   void make_factors(std::span<const NodeSpring> springs) {
@@ -232,9 +316,17 @@ struct LocalSolver::Contact {
       Matrix h = Matrix::Zero(index(unknowns()), index(unknowns()));
       const Eigen::MatrixXf of_fields = phi.transpose() * stiff;
       h.topLeftCorner(m, m) = stiffness + of_fields.cast<double>();
+      if (with_stress)
+        for (auto& part : parts) {
+          part.tangent.clear();
+          part.outer.add_tangent(u, true, part.tangent);
+          // With several parts not symmetric, but nearly so.
+          const Matrix more = (among_fields(part) - part.at_rest) / 2;
+          h.block(part.begin, 0, part.count, m) += more;
+          h.block(0, part.begin, m, part.count) += more.transpose();
+        }
       for (std::size_t i = 0; i < free.size(); ++i) {
-        h.block(m + index(3 * i), 0, 3, m) =
-            stiff.middleRows<3>(index(3 * free[i])).cast<double>();
+        h.block(m + index(3 * i), 0, 3, m) = stiff.middleRows<3>(index(3 * free[i])).cast<double>();
         for (std::size_t j = 0; j < free.size(); ++j) {
           const auto columns = tangent.columns(free[i]);
           const auto found = std::ranges::lower_bound(columns, free[j]);
@@ -246,8 +338,14 @@ struct LocalSolver::Contact {
                   .cast<double>();
         }
       }
-      factors.compute(h);
-      if (factors.info() == Eigen::Success) return;
+      // Patches beside each other have fields that are nearly the same.
+      const Vector diagonal = h.diagonal();
+      for (const double shift : kShifts) {
+        if (parts.size() > 1 && shift < kLeastShiftOfSeveral) continue;
+        h.diagonal() = diagonal * (1 + shift);
+        factors.compute(h);
+        if (factors.info() == Eigen::Success) return;
+      }
     }
   }
 
@@ -269,8 +367,8 @@ struct LocalSolver::Contact {
   std::vector<Part> parts;
   std::vector<Field> fields;
   std::vector<TetIndex> inner_tets;  // of all parts; ascending
-  std::vector<NodeIndex> nodes;     // of the tets; ascending
-  std::vector<std::uint32_t> free;  // local
+  std::vector<NodeIndex> nodes;      // of the tets; ascending
+  std::vector<std::uint32_t> free;   // local
   ElementSet inner;
   RowMatrixF phi;    // of the fields at the nodes
   Matrix stiffness;  // of the outer tets at rest
@@ -278,7 +376,7 @@ struct LocalSolver::Contact {
   Eigen::LLT<Matrix> factors;
   bool has_factors = false;
   Vector q, a;
-  std::vector<float> u, own_u, f;
+  std::vector<float> u, f;
 };
 
 LocalSolver::LocalSolver(const scene::LocalReduction& reduction, const scene::Organ& organ)
@@ -334,13 +432,11 @@ const BlockMatrix& LocalSolver::rest_tangent() {
 LocalSolver::Sizes LocalSolver::sizes() const {
   if (contact_ == nullptr) return {};
   const auto& c = *contact_;
-  Sizes sizes{.patches = c.parts.size(), .free_nodes = c.free.size(),
-              .inner_tets = c.inner.tet_count()};
-  for (const auto& part : c.parts) {
-    sizes.modes += part.patch->modes.size();
-    sizes.cubature_tets += part.outer.tet_count();
-  }
-  sizes.greens = c.fields.size() - sizes.modes;
+  Sizes sizes{
+      .patches = c.parts.size(), .free_nodes = c.free.size(), .inner_tets = c.inner.tet_count()};
+  for (const auto& part : c.parts) sizes.cubature_tets += part.outer.tet_count();
+  for (const auto& field : c.fields) sizes.greens += field.is_greens ? 1 : 0;
+  sizes.modes = c.fields.size() - sizes.greens;
   return sizes;
 }
 
@@ -363,7 +459,8 @@ LocalSolver::Report LocalSolver::solve(std::span<const NodeForce> forces,
     const Vector q = c.q, a = c.a;
     from = c.u;
     double part = 1, after = 0;
-    for (int halvings = 0; halvings <= kMaxHalvings; ++halvings, part /= 2) {
+    for (int halvings = 0; halvings <= kMaxHalvings; ++halvings) {
+      if (halvings > 0) part /= 2;
       c.q = q + part * step.head(q.size());
       c.a = a + part * step.tail(a.size());
       r = c.residual(forces, springs);
@@ -377,7 +474,11 @@ LocalSolver::Report LocalSolver::solve(std::span<const NodeForce> forces,
     } else if (after >= before) {
       c.q = q, c.a = a;
       r = c.residual(forces, springs);
-      if (is_fresh) break;
+      if (is_fresh) {
+        // No nearer in single precision.
+        report.is_converged = before <= kNearlySettled * c.norm_of(forces, springs);
+        break;
+      }
       c.has_factors = false;
       continue;
     }

@@ -75,10 +75,18 @@ TEST_F(ReduceProgram, SaysEachMistakeInOneLine) {
 TEST_F(ReduceProgram, LeavesALocalReductionAndHowFarItIsOff) {
   ASSERT_EQ(run({"make", "liver", "--tets", "1000", "--out", at("small.organ")}), 0) << log();
   const auto make = [&](const char* threads, const char* out) {
-    return run({"reduce", at("small.organ"), "--method", "local", "--patches", "2",
-                "--patch-radius", "25", "--modes", "12", "--directions", "2", "--field-nodes", "4",
-                "--force", "0.2", "--check", "2", "--threads", threads, "--out", at(out),
-                "--results", at("out")});
+    return run({"reduce",         at("small.organ"),
+                "--method",       "local",
+                "--patches",      "2",
+                "--patch-radius", "25",
+                "--modes",        "12",
+                "--directions",   "2",
+                "--field-nodes",  "4",
+                "--force",        "0.2",
+                "--check",        "2",
+                "--threads",      threads,
+                "--out",          at(out),
+                "--results",      at("out")});
   };
   ASSERT_EQ(make("1", "small.reduction"), 0) << log();
   const auto text = log();

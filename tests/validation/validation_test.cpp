@@ -163,7 +163,7 @@ TEST_F(Validation, ALocalReductionIsNearTheFullModel) {
   ASSERT_EQ(run("--short --only ours/local-reduction"), 0) << log();
   const auto names = kept_checks();
   EXPECT_TRUE(names.contains("ours/local-reduction/liver-2-layers-unseen-force"));
-  EXPECT_EQ(names.size(), 6u);
+  EXPECT_EQ(names.size(), 7u);
 }
 
 TEST_F(Validation, CommandLine) {
