@@ -34,10 +34,8 @@ double entry(const std::vector<double>& lower, std::size_t i, std::size_t j) {
 // On the diagonal where a tangent is not positive definite, the last of which makes any so that is
 // without its stress.
 constexpr std::array kShifts{1e-9, 1e-6, 1e-3};
-// Several patches' fields may cancel: not by large amounts.
-constexpr double kLeastShiftOfSeveral = 1e-6;
 // Of a later patch's mode, beside what is there already.
-constexpr float kNewInField = 0.1F;
+constexpr float kNewInField = 0.05F;
 
 template <typename T>
 void sort_once(std::vector<T>& values) {
@@ -58,32 +56,15 @@ struct LocalSolver::Contact {
   struct Field {
     const scene::PackedField* packed;
     std::size_t at;
-    bool is_greens = false;
   };
-  // A patch with its fields, which are beside each other.
-  struct Part {
-    const scene::LocalPatch* patch;
-    Eigen::Index begin = 0, count = 0;
-    ElementSet outer;
-    BlockMatrix tangent;  // of the outer tets
-    Matrix at_rest;       // among the fields
-  };
-
   // rest: the tangent at rest of all tets over all nodes, for contacts of several patches.
   Contact(const scene::LocalReduction& reduction, const scene::Organ& organ,
           std::span<const Place> places, const std::function<const BlockMatrix&()>& rest) {
     choose_fields(reduction, places);
-    if (parts.size() > 1) drop_repeated_fields();
+    if (places.size() > 1) drop_repeated_fields();
     choose_nodes(organ, places, reduction.free_layers);
     inner = ElementSet(organ, inner_tets, {}, nodes);
-    for (auto& part : parts) {
-      std::vector<TetIndex> tets;
-      std::vector<float> weights;
-      for (const auto& [tet, weight] : part.patch->cubature)
-        if (!std::ranges::binary_search(inner_tets, tet))
-          tets.push_back(tet), weights.push_back(weight);
-      part.outer = ElementSet(organ, tets, weights, nodes);
-    }
+    outer = ElementSet(organ, outer_tets, outer_weights, nodes);
     std::vector<BlockMatrix::Pair> pairs;
     inner.add_pairs(pairs);
     for (std::uint32_t n = 0; n < nodes.size(); ++n) pairs.push_back({n, n});
@@ -95,68 +76,46 @@ struct LocalSolver::Contact {
           phi(index(3 * n + k), index(c)) =
               static_cast<float>(fields[c].packed->values[3 * nodes[n].value + k]) *
               fields[c].packed->step;
-    for (auto& part : parts) {
-      std::vector<BlockMatrix::Pair> pairs_of_outer;
-      part.outer.add_pairs(pairs_of_outer);
-      part.tangent = BlockMatrix(nodes.size(), std::move(pairs_of_outer));
-      part.outer.add_rest_tangent(part.tangent);
-      part.at_rest = among_fields(part);
-    }
-    if (parts.size() == 1)
-      stiffness = stored_stiffness();
-    else
-      stiffness = stiffness_of_several(rest());
+    std::vector<BlockMatrix::Pair> outer_pairs;
+    outer.add_pairs(outer_pairs);
+    outer_tangent = BlockMatrix(nodes.size(), std::move(outer_pairs));
+    outer.add_rest_tangent(outer_tangent);
+    outer_at_rest = among_fields(outer_tangent);
+    stiffness = places.size() == 1 ? stored_stiffness(places[0].patch->outer_stiffness)
+                                   : stiffness_of_several(rest());
     q = Vector::Zero(index(fields.size()));
     a = Vector::Zero(index(3 * free.size()));
     u.assign(3 * nodes.size(), 0);
   }
 
   void choose_fields(const scene::LocalReduction& reduction, std::span<const Place> places) {
-    for (const auto& [patch, touched] : places) {
-      const std::size_t begin = fields.size();
-      for (std::size_t i = 0; i < patch->modes.size(); ++i) fields.push_back({&patch->modes[i], i});
+    for (const auto& [patch, touched] : places)
       for (const auto node : touched) {
         const auto at = static_cast<std::size_t>(std::ranges::lower_bound(patch->reach, node) -
                                                  patch->reach.begin());
         const auto greens =
             std::ranges::lower_bound(reduction.greens, node, {}, &scene::GreensFunction::node);
         for (std::size_t axis = 0; axis < 3; ++axis)
-          fields.push_back({&greens->fields[axis], patch->modes.size() + 3 * at + axis, true});
+          fields.push_back({&greens->fields[axis], patch->modes.size() + 3 * at + axis});
       }
-      parts.push_back({patch, index(begin), index(fields.size() - begin), {}, {}, {}});
-    }
+    greens_count = fields.size();
+    for (const auto& [patch, touched] : places)
+      for (std::size_t i = 0; i < patch->modes.size(); ++i) fields.push_back({&patch->modes[i], i});
   }
 
-  // Patches beside each other have modes that are nearly the same, and cubatures that differ: only
-  // what is new in a later patch's modes stays.
+  // Patches beside each other have modes that are nearly the same: only what is new in one stays.
   void drop_repeated_fields() {
     const Eigen::MatrixXf all = all_fields();
     Eigen::MatrixXf kept(all.rows(), all.cols());
     Eigen::Index count = 0;
-    std::vector<std::uint8_t> stays(fields.size(), 0);
-    const auto look_at = [&](Eigen::Index i, float least) {
-      VectorF left = all.col(i).normalized();
-      for (int twice = 0; twice < 2; ++twice)
-        left -= kept.leftCols(count) * (kept.leftCols(count).transpose() * left);
-      if (left.norm() < least) return;
-      kept.col(count++) = left.normalized();
-      stays[static_cast<std::size_t>(i)] = 1;
-    };
-    for (const auto& part : parts)
-      for (Eigen::Index i = part.begin + index(part.patch->modes.size());
-           i < part.begin + part.count; ++i)
-        look_at(i, 0);
-    for (const auto& part : parts)
-      for (std::size_t i = 0; i < part.patch->modes.size(); ++i)
-        look_at(part.begin + index(i), kNewInField);
     std::vector<Field> left;
-    for (auto& part : parts) {
-      const auto begin = index(left.size());
-      for (Eigen::Index i = part.begin; i < part.begin + part.count; ++i)
-        if (stays[static_cast<std::size_t>(i)] != 0)
-          left.push_back(fields[static_cast<std::size_t>(i)]);
-      part.begin = begin;
-      part.count = index(left.size()) - begin;
+    for (std::size_t i = 0; i < fields.size(); ++i) {
+      VectorF field = all.col(index(i)).normalized();
+      for (int twice = 0; twice < 2; ++twice)
+        field -= kept.leftCols(count) * (kept.leftCols(count).transpose() * field);
+      if (i >= greens_count && field.norm() < kNewInField) continue;
+      kept.col(count++) = field.normalized();
+      left.push_back(fields[i]);
     }
     fields = std::move(left);
   }
@@ -178,10 +137,27 @@ struct LocalSolver::Contact {
     for (const auto& [patch, touched] : places) {
       near.insert(near.end(), touched.begin(), touched.end());
       inner_tets.insert(inner_tets.end(), patch->inner_tets.begin(), patch->inner_tets.end());
-      for (const auto& [tet, weight] : patch->cubature) add(tet);
     }
     sort_once(inner_tets);
+    // Of each patch's weighted tets those that are nearest to it, so that all are of one energy.
+    const auto distance = [&](TetIndex tet, const scene::LocalPatch* patch) {
+      const auto& x = organ.mesh.rest_positions;
+      return length_squared(x[organ.mesh.tets[tet.value][0].value] - x[patch->centre.value]);
+    };
+    for (const auto& place : places)
+      for (const auto& [tet, weight] : place.patch->cubature) {
+        const double own = distance(tet, place.patch);
+        if (std::ranges::binary_search(inner_tets, tet) ||
+            std::ranges::any_of(places, [&](const Place& other) {
+              const double theirs = distance(tet, other.patch);
+              return theirs < own || (theirs == own && &other < &place);
+            }))
+          continue;
+        outer_tets.push_back(tet);
+        outer_weights.push_back(weight);
+      }
     for (const auto tet : inner_tets) add(tet);
+    for (const auto tet : outer_tets) add(tet);
     sort_once(nodes);
     for (std::uint32_t layer = 0; layer < layers; ++layer) {
       const std::size_t count = near.size();
@@ -197,9 +173,8 @@ struct LocalSolver::Contact {
         free.push_back(local(node));
   }
 
-  Matrix stored_stiffness() const {
+  Matrix stored_stiffness(const std::vector<double>& lower) const {
     Matrix k(index(fields.size()), index(fields.size()));
-    const auto& lower = parts[0].patch->outer_stiffness;
     for (std::size_t i = 0; i < fields.size(); ++i)
       for (std::size_t j = 0; j < fields.size(); ++j)
         k(index(i), index(j)) = entry(lower, fields[i].at, fields[j].at);
@@ -218,10 +193,9 @@ struct LocalSolver::Contact {
     return quadratic(rest, all) - quadratic(tangent, phi);
   }
 
-  // Of a part's outer tets between its fields and all.
-  Matrix among_fields(const Part& part) const {
-    return (phi.middleCols(part.begin, part.count).transpose() * product(part.tangent, phi))
-        .cast<double>();
+  Matrix among_fields(const BlockMatrix& k) const {
+    const Eigen::MatrixXf among = phi.transpose() * product(k, phi);
+    return among.cast<double>();
   }
 
   static RowMatrixF product(const BlockMatrix& k, const RowMatrixF& b) {
@@ -271,16 +245,9 @@ struct LocalSolver::Contact {
     for (std::size_t i = 0; i < free.size(); ++i)
       for (std::size_t k = 0; k < 3; ++k)
         r[index(fields.size() + 3 * i + k)] = -static_cast<double>(f[3 * free[i] + k]);
+    outer.add_forces(ForcePart::Nonlinear, u, f);
     const VectorF along = phi.transpose() * Eigen::Map<const VectorF>(f.data(), index(f.size()));
     r.head(index(fields.size())) = -(along.cast<double>() + stiffness * q);
-    // What is not linear farther off: by each patch's cubature for its own fields.
-    for (const auto& part : parts) {
-      std::ranges::fill(f, 0.0F);
-      part.outer.add_forces(ForcePart::Nonlinear, u, f);
-      const VectorF beyond = phi.middleCols(part.begin, part.count).transpose() *
-                             Eigen::Map<const VectorF>(f.data(), index(f.size()));
-      r.segment(part.begin, part.count) -= beyond.cast<double>();
-    }
     return r;
   }
 
@@ -316,15 +283,11 @@ struct LocalSolver::Contact {
       Matrix h = Matrix::Zero(index(unknowns()), index(unknowns()));
       const Eigen::MatrixXf of_fields = phi.transpose() * stiff;
       h.topLeftCorner(m, m) = stiffness + of_fields.cast<double>();
-      if (with_stress)
-        for (auto& part : parts) {
-          part.tangent.clear();
-          part.outer.add_tangent(u, true, part.tangent);
-          // With several parts not symmetric, but nearly so.
-          const Matrix more = (among_fields(part) - part.at_rest) / 2;
-          h.block(part.begin, 0, part.count, m) += more;
-          h.block(0, part.begin, m, part.count) += more.transpose();
-        }
+      if (with_stress) {
+        outer_tangent.clear();
+        outer.add_tangent(u, true, outer_tangent);
+        h.topLeftCorner(m, m) += among_fields(outer_tangent) - outer_at_rest;
+      }
       for (std::size_t i = 0; i < free.size(); ++i) {
         h.block(m + index(3 * i), 0, 3, m) = stiff.middleRows<3>(index(3 * free[i])).cast<double>();
         for (std::size_t j = 0; j < free.size(); ++j) {
@@ -338,10 +301,8 @@ struct LocalSolver::Contact {
                   .cast<double>();
         }
       }
-      // Patches beside each other have fields that are nearly the same.
       const Vector diagonal = h.diagonal();
       for (const double shift : kShifts) {
-        if (parts.size() > 1 && shift < kLeastShiftOfSeveral) continue;
         h.diagonal() = diagonal * (1 + shift);
         factors.compute(h);
         if (factors.info() == Eigen::Success) return;
@@ -364,15 +325,17 @@ struct LocalSolver::Contact {
     return {static_cast<double>(at[0]), static_cast<double>(at[1]), static_cast<double>(at[2])};
   }
 
-  std::vector<Part> parts;
-  std::vector<Field> fields;
-  std::vector<TetIndex> inner_tets;  // of all parts; ascending
-  std::vector<NodeIndex> nodes;      // of the tets; ascending
-  std::vector<std::uint32_t> free;   // local
-  ElementSet inner;
+  std::vector<Field> fields;  // Green's functions, then modes
+  std::size_t greens_count = 0;
+  std::vector<TetIndex> inner_tets, outer_tets;  // of all patches; inner ones ascending
+  std::vector<float> outer_weights;
+  std::vector<NodeIndex> nodes;     // of the tets; ascending
+  std::vector<std::uint32_t> free;  // local
+  ElementSet inner, outer;
   RowMatrixF phi;    // of the fields at the nodes
   Matrix stiffness;  // of the outer tets at rest
-  BlockMatrix tangent;
+  BlockMatrix tangent, outer_tangent;
+  Matrix outer_at_rest;  // of the weighted tets, among the fields
   Eigen::LLT<Matrix> factors;
   bool has_factors = false;
   Vector q, a;
@@ -432,12 +395,11 @@ const BlockMatrix& LocalSolver::rest_tangent() {
 LocalSolver::Sizes LocalSolver::sizes() const {
   if (contact_ == nullptr) return {};
   const auto& c = *contact_;
-  Sizes sizes{
-      .patches = c.parts.size(), .free_nodes = c.free.size(), .inner_tets = c.inner.tet_count()};
-  for (const auto& part : c.parts) sizes.cubature_tets += part.outer.tet_count();
-  for (const auto& field : c.fields) sizes.greens += field.is_greens ? 1 : 0;
-  sizes.modes = c.fields.size() - sizes.greens;
-  return sizes;
+  return {.modes = c.fields.size() - c.greens_count,
+          .greens = c.greens_count,
+          .free_nodes = c.free.size(),
+          .inner_tets = c.inner.tet_count(),
+          .cubature_tets = c.outer.tet_count()};
 }
 
 LocalSolver::Report LocalSolver::solve(std::span<const NodeForce> forces,

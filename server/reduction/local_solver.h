@@ -36,14 +36,13 @@ class LocalSolver {
   ~LocalSolver();
 
   // From now on these nodes are touched; the displacements are 0. What one patch does not reach is
-  // done by several together, to first order exactly, beyond it each patch for its own fields; that
-  // costs a product over the whole mesh. False, and nothing has changed, if a node is in no patch,
-  // or they are of more than kMaxPatches.
+  // done by several together, each with its own weighted tets where it is the nearest; that costs a
+  // product over the whole mesh. False, and nothing has changed, if a node is in no patch, or they
+  // are of more than kMaxPatches.
   bool touch(std::span<const NodeIndex> nodes);
 
   struct Sizes {
-    std::size_t patches = 0, modes = 0, greens = 0, free_nodes = 0, inner_tets = 0,
-                cubature_tets = 0;
+    std::size_t modes = 0, greens = 0, free_nodes = 0, inner_tets = 0, cubature_tets = 0;
     std::size_t unknowns() const { return modes + greens + 3 * free_nodes; }
   };
   Sizes sizes() const;
