@@ -63,7 +63,7 @@ Examples:
   trocar-organ reduce liver --places 6 --directions 1 --creep-nodes 0
       a quick try without creep
   trocar-organ reduce liver --method local --threads 2
-      the whole surface; half an hour
+      the whole surface; the better part of an hour
   trocar-organ reduce liver --method local --patches 4 -o try.reduction
       a quick try: some patches beside each other
 )";
