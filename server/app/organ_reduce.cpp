@@ -1,7 +1,5 @@
 #include "server/app/organ_reduce.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -13,6 +11,7 @@
 #include "common/scene/load_organ.h"
 #include "common/scene/reduction_file.h"
 #include "server/app/organ_reduce_local.h"
+#include "server/app/progress_line.h"
 #include "server/reduction/quality.h"
 
 namespace trocar::app {
@@ -23,7 +22,6 @@ using reduction::Stage;
 
 constexpr const char* kProgram = "trocar-organ";
 constexpr std::size_t kMaxCheckPlaces = 500;
-constexpr std::uint64_t kProgressEvery_ns = 5'000'000'000;
 
 constexpr const char* kHelp = R"(
 Methods:
@@ -82,20 +80,9 @@ const char* name_of(Stage stage) {
   return "";
 }
 
-// One line that is rewritten on a terminal; elsewhere one every few seconds.
 reduction::Progress make_progress() {
-  const bool is_terminal = ::isatty(STDERR_FILENO) != 0;
-  return [=, begin = monotonic_ns(), shown = monotonic_ns()](Stage stage, std::size_t done,
-                                                             std::size_t all) mutable {
-    const auto now = monotonic_ns();
-    const double seconds = static_cast<double>(now - begin) * 1e-9;
-    if (done == all) begin = now;
-    if (!is_terminal && done < all && now - shown < kProgressEvery_ns) return;
-    shown = now;
-    std::fprintf(stderr, "%s%s: %s %zu of %zu, %.0f s to go%s", is_terminal ? "\r" : "", kProgram,
-                 name_of(stage), done, all,
-                 seconds * static_cast<double>(all - done) / static_cast<double>(done),
-                 is_terminal && done < all ? "  " : "\n");
+  return [line = ProgressLine(kProgram)](Stage stage, std::size_t done, std::size_t all) mutable {
+    line.show(name_of(stage), done, all);
   };
 }
 

@@ -1,15 +1,13 @@
 #include "server/app/organ_reduce_local.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
 
 #include "common/base/text_file.h"
-#include "common/base/timing.h"
 #include "common/scene/load_organ.h"
 #include "common/scene/local_reduction_file.h"
+#include "server/app/progress_line.h"
 #include "server/reduction/local_quality.h"
 
 namespace trocar::app {
@@ -20,7 +18,6 @@ using reduction::LocalStage;
 
 constexpr const char* kProgram = "trocar-organ";
 constexpr std::size_t kMaxCheckPlaces = 500;
-constexpr std::uint64_t kProgressEvery_ns = 5'000'000'000;
 
 const char* name_of(LocalStage stage) {
   switch (stage) {
@@ -33,26 +30,6 @@ const char* name_of(LocalStage stage) {
   }
   return "";
 }
-
-// One line that is rewritten on a terminal; elsewhere one every few seconds.
-class ProgressLine {
- public:
-  void show(const char* what, std::size_t done, std::size_t all) {
-    const auto now = monotonic_ns();
-    const double seconds = static_cast<double>(now - begin_) * 1e-9;
-    if (done == all) begin_ = now;
-    if (!is_terminal_ && done < all && now - shown_ < kProgressEvery_ns) return;
-    shown_ = now;
-    std::fprintf(stderr, "%s%s: %s %zu of %zu, %.0f s to go%s", is_terminal_ ? "\r" : "", kProgram,
-                 what, done, all,
-                 seconds * static_cast<double>(all - done) / static_cast<double>(done),
-                 is_terminal_ && done < all ? "  " : "\n");
-  }
-
- private:
-  const bool is_terminal_ = ::isatty(STDERR_FILENO) != 0;
-  std::uint64_t begin_ = monotonic_ns(), shown_ = begin_;
-};
 
 // What the other method asks for, and what both do with defaults of their own.
 Status take_settings(ReduceCommand& command) {
@@ -128,7 +105,7 @@ Status check(const scene::Organ& organ, const reduction::LocalBuilt& built,
              const ReduceCommand& command, const std::filesystem::path& folder) {
   auto model = reduction::FullModel::create(organ);
   if (!model) return model.error();
-  ProgressLine line;
+  ProgressLine line(kProgram);
   const auto loads = reduction::solve_local_loads(
       **model, built, command.check_places, command.check_places,
       [&](std::size_t done, std::size_t all) { line.show("check, place", done, all); });
@@ -154,7 +131,7 @@ Status run_reduce_local(ReduceCommand command) {
       command.folder.empty() ? "out/reduce-" + stem : command.folder;
   const std::string out = command.out.empty() ? stem + ".reduction" : command.out;
   if (auto s = check_outputs(folder, out); !s) return s;
-  ProgressLine line;
+  ProgressLine line(kProgram);
   const auto built = reduction::build_local(
       *organ, command.local, [&](LocalStage stage, std::size_t done, std::size_t all) {
         line.show(name_of(stage), done, all);
