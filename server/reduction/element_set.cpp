@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "common/base/assert.h"
+#include "server/dynamics/tet_shape.h"
 
 namespace trocar::reduction {
 namespace {
@@ -34,23 +35,6 @@ Vec8 product(const Mat8& m, const Vec8& v) {
 // Its columns' cross products: cof(m) (a x b) = m a x m b. Rows of cof(m) likewise.
 Mat8 cofactors(const Mat8& m) {
   return {cross8(m.y, m.z), cross8(m.z, m.x), cross8(m.x, m.y)};
-}
-
-struct TetGradients {
-  double volume = 0;
-  std::array<Vec3d, 4> of;
-};
-TetGradients gradients_of(const mesh::TetMesh& mesh, const mesh::Tet& tet) {
-  const auto& x = mesh.rest_positions;
-  const Vec3d a = x[tet[1].value] - x[tet[0].value], b = x[tet[2].value] - x[tet[0].value],
-              c = x[tet[3].value] - x[tet[0].value];
-  const double six = dot(cross(a, b), c);
-  TetGradients g{six / 6, {}};
-  g.of[1] = cross(b, c) / six;
-  g.of[2] = cross(c, a) / six;
-  g.of[3] = cross(a, b) / six;
-  g.of[0] = (g.of[1] + g.of[2] + g.of[3]) * -1.0;
-  return g;
 }
 
 }  // namespace
@@ -102,10 +86,10 @@ ElementSet::ElementSet(const scene::Organ& organ, std::span<const TetIndex> tets
     auto& group = groups_.back();
     const auto lane = group.used++;
     const auto& tet = organ.mesh.tets[t];
-    const auto g = gradients_of(organ.mesh, tet);
+    const auto shape = dynamics::tet_shape(organ.mesh.rest_positions, tet);
     const auto& material = scene::material_at(organ, materials[t]);
     const auto [c10, bulk] = scene::neo_hookean_parameters(material);
-    const double v = g.volume * (weights.empty() ? 1.0 : static_cast<double>(weights[i]));
+    const double v = shape.volume * (weights.empty() ? 1.0 : static_cast<double>(weights[i]));
     double curvature = 0;
     if (material.elastic_law == scene::ElasticLaw::Measured) {
       const auto& law = material.measured;
@@ -116,7 +100,8 @@ ElementSet::ElementSet(const scene::Organ& organ, std::span<const TetIndex> tets
     group.bulk_v.v[lane] = static_cast<float>(bulk * v);
     group.curvature_v.v[lane] = static_cast<float>(4 * curvature * v);
     for (std::size_t k = 0; k < 4; ++k) group.nodes[k].v[lane] = local(tet[k]);
-    for (std::size_t k = 1; k < 4; ++k) group.gradients[k - 1].set(lane, to_float(g.of[k]));
+    for (std::size_t k = 1; k < 4; ++k)
+      group.gradients[k - 1].set(lane, to_float(shape.gradients[k]));
   }
 }
 

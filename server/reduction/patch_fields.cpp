@@ -1,6 +1,6 @@
 #include "server/reduction/patch_fields.h"
 
-#include <Eigen/LU>
+#include "server/dynamics/tet_shape.h"
 
 namespace trocar::reduction {
 namespace {
@@ -65,16 +65,12 @@ std::optional<Vector> state_of(FullModel& model, const Matrix& series,
 
 TetForces::TetForces(const FullModel& model, TetIndex tet)
     : material_(model.material_of(tet)), nodes_(model.organ().mesh.tets[tet.value]) {
-  const auto& x = model.organ().mesh.rest_positions;
-  const auto edge = [&](std::size_t k) {
-    const Vec3d e = x[nodes_[k].value] - x[nodes_[0].value];
-    return Eigen::Vector3d(e.x, e.y, e.z);
-  };
-  Matrix3 edges;
-  edges << edge(1), edge(2), edge(3);
-  volume_ = edges.determinant() / 6;
-  shapes_.bottomRows<3>() = edges.inverse();
-  shapes_.row(0) = -shapes_.bottomRows<3>().colwise().sum();
+  const auto shape = dynamics::tet_shape(model.organ().mesh.rest_positions, nodes_);
+  volume_ = shape.volume;
+  for (std::size_t k = 0; k < 4; ++k) {
+    const Vec3d& g = shape.gradients[k];
+    shapes_.row(index(k)) << g.x, g.y, g.z;
+  }
   const auto rest = finite_elements::stress_of(model.rest_material_of(tet), Matrix3::Identity());
   TROCAR_ASSERT(rest.has_value());
   tangent_ = rest->relaxing.tangent + rest->volumetric.tangent;
