@@ -59,12 +59,6 @@ class Builder {
         models_(std::move(models)),
         accessible_(accessible_nodes(organ, settings.patch_radius_m)) {
     std::ranges::sort(accessible_);
-    masses_.assign(organ_.mesh.node_count(), 0.0);
-    const auto materials = scene::material_map(organ_).tets;
-    for (std::uint32_t t = 0; t < organ_.mesh.tets.size(); ++t)
-      for (const auto n : organ_.mesh.tets[t])
-        masses_[n.value] += mesh::tet_volume(organ_.mesh, TetIndex(t)) / 4 *
-                            scene::material_at(organ_, materials[t]).density_kg_m3;
   }
 
   Result<LocalBuilt> build() {
@@ -257,7 +251,7 @@ class Builder {
     patch.outer_stiffness = lower(outer_stiffness(model, patch, basis));
     Matrix weighted = basis;
     for (Eigen::Index i = 0; i < basis.rows(); ++i)
-      weighted.row(i) *= masses_[static_cast<std::size_t>(i / 3)];
+      weighted.row(i) *= organ_.node_masses_kg[static_cast<std::size_t>(i / 3)];
     patch.mass = lower(basis.transpose() * weighted);
     find_patch_cubature(model, number, basis, states);
   }
@@ -364,7 +358,6 @@ class Builder {
   const std::vector<Vec3d> normals_;
   const std::vector<std::unique_ptr<FullModel>> models_;  // one per thread
   std::vector<NodeIndex> accessible_;                     // ascending
-  std::vector<double> masses_;                            // kg, per node
   std::vector<Pressed> pressed_;                          // per patch
   LocalBuilt built_;
 };
