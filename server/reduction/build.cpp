@@ -7,6 +7,7 @@
 #include <limits>
 #include <numbers>
 
+#include "server/reduction/check_count.h"
 #include "server/reduction/reduced_model.h"
 
 namespace trocar::reduction {
@@ -100,19 +101,13 @@ scene::CreepCurve curve_of(const scene::Organ& organ, NodeIndex loaded,
 
 Status validate(const Settings& s) {
   const auto wrong = [](const std::string& what) { return Error{ErrorCode::Usage, what}; };
-  const auto count = [&](const char* option, std::size_t value, std::size_t low,
-                         std::size_t high) -> Status {
-    if (value >= low && value <= high) return {};
-    return wrong(std::string(option) + ": " + std::to_string(value) + " is not from " +
-                 std::to_string(low) + " to " + std::to_string(high));
-  };
-  if (auto c = count("--modes", s.modes, 1, scene::kMaxReducedModes); !c) return c;
-  if (auto c = count("--places", s.places, 1, 1000); !c) return c;
-  if (auto c = count("--directions", s.directions, 1, 20); !c) return c;
-  if (auto c = count("--magnitudes", s.magnitudes, 1, 20); !c) return c;
-  if (auto c = count("--tangents", s.tangents, 0, 10'000); !c) return c;
-  if (auto c = count("--creep-nodes", s.creep_nodes, 0, 1000); !c) return c;
-  if (auto c = count("--threads", s.threads, 1, kMaxWorkers); !c) return c;
+  if (auto c = check_count("--modes", s.modes, 1, scene::kMaxReducedModes); !c) return c;
+  if (auto c = check_count("--places", s.places, 1, 1000); !c) return c;
+  if (auto c = check_count("--directions", s.directions, 1, 20); !c) return c;
+  if (auto c = check_count("--magnitudes", s.magnitudes, 1, 20); !c) return c;
+  if (auto c = check_count("--tangents", s.tangents, 0, 10'000); !c) return c;
+  if (auto c = check_count("--creep-nodes", s.creep_nodes, 0, 1000); !c) return c;
+  if (auto c = check_count("--threads", s.threads, 1, kMaxWorkers); !c) return c;
   if (!(s.force_n > 0 && s.force_n <= 100)) return wrong("--force: must be above 0, at most 100 N");
   if (!(s.radius_m >= 0 && s.radius_m <= 0.2)) return wrong("--radius: must be from 0 to 200 mm");
   if (!(s.influence_m >= 0 && s.influence_m <= 2))

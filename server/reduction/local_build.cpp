@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "common/scene/any_material.h"
+#include "server/reduction/check_count.h"
 #include "server/reduction/cubature.h"
 #include "server/reduction/patch_fields.h"
 #include "server/reduction/presses.h"
@@ -366,19 +367,15 @@ class Builder {
 
 Status validate(const LocalSettings& s) {
   const auto wrong = [](const std::string& what) { return Error{ErrorCode::Usage, what}; };
-  const auto count = [&](const char* option, std::size_t value, std::size_t low,
-                         std::size_t high) -> Status {
-    if (value >= low && value <= high) return {};
-    return wrong(std::string(option) + ": " + std::to_string(value) + " is not from " +
-                 std::to_string(low) + " to " + std::to_string(high));
-  };
-  if (auto c = count("--modes", s.modes, 1, scene::kMaxReducedModes); !c) return c;
-  if (auto c = count("--free-layers", s.free_layers, 0, 3); !c) return c;
-  if (auto c = count("--directions", s.directions, 0, 20); !c) return c;
-  if (auto c = count("--field-nodes", s.field_nodes, 1, 100); !c) return c;
-  if (auto c = count("--patches", s.patches, 0, 4096); !c) return c;
-  if (auto c = count("--threads", s.threads, 1, kMaxWorkers); !c) return c;
-  if (!(s.force_n > 0 && s.force_n <= 100)) return wrong("--force: must be above 0, at most 100 N");
+  if (auto c = check_count("--modes", s.modes, 1, scene::kMaxReducedModes); !c) return c;
+  if (auto c = check_count("--free-layers", s.free_layers, 0, scene::kMaxFreeLayers); !c) return c;
+  if (auto c = check_count("--directions", s.directions, 0, 20); !c) return c;
+  if (auto c = check_count("--field-nodes", s.field_nodes, 1, 100); !c) return c;
+  if (auto c = check_count("--patches", s.patches, 0, scene::kMaxLocalPatches); !c) return c;
+  if (auto c = check_count("--threads", s.threads, 1, kMaxWorkers); !c) return c;
+  if (!(s.force_n > 0 && s.force_n <= scene::kMaxLocalForce_n))
+    return wrong("--force: must be above 0, at most " +
+                 std::to_string(std::lround(scene::kMaxLocalForce_n)) + " N");
   if (!(s.patch_radius_m >= 1e-3 && s.patch_radius_m <= 0.2))
     return wrong("--patch-radius: must be from 1 to 200 mm");
   if (!(s.residual >= 0 && s.residual <= 0.1)) return wrong("--residual: must be from 0 to 0.1");

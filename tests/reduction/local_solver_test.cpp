@@ -232,6 +232,8 @@ TEST_F(LocalBlock, SettingsAreCheckedByName) {
   says({.residual = 0.2}, "--residual");
   says({.patch_radius_m = 0}, "--patch-radius");
   says({.force_n = -1}, "--force");
+  says({.force_n = 101}, "--force: must be above 0, at most 100 N");
+  says({.patches = 4097}, "--patches: 4097 is not from 0 to 4096");
   EXPECT_TRUE(validate(LocalSettings{}).ok());
 }
 
