@@ -102,13 +102,20 @@ TEST_F(LocalBlock, PatchesCoverTheirNodesAndKeepTheirResidual) {
 TEST_F(LocalBlock, IsNearTheFullModelWithinAndOutsideItsTraining) {
   const auto built = build(settings());
   const auto loads = solve_local_loads(*model_, built, 2, 4);
-  for (const bool trained : {true, false}) {
-    const auto errors = errors_of_local(built.reduction, organ_, loads, trained);
-    ASSERT_GE(errors.force.size(), 4u);
+  // Twice the worst that was measured: trained 0.61, 0.056 and 0.83 %, unseen 1.50, 0.18, 0.78 %.
+  struct Bounds {
+    bool is_trained;
+    std::size_t loads;
+    double field, contact, force;
+  };
+  for (const auto& most :
+       {Bounds{true, 4, 0.012, 0.0011, 0.017}, Bounds{false, 8, 0.03, 0.0035, 0.016}}) {
+    const auto errors = errors_of_local(built.reduction, organ_, loads, most.is_trained);
+    ASSERT_EQ(errors.force.size(), most.loads);
     EXPECT_EQ(errors.unsolved, 0u);
-    EXPECT_LT(errors_of(errors.field).worst, 0.05) << trained;
-    EXPECT_LT(errors_of(errors.contact).worst, 0.03) << trained;
-    EXPECT_LT(errors_of(errors.force).worst, 0.03) << trained;
+    EXPECT_LT(errors_of(errors.field).worst, most.field) << most.is_trained;
+    EXPECT_LT(errors_of(errors.contact).worst, most.contact) << most.is_trained;
+    EXPECT_LT(errors_of(errors.force).worst, most.force) << most.is_trained;
   }
 }
 
