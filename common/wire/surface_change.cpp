@@ -3,16 +3,11 @@
 #include <algorithm>
 #include <string>
 
+#include "common/base/mix.h"
 #include "common/wire/surface_layout.h"
 
 namespace trocar::wire {
 namespace {
-
-std::uint64_t mix(std::uint64_t x) {
-  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
-  x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
-  return x ^ (x >> 31);
-}
 
 Error bad(const std::string& what) {
   return {ErrorCode::BadMessage, "SurfaceChange: " + what};
@@ -72,7 +67,7 @@ Status check_triangles(const SurfaceChange& change, const SurfaceLayout& layout)
 std::uint64_t triangle_hash(TriangleIndex number, const Corners& corners, bool is_wound) {
   const std::uint64_t first = number.value | std::uint64_t{corners[0].value} << 32;
   const std::uint64_t rest = corners[1].value | std::uint64_t{corners[2].value} << 32;
-  const std::uint64_t hash = mix(mix(first) ^ rest);
+  const std::uint64_t hash = mix_bits(mix_bits(first) ^ rest);
   return is_wound ? ~hash : hash;
 }
 

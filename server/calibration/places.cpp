@@ -2,19 +2,14 @@
 
 #include <algorithm>
 
+#include "common/base/mix.h"
+
 namespace trocar::calibration {
 namespace {
 
 // A place beside what is fixed tells of the support, not of the tissue.
 constexpr double kFixedWeight = 4;
 constexpr std::size_t kFixedStride = 7;
-
-std::uint64_t mix(std::uint64_t x) {
-  x += 0x9e3779b97f4a7c15ull;
-  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ull;
-  x = (x ^ (x >> 27)) * 0x94d049bb133111ebull;
-  return x ^ (x >> 31);
-}
 
 }  // namespace
 
@@ -37,7 +32,7 @@ std::vector<Place> spread_places(const scene::Organ& organ, std::size_t count, s
 
   std::vector<Place> places;
   if (candidates.empty()) return places;
-  std::size_t next = mix(seed) % candidates.size();
+  std::size_t next = splitmix64(seed) % candidates.size();
   if (!taken.empty()) next = static_cast<std::size_t>(std::ranges::max_element(far) - far.begin());
   while (places.size() < std::min(count, candidates.size())) {
     const auto node = candidates[next];

@@ -9,6 +9,7 @@
 #include <numbers>
 #include <thread>
 
+#include "common/base/mix.h"
 #include "common/scene/any_material.h"
 #include "server/reduction/check_count.h"
 #include "server/reduction/cubature.h"
@@ -33,14 +34,6 @@ constexpr std::size_t kCubatureRows = 2048;
 
 Eigen::Index index(std::size_t i) {
   return static_cast<Eigen::Index>(i);
-}
-
-// splitmix64
-std::uint64_t mixed(std::uint64_t x) {
-  x += 0x9e3779b97f4a7c15;
-  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9;
-  x = (x ^ (x >> 27)) * 0x94d049bb133111eb;
-  return x ^ (x >> 31);
 }
 
 // All presses at one centre.
@@ -336,7 +329,7 @@ class Builder {
         const Vector part = scale.cwiseProduct(forces.volume() * (gradients.transpose() * p));
         for (Eigen::Index c = 0; c < fields; ++c) {
           const auto hash =
-              mixed(s * static_cast<std::size_t>(fields) + static_cast<std::size_t>(c));
+              splitmix64(s * static_cast<std::size_t>(fields) + static_cast<std::size_t>(c));
           const double sign = (hash & 1) != 0 ? 1 : -1;
           column[index((hash >> 1) % rows)] += sign * part[c];
         }
