@@ -1,7 +1,5 @@
 #include "server/app/organ_calibrate.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
@@ -13,21 +11,16 @@
 #include "common/plot/plot.h"
 #include "common/scene/load_organ.h"
 #include "common/scene/organ_file.h"
+#include "server/app/progress_line.h"
 
 namespace trocar::app {
 namespace {
 
 constexpr const char* kProgram = "trocar-organ";
 
-calibration::Progress progress_of(const char* what) {
-  const bool is_terminal = ::isatty(STDERR_FILENO) != 0;
-  const auto begin = monotonic_ns();
-  return [=](std::size_t done, std::size_t all) {
-    const double seconds = static_cast<double>(monotonic_ns() - begin) * 1e-9;
-    std::fprintf(stderr, "%s%s: %s, place %zu of %zu, %.0f s to go%s", is_terminal ? "\r" : "",
-                 kProgram, what, done, all,
-                 seconds * static_cast<double>(all - done) / static_cast<double>(done),
-                 is_terminal && done < all ? "  " : "\n");
+calibration::Progress progress_of(const char* stage) {
+  return [stage, line = ProgressLine(kProgram)](std::size_t done, std::size_t all) mutable {
+    line.show(stage, done, all);
   };
 }
 
@@ -174,7 +167,7 @@ Status run_calibrate(CalibrateCommand command) {
 
   const auto begin = monotonic_ns();
   const auto cpu = thread_cpu_ns();
-  const auto found = calibration::calibrate(*organ, settings, progress_of("pressing"));
+  const auto found = calibration::calibrate(*organ, settings, progress_of("pressing, place"));
   if (found.table.empty())
     return Error{ErrorCode::BadFile,
                  command.organ + ": no place could be pressed, try another --radius or --seed"};
@@ -192,7 +185,7 @@ Status run_calibrate(CalibrateCommand command) {
   if (auto s = plot::write_svg(folder / "errors.svg", to_plot(found, settings.error)); !s) return s;
   if (command.check_places > 0) {
     const auto checks = calibration::check(*organ, found.table, settings, command.check_places,
-                                           progress_of("checking"));
+                                           progress_of("checking, place"));
     print_check(checks);
     if (auto s = write_text_file(folder / "check.csv", check_csv(checks)); !s) return s;
   }

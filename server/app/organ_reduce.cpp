@@ -21,7 +21,6 @@ using reduction::Quality;
 using reduction::Stage;
 
 constexpr const char* kProgram = "trocar-organ";
-constexpr std::size_t kMaxCheckPlaces = 500;
 
 constexpr const char* kHelp = R"(
 Methods:

@@ -12,6 +12,8 @@
 
 namespace trocar::app {
 
+inline constexpr std::size_t kMaxCheckPlaces = 500;
+
 struct ReduceCommand {
   std::string organ, out, folder, method = "dogan";
   double radius_mm = 15, influence_mm = 45;

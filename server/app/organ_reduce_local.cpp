@@ -17,7 +17,6 @@ using reduction::LocalErrors;
 using reduction::LocalStage;
 
 constexpr const char* kProgram = "trocar-organ";
-constexpr std::size_t kMaxCheckPlaces = 500;
 
 const char* name_of(LocalStage stage) {
   switch (stage) {
