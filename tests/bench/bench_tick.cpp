@@ -2,6 +2,7 @@
 // queue and the rest still, and as sessions are by default. The state hash beside the times says
 // that it is the same work.
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cinttypes>
 #include <cmath>
@@ -14,6 +15,7 @@
 namespace trocar {
 namespace {
 
+constexpr const char* kProgram = "bench_tick";
 constexpr Tick kTicks = 6000;
 constexpr Tick kWarmUp = 1000;
 constexpr std::uint8_t kHands = 3;
@@ -42,7 +44,7 @@ float percentile(std::vector<std::uint32_t>& ns, double share) {
 
 int run(const char* title, scene::ElasticLaw law, const step::TickDecisions& decisions) {
   auto liver = scene::make_liver();
-  if (!liver) return report("bench_tick", liver.error());
+  if (!liver) return report(kProgram, liver.error());
   liver->material.elastic_law = law;
   step::Simulation simulation(std::move(*liver));
   const std::array<Vec3f, kHands> directions{
@@ -106,8 +108,13 @@ int run(const char* title, scene::ElasticLaw law, const step::TickDecisions& dec
 }  // namespace
 }  // namespace trocar
 
-int main() {
-  trocar::require_cpu_features("bench_tick");
+int main(int argc, char** argv) {
+  trocar::require_cpu_features(trocar::kProgram);
+  CLI::App app{
+      "CPU time of every stage of a tick: the built-in liver with three hands for 6 s, of springs\n"
+      "and neo-Hookean, frozen beyond 1,200 nodes and graded. Takes about 10 s.",
+      trocar::kProgram};
+  CLI11_PARSE(app, argc, argv);
   using trocar::world::Boundary;
   const trocar::step::TickDecisions frozen{
       .depth_limit = 40, .node_limit = 1200, .boundary = Boundary::Frozen};
