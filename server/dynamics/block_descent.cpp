@@ -468,8 +468,10 @@ SolveReport BlockDescent::solve(const contact::ContactList& contacts,
   TROCAR_ASSERT(loads.held.size() == loads.held_displacements.size());
   TROCAR_ASSERT(loads.forces.empty() || loads.forces.size() == world.node_count());
   // A tolerance ends the sweeps early, before the far ones.
-  TROCAR_ASSERT((settings.far_sweeps == 0 && settings.bands.empty()) ||
+  has_exterior_ = settings.exterior != nullptr;
+  TROCAR_ASSERT((settings.far_sweeps == 0 && settings.bands.empty() && !has_exterior_) ||
                 settings.residual_tolerance_n == 0);
+  TROCAR_ASSERT(!has_exterior_ || settings.far_sweeps == 0);
   if (++current_ == 0) {
     for (auto* stamps : {&slot_stamp_, &group_stamp_, &begun_stamp_, &serial_stamp_, &asked_stamp_})
       std::ranges::fill(*stamps, 0u);
@@ -486,6 +488,8 @@ SolveReport BlockDescent::solve(const contact::ContactList& contacts,
   if (auto* const relaxation = tissue_.relaxation())
     relaxation->begin_step(settings.dt, world.relaxation, workers_);
   begin_groups(world, loads);
+  const ExteriorStep outside{tissue_.groups(), x_.data(), world, contacts, near, settings.dt};
+  if (has_exterior_) settings.exterior->begin(outside);
 
   SolveReport report;
   float omega = settings.sweeps < 3
@@ -498,6 +502,7 @@ SolveReport BlockDescent::solve(const contact::ContactList& contacts,
     for (std::uint32_t far = 1; has_far && far < settings.far_sweeps; ++far)
       sweep(far_swept_, contacts, {1, settings.far_over_relaxation});
     const auto left = settings.sweeps - i;
+    if (has_exterior_ && left <= settings.corrections) settings.exterior->correct(outside);
     const bool has_few = std::ranges::any_of(settings.bands, [left](const SweepBand& band) {
       return band.sweeps >= left && band.sweeps < 3;
     });
@@ -537,6 +542,9 @@ SolveReport BlockDescent::solve(const contact::ContactList& contacts,
     v_[slot] = to_float4(world.velocities[node.value]);
   }
   report.largest_move_m = std::sqrt(squared_move);
+  if (has_exterior_)
+    report.largest_move_m =
+        std::max(report.largest_move_m, settings.exterior->end(outside, v_.data(), world));
   for (const auto g : begun_.groups)
     report.nodes_rejected += static_cast<unsigned>(__builtin_popcount(rejected_[g]));
   if (report.nodes_rejected > 0) {

@@ -23,6 +23,7 @@
 #include "common/base/index.h"
 #include "common/base/workers.h"
 #include "server/contact/contact_list.h"
+#include "server/dynamics/exterior.h"
 #include "server/dynamics/far_field.h"
 #include "server/dynamics/far_plan.h"
 #include "server/dynamics/sweep_plan.h"
@@ -53,6 +54,10 @@ struct SolveSettings {
   bool has_linear_far_field = false;
   // False: the caller watches the residual over many sweeps. Near an optimum it grows at first.
   bool has_safeguard = true;
+  // Moves all nodes that are not near, with far_sweeps = 0; null: they stand still. It corrects
+  // before each of the last `corrections` sweeps. No tolerance then.
+  Exterior* exterior = nullptr;
+  std::uint32_t corrections = 2;
   // At most kMaxSweepBands, ends ascending up to the last near node, sweeps from `sweeps` down to 1
   // and not ascending; empty: all near nodes get `sweeps`. No tolerance then.
   std::span<const SweepBand> bands;
@@ -111,6 +116,9 @@ class BlockDescent {
   // Force on a node of the last solve's loads.held or axis_holds that put it where it is, N: what
   // energies, damping, loads and tools leave of its mass times acceleration.
   Vec3f holding_force(const contact::ContactList& contacts, NodeIndex node) const;
+
+  // Of the elastic energy where the world is, N per node, between steps. O(nodes).
+  void elastic_gradient(const world::World& world, std::vector<Vec3f>& gradient);
 
   FarPlan far_plan(float dt);
   const Tissue& tissue() const { return tissue_; }
@@ -214,6 +222,7 @@ class BlockDescent {
   SweepPlan last_;                          // the last sweep: of near_ and far_swept_
   std::unique_ptr<FarField> far_field_;     // null: not used
   bool is_far_linear_ = false;              // in this step
+  bool has_exterior_ = false;               // likewise
   std::uint32_t far_interval_ = 1;          // of this step
   float inverse_dt_ = 0;                    // of this step
   std::vector<std::uint32_t> asked_stamp_;  // per group: energies have begun it

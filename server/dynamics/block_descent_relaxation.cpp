@@ -23,7 +23,7 @@ void BlockDescent::refresh_relaxed_forces(world::World& world) {
 void BlockDescent::end_relaxation(world::World& world, std::span<const NodeIndex> held) {
   auto* const relaxation = tissue_.relaxation();
   if (relaxation == nullptr) return;
-  const bool in_turns = far_.node_count > 0;
+  const bool in_turns = far_.node_count > 0 || has_exterior_;
   relaxed_.clear();
   for (const auto g : near_.groups) relaxed_.add(g, near_.lanes[g]);
   for (const auto node : held) relaxed_.add(tissue_.groups(), node);

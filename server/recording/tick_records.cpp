@@ -39,6 +39,7 @@ void to_message(const step::TickRecord& record, const step::TickDecisions* previ
     decisions.set_boundary(static_cast<std::uint32_t>(d.boundary));
     decisions.set_far_sweeps(d.far_sweeps);
     decisions.set_is_far_exact(d.is_far_exact);
+    decisions.set_is_reduction_off(d.is_reduction_off);
     if (d.far_interval != 1) decisions.set_far_interval(d.far_interval);
     if (d.layer_sweeps != step::TickDecisions{}.layer_sweeps)
       decisions.mutable_layer_sweeps()->Assign(d.layer_sweeps.begin(), d.layer_sweeps.end());
@@ -83,7 +84,8 @@ Status from_message(const proto::TickRecord& message, step::TickRecord& record) 
                         .boundary = static_cast<world::Boundary>(d.boundary()),
                         .far_sweeps = d.far_sweeps(),
                         .is_far_exact = d.is_far_exact(),
-                        .far_interval = std::max(1u, d.far_interval())};
+                        .far_interval = std::max(1u, d.far_interval()),
+                        .is_reduction_off = d.is_reduction_off()};
     auto& layers = record.decisions.layer_sweeps;
     if (d.layer_sweeps_size() > static_cast<int>(layers.size()))
       return bad(record.tick, "layer_sweeps: more than three layers");

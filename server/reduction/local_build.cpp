@@ -15,6 +15,7 @@
 #include "server/reduction/cubature.h"
 #include "server/reduction/patch_fields.h"
 #include "server/reduction/presses.h"
+#include "server/reduction/vibrations.h"
 
 namespace trocar::reduction {
 namespace {
@@ -31,6 +32,8 @@ constexpr std::size_t kMaxCubatureTets = 800;
 // The equations of a cubature, one per field and state, are added up with random signs to so many,
 // in which residuals are those of all within a few per cent.
 constexpr std::size_t kCubatureRows = 2048;
+// Of a vibration, what a patch's other modes do not have.
+constexpr double kNewInVibration = 1e-3;
 
 Eigen::Index index(std::size_t i) {
   return static_cast<Eigen::Index>(i);
@@ -69,7 +72,7 @@ class Builder {
     r.free_layers = settings_.free_layers;
     choose_patches();
     for (const auto& patch : r.patches)
-      if (const auto count = settings_.modes + 3 * patch.reach.size();
+      if (const auto count = settings_.modes + settings_.vibrations + 3 * patch.reach.size();
           count > scene::kMaxLocalFields)
         return Error{ErrorCode::Usage, "--patch-radius: a patch would have " +
                                            std::to_string(count) + " fields, at most " +
@@ -77,6 +80,7 @@ class Builder {
                                            " are possible: make it smaller"};
     find_greens();
     press_centres();
+    vibrations_ = slowest_vibrations(*models_[0], settings_.vibrations).modes;
     auto& patches = r.patches;
     built_.nonlinear.resize(patches.size());
     built_.residuals.resize(patches.size());
@@ -216,6 +220,20 @@ class Builder {
     return near;
   }
 
+  // What vibrations have besides these modes, as more of them.
+  Matrix with_vibrations(const Matrix& modes) const {
+    Matrix all(modes.rows(), modes.cols() + vibrations_.cols());
+    all.leftCols(modes.cols()) = modes;
+    Eigen::Index count = modes.cols();
+    for (const auto& vibration : vibrations_.colwise()) {
+      Vector field = vibration.normalized();
+      for (int twice = 0; twice < 2; ++twice)
+        field -= all.leftCols(count) * (all.leftCols(count).transpose() * field);
+      if (field.norm() > kNewInVibration) all.col(count++) = field.normalized();
+    }
+    return all.leftCols(count);
+  }
+
   void make(FullModel& model, std::size_t number) {
     auto& patch = built_.reduction.patches[number];
     const auto nodes = field_nodes(patch);
@@ -231,7 +249,7 @@ class Builder {
     }
     for (std::size_t i = 0; i < presses.size(); ++i)
       fields.col(index(9 * nodes.size() + i)) = presses[i];
-    const Matrix modes = karhunen_loeve(fields, settings_.modes).modes;
+    const Matrix modes = with_vibrations(karhunen_loeve(fields, settings_.modes).modes);
     for (Eigen::Index i = 0; i < modes.cols(); ++i)
       patch.modes.push_back(
           scene::pack_field({modes.col(i).data(), static_cast<std::size_t>(modes.rows())}));
@@ -353,6 +371,7 @@ class Builder {
   const std::vector<std::unique_ptr<FullModel>> models_;  // one per thread
   std::vector<NodeIndex> accessible_;                     // ascending
   std::vector<Pressed> pressed_;                          // per patch
+  Matrix vibrations_;                                     // a column each
   LocalBuilt built_;
 };
 
@@ -361,6 +380,8 @@ class Builder {
 Status validate(const LocalSettings& s) {
   const auto wrong = [](const std::string& what) { return Error{ErrorCode::Usage, what}; };
   if (auto c = check_count("--modes", s.modes, 1, scene::kMaxReducedModes); !c) return c;
+  if (auto c = check_count("--vibrations", s.vibrations, 0, scene::kMaxReducedModes - s.modes); !c)
+    return c;
   if (auto c = check_count("--free-layers", s.free_layers, 0, scene::kMaxFreeLayers); !c) return c;
   if (auto c = check_count("--directions", s.directions, 0, 20); !c) return c;
   if (auto c = check_count("--field-nodes", s.field_nodes, 1, 100); !c) return c;

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <functional>
 
-#include "server/reduction/element_set.h"
+#include "server/exterior/element_set.h"
 #include "server/reduction/karhunen_loeve.h"
 
 namespace trocar::reduction {
@@ -59,16 +59,17 @@ struct LocalSolver::Contact {
   };
   // rest: the tangent at rest of all tets over all nodes, for contacts of several patches.
   Contact(const scene::LocalReduction& reduction, const scene::Organ& organ,
-          std::span<const Place> places, const std::function<const BlockMatrix&()>& rest) {
+          std::span<const Place> places,
+          const std::function<const exterior::BlockMatrix&()>& rest) {
     choose_fields(reduction, places);
     if (places.size() > 1) drop_repeated_fields();
     choose_nodes(organ, places, reduction.free_layers);
-    inner = ElementSet(organ, inner_tets, {}, nodes);
-    outer = ElementSet(organ, outer_tets, outer_weights, nodes);
-    std::vector<BlockMatrix::Pair> pairs;
+    inner = exterior::ElementSet(organ, inner_tets, {}, nodes);
+    outer = exterior::ElementSet(organ, outer_tets, outer_weights, nodes);
+    std::vector<exterior::BlockMatrix::Pair> pairs;
     inner.add_pairs(pairs);
     for (std::uint32_t n = 0; n < nodes.size(); ++n) pairs.push_back({n, n});
-    tangent = BlockMatrix(nodes.size(), std::move(pairs));
+    tangent = exterior::BlockMatrix(nodes.size(), std::move(pairs));
     phi.resize(index(3 * nodes.size()), index(fields.size()));
     for (std::size_t n = 0; n < nodes.size(); ++n)
       for (std::size_t k = 0; k < 3; ++k)
@@ -76,9 +77,9 @@ struct LocalSolver::Contact {
           phi(index(3 * n + k), index(c)) =
               static_cast<float>(fields[c].packed->values[3 * nodes[n].value + k]) *
               fields[c].packed->step;
-    std::vector<BlockMatrix::Pair> outer_pairs;
+    std::vector<exterior::BlockMatrix::Pair> outer_pairs;
     outer.add_pairs(outer_pairs);
-    outer_tangent = BlockMatrix(nodes.size(), std::move(outer_pairs));
+    outer_tangent = exterior::BlockMatrix(nodes.size(), std::move(outer_pairs));
     outer.add_rest_tangent(outer_tangent);
     outer_at_rest = among_fields(outer_tangent);
     stiffness = places.size() == 1 ? stored_stiffness(places[0].patch->outer_stiffness)
@@ -182,23 +183,23 @@ struct LocalSolver::Contact {
   }
 
   // Of all tets at rest less that of the inner ones.
-  Matrix stiffness_of_several(const BlockMatrix& rest) {
+  Matrix stiffness_of_several(const exterior::BlockMatrix& rest) {
     const RowMatrixF all = all_fields();
     tangent.clear();
     inner.add_rest_tangent(tangent);
     // What is left is small beside the two.
-    const auto quadratic = [](const BlockMatrix& k, const RowMatrixF& b) {
+    const auto quadratic = [](const exterior::BlockMatrix& k, const RowMatrixF& b) {
       return Matrix(b.cast<double>().transpose() * product(k, b).cast<double>());
     };
     return quadratic(rest, all) - quadratic(tangent, phi);
   }
 
-  Matrix among_fields(const BlockMatrix& k) const {
+  Matrix among_fields(const exterior::BlockMatrix& k) const {
     const Eigen::MatrixXf among = phi.transpose() * product(k, phi);
     return among.cast<double>();
   }
 
-  static RowMatrixF product(const BlockMatrix& k, const RowMatrixF& b) {
+  static RowMatrixF product(const exterior::BlockMatrix& k, const RowMatrixF& b) {
     RowMatrixF kb = RowMatrixF::Zero(b.rows(), b.cols());
     for (std::size_t row = 0; row < k.node_count(); ++row) {
       const auto columns = k.columns(row);
@@ -231,7 +232,7 @@ struct LocalSolver::Contact {
   Vector residual(std::span<const NodeForce> forces, std::span<const NodeSpring> springs) {
     place(q, a);
     f.assign(u.size(), 0);
-    inner.add_forces(ForcePart::Whole, u, f);
+    inner.add_forces(exterior::ForcePart::Whole, u, f);
     const auto push = [&](NodeIndex node, const Vec3d& force) {
       float* at = f.data() + 3 * local(node);
       at[0] -= static_cast<float>(force.x);
@@ -245,7 +246,7 @@ struct LocalSolver::Contact {
     for (std::size_t i = 0; i < free.size(); ++i)
       for (std::size_t k = 0; k < 3; ++k)
         r[index(fields.size() + 3 * i + k)] = -static_cast<double>(f[3 * free[i] + k]);
-    outer.add_forces(ForcePart::Nonlinear, u, f);
+    outer.add_forces(exterior::ForcePart::Nonlinear, u, f);
     const VectorF along = phi.transpose() * Eigen::Map<const VectorF>(f.data(), index(f.size()));
     r.head(index(fields.size())) = -(along.cast<double>() + stiffness * q);
     return r;
@@ -331,10 +332,10 @@ struct LocalSolver::Contact {
   std::vector<float> outer_weights;
   std::vector<NodeIndex> nodes;     // of the tets; ascending
   std::vector<std::uint32_t> free;  // local
-  ElementSet inner, outer;
+  exterior::ElementSet inner, outer;
   RowMatrixF phi;    // of the fields at the nodes
   Matrix stiffness;  // of the outer tets at rest
-  BlockMatrix tangent, outer_tangent;
+  exterior::BlockMatrix tangent, outer_tangent;
   Matrix outer_at_rest;  // of the weighted tets, among the fields
   Eigen::LLT<Matrix> factors;
   bool has_factors = false;
@@ -360,8 +361,9 @@ bool LocalSolver::touch(std::span<const NodeIndex> nodes) {
     }
     if (places.size() > kMaxPatches) return false;
   }
-  contact_ = std::make_unique<Contact>(reduction_, organ_, places,
-                                       [this]() -> const BlockMatrix& { return rest_tangent(); });
+  contact_ = std::make_unique<Contact>(
+      reduction_, organ_, places,
+      [this]() -> const exterior::BlockMatrix& { return rest_tangent(); });
   return true;
 }
 
@@ -378,16 +380,16 @@ const scene::LocalPatch* LocalSolver::patch_of(std::span<const NodeIndex> nodes)
   return found;
 }
 
-const BlockMatrix& LocalSolver::rest_tangent() {
+const exterior::BlockMatrix& LocalSolver::rest_tangent() {
   if (rest_tangent_.node_count() > 0) return rest_tangent_;
   std::vector<TetIndex> tets;
   std::vector<NodeIndex> nodes;
   for (std::uint32_t t = 0; t < organ_.mesh.tets.size(); ++t) tets.push_back(TetIndex(t));
   for (std::uint32_t n = 0; n < organ_.mesh.node_count(); ++n) nodes.push_back(NodeIndex(n));
-  const ElementSet all(organ_, tets, {}, nodes);
-  std::vector<BlockMatrix::Pair> pairs;
+  const exterior::ElementSet all(organ_, tets, {}, nodes);
+  std::vector<exterior::BlockMatrix::Pair> pairs;
   all.add_pairs(pairs);
-  rest_tangent_ = BlockMatrix(nodes.size(), std::move(pairs));
+  rest_tangent_ = exterior::BlockMatrix(nodes.size(), std::move(pairs));
   all.add_rest_tangent(rest_tangent_);
   return rest_tangent_;
 }

@@ -15,7 +15,7 @@
 
 #include "common/scene/local_reduction.h"
 #include "common/scene/organ.h"
-#include "server/reduction/block_matrix.h"
+#include "server/exterior/block_matrix.h"
 #include "server/reduction/presses.h"
 
 namespace trocar::reduction {
@@ -64,12 +64,12 @@ class LocalSolver {
   struct Place;
   struct Contact;
   const scene::LocalPatch* patch_of(std::span<const NodeIndex> nodes) const;
-  const BlockMatrix& rest_tangent();
+  const exterior::BlockMatrix& rest_tangent();
 
   const scene::LocalReduction& reduction_;
   const scene::Organ& organ_;
   std::unique_ptr<Contact> contact_;
-  BlockMatrix rest_tangent_;  // made when it is needed
+  exterior::BlockMatrix rest_tangent_;  // made when it is needed
 };
 
 }  // namespace trocar::reduction

@@ -17,6 +17,7 @@
 #include "server/dynamics/relaxation_figures.h"
 #include "server/locks/claims.h"
 #include "server/session/inputs.h"
+#include "server/step/reduced_tissue.h"
 #include "server/step/tick_report.h"
 
 namespace trocar::step {
@@ -77,6 +78,8 @@ struct PublishedFrame {
   std::uint32_t node_limit = 0;
   float residual_n = 0;
   std::optional<dynamics::RelaxationFigures> relaxation;  // of tissue that relaxes
+  SolverFigures solver;                                   // of the frame's tick
+  std::vector<SolverChange> solver_changes;               // of the ticks since the frame before
   StageStatistics statistics;  // of the last second; for people, never an input
 };
 

@@ -10,11 +10,12 @@
 
 namespace trocar::step {
 
-State::State(const scene::Organ& organ)
+State::State(const scene::Organ& organ, bool has_reduction)
     : cuts(organ),
       world(organ),
       claims(organ.mesh.node_count()),
       quantised(cuts.layout().vertex_count()) {
+  if (has_reduction) reduced.emplace();
   dynamics::start_relaxed(organ, world);
 }
 
@@ -32,7 +33,7 @@ void State::set_mark() {
 
 std::unique_ptr<State> State::returned_to_mark(const scene::Organ& organ) const {
   if (!mark.is_set()) return nullptr;
-  auto marked = std::make_unique<State>(organ);
+  auto marked = std::make_unique<State>(organ, reduced.has_value());
   auto archive = world::StateArchive::reading(mark.state());
   marked->visit_without_mark(archive);
   if (!archive.ok() || !archive.at_end()) return nullptr;
@@ -57,6 +58,7 @@ void State::visit_without_mark(world::StateArchive& archive) {
   claims.visit_state(archive);
   grasps.visit_state(archive, world.node_count());
   proxies.visit_state(archive);
+  if (reduced) reduced->visit_state(archive);
   archive.fixed_array(quantised);
   self_contacts.visit_state(archive, world.surface_nodes, cuts.layout().triangles.size());
 }
@@ -87,9 +89,11 @@ StepContext::StepContext(const Scene& s, const world::World& uncut, const State&
       has_linear_far_field(is_costly(s.organ)),
       surface_displacements(state.cuts.layout().vertex_count()) {
   if (has_linear_far_field) solver.use_linear_far_field(uncut);
+  if (s.models) reduced.emplace(*s.models);
   contacts.reserve();
   requests.reserve(kMaxTools);
   claim_events.reserve(4 * kMaxTools);
+  solver_changes.reserve(4 * kTicksPerFrame);
   dynamics::Topology topology(s.organ);
   cutting::Places places(topology);
   cutting::SurfaceMesh surface(s.organ);
@@ -145,10 +149,13 @@ Status validate(const TickDecisions& d) {
   return {};
 }
 
-Simulation::Simulation(scene::Organ organ, unsigned workers)
-    : scene_(std::make_unique<Scene>(Scene{std::move(organ), workers})),
-      state_(std::make_unique<State>(scene_->organ)),
-      context_(std::make_unique<StepContext>(*scene_, *state_)) {}
+Simulation::Simulation(scene::Organ organ, unsigned workers,
+                       std::shared_ptr<const scene::LocalReduction> reduction)
+    : scene_(std::make_unique<Scene>(Scene{std::move(organ), workers, std::move(reduction), {}})) {
+  if (scene_->reduction) scene_->models.emplace(*scene_->reduction, scene_->organ);
+  state_ = std::make_unique<State>(scene_->organ, scene_->models.has_value());
+  context_ = std::make_unique<StepContext>(*scene_, *state_);
+}
 
 const TickReport& Simulation::tick(const session::TickInputs& inputs,
                                    const TickDecisions& decisions) {
@@ -169,6 +176,7 @@ void Simulation::use_mark(session::MarkAction action) {
     auto context = std::make_unique<StepContext>(*scene_, *state_);
     context->claim_events = std::move(context_->claim_events);
     context->mark_events = std::move(context_->mark_events);
+    context->solver_changes = std::move(context_->solver_changes);
     context_ = std::move(context);
   } else {
     event.is_done = false;
@@ -189,7 +197,7 @@ std::uint64_t Simulation::state_hash() const {
 }
 
 Status Simulation::restore_snapshot(BytesView snapshot) {
-  auto restored = std::make_unique<State>(scene_->organ);
+  auto restored = std::make_unique<State>(scene_->organ, scene_->models.has_value());
   auto archive = world::StateArchive::reading(snapshot);
   restored->visit(archive);
   if (!archive.ok() || !archive.at_end())

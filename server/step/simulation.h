@@ -16,7 +16,9 @@ Status validate(const TickDecisions& decisions);
 class Simulation {
  public:
   // workers: threads that share the solver's work; results do not depend on it.
-  explicit Simulation(scene::Organ organ, unsigned workers = 1);
+  // reduction: of this organ, with which its tissue may be moved; null: none.
+  explicit Simulation(scene::Organ organ, unsigned workers = 1,
+                      std::shared_ptr<const scene::LocalReduction> reduction = nullptr);
 
   // Simulates one tick. After a tick that publishes, take_frame() has the frame. Returning to a
   // mark costs as much as beginning a session.

@@ -47,9 +47,10 @@ void fill_queue(State& state, StepContext& context) {
   context.report.queue_nodes = static_cast<std::uint32_t>(context.queue.nodes().size());
   context.report.active_nodes = static_cast<std::uint32_t>(context.active.nodes().size());
   context.report.region_count = context.queue.region_count();
+}
 
-  // Active nodes stand by layer, those that have left the queue last.
-  const auto nodes = context.active.nodes();
+// Swept nodes stand by layer, those that have left the queue last.
+void find_bands(StepContext& context, std::span<const NodeIndex> nodes) {
   const auto layer_of = [&context](NodeIndex node) { return context.queue.layer_of(node); };
   const auto sweeps = sweeps_of_layers(context.decisions);
   std::size_t begin = 0;
@@ -65,10 +66,31 @@ void fill_queue(State& state, StepContext& context) {
   }
 }
 
+// Of a session with a reduction.
+void note_solver(Tick tick, StepContext& context) {
+  const auto& now = context.reduced->figures();
+  const auto& before = context.solver_figures;
+  if (now.is_reduced != before.is_reduced || now.reason != before.reason ||
+      now.patch != before.patch)
+    context.solver_changes.push_back({tick, now});
+  context.solver_figures = now;
+}
+
 void solve(State& state, StepContext& context) {
   const auto& decisions = context.decisions;
+  auto nodes = context.active.nodes();
+  const bool is_reduced =
+      context.reduced && context.reduced->choose({context.contacts, nodes, decisions.boundary,
+                                                  decisions.is_reduction_off},
+                                                 *state.reduced, context.solver, state.world);
+  if (is_reduced) nodes = context.reduced->near();
+  context.report.is_reduced = is_reduced;
+  if (context.reduced) note_solver(state.world.tick, context);
+  find_bands(context, nodes);
   dynamics::SolveSettings settings{decisions.sweeps, decisions.over_relaxation, kTickSeconds};
-  if (decisions.boundary == world::Boundary::Graded) {
+  if (is_reduced) {
+    settings.exterior = &context.reduced->exterior();
+  } else if (decisions.boundary == world::Boundary::Graded) {
     const auto plan =
         context.far_plan.with_sweeps(decisions.far_sweeps).with_interval(decisions.far_interval);
     settings.far_interval = decisions.far_interval;
@@ -77,8 +99,7 @@ void solve(State& state, StepContext& context) {
     settings.has_linear_far_field = context.has_linear_far_field && !decisions.is_far_exact;
   }
   if (context.sweep_bands.back().sweeps < decisions.sweeps) settings.bands = context.sweep_bands;
-  const auto solved =
-      context.solver.solve(context.contacts, context.active.nodes(), settings, state.world);
+  const auto solved = context.solver.solve(context.contacts, nodes, settings, state.world);
   const auto settled =
       context.active.settle(context.queue, context.solver.residuals_n(), state.world);
   context.solver.take_state(state.world, settled);
@@ -122,6 +143,7 @@ void cut_tissue(State& state, StepContext& context) {
       cuts.cut(state.tools, state.claims, state.world, context.travel_m, context.report.cut);
   if (context.report.cut.is_full) context.report.faults |= kFaultCutLimit;
   if (!has_cut) return;
+  if (context.reduced) context.reduced->stop_for_cut(*state.reduced, context.solver, state.world);
   const auto& edit = cuts.follow(state.world);
   for (const auto& made : cuts.new_nodes()) {
     state.claims.add_node(made.a, made.b);
@@ -193,6 +215,9 @@ void quantise_and_publish(State& state, StepContext& context) {
   frame->far_interval = context.report.far_interval;
   frame->residual_n = context.report.residual_n;
   frame->relaxation = context.solver.tissue().relaxation_figures();
+  frame->solver = context.solver_figures;
+  frame->solver_changes = context.solver_changes;
+  context.solver_changes.clear();
   context.frame = std::move(frame);
 }
 

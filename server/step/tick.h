@@ -4,6 +4,7 @@
 // contents.
 
 #include <memory>
+#include <optional>
 
 #include "common/base/checksum.h"
 #include "server/contact/contact_finder.h"
@@ -15,6 +16,7 @@
 #include "server/propagation/queue.h"
 #include "server/step/mark.h"
 #include "server/step/published_frame.h"
+#include "server/step/reduced_tissue.h"
 #include "server/step/tick_report.h"
 #include "server/step/tissue_cuts.h"
 #include "server/world/world.h"
@@ -26,7 +28,7 @@ static_assert(kSweepLayers <= dynamics::kMaxSweepBands);
 // Everything a later tick depends on. Each member names its arrays in visit_state; these bytes are
 // the snapshot and what the tick hash covers.
 struct State {
-  explicit State(const scene::Organ& organ);
+  State(const scene::Organ& organ, bool has_reduction);
 
   TissueCuts cuts;
   world::World world;
@@ -37,6 +39,7 @@ struct State {
   // Last published integers: quantisation has hysteresis, so they are state.
   wire::QuantisedSurface quantised;
   contact::SelfContactTable self_contacts;
+  std::optional<ReducedState> reduced;  // of sessions with a reduction
   Mark mark;
 
   void visit(world::StateArchive& archive);
@@ -54,6 +57,8 @@ struct State {
 struct Scene {
   scene::Organ organ;
   unsigned workers = 1;
+  std::shared_ptr<const scene::LocalReduction> reduction;  // null: none
+  std::optional<exterior::LocalModels> models;             // of it
 };
 
 // Laid out as input, scratch and output of a tick. Scratch keeps its capacity, so that a tick does
@@ -81,6 +86,7 @@ struct StepContext {
   propagation::ActiveSet active;
   std::array<dynamics::SweepBand, kSweepLayers> sweep_bands{};  // of active nodes, by layer
   dynamics::BlockDescent solver;
+  std::optional<ReducedTissue> reduced;
   dynamics::FarPlan far_plan;
   bool has_linear_far_field;
   // By tool, empty without contact; last, tissue on tissue.
@@ -94,6 +100,8 @@ struct StepContext {
   // Output.
   std::vector<locks::ClaimEvent> claim_events;  // gathered until published
   std::vector<MarkEvent> mark_events;           // likewise
+  std::vector<SolverChange> solver_changes;     // likewise
+  SolverFigures solver_figures;                 // of the last tick
   std::shared_ptr<PublishedFrame> frame;        // set by the publish stage
   TickReport report;
 };

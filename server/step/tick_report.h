@@ -28,6 +28,8 @@ struct TickDecisions {
   bool is_far_exact = false;
   std::uint32_t far_interval = 1;  // Graded: ticks from one sweep of a far node to the next
 
+  bool is_reduction_off = false;  // the full solver, whatever a session's reduction has
+
   bool operator==(const TickDecisions&) const = default;
 };
 // Layers that have sweeps of their own: touched nodes, layer 1, layer 2, all beyond.
@@ -83,6 +85,7 @@ struct TickReport {
   std::uint64_t far_node_sweeps = 0;         // of these, nodes outside the queue
   bool is_far_linear = false;                // these were stepped by matrices
   std::uint32_t far_interval = 1;            // in every so many ticks
+  bool is_reduced = false;                   // a patch of a reduction moved the far nodes
   CutReport cut;
   std::uint32_t faults = 0;  // TickFault bits
   float residual_n = 0;      // root mean square nodal force imbalance in the last sweep

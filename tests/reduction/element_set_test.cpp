@@ -1,7 +1,7 @@
 // Forces and tangents of the reduced models' tets against the off-line solver's and against
 // differences.
 
-#include "server/reduction/element_set.h"
+#include "server/exterior/element_set.h"
 
 #include <gtest/gtest.h>
 
@@ -39,10 +39,10 @@ class ElementSetOfLaw : public ::testing::TestWithParam<Case> {
     std::vector<TetIndex> tets;
     for (std::uint32_t t = 0; t < organ_.mesh.tets.size(); ++t) tets.push_back(TetIndex(t));
     for (std::uint32_t n = 0; n < organ_.mesh.node_count(); ++n) nodes_.push_back(NodeIndex(n));
-    set_ = ElementSet(organ_, tets, {}, nodes_);
-    std::vector<BlockMatrix::Pair> pairs;
+    set_ = exterior::ElementSet(organ_, tets, {}, nodes_);
+    std::vector<exterior::BlockMatrix::Pair> pairs;
     set_.add_pairs(pairs);
-    tangent_ = BlockMatrix(nodes_.size(), std::move(pairs));
+    tangent_ = exterior::BlockMatrix(nodes_.size(), std::move(pairs));
   }
 
   // Bends, shears and stretches the block by about this much strain.
@@ -54,7 +54,7 @@ class ElementSetOfLaw : public ::testing::TestWithParam<Case> {
         u.push_back(static_cast<float>(strain * part));
     return u;
   }
-  std::vector<float> forces(ForcePart part, const std::vector<float>& u) const {
+  std::vector<float> forces(exterior::ForcePart part, const std::vector<float>& u) const {
     std::vector<float> f(u.size(), 0.0F);
     set_.add_forces(part, u, f);
     return f;
@@ -68,8 +68,8 @@ class ElementSetOfLaw : public ::testing::TestWithParam<Case> {
   scene::Organ organ_;
   std::unique_ptr<FullModel> model_;
   std::vector<NodeIndex> nodes_;
-  ElementSet set_;
-  BlockMatrix tangent_;
+  exterior::ElementSet set_;
+  exterior::BlockMatrix tangent_;
 };
 
 TEST_P(ElementSetOfLaw, ForcesAreThoseOfTheOffLineSolver) {
@@ -77,19 +77,20 @@ TEST_P(ElementSetOfLaw, ForcesAreThoseOfTheOffLineSolver) {
     const auto u = moves(strain);
     const auto expected = model_->resistance(to_vector(u));
     ASSERT_TRUE(expected.has_value());
-    EXPECT_LT((to_vector(forces(ForcePart::Whole, u)) - *expected).norm(), 2e-5 * expected->norm())
+    EXPECT_LT((to_vector(forces(exterior::ForcePart::Whole, u)) - *expected).norm(),
+              2e-5 * expected->norm())
         << strain;
   }
 }
 
 TEST_P(ElementSetOfLaw, NonlinearForcesAreTheWholeLessTheLinear) {
   const auto u = moves(0.1);
-  const Vector linear =
-      to_vector(forces(ForcePart::Whole, u)) - to_vector(forces(ForcePart::Nonlinear, u));
+  const Vector linear = to_vector(forces(exterior::ForcePart::Whole, u)) -
+                        to_vector(forces(exterior::ForcePart::Nonlinear, u));
   // Of all degrees of freedom, also those that the model holds.
   const auto half = moves(0.05);
-  const Vector half_linear =
-      to_vector(forces(ForcePart::Whole, half)) - to_vector(forces(ForcePart::Nonlinear, half));
+  const Vector half_linear = to_vector(forces(exterior::ForcePart::Whole, half)) -
+                             to_vector(forces(exterior::ForcePart::Nonlinear, half));
   EXPECT_LT((linear - 2 * half_linear).norm(), 1e-5 * linear.norm());
   const auto tangent = model_->rest_tangent();
   const auto& numbers = model_->free_of_dof();
@@ -100,8 +101,8 @@ TEST_P(ElementSetOfLaw, NonlinearForcesAreTheWholeLessTheLinear) {
   for (std::size_t dof = 0; dof < numbers.size(); ++dof)
     if (numbers[dof] >= 0) free[numbers[dof]] = static_cast<double>(only_free[dof]);
   const Vector expected = tangent.selfadjointView<Eigen::Lower>() * free;
-  const Vector whole = to_vector(forces(ForcePart::Whole, only_free)),
-               rest = to_vector(forces(ForcePart::Nonlinear, only_free));
+  const Vector whole = to_vector(forces(exterior::ForcePart::Whole, only_free)),
+               rest = to_vector(forces(exterior::ForcePart::Nonlinear, only_free));
   for (std::size_t dof = 0; dof < numbers.size(); ++dof) {
     const auto i = static_cast<Eigen::Index>(dof);
     if (numbers[dof] < 0) continue;
@@ -144,8 +145,8 @@ TEST_P(ElementSetOfLaw, TheRestTangentIsTheLinearPart) {
   tangent_.clear();
   set_.add_rest_tangent(tangent_);
   const auto u = moves(0.1);
-  const Vector expected =
-      to_vector(forces(ForcePart::Whole, u)) - to_vector(forces(ForcePart::Nonlinear, u));
+  const Vector expected = to_vector(forces(exterior::ForcePart::Whole, u)) -
+                          to_vector(forces(exterior::ForcePart::Nonlinear, u));
   Vector is = Vector::Zero(expected.size());
   for (std::size_t row = 0; row < nodes_.size(); ++row)
     for (std::size_t i = 0; i < tangent_.columns(row).size(); ++i)
@@ -159,15 +160,15 @@ TEST_P(ElementSetOfLaw, TheRestTangentIsTheLinearPart) {
 TEST_P(ElementSetOfLaw, WeightsMultiplyATetsForces) {
   const std::vector<TetIndex> tets{TetIndex(2), TetIndex(5), TetIndex(7)};
   const std::vector<float> weights{2, 3, 0.5F};
-  const ElementSet weighted(organ_, tets, weights, nodes_);
+  const exterior::ElementSet weighted(organ_, tets, weights, nodes_);
   const auto u = moves(0.2);
   std::vector<float> is(u.size(), 0.0F);
-  weighted.add_forces(ForcePart::Nonlinear, u, is);
+  weighted.add_forces(exterior::ForcePart::Nonlinear, u, is);
   Vector expected = Vector::Zero(static_cast<Eigen::Index>(u.size()));
   for (std::size_t i = 0; i < tets.size(); ++i) {
-    const ElementSet one(organ_, std::span(&tets[i], 1), {}, nodes_);
+    const exterior::ElementSet one(organ_, std::span(&tets[i], 1), {}, nodes_);
     std::vector<float> f(u.size(), 0.0F);
-    one.add_forces(ForcePart::Nonlinear, u, f);
+    one.add_forces(exterior::ForcePart::Nonlinear, u, f);
     expected += static_cast<double>(weights[i]) * to_vector(f);
   }
   EXPECT_LT((to_vector(is) - expected).norm(), 1e-5 * expected.norm());

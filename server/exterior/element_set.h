@@ -11,9 +11,9 @@
 
 #include "common/scene/organ.h"
 #include "server/dynamics/psi.h"
-#include "server/reduction/block_matrix.h"
+#include "server/exterior/block_matrix.h"
 
-namespace trocar::reduction {
+namespace trocar::exterior {
 
 // Which part of a tet's forces: all, or what is left of them without the linear response at rest.
 enum class ForcePart : std::uint8_t { Whole, Nonlinear };
@@ -62,4 +62,4 @@ class ElementSet {
   std::vector<Group> groups_;
 };
 
-}  // namespace trocar::reduction
+}  // namespace trocar::exterior

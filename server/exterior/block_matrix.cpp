@@ -1,10 +1,10 @@
-#include "server/reduction/block_matrix.h"
+#include "server/exterior/block_matrix.h"
 
 #include <algorithm>
 
 #include "common/base/assert.h"
 
-namespace trocar::reduction {
+namespace trocar::exterior {
 
 BlockMatrix::BlockMatrix(std::size_t node_count, std::vector<Pair> pairs) {
   std::ranges::sort(pairs);
@@ -25,4 +25,4 @@ BlockMatrix::Block& BlockMatrix::at(std::uint32_t row, std::uint32_t column) {
   return blocks_[begins_[row] + static_cast<std::size_t>(found - of_row.begin())];
 }
 
-}  // namespace trocar::reduction
+}  // namespace trocar::exterior

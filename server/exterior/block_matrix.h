@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-namespace trocar::reduction {
+namespace trocar::exterior {
 
 class BlockMatrix {
  public:
@@ -35,4 +35,4 @@ class BlockMatrix {
   std::vector<Block> blocks_;
 };
 
-}  // namespace trocar::reduction
+}  // namespace trocar::exterior

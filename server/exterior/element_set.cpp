@@ -1,11 +1,11 @@
-#include "server/reduction/element_set.h"
+#include "server/exterior/element_set.h"
 
 #include <algorithm>
 
 #include "common/base/assert.h"
 #include "server/dynamics/tet_shape.h"
 
-namespace trocar::reduction {
+namespace trocar::exterior {
 namespace {
 
 using dynamics::all;
@@ -245,4 +245,4 @@ void ElementSet::add_tangent(std::span<const float> u, bool with_stress,
                laws_[group.law]);
 }
 
-}  // namespace trocar::reduction
+}  // namespace trocar::exterior

@@ -1,0 +1,105 @@
+#include "server/exterior/dense.h"
+
+#include <immintrin.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/base/assert.h"
+
+namespace trocar::exterior {
+namespace {
+
+constexpr std::size_t kPanel = 64;  // floats of a row in registers at once
+
+float sum(__m256 a) {
+  alignas(32) float v[8];
+  _mm256_store_ps(v, a);
+  return ((v[0] + v[4]) + (v[2] + v[6])) + ((v[1] + v[5]) + (v[3] + v[7]));
+}
+
+// y += s x, of n doubles, a multiple of four.
+void add_scaled(double s, const double* x, double* y, std::size_t n) {
+  const __m256d factor = _mm256_set1_pd(s);
+  for (std::size_t i = 0; i < n; i += 4)
+    _mm256_storeu_pd(y + i,
+                     _mm256_fmadd_pd(factor, _mm256_loadu_pd(x + i), _mm256_loadu_pd(y + i)));
+}
+
+}  // namespace
+
+void CholeskyFactor::resize(std::size_t size) {
+  size_ = size;
+  stride_ = padded(size);
+  upper_.assign(size_ * stride_, 0);
+}
+
+bool CholeskyFactor::factor() {
+  for (std::size_t k = 0; k < size_; ++k) {
+    double* const pivot = row(k);
+    if (!(pivot[k] > 0)) return false;
+    const double inverse = 1 / std::sqrt(pivot[k]);
+    for (std::size_t j = k; j < size_; ++j) pivot[j] *= inverse;
+    for (std::size_t i = k + 1; i < size_; ++i) {
+      const auto from = i / 4 * 4;  // what is left of the diagonal is not read
+      add_scaled(-pivot[i], pivot + from, row(i) + from, stride_ - from);
+    }
+  }
+  return true;
+}
+
+void CholeskyFactor::solve(std::span<double> x) const {
+  for (std::size_t k = 0; k < size_; ++k) {
+    const double* const r = upper_.data() + k * stride_;
+    x[k] /= r[k];
+    for (std::size_t j = k + 1; j < size_; ++j) x[j] -= r[j] * x[k];
+  }
+  for (std::size_t k = size_; k-- > 0;) {
+    const double* const r = upper_.data() + k * stride_;
+    double left = x[k];
+    for (std::size_t j = k + 1; j < size_; ++j) left -= r[j] * x[j];
+    x[k] = left / r[k];
+  }
+}
+
+void add_product(std::span<const double> a, std::size_t stride, std::span<const double> x,
+                 std::span<double> y) {
+  // Symmetric: its rows are its columns.
+  for (std::size_t j = 0; j < x.size(); ++j)
+    for (std::size_t i = 0; i < y.size(); ++i) y[i] += a[j * stride + i] * x[j];
+}
+
+void add_fields(const BasisRows& basis, std::span<const float> x, std::span<float> out) {
+  TROCAR_ASSERT_HOT(x.size() == basis.stride);
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    const float* const row = basis.row(i);
+    __m256 a = _mm256_setzero_ps(), b = a;
+    std::size_t c = 0;
+    for (; c + 16 <= basis.stride; c += 16) {
+      a = _mm256_fmadd_ps(_mm256_loadu_ps(row + c), _mm256_loadu_ps(x.data() + c), a);
+      b = _mm256_fmadd_ps(_mm256_loadu_ps(row + c + 8), _mm256_loadu_ps(x.data() + c + 8), b);
+    }
+    if (c < basis.stride)
+      a = _mm256_fmadd_ps(_mm256_loadu_ps(row + c), _mm256_loadu_ps(x.data() + c), a);
+    out[i] += sum(_mm256_add_ps(a, b));
+  }
+}
+
+void add_along_fields(const BasisRows& basis, std::span<const float> f, std::span<float> out) {
+  TROCAR_ASSERT_HOT(out.size() == basis.stride);
+  for (std::size_t first = 0; first < basis.stride; first += kPanel) {
+    const auto count = std::min(kPanel, basis.stride - first) / 8;
+    __m256 sums[kPanel / 8];
+    for (std::size_t k = 0; k < count; ++k) sums[k] = _mm256_loadu_ps(out.data() + first + 8 * k);
+    for (std::size_t i = 0; i < f.size(); ++i) {
+      if (f[i] == 0) continue;
+      const __m256 factor = _mm256_set1_ps(f[i]);
+      const float* const row = basis.row(i) + first;
+      for (std::size_t k = 0; k < count; ++k)
+        sums[k] = _mm256_fmadd_ps(factor, _mm256_loadu_ps(row + 8 * k), sums[k]);
+    }
+    for (std::size_t k = 0; k < count; ++k) _mm256_storeu_ps(out.data() + first + 8 * k, sums[k]);
+  }
+}
+
+}  // namespace trocar::exterior

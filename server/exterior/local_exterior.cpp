@@ -1,0 +1,422 @@
+#include "server/exterior/local_exterior.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/base/tick.h"
+#include "server/contact/contact_law.h"
+
+namespace trocar::exterior {
+namespace {
+
+// In which what the fields do not have fades, of places and of forces.
+constexpr double kFade_s = 0.05;
+// Below this the correction is nothing.
+constexpr double kLeastFade = 1e-4;
+// Steps from one estimate of the error to the next.
+constexpr std::uint32_t kEstimateInterval = 4;
+// Of touches, J: with less an error is not worth a word.
+constexpr double kLeastWork_j = 2e-6;
+// Beside 1 of every field.
+constexpr double kLeastStiffness = 1e-9;
+
+std::span<const float> floats_of(std::span<const Vec3f> values) {
+  static_assert(sizeof(Vec3f) == 3 * sizeof(float));
+  return {&values.data()->x, 3 * values.size()};
+}
+
+}  // namespace
+
+LocalExterior::LocalExterior(const LocalModels& models)
+    : models_(models),
+      node_count_(models.node_count()),
+      drag_per_s_(models.drag_per_s()),
+      is_local_(models.node_count()) {
+  std::size_t fields = 0, nodes = 0;
+  for (std::uint32_t p = 0; p < models.size(); ++p) {
+    fields = std::max(fields, models[p].stride());
+    nodes = std::max(nodes, models[p].nodes().size());
+  }
+  for (auto* values : {&start_, &ahead_, &gradient_, &scratch_}) values->reserve(fields);
+  for (auto* values : {&along_, &change_}) values->reserve(fields);
+  for (auto* values : {&u_, &f_, &moved_}) values->reserve(3 * nodes);
+  slots_.reserve(nodes);
+  is_near_.reserve(nodes);
+  near_.reserve(nodes);
+  touched_.reserve(contact::kMaxPointNodes * 64);
+  momentum_.resize(3 * node_count_);
+  run_.resize(3 * (node_count_ / kPlacingTurns + 1));
+}
+
+void LocalExterior::use(ExteriorState& state) {
+  if (&state == state_ && model_ == (state.acts() ? &models_[state.patch] : nullptr)) return;
+  state_ = &state;
+  set_model(state.acts() ? &models_[state.patch] : nullptr);
+}
+
+void LocalExterior::set_model(const PatchModel* model) {
+  if (model_ != nullptr)
+    for (const auto node : model_->nodes()) is_local_[node.value] = 0;
+  model_ = model;
+  if (model == nullptr) return;
+  for (const auto node : model->nodes()) is_local_[node.value] = 1;
+  const auto width = model->stride();
+  for (auto* values : {&start_, &ahead_, &gradient_, &scratch_}) values->assign(width, 0);
+  for (auto* values : {&along_, &change_}) values->assign(width, 0);
+  for (auto* values : {&u_, &f_, &moved_}) values->assign(3 * model->nodes().size(), 0);
+  is_near_.assign(model->nodes().size(), 0);
+  near_.clear();
+  factor_.resize(model->field_count());
+}
+
+void LocalExterior::take_over(std::uint32_t patch, std::span<const Vec3f> gradient,
+                              const world::World& world) {
+  auto& s = *state_;
+  set_model(&models_[patch]);
+  const auto count = model_->field_count(), width = model_->stride();
+  s.patch = patch;
+  s.age = 0;
+  s.estimate = 0;
+  s.fade = 1;
+  for (auto* values : {&s.amplitudes, &s.rates, &s.correction, &s.relaxed, &s.relaxed_next})
+    values->assign(count, 0);
+
+  // What the organ resists with along the fields, and what these would have to do so.
+  const auto along = [&](std::span<const float> values, std::vector<double>& out) {
+    std::ranges::fill(along_, 0.0f);
+    model_->add_along_everywhere(0, node_count_, values, along_);
+    for (std::size_t c = 0; c < count; ++c) out[c] = static_cast<double>(along_[c]);
+  };
+  along(floats_of(gradient.first(node_count_)), s.correction);
+  for (std::size_t i = 0; i < count; ++i)
+    for (std::size_t j = i; j < count; ++j)
+      factor_.row(i)[j] = model_->outer_stiffness()[i * width + j] +
+                          model_->inner_stiffness()[i * width + j] + (i == j ? kLeastStiffness : 0);
+  s.amplitudes = s.correction;
+  if (factor_.factor())
+    factor_.solve(s.amplitudes);
+  else
+    std::ranges::fill(s.amplitudes, 0.0);
+
+  for (std::size_t n = 0; n < model_->nodes().size(); ++n) {
+    const Vec3f& d = world.displacements[model_->nodes()[n].value];
+    u_[3 * n] = d.x, u_[3 * n + 1] = d.y, u_[3 * n + 2] = d.z;
+  }
+  std::ranges::fill(f_, 0.0f);
+  model_->inner().add_forces(ForcePart::Whole, u_, f_);
+  model_->outer().add_forces(ForcePart::Nonlinear, u_, f_);
+  std::ranges::fill(along_, 0.0f);
+  add_along_fields(model_->basis(), f_, along_);
+  std::ranges::fill(scratch_, 0.0);
+  add_product(model_->outer_stiffness(), width, s.amplitudes, std::span(scratch_).first(count));
+  for (std::size_t c = 0; c < count; ++c)
+    s.correction[c] -= static_cast<double>(along_[c]) + scratch_[c];
+
+  // Rates that have the momentum along the fields.
+  for (std::size_t n = 0; n < node_count_; ++n) {
+    const Vec3f p = world.velocities[n] * world.masses[n];
+    momentum_[3 * n] = p.x, momentum_[3 * n + 1] = p.y, momentum_[3 * n + 2] = p.z;
+  }
+  along(momentum_, s.rates);
+  constexpr auto kStep = static_cast<double>(kTickSeconds);
+  for (std::size_t i = 0; i < count; ++i)
+    for (std::size_t j = i; j < count; ++j)
+      factor_.row(i)[j] =
+          model_->mass()[i * width + j] +
+          kStep * kStep *
+              (model_->outer_stiffness()[i * width + j] + model_->inner_stiffness()[i * width + j]);
+  if (factor_.factor())
+    factor_.solve(s.rates);
+  else
+    std::ranges::fill(s.rates, 0.0);
+
+  if (!world.relaxation.is_empty())
+    along(floats_of(world.relaxation.forces().first(node_count_)), s.relaxed);
+  s.placed.clear();
+  for (std::uint32_t turn = 0; turn < kPlacingTurns; ++turn)
+    s.placed.insert(s.placed.end(), s.amplitudes.begin(), s.amplitudes.end());
+  s.steps_since_placed.assign(kPlacingTurns, 0);
+}
+
+void LocalExterior::hand_back(world::World& world) {
+  auto& s = *state_;
+  if (!s.acts()) return;
+  for (std::uint32_t turn = 0; turn < kPlacingTurns; ++turn)
+    if (s.steps_since_placed[turn] > 0)
+      place(turn, nullptr, nullptr, static_cast<double>(kTickSeconds), world);
+  s = {};
+  set_model(nullptr);
+}
+
+void LocalExterior::near_of(std::span<const NodeIndex> active, std::vector<NodeIndex>& near) const {
+  near.clear();
+  for (const auto node : active) {
+    const auto local = is_local_[node.value] != 0 ? model_->local(node) : PatchModel::kNone;
+    if (local != PatchModel::kNone && model_->may_be_free(local)) near.push_back(node);
+  }
+}
+
+void LocalExterior::gather(const dynamics::ExteriorStep& step) {
+  for (std::size_t n = 0; n < slots_.size(); ++n) {
+    const auto& x = step.x[slots_[n]];
+    u_[3 * n] = x.x, u_[3 * n + 1] = x.y, u_[3 * n + 2] = x.z;
+  }
+}
+
+void LocalExterior::begin(const dynamics::ExteriorStep& step) {
+  auto& s = *state_;
+  const auto& model = *model_;
+  const auto count = model.field_count();
+  slots_.clear();
+  for (const auto node : model.nodes()) slots_.push_back(step.groups.slot_of(node));
+  for (const auto local : near_) is_near_[local] = 0;
+  near_.clear();
+  for (const auto node : step.near) {
+    near_.push_back(model.local(node));
+    is_near_[near_.back()] = 1;
+  }
+  const double dt = static_cast<double>(step.dt);
+  const double stays = 1 - dt / kFade_s;
+  for (std::size_t c = 0; c < count; ++c) {
+    start_[c] = s.amplitudes[c];
+    s.amplitudes[c] += dt * s.rates[c];
+    change_[c] = static_cast<float>(s.amplitudes[c] - stays * start_[c]);
+  }
+  std::ranges::fill(moved_, 0.0f);
+  add_fields(model.basis(), change_, moved_);
+  const auto left = static_cast<float>(stays);
+  for (std::size_t n = 0; n < slots_.size(); ++n) {
+    if (is_near_[n] != 0) continue;
+    auto& x = step.x[slots_[n]];
+    x.x = x.x * left + moved_[3 * n];
+    x.y = x.y * left + moved_[3 * n + 1];
+    x.z = x.z * left + moved_[3 * n + 2];
+  }
+}
+
+// Contacts among local nodes: forces on them, and stiffness among the fields.
+void LocalExterior::add_contacts(const dynamics::ExteriorStep& step) {
+  touched_.clear();
+  contact_work_j_ = 0;
+  for (const auto& point : step.contacts.points) {
+    std::array<std::uint32_t, contact::kMaxPointNodes> local{};
+    Vec3f d;
+    bool is_here = true;
+    for (std::size_t k = 0; k < point.node_count && is_here; ++k) {
+      const auto node = point.nodes[k];
+      is_here = node.value < node_count_ && is_local_[node.value] != 0;
+      if (!is_here) break;
+      local[k] = model_->local(node);
+      d += Vec3f{u_[3 * local[k]], u_[3 * local[k] + 1], u_[3 * local[k] + 2]} * point.weights[k];
+    }
+    if (!is_here) continue;
+    const auto load = contact::load_at(point, d);
+    if (load.pressed_n == 0 && load.tangential_secant == 0) continue;
+    for (std::size_t k = 0; k < point.node_count; ++k) {
+      if ((point.moved >> k & 1) == 0) continue;
+      const float weight = point.weights[k];
+      const Vec3f force = load.gradient * weight;
+      float* const f = &f_[3 * local[k]];
+      f[0] += force.x, f[1] += force.y, f[2] += force.z;
+      const float* const u = &u_[3 * local[k]];
+      contact_work_j_ -= static_cast<double>(force.x * u[0] + force.y * u[1] + force.z * u[2]);
+      auto found = std::ranges::find(touched_, local[k], &Touched::local);
+      if (found == touched_.end()) found = touched_.insert(touched_.end(), {local[k], {}});
+      // All of a point's stiffness on its nodes' own blocks: at least what it is.
+      const float share = std::abs(weight);
+      found->block.add_identity(share * load.tangential_secant);
+      if (point.kind == contact::ContactPoint::Kind::Push && load.pressed_n > 0)
+        found->block.add_outer(point.normal, share * (load.normal_secant - load.tangential_secant));
+    }
+  }
+  const auto basis = model_->basis();
+  const auto count = model_->field_count();
+  for (const auto& [local, block] : touched_) {
+    const float* const x = basis.row(3 * local);
+    const float* const y = basis.row(3 * local + 1);
+    const float* const z = basis.row(3 * local + 2);
+    for (std::size_t i = 0; i < count; ++i) {
+      const double bx = static_cast<double>(block.xx * x[i] + block.xy * y[i] + block.xz * z[i]),
+                   by = static_cast<double>(block.xy * x[i] + block.yy * y[i] + block.yz * z[i]),
+                   bz = static_cast<double>(block.xz * x[i] + block.yz * y[i] + block.zz * z[i]);
+      double* const row = factor_.row(i);
+      for (std::size_t j = i; j < count; ++j)
+        row[j] += bx * static_cast<double>(x[j]) + by * static_cast<double>(y[j]) +
+                  bz * static_cast<double>(z[j]);
+    }
+  }
+}
+
+// Of near nodes, what theirs is besides that of the fields; ahead_: accelerations of the fields
+// with their drag, per s^2.
+void LocalExterior::add_inertia(const dynamics::ExteriorStep& step) {
+  const auto basis = model_->basis();
+  const float inverse_dt = 1 / step.dt, drag = static_cast<float>(drag_per_s_);
+  for (std::size_t c = 0; c < change_.size(); ++c) change_[c] = static_cast<float>(ahead_[c]);
+  for (std::size_t i = 0; i < near_.size(); ++i) {
+    const auto local = near_[i];
+    const auto node = step.near[i];
+    const Vec3f u{u_[3 * local], u_[3 * local + 1], u_[3 * local + 2]};
+    const Vec3f moved = u - step.world.displacements[node.value];
+    const Vec3f own =
+        ((moved * inverse_dt - step.world.velocities[node.value]) + moved * drag) * inverse_dt;
+    std::array<float, 3> of_fields{};
+    add_fields({basis.values.subspan(3 * local * basis.stride), basis.stride}, change_, of_fields);
+    const float mass = model_->masses()[local];
+    f_[3 * local] += mass * (own.x - of_fields[0]);
+    f_[3 * local + 1] += mass * (own.y - of_fields[1]);
+    f_[3 * local + 2] += mass * (own.z - of_fields[2]);
+  }
+}
+
+void LocalExterior::correct(const dynamics::ExteriorStep& step) {
+  auto& s = *state_;
+  const auto& model = *model_;
+  const auto count = model.field_count(), width = model.stride();
+  const double dt = static_cast<double>(step.dt);
+  const double inertia = (1 / dt + drag_per_s_) / dt;
+  for (std::size_t i = 0; i < count; ++i) {
+    double* const row = factor_.row(i);
+    const auto at = i * width;
+    for (std::size_t j = i; j < count; ++j)
+      row[j] = model.mass()[at + j] * inertia + model.outer_stiffness()[at + j] +
+               model.inner_stiffness()[at + j];
+  }
+  for (std::size_t c = 0; c < count; ++c) {
+    const double moved = s.amplitudes[c] - start_[c];
+    ahead_[c] = moved * inertia - s.rates[c] / dt;
+  }
+  gather(step);
+  std::ranges::fill(f_, 0.0f);
+  model.inner().add_forces(ForcePart::Whole, u_, f_);
+  model.outer().add_forces(ForcePart::Nonlinear, u_, f_);
+  add_inertia(step);
+  add_contacts(step);
+  std::ranges::fill(along_, 0.0f);
+  add_along_fields(model.basis(), f_, along_);
+  for (std::size_t c = 0; c < count; ++c)
+    gradient_[c] = static_cast<double>(along_[c]) - s.relaxed[c] + s.fade * s.correction[c];
+  const auto gradient = std::span(gradient_).first(count);
+  add_product(model.outer_stiffness(), width, s.amplitudes, gradient);
+  add_product(model.mass(), width, std::span(ahead_).first(count), gradient);
+  if (!factor_.factor()) return;
+  factor_.solve(gradient);
+  for (std::size_t c = 0; c < count; ++c) {
+    s.amplitudes[c] -= gradient[c];
+    change_[c] = static_cast<float>(-gradient[c]);
+  }
+  std::ranges::fill(moved_, 0.0f);
+  add_fields(model.basis(), change_, moved_);
+  for (std::size_t n = 0; n < slots_.size(); ++n) {
+    auto& x = step.x[slots_[n]];
+    x.x += moved_[3 * n], x.y += moved_[3 * n + 1], x.z += moved_[3 * n + 2];
+  }
+}
+
+float LocalExterior::estimate_error(const dynamics::ExteriorStep& step, const world::World& world) {
+  const auto& model = *model_;
+  gather(step);
+  std::ranges::fill(f_, 0.0f);
+  model.inner().add_forces(ForcePart::Whole, u_, f_);
+  model.beyond_rim().add_forces(ForcePart::Whole, u_, f_);
+  const auto relaxed = world.relaxation.forces();
+  const float inverse_dt = 1 / step.dt, drag = static_cast<float>(drag_per_s_);
+  double energy = 0;
+  for (std::size_t i = 0; i < model.rim().size(); ++i) {
+    const auto local = model.rim()[i];
+    const auto node = model.nodes()[local].value;
+    Vec3f left{f_[3 * local], f_[3 * local + 1], f_[3 * local + 2]};
+    // The world's velocities are still those before the step.
+    const Vec3f u{u_[3 * local], u_[3 * local + 1], u_[3 * local + 2]};
+    const Vec3f now = (u - world.displacements[node]) * inverse_dt;
+    left += ((now - world.velocities[node]) * inverse_dt + now * drag) * model.masses()[local];
+    if (!relaxed.empty()) left -= relaxed[node];
+    energy += static_cast<double>(length_squared(left) / model.rim_stiffness()[i]);
+  }
+  return static_cast<float>(std::sqrt(energy / (std::max(0.0, contact_work_j_) + kLeastWork_j)));
+}
+
+float LocalExterior::end(const dynamics::ExteriorStep& step, dynamics::Float4* velocities,
+                         world::World& world) {
+  auto& s = *state_;
+  const auto& model = *model_;
+  const auto count = model.field_count();
+  const double dt = static_cast<double>(step.dt);
+  for (std::size_t c = 0; c < count; ++c) s.rates[c] = (s.amplitudes[c] - start_[c]) / dt;
+  s.fade *= 1 - dt / kFade_s;
+  if (s.fade < kLeastFade) s.fade = 0;
+  if (s.age % kEstimateInterval == 0) s.estimate = estimate_error(step, world);
+  float squared = 0;
+  const float inverse_dt = 1 / step.dt;
+  for (std::size_t n = 0; n < slots_.size(); ++n) {
+    if (is_near_[n] != 0) continue;
+    const auto node = model.nodes()[n];
+    if (world.node_classes[node.value] == world::NodeClass::Fixed) continue;
+    const Vec3f now = dynamics::to_vec3(step.x[slots_[n]]);
+    const Vec3f move = now - world.displacements[node.value];
+    squared = std::max(squared, length_squared(move));
+    world.displacements[node.value] = now;
+    world.velocities[node.value] = move * inverse_dt;
+    velocities[slots_[n]] = dynamics::to_float4(world.velocities[node.value]);
+  }
+  for (auto& steps : s.steps_since_placed) ++steps;
+  const auto turn = s.age % kPlacingTurns;
+  squared = std::max(squared, place(turn, &step, velocities, dt, world));
+  if (!world.relaxation.is_empty()) {
+    const auto begin = node_count_ * turn / kPlacingTurns,
+               end = node_count_ * (turn + 1) / kPlacingTurns;
+    std::ranges::fill(along_, 0.0f);
+    model.add_along_everywhere(
+        begin, end, floats_of(world.relaxation.forces().subspan(begin, end - begin)), along_);
+    for (std::size_t c = 0; c < count; ++c) s.relaxed_next[c] += static_cast<double>(along_[c]);
+    if (turn + 1 == kPlacingTurns) {
+      s.relaxed = s.relaxed_next;
+      std::ranges::fill(s.relaxed_next, 0.0);
+    }
+  }
+  ++s.age;
+  return std::sqrt(squared);
+}
+
+// Nodes of one turn where the fields have them; the squared move of the farthest. step: null: it is
+// for the world alone.
+float LocalExterior::place(std::uint32_t turn, const dynamics::ExteriorStep* step,
+                           dynamics::Float4* velocities, double dt, world::World& world) {
+  auto& s = *state_;
+  const auto count = model_->field_count();
+  const auto begin = node_count_ * turn / kPlacingTurns,
+             end = node_count_ * (turn + 1) / kPlacingTurns;
+  const auto steps = s.steps_since_placed[turn];
+  double stays = 1;
+  for (int step_count = 0; step_count < steps; ++step_count) stays *= 1 - dt / kFade_s;
+  double* const placed = s.placed.data() + turn * count;
+  for (std::size_t c = 0; c < count; ++c) {
+    change_[c] = static_cast<float>(s.amplitudes[c] - stays * placed[c]);
+    placed[c] = s.amplitudes[c];
+  }
+  s.steps_since_placed[turn] = 0;
+  const auto run = std::span(run_).first(3 * (end - begin));
+  std::ranges::fill(run, 0.0f);
+  model_->add_everywhere(begin, end, change_, run);
+  const auto left = static_cast<float>(stays);
+  const float inverse_time = 1 / (static_cast<float>(dt) * static_cast<float>(steps));
+  float squared = 0;
+  for (std::size_t n = begin; n < end; ++n) {
+    if (is_local_[n] != 0 || world.node_classes[n] == world::NodeClass::Fixed) continue;
+    Vec3f& displacement = world.displacements[n];
+    const float* const moved = &run[3 * (n - begin)];
+    const Vec3f now = displacement * left + Vec3f{moved[0], moved[1], moved[2]};
+    const Vec3f move = now - displacement;
+    squared = std::max(squared, length_squared(move));
+    displacement = now;
+    world.velocities[n] = move * inverse_time;
+    if (step == nullptr) continue;
+    const auto slot = step->groups.slot_of(NodeIndex(static_cast<std::uint32_t>(n)));
+    if (slot == dynamics::kNoSlot) continue;
+    step->x[slot] = dynamics::to_float4(now);
+    velocities[slot] = dynamics::to_float4(world.velocities[n]);
+  }
+  return squared;
+}
+
+}  // namespace trocar::exterior

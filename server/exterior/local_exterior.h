@@ -1,0 +1,89 @@
+#pragma once
+
+// A local reduction at work in a session: around a patch that is touched, nodes are swept as ever;
+// all others move in the patch's fields (LocalPatch), u = Phi q and what is left of where they were
+// when the fields took over, which fades. Between sweeps, q is corrected by a step of Newton's
+// method among the fields: forces of the patch's tets, those of swept nodes included, are as they
+// are; of the others the response at rest, and what is not linear by cubature. Implicit Euler, as
+// the solver's. Stress that has relaxed is kept per tet, by the solver; its forces come along the
+// fields.
+//
+// Displacements and velocities of nodes stay what holds: whatever solver goes on from them. Of far
+// nodes an eighth is placed in each step, in turns.
+//
+// Its error is estimated from what its fields leave at the nodes of the patch's rim, where all tets
+// are known as they are but nodes do not move on their own: the root of the sum of squared forces
+// over stiffness, an energy, beside the work that the contacts' forces would do along their nodes'
+// displacements.
+//
+// Work per step: the patch's tets and nodes times fields, and an eighth of the organ's. No
+// allocation after take_over() of the patch with the most fields. One caller; deterministic.
+
+#include <span>
+#include <vector>
+
+#include "server/dynamics/exterior.h"
+#include "server/exterior/exterior_state.h"
+#include "server/exterior/patch_model.h"
+
+namespace trocar::exterior {
+
+class LocalExterior : public dynamics::Exterior {
+ public:
+  // Outlives it.
+  explicit LocalExterior(const LocalModels& models);
+
+  // The state of calls from now on.
+  void use(ExteriorState& state);
+
+  // From now on the patch's fields move what is not near. gradient: of the elastic energy, N per
+  // node, where the tissue is; all its nodes where they are. Continuous in place, momentum along
+  // the fields, and force.
+  void take_over(std::uint32_t patch, std::span<const Vec3f> gradient, const world::World& world);
+  // Every node where the fields have it; then others move it.
+  void hand_back(world::World& world);
+
+  // The nodes of `active` that may be swept while the patch acts, in that order.
+  void near_of(std::span<const NodeIndex> active, std::vector<NodeIndex>& near) const;
+
+  void begin(const dynamics::ExteriorStep& step) override;
+  void correct(const dynamics::ExteriorStep& step) override;
+  float end(const dynamics::ExteriorStep& step, dynamics::Float4* velocities,
+            world::World& world) override;
+
+ private:
+  struct Touched {
+    std::uint32_t local;
+    SymMat3f block;  // N/m
+  };
+
+  void set_model(const PatchModel* model);
+  void gather(const dynamics::ExteriorStep& step);
+  void add_contacts(const dynamics::ExteriorStep& step);
+  void add_inertia(const dynamics::ExteriorStep& step);
+  float estimate_error(const dynamics::ExteriorStep& step, const world::World& world);
+  float place(std::uint32_t turn, const dynamics::ExteriorStep* step, dynamics::Float4* velocities,
+              double dt, world::World& world);
+
+  const LocalModels& models_;
+  const std::size_t node_count_;
+  const double drag_per_s_;
+  ExteriorState* state_ = nullptr;
+  const PatchModel* model_ = nullptr;   // of the state's patch
+  std::vector<std::uint8_t> is_local_;  // per node of the organ
+
+  // Of a step. Per field:
+  std::vector<double> start_, ahead_, gradient_, scratch_;
+  std::vector<float> along_, change_;
+  CholeskyFactor factor_;
+  // Per local node, x, y, z:
+  std::vector<float> u_, f_, moved_;
+  std::vector<dynamics::Slot> slots_;
+  std::vector<std::uint8_t> is_near_;
+  std::vector<std::uint32_t> near_;  // local numbers
+  std::vector<Touched> touched_;
+  double contact_work_j_ = 0;  // of the last correction
+  std::vector<float> run_, momentum_;
+};
+
+}  // namespace trocar::exterior

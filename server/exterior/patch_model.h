@@ -1,0 +1,98 @@
+#pragma once
+
+// A patch of a local reduction made ready for ticks: its fields at the nodes near it, its tets, and
+// its matrices, all in fields of like stiffness. Immutable once made.
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "common/scene/local_reduction.h"
+#include "common/scene/organ.h"
+#include "server/exterior/dense.h"
+#include "server/exterior/element_set.h"
+
+namespace trocar::exterior {
+
+class PatchModel {
+ public:
+  PatchModel(const scene::LocalReduction& reduction, const scene::LocalPatch& patch,
+             const scene::Organ& organ);
+
+  NodeIndex centre() const { return centre_; }
+  // Modes, then the Green's functions of the patch's reach, x, y, z.
+  std::size_t field_count() const { return fields_.size(); }
+  std::size_t stride() const { return padded(field_count()); }
+
+  // Nodes of its tets, ascending: its local nodes.
+  std::span<const NodeIndex> nodes() const { return nodes_; }
+  std::span<const float> masses() const { return masses_; }  // kg
+  static constexpr std::uint32_t kNone = 0xffffffffu;
+  // kNone: it is none of them.
+  std::uint32_t local(NodeIndex node) const;
+  // Per local node: all its tets are as they are, so that it may move on its own.
+  bool may_be_free(std::uint32_t local) const { return is_free_[local] != 0; }
+  // At the local nodes, x, y, z.
+  BasisRows basis() const { return {basis_, stride()}; }
+
+  const ElementSet& inner() const { return inner_; }
+  const ElementSet& outer() const { return outer_; }  // weighted: what is not linear in them
+  // Nodes around those that may be free, by their numbers among local nodes, and all their tets
+  // that are not inner: where the fields alone have to do.
+  std::span<const std::uint32_t> rim() const { return rim_; }
+  const ElementSet& beyond_rim() const { return beyond_rim_; }
+  // Their stiffness at rest, the mean over axes, N/m.
+  std::span<const float> rim_stiffness() const { return rim_stiffness_; }
+
+  // Rows of `stride` doubles. At rest, N/m and kg: of all tets but the inner ones; of the inner
+  // ones; of the nodes.
+  std::span<const double> outer_stiffness() const { return outer_stiffness_; }
+  std::span<const double> inner_stiffness() const { return inner_stiffness_; }
+  std::span<const double> mass() const { return mass_; }
+
+  // out[3 n + k - 3 begin] += sum_c field c at node n x[c], of nodes begin to end.
+  void add_everywhere(std::size_t begin, std::size_t end, std::span<const float> x,
+                      std::span<float> out) const;
+  // out[c] += sum of field c times f, of nodes begin to end.
+  void add_along_everywhere(std::size_t begin, std::size_t end, std::span<const float> f,
+                            std::span<float> out) const;
+
+ private:
+  struct Field {
+    const std::int16_t* values;  // all nodes
+    float step;                  // with its scale
+  };
+  void choose_nodes(const scene::Organ& organ, const scene::LocalPatch& patch);
+  void make_matrices(const scene::LocalPatch& patch);
+
+  NodeIndex centre_;
+  std::vector<Field> fields_;
+  std::vector<NodeIndex> nodes_;
+  std::vector<float> masses_;
+  std::vector<std::uint8_t> is_free_;
+  std::vector<float> basis_;
+  std::vector<std::uint32_t> rim_;
+  std::vector<float> rim_stiffness_;
+  ElementSet inner_, outer_, beyond_rim_;
+  std::vector<double> outer_stiffness_, inner_stiffness_, mass_;
+};
+
+// All patches of a reduction.
+class LocalModels {
+ public:
+  // A valid reduction of this organ, whose fields it uses for as long as it is.
+  LocalModels(const scene::LocalReduction& reduction, const scene::Organ& organ);
+
+  std::size_t size() const { return models_.size(); }
+  const PatchModel& operator[](std::uint32_t patch) const { return models_[patch]; }
+  std::size_t node_count() const { return node_count_; }
+  double force_n() const { return force_n_; }  // largest of the training, at a node
+  double drag_per_s() const { return drag_per_s_; }
+
+ private:
+  std::vector<PatchModel> models_;
+  std::size_t node_count_ = 0;
+  double force_n_ = 0, drag_per_s_ = 0;
+};
+
+}  // namespace trocar::exterior

@@ -1,0 +1,93 @@
+#include "server/exterior/patch_model.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tests/reduction/small_organ.h"
+
+namespace trocar::exterior {
+namespace {
+
+class PatchModelOfBlock : public ::testing::Test {
+ protected:
+  PatchModelOfBlock()
+      : organ_(reduction::testing::block(5, 4, 5)),
+        reduction_(reduction::testing::synthetic_local_reduction(organ_)),
+        models_(reduction_, organ_) {}
+
+  std::vector<float> amplitudes(const PatchModel& model) const {
+    std::vector<float> x(model.stride());
+    for (std::size_t c = 0; c < model.field_count(); ++c)
+      x[c] = static_cast<float>(std::cos(static_cast<double>(c)));
+    return x;
+  }
+
+  scene::Organ organ_;
+  scene::LocalReduction reduction_;
+  LocalModels models_;
+};
+
+TEST_F(PatchModelOfBlock, FieldsNearAndEverywhereAreTheSame) {
+  for (std::uint32_t p = 0; p < models_.size(); ++p) {
+    const auto& model = models_[p];
+    const auto x = amplitudes(model);
+    std::vector<float> near(3 * model.nodes().size()), all(3 * models_.node_count());
+    add_fields(model.basis(), x, near);
+    // In runs that end anywhere.
+    for (std::size_t begin = 0; begin < models_.node_count(); begin += 37) {
+      const auto end = std::min(begin + 37, models_.node_count());
+      model.add_everywhere(begin, end, x, std::span(all).subspan(3 * begin, 3 * (end - begin)));
+    }
+    float largest = 0;
+    for (const float value : all) largest = std::max(largest, std::abs(value));
+    ASSERT_GT(largest, 0);
+    for (std::size_t n = 0; n < model.nodes().size(); ++n)
+      for (std::size_t k = 0; k < 3; ++k)
+        EXPECT_NEAR(near[3 * n + k], all[3 * model.nodes()[n].value + k], 1e-5f * largest);
+  }
+}
+
+TEST_F(PatchModelOfBlock, AlongIsTheTransposeOfEverywhere) {
+  const auto& model = models_[0];
+  const auto x = amplitudes(model);
+  std::vector<float> f(3 * models_.node_count()), u(f.size()), along(model.stride());
+  for (std::size_t i = 0; i < f.size(); ++i)
+    f[i] = static_cast<float>(std::sin(static_cast<double>(3 * i)));
+  model.add_everywhere(0, models_.node_count(), x, u);
+  model.add_along_everywhere(0, 41, std::span(f).first(3 * 41), along);
+  model.add_along_everywhere(41, models_.node_count(), std::span(f).subspan(3 * 41), along);
+  double by_nodes = 0, by_fields = 0, size = 0;
+  for (std::size_t i = 0; i < f.size(); ++i) {
+    by_nodes += static_cast<double>(f[i]) * static_cast<double>(u[i]);
+    size += std::abs(static_cast<double>(f[i]) * static_cast<double>(u[i]));
+  }
+  for (std::size_t c = 0; c < x.size(); ++c)
+    by_fields += static_cast<double>(x[c]) * static_cast<double>(along[c]);
+  EXPECT_NEAR(by_nodes, by_fields, 1e-5 * size);
+}
+
+TEST_F(PatchModelOfBlock, KnowsItsNodes) {
+  const auto& model = models_[1];
+  std::size_t free = 0;
+  for (std::uint32_t i = 0; i < organ_.mesh.node_count(); ++i) {
+    const NodeIndex node(i);
+    const bool is_there = std::ranges::binary_search(model.nodes(), node);
+    const auto local = model.local(node);
+    EXPECT_EQ(is_there, local != PatchModel::kNone);
+    if (!is_there) continue;
+    EXPECT_EQ(model.nodes()[local], node);
+    if (!model.may_be_free(local)) continue;
+    ++free;
+    EXPECT_FALSE(std::ranges::binary_search(organ_.fixed_nodes, node));
+    for (const auto tet : organ_.mesh.node_tets[node])
+      EXPECT_TRUE(std::ranges::binary_search(reduction_.patches[1].inner_tets, tet));
+    EXPECT_FALSE(std::ranges::count(model.rim(), local));
+  }
+  EXPECT_GT(free, 0u);
+  for (const auto stiffness : model.rim_stiffness()) EXPECT_GT(stiffness, 0);
+}
+
+}  // namespace
+}  // namespace trocar::exterior

@@ -1,0 +1,188 @@
+// Sessions whose far tissue a local reduction moves, against sessions without one.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "server/calibration/press.h"
+#include "server/reduction/local_build.h"
+#include "server/step/simulation.h"
+#include "tests/reduction/small_organ.h"
+
+namespace trocar::step {
+namespace {
+
+constexpr float kRadius = 0.012f;
+
+// Of a block, made once.
+struct Made {
+  Made() : organ(reduction::testing::block(12, 6, 12)) {
+    auto built = reduction::build_local(organ, {.modes = 16,
+                                                .vibrations = 16,
+                                                .patch_radius_m = 0.018,
+                                                .force_n = 0.5,
+                                                .directions = 1,
+                                                .field_nodes = 3,
+                                                .threads = 2});
+    TROCAR_ASSERT(built.ok());
+    local = std::make_shared<scene::LocalReduction>(std::move(built->reduction));
+  }
+  scene::Organ organ;
+  std::shared_ptr<const scene::LocalReduction> local;
+};
+const Made& made() {
+  static const Made instance;
+  return instance;
+}
+
+const Vec3d& centre_of(std::size_t patch) {
+  return made().organ.mesh.rest_positions[made().local->patches[patch].centre.value];
+}
+// Patches by how near they are to the middle of the top, from 0 on.
+std::size_t patch_number(std::size_t n) {
+  std::vector<std::size_t> order(made().local->patches.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  Vec3d top;
+  for (const auto& x : made().organ.mesh.rest_positions) top.y = std::max(top.y, x.y);
+  std::ranges::stable_sort(order, {},
+                           [&](std::size_t patch) { return length(centre_of(patch) - top); });
+  return order[n];
+}
+Vec3f place_of(std::size_t n) {
+  return to_float(centre_of(patch_number(n)));
+}
+constexpr Vec3f kOutward{0, 1, 0};
+
+// From the first patch's middle to another's.
+Vec3f towards(std::size_t patch, float speed_m_s) {
+  const Vec3f way = place_of(patch) - place_of(0);
+  return way * (speed_m_s / length(way));
+}
+
+// One tool, from 3 mm above a patch's middle along its normal.
+struct Press {
+  std::size_t patch = 0;
+  float depth_m = 0.006f;
+  Vec3f aside;  // m/s, once it is down
+
+  session::TickInputs at(Tick tick) const {
+    session::TickInputs inputs;
+    if (tick == 1) {
+      session::HandJoin join{.slot = {0}};
+      join.shapes[0] = {.radius_m = kRadius, .length_m = 0.3f, .reach_m = 0.012f};
+      inputs.joins.push_back(join);
+    }
+    const float t = static_cast<float>(tick) * 1e-3f;
+    const Vec3f out = kOutward;
+    const float height = 0.003f - std::min(depth_m + 0.003f, 0.05f * t);
+    const float down_s = (depth_m + 0.003f) / 0.05f;
+    inputs.samples.push_back({tool_slot({0}, 0),
+                              {{place_of(patch) + out * height + aside * std::max(0.0f, t - down_s),
+                                rotation_from_z(out)},
+                               scene::Verb::Push}});
+    return inputs;
+  }
+};
+
+Vec3f force_of(const Simulation& simulation) {
+  const auto& contacts = simulation.context().contacts;
+  Vec3f force;
+  for (const auto& tool : contacts.tools)
+    force += contact::reaction_on(contacts, tool, simulation.state().world).force_n;
+  return force;
+}
+
+double difference_of(const Simulation& a, const Simulation& b) {
+  double error = 0, whole = 0;
+  for (std::size_t n = 0; n < made().organ.mesh.node_count(); ++n) {
+    const auto& u = b.state().world.displacements[n];
+    error += length_squared(a.state().world.displacements[n] - u);
+    whole += length_squared(u);
+  }
+  return std::sqrt(error / whole);
+}
+
+TEST(ReducedSession, IsNearTheConvergedFullSolution) {
+  Simulation reduced(made().organ, 1, made().local), converged(made().organ);
+  const Press press{.depth_m = 0.006f};
+  const auto all = calibration::full_decisions();
+  for (Tick tick = 1; tick <= 500; ++tick) {
+    reduced.tick(press.at(tick), {});
+    converged.tick(press.at(tick), all);
+    if (tick < 100 || tick % 20 != 0) continue;
+    ASSERT_TRUE(reduced.context().report.is_reduced) << tick;
+    const Vec3f expected = force_of(converged), found = force_of(reduced);
+    EXPECT_LT(length(found - expected), 0.03f * length(expected)) << tick;
+    // While it swings, then at rest.
+    EXPECT_LT(difference_of(reduced, converged), tick < 400 ? 0.15 : 0.08) << tick;
+  }
+}
+
+TEST(ReducedSession, GoesOnBitForBitFromASnapshot) {
+  Simulation first(made().organ, 1, made().local), other(made().organ, 2, made().local);
+  const Press press{.depth_m = 0.002f, .aside = towards(1, 0.03f)};
+  for (Tick tick = 1; tick <= 237; ++tick) first.tick(press.at(tick), {});
+  ASSERT_TRUE(first.context().report.is_reduced);
+  Bytes snapshot;
+  first.write_snapshot(snapshot);
+  // Of something else before, with more workers.
+  for (Tick tick = 1; tick <= 150; ++tick) other.tick(Press{.patch = 1}.at(tick), {});
+  ASSERT_TRUE(other.restore_snapshot(snapshot).ok());
+  std::uint32_t patches = 0, last = 0;
+  for (Tick tick = 238; tick <= 900; ++tick) {
+    const auto hash = first.tick(press.at(tick), {}).state_hash;
+    ASSERT_EQ(other.tick(press.at(tick), {}).state_hash, hash) << tick;
+    const auto& figures = first.context().reduced->figures();
+    if (figures.is_reduced && figures.patch != last) last = figures.patch, ++patches;
+  }
+  EXPECT_GE(patches, 2u);
+  // A state of a session without the reduction is none of this one, and the other way round.
+  Simulation plain(made().organ);
+  EXPECT_FALSE(plain.restore_snapshot(snapshot).ok());
+}
+
+TEST(ReducedSession, HandsOverWithoutAJump) {
+  Simulation switched(made().organ, 1, made().local);
+  const Press press{.aside = {0.01f, 0, 0.004f}};
+  Vec3f before, last;
+  std::size_t handed_over = 0;
+  double largest = 0;
+  bool was_reduced = false;
+  for (Tick tick = 1; tick <= 1300; ++tick) {
+    // On and off, at no regular times.
+    const TickDecisions decisions{.is_reduction_off = tick * tick / 53 % 2 == 0};
+    const bool is_reduced = switched.tick(press.at(tick), decisions).is_reduced;
+    const Vec3f now = force_of(switched);
+    if (tick > 200 && is_reduced != was_reduced) {
+      ++handed_over;
+      largest =
+          std::max(largest, static_cast<double>(length(now - last * 2 + before) / length(now)));
+    }
+    was_reduced = is_reduced;
+    before = last;
+    last = now;
+  }
+  EXPECT_GT(handed_over, 100u);
+  EXPECT_LT(largest, 0.015);
+}
+
+TEST(ReducedSession, ComesToRestWhereTheFullOneDoes) {
+  Simulation reduced(made().organ, 1, made().local), full(made().organ);
+  auto end = Press{}.at(2);
+  end.samples[0].sample.world_from_tool.position += kOutward * 0.05f;
+  for (Tick tick = 1; tick <= 4000; ++tick) {
+    const auto inputs = tick <= 300 ? Press{}.at(tick) : end;
+    reduced.tick(inputs, {});
+    full.tick(inputs, {});
+  }
+  float farthest = 0;
+  for (std::size_t n = 0; n < made().organ.mesh.node_count(); ++n)
+    farthest = std::max(farthest, length(reduced.state().world.displacements[n] -
+                                         full.state().world.displacements[n]));
+  EXPECT_LT(farthest, 1e-4f);
+}
+
+}  // namespace
+}  // namespace trocar::step
