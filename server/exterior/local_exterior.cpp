@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/assert.h"
 #include "common/base/tick.h"
 #include "server/contact/contact_law.h"
 
@@ -17,8 +18,14 @@ constexpr double kLeastFade = 1e-4;
 constexpr std::uint32_t kEstimateInterval = 4;
 // Of touches, J: with less an error is not worth a word.
 constexpr double kLeastWork_j = 2e-6;
+// Of an amplitude in one correction; the square root of an energy in J. More is as broken as what
+// is not finite: nothing is changed, and the estimate says so until the next.
+constexpr double kMaxChange = 100;
+constexpr float kBroken = 1e6f;
 // Beside 1 of every field.
 constexpr double kLeastStiffness = 1e-9;
+// Of the solver by blocks, when patches take over.
+constexpr int kPasses = 20;
 
 std::span<const float> floats_of(std::span<const Vec3f> values) {
   static_assert(sizeof(Vec3f) == 3 * sizeof(float));
@@ -28,8 +35,7 @@ std::span<const float> floats_of(std::span<const Vec3f> values) {
 }  // namespace
 
 LocalExterior::LocalExterior(const LocalModels& models)
-    : models_(models),
-      node_count_(models.node_count()),
+    : node_count_(models.node_count()),
       drag_per_s_(models.drag_per_s()),
       is_local_(models.node_count()) {
   std::size_t fields = 0, nodes = 0;
@@ -48,10 +54,10 @@ LocalExterior::LocalExterior(const LocalModels& models)
   run_.resize(3 * (node_count_ / kPlacingTurns + 1));
 }
 
-void LocalExterior::use(ExteriorState& state) {
-  if (&state == state_ && model_ == (state.acts() ? &models_[state.patch] : nullptr)) return;
+void LocalExterior::use(ExteriorState& state, const PatchModel* model) {
+  TROCAR_ASSERT(state.acts() == (model != nullptr));
   state_ = &state;
-  set_model(state.acts() ? &models_[state.patch] : nullptr);
+  if (model != model_) set_model(model);
 }
 
 void LocalExterior::set_model(const PatchModel* model) {
@@ -66,15 +72,16 @@ void LocalExterior::set_model(const PatchModel* model) {
   for (auto* values : {&u_, &f_, &moved_}) values->assign(3 * model->nodes().size(), 0);
   is_near_.assign(model->nodes().size(), 0);
   near_.clear();
-  factor_.resize(model->field_count());
+  system_.clear_links();
+  system_.resize(model->blocks());
 }
 
-void LocalExterior::take_over(std::uint32_t patch, std::span<const Vec3f> gradient,
-                              const world::World& world) {
+void LocalExterior::take_over(const PatchSet& patches, const PatchModel& model,
+                              std::span<const Vec3f> gradient, const world::World& world) {
   auto& s = *state_;
-  set_model(&models_[patch]);
+  set_model(&model);
   const auto count = model_->field_count(), width = model_->stride();
-  s.patch = patch;
+  s.patches = patches;
   s.age = 0;
   s.estimate = 0;
   s.fade = 1;
@@ -88,13 +95,20 @@ void LocalExterior::take_over(std::uint32_t patch, std::span<const Vec3f> gradie
     for (std::size_t c = 0; c < count; ++c) out[c] = static_cast<double>(along_[c]);
   };
   along(floats_of(gradient.first(node_count_)), s.correction);
-  for (std::size_t i = 0; i < count; ++i)
-    for (std::size_t j = i; j < count; ++j)
-      factor_.row(i)[j] = model_->outer_stiffness()[i * width + j] +
-                          model_->inner_stiffness()[i * width + j] + (i == j ? kLeastStiffness : 0);
+  system_.clear_links();
+  const auto fill = [&](double stiffness, double mass) {
+    for (std::size_t i = 0; i < count; ++i)
+      for (std::size_t j = 0; j < count; ++j) {
+        const auto at = i * width + j;
+        system_.row(i)[j] =
+            stiffness * (model_->outer_stiffness()[at] + model_->inner_stiffness()[at]) +
+            mass * model_->mass()[at] + (i == j ? stiffness * kLeastStiffness : 0);
+      }
+  };
+  fill(1, 0);
   s.amplitudes = s.correction;
-  if (factor_.factor())
-    factor_.solve(s.amplitudes);
+  if (system_.factor())
+    system_.solve(s.amplitudes, kPasses);
   else
     std::ranges::fill(s.amplitudes, 0.0);
 
@@ -104,7 +118,6 @@ void LocalExterior::take_over(std::uint32_t patch, std::span<const Vec3f> gradie
   }
   std::ranges::fill(f_, 0.0f);
   model_->inner().add_forces(ForcePart::Whole, u_, f_);
-  model_->outer().add_forces(ForcePart::Nonlinear, u_, f_);
   std::ranges::fill(along_, 0.0f);
   add_along_fields(model_->basis(), f_, along_);
   std::ranges::fill(scratch_, 0.0);
@@ -119,14 +132,9 @@ void LocalExterior::take_over(std::uint32_t patch, std::span<const Vec3f> gradie
   }
   along(momentum_, s.rates);
   constexpr auto kStep = static_cast<double>(kTickSeconds);
-  for (std::size_t i = 0; i < count; ++i)
-    for (std::size_t j = i; j < count; ++j)
-      factor_.row(i)[j] =
-          model_->mass()[i * width + j] +
-          kStep * kStep *
-              (model_->outer_stiffness()[i * width + j] + model_->inner_stiffness()[i * width + j]);
-  if (factor_.factor())
-    factor_.solve(s.rates);
+  fill(kStep * kStep, 1);
+  if (system_.factor())
+    system_.solve(s.rates, kPasses);
   else
     std::ranges::fill(s.rates, 0.0);
 
@@ -230,21 +238,9 @@ void LocalExterior::add_contacts(const dynamics::ExteriorStep& step) {
     }
   }
   const auto basis = model_->basis();
-  const auto count = model_->field_count();
-  for (const auto& [local, block] : touched_) {
-    const float* const x = basis.row(3 * local);
-    const float* const y = basis.row(3 * local + 1);
-    const float* const z = basis.row(3 * local + 2);
-    for (std::size_t i = 0; i < count; ++i) {
-      const double bx = static_cast<double>(block.xx * x[i] + block.xy * y[i] + block.xz * z[i]),
-                   by = static_cast<double>(block.xy * x[i] + block.yy * y[i] + block.yz * z[i]),
-                   bz = static_cast<double>(block.xz * x[i] + block.yz * y[i] + block.zz * z[i]);
-      double* const row = factor_.row(i);
-      for (std::size_t j = i; j < count; ++j)
-        row[j] += bx * static_cast<double>(x[j]) + by * static_cast<double>(y[j]) +
-                  bz * static_cast<double>(z[j]);
-    }
-  }
+  for (const auto& [local, block] : touched_)
+    system_.add_link({basis.row(3 * local), basis.row(3 * local + 1), basis.row(3 * local + 2)},
+                     block);
 }
 
 // Of near nodes, what theirs is besides that of the fields; ahead_: accelerations of the fields
@@ -276,9 +272,9 @@ void LocalExterior::correct(const dynamics::ExteriorStep& step) {
   const double dt = static_cast<double>(step.dt);
   const double inertia = (1 / dt + drag_per_s_) / dt;
   for (std::size_t i = 0; i < count; ++i) {
-    double* const row = factor_.row(i);
+    double* const row = system_.row(i);
     const auto at = i * width;
-    for (std::size_t j = i; j < count; ++j)
+    for (std::size_t j = 0; j < count; ++j)
       row[j] = model.mass()[at + j] * inertia + model.outer_stiffness()[at + j] +
                model.inner_stiffness()[at + j];
   }
@@ -286,10 +282,10 @@ void LocalExterior::correct(const dynamics::ExteriorStep& step) {
     const double moved = s.amplitudes[c] - start_[c];
     ahead_[c] = moved * inertia - s.rates[c] / dt;
   }
+  system_.clear_links();
   gather(step);
   std::ranges::fill(f_, 0.0f);
   model.inner().add_forces(ForcePart::Whole, u_, f_);
-  model.outer().add_forces(ForcePart::Nonlinear, u_, f_);
   add_inertia(step);
   add_contacts(step);
   std::ranges::fill(along_, 0.0f);
@@ -299,8 +295,14 @@ void LocalExterior::correct(const dynamics::ExteriorStep& step) {
   const auto gradient = std::span(gradient_).first(count);
   add_product(model.outer_stiffness(), width, s.amplitudes, gradient);
   add_product(model.mass(), width, std::span(ahead_).first(count), gradient);
-  if (!factor_.factor()) return;
-  factor_.solve(gradient);
+  if (system_.factor())
+    system_.solve(gradient);
+  else
+    gradient[0] = NAN;
+  if (!std::ranges::all_of(gradient, [](double g) { return std::abs(g) < kMaxChange; })) {
+    s.estimate = kBroken;
+    return;
+  }
   for (std::size_t c = 0; c < count; ++c) {
     s.amplitudes[c] -= gradient[c];
     change_[c] = static_cast<float>(-gradient[c]);
@@ -345,7 +347,8 @@ float LocalExterior::end(const dynamics::ExteriorStep& step, dynamics::Float4* v
   for (std::size_t c = 0; c < count; ++c) s.rates[c] = (s.amplitudes[c] - start_[c]) / dt;
   s.fade *= 1 - dt / kFade_s;
   if (s.fade < kLeastFade) s.fade = 0;
-  if (s.age % kEstimateInterval == 0) s.estimate = estimate_error(step, world);
+  if (s.age % kEstimateInterval == 0 && s.estimate < kBroken)
+    s.estimate = estimate_error(step, world);
   float squared = 0;
   const float inverse_dt = 1 / step.dt;
   for (std::size_t n = 0; n < slots_.size(); ++n) {

@@ -3,8 +3,8 @@
 // A local reduction at work in a session: around a patch that is touched, nodes are swept as ever;
 // all others move in the patch's fields (LocalPatch), u = Phi q and what is left of where they were
 // when the fields took over, which fades. Between sweeps, q is corrected by a step of Newton's
-// method among the fields: forces of the patch's tets, those of swept nodes included, are as they
-// are; of the others the response at rest, and what is not linear by cubature. Implicit Euler, as
+// method among the fields: forces of the tets near the patch, those of swept nodes included, are as
+// they are; the others respond as at rest. Implicit Euler, as
 // the solver's. Stress that has relaxed is kept per tet, by the solver; its forces come along the
 // fields.
 //
@@ -17,7 +17,7 @@
 // displacements.
 //
 // Work per step: the patch's tets and nodes times fields, and an eighth of the organ's. No
-// allocation after take_over() of the patch with the most fields. One caller; deterministic.
+// allocation after take_over() of single patches. One caller; deterministic.
 
 #include <span>
 #include <vector>
@@ -33,13 +33,15 @@ class LocalExterior : public dynamics::Exterior {
   // Outlives it.
   explicit LocalExterior(const LocalModels& models);
 
-  // The state of calls from now on.
-  void use(ExteriorState& state);
+  // The state of calls from now on, and the model of its patches, null if there are none. Both must
+  // outlive their use.
+  void use(ExteriorState& state, const PatchModel* model);
 
-  // From now on the patch's fields move what is not near. gradient: of the elastic energy, N per
-  // node, where the tissue is; all its nodes where they are. Continuous in place, momentum along
-  // the fields, and force.
-  void take_over(std::uint32_t patch, std::span<const Vec3f> gradient, const world::World& world);
+  // From now on the fields of these patches, whose model it is, move what is not near. gradient: of
+  // the elastic energy, N per node, where the tissue is. Continuous in place, momentum along the
+  // fields, and force.
+  void take_over(const PatchSet& patches, const PatchModel& model, std::span<const Vec3f> gradient,
+                 const world::World& world);
   // Every node where the fields have it; then others move it.
   void hand_back(world::World& world);
 
@@ -65,17 +67,16 @@ class LocalExterior : public dynamics::Exterior {
   float place(std::uint32_t turn, const dynamics::ExteriorStep* step, dynamics::Float4* velocities,
               double dt, world::World& world);
 
-  const LocalModels& models_;
   const std::size_t node_count_;
   const double drag_per_s_;
   ExteriorState* state_ = nullptr;
-  const PatchModel* model_ = nullptr;   // of the state's patch
+  const PatchModel* model_ = nullptr;   // of the state's patches
   std::vector<std::uint8_t> is_local_;  // per node of the organ
 
   // Of a step. Per field:
   std::vector<double> start_, ahead_, gradient_, scratch_;
   std::vector<float> along_, change_;
-  CholeskyFactor factor_;
+  BlockSystem system_;
   // Per local node, x, y, z:
   std::vector<float> u_, f_, moved_;
   std::vector<dynamics::Slot> slots_;

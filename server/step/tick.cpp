@@ -71,7 +71,7 @@ void note_solver(Tick tick, StepContext& context) {
   const auto& now = context.reduced->figures();
   const auto& before = context.solver_figures;
   if (now.is_reduced != before.is_reduced || now.reason != before.reason ||
-      now.patch != before.patch)
+      !(now.patches == before.patches))
     context.solver_changes.push_back({tick, now});
   context.solver_figures = now;
 }
