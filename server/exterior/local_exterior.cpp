@@ -27,11 +27,6 @@ constexpr double kLeastStiffness = 1e-9;
 // Of the solver by blocks, when patches take over.
 constexpr int kPasses = 20;
 
-std::span<const float> floats_of(std::span<const Vec3f> values) {
-  static_assert(sizeof(Vec3f) == 3 * sizeof(float));
-  return {&values.data()->x, 3 * values.size()};
-}
-
 }  // namespace
 
 LocalExterior::LocalExterior(const LocalModels& models)
@@ -50,7 +45,8 @@ LocalExterior::LocalExterior(const LocalModels& models)
   is_near_.reserve(nodes);
   near_.reserve(nodes);
   touched_.reserve(contact::kMaxPointNodes * 64);
-  momentum_.resize(3 * node_count_);
+  momentum_.reserve(node_count_);
+  gathered_.resize(3 * node_count_);
   run_.resize(3 * (node_count_ / kPlacingTurns + 1));
 }
 
@@ -76,6 +72,50 @@ void LocalExterior::set_model(const PatchModel* model) {
   system_.resize(model->blocks());
 }
 
+void LocalExterior::follow_cuts(const world::World& world) {
+  if (follower_count() == world.origins.size()) return;
+  share_begins_.assign(1, 0);
+  shares_.clear();
+  const auto add = [&](NodeIndex node, float weight, std::size_t own) {
+    if (weight == 0) return;
+    const auto put = [&](std::uint32_t root, float part) {
+      const auto mine = std::span(shares_).subspan(own);
+      const auto found = std::ranges::find(mine, root, &Share::node);
+      if (found != mine.end())
+        found->weight += part;
+      else
+        shares_.push_back({root, part});
+    };
+    if (node.value < node_count_) return put(node.value, weight);
+    const auto parent = node.value - node_count_;
+    for (auto i = share_begins_[parent]; i < share_begins_[parent + 1]; ++i)
+      put(shares_[i].node, weight * shares_[i].weight);
+  };
+  for (const auto& origin : world.origins) {
+    const auto own = shares_.size();
+    const float t = static_cast<float>(origin.t) / 65536.0f;
+    add(origin.a, 1 - t, own);
+    add(origin.b, t, own);
+    share_begins_.push_back(static_cast<std::uint32_t>(shares_.size()));
+  }
+}
+
+std::span<const float> LocalExterior::gathered(std::span<const Vec3f> values, std::size_t begin,
+                                               std::size_t end) {
+  for (std::size_t n = begin; n < end; ++n) {
+    float* const to = &gathered_[3 * (n - begin)];
+    to[0] = values[n].x, to[1] = values[n].y, to[2] = values[n].z;
+  }
+  for (std::size_t i = 0; i < follower_count(); ++i)
+    for (const auto& [node, weight] : shares_of(i)) {
+      if (node < begin || node >= end) continue;
+      const Vec3f part = values[node_count_ + i] * weight;
+      float* const to = &gathered_[3 * (node - begin)];
+      to[0] += part.x, to[1] += part.y, to[2] += part.z;
+    }
+  return std::span(gathered_).first(3 * (end - begin));
+}
+
 void LocalExterior::take_over(const PatchSet& patches, const PatchModel& model,
                               std::span<const Vec3f> gradient, const world::World& world) {
   auto& s = *state_;
@@ -94,7 +134,7 @@ void LocalExterior::take_over(const PatchSet& patches, const PatchModel& model,
     model_->add_along_everywhere(0, node_count_, values, along_);
     for (std::size_t c = 0; c < count; ++c) out[c] = static_cast<double>(along_[c]);
   };
-  along(floats_of(gradient.first(node_count_)), s.correction);
+  along(gathered(gradient, 0, node_count_), s.correction);
   system_.clear_links();
   const auto fill = [&](double stiffness, double mass) {
     for (std::size_t i = 0; i < count; ++i)
@@ -126,11 +166,10 @@ void LocalExterior::take_over(const PatchSet& patches, const PatchModel& model,
     s.correction[c] -= static_cast<double>(along_[c]) + scratch_[c];
 
   // Rates that have the momentum along the fields.
-  for (std::size_t n = 0; n < node_count_; ++n) {
-    const Vec3f p = world.velocities[n] * world.masses[n];
-    momentum_[3 * n] = p.x, momentum_[3 * n + 1] = p.y, momentum_[3 * n + 2] = p.z;
-  }
-  along(momentum_, s.rates);
+  momentum_.resize(world.node_count());
+  for (std::size_t n = 0; n < world.node_count(); ++n)
+    momentum_[n] = world.velocities[n] * world.masses[n];
+  along(gathered(momentum_, 0, node_count_), s.rates);
   constexpr auto kStep = static_cast<double>(kTickSeconds);
   fill(kStep * kStep, 1);
   if (system_.factor())
@@ -139,7 +178,7 @@ void LocalExterior::take_over(const PatchSet& patches, const PatchModel& model,
     std::ranges::fill(s.rates, 0.0);
 
   if (!world.relaxation.is_empty())
-    along(floats_of(world.relaxation.forces().first(node_count_)), s.relaxed);
+    along(gathered(world.relaxation.forces(), 0, node_count_), s.relaxed);
   s.placed.clear();
   for (std::uint32_t turn = 0; turn < kPlacingTurns; ++turn)
     s.placed.insert(s.placed.end(), s.amplitudes.begin(), s.amplitudes.end());
@@ -159,7 +198,8 @@ void LocalExterior::hand_back(world::World& world) {
 void LocalExterior::near_of(std::span<const NodeIndex> active, std::vector<NodeIndex>& near) const {
   near.clear();
   for (const auto node : active) {
-    const auto local = is_local_[node.value] != 0 ? model_->local(node) : PatchModel::kNone;
+    const auto local = node.value < node_count_ && is_local_[node.value] != 0 ? model_->local(node)
+                                                                              : PatchModel::kNone;
     if (local != PatchModel::kNone && model_->may_be_free(local)) near.push_back(node);
   }
 }
@@ -369,8 +409,7 @@ float LocalExterior::end(const dynamics::ExteriorStep& step, dynamics::Float4* v
     const auto begin = node_count_ * turn / kPlacingTurns,
                end = node_count_ * (turn + 1) / kPlacingTurns;
     std::ranges::fill(along_, 0.0f);
-    model.add_along_everywhere(
-        begin, end, floats_of(world.relaxation.forces().subspan(begin, end - begin)), along_);
+    model.add_along_everywhere(begin, end, gathered(world.relaxation.forces(), begin, end), along_);
     for (std::size_t c = 0; c < count; ++c) s.relaxed_next[c] += static_cast<double>(along_[c]);
     if (turn + 1 == kPlacingTurns) {
       s.relaxed = s.relaxed_next;
@@ -405,21 +444,53 @@ float LocalExterior::place(std::uint32_t turn, const dynamics::ExteriorStep* ste
   const float inverse_time = 1 / (static_cast<float>(dt) * static_cast<float>(steps));
   float squared = 0;
   for (std::size_t n = begin; n < end; ++n) {
-    if (is_local_[n] != 0 || world.node_classes[n] == world::NodeClass::Fixed) continue;
+    float* const moved = &run[3 * (n - begin)];
+    if (is_local_[n] != 0 || world.node_classes[n] == world::NodeClass::Fixed) {
+      std::fill_n(moved, 3, 0.0f);
+      continue;
+    }
     Vec3f& displacement = world.displacements[n];
-    const float* const moved = &run[3 * (n - begin)];
     const Vec3f now = displacement * left + Vec3f{moved[0], moved[1], moved[2]};
     const Vec3f move = now - displacement;
     squared = std::max(squared, length_squared(move));
     displacement = now;
     world.velocities[n] = move * inverse_time;
+    moved[0] = move.x, moved[1] = move.y, moved[2] = move.z;
     if (step == nullptr) continue;
     const auto slot = step->groups.slot_of(NodeIndex(static_cast<std::uint32_t>(n)));
     if (slot == dynamics::kNoSlot) continue;
     step->x[slot] = dynamics::to_float4(now);
     velocities[slot] = dynamics::to_float4(world.velocities[n]);
   }
+  place_followers(begin, end, step, velocities, world);
   return squared;
+}
+
+// Nodes that cuts made move by their shares of what the organ's nodes of this turn have moved by.
+void LocalExterior::place_followers(std::size_t begin, std::size_t end,
+                                    const dynamics::ExteriorStep* step,
+                                    dynamics::Float4* velocities, world::World& world) {
+  for (std::size_t i = 0; i < follower_count(); ++i) {
+    const auto n = node_count_ + i;
+    if (world.node_classes[n] == world::NodeClass::Fixed) continue;
+    Vec3f moved, velocity;
+    bool is_moved = false;
+    for (const auto& [node, weight] : shares_of(i)) {
+      velocity += world.velocities[node] * weight;
+      if (node < begin || node >= end) continue;
+      const float* const move = &run_[3 * (node - begin)];
+      moved += Vec3f{move[0], move[1], move[2]} * weight;
+      is_moved = true;
+    }
+    if (!is_moved) continue;
+    world.displacements[n] += moved;
+    world.velocities[n] = velocity;
+    if (step == nullptr) continue;
+    const auto slot = step->groups.slot_of(NodeIndex(static_cast<std::uint32_t>(n)));
+    if (slot == dynamics::kNoSlot) continue;
+    step->x[slot] = dynamics::to_float4(world.displacements[n]);
+    velocities[slot] = dynamics::to_float4(velocity);
+  }
 }
 
 }  // namespace trocar::exterior

@@ -37,6 +37,9 @@ class LocalExterior : public dynamics::Exterior {
   // outlive their use.
   void use(ExteriorState& state, const PatchModel* model);
 
+  // Takes up nodes that cuts have made: they go with those that they are between. No work if there
+  // are none since the last call. While no patch acts.
+  void follow_cuts(const world::World& world);
   // From now on the fields of these patches, whose model it is, move what is not near. gradient: of
   // the elastic energy, N per node, where the tissue is. Continuous in place, momentum along the
   // fields, and force.
@@ -59,6 +62,21 @@ class LocalExterior : public dynamics::Exterior {
     SymMat3f block;  // N/m
   };
 
+  struct Share {
+    std::uint32_t node;  // of the organ
+    float weight;
+  };
+  // Of nodes beyond the organ's own.
+  std::span<const Share> shares_of(std::size_t follower) const {
+    return std::span(shares_).subspan(share_begins_[follower],
+                                      share_begins_[follower + 1] - share_begins_[follower]);
+  }
+  std::size_t follower_count() const { return share_begins_.size() - 1; }
+  // Values of the organ's nodes from `begin` to `end`, with the shares of those that follow.
+  std::span<const float> gathered(std::span<const Vec3f> values, std::size_t begin,
+                                  std::size_t end);
+  void place_followers(std::size_t begin, std::size_t end, const dynamics::ExteriorStep* step,
+                       dynamics::Float4* velocities, world::World& world);
   void set_model(const PatchModel* model);
   void gather(const dynamics::ExteriorStep& step);
   void add_contacts(const dynamics::ExteriorStep& step);
@@ -73,6 +91,9 @@ class LocalExterior : public dynamics::Exterior {
   const PatchModel* model_ = nullptr;   // of the state's patches
   std::vector<std::uint8_t> is_local_;  // per node of the organ
 
+  std::vector<std::uint32_t> share_begins_{0};
+  std::vector<Share> shares_;
+
   // Of a step. Per field:
   std::vector<double> start_, ahead_, gradient_, scratch_;
   std::vector<float> along_, change_;
@@ -84,7 +105,8 @@ class LocalExterior : public dynamics::Exterior {
   std::vector<std::uint32_t> near_;  // local numbers
   std::vector<Touched> touched_;
   double contact_work_j_ = 0;  // of the last correction
-  std::vector<float> run_, momentum_;
+  std::vector<float> run_, gathered_;
+  std::vector<Vec3f> momentum_;  // per node
 };
 
 }  // namespace trocar::exterior

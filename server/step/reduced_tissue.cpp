@@ -13,6 +13,8 @@ namespace {
 constexpr float kForceMargin = 1.5f;
 // After it gave up, ticks until it may act again.
 constexpr std::uint16_t kWaitTicks = 250;
+// After a cut, until what was near the wound has come to rest there.
+constexpr std::uint16_t kCutWaitTicks = 400;
 // Of the estimate of the error.
 constexpr float kLargestEstimate = 0.25f;
 constexpr std::size_t kMaxLoaded = 4096;
@@ -67,7 +69,8 @@ void ReducedState::visit_state(world::StateArchive& archive, const exterior::Loc
     ready_count = 0;
   }
   for (std::uint32_t i = 0; i < ready_count; ++i) visit(archive, ready[i]);
-  archive.flag(was_cut);
+  is_cut.resize(models.size());
+  archive.fixed_array(is_cut);
   if (!archive.is_reading()) return;
   const auto are_there = [&](const exterior::PatchSet& set) {
     return std::ranges::all_of(set.all(), [&](std::uint32_t p) { return p < models.size(); });
@@ -115,6 +118,7 @@ bool ReducedTissue::choose(const Inputs& inputs, ReducedState& state,
                            dynamics::BlockDescent& solver, world::World& world) {
   if (state.exterior.acts() && acting_ == nullptr) acting_ = model_of(state.exterior.patches);
   exterior_.use(state.exterior, acting_.get());
+  exterior_.follow_cuts(world);
   if (state.wait_ticks > 0) --state.wait_ticks;
   figures_.largest_node_force_n = largest_node_force(inputs.contacts, world);
   auto patches = state.exterior.patches;
@@ -143,45 +147,48 @@ SolverReason ReducedTissue::decide(const Inputs& inputs, ReducedState& state,
                                    const world::World& world, exterior::PatchSet& patches) {
   if (inputs.is_off) return SolverReason::Off;
   if (inputs.boundary != world::Boundary::Graded) return SolverReason::Frozen;
-  if (state.was_cut) return SolverReason::Cut;
   if (state.wait_ticks > 0) return state.reason;
   const bool acts = state.exterior.acts();
-  bool is_touched = false, has_all = acts;
+  bool is_touched = false, has_all = acts, is_near_cut = false;
   exterior::PatchSet needed;
-  const auto add = [&](std::span<const NodeIndex> nodes) {
-    if (nodes.empty()) return true;
+  for (const auto& tool : inputs.contacts.tools) {
+    const auto nodes = inputs.contacts.seeds_of(tool);
+    if (nodes.empty()) continue;
     is_touched = true;
-    if (has_all && has_room(*acting_, nodes)) return true;
-    has_all = false;
-    return true;
-  };
-  const auto for_each_contact = [&](auto&& visit) {
-    for (const auto& tool : inputs.contacts.tools)
-      if (!visit(inputs.contacts.seeds_of(tool))) return false;
-    return visit(std::span(inputs.contacts.self_seeds));
-  };
-  for_each_contact(add);
+    has_all = has_all && has_room(*acting_, nodes);
+  }
   if (!is_touched) return acts ? SolverReason::Fits : SolverReason::Idle;
   if (figures_.largest_node_force_n > kForceMargin * static_cast<float>(models_.force_n()))
     return SolverReason::Force;
   if (acts && !(state.exterior.estimate <= kLargestEstimate)) return SolverReason::Error;
   if (has_all) return SolverReason::Fits;
-  const bool are_found = for_each_contact([&](std::span<const NodeIndex> nodes) {
-    if (nodes.empty()) return true;
+  for (const auto& tool : inputs.contacts.tools) {
+    const auto nodes = inputs.contacts.seeds_of(tool);
+    if (nodes.empty()) continue;
     // Those that act, before others.
-    for (const auto p : state.exterior.patches.all())
-      if (has_room(models_[p], nodes)) return needed.add(p);
-    std::uint32_t patch = 0;
-    return find_patch(nodes, world, patch) && needed.add(patch);
-  });
-  if (!are_found) return SolverReason::Outside;
+    const auto acting = state.exterior.patches.all();
+    const auto same =
+        std::ranges::find_if(acting, [&](std::uint32_t p) { return has_room(models_[p], nodes); });
+    std::uint32_t patch = same != acting.end() ? *same : 0;
+    if (same == acting.end() && !find_patch(nodes, state, world, patch, is_near_cut))
+      return is_near_cut ? SolverReason::Cut : SolverReason::Outside;
+    if (!needed.add(patch)) return SolverReason::Outside;
+  }
+  // Tissue that presses on tissue elsewhere goes with the fields.
+  for (const auto p : needed.all())
+    for (const auto node : inputs.contacts.self_seeds) {
+      const auto local = models_[p].local(node);
+      if (local != exterior::PatchModel::kNone && !models_[p].may_be_free(local))
+        return SolverReason::Outside;
+    }
   if (needed.count > 1 && !is_ready(needed, state)) return SolverReason::Preparing;
   patches = needed;
   return SolverReason::Fits;
 }
 
-bool ReducedTissue::find_patch(std::span<const NodeIndex> nodes, const world::World& world,
-                               std::uint32_t& patch) const {
+bool ReducedTissue::find_patch(std::span<const NodeIndex> nodes, const ReducedState& state,
+                               const world::World& world, std::uint32_t& patch,
+                               bool& is_near_cut) const {
   Vec3f middle;
   for (const auto node : nodes) middle += world.rest_positions[node.value];
   middle = middle * (1 / static_cast<float>(nodes.size()));
@@ -190,6 +197,10 @@ bool ReducedTissue::find_patch(std::span<const NodeIndex> nodes, const world::Wo
     const auto& centre = world.rest_positions[models_[p].centre().value];
     const float distance = length_squared(centre - middle);
     if (!(distance < nearest) || !has_room(models_[p], nodes)) continue;
+    if (state.is_cut[p] != 0) {
+      is_near_cut = true;
+      continue;
+    }
     nearest = distance;
     patch = p;
   }
@@ -253,9 +264,15 @@ float ReducedTissue::largest_node_force(const contact::ContactList& contacts,
   return std::sqrt(squared);
 }
 
-void ReducedTissue::stop_for_cut(ReducedState& state, dynamics::BlockDescent& solver,
-                                 world::World& world) {
-  state.was_cut = true;
+void ReducedTissue::stop_for_cut(std::span<const NodeIndex> changed, ReducedState& state,
+                                 dynamics::BlockDescent& solver, world::World& world) {
+  for (std::uint32_t p = 0; p < models_.size(); ++p)
+    if (state.is_cut[p] == 0 && std::ranges::any_of(changed, [&](NodeIndex node) {
+          return models_[p].local(node) != exterior::PatchModel::kNone;
+        }))
+      state.is_cut[p] = 1;
+  state.wait_ticks = kCutWaitTicks;
+  state.reason = SolverReason::Cut;
   hand_back(state, solver, world);
 }
 

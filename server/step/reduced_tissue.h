@@ -26,7 +26,7 @@ enum class SolverReason : std::uint8_t {
   Frozen,     // the tissue beyond the limits stands still
   Outside,    // touched where no patch is, or by tools that touch more patches than act together
   Force,      // a node bears more than in the training
-  Cut,        // tissue of the patch was cut
+  Cut,        // tissue was cut just now, or is where it is touched
   Error,      // the estimate of the error is too large
   Off,        // it was decided so
   Preparing,  // patches that are touched together are being made ready to act together
@@ -62,7 +62,7 @@ struct ReducedState {
   std::uint32_t prepare_ticks = 0;
   std::array<exterior::PatchSet, kMaxReady> ready{};
   std::uint32_t ready_count = 0;
-  bool was_cut = false;
+  std::vector<std::uint8_t> is_cut;  // per patch: its tissue is no longer what it is of
 };
 
 class ReducedTissue {
@@ -82,8 +82,10 @@ class ReducedTissue {
               world::World& world);
   std::span<const NodeIndex> near() const { return near_; }
   dynamics::Exterior& exterior() { return exterior_; }
-  // The topology is about to change: the full solver goes on.
-  void stop_for_cut(ReducedState& state, dynamics::BlockDescent& solver, world::World& world);
+  // The tissue was cut at these nodes, before the world follows: the full solver goes on, and for
+  // good where patches are that have one of them.
+  void stop_for_cut(std::span<const NodeIndex> changed, ReducedState& state,
+                    dynamics::BlockDescent& solver, world::World& world);
 
   const SolverFigures& figures() const { return figures_; }
 
@@ -96,9 +98,9 @@ class ReducedTissue {
 
   SolverReason decide(const Inputs& inputs, ReducedState& state, const world::World& world,
                       exterior::PatchSet& patches);
-  // The nearest patch that has room for the nodes; false: there is none.
-  bool find_patch(std::span<const NodeIndex> nodes, const world::World& world,
-                  std::uint32_t& patch) const;
+  // The nearest patch that has room for the nodes and was not cut; false: there is none.
+  bool find_patch(std::span<const NodeIndex> nodes, const ReducedState& state,
+                  const world::World& world, std::uint32_t& patch, bool& is_near_cut) const;
   bool is_ready(const exterior::PatchSet& patches, ReducedState& state);
   Model model_of(const exterior::PatchSet& patches);
   void hand_back(ReducedState& state, dynamics::BlockDescent& solver, world::World& world);

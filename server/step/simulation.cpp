@@ -16,7 +16,7 @@ State::State(const scene::Organ& organ, const exterior::LocalModels* reduction)
       claims(organ.mesh.node_count()),
       quantised(cuts.layout().vertex_count()),
       models(reduction) {
-  if (models != nullptr) reduced.emplace();
+  if (models != nullptr) reduced.emplace().is_cut.resize(models->size());
   dynamics::start_relaxed(organ, world);
 }
 
