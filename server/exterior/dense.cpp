@@ -82,7 +82,17 @@ void BlockSystem::add_link(const std::array<const float*, 3>& rows, const SymMat
                  by = static_cast<double>(b.xy * x[i] + b.yy * y[i] + b.yz * z[i]),
                  bz = static_cast<double>(b.xz * x[i] + b.yz * y[i] + b.zz * z[i]);
       double* const r = row(i);
-      for (std::size_t j = i; j < begins_[block + 1]; ++j)
+      const auto stop = begins_[block + 1];
+      std::size_t j = i;
+      const __m256d fx = _mm256_set1_pd(bx), fy = _mm256_set1_pd(by), fz = _mm256_set1_pd(bz);
+      for (; j + 4 <= stop; j += 4) {
+        __m256d sum = _mm256_loadu_pd(r + j);
+        sum = _mm256_fmadd_pd(fx, _mm256_cvtps_pd(_mm_loadu_ps(x + j)), sum);
+        sum = _mm256_fmadd_pd(fy, _mm256_cvtps_pd(_mm_loadu_ps(y + j)), sum);
+        sum = _mm256_fmadd_pd(fz, _mm256_cvtps_pd(_mm_loadu_ps(z + j)), sum);
+        _mm256_storeu_pd(r + j, sum);
+      }
+      for (; j < stop; ++j)
         r[j] += bx * static_cast<double>(x[j]) + by * static_cast<double>(y[j]) +
                 bz * static_cast<double>(z[j]);
     }

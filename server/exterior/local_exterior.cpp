@@ -215,6 +215,7 @@ void LocalExterior::begin(const dynamics::ExteriorStep& step) {
   auto& s = *state_;
   const auto& model = *model_;
   const auto count = model.field_count();
+  has_factors_ = false;
   slots_.clear();
   for (const auto node : model.nodes()) slots_.push_back(step.groups.slot_of(node));
   for (const auto local : near_) is_near_[local] = 0;
@@ -242,7 +243,7 @@ void LocalExterior::begin(const dynamics::ExteriorStep& step) {
   }
 }
 
-// Contacts among local nodes: forces on them, and stiffness among the fields.
+// Contacts among local nodes: forces on them, and their stiffness.
 void LocalExterior::add_contacts(const dynamics::ExteriorStep& step) {
   touched_.clear();
   contact_work_j_ = 0;
@@ -277,10 +278,6 @@ void LocalExterior::add_contacts(const dynamics::ExteriorStep& step) {
         found->block.add_outer(point.normal, share * (load.normal_secant - load.tangential_secant));
     }
   }
-  const auto basis = model_->basis();
-  for (const auto& [local, block] : touched_)
-    system_.add_link({basis.row(3 * local), basis.row(3 * local + 1), basis.row(3 * local + 2)},
-                     block);
 }
 
 // Of near nodes, what theirs is besides that of the fields; ahead_: accelerations of the fields
@@ -305,24 +302,37 @@ void LocalExterior::add_inertia(const dynamics::ExteriorStep& step) {
   }
 }
 
+// For all corrections of a step: stiffness of contacts is that of the first.
+bool LocalExterior::make_factors(const dynamics::ExteriorStep& step) {
+  const auto& model = *model_;
+  const auto count = model.field_count(), width = model.stride();
+  const double dt = static_cast<double>(step.dt);
+  const double inertia = (1 / dt + drag_per_s_) / dt;
+  const auto mass = model.mass(), outer = model.outer_stiffness(), inner = model.inner_stiffness();
+  for (std::size_t i = 0; i < count; ++i) {
+    double* const row = system_.row(i);
+    const auto at = i * width;
+    for (std::size_t j = 0; j < count; ++j)
+      row[j] = mass[at + j] * inertia + outer[at + j] + inner[at + j];
+  }
+  system_.clear_links();
+  const auto basis = model.basis();
+  for (const auto& [local, block] : touched_)
+    system_.add_link({basis.row(3 * local), basis.row(3 * local + 1), basis.row(3 * local + 2)},
+                     block);
+  return system_.factor();
+}
+
 void LocalExterior::correct(const dynamics::ExteriorStep& step) {
   auto& s = *state_;
   const auto& model = *model_;
   const auto count = model.field_count(), width = model.stride();
   const double dt = static_cast<double>(step.dt);
   const double inertia = (1 / dt + drag_per_s_) / dt;
-  for (std::size_t i = 0; i < count; ++i) {
-    double* const row = system_.row(i);
-    const auto at = i * width;
-    for (std::size_t j = 0; j < count; ++j)
-      row[j] = model.mass()[at + j] * inertia + model.outer_stiffness()[at + j] +
-               model.inner_stiffness()[at + j];
-  }
   for (std::size_t c = 0; c < count; ++c) {
     const double moved = s.amplitudes[c] - start_[c];
     ahead_[c] = moved * inertia - s.rates[c] / dt;
   }
-  system_.clear_links();
   gather(step);
   std::ranges::fill(f_, 0.0f);
   model.inner().add_forces(ForcePart::Whole, u_, f_);
@@ -335,7 +345,8 @@ void LocalExterior::correct(const dynamics::ExteriorStep& step) {
   const auto gradient = std::span(gradient_).first(count);
   add_product(model.outer_stiffness(), width, s.amplitudes, gradient);
   add_product(model.mass(), width, std::span(ahead_).first(count), gradient);
-  if (system_.factor())
+  if (!has_factors_) has_factors_ = make_factors(step);
+  if (has_factors_)
     system_.solve(gradient);
   else
     gradient[0] = NAN;

@@ -81,6 +81,7 @@ class LocalExterior : public dynamics::Exterior {
   void gather(const dynamics::ExteriorStep& step);
   void add_contacts(const dynamics::ExteriorStep& step);
   void add_inertia(const dynamics::ExteriorStep& step);
+  bool make_factors(const dynamics::ExteriorStep& step);
   float estimate_error(const dynamics::ExteriorStep& step, const world::World& world);
   float place(std::uint32_t turn, const dynamics::ExteriorStep* step, dynamics::Float4* velocities,
               double dt, world::World& world);
@@ -98,6 +99,7 @@ class LocalExterior : public dynamics::Exterior {
   std::vector<double> start_, ahead_, gradient_, scratch_;
   std::vector<float> along_, change_;
   BlockSystem system_;
+  bool has_factors_ = false;
   // Per local node, x, y, z:
   std::vector<float> u_, f_, moved_;
   std::vector<dynamics::Slot> slots_;
