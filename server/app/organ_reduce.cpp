@@ -368,7 +368,8 @@ void add_reduce_command(CLI::App& app, ReduceCommand& command) {
   number("--check-creep", command.check_creep, "of these at which creep is compared, too", "N");
   auto& l = command.local;
   number("--patch-radius", command.patch_radius_mm, "local: of the patches of the surface", "MM");
-  number("--vibrations", l.vibrations, "local: of the organ, more modes of every patch", "N");
+  number("--vibrations", l.vibrations, "local: of the organ, the slowest; all patches share them",
+         "N");
   number("--free-layers", l.free_layers, "local: of nodes around a touched one, 0 to 3", "N");
   number("--field-nodes", l.field_nodes, "local: whose fields a patch's modes are of", "N");
   number("--residual", l.residual, "local: what weighted tets may leave of the forces; 0: all tets",

@@ -58,7 +58,8 @@ bool PatchSet::add(std::uint32_t patch) {
 PatchModel::PatchModel(const scene::LocalReduction& reduction, const scene::LocalPatch& patch,
                        const scene::Organ& organ)
     : centre_(patch.centre) {
-  for (const auto& mode : patch.modes) fields_.push_back({mode.values.data(), mode.step});
+  for (const auto* modes : {&reduction.vibrations, &patch.modes})
+    for (const auto& mode : *modes) fields_.push_back({mode.values.data(), mode.step});
   for (const auto node : patch.reach) {
     const auto greens =
         std::ranges::lower_bound(reduction.greens, node, {}, &scene::GreensFunction::node);

@@ -43,7 +43,7 @@ class PatchModel {
   PatchModel(const LocalModels& models, const PatchSet& patches);
 
   NodeIndex centre() const { return centre_; }
-  // Modes, then the Green's functions of the patch's reach, x, y, z.
+  // Vibrations, modes, then the Green's functions of the patch's reach, x, y, z.
   std::size_t field_count() const { return fields_.size(); }
   std::size_t stride() const { return padded(field_count()); }
 

@@ -32,8 +32,6 @@ constexpr std::size_t kMaxCubatureTets = 800;
 // The equations of a cubature, one per field and state, are added up with random signs to so many,
 // in which residuals are those of all within a few per cent.
 constexpr std::size_t kCubatureRows = 2048;
-// Of a vibration, what a patch's other modes do not have.
-constexpr double kNewInVibration = 1e-3;
 
 Eigen::Index index(std::size_t i) {
   return static_cast<Eigen::Index>(i);
@@ -80,7 +78,7 @@ class Builder {
                                            " are possible: make it smaller"};
     find_greens();
     press_centres();
-    vibrations_ = slowest_vibrations(*models_[0], settings_.vibrations).modes;
+    find_vibrations();
     auto& patches = r.patches;
     built_.nonlinear.resize(patches.size());
     built_.residuals.resize(patches.size());
@@ -220,18 +218,22 @@ class Builder {
     return near;
   }
 
-  // What vibrations have besides these modes, as more of them.
-  Matrix with_vibrations(const Matrix& modes) const {
-    Matrix all(modes.rows(), modes.cols() + vibrations_.cols());
-    all.leftCols(modes.cols()) = modes;
-    Eigen::Index count = modes.cols();
-    for (const auto& vibration : vibrations_.colwise()) {
-      Vector field = vibration.normalized();
-      for (int twice = 0; twice < 2; ++twice)
-        field -= all.leftCols(count) * (all.leftCols(count).transpose() * field);
-      if (field.norm() > kNewInVibration) all.col(count++) = field.normalized();
+  // The slowest ones, orthonormal and as they will be read.
+  void find_vibrations() {
+    const auto found = slowest_vibrations(*models_[0], settings_.vibrations);
+    vibrations_.resize(found.modes.rows(), found.modes.cols());
+    for (Eigen::Index i = 0; i < found.modes.cols(); ++i) {
+      Vector field = without_vibrations(found.modes.col(i).normalized(), i).normalized();
+      built_.reduction.vibrations.push_back(
+          scene::pack_field({field.data(), static_cast<std::size_t>(field.size())}));
+      vibrations_.col(i) = field;
     }
-    return all.leftCols(count);
+  }
+  // What is not of the first `count` of them, of each column.
+  Matrix without_vibrations(Matrix fields, Eigen::Index count) const {
+    const auto v = vibrations_.leftCols(count);
+    for (int twice = 0; twice < 2; ++twice) fields -= v * (v.transpose() * fields).eval();
+    return fields;
   }
 
   void make(FullModel& model, std::size_t number) {
@@ -249,16 +251,21 @@ class Builder {
     }
     for (std::size_t i = 0; i < presses.size(); ++i)
       fields.col(index(9 * nodes.size() + i)) = presses[i];
-    const Matrix modes = with_vibrations(karhunen_loeve(fields, settings_.modes).modes);
+    const Matrix modes =
+        karhunen_loeve(without_vibrations(std::move(fields), vibrations_.cols()), settings_.modes)
+            .modes;
     for (Eigen::Index i = 0; i < modes.cols(); ++i)
       patch.modes.push_back(
           scene::pack_field({modes.col(i).data(), static_cast<std::size_t>(modes.rows())}));
     // As they will be read.
-    Matrix basis(modes.rows(), index(patch.field_count()));
-    for (std::size_t i = 0; i < patch.modes.size(); ++i)
-      unpack(patch.modes[i], basis.col(index(i)));
-    for (std::size_t i = 0; i < patch.reach.size(); ++i)
-      basis.middleCols(index(patch.modes.size() + 3 * i), 3) = greens_of(patch.reach[i]);
+    Matrix basis(modes.rows(), index(built_.reduction.field_count(patch)));
+    Eigen::Index count = 0;
+    for (const auto* shared : {&built_.reduction.vibrations, &patch.modes})
+      for (const auto& mode : *shared) unpack(mode, basis.col(count++));
+    for (const auto node : patch.reach) {
+      basis.middleCols(count, 3) = greens_of(node);
+      count += 3;
+    }
     find_inner_tets(patch);
     patch.outer_stiffness = lower(outer_stiffness(model, patch, basis));
     Matrix weighted = basis;
@@ -380,8 +387,7 @@ class Builder {
 Status validate(const LocalSettings& s) {
   const auto wrong = [](const std::string& what) { return Error{ErrorCode::Usage, what}; };
   if (auto c = check_count("--modes", s.modes, 1, scene::kMaxReducedModes); !c) return c;
-  if (auto c = check_count("--vibrations", s.vibrations, 0, scene::kMaxReducedModes - s.modes); !c)
-    return c;
+  if (auto c = check_count("--vibrations", s.vibrations, 0, scene::kMaxReducedModes); !c) return c;
   if (auto c = check_count("--free-layers", s.free_layers, 0, scene::kMaxFreeLayers); !c) return c;
   if (auto c = check_count("--directions", s.directions, 0, 20); !c) return c;
   if (auto c = check_count("--field-nodes", s.field_nodes, 1, 100); !c) return c;

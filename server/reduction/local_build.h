@@ -15,7 +15,7 @@ namespace trocar::reduction {
 
 struct LocalSettings {
   std::size_t modes = 24;         // of a patch
-  std::size_t vibrations = 24;    // of the whole organ, as more modes of every patch
+  std::size_t vibrations = 24;    // of the whole organ, which all patches share
   double patch_radius_m = 0.012;  // its nodes are within, of its centre
   std::uint32_t free_layers = 2;  // of nodes around a touched one
   double force_n = 0.4;           // the largest, on a node
