@@ -375,6 +375,8 @@ void add_reduce_command(CLI::App& app, ReduceCommand& command) {
   number("--residual", l.residual, "local: what weighted tets may leave of the forces; 0: all tets",
          "SHARE");
   number("--patches", l.patches, "local: made at most, from the first outwards; 0: all", "N");
+  sub->add_flag("--resume", command.is_resumed,
+                "local: go on from the parts beside the file that an interrupted run has left");
   number("--seed", s.seed, "chooses the first place", "S");
   number("--threads", s.threads, "of the full model", "N");
 }
@@ -382,7 +384,7 @@ void add_reduce_command(CLI::App& app, ReduceCommand& command) {
 Status run_reduce(ReduceCommand command) {
   if (command.method == "local") return run_reduce_local(std::move(command));
   for (const char* option : {"--patch-radius", "--vibrations", "--free-layers", "--field-nodes",
-                             "--residual", "--patches"})
+                             "--residual", "--patches", "--resume"})
     if (command.app->count(option) > 0)
       return Error{ErrorCode::Usage, std::string(option) + ": is of --method local"};
   command.settings.radius_m = command.radius_mm * 1e-3;
