@@ -105,6 +105,24 @@ bool read_relaxation(const proto::FrameState& message, std::optional<RelaxationF
   return true;
 }
 
+// False if a number in it cannot be.
+bool read_solver(const proto::FrameState& message, std::optional<SolverFigures>& figures) {
+  figures.reset();
+  if (!message.has_solver()) return true;  // a server before 1.6, or there is no reduction
+  const proto::SolverState& s = message.solver();
+  const auto is_sane = [](float value) { return std::isfinite(value) && value >= 0; };
+  if (!is_sane(s.estimate()) || !is_sane(s.largest_node_force_n())) return false;
+  // Of one that a newer server may have nothing is known.
+  const bool is_known = s.reason() > 0 && s.reason() <= proto::SOLVER_OFF;
+  figures = {s.is_reduced(), s.patch(),
+             is_known ? static_cast<SolverReason>(s.reason()) : SolverReason::Unknown, s.estimate(),
+             s.largest_node_force_n()};
+  return true;
+}
+
+static_assert(static_cast<int>(SolverReason::Idle) == proto::SOLVER_IDLE &&
+              static_cast<int>(SolverReason::Off) == proto::SOLVER_OFF);
+
 }  // namespace
 
 Replica::Replica(Send send) : send_(std::move(send)) {}
@@ -399,6 +417,8 @@ void Replica::apply_state(const proto::FrameState& message) {
   frame.figures.state_hash = message.state_hash();
   if (!read_relaxation(message, frame.figures.relaxation))
     return fail("FrameState.relaxation: a number is not finite");
+  if (!read_solver(message, frame.figures.solver))
+    return fail("FrameState.solver: a number is negative or not finite");
   if (!read_rate(message, frame.figures.rate))
     return fail("FrameState.rate: a time is negative or not finite, or there are over 16 layers");
   frame.has_state = true;

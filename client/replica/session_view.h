@@ -82,6 +82,30 @@ struct RelaxationFigures {
   bool operator==(const RelaxationFigures&) const = default;
 };
 
+// Why the tissue is moved by the solver that moves it.
+enum class SolverReason : std::uint8_t {
+  Unknown = 0,
+  Idle = 1,
+  Fits = 2,
+  Frozen = 3,
+  Outside = 4,
+  Force = 5,
+  Cut = 6,
+  Error = 7,
+  Off = 8,
+};
+
+// Of a session with a reduction: which solver moves the tissue.
+struct SolverFigures {
+  bool is_reduced = false;
+  std::uint32_t patch = 0;  // of the reduction, from 1; 0: none acts
+  SolverReason reason = SolverReason::Unknown;
+  float estimate = 0;  // of the error in the norm of energy; that of a force is about its square
+  float largest_node_force_n = 0;
+
+  bool operator==(const SolverFigures&) const = default;
+};
+
 // What the server says about itself with each frame.
 struct FrameFigures {
   std::uint32_t active_nodes = 0, queue_nodes = 0, region_count = 0;
@@ -94,6 +118,7 @@ struct FrameFigures {
   std::uint64_t state_hash = 0;
   RateFigures rate;
   std::optional<RelaxationFigures> relaxation;
+  std::optional<SolverFigures> solver;
 };
 
 // One frame as the server published it.

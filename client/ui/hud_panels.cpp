@@ -7,6 +7,7 @@
 #include <cstdio>
 
 #include "client/ui/panel_style.h"
+#include "client/ui/solver_text.h"
 
 namespace trocar::ui {
 namespace {
@@ -39,6 +40,7 @@ ImVec4 colour_of(RateTone tone) {
 }
 
 std::string far_sweeps(const replica::FrameFigures& figures) {
+  if (figures.solver && figures.solver->is_reduced) return "as the patch";
   if (figures.far_sweeps == 0) return "rest";
   if (figures.far_interval > 1)
     return format("%u in %u ticks", figures.far_sweeps, figures.far_interval);
@@ -62,6 +64,18 @@ void rate_rows(const HudModel& model) {
   if (!text.load.empty()) row("next tick", text.load + " allowed");
   if (!text.changes.empty()) row("changes", text.changes);
   row("time", format("%.0f %% of real time", 100 * static_cast<double>(rate.time_rate)));
+}
+
+void solver_rows(const HudModel& model) {
+  if (!model.figures.solver) return;
+  const SolverText text = describe(*model.figures.solver);
+  ImGui::TableNextRow();
+  ImGui::TableNextColumn();
+  ImGui::TextDisabled("solver");
+  ImGui::TableNextColumn();
+  ImGui::TextColored(text.is_reduced ? kGood : kNotice, "%s", text.state.c_str());
+  // As tall without a patch: the panel is not to jump at every hand-over.
+  row("estimated error", text.error.empty() ? "-" : text.error);
 }
 
 void help_row(const char* key, const char* what) {
@@ -100,6 +114,7 @@ void draw_session_panel(const HudModel& model, float scale) {
     if (!model.shows_rate || f.rate.layer_sweeps.empty())
       row("sweeps", format("%u, all other nodes %s", f.sweeps, far_sweeps(f).c_str()));
     rate_rows(model);
+    solver_rows(model);
     row("residual", format("%.2g mN", static_cast<double>(f.residual_n) * 1e3));
     row("regions", std::to_string(f.region_count));
     if (f.relaxation) {

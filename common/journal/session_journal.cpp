@@ -46,6 +46,14 @@ Status SessionJournal::read_info() {
       !parse_number(entries, "organ_hash", 16, info_.organ_hash))
     return Error{ErrorCode::BadFile, mcap_->path() + ": metadata " + kSessionMetadataName +
                                          " lacks start_utc_ns, sim_version or organ_hash"};
+  if (entries.contains("reduction_hash")) {
+    auto& reduction = info_.reduction.emplace();
+    if (!parse_number(entries, "reduction_hash", 16, reduction.hash))
+      return Error{ErrorCode::BadFile, mcap_->path() + ": metadata " + kSessionMetadataName +
+                                           " has a reduction_hash that is no number"};
+    reduction.file = text("reduction_file");
+    reduction.source = text("reduction_source");
+  }
   times_.start_utc_ns = info_.start_utc_ns;
   info_.protocol = text("protocol");
   info_.organ_name = text("organ_name");
@@ -153,6 +161,10 @@ Status SessionJournal::read_frame_states(Tick from, Tick to,
 Status SessionJournal::read_claims(Tick from, Tick to,
                                    const TickVisitor<proto::ClaimLog>& visitor) {
   return read_topic(JournalTopic::Claims, from, to, visitor);
+}
+Status SessionJournal::read_solver_changes(Tick from, Tick to,
+                                           const TickVisitor<proto::SolverLog>& visitor) {
+  return read_topic(JournalTopic::Solver, from, to, visitor);
 }
 Status SessionJournal::read_snapshots(Tick from, Tick to,
                                       const TickVisitor<proto::WorldSnapshot>& visitor) {

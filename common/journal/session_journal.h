@@ -24,9 +24,10 @@ struct SessionInfo {
   std::string protocol;  // "major.minor"
   std::string organ_name;
   std::uint64_t organ_hash = 0;
-  Tick last_tick = 0;                            // of the last message
-  std::vector<proto::Participant> participants;  // everyone who was ever in, in order of joining
-  std::uint64_t gap_messages = 0;                // that the session dropped while recording
+  std::optional<ReductionDescription> reduction;  // that the session had
+  Tick last_tick = 0;                             // of the last message
+  std::vector<proto::Participant> participants;   // everyone who was ever in, in order of joining
+  std::uint64_t gap_messages = 0;                 // that the session dropped while recording
   bool is_finished = false;
   std::string summary;  // one line for people
 };
@@ -51,6 +52,7 @@ class SessionJournal {
                                const TickVisitor<proto::SurfaceChange>& visitor);
   Status read_frame_states(Tick from, Tick to, const TickVisitor<proto::FrameState>& visitor);
   Status read_claims(Tick from, Tick to, const TickVisitor<proto::ClaimLog>& visitor);
+  Status read_solver_changes(Tick from, Tick to, const TickVisitor<proto::SolverLog>& visitor);
   Status read_snapshots(Tick from, Tick to, const TickVisitor<proto::WorldSnapshot>& visitor);
 
   // The latest at or before `tick`; nothing if there is none.

@@ -40,6 +40,11 @@ Result<std::unique_ptr<SessionJournalWriter>> SessionJournalWriter::create(
       std::to_string(session.protocol_major) + "." + std::to_string(session.protocol_minor);
   metadata.entries["organ_name"] = session.organ_name;
   metadata.entries["organ_hash"] = hex(session.organ_hash);
+  if (session.reduction) {
+    metadata.entries["reduction_hash"] = hex(session.reduction->hash);
+    metadata.entries["reduction_file"] = session.reduction->file;
+    metadata.entries["reduction_source"] = session.reduction->source;
+  }
   if (Status written = (*mcap)->write_metadata(metadata); !written.ok()) return written.error();
   return std::unique_ptr<SessionJournalWriter>(
       new SessionJournalWriter(std::move(*mcap), JournalTimes{session.start_utc_ns}));

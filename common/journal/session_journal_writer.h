@@ -5,6 +5,7 @@
 
 #include <array>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "common/base/ids.h"
@@ -23,6 +24,7 @@ struct SessionDescription {
   std::uint32_t protocol_major = kProtocolMajor, protocol_minor = kProtocolMinor;
   std::string organ_name;
   std::uint64_t organ_hash = 0;
+  std::optional<ReductionDescription> reduction;  // nothing: the session has none
 };
 
 class SessionJournalWriter {
@@ -72,6 +74,10 @@ class SessionJournalWriter {
   [[nodiscard]] Status write_claims(Tick tick, std::uint64_t now_ns,
                                     const proto::ClaimLog& claims) {
     return write(JournalTopic::Claims, tick, now_ns, claims);
+  }
+  [[nodiscard]] Status write_solver(Tick tick, std::uint64_t now_ns,
+                                    const proto::SolverLog& changes) {
+    return write(JournalTopic::Solver, tick, now_ns, changes);
   }
   [[nodiscard]] Status write_frame_state(Tick tick, std::uint64_t now_ns,
                                          const proto::FrameState& state) {

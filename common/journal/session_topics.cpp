@@ -26,6 +26,7 @@ const TopicEntry& entry_of(JournalTopic topic) {
       {"/frame_state", proto::FrameState::descriptor()},
       {"/gap", proto::JournalGap::descriptor()},
       {"/topology/change", proto::SurfaceChange::descriptor()},
+      {"/solver", proto::SolverLog::descriptor()},
   }};
   return kEntries[static_cast<std::size_t>(topic)];
 }

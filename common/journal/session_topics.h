@@ -11,14 +11,16 @@
 //   /topology/change SurfaceChange    frames that begin an epoch
 //   /participants    Participants     on change
 //   /claims          ClaimLog         frames that have claim events
-//   /frame_state     FrameState       tools, regions and figures of a frame, as a client got them
-//   /gap             JournalGap       where the queue to the writer was full
-//   /tool/<slot>     ToolState        one channel per tool, for plots in other programs
+//   /solver          SolverLog        frames in which another solver took over, or for another
+//   reason /frame_state     FrameState       tools, regions and figures of a frame, as a client got
+//   them /gap             JournalGap       where the queue to the writer was full /tool/<slot>
+//   ToolState        one channel per tool, for plots in other programs
 //
 // A message of frame f carries tick 16 f; log_time = start (UTC) + tick x 1 ms, so all messages of
 // a tick share it. publish_time is the wall clock.
 
 #include <cstdint>
+#include <string>
 
 #include "common/base/tick.h"
 
@@ -40,14 +42,25 @@ enum class JournalTopic : std::uint8_t {
   FrameState,
   Gap,
   TopologyChange,
+  Solver,
 };
-inline constexpr int kJournalTopicCount = 11;
+inline constexpr int kJournalTopicCount = 12;
 
 inline constexpr const char* kJournalProfile = "trocar";
 inline constexpr const char* kSessionMetadataName = "trocar.session";
 
 const char* topic_name(JournalTopic topic);
 const google::protobuf::Descriptor& topic_message(JournalTopic topic);
+
+// Of the local reduction that a session had: without it the session cannot be simulated again.
+// In the metadata as reduction_hash, reduction_file and reduction_source; absent without one.
+struct ReductionDescription {
+  std::uint64_t hash = 0;  // scene::reduction_hash
+  std::string file;        // its name, without folders
+  std::string source;      // scene::LocalReduction::source
+
+  bool operator==(const ReductionDescription&) const = default;
+};
 
 // Log times of one session.
 struct JournalTimes {

@@ -3,9 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <type_traits>
 #include <utility>
 
+#include "common/base/checksum.h"
 #include "common/math/cholesky.h"
+#include "common/scene/any_material.h"
 
 namespace trocar::scene {
 namespace {
@@ -15,6 +18,8 @@ constexpr std::uint32_t kTetLimit = std::uint32_t{1} << 31;
 // Of the mass matrix, beside its diagonal. Fields that depend on each other exactly still leave
 // 5e-10 after packing, which rounds each on its own; those of a block leave 7e-7 and more.
 constexpr double kLeastPivot = 1e-12;
+// Of a mode's mass in the file from that of the organ's nodes: packing makes up to 1e-4.
+constexpr double kMassMargin = 0.01;
 
 Error bad(const std::string& what) {
   return {ErrorCode::BadFile, what};
@@ -193,6 +198,50 @@ Status check_owners(const LocalReduction& r) {
   return {};
 }
 
+double mass_of(const PackedField& field, const std::vector<double>& node_masses_kg) {
+  double sum = 0;
+  for (std::size_t i = 0; i < field.values.size(); ++i) {
+    const double u = static_cast<double>(field.values[i]) * static_cast<double>(field.step);
+    sum += node_masses_kg[i / 3] * u * u;
+  }
+  return sum;
+}
+
+// Arrays with their lengths, fields one by one: padding is in no hash.
+class Hash {
+ public:
+  template <typename T>
+  void add(const T& value) {
+    static_assert(std::has_unique_object_representations_v<T> || std::is_floating_point_v<T>);
+    hasher_.update(bytes_of(std::span(&value, 1)));
+  }
+  template <typename T>
+  void add(const std::vector<T>& values) {
+    add(std::uint64_t{values.size()});
+    hasher_.update(bytes_of(values));
+  }
+  void add(const PackedField& field) {
+    add(field.step);
+    add(field.values);
+  }
+  void add(const LocalPatch& patch) {
+    add(patch.centre.value);
+    add(patch.members);
+    add(patch.reach);
+    add(std::uint64_t{patch.modes.size()});
+    for (const auto& mode : patch.modes) add(mode);
+    add(patch.inner_tets);
+    add(std::uint64_t{patch.cubature.size()});
+    for (const auto& [tet, weight] : patch.cubature) add(tet.value), add(weight);
+    add(patch.outer_stiffness);
+    add(patch.mass);
+  }
+  std::uint64_t digest() const { return hasher_.digest(); }
+
+ private:
+  StateHasher hasher_;
+};
+
 Status check_patch_of(const Organ& organ, const std::string& name, const LocalPatch& patch) {
   std::vector<NodeIndex> nodes;
   const auto check_tet = [&](TetIndex tet) -> Status {
@@ -269,6 +318,53 @@ Status check_organ(const LocalReduction& r, const Organ& organ) {
     if (auto s = check_patch_of(organ, name_of(i), patch); !s) return s;
   }
   return {};
+}
+
+Status check_reducible(const Organ& organ) {
+  const auto cannot = [&](const std::string& why) {
+    return bad("sessions of " + organ.name + " can have no reduction: " + why);
+  };
+  if (organ.mesh.tets.empty() ||
+      any_material(organ, [](const auto& m) { return !is_hyperelastic(m); }))
+    return cannot("not all of it is of tets of a neo-Hookean or measured law");
+  if (any_material(organ, [](const auto& m) { return m.has_averaged_strain; }))
+    return cannot("its strain is averaged over nodes, leave out --averaged-strain");
+  if (length(organ.gravity_m_s2) > 0) return cannot("it is under gravity");
+  if (!organ.stress_free_positions_m.empty())
+    return cannot("it is settled, its tissue is not free of stress at rest");
+  if (any_material(organ, [](const auto& m) { return m.tension != 0 || m.fibre_tension != 0; }))
+    return cannot("it is under tension");
+  return {};
+}
+
+Status check_masses(const LocalReduction& r, const Organ& organ) {
+  for (std::size_t i = 0; i < r.patches.size(); ++i) {
+    const auto& patch = r.patches[i];
+    const double own = mass_of(patch.modes.front(), organ.node_masses_kg);
+    if (!(std::abs(patch.mass.front() - own) <= kMassMargin * own))
+      return bad("is of tissue of another density than that of " + organ.name +
+                 ": the first mode of " + name_of(i) + " moves " + number(patch.mass.front()) +
+                 " kg, not " + number(own) +
+                 ": make it again with trocar-organ reduce --method local");
+  }
+  return {};
+}
+
+std::uint64_t reduction_hash(const LocalReduction& r) {
+  Hash hash;
+  hash.add(r.mesh_hash);
+  hash.add(r.elasticity_hash);
+  hash.add(r.node_count);
+  hash.add(r.force_n);
+  hash.add(r.free_layers);
+  hash.add(std::uint64_t{r.greens.size()});
+  for (const auto& [node, fields] : r.greens) {
+    hash.add(node.value);
+    for (const auto& field : fields) hash.add(field);
+  }
+  hash.add(std::uint64_t{r.patches.size()});
+  for (const auto& patch : r.patches) hash.add(patch);
+  return hash.digest();
 }
 
 }  // namespace trocar::scene

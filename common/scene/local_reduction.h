@@ -94,4 +94,16 @@ Status validate(const LocalReduction& reduction);
 // Whether a valid one is of this organ, and its nodes and tets are where they must be in it.
 Status check_organ(const LocalReduction& reduction, const Organ& organ);
 
+// Whether sessions of an organ can have a local reduction at all: of tets of hyperelastic laws,
+// free of stress at rest, its strain not averaged. That last one no hash knows.
+Status check_reducible(const Organ& organ);
+// Whether its tissue is as heavy as that of the organ that it was made of; check_organ() is kept.
+// Densities are in no hash, but masses among its fields move what a session does not sweep.
+Status check_masses(const LocalReduction& reduction, const Organ& organ);
+
+// XXH3-64 over all that makes a difference to a session, in the order of LocalReduction's members,
+// each array preceded by its length (u64): names a reduction for recordings. Its source is left
+// out.
+std::uint64_t reduction_hash(const LocalReduction& reduction);
+
 }  // namespace trocar::scene

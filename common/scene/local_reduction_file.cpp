@@ -173,4 +173,15 @@ Result<LocalReduction> read_local_reduction(const std::filesystem::path& path, c
   return reduction;
 }
 
+Result<LocalReduction> read_session_reduction(const std::filesystem::path& path,
+                                              const Organ& organ) {
+  // First: otherwise what its hash covers is only "another material".
+  if (auto s = check_reducible(organ); !s) return s.error();
+  auto reduction = read_local_reduction(path, organ);
+  if (reduction.ok())
+    if (auto s = check_masses(*reduction, organ); !s)
+      reduction = Error{s.error().code, path.string() + ": " + s.error().message};
+  return reduction;
+}
+
 }  // namespace trocar::scene

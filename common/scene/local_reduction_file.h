@@ -20,6 +20,10 @@ inline constexpr std::string_view kLocalReductionMagic = "TROCARL1";
 Status write_local_reduction(const std::filesystem::path& path, const LocalReduction& reduction);
 // Refuses one of another organ, too.
 Result<LocalReduction> read_local_reduction(const std::filesystem::path& path, const Organ& organ);
+// As read_local_reduction(), for sessions: refuses also an organ that they can have none of, and
+// one of another density.
+Result<LocalReduction> read_session_reduction(const std::filesystem::path& path,
+                                              const Organ& organ);
 
 // A file's content. Errors do not name a file; unpack_local_reduction() does not know the organ.
 Result<Bytes> pack_local_reduction(const LocalReduction& reduction,

@@ -37,12 +37,20 @@ int show_info(const std::string& path, bool as_json) {
   const auto& mcap = (*journal)->container();
   const double seconds = static_cast<double>(info.last_tick) / static_cast<double>(kTicksPerSecond);
   if (as_json) {
+    std::string reduction_hash = "null";
+    if (info.reduction) {
+      char text[19];
+      std::snprintf(text, sizeof text, "\"%016" PRIx64 "\"", info.reduction->hash);
+      reduction_hash = text;
+    }
     std::printf("{\"seconds\": %.3f, \"last_tick\": %" PRIu64
                 ", \"sim_version\": %u, \"protocol\": \"%s\", \"organ\": \"%s\", "
-                "\"finished\": %s, \"gap_messages\": %" PRIu64 ", \"channels\": {",
+                "\"finished\": %s, \"gap_messages\": %" PRIu64
+                ", \"reduction_hash\": %s, "
+                "\"channels\": {",
                 seconds, info.last_tick, info.sim_version, info.protocol.c_str(),
                 json_escaped(info.organ_name).c_str(), info.is_finished ? "true" : "false",
-                info.gap_messages);
+                info.gap_messages, reduction_hash.c_str());
     const char* separator = "";
     for (const auto& [id, channel] : mcap.channels()) {
       const auto count = mcap.statistics().channel_message_counts.find(id);
@@ -57,6 +65,9 @@ int show_info(const std::string& path, bool as_json) {
   std::printf("  %s\n", info.summary.c_str());
   std::printf("  organ        %s (hash %016" PRIx64 ")\n", info.organ_name.c_str(),
               info.organ_hash);
+  if (info.reduction)
+    std::printf("  reduction    %s (hash %016" PRIx64 "): %s\n", info.reduction->file.c_str(),
+                info.reduction->hash, info.reduction->source.c_str());
   std::printf("  length       %.1f s, %" PRIu64 " ticks\n", seconds, info.last_tick);
   std::printf("  sim_version  %u%s, protocol %s\n", info.sim_version,
               info.sim_version == kSimVersion ? "" : " (this program has another)",
@@ -77,15 +88,18 @@ int show_info(const std::string& path, bool as_json) {
   return 0;
 }
 
-int verify(const std::string& path, bool as_json) {
+int verify(const std::string& path, const std::string& reduction_file, bool as_json) {
   const std::uint64_t started = monotonic_ns();
   bool is_progress_shown = false;
-  auto verified = recording::verify_journal(path, [&](Tick tick, Tick last) {
-    if (as_json || monotonic_ns() - started < 2'000'000'000u) return;
-    is_progress_shown = true;
-    std::fprintf(stderr, "\r%s: %" PRIu64 " of %" PRIu64 " s", kProgram, tick / kTicksPerSecond,
-                 last / kTicksPerSecond);
-  });
+  auto verified = recording::verify_journal(
+      path,
+      [&](Tick tick, Tick last) {
+        if (as_json || monotonic_ns() - started < 2'000'000'000u) return;
+        is_progress_shown = true;
+        std::fprintf(stderr, "\r%s: %" PRIu64 " of %" PRIu64 " s", kProgram, tick / kTicksPerSecond,
+                     last / kTicksPerSecond);
+      },
+      reduction_file);
   if (is_progress_shown) std::fprintf(stderr, "\n");
   if (!verified) return report(kProgram, verified.error());
   const auto& r = *verified;
@@ -122,6 +136,9 @@ int run(int argc, char** argv) {
       "Examples:\n"
       "  trocar-journal info out/demo/session.mcap     who, how long, which channels\n"
       "  trocar-journal verify out/demo/session.mcap   simulate again, name the first difference\n"
+      "  trocar-journal verify session.mcap --reduction liver.reduction\n"
+      "                                                likewise, of a session that had a "
+      "reduction\n"
       "Exit codes: 0 ok, 1 difference found, 2 usage, 3 file cannot be read.");
   app.require_subcommand(1);
   std::string log_level = "warn", path;
@@ -138,6 +155,9 @@ int run(int argc, char** argv) {
     command->add_option("FILE", path, "a journal (.mcap)")->required();
     command->add_flag("--json", as_json, "print one JSON object");
   }
+  std::string reduction_file;
+  check->add_option("--reduction", reduction_file, "of the session, if it had one")
+      ->type_name("FILE");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
@@ -145,7 +165,7 @@ int run(int argc, char** argv) {
     return code == 0 ? 0 : static_cast<int>(ExitCode::Usage);
   }
   if (auto s = log::configure(kProgram, log_level); !s) return report(kProgram, s.error());
-  return check->parsed() ? verify(path, as_json) : show_info(path, as_json);
+  return check->parsed() ? verify(path, reduction_file, as_json) : show_info(path, as_json);
 }
 
 }  // namespace

@@ -24,11 +24,11 @@ class RecordedSession : public JournalSink {
 
 }  // namespace
 
-Result<std::unique_ptr<JournalSink>> open_journal(const std::string& path,
-                                                  const scene::Organ& organ,
-                                                  const wire::SurfaceLayout& layout) {
+Result<std::unique_ptr<JournalSink>> open_journal(
+    const std::string& path, const scene::Organ& organ, const wire::SurfaceLayout& layout,
+    const std::optional<journal::ReductionDescription>& reduction) {
   if (path == "none") return std::unique_ptr<JournalSink>();
-  auto recorder = recording::Recorder::create(path, organ, layout);
+  auto recorder = recording::Recorder::create(path, organ, layout, reduction);
   if (!recorder) return recorder.error();
   return std::unique_ptr<JournalSink>(std::make_unique<RecordedSession>(std::move(*recorder)));
 }

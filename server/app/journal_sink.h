@@ -4,9 +4,11 @@
 // may block: an implementation queues and lets a thread of its own write.
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "common/journal/session_topics.h"
 #include "common/scene/organ.h"
 #include "common/wire/surface_layout.h"
 #include "server/session/roster.h"
@@ -26,10 +28,10 @@ class JournalSink {
   virtual Status close() = 0;
 };
 
-// A journal at `path`, or none for "none" (then null).
-Result<std::unique_ptr<JournalSink>> open_journal(const std::string& path,
-                                                  const scene::Organ& organ,
-                                                  const wire::SurfaceLayout& layout);
+// A journal at `path`, or none for "none" (then null). reduction: of the session, if it has one.
+Result<std::unique_ptr<JournalSink>> open_journal(
+    const std::string& path, const scene::Organ& organ, const wire::SurfaceLayout& layout,
+    const std::optional<journal::ReductionDescription>& reduction = {});
 
 // "./trocar-20261121T135400Z.mcap"
 std::string default_journal_path();

@@ -19,6 +19,9 @@ Examples:
       a block of springs, for everybody on the network (there is no access control yet)
   trocar-server --organ liver.organ --sweeps 6 --budget 0.6
       up to six passes, as long as a tick takes no more than 0.6 ms
+  trocar-server --organ liver --reduction liver.reduction
+      where the reduced model fits what is touched, it moves the tissue beyond; made with
+      trocar-organ reduce liver --method local --vibrations 24
   trocar-server --seconds 20 --summary out/summary.json --journal out/session.mcap
       20 simulated seconds, then the replicas are compared, and the figures written
 
@@ -68,6 +71,10 @@ Result<std::optional<ServerOptions>> parse_command_line(int argc, char** argv) {
   app.add_flag("--averaged-strain", options.has_averaged_strain,
                "average the strain of its tets over nodes: forces near those of refined elements "
                "instead of up to 40 % too stiff, at three times the time of a tick");
+  app.add_option("--reduction", options.reduction_file,
+                 "local reduction of that organ (trocar-organ reduce --method local): moves the "
+                 "tissue beyond what is touched where it fits, the full solver elsewhere")
+      ->type_name("FILE");
   app.add_option("--listen", listen, "where to listen; port 0 takes any free one")
       ->type_name("ADDR:PORT")
       ->capture_default_str();

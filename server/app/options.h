@@ -13,6 +13,7 @@ namespace trocar::app {
 struct ServerOptions {
   std::string organ = "liver";
   bool has_averaged_strain = false;
+  std::string reduction_file;  // empty: the full solver alone
   std::string address = "127.0.0.1";
   std::uint16_t port = 7690;
   std::string journal;            // a file, or "none"

@@ -12,6 +12,7 @@
 #include <chrono>
 #include <cmath>
 #include <csignal>
+#include <filesystem>
 #include <functional>
 #include <vector>
 
@@ -20,6 +21,7 @@
 #include "common/base/timing.h"
 #include "common/scene/average_strain.h"
 #include "common/scene/load_organ.h"
+#include "common/scene/local_reduction_file.h"
 #include "server/app/simulation_loop.h"
 #include "server/app/summary.h"
 #include "server/net/tcp_server.h"
@@ -42,10 +44,29 @@ Tick ticks_of(double seconds) {
   return static_cast<Tick>(std::llround(seconds * static_cast<double>(kTicksPerSecond)));
 }
 
+// What a session has of --reduction; neither without one.
+struct Reduction {
+  std::shared_ptr<const scene::LocalReduction> model;
+  std::optional<journal::ReductionDescription> description;
+};
+
+Result<Reduction> read_reduction(const std::string& file, const scene::Organ& organ) {
+  if (file.empty()) return Reduction();
+  auto model = scene::read_session_reduction(file, organ);
+  if (!model) return model.error();
+  journal::ReductionDescription description{scene::reduction_hash(*model),
+                                            std::filesystem::path(file).filename().string(),
+                                            model->source};
+  return Reduction{std::make_shared<scene::LocalReduction>(std::move(*model)),
+                   std::move(description)};
+}
+
 class Server {
  public:
-  Server(const ServerOptions& options, scene::Organ organ)
-      : options_(options), simulation_(std::move(organ), options.workers) {}
+  Server(const ServerOptions& options, scene::Organ organ, Reduction reduction)
+      : options_(options),
+        reduction_(std::move(reduction.description)),
+        simulation_(std::move(organ), options.workers, std::move(reduction.model)) {}
 
   // Binds the port and opens the journal.
   Status open();
@@ -64,6 +85,7 @@ class Server {
   Status finish();
 
   const ServerOptions& options_;
+  const std::optional<journal::ReductionDescription> reduction_;
   step::Simulation simulation_;
   std::unique_ptr<JournalSink> journal_;
   session::SimulationInbox inbox_;
@@ -93,7 +115,7 @@ Status Server::open() {
   if (!listening) return listening.error();
   tcp_ = std::move(*listening);
 
-  auto journal = open_journal(options_.journal, organ, layout);
+  auto journal = open_journal(options_.journal, organ, layout, reduction_);
   if (!journal) return journal.error();
   journal_ = std::move(*journal);
 
@@ -157,6 +179,9 @@ void Server::take_frames() {
   if (is_ending_) return;
   handover_.take_all(frames_);
   replicator_->publish(frames_);
+  for (const auto& frame : frames_)
+    for (const auto& [tick, solver] : frame->solver_changes)
+      log::debug("tick {}: solver {}", tick, replication::describe(solver));
   warn_if_slow();
 }
 
@@ -218,6 +243,7 @@ Status Server::finish() {
                         .surface_vertex_count = simulation_.layout().vertex_count(),
                         .wall_seconds = wall_seconds_,
                         .journal = journal_ ? options_.journal : "none",
+                        .reduction = reduction_,
                         .frames_lost = handover_.dropped(),
                         .loop = report,
                         .barrier = barrier_,
@@ -236,7 +262,19 @@ Status run_server(const ServerOptions& options) {
   if (!organ) return organ.error();
   if (options.has_averaged_strain)
     if (const auto averaged = scene::average_strain(*organ); !averaged) return averaged;
-  const auto server = std::make_unique<Server>(options, std::move(*organ));
+  const auto begin = monotonic_ns();
+  auto reduction = read_reduction(options.reduction_file, *organ);
+  if (!reduction) return reduction.error();
+  const auto model = reduction->model;
+  const auto server = std::make_unique<Server>(options, std::move(*organ), std::move(*reduction));
+  if (model) {
+    std::error_code ignored;
+    log::info(
+        "{}: {} patches, {:.1f} MB, ready in {:.1f} s", options.reduction_file,
+        model->patches.size(),
+        static_cast<double>(std::filesystem::file_size(options.reduction_file, ignored)) * 1e-6,
+        static_cast<double>(monotonic_ns() - begin) * 1e-9);
+  }
   if (const auto opened = server->open(); !opened) return opened;
   return server->run();
 }

@@ -66,6 +66,18 @@ void RateReport::add(const step::TickDecisions& decisions, bool has_contact,
   contact_ticks += has_contact;
 }
 
+void SolverReport::add(const step::SolverFigures& figures) {
+  if (figures.reason == step::SolverReason::None) return;
+  const auto reason = static_cast<std::size_t>(figures.reason);
+  ++(figures.is_reduced ? reduced_ticks : full_ticks);
+  ++ticks_by_reason[reason];
+  if (figures.is_reduced && !last_.is_reduced) ++to_reduced;
+  if (!figures.is_reduced && last_.is_reduced) ++to_full, ++to_full_by_reason[reason];
+  if (figures.is_reduced && last_.is_reduced && figures.patch != last_.patch) ++to_another_patch;
+  largest_estimate = std::max(largest_estimate, figures.estimate);
+  last_ = figures;
+}
+
 SimulationLoop::SimulationLoop(step::Simulation& simulation, session::SimulationInbox& inbox,
                                FrameHandover& handover, JournalSink* journal, LoopOptions options,
                                std::function<void()> ended)
@@ -125,6 +137,7 @@ bool SimulationLoop::run_tick() {
   report_.inputs_dropped += report.inputs_dropped;
   report_.nodes_rejected += report.nodes_rejected;
   report_.faults |= report.faults;
+  report_.solver.add(simulation_.context().solver_figures);
   report_.max_active_nodes = std::max(report_.max_active_nodes, report.active_nodes);
   if (report.tick % kTicksPerSecond == 0) {
     statistics_ = second_.statistics();

@@ -50,6 +50,20 @@ struct RateReport {
   void add(const step::TickDecisions& decisions, bool has_contact, step::RateLevel level);
 };
 
+// Which solver acted, over the whole run of a session with a reduction.
+struct SolverReport {
+  Tick reduced_ticks = 0, full_ticks = 0;
+  std::uint64_t to_reduced = 0, to_full = 0, to_another_patch = 0;  // hand-overs
+  std::array<Tick, step::kSolverReasons> ticks_by_reason{};
+  std::array<std::uint64_t, step::kSolverReasons> to_full_by_reason{};
+  float largest_estimate = 0;
+
+  void add(const step::SolverFigures& figures);
+
+ private:
+  step::SolverFigures last_;
+};
+
 struct LoopReport {
   Tick ticks = 0;
   std::uint64_t slow_ticks = 0;
@@ -57,6 +71,7 @@ struct LoopReport {
   std::uint32_t faults = 0;  // TickFault bits of all ticks
   std::uint32_t max_active_nodes = 0;
   RateReport rate;
+  SolverReport solver;
   step::SharedFrame last_frame;
   StageTimes times;  // of the whole run
 };

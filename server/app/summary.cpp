@@ -77,6 +77,29 @@ std::string rate_figures(const Summary& s) {
       list(mean_sweeps), list(rate.least_sweeps), rate.least_node_limit);
 }
 
+// How long each solver acted, and why others took over.
+std::string solver_figures(const Summary& s) {
+  if (!s.reduction) return "null";
+  const auto& solver = s.loop.solver;
+  const auto by_reason = [](const auto& counts) {
+    std::string out;
+    for (std::size_t i = 1; i < counts.size(); ++i)  // from 0, a session without a reduction
+      out += fmt::format("{}\"{}\": {}", out.empty() ? "" : ", ",
+                         step::name_of(static_cast<step::SolverReason>(i)), counts[i]);
+    return out;
+  };
+  return fmt::format(
+      R"({{
+    "reduction": {}, "reduction_hash": "{:016x}", "reduced_ticks": {}, "full_ticks": {},
+    "to_reduced": {}, "to_full": {}, "to_another_patch": {}, "largest_estimate": {:.4g},
+    "ticks_by_reason": {{{}}},
+    "to_full_by_reason": {{{}}}
+  }})",
+      quote(s.reduction->file), s.reduction->hash, solver.reduced_ticks, solver.full_ticks,
+      solver.to_reduced, solver.to_full, solver.to_another_patch, solver.largest_estimate,
+      by_reason(solver.ticks_by_reason), by_reason(solver.to_full_by_reason));
+}
+
 }  // namespace
 
 std::string to_json(const Summary& s) {
@@ -94,6 +117,7 @@ std::string to_json(const Summary& s) {
   ],
   "max_active_nodes": {}, "faults": {}, "inputs_dropped": {}, "nodes_rejected": {},
   "rate": {},
+  "solver": {},
   "tick_cpu_us": {},
   "stage_cpu_us": {{{}
   }},
@@ -107,8 +131,8 @@ std::string to_json(const Summary& s) {
       static_cast<double>(s.loop.ticks) / static_cast<double>(kTicksPerSecond), s.wall_seconds,
       s.loop.slow_ticks, last.tick, last.frame, last.state_hash, last.surface_crc, all_equal,
       participants(s.barrier), s.loop.max_active_nodes, s.loop.faults, s.loop.inputs_dropped,
-      s.loop.nodes_rejected, rate_figures(s), times(s.loop.times.tick), stages(s.loop.times),
-      replication_figures(s));
+      s.loop.nodes_rejected, rate_figures(s), solver_figures(s), times(s.loop.times.tick),
+      stages(s.loop.times), replication_figures(s));
 }
 
 }  // namespace trocar::app

@@ -2,6 +2,7 @@
 
 // Figures of one run as JSON, for scripts and people.
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,7 @@ struct Summary {
   std::size_t node_count = 0, surface_vertex_count = 0;
   double wall_seconds = 0;
   std::string journal;
+  std::optional<journal::ReductionDescription> reduction;
   std::uint64_t frames_lost = 0;  // between simulation and I/O thread
   const LoopReport& loop;
   const std::vector<replication::BarrierResult>& barrier;

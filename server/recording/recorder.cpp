@@ -22,6 +22,7 @@ std::size_t estimated_bytes(const step::PublishedFrame& frame) {
     bytes += frame.change->new_vertices.size() * sizeof(wire::NewVertex) +
              frame.change->removed.size() * sizeof(TriangleIndex) +
              frame.change->added.size() * sizeof(wire::NewTriangle);
+  bytes += frame.solver_changes.size() * sizeof(step::SolverChange);
   for (const auto& record : frame.records)
     bytes += sizeof record + record.inputs.samples.size() * sizeof(session::ToolInput);
   return bytes;
@@ -29,13 +30,14 @@ std::size_t estimated_bytes(const step::PublishedFrame& frame) {
 
 }  // namespace
 
-Result<std::unique_ptr<Recorder>> Recorder::create(const std::string& path,
-                                                   const scene::Organ& organ,
-                                                   const wire::SurfaceLayout& layout) {
+Result<std::unique_ptr<Recorder>> Recorder::create(
+    const std::string& path, const scene::Organ& organ, const wire::SurfaceLayout& layout,
+    const std::optional<journal::ReductionDescription>& reduction) {
   const std::uint64_t now = utc_ns();
   const std::uint64_t hash = scene::organ_hash(organ);
   auto writer = journal::SessionJournalWriter::create(
-      path, {.start_utc_ns = now, .organ_name = organ.name, .organ_hash = hash});
+      path,
+      {.start_utc_ns = now, .organ_name = organ.name, .organ_hash = hash, .reduction = reduction});
   if (!writer) return writer.error();
   if (auto s = (*writer)->write(journal::JournalTopic::Organ, 0, now, scene::encode_organ(organ));
       !s)
@@ -186,6 +188,7 @@ Status Recorder::write_frame(const step::PublishedFrame& frame) {
       replication::describe(event, roster_, *claims.add_event());
     if (auto s = writer_->write_claims(tick, now, claims); !s) return s;
   }
+  if (auto s = write_solver_changes(frame); !s) return s;
   proto::FrameState state;
   replication::describe(frame, state);
   for (const auto& tool : state.tool())
@@ -193,6 +196,14 @@ Status Recorder::write_frame(const step::PublishedFrame& frame) {
       return s;
   ++counters_.frames_written;
   return writer_->write_frame_state(tick, now, state);
+}
+
+Status Recorder::write_solver_changes(const step::PublishedFrame& frame) {
+  if (frame.solver_changes.empty()) return {};
+  proto::SolverLog changes;
+  for (const auto& change : frame.solver_changes)
+    replication::describe(change, *changes.add_change());
+  return writer_->write_solver(last_tick_, utc_ns(), changes);
 }
 
 Status Recorder::write_change(const step::PublishedFrame& frame) {

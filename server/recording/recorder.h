@@ -16,6 +16,7 @@
 #include <algorithm>
 #include <atomic>
 #include <memory>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -40,10 +41,10 @@ class Recorder {
   static constexpr std::size_t kQueueParticipants = 64;
 
   // Creates the file with organ and topology; copies what it keeps. Fails if the file exists or
-  // cannot be written.
-  static Result<std::unique_ptr<Recorder>> create(const std::string& path,
-                                                  const scene::Organ& organ,
-                                                  const wire::SurfaceLayout& layout);
+  // cannot be written. reduction: of the session; nothing: it has none.
+  static Result<std::unique_ptr<Recorder>> create(
+      const std::string& path, const scene::Organ& organ, const wire::SurfaceLayout& layout,
+      const std::optional<journal::ReductionDescription>& reduction = {});
   ~Recorder();
 
   // Simulation thread.
@@ -80,6 +81,7 @@ class Recorder {
   Status write_presence(const Presence& presence);
   Status write_gap(const Gap& gap);
   Status write_frame(const step::PublishedFrame& frame);
+  Status write_solver_changes(const step::PublishedFrame& frame);
   Status write_change(const step::PublishedFrame& frame);
   Status write_keyframe(const step::PublishedFrame& frame);
   Status write_surface(const step::PublishedFrame& frame, bool is_keyframe);

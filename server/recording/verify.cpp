@@ -1,10 +1,12 @@
 #include "server/recording/verify.h"
 
 #include <algorithm>
+#include <cstdio>
 #include <map>
 
 #include "common/base/version.h"
 #include "common/journal/session_journal.h"
+#include "common/scene/local_reduction_file.h"
 #include "common/scene/organ_file.h"
 #include "common/wire/surface_codec.h"
 #include "common/wire/surface_messages.h"
@@ -22,9 +24,10 @@ BytesView view(const std::string& bytes) {
 
 class Verifier {
  public:
-  Verifier(journal::SessionJournal& journal, scene::Organ organ, VerifyReport& report)
+  Verifier(journal::SessionJournal& journal, scene::Organ organ,
+           std::shared_ptr<const scene::LocalReduction> reduction, VerifyReport& report)
       : journal_(journal),
-        simulation_(std::move(organ)),
+        simulation_(std::move(organ), 1, std::move(reduction)),
         report_(report),
         layout_(simulation_.layout()) {
     // Messages name no nodes.
@@ -171,10 +174,43 @@ class Verifier {
   bool has_surface_ = false;
 };
 
+std::string hex(std::uint64_t value) {
+  char text[17];
+  std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(value));
+  return text;
+}
+// "liver.reduction (hash 0123456789abcdef, liver, 16 patches)"
+std::string name_of(const journal::ReductionDescription& reduction) {
+  return reduction.file + " (hash " + hex(reduction.hash) + ", " + reduction.source + ")";
+}
+
 }  // namespace
 
+Result<std::shared_ptr<const scene::LocalReduction>> reduction_of(const std::string& journal,
+                                                                  const journal::SessionInfo& info,
+                                                                  const scene::Organ& organ,
+                                                                  const std::string& file) {
+  using Shared = std::shared_ptr<const scene::LocalReduction>;
+  if (!info.reduction) {
+    if (file.empty()) return Shared();
+    return Error{ErrorCode::Usage,
+                 journal + ": was recorded without a reduction: leave out " + "--reduction"};
+  }
+  if (file.empty())
+    return Error{ErrorCode::Usage, journal + ": was recorded with the reduction " +
+                                       name_of(*info.reduction) + ": give it with --reduction"};
+  auto reduction = scene::read_session_reduction(file, organ);
+  if (!reduction) return reduction.error();
+  if (const auto hash = scene::reduction_hash(*reduction); hash != info.reduction->hash)
+    return Error{ErrorCode::BadFile, file + ": is another reduction (hash " + hex(hash) +
+                                         ") than that of " + journal + ", " +
+                                         name_of(*info.reduction)};
+  return Shared(std::make_shared<scene::LocalReduction>(std::move(*reduction)));
+}
+
 Result<VerifyReport> verify_journal(const std::string& path,
-                                    const std::function<void(Tick, Tick last)>& progress) {
+                                    const std::function<void(Tick, Tick last)>& progress,
+                                    const std::string& reduction_file) {
   auto journal = journal::SessionJournal::open(path);
   if (!journal) return journal.error();
   const auto& info = (*journal)->info();
@@ -190,7 +226,13 @@ Result<VerifyReport> verify_journal(const std::string& path,
   report.is_resimulated = info.sim_version == kSimVersion;
   report.last_tick = info.last_tick;
   report.container = info.summary;
-  Verifier verifier(**journal, std::move(*organ), report);
+  std::shared_ptr<const scene::LocalReduction> reduction;
+  if (report.is_resimulated || !reduction_file.empty()) {
+    auto read = reduction_of(path, info, *organ, reduction_file);
+    if (!read) return read.error();
+    reduction = std::move(*read);
+  }
+  Verifier verifier(**journal, std::move(*organ), std::move(reduction), report);
   for (Tick from = 0; from <= info.last_tick && report.ok(); from += kWindow) {
     verifier.verify_window(from, std::min(info.last_tick, from + kWindow - 1));
     if (progress) progress(std::min(info.last_tick, from + kWindow - 1), info.last_tick);

@@ -5,14 +5,18 @@
 //
 // With another sim_version the simulation cannot be repeated: then only the stored bytes are
 // checked (chunk CRCs, surface stream) and the report says so. Where ticks are missing (a marked
-// gap, a damaged chunk) re-simulation goes on from the next snapshot.
+// gap, a damaged chunk) re-simulation goes on from the next snapshot. A session that had a
+// reduction can be simulated again only with the same one.
 
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 
 #include "common/base/result.h"
 #include "common/base/tick.h"
+#include "common/journal/session_journal.h"
+#include "common/scene/local_reduction.h"
 
 namespace trocar::recording {
 
@@ -34,8 +38,17 @@ struct VerifyReport {
   bool ok() const { return !first_mismatch.has_value(); }
 };
 
-// `progress` is called now and then with the tick reached. Errors: the file cannot be read at all.
+// The reduction with which a session can be simulated again, from `file`, or null if it had none.
+// Error: it is missing, not that of the session, or there should be none.
+Result<std::shared_ptr<const scene::LocalReduction>> reduction_of(const std::string& journal,
+                                                                  const journal::SessionInfo& info,
+                                                                  const scene::Organ& organ,
+                                                                  const std::string& file);
+
+// `progress` is called now and then with the tick reached. reduction_file: of the session; empty:
+// it had none. Errors: the file cannot be read at all, or the reduction is missing or another.
 Result<VerifyReport> verify_journal(const std::string& path,
-                                    const std::function<void(Tick, Tick last)>& progress = {});
+                                    const std::function<void(Tick, Tick last)>& progress = {},
+                                    const std::string& reduction_file = {});
 
 }  // namespace trocar::recording

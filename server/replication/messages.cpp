@@ -1,11 +1,12 @@
 #include "server/replication/messages.h"
 
 #include <cmath>
+#include <limits>
 
 #include "common/base/version.h"
 #include "common/wire/surface_messages.h"
 #include "common/wire/tool_shape.h"
-#include "proto/wire.pb.h"
+#include "proto/journal.pb.h"
 
 namespace trocar::replication {
 namespace {
@@ -84,6 +85,58 @@ wire::SharedBytes encode_surface_change(const wire::SurfaceChange& change,
   return wire::encode_envelope(envelope);
 }
 
+namespace {
+
+proto::SolverReason message_of(step::SolverReason reason) {
+  switch (reason) {
+    case step::SolverReason::None:
+      return proto::SOLVER_UNSPECIFIED;
+    case step::SolverReason::Idle:
+      return proto::SOLVER_IDLE;
+    case step::SolverReason::Fits:
+      return proto::SOLVER_FITS;
+    case step::SolverReason::Frozen:
+      return proto::SOLVER_FROZEN;
+    case step::SolverReason::Outside:
+      return proto::SOLVER_OUTSIDE;
+    case step::SolverReason::Force:
+      return proto::SOLVER_FORCE;
+    case step::SolverReason::Cut:
+      return proto::SOLVER_CUT;
+    case step::SolverReason::Error:
+      return proto::SOLVER_ERROR;
+    case step::SolverReason::Off:
+      return proto::SOLVER_OFF;
+  }
+  return proto::SOLVER_UNSPECIFIED;
+}
+
+// Clients take no number that is not finite.
+float finite(float value) {
+  return std::isfinite(value) ? value : std::numeric_limits<float>::max();
+}
+
+void write(const step::SolverFigures& solver, proto::SolverState& message) {
+  message.set_is_reduced(solver.is_reduced);
+  if (solver.is_reduced) message.set_patch(solver.patch + 1);
+  message.set_reason(message_of(solver.reason));
+  message.set_estimate(finite(solver.estimate));
+  message.set_largest_node_force_n(finite(solver.largest_node_force_n));
+}
+
+}  // namespace
+
+std::string describe(const step::SolverFigures& solver) {
+  if (solver.is_reduced) return "reduced, patch " + std::to_string(solver.patch + 1);
+  return std::string("full, ") + step::name_of(solver.reason);
+}
+
+void describe(const step::SolverChange& change, proto::SolverChange& message) {
+  message.set_tick(change.tick);
+  write(change.figures, *message.mutable_solver());
+  message.set_text(describe(change.figures));
+}
+
 void describe(const step::PublishedFrame& frame, proto::FrameState& state) {
   state.set_frame(frame.frame);
   state.set_tick(frame.tick);
@@ -125,6 +178,7 @@ void describe(const step::PublishedFrame& frame, proto::FrameState& state) {
     relaxation.set_volume_change(static_cast<float>(frame.relaxation->volume_change));
     relaxation.set_relaxed_share(static_cast<float>(frame.relaxation->relaxed_share));
   }
+  if (frame.solver.reason != step::SolverReason::None) write(frame.solver, *state.mutable_solver());
   state.set_tick_cpu_us(frame.statistics.tick_median_us);
   state.set_tick_cpu_p99_us(frame.statistics.tick_p99_us);
   for (const float median : frame.statistics.median_us) state.add_stage_cpu_us(median);

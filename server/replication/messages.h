@@ -18,6 +18,7 @@ namespace trocar::proto {
 class ClaimEvent;
 class FrameState;
 class Participants;
+class SolverChange;
 }  // namespace trocar::proto
 
 namespace trocar::replication {
@@ -27,6 +28,7 @@ void describe(const std::vector<session::Participant>& present, proto::Participa
 void describe(const step::PublishedFrame& frame, proto::FrameState& message);
 void describe(const locks::ClaimEvent& event, const session::Roster& roster,
               proto::ClaimEvent& message);
+void describe(const step::SolverChange& change, proto::SolverChange& message);
 
 wire::SharedBytes encode_welcome(ParticipantSlot slot, std::uint64_t organ_hash);
 wire::SharedBytes encode_participants(const std::vector<session::Participant>& present);
@@ -45,5 +47,7 @@ wire::SharedBytes encode_goodbye(EndReason reason, const std::string& text);
 
 // One line for a person about what became of a claim: by whom it is held and what to do.
 std::string describe(const locks::ClaimEvent& event, const session::Roster& roster);
+// Which solver acts and why: "reduced, patch 12", "full, tissue was cut".
+std::string describe(const step::SolverFigures& solver);
 
 }  // namespace trocar::replication

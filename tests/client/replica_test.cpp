@@ -262,6 +262,36 @@ TEST_F(ReplicaTest, WhatHasRelaxedIsKept) {
   EXPECT_TRUE(replica_.fault().ok());
 }
 
+TEST_F(ReplicaTest, WhichSolverActsIsKept) {
+  start();
+  EXPECT_FALSE(replica_.newest()->figures.solver) << "there is no reduction";
+  int reason = proto::SOLVER_FITS;
+  source_.tamper = [&](proto::Envelope& m) {
+    if (!m.has_frame_state()) return true;
+    auto& solver = *m.mutable_frame_state()->mutable_solver();
+    solver.set_is_reduced(true);
+    solver.set_patch(12);
+    solver.set_reason(static_cast<proto::SolverReason>(reason));
+    solver.set_estimate(0.05f);
+    solver.set_largest_node_force_n(0.2f);
+    return true;
+  };
+  advance(1);
+  EXPECT_EQ(replica_.newest()->figures.solver,
+            (SolverFigures{true, 12, SolverReason::Fits, 0.05f, 0.2f}));
+  // A reason of a newer server is as if none were given; the rest counts.
+  for (const int newer : {9, 1000, -1}) {
+    reason = newer;
+    advance(1);
+    EXPECT_EQ(replica_.newest()->figures.solver,
+              (SolverFigures{true, 12, SolverReason::Unknown, 0.05f, 0.2f}));
+  }
+  source_.tamper = nullptr;
+  advance(1);
+  EXPECT_FALSE(replica_.newest()->figures.solver);
+  EXPECT_TRUE(replica_.fault().ok());
+}
+
 TEST_F(ReplicaTest, InvalidMessagesAreAFaultThatNamesTheField) {
   const auto fault_of = [&](auto change) {
     testing::SyntheticSource source(testing::make_blob_layout(6, 8, 0.08));
@@ -315,6 +345,13 @@ TEST_F(ReplicaTest, InvalidMessagesAreAFaultThatNamesTheField) {
                 m.mutable_frame_state()->mutable_relaxation()->set_volume_change(kInfinity);
             }).find("FrameState.relaxation"),
             std::string::npos);
+  for (const float bad : {std::nanf(""), kInfinity, -1.0f})
+    EXPECT_NE(fault_of([&](proto::Envelope& m) {
+                if (m.has_frame_state())
+                  m.mutable_frame_state()->mutable_solver()->set_estimate(bad);
+              }).find("FrameState.solver"),
+              std::string::npos)
+        << bad;
   EXPECT_NE(fault_of([](proto::Envelope& m) {
               if (m.has_welcome()) m.mutable_welcome()->set_protocol_major(9);
             }).find("protocol 9"),

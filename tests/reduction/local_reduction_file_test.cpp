@@ -118,6 +118,71 @@ TEST_F(LocalReductionFile, OneOfAnotherOrganIsRefused) {
   EXPECT_TRUE(read_local_reduction(path_, heavier).ok());
 }
 
+// The synthetic one moves 1 kg per node.
+TEST_F(LocalReductionFile, SessionsAskForMoreOfAnOrgan) {
+  ASSERT_TRUE(write_local_reduction(path_, reduction_).ok());
+  auto organ = organ_;
+  organ.node_masses_kg.assign(organ.mesh.node_count(), 1.0);
+  EXPECT_TRUE(read_session_reduction(path_, organ).ok());
+  const auto says = [&](const std::function<void(Organ&)>& change, const std::string& what) {
+    auto changed = organ;
+    change(changed);
+    const auto read = read_session_reduction(path_, changed);
+    ASSERT_FALSE(read.ok()) << what;
+    EXPECT_EQ(read.error().code, ErrorCode::BadFile);
+    EXPECT_NE(read.error().message.find(what), std::string::npos) << read.error().message;
+    EXPECT_EQ(read.error().message.find('\n'), std::string::npos);
+  };
+  says([](Organ& o) { o.gravity_m_s2.y = -9.81; }, "can have no reduction: it is under gravity");
+  says([](Organ& o) { o.stress_free_positions_m = o.mesh.rest_positions; }, "it is settled");
+  says([](Organ& o) { o.material.has_averaged_strain = true; }, "its strain is averaged");
+  says([](Organ& o) { o.material.tension = 0.1; }, "it is under tension");
+  says([](Organ& o) { o.material.fibre_tension = 0.1; }, "it is under tension");
+  says([](Organ& o) { o.material.elastic_law = ElasticLaw::Springs; },
+       "not all of it is of tets of a neo-Hookean or measured law");
+  const auto in_a_region = [](Organ& o) {
+    o.regions.push_back({"lump", o.material, {NodeIndex(0)}});
+    o.regions.back().material.has_averaged_strain = true;
+  };
+  says(in_a_region, "its strain is averaged");
+  says([](Organ& o) { o.node_masses_kg.assign(o.node_masses_kg.size(), 1.05); },
+       path_.string() + ": is of tissue of another density");
+  says([](Organ& o) { o.node_masses_kg[0] = std::nan(""); }, "is of tissue of another density");
+  says([](Organ& o) { o.mesh.rest_positions[4].x += 1e-6; }, "is of another mesh than");
+}
+
+TEST_F(LocalReductionFile, ItsHashIsOfAllThatMakesADifference) {
+  const auto hash = reduction_hash(reduction_);
+  EXPECT_EQ(reduction_hash(*unpack_local_reduction(packed())), hash);
+  auto renamed = reduction_;
+  renamed.source = "by another name";
+  EXPECT_EQ(reduction_hash(renamed), hash);
+  const std::vector<std::function<void(LocalReduction&)>> changes{
+      [](LocalReduction& r) { ++r.mesh_hash; },
+      [](LocalReduction& r) { ++r.elasticity_hash; },
+      [](LocalReduction& r) { r.force_n *= 2; },
+      [](LocalReduction& r) { ++r.free_layers; },
+      [](LocalReduction& r) { ++r.greens[1].fields[2].values[5]; },
+      [](LocalReduction& r) { r.greens[0].fields[0].step *= 2; },
+      [](LocalReduction& r) { r.patches[1].centre = r.patches[0].centre; },
+      [](LocalReduction& r) { r.patches[0].members.push_back(NodeIndex(17)); },
+      [](LocalReduction& r) { r.patches[1].reach.pop_back(); },
+      [](LocalReduction& r) { ++r.patches[0].modes[1].values[3]; },
+      [](LocalReduction& r) { r.patches[0].inner_tets.pop_back(); },
+      [](LocalReduction& r) { r.patches[1].cubature[0].weight += 1; },
+      [](LocalReduction& r) { r.patches[1].outer_stiffness[4] += 1; },
+      [](LocalReduction& r) { r.patches[1].mass[4] += 1; },
+      [](LocalReduction& r) { std::swap(r.patches[0], r.patches[1]); }};
+  std::vector<std::uint64_t> hashes{hash};
+  for (const auto& change : changes) {
+    auto changed = reduction_;
+    change(changed);
+    hashes.push_back(reduction_hash(changed));
+  }
+  std::ranges::sort(hashes);
+  EXPECT_EQ(std::ranges::adjacent_find(hashes), hashes.end());
+}
+
 TEST_F(LocalReductionFile, OneOfTheOtherMethodIsNamed) {
   expect_bad(pack_reduction(synthetic_reduction(organ_, 4)),
              "is a reduction by --method dogan, which sessions cannot use: make one with "

@@ -1,0 +1,61 @@
+#include "client/ui/solver_text.h"
+
+#include <cstdio>
+
+namespace trocar::ui {
+namespace {
+
+const char* words_of(replica::SolverReason reason) {
+  switch (reason) {
+    case replica::SolverReason::Unknown:
+      return "";
+    case replica::SolverReason::Idle:
+      return "nothing touched yet";
+    case replica::SolverReason::Fits:
+      return "within a patch";
+    case replica::SolverReason::Frozen:
+      return "far tissue is frozen";
+    case replica::SolverReason::Outside:
+      return "not within one patch";
+    case replica::SolverReason::Force:
+      return "more force than trained";
+    case replica::SolverReason::Cut:
+      return "tissue was cut";
+    case replica::SolverReason::Error:
+      return "error too large";
+    case replica::SolverReason::Off:
+      return "switched off";
+  }
+  return "";
+}
+
+// Of a contact's force: errors in energy are of second order in those of the field.
+std::string error_text(float estimate) {
+  const double percent = 100 * static_cast<double>(estimate) * static_cast<double>(estimate);
+  if (percent >= 100) return "over 100 % of the force";
+  char text[40];
+  if (percent < 0.1)
+    std::snprintf(text, sizeof text, "below 0.1 %% of the force");
+  else
+    std::snprintf(text, sizeof text, percent < 10 ? "%.1f %% of the force" : "%.0f %% of the force",
+                  percent);
+  return text;
+}
+
+}  // namespace
+
+SolverText describe(const replica::SolverFigures& solver) {
+  SolverText text;
+  text.is_reduced = solver.is_reduced;
+  if (solver.is_reduced) {
+    text.state = "reduced, patch " + std::to_string(solver.patch);
+    text.error = error_text(solver.estimate);
+    return text;
+  }
+  text.state = "full";
+  const std::string why = words_of(solver.reason);
+  if (!why.empty()) text.state += " (" + why + ")";
+  return text;
+}
+
+}  // namespace trocar::ui
