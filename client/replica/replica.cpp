@@ -113,15 +113,19 @@ bool read_solver(const proto::FrameState& message, std::optional<SolverFigures>&
   const auto is_sane = [](float value) { return std::isfinite(value) && value >= 0; };
   if (!is_sane(s.estimate()) || !is_sane(s.largest_node_force_n())) return false;
   // Of one that a newer server may have nothing is known.
-  const bool is_known = s.reason() > 0 && s.reason() <= proto::SOLVER_OFF;
-  figures = {s.is_reduced(), s.patch(),
-             is_known ? static_cast<SolverReason>(s.reason()) : SolverReason::Unknown, s.estimate(),
-             s.largest_node_force_n()};
+  const bool is_known = s.reason() > 0 && s.reason() <= proto::SOLVER_PREPARING;
+  auto& read = figures.emplace();
+  read.is_reduced = s.is_reduced();
+  if (s.patch_size() > static_cast<int>(read.patches.size())) return false;
+  for (const auto patch : s.patch()) read.patches[read.patch_count++] = patch;
+  if (is_known) read.reason = static_cast<SolverReason>(s.reason());
+  read.estimate = s.estimate();
+  read.largest_node_force_n = s.largest_node_force_n();
   return true;
 }
 
 static_assert(static_cast<int>(SolverReason::Idle) == proto::SOLVER_IDLE &&
-              static_cast<int>(SolverReason::Off) == proto::SOLVER_OFF);
+              static_cast<int>(SolverReason::Preparing) == proto::SOLVER_PREPARING);
 
 }  // namespace
 

@@ -93,12 +93,14 @@ enum class SolverReason : std::uint8_t {
   Cut = 6,
   Error = 7,
   Off = 8,
+  Preparing = 9,
 };
 
 // Of a session with a reduction: which solver moves the tissue.
 struct SolverFigures {
   bool is_reduced = false;
-  std::uint32_t patch = 0;  // of the reduction, from 1; 0: none acts
+  std::uint32_t patch_count = 0;           // that act
+  std::array<std::uint32_t, 4> patches{};  // of the reduction, from 1
   SolverReason reason = SolverReason::Unknown;
   float estimate = 0;  // of the error in the norm of energy; that of a force is about its square
   float largest_node_force_n = 0;

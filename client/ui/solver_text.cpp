@@ -16,7 +16,7 @@ const char* words_of(replica::SolverReason reason) {
     case replica::SolverReason::Frozen:
       return "far tissue is frozen";
     case replica::SolverReason::Outside:
-      return "not within one patch";
+      return "not within patches";
     case replica::SolverReason::Force:
       return "more force than trained";
     case replica::SolverReason::Cut:
@@ -25,6 +25,8 @@ const char* words_of(replica::SolverReason reason) {
       return "error too large";
     case replica::SolverReason::Off:
       return "switched off";
+    case replica::SolverReason::Preparing:
+      return "patches are being made ready";
   }
   return "";
 }
@@ -48,7 +50,9 @@ SolverText describe(const replica::SolverFigures& solver) {
   SolverText text;
   text.is_reduced = solver.is_reduced;
   if (solver.is_reduced) {
-    text.state = "reduced, patch " + std::to_string(solver.patch);
+    text.state = solver.patch_count == 1 ? "reduced, patch " : "reduced, patches ";
+    for (std::uint32_t i = 0; i < solver.patch_count; ++i)
+      text.state += (i > 0 ? " + " : "") + std::to_string(solver.patches[i]);
     text.error = error_text(solver.estimate);
     return text;
   }

@@ -9,7 +9,7 @@
 namespace trocar::ui {
 
 struct SolverText {
-  std::string state;  // "reduced, patch 12", "full (tissue was cut)"
+  std::string state;  // "reduced, patches 3 + 12", "full (tissue was cut)"
   // "0.3 % of the force", from the square of the estimate; empty: no patch acts.
   std::string error;
   bool is_reduced = false;

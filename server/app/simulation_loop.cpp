@@ -73,7 +73,8 @@ void SolverReport::add(const step::SolverFigures& figures) {
   ++ticks_by_reason[reason];
   if (figures.is_reduced && !last_.is_reduced) ++to_reduced;
   if (!figures.is_reduced && last_.is_reduced) ++to_full, ++to_full_by_reason[reason];
-  if (figures.is_reduced && last_.is_reduced && figures.patch != last_.patch) ++to_another_patch;
+  if (figures.is_reduced && last_.is_reduced && !(figures.patches == last_.patches))
+    ++to_another_patch;
   largest_estimate = std::max(largest_estimate, figures.estimate);
   last_ = figures;
 }

@@ -107,6 +107,8 @@ proto::SolverReason message_of(step::SolverReason reason) {
       return proto::SOLVER_ERROR;
     case step::SolverReason::Off:
       return proto::SOLVER_OFF;
+    case step::SolverReason::Preparing:
+      return proto::SOLVER_PREPARING;
   }
   return proto::SOLVER_UNSPECIFIED;
 }
@@ -118,7 +120,7 @@ float finite(float value) {
 
 void write(const step::SolverFigures& solver, proto::SolverState& message) {
   message.set_is_reduced(solver.is_reduced);
-  if (solver.is_reduced) message.set_patch(solver.patch + 1);
+  for (const auto patch : solver.patches.all()) message.add_patch(patch + 1);
   message.set_reason(message_of(solver.reason));
   message.set_estimate(finite(solver.estimate));
   message.set_largest_node_force_n(finite(solver.largest_node_force_n));
@@ -127,7 +129,12 @@ void write(const step::SolverFigures& solver, proto::SolverState& message) {
 }  // namespace
 
 std::string describe(const step::SolverFigures& solver) {
-  if (solver.is_reduced) return "reduced, patch " + std::to_string(solver.patch + 1);
+  if (solver.is_reduced) {
+    std::string text = solver.patches.count == 1 ? "reduced, patch " : "reduced, patches ";
+    for (std::uint32_t i = 0; i < solver.patches.count; ++i)
+      text += (i > 0 ? " + " : "") + std::to_string(solver.patches.patches[i] + 1);
+    return text;
+  }
   return std::string("full, ") + step::name_of(solver.reason);
 }
 

@@ -270,7 +270,8 @@ TEST_F(ReplicaTest, WhichSolverActsIsKept) {
     if (!m.has_frame_state()) return true;
     auto& solver = *m.mutable_frame_state()->mutable_solver();
     solver.set_is_reduced(true);
-    solver.set_patch(12);
+    solver.clear_patch();
+    solver.add_patch(12);
     solver.set_reason(static_cast<proto::SolverReason>(reason));
     solver.set_estimate(0.05f);
     solver.set_largest_node_force_n(0.2f);
@@ -278,13 +279,13 @@ TEST_F(ReplicaTest, WhichSolverActsIsKept) {
   };
   advance(1);
   EXPECT_EQ(replica_.newest()->figures.solver,
-            (SolverFigures{true, 12, SolverReason::Fits, 0.05f, 0.2f}));
+            (SolverFigures{true, 1, {12}, SolverReason::Fits, 0.05f, 0.2f}));
   // A reason of a newer server is as if none were given; the rest counts.
-  for (const int newer : {9, 1000, -1}) {
+  for (const int newer : {10, 1000, -1}) {
     reason = newer;
     advance(1);
     EXPECT_EQ(replica_.newest()->figures.solver,
-              (SolverFigures{true, 12, SolverReason::Unknown, 0.05f, 0.2f}));
+              (SolverFigures{true, 1, {12}, SolverReason::Unknown, 0.05f, 0.2f}));
   }
   source_.tamper = nullptr;
   advance(1);

@@ -10,22 +10,24 @@ namespace {
 using replica::SolverReason;
 
 TEST(SolverText, SaysWhichSolverActsAndWhy) {
-  const auto reduced = describe({true, 12, SolverReason::Fits, 0.055f, 0.1f});
+  const auto reduced = describe({true, 1, {12}, SolverReason::Fits, 0.055f, 0.1f});
   EXPECT_EQ(reduced.state, "reduced, patch 12");
   EXPECT_EQ(reduced.error, "0.3 % of the force");
   EXPECT_TRUE(reduced.is_reduced);
-  const auto full = describe({false, 0, SolverReason::Cut, 0, 0.1f});
+  EXPECT_EQ(describe({true, 2, {3, 12}, SolverReason::Fits, 0, 0}).state,
+            "reduced, patches 3 + 12");
+  const auto full = describe({false, 0, {}, SolverReason::Cut, 0, 0.1f});
   EXPECT_EQ(full.state, "full (tissue was cut)");
   EXPECT_EQ(full.error, "");
   EXPECT_FALSE(full.is_reduced);
   EXPECT_EQ(describe({}).state, "full");
-  for (int reason = 1; reason <= static_cast<int>(SolverReason::Off); ++reason)
+  for (int reason = 1; reason <= static_cast<int>(SolverReason::Preparing); ++reason)
     EXPECT_GT(describe({.reason = static_cast<SolverReason>(reason)}).state.size(), 6u) << reason;
 }
 
 TEST(SolverText, ErrorsOfAForceAreTheSquareOfTheEstimate) {
   const auto error = [](float estimate) {
-    return describe({true, 1, SolverReason::Fits, estimate, 0}).error;
+    return describe({true, 1, {1}, SolverReason::Fits, estimate, 0}).error;
   };
   EXPECT_EQ(error(0), "below 0.1 % of the force");
   EXPECT_EQ(error(0.2f), "4.0 % of the force");

@@ -141,13 +141,14 @@ TEST(ReducedSession, IsRecordedAndSimulatesAgainWithItsReductionOnly) {
   EXPECT_FALSE(changes[0].solver().is_reduced());
   EXPECT_EQ(changes[1].text(), "reduced, patch 1");
   EXPECT_TRUE(changes[1].solver().is_reduced());
-  EXPECT_EQ(changes[1].solver().patch(), 1u);
+  ASSERT_EQ(changes[1].solver().patch_size(), 1);
+  EXPECT_EQ(changes[1].solver().patch(0), 1u);
   EXPECT_EQ(changes[1].solver().reason(), proto::SOLVER_FITS);
   const auto& last = changes.back();
   EXPECT_EQ(last.text(), "full, tissue was cut");
   EXPECT_EQ(last.solver().reason(), proto::SOLVER_CUT);
   EXPECT_FALSE(last.solver().is_reduced());
-  EXPECT_EQ(last.solver().patch(), 0u);
+  EXPECT_EQ(last.solver().patch_size(), 0);
   for (std::size_t i = 1; i < changes.size(); ++i)
     EXPECT_GT(changes[i].tick(), changes[i - 1].tick());
   for (const auto& change : changes)
