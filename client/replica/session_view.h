@@ -100,7 +100,7 @@ struct SolverFigures {
   bool is_reduced = false;
   std::uint32_t patch = 0;  // of the reduction, from 1; 0: none acts
   SolverReason reason = SolverReason::Unknown;
-  float estimate = 0;  // of the error in the norm of energy; that of a force is about its square
+  float estimate = 0;  // of the error in the norm of energy; a force errs by less
   float largest_node_force_n = 0;
 
   bool operator==(const SolverFigures&) const = default;
