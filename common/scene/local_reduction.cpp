@@ -123,23 +123,29 @@ double product_of(const PackedField& a, const PackedField& b) {
   return static_cast<double>(sum) * static_cast<double>(a.step) * static_cast<double>(b.step);
 }
 
-Status check_modes(const std::string& name, const LocalPatch& patch, std::uint32_t node_count) {
-  const auto& modes = patch.modes;
-  for (std::size_t a = 0; a < modes.size(); ++a) {
-    const auto mode = "mode " + std::to_string(a + 1) + " of " + name;
-    if (auto s = check_field(mode, modes[a], node_count); !s) return s;
-    if (modes[a].step == 0) return bad(mode + " has steps of 0, must be above");
+// Each is a field, and orthonormal with those before it and with `others`.
+Status check_orthonormal(const std::string& what, const std::string& of,
+                         const std::vector<PackedField>& fields,
+                         const std::vector<PackedField>& others, std::uint32_t node_count) {
+  for (std::size_t a = 0; a < fields.size(); ++a) {
+    const auto own = what + " " + std::to_string(a + 1) + of;
+    if (auto s = check_field(own, fields[a], node_count); !s) return s;
+    if (fields[a].step == 0) return bad(own + " has steps of 0, must be above");
     for (std::size_t b = 0; b <= a; ++b)
-      if (const double product = product_of(modes[a], modes[b]);
+      if (const double product = product_of(fields[a], fields[b]);
           std::abs(product - (a == b ? 1 : 0)) > kLocalOrthonormality)
-        return bad("modes " + std::to_string(b + 1) + " and " + std::to_string(a + 1) + " of " +
-                   name + " are not orthonormal, their product is " + number(product));
+        return bad(what + "s " + std::to_string(b + 1) + " and " + std::to_string(a + 1) + of +
+                   " are not orthonormal, their product is " + number(product));
+    for (std::size_t b = 0; b < others.size(); ++b)
+      if (const double product = product_of(fields[a], others[b]);
+          std::abs(product) > kLocalOrthonormality)
+        return bad(own + " and vibration " + std::to_string(b + 1) +
+                   " are not orthogonal, their product is " + number(product));
   }
   return {};
 }
 
-Status check_matrices(const std::string& name, const LocalPatch& patch) {
-  const std::size_t n = patch.field_count();
+Status check_matrices(const std::string& name, const LocalPatch& patch, std::size_t n) {
   struct Named {
     const char* name;
     const std::vector<double>& values;
@@ -166,14 +172,17 @@ Status check_patch(const std::string& name, const LocalPatch& patch, const Local
   if (patch.modes.empty() || patch.modes.size() > kMaxReducedModes)
     return bad(name + " has " + std::to_string(patch.modes.size()) + " modes, must have 1 to " +
                std::to_string(kMaxReducedModes));
-  if (patch.field_count() > kMaxLocalFields)
-    return bad(name + " has " + std::to_string(patch.field_count()) +
-               " fields, modes and three per node of its reach, may have " +
+  const auto fields = r.field_count(patch);
+  if (fields > kMaxLocalFields)
+    return bad(name + " has " + std::to_string(fields) +
+               " fields, vibrations, modes and three per node of its reach, may have " +
                std::to_string(kMaxLocalFields));
   if (auto s = check_nodes(name, patch, r); !s) return s;
   if (auto s = check_tets(name, patch); !s) return s;
-  if (auto s = check_modes(name, patch, r.node_count); !s) return s;
-  return check_matrices(name, patch);
+  if (auto s = check_orthonormal("mode", " of " + name, patch.modes, r.vibrations, r.node_count);
+      !s)
+    return s;
+  return check_matrices(name, patch, fields);
 }
 
 // A node belongs to one patch.
@@ -282,6 +291,10 @@ Status validate(const LocalReduction& r) {
   if (r.free_layers > kMaxFreeLayers)
     return bad("has " + std::to_string(r.free_layers) + " free layers, may have " +
                std::to_string(kMaxFreeLayers));
+  if (r.vibrations.size() > kMaxReducedModes)
+    return bad("has " + std::to_string(r.vibrations.size()) + " vibrations, may have " +
+               std::to_string(kMaxReducedModes));
+  if (auto s = check_orthonormal("vibration", "", r.vibrations, {}, r.node_count); !s) return s;
   if (auto s = check_greens(r); !s) return s;
   for (std::size_t i = 0; i < r.patches.size(); ++i)
     if (auto s = check_patch(name_of(i), r.patches[i], r); !s) return s;

@@ -4,10 +4,11 @@
 // that tools reach, the fields in which the organ answers to forces there. Made by server/reduction
 // and good for the mesh and elasticity whose hashes it names.
 //
-// A patch's unknowns are its modes, the Green's functions of the nodes that are touched (their
-// displacement fields under unit forces, at rest), and the nodes around these, free one by one.
-// Tets near the patch are nonlinear as they are; of the others the linear response is exact and
-// what is nonlinear in it is summed over a few weighted tets (cubature).
+// Unknowns are the organ's slowest vibrations, which all patches share, a patch's modes, the
+// Green's functions of the nodes that are touched (their displacement fields under unit forces, at
+// rest), and the nodes around these, free one by one. Tets near the patch are nonlinear as they
+// are; of the others the linear response is exact and what is nonlinear in it is summed over a few
+// weighted tets (cubature).
 
 #include <array>
 #include <cstdint>
@@ -19,9 +20,9 @@
 
 namespace trocar::scene {
 
-// kMaxReducedModes (reduction.h) is the most modes of a patch.
+// kMaxReducedModes (reduction.h) is the most modes of a patch, and the most vibrations.
 inline constexpr std::size_t kMaxLocalPatches = 4096;
-inline constexpr std::size_t kMaxLocalFields = 400;  // of a patch: modes and 3 per node in reach
+inline constexpr std::size_t kMaxLocalFields = 400;  // of a patch, see field_count()
 inline constexpr std::size_t kMaxGreensFunctions = 100000;
 inline constexpr std::uint32_t kMaxFreeLayers = 3;
 inline constexpr double kMaxLocalForce_n = 100;
@@ -60,14 +61,13 @@ struct LocalPatch {
   std::vector<NodeIndex> members;     // surface nodes that belong to it; ascending
   std::vector<NodeIndex> reach;       // whose Green's functions it may use: its members and their
                                       // neighbours on the surface; ascending
-  std::vector<PackedField> modes;     // orthonormal but for packing
+  std::vector<PackedField> modes;     // with the vibrations orthonormal but for packing
   std::vector<TetIndex> inner_tets;   // ascending
   std::vector<CubatureTet> cubature;  // none of them inner; ascending
-  // Among modes and then the Green's functions of `reach`, x, y, z: of all tets but the inner ones
-  // at rest, and of the nodes' masses. Rows of a lower triangle.
+  // Among vibrations, modes and the Green's functions of `reach`, x, y, z: of all tets but the
+  // inner ones at rest, and of the nodes' masses. Rows of a lower triangle.
   std::vector<double> outer_stiffness, mass;
 
-  std::size_t field_count() const { return modes.size() + 3 * reach.size(); }
   bool operator==(const LocalPatch&) const = default;
 };
 
@@ -75,11 +75,15 @@ struct LocalReduction {
   std::string source;  // one line: organ and parameters
   std::uint64_t mesh_hash = 0, elasticity_hash = 0;
   std::uint32_t node_count = 0;
-  double force_n = 0;                  // largest of the training, at a node
-  std::uint32_t free_layers = 0;       // of nodes around those that are touched
+  double force_n = 0;             // largest of the training, at a node
+  std::uint32_t free_layers = 0;  // of nodes around those that are touched
+  std::vector<PackedField> vibrations;
   std::vector<GreensFunction> greens;  // ascending nodes
   std::vector<LocalPatch> patches;
 
+  std::size_t field_count(const LocalPatch& patch) const {
+    return vibrations.size() + patch.modes.size() + 3 * patch.reach.size();
+  }
   bool operator==(const LocalReduction&) const = default;
 };
 

@@ -9,7 +9,7 @@
 namespace trocar::scene {
 namespace {
 
-constexpr std::uint32_t kVersion = 1;
+constexpr std::uint32_t kVersion = 2;
 constexpr PackedKind kKind{kLocalReductionMagic,
                            "a .reduction file",
                            "make one with trocar-organ reduce --method local",
@@ -95,6 +95,7 @@ void put(const LocalReduction& r, proto::LocalReduction& message) {
     put(fields[2], *entry.mutable_z());
   }
   for (const auto& patch : r.patches) put(patch, *message.add_patch());
+  for (const auto& vibration : r.vibrations) put(vibration, *message.add_vibration());
 }
 
 Result<LocalReduction> decode(BytesView bytes) {
@@ -115,6 +116,8 @@ Result<LocalReduction> decode(BytesView bytes) {
     if (auto s = take(entry.y(), greens.fields[1]); !s) return s.error();
     if (auto s = take(entry.z(), greens.fields[2]); !s) return s.error();
   }
+  for (const auto& vibration : message.vibration())
+    if (auto s = take(vibration, r.vibrations.emplace_back()); !s) return s.error();
   for (const auto& entry : message.patch())
     if (auto s = take(entry, r.patches.emplace_back()); !s) return s.error();
   if (auto s = validate(r); !s) return s.error();

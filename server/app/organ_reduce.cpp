@@ -368,12 +368,15 @@ void add_reduce_command(CLI::App& app, ReduceCommand& command) {
   number("--check-creep", command.check_creep, "of these at which creep is compared, too", "N");
   auto& l = command.local;
   number("--patch-radius", command.patch_radius_mm, "local: of the patches of the surface", "MM");
-  number("--vibrations", l.vibrations, "local: of the organ, more modes of every patch", "N");
+  number("--vibrations", l.vibrations, "local: of the organ, the slowest; all patches share them",
+         "N");
   number("--free-layers", l.free_layers, "local: of nodes around a touched one, 0 to 3", "N");
   number("--field-nodes", l.field_nodes, "local: whose fields a patch's modes are of", "N");
   number("--residual", l.residual, "local: what weighted tets may leave of the forces; 0: all tets",
          "SHARE");
   number("--patches", l.patches, "local: made at most, from the first outwards; 0: all", "N");
+  sub->add_flag("--resume", command.is_resumed,
+                "local: go on from the parts beside the file that an interrupted run has left");
   number("--seed", s.seed, "chooses the first place", "S");
   number("--threads", s.threads, "of the full model", "N");
 }
@@ -381,7 +384,7 @@ void add_reduce_command(CLI::App& app, ReduceCommand& command) {
 Status run_reduce(ReduceCommand command) {
   if (command.method == "local") return run_reduce_local(std::move(command));
   for (const char* option : {"--patch-radius", "--vibrations", "--free-layers", "--field-nodes",
-                             "--residual", "--patches"})
+                             "--residual", "--patches", "--resume"})
     if (command.app->count(option) > 0)
       return Error{ErrorCode::Usage, std::string(option) + ": is of --method local"};
   command.settings.radius_m = command.radius_mm * 1e-3;

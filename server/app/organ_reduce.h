@@ -20,6 +20,7 @@ struct ReduceCommand {
   std::size_t check_places = 12, check_creep = 2;
   reduction::Settings settings;
   double patch_radius_mm = 12;
+  bool is_resumed = false;
   reduction::LocalSettings local;
   CLI::App* app = nullptr;
 };

@@ -130,6 +130,11 @@ Status run_reduce_local(ReduceCommand command) {
       command.folder.empty() ? "out/reduce-" + stem : command.folder;
   const std::string out = command.out.empty() ? stem + ".reduction" : command.out;
   if (auto s = check_outputs(folder, out); !s) return s;
+  command.local.parts = out + ".parts";
+  if (!command.is_resumed && std::filesystem::exists(command.local.parts))
+    return Error{ErrorCode::Usage, command.local.parts.string() +
+                                       ": is left of an interrupted run: go on from it with "
+                                       "--resume, or remove it"};
   ProgressLine line(kProgram);
   const auto built = reduction::build_local(
       *organ, command.local, [&](LocalStage stage, std::size_t done, std::size_t all) {
@@ -137,10 +142,11 @@ Status run_reduce_local(ReduceCommand command) {
       });
   if (!built) return built.error();
   if (auto s = scene::write_local_reduction(out, built->reduction); !s) return s;
+  std::error_code ignored;
+  std::filesystem::remove_all(command.local.parts, ignored);
   print_patches(*organ, *built);
   if (command.check_places > 0)
     if (auto s = check(*organ, *built, command, folder); !s) return s;
-  std::error_code ignored;
   std::printf("%s, %ju bytes; tables in %s\n", out.c_str(),
               static_cast<std::uintmax_t>(std::filesystem::file_size(out, ignored)),
               folder.c_str());

@@ -62,6 +62,91 @@ void CholeskyFactor::solve(std::span<double> x) const {
   }
 }
 
+void BlockSystem::resize(std::span<const std::size_t> begins) {
+  begins_.assign(begins.begin(), begins.end());
+  size_ = begins.back();
+  stride_ = padded(size_);
+  matrix_.assign(size_ * stride_, 0);
+  right_.assign(size_, 0);
+  change_.assign(size_, 0);
+  factors_.resize(std::max(factors_.size(), begins.size() - 1));
+  for (std::size_t b = 0; b + 1 < begins.size(); ++b) factors_[b].resize(begins[b + 1] - begins[b]);
+}
+
+void BlockSystem::add_link(const std::array<const float*, 3>& rows, const SymMat3f& b) {
+  links_.push_back({rows, b});
+  const auto& [x, y, z] = rows;
+  for (std::size_t block = 0; block + 1 < begins_.size(); ++block)
+    for (std::size_t i = begins_[block]; i < begins_[block + 1]; ++i) {
+      const auto bx = static_cast<double>(b.xx * x[i] + b.xy * y[i] + b.xz * z[i]),
+                 by = static_cast<double>(b.xy * x[i] + b.yy * y[i] + b.yz * z[i]),
+                 bz = static_cast<double>(b.xz * x[i] + b.yz * y[i] + b.zz * z[i]);
+      double* const r = row(i);
+      const auto stop = begins_[block + 1];
+      std::size_t j = i;
+      const __m256d fx = _mm256_set1_pd(bx), fy = _mm256_set1_pd(by), fz = _mm256_set1_pd(bz);
+      for (; j + 4 <= stop; j += 4) {
+        __m256d sum = _mm256_loadu_pd(r + j);
+        sum = _mm256_fmadd_pd(fx, _mm256_cvtps_pd(_mm_loadu_ps(x + j)), sum);
+        sum = _mm256_fmadd_pd(fy, _mm256_cvtps_pd(_mm_loadu_ps(y + j)), sum);
+        sum = _mm256_fmadd_pd(fz, _mm256_cvtps_pd(_mm_loadu_ps(z + j)), sum);
+        _mm256_storeu_pd(r + j, sum);
+      }
+      for (; j < stop; ++j)
+        r[j] += bx * static_cast<double>(x[j]) + by * static_cast<double>(y[j]) +
+                bz * static_cast<double>(z[j]);
+    }
+}
+
+bool BlockSystem::factor() {
+  for (std::size_t b = 0; b + 1 < begins_.size(); ++b) {
+    const auto first = begins_[b], count = begins_[b + 1] - first;
+    for (std::size_t i = 0; i < count; ++i)
+      std::copy_n(row(first + i) + first + i, count - i, factors_[b].row(i) + i);
+    if (!factors_[b].factor()) return false;
+  }
+  return true;
+}
+
+// What the right side lacks in this block, with the other blocks' x.
+void BlockSystem::solve_block(std::size_t block, std::span<double> x) {
+  const auto first = begins_[block], end = begins_[block + 1];
+  const auto own = std::span(change_).first(end - first);
+  for (std::size_t i = first; i < end; ++i) {
+    double left = right_[i];
+    const double* const r = row(i);
+    for (std::size_t j = 0; j < first; ++j) left -= r[j] * x[j];
+    for (std::size_t j = end; j < size_; ++j) left -= r[j] * x[j];
+    own[i - first] = left;
+  }
+  for (const auto& [rows, b] : links_) {
+    // What the other blocks do at the link.
+    std::array<double, 3> d{};
+    for (std::size_t k = 0; k < 3; ++k) {
+      for (std::size_t j = 0; j < first; ++j) d[k] += static_cast<double>(rows[k][j]) * x[j];
+      for (std::size_t j = end; j < size_; ++j) d[k] += static_cast<double>(rows[k][j]) * x[j];
+    }
+    const Vec3f moved{static_cast<float>(d[0]), static_cast<float>(d[1]), static_cast<float>(d[2])};
+    const Vec3f force = b * moved;
+    for (std::size_t i = first; i < end; ++i)
+      own[i - first] -=
+          static_cast<double>(rows[0][i] * force.x + rows[1][i] * force.y + rows[2][i] * force.z);
+  }
+  factors_[block].solve(own);
+  std::ranges::copy(own, x.begin() + static_cast<std::ptrdiff_t>(first));
+}
+
+void BlockSystem::solve(std::span<double> x, int passes) {
+  const auto blocks = begins_.size() - 1;
+  if (blocks == 1) return factors_[0].solve(x);
+  std::ranges::copy(x, right_.begin());
+  std::ranges::fill(x, 0.0);
+  for (int pass = 0; pass < passes; ++pass) {
+    for (std::size_t b = 0; b < blocks; ++b) solve_block(b, x);
+    for (std::size_t b = blocks - 1; b-- > 0;) solve_block(b, x);
+  }
+}
+
 void add_product(std::span<const double> a, std::size_t stride, std::span<const double> x,
                  std::span<double> y) {
   // Symmetric: its rows are its columns.

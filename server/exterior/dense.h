@@ -3,8 +3,11 @@
 // Small dense algebra for a tick: rows of floats or doubles in multiples of eight, sums in one
 // order whatever the compiler, no allocation.
 
+#include <array>
 #include <span>
 #include <vector>
+
+#include "common/math/vec3.h"
 
 namespace trocar::exterior {
 
@@ -28,6 +31,40 @@ class CholeskyFactor {
  private:
   std::size_t size_ = 0, stride_ = 0;
   std::vector<double> upper_;
+};
+
+// A symmetric system by blocks that are positive definite: each is solved on its own, there and
+// back, with what the others have given so far (block Gauss-Seidel). Exact for one block; blocks
+// that have the same in them do no harm.
+class BlockSystem {
+ public:
+  // begins: of each block, and the end.
+  void resize(std::span<const std::size_t> begins);
+  std::size_t size() const { return size_; }
+  std::span<const std::size_t> begins() const { return begins_; }
+  // To be filled: all of it, but of the blocks on the diagonal the upper triangles alone are read.
+  double* row(std::size_t i) { return matrix_.data() + i * stride_; }
+  // Then, until the next resize() or clear_links(): adds R^T B R, with R of three rows of floats,
+  // which must outlive its use. O(sum of squares of blocks).
+  void add_link(const std::array<const float*, 3>& rows, const SymMat3f& b);
+  void clear_links() { links_.clear(); }
+  // False: a block is not positive definite.
+  bool factor();
+  // x in place of the right side.
+  void solve(std::span<double> x, int passes = 1);
+
+ private:
+  struct Link {
+    std::array<const float*, 3> rows;
+    SymMat3f b;
+  };
+  void solve_block(std::size_t block, std::span<double> x);
+
+  std::size_t size_ = 0, stride_ = 0;
+  std::vector<std::size_t> begins_;
+  std::vector<double> matrix_, right_, change_;
+  std::vector<CholeskyFactor> factors_;
+  std::vector<Link> links_;
 };
 
 // y += A x, A symmetric and whole, of n rows with a stride.

@@ -5,9 +5,25 @@
 #include "common/scene/local_reduction.h"
 
 namespace trocar::exterior {
+namespace {
+
+constexpr std::uint32_t kMaxFields = PatchSet::kMaxPatches * scene::kMaxLocalFields;
+
+}  // namespace
+
+void visit(world::StateArchive& archive, PatchSet& set) {
+  archive.value(set.count);
+  if (archive.is_reading() && set.count > PatchSet::kMaxPatches) {
+    archive.fail();
+    set = {};
+  }
+  for (std::uint32_t i = 0; i < set.count; ++i) archive.value(set.patches[i]);
+  for (std::uint32_t i = 0; i + 1 < set.count; ++i)
+    if (set.patches[i] >= set.patches[i + 1]) archive.fail();
+}
 
 void ExteriorState::visit_state(world::StateArchive& archive) {
-  archive.value(patch);
+  visit(archive, patches);
   if (!acts()) {
     if (archive.is_reading()) *this = {};
     return;
@@ -16,10 +32,10 @@ void ExteriorState::visit_state(world::StateArchive& archive) {
   archive.value(estimate);
   archive.value(fade);
   for (auto* values : {&amplitudes, &rates, &correction, &relaxed, &relaxed_next}) {
-    archive.sized_array(*values, scene::kMaxLocalFields);
+    archive.sized_array(*values, kMaxFields);
     if (values->size() != amplitudes.size()) archive.fail();
   }
-  archive.sized_array(placed, kPlacingTurns * scene::kMaxLocalFields);
+  archive.sized_array(placed, kPlacingTurns * kMaxFields);
   archive.sized_array(steps_since_placed, kPlacingTurns);
   if (!archive.is_reading()) return;
   if (placed.size() != kPlacingTurns * amplitudes.size() ||

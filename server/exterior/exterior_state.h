@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "server/exterior/patch_model.h"
 #include "server/world/state_archive.h"
 
 namespace trocar::exterior {
@@ -12,16 +13,16 @@ namespace trocar::exterior {
 // Ticks in which all far nodes are put where the fields have them, an equal part in each.
 inline constexpr std::uint32_t kPlacingTurns = 8;
 
-struct ExteriorState {
-  static constexpr std::uint32_t kNoPatch = 0xffffffffu;
+void visit(world::StateArchive& archive, PatchSet& set);
 
-  bool acts() const { return patch != kNoPatch; }
+struct ExteriorState {
+  bool acts() const { return patches.count > 0; }
   void visit_state(world::StateArchive& archive);
 
-  std::uint32_t patch = kNoPatch;  // whose fields move the organ
-  std::uint32_t age = 0;           // steps since it took over
-  float estimate = 0;              // of the error, see LocalExterior
-  double fade = 0;                 // of the correction, 1 when it took over
+  PatchSet patches;       // whose fields move the organ; none: another solver does
+  std::uint32_t age = 0;  // steps since it took over
+  float estimate = 0;     // of the error, see LocalExterior
+  double fade = 0;        // of the correction, 1 when it took over
   // Per field.
   std::vector<double> amplitudes, rates;  // of fields of like stiffness (PatchModel), and per s
   std::vector<double> correction;         // what its forces lack beside the organ's at the start

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/assert.h"
 #include "common/base/tick.h"
 #include "server/contact/contact_law.h"
 
@@ -17,19 +18,19 @@ constexpr double kLeastFade = 1e-4;
 constexpr std::uint32_t kEstimateInterval = 4;
 // Of touches, J: with less an error is not worth a word.
 constexpr double kLeastWork_j = 2e-6;
+// Of an amplitude in one correction; the square root of an energy in J. More is as broken as what
+// is not finite: nothing is changed, and the estimate says so until the next.
+constexpr double kMaxChange = 100;
+constexpr float kBroken = 1e6f;
 // Beside 1 of every field.
 constexpr double kLeastStiffness = 1e-9;
-
-std::span<const float> floats_of(std::span<const Vec3f> values) {
-  static_assert(sizeof(Vec3f) == 3 * sizeof(float));
-  return {&values.data()->x, 3 * values.size()};
-}
+// Of the solver by blocks, when patches take over.
+constexpr int kPasses = 20;
 
 }  // namespace
 
 LocalExterior::LocalExterior(const LocalModels& models)
-    : models_(models),
-      node_count_(models.node_count()),
+    : node_count_(models.node_count()),
       drag_per_s_(models.drag_per_s()),
       is_local_(models.node_count()) {
   std::size_t fields = 0, nodes = 0;
@@ -44,14 +45,15 @@ LocalExterior::LocalExterior(const LocalModels& models)
   is_near_.reserve(nodes);
   near_.reserve(nodes);
   touched_.reserve(contact::kMaxPointNodes * 64);
-  momentum_.resize(3 * node_count_);
+  momentum_.reserve(node_count_);
+  gathered_.resize(3 * node_count_);
   run_.resize(3 * (node_count_ / kPlacingTurns + 1));
 }
 
-void LocalExterior::use(ExteriorState& state) {
-  if (&state == state_ && model_ == (state.acts() ? &models_[state.patch] : nullptr)) return;
+void LocalExterior::use(ExteriorState& state, const PatchModel* model) {
+  TROCAR_ASSERT(state.acts() == (model != nullptr));
   state_ = &state;
-  set_model(state.acts() ? &models_[state.patch] : nullptr);
+  if (model != model_) set_model(model);
 }
 
 void LocalExterior::set_model(const PatchModel* model) {
@@ -66,15 +68,60 @@ void LocalExterior::set_model(const PatchModel* model) {
   for (auto* values : {&u_, &f_, &moved_}) values->assign(3 * model->nodes().size(), 0);
   is_near_.assign(model->nodes().size(), 0);
   near_.clear();
-  factor_.resize(model->field_count());
+  system_.clear_links();
+  system_.resize(model->blocks());
 }
 
-void LocalExterior::take_over(std::uint32_t patch, std::span<const Vec3f> gradient,
-                              const world::World& world) {
+void LocalExterior::follow_cuts(const world::World& world) {
+  if (follower_count() == world.origins.size()) return;
+  share_begins_.assign(1, 0);
+  shares_.clear();
+  const auto add = [&](NodeIndex node, float weight, std::size_t own) {
+    if (weight == 0) return;
+    const auto put = [&](std::uint32_t root, float part) {
+      const auto mine = std::span(shares_).subspan(own);
+      const auto found = std::ranges::find(mine, root, &Share::node);
+      if (found != mine.end())
+        found->weight += part;
+      else
+        shares_.push_back({root, part});
+    };
+    if (node.value < node_count_) return put(node.value, weight);
+    const auto parent = node.value - node_count_;
+    for (auto i = share_begins_[parent]; i < share_begins_[parent + 1]; ++i)
+      put(shares_[i].node, weight * shares_[i].weight);
+  };
+  for (const auto& origin : world.origins) {
+    const auto own = shares_.size();
+    const float t = static_cast<float>(origin.t) / 65536.0f;
+    add(origin.a, 1 - t, own);
+    add(origin.b, t, own);
+    share_begins_.push_back(static_cast<std::uint32_t>(shares_.size()));
+  }
+}
+
+std::span<const float> LocalExterior::gathered(std::span<const Vec3f> values, std::size_t begin,
+                                               std::size_t end) {
+  for (std::size_t n = begin; n < end; ++n) {
+    float* const to = &gathered_[3 * (n - begin)];
+    to[0] = values[n].x, to[1] = values[n].y, to[2] = values[n].z;
+  }
+  for (std::size_t i = 0; i < follower_count(); ++i)
+    for (const auto& [node, weight] : shares_of(i)) {
+      if (node < begin || node >= end) continue;
+      const Vec3f part = values[node_count_ + i] * weight;
+      float* const to = &gathered_[3 * (node - begin)];
+      to[0] += part.x, to[1] += part.y, to[2] += part.z;
+    }
+  return std::span(gathered_).first(3 * (end - begin));
+}
+
+void LocalExterior::take_over(const PatchSet& patches, const PatchModel& model,
+                              std::span<const Vec3f> gradient, const world::World& world) {
   auto& s = *state_;
-  set_model(&models_[patch]);
+  set_model(&model);
   const auto count = model_->field_count(), width = model_->stride();
-  s.patch = patch;
+  s.patches = patches;
   s.age = 0;
   s.estimate = 0;
   s.fade = 1;
@@ -87,14 +134,21 @@ void LocalExterior::take_over(std::uint32_t patch, std::span<const Vec3f> gradie
     model_->add_along_everywhere(0, node_count_, values, along_);
     for (std::size_t c = 0; c < count; ++c) out[c] = static_cast<double>(along_[c]);
   };
-  along(floats_of(gradient.first(node_count_)), s.correction);
-  for (std::size_t i = 0; i < count; ++i)
-    for (std::size_t j = i; j < count; ++j)
-      factor_.row(i)[j] = model_->outer_stiffness()[i * width + j] +
-                          model_->inner_stiffness()[i * width + j] + (i == j ? kLeastStiffness : 0);
+  along(gathered(gradient, 0, node_count_), s.correction);
+  system_.clear_links();
+  const auto fill = [&](double stiffness, double mass) {
+    for (std::size_t i = 0; i < count; ++i)
+      for (std::size_t j = 0; j < count; ++j) {
+        const auto at = i * width + j;
+        system_.row(i)[j] =
+            stiffness * (model_->outer_stiffness()[at] + model_->inner_stiffness()[at]) +
+            mass * model_->mass()[at] + (i == j ? stiffness * kLeastStiffness : 0);
+      }
+  };
+  fill(1, 0);
   s.amplitudes = s.correction;
-  if (factor_.factor())
-    factor_.solve(s.amplitudes);
+  if (system_.factor())
+    system_.solve(s.amplitudes, kPasses);
   else
     std::ranges::fill(s.amplitudes, 0.0);
 
@@ -104,7 +158,6 @@ void LocalExterior::take_over(std::uint32_t patch, std::span<const Vec3f> gradie
   }
   std::ranges::fill(f_, 0.0f);
   model_->inner().add_forces(ForcePart::Whole, u_, f_);
-  model_->outer().add_forces(ForcePart::Nonlinear, u_, f_);
   std::ranges::fill(along_, 0.0f);
   add_along_fields(model_->basis(), f_, along_);
   std::ranges::fill(scratch_, 0.0);
@@ -113,25 +166,19 @@ void LocalExterior::take_over(std::uint32_t patch, std::span<const Vec3f> gradie
     s.correction[c] -= static_cast<double>(along_[c]) + scratch_[c];
 
   // Rates that have the momentum along the fields.
-  for (std::size_t n = 0; n < node_count_; ++n) {
-    const Vec3f p = world.velocities[n] * world.masses[n];
-    momentum_[3 * n] = p.x, momentum_[3 * n + 1] = p.y, momentum_[3 * n + 2] = p.z;
-  }
-  along(momentum_, s.rates);
+  momentum_.resize(world.node_count());
+  for (std::size_t n = 0; n < world.node_count(); ++n)
+    momentum_[n] = world.velocities[n] * world.masses[n];
+  along(gathered(momentum_, 0, node_count_), s.rates);
   constexpr auto kStep = static_cast<double>(kTickSeconds);
-  for (std::size_t i = 0; i < count; ++i)
-    for (std::size_t j = i; j < count; ++j)
-      factor_.row(i)[j] =
-          model_->mass()[i * width + j] +
-          kStep * kStep *
-              (model_->outer_stiffness()[i * width + j] + model_->inner_stiffness()[i * width + j]);
-  if (factor_.factor())
-    factor_.solve(s.rates);
+  fill(kStep * kStep, 1);
+  if (system_.factor())
+    system_.solve(s.rates, kPasses);
   else
     std::ranges::fill(s.rates, 0.0);
 
   if (!world.relaxation.is_empty())
-    along(floats_of(world.relaxation.forces().first(node_count_)), s.relaxed);
+    along(gathered(world.relaxation.forces(), 0, node_count_), s.relaxed);
   s.placed.clear();
   for (std::uint32_t turn = 0; turn < kPlacingTurns; ++turn)
     s.placed.insert(s.placed.end(), s.amplitudes.begin(), s.amplitudes.end());
@@ -151,7 +198,8 @@ void LocalExterior::hand_back(world::World& world) {
 void LocalExterior::near_of(std::span<const NodeIndex> active, std::vector<NodeIndex>& near) const {
   near.clear();
   for (const auto node : active) {
-    const auto local = is_local_[node.value] != 0 ? model_->local(node) : PatchModel::kNone;
+    const auto local = node.value < node_count_ && is_local_[node.value] != 0 ? model_->local(node)
+                                                                              : PatchModel::kNone;
     if (local != PatchModel::kNone && model_->may_be_free(local)) near.push_back(node);
   }
 }
@@ -167,6 +215,7 @@ void LocalExterior::begin(const dynamics::ExteriorStep& step) {
   auto& s = *state_;
   const auto& model = *model_;
   const auto count = model.field_count();
+  has_factors_ = false;
   slots_.clear();
   for (const auto node : model.nodes()) slots_.push_back(step.groups.slot_of(node));
   for (const auto local : near_) is_near_[local] = 0;
@@ -194,7 +243,7 @@ void LocalExterior::begin(const dynamics::ExteriorStep& step) {
   }
 }
 
-// Contacts among local nodes: forces on them, and stiffness among the fields.
+// Contacts among local nodes: forces on them, and their stiffness.
 void LocalExterior::add_contacts(const dynamics::ExteriorStep& step) {
   touched_.clear();
   contact_work_j_ = 0;
@@ -229,22 +278,6 @@ void LocalExterior::add_contacts(const dynamics::ExteriorStep& step) {
         found->block.add_outer(point.normal, share * (load.normal_secant - load.tangential_secant));
     }
   }
-  const auto basis = model_->basis();
-  const auto count = model_->field_count();
-  for (const auto& [local, block] : touched_) {
-    const float* const x = basis.row(3 * local);
-    const float* const y = basis.row(3 * local + 1);
-    const float* const z = basis.row(3 * local + 2);
-    for (std::size_t i = 0; i < count; ++i) {
-      const double bx = static_cast<double>(block.xx * x[i] + block.xy * y[i] + block.xz * z[i]),
-                   by = static_cast<double>(block.xy * x[i] + block.yy * y[i] + block.yz * z[i]),
-                   bz = static_cast<double>(block.xz * x[i] + block.yz * y[i] + block.zz * z[i]);
-      double* const row = factor_.row(i);
-      for (std::size_t j = i; j < count; ++j)
-        row[j] += bx * static_cast<double>(x[j]) + by * static_cast<double>(y[j]) +
-                  bz * static_cast<double>(z[j]);
-    }
-  }
 }
 
 // Of near nodes, what theirs is besides that of the fields; ahead_: accelerations of the fields
@@ -269,19 +302,33 @@ void LocalExterior::add_inertia(const dynamics::ExteriorStep& step) {
   }
 }
 
+// For all corrections of a step: stiffness of contacts is that of the first.
+bool LocalExterior::make_factors(const dynamics::ExteriorStep& step) {
+  const auto& model = *model_;
+  const auto count = model.field_count(), width = model.stride();
+  const double dt = static_cast<double>(step.dt);
+  const double inertia = (1 / dt + drag_per_s_) / dt;
+  const auto mass = model.mass(), outer = model.outer_stiffness(), inner = model.inner_stiffness();
+  for (std::size_t i = 0; i < count; ++i) {
+    double* const row = system_.row(i);
+    const auto at = i * width;
+    for (std::size_t j = 0; j < count; ++j)
+      row[j] = mass[at + j] * inertia + outer[at + j] + inner[at + j];
+  }
+  system_.clear_links();
+  const auto basis = model.basis();
+  for (const auto& [local, block] : touched_)
+    system_.add_link({basis.row(3 * local), basis.row(3 * local + 1), basis.row(3 * local + 2)},
+                     block);
+  return system_.factor();
+}
+
 void LocalExterior::correct(const dynamics::ExteriorStep& step) {
   auto& s = *state_;
   const auto& model = *model_;
   const auto count = model.field_count(), width = model.stride();
   const double dt = static_cast<double>(step.dt);
   const double inertia = (1 / dt + drag_per_s_) / dt;
-  for (std::size_t i = 0; i < count; ++i) {
-    double* const row = factor_.row(i);
-    const auto at = i * width;
-    for (std::size_t j = i; j < count; ++j)
-      row[j] = model.mass()[at + j] * inertia + model.outer_stiffness()[at + j] +
-               model.inner_stiffness()[at + j];
-  }
   for (std::size_t c = 0; c < count; ++c) {
     const double moved = s.amplitudes[c] - start_[c];
     ahead_[c] = moved * inertia - s.rates[c] / dt;
@@ -289,7 +336,6 @@ void LocalExterior::correct(const dynamics::ExteriorStep& step) {
   gather(step);
   std::ranges::fill(f_, 0.0f);
   model.inner().add_forces(ForcePart::Whole, u_, f_);
-  model.outer().add_forces(ForcePart::Nonlinear, u_, f_);
   add_inertia(step);
   add_contacts(step);
   std::ranges::fill(along_, 0.0f);
@@ -299,8 +345,15 @@ void LocalExterior::correct(const dynamics::ExteriorStep& step) {
   const auto gradient = std::span(gradient_).first(count);
   add_product(model.outer_stiffness(), width, s.amplitudes, gradient);
   add_product(model.mass(), width, std::span(ahead_).first(count), gradient);
-  if (!factor_.factor()) return;
-  factor_.solve(gradient);
+  if (!has_factors_) has_factors_ = make_factors(step);
+  if (has_factors_)
+    system_.solve(gradient);
+  else
+    gradient[0] = NAN;
+  if (!std::ranges::all_of(gradient, [](double g) { return std::abs(g) < kMaxChange; })) {
+    s.estimate = kBroken;
+    return;
+  }
   for (std::size_t c = 0; c < count; ++c) {
     s.amplitudes[c] -= gradient[c];
     change_[c] = static_cast<float>(-gradient[c]);
@@ -345,7 +398,8 @@ float LocalExterior::end(const dynamics::ExteriorStep& step, dynamics::Float4* v
   for (std::size_t c = 0; c < count; ++c) s.rates[c] = (s.amplitudes[c] - start_[c]) / dt;
   s.fade *= 1 - dt / kFade_s;
   if (s.fade < kLeastFade) s.fade = 0;
-  if (s.age % kEstimateInterval == 0) s.estimate = estimate_error(step, world);
+  if (s.age % kEstimateInterval == 0 && s.estimate < kBroken)
+    s.estimate = estimate_error(step, world);
   float squared = 0;
   const float inverse_dt = 1 / step.dt;
   for (std::size_t n = 0; n < slots_.size(); ++n) {
@@ -366,8 +420,7 @@ float LocalExterior::end(const dynamics::ExteriorStep& step, dynamics::Float4* v
     const auto begin = node_count_ * turn / kPlacingTurns,
                end = node_count_ * (turn + 1) / kPlacingTurns;
     std::ranges::fill(along_, 0.0f);
-    model.add_along_everywhere(
-        begin, end, floats_of(world.relaxation.forces().subspan(begin, end - begin)), along_);
+    model.add_along_everywhere(begin, end, gathered(world.relaxation.forces(), begin, end), along_);
     for (std::size_t c = 0; c < count; ++c) s.relaxed_next[c] += static_cast<double>(along_[c]);
     if (turn + 1 == kPlacingTurns) {
       s.relaxed = s.relaxed_next;
@@ -402,21 +455,53 @@ float LocalExterior::place(std::uint32_t turn, const dynamics::ExteriorStep* ste
   const float inverse_time = 1 / (static_cast<float>(dt) * static_cast<float>(steps));
   float squared = 0;
   for (std::size_t n = begin; n < end; ++n) {
-    if (is_local_[n] != 0 || world.node_classes[n] == world::NodeClass::Fixed) continue;
+    float* const moved = &run[3 * (n - begin)];
+    if (is_local_[n] != 0 || world.node_classes[n] == world::NodeClass::Fixed) {
+      std::fill_n(moved, 3, 0.0f);
+      continue;
+    }
     Vec3f& displacement = world.displacements[n];
-    const float* const moved = &run[3 * (n - begin)];
     const Vec3f now = displacement * left + Vec3f{moved[0], moved[1], moved[2]};
     const Vec3f move = now - displacement;
     squared = std::max(squared, length_squared(move));
     displacement = now;
     world.velocities[n] = move * inverse_time;
+    moved[0] = move.x, moved[1] = move.y, moved[2] = move.z;
     if (step == nullptr) continue;
     const auto slot = step->groups.slot_of(NodeIndex(static_cast<std::uint32_t>(n)));
     if (slot == dynamics::kNoSlot) continue;
     step->x[slot] = dynamics::to_float4(now);
     velocities[slot] = dynamics::to_float4(world.velocities[n]);
   }
+  place_followers(begin, end, step, velocities, world);
   return squared;
+}
+
+// Nodes that cuts made move by their shares of what the organ's nodes of this turn have moved by.
+void LocalExterior::place_followers(std::size_t begin, std::size_t end,
+                                    const dynamics::ExteriorStep* step,
+                                    dynamics::Float4* velocities, world::World& world) {
+  for (std::size_t i = 0; i < follower_count(); ++i) {
+    const auto n = node_count_ + i;
+    if (world.node_classes[n] == world::NodeClass::Fixed) continue;
+    Vec3f moved, velocity;
+    bool is_moved = false;
+    for (const auto& [node, weight] : shares_of(i)) {
+      velocity += world.velocities[node] * weight;
+      if (node < begin || node >= end) continue;
+      const float* const move = &run_[3 * (node - begin)];
+      moved += Vec3f{move[0], move[1], move[2]} * weight;
+      is_moved = true;
+    }
+    if (!is_moved) continue;
+    world.displacements[n] += moved;
+    world.velocities[n] = velocity;
+    if (step == nullptr) continue;
+    const auto slot = step->groups.slot_of(NodeIndex(static_cast<std::uint32_t>(n)));
+    if (slot == dynamics::kNoSlot) continue;
+    step->x[slot] = dynamics::to_float4(world.displacements[n]);
+    velocities[slot] = dynamics::to_float4(velocity);
+  }
 }
 
 }  // namespace trocar::exterior

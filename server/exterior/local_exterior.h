@@ -3,8 +3,8 @@
 // A local reduction at work in a session: around a patch that is touched, nodes are swept as ever;
 // all others move in the patch's fields (LocalPatch), u = Phi q and what is left of where they were
 // when the fields took over, which fades. Between sweeps, q is corrected by a step of Newton's
-// method among the fields: forces of the patch's tets, those of swept nodes included, are as they
-// are; of the others the response at rest, and what is not linear by cubature. Implicit Euler, as
+// method among the fields: forces of the tets near the patch, those of swept nodes included, are as
+// they are; the others respond as at rest. Implicit Euler, as
 // the solver's. Stress that has relaxed is kept per tet, by the solver; its forces come along the
 // fields.
 //
@@ -17,7 +17,7 @@
 // displacements.
 //
 // Work per step: the patch's tets and nodes times fields, and an eighth of the organ's. No
-// allocation after take_over() of the patch with the most fields. One caller; deterministic.
+// allocation after take_over() of single patches. One caller; deterministic.
 
 #include <span>
 #include <vector>
@@ -33,13 +33,18 @@ class LocalExterior : public dynamics::Exterior {
   // Outlives it.
   explicit LocalExterior(const LocalModels& models);
 
-  // The state of calls from now on.
-  void use(ExteriorState& state);
+  // The state of calls from now on, and the model of its patches, null if there are none. Both must
+  // outlive their use.
+  void use(ExteriorState& state, const PatchModel* model);
 
-  // From now on the patch's fields move what is not near. gradient: of the elastic energy, N per
-  // node, where the tissue is; all its nodes where they are. Continuous in place, momentum along
-  // the fields, and force.
-  void take_over(std::uint32_t patch, std::span<const Vec3f> gradient, const world::World& world);
+  // Takes up nodes that cuts have made: they go with those that they are between. No work if there
+  // are none since the last call. While no patch acts.
+  void follow_cuts(const world::World& world);
+  // From now on the fields of these patches, whose model it is, move what is not near. gradient: of
+  // the elastic energy, N per node, where the tissue is. Continuous in place, momentum along the
+  // fields, and force.
+  void take_over(const PatchSet& patches, const PatchModel& model, std::span<const Vec3f> gradient,
+                 const world::World& world);
   // Every node where the fields have it; then others move it.
   void hand_back(world::World& world);
 
@@ -57,25 +62,44 @@ class LocalExterior : public dynamics::Exterior {
     SymMat3f block;  // N/m
   };
 
+  struct Share {
+    std::uint32_t node;  // of the organ
+    float weight;
+  };
+  // Of nodes beyond the organ's own.
+  std::span<const Share> shares_of(std::size_t follower) const {
+    return std::span(shares_).subspan(share_begins_[follower],
+                                      share_begins_[follower + 1] - share_begins_[follower]);
+  }
+  std::size_t follower_count() const { return share_begins_.size() - 1; }
+  // Values of the organ's nodes from `begin` to `end`, with the shares of those that follow.
+  std::span<const float> gathered(std::span<const Vec3f> values, std::size_t begin,
+                                  std::size_t end);
+  void place_followers(std::size_t begin, std::size_t end, const dynamics::ExteriorStep* step,
+                       dynamics::Float4* velocities, world::World& world);
   void set_model(const PatchModel* model);
   void gather(const dynamics::ExteriorStep& step);
   void add_contacts(const dynamics::ExteriorStep& step);
   void add_inertia(const dynamics::ExteriorStep& step);
+  bool make_factors(const dynamics::ExteriorStep& step);
   float estimate_error(const dynamics::ExteriorStep& step, const world::World& world);
   float place(std::uint32_t turn, const dynamics::ExteriorStep* step, dynamics::Float4* velocities,
               double dt, world::World& world);
 
-  const LocalModels& models_;
   const std::size_t node_count_;
   const double drag_per_s_;
   ExteriorState* state_ = nullptr;
-  const PatchModel* model_ = nullptr;   // of the state's patch
+  const PatchModel* model_ = nullptr;   // of the state's patches
   std::vector<std::uint8_t> is_local_;  // per node of the organ
+
+  std::vector<std::uint32_t> share_begins_{0};
+  std::vector<Share> shares_;
 
   // Of a step. Per field:
   std::vector<double> start_, ahead_, gradient_, scratch_;
   std::vector<float> along_, change_;
-  CholeskyFactor factor_;
+  BlockSystem system_;
+  bool has_factors_ = false;
   // Per local node, x, y, z:
   std::vector<float> u_, f_, moved_;
   std::vector<dynamics::Slot> slots_;
@@ -83,7 +107,8 @@ class LocalExterior : public dynamics::Exterior {
   std::vector<std::uint32_t> near_;  // local numbers
   std::vector<Touched> touched_;
   double contact_work_j_ = 0;  // of the last correction
-  std::vector<float> run_, momentum_;
+  std::vector<float> run_, gathered_;
+  std::vector<Vec3f> momentum_;  // per node
 };
 
 }  // namespace trocar::exterior

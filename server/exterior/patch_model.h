@@ -1,28 +1,54 @@
 #pragma once
 
-// A patch of a local reduction made ready for ticks: its fields at the nodes near it, its tets, and
-// its matrices, all in fields of like stiffness. Immutable once made.
+// Patches of a local reduction made ready for ticks, one or several that act together: their fields
+// at the nodes near them, their tets, and their matrices, all in fields of like stiffness.
+// Immutable once made.
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
 
 #include "common/scene/local_reduction.h"
 #include "common/scene/organ.h"
+#include "server/exterior/block_matrix.h"
 #include "server/exterior/dense.h"
 #include "server/exterior/element_set.h"
 
 namespace trocar::exterior {
 
+// Ascending numbers of patches.
+struct PatchSet {
+  static constexpr std::size_t kMaxPatches = 4;
+
+  std::array<std::uint32_t, kMaxPatches> patches{};
+  std::uint32_t count = 0;
+
+  std::span<const std::uint32_t> all() const { return {patches.data(), count}; }
+  bool has(std::uint32_t patch) const;
+  bool has_all(const PatchSet& other) const;
+  // False: there is no room.
+  bool add(std::uint32_t patch);
+  bool operator==(const PatchSet&) const = default;
+};
+
+class LocalModels;
+
 class PatchModel {
  public:
   PatchModel(const scene::LocalReduction& reduction, const scene::LocalPatch& patch,
              const scene::Organ& organ);
+  // Of two patches or more together: their fields one after another, without those of later ones
+  // that are nearly of the others. Tets near any of them are as they are. O(organ x fields^2).
+  PatchModel(const LocalModels& models, const PatchSet& patches);
 
   NodeIndex centre() const { return centre_; }
-  // Modes, then the Green's functions of the patch's reach, x, y, z.
+  // Vibrations, modes, then the Green's functions of the patch's reach, x, y, z.
   std::size_t field_count() const { return fields_.size(); }
   std::size_t stride() const { return padded(field_count()); }
+
+  // Where each patch's fields begin, and the end.
+  std::span<const std::size_t> blocks() const { return blocks_; }
 
   // Nodes of its tets, ascending: its local nodes.
   std::span<const NodeIndex> nodes() const { return nodes_; }
@@ -36,7 +62,6 @@ class PatchModel {
   BasisRows basis() const { return {basis_, stride()}; }
 
   const ElementSet& inner() const { return inner_; }
-  const ElementSet& outer() const { return outer_; }  // weighted: what is not linear in them
   // Nodes around those that may be free, by their numbers among local nodes, and all their tets
   // that are not inner: where the fields alone have to do.
   std::span<const std::uint32_t> rim() const { return rim_; }
@@ -62,10 +87,20 @@ class PatchModel {
     const std::int16_t* values;  // all nodes
     float step;                  // with its scale
   };
-  void choose_nodes(const scene::Organ& organ, const scene::LocalPatch& patch);
+  // Ascending.
+  void take_tets(const scene::Organ& organ, std::span<const TetIndex> inner);
+  // Of later patches' fields, leaves out what is nearly of those before.
+  void drop_repeated_fields();
   void make_matrices(const scene::LocalPatch& patch);
+  void fill_basis();
+  void take_inner_stiffness();
+  // Inner tets at rest among the fields, rows of field_count.
+  std::vector<double> stiffness_of_inner() const;
+  // Of all nodes among the fields, and of the tets that are not inner.
+  void sum_over_nodes(const LocalModels& models, std::span<const TetIndex> inner);
 
   NodeIndex centre_;
+  std::vector<std::size_t> blocks_;
   std::vector<Field> fields_;
   std::vector<NodeIndex> nodes_;
   std::vector<float> masses_;
@@ -73,24 +108,31 @@ class PatchModel {
   std::vector<float> basis_;
   std::vector<std::uint32_t> rim_;
   std::vector<float> rim_stiffness_;
-  ElementSet inner_, outer_, beyond_rim_;
+  ElementSet inner_, beyond_rim_;
   std::vector<double> outer_stiffness_, inner_stiffness_, mass_;
 };
 
 // All patches of a reduction.
 class LocalModels {
  public:
-  // A valid reduction of this organ, whose fields it uses for as long as it is.
+  // A valid reduction of this organ; both must outlive it.
   LocalModels(const scene::LocalReduction& reduction, const scene::Organ& organ);
 
   std::size_t size() const { return models_.size(); }
+  const scene::Organ& organ() const { return organ_; }
+  const scene::LocalPatch& patch(std::uint32_t number) const { return reduction_.patches[number]; }
+  // Of all tets at rest over all nodes; empty for a single patch.
+  const BlockMatrix& rest_tangent() const { return rest_tangent_; }
   const PatchModel& operator[](std::uint32_t patch) const { return models_[patch]; }
   std::size_t node_count() const { return node_count_; }
   double force_n() const { return force_n_; }  // largest of the training, at a node
   double drag_per_s() const { return drag_per_s_; }
 
  private:
+  const scene::LocalReduction& reduction_;
+  const scene::Organ& organ_;
   std::vector<PatchModel> models_;
+  BlockMatrix rest_tangent_;
   std::size_t node_count_ = 0;
   double force_n_ = 0, drag_per_s_ = 0;
 };

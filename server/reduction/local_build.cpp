@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <cinttypes>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 #include <mutex>
 #include <numbers>
@@ -13,6 +15,7 @@
 #include "common/scene/any_material.h"
 #include "server/reduction/check_count.h"
 #include "server/reduction/cubature.h"
+#include "server/reduction/local_parts.h"
 #include "server/reduction/patch_fields.h"
 #include "server/reduction/presses.h"
 #include "server/reduction/vibrations.h"
@@ -32,29 +35,22 @@ constexpr std::size_t kMaxCubatureTets = 800;
 // The equations of a cubature, one per field and state, are added up with random signs to so many,
 // in which residuals are those of all within a few per cent.
 constexpr std::size_t kCubatureRows = 2048;
-// Of a vibration, what a patch's other modes do not have.
-constexpr double kNewInVibration = 1e-3;
 
 Eigen::Index index(std::size_t i) {
   return static_cast<Eigen::Index>(i);
 }
 
-// All presses at one centre.
-struct Pressed {
-  std::vector<Vector> fields;
-  std::size_t failed = 0;
-};
-
 class Builder {
  public:
   Builder(const scene::Organ& organ, const LocalSettings& settings, const LocalProgress& progress,
-          std::vector<std::unique_ptr<FullModel>> models)
+          std::vector<std::unique_ptr<FullModel>> models, LocalParts parts)
       : organ_(organ),
         settings_(settings),
         progress_(progress),
         normals_(mesh::surface_normals(organ.mesh)),
         models_(std::move(models)),
-        accessible_(accessible_nodes(organ, settings.patch_radius_m)) {
+        accessible_(accessible_nodes(organ, settings.patch_radius_m)),
+        parts_(std::move(parts)) {
     std::ranges::sort(accessible_);
   }
 
@@ -80,12 +76,14 @@ class Builder {
                                            " are possible: make it smaller"};
     find_greens();
     press_centres();
-    vibrations_ = slowest_vibrations(*models_[0], settings_.vibrations).modes;
+    if (!status_) return status_.error();
+    find_vibrations();
     auto& patches = r.patches;
     built_.nonlinear.resize(patches.size());
     built_.residuals.resize(patches.size());
     for_each(LocalStage::Patches, patches.size(),
-             [&](FullModel& model, std::size_t i) { make(model, i); });
+             [&](FullModel& model, std::size_t i) { return take_or_make(model, i); });
+    if (!status_) return status_.error();
     return std::move(built_);
   }
 
@@ -102,8 +100,10 @@ class Builder {
     std::mutex mutex;
     const auto run = [&](FullModel& model) {
       for (std::size_t i = next++; i < count; i = next++) {
-        work(model, i);
+        const Status done_well = work(model, i);
         const std::scoped_lock lock(mutex);
+        if (!done_well && status_.ok()) status_ = done_well;
+        if (!status_) return;
         ++done;
         if (progress_) progress_(stage, done, count);
       }
@@ -169,7 +169,7 @@ class Builder {
     nodes.erase(std::ranges::unique(nodes).begin(), nodes.end());
     auto& greens = built_.reduction.greens;
     greens.resize(nodes.size());
-    for_each(LocalStage::Greens, nodes.size(), [&](FullModel& model, std::size_t i) {
+    for_each(LocalStage::Greens, nodes.size(), [&](FullModel& model, std::size_t i) -> Status {
       const auto length = model.dof_count();
       Matrix unit = Matrix::Zero(index(length), 3);
       unit.middleRows<3>(3 * static_cast<Eigen::Index>(nodes[i].value)).setIdentity();
@@ -177,6 +177,7 @@ class Builder {
       greens[i].node = nodes[i];
       for (std::size_t axis = 0; axis < 3; ++axis)
         greens[i].fields[axis] = scene::pack_field({found.data() + axis * length, length});
+      return Status{};
     });
   }
 
@@ -194,7 +195,11 @@ class Builder {
     const auto& patches = built_.reduction.patches;
     pressed_.resize(patches.size());
     if (settings_.directions == 0) return;
-    for_each(LocalStage::Presses, patches.size(), [&](FullModel& model, std::size_t i) {
+    for_each(LocalStage::Presses, patches.size(), [&](FullModel& model, std::size_t i) -> Status {
+      if (auto known = parts_.read_pressed(i, model.dof_count())) {
+        pressed_[i] = std::move(*known);
+        return {};
+      }
       const auto node = patches[i].centre;
       for (const Vec3d& direction : press_directions(normals_[node.value], i * settings_.directions,
                                                      settings_.directions, kSlant)) {
@@ -203,6 +208,7 @@ class Builder {
         pressed_[i].failed += kShares.size() - found.size();
         std::ranges::move(found, std::back_inserter(pressed_[i].fields));
       }
+      return parts_.write(i, pressed_[i]);
     });
     for (std::size_t i = 0; i < patches.size(); ++i) {
       built_.pressed.push_back(patches[i].centre);
@@ -220,18 +226,39 @@ class Builder {
     return near;
   }
 
-  // What vibrations have besides these modes, as more of them.
-  Matrix with_vibrations(const Matrix& modes) const {
-    Matrix all(modes.rows(), modes.cols() + vibrations_.cols());
-    all.leftCols(modes.cols()) = modes;
-    Eigen::Index count = modes.cols();
-    for (const auto& vibration : vibrations_.colwise()) {
-      Vector field = vibration.normalized();
-      for (int twice = 0; twice < 2; ++twice)
-        field -= all.leftCols(count) * (all.leftCols(count).transpose() * field);
-      if (field.norm() > kNewInVibration) all.col(count++) = field.normalized();
+  // The slowest ones, orthonormal and as they will be read.
+  void find_vibrations() {
+    const auto found = slowest_vibrations(*models_[0], settings_.vibrations);
+    vibrations_.resize(found.modes.rows(), found.modes.cols());
+    for (Eigen::Index i = 0; i < found.modes.cols(); ++i) {
+      Vector field = without_vibrations(found.modes.col(i).normalized(), i).normalized();
+      built_.reduction.vibrations.push_back(
+          scene::pack_field({field.data(), static_cast<std::size_t>(field.size())}));
+      vibrations_.col(i) = field;
     }
-    return all.leftCols(count);
+  }
+  // What is not of the first `count` of them, of each column.
+  Matrix without_vibrations(Matrix fields, Eigen::Index count) const {
+    const auto v = vibrations_.leftCols(count);
+    for (int twice = 0; twice < 2; ++twice) fields -= v * (v.transpose() * fields).eval();
+    return fields;
+  }
+
+  Status take_or_make(FullModel& model, std::size_t number) {
+    auto& patch = built_.reduction.patches[number];
+    find_inner_tets(patch);
+    if (auto known = parts_.read_patch(number)) {
+      patch.modes = std::move(known->modes);
+      patch.cubature = std::move(known->cubature);
+      patch.outer_stiffness = std::move(known->outer_stiffness);
+      patch.mass = std::move(known->mass);
+      built_.nonlinear[number] = known->nonlinear;
+      built_.residuals[number] = known->residual;
+      return {};
+    }
+    make(model, number);
+    return parts_.write(number, {patch.modes, patch.cubature, patch.outer_stiffness, patch.mass,
+                                 built_.nonlinear[number], built_.residuals[number]});
   }
 
   void make(FullModel& model, std::size_t number) {
@@ -249,17 +276,21 @@ class Builder {
     }
     for (std::size_t i = 0; i < presses.size(); ++i)
       fields.col(index(9 * nodes.size() + i)) = presses[i];
-    const Matrix modes = with_vibrations(karhunen_loeve(fields, settings_.modes).modes);
+    const Matrix modes =
+        karhunen_loeve(without_vibrations(std::move(fields), vibrations_.cols()), settings_.modes)
+            .modes;
     for (Eigen::Index i = 0; i < modes.cols(); ++i)
       patch.modes.push_back(
           scene::pack_field({modes.col(i).data(), static_cast<std::size_t>(modes.rows())}));
     // As they will be read.
-    Matrix basis(modes.rows(), index(patch.field_count()));
-    for (std::size_t i = 0; i < patch.modes.size(); ++i)
-      unpack(patch.modes[i], basis.col(index(i)));
-    for (std::size_t i = 0; i < patch.reach.size(); ++i)
-      basis.middleCols(index(patch.modes.size() + 3 * i), 3) = greens_of(patch.reach[i]);
-    find_inner_tets(patch);
+    Matrix basis(modes.rows(), index(built_.reduction.field_count(patch)));
+    Eigen::Index count = 0;
+    for (const auto* shared : {&built_.reduction.vibrations, &patch.modes})
+      for (const auto& mode : *shared) unpack(mode, basis.col(count++));
+    for (const auto node : patch.reach) {
+      basis.middleCols(count, 3) = greens_of(node);
+      count += 3;
+    }
     patch.outer_stiffness = lower(outer_stiffness(model, patch, basis));
     Matrix weighted = basis;
     for (Eigen::Index i = 0; i < basis.rows(); ++i)
@@ -372,16 +403,30 @@ class Builder {
   std::vector<NodeIndex> accessible_;                     // ascending
   std::vector<Pressed> pressed_;                          // per patch
   Matrix vibrations_;                                     // a column each
+  const LocalParts parts_;
+  Status status_;  // of writing parts
   LocalBuilt built_;
 };
+
+// What the result depends on, in one line.
+std::string key_of(const scene::Organ& organ, const LocalSettings& s) {
+  char text[400];
+  std::snprintf(text, sizeof text,
+                "local 2, organ %016" PRIx64 " %016" PRIx64 " %016" PRIx64
+                ", modes %zu, vibrations %zu, radius %a, layers %u, force %a, directions %zu, "
+                "field nodes %zu, residual %a, patches %zu, seed %" PRIu64,
+                scene::organ_hash(organ), scene::mesh_hash(organ), scene::elasticity_hash(organ),
+                s.modes, s.vibrations, s.patch_radius_m, s.free_layers, s.force_n, s.directions,
+                s.field_nodes, s.residual, s.patches, s.seed);
+  return text;
+}
 
 }  // namespace
 
 Status validate(const LocalSettings& s) {
   const auto wrong = [](const std::string& what) { return Error{ErrorCode::Usage, what}; };
   if (auto c = check_count("--modes", s.modes, 1, scene::kMaxReducedModes); !c) return c;
-  if (auto c = check_count("--vibrations", s.vibrations, 0, scene::kMaxReducedModes - s.modes); !c)
-    return c;
+  if (auto c = check_count("--vibrations", s.vibrations, 0, scene::kMaxReducedModes); !c) return c;
   if (auto c = check_count("--free-layers", s.free_layers, 0, scene::kMaxFreeLayers); !c) return c;
   if (auto c = check_count("--directions", s.directions, 0, 20); !c) return c;
   if (auto c = check_count("--field-nodes", s.field_nodes, 1, 100); !c) return c;
@@ -410,7 +455,13 @@ Result<LocalBuilt> build_local(const scene::Organ& organ, const LocalSettings& s
     if (!model) return model.error();
     models.push_back(std::move(*model));
   }
-  return Builder(organ, settings, progress, std::move(models)).build();
+  LocalParts parts;
+  if (!settings.parts.empty()) {
+    auto opened = LocalParts::open(settings.parts, key_of(organ, settings));
+    if (!opened) return opened.error();
+    parts = std::move(*opened);
+  }
+  return Builder(organ, settings, progress, std::move(models), std::move(parts)).build();
 }
 
 }  // namespace trocar::reduction

@@ -6,6 +6,7 @@
 // these fields' Karhunen-Loeve modes; its cubature is the solution of a non-negative least-squares
 // problem over the same fields.
 
+#include <filesystem>
 #include <functional>
 
 #include "common/scene/local_reduction.h"
@@ -15,7 +16,7 @@ namespace trocar::reduction {
 
 struct LocalSettings {
   std::size_t modes = 24;         // of a patch
-  std::size_t vibrations = 24;    // of the whole organ, as more modes of every patch
+  std::size_t vibrations = 24;    // of the whole organ, which all patches share
   double patch_radius_m = 0.012;  // its nodes are within, of its centre
   std::uint32_t free_layers = 2;  // of nodes around a touched one
   double force_n = 0.4;           // the largest, on a node
@@ -25,6 +26,8 @@ struct LocalSettings {
   std::size_t patches = 0;        // made at most, from the first centre outwards; 0: all
   std::uint64_t seed = 1;
   unsigned threads = 1;
+  // Where finished parts are kept until all is done, and looked for; empty: nowhere.
+  std::filesystem::path parts;
 };
 // Error names the setting as trocar-organ calls it.
 Status validate(const LocalSettings& settings);
@@ -41,8 +44,8 @@ struct LocalBuilt {
   // leaves of it.
   std::vector<double> nonlinear, residuals;
 };
-// The same for every number of threads. Error: an organ that FullModel refuses, a law that is not
-// unsplit, or no node that tools reach.
+// The same for every number of threads, in one run or, with the parts of those before, in several.
+// Error: an organ that FullModel refuses, a law that is not unsplit, or no node that tools reach.
 Result<LocalBuilt> build_local(const scene::Organ& organ, const LocalSettings& settings,
                                const LocalProgress& progress = {});
 

@@ -90,6 +90,7 @@ struct LocalSolver::Contact {
   }
 
   void choose_fields(const scene::LocalReduction& reduction, std::span<const Place> places) {
+    const auto shared = reduction.vibrations.size();
     for (const auto& [patch, touched] : places)
       for (const auto node : touched) {
         const auto at = static_cast<std::size_t>(std::ranges::lower_bound(patch->reach, node) -
@@ -97,11 +98,13 @@ struct LocalSolver::Contact {
         const auto greens =
             std::ranges::lower_bound(reduction.greens, node, {}, &scene::GreensFunction::node);
         for (std::size_t axis = 0; axis < 3; ++axis)
-          fields.push_back({&greens->fields[axis], patch->modes.size() + 3 * at + axis});
+          fields.push_back({&greens->fields[axis], shared + patch->modes.size() + 3 * at + axis});
       }
     greens_count = fields.size();
+    for (std::size_t i = 0; i < shared; ++i) fields.push_back({&reduction.vibrations[i], i});
     for (const auto& [patch, touched] : places)
-      for (std::size_t i = 0; i < patch->modes.size(); ++i) fields.push_back({&patch->modes[i], i});
+      for (std::size_t i = 0; i < patch->modes.size(); ++i)
+        fields.push_back({&patch->modes[i], shared + i});
   }
 
   // Patches beside each other have modes that are nearly the same: only what is new in one stays.
@@ -326,7 +329,7 @@ struct LocalSolver::Contact {
     return {static_cast<double>(at[0]), static_cast<double>(at[1]), static_cast<double>(at[2])};
   }
 
-  std::vector<Field> fields;  // Green's functions, then modes
+  std::vector<Field> fields;  // Green's functions, vibrations, then modes
   std::size_t greens_count = 0;
   std::vector<TetIndex> inner_tets, outer_tets;  // of all patches; inner ones ascending
   std::vector<float> outer_weights;

@@ -1,9 +1,9 @@
 #pragma once
 
 // A local reduction at work: where some surface nodes are touched, the displacements of the whole
-// organ as those of a few unknowns, u = Phi q + E a: q of the patch's modes and the Green's
-// functions of the touched nodes, a of the nodes around them, each free on its own. Newton's method
-// with a tangent that is kept for as long as it is good.
+// organ as those of a few unknowns, u = Phi q + E a: q of vibrations, the patch's modes and the
+// Green's functions of the touched nodes, a of the nodes around them, each free on its own.
+// Newton's method with a tangent that is kept for as long as it is good.
 //
 // Time per iteration: the patch's tets and fields, whatever the mesh. Displacements of all nodes
 // are computed when they are asked for. One caller; deterministic.

@@ -4,10 +4,12 @@
 // beyond it the patch's fields (server/exterior/local_exterior.h). The choice is a function of the
 // state alone, made each tick.
 
+#include <array>
 #include <memory>
 #include <span>
 #include <vector>
 
+#include "common/base/background.h"
 #include "common/base/tick.h"
 #include "server/contact/contact_list.h"
 #include "server/dynamics/block_descent.h"
@@ -18,25 +20,26 @@ namespace trocar::step {
 
 // Why the solver is what it is.
 enum class SolverReason : std::uint8_t {
-  None,     // the session has no reduction
-  Idle,     // nothing has been touched yet
-  Fits,     // a patch has what is touched
-  Frozen,   // the tissue beyond the limits stands still
-  Outside,  // touched where no patch is, or where several tools touch more than one patch
-  Force,    // a node bears more than in the training
-  Cut,      // tissue of the patch was cut
-  Error,    // the estimate of the error is too large
-  Off,      // it was decided so
+  None,       // the session has no reduction
+  Idle,       // nothing has been touched yet
+  Fits,       // a patch has what is touched
+  Frozen,     // the tissue beyond the limits stands still
+  Outside,    // touched where no patch is, or by tools that touch more patches than act together
+  Force,      // a node bears more than in the training
+  Cut,        // tissue was cut just now, or is where it is touched
+  Error,      // the estimate of the error is too large
+  Off,        // it was decided so
+  Preparing,  // patches that are touched together are being made ready to act together
 };
-inline constexpr std::uint8_t kSolverReasons = 9;
+inline constexpr std::uint8_t kSolverReasons = 10;
 const char* name_of(SolverReason reason);
 
 // Which solver acted in a tick.
 struct SolverFigures {
   bool is_reduced = false;
   SolverReason reason = SolverReason::None;
-  std::uint32_t patch = 0;  // of the reduction, while it acts
-  float estimate = 0;       // of its error (exterior::LocalExterior), of the tick before
+  exterior::PatchSet patches;  // of the reduction, while they act
+  float estimate = 0;          // of its error (exterior::LocalExterior), of the tick before
   float largest_node_force_n = 0;
 };
 // From one tick to the next another solver, or patch, or reason.
@@ -47,12 +50,19 @@ struct SolverChange {
 
 // In snapshot and hash of sessions with a reduction.
 struct ReducedState {
-  void visit_state(world::StateArchive& archive);
+  static constexpr std::size_t kMaxReady = 4;
+
+  void visit_state(world::StateArchive& archive, const exterior::LocalModels& models);
 
   exterior::ExteriorState exterior;
   SolverReason reason = SolverReason::Idle;
-  std::uint16_t wait_ticks = 0;  // until a patch may take over again
-  bool was_cut = false;
+  std::uint16_t wait_ticks = 0;  // until patches may take over again
+  // Patches that are being made ready, and ticks until they are; those that were, the latest last.
+  exterior::PatchSet preparing;
+  std::uint32_t prepare_ticks = 0;
+  std::array<exterior::PatchSet, kMaxReady> ready{};
+  std::uint32_t ready_count = 0;
+  std::vector<std::uint8_t> is_cut;  // per patch: its tissue is no longer what it is of
 };
 
 class ReducedTissue {
@@ -72,24 +82,41 @@ class ReducedTissue {
               world::World& world);
   std::span<const NodeIndex> near() const { return near_; }
   dynamics::Exterior& exterior() { return exterior_; }
-  // The topology is about to change: the full solver goes on.
-  void stop_for_cut(ReducedState& state, dynamics::BlockDescent& solver, world::World& world);
+  // The tissue was cut at these nodes, before the world follows: the full solver goes on, and for
+  // good where patches are that have one of them.
+  void stop_for_cut(std::span<const NodeIndex> changed, ReducedState& state,
+                    dynamics::BlockDescent& solver, world::World& world);
 
   const SolverFigures& figures() const { return figures_; }
 
  private:
-  SolverReason decide(const Inputs& inputs, const ReducedState& state, const world::World& world,
-                      std::uint32_t& patch);
-  bool has_room(std::uint32_t patch) const;
+  using Model = std::shared_ptr<const exterior::PatchModel>;
+  struct Joint {
+    exterior::PatchSet patches;
+    Model model;
+  };
+
+  SolverReason decide(const Inputs& inputs, ReducedState& state, const world::World& world,
+                      exterior::PatchSet& patches);
+  // The nearest patch that has room for the nodes and was not cut; false: there is none.
+  bool find_patch(std::span<const NodeIndex> nodes, const ReducedState& state,
+                  const world::World& world, std::uint32_t& patch, bool& is_near_cut) const;
+  bool is_ready(const exterior::PatchSet& patches, ReducedState& state);
+  Model model_of(const exterior::PatchSet& patches);
+  void hand_back(ReducedState& state, dynamics::BlockDescent& solver, world::World& world);
   float largest_node_force(const contact::ContactList& contacts, const world::World& world);
 
   const exterior::LocalModels& models_;
   exterior::LocalExterior exterior_;
+  Model acting_;               // null: the full solver
+  std::vector<Joint> joints_;  // some of those that are ready
+  Joint making_;
   SolverFigures figures_;
-  std::vector<NodeIndex> touched_, near_;
+  std::vector<NodeIndex> near_;
   std::vector<Vec3f> gradient_;
   std::vector<NodeIndex> loaded_;
   std::vector<Vec3f> node_forces_;  // of loaded_
+  Background background_;           // last: its work uses what stands above
 };
 
 }  // namespace trocar::step

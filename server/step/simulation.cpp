@@ -10,12 +10,13 @@
 
 namespace trocar::step {
 
-State::State(const scene::Organ& organ, bool has_reduction)
+State::State(const scene::Organ& organ, const exterior::LocalModels* reduction)
     : cuts(organ),
       world(organ),
       claims(organ.mesh.node_count()),
-      quantised(cuts.layout().vertex_count()) {
-  if (has_reduction) reduced.emplace();
+      quantised(cuts.layout().vertex_count()),
+      models(reduction) {
+  if (models != nullptr) reduced.emplace().is_cut.resize(models->size());
   dynamics::start_relaxed(organ, world);
 }
 
@@ -33,7 +34,7 @@ void State::set_mark() {
 
 std::unique_ptr<State> State::returned_to_mark(const scene::Organ& organ) const {
   if (!mark.is_set()) return nullptr;
-  auto marked = std::make_unique<State>(organ, reduced.has_value());
+  auto marked = std::make_unique<State>(organ, models);
   auto archive = world::StateArchive::reading(mark.state());
   marked->visit_without_mark(archive);
   if (!archive.ok() || !archive.at_end()) return nullptr;
@@ -58,12 +59,16 @@ void State::visit_without_mark(world::StateArchive& archive) {
   claims.visit_state(archive);
   grasps.visit_state(archive, world.node_count());
   proxies.visit_state(archive);
-  if (reduced) reduced->visit_state(archive);
+  if (reduced) reduced->visit_state(archive, *models);
   archive.fixed_array(quantised);
   self_contacts.visit_state(archive, world.surface_nodes, cuts.layout().triangles.size());
 }
 
 namespace {
+
+const exterior::LocalModels* models_of(const Scene& scene) {
+  return scene.models ? &*scene.models : nullptr;
+}
 
 // Springs and linear tets cost no more than the matrices of a linear far field.
 bool is_costly(const scene::Organ& organ) {
@@ -153,7 +158,7 @@ Simulation::Simulation(scene::Organ organ, unsigned workers,
                        std::shared_ptr<const scene::LocalReduction> reduction)
     : scene_(std::make_unique<Scene>(Scene{std::move(organ), workers, std::move(reduction), {}})) {
   if (scene_->reduction) scene_->models.emplace(*scene_->reduction, scene_->organ);
-  state_ = std::make_unique<State>(scene_->organ, scene_->models.has_value());
+  state_ = std::make_unique<State>(scene_->organ, models_of(*scene_));
   context_ = std::make_unique<StepContext>(*scene_, *state_);
 }
 
@@ -197,7 +202,7 @@ std::uint64_t Simulation::state_hash() const {
 }
 
 Status Simulation::restore_snapshot(BytesView snapshot) {
-  auto restored = std::make_unique<State>(scene_->organ, scene_->models.has_value());
+  auto restored = std::make_unique<State>(scene_->organ, models_of(*scene_));
   auto archive = world::StateArchive::reading(snapshot);
   restored->visit(archive);
   if (!archive.ok() || !archive.at_end())

@@ -71,7 +71,7 @@ void note_solver(Tick tick, StepContext& context) {
   const auto& now = context.reduced->figures();
   const auto& before = context.solver_figures;
   if (now.is_reduced != before.is_reduced || now.reason != before.reason ||
-      now.patch != before.patch)
+      !(now.patches == before.patches))
     context.solver_changes.push_back({tick, now});
   context.solver_figures = now;
 }
@@ -143,7 +143,9 @@ void cut_tissue(State& state, StepContext& context) {
       cuts.cut(state.tools, state.claims, state.world, context.travel_m, context.report.cut);
   if (context.report.cut.is_full) context.report.faults |= kFaultCutLimit;
   if (!has_cut) return;
-  if (context.reduced) context.reduced->stop_for_cut(*state.reduced, context.solver, state.world);
+  if (context.reduced)
+    context.reduced->stop_for_cut(cuts.topology().changed(), *state.reduced, context.solver,
+                                  state.world);
   const auto& edit = cuts.follow(state.world);
   for (const auto& made : cuts.new_nodes()) {
     state.claims.add_node(made.a, made.b);

@@ -28,7 +28,8 @@ static_assert(kSweepLayers <= dynamics::kMaxSweepBands);
 // Everything a later tick depends on. Each member names its arrays in visit_state; these bytes are
 // the snapshot and what the tick hash covers.
 struct State {
-  State(const scene::Organ& organ, bool has_reduction);
+  // models: of the session's reduction, null if there is none.
+  State(const scene::Organ& organ, const exterior::LocalModels* models);
 
   TissueCuts cuts;
   world::World world;
@@ -39,7 +40,8 @@ struct State {
   // Last published integers: quantisation has hysteresis, so they are state.
   wire::QuantisedSurface quantised;
   contact::SelfContactTable self_contacts;
-  std::optional<ReducedState> reduced;  // of sessions with a reduction
+  const exterior::LocalModels* const models;
+  std::optional<ReducedState> reduced;  // of sessions with models
   Mark mark;
 
   void visit(world::StateArchive& archive);

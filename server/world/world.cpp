@@ -30,6 +30,7 @@ void World::add_node(const Vec3d& rest_position, NodeIndex a, NodeIndex b, std::
     const Vec3f from = values[a.value], to = values[b.value];
     return from + (to - from) * (static_cast<float>(t) / 65536.0f);
   };
+  origins.push_back({a, b, t});
   rest_positions.push_back(to_float(rest_position));
   masses.push_back(0);
   surface_areas.push_back(0);

@@ -30,6 +30,12 @@ enum class Boundary : std::uint8_t {
   Graded = 1,  // move every tick, with fewer sweeps
 };
 
+// Of a node that a cut made: t/65536 of the way from a to b, which were there before it.
+struct NodeOrigin {
+  NodeIndex a, b;
+  std::uint16_t t = 0;
+};
+
 struct World {
   explicit World(const scene::Organ& organ);
 
@@ -43,6 +49,7 @@ struct World {
   std::vector<float> masses;          // kg
   std::vector<float> surface_areas;   // m^2 of boundary triangles per node, 0 inside
   std::vector<NodeIndex> surface_nodes;
+  std::vector<NodeOrigin> origins;  // of the nodes beyond the organ's own
 
   // State, in snapshot and hash.
   Tick tick = 0;                         // ticks done

@@ -213,9 +213,9 @@ TEST_F(LocalReductionFile, DamageIsNoticed) {
   damaged[20] ^= 1;  // of the checksum
   expect_bad(damaged, "its checksum does not fit");
   auto newer = file;
-  newer[8] = 2;
+  newer[8] = 3;
   expect_bad(newer,
-             "has version 2, this program reads version 1: make it again with trocar-organ reduce "
+             "has version 3, this program reads version 2: make it again with trocar-organ reduce "
              "--method local");
   expect_bad(pack_organ(organ_),
              "is not a .reduction file: make one with trocar-organ reduce --method local");
@@ -224,12 +224,12 @@ TEST_F(LocalReductionFile, DamageIsNoticed) {
 
 // What a checksum guards against is not what somebody makes on purpose.
 TEST_F(LocalReductionFile, BodiesThatFitTheirChecksumAreNotTrustedEither) {
-  constexpr PackedKind kKind{kLocalReductionMagic, "", "", "", 1, 1};
+  constexpr PackedKind kKind{kLocalReductionMagic, "", "", "", 2, 2};
   const auto body = unpack(kKind, packed())->body;
   // What ends between its patches is whole, with fewer of them.
   for (std::size_t length = 0; length < body.size(); length += 37) {
     const Bytes cut(body.begin(), body.begin() + static_cast<std::ptrdiff_t>(length));
-    const auto unpacked = unpack_local_reduction(pack(kKind, 1, cut));
+    const auto unpacked = unpack_local_reduction(pack(kKind, 2, cut));
     EXPECT_TRUE(!unpacked.ok() || unpacked->patches.size() == 1) << length;
   }
   std::mt19937 random(1);
@@ -238,7 +238,7 @@ TEST_F(LocalReductionFile, BodiesThatFitTheirChecksumAreNotTrustedEither) {
     auto changed = body;
     for (std::uint32_t k = 0; k < 1 + random() % 4; ++k)
       changed[random() % changed.size()] = static_cast<std::uint8_t>(random());
-    const auto unpacked = unpack_local_reduction(pack(kKind, 1, changed));
+    const auto unpacked = unpack_local_reduction(pack(kKind, 2, changed));
     if (!unpacked) {
       EXPECT_EQ(unpacked.error().message.find('\n'), std::string::npos);
       continue;
@@ -262,7 +262,7 @@ TEST_F(LocalReductionFile, CountsAndScalarsHaveLimits) {
   expect_bad([](auto& r) { r.greens.resize(100001); }, "has 100001 Green's functions");
   expect_bad_patch([](auto& p) { p.modes.clear(); }, "patch 2 has 0 modes, must have 1 to 64");
   expect_bad_patch([](auto& p) { p.modes.resize(65); }, "patch 2 has 65 modes");
-  expect_bad_patch([](auto& p) { p.reach.resize(133); }, "patch 2 has 403 fields");
+  expect_bad_patch([](auto& p) { p.reach.resize(133); }, "patch 2 has 405 fields");
 }
 
 TEST_F(LocalReductionFile, FieldsAreChecked) {
@@ -290,6 +290,17 @@ TEST_F(LocalReductionFile, FieldsAreChecked) {
   expect_bad_patch([](auto& p) { p.modes[1] = p.modes[0]; },
                    "modes 1 and 2 of patch 2 are not orthonormal");
   expect_bad_patch([](auto& p) { p.modes[1].values.assign(54, -32768); }, "are not orthonormal");
+}
+
+TEST_F(LocalReductionFile, VibrationsAreChecked) {
+  expect_bad([](auto& r) { r.vibrations.resize(65); }, "has 65 vibrations, may have 64");
+  expect_bad([](auto& r) { r.vibrations[1].values.pop_back(); }, "vibration 2 has 53 numbers");
+  expect_bad([](auto& r) { r.vibrations[0].step = kNotANumber; }, "vibration 1 has steps");
+  expect_bad([](auto& r) { r.vibrations[1] = r.vibrations[0]; },
+             "vibrations 1 and 2 are not orthonormal");
+  expect_bad([](auto& r) { r.vibrations[1] = r.patches[0].modes[2]; },
+             "mode 3 of patch 1 and vibration 2 are not orthogonal");
+  expect_bad([](auto& r) { r.vibrations.pop_back(); }, "numbers, must have 105 of 14 fields");
 }
 
 TEST_F(LocalReductionFile, NodesAreChecked) {
@@ -327,9 +338,9 @@ TEST_F(LocalReductionFile, TetsAreChecked) {
 
 TEST_F(LocalReductionFile, MatricesAreChecked) {
   expect_bad_patch([](auto& p) { p.mass.pop_back(); },
-                   "mass of patch 2 has 90 numbers, must have 91 of 13 fields");
+                   "mass of patch 2 has 119 numbers, must have 120 of 15 fields");
   expect_bad_patch([](auto& p) { p.outer_stiffness.push_back(1); },
-                   "outer stiffness of patch 2 has 92 numbers");
+                   "outer stiffness of patch 2 has 121 numbers");
   expect_bad_patch([](auto& p) { p.mass[7] = std::nan(""); }, "mass of patch 2 has numbers that");
   expect_bad_patch([](auto& p) { p.outer_stiffness[7] = kInfinity; },
                    "outer stiffness of patch 2 has numbers that are not finite");

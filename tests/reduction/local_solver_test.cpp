@@ -4,9 +4,12 @@
 #include "server/reduction/local_solver.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
+#include <filesystem>
+#include <fstream>
 
 #include "server/reduction/cubature.h"
 #include "server/reduction/local_build.h"
@@ -76,6 +79,30 @@ TEST_F(LocalBlock, IsTheSameForEveryNumberOfThreads) {
   EXPECT_EQ(one.reduction, three.reduction);
   EXPECT_EQ(one.pressed, three.pressed);
   EXPECT_EQ(one.residuals, three.residuals);
+}
+
+TEST_F(LocalBlock, IsTheSameAfterAnInterruption) {
+  auto s = settings();
+  const auto whole = build(s);
+  s.parts = std::filesystem::temp_directory_path() / ("trocar-parts-" + std::to_string(::getpid()));
+  std::filesystem::remove_all(s.parts);
+  EXPECT_EQ(build(s).reduction, whole.reduction);
+  // A part is missing, another is damaged, others are taken as they are.
+  std::filesystem::remove(s.parts / "press-1.part");
+  std::filesystem::remove(s.parts / "patch-0.part");
+  std::ofstream(s.parts / "patch-1.part") << "half of it";
+  s.threads = 2;
+  const auto resumed = build(s);
+  EXPECT_EQ(resumed.reduction, whole.reduction);
+  EXPECT_EQ(resumed.residuals, whole.residuals);
+  EXPECT_EQ(resumed.failed, whole.failed);
+  auto other = s;
+  other.modes = 15;
+  const auto refused = build_local(organ_, other);
+  ASSERT_FALSE(refused.ok());
+  EXPECT_NE(refused.error().message.find("is of a run with other settings"), std::string::npos)
+      << refused.error().message;
+  std::filesystem::remove_all(s.parts);
 }
 
 TEST_F(LocalBlock, PatchesCoverTheirNodesAndKeepTheirResidual) {

@@ -49,7 +49,8 @@ Field unpacked(const scene::PackedField& field) {
 // B^T B of the patch's fields.
 std::vector<double> gram(const scene::LocalReduction& r, const scene::LocalPatch& patch) {
   std::vector<Field> basis;
-  for (const auto& mode : patch.modes) basis.push_back(unpacked(mode));
+  for (const auto* modes : {&r.vibrations, &patch.modes})
+    for (const auto& mode : *modes) basis.push_back(unpacked(mode));
   for (const auto node : patch.reach)
     for (const auto& field :
          std::ranges::lower_bound(r.greens, node, {}, &scene::GreensFunction::node)->fields)
@@ -132,7 +133,12 @@ scene::LocalReduction synthetic_local_reduction(const scene::Organ& organ) {
   std::ranges::sort(nodes);
   nodes.erase(std::ranges::unique(nodes).begin(), nodes.end());
   constexpr std::size_t kModes = 4;
-  std::size_t next = kModes + 2;
+  // Of one series, so that all modes are orthogonal to them.
+  constexpr std::size_t kVibrations = 2;
+  const auto fields = orthonormal(length, 1, kVibrations + kModes + r.patches.size());
+  for (std::size_t i = 0; i < kVibrations; ++i)
+    r.vibrations.push_back(scene::pack_field(fields[i]));
+  std::size_t next = fields.size() + 1;
   for (const auto node : nodes) {
     auto& greens = r.greens.emplace_back();
     greens.node = node;
@@ -144,8 +150,8 @@ scene::LocalReduction synthetic_local_reduction(const scene::Organ& organ) {
   }
   for (std::size_t p = 0; p < r.patches.size(); ++p) {
     auto& patch = r.patches[p];
-    for (const auto& mode : orthonormal(length, 1 + p, kModes))
-      patch.modes.push_back(scene::pack_field(mode));
+    for (std::size_t i = 0; i < kModes; ++i)
+      patch.modes.push_back(scene::pack_field(fields[kVibrations + p + i]));
     patch.mass = gram(r, patch);
     patch.outer_stiffness = patch.mass;
     for (double& value : patch.outer_stiffness) value *= 100;
