@@ -102,7 +102,7 @@ struct SolverFigures {
   std::uint32_t patch_count = 0;           // that act
   std::array<std::uint32_t, 4> patches{};  // of the reduction, from 1
   SolverReason reason = SolverReason::Unknown;
-  float estimate = 0;  // of the error in the norm of energy; that of a force is about its square
+  float estimate = 0;  // of the error in the norm of energy; a force errs by less
   float largest_node_force_n = 0;
 
   bool operator==(const SolverFigures&) const = default;

@@ -40,7 +40,7 @@ ImVec4 colour_of(RateTone tone) {
 }
 
 std::string far_sweeps(const replica::FrameFigures& figures) {
-  if (figures.solver && figures.solver->is_reduced) return "as the patch";
+  if (figures.solver && figures.solver->is_reduced) return "by the patch";
   if (figures.far_sweeps == 0) return "rest";
   if (figures.far_interval > 1)
     return format("%u in %u ticks", figures.far_sweeps, figures.far_interval);

@@ -31,16 +31,13 @@ const char* words_of(replica::SolverReason reason) {
   return "";
 }
 
-// Of a contact's force: errors in energy are of second order in those of the field.
 std::string error_text(float estimate) {
-  const double percent = 100 * static_cast<double>(estimate) * static_cast<double>(estimate);
-  if (percent >= 100) return "over 100 % of the force";
+  const double percent = 100 * static_cast<double>(estimate);
+  if (percent >= 100) return "over 100 % in energy";
   char text[40];
-  if (percent < 0.1)
-    std::snprintf(text, sizeof text, "below 0.1 %% of the force");
-  else
-    std::snprintf(text, sizeof text, percent < 10 ? "%.1f %% of the force" : "%.0f %% of the force",
-                  percent);
+  if (percent < 0.1) return "below 0.1 % in energy";
+  std::snprintf(text, sizeof text, percent < 9.95 ? "%.1f %% in energy" : "%.0f %% in energy",
+                percent);
   return text;
 }
 

@@ -10,8 +10,7 @@ namespace trocar::ui {
 
 struct SolverText {
   std::string state;  // "reduced, patches 3 + 12", "full (tissue was cut)"
-  // "0.3 % of the force", from the square of the estimate; empty: no patch acts.
-  std::string error;
+  std::string error;  // "7 % in energy", of which a force errs by less; empty: no patch acts
   bool is_reduced = false;
 };
 SolverText describe(const replica::SolverFigures& solver);

@@ -340,10 +340,12 @@ Status check_reducible(const Organ& organ) {
 Status check_masses(const LocalReduction& r, const Organ& organ) {
   for (std::size_t i = 0; i < r.patches.size(); ++i) {
     const auto& patch = r.patches[i];
-    const double own = mass_of(patch.modes.front(), organ.node_masses_kg);
+    // The first of its fields, and of its mass matrix.
+    const auto& field = r.vibrations.empty() ? patch.modes.front() : r.vibrations.front();
+    const double own = mass_of(field, organ.node_masses_kg);
     if (!(std::abs(patch.mass.front() - own) <= kMassMargin * own))
       return bad("is of tissue of another density than that of " + organ.name +
-                 ": the first mode of " + name_of(i) + " moves " + number(patch.mass.front()) +
+                 ": the first field of " + name_of(i) + " moves " + number(patch.mass.front()) +
                  " kg, not " + number(own) +
                  ": make it again with trocar-organ reduce --method local");
   }
@@ -357,6 +359,8 @@ std::uint64_t reduction_hash(const LocalReduction& r) {
   hash.add(r.node_count);
   hash.add(r.force_n);
   hash.add(r.free_layers);
+  hash.add(std::uint64_t{r.vibrations.size()});
+  for (const auto& vibration : r.vibrations) hash.add(vibration);
   hash.add(std::uint64_t{r.greens.size()});
   for (const auto& [node, fields] : r.greens) {
     hash.add(node.value);

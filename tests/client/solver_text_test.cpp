@@ -12,7 +12,7 @@ using replica::SolverReason;
 TEST(SolverText, SaysWhichSolverActsAndWhy) {
   const auto reduced = describe({true, 1, {12}, SolverReason::Fits, 0.055f, 0.1f});
   EXPECT_EQ(reduced.state, "reduced, patch 12");
-  EXPECT_EQ(reduced.error, "0.3 % of the force");
+  EXPECT_EQ(reduced.error, "5.5 % in energy");
   EXPECT_TRUE(reduced.is_reduced);
   EXPECT_EQ(describe({true, 2, {3, 12}, SolverReason::Fits, 0, 0}).state,
             "reduced, patches 3 + 12");
@@ -25,15 +25,15 @@ TEST(SolverText, SaysWhichSolverActsAndWhy) {
     EXPECT_GT(describe({.reason = static_cast<SolverReason>(reason)}).state.size(), 6u) << reason;
 }
 
-TEST(SolverText, ErrorsOfAForceAreTheSquareOfTheEstimate) {
+TEST(SolverText, ErrorsArePercentages) {
   const auto error = [](float estimate) {
     return describe({true, 1, {1}, SolverReason::Fits, estimate, 0}).error;
   };
-  EXPECT_EQ(error(0), "below 0.1 % of the force");
-  EXPECT_EQ(error(0.2f), "4.0 % of the force");
-  EXPECT_EQ(error(0.5f), "25 % of the force");
-  EXPECT_EQ(error(1), "over 100 % of the force");
-  EXPECT_EQ(error(std::numeric_limits<float>::max()), "over 100 % of the force");
+  EXPECT_EQ(error(0), "below 0.1 % in energy");
+  EXPECT_EQ(error(0.02f), "2.0 % in energy");
+  EXPECT_EQ(error(0.25f), "25 % in energy");
+  EXPECT_EQ(error(1), "over 100 % in energy");
+  EXPECT_EQ(error(std::numeric_limits<float>::max()), "over 100 % in energy");
 }
 
 }  // namespace

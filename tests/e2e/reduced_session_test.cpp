@@ -125,7 +125,7 @@ TEST(ReducedSession, IsRecordedAndSimulatesAgainWithItsReductionOnly) {
   const auto summary = read_text(folder / "server.json");
   EXPECT_EQ(json_value(summary, "all_replicas_equal"), "true") << summary;
   EXPECT_EQ(json_value(summary, "reduction"), "block.reduction");
-  EXPECT_GT(json_number(summary, "reduced_ticks"), 1000);
+  EXPECT_GT(json_number(summary, "reduced_ticks"), 100);
   EXPECT_EQ(json_number(summary, "reduced_ticks") + json_number(summary, "full_ticks"),
             json_number(summary, "ticks"));
   EXPECT_GE(json_number(summary, "to_reduced"), 1);
@@ -144,11 +144,13 @@ TEST(ReducedSession, IsRecordedAndSimulatesAgainWithItsReductionOnly) {
   ASSERT_EQ(changes[1].solver().patch_size(), 1);
   EXPECT_EQ(changes[1].solver().patch(0), 1u);
   EXPECT_EQ(changes[1].solver().reason(), proto::SOLVER_FITS);
-  const auto& last = changes.back();
-  EXPECT_EQ(last.text(), "full, tissue was cut");
-  EXPECT_EQ(last.solver().reason(), proto::SOLVER_CUT);
-  EXPECT_FALSE(last.solver().is_reduced());
-  EXPECT_EQ(last.solver().patch_size(), 0);
+  const auto cut = std::ranges::find_if(changes, [](const proto::SolverChange& change) {
+    return change.solver().reason() == proto::SOLVER_CUT;
+  });
+  ASSERT_NE(cut, changes.end());
+  EXPECT_EQ(cut->text(), "full, tissue was cut");
+  EXPECT_FALSE(cut->solver().is_reduced());
+  EXPECT_EQ(cut->solver().patch_size(), 0);
   for (std::size_t i = 1; i < changes.size(); ++i)
     EXPECT_GT(changes[i].tick(), changes[i - 1].tick());
   for (const auto& change : changes)

@@ -162,6 +162,8 @@ TEST_F(LocalReductionFile, ItsHashIsOfAllThatMakesADifference) {
       [](LocalReduction& r) { ++r.elasticity_hash; },
       [](LocalReduction& r) { r.force_n *= 2; },
       [](LocalReduction& r) { ++r.free_layers; },
+      [](LocalReduction& r) { ++r.vibrations[0].values[5]; },
+      [](LocalReduction& r) { r.vibrations.pop_back(); },
       [](LocalReduction& r) { ++r.greens[1].fields[2].values[5]; },
       [](LocalReduction& r) { r.greens[0].fields[0].step *= 2; },
       [](LocalReduction& r) { r.patches[1].centre = r.patches[0].centre; },
