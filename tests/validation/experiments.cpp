@@ -39,6 +39,8 @@ const std::vector<Experiment>& experiments() {
        "Dogan 2011, equations 6 to 14, figures 3 to 7", run_dogan_reduction},
       {"ours/local-reduction", "A reduced liver that stays close to contacts",
        "Dogan 2011's reduced model; full solve, our own", run_local_reduction},
+      {"ours/live-reduction/sessions", "A local reduction at work in sessions",
+       "converged solution, our own", run_live_reduction_sessions},
       {"ours/propagation-lattice", "What a limit of nodes costs: lattice", "full solve, our own",
        run_propagation_lattice},
       {"ours/propagation-liver-4k", "What a limit of nodes costs: liver of 4,000 nodes",
