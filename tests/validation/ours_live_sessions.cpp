@@ -16,6 +16,8 @@ namespace {
 // Targets: 3 % of force. Bounds: what is measured, and a margin.
 constexpr double kTargetForce = 0.03;
 constexpr Tick kFieldTicks = 8;
+// A place with less is none that the tip can come to from above.
+constexpr double kLeastForce_n = 0.05;
 
 struct Errors {
   std::vector<double> force, field, after;  // in contact; once nothing touches any more
@@ -32,7 +34,7 @@ class Study {
         live_places(liver_.organ(), liver_.reduction, is_short_ ? 1 : 4, is_short_ ? 1 : 6);
     for (std::size_t i = 0; i < places.size(); ++i) {
       show_progress(fmt::format("{}: session {} of {}", liver_.name(), i + 1, places.size()));
-      measure(places[i], i);
+      measure(places[i]);
     }
     show();
   }
@@ -40,7 +42,7 @@ class Study {
  private:
   enum Way { Reduced, Full, kWays };
 
-  void measure(const LivePlace& place, std::size_t number) {
+  void measure(const LivePlace& place) {
     Stroke stroke{.place = place, .aside = place.inward};
     stroke.slide_m = 0.006f;
     stroke.hold_ticks = stroke.slide_ticks = is_short_ ? 120 : 250;
@@ -50,6 +52,10 @@ class Study {
         run_session(liver_.organ(), liver_.reduction.local, script, kFieldTicks),
         run_session(liver_.organ(), nullptr, script, kFieldTicks)};
     const auto reference = run_session(liver_.organ(), nullptr, converged(script), kFieldTicks);
+    if (reference.largest_force_n() < kLeastForce_n) {
+      ++missed_;
+      return;
+    }
     std::array<std::size_t, kWays> used{};
     for (std::size_t way = 0; way < kWays; ++way) {
       auto& errors = errors_[way][place.is_trained ? 1 : 0];
@@ -57,7 +63,8 @@ class Study {
       add_errors(courses[way], reference, errors);
     }
     const auto& reduced = courses[Reduced];
-    lost_ += reduced.lost != 0 ? 1u : 0u;
+    for (std::size_t way = 0; way < kWays; ++way) lost_[way] += courses[way].lost != 0 ? 1u : 0u;
+    ++measured_;
     std::size_t acted = 0;
     for (const auto& tick : reduced.ticks) {
       ++reasons_[{tick.is_reduced, tick.figures.reason}];
@@ -72,19 +79,26 @@ class Study {
                      place.is_trained ? "trained" : "8 mm or more off"),
          fmt::format("{} N", shown(reference.largest_force_n())), part(Reduced), part(Full),
          shown_percent(static_cast<double>(acted) / static_cast<double>(reduced.ticks.size())),
-         reduced.lost == 0 ? "" : fmt::format("tick {}", reduced.lost)});
-    if (number == 0 || (!place.is_trained && !has_plotted_unseen_)) {
+         lost_text(reduced), lost_text(courses[Full])});
+    if (!has_plotted_trained_ || (!place.is_trained && !has_plotted_unseen_)) {
+      has_plotted_trained_ = true;
       if (!place.is_trained) has_plotted_unseen_ = true;
       plot(place, courses[Reduced], courses[Full], reference);
     }
   }
 
+  static std::string lost_text(const Course& course) {
+    return course.lost == 0 ? "" : fmt::format("tick {}", course.lost);
+  }
+
+  // Until it was lost.
   void add_errors(const Course& course, const Course& reference, Errors& errors) {
     const double least = kLeastShare * reference.largest_force_n();
     double largest = 0;
     std::size_t end = 0;
     for (std::size_t i = 0; i < reference.ticks.size(); ++i) {
       if (length(reference.ticks[i].force_n) > 0) end = i + 1;
+      if (course.lost != 0 && i + 1 >= course.lost) continue;
       if (length(reference.ticks[i].force_n) < least) continue;
       errors.force.push_back(force_error(course, reference, i));
       errors.us.push_back(course.ticks[i].us);
@@ -93,6 +107,7 @@ class Study {
       largest = std::max(largest, norm_of(reference.fields[f]));
     for (std::size_t f = 0; f < reference.fields.size(); ++f) {
       const auto tick = (f + 1) * reference.field_ticks - 1;
+      if (course.lost != 0 && tick + 1 >= course.lost) break;
       const double error = field_error(course, reference, f);
       if (length(reference.ticks[tick].force_n) >= least) errors.field.push_back(error);
       if (tick >= end) errors.after.push_back(error * norm_of(reference.fields[f]) / largest);
@@ -151,6 +166,12 @@ class Study {
           {key.first ? "reduced" : "full", step::name_of(key.second),
            shown_percent(static_cast<double>(ticks) / static_cast<double>(all))});
     section_.add(std::move(reasons));
+    section_.say(fmt::format(
+        "{}: {} sessions; lost, for nodes had to be put back: {} of the reduced solver, {} of the "
+        "full one; errors are of the ticks before. Places left out because the tip is inside "
+        "tissue "
+        "from the start: {}.",
+        liver_.title(), measured_, lost_[Reduced], lost_[Full], missed_));
     check();
   }
 
@@ -161,14 +182,15 @@ class Study {
   const bool is_short_;
   std::array<std::array<Errors, 2>, kWays> errors_;  // [way][is trained]
   std::map<std::pair<bool, step::SolverReason>, std::size_t> reasons_;
-  std::size_t lost_ = 0;
-  bool has_plotted_unseen_ = false;
+  std::array<std::size_t, kWays> lost_{};
+  std::size_t measured_ = 0, missed_ = 0;
+  bool has_plotted_trained_ = false, has_plotted_unseen_ = false;
   Table sessions_;
 };
 
 void Study::check() {
   const auto name = [&](const char* what) { return fmt::format("{}-{}", liver_.name(), what); };
-  section_.exactly(name("lost"), "0", std::to_string(lost_),
+  section_.exactly(name("lost"), "0", std::to_string(lost_[Reduced]),
                    "Sessions of the reduced solver in which nodes had to be put back.");
   for (const bool is_trained : {true, false}) {
     const auto& e = errors_[Reduced][is_trained ? 1 : 0];
