@@ -1,5 +1,7 @@
 #include "tests/validation/experiments.h"
 
+#include "tests/validation/live_experiments.h"
+
 namespace trocar::validation {
 
 const std::vector<Experiment>& experiments() {
@@ -45,6 +47,8 @@ const std::vector<Experiment>& experiments() {
        "full solver throughout, our own", run_live_reduction_hand_over},
       {"ours/live-reduction/estimate", "What a local reduction knows of its error",
        "converged solution, our own", run_live_reduction_estimate},
+      {"ours/live-reduction/sizes", "When a local reduction pays",
+       "full solver and converged solution, our own", run_live_reduction_sizes},
       {"ours/propagation-lattice", "What a limit of nodes costs: lattice", "full solve, our own",
        run_propagation_lattice},
       {"ours/propagation-liver-4k", "What a limit of nodes costs: liver of 4,000 nodes",

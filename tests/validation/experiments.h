@@ -39,10 +39,6 @@ void run_dogan_live(const Lab& lab, Section& section);
 void run_dogan_reduction(const Lab& lab, Section& section);
 void run_local_reduction(const Lab& lab, Section& section);
 
-void run_live_reduction_sessions(const Lab& lab, Section& section);
-void run_live_reduction_hand_over(const Lab& lab, Section& section);
-void run_live_reduction_estimate(const Lab& lab, Section& section);
-
 void run_propagation_lattice(const Lab& lab, Section& section);
 void run_propagation_liver(const Lab& lab, Section& section);
 void run_propagation_large_liver(const Lab& lab, Section& section);

@@ -10,7 +10,7 @@
 #include <numbers>
 #include <numeric>
 
-#include "tests/validation/experiments.h"
+#include "tests/validation/live_experiments.h"
 #include "tests/validation/live_livers.h"
 
 namespace trocar::validation {
@@ -99,7 +99,7 @@ class Study {
 
   void run() {
     const auto& patches = lifted_->patches;
-    const std::size_t per_patch = is_short_ ? 4 : 8;
+    const std::size_t per_patch = is_short_ ? 4 : 6;
     std::size_t number = 0;
     for (std::uint32_t p = 0; p < patches.size(); ++p) {
       const auto places = places_of_patch(liver_.organ(), liver_.reduction, p, is_short_ ? 3 : 4);

@@ -9,7 +9,7 @@
 #include <map>
 
 #include "common/base/mix.h"
-#include "tests/validation/experiments.h"
+#include "tests/validation/live_experiments.h"
 #include "tests/validation/live_livers.h"
 
 namespace trocar::validation {

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <map>
 
-#include "tests/validation/experiments.h"
+#include "tests/validation/live_experiments.h"
 #include "tests/validation/live_livers.h"
 
 namespace trocar::validation {
