@@ -226,7 +226,7 @@ class Study {
     section_.at_least(name("cuts"), "one per session", static_cast<double>(cuts_),
                       0.5 * static_cast<double>(cut_sessions_),
                       "Hand-overs because tissue was cut.");
-    section_.at_most(name("jump-cut"), shown_percent(kTarget), quantile(at[1], 0.95), 0.05,
+    section_.at_most(name("jump-cut"), shown_percent(kTarget), quantile(at[1], 0.95), kTarget,
                      "Jump of the force, 95th percentile, sessions with a cut.");
   }
 

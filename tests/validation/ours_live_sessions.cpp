@@ -195,7 +195,7 @@ void Study::check() {
   for (const bool is_trained : {true, false}) {
     const auto& e = errors_[Reduced][is_trained ? 1 : 0];
     const char* of = is_trained ? "trained" : "unseen";
-    section_.at_most(name(of) + "-force", shown_percent(kTargetForce), mean(e.force), 0.05,
+    section_.at_most(name(of) + "-force", shown_percent(kTargetForce), mean(e.force), kTargetForce,
                      "Contact force, mean over ticks in contact.");
   }
 }
