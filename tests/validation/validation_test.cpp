@@ -166,6 +166,17 @@ TEST_F(Validation, ALocalReductionIsNearTheFullModel) {
   EXPECT_EQ(names.size(), 7u);
 }
 
+TEST_F(Validation, SessionsThatALocalReductionMovesAreNearConvergedOnes) {
+  ASSERT_EQ(run("--short --only ours/live-reduction"), 0) << log();
+  const auto names = kept_checks();
+  EXPECT_TRUE(names.contains("ours/live-reduction/sessions/liver-unseen-force"));
+  EXPECT_TRUE(names.contains("ours/live-reduction/hand-over/liver-jump"));
+  EXPECT_TRUE(names.contains("ours/live-reduction/estimate/liver-missed"));
+  EXPECT_TRUE(names.contains("ours/live-reduction/sizes/4k-force"));
+  EXPECT_EQ(names.size(), 11u);
+  EXPECT_TRUE(fs::exists(out() / "scenarios" / "live-estimate.csv"));
+}
+
 TEST_F(Validation, CommandLine) {
   EXPECT_EQ(run("--help"), 0);
   EXPECT_NE(log().find("Examples:"), std::string::npos);

@@ -1,0 +1,36 @@
+#pragma once
+
+// The measured livers with local reductions that the live-reduction experiments share: made when
+// the first of them asks.
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "tests/validation/live_sessions.h"
+#include "tests/validation/measured_livers.h"
+
+namespace trocar::validation {
+
+// Below this share of a session's largest force the tool has hardly met the tissue.
+inline constexpr double kLeastShare = 0.05;
+
+struct LiveLiver {
+  MeasuredLiver liver;
+  LiveReduction reduction;
+
+  const scene::Organ& organ() const { return liver.organ; }
+  const std::string& name() const { return liver.name; }
+  const std::string& title() const { return liver.title; }
+};
+
+reduction::LocalSettings live_settings(const Lab& lab);
+// One sentence for people.
+std::string live_training_text(const Lab& lab);
+// As measured_livers().
+std::vector<std::shared_ptr<const LiveLiver>> live_livers(const Lab& lab, Section& section);
+
+// Root of the sum of squares, m.
+double norm_of(const LiveField& field);
+
+}  // namespace trocar::validation

@@ -1,0 +1,105 @@
+#pragma once
+
+// Sessions of one tool on a liver with a local reduction, for experiments that put the reduced
+// solver beside the full one: scripts of the tool, what each tick had, and how far one session is
+// from another with the same script.
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "common/scene/local_reduction.h"
+#include "server/reduction/local_build.h"
+#include "server/step/simulation.h"
+#include "tests/validation/report.h"
+
+namespace trocar::validation {
+
+struct LiveReduction {
+  std::shared_ptr<const scene::LocalReduction> local;
+  std::vector<NodeIndex> pressed;  // in the training
+  double seconds = 0;              // wall time that it took
+  std::size_t bytes = 0;           // of its file
+};
+LiveReduction make_live_reduction(const std::string& name, const scene::Organ& organ,
+                                  const reduction::LocalSettings& settings);
+
+// A place among a reduction's patches.
+struct LivePlace {
+  NodeIndex node;
+  std::uint32_t patch = 0;  // whose member it is
+  bool is_trained = false;  // pressed in the training; else at least 8 mm from all that were
+  Vec3f position, outward;  // m; unit
+  Vec3f inward;             // unit, along the surface to the middle of all patches
+};
+// Spread over the patches; fewer if there are no more.
+std::vector<LivePlace> live_places(const scene::Organ& organ, const LiveReduction& reduction,
+                                   std::size_t trained, std::size_t unseen);
+// The centre of a patch and members of it that are spread around it.
+std::vector<LivePlace> places_of_patch(const scene::Organ& organ, const LiveReduction& reduction,
+                                       std::uint32_t patch, std::size_t count);
+
+// A tip comes down on a place from above, stays, slides along the surface, and lifts.
+struct Stroke {
+  LivePlace place;
+  Vec3f aside;  // unit, across place.outward: where it slants and slides to
+  float radius_m = 0.008f, above_m = 0.002f;
+  float depth_m = 0.008f, speed_m_s = 0.04f;
+  float slant = 0;  // moved aside per way down
+  float slide_m = 0;
+  Tick hold_ticks = 250, slide_ticks = 0, free_ticks = 0;  // free: after it has lifted
+
+  Tick down_ticks() const;
+  Tick lift_ticks() const;  // 0 if it stays
+  Tick ticks() const { return down_ticks() + hold_ticks + slide_ticks + lift_ticks() + free_ticks; }
+  // Of the first hand; its join in tick 1.
+  session::TickInputs at(Tick tick) const;
+};
+
+// Displacements of all nodes, m.
+using LiveField = std::vector<Vec3f>;
+
+struct LiveTick {
+  Vec3d force_n;  // of the tissue on the first hand's tool
+  double us = 0;  // CPU time
+  bool is_reduced = false;
+  step::SolverFigures figures;  // of sessions with a reduction
+  float estimate = 0;           // of the reduction's error, after this tick
+};
+struct Course {
+  std::vector<LiveTick> ticks;
+  Tick field_ticks = 1;           // from one field to the next
+  std::vector<LiveField> fields;  // fields[i] is after ticks[(i + 1) * field_ticks - 1]
+  Tick lost = 0;                  // the first in which nodes had to be put back; 0: none
+
+  double largest_force_n() const;
+};
+
+// What a session does in each tick, numbered from 1.
+struct Script {
+  Tick ticks = 0;
+  std::function<session::TickInputs(Tick)> inputs;
+  std::function<step::TickDecisions(Tick)> decisions;  // none: as sessions run by default
+};
+Script script_of(const Stroke& stroke);
+Script converged(Script script);
+
+// reduction: null for a session without one. field_ticks 0: no fields are kept.
+Course run_session(const scene::Organ& organ,
+                   const std::shared_ptr<const scene::LocalReduction>& reduction,
+                   const Script& script, Tick field_ticks);
+
+// Errors beside a converged session with the same script, in ticks in which the reference's force
+// is at least least_n. A session that was lost errs without bound from there on.
+double force_error(const Course& course, const Course& reference, std::size_t tick);
+// Over all nodes; of field number `field`.
+double field_error(const Course& course, const Course& reference, std::size_t field);
+
+// Of values that need not be finite; NaN without values.
+double quantile(std::vector<double> values, double share);
+double mean(const std::vector<double>& values);
+// "mean (95th percentile, worst)", in per cent.
+std::string shown_errors(const std::vector<double>& errors);
+
+}  // namespace trocar::validation
