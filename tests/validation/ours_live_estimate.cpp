@@ -153,7 +153,7 @@ class Study {
       csv_ += fmt::format(
           "{},{},{},{},{:.2f},{},{},{:.1f},{},{},{:.6g},{:.6g},{:.6g},{},{:.6g},"
           "{:.6g},{:.6g},{:.6g}\n",
-          liver_.name(), number, tick.figures.patch, place.node.value, off, depth_mm, slant,
+          liver_.name(), number, tick.figures.patches.patches[0], place.node.value, off, depth_mm, slant,
           std::fmod(azimuth * 180 / std::numbers::pi, 360.0), speed_mm_s, i + 1,
           length(reference.ticks[i].force_n), length(tick.force_n),
           tick.figures.largest_node_force_n, state.is_within ? 1 : 0, state.estimate, state.force,

@@ -144,7 +144,7 @@ class Study {
       const auto &now = course.ticks[i], &before = course.ticks[i - 1];
       if (course.lost != 0 && i + 1 >= course.lost) break;
       const bool is_same = now.is_reduced == before.is_reduced &&
-                           (!now.is_reduced || now.figures.patch == before.figures.patch);
+                           (!now.is_reduced || now.figures.patches == before.figures.patches);
       if (is_same) continue;
       const double at = jump_at(course, i, least), without = jump_at(full, i, least);
       if (!std::isfinite(at) || !std::isfinite(without)) continue;

@@ -124,7 +124,7 @@ class Study {
          fmt::format("{} us, {} us", shown(found.reduced_us), shown(quantile(reduced_us, 0.99))),
          shown(found.full_us / found.reduced_us),
          shown_percent(static_cast<double>(reduced_us.size()) / static_cast<double>(contact)),
-         fmt::format("{:.0f} mm, {}", 1e3 * size.radius_m, patch.field_count()),
+         fmt::format("{:.0f} mm, {}", 1e3 * size.radius_m, made.local->field_count(patch)),
          fmt::format("{} s", shown(made.seconds)),
          fmt::format("{} MB", shown(1e-6 * static_cast<double>(made.bytes)))});
     errors_.rows.push_back({std::to_string(nodes), errors(force[1]), errors(force[0]),
