@@ -1,7 +1,7 @@
 #pragma once
 
-// Every experiment, in the order of the report. To add one: write its function, declare it here
-// (those of live reduction: live_experiments.h), and list it in experiments.cpp.
+// Every experiment, in the order of the report. To add one: write its function, declare it here,
+// and list it in experiments.cpp.
 
 #include <vector>
 
