@@ -17,7 +17,7 @@ constexpr double kLeastFade = 1e-4;
 // Steps from one estimate of the error to the next.
 constexpr std::uint32_t kEstimateInterval = 4;
 // Of touches, J: with less an error is not worth a word.
-constexpr double kLeastWork_j = 2e-6;
+constexpr double kLeastWork_j = 1e-5;
 // Of an amplitude in one correction; the square root of an energy in J. More is as broken as what
 // is not finite: nothing is changed, and the estimate says so until the next.
 constexpr double kMaxChange = 100;
@@ -343,7 +343,14 @@ void LocalExterior::correct(const dynamics::ExteriorStep& step) {
   for (std::size_t c = 0; c < count; ++c)
     gradient_[c] = static_cast<double>(along_[c]) - s.relaxed[c] + s.fade * s.correction[c];
   const auto gradient = std::span(gradient_).first(count);
-  add_product(model.outer_stiffness(), width, s.amplitudes, gradient);
+  const auto outer = std::span(scratch_).first(count);
+  std::ranges::fill(outer, 0.0);
+  add_product(model.outer_stiffness(), width, s.amplitudes, outer);
+  field_work_j_ = 0;
+  for (std::size_t c = 0; c < count; ++c) {
+    gradient[c] += outer[c];
+    field_work_j_ += outer[c] * s.amplitudes[c];
+  }
   add_product(model.mass(), width, std::span(ahead_).first(count), gradient);
   if (!has_factors_) has_factors_ = make_factors(step);
   if (has_factors_)
@@ -386,7 +393,8 @@ float LocalExterior::estimate_error(const dynamics::ExteriorStep& step, const wo
     if (!relaxed.empty()) left -= relaxed[node];
     energy += static_cast<double>(length_squared(left) / model.rim_stiffness()[i]);
   }
-  return static_cast<float>(std::sqrt(energy / (std::max(0.0, contact_work_j_) + kLeastWork_j)));
+  return static_cast<float>(
+      std::sqrt(energy / (std::max(field_work_j_, contact_work_j_) + kLeastWork_j)));
 }
 
 float LocalExterior::end(const dynamics::ExteriorStep& step, dynamics::Float4* velocities,

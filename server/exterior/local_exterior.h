@@ -4,17 +4,16 @@
 // all others move in the patch's fields (LocalPatch), u = Phi q and what is left of where they were
 // when the fields took over, which fades. Between sweeps, q is corrected by a step of Newton's
 // method among the fields: forces of the tets near the patch, those of swept nodes included, are as
-// they are; the others respond as at rest. Implicit Euler, as
-// the solver's. Stress that has relaxed is kept per tet, by the solver; its forces come along the
-// fields.
+// they are; the others respond as at rest. Implicit Euler, as the solver's. Stress that has relaxed
+// is kept per tet, by the solver; its forces come along the fields.
 //
 // Displacements and velocities of nodes stay what holds: whatever solver goes on from them. Of far
 // nodes an eighth is placed in each step, in turns.
 //
 // Its error is estimated from what its fields leave at the nodes of the patch's rim, where all tets
 // are known as they are but nodes do not move on their own: the root of the sum of squared forces
-// over stiffness, an energy, beside the work that the contacts' forces would do along their nodes'
-// displacements.
+// over stiffness, an energy, beside the larger of twice what the fields have stored and the work
+// that the contacts' forces would do along their nodes' displacements.
 //
 // Work per step: the patch's tets and nodes times fields, and an eighth of the organ's. No
 // allocation after take_over() of single patches. One caller; deterministic.
@@ -106,7 +105,7 @@ class LocalExterior : public dynamics::Exterior {
   std::vector<std::uint8_t> is_near_;
   std::vector<std::uint32_t> near_;  // local numbers
   std::vector<Touched> touched_;
-  double contact_work_j_ = 0;  // of the last correction
+  double contact_work_j_ = 0, field_work_j_ = 0;  // of the last correction
   std::vector<float> run_, gathered_;
   std::vector<Vec3f> momentum_;  // per node
 };
