@@ -40,6 +40,46 @@ TEST(CholeskyFactor, SaysWhatIsNot) {
   EXPECT_FALSE(factor.factor());
 }
 
+// Blocks of sizes that end anywhere, and a link across them, against the factor of the whole.
+TEST(BlockSystem, ComesToTheWholeSolution) {
+  constexpr std::size_t kSize = 21;
+  const std::vector<std::size_t> begins{0, 7, 12, kSize};
+  std::vector<float> row[3];
+  for (std::size_t k = 0; k < 3; ++k)
+    for (std::size_t i = 0; i < kSize; ++i)
+      row[k].push_back(static_cast<float>(wave(50 * k + 3 * i)));
+  const SymMat3f link{2, 0.1f, 0.2f, 1, 0, 1.5f};
+  BlockSystem system;
+  system.resize(begins);
+  CholeskyFactor whole(kSize);
+  for (std::size_t i = 0; i < kSize; ++i)
+    for (std::size_t j = 0; j < kSize; ++j) {
+      const double value = i == j ? 4 : 0.2 * wave(i * j + i + j);
+      system.row(i)[j] = value;
+      const Vec3f at{row[0][j], row[1][j], row[2][j]};
+      const Vec3f force = link * at;
+      if (j >= i)
+        whole.row(i)[j] = value + static_cast<double>(row[0][i] * force.x + row[1][i] * force.y +
+                                                      row[2][i] * force.z);
+    }
+  system.add_link({row[0].data(), row[1].data(), row[2].data()}, link);
+  ASSERT_TRUE(system.factor());
+  ASSERT_TRUE(whole.factor());
+  std::vector<double> x(kSize), expected(kSize);
+  for (std::size_t i = 0; i < kSize; ++i) x[i] = expected[i] = wave(i + 5);
+  whole.solve(expected);
+  auto roughly = x;
+  system.solve(roughly);
+  system.solve(x, 60);
+  double rough_error = 0, size = 0;
+  for (std::size_t i = 0; i < kSize; ++i) {
+    EXPECT_NEAR(x[i], expected[i], 1e-5);
+    rough_error += (roughly[i] - expected[i]) * (roughly[i] - expected[i]);
+    size += expected[i] * expected[i];
+  }
+  EXPECT_LT(rough_error, 0.1 * size);
+}
+
 TEST(Fields, AreSummedAndTheirTransposeToo) {
   for (const std::size_t width : {8u, 16u, 24u, 72u, 136u}) {
     constexpr std::size_t kRows = 29;

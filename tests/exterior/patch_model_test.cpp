@@ -68,6 +68,46 @@ TEST_F(PatchModelOfBlock, AlongIsTheTransposeOfEverywhere) {
   EXPECT_NEAR(by_nodes, by_fields, 1e-5 * size);
 }
 
+// Stiffness and mass among the fields of two patches, against sums over the whole organ.
+TEST_F(PatchModelOfBlock, PatchesTogetherHaveTheOrgansMatrices) {
+  PatchSet both;
+  ASSERT_TRUE(both.add(1));
+  ASSERT_TRUE(both.add(0));
+  const PatchModel joint(models_, both);
+  ASSERT_EQ(joint.blocks().size(), 3u);
+  // What both have, such as vibrations, is there once.
+  EXPECT_LT(joint.field_count(), models_[0].field_count() + models_[1].field_count());
+  EXPECT_EQ(joint.blocks()[1], models_[0].field_count());
+  const auto nodes = models_.node_count(), count = joint.field_count();
+  std::vector<std::vector<double>> fields, forces;
+  const auto& k = models_.rest_tangent();
+  for (std::size_t c = 0; c < count; ++c) {
+    std::vector<float> x(joint.stride()), out(3 * nodes);
+    x[c] = 1;
+    joint.add_everywhere(0, nodes, x, out);
+    auto& field = fields.emplace_back(out.begin(), out.end());
+    auto& force = forces.emplace_back(3 * nodes, 0.0);
+    for (std::size_t n = 0; n < nodes; ++n)
+      for (std::size_t b = 0; b < k.columns(n).size(); ++b)
+        for (std::size_t e = 0; e < 9; ++e)
+          force[3 * n + e / 3] +=
+              static_cast<double>(k.blocks(n)[b][e]) * field[3 * k.columns(n)[b] + e % 3];
+  }
+  for (std::size_t i = 0; i < count; ++i)
+    for (std::size_t j = 0; j < count; ++j) {
+      double stiffness = 0, mass = 0, largest_mass = 0;
+      for (std::size_t dof = 0; dof < 3 * nodes; ++dof) {
+        stiffness += fields[i][dof] * forces[j][dof];
+        const double m = organ_.node_masses_kg[dof / 3];
+        mass += fields[i][dof] * m * fields[j][dof];
+        largest_mass += m * (fields[i][dof] * fields[i][dof] + fields[j][dof] * fields[j][dof]);
+      }
+      const auto at = i * joint.stride() + j;
+      EXPECT_NEAR(joint.outer_stiffness()[at] + joint.inner_stiffness()[at], stiffness, 2e-3);
+      EXPECT_NEAR(joint.mass()[at], mass, 1e-5 * largest_mass);
+    }
+}
+
 TEST_F(PatchModelOfBlock, KnowsItsNodes) {
   const auto& model = models_[1];
   std::size_t free = 0;
