@@ -15,7 +15,8 @@ constexpr float kForceMargin = 1.5f;
 constexpr std::uint16_t kWaitTicks = 250;
 // After a cut, until what was near the wound has come to rest there.
 constexpr std::uint16_t kCutWaitTicks = 400;
-// Of the estimate of the error.
+// Of the estimate of the error: where it is larger something is wrong. Errors of the force of some
+// per cent, of which the estimate says little, are far below.
 constexpr float kLargestEstimate = 0.25f;
 constexpr std::size_t kMaxLoaded = 4096;
 // Of making patches ready to act together, ticks: long enough for a thread beside the ticks to be
