@@ -39,11 +39,11 @@ const char* name_of(SolverReason reason) {
     case SolverReason::Idle:
       return "nothing touched yet";
     case SolverReason::Fits:
-      return "contact within a patch";
+      return "contact within patches";
     case SolverReason::Frozen:
       return "tissue frozen beyond its limits";
     case SolverReason::Outside:
-      return "contact not within one patch";
+      return "contact not within patches";
     case SolverReason::Force:
       return "more force than trained";
     case SolverReason::Cut:
