@@ -118,7 +118,7 @@ class BlockDescent {
   Vec3f holding_force(const contact::ContactList& contacts, NodeIndex node) const;
 
   // Of the elastic energy where the world is, N per node, between steps. O(nodes).
-  void elastic_gradient(const world::World& world, std::vector<Vec3f>& gradient);
+  void elastic_gradient(std::span<Vec3f> gradient);
 
   FarPlan far_plan(float dt);
   const Tissue& tissue() const { return tissue_; }

@@ -17,8 +17,7 @@ Vec3f BlockDescent::holding_force(const contact::ContactList& contacts, NodeInde
   return gradients.at(slot % kLanes);
 }
 
-void BlockDescent::elastic_gradient(const world::World& world, std::vector<Vec3f>& gradient) {
-  gradient.resize(world.node_count());
+void BlockDescent::elastic_gradient(std::span<Vec3f> gradient) {
   restart_stars();
   for_each_group(all_groups_, [&](Group g) {
     tissue_.begin_group(g, x_.data(), 0);

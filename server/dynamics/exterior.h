@@ -22,8 +22,6 @@ struct ExteriorStep {
   const contact::ContactList& contacts;
   std::span<const NodeIndex> near;
   float dt = 1e-3f;  // s
-
-  Float4& at(NodeIndex node) const { return x[groups.slot_of(node)]; }
 };
 
 class Exterior {

@@ -21,7 +21,6 @@ class CholeskyFactor {
  public:
   explicit CholeskyFactor(std::size_t size = 0) { resize(size); }
   void resize(std::size_t size);
-  std::size_t stride() const { return stride_; }
   // To be filled: the upper triangle.
   double* row(std::size_t i) { return upper_.data() + i * stride_; }
   // False: not positive definite.
@@ -40,8 +39,6 @@ class BlockSystem {
  public:
   // begins: of each block, and the end.
   void resize(std::span<const std::size_t> begins);
-  std::size_t size() const { return size_; }
-  std::span<const std::size_t> begins() const { return begins_; }
   // To be filled: all of it, but of the blocks on the diagonal the upper triangles alone are read.
   double* row(std::size_t i) { return matrix_.data() + i * stride_; }
   // Then, until the next resize() or clear_links(): adds R^T B R, with R of three rows of floats,

@@ -22,10 +22,20 @@ void visit(world::StateArchive& archive, PatchSet& set) {
     if (set.patches[i] >= set.patches[i + 1]) archive.fail();
 }
 
+void ExteriorState::end() {
+  patches = {};
+  age = 0;
+  estimate = 0;
+  fade = 0;
+  for (auto* values : {&amplitudes, &rates, &correction, &relaxed, &relaxed_next, &placed})
+    values->clear();
+  steps_since_placed.clear();
+}
+
 void ExteriorState::visit_state(world::StateArchive& archive) {
   visit(archive, patches);
   if (!acts()) {
-    if (archive.is_reading()) *this = {};
+    if (archive.is_reading()) end();
     return;
   }
   archive.value(age);

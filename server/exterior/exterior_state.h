@@ -17,6 +17,8 @@ void visit(world::StateArchive& archive, PatchSet& set);
 
 struct ExteriorState {
   bool acts() const { return patches.count > 0; }
+  // From now on no patch acts; keeps its memory.
+  void end();
   void visit_state(world::StateArchive& archive);
 
   PatchSet patches;       // whose fields move the organ; none: another solver does

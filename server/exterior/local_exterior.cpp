@@ -191,7 +191,7 @@ void LocalExterior::hand_back(world::World& world) {
   for (std::uint32_t turn = 0; turn < kPlacingTurns; ++turn)
     if (s.steps_since_placed[turn] > 0)
       place(turn, nullptr, nullptr, static_cast<double>(kTickSeconds), world);
-  s = {};
+  s.end();
   set_model(nullptr);
 }
 
@@ -303,17 +303,15 @@ void LocalExterior::add_inertia(const dynamics::ExteriorStep& step) {
 }
 
 // For all corrections of a step: stiffness of contacts is that of the first.
-bool LocalExterior::make_factors(const dynamics::ExteriorStep& step) {
+bool LocalExterior::make_factors(double inertia_per_s2) {
   const auto& model = *model_;
   const auto count = model.field_count(), width = model.stride();
-  const double dt = static_cast<double>(step.dt);
-  const double inertia = (1 / dt + drag_per_s_) / dt;
   const auto mass = model.mass(), outer = model.outer_stiffness(), inner = model.inner_stiffness();
   for (std::size_t i = 0; i < count; ++i) {
     double* const row = system_.row(i);
     const auto at = i * width;
     for (std::size_t j = 0; j < count; ++j)
-      row[j] = mass[at + j] * inertia + outer[at + j] + inner[at + j];
+      row[j] = mass[at + j] * inertia_per_s2 + outer[at + j] + inner[at + j];
   }
   system_.clear_links();
   const auto basis = model.basis();
@@ -352,7 +350,7 @@ void LocalExterior::correct(const dynamics::ExteriorStep& step) {
     field_work_j_ += outer[c] * s.amplitudes[c];
   }
   add_product(model.mass(), width, std::span(ahead_).first(count), gradient);
-  if (!has_factors_) has_factors_ = make_factors(step);
+  if (!has_factors_) has_factors_ = make_factors(inertia);
   if (has_factors_)
     system_.solve(gradient);
   else

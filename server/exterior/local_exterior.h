@@ -16,7 +16,7 @@
 // that the contacts' forces would do along their nodes' displacements.
 //
 // Work per step: the patch's tets and nodes times fields, and an eighth of the organ's. No
-// allocation after take_over() of single patches. One caller; deterministic.
+// allocation, but when more fields take over than ever before. One caller; deterministic.
 
 #include <span>
 #include <vector>
@@ -80,7 +80,7 @@ class LocalExterior : public dynamics::Exterior {
   void gather(const dynamics::ExteriorStep& step);
   void add_contacts(const dynamics::ExteriorStep& step);
   void add_inertia(const dynamics::ExteriorStep& step);
-  bool make_factors(const dynamics::ExteriorStep& step);
+  bool make_factors(double inertia_per_s2);
   float estimate_error(const dynamics::ExteriorStep& step, const world::World& world);
   float place(std::uint32_t turn, const dynamics::ExteriorStep* step, dynamics::Float4* velocities,
               double dt, world::World& world);

@@ -44,9 +44,6 @@ BlockMatrix pattern_of(std::size_t node_count, std::initializer_list<const Eleme
 bool PatchSet::has(std::uint32_t patch) const {
   return std::ranges::binary_search(all(), patch);
 }
-bool PatchSet::has_all(const PatchSet& other) const {
-  return std::ranges::includes(all(), other.all());
-}
 bool PatchSet::add(std::uint32_t patch) {
   if (has(patch)) return true;
   if (count == kMaxPatches) return false;
@@ -87,15 +84,6 @@ PatchModel::PatchModel(const LocalModels& models, const PatchSet& patches)
   take_inner_stiffness();
   drop_repeated_fields();
   fill_basis();
-}
-
-void PatchModel::take_inner_stiffness() {
-  const auto count = field_count(), width = stride();
-  inner_stiffness_.assign(count * width, 0);
-  const auto of_inner = stiffness_of_inner();
-  for (std::size_t i = 0; i < count; ++i)
-    for (std::size_t j = 0; j < count; ++j)
-      inner_stiffness_[i * width + j] = (of_inner[i * count + j] + of_inner[j * count + i]) / 2;
 }
 
 // Tet by tet, not as a difference: the result is positive semidefinite.
@@ -234,7 +222,7 @@ void PatchModel::fill_basis() {
             static_cast<float>(fields_[c].values[3 * nodes_[n].value + k]) * fields_[c].step;
 }
 
-std::vector<double> PatchModel::stiffness_of_inner() const {
+void PatchModel::take_inner_stiffness() {
   const auto count = field_count(), width = stride();
   auto tangent = pattern_of(nodes_.size(), {&inner_});
   inner_.add_rest_tangent(tangent);
@@ -256,26 +244,29 @@ std::vector<double> PatchModel::stiffness_of_inner() const {
           inner[i * count + j] += static_cast<double>(basis_[(3 * row + k) * width + i]) *
                                   static_cast<double>(product[k * width + j]);
   }
-  return inner;
+  inner_stiffness_.assign(count * width, 0);
+  for (std::size_t i = 0; i < count; ++i)
+    for (std::size_t j = 0; j < count; ++j)
+      inner_stiffness_[i * width + j] = (inner[i * count + j] + inner[j * count + i]) / 2;
 }
 
 void PatchModel::make_matrices(const scene::LocalPatch& patch) {
   const auto count = field_count(), width = stride();
   fill_basis();
-  const auto inner = stiffness_of_inner();
+  take_inner_stiffness();
   std::vector<double> scales;
   for (std::size_t i = 0; i < count; ++i) {
-    const double own = entry(patch.outer_stiffness, i, i) + inner[i * count + i];
+    const double own = entry(patch.outer_stiffness, i, i) + inner_stiffness_[i * width + i];
     // A field is to move the tissue as a whole does that has 1 N/m.
     scales.push_back(own > 0 ? 1 / std::sqrt(own) : 1);
   }
   outer_stiffness_.assign(count * width, 0);
-  inner_stiffness_ = mass_ = outer_stiffness_;
+  mass_ = outer_stiffness_;
   for (std::size_t i = 0; i < count; ++i)
     for (std::size_t j = 0; j < count; ++j) {
       const double scale = scales[i] * scales[j];
       outer_stiffness_[i * width + j] = scale * entry(patch.outer_stiffness, i, j);
-      inner_stiffness_[i * width + j] = scale * (inner[i * count + j] + inner[j * count + i]) / 2;
+      inner_stiffness_[i * width + j] *= scale;
       mass_[i * width + j] = scale * entry(patch.mass, i, j);
     }
   for (std::size_t i = 0; i < count; ++i)

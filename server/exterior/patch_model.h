@@ -26,7 +26,6 @@ struct PatchSet {
 
   std::span<const std::uint32_t> all() const { return {patches.data(), count}; }
   bool has(std::uint32_t patch) const;
-  bool has_all(const PatchSet& other) const;
   // False: there is no room.
   bool add(std::uint32_t patch);
   bool operator==(const PatchSet&) const = default;
@@ -94,8 +93,6 @@ class PatchModel {
   void make_matrices(const scene::LocalPatch& patch);
   void fill_basis();
   void take_inner_stiffness();
-  // Inner tets at rest among the fields, rows of field_count.
-  std::vector<double> stiffness_of_inner() const;
   // Of all nodes among the fields, and of the tets that are not inner.
   void sum_over_nodes(const LocalModels& models, std::span<const TetIndex> inner);
 

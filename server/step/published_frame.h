@@ -66,8 +66,8 @@ struct PublishedFrame {
   std::vector<locks::ClaimEvent> claim_events;  // of the ticks since the frame before
   std::vector<MarkEvent> mark_events;           // likewise
   std::vector<TickRecord> records;              // of the ticks since the frame before
-  // Full state after `snapshot_tick`, at the start and every 10 s, else null. Taken between
-  // publications: publishing changes the quantisation's hysteresis after the tick's hash.
+  // Full state after `snapshot_tick`, at the start, every 10 s and on request, else null. Taken
+  // between publications: publishing changes the quantisation's hysteresis after the tick's hash.
   std::shared_ptr<const Bytes> snapshot;
   Tick snapshot_tick = 0;
   std::uint64_t state_hash = 0;

@@ -79,13 +79,10 @@ void ReducedState::visit_state(world::StateArchive& archive, const exterior::Loc
   bool is_good = static_cast<std::uint8_t>(reason) < kSolverReasons &&
                  are_there(exterior.patches) && are_there(preparing);
   for (std::uint32_t i = 0; i < ready_count; ++i) is_good = is_good && are_there(ready[i]);
-  std::size_t fields = 0;
-  for (const auto p : exterior.patches.all())
-    fields += is_good ? models[p].field_count() : std::size_t{0};
-  if (!is_good || fields != exterior.amplitudes.size()) {
-    archive.fail();
-    *this = {};
-  }
+  if (is_good) return;
+  archive.fail();
+  *this = {};
+  is_cut.resize(models.size());
 }
 
 ReducedTissue::ReducedTissue(const exterior::LocalModels& models)
@@ -95,13 +92,18 @@ ReducedTissue::ReducedTissue(const exterior::LocalModels& models)
   node_forces_.reserve(kMaxLoaded);
 }
 
+bool ReducedTissue::resume(const ReducedState& state) {
+  acting_ = model_of(state.exterior.patches);
+  return acting_ == nullptr || acting_->field_count() == state.exterior.amplitudes.size();
+}
+
 ReducedTissue::Model ReducedTissue::model_of(const exterior::PatchSet& patches) {
   if (patches.count == 0) return nullptr;
   // Single patches live as long as all of them.
   if (patches.count == 1) return {std::shared_ptr<void>(), &models_[patches.patches[0]]};
   const auto found = std::ranges::find(joints_, patches, &Joint::patches);
   if (found != joints_.end()) return found->model;
-  // Of a restored state.
+  // Of a restored state, or the thread had no time for them.
   if (joints_.size() == ReducedState::kMaxReady) joints_.erase(joints_.begin());
   joints_.push_back({patches, std::make_shared<exterior::PatchModel>(models_, patches)});
   return joints_.back().model;
@@ -117,7 +119,6 @@ void ReducedTissue::hand_back(ReducedState& state, dynamics::BlockDescent& solve
 
 bool ReducedTissue::choose(const Inputs& inputs, ReducedState& state,
                            dynamics::BlockDescent& solver, world::World& world) {
-  if (state.exterior.acts() && acting_ == nullptr) acting_ = model_of(state.exterior.patches);
   exterior_.use(state.exterior, acting_.get());
   exterior_.follow_cuts(world);
   if (state.wait_ticks > 0) --state.wait_ticks;
@@ -130,7 +131,8 @@ bool ReducedTissue::choose(const Inputs& inputs, ReducedState& state,
     if (has_failed && state.wait_ticks == 0) state.wait_ticks = kWaitTicks;
   } else if (!(patches == state.exterior.patches)) {
     hand_back(state, solver, world);
-    solver.elastic_gradient(world, gradient_);
+    gradient_.resize(world.node_count());
+    solver.elastic_gradient(gradient_);
     acting_ = model_of(patches);
     exterior_.take_over(patches, *acting_, gradient_, world);
   }
@@ -158,10 +160,10 @@ SolverReason ReducedTissue::decide(const Inputs& inputs, ReducedState& state,
     is_touched = true;
     has_all = has_all && has_room(*acting_, nodes);
   }
+  if (acts && !(state.exterior.estimate <= kLargestEstimate)) return SolverReason::Error;
   if (!is_touched) return acts ? SolverReason::Fits : SolverReason::Idle;
   if (figures_.largest_node_force_n > kForceMargin * static_cast<float>(models_.force_n()))
     return SolverReason::Force;
-  if (acts && !(state.exterior.estimate <= kLargestEstimate)) return SolverReason::Error;
   if (has_all) return SolverReason::Fits;
   for (const auto& tool : inputs.contacts.tools) {
     const auto nodes = inputs.contacts.seeds_of(tool);
@@ -209,29 +211,29 @@ bool ReducedTissue::find_patch(std::span<const NodeIndex> nodes, const ReducedSt
 }
 
 // Patches that act together are made ready by a thread of their own, and are so after a number of
-// ticks that does not depend on it.
+// ticks that does not depend on it. While it still makes others these wait.
 bool ReducedTissue::is_ready(const exterior::PatchSet& patches, ReducedState& state) {
   const auto known = std::span(state.ready).first(state.ready_count);
   if (std::ranges::find(known, patches) != known.end()) return true;
-  const auto make = [this, patches] {
+  if (!(state.preparing == patches)) {
+    state.preparing = patches;
+    state.prepare_ticks =
+        kPrepareTicks + static_cast<std::uint32_t>(models_.node_count()) / kNodesPerPrepareTick;
+  }
+  if (!(making_.patches == patches) && !background_.is_busy()) {
     making_ = {patches, nullptr};
     background_.start([this] {
       making_.model = std::make_shared<exterior::PatchModel>(models_, making_.patches);
     });
-  };
-  if (!(state.preparing == patches)) {
-    background_.wait();
-    state.preparing = patches;
-    state.prepare_ticks =
-        kPrepareTicks + static_cast<std::uint32_t>(models_.node_count()) / kNodesPerPrepareTick;
-    make();
   }
   if (state.prepare_ticks > 0) --state.prepare_ticks;
   if (state.prepare_ticks > 0) return false;
-  background_.wait();
-  if (joints_.size() == ReducedState::kMaxReady) joints_.erase(joints_.begin());
-  if (making_.patches == patches && making_.model) joints_.push_back(std::move(making_));
-  making_ = {};
+  if (making_.patches == patches) {
+    background_.wait();
+    if (joints_.size() == ReducedState::kMaxReady) joints_.erase(joints_.begin());
+    joints_.push_back(std::move(making_));
+    making_ = {};
+  }
   if (state.ready_count == ReducedState::kMaxReady) {
     std::shift_left(state.ready.begin(), state.ready.end(), 1);
     --state.ready_count;

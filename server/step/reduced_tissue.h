@@ -70,6 +70,9 @@ class ReducedTissue {
   // Outlives it.
   explicit ReducedTissue(const exterior::LocalModels& models);
 
+  // Of a state that was restored: makes its patches ready. False: the state is of others.
+  bool resume(const ReducedState& state);
+
   struct Inputs {
     const contact::ContactList& contacts;
     std::span<const NodeIndex> active;  // nodes that the full solver sweeps most

@@ -66,6 +66,16 @@ void State::visit_without_mark(world::StateArchive& archive) {
 
 namespace {
 
+std::shared_ptr<const Scene> scene_of(scene::Organ organ,
+                                      std::shared_ptr<const scene::LocalReduction> reduction) {
+  auto scene = std::make_shared<Scene>();
+  scene->organ = std::move(organ);
+  scene->reduction = std::move(reduction);
+  // Of the organ where it stays.
+  if (scene->reduction) scene->models.emplace(*scene->reduction, scene->organ);
+  return scene;
+}
+
 const exterior::LocalModels* models_of(const Scene& scene) {
   return scene.models ? &*scene.models : nullptr;
 }
@@ -79,17 +89,18 @@ bool is_costly(const scene::Organ& organ) {
 
 // The solver begins with the organ as it was, whatever the state: plans and places follow from that
 // and from the edits since.
-StepContext::StepContext(const Scene& s, const State& state)
-    : StepContext(s, world::World(s.organ), state) {}
+StepContext::StepContext(const Scene& s, unsigned workers, const State& state)
+    : StepContext(s, workers, world::World(s.organ), state) {}
 
-StepContext::StepContext(const Scene& s, const world::World& uncut, const State& state)
+StepContext::StepContext(const Scene& s, unsigned workers, const world::World& uncut,
+                         const State& state)
     : scene(s),
       finder(s.organ),
       self_finder(s.organ),
       neighbours(s.organ.mesh.node_neighbours),
       queue(state.world.node_count()),
       active(state.world.node_count()),
-      solver(s.organ, uncut, s.workers),
+      solver(s.organ, uncut, workers),
       far_plan(solver.far_plan(kTickSeconds)),
       has_linear_far_field(is_costly(s.organ)),
       surface_displacements(state.cuts.layout().vertex_count()) {
@@ -156,10 +167,16 @@ Status validate(const TickDecisions& d) {
 
 Simulation::Simulation(scene::Organ organ, unsigned workers,
                        std::shared_ptr<const scene::LocalReduction> reduction)
-    : scene_(std::make_unique<Scene>(Scene{std::move(organ), workers, std::move(reduction), {}})) {
-  if (scene_->reduction) scene_->models.emplace(*scene_->reduction, scene_->organ);
-  state_ = std::make_unique<State>(scene_->organ, models_of(*scene_));
-  context_ = std::make_unique<StepContext>(*scene_, *state_);
+    : Simulation(scene_of(std::move(organ), std::move(reduction)), workers) {}
+
+Simulation::Simulation(std::shared_ptr<const Scene> scene, unsigned workers)
+    : scene_(std::move(scene)),
+      workers_(workers),
+      state_(std::make_unique<State>(scene_->organ, models_of(*scene_))),
+      context_(std::make_unique<StepContext>(*scene_, workers_, *state_)) {}
+
+Simulation Simulation::beside(unsigned workers) const {
+  return {scene_, workers};
 }
 
 const TickReport& Simulation::tick(const session::TickInputs& inputs,
@@ -176,17 +193,26 @@ void Simulation::use_mark(session::MarkAction action) {
   MarkEvent event{state_->world.tick + 1, action, true};
   if (action == session::MarkAction::Set) {
     state_->set_mark();
-  } else if (auto marked = state_->returned_to_mark(scene_->organ)) {
+    context_->mark_events.push_back(event);
+    return;
+  }
+  auto marked = state_->returned_to_mark(scene_->organ);
+  auto context = marked ? context_of(*marked) : nullptr;
+  event.is_done = context != nullptr;
+  if (event.is_done) {
     state_ = std::move(marked);
-    auto context = std::make_unique<StepContext>(*scene_, *state_);
     context->claim_events = std::move(context_->claim_events);
     context->mark_events = std::move(context_->mark_events);
     context->solver_changes = std::move(context_->solver_changes);
     context_ = std::move(context);
-  } else {
-    event.is_done = false;
   }
   context_->mark_events.push_back(event);
+}
+
+std::unique_ptr<StepContext> Simulation::context_of(const State& state) const {
+  auto context = std::make_unique<StepContext>(*scene_, workers_, state);
+  if (state.reduced && !context->reduced->resume(*state.reduced)) return nullptr;
+  return context;
 }
 
 void Simulation::write_snapshot(Bytes& out) const {
@@ -205,13 +231,14 @@ Status Simulation::restore_snapshot(BytesView snapshot) {
   auto restored = std::make_unique<State>(scene_->organ, models_of(*scene_));
   auto archive = world::StateArchive::reading(snapshot);
   restored->visit(archive);
-  if (!archive.ok() || !archive.at_end())
+  auto context = archive.ok() && archive.at_end() ? context_of(*restored) : nullptr;
+  if (!context)
     return Error{ErrorCode::BadFile, "snapshot: " + std::to_string(snapshot.size()) +
                                          " bytes do not hold a state of this organ (" +
                                          std::to_string(scene_->organ.mesh.node_count()) +
                                          " nodes)"};
   state_ = std::move(restored);
-  context_ = std::make_unique<StepContext>(*scene_, *state_);
+  context_ = std::move(context);
   return {};
 }
 

@@ -20,6 +20,10 @@ class Simulation {
   explicit Simulation(scene::Organ organ, unsigned workers = 1,
                       std::shared_ptr<const scene::LocalReduction> reduction = nullptr);
 
+  // Another one of the same organ and reduction, at the beginning. Shares with this one what
+  // never changes, so that they may be used by two threads.
+  Simulation beside(unsigned workers) const;
+
   // Simulates one tick. After a tick that publishes, take_frame() has the frame. Returning to a
   // mark costs as much as beginning a session.
   const TickReport& tick(const session::TickInputs& inputs, const TickDecisions& decisions);
@@ -41,9 +45,14 @@ class Simulation {
   const StepContext& context() const { return *context_; }
 
  private:
-  void use_mark(session::MarkAction action);
+  Simulation(std::shared_ptr<const Scene> scene, unsigned workers);
 
-  std::unique_ptr<Scene> scene_;
+  void use_mark(session::MarkAction action);
+  // Null: the state is of another reduction's fields.
+  std::unique_ptr<StepContext> context_of(const State& state) const;
+
+  std::shared_ptr<const Scene> scene_;
+  unsigned workers_ = 1;
   std::unique_ptr<State> state_;
   std::unique_ptr<StepContext> context_;
 };

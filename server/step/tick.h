@@ -58,7 +58,6 @@ struct State {
 // Constant in a session: follows from the organ.
 struct Scene {
   scene::Organ organ;
-  unsigned workers = 1;
   std::shared_ptr<const scene::LocalReduction> reduction;  // null: none
   std::optional<exterior::LocalModels> models;             // of it
 };
@@ -66,9 +65,9 @@ struct Scene {
 // Laid out as input, scratch and output of a tick. Scratch keeps its capacity, so that a tick does
 // not allocate after warm-up; nothing in it outlives a tick's meaning.
 struct StepContext {
-  StepContext(const Scene& scene, const State& state);
+  StepContext(const Scene& scene, unsigned workers, const State& state);
   // uncut: the world of the organ as it was at first.
-  StepContext(const Scene& scene, const world::World& uncut, const State& state);
+  StepContext(const Scene& scene, unsigned workers, const world::World& uncut, const State& state);
 
   // After an edit of the topology, which the world has followed.
   void follow_edit(const dynamics::Topology& topology, const world::SurfaceEdit& edit,

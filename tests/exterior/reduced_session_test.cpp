@@ -4,54 +4,23 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "server/calibration/press.h"
-#include "server/reduction/local_build.h"
 #include "server/step/simulation.h"
-#include "tests/reduction/small_organ.h"
+#include "tests/reduction/reduced_block.h"
 
 namespace trocar::step {
 namespace {
 
 constexpr float kRadius = 0.012f;
 
-// Of a block, made once.
-struct Made {
-  Made() : organ(reduction::testing::block(12, 6, 12)) {
-    auto built = reduction::build_local(organ, {.modes = 16,
-                                                .vibrations = 16,
-                                                .patch_radius_m = 0.018,
-                                                .force_n = 0.5,
-                                                .directions = 1,
-                                                .field_nodes = 3,
-                                                .threads = 2});
-    TROCAR_ASSERT(built.ok());
-    local = std::make_shared<scene::LocalReduction>(std::move(built->reduction));
-  }
-  scene::Organ organ;
-  std::shared_ptr<const scene::LocalReduction> local;
-};
-const Made& made() {
-  static const Made instance;
+const reduction::testing::ReducedBlock& made() {
+  static const reduction::testing::ReducedBlock instance;
   return instance;
 }
 
-const Vec3d& centre_of(std::size_t patch) {
-  return made().organ.mesh.rest_positions[made().local->patches[patch].centre.value];
-}
-// Patches by how near they are to the middle of the top, from 0 on.
-std::size_t patch_number(std::size_t n) {
-  std::vector<std::size_t> order(made().local->patches.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  Vec3d top;
-  for (const auto& x : made().organ.mesh.rest_positions) top.y = std::max(top.y, x.y);
-  std::ranges::stable_sort(order, {},
-                           [&](std::size_t patch) { return length(centre_of(patch) - top); });
-  return order[n];
-}
 Vec3f place_of(std::size_t n) {
-  return to_float(centre_of(patch_number(n)));
+  return to_float(made().centre(made().near_top(n)));
 }
 constexpr Vec3f kOutward{0, 1, 0};
 
@@ -86,6 +55,10 @@ struct Press {
   }
 };
 
+Vec3f force_of(const Simulation& simulation, std::size_t tool) {
+  const auto& contacts = simulation.context().contacts;
+  return contact::reaction_on(contacts, contacts.tools[tool], simulation.state().world).force_n;
+}
 Vec3f force_of(const Simulation& simulation) {
   const auto& contacts = simulation.context().contacts;
   Vec3f force;
@@ -142,6 +115,102 @@ TEST(ReducedSession, GoesOnBitForBitFromASnapshot) {
   // A state of a session without the reduction is none of this one, and the other way round.
   Simulation plain(made().organ);
   EXPECT_FALSE(plain.restore_snapshot(snapshot).ok());
+}
+
+// Two tools, farther apart than one patch reaches.
+class TwoPatches : public ::testing::Test {
+ protected:
+  static session::TickInputs inputs_at(Tick tick) {
+    auto inputs = Press{.depth_m = 0.004f}.at(tick);
+    if (tick == 1) {
+      inputs.joins.push_back(inputs.joins[0]);
+      inputs.joins.back().slot = {1};
+    }
+    static const std::size_t patch = far_patch();
+    inputs.samples.push_back(Press{.patch = patch, .depth_m = 0.003f}.at(tick).samples[0]);
+    inputs.samples.back().tool = tool_slot({1}, 0);
+    return inputs;
+  }
+  // On the top, at least 50 mm from the first.
+  static std::size_t far_patch() {
+    std::size_t n = 1;
+    while (length(place_of(n) - place_of(0)) < 0.05f) ++n;
+    return n;
+  }
+};
+
+TEST_F(TwoPatches, ActTogether) {
+  Simulation reduced(made().organ, 1, made().local), converged(made().organ);
+  const auto all = calibration::full_decisions();
+  std::size_t preparing = 0;
+  for (Tick tick = 1; tick <= 900; ++tick) {
+    reduced.tick(inputs_at(tick), {});
+    const auto& figures = reduced.context().reduced->figures();
+    preparing += figures.reason == SolverReason::Preparing ? 1u : 0u;
+    if (tick > 500) {
+      EXPECT_EQ(figures.patches.count, 2u) << tick;
+    }
+    converged.tick(inputs_at(tick), all);
+  }
+  EXPECT_GT(preparing, 20u);
+  for (std::size_t tool = 0; tool < 2; ++tool) {
+    const Vec3f expected = force_of(converged, tool);
+    EXPECT_LT(length(force_of(reduced, tool) - expected), 0.03f * length(expected)) << tool;
+  }
+  EXPECT_LT(difference_of(reduced, converged), 0.08);
+}
+
+TEST_F(TwoPatches, GoOnBitForBitFromSnapshots) {
+  Simulation first(made().organ, 1, made().local), while_preparing(made().organ, 2, made().local),
+      acting(made().organ, 1, made().local);
+  Bytes snapshot;
+  Tick next = 1;
+  const auto run_until = [&](auto&& is_so) {
+    do first.tick(inputs_at(next), {});
+    while (!is_so(first.context().reduced->figures()) && next++ < 2000);
+    ++next;
+    snapshot.clear();
+    first.write_snapshot(snapshot);
+  };
+  run_until([](const SolverFigures& f) { return f.reason == SolverReason::Preparing; });
+  // Made beside something else before.
+  for (Tick tick = 1; tick <= 150; ++tick) while_preparing.tick(Press{.patch = 1}.at(tick), {});
+  ASSERT_TRUE(while_preparing.restore_snapshot(snapshot).ok());
+  const auto start = next;
+  run_until([](const SolverFigures& f) { return f.patches.count == 2; });
+  for (Tick tick = start; tick < next; ++tick) while_preparing.tick(inputs_at(tick), {});
+  ASSERT_TRUE(acting.restore_snapshot(snapshot).ok());
+  for (; next <= 900; ++next) {
+    const auto hash = first.tick(inputs_at(next), {}).state_hash;
+    ASSERT_EQ(while_preparing.tick(inputs_at(next), {}).state_hash, hash) << next;
+    ASSERT_EQ(acting.tick(inputs_at(next), {}).state_hash, hash) << next;
+  }
+}
+
+// Of as many patches, but not as many fields: another reduction of this organ.
+TEST_F(TwoPatches, AreNotThoseOfAnotherReduction) {
+  Simulation first(made().organ, 1, made().local);
+  for (Tick tick = 1; tick <= 600; ++tick) first.tick(inputs_at(tick), {});
+  ASSERT_EQ(first.context().reduced->figures().patches.count, 2u);
+  Bytes snapshot;
+  first.write_snapshot(snapshot);
+  auto fewer = std::make_shared<scene::LocalReduction>(*made().local);
+  for (auto& patch : fewer->patches) patch.modes.pop_back();
+  for (auto& patch : fewer->patches) {
+    const auto gone = fewer->vibrations.size() + patch.modes.size();
+    for (auto* lower : {&patch.outer_stiffness, &patch.mass}) {
+      std::vector<double> kept;
+      for (std::size_t i = 0, at = 0; at < lower->size(); ++i)
+        for (std::size_t j = 0; j <= i; ++j, ++at)
+          if (i != gone && j != gone) kept.push_back((*lower)[at]);
+      *lower = std::move(kept);
+    }
+  }
+  Simulation other(made().organ, 1, fewer);
+  const auto restored = other.restore_snapshot(snapshot);
+  ASSERT_FALSE(restored.ok());
+  EXPECT_EQ(other.current_tick(), 0u);
+  other.tick(inputs_at(1), {});
 }
 
 TEST(ReducedSession, HandsOverWithoutAJump) {
