@@ -54,18 +54,19 @@ Status parse_size(const std::string& text, render::Size& size) {
 
 Status parse_overlays(const std::vector<std::string>& names, Overlays& overlays) {
   if (names.empty()) return {};
-  overlays = {.regions = false, .holds = false, .arrows = false, .rate = false};
+  overlays = {.regions = false, .arrows = false};
   const std::map<std::string, bool Overlays::*> known = {{"regions", &Overlays::regions},
                                                          {"holds", &Overlays::holds},
                                                          {"arrows", &Overlays::arrows},
-                                                         {"rate", &Overlays::rate}};
+                                                         {"rate", &Overlays::rate},
+                                                         {"ghost", &Overlays::ghost}};
   for (const std::string& name : names) {
     if (name == "nothing" && names.size() == 1) continue;
     const auto found = known.find(name);
     if (found == known.end())
-      return Error{
-          ErrorCode::Usage,
-          "--show: '" + name + "' is not one of regions, holds, arrows, rate (or nothing, alone)"};
+      return Error{ErrorCode::Usage,
+                   "--show: '" + name +
+                       "' is not one of regions, holds, arrows, rate, ghost (or nothing, alone)"};
     overlays.*found->second = true;
   }
   return {};
@@ -131,9 +132,10 @@ Result<std::optional<ClientOptions>> parse_client_command_line(int argc, char** 
       ->type_name("N")
       ->check(CLI::Range(1.0, 240.0));
   std::vector<std::string> overlays;
-  app.add_option("--show", overlays,
-                 "what is drawn over the picture: regions, holds, arrows, rate, or nothing; keys "
-                 "change it [regions,arrows]")
+  app.add_option(
+         "--show", overlays,
+         "what is drawn over the picture: regions, holds, arrows, rate, ghost, or nothing; keys "
+         "change it [regions,arrows]")
       ->type_name("A,B")
       ->delimiter(',');
   std::vector<double> view;

@@ -15,7 +15,7 @@ enum class Display : std::uint8_t { Window, Headless, None };
 
 // What is drawn over the picture; keys change it.
 struct Overlays {
-  bool regions = true, holds = false, arrows = true, rate = false;
+  bool regions = true, holds = false, arrows = true, rate = false, ghost = false;
 
   bool operator==(const Overlays&) const = default;
 };

@@ -70,6 +70,8 @@ std::string to_json(const ClientSummary& summary, const replica::Replica& replic
   json.add_count("change_mismatches", counters.change_mismatches);
   json.add_count("healed", counters.healed);
   json.add_count("deltas_ignored", counters.deltas_ignored);
+  json.add_count("ghosts", counters.ghosts);
+  json.add_count("ghosts_ignored", counters.ghosts_ignored);
   json.add_count("bytes_received", counters.bytes);
   json.add_count("bytes_sent", source.bytes_sent);
   json.add_count("delta_payload_bytes", counters.delta_bytes);

@@ -7,6 +7,7 @@
 
 #include "client/replica/client_messages.h"
 #include "client/ui/hud_panels.h"
+#include "client/ui/solver_text.h"
 #include "common/base/log.h"
 
 namespace trocar::app {
@@ -145,6 +146,13 @@ render::SceneView Picture::scene_view(const replica::Replica& replica, Hands& ha
   scene.is_wound = replica.topology().is_wound;
   scene.positions = surface_.positions();
   scene.regions = surface_.regions();
+  const auto& ghost = replica.ghost();
+  ghost_.clear();
+  if (overlays_.ghost && ghost.epoch == replica.topology().epoch &&
+      ghost.offsets.size() == scene.positions.size())
+    for (std::size_t i = 0; i < scene.positions.size(); ++i)
+      ghost_.push_back(scene.positions[i] + ghost.offsets[i]);
+  scene.ghost_positions = ghost_;
   scene.holds = holds(replica);
   for (const replica::Tool& tool : surface_.tools())
     scene.tools.push_back(scene_tool(replica, tool, hands));
@@ -253,6 +261,7 @@ ui::HudModel Picture::hud_model(const replica::Replica& replica, replica::Sessio
   model.shows_holds = overlays_.holds;
   model.shows_arrows = overlays_.arrows;
   model.shows_rate = overlays_.rate;
+  if (overlays_.ghost) model.ghost_text = ui::describe(replica.ghost(), is_replay);
   add_participants(replica, is_replay, model);
   add_labels(replica, scene, model);
   add_messages(replica, now_ns, model);
@@ -275,6 +284,7 @@ void Picture::act(const ui::HudActions& actions, const replica::Replica& replica
   if (actions.toggle_holds) overlays_.holds = !overlays_.holds;
   if (actions.toggle_arrows) overlays_.arrows = !overlays_.arrows;
   if (actions.toggle_rate) overlays_.rate = !overlays_.rate;
+  if (actions.toggle_ghost) overlays_.ghost = !overlays_.ghost;
   if (actions.reset_camera) frame_camera(replica);
   if (actions.screenshot) wants_screenshot_ = true;
   // What cannot be sent is asked for again by whoever presses the key.
@@ -286,6 +296,11 @@ void Picture::act(const ui::HudActions& actions, const replica::Replica& replica
   if (actions.speed) playback->set_speed(*actions.speed);
   if (actions.seek_seconds)
     playback->seek(static_cast<Tick>(std::llround(std::max(0.0, *actions.seek_seconds) * 1e3)));
+}
+
+void Picture::ask_for_ghost(replica::SessionSource& source) {
+  if (source.playback() != nullptr || overlays_.ghost == has_asked_for_ghost_) return;
+  if (replica::ask_for_ghost(source, overlays_.ghost)) has_asked_for_ghost_ = overlays_.ghost;
 }
 
 void Picture::draw(const replica::Replica& replica, replica::SessionSource& source, Hands& hands,
@@ -305,6 +320,7 @@ void Picture::draw(const replica::Replica& replica, replica::SessionSource& sour
     shows_help_ = false;
     help_until_ns_ = 0;
   }
+  ask_for_ghost(source);
   context_->poll_events();
   hud_.begin_frame(seconds);
   const device::PointerInput input = hud_.input();

@@ -47,6 +47,7 @@ class Picture {
                            ui::HudModel& model);
   ui::HudModel hud_model(const replica::Replica& replica, replica::SessionSource& source,
                          const render::SceneView& scene, Hands& hands, std::uint64_t now_ns) const;
+  void ask_for_ghost(replica::SessionSource& source);
   void act(const ui::HudActions& actions, const replica::Replica& replica,
            replica::SessionSource& source);
   void frame_camera(const replica::Replica& replica);
@@ -68,6 +69,8 @@ class Picture {
   bool shows_help_ = false, wants_screenshot_ = false;
   Overlays overlays_;
   StartView view_;
+  bool has_asked_for_ghost_ = false;
+  std::vector<Vec3f> ghost_;  // where the full solution has the vertices of the last picture
   replica::ForceHistory forces_;
   replica::HeldTissue held_;
   std::uint64_t held_history_ = 0;

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <string>
 
+#include "client/render/ghost_net.h"
 #include "client/render/gl.h"
 #include "client/render/noise.h"
 #include "client/render/shader.h"
@@ -136,6 +137,7 @@ struct SceneRenderer::Parts {
   Shader plain_organ{kOrganVertexSource, lit(kPlainHead, kOrganFragmentSource).c_str()};
   Shader tool{kToolVertexSource, lit(kFineHead, kToolFragmentSource).c_str()};
   Shader background{kBackgroundVertexSource, kBackgroundFragmentSource};
+  GhostNet ghost_net;
   VertexArray organ_array, tool_array, background_array;
   GLuint rest_buffer = 0, index_buffer = 0, noise = 0;
   Target sharp, plain;  // with and without samples
@@ -439,6 +441,9 @@ void SceneRenderer::draw(const SceneView& scene, const OrbitCamera& camera, Qual
   glEnable(GL_MULTISAMPLE);
   glEnable(GL_DEPTH_TEST);
   parts.draw_organ(scene, camera, is_sharp ? parts.fine_organ : parts.plain_organ);
+  if (!scene.ghost_positions.empty())
+    parts.ghost_net.draw(scene.positions, scene.ghost_positions, scene.triangles,
+                         camera.clip_from_world(parts.size), camera.rays(parts.size).eye);
   parts.draw_tools(scene, camera);
   glDisable(GL_DEPTH_TEST);
   glBindVertexArray(0);

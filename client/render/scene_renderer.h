@@ -52,6 +52,7 @@ struct SceneView {
   std::span<const Vec3f> positions;        // m, as many as rest_positions; empty: no organ yet
   std::span<const std::uint16_t> regions;  // per vertex; may be empty
   std::vector<Hold> holds;                 // per vertex; empty: not shown
+  std::span<const Vec3f> ghost_positions;  // of another solution, as many; empty: none
   bool shows_regions = true, shows_arrows = true;
   std::vector<SceneTool> tools;
   float seconds = 0;  // since the last picture

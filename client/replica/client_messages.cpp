@@ -28,4 +28,10 @@ bool ask_for_mark(SessionSource& source, bool is_return) {
   return source.send(envelope);
 }
 
+bool ask_for_ghost(SessionSource& source, bool is_wanted) {
+  proto::Envelope envelope;
+  envelope.mutable_ghost_request()->set_is_wanted(is_wanted);
+  return source.send(envelope);
+}
+
 }  // namespace trocar::replica

@@ -1,6 +1,6 @@
 #pragma once
 
-// What a client says: a reading of one of its tools, an instructor's wish.
+// What a client says: a reading of one of its tools, a person's wish.
 
 #include "client/replica/session_source.h"
 #include "common/scene/tool.h"
@@ -12,5 +12,8 @@ bool send_tool_sample(SessionSource& source, std::uint32_t tool, std::uint32_t s
                       const scene::ToolSample& sample);
 // To mark the organ as it is, or to return it to the mark. False if the source dropped it.
 bool ask_for_mark(SessionSource& source, bool is_return);
+// To be shown the full solution beside a session with a reduction, or no longer. False if the
+// source dropped it.
+bool ask_for_ghost(SessionSource& source, bool is_wanted);
 
 }  // namespace trocar::replica

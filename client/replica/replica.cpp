@@ -124,6 +124,8 @@ bool read_solver(const proto::FrameState& message, std::optional<SolverFigures>&
   return true;
 }
 
+static_assert(static_cast<int>(GhostStatus::None) == proto::GHOST_NONE &&
+              static_cast<int>(GhostStatus::Behind) == proto::GHOST_BEHIND);
 static_assert(static_cast<int>(SolverReason::Idle) == proto::SOLVER_IDLE &&
               static_cast<int>(SolverReason::Preparing) == proto::SOLVER_PREPARING);
 
@@ -156,6 +158,8 @@ void Replica::on_message(const proto::Envelope& message, std::uint64_t arrival_n
       return apply_claim(message.claim_event(), arrival_ns);
     case proto::Envelope::kMarkEvent:
       return apply_mark(message.mark_event(), arrival_ns);
+    case proto::Envelope::kGhostFrame:
+      return apply_ghost(message.ghost_frame());
     case proto::Envelope::kBarrier:
       barrier_ = BarrierOutcome{message.barrier().frame(), message.barrier().surface_crc(), 0};
       barrier_answered_ = false;
@@ -469,6 +473,29 @@ void Replica::add_notice(Notice notice) {
   notices_.push_back(std::move(notice));
   if (notices_.size() > kMaxNotices) notices_.pop_front();
   ++notice_count_;
+}
+
+void Replica::apply_ghost(const proto::GhostFrame& message) {
+  const bool is_known = message.status() >= 0 && message.status() <= proto::GHOST_BEHIND;
+  ghost_.status = is_known ? static_cast<GhostStatus>(message.status()) : GhostStatus::Unknown;
+  ghost_.offsets.clear();
+  if (ghost_.status != GhostStatus::Follows) return;
+  const auto is_sane = [](float value) { return std::isfinite(value) && value >= 0; };
+  const Bytes payload(message.payload().begin(), message.payload().end());
+  ghost_quanta_.assign(layout_.vertex_count(), {});
+  if (message.epoch() != layout_.epoch || !is_sane(message.largest_m()) ||
+      !is_sane(message.root_mean_square_m()) ||
+      !wire::decode_keyframe(payload, ghost_quanta_).ok() ||
+      wire::surface_crc(ghost_quanta_) != message.offsets_crc()) {
+    ++counters_.ghosts_ignored;
+    return;
+  }
+  ++counters_.ghosts;
+  for (const auto& offset : ghost_quanta_) ghost_.offsets.push_back(wire::to_metres(offset));
+  ghost_.epoch = message.epoch();
+  ghost_.largest_m = message.largest_m();
+  ghost_.root_mean_square_m = message.root_mean_square_m();
+  ghost_.behind_ms = message.behind_ms();
 }
 
 const Participant* Replica::find_participant(ParticipantSlot slot) const {

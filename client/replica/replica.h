@@ -33,6 +33,7 @@ namespace trocar::proto {
 class Barrier;
 class ClaimEvent;
 class FrameState;
+class GhostFrame;
 class MarkEvent;
 class Participants;
 class SurfaceChange;
@@ -65,6 +66,8 @@ struct ReplicaCounters {
   std::uint64_t change_mismatches = 0;  // changes that did not follow, malformed ones included
   std::uint64_t change_bytes = 0;       // of applied changes
   std::uint64_t healed = 0;             // returned to InStep after a mismatch of either kind
+  std::uint64_t ghosts = 0;             // of the full solution, taken
+  std::uint64_t ghosts_ignored = 0;     // of another epoch, or malformed
   std::uint64_t bytes = 0;              // all messages, on the wire
   std::uint64_t delta_bytes = 0;        // payloads of applied deltas
   std::uint64_t changed_vertices = 0;   // by applied deltas
@@ -109,6 +112,8 @@ class Replica final : public MessageSink {
   // Latest last; `notice_count` counts all that ever came.
   const std::deque<Notice>& notices() const { return notices_; }
   std::uint64_t notice_count() const { return notice_count_; }
+  // Of the full solution, for who has asked; of the surface that is shown if the epochs agree.
+  const Ghost& ghost() const { return ghost_; }
   const std::optional<BarrierOutcome>& barrier() const { return barrier_; }
   const std::string& goodbye_text() const { return goodbye_text_; }
   const ReplicaCounters& counters() const { return counters_; }
@@ -127,6 +132,7 @@ class Replica final : public MessageSink {
   void apply_participants(const proto::Participants& message);
   void apply_mark(const proto::MarkEvent& message, std::uint64_t arrival_ns);
   void add_notice(Notice notice);
+  void apply_ghost(const proto::GhostFrame& message);
   void apply_claim(const proto::ClaimEvent& message, std::uint64_t arrival_ns);
   bool decode_surface(const proto::SurfaceFrame& message);
   void accept_frame(const proto::SurfaceFrame& message, std::uint64_t arrival_ns);
@@ -153,11 +159,13 @@ class Replica final : public MessageSink {
   std::deque<SessionFrame> history_;
   std::uint64_t history_version_ = 0;
   wire::QuantisedSurface scratch_;  // the frame being reconstructed
+  wire::QuantisedSurface ghost_quanta_;
   std::uint32_t surface_crc_ = 0;
   bool request_pending_ = false;  // a KeyframeRequest that could not be queued yet
   std::vector<Participant> participants_;
   std::deque<Notice> notices_;
   std::uint64_t notice_count_ = 0;
+  Ghost ghost_;
   std::optional<BarrierOutcome> barrier_;
   bool barrier_answered_ = false;
   std::string goodbye_text_;

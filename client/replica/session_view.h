@@ -108,6 +108,24 @@ struct SolverFigures {
   bool operator==(const SolverFigures&) const = default;
 };
 
+// What the server says of the full solution that it computes beside a session with a reduction.
+enum class GhostStatus : std::uint8_t {
+  Unknown = 0,  // nothing heard yet
+  None = 1,     // the session has no reduction
+  Begins = 2,
+  Follows = 3,
+  Changed = 4,  // the surface has changed: it begins again
+  Behind = 5,   // it did not keep up: it begins again
+};
+struct Ghost {
+  GhostStatus status = GhostStatus::Unknown;
+  // The rest while it follows.
+  std::uint32_t epoch = 0;
+  std::vector<Vec3f> offsets;  // m, per vertex: from the session's surface to the full solution
+  float largest_m = 0, root_mean_square_m = 0;
+  std::uint32_t behind_ms = 0;
+};
+
 // What the server says about itself with each frame.
 struct FrameFigures {
   std::uint32_t active_nodes = 0, queue_nodes = 0, region_count = 0;

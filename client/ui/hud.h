@@ -67,6 +67,7 @@ struct HudModel {
   std::optional<HudTimeline> timeline;
   float greatest_force_n = 0;  // of all participants' `forces_n`: their common scale
   bool shows_regions = true, shows_holds = false, shows_arrows = true, shows_rate = false;
+  std::string ghost_text;  // empty: it is not to be shown
   bool shows_help = false;
   bool has_own_tool = false;
   bool can_mark = false;  // an instructor's: he may mark the organ and return it to the mark
@@ -74,7 +75,7 @@ struct HudModel {
 
 struct HudActions {
   bool toggle_help = false, toggle_regions = false, toggle_holds = false, toggle_arrows = false;
-  bool toggle_rate = false, reset_camera = false, screenshot = false;
+  bool toggle_rate = false, toggle_ghost = false, reset_camera = false, screenshot = false;
   bool toggle_play = false;
   bool set_mark = false, return_to_mark = false;
   std::optional<double> seek_seconds;

@@ -115,6 +115,7 @@ void draw_session_panel(const HudModel& model, float scale) {
       row("sweeps", format("%u, all other nodes %s", f.sweeps, far_sweeps(f).c_str()));
     rate_rows(model);
     solver_rows(model);
+    if (!model.ghost_text.empty()) row("ghost", model.ghost_text);
     row("residual", format("%.2g mN", static_cast<double>(f.residual_n) * 1e3));
     row("regions", std::to_string(f.region_count));
     if (f.relaxation) {
@@ -265,6 +266,10 @@ void draw_help(const HudModel& model, float scale) {
     help_row("A", model.shows_arrows ? "hide force arrows" : "show force arrows");
     help_row("R",
              model.shows_rate ? "hide what the server decides" : "show what the server decides");
+    if (model.figures.solver && !model.timeline)
+      help_row("G", model.ghost_text.empty() ? "show the full solution: a net, yellow where it is "
+                                               "0.25 mm off, red from 1 mm on"
+                                             : "hide the full solution");
     help_row("F12", "screenshot into the current folder");
     help_row("H, F1", "hide this");
     ImGui::EndTable();

@@ -59,4 +59,34 @@ SolverText describe(const replica::SolverFigures& solver) {
   return text;
 }
 
+std::string describe(const replica::Ghost& ghost, bool is_replay) {
+  if (is_replay) return "none: recordings have no ghost";
+  switch (ghost.status) {
+    case replica::GhostStatus::Unknown:
+      return "asked for";
+    case replica::GhostStatus::None:
+      return "none: this session has no reduction";
+    case replica::GhostStatus::Begins:
+      return "begins";
+    case replica::GhostStatus::Changed:
+      return "begins again after the change";
+    case replica::GhostStatus::Behind:
+      return "too slow, begins again";
+    case replica::GhostStatus::Follows:
+      break;
+  }
+  if (ghost.offsets.empty()) return "waits for the surface";
+  char text[80];
+  const auto mm = [](float m) { return 1e3 * static_cast<double>(m); };
+  std::snprintf(text, sizeof text, "at most %.2f mm away, rms %.2f mm", mm(ghost.largest_m),
+                mm(ghost.root_mean_square_m));
+  std::string line = text;
+  // Less is hard to see.
+  if (ghost.behind_ms >= 200) {
+    std::snprintf(text, sizeof text, "; %.1f s behind", 1e-3 * ghost.behind_ms);
+    line += text;
+  }
+  return line;
+}
+
 }  // namespace trocar::ui

@@ -14,5 +14,7 @@ struct SolverText {
   bool is_reduced = false;
 };
 SolverText describe(const replica::SolverFigures& solver);
+// Of the full solution beside it: "at most 0.21 mm away, rms 0.03 mm", or why there is none.
+std::string describe(const replica::Ghost& ghost, bool is_replay);
 
 }  // namespace trocar::ui

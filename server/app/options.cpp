@@ -71,9 +71,11 @@ Result<std::optional<ServerOptions>> parse_command_line(int argc, char** argv) {
   app.add_flag("--averaged-strain", options.has_averaged_strain,
                "average the strain of its tets over nodes: forces near those of refined elements "
                "instead of up to 40 % too stiff, at three times the time of a tick");
-  app.add_option("--reduction", options.reduction_file,
-                 "local reduction of that organ (trocar-organ reduce --method local): moves the "
-                 "tissue beyond what is touched where it fits, the full solver elsewhere")
+  app.add_option(
+         "--reduction", options.reduction_file,
+         "local reduction of that organ (trocar-organ reduce --method local): moves the "
+         "tissue beyond what is touched where it fits, the full solver elsewhere; clients may "
+         "see the full solution as a ghost, which takes about a core meanwhile")
       ->type_name("FILE");
   app.add_option("--listen", listen, "where to listen; port 0 takes any free one")
       ->type_name("ADDR:PORT")

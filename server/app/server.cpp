@@ -24,6 +24,7 @@
 #include "common/scene/local_reduction_file.h"
 #include "server/app/simulation_loop.h"
 #include "server/app/summary.h"
+#include "server/ghost/ghost.h"
 #include "server/net/tcp_server.h"
 #include "server/replication/messages.h"
 #include "server/replication/replicator.h"
@@ -38,6 +39,7 @@ constexpr milliseconds kPollPeriod{5};
 // Slower than this is said in the log, once in a while.
 constexpr float kSlowTimeRate = 0.98f;
 constexpr float kLongTickMs = 0.9f;
+constexpr std::uintmax_t kLongFileBytes = 50'000'000;  // takes more than a second or two
 constexpr Tick kWarningPeriod = 10 * kTicksPerSecond;
 
 Tick ticks_of(double seconds) {
@@ -100,7 +102,8 @@ class Server {
   bool is_ending_ = false;
   Tick next_warning_ = 0;
   double wall_seconds_ = 0;
-  std::unique_ptr<SimulationLoop> loop_;  // last: its thread uses what stands above
+  std::unique_ptr<SimulationLoop> loop_;  // its thread uses what stands above
+  std::unique_ptr<ghost::Ghost> ghost_;   // likewise; of sessions with a reduction
 };
 
 Status Server::open() {
@@ -124,11 +127,21 @@ Status Server::open() {
     replication.on_participants = [this](const auto& present, Tick tick) {
       journal_->take_participants(present, tick);
     };
+  if (reduction_)
+    replication.on_ghost_wanted = [this](bool is_wanted) { ghost_->set_wanted(is_wanted); };
   replicator_ = std::make_unique<replication::Replicator>(
       *tcp_, inbox_, layout, organ.name, scene::organ_hash(organ), std::move(replication));
   loop_ = std::make_unique<SimulationLoop>(simulation_, inbox_, handover_, journal_.get(),
                                            loop_options(),
                                            [this] { asio::post(io_, [this] { begin_end(); }); });
+  if (reduction_)
+    ghost_ = std::make_unique<ghost::Ghost>(
+        simulation_, ghost::GhostOptions{options_.decisions, [this] { loop_->request_snapshot(); },
+                                         [this](std::shared_ptr<const ghost::GhostReport> report) {
+                                           asio::post(io_, [this, report] {
+                                             if (!is_ending_) replicator_->publish(*report);
+                                           });
+                                         }});
   return {};
 }
 
@@ -179,6 +192,7 @@ void Server::take_frames() {
   if (is_ending_) return;
   handover_.take_all(frames_);
   replicator_->publish(frames_);
+  if (ghost_) ghost_->take_frames(frames_);
   for (const auto& frame : frames_)
     for (const auto& [tick, solver] : frame->solver_changes)
       log::debug("tick {}: solver {}", tick, replication::describe(solver));
@@ -202,6 +216,7 @@ void Server::warn_if_slow() {
 void Server::begin_end() {
   take_frames();
   is_ending_ = true;
+  if (ghost_) ghost_->set_wanted(false);
   signals_.cancel();
   tcp_->stop_accepting();
   replicator_->begin_barrier(loop_->report().last_frame);
@@ -250,7 +265,8 @@ Status Server::finish() {
                         .replication = replicator_->counters(),
                         .encoding = replicator_->encode_statistics(),
                         .tcp = tcp_->counters(),
-                        .inbox = inbox_.counters()};
+                        .inbox = inbox_.counters(),
+                        .ghost = ghost_ ? ghost_->counters() : ghost::GhostCounters{}};
   const auto written = write_text_file(options_.summary_file, to_json(summary));
   return closed ? written : closed;
 }
@@ -263,18 +279,21 @@ Status run_server(const ServerOptions& options) {
   if (options.has_averaged_strain)
     if (const auto averaged = scene::average_strain(*organ); !averaged) return averaged;
   const auto begin = monotonic_ns();
+  std::error_code no_size;  // then reading says what is wrong
+  const auto file_bytes = options.reduction_file.empty()
+                              ? 0
+                              : std::filesystem::file_size(options.reduction_file, no_size);
+  if (!no_size && file_bytes > kLongFileBytes)
+    log::info("reading {}: {:.0f} MB", options.reduction_file,
+              static_cast<double>(file_bytes) * 1e-6);
   auto reduction = read_reduction(options.reduction_file, *organ);
   if (!reduction) return reduction.error();
   const auto model = reduction->model;
   const auto server = std::make_unique<Server>(options, std::move(*organ), std::move(*reduction));
-  if (model) {
-    std::error_code ignored;
-    log::info(
-        "{}: {} patches, {:.1f} MB, ready in {:.1f} s", options.reduction_file,
-        model->patches.size(),
-        static_cast<double>(std::filesystem::file_size(options.reduction_file, ignored)) * 1e-6,
-        static_cast<double>(monotonic_ns() - begin) * 1e-9);
-  }
+  if (model)
+    log::info("{}: {} patches, {:.1f} MB, ready in {:.1f} s", options.reduction_file,
+              model->patches.size(), static_cast<double>(file_bytes) * 1e-6,
+              static_cast<double>(monotonic_ns() - begin) * 1e-9);
   if (const auto opened = server->open(); !opened) return opened;
   return server->run();
 }

@@ -8,8 +8,8 @@
 namespace trocar::app {
 namespace {
 
-// A snapshot every 10 s, in the middle between two publications: publishing changes the hysteresis
-// of the quantisation after the tick's hash was taken.
+// A snapshot every 10 s and when one is asked for, in the middle between two publications:
+// publishing changes the hysteresis of the quantisation after the tick's hash was taken.
 constexpr Tick kSnapshotPeriod = 10'000;
 constexpr Tick kSnapshotPhase = kTicksPerFrame / 2;
 constexpr unsigned long kTimerSlackNs = 1000;
@@ -147,7 +147,10 @@ bool SimulationLoop::run_tick() {
     time_rate_ = ticks / (ticks + static_cast<float>(slow_ticks_ - slow_ticks_before_));
     slow_ticks_before_ = slow_ticks_;
   }
-  if (report.tick % kSnapshotPeriod == kSnapshotPhase && report.tick > kSnapshotPeriod)
+  const bool is_due =
+      report.tick % kSnapshotPeriod == kSnapshotPhase && report.tick > kSnapshotPeriod;
+  if (report.tick % kTicksPerFrame == kSnapshotPhase &&
+      (is_snapshot_requested_.exchange(false, std::memory_order_relaxed) || is_due))
     take_snapshot();
   auto frame = simulation_.take_frame();
   if (!frame) return false;

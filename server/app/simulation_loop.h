@@ -93,6 +93,8 @@ class SimulationLoop {
   ~SimulationLoop();
 
   void start();
+  // A snapshot soon, in a frame; any thread.
+  void request_snapshot() { is_snapshot_requested_.store(true, std::memory_order_relaxed); }
   void request_stop() { is_stop_requested_.store(true, std::memory_order_relaxed); }  // any thread
   // After `ended` was called, or start() never was.
   const LoopReport& report() const { return report_; }
@@ -111,7 +113,7 @@ class SimulationLoop {
   JournalSink* const journal_;
   const LoopOptions options_;
   const std::function<void()> ended_;
-  std::atomic<bool> is_stop_requested_{false};
+  std::atomic<bool> is_stop_requested_{false}, is_snapshot_requested_{false};
 
   // Simulation thread.
   std::optional<control::RateController> controller_;

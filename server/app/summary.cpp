@@ -93,11 +93,13 @@ std::string solver_figures(const Summary& s) {
     "reduction": {}, "reduction_hash": "{:016x}", "reduced_ticks": {}, "full_ticks": {},
     "to_reduced": {}, "to_full": {}, "to_another_patch": {}, "largest_estimate": {:.4g},
     "ticks_by_reason": {{{}}},
-    "to_full_by_reason": {{{}}}
+    "to_full_by_reason": {{{}}},
+    "ghost": {{"frames": {}, "begun": {}, "fallen_behind": {}, "largest_mm": {:.4g}}}
   }})",
       quote(s.reduction->file), s.reduction->hash, solver.reduced_ticks, solver.full_ticks,
       solver.to_reduced, solver.to_full, solver.to_another_patch, solver.largest_estimate,
-      by_reason(solver.ticks_by_reason), by_reason(solver.to_full_by_reason));
+      by_reason(solver.ticks_by_reason), by_reason(solver.to_full_by_reason), s.ghost.frames,
+      s.ghost.begun, s.ghost.fallen, 1e3 * static_cast<double>(s.ghost.largest_m));
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "server/app/simulation_loop.h"
+#include "server/ghost/ghost.h"
 #include "server/net/tcp_server.h"
 #include "server/replication/replicator.h"
 
@@ -25,6 +26,7 @@ struct Summary {
   const replication::EncodeStatistics& encoding;
   const net::TcpCounters& tcp;
   const session::SimulationInbox::Counters& inbox;
+  ghost::GhostCounters ghost;
 };
 
 std::string to_json(const Summary& summary);

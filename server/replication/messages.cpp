@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "common/base/version.h"
+#include "common/wire/surface_codec.h"
 #include "common/wire/surface_messages.h"
 #include "common/wire/tool_shape.h"
 #include "proto/journal.pb.h"
@@ -127,6 +128,20 @@ void write(const step::SolverFigures& solver, proto::SolverState& message) {
 }
 
 }  // namespace
+
+proto::GhostStatus message_of(ghost::GhostStatus status) {
+  switch (status) {
+    case ghost::GhostStatus::Begins:
+      return proto::GHOST_BEGINS;
+    case ghost::GhostStatus::Follows:
+      return proto::GHOST_FOLLOWS;
+    case ghost::GhostStatus::Changed:
+      return proto::GHOST_CHANGED;
+    case ghost::GhostStatus::Behind:
+      return proto::GHOST_BEHIND;
+  }
+  return proto::GHOST_UNSPECIFIED;
+}
 
 std::string describe(const step::SolverFigures& solver) {
   if (solver.is_reduced) {
@@ -286,6 +301,30 @@ wire::SharedBytes encode_early_mark(session::MarkAction action, Tick tick) {
           ? "not returned to the mark: less than a second after the last "
             "request, ask again"
           : "not marked: less than a second after the last request, ask again");
+}
+
+wire::SharedBytes encode_ghost(const ghost::GhostReport& report) {
+  proto::Envelope envelope;
+  auto& message = *envelope.mutable_ghost_frame();
+  message.set_status(message_of(report.status));
+  if (report.status == ghost::GhostStatus::Follows) {
+    Bytes payload;
+    wire::encode_keyframe(report.offsets, payload);
+    message.set_frame(report.frame);
+    message.set_epoch(report.epoch);
+    message.set_payload(payload.data(), payload.size());
+    message.set_offsets_crc(wire::surface_crc(report.offsets));
+    message.set_largest_m(report.largest_m);
+    message.set_root_mean_square_m(report.root_mean_square_m);
+    message.set_behind_ms(static_cast<std::uint32_t>(report.behind_ticks));
+  }
+  return wire::encode_envelope(envelope);
+}
+
+wire::SharedBytes encode_no_ghost() {
+  proto::Envelope envelope;
+  envelope.mutable_ghost_frame()->set_status(proto::GHOST_NONE);
+  return wire::encode_envelope(envelope);
 }
 
 wire::SharedBytes encode_barrier(const step::PublishedFrame& frame) {

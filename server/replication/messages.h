@@ -9,6 +9,7 @@
 
 #include "common/wire/framing.h"
 #include "common/wire/surface_layout.h"
+#include "server/ghost/ghost_follower.h"
 #include "server/locks/claims.h"
 #include "server/replication/validation.h"
 #include "server/session/roster.h"
@@ -41,6 +42,9 @@ wire::SharedBytes encode_claim_event(const locks::ClaimEvent& event, const sessi
 wire::SharedBytes encode_mark_event(const step::MarkEvent& event);
 // To who asked too soon after another request; nothing has been done.
 wire::SharedBytes encode_early_mark(session::MarkAction action, Tick tick);
+wire::SharedBytes encode_ghost(const ghost::GhostReport& report);
+// That there is no ghost in this session.
+wire::SharedBytes encode_no_ghost();
 wire::SharedBytes encode_barrier(const step::PublishedFrame& frame);
 wire::SharedBytes encode_pong(std::uint64_t client_time_us, Tick tick);
 wire::SharedBytes encode_goodbye(EndReason reason, const std::string& text);

@@ -38,6 +38,7 @@ struct Replicator::Client {
   bool has_old_surface = false;                     // so that no delta helps
   step::SharedFrame baseline;                       // the last frame this client was given
   bool wants_keyframe = false;
+  bool wants_ghost = false;
   std::uint64_t last_requested_keyframe_ns = 0;
   std::array<std::optional<std::uint32_t>, kToolsPerHand> last_sequence;
   std::uint64_t rate_window_begin_ns = 0;
@@ -123,6 +124,15 @@ void Replicator::settle_participants() {
       options_.on_participants(present, encoder_.current() ? encoder_.current()->tick : 0);
     broadcast(encode_participants(present));
   }
+  settle_ghost();
+}
+
+void Replicator::settle_ghost() {
+  if (!options_.on_ghost_wanted) return;
+  const bool is_wanted =
+      std::ranges::any_of(clients_, [](const auto& entry) { return entry.second->wants_ghost; });
+  if (is_wanted != is_ghost_wanted_) options_.on_ghost_wanted(is_wanted);
+  is_ghost_wanted_ = is_wanted;
 }
 
 void Replicator::end_all(EndReason reason, const std::string& text) {
@@ -163,6 +173,9 @@ std::optional<Replicator::Ending> Replicator::take_message(Client& client, Bytes
       return take_ack(client, envelope.frame_ack().frame(), envelope.frame_ack().surface_crc());
     case proto::Envelope::kMarkRequest:
       return take_mark(client, envelope.mark_request().action());
+    case proto::Envelope::kGhostRequest:
+      take_ghost_request(client, envelope.ghost_request().is_wanted());
+      return std::nullopt;
     case proto::Envelope::kKeyframeRequest:
       client.wants_keyframe = true;
       if (encoder_.current() && may_have_requested_keyframe(client)) give_frame(client, false);
@@ -258,6 +271,13 @@ std::optional<Replicator::Ending> Replicator::take_mark(Client& client, int acti
   return std::nullopt;
 }
 
+void Replicator::take_ghost_request(Client& client, bool is_wanted) {
+  client.wants_ghost = is_wanted && options_.on_ghost_wanted != nullptr;
+  if (!is_wanted) return;
+  // If it does not fit, the next one does; without a ghost the client asks again or waits in vain.
+  send(client, options_.on_ghost_wanted ? encode_ghost({}) : encode_no_ghost());
+}
+
 std::optional<Replicator::Ending> Replicator::take_ack(Client& client, Frame frame,
                                                        std::uint32_t crc) {
   if (!client.baseline || frame > client.baseline->frame)
@@ -320,13 +340,17 @@ bool Replicator::may_have_requested_keyframe(const Client& client) const {
   return options_.clock_ns() - client.last_requested_keyframe_ns >= options_.keyframe_interval_ns;
 }
 
+bool Replicator::has_room(const Client& client) const {
+  const auto limit = std::max(options_.skip_above_bytes, 2 * encoder_.typical_frame_bytes());
+  return connections_.outstanding_bytes(client.id) <= limit;
+}
+
 bool Replicator::give_frame(Client& client, bool is_required) {
   const auto& frame = *encoder_.current();
   const auto* baseline = client.baseline.get();
   const bool is_requested = client.wants_keyframe && may_have_requested_keyframe(client);
   if (baseline && baseline->frame == frame.frame && !is_requested) return true;
-  const auto limit = std::max(options_.skip_above_bytes, 2 * encoder_.typical_frame_bytes());
-  if (!is_required && connections_.outstanding_bytes(client.id) > limit) {
+  if (!is_required && !has_room(client)) {
     ++counters_.frames_skipped;
     return false;
   }
@@ -374,6 +398,19 @@ void Replicator::publish(std::span<const step::SharedFrame> frames) {
   for (const auto& [id, client] : clients_)
     if (client->participant) give_frame(*client, false);
   settle_participants();
+}
+
+void Replicator::publish(const ghost::GhostReport& report) {
+  // Of a surface that they have: a change since is on its way, or they have it already.
+  const bool follows = report.status == ghost::GhostStatus::Follows;
+  if (follows && (report.epoch != layout_.epoch || report.offsets.size() != layout_.vertex_count()))
+    return;
+  const auto bytes = encode_ghost(report);
+  for (const auto& [id, client] : clients_) {
+    if (!client->wants_ghost) continue;
+    const bool is_given = has_room(*client) && send(*client, bytes);
+    ++(is_given ? counters_.ghosts_given : counters_.ghosts_skipped);
+  }
 }
 
 void Replicator::begin_barrier(const step::SharedFrame& last) {

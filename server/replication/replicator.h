@@ -17,6 +17,8 @@
 // claim events, surface changes, topology and barrier cannot be skipped: if one does not fit, the
 // session ends as too slow.
 //
+// Ghost: who has asked gets what the ghost's thread reports, if the outbox has room for it.
+//
 // Barrier: publishes a last frame, asks each participant for the CRC of what it shows, and collects
 // the answers.
 //
@@ -33,6 +35,7 @@
 
 #include "common/base/timing.h"
 #include "common/wire/surface_layout.h"
+#include "server/ghost/ghost_follower.h"
 #include "server/net/connections.h"
 #include "server/replication/frame_encoder.h"
 #include "server/replication/validation.h"
@@ -56,6 +59,8 @@ struct ReplicatorOptions {
   std::function<std::uint64_t()> clock_ns = monotonic_ns;
   // Told who is here after each change, with the tick of the newest frame; may be empty.
   std::function<void(const std::vector<session::Participant>&, Tick)> on_participants;
+  // Whether anybody wants the ghost, after each change; empty: the session has none.
+  std::function<void(bool)> on_ghost_wanted;
 };
 
 struct BarrierResult {
@@ -77,6 +82,7 @@ struct ReplicatorCounters {
   std::uint64_t frames_given = 0, frames_skipped = 0;  // summed over clients
   std::uint64_t keyframes_given = 0;
   std::uint64_t surface_changes = 0, surface_change_bytes = 0;  // each counted once
+  std::uint64_t ghosts_given = 0, ghosts_skipped = 0;           // summed over clients
   std::uint64_t bytes_queued = 0;
 };
 
@@ -90,6 +96,8 @@ class Replicator final : public net::ConnectionHandler {
   // Frames since the last call, oldest first, none left out. Claim events and surface changes of
   // all of them are delivered, the displacements only of the newest.
   void publish(std::span<const step::SharedFrame> frames);
+
+  void publish(const ghost::GhostReport& report);
 
   // `last` has been or is now published; no further publish(). New Hellos are refused.
   void begin_barrier(const step::SharedFrame& last);
@@ -121,6 +129,7 @@ class Replicator final : public net::ConnectionHandler {
   std::optional<Ending> admit(Client& client, const proto::Hello& hello);
   std::optional<Ending> take_sample(Client& client, const proto::ToolSample& sample);
   std::optional<Ending> take_mark(Client& client, int action);
+  void take_ghost_request(Client& client, bool is_wanted);
   std::optional<Ending> take_ack(Client& client, Frame frame, std::uint32_t crc);
   bool exceeds_rate(Client& client);
 
@@ -132,6 +141,7 @@ class Replicator final : public net::ConnectionHandler {
   const wire::SharedBytes& topology();
   bool send(Client& client, const wire::SharedBytes& bytes);
   void broadcast(const wire::SharedBytes& bytes);
+  bool has_room(const Client& client) const;
   // True if the client has the newest frame afterwards. `is_required`: do not skip.
   bool give_frame(Client& client, bool is_required);
   bool may_have_requested_keyframe(const Client& client) const;
@@ -139,6 +149,7 @@ class Replicator final : public net::ConnectionHandler {
   void forget(Client& client);
   // Tells everybody who is here, as often as somebody drops out while being told.
   void settle_participants();
+  void settle_ghost();
 
   net::Connections& connections_;
   session::SimulationInbox& inbox_;
@@ -150,6 +161,7 @@ class Replicator final : public net::ConnectionHandler {
   session::Roster roster_;
   std::map<net::ConnectionId, std::unique_ptr<Client>> clients_;
   bool participants_changed_ = false;
+  bool is_ghost_wanted_ = false;
   std::optional<std::uint64_t> last_mark_ns_;
   FrameEncoder encoder_;
   step::SharedFrame barrier_;

@@ -293,6 +293,71 @@ TEST_F(ReplicaTest, WhichSolverActsIsKept) {
   EXPECT_TRUE(replica_.fault().ok());
 }
 
+TEST_F(ReplicaTest, TheGhostIsTakenWhereItFits) {
+  start();
+  const auto vertices = source_.surface().size();
+  wire::QuantisedSurface offsets(vertices);
+  offsets[5] = {10, 0, -20};
+  const auto message_of = [&](const wire::QuantisedSurface& values) {
+    proto::Envelope envelope;
+    auto& ghost = *envelope.mutable_ghost_frame();
+    Bytes payload;
+    wire::encode_keyframe(values, payload);
+    ghost.set_status(proto::GHOST_FOLLOWS);
+    ghost.set_epoch(source_.layout().epoch);
+    ghost.set_payload(payload.data(), payload.size());
+    ghost.set_offsets_crc(wire::surface_crc(values));
+    ghost.set_largest_m(7e-4f);
+    ghost.set_root_mean_square_m(1e-5f);
+    ghost.set_behind_ms(48);
+    return envelope;
+  };
+  const auto give = [&](proto::Envelope message) {
+    source_.queue(std::move(message));
+    source_.poll(replica_);
+  };
+  give(message_of(offsets));
+  EXPECT_EQ(replica_.ghost().status, GhostStatus::Follows);
+  ASSERT_EQ(replica_.ghost().offsets.size(), vertices);
+  EXPECT_EQ(replica_.ghost().offsets[5], wire::to_metres(offsets[5]));
+  EXPECT_EQ(replica_.ghost().largest_m, 7e-4f);
+  EXPECT_EQ(replica_.ghost().behind_ms, 48u);
+  EXPECT_EQ(replica_.counters().ghosts, 1u);
+
+  std::uint64_t ignored = 0;
+  const auto expect_ignored = [&](proto::Envelope message, const char* what) {
+    give(std::move(message));
+    EXPECT_TRUE(replica_.ghost().offsets.empty()) << what;
+    EXPECT_EQ(replica_.counters().ghosts_ignored, ++ignored) << what;
+  };
+  auto bad = message_of(offsets);
+  bad.mutable_ghost_frame()->set_epoch(source_.layout().epoch + 1);
+  expect_ignored(bad, "epoch");
+  bad = message_of(offsets);
+  bad.mutable_ghost_frame()->set_offsets_crc(1);
+  expect_ignored(bad, "crc");
+  bad = message_of(offsets);
+  bad.mutable_ghost_frame()->set_largest_m(std::numeric_limits<float>::quiet_NaN());
+  expect_ignored(bad, "not a number");
+  bad = message_of(wire::QuantisedSurface(vertices + 1));
+  expect_ignored(bad, "one more");
+  bad = message_of(wire::QuantisedSurface(vertices - 1));
+  expect_ignored(bad, "one less");
+  const auto whole = message_of(offsets).ghost_frame().payload();
+  for (std::size_t length = 0; length < whole.size(); ++length) {
+    bad = message_of(offsets);
+    bad.mutable_ghost_frame()->set_payload(whole.substr(0, length));
+    expect_ignored(bad, "cut off");
+  }
+  bad = message_of(offsets);
+  bad.mutable_ghost_frame()->set_status(static_cast<proto::GhostStatus>(77));
+  give(bad);
+  EXPECT_EQ(replica_.ghost().status, GhostStatus::Unknown);
+  EXPECT_TRUE(replica_.fault().ok());
+  advance(20);
+  expect_in_step();
+}
+
 TEST_F(ReplicaTest, InvalidMessagesAreAFaultThatNamesTheField) {
   const auto fault_of = [&](auto change) {
     testing::SyntheticSource source(testing::make_blob_layout(6, 8, 0.08));

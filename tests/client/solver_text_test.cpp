@@ -36,5 +36,22 @@ TEST(SolverText, ErrorsArePercentages) {
   EXPECT_EQ(error(std::numeric_limits<float>::max()), "over 100 % in energy");
 }
 
+TEST(SolverText, SaysHowFarTheGhostIs) {
+  replica::Ghost ghost;
+  EXPECT_EQ(describe(ghost, false), "asked for");
+  EXPECT_EQ(describe(ghost, true), "none: recordings have no ghost");
+  ghost.status = replica::GhostStatus::None;
+  EXPECT_EQ(describe(ghost, false), "none: this session has no reduction");
+  ghost.status = replica::GhostStatus::Follows;
+  EXPECT_EQ(describe(ghost, false), "waits for the surface");
+  ghost.offsets.resize(4);
+  ghost.largest_m = 2.14e-4f;
+  ghost.root_mean_square_m = 3e-5f;
+  ghost.behind_ms = 48;
+  EXPECT_EQ(describe(ghost, false), "at most 0.21 mm away, rms 0.03 mm");
+  ghost.behind_ms = 1240;
+  EXPECT_EQ(describe(ghost, false), "at most 0.21 mm away, rms 0.03 mm; 1.2 s behind");
+}
+
 }  // namespace
 }  // namespace trocar::ui

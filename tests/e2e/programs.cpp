@@ -7,6 +7,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <fstream>
 #include <sstream>
@@ -132,9 +133,9 @@ Session::Session(const std::string& organ, const std::vector<std::string>& extra
 Program Session::client(const std::string& name, const std::string& role,
                         const std::vector<std::string>& extra) {
   std::vector<std::string> arguments{
-      "--server",    address_,    "--name",
-      name,          "--role",    role,
-      "--no-render", "--summary", (folder / (name + ".json")).string()};
+      "--server", address_, "--name",    name,
+      "--role",   role,     "--summary", (folder / (name + ".json")).string()};
+  if (std::ranges::find(extra, "--headless") == extra.end()) arguments.push_back("--no-render");
   arguments.insert(arguments.end(), extra.begin(), extra.end());
   return Program("trocar-client", arguments, folder / (name + ".log"));
 }

@@ -12,48 +12,30 @@
 #include "common/scene/local_reduction_file.h"
 #include "common/scene/organ_file.h"
 #include "server/recording/verify.h"
-#include "server/reduction/local_build.h"
 #include "tests/e2e/programs.h"
-#include "tests/reduction/small_organ.h"
+#include "tests/reduction/reduced_block.h"
 
 namespace trocar::e2e {
 namespace {
 
 namespace fs = std::filesystem;
 
-// Of a block, made once; files in `folder`.
-struct Made {
-  Made() : organ(reduction::testing::block(12, 6, 12)) {
-    auto built = reduction::build_local(organ, {.modes = 16,
-                                                .vibrations = 16,
-                                                .patch_radius_m = 0.018,
-                                                .force_n = 0.5,
-                                                .directions = 1,
-                                                .field_nodes = 3,
-                                                .patches = 4,
-                                                .threads = 2});
-    TROCAR_ASSERT(built.ok());
-    local = std::move(built->reduction);
-  }
-  void write(const fs::path& folder) const {
-    ASSERT_TRUE(scene::write_organ(folder / "block.organ", organ).ok());
-    ASSERT_TRUE(scene::write_local_reduction(folder / "block.reduction", local).ok());
-    auto other = local;
-    other.force_n *= 2;
-    ASSERT_TRUE(scene::write_local_reduction(folder / "other.reduction", other).ok());
-  }
-  scene::Organ organ;
-  scene::LocalReduction local;
-};
-const Made& made() {
-  static const Made instance;
+const reduction::testing::ReducedBlock& made() {
+  static const reduction::testing::ReducedBlock instance(4);
   return instance;
+}
+void write_made(const fs::path& folder) {
+  ASSERT_TRUE(scene::write_organ(folder / "block.organ", made().organ).ok());
+  ASSERT_TRUE(scene::write_local_reduction(folder / "block.reduction", *made().local).ok());
+  auto other = *made().local;
+  other.force_n *= 2;
+  ASSERT_TRUE(scene::write_local_reduction(folder / "other.reduction", other).ok());
 }
 
 // Presses at the first patch's centre along the normal there, and then cuts.
 fs::path write_press_script(const fs::path& folder) {
   const auto& organ = made().organ;
-  const auto& centre = organ.mesh.rest_positions[made().local.patches[0].centre.value];
+  const auto& centre = made().centre(0);
   Vec3d out;
   Vec3d size;
   for (const auto& x : organ.mesh.rest_positions)
@@ -112,12 +94,13 @@ std::pair<int, std::string> outcome(const std::string& name,
 
 TEST(ReducedSession, IsRecordedAndSimulatesAgainWithItsReductionOnly) {
   const auto folder = test_folder();
-  made().write(folder);
+  write_made(folder);
   const auto reduction = (folder / "block.reduction").string();
   Session session((folder / "block.organ").string(),
                   {"--seconds", "6", "--reduction", reduction, "--log-level", "debug"});
   auto hand = session.hand("Hand", write_press_script(folder));
-  auto watcher = session.client("Watcher", "observer");
+  auto watcher = session.client(
+      "Watcher", "observer", {"--headless", "--fps", "2", "--size", "320x200", "--show", "ghost"});
   ASSERT_EQ(session.server().wait(300), 0) << read_text(folder / "server.log");
   EXPECT_EQ(hand.wait(20), 0) << read_text(folder / "Hand.log");
   EXPECT_EQ(watcher.wait(20), 0) << read_text(folder / "Watcher.log");
@@ -132,6 +115,12 @@ TEST(ReducedSession, IsRecordedAndSimulatesAgainWithItsReductionOnly) {
   EXPECT_GE(json_number(summary, "to_full"), 1);
   const auto log = read_text(folder / "server.log");
   EXPECT_NE(log.find("block.reduction: 4 patches, "), std::string::npos) << log;
+
+  // The full solution beside it, which begins again after the cut.
+  EXPECT_GT(json_number(session.summary_of("Watcher"), "ghosts"), 10);
+  EXPECT_EQ(json_number(session.summary_of("Watcher"), "ghosts_ignored"), 0);
+  EXPECT_GE(json_number(summary, "begun"), 1);
+  EXPECT_LT(json_number(summary, "largest_mm"), 5);
 
   // Who acted when, and why.
   const auto changes = solver_changes(session.journal);
@@ -165,7 +154,7 @@ TEST(ReducedSession, IsRecordedAndSimulatesAgainWithItsReductionOnly) {
                            << again->first_mismatch->what;
   EXPECT_GE(again->ticks_verified, 6000u);
 
-  const auto hash = fmt::format("{:016x}", scene::reduction_hash(made().local));
+  const auto hash = fmt::format("{:016x}", scene::reduction_hash(*made().local));
   auto [code, said] = outcome("trocar-journal", {"info", file}, folder);
   EXPECT_EQ(code, 0);
   EXPECT_NE(said.find("block.reduction (hash " + hash + ")"), std::string::npos) << said;
@@ -184,7 +173,7 @@ TEST(ReducedSession, IsRecordedAndSimulatesAgainWithItsReductionOnly) {
 
 TEST(ReducedSession, WithoutAReductionNothingIsAskedFor) {
   const auto folder = test_folder();
-  made().write(folder);
+  write_made(folder);
   Session session((folder / "block.organ").string(), {"--seconds", "1"});
   ASSERT_EQ(session.server().wait(60), 0);
   EXPECT_TRUE(solver_changes(session.journal).empty());
@@ -201,7 +190,7 @@ TEST(ReducedSession, WithoutAReductionNothingIsAskedFor) {
 
 TEST(ReducedSession, AReductionThatCannotBeUsedIsRefusedInOneLine) {
   const auto folder = test_folder();
-  made().write(folder);
+  write_made(folder);
   const auto organ = (folder / "block.organ").string();
   const auto reduction = (folder / "block.reduction").string();
   {

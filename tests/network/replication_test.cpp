@@ -156,6 +156,111 @@ TEST(Replication, a_mark_too_soon_after_another_is_refused_with_a_reason) {
     EXPECT_FALSE(message->has_mark_event()) << "it is nobody else's business";
 }
 
+TEST(Replication, the_ghost_goes_to_those_who_asked_while_they_do) {
+  std::atomic<int> wanted{-1};
+  replication::ReplicatorOptions options;
+  options.on_ghost_wanted = [&wanted](bool is_wanted) { wanted = is_wanted ? 1 : 0; };
+  LiveSession session({}, options);
+  session.publish(10);
+  RawClient curious(session.port()), other(session.port());
+  ASSERT_TRUE(curious.join("Curious", proto::ROLE_SURGEON));
+  ASSERT_TRUE(other.join("Other", proto::ROLE_OBSERVER));
+  EXPECT_EQ(wanted, -1);
+  const auto ask = [&](bool is_wanted) {
+    Envelope request;
+    request.mutable_ghost_request()->set_is_wanted(is_wanted);
+    return curious.send(request);
+  };
+  ASSERT_TRUE(ask(true));
+  auto answer = curious.receive(Envelope::kGhostFrame);
+  ASSERT_TRUE(answer);
+  EXPECT_EQ(answer->ghost_frame().status(), proto::GHOST_BEGINS);
+  EXPECT_TRUE(answer->ghost_frame().payload().empty());
+  EXPECT_EQ(wanted, 1);
+
+  ghost::GhostReport report{.status = ghost::GhostStatus::Follows, .frame = 7, .epoch = 0};
+  report.offsets.resize(session.layout().vertex_count());
+  report.offsets[3] = {1, -2, 3};
+  report.largest_m = 1.2e-4f;
+  report.behind_ticks = 32;
+  const auto publish = [&] { session.on_io([&] { session.replicator().publish(report); }); };
+  publish();
+  answer = curious.receive(Envelope::kGhostFrame);
+  ASSERT_TRUE(answer);
+  const auto& ghost = answer->ghost_frame();
+  EXPECT_EQ(ghost.status(), proto::GHOST_FOLLOWS);
+  EXPECT_EQ(ghost.frame(), 7u);
+  EXPECT_EQ(ghost.largest_m(), report.largest_m);
+  EXPECT_EQ(ghost.behind_ms(), 32u);
+  wire::QuantisedSurface offsets(session.layout().vertex_count());
+  const Bytes payload(ghost.payload().begin(), ghost.payload().end());
+  ASSERT_TRUE(wire::decode_keyframe(payload, offsets).ok());
+  EXPECT_EQ(offsets, report.offsets);
+  EXPECT_EQ(ghost.offsets_crc(), wire::surface_crc(offsets));
+
+  // Of a surface that they do not have: nothing.
+  report.epoch = 1;
+  publish();
+  report.epoch = 0;
+  report.offsets.pop_back();
+  publish();
+  ASSERT_TRUE(ask(false));
+  ask(false);
+  Envelope ping;
+  ping.mutable_ping();
+  ASSERT_TRUE(curious.send(ping) && other.send(ping));
+  for (auto* client : {&curious, &other})
+    for (auto message = client->receive(); message && !message->has_pong();
+         message = client->receive())
+      EXPECT_FALSE(message->has_ghost_frame());
+  EXPECT_EQ(wanted, 0);
+  ASSERT_TRUE(ask(true));
+  ASSERT_TRUE(curious.receive(Envelope::kGhostFrame));
+  EXPECT_EQ(wanted, 1);
+  // Who leaves wants nothing any more.
+  Envelope bye;
+  bye.mutable_bye();
+  ASSERT_TRUE(curious.send(bye));
+  EXPECT_TRUE(curious.reads_to_end());
+  EXPECT_EQ(wanted, 0);
+  EXPECT_EQ(counters_of(session).ghosts_given, 1u);
+}
+
+TEST(Replication, without_a_reduction_there_is_no_ghost) {
+  LiveSession session;
+  session.publish(10);
+  RawClient curious(session.port());
+  ASSERT_TRUE(curious.join("Curious", proto::ROLE_OBSERVER));
+  Envelope request;
+  request.mutable_ghost_request()->set_is_wanted(true);
+  ASSERT_TRUE(curious.send(request));
+  const auto answer = curious.receive(Envelope::kGhostFrame);
+  ASSERT_TRUE(answer);
+  EXPECT_EQ(answer->ghost_frame().status(), proto::GHOST_NONE);
+}
+
+TEST(SlowReader, is_not_given_ghosts_that_it_has_no_room_for) {
+  replication::ReplicatorOptions options;
+  options.on_ghost_wanted = [](bool) {};
+  LiveSession session({}, options, kBigSurface);
+  session.publish(kManyChanges);
+  RawClient slow(session.port(), 8 * 1024);
+  ASSERT_TRUE(slow.join("slow", proto::ROLE_OBSERVER));
+  Envelope request;
+  request.mutable_ghost_request()->set_is_wanted(true);
+  ASSERT_TRUE(slow.send(request));
+  ASSERT_TRUE(slow.receive(Envelope::kGhostFrame));
+  ghost::GhostReport report{.status = ghost::GhostStatus::Follows, .frame = 1, .epoch = 0};
+  std::mt19937 random(3);
+  for (std::size_t i = 0; i < session.layout().vertex_count(); ++i)
+    report.offsets.push_back({static_cast<std::int32_t>(random() % 1000), 0, 0});
+  for (int i = 0; i < 2000; ++i) session.on_io([&] { session.replicator().publish(report); });
+  const auto counters = counters_of(session);
+  EXPECT_GT(counters.ghosts_skipped, 100u);
+  EXPECT_EQ(counters.ghosts_given + counters.ghosts_skipped, 2000u);
+  EXPECT_EQ(session.sessions(), 1u);
+}
+
 TEST(Replication, a_keyframe_comes_on_request_and_at_most_four_times_per_second) {
   std::atomic<std::uint64_t> now_ns{1'000'000'000'000};
   replication::ReplicatorOptions options;
