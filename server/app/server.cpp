@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/post.hpp>
 #include <boost/asio/signal_set.hpp>
@@ -78,6 +79,7 @@ class Server {
  private:
   LoopOptions loop_options() const;
   void take_frames();
+  void take_ghost(std::shared_ptr<const ghost::GhostReport> report);
   void warn_if_slow();
   void on_signal(int signal);
   void begin_end();
@@ -98,6 +100,7 @@ class Server {
   std::unique_ptr<replication::Replicator> replicator_;
   FrameHandover handover_{[this] { asio::post(io_, [this] { take_frames(); }); }};
   std::vector<step::SharedFrame> frames_;
+  std::atomic<std::shared_ptr<const ghost::GhostReport>> ghost_report_;  // the newest; null: taken
   std::vector<replication::BarrierResult> barrier_;
   bool is_ending_ = false;
   Tick next_warning_ = 0;
@@ -137,11 +140,7 @@ Status Server::open() {
   if (reduction_)
     ghost_ = std::make_unique<ghost::Ghost>(
         simulation_, ghost::GhostOptions{options_.decisions, [this] { loop_->request_snapshot(); },
-                                         [this](std::shared_ptr<const ghost::GhostReport> report) {
-                                           asio::post(io_, [this, report] {
-                                             if (!is_ending_) replicator_->publish(*report);
-                                           });
-                                         }});
+                                         [this](auto report) { take_ghost(std::move(report)); }});
   return {};
 }
 
@@ -197,6 +196,15 @@ void Server::take_frames() {
     for (const auto& [tick, solver] : frame->solver_changes)
       log::debug("tick {}: solver {}", tick, replication::describe(solver));
   warn_if_slow();
+}
+
+// On the ghost's thread. Of reports that the I/O thread has not seen yet the newest counts.
+void Server::take_ghost(std::shared_ptr<const ghost::GhostReport> report) {
+  if (ghost_report_.exchange(std::move(report))) return;
+  asio::post(io_, [this] {
+    const auto newest = ghost_report_.exchange(nullptr);
+    if (!is_ending_) replicator_->publish(*newest);
+  });
 }
 
 void Server::warn_if_slow() {

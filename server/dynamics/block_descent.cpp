@@ -74,12 +74,20 @@ void BlockDescent::take_state(const world::World& world) {
       if (!node.is_valid()) continue;
       if (world.node_classes[node.value] != world::NodeClass::Fixed)
         free_[g] = static_cast<std::uint8_t>(free_[g] | 1u << lane);
-      x_[g * kLanes + lane] = to_float4(world.displacements[node.value]);
-      v_[g * kLanes + lane] = to_float4(world.velocities[node.value]);
     }
   }
+  take_motion(world);
   if (far_field_) far_field_->take_state(x_.data(), world);
   take_relaxation(world);
+}
+
+void BlockDescent::take_motion(const world::World& world) {
+  for (Slot slot = 0; slot < x_.size(); ++slot) {
+    const auto node = tissue_.groups().node_at(slot);
+    if (!node.is_valid()) continue;
+    x_[slot] = to_float4(world.displacements[node.value]);
+    v_[slot] = to_float4(world.velocities[node.value]);
+  }
 }
 
 void BlockDescent::use_linear_far_field(const world::World& world) {

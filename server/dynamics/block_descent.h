@@ -99,6 +99,9 @@ class BlockDescent {
   // Takes displacements, velocities and classes anew: after a restored state, or whenever somebody
   // else than solve() changed them for more than single nodes.
   void take_state(const world::World& world);
+  // Displacements and velocities alone, of all nodes: whoever else moved them went on from this
+  // solver's state.
+  void take_motion(const world::World& world);
   // The same for some nodes.
   void take_state(const world::World& world, std::span<const NodeIndex> nodes);
 

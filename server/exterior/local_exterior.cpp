@@ -191,8 +191,33 @@ void LocalExterior::hand_back(world::World& world) {
   for (std::uint32_t turn = 0; turn < kPlacingTurns; ++turn)
     if (s.steps_since_placed[turn] > 0)
       place(turn, nullptr, nullptr, static_cast<double>(kTickSeconds), world);
+  keep_rates(world);
   s.end();
   set_model(nullptr);
+}
+
+// Far nodes move on as the fields do. What they were not in has faded, which is no motion that
+// another solver may go on with: it would gain energy at every hand-over.
+void LocalExterior::keep_rates(world::World& world) {
+  const auto count = model_->field_count();
+  for (std::size_t c = 0; c < count; ++c) change_[c] = static_cast<float>(state_->rates[c]);
+  for (std::uint32_t turn = 0; turn < kPlacingTurns; ++turn) {
+    const auto begin = node_count_ * turn / kPlacingTurns,
+               end = node_count_ * (turn + 1) / kPlacingTurns;
+    const auto run = std::span(run_).first(3 * (end - begin));
+    std::ranges::fill(run, 0.0f);
+    model_->add_everywhere(begin, end, change_, run);
+    for (std::size_t n = begin; n < end; ++n)
+      if (is_local_[n] == 0 && world.node_classes[n] != world::NodeClass::Fixed)
+        world.velocities[n] = {run[3 * (n - begin)], run[3 * (n - begin) + 1],
+                               run[3 * (n - begin) + 2]};
+  }
+  for (std::size_t i = 0; i < follower_count(); ++i) {
+    Vec3f velocity;
+    for (const auto& [node, weight] : shares_of(i)) velocity += world.velocities[node] * weight;
+    if (world.node_classes[node_count_ + i] != world::NodeClass::Fixed)
+      world.velocities[node_count_ + i] = velocity;
+  }
 }
 
 void LocalExterior::near_of(std::span<const NodeIndex> active, std::vector<NodeIndex>& near) const {

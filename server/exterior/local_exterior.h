@@ -76,6 +76,7 @@ class LocalExterior : public dynamics::Exterior {
                                   std::size_t end);
   void place_followers(std::size_t begin, std::size_t end, const dynamics::ExteriorStep* step,
                        dynamics::Float4* velocities, world::World& world);
+  void keep_rates(world::World& world);
   void set_model(const PatchModel* model);
   void gather(const dynamics::ExteriorStep& step);
   void add_contacts(const dynamics::ExteriorStep& step);

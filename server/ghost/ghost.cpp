@@ -103,11 +103,11 @@ step::SharedFrame Ghost::next_frame() {
   }
 }
 
-// While it begins, a change of what it waits for.
+// While it waits, for what, at once and now and then: a report may not reach everybody.
 void Ghost::report(const step::PublishedFrame& frame) {
   const auto status = follower_->status();
   const bool follows = status == GhostStatus::Follows;
-  if (follows ? frame.frame % kFramesPerReport != 0 : status == reported_) return;
+  if (frame.frame % kFramesPerReport != 0 && (follows || status == reported_)) return;
   reported_ = status;
   auto report = std::make_shared<GhostReport>();
   if (follows)

@@ -27,9 +27,8 @@ void GhostFollower::follow(const step::PublishedFrame& frame) {
   if (status_ != GhostStatus::Follows && !begin(frame)) return;
   if (!run(frame)) return drop(GhostStatus::Behind);
   own_ = simulation_.take_frame();
-  TROCAR_ASSERT(own_ && own_->tick == frame.tick);
   // It has cut where the session has not.
-  if (own_->epoch != frame.epoch || own_->surface.size() != frame.surface.size())
+  if (!own_ || own_->epoch != frame.epoch || own_->surface.size() != frame.surface.size())
     drop(GhostStatus::Changed);
 }
 
@@ -44,6 +43,7 @@ bool GhostFollower::run(const step::PublishedFrame& frame) {
   for (const auto& record : frame.records) {
     if (record.tick <= simulation_.current_tick()) continue;  // before the snapshot
     if (record.tick != simulation_.current_tick() + 1) return false;
+    decisions_.depth_limit = record.decisions.depth_limit;
     simulation_.tick(record.inputs, decisions_);
   }
   return simulation_.current_tick() == frame.tick;

@@ -1,8 +1,8 @@
 #pragma once
 
 // The full solution beside a session whose tissue a reduction moves: the session's own ticks, frame
-// by frame, with the same inputs, but by the full solver, with decisions of its own: it need not
-// keep the tick's time.
+// by frame, with the same inputs, but by the full solver, with decisions of its own but for the
+// depth that forces need: it need not keep the tick's time.
 //
 // It begins from a snapshot of the session and follows until the surface changes: cuts of two
 // solutions need not be the same, and then no vertex of one is a vertex of the other. After a cut,

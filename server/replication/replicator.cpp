@@ -340,9 +340,8 @@ bool Replicator::may_have_requested_keyframe(const Client& client) const {
   return options_.clock_ns() - client.last_requested_keyframe_ns >= options_.keyframe_interval_ns;
 }
 
-bool Replicator::has_room(const Client& client) const {
-  const auto limit = std::max(options_.skip_above_bytes, 2 * encoder_.typical_frame_bytes());
-  return connections_.outstanding_bytes(client.id) <= limit;
+std::size_t Replicator::skip_limit() const {
+  return std::max(options_.skip_above_bytes, 2 * encoder_.typical_frame_bytes());
 }
 
 bool Replicator::give_frame(Client& client, bool is_required) {
@@ -350,7 +349,7 @@ bool Replicator::give_frame(Client& client, bool is_required) {
   const auto* baseline = client.baseline.get();
   const bool is_requested = client.wants_keyframe && may_have_requested_keyframe(client);
   if (baseline && baseline->frame == frame.frame && !is_requested) return true;
-  if (!is_required && !has_room(client)) {
+  if (!is_required && connections_.outstanding_bytes(client.id) > skip_limit()) {
     ++counters_.frames_skipped;
     return false;
   }
@@ -408,7 +407,8 @@ void Replicator::publish(const ghost::GhostReport& report) {
   const auto bytes = encode_ghost(report);
   for (const auto& [id, client] : clients_) {
     if (!client->wants_ghost) continue;
-    const bool is_given = has_room(*client) && send(*client, bytes);
+    const bool has_room = connections_.outstanding_bytes(id) <= skip_limit() / 2;
+    const bool is_given = has_room && send(*client, bytes);
     ++(is_given ? counters_.ghosts_given : counters_.ghosts_skipped);
   }
 }

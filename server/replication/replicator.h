@@ -17,7 +17,8 @@
 // claim events, surface changes, topology and barrier cannot be skipped: if one does not fit, the
 // session ends as too slow.
 //
-// Ghost: who has asked gets what the ghost's thread reports, if the outbox has room for it.
+// Ghost: who has asked gets what the ghost's thread reports, if the outbox is less than half as
+// full as it may be for frames: these come first.
 //
 // Barrier: publishes a last frame, asks each participant for the CRC of what it shows, and collects
 // the answers.
@@ -141,7 +142,7 @@ class Replicator final : public net::ConnectionHandler {
   const wire::SharedBytes& topology();
   bool send(Client& client, const wire::SharedBytes& bytes);
   void broadcast(const wire::SharedBytes& bytes);
-  bool has_room(const Client& client) const;
+  std::size_t skip_limit() const;
   // True if the client has the newest frame afterwards. `is_required`: do not skip.
   bool give_frame(Client& client, bool is_required);
   bool may_have_requested_keyframe(const Client& client) const;

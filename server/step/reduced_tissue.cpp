@@ -13,6 +13,10 @@ namespace {
 constexpr float kForceMargin = 1.5f;
 // After it gave up, ticks until it may act again.
 constexpr std::uint16_t kWaitTicks = 250;
+// Least ticks of either solver, and of a patch before the next: what a hand-over leaves in the
+// tissue is to fade before there is another (in every other tick they added up, in every tenth they
+// do not).
+constexpr std::uint16_t kLeastTicks = 16;
 // After a cut, until what was near the wound has come to rest there.
 constexpr std::uint16_t kCutWaitTicks = 400;
 // Of the estimate of the error: where it is larger something is wrong. Errors of the force of some
@@ -114,7 +118,7 @@ void ReducedTissue::hand_back(ReducedState& state, dynamics::BlockDescent& solve
   if (!state.exterior.acts()) return;
   exterior_.hand_back(world);
   acting_ = nullptr;
-  solver.take_state(world);
+  solver.take_motion(world);
 }
 
 bool ReducedTissue::choose(const Inputs& inputs, ReducedState& state,
@@ -126,9 +130,11 @@ bool ReducedTissue::choose(const Inputs& inputs, ReducedState& state,
   auto patches = state.exterior.patches;
   const auto reason = decide(inputs, state, world, patches);
   if (reason != SolverReason::Fits) {
-    hand_back(state, solver, world);
     const bool has_failed = reason == SolverReason::Force || reason == SolverReason::Error;
-    if (has_failed && state.wait_ticks == 0) state.wait_ticks = kWaitTicks;
+    const bool gives_up = state.exterior.acts() && reason != SolverReason::Off;
+    hand_back(state, solver, world);
+    if ((has_failed || gives_up) && state.wait_ticks == 0)
+      state.wait_ticks = has_failed ? kWaitTicks : kLeastTicks;
   } else if (!(patches == state.exterior.patches)) {
     hand_back(state, solver, world);
     gradient_.resize(world.node_count());
@@ -165,6 +171,7 @@ SolverReason ReducedTissue::decide(const Inputs& inputs, ReducedState& state,
   if (figures_.largest_node_force_n > kForceMargin * static_cast<float>(models_.force_n()))
     return SolverReason::Force;
   if (has_all) return SolverReason::Fits;
+  if (acts && state.exterior.age < kLeastTicks) return SolverReason::Outside;
   for (const auto& tool : inputs.contacts.tools) {
     const auto nodes = inputs.contacts.seeds_of(tool);
     if (nodes.empty()) continue;

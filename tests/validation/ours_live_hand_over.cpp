@@ -21,6 +21,10 @@ constexpr Tick kShortest = 4, kSpread = 25;
 constexpr int kMostRounds = 12;
 constexpr float kBladeSpeed_m_s = 0.1f, kBladeDeep_m = 0.012f, kBladeWay_m = 0.02f;
 constexpr Tick kPressTicks = 250;  // until the blade comes
+// Of hand-overs as frequent as in sessions at most, from when the press has come to rest: the
+// tissue creeps.
+constexpr Tick kRestTicks = 600, kShakenTicks = 8000, kShakenInterval = 16;
+constexpr double kShakenDepth_m = 0.004, kMostShaken = 0.25;
 constexpr std::array<float, 2> kBladeAway_m{0.018f, 0.045f};
 
 enum class Kind { Off, On, Patch, Cut, Other };
@@ -69,6 +73,7 @@ class Study {
       }
     for (const auto& place : places_)
       for (const float away : kBladeAway_m) cut_beside(place, away);
+    switch_all_the_time(places_.at(1));
     show();
   }
 
@@ -95,6 +100,29 @@ class Study {
       return step::TickDecisions{.is_reduction_off = is_off[tick]};
     };
     add(script, false);
+  }
+
+  // Does what is lost and gained at each hand-over add up?
+  void switch_all_the_time(const LivePlace& place) {
+    show_progress(fmt::format("{}: a hand-over every 16 ticks", liver_.name()));
+    Stroke stroke{
+        .place = place, .aside = place.inward, .depth_m = static_cast<float>(kShakenDepth_m)};
+    stroke.hold_ticks = kRestTicks + kShakenTicks - stroke.down_ticks();
+    auto script = script_of(stroke);
+    script.decisions = [](Tick tick) {
+      return step::TickDecisions{.is_reduction_off =
+                                     tick <= kRestTicks || tick / kShakenInterval % 2 == 0};
+    };
+    const auto course = run_session(liver_.organ(), liver_.reduction.local, script, kRestTicks);
+    const auto &before = course.fields.front(), &after = course.fields.back();
+    shaken_m_ = course.lost != 0 ? std::nan("") : 0;
+    for (std::size_t n = 0; n < before.size(); ++n)
+      shaken_m_ = std::max(shaken_m_, static_cast<double>(length(after[n] - before[n])));
+    section_.say(fmt::format(
+        "{}: after {} ticks of a press of {} mm, {} ticks with a hand-over every {} ticks "
+        "moved no node by more than {} mm.",
+        liver_.title(), kRestTicks, 1e3 * kShakenDepth_m, kShakenTicks, kShakenInterval,
+        shown(1e3 * shaken_m_)));
   }
 
   void cut_beside(const LivePlace& place, float away_m) {
@@ -228,6 +256,8 @@ class Study {
                       "Hand-overs because tissue was cut.");
     section_.at_most(name("jump-cut"), shown_percent(kTarget), quantile(at[1], 0.95), kTarget,
                      "Jump of the force, 95th percentile, sessions with a cut.");
+    section_.at_most(name("shaken"), "0 %", shaken_m_ / kShakenDepth_m, kMostShaken,
+                     "What they and creep move any node by, of the press.");
   }
 
   Section& section_;
@@ -237,6 +267,7 @@ class Study {
   const std::vector<LivePlace> places_;
   std::map<std::pair<bool, Kind>, Jumps> jumps_;
   std::size_t cuts_ = 0, cut_sessions_ = 0, lost_ = 0;
+  double shaken_m_ = 0;
 };
 
 }  // namespace
