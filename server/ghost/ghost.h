@@ -8,7 +8,6 @@
 // queue is emptied and it begins again from a new snapshot of the session. While nobody wants it,
 // it has no state and takes no time.
 
-#include <atomic>
 #include <condition_variable>
 #include <deque>
 #include <functional>
@@ -46,10 +45,10 @@ class Ghost {
   Ghost(const step::Simulation& session, GhostOptions options);
   ~Ghost();
 
-  // One thread.
+  // All from one thread.
   void set_wanted(bool is_wanted);
   void take_frames(std::span<const step::SharedFrame> frames);
-  // When it has ended or is not wanted.
+  // Any thread.
   GhostCounters counters() const;
 
  private:
