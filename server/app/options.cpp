@@ -21,7 +21,7 @@ Examples:
       up to six passes, as long as a tick takes no more than 0.6 ms
   trocar-server --organ liver --reduction liver.reduction
       where the reduced model fits what is touched, it moves the tissue beyond; made with
-      trocar-organ reduce liver --method local --vibrations 24
+      trocar-organ reduce liver --method local
   trocar-server --seconds 20 --summary out/summary.json --journal out/session.mcap
       20 simulated seconds, then the replicas are compared, and the figures written
 

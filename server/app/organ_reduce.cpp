@@ -346,7 +346,7 @@ void add_reduce_command(CLI::App& app, ReduceCommand& command) {
   const auto number = [&](const char* name, auto& value, const char* what, const char* unit) {
     sub->add_option(name, value, what)->type_name(unit)->capture_default_str();
   };
-  number("--modes", s.modes, "unknowns of the reduced model, 1 to 64; local: of a patch [24]", "N");
+  number("--modes", s.modes, "unknowns of the reduced model, 1 to 64; local: of a patch [12]", "N");
   sub->add_option("-o,--out", command.out, "file to write [<organ>.reduction, here]")
       ->type_name("FILE");
   sub->add_option("--results", command.folder,
@@ -368,6 +368,8 @@ void add_reduce_command(CLI::App& app, ReduceCommand& command) {
   number("--check-creep", command.check_creep, "of these at which creep is compared, too", "N");
   auto& l = command.local;
   number("--patch-radius", command.patch_radius_mm, "local: of the patches of the surface", "MM");
+  number("--inertia-modes", l.inertia_modes,
+         "local: of a patch, of what inertia adds to forces that change; 0: none", "N");
   number("--vibrations", l.vibrations, "local: of the organ, the slowest; all patches share them",
          "N");
   number("--free-layers", l.free_layers, "local: of nodes around a touched one, 0 to 3", "N");
@@ -383,8 +385,8 @@ void add_reduce_command(CLI::App& app, ReduceCommand& command) {
 
 Status run_reduce(ReduceCommand command) {
   if (command.method == "local") return run_reduce_local(std::move(command));
-  for (const char* option : {"--patch-radius", "--vibrations", "--free-layers", "--field-nodes",
-                             "--residual", "--patches", "--resume"})
+  for (const char* option : {"--patch-radius", "--inertia-modes", "--vibrations", "--free-layers",
+                             "--field-nodes", "--residual", "--patches", "--resume"})
     if (command.app->count(option) > 0)
       return Error{ErrorCode::Usage, std::string(option) + ": is of --method local"};
   command.settings.radius_m = command.radius_mm * 1e-3;

@@ -26,6 +26,20 @@ void add_scaled(double s, const double* x, double* y, std::size_t n) {
                      _mm256_fmadd_pd(factor, _mm256_loadu_pd(x + i), _mm256_loadu_pd(y + i)));
 }
 
+double product(const double* a, const double* b, std::size_t n) {
+  __m256d even = _mm256_setzero_pd(), odd = even;
+  std::size_t i = 0;
+  for (; i + 8 <= n; i += 8) {
+    even = _mm256_fmadd_pd(_mm256_loadu_pd(a + i), _mm256_loadu_pd(b + i), even);
+    odd = _mm256_fmadd_pd(_mm256_loadu_pd(a + i + 4), _mm256_loadu_pd(b + i + 4), odd);
+  }
+  alignas(32) double v[4];
+  _mm256_store_pd(v, _mm256_add_pd(even, odd));
+  double rest = 0;
+  for (; i < n; ++i) rest += a[i] * b[i];
+  return ((v[0] + v[2]) + (v[1] + v[3])) + rest;
+}
+
 }  // namespace
 
 void CholeskyFactor::resize(std::size_t size) {
@@ -56,9 +70,7 @@ void CholeskyFactor::solve(std::span<double> x) const {
   }
   for (std::size_t k = size_; k-- > 0;) {
     const double* const r = upper_.data() + k * stride_;
-    double left = x[k];
-    for (std::size_t j = k + 1; j < size_; ++j) left -= r[j] * x[j];
-    x[k] = left / r[k];
+    x[k] = (x[k] - product(r + k + 1, x.data() + k + 1, size_ - k - 1)) / r[k];
   }
 }
 

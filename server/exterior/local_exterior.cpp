@@ -70,6 +70,7 @@ void LocalExterior::set_model(const PatchModel* model) {
   near_.clear();
   system_.clear_links();
   system_.resize(model->blocks());
+  if (model->near_fit() != nullptr) near_fit_ = *model->near_fit();
 }
 
 void LocalExterior::follow_cuts(const world::World& world) {
@@ -189,8 +190,7 @@ void LocalExterior::hand_back(world::World& world) {
   auto& s = *state_;
   if (!s.acts()) return;
   for (std::uint32_t turn = 0; turn < kPlacingTurns; ++turn)
-    if (s.steps_since_placed[turn] > 0)
-      place(turn, nullptr, nullptr, static_cast<double>(kTickSeconds), world);
+    place(turn, nullptr, nullptr, static_cast<double>(kTickSeconds), world);
   keep_rates(world);
   s.end();
   set_model(nullptr);
@@ -327,6 +327,49 @@ void LocalExterior::add_inertia(const dynamics::ExteriorStep& step) {
   }
 }
 
+// Near nodes are swept, and moved by the fields. What sweeps undo of that in every step would build
+// up, without bound, in fields that move hardly anything else, and come out when the nodes are near
+// no more: so the fields follow the near nodes where that moves nothing else.
+void LocalExterior::follow_near(const dynamics::ExteriorStep& step) {
+  if (near_.empty()) return;
+  auto& s = *state_;
+  if (model_->near_fit() == nullptr) {
+    s.estimate = kBroken;
+    return;
+  }
+  gather(step);
+  const auto basis = model_->basis();
+  const auto count = model_->field_count();
+  const auto follow = [&](std::vector<double>& values, auto&& wanted) {
+    for (std::size_t c = 0; c < count; ++c) change_[c] = static_cast<float>(values[c]);
+    std::ranges::fill(f_, 0.0f);
+    for (std::size_t i = 0; i < near_.size(); ++i) {
+      const auto local = near_[i];
+      std::array<float, 3> of_fields{};
+      add_fields({basis.values.subspan(3 * local * basis.stride), basis.stride}, change_,
+                 of_fields);
+      const Vec3f left =
+          (wanted(i) - Vec3f{of_fields[0], of_fields[1], of_fields[2]}) * model_->masses()[local];
+      f_[3 * local] = left.x, f_[3 * local + 1] = left.y, f_[3 * local + 2] = left.z;
+    }
+    std::ranges::fill(along_, 0.0f);
+    add_along_fields(basis, f_, along_);
+    const auto change = std::span(scratch_).first(count);
+    for (std::size_t c = 0; c < count; ++c) change[c] = static_cast<double>(along_[c]);
+    near_fit_.solve(change);
+    for (std::size_t c = 0; c < count; ++c) values[c] += change[c];
+  };
+  const auto at = [&](std::size_t i) {
+    const float* const u = &u_[3 * near_[i]];
+    return Vec3f{u[0], u[1], u[2]};
+  };
+  const float inverse_dt = 1 / step.dt;
+  follow(s.amplitudes, at);
+  follow(s.rates, [&](std::size_t i) {
+    return (at(i) - step.world.displacements[step.near[i].value]) * inverse_dt;
+  });
+}
+
 // For all corrections of a step: stiffness of contacts is that of the first.
 bool LocalExterior::make_factors(double inertia_per_s2) {
   const auto& model = *model_;
@@ -427,6 +470,7 @@ float LocalExterior::end(const dynamics::ExteriorStep& step, dynamics::Float4* v
   const auto count = model.field_count();
   const double dt = static_cast<double>(step.dt);
   for (std::size_t c = 0; c < count; ++c) s.rates[c] = (s.amplitudes[c] - start_[c]) / dt;
+  follow_near(step);
   s.fade *= 1 - dt / kFade_s;
   if (s.fade < kLeastFade) s.fade = 0;
   if (s.age % kEstimateInterval == 0 && s.estimate < kBroken)
@@ -462,8 +506,9 @@ float LocalExterior::end(const dynamics::ExteriorStep& step, dynamics::Float4* v
   return std::sqrt(squared);
 }
 
-// Nodes of one turn where the fields have them; the squared move of the farthest. step: null: it is
-// for the world alone.
+// Nodes of one turn where the fields have them, or will have them halfway to their next turn, so
+// that they are not late on average; the squared move of the farthest. step: null: it is for the
+// world alone, and now.
 float LocalExterior::place(std::uint32_t turn, const dynamics::ExteriorStep* step,
                            dynamics::Float4* velocities, double dt, world::World& world) {
   auto& s = *state_;
@@ -474,16 +519,19 @@ float LocalExterior::place(std::uint32_t turn, const dynamics::ExteriorStep* ste
   double stays = 1;
   for (int step_count = 0; step_count < steps; ++step_count) stays *= 1 - dt / kFade_s;
   double* const placed = s.placed.data() + turn * count;
+  const double ahead = step != nullptr ? dt * (kPlacingTurns - 1) / 2 : 0;
   for (std::size_t c = 0; c < count; ++c) {
-    change_[c] = static_cast<float>(s.amplitudes[c] - stays * placed[c]);
-    placed[c] = s.amplitudes[c];
+    const double to = s.amplitudes[c] + ahead * s.rates[c];
+    change_[c] = static_cast<float>(to - stays * placed[c]);
+    placed[c] = to;
   }
   s.steps_since_placed[turn] = 0;
   const auto run = std::span(run_).first(3 * (end - begin));
   std::ranges::fill(run, 0.0f);
   model_->add_everywhere(begin, end, change_, run);
   const auto left = static_cast<float>(stays);
-  const float inverse_time = 1 / (static_cast<float>(dt) * static_cast<float>(steps));
+  const float inverse_time =
+      1 / (static_cast<float>(dt) * static_cast<float>(std::max<int>(steps, 1)));
   float squared = 0;
   for (std::size_t n = begin; n < end; ++n) {
     float* const moved = &run[3 * (n - begin)];

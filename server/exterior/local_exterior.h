@@ -7,8 +7,11 @@
 // they are; the others respond as at rest. Implicit Euler, as the solver's. Stress that has relaxed
 // is kept per tet, by the solver; its forces come along the fields.
 //
+// Swept nodes leave the fields where these move hardly anything else; after each step the fields
+// follow them there.
+//
 // Displacements and velocities of nodes stay what holds: whatever solver goes on from them. Of far
-// nodes an eighth is placed in each step, in turns.
+// nodes an eighth is placed in each step, in turns, each where it will be halfway to its next.
 //
 // Its error is estimated from what its fields leave at the nodes of the patch's rim, where all tets
 // are known as they are but nodes do not move on their own: the root of the sum of squared forces
@@ -80,6 +83,7 @@ class LocalExterior : public dynamics::Exterior {
   void set_model(const PatchModel* model);
   void gather(const dynamics::ExteriorStep& step);
   void add_contacts(const dynamics::ExteriorStep& step);
+  void follow_near(const dynamics::ExteriorStep& step);
   void add_inertia(const dynamics::ExteriorStep& step);
   bool make_factors(double inertia_per_s2);
   float estimate_error(const dynamics::ExteriorStep& step, const world::World& world);
@@ -98,7 +102,7 @@ class LocalExterior : public dynamics::Exterior {
   // Of a step. Per field:
   std::vector<double> start_, ahead_, gradient_, scratch_;
   std::vector<float> along_, change_;
-  BlockSystem system_;
+  BlockSystem system_, near_fit_;
   bool has_factors_ = false;
   // Per local node, x, y, z:
   std::vector<float> u_, f_, moved_;

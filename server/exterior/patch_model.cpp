@@ -31,6 +31,9 @@ void add_scaled(float s, const float* x, float* y, std::size_t n) {
 
 // Of a later patch's field, what the others have not; of any.
 constexpr double kNewInField = 0.01, kLeastPivot = 1e-6;
+// Of what is moved beside near nodes: with a tenth of the weight a fit gives contacts up to 8 %
+// more error of force, with ten times as much it lets fields go three times as far astray.
+constexpr double kBeside = 1000, kBesideTime_s2 = 1e-4;
 
 BlockMatrix pattern_of(std::size_t node_count, std::initializer_list<const ElementSet*> sets) {
   std::vector<BlockMatrix::Pair> pairs;
@@ -65,6 +68,7 @@ PatchModel::PatchModel(const scene::LocalReduction& reduction, const scene::Loca
   blocks_ = {0, fields_.size()};
   take_tets(organ, patch.inner_tets);
   make_matrices(patch);
+  make_near_fit();
 }
 
 PatchModel::PatchModel(const LocalModels& models, const PatchSet& patches)
@@ -84,6 +88,7 @@ PatchModel::PatchModel(const LocalModels& models, const PatchSet& patches)
   take_inner_stiffness();
   drop_repeated_fields();
   fill_basis();
+  make_near_fit();
 }
 
 // Tet by tet, not as a difference: the result is positive semidefinite.
@@ -248,6 +253,31 @@ void PatchModel::take_inner_stiffness() {
   for (std::size_t i = 0; i < count; ++i)
     for (std::size_t j = 0; j < count; ++j)
       inner_stiffness_[i * width + j] = (inner[i * count + j] + inner[j * count + i]) / 2;
+}
+
+void PatchModel::make_near_fit() {
+  const auto count = field_count(), width = stride();
+  std::vector<double> free_mass(count * width, 0.0);
+  for (std::size_t n = 0; n < nodes_.size(); ++n) {
+    if (is_free_[n] == 0) continue;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const float* const row = &basis_[(3 * n + k) * width];
+      for (std::size_t i = 0; i < count; ++i) {
+        const double own = static_cast<double>(masses_[n] * row[i]);
+        for (std::size_t j = i; j < count; ++j)
+          free_mass[i * width + j] += own * static_cast<double>(row[j]);
+      }
+    }
+  }
+  near_fit_.resize(blocks_);
+  for (std::size_t i = 0; i < count; ++i)
+    for (std::size_t j = 0; j < count; ++j) {
+      const double own = free_mass[std::min(i, j) * width + std::max(i, j)];
+      const auto at = i * width + j;
+      const double all = own + kBeside * (mass_[at] - own + kBesideTime_s2 * outer_stiffness_[at]);
+      near_fit_.row(i)[j] = i == j ? all * (1 + kLeastPivot) : all;
+    }
+  has_near_fit_ = near_fit_.factor();
 }
 
 void PatchModel::make_matrices(const scene::LocalPatch& patch) {

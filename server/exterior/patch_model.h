@@ -73,6 +73,10 @@ class PatchModel {
   std::span<const double> outer_stiffness() const { return outer_stiffness_; }
   std::span<const double> inner_stiffness() const { return inner_stiffness_; }
   std::span<const double> mass() const { return mass_; }
+  // Fields that move the nodes that may be free as given, and all else as little as possible: the
+  // masses of those nodes, and with a weight the masses of others and the outer stiffness.
+  // Factored; null: it is not positive definite, as of no reduction that was made of this organ.
+  const BlockSystem* near_fit() const { return has_near_fit_ ? &near_fit_ : nullptr; }
 
   // out[3 n + k - 3 begin] += sum_c field c at node n x[c], of nodes begin to end.
   void add_everywhere(std::size_t begin, std::size_t end, std::span<const float> x,
@@ -93,6 +97,7 @@ class PatchModel {
   void make_matrices(const scene::LocalPatch& patch);
   void fill_basis();
   void take_inner_stiffness();
+  void make_near_fit();
   // Of all nodes among the fields, and of the tets that are not inner.
   void sum_over_nodes(const LocalModels& models, std::span<const TetIndex> inner);
 
@@ -107,6 +112,8 @@ class PatchModel {
   std::vector<float> rim_stiffness_;
   ElementSet inner_, beyond_rim_;
   std::vector<double> outer_stiffness_, inner_stiffness_, mass_;
+  BlockSystem near_fit_;
+  bool has_near_fit_ = false;
 };
 
 // All patches of a reduction.

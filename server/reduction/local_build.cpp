@@ -15,6 +15,7 @@
 #include "common/scene/any_material.h"
 #include "server/reduction/check_count.h"
 #include "server/reduction/cubature.h"
+#include "server/reduction/inertia_fields.h"
 #include "server/reduction/local_parts.h"
 #include "server/reduction/patch_fields.h"
 #include "server/reduction/presses.h"
@@ -58,7 +59,8 @@ class Builder {
     if (accessible_.empty())
       return Error{ErrorCode::BadFile, organ_.name + ": has no surface that is not held"};
     auto& r = built_.reduction;
-    r.source = organ_.name + ", " + std::to_string(settings_.modes) + " modes, patches of " +
+    r.source = organ_.name + ", " + std::to_string(settings_.modes) + " + " +
+               std::to_string(settings_.inertia_modes) + " modes, patches of " +
                std::to_string(std::lround(settings_.patch_radius_m * 1e3)) + " mm, seed " +
                std::to_string(settings_.seed);
     r.mesh_hash = scene::mesh_hash(organ_);
@@ -68,7 +70,8 @@ class Builder {
     r.free_layers = settings_.free_layers;
     choose_patches();
     for (const auto& patch : r.patches)
-      if (const auto count = settings_.modes + settings_.vibrations + 3 * patch.reach.size();
+      if (const auto count = settings_.modes + settings_.inertia_modes + settings_.vibrations +
+                             3 * patch.reach.size();
           count > scene::kMaxLocalFields)
         return Error{ErrorCode::Usage, "--patch-radius: a patch would have " +
                                            std::to_string(count) + " fields, at most " +
@@ -231,17 +234,12 @@ class Builder {
     const auto found = slowest_vibrations(*models_[0], settings_.vibrations);
     vibrations_.resize(found.modes.rows(), found.modes.cols());
     for (Eigen::Index i = 0; i < found.modes.cols(); ++i) {
-      Vector field = without_vibrations(found.modes.col(i).normalized(), i).normalized();
+      const Vector field =
+          without(vibrations_.leftCols(i), found.modes.col(i).normalized()).col(0).normalized();
       built_.reduction.vibrations.push_back(
           scene::pack_field({field.data(), static_cast<std::size_t>(field.size())}));
       vibrations_.col(i) = field;
     }
-  }
-  // What is not of the first `count` of them, of each column.
-  Matrix without_vibrations(Matrix fields, Eigen::Index count) const {
-    const auto v = vibrations_.leftCols(count);
-    for (int twice = 0; twice < 2; ++twice) fields -= v * (v.transpose() * fields).eval();
-    return fields;
   }
 
   Status take_or_make(FullModel& model, std::size_t number) {
@@ -276,14 +274,11 @@ class Builder {
     }
     for (std::size_t i = 0; i < presses.size(); ++i)
       fields.col(index(9 * nodes.size() + i)) = presses[i];
-    const Matrix modes =
-        karhunen_loeve(without_vibrations(std::move(fields), vibrations_.cols()), settings_.modes)
-            .modes;
-    for (Eigen::Index i = 0; i < modes.cols(); ++i)
-      patch.modes.push_back(
-          scene::pack_field({modes.col(i).data(), static_cast<std::size_t>(modes.rows())}));
+    add_modes(patch,
+              karhunen_loeve(without(vibrations_, std::move(fields)), settings_.modes).modes);
+    add_modes(patch, inertia_of(model, patch, nodes));
     // As they will be read.
-    Matrix basis(modes.rows(), index(built_.reduction.field_count(patch)));
+    Matrix basis(index(model.dof_count()), index(built_.reduction.field_count(patch)));
     Eigen::Index count = 0;
     for (const auto* shared : {&built_.reduction.vibrations, &patch.modes})
       for (const auto& mode : *shared) unpack(mode, basis.col(count++));
@@ -297,6 +292,28 @@ class Builder {
       weighted.row(i) *= organ_.node_masses_kg[static_cast<std::size_t>(i / 3)];
     patch.mass = lower(basis.transpose() * weighted);
     find_patch_cubature(model, number, basis, states);
+  }
+
+  static void add_modes(LocalPatch& patch, const Matrix& modes) {
+    for (Eigen::Index i = 0; i < modes.cols(); ++i)
+      patch.modes.push_back(
+          scene::pack_field({modes.col(i).data(), static_cast<std::size_t>(modes.rows())}));
+  }
+
+  // What inertia adds to fields of forces at these nodes, beyond what the patch has.
+  Matrix inertia_of(FullModel& model, const LocalPatch& patch,
+                    std::span<const NodeIndex> nodes) const {
+    const auto modes = index(patch.modes.size());
+    Matrix fields(index(model.dof_count()), index(3 * nodes.size())),
+        known(index(model.dof_count()), modes + index(3 * patch.reach.size()));
+    for (std::size_t i = 0; i < nodes.size(); ++i)
+      fields.middleCols(index(3 * i), 3) = greens_of(nodes[i]);
+    for (std::size_t i = 0; i < patch.modes.size(); ++i)
+      unpack(patch.modes[i], known.col(index(i)));
+    // In units of the modes.
+    for (std::size_t i = 0; i < patch.reach.size(); ++i)
+      known.middleCols(modes + index(3 * i), 3) = greens_of(patch.reach[i]).colwise().normalized();
+    return inertia_modes(model, fields, vibrations_, known, settings_.inertia_modes);
   }
 
   // All tets of nodes that can be free.
@@ -411,13 +428,14 @@ class Builder {
 // What the result depends on, in one line.
 std::string key_of(const scene::Organ& organ, const LocalSettings& s) {
   char text[400];
-  std::snprintf(text, sizeof text,
-                "local 2, organ %016" PRIx64 " %016" PRIx64 " %016" PRIx64
-                ", modes %zu, vibrations %zu, radius %a, layers %u, force %a, directions %zu, "
-                "field nodes %zu, residual %a, patches %zu, seed %" PRIu64,
-                scene::organ_hash(organ), scene::mesh_hash(organ), scene::elasticity_hash(organ),
-                s.modes, s.vibrations, s.patch_radius_m, s.free_layers, s.force_n, s.directions,
-                s.field_nodes, s.residual, s.patches, s.seed);
+  std::snprintf(
+      text, sizeof text,
+      "local 3, organ %016" PRIx64 " %016" PRIx64 " %016" PRIx64
+      ", modes %zu + %zu, vibrations %zu, radius %a, layers %u, force %a, directions %zu, "
+      "field nodes %zu, residual %a, patches %zu, seed %" PRIu64,
+      scene::organ_hash(organ), scene::mesh_hash(organ), scene::elasticity_hash(organ), s.modes,
+      s.inertia_modes, s.vibrations, s.patch_radius_m, s.free_layers, s.force_n, s.directions,
+      s.field_nodes, s.residual, s.patches, s.seed);
   return text;
 }
 
@@ -426,6 +444,10 @@ std::string key_of(const scene::Organ& organ, const LocalSettings& s) {
 Status validate(const LocalSettings& s) {
   const auto wrong = [](const std::string& what) { return Error{ErrorCode::Usage, what}; };
   if (auto c = check_count("--modes", s.modes, 1, scene::kMaxReducedModes); !c) return c;
+  if (auto c =
+          check_count("--inertia-modes", s.inertia_modes, 0, scene::kMaxReducedModes - s.modes);
+      !c)
+    return c;
   if (auto c = check_count("--vibrations", s.vibrations, 0, scene::kMaxReducedModes); !c) return c;
   if (auto c = check_count("--free-layers", s.free_layers, 0, scene::kMaxFreeLayers); !c) return c;
   if (auto c = check_count("--directions", s.directions, 0, 20); !c) return c;

@@ -3,8 +3,8 @@
 // Makes a local reduction (common/scene/local_reduction.h). Off-line, for every node of the
 // surface that tools reach: the fields of unit forces, and of second order in the force. Around the
 // centre of each patch, some presses are solved by the full model. A patch's modes are the first of
-// these fields' Karhunen-Loeve modes; its cubature is the solution of a non-negative least-squares
-// problem over the same fields.
+// these fields' Karhunen-Loeve modes, and of what inertia adds to them; its cubature is the
+// solution of a non-negative least-squares problem over the same fields.
 
 #include <filesystem>
 #include <functional>
@@ -15,15 +15,16 @@
 namespace trocar::reduction {
 
 struct LocalSettings {
-  std::size_t modes = 24;         // of a patch
-  std::size_t vibrations = 24;    // of the whole organ, which all patches share
-  double patch_radius_m = 0.012;  // its nodes are within, of its centre
-  std::uint32_t free_layers = 2;  // of nodes around a touched one
-  double force_n = 0.4;           // the largest, on a node
-  std::size_t directions = 5;     // of the presses at a centre; 0: none are solved
-  std::size_t field_nodes = 12;   // whose fields a patch's modes are of
-  double residual = 1e-3;         // of the cubature, beside the whole forces; 0: all tets
-  std::size_t patches = 0;        // made at most, from the first centre outwards; 0: all
+  std::size_t modes = 12;          // of a patch
+  std::size_t inertia_modes = 18;  // of a patch, of what inertia adds (inertia_fields.h)
+  std::size_t vibrations = 36;     // of the whole organ, which all patches share
+  double patch_radius_m = 0.012;   // its nodes are within, of its centre
+  std::uint32_t free_layers = 2;   // of nodes around a touched one
+  double force_n = 0.4;            // the largest, on a node
+  std::size_t directions = 5;      // of the presses at a centre; 0: none are solved
+  std::size_t field_nodes = 12;    // whose fields a patch's modes are of
+  double residual = 1e-3;          // of the cubature, beside the whole forces; 0: all tets
+  std::size_t patches = 0;         // made at most, from the first centre outwards; 0: all
   std::uint64_t seed = 1;
   unsigned threads = 1;
   // Where finished parts are kept until all is done, and looked for; empty: nowhere.

@@ -245,7 +245,7 @@ TEST_F(LocalBlock, HasNothingWhereNoPatchReaches) {
 
 TEST_F(LocalBlock, RefusesWhatCannotBe) {
   auto s = settings();
-  s.modes = 64, s.patch_radius_m = 0.2;
+  s.modes = 64, s.inertia_modes = 0, s.patch_radius_m = 0.2;
   auto built = build_local(organ_, s);
   ASSERT_FALSE(built.ok());
   EXPECT_NE(built.error().message.find("--patch-radius: a patch would have"), std::string::npos);
@@ -262,6 +262,8 @@ TEST_F(LocalBlock, SettingsAreCheckedByName) {
     EXPECT_NE(status.error().message.find(what), std::string::npos);
   };
   says({.modes = 65}, "--modes: 65");
+  says({.modes = 50, .inertia_modes = 15}, "--inertia-modes: 15 is not from 0 to 14");
+  says({.vibrations = 65}, "--vibrations: 65");
   says({.free_layers = 4}, "--free-layers: 4");
   says({.residual = 0.2}, "--residual");
   says({.patch_radius_m = 0}, "--patch-radius");

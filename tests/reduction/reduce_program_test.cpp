@@ -75,18 +75,19 @@ TEST_F(ReduceProgram, SaysEachMistakeInOneLine) {
 TEST_F(ReduceProgram, LeavesALocalReductionAndHowFarItIsOff) {
   ASSERT_EQ(run({"make", "liver", "--tets", "1000", "--out", at("small.organ")}), 0) << log();
   const auto make = [&](const char* threads, const char* out) {
-    return run({"reduce",         at("small.organ"),
-                "--method",       "local",
-                "--patches",      "2",
-                "--patch-radius", "25",
-                "--modes",        "12",
-                "--directions",   "2",
-                "--field-nodes",  "4",
-                "--force",        "0.2",
-                "--check",        "2",
-                "--threads",      threads,
-                "--out",          at(out),
-                "--results",      at("out")});
+    return run({"reduce",          at("small.organ"),
+                "--method",        "local",
+                "--patches",       "2",
+                "--patch-radius",  "25",
+                "--modes",         "12",
+                "--inertia-modes", "3",
+                "--directions",    "2",
+                "--field-nodes",   "4",
+                "--force",         "0.2",
+                "--check",         "2",
+                "--threads",       threads,
+                "--out",           at(out),
+                "--results",       at("out")});
   };
   ASSERT_EQ(make("1", "small.reduction"), 0) << log();
   const auto text = log();
@@ -98,7 +99,7 @@ TEST_F(ReduceProgram, LeavesALocalReductionAndHowFarItIsOff) {
   const auto reduction = scene::read_local_reduction(folder_ / "small.reduction", *organ);
   ASSERT_TRUE(reduction.ok()) << reduction.error().message;
   EXPECT_EQ(reduction->patches.size(), 2u);
-  EXPECT_EQ(reduction->patches[0].modes.size(), 12u);
+  EXPECT_EQ(reduction->patches[0].modes.size(), 15u);
   EXPECT_EQ(reduction->force_n, 0.2);
   EXPECT_GT(read(folder_ / "out" / "local.csv").size(), 100u);
   ASSERT_EQ(make("2", "again.reduction"), 0) << log();

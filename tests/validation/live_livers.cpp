@@ -18,10 +18,12 @@ reduction::LocalSettings live_settings(const Lab& lab) {
 std::string live_training_text(const Lab& lab) {
   const auto s = live_settings(lab);
   return fmt::format(
-      "The reduction: {} patches of {:.0f} mm, {} modes and {} vibrations each, trained by presses "
+      "The reduction: {} patches of {:.0f} mm, {} modes, {} of inertia and {} vibrations each, "
+      "trained by presses "
       "of "
       "single nodes at the patches' centres, {} directions, up to {} N.",
-      s.patches, 1e3 * s.patch_radius_m, s.modes, s.vibrations, s.directions, s.force_n);
+      s.patches, 1e3 * s.patch_radius_m, s.modes, s.inertia_modes, s.vibrations, s.directions,
+      s.force_n);
 }
 
 std::vector<std::shared_ptr<const LiveLiver>> live_livers(const Lab& lab, Section& section) {
