@@ -43,14 +43,15 @@ What local does:
      displacements under unit forces there are found, and kept.
   2. Each patch's centre is pressed in --directions with forces up to --force.
   3. A patch gets --modes: the first Karhunen-Loeve modes of these presses, of the unit forces'
-     fields and of fields of second order around it.
-  4. Where a node is touched, the unknowns are the modes, its own fields, and the displacements of
+     fields and of fields of second order around it; and --inertia-modes of what inertia adds to
+     these, and --vibrations, for contacts that move.
+  4. Where a node is touched, the unknowns are all these, its own fields, and the displacements of
      nodes within --free-layers of it. Tets around a patch stay as they are; what is not linear in
      the others is summed over a few, with weights that leave --residual.
-  Expect errors of a few per cent anywhere, at once; creep is not in it yet.
+  Expect errors of a few per cent anywhere, at once; in sessions tissue relaxes as without it.
 
-Both are compared with the full model on loads outside the training. The server does not load these
-files.
+Both are compared with the full model on loads outside the training. Sessions take files of local:
+trocar-server --reduction FILE.
 
 Examples:
   trocar-organ reduce liver

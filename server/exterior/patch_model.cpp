@@ -31,9 +31,6 @@ void add_scaled(float s, const float* x, float* y, std::size_t n) {
 
 // Of a later patch's field, what the others have not; of any.
 constexpr double kNewInField = 0.01, kLeastPivot = 1e-6;
-// Of what is moved beside near nodes: with a tenth of the weight a fit gives contacts up to 8 %
-// more error of force, with ten times as much it lets fields go three times as far astray.
-constexpr double kBeside = 1000, kBesideTime_s2 = 1e-4;
 
 BlockMatrix pattern_of(std::size_t node_count, std::initializer_list<const ElementSet*> sets) {
   std::vector<BlockMatrix::Pair> pairs;
@@ -274,7 +271,7 @@ void PatchModel::make_near_fit() {
     for (std::size_t j = 0; j < count; ++j) {
       const double own = free_mass[std::min(i, j) * width + std::max(i, j)];
       const auto at = i * width + j;
-      const double all = own + kBeside * (mass_[at] - own + kBesideTime_s2 * outer_stiffness_[at]);
+      const double all = own + kBeside * (mass_[at] - own + kBeside_s2 * outer_stiffness_[at]);
       near_fit_.row(i)[j] = i == j ? all * (1 + kLeastPivot) : all;
     }
   has_near_fit_ = near_fit_.factor();

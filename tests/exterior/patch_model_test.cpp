@@ -108,6 +108,69 @@ TEST_F(PatchModelOfBlock, PatchesTogetherHaveTheOrgansMatrices) {
     }
 }
 
+TEST_F(PatchModelOfBlock, NearFitIsTheLeastSum) {
+  PatchSet both;
+  ASSERT_TRUE(both.add(0) && both.add(1));
+  const PatchModel model(models_, both);  // its masses are the organ's
+  ASSERT_NE(model.near_fit(), nullptr);
+  const auto nodes = models_.node_count(), count = model.field_count();
+  std::vector<std::uint8_t> is_free(nodes);
+  for (std::uint32_t local = 0; local < model.nodes().size(); ++local)
+    if (model.may_be_free(local)) is_free[model.nodes()[local].value] = 1;
+  std::vector<double> wanted(3 * nodes);
+  for (std::size_t dof = 0; dof < 3 * nodes; ++dof)
+    if (is_free[dof / 3] != 0) wanted[dof] = std::sin(static_cast<double>(dof * dof));
+  const auto moved = [&](std::span<const double> x) {
+    std::vector<float> factors(x.begin(), x.end()), out(3 * nodes);
+    factors.resize(model.stride());
+    model.add_everywhere(0, nodes, factors, out);
+    return out;
+  };
+  const auto sum = [&](std::span<const double> x) {
+    const auto u = moved(x);
+    double near = 0, others = 0;
+    for (std::size_t dof = 0; dof < 3 * nodes; ++dof) {
+      const double off = static_cast<double>(u[dof]) - wanted[dof];
+      (is_free[dof / 3] != 0 ? near : others) += organ_.node_masses_kg[dof / 3] * off * off;
+    }
+    for (std::size_t i = 0; i < count; ++i)
+      for (std::size_t j = 0; j < count; ++j)
+        others +=
+            PatchModel::kBeside_s2 * x[i] * x[j] * model.outer_stiffness()[i * model.stride() + j];
+    return near + PatchModel::kBeside * others;
+  };
+  std::vector<double> x(count);
+  for (std::size_t c = 0; c < count; ++c) {
+    std::vector<double> one(count);
+    one[c] = 1;
+    const auto field = moved(one);
+    for (std::size_t dof = 0; dof < 3 * nodes; ++dof)
+      x[c] += organ_.node_masses_kg[dof / 3] * static_cast<double>(field[dof]) * wanted[dof];
+  }
+  BlockSystem fit = *model.near_fit();
+  fit.solve(x, 200);
+  const double least = sum(x),
+               step =
+                   std::abs(*std::ranges::max_element(x, {}, [](double v) { return std::abs(v); }));
+  ASSERT_GT(step, 0);
+  EXPECT_LT(least, sum(std::vector<double>(count)));
+  // A quadratic: as much more to either side.
+  for (std::size_t c = 0; c < count; ++c) {
+    auto below = x, above = x;
+    below[c] -= step, above[c] += step;
+    const double down = sum(below) - least, up = sum(above) - least;
+    EXPECT_GT(down + up, 0) << c;
+    EXPECT_LT(std::abs(up - down), 0.01 * (up + down)) << c;
+  }
+}
+
+TEST_F(PatchModelOfBlock, HasNoNearFitWhereStiffnessMakesNone) {
+  reduction_.patches[0].outer_stiffness[0] = -1e12;
+  const LocalModels models(reduction_, organ_);
+  EXPECT_EQ(models[0].near_fit(), nullptr);
+  EXPECT_NE(models[1].near_fit(), nullptr);
+}
+
 TEST_F(PatchModelOfBlock, KnowsItsNodes) {
   const auto& model = models_[1];
   std::size_t free = 0;

@@ -133,7 +133,7 @@ class Study {
     found_.push_back(found);
     const auto check = fmt::format("{}k", (nodes + 500) / 1000);
     if (has_reference)
-      section_.at_most(check + "-force", "3 %", mean(force[0]), 0.02,
+      section_.at_most(check + "-force", "3 %", mean(force[0]), 0.03,
                        "Contact force of the reduced solver, mean over ticks in contact.");
   }
 
