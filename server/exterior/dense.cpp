@@ -26,7 +26,7 @@ void add_scaled(double s, const double* x, double* y, std::size_t n) {
                      _mm256_fmadd_pd(factor, _mm256_loadu_pd(x + i), _mm256_loadu_pd(y + i)));
 }
 
-double product(const double* a, const double* b, std::size_t n) {
+double dot(const double* a, const double* b, std::size_t n) {
   __m256d even = _mm256_setzero_pd(), odd = even;
   std::size_t i = 0;
   for (; i + 8 <= n; i += 8) {
@@ -70,7 +70,7 @@ void CholeskyFactor::solve(std::span<double> x) const {
   }
   for (std::size_t k = size_; k-- > 0;) {
     const double* const r = upper_.data() + k * stride_;
-    x[k] = (x[k] - product(r + k + 1, x.data() + k + 1, size_ - k - 1)) / r[k];
+    x[k] = (x[k] - dot(r + k + 1, x.data() + k + 1, size_ - k - 1)) / r[k];
   }
 }
 
@@ -79,8 +79,6 @@ void BlockSystem::resize(std::span<const std::size_t> begins) {
   size_ = begins.back();
   stride_ = padded(size_);
   matrix_.assign(size_ * stride_, 0);
-  right_.assign(size_, 0);
-  change_.assign(size_, 0);
   factors_.resize(std::max(factors_.size(), begins.size() - 1));
   for (std::size_t b = 0; b + 1 < begins.size(); ++b) factors_[b].resize(begins[b + 1] - begins[b]);
 }
@@ -121,12 +119,13 @@ bool BlockSystem::factor() {
 }
 
 // What the right side lacks in this block, with the other blocks' x.
-void BlockSystem::solve_block(std::size_t block, std::span<double> x) {
+void BlockSystem::solve_block(std::size_t block, std::span<const double> right, std::span<double> x,
+                              std::span<double> own) const {
   const auto first = begins_[block], end = begins_[block + 1];
-  const auto own = std::span(change_).first(end - first);
+  own = own.first(end - first);
   for (std::size_t i = first; i < end; ++i) {
-    double left = right_[i];
-    const double* const r = row(i);
+    double left = right[i];
+    const double* const r = matrix_.data() + i * stride_;
     for (std::size_t j = 0; j < first; ++j) left -= r[j] * x[j];
     for (std::size_t j = end; j < size_; ++j) left -= r[j] * x[j];
     own[i - first] = left;
@@ -148,14 +147,16 @@ void BlockSystem::solve_block(std::size_t block, std::span<double> x) {
   std::ranges::copy(own, x.begin() + static_cast<std::ptrdiff_t>(first));
 }
 
-void BlockSystem::solve(std::span<double> x, int passes) {
+void BlockSystem::solve(std::span<double> x, std::vector<double>& scratch, int passes) const {
   const auto blocks = begins_.size() - 1;
   if (blocks == 1) return factors_[0].solve(x);
-  std::ranges::copy(x, right_.begin());
+  scratch.resize(2 * size_);
+  const auto right = std::span(scratch).first(size_), own = std::span(scratch).last(size_);
+  std::ranges::copy(x, right.begin());
   std::ranges::fill(x, 0.0);
   for (int pass = 0; pass < passes; ++pass) {
-    for (std::size_t b = 0; b < blocks; ++b) solve_block(b, x);
-    for (std::size_t b = blocks - 1; b-- > 0;) solve_block(b, x);
+    for (std::size_t b = 0; b < blocks; ++b) solve_block(b, right, x, own);
+    for (std::size_t b = blocks - 1; b-- > 0;) solve_block(b, right, x, own);
   }
 }
 

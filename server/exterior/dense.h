@@ -47,19 +47,20 @@ class BlockSystem {
   void clear_links() { links_.clear(); }
   // False: a block is not positive definite.
   bool factor();
-  // x in place of the right side.
-  void solve(std::span<double> x, int passes = 1);
+  // x in place of the right side. scratch: of no meaning, kept for its memory.
+  void solve(std::span<double> x, std::vector<double>& scratch, int passes = 1) const;
 
  private:
   struct Link {
     std::array<const float*, 3> rows;
     SymMat3f b;
   };
-  void solve_block(std::size_t block, std::span<double> x);
+  void solve_block(std::size_t block, std::span<const double> right, std::span<double> x,
+                   std::span<double> own) const;
 
   std::size_t size_ = 0, stride_ = 0;
   std::vector<std::size_t> begins_;
-  std::vector<double> matrix_, right_, change_;
+  std::vector<double> matrix_;
   std::vector<CholeskyFactor> factors_;
   std::vector<Link> links_;
 };

@@ -70,7 +70,6 @@ void LocalExterior::set_model(const PatchModel* model) {
   near_.clear();
   system_.clear_links();
   system_.resize(model->blocks());
-  if (model->near_fit() != nullptr) near_fit_ = *model->near_fit();
 }
 
 void LocalExterior::follow_cuts(const world::World& world) {
@@ -149,7 +148,7 @@ void LocalExterior::take_over(const PatchSet& patches, const PatchModel& model,
   fill(1, 0);
   s.amplitudes = s.correction;
   if (system_.factor())
-    system_.solve(s.amplitudes, kPasses);
+    system_.solve(s.amplitudes, solving_, kPasses);
   else
     std::ranges::fill(s.amplitudes, 0.0);
 
@@ -174,7 +173,7 @@ void LocalExterior::take_over(const PatchSet& patches, const PatchModel& model,
   constexpr auto kStep = static_cast<double>(kTickSeconds);
   fill(kStep * kStep, 1);
   if (system_.factor())
-    system_.solve(s.rates, kPasses);
+    system_.solve(s.rates, solving_, kPasses);
   else
     std::ranges::fill(s.rates, 0.0);
 
@@ -305,10 +304,17 @@ void LocalExterior::add_contacts(const dynamics::ExteriorStep& step) {
   }
 }
 
+// Of fields with the factors of change_, at a local node.
+Vec3f LocalExterior::of_change(std::uint32_t local) const {
+  const auto basis = model_->basis();
+  std::array<float, 3> sum{};
+  add_fields({basis.values.subspan(3 * local * basis.stride), basis.stride}, change_, sum);
+  return {sum[0], sum[1], sum[2]};
+}
+
 // Of near nodes, what theirs is besides that of the fields; ahead_: accelerations of the fields
 // with their drag, per s^2.
 void LocalExterior::add_inertia(const dynamics::ExteriorStep& step) {
-  const auto basis = model_->basis();
   const float inverse_dt = 1 / step.dt, drag = static_cast<float>(drag_per_s_);
   for (std::size_t c = 0; c < change_.size(); ++c) change_[c] = static_cast<float>(ahead_[c]);
   for (std::size_t i = 0; i < near_.size(); ++i) {
@@ -318,56 +324,12 @@ void LocalExterior::add_inertia(const dynamics::ExteriorStep& step) {
     const Vec3f moved = u - step.world.displacements[node.value];
     const Vec3f own =
         ((moved * inverse_dt - step.world.velocities[node.value]) + moved * drag) * inverse_dt;
-    std::array<float, 3> of_fields{};
-    add_fields({basis.values.subspan(3 * local * basis.stride), basis.stride}, change_, of_fields);
+    const Vec3f of_fields = of_change(local);
     const float mass = model_->masses()[local];
-    f_[3 * local] += mass * (own.x - of_fields[0]);
-    f_[3 * local + 1] += mass * (own.y - of_fields[1]);
-    f_[3 * local + 2] += mass * (own.z - of_fields[2]);
+    f_[3 * local] += mass * (own.x - of_fields.x);
+    f_[3 * local + 1] += mass * (own.y - of_fields.y);
+    f_[3 * local + 2] += mass * (own.z - of_fields.z);
   }
-}
-
-// Near nodes are swept, and moved by the fields. What sweeps undo of that in every step would build
-// up, without bound, in fields that move hardly anything else, and come out when the nodes are near
-// no more: so the fields follow the near nodes where that moves nothing else.
-void LocalExterior::follow_near(const dynamics::ExteriorStep& step) {
-  if (near_.empty()) return;
-  auto& s = *state_;
-  if (model_->near_fit() == nullptr) {
-    s.estimate = kBroken;
-    return;
-  }
-  gather(step);
-  const auto basis = model_->basis();
-  const auto count = model_->field_count();
-  const auto follow = [&](std::vector<double>& values, auto&& wanted) {
-    for (std::size_t c = 0; c < count; ++c) change_[c] = static_cast<float>(values[c]);
-    std::ranges::fill(f_, 0.0f);
-    for (std::size_t i = 0; i < near_.size(); ++i) {
-      const auto local = near_[i];
-      std::array<float, 3> of_fields{};
-      add_fields({basis.values.subspan(3 * local * basis.stride), basis.stride}, change_,
-                 of_fields);
-      const Vec3f left =
-          (wanted(i) - Vec3f{of_fields[0], of_fields[1], of_fields[2]}) * model_->masses()[local];
-      f_[3 * local] = left.x, f_[3 * local + 1] = left.y, f_[3 * local + 2] = left.z;
-    }
-    std::ranges::fill(along_, 0.0f);
-    add_along_fields(basis, f_, along_);
-    const auto change = std::span(scratch_).first(count);
-    for (std::size_t c = 0; c < count; ++c) change[c] = static_cast<double>(along_[c]);
-    near_fit_.solve(change);
-    for (std::size_t c = 0; c < count; ++c) values[c] += change[c];
-  };
-  const auto at = [&](std::size_t i) {
-    const float* const u = &u_[3 * near_[i]];
-    return Vec3f{u[0], u[1], u[2]};
-  };
-  const float inverse_dt = 1 / step.dt;
-  follow(s.amplitudes, at);
-  follow(s.rates, [&](std::size_t i) {
-    return (at(i) - step.world.displacements[step.near[i].value]) * inverse_dt;
-  });
 }
 
 // For all corrections of a step: stiffness of contacts is that of the first.
@@ -420,7 +382,7 @@ void LocalExterior::correct(const dynamics::ExteriorStep& step) {
   add_product(model.mass(), width, std::span(ahead_).first(count), gradient);
   if (!has_factors_) has_factors_ = make_factors(inertia);
   if (has_factors_)
-    system_.solve(gradient);
+    system_.solve(gradient, solving_);
   else
     gradient[0] = NAN;
   if (!std::ranges::all_of(gradient, [](double g) { return std::abs(g) < kMaxChange; })) {
@@ -437,6 +399,45 @@ void LocalExterior::correct(const dynamics::ExteriorStep& step) {
     auto& x = step.x[slots_[n]];
     x.x += moved_[3 * n], x.y += moved_[3 * n + 1], x.z += moved_[3 * n + 2];
   }
+}
+
+// Near nodes are swept, and moved by the fields. What sweeps undo of that in every step would build
+// up, without bound, in fields that move hardly anything else, and come out when the nodes are near
+// no more: so the fields follow the near nodes where that moves nothing else.
+void LocalExterior::follow_near(const dynamics::ExteriorStep& step) {
+  if (near_.empty()) return;
+  auto& s = *state_;
+  const auto* const near_fit = model_->near_fit();
+  if (near_fit == nullptr) {
+    s.estimate = kBroken;
+    return;
+  }
+  gather(step);
+  const auto count = model_->field_count();
+  const auto follow = [&](std::vector<double>& values, auto&& wanted) {
+    for (std::size_t c = 0; c < count; ++c) change_[c] = static_cast<float>(values[c]);
+    std::ranges::fill(f_, 0.0f);
+    for (std::size_t i = 0; i < near_.size(); ++i) {
+      const auto local = near_[i];
+      const Vec3f left = (wanted(i) - of_change(local)) * model_->masses()[local];
+      f_[3 * local] = left.x, f_[3 * local + 1] = left.y, f_[3 * local + 2] = left.z;
+    }
+    std::ranges::fill(along_, 0.0f);
+    add_along_fields(model_->basis(), f_, along_);
+    const auto change = std::span(scratch_).first(count);
+    for (std::size_t c = 0; c < count; ++c) change[c] = static_cast<double>(along_[c]);
+    near_fit->solve(change, solving_);
+    for (std::size_t c = 0; c < count; ++c) values[c] += change[c];
+  };
+  const auto at = [&](std::size_t i) {
+    const float* const u = &u_[3 * near_[i]];
+    return Vec3f{u[0], u[1], u[2]};
+  };
+  const float inverse_dt = 1 / step.dt;
+  follow(s.amplitudes, at);
+  follow(s.rates, [&](std::size_t i) {
+    return (at(i) - step.world.displacements[step.near[i].value]) * inverse_dt;
+  });
 }
 
 float LocalExterior::estimate_error(const dynamics::ExteriorStep& step, const world::World& world) {

@@ -83,9 +83,10 @@ class LocalExterior : public dynamics::Exterior {
   void set_model(const PatchModel* model);
   void gather(const dynamics::ExteriorStep& step);
   void add_contacts(const dynamics::ExteriorStep& step);
-  void follow_near(const dynamics::ExteriorStep& step);
+  Vec3f of_change(std::uint32_t local) const;
   void add_inertia(const dynamics::ExteriorStep& step);
   bool make_factors(double inertia_per_s2);
+  void follow_near(const dynamics::ExteriorStep& step);
   float estimate_error(const dynamics::ExteriorStep& step, const world::World& world);
   float place(std::uint32_t turn, const dynamics::ExteriorStep* step, dynamics::Float4* velocities,
               double dt, world::World& world);
@@ -100,9 +101,9 @@ class LocalExterior : public dynamics::Exterior {
   std::vector<Share> shares_;
 
   // Of a step. Per field:
-  std::vector<double> start_, ahead_, gradient_, scratch_;
+  std::vector<double> start_, ahead_, gradient_, scratch_, solving_;
   std::vector<float> along_, change_;
-  BlockSystem system_, near_fit_;
+  BlockSystem system_;
   bool has_factors_ = false;
   // Per local node, x, y, z:
   std::vector<float> u_, f_, moved_;

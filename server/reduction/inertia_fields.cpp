@@ -10,13 +10,6 @@ constexpr double kRank = 1e-8;
 
 }  // namespace
 
-Matrix without(const Matrix& orthonormal, Matrix fields) {
-  // Once leaves what rounding makes of a large part.
-  for (int twice = 0; twice < 2; ++twice)
-    fields -= orthonormal * (orthonormal.transpose() * fields).eval();
-  return fields;
-}
-
 Matrix inertia_modes(FullModel& model, const Matrix& fields, const Matrix& vibrations,
                      const Matrix& known, std::size_t count) {
   if (count == 0) return Matrix(fields.rows(), 0);
@@ -24,11 +17,11 @@ Matrix inertia_modes(FullModel& model, const Matrix& fields, const Matrix& vibra
   Matrix loads = fields;
   for (Eigen::Index i = 0; i < loads.rows(); ++i)
     loads.row(i) *= masses[static_cast<std::size_t>(i / 3)];
-  const Matrix moved = without(vibrations, model.linear_displacements(loads));
-  Eigen::ColPivHouseholderQR<Matrix> factors(without(vibrations, known));
+  const Matrix moved = orthogonal_to(vibrations, model.linear_displacements(loads));
+  Eigen::ColPivHouseholderQR<Matrix> factors(orthogonal_to(vibrations, known));
   factors.setThreshold(kRank);
   const Matrix taken = factors.householderQ() * Matrix::Identity(known.rows(), factors.rank());
-  return karhunen_loeve(without(taken, moved), count).modes;
+  return karhunen_loeve(orthogonal_to(taken, moved), count).modes;
 }
 
 }  // namespace trocar::reduction

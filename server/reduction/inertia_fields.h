@@ -18,7 +18,4 @@ namespace trocar::reduction {
 Matrix inertia_modes(FullModel& model, const Matrix& fields, const Matrix& vibrations,
                      const Matrix& known, std::size_t count);
 
-// What is not of orthonormal columns, of each column.
-Matrix without(const Matrix& orthonormal, Matrix fields);
-
 }  // namespace trocar::reduction

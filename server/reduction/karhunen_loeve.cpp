@@ -23,17 +23,18 @@ KarhunenLoeve karhunen_loeve(const Matrix& snapshots, std::size_t mode_count) {
     ++rank;
   result.modes.resize(snapshots.rows(), rank);
   for (Eigen::Index i = 0; i < rank; ++i) {
-    Vector mode = snapshots * solver.eigenvectors().col(count - 1 - i);
-    mode.normalize();
-    // Of small eigenvalues rounding leaves a part along the modes before; once is not enough.
-    for (int pass = 0; pass < 2; ++pass) {
-      const auto before = result.modes.leftCols(i);
-      mode -= before * (before.transpose() * mode).eval();
-      mode.normalize();
-    }
-    result.modes.col(i) = mode;
+    const Vector mode = snapshots * solver.eigenvectors().col(count - 1 - i);
+    // Of small eigenvalues rounding leaves a part along the modes before.
+    result.modes.col(i) =
+        orthogonal_to(result.modes.leftCols(i), mode.normalized()).col(0).normalized();
   }
   return result;
+}
+
+Matrix orthogonal_to(const Eigen::Ref<const Matrix>& basis, Matrix fields) {
+  // Once leaves what rounding makes of a large part.
+  for (int pass = 0; pass < 2; ++pass) fields -= basis * (basis.transpose() * fields).eval();
+  return fields;
 }
 
 }  // namespace trocar::reduction

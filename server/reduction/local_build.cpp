@@ -234,12 +234,11 @@ class Builder {
     const auto found = slowest_vibrations(*models_[0], settings_.vibrations);
     vibrations_.resize(found.modes.rows(), found.modes.cols());
     for (Eigen::Index i = 0; i < found.modes.cols(); ++i) {
-      const Vector field =
-          without(vibrations_.leftCols(i), found.modes.col(i).normalized()).col(0).normalized();
-      built_.reduction.vibrations.push_back(
-          scene::pack_field({field.data(), static_cast<std::size_t>(field.size())}));
-      vibrations_.col(i) = field;
+      vibrations_.col(i) = orthogonal_to(vibrations_.leftCols(i), found.modes.col(i).normalized())
+                               .col(0)
+                               .normalized();
     }
+    add_packed(vibrations_, built_.reduction.vibrations);
   }
 
   Status take_or_make(FullModel& model, std::size_t number) {
@@ -274,9 +273,9 @@ class Builder {
     }
     for (std::size_t i = 0; i < presses.size(); ++i)
       fields.col(index(9 * nodes.size() + i)) = presses[i];
-    add_modes(patch,
-              karhunen_loeve(without(vibrations_, std::move(fields)), settings_.modes).modes);
-    add_modes(patch, inertia_of(model, patch, nodes));
+    add_packed(karhunen_loeve(orthogonal_to(vibrations_, std::move(fields)), settings_.modes).modes,
+               patch.modes);
+    add_packed(inertia_of(model, patch, nodes), patch.modes);
     // As they will be read.
     Matrix basis(index(model.dof_count()), index(built_.reduction.field_count(patch)));
     Eigen::Index count = 0;
@@ -294,10 +293,10 @@ class Builder {
     find_patch_cubature(model, number, basis, states);
   }
 
-  static void add_modes(LocalPatch& patch, const Matrix& modes) {
-    for (Eigen::Index i = 0; i < modes.cols(); ++i)
-      patch.modes.push_back(
-          scene::pack_field({modes.col(i).data(), static_cast<std::size_t>(modes.rows())}));
+  static void add_packed(const Matrix& fields, std::vector<scene::PackedField>& packed) {
+    for (Eigen::Index i = 0; i < fields.cols(); ++i)
+      packed.push_back(
+          scene::pack_field({fields.col(i).data(), static_cast<std::size_t>(fields.rows())}));
   }
 
   // What inertia adds to fields of forces at these nodes, beyond what the patch has.
@@ -444,10 +443,10 @@ std::string key_of(const scene::Organ& organ, const LocalSettings& s) {
 Status validate(const LocalSettings& s) {
   const auto wrong = [](const std::string& what) { return Error{ErrorCode::Usage, what}; };
   if (auto c = check_count("--modes", s.modes, 1, scene::kMaxReducedModes); !c) return c;
-  if (auto c =
-          check_count("--inertia-modes", s.inertia_modes, 0, scene::kMaxReducedModes - s.modes);
-      !c)
-    return c;
+  if (s.inertia_modes > scene::kMaxReducedModes - s.modes)
+    return wrong("--modes and --inertia-modes: " + std::to_string(s.modes) + " and " +
+                 std::to_string(s.inertia_modes) + ", together at most " +
+                 std::to_string(scene::kMaxReducedModes));
   if (auto c = check_count("--vibrations", s.vibrations, 0, scene::kMaxReducedModes); !c) return c;
   if (auto c = check_count("--free-layers", s.free_layers, 0, scene::kMaxFreeLayers); !c) return c;
   if (auto c = check_count("--directions", s.directions, 0, 20); !c) return c;

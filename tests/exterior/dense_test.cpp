@@ -69,8 +69,9 @@ TEST(BlockSystem, ComesToTheWholeSolution) {
   for (std::size_t i = 0; i < kSize; ++i) x[i] = expected[i] = wave(i + 5);
   whole.solve(expected);
   auto roughly = x;
-  system.solve(roughly);
-  system.solve(x, 60);
+  std::vector<double> scratch;
+  system.solve(roughly, scratch);
+  system.solve(x, scratch, 60);
   double rough_error = 0, size = 0;
   for (std::size_t i = 0; i < kSize; ++i) {
     EXPECT_NEAR(x[i], expected[i], 1e-5);

@@ -320,7 +320,7 @@ TEST(ReducedSession, FieldsStayWithTheNodesThatAreSwept) {
     for (std::size_t n = 0; n < model.nodes().size(); ++n)
       astray = std::max(astray, length(reduced.state().world.displacements[model.nodes()[n].value] -
                                        Vec3f{moved[3 * n], moved[3 * n + 1], moved[3 * n + 2]}));
-    EXPECT_LT(astray, 1.2e-3f) << tick;  // without: 4 mm at tick 600
+    EXPECT_LT(astray, 1.5e-3f) << tick;  // else 3 mm at once, 4 at tick 600
     EXPECT_LT(difference_of(reduced, full), 0.1) << tick;
   }
 }

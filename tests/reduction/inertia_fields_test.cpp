@@ -36,7 +36,7 @@ class InertiaFields : public ::testing::Test {
 
   Eigen::Index length() const { return static_cast<Eigen::Index>(model_->dof_count()); }
 
-  // K and M of what is not held, from parts of FullModel that these fields do not use.
+  // K - w^2 M of what is not held, and rows of `of` there.
   void dynamic(double rate_s, finite_elements::SparseMatrix& k, Matrix& f, const Matrix& of) const {
     const auto& numbers = model_->free_of_dof();
     const finite_elements::SparseMatrix lower = model_->rest_tangent();
@@ -96,7 +96,8 @@ TEST_F(InertiaFields, AreOrthonormalAndOfNothingThatIsKnown) {
   ASSERT_EQ(modes.cols(), 3);  // as many as there are
   EXPECT_LT((modes.transpose() * modes - Matrix::Identity(3, 3)).norm(), 1e-10);
   EXPECT_LT((modes.transpose() * vibrations_).norm(), 1e-10);
-  EXPECT_LT((modes.transpose() * without(vibrations_, greens_)).norm() / greens_.norm(), 1e-10);
+  EXPECT_LT((modes.transpose() * orthogonal_to(vibrations_, greens_)).norm() / greens_.norm(),
+            1e-10);
   EXPECT_EQ(inertia_modes(*model_, greens_, vibrations_, known, 0).cols(), 0);
 }
 

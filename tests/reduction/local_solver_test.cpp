@@ -262,7 +262,8 @@ TEST_F(LocalBlock, SettingsAreCheckedByName) {
     EXPECT_NE(status.error().message.find(what), std::string::npos);
   };
   says({.modes = 65}, "--modes: 65");
-  says({.modes = 50, .inertia_modes = 15}, "--inertia-modes: 15 is not from 0 to 14");
+  says({.modes = 50, .inertia_modes = 15},
+       "--modes and --inertia-modes: 50 and 15, together at most 64");
   says({.vibrations = 65}, "--vibrations: 65");
   says({.free_layers = 4}, "--free-layers: 4");
   says({.residual = 0.2}, "--residual");

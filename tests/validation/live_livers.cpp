@@ -19,9 +19,7 @@ std::string live_training_text(const Lab& lab) {
   const auto s = live_settings(lab);
   return fmt::format(
       "The reduction: {} patches of {:.0f} mm, {} modes, {} of inertia and {} vibrations each, "
-      "trained by presses "
-      "of "
-      "single nodes at the patches' centres, {} directions, up to {} N.",
+      "trained by presses of single nodes at the patches' centres, {} directions, up to {} N.",
       s.patches, 1e3 * s.patch_radius_m, s.modes, s.inertia_modes, s.vibrations, s.directions,
       s.force_n);
 }

@@ -21,7 +21,7 @@ constexpr double kBad = 0.03, kMissed = 0.01;
 // What a session would have to hold the estimate against. On the built-in liver it misses some 1 %
 // of the bad states, and three of five good ones raise an alarm, as on the coarse one: of little
 // use. Sessions hold it against a larger one, as a guard (reduced_tissue.cpp).
-constexpr double kThreshold = 0.035, kMostAlarms = 0.93;
+constexpr double kThreshold = 0.035, kMostAlarms = 0.85;
 constexpr double kLeastForce_n = 0.05;
 constexpr Tick kStateTicks = 8;
 constexpr float kForceMargin = 1.5f;  // of sessions, see server/step/reduced_tissue.cpp

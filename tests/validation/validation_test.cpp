@@ -173,7 +173,7 @@ TEST_F(Validation, SessionsThatALocalReductionMovesAreNearConvergedOnes) {
   EXPECT_TRUE(names.contains("ours/live-reduction/hand-over/liver-jump"));
   EXPECT_TRUE(names.contains("ours/live-reduction/estimate/liver-missed"));
   EXPECT_TRUE(names.contains("ours/live-reduction/sizes/4k-force"));
-  EXPECT_EQ(names.size(), 12u);
+  EXPECT_EQ(names.size(), 13u);
   EXPECT_TRUE(fs::exists(out() / "scenarios" / "live-estimate.csv"));
 }
 
