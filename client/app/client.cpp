@@ -13,7 +13,7 @@
 #include "client/replica/client_messages.h"
 #include "common/base/log.h"
 #include "common/base/timing.h"
-#include "common/scene/script.h"
+#include "common/tool/script.h"
 
 namespace trocar::app {
 namespace {
@@ -206,11 +206,11 @@ Result<ExitCode> run_client(const ClientOptions& options) {
     return run_with_source(options, **source, hands);
   }
   if (!options.script_file.empty()) {
-    auto script = scene::parse_script(options.script_file);
+    auto script = tool::parse_script(options.script_file);
     if (!script) return script.error();
     hands = Hands::scripted(std::move(*script));
   } else if (options.display == Display::Window && replica::has_tools(options.role)) {
-    hands = Hands::mouse(scene::ToolShape{});
+    hands = Hands::mouse(tool::ToolShape{});
   }
   net::NetSourceOptions connection;
   if (const auto parsed = net::parse_server_address(options.server, connection); !parsed)

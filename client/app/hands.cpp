@@ -6,26 +6,26 @@
 
 namespace trocar::app {
 
-Hands Hands::mouse(const scene::ToolShape& shape) {
+Hands Hands::mouse(const tool::ToolShape& shape) {
   Hands hands;
   hands.mouse_.emplace(shape);
   hands.mouse_shape_ = shape;
   return hands;
 }
 
-Hands Hands::scripted(scene::Script script) {
+Hands Hands::scripted(tool::Script script) {
   Hands hands;
   for (const auto& tool : script.tools) hands.script_shapes_.push_back(tool.shape);
   hands.script_ = std::move(script);
   return hands;
 }
 
-std::vector<scene::ToolShape> Hands::shapes() const {
-  return mouse_ ? std::vector<scene::ToolShape>{mouse_shape_} : script_shapes_;
+std::vector<tool::ToolShape> Hands::shapes() const {
+  return mouse_ ? std::vector<tool::ToolShape>{mouse_shape_} : script_shapes_;
 }
 
 void Hands::send(replica::SessionSource& source, std::uint32_t tool,
-                 const scene::ToolSample& sample) {
+                 const tool::ToolSample& sample) {
   // Dropped when the queue is full: the next sample says more.
   replica::send_tool_sample(source, tool, ++sequence_, sample);
 }

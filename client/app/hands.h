@@ -16,11 +16,11 @@ class Hands {
  public:
   // No hands at all: a watcher.
   Hands() = default;
-  static Hands mouse(const scene::ToolShape& shape);
-  static Hands scripted(scene::Script script);
+  static Hands mouse(const tool::ToolShape& shape);
+  static Hands scripted(tool::Script script);
 
   // What to offer when joining.
-  std::vector<scene::ToolShape> shapes() const;
+  std::vector<tool::ToolShape> shapes() const;
   device::MouseTool* mouse_tool() { return mouse_ ? &*mouse_ : nullptr; }
 
   // Sends what is due. A script begins with the first frame this client shows and runs in simulated
@@ -32,13 +32,13 @@ class Hands {
  private:
   // Simulated seconds since the script began; never goes back.
   double script_seconds(const replica::SessionFrame& newest, std::uint64_t now_ns);
-  void send(replica::SessionSource& source, std::uint32_t tool, const scene::ToolSample& sample);
+  void send(replica::SessionSource& source, std::uint32_t tool, const tool::ToolSample& sample);
 
   std::optional<device::MouseTool> mouse_;
-  scene::ToolShape mouse_shape_;
-  std::optional<scene::Script> script_;  // until the surface is known
+  tool::ToolShape mouse_shape_;
+  std::optional<tool::Script> script_;  // until the surface is known
   std::optional<device::ScriptHand> script_hand_;
-  std::vector<scene::ToolShape> script_shapes_;
+  std::vector<tool::ToolShape> script_shapes_;
   Tick script_start_tick_ = 0;
   double script_seconds_ = 0;
   std::uint64_t script_sent_ns_ = 0;

@@ -19,11 +19,11 @@ const replica::Participant* owner_of(const replica::Replica& replica, ToolSlot s
   return replica.find_participant(slot.owner());
 }
 
-scene::ToolShape shape_of(const replica::Replica& replica, ToolSlot slot) {
+tool::ToolShape shape_of(const replica::Replica& replica, ToolSlot slot) {
   const auto* owner = owner_of(replica, slot);
   const auto number = static_cast<std::size_t>(slot.number());
   return owner != nullptr && number < owner->tools.size() ? owner->tools[number]
-                                                          : scene::ToolShape{};
+                                                          : tool::ToolShape{};
 }
 
 std::string sync_text(const replica::Replica& replica) {
@@ -123,7 +123,7 @@ render::SceneTool Picture::scene_tool(const replica::Replica& replica, const rep
 std::vector<render::Hold> Picture::holds(const replica::Replica& replica) {
   if (held_history_ != replica.history_version()) held_.clear();
   held_history_ = replica.history_version();
-  std::vector<scene::ToolShape> shapes;
+  std::vector<tool::ToolShape> shapes;
   for (const auto& tool : surface_.tools()) shapes.push_back(shape_of(replica, tool.slot));
   // Kept up to date while hidden too: which tissue a grasp took is seen when it takes it.
   held_.update(surface_.positions(), surface_.tools(), shapes);
@@ -173,7 +173,7 @@ void Picture::add_participants(const replica::Replica& replica, bool is_replay,
       shown.has_tool = true;
       shown.is_silent = tool.is_silent;
       shown.is_inside = shown.is_inside || tool.is_inside;
-      if (tool.verb != scene::Verb::None) shown.verb = tool.verb, shown.has_claim = tool.has_claim;
+      if (tool.verb != tool::Verb::None) shown.verb = tool.verb, shown.has_claim = tool.has_claim;
       shown.force_n += length(tool.force_n);
       shown.torque_nm += length(tool.torque_nm);
       shown.contact_nodes += tool.contact_nodes;

@@ -18,17 +18,17 @@ constexpr float kMinDepth = 0.02f, kMaxDepth = 1.8f;
 void MouseTool::update(const PointerInput& input, const ViewRays& view,
                        std::span<const Vec3f> positions, Triangles triangles, float seconds) {
   const bool is_camera = input.right || input.middle;
-  scene::Verb verb = scene::Verb::None;
+  tool::Verb verb = tool::Verb::None;
   if (input.cut)
-    verb = scene::Verb::Cut;
+    verb = tool::Verb::Cut;
   else if (input.grasp)
-    verb = scene::Verb::Grasp;
-  else if (input.push || (input.left && (input.is_over_scene || sample_.verb == scene::Verb::Push)))
-    verb = scene::Verb::Push;
+    verb = tool::Verb::Grasp;
+  else if (input.push || (input.left && (input.is_over_scene || sample_.verb == tool::Verb::Push)))
+    verb = tool::Verb::Push;
 
-  if (is_camera || (!input.is_over_scene && verb == scene::Verb::None)) {
+  if (is_camera || (!input.is_over_scene && verb == tool::Verb::None)) {
     // A verb that is held goes on holding; the depth is that of the tip seen from the new view.
-    sample_.verb = is_valid_ ? verb : scene::Verb::None;
+    sample_.verb = is_valid_ ? verb : tool::Verb::None;
     depth_ = dot(sample_.world_from_tool.position - view.eye, view.forward);
     return;
   }
@@ -37,7 +37,7 @@ void MouseTool::update(const PointerInput& input, const ViewRays& view,
   float advance = input.control ? 0.0f : input.wheel * kWheelMetres * fine;
   if (input.deeper) advance += kKeyMetresPerSecond * fine * seconds;
   if (input.nearer) advance -= kKeyMetresPerSecond * fine * seconds;
-  if (verb == scene::Verb::None) {
+  if (verb == tool::Verb::None) {
     hover_ = std::clamp(hover_ - advance, -0.03f, 0.15f);
     if (const auto depth = pick(positions, triangles, view.eye, ray)) {
       const float wanted = *depth - hover_;
@@ -47,8 +47,8 @@ void MouseTool::update(const PointerInput& input, const ViewRays& view,
       depth_ = std::max(-dot(view.eye, view.forward), kMinDepth);  // the organ's centre
     }
   } else {
-    const bool begins = sample_.verb == scene::Verb::None;
-    if (begins && verb == scene::Verb::Cut) depth_ += hover_ + kCutDepth;
+    const bool begins = sample_.verb == tool::Verb::None;
+    if (begins && verb == tool::Verb::Cut) depth_ += hover_ + kCutDepth;
     depth_ += advance;
   }
   depth_ = std::clamp(depth_, kMinDepth, kMaxDepth);
@@ -62,7 +62,7 @@ void MouseTool::update(const PointerInput& input, const ViewRays& view,
   is_valid_ = true;
 }
 
-std::optional<scene::ToolSample> MouseTool::take_due(std::uint64_t now_ns) {
+std::optional<tool::ToolSample> MouseTool::take_due(std::uint64_t now_ns) {
   if (!is_valid_) return std::nullopt;
   const std::uint64_t since = now_ns - last_sent_ns_;
   const bool is_due = last_sent_ns_ == 0 || since >= kKeepAliveNs ||

@@ -20,7 +20,7 @@
 
 #include "client/device/ray_pick.h"
 #include "client/device/view_rays.h"
-#include "common/scene/tool.h"
+#include "common/tool/tool.h"
 
 namespace trocar::device {
 
@@ -29,21 +29,21 @@ inline constexpr std::uint64_t kKeepAliveNs = 40'000'000;
 
 class MouseTool {
  public:
-  explicit MouseTool(const scene::ToolShape& shape) : shape_(shape) {}
+  explicit MouseTool(const tool::ToolShape& shape) : shape_(shape) {}
 
   // Once per display frame; `seconds` since the last one. Positions are those on the screen.
   void update(const PointerInput& input, const ViewRays& view, std::span<const Vec3f> positions,
               Triangles triangles, float seconds);
   // The pose and verb now; invalid until the pointer was over the scene once.
-  const scene::ToolSample& current() const { return sample_; }
+  const tool::ToolSample& current() const { return sample_; }
   bool is_valid() const { return is_valid_; }
   // A sample if one is due.
-  std::optional<scene::ToolSample> take_due(std::uint64_t now_ns);
+  std::optional<tool::ToolSample> take_due(std::uint64_t now_ns);
 
  private:
-  scene::ToolShape shape_;
-  scene::ToolSample sample_;
-  scene::ToolSample last_sent_;
+  tool::ToolShape shape_;
+  tool::ToolSample sample_;
+  tool::ToolSample last_sent_;
   std::uint64_t last_sent_ns_ = 0;
   bool is_valid_ = false;
   float depth_ = 0;       // m along the view direction

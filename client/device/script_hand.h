@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "common/base/result.h"
-#include "common/scene/script.h"
-#include "common/scene/tool.h"
+#include "common/tool/script.h"
+#include "common/tool/tool.h"
 
 namespace trocar::device {
 
@@ -18,20 +18,20 @@ class ScriptHand {
  public:
   // `rest_positions`: m, world frame, per surface vertex. Error if an anchor cannot be found or a
   // key would lie more than kScriptReachLimit from the origin on this organ.
-  static Result<ScriptHand> make(scene::Script script, std::span<const Vec3f> rest_positions,
-                                 std::span<const scene::SurfaceTriangle> triangles);
+  static Result<ScriptHand> make(tool::Script script, std::span<const Vec3f> rest_positions,
+                                 std::span<const tool::SurfaceTriangle> triangles);
 
   std::size_t tool_count() const { return script_.tools.size(); }
-  std::vector<scene::ToolShape> shapes() const;  // what to offer when joining, per tool
+  std::vector<tool::ToolShape> shapes() const;  // what to offer when joining, per tool
   // `seconds` since the script began, world frame.
-  scene::ToolSample sample(std::size_t tool, double seconds) const;
+  tool::ToolSample sample(std::size_t tool, double seconds) const;
 
  private:
-  ScriptHand(scene::Script script, std::vector<scene::AnchorPoint> anchors)
+  ScriptHand(tool::Script script, std::vector<tool::AnchorPoint> anchors)
       : script_(std::move(script)), anchors_(std::move(anchors)) {}
 
-  scene::Script script_;
-  std::vector<scene::AnchorPoint> anchors_;  // per tool; unused for a tool without anchor
+  tool::Script script_;
+  std::vector<tool::AnchorPoint> anchors_;  // per tool; unused for a tool without anchor
 };
 
 }  // namespace trocar::device

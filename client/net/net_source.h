@@ -20,7 +20,7 @@
 
 #include "client/replica/session_source.h"
 #include "common/base/result.h"
-#include "common/scene/tool.h"
+#include "common/tool/tool.h"
 
 namespace trocar::net {
 
@@ -28,8 +28,8 @@ struct NetSourceOptions {
   std::string host = "127.0.0.1";  // address or name
   std::uint16_t port = 7690;
   std::string participant_name;
-  int role = 1;                         // proto::Role
-  std::vector<scene::ToolShape> tools;  // empty: one default tool for roles that have tools
+  int role = 1;                        // proto::Role
+  std::vector<tool::ToolShape> tools;  // empty: one default tool for roles that have tools
   std::chrono::milliseconds connect_deadline{5000};
   std::chrono::milliseconds connect_retry{200};
   std::chrono::milliseconds ping_interval{200};

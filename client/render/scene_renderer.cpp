@@ -345,9 +345,9 @@ void SceneRenderer::Parts::draw_tool(const SceneTool& shown, float seconds) {
     return;
   }
   draw_mesh(make_shaft(shown.shape, colour), world, 0, dim);
-  const float wanted = shown.verb != scene::Verb::Grasp ? 0.0f
-                       : shown.has_claim                ? kHoldingJaws
-                                                        : kOpenJaws;
+  const float wanted = shown.verb != tool::Verb::Grasp ? 0.0f
+                       : shown.has_claim               ? kHoldingJaws
+                                                       : kOpenJaws;
   float& opening = jaw_openings[shown.slot.value % kMaxTools];
   opening += (wanted - opening) * (1 - std::exp(-seconds / kJawSeconds));
   const MeshVertices jaw = make_jaw(shown.shape);

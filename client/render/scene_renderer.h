@@ -15,7 +15,7 @@
 #include "client/render/tool_mesh.h"
 #include "common/base/ids.h"
 #include "common/math/frame.h"
-#include "common/scene/tool.h"
+#include "common/tool/tool.h"
 
 namespace trocar::render {
 
@@ -29,8 +29,8 @@ struct SceneTool {
   ToolSlot slot;
   Pose world_from_tool;  // where it is drawn: where the tissue lets it be
   Vec3f hand_position;   // where the hand has its tip
-  scene::ToolShape shape;
-  scene::Verb verb = scene::Verb::None;
+  tool::ToolShape shape;
+  tool::Verb verb = tool::Verb::None;
   bool has_claim = false;
   bool is_silent = false;
   Vec3f force_n;  // of the tissue on the tool

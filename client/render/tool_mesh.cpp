@@ -89,11 +89,11 @@ Colour colour_of_region(int region) {
   return kColours[static_cast<std::size_t>(std::max(region - 1, 0)) % kColours.size()];
 }
 
-float jaw_length(const scene::ToolShape& shape) {
+float jaw_length(const tool::ToolShape& shape) {
   return shape.radius_m * 4.2f;
 }
 
-MeshVertices make_shaft(const scene::ToolShape& shape, Colour colour) {
+MeshVertices make_shaft(const tool::ToolShape& shape, Colour colour) {
   const float r = shape.radius_m, hinge = jaw_length(shape);
   const float end = std::max(shape.length_m, hinge + 12 * r);
   const float grip = std::max(end - 0.09f, hinge + 9 * r);
@@ -115,7 +115,7 @@ MeshVertices make_shaft(const scene::ToolShape& shape, Colour colour) {
   return out;
 }
 
-MeshVertices make_jaw(const scene::ToolShape& shape) {
+MeshVertices make_jaw(const tool::ToolShape& shape) {
   const float r = shape.radius_m, hinge = jaw_length(shape);
   std::vector<ProfilePoint> profile;
   constexpr int kRings = 8;
@@ -140,7 +140,7 @@ MeshVertices make_jaw(const scene::ToolShape& shape) {
   return out;
 }
 
-MeshVertices make_blade(const scene::ToolShape& shape, Colour colour) {
+MeshVertices make_blade(const tool::ToolShape& shape, Colour colour) {
   const float r = shape.radius_m, w = shape.half_width_m;
   const float far_end = std::max(shape.length_m - r, r + 1e-4f);
   // Outline of the core with, at each point, its outward direction in the (x, z) plane.

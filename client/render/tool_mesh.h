@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "common/math/vec3.h"
-#include "common/scene/tool.h"
+#include "common/tool/tool.h"
 
 namespace trocar::render {
 
@@ -27,14 +27,14 @@ struct MeshVertex {
 using MeshVertices = std::vector<MeshVertex>;  // three per triangle, counter-clockwise outside
 
 // Steel shaft with a collar and a band in `colour`, from behind the jaws to its end.
-MeshVertices make_shaft(const scene::ToolShape& shape, Colour colour);
+MeshVertices make_shaft(const tool::ToolShape& shape, Colour colour);
 // One of two jaws, the half of a round-nosed capsule above y = 0. Closed, two of them have the
 // outline that the simulation uses. The hinge is at z = jaw_length().
-MeshVertices make_jaw(const scene::ToolShape& shape);
-float jaw_length(const scene::ToolShape& shape);
+MeshVertices make_jaw(const tool::ToolShape& shape);
+float jaw_length(const tool::ToolShape& shape);
 // A flat tool: the solid that the simulation uses (half width across x, round edges), then a grip
 // in `colour`.
-MeshVertices make_blade(const scene::ToolShape& shape, Colour colour);
+MeshVertices make_blade(const tool::ToolShape& shape, Colour colour);
 // A thread along +z that ends, `length` on, in a small ball: from a tool to the hand that moves it.
 MeshVertices make_ghost(float length, Colour colour);
 // Along +z from the origin, `length` long including its head.

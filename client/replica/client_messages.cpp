@@ -5,7 +5,7 @@
 namespace trocar::replica {
 
 bool send_tool_sample(SessionSource& source, std::uint32_t tool, std::uint32_t sequence,
-                      const scene::ToolSample& sample) {
+                      const tool::ToolSample& sample) {
   proto::Envelope envelope;
   auto& message = *envelope.mutable_tool_sample();
   message.set_tool(tool);

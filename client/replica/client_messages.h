@@ -3,13 +3,13 @@
 // What a client says: a reading of one of its tools, a person's wish.
 
 #include "client/replica/session_source.h"
-#include "common/scene/tool.h"
+#include "common/tool/tool.h"
 
 namespace trocar::replica {
 
 // `tool` is 0 or 1; `sequence` counts up per client. False if the source dropped it.
 bool send_tool_sample(SessionSource& source, std::uint32_t tool, std::uint32_t sequence,
-                      const scene::ToolSample& sample);
+                      const tool::ToolSample& sample);
 // To mark the organ as it is, or to return it to the mark. False if the source dropped it.
 bool ask_for_mark(SessionSource& source, bool is_return);
 // To be shown the full solution beside a session with a reduction, or no longer. False if the

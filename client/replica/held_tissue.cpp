@@ -6,7 +6,7 @@ namespace trocar::replica {
 namespace {
 
 // From the surface of the solid: a capsule, or with a half width a flat blade.
-float distance_to(const Vec3f& p, const Pose& world_from_tool, const scene::ToolShape& shape) {
+float distance_to(const Vec3f& p, const Pose& world_from_tool, const tool::ToolShape& shape) {
   const Vec3f q = world_from_tool.apply_inverse(p);
   const float far_end = std::max(shape.length_m - shape.radius_m, shape.radius_m);
   const Vec3f core{std::clamp(q.x, -shape.half_width_m, shape.half_width_m), 0,
@@ -22,7 +22,7 @@ void HeldTissue::clear() {
 }
 
 void HeldTissue::update(std::span<const Vec3f> positions, std::span<const Tool> tools,
-                        std::span<const scene::ToolShape> shapes) {
+                        std::span<const tool::ToolShape> shapes) {
   if (holdings_.size() > positions.size()) clear();  // where a blade cuts it only grows
   holdings_.assign(positions.size(), Holding{});
   std::array<bool, kMaxTools> is_grasping{};
@@ -30,12 +30,12 @@ void HeldTissue::update(std::span<const Vec3f> positions, std::span<const Tool> 
     const Tool& tool = tools[t];
     if (!tool.slot.is_valid() || !tool.has_claim) continue;
     const std::uint8_t owner = tool.slot.owner().value;
-    if (tool.verb == scene::Verb::Push) {
+    if (tool.verb == tool::Verb::Push) {
       for (std::size_t i = 0; i < positions.size(); ++i)
         if (holdings_[i].owner == kHeldByNobody &&
             distance_to(positions[i], tool.world_from_proxy, shapes[t]) < kTouchMargin_m)
           holdings_[i] = {owner, false};
-    } else if (tool.verb == scene::Verb::Grasp) {
+    } else if (tool.verb == tool::Verb::Grasp) {
       is_grasping[tool.slot.value] = true;
       Grasp& grasp = grasps_[tool.slot.value];
       const Vec3f tip = tool.world_from_tool.position;

@@ -34,7 +34,7 @@ class HeldTissue {
 
   // `positions` m, per vertex slot; `shapes` per tool, as in `tools`.
   void update(std::span<const Vec3f> positions, std::span<const Tool> tools,
-              std::span<const scene::ToolShape> shapes);
+              std::span<const tool::ToolShape> shapes);
   // After the surface was replaced or time went back.
   void clear();
 

@@ -26,16 +26,16 @@ Vec3f to_vec3(const proto::Vec3& v) {
   return {v.x(), v.y(), v.z()};
 }
 
-scene::Verb to_verb(proto::Verb verb) {
+tool::Verb to_verb(proto::Verb verb) {
   switch (verb) {
     case proto::VERB_PUSH:
-      return scene::Verb::Push;
+      return tool::Verb::Push;
     case proto::VERB_GRASP:
-      return scene::Verb::Grasp;
+      return tool::Verb::Grasp;
     case proto::VERB_CUT:
-      return scene::Verb::Cut;
+      return tool::Verb::Cut;
     default:
-      return scene::Verb::None;
+      return tool::Verb::None;
   }
 }
 

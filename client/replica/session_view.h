@@ -10,7 +10,7 @@
 
 #include "common/base/ids.h"
 #include "common/base/tick.h"
-#include "common/scene/tool.h"
+#include "common/tool/tool.h"
 #include "common/wire/quantise.h"
 #include "common/wire/role.h"
 
@@ -24,14 +24,14 @@ struct Participant {
   ParticipantSlot slot;
   std::string name;
   Role role = Role::Unknown;
-  std::vector<scene::ToolShape> tools;
+  std::vector<tool::ToolShape> tools;
 };
 
 struct Tool {
   ToolSlot slot;
   Pose world_from_tool;
   Pose world_from_proxy;  // where the tissue lets it be
-  scene::Verb verb = scene::Verb::None;
+  tool::Verb verb = tool::Verb::None;
   Vec3f force_n, torque_nm;  // of the tissue on the tool, torque about its tip
   std::uint32_t contact_nodes = 0;
   float penetration_m = 0;  // deepest contact
@@ -133,7 +133,7 @@ struct FrameFigures {
   std::uint32_t far_interval = 1;            // ticks for which these far sweeps are
   float residual_n = 0;
   float tick_median_us = 0, tick_p99_us = 0;
-  std::vector<float> stage_median_us;  // order of Stage in server/step
+  std::vector<float> stage_median_us;  // order of Stage in server/tissue/step
   std::uint64_t slow_ticks = 0;
   std::uint64_t state_hash = 0;
   RateFigures rate;
@@ -169,7 +169,7 @@ inline bool is_refusal(ClaimOutcome outcome) {
 struct Notice {
   Tick tick = 0;
   ToolSlot tool;
-  scene::Verb verb = scene::Verb::None;
+  tool::Verb verb = tool::Verb::None;
   ClaimOutcome outcome = ClaimOutcome::Granted;
   std::string text;  // one line for the person
   std::uint64_t arrival_ns = 0;

@@ -25,7 +25,7 @@ struct HudParticipant {
   bool is_self = false;
   bool has_tool = false;  // the rest is valid
   render::Colour colour;
-  scene::Verb verb = scene::Verb::None;
+  tool::Verb verb = tool::Verb::None;
   bool has_claim = false, is_silent = false;
   bool is_inside = false;  // it appeared inside tissue and touches nothing
   float force_n = 0, torque_nm = 0;

@@ -55,9 +55,9 @@ const google::protobuf::Descriptor& topic_message(JournalTopic topic);
 // Of the local reduction that a session had: without it the session cannot be simulated again.
 // In the metadata as reduction_hash, reduction_file and reduction_source; absent without one.
 struct ReductionDescription {
-  std::uint64_t hash = 0;  // scene::reduction_hash
+  std::uint64_t hash = 0;  // organ::reduction_hash
   std::string file;        // its name, without folders
-  std::string source;      // scene::LocalReduction::source
+  std::string source;      // organ::LocalReduction::source
 
   bool operator==(const ReductionDescription&) const = default;
 };

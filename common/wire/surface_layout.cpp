@@ -15,7 +15,7 @@ std::uint64_t SurfaceLayout::compute_triangle_sum() const {
   return sum;
 }
 
-SurfaceLayout make_surface_layout(const scene::Organ& organ) {
+SurfaceLayout make_surface_layout(const organ::Organ& organ) {
   const mesh::TetMesh& mesh = organ.mesh;
   std::vector<Vec3d> positions;
   positions.reserve(mesh.surface_nodes.size());

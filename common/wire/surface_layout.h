@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "common/base/index.h"
-#include "common/scene/organ.h"
 #include "common/wire/quantise.h"
 #include "common/wire/surface_change.h"
+#include "server/organs/organ/organ.h"
 
 namespace trocar::wire {
 
@@ -33,6 +33,6 @@ struct SurfaceLayout {
   bool operator==(const SurfaceLayout&) const = default;
 };
 
-SurfaceLayout make_surface_layout(const scene::Organ& organ);
+SurfaceLayout make_surface_layout(const organ::Organ& organ);
 
 }  // namespace trocar::wire

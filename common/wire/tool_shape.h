@@ -1,14 +1,14 @@
 #pragma once
 
 // A tool's shape on the wire and in journals: what is absent is as tools are by default. Ranges
-// are checked by scene::is_valid, not here.
+// are checked by tool::is_valid, not here.
 
-#include "common/scene/tool.h"
+#include "common/tool/tool.h"
 #include "proto/wire.pb.h"
 
 namespace trocar::wire {
 
-inline void write(const scene::ToolShape& shape, proto::ToolShape& message) {
+inline void write(const tool::ToolShape& shape, proto::ToolShape& message) {
   message.set_radius_m(shape.radius_m);
   message.set_length_m(shape.length_m);
   message.set_reach_m(shape.reach_m);
@@ -18,8 +18,8 @@ inline void write(const scene::ToolShape& shape, proto::ToolShape& message) {
   message.set_edge_m(shape.edge_m);
 }
 
-inline scene::ToolShape read(const proto::ToolShape& message) {
-  scene::ToolShape shape{message.radius_m(), message.length_m(), message.reach_m()};
+inline tool::ToolShape read(const proto::ToolShape& message) {
+  tool::ToolShape shape{message.radius_m(), message.length_m(), message.reach_m()};
   if (message.has_half_width_m()) shape.half_width_m = message.half_width_m();
   if (message.has_friction()) shape.friction = message.friction();
   if (message.has_grip_n()) shape.grip_n = message.grip_n();

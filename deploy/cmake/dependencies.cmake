@@ -37,5 +37,5 @@ find_library(CHOLMOD_LIBRARY cholmod REQUIRED)
 add_library(trocar_cholmod INTERFACE)
 target_include_directories(trocar_cholmod SYSTEM INTERFACE ${CHOLMOD_INCLUDE})
 # gomp: the OpenMP runtime of GCC that CHOLMOD runs on, by name because FindOpenMP gives clang another
-# one; server/finite_elements/sparse_factors.cpp has to tell it something.
+# one; server/lab/finite_elements/sparse_factors.cpp has to tell it something.
 target_link_libraries(trocar_cholmod INTERFACE Eigen3::Eigen ${CHOLMOD_LIBRARY} gomp)

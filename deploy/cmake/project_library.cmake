@@ -1,8 +1,10 @@
-# project_library(<folder> SOURCES a.cpp... HEADERS a.h... DEPENDS common/base... LINK pkg...)
+# project_library(<folder> SOURCES a.cpp... HEADERS a.h... DEPENDS common/base... USES server/x... LINK pkg...)
 # One folder, one static library: target trocar_<folder with _>, alias trocar::<folder with _>.
-# DEPENDS names folders (public), LINK third-party targets (public).
+# DEPENDS names the folders that its headers include (public), USES those that only its sources
+# include (private), LINK third-party targets (public). tests/architecture compares both with the
+# sources.
 function(project_library folder)
-  cmake_parse_arguments(ARG "" "" "SOURCES;HEADERS;DEPENDS;LINK" ${ARGN})
+  cmake_parse_arguments(ARG "" "" "SOURCES;HEADERS;DEPENDS;USES;LINK" ${ARGN})
   if(ARG_UNPARSED_ARGUMENTS)
     message(FATAL_ERROR "project_library(${folder}): unknown arguments ${ARG_UNPARSED_ARGUMENTS}")
   endif()
@@ -16,6 +18,10 @@ function(project_library folder)
   foreach(dependency IN LISTS ARG_DEPENDS)
     string(REPLACE "/" "_" dependency_name ${dependency})
     target_link_libraries(trocar_${name} PUBLIC trocar_${dependency_name})
+  endforeach()
+  foreach(dependency IN LISTS ARG_USES)
+    string(REPLACE "/" "_" dependency_name ${dependency})
+    target_link_libraries(trocar_${name} PRIVATE trocar_${dependency_name})
   endforeach()
   target_link_libraries(trocar_${name} PUBLIC ${ARG_LINK})
 endfunction()

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "common/base/spsc_queue.h"
-#include "server/step/published_frame.h"
+#include "server/tissue/step/published_frame.h"
 
 namespace trocar::app {
 

@@ -11,7 +11,7 @@
 #include "common/base/version.h"
 #include "common/journal/session_journal.h"
 #include "common/wire/role.h"
-#include "server/recording/verify.h"
+#include "server/session/recording/verify.h"
 
 namespace trocar::app {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <ctime>
 
-#include "server/recording/recorder.h"
+#include "server/session/recording/recorder.h"
 
 namespace trocar::app {
 namespace {
@@ -13,7 +13,8 @@ class RecordedSession : public JournalSink {
       : recorder_(std::move(recorder)) {}
 
   void take_frame(const step::SharedFrame& frame) override { recorder_->take_frame(frame); }
-  void take_participants(const std::vector<session::Participant>& present, Tick tick) override {
+  void take_participants(const std::vector<participants::Participant>& present,
+                         Tick tick) override {
     recorder_->take_participants(present, tick);
   }
   Status close() override { return recorder_->close(); }
@@ -25,7 +26,7 @@ class RecordedSession : public JournalSink {
 }  // namespace
 
 Result<std::unique_ptr<JournalSink>> open_journal(
-    const std::string& path, const scene::Organ& organ, const wire::SurfaceLayout& layout,
+    const std::string& path, const organ::Organ& organ, const wire::SurfaceLayout& layout,
     const std::optional<journal::ReductionDescription>& reduction) {
   if (path == "none") return std::unique_ptr<JournalSink>();
   auto recorder = recording::Recorder::create(path, organ, layout, reduction);

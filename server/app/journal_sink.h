@@ -9,10 +9,10 @@
 #include <vector>
 
 #include "common/journal/session_topics.h"
-#include "common/scene/organ.h"
 #include "common/wire/surface_layout.h"
-#include "server/session/roster.h"
-#include "server/step/published_frame.h"
+#include "server/organs/organ/organ.h"
+#include "server/session/participants/roster.h"
+#include "server/tissue/step/published_frame.h"
 
 namespace trocar::app {
 
@@ -23,14 +23,15 @@ class JournalSink {
   // snapshot. The first frame has the snapshot of tick 0.
   virtual void take_frame(const step::SharedFrame& frame) = 0;
   // I/O thread: who is here, after each change. `tick` is that of the newest frame.
-  virtual void take_participants(const std::vector<session::Participant>& present, Tick tick) = 0;
+  virtual void take_participants(const std::vector<participants::Participant>& present,
+                                 Tick tick) = 0;
   // I/O thread, after the simulation thread has ended.
   virtual Status close() = 0;
 };
 
 // A journal at `path`, or none for "none" (then null). reduction: of the session, if it has one.
 Result<std::unique_ptr<JournalSink>> open_journal(
-    const std::string& path, const scene::Organ& organ, const wire::SurfaceLayout& layout,
+    const std::string& path, const organ::Organ& organ, const wire::SurfaceLayout& layout,
     const std::optional<journal::ReductionDescription>& reduction = {});
 
 // "./trocar-20261121T135400Z.mcap"

@@ -6,7 +6,7 @@
 #include "common/base/version.h"
 #include "common/base/workers.h"
 #include "server/app/journal_sink.h"
-#include "server/step/simulation.h"
+#include "server/tissue/step/simulation.h"
 
 namespace trocar::app {
 namespace {

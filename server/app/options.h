@@ -6,7 +6,7 @@
 #include <string>
 
 #include "common/base/result.h"
-#include "server/step/tick_report.h"
+#include "server/tissue/step/tick_report.h"
 
 namespace trocar::app {
 

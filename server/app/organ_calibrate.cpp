@@ -8,10 +8,10 @@
 #include "common/base/cpu.h"
 #include "common/base/text_file.h"
 #include "common/base/timing.h"
-#include "common/plot/plot.h"
-#include "common/scene/load_organ.h"
-#include "common/scene/organ_file.h"
 #include "server/app/progress_line.h"
+#include "server/lab/plot/plot.h"
+#include "server/organs/catalogue/load_organ.h"
+#include "server/organs/organ/organ_file.h"
 
 namespace trocar::app {
 namespace {
@@ -28,7 +28,7 @@ std::string limit_text(const std::optional<std::uint32_t>& limit, const char* un
   return limit ? std::to_string(*limit) + unit : "none";
 }
 
-std::string table_csv(const scene::DepthTable& table) {
+std::string table_csv(const organ::DepthTable& table) {
   std::string text =
       "force_up_to_n,frozen_nodes,frozen_error_percent,graded_depth,graded_error_percent\n";
   for (const auto& row : table.rows) {
@@ -153,7 +153,7 @@ Status run_calibrate(CalibrateCommand command) {
   settings.radius_m = command.radius_mm * 1e-3;
   settings.depth_m = command.depth_mm * 1e-3;
   if (auto s = calibration::validate(settings); !s) return s;
-  auto organ = scene::load_organ(command.organ);
+  auto organ = catalogue::load_organ(command.organ);
   if (!organ) return organ.error();
   const auto stem = std::filesystem::path(command.organ).stem().string();
   const std::filesystem::path folder =
@@ -173,9 +173,9 @@ Status run_calibrate(CalibrateCommand command) {
                  command.organ + ": no place could be pressed, try another --radius or --seed"};
   const double wall_s = static_cast<double>(monotonic_ns() - begin) * 1e-9;
   const double cpu_s = static_cast<double>(thread_cpu_ns() - cpu) * 1e-9;
-  const auto plain_bytes = scene::pack_organ(*organ).size();
+  const auto plain_bytes = organ::pack_organ(*organ).size();
   organ->depth_table = found.table;
-  if (auto s = scene::write_organ(out, *organ); !s) return s;
+  if (auto s = organ::write_organ(out, *organ); !s) return s;
   std::printf("%s: %u places pressed %.1f mm deep with a tip of %.1f mm, %zu left out\n",
               organ->name.c_str(), found.table.places, command.depth_mm,
               found.table.tool_radius_m * 1e3, found.places_left_out);
@@ -191,7 +191,7 @@ Status run_calibrate(CalibrateCommand command) {
   }
   std::printf("%.0f s (%.0f s of CPU time of one thread) for %llu ticks; %zu bytes more in %s\n",
               wall_s, cpu_s, static_cast<unsigned long long>(found.ticks),
-              scene::pack_organ(*organ).size() - plain_bytes, out.c_str());
+              organ::pack_organ(*organ).size() - plain_bytes, out.c_str());
   std::printf("tables and plot in %s\n", folder.c_str());
   return {};
 }

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "common/base/result.h"
-#include "server/calibration/calibrate.h"
+#include "server/lab/calibration/calibrate.h"
 
 namespace trocar::app {
 

@@ -5,11 +5,11 @@
 #include <filesystem>
 
 #include "common/base/text_file.h"
-#include "common/plot/plot.h"
-#include "common/scene/load_organ.h"
-#include "common/scene/organ_file.h"
-#include "server/fit/fit.h"
-#include "server/scenario/settle.h"
+#include "server/lab/fit/fit.h"
+#include "server/lab/plot/plot.h"
+#include "server/lab/scenario/settle.h"
+#include "server/organs/catalogue/load_organ.h"
+#include "server/organs/organ/organ_file.h"
 
 namespace trocar::app {
 namespace {
@@ -68,11 +68,11 @@ void print_fit(const fit::Fit& fit) {
                  kProgram);
 }
 
-Result<scene::Organ> organ_to_settle(const std::string& spec) {
-  if (std::filesystem::path(spec).extension() != ".toml") return scene::load_organ(spec);
-  auto parsed = scene::parse_scenario(spec);
+Result<organ::Organ> organ_to_settle(const std::string& spec) {
+  if (std::filesystem::path(spec).extension() != ".toml") return catalogue::load_organ(spec);
+  auto parsed = scenario::parse_scenario(spec);
   if (!parsed) return parsed.error();
-  auto resolved = scene::resolve(std::move(*parsed));
+  auto resolved = scenario::resolve(std::move(*parsed));
   if (!resolved) return resolved.error();
   return std::move(resolved->organ);
 }
@@ -108,11 +108,11 @@ void add_fit_command(CLI::App& app, FitCommand& command) {
 }
 
 Status run_fit(const FitCommand& command) {
-  auto parsed = scene::parse_scenario(command.scenario);
+  auto parsed = scenario::parse_scenario(command.scenario);
   if (!parsed) return parsed.error();
   const std::filesystem::path folder =
       command.out.empty() ? "out/fit-" + parsed->source.stem().string() : command.out;
-  const auto resolved = scene::resolve(std::move(*parsed));
+  const auto resolved = scenario::resolve(std::move(*parsed));
   if (!resolved) return resolved.error();
   const auto measured = fit::read_measurements(command.curve_file);
   if (!measured) return measured.error();
@@ -130,7 +130,7 @@ Status run_fit(const FitCommand& command) {
     return s;
   if (auto s = write_text_file(folder / "fit.csv", to_csv(*measured, *fitted)); !s) return s;
   if (!command.organ.empty())
-    if (auto s = scene::write_organ(command.organ, fitted->organ); !s) return s;
+    if (auto s = organ::write_organ(command.organ, fitted->organ); !s) return s;
   if (auto s = plot::write_svg(folder / "fit.svg", to_plot(*measured, *fitted)); !s) return s;
   std::printf("results in %s: material.toml, fit.csv, fit.svg%s%s\n", folder.c_str(),
               command.organ.empty() ? "" : "; the organ in ", command.organ.c_str());
@@ -171,7 +171,7 @@ Status run_settle(const SettleCommand& command) {
   const std::string path =
       command.out.empty() ? std::filesystem::path(command.organ).stem().string() + "-settled.organ"
                           : command.out;
-  if (auto s = scene::write_organ(path, settled->organ); !s) return s;
+  if (auto s = organ::write_organ(path, settled->organ); !s) return s;
   std::printf(
       "%s: nodes moved by %.3g mm at most, %.3g mm on average; %u sweeps, %.2g N out of "
       "balance\n",

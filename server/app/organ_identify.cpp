@@ -4,8 +4,8 @@
 #include <filesystem>
 
 #include "common/base/text_file.h"
-#include "server/fit/csv_table.h"
-#include "server/fit/identify_report.h"
+#include "server/lab/fit/csv_table.h"
+#include "server/lab/fit/identify_report.h"
 
 namespace trocar::app {
 namespace {
@@ -13,7 +13,7 @@ namespace {
 constexpr const char* kProgram = "trocar-organ";
 
 // "g:tau".
-Result<scene::PronyTerm> parse_term(const std::string& text) {
+Result<material::PronyTerm> parse_term(const std::string& text) {
   const auto colon = text.find(':');
   const auto weight = fit::number_of(std::string_view(text).substr(0, colon));
   const auto time_s = colon == std::string::npos
@@ -21,7 +21,7 @@ Result<scene::PronyTerm> parse_term(const std::string& text) {
                           : fit::number_of(std::string_view(text).substr(colon + 1));
   if (!weight || !time_s)
     return Error{ErrorCode::Usage, "--start: '" + text + "' is no weight:seconds, write 0.5:0.6"};
-  return scene::PronyTerm{*weight, *time_s};
+  return material::PronyTerm{*weight, *time_s};
 }
 
 void print_progress(int iteration, double rms_percent) {
@@ -94,7 +94,7 @@ void add_identify_command(CLI::App& app, IdentifyCommand& command) {
 Status run_identify(IdentifyCommand command) {
   command.size.length_m = command.length_mm * 1e-3;
   command.size.area_m2 = command.area_mm2 * 1e-6;
-  if (command.form == "isochoric") command.options.split = scene::VolumeSplit::Isochoric;
+  if (command.form == "isochoric") command.options.split = material::VolumeSplit::Isochoric;
   for (const auto& text : command.start) {
     const auto term = parse_term(text);
     if (!term) return term.error();

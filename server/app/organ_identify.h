@@ -6,7 +6,7 @@
 #include <string>
 
 #include "common/base/result.h"
-#include "server/fit/identify.h"
+#include "server/lab/fit/identify.h"
 
 namespace trocar::app {
 

@@ -15,17 +15,17 @@
 #include "common/base/log.h"
 #include "common/base/quote.h"
 #include "common/base/version.h"
-#include "common/scene/average_strain.h"
-#include "common/scene/builtin_organs.h"
-#include "common/scene/fibre_rule.h"
-#include "common/scene/load_organ.h"
-#include "common/scene/material_file.h"
-#include "common/scene/organ_file.h"
-#include "common/scene/scenario.h"
 #include "server/app/organ_calibrate.h"
 #include "server/app/organ_experiments.h"
 #include "server/app/organ_identify.h"
 #include "server/app/organ_reduce.h"
+#include "server/lab/scenario/scenario.h"
+#include "server/organs/catalogue/builtin_organs.h"
+#include "server/organs/catalogue/load_organ.h"
+#include "server/organs/material/material_file.h"
+#include "server/organs/organ/average_strain.h"
+#include "server/organs/organ/fibre_rule.h"
+#include "server/organs/organ/organ_file.h"
 
 namespace trocar::app {
 namespace {
@@ -125,7 +125,7 @@ Vec3d size_mm(const mesh::TetMesh& mesh) {
   return half * 2e3;
 }
 
-double mass_kg(const scene::Organ& organ) {
+double mass_kg(const organ::Organ& organ) {
   return std::accumulate(organ.node_masses_kg.begin(), organ.node_masses_kg.end(), 0.0);
 }
 
@@ -136,26 +136,26 @@ std::string grouped(std::size_t number) {
   return digits;
 }
 
-const char* name_of(scene::ElasticLaw law) {
+const char* name_of(material::ElasticLaw law) {
   switch (law) {
-    case scene::ElasticLaw::Springs:
+    case material::ElasticLaw::Springs:
       return "springs";
-    case scene::ElasticLaw::TensorMass:
+    case material::ElasticLaw::TensorMass:
       return "tensor-mass";
-    case scene::ElasticLaw::NeoHookean:
+    case material::ElasticLaw::NeoHookean:
       return "neo-hookean";
-    case scene::ElasticLaw::Measured:
+    case material::ElasticLaw::Measured:
       return "measured";
   }
   return "";
 }
 
-std::size_t nodes_with_fibres(const scene::Organ& organ) {
+std::size_t nodes_with_fibres(const organ::Organ& organ) {
   return static_cast<std::size_t>(
       std::ranges::count_if(organ.fibre_directions, [](const Vec3d& f) { return f != Vec3d{}; }));
 }
 
-void print_fibres(const scene::Material& m) {
+void print_fibres(const material::Material& m) {
   if (length(m.fibre_direction) > 0)
     std::printf("  fibres              along %.3g %.3g %.3g\n", m.fibre_direction.x,
                 m.fibre_direction.y, m.fibre_direction.z);
@@ -164,9 +164,9 @@ void print_fibres(const scene::Material& m) {
                 m.fibre_stiffness_ratio, m.fibre_tension);
 }
 
-void print_measured(const scene::HyperelasticMaterial& m) {
+void print_measured(const material::HyperelasticMaterial& m) {
   std::printf("  elasticity          measured, %s (%s)\n", m.name.c_str(), m.source.c_str());
-  if (m.energy == scene::StrainEnergy::Exponential) {
+  if (m.energy == material::StrainEnergy::Exponential) {
     std::printf("  C10, exponent       %.4g kPa, %.4g", m.coefficients_pa[0] / 1e3, m.exponent);
   } else {
     std::printf("  C10 to C50         ");
@@ -178,13 +178,13 @@ void print_measured(const scene::HyperelasticMaterial& m) {
     std::printf("  relaxes             by %.4g in %.4g s\n", weight, time_s);
 }
 
-void print_material(const scene::Material& m) {
-  if (m.elastic_law == scene::ElasticLaw::Measured)
+void print_material(const material::Material& m) {
+  if (m.elastic_law == material::ElasticLaw::Measured)
     print_measured(m.measured);
-  else if (m.elastic_law != scene::ElasticLaw::Springs)
+  else if (m.elastic_law != material::ElasticLaw::Springs)
     std::printf("  elasticity          %s, Young's modulus %.4g kPa, Poisson's ratio %.4g\n",
                 name_of(m.elastic_law), m.young_modulus_pa / 1e3, m.poisson_ratio);
-  else if (m.spring_law == scene::SpringLaw::Constant)
+  else if (m.spring_law == material::SpringLaw::Constant)
     std::printf("  springs             constant, %.4g N/m\n", m.spring_stiffness_n_m);
   else
     std::printf("  springs             from Young's modulus %.4g kPa\n", m.young_modulus_pa / 1e3);
@@ -200,7 +200,7 @@ void print_material(const scene::Material& m) {
               m.node_damping_per_s, m.spring_damping_time_s * 1e3);
 }
 
-void print_materials(const scene::Organ& organ) {
+void print_materials(const organ::Organ& organ) {
   print_material(organ.material);
   if (!organ.fibre_directions.empty())
     std::printf("  directed fibres     at %s nodes\n", grouped(nodes_with_fibres(organ)).c_str());
@@ -215,7 +215,7 @@ void print_materials(const scene::Organ& organ) {
     std::printf("  rest pose           settled, in equilibrium\n");
 }
 
-void print_text(const scene::Organ& organ) {
+void print_text(const organ::Organ& organ) {
   const mesh::TetMesh& mesh = organ.mesh;
   const Vec3d size = size_mm(mesh);
   const EdgeLengths edges = edge_lengths(mesh);
@@ -241,18 +241,18 @@ void print_text(const scene::Organ& organ) {
   std::printf("  fixed nodes         %s (%.1f %%)\n", grouped(organ.fixed_nodes.size()).c_str(),
               100.0 * static_cast<double>(organ.fixed_nodes.size()) /
                   static_cast<double>(mesh.node_count()));
-  std::printf("  hash                %016" PRIx64 "\n", scene::organ_hash(organ));
+  std::printf("  hash                %016" PRIx64 "\n", organ::organ_hash(organ));
 }
 
 // A JSON string. Names in files may hold any UTF-8, so only what JSON forbids is escaped.
-void print_json(const scene::Material& m) {
+void print_json(const material::Material& m) {
   std::printf("  \"elastic_law\": \"%s\",\n  \"poisson_ratio\": %.9g,\n", name_of(m.elastic_law),
               m.poisson_ratio);
-  if (m.elastic_law == scene::ElasticLaw::Measured)
+  if (m.elastic_law == material::ElasticLaw::Measured)
     std::printf("  \"measured\": %s,\n", quote(m.measured.name).c_str());
   std::printf("  \"averaged_strain\": %s,\n", m.has_averaged_strain ? "true" : "false");
   std::printf("  \"spring_law\": \"%s\",\n  \"spring_stiffness_n_m\": %.9g,\n",
-              m.spring_law == scene::SpringLaw::Constant ? "constant" : "volume_consistent",
+              m.spring_law == material::SpringLaw::Constant ? "constant" : "volume_consistent",
               m.spring_stiffness_n_m);
   std::printf("  \"young_modulus_pa\": %.9g,\n  \"density_kg_m3\": %.9g,\n", m.young_modulus_pa,
               m.density_kg_m3);
@@ -267,7 +267,7 @@ void print_json(const scene::Material& m) {
       m.cut_energy_j_m2, m.blade_friction_pa, m.tear_stretch);
 }
 
-void print_json(const scene::Organ& organ) {
+void print_json(const organ::Organ& organ) {
   const mesh::TetMesh& mesh = organ.mesh;
   const Vec3d size = size_mm(mesh);
   const EdgeLengths edges = edge_lengths(mesh);
@@ -296,11 +296,11 @@ void print_json(const scene::Organ& organ) {
   std::printf("  \"source_offset_m\": [%.9g, %.9g, %.9g],\n", organ.source_offset_m.x,
               organ.source_offset_m.y, organ.source_offset_m.z);
   std::printf("  \"fixed_nodes\": %zu,\n  \"hash\": \"%016" PRIx64 "\"\n}\n",
-              organ.fixed_nodes.size(), scene::organ_hash(organ));
+              organ.fixed_nodes.size(), organ::organ_hash(organ));
 }
 
-Status save(const scene::Organ& organ, const std::string& path) {
-  if (auto status = scene::write_organ(path, organ); !status) return status;
+Status save(const organ::Organ& organ, const std::string& path) {
+  if (auto status = organ::write_organ(path, organ); !status) return status;
   print_text(organ);
   std::error_code ignored;
   std::printf("  file                %s, %s bytes\n", path.c_str(),
@@ -309,44 +309,45 @@ Status save(const scene::Organ& organ, const std::string& path) {
 }
 
 // That of a scenario, with its materials, regions and held nodes.
-Result<scene::Organ> make_from_scenario(const std::string& path, const std::optional<int>& tets) {
+Result<organ::Organ> make_from_scenario(const std::string& path, const std::optional<int>& tets) {
   if (tets)
     return Error{ErrorCode::Usage, "make " + path +
                                        ": --tets does not apply, the scenario says "
                                        "what its organ is"};
-  auto parsed = scene::parse_scenario(path);
+  auto parsed = scenario::parse_scenario(path);
   if (!parsed) return parsed.error();
-  auto resolved = scene::resolve(std::move(*parsed));
+  auto resolved = scenario::resolve(std::move(*parsed));
   if (!resolved) return resolved.error();
   resolved->organ.name = std::filesystem::path(path).stem().string();
   return std::move(resolved->organ);
 }
 
-Result<scene::Organ> make_named(const std::string& name, const std::optional<int>& tets) {
+Result<organ::Organ> make_named(const std::string& name, const std::optional<int>& tets) {
   if (std::filesystem::path(name).extension() == ".toml") return make_from_scenario(name, tets);
   if (name == "lattice") {
     if (tets)
       return Error{ErrorCode::Usage, "make lattice: --tets does not apply, a lattice has none"};
-    return scene::make_lattice();
+    return catalogue::make_lattice();
   }
   if (name == "plate" || name == "chest") {
     if (tets)
       return Error{ErrorCode::Usage, "make " + name + ": --tets does not apply, its mesh is given"};
-    return name == "plate" ? scene::make_plate() : scene::make_chest();
+    return name == "plate" ? catalogue::make_plate() : catalogue::make_chest();
   }
   if (tets.value_or(0) >= kManyTets)
     std::fprintf(stderr, "%s: meshing a %s of about %s tets, this takes some seconds\n", kProgram,
                  name.c_str(), grouped(static_cast<std::size_t>(*tets)).c_str());
-  if (name == "stomach") return scene::make_stomach(tets.value_or(scene::kDefaultStomachTets));
-  const int count = tets.value_or(scene::kDefaultLiverTets);
-  return name == "liver" ? scene::make_measured_liver(count) : scene::make_liver(count);
+  if (name == "stomach")
+    return catalogue::make_stomach(tets.value_or(catalogue::kDefaultStomachTets));
+  const int count = tets.value_or(catalogue::kDefaultLiverTets);
+  return name == "liver" ? catalogue::make_measured_liver(count) : catalogue::make_liver(count);
 }
 
-Status add_fibres(const Options& options, scene::Organ& organ) {
+Status add_fibres(const Options& options, organ::Organ& organ) {
   if (!options.fibres.empty()) {
-    const auto rule = scene::parse_fibre_rule(options.fibres);
+    const auto rule = organ::parse_fibre_rule(options.fibres);
     if (!rule) return rule.error();
-    auto directions = scene::fibre_directions_by(*rule, organ.mesh);
+    auto directions = organ::fibre_directions_by(*rule, organ.mesh);
     if (!directions) return directions.error();
     organ.fibre_directions = std::move(*directions);
   } else if (options.fibre_tension || options.fibre_stiffness_ratio) {
@@ -354,13 +355,13 @@ Status add_fibres(const Options& options, scene::Organ& organ) {
                  "--fibre-tension, --fibre-stiffness: need --fibres, which says "
                  "where the fibres run"};
   }
-  if (options.fibre_stiffness_ratio && organ.material.elastic_law != scene::ElasticLaw::Springs)
+  if (options.fibre_stiffness_ratio && organ.material.elastic_law != material::ElasticLaw::Springs)
     return Error{ErrorCode::Usage, "--fibre-stiffness: is of springs, this organ is of " +
                                        std::string(name_of(organ.material.elastic_law)) + " tets"};
   return {};
 }
 
-Status change_organ(const Options& options, scene::Organ& organ) {
+Status change_organ(const Options& options, organ::Organ& organ) {
   if (auto added = add_fibres(options, organ); !added) return added;
   if (options.tear_stretch.value_or(0) > 0 &&
       (organ.mesh.tets.empty() || !organ.mesh.links.empty()))
@@ -369,12 +370,12 @@ Status change_organ(const Options& options, scene::Organ& organ) {
                  "only those of tets alone"};
   auto& material = organ.material;
   if (!options.material.empty()) {
-    const auto measured = scene::measured_material(options.material);
+    const auto measured = material::measured_material(options.material);
     if (!measured) return measured.error();
-    scene::use_measured(*measured, material);
+    material::use_measured(*measured, material);
   }
   if (options.has_averaged_strain)
-    if (auto averaged = scene::average_strain(organ); !averaged) return averaged;
+    if (auto averaged = organ::average_strain(organ); !averaged) return averaged;
   const auto set = [](const std::optional<double>& from, double& to) { to = from.value_or(to); };
   set(options.tension, material.tension);
   set(options.fibre_tension, material.fibre_tension);
@@ -382,7 +383,7 @@ Status change_organ(const Options& options, scene::Organ& organ) {
   set(options.tear_stretch, material.tear_stretch);
   set(options.cut_energy_j_m2, material.cut_energy_j_m2);
   set(options.blade_friction_pa, material.blade_friction_pa);
-  return scene::validate(organ);
+  return organ::validate(organ);
 }
 
 Status run_make(const Options& options) {
@@ -396,9 +397,9 @@ Status run_make(const Options& options) {
 Status run_import(const Options& options) {
   const auto unit = mesh::parse_unit(options.unit);
   if (!unit) return unit.error();
-  const auto fix = scene::parse_fix_rule(options.fix);
+  const auto fix = organ::parse_fix_rule(options.fix);
   if (!fix) return fix.error();
-  scene::ImportOptions import_options{*unit, *fix, std::nullopt};
+  catalogue::ImportOptions import_options{*unit, *fix, std::nullopt};
   if (!options.import_name.empty()) import_options.name = options.import_name;
   const std::filesystem::path path(options.import_file);
   std::error_code missing;
@@ -406,7 +407,7 @@ Status run_import(const Options& options) {
       !missing && bytes >= kLargeFileBytes)
     std::fprintf(stderr, "%s: reading %s, %s MB, this takes some seconds\n", kProgram,
                  options.import_file.c_str(), grouped(bytes / 1'000'000).c_str());
-  auto imported = scene::import_organ(path, import_options);
+  auto imported = catalogue::import_organ(path, import_options);
   if (!imported) return imported.error();
   if (auto changed = change_organ(options, imported->organ); !changed) return changed;
   for (const std::string& warning : imported->warnings)
@@ -419,7 +420,7 @@ Status run_import(const Options& options) {
 }
 
 Status run_inspect(const Options& options) {
-  const auto organ = scene::load_organ(options.inspected);
+  const auto organ = catalogue::load_organ(options.inspected);
   if (!organ) return organ.error();
   options.json ? print_json(*organ) : print_text(*organ);
   return {};
@@ -450,12 +451,13 @@ void add_commands(CLI::App& app, Options& options) {
   const auto range = [](int low, int high, int usual) {
     return std::to_string(low) + " to " + std::to_string(high) + " [" + std::to_string(usual) + "]";
   };
-  make->add_option(
-          "--tets", options.tets,
-          "how many tets, met within 5 %: liver " +
-              range(scene::kMinLiverTets, scene::kMaxLiverTets, scene::kDefaultLiverTets) +
-              ", stomach " +
-              range(scene::kMinStomachTets, scene::kMaxStomachTets, scene::kDefaultStomachTets))
+  make->add_option("--tets", options.tets,
+                   "how many tets, met within 5 %: liver " +
+                       range(catalogue::kMinLiverTets, catalogue::kMaxLiverTets,
+                             catalogue::kDefaultLiverTets) +
+                       ", stomach " +
+                       range(catalogue::kMinStomachTets, catalogue::kMaxStomachTets,
+                             catalogue::kDefaultStomachTets))
       ->type_name("N");
   make->add_option("--out", options.out, "file to write [NAME.organ]")->type_name("FILE");
 
@@ -482,7 +484,7 @@ void add_commands(CLI::App& app, Options& options) {
   for (auto* command : {make, import}) {
     command
         ->add_option("--material", options.material,
-                     "measured material of its tets: " + scene::measured_material_names() +
+                     "measured material of its tets: " + material::measured_material_names() +
                          ", or a .toml file as identify leaves it")
         ->type_name("NAME");
     command->add_flag("--averaged-strain", options.has_averaged_strain,

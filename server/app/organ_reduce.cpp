@@ -7,18 +7,18 @@
 
 #include "common/base/text_file.h"
 #include "common/base/timing.h"
-#include "common/plot/plot.h"
-#include "common/scene/load_organ.h"
-#include "common/scene/reduction_file.h"
 #include "server/app/organ_reduce_local.h"
 #include "server/app/progress_line.h"
-#include "server/reduction/quality.h"
+#include "server/lab/plot/plot.h"
+#include "server/lab/reduce/quality.h"
+#include "server/organs/catalogue/load_organ.h"
+#include "server/organs/organ/reduction_file.h"
 
 namespace trocar::app {
 namespace {
 
-using reduction::Quality;
-using reduction::Stage;
+using reduce::Quality;
+using reduce::Stage;
 
 constexpr const char* kProgram = "trocar-organ";
 
@@ -80,18 +80,18 @@ const char* name_of(Stage stage) {
   return "";
 }
 
-reduction::Progress make_progress() {
+reduce::Progress make_progress() {
   return [line = ProgressLine(kProgram)](Stage stage, std::size_t done, std::size_t all) mutable {
     line.show(name_of(stage), done, all);
   };
 }
 
 struct Outcome {
-  reduction::Training training;
-  reduction::Built built;
-  reduction::UnseenLoads unseen;
+  reduce::Training training;
+  reduce::Built built;
+  reduce::UnseenLoads unseen;
   std::vector<Quality> qualities;  // by number of modes; the last is of all
-  std::vector<reduction::CreepCheck> creep;
+  std::vector<reduce::CreepCheck> creep;
   double snapshot_s = 0, solve_us = 0;  // of one full and of one reduced solution
 };
 
@@ -102,10 +102,10 @@ std::vector<std::size_t> mode_counts(std::size_t all) {
   return counts;
 }
 
-double time_solve_us(const scene::Reduction& reduced, const scene::Organ& organ,
-                     const reduction::Press& press) {
-  const reduction::ReducedModel model(reduced, reduction::TangentChoice::Best);
-  const auto forces = reduction::node_forces(organ, press);
+double time_solve_us(const organ::Reduction& reduced, const organ::Organ& organ,
+                     const reduce::Press& press) {
+  const reduce::ReducedModel model(reduced, reduce::TangentChoice::Best);
+  const auto forces = reduce::node_forces(organ, press);
   constexpr int kTimes = 1000;
   double sum = 0;
   const auto begin = thread_cpu_ns();
@@ -117,7 +117,7 @@ double time_solve_us(const scene::Reduction& reduced, const scene::Organ& organ,
 // How much there is to do, before it is begun.
 void announce(const ReduceCommand& command) {
   const auto& s = command.settings;
-  const std::size_t times = reduction::creep_times(s.creep_s).size();
+  const std::size_t times = reduce::creep_times(s.creep_s).size();
   std::fprintf(stderr,
                "%s: up to %zu full solutions for snapshots, %zu for creep, %zu to check the "
                "result\n",
@@ -125,52 +125,52 @@ void announce(const ReduceCommand& command) {
                2 * command.check_places + command.check_creep * times);
 }
 
-Result<Outcome> reduce(const scene::Organ& organ, const ReduceCommand& command) {
-  auto model = reduction::FullModel::create(organ, command.settings.threads);
+Result<Outcome> reduce(const organ::Organ& organ, const ReduceCommand& command) {
+  auto model = reduce::FullModel::create(organ, command.settings.threads);
   if (!model) return model.error();
   announce(command);
   const auto progress = make_progress();
   Outcome outcome;
   const auto begin = thread_cpu_ns();
-  outcome.training = reduction::train(**model, command.settings, progress);
+  outcome.training = reduce::train(**model, command.settings, progress);
   outcome.snapshot_s = static_cast<double>(thread_cpu_ns() - begin) * 1e-9 /
                        static_cast<double>(std::max<std::size_t>(
                            1, outcome.training.snapshots.size() + outcome.training.failed));
-  auto built = reduction::reduce(**model, outcome.training, command.settings, progress);
+  auto built = reduce::reduce(**model, outcome.training, command.settings, progress);
   if (!built) return built.error();
   outcome.built = std::move(*built);
   auto& reduced = outcome.built.reduction;
-  reduction::add_creep(**model, command.settings, reduced, progress);
+  reduce::add_creep(**model, command.settings, reduced, progress);
   outcome.solve_us = time_solve_us(reduced, organ, outcome.training.snapshots.front().press);
   if (command.check_places == 0) return outcome;
-  outcome.unseen = reduction::solve_unseen(**model, outcome.training, command.settings,
-                                           command.check_places, progress);
+  outcome.unseen = reduce::solve_unseen(**model, outcome.training, command.settings,
+                                        command.check_places, progress);
   if (outcome.unseen.loads.empty()) return outcome;
   for (const auto modes : mode_counts(reduced.mode_count()))
-    outcome.qualities.push_back(reduction::quality_of(reduced, organ, outcome.unseen.loads, modes));
+    outcome.qualities.push_back(reduce::quality_of(reduced, organ, outcome.unseen.loads, modes));
   for (std::size_t i = 0; i < command.check_creep && !reduced.creep.empty(); ++i) {
     const std::size_t at = 2 * i + 1;  // the larger force of a place
     if (at >= outcome.unseen.loads.size()) break;
-    if (auto check = reduction::check_creep(**model, reduced, outcome.unseen.loads[at].press))
+    if (auto check = reduce::check_creep(**model, reduced, outcome.unseen.loads[at].press))
       outcome.creep.push_back(std::move(*check));
     progress(Stage::Creep, i + 1, command.check_creep);
   }
   return outcome;
 }
 
-std::string percent(const reduction::Errors& e) {
+std::string percent(const reduce::Errors& e) {
   char text[80];
   std::snprintf(text, sizeof text, "%5.1f / %5.1f / %5.1f %%", 100 * e.mean, 100 * e.high,
                 100 * e.worst);
   return text;
 }
 
-void print_press(const char* what, const reduction::Press& press) {
+void print_press(const char* what, const reduce::Press& press) {
   const Vec3d& f = press.force_n;
   std::printf("%s node %u under %.3g %.3g %.3g N", what, press.node.value, f.x, f.y, f.z);
 }
 
-void print(const scene::Organ& organ, const Outcome& outcome) {
+void print(const organ::Organ& organ, const Outcome& outcome) {
   const auto& r = outcome.built.reduction;
   double kept = 0;
   for (const double value : r.eigenvalues_m2) kept += value;
@@ -312,7 +312,7 @@ Status validate(const ReduceCommand& command) {
     return Error{ErrorCode::Usage, "--check: at most " + std::to_string(kMaxCheckPlaces)};
   if (command.check_creep > command.check_places)
     return Error{ErrorCode::Usage, "--check-creep: at most as many as --check"};
-  return reduction::validate(command.settings);
+  return reduce::validate(command.settings);
 }
 
 }  // namespace
@@ -393,7 +393,7 @@ Status run_reduce(ReduceCommand command) {
   command.settings.radius_m = command.radius_mm * 1e-3;
   command.settings.influence_m = command.influence_mm * 1e-3;
   if (auto s = validate(command); !s) return s;
-  const auto organ = scene::load_organ(command.organ);
+  const auto organ = catalogue::load_organ(command.organ);
   if (!organ) return organ.error();
   const auto stem = std::filesystem::path(command.organ).stem().string();
   const std::filesystem::path folder =
@@ -402,7 +402,7 @@ Status run_reduce(ReduceCommand command) {
   if (auto c = check_outputs(folder, out); !c) return c;
   const auto outcome = reduce(*organ, command);
   if (!outcome) return outcome.error();
-  if (auto s = scene::write_reduction(out, outcome->built.reduction); !s) return s;
+  if (auto s = organ::write_reduction(out, outcome->built.reduction); !s) return s;
   print(*organ, *outcome);
   std::error_code ignored;
   std::printf("%s, %ju bytes; tables and plots in %s\n", out.c_str(),

@@ -7,8 +7,8 @@
 #include <string>
 
 #include "common/base/result.h"
-#include "server/reduction/build.h"
-#include "server/reduction/local_build.h"
+#include "server/lab/reduce/build.h"
+#include "server/lab/reduce/local_build.h"
 
 namespace trocar::app {
 
@@ -18,10 +18,10 @@ struct ReduceCommand {
   std::string organ, out, folder, method = "dogan";
   double radius_mm = 15, influence_mm = 45;
   std::size_t check_places = 12, check_creep = 2;
-  reduction::Settings settings;
+  reduce::Settings settings;
   double patch_radius_mm = 12;
   bool is_resumed = false;
-  reduction::LocalSettings local;
+  reduce::LocalSettings local;
   CLI::App* app = nullptr;
 };
 void add_reduce_command(CLI::App& app, ReduceCommand& command);

@@ -5,16 +5,16 @@
 #include <filesystem>
 
 #include "common/base/text_file.h"
-#include "common/scene/load_organ.h"
-#include "common/scene/local_reduction_file.h"
 #include "server/app/progress_line.h"
-#include "server/reduction/local_quality.h"
+#include "server/lab/reduce/local_quality.h"
+#include "server/organs/catalogue/load_organ.h"
+#include "server/organs/organ/local_reduction_file.h"
 
 namespace trocar::app {
 namespace {
 
-using reduction::LocalErrors;
-using reduction::LocalStage;
+using reduce::LocalErrors;
+using reduce::LocalStage;
 
 constexpr const char* kProgram = "trocar-organ";
 
@@ -45,11 +45,11 @@ Status take_settings(ReduceCommand& command) {
   local.patch_radius_m = command.patch_radius_mm * 1e-3;
   if (command.check_places > kMaxCheckPlaces)
     return Error{ErrorCode::Usage, "--check: at most " + std::to_string(kMaxCheckPlaces)};
-  return reduction::validate(local);
+  return reduce::validate(local);
 }
 
 void print_row(const char* what, const std::vector<double>& values) {
-  const auto e = reduction::errors_of(values);
+  const auto e = reduce::errors_of(values);
   std::printf("  %-20s%6.2f / %6.2f / %6.2f %%\n", what, 100 * e.mean, 100 * e.high, 100 * e.worst);
 }
 
@@ -62,7 +62,7 @@ void print(const char* where, const LocalErrors& errors) {
   print_row("contact, force", errors.force);
 }
 
-std::string csv_of(std::span<const reduction::LocalLoad> loads, const LocalErrors& trained,
+std::string csv_of(std::span<const reduce::LocalLoad> loads, const LocalErrors& trained,
                    const LocalErrors& unseen) {
   std::string text =
       "place,node,force_x_n,force_y_n,force_z_n,l2_percent,contact_percent,force_percent\n";
@@ -81,7 +81,7 @@ std::string csv_of(std::span<const reduction::LocalLoad> loads, const LocalError
   return text;
 }
 
-void print_patches(const scene::Organ& organ, const reduction::LocalBuilt& built) {
+void print_patches(const organ::Organ& organ, const reduce::LocalBuilt& built) {
   const auto& r = built.reduction;
   std::size_t members = 0, inner = 0, cubature = 0;
   for (const auto& patch : r.patches) {
@@ -100,12 +100,12 @@ void print_patches(const scene::Organ& organ, const reduction::LocalBuilt& built
     std::printf("  left out            %zu presses without an equilibrium\n", built.failed);
 }
 
-Status check(const scene::Organ& organ, const reduction::LocalBuilt& built,
+Status check(const organ::Organ& organ, const reduce::LocalBuilt& built,
              const ReduceCommand& command, const std::filesystem::path& folder) {
-  auto model = reduction::FullModel::create(organ);
+  auto model = reduce::FullModel::create(organ);
   if (!model) return model.error();
   ProgressLine line(kProgram);
-  const auto loads = reduction::solve_local_loads(
+  const auto loads = reduce::solve_local_loads(
       **model, built, command.check_places, command.check_places,
       [&](std::size_t done, std::size_t all) { line.show("check, place", done, all); });
   if (loads.empty()) return {};
@@ -113,7 +113,7 @@ Status check(const scene::Organ& organ, const reduction::LocalBuilt& built,
   const auto unseen = errors_of_local(built.reduction, organ, loads, false);
   print("places of the training, under other forces", trained);
   print("places at least 8 mm from all of these", unseen);
-  const auto rate = reduction::rate_of_local(built.reduction, organ, loads.back().press);
+  const auto rate = reduce::rate_of_local(built.reduction, organ, loads.back().press);
   std::printf("  unknowns            %zu; a step of a press %.0f us, at worst %.0f us\n",
               unseen.largest.unknowns(), rate.median_us, rate.worst_us);
   return write_text_file(folder / "local.csv", csv_of(loads, trained, unseen));
@@ -123,7 +123,7 @@ Status check(const scene::Organ& organ, const reduction::LocalBuilt& built,
 
 Status run_reduce_local(ReduceCommand command) {
   if (auto s = take_settings(command); !s) return s;
-  const auto organ = scene::load_organ(command.organ);
+  const auto organ = catalogue::load_organ(command.organ);
   if (!organ) return organ.error();
   const auto stem = std::filesystem::path(command.organ).stem().string();
   const std::filesystem::path folder =
@@ -136,12 +136,12 @@ Status run_reduce_local(ReduceCommand command) {
                                        ": is left of an interrupted run: go on from it with "
                                        "--resume, or remove it"};
   ProgressLine line(kProgram);
-  const auto built = reduction::build_local(
-      *organ, command.local, [&](LocalStage stage, std::size_t done, std::size_t all) {
-        line.show(name_of(stage), done, all);
-      });
+  const auto built = reduce::build_local(*organ, command.local,
+                                         [&](LocalStage stage, std::size_t done, std::size_t all) {
+                                           line.show(name_of(stage), done, all);
+                                         });
   if (!built) return built.error();
-  if (auto s = scene::write_local_reduction(out, built->reduction); !s) return s;
+  if (auto s = organ::write_local_reduction(out, built->reduction); !s) return s;
   std::error_code ignored;
   std::filesystem::remove_all(command.local.parts, ignored);
   print_patches(*organ, *built);

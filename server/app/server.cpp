@@ -20,15 +20,15 @@
 #include "common/base/log.h"
 #include "common/base/text_file.h"
 #include "common/base/timing.h"
-#include "common/scene/average_strain.h"
-#include "common/scene/load_organ.h"
-#include "common/scene/local_reduction_file.h"
 #include "server/app/simulation_loop.h"
 #include "server/app/summary.h"
-#include "server/ghost/ghost.h"
-#include "server/net/tcp_server.h"
-#include "server/replication/messages.h"
-#include "server/replication/replicator.h"
+#include "server/organs/catalogue/load_organ.h"
+#include "server/organs/organ/average_strain.h"
+#include "server/organs/organ/local_reduction_file.h"
+#include "server/session/ghost/ghost.h"
+#include "server/session/net/tcp_server.h"
+#include "server/session/replication/messages.h"
+#include "server/session/replication/replicator.h"
 
 namespace trocar::app {
 namespace {
@@ -49,24 +49,24 @@ Tick ticks_of(double seconds) {
 
 // What a session has of --reduction; neither without one.
 struct Reduction {
-  std::shared_ptr<const scene::LocalReduction> model;
+  std::shared_ptr<const organ::LocalReduction> model;
   std::optional<journal::ReductionDescription> description;
 };
 
-Result<Reduction> read_reduction(const std::string& file, const scene::Organ& organ) {
+Result<Reduction> read_reduction(const std::string& file, const organ::Organ& organ) {
   if (file.empty()) return Reduction();
-  auto model = scene::read_session_reduction(file, organ);
+  auto model = organ::read_session_reduction(file, organ);
   if (!model) return model.error();
-  journal::ReductionDescription description{scene::reduction_hash(*model),
+  journal::ReductionDescription description{organ::reduction_hash(*model),
                                             std::filesystem::path(file).filename().string(),
                                             model->source};
-  return Reduction{std::make_shared<scene::LocalReduction>(std::move(*model)),
+  return Reduction{std::make_shared<organ::LocalReduction>(std::move(*model)),
                    std::move(description)};
 }
 
 class Server {
  public:
-  Server(const ServerOptions& options, scene::Organ organ, Reduction reduction)
+  Server(const ServerOptions& options, organ::Organ organ, Reduction reduction)
       : options_(options),
         reduction_(std::move(reduction.description)),
         simulation_(std::move(organ), options.workers, std::move(reduction.model)) {}
@@ -92,7 +92,7 @@ class Server {
   const std::optional<journal::ReductionDescription> reduction_;
   step::Simulation simulation_;
   std::unique_ptr<JournalSink> journal_;
-  session::SimulationInbox inbox_;
+  participants::SimulationInbox inbox_;
   asio::io_context io_{1};
   asio::signal_set signals_{io_};
   asio::steady_timer poll_{io_};
@@ -133,7 +133,7 @@ Status Server::open() {
   if (reduction_)
     replication.on_ghost_wanted = [this](bool is_wanted) { ghost_->set_wanted(is_wanted); };
   replicator_ = std::make_unique<replication::Replicator>(
-      *tcp_, inbox_, layout, organ.name, scene::organ_hash(organ), std::move(replication));
+      *tcp_, inbox_, layout, organ.name, organ::organ_hash(organ), std::move(replication));
   loop_ = std::make_unique<SimulationLoop>(simulation_, inbox_, handover_, journal_.get(),
                                            loop_options(),
                                            [this] { asio::post(io_, [this] { begin_end(); }); });
@@ -282,10 +282,10 @@ Status Server::finish() {
 }  // namespace
 
 Status run_server(const ServerOptions& options) {
-  auto organ = scene::load_organ(options.organ);
+  auto organ = catalogue::load_organ(options.organ);
   if (!organ) return organ.error();
   if (options.has_averaged_strain)
-    if (const auto averaged = scene::average_strain(*organ); !averaged) return averaged;
+    if (const auto averaged = organ::average_strain(*organ); !averaged) return averaged;
   const auto begin = monotonic_ns();
   std::error_code no_size;  // then reading says what is wrong
   const auto file_bytes = options.reduction_file.empty()

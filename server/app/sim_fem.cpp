@@ -6,11 +6,11 @@
 #include <cinttypes>
 #include <cstdio>
 
-#include "common/scene/material_file.h"
-#include "server/finite_elements/scenario_solve.h"
-#include "server/scenario/field_files.h"
-#include "server/scenario/field_times.h"
-#include "server/scenario/probe_file.h"
+#include "server/lab/finite_elements/scenario_solve.h"
+#include "server/lab/scenario/field_files.h"
+#include "server/lab/scenario/field_times.h"
+#include "server/lab/scenario/probe_file.h"
+#include "server/organs/material/material_file.h"
 
 namespace trocar::app {
 namespace {
@@ -29,7 +29,7 @@ Result<finite_elements::ScenarioSettings> settings_of(const FemCommand& command,
   settings.dt_s = command.step_ms.value_or(kUsualStep_ms) * 1e-3;
   settings.solver.threads = threads;
   if (command.material.empty()) return settings;
-  auto material = scene::measured_material(command.material);
+  auto material = material::measured_material(command.material);
   if (!material) return material.error();
   settings.material = std::move(*material);
   if (command.bulk_ratio)
@@ -39,8 +39,8 @@ Result<finite_elements::ScenarioSettings> settings_of(const FemCommand& command,
 }
 
 // Options that mean something in one kind of run only.
-Status check_mode(const FemCommand& command, const scene::RunRule& run) {
-  const bool is_static = run.mode == scene::RunMode::Static;
+Status check_mode(const FemCommand& command, const scenario::RunRule& run) {
+  const bool is_static = run.mode == scenario::RunMode::Static;
   if (is_static && command.step_ms)
     return Error{ErrorCode::Usage,
                  "--step-ms: this run is static, its steps are load_steps in [run]: remove it"};
@@ -103,7 +103,7 @@ class Outputs {
 
 Error no_equilibrium(const ScenarioSolve& solve) {
   const auto& scenario = solve.resolved().scenario;
-  const bool is_static = scenario.run.mode == scene::RunMode::Static;
+  const bool is_static = scenario.run.mode == scenario::RunMode::Static;
   const char* advice = is_static                ? "more load_steps"
                        : solve.steps_done() > 0 ? "a shorter --step-ms"
                                                 : "smaller loads at time 0";
@@ -144,7 +144,7 @@ void add_fem_options(CLI::App& app, FemCommand& command) {
       ->group(group);
   app.add_option(
          "--material", command.material,
-         "measured material instead of the organ's own: " + scene::measured_material_names() +
+         "measured material instead of the organ's own: " + material::measured_material_names() +
              ", or a .toml file as trocar-organ identify leaves it")
       ->type_name("NAME")
       ->group(group);
@@ -185,7 +185,7 @@ Status check_fem_options(const FemCommand& command, bool is_fem) {
   return {};
 }
 
-Status run_fem(const FemCommand& command, scene::ResolvedScenario resolved,
+Status run_fem(const FemCommand& command, scenario::ResolvedScenario resolved,
                const std::filesystem::path& folder, unsigned threads,
                const volatile std::sig_atomic_t& stop_requested) {
   if (auto s = check_mode(command, resolved.scenario.run); !s) return s;

@@ -11,7 +11,7 @@
 #include <string>
 
 #include "common/base/result.h"
-#include "common/scene/scenario.h"
+#include "server/lab/scenario/scenario.h"
 
 namespace trocar::app {
 
@@ -25,7 +25,7 @@ void add_fem_options(CLI::App& app, FemCommand& command);
 Status check_fem_options(const FemCommand& command, bool is_fem);
 
 // Ends early, complete, when `stop_requested` is set.
-Status run_fem(const FemCommand& command, scene::ResolvedScenario resolved,
+Status run_fem(const FemCommand& command, scenario::ResolvedScenario resolved,
                const std::filesystem::path& folder, unsigned threads,
                const volatile std::sig_atomic_t& stop_requested);
 

@@ -13,13 +13,13 @@
 #include "common/base/log.h"
 #include "common/base/timing.h"
 #include "common/base/version.h"
-#include "common/scene/any_material.h"
 #include "server/app/sim_fem.h"
-#include "server/scenario/field_files.h"
-#include "server/scenario/field_times.h"
-#include "server/scenario/probe_file.h"
-#include "server/scenario/probe_plots.h"
-#include "server/scenario/scenario_run.h"
+#include "server/lab/scenario/field_files.h"
+#include "server/lab/scenario/field_times.h"
+#include "server/lab/scenario/probe_file.h"
+#include "server/lab/scenario/probe_plots.h"
+#include "server/lab/scenario/scenario_run.h"
+#include "server/organs/organ/any_material.h"
 
 namespace trocar::app {
 namespace {
@@ -165,23 +165,24 @@ Status run_scenario(const Options& options) {
   if (auto s = check_fem_options(options.fem, is_fem); !s) return s;
   if (is_fem && options.is_plotted)
     return Error{ErrorCode::Usage, "--plot: --solver fem draws nothing, remove it"};
-  auto parsed = scene::parse_scenario(options.scenario);
+  auto parsed = scenario::parse_scenario(options.scenario);
   if (!parsed) return parsed.error();
   const std::filesystem::path folder =
       !options.out.empty()
           ? options.out
           : parsed->output_folder.value_or("out/" + parsed->source.stem().string());
-  auto resolved = scene::resolve(std::move(*parsed));
+  auto resolved = scenario::resolve(std::move(*parsed));
   if (!resolved) return resolved.error();
   if (!is_fem)
     if (auto s = scenario::check_supported(*resolved); !s) return s;
-  if (scene::any_material(resolved->organ,
-                          [](const scene::Material& m) { return m.tear_stretch > 0; }))
+  if (organ::any_material(resolved->organ,
+                          [](const material::Material& m) { return m.tear_stretch > 0; }))
     std::fprintf(
         stderr, "%s: warning: %s: tear_stretch is left out, so far tissue tears in sessions only\n",
         kProgram, resolved->scenario.source.c_str());
-  if (is_fem && scene::any_material(resolved->organ,
-                                    [](const scene::Material& m) { return m.has_averaged_strain; }))
+  if (is_fem && organ::any_material(resolved->organ, [](const material::Material& m) {
+        return m.has_averaged_strain;
+      }))
     std::fprintf(stderr,
                  "%s: warning: %s: averaged_strain is of the live solver, here quadratic elements "
                  "do not lock\n",

@@ -79,7 +79,7 @@ void SolverReport::add(const step::SolverFigures& figures) {
   last_ = figures;
 }
 
-SimulationLoop::SimulationLoop(step::Simulation& simulation, session::SimulationInbox& inbox,
+SimulationLoop::SimulationLoop(step::Simulation& simulation, participants::SimulationInbox& inbox,
                                FrameHandover& handover, JournalSink* journal, LoopOptions options,
                                std::function<void()> ended)
     : simulation_(simulation),
@@ -88,7 +88,7 @@ SimulationLoop::SimulationLoop(step::Simulation& simulation, session::Simulation
       journal_(journal),
       options_(options),
       ended_(std::move(ended)),
-      chooser_(options_.rate ? simulation.organ().depth_table : scene::DepthTable{},
+      chooser_(options_.rate ? simulation.organ().depth_table : organ::DepthTable{},
                options_.rate ? options_.rate->nodes : 0) {
   records_.reserve(kTicksPerFrame);
   if (options_.rate) controller_.emplace(*options_.rate);

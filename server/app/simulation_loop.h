@@ -20,11 +20,11 @@
 #include "server/app/frame_handover.h"
 #include "server/app/journal_sink.h"
 #include "server/app/pacer.h"
-#include "server/control/depth_chooser.h"
-#include "server/control/rate_controller.h"
-#include "server/replication/duration_histogram.h"
-#include "server/session/inbox.h"
-#include "server/step/simulation.h"
+#include "server/session/control/depth_chooser.h"
+#include "server/session/control/rate_controller.h"
+#include "server/session/participants/inbox.h"
+#include "server/session/replication/duration_histogram.h"
+#include "server/tissue/step/simulation.h"
 
 namespace trocar::app {
 
@@ -87,7 +87,7 @@ class SimulationLoop {
  public:
   // All references outlive the loop; `journal` may be null. `ended` is called on the simulation
   // thread after its last access to any of them.
-  SimulationLoop(step::Simulation& simulation, session::SimulationInbox& inbox,
+  SimulationLoop(step::Simulation& simulation, participants::SimulationInbox& inbox,
                  FrameHandover& handover, JournalSink* journal, LoopOptions options,
                  std::function<void()> ended);
   ~SimulationLoop();
@@ -108,7 +108,7 @@ class SimulationLoop {
   void take_snapshot();
 
   step::Simulation& simulation_;
-  session::SimulationInbox& inbox_;
+  participants::SimulationInbox& inbox_;
   FrameHandover& handover_;
   JournalSink* const journal_;
   const LoopOptions options_;
@@ -122,7 +122,7 @@ class SimulationLoop {
   std::uint64_t lateness_ns_ = 0;        // of the tick about to run
   std::uint64_t slow_ticks_before_ = 0;  // until the last full second
   float time_rate_ = 1;                  // in it
-  session::TickInputs inputs_;
+  hands::TickInputs inputs_;
   std::vector<step::TickRecord> records_;  // since the last frame
   std::shared_ptr<const Bytes> snapshot_;  // waits for the next frame
   Tick snapshot_tick_ = 0;

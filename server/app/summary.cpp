@@ -24,7 +24,7 @@ std::string participants(const std::vector<replication::BarrierResult>& results)
         "{}\n    {{\"slot\": {}, \"name\": {}, \"role\": \"{}\", \"answered\": {}, \"frame\": {}, "
         "\"surface_crc\": \"{:08x}\", \"equal\": {}}}",
         out.empty() ? "" : ",", result.slot.value, quote(result.name),
-        session::name_of(result.role), result.has_answered, result.frame, result.surface_crc,
+        participants::name_of(result.role), result.has_answered, result.frame, result.surface_crc,
         result.is_equal);
   return out;
 }

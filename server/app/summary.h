@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "server/app/simulation_loop.h"
-#include "server/ghost/ghost.h"
-#include "server/net/tcp_server.h"
-#include "server/replication/replicator.h"
+#include "server/session/ghost/ghost.h"
+#include "server/session/net/tcp_server.h"
+#include "server/session/replication/replicator.h"
 
 namespace trocar::app {
 
@@ -25,7 +25,7 @@ struct Summary {
   const replication::ReplicatorCounters& replication;
   const replication::EncodeStatistics& encoding;
   const net::TcpCounters& tcp;
-  const session::SimulationInbox::Counters& inbox;
+  const participants::SimulationInbox::Counters& inbox;
   ghost::GhostCounters ghost;
 };
 

@@ -21,9 +21,10 @@ TEST(Architecture, TheTreeIsRead) {
   EXPECT_GE(tree().layers.size(), 20u);
   EXPECT_GE(tree().layer_of("common/base"), 0);
   EXPECT_LT(tree().layer_of("common/base"), tree().layer_of("common/math"));
-  EXPECT_EQ(tree().layer_of("server/cutting"), tree().layer_of("server/dynamics") + 1);
-  EXPECT_TRUE(tree().closure_of("server/step").contains("common/math"));
-  EXPECT_TRUE(tree().has_file("server/step/tick.cpp"));
+  EXPECT_EQ(tree().layer_of("server/tissue/cutting"),
+            tree().layer_of("server/tissue/dynamics") + 1);
+  EXPECT_TRUE(tree().closure_of("server/tissue/step").contains("common/math"));
+  EXPECT_TRUE(tree().has_file("server/tissue/step/tick.cpp"));
   EXPECT_TRUE(tree().has_file("README.md"));
   std::size_t includes = 0;
   for (const auto& file : tree().files) includes += file.includes.size();

@@ -10,17 +10,24 @@ namespace {
 constexpr std::size_t kMaxLines = 600;
 
 // The only file of a state folder that may read a clock: it times the stages, for people.
-constexpr const char* kStageTimers = "server/step/tick.cpp";
+constexpr const char* kStageTimers = "server/tissue/step/tick.cpp";
 
-const std::set<std::string> kProtobufFolders{
-    "proto",          "common/scene",       "common/wire",      "common/journal",
-    "server/session", "server/replication", "server/recording", "client/net",
-    "client/replica", "client/replay"};
+const std::set<std::string> kProtobufFolders{"proto",
+                                             "server/organs/organ",
+                                             "common/wire",
+                                             "common/journal",
+                                             "server/session/participants",
+                                             "server/session/replication",
+                                             "server/session/recording",
+                                             "client/net",
+                                             "client/replica",
+                                             "client/replay"};
 const std::set<std::string> kGraphicsFolders{"client/render", "client/ui", "client/app"};
 const std::set<std::string> kStateFolders{
-    "common/math",     "server/world",       "server/locks",    "server/input",
-    "server/contact",  "server/propagation", "server/dynamics", "server/cutting",
-    "server/exterior", "server/step",        "server/scenario", "server/control"};
+    "common/math",           "server/tissue/world",       "server/tissue/hands",
+    "server/tissue/contact", "server/tissue/propagation", "server/tissue/dynamics",
+    "server/tissue/cutting", "server/tissue/reduction",   "server/tissue/step",
+    "server/lab/scenario",   "server/session/control"};
 
 bool is_library_code(const SourceFile& file) {
   return file.path.starts_with("common/") || file.path.starts_with("server/") ||
@@ -117,16 +124,17 @@ Breaches check_includes(const SourceTree& tree) {
 
 Breaches check_net_sees_no_world(const SourceTree& tree) {
   Breaches breaches;
-  static const std::set<std::string> kState{
-      "server/world",    "server/locks",    "server/input", "server/contact", "server/propagation",
-      "server/dynamics", "server/exterior", "server/step",  "server/scenario"};
-  for (const auto& folder : tree.closure_of("server/net"))
+  static const std::set<std::string> kState{"server/tissue/world",    "server/tissue/hands",
+                                            "server/tissue/contact",  "server/tissue/propagation",
+                                            "server/tissue/dynamics", "server/tissue/reduction",
+                                            "server/tissue/step",     "server/lab/scenario"};
+  for (const auto& folder : tree.closure_of("server/session/net"))
     if (kState.contains(folder))
-      breaches.push_back("server/net/CMakeLists.txt:1: sees " + folder +
+      breaches.push_back("server/session/net/CMakeLists.txt:1: sees " + folder +
                          " through its DEPENDS, hand it bytes instead");
   for (const auto& file : tree.files)
     for (const auto& include : file.includes)
-      if (file.folder == "server/net" && kState.contains(folder_of_include(include.target)))
+      if (file.folder == "server/session/net" && kState.contains(folder_of_include(include.target)))
         breaches.push_back(at(file, include.line) + "includes " + include.target +
                            ": hand it bytes instead");
   return breaches;

@@ -17,7 +17,7 @@ using Breaches = std::vector<std::string>;
 Breaches check_folders(const SourceTree& tree);
 // Every #include "..." exists and is of the own folder or of one seen through DEPENDS.
 Breaches check_includes(const SourceTree& tree);
-// server/net moves bytes: it sees no simulation state, not even through others.
+// server/session/net moves bytes: it sees no simulation state, not even through others.
 Breaches check_net_sees_no_world(const SourceTree& tree);
 // Generated messages only where bytes become meaning.
 Breaches check_protobuf(const SourceTree& tree);

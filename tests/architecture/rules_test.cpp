@@ -19,7 +19,8 @@ class Rules : public ::testing::Test {
     fs::remove_all(root_);
     write("CMakeLists.txt",
           "set(TROCAR_LAYERS # the order\n  common/base common/math\n  proto common/wire\n"
-          "  server/world server/step server/net\n  client/net client/render)\n");
+          "  server/tissue/world server/tissue/step server/session/net\n  client/net "
+          "client/render)\n");
     library("common/base", "SOURCES a.cpp HEADERS a.h");
     write("common/base/a.h", "#pragma once\n#include <vector>\n");
     write("common/base/a.cpp", "#include \"common/base/a.h\"\n");
@@ -28,16 +29,16 @@ class Rules : public ::testing::Test {
     library("common/wire", "SOURCES w.cpp HEADERS w.h DEPENDS common/math proto LINK zstd");
     write("common/wire/w.h", "#pragma once\n#include \"common/math/m.h\"\n");
     write("common/wire/w.cpp", "#include \"proto/wire.pb.h\"\n#include \"common/base/a.h\"\n");
-    library("server/world", "HEADERS world.h DEPENDS common/math");
-    write("server/world/world.h", "#pragma once\n#include \"common/math/m.h\"\n");
-    library("server/step", "SOURCES tick.cpp DEPENDS server/world");
-    write("server/step/tick.cpp",
+    library("server/tissue/world", "HEADERS world.h DEPENDS common/math");
+    write("server/tissue/world/world.h", "#pragma once\n#include \"common/math/m.h\"\n");
+    library("server/tissue/step", "SOURCES tick.cpp DEPENDS server/tissue/world");
+    write("server/tissue/step/tick.cpp",
           "#include \"common/base/timing.h\"\n#include <cmath>\n// std::sin(x) is not used\n"
           "float f(float x) { return std::sqrt(x) + g(thread_cpu_ns()) + h(\"std::cos(\"); }\n");
     write("common/base/timing.h", "#pragma once\n");
     library("common/base", "SOURCES a.cpp HEADERS a.h timing.h");
-    library("server/net", "SOURCES n.cpp DEPENDS common/wire");
-    write("server/net/n.cpp", "#include \"common/wire/w.h\"\n");
+    library("server/session/net", "SOURCES n.cpp DEPENDS common/wire");
+    write("server/session/net/n.cpp", "#include \"common/wire/w.h\"\n");
     library("client/net", "SOURCES n.cpp DEPENDS common/wire");
     write("client/net/n.cpp", "#include \"proto/wire.pb.h\"\n");
     library("client/render", "SOURCES r.cpp DEPENDS common/math");
@@ -90,27 +91,28 @@ TEST_F(Rules, ADependencyThatPointsDownIsFound) {
 }
 
 TEST_F(Rules, AProgramMayDependOnTheLibraryBesideIt) {
-  append("server/step/CMakeLists.txt",
-         "project_program(run MAIN main.cpp DEPENDS server/step common/math)\n");
-  write("server/step/main.cpp", "#include \"common/math/m.h\"\n");
+  append("server/tissue/step/CMakeLists.txt",
+         "project_program(run MAIN main.cpp DEPENDS server/tissue/step common/math)\n");
+  write("server/tissue/step/main.cpp", "#include \"common/math/m.h\"\n");
   EXPECT_TRUE(check_folders(tree()).empty());
   EXPECT_TRUE(check_includes(tree()).empty());
 }
 
 TEST_F(Rules, ADependencyThatDoesNotExistIsFound) {
-  library("server/world", "HEADERS world.h DEPENDS common/math common/maths");
-  expect_one(check_folders(tree()), "server/world/CMakeLists.txt:1: ", "not in TROCAR_LAYERS");
+  library("server/tissue/world", "HEADERS world.h DEPENDS common/math common/maths");
+  expect_one(check_folders(tree()),
+             "server/tissue/world/CMakeLists.txt:1: ", "not in TROCAR_LAYERS");
 }
 
 TEST_F(Rules, ServerAndClientInEitherDirectionAreFound) {
-  library("client/net", "SOURCES n.cpp DEPENDS common/wire server/world");
-  append("client/net/n.cpp", "#include \"server/world/world.h\"\n");
-  append("server/net/n.cpp", "#include \"client/net/n.h\"\n");
+  library("client/net", "SOURCES n.cpp DEPENDS common/wire server/tissue/world");
+  append("client/net/n.cpp", "#include \"server/tissue/world/world.h\"\n");
+  append("server/session/net/n.cpp", "#include \"client/net/n.h\"\n");
   expect_one(check_folders(tree()), "client/net/CMakeLists.txt:1: ", "do not see each other");
   const auto breaches = check_includes(tree());
   ASSERT_EQ(breaches.size(), 2u);
   EXPECT_EQ(breaches[0].rfind("client/net/n.cpp:2: ", 0), 0u) << breaches[0];
-  EXPECT_EQ(breaches[1].rfind("server/net/n.cpp:2: ", 0), 0u) << breaches[1];
+  EXPECT_EQ(breaches[1].rfind("server/session/net/n.cpp:2: ", 0), 0u) << breaches[1];
 }
 
 TEST_F(Rules, AnIncludeThatIsNotFromTheRootIsFound) {
@@ -133,17 +135,17 @@ TEST_F(Rules, AFolderOutsideTheLayersAndAFileThatIsNotListedAreFound) {
 }
 
 TEST_F(Rules, NetThatSeesTheWorldThroughAnotherFolderIsFound) {
-  library("server/net", "SOURCES n.cpp DEPENDS common/wire server/step");
+  library("server/session/net", "SOURCES n.cpp DEPENDS common/wire server/tissue/step");
   const auto breaches = check_net_sees_no_world(tree());
   ASSERT_EQ(breaches.size(), 2u) << "step itself and world through it";
-  append("server/net/n.cpp", "#include \"server/world/world.h\"\n");
+  append("server/session/net/n.cpp", "#include \"server/tissue/world/world.h\"\n");
   EXPECT_EQ(check_net_sees_no_world(tree()).size(), 3u);
 }
 
 TEST_F(Rules, ProtobufElsewhereIsFound) {
-  append("server/step/tick.cpp", "#include \"proto/wire.pb.h\"\n");
-  expect_one(check_protobuf(tree()), "server/step/tick.cpp:5: ", "plain types");
-  append("server/net/n.cpp", "#include <google/protobuf/message.h>\n");
+  append("server/tissue/step/tick.cpp", "#include \"proto/wire.pb.h\"\n");
+  expect_one(check_protobuf(tree()), "server/tissue/step/tick.cpp:5: ", "plain types");
+  append("server/session/net/n.cpp", "#include <google/protobuf/message.h>\n");
   EXPECT_EQ(check_protobuf(tree()).size(), 2u);
 }
 
@@ -163,22 +165,22 @@ TEST_F(Rules, EverySourceOfNondeterminismIsFound) {
         "x = std::exp(y);", "x = pow (y, 2);", "x = std::fma(a, b, c);",
         "auto h = std::hash<int>{};", "x = rand();", "t = thread_cpu_ns();",
         "clock_gettime(c, &t);"}) {
-    write("server/world/world.h", std::string("#pragma once\n") + line + "\n");
-    expect_one(check_determinism(tree()), "server/world/world.h:2: ", ":");
+    write("server/tissue/world/world.h", std::string("#pragma once\n") + line + "\n");
+    expect_one(check_determinism(tree()), "server/tissue/world/world.h:2: ", ":");
   }
 }
 
 TEST_F(Rules, ExactlyRoundedFunctionsAndLikeNamesAreAllowed) {
-  write("server/world/world.h",
+  write("server/tissue/world/world.h",
         "#pragma once\nx = std::sqrt(a) + std::abs(b) + std::floor(c) + position(d) + "
         "expand(e) + log_it(f) + distance(g) + cosine_of(h) + 1'000;\n");
   EXPECT_TRUE(check_determinism(tree()).empty());
 }
 
 TEST_F(Rules, OnlyTheStageTimersMayReadAClock) {
-  library("server/step", "SOURCES tick.cpp other.cpp DEPENDS server/world");
-  write("server/step/other.cpp", "#include \"common/base/timing.h\"\n");
-  expect_one(check_determinism(tree()), "server/step/other.cpp:1: ", "timing.h");
+  library("server/tissue/step", "SOURCES tick.cpp other.cpp DEPENDS server/tissue/world");
+  write("server/tissue/step/other.cpp", "#include \"common/base/timing.h\"\n");
+  expect_one(check_determinism(tree()), "server/tissue/step/other.cpp:1: ", "timing.h");
 }
 
 TEST_F(Rules, LongFilesMachinePathsAndMissingGuardsAreFound) {

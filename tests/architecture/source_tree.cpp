@@ -54,8 +54,8 @@ Folder read_folder(const std::string& cmake_text) {
   for (const auto& word : words_of_cmake(cmake_text)) {
     folder.words.insert(word);
     if (kKeywords.contains(word)) in_depends = false;
-    if (in_depends) folder.depends.insert(word);
-    if (word == "DEPENDS") in_depends = true;
+    if (in_depends && word != "DEPENDS" && word != "USES") folder.depends.insert(word);
+    if (word == "DEPENDS" || word == "USES") in_depends = true;
   }
   return folder;
 }

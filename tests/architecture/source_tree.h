@@ -19,7 +19,7 @@ struct Include {
 
 struct SourceFile {
   std::string path;    // from the root, with '/'
-  std::string folder;  // of the file: "server/contact", "proto", "tests/script"
+  std::string folder;  // of the file: "server/tissue/contact", "proto", "tests/script"
   std::vector<std::string> lines;
   std::vector<std::string> code_lines;  // without comments and contents of literals; C++ only
   std::vector<Include> includes;        // C++ only

@@ -10,9 +10,9 @@
 
 #include "common/base/cpu.h"
 #include "common/math/box.h"
-#include "common/scene/builtin_organs.h"
-#include "common/scene/load_organ.h"
-#include "server/step/simulation.h"
+#include "server/organs/catalogue/builtin_organs.h"
+#include "server/organs/catalogue/load_organ.h"
+#include "server/tissue/step/simulation.h"
 
 namespace trocar {
 namespace {
@@ -28,14 +28,14 @@ struct Options {
   unsigned workers = 1;
 };
 
-Box<float> box_of(const scene::Organ& organ) {
+Box<float> box_of(const organ::Organ& organ) {
   Box<float> box;
   for (const auto& p : organ.mesh.rest_positions) box.include(to_float(p));
   return box;
 }
 
-scene::ToolSample sample_of(const Box<float>& box, const Options& options, std::uint8_t blade,
-                            Tick tick) {
+tool::ToolSample sample_of(const Box<float>& box, const Options& options, std::uint8_t blade,
+                           Tick tick) {
   const float length = box.most.x - box.least.x + 2 * kBeyond_m;
   const float gone = static_cast<float>(tick) * 1e-3f * static_cast<float>(options.speed) +
                      0.3f * length * static_cast<float>(blade);
@@ -47,7 +47,7 @@ scene::ToolSample sample_of(const Box<float>& box, const Options& options, std::
   const bool is_between = along < kBeyond_m / 2;  // lifted from one end to the other
   const Vec3f tip{box.least.x - kBeyond_m + along, 0.6f * box.least.y + 0.4f * box.most.y,
                   box.least.z + aside};
-  return {{tip, rotation_from_z({0, 1, 0})}, is_between ? scene::Verb::None : scene::Verb::Cut};
+  return {{tip, rotation_from_z({0, 1, 0})}, is_between ? tool::Verb::None : tool::Verb::Cut};
 }
 
 double part(const std::vector<double>& sorted, double share) {
@@ -56,15 +56,15 @@ double part(const std::vector<double>& sorted, double share) {
              : sorted[static_cast<std::size_t>(share * static_cast<double>(sorted.size() - 1))];
 }
 
-void run(scene::Organ organ, const Options& options) {
+void run(organ::Organ organ, const Options& options) {
   const Box<float> box = box_of(organ);
   const std::string name = organ.name;
   step::Simulation simulation(std::move(organ), options.workers);
   const auto nodes_before = simulation.state().cuts.topology().node_count(),
              tets_before = simulation.state().cuts.topology().tet_count();
-  session::TickInputs inputs;
+  hands::TickInputs inputs;
   for (std::uint8_t b = 0; b < options.blades; ++b) {
-    session::HandJoin join{.slot = {b}};
+    hands::HandJoin join{.slot = {b}};
     join.shapes[0] = {.radius_m = 0.001f, .length_m = 0.3f, .edge_m = 0.12f};
     inputs.joins.push_back(join);
   }
@@ -129,11 +129,11 @@ int main(int argc, char** argv) {
   app.add_option("--blades", options.blades)->capture_default_str()->check(CLI::Range(1, 8));
   app.add_option("--workers", options.workers)->capture_default_str()->check(CLI::Range(1, 64));
   CLI11_PARSE(app, argc, argv);
-  auto organ =
-      options.organ.empty() ? scene::make_liver(kBuiltInTets) : scene::load_organ(options.organ);
+  auto organ = options.organ.empty() ? catalogue::make_liver(kBuiltInTets)
+                                     : catalogue::load_organ(options.organ);
   if (!organ) return report(kProgram, organ.error());
   if (!options.law.empty())
     organ->material.elastic_law =
-        options.law == "springs" ? scene::ElasticLaw::Springs : scene::ElasticLaw::NeoHookean;
+        options.law == "springs" ? material::ElasticLaw::Springs : material::ElasticLaw::NeoHookean;
   run(std::move(*organ), options);
 }

@@ -1,7 +1,7 @@
 // How a step's time grows: with the organ's nodes, when all of it moves and when one contact moves
 // its surroundings, frozen or graded; and with the number of contacts on one organ.
 
-#include "common/scene/builtin_organs.h"
+#include "server/organs/catalogue/builtin_organs.h"
 #include "tests/bench/pulled_work.h"
 #include "tests/bench/session_work.h"
 
@@ -14,7 +14,7 @@ constexpr std::uint32_t kNearDepth = 2;  // graded: layers with all sweeps
 
 // One surface node far from every edge, so that the nodes it moves are as many in every organ that
 // is large enough.
-BenchTool pull_top_centre(const scene::Organ& organ) {
+BenchTool pull_top_centre(const organ::Organ& organ) {
   NodeIndex best;
   double nearest = 1e30, top = -1e30;
   const auto& p = organ.mesh.rest_positions;
@@ -74,7 +74,7 @@ void add_graded_sizes(Suite& suite) {
 }
 
 void add_contacts(Suite& suite) {
-  const auto organ = scene::make_liver(suite.is_smoke() ? scene::kMinLiverTets : 88'000);
+  const auto organ = catalogue::make_liver(suite.is_smoke() ? catalogue::kMinLiverTets : 88'000);
   TROCAR_ASSERT(organ.ok());
   std::vector<std::size_t> counts{1, 2, 4, 8, 16};
   if (suite.is_smoke()) counts = {1, 4};

@@ -17,12 +17,12 @@
 
 #include "common/base/cpu.h"
 #include "common/base/timing.h"
-#include "common/scene/builtin_organs.h"
-#include "common/scene/load_organ.h"
-#include "server/calibration/places.h"
-#include "server/calibration/press.h"
-#include "server/control/depth_chooser.h"
-#include "server/control/rate_controller.h"
+#include "server/lab/calibration/places.h"
+#include "server/lab/calibration/press.h"
+#include "server/organs/catalogue/builtin_organs.h"
+#include "server/organs/catalogue/load_organ.h"
+#include "server/session/control/depth_chooser.h"
+#include "server/session/control/rate_controller.h"
 
 namespace trocar {
 namespace {
@@ -57,10 +57,10 @@ float swing(float phase) {
   return x * x * (3 - 2 * x);
 }
 
-session::ToolInput sample_of(const Hand& hand, std::uint8_t number, Tick tick) {
+hands::ToolInput sample_of(const Hand& hand, std::uint8_t number, Tick tick) {
   const float t = static_cast<float>(tick) * 1e-3f + 0.37f * static_cast<float>(number);
   float out = 0.004f, aside = 0;
-  scene::Verb verb = scene::Verb::Push;
+  tool::Verb verb = tool::Verb::Push;
   switch (number % 4) {
     case 0:  // presses, every 2 s
       out -= 0.012f * swing(t / 2);
@@ -71,7 +71,7 @@ session::ToolInput sample_of(const Hand& hand, std::uint8_t number, Tick tick) {
       break;
     case 2: {  // grasps, lifts, lets go, every 4 s
       const float phase = t / 4 - std::floor(t / 4);
-      verb = phase < 0.8f ? scene::Verb::Grasp : scene::Verb::None;
+      verb = phase < 0.8f ? tool::Verb::Grasp : tool::Verb::None;
       out = 0.015f * swing(std::min(1.0f, phase / 0.8f));
       break;
     }
@@ -116,7 +116,7 @@ std::array<Vec3d, kMaxTools> forces_of(const step::Simulation& simulation) {
 
 class Session {
  public:
-  Session(const scene::Organ& organ, const Options& options)
+  Session(const organ::Organ& organ, const Options& options)
       : options_(options), simulation_(organ, options.workers) {
     if (!options.has_no_errors) reference_.emplace(organ, options.workers);
     const auto places =
@@ -124,7 +124,7 @@ class Session {
     for (const auto& place : places) {
       const auto number = static_cast<std::uint8_t>(hands_.size());
       hands_.push_back({place, rotate(rotation_from_z(place.outward), {1, 0, 0})});
-      session::HandJoin join{.slot = {number}};
+      hands::HandJoin join{.slot = {number}};
       join.shapes[0] = {.radius_m = 0.008f, .length_m = 0.3f, .reach_m = 0.012f};
       inputs_.joins.push_back(join);
     }
@@ -174,7 +174,7 @@ class Session {
   std::optional<step::Simulation> reference_;
   bool is_following_ = false;
   std::vector<Hand> hands_;
-  session::TickInputs inputs_;
+  hands::TickInputs inputs_;
   step::TickDecisions decisions_;
   std::optional<control::RateController> controller_;
   std::optional<control::DepthChooser> chooser_;
@@ -294,9 +294,9 @@ void Session::print() const {
   const auto& organ = simulation_.organ();
   std::printf("%s, %zu nodes, %s, %d hands, %s, %u %s, %.0f s\n", organ.name.c_str(),
               organ.mesh.node_count(),
-              organ.material.elastic_law == scene::ElasticLaw::NeoHookean ? "neo-Hookean"
-              : organ.material.elastic_law == scene::ElasticLaw::Measured ? "measured"
-                                                                          : "springs or linear",
+              organ.material.elastic_law == material::ElasticLaw::NeoHookean ? "neo-Hookean"
+              : organ.material.elastic_law == material::ElasticLaw::Measured ? "measured"
+                                                                             : "springs or linear",
               options_.hands, options_.is_frozen ? "frozen" : "graded", options_.workers,
               options_.workers == 1 ? "thread" : "threads", options_.seconds);
   std::printf("%-40s %12s %10s\n", "per tick", "median", "p99");
@@ -361,11 +361,11 @@ void Session::write_csv(const std::string& path) const {
 }
 
 Status run(const Options& options) {
-  auto organ =
-      options.organ.empty() ? scene::make_liver(kBuiltInTets) : scene::load_organ(options.organ);
+  auto organ = options.organ.empty() ? catalogue::make_liver(kBuiltInTets)
+                                     : catalogue::load_organ(options.organ);
   if (!organ) return organ.error();
-  if (options.law == "springs") organ->material.elastic_law = scene::ElasticLaw::Springs;
-  if (options.law == "neo-hookean") organ->material.elastic_law = scene::ElasticLaw::NeoHookean;
+  if (options.law == "springs") organ->material.elastic_law = material::ElasticLaw::Springs;
+  if (options.law == "neo-hookean") organ->material.elastic_law = material::ElasticLaw::NeoHookean;
   if (options.is_averaged) organ->material.has_averaged_strain = true;
   Session session(*organ, options);
   session.run();

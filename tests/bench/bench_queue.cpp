@@ -1,7 +1,7 @@
 // Choi 2002 fig. 6: what a time step spends on setting up, filling the queue and solving, against
 // the nodes that move, on a lattice of 30 x 15 x 30. One surface node is pulled.
 
-#include "common/scene/builtin_organs.h"
+#include "server/organs/catalogue/builtin_organs.h"
 #include "tests/bench/session_work.h"
 
 namespace trocar::bench {
@@ -9,8 +9,8 @@ namespace {
 
 constexpr std::uint32_t kAllNodes = 1'000'000;
 
-BenchTool pull_top_centre(const scene::LatticeSize& size, const scene::Organ& organ) {
-  const auto node = scene::lattice_node(size, size.nx / 2, size.ny - 1, size.nz / 2);
+BenchTool pull_top_centre(const catalogue::LatticeSize& size, const organ::Organ& organ) {
+  const auto node = catalogue::lattice_node(size, size.nx / 2, size.ny - 1, size.nz / 2);
   return {.place = to_float(organ.mesh.rest_positions[node.value]),
           .outward = {0, 1, 0},
           .grasps = true,
@@ -21,9 +21,9 @@ BenchTool pull_top_centre(const scene::LatticeSize& size, const scene::Organ& or
 }  // namespace
 
 void add_queue(Suite& suite) {
-  const scene::LatticeSize size =
-      suite.is_smoke() ? scene::LatticeSize{8, 5, 8} : scene::LatticeSize{};
-  const auto organ = scene::make_lattice(size);
+  const catalogue::LatticeSize size =
+      suite.is_smoke() ? catalogue::LatticeSize{8, 5, 8} : catalogue::LatticeSize{};
+  const auto organ = catalogue::make_lattice(size);
   TROCAR_ASSERT(organ.ok());
   const auto tool = pull_top_centre(size, *organ);
   const std::uint32_t deepest = suite.is_smoke() ? 2 : 14;

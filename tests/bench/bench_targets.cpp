@@ -1,7 +1,7 @@
 // The work for which a time is aimed at: the papers' figure, the best other library's as measured
 // before on another machine, and ours. A row that the engine cannot do is not there.
 
-#include "common/scene/builtin_organs.h"
+#include "server/organs/catalogue/builtin_organs.h"
 #include "tests/bench/pulled_work.h"
 #include "tests/bench/session_work.h"
 
@@ -13,9 +13,9 @@ constexpr std::uint32_t kAllLayers = 1000;
 constexpr std::uint32_t kNearDepth = 2;  // layers around a contact that get all sweeps
 
 void add_lattice(Suite& suite) {
-  const auto organ = scene::make_lattice();
-  const scene::LatticeSize size;
-  const auto node = scene::lattice_node(size, size.nx / 2, size.ny - 1, size.nz / 2);
+  const auto organ = catalogue::make_lattice();
+  const catalogue::LatticeSize size;
+  const auto node = catalogue::lattice_node(size, size.nx / 2, size.ny - 1, size.nz / 2);
   const BenchTool tool{.place = to_float(organ.mesh.rest_positions[node.value]),
                        .grasps = true,
                        .reach_m = 0.002f,
@@ -29,7 +29,7 @@ void add_lattice(Suite& suite) {
 }
 
 void add_plate(Suite& suite) {
-  const auto organ = scene::make_plate();
+  const auto organ = catalogue::make_plate();
   const BenchTool tool{.place = {0, 0.002f, 0}, .amplitude_m = 0.004f};
   Row row = row_of(organ, "targets", "480 nodes of the plate, pressed", title_of(Law::Springs, {}));
   row.paper_ms = "4.1-13.7 (Nakao 2003)";
@@ -75,8 +75,8 @@ void add_whole_organs(Suite& suite) {
 }
 
 void add_whole_liver(Suite& suite) {
-  const auto liver = std::make_shared<const PulledBox>(
-      make_pulled_liver(suite.is_smoke() ? scene::kMinLiverTets : scene::kDefaultLiverTets));
+  const auto liver = std::make_shared<const PulledBox>(make_pulled_liver(
+      suite.is_smoke() ? catalogue::kMinLiverTets : catalogue::kDefaultLiverTets));
   for (const Law law : {Law::NeoHookean, Law::NeoHookeanAveraged}) {
     if (!has(law)) continue;
     const SolverOptions options{.law = law};
@@ -109,7 +109,7 @@ void add_graded(Suite& suite) {
   };
   for (const auto& work : works) {
     if (!has(work.law) || work.threads > max_threads()) continue;
-    auto organ = scene::make_liver(suite.is_smoke() ? scene::kMinLiverTets : work.tets);
+    auto organ = catalogue::make_liver(suite.is_smoke() ? catalogue::kMinLiverTets : work.tets);
     TROCAR_ASSERT(organ.ok());
     Row row = row_of(
         *organ, "targets",

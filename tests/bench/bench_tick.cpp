@@ -9,8 +9,8 @@
 #include <cstdio>
 
 #include "common/base/cpu.h"
-#include "common/scene/builtin_organs.h"
-#include "server/step/simulation.h"
+#include "server/organs/catalogue/builtin_organs.h"
+#include "server/tissue/step/simulation.h"
 
 namespace trocar {
 namespace {
@@ -42,18 +42,18 @@ float percentile(std::vector<std::uint32_t>& ns, double share) {
   return static_cast<float>(*at) * 1e-3f;
 }
 
-int run(const char* title, scene::ElasticLaw law, const step::TickDecisions& decisions) {
-  auto liver = scene::make_liver();
+int run(const char* title, material::ElasticLaw law, const step::TickDecisions& decisions) {
+  auto liver = catalogue::make_liver();
   if (!liver) return report(kProgram, liver.error());
   liver->material.elastic_law = law;
   step::Simulation simulation(std::move(*liver));
   const std::array<Vec3f, kHands> directions{
       Vec3f{0, -1, 0.9f}, {-0.5f, -0.4f, 1}, {0.6f, -0.2f, 1}};
   std::array<Vec3f, kHands> places;
-  session::TickInputs inputs;
+  hands::TickInputs inputs;
   for (std::uint8_t hand = 0; hand < kHands; ++hand) {
     places[hand] = extreme(simulation, directions[hand]);
-    session::HandJoin join{.slot = {hand}};
+    hands::HandJoin join{.slot = {hand}};
     join.shapes[0] = {.radius_m = 0.008f, .length_m = 0.3f, .reach_m = 0.016f};
     inputs.joins.push_back(join);
   }
@@ -72,7 +72,7 @@ int run(const char* title, scene::ElasticLaw law, const step::TickDecisions& dec
             grasps ? Vec3f{0, 0.03f, 0.01f} * swing : out * (0.002f - 0.015f * swing);
         inputs.samples.push_back({tool_slot({hand}, 0),
                                   {{places[hand] + move, rotation_from_z(out)},
-                                   grasps ? scene::Verb::Grasp : scene::Verb::Push}});
+                                   grasps ? tool::Verb::Grasp : tool::Verb::Push}});
       }
     const auto& report = simulation.tick(inputs, decisions);
     inputs.clear();
@@ -118,7 +118,7 @@ int main(int argc, char** argv) {
   using trocar::world::Boundary;
   const trocar::step::TickDecisions frozen{
       .depth_limit = 40, .node_limit = 1200, .boundary = Boundary::Frozen};
-  using enum trocar::scene::ElasticLaw;
+  using enum trocar::material::ElasticLaw;
   for (const auto& [law, name] : {std::pair{Springs, "springs"}, {NeoHookean, "neo-Hookean"}})
     for (const auto& [decisions, mode] : {std::pair{frozen, "frozen"}, {{}, "graded"}}) {
       const auto title = std::string(name) + ", " + mode;

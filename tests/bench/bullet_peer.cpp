@@ -82,7 +82,7 @@ std::unique_ptr<btDeformableLagrangianForce> make_elastic_force(const PulledBox&
     case BulletLaw::MassSpring:
       break;
   }
-  const auto springs = scene::springs_of(box.organ);
+  const auto springs = organ::springs_of(box.organ);
   double mean = 0;
   for (const auto& spring : springs)
     mean += spring.stiffness_n_m / static_cast<double>(springs.size());

@@ -17,7 +17,7 @@ ToolSlot slot(std::size_t i) {
 
 }  // namespace
 
-OurSession::OurSession(scene::Organ organ, std::span<const BenchTool> tools,
+OurSession::OurSession(organ::Organ organ, std::span<const BenchTool> tools,
                        const SessionOptions& options)
     : simulation_(with_law(std::move(organ), options.law), options.threads),
       tools_(tools.begin(), tools.end()) {
@@ -32,7 +32,7 @@ OurSession::OurSession(scene::Organ organ, std::span<const BenchTool> tools,
   }
   TROCAR_ASSERT(step::validate(decisions_).ok());
   for (std::size_t i = 0; i < tools_.size(); i += kToolsPerHand) {
-    session::HandJoin join{.slot = slot(i).owner()};
+    hands::HandJoin join{.slot = slot(i).owner()};
     for (std::size_t k = 0; k < kToolsPerHand && i + k < tools_.size(); ++k) {
       join.shapes[k] = {
           .radius_m = tools_[i + k].radius_m, .length_m = 0.3f, .reach_m = tools_[i + k].reach_m};
@@ -57,7 +57,7 @@ void OurSession::sample_tools() {
     const float out = tool.grasps ? moved : -moved;
     inputs_.samples.push_back({slot(i),
                                {{tool.place + tool.outward * out, rotation_from_z(tool.outward)},
-                                tool.grasps ? scene::Verb::Grasp : scene::Verb::Push}});
+                                tool.grasps ? tool::Verb::Grasp : tool::Verb::Push}});
   }
 }
 

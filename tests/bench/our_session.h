@@ -1,16 +1,16 @@
 #pragma once
 
-// The server's own ticks (server/step) with tools that move by themselves, as the benchmarks use
-// them. Everything of a tick is in it but input from outside. One caller.
+// The server's own ticks (server/tissue/step) with tools that move by themselves, as the benchmarks
+// use them. Everything of a tick is in it but input from outside. One caller.
 
 #include <cstdint>
 #include <span>
 #include <vector>
 
 #include "common/base/tick.h"
-#include "common/scene/organ.h"
-#include "server/session/inputs.h"
-#include "server/step/simulation.h"
+#include "server/organs/organ/organ.h"
+#include "server/tissue/hands/inputs.h"
+#include "server/tissue/step/simulation.h"
 #include "tests/bench/our_solver.h"
 
 namespace trocar::bench {
@@ -51,7 +51,7 @@ struct TickCounts {
 
 class OurSession {
  public:
-  OurSession(scene::Organ organ, std::span<const BenchTool> tools, const SessionOptions& options);
+  OurSession(organ::Organ organ, std::span<const BenchTool> tools, const SessionOptions& options);
 
   TickTimes tick();
   TickCounts counts() const;
@@ -70,7 +70,7 @@ class OurSession {
   step::TickDecisions decisions_;
   step::TickReport report_;
   std::vector<BenchTool> tools_;
-  session::TickInputs inputs_;
+  hands::TickInputs inputs_;
   std::vector<Vec3f> forces_;
 };
 

@@ -6,8 +6,8 @@
 
 #include "common/base/assert.h"
 #include "common/base/checksum.h"
-#include "server/dynamics/block_descent.h"
-#include "server/world/world.h"
+#include "server/tissue/dynamics/block_descent.h"
+#include "server/tissue/world/world.h"
 
 namespace trocar::bench {
 
@@ -25,11 +25,11 @@ const char* name_of(Law law) {
   return "?";
 }
 
-scene::Organ with_law(scene::Organ organ, Law law) {
+organ::Organ with_law(organ::Organ organ, Law law) {
   auto& material = organ.material;
-  material.elastic_law = law == Law::Springs      ? scene::ElasticLaw::Springs
-                         : law == Law::LinearTets ? scene::ElasticLaw::TensorMass
-                                                  : scene::ElasticLaw::NeoHookean;
+  material.elastic_law = law == Law::Springs      ? material::ElasticLaw::Springs
+                         : law == Law::LinearTets ? material::ElasticLaw::TensorMass
+                                                  : material::ElasticLaw::NeoHookean;
   material.has_averaged_strain = law == Law::NeoHookeanAveraged;
   return organ;
 }
@@ -42,7 +42,7 @@ std::uint32_t max_threads() {
 }
 
 struct OurSolver::Engine {
-  Engine(const scene::Organ& o, const SolverOptions& options)
+  Engine(const organ::Organ& o, const SolverOptions& options)
       : organ(with_law(o, options.law)), world(organ), solver(organ, world, options.threads) {
     settings = {.sweeps = options.sweeps,
                 .over_relaxation = options.over_relaxation,
@@ -54,7 +54,7 @@ struct OurSolver::Engine {
       }
   }
 
-  scene::Organ organ;
+  organ::Organ organ;
   world::World world;
   dynamics::BlockDescent solver;
   dynamics::SolveSettings settings;
@@ -63,7 +63,7 @@ struct OurSolver::Engine {
   std::vector<NodeIndex> free_nodes;
 };
 
-OurSolver::OurSolver(const scene::Organ& organ, const SolverOptions& options) {
+OurSolver::OurSolver(const organ::Organ& organ, const SolverOptions& options) {
   TROCAR_ASSERT(has(options.law) && options.threads <= max_threads());
   engine_ = std::make_unique<Engine>(organ, options);
 }

@@ -10,7 +10,7 @@
 #include <memory>
 #include <span>
 
-#include "common/scene/organ.h"
+#include "server/organs/organ/organ.h"
 
 namespace trocar::bench {
 
@@ -19,7 +19,7 @@ inline constexpr Law kLaws[] = {Law::Springs, Law::LinearTets, Law::NeoHookean,
                                 Law::NeoHookeanAveraged};
 const char* name_of(Law law);
 // The organ with this law instead of its own, the rest of its material as it is.
-scene::Organ with_law(scene::Organ organ, Law law);
+organ::Organ with_law(organ::Organ organ, Law law);
 
 struct SolverOptions {
   Law law = Law::Springs;
@@ -36,7 +36,7 @@ std::uint32_t max_threads();
 
 class OurSolver {
  public:
-  OurSolver(const scene::Organ& organ, const SolverOptions& options);
+  OurSolver(const organ::Organ& organ, const SolverOptions& options);
   ~OurSolver();
 
   void step(std::span<const Vec3f> forces_n);  // 1 ms

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "common/base/assert.h"
-#include "common/scene/builtin_organs.h"
+#include "server/organs/catalogue/builtin_organs.h"
 
 namespace trocar::bench {
 namespace {
@@ -98,23 +98,23 @@ PulledBox make_pulled_box(const BoxShape& shape, const PulledMaterial& material)
   grid.add_tets(organ.mesh);
   organ.mesh.build_adjacency();
   organ.material.density_kg_m3 = material.density_kg_m3;
-  organ.material.spring_law = scene::SpringLaw::VolumeConsistent;
+  organ.material.spring_law = material::SpringLaw::VolumeConsistent;
   organ.material.young_modulus_pa = material.young_modulus_pa;
   organ.material.node_damping_per_s = material.node_damping_per_s;
   organ.material.poisson_ratio = material.poisson_ratio;
   organ.material.spring_damping_time_s = 0;
-  organ.node_masses_kg = scene::lumped_masses(organ);
+  organ.node_masses_kg = organ::lumped_masses(organ);
   for (int j = 0; j <= shape.cells[1]; ++j)
     for (int k = 0; k <= shape.cells[2]; ++k) organ.fixed_nodes.push_back(grid.node(0, j, k));
   load_face(shape, box);
-  const auto status = scene::validate(organ);
+  const auto status = organ::validate(organ);
   TROCAR_ASSERT(status.ok());
   return box;
 }
 
 PulledBox make_pulled_liver(int target_tets) {
   constexpr double kRadius = 0.020, kForce = 0.4;
-  auto liver = scene::make_liver(target_tets);
+  auto liver = catalogue::make_liver(target_tets);
   TROCAR_ASSERT(liver.ok());
   PulledBox box;
   box.organ = std::move(*liver);

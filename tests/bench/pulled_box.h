@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "common/scene/organ.h"
+#include "server/organs/organ/organ.h"
 
 namespace trocar::bench {
 
@@ -39,7 +39,7 @@ struct PulledMaterial {
 };
 
 struct PulledBox {
-  scene::Organ organ;  // springs: VolumeConsistent at the material's E, no damping along them
+  organ::Organ organ;  // springs: VolumeConsistent at the material's E, no damping along them
   PulledMaterial material;
   std::vector<NodeIndex> loaded_nodes;  // the high x face, ascending
   std::vector<Vec3f> forces_n;          // per node of the organ

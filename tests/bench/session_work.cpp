@@ -26,7 +26,7 @@ struct Parts {
 // Sweeps after which more change nothing that counts.
 constexpr std::uint32_t kConvergedSweeps = 30;
 
-void judge(Row& row, const scene::Organ& organ, std::span<const BenchTool> tools,
+void judge(Row& row, const organ::Organ& organ, std::span<const BenchTool> tools,
            SessionOptions options, const OurSession& session) {
   options.boundary = Boundary::Frozen;
   options.is_whole = true;
@@ -74,7 +74,7 @@ void describe(Row& row, const Parts& parts, std::size_t contacts) {
   if (parts.faults != 0) row.more["fault_bits"] = parts.faults;
 }
 
-double median_frozen_solve(const scene::Organ& organ, std::span<const BenchTool> tools,
+double median_frozen_solve(const organ::Organ& organ, std::span<const BenchTool> tools,
                            SessionOptions options, std::uint64_t steps) {
   options.boundary = Boundary::Frozen;
   OurSession frozen(organ, tools, options);
@@ -85,7 +85,7 @@ double median_frozen_solve(const scene::Organ& organ, std::span<const BenchTool>
 
 }  // namespace
 
-std::vector<BenchTool> spread_tools(const scene::Organ& organ, std::size_t count,
+std::vector<BenchTool> spread_tools(const organ::Organ& organ, std::size_t count,
                                     const Vec3f& first) {
   const auto& mesh = organ.mesh;
   const auto normals = mesh::surface_normals(mesh);
@@ -122,7 +122,7 @@ std::vector<BenchTool> spread_tools(const scene::Organ& organ, std::size_t count
   return tools;
 }
 
-Row row_of(const scene::Organ& organ, std::string group, std::string object, std::string solver) {
+Row row_of(const organ::Organ& organ, std::string group, std::string object, std::string solver) {
   Row row;
   row.group = std::move(group);
   row.object = std::move(object);
@@ -133,7 +133,7 @@ Row row_of(const scene::Organ& organ, std::string group, std::string object, std
   return row;
 }
 
-Work run_session(scene::Organ organ, std::vector<BenchTool> tools,
+Work run_session(organ::Organ organ, std::vector<BenchTool> tools,
                  const SessionCase& session_case) {
   const auto& options = session_case.options;
   auto session = std::make_shared<OurSession>(organ, tools, options);
@@ -154,7 +154,7 @@ Work run_session(scene::Organ organ, std::vector<BenchTool> tools,
           }};
 }
 
-Work run_graded_session(scene::Organ organ, std::vector<BenchTool> tools, SessionOptions options) {
+Work run_graded_session(organ::Organ organ, std::vector<BenchTool> tools, SessionOptions options) {
   options.boundary = Boundary::Graded;
   Work work = run_session(organ, tools, {options, true});
   work.finish = [=, finish = std::move(work.finish), organ = std::move(organ)](Row& row) {

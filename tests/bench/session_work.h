@@ -9,7 +9,7 @@ namespace trocar::bench {
 
 // Surface places far from each other and from what is fixed, and outward normals there; the first
 // is the surface node farthest along `first`.
-std::vector<BenchTool> spread_tools(const scene::Organ& organ, std::size_t count,
+std::vector<BenchTool> spread_tools(const organ::Organ& organ, std::size_t count,
                                     const Vec3f& first);
 
 struct SessionCase {
@@ -20,10 +20,10 @@ struct SessionCase {
   // organ swept to convergence. Takes its time.
   bool is_judged = false;
 };
-Work run_session(scene::Organ organ, std::vector<BenchTool> tools, const SessionCase& session_case);
+Work run_session(organ::Organ organ, std::vector<BenchTool> tools, const SessionCase& session_case);
 // Whole graded ticks, with the solve told apart into near and far: near is what the same ticks cost
 // with everything outside the queue frozen, far is the rest. Needs as many steps again at the end.
-Work run_graded_session(scene::Organ organ, std::vector<BenchTool> tools, SessionOptions options);
-Row row_of(const scene::Organ& organ, std::string group, std::string object, std::string solver);
+Work run_graded_session(organ::Organ organ, std::vector<BenchTool> tools, SessionOptions options);
+Row row_of(const organ::Organ& organ, std::string group, std::string object, std::string solver);
 
 }  // namespace trocar::bench

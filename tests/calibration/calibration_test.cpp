@@ -7,10 +7,10 @@
 #include <cmath>
 
 #include "common/base/assert.h"
-#include "common/scene/builtin_organs.h"
-#include "common/scene/organ_file.h"
-#include "server/calibration/calibrate.h"
-#include "server/control/depth_chooser.h"
+#include "server/lab/calibration/calibrate.h"
+#include "server/organs/catalogue/builtin_organs.h"
+#include "server/organs/organ/organ_file.h"
+#include "server/session/control/depth_chooser.h"
 
 namespace trocar::calibration {
 namespace {
@@ -21,8 +21,8 @@ Settings small_settings() {
   return {.error = 0.03, .places = 3, .radius_m = 0.03, .depth_m = 0.006, .first_nodes = 64};
 }
 
-const scene::Organ& small_liver() {
-  static const auto liver = scene::make_liver(1500);
+const organ::Organ& small_liver() {
+  static const auto liver = catalogue::make_liver(1500);
   TROCAR_ASSERT(liver.ok());
   return *liver;
 }
@@ -32,7 +32,7 @@ const Calibration& small_calibration() {
   return calibration;
 }
 
-scene::DepthTable sample_table() {
+organ::DepthTable sample_table() {
   return {.error = 0.03,
           .tool_radius_m = 0.02,
           .places = 8,
@@ -117,10 +117,10 @@ TEST(Calibration, FrozenNearContactsIsSeenToBeTooStiff) {
 
 TEST(DepthTable, SurvivesTheOrganFileAndChangesNoHash) {
   auto organ = small_liver();
-  const auto hash = scene::organ_hash(organ);
+  const auto hash = organ::organ_hash(organ);
   organ.depth_table = sample_table();
-  EXPECT_EQ(scene::organ_hash(organ), hash);
-  const auto read = scene::unpack_organ(scene::pack_organ(organ));
+  EXPECT_EQ(organ::organ_hash(organ), hash);
+  const auto read = organ::unpack_organ(organ::pack_organ(organ));
   ASSERT_TRUE(read.ok()) << read.error().message;
   EXPECT_EQ(read->depth_table, organ.depth_table);
   EXPECT_TRUE(*read == organ);
@@ -136,7 +136,7 @@ TEST(DepthTable, ThatCannotBeIsRefused) {
     if (i == 2) table.rows[0].frozen_nodes = 0;
     if (i == 3) table.rows[0].graded_depth = 2000;
     if (i == 4) table.rows[2].graded_error = NAN;
-    const auto read = scene::unpack_organ(scene::pack_organ(organ));
+    const auto read = organ::unpack_organ(organ::pack_organ(organ));
     EXPECT_FALSE(read.ok()) << i;
   }
 }
@@ -144,11 +144,11 @@ TEST(DepthTable, ThatCannotBeIsRefused) {
 TEST(DepthTable, AddsNodesAndTakesTheDeepest) {
   const auto table = sample_table();
   const std::vector<double> small{0.2, 0.7}, unknown{0.2, 1.5}, beyond{3};
-  EXPECT_EQ(scene::frozen_nodes_for(table, small), 800u);
-  EXPECT_EQ(scene::graded_depth_for(table, small), 2u);
-  EXPECT_EQ(scene::frozen_nodes_for(table, unknown), std::nullopt);
-  EXPECT_EQ(scene::graded_depth_for(table, beyond), std::nullopt);
-  EXPECT_EQ(scene::frozen_nodes_for(table, {}), std::nullopt);
+  EXPECT_EQ(organ::frozen_nodes_for(table, small), 800u);
+  EXPECT_EQ(organ::graded_depth_for(table, small), 2u);
+  EXPECT_EQ(organ::frozen_nodes_for(table, unknown), std::nullopt);
+  EXPECT_EQ(organ::graded_depth_for(table, beyond), std::nullopt);
+  EXPECT_EQ(organ::frozen_nodes_for(table, {}), std::nullopt);
 }
 
 step::TickDecisions most(world::Boundary boundary) {

@@ -71,7 +71,7 @@ class MouseToolTest : public ::testing::Test {
   render::OrbitCamera camera_;
   render::Size size_{1280, 720};
   device::PointerInput input_;
-  device::MouseTool tool_{scene::ToolShape{}};
+  device::MouseTool tool_{tool::ToolShape{}};
 };
 
 TEST_F(MouseToolTest, HoversJustAboveTheSurfaceUnderThePointer) {
@@ -82,7 +82,7 @@ TEST_F(MouseToolTest, HoversJustAboveTheSurfaceUnderThePointer) {
                                     view.ray_through(input_.x, input_.y));
   ASSERT_TRUE(surface.has_value());
   EXPECT_NEAR(depth(), *surface - 0.008f, 1e-4f);
-  EXPECT_EQ(tool_.current().verb, scene::Verb::None);
+  EXPECT_EQ(tool_.current().verb, tool::Verb::None);
   // The shaft leaves towards the person.
   const Vec3f shaft = rotate(tool_.current().world_from_tool.orientation, {0, 0, 1});
   EXPECT_LT(dot(shaft, view.forward), -0.5f);
@@ -97,7 +97,7 @@ TEST_F(MouseToolTest, PushKeepsItsDepthUntilTheWheelTurns) {
     input_.x += 5;
     update();
   }
-  EXPECT_EQ(tool_.current().verb, scene::Verb::Push);
+  EXPECT_EQ(tool_.current().verb, tool::Verb::Push);
   EXPECT_NEAR(depth(), before, 1e-5f);
   input_.wheel = 2;
   update();
@@ -106,7 +106,7 @@ TEST_F(MouseToolTest, PushKeepsItsDepthUntilTheWheelTurns) {
   input_.left = false;
   input_.grasp = true;
   update();
-  EXPECT_EQ(tool_.current().verb, scene::Verb::Grasp);
+  EXPECT_EQ(tool_.current().verb, tool::Verb::Grasp);
 }
 
 TEST_F(MouseToolTest, TipStaysWhileTheCameraTurns) {

@@ -14,7 +14,7 @@ std::vector<Vec3f> sheet() {
   return positions;
 }
 
-Tool tool_of(int slot, scene::Verb verb, const Vec3f& tip) {
+Tool tool_of(int slot, tool::Verb verb, const Vec3f& tip) {
   Tool tool;
   tool.slot.value = static_cast<std::uint8_t>(slot);
   tool.verb = verb;
@@ -33,48 +33,47 @@ class HeldTissueTest : public ::testing::Test {
     return sum;
   }
   void update(std::vector<Tool> tools) {
-    held_.update(positions_, tools, std::vector<scene::ToolShape>(tools.size(), shape_));
+    held_.update(positions_, tools, std::vector<tool::ToolShape>(tools.size(), shape_));
   }
 
   std::vector<Vec3f> positions_ = sheet();
-  scene::ToolShape shape_{.radius_m = 0.004f, .length_m = 0.1f, .reach_m = 0.011f};
+  tool::ToolShape shape_{.radius_m = 0.004f, .length_m = 0.1f, .reach_m = 0.011f};
   HeldTissue held_;
 };
 
 TEST_F(HeldTissueTest, AGraspKeepsWhatItTookUntilItEnds) {
-  update({tool_of(4, scene::Verb::Grasp, {0, 0, 0})});
+  update({tool_of(4, tool::Verb::Grasp, {0, 0, 0})});
   EXPECT_EQ(count(2, true), 13);  // within 11 mm on a grid of 5 mm
   const auto before = held_.holdings();
   for (Vec3f& p : positions_) p += Vec3f{0, 0.03f, 0.04f};  // all of it is carried along
-  update({tool_of(4, scene::Verb::Grasp, {0, 0.03f, 0.04f})});
+  update({tool_of(4, tool::Verb::Grasp, {0, 0.03f, 0.04f})});
   EXPECT_EQ(held_.holdings(), before);
-  auto released = tool_of(4, scene::Verb::Grasp, {0, 0.03f, 0.04f});
+  auto released = tool_of(4, tool::Verb::Grasp, {0, 0.03f, 0.04f});
   released.has_claim = false;
   update({released});
   EXPECT_EQ(count(2, true), 0);
   // A new grasp takes what is there now.
-  update({tool_of(4, scene::Verb::Grasp, {0, 0.03f, 0.04f})});
+  update({tool_of(4, tool::Verb::Grasp, {0, 0.03f, 0.04f})});
   EXPECT_EQ(held_.holdings(), before);
 }
 
 TEST_F(HeldTissueTest, WhatComesOutOfTheJawsIsNotHeld) {
-  update({tool_of(4, scene::Verb::Grasp, {0, 0, 0})});
-  update({tool_of(4, scene::Verb::Grasp, {0.012f, 0, 0})});
+  update({tool_of(4, tool::Verb::Grasp, {0, 0, 0})});
+  update({tool_of(4, tool::Verb::Grasp, {0.012f, 0, 0})});
   EXPECT_GT(count(2, true), 0);
   EXPECT_LT(count(2, true), 13);
-  update({tool_of(4, scene::Verb::Grasp, {0.05f, 0, 0})});
+  update({tool_of(4, tool::Verb::Grasp, {0.05f, 0, 0})});
   EXPECT_EQ(count(2, true), 0);
 }
 
 TEST_F(HeldTissueTest, APushTouchesWhatLiesUnderItsSolidAndAGraspGoesFirst) {
-  update({tool_of(1, scene::Verb::Push, {0, 0.001f, 0})});
+  update({tool_of(1, tool::Verb::Push, {0, 0.001f, 0})});
   EXPECT_EQ(count(0, false), 5);
   shape_.half_width_m = 0.02f;  // flat, across x
-  update({tool_of(1, scene::Verb::Push, {0, 0.001f, 0})});
+  update({tool_of(1, tool::Verb::Push, {0, 0.001f, 0})});
   EXPECT_GT(count(0, false), 20);
   shape_.half_width_m = 0;
-  update(
-      {tool_of(1, scene::Verb::Push, {0, 0.001f, 0}), tool_of(4, scene::Verb::Grasp, {0, 0, 0})});
+  update({tool_of(1, tool::Verb::Push, {0, 0.001f, 0}), tool_of(4, tool::Verb::Grasp, {0, 0, 0})});
   EXPECT_EQ(count(0, false), 0);
   EXPECT_EQ(count(2, true), 13);
   update({});
@@ -82,9 +81,9 @@ TEST_F(HeldTissueTest, APushTouchesWhatLiesUnderItsSolidAndAGraspGoesFirst) {
 }
 
 TEST_F(HeldTissueTest, AnotherSurfaceForgetsWhatWasHeldOnTheOld) {
-  update({tool_of(4, scene::Verb::Grasp, {0, 0, 0})});
+  update({tool_of(4, tool::Verb::Grasp, {0, 0, 0})});
   positions_.resize(7);
-  update({tool_of(4, scene::Verb::Grasp, {0, 0, 0})});
+  update({tool_of(4, tool::Verb::Grasp, {0, 0, 0})});
   EXPECT_EQ(held_.holdings().size(), 7u);
   held_.clear();
   EXPECT_TRUE(held_.holdings().empty());

@@ -8,8 +8,8 @@
 #include <string>
 
 #include "common/base/timing.h"
-#include "common/scene/builtin_organs.h"
 #include "common/wire/surface_codec.h"
+#include "server/organs/catalogue/builtin_organs.h"
 #include "tests/client/synthetic_source.h"
 #include "tests/support/surface_edits.h"
 
@@ -107,7 +107,7 @@ class PictureTest : public ::testing::Test {
 
   static wire::SurfaceLayout liver() {
     static const wire::SurfaceLayout kLayout = [] {
-      auto organ = scene::make_liver();
+      auto organ = catalogue::make_liver();
       EXPECT_TRUE(organ.ok());
       return wire::make_surface_layout(*organ);
     }();

@@ -202,7 +202,7 @@ TEST_F(ReplicaTest, KeyframeMayGoBackInTime) {
 }
 
 TEST_F(ReplicaTest, ToolSamplesCarryPoseAndVerb) {
-  const scene::ToolSample sample{{{0.1f, -0.2f, 0.3f}, {0, 0.6f, 0, 0.8f}}, scene::Verb::Grasp};
+  const tool::ToolSample sample{{{0.1f, -0.2f, 0.3f}, {0, 0.6f, 0, 0.8f}}, tool::Verb::Grasp};
   ASSERT_TRUE(send_tool_sample(source_, 1, 7, sample));
   const auto& message = source_.sent.back().tool_sample();
   EXPECT_EQ(message.tool(), 1u);

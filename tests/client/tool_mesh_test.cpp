@@ -9,14 +9,14 @@ namespace trocar::render {
 namespace {
 
 // How far p is from the surface of the solid that the simulation uses for a blade.
-float off_surface(const Vec3f& p, const scene::ToolShape& shape) {
+float off_surface(const Vec3f& p, const tool::ToolShape& shape) {
   const Vec3f core{std::clamp(p.x, -shape.half_width_m, shape.half_width_m), 0,
                    std::clamp(p.z, shape.radius_m, shape.length_m - shape.radius_m)};
   return std::abs(length(p - core) - shape.radius_m);
 }
 
 TEST(ToolMesh, ABladeIsTheSolidOfTheSimulation) {
-  const scene::ToolShape shape{.radius_m = 0.002f, .length_m = 0.07f, .half_width_m = 0.016f};
+  const tool::ToolShape shape{.radius_m = 0.002f, .length_m = 0.07f, .half_width_m = 0.016f};
   const MeshVertices mesh = make_blade(shape, {});
   ASSERT_EQ(mesh.size() % 3, 0u);
   Vec3f low = mesh.front().position, high = low;

@@ -25,7 +25,7 @@ struct Press {
   bool has_dropped = false;
 };
 
-Vec3f highest_free_node(const scene::Organ& organ) {
+Vec3f highest_free_node(const organ::Organ& organ) {
   Vec3f top{0, -1, 0};
   for (const auto node : organ.mesh.surface_nodes) {
     const Vec3f p = to_float(organ.mesh.rest_positions[node.value]);
@@ -35,7 +35,7 @@ Vec3f highest_free_node(const scene::Organ& organ) {
   return top;
 }
 
-Press press(const scene::Organ& organ, Side side, float radius) {
+Press press(const organ::Organ& organ, Side side, float radius) {
   const float deepest = side == Side::Edge ? kEdge_m : kFlat_m;
   const Vec3f top = highest_free_node(organ);
   const float shaft = 0.04f;
@@ -62,7 +62,7 @@ Press press(const scene::Organ& organ, Side side, float radius) {
   return result;
 }
 
-void expect_steady_and_alike(const scene::Organ& organ, Side side) {
+void expect_steady_and_alike(const organ::Organ& organ, Side side) {
   const auto thin = press(organ, side, 0.002f), thick = press(organ, side, 0.004f);
   std::printf("2 mm: %.3f N, largest jump %.2f %%; 4 mm: %.3f N, %.2f %%\n", thin.mean_n,
               100 * thin.largest_jump_n / thin.mean_n, thick.mean_n,
@@ -77,19 +77,19 @@ void expect_steady_and_alike(const scene::Organ& organ, Side side) {
 }
 
 TEST(Blade, OnItsFlatSidePressesAsAThickerOne) {
-  expect_steady_and_alike(*scene::make_liver(), Side::Flat);
+  expect_steady_and_alike(*catalogue::make_liver(), Side::Flat);
 }
 
 TEST(Blade, OnItsEdgePressesAsAThickerOne) {
-  expect_steady_and_alike(*scene::make_liver(), Side::Edge);
+  expect_steady_and_alike(*catalogue::make_liver(), Side::Edge);
 }
 
 TEST(Blade, OnItsFlatSidePressesAsAThickerOneOnARefinedMesh) {
-  expect_steady_and_alike(*scene::make_liver(45'000), Side::Flat);
+  expect_steady_and_alike(*catalogue::make_liver(45'000), Side::Flat);
 }
 
 TEST(Blade, OnItsEdgePressesAsAThickerOneOnARefinedMesh) {
-  expect_steady_and_alike(*scene::make_liver(45'000), Side::Edge);
+  expect_steady_and_alike(*catalogue::make_liver(45'000), Side::Edge);
 }
 
 }  // namespace

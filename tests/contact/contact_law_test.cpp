@@ -1,6 +1,6 @@
 // The forces of one contact point, against their energy and Coulomb's law.
 
-#include "server/contact/contact_law.h"
+#include "server/tissue/contact/contact_law.h"
 
 #include <gtest/gtest.h>
 

@@ -14,7 +14,7 @@ constexpr double kGravity = 9.81;
 // A free block on a flat, horizontal tool; gravity is inclined instead. Returns how fast it slides
 // after a second, m/s, along the incline.
 double speed_on_incline(float friction, double slope) {
-  auto organ = block(5, 3, 5, 0.010, [&](scene::Organ& o) {
+  auto organ = block(5, 3, 5, 0.010, [&](organ::Organ& o) {
     o.fixed_nodes.clear();
     o.material.young_modulus_pa = 60'000;
     o.material.node_damping_per_s = 0;
@@ -122,7 +122,7 @@ Momenta momenta_of(const world::World& world) {
 // What the tool gives is what the block gets: the sums of the forces and torques felt over time are
 // its momenta, with a push beside its centre that sets it spinning.
 TEST(Reaction, OfAnOffAxisPushIsAllTheMomentumThatAFreeBlockGets) {
-  auto organ = block(5, 3, 5, 0.010, [](scene::Organ& o) {
+  auto organ = block(5, 3, 5, 0.010, [](organ::Organ& o) {
     o.fixed_nodes.clear();
     o.material.young_modulus_pa = 20'000;
     o.material.node_damping_per_s = 0;
@@ -177,7 +177,7 @@ TEST(Rest, AHeldContactGainsNoEnergyAndItsForceStaysForAMinute) {
 }
 
 TEST(ThinWall, PressingFromEitherSideIsTheSame) {
-  auto organ = scene::make_plate();
+  auto organ = catalogue::make_plate();
   const auto press = [&](float side) {
     HandScene scene(organ);
     scene.join(0, {.radius_m = 0.010f, .length_m = 0.1f, .friction = 0});

@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "common/base/assert.h"
-#include "common/scene/organ.h"
-#include "common/scene/scenario_block.h"
-#include "server/world/world.h"
+#include "server/lab/scenario/scenario_block.h"
+#include "server/organs/organ/organ.h"
+#include "server/tissue/world/world.h"
 
 namespace trocar::contact::testing {
 
@@ -28,10 +28,10 @@ struct Flaps {
   double half_gap_m() const { return gap / 2.0 * spacing_m; }
 };
 
-inline scene::Organ make_flaps(const Flaps& f) {
-  const scene::LatticeSize size{f.length + 1, 2 * f.thickness + f.gap + 1, f.width + 1,
-                                f.spacing_m};
-  auto organ = scene::make_block(size);
+inline organ::Organ make_flaps(const Flaps& f) {
+  const catalogue::LatticeSize size{f.length + 1, 2 * f.thickness + f.gap + 1, f.width + 1,
+                                    f.spacing_m};
+  auto organ = scenario::make_block(size);
   TROCAR_ASSERT(organ.ok());
   const auto in_gap = [&](int i, int j) {
     return i >= f.hinge && j >= f.thickness && j < f.thickness + f.gap;
@@ -61,13 +61,13 @@ inline scene::Organ make_flaps(const Flaps& f) {
   }
   kept.build_adjacency();
   organ->mesh = std::move(kept);
-  organ->material.elastic_law = scene::ElasticLaw::NeoHookean;
+  organ->material.elastic_law = material::ElasticLaw::NeoHookean;
   organ->material.young_modulus_pa = 4000;
   organ->material.poisson_ratio = 0.4;
   organ->material.node_damping_per_s = f.damping_per_s;
   organ->fixed_nodes.clear();
   organ->gravity_m_s2 = {};
-  organ->node_masses_kg = scene::lumped_masses(*organ);
+  organ->node_masses_kg = organ::lumped_masses(*organ);
   return *organ;
 }
 
@@ -88,7 +88,7 @@ inline double distance_to_triangle(const Vec3d& p, const Vec3d& a, const Vec3d& 
 
 // How far a node of the surface is inside a tet that is not its own or a neighbour's: the deepest.
 // Brute force over everything.
-inline double deepest_inside(const scene::Organ& organ, const world::World& world) {
+inline double deepest_inside(const organ::Organ& organ, const world::World& world) {
   const auto& mesh = organ.mesh;
   const auto at = [&](NodeIndex node) {
     return mesh.rest_positions[node.value] + to_double(world.displacements[node.value]);

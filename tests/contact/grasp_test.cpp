@@ -7,8 +7,8 @@
 namespace trocar::contact::testing {
 namespace {
 
-using locks::ClaimPhase;
-using scene::Verb;
+using hands::ClaimPhase;
+using tool::Verb;
 
 struct Pulled {
   float most_n = 0;       // greatest force on the tool
@@ -33,8 +33,8 @@ Pulled pull(float grip_n, HandScene& scene, float top) {
   return result;
 }
 
-scene::Organ stiff_block() {
-  return block(6, 4, 6, 0.008, [](scene::Organ& o) { o.material.young_modulus_pa = 40'000; });
+organ::Organ stiff_block() {
+  return block(6, 4, 6, 0.008, [](organ::Organ& o) { o.material.young_modulus_pa = 40'000; });
 }
 
 TEST(Grasp, TissuePulledHarderThanTheGripSlipsOutAndIsNotTakenAgain) {

@@ -10,7 +10,7 @@ namespace {
 
 using trocar::testing::Random;
 
-using scene::Verb;
+using tool::Verb;
 
 class SecondHand : public ::testing::Test {
  protected:
@@ -34,7 +34,7 @@ class SecondHand : public ::testing::Test {
     return most;
   }
 
-  scene::Organ organ;
+  organ::Organ organ;
   float top;
   HandScene scene;
   const Pose held = upright({-0.035f, top_of(organ) - 0.003f, 0.002f});

@@ -1,6 +1,6 @@
 // The grid against looking at every point.
 
-#include "server/contact/point_grid.h"
+#include "server/tissue/contact/point_grid.h"
 
 #include <gtest/gtest.h>
 

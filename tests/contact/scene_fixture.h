@@ -6,26 +6,26 @@
 #include <array>
 #include <functional>
 
-#include "common/scene/builtin_organs.h"
-#include "common/scene/scenario_block.h"
-#include "server/step/simulation.h"
+#include "server/lab/scenario/scenario_block.h"
+#include "server/organs/catalogue/builtin_organs.h"
+#include "server/tissue/step/simulation.h"
 
 namespace trocar::contact::testing {
 
 // A block of neo-Hookean tets, lowest layer fixed; size in nodes, spacing in m. Its top is at
 // (ny - 1) / 2 spacings.
-inline scene::Organ block(int nx, int ny, int nz, double spacing_m,
-                          const std::function<void(scene::Organ&)>& change = {}) {
-  auto organ = scene::make_block({.nx = nx, .ny = ny, .nz = nz, .spacing_m = spacing_m});
+inline organ::Organ block(int nx, int ny, int nz, double spacing_m,
+                          const std::function<void(organ::Organ&)>& change = {}) {
+  auto organ = scenario::make_block({.nx = nx, .ny = ny, .nz = nz, .spacing_m = spacing_m});
   TROCAR_ASSERT(organ.ok());
-  organ->material.elastic_law = scene::ElasticLaw::NeoHookean;
+  organ->material.elastic_law = material::ElasticLaw::NeoHookean;
   organ->material.poisson_ratio = 0.3;
   if (change) change(*organ);
-  organ->node_masses_kg = scene::lumped_masses(*organ);
+  organ->node_masses_kg = organ::lumped_masses(*organ);
   return *organ;
 }
 
-inline float top_of(const scene::Organ& organ) {
+inline float top_of(const organ::Organ& organ) {
   double top = -1;
   for (const auto& p : organ.mesh.rest_positions) top = std::max(top, p.y);
   return static_cast<float>(top);
@@ -40,14 +40,14 @@ inline constexpr std::array<std::uint8_t, 2> kHands{0, 1};
 
 class HandScene {
  public:
-  explicit HandScene(scene::Organ organ) : simulation(std::move(organ)) {}
+  explicit HandScene(organ::Organ organ) : simulation(std::move(organ)) {}
 
-  void join(std::uint8_t hand, const scene::ToolShape& shape) {
-    session::HandJoin join{.slot = {hand}};
+  void join(std::uint8_t hand, const tool::ToolShape& shape) {
+    hands::HandJoin join{.slot = {hand}};
     join.shapes[0] = shape;
     inputs_.joins.push_back(join);
   }
-  void put(std::uint8_t hand, const Pose& pose, scene::Verb verb = scene::Verb::Push) {
+  void put(std::uint8_t hand, const Pose& pose, tool::Verb verb = tool::Verb::Push) {
     inputs_.samples.push_back({tool_slot({hand}, 0), {pose, verb}});
   }
   const step::TickReport& tick() {
@@ -59,7 +59,7 @@ class HandScene {
     for (int i = 0; i < count; ++i) tick();
   }
   // Holds a hand there as long as a script does: a sample every 8 ticks.
-  void hold(std::uint8_t hand, const Pose& pose, int count, scene::Verb verb = scene::Verb::Push) {
+  void hold(std::uint8_t hand, const Pose& pose, int count, tool::Verb verb = tool::Verb::Push) {
     for (int i = 0; i < count; ++i) {
       if (i % 8 == 0) put(hand, pose, verb);
       tick();
@@ -82,7 +82,7 @@ class HandScene {
   step::TickDecisions decisions;
 
  private:
-  session::TickInputs inputs_;
+  hands::TickInputs inputs_;
 };
 
 }  // namespace trocar::contact::testing

@@ -1,6 +1,6 @@
 // Tissue against tissue of the same organ.
 
-#include "server/contact/self_contact.h"
+#include "server/tissue/contact/self_contact.h"
 
 #include <gtest/gtest.h>
 
@@ -8,8 +8,8 @@
 #include <cmath>
 
 #include "common/base/bytes.h"
-#include "server/contact/contact_law.h"
-#include "server/dynamics/block_descent.h"
+#include "server/tissue/contact/contact_law.h"
+#include "server/tissue/dynamics/block_descent.h"
 #include "tests/contact/folded_organ.h"
 #include "tests/contact/scene_fixture.h"
 
@@ -18,7 +18,7 @@ namespace {
 
 // An organ and the solver alone, so that a test can start with any velocity.
 struct Bodies {
-  explicit Bodies(scene::Organ o)
+  explicit Bodies(organ::Organ o)
       : organ(std::move(o)), world(organ), solver(organ, world), finder(organ) {
     for (std::uint32_t i = 0; i < world.node_count(); ++i)
       if (world.node_classes[i] != world::NodeClass::Fixed) near.push_back(NodeIndex(i));
@@ -69,7 +69,7 @@ struct Bodies {
     return upper / uppers - lower / lowers;
   }
 
-  scene::Organ organ;
+  organ::Organ organ;
   world::World world;
   dynamics::BlockDescent solver;
   SelfContactFinder finder;
@@ -179,8 +179,8 @@ TEST(Points, AddNothingToTheWhole) {
 }
 
 TEST(Rest, BuiltInOrgansDoNotTouchThemselves) {
-  const scene::Organ organs[] = {*scene::make_liver(), *scene::make_stomach(),
-                                 scene::make_lattice(), scene::make_plate()};
+  const organ::Organ organs[] = {*catalogue::make_liver(), *catalogue::make_stomach(),
+                                 catalogue::make_lattice(), catalogue::make_plate()};
   for (const auto& organ : organs) {
     world::World world(organ);
     SelfContactFinder finder(organ);
@@ -228,11 +228,11 @@ class Squeezed {
   }
   // Both tools, `closed_m` in from where they touch.
   void step(double closed_m) {
-    session::TickInputs inputs;
+    hands::TickInputs inputs;
     const Tick tick = simulation->current_tick() + 1;
     for (std::uint8_t hand = 0; hand < 2; ++hand) {
       if (tick == 1) {
-        session::HandJoin join{.slot = {hand}};
+        hands::HandJoin join{.slot = {hand}};
         join.shapes[0] = {
             .radius_m = kRadius, .length_m = 0.2f, .half_width_m = 0.03f, .friction = 0.6f};
         inputs.joins.push_back(join);
@@ -241,9 +241,8 @@ class Squeezed {
       const float side = hand == 0 ? 1.0f : -1.0f;
       const float y =
           side * static_cast<float>(flaps_.half_height_m() + 0.0005 + kRadius - closed_m);
-      inputs.samples.push_back(
-          {tool_slot({hand}, 0),
-           {{{-0.002f, y, 0}, rotation_from_z({1, 0, 0})}, scene::Verb::Push}});
+      inputs.samples.push_back({tool_slot({hand}, 0),
+                                {{{-0.002f, y, 0}, rotation_from_z({1, 0, 0})}, tool::Verb::Push}});
     }
     simulation->tick(inputs, decisions);
   }

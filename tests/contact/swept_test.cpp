@@ -14,7 +14,7 @@ namespace {
 using trocar::testing::Random;
 
 // Independent of how contact works: whether a point lies in a deformed tet.
-bool is_in_tissue(const scene::Organ& organ, const world::World& world, const Vec3f& p) {
+bool is_in_tissue(const organ::Organ& organ, const world::World& world, const Vec3f& p) {
   for (const auto& tet : organ.mesh.tets) {
     const Vec3f a = world.position(tet[0]);
     if (length_squared(a - p) > 0.0016f) continue;  // no tet here is 40 mm long
@@ -32,7 +32,7 @@ bool is_in_tissue(const scene::Organ& organ, const world::World& world, const Ve
 
 // A sheet 1 mm thick, held at its rim, hit at 1 m/s.
 TEST(Swept, AToolAtOneMetrePerSecondDoesNotPassAOneMillimetreWall) {
-  auto organ = block(15, 2, 15, 0.001, [](scene::Organ& o) {
+  auto organ = block(15, 2, 15, 0.001, [](organ::Organ& o) {
     o.fixed_nodes.clear();
     for (std::uint32_t n = 0; n < o.mesh.node_count(); ++n) {
       const auto& p = o.mesh.rest_positions[n];
@@ -66,7 +66,7 @@ TEST(Swept, AToolAtOneMetrePerSecondDoesNotPassAOneMillimetreWall) {
 // Random straight motions at 0.2 to 3 m/s across a hollow stomach, 60 mm long. Twenty share an
 // organ: `first` is a multiple of that. How many have touched.
 int sweep_across_stomach(int first, int motions) {
-  const auto organ = *scene::make_stomach();
+  const auto organ = *catalogue::make_stomach();
   int inside = 0, touched = 0;
   std::size_t checked = 0;
   std::unique_ptr<HandScene> scene;
@@ -88,7 +88,7 @@ int sweep_across_stomach(int first, int motions) {
     const float speed = 0.0002f + 0.0028f * static_cast<float>(random.unit());  // m per tick
     const Quatf turned = rotation_from_z(normalized(Vec3f{unit(), unit(), unit()}, {0, 1, 0}));
     // Appears there: from inside it would be let through until it is out.
-    scene->put(0, {begin, turned}, scene::Verb::None);
+    scene->put(0, {begin, turned}, tool::Verb::None);
     scene->ticks(12);
     const ToolSolid solid({begin, turned}, {.radius_m = 0.004f, .length_m = 0.03f});
     bool starts_inside = false;

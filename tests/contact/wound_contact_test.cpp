@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "common/base/bytes.h"
-#include "server/contact/contact_law.h"
+#include "server/tissue/contact/contact_law.h"
 #include "tests/contact/folded_organ.h"
 #include "tests/contact/scene_fixture.h"
 
@@ -13,8 +13,8 @@ namespace trocar::contact::testing {
 namespace {
 
 // 40 x 24 x 24 mm, held at the bottom; stiff contact beside soft tissue.
-scene::Organ cube() {
-  return block(11, 7, 7, 0.004, [](scene::Organ& o) {
+organ::Organ cube() {
+  return block(11, 7, 7, 0.004, [](organ::Organ& o) {
     o.material.young_modulus_pa = 6000;
     o.material.node_damping_per_s = 20;
     o.gravity_m_s2 = {};
@@ -84,15 +84,15 @@ void cut_across(HandScene& scene, float tip_y, float x = 0.0007f) {
   scene.join(0, {.radius_m = 0.001f, .length_m = 0.2f, .edge_m = 0.06f});
   for (int i = 0; i <= 360; ++i) {
     const Vec3f tip{x, tip_y, -0.018f + 1e-4f * static_cast<float>(i)};
-    if (i % 4 == 0) scene.put(0, upright(tip), scene::Verb::Cut);
+    if (i % 4 == 0) scene.put(0, upright(tip), tool::Verb::Cut);
     scene.tick();
     EXPECT_LT(pressed_n(scene), 1e-4) << "the cut itself presses nothing, tick " << i;
   }
-  scene.put(0, upright({0, 0.3f, 0}), scene::Verb::None);
+  scene.put(0, upright({0, 0.3f, 0}), tool::Verb::None);
   scene.tick();
 }
 
-constexpr scene::ToolShape kPlate{
+constexpr tool::ToolShape kPlate{
     .radius_m = 0.003f, .length_m = 0.04f, .half_width_m = 0.02f, .friction = 0.3f};
 
 // Shaft up, its width along z.
@@ -148,7 +148,7 @@ void drive_cut_under_pressure(HandScene& scene, int tick) {
     const float z = -0.018f + 1e-4f * (t - 300);
     const bool is_out = tick > 660;
     scene.put(0, upright({0.0007f, is_out ? 0.3f : -0.009f, z}),
-              is_out ? scene::Verb::None : scene::Verb::Cut);
+              is_out ? tool::Verb::None : tool::Verb::Cut);
   }
   scene.tick();
 }
@@ -201,12 +201,12 @@ TEST(Lips, DrawnApartTheyMeetAgain) {
   cut_across(scene, -0.009f);
   scene.join(1, {.radius_m = 0.003f, .length_m = 0.1f, .reach_m = 0.007f});
   const Vec3f at{0.008f, 0.0125f, 0};
-  scene.put(1, upright(at), scene::Verb::None);
+  scene.put(1, upright(at), tool::Verb::None);
   scene.ticks(10);
   double open = 0;
   for (int i = 0; i <= 300; ++i) {
     const float t = static_cast<float>(i) / 300;
-    scene.put(1, upright(at + Vec3f{0.012f, 0.004f, 0.005f} * t), scene::Verb::Grasp);
+    scene.put(1, upright(at + Vec3f{0.012f, 0.004f, 0.005f} * t), tool::Verb::Grasp);
     scene.tick();
     if (i % 60 == 59) expect_restorable(scene);
   }
@@ -214,7 +214,7 @@ TEST(Lips, DrawnApartTheyMeetAgain) {
     open = std::max(open, static_cast<double>(length(scene.world().displacements[node.value])));
   EXPECT_GT(open, 0.008) << "drawn open";
   EXPECT_EQ(pressed_n(scene), 0);
-  scene.put(1, upright({0, 0.3f, 0}), scene::Verb::None);
+  scene.put(1, upright({0, 0.3f, 0}), tool::Verb::None);
   double most = 0, deepest = 0;
   for (int i = 0; i < 400; ++i) {
     scene.tick();
@@ -237,10 +237,10 @@ class Piece : public ::testing::Test {
     scene.join(0, {.radius_m = 0.001f, .length_m = 0.2f, .edge_m = 0.06f});
     for (int i = 0; i <= 360; ++i) {
       const Vec3f tip{-0.03f, 0.0017f, -0.018f + 1e-4f * static_cast<float>(i)};
-      if (i % 4 == 0) scene.put(0, {tip, rotation_from_z({1, 0, 0})}, scene::Verb::Cut);
+      if (i % 4 == 0) scene.put(0, {tip, rotation_from_z({1, 0, 0})}, tool::Verb::Cut);
       scene.tick();
     }
-    scene.put(0, upright({0, 0.3f, 0}), scene::Verb::None);
+    scene.put(0, upright({0, 0.3f, 0}), tool::Verb::None);
     scene.tick();
   }
   // Of nodes that were above the cut.

@@ -1,6 +1,6 @@
 // What a tick costs, learnt from ticks: level, slope, and what spikes may not do to either.
 
-#include "server/control/cost_model.h"
+#include "server/session/control/cost_model.h"
 
 #include <gtest/gtest.h>
 

@@ -8,15 +8,15 @@
 #include <cstdio>
 #include <utility>
 
-#include "common/scene/builtin_organs.h"
-#include "server/control/rate_controller.h"
-#include "server/step/simulation.h"
+#include "server/organs/catalogue/builtin_organs.h"
+#include "server/session/control/rate_controller.h"
+#include "server/tissue/step/simulation.h"
 
 namespace trocar::control {
 namespace {
 
 struct Case {
-  scene::ElasticLaw law = scene::ElasticLaw::Springs;
+  material::ElasticLaw law = material::ElasticLaw::Springs;
   bool is_moving = false;
   world::Boundary boundary = world::Boundary::Graded;
 };
@@ -30,18 +30,18 @@ std::uint64_t work_ns(Tick tick) {
 
 // A simulation with one tool.
 struct Pressed {
-  explicit Pressed(const scene::Organ& organ) : simulation(organ) {}
+  explicit Pressed(const organ::Organ& organ) : simulation(organ) {}
 
   void tick(const Vec3f& tip, const step::TickDecisions& decisions) {
-    session::TickInputs inputs;
+    hands::TickInputs inputs;
     if (simulation.current_tick() == 0) {
-      session::HandJoin join{.slot = {0}};
+      hands::HandJoin join{.slot = {0}};
       join.shapes[0] = {.radius_m = 0.03f, .length_m = 0.2f, .reach_m = 0.008f};
       inputs.joins.push_back(join);
     }
     // Every tick: a tool that stands still between samples steps by itself.
     inputs.samples.push_back(
-        {tool_slot({0}, 0), {{tip, rotation_from_z({0, 1, 0})}, scene::Verb::Push}});
+        {tool_slot({0}, 0), {{tip, rotation_from_z({0, 1, 0})}, tool::Verb::Push}});
     simulation.tick(inputs, decisions);
     const auto& contacts = simulation.context().contacts;
     force_n = contacts.tools.empty()
@@ -80,7 +80,7 @@ class ForceUnderControl : public ::testing::TestWithParam<Case> {};
 // force's change. (Over a longer time a moving tool meets nodes a tick earlier or later in one of
 // the two, which is no step that anybody decided.)
 TEST_P(ForceUnderControl, DoesNotStep) {
-  auto organ = *scene::make_liver(6000);
+  auto organ = *catalogue::make_liver(6000);
   organ.material.elastic_law = GetParam().law;
   Pressed pressed(organ), copy(organ);
   const Vec3f over = top_of(pressed.simulation.state().world);
@@ -149,11 +149,12 @@ TEST_P(ForceUnderControl, DoesNotStep) {
 
 INSTANTIATE_TEST_SUITE_P(
     Tissue, ForceUnderControl,
-    ::testing::Values(Case{scene::ElasticLaw::Springs}, Case{scene::ElasticLaw::Springs, true},
-                      Case{scene::ElasticLaw::NeoHookean},
-                      Case{scene::ElasticLaw::NeoHookean, true},
-                      Case{scene::ElasticLaw::Springs, true, world::Boundary::Frozen},
-                      Case{scene::ElasticLaw::NeoHookean, true, world::Boundary::Frozen}));
+    ::testing::Values(Case{material::ElasticLaw::Springs},
+                      Case{material::ElasticLaw::Springs, true},
+                      Case{material::ElasticLaw::NeoHookean},
+                      Case{material::ElasticLaw::NeoHookean, true},
+                      Case{material::ElasticLaw::Springs, true, world::Boundary::Frozen},
+                      Case{material::ElasticLaw::NeoHookean, true, world::Boundary::Frozen}));
 
 }  // namespace
 }  // namespace trocar::control

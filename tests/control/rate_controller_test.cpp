@@ -1,13 +1,13 @@
 // The controller on a virtual clock with injected costs: what is kept, what is given up in which
 // order, and that it neither oscillates nor forgets to come back.
 
-#include "server/control/rate_controller.h"
+#include "server/session/control/rate_controller.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
-#include "server/step/simulation.h"
+#include "server/tissue/step/simulation.h"
 #include "tests/control/virtual_machine.h"
 
 namespace trocar::control {

@@ -8,12 +8,12 @@
 #include <thread>
 
 #include "common/journal/session_journal.h"
-#include "common/scene/builtin_organs.h"
 #include "proto/journal.pb.h"
 #include "proto/wire.pb.h"
 #include "server/app/simulation_loop.h"
-#include "server/recording/tick_records.h"
-#include "server/recording/verify.h"
+#include "server/organs/catalogue/builtin_organs.h"
+#include "server/session/recording/tick_records.h"
+#include "server/session/recording/verify.h"
 #include "tests/e2e/programs.h"
 #include "tests/network/session_fixture.h"
 
@@ -122,7 +122,7 @@ TEST(ControlledSession, WhatWasDecidedIsRecordedShownAndSimulatesAgain) {
 // every step down and up is in the journal.
 TEST(ControlledSession, EveryStepDownAndUpIsRecordedAndSimulatesAgain) {
   const auto file = e2e::test_folder() / "steps.mcap";
-  const auto organ = *scene::make_liver(1500);
+  const auto organ = *catalogue::make_liver(1500);
   step::Simulation simulation(organ);
   Vec3f top;
   for (const auto node : simulation.state().world.surface_nodes)
@@ -130,7 +130,7 @@ TEST(ControlledSession, EveryStepDownAndUpIsRecordedAndSimulatesAgain) {
       top = simulation.state().world.rest_positions[node.value];
   auto journal = app::open_journal(file.string(), organ, simulation.layout());
   ASSERT_TRUE(journal.ok());
-  session::SimulationInbox inbox;
+  participants::SimulationInbox inbox;
   app::FrameHandover handover([] {});
   std::uint64_t now_ns = 0, calls = 0;
   const auto clock_ns = [&] {
@@ -141,9 +141,9 @@ TEST(ControlledSession, EveryStepDownAndUpIsRecordedAndSimulatesAgain) {
                            {.rate = RateLimits{}, .tick_count = 2000, .clock_ns = clock_ns}, [] {});
   ASSERT_TRUE(inbox.try_push_join({{0}, 1, {}}));
   for (bool is_last = false; !is_last;) {
-    session::ToolInput input{{0}, {}};
+    hands::ToolInput input{{0}, {}};
     input.sample.world_from_tool = {top - Vec3f{0, 0.004f, 0}, rotation_from_z({0, 1, 0})};
-    input.sample.verb = scene::Verb::Push;
+    input.sample.verb = tool::Verb::Push;
     inbox.push_sample(input);
     is_last = loop.run_tick();
   }

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/scene/builtin_organs.h"
-#include "server/step/simulation.h"
+#include "server/organs/catalogue/builtin_organs.h"
+#include "server/tissue/step/simulation.h"
 
 namespace trocar::step {
 namespace {
@@ -14,7 +14,7 @@ namespace {
 // A tool that presses into the top of a liver and leaves it again after `release`.
 class Press {
  public:
-  explicit Press(scene::ElasticLaw law, unsigned workers = 1, Tick release = 700)
+  explicit Press(material::ElasticLaw law, unsigned workers = 1, Tick release = 700)
       : simulation_(organ_of(law), workers), release_(release) {
     const auto& world = simulation_.state().world;
     for (const auto node : world.surface_nodes)
@@ -23,9 +23,9 @@ class Press {
 
   const TickReport& tick(const TickDecisions& decisions) {
     const Tick tick = simulation_.current_tick() + 1;
-    session::TickInputs inputs;
+    hands::TickInputs inputs;
     if (tick == 1) {
-      session::HandJoin join{.slot = {0}};
+      hands::HandJoin join{.slot = {0}};
       join.shapes[0] = {.radius_m = 0.03f, .length_m = 0.2f, .reach_m = 0.008f};
       inputs.joins.push_back(join);
     }
@@ -34,7 +34,7 @@ class Press {
     if (tick % 8 == 1)
       inputs.samples.push_back(
           {tool_slot({0}, 0),
-           {{top_ - Vec3f{0, depth, 0}, rotation_from_z({0, 1, 0})}, scene::Verb::Push}});
+           {{top_ - Vec3f{0, depth, 0}, rotation_from_z({0, 1, 0})}, tool::Verb::Push}});
     return simulation_.tick(inputs, decisions);
   }
   double kinetic_energy_j() const {
@@ -48,8 +48,8 @@ class Press {
   const Simulation& simulation() const { return simulation_; }
 
  private:
-  static scene::Organ organ_of(scene::ElasticLaw law) {
-    auto organ = *scene::make_liver(3000);
+  static organ::Organ organ_of(material::ElasticLaw law) {
+    auto organ = *catalogue::make_liver(3000);
     organ.material.elastic_law = law;
     return organ;
   }
@@ -68,13 +68,13 @@ TickDecisions with_layers(std::uint32_t touched, std::uint32_t one, std::uint32_
 }
 
 TEST(SweepsPerLayer, EqualOnesAreThoseOfBefore) {
-  Press plain(scene::ElasticLaw::NeoHookean), equal(scene::ElasticLaw::NeoHookean);
+  Press plain(material::ElasticLaw::NeoHookean), equal(material::ElasticLaw::NeoHookean);
   for (int i = 0; i < 400; ++i)
     ASSERT_EQ(plain.tick({}).state_hash, equal.tick(with_layers(4, 4, 4, 4)).state_hash);
 }
 
 TEST(SweepsPerLayer, AreWhatTheReportCounts) {
-  Press press(scene::ElasticLaw::Springs);
+  Press press(material::ElasticLaw::Springs);
   const auto free = static_cast<std::uint64_t>(
       std::ranges::count_if(press.simulation().state().world.node_classes,
                             [](auto node_class) { return node_class != world::NodeClass::Fixed; }));
@@ -99,7 +99,7 @@ TEST(SweepsPerLayer, AreWhatTheReportCounts) {
 }
 
 TEST(SweepsPerLayer, DoNotDependOnTheNumberOfWorkers) {
-  Press one(scene::ElasticLaw::NeoHookean, 1), two(scene::ElasticLaw::NeoHookean, 2);
+  Press one(material::ElasticLaw::NeoHookean, 1), two(material::ElasticLaw::NeoHookean, 2);
   for (int i = 0; i < 300; ++i)
     ASSERT_EQ(one.tick(with_layers(4, 3, 2, 1)).state_hash,
               two.tick(with_layers(4, 3, 2, 1)).state_hash);
@@ -108,7 +108,7 @@ TEST(SweepsPerLayer, DoNotDependOnTheNumberOfWorkers) {
 // Nothing the controller may choose makes the tissue ring: what a press leaves dies away as it does
 // with all sweeps, within a factor.
 TEST(SweepsPerLayer, AreStable) {
-  for (const auto law : {scene::ElasticLaw::Springs, scene::ElasticLaw::NeoHookean}) {
+  for (const auto law : {material::ElasticLaw::Springs, material::ElasticLaw::NeoHookean}) {
     double usual = 0;
     for (const auto& decisions :
          {with_layers(4, 4, 4, 4), with_layers(4, 1, 1, 1), with_layers(2, 1, 1, 1)}) {
@@ -129,7 +129,7 @@ TEST(SweepsPerLayer, AreStable) {
 
 TEST(SweepsPerLayer, WhateverTheNodeLimitTouchedNodesAreInTheQueue) {
   for (const auto boundary : {world::Boundary::Graded, world::Boundary::Frozen}) {
-    Press press(scene::ElasticLaw::NeoHookean);
+    Press press(material::ElasticLaw::NeoHookean);
     TickDecisions decisions{.node_limit = 1, .sweeps = 2, .boundary = boundary};
     decisions.layer_sweeps = {1, 1, 1};
     std::uint32_t most = 0;

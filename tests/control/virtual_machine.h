@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "server/app/pacer.h"
-#include "server/control/rate_controller.h"
+#include "server/session/control/rate_controller.h"
 
 namespace trocar::control::testing {
 

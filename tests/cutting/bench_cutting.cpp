@@ -8,8 +8,8 @@
 #include <cstdio>
 
 #include "common/base/timing.h"
-#include "common/scene/load_organ.h"
-#include "server/cutting/event_codec.h"
+#include "server/organs/catalogue/load_organ.h"
+#include "server/tissue/cutting/event_codec.h"
 #include "tests/cutting/random_strokes.h"
 
 namespace trocar::cutting::testing {
@@ -52,7 +52,7 @@ class Bench {
  public:
   explicit Bench(const Options& options)
       : options_(options),
-        organ_(*scene::load_organ(options.organ)),
+        organ_(*catalogue::load_organ(options.organ)),
         topology_(organ_),
         cutter_(topology_, options.settings),
         random_(options.seed) {}
@@ -130,7 +130,7 @@ class Bench {
   }
 
   const Options options_;
-  const scene::Organ organ_;
+  const organ::Organ organ_;
   dynamics::Topology topology_;
   Cutter cutter_;
   trocar::testing::Random random_;

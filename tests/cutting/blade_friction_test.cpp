@@ -1,6 +1,6 @@
 // How much of a blade tissue lies against.
 
-#include "server/cutting/blade_friction.h"
+#include "server/tissue/cutting/blade_friction.h"
 
 #include <gtest/gtest.h>
 
@@ -12,7 +12,7 @@ namespace {
 constexpr double kTau_pa = 1500, kNear_m = 0.0005;
 
 // 4 cm wide, from -2 to 2 cm.
-scene::Organ box(double jitter = 0.2) {
+organ::Organ box(double jitter = 0.2) {
   auto organ = box_organ(4, 4, 4, 0.01, jitter);
   organ.material.blade_friction_pa = kTau_pa;
   return organ;

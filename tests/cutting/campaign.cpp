@@ -5,7 +5,7 @@
 #include <numeric>
 
 #include "common/base/timing.h"
-#include "server/cutting/event_codec.h"
+#include "server/tissue/cutting/event_codec.h"
 #include "tests/cutting/swept_surface.h"
 
 namespace trocar::cutting::testing {
@@ -98,7 +98,7 @@ std::uint32_t series_length(std::uint64_t number, const CampaignOptions& options
   return options.shortest + random.below(options.longest - options.shortest + 1);
 }
 
-Series::Series(const scene::Organ& organ, std::string name, std::uint64_t number,
+Series::Series(const organ::Organ& organ, std::string name, std::uint64_t number,
                const CampaignOptions& options)
     : name_(std::move(name)),
       number_(number),

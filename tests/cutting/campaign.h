@@ -57,7 +57,7 @@ struct CampaignOptions {
 
 class Series {
  public:
-  Series(const scene::Organ& organ, std::string name, std::uint64_t number,
+  Series(const organ::Organ& organ, std::string name, std::uint64_t number,
          const CampaignOptions& options);
 
   std::uint32_t length() const { return length_; }

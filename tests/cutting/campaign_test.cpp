@@ -6,14 +6,14 @@
 #include <cmath>
 #include <fstream>
 
-#include "common/scene/load_organ.h"
+#include "server/organs/catalogue/load_organ.h"
 #include "tests/cutting/campaign_table.h"
 #include "tests/support/shared.h"
 
 namespace trocar::cutting::testing {
 namespace {
 
-void run(const scene::Organ& organ, const std::string& name, std::uint64_t number,
+void run(const organ::Organ& organ, const std::string& name, std::uint64_t number,
          const CampaignOptions& options, CampaignTable& table) {
   Series series(organ, name, number, options);
   while (!series.is_over()) {
@@ -23,7 +23,7 @@ void run(const scene::Organ& organ, const std::string& name, std::uint64_t numbe
   }
 }
 
-void run_short(const scene::Organ& organ, const std::string& name) {
+void run_short(const organ::Organ& organ, const std::string& name) {
   CampaignTable table;
   CampaignOptions options;
   options.longest = 30;
@@ -44,7 +44,7 @@ TEST(ShortCampaign, LawsHoldInASlab) {
 TEST(ShortCampaign, LawsHoldInALiver) {
   TROCAR_SKIP_WITHOUT_SHARED("organs/liver_tiny.msh");
   const auto path = trocar::testing::shared_folder() / "organs/liver_tiny.msh";
-  run_short(*scene::load_organ(path.string()), "liver");
+  run_short(*catalogue::load_organ(path.string()), "liver");
 }
 
 TEST(ShortCampaign, ASeriesCanBeDoneAgainAndReadBack) {

@@ -13,7 +13,7 @@
 #include <fstream>
 
 #include "common/base/timing.h"
-#include "common/scene/load_organ.h"
+#include "server/organs/catalogue/load_organ.h"
 #include "tests/cutting/campaign_table.h"
 
 namespace trocar::cutting::testing {
@@ -34,11 +34,11 @@ struct Options {
   std::exit(code);
 }
 
-scene::Organ load(const std::string& spec) {
+organ::Organ load(const std::string& spec) {
   if (spec == "box") return box_organ(12, 12, 12, 0.005);
   if (spec == "regular") return box_organ(12, 12, 12, 0.005, 0);
   if (spec == "slab") return box_organ(24, 2, 24, 0.004);
-  auto organ = scene::load_organ(spec);
+  auto organ = catalogue::load_organ(spec);
   if (!organ) fail(3, organ.error().message);
   return *organ;
 }
@@ -98,7 +98,7 @@ class Campaign {
     }
   }
 
-  void run(const scene::Organ& organ, const std::string& name, std::uint64_t number) {
+  void run(const organ::Organ& organ, const std::string& name, std::uint64_t number) {
     Series series(organ, name, number, options_.campaign);
     std::string lines;
     while (!series.is_over()) {

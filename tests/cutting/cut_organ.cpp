@@ -9,12 +9,12 @@
 namespace trocar::cutting::testing {
 namespace {
 
-scene::Organ organ_of(mesh::TetMesh mesh) {
-  scene::Organ organ;
+organ::Organ organ_of(mesh::TetMesh mesh) {
+  organ::Organ organ;
   organ.name = "box";
   organ.mesh = std::move(mesh);
   organ.mesh.build_adjacency();
-  organ.node_masses_kg = scene::lumped_masses(organ);
+  organ.node_masses_kg = organ::lumped_masses(organ);
   return organ;
 }
 
@@ -23,7 +23,7 @@ constexpr int kEven[5][4] = {{0, 1, 2, 4}, {3, 2, 1, 7}, {5, 4, 7, 1}, {6, 7, 4,
 
 }  // namespace
 
-scene::Organ box_organ(int nx, int ny, int nz, double cell_m, double jitter, std::uint64_t seed) {
+organ::Organ box_organ(int nx, int ny, int nz, double cell_m, double jitter, std::uint64_t seed) {
   mesh::TetMesh mesh;
   trocar::testing::Random random(seed);
   const int size[3] = {nx, ny, nz};
@@ -59,7 +59,7 @@ scene::Organ box_organ(int nx, int ny, int nz, double cell_m, double jitter, std
   return organ_of(std::move(mesh));
 }
 
-scene::Organ tet_organ() {
+organ::Organ tet_organ() {
   mesh::TetMesh mesh;
   mesh.rest_positions = {
       {0.05, 0.05, 0.05}, {-0.05, -0.05, 0.05}, {-0.05, 0.05, -0.05}, {0.05, -0.05, -0.05}};
@@ -103,8 +103,8 @@ std::uint64_t topology_hash(const dynamics::Topology& topology) {
       {reinterpret_cast<const std::uint8_t*>(numbers.data()), numbers.size() * sizeof(double)});
 }
 
-CutOrgan::CutOrgan(scene::Organ organ, const Settings& settings)
-    : organ_(std::make_unique<const scene::Organ>(std::move(organ))),
+CutOrgan::CutOrgan(organ::Organ organ, const Settings& settings)
+    : organ_(std::make_unique<const organ::Organ>(std::move(organ))),
       topology_(*organ_),
       copy_(*organ_),
       copy_places_(copy_),

@@ -5,17 +5,17 @@
 #include <memory>
 #include <string>
 
-#include "server/cutting/cutter.h"
-#include "server/cutting/validate.h"
+#include "server/tissue/cutting/cutter.h"
+#include "server/tissue/cutting/validate.h"
 #include "tests/support/random.h"
 
 namespace trocar::cutting::testing {
 
 // Cells of five tets each, mirrored in turn; nodes moved by up to `jitter` cells, on the outside
 // along it only. Centred on the origin.
-scene::Organ box_organ(int nx, int ny, int nz, double cell_m, double jitter = 0.2,
+organ::Organ box_organ(int nx, int ny, int nz, double cell_m, double jitter = 0.2,
                        std::uint64_t seed = 1);
-scene::Organ tet_organ();  // one tet, edges about 0.1 m
+organ::Organ tet_organ();  // one tet, edges about 0.1 m
 
 double least_dihedral_sine(const dynamics::Topology& topology);
 double total_mass(const dynamics::Topology& topology);
@@ -31,10 +31,10 @@ Path straight_path(const Edge& from, const Edge& to, double step_m);
 // An organ, its cutter, and a copy that repeats every edit.
 class CutOrgan {
  public:
-  explicit CutOrgan(scene::Organ organ, const Settings& settings = {});
+  explicit CutOrgan(organ::Organ organ, const Settings& settings = {});
 
   const dynamics::Topology& topology() const { return topology_; }
-  const scene::Organ& organ() const { return *organ_; }
+  const organ::Organ& organ() const { return *organ_; }
   Cutter& cutter() { return cutter_; }
   // CPU time of the last call of Cutter::cut().
   std::uint64_t last_ns() const { return last_ns_; }
@@ -59,7 +59,7 @@ class CutOrgan {
   double travel_m = kUnknownTravel;
 
  private:
-  std::unique_ptr<const scene::Organ> organ_;
+  std::unique_ptr<const organ::Organ> organ_;
   dynamics::Topology topology_, copy_;
   Places copy_places_;
   Cutter cutter_;

@@ -1,10 +1,10 @@
 // Cut events as bytes.
 
-#include "server/cutting/event_codec.h"
+#include "server/tissue/cutting/event_codec.h"
 
 #include <gtest/gtest.h>
 
-#include "common/scene/load_organ.h"
+#include "server/organs/catalogue/load_organ.h"
 #include "tests/cutting/random_strokes.h"
 #include "tests/support/shared.h"
 
@@ -30,7 +30,7 @@ TEST(EventCodec, BytesOfEachKind) {
 TEST(EventCodec, HistoriesComeBackAndAreSmall) {
   TROCAR_SKIP_WITHOUT_SHARED("organs/liver_coarse.msh");
   const auto path = trocar::testing::shared_folder() / "organs/liver_coarse.msh";
-  CutOrgan liver(*scene::load_organ(path.string()));
+  CutOrgan liver(*catalogue::load_organ(path.string()));
   RandomStrokes strokes(liver.organ(), liver.cutter().mean_h(), 1);
   for (int cut = 0; cut < 8; ++cut) liver.stroke(strokes.next(StrokeKind::Knife));
   Bytes bytes;

@@ -2,16 +2,16 @@
 
 #include <gtest/gtest.h>
 
-#include "server/dynamics/tissue.h"
+#include "server/tissue/dynamics/tissue.h"
 #include "tests/cutting/cut_organ.h"
 
 namespace trocar::cutting::testing {
 namespace {
 
-using scene::ElasticLaw;
+using material::ElasticLaw;
 
 // Directions that turn by more than a right angle through the box, of either sign.
-scene::Organ turning_box(ElasticLaw law) {
+organ::Organ turning_box(ElasticLaw law) {
   auto organ = box_organ(4, 4, 4, 0.01);
   organ.material.elastic_law = law;
   organ.material.tension = 0.02;
@@ -39,13 +39,13 @@ double energy_without_inheritance(const CutOrgan& box) {
   for (std::uint32_t t = 0; t < topology.tet_count(); ++t) {
     std::array<Vec3d, 4> axes;
     for (std::size_t i = 0; i < 4; ++i) axes[i] = topology.fibre_axis(topology.tet(TetIndex(t))[i]);
-    topology.set_fibre_axis(TetIndex(t), scene::sum_of_axes(axes));
+    topology.set_fibre_axis(TetIndex(t), organ::sum_of_axes(axes));
   }
   return dynamics::Tissue(topology).energy_j(box.displacements);
 }
 
 // Energy after each tick of a blade, new nodes between those that they were made from.
-void expect_no_change(const scene::Organ& organ) {
+void expect_no_change(const organ::Organ& organ) {
   constexpr double kTolerance_j = 2e-7;
   CutOrgan box(organ);
   box.displacements = deformed(box.topology());

@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "common/scene/load_organ.h"
+#include "server/organs/catalogue/load_organ.h"
 #include "tests/cutting/random_strokes.h"
 #include "tests/support/shared.h"
 
@@ -14,7 +14,7 @@ namespace {
 
 // One cutter is told how far nodes have moved, the other is not. Tissue sways, now and then jumps,
 // and parts of it drift away.
-void cut_twice(const scene::Organ& organ, int strokes, std::uint64_t seed) {
+void cut_twice(const organ::Organ& organ, int strokes, std::uint64_t seed) {
   CutOrgan local(organ), full(organ);
   const double h = local.cutter().mean_h();
   RandomStrokes random_strokes(organ, h, seed);
@@ -64,12 +64,12 @@ TEST(LocalCost, SameEditsInABox) {
 TEST(LocalCost, SameEditsInALiver) {
   TROCAR_SKIP_WITHOUT_SHARED("organs/liver_coarse.msh");
   const auto path = trocar::testing::shared_folder() / "organs/liver_coarse.msh";
-  cut_twice(*scene::load_organ(path.string()), 10, 4);
+  cut_twice(*catalogue::load_organ(path.string()), 10, 4);
 }
 TEST(LocalCost, SameEditsInAGallbladder) {
   TROCAR_SKIP_WITHOUT_SHARED("organs/gallbladder_wall.msh");
   const auto path = trocar::testing::shared_folder() / "organs/gallbladder_wall.msh";
-  cut_twice(*scene::load_organ(path.string()), 15, 5);
+  cut_twice(*catalogue::load_organ(path.string()), 15, 5);
 }
 
 TEST(NodeBundles, LooksAtFewNodesWhereverTheyMove) {

@@ -5,8 +5,8 @@
 #include <array>
 #include <sstream>
 
-#include "common/scene/builtin_organs.h"
-#include "server/cutting/event_codec.h"
+#include "server/organs/catalogue/builtin_organs.h"
+#include "server/tissue/cutting/event_codec.h"
 #include "tests/cutting/cut_organ.h"
 
 namespace trocar::cutting::testing {
@@ -144,7 +144,7 @@ Path block_path(trocar::testing::Random& random, double step_m) {
 }
 
 TEST(Nakao, RandomStraightCutsLeaveASoundSolid) {
-  const auto plate = scene::make_plate();
+  const auto plate = catalogue::make_plate();
   const auto block = box_organ(6, 6, 6, 0.012);
   for (const auto method : {Method::Nakao, Method::NakaoPlain})
     for (const double piece_h : {0.0, 1.0}) {

@@ -2,15 +2,15 @@
 
 #include <gtest/gtest.h>
 
-#include "common/scene/load_organ.h"
+#include "server/organs/catalogue/load_organ.h"
 #include "tests/cutting/random_strokes.h"
 #include "tests/support/shared.h"
 
 namespace trocar::cutting::testing {
 namespace {
 
-scene::Organ load(const char* name) {
-  return *scene::load_organ((trocar::testing::shared_folder() / "organs" / name).string());
+organ::Organ load(const char* name) {
+  return *catalogue::load_organ((trocar::testing::shared_folder() / "organs" / name).string());
 }
 
 void cut_and_check(CutOrgan& organ, int cuts, std::uint64_t seed) {

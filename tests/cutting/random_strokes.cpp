@@ -16,7 +16,7 @@ Vec3d across_of(const Vec3d& v, const Vec3d& other) {
 
 }  // namespace
 
-RandomStrokes::RandomStrokes(const scene::Organ& organ, double h, std::uint64_t seed)
+RandomStrokes::RandomStrokes(const organ::Organ& organ, double h, std::uint64_t seed)
     : mesh_(organ.mesh), h_(h), normals_(mesh::surface_normals(organ.mesh)), random_(seed) {}
 
 Vec3d RandomStrokes::direction() {

@@ -11,7 +11,7 @@ enum class StrokeKind { Straight, Curved, Sawing, Short, Knife, Through, Aligned
 
 class RandomStrokes {
  public:
-  RandomStrokes(const scene::Organ& organ, double h, std::uint64_t seed);
+  RandomStrokes(const organ::Organ& organ, double h, std::uint64_t seed);
 
   // Sizes follow h. Knife: one end outside, the tip inside, moved sideways; Through: a plane across
   // everything; Aligned: in the plane of a face, along one of its edges, through its nodes;

@@ -3,16 +3,16 @@
 #include <gtest/gtest.h>
 
 #include "common/base/workers.h"
-#include "server/dynamics/tissue.h"
-#include "server/world/relaxation_state.h"
+#include "server/tissue/dynamics/tissue.h"
+#include "server/tissue/world/relaxation_state.h"
 #include "tests/cutting/cut_organ.h"
 
 namespace trocar::cutting::testing {
 namespace {
 
-scene::Organ measured_box(bool is_averaged = false) {
+organ::Organ measured_box(bool is_averaged = false) {
   auto organ = box_organ(3, 3, 3, 0.01);
-  scene::use_measured(*scene::find_measured_material("human_liver_nava2008"), organ.material);
+  material::use_measured(*material::find_measured_material("human_liver_nava2008"), organ.material);
   organ.material.has_averaged_strain = is_averaged;
   organ.material.spring_damping_time_s = 0;
   return organ;

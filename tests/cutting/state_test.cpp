@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "common/scene/load_organ.h"
+#include "server/organs/catalogue/load_organ.h"
 #include "tests/cutting/random_strokes.h"
 #include "tests/support/shared.h"
 
@@ -16,7 +16,7 @@ constexpr std::uint32_t kBlades = 3;
 // Three hands that begin, go on and end at random, in tissue that sways.
 class Hands {
  public:
-  Hands(const scene::Organ& organ, double h, std::uint64_t seed)
+  Hands(const organ::Organ& organ, double h, std::uint64_t seed)
       : strokes_(organ, h, seed), h_(h) {}
 
   // The same moves for all of them.
@@ -66,7 +66,7 @@ void expect_same(CutOrgan& a, CutOrgan& b, const std::string& when) {
 }
 
 // How many restored in the middle of a stroke, with work waiting.
-int restore_again_and_again(const scene::Organ& organ, std::uint64_t seed, int times) {
+int restore_again_and_again(const organ::Organ& organ, std::uint64_t seed, int times) {
   Settings settings;
   settings.edits_per_call = 12;
   auto original = std::make_unique<CutOrgan>(organ, settings);
@@ -114,12 +114,12 @@ TEST(CutterState, ALiverGoesOnAsItWould) {
   TROCAR_SKIP_WITHOUT_SHARED("organs/liver_tiny.msh");
   const auto path = trocar::testing::shared_folder() / "organs/liver_tiny.msh";
   for (const std::uint64_t seed : {5, 6})
-    restore_again_and_again(*scene::load_organ(path.string()), seed, 5);
+    restore_again_and_again(*catalogue::load_organ(path.string()), seed, 5);
 }
 TEST(CutterState, AGallbladderGoesOnAsItWould) {
   TROCAR_SKIP_WITHOUT_SHARED("organs/gallbladder_wall.msh");
   const auto path = trocar::testing::shared_folder() / "organs/gallbladder_wall.msh";
-  restore_again_and_again(*scene::load_organ(path.string()), 7, 5);
+  restore_again_and_again(*catalogue::load_organ(path.string()), 7, 5);
 }
 
 // Equal moves at other places of strokes and with other numbers of them: equal bytes.
@@ -189,7 +189,7 @@ class ReadingStates : public ::testing::Test {
     return archive.ok() && archive.at_end();
   }
 
-  const scene::Organ organ_;
+  const organ::Organ organ_;
   CutOrgan box_;
   Bytes state_;
 };

@@ -1,6 +1,6 @@
 // The surface that is kept from edit to edit, against that of all tets anew.
 
-#include "server/cutting/surface_mesh.h"
+#include "server/tissue/cutting/surface_mesh.h"
 
 #include <gtest/gtest.h>
 

@@ -68,7 +68,7 @@ Parting parting_of(std::uint8_t crossed) {
   return is_quad ? Parting::TwoAndTwo : Parting::Front;
 }
 
-std::vector<std::uint32_t> count_parts(const scene::Organ& organ, const CutEvents& events) {
+std::vector<std::uint32_t> count_parts(const organ::Organ& organ, const CutEvents& events) {
   dynamics::Topology topology(organ);
   Places places(topology);
   std::vector<std::uint32_t> root(topology.tet_count());

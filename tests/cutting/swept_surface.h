@@ -31,6 +31,6 @@ enum class Parting : std::uint8_t { None, Front, OneAndThree, TwoAndTwo };
 Parting parting_of(std::uint8_t crossed_edges);
 
 // Into how many tets each one of the organ has become by these events.
-std::vector<std::uint32_t> count_parts(const scene::Organ& organ, const CutEvents& events);
+std::vector<std::uint32_t> count_parts(const organ::Organ& organ, const CutEvents& events);
 
 }  // namespace trocar::cutting::testing

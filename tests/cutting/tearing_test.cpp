@@ -1,6 +1,6 @@
 // Tissue that is stretched too far: where it tears, across what, and that it stays a sound solid.
 
-#include "server/cutting/tearing.h"
+#include "server/tissue/cutting/tearing.h"
 
 #include <gtest/gtest.h>
 
@@ -13,7 +13,7 @@
 namespace trocar::cutting::testing {
 namespace {
 
-scene::Organ bar(double tear_stretch) {
+organ::Organ bar(double tear_stretch) {
   auto organ = box_organ(12, 4, 4, 0.005);
   organ.material.tear_stretch = tear_stretch;
   return organ;
@@ -23,7 +23,7 @@ using Field = std::function<Vec3d(const Vec3d&)>;  // place at rest to displacem
 
 class TornOrgan {
  public:
-  explicit TornOrgan(scene::Organ source) : organ_(std::move(source)), tearing_(organ_.organ()) {}
+  explicit TornOrgan(organ::Organ source) : organ_(std::move(source)), tearing_(organ_.organ()) {}
 
   CutOrgan& organ() { return organ_; }
   void deform(const Field& field) {

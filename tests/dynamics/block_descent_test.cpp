@@ -1,13 +1,13 @@
 // The solver: against closed forms, and the momentum balance of the whole system with reactions.
 
-#include "server/dynamics/block_descent.h"
+#include "server/tissue/dynamics/block_descent.h"
 
 #include <gtest/gtest.h>
 
 #include <numeric>
 
-#include "common/scene/builtin_organs.h"
-#include "server/contact/proxies.h"
+#include "server/organs/catalogue/builtin_organs.h"
+#include "server/tissue/contact/proxies.h"
 
 namespace trocar::dynamics {
 namespace {
@@ -16,7 +16,7 @@ using contact::ContactList;
 using contact::ContactPoint;
 
 struct Bench {
-  explicit Bench(scene::Organ o) : organ(std::move(o)), world(organ), solver(organ, world) {
+  explicit Bench(organ::Organ o) : organ(std::move(o)), world(organ), solver(organ, world) {
     for (std::uint32_t i = 0; i < organ.mesh.node_count(); ++i)
       if (world.node_classes[i] != world::NodeClass::Fixed) free_nodes.push_back(NodeIndex(i));
   }
@@ -36,15 +36,15 @@ struct Bench {
         {.tool = ToolSlot{0}, .end = static_cast<std::uint32_t>(contacts.points.size())}};
   }
 
-  scene::Organ organ;
+  organ::Organ organ;
   world::World world;
   BlockDescent solver;
   ContactList contacts;
   std::vector<NodeIndex> free_nodes;
 };
 
-scene::Organ lattice(int nx, int ny, int nz) {
-  auto organ = scene::make_lattice({.nx = nx, .ny = ny, .nz = nz});
+organ::Organ lattice(int nx, int ny, int nz) {
+  auto organ = catalogue::make_lattice({.nx = nx, .ny = ny, .nz = nz});
   EXPECT_TRUE(organ.ok()) << (organ.ok() ? "" : organ.error().message);
   return *organ;
 }
@@ -229,7 +229,7 @@ TEST(BlockDescent, WhatIsNotFiniteSendsItsRegionBackToTheStartOfTheStep) {
     bench.solver.solve(bench.contacts, bench.free_nodes, {}, bench.world, {.forces = forces});
   }
   const auto before = bench.world.displacements;
-  const NodeIndex broken = scene::lattice_node({.nx = 6, .ny = 6, .nz = 6}, 3, 5, 3);
+  const NodeIndex broken = catalogue::lattice_node({.nx = 6, .ny = 6, .nz = 6}, 3, 5, 3);
   bench.tie(broken, {NAN, 0, 0}, 2000.0f);
   const auto report = bench.step({});
   EXPECT_EQ(report.nodes_rejected, 1u);

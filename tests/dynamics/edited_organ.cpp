@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "server/dynamics/tet_shape.h"
+#include "server/tissue/dynamics/tet_shape.h"
 
 namespace trocar::dynamics::testing {
 
@@ -164,8 +164,8 @@ void EditedOrgan::remove_bare_nodes() {
       topology_.remove_node(NodeIndex(n));
 }
 
-scene::Organ EditedOrgan::built_anew(std::vector<NodeIndex>& node_of) const {
-  scene::Organ organ = organ_;
+organ::Organ EditedOrgan::built_anew(std::vector<NodeIndex>& node_of) const {
+  organ::Organ organ = organ_;
   const bool has_stress_free = !organ.stress_free_positions_m.empty();
   organ.mesh = {};
   organ.stress_free_positions_m.clear();

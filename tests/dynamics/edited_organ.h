@@ -6,13 +6,13 @@
 #include <map>
 #include <random>
 
-#include "server/dynamics/topology.h"
+#include "server/tissue/dynamics/topology.h"
 
 namespace trocar::dynamics::testing {
 
 class EditedOrgan {
  public:
-  EditedOrgan(scene::Organ organ, std::uint32_t seed)
+  EditedOrgan(organ::Organ organ, std::uint32_t seed)
       : organ_(std::move(organ)), topology_(organ_), random_(seed) {}
   EditedOrgan(const EditedOrgan&) = delete;
   EditedOrgan& operator=(const EditedOrgan&) = delete;
@@ -38,14 +38,14 @@ class EditedOrgan {
   void remove_bare_nodes();
 
   // Without the unused places, adjacency built. node_of gets the place of each of its nodes.
-  scene::Organ built_anew(std::vector<NodeIndex>& node_of) const;
+  organ::Organ built_anew(std::vector<NodeIndex>& node_of) const;
 
  private:
   NodeIndex any_node();
   NodeIndex free_node_place() const;
   TetIndex free_tet_place() const;
 
-  const scene::Organ organ_;
+  const organ::Organ organ_;
   Topology topology_;
   std::mt19937 random_;
   std::map<TetIndex, mesh::Tet> removed_;

@@ -7,20 +7,20 @@
 #include <random>
 
 #include "common/math/frame.h"
-#include "common/scene/builtin_organs.h"
-#include "server/dynamics/hyperelastic.h"
-#include "server/dynamics/tissue.h"
+#include "server/organs/catalogue/builtin_organs.h"
+#include "server/tissue/dynamics/hyperelastic.h"
+#include "server/tissue/dynamics/tissue.h"
 #include "tests/mesh/block_mesh.h"
 #include "tests/support/random.h"
 
 namespace trocar::dynamics {
 namespace {
 
-using scene::ElasticLaw;
+using material::ElasticLaw;
 
 struct Case {
   const char* name;
-  void (*change)(scene::Organ&);
+  void (*change)(organ::Organ&);
   bool is_linear = false;  // linear elasticity: invariant for small rotations alone
   bool has_stress_at_rest = false;
 };
@@ -29,8 +29,8 @@ void PrintTo(const Case& c, std::ostream* out) {
   *out << c.name;
 }
 
-scene::Organ block_organ(const Case& c) {
-  scene::Organ organ;
+organ::Organ block_organ(const Case& c) {
+  organ::Organ organ;
   organ.name = "block";
   organ.mesh = trocar::testing::block_mesh(3, 0.01);
   for (std::size_t i = 0; i < organ.mesh.node_count(); ++i)  // no regular directions left
@@ -39,8 +39,8 @@ scene::Organ block_organ(const Case& c) {
   organ.mesh.build_adjacency();
   mesh::centre_on_origin(organ.mesh);
   c.change(organ);
-  organ.node_masses_kg = scene::lumped_masses(organ);
-  const auto status = scene::validate(organ);
+  organ.node_masses_kg = organ::lumped_masses(organ);
+  const auto status = organ::validate(organ);
   EXPECT_TRUE(status) << (status ? "" : status.error().message);
   return organ;
 }
@@ -52,7 +52,7 @@ struct Linearised {
 
 class Probe {
  public:
-  explicit Probe(const scene::Organ& organ)
+  explicit Probe(const organ::Organ& organ)
       : tissue_(organ), slots_(tissue_.groups().slot_count()) {}
 
   Linearised at(NodeIndex node, const std::vector<Vec3f>& u) {
@@ -233,7 +233,7 @@ TEST_P(IsotropicEnergies, SmallStrainStoresTheEnergyOfLinearElasticity) {
   const double e = 1e-4;
   std::vector<Vec3f> u;
   for (const auto& p : organ.mesh.rest_positions) u.push_back(to_float(p * e));
-  const auto lame = scene::lame_parameters(organ.material);
+  const auto lame = material::lame_parameters(organ.material);
   const double bulk = organ.material.elastic_law == ElasticLaw::Springs
                           ? 2.0 / 3 * organ.material.young_modulus_pa
                           : lame.lambda_pa + 2.0 / 3 * lame.mu_pa;
@@ -254,25 +254,25 @@ std::string name_of(const ::testing::TestParamInfo<Case>& tested) {
 }
 
 const auto kIsotropic = ::testing::Values(
-    Case{.name = "Springs", .change = [](scene::Organ&) {}},
+    Case{.name = "Springs", .change = [](organ::Organ&) {}},
     Case{.name = "TensorMass",
-         .change = [](scene::Organ& o) { o.material.elastic_law = ElasticLaw::TensorMass; },
+         .change = [](organ::Organ& o) { o.material.elastic_law = ElasticLaw::TensorMass; },
          .is_linear = true},
     Case{.name = "NeoHookean",
-         .change = [](scene::Organ& o) { o.material.elastic_law = ElasticLaw::NeoHookean; }},
-    Case{.name = "NeoHookeanAveragedStrain", .change = [](scene::Organ& o) {
+         .change = [](organ::Organ& o) { o.material.elastic_law = ElasticLaw::NeoHookean; }},
+    Case{.name = "NeoHookeanAveragedStrain", .change = [](organ::Organ& o) {
            o.material.elastic_law = ElasticLaw::NeoHookean;
            o.material.has_averaged_strain = true;
          }});
 
-void put_under_tension(scene::Organ& organ) {
+void put_under_tension(organ::Organ& organ) {
   organ.material.tension = 0.04;
   organ.material.fibre_direction = {1, 0, 1};
   organ.material.fibre_tension = 0.02;
 }
 
 // A direction at most nodes, turning from one to the next, of either sign; another one elsewhere.
-void give_directions(scene::Organ& organ) {
+void give_directions(organ::Organ& organ) {
   organ.material.fibre_direction = {0, 0, 1};
   organ.material.fibre_tension = 0.05;
   for (std::size_t n = 0; n < organ.mesh.node_count(); ++n) {
@@ -287,28 +287,28 @@ const auto kOthers =
     ::testing::Values(
         Case{.name = "Measured",
              .change =
-                 [](scene::Organ& o) {
-                   scene::use_measured(*scene::find_measured_material("human_liver_nava2008"),
-                                       o.material);
+                 [](organ::Organ& o) {
+                   material::use_measured(*material::find_measured_material("human_liver_nava2008"),
+                                          o.material);
                  }},
         Case{.name = "MeasuredExponential",
              .change =
-                 [](scene::Organ& o) {
-                   auto material = *scene::find_measured_material("human_liver_nava2008");
-                   material.energy = scene::StrainEnergy::Exponential;
+                 [](organ::Organ& o) {
+                   auto material = *material::find_measured_material("human_liver_nava2008");
+                   material.energy = material::StrainEnergy::Exponential;
                    material.exponent = 3;
-                   scene::use_measured(material, o.material);
+                   material::use_measured(material, o.material);
                  }},
         Case{.name = "MeasuredAveragedStrain",
              .change =
-                 [](scene::Organ& o) {
-                   scene::use_measured(*scene::find_measured_material("human_liver_nava2008"),
-                                       o.material);
+                 [](organ::Organ& o) {
+                   material::use_measured(*material::find_measured_material("human_liver_nava2008"),
+                                          o.material);
                    o.material.has_averaged_strain = true;
                  }},
         Case{.name = "AveragedStrainUnderTension",
              .change =
-                 [](scene::Organ& o) {
+                 [](organ::Organ& o) {
                    o.material.elastic_law = ElasticLaw::NeoHookean;
                    o.material.has_averaged_strain = true;
                    put_under_tension(o);
@@ -316,16 +316,16 @@ const auto kOthers =
              .has_stress_at_rest = true},
         Case{.name = "SpringsAlongFibres",
              .change =
-                 [](scene::Organ& o) {
+                 [](organ::Organ& o) {
                    o.material.fibre_direction = {0, 2, 0};
                    o.material.fibre_stiffness_ratio = 0.1;
                  }},
         Case{.name = "SpringsUnderTension",
-             .change = [](scene::Organ& o) { put_under_tension(o); },
+             .change = [](organ::Organ& o) { put_under_tension(o); },
              .has_stress_at_rest = true},
         Case{.name = "TensorMassUnderTension",
              .change =
-                 [](scene::Organ& o) {
+                 [](organ::Organ& o) {
                    o.material.elastic_law = ElasticLaw::TensorMass;
                    put_under_tension(o);
                  },
@@ -333,21 +333,21 @@ const auto kOthers =
              .has_stress_at_rest = true},
         Case{.name = "NeoHookeanUnderTension",
              .change =
-                 [](scene::Organ& o) {
+                 [](organ::Organ& o) {
                    o.material.elastic_law = ElasticLaw::NeoHookean;
                    put_under_tension(o);
                  },
              .has_stress_at_rest = true},
         Case{.name = "SpringsAlongDirections",
              .change =
-                 [](scene::Organ& o) {
+                 [](organ::Organ& o) {
                    o.material.fibre_stiffness_ratio = 3;
                    give_directions(o);
                  },
              .has_stress_at_rest = true},
         Case{.name = "TensorMassAlongDirections",
              .change =
-                 [](scene::Organ& o) {
+                 [](organ::Organ& o) {
                    o.material.elastic_law = ElasticLaw::TensorMass;
                    give_directions(o);
                  },
@@ -355,12 +355,12 @@ const auto kOthers =
              .has_stress_at_rest = true},
         Case{.name = "NeoHookeanAlongDirections",
              .change =
-                 [](scene::Organ& o) {
+                 [](organ::Organ& o) {
                    o.material.elastic_law = ElasticLaw::NeoHookean;
                    give_directions(o);
                  },
              .has_stress_at_rest = true},
-        Case{.name = "NeoHookeanStiffInclusion", .change = [](scene::Organ& o) {
+        Case{.name = "NeoHookeanStiffInclusion", .change = [](organ::Organ& o) {
                o.material.elastic_law = ElasticLaw::NeoHookean;
                auto stiff = o.material;
                stiff.young_modulus_pa *= 10;
@@ -377,7 +377,7 @@ INSTANTIATE_TEST_SUITE_P(All, IsotropicEnergies, kIsotropic, name_of);
 TEST(FibreDirections, OfOneDirectionAreTheMaterials) {
   const Vec3d axis = normalized(Vec3d{0.3, -0.7, 0.45}, {});
   for (const auto law : {ElasticLaw::Springs, ElasticLaw::TensorMass, ElasticLaw::NeoHookean}) {
-    auto change = [](scene::Organ& o) {
+    auto change = [](organ::Organ& o) {
       o.material.fibre_tension = 0.05;
       o.material.tension = 0.02;
       o.material.fibre_stiffness_ratio = 3;
@@ -389,7 +389,7 @@ TEST(FibreDirections, OfOneDirectionAreTheMaterials) {
     field.material.fibre_direction = {1, 0, 0};
     for (std::size_t n = 0; n < field.mesh.node_count(); ++n)
       field.fibre_directions.push_back(n % 3 == 0 ? -axis : axis);
-    ASSERT_TRUE(scene::validate(field));
+    ASSERT_TRUE(organ::validate(field));
     std::vector<Vec3f> u;
     for (std::size_t n = 0; n < own.mesh.node_count(); ++n)
       u.push_back(Vec3f{float(n * 7 % 11), float(n * 5 % 13), float(n * 3 % 7)} * 3e-4f);
@@ -461,13 +461,13 @@ TEST(Exponential, IsExpToSinglePrecisionAndFiniteHoweverFarTissueIsStretched) {
 
 template <typename Law>
 void expect_gradient_and_block(const Law& law) {
-  const auto organ = block_organ({.name = "", .change = [](scene::Organ& o) {
+  const auto organ = block_organ({.name = "", .change = [](organ::Organ& o) {
                                     o.material.elastic_law = ElasticLaw::NeoHookean;
                                   }});
   const Topology topology(organ);
   const Groups groups(topology, Coupling::Elements);
   const Hyperelastic<Law> energy(topology, groups, nullptr,
-                                 hyperelastic_parameters(organ, scene::is_hyperelastic), law);
+                                 hyperelastic_parameters(organ, material::is_hyperelastic), law);
   const auto energy_j = [&](std::span<const Vec3d> displacements) {
     std::vector<double> shares(groups.slot_count());
     energy.add_energies_j(displacements, shares);

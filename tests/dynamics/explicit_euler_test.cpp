@@ -1,24 +1,24 @@
 // The papers' integrator: its stability limit, and agreement with the implicit solver.
 
-#include "server/dynamics/explicit_euler.h"
+#include "server/tissue/dynamics/explicit_euler.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "common/scene/builtin_organs.h"
+#include "server/organs/catalogue/builtin_organs.h"
 
 namespace trocar::dynamics {
 namespace {
 
-scene::Organ column(double node_damping_per_s, double spring_time_s) {
-  auto organ = *scene::make_lattice({.nx = 2, .ny = 12, .nz = 2});
+organ::Organ column(double node_damping_per_s, double spring_time_s) {
+  auto organ = *catalogue::make_lattice({.nx = 2, .ny = 12, .nz = 2});
   organ.material.node_damping_per_s = node_damping_per_s;
   organ.material.spring_damping_time_s = spring_time_s;
   return organ;
 }
 
-double largest_after(const scene::Organ& organ, double dt, double seconds) {
+double largest_after(const organ::Organ& organ, double dt, double seconds) {
   world::World world(organ);
   ExplicitEuler integrator(organ, world);
   for (std::uint32_t n = 0; n < world.node_count(); ++n)

@@ -1,21 +1,21 @@
 // The linear far field: its matrices against the energies, and a solver with it against one
 // without.
 
-#include "server/dynamics/far_field.h"
+#include "server/tissue/dynamics/far_field.h"
 
 #include <gtest/gtest.h>
 
-#include "common/scene/builtin_organs.h"
-#include "server/dynamics/block_descent.h"
+#include "server/organs/catalogue/builtin_organs.h"
+#include "server/tissue/dynamics/block_descent.h"
 #include "tests/support/random.h"
 
 namespace trocar::dynamics {
 namespace {
 
-using scene::ElasticLaw;
+using material::ElasticLaw;
 
-scene::Organ liver_of(ElasticLaw law) {
-  auto organ = *scene::make_liver(3000);
+organ::Organ liver_of(ElasticLaw law) {
+  auto organ = *catalogue::make_liver(3000);
   organ.material.elastic_law = law;
   return organ;
 }
@@ -80,7 +80,7 @@ INSTANTIATE_TEST_SUITE_P(Laws, LinearFarField,
                                            ElasticLaw::NeoHookean));
 
 struct Session {
-  explicit Session(scene::Organ o) : organ(std::move(o)), world(organ), solver(organ, world) {
+  explicit Session(organ::Organ o) : organ(std::move(o)), world(organ), solver(organ, world) {
     solver.use_linear_far_field(world);
     plan = solver.far_plan(1e-3f);
   }
@@ -101,13 +101,13 @@ struct Session {
     return kinetic + solver.tissue().energy_j(world.displacements);
   }
 
-  scene::Organ organ;
+  organ::Organ organ;
   world::World world;
   BlockDescent solver;
   FarPlan plan;
 };
 
-scene::Organ averaged_liver() {
+organ::Organ averaged_liver() {
   auto organ = liver_of(ElasticLaw::NeoHookean);
   organ.material.has_averaged_strain = true;
   return organ;

@@ -1,13 +1,13 @@
 // Measured tissue that relaxes, in the live energies: against the Prony series and the hereditary
 // integral.
 
-#include "server/dynamics/relaxation.h"
+#include "server/tissue/dynamics/relaxation.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "server/dynamics/block_descent.h"
+#include "server/tissue/dynamics/block_descent.h"
 #include "tests/mesh/block_mesh.h"
 
 namespace trocar::dynamics {
@@ -15,31 +15,31 @@ namespace {
 
 constexpr double kSide_m = 0.03;
 
-const scene::HyperelasticMaterial& liver() {
-  return *scene::find_measured_material("human_liver_nava2008");
+const material::HyperelasticMaterial& liver() {
+  return *material::find_measured_material("human_liver_nava2008");
 }
 
 // As stiff at first, stiffening as Fung's laws do.
-scene::HyperelasticMaterial exponential() {
+material::HyperelasticMaterial exponential() {
   auto material = liver();
   material.name = "exponential";
-  material.energy = scene::StrainEnergy::Exponential;
+  material.energy = material::StrainEnergy::Exponential;
   material.coefficients_pa = {liver().coefficients_pa[0]};
   material.exponent = 3;
   return material;
 }
 
 // A cube of a measured material, free.
-scene::Organ measured_cube(bool is_averaged,
-                           const scene::HyperelasticMaterial& material = liver()) {
-  scene::Organ organ;
+organ::Organ measured_cube(bool is_averaged,
+                           const material::HyperelasticMaterial& material = liver()) {
+  organ::Organ organ;
   organ.name = "cube";
   organ.mesh = trocar::testing::block_mesh(2, kSide_m / 2);
   mesh::centre_on_origin(organ.mesh);
-  scene::use_measured(material, organ.material);
+  material::use_measured(material, organ.material);
   organ.material.has_averaged_strain = is_averaged;
-  organ.node_masses_kg = scene::lumped_masses(organ);
-  EXPECT_TRUE(scene::validate(organ));
+  organ.node_masses_kg = organ::lumped_masses(organ);
+  EXPECT_TRUE(organ::validate(organ));
   return organ;
 }
 
@@ -52,7 +52,7 @@ class LiveRelaxation : public ::testing::TestWithParam<bool> {};
 class Specimen {
  public:
   // Far tissue is advanced in turns.
-  Specimen(bool is_averaged, bool is_near, const scene::HyperelasticMaterial& material = liver())
+  Specimen(bool is_averaged, bool is_near, const material::HyperelasticMaterial& material = liver())
       : organ_(measured_cube(is_averaged, material)),
         tissue_(organ_),
         state_(organ_),
@@ -113,7 +113,7 @@ class Specimen {
   }
 
  private:
-  scene::Organ organ_;
+  organ::Organ organ_;
   Tissue tissue_;
   world::RelaxationState state_;
   std::vector<Float4> x_;
@@ -179,13 +179,13 @@ double stretch_at(double t) {
 
 // Second Piola-Kirchhoff stress along x of the bracket at once; J = 1, so that
 // S = 2 [Psi' I - C10 C^-1].
-double stress_at_once(const scene::HyperelasticMaterial& material, double stretch) {
+double stress_at_once(const material::HyperelasticMaterial& material, double stretch) {
   const double i1 = stretch * stretch + 2 / stretch;
-  return 2 * (scene::strain_energy(material, i1 - 3).first -
+  return 2 * (material::strain_energy(material, i1 - 3).first -
               material.coefficients_pa[0] / (stretch * stretch));
 }
 
-void expect_hereditary_integral(bool is_averaged, const scene::HyperelasticMaterial& material) {
+void expect_hereditary_integral(bool is_averaged, const material::HyperelasticMaterial& material) {
   constexpr double kDt = 0.001, kEnd = 3;
   Specimen specimen(is_averaged, true, material);
   double largest = 0, worst = 0;
@@ -304,7 +304,7 @@ TEST_P(LiveRelaxation, TissueUnderTensionBeginsRelaxed) {
   world::RelaxationState fresh(organ);
   const double l = 1 / (1 - organ.material.tension), i1 = 3 * l * l;
   const double bracket =
-      2 * (scene::strain_energy(liver(), i1 - 3).first * l - liver().coefficients_pa[0] * l * l);
+      2 * (material::strain_energy(liver(), i1 - 3).first * l - liver().coefficients_pa[0] * l * l);
   const double volumetric = liver().bulk_modulus_pa * (l * l * l - 1) * l * l;
   double weights = 0;
   for (const auto& term : liver().relaxation) weights += term.weight;

@@ -1,14 +1,14 @@
 // Strain averaged over stars: what it leaves to tets, that even strain is exact, and that it does
 // not lock where linear tets do.
 
-#include "server/dynamics/stars.h"
+#include "server/tissue/dynamics/stars.h"
 
 #include <gtest/gtest.h>
 
 #include <numeric>
 
-#include "server/dynamics/tet_shape.h"
-#include "server/dynamics/tissue.h"
+#include "server/tissue/dynamics/tet_shape.h"
+#include "server/tissue/dynamics/tissue.h"
 #include "tests/mesh/block_mesh.h"
 #include "tests/support/random.h"
 
@@ -17,28 +17,28 @@ namespace {
 
 constexpr double kCell_m = 0.01;
 
-scene::Organ block(bool is_averaged) {
-  scene::Organ organ;
+organ::Organ block(bool is_averaged) {
+  organ::Organ organ;
   organ.name = "block";
   organ.mesh = trocar::testing::block_mesh(4, kCell_m);
-  organ.material.elastic_law = scene::ElasticLaw::NeoHookean;
+  organ.material.elastic_law = material::ElasticLaw::NeoHookean;
   organ.material.poisson_ratio = 0.49;
   organ.material.spring_damping_time_s = 0;
   organ.material.has_averaged_strain = is_averaged;
-  organ.node_masses_kg = scene::lumped_masses(organ);
+  organ.node_masses_kg = organ::lumped_masses(organ);
   return organ;
 }
 
 // A stiff half with or without averages, and between them tets of the soft material.
-scene::Organ block_of_two(bool is_stiff_averaged) {
+organ::Organ block_of_two(bool is_stiff_averaged) {
   auto organ = block(true);
-  scene::MaterialRegion stiff{"stiff", organ.material, {}};
+  material::MaterialRegion stiff{"stiff", organ.material, {}};
   stiff.material.young_modulus_pa *= 10;
   stiff.material.has_averaged_strain = is_stiff_averaged;
   for (std::uint32_t n = 0; n < organ.mesh.node_count(); ++n)
     if (organ.mesh.rest_positions[n].x > -0.1 * kCell_m) stiff.nodes.push_back(NodeIndex(n));
   organ.regions.push_back(stiff);
-  EXPECT_TRUE(scene::validate(organ));
+  EXPECT_TRUE(organ::validate(organ));
   return organ;
 }
 
@@ -69,7 +69,7 @@ TEST(Stars, VolumeThatTetsGiveUpIsThatOfStars) {
   }
 }
 
-double energy_at(const scene::Organ& organ, const std::vector<Vec3f>& u) {
+double energy_at(const organ::Organ& organ, const std::vector<Vec3f>& u) {
   const Tissue tissue(organ);
   const std::vector<Vec3f> rest(u.size());
   return tissue.energy_j(u) - tissue.energy_j(rest);

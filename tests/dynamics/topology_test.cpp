@@ -1,54 +1,54 @@
 // Following edits of the topology: always what building anew gives, and only where it changed.
 
-#include "server/dynamics/topology.h"
+#include "server/tissue/dynamics/topology.h"
 
 #include <gtest/gtest.h>
 
 #include <cstring>
 #include <set>
 
-#include "common/scene/builtin_organs.h"
-#include "server/dynamics/block_descent.h"
-#include "server/dynamics/hyperelastic.h"
-#include "server/dynamics/tissue.h"
+#include "server/organs/catalogue/builtin_organs.h"
+#include "server/tissue/dynamics/block_descent.h"
+#include "server/tissue/dynamics/hyperelastic.h"
+#include "server/tissue/dynamics/tissue.h"
 #include "tests/dynamics/edited_organ.h"
 #include "tests/mesh/block_mesh.h"
 
 namespace trocar::dynamics {
 namespace {
 
-using scene::ElasticLaw;
+using material::ElasticLaw;
 using testing::EditedOrgan;
 
 struct Case {
   const char* name;
-  scene::Organ (*make)();
+  organ::Organ (*make)();
 };
 
 void PrintTo(const Case& c, std::ostream* out) {
   *out << c.name;
 }
 
-scene::Organ block(int n) {
-  scene::Organ organ;
+organ::Organ block(int n) {
+  organ::Organ organ;
   organ.name = "block";
   organ.mesh = trocar::testing::block_mesh(n, 0.01);
   for (std::size_t i = 0; i < organ.mesh.node_count(); ++i)  // no regular directions left
     organ.mesh.rest_positions[i] +=
         Vec3d{double(i * 7 % 11) - 5, double(i * 5 % 13) - 6, double(i * 3 % 7) - 3} * 2e-4;
   organ.mesh.build_adjacency();
-  organ.node_masses_kg = scene::lumped_masses(organ);
+  organ.node_masses_kg = organ::lumped_masses(organ);
   return organ;
 }
 
-scene::Organ block_of(ElasticLaw law, bool has_averaged_strain = false, int n = 4) {
+organ::Organ block_of(ElasticLaw law, bool has_averaged_strain = false, int n = 4) {
   auto organ = block(n);
   organ.material.elastic_law = law;
   organ.material.has_averaged_strain = has_averaged_strain;
   return organ;
 }
 
-scene::Organ block_of_many_materials(bool has_averaged_strain) {
+organ::Organ block_of_many_materials(bool has_averaged_strain) {
   auto organ = block_of(ElasticLaw::TensorMass);
   const auto half = [&](auto&& is_in) {
     std::vector<NodeIndex> nodes;
@@ -74,8 +74,8 @@ scene::Organ block_of_many_materials(bool has_averaged_strain) {
   return organ;
 }
 
-scene::Organ small_liver(bool has_averaged_strain) {
-  auto organ = scene::make_liver(1500);
+organ::Organ small_liver(bool has_averaged_strain) {
+  auto organ = catalogue::make_liver(1500);
   organ->material.elastic_law = ElasticLaw::NeoHookean;
   organ->material.has_averaged_strain = has_averaged_strain;
   return *organ;
@@ -281,7 +281,7 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"ManyMaterialsAveraged", [] { return block_of_many_materials(true); }},
         Case{"Liver", [] { return small_liver(false); }},
         Case{"LiverAveraged", [] { return small_liver(true); }},
-        Case{"Lattice", [] { return *scene::make_lattice({.nx = 7, .ny = 5, .nz = 6}); }}),
+        Case{"Lattice", [] { return *catalogue::make_lattice({.nx = 7, .ny = 5, .nz = 6}); }}),
     [](const auto& tested) { return tested.param.name; });
 
 TEST(FollowTopology, LawsThatNeedTheInvariantFollowToo) {
@@ -289,7 +289,7 @@ TEST(FollowTopology, LawsThatNeedTheInvariantFollowToo) {
   auto& topology = edited.topology();
   Tissue tissue(topology);
   const ReducedPolynomialLaw law{{1.9f, 1.6f, 3.0f, 2.0f}};
-  const auto parameters = hyperelastic_parameters(topology.organ(), scene::is_hyperelastic);
+  const auto parameters = hyperelastic_parameters(topology.organ(), material::is_hyperelastic);
   Hyperelastic<ReducedPolynomialLaw> energy(topology, tissue.groups(), nullptr, parameters, law);
   for (int edit = 0; edit < 30; ++edit) {
     edited.edit();
@@ -422,8 +422,8 @@ TEST(Topology, AdjacencyMassesAndMaterialsAreThoseOfTheOrganBuiltAnew) {
   for (int edit = 0; edit < 60; ++edit) edited.edit();
   std::vector<NodeIndex> node_of;
   const auto organ = edited.built_anew(node_of);
-  const auto masses = scene::lumped_masses(organ);
-  const auto map = scene::material_map(organ);
+  const auto masses = organ::lumped_masses(organ);
+  const auto map = organ::material_map(organ);
   std::vector<NodeIndex> neighbours;
   for (std::size_t n = 0; n < node_of.size(); ++n) {
     const auto node = node_of[n];

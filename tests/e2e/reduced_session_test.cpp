@@ -9,27 +9,27 @@
 #include <fstream>
 
 #include "common/journal/session_journal.h"
-#include "common/scene/local_reduction_file.h"
-#include "common/scene/organ_file.h"
-#include "server/recording/verify.h"
+#include "server/organs/organ/local_reduction_file.h"
+#include "server/organs/organ/organ_file.h"
+#include "server/session/recording/verify.h"
 #include "tests/e2e/programs.h"
-#include "tests/reduction/reduced_block.h"
+#include "tests/reduce/reduced_block.h"
 
 namespace trocar::e2e {
 namespace {
 
 namespace fs = std::filesystem;
 
-const reduction::testing::ReducedBlock& made() {
-  static const reduction::testing::ReducedBlock instance(4);
+const reduce::testing::ReducedBlock& made() {
+  static const reduce::testing::ReducedBlock instance(4);
   return instance;
 }
 void write_made(const fs::path& folder) {
-  ASSERT_TRUE(scene::write_organ(folder / "block.organ", made().organ).ok());
-  ASSERT_TRUE(scene::write_local_reduction(folder / "block.reduction", *made().local).ok());
+  ASSERT_TRUE(organ::write_organ(folder / "block.organ", made().organ).ok());
+  ASSERT_TRUE(organ::write_local_reduction(folder / "block.reduction", *made().local).ok());
   auto other = *made().local;
   other.force_n *= 2;
-  ASSERT_TRUE(scene::write_local_reduction(folder / "other.reduction", other).ok());
+  ASSERT_TRUE(organ::write_local_reduction(folder / "other.reduction", other).ok());
 }
 
 // Presses at the first patch's centre along the normal there, and then cuts.
@@ -154,7 +154,7 @@ TEST(ReducedSession, IsRecordedAndSimulatesAgainWithItsReductionOnly) {
                            << again->first_mismatch->what;
   EXPECT_GE(again->ticks_verified, 6000u);
 
-  const auto hash = fmt::format("{:016x}", scene::reduction_hash(*made().local));
+  const auto hash = fmt::format("{:016x}", organ::reduction_hash(*made().local));
   auto [code, said] = outcome("trocar-journal", {"info", file}, folder);
   EXPECT_EQ(code, 0);
   EXPECT_NE(said.find("block.reduction (hash " + hash + ")"), std::string::npos) << said;
@@ -196,7 +196,7 @@ TEST(ReducedSession, AReductionThatCannotBeUsedIsRefusedInOneLine) {
   {
     const auto whole = read_text(reduction);
     std::ofstream(folder / "cut.reduction", std::ios::binary) << whole.substr(0, whole.size() / 2);
-    ASSERT_TRUE(scene::write_organ(folder / "heavy.organ",
+    ASSERT_TRUE(organ::write_organ(folder / "heavy.organ",
                                    [] {
                                      auto heavy = made().organ;
                                      heavy.material.density_kg_m3 *= 2;

@@ -12,11 +12,11 @@
 #include "client/replay/replay_source.h"
 #include "client/replica/replica.h"
 #include "common/journal/session_journal.h"
-#include "common/scene/organ_file.h"
 #include "common/wire/surface_codec.h"
-#include "server/recording/tick_records.h"
-#include "server/recording/verify.h"
-#include "server/step/simulation.h"
+#include "server/organs/organ/organ_file.h"
+#include "server/session/recording/tick_records.h"
+#include "server/session/recording/verify.h"
+#include "server/tissue/step/simulation.h"
 #include "tests/e2e/programs.h"
 #include "tests/support/shared.h"
 
@@ -31,7 +31,7 @@ std::map<Tick, std::uint32_t> simulate_again(const std::filesystem::path& file) 
   auto journal = journal::SessionJournal::open(file.string());
   EXPECT_TRUE(journal.ok());
   const std::string organ = (*journal)->organ()->SerializeAsString();
-  step::Simulation simulation(*scene::decode_organ(bytes_of(std::string_view(organ))));
+  step::Simulation simulation(*organ::decode_organ(bytes_of(std::string_view(organ))));
   step::TickRecord record;
   const auto read = (*journal)->read_tick_records(
       0, (*journal)->info().last_tick, [&](Tick tick, const proto::TickRecord& message) {

@@ -7,7 +7,7 @@
 
 #include <cmath>
 
-#include "server/finite_elements/material_point.h"
+#include "server/lab/finite_elements/material_point.h"
 #include "tests/finite_elements/specimens.h"
 #include "tests/support/random.h"
 
@@ -204,11 +204,11 @@ INSTANTIATE_TEST_SUITE_P(Orders, Homogeneous,
 // The specimen without a mesh is the same closed form.
 TEST(MaterialPoint, SpecimensMeetTheClosedForms) {
   for (const double stretch : {0.6, 0.9, 1.3, 1.7}) {
-    finite_elements::Specimen bar(liver(), scene::TestMode::Uniaxial);
+    finite_elements::Specimen bar(liver(), material::TestMode::Uniaxial);
     EXPECT_NEAR(*bar.stretch_to(stretch, 0), uniaxial(liver(), stretch),
                 1e-9 * liver().bulk_modulus_pa);
   }
-  finite_elements::Specimen sheet(liver(), scene::TestMode::Equibiaxial);
+  finite_elements::Specimen sheet(liver(), material::TestMode::Equibiaxial);
   EXPECT_NEAR(*sheet.stretch_to(1.3, 0), equibiaxial(liver(), 1.3), 1e-9 * liver().bulk_modulus_pa);
 }
 

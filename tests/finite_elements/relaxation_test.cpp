@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "server/finite_elements/material_point.h"
+#include "server/lab/finite_elements/material_point.h"
 #include "tests/finite_elements/specimens.h"
 
 namespace trocar::finite_elements::testing {
@@ -99,11 +99,11 @@ TEST(Relaxation, VolumeKeepsItsStress) {
 
 // Second Piola-Kirchhoff stress along x of diag(l, b, b): bracket and volumetric part.
 double bracket_xx(double l, double b) {
-  const auto psi = scene::strain_energy(liver(), l * l + 2 * b * b - 3);
+  const auto psi = material::strain_energy(liver(), l * l + 2 * b * b - 3);
   return 2 * psi.first - 2 * liver().coefficients_pa[0] * b * b / l;
 }
 double bracket_yy(double l, double b) {
-  const auto psi = scene::strain_energy(liver(), l * l + 2 * b * b - 3);
+  const auto psi = material::strain_energy(liver(), l * l + 2 * b * b - 3);
   return 2 * psi.first - 2 * liver().coefficients_pa[0] * l;
 }
 

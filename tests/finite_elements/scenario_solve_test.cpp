@@ -1,7 +1,7 @@
 // Scenarios on the off-line solver: where both can, it and the live solver find the same
 // equilibrium; what it cannot do is refused; a stopped run goes on.
 
-#include "server/finite_elements/scenario_solve.h"
+#include "server/lab/finite_elements/scenario_solve.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -10,7 +10,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "server/scenario/scenario_run.h"
+#include "server/lab/scenario/scenario_run.h"
 
 namespace trocar::finite_elements {
 namespace {
@@ -50,10 +50,10 @@ set = "fixed"
 quantity = "reaction"
 )";
 
-scene::ResolvedScenario resolved(const std::string& text) {
-  auto parsed = scene::parse_scenario_text(text, "test.toml");
+scenario::ResolvedScenario resolved(const std::string& text) {
+  auto parsed = scenario::parse_scenario_text(text, "test.toml");
   EXPECT_TRUE(parsed.ok()) << (parsed.ok() ? "" : parsed.error().message);
-  auto resolved = scene::resolve(std::move(*parsed));
+  auto resolved = scenario::resolve(std::move(*parsed));
   EXPECT_TRUE(resolved.ok()) << (resolved.ok() ? "" : resolved.error().message);
   return std::move(*resolved);
 }
@@ -189,7 +189,7 @@ TEST(ScenarioSolve, AMeasuredMaterialRelaxesToItsEquilibrium) {
   const std::string text =
       kColumn + kStatic +
       "[[displace]]\nset = \"top\"\n[[displace.key]]\ntime_s = 0\ndisplacement_mm = [2, 0, 0]\n";
-  ScenarioSettings settings{.material = *scene::find_measured_material("human_liver_nava2008")};
+  ScenarioSettings settings{.material = *material::find_measured_material("human_liver_nava2008")};
   const auto at_once = solve_of(text, settings);
   settings.is_equilibrium = true;
   const auto at_last = solve_of(text, settings);
@@ -333,7 +333,7 @@ TEST(ScenarioSolve, RefusesWhatItCannotDo) {
   tense.insert(tense.find("young_modulus_pa"), "tension = 0.1\n");
   refused(tense, "has no tension");
   refused(tense, "has no tension",
-          {.material = *scene::find_measured_material("human_liver_nava2008")});
+          {.material = *material::find_measured_material("human_liver_nava2008")});
   refused(kColumn +
               "[run]\nseconds = 1\n[[tool]]\nradius_mm = 5\nreach_mm = 10\n[[tool.key]]\n"
               "time_s = 0\nposition_mm = [0, 60, 0]\nverb = \"push\"\n",

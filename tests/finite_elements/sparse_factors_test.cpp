@@ -1,6 +1,6 @@
 // Sparse Cholesky factors: right, and without threads of the library's own.
 
-#include "server/finite_elements/sparse_factors.h"
+#include "server/lab/finite_elements/sparse_factors.h"
 
 #include <gtest/gtest.h>
 

@@ -5,7 +5,7 @@
 namespace trocar::finite_elements::testing {
 
 const HyperelasticMaterial& liver() {
-  return *scene::find_measured_material("human_liver_nava2008");
+  return *material::find_measured_material("human_liver_nava2008");
 }
 
 HyperelasticMaterial liver_without_relaxation() {
@@ -26,7 +26,7 @@ HyperelasticMaterial neo_hookean(double young_pa, double poisson) {
 
 Specimen::Specimen(const std::array<int, 3>& cells, double spacing_m, ElementOrder order,
                    const HyperelasticMaterial& material, const Shape& shape) {
-  const auto organ = scene::make_block({cells[0] + 1, cells[1] + 1, cells[2] + 1, spacing_m});
+  const auto organ = scenario::make_block({cells[0] + 1, cells[1] + 1, cells[2] + 1, spacing_m});
   TROCAR_ASSERT(organ.ok());
   mesh_ = organ->mesh;
   const Vec3d corner = mesh_.rest_positions.front();

@@ -6,13 +6,13 @@
 #include <map>
 #include <vector>
 
-#include "common/scene/scenario_block.h"
-#include "server/finite_elements/solver.h"
-#include "server/finite_elements/surface_traction.h"
+#include "server/lab/finite_elements/solver.h"
+#include "server/lab/finite_elements/surface_traction.h"
+#include "server/lab/scenario/scenario_block.h"
 
 namespace trocar::finite_elements::testing {
 
-using scene::HyperelasticMaterial;
+using material::HyperelasticMaterial;
 
 const HyperelasticMaterial& liver();
 HyperelasticMaterial liver_without_relaxation();

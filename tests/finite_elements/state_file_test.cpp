@@ -1,6 +1,6 @@
 // A calculation that is saved and goes on is the one that was never stopped; bad files are refused.
 
-#include "server/finite_elements/state_file.h"
+#include "server/lab/finite_elements/state_file.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // The material laws at one point: derivatives, rest, frames, closed forms.
 
-#include "server/finite_elements/stress.h"
+#include "server/lab/finite_elements/stress.h"
 
 #include <gtest/gtest.h>
 
@@ -15,11 +15,11 @@ namespace {
 
 std::vector<HyperelasticMaterial> laws() {
   HyperelasticMaterial isochoric = liver(), fung = liver(), fung_isochoric = liver();
-  isochoric.split = scene::VolumeSplit::Isochoric;
-  fung.energy = scene::StrainEnergy::Exponential;
+  isochoric.split = material::VolumeSplit::Isochoric;
+  fung.energy = material::StrainEnergy::Exponential;
   fung.exponent = 2.5;
   fung_isochoric = fung;
-  fung_isochoric.split = scene::VolumeSplit::Isochoric;
+  fung_isochoric.split = material::VolumeSplit::Isochoric;
   return {liver(), isochoric, fung, fung_isochoric, neo_hookean(4000, 0.3)};
 }
 
@@ -118,7 +118,7 @@ TEST(Stress, SmallStrainsAreThoseOfLinearElasticity) {
   EXPECT_NEAR(tangent(3, 3), mu, 1e-9 * mu);
   EXPECT_NEAR(tangent(0, 1), k - mu, 1e-9 * k) << "lambda";
   auto isochoric = liver();
-  isochoric.split = scene::VolumeSplit::Isochoric;
+  isochoric.split = material::VolumeSplit::Isochoric;
   isochoric.coefficients_pa = {liver().coefficients_pa[0], 0, 0, 0, 0};
   const auto other = stress_of(isochoric, Matrix3::Identity());
   const Matrix6 split = other->relaxing.tangent + other->volumetric.tangent;

@@ -1,6 +1,6 @@
 // A fit finds the numbers from which a curve was made, noise and all, and says what it cannot do.
 
-#include "server/fit/fit.h"
+#include "server/lab/fit/fit.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -10,8 +10,8 @@
 #include <fstream>
 #include <numbers>
 
-#include "server/fit/fit_model.h"
-#include "server/scenario/scenario_run.h"
+#include "server/lab/fit/fit_model.h"
+#include "server/lab/scenario/scenario_run.h"
 
 namespace trocar::fit {
 namespace {
@@ -49,13 +49,13 @@ std::string pulled_static(const std::string& material) {
   return text;
 }
 
-scene::ResolvedScenario resolve(const std::string& text) {
-  auto parsed = scene::parse_scenario_text(text, "test.toml");
+scenario::ResolvedScenario resolve(const std::string& text) {
+  auto parsed = scenario::parse_scenario_text(text, "test.toml");
   EXPECT_TRUE(parsed.ok()) << (parsed.ok() ? "" : parsed.error().message);
   if (!parsed) return {};
-  auto resolved = scene::resolve(std::move(*parsed));
+  auto resolved = scenario::resolve(std::move(*parsed));
   EXPECT_TRUE(resolved.ok()) << (resolved.ok() ? "" : resolved.error().message);
-  return resolved.ok() ? std::move(*resolved) : scene::ResolvedScenario{};
+  return resolved.ok() ? std::move(*resolved) : scenario::ResolvedScenario{};
 }
 
 // What a machine would record of a scenario: `noise` of the largest force, of no special form.
@@ -65,7 +65,7 @@ MeasuredCurve recorded(const std::string& text, double noise) {
   scenario::ScenarioRun run(resolved, scenario::Solver::Full);
   MeasuredCurve measured;
   measured.source = "measured.csv";
-  measured.has_times = resolved.scenario.run.mode == scene::RunMode::Dynamic;
+  measured.has_times = resolved.scenario.run.mode == scenario::RunMode::Dynamic;
   double largest = 0;
   while (!run.is_finished()) {
     run.step();
@@ -178,9 +178,9 @@ young_modulus_pa = )") +
 
 TEST(Fit, TheExampleFindsWhatItsCurveWasMadeWith) {
   const std::filesystem::path folder = std::filesystem::path(TROCAR_SOURCE_DIR) / "deploy/scenes";
-  auto parsed = scene::parse_scenario(folder / "stretch.toml");
+  auto parsed = scenario::parse_scenario(folder / "stretch.toml");
   ASSERT_TRUE(parsed.ok()) << parsed.error().message;
-  const auto resolved = scene::resolve(std::move(*parsed));
+  const auto resolved = scenario::resolve(std::move(*parsed));
   ASSERT_TRUE(resolved.ok()) << resolved.error().message;
   const auto measured = read_measurements(folder / "stretch.csv");
   ASSERT_TRUE(measured.ok()) << measured.error().message;

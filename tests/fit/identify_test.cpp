@@ -1,7 +1,7 @@
 // Identification of a measured material: table 1 from generated curves, with and without noise;
 // what data cannot tell; and what is refused.
 
-#include "server/fit/identify.h"
+#include "server/lab/fit/identify.h"
 
 #include <gtest/gtest.h>
 
@@ -11,26 +11,26 @@
 #include <map>
 #include <numbers>
 
-#include "common/scene/material_file.h"
-#include "server/finite_elements/material_point.h"
-#include "server/fit/identify_report.h"
+#include "server/lab/finite_elements/material_point.h"
+#include "server/lab/fit/identify_report.h"
+#include "server/organs/material/material_file.h"
 #include "tests/support/random.h"
 
 namespace trocar::fit {
 namespace {
 
-const scene::HyperelasticMaterial& table_one() {
-  return *scene::find_measured_material("human_liver_nava2008");
+const material::HyperelasticMaterial& table_one() {
+  return *material::find_measured_material("human_liver_nava2008");
 }
 
 constexpr double kRise_s = 0.2;
 
 // Ramp and hold, sampled every 5 ms while it rises, then ever more slowly. Made with steps of at
 // most 0.5 ms and 0.1 %, finer than what the identification does between rows.
-TestCurve generated(const std::string& name, scene::TestMode mode, double end, double hold_s,
-                    const scene::HyperelasticMaterial& material = table_one()) {
+TestCurve generated(const std::string& name, material::TestMode mode, double end, double hold_s,
+                    const material::HyperelasticMaterial& material = table_one()) {
   TestCurve curve{name, name, mode, 0.02, 1e-4, {}, {}, {}};
-  const double rest = mode == scene::TestMode::SimpleShear ? 0 : 1;
+  const double rest = mode == material::TestMode::SimpleShear ? 0 : 1;
   for (int i = 0; i <= 40; ++i) curve.times_s.push_back(kRise_s * i / 40);
   for (double since = 0.02; since < hold_s; since *= 1.12) curve.times_s.push_back(kRise_s + since);
   finite_elements::Specimen specimen(material, mode);
@@ -54,9 +54,9 @@ TestCurve generated(const std::string& name, scene::TestMode mode, double end, d
 
 const std::vector<TestCurve>& clean_curves() {
   static const std::vector<TestCurve> kCurves{
-      generated("tension", scene::TestMode::Uniaxial, 1.8, 40),
-      generated("compression", scene::TestMode::Uniaxial, 0.5, 40),
-      generated("shear", scene::TestMode::SimpleShear, 0.6, 40)};
+      generated("tension", material::TestMode::Uniaxial, 1.8, 40),
+      generated("compression", material::TestMode::Uniaxial, 0.5, 40),
+      generated("shear", material::TestMode::SimpleShear, 0.6, 40)};
   return kCurves;
 }
 
@@ -140,7 +140,7 @@ TEST(Identify, TissueThatRelaxesAlmostWhollyIsIdentified) {
   material.coefficients_pa = {883.8};
   material.relaxation = {{0.9949, 0.5}};
   const std::vector<TestCurve> curves{
-      generated("tension", scene::TestMode::Uniaxial, 1.3, 40, material)};
+      generated("tension", material::TestMode::Uniaxial, 1.3, 40, material)};
   for (const double start : {0.5, 0.994995, 0.995}) {
     const auto found = identify(curves, {.order = 1, .start = {{start, 1}}});
     ASSERT_TRUE(found.ok()) << found.error().message;
@@ -156,12 +156,12 @@ TEST(Identify, IntervalsOfFewRowsAreStudents) {
                                               {4, 2.776},  {5, 2.571}, {8, 2.306}};
   trocar::testing::Random random(5);
   for (const auto& [freedom, t] : student) {
-    TestCurve curve{"", "tension", scene::TestMode::Uniaxial, 0.02, 1e-4, {}, {}, {}};
+    TestCurve curve{"", "tension", material::TestMode::Uniaxial, 0.02, 1e-4, {}, {}, {}};
     for (std::size_t i = 0; i <= freedom; ++i) {
       curve.times_s.push_back(static_cast<double>(i));
       curve.stretches.push_back(1.01 + 0.01 * static_cast<double>(i));
     }
-    scene::HyperelasticMaterial unit;
+    material::HyperelasticMaterial unit;
     unit.coefficients_pa[0] = 1;
     unit.bulk_modulus_pa = 40;
     const auto slopes = predicted_stresses(unit, curve);
@@ -184,7 +184,7 @@ TEST(Identify, IntervalsOfFewRowsAreStudents) {
 
 TEST(Identify, SaysWhatTheDataCannotTell) {
   // Only the ramp: nothing of the slow relaxation.
-  auto ramp = generated("tension", scene::TestMode::Uniaxial, 1.15, 40);
+  auto ramp = generated("tension", material::TestMode::Uniaxial, 1.15, 40);
   ramp.times_s.resize(41), ramp.stretches.resize(41), ramp.stresses_pa.resize(41);
   trocar::testing::Random random(3);
   for (auto& stress : ramp.stresses_pa)
@@ -201,11 +201,11 @@ TEST(Identify, SaysWhatTheDataCannotTell) {
 
 TEST(Identify, TheIsochoricFormIsIdentifiedToo) {
   auto material = table_one();
-  material.split = scene::VolumeSplit::Isochoric;
+  material.split = material::VolumeSplit::Isochoric;
   const std::vector<TestCurve> curves{
-      generated("tension", scene::TestMode::Uniaxial, 1.8, 40, material),
-      generated("compression", scene::TestMode::Uniaxial, 0.5, 40, material)};
-  const auto found = identify(curves, {.split = scene::VolumeSplit::Isochoric});
+      generated("tension", material::TestMode::Uniaxial, 1.8, 40, material),
+      generated("compression", material::TestMode::Uniaxial, 0.5, 40, material)};
+  const auto found = identify(curves, {.split = material::VolumeSplit::Isochoric});
   ASSERT_TRUE(found.ok()) << found.error().message;
   for (const auto& c : found->constants)
     EXPECT_NEAR(c.value, true_value(c.name), 0.02 * true_value(c.name))
@@ -249,11 +249,11 @@ TEST(IdentifyReport, HasEachConstantAndRow) {
 
 TEST(IdentifyReport, WhatItLeavesIsRead) {
   IdentifyOptions options{.name = "a \"\\ b\t\x7f \xC3\xA4", .order = 2, .term_count = 1};
-  for (const auto split : {scene::VolumeSplit::Unsplit, scene::VolumeSplit::Isochoric}) {
+  for (const auto split : {material::VolumeSplit::Unsplit, material::VolumeSplit::Isochoric}) {
     options.split = split;
     const auto found = identify(clean_curves(), options);
     ASSERT_TRUE(found.ok()) << found.error().message;
-    const auto read = scene::parse_material_text(to_toml(*found), "material.toml");
+    const auto read = material::parse_material_text(to_toml(*found), "material.toml");
     ASSERT_TRUE(read.ok()) << read.error().message << to_toml(*found);
     EXPECT_EQ(read->name, options.name);
     EXPECT_EQ(read->split, split);

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/scene/organ_file.h"
+#include "server/organs/organ/organ_file.h"
 #include "tests/support/program_fixture.h"
 
 namespace trocar {
@@ -44,7 +44,7 @@ TEST_F(OrganProgram, MakesOrgansWithFibresAndShowsThem) {
            "3", "--blade-friction", "900", "--tear-stretch", "1.5", "--out", at("a.organ")}),
       0)
       << log();
-  const auto organ = scene::read_organ(at("a.organ"));
+  const auto organ = organ::read_organ(at("a.organ"));
   ASSERT_TRUE(organ.ok());
   EXPECT_EQ(organ->fibre_directions.size(), organ->mesh.node_count());
   EXPECT_EQ(organ->material.fibre_tension, 0.08);
@@ -82,12 +82,12 @@ TEST_F(OrganProgram, RefusesFibresAndTearsThatCannotBe) {
 TEST_F(OrganProgram, MakesTheOrganOfAScenario) {
   const auto scene = std::filesystem::path(TROCAR_SOURCE_DIR) / "deploy/scenes/tumour.toml";
   ASSERT_EQ(run({"make", scene.string(), "--averaged-strain", "--out", at("a.organ")}), 0) << log();
-  const auto organ = scene::read_organ(at("a.organ"));
+  const auto organ = organ::read_organ(at("a.organ"));
   ASSERT_TRUE(organ.ok());
   EXPECT_EQ(organ->name, "tumour");
   ASSERT_EQ(organ->regions.size(), 2u);
   for (const auto& region : organ->regions) EXPECT_TRUE(region.material.has_averaged_strain);
-  EXPECT_EQ(organ->material.elastic_law, scene::ElasticLaw::Measured);
+  EXPECT_EQ(organ->material.elastic_law, material::ElasticLaw::Measured);
   EXPECT_EQ(run({"make", scene.string(), "--tets", "2000", "--out", at("b.organ")}), 2);
   expect_line("--tets does not apply");
   EXPECT_EQ(run({"make", at("none.toml"), "--out", at("b.organ")}), 3);
@@ -116,7 +116,7 @@ TEST_F(OrganProgram, FitFindsTheStiffnessFromWhichTheExamplesCurveWasMade) {
   const auto material = read(folder_ / "out" / "material.toml");
   EXPECT_TRUE(material.starts_with("[material]\n")) << material;
   EXPECT_EQ(number_after(material, "young_modulus_pa = "), printed);
-  const auto organ = scene::read_organ(at("fitted.organ"));
+  const auto organ = organ::read_organ(at("fitted.organ"));
   ASSERT_TRUE(organ.ok()) << organ.error().message;
   EXPECT_NEAR(organ->material.young_modulus_pa, printed, 0.01);
   EXPECT_NE(read(folder_ / "out" / "fit.svg").find("</svg>"), std::string::npos);
@@ -211,7 +211,7 @@ TEST_F(OrganProgram, SettleWritesAnOrganThatIsAtRestUnderItsGravity) {
   EXPECT_GT(mean, 0.3 * largest);
   EXPECT_LT(mean, largest);
   EXPECT_LE(number_after(log(), "sweeps, "), 1e-6);
-  const auto organ = scene::read_organ(settled);
+  const auto organ = organ::read_organ(settled);
   ASSERT_TRUE(organ.ok()) << organ.error().message;
   EXPECT_EQ(organ->gravity_m_s2, (Vec3d{0, -2, 0}));
   EXPECT_EQ(organ->stress_free_positions_m.size(), organ->mesh.node_count());
@@ -222,7 +222,7 @@ TEST_F(OrganProgram, SettleWritesAnOrganThatIsAtRestUnderItsGravity) {
   ASSERT_EQ(settle(settled, {"--gravity", "0,-6,0", "-o", at("on.organ")}), 0) << log();
   ASSERT_EQ(settle(scenario_, {"--gravity", "0,-6,0", "-o", at("at_once.organ")}), 0) << log();
   EXPECT_GT(number_after(log(), "nodes moved by "), 2.9 * largest);
-  const auto on = scene::read_organ(at("on.organ")), once = scene::read_organ(at("at_once.organ"));
+  const auto on = organ::read_organ(at("on.organ")), once = organ::read_organ(at("at_once.organ"));
   ASSERT_TRUE(on.ok() && once.ok());
   ASSERT_EQ(on->mesh.node_count(), once->mesh.node_count());
   for (std::size_t i = 0; i < on->mesh.node_count(); ++i)

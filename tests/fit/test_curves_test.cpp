@@ -1,6 +1,6 @@
 // Force curves of specimens from CSV files: units and signs, and one line for each mistake.
 
-#include "server/fit/test_curves.h"
+#include "server/lab/fit/test_curves.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // The full solution beside a session with a reduction: frames of a real simulation loop.
 
-#include "server/ghost/ghost.h"
+#include "server/session/ghost/ghost.h"
 
 #include <gtest/gtest.h>
 
@@ -9,13 +9,13 @@
 #include <mutex>
 
 #include "server/app/simulation_loop.h"
-#include "tests/reduction/reduced_block.h"
+#include "tests/reduce/reduced_block.h"
 
 namespace trocar::ghost {
 namespace {
 
-const reduction::testing::ReducedBlock& made() {
-  static const reduction::testing::ReducedBlock instance(6);
+const reduce::testing::ReducedBlock& made() {
+  static const reduce::testing::ReducedBlock instance(6);
   return instance;
 }
 
@@ -25,7 +25,7 @@ class Session {
  public:
   explicit Session(bool is_cut = false) : is_cut_(is_cut) {
     for (std::uint8_t hand = 0; hand < 2; ++hand) {
-      session::HandJoin join{.slot = {hand}};
+      hands::HandJoin join{.slot = {hand}};
       if (hand == 0)
         join.shapes[0] = {.radius_m = 0.012f, .length_m = 0.3f, .reach_m = 0.012f};
       else
@@ -53,19 +53,19 @@ class Session {
     const float height = 0.003f - std::min(0.008f, 0.05f * t);
     inbox_.push_sample({tool_slot({0}, 0),
                         {{{at.x, at.y + height, at.z + 0.004f * t}, rotation_from_z({0, 1, 0})},
-                         scene::Verb::Push}});
+                         tool::Verb::Push}});
     const float since = is_cut_ ? t - 0.6f : -1;
     const float depth = since < 0 ? -0.05f : since < 0.4f ? 0.01f : -0.03f;
     const float x = -0.04f + 0.1f * std::clamp(since, 0.0f, 0.4f);
     inbox_.push_sample(
         {tool_slot({1}, 0),
          {{{x, 0.03f - depth, at.z > 0 ? -0.05f : 0.05f}, rotation_from_z({0, 1, 0})},
-          since > 0 && since < 0.4f ? scene::Verb::Cut : scene::Verb::None}});
+          since > 0 && since < 0.4f ? tool::Verb::Cut : tool::Verb::None}});
   }
 
   const bool is_cut_;
   step::Simulation simulation_{made().organ, 1, made().local};
-  session::SimulationInbox inbox_;
+  participants::SimulationInbox inbox_;
   app::FrameHandover handover_{[] {}};
   app::SimulationLoop loop_{simulation_, inbox_, handover_, nullptr, {}, [] {}};
   std::vector<step::SharedFrame> frames_;

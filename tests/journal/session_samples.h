@@ -1,6 +1,7 @@
 #pragma once
 
-// A made-up session: 62.5 frames a second with a moving surface, as server/recording writes it.
+// A made-up session: 62.5 frames a second with a moving surface, as server/session/recording writes
+// it.
 
 #include <string>
 

@@ -2,7 +2,7 @@
 
 // A block of n x n x n cubes, six tets each, for tests that need a plain mesh.
 
-#include "common/mesh/tet_mesh.h"
+#include "server/organs/mesh/tet_mesh.h"
 
 namespace trocar::testing {
 

@@ -1,4 +1,4 @@
-#include "common/mesh/gmsh_reader.h"
+#include "server/organs/mesh/gmsh_reader.h"
 
 #include <gtest/gtest.h>
 

@@ -8,7 +8,7 @@
 #include <filesystem>
 #include <set>
 
-#include "common/mesh/gmsh_reader.h"
+#include "server/organs/mesh/gmsh_reader.h"
 #include "tests/support/shared.h"
 
 namespace trocar::mesh {

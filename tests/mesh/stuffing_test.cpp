@@ -1,4 +1,4 @@
-#include "common/mesh/stuffing.h"
+#include "server/organs/mesh/stuffing.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <numbers>
 #include <random>
 
-#include "common/mesh/pieces.h"
+#include "server/organs/mesh/pieces.h"
 
 namespace trocar::mesh {
 namespace {

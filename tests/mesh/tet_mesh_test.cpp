@@ -1,4 +1,4 @@
-#include "common/mesh/tet_mesh.h"
+#include "server/organs/mesh/tet_mesh.h"
 
 #include <gtest/gtest.h>
 

@@ -180,7 +180,7 @@ TEST(Handshake, the_seventeenth_hand_is_told_full_and_may_still_watch) {
             proto::GOODBYE_FULL);
   RawClient watcher(session.port());
   EXPECT_TRUE(watcher.join("late", proto::ROLE_OBSERVER));
-  session::TickInputs inputs;
+  hands::TickInputs inputs;
   session.inbox.drain(inputs);
   EXPECT_EQ(inputs.joins.size(), static_cast<std::size_t>(kMaxHands));
   EXPECT_TRUE(inputs.leaves.empty());

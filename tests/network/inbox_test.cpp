@@ -1,7 +1,7 @@
 // The inbox against a plain model: what reaches the tick is what a simulation that saw every item
 // in order would hold; and what happens when it is full.
 
-#include "server/session/inbox.h"
+#include "server/session/participants/inbox.h"
 
 #include <gtest/gtest.h>
 
@@ -11,17 +11,17 @@
 #include <set>
 #include <thread>
 
-namespace trocar::session {
+namespace trocar::participants {
 namespace {
 
-HandJoin join_of(std::uint8_t slot, float tag) {
-  HandJoin join{{slot}, 2, {}};
+hands::HandJoin join_of(std::uint8_t slot, float tag) {
+  hands::HandJoin join{{slot}, 2, {}};
   join.shapes[0].radius_m = tag;
   return join;
 }
 
-ToolInput sample_of(std::uint8_t tool, float tag) {
-  ToolInput input{{tool}, {}};
+hands::ToolInput sample_of(std::uint8_t tool, float tag) {
+  hands::ToolInput input{{tool}, {}};
   input.sample.world_from_tool.position.x = tag;
   return input;
 }
@@ -44,7 +44,7 @@ TEST(Inbox, a_tick_sees_the_same_as_one_who_saw_every_item) {
     std::mt19937 random(seed);
     SimulationInbox inbox;
     Model truth, admitted;
-    TickInputs inputs;
+    hands::TickInputs inputs;
     float tag = 0;
     for (int tick = 0; tick < 20; ++tick) {
       for (auto actions = random() % 40; actions > 0; --actions) {
@@ -98,7 +98,7 @@ TEST(Inbox, when_full_samples_are_dropped_and_counted_and_everybody_can_still_le
     ASSERT_LT(++rejoins, SimulationInbox::kReservedForJoins);
   }
   for (std::uint8_t slot = 1; slot < kMaxHands; ++slot) inbox.push_leave({slot});
-  TickInputs inputs;
+  hands::TickInputs inputs;
   inbox.drain(inputs);
   EXPECT_TRUE(inputs.empty()) << "all came and went within one tick";
   EXPECT_TRUE(inbox.try_push_join(join_of(0, 3))) << "there is room again";
@@ -114,7 +114,7 @@ TEST(Inbox, two_threads_lose_nothing_but_superseded_samples) {
     is_done = true;
   });
   std::array<float, 4> newest{};
-  TickInputs inputs;
+  hands::TickInputs inputs;
   const auto take = [&] {
     inbox.drain(inputs);
     for (const auto& input : inputs.samples) {
@@ -130,4 +130,4 @@ TEST(Inbox, two_threads_lose_nothing_but_superseded_samples) {
 }
 
 }  // namespace
-}  // namespace trocar::session
+}  // namespace trocar::participants

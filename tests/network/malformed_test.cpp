@@ -79,7 +79,7 @@ TEST_F(Malformed, every_field_of_a_tool_sample_out_of_range_ends_the_session_wit
     EXPECT_TRUE(goodbye.text().starts_with("ToolSample")) << goodbye.text();
     expect_watcher_undisturbed();
   }
-  session::TickInputs inputs;
+  hands::TickInputs inputs;
   session_.inbox.drain(inputs);
   EXPECT_TRUE(inputs.samples.empty()) << "none of them may reach the simulation";
 }
@@ -96,12 +96,12 @@ TEST_F(Malformed, samples_at_the_edge_of_the_ranges_are_taken_and_renormalised) 
   ping.mutable_ping()->set_client_time_us(1);
   ASSERT_TRUE(client.send(ping));
   ASSERT_TRUE(client.receive(Envelope::kPong)) << "the sample was refused";
-  session::TickInputs inputs;
+  hands::TickInputs inputs;
   session_.inbox.drain(inputs);
   ASSERT_EQ(inputs.samples.size(), 1u);
   EXPECT_EQ(norm(inputs.samples[0].sample.world_from_tool.orientation), 1.0f);
   EXPECT_EQ(inputs.samples[0].sample.world_from_tool.position.y, 2.0f);
-  EXPECT_EQ(inputs.samples[0].sample.verb, scene::Verb::Grasp);
+  EXPECT_EQ(inputs.samples[0].sample.verb, tool::Verb::Grasp);
 }
 
 TEST_F(Malformed, a_sequence_that_does_not_grow_ends_the_session) {
@@ -254,7 +254,7 @@ TEST_F(Malformed, random_bytes_and_random_changes_to_valid_messages) {
     if (seed % 20 == 0) expect_watcher_undisturbed();
   }
   expect_watcher_undisturbed();
-  session::TickInputs inputs;
+  hands::TickInputs inputs;
   session_.inbox.drain(inputs);
   for (const auto& input : inputs.samples) {
     EXPECT_TRUE(is_finite(input.sample.world_from_tool.position));

@@ -7,8 +7,8 @@ namespace {
 
 using proto::Envelope;
 
-constexpr scene::LatticeSize kBigSurface{24, 12, 24, 0.01};  // 2,110 vertices on the surface
-constexpr std::size_t kManyChanges = 6000;                   // a delta of about 10 KB
+constexpr catalogue::LatticeSize kBigSurface{24, 12, 24, 0.01};  // 2,110 vertices on the surface
+constexpr std::size_t kManyChanges = 6000;                       // a delta of about 10 KB
 
 replication::ReplicatorCounters counters_of(LiveSession& session) {
   return session.on_io([&] { return session.replicator().counters(); });
@@ -91,9 +91,9 @@ TEST(SlowReader, who_does_not_even_read_what_cannot_be_skipped_is_dropped) {
   RawClient healthy(session.port()), slow(session.port(), 8 * 1024);
   ASSERT_TRUE(healthy.join("healthy", proto::ROLE_OBSERVER));
   ASSERT_TRUE(slow.join("slow", proto::ROLE_OBSERVER));
-  const locks::ClaimEvent event{1, {0}, scene::Verb::Grasp, locks::ClaimOutcome::Released, {}};
+  const hands::ClaimEvent event{1, {0}, tool::Verb::Grasp, hands::ClaimOutcome::Released, {}};
   for (int i = 0; i < 200 && session.sessions() == 2; ++i) {
-    session.publish(0, std::vector<locks::ClaimEvent>(500, event));
+    session.publish(0, std::vector<hands::ClaimEvent>(500, event));
     for (int k = 0; k < 500; ++k) ASSERT_TRUE(healthy.receive(Envelope::kClaimEvent));
   }
   EXPECT_EQ(session.sessions(), 1u);
@@ -317,14 +317,14 @@ TEST(Replication, claim_events_of_skipped_frames_arrive_with_names) {
   RawClient anna(session.port()), ben(session.port());
   ASSERT_TRUE(anna.join("Anna", proto::ROLE_SURGEON));
   ASSERT_TRUE(ben.join("Ben", proto::ROLE_ASSISTANT));
-  const auto with_event = [&](locks::ClaimEvent event) {
+  const auto with_event = [&](hands::ClaimEvent event) {
     auto frame = std::make_shared<step::PublishedFrame>(*session.make_frame(1));
     frame->claim_events.push_back(event);
     return step::SharedFrame(frame);
   };
   const std::vector<step::SharedFrame> frames = {
-      with_event({3, {0}, scene::Verb::Grasp, locks::ClaimOutcome::Granted, {}}),
-      with_event({20, {2}, scene::Verb::Grasp, locks::ClaimOutcome::RefusedHeld, {0}})};
+      with_event({3, {0}, tool::Verb::Grasp, hands::ClaimOutcome::Granted, {}}),
+      with_event({20, {2}, tool::Verb::Grasp, hands::ClaimOutcome::RefusedHeld, {0}})};
   session.on_io([&] { session.replicator().publish(frames); });
   for (auto* client : {&anna, &ben}) {
     const auto granted = client->receive(Envelope::kClaimEvent);

@@ -107,15 +107,15 @@ TEST(DurationHistogram, quantiles_within_two_per_cent) {
 // A journal that only keeps what it was given.
 struct KeepingSink final : app::JournalSink {
   void take_frame(const step::SharedFrame& frame) override { frames.push_back(frame); }
-  void take_participants(const std::vector<session::Participant>&, Tick) override {}
+  void take_participants(const std::vector<participants::Participant>&, Tick) override {}
   Status close() override { return {}; }
   std::vector<step::SharedFrame> frames;
 };
 
 TEST(SimulationLoop, its_records_and_snapshot_simulate_the_session_again) {
-  const auto organ = *scene::make_lattice({8, 5, 8, 0.01});
+  const auto organ = *catalogue::make_lattice({8, 5, 8, 0.01});
   step::Simulation simulation(organ);
-  session::SimulationInbox inbox;
+  participants::SimulationInbox inbox;
   app::FrameHandover handover([] {});
   KeepingSink sink;
   app::SimulationLoop loop(simulation, inbox, handover, &sink, {.tick_count = 500}, [] {});
@@ -127,10 +127,10 @@ TEST(SimulationLoop, its_records_and_snapshot_simulate_the_session_again) {
     ASSERT_TRUE(tick != 5 || inbox.try_push_join({{0}, 1, {}}));
     if (tick == 400) inbox.push_leave({0});
     if (tick > 5 && tick < 400) {
-      session::ToolInput input{{0}, {}};
+      hands::ToolInput input{{0}, {}};
       const auto sway = static_cast<float>(random() % 100) * 1e-5f;
       input.sample.world_from_tool = {{0.005f + sway, 0.018f, 0.005f}, rotation_from_z({0, 1, 0})};
-      input.sample.verb = scene::Verb::Push;
+      input.sample.verb = tool::Verb::Push;
       inbox.push_sample(input);
     }
     is_last = loop.run_tick();
@@ -161,9 +161,9 @@ TEST(SimulationLoop, its_records_and_snapshot_simulate_the_session_again) {
 }
 
 TEST(SimulationLoop, a_later_snapshot_restores_to_the_hashes_that_follow) {
-  const auto organ = *scene::make_lattice({4, 3, 4, 0.01});
+  const auto organ = *catalogue::make_lattice({4, 3, 4, 0.01});
   step::Simulation simulation(organ);
-  session::SimulationInbox inbox;
+  participants::SimulationInbox inbox;
   app::FrameHandover handover([] {});
   KeepingSink sink;
   app::SimulationLoop loop(simulation, inbox, handover, &sink, {.tick_count = 10'100}, [] {});

@@ -165,8 +165,8 @@ proto::Envelope make_sample(std::uint32_t sequence) {
 // ---- LiveSession ----
 
 LiveSession::LiveSession(net::TcpServerOptions tcp, replication::ReplicatorOptions options,
-                         scene::LatticeSize size)
-    : organ_(*scene::make_lattice(size)), layout_(wire::make_surface_layout(organ_)) {
+                         catalogue::LatticeSize size)
+    : organ_(*catalogue::make_lattice(size)), layout_(wire::make_surface_layout(organ_)) {
   tcp.port = 0;
   auto listening = net::TcpServer::listen(io_, tcp);
   EXPECT_TRUE(listening.ok());
@@ -207,7 +207,7 @@ step::SharedFrame LiveSession::make_frame(std::size_t changes, bool is_cut) {
   return frame;
 }
 
-step::SharedFrame LiveSession::publish(std::size_t changes, std::vector<locks::ClaimEvent> events) {
+step::SharedFrame LiveSession::publish(std::size_t changes, std::vector<hands::ClaimEvent> events) {
   auto frame = std::make_shared<step::PublishedFrame>(*make_frame(changes));
   frame->claim_events = std::move(events);
   const step::SharedFrame shared = std::move(frame);

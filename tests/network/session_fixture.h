@@ -16,13 +16,13 @@
 #include <random>
 #include <thread>
 
-#include "common/scene/builtin_organs.h"
 #include "common/wire/surface_codec.h"
 #include "common/wire/surface_layout.h"
 #include "proto/wire.pb.h"
-#include "server/net/tcp_server.h"
-#include "server/replication/replicator.h"
-#include "server/session/inbox.h"
+#include "server/organs/catalogue/builtin_organs.h"
+#include "server/session/net/tcp_server.h"
+#include "server/session/participants/inbox.h"
+#include "server/session/replication/replicator.h"
 #include "tests/support/random.h"
 
 namespace trocar::testing {
@@ -78,7 +78,7 @@ proto::Envelope make_sample(std::uint32_t sequence);
 class LiveSession {
  public:
   explicit LiveSession(net::TcpServerOptions tcp = {}, replication::ReplicatorOptions options = {},
-                       scene::LatticeSize size = {8, 5, 8, 0.01});
+                       catalogue::LatticeSize size = {8, 5, 8, 0.01});
   ~LiveSession();
 
   std::uint16_t port() const { return port_; }
@@ -95,7 +95,7 @@ class LiveSession {
   }
 
   // Publishes the next frame: the last surface with `changes` vertices moved.
-  step::SharedFrame publish(std::size_t changes, std::vector<locks::ClaimEvent> events = {});
+  step::SharedFrame publish(std::size_t changes, std::vector<hands::ClaimEvent> events = {});
   // Makes the next frame without publishing it; `is_cut`: with a change of the surface.
   step::SharedFrame make_frame(std::size_t changes, bool is_cut = false);
   void publish_all(const std::vector<step::SharedFrame>& frames);
@@ -103,12 +103,12 @@ class LiveSession {
   // Waits until there are this many connections (joined or not); false after 10 s.
   bool wait_for_sessions(std::size_t count);
 
-  session::SimulationInbox inbox;
+  participants::SimulationInbox inbox;
   net::TcpServer& tcp() { return *tcp_; }                         // inside on_io
   replication::Replicator& replicator() { return *replicator_; }  // inside on_io
 
  private:
-  scene::Organ organ_;
+  organ::Organ organ_;
   wire::SurfaceLayout layout_;
   asio::io_context io_{1};
   asio::executor_work_guard<asio::io_context::executor_type> work_{io_.get_executor()};

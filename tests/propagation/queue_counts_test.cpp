@@ -4,15 +4,15 @@
 
 #include <set>
 
-#include "common/scene/builtin_organs.h"
-#include "server/propagation/queue.h"
+#include "server/organs/catalogue/builtin_organs.h"
+#include "server/tissue/propagation/queue.h"
 
 namespace trocar::propagation {
 namespace {
 
 class LatticeQueue : public ::testing::Test {
  protected:
-  LatticeQueue() : organ(scene::make_lattice()), queue(organ.mesh.node_count()) {}
+  LatticeQueue() : organ(catalogue::make_lattice()), queue(organ.mesh.node_count()) {}
 
   NodeIndex nearest(Vec3d place) const {
     std::size_t best = 0;
@@ -31,7 +31,7 @@ class LatticeQueue : public ::testing::Test {
     return queue.nodes().size();
   }
 
-  scene::Organ organ;
+  organ::Organ organ;
   PropagationQueue queue;
 };
 

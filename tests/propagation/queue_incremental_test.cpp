@@ -11,8 +11,8 @@
 #include <random>
 #include <set>
 
-#include "common/scene/builtin_organs.h"
-#include "server/propagation/queue.h"
+#include "server/organs/catalogue/builtin_organs.h"
+#include "server/tissue/propagation/queue.h"
 
 namespace trocar::propagation {
 namespace {
@@ -235,12 +235,12 @@ void expect_history_has_no_effect(const Neighbours::Table& graph, unsigned seed,
 }
 
 TEST(QueueHistory, HasNoEffectOnTheLattice) {
-  const auto organ = scene::make_lattice({12, 8, 12, 0.01});
+  const auto organ = catalogue::make_lattice({12, 8, 12, 0.01});
   expect_history_has_no_effect(organ.value().mesh.node_neighbours, 1, 2000);
 }
 
 TEST(QueueHistory, HasNoEffectOnTheLiver) {
-  const auto organ = scene::make_liver();
+  const auto organ = catalogue::make_liver();
   expect_history_has_no_effect(organ.value().mesh.node_neighbours, 2, 1000);
 }
 

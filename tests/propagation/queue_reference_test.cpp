@@ -11,8 +11,8 @@
 #include <optional>
 #include <set>
 
-#include "common/scene/builtin_organs.h"
-#include "server/step/simulation.h"
+#include "server/organs/catalogue/builtin_organs.h"
+#include "server/tissue/step/simulation.h"
 
 namespace trocar::propagation {
 namespace {
@@ -80,7 +80,7 @@ ReferenceQueue reference_queue(const Graph& graph,
 // Eq. 1 of Choi 2002 by implicit Euler in double: minimises each node's own potential in turn.
 class ReferenceSolver {
  public:
-  ReferenceSolver(const scene::Organ& o, const Graph& g) : organ(o), graph(g) {
+  ReferenceSolver(const organ::Organ& o, const Graph& g) : organ(o), graph(g) {
     u.resize(o.mesh.node_count());
     v.resize(o.mesh.node_count());
   }
@@ -166,12 +166,12 @@ class ReferenceSolver {
     return {b[0], b[1], b[2]};
   }
 
-  const scene::Organ& organ;
+  const organ::Organ& organ;
   const Graph& graph;
 };
 
 TEST(TwoContactsThatApproach, QueueMergeAndSolveEqualAnIndependentReference) {
-  const auto organ = scene::make_lattice();
+  const auto organ = catalogue::make_lattice();
   Graph graph(organ.mesh.node_count());
   for (const auto& [a, b] : organ.mesh.links) {
     graph[a.value].push_back(b.value);
@@ -183,16 +183,16 @@ TEST(TwoContactsThatApproach, QueueMergeAndSolveEqualAnIndependentReference) {
     return out;
   }();
 
-  step::Simulation simulation(scene::make_lattice());
+  step::Simulation simulation(catalogue::make_lattice());
   ReferenceSolver reference(organ, graph);
   step::TickDecisions decisions{
       .depth_limit = 5, .node_limit = 100'000, .sweeps = 6, .boundary = world::Boundary::Frozen};
   // Over-relaxation has a safeguard that compares sums: a tie would be decided by rounding.
   decisions.over_relaxation = 1.0f;
 
-  session::TickInputs inputs;
+  hands::TickInputs inputs;
   for (std::uint8_t hand = 0; hand < 2; ++hand) {
-    session::HandJoin join{.slot = {hand}};
+    hands::HandJoin join{.slot = {hand}};
     join.shapes[0].radius_m = 0.012f;
     inputs.joins.push_back(join);
   }
@@ -206,10 +206,10 @@ TEST(TwoContactsThatApproach, QueueMergeAndSolveEqualAnIndependentReference) {
     for (const int hand : {0, 1}) {
       const double x = (hand == 0 ? -1 : 1) * (0.10 - 0.09 * tick / kTicks);
       const double depth = 0.004 * std::min(1.0, tick / 100.0);
-      session::ToolInput sample{.tool = tool_slot({static_cast<std::uint8_t>(hand)}, 0)};
+      hands::ToolInput sample{.tool = tool_slot({static_cast<std::uint8_t>(hand)}, 0)};
       sample.sample.world_from_tool = {to_float(Vec3d{x, top - depth, 0.004}),
                                        rotation_from_z({0, 1, 0})};
-      sample.sample.verb = scene::Verb::Push;
+      sample.sample.verb = tool::Verb::Push;
       inputs.samples.push_back(sample);
     }
     // Each tick's solve starts from the engine's state: what differs after it is one tick's

@@ -5,17 +5,17 @@
 
 #include <algorithm>
 
-#include "common/scene/builtin_organs.h"
-#include "server/propagation/queue.h"
+#include "server/organs/catalogue/builtin_organs.h"
+#include "server/tissue/propagation/queue.h"
 
 namespace trocar::propagation {
 namespace {
 
-constexpr scene::LatticeSize kSize;
+constexpr catalogue::LatticeSize kSize;
 
 class QueueWork : public ::testing::Test {
  protected:
-  QueueWork() : organ(scene::make_lattice()), queue(organ.mesh.node_count()) {}
+  QueueWork() : organ(catalogue::make_lattice()), queue(organ.mesh.node_count()) {}
 
   // Top nodes with i in [i_begin, i_end) and k in [k_begin, k_end).
   static std::vector<NodeIndex> patch(int i_begin, int i_end, int k_begin, int k_end) {
@@ -36,7 +36,7 @@ class QueueWork : public ::testing::Test {
     return changed;
   }
 
-  scene::Organ organ;
+  organ::Organ organ;
   PropagationQueue queue;
 };
 

@@ -4,10 +4,10 @@
 
 #include <random>
 
-#include "common/scene/builtin_organs.h"
 #include "common/wire/surface_codec.h"
-#include "server/recording/recorder.h"
-#include "server/recording/verify.h"
+#include "server/organs/catalogue/builtin_organs.h"
+#include "server/session/recording/recorder.h"
+#include "server/session/recording/verify.h"
 #include "tests/replay/recorded_session.h"
 #include "tests/support/surface_edits.h"
 
@@ -21,7 +21,7 @@ class RecordedCuts : public ::testing::Test {
   // `frames` frames, the surface cut in every third; those in `dropped` are too large for the
   // queue.
   void record(Frame frames, const std::vector<Frame>& dropped = {}) {
-    const scene::Organ organ = *scene::make_lattice({6, 4, 6, 0.01});
+    const organ::Organ organ = *catalogue::make_lattice({6, 4, 6, 0.01});
     wire::SurfaceLayout layout = wire::make_surface_layout(organ);
     auto recorder = recording::Recorder::create(path_, organ, layout);
     ASSERT_TRUE(recorder.ok());

@@ -1,6 +1,6 @@
 // Fields as another program reads them.
 
-#include "server/scenario/field_files.h"
+#include "server/lab/scenario/field_files.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -9,7 +9,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "server/scenario/field_times.h"
+#include "server/lab/scenario/field_times.h"
 #include "tests/scenario/scenario_texts.h"
 
 namespace trocar::scenario {

@@ -8,9 +8,9 @@
 #include <fstream>
 #include <random>
 
-#include "common/scene/scenario.h"
+#include "server/lab/scenario/scenario.h"
 
-namespace trocar::scene {
+namespace trocar::scenario {
 namespace {
 
 struct Bad {
@@ -267,7 +267,7 @@ TEST(ScenarioParse, TheExampleIsRightAndIsNoScript) {
   ASSERT_TRUE(resolved.ok()) << resolved.error().message;
   EXPECT_EQ(resolved->organ.mesh.node_count(), 9u * 7 * 9);
   EXPECT_EQ(resolved->displacements.at(0).nodes.size(), 81u);
-  const auto script = parse_script(path);
+  const auto script = tool::parse_script(path);
   ASSERT_FALSE(script.ok());
   EXPECT_NE(script.error().message.find("only in a scenario"), std::string::npos);
 }
@@ -301,7 +301,7 @@ TEST(ScenarioParse, MaterialChangesMassAndSprings) {
   double mass = 0;
   for (const double m : resolved->organ.node_masses_kg) mass += m;
   EXPECT_NEAR(mass, 2120 * 8e-6, 1e-9);
-  for (const auto& s : springs_of(resolved->organ)) EXPECT_EQ(s.stiffness_n_m, 7);
+  for (const auto& s : organ::springs_of(resolved->organ)) EXPECT_EQ(s.stiffness_n_m, 7);
 }
 
 Result<ResolvedScenario> resolved_text(const std::string& text, const std::string& source) {
@@ -332,16 +332,16 @@ seconds = 1
 )",
       "a.toml");
   ASSERT_TRUE(resolved.ok()) << resolved.error().message;
-  const Organ& organ = resolved->organ;
+  const organ::Organ& organ = resolved->organ;
   ASSERT_EQ(organ.regions.size(), 1u);
   EXPECT_EQ(organ.regions[0].name, "half");
-  EXPECT_EQ(organ.regions[0].material.elastic_law, ElasticLaw::NeoHookean);
+  EXPECT_EQ(organ.regions[0].material.elastic_law, material::ElasticLaw::NeoHookean);
   EXPECT_TRUE(organ.regions[0].material.has_averaged_strain);
   EXPECT_EQ(organ.regions[0].material.young_modulus_pa, 5000) << "what is left out is the organ's";
-  EXPECT_EQ(organ.material.elastic_law, ElasticLaw::Springs);
+  EXPECT_EQ(organ.material.elastic_law, material::ElasticLaw::Springs);
   double mass = 0, volume_inside = 0, volume = 0;
   for (const double m : organ.node_masses_kg) mass += m;
-  const auto map = material_map(organ);
+  const auto map = organ::material_map(organ);
   for (std::size_t t = 0; t < organ.mesh.tets.size(); ++t) {
     const double v = mesh::tet_volume(organ.mesh, TetIndex(t));
     volume += v;
@@ -434,4 +434,4 @@ TEST(ScenarioParse, TruncatedAndDamagedTextIsAnsweredWithoutCrash) {
 }
 
 }  // namespace
-}  // namespace trocar::scene
+}  // namespace trocar::scenario

@@ -1,6 +1,6 @@
 // Scenarios on the engine: against closed forms, balance of forces, and the same bits twice.
 
-#include "server/scenario/scenario_run.h"
+#include "server/lab/scenario/scenario_run.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -9,8 +9,8 @@
 #include <fstream>
 #include <sstream>
 
-#include "server/scenario/field_files.h"
-#include "server/scenario/probe_file.h"
+#include "server/lab/scenario/field_files.h"
+#include "server/lab/scenario/probe_file.h"
 #include "tests/scenario/scenario_texts.h"
 
 namespace trocar::scenario {

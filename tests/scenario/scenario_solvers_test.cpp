@@ -146,10 +146,10 @@ TEST(ScenarioRun, GradedMovesEverythingAndFrozenTheQueueOnly) {
 
 TEST(ScenarioRun, WhatTheSolverCannotDoIsRefusedWithItsLine) {
   const auto refusal = [](const std::string& text) {
-    auto parsed = scene::parse_scenario_text(text, "test.toml");
+    auto parsed = scenario::parse_scenario_text(text, "test.toml");
     EXPECT_TRUE(parsed.ok()) << (parsed.ok() ? "" : parsed.error().message);
     if (!parsed) return std::string();
-    const auto resolved = scene::resolve(std::move(*parsed));
+    const auto resolved = scenario::resolve(std::move(*parsed));
     EXPECT_TRUE(resolved.ok()) << (resolved.ok() ? "" : resolved.error().message);
     if (!resolved) return std::string();
     const auto supported = check_supported(*resolved);
@@ -199,7 +199,7 @@ TEST(ScenarioRun, AnUnstableExplicitStepIsRefusedWithTheOneToWrite) {
   const auto message = [](const std::string& run) {
     std::string stiff = swinging(run);
     stiff.replace(stiff.find("= 40"), 4, "= 40000");
-    const auto resolved = scene::resolve(*scene::parse_scenario_text(stiff, "test.toml"));
+    const auto resolved = scenario::resolve(*scenario::parse_scenario_text(stiff, "test.toml"));
     const auto supported = check_supported(*resolved);
     return supported.ok() ? std::string() : supported.error().message;
   };
@@ -215,7 +215,7 @@ TEST(ScenarioRun, AnUnstableExplicitStepIsRefusedWithTheOneToWrite) {
 
 TEST(ScenarioRun, ThreadsChangeNothing) {
   const auto text = pulled_block("elastic_law = \"neo-hookean\"\naveraged_strain = true\n", "");
-  auto resolved = scene::resolve(*scene::parse_scenario_text(text, "test.toml"));
+  auto resolved = scenario::resolve(*scenario::parse_scenario_text(text, "test.toml"));
   ASSERT_TRUE(resolved.ok());
   ScenarioRun one(*resolved, Solver::Live, 1), two(*resolved, Solver::Live, 2);
   for (int i = 0; i < 100; ++i) {

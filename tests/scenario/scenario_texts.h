@@ -7,7 +7,7 @@
 #include <memory>
 #include <string>
 
-#include "server/scenario/scenario_run.h"
+#include "server/lab/scenario/scenario_run.h"
 
 namespace trocar::scenario {
 
@@ -27,10 +27,10 @@ box_max_mm = [5, 25, 5]
 inline constexpr double kStiffness = 40, kWeight = 9.81;
 
 inline std::unique_ptr<ScenarioRun> make(const std::string& text, Solver solver = Solver::Full) {
-  auto parsed = scene::parse_scenario_text(text, "test.toml");
+  auto parsed = scenario::parse_scenario_text(text, "test.toml");
   EXPECT_TRUE(parsed.ok()) << (parsed.ok() ? "" : parsed.error().message);
   if (!parsed) return nullptr;
-  auto resolved = scene::resolve(std::move(*parsed));
+  auto resolved = scenario::resolve(std::move(*parsed));
   EXPECT_TRUE(resolved.ok()) << (resolved.ok() ? "" : resolved.error().message);
   if (!resolved) return nullptr;
   const auto supported = check_supported(*resolved);

@@ -1,36 +1,36 @@
 // A settled organ is in equilibrium where it is: it does not move when it starts.
 
-#include "server/scenario/settle.h"
+#include "server/lab/scenario/settle.h"
 
 #include <gtest/gtest.h>
 
 #include <array>
 
-#include "common/scene/scenario_block.h"
-#include "server/scenario/scenario_run.h"
+#include "server/lab/scenario/scenario_block.h"
+#include "server/lab/scenario/scenario_run.h"
 
 namespace trocar::scenario {
 namespace {
 
 constexpr Vec3d kGravity{0, -9.81, 0};
 
-scene::Organ block() {
-  auto organ = scene::make_block({5, 5, 5, 0.008});
+organ::Organ block() {
+  auto organ = scenario::make_block({5, 5, 5, 0.008});
   EXPECT_TRUE(organ.ok());
   return std::move(*organ);
 }
 
 // Tissue that relaxes, when it has hung for long.
-scene::Organ measured_block(bool is_averaged) {
+organ::Organ measured_block(bool is_averaged) {
   auto organ = block();
-  auto material = *scene::find_measured_material("human_liver_nava2008");
+  auto material = *material::find_measured_material("human_liver_nava2008");
   material.relaxation = {{0.5, 0.05}, {0.2, 0.5}};  // soon
-  scene::use_measured(material, organ.material);
+  material::use_measured(material, organ.material);
   organ.material.has_averaged_strain = is_averaged;
   return organ;
 }
 
-class SettleAny : public ::testing::TestWithParam<scene::Organ (*)()> {};
+class SettleAny : public ::testing::TestWithParam<organ::Organ (*)()> {};
 
 TEST_P(SettleAny, TheRestPoseIsInEquilibriumAndTheOldOneIsFreeOfStress) {
   const auto organ = GetParam()();
@@ -39,7 +39,7 @@ TEST_P(SettleAny, TheRestPoseIsInEquilibriumAndTheOldOneIsFreeOfStress) {
   EXPECT_GT(settled->largest_move_m, 0.5e-3) << "otherwise this test shows nothing";
   EXPECT_LE(settled->residual_n, 1e-6f);
   const auto& after = settled->organ;
-  EXPECT_TRUE(scene::validate(after).ok());
+  EXPECT_TRUE(organ::validate(after).ok());
   EXPECT_EQ(after.gravity_m_s2, kGravity);
   EXPECT_EQ(after.mesh.tets, organ.mesh.tets);
   EXPECT_EQ(after.node_masses_kg, organ.node_masses_kg);
@@ -54,7 +54,7 @@ TEST_P(SettleAny, TheRestPoseIsInEquilibriumAndTheOldOneIsFreeOfStress) {
                      organ.mesh.rest_positions[node.value] - organ.source_offset_m),
               1e-12);
 
-  scene::ResolvedScenario resolved;
+  scenario::ResolvedScenario resolved;
   resolved.organ = after;
   resolved.scenario.run.seconds = 0.3;
   ScenarioRun run(std::move(resolved), Solver::Live);
@@ -64,7 +64,7 @@ TEST_P(SettleAny, TheRestPoseIsInEquilibriumAndTheOldOneIsFreeOfStress) {
   EXPECT_LT(farthest, 0.01 * settled->largest_move_m);
 }
 
-std::string name_of(const ::testing::TestParamInfo<scene::Organ (*)()>& tested) {
+std::string name_of(const ::testing::TestParamInfo<organ::Organ (*)()>& tested) {
   constexpr std::array<const char*, 3> kNames{"Springs", "Measured", "MeasuredAveraged"};
   return kNames[tested.index];
 }
@@ -80,7 +80,7 @@ TEST(Settle, TissueThatRelaxesIsWhereItCreepsTo) {
   const auto organ = measured_block(false);
   const auto settled = settle(organ, kGravity);
   ASSERT_TRUE(settled.ok()) << settled.error().message;
-  scene::ResolvedScenario resolved;
+  scenario::ResolvedScenario resolved;
   resolved.organ = organ;
   resolved.organ.gravity_m_s2 = kGravity;
   resolved.scenario.run.seconds = 12;

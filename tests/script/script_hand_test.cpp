@@ -7,10 +7,10 @@ namespace {
 
 const std::vector<Vec3f> kPositions{
     {-0.1f, 0, -0.1f}, {0.1f, 0, -0.1f}, {0, 0, 0.2f}, {0, 0.2f, 0}};
-const std::vector<scene::SurfaceTriangle> kTriangles{{0, 1, 2}, {0, 3, 1}, {1, 3, 2}, {2, 3, 0}};
+const std::vector<tool::SurfaceTriangle> kTriangles{{0, 1, 2}, {0, 3, 1}, {1, 3, 2}, {2, 3, 0}};
 
-scene::Script parsed(const char* text) {
-  auto script = scene::parse_script_text(text, "a.toml");
+tool::Script parsed(const char* text) {
+  auto script = tool::parse_script_text(text, "a.toml");
   TROCAR_ASSERT(script.ok());
   return std::move(*script);
 }
@@ -35,7 +35,7 @@ position_mm = [0, 10, 0]
   ASSERT_EQ(hand->tool_count(), 2u);
   EXPECT_FLOAT_EQ(hand->shapes()[0].radius_m, 0.003f);
   EXPECT_NEAR(hand->sample(0, 5).world_from_tool.position.y, 0.21, 1e-6);
-  EXPECT_EQ(hand->sample(0, 5).verb, scene::Verb::Push);
+  EXPECT_EQ(hand->sample(0, 5).verb, tool::Verb::Push);
   EXPECT_NEAR(hand->sample(1, 5).world_from_tool.position.y, 0.01, 1e-6);
 }
 

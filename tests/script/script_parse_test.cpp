@@ -7,9 +7,9 @@
 #include <ostream>
 #include <random>
 
-#include "common/scene/script.h"
+#include "common/tool/script.h"
 
-namespace trocar::scene {
+namespace trocar::tool {
 namespace {
 
 const char* const kMinimal = R"([[tool]]
@@ -229,4 +229,4 @@ TEST(ScriptParse, AHugeFileIsRefusedBeforeParsing) {
 }
 
 }  // namespace
-}  // namespace trocar::scene
+}  // namespace trocar::tool

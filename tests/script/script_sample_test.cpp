@@ -5,9 +5,9 @@
 #include <cmath>
 #include <random>
 
-#include "common/scene/script.h"
+#include "common/tool/script.h"
 
-namespace trocar::scene {
+namespace trocar::tool {
 namespace {
 
 ScriptTool two_keys(Ease ease) {
@@ -166,4 +166,4 @@ TEST(ScriptAnchors, NoSurfaceAndBadIndicesAreErrors) {
 }
 
 }  // namespace
-}  // namespace trocar::scene
+}  // namespace trocar::tool

@@ -29,12 +29,12 @@ namespace trocar::step {
 namespace {
 
 TEST(Tick, DoesNotAllocateAfterWarmUp) {
-  Simulation simulation(scene::make_lattice());
+  Simulation simulation(catalogue::make_lattice());
   const Vec3f place = testing::place_on(simulation.organ());
   // Warm-up and measurement replay the same motion: the second run finds its capacity ready.
   Bytes start;
   simulation.write_snapshot(start);
-  session::TickInputs inputs;
+  hands::TickInputs inputs;
   inputs.samples.reserve(8);
   std::size_t between = 0, publishing = 0, largest_publish = 0;
   for (Tick tick = 1; tick <= 1600; ++tick) {

@@ -4,8 +4,8 @@
 
 #include <functional>
 
-#include "common/scene/builtin_organs.h"
-#include "server/step/simulation.h"
+#include "server/organs/catalogue/builtin_organs.h"
+#include "server/tissue/step/simulation.h"
 #include "tests/cutting/cut_organ.h"
 
 namespace trocar::step {
@@ -15,7 +15,7 @@ constexpr double kTau_pa = 2000;
 constexpr float kRadius_m = 0.002f;
 
 // 12 x 4 x 12 cm, held below; cutting costs nothing, so that all force is friction.
-scene::Organ block(double friction_pa = kTau_pa) {
+organ::Organ block(double friction_pa = kTau_pa) {
   auto organ = cutting::testing::box_organ(12, 4, 12, 0.01, 0);
   organ.material.cut_energy_j_m2 = 0;
   organ.material.blade_friction_pa = friction_pa;
@@ -40,15 +40,15 @@ class Hand {
  private:
   void tick() {
     const Tick tick = simulation_.current_tick() + 1;
-    session::TickInputs inputs;
+    hands::TickInputs inputs;
     if (tick == 1) {
-      session::HandJoin join{.slot = {0}};
+      hands::HandJoin join{.slot = {0}};
       join.shapes[0] = {.radius_m = kRadius_m, .length_m = 0.3f, .edge_m = 0.1f};
       inputs.joins.push_back(join);
     }
     const Vec3f tip = place_(static_cast<float>(tick) * 1e-3f);
     inputs.samples.push_back(
-        {tool_slot({0}, 0), {{tip, rotation_from_z({0, 1, 0})}, scene::Verb::Cut}});
+        {tool_slot({0}, 0), {{tip, rotation_from_z({0, 1, 0})}, tool::Verb::Cut}});
     ASSERT_EQ(simulation_.tick(inputs, {}).nodes_rejected, 0u) << "tick " << tick;
     if (tick > 1) work_j_ -= static_cast<double>(dot(force(), tip - last_));
     last_ = tip;

@@ -5,9 +5,9 @@
 #include <set>
 #include <string>
 
-#include "server/cutting/event_codec.h"
-#include "server/cutting/validate.h"
-#include "server/step/simulation.h"
+#include "server/tissue/cutting/event_codec.h"
+#include "server/tissue/cutting/validate.h"
+#include "server/tissue/step/simulation.h"
 #include "tests/cutting/cut_organ.h"
 #include "tests/step/hands.h"
 #include "tests/support/random.h"
@@ -18,16 +18,17 @@ namespace {
 // Blades come down into the liver from above and slice along it at 10 cm/s, side by side.
 class Blades : public ::testing::Test {
  protected:
-  static scene::Organ liver(scene::ElasticLaw law, bool has_averaged_strain = false) {
-    auto organ = *scene::make_liver(6000);
+  static organ::Organ liver(material::ElasticLaw law, bool has_averaged_strain = false) {
+    auto organ = *catalogue::make_liver(6000);
     organ.material.elastic_law = law;
     organ.material.has_averaged_strain = has_averaged_strain;
-    if (law != scene::ElasticLaw::Measured) return organ;
-    scene::use_measured(*scene::find_measured_material("human_liver_nava2008"), organ.material);
+    if (law != material::ElasticLaw::Measured) return organ;
+    material::use_measured(*material::find_measured_material("human_liver_nava2008"),
+                           organ.material);
     organ.material.tension = 0.03;  // so that there are stresses to remember
     return organ;
   }
-  static void add_blades(const Simulation& simulation, session::TickInputs& inputs,
+  static void add_blades(const Simulation& simulation, hands::TickInputs& inputs,
                          std::uint8_t count = 1) {
     const Tick tick = simulation.current_tick() + 1;
     Vec3f top{0, -1, 0};
@@ -35,7 +36,7 @@ class Blades : public ::testing::Test {
       if (static_cast<float>(p.y) > top.y) top = to_float(p);
     for (std::uint8_t hand = 0; hand < count; ++hand) {
       if (tick == 1) {
-        session::HandJoin join{.slot = {hand}};
+        hands::HandJoin join{.slot = {hand}};
         join.shapes[0] = {.radius_m = 0.002f, .length_m = 0.3f, .edge_m = 0.06f};
         inputs.joins.push_back(join);
       }
@@ -45,18 +46,18 @@ class Blades : public ::testing::Test {
       const float along = 0.1f * std::max(0.0f, t - 0.25f);
       const Vec3f tip = top + Vec3f{-0.03f + along, -depth, 0.02f * static_cast<float>(hand)};
       inputs.samples.push_back(
-          {tool_slot({hand}, 0), {{tip, rotation_from_z({0, 1, 0})}, scene::Verb::Cut}});
+          {tool_slot({hand}, 0), {{tip, rotation_from_z({0, 1, 0})}, tool::Verb::Cut}});
     }
   }
   static TickReport run_tick(Simulation& simulation, std::uint8_t count = 1) {
-    session::TickInputs inputs;
+    hands::TickInputs inputs;
     add_blades(simulation, inputs, count);
     return simulation.tick(inputs, {});
   }
 };
 
 TEST_F(Blades, OpenAWoundInEveryKindOfTissue) {
-  using enum scene::ElasticLaw;
+  using enum material::ElasticLaw;
   for (const auto& [law, is_averaged] : {std::pair{Springs, false},
                                          {TensorMass, false},
                                          {NeoHookean, false},
@@ -94,7 +95,7 @@ TEST_F(Blades, OpenAWoundInEveryKindOfTissue) {
 }
 
 TEST_F(Blades, WorkersDoNotChangeTheHash) {
-  for (const auto law : {scene::ElasticLaw::NeoHookean, scene::ElasticLaw::Measured}) {
+  for (const auto law : {material::ElasticLaw::NeoHookean, material::ElasticLaw::Measured}) {
     Simulation one(liver(law)), two(liver(law), 2);
     for (int i = 0; i < 500; ++i)
       ASSERT_EQ(run_tick(one, 2).state_hash, run_tick(two, 2).state_hash) << "tick " << i;
@@ -102,7 +103,7 @@ TEST_F(Blades, WorkersDoNotChangeTheHash) {
 }
 
 TEST_F(Blades, ARestoredStateGoesOnBitForBit) {
-  using enum scene::ElasticLaw;
+  using enum material::ElasticLaw;
   for (const auto& [law, is_averaged] : {std::pair{Springs, false},
                                          {NeoHookean, false},
                                          {NeoHookean, true},
@@ -132,7 +133,7 @@ TEST_F(Blades, ARestoredStateGoesOnBitForBit) {
 
 // What clients are told, applied to the surface they began with, is the surface.
 TEST_F(Blades, ChangesLeadFromSurfaceToSurface) {
-  Simulation simulation(liver(scene::ElasticLaw::Springs));
+  Simulation simulation(liver(material::ElasticLaw::Springs));
   auto followed = simulation.layout();
   for (int i = 0; i < 700; ++i) {
     run_tick(simulation, 2);
@@ -151,7 +152,7 @@ TEST_F(Blades, ChangesLeadFromSurfaceToSurface) {
 
 // Vessels will bleed, some day: who follows a session hears what has been laid open.
 TEST_F(Blades, ChangesNameTheRegionsThatAreCut) {
-  auto organ = liver(scene::ElasticLaw::Springs);
+  auto organ = liver(material::ElasticLaw::Springs);
   Vec3f top{0, -1, 0};
   for (const auto& p : organ.mesh.rest_positions)
     if (static_cast<float>(p.y) > top.y) top = to_float(p);
@@ -175,13 +176,13 @@ TEST_F(Blades, ChangesNameTheRegionsThatAreCut) {
 
 // What has been parted moves by itself: a through cut, and the free end drawn away.
 TEST_F(Blades, APieceThatIsCutOffCanBeCarriedAway) {
-  Simulation simulation(liver(scene::ElasticLaw::NeoHookean));
+  Simulation simulation(liver(material::ElasticLaw::NeoHookean));
   Vec3f end{-1, 0, 0};
   for (const auto& p : simulation.organ().mesh.rest_positions)
     if (static_cast<float>(p.x) > end.x) end = to_float(p);
-  session::TickInputs inputs;
+  hands::TickInputs inputs;
   for (std::uint8_t hand = 0; hand < 2; ++hand) {
-    session::HandJoin join{.slot = {hand}};
+    hands::HandJoin join{.slot = {hand}};
     join.shapes[0] = {.radius_m = 0.002f, .length_m = 0.3f, .reach_m = 0.02f, .edge_m = 0.2f};
     inputs.joins.push_back(join);
   }
@@ -191,10 +192,10 @@ TEST_F(Blades, APieceThatIsCutOffCanBeCarriedAway) {
       const Vec3f tip = end + Vec3f{-0.035f, 0.08f - 0.2f * t, -0.1f};
       inputs.samples.push_back(
           {tool_slot({0}, 0),
-           {{tip, rotation_from_z({0, 0, 1})}, t < 0.9f ? scene::Verb::Cut : scene::Verb::None}});
+           {{tip, rotation_from_z({0, 0, 1})}, t < 0.9f ? tool::Verb::Cut : tool::Verb::None}});
       const Vec3f drawn{0.1f * std::max(0.0f, t - 1), 0, 0};
       inputs.samples.push_back(
-          {tool_slot({1}, 0), {{end + drawn, rotation_from_z({1, 0, 0})}, scene::Verb::Grasp}});
+          {tool_slot({1}, 0), {{end + drawn, rotation_from_z({1, 0, 0})}, tool::Verb::Grasp}});
     }
     ASSERT_EQ(simulation.tick(inputs, {}).nodes_rejected, 0u) << "tick " << tick;
     inputs.clear();
@@ -218,12 +219,12 @@ TEST_F(Blades, APieceThatIsCutOffCanBeCarriedAway) {
 }
 
 TEST_F(Blades, StopAtWhatAnotherHolds) {
-  Simulation simulation(liver(scene::ElasticLaw::Springs));
-  session::TickInputs inputs;
+  Simulation simulation(liver(material::ElasticLaw::Springs));
+  hands::TickInputs inputs;
   Vec3f top{0, -1, 0};
   for (const auto& p : simulation.organ().mesh.rest_positions)
     if (static_cast<float>(p.y) > top.y) top = to_float(p);
-  session::HandJoin join{.slot = {1}};
+  hands::HandJoin join{.slot = {1}};
   join.shapes[0] = {.reach_m = 0.012f};
   inputs.joins.push_back(join);
   int refused = 0, granted = 0;
@@ -231,15 +232,15 @@ TEST_F(Blades, StopAtWhatAnotherHolds) {
   for (int tick = 1; tick <= 700; ++tick) {
     if (tick % 8 == 1)
       inputs.samples.push_back(
-          {tool_slot({1}, 0), {{top, rotation_from_z({0, 1, 0})}, scene::Verb::Grasp}});
+          {tool_slot({1}, 0), {{top, rotation_from_z({0, 1, 0})}, tool::Verb::Grasp}});
     add_blades(simulation, inputs);
     simulation.tick(inputs, {});
     inputs.clear();
     if (const auto frame = simulation.take_frame()) {
       for (const auto& event : frame->claim_events) {
-        if (event.verb != scene::Verb::Cut) continue;
-        refused += event.outcome == locks::ClaimOutcome::RefusedHeld;
-        granted += event.outcome == locks::ClaimOutcome::Granted;
+        if (event.verb != tool::Verb::Cut) continue;
+        refused += event.outcome == hands::ClaimOutcome::RefusedHeld;
+        granted += event.outcome == hands::ClaimOutcome::Granted;
       }
       for (const auto& tool : frame->tools)
         if (refused > 0 && tool.tool == tool_slot({0}, 0))
@@ -293,11 +294,11 @@ TEST(Snapshots, ThatMoveNodesAreRefused) {
 }
 
 TEST_F(Blades, ThatAreEverywhereAtOnceAreBoundedWork) {
-  Simulation simulation(liver(scene::ElasticLaw::Springs));
+  Simulation simulation(liver(material::ElasticLaw::Springs));
   trocar::testing::Random random(3);
-  session::TickInputs inputs;
+  hands::TickInputs inputs;
   for (std::uint8_t hand = 0; hand < 4; ++hand) {
-    session::HandJoin join{.slot = {hand}};
+    hands::HandJoin join{.slot = {hand}};
     join.shapes[0] = {.radius_m = 0.002f, .length_m = 0.3f, .edge_m = 0.05f};
     inputs.joins.push_back(join);
   }
@@ -309,7 +310,7 @@ TEST_F(Blades, ThatAreEverywhereAtOnceAreBoundedWork) {
       const Vec3f shaft = normalized(Vec3f{unit(), unit(), unit()}, {0, 1, 0});
       inputs.samples.push_back({tool_slot({hand}, 0),
                                 {{tip, rotation_from_z(shaft)},
-                                 random.below(5) == 0 ? scene::Verb::None : scene::Verb::Cut}});
+                                 random.below(5) == 0 ? tool::Verb::None : tool::Verb::Cut}});
     }
     const auto& report = simulation.tick(inputs, {});
     inputs.clear();

@@ -2,14 +2,14 @@
 
 #include <gtest/gtest.h>
 
-#include "server/step/simulation.h"
+#include "server/tissue/step/simulation.h"
 #include "tests/cutting/cut_organ.h"
 
 namespace trocar::step {
 namespace {
 
 // 14 x 2 x 14 cm, held at its rim; fibres along x, or around the middle.
-scene::Organ plate(scene::ElasticLaw law, bool is_round) {
+organ::Organ plate(material::ElasticLaw law, bool is_round) {
   auto organ = cutting::testing::box_organ(14, 2, 14, 0.01, 0);
   organ.material.elastic_law = law;
   organ.material.fibre_tension = 0.2;
@@ -23,17 +23,17 @@ scene::Organ plate(scene::ElasticLaw law, bool is_round) {
 }
 
 // How far apart the lips are where they are farthest, after a cut through the plate, m.
-double gape_of(const scene::Organ& organ, const Vec3f& from, const Vec3f& to) {
+double gape_of(const organ::Organ& organ, const Vec3f& from, const Vec3f& to) {
   Simulation simulation(organ);
-  session::TickInputs inputs;
-  session::HandJoin join{.slot = {0}};
+  hands::TickInputs inputs;
+  hands::HandJoin join{.slot = {0}};
   join.shapes[0] = {.radius_m = 0.001f, .length_m = 0.3f, .edge_m = 0.08f};
   inputs.joins.push_back(join);
   for (int tick = 1; tick <= 1100; ++tick) {
     const float share = std::clamp(static_cast<float>(tick - 50) / 400.0f, 0.0f, 1.0f);
     inputs.samples.push_back({tool_slot({0}, 0),
                               {{from + (to - from) * share, rotation_from_z({0, 1, 0})},
-                               tick < 460 ? scene::Verb::Cut : scene::Verb::None}});
+                               tick < 460 ? tool::Verb::Cut : tool::Verb::None}});
     EXPECT_EQ(simulation.tick(inputs, {}).nodes_rejected, 0u) << "tick " << tick;
     inputs.clear();
   }
@@ -47,7 +47,7 @@ double gape_of(const scene::Organ& organ, const Vec3f& from, const Vec3f& to) {
 }
 
 TEST(FibreWounds, GapeWiderAcrossTheFibres) {
-  for (const auto law : {scene::ElasticLaw::Springs, scene::ElasticLaw::NeoHookean}) {
+  for (const auto law : {material::ElasticLaw::Springs, material::ElasticLaw::NeoHookean}) {
     const auto organ = plate(law, false);
     const double along = gape_of(organ, {-0.03f, -0.04f, 0.003f}, {0.03f, -0.04f, 0.003f});
     const double across = gape_of(organ, {0.003f, -0.04f, -0.03f}, {0.003f, -0.04f, 0.03f});
@@ -58,7 +58,7 @@ TEST(FibreWounds, GapeWiderAcrossTheFibres) {
 
 // The same cut in the same material; what differs is where its fibres run.
 TEST(FibreWounds, FollowDirectionsThatTurn) {
-  for (const auto law : {scene::ElasticLaw::Springs, scene::ElasticLaw::NeoHookean}) {
+  for (const auto law : {material::ElasticLaw::Springs, material::ElasticLaw::NeoHookean}) {
     const Vec3f from{0.015f, -0.04f, 0.003f}, to{0.055f, -0.04f, 0.003f};
     const double around = gape_of(plate(law, true), from, to);
     const double along = gape_of(plate(law, false), from, to);

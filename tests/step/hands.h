@@ -5,8 +5,8 @@
 
 #include <algorithm>
 
-#include "common/scene/builtin_organs.h"
-#include "server/step/simulation.h"
+#include "server/organs/catalogue/builtin_organs.h"
+#include "server/tissue/step/simulation.h"
 
 namespace trocar::step::testing {
 
@@ -15,7 +15,7 @@ inline constexpr Vec3f kPressedAt{-0.105f, 0, 0.004f};
 
 // That place for an organ: over the middle of the lattice's flat top, else such that the first hand
 // comes down on the highest node.
-inline Vec3f place_on(const scene::Organ& organ) {
+inline Vec3f place_on(const organ::Organ& organ) {
   Vec3d highest{0, -1, 0};
   for (const auto& p : organ.mesh.rest_positions)
     if (p.y > highest.y) highest = p;
@@ -24,23 +24,23 @@ inline Vec3f place_on(const scene::Organ& organ) {
 }
 
 // Inputs of tick `tick` (1, 2, ...): joins first, then samples every 8 ticks.
-inline void add_two_hands(Tick tick, const Vec3f& place, session::TickInputs& inputs) {
+inline void add_two_hands(Tick tick, const Vec3f& place, hands::TickInputs& inputs) {
   if (tick == 1)
     for (std::uint8_t hand = 0; hand < 2; ++hand) {
-      session::HandJoin join{.slot = {hand}};
+      hands::HandJoin join{.slot = {hand}};
       join.shapes[0] = {.radius_m = 0.012f, .length_m = 0.3f, .reach_m = 0.012f};
       inputs.joins.push_back(join);
     }
   if (tick % 8 != 1) return;
   const float t = static_cast<float>(tick) * 1e-3f;
-  const auto add = [&](std::uint8_t hand, const Vec3f& tip, scene::Verb verb) {
+  const auto add = [&](std::uint8_t hand, const Vec3f& tip, tool::Verb verb) {
     inputs.samples.push_back(
         {tool_slot({hand}, 0), {{place + tip, rotation_from_z({0, 1, 0})}, verb}});
   };
   const float press = std::min(0.01f, 0.05f * t);
-  add(0, kPressedAt + Vec3f{0.06f * t, -press, 0}, scene::Verb::Push);
+  add(0, kPressedAt + Vec3f{0.06f * t, -press, 0}, tool::Verb::Push);
   add(1, {0.04f, std::min(0.02f, 0.04f * t), 0.003f},
-      t < 1.2f ? scene::Verb::Grasp : scene::Verb::None);
+      t < 1.2f ? tool::Verb::Grasp : tool::Verb::None);
 }
 
 }  // namespace trocar::step::testing

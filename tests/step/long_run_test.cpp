@@ -6,8 +6,8 @@
 
 #include <cmath>
 
-#include "common/scene/builtin_organs.h"
-#include "server/step/simulation.h"
+#include "server/organs/catalogue/builtin_organs.h"
+#include "server/tissue/step/simulation.h"
 #include "tests/support/random.h"
 
 namespace trocar::step {
@@ -15,15 +15,15 @@ namespace {
 
 using testing::Random;
 
-scene::Organ random_organ(Random& random) {
-  using scene::ElasticLaw;
-  scene::Organ organ;
+organ::Organ random_organ(Random& random) {
+  using material::ElasticLaw;
+  organ::Organ organ;
   if (random.below(3) == 0) {
     const auto side = [&] { return 4 + static_cast<int>(random.below(6)); };
-    organ = *scene::make_lattice({.nx = side(), .ny = side(), .nz = side()});
+    organ = *catalogue::make_lattice({.nx = side(), .ny = side(), .nz = side()});
     organ.material.spring_stiffness_n_m = random.between(5, 200);
   } else {
-    organ = *scene::make_liver(500 + static_cast<int>(random.below(2500)));
+    organ = *catalogue::make_liver(500 + static_cast<int>(random.below(2500)));
     organ.material.elastic_law = static_cast<ElasticLaw>(random.below(3));
     organ.material.young_modulus_pa = random.between(1500, 20000);
     organ.material.poisson_ratio = random.between(0.1, 0.48);
@@ -38,7 +38,7 @@ scene::Organ random_organ(Random& random) {
 struct Walker {
   Vec3f from, to;
   Tick begin = 0, end = 1;
-  scene::Verb verb = scene::Verb::None;
+  tool::Verb verb = tool::Verb::None;
 
   Vec3f at(Tick tick) const {
     const float s =
@@ -57,7 +57,7 @@ void walk(Walker& walker, Tick tick, const world::World& world, Random& random) 
   walker.to = rest + outward * static_cast<float>(random.between(-0.012, 0.02));
   walker.begin = tick;
   walker.end = tick + 200 + random.below(600);
-  walker.verb = static_cast<scene::Verb>(random.below(3));
+  walker.verb = static_cast<tool::Verb>(random.below(3));
 }
 
 double energy_of(const Simulation& simulation) {
@@ -80,14 +80,14 @@ TEST_P(LongRun, StaysFiniteBoundedAndInPlace) {
   std::array<Walker, kHands> walkers;
   for (auto& walker : walkers) walker.from = walker.to = {0, 0.4f, 0};
   TickDecisions decisions;
-  session::TickInputs inputs;
+  hands::TickInputs inputs;
   double work = 0, largest_excess = 0;  // J
   std::array<Vec3f, kMaxTools> tips{};
   for (Tick tick = 1; tick <= 10'000; ++tick) {
     inputs.clear();
     for (std::uint8_t hand = 0; hand < kHands; ++hand) {
       if (tick == 1) {
-        session::HandJoin join{.slot = {hand}};
+        hands::HandJoin join{.slot = {hand}};
         join.shapes[0] = {.radius_m = 0.008f, .length_m = 0.2f, .reach_m = 0.008f};
         inputs.joins.push_back(join);
       }
@@ -142,10 +142,10 @@ TEST_P(LongRun, StaysFiniteBoundedAndInPlace) {
 INSTANTIATE_TEST_SUITE_P(Seeds, LongRun, ::testing::Range<std::uint64_t>(1, 9));
 
 // A tool holds still, pressed in; then decisions change. Its force may not step.
-class ForceAcrossDecisions : public ::testing::TestWithParam<scene::ElasticLaw> {};
+class ForceAcrossDecisions : public ::testing::TestWithParam<material::ElasticLaw> {};
 
 TEST_P(ForceAcrossDecisions, DoesNotStep) {
-  auto organ = *scene::make_liver(6000);
+  auto organ = *catalogue::make_liver(6000);
   organ.material.elastic_law = GetParam();
   Simulation simulation(organ);
   const auto& world = simulation.state().world;
@@ -153,8 +153,8 @@ TEST_P(ForceAcrossDecisions, DoesNotStep) {
   for (const auto node : world.surface_nodes)
     if (world.rest_positions[node.value].y > world.rest_positions[top.value].y) top = node;
   const Vec3f over = world.rest_positions[top.value];
-  session::TickInputs inputs;
-  session::HandJoin join{.slot = {0}};
+  hands::TickInputs inputs;
+  hands::HandJoin join{.slot = {0}};
   join.shapes[0] = {.radius_m = 0.012f, .length_m = 0.2f, .reach_m = 0.008f};
   inputs.joins.push_back(join);
   TickDecisions decisions;
@@ -170,7 +170,7 @@ TEST_P(ForceAcrossDecisions, DoesNotStep) {
       const float press = 0.010f * std::min(1.0f, static_cast<float>(tick) * 1e-3f) - 0.003f;
       inputs.samples.push_back(
           {tool_slot({0}, 0),
-           {{over - Vec3f{0, press, 0}, rotation_from_z({0, 1, 0})}, scene::Verb::Push}});
+           {{over - Vec3f{0, press, 0}, rotation_from_z({0, 1, 0})}, tool::Verb::Push}});
     }
     if (tick == 1800) decisions.sweeps = 3;
     if (tick == 2000) decisions.depth_limit = 1;
@@ -191,9 +191,9 @@ TEST_P(ForceAcrossDecisions, DoesNotStep) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Laws, ForceAcrossDecisions,
-                         ::testing::Values(scene::ElasticLaw::Springs,
-                                           scene::ElasticLaw::TensorMass,
-                                           scene::ElasticLaw::NeoHookean));
+                         ::testing::Values(material::ElasticLaw::Springs,
+                                           material::ElasticLaw::TensorMass,
+                                           material::ElasticLaw::NeoHookean));
 
 }  // namespace
 }  // namespace trocar::step

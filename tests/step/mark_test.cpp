@@ -2,32 +2,32 @@
 
 #include <gtest/gtest.h>
 
-#include "common/scene/builtin_organs.h"
-#include "server/cutting/validate.h"
-#include "server/step/simulation.h"
+#include "server/organs/catalogue/builtin_organs.h"
+#include "server/tissue/cutting/validate.h"
+#include "server/tissue/step/simulation.h"
 
 namespace trocar::step {
 namespace {
 
-scene::Organ liver() {
-  auto organ = *scene::make_liver(4000);
-  organ.material.elastic_law = scene::ElasticLaw::NeoHookean;
+organ::Organ liver() {
+  auto organ = *catalogue::make_liver(4000);
+  organ.material.elastic_law = material::ElasticLaw::NeoHookean;
   return organ;
 }
 
 // A blade along the top, 10 cm/s; and a hand that holds and lifts the end of a lobe.
-TickReport run_tick(Simulation& simulation, session::MarkAction mark = session::MarkAction::None) {
+TickReport run_tick(Simulation& simulation, hands::MarkAction mark = hands::MarkAction::None) {
   const Tick tick = simulation.current_tick() + 1;
   Vec3f top{0, -1, 0}, end{-1, 0, 0};
   for (const auto& p : simulation.organ().mesh.rest_positions) {
     if (static_cast<float>(p.y) > top.y) top = to_float(p);
     if (static_cast<float>(p.x) > end.x) end = to_float(p);
   }
-  session::TickInputs inputs;
+  hands::TickInputs inputs;
   inputs.mark = mark;
   if (tick == 1)
     for (std::uint8_t hand = 0; hand < 2; ++hand) {
-      session::HandJoin join{.slot = {hand}};
+      hands::HandJoin join{.slot = {hand}};
       join.shapes[0] = {.radius_m = 0.002f, .length_m = 0.3f, .reach_m = 0.012f, .edge_m = 0.06f};
       inputs.joins.push_back(join);
     }
@@ -37,10 +37,10 @@ TickReport run_tick(Simulation& simulation, session::MarkAction mark = session::
     const float along = 0.1f * std::max(0.0f, t - 0.25f);
     inputs.samples.push_back(
         {tool_slot({0}, 0),
-         {{top + Vec3f{-0.03f + along, -depth, 0}, rotation_from_z({0, 1, 0})}, scene::Verb::Cut}});
+         {{top + Vec3f{-0.03f + along, -depth, 0}, rotation_from_z({0, 1, 0})}, tool::Verb::Cut}});
     inputs.samples.push_back(
         {tool_slot({1}, 0),
-         {{end + Vec3f{0, 0.02f * t, 0}, rotation_from_z({1, 0, 0})}, scene::Verb::Grasp}});
+         {{end + Vec3f{0, 0.02f * t, 0}, rotation_from_z({1, 0, 0})}, tool::Verb::Grasp}});
   }
   return simulation.tick(inputs, {});
 }
@@ -55,12 +55,12 @@ TEST(Marks, BringBackShapeAndTopology) {
   const auto before = simulation.layout();
   const auto displacements = simulation.state().world.displacements;
   ASSERT_GT(simulation.state().cuts.history().size(), 1u) << "the mark is in the middle of a cut";
-  run_tick(simulation, session::MarkAction::Set);
+  run_tick(simulation, hands::MarkAction::Set);
   run(simulation, 300);
   ASSERT_GT(simulation.layout().triangles.size(), before.triangles.size());
   const auto epoch = simulation.layout().epoch;
 
-  const auto report = run_tick(simulation, session::MarkAction::Return);
+  const auto report = run_tick(simulation, hands::MarkAction::Return);
   EXPECT_EQ(report.nodes_rejected, 0u);
   EXPECT_EQ(simulation.current_tick(), 765u) << "time goes on";
   EXPECT_EQ(simulation.layout().triangles, before.triangles);
@@ -83,9 +83,9 @@ TEST(Marks, AreFollowedFrameByFrame) {
   auto followed = simulation.layout();
   int new_layouts = 0, marks = 0;
   for (int i = 1; i <= 1600; ++i) {
-    run_tick(simulation, i == 300                ? session::MarkAction::Set
-                         : i == 700 || i == 1301 ? session::MarkAction::Return
-                                                 : session::MarkAction::None);
+    run_tick(simulation, i == 300                ? hands::MarkAction::Set
+                         : i == 700 || i == 1301 ? hands::MarkAction::Return
+                                                 : hands::MarkAction::None);
     const auto frame = simulation.take_frame();
     if (!frame) continue;
     if (frame->new_layout) {
@@ -111,7 +111,7 @@ TEST(Marks, AreInSnapshotsAndInTheHash) {
   Simulation a(liver()), b(liver());
   run(a, 330);
   const auto hash = a.state_hash();
-  run_tick(a, session::MarkAction::Set);
+  run_tick(a, hands::MarkAction::Set);
   EXPECT_NE(a.state_hash(), hash);
   run(a, 299);
   const auto follow = [&](int ticks, Tick return_at) {
@@ -120,8 +120,8 @@ TEST(Marks, AreInSnapshotsAndInTheHash) {
     const auto restored = b.restore_snapshot(snapshot);
     ASSERT_TRUE(restored.ok()) << restored.error().message;
     for (int i = 0; i < ticks; ++i) {
-      const auto mark = a.current_tick() + 1 == return_at ? session::MarkAction::Return
-                                                          : session::MarkAction::None;
+      const auto mark =
+          a.current_tick() + 1 == return_at ? hands::MarkAction::Return : hands::MarkAction::None;
       ASSERT_EQ(run_tick(a, mark).state_hash, run_tick(b, mark).state_hash) << "tick " << i;
       const auto frame_a = a.take_frame(), frame_b = b.take_frame();
       ASSERT_EQ(frame_a == nullptr, frame_b == nullptr);
@@ -132,14 +132,14 @@ TEST(Marks, AreInSnapshotsAndInTheHash) {
   };
   follow(20, 640);
   run(a, 3);
-  run_tick(a, session::MarkAction::Return);
+  run_tick(a, hands::MarkAction::Return);
   follow(60, 0);  // between the return and the frame that tells of it
 }
 
 TEST(Marks, WithoutOneNothingHappens) {
   Simulation a(liver()), b(liver());
   run(a, 20), run(b, 20);
-  EXPECT_EQ(run_tick(a, session::MarkAction::Return).state_hash, run_tick(b).state_hash);
+  EXPECT_EQ(run_tick(a, hands::MarkAction::Return).state_hash, run_tick(b).state_hash);
   run(a, 11), run(b, 11);
   const auto frame = a.take_frame();
   ASSERT_TRUE(frame);

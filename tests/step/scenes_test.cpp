@@ -2,10 +2,10 @@
 
 #include <gtest/gtest.h>
 
-#include "common/scene/builtin_organs.h"
-#include "common/scene/script.h"
-#include "server/cutting/validate.h"
-#include "server/step/simulation.h"
+#include "common/tool/script.h"
+#include "server/organs/catalogue/builtin_organs.h"
+#include "server/tissue/cutting/validate.h"
+#include "server/tissue/step/simulation.h"
 
 namespace trocar::step {
 namespace {
@@ -13,29 +13,29 @@ namespace {
 // One hand, its tools from a script.
 class Operation {
  public:
-  Operation(scene::Organ organ, const char* script) : simulation_(std::move(organ)) {
+  Operation(organ::Organ organ, const char* script) : simulation_(std::move(organ)) {
     const std::string folder = TROCAR_SOURCE_DIR "/deploy/scenes/";
-    auto parsed = scene::parse_script(folder + script);
+    auto parsed = tool::parse_script(folder + script);
     EXPECT_TRUE(parsed.ok());
     script_ = std::move(*parsed);
     const auto& mesh = simulation_.organ().mesh;
     std::vector<Vec3f> rest;
     for (const auto& p : mesh.rest_positions) rest.push_back(to_float(p));
-    std::vector<scene::SurfaceTriangle> triangles;
+    std::vector<tool::SurfaceTriangle> triangles;
     for (const auto& [a, b, c] : mesh.boundary_triangles)
       triangles.push_back({a.value, b.value, c.value});
     for (const auto& tool : script_.tools)
-      anchors_.push_back(tool.anchor ? *scene::find_anchor(*tool.anchor, rest, triangles)
-                                     : scene::AnchorPoint{});
+      anchors_.push_back(tool.anchor ? *tool::find_anchor(*tool.anchor, rest, triangles)
+                                     : tool::AnchorPoint{});
   }
 
   // Up to this time of the script; a sample per 8 ms.
   void run_to(double seconds) {
     while (static_cast<double>(simulation_.current_tick()) < seconds * 1e3) {
       const Tick tick = simulation_.current_tick() + 1;
-      session::TickInputs inputs;
+      hands::TickInputs inputs;
       if (tick == 1) {
-        session::HandJoin join{.slot = {0}, .tool_count = static_cast<int>(script_.tools.size())};
+        hands::HandJoin join{.slot = {0}, .tool_count = static_cast<int>(script_.tools.size())};
         for (std::size_t t = 0; t < script_.tools.size(); ++t)
           join.shapes[t] = script_.tools[t].shape;
         inputs.joins.push_back(join);
@@ -43,7 +43,7 @@ class Operation {
       for (std::size_t t = 0; t < script_.tools.size() && tick % 8 == 1; ++t)
         inputs.samples.push_back(
             {tool_slot({0}, static_cast<int>(t)),
-             scene::sample(script_.tools[t], static_cast<double>(tick) * 1e-3, anchors_[t])});
+             tool::sample(script_.tools[t], static_cast<double>(tick) * 1e-3, anchors_[t])});
       const auto report = simulation_.tick(inputs, {});
       ASSERT_EQ(report.nodes_rejected, 0u) << "tick " << tick;
       simulation_.take_frame();
@@ -89,12 +89,12 @@ class Operation {
 
  private:
   Simulation simulation_;
-  scene::Script script_;
-  std::vector<scene::AnchorPoint> anchors_;
+  tool::Script script_;
+  std::vector<tool::AnchorPoint> anchors_;
 };
 
 TEST(Scenes, AFlapIsCutOnThreeSidesLiftedAndTornOff) {
-  auto organ = scene::make_plate();
+  auto organ = catalogue::make_plate();
   organ.material.tear_stretch = 1.6;
   Operation flap(std::move(organ), "flap.toml");
   flap.run_to(2.8);
@@ -116,7 +116,7 @@ TEST(Scenes, AFlapIsCutOnThreeSidesLiftedAndTornOff) {
 }
 
 TEST(Scenes, AWedgeIsCutOutAndRemoved) {
-  Operation wedge(*scene::make_liver(8000), "wedge.toml");
+  Operation wedge(*catalogue::make_liver(8000), "wedge.toml");
   wedge.run_to(2.5);
   EXPECT_EQ(wedge.pieces().size(), 1u) << "one side of two";
   wedge.run_to(5.3);

@@ -1,7 +1,7 @@
 // The tick as a pure function: same inputs, same hash; snapshots continue bit for bit; what comes
 // from outside cannot break it.
 
-#include "server/step/simulation.h"
+#include "server/tissue/step/simulation.h"
 
 #include <gtest/gtest.h>
 
@@ -20,21 +20,21 @@ class TwoHands : public ::testing::Test {
   static constexpr TickDecisions kFrozen{.depth_limit = kFrozenDepthLimit,
                                          .boundary = world::Boundary::Frozen};
   static TickReport run_tick(Simulation& simulation, const TickDecisions& decisions = {}) {
-    session::TickInputs inputs;
+    hands::TickInputs inputs;
     add_two_hands(simulation.current_tick() + 1, place_on(simulation.organ()), inputs);
     return simulation.tick(inputs, decisions);
   }
 };
 
 TEST_F(TwoHands, SameInputsGiveSameHashes) {
-  Simulation a(scene::make_lattice()), b(scene::make_lattice());
+  Simulation a(catalogue::make_lattice()), b(catalogue::make_lattice());
   for (int i = 0; i < 600; ++i) ASSERT_EQ(run_tick(a).state_hash, run_tick(b).state_hash);
 }
 
 // Equal on gcc and clang, debug, release and sanitized builds: see README, "Determinism". A change
 // of results changes this number, and raises kSimVersion in the same commit.
 TEST_F(TwoHands, TheHashIsTheSameOnEveryBuild) {
-  const auto hash_after = [](scene::Organ organ, const TickDecisions& decisions, unsigned workers) {
+  const auto hash_after = [](organ::Organ organ, const TickDecisions& decisions, unsigned workers) {
     Simulation simulation(std::move(organ), workers);
     std::uint32_t most_touched = 0;
     for (int i = 0; i < 300; ++i)
@@ -42,33 +42,33 @@ TEST_F(TwoHands, TheHashIsTheSameOnEveryBuild) {
     EXPECT_GT(most_touched, 0u);
     return simulation.state_hash();
   };
-  const auto liver = [](scene::ElasticLaw law, bool has_averaged_strain) {
-    auto organ = *scene::make_liver(6000);
+  const auto liver = [](material::ElasticLaw law, bool has_averaged_strain) {
+    auto organ = *catalogue::make_liver(6000);
     organ.material.elastic_law = law;
     organ.material.has_averaged_strain = has_averaged_strain;
     organ.material.poisson_ratio = 0.47;
     organ.gravity_m_s2 = {0, -0.5, 0};  // more, and it sags away from the tools
     return organ;
   };
-  const auto measured_liver = [](scene::StrainEnergy energy, bool has_averaged_strain = false) {
-    auto organ = *scene::make_liver(6000);
-    auto material = *scene::find_measured_material("human_liver_nava2008");
+  const auto measured_liver = [](material::StrainEnergy energy, bool has_averaged_strain = false) {
+    auto organ = *catalogue::make_liver(6000);
+    auto material = *material::find_measured_material("human_liver_nava2008");
     material.energy = energy;
-    if (energy == scene::StrainEnergy::Exponential) material.exponent = 3;
-    scene::use_measured(material, organ.material);
+    if (energy == material::StrainEnergy::Exponential) material.exponent = 3;
+    material::use_measured(material, organ.material);
     organ.material.has_averaged_strain = has_averaged_strain;
     organ.gravity_m_s2 = {0, -0.5, 0};
     return organ;
   };
-  using enum scene::ElasticLaw;
-  using enum scene::StrainEnergy;
+  using enum material::ElasticLaw;
+  using enum material::StrainEnergy;
   for (const unsigned workers : {1u, 2u, 3u}) {
     EXPECT_EQ(hash_after(measured_liver(ReducedPolynomial), {}, workers), 1880254100034935329u);
     EXPECT_EQ(hash_after(measured_liver(ReducedPolynomial, true), {}, workers),
               15096250750826707144u);
     EXPECT_EQ(hash_after(measured_liver(Exponential), {}, workers), 5925352596361239379u);
-    EXPECT_EQ(hash_after(scene::make_lattice(), kFrozen, workers), 10457354252157771903u);
-    EXPECT_EQ(hash_after(scene::make_lattice(), {}, workers), 14081088538421466169u);
+    EXPECT_EQ(hash_after(catalogue::make_lattice(), kFrozen, workers), 10457354252157771903u);
+    EXPECT_EQ(hash_after(catalogue::make_lattice(), {}, workers), 14081088538421466169u);
     EXPECT_EQ(hash_after(liver(TensorMass, false), {}, workers), 9581764966789344020u);
     EXPECT_EQ(hash_after(liver(NeoHookean, false), {}, workers), 4812553863448117602u);
     EXPECT_EQ(hash_after(liver(NeoHookean, true), {}, workers), 3241821381732378906u);
@@ -76,7 +76,7 @@ TEST_F(TwoHands, TheHashIsTheSameOnEveryBuild) {
 }
 
 TEST_F(TwoHands, FramesSayHowMuchOfTheStressHasRelaxed) {
-  Simulation elastic(*scene::make_liver(2000)), measured(*scene::make_measured_liver(2000));
+  Simulation elastic(*catalogue::make_liver(2000)), measured(*catalogue::make_measured_liver(2000));
   std::shared_ptr<PublishedFrame> frame;
   for (int i = 0; i < 320; ++i) {
     run_tick(elastic), run_tick(measured);
@@ -93,9 +93,9 @@ TEST_F(TwoHands, FramesSayHowMuchOfTheStressHasRelaxed) {
 }
 
 TEST_F(TwoHands, AnyInputChangesTheHash) {
-  Simulation a(scene::make_lattice()), b(scene::make_lattice());
+  Simulation a(catalogue::make_lattice()), b(catalogue::make_lattice());
   for (int i = 0; i < 50; ++i) run_tick(a), run_tick(b);
-  session::TickInputs inputs;
+  hands::TickInputs inputs;
   add_two_hands(57, place_on(a.organ()), inputs);
   a.tick(inputs, {});
   inputs.samples[0].sample.world_from_tool.position.x += 1e-6f;
@@ -104,44 +104,44 @@ TEST_F(TwoHands, AnyInputChangesTheHash) {
 }
 
 TEST_F(TwoHands, ASnapshotIsWhatTheHashCoversAndContinuesBitForBit) {
-  Simulation a(scene::make_lattice());
+  Simulation a(catalogue::make_lattice());
   for (const int stop : {0, 15, 300}) {
     while (a.current_tick() < static_cast<Tick>(stop)) run_tick(a);
     Bytes snapshot;
     a.write_snapshot(snapshot);
-    Simulation b(scene::make_lattice());
+    Simulation b(catalogue::make_lattice());
     const auto restored = b.restore_snapshot(snapshot);
     ASSERT_TRUE(restored.ok()) << restored.error().message;
     EXPECT_EQ(b.state_hash(), a.state_hash());
-    Simulation c(scene::make_lattice());
+    Simulation c(catalogue::make_lattice());
     ASSERT_TRUE(c.restore_snapshot(snapshot).ok());
     for (int i = 0; i < 100; ++i) ASSERT_EQ(run_tick(b).state_hash, run_tick(c).state_hash);
     EXPECT_EQ(b.current_tick(), static_cast<Tick>(stop) + 100);
     // And equal to the run that never stopped.
-    Simulation d(scene::make_lattice());
+    Simulation d(catalogue::make_lattice());
     while (d.current_tick() < b.current_tick()) run_tick(d);
     EXPECT_EQ(d.state_hash(), b.state_hash());
   }
 }
 
 TEST_F(TwoHands, TheHashReportedByATickIsTheHashOfItsSnapshotBetweenPublications) {
-  Simulation a(scene::make_lattice());
+  Simulation a(catalogue::make_lattice());
   while (a.current_tick() < 15) run_tick(a);
   const auto reported = a.context().report.state_hash;
   Bytes snapshot;
   a.write_snapshot(snapshot);
   EXPECT_EQ(a.state_hash(), reported);
-  Simulation b(scene::make_lattice());
+  Simulation b(catalogue::make_lattice());
   ASSERT_TRUE(b.restore_snapshot(snapshot).ok());
   EXPECT_EQ(b.state_hash(), reported);
 }
 
 TEST_F(TwoHands, ATornOrWrongSnapshotIsRefusedAndChangesNothing) {
-  Simulation a(scene::make_lattice());
+  Simulation a(catalogue::make_lattice());
   for (int i = 0; i < 100; ++i) run_tick(a);
   Bytes snapshot;
   a.write_snapshot(snapshot);
-  Simulation b(scene::make_lattice());
+  Simulation b(catalogue::make_lattice());
   const auto hash = b.state_hash();
   for (std::size_t size = 0; size < snapshot.size(); size += 9973)
     EXPECT_FALSE(b.restore_snapshot(BytesView(snapshot).first(size)).ok());
@@ -152,7 +152,7 @@ TEST_F(TwoHands, ATornOrWrongSnapshotIsRefusedAndChangesNothing) {
 }
 
 TEST_F(TwoHands, RegionsMergeAndTissueComesToRestAgain) {
-  Simulation simulation(scene::make_lattice());
+  Simulation simulation(catalogue::make_lattice());
   bool was_apart = false, was_merged = false;
   for (int i = 0; i < 1500; ++i) {
     const auto report = run_tick(simulation, kFrozen);
@@ -161,7 +161,7 @@ TEST_F(TwoHands, RegionsMergeAndTissueComesToRestAgain) {
   }
   EXPECT_TRUE(was_apart);
   EXPECT_TRUE(was_merged);
-  session::TickInputs leave;
+  hands::TickInputs leave;
   leave.leaves = {{0}, {1}};
   simulation.tick(leave, kFrozen);
   int ticks = 0;
@@ -175,7 +175,7 @@ TEST_F(TwoHands, RegionsMergeAndTissueComesToRestAgain) {
 }
 
 TEST_F(TwoHands, FramesCarryTheQuantisedSurfaceAndItsCrc) {
-  Simulation simulation(scene::make_lattice());
+  Simulation simulation(catalogue::make_lattice());
   for (int i = 1; i <= 320; ++i) {
     run_tick(simulation);
     const auto frame = simulation.take_frame();
@@ -192,23 +192,23 @@ TEST_F(TwoHands, FramesCarryTheQuantisedSurfaceAndItsCrc) {
 }
 
 TEST(Simulation, APushOnAHeldNodeIsFeltButDoesNotMoveIt) {
-  Simulation simulation(scene::make_lattice());
+  Simulation simulation(catalogue::make_lattice());
   const float top = testing::place_on(simulation.organ()).y;
-  session::TickInputs inputs;
+  hands::TickInputs inputs;
   for (std::uint8_t hand = 0; hand < 2; ++hand) {
-    session::HandJoin join{.slot = {hand}};
+    hands::HandJoin join{.slot = {hand}};
     join.shapes[0] = {.radius_m = 0.02f, .length_m = 0.3f, .reach_m = 0.008f};
     inputs.joins.push_back(join);
   }
   float pushed_force = 0;
   Vec3f held_at{};  // once the jaws are closed, before the push
   for (int tick = 1; tick <= 700; ++tick) {
-    const auto add = [&](std::uint8_t hand, float height, scene::Verb verb) {
+    const auto add = [&](std::uint8_t hand, float height, tool::Verb verb) {
       inputs.samples.push_back(
           {tool_slot({hand}, 0), {{{0, top + height, 0}, rotation_from_z({0, 1, 0})}, verb}});
     };
-    add(0, 0, scene::Verb::Grasp);
-    add(1, tick < 200 ? 0.02f : -0.003f, scene::Verb::Push);
+    add(0, 0, tool::Verb::Grasp);
+    add(1, tick < 200 ? 0.02f : -0.003f, tool::Verb::Push);
     simulation.tick(inputs, {});
     inputs.clear();
     const auto frame = simulation.take_frame();
@@ -228,18 +228,18 @@ TEST(Simulation, APushOnAHeldNodeIsFeltButDoesNotMoveIt) {
 }
 
 TEST(Simulation, RandomInputsNeverBreakIt) {
-  auto organ = scene::make_lattice({.nx = 8, .ny = 6, .nz = 8});
+  auto organ = catalogue::make_lattice({.nx = 8, .ny = 6, .nz = 8});
   ASSERT_TRUE(organ.ok());
   Simulation simulation(*organ);
   std::mt19937 random(7);
   const auto pick = [&](std::uint32_t n) { return static_cast<std::uint32_t>(random() % n); };
   std::uniform_real_distribution<float> place(-0.06f, 0.06f);
   for (int tick = 0; tick < 4000; ++tick) {
-    session::TickInputs inputs;
+    hands::TickInputs inputs;
     if (pick(40) == 0) inputs.leaves.push_back({static_cast<std::uint8_t>(pick(20))});
     if (pick(20) == 0) {
-      session::HandJoin join{.slot = {static_cast<std::uint8_t>(pick(20))},
-                             .tool_count = static_cast<int>(pick(4))};
+      hands::HandJoin join{.slot = {static_cast<std::uint8_t>(pick(20))},
+                           .tool_count = static_cast<int>(pick(4))};
       join.shapes[0].radius_m = pick(10) == 0 ? -1.0f : 0.01f;
       inputs.joins.push_back(join);
     }
@@ -247,7 +247,7 @@ TEST(Simulation, RandomInputsNeverBreakIt) {
       inputs.samples.push_back(
           {ToolSlot{static_cast<std::uint8_t>(pick(40))},
            {{{place(random), place(random), place(random)}, rotation_from_z({0, 1, 0})},
-            static_cast<scene::Verb>(pick(3))}});
+            static_cast<tool::Verb>(pick(3))}});
     TickDecisions decisions{
         .depth_limit = pick(8), .node_limit = 1 + pick(400), .sweeps = 1 + pick(6)};
     decisions.boundary = pick(100) < 50 ? world::Boundary::Frozen : world::Boundary::Graded;

@@ -2,15 +2,15 @@
 
 #include <gtest/gtest.h>
 
-#include "common/scene/builtin_organs.h"
-#include "server/cutting/validate.h"
-#include "server/step/simulation.h"
+#include "server/organs/catalogue/builtin_organs.h"
+#include "server/tissue/cutting/validate.h"
+#include "server/tissue/step/simulation.h"
 
 namespace trocar::step {
 namespace {
 
-scene::Organ liver(scene::ElasticLaw law, double tear_stretch) {
-  auto organ = *scene::make_liver(4000);
+organ::Organ liver(material::ElasticLaw law, double tear_stretch) {
+  auto organ = *catalogue::make_liver(4000);
   organ.material.elastic_law = law;
   organ.material.tear_stretch = tear_stretch;
   return organ;
@@ -22,9 +22,9 @@ TickReport pull(Simulation& simulation) {
   Vec3f end{-1, 0, 0};
   for (const auto& p : simulation.organ().mesh.rest_positions)
     if (static_cast<float>(p.x) > end.x) end = to_float(p);
-  session::TickInputs inputs;
+  hands::TickInputs inputs;
   if (tick == 1) {
-    session::HandJoin join{.slot = {0}};
+    hands::HandJoin join{.slot = {0}};
     join.shapes[0] = {.radius_m = 0.002f, .length_m = 0.3f, .reach_m = 0.02f};
     inputs.joins.push_back(join);
   }
@@ -32,13 +32,13 @@ TickReport pull(Simulation& simulation) {
     const float t = static_cast<float>(tick) * 1e-3f;
     const Vec3f drawn{0.1f * std::max(0.0f, t - 0.2f), 0, 0};
     inputs.samples.push_back(
-        {tool_slot({0}, 0), {{end + drawn, rotation_from_z({1, 0, 0})}, scene::Verb::Grasp}});
+        {tool_slot({0}, 0), {{end + drawn, rotation_from_z({1, 0, 0})}, tool::Verb::Grasp}});
   }
   return simulation.tick(inputs, {});
 }
 
 TEST(Tears, AFlapPulledFarEnoughTearsOff) {
-  using enum scene::ElasticLaw;
+  using enum material::ElasticLaw;
   for (const auto law : {Springs, TensorMass, NeoHookean}) {
     Simulation simulation(liver(law, 1.4));
     double torn = 0;
@@ -57,13 +57,13 @@ TEST(Tears, AFlapPulledFarEnoughTearsOff) {
 }
 
 TEST(Tears, NothingTearsThatIsNotSaidTo) {
-  Simulation simulation(liver(scene::ElasticLaw::Springs, 0));
+  Simulation simulation(liver(material::ElasticLaw::Springs, 0));
   for (int i = 0; i < 600; ++i) ASSERT_EQ(pull(simulation).cut.torn_area_m2, 0);
 }
 
 TEST(Tears, ARestoredStateTearsOnBitForBit) {
-  Simulation a(liver(scene::ElasticLaw::NeoHookean, 1.3)),
-      b(liver(scene::ElasticLaw::NeoHookean, 1.3));
+  Simulation a(liver(material::ElasticLaw::NeoHookean, 1.3)),
+      b(liver(material::ElasticLaw::NeoHookean, 1.3));
   double torn = 0;
   for (int i = 0; i < 2000 && torn == 0; ++i) torn += pull(a).cut.torn_area_m2;
   ASSERT_GT(torn, 0);

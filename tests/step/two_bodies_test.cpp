@@ -2,16 +2,16 @@
 
 #include <gtest/gtest.h>
 
-#include "common/scene/builtin_organs.h"
-#include "server/cutting/validate.h"
-#include "server/step/simulation.h"
+#include "server/organs/catalogue/builtin_organs.h"
+#include "server/tissue/cutting/validate.h"
+#include "server/tissue/step/simulation.h"
 
 namespace trocar::step {
 namespace {
 
 class TwoBodies : public ::testing::Test {
  protected:
-  TwoBodies() : simulation_(scene::make_chest()) {
+  TwoBodies() : simulation_(catalogue::make_chest()) {
     const auto& organ = simulation_.organ();
     const auto& rest = organ.mesh.rest_positions;
     for (const auto& p : rest) top_ = std::max(top_, static_cast<float>(p.y));
@@ -44,8 +44,8 @@ class TwoBodies : public ::testing::Test {
 };
 
 TEST_F(TwoBodies, WhatPressesTheWallPressesTheHeart) {
-  session::TickInputs inputs;
-  session::HandJoin join{.slot = {0}};
+  hands::TickInputs inputs;
+  hands::HandJoin join{.slot = {0}};
   join.shapes[0] = {.radius_m = 0.04f, .length_m = 0.3f};
   inputs.joins.push_back(join);
   const float gap = height(above_) - height(apex_), heart = height(apex_);
@@ -54,7 +54,7 @@ TEST_F(TwoBodies, WhatPressesTheWallPressesTheHeart) {
     const float depth = std::min(0.03f, 0.1f * static_cast<float>(tick) * 1e-3f);
     inputs.samples.push_back(
         {tool_slot({0}, 0),
-         {{over_apex(0.002f - depth), rotation_from_z({0, 1, 0})}, scene::Verb::Push}});
+         {{over_apex(0.002f - depth), rotation_from_z({0, 1, 0})}, tool::Verb::Push}});
     ASSERT_EQ(simulation_.tick(inputs, {}).nodes_rejected, 0u) << "tick " << tick;
     inputs.clear();
   }
@@ -63,8 +63,8 @@ TEST_F(TwoBodies, WhatPressesTheWallPressesTheHeart) {
 }
 
 TEST_F(TwoBodies, ABladeCutsTheOneAndLeavesTheOther) {
-  session::TickInputs inputs;
-  session::HandJoin join{.slot = {0}};
+  hands::TickInputs inputs;
+  hands::HandJoin join{.slot = {0}};
   join.shapes[0] = {.radius_m = 0.001f, .length_m = 0.3f, .edge_m = 0.08f};
   inputs.joins.push_back(join);
   double opened = 0;
@@ -72,7 +72,7 @@ TEST_F(TwoBodies, ABladeCutsTheOneAndLeavesTheOther) {
     const float along = 0.1f * static_cast<float>(tick) * 1e-3f - 0.035f;
     inputs.samples.push_back(
         {tool_slot({0}, 0),
-         {{over_apex(-0.05f) + Vec3f{along, 0, 0}, rotation_from_z({0, 1, 0})}, scene::Verb::Cut}});
+         {{over_apex(-0.05f) + Vec3f{along, 0, 0}, rotation_from_z({0, 1, 0})}, tool::Verb::Cut}});
     const auto report = simulation_.tick(inputs, {});
     ASSERT_EQ(report.nodes_rejected, 0u) << "tick " << tick;
     opened += report.cut.opened_area_m2;

@@ -85,8 +85,8 @@ bool has_calculix() {
 Result<std::string> calculix_input(const finite_elements::Problem& problem,
                                    const finite_elements::Loads& loads) {
   const auto& m = problem.materials.front();
-  if (problem.materials.size() != 1 || m.split != scene::VolumeSplit::Isochoric ||
-      m.energy != scene::StrainEnergy::ReducedPolynomial || m.coefficients_pa[3] != 0 ||
+  if (problem.materials.size() != 1 || m.split != material::VolumeSplit::Isochoric ||
+      m.energy != material::StrainEnergy::ReducedPolynomial || m.coefficients_pa[3] != 0 ||
       m.coefficients_pa[4] != 0)
     return Error{ErrorCode::Usage, "CalculiX has reduced polynomials up to N = 3, isochoric"};
   std::string text = mesh_of(problem.mesh);

@@ -6,7 +6,7 @@
 
 #include <filesystem>
 
-#include "server/finite_elements/solver.h"
+#include "server/lab/finite_elements/solver.h"
 #include "tests/validation/measure.h"
 
 namespace trocar::validation {

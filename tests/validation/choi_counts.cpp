@@ -7,7 +7,7 @@
 #include <memory>
 
 #include "common/base/timing.h"
-#include "common/scene/builtin_organs.h"
+#include "server/organs/catalogue/builtin_organs.h"
 #include "tests/validation/experiments.h"
 #include "tests/validation/scenario_text.h"
 
@@ -92,7 +92,7 @@ Cost cost_of(const Lab& lab, Section& section, int depth, int steps) {
   const auto text = point_load(kSurface_mm, depth, 0.001 * steps, true);
   // Parsing and making the lattice are not part of what the paper calls initialisation.
   lab.start(section, "point load", name, text);
-  auto resolved = scene::resolve(std::move(*scene::parse_scenario_text(text, name)));
+  auto resolved = scenario::resolve(std::move(*scenario::parse_scenario_text(text, name)));
   Cost cost;
   auto begin = thread_cpu_ns();
   ScenarioRun run(std::move(*resolved), Solver::Live);
@@ -108,7 +108,7 @@ Cost cost_of(const Lab& lab, Section& section, int depth, int steps) {
 
   // The same queue by itself.
   propagation::PropagationQueue queue(run.organ().mesh.node_count());
-  const std::vector<NodeIndex> touched{scene::lattice_node({}, 15, 14, 15)};
+  const std::vector<NodeIndex> touched{catalogue::lattice_node({}, 15, 14, 15)};
   const std::vector<std::span<const NodeIndex>> seeds{touched};
   times.clear();
   for (int i = 0; i < steps; ++i) {

@@ -37,7 +37,7 @@ double protrusion(const Lab& lab, Section& section, const std::string& organ,
     profile.x.push_back(layer);
     profile.y.push_back(
         static_cast<double>(
-            run->world().displacements[scene::lattice_node({}, 15 + layer, 14, 15).value].y) *
+            run->world().displacements[catalogue::lattice_node({}, 15 + layer, 14, 15).value].y) *
         1e3);
   }
   return run->probe(0).y * 1e3;
@@ -238,7 +238,7 @@ plot::Series press(const Lab& lab, Section& section, const std::string& name, do
 }  // namespace
 
 void run_palpation(const Lab& lab, Section& section) {
-  const scene::LatticeSize size{
+  const catalogue::LatticeSize size{
       .nx = lab.is_short() ? 21 : 31, .ny = 15, .nz = lab.is_short() ? 21 : 31, .spacing_m = 0.005};
   lab.keep_organ("palpation-block", lattice_with_diagonals(size));
   section.say(fmt::format(

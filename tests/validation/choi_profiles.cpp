@@ -22,7 +22,7 @@ constexpr double kInvisible = 0.03;  // of the pull: what the paper calls imperc
 struct Material {
   const char* name;
   const char* title;
-  scene::Organ organ;
+  organ::Organ organ;
   std::string text;  // that makes it
 };
 
@@ -40,7 +40,7 @@ std::string label(int depth) {
 }
 
 // The nodes that the queue does not reach, as a file of node numbers.
-std::string beyond(const Lab& lab, const scene::Organ& organ, const std::string& name, int depth) {
+std::string beyond(const Lab& lab, const organ::Organ& organ, const std::string& name, int depth) {
   std::vector<NodeIndex> patch;
   for (const auto node : organ.mesh.surface_nodes)
     if (length(organ.mesh.rest_positions[node.value] * 1e3 - kPatch_mm) <= kPatchRadius_mm)
@@ -93,7 +93,7 @@ Pulled pull_with(const Lab& lab, Section& section, const Material& material, int
 plot::Series profile(const std::string& name, const Pulled& pulled) {
   plot::Series series{name, {}, {}, plot::Style::LineAndPoints, {}};
   for (int layer = -14; layer <= 14; ++layer) {
-    const auto node = scene::lattice_node({}, 15 + layer, 14, 15);
+    const auto node = catalogue::lattice_node({}, 15 + layer, 14, 15);
     series.x.push_back(layer);
     series.y.push_back(pulled.field[node.value].y * 1e3 / kPull_mm);
   }
@@ -223,7 +223,7 @@ void run_fig5_profiles(const Lab& lab, Section& section) {
       "its errors against the whole lattice have no bound here. The second lattice has springs "
       "along the diagonals of the faces too, and with them shear, as tissue has.");
   study(lab, section,
-        {"lattice", "Lattice of the paper", scene::make_lattice(),
+        {"lattice", "Lattice of the paper", catalogue::make_lattice(),
          lattice_organ(30, 15, 30, kSpacing_mm)},
         false);
   if (lab.is_short()) return;

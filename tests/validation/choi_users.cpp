@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "common/scene/builtin_organs.h"
+#include "server/organs/catalogue/builtin_organs.h"
 #include "tests/validation/experiments.h"
 #include "tests/validation/measure.h"
 #include "tests/validation/scenario_text.h"
@@ -36,7 +36,7 @@ std::string ids_of(const std::vector<NodeIndex>& nodes) {
 }
 
 // How many separate local regions three forces have at a depth.
-std::uint16_t regions(const scene::Organ& organ, std::uint32_t depth,
+std::uint16_t regions(const organ::Organ& organ, std::uint32_t depth,
                       const std::vector<std::vector<NodeIndex>>& seeds) {
   propagation::PropagationQueue queue(organ.mesh.node_count());
   const std::vector<std::span<const NodeIndex>> spans(seeds.begin(), seeds.end());
@@ -99,7 +99,7 @@ void run_fig2_users(const Lab& lab, Section& section) {
                   "Largest difference of any tool's force, over that force.");
 
   const auto node = [](int i, int k) {
-    return std::vector<NodeIndex>{scene::lattice_node({}, i, 14, k)};
+    return std::vector<NodeIndex>{catalogue::lattice_node({}, i, 14, k)};
   };
   const std::vector<std::vector<NodeIndex>> seeds{node(8, 15), node(15, 15), node(22, 15)};
   Table table{"Three touched nodes of the surface, seven nodes apart",

@@ -17,7 +17,7 @@ dynamics::SolveSettings solve_settings(float dt) {
   return {.sweeps = 60, .over_relaxation = 1.6f, .dt = dt, .residual_tolerance_n = 1e-6f};
 }
 
-double half_thickness(const scene::Organ& organ) {
+double half_thickness(const organ::Organ& organ) {
   double most = 0;
   for (const auto& p : organ.mesh.rest_positions) most = std::max(most, p.y);
   return most;
@@ -40,8 +40,8 @@ void add(cutting::CutOutput& sum, const cutting::CutOutput& more) {
 
 }  // namespace
 
-CutPlate::CutPlate(scene::Organ organ, const cutting::Settings& settings, Mechanics mechanics)
-    : organ_(std::make_unique<const scene::Organ>(std::move(organ))),
+CutPlate::CutPlate(organ::Organ organ, const cutting::Settings& settings, Mechanics mechanics)
+    : organ_(std::make_unique<const organ::Organ>(std::move(organ))),
       half_thickness_(half_thickness(*organ_)),
       topology_(*organ_),
       cutter_(topology_, settings),

@@ -6,8 +6,8 @@
 
 #include <memory>
 
-#include "server/cutting/cutter.h"
-#include "server/dynamics/block_descent.h"
+#include "server/tissue/cutting/cutter.h"
+#include "server/tissue/dynamics/block_descent.h"
 #include "tests/validation/remodelled_springs.h"
 
 namespace trocar::validation {
@@ -20,7 +20,7 @@ enum class Mechanics { Live, AsPrinted };
 
 class CutPlate {
  public:
-  CutPlate(scene::Organ organ, const cutting::Settings& settings, Mechanics mechanics);
+  CutPlate(organ::Organ organ, const cutting::Settings& settings, Mechanics mechanics);
 
   void step(float dt);
   // A blade of this edge goes from one place to another at once.
@@ -51,7 +51,7 @@ class CutPlate {
   template <typename Place>
   double wound_area(Place&& place) const;
 
-  std::unique_ptr<const scene::Organ> organ_;
+  std::unique_ptr<const organ::Organ> organ_;
   double half_thickness_ = 0;  // m
   dynamics::Topology topology_;
   cutting::Cutter cutter_;

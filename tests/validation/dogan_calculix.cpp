@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/finite_elements/surface_traction.h"
+#include "server/lab/finite_elements/surface_traction.h"
 #include "tests/validation/calculix.h"
 #include "tests/validation/experiments.h"
 #include "tests/validation/organs.h"
@@ -19,8 +19,8 @@ using finite_elements::ElementOrder;
 // The displacement print of ccx has seven digits; its increments end at a residual of 1e-7.
 constexpr double kBound = 1e-4;
 
-scene::HyperelasticMaterial three_terms(scene::VolumeSplit split) {
-  auto material = *scene::find_measured_material("human_liver_nava2008");
+material::HyperelasticMaterial three_terms(material::VolumeSplit split) {
+  auto material = *material::find_measured_material("human_liver_nava2008");
   material.name = "table 1, three terms";
   material.coefficients_pa[3] = material.coefficients_pa[4] = 0;
   material.relaxation.clear();
@@ -32,7 +32,7 @@ struct Setting {
   const char* name;
   const char* title;
   Vec3d size_m;
-  void (*load)(const scene::Organ& organ, finite_elements::Problem& problem,
+  void (*load)(const organ::Organ& organ, finite_elements::Problem& problem,
                finite_elements::Loads& loads);
 };
 
@@ -61,7 +61,7 @@ void sort_holds(finite_elements::Problem& problem, finite_elements::Loads& loads
 
 // A block of 60 x 30 x 60 mm, a square of 20 mm in the middle of its top pressed in by 5 mm and
 // drawn aside by 3 mm.
-void press(const scene::Organ&, finite_elements::Problem& problem, finite_elements::Loads& loads) {
+void press(const organ::Organ&, finite_elements::Problem& problem, finite_elements::Loads& loads) {
   hold(problem, loads, [](const Vec3d& p) { return p.y < -0.015 + 1e-9; }, {});
   hold(problem, loads,
        [](const Vec3d& p) {
@@ -72,7 +72,7 @@ void press(const scene::Organ&, finite_elements::Problem& problem, finite_elemen
 }
 
 // A bar of 20 x 80 x 20 mm, clamped at one end and bent by an even traction at the other.
-void bend(const scene::Organ& organ, finite_elements::Problem& problem,
+void bend(const organ::Organ& organ, finite_elements::Problem& problem,
           finite_elements::Loads& loads) {
   hold(problem, loads, [](const Vec3d& p) { return p.y < -0.04 + 1e-9; }, {});
   std::vector<std::uint8_t> is_end;
@@ -115,7 +115,7 @@ void compare(const Lab& lab, Section& section, Table& table, const Case& c) {
   show_progress(c.name());
   auto problem = finite_elements::make_problem(
       finite_elements::make_elements(organ.mesh, organ.mesh.rest_positions, c.order),
-      three_terms(scene::VolumeSplit::Isochoric));
+      three_terms(material::VolumeSplit::Isochoric));
   auto loads = finite_elements::no_loads(problem);
   c.setting.load(organ, problem, loads);
   const auto ours = solve(problem, loads);
@@ -123,7 +123,7 @@ void compare(const Lab& lab, Section& section, Table& table, const Case& c) {
   TROCAR_ASSERT(input.ok());
   const auto theirs = run_calculix(lab.scenarios(), c.name(), *input, problem.mesh.node_count());
   auto unsplit = problem;
-  unsplit.materials = {three_terms(scene::VolumeSplit::Unsplit)};
+  unsplit.materials = {three_terms(material::VolumeSplit::Unsplit)};
   const auto other = solve(unsplit, loads);
   const double error =
       theirs && ours.is_converged ? field_error(ours.field, *theirs) : std::nan("");

@@ -9,8 +9,8 @@
 #include <cmath>
 #include <limits>
 
-#include "server/calibration/places.h"
-#include "server/finite_elements/scenario_solve.h"
+#include "server/lab/calibration/places.h"
+#include "server/lab/finite_elements/scenario_solve.h"
 #include "tests/validation/experiments.h"
 #include "tests/validation/measure.h"
 #include "tests/validation/measured_livers.h"
@@ -106,7 +106,7 @@ plot::Series curve(const std::string& name, const Creep& creep, plot::Style styl
 
 // How much farther tissue is after `time_s` than at once if it is linear, incompressible and of
 // this series: 1 = strain - sum q_k with tau_k q_k' = g_k strain - q_k, by small steps.
-double linear_growth(const scene::HyperelasticMaterial& material, double time_s) {
+double linear_growth(const material::HyperelasticMaterial& material, double time_s) {
   constexpr int kSteps = 200'000;
   const double dt = time_s / kSteps;
   std::vector<double> q(material.relaxation.size(), 0.0);
@@ -208,9 +208,9 @@ class Study {
                                          bool has_inertia) const {
     const std::string run = has_inertia ? "seconds = 1\n" : "mode = \"static\"\nseconds = 1\n";
     auto parsed =
-        scene::parse_scenario_text(text(load, run), (lab_.scenarios() / "creep.toml").string());
+        scenario::parse_scenario_text(text(load, run), (lab_.scenarios() / "creep.toml").string());
     TROCAR_ASSERT(parsed.ok());
-    auto resolved = scene::resolve(std::move(*parsed));
+    auto resolved = scenario::resolve(std::move(*parsed));
     TROCAR_ASSERT(resolved.ok());
     auto made = ScenarioSolve::create(
         std::move(*resolved),
@@ -361,7 +361,7 @@ void show_two_loads(Section& section, const Study& study, const Creep& whole) {
 
 // How much farther a half-space under a point force is after all relaxation than at once: (1 - nu)
 // / mu of then over now (Boussinesq), since only shear relaxes.
-double relaxed_half_space(const scene::HyperelasticMaterial& material) {
+double relaxed_half_space(const material::HyperelasticMaterial& material) {
   const auto compliance = [&](double share) {
     const double mu = 2 * material.coefficients_pa[0] * share, k = material.bulk_modulus_pa;
     return (1 - (3 * k - 2 * mu) / (2 * (3 * k + mu))) / mu;

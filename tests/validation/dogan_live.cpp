@@ -9,10 +9,10 @@
 #include <optional>
 
 #include "common/base/timing.h"
-#include "server/calibration/places.h"
-#include "server/calibration/press.h"
-#include "server/control/rate_controller.h"
-#include "server/step/simulation.h"
+#include "server/lab/calibration/places.h"
+#include "server/lab/calibration/press.h"
+#include "server/session/control/rate_controller.h"
+#include "server/tissue/step/simulation.h"
 #include "tests/validation/experiments.h"
 #include "tests/validation/measure.h"
 #include "tests/validation/measured_livers.h"
@@ -70,7 +70,7 @@ step::TickDecisions decisions_of(Detail detail) {
 
 class Hand {
  public:
-  Hand(const scene::Organ& organ, Tick ticks)
+  Hand(const organ::Organ& organ, Tick ticks)
       : organ_(organ), place_(calibration::spread_places(organ, 1, kSeed).at(0)), ticks_(ticks) {}
 
   // The first `ticks` of the whole run.
@@ -82,8 +82,8 @@ class Hand {
                                              .layer_sweeps = simulation.context().far_plan.sweeps,
                                              .far_interval = control::kLongestFarInterval,
                                              .budget_us = kBudget_ms * 1e3});
-    session::TickInputs inputs;
-    session::HandJoin join{.slot = {0}};
+    hands::TickInputs inputs;
+    hands::HandJoin join{.slot = {0}};
     join.shapes[0] = {.radius_m = kToolRadius_m, .length_m = 0.3f};
     inputs.joins.push_back(join);
     Course course;
@@ -106,11 +106,11 @@ class Hand {
   Course press(Detail detail) const { return press(detail, ticks_); }
 
  private:
-  session::ToolInput sample_at(Tick tick) const {
+  hands::ToolInput sample_at(Tick tick) const {
     const float height = height_m(static_cast<float>(tick) / static_cast<float>(ticks_));
     return {tool_slot({0}, 0),
             {{place_.position + place_.outward * height, rotation_from_z(place_.outward)},
-             scene::Verb::Push}};
+             tool::Verb::Push}};
   }
 
   static Vec3d force_in(const step::Simulation& simulation) {
@@ -121,7 +121,7 @@ class Hand {
     return force;
   }
 
-  const scene::Organ& organ_;
+  const organ::Organ& organ_;
   const calibration::Place place_;
   const Tick ticks_;
 };

@@ -9,8 +9,8 @@
 #include <map>
 #include <numeric>
 
-#include "server/calibration/places.h"
-#include "server/finite_elements/scenario_solve.h"
+#include "server/lab/calibration/places.h"
+#include "server/lab/finite_elements/scenario_solve.h"
 #include "tests/validation/experiments.h"
 #include "tests/validation/measured_livers.h"
 #include "tests/validation/organs.h"
@@ -38,7 +38,7 @@ struct Elastic {
   double young_pa, poisson;
 };
 Elastic elastic() {
-  const auto& liver = *scene::find_measured_material("human_liver_nava2008");
+  const auto& liver = *material::find_measured_material("human_liver_nava2008");
   const double mu = 2 * liver.coefficients_pa[0], lambda = liver.bulk_modulus_pa - mu;
   const double poisson = lambda / (2 * (lambda + mu));
   return {2 * mu * (1 + poisson), poisson};
@@ -49,7 +49,7 @@ struct Geometry {
   const char* title;
   const char* quantity;  // what the table shows
   double per_si;         // to its unit
-  scene::Organ (*organ)(int cells);
+  organ::Organ (*organ)(int cells);
   // Sets, loads and one probe; and which component of it counts.
   std::string (*text)();
   double (*value)(const Vec3d& probe);
@@ -66,7 +66,7 @@ std::string traction(const Vec3d& pa) {
       pa.x, pa.y, pa.z);
 }
 
-scene::Organ beam(int cells) {
+organ::Organ beam(int cells) {
   return tet_box(even(0.02, cells), even(0.08, 4 * cells), even(0.02, cells));
 }
 std::string bend_text() {
@@ -76,7 +76,7 @@ std::string bend_text() {
 
 // Cook's membrane as a solid: 48 long, 44 high at its clamp and 16 at its end, 10 thick; mm. Lies
 // along y, so that its clamp is the lowest layer.
-scene::Organ cook(int cells) {
+organ::Organ cook(int cells) {
   auto organ = tet_box(even(0.048, cells), even(0.048, cells), even(0.01, std::max(1, cells / 4)));
   for (auto& p : organ.mesh.rest_positions) {
     const double along = p.y / 0.048 + 0.5, across = p.x / 0.048 + 0.5;
@@ -84,7 +84,7 @@ scene::Organ cook(int cells) {
     p = {low + across * (high - low), along * 0.048, p.z};
   }
   mesh::centre_on_origin(organ.mesh);
-  organ.node_masses_kg = scene::lumped_masses(organ);
+  organ.node_masses_kg = organ::lumped_masses(organ);
   organ.name = "cook";
   return organ;
 }
@@ -93,7 +93,7 @@ std::string cook_text() {
          traction({60, 0, 0}) + "[[probe]]\nset = \"end\"\nquantity = \"displacement\"\n";
 }
 
-scene::Organ block(int cells) {
+organ::Organ block(int cells) {
   return tet_box(even(0.06, 3 * cells), even(0.03, 3 * cells / 2), even(0.06, 3 * cells));
 }
 std::string press_text() {
@@ -139,9 +139,9 @@ const std::vector<Geometry>& geometries() {
 // Null where no equilibrium was found.
 std::unique_ptr<ScenarioSolve> off_line(const Lab& lab, const std::string& text,
                                         ElementOrder order) {
-  auto parsed = scene::parse_scenario_text(text, (lab.scenarios() / "locking.toml").string());
+  auto parsed = scenario::parse_scenario_text(text, (lab.scenarios() / "locking.toml").string());
   TROCAR_ASSERT(parsed.ok());
-  auto resolved = scene::resolve(std::move(*parsed));
+  auto resolved = scenario::resolve(std::move(*parsed));
   TROCAR_ASSERT(resolved.ok());
   auto solve = ScenarioSolve::create(std::move(*resolved), {.order = order});
   TROCAR_ASSERT(solve.ok());
@@ -291,7 +291,7 @@ void measure_liver(const Lab& lab, Section& section, const MeasuredLiver& liver,
 
 // --- Pressure in the pressed block ---
 
-double volume_ratio(const scene::Organ& organ, const std::vector<Vec3d>& u, const mesh::Tet& tet) {
+double volume_ratio(const organ::Organ& organ, const std::vector<Vec3d>& u, const mesh::Tet& tet) {
   const auto six_volumes = [&](bool is_moved) {
     std::array<Vec3d, 4> p;
     for (std::size_t k = 0; k < 4; ++k)
@@ -303,9 +303,9 @@ double volume_ratio(const scene::Organ& organ, const std::vector<Vec3d>& u, cons
 
 // Of each tet, kPa: K (1 - J) of its own, or the mean of its corners' stars, whose F is the mean of
 // that of the tets at them.
-std::vector<double> pressures_kpa(const scene::Organ& organ, const std::vector<Vec3d>& u,
+std::vector<double> pressures_kpa(const organ::Organ& organ, const std::vector<Vec3d>& u,
                                   bool is_averaged) {
-  const double bulk = scene::find_measured_material("human_liver_nava2008")->bulk_modulus_pa;
+  const double bulk = material::find_measured_material("human_liver_nava2008")->bulk_modulus_pa;
   std::vector<double> pressures;
   if (!is_averaged) {
     for (const auto& tet : organ.mesh.tets)
@@ -349,7 +349,7 @@ std::vector<double> pressures_kpa(const scene::Organ& organ, const std::vector<V
 
 // How much tets differ from the mean of those that they share a face with, over how much they
 // differ from the mean of all: about 1 for a checkerboard, small for what is smooth.
-double roughness(const scene::Organ& organ, const std::vector<double>& pressures) {
+double roughness(const organ::Organ& organ, const std::vector<double>& pressures) {
   std::map<std::array<std::uint32_t, 3>, std::uint32_t> seen;
   std::vector<std::pair<double, int>> beside(pressures.size());
   for (std::uint32_t t = 0; t < pressures.size(); ++t)
@@ -375,7 +375,7 @@ double roughness(const scene::Organ& organ, const std::vector<double>& pressures
 }
 
 // Tets near the middle plane, where they are at rest, in classes of pressure.
-plot::Plot picture(const std::string& title, const scene::Organ& organ,
+plot::Plot picture(const std::string& title, const organ::Organ& organ,
                    const std::vector<double>& pressures) {
   constexpr std::array<double, 6> kLimits{-0.25, 0.25, 0.75, 1.5, 3, 6};  // kPa
   plot::Plot plot{.title = title,

@@ -7,7 +7,7 @@
 #include <cstdlib>
 
 #include "common/base/timing.h"
-#include "common/scene/organ_file.h"
+#include "server/organs/organ/organ_file.h"
 
 namespace trocar::validation {
 namespace {
@@ -43,8 +43,8 @@ void show_progress(const std::string& text) {
 Lab::Lab(std::filesystem::path folder, bool is_short)
     : scenarios_(std::move(folder) / "scenarios"), is_short_(is_short) {}
 
-void Lab::keep_organ(const std::string& name, const scene::Organ& organ) const {
-  must(scene::write_organ(scenarios_ / (name + ".organ"), organ), name);
+void Lab::keep_organ(const std::string& name, const organ::Organ& organ) const {
+  must(organ::write_organ(scenarios_ / (name + ".organ"), organ), name);
 }
 
 void Lab::keep_file(const std::string& name, const std::string& text) const {
@@ -63,7 +63,7 @@ RunPtr Lab::try_start(Section& section, const std::string& family, const std::st
   const auto path = scenarios_ / (name + ".toml");
   must(write_file(path, text), name);
   auto resolved =
-      must(scene::resolve(must(scene::parse_scenario_text(text, path.string()), name)), name);
+      must(scenario::resolve(must(scenario::parse_scenario_text(text, path.string()), name)), name);
   if (const auto supported = scenario::check_supported(resolved); !supported) {
     section.say("Left out: " + name + ": " + supported.error().message);
     return nullptr;

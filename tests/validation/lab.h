@@ -9,7 +9,7 @@
 #include <memory>
 #include <string>
 
-#include "server/scenario/scenario_run.h"
+#include "server/lab/scenario/scenario_run.h"
 #include "tests/validation/report.h"
 
 namespace trocar::validation {
@@ -29,7 +29,7 @@ class Lab {
   const std::filesystem::path& scenarios() const { return scenarios_; }
 
   // Makes scenarios/<name>.organ, to which scenarios refer as "<name>.organ".
-  void keep_organ(const std::string& name, const scene::Organ& organ) const;
+  void keep_organ(const std::string& name, const organ::Organ& organ) const;
 
   // Makes scenarios/<name>, a file to which scenarios refer.
   void keep_file(const std::string& name, const std::string& text) const;

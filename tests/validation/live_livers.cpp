@@ -7,8 +7,8 @@
 
 namespace trocar::validation {
 
-reduction::LocalSettings live_settings(const Lab& lab) {
-  reduction::LocalSettings settings{.patches = 12, .threads = 2};
+reduce::LocalSettings live_settings(const Lab& lab) {
+  reduce::LocalSettings settings{.patches = 12, .threads = 2};
   if (lab.is_short())
     settings.modes = 16, settings.directions = 2, settings.field_nodes = 5, settings.patches = 3,
     settings.patch_radius_m = 0.02;

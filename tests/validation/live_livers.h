@@ -19,12 +19,12 @@ struct LiveLiver {
   MeasuredLiver liver;
   LiveReduction reduction;
 
-  const scene::Organ& organ() const { return liver.organ; }
+  const organ::Organ& organ() const { return liver.organ; }
   const std::string& name() const { return liver.name; }
   const std::string& title() const { return liver.title; }
 };
 
-reduction::LocalSettings live_settings(const Lab& lab);
+reduce::LocalSettings live_settings(const Lab& lab);
 // One sentence for people.
 std::string live_training_text(const Lab& lab);
 // As measured_livers().

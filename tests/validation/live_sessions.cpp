@@ -9,10 +9,10 @@
 
 #include "common/base/assert.h"
 #include "common/base/timing.h"
-#include "common/scene/local_reduction_file.h"
-#include "server/calibration/press.h"
-#include "server/reduction/local_quality.h"
-#include "server/reduction/presses.h"
+#include "server/lab/calibration/press.h"
+#include "server/lab/reduce/local_quality.h"
+#include "server/lab/reduce/presses.h"
+#include "server/organs/organ/local_reduction_file.h"
 #include "tests/validation/lab.h"
 
 namespace trocar::validation {
@@ -30,7 +30,7 @@ Vec3d force_in(const step::Simulation& simulation) {
   return force;
 }
 
-LivePlace place_at(const scene::Organ& organ, const LiveReduction& reduction,
+LivePlace place_at(const organ::Organ& organ, const LiveReduction& reduction,
                    const std::vector<Vec3d>& normals, NodeIndex node, std::uint32_t patch) {
   const auto& x = organ.mesh.rest_positions;
   LivePlace place{.node = node, .patch = patch};
@@ -49,23 +49,23 @@ LivePlace place_at(const scene::Organ& organ, const LiveReduction& reduction,
 
 }  // namespace
 
-LiveReduction make_live_reduction(const std::string& name, const scene::Organ& organ,
-                                  const reduction::LocalSettings& settings) {
+LiveReduction make_live_reduction(const std::string& name, const organ::Organ& organ,
+                                  const reduce::LocalSettings& settings) {
   const auto begin = monotonic_ns();
-  auto made = reduction::build_local(
-      organ, settings, [&](reduction::LocalStage stage, std::size_t done, std::size_t all) {
+  auto made = reduce::build_local(
+      organ, settings, [&](reduce::LocalStage stage, std::size_t done, std::size_t all) {
         show_progress(fmt::format("{}: reduction, stage {}, {} of {}", name,
                                   static_cast<int>(stage) + 1, done, all));
       });
   const double seconds = static_cast<double>(monotonic_ns() - begin) * 1e-9;
   TROCAR_ASSERT(made.ok());
-  const auto file = scene::pack_local_reduction(made->reduction);
+  const auto file = organ::pack_local_reduction(made->reduction);
   TROCAR_ASSERT(file.ok());
-  return {std::make_shared<scene::LocalReduction>(std::move(made->reduction)),
+  return {std::make_shared<organ::LocalReduction>(std::move(made->reduction)),
           std::move(made->pressed), seconds, file->size()};
 }
 
-std::vector<LivePlace> live_places(const scene::Organ& organ, const LiveReduction& reduction,
+std::vector<LivePlace> live_places(const organ::Organ& organ, const LiveReduction& reduction,
                                    std::size_t trained, std::size_t unseen) {
   const auto& x = organ.mesh.rest_positions;
   const auto normals = mesh::surface_normals(organ.mesh);
@@ -74,31 +74,31 @@ std::vector<LivePlace> live_places(const scene::Organ& organ, const LiveReductio
   for (const auto& patch : patches)
     for (const auto node : patch.members)
       if (std::ranges::none_of(reduction.pressed, [&](NodeIndex pressed) {
-            return length(x[pressed.value] - x[node.value]) < reduction::kFarFromTraining_m;
+            return length(x[pressed.value] - x[node.value]) < reduce::kFarFromTraining_m;
           }))
         far.push_back(node);
   const auto patch_of = [&](NodeIndex node) {
-    const auto found = std::ranges::find_if(patches, [&](const scene::LocalPatch& patch) {
+    const auto found = std::ranges::find_if(patches, [&](const organ::LocalPatch& patch) {
       return std::ranges::find(patch.members, node) != patch.members.end();
     });
     return static_cast<std::uint32_t>(found - patches.begin());
   };
   std::vector<LivePlace> places;
-  for (const auto node : reduction::spread_nodes(organ, reduction.pressed, trained, 0))
+  for (const auto node : reduce::spread_nodes(organ, reduction.pressed, trained, 0))
     places.push_back(place_at(organ, reduction, normals, node, patch_of(node)));
-  for (const auto node : reduction::spread_nodes(organ, far, unseen, 0))
+  for (const auto node : reduce::spread_nodes(organ, far, unseen, 0))
     places.push_back(place_at(organ, reduction, normals, node, patch_of(node)));
   return places;
 }
 
-std::vector<LivePlace> places_of_patch(const scene::Organ& organ, const LiveReduction& reduction,
+std::vector<LivePlace> places_of_patch(const organ::Organ& organ, const LiveReduction& reduction,
                                        std::uint32_t patch, std::size_t count) {
   const auto normals = mesh::surface_normals(organ.mesh);
   const auto& p = reduction.local->patches[patch];
   std::vector<NodeIndex> nodes{p.centre};
   const std::array taken{p.centre};
   if (count > 1)
-    for (const auto node : reduction::spread_nodes(organ, p.members, count - 1, 0, taken))
+    for (const auto node : reduce::spread_nodes(organ, p.members, count - 1, 0, taken))
       if (node != p.centre) nodes.push_back(node);
   std::vector<LivePlace> places;
   for (const auto node : nodes) places.push_back(place_at(organ, reduction, normals, node, patch));
@@ -114,10 +114,10 @@ Tick Stroke::lift_ticks() const {
              : static_cast<Tick>(std::ceil((kLift_m + depth_m) / speed_m_s / kTickSeconds));
 }
 
-session::TickInputs Stroke::at(Tick tick) const {
-  session::TickInputs inputs;
+hands::TickInputs Stroke::at(Tick tick) const {
+  hands::TickInputs inputs;
   if (tick == 1) {
-    session::HandJoin join{.slot = {0}};
+    hands::HandJoin join{.slot = {0}};
     join.shapes[0] = {.radius_m = radius_m, .length_m = 0.3f, .reach_m = 0.012f};
     inputs.joins.push_back(join);
   }
@@ -136,7 +136,7 @@ session::TickInputs Stroke::at(Tick tick) const {
   const Vec3f tip =
       place.position + place.outward * height + aside * (slant * way + slide_m * slid);
   inputs.samples.push_back(
-      {tool_slot({0}, 0), {{tip, rotation_from_z(place.outward)}, scene::Verb::Push}});
+      {tool_slot({0}, 0), {{tip, rotation_from_z(place.outward)}, tool::Verb::Push}});
   return inputs;
 }
 
@@ -155,8 +155,8 @@ Script converged(Script script) {
   return script;
 }
 
-Course run_session(const scene::Organ& organ,
-                   const std::shared_ptr<const scene::LocalReduction>& reduction,
+Course run_session(const organ::Organ& organ,
+                   const std::shared_ptr<const organ::LocalReduction>& reduction,
                    const Script& script, Tick field_ticks) {
   step::Simulation simulation(organ, 1, reduction);
   Course course;

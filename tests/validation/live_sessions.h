@@ -9,21 +9,21 @@
 #include <string>
 #include <vector>
 
-#include "common/scene/local_reduction.h"
-#include "server/reduction/local_build.h"
-#include "server/step/simulation.h"
+#include "server/lab/reduce/local_build.h"
+#include "server/organs/organ/local_reduction.h"
+#include "server/tissue/step/simulation.h"
 #include "tests/validation/report.h"
 
 namespace trocar::validation {
 
 struct LiveReduction {
-  std::shared_ptr<const scene::LocalReduction> local;
+  std::shared_ptr<const organ::LocalReduction> local;
   std::vector<NodeIndex> pressed;  // in the training
   double seconds = 0;              // wall time that it took
   std::size_t bytes = 0;           // of its file
 };
-LiveReduction make_live_reduction(const std::string& name, const scene::Organ& organ,
-                                  const reduction::LocalSettings& settings);
+LiveReduction make_live_reduction(const std::string& name, const organ::Organ& organ,
+                                  const reduce::LocalSettings& settings);
 
 // A place among a reduction's patches.
 struct LivePlace {
@@ -34,10 +34,10 @@ struct LivePlace {
   Vec3f inward;             // unit, along the surface to the middle of all patches
 };
 // Spread over the patches; fewer if there are no more.
-std::vector<LivePlace> live_places(const scene::Organ& organ, const LiveReduction& reduction,
+std::vector<LivePlace> live_places(const organ::Organ& organ, const LiveReduction& reduction,
                                    std::size_t trained, std::size_t unseen);
 // The centre of a patch and members of it that are spread around it.
-std::vector<LivePlace> places_of_patch(const scene::Organ& organ, const LiveReduction& reduction,
+std::vector<LivePlace> places_of_patch(const organ::Organ& organ, const LiveReduction& reduction,
                                        std::uint32_t patch, std::size_t count);
 
 // A tip comes down on a place from above, stays, slides along the surface, and lifts.
@@ -54,7 +54,7 @@ struct Stroke {
   Tick lift_ticks() const;  // 0 if it stays
   Tick ticks() const { return down_ticks() + hold_ticks + slide_ticks + lift_ticks() + free_ticks; }
   // Of the first hand; its join in tick 1.
-  session::TickInputs at(Tick tick) const;
+  hands::TickInputs at(Tick tick) const;
 };
 
 // Displacements of all nodes, m.
@@ -79,15 +79,15 @@ struct Course {
 // What a session does in each tick, numbered from 1.
 struct Script {
   Tick ticks = 0;
-  std::function<session::TickInputs(Tick)> inputs;
+  std::function<hands::TickInputs(Tick)> inputs;
   std::function<step::TickDecisions(Tick)> decisions;  // none: as sessions run by default
 };
 Script script_of(const Stroke& stroke);
 Script converged(Script script);
 
 // reduction: null for a session without one. field_ticks 0: no fields are kept.
-Course run_session(const scene::Organ& organ,
-                   const std::shared_ptr<const scene::LocalReduction>& reduction,
+Course run_session(const organ::Organ& organ,
+                   const std::shared_ptr<const organ::LocalReduction>& reduction,
                    const Script& script, Tick field_ticks);
 
 // Errors beside a converged session with the same script, in ticks in which the reference's force

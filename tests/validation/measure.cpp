@@ -51,7 +51,7 @@ plot::Series force_curve(const std::string& name, std::span<const Vec3d> forces_
   return series;
 }
 
-NodeIndex node_nearest(const scene::Organ& organ, const Vec3d& point_m) {
+NodeIndex node_nearest(const organ::Organ& organ, const Vec3d& point_m) {
   NodeIndex best;
   double nearest = std::numeric_limits<double>::infinity();
   for (const auto node : organ.mesh.surface_nodes) {

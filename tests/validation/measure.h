@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "common/plot/plot.h"
-#include "server/scenario/scenario_run.h"
+#include "server/lab/plot/plot.h"
+#include "server/lab/scenario/scenario_run.h"
 
 namespace trocar::validation {
 
@@ -27,6 +27,6 @@ plot::Series force_curve(const std::string& name, std::span<const Vec3d> forces_
                          plot::Style style);
 
 // The surface node at rest nearest to a point (all nodes if the organ has no such).
-NodeIndex node_nearest(const scene::Organ& organ, const Vec3d& point_m);
+NodeIndex node_nearest(const organ::Organ& organ, const Vec3d& point_m);
 
 }  // namespace trocar::validation

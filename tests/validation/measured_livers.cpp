@@ -5,8 +5,8 @@
 #include <cstdlib>
 
 #include "common/base/assert.h"
-#include "common/scene/builtin_organs.h"
-#include "common/scene/load_organ.h"
+#include "server/organs/catalogue/builtin_organs.h"
+#include "server/organs/catalogue/load_organ.h"
 
 namespace trocar::validation {
 namespace {
@@ -20,8 +20,8 @@ std::filesystem::path shared_folder() {
   return std::filesystem::path(TROCAR_SOURCE_DIR).parent_path() / "shared";
 }
 
-MeasuredLiver make(const char* name, const char* what, scene::Organ organ) {
-  scene::use_measured(*scene::find_measured_material("human_liver_nava2008"), organ.material);
+MeasuredLiver make(const char* name, const char* what, organ::Organ organ) {
+  material::use_measured(*material::find_measured_material("human_liver_nava2008"), organ.material);
   const auto title =
       fmt::format("{}, {} nodes, {} tets", what, organ.mesh.node_count(), organ.mesh.tets.size());
   return {name, title, std::move(organ)};
@@ -30,7 +30,7 @@ MeasuredLiver make(const char* name, const char* what, scene::Organ organ) {
 }  // namespace
 
 std::vector<MeasuredLiver> measured_livers(const Lab& lab, Section& section) {
-  auto built_in = scene::make_liver(lab.is_short() ? kShortTets : scene::kDefaultLiverTets);
+  auto built_in = catalogue::make_liver(lab.is_short() ? kShortTets : catalogue::kDefaultLiverTets);
   TROCAR_ASSERT(built_in.ok());
   std::vector<MeasuredLiver> livers{make("liver", "built-in liver", std::move(*built_in))};
   if (lab.is_short()) return livers;
@@ -40,7 +40,7 @@ std::vector<MeasuredLiver> measured_livers(const Lab& lab, Section& section) {
                             kImported));
     return livers;
   }
-  auto imported = scene::load_organ(path.string());
+  auto imported = catalogue::load_organ(path.string());
   TROCAR_ASSERT(imported.ok());
   livers.push_back(make("liver-coarse", "imported liver", std::move(*imported)));
   return livers;

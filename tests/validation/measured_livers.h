@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "common/scene/organ.h"
+#include "server/organs/organ/organ.h"
 #include "tests/validation/lab.h"
 
 namespace trocar::validation {
@@ -14,7 +14,7 @@ namespace trocar::validation {
 struct MeasuredLiver {
   std::string name;   // in names of files and checks
   std::string title;  // for people
-  scene::Organ organ;
+  organ::Organ organ;
 };
 
 // The built-in liver, and the imported one if the folder of optional test material has it: else the

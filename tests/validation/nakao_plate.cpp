@@ -10,7 +10,7 @@
 #include <limits>
 #include <numbers>
 
-#include "common/scene/builtin_organs.h"
+#include "server/organs/catalogue/builtin_organs.h"
 #include "tests/validation/cut_plate.h"
 #include "tests/validation/experiments.h"
 
@@ -78,7 +78,7 @@ void cut_straight(CutPlate& plate, double length_m) {
 }
 
 Wound cut_plate(const Way& way, double tension, Mechanics mechanics, bool is_short) {
-  auto organ = scene::make_plate();
+  auto organ = catalogue::make_plate();
   organ.material.tension = tension;
   organ.gravity_m_s2 = {};
   CutPlate plate(std::move(organ), way.settings, mechanics);
@@ -111,7 +111,7 @@ Wound cut_plate(const Way& way, double tension, Mechanics mechanics, bool is_sho
 
 // What a cut makes of the mesh, without mechanics.
 Wound count_only(const Way& way, double length_m) {
-  CutPlate plate(scene::make_plate(), way.settings, Mechanics::Live);
+  CutPlate plate(catalogue::make_plate(), way.settings, Mechanics::Live);
   Wound wound{.before = plate.counts()};
   cut_straight(plate, length_m);
   wound.output = plate.output();

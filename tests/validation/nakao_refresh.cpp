@@ -12,11 +12,11 @@
 #include <cmath>
 
 #include "common/base/timing.h"
-#include "common/scene/builtin_organs.h"
-#include "server/calibration/places.h"
-#include "server/control/rate_controller.h"
-#include "server/cutting/validate.h"
-#include "server/step/simulation.h"
+#include "server/lab/calibration/places.h"
+#include "server/organs/catalogue/builtin_organs.h"
+#include "server/session/control/rate_controller.h"
+#include "server/tissue/cutting/validate.h"
+#include "server/tissue/step/simulation.h"
 #include "tests/validation/experiments.h"
 
 namespace trocar::validation {
@@ -93,7 +93,7 @@ class Machine {
 };
 
 // A tip that presses 5 mm deep and slides to and fro.
-session::ToolInput sample_at(const calibration::Place& place, Tick tick) {
+hands::ToolInput sample_at(const calibration::Place& place, Tick tick) {
   const float t = static_cast<float>(tick) * 1e-3f;
   const float phase = std::fmod(t, 2.0f);
   const float aside = 0.012f * (std::min(phase, 2.0f - phase) - 0.5f);
@@ -102,7 +102,7 @@ session::ToolInput sample_at(const calibration::Place& place, Tick tick) {
   return {
       tool_slot({0}, 0),
       {{place.position + place.outward * out + rotate(orientation, {1, 0, 0}) * aside, orientation},
-       scene::Verb::Push}};
+       tool::Verb::Push}};
 }
 
 // Where a tip presses and, beside it, a blade cuts, its way turned by the angle with this sine: a
@@ -113,7 +113,7 @@ struct Site {
 };
 
 // A blade 25 mm deep, 2 cm/s, to and fro in front of the tip, each time 3 mm farther on.
-session::ToolInput blade_at(const Site& site, Tick tick) {
+hands::ToolInput blade_at(const Site& site, Tick tick) {
   const auto& place = site.place;
   constexpr float kPass_s = 1.5f, kSpeed_m_s = 0.02f;
   const float t = static_cast<float>(tick) * 1e-3f;
@@ -125,7 +125,7 @@ session::ToolInput blade_at(const Site& site, Tick tick) {
   const float s = site.turn, c = std::sqrt(1 - s * s);
   const Vec3f aside = rotate(orientation, {c * along - s * across, s * along + c * across, 0});
   return {tool_slot({1}, 0),
-          {{place.position + place.outward * -0.025f + aside, orientation}, scene::Verb::Cut}};
+          {{place.position + place.outward * -0.025f + aside, orientation}, tool::Verb::Cut}};
 }
 
 void add_stages(const step::TickReport& report, Course& course) {
@@ -140,12 +140,12 @@ void add_stages(const step::TickReport& report, Course& course) {
   course.crossed += report.cut.crossed_tets;
 }
 
-Site any_site(const scene::Organ& organ) {
+Site any_site(const organ::Organ& organ) {
   return {calibration::spread_places(organ, 1, 1).at(0)};
 }
 
 // In the middle of what lies uppermost.
-Site site_on_top(const scene::Organ& organ) {
+Site site_on_top(const organ::Organ& organ) {
   const auto& rest = organ.mesh.rest_positions;
   const auto is_better = [&](NodeIndex a, NodeIndex b) {
     const auto &p = rest[a.value], &q = rest[b.value];
@@ -156,14 +156,14 @@ Site site_on_top(const scene::Organ& organ) {
   return {{node, to_float(rest[node.value])}, 0.305f};
 }
 
-Course follow(const scene::Organ& organ, const Site& site, const step::TickDecisions& most,
+Course follow(const organ::Organ& organ, const Site& site, const step::TickDecisions& most,
               const Phases& phases, bool is_controlled, Blade blade = Blade::None) {
   step::Simulation simulation(organ);
   control::RateController controller({.highest = most, .budget_us = kBudget_us});
   const Machine machine(phases);
   Course course;
-  session::TickInputs inputs;
-  session::HandJoin join{.slot = {0}};
+  hands::TickInputs inputs;
+  hands::HandJoin join{.slot = {0}};
   join.shapes[0] = {.radius_m = 0.012f, .length_m = 0.05f};
   inputs.joins.push_back(join);
   if (blade == Blade::Cuts) {
@@ -210,7 +210,7 @@ double percentile(std::vector<double> values, double share) {
 }
 
 // Layers with which the number of nodes comes nearest to the paper's, with its largest as a limit.
-step::TickDecisions decisions_like(const scene::Organ& organ, const Site& site,
+step::TickDecisions decisions_like(const organ::Organ& organ, const Site& site,
                                    const PaperCase& paper) {
   step::TickDecisions best;
   double nearest = 1e9;
@@ -327,7 +327,7 @@ double force_difference(const Course& a, const Course& b) {
 // A large case with a blade. What the paper calls a cycle is contact, mechanics and topology.
 struct LargeCase {
   std::string title, prefix;  // of tables; of names of checks
-  scene::Organ organ;
+  organ::Organ organ;
   Site site;
 };
 
@@ -406,9 +406,9 @@ void run_refresh_rate(const Lab& lab, Section& section) {
       "less "
       "work only after a while: active nodes are more than those of the queue.",
       kScale, kSpike_us * kScale * 1e-3, kSpikeEvery, kSlowest));
-  auto organ = scene::make_liver(lab.is_short() ? 18'500 : 90'000);
+  auto organ = catalogue::make_liver(lab.is_short() ? 18'500 : 90'000);
   TROCAR_ASSERT(organ.ok());
-  organ->material.elastic_law = scene::ElasticLaw::Springs;
+  organ->material.elastic_law = material::ElasticLaw::Springs;
   const auto site = any_site(*organ);
   const Tick unit = lab.is_short() ? 500 : 1000;
   const Phases phases{unit, 3 * unit, 5 * unit, 8 * unit};
@@ -480,12 +480,12 @@ void run_refresh_cutting(const Lab& lab, Section& section) {
       "are CPU time of this machine, shown and not held to anything; a cycle is contact with the "
       "queue, mechanics, topology. The controller works against the machine on paper, which knows "
       "no topology.");
-  auto liver = scene::make_liver(lab.is_short() ? 18'500 : 90'000);
+  auto liver = catalogue::make_liver(lab.is_short() ? 18'500 : 90'000);
   TROCAR_ASSERT(liver.ok());
-  liver->material.elastic_law = scene::ElasticLaw::Springs;
+  liver->material.elastic_law = material::ElasticLaw::Springs;
   liver->material.tension = 0.04;
   if (!lab.is_short()) {
-    const auto chest = scene::make_chest();
+    const auto chest = catalogue::make_chest();
     cut_large(lab, {"Chest", "chest-", chest, site_on_top(chest)}, section);
   }
   cut_large(lab, {"Liver", "", *liver, any_site(*liver)}, section);

@@ -5,10 +5,10 @@
 
 namespace trocar::validation {
 
-scene::Organ lattice_with_diagonals(const scene::LatticeSize& size) {
-  auto made = scene::make_lattice(size);
+organ::Organ lattice_with_diagonals(const catalogue::LatticeSize& size) {
+  auto made = catalogue::make_lattice(size);
   TROCAR_ASSERT(made.ok());
-  scene::Organ organ = std::move(*made);
+  organ::Organ organ = std::move(*made);
   constexpr std::array<std::array<int, 3>, 6> kDiagonals{
       {{1, 1, 0}, {1, -1, 0}, {1, 0, 1}, {1, 0, -1}, {0, 1, 1}, {0, 1, -1}}};
   const auto is_inside = [](int i, int n) { return i >= 0 && i < n; };
@@ -18,7 +18,8 @@ scene::Organ lattice_with_diagonals(const scene::LatticeSize& size) {
         for (const auto& [dx, dy, dz] : kDiagonals) {
           const int x = i + dx, y = j + dy, z = k + dz;
           if (!is_inside(x, size.nx) || !is_inside(y, size.ny) || !is_inside(z, size.nz)) continue;
-          const auto a = scene::lattice_node(size, i, j, k), b = scene::lattice_node(size, x, y, z);
+          const auto a = catalogue::lattice_node(size, i, j, k),
+                     b = catalogue::lattice_node(size, x, y, z);
           organ.mesh.links.push_back({std::min(a, b), std::max(a, b)});
         }
   organ.mesh.build_adjacency();
@@ -33,9 +34,9 @@ std::vector<double> even(double length, int cells) {
   return places;
 }
 
-scene::Organ tet_box(const std::vector<double>& x, const std::vector<double>& y,
+organ::Organ tet_box(const std::vector<double>& x, const std::vector<double>& y,
                      const std::vector<double>& z) {
-  scene::Organ organ;
+  organ::Organ organ;
   organ.name = "box";
   organ.source = "box of " + std::to_string(x.size() - 1) + " x " + std::to_string(y.size() - 1) +
                  " x " + std::to_string(z.size() - 1) + " cells, five tets each";
@@ -69,13 +70,13 @@ scene::Organ tet_box(const std::vector<double>& x, const std::vector<double>& y,
   for (std::uint32_t n = 0; n < mesh.node_count(); ++n)
     if (mesh.rest_positions[n].y <= base) organ.fixed_nodes.push_back(NodeIndex(n));
   mesh::centre_on_origin(mesh);
-  organ.node_masses_kg = scene::lumped_masses(organ);
-  TROCAR_ASSERT(scene::validate(organ).ok());
+  organ.node_masses_kg = organ::lumped_masses(organ);
+  TROCAR_ASSERT(organ::validate(organ).ok());
   return organ;
 }
 
-CubicConstants constants_of(const scene::Organ& organ) {
-  const auto springs = scene::springs_of(organ);
+CubicConstants constants_of(const organ::Organ& organ) {
+  const auto springs = organ::springs_of(organ);
   const auto& pairs = organ.mesh.spring_pairs();
   CubicConstants sum;
   for (std::size_t s = 0; s < springs.size(); ++s) {

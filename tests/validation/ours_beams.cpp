@@ -50,14 +50,14 @@ struct Elastic {
 };
 
 // What the law is as a continuum: springs in five tets per cell are stiffer along the cell's axes.
-Elastic elastic_of(const Law& law, const scene::Organ& organ) {
+Elastic elastic_of(const Law& law, const organ::Organ& organ) {
   if (law.poisson) return {kYoung_pa, kYoung_pa / (2 * (1 + *law.poisson)), *law.poisson};
   const auto c = constants_of(organ);
   return {c.young_modulus(), c.c44, c.poisson_ratio()};
 }
 
 std::string organ_of(const Lab& lab, const char* what, double length_m, int across,
-                     scene::Organ& organ) {
+                     organ::Organ& organ) {
   const auto name = fmt::format("{}-{}", what, across);
   const auto side = even(kWidth_m, across);
   organ = tet_box(side, even(length_m, static_cast<int>(std::lround(length_m / kWidth_m)) * across),
@@ -137,7 +137,7 @@ std::map<std::string, double> refine(const Lab& lab, Section& section, const cha
 std::optional<double> stretch_bar(const Lab& lab, Section& section, const Law& law, int across,
                                   double& expected_mm) {
   constexpr double kStrain = 0.01;
-  scene::Organ organ;
+  organ::Organ organ;
   const auto source = organ_of(lab, "bar", kBar_m, across, organ);
   const double stress_pa = kStrain * kYoung_pa;
   // The middle half: the clamped end does not let the section shrink.
@@ -155,7 +155,7 @@ std::optional<double> stretch_bar(const Lab& lab, Section& section, const Law& l
 std::optional<double> bend_beam(const Lab& lab, Section& section, const Law& law, int across,
                                 double& expected_mm) {
   constexpr double kForce_n = 0.004;
-  scene::Organ organ;
+  organ::Organ organ;
   const auto source = organ_of(lab, "beam", kBeam_m, across, organ);
   const auto run = lab.try_start(
       section, law.title, fmt::format("cantilever-{}-{}", law.name, across),

@@ -54,7 +54,7 @@ std::vector<double> growing(double h_mm) {
 }
 
 // A block that is fine where the tool is, at (0, top, 0), and coarse far from it.
-scene::Organ half_space(double h_mm) {
+organ::Organ half_space(double h_mm) {
   const auto out = growing(h_mm);
   std::vector<double> across, down;
   for (auto it = out.rbegin(); it != out.rend(); ++it) {

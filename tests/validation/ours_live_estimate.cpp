@@ -24,7 +24,7 @@ constexpr double kBad = 0.03, kMissed = 0.01;
 constexpr double kThreshold = 0.035, kMostAlarms = 0.85;
 constexpr double kLeastForce_n = 0.05;
 constexpr Tick kStateTicks = 8;
-constexpr float kForceMargin = 1.5f;  // of sessions, see server/step/reduced_tissue.cpp
+constexpr float kForceMargin = 1.5f;  // of sessions, see server/tissue/step/reduced_tissue.cpp
 constexpr std::array kDepths_mm{2.0, 5.0, 8.0, 11.0, 15.0};
 constexpr std::array kSlants{0.0, 0.5, 1.0};
 constexpr std::array kSpeeds_mm_s{30.0, 90.0};
@@ -95,8 +95,8 @@ class Study {
       : section_(section), liver_(liver), is_short_(lab.is_short()), csv_(csv) {
     // As if it were trained with the largest force that there is: nothing else reads it.
     auto lifted = *liver.reduction.local;
-    lifted.force_n = scene::kMaxLocalForce_n;
-    lifted_ = std::make_shared<scene::LocalReduction>(std::move(lifted));
+    lifted.force_n = organ::kMaxLocalForce_n;
+    lifted_ = std::make_shared<organ::LocalReduction>(std::move(lifted));
   }
 
   void run() {
@@ -267,7 +267,7 @@ class Study {
   const LiveLiver& liver_;
   const bool is_short_;
   std::string& csv_;
-  std::shared_ptr<const scene::LocalReduction> lifted_;
+  std::shared_ptr<const organ::LocalReduction> lifted_;
   std::vector<State> states_;
   std::size_t presses_ = 0, lost_ = 0;
   std::string lost_texts_;

@@ -150,7 +150,7 @@ class Study {
     script.inputs = [=](Tick tick) {
       auto inputs = stroke.at(tick);
       if (tick == 1) {
-        session::HandJoin join{.slot = {1}};
+        hands::HandJoin join{.slot = {1}};
         join.shapes[0] = {.radius_m = 0.002f, .length_m = 0.3f, .edge_m = 0.04f};
         inputs.joins.push_back(join);
       }
@@ -159,8 +159,7 @@ class Study {
       const float down = std::min(0.01f + kBladeDeep_m, went);
       const float along = std::clamp(went - down, 0.0f, kBladeWay_m);
       const Vec3f tip = at + out * (0.01f - down) + across * (along - kBladeWay_m / 2);
-      inputs.samples.push_back(
-          {tool_slot({1}, 0), {{tip, rotation_from_z(out)}, scene::Verb::Cut}});
+      inputs.samples.push_back({tool_slot({1}, 0), {{tip, rotation_from_z(out)}, tool::Verb::Cut}});
       return inputs;
     };
     cuts_ += add(script, true);

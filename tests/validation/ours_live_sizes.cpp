@@ -8,10 +8,10 @@
 #include <array>
 #include <cmath>
 
-#include "common/mesh/stuffing.h"
-#include "common/scene/builtin_organs.h"
-#include "common/scene/builtin_search.h"
-#include "common/scene/liver_shape.h"
+#include "server/organs/catalogue/builtin_organs.h"
+#include "server/organs/catalogue/builtin_search.h"
+#include "server/organs/catalogue/liver_shape.h"
+#include "server/organs/mesh/stuffing.h"
 #include "tests/validation/live_experiments.h"
 #include "tests/validation/live_livers.h"
 
@@ -29,32 +29,32 @@ struct Size {
 };
 // About 1,000, 4,000, 17,000, 50,000 and 100,000 nodes.
 constexpr std::array<Size, 5> kSizes{{{4'200, 0.02, 5},
-                                      {scene::kDefaultLiverTets, 0.012, 5},
+                                      {catalogue::kDefaultLiverTets, 0.012, 5},
                                       {87'000, 0.012, 2},
                                       {265'000, 0.008, 1},
                                       {540'000, 0.0065, 1}}};
 constexpr std::size_t kShortSizes = 2;
 
-// scene::make_measured_liver() has a limit.
-scene::Organ liver_of(int tets) {
-  auto mesh = scene::mesh_with_about(
+// catalogue::make_measured_liver() has a limit.
+organ::Organ liver_of(int tets) {
+  auto mesh = catalogue::mesh_with_about(
       tets, 1.63e-3,
       [](double spacing_m) {
-        return mesh::stuff_isosurface(scene::liver_field, scene::liver_box(), spacing_m);
+        return mesh::stuff_isosurface(catalogue::liver_field, catalogue::liver_box(), spacing_m);
       },
       "liver");
   TROCAR_ASSERT(mesh.ok());
-  scene::Organ organ;
+  organ::Organ organ;
   organ.name = "liver";
   organ.source = fmt::format("liver, {} tets asked for", tets);
   organ.mesh = std::move(*mesh);
   for (const NodeIndex node : organ.mesh.surface_nodes)
-    if (scene::is_liver_held(organ.mesh.rest_positions[node.value]))
+    if (catalogue::is_liver_held(organ.mesh.rest_positions[node.value]))
       organ.fixed_nodes.push_back(node);
   organ.source_offset_m = mesh::centre_on_origin(organ.mesh);
-  organ.node_masses_kg = scene::lumped_masses(organ);
-  scene::use_measured(*scene::find_measured_material("human_liver_nava2008"), organ.material);
-  TROCAR_ASSERT(scene::validate(organ).ok());
+  organ.node_masses_kg = organ::lumped_masses(organ);
+  material::use_measured(*material::find_measured_material("human_liver_nava2008"), organ.material);
+  TROCAR_ASSERT(organ::validate(organ).ok());
   return organ;
 }
 
@@ -77,7 +77,7 @@ class Study {
     const auto nodes = organ.mesh.node_count();
     const auto name = fmt::format("{} nodes", nodes);
     show_progress(name);
-    reduction::LocalSettings settings{
+    reduce::LocalSettings settings{
         .patch_radius_m = size.radius_m, .directions = size.directions, .patches = 1, .threads = 2};
     if (is_short_) settings.directions = 1, settings.field_nodes = 5;
     const auto made = make_live_reduction(name, organ, settings);

@@ -10,15 +10,15 @@
 #include <numeric>
 
 #include "common/base/timing.h"
-#include "common/scene/local_reduction_file.h"
-#include "server/reduction/local_quality.h"
+#include "server/lab/reduce/local_quality.h"
+#include "server/organs/organ/local_reduction_file.h"
 #include "tests/validation/experiments.h"
 #include "tests/validation/measured_livers.h"
 
 namespace trocar::validation {
 namespace {
 
-using namespace reduction;
+using namespace reduce;
 
 // Targets: means at trained places, and anywhere. The short form's liver is coarse: its nodes are
 // 13 mm apart, where a force on one of them is harder to follow.
@@ -93,7 +93,7 @@ class Study {
       return std::accumulate(v.begin(), v.end(), 0.0) / static_cast<double>(v.size());
     };
     const auto& z = unseen.largest;
-    const auto file = scene::pack_local_reduction(r);
+    const auto file = organ::pack_local_reduction(r);
     TROCAR_ASSERT(file.ok());
     costs.rows.push_back({name, std::to_string(z.unknowns()),
                           fmt::format("{} + {} weighted", z.inner_tets, z.cubature_tets),
@@ -126,7 +126,7 @@ class Study {
     const auto training = train(*model_, settings, [&](Stage, std::size_t done, std::size_t all) {
       show_progress(fmt::format("{}, eight modes: {} of {}", liver_.name, done, all));
     });
-    const auto built = reduce(*model_, training, settings);
+    const auto built = reduce::reduce(*model_, training, settings);
     TROCAR_ASSERT(built.ok());
     std::vector<Unseen> loads;
     for (const auto& load : loads_)

@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "common/base/timing.h"
-#include "common/scene/builtin_organs.h"
+#include "server/organs/catalogue/builtin_organs.h"
 #include "tests/validation/experiments.h"
 #include "tests/validation/measure.h"
 #include "tests/validation/organs.h"
@@ -241,7 +241,7 @@ void run_propagation_liver(const Lab& lab, Section& section) {
 
 void run_propagation_large_liver(const Lab& lab, Section& section) {
   introduce(section, 18, 10);
-  auto liver = scene::make_liver(90'000);
+  auto liver = catalogue::make_liver(90'000);
   TROCAR_ASSERT(liver.ok());
   lab.keep_organ("liver-17k", *liver);
   study_press(lab, section,

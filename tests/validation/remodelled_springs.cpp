@@ -19,7 +19,7 @@ std::pair<NodeIndex, NodeIndex> edge_of(NodeIndex a, NodeIndex b) {
 
 }  // namespace
 
-RemodelledSprings::RemodelledSprings(const scene::Organ& organ, double viscosity_n_s_m)
+RemodelledSprings::RemodelledSprings(const organ::Organ& organ, double viscosity_n_s_m)
     : organ_(organ),
       viscosity_n_s_m_(viscosity_n_s_m),
       topology_(organ),

@@ -17,14 +17,14 @@
 #include <utility>
 #include <vector>
 
-#include "server/cutting/edits.h"
+#include "server/tissue/cutting/edits.h"
 
 namespace trocar::validation {
 
 class RemodelledSprings {
  public:
   // Of an organ with SpringLaw::Constant; viscosity in N s/m per node.
-  RemodelledSprings(const scene::Organ& organ, double viscosity_n_s_m);
+  RemodelledSprings(const organ::Organ& organ, double viscosity_n_s_m);
 
   // Repeats what a cut of the same organ did.
   Status follow(const cutting::CutEvents& events);
@@ -58,7 +58,7 @@ class RemodelledSprings {
   void take_masses();
   void list_pulls();
 
-  const scene::Organ& organ_;
+  const organ::Organ& organ_;
   const double viscosity_n_s_m_;
   dynamics::Topology topology_;
   cutting::Places places_;

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "common/base/result.h"
-#include "common/plot/plot.h"
+#include "server/lab/plot/plot.h"
 
 namespace trocar::validation {
 

@@ -6,8 +6,8 @@ namespace trocar::wire {
 namespace {
 
 // Five nodes, of which node 2 is interior; a closed surface over the other four.
-scene::Organ small_organ() {
-  scene::Organ organ;
+organ::Organ small_organ() {
+  organ::Organ organ;
   auto& mesh = organ.mesh;
   mesh.rest_positions = {
       {0.016, 0, 0}, {0, 0, 0.016}, {0.002, 0.002, 0.002}, {0, 0, 0}, {0, 0.016, 0}};

@@ -1,0 +1,39 @@
+#pragma once
+
+// What a tool is and what it can be asked to do.
+
+#include <cstdint>
+
+#include "common/math/frame.h"
+
+namespace trocar::tool {
+
+// What the holder wants the tool to do, as long as the sample says so.
+enum class Verb : std::uint8_t { None = 0, Push = 1, Grasp = 2, Cut = 3 };
+inline constexpr int kVerbCount = 4;
+const char* name_of(Verb verb);
+
+// A capsule: tip at the tool frame's origin, shaft along +z. With a half width it is a flat blade
+// with round edges, as wide along the tool's x on both sides of the shaft.
+struct ToolShape {
+  float radius_m = 0.005f;  // 0.0005 to 0.05
+  float length_m = 0.30f;   // 0.01 to 1
+  float reach_m = 0.010f;   // a grasp takes the surface nodes this near to the tip; 0.001 to 0.05
+  float half_width_m = 0;   // 0 to 0.05
+  float friction = 0.2f;    // Coulomb's coefficient on tissue, 0 to 2
+  float grip_n = 8;         // pulled harder than this, tissue slips out of the jaws; 0.1 to 100
+  float edge_m = 0.020f;    // sharp from the tip up along the shaft, when it cuts; 0.001 to 0.2
+
+  bool operator==(const ToolShape&) const = default;
+};
+bool is_valid(const ToolShape& shape);
+
+// One reading of a tool, as the client sent it.
+struct ToolSample {
+  Pose world_from_tool;
+  Verb verb = Verb::None;
+
+  bool operator==(const ToolSample&) const = default;
+};
+
+}  // namespace trocar::tool

@@ -1,0 +1,71 @@
+#pragma once
+
+// Force to depth (Choi 2002 sec. 3): measures an organ's organ::DepthTable. At places spread over
+// the surface a round tip, its radius over three elements, presses until the deepest; the force of
+// each limit of nodes (Frozen) and each depth (Graded) is compared with that of the full solution,
+// tick by tick, in ranges of force that double. A limit is what all places but none needs: the
+// largest over them. Deterministic for an organ and its settings.
+
+#include <functional>
+#include <string>
+
+#include "server/lab/calibration/press.h"
+#include "server/organs/organ/depth_table.h"
+
+namespace trocar::calibration {
+
+struct Settings {
+  double error = 0.03;  // asked of the contact force: mean difference over mean force in a range
+  std::size_t places = 16;
+  std::uint64_t seed = 1;
+  double radius_m = 0;     // 0: 3.2 edges of the surface, within what a tool may have
+  double depth_m = 0.012;  // of the deepest press
+  double first_n = 0.125;  // upper end of the first range
+  std::uint32_t first_nodes = 128;
+  unsigned workers = 1;
+};
+Status validate(const Settings& settings);
+double radius_of(const organ::Organ& organ, const Settings& settings);
+
+// One place, one range of force; for people.
+struct Finding {
+  std::size_t place = 0;
+  NodeIndex node;
+  double force_n = 0;  // upper end of the range
+  struct Tried {
+    std::uint32_t limit = 0;  // nodes or layers
+    std::uint32_t nodes = 0;  // in the queue, mean over the range
+    double error = 0;
+  };
+  std::vector<Tried> frozen, graded;
+};
+
+struct Calibration {
+  organ::DepthTable table;
+  std::vector<Finding> findings;
+  std::size_t places_left_out = 0;  // where the tip could not press
+  std::uint64_t ticks = 0;          // simulated, all presses together
+};
+
+// done and all: places. Called after each.
+using Progress = std::function<void(std::size_t done, std::size_t all)>;
+Calibration calibrate(const organ::Organ& organ, const Settings& settings,
+                      const Progress& progress = {});
+
+// The table at work, at other places, at half the speed and aslant: errors of the contact force per
+// range, of what control::DepthChooser decides from the forces it meets. Where the table knows no
+// limit, frozen is as decided without it and not counted.
+struct Check {
+  double force_n = 0;  // upper end of the range
+  std::size_t places = 0, frozen_places = 0;
+  double frozen_mean = 0, frozen_largest = 0;  // over places
+  double graded_mean = 0, graded_largest = 0;
+  double frozen_nodes = 0, graded_nodes = 0;  // in the queue, mean
+};
+std::vector<Check> check(const organ::Organ& organ, const organ::DepthTable& table,
+                         const Settings& settings, std::size_t places,
+                         const Progress& progress = {});
+
+std::string to_csv(const Calibration& calibration);
+
+}  // namespace trocar::calibration

@@ -1,0 +1,72 @@
+#pragma once
+
+// The full model from which a reduced one is made: an organ of linear tets on the off-line solver,
+// without inertia. At once (nothing relaxes) for snapshots and tangents, with relaxation for creep.
+// One caller; deterministic.
+//
+// Elements are plain linear tets, also where the organ's live ones have their volume averaged:
+// nearly incompressible, they are stiffer than those.
+
+#include <memory>
+#include <optional>
+#include <span>
+
+#include "server/lab/finite_elements/solver.h"
+#include "server/lab/reduce/karhunen_loeve.h"
+#include "server/lab/reduce/presses.h"
+
+namespace trocar::reduce {
+
+class FullModel {
+ public:
+  // Error: an organ without tets, of springs or tensor-mass, settled, or under gravity or tension.
+  static Result<std::unique_ptr<FullModel>> create(const organ::Organ& organ, unsigned threads = 1);
+
+  // 3 per node, N.
+  Vector forces_of(const Press& press) const;
+  // Displacements (3 per node, m) under shares of the forces, ascending, each from the one before.
+  // As many as were found: a load that Newton's method does not manage ends the list.
+  std::vector<Vector> displacements(const Vector& forces, std::span<const double> shares);
+  // Of the tissue at rest with its first tangent: K u = f, a column each. Factors are kept.
+  Matrix linear_displacements(const Matrix& forces);
+  // What the tissue resists displacements with, at once; nothing where an element is not
+  // admissible.
+  std::optional<Vector> resistance(const Vector& displacements);
+  // Of the tissue at rest, over the degrees of freedom that are not held, and their numbers: -1 for
+  // held ones. N/m.
+  finite_elements::SparseMatrix rest_tangent();
+  const std::vector<int>& free_of_dof() const { return assembler_->pattern().free_of_dof(); }
+  // B^T K B with the tangent at these displacements, of modes that leave held nodes at rest;
+  // nothing where an element is not admissible. N/m.
+  std::optional<Matrix> reduced_tangent(const Vector& displacements, const Matrix& modes);
+  // Under constant forces from time 0 on; times ascending from 0. As displacements().
+  std::vector<Vector> creep(const Vector& forces, std::span<const double> times_s);
+
+  const organ::Organ& organ() const { return organ_; }
+  // Without its relaxation; the law that it is near rest.
+  const material::HyperelasticMaterial& material_of(TetIndex tet) const {
+    return elastic_->problem().material_of(tet.value);
+  }
+  const material::HyperelasticMaterial& rest_material_of(TetIndex tet) const {
+    return rest_problem_.material_of(tet.value);
+  }
+  std::size_t dof_count() const { return elastic_->problem().dof_count(); }
+
+ private:
+  FullModel(const organ::Organ& organ, finite_elements::Problem problem, unsigned threads);
+  // Fills tangent_ at the displacements. At rest unsplit laws have two tangents, one for each sign
+  // of I1 - 3; what shears is on the upper side, so that one is taken.
+  bool assemble(const Vector& displacements);
+
+  const organ::Organ organ_;
+  std::unique_ptr<finite_elements::Solver> elastic_;
+  std::unique_ptr<finite_elements::Solver> relaxing_;  // made when it is needed
+  finite_elements::Problem relaxing_problem_, rest_problem_;
+  finite_elements::State elastic_rest_, relaxing_rest_;
+  std::unique_ptr<finite_elements::Assembler> assembler_, rest_assembler_;
+  finite_elements::SparseMatrix tangent_;
+  std::unique_ptr<finite_elements::SparseFactors> rest_factors_;  // made when they are needed
+  const unsigned threads_;
+};
+
+}  // namespace trocar::reduce

@@ -1,0 +1,244 @@
+#pragma once
+
+// Scenarios: experiments on one organ without people. Which organ and material, which nodes are
+// held, moved, loaded and probed over time, which scripted tools act, what is written. Read from a
+// TOML file of which scripts are a part; README, "Scenarios", describes it to a person.
+//
+// Two steps: parse_scenario() checks the file by itself, resolve() checks it against the organ and
+// turns names into nodes. Errors of both are one line with file, line and key.
+// Units: SI here; the file has them in each key's name. Immutable after reading: any thread.
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/tool/script.h"
+#include "server/organs/organ/organ.h"
+
+namespace trocar::scenario {
+
+inline constexpr std::size_t kScenarioFileLimitBytes = 16u << 20;
+inline constexpr double kScenarioTimeLimit = 3600;         // s
+inline constexpr std::uint32_t kScenarioRateLimit = 1000;  // rows per second of simulated time
+
+// Where something stands in the file, for messages about it.
+struct Place {
+  int line = 0;
+  std::string key;
+};
+
+struct ScenarioOrgan {
+  Place place;
+  // As load_organ() takes it, or "block"; files are relative to the scenario.
+  std::string source;
+  std::optional<std::array<int, 3>> lattice_nodes;  // of a lattice or block
+  std::optional<double> lattice_spacing_m;
+};
+
+// What is set replaces the organ's own.
+struct MaterialChange {
+  Place place;               // of the table
+  std::vector<Place> given;  // of each key in it
+  std::optional<double> density_kg_m3;
+  std::optional<double> young_modulus_pa;
+  std::optional<double> spring_stiffness_n_m;
+  std::optional<double> node_damping_per_s;
+  std::optional<double> spring_damping_time_s;
+  std::optional<material::ElasticLaw> elastic_law;
+  std::optional<double> poisson_ratio;
+  std::optional<std::string> measured;  // name of a measured material
+  std::optional<bool> has_averaged_strain;
+  std::optional<Vec3d> fibre_direction;
+  std::optional<double> fibre_stiffness_ratio, tension, fibre_tension;
+  std::optional<double> cut_energy_j_m2, blade_friction_pa, tear_stretch;
+
+  // Of the key with this name, or of the table if it is not in it.
+  const Place& place_of(std::string_view key) const;
+};
+
+// A named set: exactly one of ids, csv, box and near is given, or else `is_on_surface` alone.
+struct NodeRule {
+  Place place;
+  std::string name;
+  std::optional<std::vector<std::int64_t>> ids;
+  std::optional<std::string> csv;  // file of ids, relative to the scenario
+  Place ids_place;                 // of either
+  struct Box {
+    Vec3d low_m, high_m;
+  };
+  std::optional<Box> box;  // rest positions, edges included to within 1 um
+  struct Near {
+    Vec3d point_m;
+    std::optional<double> radius_m;  // all within it; without: the nearest one
+  };
+  std::optional<Near> near;
+  bool is_on_surface = false;  // of what the rest selects, only nodes of the surface
+};
+
+// The name of a set where it is used.
+struct SetUse {
+  Place place;
+  std::string name;
+};
+
+// A vector over time: linear between keys, constant before the first and after the last.
+struct TimedVector {
+  struct Key {
+    double time_s = 0;  // strictly increasing
+    Vec3d value;
+  };
+  std::vector<Key> keys;  // at least one
+
+  Vec3d at(double time_s) const;
+};
+
+// A part of the organ with a material of its own.
+struct RegionRule {
+  std::string name;
+  std::optional<SetUse> set;  // without: the organ's own region of this name is changed
+  MaterialChange material;
+};
+
+inline constexpr std::uint8_t kAllAxes = 7;  // bit 0: x, bit 1: y, bit 2: z
+
+struct DisplacementRule {
+  SetUse set;
+  std::uint8_t axes = kAllAxes;  // held ones; the set is free along the others
+  TimedVector over_time;         // m
+};
+
+struct ForceRule {
+  SetUse set;
+  TimedVector over_time;  // total, N
+};
+
+// On the surface triangles whose three nodes are in the set. Areas and normals are those at rest.
+struct TractionRule {
+  SetUse set;
+  bool is_pressure = false;  // along the inward normal, value in x; otherwise a vector
+  TimedVector over_time;     // Pa
+};
+
+enum class ProbeQuantity : std::uint8_t {
+  Displacement,  // mean of the set, m
+  Velocity,      // mean of the set, m/s
+  Reaction,      // total force that holds the set, on the tissue, N
+  ToolForce,     // of the tissue on a tool, N
+};
+
+struct ProbeRule {
+  std::string name;  // of the columns
+  std::optional<SetUse> set;
+  std::optional<std::uint32_t> tool;  // ToolForce
+  Place place;
+  ProbeQuantity quantity = ProbeQuantity::Displacement;
+  std::uint32_t every_ticks = 10;
+};
+
+enum class RunMode : std::uint8_t {
+  Dynamic,
+  Static,  // equilibrium at each load step
+};
+
+enum class Boundary : std::uint8_t {
+  Whole,   // every node moves, equally well solved
+  Frozen,  // only the queue around tools and loads moves
+  Graded,  // every node moves, the queue is swept more
+};
+
+enum class Integrator : std::uint8_t { Implicit, Explicit };
+
+struct RunRule {
+  RunMode mode = RunMode::Dynamic;
+  double seconds = 0;
+  std::vector<double> load_times_s;  // of the steps of a static run, increasing
+  bool starts_in_equilibrium = false;
+  Integrator integrator = Integrator::Implicit;
+  std::uint32_t steps_per_tick = 1;  // 1 ms / dt
+  Boundary boundary = Boundary::Whole;
+  // Of the queue, as in a session; unlimited without.
+  std::optional<std::uint32_t> depth, nodes;
+  std::uint32_t sweeps = 4;
+  double over_relaxation = 1.5;
+  // Graded, outside the queue; without: what the organ needs.
+  std::optional<std::uint32_t> far_sweeps;
+  std::optional<double> far_over_relaxation;
+  bool self_contact = true;         // tissue does not pass through tissue; dynamic runs
+  double tolerance_n = 1e-5;        // of the full solver: residual at which a step is done
+  std::uint32_t max_sweeps = 2000;  // of the full solver
+  std::vector<Place> given;         // of each key in [run]
+
+  double dt_s() const { return 1e-3 / steps_per_tick; }
+};
+
+struct Scenario {
+  std::filesystem::path source;  // the file
+  ScenarioOrgan organ;
+  MaterialChange material;
+  std::vector<NodeRule> node_rules;
+  bool keeps_organ_fixed = true;
+  std::vector<SetUse> fixes;
+  std::vector<RegionRule> regions;
+  std::vector<DisplacementRule> displacements;
+  std::vector<ForceRule> forces;
+  std::vector<TractionRule> tractions;
+  std::optional<Vec3d> gravity_m_s2;  // without: the organ's own
+  Place gravity_place;
+  std::vector<tool::ScriptTool> tools;
+  RunRule run;
+  Place run_place;
+  std::vector<ProbeRule> probes;
+  std::optional<std::string> output_folder;
+  std::vector<double> field_times_s;  // increasing
+};
+
+Result<Scenario> parse_scenario(const std::filesystem::path& path);
+// `source` stands for the file's path: in messages, and for files relative to it.
+Result<Scenario> parse_scenario_text(std::string_view text, std::string_view source);
+
+using NodeList = std::vector<NodeIndex>;  // ascending, distinct, not empty
+
+struct ResolvedDisplacement {
+  NodeList nodes;
+  std::uint8_t axes = kAllAxes;
+  TimedVector over_time;  // m
+};
+
+// Of forces and tractions: the force on nodes[i] is value x shares[i], or minus value.x x
+// normal_areas_m2[i] for a pressure.
+struct ResolvedForce {
+  NodeList nodes;
+  TimedVector over_time;               // N or Pa
+  std::vector<double> shares;          // 1 or m^2
+  std::vector<Vec3d> normal_areas_m2;  // of a pressure, then shares is empty
+
+  Vec3d on_node(std::size_t i, const Vec3d& value) const {
+    return normal_areas_m2.empty() ? value * shares[i] : normal_areas_m2[i] * -value.x;
+  }
+};
+
+// A scenario on its organ. No node is held twice along an axis, and no force acts along an axis
+// along which its node is held; tractions may reach held nodes beside free ones.
+struct ResolvedScenario {
+  Scenario scenario;
+  organ::Organ organ;  // with the scenario's materials, gravity and fixed nodes
+  std::vector<ResolvedDisplacement> displacements;
+  std::vector<ResolvedForce> forces;       // and tractions
+  std::vector<NodeList> probe_nodes;       // per probe; empty for a tool's
+  std::vector<tool::AnchorPoint> anchors;  // per tool
+};
+
+// Of a key in a list of places, or of `other` if it is not in the list.
+const Place& place_of_key(const std::vector<Place>& places, std::string_view key,
+                          const Place& other);
+// "file:line: key k: what", for what is found out after reading.
+Error scenario_error(const Scenario& scenario, const Place& place, const std::string& what);
+
+Result<ResolvedScenario> resolve(Scenario scenario);
+
+}  // namespace trocar::scenario

@@ -1,0 +1,107 @@
+// [run] of a scenario's TOML form.
+
+#include "server/lab/scenario/scenario_tables.h"
+
+namespace trocar::scenario {
+namespace {
+
+// Keys that mean something in another kind of run only.
+void refuse_keys(tool::TableReader& reader, std::initializer_list<std::string_view> keys,
+                 const std::string& why) {
+  for (const auto key : keys)
+    if (reader.has(key)) reader.fail(key, why + ", remove it");
+}
+
+void read_count(tool::TableReader& reader, std::string_view key, std::int64_t least,
+                std::int64_t most, std::uint32_t& value) {
+  if (const auto number = reader.integer(key, least, most))
+    value = static_cast<std::uint32_t>(*number);
+}
+
+void read_boundary(tool::TableReader& reader, RunRule& run) {
+  const auto boundary = reader.choice<Boundary, 3>(
+      "boundary",
+      {{{"whole", Boundary::Whole}, {"frozen", Boundary::Frozen}, {"graded", Boundary::Graded}}});
+  std::uint32_t limit = 0;
+  read_count(reader, "depth", 1, 1000, limit);
+  if (limit > 0) run.depth = limit;
+  limit = 0;
+  read_count(reader, "nodes", 1, 10'000'000, limit);
+  if (limit > 0) run.nodes = limit;
+  const bool is_limited = run.depth || run.nodes;
+  run.boundary = boundary.value_or(is_limited ? Boundary::Frozen : Boundary::Whole);
+  if (run.boundary == Boundary::Whole)
+    refuse_keys(reader, {"depth", "nodes"}, "limits boundary \"frozen\" or \"graded\"");
+  else if (!is_limited)
+    reader.fail("boundary", "\"frozen\" and \"graded\" need depth or nodes or both beside it");
+  limit = 0;
+  read_count(reader, "far_sweeps", 1, 16, limit);
+  if (limit > 0) run.far_sweeps = limit;
+  run.far_over_relaxation = reader.number("far_over_relaxation", 0.5, 1.9);
+  if (run.boundary != Boundary::Graded)
+    refuse_keys(reader, {"far_sweeps", "far_over_relaxation"}, "is for boundary = \"graded\"");
+}
+
+void read_step(tool::TableReader& reader, RunRule& run) {
+  run.integrator = reader
+                       .choice<Integrator, 2>("integrator", {{{"implicit", Integrator::Implicit},
+                                                              {"explicit", Integrator::Explicit}}})
+                       .value_or(Integrator::Implicit);
+  if (const auto dt = reader.number("dt_s", 1e-6, 1e-3)) {
+    const double steps = std::round(1e-3 / *dt);
+    if (std::abs(steps * *dt - 1e-3) > 1e-9)
+      reader.fail("dt_s", "is " + tool::shown(*dt) +
+                              ", which does not divide a tick of 0.001 s, write " +
+                              tool::shown(1e-3 / std::max(std::ceil(1e-3 / *dt), 1.0)));
+    run.steps_per_tick = static_cast<std::uint32_t>(steps);
+  }
+  if (run.integrator != Integrator::Explicit) return;
+  if (run.boundary != Boundary::Whole)
+    reader.fail("integrator",
+                "\"explicit\" moves the whole organ, remove boundary, depth and nodes");
+  refuse_keys(reader, {"sweeps", "over_relaxation", "tolerance_n", "max_sweeps", "self_contact"},
+              "is of the implicit integrator");
+}
+
+}  // namespace
+
+RunRule read_run(tool::TableReader& reader) {
+  RunRule run;
+  run.given = places_of_keys(reader);
+  run.mode = reader
+                 .choice<RunMode, 2>("mode",
+                                     {{{"dynamic", RunMode::Dynamic}, {"static", RunMode::Static}}})
+                 .value_or(RunMode::Dynamic);
+  const auto seconds = reader.number("seconds", 0.001, kScenarioTimeLimit);
+  if (!seconds) reader.fail_missing("seconds", "write how long to simulate");
+  run.seconds = seconds.value_or(1);
+  std::uint32_t load_steps = 1;
+  read_count(reader, "load_steps", 1, 100'000, load_steps);
+  for (std::uint32_t i = 1; run.mode == RunMode::Static && i <= load_steps; ++i)
+    run.load_times_s.push_back(run.seconds * i / load_steps);
+  const auto start = reader.choice<bool, 2>("start", {{{"rest", false}, {"equilibrium", true}}});
+  run.starts_in_equilibrium = start.value_or(false);
+  read_boundary(reader, run);
+  read_step(reader, run);
+  read_count(reader, "sweeps", 1, 64, run.sweeps);
+  run.over_relaxation = reader.number("over_relaxation", 1, 1.9).value_or(run.over_relaxation);
+  run.self_contact = reader.boolean("self_contact").value_or(true);
+  if (run.mode == RunMode::Static) {
+    // What is left out of balance adds up over all nodes, and nothing corrects it later.
+    run.tolerance_n = 1e-7;
+    run.max_sweeps = 50'000;
+  }
+  run.tolerance_n = reader.number("tolerance_n", 1e-9, 1).value_or(run.tolerance_n);
+  read_count(reader, "max_sweeps", 1, 1'000'000, run.max_sweeps);
+  if (run.mode == RunMode::Static)
+    refuse_keys(
+        reader,
+        {"start", "boundary", "depth", "nodes", "integrator", "dt_s", "sweeps", "self_contact"},
+        "is for mode = \"dynamic\"");
+  else
+    refuse_keys(reader, {"load_steps"}, "is for mode = \"static\"");
+  reader.finish();
+  return run;
+}
+
+}  // namespace trocar::scenario

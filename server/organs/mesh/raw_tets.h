@@ -1,0 +1,44 @@
+#pragma once
+
+// Tetrahedra as a file gives them, and what makes a valid mesh of them.
+//
+// make_mesh() repairs what can only have been meant one way, and says so in `warnings`: it drops
+// unused nodes, welds nodes at exactly the same place, drops tets listed twice, and turns tets
+// whose nodes are listed in the mirrored order. It rejects, naming the first culprit by the file's
+// own numbers: tets that use a node twice or have no volume, tets that overlap a neighbour (a
+// tangled mesh, or a face of three tets), surfaces that are not manifold, and meshes larger than 2
+// m. All of it in double precision; the result is centred on the origin before anything is
+// measured, so a mesh far from the origin loses nothing more than its file has lost.
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/base/result.h"
+#include "server/organs/mesh/tet_mesh.h"
+
+namespace trocar::mesh {
+
+enum class Unit : std::uint8_t { Metre, Centimetre, Millimetre };
+// "m", "cm" or "mm".
+Result<Unit> parse_unit(std::string_view text);
+double metres_of(Unit unit);
+
+struct RawTets {
+  std::vector<Vec3d> positions;           // in the file's unit
+  std::vector<std::int64_t> node_ids;     // the file's number of each node
+  std::vector<Tet> tets;                  // valid indices into `positions`
+  std::vector<std::int64_t> element_ids;  // the file's number of each tet
+};
+
+struct ImportedMesh {
+  TetMesh mesh;    // adjacency built, valid, rest bounding box centred on the origin
+  Vec3d offset_m;  // add to a rest position to get the file's place
+  std::vector<std::string> warnings;  // one line each: what was repaired, and how often
+};
+
+// `name` starts each error, usually the file's path.
+Result<ImportedMesh> make_mesh(RawTets raw, Unit unit, const std::string& name);
+
+}  // namespace trocar::mesh

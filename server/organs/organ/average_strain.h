@@ -1,0 +1,10 @@
+#pragma once
+
+#include "server/organs/organ/organ.h"
+
+namespace trocar::organ {
+
+// Material::has_averaged_strain in all of the organ's hyperelastic tissue. Error: it has none.
+Status average_strain(Organ& organ);
+
+}  // namespace trocar::organ

@@ -1,0 +1,216 @@
+#include "server/session/control/rate_controller.h"
+
+#include <algorithm>
+
+#include "common/base/tick.h"
+
+namespace trocar::control {
+namespace {
+
+constexpr double kRaiseBelow = 0.9;  // of the budget
+constexpr int kRegret = 500, kForget = 5000;
+constexpr int kLongAgo = 1'000'000;
+constexpr std::uint32_t kNodeShare = 16;
+constexpr double kForgetPeaks = 1.0 / 2048;
+// Load and lateness.
+constexpr double kTickUs = static_cast<double>(kTickNanoseconds) * 1e-3;
+constexpr double kLoadGain = 1.0 / 256, kLateGain = 1.0 / 64;
+constexpr double kMaxWorkTicks = 4;
+constexpr double kHighLoad = 0.95, kLowLoad = 0.85, kHighLateShare = 0.2;
+constexpr double kMinBudgetShare = 0.5, kShrink = 1.0 / 512, kGrow = 1.0 / 2048;
+
+// Share of the tick's cost that is the solver's.
+double solve_share(const step::TickReport& report) {
+  double total = 0;
+  for (const auto ns : report.stage_cpu_ns) total += ns;
+  const double solve = report.stage_cpu_ns[static_cast<std::size_t>(step::Stage::Solve)];
+  return total > 0 ? solve / total : 0;
+}
+
+// In node sweeps by energies.
+double far_work(const step::TickReport& report) {
+  return static_cast<double>(report.far_node_sweeps) *
+         (report.is_far_linear ? RateController::kLinearWork : 1.0);
+}
+double work_of(const step::TickReport& report) {
+  return static_cast<double>(report.node_sweeps - report.far_node_sweeps) + far_work(report);
+}
+
+}  // namespace
+
+RateController::RateController(const RateLimits& limits)
+    : limits_(limits),
+      highest_sweeps_(step::sweeps_of_layers(limits.highest)),
+      lowest_nodes_(std::min(limits.nodes, limits.highest.node_limit)),
+      longest_interval_(std::max(limits.far_interval, limits.highest.far_interval)),
+      sweeps_(highest_sweeps_),
+      nodes_(limits.highest.node_limit),
+      far_interval_(limits.highest.far_interval),
+      decisions_(limits.highest) {
+  for (std::size_t layer = 0; layer < step::kSweepLayers; ++layer)
+    lowest_sweeps_[layer] =
+        std::min(std::max(1u, layer == 0 ? std::max(limits.touched_sweeps, limits.layer_sweeps)
+                                         : limits.layer_sweeps),
+                 highest_sweeps_[layer]);
+}
+
+void RateController::observe(const step::TickReport& report, const TickTiming& timing) {
+  const double work_us = static_cast<double>(timing.work_ns) * 1e-3;
+  const double node_sweeps = work_of(report);
+  model_.add(node_sweeps, work_us, solve_share(report));
+  remember_peaks(report);
+  since_lower_ = std::min(since_lower_ + 1, kLongAgo);
+  since_raise_ = std::min(since_raise_ + 1, kLongAgo);
+  if (since_lower_ > kForget) hold_ = kHold;
+  if (!model_.is_ready()) return;
+  predicted_us_ = model_.predict_us(node_sweeps);
+  const bool can_lower = next_lower(report).is_any;
+  watch_load(timing, can_lower);
+  is_too_much_ = predicted_us_ > budget_us() && !can_lower;
+  if (predicted_us_ > budget_us()) {
+    room_ticks_ = 0;
+    lower(report);
+  } else {
+    raise(report);
+  }
+}
+
+void RateController::remember_peaks(const step::TickReport& report) {
+  const auto remember = [](double& peak, std::uint32_t now) {
+    peak = std::max(static_cast<double>(now), peak - kForgetPeaks * peak);
+    if (peak < 1) peak = 0;
+  };
+  for (std::size_t layer = 0; layer < step::kSweepLayers; ++layer)
+    remember(peak_layer_nodes_[layer], report.layer_nodes[layer]);
+  remember(peak_queue_nodes_, report.queue_nodes);
+  far_work_ = far_work(report) * report.far_interval;
+}
+
+void RateController::watch_load(const TickTiming& timing, bool can_lower) {
+  const double work = static_cast<double>(timing.work_ns) * 1e-3 / kTickUs;
+  load_ += kLoadGain * (std::min(work, kMaxWorkTicks) - load_);
+  const double is_late = timing.lateness_ns > kTickNanoseconds ? 1 : 0;
+  late_share_ += kLateGain * (is_late - late_share_);
+  const bool is_pressed = load_ > kHighLoad || late_share_ > kHighLateShare;
+  if (is_pressed && can_lower && predicted_us_ <= budget_us())
+    budget_share_ = std::max(kMinBudgetShare, budget_share_ - kShrink);
+  else if (load_ < kLowLoad)
+    budget_share_ = std::min(1.0, budget_share_ + kGrow);
+}
+
+// The deepest layer that has sweeps to give, then nodes.
+RateController::Step RateController::next_lower(const step::TickReport& report) const {
+  Step step{sweeps_, far_interval_, nodes_, 0, report.active_nodes > 0};
+  if (!step.is_any) return step;
+  for (std::size_t layer = step::kSweepLayers; layer-- > 0;) {
+    if (sweeps_[layer] == lowest_sweeps_[layer]) continue;
+    --step.sweeps[layer];
+    step.change = -static_cast<double>(report.layer_nodes[layer]);
+    return step;
+  }
+  if (far_interval_ < longest_interval_) {
+    ++step.far_interval;
+    step.change = -far_work_ / (far_interval_ * step.far_interval);
+    return step;
+  }
+  // A limit above what the queue holds limits nothing.
+  const auto least = std::max(lowest_nodes_, report.contact_nodes);
+  if (nodes_ > std::max(least, report.queue_nodes)) {
+    step.nodes = std::max(least, report.queue_nodes);
+  } else if (nodes_ > least) {
+    step.nodes = std::max(least, nodes_ - std::max(1u, nodes_ / kNodeShare));
+    step.change = -static_cast<double>(nodes_ - step.nodes);
+  } else {
+    step.is_any = false;
+  }
+  return step;
+}
+
+RateController::Step RateController::next_higher() const {
+  Step step{sweeps_, far_interval_, nodes_, 0, true};
+  if (nodes_ < limits_.highest.node_limit) {
+    if (peak_queue_nodes_ < nodes_) {
+      step.nodes = limits_.highest.node_limit;  // there are no more
+    } else {
+      step.nodes = std::min(limits_.highest.node_limit, nodes_ + std::max(1u, nodes_ / kNodeShare));
+      step.change = static_cast<double>(step.nodes - nodes_) * sweeps_.back();
+    }
+    return step;
+  }
+  if (far_interval_ > limits_.highest.far_interval) {
+    --step.far_interval;
+    step.change = far_work_ / (far_interval_ * step.far_interval);
+    return step;
+  }
+  for (std::size_t layer = 0; layer < step::kSweepLayers; ++layer) {
+    if (sweeps_[layer] == highest_sweeps_[layer]) continue;
+    ++step.sweeps[layer];
+    step.change = peak_layer_nodes_[layer];
+    return step;
+  }
+  step.is_any = false;
+  return step;
+}
+
+void RateController::lower(const step::TickReport& report) {
+  if (since_lower_ < kLowerEvery) return;
+  auto step = next_lower(report);
+  if (!step.is_any) return;
+  while (step.is_any && step.change == 0) {
+    take(step);
+    step = next_lower(report);
+  }
+  if (step.is_any) take(step);
+  if (since_raise_ < kRegret && since_lower_ > since_raise_) hold_ = std::min(kMaxHold, 2 * hold_);
+  since_lower_ = 0;
+  ++lowered_;
+}
+
+void RateController::raise(const step::TickReport& report) {
+  double node_sweeps = work_of(report);
+  for (std::size_t layer = 0; layer < step::kSweepLayers; ++layer)
+    node_sweeps += (peak_layer_nodes_[layer] - report.layer_nodes[layer]) * sweeps_[layer];
+  const auto has_room = [&](const Step& step) {
+    return step.is_any && model_.predict_us(node_sweeps + step.change) < kRaiseBelow * budget_us();
+  };
+  auto step = next_higher();
+  if (!has_room(step)) {
+    room_ticks_ = 0;
+    return;
+  }
+  if (++room_ticks_ < hold_) return;
+  while (step.is_any && step.change == 0) {
+    take(step);
+    step = next_higher();
+  }
+  if (has_room(step)) take(step);
+  room_ticks_ = std::max(0, hold_ - kRaiseEvery);
+  since_raise_ = 0;
+  ++raised_;
+}
+
+void RateController::take(const Step& step) {
+  sweeps_ = step.sweeps;
+  nodes_ = step.nodes;
+  far_interval_ = step.far_interval;
+  decisions_ = limits_.highest;
+  decisions_.far_interval = far_interval_;
+  decisions_.node_limit = nodes_;
+  if (sweeps_ == highest_sweeps_) return;
+  decisions_.sweeps = sweeps_[0];
+  for (std::size_t layer = 1; layer < step::kSweepLayers; ++layer)
+    decisions_.layer_sweeps[layer - 1] = sweeps_[layer];
+}
+
+step::RateFigures RateController::figures() const {
+  using step::RateLevel;
+  const bool is_full = decisions_ == limits_.highest;
+  return {.level = is_too_much_ ? RateLevel::Overloaded
+                                : (is_full ? RateLevel::Full : RateLevel::Reduced),
+          .budget_us = static_cast<float>(budget_us()),
+          .predicted_us = static_cast<float>(predicted_us_),
+          .lowered = lowered_,
+          .raised = raised_};
+}
+
+}  // namespace trocar::control

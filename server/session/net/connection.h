@@ -1,0 +1,79 @@
+#pragma once
+
+// One accepted TCP connection: a reader coroutine that cuts the stream into frames, a writer
+// coroutine that empties a bounded outbox. Used by TcpServer only.
+//
+//   Open --close_after_flush--> Draining --all sent--> (send side shut) --peer closes--> Closed
+//     \--------------------------close, error, deadline------------------------------->/
+//
+// While Draining the peer's bytes are read and thrown away: closing a socket with unread bytes
+// makes the kernel send a reset, and the peer could lose the last words that are on their way.
+
+#include "common/base/asio.h"  // before Boost: see there
+
+#include <boost/asio/awaitable.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <chrono>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "server/session/net/connections.h"
+
+namespace trocar::net {
+
+class Connection : public std::enable_shared_from_this<Connection> {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  // What the server wants to hear; called on the I/O thread.
+  struct Events {
+    std::function<void(BytesView)> message;
+    std::function<void(ConnectionFault)> fault;
+    std::function<void(std::size_t)> bytes_written;
+    std::function<void()> closed;
+  };
+
+  Connection(asio::ip::tcp::socket socket, std::uint32_t max_message_bytes,
+             std::size_t outbox_bytes);
+
+  void start(Events events);
+
+  bool send(wire::SharedBytes frame);
+  std::size_t outstanding_bytes() const { return outstanding_; }
+  void close_after_flush(wire::SharedBytes last_words, Clock::time_point deadline);
+  void close();
+  // Reports `fault` once and stops delivering; the handler closes.
+  void fail(ConnectionFault fault);
+
+  // Checks time limits; called a few times per second.
+  void check_deadlines(Clock::time_point now, Clock::duration hello, Clock::duration idle);
+
+ private:
+  enum class State { Open, Failed, Draining, Closed };
+
+  asio::awaitable<void> read_frames();
+  asio::awaitable<void> write_outbox();
+  // Delivers every complete frame in the buffer; false when nothing more is to be read.
+  bool deliver_frames();
+  void discard_outbox();
+
+  asio::ip::tcp::socket socket_;
+  asio::steady_timer outbox_changed_;  // never expires; cancelled to wake the writer
+  const std::uint32_t max_message_bytes_;
+  const std::size_t outbox_bytes_;
+  Events events_;
+  State state_ = State::Open;
+  bool first_message_seen_ = false;
+  Clock::time_point last_message_ = Clock::now();
+  Clock::time_point drain_deadline_{};
+  Bytes inbound_;  // received and not yet delivered: [begin_, end_)
+  std::size_t begin_ = 0, end_ = 0;
+  std::deque<wire::SharedBytes> outbox_;
+  std::vector<wire::SharedBytes> in_flight_;
+  std::size_t outstanding_ = 0;  // bytes in outbox_ and in_flight_
+};
+
+}  // namespace trocar::net

@@ -1,0 +1,80 @@
+#pragma once
+
+// TCP listener and its connections. Moves framed messages and knows nothing about what they say.
+//
+// Bounds, so that no peer can take memory or time from the others:
+//   - connections: `max_connections`; one more is closed at once and counted;
+//   - inbound: one frame per connection is buffered, at most `max_message_bytes`;
+//   - outbound: `outbox_bytes` per connection; send() says no when full, the caller decides;
+//   - time: a first message within `hello_deadline`, then one at least every `idle_deadline`;
+//     a closing connection has `flush_deadline` to take its last bytes.
+// The kernel's send buffer is fixed at `send_buffer_bytes`: left to grow by itself it would hold
+// seconds of stale frames for a slow reader, unseen by outstanding_bytes().
+//
+// Thread: all calls and callbacks on the one thread that runs the I/O context, which outlives this.
+
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "common/base/asio.h"
+#include "common/base/ids.h"
+#include "common/base/result.h"
+#include "server/session/net/connections.h"
+
+namespace boost::asio {
+class io_context;
+}
+
+namespace trocar::net {
+
+struct TcpServerOptions {
+  std::string address = "127.0.0.1";
+  std::uint16_t port = 7690;                            // 0: any free port
+  std::size_t max_connections = kMaxParticipants + 12;  // some room to tell the next one "full"
+  std::uint32_t max_message_bytes = wire::kMaxUpstreamBytes;
+  std::size_t outbox_bytes = 1024 * 1024;
+  int send_buffer_bytes = 128 * 1024;
+  std::chrono::milliseconds hello_deadline{5000};
+  std::chrono::milliseconds idle_deadline{10000};
+  std::chrono::milliseconds flush_deadline{2000};
+};
+
+struct TcpCounters {
+  std::uint64_t accepted = 0;
+  std::uint64_t rejected_full = 0;  // closed at once: max_connections reached
+  std::uint64_t faults = 0;
+  std::uint64_t messages_in = 0, bytes_in = 0, bytes_out = 0;
+};
+
+class TcpServer final : public Connections {
+ public:
+  // Binds and listens; ErrorCode::ResourceMissing when the address or port cannot be had.
+  static Result<std::unique_ptr<TcpServer>> listen(asio::io_context& context,
+                                                   const TcpServerOptions& options);
+  // Closes everything; no callback after this.
+  ~TcpServer() override;
+
+  // Starts accepting. `handler` outlives this object.
+  void start(ConnectionHandler& handler);
+  // No further connections; those that exist stay.
+  void stop_accepting();
+
+  std::uint16_t port() const;
+  std::size_t connection_count() const;
+  const TcpCounters& counters() const;
+
+  bool send(ConnectionId id, wire::SharedBytes frame) override;
+  std::size_t outstanding_bytes(ConnectionId id) const override;
+  void close_after_flush(ConnectionId id, wire::SharedBytes last_words) override;
+  void close(ConnectionId id) override;
+
+ private:
+  class Core;
+  explicit TcpServer(std::shared_ptr<Core> core);
+
+  std::shared_ptr<Core> core_;  // shared with the coroutines, which may outlive this object
+};
+
+}  // namespace trocar::net

@@ -1,0 +1,65 @@
+#pragma once
+
+// The way of inputs from the I/O thread into the simulation: a bounded queue without locks.
+//
+//   I/O thread: try_push_join / push_leave / push_sample --> [1024] --> drain: simulation thread
+//
+// When full: samples are dropped and counted (the next one of that tool replaces it anyway). Joins
+// and leaves have reserved room: a join is taken only if there is also room for everybody present
+// to leave, so a leave always fits. drain() gives one tick's inputs in the order a tick admits them
+// (leaves, joins, samples): only the newest sample of each tool, and none that an earlier tenant of
+// a slot left behind. So a new tenant never starts with somebody else's pose.
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <optional>
+#include <variant>
+
+#include "common/base/spsc_queue.h"
+#include "server/tissue/hands/inputs.h"
+
+namespace trocar::participants {
+
+class SimulationInbox {
+ public:
+  static constexpr std::size_t kCapacity = 1024;
+  static constexpr std::size_t kReservedForJoins = 64;
+
+  struct Counters {
+    std::uint64_t samples_taken = 0;
+    std::uint64_t samples_dropped = 0;  // queue full
+  };
+
+  // I/O thread.
+  [[nodiscard]] bool try_push_join(const hands::HandJoin& join);  // false: no room, refuse the join
+  void push_leave(ParticipantSlot slot);                          // of a slot that has joined
+  void push_sample(const hands::ToolInput& input);
+  // Of two before a drain the newer one counts.
+  void push_mark(hands::MarkAction action) { mark_.store(action, std::memory_order_relaxed); }
+  const Counters& counters() const { return counters_; }
+
+  // Simulation thread. Replaces the content of `inputs`; at most kCapacity items per call.
+  void drain(hands::TickInputs& inputs);
+
+ private:
+  using Item = std::variant<std::monostate, ParticipantSlot, hands::HandJoin, hands::ToolInput>;
+
+  void push(Item item);
+
+  SpscQueue<Item> queue_{kCapacity};
+  std::atomic<std::size_t> pending_{0};  // never less than what is in queue_
+  std::atomic<hands::MarkAction> mark_{hands::MarkAction::None};
+  std::size_t joined_hands_ = 0;  // I/O thread
+  Counters counters_;             // I/O thread
+
+  // Simulation thread: what this drain has seen, by slot.
+  struct SlotChange {
+    bool leaves = false;
+    std::optional<hands::HandJoin> join;
+  };
+  std::array<SlotChange, kMaxHands> changes_;
+  std::array<std::optional<tool::ToolSample>, kMaxTools> samples_;
+};
+
+}  // namespace trocar::participants

@@ -1,0 +1,51 @@
+#pragma once
+
+// Who is in the session: names, roles, slots. Lives on the I/O strand; the simulation only knows
+// which slots have tools.
+
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/base/ids.h"
+#include "common/base/result.h"
+#include "common/tool/tool.h"
+#include "common/wire/role.h"
+
+namespace trocar::participants {
+
+using wire::has_tools;
+using wire::name_of;
+using wire::Role;
+
+struct Participant {
+  ParticipantSlot slot;
+  std::string name;
+  Role role = Role::Observer;
+  std::vector<tool::ToolShape> tools;  // 1 or 2 for roles with tools, else none
+};
+
+enum class JoinRefusal { NameInvalid, NameTaken, Full, ToolsInvalid };
+
+class Roster {
+ public:
+  Roster() = default;
+  // The same people in the same slots, e.g. as a journal lists them.
+  explicit Roster(const std::vector<Participant>& present);
+
+  // Admits a participant into the lowest free slot of its kind, or says why not. `refusal` is set
+  // on error. A name is 1 to 32 bytes of printable UTF-8 and unique; a role with tools that names
+  // none gets one default tool; a role without tools may not bring any.
+  Result<Participant> join(std::string_view name, Role role, std::vector<tool::ToolShape> tools,
+                           JoinRefusal& refusal);
+  void leave(ParticipantSlot slot);
+
+  const Participant* find(ParticipantSlot slot) const;
+  std::vector<Participant> list() const;  // by slot
+
+ private:
+  std::array<std::optional<Participant>, kMaxParticipants> slots_;
+};
+
+}  // namespace trocar::participants

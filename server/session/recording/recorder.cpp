@@ -1,0 +1,262 @@
+#include "server/session/recording/recorder.h"
+
+#include "common/base/log.h"
+#include "common/base/timing.h"
+#include "common/base/version.h"
+#include "common/wire/surface_codec.h"
+#include "common/wire/surface_messages.h"
+#include "server/organs/organ/organ_file.h"
+#include "server/session/recording/tick_records.h"
+#include "server/session/replication/messages.h"
+
+namespace trocar::recording {
+namespace {
+
+constexpr Tick kKeyPeriod = 1000;
+
+std::size_t estimated_bytes(const step::PublishedFrame& frame) {
+  std::size_t bytes = sizeof frame + frame.surface.size() * sizeof(wire::QuantisedVertex) +
+                      frame.regions.size() * sizeof(std::uint16_t);
+  if (frame.snapshot) bytes += frame.snapshot->size();
+  if (frame.change)
+    bytes += frame.change->new_vertices.size() * sizeof(wire::NewVertex) +
+             frame.change->removed.size() * sizeof(TriangleIndex) +
+             frame.change->added.size() * sizeof(wire::NewTriangle);
+  bytes += frame.solver_changes.size() * sizeof(step::SolverChange);
+  for (const auto& record : frame.records)
+    bytes += sizeof record + record.inputs.samples.size() * sizeof(hands::ToolInput);
+  return bytes;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Recorder>> Recorder::create(
+    const std::string& path, const organ::Organ& organ, const wire::SurfaceLayout& layout,
+    const std::optional<journal::ReductionDescription>& reduction) {
+  const std::uint64_t now = utc_ns();
+  const std::uint64_t hash = organ::organ_hash(organ);
+  auto writer = journal::SessionJournalWriter::create(
+      path,
+      {.start_utc_ns = now, .organ_name = organ.name, .organ_hash = hash, .reduction = reduction});
+  if (!writer) return writer.error();
+  if (auto s = (*writer)->write(journal::JournalTopic::Organ, 0, now, organ::encode_organ(organ));
+      !s)
+    return s.error();
+  proto::SurfaceTopology topology;
+  wire::write(layout, organ.name, topology);
+  if (auto s = (*writer)->write_topology(0, now, topology); !s) return s.error();
+  if (auto s = (*writer)->flush(); !s) return s.error();
+  return std::unique_ptr<Recorder>(new Recorder(std::move(*writer), organ, hash, layout));
+}
+
+Recorder::Recorder(std::unique_ptr<journal::SessionJournalWriter> writer, const organ::Organ& organ,
+                   std::uint64_t organ_hash, const wire::SurfaceLayout& layout)
+    : writer_(std::move(writer)),
+      layout_(layout),
+      organ_name_(organ.name),
+      organ_hash_(organ_hash),
+      thread_([this] { run(); }) {}
+
+Recorder::~Recorder() {
+  if (thread_.joinable()) static_cast<void>(close());
+}
+
+void Recorder::take_frame(const step::SharedFrame& frame) {
+  const std::size_t bytes = estimated_bytes(*frame);
+  const Tick first = frame->records.empty() ? frame->tick : frame->records.front().tick;
+  bool is_taken = queued_bytes_.load(std::memory_order_relaxed) + bytes <= kQueueBytes;
+  if (is_taken) {
+    queued_bytes_.fetch_add(bytes, std::memory_order_relaxed);
+    is_taken = frames_.try_push({frame, bytes, open_gap_});
+    if (!is_taken) queued_bytes_.fetch_sub(bytes, std::memory_order_relaxed);
+  }
+  if (is_taken) {
+    open_gap_ = {};
+  } else {
+    if (open_gap_.frames++ == 0) open_gap_.first_tick = first;
+    open_gap_.last_tick = frame->tick;
+    if (frame->new_layout) {
+      open_gap_.new_layout = frame->new_layout;
+      open_gap_.changes.clear();
+    }
+    if (frame->change) open_gap_.changes.push_back(frame->change);
+  }
+  wake_ups_.fetch_add(1);
+  wake_ups_.notify_one();
+}
+
+void Recorder::take_participants(std::vector<participants::Participant> present, Tick tick) {
+  // A list that does not fit is replaced by the next one; 64 changes would have to come at once.
+  static_cast<void>(presences_.try_push({std::move(present), tick}));
+  wake_ups_.fetch_add(1);
+  wake_ups_.notify_one();
+}
+
+void Recorder::run() {
+  for (;;) {
+    const auto seen = wake_ups_.load();
+    const bool is_closing = is_closing_.load();
+    if (write_queued()) continue;
+    if (is_closing) return;
+    wake_ups_.wait(seen);
+  }
+}
+
+bool Recorder::write_queued() {
+  bool any = false;
+  while (auto presence = presences_.try_pop()) {
+    any = true;
+    if (!status_.ok()) continue;
+    if (auto s = write_presence(*presence); !s) fail_with(s.error());
+  }
+  while (auto queued = frames_.try_pop()) {
+    any = true;
+    if (status_.ok()) {
+      Status s = queued->gap_before.frames > 0 ? write_gap(queued->gap_before) : Status{};
+      if (s.ok()) s = write_frame(*queued->frame);
+      if (!s) fail_with(s.error());
+    }
+    queued_bytes_.fetch_sub(queued->bytes, std::memory_order_relaxed);
+  }
+  return any;
+}
+
+void Recorder::fail_with(const Error& error) {
+  status_ = error;
+  log::error("recording ends here: {}", error.message);
+}
+
+Status Recorder::write_presence(const Presence& presence) {
+  roster_ = participants::Roster(presence.present);
+  proto::Participants message;
+  replication::describe(presence.present, message);
+  return writer_->write_participants(not_before_last(presence.tick), utc_ns(), message);
+}
+
+Status Recorder::write_gap(const Gap& gap) {
+  has_baseline_ = false;
+  has_decisions_ = false;
+  if (gap.new_layout) layout_ = *gap.new_layout;
+  for (const auto& change : gap.changes)
+    if (auto s = wire::apply(*change, layout_); !s) return s;
+  counters_.frames_dropped += gap.frames;
+  log::warn("recording: the disk was too slow, ticks {} to {} are missing", gap.first_tick,
+            gap.last_tick);
+  proto::JournalGap message;
+  message.set_first_tick(gap.first_tick);
+  message.set_last_tick(gap.last_tick);
+  message.set_messages(gap.frames);
+  return writer_->write_gap(not_before_last(gap.last_tick), utc_ns(), message);
+}
+
+Status Recorder::write_frame(const step::PublishedFrame& frame) {
+  const std::uint64_t now = utc_ns();
+  if (frame.snapshot) {
+    proto::WorldSnapshot message;
+    message.set_tick(frame.snapshot_tick);
+    message.set_sim_version(kSimVersion);
+    message.set_organ_hash(organ_hash_);
+    message.set_state_hash(xxh3_64(*frame.snapshot));
+    message.set_state(frame.snapshot->data(), frame.snapshot->size());
+    if (auto s = writer_->write_snapshot(not_before_last(frame.snapshot_tick), now, message); !s)
+      return s;
+  }
+  const Tick tick = not_before_last(frame.tick);
+  proto::TickBatch batch;
+  for (const auto& record : frame.records) {
+    to_message(record, has_decisions_ ? &last_decisions_ : nullptr, *batch.add_record());
+    last_decisions_ = record.decisions;
+    has_decisions_ = true;
+  }
+  if (auto s = writer_->write_tick_batch(tick, now, batch); !s) return s;
+
+  if (frame.new_layout) {
+    layout_ = *frame.new_layout;
+    has_baseline_ = false;
+  }
+  if (auto s = write_change(frame); !s) return s;
+  const bool has_key = !has_baseline_ || frame.tick - last_key_tick_ >= kKeyPeriod;
+  if (has_baseline_) {
+    if (auto s = write_surface(frame, false); !s) return s;
+  }
+  if (has_key) {
+    if (auto s = write_keyframe(frame); !s) return s;
+  }
+  if (!frame.claim_events.empty()) {
+    proto::ClaimLog claims;
+    for (const auto& event : frame.claim_events)
+      replication::describe(event, roster_, *claims.add_event());
+    if (auto s = writer_->write_claims(tick, now, claims); !s) return s;
+  }
+  if (auto s = write_solver_changes(frame); !s) return s;
+  proto::FrameState state;
+  replication::describe(frame, state);
+  for (const auto& tool : state.tool())
+    if (auto s = writer_->write_tool({static_cast<std::uint8_t>(tool.tool())}, tick, now, tool); !s)
+      return s;
+  ++counters_.frames_written;
+  return writer_->write_frame_state(tick, now, state);
+}
+
+Status Recorder::write_solver_changes(const step::PublishedFrame& frame) {
+  if (frame.solver_changes.empty()) return {};
+  proto::SolverLog changes;
+  for (const auto& change : frame.solver_changes)
+    replication::describe(change, *changes.add_change());
+  return writer_->write_solver(last_tick_, utc_ns(), changes);
+}
+
+Status Recorder::write_change(const step::PublishedFrame& frame) {
+  if (!frame.change) return {};
+  if (auto s = wire::apply(*frame.change, layout_); !s) return s;
+  proto::SurfaceChange message;
+  wire::write(*frame.change, layout_, message);
+  return writer_->write_topology_change(last_tick_, utc_ns(), message);
+}
+
+Status Recorder::write_keyframe(const step::PublishedFrame& frame) {
+  last_key_tick_ = frame.tick;
+  if (layout_.epoch > 0) {
+    proto::SurfaceTopology topology;
+    wire::write(layout_, organ_name_, topology);
+    if (auto s = writer_->write_topology(last_tick_, utc_ns(), topology); !s) return s;
+  }
+  return write_surface(frame, true);
+}
+
+Status Recorder::write_surface(const step::PublishedFrame& frame, bool is_keyframe) {
+  proto::SurfaceFrame message;
+  message.set_frame(frame.frame);
+  message.set_tick(frame.tick);
+  message.set_epoch(frame.epoch);
+  message.set_is_keyframe(is_keyframe);
+  message.set_surface_crc(frame.surface_crc);
+  Bytes payload;
+  if (is_keyframe) {
+    wire::encode_keyframe(frame.surface, payload);
+  } else {
+    message.set_base_frame(baseline_frame_);
+    baseline_.resize(frame.surface.size());  // zeros for new vertices
+    wire::encode_delta(baseline_, frame.surface, payload);
+  }
+  message.set_payload(payload.data(), payload.size());
+  baseline_.assign(frame.surface.begin(), frame.surface.end());
+  baseline_frame_ = frame.frame;
+  has_baseline_ = true;
+  return writer_->write_surface(not_before_last(frame.tick), utc_ns(), message);
+}
+
+Status Recorder::close() {
+  is_closing_.store(true);
+  wake_ups_.fetch_add(1);
+  wake_ups_.notify_one();
+  thread_.join();
+  if (open_gap_.frames > 0 && status_.ok()) {
+    if (auto s = write_gap(open_gap_); !s) status_ = s;
+  }
+  const Status closed = writer_->close();
+  counters_.bytes_written = writer_->bytes_written();
+  return status_.ok() ? closed : status_;
+}
+
+}  // namespace trocar::recording

@@ -1,0 +1,115 @@
+#pragma once
+
+// Writes a session's journal from a thread of its own.
+//
+//   simulation thread: take_frame ------> [frames, 8 MiB] --.
+//   I/O thread:        take_participants -> [64 lists] -----+--> writer thread -> MCAP file
+//
+// Neither producer ever waits. When the frames' queue is full a frame is dropped, counted, and the
+// journal gets a JournalGap with the ticks that are missing; the surface goes on with topology and
+// keyframe (what a dropped frame changed of it is kept) and re-simulation from the next snapshot. A
+// disk error ends the recording, is logged once, and close() returns it.
+//
+// Changes of the surface are written with their frame. From epoch 1 on each keyframe (1 Hz) follows
+// a full SurfaceTopology of its tick, so that a seek, or what comes after damage, starts right.
+
+#include <algorithm>
+#include <atomic>
+#include <memory>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "common/base/spsc_queue.h"
+#include "common/journal/session_journal_writer.h"
+#include "common/wire/surface_layout.h"
+#include "server/organs/organ/organ.h"
+#include "server/session/participants/roster.h"
+#include "server/tissue/step/published_frame.h"
+
+namespace trocar::recording {
+
+struct RecorderCounters {
+  std::uint64_t frames_written = 0, frames_dropped = 0, bytes_written = 0;
+};
+
+class Recorder {
+ public:
+  static constexpr std::size_t kQueueBytes = 8 * 1024 * 1024;
+  static constexpr std::size_t kQueueFrames = 1024;
+  static constexpr std::size_t kQueueParticipants = 64;
+
+  // Creates the file with organ and topology; copies what it keeps. Fails if the file exists or
+  // cannot be written. reduction: of the session; nothing: it has none.
+  static Result<std::unique_ptr<Recorder>> create(
+      const std::string& path, const organ::Organ& organ, const wire::SurfaceLayout& layout,
+      const std::optional<journal::ReductionDescription>& reduction = {});
+  ~Recorder();
+
+  // Simulation thread.
+  void take_frame(const step::SharedFrame& frame);
+  // I/O thread: after each change.
+  void take_participants(std::vector<participants::Participant> present, Tick tick);
+  // After both producers have ended: writes what is queued and the file's summary.
+  Status close();
+  // After close().
+  const RecorderCounters& counters() const { return counters_; }
+
+ private:
+  struct Presence {
+    std::vector<participants::Participant> present;
+    Tick tick = 0;
+  };
+  struct Gap {
+    Tick first_tick = 0, last_tick = 0;
+    std::uint64_t frames = 0;
+    std::shared_ptr<const wire::SurfaceLayout> new_layout;  // before `changes`
+    std::vector<std::shared_ptr<const wire::SurfaceChange>> changes;
+  };
+  struct QueuedFrame {
+    step::SharedFrame frame;
+    std::size_t bytes = 0;
+    Gap gap_before;  // frames dropped just before this one
+  };
+
+  Recorder(std::unique_ptr<journal::SessionJournalWriter> writer, const organ::Organ& organ,
+           std::uint64_t organ_hash, const wire::SurfaceLayout& layout);
+  void run();
+  // Writes everything queued; false when both queues were empty.
+  bool write_queued();
+  Status write_presence(const Presence& presence);
+  Status write_gap(const Gap& gap);
+  Status write_frame(const step::PublishedFrame& frame);
+  Status write_solver_changes(const step::PublishedFrame& frame);
+  Status write_change(const step::PublishedFrame& frame);
+  Status write_keyframe(const step::PublishedFrame& frame);
+  Status write_surface(const step::PublishedFrame& frame, bool is_keyframe);
+  void fail_with(const Error& error);
+  Tick not_before_last(Tick tick) { return last_tick_ = std::max(last_tick_, tick); }
+
+  // Writer thread, or the caller's after it has ended.
+  std::unique_ptr<journal::SessionJournalWriter> writer_;
+  participants::Roster roster_;  // names for claim events
+  wire::SurfaceLayout layout_;   // of the last frame written
+  std::string organ_name_;
+  wire::QuantisedSurface baseline_;  // last surface written
+  Frame baseline_frame_ = 0;
+  bool has_baseline_ = false;  // else a keyframe is due
+  step::TickDecisions last_decisions_;
+  bool has_decisions_ = false;
+  Tick last_key_tick_ = 0, last_tick_ = 0;
+  std::uint64_t organ_hash_ = 0;
+  RecorderCounters counters_;
+  Status status_;
+
+  SpscQueue<QueuedFrame> frames_{kQueueFrames};
+  SpscQueue<Presence> presences_{kQueueParticipants};
+  std::atomic<std::size_t> queued_bytes_{0};
+  Gap open_gap_;  // simulation thread
+  std::atomic<std::uint32_t> wake_ups_{0};
+  std::atomic<bool> is_closing_{false};
+  std::thread thread_;
+};
+
+}  // namespace trocar::recording

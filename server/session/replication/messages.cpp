@@ -1,0 +1,351 @@
+#include "server/session/replication/messages.h"
+
+#include <cmath>
+#include <limits>
+
+#include "common/base/version.h"
+#include "common/wire/surface_codec.h"
+#include "common/wire/surface_messages.h"
+#include "common/wire/tool_shape.h"
+#include "proto/journal.pb.h"
+
+namespace trocar::replication {
+namespace {
+
+static_assert(static_cast<int>(hands::ClaimOutcome::Slipped) == proto::CLAIM_SLIPPED);
+static_assert(static_cast<int>(step::RateLevel::Overloaded) == proto::RATE_OVERLOADED);
+
+void write(const Vec3f& from, proto::Vec3& to) {
+  to.set_x(from.x);
+  to.set_y(from.y);
+  to.set_z(from.z);
+}
+
+void write(const Quatf& from, proto::Quat& to) {
+  to.set_x(from.x);
+  to.set_y(from.y);
+  to.set_z(from.z);
+  to.set_w(from.w);
+}
+
+std::string name_of_holder(ToolSlot tool, const participants::Roster& roster) {
+  const auto* participant = roster.find(tool.owner());
+  return participant ? participant->name : "somebody who has left";
+}
+
+const tool::ToolShape* find_shape(ToolSlot tool, const participants::Roster& roster) {
+  const auto* participant = roster.find(tool.owner());
+  const auto number = static_cast<std::size_t>(tool.number());
+  return participant && number < participant->tools.size() ? &participant->tools[number] : nullptr;
+}
+
+}  // namespace
+
+wire::SharedBytes encode_welcome(ParticipantSlot slot, std::uint64_t organ_hash) {
+  proto::Envelope envelope;
+  auto& welcome = *envelope.mutable_welcome();
+  welcome.set_protocol_major(kProtocolMajor);
+  welcome.set_protocol_minor(kProtocolMinor);
+  welcome.set_sim_version(kSimVersion);
+  welcome.set_participant(slot.value);
+  welcome.set_organ_hash(organ_hash);
+  welcome.set_tick_us(static_cast<std::uint32_t>(kTickNanoseconds / 1000));
+  welcome.set_ticks_per_frame(static_cast<std::uint32_t>(kTicksPerFrame));
+  return wire::encode_envelope(envelope);
+}
+
+void describe(const std::vector<participants::Participant>& present, proto::Participants& list) {
+  for (const auto& participant : present) {
+    auto& entry = *list.add_participant();
+    entry.set_slot(participant.slot.value);
+    entry.set_name(participant.name);
+    entry.set_role(static_cast<proto::Role>(participant.role));
+    for (const auto& shape : participant.tools) {
+      wire::write(shape, *entry.add_tool());
+    }
+  }
+}
+
+wire::SharedBytes encode_participants(const std::vector<participants::Participant>& present) {
+  proto::Envelope envelope;
+  describe(present, *envelope.mutable_participants());
+  return wire::encode_envelope(envelope);
+}
+
+wire::SharedBytes encode_topology(const wire::SurfaceLayout& layout,
+                                  const std::string& organ_name) {
+  proto::Envelope envelope;
+  wire::write(layout, organ_name, *envelope.mutable_surface_topology());
+  return wire::encode_envelope(envelope);
+}
+
+wire::SharedBytes encode_surface_change(const wire::SurfaceChange& change,
+                                        const wire::SurfaceLayout& layout) {
+  proto::Envelope envelope;
+  wire::write(change, layout, *envelope.mutable_surface_change());
+  return wire::encode_envelope(envelope);
+}
+
+namespace {
+
+proto::SolverReason message_of(step::SolverReason reason) {
+  switch (reason) {
+    case step::SolverReason::None:
+      return proto::SOLVER_UNSPECIFIED;
+    case step::SolverReason::Idle:
+      return proto::SOLVER_IDLE;
+    case step::SolverReason::Fits:
+      return proto::SOLVER_FITS;
+    case step::SolverReason::Frozen:
+      return proto::SOLVER_FROZEN;
+    case step::SolverReason::Outside:
+      return proto::SOLVER_OUTSIDE;
+    case step::SolverReason::Force:
+      return proto::SOLVER_FORCE;
+    case step::SolverReason::Cut:
+      return proto::SOLVER_CUT;
+    case step::SolverReason::Error:
+      return proto::SOLVER_ERROR;
+    case step::SolverReason::Off:
+      return proto::SOLVER_OFF;
+    case step::SolverReason::Preparing:
+      return proto::SOLVER_PREPARING;
+  }
+  return proto::SOLVER_UNSPECIFIED;
+}
+
+// Clients take no number that is not finite.
+float finite(float value) {
+  return std::isfinite(value) ? value : std::numeric_limits<float>::max();
+}
+
+void write(const step::SolverFigures& solver, proto::SolverState& message) {
+  message.set_is_reduced(solver.is_reduced);
+  for (const auto patch : solver.patches.all()) message.add_patch(patch + 1);
+  message.set_reason(message_of(solver.reason));
+  message.set_estimate(finite(solver.estimate));
+  message.set_largest_node_force_n(finite(solver.largest_node_force_n));
+}
+
+}  // namespace
+
+proto::GhostStatus message_of(ghost::GhostStatus status) {
+  switch (status) {
+    case ghost::GhostStatus::Begins:
+      return proto::GHOST_BEGINS;
+    case ghost::GhostStatus::Follows:
+      return proto::GHOST_FOLLOWS;
+    case ghost::GhostStatus::Changed:
+      return proto::GHOST_CHANGED;
+    case ghost::GhostStatus::Behind:
+      return proto::GHOST_BEHIND;
+  }
+  return proto::GHOST_UNSPECIFIED;
+}
+
+std::string describe(const step::SolverFigures& solver) {
+  if (solver.is_reduced) {
+    std::string text = solver.patches.count == 1 ? "reduced, patch " : "reduced, patches ";
+    for (std::uint32_t i = 0; i < solver.patches.count; ++i)
+      text += (i > 0 ? " + " : "") + std::to_string(solver.patches.patches[i] + 1);
+    return text;
+  }
+  return std::string("full, ") + step::name_of(solver.reason);
+}
+
+void describe(const step::SolverChange& change, proto::SolverChange& message) {
+  message.set_tick(change.tick);
+  write(change.figures, *message.mutable_solver());
+  message.set_text(describe(change.figures));
+}
+
+void describe(const step::PublishedFrame& frame, proto::FrameState& state) {
+  state.set_frame(frame.frame);
+  state.set_tick(frame.tick);
+  for (const auto& tool : frame.tools) {
+    auto& entry = *state.add_tool();
+    entry.set_tool(tool.tool.value);
+    write(tool.world_from_tool.position, *entry.mutable_position_m());
+    write(tool.world_from_tool.orientation, *entry.mutable_orientation());
+    entry.set_verb(static_cast<proto::Verb>(tool.verb));
+    write(tool.force_n, *entry.mutable_force_n());
+    entry.set_contact_nodes(tool.contact_nodes);
+    entry.set_has_claim(tool.has_claim);
+    entry.set_penetration_m(tool.penetration_m);
+    entry.set_is_silent(tool.is_silent);
+    entry.set_is_inside(tool.is_inside);
+    write(tool.torque_nm, *entry.mutable_torque_nm());
+    if (tool.world_from_proxy != tool.world_from_tool) {
+      write(tool.world_from_proxy.position, *entry.mutable_proxy_position_m());
+      write(tool.world_from_proxy.orientation, *entry.mutable_proxy_orientation());
+    }
+  }
+  for (std::size_t begin = 0; begin < frame.regions.size();) {
+    std::size_t end = begin + 1;
+    while (end < frame.regions.size() && frame.regions[end] == frame.regions[begin]) ++end;
+    state.add_region_runs(frame.regions[begin]);
+    state.add_region_runs(static_cast<std::uint32_t>(end - begin));
+    begin = end;
+  }
+  state.set_active_nodes(frame.active_nodes);
+  state.set_queue_nodes(frame.queue_nodes);
+  state.set_region_count(frame.region_count);
+  state.set_sweeps(frame.sweeps);
+  state.set_far_sweeps(frame.far_sweeps);
+  state.set_far_interval(frame.far_interval);
+  state.set_residual_n(frame.residual_n);
+  if (frame.relaxation) {
+    auto& relaxation = *state.mutable_relaxation();
+    relaxation.set_energy_j(frame.relaxation->energy_j);
+    relaxation.set_volume_change(static_cast<float>(frame.relaxation->volume_change));
+    relaxation.set_relaxed_share(static_cast<float>(frame.relaxation->relaxed_share));
+  }
+  if (frame.solver.reason != step::SolverReason::None) write(frame.solver, *state.mutable_solver());
+  state.set_tick_cpu_us(frame.statistics.tick_median_us);
+  state.set_tick_cpu_p99_us(frame.statistics.tick_p99_us);
+  for (const float median : frame.statistics.median_us) state.add_stage_cpu_us(median);
+  state.set_slow_ticks(frame.statistics.slow_ticks);
+  state.set_state_hash(frame.state_hash);
+  const auto& figures = frame.statistics.rate;
+  auto& rate = *state.mutable_rate();
+  rate.set_level(static_cast<proto::RateLevel>(figures.level));
+  for (const auto sweeps : frame.layer_sweeps) rate.add_layer_sweeps(sweeps);
+  rate.set_node_limit(frame.node_limit);
+  rate.set_budget_us(figures.budget_us);
+  rate.set_predicted_us(figures.predicted_us);
+  rate.set_lowered(figures.lowered);
+  rate.set_raised(figures.raised);
+  rate.set_time_rate(figures.time_rate);
+}
+
+wire::SharedBytes encode_frame_state(const step::PublishedFrame& frame) {
+  proto::Envelope envelope;
+  describe(frame, *envelope.mutable_frame_state());
+  return wire::encode_envelope(envelope);
+}
+
+std::string describe(const hands::ClaimEvent& event, const participants::Roster& roster) {
+  const std::string who = name_of_holder(event.tool, roster);
+  const std::string holder = name_of_holder(event.holder, roster);
+  const bool is_grasp = event.verb == tool::Verb::Grasp, is_cut = event.verb == tool::Verb::Cut;
+  switch (event.outcome) {
+    case hands::ClaimOutcome::Granted:
+      return who + (is_grasp ? " has a grasp" : is_cut ? " cuts" : " pushes");
+    case hands::ClaimOutcome::RefusedHeld:
+      return (is_cut ? "the blade is stopped: tissue ahead is held by " : "held by ") + holder +
+             ": wait, or ask " + holder + " to let go";
+    case hands::ClaimOutcome::RefusedNothingInReach: {
+      const auto* shape = find_shape(event.tool, roster);
+      const auto reach_mm = std::lround((shape ? *shape : tool::ToolShape{}).reach_m * 1000);
+      return "nothing in reach of " + who + ": bring the tip within " + std::to_string(reach_mm) +
+             " mm of the surface";
+    }
+    case hands::ClaimOutcome::Released:
+      return who + (is_grasp ? " let go" : is_cut ? " stopped cutting" : " stopped pushing");
+    case hands::ClaimOutcome::TakenOver:
+      return who + " was silent: " + holder + " took over";
+    case hands::ClaimOutcome::Expired:
+      return who + " was silent for " + std::to_string(hands::kAbandonTicks / kTicksPerSecond) +
+             (is_grasp ? " s: the grasp was let go" : " s: the claim has ended");
+    case hands::ClaimOutcome::Slipped:
+      return who + " lost the grasp: the tissue was pulled out of the jaws";
+  }
+  return {};
+}
+
+void describe(const hands::ClaimEvent& event, const participants::Roster& roster,
+              proto::ClaimEvent& message) {
+  message.set_tick(event.tick);
+  message.set_tool(event.tool.value);
+  message.set_verb(static_cast<proto::Verb>(event.verb));
+  message.set_outcome(static_cast<proto::ClaimOutcome>(event.outcome));
+  if (event.holder.is_valid()) {
+    message.set_holder(event.holder.value);
+    message.set_holder_name(name_of_holder(event.holder, roster));
+  }
+  message.set_text(describe(event, roster));
+}
+
+wire::SharedBytes encode_claim_event(const hands::ClaimEvent& event,
+                                     const participants::Roster& roster) {
+  proto::Envelope envelope;
+  describe(event, roster, *envelope.mutable_claim_event());
+  return wire::encode_envelope(envelope);
+}
+
+namespace {
+
+wire::SharedBytes encode_mark_event(const step::MarkEvent& event, const char* text) {
+  proto::Envelope envelope;
+  auto& message = *envelope.mutable_mark_event();
+  message.set_tick(event.tick);
+  message.set_action(static_cast<proto::MarkAction>(event.action));
+  message.set_is_done(event.is_done);
+  message.set_text(text);
+  return wire::encode_envelope(envelope);
+}
+
+}  // namespace
+
+wire::SharedBytes encode_mark_event(const step::MarkEvent& event) {
+  const bool is_return = event.action == hands::MarkAction::Return;
+  return encode_mark_event(event, !event.is_done ? "there is no mark to return to: set one first"
+                                  : is_return ? "the instructor has returned the organ to the mark"
+                                              : "the instructor has marked the organ as it is");
+}
+
+wire::SharedBytes encode_early_mark(hands::MarkAction action, Tick tick) {
+  return encode_mark_event(
+      {tick, action, false},
+      action == hands::MarkAction::Return
+          ? "not returned to the mark: less than a second after the last "
+            "request, ask again"
+          : "not marked: less than a second after the last request, ask again");
+}
+
+wire::SharedBytes encode_ghost(const ghost::GhostReport& report) {
+  proto::Envelope envelope;
+  auto& message = *envelope.mutable_ghost_frame();
+  message.set_status(message_of(report.status));
+  if (report.status == ghost::GhostStatus::Follows) {
+    Bytes payload;
+    wire::encode_keyframe(report.offsets, payload);
+    message.set_frame(report.frame);
+    message.set_epoch(report.epoch);
+    message.set_payload(payload.data(), payload.size());
+    message.set_offsets_crc(wire::surface_crc(report.offsets));
+    message.set_largest_m(report.largest_m);
+    message.set_root_mean_square_m(report.root_mean_square_m);
+    message.set_behind_ms(static_cast<std::uint32_t>(report.behind_ticks));
+  }
+  return wire::encode_envelope(envelope);
+}
+
+wire::SharedBytes encode_no_ghost() {
+  proto::Envelope envelope;
+  envelope.mutable_ghost_frame()->set_status(proto::GHOST_NONE);
+  return wire::encode_envelope(envelope);
+}
+
+wire::SharedBytes encode_barrier(const step::PublishedFrame& frame) {
+  proto::Envelope envelope;
+  envelope.mutable_barrier()->set_frame(frame.frame);
+  envelope.mutable_barrier()->set_surface_crc(frame.surface_crc);
+  return wire::encode_envelope(envelope);
+}
+
+wire::SharedBytes encode_pong(std::uint64_t client_time_us, Tick tick) {
+  proto::Envelope envelope;
+  envelope.mutable_pong()->set_client_time_us(client_time_us);
+  envelope.mutable_pong()->set_tick(tick);
+  return wire::encode_envelope(envelope);
+}
+
+wire::SharedBytes encode_goodbye(EndReason reason, const std::string& text) {
+  proto::Envelope envelope;
+  envelope.mutable_goodbye()->set_reason(static_cast<proto::GoodbyeReason>(reason));
+  envelope.mutable_goodbye()->set_text(text);
+  return wire::encode_envelope(envelope);
+}
+
+}  // namespace trocar::replication

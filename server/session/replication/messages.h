@@ -1,0 +1,58 @@
+#pragma once
+
+// Builders of what the server says, each as one framed, encoded, immutable buffer.
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/wire/framing.h"
+#include "common/wire/surface_layout.h"
+#include "server/session/ghost/ghost_follower.h"
+#include "server/session/participants/roster.h"
+#include "server/session/replication/validation.h"
+#include "server/tissue/hands/claims.h"
+#include "server/tissue/step/published_frame.h"
+
+namespace trocar::proto {
+class ClaimEvent;
+class FrameState;
+class Participants;
+class SolverChange;
+}  // namespace trocar::proto
+
+namespace trocar::replication {
+
+// Messages that clients and journal get alike.
+void describe(const std::vector<participants::Participant>& present, proto::Participants& message);
+void describe(const step::PublishedFrame& frame, proto::FrameState& message);
+void describe(const hands::ClaimEvent& event, const participants::Roster& roster,
+              proto::ClaimEvent& message);
+void describe(const step::SolverChange& change, proto::SolverChange& message);
+
+wire::SharedBytes encode_welcome(ParticipantSlot slot, std::uint64_t organ_hash);
+wire::SharedBytes encode_participants(const std::vector<participants::Participant>& present);
+wire::SharedBytes encode_topology(const wire::SurfaceLayout& layout, const std::string& organ_name);
+// `layout`: the one that the change was applied to.
+wire::SharedBytes encode_surface_change(const wire::SurfaceChange& change,
+                                        const wire::SurfaceLayout& layout);
+wire::SharedBytes encode_frame_state(const step::PublishedFrame& frame);
+wire::SharedBytes encode_claim_event(const hands::ClaimEvent& event,
+                                     const participants::Roster& roster);
+wire::SharedBytes encode_mark_event(const step::MarkEvent& event);
+// To who asked too soon after another request; nothing has been done.
+wire::SharedBytes encode_early_mark(hands::MarkAction action, Tick tick);
+wire::SharedBytes encode_ghost(const ghost::GhostReport& report);
+// That there is no ghost in this session.
+wire::SharedBytes encode_no_ghost();
+wire::SharedBytes encode_barrier(const step::PublishedFrame& frame);
+wire::SharedBytes encode_pong(std::uint64_t client_time_us, Tick tick);
+wire::SharedBytes encode_goodbye(EndReason reason, const std::string& text);
+
+// One line for a person about what became of a claim: by whom it is held and what to do.
+std::string describe(const hands::ClaimEvent& event, const participants::Roster& roster);
+// Which solver acts and why: "reduced, patch 12", "full, tissue was cut".
+std::string describe(const step::SolverFigures& solver);
+
+}  // namespace trocar::replication

@@ -1,0 +1,441 @@
+#include "server/session/replication/replicator.h"
+
+#include <algorithm>
+#include <cstdlib>
+
+#include "common/base/log.h"
+#include "proto/wire.pb.h"
+#include "server/session/replication/messages.h"
+
+namespace trocar::replication {
+namespace {
+
+constexpr std::uint64_t kSecondNs = 1'000'000'000;
+
+std::string text_of_role(participants::Role role) {
+  return participants::name_of(role);
+}
+
+EndReason reason_of(participants::JoinRefusal refusal, participants::Role role) {
+  switch (refusal) {
+    case participants::JoinRefusal::NameInvalid:
+      return EndReason::ProtocolError;
+    case participants::JoinRefusal::NameTaken:
+      return EndReason::NameTaken;
+    case participants::JoinRefusal::Full:
+      return EndReason::Full;
+    case participants::JoinRefusal::ToolsInvalid:
+      return participants::has_tools(role) ? EndReason::ProtocolError : EndReason::Role;
+  }
+  return EndReason::Unspecified;
+}
+
+}  // namespace
+
+struct Replicator::Client {
+  net::ConnectionId id = 0;
+  std::optional<participants::Participant> participant;  // set by Hello
+  bool has_old_surface = false;                          // so that no delta helps
+  step::SharedFrame baseline;                            // the last frame this client was given
+  bool wants_keyframe = false;
+  bool wants_ghost = false;
+  std::uint64_t last_requested_keyframe_ns = 0;
+  std::array<std::optional<std::uint32_t>, kToolsPerHand> last_sequence;
+  std::uint64_t rate_window_begin_ns = 0;
+  std::uint32_t messages_in_window = 0;
+};
+
+Replicator::Replicator(net::Connections& connections, participants::SimulationInbox& inbox,
+                       wire::SurfaceLayout layout, std::string organ_name, std::uint64_t organ_hash,
+                       ReplicatorOptions options)
+    : connections_(connections),
+      inbox_(inbox),
+      options_(std::move(options)),
+      organ_hash_(organ_hash),
+      organ_name_(std::move(organ_name)),
+      layout_(std::move(layout)) {}
+
+Replicator::~Replicator() = default;
+
+// ---- who is here ----
+
+void Replicator::on_open(net::ConnectionId id) {
+  auto client = std::make_unique<Client>();
+  client->id = id;
+  client->rate_window_begin_ns = options_.clock_ns();
+  clients_.emplace(id, std::move(client));
+}
+
+void Replicator::on_close(net::ConnectionId id) {
+  const auto found = clients_.find(id);
+  if (found == clients_.end()) return;
+  if (const auto& participant = found->second->participant)
+    log::info("{} ({}) is gone", participant->name, text_of_role(participant->role));
+  forget(*found->second);
+  settle_participants();
+}
+
+void Replicator::on_fault(net::ConnectionId id, net::ConnectionFault fault) {
+  const auto found = clients_.find(id);
+  if (found == clients_.end()) return connections_.close(id);
+  const bool is_timeout =
+      fault == net::ConnectionFault::HelloTimeout || fault == net::ConnectionFault::IdleTimeout;
+  end_session(*found->second,
+              {is_timeout ? EndReason::Timeout : EndReason::ProtocolError, net::describe(fault)});
+  settle_participants();
+}
+
+void Replicator::on_message(net::ConnectionId id, BytesView message) {
+  const auto found = clients_.find(id);
+  if (found == clients_.end()) return;
+  auto& client = *found->second;
+  if (const auto ending = take_message(client, message)) end_session(client, *ending);
+  settle_participants();
+}
+
+void Replicator::end_session(Client& client, const Ending& ending) {
+  const std::string who =
+      client.participant ? client.participant->name : "connection " + std::to_string(client.id);
+  if (ending.reason == EndReason::ServerClosing)
+    log::debug("{}: {}", who, ending.text);
+  else
+    log::warn("session of {} ended: {}", who, ending.text);
+  ++counters_.ended[static_cast<std::size_t>(ending.reason)];
+  const auto id = client.id;
+  forget(client);
+  connections_.close_after_flush(id, encode_goodbye(ending.reason, ending.text));
+}
+
+void Replicator::forget(Client& client) {
+  if (client.participant) {
+    const auto slot = client.participant->slot;
+    roster_.leave(slot);
+    if (slot.has_tools()) inbox_.push_leave(slot);
+    participants_changed_ = true;
+  }
+  clients_.erase(client.id);
+}
+
+void Replicator::settle_participants() {
+  while (participants_changed_) {
+    participants_changed_ = false;
+    const auto present = roster_.list();
+    if (options_.on_participants)
+      options_.on_participants(present, encoder_.current() ? encoder_.current()->tick : 0);
+    broadcast(encode_participants(present));
+  }
+  settle_ghost();
+}
+
+void Replicator::settle_ghost() {
+  if (!options_.on_ghost_wanted) return;
+  const bool is_wanted =
+      std::ranges::any_of(clients_, [](const auto& entry) { return entry.second->wants_ghost; });
+  if (is_wanted != is_ghost_wanted_) options_.on_ghost_wanted(is_wanted);
+  is_ghost_wanted_ = is_wanted;
+}
+
+void Replicator::end_all(EndReason reason, const std::string& text) {
+  while (!clients_.empty()) end_session(*clients_.begin()->second, {reason, text});
+  participants_changed_ = false;
+}
+
+// ---- what they say ----
+
+bool Replicator::exceeds_rate(Client& client) {
+  const auto now = options_.clock_ns();
+  if (now - client.rate_window_begin_ns >= kSecondNs) {
+    client.rate_window_begin_ns = now;
+    client.messages_in_window = 0;
+  }
+  return ++client.messages_in_window > options_.max_messages_per_second;
+}
+
+std::optional<Replicator::Ending> Replicator::take_message(Client& client, BytesView bytes) {
+  const auto protocol_error = [](std::string text) {
+    return Ending{EndReason::ProtocolError, std::move(text)};
+  };
+  if (exceeds_rate(client))
+    return protocol_error("more than " + std::to_string(options_.max_messages_per_second) +
+                          " messages in a second: send each tool at most 250 times per second");
+  proto::Envelope envelope;
+  if (const auto decoded = wire::decode_envelope(bytes, envelope); !decoded)
+    return protocol_error(decoded.error().message);
+  if (!client.participant && !envelope.has_hello())
+    return protocol_error("the first message must be Hello");
+
+  switch (envelope.message_case()) {
+    case proto::Envelope::kHello:
+      return admit(client, envelope.hello());
+    case proto::Envelope::kToolSample:
+      return take_sample(client, envelope.tool_sample());
+    case proto::Envelope::kFrameAck:
+      return take_ack(client, envelope.frame_ack().frame(), envelope.frame_ack().surface_crc());
+    case proto::Envelope::kMarkRequest:
+      return take_mark(client, envelope.mark_request().action());
+    case proto::Envelope::kGhostRequest:
+      take_ghost_request(client, envelope.ghost_request().is_wanted());
+      return std::nullopt;
+    case proto::Envelope::kKeyframeRequest:
+      client.wants_keyframe = true;
+      if (encoder_.current() && may_have_requested_keyframe(client)) give_frame(client, false);
+      return std::nullopt;
+    case proto::Envelope::kPing: {
+      const auto tick = encoder_.current() ? encoder_.current()->tick : 0;
+      // A pong that does not fit is left out: the client measures again in a moment.
+      send(client, encode_pong(envelope.ping().client_time_us(), tick));
+      return std::nullopt;
+    }
+    case proto::Envelope::kBye: {
+      log::info("{} ({}) left", client.participant->name, text_of_role(client.participant->role));
+      const auto id = client.id;
+      forget(client);
+      connections_.close_after_flush(id, nullptr);
+      return std::nullopt;
+    }
+    case proto::Envelope::MESSAGE_NOT_SET:
+      return std::nullopt;  // a message of a newer minor version (decode_envelope knows)
+    default:
+      return protocol_error("a message that only the server may send");
+  }
+}
+
+std::optional<Replicator::Ending> Replicator::admit(Client& client, const proto::Hello& hello) {
+  if (client.participant) return Ending{EndReason::ProtocolError, "Hello: once is enough"};
+  if (barrier_) return Ending{EndReason::ServerClosing, "the session is ending"};
+  auto reason = EndReason::ProtocolError;
+  auto request = check_hello(hello, reason);
+  if (!request) return Ending{reason, request.error().message};
+  auto refusal = participants::JoinRefusal::Full;
+  auto joined = roster_.join(request->name, request->role, std::move(request->tools), refusal);
+  if (!joined) return Ending{reason_of(refusal, request->role), joined.error().message};
+  const auto& participant = *joined;
+  if (participant.slot.has_tools()) {
+    hands::HandJoin join{participant.slot, static_cast<int>(participant.tools.size()), {}};
+    std::copy(participant.tools.begin(), participant.tools.end(), join.shapes.begin());
+    if (!inbox_.try_push_join(join)) {
+      roster_.leave(participant.slot);
+      return Ending{EndReason::Full, "the server is busy: try again in a second"};
+    }
+  }
+  log::info("{} ({}) joined as participant {}", participant.name, text_of_role(participant.role),
+            participant.slot.value);
+  client.participant = participant;
+  ++counters_.sessions;
+  const Ending too_slow{EndReason::TooSlow, "the outbox is too small for the first messages"};
+  if (!send(client, encode_welcome(participant.slot, organ_hash_)) ||
+      !send(client, encode_participants(roster_.list())) || !send(client, topology()))
+    return too_slow;
+  if (encoder_.current() && !give_frame(client, true)) return too_slow;
+  // The others; the newcomer has it already, a second copy does no harm.
+  participants_changed_ = true;
+  return std::nullopt;
+}
+
+std::optional<Replicator::Ending> Replicator::take_sample(Client& client,
+                                                          const proto::ToolSample& sample) {
+  const auto& participant = *client.participant;
+  if (!participants::has_tools(participant.role))
+    return Ending{EndReason::Role,
+                  "ToolSample: an " + text_of_role(participant.role) + " watches and has no tools"};
+  const auto checked = check_tool_sample(sample, participant.tools.size());
+  if (!checked) return Ending{EndReason::ProtocolError, checked.error().message};
+  auto& last = client.last_sequence[static_cast<std::size_t>(checked->tool)];
+  if (last && checked->sequence <= *last)
+    return Ending{EndReason::ProtocolError,
+                  "ToolSample.sequence: " + std::to_string(checked->sequence) + " after " +
+                      std::to_string(*last) + ", it must grow"};
+  last = checked->sequence;
+  ++counters_.samples;
+  inbox_.push_sample({tool_slot(participant.slot, checked->tool), checked->sample});
+  return std::nullopt;
+}
+
+std::optional<Replicator::Ending> Replicator::take_mark(Client& client, int action) {
+  const auto role = client.participant->role;
+  if (role != participants::Role::Instructor)
+    return Ending{EndReason::Role,
+                  "MarkRequest: marks are the instructor's, not of an " + text_of_role(role)};
+  if (action != proto::MARK_SET && action != proto::MARK_RETURN)
+    return Ending{EndReason::ProtocolError, "MarkRequest.action: " + std::to_string(action) +
+                                                " is not 1 (set) or 2 (return)"};
+  const auto wanted = static_cast<hands::MarkAction>(action);
+  // Returning takes the simulation as long as beginning: what comes too soon is refused.
+  const auto now = options_.clock_ns();
+  if (last_mark_ns_ && now - *last_mark_ns_ < kSecondNs) {
+    send(client, encode_early_mark(wanted, encoder_.current() ? encoder_.current()->tick : 0));
+    return std::nullopt;
+  }
+  last_mark_ns_ = now;
+  inbox_.push_mark(wanted);
+  return std::nullopt;
+}
+
+void Replicator::take_ghost_request(Client& client, bool is_wanted) {
+  client.wants_ghost = is_wanted && options_.on_ghost_wanted != nullptr;
+  if (!is_wanted) return;
+  // If it does not fit, the next one does; without a ghost the client asks again or waits in vain.
+  send(client, options_.on_ghost_wanted ? encode_ghost({}) : encode_no_ghost());
+}
+
+std::optional<Replicator::Ending> Replicator::take_ack(Client& client, Frame frame,
+                                                       std::uint32_t crc) {
+  if (!client.baseline || frame > client.baseline->frame)
+    return Ending{EndReason::ProtocolError,
+                  "FrameAck.frame: " + std::to_string(frame) + " was not given to you yet"};
+  if (!barrier_ || frame != barrier_->frame) return std::nullopt;
+  const auto slot = client.participant->slot;
+  for (auto& result : barrier_results_) {
+    if (result.slot != slot) continue;
+    result.has_answered = true;
+    result.frame = frame;
+    result.surface_crc = crc;
+    result.is_equal = crc == barrier_->surface_crc;
+  }
+  return std::nullopt;
+}
+
+// ---- what they are given ----
+
+const wire::SharedBytes& Replicator::topology() {
+  if (!topology_) topology_ = encode_topology(layout_, organ_name_);
+  return topology_;
+}
+
+Status Replicator::change_surface(const wire::SurfaceChange& change) {
+  if (Status applied = wire::apply(change, layout_); !applied.ok()) return applied;
+  const auto bytes = encode_surface_change(change, layout_);
+  topology_.reset();
+  ++counters_.surface_changes;
+  counters_.surface_change_bytes += bytes->size();
+  broadcast(bytes);
+  return {};
+}
+
+void Replicator::replace_surface(const wire::SurfaceLayout& layout) {
+  layout_ = layout;
+  topology_.reset();
+  broadcast(topology());
+  for (const auto& [id, client] : clients_) client->has_old_surface = true;
+}
+
+bool Replicator::send(Client& client, const wire::SharedBytes& bytes) {
+  if (!connections_.send(client.id, bytes)) return false;
+  counters_.bytes_queued += bytes->size();
+  return true;
+}
+
+void Replicator::broadcast(const wire::SharedBytes& bytes) {
+  for (auto next = clients_.begin(); next != clients_.end();) {
+    auto& client = *next->second;
+    ++next;  // ending a session erases it
+    if (client.participant && !send(client, bytes))
+      end_session(client,
+                  {EndReason::TooSlow,
+                   "your connection is too slow: messages that cannot be skipped piled up"});
+  }
+}
+
+bool Replicator::may_have_requested_keyframe(const Client& client) const {
+  return options_.clock_ns() - client.last_requested_keyframe_ns >= options_.keyframe_interval_ns;
+}
+
+std::size_t Replicator::skip_limit() const {
+  return std::max(options_.skip_above_bytes, 2 * encoder_.typical_frame_bytes());
+}
+
+bool Replicator::give_frame(Client& client, bool is_required) {
+  const auto& frame = *encoder_.current();
+  const auto* baseline = client.baseline.get();
+  const bool is_requested = client.wants_keyframe && may_have_requested_keyframe(client);
+  if (baseline && baseline->frame == frame.frame && !is_requested) return true;
+  if (!is_required && connections_.outstanding_bytes(client.id) > skip_limit()) {
+    ++counters_.frames_skipped;
+    return false;
+  }
+  const bool is_keyframe = is_requested || !baseline || client.has_old_surface ||
+                           frame.frame - baseline->frame > options_.keyframe_after_frames;
+  // Who asks may have lost count of the surface's changes, too.
+  const bool is_lost = is_requested && frame.epoch > 0;
+  if ((is_lost && !send(client, topology())) ||
+      !send(client, is_keyframe ? encoder_.keyframe() : encoder_.delta_from(*baseline))) {
+    ++counters_.frames_skipped;
+    return false;
+  }
+  client.baseline = encoder_.current();
+  client.has_old_surface = false;
+  ++counters_.frames_given;
+  if (is_keyframe) ++counters_.keyframes_given;
+  if (is_requested) {
+    client.wants_keyframe = false;
+    client.last_requested_keyframe_ns = options_.clock_ns();
+  }
+  send(client, encoder_.state());  // figures and tools: the next frame brings newer ones
+  return true;
+}
+
+void Replicator::publish(std::span<const step::SharedFrame> frames) {
+  if (frames.empty()) return;
+  TROCAR_ASSERT(!barrier_);
+  Status followed;
+  for (const auto& frame : frames) {
+    for (const auto& event : frame->mark_events) broadcast(encode_mark_event(event));
+    if (frame->new_layout) replace_surface(*frame->new_layout);
+    for (const auto& event : frame->claim_events) broadcast(encode_claim_event(event, roster_));
+    if (frame->change && followed.ok()) followed = change_surface(*frame->change);
+  }
+  const auto& newest = *frames.back();
+  if (newest.epoch != layout_.epoch || newest.surface.size() != layout_.vertex_count()) {
+    // Nothing that is sent from here on could be understood.
+    log::error("frame {}: no way to epoch {} of the surface; {}", newest.frame, newest.epoch,
+               followed.ok() ? "a change is missing" : followed.error().message);
+    return end_all(EndReason::Unspecified, "the server lost track of the surface: start it again");
+  }
+  counters_.frames_published += frames.size();
+  counters_.frames_conflated += frames.size() - 1;
+  encoder_.set_current(frames.back());
+  for (const auto& [id, client] : clients_)
+    if (client->participant) give_frame(*client, false);
+  settle_participants();
+}
+
+void Replicator::publish(const ghost::GhostReport& report) {
+  // Of a surface that they have: a change since is on its way, or they have it already.
+  const bool follows = report.status == ghost::GhostStatus::Follows;
+  if (follows && (report.epoch != layout_.epoch || report.offsets.size() != layout_.vertex_count()))
+    return;
+  const auto bytes = encode_ghost(report);
+  for (const auto& [id, client] : clients_) {
+    if (!client->wants_ghost) continue;
+    const bool has_room = connections_.outstanding_bytes(id) <= skip_limit() / 2;
+    const bool is_given = has_room && send(*client, bytes);
+    ++(is_given ? counters_.ghosts_given : counters_.ghosts_skipped);
+  }
+}
+
+void Replicator::begin_barrier(const step::SharedFrame& last) {
+  if (encoder_.current() != last) publish({&last, 1});
+  barrier_ = last;
+  for (const auto& participant : roster_.list())
+    barrier_results_.push_back({participant.slot, participant.name, participant.role});
+  const auto barrier = encode_barrier(*last);
+  for (auto next = clients_.begin(); next != clients_.end();) {
+    auto& client = *next->second;
+    ++next;
+    if (!client.participant) continue;
+    if (!give_frame(client, true) || !send(client, barrier))
+      end_session(client, {EndReason::TooSlow, "your connection is too slow for the last frame"});
+  }
+}
+
+bool Replicator::is_barrier_complete() const {
+  return std::all_of(barrier_results_.begin(), barrier_results_.end(), [this](const auto& result) {
+    return result.has_answered || roster_.find(result.slot) == nullptr;
+  });
+}
+
+std::vector<BarrierResult> Replicator::barrier_results() const {
+  return barrier_results_;
+}
+
+}  // namespace trocar::replication

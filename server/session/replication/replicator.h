@@ -1,0 +1,173 @@
+#pragma once
+
+// The sessions of all clients: who they are, what they may say, and what each was given last.
+//
+//   Hello -> Welcome, Participants, SurfaceTopology, keyframe -> then per published frame
+//            SurfaceChange (where it begins an epoch), SurfaceFrame (delta against the last frame
+//            this client was given, whichever epoch that was), FrameState
+//
+// Inbound: every message is checked by role and range (validation.h); samples, joins and leaves go
+// to the simulation through the SimulationInbox. Anything malformed, oversized, too frequent or not
+// this role's to say ends that session with a Goodbye that names the reason; nobody else notices.
+//
+// Outbound: when a client's outbox holds more than max(64 KiB, 2 frames), the frame is skipped for
+// it; the next delta is encoded against the last frame it was given, so nothing queues up and
+// nothing is lost. It gets a keyframe instead when it asks (at most 4 per second; from epoch 1 on
+// with the topology before it) and when its baseline is older than 63 frames (1 s). Participants,
+// claim events, surface changes, topology and barrier cannot be skipped: if one does not fit, the
+// session ends as too slow.
+//
+// Ghost: who has asked gets what the ghost's thread reports, if the outbox is less than half as
+// full as it may be for frames: these come first.
+//
+// Barrier: publishes a last frame, asks each participant for the CRC of what it shows, and collects
+// the answers.
+//
+// Thread: every call on the I/O thread. `connections` and `inbox` outlive this.
+
+#include <array>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/base/timing.h"
+#include "common/wire/surface_layout.h"
+#include "server/session/ghost/ghost_follower.h"
+#include "server/session/net/connections.h"
+#include "server/session/participants/inbox.h"
+#include "server/session/participants/roster.h"
+#include "server/session/replication/frame_encoder.h"
+#include "server/session/replication/validation.h"
+#include "server/tissue/step/published_frame.h"
+
+namespace trocar::proto {
+class Envelope;
+class Hello;
+class ToolSample;
+}  // namespace trocar::proto
+
+namespace trocar::replication {
+
+struct ReplicatorOptions {
+  std::uint32_t max_messages_per_second = 2000;      // per connection; two tools at 250 Hz need 500
+  std::size_t skip_above_bytes = 64 * 1024;          // see above
+  Frame keyframe_after_frames = 63;                  // about 1 s
+  std::uint64_t keyframe_interval_ns = 250'000'000;  // of keyframes on request
+  std::function<std::uint64_t()> clock_ns = monotonic_ns;
+  // Told who is here after each change, with the tick of the newest frame; may be empty.
+  std::function<void(const std::vector<participants::Participant>&, Tick)> on_participants;
+  // Whether anybody wants the ghost, after each change; empty: the session has none.
+  std::function<void(bool)> on_ghost_wanted;
+};
+
+struct BarrierResult {
+  ParticipantSlot slot;
+  std::string name;
+  participants::Role role = participants::Role::Observer;
+  bool has_answered = false;
+  Frame frame = 0;  // acknowledged
+  std::uint32_t surface_crc = 0;
+  bool is_equal = false;
+};
+
+struct ReplicatorCounters {
+  std::uint64_t sessions = 0;                          // welcomed
+  std::array<std::uint64_t, kEndReasonCount> ended{};  // by EndReason, where we ended it
+  std::uint64_t samples = 0;
+  std::uint64_t frames_published = 0;
+  std::uint64_t frames_conflated = 0;  // overtaken by a newer one before this thread saw them
+  std::uint64_t frames_given = 0, frames_skipped = 0;  // summed over clients
+  std::uint64_t keyframes_given = 0;
+  std::uint64_t surface_changes = 0, surface_change_bytes = 0;  // each counted once
+  std::uint64_t ghosts_given = 0, ghosts_skipped = 0;           // summed over clients
+  std::uint64_t bytes_queued = 0;
+};
+
+class Replicator final : public net::ConnectionHandler {
+ public:
+  Replicator(net::Connections& connections, participants::SimulationInbox& inbox,
+             wire::SurfaceLayout layout, std::string organ_name, std::uint64_t organ_hash,
+             ReplicatorOptions options = {});
+  ~Replicator() override;
+
+  // Frames since the last call, oldest first, none left out. Claim events and surface changes of
+  // all of them are delivered, the displacements only of the newest.
+  void publish(std::span<const step::SharedFrame> frames);
+
+  void publish(const ghost::GhostReport& report);
+
+  // `last` has been or is now published; no further publish(). New Hellos are refused.
+  void begin_barrier(const step::SharedFrame& last);
+  bool is_barrier_complete() const;                    // everybody who is still here has answered
+  std::vector<BarrierResult> barrier_results() const;  // those present when it began, by slot
+
+  // Goodbye to everybody.
+  void end_all(EndReason reason, const std::string& text);
+
+  std::size_t session_count() const { return clients_.size(); }
+  const participants::Roster& roster() const { return roster_; }
+  const ReplicatorCounters& counters() const { return counters_; }
+  const EncodeStatistics& encode_statistics() const { return encoder_.statistics(); }
+
+  void on_open(net::ConnectionId id) override;
+  void on_message(net::ConnectionId id, BytesView message) override;
+  void on_fault(net::ConnectionId id, net::ConnectionFault fault) override;
+  void on_close(net::ConnectionId id) override;
+
+ private:
+  struct Client;
+  struct Ending {
+    EndReason reason;
+    std::string text;
+  };
+
+  // What to end the session with, or nothing.
+  std::optional<Ending> take_message(Client& client, BytesView bytes);
+  std::optional<Ending> admit(Client& client, const proto::Hello& hello);
+  std::optional<Ending> take_sample(Client& client, const proto::ToolSample& sample);
+  std::optional<Ending> take_mark(Client& client, int action);
+  void take_ghost_request(Client& client, bool is_wanted);
+  std::optional<Ending> take_ack(Client& client, Frame frame, std::uint32_t crc);
+  bool exceeds_rate(Client& client);
+
+  // Tells everybody what begins an epoch and keeps it; an error if it does not follow.
+  Status change_surface(const wire::SurfaceChange& change);
+  // Another one, to which no change leads: everybody gets it and a keyframe.
+  void replace_surface(const wire::SurfaceLayout& layout);
+  // Of the surface as it is now.
+  const wire::SharedBytes& topology();
+  bool send(Client& client, const wire::SharedBytes& bytes);
+  void broadcast(const wire::SharedBytes& bytes);
+  std::size_t skip_limit() const;
+  // True if the client has the newest frame afterwards. `is_required`: do not skip.
+  bool give_frame(Client& client, bool is_required);
+  bool may_have_requested_keyframe(const Client& client) const;
+  void end_session(Client& client, const Ending& ending);
+  void forget(Client& client);
+  // Tells everybody who is here, as often as somebody drops out while being told.
+  void settle_participants();
+  void settle_ghost();
+
+  net::Connections& connections_;
+  participants::SimulationInbox& inbox_;
+  const ReplicatorOptions options_;
+  const std::uint64_t organ_hash_;
+  const std::string organ_name_;
+  wire::SurfaceLayout layout_;  // of the newest frame
+  wire::SharedBytes topology_;  // its encoding; null: not since the last change
+  participants::Roster roster_;
+  std::map<net::ConnectionId, std::unique_ptr<Client>> clients_;
+  bool participants_changed_ = false;
+  bool is_ghost_wanted_ = false;
+  std::optional<std::uint64_t> last_mark_ns_;
+  FrameEncoder encoder_;
+  step::SharedFrame barrier_;
+  std::vector<BarrierResult> barrier_results_;
+  ReplicatorCounters counters_;
+};
+
+}  // namespace trocar::replication

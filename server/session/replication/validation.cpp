@@ -1,0 +1,75 @@
+#include "server/session/replication/validation.h"
+
+#include <cmath>
+
+#include "common/base/version.h"
+#include "common/wire/tool_shape.h"
+#include "proto/wire.pb.h"
+
+namespace trocar::replication {
+namespace {
+
+static_assert(static_cast<int>(EndReason::Timeout) == proto::GOODBYE_TIMEOUT);
+static_assert(static_cast<int>(tool::Verb::Grasp) == proto::VERB_GRASP);
+static_assert(static_cast<int>(tool::Verb::Cut) == proto::VERB_CUT);
+static_assert(tool::kVerbCount == proto::Verb_ARRAYSIZE);
+
+Error bad(std::string message) {
+  return {ErrorCode::BadMessage, std::move(message)};
+}
+
+}  // namespace
+
+Result<HelloRequest> check_hello(const proto::Hello& hello, EndReason& reason) {
+  if (hello.protocol_major() != kProtocolMajor) {
+    reason = EndReason::Version;
+    return bad("Hello.protocol_major: this server speaks protocol " +
+               std::to_string(kProtocolMajor) + "." + std::to_string(kProtocolMinor) +
+               ", you speak " + std::to_string(hello.protocol_major()) + "." +
+               std::to_string(hello.protocol_minor()) + ": use client and server of one release");
+  }
+  if (wire::role_of(hello.role()) == wire::Role::Unknown) {
+    reason = EndReason::Role;
+    return bad("Hello.role: " + std::to_string(static_cast<int>(hello.role())) + " is none of " +
+               wire::list_roles());
+  }
+  reason = EndReason::ProtocolError;
+  if (hello.tool_size() > kToolsPerHand)
+    return bad("Hello.tool: " + std::to_string(hello.tool_size()) + " tools, at most 2");
+  HelloRequest request;
+  request.protocol_minor = hello.protocol_minor();
+  request.name = hello.name();
+  request.role = wire::role_of(hello.role());
+  for (const auto& tool : hello.tool()) request.tools.push_back(wire::read(tool));
+  return request;
+}
+
+Result<CheckedSample> check_tool_sample(const proto::ToolSample& sample, std::size_t tool_count) {
+  if (sample.tool() >= tool_count)
+    return bad("ToolSample.tool: " + std::to_string(sample.tool()) + ", you have " +
+               std::to_string(tool_count) + " (counted from 0)");
+  if (!sample.has_position_m() || !sample.has_orientation())
+    return bad("ToolSample: position_m and orientation must be there");
+  const auto& p = sample.position_m();
+  const auto& q = sample.orientation();
+  const Vec3f position{p.x(), p.y(), p.z()};
+  if (!is_finite(position)) return bad("ToolSample.position_m: not finite");
+  // Compared as |p|^2 in double: a float would overflow for large coordinates.
+  const Vec3d wide = to_double(position);
+  if (length_squared(wide) > double{kMaxDistanceFromOriginM} * kMaxDistanceFromOriginM)
+    return bad("ToolSample.position_m: farther than 2 m from the origin");
+  const Quatf orientation{q.x(), q.y(), q.z(), q.w()};
+  // Not finite fails here too: every comparison with NaN is false.
+  if (!(std::abs(norm(orientation) - 1.0f) <= kMaxQuaternionError))
+    return bad("ToolSample.orientation: not of unit length (within 0.001)");
+  if (sample.verb() < 0 || sample.verb() >= tool::kVerbCount)
+    return bad("ToolSample.verb: " + std::to_string(static_cast<int>(sample.verb())) +
+               " is none of none (0), push (1), grasp (2), cut (3)");
+  CheckedSample checked;
+  checked.tool = static_cast<int>(sample.tool());
+  checked.sequence = sample.sequence();
+  checked.sample = {{position, normalized(orientation)}, static_cast<tool::Verb>(sample.verb())};
+  return checked;
+}
+
+}  // namespace trocar::replication

@@ -1,0 +1,54 @@
+#pragma once
+
+// What a client said, checked field by field and turned into our own types. Everything that comes
+// from a socket passes here first; what is wrong with it is an error line that goes back to the
+// client, and the reason its session ends with.
+
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/tool/tool.h"
+#include "server/session/participants/roster.h"
+
+namespace trocar::proto {
+class Hello;
+class ToolSample;
+}  // namespace trocar::proto
+
+namespace trocar::replication {
+
+inline constexpr float kMaxDistanceFromOriginM = 2.0f;
+inline constexpr float kMaxQuaternionError = 1e-3f;
+
+// Values of proto::GoodbyeReason, here so that headers need no generated code.
+enum class EndReason : std::uint8_t {
+  Unspecified = 0,
+  ServerClosing = 1,
+  ProtocolError = 2,
+  Version = 3,
+  Full = 4,
+  NameTaken = 5,
+  Role = 6,
+  TooSlow = 7,
+  Timeout = 8,
+};
+inline constexpr int kEndReasonCount = 9;
+
+struct HelloRequest {
+  std::uint32_t protocol_minor = 0;
+  std::string name;  // not yet checked: the roster does
+  participants::Role role = participants::Role::Observer;
+  std::vector<tool::ToolShape> tools;  // not yet checked
+};
+// `reason` is set on error.
+Result<HelloRequest> check_hello(const proto::Hello& hello, EndReason& reason);
+
+struct CheckedSample {
+  int tool = 0;  // number, below the participant's tool count
+  std::uint32_t sequence = 0;
+  tool::ToolSample sample;  // orientation of unit length
+};
+Result<CheckedSample> check_tool_sample(const proto::ToolSample& sample, std::size_t tool_count);
+
+}  // namespace trocar::replication

@@ -1,0 +1,73 @@
+#pragma once
+
+// Which nodes each grasping tool holds, and where in its frame. Created when a claim is granted,
+// dropped when it ends. Each node is held with its share, by surface area, of the grip: pulled
+// harder it slips between the jaws, and is lost where it leaves them; a grasp that has lost all of
+// its nodes has slipped off. Jaws close in kClosingTicks, along the tool's x: what lies between
+// them is squeezed, and the grip grows with it. While a claim fades out (its holder left, fell
+// silent or was taken over) the grasp stays where it last was, whatever becomes of the tool's slot.
+
+#include <array>
+#include <span>
+#include <vector>
+
+#include "server/tissue/contact/contact_list.h"
+#include "server/tissue/hands/claims.h"
+#include "server/tissue/hands/tool_table.h"
+#include "server/tissue/world/world.h"
+
+namespace trocar::contact {
+
+inline constexpr float kClosingTicks = 100;
+// How much thinner tissue is between closed jaws.
+inline constexpr float kSqueeze = 0.4f;
+
+struct Grasp {
+  std::vector<NodeIndex> nodes;  // ascending; empty: nothing held
+  std::vector<Vec3f> offsets;    // m, tool frame, with the jaws still open
+  float grip_n = 0;              // of all nodes together
+  float reach_m = 0;             // how far the jaws hold
+  float closed = 0;              // 0: jaws open, 1: closed
+  bool is_anchored = false;      // fading out: `anchor` replaces the tool's pose
+  Pose anchor;                   // world_from_tool
+};
+
+// Where the jaws hold a node, tool frame.
+inline Vec3f held_offset(const Grasp& grasp, std::size_t i) {
+  const Vec3f& offset = grasp.offsets[i];
+  return {offset.x * (1 - kSqueeze * grasp.closed), offset.y, offset.z};
+}
+
+class GraspTable {
+ public:
+  const Grasp& operator[](ToolSlot slot) const { return grasps_[slot.value]; }
+  // Where the grasp's frame is this tick.
+  Pose pose(ToolSlot slot, const hands::Tool& tool) const {
+    return grasps_[slot.value].is_anchored ? grasps_[slot.value].anchor : tool.pose;
+  }
+
+  // O(tools x log(nodes held)).
+  bool holds(NodeIndex node) const;
+
+  // Before inputs change a tool: keeps the last pose of grasps that are going to fade.
+  void anchor(ToolSlot slot, const Pose& pose);
+  // After the claims were decided: takes hold of what was granted, lets go of what ended.
+  void follow_claims(const world::World& world, const hands::ToolTable& tools,
+                     const hands::ClaimTable& claims,
+                     std::span<const hands::ClaimRequest> requests);
+
+  // After the solve: nodes that were pulled beyond their share of the grip have slipped. Lost nodes
+  // are free; a grasp without nodes ends its claim.
+  void follow_slip(const ContactList& contacts, const world::World& world,
+                   hands::ClaimTable& claims, std::vector<hands::ClaimEvent>& events);
+
+  // What holds a node holds its copy, too.
+  void add_copy(NodeIndex node, NodeIndex copy);
+
+  void visit_state(world::StateArchive& archive, std::size_t node_count);
+
+ private:
+  std::array<Grasp, kMaxTools> grasps_;
+};
+
+}  // namespace trocar::contact

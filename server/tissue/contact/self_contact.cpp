@@ -1,0 +1,389 @@
+#include "server/tissue/contact/self_contact.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "common/base/tick.h"
+
+namespace trocar::contact {
+namespace {
+
+// Faces that touch at rest may do so for ever: a force begins this far beyond.
+constexpr float kTouch_m = 2e-6f;
+constexpr float kOverlapAtRest_m = 0.001f;
+// Cosine of the normals: of a pair that begins, and of one that goes on.
+constexpr float kBeginsFacing = -0.1f, kStaysFacing = 0.2f;
+// The closest point lies along the normal, within so many gaps and a little.
+constexpr float kAsidePerGap = 1, kAside_m = 0.0005f;
+constexpr float kDeepest_m = 0.008f;
+constexpr float kRounding_m = 1e-5f;
+constexpr float kNoLimit_n = 1e6f;
+constexpr std::uint32_t kNoSite = 0xffffffffu;
+
+// Barycentric weights of the point of a triangle closest to p (Ericson, Real-Time Collision
+// Detection, 5.1.5).
+Vec3f nearest_weights(const Vec3f& p, const Vec3f& a, const Vec3f& b, const Vec3f& c) {
+  const Vec3f ab = b - a, ac = c - a, ap = p - a;
+  const float d1 = dot(ab, ap), d2 = dot(ac, ap);
+  if (d1 <= 0 && d2 <= 0) return {1, 0, 0};
+  const Vec3f bp = p - b;
+  const float d3 = dot(ab, bp), d4 = dot(ac, bp);
+  if (d3 >= 0 && d4 <= d3) return {0, 1, 0};
+  const float vc = d1 * d4 - d3 * d2;
+  if (vc <= 0 && d1 >= 0 && d3 <= 0 && d1 > d3) {
+    const float v = d1 / (d1 - d3);
+    return {1 - v, v, 0};
+  }
+  const Vec3f cp = p - c;
+  const float d5 = dot(ab, cp), d6 = dot(ac, cp);
+  if (d6 >= 0 && d5 <= d6) return {0, 0, 1};
+  const float vb = d5 * d2 - d1 * d6;
+  if (vb <= 0 && d2 >= 0 && d6 <= 0 && d2 > d6) {
+    const float w = d2 / (d2 - d6);
+    return {1 - w, 0, w};
+  }
+  const float va = d3 * d6 - d5 * d4;
+  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0 && (d4 - d3) + (d5 - d6) > 0) {
+    const float w = (d4 - d3) / ((d4 - d3) + (d5 - d6));
+    return {0, 1 - w, w};
+  }
+  const float sum = va + vb + vc;
+  if (!(sum > 0)) return {1, 0, 0};  // no area
+  const float v = vb / sum, w = vc / sum;
+  return {1 - v - w, v, w};
+}
+
+}  // namespace
+
+SelfContactTable::SelfContactTable() {
+  nodes_.reserve(kMaxSelfPoints);
+  triangles_.reserve(kMaxSelfPoints);
+  places_.reserve(kMaxSelfPoints);
+}
+
+namespace {
+bool is_place(const SelfContactPlace& place) {
+  const auto& w = place.weights;
+  return w.x >= 0 && w.y >= 0 && w.z >= 0 && std::abs(w.x + w.y + w.z - 1) < 1e-4f &&
+         std::abs(length_squared(place.normal) - 1) < 1e-3f &&
+         std::abs(place.shift) <= 2 * kOverlapAtRest_m;
+}
+}  // namespace
+
+void SelfContactTable::visit_state(world::StateArchive& archive,
+                                   std::span<const NodeIndex> surface_nodes,
+                                   std::size_t triangle_count) {
+  if (archive.is_reading()) {
+    clear();
+    if (archive.at_end()) return;
+  } else if (nodes_.empty()) {
+    return;
+  }
+  archive.sized_array(nodes_, kMaxSelfPoints);
+  archive.sized_array(triangles_, kMaxSelfPoints);
+  archive.sized_array(places_, kMaxSelfPoints);
+  if (!archive.is_reading()) return;
+  bool is_good = !nodes_.empty() && nodes_.size() == triangles_.size() &&
+                 nodes_.size() == places_.size() && std::ranges::all_of(places_, is_place);
+  for (std::size_t i = 0; is_good && i < nodes_.size(); ++i)
+    is_good = std::ranges::binary_search(surface_nodes, nodes_[i]) &&
+              triangles_[i].value < triangle_count && (i == 0 || nodes_[i - 1] < nodes_[i]);
+  if (is_good) return;
+  archive.fail();
+  clear();
+}
+
+const Vec3f& SelfContactFinder::normal(Site site, Sort sort, const world::World& world) {
+  const std::size_t place = 2 * std::size_t{site} + static_cast<std::size_t>(sort);
+  if (normal_stamp_[place] == tick_current_) return normals_[place];
+  normal_stamp_[place] = tick_current_;
+  return normals_[place] =
+             surface_.normal(site, sort, [&](TriangleIndex t) { return up(t, world); });
+}
+
+// Of what the node is of, that which looks most against them.
+Vec3f SelfContactFinder::normal_towards(Site site, const Vec3f& theirs, const world::World& world) {
+  if (!surface_.is_of(site, Sort::Wound)) return normal(site, Sort::Skin, world);
+  const Vec3f& of_wound = normal(site, Sort::Wound, world);
+  if (!surface_.is_of(site, Sort::Skin)) return of_wound;
+  const Vec3f& of_skin = normal(site, Sort::Skin, world);
+  const bool is_wound =
+      length_squared(of_wound) > 0 && dot(of_wound, theirs) <= dot(of_skin, theirs);
+  return is_wound ? of_wound : of_skin;
+}
+
+const Vec3f& SelfContactFinder::up(TriangleIndex triangle, const world::World& world) {
+  auto& up = ups_[triangle.value];
+  if (std::exchange(up_stamp_[triangle.value], tick_current_) != tick_current_)
+    up = surface_.up(triangle, [&](Site s) { return position(s, world); });
+  return up;
+}
+
+bool SelfContactFinder::can_meet(Site site, TriangleIndex triangle, const world::World& world) {
+  if (!is_of_lips(site, triangle)) return !surface_.is_near(site, triangle);
+  return std::ranges::find(surface_[triangle], site) == surface_[triangle].end() &&
+         dot(up(triangle, world), normal(site, Sort::Wound, world)) < 0;
+}
+
+SelfContactFinder::ClosestPoint SelfContactFinder::closest_point(Site site, TriangleIndex triangle,
+                                                                 const world::World& world) const {
+  const auto& sites = surface_[triangle];
+  const Vec3f p = position(site, world), a = position(sites[0], world),
+              b = position(sites[1], world), c = position(sites[2], world);
+  const Vec3f w = nearest_weights(p, a, b, c);
+  const Vec3f from = p - (a * w.x + b * w.y + c * w.z);
+  return {triangle, w, from, length_squared(from)};
+}
+
+// Of the triangles at some nodes; the first of equals.
+SelfContactFinder::ClosestPoint SelfContactFinder::closest_point_around(
+    Site site, std::span<const Site> around, bool is_of_lips, const world::World& world) {
+  ClosestPoint best;
+  for (const auto corner : around)
+    for (const auto t : surface_.triangles_of(corner)) {
+      if (this->is_of_lips(site, t) != is_of_lips) continue;
+      const ClosestPoint closest = closest_point(site, t, world);
+      const bool is_better = !best.triangle.is_valid() || closest.squared < best.squared ||
+                             (closest.squared == best.squared && closest.triangle < best.triangle);
+      if (is_better && can_meet(site, t, world)) best = closest;
+    }
+  return best;
+}
+
+SelfContactFinder::Touch SelfContactFinder::touch_at(Site site, const ClosestPoint& closest,
+                                                     const world::World& world) {
+  const auto& sites = surface_[closest.triangle];
+  const auto sort = surface_.sort_of(closest.triangle);
+  const float weights[] = {closest.weights.x, closest.weights.y, closest.weights.z};
+  // Corners on a wound's front are as the triangle itself.
+  const Vec3f flat =
+      sort == Sort::Wound ? normalized(up(closest.triangle, world), {0, 1, 0}) : Vec3f{};
+  Vec3f theirs, velocity = world.velocities[site], rest[3];
+  Touch touch;
+  touch.at_rest = world.rest_positions[site];
+  for (std::size_t k = 0; k < 3; ++k) {
+    const auto node = sites[k];
+    const Vec3f& at_corner = normal(node, sort, world);
+    const bool is_flat = sort == Sort::Wound && !(dot(at_corner, flat) > 0);
+    theirs += (is_flat ? flat : at_corner) * weights[k];
+    velocity -= world.velocities[node] * weights[k];
+    rest[k] = world.rest_positions[node];
+    touch.at_rest -= rest[k] * weights[k];
+  }
+  const Vec3f own = normal_towards(site, theirs, world);
+  theirs = normalized(theirs, -own);
+  touch.own = own;
+  touch.facing = dot(own, theirs);
+  touch.normal = normalized(theirs - own, theirs);
+  touch.shift = -kTouch_m;
+  if (length_squared(touch.at_rest) < kOverlapAtRest_m * kOverlapAtRest_m) {
+    const Vec3f up = normalized(cross(rest[1] - rest[0], rest[2] - rest[0]), touch.normal);
+    touch.shift += std::min(0.0f, dot(up, touch.at_rest));
+  }
+  const float along = dot(touch.normal, closest.from);
+  touch.gap = along - touch.shift;
+  touch.aside = std::sqrt(std::max(0.0f, closest.squared - along * along));
+  touch.closing = -dot(touch.normal, velocity);
+  return touch;
+}
+
+namespace {
+float margin_of(float closing) {
+  return std::min(kSelfMargin_m + kSelfTicksAhead * kTickSeconds * std::max(0.0f, closing),
+                  kSelfMaxMargin_m);
+}
+bool lies_along(float aside, float gap) {
+  return aside <= kAsidePerGap * std::abs(gap) + kAside_m;
+}
+}  // namespace
+
+// The other side of a wound, whether or not anything has moved.
+bool SelfContactFinder::can_meet_lip(Site site, Site across, const world::World& world) const {
+  if (!surface_.is_on_lip(site) || !surface_.is_of(across, Sort::Wound)) return false;
+  const float far = surface_.near_m();
+  return !surface_.share_lip_at_rest(site, across) || has_moved(site, far, world) ||
+         has_moved(across, far, world);
+}
+
+bool SelfContactFinder::can_meet_other(Site site, Site across, bool is_moved,
+                                       const world::World& world) {
+  if (!(is_moved || has_moved(across, kMovedSlacks * slack_m_, world) ||
+        surface_.faced_at_rest(site, across)) ||
+      !surface_.is_of_any(site) || !surface_.is_of_any(across))
+    return false;
+  return dot(main_normal(site, world), main_normal(across, world)) <= kStaysFacing &&
+         // Else the list has no such pairs.
+         !((surface_.was_cut(site) || surface_.was_cut(across)) && surface_.is_near(site, across));
+}
+
+// Whether a pair begins with a triangle at this node.
+bool SelfContactFinder::begins(Site site, Site nearest, float squared, bool is_of_lips,
+                               const world::World& world, ClosestPoint& closest, Touch& touch) {
+  closest = closest_point_around(site, std::span(&nearest, 1), is_of_lips, world);
+  if (!closest.triangle.is_valid()) return false;
+  touch = touch_at(site, closest, world);
+  // Nothing here may let in what find() or a list would not have looked at.
+  const float margin = margin_of(touch.closing), reach = corner_reach_m_ + margin;
+  return touch.facing < kBeginsFacing && touch.gap >= 0 && closest.squared < margin * margin &&
+         squared < reach * reach && lies_along(touch.aside, touch.gap) &&
+         dot(closest.from, normalized(up(closest.triangle, world), touch.normal)) >= touch.shift &&
+         dot(closest.from, touch.own) <= -touch.shift;
+}
+
+// Whether a node without a pair meets the surface across from it: first the other side of its
+// wound.
+bool SelfContactFinder::meets(Site site, std::size_t first, std::size_t end,
+                              const world::World& world, ClosestPoint& closest, Touch& touch) {
+  const auto passed = static_cast<float>(travel_ - list_.travel);
+  while (first < end && list_.far_until[first] > passed) ++first;
+  if (first == end) return false;
+  const Vec3f p = position(site, world);
+  const bool is_moved = has_moved(site, kMovedSlacks * slack_m_, world);
+  float least = reach_m_ * reach_m_, least_of_lips = least;
+  Site nearest = kNoSite, nearest_of_lips = kNoSite;
+  for (auto i = first; i < end; ++i) {
+    if (list_.far_until[i] > passed) continue;
+    const auto& pair = list_.pairs[i];
+    const Vec3f way = position(pair.across, world) - p;
+    const float squared = length_squared(way);
+    if (squared > reach_m_ * reach_m_)
+      list_.far_until[i] = passed + 0.5f * (std::sqrt(squared) - reach_m_) - kRounding_m;
+    if (squared < least_of_lips && can_meet_lip(site, pair.across, world) &&
+        dot(normal(site, Sort::Wound, world), normal(pair.across, Sort::Wound, world)) <=
+            kStaysFacing) {
+      least_of_lips = squared;
+      nearest_of_lips = pair.across;
+    }
+    if (squared < least && can_meet_other(site, pair.across, is_moved, world)) {
+      least = squared;
+      nearest = pair.across;
+    }
+  }
+  return (nearest_of_lips != kNoSite &&
+          begins(site, nearest_of_lips, least_of_lips, true, world, closest, touch)) ||
+         (nearest != kNoSite && begins(site, nearest, least, false, world, closest, touch));
+}
+
+// Where to look on from the closest point of a triangle: at its corners. What is nearer than a
+// point on an edge or corner is there: lips that have not moved are corner on corner.
+std::span<const SelfSurface::Site> SelfContactFinder::around(TriangleIndex triangle,
+                                                             const Vec3f& weights,
+                                                             bool is_there_only) {
+  const auto& corners = surface_[triangle];
+  if (!is_there_only) return corners;
+  const float of_corner[] = {weights.x, weights.y, weights.z};
+  corners_.clear();
+  for (std::size_t k = 0; k < 3; ++k)
+    if (of_corner[k] > 0) corners_.push_back(corners[k]);
+  return corners_;
+}
+
+// Where a pair is now; false when it has come apart.
+bool SelfContactFinder::stays(Site site, TriangleIndex triangle, const world::World& world,
+                              ClosestPoint& closest, Touch& touch) {
+  const bool is_of_lips = this->is_of_lips(site, triangle);
+  const bool is_there = !surface_.is_gone(triangle) && can_meet(site, triangle, world);
+  if (!is_there && !surface_.is_gone(triangle) && !is_of_lips) return false;
+  if (is_there) closest = closest_point(site, triangle, world);
+  const Vec3f& w = closest.weights;
+  if (!is_there || !(w.x > 0 && w.y > 0 && w.z > 0))
+    closest =
+        closest_point_around(site, around(triangle, w, is_there && is_of_lips), is_of_lips, world);
+  if (!closest.triangle.is_valid()) return false;
+  touch = touch_at(site, closest, world);
+  // A little farther than where it began, so that it does not flutter.
+  return touch.facing < kStaysFacing &&
+         touch.gap < margin_of(touch.closing) + 0.5f * kSelfMargin_m && touch.gap > -kDeepest_m &&
+         lies_along(touch.aside, touch.gap);
+}
+
+// What it was when it was last looked at holds.
+bool SelfContactFinder::lies_still(Site site, TriangleIndex triangle,
+                                   const world::World& world) const {
+  if ((world.tick + site) % kLookEvery == 0 || surface_.is_gone(triangle)) return false;
+  const auto is_still = [&](Site s) {
+    return length_squared(world.velocities[s]) < kStill_m_s * kStill_m_s;
+  };
+  const auto& [a, b, c] = surface_[triangle];
+  return is_still(site) && is_still(a) && is_still(b) && is_still(c);
+}
+
+void SelfContactFinder::add_point(Site site, TriangleIndex triangle, const Place& place,
+                                  const world::World& world, SelfContactTable& pairs,
+                                  ContactList& out) const {
+  if (pairs.nodes().size() >= kMaxSelfPoints) {
+    ++out.dropped;
+    return;
+  }
+  const auto& [a, b, c] = surface_[triangle];
+  const auto& w = place.weights;
+  const auto between = [&](const auto& at) {
+    return at(site) - (at(a) * w.x + at(b) * w.y + at(c) * w.z);
+  };
+  const Vec3f from = between([&](Site s) { return position(s, world); });
+  const Vec3f at_rest = between([&](Site s) -> const Vec3f& { return world.rest_positions[s]; });
+  const NodeIndex node(site);
+  pairs.add(node, triangle, place);
+  ContactPoint point{
+      .nodes = {node, NodeIndex(a), NodeIndex(b), NodeIndex(c)},
+      .weights = {1, -w.x, -w.y, -w.z},
+      .node_count = 4,
+      .id = static_cast<std::uint32_t>(pairs.nodes().size() - 1),
+      .stiffness = 0.5f * kSelfStiffnessPaPerM * world.surface_areas[node.value],
+      .limit_n = kNoLimit_n,
+      .normal = place.normal,
+      .plane = place.normal * place.shift - at_rest,
+  };
+  out.points.push_back(point);
+  if (dot(place.normal, from) > place.shift) return;
+  out.self_seeds.insert(out.self_seeds.end(), point.nodes.begin(), point.nodes.end());
+}
+
+void SelfContactFinder::find(const world::World& world, SelfContactTable& pairs, ContactList& out) {
+  keep_list(world);
+  pairs_looked_at_ = 0;
+  const auto& runs = list_.runs;
+  // No two are nearer to each other than their references by more than that.
+  const float moved =
+      2 * (kReferenceSlacks * slack_m_ + static_cast<float>(travel_ - list_.travel));
+  // What the fastest pair could reach.
+  const float reach = corner_reach_m_ + margin_of(2 * last_move_m_ / kTickSeconds);
+  const bool is_far = runs.empty() || list_.least_distance - moved > reach;
+  if (is_far && pairs.nodes().empty()) return;
+  if (++tick_current_ == 0) {
+    std::ranges::fill(normal_stamp_, 0u);
+    std::ranges::fill(up_stamp_, 0u);
+    tick_current_ = 1;
+  }
+  std::swap(old_pairs_, pairs);
+  pairs.clear();
+  // Nodes with a pair and nodes with something listed, together ascending.
+  const auto nodes = old_pairs_.nodes();
+  std::size_t old = 0, run = 0;
+  while (old < nodes.size() || run < runs.size()) {
+    const Site of_old = old < nodes.size() ? nodes[old].value : kNoSite;
+    const Site of_run = run < runs.size() ? runs[run].node : kNoSite;
+    const Site site = std::min(of_old, of_run);
+    const bool is_old = site == of_old, is_listed = site == of_run;
+    const auto i = is_old ? old++ : old;
+    const auto r = is_listed ? run++ : run;
+    if (is_old && lies_still(site, old_pairs_.triangles()[i], world)) {
+      add_point(site, old_pairs_.triangles()[i], old_pairs_.places()[i], world, pairs, out);
+      continue;
+    }
+    ClosestPoint closest;
+    Touch touch;
+    if ((is_old && stays(site, old_pairs_.triangles()[i], world, closest, touch)) ||
+        (is_listed && meets(site, runs[r].first, end_of_run(r), world, closest, touch))) {
+      ++pairs_looked_at_;
+      add_point(site, closest.triangle, {closest.weights, touch.normal, touch.shift}, world, pairs,
+                out);
+    }
+  }
+  std::ranges::sort(out.self_seeds);
+  out.self_seeds.erase(std::unique(out.self_seeds.begin(), out.self_seeds.end()),
+                       out.self_seeds.end());
+}
+
+}  // namespace trocar::contact

@@ -1,0 +1,253 @@
+#pragma once
+
+// Tissue against tissue of one organ: the walls of a hollow one, a fold, a flap laid on its base.
+//
+// A node of the surface does not pass through a triangle across from it. What holds them apart is a
+// Push (contact_list.h) of the node against the closest point of a triangle: displacement of the
+// node less that of the point, so that the force on one is minus that on the other, along a
+// normal that is the mean of both sides' and changes smoothly over edges. It starts at touch, has
+// no friction (wet serosa slips) and no limit. Nodes of both sides meet the other's triangles, each
+// for half of its surface.
+//
+// A node meets a triangle from outside only: in front of it, facing it, within the margin of the
+// tick's motion. That node and triangle then stay a pair while the node is near, however deep it is
+// pressed and wherever it slides, so that nothing flips: pairs are state. What is near a node in
+// the tissue (self_surface.h) never meets it: its neighbourhood, and the other face of a thin wall.
+// What touches or overlaps at rest may stay as it is.
+//
+// Cuts: the two sides of a wound are face to face from the start, and pairs like any others, which
+// press once they overlap: cutting adds no force and no energy. Wounds and skin are surfaces of
+// their own: a node at the rim has a normal of each, and a node on a wound meets the other side of
+// wounds first. A pair whose triangle an edit has replaced goes on with what is there now.
+//
+// A pair that hardly moves stays where it lies for up to kLookEvery ticks: a node slower than
+// kStill_m_s gets less than a micrometre away from there. Where it lies is state, too.
+//
+// Work: pairs of nodes that can come near are listed with slack, and again for those nodes that
+// have moved a part of it: O(surface nodes + these x their surroundings), over several ticks. Every
+// tick: O(pairs of nodes listed), nothing where nothing is near.
+// An edit adds the pairs around it to the list, and to the one that is being made: O(what is within
+// reach of it), and a look at each surface node's place.
+// Pairs are a function of the state: results do not depend on when lists were made.
+
+#include <span>
+#include <vector>
+
+#include "server/tissue/contact/contact_list.h"
+#include "server/tissue/contact/point_grid.h"
+#include "server/tissue/contact/self_surface.h"
+#include "server/tissue/world/state_archive.h"
+
+namespace trocar::contact {
+
+// Pa/m, of both sides together: twice a tool's (contact_finder.h), for there is no hand that could
+// back off. 10 kPa press walls 0.2 mm into each other.
+inline constexpr float kSelfStiffnessPaPerM = 5e7f;
+// Pairs are made when this near, or so many ticks before they touch at their present speed, but
+// never from farther than kSelfMaxMargin_m: enough for 1.3 m/s.
+inline constexpr float kSelfMargin_m = 0.001f, kSelfMaxMargin_m = 0.003f;
+inline constexpr float kSelfTicksAhead = 1.5f;
+inline constexpr float kStill_m_s = 1e-4f;
+inline constexpr Tick kLookEvery = 8;
+
+// Where on its triangle a node lies, when that was last looked at.
+struct SelfContactPlace {
+  Vec3f weights;    // of the corners
+  Vec3f normal;     // from the triangle to the node
+  float shift = 0;  // m, the gap from which on it presses
+};
+
+}  // namespace trocar::contact
+
+template <>
+struct trocar::world::IsPaddingFree<trocar::contact::SelfContactPlace> : std::true_type {};
+
+namespace trocar::contact {
+
+// The pairs: state.
+class SelfContactTable {
+ public:
+  SelfContactTable();
+
+  std::span<const NodeIndex> nodes() const { return nodes_; }  // ascending, each once
+  std::span<const TriangleIndex> triangles() const { return triangles_; }
+
+  std::span<const SelfContactPlace> places() const { return places_; }
+
+  void clear() { nodes_.clear(), triangles_.clear(), places_.clear(); }
+  void add(NodeIndex node, TriangleIndex triangle, const SelfContactPlace& place) {
+    nodes_.push_back(node);
+    triangles_.push_back(triangle);
+    places_.push_back(place);
+  }
+
+  // Takes no bytes without pairs. Last in a state. surface_nodes: ascending; triangle_count:
+  // numbers given so far.
+  void visit_state(world::StateArchive& archive, std::span<const NodeIndex> surface_nodes,
+                   std::size_t triangle_count);
+
+ private:
+  std::vector<NodeIndex> nodes_;
+  std::vector<TriangleIndex> triangles_;
+  std::vector<SelfContactPlace> places_;
+};
+
+class SelfContactFinder {
+ public:
+  explicit SelfContactFinder(const organ::Organ& organ);
+
+  // After ContactFinder::find(): brings the pairs up to date and adds their points to `out`.
+  void find(const world::World& world, SelfContactTable& pairs, ContactList& out);
+
+  // No node has moved by more than this since the last call.
+  void surface_moved(float at_most_m) {
+    travel_ += static_cast<double>(at_most_m);
+    last_move_m_ = at_most_m;
+  }
+
+  // The world has its new nodes.
+  void follow(const world::SurfaceEdit& edit, const world::World& world);
+
+  // Lists made, and pairs of nodes in the last one.
+  std::uint64_t lists_made() const { return lists_made_; }
+  std::size_t pairs_listed() const { return list_.pairs.size(); }
+  // Pairs of the last find() that were looked at anew.
+  std::size_t pairs_looked_at() const { return pairs_looked_at_; }
+
+ private:
+  using Site = SelfSurface::Site;
+  using Sort = SelfSurface::Sort;
+  using Place = SelfContactPlace;
+  // Nodes this far from rest, in slacks, are listed; a pair needs one that is farther than
+  // kListedSlacks + 1/2, unless it faced something this near at rest.
+  static constexpr float kReferenceSlacks = 0.25f;
+  static constexpr float kListedSlacks = 0.5f, kMovedSlacks = kListedSlacks + 0.5f;
+
+  struct NodePair {
+    Site node = 0, across = 0;
+    auto operator<=>(const NodePair&) const = default;
+  };
+  // Pairs of one node, up to where the next run begins.
+  struct Run {
+    Site node = 0;
+    std::uint32_t first = 0;
+  };
+  struct ClosestPoint {
+    TriangleIndex triangle;
+    Vec3f weights;
+    Vec3f from;  // m, from the point to the node
+    float squared = 0;
+  };
+  struct Touch {
+    Vec3f normal, own;              // from the triangle's side to the node's; the node's
+    Vec3f at_rest;                  // m, from the point to the node
+    float shift = 0;                // m, the gap from which on it presses
+    float gap = 0;                  // m, beyond that
+    float aside = 0;                // m, across the normal
+    float facing = 0, closing = 0;  // cosine of both normals; m/s
+  };
+
+  // What is listed, when it began to be, and where from. Per node: a reference, see begin_list(),
+  // and whether that is not where the node was at rest.
+  struct List {
+    std::vector<NodePair> pairs;   // ascending
+    std::vector<Run> runs;         // of pairs, per node that has some; ascending
+    std::vector<float> far_until;  // per pair: beyond reach_m_ before so much more travel, m
+    double travel = 0;
+    float least_distance = 1;  // m, of a pair, when it began
+    std::vector<Vec3f> references;
+    std::vector<std::uint8_t> has_left;
+  };
+
+  void keep_list(const world::World& world);
+  void begin_list();
+  void go_on_listing(double share, const world::World& world);
+  void take_references(std::size_t end, const world::World& world);
+  void keep_pairs();
+  void order_due();
+  void end_list();
+  void list_around(Site site);
+  void extend();
+  void take_reference(Site site, const world::World& world, List& list) const;
+  void list_edit(List& list);
+  static void add_to_list(std::vector<NodePair>& found, List& list);
+  bool looks_around(Site site, const List& list) const;
+  bool may_meet(Site site, Site other, const List& list) const;
+  bool has_moved(Site site, float by_m, const world::World& world) const {
+    return length_squared(world.displacements[site]) > by_m * by_m;
+  }
+  // When its surroundings were last looked through.
+  bool was_moved(Site site, float by_m, const List& list) const {
+    return length_squared(list.references[site] - surface_.rest_position(site)) > by_m * by_m;
+  }
+  static Vec3f position(Site site, const world::World& world) {
+    return world.position(NodeIndex(site));
+  }
+  const Vec3f& normal(Site site, Sort sort, const world::World& world);
+  const Vec3f& main_normal(Site site, const world::World& world) {
+    return normal(site, surface_.is_of(site, Sort::Skin) ? Sort::Skin : Sort::Wound, world);
+  }
+  Vec3f normal_towards(Site site, const Vec3f& theirs, const world::World& world);
+  const Vec3f& up(TriangleIndex triangle, const world::World& world);
+  // The wound of the triangle is one that the node is on a lip of.
+  bool is_of_lips(Site site, TriangleIndex triangle) const {
+    return surface_.sort_of(triangle) == Sort::Wound && surface_.is_on_lip(site);
+  }
+  bool can_meet(Site site, TriangleIndex triangle, const world::World& world);
+  ClosestPoint closest_point(Site site, TriangleIndex triangle, const world::World& world) const;
+  std::span<const Site> around(TriangleIndex triangle, const Vec3f& weights, bool is_there_only);
+  ClosestPoint closest_point_around(Site site, std::span<const Site> around, bool is_of_lips,
+                                    const world::World& world);
+  Touch touch_at(Site site, const ClosestPoint& closest, const world::World& world);
+  bool can_meet_lip(Site site, Site across, const world::World& world) const;
+  bool can_meet_other(Site site, Site across, bool is_moved, const world::World& world);
+  bool begins(Site site, Site nearest, float squared, bool is_of_lips, const world::World& world,
+              ClosestPoint& closest, Touch& touch);
+  std::size_t end_of_run(std::size_t run) const {
+    return run + 1 < list_.runs.size() ? list_.runs[run + 1].first : list_.pairs.size();
+  }
+  // Of list_.pairs.
+  bool meets(Site site, std::size_t first, std::size_t end, const world::World& world,
+             ClosestPoint& closest, Touch& touch);
+  bool stays(Site site, TriangleIndex triangle, const world::World& world, ClosestPoint& closest,
+             Touch& touch);
+  bool lies_still(Site site, TriangleIndex triangle, const world::World& world) const;
+  void add_point(Site site, TriangleIndex triangle, const Place& place, const world::World& world,
+                 SelfContactTable& pairs, ContactList& out) const;
+
+  SelfSurface surface_;
+  std::vector<std::uint8_t> is_close_at_rest_;  // per node: something may face it there
+  float slack_m_ = 0, corner_reach_m_ = 0;      // see begin_list()
+  float reach_m_ = 0;                           // with the greatest margin
+
+  bool has_list_ = false;
+  double travel_ = 0;
+  float last_move_m_ = 1;  // of any node, in the last tick
+  std::uint64_t lists_made_ = 0;
+  std::size_t pairs_looked_at_ = 0;
+  List list_;
+  // The next one, made over several ticks: first references, then the surroundings of due nodes.
+  bool is_listing_ = false;
+  List next_list_;                    // with the pairs that are kept
+  std::vector<NodePair> next_found_;  // and these, to be added
+  std::size_t sites_seen_ = 0;        // whose references are taken
+  std::size_t due_count_ = 0;         // of these
+  std::vector<std::uint8_t> is_due_;  // per node
+  std::vector<Site> due_;             // in the order in which they look around
+  std::size_t sites_listed_ = 0;      // of due_
+  PointGrid grid_;                    // of references
+  std::vector<Site> grid_sites_;      // what it numbers
+
+  // Scratch.
+  std::vector<std::uint32_t> near_stamp_;  // per node
+  std::uint32_t near_current_ = 0;
+  // Of this tick, where the stamp is current: per node and sort, and per triangle.
+  std::vector<Vec3f> normals_, ups_;
+  std::vector<std::uint32_t> normal_stamp_, up_stamp_;
+  std::uint32_t tick_current_ = 0;
+  SelfContactTable old_pairs_;
+  std::vector<NodePair> found_;  // of an edit
+  std::vector<Site> around_, looking_, corners_;
+};
+
+}  // namespace trocar::contact

@@ -1,0 +1,310 @@
+// Which pairs of nodes can come near.
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "common/math/box.h"
+#include "server/tissue/contact/self_contact.h"
+
+namespace trocar::contact {
+namespace {
+
+// Of a list, per tick, at least.
+constexpr std::size_t kReferencesPerTick = 512, kSitesPerTick = 32;
+// Of the work on a list, the part that taking references is.
+constexpr double kReferencesShare = 0.3;
+constexpr std::size_t kReservedPairs = 1u << 15;
+// How far the surface may move between lists, in mean edges; in metres at most kMaxSlack_m.
+constexpr float kSlackEdges = 1, kMaxSlack_m = 0.006f;
+// The nearest corner of a triangle, from any point on it, in longest edges.
+constexpr float kCornerReach = 0.6f;
+
+}  // namespace
+
+SelfContactFinder::SelfContactFinder(const organ::Organ& organ) : surface_(organ), grid_(1, 1) {
+  slack_m_ = std::clamp(kSlackEdges * surface_.mean_edge_m(), 1e-4f, kMaxSlack_m);
+  // An edge far longer than the mean one is a flaw of the mesh.
+  corner_reach_m_ = kCornerReach * std::min(surface_.longest_edge_m(), 3 * surface_.mean_edge_m());
+  reach_m_ = kSelfMaxMargin_m + corner_reach_m_;
+  const auto sites = surface_.sites();
+  due_.reserve(sites.size());
+  grid_sites_.reserve(sites.size());
+  for (auto* list : {&list_, &next_list_}) {
+    list->pairs.reserve(kReservedPairs);
+    list->far_until.reserve(kReservedPairs);
+    list->runs.reserve(sites.size());
+  }
+  found_.reserve(kReservedPairs);
+  next_found_.reserve(kReservedPairs);
+  extend();
+  // Two nodes that have both moved by kMovedSlacks come this much nearer.
+  const float range = reach_m_ + 2 * kMovedSlacks * slack_m_;
+  grid_ = PointGrid(range, sites.size());
+  grid_.build(sites.size(), [&](std::size_t i) { return surface_.rest_position(sites[i]); });
+  for (const Site s : sites)
+    grid_.visit(surface_.rest_position(s), range, [&](std::uint32_t place, float) {
+      if (surface_.faced_at_rest(s, sites[place]) && !surface_.is_near(s, sites[place]))
+        is_close_at_rest_[s] = 1;
+    });
+  grid_ = PointGrid(reach_m_ + slack_m_, sites.size());
+}
+
+// For all nodes that there are.
+void SelfContactFinder::extend() {
+  const auto count = surface_.node_count();
+  is_close_at_rest_.resize(count);
+  for (auto* list : {&list_, &next_list_}) {
+    list->references.resize(count);
+    list->has_left.resize(count);
+  }
+  is_due_.resize(count);
+  near_stamp_.resize(count);
+  normals_.resize(2 * count);
+  normal_stamp_.resize(2 * count);
+  ups_.resize(surface_.triangle_count());
+  up_stamp_.resize(surface_.triangle_count());
+}
+
+void SelfContactFinder::take_reference(Site site, const world::World& world, List& list) const {
+  list.references[site] = position(site, world);
+  list.has_left[site] = has_moved(site, kListedSlacks * slack_m_, world) ? 1 : 0;
+}
+
+// What the edit has changed looks around, in the list that there is and in the one to come: what
+// that has kept or found is found there once more.
+void SelfContactFinder::follow(const world::SurfaceEdit& edit, const world::World& world) {
+  const auto before = surface_.sites();
+  const bool has_references = is_listing_ && sites_seen_ == before.size();
+  // The first site whose reference the next list lacks.
+  const Site unseen = !has_references && is_listing_ ? before[sites_seen_] : Site{0};
+  surface_.follow(edit, world);
+  extend();
+  for (const auto node : edit.touched) is_close_at_rest_[node.value] = 1;
+  for (const auto node : edit.surfaced) {
+    const Site s = node.value;
+    take_reference(s, world, list_);
+    is_due_[s] = 0;
+    if (has_references || s < unseen) take_reference(s, world, next_list_);
+  }
+  if (has_list_) list_edit(list_), add_to_list(found_, list_);
+  if (!is_listing_) return;
+  const auto sites = surface_.sites();
+  if (!has_references) {
+    sites_seen_ = static_cast<std::size_t>(std::ranges::lower_bound(sites, unseen) - sites.begin());
+    return;
+  }
+  sites_seen_ = sites.size();
+  list_edit(next_list_);
+  next_found_.insert(next_found_.end(), found_.begin(), found_.end());
+}
+
+// Whether it may meet what does not look around itself.
+bool SelfContactFinder::looks_around(Site site, const List& list) const {
+  return list.has_left[site] == 1 || is_close_at_rest_[site] == 1 ||
+         surface_.is_of(site, Sort::Wound);
+}
+
+// The pairs that nodes of the last edit are in and that the list lacks, into found_. A list has
+// each pair from both sides or not at all.
+void SelfContactFinder::list_edit(List& list) {
+  const float range = reach_m_ + slack_m_;
+  const auto& references = list.references;
+  trocar::Box<float> box;
+  for (const Site s : surface_.followed()) box.include(references[s]);
+  box.grow(range);
+  around_.clear();
+  looking_.clear();
+  for (const Site s : surface_.sites()) {
+    if (!box.contains(references[s])) continue;
+    around_.push_back(s);
+    if (looks_around(s, list)) looking_.push_back(s);
+  }
+  found_.clear();
+  float least_squared = list.least_distance * list.least_distance;
+  for (const Site s : surface_.followed()) {
+    auto known = std::ranges::lower_bound(list.pairs, NodePair{s, 0});
+    for (const Site other : looks_around(s, list) ? around_ : looking_) {
+      const float squared = length_squared(references[s] - references[other]);
+      if (squared > range * range || other == s) continue;
+      while (known != list.pairs.end() && *known < NodePair{s, other}) ++known;
+      const bool is_known = known != list.pairs.end() && *known == NodePair{s, other};
+      if (is_known || !may_meet(s, other, list)) continue;
+      found_.push_back({s, other});
+      found_.push_back({other, s});
+      least_squared = std::min(least_squared, squared);
+    }
+  }
+  list.least_distance = std::min(list.least_distance, std::sqrt(least_squared));
+}
+
+// What was found and the list lacks; found from both sides, some of it twice.
+void SelfContactFinder::add_to_list(std::vector<NodePair>& found, List& list) {
+  std::ranges::sort(found);
+  found.erase(std::unique(found.begin(), found.end()), found.end());
+  auto& pairs = list.pairs;
+  // From behind, each to its place.
+  auto old = pairs.size(), fresh = found.size();
+  pairs.resize(old + fresh);
+  list.far_until.resize(old + fresh);
+  while (fresh > 0) {
+    const auto place = old + fresh - 1;
+    const bool is_old = old > 0 && found[fresh - 1] < pairs[old - 1];
+    pairs[place] = is_old ? pairs[old - 1] : found[fresh - 1];
+    list.far_until[place] = is_old ? list.far_until[old - 1] : 0;
+    --(is_old ? old : fresh);
+  }
+  list.runs.clear();
+  for (std::uint32_t i = 0; i < pairs.size(); ++i)
+    if (i == 0 || pairs[i].node != pairs[i - 1].node) list.runs.push_back({pairs[i].node, i});
+}
+
+// The list has all pairs of nodes whose references are within reach_m_ + slack_m_ and that may
+// meet: if they faced each other at rest or one of the references at least is kListedSlacks from
+// rest, and they are not near each other as the uncut organ is; or, of wounds, if they are not
+// beside each other on one lip, or one of the references is as far from rest as what is beside. A
+// reference is where the node was when its surroundings were last looked through; it is never
+// farther than slack_m_ / 2 from where the node is now. So each pair that is within reach_m_ is on
+// the list, and only what moves is looked through again.
+void SelfContactFinder::begin_list() {
+  is_listing_ = true;
+  next_list_.travel = travel_;
+  next_list_.least_distance = 1;
+  next_list_.pairs.clear();
+  next_list_.far_until.clear();
+  next_found_.clear();
+  sites_seen_ = sites_listed_ = due_count_ = 0;
+}
+
+void SelfContactFinder::take_references(std::size_t end, const world::World& world) {
+  const float far = kReferenceSlacks * slack_m_;
+  for (; sites_seen_ < end; ++sites_seen_) {
+    const Site s = surface_.sites()[sites_seen_];
+    const Vec3f& old = list_.references[s];
+    is_due_[s] = !has_list_ || length_squared(position(s, world) - old) > far * far ? 1 : 0;
+    if (is_due_[s] == 0) {
+      next_list_.references[s] = old;
+      next_list_.has_left[s] = list_.has_left[s];
+      continue;
+    }
+    take_reference(s, world, next_list_);
+    ++due_count_;
+  }
+}
+
+// Neighbours after one another, which look through the same cells.
+void SelfContactFinder::order_due() {
+  due_.clear();
+  if (due_count_ == 0) return;
+  grid_sites_.assign(surface_.sites().begin(), surface_.sites().end());
+  grid_.build(grid_sites_.size(),
+              [&](std::size_t i) { return next_list_.references[grid_sites_[i]]; });
+  for (const auto i : grid_.entries()) {
+    const Site s = grid_sites_[i];
+    // At first, whoever stays where nothing faces it has nothing to look for.
+    if (is_due_[s] == 1 && (has_list_ || next_list_.has_left[s] == 1 || is_close_at_rest_[s] == 1))
+      due_.push_back(s);
+  }
+}
+
+// Of the list that there is, what has not moved.
+void SelfContactFinder::keep_pairs() {
+  const auto& references = next_list_.references;
+  float least_squared = next_list_.least_distance * next_list_.least_distance;
+  for (const auto& pair : list_.pairs) {
+    if (is_due_[pair.node] == 1 || is_due_[pair.across] == 1) continue;
+    next_list_.pairs.push_back(pair);
+    next_list_.far_until.push_back(0);
+    least_squared =
+        std::min(least_squared, length_squared(references[pair.node] - references[pair.across]));
+  }
+  next_list_.least_distance = std::min(next_list_.least_distance, std::sqrt(least_squared));
+}
+
+void SelfContactFinder::end_list() {
+  add_to_list(next_found_, next_list_);
+  std::swap(list_, next_list_);
+  is_listing_ = false;
+  has_list_ = true;
+  ++lists_made_;
+}
+
+// share: how much of the work shall be done by now. All of it is done at once; else each tick does
+// a little of one kind.
+void SelfContactFinder::go_on_listing(double share, const world::World& world) {
+  const auto part = [](double of_it, std::size_t all) {
+    return static_cast<std::size_t>(std::clamp(of_it, 0.0, 1.0) * static_cast<double>(all));
+  };
+  if (sites_seen_ < surface_.sites().size()) {
+    const auto end = std::max(part(share / kReferencesShare, surface_.sites().size()),
+                              sites_seen_ + kReferencesPerTick);
+    take_references(std::min(end, surface_.sites().size()), world);
+    if (sites_seen_ < surface_.sites().size()) return;
+    keep_pairs();
+    order_due();
+    if (share < 1) return;
+  }
+  const auto end = std::max(part((share - kReferencesShare) / (1 - kReferencesShare), due_.size()),
+                            sites_listed_ + kSitesPerTick);
+  for (; sites_listed_ < std::min(end, due_.size()); ++sites_listed_)
+    list_around(due_[sites_listed_]);
+  if (sites_listed_ == due_.size()) end_list();
+}
+
+bool SelfContactFinder::may_meet(Site site, Site other, const List& list) const {
+  if (surface_.is_of(site, Sort::Wound) && surface_.is_of(other, Sort::Wound)) {
+    const float far = surface_.near_m() - 0.5f * slack_m_;
+    if (!surface_.share_lip_at_rest(site, other) || was_moved(site, far, list) ||
+        was_moved(other, far, list))
+      return true;
+  }
+  return list.has_left[site] == 1 || list.has_left[other] == 1 ||
+         ((is_close_at_rest_[site] == 1 || is_close_at_rest_[other] == 1) &&
+          surface_.faced_at_rest(site, other));
+}
+
+void SelfContactFinder::list_around(Site site) {
+  const auto stamp_near_sites = [&] {
+    if (++near_current_ == 0) {
+      std::ranges::fill(near_stamp_, 0u);
+      near_current_ = 1;
+    }
+    for (const auto s : surface_.near(site)) near_stamp_[s] = near_current_;
+  };
+  bool is_stamped = false;
+  const bool was_cut = surface_.was_cut(site);
+  float least_squared = next_list_.least_distance * next_list_.least_distance;
+  grid_.visit(next_list_.references[site], reach_m_ + slack_m_,
+              [&](std::uint32_t place, float squared) {
+                const Site other = grid_sites_[place];
+                if (other == site || !may_meet(site, other, next_list_)) return;
+                if (!was_cut && !surface_.was_cut(other)) {
+                  if (!std::exchange(is_stamped, true)) stamp_near_sites();
+                  if (near_stamp_[other] == near_current_) return;
+                }
+                next_found_.push_back({site, other});
+                next_found_.push_back({other, site});
+                least_squared = std::min(least_squared, squared);
+              });
+  next_list_.least_distance = std::min(next_list_.least_distance, std::sqrt(least_squared));
+}
+
+// Made anew when the surface has moved by an eighth of the slack since it was last begun, and done
+// before that is a quarter: a node that was not due then, up to a quarter from its reference, is
+// not beyond half.
+void SelfContactFinder::keep_list(const world::World& world) {
+  const auto used = [this] {
+    return (travel_ - list_.travel) / static_cast<double>(kReferenceSlacks * slack_m_);
+  };
+  if (!is_listing_ && has_list_ && used() <= 0.5) return;
+  if (!is_listing_) begin_list();
+  go_on_listing(has_list_ ? 3 * (used() - 0.5) : 1, world);
+  if (used() <= 1) return;
+  if (is_listing_) go_on_listing(1, world);
+  if (used() <= 1) return;
+  // It moved farther than that since it began.
+  begin_list();
+  go_on_listing(1, world);
+}
+
+}  // namespace trocar::contact

@@ -1,0 +1,196 @@
+#include "server/tissue/cutting/cutter.h"
+
+#include <algorithm>
+#include <numeric>
+
+namespace trocar::cutting {
+
+Cutter::Cutter(dynamics::Topology& topology, const Settings& settings)
+    : strokes_(kMaxStrokes), mesh_(topology, settings, strokes_) {
+  stroke_of_.fill(kNone);
+}
+
+Stroke* Cutter::begin_stroke(std::uint32_t blade) {
+  for (std::uint32_t s = 0; s < strokes_.size(); ++s) {
+    if (strokes_[s].is_active) continue;
+    auto& stroke = strokes_[s];
+    stroke.is_active = true;
+    stroke.id = next_id_++;
+    stroke.h = mesh_.mean_h();
+    stroke_of_[blade] = s;
+    return &stroke;
+  }
+  return nullptr;
+}
+
+bool Cutter::move(std::uint32_t blade, std::span<const Vec3d> edge) {
+  if (blade >= kMaxBlades || !is_blade(edge)) return false;
+  if (stroke_of_[blade] != kNone) {
+    auto& stroke = strokes_[stroke_of_[blade]];
+    if (stroke.motion.move(edge, stroke.h, mesh_.settings()) == BladeMotion::Verdict::Accepted)
+      return true;
+    lift(blade);
+  }
+  auto* const stroke = begin_stroke(blade);
+  if (stroke == nullptr) return false;
+  return stroke->motion.move(edge, stroke->h, mesh_.settings()) == BladeMotion::Verdict::Accepted;
+}
+
+void Cutter::lift(std::uint32_t blade) {
+  if (blade >= kMaxBlades || stroke_of_[blade] == kNone) return;
+  auto& stroke = strokes_[stroke_of_[blade]];
+  stroke.motion.finish(stroke.h, mesh_.settings());
+  stroke.has_ended = true;
+  stroke_of_[blade] = kNone;
+}
+
+bool Cutter::is_idle() const {
+  return torn_.empty() && std::ranges::none_of(strokes_, [](const Stroke& stroke) {
+           return stroke.is_active && (stroke.has_ended || stroke.motion.has_strip());
+         });
+}
+
+double Cutter::behind_m(std::uint32_t blade) const {
+  if (blade >= kMaxBlades || stroke_of_[blade] == kNone) return 0;
+  return strokes_[stroke_of_[blade]].motion.behind();
+}
+
+Status Cutter::repeat(const CutEvents& events, std::vector<NewNode>& made) {
+  if (std::ranges::any_of(strokes_, &Stroke::is_active))
+    return Error{ErrorCode::Refused, "cut events cannot be repeated while a blade cuts"};
+  return mesh_.repeat(events, made);
+}
+
+void Cutter::clear_strokes() {
+  for (auto& stroke : strokes_) stroke.clear();
+  stroke_of_.fill(kNone);
+  next_id_ = 0;
+}
+
+// Strokes in their order, each with its blade, or kMaxBlades for one that has ended. Their places
+// and numbers change nothing.
+void Cutter::visit_state(world::StateArchive& archive) {
+  order_.clear();
+  for (std::uint32_t s = 0; s < strokes_.size(); ++s)
+    if (strokes_[s].is_active) order_.push_back(s);
+  order_strokes();
+  auto count = static_cast<std::uint8_t>(order_.size());
+  archive.value(count);
+  if (archive.is_reading()) {
+    clear_strokes();
+    mesh_.forget_places();
+    if (count > kMaxStrokes) archive.fail();
+    order_.resize(archive.ok() ? count : 0);
+    std::iota(order_.begin(), order_.end(), 0u);
+  }
+  for (const auto s : order_) visit_stroke(archive, s);
+  if (!archive.ok()) clear_strokes();
+}
+
+void Cutter::visit_stroke(world::StateArchive& archive, std::uint32_t place) {
+  auto& stroke = strokes_[place];
+  const auto at = std::ranges::find(stroke_of_, place);
+  auto blade = static_cast<std::uint8_t>(at - stroke_of_.begin());
+  archive.value(blade);
+  if (archive.is_reading()) {
+    if (blade > kMaxBlades || (blade < kMaxBlades && stroke_of_[blade] != kNone)) archive.fail();
+    if (!archive.ok()) return;
+    stroke.id = next_id_++;
+    stroke.is_active = true;
+    stroke.has_ended = blade == kMaxBlades;
+    if (!stroke.has_ended) stroke_of_[blade] = place;
+  }
+  stroke.visit_state(archive, mesh_.topology());
+}
+
+void Cutter::order_strokes() {
+  std::sort(order_.begin(), order_.end(),
+            [&](auto a, auto b) { return strokes_[a].id < strokes_[b].id; });
+}
+
+void Cutter::cut(std::span<const Vec3f> displacements, CutOutput& out, double travel_m) {
+  out.clear();
+  if (is_idle()) return;
+  mesh_.begin(displacements, travel_m, out);
+  if (!torn_.empty()) {
+    opening_.open(mesh_, torn_);
+    torn_.clear();
+    out.torn_area_m2 = out.opened_area_m2;
+    out.work_j = 0;
+  }
+  order_.clear();
+  for (std::uint32_t s = 0; s < strokes_.size(); ++s)
+    if (strokes_[s].is_active && (strokes_[s].has_ended || strokes_[s].motion.has_strip()))
+      order_.push_back(s);
+  order_strokes();
+  const auto strokes = std::max(1u, static_cast<std::uint32_t>(order_.size()));
+  const auto share = std::max(1u, mesh_.settings().edits_per_call / strokes);
+  for (const auto s : order_) {
+    auto budget = share;
+    const bool is_done = work(strokes_[s], budget);
+    // What comes at the end of a stroke is done in calls of its own.
+    if (!is_done || (strokes_[s].has_ended && (budget < share || !end(strokes_[s]))))
+      out.is_behind = true;
+  }
+  mesh_.end();
+}
+
+double Cutter::friction_along(std::span<const Vec3f> displacements, double travel_m,
+                              const Vec3d& from, const Vec3d& to) {
+  mesh_.begin(displacements, travel_m, unchanged_);
+  const double friction = friction_.along(mesh_, from, to);
+  mesh_.end();
+  return friction;
+}
+
+// Returns whether nothing is left.
+bool Cutter::work(Stroke& stroke, std::uint32_t& budget) {
+  while (stroke.motion.has_strip()) {
+    if (budget == 0) return false;
+    const bool is_robust = mesh_.settings().method == Method::Robust;
+    const double extension = is_robust ? mesh_.settings().extension_h * stroke.h : 0;
+    auto sides = stroke.side_normals;
+    make_patch(stroke.motion.strip(), extension, sides, stroke.patch);
+    const bool is_finished = is_robust ? splitter_.run(mesh_, stroke, stroke.patch, budget)
+                                       : nakao_splitter_.run(mesh_, stroke, stroke.patch, budget);
+    opening_.run(mesh_, stroke);
+    if (!is_finished) return false;
+    stroke.side_normals = sides;
+    stroke.way += longest_motion(stroke.motion.strip().from, stroke.motion.strip().to);
+    stroke.motion.pop();
+    if (stroke.way > mesh_.settings().repair_h * stroke.h) {
+      stroke.way = 0;
+      if (!stroke.waiting.empty()) repair_.run_behind(mesh_, stroke, opening_);
+    }
+    forget(stroke);
+  }
+  return true;
+}
+
+// Returns whether the stroke is over.
+bool Cutter::end(Stroke& stroke) {
+  if (!repair_.finish(mesh_, stroke, opening_)) return false;
+  mesh_.out().waiting_area_m2 += opening_.waiting_area(mesh_, stroke);
+  stroke.clear();
+  return true;
+}
+
+void Cutter::forget(Stroke& stroke) {
+  kept_.clear();
+  for (const auto t : stroke.waiting)
+    for (const auto node : mesh_.topology().tet(t)) kept_.push_back(node);
+  std::sort(kept_.begin(), kept_.end());
+  const double range = mesh_.settings().forget_h * stroke.h;
+  const auto is_far = [&](NodeIndex node) {
+    const auto p = mesh_.position(node);
+    return std::ranges::none_of(stroke.patch,
+                                [&](const PatchTriangle& triangle) {
+                                  return std::abs(signed_distance(triangle, p)) <= range &&
+                                         is_inside(triangle, p, range);
+                                }) &&
+           !std::binary_search(kept_.begin(), kept_.end(), node);
+  };
+  stroke.forget_if(is_far, mesh_.topology());
+}
+
+}  // namespace trocar::cutting

@@ -1,0 +1,27 @@
+#pragma once
+
+// Which places of nodes and tets are unused. The lowest is taken first, then the next at the end,
+// so that two who hold the same topology choose the same. Whoever removes something says so.
+
+#include <vector>
+
+#include "server/tissue/dynamics/topology.h"
+
+namespace trocar::cutting {
+
+class Places {
+ public:
+  explicit Places(const dynamics::Topology& topology);
+
+  NodeIndex next_node(const dynamics::Topology& topology) const;
+  NodeIndex take_node(const dynamics::Topology& topology);
+  TetIndex take_tet(const dynamics::Topology& topology);
+  void give_back(NodeIndex node);
+  void give_back(TetIndex tet);
+
+ private:
+  std::vector<NodeIndex> nodes_;  // descending
+  std::vector<TetIndex> tets_;
+};
+
+}  // namespace trocar::cutting

@@ -1,0 +1,41 @@
+#include "server/tissue/dynamics/far_plan.h"
+
+#include <algorithm>
+
+namespace trocar::dynamics {
+namespace {
+
+// One far sweep is stable up to omega = 4/3 (stiff limit), two up to 1.58: 1 + 3^(-1/k).
+constexpr float kMaxFarOverRelaxationOneSweep = 1.33f;
+constexpr float kMaxFarOverRelaxationTwoSweeps = 1.5f;
+// Up to here one sweep with what is stable (1.33 for omega* up to 1.5) keeps forces as true as two:
+// 0.86 beside 0.82 % for the measured liver, in three quarters of the time.
+constexpr float kMostKappaOneSweep = 2;
+
+}  // namespace
+
+FarPlan FarPlan::of(double stiffness, double mass, double dt) {
+  FarPlan plan;
+  if (!(mass > 0)) return plan;
+  plan.kappa = static_cast<float>(dt * dt * stiffness / mass);
+  return plan.with_sweeps(plan.kappa <= kMostKappaOneSweep ? 1 : 2);
+}
+
+FarPlan FarPlan::with_interval(std::uint32_t steps) const {
+  FarPlan plan = *this;
+  if (steps == 1) return plan;
+  plan.kappa *= static_cast<float>(steps * steps);
+  return plan.with_sweeps(sweeps);
+}
+
+FarPlan FarPlan::with_sweeps(std::uint32_t count) const {
+  FarPlan plan = *this;
+  if (count == 0) return plan;
+  plan.sweeps = count;
+  const float best = 2 * (1 + kappa) / (2 + kappa);
+  plan.over_relaxation =
+      std::min(best, count == 1 ? kMaxFarOverRelaxationOneSweep : kMaxFarOverRelaxationTwoSweeps);
+  return plan;
+}
+
+}  // namespace trocar::dynamics

@@ -1,0 +1,122 @@
+#pragma once
+
+// Relaxation of measured tissue (quasi-linear viscoelasticity, Dogan 2011 eq. 1 to 4): of the
+// stress S that the bracket of the law would have at once (psi.h), each term k has taken away q_k,
+// with
+//   dq_k/dt = (g_k S - q_k) / tau_k.
+// Steps are exact for a stress that grows evenly during the step:
+//   q' = e q + g [(1 - e) S + b (S' - S)],  e = exp(-dt/tau),  b = 1 - (1 - e) tau/dt.
+//
+// A solver that seeks S' takes b (S' - S) to be zero, an error of g dt/(2 tau) times the change in
+// one step (4e-4 of it for liver at 1 ms) that is gone after it: what has relaxed by then is a
+// stress that stays the same in the step, and with it the forces on nodes (relaxed_stress.h).
+//
+// Tets may take turns, and be advanced over as many steps at once, which is as exact; until then
+// what they have relaxed acts on as it was. Near what is solved a turn comes in each step, or,
+// where the rest is solved roughly, once in kNearTime_s; elsewhere once in kFarTime_s. In 4 ms
+// liver relaxes by 0.35 % of its stress at most. A step costs O(tets whose turn it is).
+//
+// Stars, where strain is averaged, relax as tets do (star_relaxation.h). Between steps the state is
+// world::RelaxationState.
+
+#include <memory>
+#include <vector>
+
+#include "common/base/workers.h"
+#include "server/tissue/dynamics/relaxation_figures.h"
+#include "server/tissue/dynamics/star_relaxation.h"
+#include "server/tissue/world/world.h"
+
+namespace trocar::dynamics {
+
+class Relaxation {
+ public:
+  static constexpr std::size_t kEdges = 6;  // of a tet: ab, ac, ad, bc, bd, cd
+  static constexpr float kNearTime_s = 0.004f, kFarTime_s = 0.008f;
+
+  static bool is_needed(const organ::Organ& organ);
+
+  // The topology's organ and the stars must outlive it. Stars: null if nothing is averaged; they
+  // are to be where the tissue is in settle() and end_step().
+  Relaxation(const Topology& topology, const Groups& groups, const Stars* stars);
+
+  // Tets and stars at nodes in these lanes anew; with stars, lanes as for Stars::rebuild().
+  void follow(const Topology& topology, const Groups& groups, std::span<const GroupLanes> lanes);
+
+  // The state is new everywhere.
+  void take_state() { is_stale_ = true; }
+  // Tissue has been where it is for long. Displacements per slot.
+  void settle(const Float4* x, world::RelaxationState& state);
+  // Before a step of so many seconds: loads().
+  void begin_step(float dt, const world::RelaxationState& state, Workers& workers);
+  // After it: advances tets at near nodes, each of them or in turns, and others whose turn it is.
+  void end_step(const Float4* x, std::span<const GroupLanes> near, bool near_in_turns,
+                world::RelaxationState& state, Workers& workers);
+  // After follow(), once a step has been begun: their loads.
+  void refresh(const world::RelaxationState& state);
+  // O(tets / 8).
+  RelaxationFigures figures() const;
+  // Steps from one turn to the next, near and elsewhere.
+  std::uint32_t near_turns() const { return near_turns_; }
+  std::uint32_t far_turns() const { return far_turns_; }
+  // Whether it is the turn of a block of tets, or group of nodes, in this step of the state.
+  static bool is_turn_of(std::size_t index, std::uint32_t turns, std::uint8_t step) {
+    return index / kRun % turns == step % turns;
+  }
+
+  // Of the stress that has relaxed: N/m per edge of each tet, along the edge as it is. load_index()
+  // of the edge between two corners of a tet; kNoLoad is zero.
+  const float* loads() const { return loads_.data(); }
+  static std::uint32_t load_index(TetIndex tet, std::size_t corner, std::size_t other);
+  static constexpr std::uint32_t kNoLoad = 0;
+  // Of stars; null if none relaxes.
+  const StarRelaxation* stars() const { return star_relaxation_.get(); }
+
+ private:
+  static constexpr std::size_t kBlockLoads = kEdges * kLanes;
+
+  struct Block {
+    std::array<SlotLanes, 4> nodes;
+    std::array<Vec3Lanes, 3> gradients;  // of b, c and d, 1/m
+    std::array<Vec3Lanes, 3> rest;       // columns of the stretch of the rest pose
+    Lanes volume;                        // m^3, 0: no tet that relaxes
+    Lanes bracket, volumetric;           // shares of it that are not of stars
+    LaneMaterials materials;
+  };
+
+  void set_lane(const Topology& topology, const Groups& groups, TetIndex tet);
+  void set_dt(float dt);
+  static RelaxationTerms::Response response_of(const Block& block,
+                                               const RelaxationTerms::Constants& c,
+                                               const Float4* x);
+  void set_shares(std::size_t index, const RelaxationTerms::Response& response,
+                  const SymMat8& relaxed_stress);
+  void set_loads(const Block& block, std::size_t index, const SymMat8& relaxed_stress);
+  void begin_block(std::size_t index, const world::StressHistory& history,
+                   RelaxationTerms::Constants& scratch);
+  // The hash's difference.
+  std::uint64_t end_block(std::size_t index, const Float4* x, world::StressHistory& history,
+                          RelaxationTerms::Constants& scratch);
+  void list_blocks_of(const Topology& topology, const Groups& groups, Slot slot);
+  void list_due(std::span<const GroupLanes> near, std::uint32_t near_turns, std::uint8_t step);
+
+  const organ::Organ& organ_;
+  const Stars* const stars_;
+  RelaxationTerms terms_;
+  std::unique_ptr<StarRelaxation> star_relaxation_;
+  std::vector<Block> blocks_;
+  std::vector<RelaxationShares> shares_;
+  static constexpr std::uint32_t kRun = 4;  // blocks, or groups, whose turn comes together
+  std::uint32_t near_turns_ = 1, far_turns_ = 1;
+  std::vector<std::vector<std::uint32_t>> blocks_of_;  // per slot: of tets at its node
+  std::vector<std::uint32_t> due_, due_stamp_;         // blocks of tets, then of stars; per block
+  std::uint32_t current_ = 0;
+  std::vector<float> loads_;  // [block][edge][tet], after one block of zeros
+  bool is_stale_ = true;
+  std::vector<std::uint32_t> stale_;                       // blocks, unless is_stale_
+  std::vector<TetIndex> tets_;                             // while it follows
+  std::vector<RelaxationTerms::Constants> scratch_;        // per worker
+  std::vector<std::array<std::uint64_t, 2>> differences_;  // of tets and stars
+};
+
+}  // namespace trocar::dynamics

@@ -1,0 +1,149 @@
+#include "server/tissue/dynamics/relaxed_stress.h"
+
+#include <algorithm>
+
+namespace trocar::dynamics {
+namespace {
+
+constexpr int kFewLanes = 3;
+
+Float8 loads_at(const float* loads, const SlotLanes& places) {
+  return _mm256_i32gather_ps(loads, _mm256_load_si256(reinterpret_cast<const __m256i*>(places.v)),
+                             sizeof(float));
+}
+
+}  // namespace
+
+RelaxedStress::RelaxedStress(const Topology& topology, const Groups& groups,
+                             const Relaxation& relaxation, const Stars* stars)
+    : groups_(groups), relaxation_(relaxation), stars_(stars), forces_(groups.group_count()) {
+  rows_.reserve(groups, [&](NodeIndex node) { return topology.tets_of(node).size(); });
+  for (Group g = 0; g < groups.group_count(); ++g) fill(topology, groups, {g, 0xff});
+  rows_.end_building();
+}
+
+void RelaxedStress::rebuild(const Topology& topology, const Groups& groups,
+                            std::span<const GroupLanes> lanes) {
+  rows_.extend(groups);
+  forces_.resize(groups.group_count());
+  for (const auto group_lanes : lanes) fill(topology, groups, group_lanes);
+  rows_.tidy();
+}
+
+void RelaxedStress::fill(const Topology& topology, const Groups& groups, GroupLanes lanes) {
+  const auto nodes = groups.nodes_of(lanes.group);
+  std::array<std::uint32_t, kLanes> counts{};
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    tets_[lane].clear();
+    if (!lanes.has(lane) || !nodes[lane].is_valid()) continue;
+    for (const auto t : topology.tets_of(nodes[lane]))
+      if (relaxes(organ::material_at(topology.organ(), topology.material_of(t))))
+        tets_[lane].push_back(t);
+    counts[lane] = static_cast<std::uint32_t>(tets_[lane].size());
+  }
+  const auto rows = rows_.reshape(lanes, counts);
+  const auto rest = topology.rest();
+  for (std::size_t lane = 0; lane < kLanes; ++lane)
+    for (std::size_t i = 0; i < tets_[lane].size(); ++i) {
+      const auto t = tets_[lane][i];
+      const auto& tet = topology.tet(t);
+      const auto own = static_cast<std::size_t>(std::ranges::find(tet, nodes[lane]) - tet.begin());
+      for (std::size_t k = 0; k < 3; ++k) {
+        const auto other = (own + 1 + k) % 4;
+        rows[i].others[k].v[lane] = groups.slot_of(tet[other]);
+        rows[i].loads[k].v[lane] = Relaxation::load_index(t, own, other);
+        rows[i].edges[k].set(lane, to_float(rest[tet[other].value] - rest[tet[own].value]));
+      }
+    }
+}
+
+Vec8 RelaxedStress::forces_of_stars(Group group) const {
+  Vec8 sum = zero_vec8();
+  const Float4* const q = relaxation_.stars()->relaxed();
+  for (const auto& row : stars_->rows(group)) {
+    const Vec8 b = load(row.part);
+    const Vec8 qb{dot8(gather(q, row.star), b), dot8(gather(q + 1, row.star), b),
+                  dot8(gather(q + 2, row.star), b)};
+    const auto f = stars_->gradient_at(row.star);
+    sum = sum + Vec8{dot8(f.rows[0], qb), dot8(f.rows[1], qb), dot8(f.rows[2], qb)};
+  }
+  return sum;
+}
+
+// Along an edge a stress pulls its ends together; what has relaxed of it lets them go.
+Vec8 RelaxedStress::forces_at(Group group, const Float4* x) const {
+  const float* const loads = relaxation_.loads();
+  const Vec8 own = load_group(x + group * kLanes);
+  Vec8 sum = zero_vec8();
+  for (const Row& row : rows_[group])
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vec8 edge = load(row.edges[k]) + (gather(x, row.others[k]) - own);
+      sum = fma8(edge, loads_at(loads, row.loads[k]), sum);
+    }
+  return sum;
+}
+
+// The same to the bit: where few lanes are asked for, one after another is quicker.
+Vec3f RelaxedStress::force_at(Group group, std::size_t lane, const Float4* x) const {
+  const float* const loads = relaxation_.loads();
+  const auto displacement = [x](Slot slot) { return _mm_load_ps(&x[slot].x); };
+  const __m128 own = displacement(static_cast<Slot>(group * kLanes + lane));
+  __m128 sum = _mm_setzero_ps();
+  for (const Row& row : rows_[group])
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto& edges = row.edges[k];
+      const __m128 rest = _mm_setr_ps(edges.x.v[lane], edges.y.v[lane], edges.z.v[lane], 0);
+      const __m128 edge = _mm_add_ps(rest, _mm_sub_ps(displacement(row.others[k].v[lane]), own));
+      sum = _mm_fmadd_ps(edge, _mm_set1_ps(loads[row.loads[k].v[lane]]), sum);
+    }
+  Float4 force;
+  _mm_store_ps(&force.x, sum);
+  return to_vec3(force);
+}
+
+void RelaxedStress::refresh(GroupLanes lanes, const Float4* x, world::RelaxationState& state) {
+  const auto group = lanes.group;
+  const bool are_few = __builtin_popcount(lanes.lanes) <= kFewLanes;
+  Vec3Lanes all;
+  if (!are_few) store(all, forces_at(group, x));
+  Vec3Lanes of_stars;
+  if (relaxation_.stars() != nullptr) store(of_stars, forces_of_stars(group));
+  const auto nodes = groups_.nodes_of(group);
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    if (!lanes.has(lane)) continue;
+    const Vec3f force = (are_few ? force_at(group, lane, x) : all.at(lane)) + of_stars.at(lane);
+    forces_[group].set(lane, force);
+    if (nodes[lane].is_valid()) state.set_force(nodes[lane], force);
+  }
+}
+
+void RelaxedStress::take_state(const world::RelaxationState& state) {
+  for (Group g = 0; g < groups_.group_count(); ++g)
+    for (std::size_t lane = 0; lane < kLanes; ++lane)
+      if (const auto node = groups_.nodes_of(g)[lane]; node.is_valid())
+        forces_[g].set(lane, state.forces()[node.value]);
+}
+
+void start_relaxed(const organ::Organ& organ, world::World& world) {
+  if (!Relaxation::is_needed(organ)) return;
+  const Topology topology(organ);
+  const Groups groups(topology, Coupling::Elements);
+  std::optional<Stars> stars;
+  if (Stars::are_needed(organ)) stars.emplace(topology, groups);
+  std::vector<Float4> x(groups.slot_count());
+  for (Slot slot = 0; slot < x.size(); ++slot)
+    if (const auto node = groups.node_at(slot); node.is_valid())
+      x[slot] = to_float4(world.displacements[node.value]);
+  const Stars* const averaged = stars ? &*stars : nullptr;
+  for (Group g = 0; stars && g < groups.group_count(); ++g) stars->restart_group(g, x.data());
+  Relaxation relaxation(topology, groups, averaged);
+  relaxation.settle(x.data(), world.relaxation);
+  // Of tissue that stays as it is the loads do not depend on the step.
+  Workers alone(1);
+  relaxation.begin_step(1, world.relaxation, alone);
+  RelaxedStress stress(topology, groups, relaxation, averaged);
+  for (Group g = 0; g < groups.group_count(); ++g)
+    stress.refresh({g, 0xff}, x.data(), world.relaxation);
+}
+
+}  // namespace trocar::dynamics

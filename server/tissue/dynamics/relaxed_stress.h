@@ -1,0 +1,61 @@
+#pragma once
+
+// What has relaxed of the stress of measured tissue (relaxation.h), as forces on nodes: each edge
+// of a tet that relaxes bears a load that is constant in a step, in N per m of the edge. Forces are
+// taken where the tissue is between two steps, and are constant in the next; those of all nodes,
+// taken at once, balance in force and torque. Where strain is averaged, stars have their part: F Q
+// b with F as Stars keeps it. O(tets and stars at the nodes) each time.
+
+#include "server/tissue/dynamics/lanes.h"
+#include "server/tissue/dynamics/relaxation.h"
+
+namespace trocar::dynamics {
+
+class RelaxedStress {
+ public:
+  // Groups, the relaxation and the stars, null if nothing is averaged, must outlive it.
+  RelaxedStress(const Topology& topology, const Groups& groups, const Relaxation& relaxation,
+                const Stars* stars);
+
+  // Forces on these nodes anew, in the state too; x: displacements per slot. Different groups at
+  // once: allowed.
+  void refresh(GroupLanes lanes, const Float4* x, world::RelaxationState& state);
+  // As they were taken last, N.
+  Vec8 forces(Group group) const { return load(forces_[group]); }
+  // All of them from the state.
+  void take_state(const world::RelaxationState& state);
+  // As energies follow edits, see Energy::rebuild().
+  void rebuild(const Topology& topology, const Groups& groups, std::span<const GroupLanes> lanes);
+
+ private:
+  // A tet seen from one of its nodes: the other three, the edges there, and where their loads are.
+  struct Row {
+    std::array<SlotLanes, 3> others, loads;
+    std::array<Vec3Lanes, 3> edges;  // rest pose, m
+
+    void pad(std::size_t lane, Slot own) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        others[k].v[lane] = own;
+        loads[k].v[lane] = Relaxation::kNoLoad;
+      }
+    }
+  };
+
+  void fill(const Topology& topology, const Groups& groups, GroupLanes lanes);
+
+  Vec8 forces_of_stars(Group group) const;
+  Vec8 forces_at(Group group, const Float4* x) const;
+  Vec3f force_at(Group group, std::size_t lane, const Float4* x) const;
+
+  const Groups& groups_;
+  const Relaxation& relaxation_;
+  const Stars* const stars_;
+  GroupRows<Row> rows_;
+  std::vector<Vec3Lanes> forces_;
+  std::array<std::vector<TetIndex>, kLanes> tets_;  // while rows are filled
+};
+
+// A world that begins: its tissue has been where it is for long. Measured organs under tension.
+void start_relaxed(const organ::Organ& organ, world::World& world);
+
+}  // namespace trocar::dynamics

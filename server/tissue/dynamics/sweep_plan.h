@@ -1,0 +1,41 @@
+#pragma once
+
+// Which groups and lanes a sweep goes over, colour by colour.
+
+#include <vector>
+
+#include "server/tissue/dynamics/groups.h"
+
+namespace trocar::dynamics {
+
+struct SweepPlan {
+  std::vector<std::uint8_t> lanes;           // per group of the tissue
+  std::vector<Group> groups;                 // with a lane; ascending by colour after finish()
+  std::vector<std::uint32_t> colour_begins;  // into groups, colour_count + 1
+  std::uint64_t node_count = 0;
+
+  // Room for all groups.
+  void reserve(const Groups& all) {
+    lanes.resize(all.group_count());
+    groups.reserve(all.group_count());
+    colour_begins.resize(all.colour_count() + 1);
+  }
+  void clear() {
+    for (const auto g : groups) lanes[g] = 0;
+    groups.clear();
+    node_count = 0;
+  }
+  void add(Group group, std::uint8_t bits) {
+    if (bits == 0) return;
+    if (lanes[group] == 0) groups.push_back(group);
+    node_count += static_cast<unsigned>(__builtin_popcount(bits & ~lanes[group]));
+    lanes[group] = static_cast<std::uint8_t>(lanes[group] | bits);
+  }
+  void add(const Groups& all, NodeIndex node) {
+    const Slot slot = all.slot_of(node);
+    add(slot / kLanes, static_cast<std::uint8_t>(1u << slot % kLanes));
+  }
+  void finish(const Groups& all) { all.order_by_colour(groups, colour_begins); }
+};
+
+}  // namespace trocar::dynamics

@@ -1,0 +1,104 @@
+#pragma once
+
+// The energies of one organ, on its nodes' colours: what a solver or integrator asks for gradients.
+//
+// After an edit of the topology, between steps, follow_topology() brings colours, groups and rows
+// up to date in time that is proportional to what meets at the changed nodes. Results are bit for
+// bit those of a tissue built anew from the changed organ with the colours of this one.
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "server/tissue/dynamics/averaged_strain.h"
+#include "server/tissue/dynamics/energy.h"
+#include "server/tissue/dynamics/relaxation.h"
+#include "server/tissue/dynamics/relaxed_stress.h"
+
+namespace trocar::dynamics {
+
+// What following a change has cost.
+struct FollowReport {
+  std::size_t nodes_changed = 0;  // whose existence, place or elements have changed
+  std::size_t nodes_moved = 0;    // to another slot
+  std::size_t groups = 0;         // with lanes written
+  std::size_t lanes = 0;          // written, by the energy that writes most
+  std::size_t rows = 0;           // written, per lane, all energies together
+};
+
+class Tissue {
+ public:
+  explicit Tissue(const organ::Organ& organ);
+  // colours: per place of a node, those of a tissue stored before; empty: greedy.
+  explicit Tissue(const Topology& topology, std::span<const Colour> colours = {});
+
+  const Groups& groups() const { return groups_; }
+  // What strain is averaged over, to be told of moves; null: nothing.
+  Stars* stars() { return stars_.get(); }
+  const Stars* stars() const { return stars_.get(); }
+
+  void begin_group(Group group, const Float4* start, float inverse_dt);
+  void add(Group group, const Float4* x, const Vec8& own, NodeStep8& step) const {
+    for (const auto& energy : energies_) energy->add(group, x, own, step);
+    add_averaged(group, step);
+  }
+  // Of these, energies over stars alone.
+  void add_averaged(Group group, NodeStep8& step) const {
+    for (const auto& energy : averaged_) energy->add(group, step);
+  }
+
+  // The elastic part at displacements x but for energies over stars, see Energy::linearise().
+  void linearise(Group group, const Float4* x, const Vec8& own, NodeStep8& step,
+                 StiffnessSink& sink) const {
+    for (const auto& energy : energies_) energy->linearise(group, x, own, step, sink);
+  }
+
+  // Per slot, of the node's block of second derivatives with everything at rest, damping for steps
+  // of this length included, energies over stars if asked for; N/m.
+  std::vector<float> traces_at_rest(float inverse_dt, bool has_averaged);
+
+  // Follows topology.changed(). The topology is the one this tissue was made from, or another of
+  // the same organ with the same edits.
+  FollowReport follow_topology(const Topology& topology);
+  // Lanes whose node, or what meets at it, the last follow_topology() found changed; ascending.
+  std::span<const GroupLanes> touched() const { return touched_; }
+  // Lanes that energies had to rebuild: with averaged strain also those with a neighbour of a node
+  // that changed.
+  std::span<const GroupLanes> rebuilt() const { return stars_ ? wide_ : touched_; }
+
+  // What remembers stresses, and the forces of stress that has relaxed, which no energy has; null
+  // where nothing relaxes.
+  Relaxation* relaxation() { return relaxation_.get(); }
+  RelaxedStress* relaxed_stress() { return relaxed_stress_.get(); }
+  const RelaxedStress* relaxed_stress() const { return relaxed_stress_.get(); }
+  std::optional<RelaxationFigures> relaxation_figures() const {
+    return relaxation_ ? std::optional(relaxation_->figures()) : std::nullopt;
+  }
+
+  // Elastic energy in double, J; displacements per place of a node.
+  double energy_j(std::span<const Vec3f> displacements) const;
+
+ private:
+  Groups groups_;
+  std::unique_ptr<Stars> stars_;  // null: nothing is averaged
+  std::vector<std::unique_ptr<Energy>> energies_;
+  std::vector<std::unique_ptr<StarEnergy>> averaged_;
+  std::unique_ptr<Relaxation> relaxation_;
+  std::unique_ptr<RelaxedStress> relaxed_stress_;
+
+  template <typename Law>
+  void add_hyperelastic(const Topology& topology, const HyperelasticParameters& parameters,
+                        const Law& law = {});
+  template <typename Law>
+  void add_measured(const Topology& topology);
+  void add_relaxation(const Topology& topology);
+  void touch(Slot slot);
+  void list_touched(std::vector<GroupLanes>& out);
+
+  std::vector<NodeIndex> changed_;          // ascending
+  std::vector<std::uint8_t> lanes_;         // per group, while lanes are collected
+  std::vector<Group> touched_groups_;       // of these
+  std::vector<GroupLanes> touched_, wide_;  // wide: with neighbours of changed nodes
+};
+
+}  // namespace trocar::dynamics

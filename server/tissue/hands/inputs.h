@@ -1,0 +1,53 @@
+#pragma once
+
+// What a tick takes from outside. A TickInputs is all that the network, scripts or a journal can
+// say to the simulation; with TickDecisions it determines the next state to the bit.
+
+#include <array>
+#include <vector>
+
+#include "common/base/ids.h"
+#include "common/tool/tool.h"
+
+namespace trocar::hands {
+
+struct HandJoin {
+  ParticipantSlot slot;  // has_tools()
+  int tool_count = 1;    // 1 or 2
+  std::array<tool::ToolShape, kToolsPerHand> shapes;
+};
+
+// What an instructor may do to the organ as a whole.
+enum class MarkAction : std::uint8_t {
+  None = 0,
+  Set = 1,     // marks it as it is, instead of the mark before
+  Return = 2,  // makes it what it was when it was marked
+};
+
+struct ToolInput {
+  ToolSlot tool;
+  tool::ToolSample sample;
+};
+
+// Admitted in this order: mark, leaves, joins, samples. Several samples of one tool: the last one
+// counts.
+// Everything is validated before (server/session/replication); the tick drops what does not fit its
+// state, such as a sample for an empty slot, and counts it.
+struct TickInputs {
+  MarkAction mark = MarkAction::None;
+  std::vector<ParticipantSlot> leaves;
+  std::vector<HandJoin> joins;
+  std::vector<ToolInput> samples;
+
+  bool empty() const {
+    return mark == MarkAction::None && leaves.empty() && joins.empty() && samples.empty();
+  }
+  void clear() {
+    mark = MarkAction::None;
+    leaves.clear();
+    joins.clear();
+    samples.clear();
+  }
+};
+
+}  // namespace trocar::hands

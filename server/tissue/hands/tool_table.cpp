@@ -1,0 +1,84 @@
+#include "server/tissue/hands/tool_table.h"
+
+#include <algorithm>
+#include <span>
+
+namespace trocar::hands {
+
+std::uint32_t ToolTable::admit(const hands::TickInputs& inputs, Tick tick) {
+  std::uint32_t dropped = 0;
+  for (const auto slot : inputs.leaves) {
+    const bool is_known = slot.has_tools() && tools_[tool_slot(slot, 0).value].is_present;
+    if (!is_known) {
+      ++dropped;
+      continue;
+    }
+    for (int i = 0; i < kToolsPerHand; ++i) tools_[tool_slot(slot, i).value] = Tool{};
+  }
+  for (const auto& join : inputs.joins) dropped += admit_join(join, tick) ? 0 : 1;
+  for (const auto& sample : inputs.samples) dropped += admit_sample(sample, tick) ? 0 : 1;
+
+  for (auto& tool : tools_) {
+    if (tool.steps_left == 0) continue;
+    const float t = 1.0f / static_cast<float>(tool.steps_left);
+    if (--tool.steps_left == 0) {
+      tool.pose = tool.target;
+    } else {
+      tool.pose.position += (tool.target.position - tool.pose.position) * t;
+      tool.pose.orientation = interpolate(tool.pose.orientation, tool.target.orientation, t);
+    }
+  }
+  return dropped;
+}
+
+bool ToolTable::admit_join(const hands::HandJoin& join, Tick tick) {
+  if (!join.slot.has_tools() || join.tool_count < 1 || join.tool_count > kToolsPerHand ||
+      tools_[tool_slot(join.slot, 0).value].is_present)
+    return false;
+  const auto shapes = std::span(join.shapes).first(static_cast<std::size_t>(join.tool_count));
+  if (!std::all_of(shapes.begin(), shapes.end(), tool::is_valid)) return false;
+  for (int i = 0; i < join.tool_count; ++i)
+    tools_[tool_slot(join.slot, i).value] = Tool{
+        .is_present = true, .shape = shapes[static_cast<std::size_t>(i)], .last_sample_tick = tick};
+  return true;
+}
+
+bool ToolTable::admit_sample(const hands::ToolInput& input, Tick tick) {
+  if (!input.tool.is_valid()) return false;
+  Tool& tool = tools_[input.tool.value];
+  if (!tool.is_present) return false;
+  tool.target = input.sample.world_from_tool;
+  tool.verb = input.sample.verb;
+  tool.last_sample_tick = tick;
+  if (tool.has_sample) {
+    tool.steps_left = kPoseTicks;
+  } else {
+    tool.has_sample = true;  // appears where it is; there is no path to walk
+    tool.pose = tool.target;
+  }
+  return true;
+}
+
+void ToolTable::visit_state(world::StateArchive& archive) {
+  for (auto& tool : tools_) {
+    archive.flag(tool.is_present);
+    archive.flag(tool.has_sample);
+    archive.value(tool.shape.radius_m);
+    archive.value(tool.shape.length_m);
+    archive.value(tool.shape.reach_m);
+    archive.value(tool.shape.half_width_m);
+    archive.value(tool.shape.friction);
+    archive.value(tool.shape.grip_n);
+    archive.value(tool.shape.edge_m);
+    archive.value(tool.verb);
+    archive.value(tool.pose);
+    archive.value(tool.target);
+    archive.value(tool.steps_left);
+    archive.value(tool.last_sample_tick);
+    if (archive.is_reading() && tool.is_present &&
+        (!tool::is_valid(tool.shape) || tool.verb > tool::Verb::Cut))
+      archive.fail();
+  }
+}
+
+}  // namespace trocar::hands

@@ -1,0 +1,50 @@
+#pragma once
+
+// The tools in the session as the simulation knows them. Samples arrive at about 125 Hz, ticks run
+// at 1 kHz: each tool latches its newest sample and moves to it in equal steps, so that tissue
+// meets a moving tool and not a jumping one. Verbs change at once.
+
+#include <array>
+
+#include "common/base/ids.h"
+#include "common/base/tick.h"
+#include "common/math/frame.h"
+#include "common/tool/tool.h"
+#include "server/tissue/hands/inputs.h"
+#include "server/tissue/world/state_archive.h"
+
+namespace trocar::hands {
+
+// Ticks in which a tool reaches a new sample: a little over the 8 ms between samples, so that
+// jitter leaves no stand-still.
+inline constexpr std::uint32_t kPoseTicks = 10;
+
+struct Tool {
+  bool is_present = false;
+  bool has_sample = false;  // until the first sample the tool touches nothing
+  tool::ToolShape shape;
+  tool::Verb verb = tool::Verb::None;
+  Pose pose;                     // world_from_tool, this tick
+  Pose target;                   // of the newest sample
+  std::uint32_t steps_left = 0;  // until pose reaches target
+  Tick last_sample_tick = 0;
+};
+
+class ToolTable {
+ public:
+  const Tool& operator[](ToolSlot slot) const { return tools_[slot.value]; }
+
+  // Admits a tick's inputs, then moves every tool one step. Returns how many inputs did not fit the
+  // state (an empty slot, a taken one) and were dropped.
+  std::uint32_t admit(const hands::TickInputs& inputs, Tick tick);
+
+  void visit_state(world::StateArchive& archive);
+
+ private:
+  bool admit_join(const hands::HandJoin& join, Tick tick);
+  bool admit_sample(const hands::ToolInput& input, Tick tick);
+
+  std::array<Tool, kMaxTools> tools_;
+};
+
+}  // namespace trocar::hands

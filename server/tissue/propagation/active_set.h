@@ -1,0 +1,52 @@
+#pragma once
+
+// Which nodes the solver sweeps most: the queue, then nodes that have left it a short while ago.
+//
+// Boundary::Frozen (the papers'): all other nodes stand still. A node that left the queue goes on
+// being swept and stops only when, for 100 ticks in a row, its residual force, speed and
+// displacement all stayed below thresholds: nothing freezes with a dent.
+// Boundary::Graded: all other nodes move too, with fewer sweeps; a node that left the queue keeps
+// all sweeps for 100 ticks, so that a change of class disturbs nothing.
+// O(nodes in the set) per tick.
+
+#include <span>
+#include <vector>
+
+#include "server/tissue/propagation/queue.h"
+#include "server/tissue/world/world.h"
+
+namespace trocar::propagation {
+
+inline constexpr std::uint16_t kQuietTicks = 100;
+inline constexpr float kQuietResidualNewton = 1e-4f;
+inline constexpr float kQuietSpeedMetresPerSecond = 1e-3f;
+// A tenth of the wire's quantum: nobody sees the rest of the way.
+inline constexpr float kQuietDisplacementMetres = 3.2e-6f;
+
+class ActiveSet {
+ public:
+  explicit ActiveSet(std::size_t node_count) {
+    nodes_.reserve(node_count);
+    before_.reserve(node_count);
+    settled_.reserve(node_count);
+  }
+
+  // Classes were changed by somebody else.
+  void forget() { has_history_ = false; }
+
+  // Sets classes of queued nodes to Active. Sweep order: queue order, then lingering nodes
+  // ascending; fixed nodes are left out.
+  void collect(const PropagationQueue& queue, world::Boundary boundary, world::World& world);
+  std::span<const NodeIndex> nodes() const { return nodes_; }
+
+  // After the solve: counts ticks of lingering nodes (`residuals_n`: per entry of nodes()) and
+  // lets go of those that are due. Returns the nodes whose displacement it set to zero.
+  std::span<const NodeIndex> settle(const PropagationQueue& queue,
+                                    std::span<const float> residuals_n, world::World& world);
+
+ private:
+  std::vector<NodeIndex> nodes_, before_, settled_;
+  bool has_history_ = false;
+};
+
+}  // namespace trocar::propagation

@@ -1,0 +1,41 @@
+#pragma once
+
+// Which nodes are next to which: the organ's table, and instead of its rows those of nodes that an
+// edit of the topology has changed since. Symmetric; rows ascending.
+
+#include "common/base/blocks.h"
+#include "common/base/index.h"
+#include "server/organs/mesh/csr.h"
+
+namespace trocar::propagation {
+
+class Neighbours {
+ public:
+  using Table = mesh::Csr<NodeIndex, NodeIndex>;
+
+  // The table must outlive it. Implicit: a table is what most have.
+  Neighbours(const Table& table) : table_(&table), row_count_(table.row_count()) {
+    rows_.end_building();
+  }
+
+  std::size_t row_count() const { return row_count_; }
+  const Table& table() const { return *table_; }
+  std::span<const NodeIndex> operator[](NodeIndex node) const {
+    if (node.value < changed_.size() && changed_[node.value] != 0)
+      return rows_[changed_[node.value] - 1];
+    return (*table_)[node];
+  }
+
+  // Of a node of the table, or a new one. O(row), and O(nodes) the first time.
+  void set(NodeIndex node, std::span<const NodeIndex> neighbours);
+  // To be called after a number of set(): frees memory that rows have left.
+  void tidy() { rows_.tidy(); }
+
+ private:
+  const Table* table_;
+  std::size_t row_count_;
+  std::vector<std::uint32_t> changed_;  // per node: 1 + place in rows_; 0: as in the table
+  Blocks<NodeIndex> rows_;
+};
+
+}  // namespace trocar::propagation

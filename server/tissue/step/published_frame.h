@@ -1,0 +1,88 @@
+#pragma once
+
+// What leaves the simulation every 16th tick: one immutable object, shared by the replication
+// strand and the journal. Nobody outside the simulation thread sees anything else of its state.
+
+#include <array>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "common/base/bytes.h"
+#include "common/base/ids.h"
+#include "common/base/tick.h"
+#include "common/tool/tool.h"
+#include "common/wire/quantise.h"
+#include "common/wire/surface_change.h"
+#include "server/tissue/dynamics/relaxation_figures.h"
+#include "server/tissue/hands/claims.h"
+#include "server/tissue/hands/inputs.h"
+#include "server/tissue/step/reduced_tissue.h"
+#include "server/tissue/step/tick_report.h"
+
+namespace trocar::step {
+
+struct ToolFrame {
+  ToolSlot tool;
+  Pose world_from_tool;
+  Pose world_from_proxy;  // where the tissue lets it be
+  tool::Verb verb = tool::Verb::None;
+  Vec3f force_n, torque_nm;  // of the tissue on the tool, world frame; torque about the tip
+  std::uint32_t contact_nodes = 0;
+  float penetration_m = 0;  // deepest contact, >= 0
+  bool has_claim = false;   // its push or grasp is in effect
+  bool is_inside = false;   // appeared inside tissue: touches nothing until it has come out
+  bool is_silent = false;   // lease no longer fresh
+};
+
+// What became of what an instructor asked for.
+struct MarkEvent {
+  Tick tick = 0;
+  hands::MarkAction action = hands::MarkAction::None;
+  bool is_done = false;  // false: there is no mark to return to
+};
+
+// What the journal needs to simulate one tick again.
+struct TickRecord {
+  Tick tick = 0;
+  TickDecisions decisions;
+  hands::TickInputs inputs;
+  std::uint64_t state_hash = 0;  // after the tick
+};
+
+struct PublishedFrame {
+  Frame frame = 0;
+  Tick tick = 0;
+  std::uint32_t epoch = 0;  // after `change`
+  // Of the surface since the frame before; null: none.
+  std::shared_ptr<const wire::SurfaceChange> change;
+  // Another surface than that of the frame before, from which no change leads to it; null: none.
+  std::shared_ptr<const wire::SurfaceLayout> new_layout;
+  wire::QuantisedSurface surface;  // displacements from rest, per vertex slot
+  std::uint32_t surface_crc = 0;
+  std::vector<std::uint16_t>
+      regions;                   // per vertex slot: 0 not active, else merged region 1, 2, ...
+  std::vector<ToolFrame> tools;  // occupied tools, by slot
+  std::vector<hands::ClaimEvent> claim_events;  // of the ticks since the frame before
+  std::vector<MarkEvent> mark_events;           // likewise
+  std::vector<TickRecord> records;              // of the ticks since the frame before
+  // Full state after `snapshot_tick`, at the start, every 10 s and on request, else null. Taken
+  // between publications: publishing changes the quantisation's hysteresis after the tick's hash.
+  std::shared_ptr<const Bytes> snapshot;
+  Tick snapshot_tick = 0;
+  std::uint64_t state_hash = 0;
+  std::uint32_t active_nodes = 0, queue_nodes = 0, region_count = 0;
+  std::uint32_t sweeps = 0, far_sweeps = 0;  // of active nodes and of all others
+  std::uint32_t far_interval = 1;            // ticks for which these far sweeps are
+  LayerCounts layer_sweeps{};                // of active nodes by layer
+  std::uint32_t node_limit = 0;
+  float residual_n = 0;
+  std::optional<dynamics::RelaxationFigures> relaxation;  // of tissue that relaxes
+  SolverFigures solver;                                   // of the frame's tick
+  std::vector<SolverChange> solver_changes;               // of the ticks since the frame before
+  StageStatistics statistics;  // of the last second; for people, never an input
+};
+
+using SharedFrame = std::shared_ptr<const PublishedFrame>;
+
+}  // namespace trocar::step

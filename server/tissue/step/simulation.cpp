@@ -1,0 +1,245 @@
+#include "server/tissue/step/simulation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "common/base/assert.h"
+#include "server/organs/organ/any_material.h"
+#include "server/tissue/dynamics/relaxation.h"
+
+namespace trocar::step {
+
+State::State(const organ::Organ& organ, const reduction::LocalModels* reduction)
+    : cuts(organ),
+      world(organ),
+      claims(organ.mesh.node_count()),
+      quantised(cuts.layout().vertex_count()),
+      models(reduction) {
+  if (models != nullptr) reduced.emplace().is_cut.resize(models->size());
+  dynamics::start_relaxed(organ, world);
+}
+
+void State::visit(world::StateArchive& archive) {
+  mark.visit_state(archive);
+  visit_without_mark(archive);  // ends with what may take no bytes
+}
+
+void State::set_mark() {
+  Bytes bytes;
+  auto archive = world::StateArchive::writing(bytes);
+  visit_without_mark(archive);
+  mark.set(std::move(bytes));
+}
+
+std::unique_ptr<State> State::returned_to_mark(const organ::Organ& organ) const {
+  if (!mark.is_set()) return nullptr;
+  auto marked = std::make_unique<State>(organ, models);
+  auto archive = world::StateArchive::reading(mark.state());
+  marked->visit_without_mark(archive);
+  if (!archive.ok() || !archive.at_end()) return nullptr;
+  marked->cuts.follow_on(cuts);
+  marked->world.tick = world.tick;
+  marked->tools = tools;
+  marked->claims.let_go(claims);
+  marked->grasps = {};
+  marked->proxies = {};
+  marked->mark = mark;
+  return marked;
+}
+
+void State::visit_without_mark(world::StateArchive& archive) {
+  cuts.visit_state(archive, world);
+  if (archive.is_reading()) {
+    claims.resize(world.node_count());
+    quantised.resize(cuts.layout().vertex_count());
+  }
+  world.visit_state(archive);
+  tools.visit_state(archive);
+  claims.visit_state(archive);
+  grasps.visit_state(archive, world.node_count());
+  proxies.visit_state(archive);
+  if (reduced) reduced->visit_state(archive, *models);
+  archive.fixed_array(quantised);
+  self_contacts.visit_state(archive, world.surface_nodes, cuts.layout().triangles.size());
+}
+
+namespace {
+
+std::shared_ptr<const Scene> scene_of(organ::Organ organ,
+                                      std::shared_ptr<const organ::LocalReduction> reduction) {
+  auto scene = std::make_shared<Scene>();
+  scene->organ = std::move(organ);
+  scene->reduction = std::move(reduction);
+  // Of the organ where it stays.
+  if (scene->reduction) scene->models.emplace(*scene->reduction, scene->organ);
+  return scene;
+}
+
+const reduction::LocalModels* models_of(const Scene& scene) {
+  return scene.models ? &*scene.models : nullptr;
+}
+
+// Springs and linear tets cost no more than the matrices of a linear far field.
+bool is_costly(const organ::Organ& organ) {
+  return organ::any_material(organ, material::is_hyperelastic);
+}
+
+}  // namespace
+
+// The solver begins with the organ as it was, whatever the state: plans and places follow from that
+// and from the edits since.
+StepContext::StepContext(const Scene& s, unsigned workers, const State& state)
+    : StepContext(s, workers, world::World(s.organ), state) {}
+
+StepContext::StepContext(const Scene& s, unsigned workers, const world::World& uncut,
+                         const State& state)
+    : scene(s),
+      finder(s.organ),
+      self_finder(s.organ),
+      neighbours(s.organ.mesh.node_neighbours),
+      queue(state.world.node_count()),
+      active(state.world.node_count()),
+      solver(s.organ, uncut, workers),
+      far_plan(solver.far_plan(kTickSeconds)),
+      has_linear_far_field(is_costly(s.organ)),
+      surface_displacements(state.cuts.layout().vertex_count()) {
+  if (has_linear_far_field) solver.use_linear_far_field(uncut);
+  if (s.models) reduced.emplace(*s.models);
+  contacts.reserve();
+  requests.reserve(kMaxTools);
+  claim_events.reserve(4 * kMaxTools);
+  solver_changes.reserve(4 * kTicksPerFrame);
+  dynamics::Topology topology(s.organ);
+  cutting::Places places(topology);
+  cutting::SurfaceMesh surface(s.organ);
+  for (const auto& events : state.cuts.history()) {
+    const auto applied = cutting::apply(events, topology, places);
+    TROCAR_ASSERT(applied.ok());
+    follow_edit(topology, surface.follow(topology), state.world);
+    topology.clear_changes();
+  }
+  if (!state.cuts.history().empty()) follow_edit(state.cuts.topology(), {}, state.world);
+  solver.take_state(state.world);
+}
+
+void StepContext::follow_edit(const dynamics::Topology& topology, const world::SurfaceEdit& edit,
+                              const world::World& world) {
+  for (const auto node : topology.changed()) {
+    topology.neighbours_of(node, changed_neighbours);
+    neighbours.set(node, changed_neighbours);
+  }
+  neighbours.tidy();
+  queue.forget(world.node_count());
+  active.forget();
+  finder.follow(edit, world);
+  self_finder.follow(edit, world);
+  solver.follow_topology(topology, world);
+}
+
+Status validate(const TickDecisions& d) {
+  const auto out_of_range = [](const char* field, auto value, const char* range) {
+    return Error{ErrorCode::Usage,
+                 std::string(field) + ": " + std::to_string(value) + " is outside " + range};
+  };
+  if (d.depth_limit > kMaxDepthLimit)
+    return out_of_range("depth_limit", d.depth_limit, "0 to 1000 layers");
+  if (d.node_limit < 1 || d.node_limit > kMaxNodeLimit)
+    return out_of_range("node_limit", d.node_limit, "1 to 10000000 nodes");
+  if (d.sweeps < 1 || d.sweeps > kMaxSweeps) return out_of_range("sweeps", d.sweeps, "1 to 64");
+  const auto sweeps = sweeps_of_layers(d);
+  for (std::size_t layer = 1; layer < kSweepLayers; ++layer)
+    if (sweeps[layer] > sweeps[layer - 1])
+      return Error{ErrorCode::Usage, "layer_sweeps: layer " + std::to_string(layer) + " has " +
+                                         std::to_string(sweeps[layer]) +
+                                         " sweeps, more than the layer before: give at most " +
+                                         std::to_string(sweeps[layer - 1])};
+  if (d.boundary > world::Boundary::Graded)
+    return out_of_range("boundary", static_cast<int>(d.boundary), "0 (frozen) to 1 (graded)");
+  if (d.far_interval < 1 || d.far_interval > kMaxFarInterval)
+    return out_of_range("far_interval", d.far_interval, "1 to 4 ticks");
+  if (d.far_sweeps > kMaxFarSweeps)
+    return out_of_range("far_sweeps", d.far_sweeps, "0 (as the organ needs) to 16");
+  if (!(d.over_relaxation >= 1.0f && d.over_relaxation <= 1.9f))
+    return out_of_range("over_relaxation", d.over_relaxation, "1 to 1.9");
+  return {};
+}
+
+Simulation::Simulation(organ::Organ organ, unsigned workers,
+                       std::shared_ptr<const organ::LocalReduction> reduction)
+    : Simulation(scene_of(std::move(organ), std::move(reduction)), workers) {}
+
+Simulation::Simulation(std::shared_ptr<const Scene> scene, unsigned workers)
+    : scene_(std::move(scene)),
+      workers_(workers),
+      state_(std::make_unique<State>(scene_->organ, models_of(*scene_))),
+      context_(std::make_unique<StepContext>(*scene_, workers_, *state_)) {}
+
+Simulation Simulation::beside(unsigned workers) const {
+  return {scene_, workers};
+}
+
+const TickReport& Simulation::tick(const hands::TickInputs& inputs,
+                                   const TickDecisions& decisions) {
+  if (inputs.mark != hands::MarkAction::None) use_mark(inputs.mark);
+  context_->inputs = &inputs;
+  context_->decisions = decisions;
+  run_tick(*state_, *context_);
+  context_->inputs = nullptr;
+  return context_->report;
+}
+
+void Simulation::use_mark(hands::MarkAction action) {
+  MarkEvent event{state_->world.tick + 1, action, true};
+  if (action == hands::MarkAction::Set) {
+    state_->set_mark();
+    context_->mark_events.push_back(event);
+    return;
+  }
+  auto marked = state_->returned_to_mark(scene_->organ);
+  auto context = marked ? context_of(*marked) : nullptr;
+  event.is_done = context != nullptr;
+  if (event.is_done) {
+    state_ = std::move(marked);
+    context->claim_events = std::move(context_->claim_events);
+    context->mark_events = std::move(context_->mark_events);
+    context->solver_changes = std::move(context_->solver_changes);
+    context_ = std::move(context);
+  }
+  context_->mark_events.push_back(event);
+}
+
+std::unique_ptr<StepContext> Simulation::context_of(const State& state) const {
+  auto context = std::make_unique<StepContext>(*scene_, workers_, state);
+  if (state.reduced && !context->reduced->resume(*state.reduced)) return nullptr;
+  return context;
+}
+
+void Simulation::write_snapshot(Bytes& out) const {
+  auto archive = world::StateArchive::writing(out);
+  state_->visit(archive);
+}
+
+std::uint64_t Simulation::state_hash() const {
+  StateHasher hasher;
+  auto archive = world::StateArchive::hashing(hasher);
+  state_->visit(archive);
+  return hasher.digest();
+}
+
+Status Simulation::restore_snapshot(BytesView snapshot) {
+  auto restored = std::make_unique<State>(scene_->organ, models_of(*scene_));
+  auto archive = world::StateArchive::reading(snapshot);
+  restored->visit(archive);
+  auto context = archive.ok() && archive.at_end() ? context_of(*restored) : nullptr;
+  if (!context)
+    return Error{ErrorCode::BadFile, "snapshot: " + std::to_string(snapshot.size()) +
+                                         " bytes do not hold a state of this organ (" +
+                                         std::to_string(scene_->organ.mesh.node_count()) +
+                                         " nodes)"};
+  state_ = std::move(restored);
+  context_ = std::move(context);
+  return {};
+}
+
+}  // namespace trocar::step

@@ -1,0 +1,60 @@
+#pragma once
+
+// The simulation as everybody outside sees it: inputs and decisions in, reports and frames out,
+// snapshots both ways. Used by the server, by re-simulation of journals, and by tests. One thread
+// at a time.
+
+#include <memory>
+
+#include "server/tissue/step/tick.h"
+
+namespace trocar::step {
+
+// Checks ranges of what a person or a journal may choose; error names the field and the limit.
+Status validate(const TickDecisions& decisions);
+
+class Simulation {
+ public:
+  // workers: threads that share the solver's work; results do not depend on it.
+  // reduction: of this organ, with which its tissue may be moved; null: none.
+  explicit Simulation(organ::Organ organ, unsigned workers = 1,
+                      std::shared_ptr<const organ::LocalReduction> reduction = nullptr);
+
+  // Another one of the same organ and reduction, at the beginning. Shares with this one what
+  // never changes, so that they may be used by two threads.
+  Simulation beside(unsigned workers) const;
+
+  // Simulates one tick. After a tick that publishes, take_frame() has the frame. Returning to a
+  // mark costs as much as beginning a session.
+  const TickReport& tick(const hands::TickInputs& inputs, const TickDecisions& decisions);
+
+  // The frame of the last tick, or null. Not yet shared, so the caller may add what is not
+  // simulation: statistics, a snapshot for the journal. Frame f shows the state after tick 16 f.
+  std::shared_ptr<PublishedFrame> take_frame() { return std::move(context_->frame); }
+
+  // Full state: all that the tick hash covers.
+  void write_snapshot(Bytes& out) const;
+  // Replaces the state, or leaves it as it was and says what is wrong with the bytes.
+  Status restore_snapshot(BytesView snapshot);
+  std::uint64_t state_hash() const;
+
+  Tick current_tick() const { return state_->world.tick; }
+  const wire::SurfaceLayout& layout() const { return state_->cuts.layout(); }
+  const organ::Organ& organ() const { return scene_->organ; }
+  const State& state() const { return *state_; }
+  const StepContext& context() const { return *context_; }
+
+ private:
+  Simulation(std::shared_ptr<const Scene> scene, unsigned workers);
+
+  void use_mark(hands::MarkAction action);
+  // Null: the state is of another reduction's fields.
+  std::unique_ptr<StepContext> context_of(const State& state) const;
+
+  std::shared_ptr<const Scene> scene_;
+  unsigned workers_ = 1;
+  std::unique_ptr<State> state_;
+  std::unique_ptr<StepContext> context_;
+};
+
+}  // namespace trocar::step

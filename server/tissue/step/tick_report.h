@@ -1,0 +1,120 @@
+#pragma once
+
+// What a tick is told (TickDecisions) and what it says about itself (TickReport).
+
+#include <array>
+#include <cstdint>
+
+#include "common/base/tick.h"
+#include "server/tissue/world/world.h"
+
+namespace trocar::step {
+
+// Decided between ticks, recorded in the journal. Defaults: decisions that everything shares.
+struct TickDecisions {
+  std::uint32_t depth_limit = 3;    // propagation layers
+  std::uint32_t node_limit = 1200;  // nodes in the queue; may end inside a layer
+  std::uint32_t sweeps = 4;
+  float over_relaxation = 1.5f;  // 1 to 1.9; for fewer than 3 sweeps at most 1.3 is used
+
+  world::Boundary boundary = world::Boundary::Graded;
+  std::uint32_t far_sweeps = 0;  // Graded: of nodes outside the queue; 0: as the organ needs
+
+  // Of layer 1, of layer 2, and of layer 3 and deeper with nodes that have left the queue; never
+  // more than the layer before. 0: as the layer before. `sweeps` is of the touched nodes then.
+  std::array<std::uint32_t, 3> layer_sweeps{};
+
+  // Graded: forces in the far field from the energies, not from matrices about a recent pose.
+  bool is_far_exact = false;
+  std::uint32_t far_interval = 1;  // Graded: ticks from one sweep of a far node to the next
+
+  bool is_reduction_off = false;  // the full solver, whatever a session's reduction has
+
+  bool operator==(const TickDecisions&) const = default;
+};
+// Layers that have sweeps of their own: touched nodes, layer 1, layer 2, all beyond.
+inline constexpr std::size_t kSweepLayers = 4;
+using LayerCounts = std::array<std::uint32_t, kSweepLayers>;
+LayerCounts sweeps_of_layers(const TickDecisions& decisions);
+
+inline constexpr std::uint32_t kMaxDepthLimit = 1000;
+inline constexpr std::uint32_t kMaxNodeLimit = 10'000'000;
+inline constexpr std::uint32_t kMaxSweeps = 64;
+inline constexpr std::uint32_t kMaxFarSweeps = 16;
+inline constexpr std::uint32_t kMaxFarInterval = 4;
+// Layers where nodes outside the queue stand still: shallower ones feel stiff.
+inline constexpr std::uint32_t kFrozenDepthLimit = 6;
+
+enum class Stage { Admit, Contacts, Queue, Solve, Cut, Claims, Hash, Publish };
+inline constexpr int kStageCount = 8;
+const char* name_of(Stage stage);
+
+// Error bits: what was dropped or degraded, and which limit to raise.
+enum TickFault : std::uint32_t {
+  kFaultInputDropped = 1u << 0,    // an input did not fit the state (empty slot, no such tool)
+  kFaultContactLimit = 1u << 1,    // more contact nodes than the contact list holds
+  kFaultOverRelaxation = 1u << 2,  // residual grew: the tick went on without over-relaxation
+  kFaultToolInside = 1u << 4,      // a tool appeared inside tissue: draw it back to touch
+  kFaultNonFinite = 1u << 3,       // a node's step was not finite: its region went back a tick
+  kFaultCutLimit = 1u << 5,        // the surface has as many triangles as may be: blades are blunt
+};
+
+// What blades did in one tick.
+struct CutReport {
+  std::uint32_t crossed_tets = 0, splits = 0;
+  double opened_area_m2 = 0;  // one side of the wound
+  double torn_area_m2 = 0;    // part of it
+  bool is_behind = false;     // work is left for later ticks
+  bool is_full = false;       // see kFaultCutLimit
+};
+
+struct TickReport {
+  Tick tick = 0;
+  std::array<std::uint32_t, kStageCount> stage_cpu_ns{};
+  std::uint32_t contact_nodes = 0;
+  std::uint32_t self_pairs = 0;   // of tissue near tissue, see server/tissue/contact/self_contact.h
+  std::uint32_t queue_nodes = 0;  // nodes the propagation reached
+  std::uint32_t active_nodes = 0;  // queue plus nodes that have not come to rest
+  LayerCounts layer_nodes{};       // active nodes that are not fixed, as in sweeps_of_layers()
+  std::uint32_t region_count = 0;
+  std::uint32_t inputs_dropped = 0;
+  std::uint32_t nodes_rejected = 0;          // see kFaultNonFinite
+  std::uint32_t nodes_restored = 0;          // likewise: put back, at rest
+  std::uint32_t sweeps = 0, far_sweeps = 0;  // of active nodes and of all others
+  std::uint64_t node_sweeps = 0;             // nodes stepped by the solver, all sweeps together
+  std::uint64_t far_node_sweeps = 0;         // of these, nodes outside the queue
+  bool is_far_linear = false;                // these were stepped by matrices
+  std::uint32_t far_interval = 1;            // in every so many ticks
+  bool is_reduced = false;                   // a patch of a reduction moved the far nodes
+  CutReport cut;
+  std::uint32_t faults = 0;  // TickFault bits
+  float residual_n = 0;      // root mean square nodal force imbalance in the last sweep
+  std::uint64_t state_hash = 0;
+};
+
+// What the rate controller has to say (server/session/control); for people, never an input of a
+// tick.
+enum class RateLevel : std::uint8_t {
+  Fixed,       // decisions are fixed: there is no controller
+  Full,        // all that was asked for
+  Reduced,     // less, within its limits
+  Overloaded,  // the least, and still too much: simulated time slows
+};
+const char* name_of(RateLevel level);
+
+struct RateFigures {
+  RateLevel level = RateLevel::Fixed;
+  float budget_us = 0, predicted_us = 0;  // of a tick's time; what the next one will take
+  std::uint64_t lowered = 0, raised = 0;  // steps in the whole session
+  float time_rate = 1;                    // simulated time over real time, last second
+};
+
+struct StageStatistics {
+  std::array<float, kStageCount> median_us{};
+  std::array<float, kStageCount> p99_us{};
+  float tick_median_us = 0, tick_p99_us = 0;
+  std::uint64_t slow_ticks = 0;  // ticks by which simulated time fell behind real time
+  RateFigures rate;
+};
+
+}  // namespace trocar::step

@@ -1,0 +1,64 @@
+#include "server/tissue/world/world.h"
+
+namespace trocar::world {
+
+World::World(const organ::Organ& organ)
+    : surface_nodes(organ.mesh.surface_nodes),
+      displacements(organ.mesh.node_count()),
+      velocities(organ.mesh.node_count()),
+      node_classes(organ.mesh.node_count(), NodeClass::Outer),
+      quiet_ticks(organ.mesh.node_count()),
+      far_poses(organ.mesh.node_count()),
+      relaxation(organ) {
+  const auto& mesh = organ.mesh;
+  rest_positions.reserve(mesh.node_count());
+  masses.reserve(mesh.node_count());
+  for (const auto& p : mesh.rest_positions) rest_positions.push_back(to_float(p));
+  for (const double m : organ.node_masses_kg) masses.push_back(static_cast<float>(m));
+  std::vector<double> areas(mesh.node_count());
+  for (const auto& [a, b, c] : mesh.boundary_triangles) {
+    const auto& p = mesh.rest_positions;
+    const double third = length(cross(p[b.value] - p[a.value], p[c.value] - p[a.value])) / 6.0;
+    for (const auto node : {a, b, c}) areas[node.value] += third;
+  }
+  for (const double area : areas) surface_areas.push_back(static_cast<float>(area));
+  for (const auto node : organ.fixed_nodes) node_classes[node.value] = NodeClass::Fixed;
+}
+
+void World::add_node(const Vec3d& rest_position, NodeIndex a, NodeIndex b, std::uint16_t t) {
+  const auto between = [&](const std::vector<Vec3f>& values) {
+    const Vec3f from = values[a.value], to = values[b.value];
+    return from + (to - from) * (static_cast<float>(t) / 65536.0f);
+  };
+  origins.push_back({a, b, t});
+  rest_positions.push_back(to_float(rest_position));
+  masses.push_back(0);
+  surface_areas.push_back(0);
+  displacements.push_back(between(displacements));
+  velocities.push_back(between(velocities));
+  const bool is_fixed =
+      node_classes[a.value] == NodeClass::Fixed && node_classes[b.value] == NodeClass::Fixed;
+  node_classes.push_back(is_fixed ? NodeClass::Fixed : NodeClass::Active);
+  quiet_ticks.push_back(0);
+  far_poses.add_node(a, b, t);
+  relaxation.add_node(a);
+}
+
+void World::visit_state(StateArchive& archive) {
+  archive.value(tick);
+  archive.value(boundary);
+  archive.fixed_array(displacements);
+  archive.fixed_array(velocities);
+  archive.fixed_array(node_classes);
+  archive.fixed_array(quiet_ticks);
+  far_poses.visit_state(archive);
+  relaxation.visit_state(archive);
+  if (!archive.is_reading()) return;
+  if (boundary > Boundary::Graded) archive.fail();
+  for (std::size_t i = 0; i < node_count(); ++i)
+    if (node_classes[i] > NodeClass::Active || !is_finite(displacements[i]) ||
+        !is_finite(velocities[i]))
+      archive.fail();
+}
+
+}  // namespace trocar::world

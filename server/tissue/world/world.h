@@ -1,0 +1,71 @@
+#pragma once
+
+// The authoritative tissue state as arrays over nodes, in the organ's own numbering.
+//
+// Displacements are float32 relative to rest (the rest pose stays in double in the organ), so a
+// micrometre is still exact a metre from the origin. Invariants: fixed nodes have zero displacement
+// and velocity, except those that a scenario moves; everything is finite. Owned by the simulation
+// thread; nobody else sees it.
+
+#include <vector>
+
+#include "common/base/tick.h"
+#include "common/math/vec3.h"
+#include "server/organs/organ/organ.h"
+#include "server/tissue/world/far_poses.h"
+#include "server/tissue/world/relaxation_state.h"
+#include "server/tissue/world/state_archive.h"
+
+namespace trocar::world {
+
+enum class NodeClass : std::uint8_t {
+  Fixed = 0,   // held by ligaments: never moves
+  Outer = 1,   // away from all contacts: at rest (Frozen), or swept less (Graded)
+  Active = 2,  // in the queue, or not long ago
+};
+
+// What nodes outside the queue do.
+enum class Boundary : std::uint8_t {
+  Frozen = 0,  // stand still (Choi 2002, Nakao 2003)
+  Graded = 1,  // move every tick, with fewer sweeps
+};
+
+// Of a node that a cut made: t/65536 of the way from a to b, which were there before it.
+struct NodeOrigin {
+  NodeIndex a, b;
+  std::uint16_t t = 0;
+};
+
+struct World {
+  explicit World(const organ::Organ& organ);
+
+  std::size_t node_count() const { return displacements.size(); }
+  Vec3f position(NodeIndex node) const {
+    return rest_positions[node.value] + displacements[node.value];
+  }
+
+  // Constant in a session.
+  std::vector<Vec3f> rest_positions;  // m, world frame
+  std::vector<float> masses;          // kg
+  std::vector<float> surface_areas;   // m^2 of boundary triangles per node, 0 inside
+  std::vector<NodeIndex> surface_nodes;
+  std::vector<NodeOrigin> origins;  // of the nodes beyond the organ's own
+
+  // State, in snapshot and hash.
+  Tick tick = 0;                         // ticks done
+  Boundary boundary = Boundary::Frozen;  // of the last tick
+  std::vector<Vec3f> displacements;      // m, from rest
+  std::vector<Vec3f> velocities;         // m/s
+  std::vector<NodeClass> node_classes;
+  std::vector<std::uint16_t> quiet_ticks;  // ticks in a row below the freezing thresholds
+  FarPoses far_poses;                      // about which the far field is linear
+  RelaxationState relaxation;              // of stresses, per tet
+
+  // A node between a and b, t/65536 of the way from a; a copy of a where b is a. Moves with them,
+  // fixed where both are, with no mass and no surface yet.
+  void add_node(const Vec3d& rest_position, NodeIndex a, NodeIndex b, std::uint16_t t);
+
+  void visit_state(StateArchive& archive);
+};
+
+}  // namespace trocar::world
