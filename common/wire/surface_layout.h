@@ -1,15 +1,17 @@
 #pragma once
 
-// Which nodes of an organ its surface stream carries, and in which slots. Server, journal and tests
-// build it from the organ; clients receive it as a SurfaceTopology message. Cuts change it by
+// Which nodes of an organ its surface stream carries, and in which slots. The server builds it from
+// the organ at rest; clients receive it as a SurfaceTopology message. Cuts change it by
 // SurfaceChange (surface_change.h) only.
 
+#include <array>
+#include <span>
 #include <vector>
 
 #include "common/base/index.h"
+#include "common/math/vec3.h"
 #include "common/wire/quantise.h"
 #include "common/wire/surface_change.h"
-#include "server/organs/organ/organ.h"
 
 namespace trocar::wire {
 
@@ -33,6 +35,14 @@ struct SurfaceLayout {
   bool operator==(const SurfaceLayout&) const = default;
 };
 
-SurfaceLayout make_surface_layout(const organ::Organ& organ);
+// An organ's surface at rest, as arrays: this folder knows no organs.
+struct RestSurface {
+  std::span<const Vec3d> rest_positions_m;  // per node, interior ones included
+  std::span<const NodeIndex> surface_nodes;
+  std::span<const std::array<NodeIndex, 3>> triangles;  // corners are surface nodes
+  std::span<const NodeIndex> fixed_nodes;               // interior ones are left out of the layout
+};
+
+SurfaceLayout make_surface_layout(const RestSurface& surface);
 
 }  // namespace trocar::wire
