@@ -16,11 +16,11 @@
 #include <string>
 #include <vector>
 
-#include "server/organs/organ/reduction.h"
+#include "server/organs/organ/reduced_organ.h"
 
 namespace trocar::organ {
 
-// kMaxReducedModes (reduction.h) is the most modes of a patch, and the most vibrations.
+// kMaxReducedModes (reduced_organ.h) is the most modes of a patch, and the most vibrations.
 inline constexpr std::size_t kMaxLocalPatches = 4096;
 inline constexpr std::size_t kMaxLocalFields = 400;  // of a patch, see field_count()
 inline constexpr std::size_t kMaxGreensFunctions = 100000;
