@@ -1,6 +1,6 @@
 #pragma once
 
-// The calibrate command of trocar-organ.
+// This is the calibrate command of trocar-organ.
 
 #include <CLI/CLI.hpp>
 #include <string>

@@ -1,6 +1,6 @@
 #pragma once
 
-// The identify command of trocar-organ.
+// This is the identify command of trocar-organ.
 
 #include <CLI/CLI.hpp>
 #include <string>

@@ -108,7 +108,8 @@ EdgeLengths edge_lengths(const mesh::TetMesh& mesh) {
   return lengths;
 }
 
-// Of what the surface encloses: that of the tets where there are any, and of a lattice too.
+// Returns the volume that the surface encloses: that of the tets where there are any, and that of a
+// lattice too.
 double enclosed_volume(const mesh::TetMesh& mesh) {
   double volume = 0;
   for (const auto& [a, b, c] : mesh.boundary_triangles)
@@ -308,7 +309,7 @@ Status save(const organ::Organ& organ, const std::string& path) {
   return {};
 }
 
-// That of a scenario, with its materials, regions and held nodes.
+// Makes the organ of a scenario, with its materials, regions and held nodes.
 Result<organ::Organ> make_from_scenario(const std::string& path, const std::optional<int>& tets) {
   if (tets)
     return Error{ErrorCode::Usage, "make " + path +

@@ -1,6 +1,6 @@
 #pragma once
 
-// The reduce command of trocar-organ.
+// This is the reduce command of trocar-organ.
 
 #include <CLI/CLI.hpp>
 #include <filesystem>

@@ -30,7 +30,7 @@ const char* name_of(LocalStage stage) {
   return "";
 }
 
-// What the other method asks for, and what both do with defaults of their own.
+// Refuses options of the other method, and takes those that both have with their own defaults.
 Status take_settings(ReduceCommand& command) {
   for (const char* option : {"--places", "--magnitudes", "--radius", "--tangents", "--creep-nodes",
                              "--creep-seconds", "--influence", "--check-creep"})

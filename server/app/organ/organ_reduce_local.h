@@ -5,7 +5,7 @@
 
 namespace trocar::app {
 
-// The reduce command with --method local.
+// Runs the reduce command with --method local.
 Status run_reduce_local(ReduceCommand command);
 
 }  // namespace trocar::app

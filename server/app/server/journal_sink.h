@@ -1,7 +1,7 @@
 #pragma once
 
-// Where a session is recorded: the seam between the server's threads and its journal. Nothing here
-// may block: an implementation queues and lets a thread of its own write.
+// A session is recorded through this sink: it is the seam between the server's threads and its
+// journal. Nothing here may block: an implementation queues and lets a thread of its own write.
 
 #include <memory>
 #include <optional>

@@ -14,7 +14,7 @@ class Pacer {
  public:
   explicit Pacer(std::uint64_t now_ns) : due_ns_(now_ns) {}
 
-  // Absolute time of the next tick.
+  // Returns the absolute time of the next tick.
   std::uint64_t due_ns() const { return due_ns_; }
 
   // The next tick begins at `now_ns` >= due_ns().

@@ -47,7 +47,7 @@ Tick ticks_of(double seconds) {
   return static_cast<Tick>(std::llround(seconds * static_cast<double>(kTicksPerSecond)));
 }
 
-// What a session has of --reduction; neither without one.
+// A session has these of --reduction; it has neither without one.
 struct Reduction {
   std::shared_ptr<const organ::LocalReduction> model;
   std::optional<journal::ReductionDescription> description;

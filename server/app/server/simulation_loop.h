@@ -38,7 +38,7 @@ struct StageTimes {
   step::StageStatistics statistics() const;  // slow_ticks stays 0
 };
 
-// What the rate controller decided, over the whole run.
+// The report says what the rate controller decided, over the whole run.
 struct RateReport {
   std::array<Tick, 4> ticks_at{};                          // by step::RateLevel
   std::array<std::uint64_t, step::kSweepLayers> sweeps{};  // sums over ticks in contact, by layer
@@ -50,7 +50,7 @@ struct RateReport {
   void add(const step::TickDecisions& decisions, bool has_contact, step::RateLevel level);
 };
 
-// Which solver acted, over the whole run of a session with a reduction.
+// The report says which solver acted, over the whole run of a session with a reduction.
 struct SolverReport {
   Tick reduced_ticks = 0, full_ticks = 0;
   std::uint64_t to_reduced = 0, to_full = 0, to_another_patch = 0;  // hand-overs
@@ -93,7 +93,7 @@ class SimulationLoop {
   ~SimulationLoop();
 
   void start();
-  // A snapshot soon, in a frame; any thread.
+  // Asks for a snapshot soon, in a frame; any thread may call it.
   void request_snapshot() { is_snapshot_requested_.store(true, std::memory_order_relaxed); }
   void request_stop() { is_stop_requested_.store(true, std::memory_order_relaxed); }  // any thread
   // After `ended` was called, or start() never was.

@@ -76,7 +76,7 @@ class Outputs {
         probes_(std::move(probes)),
         field_times_(solve.resolved().scenario.field_times_s, step_of(solve)) {}
 
-  // Of the state at time 0, which has no row of probes.
+  // Adds the state at time 0, which has no row of probes.
   Status add_start(const ScenarioSolve& solve) { return add_due_field(solve); }
   Status add(const ScenarioSolve& solve) {
     std::vector<std::optional<Vec3d>> values(solve.resolved().scenario.probes.size());

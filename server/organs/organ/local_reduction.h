@@ -27,7 +27,7 @@ inline constexpr std::size_t kMaxGreensFunctions = 100000;
 inline constexpr std::uint32_t kMaxFreeLayers = 3;
 inline constexpr double kMaxLocalForce_n = 100;
 inline constexpr float kMaxCubatureWeight = 1e6f;
-// Of a field: with it, displacements per force reach 33 km/N.
+// A field's step is at most this: with it, displacements per force reach 33 km/N.
 inline constexpr float kMaxFieldStep = 1;
 // Largest deviation of a patch's modes' products from 1 and 0. Packing makes up to 3e-5 of exactly
 // orthonormal fields, smooth or with a peak of a few nodes, on meshes of 18 to 100,000 nodes.

@@ -22,8 +22,8 @@ inline constexpr std::string_view kDoganReductionMagic = "TROCARR1";
 Status write_local_reduction(const std::filesystem::path& path, const LocalReduction& reduction);
 // Refuses one of another organ, too.
 Result<LocalReduction> read_local_reduction(const std::filesystem::path& path, const Organ& organ);
-// As read_local_reduction(), for sessions: refuses also an organ that they can have none of, and
-// one of another density.
+// Does the same as read_local_reduction(), for sessions: it refuses also an organ that they can
+// have none of, and one of another density.
 Result<LocalReduction> read_session_reduction(const std::filesystem::path& path,
                                               const Organ& organ);
 

@@ -17,7 +17,7 @@ inline constexpr std::size_t kMaxReducedModes = 64;
 std::uint64_t mesh_hash(const Organ& organ);
 std::uint64_t elasticity_hash(const Organ& organ);
 
-// What a reduction, of whichever method, says of its organ.
+// A reduction, of whichever method, says this of its organ.
 struct ReducedOrgan {
   std::uint32_t node_count = 0;
   std::uint64_t mesh_hash = 0, elasticity_hash = 0;

@@ -17,7 +17,8 @@ using namespace reduce;
 namespace {
 
 constexpr double kSlant = 40 * std::numbers::pi / 180;
-// Of 20 s. Steps of the full model, so that the fast term of table 1 (0.58 s) is followed.
+// These times are of 20 s. They are steps of the full model, so that the fast term of table 1 (0.58
+// s) is followed.
 constexpr std::array kCreepTimes{0.0, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0,  1.5, 2.0,
                                  3.0, 4.0, 5.5, 7.5,  10., 13.,  16.5, 20.0};
 // A neighbour that moves less than this part of the loaded node has no growth of its own.
@@ -75,7 +76,7 @@ Vector at_node(const Vector& all, NodeIndex node) {
   return all.segment<3>(3 * static_cast<Eigen::Index>(node.value));
 }
 
-// Displacement at each time along that at once, over it.
+// Returns the displacement at each time along that at once, over it.
 std::vector<double> growth_of(const std::vector<Vector>& displacements) {
   std::vector<double> growth{1};
   for (std::size_t i = 1; i < displacements.size(); ++i)

@@ -78,7 +78,7 @@ Result<Built> reduce(FullModel& model, const Training& training, const Settings&
 void add_creep(FullModel& model, const Settings& settings, Reduction& reduction,
                const Progress& progress = {});
 
-// Of the stored curves: denser at first, when tissue is fast.
+// Returns the times of the stored curves: they are denser at first, when tissue is fast.
 std::vector<double> creep_times(double seconds);
 
 }  // namespace trocar::dogan

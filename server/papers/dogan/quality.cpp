@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kSlant = 20 * std::numbers::pi / 180;
 constexpr std::array kShares{0.3, 0.85};
-// Of the first unseen press among all: its azimuths are between those of the training.
+// The first unseen press has this number among all: its azimuths are between those of the training.
 constexpr std::size_t kFirst = 1001;
 
 Eigen::Vector3d at_node(const Vector& all, NodeIndex node) {

@@ -36,7 +36,7 @@ struct Quality {
     double contact_ratio = 0;  // mean of the contact's reduced over its full displacement
   } initial, best;
 };
-// Of the first `modes` modes, 0: all.
+// Measures the first `modes` modes; 0 stands for all.
 Quality quality_of(const Reduction& reduction, const organ::Organ& organ,
                    std::span<const Unseen> loads, std::size_t modes = 0);
 

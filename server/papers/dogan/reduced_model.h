@@ -16,7 +16,8 @@ using reduce::Matrix;
 using reduce::NodeForce;
 using reduce::Vector;
 
-// Of the tissue at rest, or the one of all stored that erred least in the training.
+// The tangent is that of the tissue at rest, or the one of all stored that erred least in the
+// training.
 enum class TangentChoice : std::uint8_t { Initial, Best };
 
 class ReducedModel {
@@ -45,8 +46,8 @@ class CreepFactors {
 
   bool empty() const { return reduction_.creep.empty(); }
   const CreepCurve& curve_near(NodeIndex loaded) const;
-  // What a node's displacement is after a time over that at once; linear between stored times, the
-  // last one after them. 1 without curves.
+  // Returns a node's displacement after a time over that at once; it is linear between stored
+  // times, the last one after them. 1 without curves.
   double growth(NodeIndex loaded, NodeIndex node, double time_s) const;
   // Scales displacements at once (3 per node) to those after a time.
   void scale(NodeIndex loaded, double time_s, Vector& displacements) const;

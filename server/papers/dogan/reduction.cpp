@@ -9,7 +9,7 @@ namespace trocar::dogan {
 namespace {
 
 constexpr double kSymmetry = 1e-9;
-// What tissue may grow by, beyond what any relaxation of ours can give.
+// Tissue may grow by this factor, which is beyond what any relaxation here can give.
 constexpr double kMaxGrowth = 1e4;
 
 Error bad(const std::string& what) {

@@ -25,7 +25,7 @@ struct CreepNeighbour {
   bool operator==(const CreepNeighbour&) const = default;
 };
 
-// Creep under a constant force around one surface node.
+// A curve holds the creep under a constant force around one surface node.
 struct CreepCurve {
   NodeIndex node;
   std::vector<double> overall_growth;      // of nodes beyond the radius of influence; per time

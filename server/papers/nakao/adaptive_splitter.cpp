@@ -300,7 +300,7 @@ void AdaptiveSplitter::pull_all(CutMesh& mesh) {
   }
 }
 
-// Of the neighbours of nodes that moved, those that are not on the wound.
+// Smooths those neighbours of nodes that moved that are not on the wound.
 void AdaptiveSplitter::smooth(CutMesh& mesh, const Stroke& stroke) {
   std::vector<NodeIndex> beside;
   for (const auto node : pulled_)

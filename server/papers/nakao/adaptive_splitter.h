@@ -53,7 +53,7 @@ class AdaptiveSplitter final : public cutting::PatchSplitter {
   using Stroke = cutting::Stroke;
   using PatchTriangle = cutting::PatchTriangle;
 
-  // Where an edge crosses the plane.
+  // An edge crosses the plane here.
   struct Crossing {
     NodeIndex a, b;  // a < b
     double t = 0;
