@@ -26,7 +26,8 @@ struct StartView {
 
 struct ClientOptions {
   std::string server = "127.0.0.1:7690";
-  std::string name;  // empty: made from the login name and the process
+  double wait_s = 15;  // for a server that is not there yet
+  std::string name;    // empty: made from the login name and the process
   replica::Role role = replica::Role::Surgeon;
   Display display = Display::Window;
   render::Size size{1280, 720};

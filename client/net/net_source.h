@@ -30,7 +30,7 @@ struct NetSourceOptions {
   std::string participant_name;
   int role = 1;                        // proto::Role
   std::vector<tool::ToolShape> tools;  // empty: one default tool for roles that have tools
-  std::chrono::milliseconds connect_deadline{5000};
+  std::chrono::milliseconds connect_deadline{15000};  // a server may still be starting
   std::chrono::milliseconds connect_retry{200};
   std::chrono::milliseconds ping_interval{200};
   std::chrono::milliseconds silence_deadline{10000};  // nothing from the server: lost

@@ -39,23 +39,40 @@ namespace trocar::tool {
 namespace trocar::tool {
 
 // The first error wins; later reads return defaults, so that a reader checks once at the end.
+// One error gives way: that a key is missing, to an unknown key of the same table, because the one
+// is most likely the other misspelt.
 class Document {
  public:
   explicit Document(std::string_view source) : source_(source) {}
 
   void fail(const toml::source_region& at, const std::string& key, const std::string& what) {
+    if (!error_) set(at, key, what);
+  }
+  void fail_missing(const toml::table& table, const std::string& key, const std::string& what) {
     if (error_) return;
-    std::string message(source_);
-    if (at.begin.line > 0) message += ":" + std::to_string(at.begin.line);
-    if (!key.empty()) message += ": key " + key;
-    error_ = Error{ErrorCode::BadFile, message + ": " + what};
+    set(table.source(), key, what);
+    lacks_a_key_ = &table;
+  }
+  void fail_unknown(const toml::table& table, const toml::source_region& at, const std::string& key,
+                    const std::string& what) {
+    if (error_ && lacks_a_key_ != &table) return;
+    lacks_a_key_ = nullptr;
+    set(at, key, what);
   }
   bool ok() const { return !error_; }
   const Error& error() const { return *error_; }
 
  private:
+  void set(const toml::source_region& at, const std::string& key, const std::string& what) {
+    std::string message(source_);
+    if (at.begin.line > 0) message += ":" + std::to_string(at.begin.line);
+    if (!key.empty()) message += ": key " + key;
+    error_ = Error{ErrorCode::BadFile, message + ": " + what};
+  }
+
   std::string source_;
   std::optional<Error> error_;
+  const toml::table* lacks_a_key_ = nullptr;  // the table of a missing key, if that is the error
 };
 
 // A number as a person would write it.
@@ -83,7 +100,10 @@ class TableReader {
   }
   void fail(std::string_view key, const std::string& what) {
     const toml::node* node = table_.get(key);
-    document_.fail(node != nullptr ? node->source() : table_.source(), path_of(key), what);
+    if (node != nullptr || key.empty())
+      document_.fail(node != nullptr ? node->source() : table_.source(), path_of(key), what);
+    else
+      document_.fail_missing(table_, path_of(key), what);
   }
 
   // For a key that has to be there: if it is there in another unit, that is what is wrong.
@@ -235,10 +255,11 @@ class TableReader {
       if (std::find(known_.begin(), known_.end(), name) != known_.end()) continue;
       for (const auto& known : known_)
         if (const auto hint = unit_hint(name, node, known))
-          document_.fail(key.source(), path_of(name), *hint);
+          document_.fail_unknown(table_, key.source(), path_of(name), *hint);
       std::string all;
       for (const auto& known : known_) all += (all.empty() ? "" : ", ") + known;
-      document_.fail(key.source(), path_of(name), "is unknown, the keys here are " + all);
+      document_.fail_unknown(table_, key.source(), path_of(name),
+                             "is unknown, the keys here are " + all);
     }
   }
 

@@ -1,7 +1,7 @@
 #pragma once
 
 // The rules of the architecture. Each returns its breaches, one line each: "path:line: what, what
-// to do". README, "Folders" and "Contracts", says the same to a person.
+// to do". docs/the-source.md says the same.
 
 #include <string>
 #include <vector>

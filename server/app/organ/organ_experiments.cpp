@@ -1,5 +1,7 @@
 #include "server/app/organ/organ_experiments.h"
 
+#include <unistd.h>
+
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -42,6 +44,7 @@ plot::Plot to_plot(const fit::MeasuredCurve& measured, const fit::Fit& fit) {
 }
 
 void print_progress(int run, const std::vector<fit::FittedParameter>& tried, double rms_n) {
+  if (::isatty(STDERR_FILENO) == 0) return;
   std::fprintf(stderr, "%s: run %d:", kProgram, run);
   for (const auto& p : tried) std::fprintf(stderr, " %s %.6g", p.key.c_str(), p.value);
   std::fprintf(stderr, ", rms %.4g N\n", rms_n);

@@ -3,21 +3,20 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
-#include <cinttypes>
 #include <cstdio>
 #include <filesystem>
-#include <numeric>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
 
 #include "common/base/cpu.h"
 #include "common/base/log.h"
-#include "common/base/quote.h"
 #include "common/base/version.h"
 #include "server/app/organ/organ_calibrate.h"
 #include "server/app/organ/organ_experiments.h"
 #include "server/app/organ/organ_identify.h"
+#include "server/app/organ/organ_print.h"
 #include "server/app/organ/organ_reduce.h"
 #include "server/lab/scenario/scenario.h"
 #include "server/organs/catalogue/builtin_organs.h"
@@ -51,6 +50,8 @@ Examples:
       the organ of a scenario, here of several materials, into tumour.organ
   trocar-organ import spleen.msh --unit mm --fix back:0.1
       a mesh in millimetres, held at the hindmost tenth, into spleen.organ
+  trocar-organ import spleen.msh --law neo-hookean --young-modulus 6000
+      the same mesh, in metres, of neo-Hookean tets of 6 kPa
   trocar-organ inspect spleen.organ --json
       its figures, for other programs
   trocar-organ settle spleen.organ --gravity 0,-9.81,0
@@ -79,6 +80,8 @@ struct Options {
   std::string unit = "m";
   std::string fix = "bottom:0.2";
   std::string import_name;
+  std::string law;
+  std::optional<double> young_modulus_pa, poisson_ratio;
   std::string inspected;
   bool json = false;
   bool has_averaged_strain = false;
@@ -88,217 +91,6 @@ struct Options {
   IdentifyCommand identify;
   ReduceCommand reduce;
 };
-
-struct EdgeLengths {
-  double min_mm = 0, mean_mm = 0, max_mm = 0;
-};
-
-// Lengths of the springs' edges.
-EdgeLengths edge_lengths(const mesh::TetMesh& mesh) {
-  EdgeLengths lengths;
-  const auto& pairs = mesh.spring_pairs();
-  if (pairs.empty()) return lengths;
-  lengths.min_mm = 1e9;
-  for (const auto& [a, b] : pairs) {
-    const double l = 1e3 * length(mesh.rest_positions[b.value] - mesh.rest_positions[a.value]);
-    lengths.min_mm = std::min(lengths.min_mm, l);
-    lengths.max_mm = std::max(lengths.max_mm, l);
-    lengths.mean_mm += l / static_cast<double>(pairs.size());
-  }
-  return lengths;
-}
-
-// Returns the volume that the surface encloses: that of the tets where there are any, and that of a
-// lattice too.
-double enclosed_volume(const mesh::TetMesh& mesh) {
-  double volume = 0;
-  for (const auto& [a, b, c] : mesh.boundary_triangles)
-    volume += dot(cross(mesh.rest_positions[a.value], mesh.rest_positions[b.value]),
-                  mesh.rest_positions[c.value]) /
-              6;
-  return volume;
-}
-
-Vec3d size_mm(const mesh::TetMesh& mesh) {
-  Vec3d half{};  // the rest bounding box is centred on the origin
-  for (const Vec3d& p : mesh.rest_positions)
-    half = {std::max(half.x, p.x), std::max(half.y, p.y), std::max(half.z, p.z)};
-  return half * 2e3;
-}
-
-double mass_kg(const organ::Organ& organ) {
-  return std::accumulate(organ.node_masses_kg.begin(), organ.node_masses_kg.end(), 0.0);
-}
-
-std::string grouped(std::size_t number) {
-  std::string digits = std::to_string(number);
-  for (auto i = static_cast<int>(digits.size()) - 3; i > 0; i -= 3)
-    digits.insert(static_cast<std::size_t>(i), ",");
-  return digits;
-}
-
-const char* name_of(material::ElasticLaw law) {
-  switch (law) {
-    case material::ElasticLaw::Springs:
-      return "springs";
-    case material::ElasticLaw::TensorMass:
-      return "tensor-mass";
-    case material::ElasticLaw::NeoHookean:
-      return "neo-hookean";
-    case material::ElasticLaw::Measured:
-      return "measured";
-  }
-  return "";
-}
-
-std::size_t nodes_with_fibres(const organ::Organ& organ) {
-  return static_cast<std::size_t>(
-      std::ranges::count_if(organ.fibre_directions, [](const Vec3d& f) { return f != Vec3d{}; }));
-}
-
-void print_fibres(const material::Material& m) {
-  if (length(m.fibre_direction) > 0)
-    std::printf("  fibres              along %.3g %.3g %.3g\n", m.fibre_direction.x,
-                m.fibre_direction.y, m.fibre_direction.z);
-  if (m.fibre_stiffness_ratio != 1 || m.fibre_tension != 0)
-    std::printf("  along fibres        %.4g times as stiff, tension %.4g\n",
-                m.fibre_stiffness_ratio, m.fibre_tension);
-}
-
-void print_measured(const material::HyperelasticMaterial& m) {
-  std::printf("  elasticity          measured, %s (%s)\n", m.name.c_str(), m.source.c_str());
-  if (m.energy == material::StrainEnergy::Exponential) {
-    std::printf("  C10, exponent       %.4g kPa, %.4g", m.coefficients_pa[0] / 1e3, m.exponent);
-  } else {
-    std::printf("  C10 to C50         ");
-    for (const double c : m.coefficients_pa) std::printf(" %.4g", c / 1e3);
-    std::printf(" kPa");
-  }
-  std::printf("; bulk modulus %.4g kPa\n", m.bulk_modulus_pa / 1e3);
-  for (const auto& [weight, time_s] : m.relaxation)
-    std::printf("  relaxes             by %.4g in %.4g s\n", weight, time_s);
-}
-
-void print_material(const material::Material& m) {
-  if (m.elastic_law == material::ElasticLaw::Measured)
-    print_measured(m.measured);
-  else if (m.elastic_law != material::ElasticLaw::Springs)
-    std::printf("  elasticity          %s, Young's modulus %.4g kPa, Poisson's ratio %.4g\n",
-                name_of(m.elastic_law), m.young_modulus_pa / 1e3, m.poisson_ratio);
-  else if (m.spring_law == material::SpringLaw::Constant)
-    std::printf("  springs             constant, %.4g N/m\n", m.spring_stiffness_n_m);
-  else
-    std::printf("  springs             from Young's modulus %.4g kPa\n", m.young_modulus_pa / 1e3);
-  if (m.has_averaged_strain) std::printf("  strain              averaged over nodes\n");
-  print_fibres(m);
-  if (m.tension > 0) std::printf("  tension             %.4g\n", m.tension);
-  std::printf("  cutting             %.4g J/m^2 of wound, %.4g kPa on the blade's sides\n",
-              m.cut_energy_j_m2, m.blade_friction_pa / 1e3);
-  if (m.tear_stretch > 0)
-    std::printf("  tears               at %.4g times its length\n", m.tear_stretch);
-  std::printf("  density             %.4g kg/m^3\n", m.density_kg_m3);
-  std::printf("  damping             %.4g 1/s per node, %.4g ms along springs\n",
-              m.node_damping_per_s, m.spring_damping_time_s * 1e3);
-}
-
-void print_materials(const organ::Organ& organ) {
-  print_material(organ.material);
-  if (!organ.fibre_directions.empty())
-    std::printf("  directed fibres     at %s nodes\n", grouped(nodes_with_fibres(organ)).c_str());
-  for (const auto& region : organ.regions) {
-    std::printf("  region              %s, %s nodes:\n", region.name.c_str(),
-                grouped(region.nodes.size()).c_str());
-    print_material(region.material);
-  }
-  const Vec3d& g = organ.gravity_m_s2;
-  if (length(g) > 0) std::printf("  gravity             %.4g %.4g %.4g m/s^2\n", g.x, g.y, g.z);
-  if (!organ.stress_free_positions_m.empty())
-    std::printf("  rest pose           settled, in equilibrium\n");
-}
-
-void print_text(const organ::Organ& organ) {
-  const mesh::TetMesh& mesh = organ.mesh;
-  const Vec3d size = size_mm(mesh);
-  const EdgeLengths edges = edge_lengths(mesh);
-  std::printf("%s  (%s)\n", organ.name.c_str(), organ.source.c_str());
-  std::printf("  nodes               %s, %s of them on the surface\n",
-              grouped(mesh.node_count()).c_str(), grouped(mesh.surface_nodes.size()).c_str());
-  std::printf("  tets                %s\n", grouped(mesh.tets.size()).c_str());
-  if (mesh.links.empty())
-    std::printf("  edges               %s\n", grouped(mesh.edges.size()).c_str());
-  else
-    std::printf("  links               %s\n", grouped(mesh.links.size()).c_str());
-  std::printf("  surface triangles   %s\n", grouped(mesh.boundary_triangles.size()).c_str());
-  std::printf("  size                %.1f x %.1f x %.1f mm\n", size.x, size.y, size.z);
-  std::printf("  volume              %.4g l\n", enclosed_volume(mesh) * 1e3);
-  std::printf("  mass                %.4g kg\n", mass_kg(organ));
-  std::printf("  edge lengths        %.2f / %.2f / %.2f mm (least, mean, largest)\n", edges.min_mm,
-              edges.mean_mm, edges.max_mm);
-  if (!mesh.tets.empty()) {
-    const auto angles = mesh::dihedral_range(mesh);
-    std::printf("  dihedral angles     %.1f to %.1f degrees\n", angles.min_deg, angles.max_deg);
-  }
-  print_materials(organ);
-  std::printf("  fixed nodes         %s (%.1f %%)\n", grouped(organ.fixed_nodes.size()).c_str(),
-              100.0 * static_cast<double>(organ.fixed_nodes.size()) /
-                  static_cast<double>(mesh.node_count()));
-  std::printf("  hash                %016" PRIx64 "\n", organ::organ_hash(organ));
-}
-
-// A JSON string. Names in files may hold any UTF-8, so only what JSON forbids is escaped.
-void print_json(const material::Material& m) {
-  std::printf("  \"elastic_law\": \"%s\",\n  \"poisson_ratio\": %.9g,\n", name_of(m.elastic_law),
-              m.poisson_ratio);
-  if (m.elastic_law == material::ElasticLaw::Measured)
-    std::printf("  \"measured\": %s,\n", quote(m.measured.name).c_str());
-  std::printf("  \"averaged_strain\": %s,\n", m.has_averaged_strain ? "true" : "false");
-  std::printf("  \"spring_law\": \"%s\",\n  \"spring_stiffness_n_m\": %.9g,\n",
-              m.spring_law == material::SpringLaw::Constant ? "constant" : "volume_consistent",
-              m.spring_stiffness_n_m);
-  std::printf("  \"young_modulus_pa\": %.9g,\n  \"density_kg_m3\": %.9g,\n", m.young_modulus_pa,
-              m.density_kg_m3);
-  std::printf("  \"node_damping_per_s\": %.9g,\n  \"spring_damping_time_s\": %.9g,\n",
-              m.node_damping_per_s, m.spring_damping_time_s);
-  std::printf("  \"fibre_direction\": [%.9g, %.9g, %.9g],\n  \"fibre_stiffness_ratio\": %.9g,\n",
-              m.fibre_direction.x, m.fibre_direction.y, m.fibre_direction.z,
-              m.fibre_stiffness_ratio);
-  std::printf("  \"fibre_tension\": %.9g,\n  \"tension\": %.9g,\n", m.fibre_tension, m.tension);
-  std::printf(
-      "  \"cut_energy_j_m2\": %.9g,\n  \"blade_friction_pa\": %.9g,\n  \"tear_stretch\": %.9g,\n",
-      m.cut_energy_j_m2, m.blade_friction_pa, m.tear_stretch);
-}
-
-void print_json(const organ::Organ& organ) {
-  const mesh::TetMesh& mesh = organ.mesh;
-  const Vec3d size = size_mm(mesh);
-  const EdgeLengths edges = edge_lengths(mesh);
-  std::printf("{\n  \"name\": %s,\n  \"source\": %s,\n", quote(organ.name).c_str(),
-              quote(organ.source).c_str());
-  std::printf("  \"nodes\": %zu,\n  \"surface_nodes\": %zu,\n  \"tets\": %zu,\n", mesh.node_count(),
-              mesh.surface_nodes.size(), mesh.tets.size());
-  std::printf("  \"edges\": %zu,\n  \"links\": %zu,\n  \"surface_triangles\": %zu,\n",
-              mesh.edges.size(), mesh.links.size(), mesh.boundary_triangles.size());
-  std::printf("  \"size_mm\": [%.6g, %.6g, %.6g],\n  \"volume_l\": %.9g,\n  \"mass_kg\": %.9g,\n",
-              size.x, size.y, size.z, enclosed_volume(mesh) * 1e3, mass_kg(organ));
-  std::printf("  \"edge_mm\": {\"min\": %.6g, \"mean\": %.6g, \"max\": %.6g},\n", edges.min_mm,
-              edges.mean_mm, edges.max_mm);
-  if (mesh.tets.empty()) {
-    std::printf("  \"dihedral_deg\": null,\n");
-  } else {
-    const auto angles = mesh::dihedral_range(mesh);
-    std::printf("  \"dihedral_deg\": {\"min\": %.6g, \"max\": %.6g},\n", angles.min_deg,
-                angles.max_deg);
-  }
-  print_json(organ.material);
-  std::printf("  \"fibre_nodes\": %zu,\n", nodes_with_fibres(organ));
-  std::printf("  \"regions\": %zu,\n  \"gravity_m_s2\": [%.9g, %.9g, %.9g],\n  \"settled\": %s,\n",
-              organ.regions.size(), organ.gravity_m_s2.x, organ.gravity_m_s2.y,
-              organ.gravity_m_s2.z, organ.stress_free_positions_m.empty() ? "false" : "true");
-  std::printf("  \"source_offset_m\": [%.9g, %.9g, %.9g],\n", organ.source_offset_m.x,
-              organ.source_offset_m.y, organ.source_offset_m.z);
-  std::printf("  \"fixed_nodes\": %zu,\n  \"hash\": \"%016" PRIx64 "\"\n}\n",
-              organ.fixed_nodes.size(), organ::organ_hash(organ));
-}
 
 Status save(const organ::Organ& organ, const std::string& path) {
   if (auto status = organ::write_organ(path, organ); !status) return status;
@@ -395,6 +187,38 @@ Status run_make(const Options& options) {
   return save(*organ, options.out.empty() ? stem + ".organ" : options.out);
 }
 
+// The imported tissue is made of this, unless --material says it.
+Status choose_law(const Options& options, material::Material& material) {
+  static const std::map<std::string, material::ElasticLaw> kLaws{
+      {"springs", material::ElasticLaw::Springs},
+      {"tensor-mass", material::ElasticLaw::TensorMass},
+      {"neo-hookean", material::ElasticLaw::NeoHookean}};
+  const bool is_chosen = !options.law.empty() || options.young_modulus_pa || options.poisson_ratio;
+  if (!options.material.empty())
+    return is_chosen ? Status{Error{ErrorCode::Usage,
+                                    "--material: a measured material has its own law and moduli; "
+                                    "remove --law, --young-modulus and --poisson-ratio"}}
+                     : Status{};
+  if (!options.law.empty()) material.elastic_law = kLaws.at(options.law);
+  if (options.poisson_ratio && material.elastic_law == material::ElasticLaw::Springs)
+    return Error{ErrorCode::Usage,
+                 "--poisson-ratio: springs have 1/4 whatever is asked; choose --law neo-hookean or "
+                 "tensor-mass"};
+  material.young_modulus_pa = options.young_modulus_pa.value_or(material.young_modulus_pa);
+  material.poisson_ratio = options.poisson_ratio.value_or(material.poisson_ratio);
+  return {};
+}
+
+void say_what_was_chosen(const Options& options, const material::Material& m) {
+  if (!options.material.empty() || (!options.law.empty() && options.young_modulus_pa)) return;
+  std::fprintf(stderr,
+               "%s: %s: chosen, as nothing was asked for: %s%sYoung's modulus %.4g kPa "
+               "(--law, --young-modulus or --material choose others)\n",
+               kProgram, options.import_file.c_str(),
+               options.law.empty() ? name_of(m.elastic_law) : "", options.law.empty() ? ", " : "",
+               m.young_modulus_pa / 1e3);
+}
+
 Status run_import(const Options& options) {
   const auto unit = mesh::parse_unit(options.unit);
   if (!unit) return unit.error();
@@ -410,7 +234,9 @@ Status run_import(const Options& options) {
                  options.import_file.c_str(), grouped(bytes / 1'000'000).c_str());
   auto imported = catalogue::import_organ(path, import_options);
   if (!imported) return imported.error();
+  if (auto chosen = choose_law(options, imported->organ.material); !chosen) return chosen;
   if (auto changed = change_organ(options, imported->organ); !changed) return changed;
+  say_what_was_chosen(options, imported->organ.material);
   for (const std::string& warning : imported->warnings)
     std::fprintf(stderr, "%s: warning: %s: %s\n", kProgram, options.import_file.c_str(),
                  warning.c_str());
@@ -477,6 +303,16 @@ void add_commands(CLI::App& app, Options& options) {
       ->type_name("NAME");
   import->add_option("--out", options.out, "file to write [<file's name>.organ, here]")
       ->type_name("FILE");
+
+  import->add_option("--law", options.law, "springs, tensor-mass or neo-hookean [springs]")
+      ->type_name("LAW")
+      ->check(CLI::IsMember({"springs", "tensor-mass", "neo-hookean"}));
+  import->add_option("--young-modulus", options.young_modulus_pa, "of its tissue, Pa [4000]")
+      ->type_name("E");
+  import
+      ->add_option("--poisson-ratio", options.poisson_ratio,
+                   "of tensor-mass and neo-hookean tissue, 0 to 0.4999 [0.45]")
+      ->type_name("NU");
 
   auto* inspect = app.add_subcommand("inspect", "check an organ and print its figures");
   inspect->add_option("FILE", options.inspected, ".organ or .msh file, or a built-in organ's name")

@@ -34,6 +34,50 @@ std::string version_text() {
          ", protocol " + std::to_string(kProtocolMajor) + "." + std::to_string(kProtocolMinor);
 }
 
+struct ResearchOptions {
+  bool is_frozen = false;
+  const CLI::Option* depth = nullptr;
+};
+
+// A lesson needs none of these, so --help shows them last, under a heading of their own.
+void add_research_options(CLI::App& app, ServerOptions& options, ResearchOptions& more) {
+  auto* research = app.add_option_group("Research", "the solver's settings");
+  research->add_flag("--averaged-strain", options.has_averaged_strain,
+                     "average the strain of its tets over nodes: forces near those of refined "
+                     "elements instead of up to 40 % too stiff, at three times the time of a tick");
+  research->add_flag("--frozen", more.is_frozen,
+                     "tissue beyond the limits stands still, as in the papers, "
+                     "instead of moving with fewer sweeps");
+  research->add_flag("--fixed-decisions", options.has_fixed_decisions,
+                     "always do as --nodes and --sweeps say; otherwise they are the most, and less "
+                     "is done when a tick would take longer than --budget");
+  research
+      ->add_option("--budget", options.budget_ms, "of each millisecond, how much the tick may take")
+      ->type_name("MS")
+      ->check(CLI::Range(0.05, 1.0))
+      ->capture_default_str();
+  more.depth =
+      research->add_option("--depth", options.decisions.depth_limit,
+                           "layers around each contact that get all sweeps [3, frozen: 6]");
+  research
+      ->add_option("--nodes", options.decisions.node_limit, "nodes that all forces together reach")
+      ->capture_default_str();
+  research->add_option("--sweeps", options.decisions.sweeps, "passes of the solver per tick")
+      ->capture_default_str();
+  research->add_option("--omega", options.decisions.over_relaxation, "over-relaxation, 1 to 1.9")
+      ->capture_default_str();
+  research
+      ->add_option("--far-sweeps", options.decisions.far_sweeps,
+                   "passes per tick for the rest of the organ, 0: as many as the organ needs")
+      ->capture_default_str();
+  research->add_flag("--exact-far", options.decisions.is_far_exact,
+                     "forces in the rest of the organ from its material law, not from matrices "
+                     "that are renewed every 64 ticks");
+  research
+      ->add_option("--ready-file", options.ready_file, "write the port to this file when listening")
+      ->type_name("FILE");
+}
+
 }  // namespace
 
 Status parse_listen_address(const std::string& text, ServerOptions& options) {
@@ -64,19 +108,9 @@ Result<std::optional<ServerOptions>> parse_command_line(int argc, char** argv) {
   app.set_version_flag("--version", version_text());
   app.add_option("--organ", options.organ,
                  "built-in organ (liver, elastic-liver, lattice, plate, stomach, chest), an .organ "
-                 "file or a .msh "
-                 "mesh")
+                 "file or a .msh mesh")
       ->type_name("NAME|FILE")
       ->capture_default_str();
-  app.add_flag("--averaged-strain", options.has_averaged_strain,
-               "average the strain of its tets over nodes: forces near those of refined elements "
-               "instead of up to 40 % too stiff, at three times the time of a tick");
-  app.add_option(
-         "--reduction", options.reduction_file,
-         "local reduction of that organ (trocar-organ reduce --method local): moves the "
-         "tissue beyond what is touched where it fits, the full solver elsewhere; clients may "
-         "see the full solution as a ghost, which takes about a core meanwhile")
-      ->type_name("FILE");
   app.add_option("--listen", listen, "where to listen; port 0 takes any free one")
       ->type_name("ADDR:PORT")
       ->capture_default_str();
@@ -88,38 +122,19 @@ Result<std::optional<ServerOptions>> parse_command_line(int argc, char** argv) {
       ->check(CLI::Range(0.0, 1e9));
   app.add_option("--summary", options.summary_file, "write figures of the run as JSON at the end")
       ->type_name("FILE");
-  app.add_option("--ready-file", options.ready_file, "write the port to this file when listening")
+  app.add_option(
+         "--reduction", options.reduction_file,
+         "local reduction of that organ (trocar-organ reduce --method local): moves the "
+         "tissue beyond what is touched where it fits, the full solver elsewhere; clients may "
+         "see the full solution as a ghost, which takes about a core meanwhile")
       ->type_name("FILE");
-  bool is_frozen = false;
-  app.add_flag("--frozen", is_frozen,
-               "tissue beyond the limits stands still, as in the papers, instead of moving with "
-               "fewer sweeps");
-  app.add_flag("--fixed-decisions", options.has_fixed_decisions,
-               "always do as --nodes and --sweeps say; otherwise they are the most, and less is "
-               "done when a tick would take longer than --budget");
-  app.add_option("--budget", options.budget_ms, "of each millisecond, how much the tick may take")
-      ->type_name("MS")
-      ->check(CLI::Range(0.05, 1.0))
-      ->capture_default_str();
-  auto* depth = app.add_option("--depth", options.decisions.depth_limit,
-                               "layers around each contact that get all sweeps [3, frozen: 6]");
-  app.add_option("--nodes", options.decisions.node_limit, "nodes that all forces together reach")
-      ->capture_default_str();
-  app.add_option("--sweeps", options.decisions.sweeps, "passes of the solver per tick")
-      ->capture_default_str();
-  app.add_option("--omega", options.decisions.over_relaxation, "over-relaxation, 1 to 1.9")
-      ->capture_default_str();
-  app.add_option("--far-sweeps", options.decisions.far_sweeps,
-                 "passes per tick for the rest of the organ, 0: as many as the organ needs")
-      ->capture_default_str();
-  app.add_flag("--exact-far", options.decisions.is_far_exact,
-               "forces in the rest of the organ from its material law, not from matrices that are "
-               "renewed every 64 ticks");
   app.add_option("--workers", options.workers, "threads that share a tick's work")
       ->check(CLI::Range(1u, kMaxWorkers))
       ->capture_default_str();
   app.add_option("--log-level", options.log_level, "error, warn, info, debug or off")
       ->capture_default_str();
+  ResearchOptions research;
+  add_research_options(app, options, research);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -129,9 +144,9 @@ Result<std::optional<ServerOptions>> parse_command_line(int argc, char** argv) {
     }
     return Error{ErrorCode::Usage, std::string(error.what()) + " (see --help)"};
   }
-  if (is_frozen) {
+  if (research.is_frozen) {
     options.decisions.boundary = world::Boundary::Frozen;
-    if (depth->count() == 0) options.decisions.depth_limit = step::kFrozenDepthLimit;
+    if (research.depth->count() == 0) options.decisions.depth_limit = step::kFrozenDepthLimit;
   }
   if (const auto parsed = parse_listen_address(listen, options); !parsed) return parsed.error();
   if (const auto valid = step::validate(options.decisions); !valid) return valid.error();

@@ -54,7 +54,7 @@ scenario::Field field_of(const ScenarioSolve& solve) {
           solve.held_nodes()};
 }
 
-// Lines on stderr: one per step, and where that takes long, its Newton iterations on a terminal.
+// On a terminal, stderr shows the Newton iterations of a step that takes long.
 void show_iterations(ScenarioSolve& solve) {
   if (isatty(STDERR_FILENO) == 0) return;
   solve.solver().on_progress = [](const finite_elements::NewtonProgress& p) {
@@ -123,10 +123,11 @@ Status solve_all(ScenarioSolve& solve, Outputs& outputs, const std::filesystem::
   }
   while (!solve.is_finished() && stop_requested == 0) {
     const auto report = solve.step();
-    std::fprintf(stderr,
-                 "%s%s: step %" PRIu64 " of %" PRIu64 ": %d iterations in %d parts, %.2g N\n",
-                 isatty(STDERR_FILENO) != 0 ? "\r" : "", kProgram, solve.steps_done(),
-                 solve.step_count(), report.iterations, report.parts, report.residual_n);
+    if (isatty(STDERR_FILENO) != 0)
+      std::fprintf(stderr,
+                   "\r%s: step %" PRIu64 " of %" PRIu64 ": %d iterations in %d parts, %.2g N\n",
+                   kProgram, solve.steps_done(), solve.step_count(), report.iterations,
+                   report.parts, report.residual_n);
     if (!report.is_converged) return no_equilibrium(solve);
     if (auto s = outputs.add(solve); !s) return s;
     if (auto s = solve.save(folder / kStateFile); !s) return s;

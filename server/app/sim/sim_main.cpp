@@ -1,5 +1,7 @@
 // trocar-sim: runs a scenario on the engine, without a network, and writes what its probes saw.
 
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cinttypes>
@@ -61,10 +63,11 @@ extern "C" void request_stop(int) {
   stop_requested = 1;
 }
 
-// A line on stderr that is rewritten, once a run has taken two seconds.
+// On a terminal, a line on stderr is rewritten once a run has taken two seconds.
 class Progress {
  public:
   void show(const scenario::ScenarioRun& run) {
+    if (!is_terminal_) return;
     const std::uint64_t now = monotonic_ns();
     if (now < next_) return;
     next_ = now + kProgressEvery_ns;
@@ -79,6 +82,7 @@ class Progress {
 
  private:
   std::uint64_t next_ = monotonic_ns() + kProgressAfter_ns;
+  const bool is_terminal_ = ::isatty(STDERR_FILENO) != 0;
   bool is_shown_ = false;
 };
 
@@ -208,8 +212,8 @@ Status run_scenario(const Options& options) {
 int run(int argc, char** argv) {
   Options options;
   CLI::App app(
-      "Runs a scenario: an organ, loads and scripted tools over time, without a network. README, "
-      "\"Scenarios\", describes the file.",
+      "Runs a scenario: an organ, loads and scripted tools over time, without a network. "
+      "docs/scripts-and-scenarios.md describes the file.",
       kProgram);
   app.footer(kExamples);
   app.set_version_flag("--version", std::string(kProgram) + " " + kVersion + ", sim_version " +
