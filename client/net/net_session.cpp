@@ -227,7 +227,7 @@ bool NetSource::Session::make_room_for(std::span<const std::uint8_t, wire::kHead
   return length.ok();
 }
 
-// What is for the render thread; null for what is our own business or broken.
+// Returns the message for the render thread; null if it is this layer's own business or broken.
 std::shared_ptr<const proto::Envelope> NetSource::Session::take_message() {
   last_heard_ = Clock::now();
   auto message = std::make_shared<proto::Envelope>();

@@ -38,7 +38,7 @@ struct NetSourceOptions {
   std::size_t outbound_capacity = 256;
 };
 
-// "HOST", "HOST:PORT" or "[IPV6]:PORT" into options.host and options.port.
+// Reads "HOST", "HOST:PORT" or "[IPV6]:PORT" into options.host and options.port.
 Status parse_server_address(const std::string& text, NetSourceOptions& options);
 
 class NetSource final : public replica::SessionSource {
