@@ -8,6 +8,7 @@
 #include "server/organs/catalogue/builtin_organs.h"
 #include "server/session/recording/recorder.h"
 #include "server/session/recording/verify.h"
+#include "server/tissue/world/surface_layout.h"
 #include "tests/replay/recorded_session.h"
 #include "tests/support/surface_edits.h"
 
@@ -22,7 +23,7 @@ class RecordedCuts : public ::testing::Test {
   // queue.
   void record(Frame frames, const std::vector<Frame>& dropped = {}) {
     const organ::Organ organ = *catalogue::make_lattice({6, 4, 6, 0.01});
-    wire::SurfaceLayout layout = wire::make_surface_layout(organ);
+    wire::SurfaceLayout layout = world::make_surface_layout(organ);
     auto recorder = recording::Recorder::create(path_, organ, layout);
     ASSERT_TRUE(recorder.ok());
     wire::QuantisedSurface surface(layout.vertex_count());
