@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/reduce/reduced_block.h"
 #include "tests/snapshots/random_session.h"
 
 namespace trocar::testing {
@@ -38,12 +37,6 @@ TEST(Snapshots, OfRandomSessionsAreReadAndContinuedBitForBit) {
 TEST(Snapshots, OfLargeOrgansAreReadAndContinuedBitForBit) {
   run(random_scene(SnapshotOrgan::Stomach, 1), 1, 3);
   run(random_scene(SnapshotOrgan::Chest, 1), 1, 3);
-}
-
-TEST(Snapshots, OfASessionWithAReductionAreReadAndContinuedBitForBit) {
-  const reduce::testing::ReducedBlock block(4);
-  const auto figures = run({block.organ, block.local, 0}, 1, 30);
-  EXPECT_GT(figures.reduced, 0u);
 }
 
 }  // namespace

@@ -21,6 +21,9 @@ constexpr Tick kSettled = 1000;
 // From a snapshot on, so many ticks are compared: two frames.
 constexpr Tick kContinued = 2 * kTicksPerFrame;
 
+// A recording of ours has one of each at a time; a file that has more is not believed.
+constexpr std::size_t kMostPending = 16;
+
 constexpr const char* kTickBatches = "/tick_batch";
 constexpr const char* kSnapshots = "/world/snapshot";
 
@@ -202,9 +205,11 @@ void Verifier::take_snapshot(const proto::WorldSnapshot& snapshot) {
   if (snapshot.organ_hash() != info_.organ_hash)
     return differ(
         {tick, kSnapshots, "organ_hash", hex(snapshot.organ_hash()), hex(info_.organ_hash)});
+  if (!report_.is_resimulated) return;
+  if (snapshots_.size() >= kMostPending)
+    return add_reason(fmt::format("tick {}: too many snapshots wait for their tick", tick));
   snapshots_[tick] = snapshot;
-  if (report_.is_resimulated && is_in_step_ && tick == simulation_.current_tick())
-    compare_snapshot(tick);
+  if (is_in_step_ && tick == simulation_.current_tick()) compare_snapshot(tick);
 }
 
 void Verifier::take_batch(const proto::TickBatch& batch) {
@@ -297,6 +302,8 @@ void Verifier::compare_snapshot(Tick tick) {
                    text(in_recorded, recorded.end()), text(in_state, state.end())});
   }
   ++report_.snapshots_verified;
+  if (continuations_.size() >= kMostPending)
+    return add_reason(fmt::format("tick {}: too many snapshots at once to go on from", tick));
   Continuation next{simulation_.beside(1), tick, tick + kContinued};
   if (const Status restored = next.simulation.restore_snapshot(recorded); !restored.ok())
     return differ({tick, kSnapshots, "state", "cannot be restored: " + restored.error().message,
@@ -462,8 +469,7 @@ void Verifier::finish(const journal::McapReader& container) {
     add_reason(fmt::format("{} surfaces: what comes before them is missing, they cannot be decoded",
                            surface_.undecodable()));
   for (const auto& [tick, snapshot] : snapshots_)
-    if (report_.is_resimulated)
-      add_reason(fmt::format("tick {}: nothing was simulated to compare the snapshot with", tick));
+    add_reason(fmt::format("tick {}: nothing was simulated to compare the snapshot with", tick));
   if (report_.ticks_not_simulated > 0)
     add_reason(fmt::format("{} ticks: recorded, but no snapshot before them to simulate from",
                            report_.ticks_not_simulated));
