@@ -60,6 +60,8 @@ std::string to_json(const ClientSummary& summary, const replica::Replica& replic
   } else {
     json.add("barrier", "null");
   }
+  json.add_text("recording", wire::name_of(replica.recording().status));
+  json.add_text("recording_text", replica.recording().text);
   json.add_count("frames", counters.frames);
   json.add_count("keyframes", counters.keyframes);
   json.add_count("crc_mismatches", counters.crc_mismatches);

@@ -112,6 +112,7 @@ std::string to_json(const Summary& s) {
       R"({{
   "program": "trocar-server", "version": "{}", "sim_version": {}, "protocol": "{}.{}",
   "organ": {}, "nodes": {}, "surface_vertices": {}, "journal": {},
+  "recording": {{"status": "{}", "frames_missing": {}, "text": {}}},
   "ticks": {}, "simulated_seconds": {:.3f}, "wall_seconds": {:.3f}, "slow_ticks": {},
   "last_tick": {}, "last_frame": {}, "state_hash": "{:016x}", "surface_crc": "{:08x}",
   "all_replicas_equal": {},
@@ -129,7 +130,8 @@ std::string to_json(const Summary& s) {
 }}
 )",
       kVersion, kSimVersion, kProtocolMajor, kProtocolMinor, quote(s.organ), s.node_count,
-      s.surface_vertex_count, quote(s.journal), s.loop.ticks,
+      s.surface_vertex_count, quote(s.journal), wire::name_of(s.recording.status),
+      s.recording.frames_missing, quote(s.recording.text), s.loop.ticks,
       static_cast<double>(s.loop.ticks) / static_cast<double>(kTicksPerSecond), s.wall_seconds,
       s.loop.slow_ticks, last.tick, last.frame, last.state_hash, last.surface_crc, all_equal,
       participants(s.barrier), s.loop.max_active_nodes, s.loop.faults, s.loop.inputs_dropped,
