@@ -1,6 +1,6 @@
 #pragma once
 
-// What people use in a session sees no paper's own method and no off-line tool.
+// The programs of a session see no paper's own method and no off-line tool.
 
 #include "tests/architecture/rules.h"
 

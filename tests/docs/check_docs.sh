@@ -12,7 +12,7 @@
 set -uo pipefail
 export LC_ALL=C.UTF-8
 
-check=${1:?check} root=$(cd "${2:?root of the repository}" && pwd) bin=${3:-}
+check=${1:?check} root=$(cd "${2:?root of the repository}" && pwd) bin=${3:+$(cd "$3" && pwd)}
 cd "$root" || exit 2
 faults=$(mktemp)
 trap 'rm -f "$faults"' EXIT
@@ -79,11 +79,11 @@ check_style() {
 }
 
 # The options that a --help text on stdin names, one per line: those that begin a line.
-options_of_help() { grep -oE '^ {2,}(-[a-z], ?)?--[a-z][a-z-]*' | grep -oE -- '--[a-z][a-z-]*' | sort -u; }
+options_of_help() { grep -oE '^ {2,}(-[a-z], ?)?--[a-z][a-z0-9-]*' | grep -oE -- '--[a-z][a-z0-9-]*' | sort -u; }
 # The options in the first cells of the tables below a heading of docs/programs.md.
 options_of_section() {
   awk -v heading="$1" '/^#/ {in_it = $0 == heading} in_it && /^\| `-/ {split($0, cell, "|"); print cell[2]}' \
-    docs/programs.md | grep -oE -- '--[a-z][a-z-]*' | sort -u
+    docs/programs.md | grep -oE -- '--[a-z][a-z0-9-]*' | sort -u
 }
 
 check_section() { # HEADING COMMAND...
@@ -102,7 +102,7 @@ check_options() {
   local program sub page option known
   known=$(mktemp)
   for program in trocar-server trocar-client trocar-organ trocar-sim trocar-journal; do
-    [ -x "$bin/$program" ] || { fault "$bin/$program: is not built"; continue; }
+    [ -x "$bin/$program" ] || { fault "$bin/$program: is not built"; rm -f "$known"; return; }
     check_section "## $program" "$bin/$program"
     "$bin/$program" --help | options_of_help >>"$known"
     for sub in $("$bin/$program" --help | awk '/^Subcommands:|^SUBCOMMANDS:/ {f = 1; next} /^[^ ]/ {f = 0} f && /^  [a-z]/ {print $1}'); do
@@ -112,13 +112,13 @@ check_options() {
   done
   for program in deploy/*; do
     [ -f "$program" ] && [ -x "$program" ] || continue
-    bash "$program" --help | grep -oE -- '--[a-z][a-z-]*' >>"$known"
+    bash "$program" --help | grep -oE -- '--[a-z][a-z0-9-]*' >>"$known"
   done
-  printf '%s\n' --preset --version --help >>"$known"  # cmake's, and everybody's
+  printf '%s\n' --preset >>"$known"  # cmake's
   for page in "${pages[@]}"; do
     while read -r option; do
       grep -qxF -- "$option" "$known" || fault "$page: names $option, which no program or script has"
-    done < <(grep -oE '(^|[ `(])--[a-z][a-z-]+' "$page" | grep -oE -- '--[a-z][a-z-]+' | sort -u)
+    done < <(grep -oE '(^|[ `(])--[a-z][a-z0-9-]+' "$page" | grep -oE -- '--[a-z][a-z0-9-]+' | sort -u)
   done
   rm -f "$known"
 }

@@ -2,7 +2,7 @@
 # Breaks a copy of the book in one way after the other: each fault must be found by its check, with the
 # words that name it. Usage: faults_test.sh ROOT FOLDER_OF_PROGRAMS
 set -uo pipefail
-root=$1 bin=$2
+root=$(cd "$1" && pwd) bin=$(cd "$2" && pwd)
 copy=$(mktemp -d)
 trap 'rm -rf "$copy"' EXIT
 failed=0
@@ -24,7 +24,7 @@ expect() {
     printf '%s: a fault was not found: %s\n' "$1" "$2"
     failed=1
   elif ! grep -qF -- "$2" <<<"$said"; then
-    printf '%s: wanted "%s", got:\n%s\n' "$1" "$2" "$said"
+    printf '%s: wanted "%s", got:\n%s\n' "$1" "$2" "$(head -n 5 <<<"$said")"
     failed=1
   fi
 }
