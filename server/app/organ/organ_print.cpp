@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "common/base/json.h"
+#include "server/organs/material/material_keys.h"
 #include "server/organs/organ/organ_file.h"
 
 namespace trocar::app {
@@ -123,23 +124,12 @@ Json array_of(const Vec3d& v) {
 
 void add_material(const material::Material& m, Json& json) {
   json["elastic_law"] = name_of(m.elastic_law);
-  json["poisson_ratio"] = m.poisson_ratio;
   if (m.elastic_law == material::ElasticLaw::Measured) json["measured"] = m.measured.name;
   json["averaged_strain"] = m.has_averaged_strain;
   json["spring_law"] =
       m.spring_law == material::SpringLaw::Constant ? "constant" : "volume_consistent";
-  json["spring_stiffness_n_m"] = m.spring_stiffness_n_m;
-  json["young_modulus_pa"] = m.young_modulus_pa;
-  json["density_kg_m3"] = m.density_kg_m3;
-  json["node_damping_per_s"] = m.node_damping_per_s;
-  json["spring_damping_time_s"] = m.spring_damping_time_s;
+  for (const auto& key : material::kNumberKeys) json[std::string(key.key)] = m.*key.member;
   json["fibre_direction"] = array_of(m.fibre_direction);
-  json["fibre_stiffness_ratio"] = m.fibre_stiffness_ratio;
-  json["fibre_tension"] = m.fibre_tension;
-  json["tension"] = m.tension;
-  json["cut_energy_j_m2"] = m.cut_energy_j_m2;
-  json["blade_friction_pa"] = m.blade_friction_pa;
-  json["tear_stretch"] = m.tear_stretch;
 }
 
 }  // namespace
