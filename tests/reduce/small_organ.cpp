@@ -105,7 +105,7 @@ organ::LocalReduction synthetic_local_reduction(const organ::Organ& organ) {
   for (const auto& patch : r.patches)
     nodes.insert(nodes.end(), patch.reach.begin(), patch.reach.end());
   std::ranges::sort(nodes);
-  nodes.erase(std::ranges::unique(nodes).begin(), nodes.end());
+  nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
   constexpr std::size_t kModes = 4;
   // Of one series, so that all modes are orthogonal to them.
   constexpr std::size_t kVibrations = 2;
