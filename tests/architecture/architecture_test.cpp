@@ -29,7 +29,7 @@ TEST(Architecture, TheTreeIsRead) {
   EXPECT_TRUE(tree().closure_of("server/tissue/step").contains("common/math"));
   EXPECT_TRUE(tree().state_folders.contains("server/tissue/step"));
   for (const auto& folder : tree().state_folders) EXPECT_GE(tree().layer_of(folder), 0) << folder;
-  EXPECT_FALSE(tree().folders.at("server/app/server").programs.empty());
+  EXPECT_FALSE(tree().folders.at("server/app/sim").programs.empty());
   EXPECT_TRUE(tree().has_file("server/tissue/step/tick.cpp"));
   EXPECT_TRUE(tree().has_file("README.md"));
   std::size_t includes = 0;

@@ -1,6 +1,6 @@
 #pragma once
 
-// The programs of a session see no paper's own method and no off-line tool.
+// Programs and folders that people use in a session see no paper's own method and no off-line tool.
 
 #include "tests/architecture/rules.h"
 

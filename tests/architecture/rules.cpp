@@ -15,6 +15,7 @@ constexpr const char* kStageTimers = "server/tissue/step/tick.cpp";
 
 const std::set<std::string> kProtobufFolders{"proto",
                                              "server/organs/organ",
+                                             "server/papers/dogan",
                                              "common/wire",
                                              "common/journal",
                                              "server/session/participants",

@@ -18,9 +18,9 @@ using Breaches = std::vector<std::string>;
 Breaches check_folders(const SourceTree& tree);
 // Every #include "..." names an existing file from the root.
 Breaches check_includes(const SourceTree& tree);
-// A CMakeLists.txt says what the sources do, in both directions: the folders that headers include
-// are its DEPENDS, those that only sources include its USES. A program's DEPENDS are the folders
-// that its files include.
+// A CMakeLists.txt lists what the sources include, no less and no more: the folders that headers
+// include are its DEPENDS, those that only sources include its USES. A program's DEPENDS are the
+// folders that its files include.
 Breaches check_dependencies(const SourceTree& tree);
 // server/session/net moves bytes: it links nothing else of the server, not even through others.
 Breaches check_net_sees_no_world(const SourceTree& tree);

@@ -29,14 +29,14 @@ struct SourceFile {
   bool is_cpp() const { return path.ends_with(".h") || path.ends_with(".cpp"); }
 };
 
-// A project_program() of a folder says this.
+// A project_program() of a folder, as its CMakeLists.txt lists it.
 struct Program {
   std::string name;
   std::set<std::string> files;    // MAIN, from the folder
   std::set<std::string> depends;  // DEPENDS
 };
 
-// The CMakeLists.txt of a folder says this.
+// What the CMakeLists.txt of a folder says.
 struct Folder {
   std::set<std::string> headers;  // HEADERS of its project_library(), from the folder
   std::set<std::string> sources;  // SOURCES
@@ -56,7 +56,7 @@ struct SourceTree {
 
   // Position in `layers`, or -1.
   int layer_of(const std::string& folder) const;
-  // Returns what `folder` links, directly or through others.
+  // What `folder` links, directly or through others.
   std::set<std::string> closure_of(const std::string& folder) const;
   bool has_file(const std::string& path) const;
 };
