@@ -25,6 +25,8 @@ std::string to_json(const ClientSummary& summary, const replica::Replica& replic
                   {"final_tick", last != nullptr ? last->tick : 0},
                   {"surface_crc", hex32(replica.surface_crc())},
                   {"barrier", barrier},
+                   {"recording", wire::name_of(replica.recording().status)},
+                   {"recording_text", replica.recording().text},
                   {"frames", counters.frames},
                   {"keyframes", counters.keyframes},
                   {"crc_mismatches", counters.crc_mismatches},
