@@ -1,6 +1,6 @@
 #pragma once
 
-// The command line of trocar-client.
+// This is the command line of trocar-client.
 
 #include <optional>
 #include <string>
@@ -13,7 +13,7 @@ namespace trocar::app {
 
 enum class Display : std::uint8_t { Window, Headless, None };
 
-// What is drawn over the picture; keys change it.
+// These overlays are drawn over the picture; keys switch them.
 struct Overlays {
   bool regions = true, holds = false, arrows = true, rate = false, ghost = false;
 

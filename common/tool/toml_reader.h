@@ -78,8 +78,8 @@ class Document {
 // A number as a person would write it.
 std::string shown(double value);
 
-// What to say of a key that is `known` with another unit in its name, or with none: nothing if it
-// is not.
+// Returns what to say of a key that is `known` with another unit in its name, or with none; nothing
+// if it is not.
 std::optional<std::string> unit_hint(std::string_view key, const toml::node& value,
                                      std::string_view known);
 
@@ -89,7 +89,7 @@ class TableReader {
   TableReader(Document& document, const toml::table& table, std::string path)
       : document_(document), table_(table), path_(std::move(path)) {}
 
-  // Of a key, or of the table itself if `key` is empty.
+  // Returns the path of a key, or of the table itself if `key` is empty.
   std::string path_of(std::string_view key) const {
     if (path_.empty() || key.empty()) return path_ + std::string(key);
     return path_ + "." + std::string(key);
@@ -202,14 +202,14 @@ class TableReader {
           return n.is_string() ? std::optional(n.as_string()->get()) : std::nullopt;
         });
   }
-  // A [key] table, or null if absent or wrong.
+  // Returns a [key] table, or null if it is absent or wrong.
   const toml::table* table(std::string_view key) {
     const toml::node* node = find(key);
     if (node == nullptr) return nullptr;
     if (!node->is_table()) fail(key, "is not a table, write [" + header_of(key) + "] above it");
     return node->as_table();
   }
-  // Where the key is, or the table if it has no such key; 0 if unknown.
+  // Returns the line of the key, or of the table if it has no such key; 0 if unknown.
   int line(std::string_view key) const {
     const toml::node* node = table_.get(key);
     return static_cast<int>((node != nullptr ? node->source() : table_.source()).begin.line);

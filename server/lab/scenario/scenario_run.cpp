@@ -93,7 +93,7 @@ Status check_explicit(const scenario::ResolvedScenario& resolved) {
         scenario, place,
         "\"explicit\" knows no relaxation, which this material has: take "
         "\"implicit\"");
-  const double stable = dynamics::ExplicitEuler(resolved.organ, world_of(resolved)).stable_dt_s();
+  const double stable = nakao::ExplicitEuler(resolved.organ, world_of(resolved)).stable_dt_s();
   if (scenario.run.dt_s() <= stable) return {};
   char text[160];
   const double most = 1e-3 / std::ceil(1e-3 / stable);

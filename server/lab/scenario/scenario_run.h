@@ -14,10 +14,10 @@
 #include <vector>
 
 #include "server/lab/scenario/scenario.h"
+#include "server/papers/nakao/explicit_euler.h"
 #include "server/tissue/contact/contact_finder.h"
 #include "server/tissue/contact/self_contact.h"
 #include "server/tissue/dynamics/block_descent.h"
-#include "server/tissue/dynamics/explicit_euler.h"
 #include "server/tissue/hands/claims.h"
 #include "server/tissue/hands/tool_table.h"
 #include "server/tissue/propagation/active_set.h"
@@ -119,7 +119,7 @@ class ScenarioRun {
   propagation::PropagationQueue queue_;
   propagation::ActiveSet active_set_;
   dynamics::BlockDescent solver_;
-  std::optional<dynamics::ExplicitEuler> explicit_;
+  std::optional<nakao::ExplicitEuler> explicit_;
   dynamics::FarPlan far_plan_;                  // graded
   std::vector<Vec3f> forces_;                   // per node; empty without loads
   std::vector<NodeIndex> held_;                 // fixed, then displaced nodes
