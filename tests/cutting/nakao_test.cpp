@@ -24,7 +24,7 @@ Settings settings_of(Method method, double piece_h = 0) {
   return settings;
 }
 
-std::uint32_t tets(const dynamics::Topology& topology) {
+std::uint32_t tets(const topology::Topology& topology) {
   std::uint32_t count = 0;
   for (std::uint32_t t = 0; t < topology.tet_count(); ++t) count += topology.has_tet(TetIndex(t));
   return count;
@@ -53,7 +53,7 @@ TEST(Nakao, AChosenPatternIsNoWorseThanAnyOther) {
   trocar::testing::Random random(1);
   for (int i = 0; i < 200; ++i) {
     const auto organ = box_organ(1, 1, 1, 0.01, 0, 1);
-    const dynamics::Topology start(organ);
+    const topology::Topology start(organ);
     // Edges from the middle tet's first corner, or those between two of its pairs.
     const auto tet = start.tet(TetIndex(4u));
     const bool is_three = i % 2 == 0;
@@ -70,7 +70,7 @@ TEST(Nakao, AChosenPatternIsNoWorseThanAnyOther) {
     });
     // Sum over the cut tets of the worst sine in each.
     const auto score = [&](std::span<const std::uint32_t> order) {
-      dynamics::Topology topology(organ);
+      topology::Topology topology(organ);
       Places places(topology);
       std::vector<TetChild> children;
       std::vector<std::uint32_t> origin(topology.tet_count());
@@ -214,7 +214,7 @@ TEST(Nakao, MovedNodesGoWithTheTissue) {
 
 TEST(Nakao, MovesThatWouldBreakTheSolidAreRefused) {
   const auto organ = box_organ(2, 2, 2, 0.01, 0);
-  dynamics::Topology topology(organ);
+  topology::Topology topology(organ);
   const auto at = [&](const Vec3d& p) {
     for (std::uint32_t n = 0; n < topology.node_count(); ++n)
       if (length(topology.rest()[n] - p) < 1e-9) return NodeIndex(n);
@@ -239,7 +239,7 @@ TEST(Nakao, MovesThatWouldBreakTheSolidAreRefused) {
   EXPECT_TRUE(validate(topology));
   auto held = organ;
   held.fixed_nodes = {centre};
-  EXPECT_FALSE(can_move(dynamics::Topology(held), {centre, face, 20000}));
+  EXPECT_FALSE(can_move(topology::Topology(held), {centre, face, 20000}));
 }
 
 // As of the other events: whatever is sent, it is refused or leaves as much solid as there was.
@@ -261,7 +261,7 @@ TEST(Nakao, ChangedHistoriesWithMovesBreakNoTopology) {
         static_cast<std::uint8_t>(random.below(256));
     const auto events = decode(changed);
     if (!events) continue;
-    dynamics::Topology topology(block);
+    topology::Topology topology(block);
     Places places(topology);
     done += apply(*events, topology, places).ok();
     EXPECT_NEAR(total_volume(topology), volume, 1e-9 * volume) << i;

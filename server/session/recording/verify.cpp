@@ -11,6 +11,7 @@
 #include "server/organs/organ/local_reduction_file.h"
 #include "server/organs/organ/organ_file.h"
 #include "server/session/recording/tick_records.h"
+#include "server/tissue/reduction/reduced_tissue.h"
 #include "server/tissue/step/simulation.h"
 
 namespace trocar::recording {
@@ -27,7 +28,7 @@ class Verifier {
   Verifier(journal::SessionJournal& journal, organ::Organ organ,
            std::shared_ptr<const organ::LocalReduction> reduction, VerifyReport& report)
       : journal_(journal),
-        simulation_(std::move(organ), 1, std::move(reduction)),
+        simulation_(std::move(organ), 1, reduction::at_work(std::move(reduction))),
         report_(report),
         layout_(simulation_.layout()) {
     // Messages name no nodes.
