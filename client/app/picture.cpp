@@ -287,7 +287,7 @@ void Picture::act(const ui::HudActions& actions, const replica::Replica& replica
   if (actions.toggle_ghost) overlays_.ghost = !overlays_.ghost;
   if (actions.reset_camera) frame_camera(replica);
   if (actions.screenshot) wants_screenshot_ = true;
-  // What cannot be sent is asked for again by whoever presses the key.
+  // A wish that cannot be sent is lost: whoever presses the key asks again.
   if (actions.set_mark) replica::ask_for_mark(source, false);
   if (actions.return_to_mark) replica::ask_for_mark(source, true);
   replica::PlaybackControl* playback = source.playback();

@@ -9,6 +9,7 @@
 #include <boost/asio/use_awaitable.hpp>
 #include <boost/asio/write.hpp>
 
+#include "common/base/log.h"
 #include "common/base/timing.h"
 #include "common/base/version.h"
 #include "common/wire/tool_shape.h"
@@ -149,6 +150,11 @@ void NetSource::Session::end_after_stream() {
   end(replica::CloseKind::Lost, "connection to " + server_name() + " broke: the server is gone");
 }
 
+void NetSource::Session::say_waiting(const std::string& why) const {
+  log::info("no server at {} yet ({}): trying for {} s", server_name(), why,
+            std::chrono::ceil<std::chrono::seconds>(options_.connect_deadline).count());
+}
+
 void NetSource::Session::end_unreachable(const std::string& why) {
   end(replica::CloseKind::Unreachable, "no server at " + server_name() + " (" + why +
                                            "): start trocar-server, or check address and port");
@@ -165,6 +171,7 @@ asio::awaitable<bool> NetSource::Session::connect() {
   const auto deadline = Clock::now() + options_.connect_deadline;
   asio::co_spawn(context_, expire(deadline), [](std::exception_ptr) {});
   std::string why = "no answer";
+  bool is_said = false;
   while (!is_done_ && Clock::now() < deadline) {
     const auto [unresolved, endpoints] =
         co_await resolver_.async_resolve(options_.host, std::to_string(options_.port), kNoThrow);
@@ -182,6 +189,8 @@ asio::awaitable<bool> NetSource::Session::connect() {
       if (error != asio::error::operation_aborted) why = error.message();
     }
     if (is_done_ || Clock::now() >= deadline) break;
+    if (!is_said) say_waiting(why);
+    is_said = true;
     retry_timer_.expires_after(options_.connect_retry);
     co_await retry_timer_.async_wait(kNoThrow);
   }
@@ -218,7 +227,7 @@ bool NetSource::Session::make_room_for(std::span<const std::uint8_t, wire::kHead
   return length.ok();
 }
 
-// What is for the render thread; null for what is our own business or broken.
+// Returns the message for the render thread; null if it is this layer's own business or broken.
 std::shared_ptr<const proto::Envelope> NetSource::Session::take_message() {
   last_heard_ = Clock::now();
   auto message = std::make_shared<proto::Envelope>();

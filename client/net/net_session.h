@@ -61,6 +61,7 @@ class NetSource::Session {
   std::shared_ptr<const proto::Envelope> take_message();
   void end_if_final(const proto::Envelope& message);
   void end_after_stream();
+  void say_waiting(const std::string& why) const;
   void end_unreachable(const std::string& why);
   void check_silence();
   void queue_ping();

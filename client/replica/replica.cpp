@@ -112,7 +112,7 @@ bool read_solver(const proto::FrameState& message, std::optional<SolverFigures>&
   const proto::SolverState& s = message.solver();
   const auto is_sane = [](float value) { return std::isfinite(value) && value >= 0; };
   if (!is_sane(s.estimate()) || !is_sane(s.largest_node_force_n())) return false;
-  // Of one that a newer server may have nothing is known.
+  // A newer server may give a reason that is not known here.
   const bool is_known = s.reason() > 0 && s.reason() <= proto::SOLVER_PREPARING;
   auto& read = figures.emplace();
   read.is_reduced = s.is_reduced();

@@ -112,7 +112,7 @@ class Replica final : public MessageSink {
   // Latest last; `notice_count` counts all that ever came.
   const std::deque<Notice>& notices() const { return notices_; }
   std::uint64_t notice_count() const { return notice_count_; }
-  // Of the full solution, for who has asked; of the surface that is shown if the epochs agree.
+  // The full solution, for whoever has asked, is of the surface that is shown if the epochs agree.
   const Ghost& ghost() const { return ghost_; }
   const std::optional<BarrierOutcome>& barrier() const { return barrier_; }
   const std::string& goodbye_text() const { return goodbye_text_; }
@@ -136,7 +136,7 @@ class Replica final : public MessageSink {
   void apply_claim(const proto::ClaimEvent& message, std::uint64_t arrival_ns);
   bool decode_surface(const proto::SurfaceFrame& message);
   void accept_frame(const proto::SurfaceFrame& message, std::uint64_t arrival_ns);
-  // Of the stream, to be shown: all of it, or what changed.
+  // These take the layout over from the stream to be shown: all of it, or what changed.
   void show_layout();
   void show_changes();
   // Gives the history's frames the new vertices, `surface` being the next frame after them.

@@ -1,7 +1,8 @@
 #pragma once
 
-// What stands in front of the scene: figures of the session, participants, messages, names at
-// tools, help, and the timeline of a replay. Dear ImGui, with a window's events or (headless) none.
+// The head-up display stands in front of the scene: it shows figures of the session, participants,
+// messages, names at tools, help, and the timeline of a replay. Dear ImGui, with a window's events
+// or (headless) none.
 //
 // Per picture: begin_frame, then input(), then draw(model), then, after the scene was drawn into
 // the context's framebuffer, render(). Thread: render thread. One Hud per process (Dear ImGui keeps

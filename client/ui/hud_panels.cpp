@@ -74,7 +74,7 @@ void solver_rows(const HudModel& model) {
   ImGui::TextDisabled("solver");
   ImGui::TableNextColumn();
   ImGui::TextColored(text.is_reduced ? kGood : kNotice, "%s", text.state.c_str());
-  // As tall without a patch: the panel is not to jump at every hand-over.
+  // The panel is as tall without a patch, so that it does not jump at every hand-over.
   row("estimated error", text.error.empty() ? "-" : text.error);
 }
 

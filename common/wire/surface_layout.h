@@ -1,8 +1,8 @@
 #pragma once
 
-// Which nodes of an organ its surface stream carries, and in which slots. The server builds it from
-// the organ (server/tissue/world/surface_layout.h); clients receive it as a SurfaceTopology
-// message. Cuts change it by SurfaceChange (surface_change.h) only.
+// The layout says which nodes of an organ its surface stream carries, and in which slots. The server
+// builds it from the organ (server/tissue/world/surface_layout.h); clients receive it as a
+// SurfaceTopology message. Cuts change it by SurfaceChange (surface_change.h) only.
 
 #include <array>
 #include <span>
@@ -28,7 +28,7 @@ struct SurfaceLayout {
 
   std::size_t vertex_count() const { return rest_quanta.size(); }
   bool has_triangle(TriangleIndex number) const { return triangles[number.value][0].is_valid(); }
-  // From the first triangle on.
+  // Computes the sum from the first triangle on.
   std::uint64_t compute_triangle_sum() const;
 
   bool operator==(const SurfaceLayout&) const = default;

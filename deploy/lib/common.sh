@@ -29,6 +29,9 @@ absolute() {
   esac
 }
 
+# All programs, as deploy/build and deploy/demo build them.
+all_programs=(trocar-server trocar-client trocar-organ trocar-sim trocar-journal)
+
 # build PRESET [TARGET...]: configures if needed and builds.
 build() {
   local preset=$1

@@ -10,7 +10,7 @@
 #include "common/journal/session_journal.h"
 #include "proto/journal.pb.h"
 #include "proto/wire.pb.h"
-#include "server/app/simulation_loop.h"
+#include "server/app/server/simulation_loop.h"
 #include "server/organs/catalogue/builtin_organs.h"
 #include "server/session/recording/tick_records.h"
 #include "server/session/recording/verify.h"

@@ -265,7 +265,7 @@ TEST(surface_topology, what_is_wrong_is_named) {
   EXPECT_EQ(*read(old), without_nodes(box()));
 }
 
-// Not above what README states.
+// The bound is what docs/the-wire.md states.
 TEST(surface_change, costs_few_bytes) {
   Random random(11);
   SurfaceLayout layout = world::make_surface_layout(*catalogue::make_lattice({24, 12, 24, 0.01}));

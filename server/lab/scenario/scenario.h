@@ -2,7 +2,7 @@
 
 // Scenarios: experiments on one organ without people. Which organ and material, which nodes are
 // held, moved, loaded and probed over time, which scripted tools act, what is written. Read from a
-// TOML file of which scripts are a part; README, "Scenarios", describes it to a person.
+// TOML file of which scripts are a part; docs/scripts-and-scenarios.md describes it.
 //
 // Two steps: parse_scenario() checks the file by itself, resolve() checks it against the organ and
 // turns names into nodes. Errors of both are one line with file, line and key.

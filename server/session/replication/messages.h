@@ -44,7 +44,7 @@ wire::SharedBytes encode_mark_event(const step::MarkEvent& event);
 // To who asked too soon after another request; nothing has been done.
 wire::SharedBytes encode_early_mark(hands::MarkAction action, Tick tick);
 wire::SharedBytes encode_ghost(const ghost::GhostReport& report);
-// That there is no ghost in this session.
+// The message says that there is no ghost in this session.
 wire::SharedBytes encode_no_ghost();
 wire::SharedBytes encode_barrier(const step::PublishedFrame& frame);
 wire::SharedBytes encode_pong(std::uint64_t client_time_us, Tick tick);
@@ -52,7 +52,7 @@ wire::SharedBytes encode_goodbye(EndReason reason, const std::string& text);
 
 // One line for a person about what became of a claim: by whom it is held and what to do.
 std::string describe(const hands::ClaimEvent& event, const participants::Roster& roster);
-// Which solver acts and why: "reduced, patch 12", "full, tissue was cut".
+// Says which solver acts and why: "reduced, patch 12", "full, tissue was cut".
 std::string describe(const step::SolverFigures& solver);
 
 }  // namespace trocar::replication

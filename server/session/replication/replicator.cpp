@@ -400,7 +400,8 @@ void Replicator::publish(std::span<const step::SharedFrame> frames) {
 }
 
 void Replicator::publish(const ghost::GhostReport& report) {
-  // Of a surface that they have: a change since is on its way, or they have it already.
+  // Clients get a report only of the surface that they have: they may wait for a change, or have it
+  // already.
   const bool follows = report.status == ghost::GhostStatus::Follows;
   if (follows && (report.epoch != layout_.epoch || report.offsets.size() != layout_.vertex_count()))
     return;

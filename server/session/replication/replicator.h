@@ -125,7 +125,7 @@ class Replicator final : public net::ConnectionHandler {
     std::string text;
   };
 
-  // What to end the session with, or nothing.
+  // These return what to end the client's session with, or nothing.
   std::optional<Ending> take_message(Client& client, BytesView bytes);
   std::optional<Ending> admit(Client& client, const proto::Hello& hello);
   std::optional<Ending> take_sample(Client& client, const proto::ToolSample& sample);
@@ -138,7 +138,7 @@ class Replicator final : public net::ConnectionHandler {
   Status change_surface(const wire::SurfaceChange& change);
   // Another one, to which no change leads: everybody gets it and a keyframe.
   void replace_surface(const wire::SurfaceLayout& layout);
-  // Of the surface as it is now.
+  // Makes the message of the surface as it is now.
   const wire::SharedBytes& topology();
   bool send(Client& client, const wire::SharedBytes& bytes);
   void broadcast(const wire::SharedBytes& bytes);

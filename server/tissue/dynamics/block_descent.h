@@ -6,7 +6,7 @@
 // colour after colour, several sweeps per step, over-relaxed. Over-relaxation is stepped down to 1
 // for the rest of the step when a sweep's residual grew against the sweep before.
 //
-// Two classes of nodes (graded-exterior scheme): the near ones get `sweeps`; with far_sweeps > 0
+// Two classes of nodes (a graded far field): the near ones get `sweeps`; with far_sweeps > 0
 // all other free nodes get that many, with an over-relaxation of their own, the last one together
 // with the near nodes' last; there is no residual tolerance then. With far_sweeps = 0 the others
 // stand still. Near nodes may come in bands with fewer sweeps each (SweepBand): these take part in

@@ -70,13 +70,13 @@ void BlockDescent::schedule_sweeps(const SolveSettings& settings) {
       schedule_.push_back({.plan = &far_swept_});
     const SweepPlan& near = plan_of(left, settings.bands);
     // The last sweep is one for all: a group with near and far nodes costs no more than near ones.
-    schedule_.push_back({.plan = ends_far ? &last_ : &near,
-                         .near_nodes = near.node_count,
-                         .max_over_relaxation = has_few(left)
-                                                    ? kMaxOverRelaxationFewSweeps
-                                                    : std::numeric_limits<float>::infinity(),
-                         .is_near = true,
-                         .corrects_far = settings.far_solver != nullptr && left <= settings.corrections});
+    schedule_.push_back(
+        {.plan = ends_far ? &last_ : &near,
+         .near_nodes = near.node_count,
+         .max_over_relaxation =
+             has_few(left) ? kMaxOverRelaxationFewSweeps : std::numeric_limits<float>::infinity(),
+         .is_near = true,
+         .corrects_far = settings.far_solver != nullptr && left <= settings.corrections});
   }
 }
 

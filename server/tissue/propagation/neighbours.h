@@ -1,7 +1,7 @@
 #pragma once
 
-// Which nodes are next to which: the organ's table, and instead of its rows those of nodes that an
-// edit of the topology has changed since. Symmetric; rows ascending.
+// This table says which nodes are next to which: it is the organ's, and instead of its rows those
+// of nodes that an edit of the topology has changed since. Symmetric; rows ascending.
 
 #include "common/base/blocks.h"
 #include "common/base/index.h"

@@ -1,6 +1,6 @@
 #pragma once
 
-// What a local exterior keeps from tick to tick besides the world's nodes.
+// A reduced far field keeps this from tick to tick besides the world's nodes.
 
 #include <cstdint>
 #include <vector>
