@@ -30,6 +30,9 @@
 
 namespace trocar::reduction {
 
+// The time in which places and forces that the fields do not have fade.
+inline constexpr double kFade_s = 0.05;
+
 class ReducedFarField : public dynamics::FarFieldSolver {
  public:
   // Outlives it.
