@@ -131,7 +131,7 @@ class Bench {
 
   const Options options_;
   const organ::Organ organ_;
-  dynamics::Topology topology_;
+  topology::Topology topology_;
   Cutter cutter_;
   trocar::testing::Random random_;
   std::vector<Vec3f> displacements_;

@@ -55,7 +55,7 @@ double drift(double now, double before) {
 }
 
 // Sides of faces know each other, and nothing is left across a face that was opened.
-std::string broken_adjacency(const dynamics::Topology& topology) {
+std::string broken_adjacency(const topology::Topology& topology) {
   for (std::uint32_t t = 0; t < topology.tet_count(); ++t) {
     if (!topology.has_tet(TetIndex(t))) continue;
     for (std::uint8_t corner = 0; corner < 4; ++corner) {

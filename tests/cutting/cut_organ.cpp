@@ -70,7 +70,7 @@ organ::Organ tet_organ() {
   return organ_of(std::move(mesh));
 }
 
-double least_dihedral_sine(const dynamics::Topology& topology) {
+double least_dihedral_sine(const topology::Topology& topology) {
   double least = 1;
   for (std::uint32_t t = 0; t < topology.tet_count(); ++t)
     if (topology.has_tet(TetIndex(t)))
@@ -78,14 +78,14 @@ double least_dihedral_sine(const dynamics::Topology& topology) {
   return least;
 }
 
-double total_mass(const dynamics::Topology& topology) {
+double total_mass(const topology::Topology& topology) {
   double total = 0;
   for (std::uint32_t n = 0; n < topology.node_count(); ++n)
     if (topology.has_node(NodeIndex(n))) total += topology.lumped_mass(NodeIndex(n));
   return total;
 }
 
-std::uint64_t topology_hash(const dynamics::Topology& topology) {
+std::uint64_t topology_hash(const topology::Topology& topology) {
   std::vector<double> numbers;
   for (std::uint32_t n = 0; n < topology.node_count(); ++n) {
     const NodeIndex node(n);
@@ -164,7 +164,7 @@ Bytes CutOrgan::state() {
 }
 
 std::string CutOrgan::resume(CutOrgan& other) {
-  std::vector<NewNode> made;
+  std::vector<topology::NewNode> made;
   if (const auto status = cutter_.repeat(other.history_, made); !status)
     return status.error().message;
   if (const auto status = apply(other.history_, copy_, copy_places_); !status)

@@ -17,10 +17,10 @@ organ::Organ box_organ(int nx, int ny, int nz, double cell_m, double jitter = 0.
                        std::uint64_t seed = 1);
 organ::Organ tet_organ();  // one tet, edges about 0.1 m
 
-double least_dihedral_sine(const dynamics::Topology& topology);
-double total_mass(const dynamics::Topology& topology);
+double least_dihedral_sine(const topology::Topology& topology);
+double total_mass(const topology::Topology& topology);
 // Over everything: places, tets, positions.
-std::uint64_t topology_hash(const dynamics::Topology& topology);
+std::uint64_t topology_hash(const topology::Topology& topology);
 
 // Places of a blade's edge, one per tick.
 using Edge = std::vector<Vec3d>;
@@ -33,7 +33,7 @@ class CutOrgan {
  public:
   explicit CutOrgan(organ::Organ organ, const Settings& settings = {});
 
-  const dynamics::Topology& topology() const { return topology_; }
+  const topology::Topology& topology() const { return topology_; }
   const organ::Organ& organ() const { return *organ_; }
   Cutter& cutter() { return cutter_; }
   // CPU time of the last call of Cutter::cut().
@@ -60,7 +60,7 @@ class CutOrgan {
 
  private:
   std::unique_ptr<const organ::Organ> organ_;
-  dynamics::Topology topology_, copy_;
+  topology::Topology topology_, copy_;
   Places copy_places_;
   Cutter cutter_;
   CutOutput output_, total_;

@@ -69,7 +69,7 @@ TEST(EventCodec, WhatIsNoEncodingIsRefusedAndNoneBreaksATopology) {
         static_cast<std::uint8_t>(random.below(256));
     const auto events = decode(changed);
     if (!events) continue;
-    dynamics::Topology topology(organ);
+    topology::Topology topology(organ);
     Places places(topology);
     const auto status = apply(*events, topology, places);
     const double volume = total_volume(box.topology());

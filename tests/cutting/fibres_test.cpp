@@ -24,7 +24,7 @@ organ::Organ turning_box(ElasticLaw law) {
   return organ;
 }
 
-std::vector<Vec3f> deformed(const dynamics::Topology& topology) {
+std::vector<Vec3f> deformed(const topology::Topology& topology) {
   std::vector<Vec3f> u;
   for (const auto& p : topology.rest())
     u.push_back(to_float(Vec3d{3 * p.y * p.x, -2 * p.z * p.z + 0.1 * p.x, 4 * p.x * p.y}));
@@ -33,7 +33,7 @@ std::vector<Vec3f> deformed(const dynamics::Topology& topology) {
 
 // As if parts had the direction of their own nodes.
 double energy_without_inheritance(const CutOrgan& box) {
-  dynamics::Topology topology(box.organ());
+  topology::Topology topology(box.organ());
   Places places(topology);
   EXPECT_TRUE(apply(box.history(), topology, places));
   for (std::uint32_t t = 0; t < topology.tet_count(); ++t) {
@@ -78,7 +78,7 @@ TEST(Fibres, ASplitOfTetsChangesNoEnergy) {
 // Every part of a tet has its direction, to the bit, through thousands of edits.
 TEST(Fibres, PartsKeepTheDirectionOfTheWhole) {
   const auto organ = turning_box(ElasticLaw::NeoHookean);
-  dynamics::Topology topology(organ);
+  topology::Topology topology(organ);
   Places places(topology);
   trocar::testing::Random random(11);
   std::vector<Vec3d> axes;

@@ -91,7 +91,7 @@ TEST(HostileEvents, AreRefused) {
   box.stroke(straight_path({{0.003, -0.06, -0.06}, {0.003, -0.06, 0.06}},
                            {{0.003, 0.06, -0.06}, {0.003, 0.06, 0.06}}, 0.01));
   const auto refused = [&](const CutEvents& events) {
-    dynamics::Topology topology(organ);
+    topology::Topology topology(organ);
     Places places(topology);
     const auto status = apply(events, topology, places);
     EXPECT_TRUE(validate(topology).ok());

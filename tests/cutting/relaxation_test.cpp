@@ -36,8 +36,8 @@ std::vector<Vec3d> gradients(dynamics::Tissue& tissue, const std::vector<Vec3f>&
   std::vector<GroupLanes> near;
   for (Group g = 0; g < groups.group_count() && which == Advance::All; ++g)
     near.push_back({g, 0xff});
-  if (auto* const stars = tissue.stars())
-    for (Group g = 0; g < groups.group_count(); ++g) stars->restart_group(g, x.data());
+  if (auto* const strain = tissue.nodal_strain())
+    for (Group g = 0; g < groups.group_count(); ++g) strain->restart_group(g, x.data());
   tissue.relaxation()->take_state();
   for (int i = 0; i < steps; ++i) {
     tissue.relaxation()->begin_step(0.001f, state, workers);
@@ -62,7 +62,7 @@ std::vector<Vec3d> gradients(dynamics::Tissue& tissue, const std::vector<Vec3f>&
 // Through hundreds of splits: what a new node bears is what its ends no longer do.
 TEST(CutRelaxation, PartsRememberWhatTheWholeDid) {
   const auto organ = measured_box();
-  dynamics::Topology topology(organ);
+  topology::Topology topology(organ);
   Places places(topology);
   dynamics::Tissue tissue(topology);
   world::RelaxationState state(organ);
@@ -123,10 +123,10 @@ TEST(CutRelaxation, PartsRememberWhatTheWholeDid) {
 }
 
 // Averages over parts are not those over the whole, but what has followed splits is what it would
-// be had it been built so: forces, and what stars and tets remember.
+// be had it been built so: forces, and what smoothing domains and tets remember.
 TEST(CutRelaxation, AveragedTissueFollowsSplitsAsIfBuiltAnew) {
   const auto organ = measured_box(true);
-  dynamics::Topology topology(organ);
+  topology::Topology topology(organ);
   Places places(topology);
   dynamics::Tissue tissue(topology);
   world::RelaxationState state(organ);

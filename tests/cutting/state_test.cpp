@@ -144,7 +144,7 @@ TEST(CutterState, RepeatsOnlyWhatFitsAndOnlyWhenNoBladeIsOn) {
   CutEvents events;
   events.events = {Split{NodeIndex(0u), NodeIndex(1u), 32768, NodeIndex(64u)}};
   EXPECT_TRUE(box.cutter().move(0, Edge{{0, 0, 0}, {0, 0, 0.01}}));
-  std::vector<NewNode> made;
+  std::vector<topology::NewNode> made;
   EXPECT_FALSE(box.cutter().repeat(events, made).ok());
   box.cutter().lift(0);
   box.run_until_idle();

@@ -205,9 +205,9 @@ TEST(StraightCut, WorkIsBoundedAndNothingIsLost) {
 // What a removed corner leaves unused is used again, by the copy alike.
 TEST(StraightCut, UsesUnusedPlacesFirst) {
   const auto organ = box_organ(4, 4, 4, 0.01);
-  dynamics::Topology topology(organ), copy(organ);
+  topology::Topology topology(organ), copy(organ);
   Cutter cutter(topology);
-  const auto remove_corner = [](dynamics::Topology& from, Places& places) {
+  const auto remove_corner = [](topology::Topology& from, Places& places) {
     const NodeIndex corner(0u);
     const auto at = from.tets_of(corner);
     for (const auto tet : std::vector<TetIndex>(at.begin(), at.end())) {

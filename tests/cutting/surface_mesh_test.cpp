@@ -1,6 +1,6 @@
 // The surface that is kept from edit to edit, against that of all tets anew.
 
-#include "server/tissue/cutting/surface_mesh.h"
+#include "server/tissue/topology/surface_mesh.h"
 
 #include <gtest/gtest.h>
 
@@ -21,7 +21,7 @@ Key turned(const std::array<NodeIndex, 3>& nodes) {
   return key;
 }
 
-std::set<Key> surface_of(const dynamics::Topology& topology) {
+std::set<Key> surface_of(const topology::Topology& topology) {
   constexpr int kFaces[4][3] = {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
   std::map<Key, std::pair<int, Key>> faces;
   for (std::uint32_t t = 0; t < topology.tet_count(); ++t) {
@@ -47,9 +47,9 @@ std::set<Key> surface_of(const dynamics::Topology& topology) {
 TEST(SurfaceMesh, FollowsEveryEditAndKeepsItsNumbers) {
   trocar::testing::Random random(5);
   const auto organ = box_organ(6, 4, 6, 0.01);
-  dynamics::Topology topology(organ);
+  topology::Topology topology(organ);
   Cutter cutter(topology);
-  SurfaceMesh surface(organ);
+  topology::SurfaceMesh surface(organ);
   std::vector<Key> known;
   for (const auto& nodes : organ.mesh.boundary_triangles) known.push_back(turned(nodes));
   double opened = 0;

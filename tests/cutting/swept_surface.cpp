@@ -40,7 +40,7 @@ bool SweptSurface::crosses(const Vec3d& a, const Vec3d& b) const {
   });
 }
 
-std::uint8_t SweptSurface::crossed_edges(const dynamics::Topology& topology, TetIndex tet) const {
+std::uint8_t SweptSurface::crossed_edges(const topology::Topology& topology, TetIndex tet) const {
   const auto corners = rest_corners(topology, topology.tet(tet));
   Box box;
   for (const auto& p : corners) box.include(p);
@@ -52,7 +52,7 @@ std::uint8_t SweptSurface::crossed_edges(const dynamics::Topology& topology, Tet
   return crossed;
 }
 
-std::uint32_t SweptSurface::touched_tets(const dynamics::Topology& topology,
+std::uint32_t SweptSurface::touched_tets(const topology::Topology& topology,
                                          std::uint32_t most) const {
   std::uint32_t touched = 0;
   for (std::uint32_t t = 0; t < topology.tet_count() && touched < most; ++t)
@@ -69,7 +69,7 @@ Parting parting_of(std::uint8_t crossed) {
 }
 
 std::vector<std::uint32_t> count_parts(const organ::Organ& organ, const CutEvents& events) {
-  dynamics::Topology topology(organ);
+  topology::Topology topology(organ);
   Places places(topology);
   std::vector<std::uint32_t> root(topology.tet_count());
   for (std::uint32_t t = 0; t < root.size(); ++t) root[t] = t;

@@ -13,9 +13,9 @@ class SweptSurface {
 
   bool crosses(const Vec3d& a, const Vec3d& b) const;
   // Bits by edge 01, 02, 03, 12, 13, 23.
-  std::uint8_t crossed_edges(const dynamics::Topology& topology, TetIndex tet) const;
+  std::uint8_t crossed_edges(const topology::Topology& topology, TetIndex tet) const;
   // Counts no further than `most`.
-  std::uint32_t touched_tets(const dynamics::Topology& topology, std::uint32_t most) const;
+  std::uint32_t touched_tets(const topology::Topology& topology, std::uint32_t most) const;
 
  private:
   struct Triangle {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "server/tissue/dynamics/tet_shape.h"
+#include "server/tissue/topology/tet_shape.h"
 
 namespace trocar::dynamics::testing {
 
@@ -76,8 +76,8 @@ void EditedOrgan::restore_tets() {
   // A node may be another by now, at the same number.
   const auto is_sound = [&](const mesh::Tet& tet) {
     return std::ranges::all_of(tet, [&](NodeIndex n) { return topology_.has_node(n); }) &&
-           tet_shape(topology_.rest(), tet).volume > 1e-12 &&
-           tet_shape(topology_.stress_free(), tet).volume > 1e-12;
+           topology::tet_shape(topology_.rest(), tet).volume > 1e-12 &&
+           topology::tet_shape(topology_.stress_free(), tet).volume > 1e-12;
   };
   for (const auto& [place, tet] : removed_)
     if (is_sound(tet)) topology_.put_tet(place, tet);

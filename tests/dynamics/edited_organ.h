@@ -6,7 +6,7 @@
 #include <map>
 #include <random>
 
-#include "server/tissue/dynamics/topology.h"
+#include "server/tissue/topology/topology.h"
 
 namespace trocar::dynamics::testing {
 
@@ -17,7 +17,7 @@ class EditedOrgan {
   EditedOrgan(const EditedOrgan&) = delete;
   EditedOrgan& operator=(const EditedOrgan&) = delete;
 
-  Topology& topology() { return topology_; }
+  topology::Topology& topology() { return topology_; }
   std::uint32_t below(std::size_t count) { return static_cast<std::uint32_t>(random_() % count); }
 
   // One of the edits below, of a kind that fits the organ, and then sometimes remove_bare_nodes().
@@ -46,7 +46,7 @@ class EditedOrgan {
   TetIndex free_tet_place() const;
 
   const organ::Organ organ_;
-  Topology topology_;
+  topology::Topology topology_;
   std::mt19937 random_;
   std::map<TetIndex, mesh::Tet> removed_;
   std::vector<mesh::NodePair> removed_links_;

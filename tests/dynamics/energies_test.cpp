@@ -59,7 +59,7 @@ class Probe {
     for (std::uint32_t n = 0; n < u.size(); ++n)
       slots_[tissue_.groups().slot_of(NodeIndex(n))] = to_float4(u[n]);
     for (Group g = 0; g < tissue_.groups().group_count(); ++g)
-      if (auto* const stars = tissue_.stars()) stars->restart_group(g, slots_.data());
+      if (auto* const strain = tissue_.nodal_strain()) strain->restart_group(g, slots_.data());
     const Slot slot = tissue_.groups().slot_of(node);
     const Group g = slot / kLanes;
     NodeStep8 step{zero_vec8(), zero_sym_mat8()};
@@ -464,7 +464,7 @@ void expect_gradient_and_block(const Law& law) {
   const auto organ = block_organ({.name = "", .change = [](organ::Organ& o) {
                                     o.material.elastic_law = ElasticLaw::NeoHookean;
                                   }});
-  const Topology topology(organ);
+  const topology::Topology topology(organ);
   const Groups groups(topology, Coupling::Elements);
   const Hyperelastic<Law> energy(topology, groups, nullptr,
                                  hyperelastic_parameters(organ, material::is_hyperelastic), law);

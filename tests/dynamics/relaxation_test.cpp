@@ -73,8 +73,8 @@ class Specimen {
     auto& relaxation = *tissue_.relaxation();
     relaxation.begin_step(static_cast<float>(dt), state_, workers_);
     Vec3d force;
-    if (auto* const stars = tissue_.stars())
-      for (Group g = 0; g < groups.group_count(); ++g) stars->restart_group(g, x_.data());
+    if (auto* const strain = tissue_.nodal_strain())
+      for (Group g = 0; g < groups.group_count(); ++g) strain->restart_group(g, x_.data());
     for (Group g = 0; g < groups.group_count(); ++g) {
       NodeStep8 step{zero_vec8(), zero_sym_mat8()};
       tissue_.begin_group(g, x_.data(), 0);
@@ -282,8 +282,8 @@ TEST_P(LiveRelaxation, TissueUnderTensionBeginsRelaxed) {
     const auto& groups = tissue.groups();
     std::vector<Float4> x(groups.slot_count());
     Workers workers(1);
-    if (auto* const stars = tissue.stars())
-      for (Group g = 0; g < groups.group_count(); ++g) stars->restart_group(g, x.data());
+    if (auto* const strain = tissue.nodal_strain())
+      for (Group g = 0; g < groups.group_count(); ++g) strain->restart_group(g, x.data());
     tissue.relaxation()->take_state();
     tissue.relaxation()->begin_step(0.001f, state, workers);
     double sum = 0;
@@ -314,7 +314,7 @@ TEST_P(LiveRelaxation, TissueUnderTensionBeginsRelaxed) {
 }
 
 INSTANTIATE_TEST_SUITE_P(, LiveRelaxation, ::testing::Bool(), [](const auto& tested) {
-  return tested.param ? "AveragedStrain" : "PlainTets";
+  return tested.param ? "NodalHyperelastic" : "PlainTets";
 });
 
 }  // namespace

@@ -1,6 +1,6 @@
 // Following edits of the topology: always what building anew gives, and only where it changed.
 
-#include "server/tissue/dynamics/topology.h"
+#include "server/tissue/topology/topology.h"
 
 #include <gtest/gtest.h>
 
@@ -82,7 +82,8 @@ organ::Organ small_liver(bool has_averaged_strain) {
 }
 
 // Greedy colours are not needed to see that they are valid.
-void expect_valid_groups(const Topology& topology, const Groups& groups, Coupling coupling) {
+void expect_valid_groups(const topology::Topology& topology, const Groups& groups,
+                         Coupling coupling) {
   std::size_t nodes = 0, in_slots = 0;
   for (Slot slot = 0; slot < groups.slot_count(); ++slot)
     if (groups.node_at(slot).is_valid()) {
@@ -151,7 +152,7 @@ Evaluated evaluate(Tissue& tissue, const std::vector<Vec3f>& u) {
   const std::vector<Float4> start(x.size());
   for (const auto g : order) tissue.begin_group(g, start.data(), 1000);
   for (Group g = 0; g < groups.group_count(); ++g)
-    if (auto* const stars = tissue.stars()) stars->restart_group(g, x.data());
+    if (auto* const strain = tissue.nodal_strain()) strain->restart_group(g, x.data());
   Evaluated result;
   result.nodes.resize(u.size());
   result.swept.resize(u.size());
@@ -174,13 +175,13 @@ Evaluated evaluate(Tissue& tissue, const std::vector<Vec3f>& u) {
       }
       const Vec8 dx = solve_positive_definite(step.block, step.gradient) * all(-1.0f);
       store_group(&x[g * kLanes], own + dx);
-      if (auto* const stars = tissue.stars()) stars->after_move(g, dx, 0xff);
+      if (auto* const strain = tissue.nodal_strain()) strain->after_move(g, dx, 0xff);
     }
   each_node([&](std::uint32_t n, Slot slot) { result.swept[n] = to_vec3(x[slot]); });
   return result;
 }
 
-std::vector<Colour> colours_of(const Tissue& tissue, const Topology& topology) {
+std::vector<Colour> colours_of(const Tissue& tissue, const topology::Topology& topology) {
   std::vector<Colour> colours;
   for (std::uint32_t n = 0; n < topology.node_count(); ++n)
     colours.push_back(tissue.groups().colour_of(NodeIndex(n)));
@@ -216,7 +217,8 @@ TEST_P(FollowTopology, EveryEditGivesWhatBuildingAnewGives) {
     EditedOrgan edited(GetParam().make(), seed);
     auto& topology = edited.topology();
     Tissue tissue(edited.topology());
-    const auto coupling = tissue.stars() != nullptr ? Coupling::Stars : Coupling::Elements;
+    const auto coupling =
+        tissue.nodal_strain() != nullptr ? Coupling::NodalStrain : Coupling::Elements;
     std::size_t moved = 0;
     for (int edit = 0; edit < 40; ++edit) {
       SCOPED_TRACE("seed " + std::to_string(seed) + " edit " + std::to_string(edit));
@@ -239,7 +241,7 @@ TEST_P(FollowTopology, WorkIsInProportionToTheChange) {
   for (int edit = 0; edit < 100; ++edit) {
     edited.edit();
     const auto report = tissue.follow_topology(topology);
-    // A changed node, its neighbours if it moved or stars count, and slots left behind.
+    // A changed node, its neighbours if it moved or smoothing domains count, and slots left behind.
     std::set<NodeIndex> expected;
     const auto expect = [&](std::span<const NodeIndex> nodes, bool has_neighbours) {
       for (const auto node : nodes) {
@@ -248,7 +250,7 @@ TEST_P(FollowTopology, WorkIsInProportionToTheChange) {
         if (has_neighbours) expected.insert(neighbours.begin(), neighbours.end());
       }
     };
-    expect(topology.changed(), tissue.stars() != nullptr);
+    expect(topology.changed(), tissue.nodal_strain() != nullptr);
     expect(tissue.groups().moved(), true);
     EXPECT_EQ(report.nodes_changed, topology.changed().size());
     EXPECT_LE(report.lanes, expected.size() + tissue.groups().vacated().size());
@@ -366,12 +368,12 @@ TEST(FollowTopology, FillAndMemoryStayBoundedOverThousandsOfEdits) {
 
 // --- The solver ---
 
-void follow_nodes(const Topology& topology, world::World& world) {
+void follow_nodes(const topology::Topology& topology, world::World& world) {
   world.rest_positions.resize(topology.node_count());
   world.masses.resize(topology.node_count());
   world.displacements.resize(topology.node_count());
   world.velocities.resize(topology.node_count());
-  world.node_classes.resize(topology.node_count(), world::NodeClass::Outer);
+  world.node_classes.resize(topology.node_count(), world::NodeClass::Far);
   world.quiet_ticks.resize(topology.node_count());
   for (const auto node : topology.changed()) {
     world.rest_positions[node.value] = to_float(topology.rest()[node.value]);

@@ -9,6 +9,7 @@
 #include <mutex>
 
 #include "server/app/server/simulation_loop.h"
+#include "server/tissue/reduction/reduced_tissue.h"
 #include "tests/reduce/reduced_block.h"
 
 namespace trocar::ghost {
@@ -64,7 +65,7 @@ class Session {
   }
 
   const bool is_cut_;
-  step::Simulation simulation_{made().organ, 1, made().local};
+  step::Simulation simulation_{made().organ, 1, reduction::at_work(made().local)};
   participants::SimulationInbox inbox_;
   app::FrameHandover handover_{[] {}};
   app::SimulationLoop loop_{simulation_, inbox_, handover_, nullptr, {}, [] {}};

@@ -16,7 +16,7 @@ namespace {
 using nakao::settings_of;
 using nakao::Variant;
 
-std::uint32_t tets(const dynamics::Topology& topology) {
+std::uint32_t tets(const topology::Topology& topology) {
   std::uint32_t count = 0;
   for (std::uint32_t t = 0; t < topology.tet_count(); ++t) count += topology.has_tet(TetIndex(t));
   return count;
@@ -45,7 +45,7 @@ TEST(Nakao, AChosenPatternIsNoWorseThanAnyOther) {
   trocar::testing::Random random(1);
   for (int i = 0; i < 200; ++i) {
     const auto organ = box_organ(1, 1, 1, 0.01, 0, 1);
-    const dynamics::Topology start(organ);
+    const topology::Topology start(organ);
     // Edges from the middle tet's first corner, or those between two of its pairs.
     const auto tet = start.tet(TetIndex(4u));
     const bool is_three = i % 2 == 0;
@@ -62,7 +62,7 @@ TEST(Nakao, AChosenPatternIsNoWorseThanAnyOther) {
     });
     // Sum over the cut tets of the worst sine in each.
     const auto score = [&](std::span<const std::uint32_t> order) {
-      dynamics::Topology topology(organ);
+      topology::Topology topology(organ);
       Places places(topology);
       std::vector<TetChild> children;
       std::vector<std::uint32_t> origin(topology.tet_count());
@@ -206,7 +206,7 @@ TEST(Nakao, MovedNodesGoWithTheTissue) {
 
 TEST(Nakao, MovesThatWouldBreakTheSolidAreRefused) {
   const auto organ = box_organ(2, 2, 2, 0.01, 0);
-  dynamics::Topology topology(organ);
+  topology::Topology topology(organ);
   const auto at = [&](const Vec3d& p) {
     for (std::uint32_t n = 0; n < topology.node_count(); ++n)
       if (length(topology.rest()[n] - p) < 1e-9) return NodeIndex(n);
@@ -231,7 +231,7 @@ TEST(Nakao, MovesThatWouldBreakTheSolidAreRefused) {
   EXPECT_TRUE(validate(topology));
   auto held = organ;
   held.fixed_nodes = {centre};
-  EXPECT_FALSE(can_move(dynamics::Topology(held), {centre, face, 20000}));
+  EXPECT_FALSE(can_move(topology::Topology(held), {centre, face, 20000}));
 }
 
 // Moves are like the other events: whatever is sent, it is refused or leaves as much solid as there
@@ -254,7 +254,7 @@ TEST(Nakao, ChangedHistoriesWithMovesBreakNoTopology) {
         static_cast<std::uint8_t>(random.below(256));
     const auto events = decode(changed);
     if (!events) continue;
-    dynamics::Topology topology(block);
+    topology::Topology topology(block);
     Places places(topology);
     done += apply(*events, topology, places).ok();
     EXPECT_NEAR(total_volume(topology), volume, 1e-9 * volume) << i;

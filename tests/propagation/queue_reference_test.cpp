@@ -247,7 +247,7 @@ TEST(TwoContactsThatApproach, QueueMergeAndSolveEqualAnIndependentReference) {
     reference.step(swept, contacts, decisions.sweeps);
     for (std::uint32_t i = 0; i < organ.mesh.node_count(); ++i) {
       // A node that froze in this tick was put to rest by the rule, not by the solve.
-      if (simulation.state().world.node_classes[i] == world::NodeClass::Outer) continue;
+      if (simulation.state().world.node_classes[i] == world::NodeClass::Far) continue;
       const auto& ours = simulation.state().world.displacements[i];
       worst = std::max(worst, length(to_double(ours) - reference.u[i]));
       largest = std::max(largest, length(reference.u[i]));

@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <new>
 
+#include "server/tissue/reduction/reduced_tissue.h"
 #include "server/tissue/step/simulation.h"
 #include "tests/reduce/reduced_block.h"
 
@@ -31,7 +32,7 @@ namespace {
 
 TEST(ReducedTick, DoesNotAllocateAfterWarmUp) {
   const reduce::testing::ReducedBlock made(4);
-  Simulation simulation(made.organ, 1, made.local);
+  Simulation simulation(made.organ, 1, reduction::at_work(made.local));
   const Vec3f place = to_float(made.centre(0));
   const Vec3f out = std::abs(place.y) > 0.025f   ? Vec3f{0, place.y > 0 ? 1.0f : -1.0f, 0}
                     : std::abs(place.x) > 0.055f ? Vec3f{place.x > 0 ? 1.0f : -1.0f, 0, 0}

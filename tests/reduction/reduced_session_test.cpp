@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "server/lab/calibration/press.h"
+#include "server/tissue/reduction/reduced_tissue.h"
 #include "server/tissue/step/simulation.h"
 #include "tests/reduce/reduced_block.h"
 
@@ -78,7 +79,7 @@ double difference_of(const Simulation& a, const Simulation& b) {
 }
 
 TEST(ReducedSession, IsNearTheConvergedFullSolution) {
-  Simulation reduced(made().organ, 1, made().local), converged(made().organ);
+  Simulation reduced(made().organ, 1, reduction::at_work(made().local)), converged(made().organ);
   const Press press{.depth_m = 0.006f};
   const auto all = calibration::full_decisions();
   for (Tick tick = 1; tick <= 500; ++tick) {
@@ -94,7 +95,8 @@ TEST(ReducedSession, IsNearTheConvergedFullSolution) {
 }
 
 TEST(ReducedSession, GoesOnBitForBitFromASnapshot) {
-  Simulation first(made().organ, 1, made().local), other(made().organ, 2, made().local);
+  Simulation first(made().organ, 1, reduction::at_work(made().local)),
+      other(made().organ, 2, reduction::at_work(made().local));
   const Press press{.depth_m = 0.002f, .aside = towards(1, 0.03f)};
   for (Tick tick = 1; tick <= 237; ++tick) first.tick(press.at(tick), {});
   ASSERT_TRUE(first.context().report.is_reduced);
@@ -108,7 +110,7 @@ TEST(ReducedSession, GoesOnBitForBitFromASnapshot) {
   for (Tick tick = 238; tick <= 900; ++tick) {
     const auto hash = first.tick(press.at(tick), {}).state_hash;
     ASSERT_EQ(other.tick(press.at(tick), {}).state_hash, hash) << tick;
-    const auto& figures = first.context().reduced->figures();
+    const auto& figures = first.state().far_model->figures();
     if (figures.is_reduced && !(figures.patches == last)) last = figures.patches, ++patches;
   }
   EXPECT_GE(patches, 2u);
@@ -140,12 +142,12 @@ class TwoPatches : public ::testing::Test {
 };
 
 TEST_F(TwoPatches, ActTogether) {
-  Simulation reduced(made().organ, 1, made().local), converged(made().organ);
+  Simulation reduced(made().organ, 1, reduction::at_work(made().local)), converged(made().organ);
   const auto all = calibration::full_decisions();
   std::size_t preparing = 0;
   for (Tick tick = 1; tick <= 900; ++tick) {
     reduced.tick(inputs_at(tick), {});
-    const auto& figures = reduced.context().reduced->figures();
+    const auto& figures = reduced.state().far_model->figures();
     preparing += figures.reason == SolverReason::Preparing ? 1u : 0u;
     if (tick > 500) {
       EXPECT_EQ(figures.patches.count, 2u) << tick;
@@ -161,13 +163,14 @@ TEST_F(TwoPatches, ActTogether) {
 }
 
 TEST_F(TwoPatches, GoOnBitForBitFromSnapshots) {
-  Simulation first(made().organ, 1, made().local), while_preparing(made().organ, 2, made().local),
-      acting(made().organ, 1, made().local);
+  Simulation first(made().organ, 1, reduction::at_work(made().local)),
+      while_preparing(made().organ, 2, reduction::at_work(made().local)),
+      acting(made().organ, 1, reduction::at_work(made().local));
   Bytes snapshot;
   Tick next = 1;
   const auto run_until = [&](auto&& is_so) {
     do first.tick(inputs_at(next), {});
-    while (!is_so(first.context().reduced->figures()) && next++ < 2000);
+    while (!is_so(first.state().far_model->figures()) && next++ < 2000);
     ++next;
     snapshot.clear();
     first.write_snapshot(snapshot);
@@ -189,9 +192,9 @@ TEST_F(TwoPatches, GoOnBitForBitFromSnapshots) {
 
 // Of as many patches, but not as many fields: another reduction of this organ.
 TEST_F(TwoPatches, AreNotThoseOfAnotherReduction) {
-  Simulation first(made().organ, 1, made().local);
+  Simulation first(made().organ, 1, reduction::at_work(made().local));
   for (Tick tick = 1; tick <= 600; ++tick) first.tick(inputs_at(tick), {});
-  ASSERT_EQ(first.context().reduced->figures().patches.count, 2u);
+  ASSERT_EQ(first.state().far_model->figures().patches.count, 2u);
   Bytes snapshot;
   first.write_snapshot(snapshot);
   auto fewer = std::make_shared<organ::LocalReduction>(*made().local);
@@ -206,7 +209,7 @@ TEST_F(TwoPatches, AreNotThoseOfAnotherReduction) {
       *lower = std::move(kept);
     }
   }
-  Simulation other(made().organ, 1, fewer);
+  Simulation other(made().organ, 1, reduction::at_work(fewer));
   const auto restored = other.restore_snapshot(snapshot);
   ASSERT_FALSE(restored.ok());
   EXPECT_EQ(other.current_tick(), 0u);
@@ -214,7 +217,7 @@ TEST_F(TwoPatches, AreNotThoseOfAnotherReduction) {
 }
 
 TEST(ReducedSession, HandsOverWithoutAJump) {
-  Simulation switched(made().organ, 1, made().local);
+  Simulation switched(made().organ, 1, reduction::at_work(made().local));
   const Press press{.aside = {0.01f, 0, 0.004f}};
   Vec3f before, last;
   std::size_t handed_over = 0;
@@ -268,7 +271,7 @@ class CutSession : public ::testing::Test {
 };
 
 TEST_F(CutSession, GoesOnReducedElsewhere) {
-  Simulation reduced(made().organ, 1, made().local), full(made().organ);
+  Simulation reduced(made().organ, 1, reduction::at_work(made().local)), full(made().organ);
   std::size_t crossed = 0, reduced_before = 0, reduced_after = 0;
   Tick last_cut = 0;
   Bytes snapshot;
@@ -288,7 +291,7 @@ TEST_F(CutSession, GoesOnReducedElsewhere) {
   const Vec3f expected = force_of(full);
   EXPECT_LT(length(force_of(reduced) - expected), 0.03f * length(expected));
   // Bit for bit from a state with a wound.
-  Simulation other(made().organ, 1, made().local);
+  Simulation other(made().organ, 1, reduction::at_work(made().local));
   ASSERT_TRUE(other.restore_snapshot(snapshot).ok());
   for (Tick tick = 2001; tick <= 2400; ++tick) other.tick(inputs_at(tick), {});
   EXPECT_EQ(other.state_hash(), reduced.state_hash());
@@ -297,7 +300,7 @@ TEST_F(CutSession, GoesOnReducedElsewhere) {
 // What moves swept nodes alone must not build up in the fields while they are swept: it would come
 // out when they are let go.
 TEST(ReducedSession, FieldsStayWithTheNodesThatAreSwept) {
-  Simulation reduced(made().organ, 1, made().local), full(made().organ);
+  Simulation reduced(made().organ, 1, reduction::at_work(made().local)), full(made().organ);
   const reduction::LocalModels models(*made().local, made().organ);
   const Press press;
   const Tick down = 1000, lifted = 1300;
@@ -310,7 +313,8 @@ TEST(ReducedSession, FieldsStayWithTheNodesThatAreSwept) {
     full.tick(inputs, {});
     if (tick % 100 != 0 || tick < 300) continue;
     ASSERT_TRUE(reduced.context().report.is_reduced) << tick;
-    const auto& state = reduced.state().reduced->exterior;
+    const auto& tissue = static_cast<const reduction::ReducedTissue&>(*reduced.state().far_model);
+    const auto& state = tissue.state().far;
     const auto& model = models[state.patches.patches[0]];
     std::vector<float> amplitudes(state.amplitudes.begin(), state.amplitudes.end());
     amplitudes.resize(model.stride());
@@ -326,7 +330,7 @@ TEST(ReducedSession, FieldsStayWithTheNodesThatAreSwept) {
 }
 
 TEST(ReducedSession, ComesToRestWhereTheFullOneDoes) {
-  Simulation reduced(made().organ, 1, made().local), full(made().organ);
+  Simulation reduced(made().organ, 1, reduction::at_work(made().local)), full(made().organ);
   auto end = Press{}.at(2);
   end.samples[0].sample.world_from_tool.position += kOutward * 0.05f;
   for (Tick tick = 1; tick <= 4000; ++tick) {

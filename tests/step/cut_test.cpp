@@ -275,17 +275,17 @@ TEST(Snapshots, ThatMoveNodesAreRefused) {
     auto written = events;
     cutting::visit_state(writing, written);
     Bytes idle;  // an uncut organ's, without its history
-    TissueCuts uncut(organ);
-    world::World world(organ);
+    blades::TissueCuts uncut(organ);
+    const auto ignore = [](const topology::Edit&) {};
     auto writing_idle = world::StateArchive::writing(idle);
-    uncut.visit_state(writing_idle, world);
+    uncut.visit_state(writing_idle, ignore);
     bytes.insert(bytes.end(), idle.begin() + 21, idle.end());
-    TissueCuts cuts(organ);
+    blades::TissueCuts cuts(organ);
     auto reading = world::StateArchive::reading(bytes);
-    cuts.visit_state(reading, world);
+    cuts.visit_state(reading, ignore);
     return reading.ok() && reading.at_end();
   };
-  const dynamics::Topology topology(organ);
+  const topology::Topology topology(organ);
   const NodeIndex inner(21u), beside(22u);  // (1, 1, 1) and (2, 1, 1)
   ASSERT_TRUE(cutting::can_move(topology, {inner, beside, 6000}));
   EXPECT_FALSE(read(cutting::Move{inner, beside, 6000}));

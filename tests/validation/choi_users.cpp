@@ -76,7 +76,7 @@ void run_fig2_users(const Lab& lab, Section& section) {
 
   std::vector<NodeIndex> outside;
   for (std::uint32_t i = 0; i < joint->world().node_count(); ++i)
-    if (joint->world().node_classes[i] == world::NodeClass::Outer) outside.push_back(NodeIndex(i));
+    if (joint->world().node_classes[i] == world::NodeClass::Far) outside.push_back(NodeIndex(i));
   const auto one =
       lab.start(section, "one region", "fig2-one-region",
                 three_tools() + "[[nodes]]\nname = \"outside\"\nids = [" + ids_of(outside) +

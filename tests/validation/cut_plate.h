@@ -27,7 +27,7 @@ class CutPlate {
   void cut(const std::array<Vec3d, 2>& from, const std::array<Vec3d, 2>& to);
 
   const cutting::CutOutput& output() const { return output_; }  // of cut()
-  const dynamics::Topology& topology() const { return topology_; }
+  const topology::Topology& topology() const { return topology_; }
   Vec3d position(NodeIndex node) const;  // now, m
   ElementCounts counts() const;
   // Of faces that cuts have opened, both sides, as they are now and as they were at rest, m^2.
@@ -53,7 +53,7 @@ class CutPlate {
 
   std::unique_ptr<const organ::Organ> organ_;
   double half_thickness_ = 0;  // m
-  dynamics::Topology topology_;
+  topology::Topology topology_;
   cutting::Cutter cutter_;
   world::World world_;
   dynamics::BlockDescent solver_;

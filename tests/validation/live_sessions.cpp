@@ -13,6 +13,7 @@
 #include "server/lab/reduce/local_quality.h"
 #include "server/lab/reduce/presses.h"
 #include "server/organs/organ/local_reduction_file.h"
+#include "server/tissue/reduction/reduced_tissue.h"
 #include "tests/validation/lab.h"
 
 namespace trocar::validation {
@@ -158,7 +159,7 @@ Script converged(Script script) {
 Course run_session(const organ::Organ& organ,
                    const std::shared_ptr<const organ::LocalReduction>& reduction,
                    const Script& script, Tick field_ticks) {
-  step::Simulation simulation(organ, 1, reduction);
+  step::Simulation simulation(organ, 1, reduction::at_work(reduction));
   Course course;
   course.field_ticks = std::max<Tick>(1, field_ticks);
   for (Tick tick = 1; tick <= script.ticks; ++tick) {
@@ -171,9 +172,9 @@ Course run_session(const organ::Organ& organ,
     LiveTick now{.force_n = force_in(simulation),
                  .us = static_cast<double>(cpu_ns) * 1e-3,
                  .is_reduced = report.is_reduced};
-    if (const auto& reduced = simulation.context().reduced) {
-      now.figures = reduced->figures();
-      now.estimate = simulation.state().reduced->exterior.estimate;
+    if (const auto* const model = simulation.state().far_model.get()) {
+      now.figures = model->figures();
+      now.estimate = static_cast<const reduction::ReducedTissue&>(*model).state().far.estimate;
     }
     if (course.lost == 0 && (report.nodes_rejected > 0 || !std::isfinite(length(now.force_n))))
       course.lost = tick;

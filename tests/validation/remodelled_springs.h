@@ -32,7 +32,7 @@ class RemodelledSprings {
   void advance(double seconds, std::span<const std::uint8_t> held);
 
   std::span<const Vec3d> positions() const { return positions_; }  // m, per node
-  const dynamics::Topology& topology() const { return topology_; }
+  const topology::Topology& topology() const { return topology_; }
   double energy_j() const;
   double stable_step_s() const { return stable_step_s_; }
   // By which the lightest nodes were made heavier for the sake of the step, share of all mass.
@@ -60,7 +60,7 @@ class RemodelledSprings {
 
   const organ::Organ& organ_;
   const double viscosity_n_s_m_;
-  dynamics::Topology topology_;
+  topology::Topology topology_;
   cutting::Places places_;
   std::map<Edge, Spring> springs_;
   std::vector<Vec3d> positions_, velocities_, forces_;

@@ -29,6 +29,7 @@
 #include "server/session/net/tcp_server.h"
 #include "server/session/replication/messages.h"
 #include "server/session/replication/replicator.h"
+#include "server/tissue/reduction/reduced_tissue.h"
 
 namespace trocar::app {
 namespace {
@@ -69,7 +70,8 @@ class Server {
   Server(const ServerOptions& options, organ::Organ organ, Reduction reduction)
       : options_(options),
         reduction_(std::move(reduction.description)),
-        simulation_(std::move(organ), options.workers, std::move(reduction.model)) {}
+        simulation_(std::move(organ), options.workers,
+                    reduction::at_work(std::move(reduction.model))) {}
 
   // Binds the port and opens the journal.
   Status open();

@@ -1,6 +1,6 @@
 #include "server/lab/reduce/patch_fields.h"
 
-#include "server/tissue/dynamics/tet_shape.h"
+#include "server/tissue/topology/tet_shape.h"
 
 namespace trocar::reduce {
 namespace {
@@ -65,7 +65,7 @@ std::optional<Vector> state_of(FullModel& model, const Matrix& series,
 
 TetForces::TetForces(const FullModel& model, TetIndex tet)
     : material_(model.material_of(tet)), nodes_(model.organ().mesh.tets[tet.value]) {
-  const auto shape = dynamics::tet_shape(model.organ().mesh.rest_positions, nodes_);
+  const auto shape = topology::tet_shape(model.organ().mesh.rest_positions, nodes_);
   volume_ = shape.volume;
   for (std::size_t k = 0; k < 4; ++k) {
     const Vec3d& g = shape.gradients[k];

@@ -44,13 +44,13 @@ struct Material {
   // small strains at first (use_measured).
   HyperelasticMaterial measured{};
   // NeoHookean, Measured: strain averaged over each node's tets, against locking
-  // (dynamics::Stars).
+  // (dynamics::NodalStrain).
   bool has_averaged_strain = false;
   // Transverse isotropy (springs) and tension (all laws): along a spring at the angle a to the
   // fibres,
   //   k = k0 (1 + (fibre_stiffness_ratio - 1) cos^2 a),
   //   rest length = length (1 - tension - fibre_tension cos^2 a)    (Nakao 2003 eq. 3);
-  // tets accordingly (dynamics::stress_free_shape).
+  // tets accordingly (topology::stress_free_shape).
   // Of any length; zero: none. Organ::fibre_directions go before it.
   Vec3d fibre_direction{};
   double fibre_stiffness_ratio = 1;

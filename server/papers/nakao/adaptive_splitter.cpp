@@ -33,7 +33,7 @@ bool is_inside_patch(std::span<const PatchTriangle> patch, const Vec3d& p, doubl
       patch, [&](const PatchTriangle& triangle) { return is_inside(triangle, p, slack); });
 }
 
-bool is_surface_edge(const dynamics::Topology& topology, std::span<const TetIndex> ring,
+bool is_surface_edge(const topology::Topology& topology, std::span<const TetIndex> ring,
                      NodeIndex a, NodeIndex b) {
   for (const auto t : ring)
     for (std::uint8_t corner = 0; corner < 4; ++corner)

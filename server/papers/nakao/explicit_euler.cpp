@@ -47,8 +47,8 @@ ExplicitEuler::ExplicitEuler(const organ::Organ& organ, const world::World& worl
 std::vector<Vec3f> ExplicitEuler::gradients(std::span<const Float4> x) {
   const auto& groups = tissue_.groups();
   std::vector<Vec3f> result(masses_.size());
-  if (auto* const stars = tissue_.stars())
-    for (Group g = 0; g < groups.group_count(); ++g) stars->restart_group(g, x.data());
+  if (auto* const strain = tissue_.nodal_strain())
+    for (Group g = 0; g < groups.group_count(); ++g) strain->restart_group(g, x.data());
   for (Group g = 0; g < groups.group_count(); ++g) {
     NodeStep8 step{zero_vec8(), zero_sym_mat8()};
     tissue_.add(g, x.data(), load_group(x.data() + g * kLanes), step);

@@ -10,6 +10,7 @@
 #include "server/session/recording/message_difference.h"
 #include "server/session/recording/tick_records.h"
 #include "server/session/replication/messages.h"
+#include "server/tissue/reduction/reduced_tissue.h"
 
 namespace trocar::recording {
 namespace {
@@ -92,7 +93,7 @@ Verifier::Verifier(const journal::SessionInfo& info, organ::Organ organ,
     : info_(info),
       report_(report),
       is_older_(is_older(info.protocol)),
-      simulation_(std::move(organ), 1, std::move(reduction)),
+      simulation_(std::move(organ), 1, reduction::at_work(std::move(reduction))),
       messages_(simulation_.organ().name, simulation_.layout()) {
   if (!report_.is_resimulated) return;
   proto::SurfaceTopology topology;

@@ -242,7 +242,7 @@ ContactFinder::ContactFinder(const organ::Organ& organ)
   }
 }
 
-void ContactFinder::follow(const world::SurfaceEdit& edit, const world::World& world) {
+void ContactFinder::follow(const topology::SurfaceEdit& edit, const world::World& world) {
   surface_.follow(edit, world);
   near_of_node_.resize(world.node_count(), kNotNear);
   for (auto& nearby : nearby_) nearby.is_known = false;

@@ -1,3 +1,21 @@
+// Why a penalty on pairs that are remembered.
+//
+// A node and the closest point of a triangle, with barycentric weights w, press with
+//   f = k A/2 max(0, shift - n . (x - sum_c w_c x_c)) n,   k = kSelfStiffnessPaPerM,
+// A the node's share of the surface; half of it, because nodes of both sides meet each other's
+// triangles. Minus f goes to the corners by their weights, so that forces and torques balance.
+//
+// A force from the present gap alone knows no side: tissue that is pressed through a thin fold
+// would be pushed out behind it. Continuous collision detection finds the side, but asks for a
+// search along each path in each tick. Here a pair begins before node and triangle can touch, while
+// they face each other across a gap, and is state from then on: it keeps its side however deep it
+// is pressed. The normal n is the mean of both sides', interpolated by w, so that it turns smoothly
+// while the pair slides over edges; the closest point is that of Ericson 2005, sec. 5.1.5.
+//
+// Neighbours in the tissue are near each other without touching. They never meet: neither within
+// kNearLayers of edges through the tissue, nor, where cuts have parted the tissue, within as many
+// edges' length along the surface that there is now (self_surface.h).
+
 #include "server/tissue/contact/self_contact.h"
 
 #include <algorithm>

@@ -106,7 +106,7 @@ class SelfContactFinder {
   }
 
   // The world has its new nodes.
-  void follow(const world::SurfaceEdit& edit, const world::World& world);
+  void follow(const topology::SurfaceEdit& edit, const world::World& world);
 
   // Lists made, and pairs of nodes in the last one.
   std::uint64_t lists_made() const { return lists_made_; }

@@ -73,7 +73,7 @@ void SelfContactFinder::take_reference(Site site, const world::World& world, Lis
 
 // What the edit has changed looks around, in the list that there is and in the one to come: what
 // that has kept or found is found there once more.
-void SelfContactFinder::follow(const world::SurfaceEdit& edit, const world::World& world) {
+void SelfContactFinder::follow(const topology::SurfaceEdit& edit, const world::World& world) {
   const auto before = surface_.sites();
   const bool has_references = is_listing_ && sites_seen_ == before.size();
   // The first site whose reference the next list lacks.

@@ -168,7 +168,7 @@ bool SelfSurface::faced_at_rest(Site site, Site across) const {
   return dot(own, theirs) < 0 && dot(way, own) >= -kFacing_m && dot(way, theirs) <= kFacing_m;
 }
 
-void SelfSurface::follow(const world::SurfaceEdit& edit, const world::World& world) {
+void SelfSurface::follow(const topology::SurfaceEdit& edit, const world::World& world) {
   followed_.clear();
   if (edit.touched.empty()) return;
   extend(world);

@@ -22,7 +22,7 @@
 #include "common/base/blocks.h"
 #include "server/organs/mesh/csr.h"
 #include "server/organs/organ/organ.h"
-#include "server/tissue/world/surface_edit.h"
+#include "server/tissue/topology/edit.h"
 #include "server/tissue/world/world.h"
 
 namespace trocar::contact {
@@ -98,7 +98,7 @@ class SelfSurface {
   float longest_edge_m() const { return longest_edge_m_; }
 
   // The world has its new nodes.
-  void follow(const world::SurfaceEdit& edit, const world::World& world);
+  void follow(const topology::SurfaceEdit& edit, const world::World& world);
   // Sites of which the last edit has changed triangles, or that was_cut() since it; ascending.
   std::span<const Site> followed() const { return followed_; }
 

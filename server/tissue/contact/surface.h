@@ -23,7 +23,7 @@
 #include "common/base/index.h"
 #include "common/math/box.h"
 #include "server/organs/organ/organ.h"
-#include "server/tissue/world/surface_edit.h"
+#include "server/tissue/topology/edit.h"
 #include "server/tissue/world/world.h"
 
 namespace trocar::contact {
@@ -59,7 +59,7 @@ class Surface {
   std::size_t triangle_count() const { return triangles_.size(); }
 
   // O(the edit).
-  void follow(const world::SurfaceEdit& edit, const world::World& world);
+  void follow(const topology::SurfaceEdit& edit, const world::World& world);
 
   // Triangles whose box, now, overlaps the given one; ascending. travel_m: a sum over ticks of the
   // farthest that any node has moved.

@@ -30,7 +30,7 @@ void CutOutput::clear() {
   new_nodes = std::move(kept_nodes);
 }
 
-CutMesh::CutMesh(dynamics::Topology& topology, const Settings& settings, std::span<Stroke> strokes)
+CutMesh::CutMesh(topology::Topology& topology, const Settings& settings, std::span<Stroke> strokes)
     : topology_(topology), settings_(settings), strokes_(strokes), places_(topology) {
   TROCAR_ASSERT(!topology.has_links());
   measure_scale();
@@ -117,7 +117,7 @@ double CutMesh::sine_after_split(NodeIndex a, NodeIndex b, std::uint16_t t, doub
   return least;
 }
 
-void CutMesh::measure_scale_of(const NewNode& made) {
+void CutMesh::measure_scale_of(const topology::NewNode& made) {
   h_.resize(topology_.node_count());
   reach_.resize(topology_.node_count());
   const auto n = made.node.value, a = made.a.value, b = made.b.value;
@@ -128,7 +128,7 @@ void CutMesh::measure_scale_of(const NewNode& made) {
   });
 }
 
-void CutMesh::add_node(const NewNode& made) {
+void CutMesh::add_node(const topology::NewNode& made) {
   measure_scale_of(made);
   made_.resize(topology_.node_count());
   is_made_.resize(topology_.node_count());
@@ -139,10 +139,10 @@ void CutMesh::add_node(const NewNode& made) {
   out_->new_nodes.push_back(made);
 }
 
-Status CutMesh::repeat(const CutEvents& events, std::vector<NewNode>& made_nodes) {
+Status CutMesh::repeat(const CutEvents& events, std::vector<topology::NewNode>& made_nodes) {
   const auto place = [this](NodeIndex n) { return topology_.rest()[n.value]; };
   made_nodes.clear();
-  auto status = apply(events, topology_, places_, [&](const NewNode& made) {
+  auto status = apply(events, topology_, places_, [&](const topology::NewNode& made) {
     made_nodes.push_back(made);
     if (made.has_moved()) return follow_move(made);
     measure_scale_of(made);
@@ -170,14 +170,14 @@ void CutMesh::move(const Move& move) {
   is_made_.resize(topology_.node_count());
   made_[move.node.value] = now;
   is_made_[move.node.value] = 1;
-  const NewNode moved{move.node, move.node, move.toward, move.t};
+  const topology::NewNode moved{move.node, move.node, move.toward, move.t};
   follow_move(moved);
   out_->new_nodes.push_back(moved);
   out_->events.events.emplace_back(move);
 }
 
 // Its neighbours may reach farther now, and bundles hold for nodes that move with the tissue.
-void CutMesh::follow_move(const NewNode& moved) {
+void CutMesh::follow_move(const topology::NewNode& moved) {
   measure_scale_of(moved);
   topology_.for_each_neighbour(moved.node, [&](NodeIndex j) {
     const double edge = length(topology_.rest()[j.value] - topology_.rest()[moved.node.value]);

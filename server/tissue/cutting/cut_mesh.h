@@ -20,7 +20,7 @@ inline constexpr double kUnknownTravel = std::numeric_limits<double>::infinity()
 
 struct CutOutput {
   CutEvents events;
-  std::vector<NewNode>
+  std::vector<topology::NewNode>
       new_nodes;               // in order: a parent may be new, too; those that moved among them
   double opened_area_m2 = 0;   // one side of the wound, at rest
   double torn_area_m2 = 0;     // part of it
@@ -38,13 +38,13 @@ struct CutOutput {
 
 class CutMesh {
  public:
-  CutMesh(dynamics::Topology& topology, const Settings& settings, std::span<Stroke> strokes);
+  CutMesh(topology::Topology& topology, const Settings& settings, std::span<Stroke> strokes);
 
   // A call: displacements as in Cutter::cut(), until end().
   void begin(std::span<const Vec3f> displacements, double travel_m, CutOutput& out);
   void end();
 
-  const dynamics::Topology& topology() const { return topology_; }
+  const topology::Topology& topology() const { return topology_; }
   const Settings& settings() const { return settings_; }
   Vec3d position(NodeIndex n) const {  // now, m
     if (n.value < is_made_.size() && is_made_[n.value] != 0) return made_[n.value];
@@ -75,17 +75,17 @@ class CutMesh {
   // these faces cut.
   void open(std::span<const TetFace> faces, std::span<const Star> stars);
   // Does what another cutter of the same topology did; made: its nodes.
-  Status repeat(const CutEvents& events, std::vector<NewNode>& made);
+  Status repeat(const CutEvents& events, std::vector<topology::NewNode>& made);
   // Tets bisected by the last split().
   std::size_t last_ring() const { return children_.size(); }
 
  private:
   void measure_scale();
-  void measure_scale_of(const NewNode& node);
-  void add_node(const NewNode& node);
-  void follow_move(const NewNode& moved);
+  void measure_scale_of(const topology::NewNode& node);
+  void add_node(const topology::NewNode& node);
+  void follow_move(const topology::NewNode& moved);
 
-  dynamics::Topology& topology_;
+  topology::Topology& topology_;
   const Settings settings_;
   const std::span<Stroke> strokes_;
   Places places_;

@@ -5,7 +5,7 @@
 
 namespace trocar::cutting {
 
-Cutter::Cutter(dynamics::Topology& topology, const Settings& settings)
+Cutter::Cutter(topology::Topology& topology, const Settings& settings)
     : strokes_(kMaxStrokes),
       mesh_(topology, settings, strokes_),
       splitter_(settings.make_splitter ? settings.make_splitter() : std::make_unique<Splitter>()) {
@@ -57,7 +57,7 @@ double Cutter::behind_m(std::uint32_t blade) const {
   return strokes_[stroke_of_[blade]].motion.behind();
 }
 
-Status Cutter::repeat(const CutEvents& events, std::vector<NewNode>& made) {
+Status Cutter::repeat(const CutEvents& events, std::vector<topology::NewNode>& made) {
   if (std::ranges::any_of(strokes_, &Stroke::is_active))
     return Error{ErrorCode::Refused, "cut events cannot be repeated while a blade cuts"};
   return mesh_.repeat(events, made);

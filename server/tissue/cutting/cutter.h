@@ -32,7 +32,7 @@ inline constexpr std::uint32_t kMaxStrokes = 2 * kMaxBlades;
 
 class Cutter {
  public:
-  explicit Cutter(dynamics::Topology& topology, const Settings& settings = {});
+  explicit Cutter(topology::Topology& topology, const Settings& settings = {});
 
   // Where a blade's edge is now, m, two to kMaxEdgePoints points. False: refused; the stroke, if
   // there is one, waits where it was.
@@ -54,7 +54,7 @@ class Cutter {
   // Does what another cutter did to the same topology: all its events, of all its calls, in order;
   // with no stroke on. What is wrong is refused; what comes before it has been done. made: the
   // nodes, as in CutOutput.
-  Status repeat(const CutEvents& events, std::vector<NewNode>& made);
+  Status repeat(const CutEvents& events, std::vector<topology::NewNode>& made);
 
   // Everything that later calls depend on besides topology and settings: the same bytes, the same
   // future. One byte while no stroke is on. To be read by a cutter whose topology has had the same

@@ -12,7 +12,7 @@ Error mismatch(std::size_t event, const char* what) {
   return {ErrorCode::BadMessage, "cut event " + std::to_string(event) + ": " + what};
 }
 
-void replace_node(dynamics::Topology& topology, TetIndex place, NodeIndex old, NodeIndex node) {
+void replace_node(topology::Topology& topology, TetIndex place, NodeIndex old, NodeIndex node) {
   auto tet = topology.tet(place);
   const auto wound = topology.wound_faces(place);
   const auto axis = topology.fibre_axis(place);
@@ -33,7 +33,7 @@ Vec3d axis_along(const Vec3d& a, const Vec3d& b, std::uint16_t t) {
 std::uint8_t bit(std::uint8_t corner) {
   return static_cast<std::uint8_t>(1u << corner);
 }
-void clear_wound(dynamics::Topology& topology, TetIndex tet, std::uint8_t corner) {
+void clear_wound(topology::Topology& topology, TetIndex tet, std::uint8_t corner) {
   topology.mark_wound_faces(tet,
                             static_cast<std::uint8_t>(topology.wound_faces(tet) & ~bit(corner)));
 }
@@ -46,8 +46,8 @@ constexpr double kLeastVolumeLeft = 1e-4;
 // One event after another on a topology.
 class Replay {
  public:
-  Replay(const CutEvents& events, dynamics::Topology& topology, Places& places,
-         const std::function<void(const NewNode&)>& on_new_node)
+  Replay(const CutEvents& events, topology::Topology& topology, Places& places,
+         const std::function<void(const topology::NewNode&)>& on_new_node)
       : events_(events),
         topology_(topology),
         places_(places),
@@ -124,9 +124,9 @@ class Replay {
   }
 
   const CutEvents& events_;
-  dynamics::Topology& topology_;
+  topology::Topology& topology_;
   Places& places_;
-  const std::function<void(const NewNode&)>& on_new_node_;
+  const std::function<void(const topology::NewNode&)>& on_new_node_;
   CutFaces cuts_;
   StarAnalysis analysis_;
   std::vector<NodeIndex> nodes_;
@@ -152,7 +152,7 @@ void CutEvents::append(const CutEvents& later) {
   }
 }
 
-NodeIndex split_edge(dynamics::Topology& topology, Places& places, NodeIndex a, NodeIndex b,
+NodeIndex split_edge(topology::Topology& topology, Places& places, NodeIndex a, NodeIndex b,
                      std::uint16_t t, std::vector<TetChild>& children) {
   TROCAR_ASSERT(t > 0);
   std::vector<TetIndex> ring;
@@ -186,7 +186,7 @@ NodeIndex split_edge(dynamics::Topology& topology, Places& places, NodeIndex a, 
   return node;
 }
 
-void mark_wound(dynamics::Topology& topology, std::span<const TetFace> faces) {
+void mark_wound(topology::Topology& topology, std::span<const TetFace> faces) {
   for (const auto& face : faces) {
     const auto other = across(topology, face);
     TROCAR_ASSERT(other);
@@ -196,7 +196,7 @@ void mark_wound(dynamics::Topology& topology, std::span<const TetFace> faces) {
   }
 }
 
-void part(dynamics::Topology& topology, Places& places, std::span<const Star> stars,
+void part(topology::Topology& topology, Places& places, std::span<const Star> stars,
           std::vector<Duplicate>& copies) {
   for (const auto& star : stars)
     for (std::uint16_t c = 1; c < star.component_count; ++c) {
@@ -213,7 +213,7 @@ void part(dynamics::Topology& topology, Places& places, std::span<const Star> st
     }
 }
 
-bool can_move(const dynamics::Topology& topology, const Move& move) {
+bool can_move(const topology::Topology& topology, const Move& move) {
   const auto [node, toward, t] = move;
   const auto rest = topology.rest();
   const auto is_end = [&, node = node](NodeIndex n) { return n == node; };
@@ -243,7 +243,7 @@ bool can_move(const dynamics::Topology& topology, const Move& move) {
   return is_edge && std::abs(after - before) <= kVolumeSlack * before;
 }
 
-void move_node(dynamics::Topology& topology, const Move& move) {
+void move_node(topology::Topology& topology, const Move& move) {
   const auto [node, toward, t] = move;
   const auto middle = [&, node = node, toward = toward, t = t](std::span<const Vec3d> positions) {
     return along(positions[node.value], positions[toward.value], t);
@@ -251,8 +251,8 @@ void move_node(dynamics::Topology& topology, const Move& move) {
   topology.move_node(node, middle(topology.rest()), middle(topology.stress_free()));
 }
 
-Status apply(const CutEvents& events, dynamics::Topology& topology, Places& places,
-             const std::function<void(const NewNode&)>& on_new_node) {
+Status apply(const CutEvents& events, topology::Topology& topology, Places& places,
+             const std::function<void(const topology::NewNode&)>& on_new_node) {
   return Replay(events, topology, places, on_new_node).run();
 }
 

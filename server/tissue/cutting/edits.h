@@ -12,7 +12,7 @@
 //   Move       a node goes t/65536 of the way along an edge, at rest and free of stress, where that
 //              inverts no tet and changes neither the solid nor its materials (can_move()).
 //
-// What physics needs for a new node is here too: between which nodes it is, and where, so that its
+// Physics needs of a new node between which nodes it is, and where (topology::NewNode), so that its
 // displacement and velocity follow. Masses are the topology's.
 
 #include <cstdint>
@@ -24,6 +24,7 @@
 #include "common/base/result.h"
 #include "server/tissue/cutting/places.h"
 #include "server/tissue/cutting/star.h"
+#include "server/tissue/topology/edit.h"
 
 namespace trocar::cutting {
 
@@ -48,16 +49,6 @@ struct Move {
 };
 using CutEvent = std::variant<Split, Open, Duplicate, Move>;
 
-// displacement(node) = a + (b - a) t/65536 of the displacements at its parents; velocity likewise.
-// A copy has its original as both. One that is not new but has moved along an edge, which is
-// straight now as it was at rest, has itself as a.
-struct NewNode {
-  NodeIndex node, a, b;
-  std::uint16_t t = 0;
-
-  bool has_moved() const { return node == a; }
-};
-
 struct CutEvents {
   std::vector<CutEvent> events;
   std::vector<TetFace> faces;  // from the side of the lower tet
@@ -72,28 +63,29 @@ struct TetChild {
 };
 
 // Of an edge of a tet, 0 < t. Returns the new node; children: the tet that keeps a, the new one.
-NodeIndex split_edge(dynamics::Topology& topology, Places& places, NodeIndex a, NodeIndex b,
+NodeIndex split_edge(topology::Topology& topology, Places& places, NodeIndex a, NodeIndex b,
                      std::uint16_t t, std::vector<TetChild>& children);
 
 // Both sides of inner faces become wound (Topology::wound_faces()); before part().
-void mark_wound(dynamics::Topology& topology, std::span<const TetFace> faces);
+void mark_wound(topology::Topology& topology, std::span<const TetFace> faces);
 
 // Gives every component of the stars but the first a copy of its node.
-void part(dynamics::Topology& topology, Places& places, std::span<const Star> stars,
+void part(topology::Topology& topology, Places& places, std::span<const Star> stars,
           std::vector<Duplicate>& copies);
 
 // Whether there is that edge, all tets at the node keep a positive volume, and the sum of their
 // volumes stays what it is: a node of the surface stays in it where that is flat, and elsewhere
 // takes as much as it gives. No node of a wound moves, nor one that the organ holds; all tets at
 // the node are of one material and free of stress at rest.
-bool can_move(const dynamics::Topology& topology, const Move& move);
+bool can_move(const topology::Topology& topology, const Move& move);
 // Which can be done.
-void move_node(dynamics::Topology& topology, const Move& move);
+void move_node(topology::Topology& topology, const Move& move);
 
 // Repeats a cut. Everything is checked before it is done; after an error the edits before it have
 // been done. on_new_node is told of each new node once all is in place that its edit changes.
 Status apply(
-    const CutEvents& events, dynamics::Topology& topology, Places& places,
-    const std::function<void(const NewNode&)>& on_new_node = [](const NewNode&) {});
+    const CutEvents& events, topology::Topology& topology, Places& places,
+    const std::function<void(const topology::NewNode&)>& on_new_node =
+        [](const topology::NewNode&) {});
 
 }  // namespace trocar::cutting

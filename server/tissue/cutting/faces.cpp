@@ -4,7 +4,7 @@
 
 namespace trocar::cutting {
 
-std::optional<TetFace> across(const dynamics::Topology& topology, const TetFace& face) {
+std::optional<TetFace> across(const topology::Topology& topology, const TetFace& face) {
   const auto nodes = face_nodes(topology.tet(face.tet), face.corner);
   auto shortest = topology.tets_of(nodes[0]);
   for (std::size_t i = 1; i < 3; ++i)
@@ -25,14 +25,14 @@ std::optional<TetFace> across(const dynamics::Topology& topology, const TetFace&
   return std::nullopt;
 }
 
-void ring_of(const dynamics::Topology& topology, NodeIndex a, NodeIndex b,
+void ring_of(const topology::Topology& topology, NodeIndex a, NodeIndex b,
              std::vector<TetIndex>& out) {
   out.clear();
   for (const auto t : topology.tets_of(a))
     if (corner_of(topology.tet(t), b) < 4) out.push_back(t);
 }
 
-double face_area(const dynamics::Topology& topology, const TetFace& face) {
+double face_area(const topology::Topology& topology, const TetFace& face) {
   const auto nodes = face_nodes(topology.tet(face.tet), face.corner);
   const auto at = [&](std::size_t i) { return topology.rest()[nodes[i].value]; };
   return length(cross(at(1) - at(0), at(2) - at(0))) / 2;
@@ -64,7 +64,7 @@ double least_sine(const std::array<Vec3d, 4>& corners) {
   return volume > 0 ? sine : -sine;
 }
 
-std::array<Vec3d, 4> rest_corners(const dynamics::Topology& topology, const mesh::Tet& tet) {
+std::array<Vec3d, 4> rest_corners(const topology::Topology& topology, const mesh::Tet& tet) {
   std::array<Vec3d, 4> corners;
   for (std::size_t i = 0; i < 4; ++i) corners[i] = topology.rest()[tet[i].value];
   return corners;

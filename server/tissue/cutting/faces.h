@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "server/tissue/dynamics/topology.h"
+#include "server/tissue/topology/topology.h"
 
 namespace trocar::cutting {
 
@@ -35,20 +35,20 @@ inline mesh::Triangle face_nodes(const mesh::Tet& tet, std::uint8_t corner) {
 }
 
 // The same face seen from the tet on its other side.
-std::optional<TetFace> across(const dynamics::Topology& topology, const TetFace& face);
+std::optional<TetFace> across(const topology::Topology& topology, const TetFace& face);
 
 // Tets at an edge, ascending.
-void ring_of(const dynamics::Topology& topology, NodeIndex a, NodeIndex b,
+void ring_of(const topology::Topology& topology, NodeIndex a, NodeIndex b,
              std::vector<TetIndex>& out);
 
-double face_area(const dynamics::Topology& topology, const TetFace& face);  // at rest, m^2
+double face_area(const topology::Topology& topology, const TetFace& face);  // at rest, m^2
 
 // Six times the volume; positive in the order of mesh::Tet.
 double six_volumes(const std::array<Vec3d, 4>& corners);
 // The smallest sine of a dihedral angle: V6 l / (4 A1 A2), l the shared edge, A1 and A2 the faces;
 // negative for an inverted tet.
 double least_sine(const std::array<Vec3d, 4>& corners);
-std::array<Vec3d, 4> rest_corners(const dynamics::Topology& topology, const mesh::Tet& tet);
+std::array<Vec3d, 4> rest_corners(const topology::Topology& topology, const mesh::Tet& tet);
 
 // A share from 0 to 1 of an edge in 1/65536, an end short of the whole.
 std::uint16_t quantised_share(double share);

@@ -1,3 +1,22 @@
+// Why faces are opened by topology alone, and why the loop ends.
+//
+// A blade's path and a tet mesh agree only where nodes lie on the path. The wound is therefore a
+// set of faces between tets of different sides, and what it does to the surface is decided by
+// counting, never by coordinates: two computers, and a replay, come to the same wound. Opening all
+// proposed faces gives every component of tets around a node a node of its own (star.h). The
+// surface stays manifold there if the link of each component is a disc or a sphere; with fans as
+// the link's vertices, faces as its edges and tets as its triangles that is Euler's characteristic,
+//   chi = fans - faces + tets = 1 (disc) or 2 (sphere),
+// and if no edge has two fans that are in the same components at both of its ends: these would be
+// one edge with four wound faces.
+//
+// A proposal that breaks this can't be mended by parting more, for the blade has not been there. So
+// faces are closed again, one for each breach: the one that parts the fewest nodes, because it is
+// the one that does least for the wound. Closing a face changes the stars of its three nodes alone,
+// so that only these are looked at again. Each round closes a face or ends, and with no face open
+// there is no breach: the loop ends after at most as many rounds as there are proposals. What was
+// closed waits until the blade has changed something beside it.
+
 #include "server/tissue/cutting/opening.h"
 
 #include <algorithm>

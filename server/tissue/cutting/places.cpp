@@ -20,20 +20,20 @@ void put(std::vector<Index>& unused, Index place) {
 
 }  // namespace
 
-Places::Places(const dynamics::Topology& topology) {
+Places::Places(const topology::Topology& topology) {
   for (auto n = topology.node_count(); n-- > 0;)
     if (!topology.has_node(NodeIndex(n))) nodes_.emplace_back(n);
   for (auto t = topology.tet_count(); t-- > 0;)
     if (!topology.has_tet(TetIndex(t))) tets_.emplace_back(t);
 }
 
-NodeIndex Places::next_node(const dynamics::Topology& topology) const {
+NodeIndex Places::next_node(const topology::Topology& topology) const {
   return nodes_.empty() ? NodeIndex(topology.node_count()) : nodes_.back();
 }
-NodeIndex Places::take_node(const dynamics::Topology& topology) {
+NodeIndex Places::take_node(const topology::Topology& topology) {
   return take(nodes_, topology.node_count());
 }
-TetIndex Places::take_tet(const dynamics::Topology& topology) {
+TetIndex Places::take_tet(const topology::Topology& topology) {
   return take(tets_, topology.tet_count());
 }
 void Places::give_back(NodeIndex node) {

@@ -5,17 +5,17 @@
 
 #include <vector>
 
-#include "server/tissue/dynamics/topology.h"
+#include "server/tissue/topology/topology.h"
 
 namespace trocar::cutting {
 
 class Places {
  public:
-  explicit Places(const dynamics::Topology& topology);
+  explicit Places(const topology::Topology& topology);
 
-  NodeIndex next_node(const dynamics::Topology& topology) const;
-  NodeIndex take_node(const dynamics::Topology& topology);
-  TetIndex take_tet(const dynamics::Topology& topology);
+  NodeIndex next_node(const topology::Topology& topology) const;
+  NodeIndex take_node(const topology::Topology& topology);
+  TetIndex take_tet(const topology::Topology& topology);
   void give_back(NodeIndex node);
   void give_back(TetIndex tet);
 

@@ -48,7 +48,7 @@ void StarAnalysis::join(std::vector<std::uint32_t>& parents, std::uint32_t a, st
   parents[std::max(a, b)] = std::min(a, b);
 }
 
-void StarAnalysis::join_over_faces(const dynamics::Topology& topology, const CutFaces& cuts,
+void StarAnalysis::join_over_faces(const topology::Topology& topology, const CutFaces& cuts,
                                    const Star& star) {
   const auto count = static_cast<std::uint32_t>(star.tets.size());
   sides_.clear();
@@ -102,7 +102,7 @@ void StarAnalysis::number_components(Star& out) {
   }
 }
 
-void StarAnalysis::find_fans(const dynamics::Topology& topology, Star& out) {
+void StarAnalysis::find_fans(const topology::Topology& topology, Star& out) {
   corners_.clear();
   for (std::uint32_t i = 0; i < out.tets.size(); ++i) {
     const auto& tet = topology.tet(out.tets[i]);
@@ -141,7 +141,7 @@ void StarAnalysis::judge(Star& out) {
     if (chi_[c] != (boundary_[c] > 0 ? 2 : 4)) out.bad_components.push_back(c);
 }
 
-void StarAnalysis::run(const dynamics::Topology& topology, const CutFaces& cuts, NodeIndex node,
+void StarAnalysis::run(const topology::Topology& topology, const CutFaces& cuts, NodeIndex node,
                        Star& out) {
   out.node = node;
   const auto tets = topology.tets_of(node);

@@ -20,7 +20,7 @@ namespace trocar::cutting {
 // Which faces are cut, as a mask of corners per tet, on both sides of each face.
 class CutFaces {
  public:
-  explicit CutFaces(const dynamics::Topology& topology) : topology_(topology) {}
+  explicit CutFaces(const topology::Topology& topology) : topology_(topology) {}
 
   // An inner face, not cut yet.
   void cut(const TetFace& face);
@@ -33,7 +33,7 @@ class CutFaces {
  private:
   void flip(const TetFace& face);
 
-  const dynamics::Topology& topology_;
+  const topology::Topology& topology_;
   std::vector<std::uint8_t> masks_;  // per tet
   std::vector<TetIndex> masked_;
 };
@@ -59,7 +59,7 @@ struct Star {
 
 class StarAnalysis {
  public:
-  void run(const dynamics::Topology& topology, const CutFaces& cuts, NodeIndex node, Star& out);
+  void run(const topology::Topology& topology, const CutFaces& cuts, NodeIndex node, Star& out);
 
  private:
   struct Side {  // of a face at the node
@@ -76,9 +76,9 @@ class StarAnalysis {
 
   static std::uint32_t find(std::vector<std::uint32_t>& parents, std::uint32_t item);
   static void join(std::vector<std::uint32_t>& parents, std::uint32_t a, std::uint32_t b);
-  void join_over_faces(const dynamics::Topology& topology, const CutFaces& cuts, const Star& star);
+  void join_over_faces(const topology::Topology& topology, const CutFaces& cuts, const Star& star);
   void number_components(Star& out);
-  void find_fans(const dynamics::Topology& topology, Star& out);
+  void find_fans(const topology::Topology& topology, Star& out);
   void judge(Star& out);
 
   std::vector<Side> sides_;

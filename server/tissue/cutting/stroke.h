@@ -73,7 +73,7 @@ class Stroke {
 
   // Labels and heights of nodes, and sides of tets without a labelled node.
   template <typename IsFar>
-  void forget_if(IsFar&& is_far, const dynamics::Topology& topology) {
+  void forget_if(IsFar&& is_far, const topology::Topology& topology) {
     std::erase_if(labelled_,
                   [&](NodeIndex n) { return is_far(n) ? (labels_[n.value] = 0, true) : false; });
     std::erase_if(measured_,
@@ -89,7 +89,7 @@ class Stroke {
 
   // All but the id. What is read must fit the topology and be what a stroke can be; if it does
   // not, archive.fail(), and what is left is good for clear() only.
-  void visit_state(world::StateArchive& archive, const dynamics::Topology& topology);
+  void visit_state(world::StateArchive& archive, const topology::Topology& topology);
 
   std::uint32_t id = 0;
   bool is_active = false, has_ended = false;
@@ -105,8 +105,8 @@ class Stroke {
  private:
   void forget_height(NodeIndex node);
   void visit_patch(world::StateArchive& archive);
-  void visit_nodes(world::StateArchive& archive, const dynamics::Topology& topology);
-  void visit_tets(world::StateArchive& archive, const dynamics::Topology& topology);
+  void visit_nodes(world::StateArchive& archive, const topology::Topology& topology);
+  void visit_tets(world::StateArchive& archive, const topology::Topology& topology);
 
   std::vector<std::uint8_t> labels_;
   std::vector<NodeIndex> labelled_;

@@ -97,7 +97,7 @@ void Stroke::visit_patch(world::StateArchive& archive) {
   }
 }
 
-void Stroke::visit_nodes(world::StateArchive& archive, const dynamics::Topology& topology) {
+void Stroke::visit_nodes(world::StateArchive& archive, const topology::Topology& topology) {
   const auto has = [&](NodeIndex n) {
     return n.value < topology.node_count() && topology.has_node(n);
   };
@@ -128,7 +128,7 @@ void Stroke::visit_nodes(world::StateArchive& archive, const dynamics::Topology&
   if (!is_ascending(fresh)) archive.fail();
 }
 
-void Stroke::visit_tets(world::StateArchive& archive, const dynamics::Topology& topology) {
+void Stroke::visit_tets(world::StateArchive& archive, const topology::Topology& topology) {
   const auto has = [&](TetIndex t) {
     return t.value < topology.tet_count() && topology.has_tet(t);
   };
@@ -147,7 +147,7 @@ void Stroke::visit_tets(world::StateArchive& archive, const dynamics::Topology& 
   if (!is_ascending(waiting)) archive.fail();
 }
 
-void Stroke::visit_state(world::StateArchive& archive, const dynamics::Topology& topology) {
+void Stroke::visit_state(world::StateArchive& archive, const topology::Topology& topology) {
   motion.visit_state(archive, has_ended);
   if (!archive.ok()) return;
   for (auto* const value : {&h, &way}) {

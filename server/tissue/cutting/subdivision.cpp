@@ -53,7 +53,7 @@ class Parts {
 
 }  // namespace
 
-void Subdivision::find_tets(const dynamics::Topology& topology) {
+void Subdivision::find_tets(const topology::Topology& topology) {
   std::vector<std::pair<TetIndex, std::uint32_t>> pairs;
   std::vector<TetIndex> ring;
   for (std::uint32_t c = 0; c < cuts_.size(); ++c) {
@@ -70,7 +70,7 @@ void Subdivision::find_tets(const dynamics::Topology& topology) {
   }
 }
 
-void Subdivision::rank_by_length(const dynamics::Topology& topology) {
+void Subdivision::rank_by_length(const topology::Topology& topology) {
   const auto rest = topology.rest();
   const auto key = [&](std::uint32_t c) {
     const auto& cut = cuts_[c];
@@ -83,7 +83,7 @@ void Subdivision::rank_by_length(const dynamics::Topology& topology) {
   for (std::uint32_t r = 0; r < order_.size(); ++r) ranks_[order_[r]] = r;
 }
 
-double Subdivision::score(const dynamics::Topology& topology, const CutTet& cut_tet) {
+double Subdivision::score(const topology::Topology& topology, const CutTet& cut_tet) {
   own_ = cut_tet.cuts;
   std::sort(own_.begin(), own_.end(), [&](auto x, auto y) { return ranks_[x] < ranks_[y]; });
   const auto& tet = topology.tet(cut_tet.tet);
@@ -92,13 +92,13 @@ double Subdivision::score(const dynamics::Topology& topology, const CutTet& cut_
   return parts.least();
 }
 
-double Subdivision::score_around(const dynamics::Topology& topology) {
+double Subdivision::score_around(const topology::Topology& topology) {
   double sum = 0;
   for (const auto t : around_) sum += score(topology, tets_[t]);
   return sum;
 }
 
-bool Subdivision::improve(const dynamics::Topology& topology, const CutTet& cut_tet) {
+bool Subdivision::improve(const topology::Topology& topology, const CutTet& cut_tet) {
   around_.clear();
   std::vector<std::uint32_t> ranks, best;
   for (const auto c : cut_tet.cuts) {
@@ -127,7 +127,7 @@ bool Subdivision::improve(const dynamics::Topology& topology, const CutTet& cut_
   return is_better;
 }
 
-std::span<const std::uint32_t> Subdivision::order(const dynamics::Topology& topology,
+std::span<const std::uint32_t> Subdivision::order(const topology::Topology& topology,
                                                   std::span<const EdgeCut> cuts) {
   cuts_ = cuts;
   find_tets(topology);

@@ -25,7 +25,7 @@ struct EdgeCut {
 class Subdivision {
  public:
   // Places in `cuts`, which are distinct edges, in the order to be bisected in.
-  std::span<const std::uint32_t> order(const dynamics::Topology& topology,
+  std::span<const std::uint32_t> order(const topology::Topology& topology,
                                        std::span<const EdgeCut> cuts);
 
  private:
@@ -34,12 +34,12 @@ class Subdivision {
     std::vector<std::uint32_t> cuts;  // ascending
   };
 
-  void find_tets(const dynamics::Topology& topology);
-  void rank_by_length(const dynamics::Topology& topology);
+  void find_tets(const topology::Topology& topology);
+  void rank_by_length(const topology::Topology& topology);
   // Of the parts of a tet; the smallest sine.
-  double score(const dynamics::Topology& topology, const CutTet& cut_tet);
-  double score_around(const dynamics::Topology& topology);
-  bool improve(const dynamics::Topology& topology, const CutTet& cut_tet);
+  double score(const topology::Topology& topology, const CutTet& cut_tet);
+  double score_around(const topology::Topology& topology);
+  bool improve(const topology::Topology& topology, const CutTet& cut_tet);
 
   std::span<const EdgeCut> cuts_;
   std::vector<CutTet> tets_;

@@ -5,7 +5,7 @@
 
 #include "common/math/symmetric.h"
 #include "server/organs/organ/organ.h"
-#include "server/tissue/dynamics/tet_shape.h"
+#include "server/tissue/topology/tet_shape.h"
 
 namespace trocar::cutting {
 namespace {
@@ -14,13 +14,13 @@ namespace {
 // part of its length. In a well-shaped tet F - I is at most about twice the largest of its edges'.
 constexpr double kNoticed = 0.25;
 
-Principal stretch_at(const dynamics::Topology& topology, std::span<const Vec3f> displacements,
+Principal stretch_at(const topology::Topology& topology, std::span<const Vec3f> displacements,
                      NodeIndex node) {
   SymMat3<double> sum;
   double volume = 0;
   for (const auto t : topology.tets_of(node)) {
     const auto& tet = topology.tet(t);
-    const auto shape = dynamics::tet_shape(topology.rest(), tet);
+    const auto shape = topology::tet_shape(topology.rest(), tet);
     // Rows of F: gradients of the three coordinates.
     Vec3d x{1, 0, 0}, y{0, 1, 0}, z{0, 0, 1};
     for (std::size_t i = 0; i < 4; ++i) {
@@ -46,7 +46,7 @@ Tearing::Tearing(const organ::Organ& organ) {
   }
 }
 
-bool Tearing::is_near_rest(const dynamics::Topology& topology, std::span<const Vec3f> displacements,
+bool Tearing::is_near_rest(const topology::Topology& topology, std::span<const Vec3f> displacements,
                            NodeIndex node) const {
   const double most = (least_stretch_ - 1) * kNoticed;
   const Vec3f own = displacements[node.value];
@@ -59,7 +59,7 @@ bool Tearing::is_near_rest(const dynamics::Topology& topology, std::span<const V
   return is_near;
 }
 
-std::span<const TetFace> Tearing::find(const dynamics::Topology& topology,
+std::span<const TetFace> Tearing::find(const topology::Topology& topology,
                                        std::span<const Vec3f> displacements,
                                        std::span<const NodeIndex> nodes) {
   tears_.clear();
@@ -87,7 +87,7 @@ std::span<const TetFace> Tearing::find(const dynamics::Topology& topology,
   return faces_;
 }
 
-void Tearing::part(const dynamics::Topology& topology, const Tear& tear) {
+void Tearing::part(const topology::Topology& topology, const Tear& tear) {
   const auto rest = topology.rest();
   const auto is_beyond = [&](TetIndex t) {
     double height = 0;

@@ -29,7 +29,7 @@ class Tearing {
   // Faces that part at these nodes, the most stretched first; valid until the next call.
   // displacements: of all nodes, m. O(edges at the nodes), and their tets where edges have changed
   // by a good part of what tears.
-  std::span<const TetFace> find(const dynamics::Topology& topology,
+  std::span<const TetFace> find(const topology::Topology& topology,
                                 std::span<const Vec3f> displacements,
                                 std::span<const NodeIndex> nodes);
 
@@ -40,9 +40,9 @@ class Tearing {
     Vec3d across;
   };
 
-  bool is_near_rest(const dynamics::Topology& topology, std::span<const Vec3f> displacements,
+  bool is_near_rest(const topology::Topology& topology, std::span<const Vec3f> displacements,
                     NodeIndex node) const;
-  void part(const dynamics::Topology& topology, const Tear& tear);
+  void part(const topology::Topology& topology, const Tear& tear);
 
   double least_stretch_ = 0;
   std::vector<Tear> tears_;

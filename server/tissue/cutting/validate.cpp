@@ -14,14 +14,14 @@ Error broken(const char* what, std::uint32_t index) {
   return {ErrorCode::Mismatch, std::string(what) + " " + std::to_string(index)};
 }
 
-std::vector<TetIndex> tets_of(const dynamics::Topology& topology) {
+std::vector<TetIndex> tets_of(const topology::Topology& topology) {
   std::vector<TetIndex> tets;
   for (std::uint32_t t = 0; t < topology.tet_count(); ++t)
     if (topology.has_tet(TetIndex(t))) tets.emplace_back(t);
   return tets;
 }
 
-Status check_tets(const dynamics::Topology& topology) {
+Status check_tets(const topology::Topology& topology) {
   std::vector<std::array<NodeIndex, 4>> all;
   for (const auto t : tets_of(topology)) {
     auto tet = topology.tet(t);
@@ -43,7 +43,7 @@ Status check_tets(const dynamics::Topology& topology) {
   return {};
 }
 
-Status check_nodes(const dynamics::Topology& topology) {
+Status check_nodes(const topology::Topology& topology) {
   for (std::uint32_t n = 0; n < topology.node_count(); ++n)
     for (const auto t : topology.tets_of(NodeIndex(n)))
       if (!topology.has_tet(t) || corner_of(topology.tet(t), NodeIndex(n)) > 3)
@@ -55,7 +55,7 @@ struct Side {
   mesh::Triangle nodes;  // ascending
   TetIndex tet;
 };
-std::vector<Side> sorted_sides(const dynamics::Topology& topology) {
+std::vector<Side> sorted_sides(const topology::Topology& topology) {
   std::vector<Side> sides;
   for (const auto t : tets_of(topology))
     for (std::uint8_t corner = 0; corner < 4; ++corner) {
@@ -69,7 +69,7 @@ std::vector<Side> sorted_sides(const dynamics::Topology& topology) {
   return sides;
 }
 
-Status check_surface(const dynamics::Topology& topology) {
+Status check_surface(const topology::Topology& topology) {
   const auto sides = sorted_sides(topology);
   std::vector<mesh::NodePair> edges;  // of the surface
   for (std::size_t i = 0, end = 0; i < sides.size(); i = end) {
@@ -86,7 +86,7 @@ Status check_surface(const dynamics::Topology& topology) {
   return {};
 }
 
-Status check_links(const dynamics::Topology& topology) {
+Status check_links(const topology::Topology& topology) {
   const CutFaces none(topology);
   StarAnalysis analysis;
   Star star;
@@ -103,13 +103,13 @@ Status check_links(const dynamics::Topology& topology) {
 
 }  // namespace
 
-Status validate(const dynamics::Topology& topology) {
+Status validate(const topology::Topology& topology) {
   for (const auto check : {check_tets, check_nodes, check_surface, check_links})
     if (auto status = check(topology); !status) return status;
   return {};
 }
 
-Pieces find_pieces(const dynamics::Topology& topology) {
+Pieces find_pieces(const topology::Topology& topology) {
   Pieces pieces;
   pieces.piece_of_tet.assign(topology.tet_count(), kNone);
   std::vector<TetIndex> stack;
@@ -134,14 +134,14 @@ Pieces find_pieces(const dynamics::Topology& topology) {
   return pieces;
 }
 
-double total_volume(const dynamics::Topology& topology) {
+double total_volume(const topology::Topology& topology) {
   double total = 0;
   for (const auto t : tets_of(topology))
     total += six_volumes(rest_corners(topology, topology.tet(t))) / 6;
   return total;
 }
 
-double surface_area(const dynamics::Topology& topology) {
+double surface_area(const topology::Topology& topology) {
   double total = 0;
   for (const auto t : tets_of(topology))
     for (std::uint8_t corner = 0; corner < 4; ++corner)

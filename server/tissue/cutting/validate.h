@@ -3,7 +3,7 @@
 // Whether a topology is a sound solid after cuts, and what it consists of.
 
 #include "common/base/result.h"
-#include "server/tissue/dynamics/topology.h"
+#include "server/tissue/topology/topology.h"
 
 namespace trocar::cutting {
 
@@ -11,7 +11,7 @@ namespace trocar::cutting {
 // at rest and free of stress; a face belongs to at most two tets; an edge of the surface has
 // exactly two surface faces; the tets around a node hang together and its link is a disc or a
 // sphere; no tet twice. O(n log n).
-Status validate(const dynamics::Topology& topology);
+Status validate(const topology::Topology& topology);
 
 struct Pieces {
   std::uint32_t count = 0;
@@ -19,9 +19,9 @@ struct Pieces {
   std::vector<std::uint32_t> tets;          // per piece
 };
 // Which tets hang together over faces.
-Pieces find_pieces(const dynamics::Topology& topology);
+Pieces find_pieces(const topology::Topology& topology);
 
-double total_volume(const dynamics::Topology& topology);  // at rest, m^3
-double surface_area(const dynamics::Topology& topology);  // at rest, m^2
+double total_volume(const topology::Topology& topology);  // at rest, m^3
+double surface_area(const topology::Topology& topology);  // at rest, m^2
 
 }  // namespace trocar::cutting

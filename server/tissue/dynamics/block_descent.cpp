@@ -1,3 +1,29 @@
+// Why vertex block descent, and how a step goes.
+//
+// A step of implicit Euler is the minimum of the incremental potential (Chen 2024, sec. 3)
+//   G(x) = sum_i m_i/(2 dt^2) |x_i - y_i|^2 + W(x),   y_i = x_i(t) + dt v_i(t) + dt^2 g,
+// with W the energies of tissue, damping and contacts. A Newton step on all nodes at once needs a
+// sparse factorisation that every cut and every new contact makes stale. A Newton step on one node,
+//   (m_i/dt^2 I + d2W/dx_i^2) dx_i = -dG/dx_i,
+// needs a 3 x 3 system. Its block is positive definite for every energy here whatever the
+// deformation (psi.h), so each full step lowers the quadratic model of G, whatever the order. So a
+// tick may stop after a fixed number of sweeps: what is left is an error of the step, not an
+// instability. This is Gauss-Seidel on the nodes' blocks; nodes of one colour share no element and
+// are stepped together, so the result does not depend on the number of workers.
+//
+// A sweep carries a force across one layer of elements and leaves long waves nearly as they were.
+// Three things make few sweeps enough. The step starts from x + dt v (begin_inertia()), which is
+// exact for rigid motion. Steps are over-relaxed by omega, which shortens the tail of smooth errors
+// as in successive over-relaxation (Young 1954); where the residual of a sweep has grown against
+// the one before, the rest of the step goes on with omega = 1, because over-relaxation of the
+// nonlinear problem has no guarantee. Nodes near a tool get more sweeps than the far field, where a
+// few suffice (FarPlan says how many, and with which omega).
+//
+// The far field is moved in one of four ways: not at all, by sweeps over its energies, by sweeps
+// over linear forces (linear_far_field.h), or by a FarFieldSolver. A schedule made before the first
+// sweep (block_descent_schedule.cpp) says what each sweep goes over; execute_schedule() knows no
+// modes.
+
 #include "server/tissue/dynamics/block_descent.h"
 
 #include <algorithm>
@@ -10,9 +36,6 @@ namespace trocar::dynamics {
 namespace {
 
 constexpr std::uint32_t kNone = 0xffffffffu;
-// Groups next to one another that take turns together, so that memory is read in runs.
-constexpr std::uint32_t kPhaseGroups = 16;
-constexpr float kMaxOverRelaxationFewSweeps = 1.3f;
 // A step of one node beyond this, m, is as broken as one that is not finite.
 constexpr float kMaxNodeStep = 1.0f;
 // What goes back with a node whose step was not finite: the nodes within so many layers.
@@ -27,23 +50,8 @@ float sum(const Lanes& a) {
 BlockDescent::BlockDescent(const organ::Organ& organ, const world::World& world, unsigned workers)
     : organ_(organ), tissue_(organ), workers_(workers), gravity_(to_float(organ.gravity_m_s2)) {
   const auto& groups = tissue_.groups();
-  const auto group_count = groups.group_count(), slot_count = groups.slot_count();
-  constants_.resize(group_count);
-  free_.resize(group_count);
-  x_.resize(slot_count);
-  v_.resize(slot_count);
-  start_.resize(slot_count);
-  inertia_.resize(group_count);
-  squares_.resize(group_count);
-  group_squares_.resize(group_count);
-  squared_moves_.resize(group_count);
-  rejected_.resize(group_count);
-  begun_stamp_.resize(group_count);
-  group_stamp_.resize(group_count);
-  asked_stamp_.resize(group_count);
-  serial_stamp_.resize(group_count);
-  slot_stamp_.resize(slot_count);
-  first_link_.resize(slot_count);
+  const auto group_count = groups.group_count();
+  resize_arrays();
   links_.reserve(8 * contact::kMaxPointsPerTool + contact::kMaxSelfPoints);
   residuals_.reserve(world.node_count());
   relaxed_lanes_.reserve(group_count);
@@ -51,7 +59,6 @@ BlockDescent::BlockDescent(const organ::Organ& organ, const world::World& world,
   for (auto& band : bands_) band.reserve(groups);
   const auto map = organ::material_map(organ);
   for (Group g = 0; g < group_count; ++g) {
-    all_groups_.push_back(g);
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
       const auto node = groups.nodes_of(g)[lane];
       if (!node.is_valid()) continue;
@@ -77,7 +84,7 @@ void BlockDescent::take_state(const world::World& world) {
     }
   }
   take_motion(world);
-  if (far_field_) far_field_->take_state(x_.data(), world);
+  if (linear_far_field_) linear_far_field_->take_state(x_.data(), world);
   take_relaxation(world);
 }
 
@@ -91,8 +98,8 @@ void BlockDescent::take_motion(const world::World& world) {
 }
 
 void BlockDescent::use_linear_far_field(const world::World& world) {
-  far_field_ = std::make_unique<FarField>(tissue_, world);
-  far_field_->take_state(x_.data(), world);
+  linear_far_field_ = std::make_unique<LinearFarField>(tissue_, world);
+  linear_far_field_->take_state(x_.data(), world);
   takings_.resize(workers_.count());
   due_.reserve(all_groups_.size());
 }
@@ -105,47 +112,7 @@ void BlockDescent::take_state(const world::World& world, std::span<const NodeInd
   }
 }
 
-// --- Which groups and lanes ---
-
-void BlockDescent::plan_step(std::span<const NodeIndex> near, const SolveSettings& settings,
-                             Tick tick, std::span<const NodeIndex> held) {
-  const auto& groups = tissue_.groups();
-  for (auto* plan : {&near_, &far_, &far_swept_, &last_, &begun_}) plan->clear();
-  for (const auto node : near) near_.add(groups, node);
-  near_.finish(groups);
-  far_interval_ = settings.far_interval;
-  if (settings.far_sweeps > 0)
-    for (Group g = 0; g < free_.size(); ++g) {
-      const auto lanes = static_cast<std::uint8_t>(free_[g] & ~near_.lanes[g]);
-      far_.add(g, lanes);
-      if (!is_slow(g) || (g / kPhaseGroups + tick) % far_interval_ == 0) far_swept_.add(g, lanes);
-    }
-  far_swept_.finish(groups);
-  if (settings.far_sweeps > 0) {
-    for (const auto g : near_.groups) last_.add(g, near_.lanes[g]);
-    for (const auto g : far_swept_.groups) last_.add(g, far_swept_.lanes[g]);
-    last_.finish(groups);
-  }
-  for (const auto g : near_.groups) begun_.add(g, 0xff);
-  for (const auto g : is_far_linear_ ? all_groups_ : far_.groups) begun_.add(g, 0xff);
-  for (const auto node : held) begun_.add(groups.slot_of(node) / kLanes, 0xff);
-  for (const auto g : begun_.groups) begun_stamp_[g] = current_;
-}
-
-void BlockDescent::plan_bands(std::span<const NodeIndex> near, std::span<const SweepBand> bands) {
-  TROCAR_ASSERT(bands.size() <= kMaxSweepBands);
-  for (std::size_t b = 0; b + 1 < bands.size(); ++b) {
-    bands_[b].clear();
-    for (const auto node : near.first(bands[b].end)) bands_[b].add(tissue_.groups(), node);
-    bands_[b].finish(tissue_.groups());
-  }
-}
-
-const SweepPlan& BlockDescent::plan_of(std::uint32_t left, std::span<const SweepBand> bands) const {
-  for (std::size_t b = 0; b + 1 < bands.size(); ++b)
-    if (bands[b + 1].sweeps < left) return bands_[b];
-  return near_;
-}
+// --- Contacts ---
 
 void BlockDescent::link_contacts(const contact::ContactList& contacts) {
   const auto& groups = tissue_.groups();
@@ -214,14 +181,14 @@ void BlockDescent::ask_energies(Group group, const Float4* start) {
 
 void BlockDescent::begin_groups(world::World& world, const ExternalLoads& loads) {
   if (is_far_linear_) {
-    far_field_->begin_step(x_.data(), world);
+    linear_far_field_->begin_step(x_.data(), world);
     due_.clear();
     for (const auto g : all_groups_)
-      if (far_field_->is_due(g)) due_.push_back(g);
+      if (linear_far_field_->is_due(g)) due_.push_back(g);
     workers_.run([&](unsigned w) {
       const auto n = due_.size(), count = std::size_t{workers_.count()};
       for (auto i = n * w / count; i < n * (w + 1) / count; ++i)
-        far_field_->renew(due_[i], takings_[w]);
+        linear_far_field_->renew(due_[i], takings_[w]);
     });
   } else {
     for_each_group(far_swept_.groups, [&](Group g) { ask_energies(g, x_.data()); });
@@ -234,16 +201,16 @@ void BlockDescent::begin_groups(world::World& world, const ExternalLoads& loads)
   place_held(loads);
   if (is_far_linear_)
     for_each_group(begun_.groups, [&](Group g) {
-      far_field_->begin_group(g, x_.data(), start_.data(),
-                              coasts(g) ? inverse_dt_ : inverse_dt_of(g));
+      linear_far_field_->begin_group(g, x_.data(), start_.data(),
+                                     coasts(g) ? inverse_dt_ : inverse_dt_of(g));
     });
-  restart_stars();
+  restart_nodal_strain();
   for (const auto g : begun_.groups) rejected_[g] = 0, squared_moves_[g] = 0;
 }
 
-void BlockDescent::restart_stars() {
-  if (auto* const stars = tissue_.stars())
-    for_each_group(all_groups_, [&](Group g) { stars->restart_group(g, x_.data()); });
+void BlockDescent::restart_nodal_strain() {
+  if (auto* const strain = tissue_.nodal_strain())
+    for_each_group(all_groups_, [&](Group g) { strain->restart_group(g, x_.data()); });
 }
 
 void BlockDescent::place_held(const ExternalLoads& loads) {
@@ -337,7 +304,7 @@ void BlockDescent::relax(const SweepPlan& plan, Group group, const contact::Cont
   NodeStep8 step = inertia_of(group, own);
   const bool is_linear = is_far_linear_ && near_.lanes[group] == 0 &&
                          group_stamp_[group] != current_ &&
-                         far_field_->add(group, lanes, inverse_dt_of(group), step);
+                         linear_far_field_->add(group, lanes, inverse_dt_of(group), step);
   if (is_linear) {
     tissue_.add_averaged(group, step);
   } else {
@@ -360,10 +327,9 @@ void BlockDescent::relax(const SweepPlan& plan, Group group, const contact::Cont
   const Float8 moves = _mm256_and_ps(swept, is_sound);
   const Vec8 moved{where(moves, dx.x), where(moves, dx.y), where(moves, dx.z)};
   store_group(x, own + moved);
-  if (auto* const stars = tissue_.stars()) stars->after_move(group, moved, lanes);
-  if (is_far_linear_) far_field_->after_move(group, moved, inverse_dt_of(group));
+  if (auto* const strain = tissue_.nodal_strain()) strain->after_move(group, moved, lanes);
+  if (is_far_linear_) linear_far_field_->after_move(group, moved, inverse_dt_of(group));
   store(squares_[group], where(moves, squared));
-  group_squares_[group] = sum(squares_[group]);
   const auto bad = static_cast<std::uint8_t>(lanes & ~bits_of(is_sound));
   rejected_[group] = static_cast<std::uint8_t>(rejected_[group] | bad);
 }
@@ -392,13 +358,7 @@ void BlockDescent::sweep(const SweepPlan& plan, const contact::ContactList& cont
   });
 }
 
-double BlockDescent::sum_of_squares(const SweepPlan& plan) const {
-  double total = 0;
-  for (const auto g : plan.groups) total += static_cast<double>(group_squares_[g]);
-  return total;
-}
-
-double BlockDescent::sum_of_squares_within(const SweepPlan& core) const {
+double BlockDescent::sum_of_squares(const SweepPlan& core) const {
   double total = 0;
   for (const auto g : core.groups) {
     Lanes squares;
@@ -470,72 +430,58 @@ BlockDescent::Restored BlockDescent::restore_rejected(world::World& world) {
   return restored;
 }
 
-SolveReport BlockDescent::solve(const contact::ContactList& contacts,
-                                std::span<const NodeIndex> near, const SolveSettings& settings,
-                                world::World& world, const ExternalLoads& loads) {
-  TROCAR_ASSERT(loads.held.size() == loads.held_displacements.size());
-  TROCAR_ASSERT(loads.forces.empty() || loads.forces.size() == world.node_count());
-  // A tolerance ends the sweeps early, before the far ones.
-  has_exterior_ = settings.exterior != nullptr;
-  TROCAR_ASSERT((settings.far_sweeps == 0 && settings.bands.empty() && !has_exterior_) ||
-                settings.residual_tolerance_n == 0);
-  TROCAR_ASSERT(!has_exterior_ || settings.far_sweeps == 0);
+void BlockDescent::begin_step(const contact::ContactList& contacts, std::span<const NodeIndex> near,
+                              const SolveSettings& settings, world::World& world,
+                              const ExternalLoads& loads) {
   if (++current_ == 0) {
     for (auto* stamps : {&slot_stamp_, &group_stamp_, &begun_stamp_, &serial_stamp_, &asked_stamp_})
       std::ranges::fill(*stamps, 0u);
     current_ = 1;
   }
   inverse_dt_ = 1.0f / settings.dt;
+  has_far_solver_ = settings.far_solver != nullptr;
   // A node that is held along an axis alone has no linear form.
   is_far_linear_ =
       settings.far_sweeps > 0 && settings.has_linear_far_field && loads.axis_holds.empty();
-  TROCAR_ASSERT(!is_far_linear_ || far_field_);
+  TROCAR_ASSERT(!is_far_linear_ || linear_far_field_);
   plan_step(near, settings, world.tick, loads.held);
   plan_bands(near, settings.bands);
+  schedule_sweeps(settings);
   link_contacts(contacts);
   if (auto* const relaxation = tissue_.relaxation())
     relaxation->begin_step(settings.dt, world.relaxation, workers_);
   begin_groups(world, loads);
-  const ExteriorStep outside{tissue_.groups(), x_.data(), world, contacts, near, settings.dt};
-  if (has_exterior_) settings.exterior->begin(outside);
+}
 
-  SolveReport report;
-  float omega = settings.sweeps < 3
-                    ? std::min(settings.over_relaxation, kMaxOverRelaxationFewSweeps)
-                    : settings.over_relaxation;
-  double squares = 0, last_squares = INFINITY;
+void BlockDescent::execute_schedule(const contact::ContactList& contacts,
+                                    const SolveSettings& settings, const FarFieldStep& far,
+                                    SolveReport& report) {
+  // Growth is judged by the nodes that every sweep has.
+  const SweepPlan& judged = plan_of(settings.sweeps, settings.bands);
   const auto tolerance = static_cast<double>(settings.residual_tolerance_n);
-  for (std::uint32_t i = 0; i < settings.sweeps; ++i) {
-    const bool has_far = i + 1 == settings.sweeps && settings.far_sweeps > 0;
-    for (std::uint32_t far = 1; has_far && far < settings.far_sweeps; ++far)
-      sweep(far_swept_, contacts, {1, settings.far_over_relaxation});
-    const auto left = settings.sweeps - i;
-    if (has_exterior_ && left <= settings.corrections) settings.exterior->correct(outside);
-    const bool has_few = std::ranges::any_of(settings.bands, [left](const SweepBand& band) {
-      return band.sweeps >= left && band.sweeps < 3;
-    });
-    const SweepPlan& plan = plan_of(left, settings.bands);
-    // The last is one for all: a group with near and far nodes costs no more than near ones.
-    sweep(has_far ? last_ : plan, contacts,
-          {has_few ? std::min(omega, kMaxOverRelaxationFewSweeps) : omega,
-           settings.far_over_relaxation});
-    report.node_sweeps += plan.node_count;
+  const auto enough = tolerance * tolerance * static_cast<double>(far.near.size());
+  float omega = settings.over_relaxation;
+  double last_squares = INFINITY;
+  for (const auto& scheduled : schedule_) {
+    if (scheduled.corrects_far) settings.far_solver->correct(far);
+    sweep(*scheduled.plan, contacts,
+          {std::min(omega, scheduled.max_over_relaxation), settings.far_over_relaxation});
+    if (!scheduled.is_near) continue;
+    report.node_sweeps += scheduled.near_nodes;
     ++report.sweeps;
-    // Growth is judged by the nodes that every sweep has.
-    squares = settings.bands.empty() && !has_far
-                  ? sum_of_squares(near_)
-                  : sum_of_squares_within(plan_of(settings.sweeps, settings.bands));
+    const double squares = sum_of_squares(judged);
     if (settings.has_safeguard && squares > last_squares && omega > 1.0f) {
       omega = 1.0f;
       report.is_stepped_down = true;
     }
     last_squares = squares;
-    if (tolerance > 0 && squares <= tolerance * tolerance * static_cast<double>(near.size())) break;
+    if (tolerance > 0 && squares <= enough) break;
   }
-
   report.far_node_sweeps = settings.far_sweeps * far_swept_.node_count;
   report.node_sweeps += report.far_node_sweeps;
-  if (!settings.bands.empty()) squares = sum_of_squares_within(near_);
+}
+
+float BlockDescent::write_back(const ExternalLoads& loads, world::World& world) {
   write_back(near_, world);
   write_back(far_, world);
   float squared_move = 0;
@@ -549,10 +495,39 @@ SolveReport BlockDescent::solve(const contact::ContactList& contacts,
     world.velocities[node.value] = move * inverse_dt_;
     v_[slot] = to_float4(world.velocities[node.value]);
   }
-  report.largest_move_m = std::sqrt(squared_move);
-  if (has_exterior_)
+  return std::sqrt(squared_move);
+}
+
+// The root mean square of the near nodes' residuals in the last sweep.
+float BlockDescent::note_residuals(std::span<const NodeIndex> near) {
+  residuals_.clear();
+  for (const auto node : near) {
+    const Slot slot = tissue_.groups().slot_of(node);
+    residuals_.push_back(std::sqrt(squares_[slot / kLanes].v[slot % kLanes]));
+  }
+  if (near.empty()) return 0;
+  return static_cast<float>(std::sqrt(sum_of_squares(near_) / static_cast<double>(near.size())));
+}
+
+SolveReport BlockDescent::solve(const contact::ContactList& contacts,
+                                std::span<const NodeIndex> near, const SolveSettings& settings,
+                                world::World& world, const ExternalLoads& loads) {
+  TROCAR_ASSERT(loads.held.size() == loads.held_displacements.size());
+  TROCAR_ASSERT(loads.forces.empty() || loads.forces.size() == world.node_count());
+  const bool is_plain =
+      settings.far_sweeps == 0 && settings.bands.empty() && settings.far_solver == nullptr;
+  TROCAR_ASSERT(is_plain || settings.residual_tolerance_n == 0);
+  TROCAR_ASSERT(settings.far_solver == nullptr || settings.far_sweeps == 0);
+
+  SolveReport report;
+  begin_step(contacts, near, settings, world, loads);
+  const FarFieldStep far{tissue_.groups(), x_.data(), world, contacts, near, settings.dt};
+  if (has_far_solver_) settings.far_solver->begin(far);
+  execute_schedule(contacts, settings, far, report);
+  report.largest_move_m = write_back(loads, world);
+  if (has_far_solver_)
     report.largest_move_m =
-        std::max(report.largest_move_m, settings.exterior->end(outside, v_.data(), world));
+        std::max(report.largest_move_m, settings.far_solver->end(far, v_.data(), world));
   for (const auto g : begun_.groups)
     report.nodes_rejected += static_cast<unsigned>(__builtin_popcount(rejected_[g]));
   if (report.nodes_rejected > 0) {
@@ -560,16 +535,10 @@ SolveReport BlockDescent::solve(const contact::ContactList& contacts,
     const auto restored = restore_rejected(world);
     report.nodes_restored = restored.nodes;
     report.largest_move_m += restored.largest_move_m;
-    restart_stars();
+    restart_nodal_strain();
   }
   end_relaxation(world, loads.held);
-  residuals_.clear();
-  for (const auto node : near) {
-    const Slot slot = tissue_.groups().slot_of(node);
-    residuals_.push_back(std::sqrt(squares_[slot / kLanes].v[slot % kLanes]));
-  }
-  if (!near.empty())
-    report.residual_n = static_cast<float>(std::sqrt(squares / static_cast<double>(near.size())));
+  report.residual_n = note_residuals(near);
   return report;
 }
 

@@ -6,7 +6,7 @@
 // colour after colour, several sweeps per step, over-relaxed. Over-relaxation is stepped down to 1
 // for the rest of the step when a sweep's residual grew against the sweep before.
 //
-// Two classes of nodes (graded-exterior scheme): the near ones get `sweeps`; with far_sweeps > 0
+// Two classes of nodes (a graded far field): the near ones get `sweeps`; with far_sweeps > 0
 // all other free nodes get that many, with an over-relaxation of their own, the last one together
 // with the near nodes' last; there is no residual tolerance then. With far_sweeps = 0 the others
 // stand still. Near nodes may come in bands with fewer sweeps each (SweepBand): these take part in
@@ -23,9 +23,9 @@
 #include "common/base/index.h"
 #include "common/base/workers.h"
 #include "server/tissue/contact/contact_list.h"
-#include "server/tissue/dynamics/exterior.h"
-#include "server/tissue/dynamics/far_field.h"
+#include "server/tissue/dynamics/far_field_solver.h"
 #include "server/tissue/dynamics/far_plan.h"
+#include "server/tissue/dynamics/linear_far_field.h"
 #include "server/tissue/dynamics/sweep_plan.h"
 #include "server/tissue/dynamics/tissue.h"
 #include "server/tissue/world/world.h"
@@ -50,13 +50,14 @@ struct SolveSettings {
   // Far nodes are swept in every so many steps, one group of eight after another, each then for all
   // the time since; in between they coast. Solve once per world.tick, then.
   std::uint32_t far_interval = 1;
-  // Far nodes are linear about a pose of not long ago (FarField), after use_linear_far_field().
+  // Far nodes are linear about a pose of not long ago (LinearFarField), after
+  // use_linear_far_field().
   bool has_linear_far_field = false;
   // False: the caller watches the residual over many sweeps. Near an optimum it grows at first.
   bool has_safeguard = true;
   // Moves all nodes that are not near, with far_sweeps = 0; null: they stand still. It corrects
   // before each of the last `corrections` sweeps. No tolerance then.
-  Exterior* exterior = nullptr;
+  FarFieldSolver* far_solver = nullptr;
   std::uint32_t corrections = 2;
   // At most kMaxSweepBands, ends ascending up to the last near node, sweeps from `sweeps` down to 1
   // and not ascending; empty: all near nodes get `sweeps`. No tolerance then.
@@ -129,7 +130,7 @@ class BlockDescent {
   // Between steps: follows topology.changed(). The world already has its nodes, their masses,
   // classes and displacements; arrays over nodes have an entry for every place of one. The
   // topology must outlive the solver.
-  FollowReport follow_topology(const Topology& topology, const world::World& world);
+  FollowReport follow_topology(const topology::Topology& topology, const world::World& world);
   // After it, once there have been steps: the world's forces of stress that has relaxed, where the
   // topology changed.
   void refresh_relaxed_forces(world::World& world);
@@ -143,6 +144,14 @@ class BlockDescent {
     Lanes mass;     // kg; 0 for padding
     Lanes damping;  // rate m, kg/s
   };
+  // One sweep of the step's schedule.
+  struct ScheduledSweep {
+    const SweepPlan* plan = nullptr;  // groups and lanes that it steps
+    std::uint64_t near_nodes = 0;     // of these
+    float max_over_relaxation = 1;    // of near nodes
+    bool is_near = false;             // counts as a sweep of near nodes, and is judged
+    bool corrects_far = false;        // the far-field solver goes first
+  };
   struct PointLinks {
     std::array<Slot, contact::kMaxPointNodes> slots;
     std::array<std::uint32_t, contact::kMaxPointNodes> next;  // of the same slot's links
@@ -153,6 +162,15 @@ class BlockDescent {
   void plan_bands(std::span<const NodeIndex> near, std::span<const SweepBand> bands);
   // What takes part when `left` sweeps are left, this one included.
   const SweepPlan& plan_of(std::uint32_t left, std::span<const SweepBand> bands) const;
+  void schedule_sweeps(const SolveSettings& settings);
+  void begin_step(const contact::ContactList& contacts, std::span<const NodeIndex> near,
+                  const SolveSettings& settings, world::World& world, const ExternalLoads& loads);
+  void execute_schedule(const contact::ContactList& contacts, const SolveSettings& settings,
+                        const FarFieldStep& far, SolveReport& report);
+  // How far the farthest node has moved, m.
+  float write_back(const ExternalLoads& loads, world::World& world);
+  float note_residuals(std::span<const NodeIndex> near);
+  void resize_arrays();
   void link_contacts(const contact::ContactList& contacts);
   void begin_groups(world::World& world, const ExternalLoads& loads);
   // Stress that has relaxed, where something relaxes.
@@ -174,7 +192,7 @@ class BlockDescent {
                     Lanes& omega) const;
   void ask_energies(Group group, const Float4* start);
   void hold_axes(Group group, NodeStep8& step) const;
-  void restart_stars();
+  void restart_nodal_strain();
   void place_held(const ExternalLoads& loads);
   // Over-relaxation of near and of far nodes.
   struct Relaxation {
@@ -183,8 +201,8 @@ class BlockDescent {
   void sweep(const SweepPlan& plan, const contact::ContactList& contacts, Relaxation omega);
   void relax(const SweepPlan& plan, Group group, const contact::ContactList& contacts,
              Relaxation omega);
+  // Of residuals in the last sweep, over these lanes, N^2.
   double sum_of_squares(const SweepPlan& plan) const;
-  double sum_of_squares_within(const SweepPlan& core) const;
   void write_back(const SweepPlan& plan, world::World& world);
   struct Restored {
     std::uint32_t nodes = 0;
@@ -201,7 +219,7 @@ class BlockDescent {
   }
 
   const organ::Organ& organ_;
-  const Topology* topology_ = nullptr;  // once there was an edit
+  const topology::Topology* topology_ = nullptr;  // once there was an edit
   Tissue tissue_;
   Workers workers_;
   std::vector<Linearisation::Taking> takings_;  // per worker
@@ -214,22 +232,22 @@ class BlockDescent {
   std::vector<Float4> start_;           // per slot: at the start of the step; begun groups
   std::vector<Inertia> inertia_;        // per group; begun groups
   std::vector<Lanes> squares_;          // per group: squared residuals of the last sweep
-  std::vector<float> group_squares_;    // their sum over swept lanes
   std::vector<float> squared_moves_;    // per group: largest of a node in this step, m^2
   std::vector<std::uint8_t> rejected_;  // per group: lanes with a step that was not finite
   std::vector<Group> all_groups_;
   SweepPlan near_, far_, begun_;
+  std::vector<ScheduledSweep> schedule_;  // of this step, in order
   std::vector<GroupLanes> relaxed_lanes_;
-  SweepPlan relaxed_;                       // whose forces of relaxed stress a step takes anew
-  SweepPlan far_swept_;                     // of far_, in this step; the others coast
-  SweepPlan last_;                          // the last sweep: of near_ and far_swept_
-  std::unique_ptr<FarField> far_field_;     // null: not used
-  bool is_far_linear_ = false;              // in this step
-  bool has_exterior_ = false;               // likewise
-  std::uint32_t far_interval_ = 1;          // of this step
-  float inverse_dt_ = 0;                    // of this step
-  std::vector<std::uint32_t> asked_stamp_;  // per group: energies have begun it
-  std::vector<Group> due_;                  // to be linearised anew
+  SweepPlan relaxed_;    // whose forces of relaxed stress a step takes anew
+  SweepPlan far_swept_;  // of far_, in this step; the others coast
+  SweepPlan last_;       // the last sweep: of near_ and far_swept_
+  std::unique_ptr<LinearFarField> linear_far_field_;  // null: not used
+  bool is_far_linear_ = false;                        // in this step
+  bool has_far_solver_ = false;                       // likewise
+  std::uint32_t far_interval_ = 1;                    // of this step
+  float inverse_dt_ = 0;                              // of this step
+  std::vector<std::uint32_t> asked_stamp_;            // per group: energies have begun it
+  std::vector<Group> due_;                            // to be linearised anew
   std::array<SweepPlan, kMaxSweepBands>
       bands_;                               // [b]: near nodes of bands 0 to b; the last is near_
   std::vector<std::uint32_t> begun_stamp_;  // per group

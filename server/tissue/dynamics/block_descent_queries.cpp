@@ -18,7 +18,7 @@ Vec3f BlockDescent::holding_force(const contact::ContactList& contacts, NodeInde
 }
 
 void BlockDescent::elastic_gradient(std::span<Vec3f> gradient) {
-  restart_stars();
+  restart_nodal_strain();
   for_each_group(all_groups_, [&](Group g) {
     tissue_.begin_group(g, x_.data(), 0);
     NodeStep8 step{zero_vec8(), zero_sym_mat8()};

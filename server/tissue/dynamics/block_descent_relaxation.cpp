@@ -12,8 +12,8 @@ void BlockDescent::take_relaxation(const world::World& world) {
 
 void BlockDescent::refresh_relaxed_forces(world::World& world) {
   if (tissue_.relaxation() == nullptr) return;
-  if (auto* const stars = tissue_.stars())
-    for (const auto lanes : tissue_.rebuilt()) stars->restart_group(lanes.group, x_.data());
+  if (auto* const strain = tissue_.nodal_strain())
+    for (const auto lanes : tissue_.rebuilt()) strain->restart_group(lanes.group, x_.data());
   tissue_.relaxation()->refresh(world.relaxation);
   for (const auto lanes : tissue_.rebuilt())
     tissue_.relaxed_stress()->refresh(lanes, x_.data(), world.relaxation);
@@ -23,7 +23,7 @@ void BlockDescent::refresh_relaxed_forces(world::World& world) {
 void BlockDescent::end_relaxation(world::World& world, std::span<const NodeIndex> held) {
   auto* const relaxation = tissue_.relaxation();
   if (relaxation == nullptr) return;
-  const bool in_turns = far_.node_count > 0 || has_exterior_;
+  const bool in_turns = far_.node_count > 0 || has_far_solver_;
   relaxed_.clear();
   for (const auto g : near_.groups) relaxed_.add(g, near_.lanes[g]);
   for (const auto node : held) relaxed_.add(tissue_.groups(), node);

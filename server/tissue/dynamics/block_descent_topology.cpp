@@ -4,9 +4,8 @@
 
 namespace trocar::dynamics {
 
-FollowReport BlockDescent::follow_topology(const Topology& topology, const world::World& world) {
-  topology_ = &topology;
-  const auto report = tissue_.follow_topology(topology);
+// As many entries as there are groups and slots now; new ones are empty.
+void BlockDescent::resize_arrays() {
   const auto& groups = tissue_.groups();
   const auto group_count = groups.group_count(), slot_count = groups.slot_count();
   while (all_groups_.size() < group_count)
@@ -14,7 +13,6 @@ FollowReport BlockDescent::follow_topology(const Topology& topology, const world
   constants_.resize(group_count);
   inertia_.resize(group_count);
   squares_.resize(group_count);
-  group_squares_.resize(group_count);
   for (auto* lanes : {&free_, &rejected_, &near_.lanes, &far_.lanes, &far_swept_.lanes,
                       &last_.lanes, &begun_.lanes, &relaxed_.lanes})
     lanes->resize(group_count);
@@ -25,6 +23,14 @@ FollowReport BlockDescent::follow_topology(const Topology& topology, const world
   slot_stamp_.resize(slot_count);
   squared_moves_.resize(group_count);
   first_link_.resize(slot_count);
+}
+
+FollowReport BlockDescent::follow_topology(const topology::Topology& topology,
+                                           const world::World& world) {
+  topology_ = &topology;
+  const auto report = tissue_.follow_topology(topology);
+  const auto& groups = tissue_.groups();
+  resize_arrays();
   for (const auto lanes : tissue_.touched())
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
       if (!lanes.has(lane)) continue;
@@ -41,8 +47,8 @@ FollowReport BlockDescent::follow_topology(const Topology& topology, const world
       x_[g * kLanes + lane] = has_node ? to_float4(world.displacements[node.value]) : Float4{};
       v_[g * kLanes + lane] = has_node ? to_float4(world.velocities[node.value]) : Float4{};
     }
-  if (far_field_) far_field_->follow_topology(x_.data(), world);
-  due_.reserve(group_count);
+  if (linear_far_field_) linear_far_field_->follow_topology(x_.data(), world);
+  due_.reserve(groups.group_count());
   return report;
 }
 

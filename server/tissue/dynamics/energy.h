@@ -6,8 +6,8 @@
 // Contract: gradients are exact derivatives of energy_j() (plus, in a step, of the damping's
 // potential); blocks are symmetric, positive semi-definite and at least close to the second
 // derivative; rows of padding contribute nothing. A change of topology is followed lane by lane,
-// bit for bit as if built anew. Energies over a node's whole star have an interface of their own,
-// StarEnergy (averaged_strain.h).
+// bit for bit as if built anew. Energies over a node's whole smoothing domain have an interface of
+// their own, NodalStrainEnergy (nodal_hyperelastic.h).
 
 #include <span>
 
@@ -61,7 +61,7 @@ class Energy {
   // are those with another node than before, with a node that has changed, and with a neighbour of
   // a node in a new slot; where strain is averaged also those with a neighbour of a node that has
   // changed. Returns rows written, counted per lane.
-  virtual std::size_t rebuild(const Topology& topology, const Groups& groups,
+  virtual std::size_t rebuild(const topology::Topology& topology, const Groups& groups,
                               std::span<const GroupLanes> lanes) = 0;
 };
 

@@ -27,7 +27,7 @@ std::uint64_t code_of(const Vec3d& p) {
 }  // namespace
 
 template <typename Visit>
-void Groups::for_each_coupled(const Topology& topology, NodeIndex node, Visit&& visit) {
+void Groups::for_each_coupled(const topology::Topology& topology, NodeIndex node, Visit&& visit) {
   if (coupling_ == Coupling::Elements) {
     topology.for_each_neighbour(node, visit);
     return;
@@ -46,7 +46,7 @@ void Groups::for_each_coupled(const Topology& topology, NodeIndex node, Visit&& 
 }
 
 template <typename ColourOf>
-Colour Groups::smallest_free_colour(const Topology& topology, NodeIndex node,
+Colour Groups::smallest_free_colour(const topology::Topology& topology, NodeIndex node,
                                     ColourOf&& colour_of) {
   is_taken_.assign(is_taken_.size(), 0);
   for_each_coupled(topology, node, [&](NodeIndex j) {
@@ -58,7 +58,7 @@ Colour Groups::smallest_free_colour(const Topology& topology, NodeIndex node,
   return static_cast<Colour>(std::ranges::find(is_taken_, 0) - is_taken_.begin());
 }
 
-std::vector<Colour> Groups::greedy_colours(const Topology& topology) {
+std::vector<Colour> Groups::greedy_colours(const topology::Topology& topology) {
   std::vector<Colour> colours(topology.node_count(), kNoColour);
   for (std::uint32_t i = 0; i < colours.size(); ++i)
     if (topology.has_node(NodeIndex(i)))
@@ -67,7 +67,7 @@ std::vector<Colour> Groups::greedy_colours(const Topology& topology) {
   return colours;
 }
 
-Groups::Groups(const Topology& topology, Coupling coupling, std::span<const Colour> given)
+Groups::Groups(const topology::Topology& topology, Coupling coupling, std::span<const Colour> given)
     : coupling_(coupling) {
   const auto colours =
       given.empty() ? greedy_colours(topology) : std::vector<Colour>(given.begin(), given.end());
@@ -144,7 +144,7 @@ void Groups::order_by_colour(std::vector<Group>& groups,
 
 // --- Following a change ---
 
-void Groups::update(const Topology& topology, std::span<const NodeIndex> changed) {
+void Groups::update(const topology::Topology& topology, std::span<const NodeIndex> changed) {
   moved_.clear();
   vacated_.clear();
   slot_of_node_.resize(topology.node_count(), kNoSlot);
@@ -168,7 +168,7 @@ void Groups::update(const Topology& topology, std::span<const NodeIndex> changed
   moved_.erase(std::unique(moved_.begin(), moved_.end()), moved_.end());
 }
 
-bool Groups::has_conflict(const Topology& topology, NodeIndex node) {
+bool Groups::has_conflict(const topology::Topology& topology, NodeIndex node) {
   const Colour own = colour_of(node);
   bool is_taken = false;
   for_each_coupled(topology, node, [&](NodeIndex j) { is_taken |= colour_of(j) == own; });
@@ -207,7 +207,7 @@ void Groups::vacate(NodeIndex node) {
 }
 
 // Of colours that lost a node. Each removed node brings at most about one other to a new lane.
-void Groups::part_emptiest_groups(const Topology& topology) {
+void Groups::part_emptiest_groups(const topology::Topology& topology) {
   for (std::size_t i = 0, count = vacated_.size(); i < count; ++i) {
     const Colour colour = colour_of_group_[vacated_[i] / kLanes];
     if (colour == kNoColour) continue;

@@ -4,10 +4,10 @@
 // a colour are solved at once, by lanes and by workers, with the same result as one after another.
 //
 // Colours are greedy in ascending node order: over elements' nodes, or, for energies over a node's
-// whole star, over nodes at distance two. Within a colour, nodes lie along a Morton curve so that
-// what is near in space is near in memory, and are sorted by valence within stretches of the curve
-// so that the lanes of a group have like amounts of work. A slot is a place in that order: group *
-// 8 + lane; slots without a node are padding.
+// whole smoothing domain, over nodes at distance two. Within a colour, nodes lie along a Morton
+// curve so that what is near in space is near in memory, and are sorted by valence within stretches
+// of the curve so that the lanes of a group have like amounts of work. A slot is a place in that
+// order: group * 8 + lane; slots without a node are padding.
 //
 // When the topology changes, update() follows it locally. A node that may keep its colour keeps its
 // slot. Others get, in ascending node order, the smallest colour that no node it couples with has,
@@ -21,9 +21,9 @@
 // suffice.
 //
 // What a sweep does to a node is a function of the colours: which nodes share a group matters only
-// to speed. But far nodes take turns by groups (SolveSettings::far_interval, FarField), and after a
-// change colours and groups are a function of the history of changes: whoever stores a state then
-// stores the slot of every node beside the topology.
+// to speed. But far nodes take turns by groups (SolveSettings::far_interval, LinearFarField), and
+// after a change colours and groups are a function of the history of changes: whoever stores a
+// state then stores the slot of every node beside the topology.
 
 #include <algorithm>
 #include <array>
@@ -36,7 +36,7 @@
 #include "common/base/blocks.h"
 #include "common/base/index.h"
 #include "server/tissue/dynamics/lanes.h"
-#include "server/tissue/dynamics/topology.h"
+#include "server/tissue/topology/topology.h"
 
 namespace trocar::dynamics {
 
@@ -46,7 +46,7 @@ using Colour = std::uint32_t;
 inline constexpr Slot kNoSlot = 0xffffffffu;
 inline constexpr Colour kNoColour = 0xffffffffu;
 
-enum class Coupling : std::uint8_t { Elements, Stars };
+enum class Coupling : std::uint8_t { Elements, NodalStrain };
 
 // Some lanes of a group.
 struct GroupLanes {
@@ -59,7 +59,8 @@ struct GroupLanes {
 class Groups {
  public:
   // colours: per place of a node, valid for the coupling; empty: greedy.
-  Groups(const Topology& topology, Coupling coupling, std::span<const Colour> colours = {});
+  Groups(const topology::Topology& topology, Coupling coupling,
+         std::span<const Colour> colours = {});
 
   // The last one has nodes; others need not.
   std::size_t colour_count() const { return members_.size(); }
@@ -88,7 +89,7 @@ class Groups {
   void order_by_colour(std::vector<Group>& groups, std::vector<std::uint32_t>& colour_begins) const;
 
   // changed: nodes whose existence or elements have changed, ascending, distinct.
-  void update(const Topology& topology, std::span<const NodeIndex> changed);
+  void update(const topology::Topology& topology, std::span<const NodeIndex> changed);
   // What the last update did: nodes that have a new slot, ascending, and slots that lost their
   // node (some of which hold another now).
   std::span<const NodeIndex> moved() const { return moved_; }
@@ -107,17 +108,18 @@ class Groups {
   };
 
   template <typename Visit>
-  void for_each_coupled(const Topology& topology, NodeIndex node, Visit&& visit);
+  void for_each_coupled(const topology::Topology& topology, NodeIndex node, Visit&& visit);
   template <typename ColourOf>
-  Colour smallest_free_colour(const Topology& topology, NodeIndex node, ColourOf&& colour_of);
-  std::vector<Colour> greedy_colours(const Topology& topology);
-  bool has_conflict(const Topology& topology, NodeIndex node);
+  Colour smallest_free_colour(const topology::Topology& topology, NodeIndex node,
+                              ColourOf&& colour_of);
+  std::vector<Colour> greedy_colours(const topology::Topology& topology);
+  bool has_conflict(const topology::Topology& topology, NodeIndex node);
   void vacate(NodeIndex node);
   void place(NodeIndex node, Colour colour, std::uint64_t code);
   Group group_with_room(Colour colour, std::uint64_t code);
   void take_out(NodeIndex node);
   void give_up(Group group);
-  void part_emptiest_groups(const Topology& topology);
+  void part_emptiest_groups(const topology::Topology& topology);
   std::uint32_t nodes_in(Group group) const;
 
   const Coupling coupling_;

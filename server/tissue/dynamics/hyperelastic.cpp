@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "common/base/assert.h"
-#include "server/tissue/dynamics/tet_shape.h"
+#include "server/tissue/topology/tet_shape.h"
 
 namespace trocar::dynamics {
 namespace {
@@ -29,9 +29,10 @@ struct Hyperelastic<Law>::RowShape {
 };
 
 template <typename Law>
-Hyperelastic<Law>::Hyperelastic(const Topology& topology, const Groups& groups, const Stars* stars,
-                                HyperelasticParameters parameters, const Law& law)
-    : law_(law), stars_(stars), parameters_(std::move(parameters)) {
+Hyperelastic<Law>::Hyperelastic(const topology::Topology& topology, const Groups& groups,
+                                const NodalStrain* strain, HyperelasticParameters parameters,
+                                const Law& law)
+    : law_(law), nodal_strain_(strain), parameters_(std::move(parameters)) {
   const auto bound = [&](NodeIndex node) { return topology.tets_of(node).size(); };
   rows_.reserve(groups, bound);
   if constexpr (!Law::kIsLinear) invariant_rows_.reserve(groups, bound);
@@ -53,7 +54,7 @@ void Hyperelastic<Law>::extend(const Groups& groups) {
 }
 
 template <typename Law>
-std::size_t Hyperelastic<Law>::rebuild(const Topology& topology, const Groups& groups,
+std::size_t Hyperelastic<Law>::rebuild(const topology::Topology& topology, const Groups& groups,
                                        std::span<const GroupLanes> lanes) {
   extend(groups);
   std::size_t written = 0;
@@ -64,7 +65,7 @@ std::size_t Hyperelastic<Law>::rebuild(const Topology& topology, const Groups& g
 }
 
 template <typename Law>
-void Hyperelastic<Law>::find_tets(const Topology& topology, NodeIndex node,
+void Hyperelastic<Law>::find_tets(const topology::Topology& topology, NodeIndex node,
                                   std::vector<At>& out) const {
   out.clear();
   for (const auto t : topology.tets_of(node)) {
@@ -72,14 +73,15 @@ void Hyperelastic<Law>::find_tets(const Topology& topology, NodeIndex node,
     if (!parameters_[material]) continue;
     const auto [c10, bulk] = *parameters_[material];
     const auto tet = seen_from(topology.tet(t), node);
-    const auto left = stars_ == nullptr ? Stars::Left{} : stars_->left_to(topology, t);
-    out.push_back(
-        {tet, c10 * left.bracket, bulk * left.volumetric, stress_free_shape(topology, t, tet)});
+    const auto left =
+        nodal_strain_ == nullptr ? NodalStrain::Left{} : nodal_strain_->left_to(topology, t);
+    out.push_back({tet, c10 * left.bracket, bulk * left.volumetric,
+                   topology::stress_free_shape(topology, t, tet)});
   }
 }
 
 template <typename Law>
-std::size_t Hyperelastic<Law>::fill(const Topology& topology, const Groups& groups,
+std::size_t Hyperelastic<Law>::fill(const topology::Topology& topology, const Groups& groups,
                                     GroupLanes lanes) {
   const auto nodes = groups.nodes_of(lanes.group);
   std::array<std::uint32_t, kLanes> counts{};
@@ -99,7 +101,7 @@ std::size_t Hyperelastic<Law>::fill(const Topology& topology, const Groups& grou
 }
 
 template <typename Law>
-void Hyperelastic<Law>::fill_lane(const Topology& topology, const Groups& groups,
+void Hyperelastic<Law>::fill_lane(const topology::Topology& topology, const Groups& groups,
                                   std::span<const At> tets, Group group, std::size_t lane) {
   const auto rest = topology.rest();
   const auto rows = rows_[group];

@@ -7,21 +7,21 @@
 // is exact and positive definite and an inverted tet is no special case. Both brackets are free of
 // stress at rest.
 //
-// Where strain is averaged (averaged_strain.h), tets have what is left to them.
+// Where strain is averaged (nodal_hyperelastic.h), tets have what is left to them.
 
 #include "server/tissue/dynamics/energy.h"
+#include "server/tissue/dynamics/nodal_strain.h"
 #include "server/tissue/dynamics/psi.h"
-#include "server/tissue/dynamics/stars.h"
-#include "server/tissue/dynamics/tet_shape.h"
+#include "server/tissue/topology/tet_shape.h"
 
 namespace trocar::dynamics {
 
 template <typename Law>
 class Hyperelastic final : public Energy {
  public:
-  // Of the tets whose material has parameters here. Stars, which must outlive it: null if nothing
-  // is averaged.
-  Hyperelastic(const Topology& topology, const Groups& groups, const Stars* stars,
+  // Of the tets whose material has parameters here. NodalStrain, which must outlive it: null if
+  // nothing is averaged.
+  Hyperelastic(const topology::Topology& topology, const Groups& groups, const NodalStrain* strain,
                HyperelasticParameters parameters, const Law& law = {});
 
   void add(Group group, const Float4* x, const Vec8& own, NodeStep8& step) const override;
@@ -29,7 +29,7 @@ class Hyperelastic final : public Energy {
                  StiffnessSink& sink) const override;
   void add_energies_j(std::span<const Vec3d> displacements,
                       std::span<double> energies) const override;
-  std::size_t rebuild(const Topology& topology, const Groups& groups,
+  std::size_t rebuild(const topology::Topology& topology, const Groups& groups,
                       std::span<const GroupLanes> lanes) override;
 
  private:
@@ -61,16 +61,16 @@ class Hyperelastic final : public Energy {
   struct At {
     mesh::Tet tet;
     double c10 = 0, bulk = 0;  // left to it, Pa
-    TetShape shape;            // free of stress, of `tet`
+    topology::TetShape shape;  // free of stress, of `tet`
   };
-  void find_tets(const Topology& topology, NodeIndex node, std::vector<At>& out) const;
+  void find_tets(const topology::Topology& topology, NodeIndex node, std::vector<At>& out) const;
   void extend(const Groups& groups);
-  std::size_t fill(const Topology& topology, const Groups& groups, GroupLanes lanes);
-  void fill_lane(const Topology& topology, const Groups& groups, std::span<const At> tets,
+  std::size_t fill(const topology::Topology& topology, const Groups& groups, GroupLanes lanes);
+  void fill_lane(const topology::Topology& topology, const Groups& groups, std::span<const At> tets,
                  Group group, std::size_t lane);
 
   const Law law_;
-  const Stars* const stars_;
+  const NodalStrain* const nodal_strain_;
   const HyperelasticParameters parameters_;
   GroupRows<Row> rows_;
   GroupRows<InvariantRow> invariant_rows_;    // empty for a linear law

@@ -1,7 +1,7 @@
 #pragma once
 
-// The elastic part of a tissue, but for energies over stars, as matrices: what a node's gradient
-// becomes when displacements move away from a pose X,
+// The elastic part of a tissue, but for energies of nodal strain, as matrices: what a node's
+// gradient becomes when displacements move away from a pose X,
 //   gradient_i(x) = g_i + sum over neighbours j of H_ij [(x_j - X_j) - (x_i - X_i)],
 // with g_i and H_ij = d gradient_i / d x_j from the energies at X. A uniform motion changes
 // nothing, exactly; the error is of second order in how much neighbours have moved apart.

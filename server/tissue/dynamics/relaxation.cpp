@@ -5,7 +5,7 @@
 
 #include "common/base/assert.h"
 #include "server/tissue/dynamics/psi.h"
-#include "server/tissue/dynamics/tet_shape.h"
+#include "server/tissue/topology/tet_shape.h"
 
 namespace trocar::dynamics {
 namespace {
@@ -22,17 +22,22 @@ bool Relaxation::is_needed(const organ::Organ& organ) {
   return world::RelaxationState::terms_of(organ) > 0;
 }
 
-Relaxation::Relaxation(const Topology& topology, const Groups& groups, const Stars* stars)
-    : organ_(topology.organ()), stars_(stars), terms_(topology.organ()), loads_(kBlockLoads) {
-  if (world::RelaxationState::has_stars(organ_))
-    star_relaxation_ = std::make_unique<StarRelaxation>(topology, groups, *stars, terms_);
+Relaxation::Relaxation(const topology::Topology& topology, const Groups& groups,
+                       const NodalStrain* strain)
+    : organ_(topology.organ()),
+      nodal_strain_(strain),
+      terms_(topology.organ()),
+      loads_(kBlockLoads) {
+  if (world::RelaxationState::has_nodal(organ_))
+    nodal_relaxation_ = std::make_unique<NodalRelaxation>(topology, groups, *strain, terms_);
   for (std::uint32_t t = 0; t < topology.tet_count(); ++t) set_lane(topology, groups, TetIndex(t));
   blocks_of_.resize(groups.slot_count());
   for (Slot slot = 0; slot < groups.slot_count(); ++slot) list_blocks_of(topology, groups, slot);
   due_.reserve(blocks_.size());
 }
 
-void Relaxation::list_blocks_of(const Topology& topology, const Groups& groups, Slot slot) {
+void Relaxation::list_blocks_of(const topology::Topology& topology, const Groups& groups,
+                                Slot slot) {
   auto& list = blocks_of_[slot];
   list.clear();
   const auto node = groups.node_at(slot);
@@ -50,7 +55,7 @@ std::uint32_t Relaxation::load_index(TetIndex tet, std::size_t corner, std::size
          tet.value % kLanes;
 }
 
-void Relaxation::set_lane(const Topology& topology, const Groups& groups, TetIndex tet) {
+void Relaxation::set_lane(const topology::Topology& topology, const Groups& groups, TetIndex tet) {
   const std::size_t index = tet.value / kLanes, lane = tet.value % kLanes;
   if (index >= blocks_.size()) {
     blocks_.resize(index + 1);
@@ -66,11 +71,12 @@ void Relaxation::set_lane(const Topology& topology, const Groups& groups, TetInd
   if (!topology.has_tet(tet)) return;
   const auto material = topology.material_of(tet);
   block.materials.set(lane, material);
-  const auto left = stars_ == nullptr ? Stars::Left{} : stars_->left_to(topology, tet);
+  const auto left =
+      nodal_strain_ == nullptr ? NodalStrain::Left{} : nodal_strain_->left_to(topology, tet);
   block.bracket.v[lane] = static_cast<float>(left.bracket);
   block.volumetric.v[lane] = static_cast<float>(left.volumetric);
   const auto& corners = topology.tet(tet);
-  const auto shape = stress_free_shape(topology, tet, corners);
+  const auto shape = topology::stress_free_shape(topology, tet, corners);
   std::array<Vec3d, 3> columns{};
   for (std::size_t k = 1; k < 4; ++k) {
     const Vec3d edge = topology.rest()[corners[k].value] - topology.rest()[corners[0].value];
@@ -84,7 +90,7 @@ void Relaxation::set_lane(const Topology& topology, const Groups& groups, TetInd
     block.volume.v[lane] = static_cast<float>(shape.volume);
 }
 
-void Relaxation::follow(const Topology& topology, const Groups& groups,
+void Relaxation::follow(const topology::Topology& topology, const Groups& groups,
                         std::span<const GroupLanes> lanes) {
   tets_.clear();
   for (const auto group_lanes : lanes)
@@ -100,7 +106,7 @@ void Relaxation::follow(const Topology& topology, const Groups& groups,
     if (const auto block = tet.value / kLanes; stale_.empty() || stale_.back() != block)
       stale_.push_back(block);
   }
-  if (star_relaxation_) star_relaxation_->follow(topology, groups, lanes);
+  if (nodal_relaxation_) nodal_relaxation_->follow(topology, groups, lanes);
   blocks_of_.resize(groups.slot_count());
   for (const auto group_lanes : lanes)
     for (std::size_t lane = 0; lane < kLanes; ++lane)
@@ -157,7 +163,7 @@ RelaxationFigures Relaxation::figures() const {
     }
   };
   add(shares_);
-  if (star_relaxation_) add(star_relaxation_->shares());
+  if (nodal_relaxation_) add(nodal_relaxation_->shares());
   return {energy, volume > 0 ? growth / volume : 0, squared > 0 ? relaxed / squared : 0};
 }
 
@@ -204,8 +210,8 @@ void Relaxation::settle(const Float4* x, world::RelaxationState& state) {
     terms_.settle(tets.block(i), response.stress, materials);
     tets.add_to_hash(tets.advanced(i));
   }
-  for (std::size_t i = 0; star_relaxation_ && i < star_relaxation_->block_count(); ++i)
-    state.stars().add_to_hash(star_relaxation_->settle_block(i, state.stars(), scratch));
+  for (std::size_t i = 0; nodal_relaxation_ && i < nodal_relaxation_->block_count(); ++i)
+    state.nodal().add_to_hash(nodal_relaxation_->settle_block(i, state.nodal(), scratch));
   is_stale_ = true;
 }
 
@@ -213,10 +219,10 @@ void Relaxation::refresh(const world::RelaxationState& state) {
   TROCAR_ASSERT(terms_.dt() > 0);
   for (const auto block : stale_) begin_block(block, state.tets(), scratch_[0]);
   stale_.clear();
-  if (!star_relaxation_) return;
-  for (const auto block : star_relaxation_->stale())
-    star_relaxation_->begin_block(block, state.stars(), scratch_[0]);
-  star_relaxation_->clear_stale();
+  if (!nodal_relaxation_) return;
+  for (const auto block : nodal_relaxation_->stale())
+    nodal_relaxation_->begin_block(block, state.nodal(), scratch_[0]);
+  nodal_relaxation_->clear_stale();
 }
 
 void Relaxation::begin_step(float dt, const world::RelaxationState& state, Workers& workers) {
@@ -230,16 +236,16 @@ void Relaxation::begin_step(float dt, const world::RelaxationState& state, Worke
   }
   is_stale_ = false;
   stale_.clear();
-  if (star_relaxation_) star_relaxation_->clear_stale();
+  if (nodal_relaxation_) nodal_relaxation_->clear_stale();
   workers.run([&](unsigned w) {
     const auto of_worker = [&](std::size_t n, auto&& task) {
       const auto count = std::size_t{workers.count()};
       for (auto i = n * w / count; i < n * (w + 1) / count; ++i) task(i);
     };
     of_worker(blocks_.size(), [&](std::size_t i) { begin_block(i, state.tets(), scratch_[w]); });
-    if (star_relaxation_)
-      of_worker(star_relaxation_->block_count(), [&](std::size_t i) {
-        star_relaxation_->begin_block(i, state.stars(), scratch_[w]);
+    if (nodal_relaxation_)
+      of_worker(nodal_relaxation_->block_count(), [&](std::size_t i) {
+        nodal_relaxation_->begin_block(i, state.nodal(), scratch_[w]);
       });
   });
 }
@@ -249,7 +255,7 @@ void Relaxation::list_due(std::span<const GroupLanes> near, std::uint32_t near_t
   due_.clear();
   const auto tets = static_cast<std::uint32_t>(blocks_.size());
   const auto all =
-      tets + static_cast<std::uint32_t>(star_relaxation_ ? star_relaxation_->block_count() : 0);
+      tets + static_cast<std::uint32_t>(nodal_relaxation_ ? nodal_relaxation_->block_count() : 0);
   due_stamp_.resize(all);
   if (++current_ == 0) std::ranges::fill(due_stamp_, 0u), current_ = 1;
   const auto add = [&](std::uint32_t block) {
@@ -262,10 +268,10 @@ void Relaxation::list_due(std::span<const GroupLanes> near, std::uint32_t near_t
       if (!group_lanes.has(lane)) continue;
       for (const auto block : blocks_of_[group_lanes.group * kLanes + lane])
         if (is_turn_of(block, near_turns, step)) add(block);
-      if (!star_relaxation_) continue;
+      if (!nodal_relaxation_) continue;
       const auto slot = static_cast<Slot>(group_lanes.group * kLanes + lane);
-      if (const auto block = star_relaxation_->block_of(slot);
-          block != StarRelaxation::kNoBlock && is_turn_of(tets + block, near_turns, step))
+      if (const auto block = nodal_relaxation_->block_of(slot);
+          block != NodalRelaxation::kNoBlock && is_turn_of(tets + block, near_turns, step))
         add(tets + block);
     }
   for (auto run = step % far_turns_ * kRun; run < all; run += far_turns_ * kRun)
@@ -284,12 +290,12 @@ void Relaxation::end_step(const Float4* x, std::span<const GroupLanes> near, boo
         differences[0] += end_block(due_[i], x, state.tets(), scratch_[w]);
       else
         differences[1] +=
-            star_relaxation_->end_block(due_[i] - blocks_.size(), state.stars(), scratch_[w]);
+            nodal_relaxation_->end_block(due_[i] - blocks_.size(), state.nodal(), scratch_[w]);
     differences_[w] = differences;
   });
-  for (const auto& [of_tets, of_stars] : differences_) {
+  for (const auto& [of_tets, nodal] : differences_) {
     state.tets().add_to_hash(of_tets);
-    state.stars().add_to_hash(of_stars);
+    state.nodal().add_to_hash(nodal);
   }
 }
 

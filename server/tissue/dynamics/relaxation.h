@@ -16,15 +16,15 @@
 // where the rest is solved roughly, once in kNearTime_s; elsewhere once in kFarTime_s. In 4 ms
 // liver relaxes by 0.35 % of its stress at most. A step costs O(tets whose turn it is).
 //
-// Stars, where strain is averaged, relax as tets do (star_relaxation.h). Between steps the state is
-// world::RelaxationState.
+// NodalStrain, where strain is averaged, relax as tets do (nodal_relaxation.h). Between steps the
+// state is world::RelaxationState.
 
 #include <memory>
 #include <vector>
 
 #include "common/base/workers.h"
+#include "server/tissue/dynamics/nodal_relaxation.h"
 #include "server/tissue/dynamics/relaxation_figures.h"
-#include "server/tissue/dynamics/star_relaxation.h"
 #include "server/tissue/world/world.h"
 
 namespace trocar::dynamics {
@@ -36,12 +36,14 @@ class Relaxation {
 
   static bool is_needed(const organ::Organ& organ);
 
-  // The topology's organ and the stars must outlive it. Stars: null if nothing is averaged; they
-  // are to be where the tissue is in settle() and end_step().
-  Relaxation(const Topology& topology, const Groups& groups, const Stars* stars);
+  // The topology's organ and the smoothing domains must outlive it. NodalStrain: null if nothing is
+  // averaged; they are to be where the tissue is in settle() and end_step().
+  Relaxation(const topology::Topology& topology, const Groups& groups, const NodalStrain* strain);
 
-  // Tets and stars at nodes in these lanes anew; with stars, lanes as for Stars::rebuild().
-  void follow(const Topology& topology, const Groups& groups, std::span<const GroupLanes> lanes);
+  // Tets and smoothing domains at nodes in these lanes anew; with smoothing domains, lanes as for
+  // NodalStrain::rebuild().
+  void follow(const topology::Topology& topology, const Groups& groups,
+              std::span<const GroupLanes> lanes);
 
   // The state is new everywhere.
   void take_state() { is_stale_ = true; }
@@ -69,8 +71,8 @@ class Relaxation {
   const float* loads() const { return loads_.data(); }
   static std::uint32_t load_index(TetIndex tet, std::size_t corner, std::size_t other);
   static constexpr std::uint32_t kNoLoad = 0;
-  // Of stars; null if none relaxes.
-  const StarRelaxation* stars() const { return star_relaxation_.get(); }
+  // Of smoothing domains; null if none relaxes.
+  const NodalRelaxation* nodal() const { return nodal_relaxation_.get(); }
 
  private:
   static constexpr std::size_t kBlockLoads = kEdges * kLanes;
@@ -80,11 +82,11 @@ class Relaxation {
     std::array<Vec3Lanes, 3> gradients;  // of b, c and d, 1/m
     std::array<Vec3Lanes, 3> rest;       // columns of the stretch of the rest pose
     Lanes volume;                        // m^3, 0: no tet that relaxes
-    Lanes bracket, volumetric;           // shares of it that are not of stars
+    Lanes bracket, volumetric;           // shares of it that are not of smoothing domains
     LaneMaterials materials;
   };
 
-  void set_lane(const Topology& topology, const Groups& groups, TetIndex tet);
+  void set_lane(const topology::Topology& topology, const Groups& groups, TetIndex tet);
   void set_dt(float dt);
   static RelaxationTerms::Response response_of(const Block& block,
                                                const RelaxationTerms::Constants& c,
@@ -97,26 +99,27 @@ class Relaxation {
   // The hash's difference.
   std::uint64_t end_block(std::size_t index, const Float4* x, world::StressHistory& history,
                           RelaxationTerms::Constants& scratch);
-  void list_blocks_of(const Topology& topology, const Groups& groups, Slot slot);
+  void list_blocks_of(const topology::Topology& topology, const Groups& groups, Slot slot);
   void list_due(std::span<const GroupLanes> near, std::uint32_t near_turns, std::uint8_t step);
 
   const organ::Organ& organ_;
-  const Stars* const stars_;
+  const NodalStrain* const nodal_strain_;
   RelaxationTerms terms_;
-  std::unique_ptr<StarRelaxation> star_relaxation_;
+  std::unique_ptr<NodalRelaxation> nodal_relaxation_;
   std::vector<Block> blocks_;
   std::vector<RelaxationShares> shares_;
   static constexpr std::uint32_t kRun = 4;  // blocks, or groups, whose turn comes together
   std::uint32_t near_turns_ = 1, far_turns_ = 1;
   std::vector<std::vector<std::uint32_t>> blocks_of_;  // per slot: of tets at its node
-  std::vector<std::uint32_t> due_, due_stamp_;         // blocks of tets, then of stars; per block
+  std::vector<std::uint32_t> due_,
+      due_stamp_;  // blocks of tets, then of smoothing domains; per block
   std::uint32_t current_ = 0;
   std::vector<float> loads_;  // [block][edge][tet], after one block of zeros
   bool is_stale_ = true;
   std::vector<std::uint32_t> stale_;                       // blocks, unless is_stale_
   std::vector<TetIndex> tets_;                             // while it follows
   std::vector<RelaxationTerms::Constants> scratch_;        // per worker
-  std::vector<std::array<std::uint64_t, 2>> differences_;  // of tets and stars
+  std::vector<std::array<std::uint64_t, 2>> differences_;  // of tets and smoothing domains
 };
 
 }  // namespace trocar::dynamics

@@ -1,8 +1,8 @@
 #pragma once
 
-// What a relaxing material does to a stress, eight places (tets, or stars) at once: the stress that
-// it would have at once, and how the parts q_k that have relaxed follow over one or more steps
-// (relaxation.h). Immutable but for set_dt(): any thread.
+// What a relaxing material does to a stress, eight places (tets, or smoothing domains) at once: the
+// stress that it would have at once, and how the parts q_k that have relaxed follow over one or
+// more steps (relaxation.h). Immutable but for set_dt(): any thread.
 
 #include <array>
 #include <vector>

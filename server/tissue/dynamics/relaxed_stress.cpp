@@ -14,15 +14,18 @@ Float8 loads_at(const float* loads, const SlotLanes& places) {
 
 }  // namespace
 
-RelaxedStress::RelaxedStress(const Topology& topology, const Groups& groups,
-                             const Relaxation& relaxation, const Stars* stars)
-    : groups_(groups), relaxation_(relaxation), stars_(stars), forces_(groups.group_count()) {
+RelaxedStress::RelaxedStress(const topology::Topology& topology, const Groups& groups,
+                             const Relaxation& relaxation, const NodalStrain* strain)
+    : groups_(groups),
+      relaxation_(relaxation),
+      nodal_strain_(strain),
+      forces_(groups.group_count()) {
   rows_.reserve(groups, [&](NodeIndex node) { return topology.tets_of(node).size(); });
   for (Group g = 0; g < groups.group_count(); ++g) fill(topology, groups, {g, 0xff});
   rows_.end_building();
 }
 
-void RelaxedStress::rebuild(const Topology& topology, const Groups& groups,
+void RelaxedStress::rebuild(const topology::Topology& topology, const Groups& groups,
                             std::span<const GroupLanes> lanes) {
   rows_.extend(groups);
   forces_.resize(groups.group_count());
@@ -30,7 +33,8 @@ void RelaxedStress::rebuild(const Topology& topology, const Groups& groups,
   rows_.tidy();
 }
 
-void RelaxedStress::fill(const Topology& topology, const Groups& groups, GroupLanes lanes) {
+void RelaxedStress::fill(const topology::Topology& topology, const Groups& groups,
+                         GroupLanes lanes) {
   const auto nodes = groups.nodes_of(lanes.group);
   std::array<std::uint32_t, kLanes> counts{};
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
@@ -57,14 +61,14 @@ void RelaxedStress::fill(const Topology& topology, const Groups& groups, GroupLa
     }
 }
 
-Vec8 RelaxedStress::forces_of_stars(Group group) const {
+Vec8 RelaxedStress::nodal_forces(Group group) const {
   Vec8 sum = zero_vec8();
-  const Float4* const q = relaxation_.stars()->relaxed();
-  for (const auto& row : stars_->rows(group)) {
+  const Float4* const q = relaxation_.nodal()->relaxed();
+  for (const auto& row : nodal_strain_->rows(group)) {
     const Vec8 b = load(row.part);
-    const Vec8 qb{dot8(gather(q, row.star), b), dot8(gather(q + 1, row.star), b),
-                  dot8(gather(q + 2, row.star), b)};
-    const auto f = stars_->gradient_at(row.star);
+    const Vec8 qb{dot8(gather(q, row.domain), b), dot8(gather(q + 1, row.domain), b),
+                  dot8(gather(q + 2, row.domain), b)};
+    const auto f = nodal_strain_->gradient_at(row.domain);
     sum = sum + Vec8{dot8(f.rows[0], qb), dot8(f.rows[1], qb), dot8(f.rows[2], qb)};
   }
   return sum;
@@ -106,12 +110,12 @@ void RelaxedStress::refresh(GroupLanes lanes, const Float4* x, world::Relaxation
   const bool are_few = __builtin_popcount(lanes.lanes) <= kFewLanes;
   Vec3Lanes all;
   if (!are_few) store(all, forces_at(group, x));
-  Vec3Lanes of_stars;
-  if (relaxation_.stars() != nullptr) store(of_stars, forces_of_stars(group));
+  Vec3Lanes nodal;
+  if (relaxation_.nodal() != nullptr) store(nodal, nodal_forces(group));
   const auto nodes = groups_.nodes_of(group);
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     if (!lanes.has(lane)) continue;
-    const Vec3f force = (are_few ? force_at(group, lane, x) : all.at(lane)) + of_stars.at(lane);
+    const Vec3f force = (are_few ? force_at(group, lane, x) : all.at(lane)) + nodal.at(lane);
     forces_[group].set(lane, force);
     if (nodes[lane].is_valid()) state.set_force(nodes[lane], force);
   }
@@ -126,16 +130,16 @@ void RelaxedStress::take_state(const world::RelaxationState& state) {
 
 void start_relaxed(const organ::Organ& organ, world::World& world) {
   if (!Relaxation::is_needed(organ)) return;
-  const Topology topology(organ);
+  const topology::Topology topology(organ);
   const Groups groups(topology, Coupling::Elements);
-  std::optional<Stars> stars;
-  if (Stars::are_needed(organ)) stars.emplace(topology, groups);
+  std::optional<NodalStrain> strain;
+  if (NodalStrain::are_needed(organ)) strain.emplace(topology, groups);
   std::vector<Float4> x(groups.slot_count());
   for (Slot slot = 0; slot < x.size(); ++slot)
     if (const auto node = groups.node_at(slot); node.is_valid())
       x[slot] = to_float4(world.displacements[node.value]);
-  const Stars* const averaged = stars ? &*stars : nullptr;
-  for (Group g = 0; stars && g < groups.group_count(); ++g) stars->restart_group(g, x.data());
+  const NodalStrain* const averaged = strain ? &*strain : nullptr;
+  for (Group g = 0; strain && g < groups.group_count(); ++g) strain->restart_group(g, x.data());
   Relaxation relaxation(topology, groups, averaged);
   relaxation.settle(x.data(), world.relaxation);
   // Of tissue that stays as it is the loads do not depend on the step.

@@ -3,8 +3,9 @@
 // What has relaxed of the stress of measured tissue (relaxation.h), as forces on nodes: each edge
 // of a tet that relaxes bears a load that is constant in a step, in N per m of the edge. Forces are
 // taken where the tissue is between two steps, and are constant in the next; those of all nodes,
-// taken at once, balance in force and torque. Where strain is averaged, stars have their part: F Q
-// b with F as Stars keeps it. O(tets and stars at the nodes) each time.
+// taken at once, balance in force and torque. Where strain is averaged, smoothing domains have
+// their part: F Q b with F as NodalStrain keeps it. O(tets and smoothing domains at the nodes) each
+// time.
 
 #include "server/tissue/dynamics/lanes.h"
 #include "server/tissue/dynamics/relaxation.h"
@@ -13,9 +14,9 @@ namespace trocar::dynamics {
 
 class RelaxedStress {
  public:
-  // Groups, the relaxation and the stars, null if nothing is averaged, must outlive it.
-  RelaxedStress(const Topology& topology, const Groups& groups, const Relaxation& relaxation,
-                const Stars* stars);
+  // Groups, the relaxation and the smoothing domains, null if nothing is averaged, must outlive it.
+  RelaxedStress(const topology::Topology& topology, const Groups& groups,
+                const Relaxation& relaxation, const NodalStrain* strain);
 
   // Forces on these nodes anew, in the state too; x: displacements per slot. Different groups at
   // once: allowed.
@@ -25,7 +26,8 @@ class RelaxedStress {
   // All of them from the state.
   void take_state(const world::RelaxationState& state);
   // As energies follow edits, see Energy::rebuild().
-  void rebuild(const Topology& topology, const Groups& groups, std::span<const GroupLanes> lanes);
+  void rebuild(const topology::Topology& topology, const Groups& groups,
+               std::span<const GroupLanes> lanes);
 
  private:
   // A tet seen from one of its nodes: the other three, the edges there, and where their loads are.
@@ -41,15 +43,15 @@ class RelaxedStress {
     }
   };
 
-  void fill(const Topology& topology, const Groups& groups, GroupLanes lanes);
+  void fill(const topology::Topology& topology, const Groups& groups, GroupLanes lanes);
 
-  Vec8 forces_of_stars(Group group) const;
+  Vec8 nodal_forces(Group group) const;
   Vec8 forces_at(Group group, const Float4* x) const;
   Vec3f force_at(Group group, std::size_t lane, const Float4* x) const;
 
   const Groups& groups_;
   const Relaxation& relaxation_;
-  const Stars* const stars_;
+  const NodalStrain* const nodal_strain_;
   GroupRows<Row> rows_;
   std::vector<Vec3Lanes> forces_;
   std::array<std::vector<TetIndex>, kLanes> tets_;  // while rows are filled

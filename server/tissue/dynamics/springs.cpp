@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "server/organs/organ/any_material.h"
-#include "server/tissue/dynamics/tet_shape.h"
+#include "server/tissue/topology/tet_shape.h"
 
 namespace trocar::dynamics {
 namespace {
@@ -34,7 +34,7 @@ bool Springs::are_needed(const organ::Organ& organ) {
   return has_damping(organ) || has_elasticity(organ);
 }
 
-Springs::Springs(const Topology& topology, const Groups& groups)
+Springs::Springs(const topology::Topology& topology, const Groups& groups)
     : has_damping_(has_damping(topology.organ())),
       has_elasticity_(has_elasticity(topology.organ())) {
   std::vector<NodeIndex> neighbours;
@@ -53,7 +53,8 @@ Springs::Springs(const Topology& topology, const Groups& groups)
 }
 
 // Those that do something, by ascending other end.
-void Springs::find_springs(const Topology& topology, NodeIndex node, std::vector<End>& out) {
+void Springs::find_springs(const topology::Topology& topology, NodeIndex node,
+                           std::vector<End>& out) {
   out.clear();
   const auto& organ = topology.organ();
   const auto free = topology.stress_free();
@@ -77,14 +78,15 @@ void Springs::find_springs(const Topology& topology, NodeIndex node, std::vector
   for (std::size_t i = 0; i < tets_beside_.size(); ++i) {
     const auto [other, t] = tets_beside_[i];
     tets_.push_back({&organ::material_at(organ, topology.material_of(t)),
-                     tet_shape(free, topology.tet(t)).volume});
+                     topology::tet_shape(free, topology.tet(t)).volume});
     if (i + 1 < tets_beside_.size() && tets_beside_[i + 1].first == other) continue;
     add(other);
     tets_.clear();
   }
 }
 
-std::size_t Springs::fill(const Topology& topology, const Groups& groups, GroupLanes lanes) {
+std::size_t Springs::fill(const topology::Topology& topology, const Groups& groups,
+                          GroupLanes lanes) {
   const auto nodes = groups.nodes_of(lanes.group);
   std::array<std::uint32_t, kLanes> counts{};
   std::size_t written = 0;
@@ -112,7 +114,7 @@ std::size_t Springs::fill(const Topology& topology, const Groups& groups, GroupL
   return written;
 }
 
-std::size_t Springs::rebuild(const Topology& topology, const Groups& groups,
+std::size_t Springs::rebuild(const topology::Topology& topology, const Groups& groups,
                              std::span<const GroupLanes> lanes) {
   rows_.extend(groups);
   constants_.extend(groups);

@@ -15,7 +15,7 @@ namespace trocar::dynamics {
 
 class Springs final : public Energy {
  public:
-  Springs(const Topology& topology, const Groups& groups);
+  Springs(const topology::Topology& topology, const Groups& groups);
   // False: no material of the organ can have any.
   static bool are_needed(const organ::Organ& organ);
 
@@ -25,7 +25,7 @@ class Springs final : public Energy {
                  StiffnessSink& sink) const override;
   void add_energies_j(std::span<const Vec3d> displacements,
                       std::span<double> energies) const override;
-  std::size_t rebuild(const Topology& topology, const Groups& groups,
+  std::size_t rebuild(const topology::Topology& topology, const Groups& groups,
                       std::span<const GroupLanes> lanes) override;
 
  private:
@@ -50,8 +50,8 @@ class Springs final : public Energy {
     organ::Spring spring;
   };
 
-  void find_springs(const Topology& topology, NodeIndex node, std::vector<End>& out);
-  std::size_t fill(const Topology& topology, const Groups& groups, GroupLanes lanes);
+  void find_springs(const topology::Topology& topology, NodeIndex node, std::vector<End>& out);
+  std::size_t fill(const topology::Topology& topology, const Groups& groups, GroupLanes lanes);
   void take_step_length(Group group);
 
   GroupRows<Row> rows_;

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "server/tissue/dynamics/tet_shape.h"
+#include "server/tissue/topology/tet_shape.h"
 
 namespace trocar::dynamics {
 
@@ -38,7 +38,7 @@ struct Tension {
   Vec3d fibres;
 
   Vec3d stress_on(const Vec3d& v) const {
-    return v * isotropic_pa + (v - relaxed(material, fibres, v)) * (2 * mu_pa);
+    return v * isotropic_pa + (v - topology::relaxed(material, fibres, v)) * (2 * mu_pa);
   }
 };
 
@@ -54,7 +54,7 @@ Tension tension_of(const material::Material& material, const Vec3d& fibres,
 
 }  // namespace
 
-TensorMass::TensorMass(const Topology& topology, const Groups& groups) {
+TensorMass::TensorMass(const topology::Topology& topology, const Groups& groups) {
   std::vector<NodeIndex> neighbours;
   std::vector<std::uint32_t> bounds(topology.node_count());
   for (std::uint32_t n = 0; n < bounds.size(); ++n) {
@@ -70,7 +70,7 @@ TensorMass::TensorMass(const Topology& topology, const Groups& groups) {
 }
 
 // By ascending other end; each a sum over ascending tets.
-void TensorMass::find_edges(const Topology& topology, NodeIndex node, Node& out) {
+void TensorMass::find_edges(const topology::Topology& topology, NodeIndex node, Node& out) {
   out.edges.clear();
   out.gradient_n = {};
   out.energy_j = 0;
@@ -82,7 +82,7 @@ void TensorMass::find_edges(const Topology& topology, NodeIndex node, Node& out)
     if (material.elastic_law != material::ElasticLaw::TensorMass) continue;
     const auto lame = material::lame_parameters(material);
     const auto& tet = topology.tet(t);
-    const auto shape = tet_shape(topology.stress_free(), tet);
+    const auto shape = topology::tet_shape(topology.stress_free(), tet);
     const auto i = static_cast<std::size_t>(std::ranges::find(tet, node) - tet.begin());
     Vec3d gradient;
     for (std::size_t j = 0; j < 4; ++j) {
@@ -103,7 +103,8 @@ void TensorMass::find_edges(const Topology& topology, NodeIndex node, Node& out)
   std::ranges::sort(out.edges, {}, &Edge::other);
 }
 
-std::size_t TensorMass::fill(const Topology& topology, const Groups& groups, GroupLanes lanes) {
+std::size_t TensorMass::fill(const topology::Topology& topology, const Groups& groups,
+                             GroupLanes lanes) {
   const auto nodes = groups.nodes_of(lanes.group);
   std::array<std::uint32_t, kLanes> counts{};
   std::size_t written = 0;
@@ -139,7 +140,7 @@ void TensorMass::set_node(const Node& node, Slot slot) {
   rest_energies_j_[slot] = is_empty ? 0 : node.energy_j;
 }
 
-std::size_t TensorMass::rebuild(const Topology& topology, const Groups& groups,
+std::size_t TensorMass::rebuild(const topology::Topology& topology, const Groups& groups,
                                 std::span<const GroupLanes> lanes) {
   rows_.extend(groups);
   blocks_.resize(groups.group_count());

@@ -12,14 +12,14 @@ namespace trocar::dynamics {
 
 class TensorMass final : public Energy {
  public:
-  TensorMass(const Topology& topology, const Groups& groups);
+  TensorMass(const topology::Topology& topology, const Groups& groups);
 
   void add(Group group, const Float4* x, const Vec8& own, NodeStep8& step) const override;
   void linearise(Group group, const Float4* x, const Vec8& own, NodeStep8& step,
                  StiffnessSink& sink) const override;
   void add_energies_j(std::span<const Vec3d> displacements,
                       std::span<double> energies) const override;
-  std::size_t rebuild(const Topology& topology, const Groups& groups,
+  std::size_t rebuild(const topology::Topology& topology, const Groups& groups,
                       std::span<const GroupLanes> lanes) override;
 
  private:
@@ -47,8 +47,8 @@ class TensorMass final : public Energy {
 
   static Matrix edge_matrix(const Vec3d& gi, const Vec3d& gj, double volume,
                             const material::LameParameters& lame);
-  static void find_edges(const Topology& topology, NodeIndex node, Node& out);
-  std::size_t fill(const Topology& topology, const Groups& groups, GroupLanes lanes);
+  static void find_edges(const topology::Topology& topology, NodeIndex node, Node& out);
+  std::size_t fill(const topology::Topology& topology, const Groups& groups, GroupLanes lanes);
   void set_node(const Node& node, Slot slot);
 
   GroupRows<Row> rows_;

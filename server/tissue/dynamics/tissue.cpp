@@ -38,13 +38,16 @@ std::optional<ExponentialLaw> law_of(const material::Material& material, Exponen
 
 }  // namespace
 
-Tissue::Tissue(const organ::Organ& organ) : Tissue(Topology(organ)) {}
+Tissue::Tissue(const organ::Organ& organ) : Tissue(topology::Topology(organ)) {}
 
-Tissue::Tissue(const Topology& topology, std::span<const Colour> colours)
-    : groups_(topology, Stars::are_needed(topology.organ()) ? Coupling::Stars : Coupling::Elements,
-              colours) {
+Tissue::Tissue(const topology::Topology& topology, std::span<const Colour> colours)
+    : groups_(
+          topology,
+          NodalStrain::are_needed(topology.organ()) ? Coupling::NodalStrain : Coupling::Elements,
+          colours) {
   const auto& organ = topology.organ();
-  if (Stars::are_needed(organ)) stars_ = std::make_unique<Stars>(topology, groups_);
+  if (NodalStrain::are_needed(organ))
+    nodal_strain_ = std::make_unique<NodalStrain>(topology, groups_);
   if (Springs::are_needed(organ)) energies_.push_back(std::make_unique<Springs>(topology, groups_));
   if (has_law(organ, ElasticLaw::TensorMass))
     energies_.push_back(std::make_unique<TensorMass>(topology, groups_));
@@ -59,25 +62,25 @@ Tissue::Tissue(const Topology& topology, std::span<const Colour> colours)
 }
 
 template <typename Law>
-void Tissue::add_hyperelastic(const Topology& topology, const HyperelasticParameters& parameters,
-                              const Law& law) {
+void Tissue::add_hyperelastic(const topology::Topology& topology,
+                              const HyperelasticParameters& parameters, const Law& law) {
   energies_.push_back(
-      std::make_unique<Hyperelastic<Law>>(topology, groups_, stars_.get(), parameters, law));
+      std::make_unique<Hyperelastic<Law>>(topology, groups_, nodal_strain_.get(), parameters, law));
   const auto is_averaged = [&](std::size_t i) {
     const auto& material = organ::material_at(topology.organ(), static_cast<std::uint16_t>(i));
     return parameters[i] && material.has_averaged_strain;
   };
   for (std::size_t i = 0; i < parameters.size(); ++i)
     if (is_averaged(i)) {
-      averaged_.push_back(
-          std::make_unique<AveragedStrain<Law>>(topology, groups_, *stars_, parameters, law));
+      averaged_.push_back(std::make_unique<NodalHyperelastic<Law>>(
+          topology, groups_, *nodal_strain_, parameters, law));
       return;
     }
 }
 
 // One energy for all materials whose laws are multiples of each other.
 template <typename Law>
-void Tissue::add_measured(const Topology& topology) {
+void Tissue::add_measured(const topology::Topology& topology) {
   const auto& organ = topology.organ();
   std::vector<Law> laws;
   for (std::size_t i = 0; i <= organ.regions.size(); ++i) {
@@ -92,10 +95,11 @@ void Tissue::add_measured(const Topology& topology) {
         law);
 }
 
-void Tissue::add_relaxation(const Topology& topology) {
+void Tissue::add_relaxation(const topology::Topology& topology) {
   if (!Relaxation::is_needed(topology.organ())) return;
-  relaxation_ = std::make_unique<Relaxation>(topology, groups_, stars_.get());
-  relaxed_stress_ = std::make_unique<RelaxedStress>(topology, groups_, *relaxation_, stars_.get());
+  relaxation_ = std::make_unique<Relaxation>(topology, groups_, nodal_strain_.get());
+  relaxed_stress_ =
+      std::make_unique<RelaxedStress>(topology, groups_, *relaxation_, nodal_strain_.get());
 }
 
 void Tissue::touch(Slot slot) {
@@ -126,7 +130,7 @@ std::vector<float> Tissue::traces_at_rest(float inverse_dt, bool has_averaged) {
   return traces;
 }
 
-FollowReport Tissue::follow_topology(const Topology& topology) {
+FollowReport Tissue::follow_topology(const topology::Topology& topology) {
   changed_.assign(topology.changed().begin(), topology.changed().end());
   std::ranges::sort(changed_);
   groups_.update(topology, changed_);
@@ -142,8 +146,8 @@ FollowReport Tissue::follow_topology(const Topology& topology) {
   }
   list_touched(touched_);
   wide_.clear();
-  if (stars_) {
-    stars_->follow(topology, changed_);
+  if (nodal_strain_) {
+    nodal_strain_->follow(topology, changed_);
     for (const auto node : changed_) topology.for_each_neighbour(node, touch_node);
     list_touched(wide_);
   }
@@ -157,7 +161,7 @@ FollowReport Tissue::follow_topology(const Topology& topology) {
   }
   touched_groups_.clear();
   const auto lanes = rebuilt();
-  if (stars_) report.rows += stars_->rebuild(topology, groups_, lanes);
+  if (nodal_strain_) report.rows += nodal_strain_->rebuild(topology, groups_, lanes);
   if (relaxation_) {
     relaxation_->follow(topology, groups_, lanes);
     relaxed_stress_->rebuild(topology, groups_, lanes);

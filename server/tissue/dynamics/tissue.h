@@ -10,8 +10,8 @@
 #include <optional>
 #include <vector>
 
-#include "server/tissue/dynamics/averaged_strain.h"
 #include "server/tissue/dynamics/energy.h"
+#include "server/tissue/dynamics/nodal_hyperelastic.h"
 #include "server/tissue/dynamics/relaxation.h"
 #include "server/tissue/dynamics/relaxed_stress.h"
 
@@ -30,41 +30,41 @@ class Tissue {
  public:
   explicit Tissue(const organ::Organ& organ);
   // colours: per place of a node, those of a tissue stored before; empty: greedy.
-  explicit Tissue(const Topology& topology, std::span<const Colour> colours = {});
+  explicit Tissue(const topology::Topology& topology, std::span<const Colour> colours = {});
 
   const Groups& groups() const { return groups_; }
   // What strain is averaged over, to be told of moves; null: nothing.
-  Stars* stars() { return stars_.get(); }
-  const Stars* stars() const { return stars_.get(); }
+  NodalStrain* nodal_strain() { return nodal_strain_.get(); }
+  const NodalStrain* nodal_strain() const { return nodal_strain_.get(); }
 
   void begin_group(Group group, const Float4* start, float inverse_dt);
   void add(Group group, const Float4* x, const Vec8& own, NodeStep8& step) const {
     for (const auto& energy : energies_) energy->add(group, x, own, step);
     add_averaged(group, step);
   }
-  // Of these, energies over stars alone.
+  // Of these, energies of nodal strain alone.
   void add_averaged(Group group, NodeStep8& step) const {
     for (const auto& energy : averaged_) energy->add(group, step);
   }
 
-  // The elastic part at displacements x but for energies over stars, see Energy::linearise().
+  // The elastic part at displacements x but for energies of nodal strain, see Energy::linearise().
   void linearise(Group group, const Float4* x, const Vec8& own, NodeStep8& step,
                  StiffnessSink& sink) const {
     for (const auto& energy : energies_) energy->linearise(group, x, own, step, sink);
   }
 
   // Per slot, of the node's block of second derivatives with everything at rest, damping for steps
-  // of this length included, energies over stars if asked for; N/m.
+  // of this length included, energies of nodal strain if asked for; N/m.
   std::vector<float> traces_at_rest(float inverse_dt, bool has_averaged);
 
   // Follows topology.changed(). The topology is the one this tissue was made from, or another of
   // the same organ with the same edits.
-  FollowReport follow_topology(const Topology& topology);
+  FollowReport follow_topology(const topology::Topology& topology);
   // Lanes whose node, or what meets at it, the last follow_topology() found changed; ascending.
   std::span<const GroupLanes> touched() const { return touched_; }
   // Lanes that energies had to rebuild: with averaged strain also those with a neighbour of a node
   // that changed.
-  std::span<const GroupLanes> rebuilt() const { return stars_ ? wide_ : touched_; }
+  std::span<const GroupLanes> rebuilt() const { return nodal_strain_ ? wide_ : touched_; }
 
   // What remembers stresses, and the forces of stress that has relaxed, which no energy has; null
   // where nothing relaxes.
@@ -80,18 +80,18 @@ class Tissue {
 
  private:
   Groups groups_;
-  std::unique_ptr<Stars> stars_;  // null: nothing is averaged
+  std::unique_ptr<NodalStrain> nodal_strain_;  // null: nothing is averaged
   std::vector<std::unique_ptr<Energy>> energies_;
-  std::vector<std::unique_ptr<StarEnergy>> averaged_;
+  std::vector<std::unique_ptr<NodalStrainEnergy>> averaged_;
   std::unique_ptr<Relaxation> relaxation_;
   std::unique_ptr<RelaxedStress> relaxed_stress_;
 
   template <typename Law>
-  void add_hyperelastic(const Topology& topology, const HyperelasticParameters& parameters,
-                        const Law& law = {});
+  void add_hyperelastic(const topology::Topology& topology,
+                        const HyperelasticParameters& parameters, const Law& law = {});
   template <typename Law>
-  void add_measured(const Topology& topology);
-  void add_relaxation(const Topology& topology);
+  void add_measured(const topology::Topology& topology);
+  void add_relaxation(const topology::Topology& topology);
   void touch(Slot slot);
   void list_touched(std::vector<GroupLanes>& out);
 

@@ -88,8 +88,6 @@ class ClaimTable {
   // 1 while held, then down to 0 along the ramp: scales the force of the claim's verb.
   float strength(ToolSlot tool, Tick tick) const;
 
-  // For so many nodes, to be read.
-  void resize(std::size_t node_count) { owners_.resize(node_count); }
   // A node that is a copy of another, or between two: held by whoever holds both.
   void add_node(NodeIndex a, NodeIndex b) {
     const auto holder = owners_[a.value];

@@ -17,7 +17,7 @@ void ActiveSet::collect(const PropagationQueue& queue, Boundary boundary, world:
     before_.clear();
     for (std::uint32_t i = 0; i < world.node_count(); ++i) {
       auto& node_class = world.node_classes[i];
-      if (stops_outer && node_class == NodeClass::Outer) {
+      if (stops_outer && node_class == NodeClass::Far) {
         node_class = NodeClass::Active;
         world.quiet_ticks[i] = 0;
       }
@@ -53,7 +53,7 @@ std::span<const NodeIndex> ActiveSet::settle(const PropagationQueue& queue,
                            below(world.displacements[n], kQuietDisplacementMetres));
     world.quiet_ticks[n] = is_quiet ? static_cast<std::uint16_t>(world.quiet_ticks[n] + 1) : 0;
     if (world.quiet_ticks[n] < kQuietTicks) continue;
-    world.node_classes[n] = NodeClass::Outer;
+    world.node_classes[n] = NodeClass::Far;
     world.quiet_ticks[n] = 0;
     if (world.boundary == Boundary::Graded) continue;
     world.displacements[n] = {};

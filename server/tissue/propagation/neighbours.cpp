@@ -2,6 +2,14 @@
 
 namespace trocar::propagation {
 
+void Neighbours::take_changed(const topology::Topology& topology) {
+  for (const auto node : topology.changed()) {
+    topology.neighbours_of(node, row_);
+    set(node, row_);
+  }
+  rows_.tidy();
+}
+
 void Neighbours::set(NodeIndex node, std::span<const NodeIndex> neighbours) {
   row_count_ = std::max<std::size_t>(row_count_, node.value + 1);
   changed_.resize(row_count_);

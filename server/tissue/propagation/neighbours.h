@@ -6,6 +6,7 @@
 #include "common/base/blocks.h"
 #include "common/base/index.h"
 #include "server/organs/mesh/csr.h"
+#include "server/tissue/topology/topology.h"
 
 namespace trocar::propagation {
 
@@ -26,16 +27,17 @@ class Neighbours {
     return (*table_)[node];
   }
 
-  // Replaces the row of a node of the table, or of a new one. O(row), and O(nodes) the first time.
-  void set(NodeIndex node, std::span<const NodeIndex> neighbours);
-  // To be called after a number of set(): frees memory that rows have left.
-  void tidy() { rows_.tidy(); }
+  // Takes the rows of topology.changed(). O(rows), and O(nodes) the first time.
+  void take_changed(const topology::Topology& topology);
 
  private:
+  void set(NodeIndex node, std::span<const NodeIndex> neighbours);
+
   const Table* table_;
   std::size_t row_count_;
   std::vector<std::uint32_t> changed_;  // per node: 1 + place in rows_; 0: as in the table
   Blocks<NodeIndex> rows_;
+  std::vector<NodeIndex> row_;  // scratch
 };
 
 }  // namespace trocar::propagation

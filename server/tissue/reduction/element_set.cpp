@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "common/base/assert.h"
-#include "server/tissue/dynamics/tet_shape.h"
+#include "server/tissue/topology/tet_shape.h"
 
 namespace trocar::reduction {
 namespace {
@@ -86,7 +86,7 @@ ElementSet::ElementSet(const organ::Organ& organ, std::span<const TetIndex> tets
     auto& group = groups_.back();
     const auto lane = group.used++;
     const auto& tet = organ.mesh.tets[t];
-    const auto shape = dynamics::tet_shape(organ.mesh.rest_positions, tet);
+    const auto shape = topology::tet_shape(organ.mesh.rest_positions, tet);
     const auto& material = organ::material_at(organ, materials[t]);
     const auto [c10, bulk] = material::neo_hookean_parameters(material);
     const double v = shape.volume * (weights.empty() ? 1.0 : static_cast<double>(weights[i]));

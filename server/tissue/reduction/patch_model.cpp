@@ -41,17 +41,6 @@ BlockMatrix pattern_of(std::size_t node_count, std::initializer_list<const Eleme
 
 }  // namespace
 
-bool PatchSet::has(std::uint32_t patch) const {
-  return std::ranges::binary_search(all(), patch);
-}
-bool PatchSet::add(std::uint32_t patch) {
-  if (has(patch)) return true;
-  if (count == kMaxPatches) return false;
-  patches[count++] = patch;
-  std::sort(patches.begin(), patches.begin() + count);
-  return true;
-}
-
 PatchModel::PatchModel(const organ::LocalReduction& reduction, const organ::LocalPatch& patch,
                        const organ::Organ& organ)
     : centre_(patch.centre) {

@@ -11,25 +11,14 @@
 
 #include "server/organs/organ/local_reduction.h"
 #include "server/organs/organ/organ.h"
+#include "server/tissue/dynamics/solver_figures.h"
 #include "server/tissue/reduction/block_matrix.h"
 #include "server/tissue/reduction/dense.h"
 #include "server/tissue/reduction/element_set.h"
 
 namespace trocar::reduction {
 
-// Ascending numbers of patches.
-struct PatchSet {
-  static constexpr std::size_t kMaxPatches = 4;
-
-  std::array<std::uint32_t, kMaxPatches> patches{};
-  std::uint32_t count = 0;
-
-  std::span<const std::uint32_t> all() const { return {patches.data(), count}; }
-  bool has(std::uint32_t patch) const;
-  // False: there is no room.
-  bool add(std::uint32_t patch);
-  bool operator==(const PatchSet&) const = default;
-};
+using dynamics::PatchSet;
 
 class LocalModels;
 

@@ -15,12 +15,15 @@
 #include "common/wire/quantise.h"
 #include "common/wire/surface_change.h"
 #include "server/tissue/dynamics/relaxation_figures.h"
+#include "server/tissue/dynamics/solver_figures.h"
 #include "server/tissue/hands/claims.h"
 #include "server/tissue/hands/inputs.h"
-#include "server/tissue/step/reduced_tissue.h"
 #include "server/tissue/step/tick_report.h"
 
 namespace trocar::step {
+
+using dynamics::kSolverReasons, dynamics::SolverChange, dynamics::SolverFigures,
+    dynamics::SolverReason, dynamics::name_of;
 
 struct ToolFrame {
   ToolSlot tool;

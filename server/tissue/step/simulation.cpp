@@ -6,17 +6,20 @@
 
 #include "common/base/assert.h"
 #include "server/organs/organ/any_material.h"
+#include "server/tissue/cutting/edits.h"
 #include "server/tissue/dynamics/relaxation.h"
+#include "server/tissue/step/edit_followers.h"
+#include "server/tissue/topology/surface_mesh.h"
 
 namespace trocar::step {
 
-State::State(const organ::Organ& organ, const reduction::LocalModels* reduction)
+State::State(const organ::Organ& organ, const dynamics::FarFieldModels* models)
     : cuts(organ),
       world(organ),
       claims(organ.mesh.node_count()),
       quantised(cuts.layout().vertex_count()),
-      models(reduction) {
-  if (models != nullptr) reduced.emplace().is_cut.resize(models->size());
+      far_models(models),
+      far_model(models != nullptr ? models->make() : nullptr) {
   dynamics::start_relaxed(organ, world);
 }
 
@@ -34,11 +37,11 @@ void State::set_mark() {
 
 std::unique_ptr<State> State::returned_to_mark(const organ::Organ& organ) const {
   if (!mark.is_set()) return nullptr;
-  auto marked = std::make_unique<State>(organ, models);
+  auto marked = std::make_unique<State>(organ, far_models);
   auto archive = world::StateArchive::reading(mark.state());
   marked->visit_without_mark(archive);
   if (!archive.ok() || !archive.at_end()) return nullptr;
-  marked->cuts.follow_on(cuts);
+  marked->cuts.replace(cuts);
   marked->world.tick = world.tick;
   marked->tools = tools;
   marked->claims.let_go(claims);
@@ -49,17 +52,13 @@ std::unique_ptr<State> State::returned_to_mark(const organ::Organ& organ) const 
 }
 
 void State::visit_without_mark(world::StateArchive& archive) {
-  cuts.visit_state(archive, world);
-  if (archive.is_reading()) {
-    claims.resize(world.node_count());
-    quantised.resize(cuts.layout().vertex_count());
-  }
+  cuts.visit_state(archive, [this](const topology::Edit& edit) { hand_out(edit, *this); });
   world.visit_state(archive);
   tools.visit_state(archive);
   claims.visit_state(archive);
   grasps.visit_state(archive, world.node_count());
   proxies.visit_state(archive);
-  if (reduced) reduced->visit_state(archive, *models);
+  if (far_model) far_model->visit_state(archive);
   archive.fixed_array(quantised);
   self_contacts.visit_state(archive, world.surface_nodes, cuts.layout().triangles.size());
 }
@@ -67,17 +66,11 @@ void State::visit_without_mark(world::StateArchive& archive) {
 namespace {
 
 std::shared_ptr<const Scene> scene_of(organ::Organ organ,
-                                      std::shared_ptr<const organ::LocalReduction> reduction) {
+                                      const dynamics::MakeFarFieldModels& far_models) {
   auto scene = std::make_shared<Scene>();
   scene->organ = std::move(organ);
-  scene->reduction = std::move(reduction);
-  // Of the organ where it stays.
-  if (scene->reduction) scene->models.emplace(*scene->reduction, scene->organ);
+  if (far_models) scene->far_models = far_models(scene->organ);
   return scene;
-}
-
-const reduction::LocalModels* models_of(const Scene& scene) {
-  return scene.models ? &*scene.models : nullptr;
 }
 
 // Springs and linear tets cost no more than the matrices of a linear far field.
@@ -105,36 +98,22 @@ StepContext::StepContext(const Scene& s, unsigned workers, const world::World& u
       has_linear_far_field(is_costly(s.organ)),
       surface_displacements(state.cuts.layout().vertex_count()) {
   if (has_linear_far_field) solver.use_linear_far_field(uncut);
-  if (s.models) reduced.emplace(*s.models);
   contacts.reserve();
   requests.reserve(kMaxTools);
   claim_events.reserve(4 * kMaxTools);
   solver_changes.reserve(4 * kTicksPerFrame);
-  dynamics::Topology topology(s.organ);
+  topology::Topology topology(s.organ);
   cutting::Places places(topology);
-  cutting::SurfaceMesh surface(s.organ);
+  topology::SurfaceMesh surface(s.organ);
   for (const auto& events : state.cuts.history()) {
     const auto applied = cutting::apply(events, topology, places);
     TROCAR_ASSERT(applied.ok());
-    follow_edit(topology, surface.follow(topology), state.world);
+    hand_out({topology, {}, surface.follow(topology)}, state.world, *this);
     topology.clear_changes();
   }
-  if (!state.cuts.history().empty()) follow_edit(state.cuts.topology(), {}, state.world);
+  // From now on everybody looks at the state's own topology.
+  if (!state.cuts.history().empty()) hand_out({state.cuts.topology(), {}, {}}, state.world, *this);
   solver.take_state(state.world);
-}
-
-void StepContext::follow_edit(const dynamics::Topology& topology, const world::SurfaceEdit& edit,
-                              const world::World& world) {
-  for (const auto node : topology.changed()) {
-    topology.neighbours_of(node, changed_neighbours);
-    neighbours.set(node, changed_neighbours);
-  }
-  neighbours.tidy();
-  queue.forget(world.node_count());
-  active.forget();
-  finder.follow(edit, world);
-  self_finder.follow(edit, world);
-  solver.follow_topology(topology, world);
 }
 
 Status validate(const TickDecisions& d) {
@@ -166,13 +145,13 @@ Status validate(const TickDecisions& d) {
 }
 
 Simulation::Simulation(organ::Organ organ, unsigned workers,
-                       std::shared_ptr<const organ::LocalReduction> reduction)
-    : Simulation(scene_of(std::move(organ), std::move(reduction)), workers) {}
+                       const dynamics::MakeFarFieldModels& far_models)
+    : Simulation(scene_of(std::move(organ), far_models), workers) {}
 
 Simulation::Simulation(std::shared_ptr<const Scene> scene, unsigned workers)
     : scene_(std::move(scene)),
       workers_(workers),
-      state_(std::make_unique<State>(scene_->organ, models_of(*scene_))),
+      state_(std::make_unique<State>(scene_->organ, scene_->far_models.get())),
       context_(std::make_unique<StepContext>(*scene_, workers_, *state_)) {}
 
 Simulation Simulation::beside(unsigned workers) const {
@@ -209,10 +188,9 @@ void Simulation::use_mark(hands::MarkAction action) {
   context_->mark_events.push_back(event);
 }
 
-std::unique_ptr<StepContext> Simulation::context_of(const State& state) const {
-  auto context = std::make_unique<StepContext>(*scene_, workers_, state);
-  if (state.reduced && !context->reduced->resume(*state.reduced)) return nullptr;
-  return context;
+std::unique_ptr<StepContext> Simulation::context_of(State& state) const {
+  if (state.far_model && !state.far_model->resume()) return nullptr;
+  return std::make_unique<StepContext>(*scene_, workers_, state);
 }
 
 void Simulation::write_snapshot(Bytes& out) const {
@@ -228,7 +206,7 @@ std::uint64_t Simulation::state_hash() const {
 }
 
 Status Simulation::restore_snapshot(BytesView snapshot) {
-  auto restored = std::make_unique<State>(scene_->organ, models_of(*scene_));
+  auto restored = std::make_unique<State>(scene_->organ, scene_->far_models.get());
   auto archive = world::StateArchive::reading(snapshot);
   restored->visit(archive);
   auto context = archive.ok() && archive.at_end() ? context_of(*restored) : nullptr;

@@ -16,11 +16,11 @@ Status validate(const TickDecisions& decisions);
 class Simulation {
  public:
   // workers: threads that share the solver's work; results do not depend on it.
-  // reduction: of this organ, with which its tissue may be moved; null: none.
+  // far_models: what may move the far field instead of sweeps; empty: nothing.
   explicit Simulation(organ::Organ organ, unsigned workers = 1,
-                      std::shared_ptr<const organ::LocalReduction> reduction = nullptr);
+                      const dynamics::MakeFarFieldModels& far_models = {});
 
-  // Another one of the same organ and reduction, at the beginning. Shares with this one what
+  // Another one of the same organ and far-field models, at the beginning. Shares with this one what
   // never changes, so that they may be used by two threads.
   Simulation beside(unsigned workers) const;
 
@@ -48,8 +48,8 @@ class Simulation {
   Simulation(std::shared_ptr<const Scene> scene, unsigned workers);
 
   void use_mark(hands::MarkAction action);
-  // Null: the state is of another reduction's fields.
-  std::unique_ptr<StepContext> context_of(const State& state) const;
+  // Null: the state is of another far-field model.
+  std::unique_ptr<StepContext> context_of(State& state) const;
 
   std::shared_ptr<const Scene> scene_;
   unsigned workers_ = 1;

@@ -1,10 +1,12 @@
 #include "server/tissue/step/tick.h"
 
 #include <algorithm>
+#include <optional>
 #include <utility>
 
 #include "common/base/timing.h"
 #include "server/tissue/contact/update_claims.h"
+#include "server/tissue/step/edit_followers.h"
 
 namespace trocar::step {
 namespace {
@@ -66,9 +68,7 @@ void find_bands(StepContext& context, std::span<const NodeIndex> nodes) {
   }
 }
 
-// Of a session with a reduction.
-void note_solver(Tick tick, StepContext& context) {
-  const auto& now = context.reduced->figures();
+void note_solver(Tick tick, const SolverFigures& now, StepContext& context) {
   const auto& before = context.solver_figures;
   if (now.is_reduced != before.is_reduced || now.reason != before.reason ||
       !(now.patches == before.patches))
@@ -79,17 +79,19 @@ void note_solver(Tick tick, StepContext& context) {
 void solve(State& state, StepContext& context) {
   const auto& decisions = context.decisions;
   auto nodes = context.active.nodes();
-  const bool is_reduced =
-      context.reduced && context.reduced->choose({context.contacts, nodes, decisions.boundary,
-                                                  decisions.is_reduction_off},
-                                                 *state.reduced, context.solver, state.world);
-  if (is_reduced) nodes = context.reduced->near();
-  context.report.is_reduced = is_reduced;
-  if (context.reduced) note_solver(state.world.tick, context);
+  std::optional<dynamics::FarFieldModel::Choice> modelled;
+  if (state.far_model) {
+    modelled = state.far_model->choose(
+        {context.contacts, nodes, decisions.boundary, decisions.is_reduction_off}, context.solver,
+        state.world);
+    note_solver(state.world.tick, state.far_model->figures(), context);
+  }
+  if (modelled) nodes = modelled->near;
+  context.report.is_reduced = modelled.has_value();
   find_bands(context, nodes);
   dynamics::SolveSettings settings{decisions.sweeps, decisions.over_relaxation, kTickSeconds};
-  if (is_reduced) {
-    settings.exterior = &context.reduced->exterior();
+  if (modelled) {
+    settings.far_solver = modelled->far;
   } else if (decisions.boundary == world::Boundary::Graded) {
     const auto plan =
         context.far_plan.with_sweeps(decisions.far_sweeps).with_interval(decisions.far_interval);
@@ -139,22 +141,12 @@ void find_tears(State& state, StepContext& context) {
 void cut_tissue(State& state, StepContext& context) {
   auto& cuts = state.cuts;
   find_tears(state, context);
-  const bool has_cut =
+  const auto edit =
       cuts.cut(state.tools, state.claims, state.world, context.travel_m, context.report.cut);
   if (context.report.cut.is_full) context.report.faults |= kFaultCutLimit;
-  if (!has_cut) return;
-  if (context.reduced)
-    context.reduced->stop_for_cut(cuts.topology().changed(), *state.reduced, context.solver,
-                                  state.world);
-  const auto& edit = cuts.follow(state.world);
-  for (const auto& made : cuts.new_nodes()) {
-    state.claims.add_node(made.a, made.b);
-    if (made.a == made.b) state.grasps.add_copy(made.a, made.node);
-  }
-  state.quantised.resize(cuts.layout().vertex_count());
-  context.follow_edit(cuts.topology(), edit, state.world);
-  context.solver.refresh_relaxed_forces(state.world);
-  cuts.clear_changes();
+  if (!edit) return;
+  hand_out(*edit, state, context);
+  cuts.end_edit();
 }
 
 void update_claims(State& state, StepContext& context) {

@@ -4,21 +4,20 @@
 // contents.
 
 #include <memory>
-#include <optional>
 
 #include "common/base/checksum.h"
+#include "server/tissue/blades/tissue_cuts.h"
 #include "server/tissue/contact/contact_finder.h"
 #include "server/tissue/contact/self_contact.h"
 #include "server/tissue/dynamics/block_descent.h"
+#include "server/tissue/dynamics/far_field_model.h"
 #include "server/tissue/hands/claims.h"
 #include "server/tissue/hands/tool_table.h"
 #include "server/tissue/propagation/active_set.h"
 #include "server/tissue/propagation/queue.h"
 #include "server/tissue/step/mark.h"
 #include "server/tissue/step/published_frame.h"
-#include "server/tissue/step/reduced_tissue.h"
 #include "server/tissue/step/tick_report.h"
-#include "server/tissue/step/tissue_cuts.h"
 #include "server/tissue/world/world.h"
 
 namespace trocar::step {
@@ -28,10 +27,10 @@ static_assert(kSweepLayers <= dynamics::kMaxSweepBands);
 // Everything a later tick depends on. Each member names its arrays in visit_state; these bytes are
 // the snapshot and what the tick hash covers.
 struct State {
-  // models: of the session's reduction, null if there is none.
-  State(const organ::Organ& organ, const reduction::LocalModels* models);
+  // models: null: sweeps alone move the tissue.
+  State(const organ::Organ& organ, const dynamics::FarFieldModels* models);
 
-  TissueCuts cuts;
+  blades::TissueCuts cuts;
   world::World world;
   hands::ToolTable tools;
   hands::ClaimTable claims;
@@ -40,8 +39,8 @@ struct State {
   // Last published integers: quantisation has hysteresis, so they are state.
   wire::QuantisedSurface quantised;
   contact::SelfContactTable self_contacts;
-  const reduction::LocalModels* const models;
-  std::optional<ReducedState> reduced;  // of sessions with models
+  const dynamics::FarFieldModels* const far_models;
+  std::unique_ptr<dynamics::FarFieldModel> far_model;  // of sessions with models
   Mark mark;
 
   void visit(world::StateArchive& archive);
@@ -58,8 +57,7 @@ struct State {
 // Constant in a session: follows from the organ.
 struct Scene {
   organ::Organ organ;
-  std::shared_ptr<const organ::LocalReduction> reduction;  // null: none
-  std::optional<reduction::LocalModels> models;            // of it
+  std::unique_ptr<const dynamics::FarFieldModels> far_models;  // of it where it stays; null: none
 };
 
 // Laid out as input, scratch and output of a tick. Scratch keeps its capacity, so that a tick does
@@ -68,10 +66,6 @@ struct StepContext {
   StepContext(const Scene& scene, unsigned workers, const State& state);
   // uncut: the world of the organ as it was at first.
   StepContext(const Scene& scene, unsigned workers, const world::World& uncut, const State& state);
-
-  // After an edit of the topology, which the world has followed.
-  void follow_edit(const dynamics::Topology& topology, const world::SurfaceEdit& edit,
-                   const world::World& world);
 
   // Input.
   const Scene& scene;
@@ -87,14 +81,13 @@ struct StepContext {
   propagation::ActiveSet active;
   std::array<dynamics::SweepBand, kSweepLayers> sweep_bands{};  // of active nodes, by layer
   dynamics::BlockDescent solver;
-  std::optional<ReducedTissue> reduced;
   dynamics::FarPlan far_plan;
   bool has_linear_far_field;
   // By tool, empty without contact; last, tissue on tissue.
   std::array<std::span<const NodeIndex>, kMaxTools + 1> seeds;
   std::vector<hands::ClaimRequest> requests;
   std::vector<Vec3f> surface_displacements;
-  std::vector<NodeIndex> changed_neighbours, may_tear;
+  std::vector<NodeIndex> may_tear;
   double travel_m = 0;  // sum over ticks of the farthest that any node has moved
   StateHasher hasher;
 

@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "common/base/tick.h"
+#include "server/tissue/blades/cut_report.h"
 #include "server/tissue/world/world.h"
 
 namespace trocar::step {
@@ -59,15 +60,6 @@ enum TickFault : std::uint32_t {
   kFaultCutLimit = 1u << 5,        // the surface has as many triangles as may be: blades are blunt
 };
 
-// What blades did in one tick.
-struct CutReport {
-  std::uint32_t crossed_tets = 0, splits = 0;
-  double opened_area_m2 = 0;  // one side of the wound
-  double torn_area_m2 = 0;    // part of it
-  bool is_behind = false;     // work is left for later ticks
-  bool is_full = false;       // see kFaultCutLimit
-};
-
 struct TickReport {
   Tick tick = 0;
   std::array<std::uint32_t, kStageCount> stage_cpu_ns{};
@@ -86,7 +78,7 @@ struct TickReport {
   bool is_far_linear = false;                // these were stepped by matrices
   std::uint32_t far_interval = 1;            // in every so many ticks
   bool is_reduced = false;                   // a patch of a reduction moved the far nodes
-  CutReport cut;
+  blades::CutReport cut;
   std::uint32_t faults = 0;  // TickFault bits
   float residual_n = 0;      // root mean square nodal force imbalance in the last sweep
   std::uint64_t state_hash = 0;

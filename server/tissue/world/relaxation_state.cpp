@@ -23,7 +23,7 @@ std::size_t RelaxationState::terms_of(const organ::Organ& organ) {
   return most;
 }
 
-bool RelaxationState::has_stars(const organ::Organ& organ) {
+bool RelaxationState::has_nodal(const organ::Organ& organ) {
   return organ::any_material(organ, [](const material::Material& m) {
     return world::terms_of(m) > 0 && m.has_averaged_strain;
   });
@@ -33,24 +33,24 @@ RelaxationState::RelaxationState(const organ::Organ& organ) {
   const auto terms = terms_of(organ), nodes = organ.mesh.node_count();
   if (terms == 0) return;
   tets_ = StressHistory(terms, organ.mesh.tets.size());
-  if (has_stars(organ)) stars_ = StressHistory(terms, nodes);
+  if (has_nodal(organ)) nodal_ = StressHistory(terms, nodes);
   forces_.resize(nodes);
 }
 
 void RelaxationState::add_node(NodeIndex parent) {
   if (is_empty()) return;
-  stars_.inherit(forces_.size(), parent.value);
+  nodal_.inherit(forces_.size(), parent.value);
   forces_.emplace_back();
 }
 
 void RelaxationState::visit_state(StateArchive& archive) {
   if (is_empty()) return;
   tets_.visit_hash(archive);
-  stars_.visit_hash(archive);
+  nodal_.visit_hash(archive);
   archive.fixed_array(forces_);
   if (archive.is_hashing()) return;
   tets_.visit_values(archive);
-  stars_.visit_values(archive);
+  nodal_.visit_values(archive);
   if (archive.is_reading() &&
       !std::ranges::all_of(forces_, [](const Vec3f& f) { return is_finite(f); }))
     archive.fail();

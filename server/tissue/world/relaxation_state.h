@@ -1,7 +1,7 @@
 #pragma once
 
 // Tissue remembers stresses that it has had (quasi-linear viscoelasticity, Dogan 2011 eq. 1 to 4):
-// those of tets, of the stars of nodes where strain is averaged, and per node the force of what has
+// those of tets, of the nodes where strain is averaged, and per node the force of what has
 // relaxed, as of the step that took it last. Empty for organs of which nothing relaxes.
 
 #include "common/base/index.h"
@@ -17,17 +17,17 @@ class RelaxationState {
   // The most that a material of the organ has.
   static std::size_t terms_of(const organ::Organ& organ);
   // A material relaxes, and its strain is averaged.
-  static bool has_stars(const organ::Organ& organ);
+  static bool has_nodal(const organ::Organ& organ);
 
   bool is_empty() const { return tets_.is_empty(); }
   StressHistory& tets() { return tets_; }
   const StressHistory& tets() const { return tets_; }
-  // Places are nodes; empty unless has_stars().
-  StressHistory& stars() { return stars_; }
-  const StressHistory& stars() const { return stars_; }
+  // Places are nodes; empty unless has_nodal().
+  StressHistory& nodal() { return nodal_; }
+  const StressHistory& nodal() const { return nodal_; }
 
   // Counts a step.
-  void begin_step() { tets_.begin_step(), stars_.begin_step(); }
+  void begin_step() { tets_.begin_step(), nodal_.begin_step(); }
   std::uint8_t step() const { return tets_.step(); }
 
   // N; of as many nodes as the world has.
@@ -40,7 +40,7 @@ class RelaxationState {
   void visit_state(StateArchive& archive);
 
  private:
-  StressHistory tets_, stars_;
+  StressHistory tets_, nodal_;
   std::vector<Vec3f> forces_;
 };
 

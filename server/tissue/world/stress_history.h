@@ -1,9 +1,9 @@
 #pragma once
 
-// Stresses that tissue has had, in some places (tets, or stars): per place the stress that would be
-// there at once, as of the step that advanced it last, and how much of it each relaxation term has
-// taken away since. Symmetric tensors over the pose without stress (second Piola-Kirchhoff, Pa), so
-// that the parts of a tet that is split have those of the whole.
+// Stresses that tissue has had, in some places (tets, or smoothing domains): per place the stress
+// that would be there at once, as of the step that advanced it last, and how much of it each
+// relaxation term has taken away since. Symmetric tensors over the pose without stress (second
+// Piola-Kirchhoff, Pa), so that the parts of a tet that is split have those of the whole.
 //
 // Places by eights: values of a block lie as [tensor][component][place], with components xx, xy,
 // xz, yy, yz, zz. A solver advances some blocks in a step: the tick hash covers a sum of theirs,

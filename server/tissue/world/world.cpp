@@ -1,12 +1,16 @@
 #include "server/tissue/world/world.h"
 
+#include <algorithm>
+
+#include "common/base/assert.h"
+
 namespace trocar::world {
 
 World::World(const organ::Organ& organ)
     : surface_nodes(organ.mesh.surface_nodes),
       displacements(organ.mesh.node_count()),
       velocities(organ.mesh.node_count()),
-      node_classes(organ.mesh.node_count(), NodeClass::Outer),
+      node_classes(organ.mesh.node_count(), NodeClass::Far),
       quiet_ticks(organ.mesh.node_count()),
       far_poses(organ.mesh.node_count()),
       relaxation(organ) {
@@ -42,6 +46,29 @@ void World::add_node(const Vec3d& rest_position, NodeIndex a, NodeIndex b, std::
   quiet_ticks.push_back(0);
   far_poses.add_node(a, b, t);
   relaxation.add_node(a);
+}
+
+void World::apply(const topology::Edit& edit) {
+  const auto& topology = edit.topology;
+  for (const auto& made : edit.new_nodes) {
+    TROCAR_ASSERT(made.node.value == node_count());
+    add_node(topology.rest()[made.node.value], made.a, made.b, made.t);
+  }
+  for (const auto& [part, parent] : topology.parts())
+    relaxation.tets().inherit(part.value, parent.value);
+  for (const auto node : topology.changed()) {
+    masses[node.value] = static_cast<float>(topology.lumped_mass(node));
+    auto& node_class = node_classes[node.value];
+    if (node_class == NodeClass::Fixed) continue;
+    node_class = NodeClass::Active;
+    quiet_ticks[node.value] = 0;
+  }
+  const auto& surface = edit.surface;
+  for (std::size_t i = 0; i < surface.touched.size(); ++i)
+    surface_areas[surface.touched[i].value] = surface.areas_m2[i];
+  const auto middle = static_cast<std::ptrdiff_t>(surface_nodes.size());
+  surface_nodes.insert(surface_nodes.end(), surface.surfaced.begin(), surface.surfaced.end());
+  std::inplace_merge(surface_nodes.begin(), surface_nodes.begin() + middle, surface_nodes.end());
 }
 
 void World::visit_state(StateArchive& archive) {

@@ -12,6 +12,7 @@
 #include "common/base/tick.h"
 #include "common/math/vec3.h"
 #include "server/organs/organ/organ.h"
+#include "server/tissue/topology/edit.h"
 #include "server/tissue/world/far_poses.h"
 #include "server/tissue/world/relaxation_state.h"
 #include "server/tissue/world/state_archive.h"
@@ -20,7 +21,7 @@ namespace trocar::world {
 
 enum class NodeClass : std::uint8_t {
   Fixed = 0,   // held by ligaments: never moves
-  Outer = 1,   // away from all contacts: at rest (Frozen), or swept less (Graded)
+  Far = 1,     // away from all contacts: at rest (Frozen), or swept less (Graded)
   Active = 2,  // in the queue, or not long ago
 };
 
@@ -60,6 +61,10 @@ struct World {
   std::vector<std::uint16_t> quiet_ticks;  // ticks in a row below the freezing thresholds
   FarPoses far_poses;                      // about which the far field is linear
   RelaxationState relaxation;              // of stresses, per tet
+
+  // Brings all arrays up to date with an edit of the topology. Nodes whose elements have changed
+  // are active: what a wound sets free is swept like what is touched, for a while.
+  void apply(const topology::Edit& edit);
 
   // A node between a and b, t/65536 of the way from a; a copy of a where b is a. Moves with them,
   // fixed where both are, with no mass and no surface yet.

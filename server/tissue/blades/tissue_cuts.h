@@ -1,0 +1,95 @@
+#pragma once
+
+// The organ as it has been cut and torn: topology, blades at work in it, the surface that follows,
+// and the list of all edits. That list is the state: who applies it to the organ has the same
+// topology, surface and slots again. The tick hash covers a hash of it.
+//
+// An organ with links, or without tets, cannot be cut: claims to cut it are granted and do nothing.
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "common/base/ids.h"
+#include "common/base/tick.h"
+#include "common/wire/surface_layout.h"
+#include "server/tissue/blades/blades.h"
+#include "server/tissue/blades/cut_report.h"
+#include "server/tissue/cutting/cutter.h"
+#include "server/tissue/cutting/tearing.h"
+#include "server/tissue/hands/claims.h"
+#include "server/tissue/hands/tool_table.h"
+#include "server/tissue/topology/surface_mesh.h"
+#include "server/tissue/world/world.h"
+
+namespace trocar::blades {
+
+class TissueCuts {
+ public:
+  explicit TissueCuts(const organ::Organ& organ);
+
+  bool can_cut() const { return cutter_ != nullptr; }
+  const topology::Topology& topology() const { return topology_; }
+  const wire::SurfaceLayout& layout() const { return layout_; }
+  // Of the tissue on a blade, N, world frame.
+  Vec3f force_n(ToolSlot tool) const { return blades_[tool].force_n; }
+
+  // What is stretched too far around these nodes tears in the next cut().
+  void tear(const world::World& world, std::span<const NodeIndex> nodes);
+  bool can_tear() const { return can_cut() && tearing_.is_possible(); }
+
+  // Blades of claims in effect go where their tools are; then what they cross is cut. An edit, if
+  // the topology has changed: it is to be handed to all who follow it, among them extend_layout();
+  // then end_edit() is due.
+  // travel_m: a sum over ticks of the farthest that any node has moved.
+  std::optional<topology::Edit> cut(const hands::ToolTable& tools, const hands::ClaimTable& claims,
+                                    const world::World& world, double travel_m, CutReport& report);
+  void end_edit() { topology_.clear_changes(); }
+  // Gives what has come to the surface its slots and numbers. The world has applied the edit.
+  void extend_layout(const topology::Edit& edit, const world::World& world);
+
+  // All edits, oldest first.
+  std::span<const cutting::CutEvents> history() const { return history_; }
+
+  // Takes the place of another state of the same organ: clients know that one's surface. Blades are
+  // lifted.
+  void replace(const TissueCuts& before);
+
+  // After that, once: the surface as it is, which no change leads to; else null.
+  std::shared_ptr<const wire::SurfaceLayout> take_new_layout();
+  // What has changed since the last call, for clients, or null. Before a frame is published.
+  std::shared_ptr<const wire::SurfaceChange> take_change();
+
+  // History, strokes and forces. Each edit that is read goes to hand_out, as those of cut() do.
+  using HandOut = std::function<void(const topology::Edit&)>;
+  void visit_state(world::StateArchive& archive, const HandOut& hand_out);
+
+ private:
+  bool is_full() const;
+  void measure_friction(const hands::ToolTable& tools, const world::World& world, double travel_m);
+  void forget_pending();
+  void record(cutting::CutEvents events);
+  topology::Edit edit();
+  void name_region(std::uint16_t material);
+  void read_history(world::StateArchive& archive, std::uint32_t count, const HandOut& hand_out);
+
+  topology::Topology topology_;
+  std::unique_ptr<cutting::Cutter> cutter_;
+  cutting::Tearing tearing_;
+  topology::SurfaceMesh surface_;
+  wire::SurfaceLayout layout_;
+  std::vector<cutting::CutEvents> history_;
+  std::uint32_t published_ = 0;  // edits of history_ that clients know
+  bool is_new_to_clients_ = false;
+  std::uint64_t history_hash_ = 0;
+  BladeTable blades_;
+  wire::SurfaceChange pending_;
+  std::uint32_t first_pending_ = 0;  // number of pending_.added[0]
+  // Scratch.
+  cutting::CutOutput output_;
+  std::vector<topology::NewNode> new_nodes_;
+};
+
+}  // namespace trocar::blades

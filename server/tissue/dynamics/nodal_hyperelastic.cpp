@@ -1,0 +1,102 @@
+#include "server/tissue/dynamics/nodal_hyperelastic.h"
+
+namespace trocar::dynamics {
+
+template <typename Law>
+NodalHyperelastic<Law>::NodalHyperelastic(const topology::Topology& topology, const Groups& groups,
+                                          const NodalStrain& strain,
+                                          const HyperelasticParameters& of_law, const Law& law)
+    : nodal_strain_(strain), law_(law) {
+  for (std::size_t m = 0; m < of_law.size(); ++m) {
+    const auto& material = organ::material_at(topology.organ(), static_cast<std::uint16_t>(m));
+    is_of_law_.push_back(of_law[m].has_value());
+    has_others_ |=
+        !of_law[m] && material::is_hyperelastic(material) && material.has_averaged_strain;
+  }
+  if (!has_others_) return;
+  is_own_.resize(3 * groups.slot_count());
+  for (Slot slot = 0; slot < groups.slot_count(); ++slot) set(groups, slot);
+}
+
+template <typename Law>
+void NodalHyperelastic<Law>::set(const Groups& groups, Slot slot) {
+  const auto node = groups.node_at(slot);
+  const auto material = node.is_valid() ? nodal_strain_.material_of(node) : NodalStrain::kNone;
+  is_own_[3 * slot] = material != NodalStrain::kNone && is_of_law_[material] ? 1.0f : 0.0f;
+}
+
+template <typename Law>
+void NodalHyperelastic<Law>::rebuild(const Groups& groups, std::span<const GroupLanes> lanes) {
+  if (!has_others_) return;
+  is_own_.resize(3 * groups.slot_count());
+  for (const auto group_lanes : lanes)
+    for (std::size_t lane = 0; lane < kLanes; ++lane)
+      if (group_lanes.has(lane)) set(groups, static_cast<Slot>(group_lanes.group * kLanes + lane));
+}
+
+template <typename Law>
+void NodalHyperelastic<Law>::add(Group group, NodeStep8& step) const {
+  // Sums live in registers: in `step` they would be stored and loaded again row after row.
+  Vec8 gradient = step.gradient;
+  SymMat8 block = step.block;
+  Float8 identity = all(0);
+  for (const auto& row : nodal_strain_.rows(group)) {
+    const auto f = nodal_strain_.gradient_at(row.domain);
+    const auto& [f0, f1, f2] = f.rows;
+    Vec8 b = load(row.part);
+    if (has_others_) b = b * gather(is_own_.data(), row.domain);
+    const Vec8 k0 = cross8(f1, f2), k1 = cross8(f2, f0), k2 = cross8(f0, f1);  // cofactors
+    const Vec8 fb{dot8(f0, b), dot8(f1, b), dot8(f2, b)};
+    const Vec8 kb{dot8(k0, b), dot8(k1, b), dot8(k2, b)};
+    const Float8 pressure = fma8(f.bulk, dot8(f0, k0) - all(1), all(0) - f.two_c10);
+    gradient = fma8(kb, pressure, gradient);
+    block.add_outer(kb, f.bulk * f.inverse_volume);
+    const Float8 squared = dot8(b, b) * f.inverse_volume;
+    if constexpr (Law::kIsLinear) {
+      gradient = fma8(fb, f.two_c10, gradient);
+      identity = fma8(squared, f.two_c10, identity);
+    } else {
+      const Float8 i1 = dot8(f0, f0) + (dot8(f1, f1) + dot8(f2, f2));
+      Float8 first, second;
+      law_.derivatives(i1 - all(3), first, second);
+      first = first * f.two_c10;
+      gradient = fma8(fb, first, gradient);
+      identity = fma8(squared, first, identity);
+      block.add_outer(fb, second * f.two_c10 * (f.inverse_volume + f.inverse_volume));
+    }
+  }
+  block.add_identity(identity);
+  step = {gradient, block};
+}
+
+template <typename Law>
+void NodalHyperelastic<Law>::add_energies_j(std::span<const Vec3d> displacements,
+                                            std::span<double> energies) const {
+  for (Slot own = 0; own < nodal_strain_.slot_count(); ++own) {
+    const NodalStrain::Domain& rest = nodal_strain_.at_rest(own);
+    if (rest[0].w == 0 || (has_others_ && is_own_[3 * own] == 0)) continue;
+    std::array<Vec3d, 3> f;
+    for (std::size_t r = 0; r < 3; ++r) f[r] = to_double(to_vec3(rest[r]));
+    for (const auto& member : nodal_strain_.members(own / kLanes)) {
+      const std::size_t lane = own % kLanes;
+      const Vec3d u = displacements[member.node.v[lane]] - displacements[own];
+      const Vec3d b = to_double(member.part.at(lane));
+      f[0] += b * u.x, f[1] += b * u.y, f[2] += b * u.z;
+    }
+    const double inverse_volume = static_cast<double>(rest[0].w);
+    for (auto& row : f) row = row * inverse_volume;
+    f[0].x += 1, f[1].y += 1, f[2].z += 1;
+    const double growth = dot(f[0], cross(f[1], f[2])) - 1;
+    const double e = length_squared(f[0]) + length_squared(f[1]) + length_squared(f[2]) - 3;
+    double psi = e;  // over C10
+    if constexpr (!Law::kIsLinear) psi = law_.energy(e);
+    const auto two_c10 = static_cast<double>(rest[1].w), bulk = static_cast<double>(rest[2].w);
+    energies[own] += (two_c10 * (psi / 2 - growth) + bulk / 2 * growth * growth) / inverse_volume;
+  }
+}
+
+template class NodalHyperelastic<NeoHookeanLaw>;
+template class NodalHyperelastic<ReducedPolynomialLaw>;
+template class NodalHyperelastic<ExponentialLaw>;
+
+}  // namespace trocar::dynamics

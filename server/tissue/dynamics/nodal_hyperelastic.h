@@ -1,0 +1,57 @@
+#pragma once
+
+// Hyperelastic tissue whose strain is averaged: a smoothing domain of stress-free volume V and
+// deformation gradient F (nodal_strain.h) has the energy
+//   V [s (Psi(I1) - 2 C10 (J - 1)) + K/2 (J - 1)^2],   I1 = |F|^2, J = det F,
+// with s = NodalStrain::kAveragedBracket; the tets have the rest (hyperelastic.h). J is affine in
+// each node, so that a node's block is exact and positive definite, as that of tets is. Constant
+// strain is exact (patch test). Work per node and sweep: its neighbours.
+
+#include "server/tissue/dynamics/energy.h"
+#include "server/tissue/dynamics/nodal_strain.h"
+#include "server/tissue/dynamics/psi.h"
+
+namespace trocar::dynamics {
+
+// As Energy, of smoothing domains where they are.
+class NodalStrainEnergy {
+ public:
+  NodalStrainEnergy() = default;
+  NodalStrainEnergy(const NodalStrainEnergy&) = delete;
+  NodalStrainEnergy& operator=(const NodalStrainEnergy&) = delete;
+  virtual ~NodalStrainEnergy() = default;
+
+  virtual void add(Group group, NodeStep8& step) const = 0;
+  virtual void add_energies_j(std::span<const Vec3d> displacements,
+                              std::span<double> energies) const = 0;
+  virtual void rebuild(const Groups& groups, std::span<const GroupLanes> lanes) = 0;
+};
+
+template <typename Law>
+class NodalHyperelastic final : public NodalStrainEnergy {
+ public:
+  // Of smoothing domains whose material has this law; the smoothing domains must outlive it.
+  NodalHyperelastic(const topology::Topology& topology, const Groups& groups,
+                    const NodalStrain& strain, const HyperelasticParameters& of_law,
+                    const Law& law = {});
+
+  void add(Group group, NodeStep8& step) const override;
+  void add_energies_j(std::span<const Vec3d> displacements,
+                      std::span<double> energies) const override;
+  void rebuild(const Groups& groups, std::span<const GroupLanes> lanes) override;
+
+ private:
+  void set(const Groups& groups, Slot slot);
+
+  const NodalStrain& nodal_strain_;
+  const Law law_;
+  std::vector<std::uint8_t> is_of_law_;  // per material, as organ::material_at() counts
+  bool has_others_ = false;              // smoothing domains of another law
+  std::vector<float> is_own_;            // three per slot, 1 or 0; empty unless has_others_
+};
+
+extern template class NodalHyperelastic<NeoHookeanLaw>;
+extern template class NodalHyperelastic<ReducedPolynomialLaw>;
+extern template class NodalHyperelastic<ExponentialLaw>;
+
+}  // namespace trocar::dynamics

@@ -1,0 +1,32 @@
+#include "server/tissue/step/edit_followers.h"
+
+namespace trocar::step {
+
+void hand_out(const topology::Edit& edit, State& state) {
+  state.world.apply(edit);
+  state.cuts.extend_layout(edit, state.world);
+  state.quantised.resize(state.cuts.layout().vertex_count());
+  for (const auto& made : edit.new_nodes) {
+    state.claims.add_node(made.a, made.b);
+    if (made.is_copy()) state.grasps.add_copy(made.a, made.node);
+  }
+}
+
+void hand_out(const topology::Edit& edit, const world::World& world, StepContext& context) {
+  context.neighbours.take_changed(edit.topology);
+  context.queue.forget(world.node_count());
+  context.active.forget();
+  context.finder.follow(edit.surface, world);
+  context.self_finder.follow(edit.surface, world);
+  context.solver.follow_topology(edit.topology, world);  // and with it its far field
+}
+
+void hand_out(const topology::Edit& edit, State& state, StepContext& context) {
+  // The far field's nodes are given back first: new ones lie between nodes where these are.
+  if (state.far_model) state.far_model->stop_for(edit, context.solver, state.world);
+  hand_out(edit, state);
+  hand_out(edit, state.world, context);
+  context.solver.refresh_relaxed_forces(state.world);
+}
+
+}  // namespace trocar::step
