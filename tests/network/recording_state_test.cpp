@@ -7,6 +7,7 @@
 #include <filesystem>
 
 #include "server/session/recording/recorder.h"
+#include "server/tissue/world/surface_layout.h"
 #include "tests/network/session_fixture.h"
 
 namespace trocar::testing {
@@ -25,7 +26,7 @@ class RecordingStates : public ::testing::Test {
   RecordingStates() {
     std::filesystem::create_directories(folder_);
     auto made = recording::Recorder::create((folder_ / "session.mcap").string(), organ_,
-                                            wire::make_surface_layout(organ_));
+                                            world::make_surface_layout(organ_));
     EXPECT_TRUE(made.ok());
     recorder_ = std::move(*made);
     tell();

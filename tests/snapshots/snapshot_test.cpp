@@ -18,8 +18,8 @@ SnapshotFigures run(SnapshotScene scene, std::uint64_t seed, std::uint64_t snaps
 TEST(Snapshots, OfRandomSessionsAreReadAndContinuedBitForBit) {
   SnapshotFigures all;
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
-    all += run(random_scene(SnapshotOrgan::Liver, seed), seed, 15);
-    all += run(random_scene(SnapshotOrgan::MeasuredLiver, seed), seed, 10);
+    all += run(random_scene(SnapshotOrgan::Liver, seed), seed, 20);
+    all += run(random_scene(SnapshotOrgan::MeasuredLiver, seed), seed, 5);
   }
   all += run(random_scene(SnapshotOrgan::Plate, 1), 1, 10);
   all += run(random_scene(SnapshotOrgan::Lattice, 1), 1, 10);
