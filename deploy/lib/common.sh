@@ -21,6 +21,14 @@ need_value() {
   [ $# -ge 2 ] && [ -n "$2" ] || fail 2 "$1: needs a value, see $program --help"
 }
 
+# commit: of the sources, with a + if they are changed.
+commit() {
+  local id
+  id=$(git -C "$root" rev-parse --short=12 HEAD 2>/dev/null) || { printf unknown; return; }
+  git -C "$root" diff --quiet HEAD 2>/dev/null || id+=+
+  printf '%s' "$id"
+}
+
 # absolute PATH: relative to where the person is, not to the repository.
 absolute() {
   case $1 in

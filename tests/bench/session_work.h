@@ -22,7 +22,7 @@ struct SessionCase {
 };
 Work run_session(organ::Organ organ, std::vector<BenchTool> tools, const SessionCase& session_case);
 // Whole graded ticks, with the solve told apart into near and far: near is what the same ticks cost
-// with everything outside the queue frozen, far is the rest. Needs as many steps again at the end.
+// with everything outside the queue frozen, run beside it tick by tick; far is the rest.
 Work run_graded_session(organ::Organ organ, std::vector<BenchTool> tools, SessionOptions options);
 Row row_of(const organ::Organ& organ, std::string group, std::string object, std::string solver);
 

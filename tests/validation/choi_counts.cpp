@@ -61,13 +61,14 @@ void run_eq2(const Lab& lab, Section& section) {
     table.rows.push_back(row);
   }
   section.exactly("depth-10", std::to_string(kPaperNodes), std::to_string(at_paper_depth),
-                  "Nodes at depth 10, which the paper prints.");
+                  paper(0, "equation 2 at n = 10"), "Nodes at depth 10, which the paper prints.");
   section.exactly("surface", "0 of 12 depths differ",
                   fmt::format("{} of 12 depths differ", wrong_surface),
+                  law(0, "equation 2, a count of layers"),
                   "Equation 2 for a node of the surface, n = 1 to 12.");
-  section.exactly("inside", "0 of 7 depths differ",
-                  fmt::format("{} of 7 depths differ", wrong_inside),
-                  "The formula for an inner node, n = 1 to 7.");
+  section.exactly(
+      "inside", "0 of 7 depths differ", fmt::format("{} of 7 depths differ", wrong_inside),
+      law(0, "the same count without a surface"), "The formula for an inner node, n = 1 to 7.");
   section.add(std::move(table));
 }
 
@@ -163,7 +164,8 @@ void run_fig6_times(const Lab& lab, Section& section) {
   }
   const auto below = [&](const char* what, double paper_ms, double ours_ms, const char* note) {
     section.checks.push_back({section.name + "/" + what, fmt::format("{:g} ms", paper_ms),
-                              shown(ours_ms) + " ms", ours_ms, paper_ms, false, note});
+                              shown(ours_ms) + " ms", ours_ms,
+                              paper(paper_ms, "figure 6, its own time"), false, note});
   };
   below("step-at-891-nodes", 5, at_paper_depth,
         "CPU time of a step at depth 10, in ms; the bound is the paper's own time.");

@@ -90,12 +90,14 @@ void run_fig2_users(const Lab& lab, Section& section) {
 
   const Field ours = field_of(*joint), reference = field_of(*one);
   section.at_most("displacement", "one region that covers all",
-                  largest_difference(ours, reference) / largest(reference), 1e-3,
+                  largest_difference(ours, reference) / largest(reference),
+                  law(1e-3, "one problem has one equilibrium"),
                   "Largest difference of any node's displacement, over the largest displacement.");
   double worst = 0;
   for (std::size_t i = 0; i < 3; ++i)
     worst = std::max(worst, length(joint->probe(i) - one->probe(i)) / length(one->probe(i)));
-  section.at_most("tool-forces", "one region that covers all", worst, 1e-3,
+  section.at_most("tool-forces", "one region that covers all", worst,
+                  law(1e-3, "one problem has one equilibrium"),
                   "Largest difference of any tool's force, over that force.");
 
   const auto node = [](int i, int k) {
@@ -115,6 +117,7 @@ void run_fig2_users(const Lab& lab, Section& section) {
         {std::to_string(depth), std::to_string(ours_count), std::to_string(expected)});
   }
   section.exactly("merging", "0 of 6 depths differ", fmt::format("{} of 6 depths differ", wrong),
+                  law(0, "sets of nodes that meet are one"),
                   "Regions become one exactly when they have a node in common.");
   section.add({.title = "Force on each tool",
                .x = {"time, s"},

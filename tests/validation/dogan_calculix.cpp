@@ -128,7 +128,8 @@ void compare(const Lab& lab, Section& section, Table& table, const Case& c) {
   const double error =
       theirs && ours.is_converged ? field_error(ours.field, *theirs) : std::nan("");
   if (!theirs) section.say("CalculiX: " + theirs.error().message);
-  section.at_most(c.name(), theirs ? shown(largest(*theirs) * 1e3) + " mm" : "none", error, kBound,
+  section.at_most(c.name(), theirs ? shown(largest(*theirs) * 1e3) + " mm" : "none", error,
+                  law(kBound, "the same discrete equations"),
                   "Field of displacements of all nodes, middle ones too, against CalculiX.");
   table.rows.push_back(
       {c.setting.title, c.order == ElementOrder::Linear ? "linear" : "quadratic",

@@ -39,11 +39,11 @@ constexpr double kPaper_mm = 4.5, kPaperHalf_mm = 2.1;
 // The part of the force at which tissue is linear.
 constexpr double kSmallPart = 0.01;
 
-// Live against off-line, measured: 2 % while tissue swings, 0.5 % from 0.5 s on, 0.1 % at the end.
-// A held body is no half-space: 5 % off. The paper's force, place and mesh are unknown, so that its
-// ratio is met in kind alone.
-constexpr double kLiveBound = 0.03, kLiveEndBound = 0.01, kRelaxedBound = 0.08, kStepsBound = 0.005,
-                 kHalfForceBound = 0.15;
+// What sessions aim at, and what swinging tissue is known to miss it by.
+constexpr double kLiveTarget = 0.01, kLiveOnRecord = 0.03;
+// A point force on a half-space, which the held body is not.
+constexpr double kRelaxedBound = 0.05, kRelaxedOnRecord = 0.08;
+constexpr double kStepsBound = 0.005;
 
 struct Steps {
   int count;
@@ -277,7 +277,8 @@ std::vector<Creep> show_places(Section& section, const Study& study) {
     places.series.push_back(
         curve(fmt::format("place {}", place + 1), creep, plot::Style::Line, {}));
     section.exactly(name_of(study, "rises-") + std::to_string(place + 1), "yes",
-                    creep.rises() ? "yes" : "no", "The displacement grows in every step.");
+                    creep.rises() ? "yes" : "no", law(0, "relaxation under a constant force"),
+                    "The displacement grows in every step.");
   }
   plot::Plot neighbours{.title = "Place 1 and nodes of the surface around it",
                         .x = {"time, s"},
@@ -311,9 +312,11 @@ void show_half_force(const Lab& lab, Section& section, const Study& study) {
     const double pressed = ratio(place, kForce_n, ElementOrder::Linear);
     ratio(place, -kForce_n, ElementOrder::Linear);
     if (place == 0)
-      section.compare(
-          name_of(study, "half-force"), kPaperHalf_mm / kPaper_mm, pressed, kHalfForceBound, "",
-          "Displacement at half of the force over that at the whole, place 1, pressed.");
+      section.measured(name_of(study, "half-force"), shown(pressed),
+                       fmt::format("Displacement at half of the force over that at the whole, "
+                                   "place 1, pressed. The paper's is {}; its force, place and "
+                                   "mesh are unknown, ours are chosen.",
+                                   shown(kPaperHalf_mm / kPaper_mm)));
   }
   if (!lab.is_short()) ratio(0, kForce_n, ElementOrder::Quadratic);
   table.rows.push_back({"paper's", "not stated", shown(kPaper_mm), shown(kPaperHalf_mm),
@@ -353,10 +356,12 @@ void show_two_loads(Section& section, const Study& study, const Creep& whole) {
   }
   section.add(std::move(table));
   section.at_most(name_of(study, "live"), "off-line with inertia",
-                  curve_error(live, moving, kSwings_s), kLiveBound,
+                  curve_error(live, moving, kSwings_s),
+                  target(kLiveTarget, "1 % of the converged solution").missed(kLiveOnRecord),
                   "Live solver, same mesh and elements, largest difference from 0.2 s on.");
-  section.compare(name_of(study, "live-end"), moving.at_mm(end), live.at_mm(end), kLiveEndBound,
-                  "mm", "The same at the end.");
+  section.compare(name_of(study, "live-end"), moving.at_mm(end), live.at_mm(end),
+                  target(kLiveTarget, "1 % of the converged solution"), "mm",
+                  "The same at the end.");
 }
 
 // How much farther a half-space under a point force is after all relaxation than at once: (1 - nu)
@@ -384,7 +389,8 @@ void show_relaxed(const Lab& lab, Section& section, const Study& study) {
                           shown(length(creep.moves.back()[0]) * 1e6),
                           shown(creep.last_over_first()), shown(expected)});
     if (!is_linear)
-      section.compare(name_of(study, "relaxed"), expected, creep.last_over_first(), kRelaxedBound,
+      section.compare(name_of(study, "relaxed"), expected, creep.last_over_first(),
+                      law(kRelaxedBound, "Boussinesq, only shear relaxes").missed(kRelaxedOnRecord),
                       "",
                       "A hundredth of the force, quadratic elements: displacement after all "
                       "relaxation over that at once, against a half-space under a point force.");
@@ -394,8 +400,9 @@ void show_relaxed(const Lab& lab, Section& section, const Study& study) {
   const double end = study.seconds();
   const auto creep = study.off_line({0}, Way::Slowly),
              longer = study.off_line({0}, Way::Slowly, ElementOrder::Linear, 2);
-  section.compare(name_of(study, "time-steps"), creep.at_mm(end), longer.at_mm(end), kStepsBound,
-                  "mm", "Off-line with steps of time twice as long.");
+  section.compare(name_of(study, "time-steps"), creep.at_mm(end), longer.at_mm(end),
+                  target(kStepsBound, "steps of time do not show"), "mm",
+                  "Off-line with steps of time twice as long.");
 }
 
 }  // namespace
@@ -413,7 +420,7 @@ void run_dogan_creep(const Lab& lab, Section& section) {
       "compared. Ours: {} N along the inward normal, spread over the surface nodes within {} mm; "
       "table 1 with K = 40 C10, plain linear tets, which lock (see dogan2011/locking).",
       kForce_n, kRadius_mm));
-  for (const auto& liver : measured_livers(lab, section)) {
+  for (const auto& liver : measured_livers(lab)) {
     const Study study(lab, section, liver);
     const auto places = show_places(section, study);
     show_half_force(lab, section, study);

@@ -22,9 +22,9 @@ namespace {
 
 // What is aimed at: 1 % and 1 ms.
 constexpr double kErrorTarget = 0.01, kTickTarget_ms = 1, kBudget_ms = 0.8;
-// What is kept: plain tets miss the 1 % by little. Measured, of
-// displacement and force: 1.01 and 0.85 %, imported liver 1.18 and 1.15 % (averaged: 0.7 %).
-constexpr double kPlainBound = 0.015;
+constexpr double kReferenceTarget = kErrorTarget / 5;
+// Plain tets are known to miss it by little.
+constexpr double kPlainOnRecord = 0.015;
 constexpr float kToolRadius_m = 0.008f, kDeep_m = 0.010f, kAbove_m = 0.003f;
 constexpr Tick kSampleTicks = 8;
 constexpr std::uint64_t kSeed = 2011;
@@ -58,14 +58,12 @@ struct Course {
 };
 
 // How a tick decides.
-enum class Detail { Fixed, ExactFar, Controlled, Converged, TwiceConverged };
+enum class Detail { Fixed, ExactFar, Controlled, Converged };
 
-step::TickDecisions decisions_of(Detail detail) {
+step::TickDecisions decisions_of(Detail detail, std::uint32_t converged_sweeps) {
   if (detail == Detail::Fixed || detail == Detail::Controlled) return {};
   if (detail == Detail::ExactFar) return {.is_far_exact = true};
-  auto decisions = calibration::full_decisions();
-  if (detail == Detail::TwiceConverged) decisions.sweeps *= 2;
-  return decisions;
+  return calibration::full_decisions(converged_sweeps);
 }
 
 class Hand {
@@ -78,7 +76,7 @@ class Hand {
     step::Simulation simulation(organ_);
     std::optional<control::RateController> controller;
     if (detail == Detail::Controlled)
-      controller.emplace(control::RateLimits{.highest = decisions_of(detail),
+      controller.emplace(control::RateLimits{.highest = decisions_of(detail, converged_sweeps_),
                                              .layer_sweeps = simulation.context().far_plan.sweeps,
                                              .far_interval = control::kLongestFarInterval,
                                              .budget_us = kBudget_ms * 1e3});
@@ -90,8 +88,8 @@ class Hand {
     for (Tick tick = 1; tick <= ticks; ++tick) {
       if (tick % kSampleTicks == 1) inputs.samples.push_back(sample_at(tick));
       const auto begin = thread_cpu_ns();
-      const auto& report =
-          simulation.tick(inputs, controller ? controller->decisions() : decisions_of(detail));
+      const auto& report = simulation.tick(
+          inputs, controller ? controller->decisions() : decisions_of(detail, converged_sweeps_));
       const auto cpu_ns = thread_cpu_ns() - begin;
       inputs.clear();
       simulation.take_frame();
@@ -104,6 +102,11 @@ class Hand {
     return course;
   }
   Course press(Detail detail) const { return press(detail, ticks_); }
+
+  // Doubles the reference's sweeps while half of them differ by more than the tolerance in the
+  // force of the first press; how much half of them differ in the end.
+  double converge(double tolerance);
+  std::uint32_t converged_sweeps() const { return converged_sweeps_; }
 
  private:
   hands::ToolInput sample_at(Tick tick) const {
@@ -124,6 +127,7 @@ class Hand {
   const organ::Organ& organ_;
   const calibration::Place place_;
   const Tick ticks_;
+  std::uint32_t converged_sweeps_ = calibration::kFullSweeps;
 };
 
 double percentile(std::vector<double> values, double share) {
@@ -160,6 +164,18 @@ Error error_of(const std::vector<Vec3d>& ours, const std::vector<Vec3d>& referen
   return {sum / reference_sum, percentile(differences, 0.95), percentile(differences, 1)};
 }
 
+double Hand::converge(double tolerance) {
+  converged_sweeps_ = calibration::kFullSweeps / 2;
+  auto half = press(Detail::Converged, ticks_ / 4);
+  for (;;) {
+    converged_sweeps_ *= 2;
+    auto course = press(Detail::Converged, ticks_ / 4);
+    const double change = error_of(half.forces_n, course.forces_n, course.forces_n).worst;
+    if (change <= tolerance || 2 * converged_sweeps_ > step::kMaxSweeps) return change;
+    half = std::move(course);
+  }
+}
+
 struct Study {
   Table table{
       "One hand on the measured liver: displacement and force at the contact against the "
@@ -189,7 +205,8 @@ void measure(const Lab& lab, Section& section, const MeasuredLiver& liver, bool 
   auto organ = liver.organ;
   organ.material.has_averaged_strain = is_averaged;
   const Tick ticks = lab.is_short() ? 400 : 1500;
-  const Hand hand(organ, ticks);
+  Hand hand(organ, ticks);
+  const double own_error = hand.converge(kReferenceTarget);
   const auto reference = hand.press(Detail::Converged);
   const auto errors = [&](const Course& course) {
     return std::pair{error_of(course.moves_m, reference.moves_m, reference.forces_n),
@@ -206,19 +223,24 @@ void measure(const Lab& lab, Section& section, const MeasuredLiver& liver, bool 
   const auto [controlled_move, controlled_force] = errors(controlled);
   add_row(study, liver, strain, "rate controller, 0.8 ms", controlled, controlled_move,
           controlled_force);
-  if (lab.is_short()) {
-    // How converged the reference is.
-    const auto twice = hand.press(Detail::TwiceConverged, ticks / 4);
-    const auto [rest_move, rest_force] = errors(twice);
-    add_row(study, liver, strain, "twice the reference's sweeps", twice, rest_move, rest_force);
-  }
   const auto name = [&](const char* what) {
     return fmt::format("{}-{}-{}", liver.name, strain, what);
   };
-  const double bound = is_averaged ? kErrorTarget : kPlainBound;
-  section.at_most(name("displacement"), "its converged solution", move.p95, bound,
+  section.at_most(
+      name("reference"), "half of the sweeps", own_error,
+      target(kReferenceTarget, "a fifth of what the reference judges"),
+      fmt::format("Largest change of the force of the first press by the second half of "
+                  "the reference's {} sweeps a tick.",
+                  hand.converged_sweeps()));
+  const auto aim = target(kErrorTarget, "1 % of the converged solution");
+  // Of plain tets the coarse liver of the short form misses it with the force, the other with the
+  // displacement.
+  const auto bound = [&](bool is_missed) {
+    return is_missed && !is_averaged ? aim.missed(kPlainOnRecord) : aim;
+  };
+  section.at_most(name("displacement"), "its converged solution", move.p95, bound(!lab.is_short()),
                   "Displacement at the contact, 95th percentile over ticks.");
-  section.at_most(name("force"), "its converged solution", force.p95, bound,
+  section.at_most(name("force"), "its converged solution", force.p95, bound(lab.is_short()),
                   "Contact force, 95th percentile over ticks.");
   section.add({.title = fmt::format("Contact force, {}, {} strain", liver.title, strain),
                .x = {"time, s"},
@@ -236,14 +258,15 @@ void run_dogan_live(const Lab& lab, Section& section) {
       "A tip of {:.0f} mm presses the measured liver 6 mm in, holds while the tissue relaxes, "
       "presses 10 mm in and leaves, in the ticks of a session. The same hand on the same organ "
       "with "
-      "every node swept {} times a tick is the reference. Errors are over the ticks with force: "
+      "every node swept until more sweeps change little is the reference. Errors are over the "
+      "ticks with force: "
       "the "
       "mean is a sum over a sum, the others are over the reference's largest value. Aimed at: 1 % "
       "(displacement and force, 95th percentile) and 1 ms; times depend on the machine and are no "
       "bound.",
-      1e3 * static_cast<double>(kToolRadius_m), calibration::full_decisions().sweeps));
+      1e3 * static_cast<double>(kToolRadius_m)));
   Study study;
-  for (const auto& liver : measured_livers(lab, section))
+  for (const auto& liver : measured_livers(lab))
     for (const bool is_averaged : {false, true}) measure(lab, section, liver, is_averaged, study);
   section.add(std::move(study.table));
 }

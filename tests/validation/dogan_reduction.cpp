@@ -26,10 +26,8 @@ constexpr std::size_t kPaperModes = 8;
 constexpr std::array<std::size_t, 7> kModes{1, 2, 4, 8, 16, 32, 64};
 constexpr std::size_t kOwnPlaces = 3, kOwnSteps = 12;
 constexpr int kSolves = 2000;
-// Measured: 20.1 and 17.9 % on the two livers, 34 % on the coarse one with few snapshots.
-constexpr double kEightBound = 0.25, kShortEightBound = 0.4;
-// Measured: 34 % where a thin edge bends by 19 mm at once, 4 to 12 % elsewhere.
-constexpr double kScalingBound = 0.4;
+// On record: the coarse liver with few snapshots, and creep where a thin edge bends by 19 mm.
+constexpr double kShortEightOnRecord = 0.4, kScalingOnRecord = 0.4;
 
 Settings settings_of(const Lab& lab) {
   Settings settings{.modes = kModes.back(), .places = 30, .magnitudes = 2, .creep_nodes = 6};
@@ -107,7 +105,6 @@ void Study::show_modes() {
                        shown_percent(e.worst));
   };
   std::vector<Quality> qualities;
-  bool tangents_hold = true;
   for (const auto modes : kModes) {
     const auto made = built(modes);
     // No more than the snapshots span.
@@ -123,12 +120,12 @@ void Study::show_modes() {
       plot.series[i].x.push_back(static_cast<double>(modes));
       plot.series[i].y.push_back(100 * values[i]);
     }
-    tangents_hold = tangents_hold && made.best_error <= made.initial_error;
     if (modes != kPaperModes) continue;
     eight_ = made.reduction;
     section_.at_most(
         name("eight-modes"), shown_percent(kPaperInitial), q.initial.field.mean,
-        is_short_ ? kShortEightBound : kEightBound,
+        is_short_ ? paper(kPaperInitial, "section 4").missed(kShortEightOnRecord)
+                  : paper(kPaperInitial, "section 4"),
         "Eight modes, initial tangent, loads outside the training: mean L2. The paper's "
         "is on a load of the training.");
   }
@@ -139,11 +136,9 @@ void Study::show_modes() {
                         "on its own load", ""});
   section_.add(std::move(table));
   section_.add(std::move(plot));
-  section_.exactly(name("best-tangent"), "yes", tangents_hold ? "yes" : "no",
-                   "On the training the best of the stored tangents errs no more than the initial "
-                   "one, with every number of modes.");
   section_.at_least(name("modes"), "less error than with 1",
-                    qualities.front().initial.field.mean / qualities.back().initial.field.mean, 1,
+                    qualities.front().initial.field.mean / qualities.back().initial.field.mean,
+                    target(1, "modes are of use"),
                     "Initial tangent, loads outside the training: error of 1 mode over that of the "
                     "most.");
 }
@@ -188,9 +183,10 @@ void Study::show_own_load() {
     return errors.size() == kOwnPlaces ? errors_of(errors).mean : std::nan("");
   };
   section_.at_most(name("own-load-initial"), shown_percent(kPaperInitial), mean(initial),
-                   kPaperInitial,
+                   paper(kPaperInitial, "section 4"),
                    "The paper's case, its error with the initial tangent: L2, mean of the places.");
-  section_.at_most(name("own-load-best"), shown_percent(kPaperBest), mean(best), kPaperBest,
+  section_.at_most(name("own-load-best"), shown_percent(kPaperBest), mean(best),
+                   paper(kPaperBest, "section 4"),
                    "The same with the best of the stored tangents.");
 }
 
@@ -201,7 +197,6 @@ void Study::show_half_force() {
   Table table{fmt::format("Half of the force, loaded node, mm: {}", liver_.title),
               {"place", "full, whole", "half", "ratio", "reduced, whole", "half", "ratio"},
               {}};
-  double worst = 0;
   for (std::size_t place = 0; place < kOwnPlaces; ++place) {
     const auto node = training_.places[place];
     const Press press{node, normals[node.value] * -settings_.force_n, settings_.radius_m};
@@ -213,16 +208,12 @@ void Study::show_half_force() {
       const auto forces = node_forces(liver_.organ, {node, press.force_n * share, press.radius_m});
       return 1e3 * length(reduced.displacement(reduced.solve(forces), node));
     };
-    worst = std::max(worst, std::abs(moves(0.5) / moves(1) - 0.5));
     table.rows.push_back({std::to_string(place + 1), shown(whole), shown(half), shown(half / whole),
                           shown(moves(1)), shown(moves(0.5)), shown(moves(0.5) / moves(1))});
   }
   table.rows.push_back(
       {"paper's", "4.5", "2.1", shown(kPaperFullHalf), "5.28", "2.25", shown(kPaperHalf)});
   section_.add(std::move(table));
-  section_.at_most(name("half-force"), "0.5", worst, 1e-9,
-                   "Equation 14 is linear in the force: the ratio is one half. The paper's 0.426 "
-                   "cannot come of it and of a growth that does not know the force.");
 }
 
 void Study::show_creep() {
@@ -261,7 +252,10 @@ void Study::show_creep() {
   }
   section_.add(std::move(table));
   section_.add(std::move(plot));
-  section_.at_most(name("creep-scaling"), "the full model", scaling, kScalingBound,
+  section_.at_most(name("creep-scaling"), "the full model", scaling,
+                   is_short_
+                       ? paper(kPaperBest, "section 4, the whole error")
+                       : paper(kPaperBest, "section 4, the whole error").missed(kScalingOnRecord),
                    "Growth around the nearest stored node, put on the full model's displacements "
                    "at once: L2 after 20 s, the worst load.");
 }
@@ -298,7 +292,7 @@ void run_dogan_reduction(const Lab& lab, Section& section) {
       "ones with the least mean error on the training.",
       settings.force_n, 1e3 * settings.radius_m, settings.places, settings.directions,
       settings.magnitudes));
-  for (const auto& liver : measured_livers(lab, section)) {
+  for (const auto& liver : measured_livers(lab)) {
     Study study(lab, section, liver);
     study.show_modes();
     study.show_own_load();

@@ -12,7 +12,7 @@ namespace {
 
 constexpr const char* kStyle = R"(
 :root { --ink: #1c2730; --dim: #5c6b77; --line: #dde4ea; --ground: #f5f7f9; --kept: #1a7f4b;
-  --broken: #b3261e; --accent: #0b5c8a; }
+  --broken: #b3261e; --missed: #b26a00; --accent: #0b5c8a; }
 * { box-sizing: border-box; }
 body { margin: 0; background: var(--ground); color: var(--ink);
   font: 16px/1.55 "Segoe UI", "Helvetica Neue", Arial, "DejaVu Sans", sans-serif; }
@@ -40,6 +40,8 @@ table.data th, table.data td { padding-right: 1.6rem; }
 .pill { display: inline-block; border-radius: 99px; padding: 0 .65rem; font-size: .8rem;
   font-weight: 600; color: #fff; background: var(--kept); white-space: nowrap; }
 .pill.broken { background: var(--broken); }
+.pill.missed { background: var(--missed); }
+.pill.measured { background: var(--dim); }
 a { color: var(--accent); }
 figure { margin: 1.2rem 0; }
 figure svg { display: block; max-width: 100%; height: auto; }
@@ -79,9 +81,21 @@ std::string anchor(const std::string& name) {
   return out;
 }
 
-std::string pill(bool is_kept) {
-  return is_kept ? "<span class=\"pill\">kept</span>"
-                 : "<span class=\"pill broken\">not kept</span>";
+std::string pill(Verdict verdict) {
+  const char* style = verdict == Verdict::Kept       ? "pill"
+                      : verdict == Verdict::Missed   ? "pill missed"
+                      : verdict == Verdict::Measured ? "pill measured"
+                                                     : "pill broken";
+  return fmt::format("<span class=\"{}\">{}</span>", style, name_of(verdict));
+}
+
+// Of an experiment: its worst.
+Verdict verdict_of(const Section& section) {
+  const auto counts = count(section.checks);
+  return counts.failed > 0   ? Verdict::Broken
+         : counts.missed > 0 ? Verdict::Missed
+         : counts.kept > 0   ? Verdict::Kept
+                             : Verdict::Measured;
 }
 
 bool is_number(const std::string& text) {
@@ -108,15 +122,18 @@ std::string short_cell(const std::string& text) {
 std::string checks_table(const Section& section) {
   std::string out =
       "<div class=\"table\"><table><tr><th>check</th><th>paper or reference</th><th>ours</th>"
-      "<th class=\"number\">error</th><th class=\"number\">bound</th><th></th></tr>";
+      "<th class=\"number\">error</th><th class=\"number\">bound</th><th>source of the "
+      "bound</th><th></th></tr>";
   for (const auto& check : section.checks) {
     const auto what = check.name.substr(section.name.size() + 1);
     out += fmt::format(
         "<tr><td><code>{}</code><br><span class=\"small dim\">{}</span></td>{}{}"
-        "<td class=\"number\">{}</td><td class=\"number\">{}</td><td>{}</td></tr>",
+        "<td class=\"number\">{}</td><td class=\"number\">{}</td><td "
+        "class=\"small\">{}</td><td>{}</td></tr>",
         escaped(what), escaped(check.note), short_cell(check.expected), short_cell(check.ours),
-        size_of(check.error, check.is_relative), size_of(check.bound, check.is_relative),
-        pill(check.is_kept()));
+        check.has_bound ? size_of(check.error, check.is_relative) : "",
+        check.has_bound ? size_of(check.bound.value, check.is_relative) : "",
+        check.has_bound ? escaped(check.bound.words()) : "", pill(check.verdict()));
   }
   return out + "</table></div>";
 }
@@ -174,29 +191,17 @@ std::string scenes(const Section& section) {
 }
 
 std::string summary(const Report& report) {
-  std::size_t checks = 0, kept = 0;
-  for (const auto& section : report.sections)
-    for (const auto& check : section.checks) {
-      ++checks;
-      kept += check.is_kept() ? 1u : 0u;
-    }
   std::string out = fmt::format(
-      "<div class=\"summary\"><h2>{} of {} bounds kept</h2><div class=\"table\"><table>"
+      "<div class=\"summary\"><h2>{}</h2><div class=\"table\"><table>"
       "<tr><th>experiment</th><th>what</th><th class=\"number\">checks</th>"
       "<th class=\"number\">CPU time</th><th></th></tr>",
-      kept, checks);
+      escaped(totals(report.sections)));
   for (const auto& section : report.sections) {
-    const auto broken = static_cast<std::size_t>(
-        std::count_if(section.checks.begin(), section.checks.end(),
-                      [](const Check& check) { return !check.is_kept(); }));
     out += fmt::format(
         "<tr><td><a href=\"#{}\"><code>{}</code></a></td><td>{}</td><td class=\"number\">{}</td>"
         "<td class=\"number\">{:.1f} s</td><td>{}</td></tr>",
-        anchor(section.name), escaped(section.name), escaped(section.title),
-        broken == 0
-            ? std::to_string(section.checks.size())
-            : fmt::format("{} of {}", section.checks.size() - broken, section.checks.size()),
-        section.seconds, pill(broken == 0));
+        anchor(section.name), escaped(section.name), escaped(section.title), section.checks.size(),
+        section.seconds, pill(verdict_of(section)));
   }
   return out + "</table></div></div>";
 }
@@ -213,7 +218,8 @@ Result<std::string> to_html(const Report& report) {
       "error is relative to the value beside it; a bound is what the tests hold us to, and one "
       "that is not kept says so. Times are of this machine.</p>"
       "<p class=\"small dim\">{} &middot; {} &middot; <code>{}</code>{}</p>",
-      kStyle, escaped(report.date), escaped(report.machine), escaped(report.command),
+      kStyle, escaped(report.date), escaped(report.processor + ", " + report.compiler),
+      escaped(report.command),
       report.is_short ? " &middot; short form: coarser meshes, fewer points" : "");
   out += summary(report);
   for (const auto& section : report.sections) {
@@ -234,9 +240,6 @@ Result<std::string> to_html(const Report& report) {
         out += *svg;
       }
     }
-    if (section.unconverged_steps > 0)
-      out += fmt::format("<p>{} of {} steps did not reach their tolerance.</p>",
-                         section.unconverged_steps, section.steps);
     out += scenes(section) + "</section>";
   }
   return out + "</main></body></html>\n";

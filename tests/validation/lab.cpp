@@ -6,6 +6,8 @@
 #include <cstdio>
 #include <cstdlib>
 
+#include "common/base/bytes.h"
+#include "common/base/checksum.h"
 #include "common/base/timing.h"
 #include "server/organs/organ/organ_file.h"
 
@@ -88,6 +90,10 @@ void Lab::finish(Section& section, ScenarioRun& run,
           100.0 * static_cast<double>(run.steps_done()) / static_cast<double>(run.step_count())));
     }
   }
+  StateHasher hash;
+  hash.update(bytes_of(std::span<const std::uint64_t>(&section.state_hash, 1)));
+  hash.update(bytes_of(run.world().displacements));
+  section.state_hash = hash.digest();
 }
 
 }  // namespace trocar::validation

@@ -24,10 +24,10 @@ std::string live_training_text(const Lab& lab) {
       s.force_n);
 }
 
-std::vector<std::shared_ptr<const LiveLiver>> live_livers(const Lab& lab, Section& section) {
+std::vector<std::shared_ptr<const LiveLiver>> live_livers(const Lab& lab) {
   static std::map<std::string, std::shared_ptr<const LiveLiver>> made;
   std::vector<std::shared_ptr<const LiveLiver>> livers;
-  for (auto& liver : measured_livers(lab, section)) {
+  for (auto& liver : measured_livers(lab)) {
     auto& kept = made[liver.name];
     if (!kept) {
       auto reduction = make_live_reduction(liver.name, liver.organ, live_settings(lab));

@@ -28,7 +28,7 @@ reduce::LocalSettings live_settings(const Lab& lab);
 // One sentence for people.
 std::string live_training_text(const Lab& lab);
 // As measured_livers().
-std::vector<std::shared_ptr<const LiveLiver>> live_livers(const Lab& lab, Section& section);
+std::vector<std::shared_ptr<const LiveLiver>> live_livers(const Lab& lab);
 
 // Root of the sum of squares, m.
 double norm_of(const LiveField& field);

@@ -151,9 +151,16 @@ Script script_of(const Stroke& stroke) {
   return {stroke.ticks(), [stroke](Tick tick) { return stroke.at(tick); }, {}};
 }
 
-Script converged(Script script) {
-  script.decisions = [](Tick) { return calibration::full_decisions(); };
+Script converged(Script script, std::uint32_t sweeps) {
+  script.decisions = [sweeps](Tick) { return calibration::full_decisions(sweeps); };
   return script;
+}
+
+double own_error(const Course& reference, const Course& more) {
+  double most = 0;
+  for (std::size_t i = 0; i < more.ticks.size(); ++i)
+    most = std::max(most, length(reference.ticks[i].force_n - more.ticks[i].force_n));
+  return most / more.largest_force_n();
 }
 
 Course run_session(const organ::Organ& organ,

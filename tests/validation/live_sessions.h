@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "server/lab/calibration/press.h"
 #include "server/lab/reduce/local_build.h"
 #include "server/organs/organ/local_reduction.h"
 #include "server/tissue/step/simulation.h"
@@ -83,7 +84,9 @@ struct Script {
   std::function<step::TickDecisions(Tick)> decisions;  // none: as sessions run by default
 };
 Script script_of(const Stroke& stroke);
-Script converged(Script script);
+Script converged(Script script, std::uint32_t sweeps = calibration::kFullSweeps);
+// Largest difference of the forces over the largest: what more sweeps change of a reference.
+double own_error(const Course& reference, const Course& more);
 
 // reduction: null for a session without one. field_ticks 0: no fields are kept.
 Course run_session(const organ::Organ& organ,

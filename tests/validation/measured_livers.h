@@ -1,6 +1,6 @@
 #pragma once
 
-// The livers of about 4,000 nodes that Dogan 2011 is compared on (4,055 nodes, 9,126 tets there),
+// The liver of about 4,000 nodes that Dogan 2011 is compared on (4,055 nodes, 9,126 tets there),
 // made of table 1.
 
 #include <string>
@@ -17,8 +17,7 @@ struct MeasuredLiver {
   organ::Organ organ;
 };
 
-// The built-in liver, and the imported one if the folder of optional test material has it: else the
-// section says that it was left out. Short form: a coarse built-in one alone.
-std::vector<MeasuredLiver> measured_livers(const Lab& lab, Section& section);
+// The built-in liver; in the short form a coarse one.
+std::vector<MeasuredLiver> measured_livers(const Lab& lab);
 
 }  // namespace trocar::validation

@@ -378,9 +378,10 @@ void cut_large(const Lab& lab, const LargeCase& large, Section& section) {
     times.series.push_back(
         {paper->title, course.ticks, scaled(cycle_us, 1e-3), plot::Style::Line, ++colour});
     const std::string name = fmt::format("{}{}", prefix, paper->nodes_high);
-    section.at_most("valid-" + name, "none", course.is_valid ? 0 : 1, 0,
+    section.at_most("valid-" + name, "none", course.is_valid ? 0 : 1, law(0, "a conforming mesh"),
                     "Whether the mesh is broken at the end.");
-    section.at_least("wound-" + name, "cuts", course.wound_m2 * 1e4, lab.is_short() ? 2 : 10,
+    section.at_least("wound-" + name, "cuts", course.wound_m2 * 1e4,
+                     target(lab.is_short() ? 2 : 10, "a cut of a lesson's length"),
                      "Area of the wound, one side, cm2: the blade has really been at work.");
   }
   section.add(std::move(cycles));
@@ -441,30 +442,35 @@ void run_refresh_rate(const Lab& lab, Section& section) {
     return std::max({0.0, (paper.nodes_low - low) / paper.nodes_low,
                      (high - paper.nodes_high) / paper.nodes_high});
   };
-  section.at_most("nodes-4-layers", "219 to 232 nodes", outside(four, kFig15), 0.15,
+  section.at_most("nodes-4-layers", "219 to 232 nodes", outside(four, kFig15),
+                  paper(0.15, "figure 15"),
                   "How far the middle four fifths of our cycles lie outside the paper's range.");
-  section.at_most("nodes-6-layers", "346 to 480 nodes", outside(free, kFig16), 0.15,
-                  "The same with 6 layers.");
-  section.at_most("spikes", "0 decisions", static_cast<double>(held.lowered_by_spikes), 0,
+  section.at_most("nodes-6-layers", "346 to 480 nodes", outside(free, kFig16),
+                  paper(0.15, "figure 16"), "The same with 6 layers.");
+  section.at_most("spikes", "0 decisions", static_cast<double>(held.lowered_by_spikes),
+                  target(0, "a spike is no trend"),
                   "Spikes alone, as long as figure 16's: how often the controller gives something "
                   "up.");
   section.at_least("without-control", "more than half of the slowed cycles",
-                   over_budget(free, phases), 0.4,
+                   over_budget(free, phases), paper(0.5, "figure 16: most cycles are late"),
                    "Cycles without a spike that exceed 5.6 ms, without control.");
-  section.at_most("with-control", "no spread in time", over_budget(held, phases), 0.02,
+  section.at_most("with-control", "no spread in time", over_budget(held, phases),
+                  paper(0.02, "figure 17: no spread in time"),
                   "The same with control, from 200 cycles after each change of the machine on.");
   // What 0.8 ms leave room for when all takes so much longer.
   const double room = (kBudget_us / kSlowest - kFixed_us) / kPerSweep_us;
   section.at_most(
       "work-when-slowest", fmt::format("{:.0f} node sweeps", room),
       std::max(0.0, largest_work(held, phases.slower_end + kSettle, phases.slowest_end) / room - 1),
-      0.02,
+      target(0.02, "what fits into the cycle"),
       "Largest work of a cycle while the machine is slowest, over what then fits into 5.6 ms.");
   section.at_least("work-comes-back", "as without control",
                    percentile({held.sweeps.end() - 300, held.sweeps.end()}, 0.5) /
                        percentile({free.sweeps.end() - 300, free.sweeps.end()}, 0.5),
-                   0.99, "Work of the last 300 cycles, over that without control.");
-  section.at_most("force", "without control", force_difference(held, free), 0.05,
+                   target(0.99, "control leaves no trace"),
+                   "Work of the last 300 cycles, over that without control.");
+  section.at_most("force", "without control", force_difference(held, free),
+                  target(0.05, "control is not felt"),
                   "Mean difference of the contact force that control makes, over its mean.");
   section.add(std::move(table));
   add_measured(section, four, free);

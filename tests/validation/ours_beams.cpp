@@ -21,13 +21,22 @@ constexpr double kYoung_pa = 4000;
 constexpr double kArea_m2 = kWidth_m * kWidth_m;
 constexpr double kMoment_m4 = kWidth_m * kWidth_m * kWidth_m * kWidth_m / 12;
 constexpr double kLiverPoisson = 0.4756;  // K = 40 C10
+constexpr double kBarTarget = 0.03, kBeamTarget = 0.05;
 
 struct Law {
   const char* name;
   const char* title;
   std::string material;           // keys of [material]
   std::optional<double> poisson;  // springs: as the mesh makes it
-  double bar_bound, beam_bound;   // on the finest mesh
+  // Of the cantilever on the finest mesh of the long and of the short form, errors on record where
+  // the target is missed.
+  std::optional<double> on_record, short_on_record;
+
+  Bound beam_bound(bool is_short) const {
+    const auto aim = validation::law(kBeamTarget, "Timoshenko");
+    const auto& missed = is_short ? short_on_record : on_record;
+    return missed ? aim.missed(*missed) : aim;
+  }
 };
 
 std::vector<Law> laws() {
@@ -36,12 +45,12 @@ std::vector<Law> laws() {
                        is_averaged ? "averaged_strain = true\n" : "");
   };
   return {
-      {"springs", "springs", "", std::nullopt, 0.015, 0.06},
-      {"tensor-mass", "tensor-mass, nu = 0.25", tets("tensor-mass", 0.25, false), 0.25, 0.01, 0.10},
+      {"springs", "springs", "", std::nullopt, {}, 0.08},
+      {"tensor-mass", "tensor-mass, nu = 0.25", tets("tensor-mass", 0.25, false), 0.25, 0.10, 0.15},
       {"neo-hookean", "neo-Hookean, nu = 0.4756", tets("neo-hookean", kLiverPoisson, false),
-       kLiverPoisson, 0.03, 0.25},
+       kLiverPoisson, 0.25, 0.25},
       {"neo-hookean-averaged", "neo-Hookean, averaged strain, nu = 0.4756",
-       tets("neo-hookean", kLiverPoisson, true), kLiverPoisson, 0.03, 0.15},
+       tets("neo-hookean", kLiverPoisson, true), kLiverPoisson, 0.15, 0.15},
   };
 }
 
@@ -119,10 +128,11 @@ std::map<std::string, double> refine(const Lab& lab, Section& section, const cha
                             shown_percent(*ours / expected - 1)});
     }
     if (series.x.size() < sizes.size()) continue;
-    const double bound = is_beam ? law.beam_bound : law.bar_bound;
-    section.at_most(law.name, fmt::format("{} mm", shown(expected)), error, bound,
-                    fmt::format("{}, {} elements across: {} of the closed form.", law.title,
-                                sizes.back(), shown(series.y.back())));
+    section.at_most(
+        law.name, fmt::format("{} mm", shown(expected)), error,
+        is_beam ? law.beam_bound(lab.is_short()) : validation::law(kBarTarget, "F L / (E A)"),
+        fmt::format("{}, {} elements across: {} of the closed form.", law.title, sizes.back(),
+                    shown(series.y.back())));
     finest[law.name] = series.y.back();
     plot.series.push_back(std::move(series));
   }
@@ -144,7 +154,7 @@ std::optional<double> stretch_bar(const Lab& lab, Section& section, const Law& l
   const auto run = lab.try_start(section, law.title, fmt::format("bar-{}-{}", law.name, across),
                                  source + material_of(law) + plane("end", kBar_m * 500) +
                                      plane("lower", -kBar_m * 250) + plane("upper", kBar_m * 250) +
-                                     traction({0, stress_pa, 0}) + static_to(2e-7) +
+                                     traction({0, stress_pa, 0}) + static_to(1e-6) +
                                      displacement_probe("upper") + displacement_probe("lower"));
   if (!run) return std::nullopt;
   lab.finish(section, *run);
@@ -160,7 +170,7 @@ std::optional<double> bend_beam(const Lab& lab, Section& section, const Law& law
   const auto run = lab.try_start(
       section, law.title, fmt::format("cantilever-{}-{}", law.name, across),
       source + material_of(law) + plane("end", kBeam_m * 500) +
-          traction({kForce_n / kArea_m2, 0, 0}) + static_to(2e-7) + displacement_probe("end"));
+          traction({kForce_n / kArea_m2, 0, 0}) + static_to(1e-6) + displacement_probe("end"));
   if (!run) return std::nullopt;
   lab.finish(section, *run);
   const Elastic e = elastic_of(law, organ);
@@ -197,7 +207,8 @@ void run_cantilever(const Lab& lab, Section& section) {
              lab.is_short() ? std::vector<int>{2, 4} : std::vector<int>{2, 4, 6}, bend_beam);
   if (finest.contains("neo-hookean") && finest.contains("neo-hookean-averaged"))
     section.at_least("averaging-against-locking", "softer than without",
-                     finest.at("neo-hookean-averaged") / finest.at("neo-hookean"), 1.02,
+                     finest.at("neo-hookean-averaged") / finest.at("neo-hookean"),
+                     target(1.02, "averaging is worth its price"),
                      "Deflection with averaged strain over that without, finest mesh.");
   section.say(
       "Averaged strain takes away more than half of what plain tets are too stiff by: of what "

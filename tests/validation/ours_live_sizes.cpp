@@ -132,9 +132,16 @@ class Study {
                             reduced.lost == 0 ? "" : fmt::format("tick {}", reduced.lost)});
     found_.push_back(found);
     const auto check = fmt::format("{}k", (nodes + 500) / 1000);
-    if (has_reference)
-      section_.at_most(check + "-force", "3 %", mean(force[0]), 0.03,
+    if (has_reference) {
+      const auto twice =
+          run_session(organ, nullptr, converged(script, 2 * calibration::kFullSweeps), 0);
+      section_.at_most(check + "-reference", "twice the sweeps", own_error(reference, twice),
+                       target(0.03 / 5, "a fifth of what the reference judges"),
+                       "Largest change of the reference's force with twice the sweeps.");
+      section_.at_most(check + "-force", "3 %", mean(force[0]),
+                       target(0.03, "3 % of the converged force"),
                        "Contact force of the reduced solver, mean over ticks in contact.");
+    }
   }
 
   // The number of nodes where both take as long, between sizes; empty: there is none.

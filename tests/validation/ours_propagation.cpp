@@ -18,13 +18,10 @@ namespace {
 
 constexpr double kPressEnd_s = 0.25, kHoldEnd_s = 0.35, kLiftEnd_s = 0.40, kEnd_s = 0.60;
 constexpr int kDefaultNodes = 1200;
-// What 1,200 nodes cost a liver that is nearly incompressible: what a press displaces must go
+// 1,200 nodes cost much in a liver that is nearly incompressible: what a press displaces must go
 // somewhere, and there is nowhere to go but into the nodes that stand still. With springs, which
-// are compressible, it was 12 to 16 %. Measured: 32 and 31 % of 4,000 nodes, 83 % of 17,000, where
-// 1,200 nodes are a smaller piece of the organ.
-constexpr double kFrozenLiver4k = 0.4, kFrozenLiver17k = 1;
-// Of the same material: 83 %.
-constexpr double kFrozenStomach = 1;
+// are compressible, it was 12 to 16 %. These errors are on record.
+constexpr double kFrozenLiver4k = 0.4, kFrozenLiver17k = 0.9, kFrozenStomach = 0.9;
 
 struct Press {
   const char* organ;   // in names
@@ -34,6 +31,12 @@ struct Press {
   double depth_mm;   // below 0: grasps and pulls
   // Bounds of the contact force's error, the latter three at the default limit of nodes.
   double whole_mean = 0.01, frozen_mean = 0.2, graded_mean = 0.03, graded_peak = 0.05;
+  std::optional<double> frozen_on_record;  // where frozen_mean is known to be missed
+
+  Bound frozen_bound() const {
+    const auto aim = target(frozen_mean, "20 % of the converged force");
+    return frozen_on_record ? aim.missed(*frozen_on_record) : aim;
+  }
 };
 
 std::string press_scene(const Press& press, const std::string& run) {
@@ -162,24 +165,24 @@ void study_press(const Lab& lab, Section& section, const Press& press) {
   const Errors live_errors = compare(live, reference);
   add_row(study, "whole", "all", live, live_errors);
   section.at_most(fmt::format("{}-whole", press.organ), "full solve", live_errors.mean,
-                  press.whole_mean,
+                  target(press.whole_mean, "1 % of the converged force"),
                   "Every node, four sweeps per tick: mean error of the contact force.");
 
   Errors frozen, graded;
   sweep_limits(lab, section, press, reference, "frozen", study, frozen);
   section.at_most(fmt::format("{}-frozen", press.organ), "full solve", frozen.mean,
-                  press.frozen_mean,
-                  fmt::format("Only {} nodes move: mean error of the contact force (peak {}). The "
-                              "bound is what this mode is known to do, not what is wanted.",
+                  press.frozen_bound(),
+                  fmt::format("Only {} nodes move: mean error of the contact force (peak {}).",
                               kDefaultNodes, shown_percent(frozen.peak)));
   if (sweep_limits(lab, section, press, reference, "graded", study, graded)) {
     section.at_most(fmt::format("{}-graded", press.organ), "full solve", graded.mean,
-                    press.graded_mean,
+                    target(press.graded_mean, "3 % of the converged force"),
                     fmt::format("{} nodes swept more, the rest less: mean error of the contact "
                                 "force.",
                                 kDefaultNodes));
     section.at_most(fmt::format("{}-graded-peak", press.organ), "full solve", graded.peak,
-                    press.graded_peak, "The same: largest error over the largest force.");
+                    target(press.graded_peak, "5 % of the largest force"),
+                    "The same: largest error over the largest force.");
   }
   // Last, so that it is seen on top of what agrees with it.
   study.forces.series.push_back(force_curve("full", reference.forces_n, plot::Style::Dashed));
@@ -221,7 +224,7 @@ void run_propagation_lattice(const Lab& lab, Section& section) {
                .anchor = "[0.03, 1, 0.03]",
                .radius_mm = 16,
                .depth_mm = -10,
-               .frozen_mean = 0.7});
+               .frozen_on_record = 0.7});
 }
 
 void run_propagation_liver(const Lab& lab, Section& section) {
@@ -231,7 +234,7 @@ void run_propagation_liver(const Lab& lab, Section& section) {
               .anchor = "[0.2, 0.1, 1]",
               .radius_mm = 28,
               .depth_mm = 10,
-              .frozen_mean = kFrozenLiver4k};
+              .frozen_on_record = kFrozenLiver4k};
   study_press(lab, section, press);
   if (lab.is_short()) return;
   press.organ = "liver-4k-left";
@@ -250,7 +253,7 @@ void run_propagation_large_liver(const Lab& lab, Section& section) {
                .anchor = "[0.2, 0.1, 1]",
                .radius_mm = 18,
                .depth_mm = 10,
-               .frozen_mean = kFrozenLiver17k});
+               .frozen_on_record = kFrozenLiver17k});
 }
 
 void run_propagation_stomach(const Lab& lab, Section& section) {
@@ -261,7 +264,7 @@ void run_propagation_stomach(const Lab& lab, Section& section) {
                .anchor = "[0.3, 0.2, 1]",
                .radius_mm = 14,
                .depth_mm = 10,
-               .frozen_mean = kFrozenStomach});
+               .frozen_on_record = kFrozenStomach});
 }
 
 }  // namespace trocar::validation

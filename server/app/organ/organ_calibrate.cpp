@@ -179,6 +179,9 @@ Status run_calibrate(CalibrateCommand command) {
   std::printf("%s: %u places pressed %.1f mm deep with a tip of %.1f mm, %zu left out\n",
               organ->name.c_str(), found.table.places, command.depth_mm,
               found.table.tool_radius_m * 1e3, found.places_left_out);
+  std::printf("reference: %u sweeps a tick, own error %.2f %%%s\n", found.reference.sweeps,
+              100 * found.reference.own_error,
+              found.reference.is_converged() ? "" : ", which is more than a tenth of --error");
   print_table(found);
   if (auto s = write_text_file(folder / "table.csv", table_csv(found.table)); !s) return s;
   if (auto s = write_text_file(folder / "places.csv", calibration::to_csv(found)); !s) return s;

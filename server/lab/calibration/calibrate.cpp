@@ -72,9 +72,9 @@ bool suffices(const std::vector<Finding::Tried>& tried, double error) {
 class PlaceStudy {
  public:
   PlaceStudy(PressBench& bench, const Place& place, std::size_t number, const PressPlan& plan,
-             const Settings& settings)
+             const Settings& settings, const step::TickDecisions& full)
       : bench_(bench), place_(place), plan_(plan), settings_(settings), ranges_{settings.first_n} {
-    full_ = bench.press(place, plan, full_decisions());
+    full_ = bench.press(place, plan, full);
     const RangeErrors reached(full_, full_, ranges_);
     for (std::size_t range = 0; range < kMaxRanges; ++range)
       if (reached.has(range))
@@ -175,8 +175,9 @@ Calibration calibrate(const organ::Organ& organ, const Settings& settings,
   const auto places = spread_places(organ, settings.places, settings.seed);
   const auto plan = plan_of(organ, settings);
   PressBench bench(organ, settings.workers);
+  result.reference = find_reference(bench, places, plan, settings.reference_error * settings.error);
   for (std::size_t i = 0; i < places.size(); ++i) {
-    PlaceStudy study(bench, places[i], i, plan, settings);
+    PlaceStudy study(bench, places[i], i, plan, settings, result.reference.decisions());
     auto findings = study.study();
     result.places_left_out += findings.empty();
     std::ranges::move(findings, std::back_inserter(result.findings));
@@ -214,8 +215,10 @@ std::vector<Check> check(const organ::Organ& organ, const organ::DepthTable& tab
   std::vector<Check> checks(table.rows.size());
   for (std::size_t k = 0; k < checks.size(); ++k) checks[k].force_n = table.rows[k].force_n;
 
+  const auto reference =
+      find_reference(bench, unseen, plan, settings.reference_error * settings.error);
   for (std::size_t i = 0; i < unseen.size(); ++i) {
-    const auto full = bench.press(unseen[i], plan, full_decisions());
+    const auto full = bench.press(unseen[i], plan, reference.decisions());
     const auto chosen = [&](const step::TickDecisions& most) {
       control::DepthChooser chooser(table, 1);
       const auto course = bench.press(unseen[i], plan, [&](std::span<const double> forces) {

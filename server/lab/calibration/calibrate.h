@@ -16,6 +16,8 @@ namespace trocar::calibration {
 
 struct Settings {
   double error = 0.03;  // asked of the contact force: mean difference over mean force in a range
+  // Of the reference itself, as a share of `error`.
+  double reference_error = 0.1;
   std::size_t places = 16;
   std::uint64_t seed = 1;
   double radius_m = 0;     // 0: 3.2 edges of the surface, within what a tool may have
@@ -45,6 +47,7 @@ struct Calibration {
   std::vector<Finding> findings;
   std::size_t places_left_out = 0;  // where the tip could not press
   std::uint64_t ticks = 0;          // simulated, all presses together
+  Reference reference;              // what all errors are against
 };
 
 // done and all: places. Called after each.

@@ -11,15 +11,13 @@ namespace {
 
 // From above the surface, where the tip meets it at its speed and not by appearing.
 constexpr double kStart_m = 0.001;
-// Four are used in sessions; with more than these, forces change by less than 0.2 %.
-constexpr std::uint32_t kFullSweeps = 30;
 
 }  // namespace
 
-step::TickDecisions full_decisions() {
+step::TickDecisions full_decisions(std::uint32_t sweeps) {
   return {.depth_limit = step::kMaxDepthLimit,
           .node_limit = step::kMaxNodeLimit,
-          .sweeps = kFullSweeps,
+          .sweeps = sweeps,
           .boundary = world::Boundary::Graded};
 }
 
@@ -72,6 +70,31 @@ PressCourse PressBench::press(const Place& place, const PressPlan& plan, const D
 PressCourse PressBench::press(const Place& place, const PressPlan& plan,
                               const step::TickDecisions& decisions) {
   return press(place, plan, [&](std::span<const double>) { return decisions; });
+}
+
+double force_difference(const PressCourse& a, const PressCourse& b) {
+  double most = 0, largest = 0;
+  for (std::size_t i = 0; i < b.forces_n.size(); ++i) {
+    most = std::max(most, length(a.forces_n[i] - b.forces_n[i]));
+    largest = std::max(largest, length(b.forces_n[i]));
+  }
+  return largest > 0 ? most / largest : std::nan("");
+}
+
+Reference find_reference(PressBench& bench, std::span<const Place> places, const PressPlan& plan,
+                         double tolerance) {
+  Reference reference{.own_error = std::nan(""), .tolerance = tolerance};
+  for (const auto& place : places) {
+    auto half = bench.press(place, plan, full_decisions(kFullSweeps / 2));
+    for (reference.sweeps = kFullSweeps;; reference.sweeps *= 2) {
+      auto course = bench.press(place, plan, reference.decisions());
+      reference.own_error = force_difference(half, course);
+      if (!(reference.own_error > tolerance) || 2 * reference.sweeps > step::kMaxSweeps) break;
+      half = std::move(course);
+    }
+    if (!std::isnan(reference.own_error)) break;
+  }
+  return reference;
 }
 
 }  // namespace trocar::calibration

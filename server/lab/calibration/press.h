@@ -3,7 +3,9 @@
 // One press of a round tip into an organ, tick by tick as in a session, with the force that the
 // tissue has on it. From rest, straight along the surface's normal, at a steady speed.
 
+#include <cstdint>
 #include <functional>
+#include <span>
 #include <vector>
 
 #include "server/lab/calibration/places.h"
@@ -25,8 +27,10 @@ struct PressCourse {
   std::vector<std::uint32_t> queue_depths;  // layers around the touched nodes, per tick
 };
 
-// Every node swept until more sweeps change nothing that counts: what others are compared with.
-step::TickDecisions full_decisions();
+// Every node swept so often a tick: what others are compared with. How many sweeps that takes
+// depends on the organ, see find_reference().
+inline constexpr std::uint32_t kFullSweeps = 30;
+step::TickDecisions full_decisions(std::uint32_t sweeps = kFullSweeps);
 
 class PressBench {
  public:
@@ -46,5 +50,23 @@ class PressBench {
   Bytes rest_;
   std::uint64_t ticks_ = 0;
 };
+
+// A number of sweeps with which a press is converged.
+struct Reference {
+  std::uint32_t sweeps = kFullSweeps;
+  // What the second half of the sweeps changes: largest difference of the force over the largest
+  // force. It is larger than what further sweeps change, since each half changes less.
+  double own_error = 0;
+  double tolerance = 0;
+
+  bool is_converged() const { return own_error <= tolerance; }
+  step::TickDecisions decisions() const { return full_decisions(sweeps); }
+};
+// The largest difference of two presses' forces over the second's largest; NaN without a force.
+double force_difference(const PressCourse& a, const PressCourse& b);
+// Doubles kFullSweeps, at the first place that can be pressed, while half of the sweeps differ by
+// more than the tolerance and a tick may have as many.
+Reference find_reference(PressBench& bench, std::span<const Place> places, const PressPlan& plan,
+                         double tolerance);
 
 }  // namespace trocar::calibration
