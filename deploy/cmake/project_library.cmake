@@ -36,10 +36,10 @@ function(project_library folder)
   target_link_libraries(trocar_${name} PUBLIC ${ARG_LINK})
 endfunction()
 
-# project_program(<name> MAIN file.cpp DEPENDS folder... LINK target...): one executable in
+# project_program(<name> [ABOUT "What its folder is for."] MAIN file.cpp DEPENDS folder... LINK target...): one executable in
 # build/<preset>/bin. DEPENDS names the folders that its files include.
 function(project_program name)
-  cmake_parse_arguments(ARG "" "" "MAIN;DEPENDS;LINK" ${ARGN})
+  cmake_parse_arguments(PARSE_ARGV 1 ARG "" "ABOUT" "MAIN;DEPENDS;LINK")
   add_executable(${name} ${ARG_MAIN})
   target_link_libraries(${name} PRIVATE trocar_options ${ARG_LINK})
   foreach(dependency IN LISTS ARG_DEPENDS)

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <fstream>
 
 #include "tests/architecture/folder_table.h"
@@ -29,7 +30,7 @@ TEST(Architecture, TheTreeIsRead) {
   EXPECT_TRUE(tree().closure_of("server/tissue/step").contains("common/math"));
   EXPECT_TRUE(tree().state_folders.contains("server/tissue/step"));
   for (const auto& folder : tree().state_folders) EXPECT_GE(tree().layer_of(folder), 0) << folder;
-  EXPECT_FALSE(tree().folders.at("server/app").programs.empty());
+  EXPECT_FALSE(tree().folders.at("server/app/sim").programs.empty());
   EXPECT_TRUE(tree().has_file("server/tissue/step/tick.cpp"));
   EXPECT_TRUE(tree().has_file("README.md"));
   std::size_t includes = 0;
@@ -59,7 +60,7 @@ TEST(Architecture, StateIsDeterministic) {
   expect_none(check_determinism(tree()));
 }
 TEST(Architecture, TheTableOfFoldersIsUpToDate) {
-  std::ifstream file(std::string(TROCAR_SOURCE_DIR) + "/docs/folders.md");
+  std::ifstream file(std::filesystem::path(TROCAR_SOURCE_DIR) / "docs/folders.md");
   const std::string committed{std::istreambuf_iterator<char>(file), {}};
   EXPECT_EQ(committed, folder_table(tree()))
       << "write it again: build/release/bin/folder_table > docs/folders.md";

@@ -15,11 +15,13 @@ constexpr const char* kStageTimers = "server/tissue/step/tick.cpp";
 
 const std::set<std::string> kProtobufFolders{"proto",
                                              "server/organs/organ",
+                                             "server/papers/dogan",
                                              "common/wire",
                                              "common/journal",
                                              "server/session/participants",
                                              "server/session/replication",
                                              "server/session/recording",
+                                             "server/papers/dogan",
                                              "client/net",
                                              "client/replica",
                                              "client/replay"};

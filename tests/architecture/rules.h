@@ -1,7 +1,7 @@
 #pragma once
 
 // The rules of the architecture. Each returns its breaches, one line each: "path:line: what, what
-// to do". README, "Folders" and "Contracts", says the same to a person.
+// to do". docs/the-source.md says the same.
 
 #include <string>
 #include <vector>
@@ -19,7 +19,7 @@ Breaches check_folders(const SourceTree& tree);
 // Every #include "..." names an existing file from the root, and a source includes the header of
 // its own name first.
 Breaches check_includes(const SourceTree& tree);
-// What a CMakeLists.txt says is what the sources do, in both directions: the folders that headers
+// A CMakeLists.txt lists what the sources include, no less and no more: the folders that headers
 // include are its DEPENDS, those that only sources include its USES. A program's DEPENDS are the
 // folders that its files include.
 Breaches check_dependencies(const SourceTree& tree);

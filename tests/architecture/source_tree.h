@@ -29,7 +29,7 @@ struct SourceFile {
   bool is_cpp() const { return path.ends_with(".h") || path.ends_with(".cpp"); }
 };
 
-// What a project_program() of a folder says.
+// A project_program() of a folder, as its CMakeLists.txt lists it.
 struct Program {
   std::string name;
   std::set<std::string> files;    // MAIN, from the folder

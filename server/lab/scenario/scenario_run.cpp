@@ -22,6 +22,13 @@ constexpr float kStaticStep_s = 100;
 // judged from stretch to stretch of sweeps, and lowered where a stretch brought nothing.
 constexpr float kStaticOverRelaxation = 1.85f;
 constexpr float kOverRelaxationStepDown = 0.8f;
+// Springs that are compressed buckle, and sweeps that overshoot may then jump to a far equilibrium,
+// or climb from one to the next: stable tissue loses potential energy from stretch to stretch. One
+// that gains is taken back and done again with shorter steps, which descend if they are short
+// enough.
+constexpr float kOverRelaxationStepBack = 0.8f;
+// Rounding of displacements in float, as a share of the energy.
+constexpr double kEnergySlack = 1e-6;
 constexpr std::uint32_t kSweepsPerRelaxation = 100;
 // A contact that is found changes the equilibrium, and that the contacts. First the tool walks to
 // its new place, as it does in a session, and its claim takes effect.
@@ -86,7 +93,7 @@ Status check_explicit(const scenario::ResolvedScenario& resolved) {
         scenario, place,
         "\"explicit\" knows no relaxation, which this material has: take "
         "\"implicit\"");
-  const double stable = dynamics::ExplicitEuler(resolved.organ, world_of(resolved)).stable_dt_s();
+  const double stable = nakao::ExplicitEuler(resolved.organ, world_of(resolved)).stable_dt_s();
   if (scenario.run.dt_s() <= stable) return {};
   char text[160];
   const double most = 1e-3 / std::ceil(1e-3 / stable);
@@ -318,6 +325,32 @@ StepReport ScenarioRun::step_dynamic() {
   return report;
 }
 
+void ScenarioRun::place_held() {
+  float largest_move_m = 0;
+  const auto put = [&](NodeIndex node, std::uint8_t axes, const Vec3f& displacement) {
+    Vec3f& u = world_.displacements[node.value];
+    const Vec3f from = u;
+    if (axes & 1) u.x = displacement.x;
+    if (axes & 2) u.y = displacement.y;
+    if (axes & 4) u.z = displacement.z;
+    largest_move_m = std::max(largest_move_m, length(u - from));
+  };
+  for (std::size_t i = 0; i < held_.size(); ++i) put(held_[i], kAllAxes, held_displacements_[i]);
+  for (const auto& hold : axis_holds_) put(hold.node, hold.axes, hold.displacement);
+  solver_.take_motion(world_);
+  finder_.surface_moved(largest_move_m);
+}
+
+double ScenarioRun::potential_energy_j() const {
+  double energy_j = solver_.tissue().energy_j(world_.displacements);
+  for (std::size_t i = 0; i < world_.node_count(); ++i) {
+    Vec3d load = organ().gravity_m_s2 * static_cast<double>(world_.masses[i]);
+    if (!forces_.empty()) load += to_double(forces_[i]);
+    energy_j -= dot(load, to_double(world_.displacements[i]));
+  }
+  return energy_j;
+}
+
 StepReport ScenarioRun::relax() {
   auto how = settings();
   const std::uint32_t most = scenario().run.max_sweeps;
@@ -330,16 +363,29 @@ StepReport ScenarioRun::relax() {
   report.active_nodes = free_nodes_.size();
   std::uint32_t sweeps = 0;
   float last_residual = INFINITY;
+  place_held();
+  // Contacts that slide have no potential energy, so that nothing can be said about its descent.
+  const bool descends = contacts_.points.empty();
+  double last_energy_j = descends ? potential_energy_j() : 0;
   do {
+    if (descends) before_stretch_.assign(world_.displacements.begin(), world_.displacements.end());
     how.sweeps = std::min(kSweepsPerRelaxation, most - sweeps);
     report.solve = solver_.solve(contacts_, free_nodes_, how, world_,
                                  {forces_, held_, held_displacements_, axis_holds_});
     finder_.surface_moved(report.solve.largest_move_m);
     std::ranges::fill(world_.velocities, Vec3f{});
     sweeps += report.solve.sweeps;
+    const double energy_j = descends ? potential_energy_j() : 0;
+    if (!(energy_j <= last_energy_j + kEnergySlack * std::abs(last_energy_j))) {
+      std::ranges::copy(before_stretch_, world_.displacements.begin());
+      solver_.take_motion(world_);
+      how.over_relaxation *= kOverRelaxationStepBack;
+      continue;
+    }
+    last_energy_j = energy_j;
     report.is_converged =
         report.solve.residual_n <= how.residual_tolerance_n && report.solve.nodes_rejected == 0;
-    if (!(report.solve.residual_n < last_residual))
+    if (!(report.solve.residual_n < last_residual) && how.over_relaxation > 1)
       how.over_relaxation = 1 + (how.over_relaxation - 1) * kOverRelaxationStepDown;
     last_residual = report.solve.residual_n;
   } while (!report.is_converged && sweeps < most);

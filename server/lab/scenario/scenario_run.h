@@ -14,10 +14,10 @@
 #include <vector>
 
 #include "server/lab/scenario/scenario.h"
+#include "server/papers/nakao/explicit_euler.h"
 #include "server/tissue/contact/contact_finder.h"
 #include "server/tissue/contact/self_contact.h"
 #include "server/tissue/dynamics/block_descent.h"
-#include "server/tissue/dynamics/explicit_euler.h"
 #include "server/tissue/hands/claims.h"
 #include "server/tissue/hands/tool_table.h"
 #include "server/tissue/propagation/active_set.h"
@@ -90,6 +90,10 @@ class ScenarioRun {
   StepReport step_static();
   // Sweeps until nothing is out of balance by more than the tolerance; everything is at rest then.
   StepReport relax();
+  // Held and displaced nodes go where the loads of now have them.
+  void place_held();
+  // Elastic energy minus the work of loads and gravity, J. O(nodes).
+  double potential_energy_j() const;
   StepReport relax_for_long(unsigned threads);
 
   const scenario::ResolvedScenario resolved_;
@@ -115,7 +119,7 @@ class ScenarioRun {
   propagation::PropagationQueue queue_;
   propagation::ActiveSet active_set_;
   dynamics::BlockDescent solver_;
-  std::optional<dynamics::ExplicitEuler> explicit_;
+  std::optional<nakao::ExplicitEuler> explicit_;
   dynamics::FarPlan far_plan_;                  // graded
   std::vector<Vec3f> forces_;                   // per node; empty without loads
   std::vector<NodeIndex> held_;                 // fixed, then displaced nodes
@@ -123,6 +127,7 @@ class ScenarioRun {
   std::vector<dynamics::AxisHold> axis_holds_;  // by node
   std::vector<NodeIndex> free_nodes_;           // what is active unless frozen
   std::vector<Vec3f> before_;                   // displacements before a round of contacts
+  std::vector<Vec3f> before_stretch_;           // displacements before a stretch of sweeps
   std::vector<std::span<const NodeIndex>> seeds_;
   std::vector<hands::ClaimRequest> requests_;
   std::vector<hands::ClaimEvent> claim_events_;

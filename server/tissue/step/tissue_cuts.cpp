@@ -7,7 +7,7 @@
 #include "common/base/assert.h"
 #include "common/base/checksum.h"
 #include "server/tissue/cutting/event_codec.h"
-#include "server/tissue/step/organ_surface.h"
+#include "server/tissue/world/surface_layout.h"
 
 namespace trocar::step {
 namespace {
@@ -28,7 +28,10 @@ bool moves_nodes(const cutting::CutEvents& events) {
 }  // namespace
 
 TissueCuts::TissueCuts(const organ::Organ& organ)
-    : topology_(organ), tearing_(organ), surface_(organ), layout_(make_surface_layout(organ)) {
+    : topology_(organ),
+      tearing_(organ),
+      surface_(organ),
+      layout_(world::make_surface_layout(organ)) {
   if (!organ.mesh.tets.empty() && !topology_.has_links())
     cutter_ = std::make_unique<cutting::Cutter>(topology_);
   first_pending_ = static_cast<std::uint32_t>(layout_.triangles.size());
