@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <fstream>
 
 #include "tests/architecture/folder_table.h"
@@ -59,7 +60,7 @@ TEST(Architecture, StateIsDeterministic) {
   expect_none(check_determinism(tree()));
 }
 TEST(Architecture, TheTableOfFoldersIsUpToDate) {
-  std::ifstream file(std::string(TROCAR_SOURCE_DIR) + "/docs/folders.md");
+  std::ifstream file(std::filesystem::path(TROCAR_SOURCE_DIR) / "docs/folders.md");
   const std::string committed{std::istreambuf_iterator<char>(file), {}};
   EXPECT_EQ(committed, folder_table(tree()))
       << "write it again: build/release/bin/folder_table > docs/folders.md";

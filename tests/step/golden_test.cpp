@@ -1,5 +1,5 @@
 // The state hash of short sessions, as numbers: equal with gcc and clang, debug and release, for
-// any number of workers (README, "Determinism"). A change of results changes a number here, and
+// any number of workers (docs/determinism.md). A change of results changes a number here, and
 // raises kSimVersion in the same commit.
 
 #include <gtest/gtest.h>

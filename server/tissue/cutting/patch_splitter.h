@@ -11,7 +11,7 @@ namespace trocar::cutting {
 
 class CutMesh;
 struct PatchTriangle;
-struct Stroke;
+class Stroke;
 
 class PatchSplitter {
  public:
