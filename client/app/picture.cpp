@@ -251,6 +251,7 @@ ui::HudModel Picture::hud_model(const replica::Replica& replica, replica::Sessio
   model.pictures_per_second = rate_.pictures_per_second;
   model.frames_per_second = rate_.frames_per_second;
   model.bytes_per_second = rate_.bytes_per_second;
+  model.recording_text = replica.recording().text;
   model.sync_text = sync_text(replica);
   model.is_in_step = replica.sync_state() == replica::SyncState::InStep;
   model.shows_regions = overlays_.regions;

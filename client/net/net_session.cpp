@@ -30,7 +30,10 @@ NetSource::Session::Session(NetSourceOptions options)
     : options_(std::move(options)),
       inbound_(options_.inbound_capacity),
       outbound_(options_.outbound_capacity) {
-  asio::co_spawn(context_, run(), [](std::exception_ptr) {});
+  asio::co_spawn(context_, run(), [this](std::exception_ptr failure) {
+    end_if_failed(failure);
+    has_ended_.store(true, std::memory_order_release);
+  });
   thread_ = std::thread([this] { context_.run(); });
 }
 
@@ -98,7 +101,8 @@ void NetSource::Session::begin_close(const std::string& reason) {
   control_.push_back(wire::encode_envelope(envelope));
   wake_timer_.cancel();
   room_timer_.cancel();
-  asio::co_spawn(context_, expire(Clock::now() + kCloseDeadline), [](std::exception_ptr) {});
+  asio::co_spawn(context_, expire(Clock::now() + kCloseDeadline),
+                 [this](std::exception_ptr failure) { end_if_failed(failure); });
 }
 
 asio::awaitable<void> NetSource::Session::expire(Clock::time_point deadline) {
@@ -134,15 +138,28 @@ asio::awaitable<void> NetSource::Session::run() {
     co_await read_messages();
     end_after_stream();
   }
-  has_ended_.store(true, std::memory_order_release);
+}
+
+// An exception is a fault of this program: the session ends, and its reason says so.
+void NetSource::Session::end_if_failed(const std::exception_ptr& failure) {
+  if (!failure) return;
+  std::string what = "unknown";
+  try {
+    std::rethrow_exception(failure);
+  } catch (const std::exception& exception) {
+    what = exception.what();
+  } catch (...) {  // then nothing more is known
+  }
+  end(replica::CloseKind::Lost, "this client failed (" + what + "): start it again");
 }
 
 void NetSource::Session::begin_conversation() {
   is_connected_ = true;
   last_heard_ = Clock::now();
   control_.push_back(encode_hello());
-  asio::co_spawn(context_, write_messages(), [](std::exception_ptr) {});
-  asio::co_spawn(context_, ping(), [](std::exception_ptr) {});
+  asio::co_spawn(context_, write_messages(),
+                 [this](std::exception_ptr failure) { end_if_failed(failure); });
+  asio::co_spawn(context_, ping(), [this](std::exception_ptr failure) { end_if_failed(failure); });
 }
 
 void NetSource::Session::end_after_stream() {
@@ -169,7 +186,8 @@ void NetSource::Session::check_silence() {
 
 asio::awaitable<bool> NetSource::Session::connect() {
   const auto deadline = Clock::now() + options_.connect_deadline;
-  asio::co_spawn(context_, expire(deadline), [](std::exception_ptr) {});
+  asio::co_spawn(context_, expire(deadline),
+                 [this](std::exception_ptr failure) { end_if_failed(failure); });
   std::string why = "no answer";
   bool is_said = false;
   while (!is_done_ && Clock::now() < deadline) {
@@ -244,6 +262,7 @@ std::shared_ptr<const proto::Envelope> NetSource::Session::take_message() {
   if (message->message_case() == proto::Envelope::MESSAGE_NOT_SET) return nullptr;
   if (message->has_surface_frame()) frames_received_.fetch_add(1, std::memory_order_relaxed);
   has_heard_ = true;
+  if (options_.before_message) options_.before_message();
   return message;
 }
 

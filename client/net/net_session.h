@@ -56,6 +56,7 @@ class NetSource::Session {
   asio::awaitable<void> ping();
   asio::awaitable<void> expire(Clock::time_point deadline);
 
+  void end_if_failed(const std::exception_ptr& failure);
   void begin_conversation();
   bool make_room_for(std::span<const std::uint8_t, wire::kHeaderBytes> header);
   std::shared_ptr<const proto::Envelope> take_message();

@@ -14,6 +14,7 @@
 // See session_source.h for what each member promises.
 
 #include <chrono>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -36,6 +37,7 @@ struct NetSourceOptions {
   std::chrono::milliseconds silence_deadline{10000};  // nothing from the server: lost
   std::size_t inbound_capacity = 256;                 // messages
   std::size_t outbound_capacity = 256;
+  std::function<void()> before_message;  // for tests: on the Asio thread, before each is handed on
 };
 
 // Reads "HOST", "HOST:PORT" or "[IPV6]:PORT" into options.host and options.port.

@@ -154,6 +154,18 @@ void draw_slow_time(const HudModel& model, float scale) {
   ImGui::End();
 }
 
+void draw_recording(const HudModel& model, float scale) {
+  if (model.recording_text.empty()) return;
+  const ImVec2 screen = ImGui::GetIO().DisplaySize;
+  constexpr float kBelowSlowTime = 64;
+  ImGui::SetNextWindowPos({screen.x / 2, (kMargin + kBelowSlowTime) * scale}, 0, {0.5f, 0});
+  ImGui::Begin("recording", nullptr, kGlass);
+  ImGui::PushFont(bold());
+  ImGui::TextColored(kTrouble, "%s", model.recording_text.c_str());
+  ImGui::PopFont();
+  ImGui::End();
+}
+
 void draw_labels(const HudModel& model, float scale) {
   ImDrawList* list = ImGui::GetBackgroundDrawList();
   for (const HudLabel& label : model.labels) {

@@ -27,8 +27,8 @@ function(project_library folder)
   target_link_libraries(trocar_${name} PUBLIC ${ARG_LINK})
 endfunction()
 
-# project_program(<name> [ABOUT "What it is for."] MAIN file.cpp DEPENDS folder... LINK target...):
-# one executable in build/<preset>/bin. DEPENDS names the folders that its files include.
+# project_program(<name> [ABOUT "What its folder is for."] MAIN file.cpp DEPENDS folder... LINK target...): one executable in
+# build/<preset>/bin. DEPENDS names the folders that its files include.
 function(project_program name)
   cmake_parse_arguments(PARSE_ARGV 1 ARG "" "ABOUT" "MAIN;DEPENDS;LINK")
   add_executable(${name} ${ARG_MAIN})

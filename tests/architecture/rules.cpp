@@ -21,6 +21,7 @@ const std::set<std::string> kProtobufFolders{"proto",
                                              "server/session/participants",
                                              "server/session/replication",
                                              "server/session/recording",
+                                             "server/papers/dogan",
                                              "client/net",
                                              "client/replica",
                                              "client/replay"};

@@ -130,8 +130,11 @@ documented_keys() {
     c && /^\|/ {print $c}' docs/scripts-and-scenarios.md | grep -oE '`[a-z0-9_]+`' | tr -d '`' | sort -u
 }
 read_keys() {
-  grep -hoE '\b[a-z_]+(<[^>]*>)?\("[a-z0-9_]+"' "${readers[@]}" |
-    grep -vE '^(fail|fail_missing|table_entry|fputs|contains|find|place_of|has|with|tables?|limited_tables)\(' |
+  {
+    grep -hoE '\b[a-z_]+(<[^>]*>)?\("[a-z0-9_]+"' "${readers[@]}" |
+      grep -vE '^(fail|fail_missing|table_entry|fputs|contains|find|place_of|has|with|tables?|limited_tables)\('
+    grep -hoE 'NumberKey\{"[a-z0-9_]+"' server/organs/material/material_keys.h
+  } |
     grep -oE '"[a-z0-9_]+"' | tr -d '"' | sort -u
 }
 

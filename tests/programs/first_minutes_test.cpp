@@ -181,12 +181,17 @@ TEST_F(Sim, TheFirstExampleStartsInEquilibrium) {
   for (std::size_t column = 0; column < names.size(); ++column) {
     if (names[column].find("middle_displacement_y") == std::string::npos) continue;
     is_found = true;
-    // A fall of the same block from rest reaches about g t^2 / 2 = 49 mm in this time where nothing
-    // holds it; in equilibrium it stays, to the tolerance of the start.
-    for (const auto& row : table)
+    // The start leaves at most tolerance_n (1e-5 N) at each of 405 free nodes; over the stiffness
+    // E A / L of the block, 4000 Pa x 80 mm x 80 mm / 60 mm, that is 9.5 um. From rest it sinks by
+    // 0.4 mm and swings.
+    constexpr double kBound_mm = 1e3 * 405 * 1e-5 / (4000 * 0.08 * 0.08 / 0.06);
+    double at_first = NAN;  // in the first row that has it: probes have their own rates
+    for (const auto& row : table) {
+      if (std::isnan(at_first)) at_first = row[column];
       if (!std::isnan(row[column])) {
-        EXPECT_NEAR(row[column], table.front()[column], 1e-5);
+        EXPECT_NEAR(row[column], at_first, kBound_mm);
       }
+    }
   }
   EXPECT_TRUE(is_found) << line;
 }

@@ -100,8 +100,9 @@ TEST_F(RecordedCuts, PlayFrameByFrameAndAfterAnySeek) {
   }
   const auto verified = recording::verify_journal(path_, {});
   ASSERT_TRUE(verified.ok());
-  EXPECT_TRUE(verified->ok()) << verified->first_mismatch->what;
-  EXPECT_EQ(verified->surfaces_verified, 199u);
+  // These frames were never simulated: the surface stream is all that can be checked.
+  EXPECT_EQ(verified->verdict(), recording::Verdict::NotVerified) << verified->why();
+  EXPECT_EQ(verified->surfaces_decoded, 199u + 4u) << "keyframes too";
 }
 
 TEST_F(RecordedCuts, GoOnAfterDroppedFramesThatHadChanges) {
@@ -115,8 +116,8 @@ TEST_F(RecordedCuts, GoOnAfterDroppedFramesThatHadChanges) {
   }
   const auto verified = recording::verify_journal(path_, {});
   ASSERT_TRUE(verified.ok());
-  EXPECT_TRUE(verified->ok()) << verified->first_mismatch->what;
-  EXPECT_EQ(verified->surfaces_verified, 194u);
+  EXPECT_EQ(verified->verdict(), recording::Verdict::NotVerified) << verified->why();
+  EXPECT_EQ(verified->surfaces_decoded, 194u + 5u) << "keyframes too, one after the gap";
 }
 
 }  // namespace

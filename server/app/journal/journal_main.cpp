@@ -1,5 +1,6 @@
 // trocar-journal: what a recorded session holds, and whether it simulates to the same bits again.
 
+#include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
 #include <cinttypes>
@@ -7,6 +8,7 @@
 
 #include "common/base/cpu.h"
 #include "common/base/log.h"
+#include "common/base/quote.h"
 #include "common/base/timing.h"
 #include "common/base/version.h"
 #include "common/journal/session_journal.h"
@@ -88,6 +90,46 @@ int show_info(const std::string& path, bool as_json) {
   return 0;
 }
 
+std::string json_of(const recording::VerifyReport& r) {
+  std::string difference = "null", reasons;
+  if (r.first_difference)
+    difference = fmt::format(
+        R"({{"tick": {}, "channel": {}, "field": {}, "recorded": {}, "simulated": {}}})",
+        r.first_difference->tick, quote(r.first_difference->channel),
+        quote(r.first_difference->field), quote(r.first_difference->recorded),
+        quote(r.first_difference->simulated));
+  for (const auto& reason : r.reasons) reasons += (reasons.empty() ? "" : ", ") + quote(reason);
+  return fmt::format(
+      R"({{"verified": {}, "verdict": "{}", "reasons": [{}], "reasons_left_out": {},
+"first_difference": {},
+"resimulated": {}, "first_tick": {}, "last_tick": {}, "ticks_verified": {}, "ticks_missing": {},
+"ticks_not_simulated": {}, "frames_verified": {}, "surfaces_verified": {}, "surfaces_decoded": {},
+"snapshots_verified": {}, "snapshots_continued": {}, "participants_verified": {},
+"damaged_chunks": {}, "last_hash": "{:016x}", "container": {}}}
+)",
+      r.verdict() == recording::Verdict::Verified, recording::name_of(r.verdict()), reasons,
+      r.reasons_left_out, difference, r.is_resimulated, r.first_tick, r.last_tick, r.ticks_verified,
+      r.ticks_missing, r.ticks_not_simulated, r.frames_verified, r.surfaces_verified,
+      r.surfaces_decoded, r.snapshots_verified, r.snapshots_continued, r.participants_verified,
+      r.damaged_chunks, r.last_hash, quote(r.container));
+}
+
+std::string text_of(const std::string& path, const recording::VerifyReport& r) {
+  std::string out = fmt::format(
+      "{}: {}\n"
+      "{} of {} ticks simulated again with equal hashes, {} missing; equal: {} frames with tools "
+      "and "
+      "claims, {} surfaces ({} decoded), {} snapshots ({} restored and continued), participants in "
+      "{} frames\n",
+      path, r.container, r.ticks_verified, r.last_tick, r.ticks_missing, r.frames_verified,
+      r.surfaces_verified, r.surfaces_decoded, r.snapshots_verified, r.snapshots_continued,
+      r.participants_verified);
+  out += r.why();
+  if (r.verdict() == recording::Verdict::Verified)
+    out += fmt::format("verified to tick {}, hash {:016x}\n", r.last_tick, r.last_hash);
+  return out;
+}
+
 int verify(const std::string& path, const std::string& reduction_file, bool as_json) {
   const std::uint64_t started = monotonic_ns();
   bool is_progress_shown = false;
@@ -102,32 +144,16 @@ int verify(const std::string& path, const std::string& reduction_file, bool as_j
       reduction_file);
   if (is_progress_shown) std::fprintf(stderr, "\n");
   if (!verified) return report(kProgram, verified.error());
-  const auto& r = *verified;
-  if (as_json) {
-    std::printf("{\"verified\": %s, \"resimulated\": %s, \"ticks_verified\": %" PRIu64
-                ", \"last_tick\": %" PRIu64 ", \"ticks_missing\": %" PRIu64
-                ", \"snapshots_verified\": %" PRIu64 ", \"surfaces_verified\": %" PRIu64
-                ", \"first_mismatch_tick\": %s, \"mismatch\": \"%s\", \"last_hash\": \"%016" PRIx64
-                "\", \"container\": \"%s\"}\n",
-                r.ok() ? "true" : "false", r.is_resimulated ? "true" : "false", r.ticks_verified,
-                r.last_tick, r.ticks_missing, r.snapshots_verified, r.surfaces_verified,
-                r.ok() ? "null" : std::to_string(r.first_mismatch->tick).c_str(),
-                r.ok() ? "" : r.first_mismatch->what.c_str(), r.last_hash,
-                json_escaped(r.container).c_str());
-  } else {
-    std::printf("%s: %s\n", path.c_str(), r.container.c_str());
-    if (!r.is_resimulated)
-      std::printf("recorded with another sim_version: cannot re-simulate, stored bytes checked\n");
-    std::printf("%" PRIu64 " ticks re-simulated to the same hash, %" PRIu64 " missing; %" PRIu64
-                " snapshots, %" PRIu64 " surfaces equal\n",
-                r.ticks_verified, r.ticks_missing, r.snapshots_verified, r.surfaces_verified);
-    if (r.ok())
-      std::printf("verified to tick %" PRIu64 ", hash %016" PRIx64 "\n", r.last_tick, r.last_hash);
-    else
-      std::printf("first difference at tick %" PRIu64 ": %s\n", r.first_mismatch->tick,
-                  r.first_mismatch->what.c_str());
+  std::fputs(as_json ? json_of(*verified).c_str() : text_of(path, *verified).c_str(), stdout);
+  switch (verified->verdict()) {
+    case recording::Verdict::Verified:
+      return static_cast<int>(ExitCode::Ok);
+    case recording::Verdict::Different:
+      return static_cast<int>(ExitCode::Mismatch);
+    case recording::Verdict::NotVerified:
+      return static_cast<int>(ExitCode::NotVerified);
   }
-  return static_cast<int>(r.ok() ? ExitCode::Ok : ExitCode::Mismatch);
+  return static_cast<int>(ExitCode::NotVerified);
 }
 
 int run(int argc, char** argv) {
@@ -137,9 +163,11 @@ int run(int argc, char** argv) {
       "  trocar-journal info out/demo/session.mcap     who, how long, which channels\n"
       "  trocar-journal verify out/demo/session.mcap   simulate again, name the first difference\n"
       "  trocar-journal verify session.mcap --reduction liver.reduction\n"
-      "                                                likewise, of a session that had a "
+      "                                                the same for a session that had a "
       "reduction\n"
-      "Exit codes: 0 ok, 1 difference found, 2 usage, 3 file cannot be read.");
+      "Exit codes: 0 verified, 1 difference found, 2 usage, 3 file cannot be read, 6 not all "
+      "could\n"
+      "be verified, though nothing differs: the reasons are printed.");
   app.require_subcommand(1);
   std::string log_level = "warn", path;
   bool as_json = false;
@@ -150,7 +178,8 @@ int run(int argc, char** argv) {
   app.add_option("--log-level", log_level, "error, warn, info, debug or off")
       ->capture_default_str();
   auto* info = app.add_subcommand("info", "Show what the journal holds");
-  auto* check = app.add_subcommand("verify", "Simulate the session again and compare every tick");
+  auto* check =
+      app.add_subcommand("verify", "Simulate the session again and compare all that it says");
   for (auto* command : {info, check}) {
     command->add_option("FILE", path, "a journal (.mcap)")->required();
     command->add_flag("--json", as_json, "print one JSON object");

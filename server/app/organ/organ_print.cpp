@@ -5,7 +5,8 @@
 #include <cstdio>
 #include <numeric>
 
-#include "common/base/quote.h"
+#include "common/base/json.h"
+#include "server/organs/material/material_keys.h"
 #include "server/organs/organ/organ_file.h"
 
 namespace trocar::app {
@@ -117,26 +118,18 @@ void print_materials(const organ::Organ& organ) {
     std::printf("  rest pose           settled, in equilibrium\n");
 }
 
-void print_json(const material::Material& m) {
-  std::printf("  \"elastic_law\": \"%s\",\n  \"poisson_ratio\": %.9g,\n", name_of(m.elastic_law),
-              m.poisson_ratio);
-  if (m.elastic_law == material::ElasticLaw::Measured)
-    std::printf("  \"measured\": %s,\n", quote(m.measured.name).c_str());
-  std::printf("  \"averaged_strain\": %s,\n", m.has_averaged_strain ? "true" : "false");
-  std::printf("  \"spring_law\": \"%s\",\n  \"spring_stiffness_n_m\": %.9g,\n",
-              m.spring_law == material::SpringLaw::Constant ? "constant" : "volume_consistent",
-              m.spring_stiffness_n_m);
-  std::printf("  \"young_modulus_pa\": %.9g,\n  \"density_kg_m3\": %.9g,\n", m.young_modulus_pa,
-              m.density_kg_m3);
-  std::printf("  \"node_damping_per_s\": %.9g,\n  \"spring_damping_time_s\": %.9g,\n",
-              m.node_damping_per_s, m.spring_damping_time_s);
-  std::printf("  \"fibre_direction\": [%.9g, %.9g, %.9g],\n  \"fibre_stiffness_ratio\": %.9g,\n",
-              m.fibre_direction.x, m.fibre_direction.y, m.fibre_direction.z,
-              m.fibre_stiffness_ratio);
-  std::printf("  \"fibre_tension\": %.9g,\n  \"tension\": %.9g,\n", m.fibre_tension, m.tension);
-  std::printf(
-      "  \"cut_energy_j_m2\": %.9g,\n  \"blade_friction_pa\": %.9g,\n  \"tear_stretch\": %.9g,\n",
-      m.cut_energy_j_m2, m.blade_friction_pa, m.tear_stretch);
+Json array_of(const Vec3d& v) {
+  return {v.x, v.y, v.z};
+}
+
+void add_material(const material::Material& m, Json& json) {
+  json["elastic_law"] = name_of(m.elastic_law);
+  if (m.elastic_law == material::ElasticLaw::Measured) json["measured"] = m.measured.name;
+  json["averaged_strain"] = m.has_averaged_strain;
+  json["spring_law"] =
+      m.spring_law == material::SpringLaw::Constant ? "constant" : "volume_consistent";
+  for (const auto& key : material::kNumberKeys) json[std::string(key.key)] = m.*key.member;
+  json["fibre_direction"] = array_of(m.fibre_direction);
 }
 
 }  // namespace
@@ -196,34 +189,33 @@ void print_text(const organ::Organ& organ) {
 
 void print_json(const organ::Organ& organ) {
   const mesh::TetMesh& mesh = organ.mesh;
-  const Vec3d size = size_mm(mesh);
   const EdgeLengths edges = edge_lengths(mesh);
-  std::printf("{\n  \"name\": %s,\n  \"source\": %s,\n", quote(organ.name).c_str(),
-              quote(organ.source).c_str());
-  std::printf("  \"nodes\": %zu,\n  \"surface_nodes\": %zu,\n  \"tets\": %zu,\n", mesh.node_count(),
-              mesh.surface_nodes.size(), mesh.tets.size());
-  std::printf("  \"edges\": %zu,\n  \"links\": %zu,\n  \"surface_triangles\": %zu,\n",
-              mesh.edges.size(), mesh.links.size(), mesh.boundary_triangles.size());
-  std::printf("  \"size_mm\": [%.6g, %.6g, %.6g],\n  \"volume_l\": %.9g,\n  \"mass_kg\": %.9g,\n",
-              size.x, size.y, size.z, enclosed_volume(mesh) * 1e3, mass_kg(organ));
-  std::printf("  \"edge_mm\": {\"min\": %.6g, \"mean\": %.6g, \"max\": %.6g},\n", edges.min_mm,
-              edges.mean_mm, edges.max_mm);
-  if (mesh.tets.empty()) {
-    std::printf("  \"dihedral_deg\": null,\n");
-  } else {
+  Json json{{"name", organ.name},
+            {"source", organ.source},
+            {"nodes", mesh.node_count()},
+            {"surface_nodes", mesh.surface_nodes.size()},
+            {"tets", mesh.tets.size()},
+            {"edges", mesh.edges.size()},
+            {"links", mesh.links.size()},
+            {"surface_triangles", mesh.boundary_triangles.size()},
+            {"size_mm", array_of(size_mm(mesh))},
+            {"volume_l", enclosed_volume(mesh) * 1e3},
+            {"mass_kg", mass_kg(organ)},
+            {"edge_mm", {{"min", edges.min_mm}, {"mean", edges.mean_mm}, {"max", edges.max_mm}}},
+            {"dihedral_deg", nullptr}};
+  if (!mesh.tets.empty()) {
     const auto angles = mesh::dihedral_range(mesh);
-    std::printf("  \"dihedral_deg\": {\"min\": %.6g, \"max\": %.6g},\n", angles.min_deg,
-                angles.max_deg);
+    json["dihedral_deg"] = {{"min", angles.min_deg}, {"max", angles.max_deg}};
   }
-  print_json(organ.material);
-  std::printf("  \"fibre_nodes\": %zu,\n", nodes_with_fibres(organ));
-  std::printf("  \"regions\": %zu,\n  \"gravity_m_s2\": [%.9g, %.9g, %.9g],\n  \"settled\": %s,\n",
-              organ.regions.size(), organ.gravity_m_s2.x, organ.gravity_m_s2.y,
-              organ.gravity_m_s2.z, organ.stress_free_positions_m.empty() ? "false" : "true");
-  std::printf("  \"source_offset_m\": [%.9g, %.9g, %.9g],\n", organ.source_offset_m.x,
-              organ.source_offset_m.y, organ.source_offset_m.z);
-  std::printf("  \"fixed_nodes\": %zu,\n  \"hash\": \"%016" PRIx64 "\"\n}\n",
-              organ.fixed_nodes.size(), organ::organ_hash(organ));
+  add_material(organ.material, json);
+  json["fibre_nodes"] = nodes_with_fibres(organ);
+  json["regions"] = organ.regions.size();
+  json["gravity_m_s2"] = array_of(organ.gravity_m_s2);
+  json["settled"] = !organ.stress_free_positions_m.empty();
+  json["source_offset_m"] = array_of(organ.source_offset_m);
+  json["fixed_nodes"] = organ.fixed_nodes.size();
+  json["hash"] = hex64(organ::organ_hash(organ));
+  std::fputs(to_text(json).c_str(), stdout);
 }
 
 }  // namespace trocar::app

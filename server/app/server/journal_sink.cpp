@@ -18,6 +18,7 @@ class RecordedSession : public JournalSink {
     recorder_->take_participants(present, tick);
   }
   Status close() override { return recorder_->close(); }
+  wire::RecordingState state() const override { return recorder_->state(); }
 
  private:
   std::unique_ptr<recording::Recorder> recorder_;

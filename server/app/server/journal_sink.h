@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "common/journal/session_topics.h"
+#include "common/wire/recording_state.h"
 #include "common/wire/surface_layout.h"
 #include "server/organs/organ/organ.h"
 #include "server/session/participants/roster.h"
@@ -27,6 +28,8 @@ class JournalSink {
                                  Tick tick) = 0;
   // I/O thread, after the simulation thread has ended.
   virtual Status close() = 0;
+  // Any thread, at any time: whether everything has been recorded so far.
+  virtual wire::RecordingState state() const = 0;
 };
 
 // A journal at `path`, or none for "none" (then null). reduction: of the session, if it has one.

@@ -136,6 +136,7 @@ Status Server::open() {
     replication.on_ghost_wanted = [this](bool is_wanted) { ghost_->set_wanted(is_wanted); };
   replicator_ = std::make_unique<replication::Replicator>(
       *tcp_, inbox_, layout, organ.name, organ::organ_hash(organ), std::move(replication));
+  if (journal_) replicator_->set_recording(journal_->state());
   loop_ = std::make_unique<SimulationLoop>(simulation_, inbox_, handover_, journal_.get(),
                                            loop_options(),
                                            [this] { asio::post(io_, [this] { begin_end(); }); });
@@ -177,9 +178,14 @@ Status Server::run() {
   log::info("{} ({} nodes) at {}:{}, Ctrl-C ends the session", simulation_.organ().name,
             simulation_.organ().mesh.node_count(), options_.address, tcp_->port());
   loop_->start();
-  io_.run();
+  const Status ran = net::run(io_);
+  if (!ran.ok()) {
+    log::error("{}", ran.error().message);
+    loop_->stop();  // what has been simulated is in the recording
+  }
   wall_seconds_ = static_cast<double>(monotonic_ns() - begin) * 1e-9;
-  return finish();
+  const Status finished = finish();
+  return ran.ok() ? finished : ran;
 }
 
 void Server::on_signal(int signal) {
@@ -191,6 +197,7 @@ void Server::on_signal(int signal) {
 
 void Server::take_frames() {
   if (is_ending_) return;
+  if (journal_) replicator_->set_recording(journal_->state());
   handover_.take_all(frames_);
   replicator_->publish(frames_);
   if (ghost_) ghost_->take_frames(frames_);
@@ -263,11 +270,14 @@ Status Server::finish() {
     log::warn("{} frames never reached the clients: the network thread was stuck",
               handover_.dropped());
   if (options_.summary_file.empty()) return closed;
+  const wire::RecordingState not_recorded{
+      .status = wire::RecordingStatus::Off, .frames_missing = 0, .text = {}};
   const Summary summary{.organ = simulation_.organ().name,
                         .node_count = simulation_.organ().mesh.node_count(),
                         .surface_vertex_count = simulation_.layout().vertex_count(),
                         .wall_seconds = wall_seconds_,
                         .journal = journal_ ? options_.journal : "none",
+                        .recording = journal_ ? journal_->state() : not_recorded,
                         .reduction = reduction_,
                         .frames_lost = handover_.dropped(),
                         .loop = report,

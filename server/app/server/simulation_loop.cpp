@@ -96,6 +96,10 @@ SimulationLoop::SimulationLoop(step::Simulation& simulation, participants::Simul
 }
 
 SimulationLoop::~SimulationLoop() {
+  stop();
+}
+
+void SimulationLoop::stop() {
   request_stop();
   if (thread_.joinable()) thread_.join();
 }

@@ -96,7 +96,9 @@ class SimulationLoop {
   // Asks for a snapshot soon, in a frame; any thread may call it.
   void request_snapshot() { is_snapshot_requested_.store(true, std::memory_order_relaxed); }
   void request_stop() { is_stop_requested_.store(true, std::memory_order_relaxed); }  // any thread
-  // After `ended` was called, or start() never was.
+  // Ends the loop at its next frame and waits for that.
+  void stop();
+  // After `ended` was called, or stop(), or start() never was.
   const LoopReport& report() const { return report_; }
 
   // One tick without pacing; true if it was the last. For start()'s thread, and for tests.

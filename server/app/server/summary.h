@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "common/wire/recording_state.h"
 #include "server/app/server/simulation_loop.h"
 #include "server/session/ghost/ghost.h"
 #include "server/session/net/tcp_server.h"
@@ -18,6 +19,7 @@ struct Summary {
   std::size_t node_count = 0, surface_vertex_count = 0;
   double wall_seconds = 0;
   std::string journal;
+  wire::RecordingState recording;
   std::optional<journal::ReductionDescription> reduction;
   std::uint64_t frames_lost = 0;  // between simulation and I/O thread
   const LoopReport& loop;

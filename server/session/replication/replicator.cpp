@@ -227,6 +227,7 @@ std::optional<Replicator::Ending> Replicator::admit(Client& client, const proto:
       !send(client, encode_participants(roster_.list())) || !send(client, topology()))
     return too_slow;
   if (encoder_.current() && !give_frame(client, true)) return too_slow;
+  if (!send(client, encode_recording(recording_))) return too_slow;
   // The others; the newcomer has it already, a second copy does no harm.
   participants_changed_ = true;
   return std::nullopt;
@@ -412,6 +413,17 @@ void Replicator::publish(const ghost::GhostReport& report) {
     const bool is_given = has_room && send(*client, bytes);
     ++(is_given ? counters_.ghosts_given : counters_.ghosts_skipped);
   }
+}
+
+void Replicator::set_recording(const wire::RecordingState& state) {
+  if (state == recording_) return;
+  const auto now = options_.clock_ns();
+  if (state.status == recording_.status && now - recording_told_ns_ < kSecondNs) return;
+  if (state.is_damaged() && state.status != recording_.status) log::error("{}", state.text);
+  recording_ = state;
+  recording_told_ns_ = now;
+  broadcast(encode_recording(recording_));
+  settle_participants();
 }
 
 void Replicator::begin_barrier(const step::SharedFrame& last) {

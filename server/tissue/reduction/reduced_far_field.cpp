@@ -416,8 +416,9 @@ float ReducedFarField::estimate_error(const dynamics::FarFieldStep& step,
     if (!relaxed.empty()) left -= relaxed[node];
     energy += static_cast<double>(length_squared(left) / model.rim_stiffness()[i]);
   }
-  return static_cast<float>(
+  const auto estimate = static_cast<float>(
       std::sqrt(energy / (std::max(field_work_j_, contact_work_j_) + kLeastWork_j)));
+  return estimate < kBroken ? estimate : kBroken;  // finite: it is part of the state
 }
 
 float ReducedFarField::end(const dynamics::FarFieldStep& step, dynamics::Float4* velocities,
