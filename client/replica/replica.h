@@ -117,7 +117,7 @@ class Replica final : public MessageSink {
   std::uint64_t notice_count() const { return notice_count_; }
   // The full solution, for whoever has asked, is of the surface that is shown if the epochs agree.
   const Ghost& ghost() const { return ghost_; }
-  // What the server last said of its recording.
+  // Returns what the server last said of its recording.
   const wire::RecordingState& recording() const { return recording_; }
   const std::optional<BarrierOutcome>& barrier() const { return barrier_; }
   const std::string& goodbye_text() const { return goodbye_text_; }

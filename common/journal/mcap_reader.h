@@ -35,7 +35,7 @@ struct ReadReport {
 
 // Returns false to stop reading. The message's bytes are valid only during the call.
 using MessageVisitor = std::function<bool(const McapMessage&)>;
-// Which channels to read; none given: all.
+// The filter says which channels to read; without one, all are read.
 using ChannelFilter = std::function<bool(const McapChannel&)>;
 
 struct OwnedMessage {
@@ -56,7 +56,7 @@ class McapReader {
   const std::map<std::uint16_t, McapSchema>& schemas() const { return schemas_; }
   const std::map<std::uint16_t, McapChannel>& channels() const { return channels_; }
   const std::vector<McapMetadata>& metadata() const { return metadata_; }
-  // As the file says, or, if recovered, as counted.
+  // These are as the file says or, if it was recovered, as counted.
   const McapStatistics& statistics() const { return statistics_; }
   // By start time.
   const std::vector<McapChunkIndex>& chunks() const { return chunks_; }

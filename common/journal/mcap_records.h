@@ -119,7 +119,7 @@ class RecordScope {
   std::size_t content_at_;
 };
 
-// Append a whole record.
+// These append a whole record each.
 void put_header(Bytes& out, const McapHeader& header);
 void put_schema(Bytes& out, const McapSchema& schema);
 void put_channel(Bytes& out, const McapChannel& channel);

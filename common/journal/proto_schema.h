@@ -1,6 +1,6 @@
 #pragma once
 
-// What MCAP's "protobuf" encoding wants in a schema: a serialised FileDescriptorSet from which any
+// MCAP's "protobuf" encoding wants this in a schema: a serialised FileDescriptorSet from which any
 // reader can decode the message, files in order of dependency.
 //
 // Only the messages and enums that the message can contain are in it: each chunk of a journal
@@ -20,7 +20,7 @@ inline constexpr const char* kProtobufEncoding = "protobuf";
 
 // Deterministic: equal descriptors give equal bytes.
 Bytes schema_bytes(const google::protobuf::Descriptor& message);
-// Full name without a leading dot.
+// Returns the full name without a leading dot.
 std::string schema_name(const google::protobuf::Descriptor& message);
 
 }  // namespace trocar::journal

@@ -56,8 +56,8 @@ const char* topic_name(JournalTopic topic);
 std::optional<JournalTopic> topic_of(std::string_view name);
 const google::protobuf::Descriptor& topic_message(JournalTopic topic);
 
-// Of the local reduction that a session had: without it the session cannot be simulated again.
-// In the metadata as reduction_hash, reduction_file and reduction_source; absent without one.
+// A session that had a local reduction cannot be simulated again without it. The metadata name it
+// as reduction_hash, reduction_file and reduction_source; absent without one.
 struct ReductionDescription {
   std::uint64_t hash = 0;  // organ::reduction_hash
   std::string file;        // its name, without folders

@@ -14,6 +14,7 @@ function(project_test name)
     string(REPLACE "/" "_" dependency_name ${dependency})
     target_link_libraries(${name} PRIVATE trocar_${dependency_name})
   endforeach()
+  use_precompiled_headers(${name} test ${ARG_DEPENDS})
   target_compile_definitions(${name} PRIVATE
     TROCAR_SOURCE_DIR="${PROJECT_SOURCE_DIR}" TROCAR_BINARY_DIR="${PROJECT_BINARY_DIR}/bin")
   set(labels)

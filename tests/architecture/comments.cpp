@@ -16,15 +16,18 @@ const std::set<std::string> kOpeners{"As",    "Else",  "Likewise", "Neither", "N
                                      "Where", "Which", "Whose",    "What"};
 // Finite verbs that do not end in s or ed, and imperatives with which comments begin.
 const std::set<std::string> kVerbs{
-    "add",  "am",    "are",    "ask",    "be",      "become", "began",  "begin", "belong", "call",
-    "came", "can",   "cannot", "come",   "compare", "could",  "count",  "cut",   "did",    "do",
-    "fall", "fell",  "find",   "follow", "gave",    "get",    "give",   "go",    "had",    "have",
-    "hold", "keep",  "kept",   "know",   "lay",     "leave",  "left",   "let",   "lie",    "lost",
-    "made", "make",  "may",    "mean",   "meet",    "met",    "might",  "move",  "must",   "need",
-    "pass", "press", "put",    "read",   "reach",   "remain", "return", "run",   "said",   "saw",
-    "say",  "see",   "send",   "sent",   "set",     "shall",  "should", "show",  "stand",  "start",
-    "stay", "stood", "take",   "tell",   "told",    "took",   "try",    "turn",  "use",    "want",
-    "went", "were",  "will",   "work",   "would",   "write",  "wrote",  "don't", "isn't",  "it's"};
+    "add",   "allow",  "append", "bring",   "build",  "carry",  "contain", "differ", "exist",
+    "grow",  "happen", "refuse", "replace", "am",     "are",    "ask",     "be",     "become",
+    "began", "begin",  "belong", "call",    "came",   "can",    "cannot",  "come",   "compare",
+    "could", "count",  "cut",    "did",     "do",     "fall",   "fell",    "find",   "follow",
+    "gave",  "get",    "give",   "go",      "had",    "have",   "hold",    "keep",   "kept",
+    "know",  "lay",    "leave",  "left",    "let",    "lie",    "lost",    "made",   "make",
+    "may",   "mean",   "meet",   "met",     "might",  "move",   "must",    "need",   "pass",
+    "press", "put",    "read",   "reach",   "remain", "return", "run",     "said",   "saw",
+    "say",   "see",    "send",   "sent",    "set",    "shall",  "should",  "show",   "stand",
+    "start", "stay",   "stood",  "take",    "tell",   "told",   "took",    "try",    "turn",
+    "use",   "want",   "went",   "were",    "will",   "work",   "would",   "write",  "wrote",
+    "don't", "isn't",  "it's"};
 
 // The text of the line's comment if the line holds nothing else.
 bool is_comment_line(const std::string& line, std::string& text) {

@@ -156,6 +156,11 @@ Breaches check_includes(const SourceTree& tree) {
         breaches.push_back(at(file, include.line) + "includes " + include.target +
                            ": no such file from the root, write the path from there");
     }
+    if (file.is_header()) continue;
+    const std::string own = file.path.substr(0, file.path.size() - 4) + ".h";
+    if (tree.has_file(own) && (file.includes.empty() || file.includes.front().target != own))
+      breaches.push_back(at(file, 1) + "does not include " + own +
+                         " first, which would show that it compiles alone");
   }
   return breaches;
 }

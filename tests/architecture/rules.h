@@ -16,7 +16,8 @@ using Breaches = std::vector<std::string>;
 // and says what it is about, and depends only on layers above it. Server and client do not depend
 // on each other, and what they share depends on neither.
 Breaches check_folders(const SourceTree& tree);
-// Every #include "..." names an existing file from the root.
+// Every #include "..." names an existing file from the root, and a source includes the header of
+// its own name first.
 Breaches check_includes(const SourceTree& tree);
 // A CMakeLists.txt lists what the sources include, no less and no more: the folders that headers
 // include are its DEPENDS, those that only sources include its USES. A program's DEPENDS are the

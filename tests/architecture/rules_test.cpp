@@ -31,7 +31,9 @@ class Rules : public ::testing::Test {
     write("common/math/m.h", "#pragma once\n#include \"common/base/a.h\"\n");
     library("common/wire", "SOURCES w.cpp HEADERS w.h DEPENDS common/math USES proto LINK zstd");
     write("common/wire/w.h", "#pragma once\n#include \"common/math/m.h\"\n");
-    write("common/wire/w.cpp", "#include \"proto/wire.pb.h\"\n#include \"common/math/m.h\"\n");
+    write("common/wire/w.cpp",
+          "#include \"common/wire/w.h\"\n#include \"proto/wire.pb.h\"\n#include "
+          "\"common/math/m.h\"\n");
     library("server/tissue/world", "HEADERS world.h DEPENDS common/math");
     write("server/tissue/world/world.h", "#pragma once\n#include \"common/math/m.h\"\n");
     library("server/tissue/step", "SOURCES tick.cpp USES common/base");
@@ -164,7 +166,12 @@ TEST_F(Rules, WhatIsSharedSeesNeitherServerNorClient) {
 
 TEST_F(Rules, AnIncludeThatIsNotFromTheRootIsFound) {
   append("common/wire/w.cpp", "#include \"w.h\"\n");
-  expect_one(check_includes(tree()), "common/wire/w.cpp:3: ", "from the root");
+  expect_one(check_includes(tree()), "common/wire/w.cpp:4: ", "from the root");
+}
+
+TEST_F(Rules, ASourceThatDoesNotBeginWithItsOwnHeaderIsFound) {
+  write("common/base/a.cpp", "#include <vector>\n#include \"common/base/a.h\"\n");
+  expect_one(check_includes(tree()), "common/base/a.cpp:1: ", "does not include common/base/a.h");
 }
 
 TEST_F(Rules, AnIncludeInACommentIsNone) {

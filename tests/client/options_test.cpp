@@ -21,6 +21,7 @@ TEST(ClientOptions, DefaultsAreAWindowAndASurgeonOnThisMachine) {
   EXPECT_EQ((*options)->display, Display::Window);
   EXPECT_EQ((*options)->role, replica::Role::Surgeon);
   EXPECT_FALSE((*options)->name.empty());
+  EXPECT_EQ((*options)->wait_s, 15);
   EXPECT_LE((*options)->name.size(), 32u);
 }
 
@@ -45,6 +46,7 @@ TEST(ClientOptions, EachWrongValueIsAUsageErrorThatNamesTheOption) {
       {{"--size", "640x480x3"}, "--size"},
       {{"--role", "nurse"}, "--role"},
       {{"--fps", "0"}, "--fps"},
+      {{"--wait", "-1"}, "--wait"},
       {{"--screenshot-at", "-3"}, "--screenshot-at"},
       {{"--role", "observer", "--script", "x.toml"}, "--script"},
       {{"--replay", "x.mcap", "--script", "x.toml"}, "--replay"},

@@ -119,8 +119,8 @@ Momenta momenta_of(const world::World& world) {
   return sum;
 }
 
-// What the tool gives is what the block gets: the sums of the forces and torques felt over time are
-// its momenta, with a push beside its centre that sets it spinning.
+// The block gets what the tool gives: the sums of the forces and torques felt over time are its
+// momenta, with a push beside its centre that sets it spinning.
 TEST(Reaction, OfAnOffAxisPushIsAllTheMomentumThatAFreeBlockGets) {
   auto organ = block(5, 3, 5, 0.010, [](organ::Organ& o) {
     o.fixed_nodes.clear();

@@ -110,7 +110,7 @@ TEST(Grasp, TwoHandsPullOneFlapAndTheirForcesBalanceWhatHoldsIt) {
   const float both = scene.reaction(0).force_n.y + scene.reaction(1).force_n.y;
   EXPECT_LT(scene.reaction(0).force_n.y, -0.02f);
   EXPECT_LT(scene.reaction(1).force_n.y, -0.02f);
-  // What holds the fixed layer in place: the slope of the energy over its height.
+  // The slope of the energy over its height is what holds the fixed layer in place.
   const auto energy_at = [&](double height) {
     auto displacements = scene.world().displacements;
     for (const auto node : organ.fixed_nodes)

@@ -1,4 +1,4 @@
-// The grid against looking at every point.
+// The grid is compared with looking at every point.
 
 #include "server/tissue/contact/point_grid.h"
 

@@ -31,7 +31,7 @@ inline float top_of(const organ::Organ& organ) {
   return static_cast<float>(top);
 }
 
-// Shaft up, tip at the lowest point.
+// The shaft points up, and the tip is at the lowest point.
 inline Pose upright(const Vec3f& tip) {
   return {tip, rotation_from_z({0, 1, 0})};
 }

@@ -1,4 +1,4 @@
-// What a tick costs, learnt from ticks: level, slope, and what spikes may not do to either.
+// The cost of a tick is learnt from ticks: level, slope, and what spikes may not do to either.
 
 #include "server/session/control/cost_model.h"
 

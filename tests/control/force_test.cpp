@@ -28,7 +28,7 @@ std::uint64_t work_ns(Tick tick) {
   return tick >= kHeavyFrom && tick < kHeavyTo ? 3'000'000 : 100'000;
 }
 
-// A simulation with one tool.
+// This is a simulation with one tool.
 struct Pressed {
   explicit Pressed(const organ::Organ& organ) : simulation(organ) {}
 

@@ -1,4 +1,4 @@
-// What the controller decides in virtual sessions, as a table and as plots to look at.
+// Writes what the controller decides in virtual sessions, as a table and as plots to look at.
 
 #include <CLI/CLI.hpp>
 #include <cstdio>

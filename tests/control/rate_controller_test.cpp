@@ -24,7 +24,7 @@ using testing::run_virtual;
 
 const step::LayerCounts kAll{4, 4, 4, 4}, kLeast{2, 1, 1, 1};
 
-// What must hold in every run, whatever happens.
+// These rules must hold in every run, whatever happens.
 void expect_rules(const std::vector<Row>& rows, const RateLimits& limits) {
   int since_change = 1000;
   for (std::size_t i = 0; i < rows.size(); ++i) {

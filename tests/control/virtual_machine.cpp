@@ -7,7 +7,7 @@ namespace {
 
 constexpr double kTickUs = static_cast<double>(kTickNanoseconds) * 1e-3;
 
-// What the tissue's side of a tick would report.
+// Returns what the tissue's side of a tick would report.
 step::TickReport report_of(const Machine& machine, int contacts, const step::TickDecisions& d,
                            Tick tick) {
   step::TickReport report;

@@ -109,7 +109,7 @@ CutOrgan::CutOrgan(organ::Organ organ, const Settings& settings)
       copy_(*organ_),
       copy_places_(copy_),
       cutter_(topology_, settings),
-      has_floor_(settings.method == Method::Robust),
+      has_floor_(settings.make_splitter == nullptr),
       volume_(total_volume(topology_)),
       mass_(total_mass(topology_)),
       surface_(surface_area(topology_)) {}

@@ -20,7 +20,7 @@ fault() { printf '%s\n' "$*" >>"$faults"; }
 
 pages=(README.md CONTRIBUTING.md docs/*.md)
 # Pages that a generator writes: their numbers and rows are its business.
-is_generated() { grep -q 'generated' <<<"$(head -n 3 "$1")"; }
+is_generated() { head -n 5 "$1" | grep -qiE 'generated|(written|made) by'; }
 
 # Text outside of code blocks, with line numbers kept.
 prose() { awk '/^```/ {f = !f; print ""; next} f || /^(    |\t)[^-* ]/ {print ""; next} {print}' "$1"; }

@@ -13,6 +13,8 @@
 #include <sstream>
 #include <thread>
 
+#include "common/journal/session_journal.h"
+
 extern char** environ;
 
 namespace trocar::e2e {
@@ -97,12 +99,16 @@ double json_number(const std::string& json, const std::string& key) {
   return text.empty() ? 0 : std::stod(text);
 }
 
-bool wait_for_file(const fs::path& file, double seconds) {
+bool wait_until(const std::function<bool()>& condition, double seconds) {
   for (int i = 0; i < static_cast<int>(seconds * 50); ++i) {
-    if (fs::exists(file) && fs::file_size(file) > 0) return true;
+    if (condition()) return true;
     std::this_thread::sleep_for(milliseconds(20));
   }
   return false;
+}
+
+bool wait_for_file(const fs::path& file, double seconds) {
+  return wait_until([&] { return fs::exists(file) && fs::file_size(file) > 0; }, seconds);
 }
 
 namespace {
@@ -142,6 +148,15 @@ Program Session::client(const std::string& name, const std::string& role,
 
 Program Session::hand(const std::string& name, const fs::path& script) {
   return client(name, "surgeon", {"--script", script.string()});
+}
+
+bool Session::wait_for_tick(Tick tick, double seconds) const {
+  return wait_until(
+      [&] {
+        const auto recorded = journal::SessionJournal::open(journal.string());
+        return recorded.ok() && (*recorded)->info().last_tick >= tick;
+      },
+      seconds);
 }
 
 }  // namespace trocar::e2e

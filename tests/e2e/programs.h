@@ -5,8 +5,11 @@
 #include <sys/types.h>
 
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
+
+#include "common/base/tick.h"
 
 namespace trocar::e2e {
 
@@ -38,6 +41,8 @@ std::string read_text(const std::filesystem::path& file);
 std::string json_value(const std::string& json, const std::string& key);
 double json_number(const std::string& json, const std::string& key);
 bool wait_for_file(const std::filesystem::path& file, double seconds);
+// Asks every 20 ms; false if the answer is still no after `seconds`.
+bool wait_until(const std::function<bool()>& condition, double seconds);
 
 // A server on a free port and clients of it, all logging into test_folder().
 class Session {
@@ -50,6 +55,8 @@ class Session {
                  const std::vector<std::string>& extra = {});
   // A client that plays a script of deploy/scenes or of `folder`.
   Program hand(const std::string& name, const std::filesystem::path& script);
+  // Until that tick is in the recording, which gets a chunk every 250 ms.
+  bool wait_for_tick(Tick tick, double seconds = 120) const;
   std::string summary_of(const std::string& name) const {
     return read_text(folder / (name + ".json"));
   }

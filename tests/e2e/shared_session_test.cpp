@@ -7,7 +7,6 @@
 #include <fstream>
 #include <map>
 #include <random>
-#include <thread>
 
 #include "client/replay/replay_source.h"
 #include "client/replica/replica.h"
@@ -50,7 +49,7 @@ void expect_replay_equals(const std::filesystem::path& file,
   auto source = replay::ReplaySource::open(file.string(), [&now] { return now; });
   ASSERT_TRUE(source.ok()) << source.error().message;
   replica::Replica replica([](const proto::Envelope&) { return true; });
-  std::mt19937 random(std::random_device{}());
+  std::mt19937 random(5);
   (*source)->pause();
   for (int i = 0; i < 5; ++i) {
     auto chosen = crcs.begin();
@@ -69,7 +68,7 @@ void run_shared_session(const std::string& organ) {
   auto lift = session.hand("Lift", kScenes / "lift.toml");
   auto press = session.hand("Press", kScenes / "press.toml");
   auto instructor = session.client("Instructor", "instructor");
-  std::this_thread::sleep_for(std::chrono::seconds(5));
+  ASSERT_TRUE(session.wait_for_tick(5000));
   auto observer = session.client("Observer", "observer", {"--corrupt-frame", "100"});
 
   ASSERT_EQ(session.server().wait(300), 0) << read_text(session.folder / "server.log");
@@ -134,7 +133,7 @@ TEST(SharedSession, CutsAreTheSameForEverybodyAndInTheRecording) {
   auto retract = session.hand("Retract", kScenes / "retract.toml");
   auto slices = session.hand("Slices", kScenes / "slices.toml");
   auto watcher = session.client("Watcher", "observer", {"--corrupt-frame", "200"});
-  std::this_thread::sleep_for(std::chrono::seconds(4));
+  ASSERT_TRUE(session.wait_for_tick(4000));
   auto late = session.client("Late", "instructor");
 
   ASSERT_EQ(session.server().wait(300), 0) << read_text(session.folder / "server.log");
@@ -178,7 +177,7 @@ TEST(SharedSession, AKilledServerLosesAtMostHalfASecondOfItsRecording) {
   Session session("liver");
   auto lift = session.hand("Lift", kScenes / "lift.toml");
   auto observer = session.client("Observer", "observer");
-  std::this_thread::sleep_for(std::chrono::milliseconds(6300));
+  ASSERT_TRUE(session.wait_for_tick(6000));
   session.server().signal(SIGKILL);
   EXPECT_EQ(session.server().wait(10), 128 + SIGKILL);
   EXPECT_EQ(observer.wait(20), 5) << "the session was lost";
@@ -201,7 +200,7 @@ TEST(SharedSession, AKilledServerLosesAtMostHalfASecondOfItsRecording) {
 TEST(SharedSession, SigtermEndsItInOrder) {
   Session session("liver");
   auto lift = session.hand("Lift", kScenes / "lift.toml");
-  std::this_thread::sleep_for(std::chrono::seconds(2));
+  ASSERT_TRUE(session.wait_for_tick(1000));
   session.server().signal(SIGTERM);
   EXPECT_EQ(session.server().wait(20), 0);
   EXPECT_EQ(lift.wait(20), 0);

@@ -126,7 +126,7 @@ Path plate_path(trocar::testing::Random& random, double step_m) {
   return straight_path({middle - along - down, middle - along + down},
                        {middle + along - down, middle + along + down}, step_m);
 }
-// Into a block from outside, to somewhere inside.
+// The path goes into a block from outside, to somewhere inside.
 Path block_path(trocar::testing::Random& random, double step_m) {
   const Vec3d tip{random.between(-0.02, 0.02), random.between(-0.02, 0.02), 0.06};
   const Vec3d deep = tip - Vec3d{0, 0, random.between(0.04, 0.09)};
@@ -234,7 +234,8 @@ TEST(Nakao, MovesThatWouldBreakTheSolidAreRefused) {
   EXPECT_FALSE(can_move(topology::Topology(held), {centre, face, 20000}));
 }
 
-// As of the other events: whatever is sent, it is refused or leaves as much solid as there was.
+// Moves are like the other events: whatever is sent, it is refused or leaves as much solid as there
+// was.
 TEST(Nakao, ChangedHistoriesWithMovesBreakNoTopology) {
   const auto block = box_organ(4, 4, 4, 0.014);
   CutOrgan organ(block, settings_of(Variant::Adaptive));

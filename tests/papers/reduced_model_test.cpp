@@ -69,8 +69,8 @@ TEST(ReducedModel, AllModesGiveTheLinearSolutionOfTheFullModel) {
   EXPECT_LT((u - expected).norm(), 1e-8 * expected.norm());
 }
 
-// Of a law without C20: with it the resistance to volume is another in growth than in loss, however
-// small they are.
+// The law is without C20: with it the resistance to volume is another in growth than in loss,
+// however small they are.
 TEST(ReducedModel, IsTheFullModelAsForcesVanish) {
   auto organ = block(3, 3, 2);
   std::fill_n(organ.material.measured.coefficients_pa.begin() + 1, 4, 0.0);
@@ -151,7 +151,7 @@ TEST(Build, TheBestTangentErrsNoMoreThanTheInitialOnTheTraining) {
   ASSERT_TRUE(validate(built->reduction).ok()) << validate(built->reduction).error().message;
   EXPECT_EQ(built->tried.size() + built->indefinite, 54u);
   EXPECT_LE(built->best_error, built->initial_error);
-  // What it says is what the reduced model does.
+  // The reduced model does what the report says.
   double sum = 0;
   const ReducedModel reduced(built->reduction, TangentChoice::Best);
   for (const auto& [press, u] : training.snapshots)

@@ -99,7 +99,7 @@ TEST_F(ReductionFile, OneOfAnotherOrganIsRefused) {
   auto patched = organ_;
   patched.regions.push_back({"hard", patched.material, {NodeIndex(1), NodeIndex(2)}});
   says(patched, "is of another material than");
-  // What changes no solution may differ.
+  // Figures that change no solution may differ.
   auto heavier = organ_;
   heavier.material.density_kg_m3 *= 2;
   heavier.name = "another";

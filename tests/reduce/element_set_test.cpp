@@ -87,7 +87,7 @@ TEST_P(ElementSetOfLaw, NonlinearForcesAreTheWholeLessTheLinear) {
   const auto u = moves(0.1);
   const Vector linear = to_vector(forces(reduction::ForcePart::Whole, u)) -
                         to_vector(forces(reduction::ForcePart::Nonlinear, u));
-  // Of all degrees of freedom, also those that the model holds.
+  // The forces are those of all degrees of freedom, also those that the model holds.
   const auto half = moves(0.05);
   const Vector half_linear = to_vector(forces(reduction::ForcePart::Whole, half)) -
                              to_vector(forces(reduction::ForcePart::Nonlinear, half));
@@ -114,7 +114,7 @@ TEST_P(ElementSetOfLaw, TheTangentIsTheDerivativeOfTheForces) {
   const auto u = moves(0.2);
   tangent_.clear();
   set_.add_tangent(u, true, tangent_);
-  // Of the off-line solver's forces, which are those of double precision.
+  // The differences are of the off-line solver's forces, which are those of double precision.
   const double h = 1e-7;
   double worst = 0, largest = 0;
   for (std::uint32_t column = 0; column < nodes_.size(); ++column)

@@ -29,7 +29,7 @@ class InertiaFields : public ::testing::Test {
     forces_.middleRows<3>(3 * static_cast<Eigen::Index>(top)).setIdentity();
     greens_ = model_->linear_displacements(forces_);
     Matrix modes = slowest_vibrations(*model_, 8).modes;
-    // Orthonormal, of the same span.
+    // The fields become orthonormal; their span stays the same.
     vibrations_ = Eigen::HouseholderQR<Matrix>(modes).householderQ() *
                   Matrix::Identity(modes.rows(), modes.cols());
   }
@@ -49,7 +49,8 @@ class InertiaFields : public ::testing::Test {
     }
   }
 
-  // Of the response at the node that is struck, in a basis beside all degrees of freedom.
+  // Returns the error of the response at the node that is struck, in a basis beside all degrees of
+  // freedom.
   double error(const Matrix& basis, double rate_hz) const {
     finite_elements::SparseMatrix k;
     Matrix f, b;

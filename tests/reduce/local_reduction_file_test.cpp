@@ -217,11 +217,11 @@ TEST_F(LocalReductionFile, DamageIsNoticed) {
   expect_bad(Bytes{}, "is not a .reduction file");
 }
 
-// What a checksum guards against is not what somebody makes on purpose.
+// A checksum does not guard against what somebody makes on purpose.
 TEST_F(LocalReductionFile, BodiesThatFitTheirChecksumAreNotTrustedEither) {
   constexpr PackedKind kKind{kLocalReductionMagic, "", "", "", 2, 2};
   const auto body = unpack(kKind, packed())->body;
-  // What ends between its patches is whole, with fewer of them.
+  // A body that ends between its patches is whole, with fewer of them.
   for (std::size_t length = 0; length < body.size(); length += 37) {
     const Bytes cut(body.begin(), body.begin() + static_cast<std::ptrdiff_t>(length));
     const auto unpacked = unpack_local_reduction(pack(kKind, 2, cut));
@@ -379,7 +379,7 @@ TEST_F(LocalReductionFile, NodesAndTetsMustFitTheOrgan) {
   says("a Green's function");
 }
 
-// Of smooth fields with peaks of all widths, on as many nodes as organs have.
+// The modes are smooth fields with peaks of all widths, on as many nodes as organs have.
 TEST_F(LocalReductionFile, PackingLeavesModesOrthonormal) {
   constexpr std::size_t kNodes = 4000, kModes = 16;
   std::mt19937 random(1);

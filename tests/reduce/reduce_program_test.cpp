@@ -104,7 +104,7 @@ TEST_F(ReduceProgram, LeavesALocalReductionAndHowFarItIsOff) {
   EXPECT_GT(read(folder_ / "out" / "local.csv").size(), 100u);
   ASSERT_EQ(make("2", "again.reduction"), 0) << log();
   EXPECT_EQ(read(folder_ / "again.reduction"), read(folder_ / "small.reduction"));
-  // What is of one method is not of the other.
+  // Options of one method are not of the other.
   EXPECT_EQ(run({"reduce", "liver", "--method", "local", "--tangents", "3"}), 2);
   expect_line("--tangents: is of --method dogan");
   EXPECT_EQ(run({"reduce", "liver", "--patches", "3"}), 2);

@@ -105,9 +105,9 @@ organ::LocalReduction synthetic_local_reduction(const organ::Organ& organ) {
   for (const auto& patch : r.patches)
     nodes.insert(nodes.end(), patch.reach.begin(), patch.reach.end());
   std::ranges::sort(nodes);
-  nodes.erase(std::ranges::unique(nodes).begin(), nodes.end());
+  nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
   constexpr std::size_t kModes = 4;
-  // Of one series, so that all modes are orthogonal to them.
+  // They are of one series with the modes, so that all modes are orthogonal to them.
   constexpr std::size_t kVibrations = 2;
   const auto fields = orthonormal(length, 1, kVibrations + kModes + r.patches.size());
   for (std::size_t i = 0; i < kVibrations; ++i)

@@ -1,6 +1,8 @@
 // trocar-journal: what a recorded session holds, and whether it simulates to the same bits again.
 
 #include <fmt/format.h>
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
 
 #include <cinttypes>
@@ -132,11 +134,12 @@ std::string text_of(const std::string& path, const recording::VerifyReport& r) {
 
 int verify(const std::string& path, const std::string& reduction_file, bool as_json) {
   const std::uint64_t started = monotonic_ns();
+  const bool is_terminal = ::isatty(STDERR_FILENO) != 0;
   bool is_progress_shown = false;
   auto verified = recording::verify_journal(
       path,
       [&](Tick tick, Tick last) {
-        if (as_json || monotonic_ns() - started < 2'000'000'000u) return;
+        if (!is_terminal || as_json || monotonic_ns() - started < 2'000'000'000u) return;
         is_progress_shown = true;
         std::fprintf(stderr, "\r%s: %" PRIu64 " of %" PRIu64 " s", kProgram, tick / kTicksPerSecond,
                      last / kTicksPerSecond);

@@ -308,11 +308,13 @@ void add_commands(CLI::App& app, Options& options) {
       ->type_name("LAW")
       ->check(CLI::IsMember({"springs", "tensor-mass", "neo-hookean"}));
   import->add_option("--young-modulus", options.young_modulus_pa, "of its tissue, Pa [4000]")
-      ->type_name("E");
+      ->type_name("E")
+      ->check(CLI::Range(1.0, 1e12));
   import
       ->add_option("--poisson-ratio", options.poisson_ratio,
                    "of tensor-mass and neo-hookean tissue, 0 to 0.4999 [0.45]")
-      ->type_name("NU");
+      ->type_name("NU")
+      ->check(CLI::Range(0.0, 0.4999));
 
   auto* inspect = app.add_subcommand("inspect", "check an organ and print its figures");
   inspect->add_option("FILE", options.inspected, ".organ or .msh file, or a built-in organ's name")

@@ -1,6 +1,6 @@
 #pragma once
 
-// What one published frame becomes in a journal: the recorder writes these messages, and
+// One published frame becomes these messages in a journal: the recorder writes these messages, and
 // verification builds them again from a second simulation and compares.
 //
 // The order is: tick batch, surface change, surface delta, topology, keyframe, claims, solver

@@ -1,6 +1,6 @@
 #pragma once
 
-// Where a recorded message differs from the one that a simulation gives.
+// A difference says where a recorded message differs from the one that a simulation gives.
 
 #include <optional>
 #include <string>

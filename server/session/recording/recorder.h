@@ -52,13 +52,13 @@ class Recorder {
 
   // Simulation thread.
   void take_frame(const step::SharedFrame& frame);
-  // I/O thread: after each change.
+  // The I/O thread calls it after each change.
   void take_participants(std::vector<participants::Participant> present, Tick tick);
   // After both producers have ended: writes what is queued and the file's summary.
   Status close();
   // After close().
   const RecorderCounters& counters() const { return counters_; }
-  // Any thread, at any time.
+  // Any thread may call it at any time.
   wire::RecordingState state() const;
 
  private:

@@ -24,7 +24,7 @@ struct StoredDifference {
 
 class StoredSurface {
  public:
-  // What the stream says wrongly of itself, or nothing.
+  // A check returns what the stream says wrongly of itself, or nothing.
   using Check = std::optional<StoredDifference>;
 
   Check take(const proto::SurfaceTopology& message);

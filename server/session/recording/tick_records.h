@@ -1,6 +1,7 @@
 #pragma once
 
-// What a tick took from outside, between the simulation's structs and the journal's messages.
+// These functions carry what a tick took from outside between the simulation's structs and the
+// journal's messages.
 
 #include "common/base/result.h"
 #include "server/tissue/step/published_frame.h"

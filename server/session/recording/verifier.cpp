@@ -49,7 +49,7 @@ std::unique_ptr<google::protobuf::Message> comparable(const google::protobuf::Me
   return copy;
 }
 
-// What depends on lists of participants.
+// Clears what depends on lists of participants.
 void clear_names(google::protobuf::Message& message) {
   auto* claims = dynamic_cast<proto::ClaimLog*>(&message);
   if (claims == nullptr) return;
@@ -437,7 +437,7 @@ void Verifier::compare(std::string_view topic, const google::protobuf::Message& 
   end_frame();  // it is the last message of a frame
 }
 
-// What the simulation expects and the recording has not shown is missing.
+// A message that the simulation expects and the recording has not shown is missing.
 void Verifier::end_frame() {
   for (const auto& entry : expected_)
     add_reason(fmt::format("tick {}: a message on {} is missing", frame_tick_, entry.topic));

@@ -30,11 +30,11 @@ class Verifier {
 
   // False once there is a difference.
   bool take(std::string_view topic, BytesView bytes);
-  // After the last message.
+  // This is called after the last message.
   void finish(const journal::McapReader& container);
 
  private:
-  // What the simulation says that a frame's messages are.
+  // The simulation expects these messages of a frame.
   struct Expected {
     std::string topic;
     std::unique_ptr<google::protobuf::Message> message;

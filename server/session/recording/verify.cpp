@@ -100,7 +100,7 @@ Result<VerifyReport> verify_journal(const std::string& path,
         fmt::format("it was recorded with sim_version {}, this program has {}: it cannot be "
                     "simulated again, only its surfaces were decoded",
                     info.sim_version, kSimVersion));
-  // What is damaged is known before anything is compared: lists of participants may be among it.
+  // Damage is known before anything is compared: lists of participants may be among it.
   const auto whole = (*journal)->read_all([](auto, Tick, BytesView) { return true; });
   report.damaged_chunks = whole.damaged_chunks;
   if (whole.damaged_chunks > 0)

@@ -338,7 +338,9 @@ void SelfContactFinder::add_point(Site site, TriangleIndex triangle, const Place
     ++out.dropped;
     return;
   }
-  const auto& [a, b, c] = surface_[triangle];
+  // Clang 14 lets no lambda capture a structured binding.
+  const auto& corners = surface_[triangle];
+  const Site a = corners[0], b = corners[1], c = corners[2];
   const auto& w = place.weights;
   const auto between = [&](const auto& at) {
     return at(site) - (at(a) * w.x + at(b) * w.y + at(c) * w.z);

@@ -100,8 +100,7 @@ void Relaxation::follow(const topology::Topology& topology, const Groups& groups
       for (const auto tet : topology.tets_of(node)) tets_.push_back(tet);
     }
   std::ranges::sort(tets_);
-  const auto doubles = std::ranges::unique(tets_);
-  tets_.erase(doubles.begin(), doubles.end());
+  tets_.erase(std::unique(tets_.begin(), tets_.end()), tets_.end());
   for (const auto tet : tets_) {
     set_lane(topology, groups, tet);
     if (const auto block = tet.value / kLanes; stale_.empty() || stale_.back() != block)

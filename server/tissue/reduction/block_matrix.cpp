@@ -8,7 +8,7 @@ namespace trocar::reduction {
 
 BlockMatrix::BlockMatrix(std::size_t node_count, std::vector<Pair> pairs) {
   std::ranges::sort(pairs);
-  pairs.erase(std::ranges::unique(pairs).begin(), pairs.end());
+  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
   begins_.assign(node_count + 1, 0);
   for (const auto& [row, column] : pairs) {
     ++begins_[row + 1];

@@ -14,7 +14,7 @@ namespace {
 template <typename T>
 void sort_once(std::vector<T>& values) {
   std::ranges::sort(values);
-  values.erase(std::ranges::unique(values).begin(), values.end());
+  values.erase(std::unique(values.begin(), values.end()), values.end());
 }
 
 double entry(const std::vector<double>& lower, std::size_t i, std::size_t j) {

@@ -1,0 +1,174 @@
+#include "tests/fuzz/decoders.h"
+
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <string>
+
+#include "common/base/assert.h"
+#include "common/journal/session_journal.h"
+#include "common/tool/script.h"
+#include "common/wire/framing.h"
+#include "common/wire/surface_codec.h"
+#include "common/wire/surface_messages.h"
+#include "proto/journal.pb.h"
+#include "proto/wire.pb.h"
+#include "server/lab/scenario/scenario.h"
+#include "server/organs/catalogue/builtin_organs.h"
+#include "server/organs/material/material_file.h"
+#include "server/organs/mesh/gmsh_reader.h"
+#include "server/organs/organ/local_reduction_file.h"
+#include "server/organs/organ/organ_file.h"
+#include "server/organs/organ/reduction_file.h"
+#include "server/tissue/step/organ_surface.h"
+
+namespace trocar::fuzz {
+namespace {
+
+// An error is one line that says something.
+bool checked(const Status& status) {
+  if (status.ok()) return true;
+  TROCAR_ASSERT(!status.error().message.empty());
+  TROCAR_ASSERT(status.error().message.find('\n') == std::string::npos);
+  return false;
+}
+template <typename T>
+bool checked(const Result<T>& result) {
+  return result.ok() || checked(Status(result.error()));
+}
+
+std::string_view text_of(BytesView bytes) {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+bool decode_envelope(BytesView bytes) {
+  proto::Envelope envelope;
+  return checked(wire::decode_envelope(bytes, envelope));
+}
+
+// The first byte chooses between a delta and a keyframe, and how many vertices there are.
+bool decode_surface(BytesView bytes) {
+  if (bytes.empty()) return false;
+  const bool is_keyframe = (bytes[0] & 1) != 0;
+  const wire::QuantisedSurface before(1 + std::size_t{2} * bytes[0],
+                                      wire::QuantisedVertex{7, 8, 9});
+  auto surface = before;
+  const auto payload = bytes.subspan(1);
+  const bool is_accepted = checked(is_keyframe ? wire::decode_keyframe(payload, surface)
+                                               : wire::decode_delta(payload, surface));
+  TROCAR_ASSERT(is_accepted || surface == before);
+  for (const auto& v : surface)
+    TROCAR_ASSERT(std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}) <= wire::kMaxQuanta);
+  return is_accepted;
+}
+
+bool decode_topology(BytesView bytes) {
+  proto::SurfaceTopology message;
+  return message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())) &&
+         checked(wire::read(message));
+}
+
+// A change of a small block's surface, as a client knows it.
+bool decode_change(BytesView bytes) {
+  static const wire::SurfaceLayout kBefore = [] {
+    auto layout = step::make_surface_layout(*catalogue::make_lattice({6, 4, 6, 0.01}));
+    layout.vertex_of_node.clear();
+    std::ranges::fill(layout.node_of_vertex, NodeIndex{});
+    return layout;
+  }();
+  proto::SurfaceChange message;
+  if (!message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) return false;
+  const auto change = wire::read(message, kBefore);
+  if (!checked(change)) return false;
+  auto layout = kBefore;
+  const bool is_accepted = checked(wire::apply(*change, layout));
+  TROCAR_ASSERT(is_accepted || layout == kBefore);
+  return is_accepted;
+}
+
+bool decode_journal(BytesView bytes) {
+  const int file = memfd_create("journal", 0);
+  TROCAR_ASSERT(file >= 0);
+  const bool is_written =
+      write(file, bytes.data(), bytes.size()) == static_cast<ssize_t>(bytes.size());
+  TROCAR_ASSERT(is_written);
+  const auto journal = journal::SessionJournal::open("/proc/self/fd/" + std::to_string(file));
+  bool is_accepted = checked(journal);
+  if (is_accepted) {
+    auto& read = **journal;
+    constexpr Tick kLast = ~Tick{0} >> 1;
+    const auto all = [](Tick, const auto&) { return true; };
+    is_accepted &= checked(read.organ());
+    is_accepted &= checked(read.read_tick_records(0, kLast, all));
+    is_accepted &= checked(read.read_surface_deltas(0, kLast, all));
+    is_accepted &= checked(read.read_topology_changes(0, kLast, all));
+    is_accepted &= checked(read.read_frame_states(0, kLast, all));
+    is_accepted &= checked(read.read_claims(0, kLast, all));
+    is_accepted &= checked(read.read_snapshots(0, kLast, all));
+    is_accepted &= checked(read.surface_key_before(kLast));
+    is_accepted &= checked(read.participants_before(kLast));
+  }
+  close(file);
+  return is_accepted;
+}
+
+// Bytes without a file's magic are taken for the content of one: no fuzzer guesses a CRC.
+template <typename Unpack>
+bool decode_packed(BytesView bytes, std::string_view magic, std::uint32_t version,
+                   const Unpack& unpack) {
+  if (organ::has_magic(bytes, magic)) return checked(unpack(bytes));
+  const organ::PackedKind kind{magic, "", "", "", version, version};
+  return checked(unpack(organ::pack(kind, version, Bytes(bytes.begin(), bytes.end()))));
+}
+
+bool decode_organ(BytesView bytes) {
+  return organ::has_magic(bytes, "TROCARO1") ? checked(organ::unpack_organ(bytes))
+                                             : checked(organ::decode_organ(bytes));
+}
+bool decode_reduction(BytesView bytes) {
+  return decode_packed(bytes, organ::kReductionMagic, 1, organ::unpack_reduction);
+}
+bool decode_local_reduction(BytesView bytes) {
+  return decode_packed(bytes, organ::kLocalReductionMagic, 2, organ::unpack_local_reduction);
+}
+bool decode_gmsh(BytesView bytes) {
+  return checked(mesh::parse_gmsh(text_of(bytes), mesh::Unit::Metre, "a.msh"));
+}
+bool decode_script(BytesView bytes) {
+  return checked(tool::parse_script_text(text_of(bytes), "a.toml"));
+}
+bool decode_scenario(BytesView bytes) {
+  return checked(scenario::parse_scenario_text(text_of(bytes), "a.toml"));
+}
+bool decode_material(BytesView bytes) {
+  return checked(material::parse_material_text(text_of(bytes), "a.toml"));
+}
+
+constexpr Decoder kDecoders[] = {
+    {"envelope", decode_envelope},
+    {"surface_codec", decode_surface},
+    {"surface_topology", decode_topology},
+    {"surface_change", decode_change},
+    {"journal", decode_journal},
+    {"organ", decode_organ},
+    {"reduction", decode_reduction},
+    {"local_reduction", decode_local_reduction},
+    {"gmsh", decode_gmsh},
+    {"script", decode_script},
+    {"scenario", decode_scenario},
+    {"material", decode_material},
+};
+
+}  // namespace
+
+std::span<const Decoder> decoders() {
+  return kDecoders;
+}
+
+const Decoder* find_decoder(std::string_view name) {
+  const auto at = std::ranges::find(kDecoders, name, &Decoder::name);
+  return at == std::end(kDecoders) ? nullptr : at;
+}
+
+}  // namespace trocar::fuzz

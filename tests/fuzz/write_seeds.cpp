@@ -1,0 +1,100 @@
+// write_seeds DIR: the seeds that are not text, one file per decoder, made from small sound data.
+// Run after a change of a format: build/release/bin/write_seeds tests/fuzz/seeds
+
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+
+#include "common/wire/surface_messages.h"
+#include "proto/wire.pb.h"
+#include "server/organs/catalogue/builtin_organs.h"
+#include "server/organs/organ/local_reduction_file.h"
+#include "server/organs/organ/organ_file.h"
+#include "server/organs/organ/reduction_file.h"
+#include "server/tissue/step/organ_surface.h"
+#include "tests/journal/session_samples.h"
+#include "tests/reduce/small_organ.h"
+#include "tests/support/surface_edits.h"
+
+namespace {
+
+using namespace trocar;  // NOLINT: a program's own file
+namespace fs = std::filesystem;
+
+fs::path root;
+
+void save(const char* decoder, const char* name, BytesView bytes) {
+  fs::create_directories(root / decoder);
+  std::ofstream file(root / decoder / name, std::ios::binary);
+  file.write(reinterpret_cast<const char*>(bytes.data()),
+             static_cast<std::streamsize>(bytes.size()));
+  std::printf("%s/%s: %zu bytes\n", decoder, name, bytes.size());
+}
+void save(const char* decoder, const char* name, const google::protobuf::Message& message) {
+  save(decoder, name, bytes_of(std::string_view(message.SerializeAsString())));
+}
+
+void save_surfaces() {
+  for (const bool is_keyframe : {false, true}) {
+    // As decoders.cpp reads it: the first byte is the count of vertices and the kind.
+    Bytes bytes{static_cast<std::uint8_t>(is_keyframe ? 101 : 100)};
+    const wire::QuantisedSurface before(1 + 2 * bytes[0], wire::QuantisedVertex{7, 8, 9});
+    auto after = before;
+    for (std::size_t i = 0; i < after.size(); i += 3)
+      after[i].x += static_cast<std::int32_t>(i) - 90;
+    if (is_keyframe)
+      wire::encode_keyframe(after, bytes);
+    else
+      wire::encode_delta(before, after, bytes);
+    save("surface_codec", is_keyframe ? "keyframe" : "delta", bytes);
+  }
+  const auto layout = step::make_surface_layout(*catalogue::make_lattice({6, 4, 6, 0.01}));
+  proto::SurfaceTopology topology;
+  wire::write(layout, "box", topology);
+  save("surface_topology", "box", topology);
+  const auto& first = layout.triangles.front();
+  auto change = trocar::testing::split_edge(layout, first[0], first[1], 1);
+  auto after = layout;
+  TROCAR_ASSERT(wire::apply(change, after).ok());
+  proto::SurfaceChange message;
+  wire::write(change, after, message);
+  save("surface_change", "split_edge", message);
+}
+
+void save_envelopes() {
+  proto::Envelope hello;
+  hello.mutable_hello()->set_name("Ada");
+  save("envelope", "hello", hello);
+  proto::Envelope sample;
+  sample.mutable_tool_sample()->set_sequence(1);
+  save("envelope", "tool_sample", sample);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 2) {
+    std::fputs("write_seeds: usage: write_seeds DIR\n", stderr);
+    return 2;
+  }
+  root = argv[1];
+  save_surfaces();
+  save_envelopes();
+  const auto block = reduce::testing::block(3, 3, 3);
+  save("organ", "block", organ::encode_organ(block));
+  save("organ", "block.organ", organ::pack_organ(block));
+  save("reduction", "synthetic.reduction",
+       organ::pack_reduction(reduce::testing::synthetic_reduction(block, 3)));
+  save("local_reduction", "synthetic.reduction",
+       *organ::pack_local_reduction(reduce::testing::synthetic_local_reduction(block)));
+  const auto path = fs::temp_directory_path() / "trocar-seed.mcap";
+  fs::remove(path);
+  {
+    journal::testing::SampleSession session(path.string(), 800);
+    session.run(4);
+    TROCAR_ASSERT(session.writer().close().ok());
+  }
+  std::ifstream file(path, std::ios::binary);
+  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  save("journal", "sample", bytes_of(std::string_view(text)));
+}
