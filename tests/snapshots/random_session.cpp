@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "server/organs/catalogue/builtin_organs.h"
+#include "server/tissue/reduction/reduced_tissue.h"
 
 namespace trocar::testing {
 namespace {
@@ -84,7 +85,7 @@ SnapshotScene random_scene(SnapshotOrgan kind, std::uint64_t seed) {
 }
 
 RandomSession::RandomSession(SnapshotScene scene, std::uint64_t seed)
-    : simulation_(std::move(scene.organ), 1, std::move(scene.reduction)),
+    : simulation_(std::move(scene.organ), 1, reduction::at_work(std::move(scene.reduction))),
       reach_m_(scene.reach_m),
       random_(seed),
       hands_(kHands) {

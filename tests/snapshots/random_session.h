@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "server/organs/organ/local_reduction.h"
 #include "server/tissue/step/simulation.h"
 #include "tests/support/random.h"
 

@@ -8,6 +8,7 @@
 #include <functional>
 
 #include "server/organs/organ/local_reduction_file.h"
+#include "server/tissue/reduction/reduced_tissue.h"
 #include "tests/contact/folded_organ.h"
 #include "tests/reduce/small_organ.h"
 #include "tests/step/hands.h"
@@ -32,7 +33,7 @@ struct Golden {
 
 void expect_golden(const Golden& golden) {
   for (const unsigned workers : {1u, 3u}) {
-    Simulation simulation(golden.organ, workers, golden.reduction);
+    Simulation simulation(golden.organ, workers, reduction::at_work(golden.reduction));
     bool has_happened = false;
     for (Tick tick = 1; tick <= static_cast<Tick>(golden.ticks); ++tick) {
       hands::TickInputs inputs;
