@@ -36,7 +36,7 @@ struct Program {
   std::set<std::string> depends;  // DEPENDS
 };
 
-// What the CMakeLists.txt of a folder says.
+// The CMakeLists.txt of a folder says this.
 struct Folder {
   std::set<std::string> headers;  // HEADERS of its project_library(), from the folder
   std::set<std::string> sources;  // SOURCES

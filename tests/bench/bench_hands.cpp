@@ -226,7 +226,8 @@ void Session::one_tick() {
   const auto cpu_ns = thread_cpu_ns() - cpu;
   wall_.push_back(static_cast<double>(monotonic_ns() - wall) * 1e-3);
   simulation_.take_frame();
-  // What the tick itself needs: a shared machine's other work is not what is measured.
+  // The controller hears the CPU time, which the tick itself needs: a shared machine's other work
+  // is not what is measured.
   if (controller_) controller_->observe(report, {cpu_ns, 0});
   for (std::size_t s = 0; s < stages_.size(); ++s)
     if (report.stage_cpu_ns[s] > 0) stages_[s].push_back(1e-3 * report.stage_cpu_ns[s]);

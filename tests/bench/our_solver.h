@@ -30,7 +30,7 @@ struct SolverOptions {
   float tolerance_n = 0;
 };
 
-// What this build of the engine can do; what it cannot is left out of the results.
+// Whether this build of the engine can do it; what it cannot is left out of the results.
 bool has(Law law);
 std::uint32_t max_threads();
 

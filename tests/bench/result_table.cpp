@@ -147,7 +147,7 @@ struct Column {
   const char* format;
 };
 
-// What the row's JSON holds under the columns' keys; columns that no row has are left out.
+// Writes what the rows' JSON holds under the columns' keys; columns that no row has are left out.
 std::string parts_table(const std::vector<const Row*>& rows, std::vector<Column> columns) {
   std::vector<Json> objects;
   for (const Row* row : rows) objects.push_back(to_json(*row));

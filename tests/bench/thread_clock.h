@@ -16,7 +16,7 @@ inline double seconds_on(clockid_t clock) {
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
-// What one piece of work took, s.
+// One piece of work took so long, s.
 struct Duration {
   double thread_cpu = 0, process_cpu = 0, wall = 0;
 };

@@ -372,7 +372,7 @@ TEST(Squeeze, DamagedPairsAreRefused) {
   EXPECT_TRUE(squeezed.simulation->restore_snapshot(good).ok());
 }
 
-// What lies still is looked at every kLookEvery ticks, and found where it was.
+// Tissue that lies still is looked at every kLookEvery ticks, and found where it was.
 TEST(Squeeze, PairsThatLieStillAreSeldomLookedAt) {
   Squeezed squeezed;
   squeezed.close(kPressed, 100);

@@ -229,7 +229,7 @@ TEST(Lips, DrawnApartTheyMeetAgain) {
   EXPECT_LT(deepest_overlap(scene.simulation), 0.0001);
 }
 
-// What is above a cut through the whole block, against what is below.
+// The part above a cut through the whole block is pressed against the part below.
 class Piece : public ::testing::Test {
  protected:
   // The blade lies along x.

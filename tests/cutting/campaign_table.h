@@ -26,7 +26,7 @@ class CampaignTable {
 
   // Markdown: what the cuts did, by organ, by kind of cut, by place in the series.
   std::string text() const;
-  // What does not hold, a line each; nothing: all laws hold.
+  // Returns what does not hold, a line each; nothing: all laws hold.
   std::vector<std::string> broken_laws() const;
 
  private:

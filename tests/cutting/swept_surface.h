@@ -1,7 +1,7 @@
 #pragma once
 
-// What blades sweep, as triangles, and which tets of a mesh it touches: without regard for what the
-// cutter makes of it.
+// Finds what blades sweep, as triangles, and which tets of a mesh it touches: without regard for
+// what the cutter makes of it.
 
 #include "tests/cutting/cut_organ.h"
 

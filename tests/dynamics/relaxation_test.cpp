@@ -121,7 +121,7 @@ class Specimen {
   Workers workers_{1};
 };
 
-// What is left of a stress that has come evenly within the first `ramp` seconds.
+// Returns what is left of a stress that has come evenly within the first `ramp` seconds.
 double left_after_ramp(double t, double ramp) {
   double left = 1;
   for (const auto& [weight, tau] : liver().relaxation)

@@ -28,7 +28,7 @@ class OrganProgram : public testing::ProgramFixture {
     arguments.insert(arguments.end(), more.begin(), more.end());
     return run(arguments);
   }
-  // The number after `word` in `text`.
+  // Returns the number after `word` in `text`.
   static double number_after(const std::string& text, const std::string& word) {
     const auto found = text.find(word);
     EXPECT_NE(found, std::string::npos) << word << " is missing in " << text;

@@ -63,7 +63,7 @@ constexpr Outcome kOutcomes[] = {
     {"ok_comments_extra_sections.msh", nullptr, nullptr},
 };
 
-// What a mesh is, whatever its numbering.
+// Expects the same mesh, whatever its numbering.
 void expect_same_shape(const TetMesh& a, const TetMesh& b, double tolerance_m) {
   const auto sorted = [](const TetMesh& mesh) {
     std::vector<std::array<double, 3>> points;

@@ -198,7 +198,7 @@ TEST(Replication, the_ghost_goes_to_those_who_asked_while_they_do) {
   EXPECT_EQ(offsets, report.offsets);
   EXPECT_EQ(ghost.offsets_crc(), wire::surface_crc(offsets));
 
-  // Of a surface that they do not have: nothing.
+  // Clients get nothing of a surface that they do not have.
   report.epoch = 1;
   publish();
   report.epoch = 0;

@@ -52,7 +52,7 @@ class RawClient {
   // Says Hello and reads up to Welcome.
   bool join(const std::string& name, proto::Role role);
 
-  // What this client shows, kept up to date by follow().
+  // The client shows this; follow() keeps it up to date.
   wire::QuantisedSurface surface;
   std::optional<wire::SurfaceLayout> layout;  // from the first topology that follow() met
   int topologies = 0, changes = 0;

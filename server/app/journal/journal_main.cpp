@@ -9,8 +9,8 @@
 #include <cstdio>
 
 #include "common/base/cpu.h"
+#include "common/base/json.h"
 #include "common/base/log.h"
-#include "common/base/quote.h"
 #include "common/base/timing.h"
 #include "common/base/version.h"
 #include "common/journal/session_journal.h"
@@ -22,16 +22,24 @@ namespace {
 
 constexpr const char* kProgram = "trocar-journal";
 
-std::string json_escaped(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    if (c == '"' || c == '\\') out += '\\';
-    if (static_cast<unsigned char>(c) < 0x20)
-      out += ' ';
-    else
-      out += c;
-  }
-  return out;
+std::uint64_t count_of(const journal::McapReader& mcap, std::uint16_t id) {
+  const auto& counts = mcap.statistics().channel_message_counts;
+  const auto count = counts.find(id);
+  return count == counts.end() ? 0 : count->second;
+}
+
+Json json_of(const journal::SessionInfo& info, const journal::McapReader& mcap) {
+  Json channels = Json::object();
+  for (const auto& [id, channel] : mcap.channels()) channels[channel.topic] = count_of(mcap, id);
+  return {{"seconds", static_cast<double>(info.last_tick) / static_cast<double>(kTicksPerSecond)},
+          {"last_tick", info.last_tick},
+          {"sim_version", info.sim_version},
+          {"protocol", info.protocol},
+          {"organ", info.organ_name},
+          {"finished", info.is_finished},
+          {"gap_messages", info.gap_messages},
+          {"reduction_hash", info.reduction ? Json(hex64(info.reduction->hash)) : Json()},
+          {"channels", channels}};
 }
 
 int show_info(const std::string& path, bool as_json) {
@@ -41,28 +49,7 @@ int show_info(const std::string& path, bool as_json) {
   const auto& mcap = (*journal)->container();
   const double seconds = static_cast<double>(info.last_tick) / static_cast<double>(kTicksPerSecond);
   if (as_json) {
-    std::string reduction_hash = "null";
-    if (info.reduction) {
-      char text[19];
-      std::snprintf(text, sizeof text, "\"%016" PRIx64 "\"", info.reduction->hash);
-      reduction_hash = text;
-    }
-    std::printf("{\"seconds\": %.3f, \"last_tick\": %" PRIu64
-                ", \"sim_version\": %u, \"protocol\": \"%s\", \"organ\": \"%s\", "
-                "\"finished\": %s, \"gap_messages\": %" PRIu64
-                ", \"reduction_hash\": %s, "
-                "\"channels\": {",
-                seconds, info.last_tick, info.sim_version, info.protocol.c_str(),
-                json_escaped(info.organ_name).c_str(), info.is_finished ? "true" : "false",
-                info.gap_messages, reduction_hash.c_str());
-    const char* separator = "";
-    for (const auto& [id, channel] : mcap.channels()) {
-      const auto count = mcap.statistics().channel_message_counts.find(id);
-      std::printf("%s\"%s\": %" PRIu64, separator, json_escaped(channel.topic).c_str(),
-                  count == mcap.statistics().channel_message_counts.end() ? 0 : count->second);
-      separator = ", ";
-    }
-    std::printf("}}\n");
+    std::fputs(to_text(json_of(info, mcap)).c_str(), stdout);
     return 0;
   }
   std::printf("%s\n", path.c_str());
@@ -81,39 +68,42 @@ int show_info(const std::string& path, bool as_json) {
     std::printf("    %-24s %s\n", participant.name().c_str(),
                 wire::name_of(wire::role_of(participant.role())));
   std::printf("  channels\n");
-  for (const auto& [id, channel] : mcap.channels()) {
-    const auto count = mcap.statistics().channel_message_counts.find(id);
-    std::printf("    %-24s %8" PRIu64 " messages\n", channel.topic.c_str(),
-                count == mcap.statistics().channel_message_counts.end() ? 0 : count->second);
-  }
+  for (const auto& [id, channel] : mcap.channels())
+    std::printf("    %-24s %8" PRIu64 " messages\n", channel.topic.c_str(), count_of(mcap, id));
   if (info.gap_messages > 0)
     std::printf("  gaps         %" PRIu64 " frames were dropped while recording\n",
                 info.gap_messages);
   return 0;
 }
 
-std::string json_of(const recording::VerifyReport& r) {
-  std::string difference = "null", reasons;
-  if (r.first_difference)
-    difference = fmt::format(
-        R"({{"tick": {}, "channel": {}, "field": {}, "recorded": {}, "simulated": {}}})",
-        r.first_difference->tick, quote(r.first_difference->channel),
-        quote(r.first_difference->field), quote(r.first_difference->recorded),
-        quote(r.first_difference->simulated));
-  for (const auto& reason : r.reasons) reasons += (reasons.empty() ? "" : ", ") + quote(reason);
-  return fmt::format(
-      R"({{"verified": {}, "verdict": "{}", "reasons": [{}], "reasons_left_out": {},
-"first_difference": {},
-"resimulated": {}, "first_tick": {}, "last_tick": {}, "ticks_verified": {}, "ticks_missing": {},
-"ticks_not_simulated": {}, "frames_verified": {}, "surfaces_verified": {}, "surfaces_decoded": {},
-"snapshots_verified": {}, "snapshots_continued": {}, "participants_verified": {},
-"damaged_chunks": {}, "last_hash": "{:016x}", "container": {}}}
-)",
-      r.verdict() == recording::Verdict::Verified, recording::name_of(r.verdict()), reasons,
-      r.reasons_left_out, difference, r.is_resimulated, r.first_tick, r.last_tick, r.ticks_verified,
-      r.ticks_missing, r.ticks_not_simulated, r.frames_verified, r.surfaces_verified,
-      r.surfaces_decoded, r.snapshots_verified, r.snapshots_continued, r.participants_verified,
-      r.damaged_chunks, r.last_hash, quote(r.container));
+Json json_of(const recording::VerifyReport& r) {
+  Json difference;
+  if (const auto& first = r.first_difference)
+    difference = {{"tick", first->tick},
+                  {"channel", first->channel},
+                  {"field", first->field},
+                  {"recorded", first->recorded},
+                  {"simulated", first->simulated}};
+  return {{"verified", r.verdict() == recording::Verdict::Verified},
+          {"verdict", recording::name_of(r.verdict())},
+          {"reasons", r.reasons},
+          {"reasons_left_out", r.reasons_left_out},
+          {"first_difference", difference},
+          {"resimulated", r.is_resimulated},
+          {"first_tick", r.first_tick},
+          {"last_tick", r.last_tick},
+          {"ticks_verified", r.ticks_verified},
+          {"ticks_missing", r.ticks_missing},
+          {"ticks_not_simulated", r.ticks_not_simulated},
+          {"frames_verified", r.frames_verified},
+          {"surfaces_verified", r.surfaces_verified},
+          {"surfaces_decoded", r.surfaces_decoded},
+          {"snapshots_verified", r.snapshots_verified},
+          {"snapshots_continued", r.snapshots_continued},
+          {"participants_verified", r.participants_verified},
+          {"damaged_chunks", r.damaged_chunks},
+          {"last_hash", hex64(r.last_hash)},
+          {"container", r.container}};
 }
 
 std::string text_of(const std::string& path, const recording::VerifyReport& r) {
@@ -147,7 +137,8 @@ int verify(const std::string& path, const std::string& reduction_file, bool as_j
       reduction_file);
   if (is_progress_shown) std::fprintf(stderr, "\n");
   if (!verified) return report(kProgram, verified.error());
-  std::fputs(as_json ? json_of(*verified).c_str() : text_of(path, *verified).c_str(), stdout);
+  std::fputs(as_json ? to_text(json_of(*verified)).c_str() : text_of(path, *verified).c_str(),
+             stdout);
   switch (verified->verdict()) {
     case recording::Verdict::Verified:
       return static_cast<int>(ExitCode::Ok);
