@@ -223,7 +223,7 @@ Result<VerifyReport> verify_journal(const std::string& path,
     return Error{ErrorCode::BadFile, path + ": /organ is not the organ that the session names"};
 
   VerifyReport report;
-  report.is_resimulated = info.sim_version == kSimVersion;
+  report.is_resimulated = info.sim_version == kSimVersion && !info.has_external_loads;
   report.last_tick = info.last_tick;
   report.container = info.summary;
   std::shared_ptr<const organ::LocalReduction> reduction;
