@@ -215,6 +215,8 @@ Result<ExitCode> run_client(const ClientOptions& options) {
   net::NetSourceOptions connection;
   if (const auto parsed = net::parse_server_address(options.server, connection); !parsed)
     return Error{parsed.error().code, "--server: " + parsed.error().message};
+  connection.connect_deadline =
+      std::chrono::milliseconds(static_cast<std::int64_t>(options.wait_s * 1e3));
   connection.participant_name = options.name;
   connection.role = static_cast<int>(options.role);
   connection.tools = hands.shapes();

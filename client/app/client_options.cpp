@@ -117,6 +117,10 @@ Result<std::optional<ClientOptions>> parse_client_command_line(int argc, char** 
   app.add_option("--server", options.server, "where the session is")
       ->type_name("HOST:PORT")
       ->capture_default_str();
+  app.add_option("--wait", options.wait_s, "how long to try while no server is there yet")
+      ->type_name("S")
+      ->check(CLI::Range(0.0, 3600.0))
+      ->capture_default_str();
   app.add_option("--name", options.name, "how others see you, unique in the session")
       ->type_name("NAME");
   std::string role = "surgeon";

@@ -1,6 +1,6 @@
 #pragma once
 
-// The command line of trocar-client.
+// This is the command line of trocar-client.
 
 #include <optional>
 #include <string>
@@ -13,7 +13,7 @@ namespace trocar::app {
 
 enum class Display : std::uint8_t { Window, Headless, None };
 
-// What is drawn over the picture; keys change it.
+// These overlays are drawn over the picture; keys switch them.
 struct Overlays {
   bool regions = true, holds = false, arrows = true, rate = false, ghost = false;
 
@@ -26,7 +26,8 @@ struct StartView {
 
 struct ClientOptions {
   std::string server = "127.0.0.1:7690";
-  std::string name;  // empty: made from the login name and the process
+  double wait_s = 15;  // for a server that is not there yet
+  std::string name;    // empty: made from the login name and the process
   replica::Role role = replica::Role::Surgeon;
   Display display = Display::Window;
   render::Size size{1280, 720};

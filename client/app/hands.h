@@ -19,7 +19,7 @@ class Hands {
   static Hands mouse(const tool::ToolShape& shape);
   static Hands scripted(tool::Script script);
 
-  // What to offer when joining.
+  // Returns the tools to offer when joining.
   std::vector<tool::ToolShape> shapes() const;
   device::MouseTool* mouse_tool() { return mouse_ ? &*mouse_ : nullptr; }
 

@@ -251,6 +251,7 @@ ui::HudModel Picture::hud_model(const replica::Replica& replica, replica::Sessio
   model.pictures_per_second = rate_.pictures_per_second;
   model.frames_per_second = rate_.frames_per_second;
   model.bytes_per_second = rate_.bytes_per_second;
+  model.recording_text = replica.recording().text;
   model.sync_text = sync_text(replica);
   model.is_in_step = replica.sync_state() == replica::SyncState::InStep;
   model.shows_regions = overlays_.regions;
@@ -287,7 +288,7 @@ void Picture::act(const ui::HudActions& actions, const replica::Replica& replica
   if (actions.toggle_ghost) overlays_.ghost = !overlays_.ghost;
   if (actions.reset_camera) frame_camera(replica);
   if (actions.screenshot) wants_screenshot_ = true;
-  // What cannot be sent is asked for again by whoever presses the key.
+  // A wish that cannot be sent is lost: whoever presses the key asks again.
   if (actions.set_mark) replica::ask_for_mark(source, false);
   if (actions.return_to_mark) replica::ask_for_mark(source, true);
   replica::PlaybackControl* playback = source.playback();

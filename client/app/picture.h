@@ -1,7 +1,7 @@
 #pragma once
 
-// One picture after another: input, camera, scene and HUD of a session, in a window or in memory.
-// Thread: render thread.
+// Draws one picture after another: input, camera, scene and HUD of a session, in a window or in
+// memory. Thread: render thread.
 
 #include <deque>
 #include <memory>

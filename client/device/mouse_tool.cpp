@@ -54,7 +54,7 @@ void MouseTool::update(const PointerInput& input, const ViewRays& view,
   depth_ = std::clamp(depth_, kMinDepth, kMaxDepth);
   const Vec3f tip = view.eye + ray * depth_;
   if (length(tip) > 1.9f) return;  // the server ends a session for poses beyond 2 m
-  // Through a port above the camera, on the side of the hand.
+  // The shaft goes through a port above the camera, on the side of the hand.
   const Vec3f port = view.eye + view.up * 0.16f + view.right * 0.14f;
   sample_.world_from_tool.position = tip;
   sample_.world_from_tool.orientation = rotation_from_z(normalized(port - tip, Vec3f{0, 0, 1}));

@@ -6,7 +6,7 @@ std::optional<float> pick(std::span<const Vec3f> positions, Triangles triangles,
                           const Vec3f& origin, const Vec3f& direction) {
   std::optional<float> nearest;
   for (const auto& triangle : triangles) {
-    // Moller and Trumbore 1997, with culling.
+    // The test is that of Moller and Trumbore 1997, with culling.
     const Vec3f a = positions[triangle[0]];
     const Vec3f ab = positions[triangle[1]] - a, ac = positions[triangle[2]] - a;
     const Vec3f p = cross(direction, ac);

@@ -1,7 +1,7 @@
 #pragma once
 
-// Where a ray first meets a triangle surface. Linear in the number of triangles: a few thousand
-// triangles cost some tens of microseconds, once per display frame.
+// Finds where a ray first meets a triangle surface. The time is linear in the number of triangles:
+// a few thousand triangles cost some tens of microseconds, once per display frame.
 
 #include <array>
 #include <cstdint>

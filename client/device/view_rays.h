@@ -21,7 +21,7 @@ struct ViewRays {
   }
 };
 
-// What a person does with mouse and keyboard, once per display frame.
+// A person's mouse and keyboard are read into this once per display frame.
 struct PointerInput {
   float x = 0, y = 0;                                // pixels, origin top left
   float dx = 0, dy = 0;                              // since the frame before

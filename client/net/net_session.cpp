@@ -9,6 +9,7 @@
 #include <boost/asio/use_awaitable.hpp>
 #include <boost/asio/write.hpp>
 
+#include "common/base/log.h"
 #include "common/base/timing.h"
 #include "common/base/version.h"
 #include "common/wire/tool_shape.h"
@@ -29,7 +30,10 @@ NetSource::Session::Session(NetSourceOptions options)
     : options_(std::move(options)),
       inbound_(options_.inbound_capacity),
       outbound_(options_.outbound_capacity) {
-  asio::co_spawn(context_, run(), [](std::exception_ptr) {});
+  asio::co_spawn(context_, run(), [this](std::exception_ptr failure) {
+    end_if_failed(failure);
+    has_ended_.store(true, std::memory_order_release);
+  });
   thread_ = std::thread([this] { context_.run(); });
 }
 
@@ -97,7 +101,8 @@ void NetSource::Session::begin_close(const std::string& reason) {
   control_.push_back(wire::encode_envelope(envelope));
   wake_timer_.cancel();
   room_timer_.cancel();
-  asio::co_spawn(context_, expire(Clock::now() + kCloseDeadline), [](std::exception_ptr) {});
+  asio::co_spawn(context_, expire(Clock::now() + kCloseDeadline),
+                 [this](std::exception_ptr failure) { end_if_failed(failure); });
 }
 
 asio::awaitable<void> NetSource::Session::expire(Clock::time_point deadline) {
@@ -133,20 +138,38 @@ asio::awaitable<void> NetSource::Session::run() {
     co_await read_messages();
     end_after_stream();
   }
-  has_ended_.store(true, std::memory_order_release);
+}
+
+// An exception is a fault of this program: the session ends, and its reason says so.
+void NetSource::Session::end_if_failed(const std::exception_ptr& failure) {
+  if (!failure) return;
+  std::string what = "unknown";
+  try {
+    std::rethrow_exception(failure);
+  } catch (const std::exception& exception) {
+    what = exception.what();
+  } catch (...) {  // then nothing more is known
+  }
+  end(replica::CloseKind::Lost, "this client failed (" + what + "): start it again");
 }
 
 void NetSource::Session::begin_conversation() {
   is_connected_ = true;
   last_heard_ = Clock::now();
   control_.push_back(encode_hello());
-  asio::co_spawn(context_, write_messages(), [](std::exception_ptr) {});
-  asio::co_spawn(context_, ping(), [](std::exception_ptr) {});
+  asio::co_spawn(context_, write_messages(),
+                 [this](std::exception_ptr failure) { end_if_failed(failure); });
+  asio::co_spawn(context_, ping(), [this](std::exception_ptr failure) { end_if_failed(failure); });
 }
 
 void NetSource::Session::end_after_stream() {
   if (is_closing_) return end(replica::CloseKind::Ended, "closed");
   end(replica::CloseKind::Lost, "connection to " + server_name() + " broke: the server is gone");
+}
+
+void NetSource::Session::say_waiting(const std::string& why) const {
+  log::info("no server at {} yet ({}): trying for {} s", server_name(), why,
+            std::chrono::ceil<std::chrono::seconds>(options_.connect_deadline).count());
 }
 
 void NetSource::Session::end_unreachable(const std::string& why) {
@@ -163,8 +186,10 @@ void NetSource::Session::check_silence() {
 
 asio::awaitable<bool> NetSource::Session::connect() {
   const auto deadline = Clock::now() + options_.connect_deadline;
-  asio::co_spawn(context_, expire(deadline), [](std::exception_ptr) {});
+  asio::co_spawn(context_, expire(deadline),
+                 [this](std::exception_ptr failure) { end_if_failed(failure); });
   std::string why = "no answer";
+  bool is_said = false;
   while (!is_done_ && Clock::now() < deadline) {
     const auto [unresolved, endpoints] =
         co_await resolver_.async_resolve(options_.host, std::to_string(options_.port), kNoThrow);
@@ -182,6 +207,8 @@ asio::awaitable<bool> NetSource::Session::connect() {
       if (error != asio::error::operation_aborted) why = error.message();
     }
     if (is_done_ || Clock::now() >= deadline) break;
+    if (!is_said) say_waiting(why);
+    is_said = true;
     retry_timer_.expires_after(options_.connect_retry);
     co_await retry_timer_.async_wait(kNoThrow);
   }
@@ -218,7 +245,7 @@ bool NetSource::Session::make_room_for(std::span<const std::uint8_t, wire::kHead
   return length.ok();
 }
 
-// What is for the render thread; null for what is our own business or broken.
+// Returns the message for the render thread; null if it is this layer's own business or broken.
 std::shared_ptr<const proto::Envelope> NetSource::Session::take_message() {
   last_heard_ = Clock::now();
   auto message = std::make_shared<proto::Envelope>();
@@ -235,6 +262,7 @@ std::shared_ptr<const proto::Envelope> NetSource::Session::take_message() {
   if (message->message_case() == proto::Envelope::MESSAGE_NOT_SET) return nullptr;
   if (message->has_surface_frame()) frames_received_.fetch_add(1, std::memory_order_relaxed);
   has_heard_ = true;
+  if (options_.before_message) options_.before_message();
   return message;
 }
 

@@ -56,11 +56,13 @@ class NetSource::Session {
   asio::awaitable<void> ping();
   asio::awaitable<void> expire(Clock::time_point deadline);
 
+  void end_if_failed(const std::exception_ptr& failure);
   void begin_conversation();
   bool make_room_for(std::span<const std::uint8_t, wire::kHeaderBytes> header);
   std::shared_ptr<const proto::Envelope> take_message();
   void end_if_final(const proto::Envelope& message);
   void end_after_stream();
+  void say_waiting(const std::string& why) const;
   void end_unreachable(const std::string& why);
   void check_silence();
   void queue_ping();

@@ -14,6 +14,7 @@
 // See session_source.h for what each member promises.
 
 #include <chrono>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -30,15 +31,16 @@ struct NetSourceOptions {
   std::string participant_name;
   int role = 1;                        // proto::Role
   std::vector<tool::ToolShape> tools;  // empty: one default tool for roles that have tools
-  std::chrono::milliseconds connect_deadline{5000};
+  std::chrono::milliseconds connect_deadline{15000};  // a server may still be starting
   std::chrono::milliseconds connect_retry{200};
   std::chrono::milliseconds ping_interval{200};
   std::chrono::milliseconds silence_deadline{10000};  // nothing from the server: lost
   std::size_t inbound_capacity = 256;                 // messages
   std::size_t outbound_capacity = 256;
+  std::function<void()> before_message;  // for tests: on the Asio thread, before each is handed on
 };
 
-// "HOST", "HOST:PORT" or "[IPV6]:PORT" into options.host and options.port.
+// Reads "HOST", "HOST:PORT" or "[IPV6]:PORT" into options.host and options.port.
 Status parse_server_address(const std::string& text, NetSourceOptions& options);
 
 class NetSource final : public replica::SessionSource {

@@ -38,7 +38,7 @@ class GlContext {
   // Null when there is no window.
   virtual GLFWwindow* window() { return nullptr; }
 
-  // "llvmpipe ..." and the like.
+  // The name is "llvmpipe ..." and the like.
   std::string renderer_name() const;
   // True for Mesa's software rasterisers: then the scene is drawn with less.
   bool is_software() const;

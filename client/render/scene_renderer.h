@@ -67,7 +67,7 @@ class SceneRenderer {
   ~SceneRenderer();
 
   void draw(const SceneView& scene, const OrbitCamera& camera, Quality quality = Quality::Live);
-  // What limits the picture, for --log-level debug: renderer, samples, triangles drawn.
+  // Says what limits the picture, for --log-level debug: renderer, samples, triangles drawn.
   std::string description() const;
 
  private:
@@ -76,7 +76,7 @@ class SceneRenderer {
   std::unique_ptr<Parts> parts_;
 };
 
-// Where an arrow for this force ends, from the tip; none if too small to draw.
+// Returns where an arrow for this force ends, from the tip; none if it is too small to draw.
 std::optional<Vec3f> arrow_end(const Vec3f& tip, const Vec3f& force_n);
 
 }  // namespace trocar::render

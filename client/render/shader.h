@@ -21,7 +21,7 @@ class Shader {
   void set(const char* name, int value) const;
   void set(const char* name, const Vec3f& value) const;
   void set(const char* name, const Matrix4& value) const;
-  // An array of vec4.
+  // The uniform is an array of vec4.
   void set_array(const char* name, const float* values, int count) const;
 
  private:

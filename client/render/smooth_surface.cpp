@@ -26,7 +26,7 @@ void SmoothSurface::EdgeTable::clear(std::size_t most_edges) {
 
 std::uint32_t& SmoothSurface::EdgeTable::at(std::uint32_t a, std::uint32_t b) {
   const std::uint64_t key = std::uint64_t{std::min(a, b)} << 32 | std::max(a, b);
-  // Fibonacci hashing (Knuth vol. 3, 6.4).
+  // This is Fibonacci hashing (Knuth vol. 3, 6.4).
   std::size_t i = static_cast<std::size_t>(key * 0x9e3779b97f4a7c15u >> shift_);
   while (slots_[i].key != key && slots_[i].key != kEmpty) i = (i + 1) & (slots_.size() - 1);
   slots_[i].key = key;

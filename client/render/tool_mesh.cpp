@@ -158,7 +158,7 @@ MeshVertices make_blade(const tool::ToolShape& shape, Colour colour) {
           (static_cast<float>(i) - 1 + static_cast<float>(step) / static_cast<float>(kCornerSteps));
       outline.push_back({corners[i].x, corners[i].z, std::cos(angle), std::sin(angle)});
     }
-  // Around the rim from the lower face to the upper one.
+  // The rings go around the rim from the lower face to the upper one.
   const auto vertex = [&](const Edge& e, int ring) {
     const float a = kPi * (static_cast<float>(ring) / kRings - 0.5f);
     const Vec3f n{e.nx * std::cos(a), std::sin(a), e.nz * std::cos(a)};
@@ -182,7 +182,7 @@ MeshVertices make_blade(const tool::ToolShape& shape, Colour colour) {
     else
       out.insert(out.end(), {p, q, s, p, s, t});
   }
-  // A round neck and grip beyond the blade, for the eye only.
+  // Adds a round neck and grip beyond the blade, for the eye only.
   const float neck = std::clamp(0.3f * w, 0.0025f, 0.006f), end = far_end + r;
   const Material ring = plastic(colour);
   const ProfilePoint profile[] = {

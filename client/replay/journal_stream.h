@@ -52,7 +52,7 @@ class JournalStream {
   // The latest message of a topic at or before `tick` that can be read. Keeps the read-ahead.
   std::optional<Found> last_before(journal::JournalTopic topic, Tick tick);
 
-  // What a message that is not what its topic says is reported as.
+  // Makes the error of a message that is not what its topic says.
   Error malformed(journal::JournalTopic topic, Tick tick, const std::string& what) const;
 
  private:

@@ -208,7 +208,7 @@ Status ReplaySource::run_until(Tick target, replica::MessageSink& sink) {
   return {};
 }
 
-// In the order of a live session, whatever that of the file.
+// Messages come in the order of a live session, whatever that of the file.
 Status ReplaySource::deliver_tick(Entries entries, replica::MessageSink& sink) {
   const auto each = [&](JournalTopic topic, auto&& visit) {
     Status done;

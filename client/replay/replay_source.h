@@ -98,7 +98,7 @@ class ReplaySource final : public replica::SessionSource, public replica::Playba
   double pace_from_tick_ = 0;        // play has reached this tick
   std::uint64_t pace_from_ns_ = 0;   // at this time
 
-  // What the sink holds.
+  // The members below say what the sink holds.
   bool has_welcomed_ = false;
   std::optional<std::uint32_t> epoch_;  // none: it needs a topology, too
   Frame frame_ = 0;

@@ -1,6 +1,6 @@
 #pragma once
 
-// What a client says: a reading of one of its tools, a person's wish.
+// A client says two things: a reading of one of its tools, and a person's wish.
 
 #include "client/replica/session_source.h"
 #include "common/tool/tool.h"

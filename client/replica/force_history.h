@@ -31,7 +31,8 @@ class ForceHistory {
   // Ticks in any order that does not go back by more than a bin; earlier ones are ignored.
   void add(Tick tick, const Forces& forces_n);
 
-  // Of one hand, oldest first, the bin that is being filled last. Valid until the next add().
+  // Returns the bins of one hand, oldest first, the bin that is being filled last. Valid until the
+  // next add().
   std::array<float, kForceBins> forces(ParticipantSlot slot) const;
   // The greatest of all hands in the window.
   float greatest() const;
@@ -44,7 +45,7 @@ class ForceHistory {
   Tick last_tick_ = 0;  // of the last frame taken in
 };
 
-// What each participant's tools feel together, as sums of magnitudes.
+// Returns what each participant's tools feel together, as sums of magnitudes.
 ForceHistory::Forces forces_of(std::span<const Tool> tools);
 
 }  // namespace trocar::replica

@@ -5,7 +5,7 @@
 namespace trocar::replica {
 namespace {
 
-// From the surface of the solid: a capsule, or with a half width a flat blade.
+// The distance is from the surface of the solid: a capsule, or with a half width a flat blade.
 float distance_to(const Vec3f& p, const Pose& world_from_tool, const tool::ToolShape& shape) {
   const Vec3f q = world_from_tool.apply_inverse(p);
   const float far_end = std::max(shape.length_m - shape.radius_m, shape.radius_m);

@@ -1,6 +1,7 @@
 #pragma once
 
-// What to show now: float positions and tools between two published frames.
+// The surface to show now: float positions and tools between two published frames are computed
+// here.
 //
 // Frames arrive every 16 ms with jitter; the display runs about 1.5 frames (24 ticks) behind the
 // newest, so that there nearly always is a frame on either side. The display tick follows
@@ -24,7 +25,7 @@ inline constexpr double kDisplayDelayTicks = 24;
 class DisplayClock {
  public:
   void restart();
-  // Each frame once, in order.
+  // Takes each frame once, in order.
   void add_arrival(Tick tick, std::uint64_t arrival_ns);
   // Advances to `now_ns` and returns the display tick; monotone between restarts.
   double advance(std::uint64_t now_ns);

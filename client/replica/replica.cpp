@@ -112,7 +112,7 @@ bool read_solver(const proto::FrameState& message, std::optional<SolverFigures>&
   const proto::SolverState& s = message.solver();
   const auto is_sane = [](float value) { return std::isfinite(value) && value >= 0; };
   if (!is_sane(s.estimate()) || !is_sane(s.largest_node_force_n())) return false;
-  // Of one that a newer server may have nothing is known.
+  // A newer server may give a reason that is not known here.
   const bool is_known = s.reason() > 0 && s.reason() <= proto::SOLVER_PREPARING;
   auto& read = figures.emplace();
   read.is_reduced = s.is_reduced();
@@ -160,6 +160,8 @@ void Replica::on_message(const proto::Envelope& message, std::uint64_t arrival_n
       return apply_mark(message.mark_event(), arrival_ns);
     case proto::Envelope::kGhostFrame:
       return apply_ghost(message.ghost_frame());
+    case proto::Envelope::kRecordingState:
+      return apply_recording(message.recording_state());
     case proto::Envelope::kBarrier:
       barrier_ = BarrierOutcome{message.barrier().frame(), message.barrier().surface_crc(), 0};
       barrier_answered_ = false;
@@ -473,6 +475,14 @@ void Replica::add_notice(Notice notice) {
   notices_.push_back(std::move(notice));
   if (notices_.size() > kMaxNotices) notices_.pop_front();
   ++notice_count_;
+}
+
+void Replica::apply_recording(const proto::RecordingState& message) {
+  const bool is_known = message.status() >= 0 && message.status() <= proto::RECORDING_FAILED;
+  recording_.status = is_known ? static_cast<wire::RecordingStatus>(message.status())
+                               : wire::RecordingStatus::Unknown;
+  recording_.frames_missing = message.frames_missing();
+  recording_.text = message.text().substr(0, kMaxRecordingText);
 }
 
 void Replica::apply_ghost(const proto::GhostFrame& message) {

@@ -27,6 +27,7 @@
 #include "client/replica/session_source.h"
 #include "client/replica/session_view.h"
 #include "common/base/result.h"
+#include "common/wire/recording_state.h"
 #include "common/wire/surface_layout.h"
 
 namespace trocar::proto {
@@ -35,6 +36,7 @@ class ClaimEvent;
 class FrameState;
 class GhostFrame;
 class MarkEvent;
+class RecordingState;
 class Participants;
 class SurfaceChange;
 class SurfaceFrame;
@@ -46,6 +48,7 @@ namespace trocar::replica {
 
 inline constexpr std::size_t kHistoryFrames = 8;  // 128 ms: covers the display delay and its jitter
 inline constexpr std::size_t kMaxNotices = 32;
+inline constexpr std::size_t kMaxRecordingText = 200;
 inline constexpr Frame kFramesPerAck = 16;
 
 enum class SyncState : std::uint8_t {
@@ -112,8 +115,10 @@ class Replica final : public MessageSink {
   // Latest last; `notice_count` counts all that ever came.
   const std::deque<Notice>& notices() const { return notices_; }
   std::uint64_t notice_count() const { return notice_count_; }
-  // Of the full solution, for who has asked; of the surface that is shown if the epochs agree.
+  // The full solution, for whoever has asked, is of the surface that is shown if the epochs agree.
   const Ghost& ghost() const { return ghost_; }
+  // What the server last said of its recording.
+  const wire::RecordingState& recording() const { return recording_; }
   const std::optional<BarrierOutcome>& barrier() const { return barrier_; }
   const std::string& goodbye_text() const { return goodbye_text_; }
   const ReplicaCounters& counters() const { return counters_; }
@@ -133,10 +138,11 @@ class Replica final : public MessageSink {
   void apply_mark(const proto::MarkEvent& message, std::uint64_t arrival_ns);
   void add_notice(Notice notice);
   void apply_ghost(const proto::GhostFrame& message);
+  void apply_recording(const proto::RecordingState& message);
   void apply_claim(const proto::ClaimEvent& message, std::uint64_t arrival_ns);
   bool decode_surface(const proto::SurfaceFrame& message);
   void accept_frame(const proto::SurfaceFrame& message, std::uint64_t arrival_ns);
-  // Of the stream, to be shown: all of it, or what changed.
+  // These take the layout over from the stream to be shown: all of it, or what changed.
   void show_layout();
   void show_changes();
   // Gives the history's frames the new vertices, `surface` being the next frame after them.
@@ -166,6 +172,7 @@ class Replica final : public MessageSink {
   std::deque<Notice> notices_;
   std::uint64_t notice_count_ = 0;
   Ghost ghost_;
+  wire::RecordingState recording_;
   std::optional<BarrierOutcome> barrier_;
   bool barrier_answered_ = false;
   std::string goodbye_text_;

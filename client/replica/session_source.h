@@ -1,6 +1,6 @@
 #pragma once
 
-// Where a client's messages come from: a live server (client/net, NetSource) or a journal
+// A client's messages come from a source: a live server (client/net, NetSource) or a journal
 // (client/replay, ReplaySource). The replica and the programs above it do not know which.
 //
 //   source's own thread                      render thread
@@ -93,9 +93,9 @@ class SessionSource {
   virtual SourceState state() const = 0;
   virtual CloseReason close_reason() const = 0;
   virtual SourceStatistics statistics() const = 0;
-  // Where it comes from, for the window's title: "127.0.0.1:7690" or a file's name.
+  // The window's title names the source by this text: "127.0.0.1:7690" or a file's name.
   virtual std::string name() const = 0;
-  // Null for a live source.
+  // The pointer is null for a live source.
   virtual PlaybackControl* playback() { return nullptr; }
 };
 

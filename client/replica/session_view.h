@@ -1,7 +1,7 @@
 #pragma once
 
-// What a client knows of the session, in plain types: nothing above the replica sees a Protobuf
-// message. Metres, world frame.
+// A client keeps what it knows of the session in these plain types: nothing above the replica sees
+// a Protobuf message. Metres, world frame.
 
 #include <array>
 #include <optional>
@@ -40,7 +40,8 @@ struct Tool {
   bool is_silent = false;   // no sample for 250 ticks
 };
 
-// The surface at rest, per vertex slot and triangle number. Both only grow within a session.
+// The surface at rest is given per vertex slot and triangle number; both only grow within a
+// session.
 struct Topology {
   std::uint32_t epoch = 0;
   std::string organ_name;
@@ -51,7 +52,7 @@ struct Topology {
   std::vector<std::uint32_t> fixed_vertices;
 };
 
-// What the server's rate controller decided for a frame's tick.
+// The server's rate controller decided this for a frame's tick.
 enum class RateLevel : std::uint8_t {
   Fixed = 0,       // there is no controller
   Full = 1,        // all that was asked for
@@ -72,7 +73,7 @@ struct RateFigures {
   bool operator==(const RateFigures&) const = default;
 };
 
-// Of all measured tissue that relaxes.
+// These figures are sums over all measured tissue that relaxes.
 struct RelaxationFigures {
   double energy_j = 0;      // elastic, as if nothing had relaxed
   float volume_change = 0;  // of the whole, over its volume without stress
@@ -96,7 +97,7 @@ enum class SolverReason : std::uint8_t {
   Preparing = 9,
 };
 
-// Of a session with a reduction: which solver moves the tissue.
+// In a session with a reduction, this says which solver moves the tissue.
 struct SolverFigures {
   bool is_reduced = false;
   std::uint32_t patch_count = 0;           // that act
@@ -108,7 +109,8 @@ struct SolverFigures {
   bool operator==(const SolverFigures&) const = default;
 };
 
-// What the server says of the full solution that it computes beside a session with a reduction.
+// The server sends these figures of the full solution that it computes beside a session with a
+// reduction.
 enum class GhostStatus : std::uint8_t {
   Unknown = 0,  // nothing heard yet
   None = 1,     // the session has no reduction
@@ -126,7 +128,7 @@ struct Ghost {
   std::uint32_t behind_ms = 0;
 };
 
-// What the server says about itself with each frame.
+// The server sends these figures about itself with each frame.
 struct FrameFigures {
   std::uint32_t active_nodes = 0, queue_nodes = 0, region_count = 0;
   std::uint32_t sweeps = 0, far_sweeps = 0;  // of active nodes and of all others

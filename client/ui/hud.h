@@ -1,7 +1,8 @@
 #pragma once
 
-// What stands in front of the scene: figures of the session, participants, messages, names at
-// tools, help, and the timeline of a replay. Dear ImGui, with a window's events or (headless) none.
+// The head-up display stands in front of the scene: it shows figures of the session, participants,
+// messages, names at tools, help, and the timeline of a replay. Dear ImGui, with a window's events
+// or (headless) none.
 //
 // Per picture: begin_frame, then input(), then draw(model), then, after the scene was drawn into
 // the context's framebuffer, render(). Thread: render thread. One Hud per process (Dear ImGui keeps
@@ -67,7 +68,8 @@ struct HudModel {
   std::optional<HudTimeline> timeline;
   float greatest_force_n = 0;  // of all participants' `forces_n`: their common scale
   bool shows_regions = true, shows_holds = false, shows_arrows = true, shows_rate = false;
-  std::string ghost_text;  // empty: it is not to be shown
+  std::string recording_text;  // empty: nothing is wrong with the recording
+  std::string ghost_text;      // empty: it is not to be shown
   bool shows_help = false;
   bool has_own_tool = false;
   bool can_mark = false;  // an instructor's: he may mark the organ and return it to the mark

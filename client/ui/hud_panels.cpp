@@ -74,7 +74,7 @@ void solver_rows(const HudModel& model) {
   ImGui::TextDisabled("solver");
   ImGui::TableNextColumn();
   ImGui::TextColored(text.is_reduced ? kGood : kNotice, "%s", text.state.c_str());
-  // As tall without a patch: the panel is not to jump at every hand-over.
+  // The panel is as tall without a patch, so that it does not jump at every hand-over.
   row("estimated error", text.error.empty() ? "-" : text.error);
 }
 
@@ -151,6 +151,18 @@ void draw_slow_time(const HudModel& model, float scale) {
   ImGui::PopFont();
   ImGui::TextDisabled("%s", model.has_own_tool ? "the server cannot keep up: move slowly"
                                                : "the server cannot keep up");
+  ImGui::End();
+}
+
+void draw_recording(const HudModel& model, float scale) {
+  if (model.recording_text.empty()) return;
+  const ImVec2 screen = ImGui::GetIO().DisplaySize;
+  constexpr float kBelowSlowTime = 64;
+  ImGui::SetNextWindowPos({screen.x / 2, (kMargin + kBelowSlowTime) * scale}, 0, {0.5f, 0});
+  ImGui::Begin("recording", nullptr, kGlass);
+  ImGui::PushFont(bold());
+  ImGui::TextColored(kTrouble, "%s", model.recording_text.c_str());
+  ImGui::PopFont();
   ImGui::End();
 }
 

@@ -12,6 +12,8 @@ void draw_session_panel(const HudModel& model, float scale);
 void draw_participants_panel(const HudModel& model, float scale);
 // A banner while simulated time runs slower than real time.
 void draw_slow_time(const HudModel& model, float scale);
+// What is wrong with the recording, as long as the session lasts.
+void draw_recording(const HudModel& model, float scale);
 void draw_labels(const HudModel& model, float scale);
 void draw_messages(const HudModel& model, float scale);
 void draw_timeline(const HudTimeline& timeline, float scale, HudActions& actions);

@@ -1,7 +1,7 @@
 #pragma once
 
-// What the parts of the HUD share: window flags, colours, the bold font. Only for client/ui's own
-// .cpp files, after <imgui.h>.
+// The parts of the HUD share window flags, colours and the bold font. Only for client/ui's own .cpp
+// files, after <imgui.h>.
 
 #include <imgui.h>
 

@@ -70,7 +70,8 @@ void draw_plot(const HudParticipant& p, float greatest_n, float scale) {
   list->PopClipRect();
 }
 
-// As wide as they get, so that the panel does not breathe with them. 0: as they are.
+// The figures' column is as wide as they get, so that the panel does not breathe with them. 0
+// leaves it as wide as they are.
 float width_of_figures(const HudModel& model) {
   float width = 0;
   for (const HudParticipant& p : model.participants)

@@ -1,7 +1,7 @@
 #pragma once
 
-// What the server's rate controller does, in words for somebody who learns to operate and in
-// figures for somebody who knows the simulator. No drawing here.
+// These texts say what the server's rate controller does: in words for somebody who learns to
+// operate, in figures for somebody who knows the simulator. Nothing is drawn here.
 
 #include <string>
 

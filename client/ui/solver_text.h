@@ -1,6 +1,7 @@
 #pragma once
 
-// Which solver moves the tissue, in words for somebody who learns to operate. No drawing here.
+// These texts say which solver moves the tissue, in words for somebody who learns to operate.
+// Nothing is drawn here.
 
 #include <string>
 
@@ -14,7 +15,7 @@ struct SolverText {
   bool is_reduced = false;
 };
 SolverText describe(const replica::SolverFigures& solver);
-// Of the full solution beside it: "at most 0.21 mm away, rms 0.03 mm", or why there is none.
+// Describes the full solution beside it: "at most 0.21 mm away, rms 0.03 mm", or why there is none.
 std::string describe(const replica::Ghost& ghost, bool is_replay);
 
 }  // namespace trocar::ui

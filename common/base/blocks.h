@@ -113,7 +113,7 @@ class Blocks {
       return {data, 0, capacity};
     }
     if (left_ < capacity) {
-      // What is left of the chunk is a place like a freed one.
+      // The rest of the chunk is a place like a freed one.
       if (left_ > 0) release({next_, 0, static_cast<std::uint32_t>(std::min(left_, kMostLeft))});
       add_chunk(std::max(std::size_t{capacity}, kChunk));
     }

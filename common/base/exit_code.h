@@ -10,6 +10,7 @@ enum class ExitCode : int {
   BadFile = 3,          // a file that cannot be used
   Refused = 4,          // the server said no
   ResourceMissing = 5,  // port taken, no display, processor too old...
+  NotVerified = 6,      // a check could not be made, or not in full; no difference was found
 };
 
 }  // namespace trocar

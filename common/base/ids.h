@@ -22,7 +22,7 @@ struct ParticipantSlot {
   bool has_tools() const { return value < kMaxHands; }
 };
 
-// Tool slot: participant slot x kToolsPerHand + tool number.
+// A tool slot is participant slot x kToolsPerHand + tool number.
 struct ToolSlot {
   std::uint8_t value = 0xff;
 

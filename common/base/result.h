@@ -1,7 +1,7 @@
 #pragma once
 
-// What every function that reads outside data returns: a value, or an error with one line that says
-// what is wrong, where, and what to do. Handle once: pass it on or report it.
+// Every function that reads outside data returns a Result: a value, or an error with one line that
+// says what is wrong, where, and what to do. Handle once: pass it on or report it.
 
 #include <string>
 #include <utility>

@@ -159,6 +159,10 @@ Status SessionJournal::read_frame_states(Tick from, Tick to,
                                          const TickVisitor<proto::FrameState>& visitor) {
   return read_topic(JournalTopic::FrameState, from, to, visitor);
 }
+Status SessionJournal::read_participants(Tick from, Tick to,
+                                         const TickVisitor<proto::Participants>& visitor) {
+  return read_topic(JournalTopic::Participants, from, to, visitor);
+}
 Status SessionJournal::read_claims(Tick from, Tick to,
                                    const TickVisitor<proto::ClaimLog>& visitor) {
   return read_topic(JournalTopic::Claims, from, to, visitor);
@@ -170,6 +174,12 @@ Status SessionJournal::read_solver_changes(Tick from, Tick to,
 Status SessionJournal::read_snapshots(Tick from, Tick to,
                                       const TickVisitor<proto::WorldSnapshot>& visitor) {
   return read_topic(JournalTopic::Snapshot, from, to, visitor);
+}
+
+ReadReport SessionJournal::read_all(const BytesVisitor& visitor) {
+  return mcap_->read({}, {}, [&](const McapMessage& m) {
+    return visitor(mcap_->channels().at(m.channel_id).topic, times_.tick(m.log_time), m.data);
+  });
 }
 
 Result<std::optional<proto::WorldSnapshot>> SessionJournal::snapshot_before(Tick tick) {

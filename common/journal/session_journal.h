@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "common/journal/mcap_reader.h"
@@ -53,9 +54,14 @@ class SessionJournal {
   Status read_topology_changes(Tick from, Tick to,
                                const TickVisitor<proto::SurfaceChange>& visitor);
   Status read_frame_states(Tick from, Tick to, const TickVisitor<proto::FrameState>& visitor);
+  Status read_participants(Tick from, Tick to, const TickVisitor<proto::Participants>& visitor);
   Status read_claims(Tick from, Tick to, const TickVisitor<proto::ClaimLog>& visitor);
   Status read_solver_changes(Tick from, Tick to, const TickVisitor<proto::SolverLog>& visitor);
   Status read_snapshots(Tick from, Tick to, const TickVisitor<proto::WorldSnapshot>& visitor);
+
+  // Every message there is, in the order in which they were recorded, with its channel's topic.
+  using BytesVisitor = std::function<bool(std::string_view topic, Tick, BytesView)>;
+  ReadReport read_all(const BytesVisitor& visitor);
 
   // The latest at or before `tick`; nothing if there is none.
   Result<std::optional<proto::WorldSnapshot>> snapshot_before(Tick tick);

@@ -36,6 +36,11 @@ const TopicEntry& entry_of(JournalTopic topic) {
 const char* topic_name(JournalTopic topic) {
   return entry_of(topic).name;
 }
+std::optional<JournalTopic> topic_of(std::string_view name) {
+  for (int i = 0; i < kJournalTopicCount; ++i)
+    if (name == topic_name(static_cast<JournalTopic>(i))) return static_cast<JournalTopic>(i);
+  return std::nullopt;
+}
 const google::protobuf::Descriptor& topic_message(JournalTopic topic) {
   return *entry_of(topic).message;
 }

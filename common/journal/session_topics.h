@@ -11,16 +11,19 @@
 //   /topology/change SurfaceChange    frames that begin an epoch
 //   /participants    Participants     on change
 //   /claims          ClaimLog         frames that have claim events
-//   /solver          SolverLog        frames in which another solver took over, or for another
-//   reason /frame_state     FrameState       tools, regions and figures of a frame, as a client got
-//   them /gap             JournalGap       where the queue to the writer was full /tool/<slot>
-//   ToolState        one channel per tool, for plots in other programs
+//   /solver          SolverLog        frames in which another solver took over, or gave another
+//                                     reason
+//   /frame_state     FrameState       tools, regions and figures of a frame, as a client got them
+//   /gap             JournalGap       where the queue to the writer was full
+//   /tool/<slot>     ToolState        one channel per tool, for plots in other programs
 //
 // A message of frame f carries tick 16 f; log_time = start (UTC) + tick x 1 ms, so all messages of
 // a tick share it. publish_time is the wall clock.
 
 #include <cstdint>
+#include <optional>
 #include <string>
+#include <string_view>
 
 #include "common/base/tick.h"
 
@@ -50,6 +53,7 @@ inline constexpr const char* kJournalProfile = "trocar";
 inline constexpr const char* kSessionMetadataName = "trocar.session";
 
 const char* topic_name(JournalTopic topic);
+std::optional<JournalTopic> topic_of(std::string_view name);
 const google::protobuf::Descriptor& topic_message(JournalTopic topic);
 
 // Of the local reduction that a session had: without it the session cannot be simulated again.

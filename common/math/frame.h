@@ -7,7 +7,7 @@
 
 namespace trocar {
 
-// Unit quaternion, component order x, y, z, w (also on the wire).
+// A unit quaternion has the component order x, y, z, w (also on the wire).
 struct Quatf {
   float x = 0, y = 0, z = 0, w = 1;
 

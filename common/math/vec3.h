@@ -64,7 +64,7 @@ inline Vec3d to_double(const Vec3f& a) {
   return {a.x, a.y, a.z};
 }
 
-// Symmetric 3x3 matrix, upper triangle.
+// A symmetric 3x3 matrix keeps its upper triangle.
 template <typename T>
 struct SymMat3 {
   T xx{}, xy{}, xz{}, yy{}, yz{}, zz{};

@@ -1,8 +1,9 @@
 #pragma once
 
-// Scripted hands: poses and verbs of one hand's tools over time, read from a TOML file. README,
-// "Scripts", and deploy/scenes/example.toml describe the format to a person; this is the same in
-// types. A script is the `[[tool]]` part of a scenario: the other top-level tables are reserved.
+// Scripted hands: poses and verbs of one hand's tools over time, read from a TOML file.
+// docs/scripts-and-scenarios.md and deploy/scenes/example.toml describe the format; this is the
+// same in types. A script is the `[[tool]]` part of a scenario: the other top-level tables are
+// reserved.
 //
 // Frames: a tool without an anchor is in the world frame. A tool with one is relative to a point of
 // the organ's surface at rest, so the same script fits any organ:

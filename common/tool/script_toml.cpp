@@ -1,4 +1,4 @@
-// The TOML form of a script.
+// This reads the TOML form of a script.
 
 #include "common/tool/script_toml.h"
 

@@ -39,30 +39,47 @@ namespace trocar::tool {
 namespace trocar::tool {
 
 // The first error wins; later reads return defaults, so that a reader checks once at the end.
+// One error gives way: that a key is missing, to an unknown key of the same table, because the one
+// is most likely the other misspelt.
 class Document {
  public:
   explicit Document(std::string_view source) : source_(source) {}
 
   void fail(const toml::source_region& at, const std::string& key, const std::string& what) {
+    if (!error_) set(at, key, what);
+  }
+  void fail_missing(const toml::table& table, const std::string& key, const std::string& what) {
     if (error_) return;
-    std::string message(source_);
-    if (at.begin.line > 0) message += ":" + std::to_string(at.begin.line);
-    if (!key.empty()) message += ": key " + key;
-    error_ = Error{ErrorCode::BadFile, message + ": " + what};
+    set(table.source(), key, what);
+    lacks_a_key_ = &table;
+  }
+  void fail_unknown(const toml::table& table, const toml::source_region& at, const std::string& key,
+                    const std::string& what) {
+    if (error_ && lacks_a_key_ != &table) return;
+    lacks_a_key_ = nullptr;
+    set(at, key, what);
   }
   bool ok() const { return !error_; }
   const Error& error() const { return *error_; }
 
  private:
+  void set(const toml::source_region& at, const std::string& key, const std::string& what) {
+    std::string message(source_);
+    if (at.begin.line > 0) message += ":" + std::to_string(at.begin.line);
+    if (!key.empty()) message += ": key " + key;
+    error_ = Error{ErrorCode::BadFile, message + ": " + what};
+  }
+
   std::string source_;
   std::optional<Error> error_;
+  const toml::table* lacks_a_key_ = nullptr;  // the table of a missing key, if that is the error
 };
 
 // A number as a person would write it.
 std::string shown(double value);
 
-// What to say of a key that is `known` with another unit in its name, or with none: nothing if it
-// is not.
+// Returns what to say of a key that is `known` with another unit in its name, or with none; nothing
+// if it is not.
 std::optional<std::string> unit_hint(std::string_view key, const toml::node& value,
                                      std::string_view known);
 
@@ -72,7 +89,7 @@ class TableReader {
   TableReader(Document& document, const toml::table& table, std::string path)
       : document_(document), table_(table), path_(std::move(path)) {}
 
-  // Of a key, or of the table itself if `key` is empty.
+  // Returns the path of a key, or of the table itself if `key` is empty.
   std::string path_of(std::string_view key) const {
     if (path_.empty() || key.empty()) return path_ + std::string(key);
     return path_ + "." + std::string(key);
@@ -83,7 +100,10 @@ class TableReader {
   }
   void fail(std::string_view key, const std::string& what) {
     const toml::node* node = table_.get(key);
-    document_.fail(node != nullptr ? node->source() : table_.source(), path_of(key), what);
+    if (node != nullptr || key.empty())
+      document_.fail(node != nullptr ? node->source() : table_.source(), path_of(key), what);
+    else
+      document_.fail_missing(table_, path_of(key), what);
   }
 
   // For a key that has to be there: if it is there in another unit, that is what is wrong.
@@ -182,14 +202,14 @@ class TableReader {
           return n.is_string() ? std::optional(n.as_string()->get()) : std::nullopt;
         });
   }
-  // A [key] table, or null if absent or wrong.
+  // Returns a [key] table, or null if it is absent or wrong.
   const toml::table* table(std::string_view key) {
     const toml::node* node = find(key);
     if (node == nullptr) return nullptr;
     if (!node->is_table()) fail(key, "is not a table, write [" + header_of(key) + "] above it");
     return node->as_table();
   }
-  // Where the key is, or the table if it has no such key; 0 if unknown.
+  // Returns the line of the key, or of the table if it has no such key; 0 if unknown.
   int line(std::string_view key) const {
     const toml::node* node = table_.get(key);
     return static_cast<int>((node != nullptr ? node->source() : table_.source()).begin.line);
@@ -235,10 +255,11 @@ class TableReader {
       if (std::find(known_.begin(), known_.end(), name) != known_.end()) continue;
       for (const auto& known : known_)
         if (const auto hint = unit_hint(name, node, known))
-          document_.fail(key.source(), path_of(name), *hint);
+          document_.fail_unknown(table_, key.source(), path_of(name), *hint);
       std::string all;
       for (const auto& known : known_) all += (all.empty() ? "" : ", ") + known;
-      document_.fail(key.source(), path_of(name), "is unknown, the keys here are " + all);
+      document_.fail_unknown(table_, key.source(), path_of(name),
+                             "is unknown, the keys here are " + all);
     }
   }
 

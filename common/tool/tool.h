@@ -1,6 +1,6 @@
 #pragma once
 
-// What a tool is and what it can be asked to do.
+// A tool has a shape, and a verb says what it is asked to do.
 
 #include <cstdint>
 
@@ -8,7 +8,7 @@
 
 namespace trocar::tool {
 
-// What the holder wants the tool to do, as long as the sample says so.
+// The verb is what the holder wants the tool to do, as long as the sample says so.
 enum class Verb : std::uint8_t { None = 0, Push = 1, Grasp = 2, Cut = 3 };
 inline constexpr int kVerbCount = 4;
 const char* name_of(Verb verb);

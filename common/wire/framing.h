@@ -1,6 +1,6 @@
 #pragma once
 
-// Frame on a stream: u32 little-endian length, then one Envelope.
+// A frame on a stream is a u32 little-endian length, then one Envelope.
 
 #include <cstdint>
 #include <memory>
@@ -21,10 +21,10 @@ inline constexpr std::size_t kHeaderBytes = 4;
 
 using SharedBytes = std::shared_ptr<const Bytes>;  // one immutable buffer may go to many receivers
 
-// Header and encoding in one buffer.
+// Returns header and encoding in one buffer.
 SharedBytes encode_envelope(const proto::Envelope& envelope);
 
-// Length from a header; error if zero or over `limit`.
+// Reads the length from a header; it is an error if it is zero or over `limit`.
 Result<std::uint32_t> decode_length(std::span<const std::uint8_t, kHeaderBytes> header,
                                     std::uint32_t limit);
 // Parses the body of one frame; error if it is not an Envelope or an empty one. A message of a

@@ -1,7 +1,7 @@
 #pragma once
 
-// What a participant may do, with the name that people read and write. The numbers are those of
-// proto::Role.
+// A role says what a participant may do, and has the name that people read and write. The numbers
+// are those of proto::Role.
 
 #include <array>
 #include <cstdint>

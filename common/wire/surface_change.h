@@ -1,7 +1,7 @@
 #pragma once
 
-// What one epoch changes about the organ's surface: new vertices, triangles that are gone,
-// triangles that are new. Server, journal and clients apply the same changes to the same
+// One epoch changes the organ's surface by one SurfaceChange: new vertices, triangles that are
+// gone, triangles that are new. Server, journal and clients apply the same changes to the same
 // SurfaceLayout.
 //
 // Numbers are never used again: new vertices take the next slots, new triangles the next numbers, a
@@ -67,7 +67,8 @@ struct SurfaceChange {
   bool operator==(const SurfaceChange&) const = default;
 };
 
-// Of one triangle. 64-bit integers only, so that any language can do it:
+// Returns the hash of one triangle. It takes 64-bit integers only, so that any language can compute
+// it:
 //   mix(mix(number + 2^32 corner 0) xor (corner 1 + 2^32 corner 2)) xor (wound ? 2^64 - 1 : 0)
 // with mix the finaliser of SplitMix64 (Steele, Lea and Flood 2014).
 std::uint64_t triangle_hash(TriangleIndex number, const Corners& corners, bool is_wound);
@@ -80,7 +81,8 @@ std::uint64_t sum_after(const SurfaceChange& change, const SurfaceLayout& layout
 // removed lives, the sum. Cost proportional to the change (amortised, vectors grow).
 Status apply(const SurfaceChange& change, SurfaceLayout& layout);
 
-// Where a vertex on the way from a to b lies, rounded: for a rest position or a displacement.
+// Returns where a vertex on the way from a to b lies, rounded: for a rest position or a
+// displacement.
 QuantisedVertex between(const QuantisedVertex& a, const QuantisedVertex& b, std::uint16_t t);
 
 }  // namespace trocar::wire

@@ -46,7 +46,7 @@ std::uint64_t full_mask(std::size_t block, std::size_t vertices) {
   return slots == kBlockVertices ? ~std::uint64_t{0} : (std::uint64_t{1} << slots) - 1;
 }
 
-// What the predictions of modes 1 and 2 start from: the changed vertex before this one, zero at the
+// The predictions of modes 1 and 2 start from this: the changed vertex before this one, zero at the
 // start of a payload.
 struct Predictor {
   QuantisedVertex value, difference;

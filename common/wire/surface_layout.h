@@ -1,15 +1,16 @@
 #pragma once
 
-// Which nodes of an organ its surface stream carries, and in which slots. Server, journal and tests
-// build it from the organ; clients receive it as a SurfaceTopology message. Cuts change it by
-// SurfaceChange (surface_change.h) only.
+// The layout says which nodes of an organ its surface stream carries, and in which slots. The server
+// builds it from the organ (server/tissue/world/surface_layout.h); clients receive it as a
+// SurfaceTopology message. Cuts change it by SurfaceChange (surface_change.h) only.
 
+#include <array>
+#include <span>
 #include <vector>
 
 #include "common/base/index.h"
 #include "common/wire/quantise.h"
 #include "common/wire/surface_change.h"
-#include "server/organs/organ/organ.h"
 
 namespace trocar::wire {
 
@@ -27,12 +28,17 @@ struct SurfaceLayout {
 
   std::size_t vertex_count() const { return rest_quanta.size(); }
   bool has_triangle(TriangleIndex number) const { return triangles[number.value][0].is_valid(); }
-  // From the first triangle on.
+  // Computes the sum from the first triangle on.
   std::uint64_t compute_triangle_sum() const;
 
   bool operator==(const SurfaceLayout&) const = default;
 };
 
-SurfaceLayout make_surface_layout(const organ::Organ& organ);
+// The surface of a mesh at rest. rest_m: positions of all nodes; triangles: corners are surface
+// nodes, counterclockwise from outside.
+SurfaceLayout make_surface_layout(std::span<const Vec3d> rest_m,
+                                  std::span<const NodeIndex> surface_nodes,
+                                  std::span<const std::array<NodeIndex, 3>> triangles,
+                                  std::span<const NodeIndex> fixed_nodes);
 
 }  // namespace trocar::wire

@@ -1,10 +1,11 @@
-# project_library(<folder> SOURCES a.cpp... HEADERS a.h... DEPENDS common/base... USES server/x... LINK pkg...)
+# project_library(<folder> ABOUT "What it is for." SOURCES a.cpp... HEADERS a.h... DEPENDS common/base...
+#                 USES server/x... LINK pkg...)
 # One folder, one static library: target trocar_<folder with _>, alias trocar::<folder with _>.
-# DEPENDS names the folders that its headers include (public), USES those that only its sources
-# include (private), LINK third-party targets (public). tests/architecture compares both with the
-# sources.
+# ABOUT is the folder's line in docs/folders.md. DEPENDS names the folders that its headers include
+# (public), USES those that only its sources include (private), LINK third-party targets (public).
+# tests/architecture compares DEPENDS and USES with the sources.
 function(project_library folder)
-  cmake_parse_arguments(ARG "" "" "SOURCES;HEADERS;DEPENDS;USES;LINK" ${ARGN})
+  cmake_parse_arguments(PARSE_ARGV 1 ARG "" "ABOUT" "SOURCES;HEADERS;DEPENDS;USES;LINK")
   if(ARG_UNPARSED_ARGUMENTS)
     message(FATAL_ERROR "project_library(${folder}): unknown arguments ${ARG_UNPARSED_ARGUMENTS}")
   endif()
@@ -26,9 +27,10 @@ function(project_library folder)
   target_link_libraries(trocar_${name} PUBLIC ${ARG_LINK})
 endfunction()
 
-# project_program(<name> MAIN file.cpp DEPENDS folder... LINK target...): one executable in build/<preset>/bin.
+# project_program(<name> [ABOUT "What its folder is for."] MAIN file.cpp DEPENDS folder... LINK target...): one executable in
+# build/<preset>/bin. DEPENDS names the folders that its files include.
 function(project_program name)
-  cmake_parse_arguments(ARG "" "" "MAIN;DEPENDS;LINK" ${ARGN})
+  cmake_parse_arguments(PARSE_ARGV 1 ARG "" "ABOUT" "MAIN;DEPENDS;LINK")
   add_executable(${name} ${ARG_MAIN})
   target_link_libraries(${name} PRIVATE trocar_options ${ARG_LINK})
   foreach(dependency IN LISTS ARG_DEPENDS)

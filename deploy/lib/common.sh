@@ -29,12 +29,18 @@ absolute() {
   esac
 }
 
-# build PRESET [TARGET...]: configures if needed and builds.
+# All programs, as deploy/build and deploy/demo build them.
+all_programs=(trocar-server trocar-client trocar-organ trocar-sim trocar-journal)
+
+# build PRESET [TARGET...]: configures if needed and builds. Tests are there if the script sets
+# with_tests=true, after deploy/setup --with-tests.
 build() {
-  local preset=$1
+  local preset=$1 tests=OFF
   shift
-  if [ ! -e "$root/build/$preset/build.ninja" ]; then
-    (cd "$root" && cmake --preset "$preset" >"$root/build-$preset.log" 2>&1) || {
+  if ${with_tests:-false}; then tests=ON; fi
+  if [ ! -e "$root/build/$preset/build.ninja" ] ||
+    { [ $tests = ON ] && ! grep -q '^TROCAR_TESTS:BOOL=ON' "$root/build/$preset/CMakeCache.txt"; }; then
+    (cd "$root" && cmake --preset "$preset" -DTROCAR_TESTS=$tests >"$root/build-$preset.log" 2>&1) || {
       cat "$root/build-$preset.log" >&2
       rm -f "$root/build-$preset.log"
       return 1

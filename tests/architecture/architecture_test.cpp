@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <fstream>
+
+#include "tests/architecture/folder_table.h"
 #include "tests/architecture/rules.h"
 
 namespace trocar::architecture {
@@ -24,6 +27,9 @@ TEST(Architecture, TheTreeIsRead) {
   EXPECT_EQ(tree().layer_of("server/tissue/cutting"),
             tree().layer_of("server/tissue/dynamics") + 1);
   EXPECT_TRUE(tree().closure_of("server/tissue/step").contains("common/math"));
+  EXPECT_TRUE(tree().state_folders.contains("server/tissue/step"));
+  for (const auto& folder : tree().state_folders) EXPECT_GE(tree().layer_of(folder), 0) << folder;
+  EXPECT_FALSE(tree().folders.at("server/app/sim").programs.empty());
   EXPECT_TRUE(tree().has_file("server/tissue/step/tick.cpp"));
   EXPECT_TRUE(tree().has_file("README.md"));
   std::size_t includes = 0;
@@ -34,8 +40,11 @@ TEST(Architecture, TheTreeIsRead) {
 TEST(Architecture, FoldersAreLayersAndListTheirFiles) {
   expect_none(check_folders(tree()));
 }
-TEST(Architecture, IncludesFollowDepends) {
+TEST(Architecture, IncludesExist) {
   expect_none(check_includes(tree()));
+}
+TEST(Architecture, DependenciesAreWhatIsIncluded) {
+  expect_none(check_dependencies(tree()));
 }
 TEST(Architecture, NetSeesNoWorld) {
   expect_none(check_net_sees_no_world(tree()));
@@ -48,6 +57,12 @@ TEST(Architecture, OnlyDrawingFoldersDraw) {
 }
 TEST(Architecture, StateIsDeterministic) {
   expect_none(check_determinism(tree()));
+}
+TEST(Architecture, TheTableOfFoldersIsUpToDate) {
+  std::ifstream file(std::string(TROCAR_SOURCE_DIR) + "/docs/folders.md");
+  const std::string committed{std::istreambuf_iterator<char>(file), {}};
+  EXPECT_EQ(committed, folder_table(tree()))
+      << "write it again: build/release/bin/folder_table > docs/folders.md";
 }
 TEST(Architecture, FilesAreShortAndBelongToNoMachine) {
   expect_none(check_files(tree()));

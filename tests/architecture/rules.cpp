@@ -1,6 +1,7 @@
 #include "tests/architecture/rules.h"
 
 #include <algorithm>
+#include <map>
 #include <regex>
 #include <set>
 
@@ -14,21 +15,17 @@ constexpr const char* kStageTimers = "server/tissue/step/tick.cpp";
 
 const std::set<std::string> kProtobufFolders{"proto",
                                              "server/organs/organ",
+                                             "server/papers/dogan",
                                              "common/wire",
                                              "common/journal",
                                              "server/session/participants",
                                              "server/session/replication",
                                              "server/session/recording",
+                                             "server/papers/dogan",
                                              "client/net",
                                              "client/replica",
                                              "client/replay"};
 const std::set<std::string> kGraphicsFolders{"client/render", "client/ui", "client/app"};
-const std::set<std::string> kStateFolders{
-    "common/math",           "server/tissue/world",       "server/tissue/hands",
-    "server/tissue/contact", "server/tissue/propagation", "server/tissue/dynamics",
-    "server/tissue/cutting", "server/tissue/reduction",   "server/tissue/step",
-    "server/lab/scenario",   "server/session/control"};
-
 bool is_library_code(const SourceFile& file) {
   return file.path.starts_with("common/") || file.path.starts_with("server/") ||
          file.path.starts_with("client/");
@@ -43,9 +40,12 @@ std::string folder_of_include(const std::string& target) {
   return slash == std::string::npos ? "" : target.substr(0, slash);
 }
 
-bool are_opposite_sides(const std::string& a, const std::string& b) {
-  return (a.starts_with("server/") && b.starts_with("client/")) ||
-         (a.starts_with("client/") && b.starts_with("server/"));
+// Server and client do not see each other; what they share sees neither.
+bool may_not_see(const std::string& from, const std::string& to) {
+  const bool sees_server = to.starts_with("server/"), sees_client = to.starts_with("client/");
+  return (from.starts_with("server/") && sees_client) ||
+         (from.starts_with("client/") && sees_server) ||
+         (from.starts_with("common/") && (sees_server || sees_client));
 }
 
 Breaches matching_includes(const SourceTree& tree, const std::regex& pattern,
@@ -60,19 +60,55 @@ Breaches matching_includes(const SourceTree& tree, const std::regex& pattern,
   return breaches;
 }
 
-void check_depends(const SourceTree& tree, const std::string& name, Breaches& breaches) {
+void check_order(const SourceTree& tree, const std::string& name,
+                 const std::set<std::string>& dependencies, Breaches& breaches) {
   const int layer = tree.layer_of(name);
-  for (const auto& dependency : tree.folders.at(name).depends) {
+  for (const auto& dependency : dependencies) {
     if (dependency == name) continue;  // a program and the library beside it
     const int other = tree.layer_of(dependency);
-    const std::string start = name + "/CMakeLists.txt:1: DEPENDS " + dependency;
+    const std::string start = name + "/CMakeLists.txt:1: depends on " + dependency;
     if (other < 0)
       breaches.push_back(start + ": is not in TROCAR_LAYERS, correct the name");
+    else if (may_not_see(name, dependency))
+      breaches.push_back(start +
+                         ": server and client do not see each other, share it in common, which "
+                         "sees neither");
     else if (other >= layer)
       breaches.push_back(start + ": is not above " + name + " in TROCAR_LAYERS, turn it around");
-    else if (are_opposite_sides(name, dependency))
-      breaches.push_back(start + ": server and client do not see each other, share it in common");
   }
+}
+
+// `said` and `included` must be equal; `what` is the keyword of the CMakeLists.txt.
+void compare(const std::string& where, const std::string& what, const std::set<std::string>& said,
+             const std::map<std::string, std::string>& included, Breaches& breaches) {
+  for (const auto& [folder, place] : included)
+    if (!said.contains(folder))
+      breaches.push_back(place + " is of " + folder + ", which is not among the " + what + " of " +
+                         where + ", add it there");
+  for (const auto& folder : said)
+    if (!included.contains(folder))
+      breaches.push_back(where + ": " + what + " " + folder +
+                         ": no include asks for it there, take it away");
+}
+
+// Folders that the files named in `files` include, each with the first place that does. Files
+// beside them, in `files` or in `own`, are no dependency.
+std::map<std::string, std::string> included_folders(const SourceTree& tree,
+                                                    const std::string& folder,
+                                                    const std::set<std::string>& files,
+                                                    const std::set<std::string>& own) {
+  std::map<std::string, std::string> folders;
+  for (const auto& file : tree.files) {
+    if (file.folder != folder || !files.contains(file.name())) continue;
+    for (const auto& include : file.includes) {
+      const std::string target = folder_of_include(include.target);
+      if (!include.is_quoted || target.empty()) continue;
+      const std::string name = include.target.substr(target.size() + 1);
+      if (target == folder && (files.contains(name) || own.contains(name))) continue;
+      folders.emplace(target, at(file, include.line) + include.target);
+    }
+  }
+  return folders;
 }
 
 }  // namespace
@@ -92,11 +128,18 @@ Breaches check_folders(const SourceTree& tree) {
       breaches.push_back(at(file, 1) + "folder " + file.folder + " has no CMakeLists.txt, add one");
       continue;
     }
-    const std::string name = file.path.substr(file.folder.size() + 1);
-    if (!folder->second.words.contains(name))
+    if (!folder->second.lists(file.name()))
       breaches.push_back(at(file, 1) + "is not listed in " + file.folder +
                          "/CMakeLists.txt, add it to SOURCES or HEADERS");
-    if (checked.insert(file.folder).second) check_depends(tree, file.folder, breaches);
+    if (!checked.insert(file.folder).second) continue;
+    if (folder->second.about.empty())
+      breaches.push_back(file.folder +
+                         "/CMakeLists.txt:1: has no ABOUT, say in a line what the folder is for");
+    std::set<std::string> dependencies = folder->second.depends;
+    dependencies.insert(folder->second.uses.begin(), folder->second.uses.end());
+    for (const auto& program : folder->second.programs)
+      dependencies.insert(program.depends.begin(), program.depends.end());
+    check_order(tree, file.folder, dependencies, breaches);
   }
   return breaches;
 }
@@ -105,38 +148,41 @@ Breaches check_includes(const SourceTree& tree) {
   Breaches breaches;
   for (const auto& file : tree.files) {
     if (!is_library_code(file)) continue;
-    const auto visible = tree.closure_of(file.folder);
     for (const auto& include : file.includes) {
       if (!include.is_quoted) continue;
-      const std::string folder = folder_of_include(include.target);
-      const std::string start = at(file, include.line) + "includes " + include.target + ": ";
-      const bool is_generated = folder == "proto" && include.target.ends_with(".pb.h");
-      if (are_opposite_sides(file.folder, folder))
-        breaches.push_back(start + "server and client do not see each other, share it in common");
-      else if (!is_generated && !tree.has_file(include.target))
-        breaches.push_back(start + "no such file from the root, write the path from there");
-      else if (folder != file.folder && !visible.contains(folder))
-        breaches.push_back(start + folder + " is not among the DEPENDS of " + file.folder);
+      const bool is_generated =
+          include.target.starts_with("proto/") && include.target.ends_with(".pb.h");
+      if (!is_generated && !tree.has_file(include.target))
+        breaches.push_back(at(file, include.line) + "includes " + include.target +
+                           ": no such file from the root, write the path from there");
     }
+  }
+  return breaches;
+}
+
+Breaches check_dependencies(const SourceTree& tree) {
+  Breaches breaches;
+  for (const auto& [path, folder] : tree.folders) {
+    if (tree.layer_of(path) < 0 || path == "proto") continue;
+    const std::string where = path + "/CMakeLists.txt";
+    auto of_headers = included_folders(tree, path, folder.headers, folder.sources);
+    auto of_sources = included_folders(tree, path, folder.sources, folder.headers);
+    for (const auto& [name, place] : of_headers) of_sources.erase(name);
+    compare(where, "DEPENDS", folder.depends, of_headers, breaches);
+    compare(where, "USES", folder.uses, of_sources, breaches);
+    for (const auto& program : folder.programs)
+      compare(where + ", " + program.name, "DEPENDS", program.depends,
+              included_folders(tree, path, program.files, {}), breaches);
   }
   return breaches;
 }
 
 Breaches check_net_sees_no_world(const SourceTree& tree) {
   Breaches breaches;
-  static const std::set<std::string> kState{"server/tissue/world",    "server/tissue/hands",
-                                            "server/tissue/contact",  "server/tissue/propagation",
-                                            "server/tissue/dynamics", "server/tissue/reduction",
-                                            "server/tissue/step",     "server/lab/scenario"};
   for (const auto& folder : tree.closure_of("server/session/net"))
-    if (kState.contains(folder))
-      breaches.push_back("server/session/net/CMakeLists.txt:1: sees " + folder +
-                         " through its DEPENDS, hand it bytes instead");
-  for (const auto& file : tree.files)
-    for (const auto& include : file.includes)
-      if (file.folder == "server/session/net" && kState.contains(folder_of_include(include.target)))
-        breaches.push_back(at(file, include.line) + "includes " + include.target +
-                           ": hand it bytes instead");
+    if (folder.starts_with("server/"))
+      breaches.push_back("server/session/net/CMakeLists.txt:1: links " + folder +
+                         ", perhaps through others: hand it bytes instead");
   return breaches;
 }
 
@@ -163,7 +209,7 @@ Breaches check_determinism(const SourceTree& tree) {
       "\\butc_ns\\b");
   Breaches breaches;
   for (const auto& file : tree.files) {
-    if (!kStateFolders.contains(file.folder) || !file.is_cpp()) continue;
+    if (!tree.state_folders.contains(file.folder) || !file.is_cpp()) continue;
     const bool may_time = file.path == kStageTimers;
     for (const auto& include : file.includes)
       if (std::regex_search(include.target, kIncludes) &&

@@ -4,6 +4,7 @@
 
 #include <fstream>
 
+#include "tests/architecture/folder_table.h"
 #include "tests/architecture/rules.h"
 
 namespace trocar::architecture {
@@ -20,28 +21,28 @@ class Rules : public ::testing::Test {
     write("CMakeLists.txt",
           "set(TROCAR_LAYERS # the order\n  common/base common/math\n  proto common/wire\n"
           "  server/tissue/world server/tissue/step server/session/net\n  client/net "
-          "client/render)\n");
-    library("common/base", "SOURCES a.cpp HEADERS a.h");
+          "client/render)\nset(TROCAR_STATE_FOLDERS common/math server/tissue/world "
+          "server/tissue/step)\n");
+    library("common/base", "SOURCES a.cpp HEADERS a.h timing.h");
     write("common/base/a.h", "#pragma once\n#include <vector>\n");
     write("common/base/a.cpp", "#include \"common/base/a.h\"\n");
+    write("common/base/timing.h", "#pragma once\n");
     library("common/math", "HEADERS m.h DEPENDS common/base");
     write("common/math/m.h", "#pragma once\n#include \"common/base/a.h\"\n");
-    library("common/wire", "SOURCES w.cpp HEADERS w.h DEPENDS common/math proto LINK zstd");
+    library("common/wire", "SOURCES w.cpp HEADERS w.h DEPENDS common/math USES proto LINK zstd");
     write("common/wire/w.h", "#pragma once\n#include \"common/math/m.h\"\n");
-    write("common/wire/w.cpp", "#include \"proto/wire.pb.h\"\n#include \"common/base/a.h\"\n");
+    write("common/wire/w.cpp", "#include \"proto/wire.pb.h\"\n#include \"common/math/m.h\"\n");
     library("server/tissue/world", "HEADERS world.h DEPENDS common/math");
     write("server/tissue/world/world.h", "#pragma once\n#include \"common/math/m.h\"\n");
-    library("server/tissue/step", "SOURCES tick.cpp DEPENDS server/tissue/world");
+    library("server/tissue/step", "SOURCES tick.cpp USES common/base");
     write("server/tissue/step/tick.cpp",
           "#include \"common/base/timing.h\"\n#include <cmath>\n// std::sin(x) is not used\n"
           "float f(float x) { return std::sqrt(x) + g(thread_cpu_ns()) + h(\"std::cos(\"); }\n");
-    write("common/base/timing.h", "#pragma once\n");
-    library("common/base", "SOURCES a.cpp HEADERS a.h timing.h");
-    library("server/session/net", "SOURCES n.cpp DEPENDS common/wire");
+    library("server/session/net", "SOURCES n.cpp USES common/wire");
     write("server/session/net/n.cpp", "#include \"common/wire/w.h\"\n");
-    library("client/net", "SOURCES n.cpp DEPENDS common/wire");
+    library("client/net", "SOURCES n.cpp USES proto");
     write("client/net/n.cpp", "#include \"proto/wire.pb.h\"\n");
-    library("client/render", "SOURCES r.cpp DEPENDS common/math");
+    library("client/render", "SOURCES r.cpp");
     write("client/render/r.cpp", "#include <GLFW/glfw3.h>\n#include <imgui.h>\n");
   }
   ~Rules() override { fs::remove_all(root_); }
@@ -54,8 +55,9 @@ class Rules : public ::testing::Test {
     std::ofstream(root_ / path, std::ios::app) << text;
   }
   void library(const std::string& folder, const std::string& rest) {
-    write(folder + "/CMakeLists.txt",
-          "project_library(" + folder + " # one folder\n  " + rest + ")\n");
+    write(folder + "/CMakeLists.txt", "project_library(" + folder +
+                                          " # one folder\n  ABOUT \"What (it) is for.\" " + rest +
+                                          ")\n");
   }
   const fs::path& root() const { return root_; }
   SourceTree tree() const { return read_source_tree(root_); }
@@ -74,28 +76,71 @@ class Rules : public ::testing::Test {
 
 TEST_F(Rules, AGoodTreeHasNoBreach) {
   const auto good = tree();
-  for (const auto& breaches :
-       {check_folders(good), check_includes(good), check_net_sees_no_world(good),
-        check_protobuf(good), check_graphics(good), check_determinism(good), check_files(good)})
+  for (const auto& breaches : {check_folders(good), check_includes(good), check_dependencies(good),
+                               check_net_sees_no_world(good), check_protobuf(good),
+                               check_graphics(good), check_determinism(good), check_files(good)})
     EXPECT_TRUE(breaches.empty()) << breaches.front();
 }
 
-TEST_F(Rules, AnIncludeThatIsNotAmongTheDependsIsFound) {
+TEST_F(Rules, AnIncludeOfAHeaderThatIsNotAmongTheDependsIsFound) {
+  append("server/tissue/world/world.h", "#include \"common/base/a.h\"\n");
+  expect_one(check_dependencies(tree()),
+             "server/tissue/world/world.h:3: ", "common/base, which is not among the DEPENDS");
+  // Seen through common/math is not enough, and USES is for sources.
+  library("server/tissue/world", "HEADERS world.h DEPENDS common/math USES common/base");
+  EXPECT_EQ(check_dependencies(tree()).size(), 2u);
+  library("server/tissue/world", "HEADERS world.h DEPENDS common/math common/base");
+  EXPECT_TRUE(check_dependencies(tree()).empty());
+}
+
+TEST_F(Rules, AnIncludeOfASourceThatIsNotAmongTheUsesIsFound) {
   append("client/render/r.cpp", "#include \"common/wire/w.h\"\n");
-  expect_one(check_includes(tree()), "client/render/r.cpp:3: ", "not among the DEPENDS");
+  expect_one(check_dependencies(tree()),
+             "client/render/r.cpp:3: ", "common/wire, which is not among the USES");
+  library("client/render", "SOURCES r.cpp DEPENDS common/wire");
+  EXPECT_EQ(check_dependencies(tree()).size(), 2u) << "a source makes nothing public";
+  library("client/render", "SOURCES r.cpp USES common/wire");
+  EXPECT_TRUE(check_dependencies(tree()).empty());
+}
+
+TEST_F(Rules, ADependencyThatNothingIncludesIsFound) {
+  library("common/math", "HEADERS m.h DEPENDS common/base USES common/base");
+  expect_one(check_dependencies(tree()), "common/math/CMakeLists.txt: USES common/base", "take");
+  library("common/math", "HEADERS m.h DEPENDS common/base");
+  library("client/render", "SOURCES r.cpp DEPENDS common/math");
+  expect_one(check_dependencies(tree()), "client/render/CMakeLists.txt: DEPENDS common/math",
+             "take");
+}
+
+TEST_F(Rules, AProgramDependsOnWhatItsFilesInclude) {
+  const auto program = [&](const std::string& depends) {
+    library("server/tissue/step", "SOURCES tick.cpp HEADERS t.h USES common/base");
+    append("server/tissue/step/CMakeLists.txt",
+           "project_program(run\n  MAIN main.cpp main.h\n  DEPENDS " + depends + ")\n");
+  };
+  write("server/tissue/step/t.h", "#pragma once\n");
+  write("server/tissue/step/main.h", "#pragma once\n#include \"common/math/m.h\"\n");
+  write("server/tissue/step/main.cpp",
+        "#include \"server/tissue/step/main.h\"\n#include \"server/tissue/step/t.h\"\n");
+  program("server/tissue/step common/math");
+  EXPECT_TRUE(check_folders(tree()).empty());
+  EXPECT_TRUE(check_dependencies(tree()).empty());
+  program("common/math");
+  expect_one(check_dependencies(tree()),
+             "server/tissue/step/main.cpp:2: ", "of server/tissue/step");
+  program("server/tissue/step common/math common/base");
+  expect_one(check_dependencies(tree()), "server/tissue/step/CMakeLists.txt, run: ", "common/base");
+}
+
+TEST_F(Rules, AFolderThatDoesNotSayWhatItIsForIsFound) {
+  write("common/math/CMakeLists.txt",
+        "project_library(common/math HEADERS m.h DEPENDS common/base)\n");
+  expect_one(check_folders(tree()), "common/math/CMakeLists.txt:1: ", "ABOUT");
 }
 
 TEST_F(Rules, ADependencyThatPointsDownIsFound) {
-  library("common/base", "SOURCES a.cpp HEADERS a.h timing.h DEPENDS common/math");
+  library("common/base", "SOURCES a.cpp HEADERS a.h timing.h USES common/math");
   expect_one(check_folders(tree()), "common/base/CMakeLists.txt:1: ", "turn it around");
-}
-
-TEST_F(Rules, AProgramMayDependOnTheLibraryBesideIt) {
-  append("server/tissue/step/CMakeLists.txt",
-         "project_program(run MAIN main.cpp DEPENDS server/tissue/step common/math)\n");
-  write("server/tissue/step/main.cpp", "#include \"common/math/m.h\"\n");
-  EXPECT_TRUE(check_folders(tree()).empty());
-  EXPECT_TRUE(check_includes(tree()).empty());
 }
 
 TEST_F(Rules, ADependencyThatDoesNotExistIsFound) {
@@ -105,14 +150,16 @@ TEST_F(Rules, ADependencyThatDoesNotExistIsFound) {
 }
 
 TEST_F(Rules, ServerAndClientInEitherDirectionAreFound) {
-  library("client/net", "SOURCES n.cpp DEPENDS common/wire server/tissue/world");
-  append("client/net/n.cpp", "#include \"server/tissue/world/world.h\"\n");
-  append("server/session/net/n.cpp", "#include \"client/net/n.h\"\n");
+  library("client/net", "SOURCES n.cpp USES proto server/tissue/world");
   expect_one(check_folders(tree()), "client/net/CMakeLists.txt:1: ", "do not see each other");
-  const auto breaches = check_includes(tree());
-  ASSERT_EQ(breaches.size(), 2u);
-  EXPECT_EQ(breaches[0].rfind("client/net/n.cpp:2: ", 0), 0u) << breaches[0];
-  EXPECT_EQ(breaches[1].rfind("server/session/net/n.cpp:2: ", 0), 0u) << breaches[1];
+  library("client/net", "SOURCES n.cpp USES proto");
+  library("server/session/net", "SOURCES n.cpp USES common/wire client/net");
+  expect_one(check_folders(tree()), "server/session/net/CMakeLists.txt:1: ", "do not see");
+}
+
+TEST_F(Rules, WhatIsSharedSeesNeitherServerNorClient) {
+  library("common/wire", "SOURCES w.cpp HEADERS w.h DEPENDS common/math server/tissue/world");
+  expect_one(check_folders(tree()), "common/wire/CMakeLists.txt:1: ", "sees neither");
 }
 
 TEST_F(Rules, AnIncludeThatIsNotFromTheRootIsFound) {
@@ -134,12 +181,23 @@ TEST_F(Rules, AFolderOutsideTheLayersAndAFileThatIsNotListedAreFound) {
   expect_one(check_folders(tree()), "common/wire/forgotten.h:1: ", "not listed");
 }
 
-TEST_F(Rules, NetThatSeesTheWorldThroughAnotherFolderIsFound) {
-  library("server/session/net", "SOURCES n.cpp DEPENDS common/wire server/tissue/step");
-  const auto breaches = check_net_sees_no_world(tree());
-  ASSERT_EQ(breaches.size(), 2u) << "step itself and world through it";
-  append("server/session/net/n.cpp", "#include \"server/tissue/world/world.h\"\n");
-  EXPECT_EQ(check_net_sees_no_world(tree()).size(), 3u);
+TEST_F(Rules, NetThatLinksTheWorldThroughAnotherFolderIsFound) {
+  library("server/tissue/step", "SOURCES tick.cpp USES server/tissue/world");
+  library("server/session/net", "SOURCES n.cpp USES server/tissue/step");
+  EXPECT_EQ(check_net_sees_no_world(tree()).size(), 2u) << "step itself and world through it";
+  library("common/wire", "SOURCES w.cpp HEADERS w.h DEPENDS server/tissue/world");
+  library("server/session/net", "SOURCES n.cpp USES common/wire");
+  expect_one(check_net_sees_no_world(tree()), "server/session/net/CMakeLists.txt:1: ",
+             "server/tissue/world, perhaps through others");
+}
+
+TEST_F(Rules, TheTableOfFoldersFollowsTheLayers) {
+  const std::string table = folder_table(tree());
+  EXPECT_NE(table.find("## `server/tissue`\n\n| folder | purpose | state |\n|---|---|---|\n"
+                       "| `server/tissue/world` | What (it) is for. | x |\n"),
+            std::string::npos)
+      << table;
+  EXPECT_NE(table.find("| `common/base` | What (it) is for. |  |\n"), std::string::npos) << table;
 }
 
 TEST_F(Rules, ProtobufElsewhereIsFound) {
@@ -178,7 +236,7 @@ TEST_F(Rules, ExactlyRoundedFunctionsAndLikeNamesAreAllowed) {
 }
 
 TEST_F(Rules, OnlyTheStageTimersMayReadAClock) {
-  library("server/tissue/step", "SOURCES tick.cpp other.cpp DEPENDS server/tissue/world");
+  library("server/tissue/step", "SOURCES tick.cpp other.cpp USES common/base");
   write("server/tissue/step/other.cpp", "#include \"common/base/timing.h\"\n");
   expect_one(check_determinism(tree()), "server/tissue/step/other.cpp:1: ", "timing.h");
 }

@@ -37,10 +37,11 @@ bool is_left_out(const fs::path& folder) {
          name == "node_modules";
 }
 
+// Words, parentheses, and quoted strings with their quotes.
 std::vector<std::string> words_of_cmake(const std::string& text) {
   const std::string code = std::regex_replace(text, std::regex("#[^\n]*"), "");
   std::vector<std::string> words;
-  static const std::regex kWord("[()]|[^\\s()]+");
+  static const std::regex kWord("[()]|\"[^\"]*\"|[^\\s()\"]+");
   for (auto it = std::sregex_iterator(code.begin(), code.end(), kWord);
        it != std::sregex_iterator(); ++it)
     words.push_back(it->str());
@@ -48,25 +49,45 @@ std::vector<std::string> words_of_cmake(const std::string& text) {
 }
 
 Folder read_folder(const std::string& cmake_text) {
-  static const std::set<std::string> kKeywords{"SOURCES", "HEADERS", "LINK", "MAIN", ")"};
+  static const std::set<std::string> kKeywords{"ABOUT", "SOURCES", "HEADERS", "DEPENDS",
+                                               "USES",  "LINK",    "MAIN"};
   Folder folder;
-  bool in_depends = false;
-  for (const auto& word : words_of_cmake(cmake_text)) {
-    folder.words.insert(word);
-    if (kKeywords.contains(word)) in_depends = false;
-    if (in_depends && word != "DEPENDS" && word != "USES") folder.depends.insert(word);
-    if (word == "DEPENDS" || word == "USES") in_depends = true;
+  std::string command, keyword;
+  const auto words = words_of_cmake(cmake_text);
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    const std::string& word = words[i];
+    if (word == "(") {
+      command = i == 0 ? "" : words[i - 1];
+      if (command == "project_program" && i + 1 < words.size())
+        folder.programs.push_back({.name = words[i + 1], .files = {}, .depends = {}});
+      keyword.clear();
+    } else if (word == ")") {
+      command.clear();
+    } else if (kKeywords.contains(word)) {
+      keyword = word;
+    } else if (keyword == "ABOUT" && word.size() > 2) {
+      folder.about = word.substr(1, word.size() - 2);
+    } else if (command == "project_library") {
+      if (keyword == "SOURCES") folder.sources.insert(word);
+      if (keyword == "HEADERS") folder.headers.insert(word);
+      if (keyword == "DEPENDS") folder.depends.insert(word);
+      if (keyword == "USES") folder.uses.insert(word);
+    } else if (command == "project_program") {
+      if (keyword == "MAIN") folder.programs.back().files.insert(word);
+      if (keyword == "DEPENDS") folder.programs.back().depends.insert(word);
+    }
   }
   return folder;
 }
 
-std::vector<std::string> read_layers(const std::string& cmake_text) {
+// The words of set(`name` ...).
+std::vector<std::string> read_list(const std::string& cmake_text, const std::string& name) {
   const auto words = words_of_cmake(cmake_text);
-  auto at = std::find(words.begin(), words.end(), "TROCAR_LAYERS");
-  std::vector<std::string> layers;
+  auto at = std::find(words.begin(), words.end(), name);
+  std::vector<std::string> list;
   for (; at != words.end() && *at != ")"; ++at)
-    if (*at != "TROCAR_LAYERS") layers.push_back(*at);
-  return layers;
+    if (*at != name) list.push_back(*at);
+  return list;
 }
 
 SourceFile read_file(const fs::path& root, const fs::path& path) {
@@ -89,6 +110,12 @@ SourceFile read_file(const fs::path& root, const fs::path& path) {
 
 }  // namespace
 
+bool Folder::lists(const std::string& file) const {
+  return headers.contains(file) || sources.contains(file) ||
+         std::any_of(programs.begin(), programs.end(),
+                     [&](const Program& program) { return program.files.contains(file); });
+}
+
 int SourceTree::layer_of(const std::string& folder) const {
   const auto at = std::find(layers.begin(), layers.end(), folder);
   return at == layers.end() ? -1 : static_cast<int>(at - layers.begin());
@@ -101,8 +128,9 @@ std::set<std::string> SourceTree::closure_of(const std::string& folder) const {
     const auto at = folders.find(open.back());
     open.pop_back();
     if (at == folders.end()) continue;
-    for (const auto& next : at->second.depends)
-      if (seen.insert(next).second) open.push_back(next);
+    for (const auto* names : {&at->second.depends, &at->second.uses})
+      for (const auto& next : *names)
+        if (seen.insert(next).second) open.push_back(next);
   }
   return seen;
 }
@@ -114,7 +142,10 @@ bool SourceTree::has_file(const std::string& path) const {
 
 SourceTree read_source_tree(const std::filesystem::path& root) {
   SourceTree tree;
-  tree.layers = read_layers(read_text(root / "CMakeLists.txt"));
+  const std::string top = read_text(root / "CMakeLists.txt");
+  tree.layers = read_list(top, "TROCAR_LAYERS");
+  for (const auto& folder : read_list(top, "TROCAR_STATE_FOLDERS"))
+    tree.state_folders.insert(folder);
   for (auto it = fs::recursive_directory_iterator(root); it != fs::recursive_directory_iterator();
        ++it) {
     if (it->is_directory() && is_left_out(it->path())) it.disable_recursion_pending();

@@ -24,23 +24,39 @@ struct SourceFile {
   std::vector<std::string> code_lines;  // without comments and contents of literals; C++ only
   std::vector<Include> includes;        // C++ only
 
+  std::string name() const { return path.substr(folder.empty() ? 0 : folder.size() + 1); }
   bool is_header() const { return path.ends_with(".h"); }
   bool is_cpp() const { return path.ends_with(".h") || path.ends_with(".cpp"); }
 };
 
+// A project_program() of a folder, as its CMakeLists.txt lists it.
+struct Program {
+  std::string name;
+  std::set<std::string> files;    // MAIN, from the folder
+  std::set<std::string> depends;  // DEPENDS
+};
+
+// What the CMakeLists.txt of a folder says.
 struct Folder {
-  std::set<std::string> depends;  // as written in its CMakeLists.txt
-  std::set<std::string> words;    // every word of that file
+  std::set<std::string> headers;  // HEADERS of its project_library(), from the folder
+  std::set<std::string> sources;  // SOURCES
+  std::set<std::string> depends;  // DEPENDS
+  std::set<std::string> uses;     // USES
+  std::string about;              // ABOUT: what the folder is for
+  std::vector<Program> programs;
+
+  bool lists(const std::string& file) const;
 };
 
 struct SourceTree {
-  std::vector<std::string> layers;  // TROCAR_LAYERS, top first
+  std::vector<std::string> layers;      // TROCAR_LAYERS, top first
+  std::set<std::string> state_folders;  // TROCAR_STATE_FOLDERS
   std::map<std::string, Folder> folders;
   std::vector<SourceFile> files;  // by path
 
   // Position in `layers`, or -1.
   int layer_of(const std::string& folder) const;
-  // What `folder` may see through its DEPENDS, directly or through others.
+  // What `folder` links, directly or through others.
   std::set<std::string> closure_of(const std::string& folder) const;
   bool has_file(const std::string& path) const;
 };

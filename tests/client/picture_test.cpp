@@ -10,6 +10,7 @@
 #include "common/base/timing.h"
 #include "common/wire/surface_codec.h"
 #include "server/organs/catalogue/builtin_organs.h"
+#include "server/tissue/world/surface_layout.h"
 #include "tests/client/synthetic_source.h"
 #include "tests/support/surface_edits.h"
 
@@ -109,7 +110,7 @@ class PictureTest : public ::testing::Test {
     static const wire::SurfaceLayout kLayout = [] {
       auto organ = catalogue::make_liver();
       EXPECT_TRUE(organ.ok());
-      return wire::make_surface_layout(*organ);
+      return world::make_surface_layout(*organ);
     }();
     return kLayout;
   }

@@ -424,5 +424,24 @@ TEST_F(ReplicaTest, InvalidMessagesAreAFaultThatNamesTheField) {
             std::string::npos);
 }
 
+TEST_F(ReplicaTest, KeepsWhatTheServerSaysOfItsRecording) {
+  start();
+  EXPECT_EQ(replica_.recording().status, wire::RecordingStatus::Unknown);
+  proto::Envelope message;
+  auto& state = *message.mutable_recording_state();
+  state.set_status(proto::RECORDING_GAPPED);
+  state.set_frames_missing(7);
+  state.set_text(std::string(1000, 'x'));
+  replica_.on_message(message, 0, 0);
+  advance(100);
+  EXPECT_TRUE(replica_.recording().is_damaged()) << "it stays, whatever comes";
+  EXPECT_EQ(replica_.recording().frames_missing, 7u);
+  EXPECT_EQ(replica_.recording().text.size(), kMaxRecordingText);
+  state.set_status(static_cast<proto::RecordingStatus>(77));
+  replica_.on_message(message, 0, 0);
+  EXPECT_EQ(replica_.recording().status, wire::RecordingStatus::Unknown);
+  EXPECT_TRUE(replica_.fault().ok());
+}
+
 }  // namespace
 }  // namespace trocar::replica

@@ -10,7 +10,7 @@
 #include "common/journal/session_journal.h"
 #include "proto/journal.pb.h"
 #include "proto/wire.pb.h"
-#include "server/app/simulation_loop.h"
+#include "server/app/server/simulation_loop.h"
 #include "server/organs/catalogue/builtin_organs.h"
 #include "server/session/recording/tick_records.h"
 #include "server/session/recording/verify.h"
@@ -88,8 +88,7 @@ void expect_verifies(const std::filesystem::path& file) {
   const auto verified = recording::verify_journal(file.string());
   ASSERT_TRUE(verified.ok()) << verified.error().message;
   EXPECT_TRUE(verified->is_resimulated);
-  EXPECT_TRUE(verified->ok()) << "tick " << verified->first_mismatch->tick << ": "
-                              << verified->first_mismatch->what;
+  EXPECT_EQ(verified->verdict(), recording::Verdict::Verified) << verified->why();
   EXPECT_EQ(verified->ticks_verified, 2000u);
   EXPECT_EQ(verified->ticks_missing, 0u);
 }

@@ -8,7 +8,7 @@
 #include <functional>
 #include <vector>
 
-#include "server/app/pacer.h"
+#include "server/app/server/pacer.h"
 #include "server/session/control/rate_controller.h"
 
 namespace trocar::control::testing {

@@ -150,8 +150,7 @@ TEST(ReducedSession, IsRecordedAndSimulatesAgainWithItsReductionOnly) {
   const auto file = session.journal.string();
   const auto again = recording::verify_journal(file, {}, reduction);
   ASSERT_TRUE(again.ok()) << again.error().message;
-  EXPECT_TRUE(again->ok()) << "tick " << again->first_mismatch->tick << ": "
-                           << again->first_mismatch->what;
+  EXPECT_EQ(again->verdict(), recording::Verdict::Verified) << again->why();
   EXPECT_GE(again->ticks_verified, 6000u);
 
   const auto hash = fmt::format("{:016x}", organ::reduction_hash(*made().local));

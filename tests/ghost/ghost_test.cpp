@@ -8,7 +8,7 @@
 #include <condition_variable>
 #include <mutex>
 
-#include "server/app/simulation_loop.h"
+#include "server/app/server/simulation_loop.h"
 #include "tests/reduce/reduced_block.h"
 
 namespace trocar::ghost {

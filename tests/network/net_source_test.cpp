@@ -146,6 +146,24 @@ TEST(NetSource, no_server_is_unreachable_and_a_broken_connection_is_lost) {
   EXPECT_TRUE(sink.messages.empty());
 }
 
+TEST(NetSource, an_exception_on_its_thread_ends_it_with_a_reason) {
+  LiveSession session;
+  session.publish(10);
+  auto options = options_for(session.port(), "Anna");
+  int messages = 0;
+  options.before_message = [&messages] {
+    if (++messages == 3) throw std::runtime_error("no room for a message");
+  };
+  net::NetSource source(options);
+  Collector sink;
+  ASSERT_TRUE(poll_until(source, sink, [&] { return source.state() == SourceState::Closed; }));
+  EXPECT_EQ(source.close_reason().kind, CloseKind::Lost);
+  EXPECT_NE(source.close_reason().text.find("this client failed (no room for a message)"),
+            std::string::npos)
+      << source.close_reason().text;
+  EXPECT_EQ(sink.messages.size(), 2u) << "what came before is not lost";
+}
+
 TEST(NetSource, goes_away_in_any_state) {
   LiveSession session;
   for (int i = 0; i < 20; ++i) {

@@ -9,10 +9,10 @@
 #include <fstream>
 #include <sstream>
 
-#include "server/app/frame_handover.h"
-#include "server/app/options.h"
-#include "server/app/pacer.h"
-#include "server/app/simulation_loop.h"
+#include "server/app/server/frame_handover.h"
+#include "server/app/server/options.h"
+#include "server/app/server/pacer.h"
+#include "server/app/server/simulation_loop.h"
 #include "tests/network/session_fixture.h"
 
 namespace trocar::testing {

@@ -12,6 +12,7 @@
 #include <chrono>
 
 #include "common/base/version.h"
+#include "server/tissue/world/surface_layout.h"
 
 namespace trocar::testing {
 
@@ -166,7 +167,7 @@ proto::Envelope make_sample(std::uint32_t sequence) {
 
 LiveSession::LiveSession(net::TcpServerOptions tcp, replication::ReplicatorOptions options,
                          catalogue::LatticeSize size)
-    : organ_(*catalogue::make_lattice(size)), layout_(wire::make_surface_layout(organ_)) {
+    : organ_(*catalogue::make_lattice(size)), layout_(world::make_surface_layout(organ_)) {
   tcp.port = 0;
   auto listening = net::TcpServer::listen(io_, tcp);
   EXPECT_TRUE(listening.ok());

@@ -253,6 +253,16 @@ TEST(ScenarioParse, WhatIsMissingIsSaid) {
   EXPECT_NE(message_of("[run]\nseconds = 1\n").find("key organ: is missing"), std::string::npos);
   EXPECT_NE(message_of("[organ]\nsource = \"lattice\"\n").find("key run: is missing"),
             std::string::npos);
+  // A misspelt key is named itself, not the one that it leaves missing.
+  EXPECT_NE(message_of("[organ]\nsourc = \"lattice\"\n[run]\nseconds = 1\n")
+                .find("bad.toml:2: key organ.sourc: is unknown, the keys here are source"),
+            std::string::npos);
+  EXPECT_NE(
+      message_of("[orgn]\nsource = \"lattice\"\n[run]\nseconds = 1\n").find("key orgn: is unknown"),
+      std::string::npos);
+  // A key that another table lacks stays what is wrong.
+  EXPECT_NE(message_of("[organ]\n[run]\nseconds = 1\n[rum]\n").find("key organ.source: is missing"),
+            std::string::npos);
   EXPECT_TRUE(message_of("[organ\n").starts_with("bad.toml:1: is not TOML"));
 }
 

@@ -126,6 +126,58 @@ quantity = "reaction"
   EXPECT_TRUE(run->is_finished());
 }
 
+// Springs along three axes have no shear stiffness, so that they buckle wherever they are
+// compressed. Sweeps that overshoot once left this equilibrium for others, hundreds of millimetres
+// away.
+TEST(ScenarioRun, AStaticPullAtALatticeStaysInTheEquilibriumItCameFrom) {
+  constexpr double kForce_n = 0.05, kAlongColumn = 1, kSpringsBelow = 14, kPulled = 9;
+  const auto pull = [](const char* fibres) {
+    return make(std::string(R"([organ]
+source = "lattice"
+nodes = [16, 15, 16]
+spacing_mm = 10
+[material]
+spring_stiffness_n_m = 10
+)") + fibres + R"([[nodes]]
+name = "patch"
+nearest_mm = [5, 70, 5]
+radius_mm = 14.2
+[[force]]
+set = "patch"
+[[force.key]]
+time_s = 0
+force_n = [0, 0, 0]
+[[force.key]]
+time_s = 1
+force_n = [0, 0.05, 0]
+[run]
+mode = "static"
+seconds = 1
+load_steps = 3
+tolerance_n = 4e-6
+max_sweeps = 8000
+[[probe]]
+set = "patch"
+quantity = "displacement"
+)");
+  };
+  const auto stiff = pull("");
+  const auto soft = pull("fibre_direction = [0, 1, 0]\nfibre_stiffness_ratio = 0.1\n");
+  ASSERT_TRUE(stiff && soft);
+  Vec3d before;
+  for (int step = 1; step <= 3; ++step) {
+    EXPECT_TRUE(stiff->step().is_converged) << step;
+    EXPECT_TRUE(soft->step().is_converged) << step;
+    const Vec3d moved = soft->probe(0);
+    EXPECT_GT(moved.y, before.y) << "a larger force pulls further";
+    // The columns below alone would stretch so far; the springs across only hold them back.
+    EXPECT_LT(moved.y, kForce_n * step / 3 / kPulled * kSpringsBelow / kAlongColumn);
+    EXPECT_GT(moved.y, stiff->probe(0).y) << "softer along the pull";
+    EXPECT_LT(std::hypot(moved.x, moved.z), 0.05 * moved.y) << "along the pull";
+    before = moved;
+  }
+}
+
 TEST(ScenarioRun, AToolPressesInAStaticRun) {
   const auto run = make(R"([organ]
 source = "liver"

@@ -217,9 +217,6 @@ verb = "cut"
 time_s = 0.2
 position_mm = [30, 2, 0]
 [[probe]]
-set = "fixed"
-quantity = "reaction"
-[[probe]]
 tool = 0
 quantity = "force"
 [output]
@@ -259,7 +256,7 @@ TEST_F(SimProgram, AJournalWithLoadsSaysThatItCannotBeSimulatedAgain) {
                            "\"top\"\nids = [26]\n[[force]]\nset = \"top\"\n[[force.key]]\ntime_s "
                            "= 0\nforce_n = [0, 0.01, 0]\n[run]\nseconds = 0.032\n");
   ASSERT_EQ(run({pulls, "--out", at("pulls"), "--journal", at("pulls.mcap")}), 0) << log();
-  EXPECT_NE(log().find("loads are not in a journal"), std::string::npos) << log();
+  EXPECT_NE(log().find("are not in a journal"), std::string::npos) << log();
   EXPECT_EQ(run({"--hands", at("pulls.mcap"), "--out", at("again")}), 3);
   EXPECT_NE(log().find("is of a scenario with loads"), std::string::npos) << log();
 }

@@ -31,7 +31,7 @@ TEST_F(TwoHands, SameInputsGiveSameHashes) {
   for (int i = 0; i < 600; ++i) ASSERT_EQ(run_tick(a).state_hash, run_tick(b).state_hash);
 }
 
-// Equal on gcc and clang, debug, release and sanitized builds: see README, "Determinism". A change
+// Equal on gcc and clang, debug, release and sanitized builds: see docs/determinism.md. A change
 // of results changes this number, and raises kSimVersion in the same commit.
 TEST_F(TwoHands, TheHashIsTheSameOnEveryBuild) {
   const auto hash_after = [](organ::Organ organ, const TickDecisions& decisions, unsigned workers) {

@@ -9,13 +9,14 @@
 #include <cmath>
 
 #include "common/base/timing.h"
-#include "server/lab/reduce/quality.h"
+#include "server/papers/dogan/quality.h"
 #include "tests/validation/experiments.h"
 #include "tests/validation/measured_livers.h"
 
 namespace trocar::validation {
 namespace {
 
+using namespace dogan;
 using namespace reduce;
 
 // Of the paper, on its eight modes.
@@ -70,7 +71,7 @@ class Study {
     auto settings = settings_;
     settings.modes = modes;
     show_progress(fmt::format("{}: {} modes", liver_.name, modes));
-    auto result = reduce::reduce(*model_, training_, settings);
+    auto result = dogan::reduce(*model_, training_, settings);
     TROCAR_ASSERT(result.ok());
     return std::move(*result);
   }
@@ -84,7 +85,7 @@ class Study {
   Training training_;
   UnseenLoads unseen_;
   double full_s_ = 0;
-  organ::Reduction eight_;  // the paper's number of modes
+  dogan::Reduction eight_;  // the paper's number of modes
 };
 
 // Errors over the number of modes, for each its own best tangent.
@@ -168,7 +169,7 @@ void Study::show_own_load() {
       own.snapshots.push_back({{node, press.force_n * shares[i], press.radius_m}, steps[i]});
     auto settings = settings_;
     settings.modes = kPaperModes;
-    const auto made = reduce::reduce(*model_, own, settings);
+    const auto made = dogan::reduce(*model_, own, settings);
     TROCAR_ASSERT(made.ok());
     const Unseen load{press, steps.back()};
     const auto q = quality_of(made->reduction, liver_.organ, {&load, 1});

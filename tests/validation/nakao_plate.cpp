@@ -11,6 +11,7 @@
 #include <numbers>
 
 #include "server/organs/catalogue/builtin_organs.h"
+#include "server/papers/nakao/adaptive_splitter.h"
 #include "tests/validation/cut_plate.h"
 #include "tests/validation/experiments.h"
 
@@ -37,19 +38,10 @@ struct Way {
 };
 
 std::vector<Way> ways() {
-  // One patch for the whole cut.
-  cutting::Settings nakao;
-  nakao.method = cutting::Method::Nakao;
-  nakao.piece_h = nakao.collect_h = 1e3;
-  nakao.collect_ticks = 0xffffffff;
-  nakao.debris_tets = 0;  // a rule of ours
-  nakao.debris_volume_h3 = 0;
-  auto plain = nakao;
-  plain.method = cutting::Method::NakaoPlain;
   cutting::Settings faces;
   faces.snap = 0.51;  // always the nearer end: nothing is split
-  return {{"adaptive", "adaptive (Nakao)", nakao},
-          {"plain", "split, neither moved nor chosen", plain},
+  return {{"adaptive", "adaptive (Nakao)", nakao::settings_of(nakao::Variant::Adaptive)},
+          {"plain", "split, neither moved nor chosen", nakao::settings_of(nakao::Variant::Plain)},
           {"faces", "faces of existing tets only", faces},
           {"robust", "ours, of sessions", cutting::Settings{}}};
 }
@@ -348,7 +340,7 @@ void run_plate(const Lab& lab, Section& section) {
   check_openings(section, "printed", printed);
   check_areas(section, printed);
   for (const auto& [way, wounds] : printed)
-    if (way.settings.method != cutting::Method::Nakao)
+    if (way.name != std::string_view("adaptive"))
       section.at_most(fmt::format("energy-{}", way.name), "unchanged (sec. 3.2)",
                       std::abs(wounds.back().energy_gain), kEnergyBound,
                       fmt::format("{}: elastic energy at the instant of the cut.", way.title));

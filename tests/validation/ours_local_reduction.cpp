@@ -12,6 +12,7 @@
 #include "common/base/timing.h"
 #include "server/lab/reduce/local_quality.h"
 #include "server/organs/organ/local_reduction_file.h"
+#include "server/papers/dogan/quality.h"
 #include "tests/validation/experiments.h"
 #include "tests/validation/measured_livers.h"
 
@@ -121,12 +122,13 @@ class Study {
 
   // The paper's method on the same places, for the same loads.
   void show_dogan(Table& errors) {
-    Settings settings{.modes = kDoganModes, .places = 30, .magnitudes = 2, .radius_m = 0};
+    using namespace dogan;
+    dogan::Settings settings{.modes = kDoganModes, .places = 30, .magnitudes = 2, .radius_m = 0};
     if (is_short_) settings.places = 8, settings.directions = 2, settings.tangents = 8;
     const auto training = train(*model_, settings, [&](Stage, std::size_t done, std::size_t all) {
       show_progress(fmt::format("{}, eight modes: {} of {}", liver_.name, done, all));
     });
-    const auto built = reduce::reduce(*model_, training, settings);
+    const auto built = dogan::reduce(*model_, training, settings);
     TROCAR_ASSERT(built.ok());
     std::vector<Unseen> loads;
     for (const auto& load : loads_)

@@ -9,6 +9,7 @@
 #include "common/wire/surface_messages.h"
 #include "proto/wire.pb.h"
 #include "server/organs/catalogue/builtin_organs.h"
+#include "server/tissue/world/surface_layout.h"
 #include "tests/support/surface_edits.h"
 
 namespace trocar::wire {
@@ -22,7 +23,7 @@ using testing::random_change;
 using testing::split_edge;
 
 SurfaceLayout box() {
-  return make_surface_layout(*catalogue::make_lattice({8, 5, 8, 0.01}));
+  return world::make_surface_layout(*catalogue::make_lattice({8, 5, 8, 0.01}));
 }
 VertexIndex nearest(const SurfaceLayout& layout, const QuantisedVertex& at) {
   const auto distance = [&](const QuantisedVertex& v) {
@@ -264,10 +265,10 @@ TEST(surface_topology, what_is_wrong_is_named) {
   EXPECT_EQ(*read(old), without_nodes(box()));
 }
 
-// Not above what README states.
+// The bound is what docs/the-wire.md states.
 TEST(surface_change, costs_few_bytes) {
   Random random(11);
-  SurfaceLayout layout = make_surface_layout(*catalogue::make_lattice({24, 12, 24, 0.01}));
+  SurfaceLayout layout = world::make_surface_layout(*catalogue::make_lattice({24, 12, 24, 0.01}));
   std::size_t bytes = 0, triangles = 0, vertices = 0;
   for (int i = 0; i < 40; ++i) {
     const SurfaceChange change = random_change(layout, random);

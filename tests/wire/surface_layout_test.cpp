@@ -1,4 +1,5 @@
 #include "common/wire/surface_layout.h"
+#include "server/tissue/world/surface_layout.h"
 
 #include <gtest/gtest.h>
 
@@ -23,7 +24,7 @@ organ::Organ small_organ() {
 }
 
 TEST(surface_layout, slots_follow_the_morton_curve) {
-  const SurfaceLayout layout = make_surface_layout(small_organ());
+  const SurfaceLayout layout = world::make_surface_layout(small_organ());
   // Origin, then x, y, z.
   EXPECT_EQ(layout.node_of_vertex,
             (std::vector{NodeIndex(3), NodeIndex(0), NodeIndex(4), NodeIndex(1)}));
@@ -33,7 +34,7 @@ TEST(surface_layout, slots_follow_the_morton_curve) {
 }
 
 TEST(surface_layout, triangles_keep_order_and_orientation) {
-  const SurfaceLayout layout = make_surface_layout(small_organ());
+  const SurfaceLayout layout = world::make_surface_layout(small_organ());
   const std::array<VertexIndex, 3> first{VertexIndex(0), VertexIndex(2), VertexIndex(1)};
   const std::array<VertexIndex, 3> last{VertexIndex(1), VertexIndex(2), VertexIndex(3)};
   ASSERT_EQ(layout.triangles.size(), 4u);
@@ -42,7 +43,7 @@ TEST(surface_layout, triangles_keep_order_and_orientation) {
 }
 
 TEST(surface_layout, fixed_vertices_are_surface_slots_ascending) {
-  const SurfaceLayout layout = make_surface_layout(small_organ());
+  const SurfaceLayout layout = world::make_surface_layout(small_organ());
   EXPECT_EQ(layout.fixed_vertices, (std::vector{VertexIndex(0), VertexIndex(3)}));
 }
 

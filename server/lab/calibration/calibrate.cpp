@@ -117,7 +117,8 @@ class PlaceStudy {
   std::vector<Finding> findings_;
 };
 
-// What all places need in one range; a limit below one that a smaller force needs is raised to it.
+// Makes the row of what all places need in one range; a limit below one that a smaller force needs
+// is raised to it.
 organ::DepthRow row_of(const std::vector<Finding>& findings, double force_n, double error,
                        const organ::DepthRow* before) {
   organ::DepthRow row{force_n, 0u, 0u, 0, 0};

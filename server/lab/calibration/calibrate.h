@@ -27,7 +27,7 @@ struct Settings {
 Status validate(const Settings& settings);
 double radius_of(const organ::Organ& organ, const Settings& settings);
 
-// One place, one range of force; for people.
+// A finding is of one place and one range of force; it is for people.
 struct Finding {
   std::size_t place = 0;
   NodeIndex node;

@@ -45,7 +45,7 @@ class Assembler {
   void set_history(std::vector<double> history) { history_ = std::move(history); }
 
  private:
-  // Of one block of elements; entries row by row, as the pattern wants them.
+  // The results of one block of elements have their entries row by row, as the pattern wants them.
   struct Block {
     std::vector<double> forces, products, entries;
     std::vector<std::uint8_t> is_admissible;

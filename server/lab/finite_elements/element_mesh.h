@@ -30,7 +30,8 @@ struct ElementMesh {
   std::vector<std::array<std::uint32_t, 2>> edge_ends;  // corners beside node corner_count + i
   std::vector<std::uint32_t> nodes;                     // nodes_per_element() of each
 
-  // Of each element: gradients of the four barycentric coordinates (rows), 1/m, and volume, m^3.
+  // Each element has the gradients of its four barycentric coordinates (rows), 1/m, and a volume,
+  // m^3.
   std::vector<Eigen::Matrix<double, 4, 3>> gradients;
   std::vector<double> volumes;
 

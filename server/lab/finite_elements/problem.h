@@ -1,7 +1,7 @@
 #pragma once
 
-// What the off-line solver solves: elements, materials, what is held. A degree of freedom is
-// 3 node + axis. SI units.
+// The off-line solver solves a problem: elements, materials, and what is held. A degree of freedom
+// is 3 node + axis. SI units.
 
 #include <cstdint>
 #include <string>
@@ -28,12 +28,12 @@ struct Problem {
   }
 };
 
-// One material everywhere, nothing held.
+// Makes a problem of one material everywhere, in which nothing is held.
 Problem make_problem(ElementMesh mesh, const material::HyperelasticMaterial& material,
                      double density_kg_m3 = 1060);
 
-// What hyperelastic tissue is to this solver: the measured law, or as one the live solver's
-// neo-Hookean law of linear elastic constants.
+// To this solver, hyperelastic tissue is a measured law: its own, or the live solver's neo-Hookean
+// law of linear elastic constants written as one.
 material::HyperelasticMaterial law_of(const material::Material& material, const std::string& name);
 
 // Error names the first number that is out of range; every material is validated.

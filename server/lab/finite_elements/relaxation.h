@@ -19,7 +19,7 @@
 
 namespace trocar::finite_elements {
 
-// Of one material over one step of time.
+// One material relaxes by these numbers over one step of time.
 struct RelaxationStep {
   std::size_t term_count = 0;
   double equilibrium_share = 1;
@@ -42,8 +42,8 @@ struct RelaxationStep {
   }
 };
 
-// What one point remembers: S at the end of the last step, then h_k per term; in one array of six
-// components each, so that a mesh keeps all of its points in one.
+// One point remembers S at the end of the last step, then h_k per term. They stand in one array of
+// six components each, so that a mesh keeps all of its points in one.
 inline constexpr std::size_t kHistoryComponents = 6;
 inline std::size_t history_size(std::size_t term_count) {
   return term_count == 0 ? 0 : kHistoryComponents * (term_count + 1);

@@ -13,7 +13,8 @@ namespace trocar::finite_elements {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-// Of a number of steps, from decimal fractions: 3,600 s of 1 us are wrong by less.
+// A number of steps may be off by this through decimal fractions: 3,600 s of 1 us are wrong by
+// less.
 constexpr double kStepRounding = 1e-5;
 
 Eigen::Index first_dof(std::uint32_t node) {
@@ -50,7 +51,8 @@ Status check_organ(const scenario::ResolvedScenario& resolved) {
   return {};
 }
 
-// Of a dynamic run; a part of a step that is left over would silently change its length.
+// Checks the steps of a dynamic run; a part of a step that is left over would silently change its
+// length.
 Status check_steps(double seconds, double dt_s) {
   const double steps = seconds / dt_s;
   if (dt_s > 0 && steps > 0.5 && std::abs(steps - std::round(steps)) <= kStepRounding) return {};
@@ -197,7 +199,8 @@ bool ScenarioSolve::starts_in_equilibrium() const {
   return resolved_.scenario.run.starts_in_equilibrium;
 }
 
-// Of the state at time 0: in equilibrium with all, or at rest, with nothing moved but what is held.
+// Returns the loads of the state at time 0: it is in equilibrium with all, or at rest with nothing
+// moved but what is held.
 Loads ScenarioSolve::start_loads() const {
   Loads loads = loads_at(0);
   if (!starts_in_equilibrium()) loads.forces.setZero();
@@ -313,7 +316,7 @@ Status ScenarioSolve::resume(const std::filesystem::path& path) {
   return {};
 }
 
-// Of the solver when these steps are done.
+// Hashes the solver's path to the state in which these steps are done.
 std::uint64_t ScenarioSolve::path_to(std::uint64_t steps) const {
   std::uint64_t path = 0;
   if (!is_static()) {

@@ -32,13 +32,13 @@ class ScenarioSolve {
   static Result<std::unique_ptr<ScenarioSolve>> create(scenario::ResolvedScenario resolved,
                                                        const ScenarioSettings& settings);
 
-  // One load step or step of time.
+  // Advances by one load step or step of time.
   StepReport step();
 
   std::uint64_t steps_done() const { return steps_done_; }
   std::uint64_t step_count() const { return step_count_; }
   bool is_finished() const { return steps_done_ >= step_count_; }
-  // Of the scenario, at the end of the last step.
+  // Returns the scenario's time at the end of the last step.
   double time_s() const { return time_after(steps_done_); }
   // The state at time 0, which the first step makes if nobody has: how its equilibrium was found.
   const StepReport& start();
@@ -46,7 +46,7 @@ class ScenarioSolve {
   // Whether the probe has a value for the last step.
   bool is_due(std::size_t probe) const;
   Vec3d probe(std::size_t index) const;  // m, m/s or N
-  // Of the organ's own nodes.
+  // These return values of the organ's own nodes.
   std::vector<Vec3d> displacements() const;
   std::vector<Vec3d> velocities() const;
   std::vector<std::uint8_t> held_nodes() const;

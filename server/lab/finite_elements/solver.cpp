@@ -206,7 +206,7 @@ bool Solver::solve_part(const Part& part, double part_done, StepReport& report) 
     const Vector right = free_part(residual.values + product);
     Vector change = held;
     add_free(-factors_.solve(right), change);
-    // What is held moves all the way at once.
+    // Held degrees of freedom move all the way at once.
     const double way = held.isZero(0) ? line_search(u, change, part, residual) : 1;
     if (way == 0) return false;
     u += way * change;

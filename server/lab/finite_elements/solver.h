@@ -56,7 +56,7 @@ struct StepReport {
   double residual_n = 0;  // norm over the free degrees of freedom
 };
 
-// Where a step is, after each iteration.
+// The progress says where a step is, after each iteration.
 struct NewtonProgress {
   double part_done = 0;  // of the step
   int iteration = 0;
@@ -91,14 +91,14 @@ class Solver {
   const Vector& displacements() const { return u_; }
   const Vector& velocities() const { return velocity_; }
   double time_s() const { return time_s_; }
-  // What holds and loads the tissue, 3 per node, N: at held degrees of freedom the reactions on the
-  // tissue, inertia and damping included; at free ones the loads.
+  // Returns what holds and loads the tissue, 3 per node, N: at held degrees of freedom the
+  // reactions on the tissue, inertia and damping included; at free ones the loads.
   Vector reactions() const;
   // Weights of all nodes, 3 per node, N.
   Vector weights(const Vec3d& gravity_m_s2) const;
 
   State state() const;
-  // A state of the same problem.
+  // Takes over a state of the same problem.
   void restore(const State& state);
 
   std::function<void(const NewtonProgress&)> on_progress;
@@ -143,7 +143,7 @@ class Solver {
   Loads loads_;
   bool is_moving_ = false;  // acceleration_ is in balance with the loads
 
-  // Of a step with inertia: weights of the step's start, and Newmark's numbers.
+  // A step with inertia has weights of its start, and Newmark's numbers.
   double alpha_f_ = 0, alpha_m_ = 0, beta_ = 0.25, gamma_ = 0.5, dt_s_ = 0;
 };
 

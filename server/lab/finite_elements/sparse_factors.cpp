@@ -1,7 +1,8 @@
 #include "server/lab/finite_elements/sparse_factors.h"
 
-// Of GCC's libgomp, with which Debian builds CHOLMOD. Declared here because clang finds an omp.h
-// only beside a runtime of its own, which is not the one that is to be told.
+// These functions belong to GCC's libgomp, with which Debian builds CHOLMOD. They are declared here
+// because clang finds an omp.h only beside a runtime of its own, which is not the one that is to be
+// told.
 extern "C" {
 int omp_get_max_active_levels();
 void omp_set_max_active_levels(int levels);

@@ -18,7 +18,7 @@ class SparseFactors {
 
   // Once per pattern of entries, before factor().
   void analyze(const SparseMatrix& matrix);
-  // Of matrix + shift on its diagonal, whose pattern is the analyzed one.
+  // Factors matrix + shift on its diagonal; its pattern is the analyzed one.
   bool factor(const SparseMatrix& matrix, double shift = 0);
   // After a factor() that was true; of a matrix each column.
   Vector solve(const Vector& right) const { return factors_.solve(right); }

@@ -1,8 +1,8 @@
 #pragma once
 
-// Where elements' entries lie in the lower triangle of the tangent over the free degrees of
-// freedom. Built once per problem: O(elements log) time, and 4 bytes per entry of an element's
-// matrix.
+// The pattern says where elements' entries lie in the lower triangle of the tangent over the free
+// degrees of freedom. It is built once per problem: O(elements log) time, and 4 bytes per entry of
+// an element's matrix.
 
 #include <Eigen/SparseCore>
 #include <cstdint>

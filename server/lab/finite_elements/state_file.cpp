@@ -59,7 +59,7 @@ Status take_version_and_problem(ByteReader& in, const Problem& problem) {
   return {};
 }
 
-// Of a state of this problem, whatever it holds.
+// Returns the size of a file of this problem's state, whatever the state holds.
 std::uintmax_t size_of(const Problem& problem) {
   const std::uintmax_t dofs = problem.dof_count();
   const std::uintmax_t numbers = 5 * dofs + problem.held_dofs.size() + history_length(problem);
@@ -126,7 +126,7 @@ Result<State> read_state(const std::filesystem::path& path, const Problem& probl
   const auto size = std::filesystem::file_size(path, missing);
   std::ifstream file(path, std::ios::binary);
   if (missing || !file) return wrong("cannot be opened, check name and rights");
-  // What it is comes before memory for all of it.
+  // The head is read before memory is taken for all of it.
   Bytes bytes(std::min<std::uintmax_t>(size, kHeadBytes));
   const auto read_to = [&](std::size_t begin) {
     file.read(reinterpret_cast<char*>(bytes.data() + begin),

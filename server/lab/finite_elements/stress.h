@@ -27,8 +27,8 @@ struct Stress {
   StressPart relaxing, volumetric;
 };
 
-// Of the instantaneous response to the deformation gradient. Nothing where the volume ratio det F
-// is not above 1e-4: turned inside out, or about to be.
+// Returns the stress of the instantaneous response to the deformation gradient. It is nothing where
+// the volume ratio det F is not above 1e-4: turned inside out, or about to be.
 std::optional<Stress> stress_of(const material::HyperelasticMaterial& material, const Matrix3& f);
 
 Matrix3 to_matrix(const Vector6& stress);

@@ -28,7 +28,7 @@ std::string_view stripped(std::string_view cell) {
   return cell.substr(begin, cell.find_last_not_of(kAround) + 1 - begin);
 }
 
-// "a, b and c"
+// Writes names as "a, b and c".
 std::string list_of(const std::vector<std::string>& names, const char* between, const char* last) {
   std::string text;
   for (std::size_t i = 0; i < names.size(); ++i)
@@ -81,7 +81,7 @@ Status CsvTable::take_header(const Columns& columns) {
   return {};
 }
 
-// Of the next line that has any.
+// Reads the cells of the next line that has any.
 bool CsvTable::next_cells() {
   while (position_ < text_.size()) {
     const auto end = std::min(text_.find('\n', position_), text_.size());
@@ -135,7 +135,7 @@ Error CsvTable::wrong(const std::string& what) const {
 }
 
 std::optional<double> number_of(std::string_view text) {
-  // What machines write before positive numbers, and from_chars does not know.
+  // Machines write a plus before positive numbers, which from_chars does not know.
   if (text.size() > 1 && text[0] == '+' && text[1] != '-') text.remove_prefix(1);
   double value = 0;
   const auto [rest, failed] = std::from_chars(text.data(), text.data() + text.size(), value);

@@ -29,12 +29,13 @@ class CsvTable {
   bool has(std::string_view column) const;
   // Goes to the next row; false behind the last one.
   Result<bool> next();
-  // Of the row: nothing unless the cell is one finite number with a decimal point.
+  // Returns the row's number in a column; nothing unless the cell is one finite number with a
+  // decimal point.
   std::optional<double> number(std::string_view column) const;
-  // Empty without the column or cell.
+  // The text is empty without the column or cell.
   std::string_view text(std::string_view column) const;
   int line() const { return line_; }
-  // What is wrong with the row, or, behind the last one, with the file.
+  // Says what is wrong with the row or, behind the last one, with the file.
   Error wrong(const std::string& what) const;
 
  private:
@@ -53,7 +54,7 @@ class CsvTable {
 
 // Nothing unless all of the text is one finite number.
 std::optional<double> number_of(std::string_view text);
-// As a cell that is read back as this text, in files separated by commas.
+// Writes a cell that is read back as this text, in files separated by commas.
 std::string csv_cell(std::string_view text);
 
 }  // namespace trocar::fit

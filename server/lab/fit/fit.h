@@ -44,7 +44,7 @@ struct Fit {
   organ::Organ organ;                  // with the fitted material
 };
 
-// What was tried so far, after each run.
+// The function hears after each run what was tried so far.
 using Progress =
     std::function<void(int run, const std::vector<FittedParameter>& tried, double rms_n)>;
 

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "server/lab/scenario/scenario_run.h"
-#include "server/organs/material/law_keys.h"
+#include "server/organs/material/material_keys.h"
 
 namespace trocar::fit {
 namespace {

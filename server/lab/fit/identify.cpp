@@ -16,7 +16,7 @@ using material::HyperelasticMaterial;
 
 constexpr double kLargestStretchStep = 0.01;
 constexpr double kLargestWeightSum = 0.995;
-// Of the central differences, in parameters that are about 1.
+// Central differences take this step, in parameters that are about 1.
 constexpr double kDifference = 1e-5;
 constexpr double kZ95 = 1.959963985;
 // Student's t of 95 % from one degree of freedom on, where the expansion does not hold yet.
@@ -205,7 +205,7 @@ std::optional<Start> scaled(Model& model, const std::vector<TestCurve>& curves,
   return Start{std::move(x), 1000 * both / own, measured - both * both / own};
 }
 
-// Of a whole number of degrees of freedom; right to 1 %.
+// Returns Student's t of 95 % for a whole number of degrees of freedom; it is right to 1 %.
 double student_95(double freedom) {
   if (freedom <= static_cast<double>(kStudent95.size()))
     return kStudent95[static_cast<std::size_t>(freedom) - 1];
@@ -235,7 +235,7 @@ Eigen::MatrixXd covariance_of(const Model& model, const std::vector<double>& x) 
   return inverse * covariance * inverse;
 }
 
-// Which other constant each is most strongly correlated with.
+// Notes which other constant each is most strongly correlated with.
 void add_couplings(const Eigen::MatrixXd& covariance, std::vector<IdentifiedConstant>& constants) {
   for (std::size_t k = 0; k < constants.size(); ++k)
     for (std::size_t other = 0; other < constants.size(); ++other) {

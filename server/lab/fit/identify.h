@@ -57,8 +57,8 @@ Result<Identification> identify(const std::vector<TestCurve>& curves,
                                 const IdentifyOptions& options,
                                 const IdentifyProgress& progress = {});
 
-// What a material would show at the curve's times and stretches, Pa; empty if no equilibrium of its
-// free sides was found. Steps of stretch are at most 1 %.
+// Returns what a material would show at the curve's times and stretches, Pa; empty if no
+// equilibrium of its free sides was found. Steps of stretch are at most 1 %.
 std::vector<double> predicted_stresses(const material::HyperelasticMaterial& material,
                                        const TestCurve& curve);
 

@@ -1,6 +1,6 @@
 #pragma once
 
-// What an identification leaves for people and programs: the constants as text and as TOML, each
+// An identification leaves these for people and programs: the constants as text and as TOML, each
 // measured force beside the material's, and two pictures.
 
 #include "server/lab/fit/identify.h"

@@ -10,7 +10,7 @@ namespace {
 using finite_elements::Problem;
 using finite_elements::Solver;
 
-// Of snapshots: far below any error of a reduced model.
+// Snapshots are solved to this tolerance, far below any error of a reduced model.
 constexpr double kTolerance = 1e-7;
 
 Error wrong(const organ::Organ& organ, const std::string& what) {
@@ -74,7 +74,7 @@ Result<std::unique_ptr<FullModel>> FullModel::create(const organ::Organ& organ, 
 
 FullModel::FullModel(const organ::Organ& organ, Problem problem, unsigned threads)
     : organ_(organ), relaxing_problem_(std::move(problem)), threads_(threads) {
-  // What acts at once is the law without its relaxation, and remembers nothing.
+  // The law that acts at once has no relaxation, and remembers nothing.
   Problem elastic = relaxing_problem_;
   for (auto& material : elastic.materials) material.relaxation.clear();
   elastic_ = std::make_unique<Solver>(

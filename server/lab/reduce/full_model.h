@@ -27,13 +27,13 @@ class FullModel {
   // Displacements (3 per node, m) under shares of the forces, ascending, each from the one before.
   // As many as were found: a load that Newton's method does not manage ends the list.
   std::vector<Vector> displacements(const Vector& forces, std::span<const double> shares);
-  // Of the tissue at rest with its first tangent: K u = f, a column each. Factors are kept.
+  // Solves K u = f with the first tangent of the tissue at rest, a column each. Factors are kept.
   Matrix linear_displacements(const Matrix& forces);
-  // What the tissue resists displacements with, at once; nothing where an element is not
-  // admissible.
+  // Returns the forces with which the tissue resists displacements at once; nothing where an
+  // element is not admissible.
   std::optional<Vector> resistance(const Vector& displacements);
-  // Of the tissue at rest, over the degrees of freedom that are not held, and their numbers: -1 for
-  // held ones. N/m.
+  // Returns the tangent of the tissue at rest over the degrees of freedom that are not held, N/m;
+  // free_of_dof() gives their numbers, -1 for held ones.
   finite_elements::SparseMatrix rest_tangent();
   const std::vector<int>& free_of_dof() const { return assembler_->pattern().free_of_dof(); }
   // B^T K B with the tangent at these displacements, of modes that leave held nodes at rest;

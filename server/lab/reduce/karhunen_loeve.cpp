@@ -24,7 +24,7 @@ KarhunenLoeve karhunen_loeve(const Matrix& snapshots, std::size_t mode_count) {
   result.modes.resize(snapshots.rows(), rank);
   for (Eigen::Index i = 0; i < rank; ++i) {
     const Vector mode = snapshots * solver.eigenvectors().col(count - 1 - i);
-    // Of small eigenvalues rounding leaves a part along the modes before.
+    // For small eigenvalues, rounding leaves a part along the modes before.
     result.modes.col(i) =
         orthogonal_to(result.modes.leftCols(i), mode.normalized()).col(0).normalized();
   }

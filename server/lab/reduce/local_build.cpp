@@ -276,7 +276,7 @@ class Builder {
     add_packed(karhunen_loeve(orthogonal_to(vibrations_, std::move(fields)), settings_.modes).modes,
                patch.modes);
     add_packed(inertia_of(model, patch, nodes), patch.modes);
-    // As they will be read.
+    // The fields are unpacked, as they will be read.
     Matrix basis(index(model.dof_count()), index(built_.reduction.field_count(patch)));
     Eigen::Index count = 0;
     for (const auto* shared : {&built_.reduction.vibrations, &patch.modes})
@@ -299,7 +299,7 @@ class Builder {
           organ::pack_field({fields.col(i).data(), static_cast<std::size_t>(fields.rows())}));
   }
 
-  // What inertia adds to fields of forces at these nodes, beyond what the patch has.
+  // Returns what inertia adds to fields of forces at these nodes, beyond what the patch has.
   Matrix inertia_of(FullModel& model, const LocalPatch& patch,
                     std::span<const NodeIndex> nodes) const {
     const auto modes = index(patch.modes.size());
@@ -424,7 +424,7 @@ class Builder {
   LocalBuilt built_;
 };
 
-// What the result depends on, in one line.
+// Names what the result depends on, in one line.
 std::string key_of(const organ::Organ& organ, const LocalSettings& s) {
   char text[400];
   std::snprintf(

@@ -27,7 +27,7 @@ struct LocalSettings {
   std::size_t patches = 0;         // made at most, from the first centre outwards; 0: all
   std::uint64_t seed = 1;
   unsigned threads = 1;
-  // Where finished parts are kept until all is done, and looked for; empty: nowhere.
+  // Finished parts are kept here until all is done, and looked for; empty: nowhere.
   std::filesystem::path parts;
 };
 // Error names the setting as trocar-organ calls it.

@@ -1,6 +1,6 @@
 #pragma once
 
-// What an interrupted run of build_local() has done, in a folder: a file per centre that was
+// A folder keeps what an interrupted run of build_local() has done: a file per centre that was
 // pressed and per patch, each written whole or not at all, and the run's own key. Different files
 // may be read and written by several threads at once.
 
@@ -20,7 +20,7 @@ struct Pressed {
   std::size_t failed = 0;
 };
 
-// What takes long of a patch.
+// These parts of a patch take long to make.
 struct FinishedPatch {
   std::vector<organ::PackedField> modes;
   std::vector<organ::CubatureTet> cubature;

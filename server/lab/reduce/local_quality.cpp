@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kSlant = 25 * std::numbers::pi / 180;
 constexpr std::array kShares{0.3, 0.85};
-// Of the first press here among all, so that azimuths are not those of the training.
+// The first press here has this number among all, so that azimuths are not those of the training.
 constexpr std::size_t kFirst = 1001;
 constexpr double kHold_n_m = 1e4;  // some hundred times as stiff as tissue
 constexpr int kRateSteps = 100;

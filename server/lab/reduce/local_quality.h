@@ -6,9 +6,9 @@
 // Errors: L2 of the displacement field over all nodes; of the loaded node's displacement; of the
 // force on it where it is held at the full solution's place. Each beside the full one's norm.
 
+#include "server/lab/reduce/errors.h"
 #include "server/lab/reduce/local_build.h"
 #include "server/lab/reduce/local_solver.h"
-#include "server/lab/reduce/quality.h"
 
 namespace trocar::reduce {
 

@@ -34,7 +34,7 @@ double entry(const std::vector<double>& lower, std::size_t i, std::size_t j) {
 // On the diagonal where a tangent is not positive definite, the last of which makes any so that is
 // without its stress.
 constexpr std::array kShifts{1e-9, 1e-6, 1e-3};
-// Of a later patch's mode, beside what is there already.
+// A later patch's mode is kept if it has this share of its own, beside what is there already.
 constexpr float kNewInField = 0.05F;
 
 template <typename T>
@@ -45,7 +45,7 @@ void sort_once(std::vector<T>& values) {
 
 }  // namespace
 
-// Where one patch's nodes are touched.
+// A place says where one patch's nodes are touched.
 struct LocalSolver::Place {
   const organ::LocalPatch* patch;
   std::vector<NodeIndex> touched;
@@ -143,7 +143,8 @@ struct LocalSolver::Contact {
       inner_tets.insert(inner_tets.end(), patch->inner_tets.begin(), patch->inner_tets.end());
     }
     sort_once(inner_tets);
-    // Of each patch's weighted tets those that are nearest to it, so that all are of one energy.
+    // From each patch's weighted tets those that are nearest to it are taken, so that all are of
+    // one energy.
     const auto distance = [&](TetIndex tet, const organ::LocalPatch* patch) {
       const auto& x = organ.mesh.rest_positions;
       return length_squared(x[organ.mesh.tets[tet.value][0].value] - x[patch->centre.value]);
@@ -185,12 +186,12 @@ struct LocalSolver::Contact {
     return k;
   }
 
-  // Of all tets at rest less that of the inner ones.
+  // Returns the stiffness of all tets at rest less that of the inner ones.
   Matrix stiffness_of_several(const reduction::BlockMatrix& rest) {
     const RowMatrixF all = all_fields();
     tangent.clear();
     inner.add_rest_tangent(tangent);
-    // What is left is small beside the two.
+    // The difference is small beside the two.
     const auto quadratic = [](const reduction::BlockMatrix& k, const RowMatrixF& b) {
       return Matrix(b.cast<double>().transpose() * product(k, b).cast<double>());
     };
@@ -231,7 +232,7 @@ struct LocalSolver::Contact {
         u[3 * free[i] + k] += static_cast<float>(at_a[index(3 * i + k)]);
   }
 
-  // What is left of the loads, per unknown.
+  // Returns what is left of the loads, per unknown.
   Vector residual(std::span<const NodeForce> forces, std::span<const NodeSpring> springs) {
     place(q, a);
     f.assign(u.size(), 0);
@@ -255,7 +256,7 @@ struct LocalSolver::Contact {
     return r;
   }
 
-  // Of the loads over the unknowns.
+  // Returns the norm of the loads over the unknowns.
   double norm_of(std::span<const NodeForce> forces, std::span<const NodeSpring> springs) const {
     Vector loads = Vector::Zero(index(unknowns()));
     const auto add = [&](NodeIndex node, const Vec3d& force) {
@@ -442,7 +443,7 @@ LocalSolver::Report LocalSolver::solve(std::span<const NodeForce> forces,
       c.q = q, c.a = a;
       r = c.residual(forces, springs);
       if (is_fresh) {
-        // No nearer in single precision.
+        // It gets no nearer in single precision.
         report.is_converged = before <= kNearlySettled * c.norm_of(forces, springs);
         break;
       }

@@ -55,9 +55,9 @@ class LocalSolver {
   // Equilibrium with forces on touched or free nodes and springs there, from where it is.
   Report solve(std::span<const NodeForce> forces, std::span<const NodeSpring> springs = {});
 
-  // Of a node near the contact.
+  // Returns the displacement of a node near the contact.
   Vec3d displacement(NodeIndex node) const;
-  // Of all.
+  // Returns the displacements of all nodes.
   std::vector<Vec3d> displacements() const;
 
  private:

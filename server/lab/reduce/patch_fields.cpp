@@ -29,7 +29,7 @@ void unpack(const organ::PackedField& field, Eigen::Ref<Vector> out) {
 
 Matrix series_of(FullModel& model, const Matrix& greens, double force_n) {
   const Matrix first = greens * force_n;
-  // Where a tet would turn inside out there is no second order.
+  // There is no second order where a tet would turn inside out.
   const auto resistance = [&](const Vector& u) {
     auto found = model.resistance(kDifference * u);
     return found ? std::move(*found) : Vector(Vector::Zero(u.size()));

@@ -27,13 +27,13 @@ Matrix series_of(FullModel& model, const Matrix& greens, double force_n);
 std::optional<Vector> state_of(FullModel& model, const Matrix& series,
                                const Eigen::Vector3d& force);
 
-// One tet of the model.
+// This is one tet of the model.
 class TetForces {
  public:
   TetForces(const FullModel& model, TetIndex tet);
 
   double volume() const { return volume_; }
-  // Of a field.
+  // Returns the gradient of a field in the tet.
   Matrix3 gradient(const Eigen::Ref<const Vector>& field) const;
   // Gradients of some fields, a column each.
   Matrix gradients(const Matrix& fields) const;

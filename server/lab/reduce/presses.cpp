@@ -16,7 +16,7 @@ const Vec3d& position(const organ::Organ& organ, NodeIndex node) {
   return organ.mesh.rest_positions[node.value];
 }
 
-// A third of the area of each boundary triangle, per node.
+// Gives each node a third of the area of each of its boundary triangles.
 std::vector<double> node_areas(const mesh::TetMesh& mesh) {
   std::vector<double> areas(mesh.node_count(), 0.0);
   for (const auto& [a, b, c] : mesh.boundary_triangles) {

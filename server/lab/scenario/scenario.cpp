@@ -213,6 +213,12 @@ const Place& place_of_key(const std::vector<Place>& places, std::string_view key
   return other;
 }
 
+bool MaterialChange::sets(double material::Material::*member) const {
+  for (std::size_t i = 0; i < numbers.size(); ++i)
+    if (material::kNumberKeys[i].member == member) return numbers[i].has_value();
+  return false;
+}
+
 const Place& MaterialChange::place_of(std::string_view key) const {
   return place_of_key(given, key, place);
 }

@@ -2,7 +2,7 @@
 
 // Scenarios: experiments on one organ without people. Which organ and material, which nodes are
 // held, moved, loaded and probed over time, which scripted tools act, what is written. Read from a
-// TOML file of which scripts are a part; README, "Scenarios", describes it to a person.
+// TOML file of which scripts are a part; docs/scripts-and-scenarios.md describes it.
 //
 // Two steps: parse_scenario() checks the file by itself, resolve() checks it against the organ and
 // turns names into nodes. Errors of both are one line with file, line and key.
@@ -19,6 +19,7 @@
 
 #include "common/base/result.h"
 #include "common/tool/script.h"
+#include "server/organs/material/material_keys.h"
 #include "server/organs/organ/local_reduction.h"
 #include "server/organs/organ/organ.h"
 #include "server/tissue/step/external_loads.h"
@@ -45,21 +46,16 @@ struct ScenarioOrgan {
 
 // What is set replaces the organ's own.
 struct MaterialChange {
-  Place place;               // of the table
-  std::vector<Place> given;  // of each key in it
-  std::optional<double> density_kg_m3;
-  std::optional<double> young_modulus_pa;
-  std::optional<double> spring_stiffness_n_m;
-  std::optional<double> node_damping_per_s;
-  std::optional<double> spring_damping_time_s;
+  Place place;                                                              // of the table
+  std::vector<Place> given;                                                 // of each key in it
+  std::array<std::optional<double>, material::kNumberKeys.size()> numbers;  // per key
   std::optional<material::ElasticLaw> elastic_law;
-  std::optional<double> poisson_ratio;
   std::optional<std::string> measured;  // name of a measured material
   std::optional<bool> has_averaged_strain;
   std::optional<Vec3d> fibre_direction;
-  std::optional<double> fibre_stiffness_ratio, tension, fibre_tension;
-  std::optional<double> cut_energy_j_m2, blade_friction_pa, tear_stretch;
 
+  // Whether the number of this member is set.
+  bool sets(double material::Material::*member) const;
   // Of the key with this name, or of the table if it is not in it.
   const Place& place_of(std::string_view key) const;
 };

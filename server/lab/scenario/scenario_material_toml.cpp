@@ -8,28 +8,21 @@ namespace {
 void read_material_keys(tool::TableReader& reader, MaterialChange& material) {
   material.place = place_of(reader, "");
   material.given = places_of_keys(reader);
-  material.density_kg_m3 = reader.number("density_kg_m3", 1, 30000);
-  material.young_modulus_pa = reader.number("young_modulus_pa", 0, 1e12);
-  material.spring_stiffness_n_m = reader.number("spring_stiffness_n_m", 0, 1e9);
-  material.node_damping_per_s = reader.number("node_damping_per_s", 0, 1e6);
-  material.spring_damping_time_s = reader.number("spring_damping_time_s", 0, 100);
+  for (std::size_t i = 0; i < material.numbers.size(); ++i) {
+    const auto& key = material::kNumberKeys[i];
+    material.numbers[i] = reader.number(key.key, key.low, key.high);
+  }
   material.elastic_law = reader.choice<material::ElasticLaw, 4>(
       "elastic_law", {{{"springs", material::ElasticLaw::Springs},
                        {"tensor-mass", material::ElasticLaw::TensorMass},
                        {"neo-hookean", material::ElasticLaw::NeoHookean},
                        {"measured", material::ElasticLaw::Measured}}});
   material.measured = reader.string("measured");
-  material.poisson_ratio = reader.number("poisson_ratio", 0, 0.4999);
   material.has_averaged_strain = reader.boolean("averaged_strain");
   if (const auto direction = reader.direction("fibre_direction"))
     material.fibre_direction = reader.vector("fibre_direction");
-  material.fibre_stiffness_ratio = reader.number("fibre_stiffness_ratio", 0, 1000);
-  material.tension = reader.number("tension", 0, 0.9);
-  material.fibre_tension = reader.number("fibre_tension", 0, 0.9);
-  material.cut_energy_j_m2 = reader.number("cut_energy_j_m2", 0, 1e6);
-  material.blade_friction_pa = reader.number("blade_friction_pa", 0, 1e6);
-  material.tear_stretch = reader.number("tear_stretch", 0, 100);
-  if (material.young_modulus_pa && material.spring_stiffness_n_m)
+  if (material.sets(&material::Material::young_modulus_pa) &&
+      material.sets(&material::Material::spring_stiffness_n_m))
     reader.fail("young_modulus_pa", "and spring_stiffness_n_m exclude each other, remove one");
 }
 

@@ -6,8 +6,8 @@
 #include "server/lab/scenario/scenario_resolver.h"
 #include "server/organs/catalogue/builtin_organs.h"
 #include "server/organs/catalogue/load_organ.h"
-#include "server/organs/material/law_keys.h"
 #include "server/organs/material/material_file.h"
+#include "server/organs/material/material_keys.h"
 
 namespace trocar::scenario {
 namespace {
@@ -79,29 +79,18 @@ Status Resolver::change_material(const MaterialChange& change, const organ::Orga
                  "needs a measured material, write measured = \"NAME\", one of " +
                      material::measured_material_names());
   }
-  set(change.density_kg_m3, m.density_kg_m3);
-  if (change.young_modulus_pa) {
+  for (std::size_t i = 0; i < change.numbers.size(); ++i)
+    set(change.numbers[i], m.*material::kNumberKeys[i].member);
+  if (change.sets(&material::Material::young_modulus_pa)) {
     if (m.elastic_law == material::ElasticLaw::Springs && !has_tet_springs)
       return wrong(change.place_of("young_modulus_pa"),
                    "this organ's springs are no edges of tets, write spring_stiffness_n_m");
     m.spring_law = material::SpringLaw::VolumeConsistent;
-    m.young_modulus_pa = *change.young_modulus_pa;
   }
-  if (change.spring_stiffness_n_m) {
+  if (change.sets(&material::Material::spring_stiffness_n_m))
     m.spring_law = material::SpringLaw::Constant;
-    m.spring_stiffness_n_m = *change.spring_stiffness_n_m;
-  }
-  set(change.node_damping_per_s, m.node_damping_per_s);
-  set(change.spring_damping_time_s, m.spring_damping_time_s);
-  set(change.poisson_ratio, m.poisson_ratio);
   set(change.has_averaged_strain, m.has_averaged_strain);
   set(change.fibre_direction, m.fibre_direction);
-  set(change.fibre_stiffness_ratio, m.fibre_stiffness_ratio);
-  set(change.tension, m.tension);
-  set(change.fibre_tension, m.fibre_tension);
-  set(change.cut_energy_j_m2, m.cut_energy_j_m2);
-  set(change.blade_friction_pa, m.blade_friction_pa);
-  set(change.tear_stretch, m.tear_stretch);
   if (m.tear_stretch > 0 && m.tear_stretch < material::kLeastTearStretch)
     return wrong(change.place_of("tear_stretch"),
                  "is a length over a length at rest: write at least 1.05, or 0 for tissue that "
@@ -111,8 +100,9 @@ Status Resolver::change_material(const MaterialChange& change, const organ::Orga
     if (&place != &change.place && length(m.fibre_direction) == 0 && organ.fibre_directions.empty())
       return wrong(place, "needs a fibre_direction");
   }
-  if (m.tension + m.fibre_tension > 0.9)
-    return wrong(change.place_of(change.fibre_tension ? "fibre_tension" : "tension"),
+  if (m.tension + m.fibre_tension > material::kMaxTension)
+    return wrong(change.place_of(change.sets(&material::Material::fibre_tension) ? "fibre_tension"
+                                                                                 : "tension"),
                  "shorten tissue by more than 0.9 of its length, write less");
   return {};
 }

@@ -22,6 +22,13 @@ constexpr float kStaticStep_s = 100;
 // judged from stretch to stretch of sweeps, and lowered where a stretch brought nothing.
 constexpr float kStaticOverRelaxation = 1.85f;
 constexpr float kOverRelaxationStepDown = 0.8f;
+// Springs that are compressed buckle, and sweeps that overshoot may then jump to a far equilibrium,
+// or climb from one to the next: stable tissue loses potential energy from stretch to stretch. One
+// that gains is taken back and done again with shorter steps, which descend if they are short
+// enough.
+constexpr float kOverRelaxationStepBack = 0.8f;
+// Rounding of displacements in float, as a share of the energy.
+constexpr double kEnergySlack = 1e-6;
 constexpr std::uint32_t kSweepsPerRelaxation = 100;
 // A contact that is found changes the equilibrium, and that the contacts. First the tool walks to
 // its new place, as it does in a session, and its claim takes effect.
@@ -113,7 +120,7 @@ Status check_explicit(const scenario::ResolvedScenario& resolved) {
         scenario, place,
         "\"explicit\" knows no relaxation, which this material has: take "
         "\"implicit\"");
-  const double stable = dynamics::ExplicitEuler(resolved.organ, world_of(resolved)).stable_dt_s();
+  const double stable = nakao::ExplicitEuler(resolved.organ, world_of(resolved)).stable_dt_s();
   if (scenario.run.dt_s() <= stable) return {};
   char text[160];
   const double most = 1e-3 / std::ceil(1e-3 / stable);
@@ -222,7 +229,8 @@ StepReport ScenarioRun::step_dynamic() {
   if (explicit_) return step_explicit();
   const Tick before = simulation_.current_tick();
   take_samples(before + 1, seconds_of(before), before % kSampleTicks == 0);
-  const auto& tick = simulation_.tick(inputs_, decisions_, &loads_);
+  const auto& tick =
+      simulation_.tick(inputs_, decisions_, has_external_loads() ? &loads_ : nullptr);
   StepReport report;
   report.active_nodes = tick.active_nodes;
   report.is_converged = tick.is_converged;
@@ -248,6 +256,35 @@ StepReport ScenarioRun::step_explicit() {
   return report;
 }
 
+void ScenarioRun::place_held(const dynamics::ExternalLoads& loads) {
+  auto& world = simulation_.editable_state().world;
+  auto& context = simulation_.editable_context();
+  float largest_move_m = 0;
+  const auto put = [&](NodeIndex node, std::uint8_t axes, const Vec3f& displacement) {
+    Vec3f& u = world.displacements[node.value];
+    const Vec3f from = u;
+    if (axes & 1) u.x = displacement.x;
+    if (axes & 2) u.y = displacement.y;
+    if (axes & 4) u.z = displacement.z;
+    largest_move_m = std::max(largest_move_m, length(u - from));
+  };
+  for (std::size_t i = 0; i < loads.held.size(); ++i)
+    put(loads.held[i], kAllAxes, loads.held_displacements[i]);
+  for (const auto& hold : loads.axis_holds) put(hold.node, hold.axes, hold.displacement);
+  context.solver.take_motion(world);
+  context.finder.surface_moved(largest_move_m);
+}
+
+double ScenarioRun::potential_energy_j(const dynamics::ExternalLoads& loads) const {
+  double energy_j = simulation_.context().solver.tissue().energy_j(world().displacements);
+  for (std::size_t i = 0; i < world().node_count(); ++i) {
+    Vec3d load = organ().gravity_m_s2 * static_cast<double>(world().masses[i]);
+    if (!loads.forces.empty()) load += to_double(loads.forces[i]);
+    energy_j -= dot(load, to_double(world().displacements[i]));
+  }
+  return energy_j;
+}
+
 StepReport ScenarioRun::relax(const dynamics::ExternalLoads& loads) {
   auto& world = simulation_.editable_state().world;
   auto& context = simulation_.editable_context();
@@ -260,15 +297,28 @@ StepReport ScenarioRun::relax(const dynamics::ExternalLoads& loads) {
   report.active_nodes = free_nodes_.size();
   std::uint32_t sweeps = 0;
   float last_residual = INFINITY;
+  place_held(loads);
+  // Contacts that slide have no potential energy, so that nothing can be said about its descent.
+  const bool descends = context.contacts.points.empty();
+  double last_energy_j = descends ? potential_energy_j(loads) : 0;
   do {
+    if (descends) before_stretch_.assign(world.displacements.begin(), world.displacements.end());
     how.sweeps = std::min(kSweepsPerRelaxation, most - sweeps);
     report.solve = context.solver.solve(context.contacts, free_nodes_, how, world, loads);
     context.finder.surface_moved(report.solve.largest_move_m);
     std::ranges::fill(world.velocities, Vec3f{});
     sweeps += report.solve.sweeps;
+    const double energy_j = descends ? potential_energy_j(loads) : 0;
+    if (!(energy_j <= last_energy_j + kEnergySlack * std::abs(last_energy_j))) {
+      std::ranges::copy(before_stretch_, world.displacements.begin());
+      context.solver.take_motion(world);
+      how.over_relaxation *= kOverRelaxationStepBack;
+      continue;
+    }
+    last_energy_j = energy_j;
     report.is_converged =
         report.solve.residual_n <= how.residual_tolerance_n && report.solve.nodes_rejected == 0;
-    if (!(report.solve.residual_n < last_residual))
+    if (!(report.solve.residual_n < last_residual) && how.over_relaxation > 1)
       how.over_relaxation = 1 + (how.over_relaxation - 1) * kOverRelaxationStepDown;
     last_residual = report.solve.residual_n;
   } while (!report.is_converged && sweeps < most);

@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "server/lab/scenario/scenario.h"
-#include "server/tissue/dynamics/explicit_euler.h"
+#include "server/papers/nakao/explicit_euler.h"
 #include "server/tissue/step/simulation.h"
 
 namespace trocar::scenario {
@@ -61,6 +61,9 @@ class ScenarioRun {
   bool has_ticks() const { return !is_static() && !explicit_; }
   step::Simulation& simulation() { return simulation_; }
   const step::Simulation& simulation() const { return simulation_; }
+  // More goes into a tick than inputs and decisions: loads, or nodes whose reaction is probed,
+  // which the solver places in each step.
+  bool has_external_loads() const { return !loads_.empty(); }
   const hands::TickInputs& inputs() const { return inputs_; }
   const step::TickDecisions& decisions() const { return decisions_; }
 
@@ -89,6 +92,10 @@ class ScenarioRun {
   StepReport step_static();
   // Sweeps until nothing is out of balance by more than the tolerance; everything is at rest then.
   StepReport relax(const dynamics::ExternalLoads& loads);
+  // Held and displaced nodes go where the loads have them.
+  void place_held(const dynamics::ExternalLoads& loads);
+  // Elastic energy minus the work of loads and gravity, J. O(nodes).
+  double potential_energy_j(const dynamics::ExternalLoads& loads) const;
   void settle(unsigned threads);
 
   const scenario::ResolvedScenario resolved_;
@@ -104,9 +111,10 @@ class ScenarioRun {
 
   // Scratch of a step.
   hands::TickInputs inputs_;
-  std::optional<dynamics::ExplicitEuler> explicit_;
+  std::optional<nakao::ExplicitEuler> explicit_;
   std::vector<NodeIndex> free_nodes_;  // of a static run
   std::vector<Vec3f> before_;          // displacements before a round of contacts
+  std::vector<Vec3f> before_stretch_;  // displacements before a stretch of sweeps
 };
 
 }  // namespace trocar::scenario

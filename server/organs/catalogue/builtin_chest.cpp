@@ -83,7 +83,7 @@ void add_below(const mesh::TetMesh& heart, mesh::TetMesh& wall) {
   }
 }
 
-// That of such springs on average over all directions, see springs_of().
+// Such springs have this modulus on average over all directions, see springs_of().
 double young_modulus_of_springs(const mesh::TetMesh& mesh, double stiffness_n_m) {
   double sum = 0;
   for (const auto& [a, b] : mesh.edges)

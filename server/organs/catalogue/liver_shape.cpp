@@ -65,7 +65,7 @@ double visceral_bed(const Vec3d& p) {
   return length(p - bed_centre()) - kBedRadius_m;
 }
 
-// Point `depth` above the visceral surface at (x, z).
+// Returns the point `depth` above the visceral surface at (x, z).
 Vec3d in_visceral_surface(double x, double z, double depth) {
   const Vec3d c = bed_centre();
   const double dx = x - c.x, dz = z - c.z;
@@ -83,7 +83,7 @@ double liver_field(const Vec3d& p) {
                                    in_visceral_surface(0.020, -0.030, 0.003)};
   double d = diaphragmatic_body(p);
   d = smooth_max(d, -visceral_bed(p), 0.012);
-  // Spine and crura behind the middle.
+  // Spine and crura lie behind the middle.
   d = smooth_max(d, -capsule(p, {0.030, -0.2, -0.090}, {0.030, 0.2, -0.090}, 0.056), 0.012);
   // Vena cava.
   d = smooth_max(d, -capsule(p, {-0.014, -0.2, -0.058}, {-0.010, 0.2, -0.050}, 0.014), 0.006);

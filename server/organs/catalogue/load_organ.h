@@ -25,7 +25,7 @@ struct ImportedOrgan {
   std::vector<std::string> warnings;  // one line each: what was repaired
 };
 
-// A mesh file (.msh, Gmsh 2.2 ASCII) with the default material.
+// Reads a mesh file (.msh, Gmsh 2.2 ASCII) and gives it the default material.
 Result<ImportedOrgan> import_organ(const std::filesystem::path& path, const ImportOptions& options);
 
 // "liver" (measured), "elastic-liver", "lattice", "plate", "stomach", "chest", or the path of an

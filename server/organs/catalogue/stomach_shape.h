@@ -22,8 +22,8 @@ inline constexpr double kStomachWall_m = 0.007;
 // Negative within the wall; near the surface about the distance in metres.
 double stomach_field(const Vec3d& p);
 
-// As stomach_field(), of the sac without its hollow and with the tube going on at both ends: zero
-// on the outer face of the wall, -kStomachWall_m on the inner face.
+// This is the stomach_field() of the sac without its hollow and with the tube going on at both
+// ends: it is zero on the outer face of the wall, -kStomachWall_m on the inner face.
 double stomach_sac_field(const Vec3d& p);
 
 // Box that holds the whole stomach.

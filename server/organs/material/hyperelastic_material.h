@@ -47,13 +47,13 @@ struct HyperelasticMaterial {
   std::string name, source;
   StrainEnergy energy = StrainEnergy::ReducedPolynomial;
   VolumeSplit split = VolumeSplit::Unsplit;
-  // C10 to C50; of the exponential law only C10.
+  // These are C10 to C50; the exponential law has only C10.
   std::array<double, kMaxPolynomialOrder> coefficients_pa{};
   double exponent = 0;  // b of the exponential law
   double bulk_modulus_pa = 0;
   std::vector<PronyTerm> relaxation;
 
-  // What remains of the bracket's stress in the end: 1 - sum g_k.
+  // This share of the bracket's stress remains in the end: 1 - sum g_k.
   double equilibrium_share() const;
 
   bool operator==(const HyperelasticMaterial&) const = default;
@@ -72,8 +72,8 @@ const char* name_of(TestMode mode);
 // Nominal stress of the incompressible material at a stretch (shear: amount of shear), Pa.
 double incompressible_stress(const HyperelasticMaterial& material, TestMode mode, double stretch);
 
-// Where stress must grow with stretch, and stretch be resisted at all. Wider than what tissue
-// bears; a law that is stable in it may still fail beyond.
+// In this range of stretches, stress must grow with stretch and stretch be resisted at all. The
+// range is wider than what tissue bears; a law that is stable in it may still fail beyond.
 struct StabilityRange {
   double uniaxial_low = 0.4, uniaxial_high = 2.0;        // stretch
   double equibiaxial_low = 0.6, equibiaxial_high = 1.6;  // stretch

@@ -1,7 +1,7 @@
 #pragma once
 
-// What tissue is made of. SI units. Which energies of server/tissue/dynamics a material becomes
-// follows from `elastic_law`.
+// A material says what tissue is made of, in SI units. Its `elastic_law` decides which energies of
+// server/tissue/dynamics it becomes.
 
 #include <cstdint>
 #include <string>

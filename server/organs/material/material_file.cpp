@@ -65,7 +65,7 @@ void read_hyperelastic(tool::TableReader& reader, HyperelasticMaterial& m) {
 Result<HyperelasticMaterial> parse_material_text(std::string_view text, std::string_view source) {
   tool::Document document(source);
   const auto table = tool::parse_toml(document, text, source, kLimitBytes, "material",
-                                      "README, \"A measured material\"");
+                                      "docs/organs-and-materials.md");
   if (!table) return document.error();
   tool::TableReader root(document, *table, "");
   HyperelasticMaterial material;

@@ -26,7 +26,8 @@ Result<HyperelasticMaterial> read_material_file(const std::filesystem::path& pat
 // `source` stands for the file's path in messages.
 Result<HyperelasticMaterial> parse_material_text(std::string_view text, std::string_view source);
 
-// What an option --material names: one that ships with Trocar, or a file whose name ends in .toml.
+// Returns the material that an option --material names: one that ships with Trocar, or a file whose
+// name ends in .toml.
 Result<HyperelasticMaterial> measured_material(const std::string& name_or_file);
 
 }  // namespace trocar::material

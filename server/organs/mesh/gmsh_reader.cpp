@@ -14,7 +14,7 @@ constexpr std::size_t kMaxShownBytes = 40;
 constexpr const char* kFormats =
     "only Gmsh 2.2 ASCII is read, convert with: gmsh IN -save -format msh22 -o OUT.msh";
 
-// Part of a foreign file, safe to print on one line.
+// Makes a part of a foreign file safe to print on one line.
 std::string shown(std::string_view text) {
   std::string out = "'";
   for (const char c : text.substr(0, kMaxShownBytes)) out += c >= 32 && c < 127 ? c : '?';

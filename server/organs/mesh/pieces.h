@@ -21,8 +21,8 @@ Pieces find_pieces(const TetMesh& mesh);
 // Keeps the piece of largest volume (the first of equals). Returns how many others were dropped.
 std::uint32_t keep_largest_piece(TetMesh& mesh);
 
-// Where the tets around an edge form several fans that touch along that edge only, the surface
-// would not be manifold: keeps the fan of largest volume, drops the others, until there is no such
+// The surface would not be manifold where the tets around an edge form several fans that touch
+// along that edge only: keeps the fan of largest volume, drops the others, until there is no such
 // edge. Returns how many tets were dropped.
 std::size_t drop_touching_parts(TetMesh& mesh);
 

@@ -21,7 +21,7 @@
 namespace trocar::mesh {
 
 enum class Unit : std::uint8_t { Metre, Centimetre, Millimetre };
-// "m", "cm" or "mm".
+// The unit is "m", "cm" or "mm".
 Result<Unit> parse_unit(std::string_view text);
 double metres_of(Unit unit);
 

@@ -62,7 +62,7 @@ class Stuffing {
     Vec3d position;
     double from_low = 0;  // share of the edge from its lower-numbered end
   };
-  // One corner of a lattice tet.
+  // This is one corner of a lattice tet.
   struct Corner {
     Place place;
     std::int32_t number = 0;
@@ -318,7 +318,7 @@ class Stuffing {
   double half_spacing_;
   Vec3d corner_;
   int nx_ = 0, ny_ = 0, nz_ = 0;
-  // Per place of the grid.
+  // There is one entry per place of the grid.
   std::vector<double> value_;
   std::vector<std::int8_t> sign_;  // -1 inside, 0 on the surface, 1 outside
   std::vector<Vec3d> position_;

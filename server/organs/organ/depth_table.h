@@ -39,8 +39,9 @@ struct DepthTable {
   bool operator==(const DepthTable&) const = default;
 };
 
-// Of the forces of all contacts of a tick. Frozen: the sum of what each needs; graded: the deepest.
-// Nothing if there is no contact, or for one of them nothing is known or suffices.
+// Both take the forces of all contacts of a tick. Frozen nodes are the sum of what each contact
+// needs, the graded depth is the deepest. The result is nothing if there is no contact, or for one
+// of them nothing is known or suffices.
 std::optional<std::uint32_t> frozen_nodes_for(const DepthTable& table,
                                               std::span<const double> forces_n);
 std::optional<std::uint32_t> graded_depth_for(const DepthTable& table,

@@ -1,7 +1,7 @@
 #pragma once
 
-// Where the fibres of an organ run, as a rule says: along an axis; around one, as Langer's lines
-// run around a trunk or neck; or as a table says node by node.
+// A rule says where the fibres of an organ run: along an axis; around one, as Langer's lines run
+// around a trunk or neck; or as a table says node by node.
 
 #include <filesystem>
 #include <string>
@@ -23,7 +23,7 @@ struct FibreRule {
   bool operator==(const FibreRule&) const = default;
 };
 
-// "x", "y", "z", "around:x", "around:y", "around:z", or the name of a .csv file.
+// A rule is written "x", "y", "z", "around:x", "around:y", "around:z", or the name of a .csv file.
 Result<FibreRule> parse_fibre_rule(std::string_view text);
 
 // Per node, as Organ::fibre_directions; zero on the axis that they run around. A table has the

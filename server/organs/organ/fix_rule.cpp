@@ -42,7 +42,7 @@ std::string to_text(const FixRule& rule) {
 
 std::vector<NodeIndex> nodes_held_by(const FixRule& rule, const mesh::TetMesh& mesh) {
   if (rule.side == FixRule::Side::None) return {};
-  // Height above the held side.
+  // Returns the height above the held side.
   const auto coordinate = [&](const Vec3d& p) {
     return rule.side == FixRule::Side::Bottom ? p.y : rule.side == FixRule::Side::Top ? -p.y : p.z;
   };

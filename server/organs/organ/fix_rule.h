@@ -1,7 +1,7 @@
 #pragma once
 
-// Which nodes of an imported mesh are held: those of its surface that lie in a slab at one side of
-// the rest bounding box.
+// A rule says which nodes of an imported mesh are held: those of its surface that lie in a slab at
+// one side of the rest bounding box.
 
 #include <string>
 #include <string_view>
@@ -21,7 +21,7 @@ struct FixRule {
   bool operator==(const FixRule&) const = default;
 };
 
-// "none", "bottom:F", "top:F" or "back:F".
+// A rule is written "none", "bottom:F", "top:F" or "back:F".
 Result<FixRule> parse_fix_rule(std::string_view text);
 std::string to_text(const FixRule& rule);
 

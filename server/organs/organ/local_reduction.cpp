@@ -15,10 +15,12 @@ namespace {
 
 constexpr std::size_t kMaxSourceBytes = 4096;
 constexpr std::uint32_t kTetLimit = std::uint32_t{1} << 31;
-// Of the mass matrix, beside its diagonal. Fields that depend on each other exactly still leave
-// 5e-10 after packing, which rounds each on its own; those of a block leave 7e-7 and more.
+// A pivot of the mass matrix must be at least this share of its diagonal. Fields that depend on
+// each other exactly still leave 5e-10 after packing, which rounds each on its own; those of a
+// block leave 7e-7 and more.
 constexpr double kLeastPivot = 1e-12;
-// Of a mode's mass in the file from that of the organ's nodes: packing makes up to 1e-4.
+// A mode's mass in the file may deviate by this share from that of the organ's nodes: packing makes
+// up to 1e-4.
 constexpr double kMassMargin = 0.01;
 
 Error bad(const std::string& what) {
@@ -39,7 +41,7 @@ std::string name_of(TetIndex tet) {
   return "tet " + std::to_string(tet.value);
 }
 
-// Ascending, distinct and below a limit.
+// Says whether they are ascending, distinct and below a limit.
 template <typename Index>
 Status check_indices(const std::string& what, const std::vector<Index>& indices,
                      std::uint32_t limit) {

@@ -16,18 +16,18 @@
 #include <string>
 #include <vector>
 
-#include "server/organs/organ/reduction.h"
+#include "server/organs/organ/reduced_organ.h"
 
 namespace trocar::organ {
 
-// kMaxReducedModes (reduction.h) is the most modes of a patch, and the most vibrations.
+// kMaxReducedModes (reduced_organ.h) is the most modes of a patch, and the most vibrations.
 inline constexpr std::size_t kMaxLocalPatches = 4096;
 inline constexpr std::size_t kMaxLocalFields = 400;  // of a patch, see field_count()
 inline constexpr std::size_t kMaxGreensFunctions = 100000;
 inline constexpr std::uint32_t kMaxFreeLayers = 3;
 inline constexpr double kMaxLocalForce_n = 100;
 inline constexpr float kMaxCubatureWeight = 1e6f;
-// Of a field: with it, displacements per force reach 33 km/N.
+// A field's step is at most this: with it, displacements per force reach 33 km/N.
 inline constexpr float kMaxFieldStep = 1;
 // Largest deviation of a patch's modes' products from 1 and 0. Packing makes up to 3e-5 of exactly
 // orthonormal fields, smooth or with a peak of a few nodes, on meshes of 18 to 100,000 nodes.

@@ -4,7 +4,6 @@
 #include <cstring>
 
 #include "proto/local_reduction.pb.h"
-#include "server/organs/organ/reduction_file.h"
 
 namespace trocar::organ {
 namespace {
@@ -146,7 +145,7 @@ Result<Bytes> pack_local_reduction(const LocalReduction& reduction, std::uint64_
 }
 
 Result<LocalReduction> unpack_local_reduction(BytesView file) {
-  if (has_magic(file, kReductionMagic))
+  if (has_magic(file, kDoganReductionMagic))
     return bad(
         "is a reduction by --method dogan, which sessions cannot use: make one with trocar-organ "
         "reduce --method local");

@@ -1,9 +1,9 @@
 #pragma once
 
 // `.reduction` files of the method local: a packed file (packed_file.h) with the magic "TROCARL1"
-// and one proto LocalReduction message (proto/local_reduction.proto). Those of the method dogan are
-// in reduction_file.h. Nothing in a file is trusted: any bytes give a reduction that validate()
-// accepts, or an error of one line.
+// and one proto LocalReduction message (proto/local_reduction.proto). Those of the method dogan
+// are in server/papers/dogan/reduction_file.h. Nothing in a file is trusted: any bytes give a
+// reduction that validate() accepts, or an error of one line.
 
 #include <filesystem>
 #include <string_view>
@@ -15,13 +15,15 @@
 namespace trocar::organ {
 
 inline constexpr std::string_view kLocalReductionMagic = "TROCARL1";
+// The magic of the other method's files, which sessions refuse by name.
+inline constexpr std::string_view kDoganReductionMagic = "TROCARR1";
 
 // Error, too: it is larger than a packed file may be.
 Status write_local_reduction(const std::filesystem::path& path, const LocalReduction& reduction);
 // Refuses one of another organ, too.
 Result<LocalReduction> read_local_reduction(const std::filesystem::path& path, const Organ& organ);
-// As read_local_reduction(), for sessions: refuses also an organ that they can have none of, and
-// one of another density.
+// Does the same as read_local_reduction(), for sessions: it refuses also an organ that they can
+// have none of, and one of another density.
 Result<LocalReduction> read_session_reduction(const std::filesystem::path& path,
                                               const Organ& organ);
 

@@ -6,6 +6,7 @@
 
 #include "common/base/bytes.h"
 #include "common/base/checksum.h"
+#include "server/organs/material/material_keys.h"
 
 namespace trocar::organ {
 namespace {
@@ -46,26 +47,19 @@ Status check_material(const Organ& organ, const material::Material& m) {
   const auto number = [&](const char* name, double value, double low, double high) {
     return check_number(organ, name, value, low, high);
   };
-  if (auto s = number("density (kg/m^3)", m.density_kg_m3, 1, 30000); !s) return s;
+  for (const auto& key : material::kNumberKeys)
+    if (auto s = number(key.title, m.*key.member, key.low, key.high); !s) return s;
+  if (auto s = number("tension and fibre tension together", m.tension + m.fibre_tension, 0,
+                      material::kMaxTension);
+      !s)
+    return s;
+  if (m.tear_stretch != 0)
+    if (auto s = number("tear stretch", m.tear_stretch, material::kLeastTearStretch, 100); !s)
+      return s;
   if (m.elastic_law > material::ElasticLaw::Measured)
     return broken(organ, "unknown elastic law " + std::to_string(static_cast<int>(m.elastic_law)));
   if (m.spring_law > material::SpringLaw::VolumeConsistent)
     return broken(organ, "unknown spring law " + std::to_string(static_cast<int>(m.spring_law)));
-  for (const auto& s :
-       {number("spring stiffness (N/m)", m.spring_stiffness_n_m, 0, 1e9),
-        number("Young's modulus (Pa)", m.young_modulus_pa, 0, 1e12),
-        number("node damping (1/s)", m.node_damping_per_s, 0, 1e6),
-        number("spring damping time (s)", m.spring_damping_time_s, 0, 100),
-        number("Poisson's ratio", m.poisson_ratio, 0, 0.4999),
-        number("fibre stiffness ratio", m.fibre_stiffness_ratio, 0, 1000),
-        number("tension", m.tension, 0, 0.9), number("fibre tension", m.fibre_tension, 0, 0.9),
-        number("tension and fibre tension together", m.tension + m.fibre_tension, 0, 0.9),
-        number("cut energy (J/m^2)", m.cut_energy_j_m2, 0, 1e6),
-        number("blade friction (Pa)", m.blade_friction_pa, 0, 1e6),
-        m.tear_stretch == 0
-            ? Status()
-            : number("tear stretch", m.tear_stretch, material::kLeastTearStretch, 100)})
-    if (!s) return s;
   if (m.elastic_law == material::ElasticLaw::Measured)
     if (auto s = check_measured(m.measured); !s) return broken(organ, s.error().message);
   if (!is_finite(m.fibre_direction)) return broken(organ, "fibre direction is not finite");

@@ -25,7 +25,7 @@ struct Organ {
   std::vector<double> node_masses_kg;  // node_count; Nakao 2003 eq. 4 where there are tets
   Vec3d source_offset_m;               // add to a rest position to get the source's coordinates
   Vec3d gravity_m_s2;
-  // Where every node would be without gravity and tension, if the rest pose is in equilibrium with
+  // Every node would be here without gravity and tension, if the rest pose is in equilibrium with
   // them: then the organ does not sag when a session starts. Empty: the rest pose itself.
   std::vector<Vec3d> stress_free_positions_m;
   // Per node the direction of its fibres, such as Langer's lines of skin: of length 1, either sign,
@@ -49,18 +49,17 @@ struct MaterialMap {
 MaterialMap material_map(const Organ& organ);
 const material::Material& material_at(const Organ& organ, std::uint16_t index);
 
-// What an element's fibres are from those of its nodes: the sum of the axes, each with the sign
-// that is nearer to the first of them; zeros are left out. Nothing can cancel, for no part is
-// turned by more than a right angle from the first. Of equal ones exactly a multiple by a power of
-// two.
+// Returns an element's fibres from those of its nodes: the sum of the axes, each with the sign that
+// is nearer to the first of them; zeros are left out. Nothing can cancel, for no part is turned by
+// more than a right angle from the first. Of equal ones exactly a multiple by a power of two.
 Vec3d sum_of_axes(std::span<const Vec3d> axes);
 // `axis`, or the material's own direction where it is zero; of any length.
 const Vec3d& fibres_in(const material::Material& material, const Vec3d& axis);
 
-// Of one pair of mesh.spring_pairs(). SpringLaw::VolumeConsistent: k = sum over the tets at the
-// edge of E V / length^2, derived in the source; it gives Young's modulus E on average over
-// orientations, and Poisson's ratio 1/4, as every network of springs does. Edges of tets whose law
-// is not ElasticLaw::Springs get the damping but no stiffness of them.
+// A spring stands for one pair of mesh.spring_pairs(). With SpringLaw::VolumeConsistent, k = sum
+// over the tets at the edge of E V / length^2, derived in the source; it gives Young's modulus E on
+// average over orientations, and Poisson's ratio 1/4, as every network of springs does. Edges of
+// tets whose law is not ElasticLaw::Springs get the damping but no stiffness of them.
 struct Spring {
   double stiffness_n_m = 0;
   double damping_n_s_m = 0;

@@ -1,7 +1,7 @@
 #pragma once
 
-// What a tick costs: cost = a + b x, with x the node sweeps of the solver and b what one of them
-// takes. Fitted while the session runs, from the last kWindow ticks, by medians:
+// The model says what a tick costs: cost = a + b x, with x the node sweeps of the solver and b what
+// one of them takes. Fitted while the session runs, from the last kWindow ticks, by medians:
 //
 //   level  a and b are scaled by 1 + 0.3 (q - 1), q the median of measured / predicted over the
 //          last kLevelWindow ticks. Up to kLevelWindow / 2 of these may be spikes of any size

@@ -28,7 +28,8 @@ class DepthChooser {
       : table_(std::move(table)), least_nodes_(least_nodes) {}
 
   bool is_in_use() const { return !table_.empty(); }
-  // Of the next tick. decided: without the table; forces_n: of the tools that touch, in the last.
+  // Returns the decisions for the next tick. `decided` are those without the table; `forces_n` are
+  // those on tools that touched in the last tick.
   step::TickDecisions choose(const step::TickDecisions& decided, std::span<const double> forces_n);
 
  private:
@@ -41,7 +42,7 @@ class DepthChooser {
   int room_ticks_ = 0;
 };
 
-// Of each tool that touched something in the last tick, N.
+// Reads the force on each tool that touched something in the last tick, N.
 void read_forces(const step::Simulation& simulation, std::vector<double>& forces_n);
 
 }  // namespace trocar::control

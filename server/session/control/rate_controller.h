@@ -45,7 +45,7 @@ struct RateLimits {
   double budget_us = 800;  // of a tick's time for its work
 };
 
-// Of one tick, measured outside it.
+// These figures of one tick are measured outside it.
 struct TickTiming {
   std::uint64_t work_ns = 0;      // what it took, in real time
   std::uint64_t lateness_ns = 0;  // how long after it was due it began
@@ -60,7 +60,7 @@ class RateController {
   // `highest` passes step::validate.
   explicit RateController(const RateLimits& limits);
 
-  // Of the next tick.
+  // Returns the decisions for the next tick.
   const step::TickDecisions& decisions() const { return decisions_; }
   // After every tick, with decisions() as they were in it, or less of the queue (DepthChooser).
   void observe(const step::TickReport& report, const TickTiming& timing);

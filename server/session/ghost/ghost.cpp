@@ -47,7 +47,7 @@ void Ghost::take_frames(std::span<const step::SharedFrame> frames) {
       queue_.clear();
       has_lost_ = true;
     }
-    // What is lost is lost: the newest of very many.
+    // If there are very many, the last of them are lost.
     const auto kept = std::min(frames.size(), kMostFrames);
     queue_.insert(queue_.end(), frames.end() - static_cast<std::ptrdiff_t>(kept), frames.end());
     newest_tick_ = frames.back()->tick;

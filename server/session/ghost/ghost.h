@@ -45,7 +45,7 @@ class Ghost {
   Ghost(const step::Simulation& session, GhostOptions options);
   ~Ghost();
 
-  // All from one thread.
+  // All are called from one thread.
   void set_wanted(bool is_wanted);
   void take_frames(std::span<const step::SharedFrame> frames);
   // Any thread.

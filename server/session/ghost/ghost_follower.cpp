@@ -54,7 +54,7 @@ GhostReport GhostFollower::compare(const step::PublishedFrame& frame) const {
   GhostReport report{
       .status = status_, .frame = frame.frame, .tick = frame.tick, .epoch = frame.epoch};
   report.offsets.reserve(frame.surface.size());
-  // As far as can be sent.
+  // An offset is cut off at what can be sent.
   const auto offset = [](std::int32_t to, std::int32_t from) {
     return std::clamp(to - from, -wire::kMaxQuanta, wire::kMaxQuanta);
   };

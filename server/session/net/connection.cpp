@@ -4,7 +4,6 @@
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/co_spawn.hpp>
-#include <boost/asio/detached.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <boost/asio/write.hpp>
 #include <cstring>
@@ -46,8 +45,9 @@ void Connection::start(Events events) {
   // in the completion handler until the coroutine has ended.
   const auto self = shared_from_this();
   const auto executor = socket_.get_executor();
-  asio::co_spawn(executor, read_frames(), [self](std::exception_ptr) {});
-  asio::co_spawn(executor, write_outbox(), [self](std::exception_ptr) {});
+  asio::co_spawn(executor, read_frames(), [self](std::exception_ptr failure) { rethrow(failure); });
+  asio::co_spawn(executor, write_outbox(),
+                 [self](std::exception_ptr failure) { rethrow(failure); });
 }
 
 bool Connection::send(wire::SharedBytes frame) {

@@ -28,7 +28,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
  public:
   using Clock = std::chrono::steady_clock;
 
-  // What the server wants to hear; called on the I/O thread.
+  // The server hears of a connection through these; they are called on the I/O thread.
   struct Events {
     std::function<void(BytesView)> message;
     std::function<void(ConnectionFault)> fault;

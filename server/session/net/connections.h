@@ -1,6 +1,6 @@
 #pragma once
 
-// What the layers above see of the network: messages as bytes, connections as numbers.
+// The layers above see this of the network: messages as bytes, connections as numbers.
 //
 //   TcpServer --on_open/on_message/on_fault/on_close--> ConnectionHandler
 //   TcpServer <--send/close_after_flush/close---------- whoever holds a Connections&
@@ -37,7 +37,7 @@ class ConnectionHandler {
   // `message` is the body of one frame, valid during the call.
   virtual void on_message(ConnectionId id, BytesView message) = 0;
   virtual void on_fault(ConnectionId id, ConnectionFault fault) = 0;
-  // Exactly once per connection, also after close() and close_after_flush().
+  // This is called exactly once per connection, also after close() and close_after_flush().
   virtual void on_close(ConnectionId id) = 0;
 };
 

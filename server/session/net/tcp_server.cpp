@@ -53,8 +53,10 @@ class TcpServer::Core : public std::enable_shared_from_this<TcpServer::Core> {
   void start(ConnectionHandler& to) {
     handler = &to;
     const auto self = shared_from_this();
-    asio::co_spawn(acceptor.get_executor(), accept_connections(), [self](std::exception_ptr) {});
-    asio::co_spawn(acceptor.get_executor(), sweep_deadlines(), [self](std::exception_ptr) {});
+    asio::co_spawn(acceptor.get_executor(), accept_connections(),
+                   [self](std::exception_ptr failure) { rethrow(failure); });
+    asio::co_spawn(acceptor.get_executor(), sweep_deadlines(),
+                   [self](std::exception_ptr failure) { rethrow(failure); });
   }
 
   void stop_accepting() {
@@ -152,6 +154,21 @@ class TcpServer::Core : public std::enable_shared_from_this<TcpServer::Core> {
     }
   }
 };
+
+Status run(asio::io_context& context) {
+  const auto failed = [](const char* what) {
+    return Error{ErrorCode::ResourceMissing,
+                 std::string("the session has ended: its network thread failed (") + what + ")"};
+  };
+  try {
+    context.run();
+  } catch (const std::exception& exception) {
+    return failed(exception.what());
+  } catch (...) {
+    return failed("unknown");
+  }
+  return {};
+}
 
 Result<std::unique_ptr<TcpServer>> TcpServer::listen(asio::io_context& context,
                                                      const TcpServerOptions& options) {

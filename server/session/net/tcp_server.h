@@ -48,6 +48,10 @@ struct TcpCounters {
   std::uint64_t messages_in = 0, bytes_in = 0, bytes_out = 0;
 };
 
+// Runs handlers and coroutines until the context is stopped or has nothing left to do. What one of
+// them throws ends that: an error says what it was, and the context is not run again.
+Status run(asio::io_context& context);
+
 class TcpServer final : public Connections {
  public:
   // Binds and listens; ErrorCode::ResourceMissing when the address or port cannot be had.

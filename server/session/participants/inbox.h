@@ -35,7 +35,7 @@ class SimulationInbox {
   [[nodiscard]] bool try_push_join(const hands::HandJoin& join);  // false: no room, refuse the join
   void push_leave(ParticipantSlot slot);                          // of a slot that has joined
   void push_sample(const hands::ToolInput& input);
-  // Of two before a drain the newer one counts.
+  // If two marks arrive before a drain, the newer one counts.
   void push_mark(hands::MarkAction action) { mark_.store(action, std::memory_order_relaxed); }
   const Counters& counters() const { return counters_; }
 

@@ -3,16 +3,12 @@
 #include "common/base/log.h"
 #include "common/base/timing.h"
 #include "common/base/version.h"
-#include "common/wire/surface_codec.h"
 #include "common/wire/surface_messages.h"
 #include "server/organs/organ/organ_file.h"
-#include "server/session/recording/tick_records.h"
 #include "server/session/replication/messages.h"
 
 namespace trocar::recording {
 namespace {
-
-constexpr Tick kKeyPeriod = 1000;
 
 std::size_t estimated_bytes(const step::PublishedFrame& frame) {
   std::size_t bytes = sizeof frame + frame.surface.size() * sizeof(wire::QuantisedVertex) +
@@ -27,6 +23,23 @@ std::size_t estimated_bytes(const step::PublishedFrame& frame) {
     bytes += sizeof record + record.inputs.samples.size() * sizeof(hands::ToolInput);
   return bytes;
 }
+
+class FileSink final : public MessageSink {
+ public:
+  FileSink(journal::SessionJournalWriter& writer, Tick tick, std::uint64_t now_ns)
+      : writer_(writer), tick_(tick), now_ns_(now_ns) {}
+  Status take(journal::JournalTopic topic, const google::protobuf::Message& message) override {
+    return writer_.write(topic, tick_, now_ns_, message);
+  }
+  Status take(const proto::ToolState& tool) override {
+    return writer_.write_tool({static_cast<std::uint8_t>(tool.tool())}, tick_, now_ns_, tool);
+  }
+
+ private:
+  journal::SessionJournalWriter& writer_;
+  Tick tick_;
+  std::uint64_t now_ns_;
+};
 
 }  // namespace
 
@@ -55,8 +68,7 @@ Result<std::unique_ptr<Recorder>> Recorder::create(
 Recorder::Recorder(std::unique_ptr<journal::SessionJournalWriter> writer, const organ::Organ& organ,
                    std::uint64_t organ_hash, const wire::SurfaceLayout& layout)
     : writer_(std::move(writer)),
-      layout_(layout),
-      organ_name_(organ.name),
+      messages_(organ.name, layout),
       organ_hash_(organ_hash),
       thread_([this] { run(); }) {}
 
@@ -76,6 +88,7 @@ void Recorder::take_frame(const step::SharedFrame& frame) {
   if (is_taken) {
     open_gap_ = {};
   } else {
+    frames_dropped_.fetch_add(1, std::memory_order_relaxed);
     if (open_gap_.frames++ == 0) open_gap_.first_tick = first;
     open_gap_.last_tick = frame->tick;
     if (frame->new_layout) {
@@ -126,6 +139,7 @@ bool Recorder::write_queued() {
 
 void Recorder::fail_with(const Error& error) {
   status_ = error;
+  has_failed_.store(true, std::memory_order_release);
   log::error("recording ends here: {}", error.message);
 }
 
@@ -137,11 +151,7 @@ Status Recorder::write_presence(const Presence& presence) {
 }
 
 Status Recorder::write_gap(const Gap& gap) {
-  has_baseline_ = false;
-  has_decisions_ = false;
-  if (gap.new_layout) layout_ = *gap.new_layout;
-  for (const auto& change : gap.changes)
-    if (auto s = wire::apply(*change, layout_); !s) return s;
+  if (auto s = messages_.skip(gap.new_layout.get(), gap.changes); !s) return s;
   counters_.frames_dropped += gap.frames;
   log::warn("recording: the disk was too slow, ticks {} to {} are missing", gap.first_tick,
             gap.last_tick);
@@ -164,89 +174,25 @@ Status Recorder::write_frame(const step::PublishedFrame& frame) {
     if (auto s = writer_->write_snapshot(not_before_last(frame.snapshot_tick), now, message); !s)
       return s;
   }
-  const Tick tick = not_before_last(frame.tick);
-  proto::TickBatch batch;
-  for (const auto& record : frame.records) {
-    to_message(record, has_decisions_ ? &last_decisions_ : nullptr, *batch.add_record());
-    last_decisions_ = record.decisions;
-    has_decisions_ = true;
-  }
-  if (auto s = writer_->write_tick_batch(tick, now, batch); !s) return s;
-
-  if (frame.new_layout) {
-    layout_ = *frame.new_layout;
-    has_baseline_ = false;
-  }
-  if (auto s = write_change(frame); !s) return s;
-  const bool has_key = !has_baseline_ || frame.tick - last_key_tick_ >= kKeyPeriod;
-  if (has_baseline_) {
-    if (auto s = write_surface(frame, false); !s) return s;
-  }
-  if (has_key) {
-    if (auto s = write_keyframe(frame); !s) return s;
-  }
-  if (!frame.claim_events.empty()) {
-    proto::ClaimLog claims;
-    for (const auto& event : frame.claim_events)
-      replication::describe(event, roster_, *claims.add_event());
-    if (auto s = writer_->write_claims(tick, now, claims); !s) return s;
-  }
-  if (auto s = write_solver_changes(frame); !s) return s;
-  proto::FrameState state;
-  replication::describe(frame, state);
-  for (const auto& tool : state.tool())
-    if (auto s = writer_->write_tool({static_cast<std::uint8_t>(tool.tool())}, tick, now, tool); !s)
-      return s;
+  FileSink sink(*writer_, not_before_last(frame.tick), now);
+  if (auto s = messages_.write(frame, roster_, sink); !s) return s;
   ++counters_.frames_written;
-  return writer_->write_frame_state(tick, now, state);
+  return {};
 }
 
-Status Recorder::write_solver_changes(const step::PublishedFrame& frame) {
-  if (frame.solver_changes.empty()) return {};
-  proto::SolverLog changes;
-  for (const auto& change : frame.solver_changes)
-    replication::describe(change, *changes.add_change());
-  return writer_->write_solver(last_tick_, utc_ns(), changes);
-}
-
-Status Recorder::write_change(const step::PublishedFrame& frame) {
-  if (!frame.change) return {};
-  if (auto s = wire::apply(*frame.change, layout_); !s) return s;
-  proto::SurfaceChange message;
-  wire::write(*frame.change, layout_, message);
-  return writer_->write_topology_change(last_tick_, utc_ns(), message);
-}
-
-Status Recorder::write_keyframe(const step::PublishedFrame& frame) {
-  last_key_tick_ = frame.tick;
-  if (layout_.epoch > 0) {
-    proto::SurfaceTopology topology;
-    wire::write(layout_, organ_name_, topology);
-    if (auto s = writer_->write_topology(last_tick_, utc_ns(), topology); !s) return s;
+wire::RecordingState Recorder::state() const {
+  wire::RecordingState state{.status = wire::RecordingStatus::Whole,
+                             .frames_missing = frames_dropped_.load(std::memory_order_relaxed),
+                             .text = {}};
+  if (has_failed_.load(std::memory_order_acquire)) {
+    state.status = wire::RecordingStatus::Failed;
+    state.text = "the recording has ended: " + status_.error().message;
+  } else if (state.frames_missing > 0) {
+    state.status = wire::RecordingStatus::Gapped;
+    state.text = "the recording has gaps: " + std::to_string(state.frames_missing) +
+                 " frames are missing, the disk was too slow";
   }
-  return write_surface(frame, true);
-}
-
-Status Recorder::write_surface(const step::PublishedFrame& frame, bool is_keyframe) {
-  proto::SurfaceFrame message;
-  message.set_frame(frame.frame);
-  message.set_tick(frame.tick);
-  message.set_epoch(frame.epoch);
-  message.set_is_keyframe(is_keyframe);
-  message.set_surface_crc(frame.surface_crc);
-  Bytes payload;
-  if (is_keyframe) {
-    wire::encode_keyframe(frame.surface, payload);
-  } else {
-    message.set_base_frame(baseline_frame_);
-    baseline_.resize(frame.surface.size());  // zeros for new vertices
-    wire::encode_delta(baseline_, frame.surface, payload);
-  }
-  message.set_payload(payload.data(), payload.size());
-  baseline_.assign(frame.surface.begin(), frame.surface.end());
-  baseline_frame_ = frame.frame;
-  has_baseline_ = true;
-  return writer_->write_surface(not_before_last(frame.tick), utc_ns(), message);
+  return state;
 }
 
 Status Recorder::close() {
@@ -255,11 +201,12 @@ Status Recorder::close() {
   wake_ups_.notify_one();
   thread_.join();
   if (open_gap_.frames > 0 && status_.ok()) {
-    if (auto s = write_gap(open_gap_); !s) status_ = s;
+    if (auto s = write_gap(open_gap_); !s) fail_with(s.error());
   }
   const Status closed = writer_->close();
+  if (status_.ok() && !closed.ok()) fail_with(closed.error());
   counters_.bytes_written = writer_->bytes_written();
-  return status_.ok() ? closed : status_;
+  return status_;
 }
 
 }  // namespace trocar::recording

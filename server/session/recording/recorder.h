@@ -8,7 +8,8 @@
 // Neither producer ever waits. When the frames' queue is full a frame is dropped, counted, and the
 // journal gets a JournalGap with the ticks that are missing; the surface goes on with topology and
 // keyframe (what a dropped frame changed of it is kept) and re-simulation from the next snapshot. A
-// disk error ends the recording, is logged once, and close() returns it.
+// disk error ends the recording, is logged once, and close() returns it. Both show in state() at
+// once, so that the session can tell everybody.
 //
 // Changes of the surface are written with their frame. From epoch 1 on each keyframe (1 Hz) follows
 // a full SurfaceTopology of its tick, so that a seek, or what comes after damage, starts right.
@@ -23,9 +24,11 @@
 
 #include "common/base/spsc_queue.h"
 #include "common/journal/session_journal_writer.h"
+#include "common/wire/recording_state.h"
 #include "common/wire/surface_layout.h"
 #include "server/organs/organ/organ.h"
 #include "server/session/participants/roster.h"
+#include "server/session/recording/frame_messages.h"
 #include "server/tissue/step/published_frame.h"
 
 namespace trocar::recording {
@@ -59,6 +62,8 @@ class Recorder {
   Status close();
   // After close().
   const RecorderCounters& counters() const { return counters_; }
+  // Any thread, at any time.
+  wire::RecordingState state() const;
 
  private:
   struct Presence {
@@ -85,28 +90,20 @@ class Recorder {
   Status write_presence(const Presence& presence);
   Status write_gap(const Gap& gap);
   Status write_frame(const step::PublishedFrame& frame);
-  Status write_solver_changes(const step::PublishedFrame& frame);
-  Status write_change(const step::PublishedFrame& frame);
-  Status write_keyframe(const step::PublishedFrame& frame);
-  Status write_surface(const step::PublishedFrame& frame, bool is_keyframe);
   void fail_with(const Error& error);
   Tick not_before_last(Tick tick) { return last_tick_ = std::max(last_tick_, tick); }
 
   // Writer thread, or the caller's after it has ended.
   std::unique_ptr<journal::SessionJournalWriter> writer_;
   participants::Roster roster_;  // names for claim events
-  wire::SurfaceLayout layout_;   // of the last frame written
-  std::string organ_name_;
-  wire::QuantisedSurface baseline_;  // last surface written
-  Frame baseline_frame_ = 0;
-  bool has_baseline_ = false;  // else a keyframe is due
-  step::TickDecisions last_decisions_;
-  bool has_decisions_ = false;
-  Tick last_key_tick_ = 0, last_tick_ = 0;
+  FrameMessages messages_;
+  Tick last_tick_ = 0;
   std::uint64_t organ_hash_ = 0;
   RecorderCounters counters_;
   Status status_;
+  std::atomic<bool> has_failed_{false};  // status_ is an error, and changes no more
 
+  std::atomic<std::uint64_t> frames_dropped_{0};
   SpscQueue<QueuedFrame> frames_{kQueueFrames};
   SpscQueue<Presence> presences_{kQueueParticipants};
   std::atomic<std::size_t> queued_bytes_{0};

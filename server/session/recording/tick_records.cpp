@@ -122,7 +122,9 @@ Status from_message(const proto::TickRecord& message, step::TickRecord& record) 
     if (join.tool_count < 1 || join.tool_count > kToolsPerHand)
       return bad(record.tick, "join: a hand has 1 or 2 tools");
     for (int i = 0; i < join.tool_count; ++i) {
-      join.shapes[static_cast<std::size_t>(i)] = wire::read(entry.tool(i));
+      auto& shape = join.shapes[static_cast<std::size_t>(i)];
+      shape = wire::read(entry.tool(i));
+      if (!tool::is_valid(shape)) return bad(record.tick, "join: a tool has an impossible shape");
     }
     record.inputs.joins.push_back(join);
   }

@@ -13,6 +13,7 @@ namespace trocar::replication {
 namespace {
 
 static_assert(static_cast<int>(hands::ClaimOutcome::Slipped) == proto::CLAIM_SLIPPED);
+static_assert(static_cast<int>(wire::RecordingStatus::Failed) == proto::RECORDING_FAILED);
 static_assert(static_cast<int>(step::RateLevel::Overloaded) == proto::RATE_OVERLOADED);
 
 void write(const Vec3f& from, proto::Vec3& to) {
@@ -218,6 +219,20 @@ void describe(const step::PublishedFrame& frame, proto::FrameState& state) {
   rate.set_time_rate(figures.time_rate);
 }
 
+void clear_measured(proto::FrameState& state) {
+  state.clear_tick_cpu_us();
+  state.clear_tick_cpu_p99_us();
+  state.clear_stage_cpu_us();
+  state.clear_slow_ticks();
+  auto& rate = *state.mutable_rate();
+  rate.clear_level();
+  rate.clear_budget_us();
+  rate.clear_predicted_us();
+  rate.clear_lowered();
+  rate.clear_raised();
+  rate.clear_time_rate();
+}
+
 wire::SharedBytes encode_frame_state(const step::PublishedFrame& frame) {
   proto::Envelope envelope;
   describe(frame, *envelope.mutable_frame_state());
@@ -324,6 +339,15 @@ wire::SharedBytes encode_ghost(const ghost::GhostReport& report) {
 wire::SharedBytes encode_no_ghost() {
   proto::Envelope envelope;
   envelope.mutable_ghost_frame()->set_status(proto::GHOST_NONE);
+  return wire::encode_envelope(envelope);
+}
+
+wire::SharedBytes encode_recording(const wire::RecordingState& state) {
+  proto::Envelope envelope;
+  auto& message = *envelope.mutable_recording_state();
+  message.set_status(static_cast<proto::RecordingStatus>(state.status));
+  message.set_frames_missing(state.frames_missing);
+  message.set_text(state.text);
   return wire::encode_envelope(envelope);
 }
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/wire/framing.h"
+#include "common/wire/recording_state.h"
 #include "common/wire/surface_layout.h"
 #include "server/session/ghost/ghost_follower.h"
 #include "server/session/participants/roster.h"
@@ -27,6 +28,9 @@ namespace trocar::replication {
 // Messages that clients and journal get alike.
 void describe(const std::vector<participants::Participant>& present, proto::Participants& message);
 void describe(const step::PublishedFrame& frame, proto::FrameState& message);
+// Clears what no simulation can repeat: times that were measured, and what the rate controller made
+// of them.
+void clear_measured(proto::FrameState& message);
 void describe(const hands::ClaimEvent& event, const participants::Roster& roster,
               proto::ClaimEvent& message);
 void describe(const step::SolverChange& change, proto::SolverChange& message);
@@ -44,15 +48,16 @@ wire::SharedBytes encode_mark_event(const step::MarkEvent& event);
 // To who asked too soon after another request; nothing has been done.
 wire::SharedBytes encode_early_mark(hands::MarkAction action, Tick tick);
 wire::SharedBytes encode_ghost(const ghost::GhostReport& report);
-// That there is no ghost in this session.
+// The message says that there is no ghost in this session.
 wire::SharedBytes encode_no_ghost();
+wire::SharedBytes encode_recording(const wire::RecordingState& state);
 wire::SharedBytes encode_barrier(const step::PublishedFrame& frame);
 wire::SharedBytes encode_pong(std::uint64_t client_time_us, Tick tick);
 wire::SharedBytes encode_goodbye(EndReason reason, const std::string& text);
 
 // One line for a person about what became of a claim: by whom it is held and what to do.
 std::string describe(const hands::ClaimEvent& event, const participants::Roster& roster);
-// Which solver acts and why: "reduced, patch 12", "full, tissue was cut".
+// Says which solver acts and why: "reduced, patch 12", "full, tissue was cut".
 std::string describe(const step::SolverFigures& solver);
 
 }  // namespace trocar::replication

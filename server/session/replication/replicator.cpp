@@ -227,6 +227,7 @@ std::optional<Replicator::Ending> Replicator::admit(Client& client, const proto:
       !send(client, encode_participants(roster_.list())) || !send(client, topology()))
     return too_slow;
   if (encoder_.current() && !give_frame(client, true)) return too_slow;
+  if (!send(client, encode_recording(recording_))) return too_slow;
   // The others; the newcomer has it already, a second copy does no harm.
   participants_changed_ = true;
   return std::nullopt;
@@ -400,7 +401,8 @@ void Replicator::publish(std::span<const step::SharedFrame> frames) {
 }
 
 void Replicator::publish(const ghost::GhostReport& report) {
-  // Of a surface that they have: a change since is on its way, or they have it already.
+  // Clients get a report only of the surface that they have: they may wait for a change, or have it
+  // already.
   const bool follows = report.status == ghost::GhostStatus::Follows;
   if (follows && (report.epoch != layout_.epoch || report.offsets.size() != layout_.vertex_count()))
     return;
@@ -411,6 +413,17 @@ void Replicator::publish(const ghost::GhostReport& report) {
     const bool is_given = has_room && send(*client, bytes);
     ++(is_given ? counters_.ghosts_given : counters_.ghosts_skipped);
   }
+}
+
+void Replicator::set_recording(const wire::RecordingState& state) {
+  if (state == recording_) return;
+  const auto now = options_.clock_ns();
+  if (state.status == recording_.status && now - recording_told_ns_ < kSecondNs) return;
+  if (state.is_damaged() && state.status != recording_.status) log::error("{}", state.text);
+  recording_ = state;
+  recording_told_ns_ = now;
+  broadcast(encode_recording(recording_));
+  settle_participants();
 }
 
 void Replicator::begin_barrier(const step::SharedFrame& last) {

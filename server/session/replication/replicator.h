@@ -14,8 +14,8 @@
 // it; the next delta is encoded against the last frame it was given, so nothing queues up and
 // nothing is lost. It gets a keyframe instead when it asks (at most 4 per second; from epoch 1 on
 // with the topology before it) and when its baseline is older than 63 frames (1 s). Participants,
-// claim events, surface changes, topology and barrier cannot be skipped: if one does not fit, the
-// session ends as too slow.
+// claim events, surface changes, topology, recording state and barrier cannot be skipped: if one
+// does not fit, the session ends as too slow.
 //
 // Ghost: who has asked gets what the ghost's thread reports, if the outbox is less than half as
 // full as it may be for frames: these come first.
@@ -35,6 +35,7 @@
 #include <vector>
 
 #include "common/base/timing.h"
+#include "common/wire/recording_state.h"
 #include "common/wire/surface_layout.h"
 #include "server/session/ghost/ghost_follower.h"
 #include "server/session/net/connections.h"
@@ -100,6 +101,10 @@ class Replicator final : public net::ConnectionHandler {
 
   void publish(const ghost::GhostReport& report);
 
+  // Everybody is told of another status at once, of more missing frames at most once a second; who
+  // joins is told what it is.
+  void set_recording(const wire::RecordingState& state);
+
   // `last` has been or is now published; no further publish(). New Hellos are refused.
   void begin_barrier(const step::SharedFrame& last);
   bool is_barrier_complete() const;                    // everybody who is still here has answered
@@ -125,7 +130,7 @@ class Replicator final : public net::ConnectionHandler {
     std::string text;
   };
 
-  // What to end the session with, or nothing.
+  // These return what to end the client's session with, or nothing.
   std::optional<Ending> take_message(Client& client, BytesView bytes);
   std::optional<Ending> admit(Client& client, const proto::Hello& hello);
   std::optional<Ending> take_sample(Client& client, const proto::ToolSample& sample);
@@ -138,7 +143,7 @@ class Replicator final : public net::ConnectionHandler {
   Status change_surface(const wire::SurfaceChange& change);
   // Another one, to which no change leads: everybody gets it and a keyframe.
   void replace_surface(const wire::SurfaceLayout& layout);
-  // Of the surface as it is now.
+  // Makes the message of the surface as it is now.
   const wire::SharedBytes& topology();
   bool send(Client& client, const wire::SharedBytes& bytes);
   void broadcast(const wire::SharedBytes& bytes);
@@ -163,6 +168,9 @@ class Replicator final : public net::ConnectionHandler {
   std::map<net::ConnectionId, std::unique_ptr<Client>> clients_;
   bool participants_changed_ = false;
   bool is_ghost_wanted_ = false;
+  wire::RecordingState recording_{
+      .status = wire::RecordingStatus::Off, .frames_missing = 0, .text = {}};
+  std::uint64_t recording_told_ns_ = 0;
   std::optional<std::uint64_t> last_mark_ns_;
   FrameEncoder encoder_;
   step::SharedFrame barrier_;

@@ -1,6 +1,6 @@
 #pragma once
 
-// What a client said, checked field by field and turned into our own types. Everything that comes
+// A client's message is checked field by field and turned into our own types. Everything that comes
 // from a socket passes here first; what is wrong with it is an error line that goes back to the
 // client, and the reason its session ends with.
 

@@ -12,7 +12,7 @@ constexpr std::size_t kMaxPathSteps = 64;
 constexpr float kRounding_m = 1e-5f;
 constexpr std::uint32_t kNotNear = 0xffffffffu;
 
-// Part t of the way from a to b.
+// Returns the pose at part t of the way from a to b.
 Pose between(const Pose& a, const Pose& b, float t) {
   if (t >= 1) return b;
   return {a.position + (b.position - a.position) * t, interpolate(a.orientation, b.orientation, t)};
@@ -22,7 +22,7 @@ float distance_to(const ToolSolid& solid, const Vec3f& p) {
   return length(p - solid.nearest_on_core(p));
 }
 
-// What a tool touches is as wide as its radius one way, and its half width more the other.
+// A tool touches a patch as wide as its radius one way, and as its half width more the other.
 float stiffness_of(const trocar::tool::ToolShape& shape) {
   const auto thinness = [](float half_m) { return std::max(1.0f, kStiffnessRadius_m / half_m); };
   return kStiffnessPaPerM *
@@ -60,8 +60,8 @@ Vec3f combine(std::span<const Vec3f> values, const std::array<std::uint32_t, 3>&
   return sum;
 }
 
-// Where a point that is at `p` meets the tool on its way. is_held: the tool pressed it in the last
-// tick, so that it was met from outside whatever it looks like now.
+// Finds where a point that is at `p` meets the tool on its way. is_held: the tool pressed it in the
+// last tick, so that it was met from outside whatever it looks like now.
 struct Meeting {
   bool is_near = false;     // within the margin at the end of the way
   bool is_touched = false;  // inside the tool somewhere on the way

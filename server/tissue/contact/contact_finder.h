@@ -48,7 +48,7 @@ inline constexpr float kJump_m = 0.01f;
 inline constexpr float kMaxStep_m = 0.005f;
 // A blade claims the surface this near to its edge, ahead of its motion.
 inline constexpr float kCutCore_m = 0.004f;
-// What appears inside by no more than this is taken to have come from outside.
+// A point that appears inside by no more than this is taken to have come from outside.
 inline constexpr float kBack_m = 0.012f;
 // Quadrature points for a tool are this many radii apart, at most: between them it enters by 1/20
 // of a radius.
@@ -89,7 +89,7 @@ class ContactFinder {
   std::size_t triangles_visited() const { return triangles_visited_; }
 
  private:
-  // What a tool can meet while nothing has come nearer to it by more than the slack.
+  // The list holds what a tool can meet while nothing has come nearer to it by more than the slack.
   struct Nearby {
     bool is_known = false;
     std::array<Vec3f, 4> corners;
@@ -117,10 +117,10 @@ class ContactFinder {
   float greatest_pressure_ = 0;  // Pa
   double surface_travel_ = 0;    // m, sum over ticks
   std::array<Nearby, kMaxTools> nearby_;
-  // Of the tool in work: start, ..., goal; and where the nodes near it are.
+  // The tool in work has a path (start, ..., goal), and positions of the nodes near it.
   std::vector<ToolSolid> path_;
   std::vector<Vec3f> positions_;
-  // Scratch of list_near() and find_reach().
+  // These are scratch of list_near() and find_reach().
   std::vector<TriangleIndex> found_;
   std::vector<NodeIndex> near_nodes_;
   std::vector<std::uint32_t> near_of_node_;  // per node of the organ

@@ -51,7 +51,7 @@ inline PointLoad load_at(const ContactPoint& point, const Vec3f& d) {
   return load;
 }
 
-// Positive semi-definite, close to the second derivative.
+// The block is positive semi-definite, close to the second derivative.
 inline void add_block(const ContactPoint& point, const PointLoad& load, float weight,
                       SymMat3f& block) {
   const float share = weight * weight;

@@ -1,7 +1,7 @@
 #pragma once
 
-// What touches what in this tick, as the solver sees it: quadrature points of the surface
-// (surface.h), each a fixed combination of a triangle's nodes, and what acts on them.
+// The list says what touches what in this tick, as the solver sees it: quadrature points of the
+// surface (surface.h), each a fixed combination of a triangle's nodes, and what acts on them.
 //
 // Push: the point may not enter the tool. The tool's face there is a plane; the point leaves it
 //   freely and is resisted behind it, in proportion to depth and to the surface that the point

@@ -1,11 +1,12 @@
 #pragma once
 
-// Which nodes each grasping tool holds, and where in its frame. Created when a claim is granted,
-// dropped when it ends. Each node is held with its share, by surface area, of the grip: pulled
-// harder it slips between the jaws, and is lost where it leaves them; a grasp that has lost all of
-// its nodes has slipped off. Jaws close in kClosingTicks, along the tool's x: what lies between
-// them is squeezed, and the grip grows with it. While a claim fades out (its holder left, fell
-// silent or was taken over) the grasp stays where it last was, whatever becomes of the tool's slot.
+// The table says which nodes each grasping tool holds, and where in its frame. A grasp is created
+// when a claim is granted, dropped when it ends. Each node is held with its share, by surface area,
+// of the grip: pulled harder it slips between the jaws, and is lost where it leaves them; a grasp
+// that has lost all of its nodes has slipped off. Jaws close in kClosingTicks, along the tool's x:
+// what lies between them is squeezed, and the grip grows with it. While a claim fades out (its
+// holder left, fell silent or was taken over) the grasp stays where it last was, whatever becomes
+// of the tool's slot.
 
 #include <array>
 #include <span>
@@ -32,7 +33,7 @@ struct Grasp {
   Pose anchor;                   // world_from_tool
 };
 
-// Where the jaws hold a node, tool frame.
+// Returns where the jaws hold a node, in the tool's frame.
 inline Vec3f held_offset(const Grasp& grasp, std::size_t i) {
   const Vec3f& offset = grasp.offsets[i];
   return {offset.x * (1 - kSqueeze * grasp.closed), offset.y, offset.z};
@@ -41,7 +42,7 @@ inline Vec3f held_offset(const Grasp& grasp, std::size_t i) {
 class GraspTable {
  public:
   const Grasp& operator[](ToolSlot slot) const { return grasps_[slot.value]; }
-  // Where the grasp's frame is this tick.
+  // Returns where the grasp's frame is this tick.
   Pose pose(ToolSlot slot, const hands::Tool& tool) const {
     return grasps_[slot.value].is_anchored ? grasps_[slot.value].anchor : tool.pose;
   }
@@ -61,7 +62,7 @@ class GraspTable {
   void follow_slip(const ContactList& contacts, const world::World& world,
                    hands::ClaimTable& claims, std::vector<hands::ClaimEvent>& events);
 
-  // What holds a node holds its copy, too.
+  // A grasp that holds a node holds its copy, too.
   void add_copy(NodeIndex node, NodeIndex copy);
 
   void visit_state(world::StateArchive& archive, std::size_t node_count);

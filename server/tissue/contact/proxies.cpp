@@ -10,8 +10,8 @@ namespace {
 
 constexpr int kMaxPushesOut = 24;
 constexpr float kOutside_m = 1e-6f;
-// What may be left inside, in radii, of a tool that the surface holds from all sides; with more it
-// rather stays where it was.
+// So much of a tool, in radii, may be left inside where the surface holds it from all sides; with
+// more it rather stays where it was.
 constexpr float kLeftInside = 0.1f;
 // A tool walks at most by what it came nearer to its hand in the tick before and a fifth, and,
 // where it presses, as deep as its force still grows; else, so that one that is far behind its hand

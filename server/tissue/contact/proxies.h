@@ -27,7 +27,7 @@ struct Proxy {
   std::vector<Vec3f> anchors;            // m, tool frame; per point
 };
 
-// Of the tissue on the tool, world frame.
+// The tissue acts on the tool with this force and torque, in the world frame.
 struct Reaction {
   Vec3f force_n;
   Vec3f torque_nm;          // about the tip

@@ -50,8 +50,11 @@ Vec3f nearest_weights(const Vec3f& p, const Vec3f& a, const Vec3f& b, const Vec3
   }
   const float sum = va + vb + vc;
   if (!(sum > 0)) return {1, 0, 0};  // no area
-  const float v = vb / sum, w = vc / sum;
-  return {1 - v - w, v, w};
+  const float v = vb / sum, w = vc / sum, u = 1 - v - w;
+  if (u >= 0 && v >= 0 && w >= 0) return {u, v, w};
+  // Rounding puts a point beside an edge some 1e-8 outside: it is moved back onto the triangle.
+  const Vec3f inside{std::max(u, 0.0f), std::max(v, 0.0f), std::max(w, 0.0f)};
+  return inside / (inside.x + inside.y + inside.z);
 }
 
 }  // namespace
@@ -293,7 +296,8 @@ bool SelfContactFinder::stays(Site site, TriangleIndex triangle, const world::Wo
   if (!closest.triangle.is_valid()) return false;
   touch = touch_at(site, closest, world);
   // A little farther than where it began, so that it does not flutter.
-  return touch.facing < kStaysFacing &&
+  // Where neither side faces anywhere there is no normal, and nothing to press against.
+  return touch.facing < kStaysFacing && length_squared(touch.normal) > 0 &&
          touch.gap < margin_of(touch.closing) + 0.5f * kSelfMargin_m && touch.gap > -kDeepest_m &&
          lies_along(touch.aside, touch.gap);
 }

@@ -70,7 +70,7 @@ Surface::Surface(const organ::Organ& organ) {
     add_bundle(first, std::min(first + kBundleTriangles, order_.size()));
 }
 
-// Of order_.
+// Adds the bundle of these entries of order_.
 void Surface::add_bundle(std::size_t first, std::size_t last) {
   Bundle bundle{.first_triangle = static_cast<std::uint32_t>(first),
                 .last_triangle = static_cast<std::uint32_t>(last),

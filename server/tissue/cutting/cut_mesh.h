@@ -27,8 +27,8 @@ struct CutOutput {
   double work_j = 0;           // of blades, by the materials' energy per area
   double waiting_area_m2 = 0;  // of strokes that ended: faces that could not be opened
   std::uint32_t crossed_tets = 0, splits = 0, labels = 0, refused_splits = 0, pinch_splits = 0;
-  // Method::Nakao: tets of the paper's two patterns and other crossed ones; nodes outside the patch
-  // that came to its border and that could not.
+  // A splitter with patterns (Nakao 2003) counts tets of its two patterns and other crossed ones,
+  // and nodes outside the patch that came to its border or could not.
   std::uint32_t four_tets = 0, six_tets = 0, other_tets = 0, moved_nodes = 0, refused_moves = 0;
   std::uint32_t smoothed_nodes = 0;
   bool is_behind = false;  // work is left for the next call

@@ -6,7 +6,9 @@
 namespace trocar::cutting {
 
 Cutter::Cutter(dynamics::Topology& topology, const Settings& settings)
-    : strokes_(kMaxStrokes), mesh_(topology, settings, strokes_) {
+    : strokes_(kMaxStrokes),
+      mesh_(topology, settings, strokes_),
+      splitter_(settings.make_splitter ? settings.make_splitter() : std::make_unique<Splitter>()) {
   stroke_of_.fill(kNone);
 }
 
@@ -147,12 +149,9 @@ double Cutter::friction_along(std::span<const Vec3f> displacements, double trave
 bool Cutter::work(Stroke& stroke, std::uint32_t& budget) {
   while (stroke.motion.has_strip()) {
     if (budget == 0) return false;
-    const bool is_robust = mesh_.settings().method == Method::Robust;
-    const double extension = is_robust ? mesh_.settings().extension_h * stroke.h : 0;
     auto sides = stroke.side_normals;
-    make_patch(stroke.motion.strip(), extension, sides, stroke.patch);
-    const bool is_finished = is_robust ? splitter_.run(mesh_, stroke, stroke.patch, budget)
-                                       : nakao_splitter_.run(mesh_, stroke, stroke.patch, budget);
+    make_patch(stroke.motion.strip(), mesh_.settings().extension_h * stroke.h, sides, stroke.patch);
+    const bool is_finished = splitter_->run(mesh_, stroke, stroke.patch, budget);
     opening_.run(mesh_, stroke);
     if (!is_finished) return false;
     stroke.side_normals = sides;

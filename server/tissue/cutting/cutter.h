@@ -7,7 +7,7 @@
 // (splitter.h); wound faces are opened as far as the surface stays manifold (opening.h); nodes are
 // parted by topology alone (star.h). So at every return of cut():
 //   - every tet has a positive volume; its dihedral angles keep the floor, half of it where a
-//     pinch was repaired (Settings); Nakao's methods know no floor;
+//     pinch was repaired (Settings); a splitter of Settings' may know no floor;
 //   - every piece is a closed manifold solid; volume and mass are those of before, to rounding;
 //   - the edits listed in CutOutput, applied to a topology as it was before, make the one it is.
 // Paths are in the world and meet tissue where it is now; floors are of the shape at rest.
@@ -21,7 +21,6 @@
 // construction and destruction, except that tets and nodes may be removed while no stroke is on.
 
 #include "server/tissue/cutting/blade_friction.h"
-#include "server/tissue/cutting/nakao_splitter.h"
 #include "server/tissue/cutting/opening.h"
 #include "server/tissue/cutting/repair.h"
 #include "server/tissue/cutting/splitter.h"
@@ -85,8 +84,7 @@ class Cutter {
 
   std::vector<Stroke> strokes_;
   CutMesh mesh_;
-  Splitter splitter_;
-  NakaoSplitter nakao_splitter_;
+  std::unique_ptr<PatchSplitter> splitter_;
   Opening opening_;
   Repair repair_;
   BladeFriction friction_;

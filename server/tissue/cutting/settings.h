@@ -3,18 +3,15 @@
 // What a cut may do to the mesh. Lengths are in h, the local mean edge length of the uncut mesh.
 
 #include <cstdint>
+#include <memory>
 
 namespace trocar::cutting {
 
-enum class Method : std::uint8_t {
-  Robust,  // splitter.h
-  Nakao,   // Nakao 2003 as printed: nakao_splitter.h
-  // The same without what makes it adaptive: no node moves, no pattern is chosen.
-  NakaoPlain,
-};
+class PatchSplitter;
 
 struct Settings {
-  Method method = Method::Robust;
+  // Makes the method that splits tets; null: splitter.h.
+  std::unique_ptr<PatchSplitter> (*make_splitter)() = nullptr;
   double snap = 0.15;        // share of an edge: a crossing nearer to an end labels that end
   double extension_h = 0.3;  // how far the patch goes ahead of the blade and past its ends
   // Sine of 8 degrees. A mesh whose own worst angle is below it gets 0.9 of that instead.

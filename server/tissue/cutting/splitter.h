@@ -9,15 +9,15 @@
 // Repeating a patch changes nothing, because an edge with a labelled end is settled; so one that
 // could not be finished within a budget is simply begun again.
 
+#include "server/tissue/cutting/patch_splitter.h"
 #include "server/tissue/cutting/small_pieces.h"
 
 namespace trocar::cutting {
 
-class Splitter {
+class Splitter final : public PatchSplitter {
  public:
-  // Returns whether the patch is finished; takes what it did from `budget`.
   bool run(CutMesh& mesh, Stroke& stroke, std::span<const PatchTriangle> patch,
-           std::uint32_t& budget);
+           std::uint32_t& budget) override;
 
  private:
   struct Crossing {

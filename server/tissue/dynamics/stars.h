@@ -30,7 +30,7 @@ class Stars {
   // Of the bracket Psi - 2 C10 (J - 1), the part that is averaged; of the volumetric term all is.
   // With none tissue is too stiff, with all of it too soft, and nodes that move against each other
   // by turns meet no resistance. Found on bars, Cook's membrane and pressed livers of 250 to 4,400
-  // nodes (README).
+  // nodes (docs/validation.md).
   static constexpr double kAveragedBracket = 0.55;
 
   // A star that a node is in: its place among gradients(), and the node's b there, m^2.

@@ -48,7 +48,7 @@ struct ClaimEvent {
   ToolSlot holder;  // RefusedHeld: who holds it; TakenOver: who took it; else invalid
 };
 
-// What a tool asks for at the end of a tick.
+// A tool asks for this at the end of a tick.
 struct ClaimRequest {
   ToolSlot tool;
   tool::Verb verb = tool::Verb::None;

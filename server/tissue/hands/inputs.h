@@ -1,6 +1,6 @@
 #pragma once
 
-// What a tick takes from outside. A TickInputs is all that the network, scripts or a journal can
+// A tick takes these from outside. A TickInputs is all that the network, scripts or a journal can
 // say to the simulation; with TickDecisions it determines the next state to the bit.
 
 #include <array>
@@ -17,7 +17,7 @@ struct HandJoin {
   std::array<tool::ToolShape, kToolsPerHand> shapes;
 };
 
-// What an instructor may do to the organ as a whole.
+// An instructor may do this to the organ as a whole.
 enum class MarkAction : std::uint8_t {
   None = 0,
   Set = 1,     // marks it as it is, instead of the mark before

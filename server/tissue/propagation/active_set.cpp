@@ -13,7 +13,8 @@ void ActiveSet::collect(const PropagationQueue& queue, Boundary boundary, world:
   nodes_.clear();
   const bool stops_outer = boundary == Boundary::Frozen && world.boundary != boundary;
   if (!has_history_ || stops_outer) {
-    // Of a restored state, or about to stop nodes that moved: whoever is not at rest lingers.
+    // The state was restored, or nodes that moved are about to stop: whoever is not at rest
+    // lingers.
     before_.clear();
     for (std::uint32_t i = 0; i < world.node_count(); ++i) {
       auto& node_class = world.node_classes[i];

@@ -1,6 +1,6 @@
 #pragma once
 
-// Which nodes the solver sweeps most: the queue, then nodes that have left it a short while ago.
+// The solver sweeps these nodes most: the queue, then nodes that have left it a short while ago.
 //
 // Boundary::Frozen (the papers'): all other nodes stand still. A node that left the queue goes on
 // being swept and stops only when, for 100 ticks in a row, its residual force, speed and

@@ -37,7 +37,7 @@ class LayerLists {
 
   std::span<const NodeIndex> nodes() const { return nodes_; }
   std::size_t layer_count() const { return (begins_.size() - 1) / contact_capacity_; }
-  // Empty from layer_count() on.
+  // The list is empty from layer_count() on.
   std::span<const NodeIndex> layer(std::size_t layer) const {
     if (layer >= layer_count()) return {};
     return range(layer * contact_capacity_, (layer + 1) * contact_capacity_);

@@ -1,7 +1,7 @@
 #pragma once
 
-// Which nodes are next to which: the organ's table, and instead of its rows those of nodes that an
-// edit of the topology has changed since. Symmetric; rows ascending.
+// This table says which nodes are next to which: it is the organ's, and instead of its rows those
+// of nodes that an edit of the topology has changed since. Symmetric; rows ascending.
 
 #include "common/base/blocks.h"
 #include "common/base/index.h"
@@ -26,7 +26,7 @@ class Neighbours {
     return (*table_)[node];
   }
 
-  // Of a node of the table, or a new one. O(row), and O(nodes) the first time.
+  // Replaces the row of a node of the table, or of a new one. O(row), and O(nodes) the first time.
   void set(NodeIndex node, std::span<const NodeIndex> neighbours);
   // To be called after a number of set(): frees memory that rows have left.
   void tidy() { rows_.tidy(); }

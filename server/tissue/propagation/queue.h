@@ -62,7 +62,7 @@ class PropagationQueue {
     return label < whole_end_ ||
            (label != kNoLabel && node.value < share_ends_[propagation::contact_of(label)]);
   }
-  // kNoLayer if not in the queue.
+  // Returns kNoLayer if the node is not in the queue.
   std::uint32_t layer_of(NodeIndex node) const {
     return contains(node) ? propagation::layer_of(search_.label(node)) : kNoLayer;
   }

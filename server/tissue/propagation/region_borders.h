@@ -1,9 +1,9 @@
 #pragma once
 
-// Which contacts' regions overlap. Two contacts reach a common node within the depth limit, over
-// any number of contacts between them, exactly if a chain of edges leads from one's nodes to the
-// other's, each edge between nodes of two contacts and with an end that is not in the last layer:
-// the other end then lies within the depth of both. So the number of such edges per pair of
+// Finds which contacts' regions overlap. Two contacts reach a common node within the depth limit,
+// over any number of contacts between them, exactly if a chain of edges leads from one's nodes to
+// the other's, each edge between nodes of two contacts and with an end that is not in the last
+// layer: the other end then lies within the depth of both. So the number of such edges per pair of
 // contacts is kept, and only edges at changed nodes are counted anew.
 
 #include <cstdint>

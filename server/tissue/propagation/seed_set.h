@@ -1,7 +1,7 @@
 #pragma once
 
-// Which contact starts at which node, and what changed in that since the last call. A node that
-// several contacts touch belongs to the lowest. Seeds may come in any order and repeat.
+// The set knows which contact starts at which node, and what changed in that since the last call. A
+// node that several contacts touch belongs to the lowest. Seeds may come in any order and repeat.
 // O(seeds before + seeds now).
 
 #include <cstdint>
@@ -28,10 +28,10 @@ class SeedSet {
   bool equals(Seeds seeds) const;
   void replace(Seeds seeds);
 
-  // As given, contact after contact.
+  // Nodes stand as they were given, contact after contact.
   std::span<const NodeIndex> nodes() const { return nodes_; }
   std::uint16_t contact_of(NodeIndex node) const { return contacts_[node.value]; }
-  // Of the last replace(); each node once.
+  // These are the changes of the last replace(); each node is there once.
   std::span<const Change> changes() const { return changes_; }
 
  private:

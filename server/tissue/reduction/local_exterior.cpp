@@ -460,8 +460,9 @@ float LocalExterior::estimate_error(const dynamics::ExteriorStep& step, const wo
     if (!relaxed.empty()) left -= relaxed[node];
     energy += static_cast<double>(length_squared(left) / model.rim_stiffness()[i]);
   }
-  return static_cast<float>(
+  const auto estimate = static_cast<float>(
       std::sqrt(energy / (std::max(field_work_j_, contact_work_j_) + kLeastWork_j)));
+  return estimate < kBroken ? estimate : kBroken;  // finite: it is part of the state
 }
 
 float LocalExterior::end(const dynamics::ExteriorStep& step, dynamics::Float4* velocities,

@@ -74,6 +74,8 @@ class ExternalLoads {
   // Where force enters the tissue: propagation starts there as from a contact.
   std::span<const std::span<const NodeIndex>> seeds() const { return seeds_; }
   const LoadRules& rules() const { return rules_; }
+  // Nothing is displaced, loaded or watched: a tick without it does the same.
+  bool empty() const { return rules_.empty() && watched_.empty(); }
   // Asks for the force that holds these nodes, of the uncut organ. Returns its number.
   std::size_t watch(std::span<const NodeIndex> nodes);
   // After a solve with these loads, and before an edit of the topology.

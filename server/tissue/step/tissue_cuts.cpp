@@ -7,6 +7,7 @@
 #include "common/base/assert.h"
 #include "common/base/checksum.h"
 #include "server/tissue/cutting/event_codec.h"
+#include "server/tissue/world/surface_layout.h"
 
 namespace trocar::step {
 namespace {
@@ -30,7 +31,7 @@ TissueCuts::TissueCuts(const organ::Organ& organ)
     : topology_(organ),
       tearing_(organ),
       surface_(organ),
-      layout_(wire::make_surface_layout(organ)) {
+      layout_(world::make_surface_layout(organ)) {
   if (!organ.mesh.tets.empty() && !topology_.has_links())
     cutter_ = std::make_unique<cutting::Cutter>(topology_);
   first_pending_ = static_cast<std::uint32_t>(layout_.triangles.size());

@@ -14,7 +14,7 @@ std::int32_t to_grid(float metres) {
   return static_cast<std::int32_t>(v < 0 ? v - 0.5f : v + 0.5f);
 }
 
-// Of what was added, one after another (FNV-1a over its three numbers).
+// Folds a point into the hash of those added before it (FNV-1a over its three numbers).
 std::uint64_t folded(std::uint64_t hash, const GridPoint& point) {
   for (const auto v : {point.x, point.y, point.z})
     hash = (hash ^ static_cast<std::uint32_t>(v)) * 0x100000001b3u;

@@ -45,7 +45,7 @@ class FarPoses {
 
  private:
   void take(std::span<const Vec3f> displacements);
-  // Of the nodes that there were when the pose was taken, then of each that was added since.
+  // Hashes the nodes that there were when the pose was taken, then each that was added since.
   std::uint64_t hash_of(std::uint32_t number) const;
 
   std::uint32_t newest_ = 0, age_ = kInterval - 1;

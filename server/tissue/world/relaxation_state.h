@@ -1,8 +1,8 @@
 #pragma once
 
-// What tissue remembers of stresses that it has had (quasi-linear viscoelasticity, Dogan 2011 eq. 1
-// to 4): of tets, of the stars of nodes where strain is averaged, and per node the force of what
-// has relaxed, as of the step that took it last. Empty for organs of which nothing relaxes.
+// Tissue remembers stresses that it has had (quasi-linear viscoelasticity, Dogan 2011 eq. 1 to 4):
+// those of tets, of the stars of nodes where strain is averaged, and per node the force of what has
+// relaxed, as of the step that took it last. Empty for organs of which nothing relaxes.
 
 #include "common/base/index.h"
 #include "server/organs/organ/organ.h"

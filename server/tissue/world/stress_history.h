@@ -24,7 +24,7 @@ class StressHistory {
   using Steps = std::array<std::uint8_t, kPlaces>;
 
   StressHistory() = default;
-  // Of so many relaxation terms, at least one.
+  // There is at least one relaxation term.
   StressHistory(std::size_t terms, std::size_t places);
 
   bool is_empty() const { return tensors_ == 0; }
@@ -38,7 +38,7 @@ class StressHistory {
 
   // Counts a step.
   void begin_step() { ++step_; }
-  // Of all that there were, modulo 256.
+  // Returns the number of steps so far, modulo 256.
   std::uint8_t step() const { return step_; }
 
   // A block to be advanced to this step. Once its values are written, advanced() gives what

@@ -24,14 +24,14 @@ enum class NodeClass : std::uint8_t {
   Active = 2,  // in the queue, or not long ago
 };
 
-// What nodes outside the queue do.
+// Nodes outside the queue do one of these.
 enum class Boundary : std::uint8_t {
   Frozen = 0,  // They stand still (Choi 2002, Nakao 2003).
   Graded = 1,  // They move every tick, with fewer sweeps.
   Whole = 2,   // They are swept like the queue. Sessions never choose it: it takes too long.
 };
 
-// Of a node that a cut made: t/65536 of the way from a to b, which were there before it.
+// A cut made this node at t/65536 of the way from a to b, which were there before it.
 struct NodeOrigin {
   NodeIndex a, b;
   std::uint16_t t = 0;
@@ -45,14 +45,14 @@ struct World {
     return rest_positions[node.value] + displacements[node.value];
   }
 
-  // Constant in a session.
+  // The members below are constant in a session.
   std::vector<Vec3f> rest_positions;  // m, world frame
   std::vector<float> masses;          // kg
   std::vector<float> surface_areas;   // m^2 of boundary triangles per node, 0 inside
   std::vector<NodeIndex> surface_nodes;
   std::vector<NodeOrigin> origins;  // of the nodes beyond the organ's own
 
-  // State, in snapshot and hash.
+  // These are state, in snapshot and hash.
   Tick tick = 0;                         // ticks done
   Boundary boundary = Boundary::Frozen;  // of the last tick
   std::vector<Vec3f> displacements;      // m, from rest

@@ -1,0 +1,206 @@
+// trocar-journal: what a recorded session holds, and whether it simulates to the same bits again.
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include <cinttypes>
+#include <cstdio>
+
+#include "common/base/cpu.h"
+#include "common/base/log.h"
+#include "common/base/quote.h"
+#include "common/base/timing.h"
+#include "common/base/version.h"
+#include "common/journal/session_journal.h"
+#include "common/wire/role.h"
+#include "server/session/recording/verify.h"
+
+namespace trocar::app {
+namespace {
+
+constexpr const char* kProgram = "trocar-journal";
+
+std::string json_escaped(const std::string& text) {
+  std::string out;
+  for (const char c : text) {
+    if (c == '"' || c == '\\') out += '\\';
+    if (static_cast<unsigned char>(c) < 0x20)
+      out += ' ';
+    else
+      out += c;
+  }
+  return out;
+}
+
+int show_info(const std::string& path, bool as_json) {
+  auto journal = journal::SessionJournal::open(path);
+  if (!journal) return report(kProgram, journal.error());
+  const auto& info = (*journal)->info();
+  const auto& mcap = (*journal)->container();
+  const double seconds = static_cast<double>(info.last_tick) / static_cast<double>(kTicksPerSecond);
+  if (as_json) {
+    std::string reduction_hash = "null";
+    if (info.reduction) {
+      char text[19];
+      std::snprintf(text, sizeof text, "\"%016" PRIx64 "\"", info.reduction->hash);
+      reduction_hash = text;
+    }
+    std::printf("{\"seconds\": %.3f, \"last_tick\": %" PRIu64
+                ", \"sim_version\": %u, \"protocol\": \"%s\", \"organ\": \"%s\", "
+                "\"finished\": %s, \"gap_messages\": %" PRIu64
+                ", \"reduction_hash\": %s, "
+                "\"channels\": {",
+                seconds, info.last_tick, info.sim_version, info.protocol.c_str(),
+                json_escaped(info.organ_name).c_str(), info.is_finished ? "true" : "false",
+                info.gap_messages, reduction_hash.c_str());
+    const char* separator = "";
+    for (const auto& [id, channel] : mcap.channels()) {
+      const auto count = mcap.statistics().channel_message_counts.find(id);
+      std::printf("%s\"%s\": %" PRIu64, separator, json_escaped(channel.topic).c_str(),
+                  count == mcap.statistics().channel_message_counts.end() ? 0 : count->second);
+      separator = ", ";
+    }
+    std::printf("}}\n");
+    return 0;
+  }
+  std::printf("%s\n", path.c_str());
+  std::printf("  %s\n", info.summary.c_str());
+  std::printf("  organ        %s (hash %016" PRIx64 ")\n", info.organ_name.c_str(),
+              info.organ_hash);
+  if (info.reduction)
+    std::printf("  reduction    %s (hash %016" PRIx64 "): %s\n", info.reduction->file.c_str(),
+                info.reduction->hash, info.reduction->source.c_str());
+  std::printf("  length       %.1f s, %" PRIu64 " ticks\n", seconds, info.last_tick);
+  std::printf("  sim_version  %u%s, protocol %s\n", info.sim_version,
+              info.sim_version == kSimVersion ? "" : " (this program has another)",
+              info.protocol.c_str());
+  std::printf("  participants %zu\n", info.participants.size());
+  for (const auto& participant : info.participants)
+    std::printf("    %-24s %s\n", participant.name().c_str(),
+                wire::name_of(wire::role_of(participant.role())));
+  std::printf("  channels\n");
+  for (const auto& [id, channel] : mcap.channels()) {
+    const auto count = mcap.statistics().channel_message_counts.find(id);
+    std::printf("    %-24s %8" PRIu64 " messages\n", channel.topic.c_str(),
+                count == mcap.statistics().channel_message_counts.end() ? 0 : count->second);
+  }
+  if (info.gap_messages > 0)
+    std::printf("  gaps         %" PRIu64 " frames were dropped while recording\n",
+                info.gap_messages);
+  return 0;
+}
+
+std::string json_of(const recording::VerifyReport& r) {
+  std::string difference = "null", reasons;
+  if (r.first_difference)
+    difference = fmt::format(
+        R"({{"tick": {}, "channel": {}, "field": {}, "recorded": {}, "simulated": {}}})",
+        r.first_difference->tick, quote(r.first_difference->channel),
+        quote(r.first_difference->field), quote(r.first_difference->recorded),
+        quote(r.first_difference->simulated));
+  for (const auto& reason : r.reasons) reasons += (reasons.empty() ? "" : ", ") + quote(reason);
+  return fmt::format(
+      R"({{"verified": {}, "verdict": "{}", "reasons": [{}], "reasons_left_out": {},
+"first_difference": {},
+"resimulated": {}, "first_tick": {}, "last_tick": {}, "ticks_verified": {}, "ticks_missing": {},
+"ticks_not_simulated": {}, "frames_verified": {}, "surfaces_verified": {}, "surfaces_decoded": {},
+"snapshots_verified": {}, "snapshots_continued": {}, "participants_verified": {},
+"damaged_chunks": {}, "last_hash": "{:016x}", "container": {}}}
+)",
+      r.verdict() == recording::Verdict::Verified, recording::name_of(r.verdict()), reasons,
+      r.reasons_left_out, difference, r.is_resimulated, r.first_tick, r.last_tick, r.ticks_verified,
+      r.ticks_missing, r.ticks_not_simulated, r.frames_verified, r.surfaces_verified,
+      r.surfaces_decoded, r.snapshots_verified, r.snapshots_continued, r.participants_verified,
+      r.damaged_chunks, r.last_hash, quote(r.container));
+}
+
+std::string text_of(const std::string& path, const recording::VerifyReport& r) {
+  std::string out = fmt::format(
+      "{}: {}\n"
+      "{} of {} ticks simulated again with equal hashes, {} missing; equal: {} frames with tools "
+      "and "
+      "claims, {} surfaces ({} decoded), {} snapshots ({} restored and continued), participants in "
+      "{} frames\n",
+      path, r.container, r.ticks_verified, r.last_tick, r.ticks_missing, r.frames_verified,
+      r.surfaces_verified, r.surfaces_decoded, r.snapshots_verified, r.snapshots_continued,
+      r.participants_verified);
+  out += r.why();
+  if (r.verdict() == recording::Verdict::Verified)
+    out += fmt::format("verified to tick {}, hash {:016x}\n", r.last_tick, r.last_hash);
+  return out;
+}
+
+int verify(const std::string& path, const std::string& reduction_file, bool as_json) {
+  const std::uint64_t started = monotonic_ns();
+  bool is_progress_shown = false;
+  auto verified = recording::verify_journal(
+      path,
+      [&](Tick tick, Tick last) {
+        if (as_json || monotonic_ns() - started < 2'000'000'000u) return;
+        is_progress_shown = true;
+        std::fprintf(stderr, "\r%s: %" PRIu64 " of %" PRIu64 " s", kProgram, tick / kTicksPerSecond,
+                     last / kTicksPerSecond);
+      },
+      reduction_file);
+  if (is_progress_shown) std::fprintf(stderr, "\n");
+  if (!verified) return report(kProgram, verified.error());
+  std::fputs(as_json ? json_of(*verified).c_str() : text_of(path, *verified).c_str(), stdout);
+  switch (verified->verdict()) {
+    case recording::Verdict::Verified:
+      return static_cast<int>(ExitCode::Ok);
+    case recording::Verdict::Different:
+      return static_cast<int>(ExitCode::Mismatch);
+    case recording::Verdict::NotVerified:
+      return static_cast<int>(ExitCode::NotVerified);
+  }
+  return static_cast<int>(ExitCode::NotVerified);
+}
+
+int run(int argc, char** argv) {
+  CLI::App app{"Looks into recorded Trocar sessions (.mcap).", kProgram};
+  app.footer(
+      "Examples:\n"
+      "  trocar-journal info out/demo/session.mcap     who, how long, which channels\n"
+      "  trocar-journal verify out/demo/session.mcap   simulate again, name the first difference\n"
+      "  trocar-journal verify session.mcap --reduction liver.reduction\n"
+      "                                                the same for a session that had a "
+      "reduction\n"
+      "Exit codes: 0 verified, 1 difference found, 2 usage, 3 file cannot be read, 6 not all "
+      "could\n"
+      "be verified, though nothing differs: the reasons are printed.");
+  app.require_subcommand(1);
+  std::string log_level = "warn", path;
+  bool as_json = false;
+  app.set_version_flag("--version", std::string(kProgram) + " " + kVersion + ", sim_version " +
+                                        std::to_string(kSimVersion) + ", protocol " +
+                                        std::to_string(kProtocolMajor) + "." +
+                                        std::to_string(kProtocolMinor));
+  app.add_option("--log-level", log_level, "error, warn, info, debug or off")
+      ->capture_default_str();
+  auto* info = app.add_subcommand("info", "Show what the journal holds");
+  auto* check =
+      app.add_subcommand("verify", "Simulate the session again and compare all that it says");
+  for (auto* command : {info, check}) {
+    command->add_option("FILE", path, "a journal (.mcap)")->required();
+    command->add_flag("--json", as_json, "print one JSON object");
+  }
+  std::string reduction_file;
+  check->add_option("--reduction", reduction_file, "of the session, if it had one")
+      ->type_name("FILE");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    const int code = app.exit(e);
+    return code == 0 ? 0 : static_cast<int>(ExitCode::Usage);
+  }
+  if (auto s = log::configure(kProgram, log_level); !s) return report(kProgram, s.error());
+  return check->parsed() ? verify(path, reduction_file, as_json) : show_info(path, as_json);
+}
+
+}  // namespace
+}  // namespace trocar::app
+
+int main(int argc, char** argv) {
+  trocar::require_cpu_features(trocar::app::kProgram);
+  return trocar::app::run(argc, argv);
+}

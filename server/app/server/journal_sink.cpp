@@ -1,0 +1,47 @@
+#include "server/app/server/journal_sink.h"
+
+#include <ctime>
+
+#include "server/session/recording/recorder.h"
+
+namespace trocar::app {
+namespace {
+
+class RecordedSession : public JournalSink {
+ public:
+  explicit RecordedSession(std::unique_ptr<recording::Recorder> recorder)
+      : recorder_(std::move(recorder)) {}
+
+  void take_frame(const step::SharedFrame& frame) override { recorder_->take_frame(frame); }
+  void take_participants(const std::vector<participants::Participant>& present,
+                         Tick tick) override {
+    recorder_->take_participants(present, tick);
+  }
+  Status close() override { return recorder_->close(); }
+  wire::RecordingState state() const override { return recorder_->state(); }
+
+ private:
+  std::unique_ptr<recording::Recorder> recorder_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<JournalSink>> open_journal(
+    const std::string& path, const organ::Organ& organ, const wire::SurfaceLayout& layout,
+    const std::optional<journal::ReductionDescription>& reduction) {
+  if (path == "none") return std::unique_ptr<JournalSink>();
+  auto recorder = recording::Recorder::create(path, organ, layout, reduction);
+  if (!recorder) return recorder.error();
+  return std::unique_ptr<JournalSink>(std::make_unique<RecordedSession>(std::move(*recorder)));
+}
+
+std::string default_journal_path() {
+  const std::time_t now = std::time(nullptr);
+  std::tm utc{};
+  gmtime_r(&now, &utc);
+  char text[64];
+  std::strftime(text, sizeof text, "./trocar-%Y%m%dT%H%M%SZ.mcap", &utc);
+  return text;
+}
+
+}  // namespace trocar::app

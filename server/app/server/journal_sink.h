@@ -1,0 +1,43 @@
+#pragma once
+
+// A session is recorded through this sink: it is the seam between the server's threads and its
+// journal. Nothing here may block: an implementation queues and lets a thread of its own write.
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/journal/session_topics.h"
+#include "common/wire/recording_state.h"
+#include "common/wire/surface_layout.h"
+#include "server/organs/organ/organ.h"
+#include "server/session/participants/roster.h"
+#include "server/tissue/step/published_frame.h"
+
+namespace trocar::app {
+
+class JournalSink {
+ public:
+  virtual ~JournalSink() = default;
+  // Simulation thread: every published frame, with records of its ticks and, now and then, a
+  // snapshot. The first frame has the snapshot of tick 0.
+  virtual void take_frame(const step::SharedFrame& frame) = 0;
+  // I/O thread: who is here, after each change. `tick` is that of the newest frame.
+  virtual void take_participants(const std::vector<participants::Participant>& present,
+                                 Tick tick) = 0;
+  // I/O thread, after the simulation thread has ended.
+  virtual Status close() = 0;
+  // Any thread, at any time: whether everything has been recorded so far.
+  virtual wire::RecordingState state() const = 0;
+};
+
+// A journal at `path`, or none for "none" (then null). reduction: of the session, if it has one.
+Result<std::unique_ptr<JournalSink>> open_journal(
+    const std::string& path, const organ::Organ& organ, const wire::SurfaceLayout& layout,
+    const std::optional<journal::ReductionDescription>& reduction = {});
+
+// "./trocar-20261121T135400Z.mcap"
+std::string default_journal_path();
+
+}  // namespace trocar::app

@@ -1,0 +1,157 @@
+#include "server/app/server/options.h"
+
+#include <CLI/CLI.hpp>
+#include <charconv>
+
+#include "common/base/version.h"
+#include "common/base/workers.h"
+#include "server/app/server/journal_sink.h"
+#include "server/tissue/step/simulation.h"
+
+namespace trocar::app {
+namespace {
+
+constexpr const char* kExamples = R"(
+Examples:
+  trocar-server
+      the built-in liver at 127.0.0.1:7690, for programs on this machine
+  trocar-server --organ lattice --listen 0.0.0.0:7690
+      a block of springs, for everybody on the network (there is no access control yet)
+  trocar-server --organ liver.organ --sweeps 6 --budget 0.6
+      up to six passes, as long as a tick takes no more than 0.6 ms
+  trocar-server --organ liver --reduction liver.reduction
+      where the reduced model fits what is touched, it moves the tissue beyond; made with
+      trocar-organ reduce liver --method local
+  trocar-server --seconds 20 --summary out/summary.json --journal out/session.mcap
+      20 simulated seconds, then the replicas are compared, and the figures written
+
+Ctrl-C or SIGTERM: everybody is asked for the CRC of what they show, told goodbye, and the journal
+is closed. Exit codes: 0 ok, 2 command line, 3 bad file, 5 port taken or processor too old.
+)";
+
+std::string version_text() {
+  return std::string("trocar-server ") + kVersion + ", sim_version " + std::to_string(kSimVersion) +
+         ", protocol " + std::to_string(kProtocolMajor) + "." + std::to_string(kProtocolMinor);
+}
+
+struct ResearchOptions {
+  bool is_frozen = false;
+  const CLI::Option* depth = nullptr;
+};
+
+// A lesson needs none of these, so --help shows them last, under a heading of their own.
+void add_research_options(CLI::App& app, ServerOptions& options, ResearchOptions& more) {
+  auto* research = app.add_option_group("Research", "the solver's settings");
+  research->add_flag("--averaged-strain", options.has_averaged_strain,
+                     "average the strain of its tets over nodes: forces near those of refined "
+                     "elements instead of up to 40 % too stiff, at three times the time of a tick");
+  research->add_flag("--frozen", more.is_frozen,
+                     "tissue beyond the limits stands still, as in the papers, "
+                     "instead of moving with fewer sweeps");
+  research->add_flag("--fixed-decisions", options.has_fixed_decisions,
+                     "always do as --nodes and --sweeps say; otherwise they are the most, and less "
+                     "is done when a tick would take longer than --budget");
+  research
+      ->add_option("--budget", options.budget_ms, "of each millisecond, how much the tick may take")
+      ->type_name("MS")
+      ->check(CLI::Range(0.05, 1.0))
+      ->capture_default_str();
+  more.depth =
+      research->add_option("--depth", options.decisions.depth_limit,
+                           "layers around each contact that get all sweeps [3, frozen: 6]");
+  research
+      ->add_option("--nodes", options.decisions.node_limit, "nodes that all forces together reach")
+      ->capture_default_str();
+  research->add_option("--sweeps", options.decisions.sweeps, "passes of the solver per tick")
+      ->capture_default_str();
+  research->add_option("--omega", options.decisions.over_relaxation, "over-relaxation, 1 to 1.9")
+      ->capture_default_str();
+  research
+      ->add_option("--far-sweeps", options.decisions.far_sweeps,
+                   "passes per tick for the rest of the organ, 0: as many as the organ needs")
+      ->capture_default_str();
+  research->add_flag("--exact-far", options.decisions.is_far_exact,
+                     "forces in the rest of the organ from its material law, not from matrices "
+                     "that are renewed every 64 ticks");
+  research
+      ->add_option("--ready-file", options.ready_file, "write the port to this file when listening")
+      ->type_name("FILE");
+}
+
+}  // namespace
+
+Status parse_listen_address(const std::string& text, ServerOptions& options) {
+  const Error bad{ErrorCode::Usage,
+                  "--listen: '" + text + "' is not ADDRESS:PORT, such as 127.0.0.1:7690"};
+  const auto colon = text.rfind(':');
+  if (colon == std::string::npos || colon == 0) return bad;
+  std::string address = text.substr(0, colon);
+  if (address.starts_with('[') && address.ends_with(']'))
+    address = address.substr(1, address.size() - 2);
+  std::uint16_t port = 0;
+  const char* end = text.data() + text.size();
+  const auto parsed = std::from_chars(text.data() + colon + 1, end, port);
+  if (address.empty() || parsed.ec != std::errc{} || parsed.ptr != end) return bad;
+  options.address = std::move(address);
+  options.port = port;
+  return {};
+}
+
+Result<std::optional<ServerOptions>> parse_command_line(int argc, char** argv) {
+  ServerOptions options;
+  std::string listen = "127.0.0.1:7690";
+  CLI::App app(
+      "Hosts one session: one organ, simulated 1000 times per second, shared by up to 16 "
+      "people with tools and 100 who watch.",
+      "trocar-server");
+  app.footer(kExamples);
+  app.set_version_flag("--version", version_text());
+  app.add_option("--organ", options.organ,
+                 "built-in organ (liver, elastic-liver, lattice, plate, stomach, chest), an .organ "
+                 "file or a .msh mesh")
+      ->type_name("NAME|FILE")
+      ->capture_default_str();
+  app.add_option("--listen", listen, "where to listen; port 0 takes any free one")
+      ->type_name("ADDR:PORT")
+      ->capture_default_str();
+  app.add_option("--journal", options.journal,
+                 "file to record the session in, or none [./trocar-<UTC>.mcap]")
+      ->type_name("FILE");
+  app.add_option("--seconds", options.seconds, "end after this many simulated seconds")
+      ->type_name("N")
+      ->check(CLI::Range(0.0, 1e9));
+  app.add_option("--summary", options.summary_file, "write figures of the run as JSON at the end")
+      ->type_name("FILE");
+  app.add_option(
+         "--reduction", options.reduction_file,
+         "local reduction of that organ (trocar-organ reduce --method local): moves the "
+         "tissue beyond what is touched where it fits, the full solver elsewhere; clients may "
+         "see the full solution as a ghost, which takes about a core meanwhile")
+      ->type_name("FILE");
+  app.add_option("--workers", options.workers, "threads that share a tick's work")
+      ->check(CLI::Range(1u, kMaxWorkers))
+      ->capture_default_str();
+  app.add_option("--log-level", options.log_level, "error, warn, info, debug or off")
+      ->capture_default_str();
+  ResearchOptions research;
+  add_research_options(app, options, research);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) {
+      app.exit(error);
+      return std::optional<ServerOptions>();
+    }
+    return Error{ErrorCode::Usage, std::string(error.what()) + " (see --help)"};
+  }
+  if (research.is_frozen) {
+    options.decisions.boundary = world::Boundary::Frozen;
+    if (research.depth->count() == 0) options.decisions.depth_limit = step::kFrozenDepthLimit;
+  }
+  if (const auto parsed = parse_listen_address(listen, options); !parsed) return parsed.error();
+  if (const auto valid = step::validate(options.decisions); !valid) return valid.error();
+  if (options.journal.empty()) options.journal = default_journal_path();
+  return std::optional(std::move(options));
+}
+
+}  // namespace trocar::app

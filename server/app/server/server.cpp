@@ -1,0 +1,319 @@
+#include "server/app/server/server.h"
+
+#include "common/base/asio.h"  // before Boost: see there
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/signal_set.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <filesystem>
+#include <functional>
+#include <vector>
+
+#include "common/base/log.h"
+#include "common/base/text_file.h"
+#include "common/base/timing.h"
+#include "server/app/server/simulation_loop.h"
+#include "server/app/server/summary.h"
+#include "server/organs/catalogue/load_organ.h"
+#include "server/organs/organ/average_strain.h"
+#include "server/organs/organ/local_reduction_file.h"
+#include "server/session/ghost/ghost.h"
+#include "server/session/net/tcp_server.h"
+#include "server/session/replication/messages.h"
+#include "server/session/replication/replicator.h"
+
+namespace trocar::app {
+namespace {
+
+using std::chrono::milliseconds;
+constexpr milliseconds kBarrierDeadline{2000};
+constexpr milliseconds kGoodbyeDeadline{2500};  // a little more than the flush deadline
+constexpr milliseconds kPollPeriod{5};
+// Slower than this is said in the log, once in a while.
+constexpr float kSlowTimeRate = 0.98f;
+constexpr float kLongTickMs = 0.9f;
+constexpr std::uintmax_t kLongFileBytes = 50'000'000;  // takes more than a second or two
+constexpr Tick kWarningPeriod = 10 * kTicksPerSecond;
+
+Tick ticks_of(double seconds) {
+  return static_cast<Tick>(std::llround(seconds * static_cast<double>(kTicksPerSecond)));
+}
+
+// A session has these of --reduction; it has neither without one.
+struct Reduction {
+  std::shared_ptr<const organ::LocalReduction> model;
+  std::optional<journal::ReductionDescription> description;
+};
+
+Result<Reduction> read_reduction(const std::string& file, const organ::Organ& organ) {
+  if (file.empty()) return Reduction();
+  auto model = organ::read_session_reduction(file, organ);
+  if (!model) return model.error();
+  journal::ReductionDescription description{organ::reduction_hash(*model),
+                                            std::filesystem::path(file).filename().string(),
+                                            model->source};
+  return Reduction{std::make_shared<organ::LocalReduction>(std::move(*model)),
+                   std::move(description)};
+}
+
+class Server {
+ public:
+  Server(const ServerOptions& options, organ::Organ organ, Reduction reduction)
+      : options_(options),
+        reduction_(std::move(reduction.description)),
+        simulation_(std::move(organ), options.workers, std::move(reduction.model)) {}
+
+  // Binds the port and opens the journal.
+  Status open();
+  // Until the session has ended.
+  Status run();
+
+ private:
+  LoopOptions loop_options() const;
+  void take_frames();
+  void take_ghost(std::shared_ptr<const ghost::GhostReport> report);
+  void warn_if_slow();
+  void on_signal(int signal);
+  void begin_end();
+  // Calls `then` when `is_done` holds, at the latest after `deadline`.
+  void wait_for(std::function<bool()> is_done, milliseconds deadline, std::function<void()> then);
+  void say_goodbye();
+  Status finish();
+
+  const ServerOptions& options_;
+  const std::optional<journal::ReductionDescription> reduction_;
+  step::Simulation simulation_;
+  std::unique_ptr<JournalSink> journal_;
+  participants::SimulationInbox inbox_;
+  asio::io_context io_{1};
+  asio::signal_set signals_{io_};
+  asio::steady_timer poll_{io_};
+  std::unique_ptr<net::TcpServer> tcp_;
+  std::unique_ptr<replication::Replicator> replicator_;
+  FrameHandover handover_{[this] { asio::post(io_, [this] { take_frames(); }); }};
+  std::vector<step::SharedFrame> frames_;
+  std::atomic<std::shared_ptr<const ghost::GhostReport>> ghost_report_;  // the newest; null: taken
+  std::vector<replication::BarrierResult> barrier_;
+  bool is_ending_ = false;
+  Tick next_warning_ = 0;
+  double wall_seconds_ = 0;
+  std::unique_ptr<SimulationLoop> loop_;  // its thread uses what stands above
+  std::unique_ptr<ghost::Ghost> ghost_;   // likewise; of sessions with a reduction
+};
+
+Status Server::open() {
+  const auto& organ = simulation_.organ();
+  const auto& layout = simulation_.layout();
+  net::TcpServerOptions tcp{.address = options_.address, .port = options_.port};
+  // Topology and a keyframe of about that size must fit at once for somebody who joins, and for
+  // everybody after a return to a mark; cuts make the surface larger.
+  const auto topology_bytes = replication::encode_topology(layout, organ.name)->size();
+  tcp.outbox_bytes = std::max(tcp.outbox_bytes, 8 * topology_bytes);
+  auto listening = net::TcpServer::listen(io_, tcp);
+  if (!listening) return listening.error();
+  tcp_ = std::move(*listening);
+
+  auto journal = open_journal(options_.journal, organ, layout, reduction_);
+  if (!journal) return journal.error();
+  journal_ = std::move(*journal);
+
+  replication::ReplicatorOptions replication;
+  if (journal_)
+    replication.on_participants = [this](const auto& present, Tick tick) {
+      journal_->take_participants(present, tick);
+    };
+  if (reduction_)
+    replication.on_ghost_wanted = [this](bool is_wanted) { ghost_->set_wanted(is_wanted); };
+  replicator_ = std::make_unique<replication::Replicator>(
+      *tcp_, inbox_, layout, organ.name, organ::organ_hash(organ), std::move(replication));
+  if (journal_) replicator_->set_recording(journal_->state());
+  loop_ = std::make_unique<SimulationLoop>(simulation_, inbox_, handover_, journal_.get(),
+                                           loop_options(),
+                                           [this] { asio::post(io_, [this] { begin_end(); }); });
+  if (reduction_)
+    ghost_ = std::make_unique<ghost::Ghost>(
+        simulation_, ghost::GhostOptions{options_.decisions, [this] { loop_->request_snapshot(); },
+                                         [this](auto report) { take_ghost(std::move(report)); }});
+  return {};
+}
+
+LoopOptions Server::loop_options() const {
+  const auto& decisions = options_.decisions;
+  LoopOptions loop{.decisions = decisions, .tick_count = ticks_of(options_.seconds)};
+  if (options_.has_fixed_decisions) return loop;
+  control::RateLimits rate{.highest = decisions, .budget_us = options_.budget_ms * 1e3};
+  // Nodes of the queue are not swept less than those outside it.
+  if (decisions.boundary == world::Boundary::Graded) {
+    rate.layer_sweeps = simulation_.context().far_plan.with_sweeps(decisions.far_sweeps).sweeps;
+    rate.far_interval = control::kLongestFarInterval;
+  }
+  loop.rate = rate;
+  return loop;
+}
+
+Status Server::run() {
+  const auto begin = monotonic_ns();
+  boost::system::error_code ignored;
+  signals_.add(SIGINT, ignored);
+  signals_.add(SIGTERM, ignored);
+  signals_.async_wait([this](boost::system::error_code error, int signal) {
+    if (!error) on_signal(signal);
+  });
+  tcp_->start(*replicator_);
+  if (!options_.ready_file.empty())
+    if (const auto written =
+            write_text_file(options_.ready_file, std::to_string(tcp_->port()) + "\n");
+        !written)
+      return written;
+  log::info("{} ({} nodes) at {}:{}, Ctrl-C ends the session", simulation_.organ().name,
+            simulation_.organ().mesh.node_count(), options_.address, tcp_->port());
+  loop_->start();
+  const Status ran = net::run(io_);
+  if (!ran.ok()) {
+    log::error("{}", ran.error().message);
+    loop_->stop();  // what has been simulated is in the recording
+  }
+  wall_seconds_ = static_cast<double>(monotonic_ns() - begin) * 1e-9;
+  const Status finished = finish();
+  return ran.ok() ? finished : ran;
+}
+
+void Server::on_signal(int signal) {
+  log::info("{}: ending the session", signal == SIGINT ? "Ctrl-C" : "SIGTERM");
+  loop_->request_stop();
+  signals_.cancel();
+  signals_.clear();  // a second one ends the process at once
+}
+
+void Server::take_frames() {
+  if (is_ending_) return;
+  if (journal_) replicator_->set_recording(journal_->state());
+  handover_.take_all(frames_);
+  replicator_->publish(frames_);
+  if (ghost_) ghost_->take_frames(frames_);
+  for (const auto& frame : frames_)
+    for (const auto& [tick, solver] : frame->solver_changes)
+      log::debug("tick {}: solver {}", tick, replication::describe(solver));
+  warn_if_slow();
+}
+
+// On the ghost's thread. Of reports that the I/O thread has not seen yet the newest counts.
+void Server::take_ghost(std::shared_ptr<const ghost::GhostReport> report) {
+  if (ghost_report_.exchange(std::move(report))) return;
+  asio::post(io_, [this] {
+    const auto newest = ghost_report_.exchange(nullptr);
+    if (!is_ending_) replicator_->publish(*newest);
+  });
+}
+
+void Server::warn_if_slow() {
+  if (frames_.empty()) return;
+  const auto& frame = *frames_.back();
+  const auto& rate = frame.statistics.rate;
+  if (rate.time_rate > kSlowTimeRate || frame.tick < next_warning_) return;
+  next_warning_ = frame.tick + kWarningPeriod;
+  const auto tick_ms = frame.statistics.tick_median_us * 1e-3f;
+  log::warn(
+      "simulated time runs at {:.0f} % of real time: {}", 100 * rate.time_rate,
+      tick_ms > kLongTickMs
+          ? fmt::format("a tick takes {:.2f} ms (a smaller organ or --workers helps)", tick_ms)
+          : std::string("ticks are held up, perhaps by other programs"));
+}
+
+void Server::begin_end() {
+  take_frames();
+  is_ending_ = true;
+  if (ghost_) ghost_->set_wanted(false);
+  signals_.cancel();
+  tcp_->stop_accepting();
+  replicator_->begin_barrier(loop_->report().last_frame);
+  wait_for([this] { return replicator_->is_barrier_complete(); }, kBarrierDeadline,
+           [this] { say_goodbye(); });
+}
+
+void Server::say_goodbye() {
+  barrier_ = replicator_->barrier_results();
+  replicator_->end_all(replication::EndReason::ServerClosing, "the session is over");
+  wait_for([this] { return tcp_->connection_count() == 0; }, kGoodbyeDeadline,
+           [this] { io_.stop(); });
+}
+
+void Server::wait_for(std::function<bool()> is_done, milliseconds deadline,
+                      std::function<void()> then) {
+  if (is_done() || deadline <= milliseconds::zero()) return then();
+  poll_.expires_after(kPollPeriod);
+  poll_.async_wait([this, is_done, deadline, then](boost::system::error_code error) {
+    if (!error) wait_for(is_done, deadline - kPollPeriod, then);
+  });
+}
+
+Status Server::finish() {
+  Status closed;
+  if (journal_) closed = journal_->close();
+  const auto& report = loop_->report();
+  std::size_t equal = 0;
+  for (const auto& result : barrier_) equal += result.is_equal;
+  log::info("{:.3f} s simulated in {:.3f} s, {} slow ticks, {} of {} replicas equal",
+            static_cast<double>(report.ticks) / static_cast<double>(kTicksPerSecond), wall_seconds_,
+            report.slow_ticks, equal, barrier_.size());
+  if (handover_.dropped() > 0)
+    log::warn("{} frames never reached the clients: the network thread was stuck",
+              handover_.dropped());
+  if (options_.summary_file.empty()) return closed;
+  const wire::RecordingState not_recorded{
+      .status = wire::RecordingStatus::Off, .frames_missing = 0, .text = {}};
+  const Summary summary{.organ = simulation_.organ().name,
+                        .node_count = simulation_.organ().mesh.node_count(),
+                        .surface_vertex_count = simulation_.layout().vertex_count(),
+                        .wall_seconds = wall_seconds_,
+                        .journal = journal_ ? options_.journal : "none",
+                        .recording = journal_ ? journal_->state() : not_recorded,
+                        .reduction = reduction_,
+                        .frames_lost = handover_.dropped(),
+                        .loop = report,
+                        .barrier = barrier_,
+                        .replication = replicator_->counters(),
+                        .encoding = replicator_->encode_statistics(),
+                        .tcp = tcp_->counters(),
+                        .inbox = inbox_.counters(),
+                        .ghost = ghost_ ? ghost_->counters() : ghost::GhostCounters{}};
+  const auto written = write_text_file(options_.summary_file, to_json(summary));
+  return closed ? written : closed;
+}
+
+}  // namespace
+
+Status run_server(const ServerOptions& options) {
+  auto organ = catalogue::load_organ(options.organ);
+  if (!organ) return organ.error();
+  if (options.has_averaged_strain)
+    if (const auto averaged = organ::average_strain(*organ); !averaged) return averaged;
+  const auto begin = monotonic_ns();
+  std::error_code no_size;  // then reading says what is wrong
+  const auto file_bytes = options.reduction_file.empty()
+                              ? 0
+                              : std::filesystem::file_size(options.reduction_file, no_size);
+  if (!no_size && file_bytes > kLongFileBytes)
+    log::info("reading {}: {:.0f} MB", options.reduction_file,
+              static_cast<double>(file_bytes) * 1e-6);
+  auto reduction = read_reduction(options.reduction_file, *organ);
+  if (!reduction) return reduction.error();
+  const auto model = reduction->model;
+  const auto server = std::make_unique<Server>(options, std::move(*organ), std::move(*reduction));
+  if (model)
+    log::info("{}: {} patches, {:.1f} MB, ready in {:.1f} s", options.reduction_file,
+              model->patches.size(), static_cast<double>(file_bytes) * 1e-6,
+              static_cast<double>(monotonic_ns() - begin) * 1e-9);
+  if (const auto opened = server->open(); !opened) return opened;
+  return server->run();
+}
+
+}  // namespace trocar::app

@@ -1,0 +1,189 @@
+#include "server/app/server/simulation_loop.h"
+
+#include <sys/prctl.h>
+
+#include <algorithm>
+#include <ctime>
+
+namespace trocar::app {
+namespace {
+
+// A snapshot every 10 s and when one is asked for, in the middle between two publications:
+// publishing changes the hysteresis of the quantisation after the tick's hash was taken.
+constexpr Tick kSnapshotPeriod = 10'000;
+constexpr Tick kSnapshotPhase = kTicksPerFrame / 2;
+constexpr unsigned long kTimerSlackNs = 1000;
+
+void sleep_until(std::uint64_t monotonic) {
+  const timespec until{static_cast<time_t>(monotonic / 1'000'000'000),
+                       static_cast<long>(monotonic % 1'000'000'000)};
+  while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr) == EINTR) {
+  }
+}
+
+}  // namespace
+
+void StageTimes::add(const step::TickReport& report) {
+  std::uint64_t total = 0;
+  for (std::size_t i = 0; i < stages.size(); ++i) {
+    total += report.stage_cpu_ns[i];
+    const bool has_run =
+        i != static_cast<std::size_t>(step::Stage::Publish) || publishes_frame(report.tick);
+    if (has_run) stages[i].add(report.stage_cpu_ns[i]);
+  }
+  tick.add(total);
+}
+
+void StageTimes::clear() {
+  for (auto& stage : stages) stage.clear();
+  tick.clear();
+}
+
+step::StageStatistics StageTimes::statistics() const {
+  step::StageStatistics result;
+  for (std::size_t i = 0; i < stages.size(); ++i) {
+    result.median_us[i] = static_cast<float>(stages[i].quantile_us(0.5));
+    result.p99_us[i] = static_cast<float>(stages[i].quantile_us(0.99));
+  }
+  result.tick_median_us = static_cast<float>(tick.quantile_us(0.5));
+  result.tick_p99_us = static_cast<float>(tick.quantile_us(0.99));
+  return result;
+}
+
+void RateReport::add(const step::TickDecisions& decisions, bool has_contact,
+                     step::RateLevel level) {
+  ++ticks_at[static_cast<std::size_t>(level)];
+  const auto sweeps_now = step::sweeps_of_layers(decisions);
+  if (least_node_limit == 0) {
+    least_sweeps = sweeps_now;
+    least_node_limit = decisions.node_limit;
+  }
+  least_node_limit = std::min(least_node_limit, decisions.node_limit);
+  for (std::size_t layer = 0; layer < step::kSweepLayers; ++layer) {
+    least_sweeps[layer] = std::min(least_sweeps[layer], sweeps_now[layer]);
+    if (has_contact) sweeps[layer] += sweeps_now[layer];
+  }
+  contact_ticks += has_contact;
+}
+
+void SolverReport::add(const step::SolverFigures& figures) {
+  if (figures.reason == step::SolverReason::None) return;
+  const auto reason = static_cast<std::size_t>(figures.reason);
+  ++(figures.is_reduced ? reduced_ticks : full_ticks);
+  ++ticks_by_reason[reason];
+  if (figures.is_reduced && !last_.is_reduced) ++to_reduced;
+  if (!figures.is_reduced && last_.is_reduced) ++to_full, ++to_full_by_reason[reason];
+  if (figures.is_reduced && last_.is_reduced && !(figures.patches == last_.patches))
+    ++to_another_patch;
+  largest_estimate = std::max(largest_estimate, figures.estimate);
+  last_ = figures;
+}
+
+SimulationLoop::SimulationLoop(step::Simulation& simulation, participants::SimulationInbox& inbox,
+                               FrameHandover& handover, JournalSink* journal, LoopOptions options,
+                               std::function<void()> ended)
+    : simulation_(simulation),
+      inbox_(inbox),
+      handover_(handover),
+      journal_(journal),
+      options_(options),
+      ended_(std::move(ended)),
+      chooser_(options_.rate ? simulation.organ().depth_table : organ::DepthTable{},
+               options_.rate ? options_.rate->nodes : 0) {
+  records_.reserve(kTicksPerFrame);
+  if (options_.rate) controller_.emplace(*options_.rate);
+  take_snapshot();
+}
+
+SimulationLoop::~SimulationLoop() {
+  stop();
+}
+
+void SimulationLoop::stop() {
+  request_stop();
+  if (thread_.joinable()) thread_.join();
+}
+
+void SimulationLoop::start() {
+  thread_ = std::thread([this] { run(); });
+}
+
+void SimulationLoop::run() {
+  // The default slack of 50 us would be 5 % of a tick.
+  prctl(PR_SET_TIMERSLACK, kTimerSlackNs, 0, 0, 0);
+  Pacer pacer(monotonic_ns());
+  bool is_last = false;
+  while (!is_last) {
+    sleep_until(pacer.due_ns());
+    const auto now = monotonic_ns();
+    lateness_ns_ = now - pacer.due_ns();
+    pacer.begin_tick(now);
+    slow_ticks_ = pacer.slow_ticks();
+    is_last = run_tick();
+  }
+  ended_();
+}
+
+bool SimulationLoop::run_tick() {
+  inbox_.drain(inputs_);
+  if (chooser_.is_in_use()) control::read_forces(simulation_, forces_n_);
+  const auto decisions =
+      chooser_.choose(controller_ ? controller_->decisions() : options_.decisions, forces_n_);
+  const auto begin = options_.clock_ns();
+  const auto& report = simulation_.tick(inputs_, decisions);
+  if (controller_) controller_->observe(report, {options_.clock_ns() - begin, lateness_ns_});
+  const auto level = controller_ ? controller_->figures().level : step::RateLevel::Fixed;
+  report_.rate.add(decisions, report.contact_nodes > 0, level);
+  report_.rate.late_ticks += lateness_ns_ > kTickNanoseconds;
+  records_.push_back({report.tick, decisions, inputs_, report.state_hash});
+  second_.add(report);
+  report_.times.add(report);
+  report_.ticks = report.tick;
+  report_.inputs_dropped += report.inputs_dropped;
+  report_.nodes_rejected += report.nodes_rejected;
+  report_.faults |= report.faults;
+  report_.solver.add(simulation_.context().solver_figures);
+  report_.max_active_nodes = std::max(report_.max_active_nodes, report.active_nodes);
+  if (report.tick % kTicksPerSecond == 0) {
+    statistics_ = second_.statistics();
+    second_.clear();
+    const auto ticks = static_cast<float>(kTicksPerSecond);
+    time_rate_ = ticks / (ticks + static_cast<float>(slow_ticks_ - slow_ticks_before_));
+    slow_ticks_before_ = slow_ticks_;
+  }
+  const bool is_due =
+      report.tick % kSnapshotPeriod == kSnapshotPhase && report.tick > kSnapshotPeriod;
+  if (report.tick % kTicksPerFrame == kSnapshotPhase &&
+      (is_snapshot_requested_.exchange(false, std::memory_order_relaxed) || is_due))
+    take_snapshot();
+  auto frame = simulation_.take_frame();
+  if (!frame) return false;
+  finish_frame(std::move(frame));
+  return is_stop_requested_.load(std::memory_order_relaxed) ||
+         (options_.tick_count > 0 && report.tick >= options_.tick_count);
+}
+
+void SimulationLoop::finish_frame(std::shared_ptr<step::PublishedFrame> frame) {
+  frame->state_hash = records_.back().state_hash;
+  frame->records = std::exchange(records_, {});
+  records_.reserve(kTicksPerFrame);
+  frame->snapshot = std::exchange(snapshot_, nullptr);
+  frame->snapshot_tick = snapshot_tick_;
+  frame->statistics = statistics_;
+  frame->statistics.slow_ticks = slow_ticks_;
+  if (controller_) frame->statistics.rate = controller_->figures();
+  frame->statistics.rate.time_rate = time_rate_;
+  report_.slow_ticks = slow_ticks_;
+  report_.last_frame = frame;
+  if (journal_) journal_->take_frame(report_.last_frame);
+  handover_.push(report_.last_frame);
+}
+
+void SimulationLoop::take_snapshot() {
+  Bytes bytes;
+  simulation_.write_snapshot(bytes);
+  snapshot_ = std::make_shared<const Bytes>(std::move(bytes));
+  snapshot_tick_ = simulation_.current_tick();
+}
+
+}  // namespace trocar::app

@@ -1,0 +1,138 @@
+#pragma once
+
+// The simulation thread: 1 kHz by absolute time, inputs in, frames out.
+//
+//   inbox.drain -> Simulation::tick -> record -> RateController::observe, which decides the next
+//   tick; every 16th tick: complete the frame (records, hash, statistics, snapshot),
+//   journal.take_frame, handover.push
+//
+// It never waits for the I/O thread or the journal. It ends after a published frame, so the last
+// frame shows the last tick.
+
+#include <atomic>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <thread>
+#include <vector>
+
+#include "common/base/timing.h"
+#include "server/app/server/frame_handover.h"
+#include "server/app/server/journal_sink.h"
+#include "server/app/server/pacer.h"
+#include "server/session/control/depth_chooser.h"
+#include "server/session/control/rate_controller.h"
+#include "server/session/participants/inbox.h"
+#include "server/session/replication/duration_histogram.h"
+#include "server/tissue/step/simulation.h"
+
+namespace trocar::app {
+
+// Thread CPU time of the stages.
+struct StageTimes {
+  std::array<replication::DurationHistogram, step::kStageCount> stages;
+  replication::DurationHistogram tick;
+
+  void add(const step::TickReport& report);
+  void clear();
+  step::StageStatistics statistics() const;  // slow_ticks stays 0
+};
+
+// The report says what the rate controller decided, over the whole run.
+struct RateReport {
+  std::array<Tick, 4> ticks_at{};                          // by step::RateLevel
+  std::array<std::uint64_t, step::kSweepLayers> sweeps{};  // sums over ticks in contact, by layer
+  Tick contact_ticks = 0;
+  step::LayerCounts least_sweeps{};
+  std::uint32_t least_node_limit = 0;
+  std::uint64_t late_ticks = 0;  // began more than a tick after they were due
+
+  void add(const step::TickDecisions& decisions, bool has_contact, step::RateLevel level);
+};
+
+// The report says which solver acted, over the whole run of a session with a reduction.
+struct SolverReport {
+  Tick reduced_ticks = 0, full_ticks = 0;
+  std::uint64_t to_reduced = 0, to_full = 0, to_another_patch = 0;  // hand-overs
+  std::array<Tick, step::kSolverReasons> ticks_by_reason{};
+  std::array<std::uint64_t, step::kSolverReasons> to_full_by_reason{};
+  float largest_estimate = 0;
+
+  void add(const step::SolverFigures& figures);
+
+ private:
+  step::SolverFigures last_;
+};
+
+struct LoopReport {
+  Tick ticks = 0;
+  std::uint64_t slow_ticks = 0;
+  std::uint64_t inputs_dropped = 0, nodes_rejected = 0;
+  std::uint32_t faults = 0;  // TickFault bits of all ticks
+  std::uint32_t max_active_nodes = 0;
+  RateReport rate;
+  SolverReport solver;
+  step::SharedFrame last_frame;
+  StageTimes times;  // of the whole run
+};
+
+struct LoopOptions {
+  step::TickDecisions decisions;  // without a rate controller
+  std::optional<control::RateLimits> rate;
+  Tick tick_count = 0;  // end at the first frame at or after this; 0: when told to
+  std::function<std::uint64_t()> clock_ns = monotonic_ns;  // of what ticks take; tests have others
+};
+
+class SimulationLoop {
+ public:
+  // All references outlive the loop; `journal` may be null. `ended` is called on the simulation
+  // thread after its last access to any of them.
+  SimulationLoop(step::Simulation& simulation, participants::SimulationInbox& inbox,
+                 FrameHandover& handover, JournalSink* journal, LoopOptions options,
+                 std::function<void()> ended);
+  ~SimulationLoop();
+
+  void start();
+  // Asks for a snapshot soon, in a frame; any thread may call it.
+  void request_snapshot() { is_snapshot_requested_.store(true, std::memory_order_relaxed); }
+  void request_stop() { is_stop_requested_.store(true, std::memory_order_relaxed); }  // any thread
+  // Ends the loop at its next frame and waits for that.
+  void stop();
+  // After `ended` was called, or stop(), or start() never was.
+  const LoopReport& report() const { return report_; }
+
+  // One tick without pacing; true if it was the last. For start()'s thread, and for tests.
+  bool run_tick();
+
+ private:
+  void run();
+  void finish_frame(std::shared_ptr<step::PublishedFrame> frame);
+  void take_snapshot();
+
+  step::Simulation& simulation_;
+  participants::SimulationInbox& inbox_;
+  FrameHandover& handover_;
+  JournalSink* const journal_;
+  const LoopOptions options_;
+  const std::function<void()> ended_;
+  std::atomic<bool> is_stop_requested_{false}, is_snapshot_requested_{false};
+
+  // Simulation thread.
+  std::optional<control::RateController> controller_;
+  control::DepthChooser chooser_;        // of a calibrated organ, unless decisions are fixed
+  std::vector<double> forces_n_;         // of the tools that touched in the last tick
+  std::uint64_t lateness_ns_ = 0;        // of the tick about to run
+  std::uint64_t slow_ticks_before_ = 0;  // until the last full second
+  float time_rate_ = 1;                  // in it
+  hands::TickInputs inputs_;
+  std::vector<step::TickRecord> records_;  // since the last frame
+  std::shared_ptr<const Bytes> snapshot_;  // waits for the next frame
+  Tick snapshot_tick_ = 0;
+  StageTimes second_;                 // since the last statistics
+  step::StageStatistics statistics_;  // of the last full second
+  std::uint64_t slow_ticks_ = 0;
+  LoopReport report_;
+  std::thread thread_;
+};
+
+}  // namespace trocar::app

@@ -1,0 +1,152 @@
+#include "server/app/server/summary.h"
+
+#include <algorithm>
+#include <array>
+
+#include "common/base/json.h"
+#include "common/base/version.h"
+
+namespace trocar::app {
+namespace {
+
+Json times(const replication::DurationHistogram& histogram) {
+  return {{"count", histogram.count()},
+          {"median", histogram.quantile_us(0.5)},
+          {"p99", histogram.quantile_us(0.99)}};
+}
+
+Json participants(const std::vector<replication::BarrierResult>& results) {
+  Json list = Json::array();
+  for (const auto& result : results)
+    list.push_back({{"slot", result.slot.value},
+                    {"name", result.name},
+                    {"role", participants::name_of(result.role)},
+                    {"answered", result.has_answered},
+                    {"frame", result.frame},
+                    {"surface_crc", hex32(result.surface_crc)},
+                    {"equal", result.is_equal}});
+  return list;
+}
+
+Json stages(const StageTimes& of) {
+  Json list = Json::object();
+  for (std::size_t i = 0; i < of.stages.size(); ++i)
+    list[step::name_of(static_cast<step::Stage>(i))] = times(of.stages[i]);
+  return list;
+}
+
+Json replication_figures(const Summary& s) {
+  const auto& e = s.encoding;
+  const double per_vertex = e.changed_vertices ? static_cast<double>(e.delta_payload_bytes) /
+                                                     static_cast<double>(e.changed_vertices)
+                                               : 0.0;
+  const auto& r = s.replication;
+  return {{"sessions", r.sessions},
+          {"bytes_sent", s.tcp.bytes_out},
+          {"bytes_received", s.tcp.bytes_in},
+          {"samples", r.samples},
+          {"samples_dropped", s.inbox.samples_dropped},
+          {"frames_published", r.frames_published},
+          {"frames_conflated", r.frames_conflated},
+          {"frames_lost", s.frames_lost},
+          {"frames_given", r.frames_given},
+          {"frames_skipped", r.frames_skipped},
+          {"keyframes_given", r.keyframes_given},
+          {"buffers_shared", e.shared},
+          {"deltas", e.deltas},
+          {"delta_payload_bytes", e.delta_payload_bytes},
+          {"changed_vertices", e.changed_vertices},
+          {"bytes_per_changed_vertex", per_vertex},
+          {"encode_delta_cpu_us", times(e.delta_cpu)},
+          {"encode_keyframe_cpu_us", times(e.keyframe_cpu)}};
+}
+
+Json rate_figures(const Summary& s) {
+  const auto& rate = s.loop.rate;
+  const auto& last = s.loop.last_frame->statistics.rate;
+  std::array<double, step::kSweepLayers> mean_sweeps{};
+  for (std::size_t i = 0; i < mean_sweeps.size(); ++i)
+    mean_sweeps[i] = static_cast<double>(rate.sweeps[i]) /
+                     static_cast<double>(std::max<Tick>(1, rate.contact_ticks));
+  Json ticks = Json::object();
+  for (std::size_t i = 0; i < rate.ticks_at.size(); ++i)
+    ticks[step::name_of(static_cast<step::RateLevel>(i))] = rate.ticks_at[i];
+  return {{"ticks", ticks},
+          {"late_ticks", rate.late_ticks},
+          {"lowered", last.lowered},
+          {"raised", last.raised},
+          {"budget_us", last.budget_us},
+          {"contact_ticks", rate.contact_ticks},
+          {"mean_sweeps_in_contact", mean_sweeps},
+          {"least_sweeps", rate.least_sweeps},
+          {"least_node_limit", rate.least_node_limit}};
+}
+
+// Says how long each solver acted, and why others took over.
+Json solver_figures(const Summary& s) {
+  if (!s.reduction) return nullptr;
+  const auto& solver = s.loop.solver;
+  const auto by_reason = [](const auto& counts) {
+    Json list = Json::object();
+    for (std::size_t i = 1; i < counts.size(); ++i)  // from 0, a session without a reduction
+      list[step::name_of(static_cast<step::SolverReason>(i))] = counts[i];
+    return list;
+  };
+  return {{"reduction", s.reduction->file},
+          {"reduction_hash", hex64(s.reduction->hash)},
+          {"reduced_ticks", solver.reduced_ticks},
+          {"full_ticks", solver.full_ticks},
+          {"to_reduced", solver.to_reduced},
+          {"to_full", solver.to_full},
+          {"to_another_patch", solver.to_another_patch},
+          {"largest_estimate", solver.largest_estimate},
+          {"ticks_by_reason", by_reason(solver.ticks_by_reason)},
+          {"to_full_by_reason", by_reason(solver.to_full_by_reason)},
+          {"ghost",
+           {{"frames", s.ghost.frames},
+            {"begun", s.ghost.begun},
+            {"fallen_behind", s.ghost.fallen},
+            {"largest_mm", 1e3 * static_cast<double>(s.ghost.largest_m)}}}};
+}
+
+}  // namespace
+
+std::string to_json(const Summary& s) {
+  const auto& last = *s.loop.last_frame;
+  return to_text(
+      {{"program", "trocar-server"},
+       {"version", kVersion},
+       {"sim_version", kSimVersion},
+       {"protocol", std::to_string(kProtocolMajor) + "." + std::to_string(kProtocolMinor)},
+       {"organ", s.organ},
+       {"nodes", s.node_count},
+       {"surface_vertices", s.surface_vertex_count},
+       {"journal", s.journal},
+        {"recording",
+         {{"status", wire::name_of(s.recording.status)},
+          {"frames_missing", s.recording.frames_missing},
+          {"text", s.recording.text}}},
+       {"ticks", s.loop.ticks},
+       {"simulated_seconds",
+        static_cast<double>(s.loop.ticks) / static_cast<double>(kTicksPerSecond)},
+       {"wall_seconds", s.wall_seconds},
+       {"slow_ticks", s.loop.slow_ticks},
+       {"last_tick", last.tick},
+       {"last_frame", last.frame},
+       {"state_hash", hex64(last.state_hash)},
+       {"surface_crc", hex32(last.surface_crc)},
+       {"all_replicas_equal",
+        std::ranges::all_of(s.barrier, &replication::BarrierResult::is_equal)},
+       {"participants", participants(s.barrier)},
+       {"max_active_nodes", s.loop.max_active_nodes},
+       {"faults", s.loop.faults},
+       {"inputs_dropped", s.loop.inputs_dropped},
+       {"nodes_rejected", s.loop.nodes_rejected},
+       {"rate", rate_figures(s)},
+       {"solver", solver_figures(s)},
+       {"tick_cpu_us", times(s.loop.times.tick)},
+       {"stage_cpu_us", stages(s.loop.times)},
+       {"replication", replication_figures(s)}});
+}
+
+}  // namespace trocar::app

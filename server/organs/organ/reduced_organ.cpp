@@ -1,0 +1,71 @@
+#include "server/organs/organ/reduced_organ.h"
+
+#include "common/base/checksum.h"
+
+namespace trocar::organ {
+namespace {
+
+Error bad(const std::string& what) {
+  return {ErrorCode::BadFile, what};
+}
+
+template <typename T>
+void add(StateHasher& hasher, const std::vector<T>& values) {
+  const std::uint64_t count = values.size();
+  hasher.update(bytes_of(std::span(&count, 1)));
+  hasher.update(bytes_of(values));
+}
+
+std::vector<double> elasticity_of(const material::Material& m) {
+  std::vector<double> numbers{static_cast<double>(m.elastic_law), m.tension, m.fibre_tension};
+  if (m.elastic_law != material::ElasticLaw::Measured) {
+    const auto [c10_pa, bulk_modulus_pa] = material::neo_hookean_parameters(m);
+    numbers.insert(numbers.end(), {c10_pa, bulk_modulus_pa});
+    return numbers;
+  }
+  const auto& law = m.measured;
+  numbers.insert(numbers.end(), {static_cast<double>(law.energy), static_cast<double>(law.split),
+                                 law.exponent, law.bulk_modulus_pa});
+  numbers.insert(numbers.end(), law.coefficients_pa.begin(), law.coefficients_pa.end());
+  for (const auto& [weight, time_s] : law.relaxation)
+    numbers.insert(numbers.end(), {weight, time_s});
+  return numbers;
+}
+
+}  // namespace
+
+std::uint64_t mesh_hash(const Organ& organ) {
+  StateHasher hasher;
+  add(hasher, organ.mesh.rest_positions);
+  add(hasher, organ.mesh.tets);
+  add(hasher, organ.fixed_nodes);
+  return hasher.digest();
+}
+
+std::uint64_t elasticity_hash(const Organ& organ) {
+  StateHasher hasher;
+  add(hasher, elasticity_of(organ.material));
+  for (const auto& region : organ.regions) {
+    add(hasher, elasticity_of(region.material));
+    add(hasher, region.nodes);
+  }
+  add(hasher, std::vector<Vec3d>{organ.gravity_m_s2});
+  add(hasher, organ.stress_free_positions_m);
+  return hasher.digest();
+}
+
+Status check_organ(const ReducedOrgan& of, const Organ& organ) {
+  if (of.node_count != organ.mesh.node_count())
+    return bad("is of another mesh: it has " + std::to_string(of.node_count) + " nodes, " +
+               organ.name + " has " + std::to_string(organ.mesh.node_count()) +
+               ": make it again with trocar-organ reduce");
+  if (of.mesh_hash != mesh_hash(organ))
+    return bad("is of another mesh than " + organ.name +
+               ", or one that is held elsewhere: make it again with trocar-organ reduce");
+  if (of.elasticity_hash != elasticity_hash(organ))
+    return bad("is of another material than that of " + organ.name +
+               ": make it again with trocar-organ reduce");
+  return {};
+}
+
+}  // namespace trocar::organ

@@ -1,0 +1,23 @@
+#pragma once
+
+// `.reduction` files of the method dogan: a packed file (server/organs/organ/packed_file.h) with
+// the magic "TROCARR1" and one proto Reduction message (proto/reduction.proto). Those of the method
+// local are in server/organs/organ/local_reduction_file.h. Nothing in a file is trusted: any bytes
+// give a reduction that validate() accepts, or an error of one line.
+
+#include <filesystem>
+
+#include "common/base/bytes.h"
+#include "server/papers/dogan/reduction.h"
+
+namespace trocar::dogan {
+
+Status write_reduction(const std::filesystem::path& path, const Reduction& reduction);
+// Refuses one of another organ, too.
+Result<Reduction> read_reduction(const std::filesystem::path& path, const organ::Organ& organ);
+
+// A file's content. Errors do not name a file; unpack_reduction() does not know the organ.
+Bytes pack_reduction(const Reduction& reduction);
+Result<Reduction> unpack_reduction(BytesView file);
+
+}  // namespace trocar::dogan

@@ -1,0 +1,64 @@
+// Comments that are no sentence are counted; their number only goes down.
+
+#include "tests/architecture/comments.h"
+
+#include <gtest/gtest.h>
+
+namespace trocar::architecture {
+namespace {
+
+std::size_t count_in(const std::vector<std::string>& lines) {
+  SourceFile file;
+  file.path = "common/base/a.h";
+  file.lines = lines;
+  return find_fragments(file).size();
+}
+
+TEST(Comments, AFragmentIsFound) {
+  for (const char* opener :
+       {"Of", "What", "Where", "Whose", "Which", "Likewise,", "Neither", "As", "So", "Else"})
+    EXPECT_EQ(count_in({std::string("  // ") + opener + " the last call, which is over."}), 1u)
+        << opener;
+  EXPECT_EQ(count_in({"// Half of the way from a to b."}), 1u) << "no verb";
+  EXPECT_EQ(count_in({"int a;", "// Of the first.", "int b;", "// Of the last."}), 2u);
+  EXPECT_EQ(count_in({"// Of the first.", "//", "// It is the second paragraph."}), 1u);
+}
+
+TEST(Comments, ASentenceIsNone) {
+  for (const char* text :
+       {"// The queue holds nodes by layer.", "// Returns half of the way.", "// Consumer thread.",
+        "// N(n) = (n + 1)(2 n^2 + 4 n + 3) / 3", "// Nodes must be ascending.",
+        "int a;  // of the last call, m", "text = \"// Of no comment\";"})
+    EXPECT_EQ(count_in({text}), 0u) << text;
+  EXPECT_EQ(count_in({"// A long sentence goes on in a second line", "// Of which it is a part."}),
+            0u);
+}
+
+TEST(Comments, AFileBelongsToItsWing) {
+  EXPECT_EQ(wing_of("common/base/a.h"), "common");
+  EXPECT_EQ(wing_of("server/tissue/step/tick.cpp"), "server/tissue");
+  EXPECT_EQ(wing_of("tests/base/a.cpp"), "tests");
+}
+
+// Whoever mends a comment lowers the ceiling of its wing; nobody raises one.
+TEST(Comments, FragmentsBecomeFewer) {
+  const std::map<std::string, std::size_t> ceilings{
+      {"client", 0},         {"common", 6},          {"server/app", 0},
+      {"server/lab", 17},    {"server/organs", 0},   {"server/papers", 0},
+      {"server/session", 2}, {"server/tissue", 166}, {"tests", 170}};
+  const auto wings = fragments_by_wing(read_source_tree(TROCAR_SOURCE_DIR));
+  for (const auto& [wing, fragments] : wings) {
+    const auto ceiling = ceilings.find(wing);
+    const auto most = ceiling == ceilings.end() ? 0 : ceiling->second;
+    if (fragments.size() <= most) continue;
+    std::string text;
+    for (const auto& [path, line, comment] : fragments)
+      text += path + ":" + std::to_string(line) + ": " + comment + "\n";
+    ADD_FAILURE() << wing << " has " << fragments.size() << " comments that are no sentence, "
+                  << most << " are allowed: begin with a subject or a verb\n"
+                  << text;
+  }
+}
+
+}  // namespace
+}  // namespace trocar::architecture

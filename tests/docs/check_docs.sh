@@ -1,0 +1,158 @@
+#!/usr/bin/env bash
+# Checks the book. Usage: check_docs.sh links|style|options|keys ROOT [FOLDER_OF_PROGRAMS]
+#
+#   links    each link, picture and anchor of README, CONTRIBUTING and docs leads somewhere, each page is
+#            in the README's table and in the site's list, each path of the source that is named exists
+#   style    the README keeps 150 lines, paragraphs keep 90 words, pictures keep 150 kB
+#   options  docs/programs.md has exactly the options that the programs' --help has, and no page names
+#            an option that no program or script has
+#   keys     docs/scripts-and-scenarios.md has exactly the keys that the sources read
+#
+# Each fault is one line on stdout; the exit code is 1 if there is any.
+set -uo pipefail
+export LC_ALL=C.UTF-8
+
+check=${1:?check} root=$(cd "${2:?root of the repository}" && pwd) bin=${3:+$(cd "$3" && pwd)}
+cd "$root" || exit 2
+faults=$(mktemp)
+trap 'rm -f "$faults"' EXIT
+fault() { printf '%s\n' "$*" >>"$faults"; }
+
+pages=(README.md CONTRIBUTING.md docs/*.md)
+# Pages that a generator writes: their numbers and rows are its business.
+is_generated() { grep -q 'generated' <<<"$(head -n 3 "$1")"; }
+
+# Text outside of code blocks, with line numbers kept.
+prose() { awk '/^```/ {f = !f; print ""; next} f || /^(    |\t)[^-* ]/ {print ""; next} {print}' "$1"; }
+
+# Anchors of a page, as GitHub and MkDocs make them from its headings.
+anchors() {
+  prose "$1" | sed -n 's/^#\{1,6\} \(.*\)$/\1/p' | tr '[:upper:]' '[:lower:]' |
+    sed 's/[^a-z0-9 _-]//g; s/^ *//; s/ *$//; s/ /-/g'
+}
+
+check_links() {
+  local page target file anchor
+  for page in "${pages[@]}"; do
+    while read -r target; do
+      case $target in http://* | https://* | mailto:*) continue ;; esac
+      file=${target%%#*} anchor=
+      [[ $target == *'#'* ]] && anchor=${target#*#}
+      if [ -z "$file" ]; then file=$page; else file=$(dirname "$page")/$file; fi
+      if [ ! -e "$file" ]; then
+        fault "$page: link to $target: there is no such file"
+      elif [ -n "$anchor" ] && ! anchors "$file" | grep -qxF -- "$anchor"; then
+        fault "$page: link to $target: $file has no such heading"
+      fi
+    done < <(prose "$page" | grep -oE '\]\([^) ]+\)' | sed 's/^](//; s/)$//')
+    # Paths of the source in code spans.
+    while read -r target; do
+      [ -e "$target" ] || fault "$page: names $target, which does not exist"
+    done < <(grep -oE '`(server|client|common|proto|tests|deploy)/[A-Za-z0-9_./-]*[A-Za-z0-9_]`' "$page" |
+      tr -d '`' | sort -u)
+  done
+  for page in docs/*.md; do
+    grep -qF "($page)" README.md || grep -qF "($(basename "$page"))" docs/*.md ||
+      fault "README.md: no page leads to $page"
+    grep -qE ": $(basename "$page")\$" deploy/mkdocs.yml ||
+      fault "deploy/mkdocs.yml: $(basename "$page") is not in nav"
+  done
+}
+
+check_style() {
+  local page lines
+  lines=$(wc -l <README.md)
+  [ "$lines" -le 150 ] || fault "README.md: has $lines lines, allowed are 150"
+  for page in "${pages[@]}"; do
+    is_generated "$page" && continue
+    prose "$page" | awk -v page="$page" '
+      function done() { if (words > 90) printf "%s:%d: a paragraph of %d words, allowed are 90\n", page, first, words; words = 0 }
+      /^$/ || /^[#|>!-]/ || /^[0-9]+\. / { done() }
+      /^$/ || /^[#|]/ { next }
+      { if (!words) first = NR; words += NF }
+      END { done() }' >>"$faults"
+  done
+  for page in docs/pictures/*; do
+    lines=$(wc -c <"$page")
+    [ "$lines" -le 150000 ] || fault "$page: has $lines bytes, allowed are 150000"
+  done
+}
+
+# The options that a --help text on stdin names, one per line: those that begin a line.
+options_of_help() { grep -oE '^ {2,}(-[a-z], ?)?--[a-z][a-z0-9-]*' | grep -oE -- '--[a-z][a-z0-9-]*' | sort -u; }
+# The options in the first cells of the tables below a heading of docs/programs.md.
+options_of_section() {
+  awk -v heading="$1" '/^#/ {in_it = $0 == heading} in_it && /^\| `-/ {split($0, cell, "|"); print cell[2]}' \
+    docs/programs.md | grep -oE -- '--[a-z][a-z0-9-]*' | sort -u
+}
+
+check_section() { # HEADING COMMAND...
+  local heading=$1 line help
+  shift
+  help=$("$@" --help 2>/dev/null | sed '/^Examples:/,$d') || fault "$*: has no --help"
+  while read -r line; do
+    fault "docs/programs.md: '$heading' does not have $line, which $(basename "$1")${2:+ $2} has"
+  done < <(comm -13 <(options_of_section "$heading") <(options_of_help <<<"$help"))
+  while read -r line; do
+    fault "docs/programs.md: '$heading' has $line, which $(basename "$1")${2:+ $2} does not have"
+  done < <(comm -23 <(options_of_section "$heading") <(options_of_help <<<"$help"))
+}
+
+check_options() {
+  local program sub page option known
+  known=$(mktemp)
+  for program in trocar-server trocar-client trocar-organ trocar-sim trocar-journal; do
+    [ -x "$bin/$program" ] || { fault "$bin/$program: is not built"; rm -f "$known"; return; }
+    check_section "## $program" "$bin/$program"
+    "$bin/$program" --help | options_of_help >>"$known"
+    for sub in $("$bin/$program" --help | awk '/^Subcommands:|^SUBCOMMANDS:/ {f = 1; next} /^[^ ]/ {f = 0} f && /^  [a-z]/ {print $1}'); do
+      check_section "### $program $sub" "$bin/$program" "$sub"
+      "$bin/$program" "$sub" --help | options_of_help >>"$known"
+    done
+  done
+  for program in deploy/*; do
+    [ -f "$program" ] && [ -x "$program" ] || continue
+    bash "$program" --help | grep -oE -- '--[a-z][a-z0-9-]*' >>"$known"
+  done
+  printf '%s\n' --preset >>"$known"  # cmake's
+  for page in "${pages[@]}"; do
+    while read -r option; do
+      grep -qxF -- "$option" "$known" || fault "$page: names $option, which no program or script has"
+    done < <(grep -oE '(^|[ `(])--[a-z][a-z0-9-]+' "$page" | grep -oE -- '--[a-z][a-z0-9-]+' | sort -u)
+  done
+  rm -f "$known"
+}
+
+readers=(server/lab/scenario/*.cpp common/tool/script*.cpp)
+# Keys in the first or, below '| table | key', second cells of the tables.
+documented_keys() {
+  awk -F'|' '/^\| table \| key/ {c = 3; next} /^\| key in|^\| key \|/ {c = 2; next} /^$/ {c = 0}
+    c && /^\|/ {print $c}' docs/scripts-and-scenarios.md | grep -oE '`[a-z0-9_]+`' | tr -d '`' | sort -u
+}
+read_keys() {
+  {
+    grep -hoE '\b[a-z_]+(<[^>]*>)?\("[a-z0-9_]+"' "${readers[@]}" |
+      grep -vE '^(fail|fail_missing|table_entry|fputs|contains|find|place_of|has|with|tables?|limited_tables)\('
+    grep -hoE 'NumberKey\{"[a-z0-9_]+"' server/organs/material/material_keys.h
+  } |
+    grep -oE '"[a-z0-9_]+"' | tr -d '"' | sort -u
+}
+
+check_keys() {
+  local key
+  while read -r key; do
+    grep -qF "\"$key\"" "${readers[@]}" server/organs/material/*.h ||
+      fault "docs/scripts-and-scenarios.md: has the key $key, which nothing reads"
+  done < <(documented_keys)
+  while read -r key; do
+    fault "docs/scripts-and-scenarios.md: does not have the key $key, which is read"
+  done < <(comm -13 <(documented_keys) <(read_keys))
+  [ "$(documented_keys | wc -l)" -ge 60 ] || fault "docs/scripts-and-scenarios.md: fewer than 60 keys were found"
+}
+
+case $check in
+  links | style | options | keys) "check_$check" ;;
+  *) printf '%s: no such check\n' "$check" >&2; exit 2 ;;
+esac
+cat "$faults"
+[ ! -s "$faults" ]

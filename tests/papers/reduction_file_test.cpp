@@ -1,0 +1,168 @@
+// Files of reduced models: what is written is read, and each way of being wrong has its line.
+
+#include "server/papers/dogan/reduction_file.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <fstream>
+#include <functional>
+#include <limits>
+
+#include "server/organs/organ/local_reduction_file.h"
+#include "server/organs/organ/organ_file.h"
+#include "server/organs/organ/packed_file.h"
+#include "tests/papers/synthetic_reduction.h"
+#include "tests/reduce/small_organ.h"
+
+namespace trocar::dogan {
+namespace {
+
+using reduce::testing::block;
+using testing::synthetic_reduction;
+
+class ReductionFile : public ::testing::Test {
+ protected:
+  ~ReductionFile() override { std::filesystem::remove(path_); }
+
+  void expect_bad(BytesView file, const std::string& says) const {
+    std::ofstream(path_, std::ios::binary)
+        .write(reinterpret_cast<const char*>(file.data()),
+               static_cast<std::streamsize>(file.size()));
+    const auto read = read_reduction(path_, organ_);
+    ASSERT_FALSE(read.ok()) << says;
+    EXPECT_EQ(read.error().code, ErrorCode::BadFile);
+    const auto& line = read.error().message;
+    EXPECT_TRUE(line.starts_with(path_.string() + ": ")) << line;
+    EXPECT_NE(line.find(says), std::string::npos) << line;
+    EXPECT_EQ(line.find('\n'), std::string::npos) << line;
+  }
+  void expect_bad(const std::function<void(Reduction&)>& change, const std::string& says) const {
+    auto changed = reduction_;
+    change(changed);
+    expect_bad(pack_reduction(changed), says);
+  }
+
+  const organ::Organ organ_ = block(3, 3, 2);
+  const Reduction reduction_ = synthetic_reduction(organ_, 4);
+  const std::filesystem::path path_ =
+      std::filesystem::temp_directory_path() /
+      ("trocar-" + std::to_string(::getpid()) + "-" +
+       ::testing::UnitTest::GetInstance()->current_test_info()->name() + ".reduction");
+};
+
+TEST_F(ReductionFile, WhatIsWrittenIsRead) {
+  ASSERT_TRUE(validate(reduction_).ok()) << validate(reduction_).error().message;
+  ASSERT_TRUE(write_reduction(path_, reduction_).ok());
+  const auto read = read_reduction(path_, organ_);
+  ASSERT_TRUE(read.ok()) << read.error().message;
+  EXPECT_EQ(*read, reduction_);
+  auto without_creep = reduction_;
+  without_creep.creep.clear();
+  without_creep.creep_times_s.clear();
+  const auto unpacked = unpack_reduction(pack_reduction(without_creep));
+  ASSERT_TRUE(unpacked.ok()) << unpacked.error().message;
+  EXPECT_EQ(*unpacked, without_creep);
+}
+
+TEST_F(ReductionFile, NothingIsWrittenThatCouldNotBeRead) {
+  auto wrong = reduction_;
+  wrong.modes[0] = std::nan("");
+  EXPECT_FALSE(write_reduction(path_, wrong).ok());
+  EXPECT_FALSE(std::filesystem::exists(path_));
+  const auto missing = read_reduction(path_, organ_);
+  ASSERT_FALSE(missing.ok());
+  EXPECT_NE(missing.error().message.find("cannot be opened"), std::string::npos);
+}
+
+TEST_F(ReductionFile, OneOfAnotherOrganIsRefused) {
+  ASSERT_TRUE(write_reduction(path_, reduction_).ok());
+  const auto says = [&](const organ::Organ& organ, const std::string& what) {
+    const auto read = read_reduction(path_, organ);
+    ASSERT_FALSE(read.ok()) << what;
+    EXPECT_NE(read.error().message.find(what), std::string::npos) << read.error().message;
+  };
+  says(block(3, 3, 3), "is of another mesh: it has 18 nodes");
+  auto moved = organ_;
+  moved.mesh.rest_positions[4].x += 1e-6;
+  says(moved, "is of another mesh than");
+  auto held = organ_;
+  held.fixed_nodes.pop_back();
+  says(held, "or one that is held elsewhere");
+  auto stiffer = organ_;
+  stiffer.material.measured.coefficients_pa[1] += 1;
+  says(stiffer, "is of another material than");
+  auto slower = organ_;
+  slower.material.measured.relaxation[0].relaxation_time_s *= 2;
+  says(slower, "is of another material than");
+  auto patched = organ_;
+  patched.regions.push_back({"hard", patched.material, {NodeIndex(1), NodeIndex(2)}});
+  says(patched, "is of another material than");
+  // What changes no solution may differ.
+  auto heavier = organ_;
+  heavier.material.density_kg_m3 *= 2;
+  heavier.name = "another";
+  heavier.material.cut_energy_j_m2 = 5;
+  EXPECT_TRUE(read_reduction(path_, heavier).ok());
+}
+
+TEST_F(ReductionFile, OneOfTheOtherMethodIsNamed) {
+  expect_bad(organ::pack(organ::PackedKind{organ::kLocalReductionMagic, "", "", "", 2, 2}, 2, {}),
+             "is a reduction by --method local");
+}
+
+TEST_F(ReductionFile, DamageIsNoticed) {
+  const auto file = pack_reduction(reduction_);
+  for (std::size_t length = 0; length < file.size(); ++length)
+    EXPECT_FALSE(unpack_reduction(BytesView(file).first(length)).ok()) << length;
+  for (std::size_t i = 0; i < file.size(); ++i) {
+    auto flipped = file;
+    flipped[i] ^= 0x10;
+    const auto unpacked = unpack_reduction(flipped);  // zstd leaves a bit of its own unused
+    EXPECT_TRUE(!unpacked.ok() || *unpacked == reduction_) << i;
+  }
+  expect_bad(BytesView(file).first(10), "is cut off in its header");
+  expect_bad(BytesView(file).first(file.size() - 5), "cut off");
+  auto longer = file;
+  longer.push_back(0);
+  expect_bad(longer, "has bytes behind its body");
+  auto damaged = file;
+  damaged[20] ^= 1;  // of the checksum
+  expect_bad(damaged, "its checksum does not fit");
+  auto newer = file;
+  newer[8] = 2;
+  expect_bad(newer,
+             "has version 2, this program reads version 1: make it again with trocar-organ reduce");
+  expect_bad(pack_organ(organ_), "is not a .reduction file: make one with trocar-organ reduce");
+  expect_bad(Bytes{}, "is not a .reduction file");
+}
+
+TEST_F(ReductionFile, NumbersThatCannotBeAreRefused) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  expect_bad([](auto& r) { r.modes[7] = std::nan(""); }, "not finite");
+  expect_bad([](auto& r) { r.best_tangent_n_m[1] = kInfinity; }, "not finite");
+  expect_bad([](auto& r) { r.creep_times_s[1] = std::nan(""); }, "not finite");
+  expect_bad([](auto& r) { r.influence_m = -1; }, "from 0 up");
+  expect_bad([](auto& r) { r.modes[0] = 0.999; }, "modes 1 and 1 are not orthonormal");
+  expect_bad([](auto& r) { r.modes[54] = 1e-6; }, "modes 1 and 2 are not orthonormal");
+  expect_bad([](auto& r) { r.method = "magic"; }, "unknown method 'magic'");
+  expect_bad([](auto& r) { r.modes.pop_back(); }, "numbers in its modes");
+  expect_bad([](auto& r) { r.eigenvalues_m2.clear(); }, "has 0 modes");
+  expect_bad([](auto& r) { r.eigenvalues_m2.assign(65, 1); }, "has 65 modes");
+  expect_bad([](auto& r) { std::swap(r.eigenvalues_m2[0], r.eigenvalues_m2[1]); }, "descending");
+  expect_bad([](auto& r) { r.initial_tangent_n_m.pop_back(); }, "4 x 4 numbers");
+  expect_bad([](auto& r) { r.initial_tangent_n_m[1] += 0.01; }, "not symmetric");
+  expect_bad([](auto& r) { r.best_tangent_n_m[5] = -1; }, "positive definite");
+  expect_bad([](auto& r) { r.creep.clear(); }, "times of creep without curves");
+  expect_bad([](auto& r) { r.creep_times_s[2] = 0.5; }, "not ascending");
+  expect_bad([](auto& r) { r.creep[0].node = NodeIndex(18); }, "creep around node 18");
+  expect_bad([](auto& r) { r.creep[1].overall_growth.pop_back(); }, "creep around node 7");
+  expect_bad([](auto& r) { r.creep[1].neighbours[0].growth[1] = std::nan(""); },
+             "growths out of range");
+  expect_bad([](auto& r) { std::swap(r.creep[1].neighbours[0], r.creep[1].neighbours[1]); },
+             "not ascending");
+}
+
+}  // namespace
+}  // namespace trocar::dogan

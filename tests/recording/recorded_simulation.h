@@ -1,0 +1,45 @@
+#pragma once
+
+// A session without a server: hands press, grasp and cut a small liver, and the recorder writes it.
+// Then copies of the file, with what a test changes in them.
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <string_view>
+
+#include "common/base/bytes.h"
+#include "common/base/tick.h"
+#include "common/base/version.h"
+
+namespace google::protobuf {
+class Message;
+}
+
+namespace trocar::recording::testing {
+
+class TemporaryFolder {
+ public:
+  TemporaryFolder();
+  ~TemporaryFolder() { std::filesystem::remove_all(path_); }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  std::string file(const std::string& name) const { return (path_ / name).string(); }
+
+ private:
+  std::filesystem::path path_;
+};
+
+inline constexpr Tick kRecordedTicks = 2400;
+// Snapshots are of tick 0 and of these.
+inline constexpr Tick kSnapshotTicks[] = {808, 1608};
+
+// dropped_at: a frame that is too large for the recorder's queue, or 0.
+void record_simulation(const std::string& path, Tick dropped_at = 0);
+
+// A message of a recording while it is copied. False: it is left out.
+using Edit = std::function<bool(std::string_view topic, google::protobuf::Message& message)>;
+void copy_journal(const std::string& from, const std::string& to, const Edit& edit,
+                  std::uint32_t sim_version = kSimVersion);
+
+}  // namespace trocar::recording::testing
