@@ -54,6 +54,7 @@ Status SessionJournal::read_info() {
     reduction.file = text("reduction_file");
     reduction.source = text("reduction_source");
   }
+  info_.has_external_loads = entries.contains("external_loads");
   times_.start_utc_ns = info_.start_utc_ns;
   info_.protocol = text("protocol");
   info_.organ_name = text("organ_name");

@@ -45,6 +45,7 @@ Result<std::unique_ptr<SessionJournalWriter>> SessionJournalWriter::create(
     metadata.entries["reduction_file"] = session.reduction->file;
     metadata.entries["reduction_source"] = session.reduction->source;
   }
+  if (session.has_external_loads) metadata.entries["external_loads"] = "not recorded";
   if (Status written = (*mcap)->write_metadata(metadata); !written.ok()) return written.error();
   return std::unique_ptr<SessionJournalWriter>(
       new SessionJournalWriter(std::move(*mcap), JournalTimes{session.start_utc_ns}));

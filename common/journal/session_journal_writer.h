@@ -25,6 +25,7 @@ struct SessionDescription {
   std::string organ_name;
   std::uint64_t organ_hash = 0;
   std::optional<ReductionDescription> reduction;  // nothing: the session has none
+  bool has_external_loads = false;                // see SessionInfo
 };
 
 class SessionJournalWriter {

@@ -5,12 +5,12 @@
 namespace trocar::tool {
 namespace {
 
-// Tables of a scenario that a script does not have. A scenario reader accepts these and reads its
-// hands with read_tools() below.
-constexpr std::array<std::string_view, 17> kScenarioTables{
-    "scene", "organ",   "session",  "server", "participant", "decisions",
-    "mark",  "expect",  "material", "nodes",  "fix",         "displace",
-    "force", "gravity", "run",      "probe",  "output"};
+// The tables of a scenario besides its tools. A whole scenario, which has [run], is a script, too:
+// its tools are played, and the rest is left to trocar-sim, which checks it. In another file such a
+// table is a mistake.
+constexpr std::array<std::string_view, 12> kScenarioTables{
+    "organ", "material", "nodes",   "region", "fix",   "displace",
+    "force", "traction", "gravity", "run",    "probe", "output"};
 
 void read_shape(TableReader& reader, ToolShape& shape) {
   const auto set = [&](std::string_view key, float& value_m, double least_mm, double most_mm) {
@@ -127,12 +127,11 @@ Result<Script> parse_script_text(std::string_view text, std::string_view source)
   const auto table = parse_toml(document, text, source, kScriptFileLimitBytes, "script",
                                 "deploy/scenes/example.toml");
   if (!table) return document.error();
-  for (const auto& [key, node] : *table)
-    if (std::find(kScenarioTables.begin(), kScenarioTables.end(), key.str()) !=
-        kScenarioTables.end())
-      document.fail(key.source(), std::string(key.str()),
-                    "is not supported in a script, only in a scenario: remove it");
   TableReader root(document, *table, "");
+  const bool is_scenario = root.has("run");
+  for (const auto key : kScenarioTables)
+    if (root.find(key) != nullptr && !is_scenario)
+      root.fail(key, "is not supported in a script, only in a scenario: remove it");
   Script script{std::string(source), read_tools(document, root, kToolsPerHand)};
   if (script.tools.empty()) root.fail("tool", "is missing, add a [[tool]] with its keys");
   root.finish();

@@ -121,7 +121,16 @@ INSTANTIATE_TEST_SUITE_P(
         Bad{"reaction_of_free", "[[probe]]\nquantity = \"reaction\"\nset = \"top\"", "probe[0].set",
             "a reaction needs a held set"},
         Bad{"cuts", "[[tool]]\n[[tool.key]]\ntime_s = 0\nposition_mm = [0, 0, 0]\nverb = \"cut\"",
-            "tool", "only sessions cut", 11},
+            "organ.source", "which no [[tool]] can cut", 2},
+        Bad{"like_whom", "like = \"server\"", "run.like", "session"},
+        Bad{"like_and_step", "like = \"session\"\ndt_s = 0.0005", "run.dt_s",
+            "follows from like = \"session\", remove it"},
+        Bad{"far_field_of_nothing", "far_field = \"linear\"", "run.far_field",
+            "is for boundary = \"graded\" or like = \"session\", remove it"},
+        Bad{"unknown_far_field", "like = \"session\"\nfar_field = \"quadratic\"", "run.far_field",
+            "linear"},
+        Bad{"no_reduction", "like = \"session\"\nreduction = \"missing.reduction\"",
+            "run.reduction", "missing.reduction"},
         Bad{"no_such_tool", "[[probe]]\nquantity = \"force\"\ntool = 0", "probe[0].tool",
             "there are 0"},
         Bad{"odd_rate", "[[probe]]\nset = \"top\"\nquantity = \"velocity\"\nrate_hz = 300",
@@ -269,7 +278,7 @@ TEST(ScenarioParse, GravityNeedsTheWholeOrgan) {
       << resolved.error().message;
 }
 
-TEST(ScenarioParse, TheExampleIsRightAndIsNoScript) {
+TEST(ScenarioParse, TheExampleIsRightAndHasNoToolsToPlay) {
   const auto path = std::filesystem::path(TROCAR_SOURCE_DIR) / "deploy/scenes/pull.toml";
   auto parsed = parse_scenario(path);
   ASSERT_TRUE(parsed.ok()) << parsed.error().message;
@@ -279,7 +288,8 @@ TEST(ScenarioParse, TheExampleIsRightAndIsNoScript) {
   EXPECT_EQ(resolved->displacements.at(0).nodes.size(), 81u);
   const auto script = tool::parse_script(path);
   ASSERT_FALSE(script.ok());
-  EXPECT_NE(script.error().message.find("only in a scenario"), std::string::npos);
+  EXPECT_NE(script.error().message.find("key tool: is missing"), std::string::npos)
+      << script.error().message;
 }
 
 TEST(ScenarioParse, SetsSelectByBoxAndByDistance) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstdlib>
 #include <thread>
 
 #include "tests/support/program_fixture.h"
@@ -198,19 +199,83 @@ fields_s = [0, 0.005]
     EXPECT_NE(entry.path().extension(), ".part") << "half a file";
 }
 
-TEST_F(SimProgram, WhatOnlySessionsDoIsSaidInOneLine) {
-  const auto tears = write("tears.toml",
-                           "[organ]\nsource = \"block\"\nnodes = [3, 3, 3]\n[material]\n"
-                           "tear_stretch = 1.3\n[run]\nseconds = 0.01\n");
+constexpr const char* kCutBlock = R"([organ]
+source = "block"
+nodes = [9, 5, 9]
+spacing_mm = 5
+[material]
+elastic_law = "neo-hookean"
+[[tool]]
+radius_mm = 1
+edge_mm = 30
+[[tool.key]]
+time_s = 0
+position_mm = [-30, 2, 0]
+shaft = [0, 1, 0]
+verb = "cut"
+[[tool.key]]
+time_s = 0.2
+position_mm = [30, 2, 0]
+[[probe]]
+tool = 0
+quantity = "force"
+[output]
+fields_s = [0, 0.25]
+[run]
+like = "session"
+seconds = 0.256
+)";
+
+TEST_F(SimProgram, AScenarioCutsAndItsJournalVerifies) {
+  const auto cuts = write("cuts.toml", kCutBlock);
+  const auto journal = at("cuts.mcap"), out = at("cuts");
+  ASSERT_EQ(run({cuts, "--out", out, "--journal", journal}), 0) << log();
+  const auto before = read(folder_ / "cuts" / "field_0000000ms.csv"),
+             after = read(folder_ / "cuts" / "field_0000250ms.csv");
+  EXPECT_GT(std::count(after.begin(), after.end(), '\n'),
+            std::count(before.begin(), before.end(), '\n') + 50)
+      << "the wound has nodes of its own";
+  EXPECT_EQ(run({cuts, "--out", out, "--journal", journal}), 5) << "a journal is never overwritten";
+  ASSERT_EQ(std::system((std::string(TROCAR_BINARY_DIR) + "/trocar-journal verify " + journal +
+                         " > " + at("verify.log") + " 2>&1")
+                            .c_str()),
+            0)
+      << read(folder_ / "verify.log");
+
+  // The same hands on the same organ are the same session; on another they are not.
+  ASSERT_EQ(run({"--hands", journal, "--out", at("same"), "--journal", at("same.mcap")}), 0)
+      << log();
+  EXPECT_EQ(read(folder_ / "same" / "field_0000256ms.csv").empty(), false);
+  ASSERT_EQ(run({"--hands", journal, "--organ", "liver", "--out", at("other")}), 0) << log();
+  EXPECT_NE(log().find("256 ticks of its hands on liver"), std::string::npos) << log();
+}
+
+TEST_F(SimProgram, AJournalWithLoadsSaysThatItCannotBeSimulatedAgain) {
+  const auto pulls = write("pulls.toml",
+                           "[organ]\nsource = \"block\"\nnodes = [3, 3, 3]\n[[nodes]]\nname = "
+                           "\"top\"\nids = [26]\n[[force]]\nset = \"top\"\n[[force.key]]\ntime_s "
+                           "= 0\nforce_n = [0, 0.01, 0]\n[run]\nseconds = 0.032\n");
+  ASSERT_EQ(run({pulls, "--out", at("pulls"), "--journal", at("pulls.mcap")}), 0) << log();
+  EXPECT_NE(log().find("are not in a journal"), std::string::npos) << log();
+  EXPECT_EQ(run({"--hands", at("pulls.mcap"), "--out", at("again")}), 3);
+  EXPECT_NE(log().find("is of a scenario with loads"), std::string::npos) << log();
+}
+
+TEST_F(SimProgram, TissueTearsInAScenario) {
+  const auto tears =
+      write("tears.toml",
+            "[organ]\nsource = \"block\"\nnodes = [5, 9, 5]\nspacing_mm = 5\n"
+            "[material]\nelastic_law = \"neo-hookean\"\ntear_stretch = 1.3\n"
+            "[[nodes]]\nname = \"top\"\nbox_min_mm = [-10, 20, -10]\nbox_max_mm = "
+            "[10, 20, 10]\n[[displace]]\nset = \"top\"\n[[displace.key]]\ntime_s = "
+            "0\ndisplacement_mm = [0, 0, 0]\n[[displace.key]]\ntime_s = "
+            "0.3\ndisplacement_mm = [0, 40, 0]\n[[probe]]\nset = \"top\"\nquantity = "
+            "\"reaction\"\n[run]\nseconds = 0.4\n[output]\nfields_s = [0, 0.4]\n");
   ASSERT_EQ(run({tears, "--out", at("tears")}), 0) << log();
-  EXPECT_NE(log().find("tears.toml: tear_stretch is left out"), std::string::npos) << log();
-  const auto cuts = write("cuts.toml",
-                          "[organ]\nsource = \"block\"\n[run]\nseconds = 0.01\n[[tool]]\n"
-                          "[[tool.key]]\ntime_s = 0\nposition_mm = [0, 0, 0]\nverb = \"cut\"\n");
-  EXPECT_EQ(run({cuts, "--out", at("cuts")}), 3);
-  EXPECT_NE(log().find("only sessions cut"), std::string::npos) << log();
-  const std::string line = log();
-  EXPECT_EQ(std::count(line.begin(), line.end(), '\n'), 1) << line;
+  const auto before = read(folder_ / "tears" / "field_0000000ms.csv"),
+             after = read(folder_ / "tears" / "field_0000400ms.csv");
+  EXPECT_GT(std::count(after.begin(), after.end(), '\n'),
+            std::count(before.begin(), before.end(), '\n'));
 }
 
 TEST_F(SimProgram, ExitCodesSayWhatWasWrong) {

@@ -24,7 +24,7 @@ constexpr double kBad = 0.03, kMissed = 0.01;
 constexpr double kThreshold = 0.035, kMostAlarms = 0.2, kAlarmsOnRecord = 0.85;
 constexpr double kLeastForce_n = 0.05;
 constexpr Tick kStateTicks = 8;
-constexpr float kForceMargin = 1.5f;  // of sessions, see server/tissue/step/reduced_tissue.cpp
+constexpr float kForceMargin = 1.5f;  // of sessions, see server/tissue/reduction/reduced_tissue.cpp
 constexpr std::array kDepths_mm{2.0, 5.0, 8.0, 11.0, 15.0};
 constexpr std::array kSlants{0.0, 0.5, 1.0};
 constexpr std::array kSpeeds_mm_s{30.0, 90.0};

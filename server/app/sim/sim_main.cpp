@@ -16,12 +16,15 @@
 #include "common/base/timing.h"
 #include "common/base/version.h"
 #include "server/app/sim/sim_fem.h"
+#include "server/app/sim/sim_hands.h"
+#include "server/app/sim/sim_journal.h"
 #include "server/lab/scenario/field_files.h"
 #include "server/lab/scenario/field_times.h"
 #include "server/lab/scenario/probe_file.h"
 #include "server/lab/scenario/probe_plots.h"
 #include "server/lab/scenario/scenario_run.h"
 #include "server/organs/organ/any_material.h"
+#include "server/organs/organ/local_reduction_file.h"
 
 namespace trocar::app {
 namespace {
@@ -40,6 +43,11 @@ Examples:
       the same with every step solved to the tolerance in [run]
   trocar-sim deploy/scenes/stretch.toml --solver fem --material human_liver_nava2008
       a measured material on quadratic finite elements, which do not lock
+  trocar-sim deploy/scenes/wedge.toml --journal out/wedge.mcap
+      cuts a wedge out of the liver, and records it as a session is recorded: trocar-journal verify
+      simulates it again, trocar-client --replay shows it
+  trocar-sim --hands session.mcap --organ other.organ --out out/other
+      the hands of a recorded session on another organ
 
 Writes probes.csv, and field_<ms>ms.csv and .vtu (ParaView) for the times in [output].
 Ctrl-C ends a run early; what was written until then is complete.
@@ -53,6 +61,8 @@ struct Options {
   std::string scenario;
   std::string out;
   std::string solver = "live";
+  std::string journal;
+  HandsCommand hands;
   bool is_plotted = false;
   unsigned threads = 1;
   std::string log_level = "info";
@@ -103,7 +113,7 @@ struct Totals {
 };
 
 Status simulate(scenario::ScenarioRun& run, const std::filesystem::path& folder, bool is_plotted,
-                Totals& totals) {
+                SimJournal* journal, Totals& totals) {
   auto probes = scenario::ProbeFile::create(folder / "probes.csv", run.scenario());
   if (!probes) return probes.error();
   scenario::FieldTimes field_times(run.scenario().field_times_s, kTick_s);
@@ -117,6 +127,12 @@ Status simulate(scenario::ScenarioRun& run, const std::filesystem::path& folder,
   while (!run.is_finished() && stop_requested == 0) {
     const auto report = run.step();
     totals.add(run.time_s(), report);
+    if (journal != nullptr) {
+      auto& simulation = run.simulation();
+      journal->add(simulation.take_frame(), run.inputs(), run.decisions(),
+                   simulation.context().report);
+      journal->take_due_snapshot(simulation);
+    }
     probes->add(run);
     if (plots) plots->add(run);
     if (auto s = write_due_field(); !s) return s;
@@ -164,11 +180,78 @@ void print_summary(const scenario::ScenarioRun& run, const Totals& totals,
   std::printf("results in %s\n", folder.c_str());
 }
 
+// Two tools each, as ScenarioRun gives them to hands.
+std::vector<participants::Participant> hands_of(const scenario::Scenario& scenario) {
+  std::vector<participants::Participant> hands;
+  for (std::size_t i = 0; i < scenario.tools.size(); i += kToolsPerHand) {
+    auto& hand = hands.emplace_back();
+    hand.slot = ToolSlot{static_cast<std::uint8_t>(i)}.owner();
+    hand.name = "hand " + std::to_string(hands.size());
+    hand.role = participants::Role::Surgeon;
+    for (std::size_t t = i; t < std::min(i + kToolsPerHand, scenario.tools.size()); ++t)
+      hand.tools.push_back(scenario.tools[t].shape);
+  }
+  return hands;
+}
+
+// Null without --journal.
+Result<std::unique_ptr<SimJournal>> open_sim_journal(const Options& options,
+                                                     const scenario::ScenarioRun& run) {
+  if (options.journal.empty()) return std::unique_ptr<SimJournal>();
+  if (!run.has_ticks())
+    return Error{ErrorCode::Usage,
+                 "--journal: records ticks, which a static run and the explicit integrator have "
+                 "not: leave it out"};
+  const auto& resolved = run.resolved();
+  std::optional<journal::ReductionDescription> reduction;
+  if (resolved.reduction)
+    reduction = {organ::reduction_hash(*resolved.reduction),
+                 std::filesystem::path(*run.scenario().run.reduction).filename().string(),
+                 resolved.reduction->source};
+  if (run.has_external_loads())
+    std::fprintf(stderr,
+                 "%s: warning: %s: loads and probed reactions are not in a journal, so that "
+                 "trocar-journal cannot simulate it again; the scenario can\n",
+                 kProgram, options.journal.c_str());
+  return SimJournal::create(options.journal, run.simulation(), hands_of(run.scenario()),
+                            run.has_external_loads(), reduction);
+}
+
+Result<std::filesystem::path> make_folder(const std::filesystem::path& folder) {
+  std::error_code failed;
+  std::filesystem::create_directories(folder, failed);
+  if (failed)
+    return Error{ErrorCode::ResourceMissing,
+                 folder.string() + ": cannot be made (" + failed.message() + "), see --out"};
+  std::signal(SIGINT, request_stop);
+  std::signal(SIGTERM, request_stop);
+  return folder;
+}
+
+Status run_recording(const Options& options) {
+  if (!options.scenario.empty())
+    return Error{ErrorCode::Usage, "--hands: stands in place of a scenario, leave one out"};
+  if (options.solver != "live" || options.is_plotted)
+    return Error{ErrorCode::Usage, "--hands: has neither --solver nor --plot, leave them out"};
+  const std::filesystem::path named =
+      "out/" + std::filesystem::path(options.hands.recording).stem().string();
+  const auto folder = make_folder(options.out.empty() ? named : std::filesystem::path(options.out));
+  if (!folder) return folder.error();
+  return run_hands(options.hands, *folder, options.journal, options.threads, stop_requested);
+}
+
 Status run_scenario(const Options& options) {
+  if (!options.hands.recording.empty()) return run_recording(options);
+  if (options.scenario.empty())
+    return Error{ErrorCode::Usage, "SCENARIO: is missing, name a file (see --help)"};
+  if (!options.hands.organ.empty())
+    return Error{ErrorCode::Usage, "--organ: is of --hands; a scenario names its own organ"};
   const bool is_fem = options.solver == "fem";
   if (auto s = check_fem_options(options.fem, is_fem); !s) return s;
   if (is_fem && options.is_plotted)
     return Error{ErrorCode::Usage, "--plot: --solver fem draws nothing, remove it"};
+  if (is_fem && !options.journal.empty())
+    return Error{ErrorCode::Usage, "--journal: --solver fem has no ticks to record, remove it"};
   auto parsed = scenario::parse_scenario(options.scenario);
   if (!parsed) return parsed.error();
   const std::filesystem::path folder =
@@ -179,11 +262,15 @@ Status run_scenario(const Options& options) {
   if (!resolved) return resolved.error();
   if (!is_fem)
     if (auto s = scenario::check_supported(*resolved); !s) return s;
-  if (organ::any_material(resolved->organ,
-                          [](const material::Material& m) { return m.tear_stretch > 0; }))
-    std::fprintf(
-        stderr, "%s: warning: %s: tear_stretch is left out, so far tissue tears in sessions only\n",
-        kProgram, resolved->scenario.source.c_str());
+  const bool has_ticks = !is_fem && resolved->scenario.run.mode == scenario::RunMode::Dynamic &&
+                         resolved->scenario.run.integrator == scenario::Integrator::Implicit;
+  if (!has_ticks && organ::any_material(resolved->organ, [](const material::Material& m) {
+        return m.tear_stretch > 0;
+      }))
+    std::fprintf(stderr,
+                 "%s: warning: %s: tear_stretch is left out: tissue tears in dynamic runs of the "
+                 "live solver only\n",
+                 kProgram, resolved->scenario.source.c_str());
   if (is_fem && organ::any_material(resolved->organ, [](const material::Material& m) {
         return m.has_averaged_strain;
       }))
@@ -191,20 +278,18 @@ Status run_scenario(const Options& options) {
                  "%s: warning: %s: averaged_strain is of the live solver, here quadratic elements "
                  "do not lock\n",
                  kProgram, resolved->scenario.source.c_str());
-  std::error_code failed;
-  std::filesystem::create_directories(folder, failed);
-  if (failed)
-    return Error{ErrorCode::ResourceMissing,
-                 folder.string() + ": cannot be made (" + failed.message() + "), see --out"};
-  std::signal(SIGINT, request_stop);
-  std::signal(SIGTERM, request_stop);
+  if (const auto made = make_folder(folder); !made) return made.error();
   if (is_fem)
     return run_fem(options.fem, std::move(*resolved), folder, options.threads, stop_requested);
   scenario::ScenarioRun run(
       std::move(*resolved),
       options.solver == "full" ? scenario::Solver::Full : scenario::Solver::Live, options.threads);
+  auto journal = open_sim_journal(options, run);
+  if (!journal) return journal.error();
   Totals totals;
-  if (auto s = simulate(run, folder, options.is_plotted, totals); !s) return s;
+  if (auto s = simulate(run, folder, options.is_plotted, journal->get(), totals); !s) return s;
+  if (*journal)
+    if (auto s = (*journal)->close(); !s) return s;
   print_summary(run, totals, folder);
   return {};
 }
@@ -218,7 +303,7 @@ int run(int argc, char** argv) {
   app.footer(kExamples);
   app.set_version_flag("--version", std::string(kProgram) + " " + kVersion + ", sim_version " +
                                         std::to_string(kSimVersion));
-  app.add_option("SCENARIO", options.scenario, "scenario file (.toml)")->required();
+  app.add_option("SCENARIO", options.scenario, "scenario file (.toml)");
   app.add_option("--out", options.out, "folder of the results [dir in [output], else out/<name>]")
       ->type_name("DIR");
   app.add_option("--solver", options.solver,
@@ -234,6 +319,10 @@ int run(int argc, char** argv) {
       ->type_name("N")
       ->check(CLI::Range(1, 64))
       ->capture_default_str();
+  app.add_option("--journal", options.journal,
+                 "also record the run as a session is recorded, in this file (.mcap)")
+      ->type_name("FILE");
+  add_hands_options(app, options.hands);
   add_fem_options(app, options.fem);
   app.add_option("--log-level", options.log_level, "error, warn, info, debug or off")
       ->capture_default_str();

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstring>
+#include <span>
 #include <string>
 
 namespace trocar::scenario {
@@ -27,21 +28,28 @@ Status write_file(const std::filesystem::path& path, Body body) {
   return {};
 }
 
-void write_csv(std::FILE* file, const Field& field, const organ::MaterialMap& regions) {
+// What is written of a mesh, of the organ's own or of what was cut of it.
+struct Mesh {
+  std::span<const Vec3d> rest_m;
+  std::span<const mesh::Tet> tets;
+  std::span<const std::uint16_t> node_regions, cell_regions;
+};
+
+void write_csv(std::FILE* file, const Field& field, const Mesh& mesh) {
   std::fputs(
       "node,rest_x_mm,rest_y_mm,rest_z_mm,displacement_x_mm,displacement_y_mm,"
       "displacement_z_mm,velocity_x_mm_s,velocity_y_mm_s,velocity_z_mm_s,held,region\n",
       file);
-  for (std::size_t i = 0; i < field.organ.mesh.node_count(); ++i) {
-    const Vec3d p = field.organ.mesh.rest_positions[i] * 1e3;
+  for (std::size_t i = 0; i < mesh.rest_m.size(); ++i) {
+    const Vec3d p = mesh.rest_m[i] * 1e3;
     const Vec3d u = field.displacements_m[i] * 1e3;
     const Vec3d v = field.velocities_m_s[i] * 1e3;
     std::fprintf(file, "%zu,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%d,%u\n", i, p.x, p.y, p.z,
-                 u.x, u.y, u.z, v.x, v.y, v.z, field.is_held[i], regions.nodes[i]);
+                 u.x, u.y, u.z, v.x, v.y, v.z, field.is_held[i], mesh.node_regions[i]);
   }
 }
 
-void write_vectors(std::FILE* file, const char* name, const std::vector<Vec3d>& vectors) {
+void write_vectors(std::FILE* file, const char* name, std::span<const Vec3d> vectors) {
   std::fprintf(file,
                "        <DataArray type=\"Float64\" Name=\"%s\" NumberOfComponents=\"3\" "
                "format=\"ascii\">\n",
@@ -50,7 +58,7 @@ void write_vectors(std::FILE* file, const char* name, const std::vector<Vec3d>& 
   std::fputs("        </DataArray>\n", file);
 }
 
-void write_regions(std::FILE* file, const std::vector<std::uint16_t>& regions) {
+void write_regions(std::FILE* file, std::span<const std::uint16_t> regions) {
   std::fputs("        <DataArray type=\"UInt16\" Name=\"region\" format=\"ascii\">\n", file);
   for (const auto region : regions) std::fprintf(file, "%u\n", region);
   std::fputs("        </DataArray>\n", file);
@@ -94,9 +102,9 @@ void write_cells(std::FILE* file, const Cells& cells, int type) {
   std::fputs("        </DataArray>\n      </Cells>\n", file);
 }
 
-void write_vtu(std::FILE* file, const Field& field, const organ::MaterialMap& regions) {
-  const auto& mesh = field.organ.mesh;
-  const std::size_t cell_count = mesh.tets.empty() ? mesh.links.size() : mesh.tets.size();
+void write_vtu(std::FILE* file, const Field& field, const Mesh& mesh) {
+  const auto& links = field.organ.mesh.links;
+  const std::size_t cell_count = mesh.tets.empty() ? links.size() : mesh.tets.size();
   std::fputs(
       "<?xml version=\"1.0\"?>\n"
       "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" "
@@ -106,20 +114,20 @@ void write_vtu(std::FILE* file, const Field& field, const organ::MaterialMap& re
   write_region_names(file, field.organ);
   std::fprintf(file,
                "    <Piece NumberOfPoints=\"%zu\" NumberOfCells=\"%zu\">\n      <PointData>\n",
-               mesh.node_count(), cell_count);
+               mesh.rest_m.size(), cell_count);
   write_vectors(file, "displacement_m", field.displacements_m);
   write_vectors(file, "velocity_m_s", field.velocities_m_s);
   std::fputs("        <DataArray type=\"UInt8\" Name=\"held\" format=\"ascii\">\n", file);
-  for (std::size_t i = 0; i < mesh.node_count(); ++i) std::fprintf(file, "%d\n", field.is_held[i]);
+  for (std::size_t i = 0; i < mesh.rest_m.size(); ++i) std::fprintf(file, "%d\n", field.is_held[i]);
   std::fputs("        </DataArray>\n", file);
-  write_regions(file, regions.nodes);
+  write_regions(file, mesh.node_regions);
   std::fputs("      </PointData>\n      <CellData>\n", file);
-  write_regions(file, mesh.tets.empty() ? regions.spring_pairs : regions.tets);
+  write_regions(file, mesh.cell_regions);
   std::fputs("      </CellData>\n      <Points>\n", file);
-  write_vectors(file, "rest_m", mesh.rest_positions);
+  write_vectors(file, "rest_m", mesh.rest_m);
   std::fputs("      </Points>\n", file);
   if (mesh.tets.empty())
-    write_cells(file, mesh.links, kVtkLine);
+    write_cells(file, links, kVtkLine);
   else
     write_cells(file, mesh.tets, kVtkTetra);
   std::fputs("    </Piece>\n  </UnstructuredGrid>\n</VTKFile>\n", file);
@@ -127,14 +135,34 @@ void write_vtu(std::FILE* file, const Field& field, const organ::MaterialMap& re
 
 }  // namespace
 
-Field field_of(const ScenarioRun& run) {
-  const auto& world = run.world();
-  Field field{run.organ(), run.time_s(), {}, {}, {}};
+namespace {
+
+CutMesh cut_mesh_of(const topology::Topology& topology) {
+  CutMesh mesh;
+  mesh.rest_m.assign(topology.rest().begin(), topology.rest().end());
+  for (std::uint32_t n = 0; n < topology.node_count(); ++n)
+    mesh.node_regions.push_back(topology.has_node(NodeIndex(n)) ? topology.material_of(NodeIndex(n))
+                                                                : std::uint16_t{0});
+  for (std::uint32_t t = 0; t < topology.tet_count(); ++t) {
+    if (!topology.has_tet(TetIndex(t))) continue;
+    mesh.tets.push_back(topology.tet(TetIndex(t)));
+    mesh.tet_regions.push_back(topology.material_of(TetIndex(t)));
+  }
+  return mesh;
+}
+
+}  // namespace
+
+Field field_of(const step::Simulation& simulation, double time_s) {
+  const auto& world = simulation.state().world;
+  Field field{simulation.organ(), time_s, {}, {}, {}};
   for (std::size_t i = 0; i < world.node_count(); ++i) {
     field.displacements_m.push_back(to_double(world.displacements[i]));
     field.velocities_m_s.push_back(to_double(world.velocities[i]));
     field.is_held.push_back(world.node_classes[i] == world::NodeClass::Fixed ? 1 : 0);
   }
+  const auto& cuts = simulation.state().cuts;
+  if (!cuts.history().empty()) field.cut = cut_mesh_of(cuts.topology());
   return field;
 }
 
@@ -142,10 +170,15 @@ Status write_field(const std::filesystem::path& folder, const Field& field) {
   char name[40];
   std::snprintf(name, sizeof name, "field_%07lldms", std::llround(field.time_s * 1e3));
   const auto regions = organ::material_map(field.organ);
+  const auto& whole = field.organ.mesh;
+  const Mesh mesh = field.cut ? Mesh{field.cut->rest_m, field.cut->tets, field.cut->node_regions,
+                                     field.cut->tet_regions}
+                              : Mesh{whole.rest_positions, whole.tets, regions.nodes,
+                                     whole.tets.empty() ? regions.spring_pairs : regions.tets};
   const auto csv = folder / (std::string(name) + ".csv");
-  if (auto s = write_file(csv, [&](std::FILE* f) { write_csv(f, field, regions); }); !s) return s;
+  if (auto s = write_file(csv, [&](std::FILE* f) { write_csv(f, field, mesh); }); !s) return s;
   const auto vtu = folder / (std::string(name) + ".vtu");
-  return write_file(vtu, [&](std::FILE* f) { write_vtu(f, field, regions); });
+  return write_file(vtu, [&](std::FILE* f) { write_vtu(f, field, mesh); });
 }
 
 }  // namespace trocar::scenario

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "server/lab/scenario/scenario_resolver.h"
+#include "server/organs/organ/local_reduction_file.h"
 
 namespace trocar::scenario {
 namespace {
@@ -89,7 +90,7 @@ Status resolve_tractions(const Resolver& resolver, const std::vector<Hold>& hold
         normal_areas[node.value] += twice / 6;
       }
     }
-    ResolvedForce force{{}, rule.over_time, {}, {}};
+    LoadedNodes force{{}, rule.over_time, {}, {}};
     bool moves = false;
     for (const auto node : *nodes) {
       if (areas[node.value] == 0) continue;
@@ -157,6 +158,39 @@ Status resolve_anchors(const Resolver& resolver, ResolvedScenario& result) {
   return {};
 }
 
+Status check_blades(const Resolver& resolver, const organ::Organ& organ) {
+  const auto& scenario = resolver.scenario();
+  if (!has_blade(scenario)) return {};
+  if (organ.mesh.tets.empty() || !organ.mesh.links.empty())
+    return resolver.wrong(
+        scenario.organ.place,
+        "is an organ without tets, or with links, which no [[tool]] can cut: take "
+        "\"liver\" or \"block\"");
+  if (scenario.run.mode == RunMode::Static)
+    return resolver.wrong(place_of_key(scenario.run.given, "mode", scenario.run_place),
+                          "is \"static\", and a [[tool]] has the verb \"cut\": take \"dynamic\"");
+  return {};
+}
+
+Status resolve_reduction(const Resolver& resolver, ResolvedScenario& result) {
+  const auto& run = resolver.scenario().run;
+  if (!run.reduction) return {};
+  const Place& place = place_of_key(run.given, "reduction", resolver.scenario().run_place);
+  if (run.steps_per_tick > 1)
+    return resolver.wrong(place, "needs one step of time in a tick: remove dt_s");
+  if (!result.displacements.empty() || !result.forces.empty())
+    return resolver.wrong(place,
+                          "is for tools alone: remove [[displace]], [[force]], [[traction]]");
+  for (const auto& probe : resolver.scenario().probes)
+    if (probe.quantity == ProbeQuantity::Reaction)
+      return resolver.wrong(probe.place, "a reaction is not known where a reduction acts");
+  const auto path = resolver.scenario().source.parent_path() / *run.reduction;
+  auto reduction = organ::read_session_reduction(path.string(), result.organ);
+  if (!reduction) return resolver.wrong(place, reduction.error().message);
+  result.reduction = std::make_shared<const organ::LocalReduction>(std::move(*reduction));
+  return {};
+}
+
 // Far from the queue nothing moves: whatever acts there has to be in equilibrium already.
 Status check_gravity(const Resolver& resolver, const organ::Organ& organ) {
   const auto& scenario = resolver.scenario();
@@ -195,15 +229,11 @@ Error scenario_error(const Scenario& scenario, const Place& place, const std::st
   return {ErrorCode::BadFile, scenario.source.string() + line + ": " + key + what};
 }
 
-Vec3d TimedVector::at(double time_s) const {
-  if (time_s <= keys.front().time_s) return keys.front().value;
-  for (std::size_t i = 1; i < keys.size(); ++i) {
-    if (time_s > keys[i].time_s) continue;
-    const auto& [t0, a] = keys[i - 1];
-    const auto& [t1, b] = keys[i];
-    return a + (b - a) * ((time_s - t0) / (t1 - t0));
-  }
-  return keys.back().value;
+bool has_blade(const Scenario& scenario) {
+  return std::ranges::any_of(scenario.tools, [](const tool::ScriptTool& tool) {
+    return std::ranges::any_of(tool.keys,
+                               [](const auto& key) { return key.verb == tool::Verb::Cut; });
+  });
 }
 
 Result<ResolvedScenario> resolve(Scenario scenario) {
@@ -223,6 +253,8 @@ Result<ResolvedScenario> resolve(Scenario scenario) {
   if (auto s = resolve_tractions(resolver, holds, result); !s) return s.error();
   if (auto s = resolve_probes(resolver, holds, result); !s) return s.error();
   if (auto s = resolve_anchors(resolver, result); !s) return s.error();
+  if (auto s = check_blades(resolver, result.organ); !s) return s.error();
+  if (auto s = resolve_reduction(resolver, result); !s) return s.error();
   result.scenario = std::move(scenario);
   return result;
 }

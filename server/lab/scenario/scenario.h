@@ -11,6 +11,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -19,7 +20,9 @@
 #include "common/base/result.h"
 #include "common/tool/script.h"
 #include "server/organs/material/material_keys.h"
+#include "server/organs/organ/local_reduction.h"
 #include "server/organs/organ/organ.h"
+#include "server/tissue/step/external_loads.h"
 
 namespace trocar::scenario {
 
@@ -82,16 +85,8 @@ struct SetUse {
   std::string name;
 };
 
-// A vector over time: linear between keys, constant before the first and after the last.
-struct TimedVector {
-  struct Key {
-    double time_s = 0;  // strictly increasing
-    Vec3d value;
-  };
-  std::vector<Key> keys;  // at least one
-
-  Vec3d at(double time_s) const;
-};
+using step::kAllAxes;
+using step::TimedVector;
 
 // A part of the organ with a material of its own.
 struct RegionRule {
@@ -99,8 +94,6 @@ struct RegionRule {
   std::optional<SetUse> set;  // without: the organ's own region of this name is changed
   MaterialChange material;
 };
-
-inline constexpr std::uint8_t kAllAxes = 7;  // bit 0: x, bit 1: y, bit 2: z
 
 struct DisplacementRule {
   SetUse set;
@@ -164,10 +157,12 @@ struct RunRule {
   // Graded, outside the queue; without: what the organ needs.
   std::optional<std::uint32_t> far_sweeps;
   std::optional<double> far_over_relaxation;
-  bool self_contact = true;         // tissue does not pass through tissue; dynamic runs
-  double tolerance_n = 1e-5;        // of the full solver: residual at which a step is done
-  std::uint32_t max_sweeps = 2000;  // of the full solver
-  std::vector<Place> given;         // of each key in [run]
+  bool has_linear_far_field = false;     // as in sessions
+  std::optional<std::string> reduction;  // file, relative to the scenario
+  bool self_contact = true;              // tissue does not pass through tissue; dynamic runs
+  double tolerance_n = 1e-5;             // of the full solver: residual at which a step is done
+  std::uint32_t max_sweeps = 2000;       // of the full solver
+  std::vector<Place> given;              // of each key in [run]
 
   double dt_s() const { return 1e-3 / steps_per_tick; }
 };
@@ -199,34 +194,20 @@ Result<Scenario> parse_scenario_text(std::string_view text, std::string_view sou
 
 using NodeList = std::vector<NodeIndex>;  // ascending, distinct, not empty
 
-struct ResolvedDisplacement {
-  NodeList nodes;
-  std::uint8_t axes = kAllAxes;
-  TimedVector over_time;  // m
-};
-
-// Of forces and tractions: the force on nodes[i] is value x shares[i], or minus value.x x
-// normal_areas_m2[i] for a pressure.
-struct ResolvedForce {
-  NodeList nodes;
-  TimedVector over_time;               // N or Pa
-  std::vector<double> shares;          // 1 or m^2
-  std::vector<Vec3d> normal_areas_m2;  // of a pressure, then shares is empty
-
-  Vec3d on_node(std::size_t i, const Vec3d& value) const {
-    return normal_areas_m2.empty() ? value * shares[i] : normal_areas_m2[i] * -value.x;
-  }
-};
+// Displaced and loaded nodes; forces and tractions are one there.
+using step::DisplacedNodes;
+using step::LoadedNodes;
 
 // A scenario on its organ. No node is held twice along an axis, and no force acts along an axis
 // along which its node is held; tractions may reach held nodes beside free ones.
 struct ResolvedScenario {
   Scenario scenario;
   organ::Organ organ;  // with the scenario's materials, gravity and fixed nodes
-  std::vector<ResolvedDisplacement> displacements;
-  std::vector<ResolvedForce> forces;       // and tractions
-  std::vector<NodeList> probe_nodes;       // per probe; empty for a tool's
-  std::vector<tool::AnchorPoint> anchors;  // per tool
+  std::vector<DisplacedNodes> displacements;
+  std::vector<LoadedNodes> forces;                         // and tractions
+  std::vector<NodeList> probe_nodes;                       // per probe; empty for a tool's
+  std::vector<tool::AnchorPoint> anchors;                  // per tool
+  std::shared_ptr<const organ::LocalReduction> reduction;  // null: none
 };
 
 // Of a key in a list of places, or of `other` if it is not in the list.
@@ -236,5 +217,8 @@ const Place& place_of_key(const std::vector<Place>& places, std::string_view key
 Error scenario_error(const Scenario& scenario, const Place& place, const std::string& what);
 
 Result<ResolvedScenario> resolve(Scenario scenario);
+
+// A tool of it has the verb "cut".
+bool has_blade(const Scenario& scenario);
 
 }  // namespace trocar::scenario

@@ -1,6 +1,7 @@
 // [run] of a scenario's TOML form.
 
 #include "server/lab/scenario/scenario_tables.h"
+#include "server/tissue/step/tick_report.h"
 
 namespace trocar::scenario {
 namespace {
@@ -18,6 +19,33 @@ void read_count(tool::TableReader& reader, std::string_view key, std::int64_t le
     value = static_cast<std::uint32_t>(*number);
 }
 
+// What a session does unless its server is told otherwise (step::TickDecisions).
+void read_like(tool::TableReader& reader, RunRule& run) {
+  if (!reader.choice<bool, 1>("like", {{{"session", true}}})) return;
+  const step::TickDecisions session;
+  run.boundary = Boundary::Graded;
+  run.depth = session.depth_limit;
+  run.nodes = session.node_limit;
+  run.sweeps = session.sweeps;
+  run.over_relaxation = static_cast<double>(session.over_relaxation);
+  run.has_linear_far_field = !session.is_far_exact;
+  refuse_keys(reader, {"dt_s", "integrator", "boundary"}, "follows from like = \"session\"");
+}
+
+void read_far_field(tool::TableReader& reader, RunRule& run) {
+  const auto is_linear =
+      reader.choice<bool, 2>("far_field", {{{"linear", true}, {"exact", false}}});
+  run.has_linear_far_field = is_linear.value_or(run.has_linear_far_field);
+  run.reduction = reader.string("reduction");
+  std::uint32_t sweeps = 0;
+  read_count(reader, "far_sweeps", 1, 16, sweeps);
+  if (sweeps > 0) run.far_sweeps = sweeps;
+  run.far_over_relaxation = reader.number("far_over_relaxation", 0.5, 1.9);
+  if (run.boundary != Boundary::Graded)
+    refuse_keys(reader, {"far_sweeps", "far_over_relaxation", "far_field", "reduction"},
+                "is for boundary = \"graded\" or like = \"session\"");
+}
+
 void read_boundary(tool::TableReader& reader, RunRule& run) {
   const auto boundary = reader.choice<Boundary, 3>(
       "boundary",
@@ -29,17 +57,13 @@ void read_boundary(tool::TableReader& reader, RunRule& run) {
   read_count(reader, "nodes", 1, 10'000'000, limit);
   if (limit > 0) run.nodes = limit;
   const bool is_limited = run.depth || run.nodes;
-  run.boundary = boundary.value_or(is_limited ? Boundary::Frozen : Boundary::Whole);
+  if (boundary || !reader.has("like"))
+    run.boundary = boundary.value_or(is_limited ? Boundary::Frozen : Boundary::Whole);
   if (run.boundary == Boundary::Whole)
     refuse_keys(reader, {"depth", "nodes"}, "limits boundary \"frozen\" or \"graded\"");
   else if (!is_limited)
     reader.fail("boundary", "\"frozen\" and \"graded\" need depth or nodes or both beside it");
-  limit = 0;
-  read_count(reader, "far_sweeps", 1, 16, limit);
-  if (limit > 0) run.far_sweeps = limit;
-  run.far_over_relaxation = reader.number("far_over_relaxation", 0.5, 1.9);
-  if (run.boundary != Boundary::Graded)
-    refuse_keys(reader, {"far_sweeps", "far_over_relaxation"}, "is for boundary = \"graded\"");
+  read_far_field(reader, run);
 }
 
 void read_step(tool::TableReader& reader, RunRule& run) {
@@ -81,6 +105,7 @@ RunRule read_run(tool::TableReader& reader) {
     run.load_times_s.push_back(run.seconds * i / load_steps);
   const auto start = reader.choice<bool, 2>("start", {{{"rest", false}, {"equilibrium", true}}});
   run.starts_in_equilibrium = start.value_or(false);
+  read_like(reader, run);
   read_boundary(reader, run);
   read_step(reader, run);
   read_count(reader, "sweeps", 1, 64, run.sweeps);
@@ -94,10 +119,10 @@ RunRule read_run(tool::TableReader& reader) {
   run.tolerance_n = reader.number("tolerance_n", 1e-9, 1).value_or(run.tolerance_n);
   read_count(reader, "max_sweeps", 1, 1'000'000, run.max_sweeps);
   if (run.mode == RunMode::Static)
-    refuse_keys(
-        reader,
-        {"start", "boundary", "depth", "nodes", "integrator", "dt_s", "sweeps", "self_contact"},
-        "is for mode = \"dynamic\"");
+    refuse_keys(reader,
+                {"start", "like", "reduction", "far_field", "boundary", "depth", "nodes",
+                 "integrator", "dt_s", "sweeps", "self_contact"},
+                "is for mode = \"dynamic\"");
   else
     refuse_keys(reader, {"load_steps"}, "is for mode = \"static\"");
   reader.finish();

@@ -140,12 +140,6 @@ void read_scenario(tool::Document& document, tool::TableReader& root, Scenario& 
     r.finish();
   });
   scenario.tools = tool::read_tools(document, root, kMaxTools);
-  for (std::size_t i = 0; i < scenario.tools.size(); ++i)
-    for (const auto& key : scenario.tools[i].keys)
-      if (key.verb == tool::Verb::Cut)
-        return root.fail("tool", table_entry("tool", i) +
-                                     " has the verb \"cut\", so far only sessions cut "
-                                     "(trocar-server)");
   if (!with("run", [&](tool::TableReader& r) { scenario.run = read_run(r); }))
     root.fail("run", "is missing, add [run] with seconds");
   scenario.run_place = place_of(root, "run");

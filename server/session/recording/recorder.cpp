@@ -45,12 +45,15 @@ class FileSink final : public MessageSink {
 
 Result<std::unique_ptr<Recorder>> Recorder::create(
     const std::string& path, const organ::Organ& organ, const wire::SurfaceLayout& layout,
-    const std::optional<journal::ReductionDescription>& reduction) {
+    const std::optional<journal::ReductionDescription>& reduction, bool has_external_loads) {
   const std::uint64_t now = utc_ns();
   const std::uint64_t hash = organ::organ_hash(organ);
-  auto writer = journal::SessionJournalWriter::create(
-      path,
-      {.start_utc_ns = now, .organ_name = organ.name, .organ_hash = hash, .reduction = reduction});
+  auto writer =
+      journal::SessionJournalWriter::create(path, {.start_utc_ns = now,
+                                                   .organ_name = organ.name,
+                                                   .organ_hash = hash,
+                                                   .reduction = reduction,
+                                                   .has_external_loads = has_external_loads});
   if (!writer) return writer.error();
   if (auto s = (*writer)->write(journal::JournalTopic::Organ, 0, now, organ::encode_organ(organ));
       !s)

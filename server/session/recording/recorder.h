@@ -44,14 +44,18 @@ class Recorder {
   static constexpr std::size_t kQueueParticipants = 64;
 
   // Creates the file with organ and topology; copies what it keeps. Fails if the file exists or
-  // cannot be written. reduction: of the session; nothing: it has none.
+  // cannot be written. reduction: of the session; nothing: it has none. has_external_loads: more
+  // acts on the tissue than the ticks' records tell, so that nobody can simulate them again.
   static Result<std::unique_ptr<Recorder>> create(
       const std::string& path, const organ::Organ& organ, const wire::SurfaceLayout& layout,
-      const std::optional<journal::ReductionDescription>& reduction = {});
+      const std::optional<journal::ReductionDescription>& reduction = {},
+      bool has_external_loads = false);
   ~Recorder();
 
   // Simulation thread.
   void take_frame(const step::SharedFrame& frame);
+  // A producer that can wait asks: near kQueueBytes the next frame may be dropped.
+  std::size_t queued_bytes() const { return queued_bytes_.load(std::memory_order_relaxed); }
   // The I/O thread calls it after each change.
   void take_participants(std::vector<participants::Participant> present, Tick tick);
   // After both producers have ended: writes what is queued and the file's summary.

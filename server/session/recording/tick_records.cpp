@@ -43,6 +43,15 @@ void to_message(const step::TickRecord& record, const step::TickDecisions* previ
     if (d.far_interval != 1) decisions.set_far_interval(d.far_interval);
     if (d.layer_sweeps != step::TickDecisions{}.layer_sweeps)
       decisions.mutable_layer_sweeps()->Assign(d.layer_sweeps.begin(), d.layer_sweeps.end());
+    const auto& p = d.policy;
+    if (p != step::TickPolicy{}) {
+      auto& policy = *decisions.mutable_policy();
+      policy.set_steps_per_tick(p.steps_per_tick);
+      policy.set_residual_tolerance_n(p.residual_tolerance_n);
+      policy.set_max_sweeps(p.max_sweeps);
+      policy.set_far_over_relaxation(p.far_over_relaxation);
+      policy.set_has_no_self_contact(!p.has_self_contact);
+    }
   }
   message.set_mark(static_cast<proto::MarkAction>(record.inputs.mark));
   for (const auto slot : record.inputs.leaves) message.add_leave()->set_slot(slot.value);
@@ -75,7 +84,7 @@ Status from_message(const proto::TickRecord& message, step::TickRecord& record) 
   record.inputs.clear();
   if (message.has_decisions()) {
     const auto& d = message.decisions();
-    if (d.boundary() > static_cast<std::uint32_t>(world::Boundary::Graded))
+    if (d.boundary() > static_cast<std::uint32_t>(world::Boundary::Whole))
       return bad(record.tick, "unknown boundary mode");
     record.decisions = {.depth_limit = d.depth_limit(),
                         .node_limit = d.node_limit(),
@@ -86,6 +95,12 @@ Status from_message(const proto::TickRecord& message, step::TickRecord& record) 
                         .is_far_exact = d.is_far_exact(),
                         .far_interval = std::max(1u, d.far_interval()),
                         .is_reduction_off = d.is_reduction_off()};
+    if (d.has_policy())
+      record.decisions.policy = {.steps_per_tick = d.policy().steps_per_tick(),
+                                 .residual_tolerance_n = d.policy().residual_tolerance_n(),
+                                 .max_sweeps = d.policy().max_sweeps(),
+                                 .far_over_relaxation = d.policy().far_over_relaxation(),
+                                 .has_self_contact = !d.policy().has_no_self_contact()};
     auto& layers = record.decisions.layer_sweeps;
     if (d.layer_sweeps_size() > static_cast<int>(layers.size()))
       return bad(record.tick, "layer_sweeps: more than three layers");

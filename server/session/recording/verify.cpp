@@ -86,7 +86,7 @@ Result<VerifyReport> verify_journal(const std::string& path,
     return Error{ErrorCode::BadFile, path + ": /organ is not the organ that the session names"};
 
   VerifyReport report;
-  report.is_resimulated = info.sim_version == kSimVersion;
+  report.is_resimulated = info.sim_version == kSimVersion && !info.has_external_loads;
   report.last_tick = info.last_tick;
   report.container = (*journal)->container().summary_text();
   std::shared_ptr<const organ::LocalReduction> reduction;
@@ -95,7 +95,12 @@ Result<VerifyReport> verify_journal(const std::string& path,
     if (!read) return read.error();
     reduction = std::move(*read);
   }
-  if (!report.is_resimulated)
+  if (info.has_external_loads)
+    report.reasons.push_back(
+        "it is of a scenario with loads besides its tools, which are not recorded: run the "
+        "scenario "
+        "again");
+  else if (!report.is_resimulated)
     report.reasons.push_back(
         fmt::format("it was recorded with sim_version {}, this program has {}: it cannot be "
                     "simulated again, only its surfaces were decoded",

@@ -21,6 +21,13 @@ FarPlan FarPlan::of(double stiffness, double mass, double dt) {
   return plan.with_sweeps(plan.kappa <= kMostKappaOneSweep ? 1 : 2);
 }
 
+FarPlan FarPlan::with_steps(std::uint32_t steps_per_tick) const {
+  FarPlan plan = *this;
+  if (steps_per_tick == 1) return plan;
+  plan.kappa /= static_cast<float>(steps_per_tick * steps_per_tick);
+  return plan.with_sweeps(plan.kappa <= kMostKappaOneSweep ? 1 : 2);
+}
+
 FarPlan FarPlan::with_interval(std::uint32_t steps) const {
   FarPlan plan = *this;
   if (steps == 1) return plan;

@@ -19,6 +19,8 @@ struct FarPlan {
   FarPlan with_sweeps(std::uint32_t count) const;
   // For sweeps in every so many steps.
   FarPlan with_interval(std::uint32_t steps) const;
+  // For steps of time that are shorter by this ratio.
+  FarPlan with_steps(std::uint32_t steps_per_tick) const;
 };
 
 }  // namespace trocar::dynamics

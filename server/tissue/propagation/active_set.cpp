@@ -8,6 +8,7 @@ using world::Boundary;
 using world::NodeClass;
 
 void ActiveSet::collect(const PropagationQueue& queue, Boundary boundary, world::World& world) {
+  if (boundary == Boundary::Whole) return collect_whole(world);
   std::swap(nodes_, before_);
   nodes_.clear();
   const bool stops_outer = boundary == Boundary::Frozen && world.boundary != boundary;
@@ -39,11 +40,24 @@ void ActiveSet::collect(const PropagationQueue& queue, Boundary boundary, world:
   std::sort(nodes_.begin() + static_cast<std::ptrdiff_t>(queued), nodes_.end());
 }
 
+void ActiveSet::collect_whole(world::World& world) {
+  world.boundary = Boundary::Whole;
+  has_history_ = true;
+  nodes_.clear();
+  for (std::uint32_t i = 0; i < world.node_count(); ++i) {
+    if (world.node_classes[i] == NodeClass::Fixed) continue;
+    world.node_classes[i] = NodeClass::Active;
+    world.quiet_ticks[i] = 0;
+    nodes_.push_back(NodeIndex(i));
+  }
+}
+
 std::span<const NodeIndex> ActiveSet::settle(const PropagationQueue& queue,
                                              std::span<const float> residuals_n,
                                              world::World& world) {
   const auto below = [](const Vec3f& v, float limit) { return length_squared(v) < limit * limit; };
   settled_.clear();
+  if (world.boundary == Boundary::Whole) return settled_;
   for (std::size_t i = 0; i < nodes_.size(); ++i) {
     const auto n = nodes_[i].value;
     if (queue.contains(nodes_[i])) continue;

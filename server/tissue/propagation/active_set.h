@@ -7,6 +7,7 @@
 // displacement all stayed below thresholds: nothing freezes with a dent.
 // Boundary::Graded: all other nodes move too, with fewer sweeps; a node that left the queue keeps
 // all sweeps for 100 ticks, so that a change of class disturbs nothing.
+// Boundary::Whole: every node that is not fixed is in the set, in ascending order, and stays.
 // O(nodes in the set) per tick.
 
 #include <span>
@@ -34,8 +35,8 @@ class ActiveSet {
   // Classes were changed by somebody else.
   void forget() { has_history_ = false; }
 
-  // Sets classes of queued nodes to Active. Sweep order: queue order, then lingering nodes
-  // ascending; fixed nodes are left out.
+  // Sets classes of queued nodes to Active, of all nodes for Boundary::Whole. Sweep order: queue
+  // order, then lingering nodes ascending; fixed nodes are left out.
   void collect(const PropagationQueue& queue, world::Boundary boundary, world::World& world);
   std::span<const NodeIndex> nodes() const { return nodes_; }
 
@@ -45,6 +46,8 @@ class ActiveSet {
                                     std::span<const float> residuals_n, world::World& world);
 
  private:
+  void collect_whole(world::World& world);
+
   std::vector<NodeIndex> nodes_, before_, settled_;
   bool has_history_ = false;
 };

@@ -99,6 +99,7 @@ StepContext::StepContext(const Scene& s, unsigned workers, const world::World& u
       surface_displacements(state.cuts.layout().vertex_count()) {
   if (has_linear_far_field) solver.use_linear_far_field(uncut);
   contacts.reserve();
+  seeds.reserve(2 * kMaxTools);
   requests.reserve(kMaxTools);
   claim_events.reserve(4 * kMaxTools);
   solver_changes.reserve(4 * kTicksPerFrame);
@@ -116,11 +117,38 @@ StepContext::StepContext(const Scene& s, unsigned workers, const world::World& u
   solver.take_state(state.world);
 }
 
-Status validate(const TickDecisions& d) {
-  const auto out_of_range = [](const char* field, auto value, const char* range) {
+namespace {
+
+template <typename Value>
+Error out_of_range(const char* field, Value value, const char* range) {
+  return {ErrorCode::Usage,
+          std::string(field) + ": " + std::to_string(value) + " is outside " + range};
+}
+
+Status validate_policy(const TickDecisions& d) {
+  const auto& policy = d.policy;
+  if (policy.steps_per_tick < 1 || policy.steps_per_tick > kMaxStepsPerTick)
+    return out_of_range("steps_per_tick", policy.steps_per_tick, "1 to 1000");
+  if (!(policy.residual_tolerance_n >= 0 && policy.residual_tolerance_n <= 1))
+    return out_of_range("residual_tolerance_n", policy.residual_tolerance_n, "0 to 1 N");
+  if (policy.max_sweeps < 1 || policy.max_sweeps > kMaxPolicySweeps)
+    return out_of_range("max_sweeps", policy.max_sweeps, "1 to 1000000");
+  const float far = policy.far_over_relaxation;
+  if (!(far == 0 || (far >= 0.5f && far <= 1.9f)))
+    return out_of_range("far_over_relaxation", far, "0.5 to 1.9 (or 0: as the organ needs)");
+  const bool has_tolerance = policy.residual_tolerance_n > 0;
+  if (has_tolerance && d.boundary == world::Boundary::Graded)
     return Error{ErrorCode::Usage,
-                 std::string(field) + ": " + std::to_string(value) + " is outside " + range};
-  };
+                 "residual_tolerance_n: is not for the boundary graded, whose "
+                 "far nodes are swept once"};
+  if (policy.steps_per_tick > 1 && d.far_interval > 1)
+    return Error{ErrorCode::Usage, "far_interval: is for one step of time in a tick"};
+  return {};
+}
+
+}  // namespace
+
+Status validate(const TickDecisions& d) {
   if (d.depth_limit > kMaxDepthLimit)
     return out_of_range("depth_limit", d.depth_limit, "0 to 1000 layers");
   if (d.node_limit < 1 || d.node_limit > kMaxNodeLimit)
@@ -133,15 +161,15 @@ Status validate(const TickDecisions& d) {
                                          std::to_string(sweeps[layer]) +
                                          " sweeps, more than the layer before: give at most " +
                                          std::to_string(sweeps[layer - 1])};
-  if (d.boundary > world::Boundary::Graded)
-    return out_of_range("boundary", static_cast<int>(d.boundary), "0 (frozen) to 1 (graded)");
+  if (d.boundary > world::Boundary::Whole)
+    return out_of_range("boundary", static_cast<int>(d.boundary), "0 (frozen) to 2 (whole)");
   if (d.far_interval < 1 || d.far_interval > kMaxFarInterval)
     return out_of_range("far_interval", d.far_interval, "1 to 4 ticks");
   if (d.far_sweeps > kMaxFarSweeps)
     return out_of_range("far_sweeps", d.far_sweeps, "0 (as the organ needs) to 16");
   if (!(d.over_relaxation >= 1.0f && d.over_relaxation <= 1.9f))
     return out_of_range("over_relaxation", d.over_relaxation, "1 to 1.9");
-  return {};
+  return validate_policy(d);
 }
 
 Simulation::Simulation(organ::Organ organ, unsigned workers,
@@ -158,13 +186,15 @@ Simulation Simulation::beside(unsigned workers) const {
   return {scene_, workers};
 }
 
-const TickReport& Simulation::tick(const hands::TickInputs& inputs,
-                                   const TickDecisions& decisions) {
+const TickReport& Simulation::tick(const hands::TickInputs& inputs, const TickDecisions& decisions,
+                                   ExternalLoads* loads) {
   if (inputs.mark != hands::MarkAction::None) use_mark(inputs.mark);
   context_->inputs = &inputs;
   context_->decisions = decisions;
+  context_->loads = loads;
   run_tick(*state_, *context_);
   context_->inputs = nullptr;
+  context_->loads = nullptr;
   return context_->report;
 }
 

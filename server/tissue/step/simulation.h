@@ -25,8 +25,9 @@ class Simulation {
   Simulation beside(unsigned workers) const;
 
   // Simulates one tick. After a tick that publishes, take_frame() has the frame. Returning to a
-  // mark costs as much as beginning a session.
-  const TickReport& tick(const hands::TickInputs& inputs, const TickDecisions& decisions);
+  // mark costs as much as beginning a session. loads: what acts besides tools; null: nothing.
+  const TickReport& tick(const hands::TickInputs& inputs, const TickDecisions& decisions,
+                         ExternalLoads* loads = nullptr);
 
   // The frame of the last tick, or null. Not yet shared, so the caller may add what is not
   // simulation: statistics, a snapshot for the journal. Frame f shows the state after tick 16 f.
@@ -43,6 +44,13 @@ class Simulation {
   const organ::Organ& organ() const { return scene_->organ; }
   const State& state() const { return *state_; }
   const StepContext& context() const { return *context_; }
+
+  // For drivers that move the tissue by other means than ticks, such as the search for an
+  // equilibrium: they change the state, then call resume(), and ticks go on from there as from a
+  // restored snapshot.
+  State& editable_state() { return *state_; }
+  StepContext& editable_context() { return *context_; }
+  void resume() { context_ = context_of(*state_); }
 
  private:
   Simulation(std::shared_ptr<const Scene> scene, unsigned workers);

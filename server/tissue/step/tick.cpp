@@ -9,7 +9,6 @@
 #include "server/tissue/step/edit_followers.h"
 
 namespace trocar::step {
-namespace {
 
 void admit_inputs(State& state, StepContext& context) {
   for (const auto slot : context.inputs->leaves)
@@ -22,11 +21,23 @@ void admit_inputs(State& state, StepContext& context) {
   if (context.report.inputs_dropped > 0) context.report.faults |= kFaultInputDropped;
 }
 
+void follow_contacts(State& state, StepContext& context) {
+  state.proxies.follow(context.contacts, state.world, state.tools);
+}
+
+void update_claims(State& state, StepContext& context) {
+  contact::update_claims(state.world, state.tools, context.contacts, context.requests, state.claims,
+                         state.grasps, context.claim_events);
+}
+
+namespace {
+
 void find_contacts(State& state, StepContext& context) {
   context.finder.find(
       {state.world, state.tools, state.claims, state.grasps, state.proxies, state.world.tick},
       context.contacts);
-  context.self_finder.find(state.world, state.self_contacts, context.contacts);
+  if (context.decisions.policy.has_self_contact)
+    context.self_finder.find(state.world, state.self_contacts, context.contacts);
   context.report.self_pairs = static_cast<std::uint32_t>(context.contacts.self_points().size());
   context.report.contact_nodes = static_cast<std::uint32_t>(context.contacts.seeds.size());
   if (context.contacts.dropped > 0) context.report.faults |= kFaultContactLimit;
@@ -34,11 +45,14 @@ void find_contacts(State& state, StepContext& context) {
 }
 
 void fill_queue(State& state, StepContext& context) {
-  context.seeds.fill({});
+  context.seeds.assign(kMaxTools + 1, {});
   for (const auto& tool : context.contacts.tools)
     context.seeds[tool.tool.value] = context.contacts.seeds_of(tool);
   context.seeds.back() = context.contacts.self_seeds;
-  // However little else there is room for, every touched node is in the queue.
+  if (context.loads != nullptr)
+    context.seeds.insert(context.seeds.end(), context.loads->seeds().begin(),
+                         context.loads->seeds().end());
+  // However little else there is room for, every touched or loaded node is in the queue.
   std::size_t touched = 0;
   for (const auto& seeds : context.seeds) touched += seeds.size();
   const auto node_limit =
@@ -53,6 +67,11 @@ void fill_queue(State& state, StepContext& context) {
 
 // Swept nodes stand by layer, those that have left the queue last.
 void find_bands(StepContext& context, std::span<const NodeIndex> nodes) {
+  if (context.decisions.boundary == world::Boundary::Whole) {  // No layer has less than another.
+    context.sweep_bands.fill({nodes.size(), context.decisions.sweeps});
+    context.report.layer_nodes.back() = static_cast<std::uint32_t>(nodes.size());
+    return;
+  }
   const auto layer_of = [&context](NodeIndex node) { return context.queue.layer_of(node); };
   const auto sweeps = sweeps_of_layers(context.decisions);
   std::size_t begin = 0;
@@ -76,55 +95,96 @@ void note_solver(Tick tick, const SolverFigures& now, StepContext& context) {
   context.solver_figures = now;
 }
 
+// The solver is told this for one step of time. far: it moves what is not swept; null: sweeps do.
+dynamics::SolveSettings settings_of(StepContext& context, dynamics::FarFieldSolver* far) {
+  const auto& decisions = context.decisions;
+  const auto& policy = decisions.policy;
+  dynamics::SolveSettings settings{decisions.sweeps, decisions.over_relaxation, kTickSeconds};
+  if (policy.steps_per_tick > 1) settings.dt = static_cast<float>(1e-3 / policy.steps_per_tick);
+  if (far != nullptr) {
+    settings.far_solver = far;
+  } else if (decisions.boundary == world::Boundary::Graded) {
+    const auto plan = context.far_plan.with_steps(policy.steps_per_tick)
+                          .with_sweeps(decisions.far_sweeps)
+                          .with_interval(decisions.far_interval);
+    settings.far_interval = decisions.far_interval;
+    settings.far_sweeps = plan.sweeps;
+    settings.far_over_relaxation =
+        policy.far_over_relaxation > 0 ? policy.far_over_relaxation : plan.over_relaxation;
+    settings.has_linear_far_field = context.has_linear_far_field && !decisions.is_far_exact;
+  }
+  if (policy.residual_tolerance_n > 0) {
+    settings.sweeps = policy.max_sweeps;
+    settings.residual_tolerance_n = policy.residual_tolerance_n;
+  } else if (context.sweep_bands.back().sweeps < decisions.sweeps) {
+    settings.bands = context.sweep_bands;
+  }
+  return settings;
+}
+
+// Writes the world's displacements and velocities, and the solver's figures of the report.
+// largest_move_m: of a node in the whole tick, at most.
+float solve_steps(std::span<const NodeIndex> nodes, const dynamics::SolveSettings& settings,
+                  State& state, StepContext& context) {
+  auto& report = context.report;
+  const auto steps = context.decisions.policy.steps_per_tick;
+  const double begin_s =
+      static_cast<double>(state.world.tick - 1) / static_cast<double>(kTicksPerSecond);
+  float largest_move_m = 0;
+  for (std::uint32_t i = 1; i <= steps; ++i) {
+    const auto loads = context.loads != nullptr
+                           ? context.loads->at(begin_s + 1e-3 / steps * i, state.world)
+                           : dynamics::ExternalLoads{};
+    const auto solved = context.solver.solve(context.contacts, nodes, settings, state.world, loads);
+    largest_move_m += solved.largest_move_m;
+    report.residual_n = solved.residual_n;
+    report.sweeps += solved.sweeps;
+    report.node_sweeps += solved.node_sweeps;
+    report.far_node_sweeps += solved.far_node_sweeps;
+    report.nodes_rejected += solved.nodes_rejected;
+    report.nodes_restored += solved.nodes_restored;
+    report.is_converged &=
+        settings.residual_tolerance_n == 0 ||
+        (solved.residual_n <= settings.residual_tolerance_n && solved.nodes_rejected == 0);
+    if (solved.is_stepped_down) report.faults |= kFaultOverRelaxation;
+    if (solved.nodes_rejected > 0) report.faults |= kFaultNonFinite;
+  }
+  if (context.loads != nullptr) context.loads->measure(context.solver, context.contacts);
+  report.far_sweeps = settings.far_sweeps;
+  report.is_far_linear = settings.has_linear_far_field;
+  report.far_interval = settings.far_interval;
+  return largest_move_m;
+}
+
+// Its fields know tools alone, and one step of time in a tick.
+bool is_reduction_off(const StepContext& context) {
+  const auto& decisions = context.decisions;
+  return decisions.is_reduction_off || decisions.policy.steps_per_tick > 1 ||
+         (context.loads != nullptr && !context.loads->rules().empty());
+}
+
 void solve(State& state, StepContext& context) {
   const auto& decisions = context.decisions;
   auto nodes = context.active.nodes();
   std::optional<dynamics::FarFieldModel::Choice> modelled;
   if (state.far_model) {
     modelled = state.far_model->choose(
-        {context.contacts, nodes, decisions.boundary, decisions.is_reduction_off}, context.solver,
+        {context.contacts, nodes, decisions.boundary, is_reduction_off(context)}, context.solver,
         state.world);
     note_solver(state.world.tick, state.far_model->figures(), context);
   }
   if (modelled) nodes = modelled->near;
   context.report.is_reduced = modelled.has_value();
   find_bands(context, nodes);
-  dynamics::SolveSettings settings{decisions.sweeps, decisions.over_relaxation, kTickSeconds};
-  if (modelled) {
-    settings.far_solver = modelled->far;
-  } else if (decisions.boundary == world::Boundary::Graded) {
-    const auto plan =
-        context.far_plan.with_sweeps(decisions.far_sweeps).with_interval(decisions.far_interval);
-    settings.far_interval = decisions.far_interval;
-    settings.far_sweeps = plan.sweeps;
-    settings.far_over_relaxation = plan.over_relaxation;
-    settings.has_linear_far_field = context.has_linear_far_field && !decisions.is_far_exact;
-  }
-  if (context.sweep_bands.back().sweeps < decisions.sweeps) settings.bands = context.sweep_bands;
-  const auto solved = context.solver.solve(context.contacts, nodes, settings, state.world);
+  float largest_move =
+      solve_steps(nodes, settings_of(context, modelled ? modelled->far : nullptr), state, context);
   const auto settled =
       context.active.settle(context.queue, context.solver.residuals_n(), state.world);
   context.solver.take_state(state.world, settled);
-  const float largest_move =
-      solved.largest_move_m + (settled.empty() ? 0 : propagation::kQuietDisplacementMetres);
+  largest_move += settled.empty() ? 0 : propagation::kQuietDisplacementMetres;
   context.finder.surface_moved(largest_move);
   context.self_finder.surface_moved(largest_move);
   context.travel_m += static_cast<double>(largest_move);
-  context.report.residual_n = solved.residual_n;
-  context.report.sweeps = solved.sweeps;
-  context.report.far_sweeps = settings.far_sweeps;
-  context.report.node_sweeps = solved.node_sweeps;
-  context.report.far_node_sweeps = solved.far_node_sweeps;
-  context.report.is_far_linear = settings.has_linear_far_field;
-  context.report.far_interval = settings.far_interval;
-  context.report.nodes_rejected = solved.nodes_rejected;
-  context.report.nodes_restored = solved.nodes_restored;
-  if (solved.is_stepped_down) context.report.faults |= kFaultOverRelaxation;
-  if (solved.nodes_rejected > 0) context.report.faults |= kFaultNonFinite;
-}
-
-void follow_contacts(State& state, StepContext& context) {
-  state.proxies.follow(context.contacts, state.world, state.tools);
 }
 
 // Each active node once a frame: what has been stretched for that long tears. Not where it is held:
@@ -147,11 +207,6 @@ void cut_tissue(State& state, StepContext& context) {
   if (!edit) return;
   hand_out(*edit, state, context);
   cuts.end_edit();
-}
-
-void update_claims(State& state, StepContext& context) {
-  contact::update_claims(state.world, state.tools, context.contacts, context.requests, state.claims,
-                         state.grasps, context.claim_events);
 }
 
 ToolFrame describe_tool(const State& state, const StepContext& context, ToolSlot slot) {

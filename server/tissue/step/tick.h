@@ -15,6 +15,7 @@
 #include "server/tissue/hands/tool_table.h"
 #include "server/tissue/propagation/active_set.h"
 #include "server/tissue/propagation/queue.h"
+#include "server/tissue/step/external_loads.h"
 #include "server/tissue/step/mark.h"
 #include "server/tissue/step/published_frame.h"
 #include "server/tissue/step/tick_report.h"
@@ -71,6 +72,7 @@ struct StepContext {
   const Scene& scene;
   const hands::TickInputs* inputs = nullptr;
   TickDecisions decisions;
+  ExternalLoads* loads = nullptr;  // null: only tools act
 
   // Scratch and stage results, valid from their stage to the end of the tick.
   contact::ContactFinder finder;
@@ -83,8 +85,8 @@ struct StepContext {
   dynamics::BlockDescent solver;
   dynamics::FarPlan far_plan;
   bool has_linear_far_field;
-  // By tool, empty without contact; last, tissue on tissue.
-  std::array<std::span<const NodeIndex>, kMaxTools + 1> seeds;
+  // By tool, empty without contact; then tissue on tissue; then external loads.
+  std::vector<std::span<const NodeIndex>> seeds;
   std::vector<hands::ClaimRequest> requests;
   std::vector<Vec3f> surface_displacements;
   std::vector<NodeIndex> may_tear;
@@ -102,5 +104,14 @@ struct StepContext {
 
 // The stages, in order, each timed.
 void run_tick(State& state, StepContext& context);
+
+// Stages that other drivers of the same state use: those that look for equilibria.
+//
+// Tools come and go, and move one step.
+void admit_inputs(State& state, StepContext& context);
+// After the solve: proxies go where the surface lets them.
+void follow_contacts(State& state, StepContext& context);
+// Who holds what from the next tick.
+void update_claims(State& state, StepContext& context);
 
 }  // namespace trocar::step

@@ -11,6 +11,21 @@
 
 namespace trocar::step {
 
+// How exactly a tick is solved. A session has the default; an experiment may want more.
+struct TickPolicy {
+  std::uint32_t steps_per_tick = 1;  // The solver takes so many equal steps of time in a tick.
+  // Above 0: sweeps go on until the residual is at most this, at most max_sweeps of them, and
+  // TickDecisions::sweeps does not count. Not for Boundary::Graded.
+  float residual_tolerance_n = 0;
+  std::uint32_t max_sweeps = 2000;
+  float far_over_relaxation = 0;  // Graded: of far nodes; 0: what the organ needs
+  bool has_self_contact = true;   // Tissue does not pass through tissue.
+
+  bool operator==(const TickPolicy&) const = default;
+};
+inline constexpr std::uint32_t kMaxStepsPerTick = 1000;
+inline constexpr std::uint32_t kMaxPolicySweeps = 1'000'000;
+
 // Decided between ticks, recorded in the journal. Defaults: decisions that everything shares.
 struct TickDecisions {
   std::uint32_t depth_limit = 3;    // propagation layers
@@ -30,6 +45,8 @@ struct TickDecisions {
   std::uint32_t far_interval = 1;  // Graded: ticks from one sweep of a far node to the next
 
   bool is_reduction_off = false;  // the full solver, whatever a session's reduction has
+
+  TickPolicy policy;
 
   bool operator==(const TickDecisions&) const = default;
 };
@@ -72,6 +89,7 @@ struct TickReport {
   std::uint32_t inputs_dropped = 0;
   std::uint32_t nodes_rejected = 0;          // see kFaultNonFinite
   std::uint32_t nodes_restored = 0;          // likewise: put back, at rest
+  bool is_converged = true;                  // unless a step missed TickPolicy's tolerance
   std::uint32_t sweeps = 0, far_sweeps = 0;  // of active nodes and of all others
   std::uint64_t node_sweeps = 0;             // nodes stepped by the solver, all sweeps together
   std::uint64_t far_node_sweeps = 0;         // of these, nodes outside the queue

@@ -81,7 +81,7 @@ void World::visit_state(StateArchive& archive) {
   far_poses.visit_state(archive);
   relaxation.visit_state(archive);
   if (!archive.is_reading()) return;
-  if (boundary > Boundary::Graded) archive.fail();
+  if (boundary > Boundary::Whole) archive.fail();
   for (std::size_t i = 0; i < node_count(); ++i)
     if (node_classes[i] > NodeClass::Active || !is_finite(displacements[i]) ||
         !is_finite(velocities[i]))

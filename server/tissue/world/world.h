@@ -27,8 +27,9 @@ enum class NodeClass : std::uint8_t {
 
 // Nodes outside the queue do one of these.
 enum class Boundary : std::uint8_t {
-  Frozen = 0,  // stand still (Choi 2002, Nakao 2003)
-  Graded = 1,  // move every tick, with fewer sweeps
+  Frozen = 0,  // They stand still (Choi 2002, Nakao 2003).
+  Graded = 1,  // They move every tick, with fewer sweeps.
+  Whole = 2,   // They are swept like the queue. Sessions never choose it: it takes too long.
 };
 
 // A cut made this node at t/65536 of the way from a to b, which were there before it.

@@ -1,0 +1,156 @@
+#include "server/app/sim/sim_hands.h"
+
+#include <cinttypes>
+#include <cstdio>
+#include <memory>
+
+#include "common/base/bytes.h"
+#include "common/journal/session_journal.h"
+#include "proto/journal.pb.h"
+#include "server/app/sim/sim_journal.h"
+#include "server/lab/scenario/field_files.h"
+#include "server/organs/catalogue/load_organ.h"
+#include "server/organs/organ/organ_file.h"
+#include "server/session/recording/tick_records.h"
+
+namespace trocar::app {
+namespace {
+
+struct CloseFile {
+  void operator()(std::FILE* file) const { std::fclose(file); }
+};
+using File = std::unique_ptr<std::FILE, CloseFile>;
+
+Result<organ::Organ> organ_of(const HandsCommand& command, journal::SessionJournal& journal) {
+  if (!command.organ.empty()) return catalogue::load_organ(command.organ);
+  auto message = journal.organ();
+  if (!message) return message.error();
+  const std::string encoded = message->SerializeAsString();
+  return organ::decode_organ(bytes_of(std::string_view(encoded)));
+}
+
+std::vector<participants::Participant> people_of(const journal::SessionInfo& info) {
+  std::vector<participants::Participant> people;
+  for (const auto& person : info.participants) {
+    const ParticipantSlot slot{static_cast<std::uint8_t>(person.slot())};
+    if (!slot.has_tools()) continue;
+    const bool is_known =
+        std::ranges::any_of(people, [&](const auto& p) { return p.slot == slot; });
+    if (!is_known)
+      people.push_back({slot, person.name(), participants::Role::Surgeon, {tool::ToolShape{}}});
+  }
+  return people;
+}
+
+void write_tools(const step::PublishedFrame& frame, std::FILE* csv) {
+  for (const auto& tool : frame.tools) {
+    const auto& p = tool.world_from_tool.position;
+    const auto& f = tool.force_n;
+    std::fprintf(csv, "%.3f,%u,%s,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%u\n",
+                 static_cast<double>(frame.tick) / static_cast<double>(kTicksPerSecond),
+                 unsigned{tool.tool.value}, tool::name_of(tool.verb),
+                 1e3 * static_cast<double>(p.x), 1e3 * static_cast<double>(p.y),
+                 1e3 * static_cast<double>(p.z), static_cast<double>(f.x), static_cast<double>(f.y),
+                 static_cast<double>(f.z), tool.contact_nodes);
+  }
+}
+
+// Drives the ticks of a recording, one after another.
+class Replay {
+ public:
+  Replay(step::Simulation& simulation, SimJournal* journal, std::FILE* csv)
+      : simulation_(simulation), journal_(journal), csv_(csv) {}
+
+  Status take(const proto::TickRecord& message) {
+    if (auto read = recording::from_message(message, record_); !read) return read;
+    if (record_.tick != simulation_.current_tick() + 1)
+      return Error{ErrorCode::BadFile, "ticks " + std::to_string(simulation_.current_tick() + 1) +
+                                           " to " + std::to_string(record_.tick - 1) +
+                                           " are missing: its hands are not all there"};
+    const auto& report = simulation_.tick(record_.inputs, record_.decisions);
+    opened_m2 += report.cut.opened_area_m2;
+    rejected += report.nodes_rejected;
+    if (publishes_frame(report.tick)) {
+      auto frame = std::shared_ptr<step::PublishedFrame>(simulation_.take_frame());
+      write_tools(*frame, csv_);
+      if (journal_ != nullptr)
+        journal_->add(std::move(frame), record_.inputs, record_.decisions, report);
+    } else if (journal_ != nullptr) {
+      journal_->add(nullptr, record_.inputs, record_.decisions, report);
+    }
+    if (journal_ != nullptr) journal_->take_due_snapshot(simulation_);
+    return {};
+  }
+
+  double opened_m2 = 0;
+  std::uint64_t rejected = 0;
+
+ private:
+  step::Simulation& simulation_;
+  SimJournal* const journal_;
+  std::FILE* const csv_;
+  step::TickRecord record_;
+};
+
+}  // namespace
+
+void add_hands_options(CLI::App& app, HandsCommand& command) {
+  app.add_option("--hands", command.recording,
+                 "instead of a scenario: the hands of this recorded session, on --organ")
+      ->type_name("JOURNAL");
+  app.add_option("--organ", command.organ,
+                 "with --hands: built-in organ, .organ or .msh file [that of the recording]")
+      ->type_name("NAME|FILE");
+}
+
+Status run_hands(const HandsCommand& command, const std::filesystem::path& folder,
+                 const std::string& journal_path, unsigned threads,
+                 const volatile std::sig_atomic_t& stop) {
+  auto source = journal::SessionJournal::open(command.recording);
+  if (!source) return source.error();
+  const auto& info = (*source)->info();
+  if (info.has_external_loads)
+    return Error{ErrorCode::BadFile, command.recording +
+                                         ": is of a scenario with loads, which are "
+                                         "not recorded: run the scenario itself"};
+  auto organ = organ_of(command, **source);
+  if (!organ) return organ.error();
+  step::Simulation simulation(std::move(*organ), threads);
+  const auto path = folder / "hands.csv";
+  const File csv(std::fopen(path.c_str(), "wb"));
+  if (!csv) return Error{ErrorCode::ResourceMissing, path.string() + ": cannot be written"};
+  std::fputs("time_s,tool,verb,x_mm,y_mm,z_mm,force_x_n,force_y_n,force_z_n,contact_nodes\n",
+             csv.get());
+  std::unique_ptr<SimJournal> journal;
+  if (!journal_path.empty()) {
+    auto created = SimJournal::create(journal_path, simulation, people_of(info), false);
+    if (!created) return created.error();
+    journal = std::move(*created);
+  }
+  Replay replay(simulation, journal.get(), csv.get());
+  Status status;
+  const Status read =
+      (*source)->read_tick_records(0, info.last_tick, [&](Tick, const proto::TickRecord& message) {
+        status = replay.take(message);
+        return status.ok() && stop == 0;
+      });
+  const Status closed = journal ? journal->close() : Status{};
+  if (!status) return Error{status.error().code, command.recording + ": " + status.error().message};
+  if (!read) return read;
+  if (!closed) return closed;
+  const auto ticks = simulation.current_tick();
+  const double seconds = static_cast<double>(ticks) / static_cast<double>(kTicksPerSecond);
+  if (std::ferror(csv.get()) != 0)
+    return Error{ErrorCode::ResourceMissing, path.string() + ": cannot be written"};
+  if (auto s = scenario::write_field(folder, scenario::field_of(simulation, seconds)); !s) return s;
+  std::printf("%s: %" PRIu64 " ticks of its hands on %s, %zu nodes, %.1f cm2 cut, state %016" PRIx64
+              "\nresults in %s\n",
+              command.recording.c_str(), ticks, simulation.organ().name.c_str(),
+              simulation.state().world.node_count(), replay.opened_m2 * 1e4,
+              simulation.state_hash(), folder.c_str());
+  if (replay.rejected > 0)
+    std::fprintf(stderr, "trocar-sim: warning: some nodes had no finite step\n");
+  return {};
+}
+
+}  // namespace trocar::app
