@@ -28,9 +28,9 @@ struct SessionInfo {
   std::optional<ReductionDescription> reduction;  // that the session had
   // Of a scenario with loads besides its tools: its ticks cannot be simulated from the journal.
   bool has_external_loads = false;
-  Tick last_tick = 0;                             // of the last message
-  std::vector<proto::Participant> participants;   // everyone who was ever in, in order of joining
-  std::uint64_t gap_messages = 0;                 // that the session dropped while recording
+  Tick last_tick = 0;                            // of the last message
+  std::vector<proto::Participant> participants;  // everyone who was ever in, in order of joining
+  std::uint64_t gap_messages = 0;                // that the session dropped while recording
   bool is_finished = false;
   std::string summary;  // one line for people
 };

@@ -1,7 +1,7 @@
 #pragma once
 
-// The layout says which nodes of an organ its surface stream carries, and in which slots. The server
-// builds it from the organ (server/tissue/world/surface_layout.h); clients receive it as a
+// The layout says which nodes of an organ its surface stream carries, and in which slots. The
+// server builds it from the organ (server/tissue/world/surface_layout.h); clients receive it as a
 // SurfaceTopology message. Cuts change it by SurfaceChange (surface_change.h) only.
 
 #include <array>

@@ -24,7 +24,7 @@ using std::chrono::milliseconds;
 
 Program::Program(const std::string& name, const std::vector<std::string>& arguments,
                  const fs::path& log) {
-  const std::string path = std::string(TROCAR_BINARY_DIR) + "/" + name;
+  const std::string path = TROCAR_BINARY_DIR "/" + name;
   std::vector<char*> argv{const_cast<char*>(path.c_str())};
   for (const auto& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
   argv.push_back(nullptr);

@@ -20,7 +20,7 @@
 #include "server/organs/mesh/gmsh_reader.h"
 #include "server/organs/organ/local_reduction_file.h"
 #include "server/organs/organ/organ_file.h"
-#include "server/organs/organ/reduction_file.h"
+#include "server/papers/dogan/reduction_file.h"
 #include "server/tissue/step/organ_surface.h"
 
 namespace trocar::fuzz {
@@ -127,7 +127,7 @@ bool decode_organ(BytesView bytes) {
                                              : checked(organ::decode_organ(bytes));
 }
 bool decode_reduction(BytesView bytes) {
-  return decode_packed(bytes, organ::kReductionMagic, 1, organ::unpack_reduction);
+  return decode_packed(bytes, organ::kDoganReductionMagic, 1, dogan::unpack_reduction);
 }
 bool decode_local_reduction(BytesView bytes) {
   return decode_packed(bytes, organ::kLocalReductionMagic, 2, organ::unpack_local_reduction);

@@ -10,9 +10,10 @@
 #include "server/organs/catalogue/builtin_organs.h"
 #include "server/organs/organ/local_reduction_file.h"
 #include "server/organs/organ/organ_file.h"
-#include "server/organs/organ/reduction_file.h"
+#include "server/papers/dogan/reduction_file.h"
 #include "server/tissue/step/organ_surface.h"
 #include "tests/journal/session_samples.h"
+#include "tests/papers/synthetic_reduction.h"
 #include "tests/reduce/small_organ.h"
 #include "tests/support/surface_edits.h"
 
@@ -84,7 +85,7 @@ int main(int argc, char** argv) {
   save("organ", "block", organ::encode_organ(block));
   save("organ", "block.organ", organ::pack_organ(block));
   save("reduction", "synthetic.reduction",
-       organ::pack_reduction(reduce::testing::synthetic_reduction(block, 3)));
+       dogan::pack_reduction(dogan::testing::synthetic_reduction(block, 3)));
   save("local_reduction", "synthetic.reduction",
        *organ::pack_local_reduction(reduce::testing::synthetic_local_reduction(block)));
   const auto path = fs::temp_directory_path() / "trocar-seed.mcap";

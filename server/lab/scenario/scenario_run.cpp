@@ -7,6 +7,7 @@
 #include "common/base/assert.h"
 #include "server/lab/scenario/relaxed_organ.h"
 #include "server/tissue/dynamics/relaxation.h"
+#include "server/tissue/reduction/reduced_tissue.h"
 
 namespace trocar::scenario {
 namespace {
@@ -155,7 +156,7 @@ ScenarioRun::ScenarioRun(scenario::ResolvedScenario resolved, Solver solver, uns
       solver_kind_(solver),
       decisions_(decisions_of(scenario().run, solver)),
       step_count_(steps_of(scenario().run)),
-      simulation_(resolved_.organ, threads, resolved_.reduction),
+      simulation_(resolved_.organ, threads, reduction::at_work(resolved_.reduction)),
       loads_({resolved_.displacements, resolved_.forces}, organ().fixed_nodes,
              organ().mesh.node_count()) {
   for (std::size_t i = 0; i < scenario().probes.size(); ++i)
