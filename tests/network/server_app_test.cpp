@@ -109,6 +109,7 @@ struct KeepingSink final : app::JournalSink {
   void take_frame(const step::SharedFrame& frame) override { frames.push_back(frame); }
   void take_participants(const std::vector<participants::Participant>&, Tick) override {}
   Status close() override { return {}; }
+  wire::RecordingState state() const override { return {}; }
   std::vector<step::SharedFrame> frames;
 };
 
