@@ -30,7 +30,7 @@ hashes mean that the same work was done.
 
 struct Options {
   Scale scale = Scale::Full;
-  std::string out, filter = ".";
+  std::string out, filter = ".", commit = "unknown";
   bool lists = false;
 };
 
@@ -39,6 +39,7 @@ int run(const Options& options) {
   suite.scale = options.scale;
   Machine machine = this_machine();
   machine.peer_version = BulletPeer::version();
+  machine.commit = options.commit;
 
   std::vector<std::string> arguments{kProgram, "--benchmark_filter=" + options.filter};
   if (options.lists) arguments.push_back("--benchmark_list_tests=true");
@@ -90,6 +91,7 @@ int main(int argc, char** argv) {
                "tiny objects, seconds: shows that everything runs, no figures");
   app.add_option("--out", options.out, "folder for the results; without, they are only shown");
   app.add_option("--filter", options.filter, "regular expression: only what matches");
+  app.add_option("--commit", options.commit, "of the source, for the results");
   app.add_flag("--list", options.lists, "name what --filter selects, and run nothing");
   try {
     app.parse(argc, argv);

@@ -80,8 +80,11 @@ std::string table(const std::vector<std::vector<std::string>>& lines) {
 }
 
 std::string wall_words(const Row& row) {
-  return row.wall_us ? milliseconds(*row.wall_us) + " (" + milliseconds(*row.wall_p10_us) + ")"
-                     : "";
+  return row.wall_us ? milliseconds(*row.wall_us) : "";
+}
+
+std::string fastest_wall_words(const Row& row) {
+  return row.wall_us ? milliseconds(*row.wall_p10_us) : "";
 }
 
 // Of a force, mean and largest; the largest may be 5/3 of what the mean may be.
@@ -92,12 +95,9 @@ bool is_accurate(const Row& row) {
          (largest == row.more.end() || largest->second <= *row.error_limit_percent * 5 / 3);
 }
 
-std::string error_words(const Row& row) {
-  if (!row.error_percent) return "";
-  std::string words = number(*row.error_percent, "%.2f");
+std::string largest_error_words(const Row& row) {
   const auto largest = row.more.find("force_error_max_percent");
-  if (largest != row.more.end()) words += ", at most " + number(largest->second, "%.1f");
-  return words;
+  return largest == row.more.end() ? "" : number(largest->second, "%.1f");
 }
 
 std::string hash_words(const std::string& hash) {
@@ -106,13 +106,14 @@ std::string hash_words(const std::string& hash) {
 
 std::string peers_table(const std::vector<const Row*>& rows) {
   std::vector<std::vector<std::string>> lines{{"mesh", "solver", "dt ms", "CPU ms/step",
-                                               "CPU ms/ms", "wall ms (fastest 10 %)", "u(0.1 s) mm",
-                                               "converged mm", "error %", "hash"}};
+                                               "CPU ms/ms", "wall ms", "wall ms, fastest 10 %",
+                                               "u(0.1 s) mm", "converged mm", "error %", "hash"}};
   for (const Row* row : rows)
     lines.push_back({row->object, row->solver, number(row->dt_ms, "%g"),
                      milliseconds(row->median_us), milliseconds(row->median_us / row->dt_ms),
-                     wall_words(*row), number(row->u_mm, "%.3f"), number(row->converged_mm, "%.3f"),
-                     number(row->error_percent, "%.2f"), hash_words(row->state_hash)});
+                     wall_words(*row), fastest_wall_words(*row), number(row->u_mm, "%.3f"),
+                     number(row->converged_mm, "%.3f"), number(row->error_percent, "%.2f"),
+                     hash_words(row->state_hash)});
   return table(lines);
 }
 
@@ -124,7 +125,8 @@ std::string targets_table(const std::vector<const Row*>& rows, const std::vector
   };
   std::vector<std::vector<std::string>> lines{
       {"work", "solver", "threads", "paper ms", "best peer ms", "Bullet here ms", "target ms",
-       "ours CPU ms", "fastest 10 %", "wall ms (fastest 10 %)", "error %", "reached", "hash"}};
+       "ours CPU ms", "fastest 10 %", "wall ms", "wall ms, fastest 10 %", "error %",
+       "error at most %", "reached", "hash"}};
   for (const Row* row : rows) {
     const double us = row->wall_us.value_or(row->median_us);
     const bool is_right = is_accurate(*row);
@@ -132,7 +134,8 @@ std::string targets_table(const std::vector<const Row*>& rows, const std::vector
     lines.push_back({row->object, row->solver, std::to_string(row->threads), row->paper_ms,
                      row->peer_ms, peer_here(*row), number(row->target_ms, "%g"),
                      milliseconds(row->median_us), milliseconds(row->p10_us), wall_words(*row),
-                     error_words(*row),
+                     fastest_wall_words(*row), number(row->error_percent, "%.2f"),
+                     largest_error_words(*row),
                      reached     ? "yes"
                      : !is_right ? "no: error"
                                  : "no",
@@ -301,8 +304,9 @@ Machine this_machine() {
 std::string ResultTable::markdown(const Machine& machine) const {
   std::string out = "# Benchmarks\n\nMachine: " + machine.processor + ", " +
                     std::to_string(machine.cores) + " cores; " + machine.compiler + ", " +
-                    machine.isa + ", " + machine.build_type + "; peer: " + machine.peer_version +
-                    ".\nLoad average " + number(machine.load_before, "%.2f") + " before, " +
+                    machine.isa + ", " + machine.build_type + "; commit " + machine.commit +
+                    "; peer: " + machine.peer_version + ".\nLoad average " +
+                    number(machine.load_before, "%.2f") + " before, " +
                     number(machine.load_after, "%.2f") + " after.";
   if (machine.is_busy())
     out +=
@@ -348,6 +352,7 @@ Status ResultTable::write(const std::filesystem::path& folder, const Machine& ma
               {"compiler", machine.compiler},
               {"isa", machine.isa},
               {"build_type", machine.build_type},
+              {"commit", machine.commit},
               {"peer", machine.peer_version},
               {"load_before", machine.load_before},
               {"load_after", machine.load_after},

@@ -48,6 +48,7 @@ struct Row {
 
 struct Machine {
   std::string processor, compiler, isa, build_type, peer_version;
+  std::string commit = "unknown";
   unsigned cores = 0;
   double load_before = 0, load_after = 0;  // 1 min averages
 
