@@ -21,7 +21,7 @@
 #include "server/organs/organ/local_reduction_file.h"
 #include "server/organs/organ/organ_file.h"
 #include "server/papers/dogan/reduction_file.h"
-#include "server/tissue/step/organ_surface.h"
+#include "server/tissue/world/surface_layout.h"
 
 namespace trocar::fuzz {
 namespace {
@@ -72,7 +72,7 @@ bool decode_topology(BytesView bytes) {
 // A change of a small block's surface, as a client knows it.
 bool decode_change(BytesView bytes) {
   static const wire::SurfaceLayout kBefore = [] {
-    auto layout = step::make_surface_layout(*catalogue::make_lattice({6, 4, 6, 0.01}));
+    auto layout = world::make_surface_layout(*catalogue::make_lattice({6, 4, 6, 0.01}));
     layout.vertex_of_node.clear();
     std::ranges::fill(layout.node_of_vertex, NodeIndex{});
     return layout;

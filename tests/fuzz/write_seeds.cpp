@@ -11,7 +11,7 @@
 #include "server/organs/organ/local_reduction_file.h"
 #include "server/organs/organ/organ_file.h"
 #include "server/papers/dogan/reduction_file.h"
-#include "server/tissue/step/organ_surface.h"
+#include "server/tissue/world/surface_layout.h"
 #include "tests/journal/session_samples.h"
 #include "tests/papers/synthetic_reduction.h"
 #include "tests/reduce/small_organ.h"
@@ -49,7 +49,7 @@ void save_surfaces() {
       wire::encode_delta(before, after, bytes);
     save("surface_codec", is_keyframe ? "keyframe" : "delta", bytes);
   }
-  const auto layout = step::make_surface_layout(*catalogue::make_lattice({6, 4, 6, 0.01}));
+  const auto layout = world::make_surface_layout(*catalogue::make_lattice({6, 4, 6, 0.01}));
   proto::SurfaceTopology topology;
   wire::write(layout, "box", topology);
   save("surface_topology", "box", topology);

@@ -33,7 +33,7 @@ class ProgramFixture : public ::testing::Test {
   }
 
   void start(std::vector<std::string> arguments) {
-    arguments.insert(arguments.begin(), std::string(TROCAR_BINARY_DIR) + "/" + program_);
+    arguments.insert(arguments.begin(), TROCAR_BINARY_DIR "/" + program_);
     std::vector<char*> argv;
     for (auto& argument : arguments) argv.push_back(argument.data());
     argv.push_back(nullptr);
