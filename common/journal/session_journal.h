@@ -26,7 +26,8 @@ struct SessionInfo {
   std::string organ_name;
   std::uint64_t organ_hash = 0;
   std::optional<ReductionDescription> reduction;  // that the session had
-  // Of a scenario with loads besides its tools: its ticks cannot be simulated from the journal.
+  // The journal is of a scenario with loads besides its tools, which it does not hold: its ticks
+  // cannot be simulated again.
   bool has_external_loads = false;
   Tick last_tick = 0;                            // of the last message
   std::vector<proto::Participant> participants;  // everyone who was ever in, in order of joining

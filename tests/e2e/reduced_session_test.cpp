@@ -83,7 +83,7 @@ std::vector<proto::SolverChange> solver_changes(const fs::path& file) {
   return changes;
 }
 
-// Exit code and output of a program.
+// A program's exit code and what it printed.
 std::pair<int, std::string> outcome(const std::string& name,
                                     const std::vector<std::string>& arguments,
                                     const fs::path& folder) {

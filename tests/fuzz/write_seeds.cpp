@@ -37,7 +37,7 @@ void save(const char* decoder, const char* name, const google::protobuf::Message
 
 void save_surfaces() {
   for (const bool is_keyframe : {false, true}) {
-    // As decoders.cpp reads it: the first byte is the count of vertices and the kind.
+    // decoders.cpp reads it so: the first byte is the count of vertices and the kind.
     Bytes bytes{static_cast<std::uint8_t>(is_keyframe ? 101 : 100)};
     const wire::QuantisedSurface before(1 + 2 * bytes[0], wire::QuantisedVertex{7, 8, 9});
     auto after = before;

@@ -91,7 +91,7 @@ TEST_F(RecordingStates, AFullDiskIsToldToEverybody) {
   rlimit none = before;
   none.rlim_cur = 1;
   ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &none), 0);
-  // What does not compress, so that a chunk is full and has to be written.
+  // These bytes do not compress, so that a chunk is full and has to be written.
   std::mt19937 random(3);
   for (int i = 0; i < 40; ++i) {
     auto frame = std::make_shared<step::PublishedFrame>(*session_.make_frame(10));

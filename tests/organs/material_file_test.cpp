@@ -82,7 +82,7 @@ TEST(MaterialFile, WhatIsWrongIsOneLineWithItsKey) {
   refused(with("0.1485]", "0.6]"), "add up to 1.1054");
   refused(with("6.8863]", "0]"), "relaxation_times_s: has 0, allowed are");
   refused(with("isochoric", "split"), "write one of \"unsplit\", \"isochoric\"");
-  refused(with("name", "label"), "name: is missing");
+  refused(with("name", "label"), "hyperelastic.label: is unknown");
   refused(with("1707.9]", "-1707.9]"), "is unstable");
   refused(kGood + "colour = 3\n", ":8: key hyperelastic.colour: is unknown");
 }

@@ -16,7 +16,7 @@ TEST(NearestPoint, WeightsAreNeverNegativeAndSumToOne) {
   const auto vector = [&] { return Vec3f{component(), component(), component()}; };
   for (int i = 0; i < 1'000'000; ++i) {
     const Vec3f away = vector() * 10, a = away + vector(), b = away + vector(), c = away + vector();
-    // On an edge but for rounding, and to one side of the triangle.
+    // Each point lies on an edge but for rounding, and to one side of the triangle.
     const auto t = static_cast<float>(random.unit());
     const Vec3f up = cross(b - a, c - a) * static_cast<float>(random.between(-3, 3));
     const Vec3f p = b * t + c * (1 - t) + up;

@@ -78,7 +78,7 @@ SnapshotScene random_scene(SnapshotOrgan kind, std::uint64_t seed) {
       organ.material.elastic_law != ElasticLaw::Springs && random.below(3) == 0;
   if (random.below(2) == 0) organ.material.tension = random.between(0.01, 0.06);
   if (random.below(2) == 0) organ.material.tear_stretch = random.between(1.2, 1.6);
-  // Where all cut at one place, wounds meet wounds.
+  // All cut at one place, so that wounds meet wounds.
   const bool is_large = kind == SnapshotOrgan::Stomach || kind == SnapshotOrgan::Chest;
   if (is_large || random.below(2) == 0) scene.reach_m = 0.06f;
   return scene;

@@ -17,7 +17,7 @@ enum class SnapshotOrgan { Liver, MeasuredLiver, Plate, Stomach, Chest, Lattice 
 inline constexpr int kSnapshotOrgans = 6;
 const char* name_of(SnapshotOrgan organ);
 
-// Of the states that were written, how many showed what.
+// These figures count what the written states have shown.
 struct SnapshotFigures {
   std::uint64_t snapshots = 0, bytes = 0;
   std::uint64_t in_a_cut = 0;  // a blade's claim was in effect

@@ -1,4 +1,4 @@
-// What the engine writes, it reads: states of random sessions, restored and continued. More of
+// The engine reads what it writes: states of random sessions, restored and continued. More of
 // them: deploy/campaign snapshots.
 
 #include <gtest/gtest.h>

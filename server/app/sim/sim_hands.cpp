@@ -4,14 +4,11 @@
 #include <cstdio>
 #include <memory>
 
-#include "common/base/bytes.h"
 #include "common/journal/session_journal.h"
-#include "proto/journal.pb.h"
 #include "server/app/sim/sim_journal.h"
 #include "server/lab/scenario/field_files.h"
 #include "server/organs/catalogue/load_organ.h"
-#include "server/organs/organ/organ_file.h"
-#include "server/session/recording/tick_records.h"
+#include "server/session/recording/recorded_session.h"
 
 namespace trocar::app {
 namespace {
@@ -20,27 +17,6 @@ struct CloseFile {
   void operator()(std::FILE* file) const { std::fclose(file); }
 };
 using File = std::unique_ptr<std::FILE, CloseFile>;
-
-Result<organ::Organ> organ_of(const HandsCommand& command, journal::SessionJournal& journal) {
-  if (!command.organ.empty()) return catalogue::load_organ(command.organ);
-  auto message = journal.organ();
-  if (!message) return message.error();
-  const std::string encoded = message->SerializeAsString();
-  return organ::decode_organ(bytes_of(std::string_view(encoded)));
-}
-
-std::vector<participants::Participant> people_of(const journal::SessionInfo& info) {
-  std::vector<participants::Participant> people;
-  for (const auto& person : info.participants) {
-    const ParticipantSlot slot{static_cast<std::uint8_t>(person.slot())};
-    if (!slot.has_tools()) continue;
-    const bool is_known =
-        std::ranges::any_of(people, [&](const auto& p) { return p.slot == slot; });
-    if (!is_known)
-      people.push_back({slot, person.name(), participants::Role::Surgeon, {tool::ToolShape{}}});
-  }
-  return people;
-}
 
 void write_tools(const step::PublishedFrame& frame, std::FILE* csv) {
   for (const auto& tool : frame.tools) {
@@ -61,22 +37,21 @@ class Replay {
   Replay(step::Simulation& simulation, SimJournal* journal, std::FILE* csv)
       : simulation_(simulation), journal_(journal), csv_(csv) {}
 
-  Status take(const proto::TickRecord& message) {
-    if (auto read = recording::from_message(message, record_); !read) return read;
-    if (record_.tick != simulation_.current_tick() + 1)
+  Status take(const step::TickRecord& record) {
+    if (record.tick != simulation_.current_tick() + 1)
       return Error{ErrorCode::BadFile, "ticks " + std::to_string(simulation_.current_tick() + 1) +
-                                           " to " + std::to_string(record_.tick - 1) +
+                                           " to " + std::to_string(record.tick - 1) +
                                            " are missing: its hands are not all there"};
-    const auto& report = simulation_.tick(record_.inputs, record_.decisions);
+    const auto& report = simulation_.tick(record.inputs, record.decisions);
     opened_m2 += report.cut.opened_area_m2;
     rejected += report.nodes_rejected;
     if (publishes_frame(report.tick)) {
       auto frame = std::shared_ptr<step::PublishedFrame>(simulation_.take_frame());
       write_tools(*frame, csv_);
       if (journal_ != nullptr)
-        journal_->add(std::move(frame), record_.inputs, record_.decisions, report);
+        journal_->add(std::move(frame), record.inputs, record.decisions, report);
     } else if (journal_ != nullptr) {
-      journal_->add(nullptr, record_.inputs, record_.decisions, report);
+      journal_->add(nullptr, record.inputs, record.decisions, report);
     }
     if (journal_ != nullptr) journal_->take_due_snapshot(simulation_);
     return {};
@@ -89,7 +64,6 @@ class Replay {
   step::Simulation& simulation_;
   SimJournal* const journal_;
   std::FILE* const csv_;
-  step::TickRecord record_;
 };
 
 }  // namespace
@@ -113,7 +87,8 @@ Status run_hands(const HandsCommand& command, const std::filesystem::path& folde
     return Error{ErrorCode::BadFile, command.recording +
                                          ": is of a scenario with loads, which are "
                                          "not recorded: run the scenario itself"};
-  auto organ = organ_of(command, **source);
+  auto organ = command.organ.empty() ? recording::recorded_organ(**source, command.recording)
+                                     : catalogue::load_organ(command.organ);
   if (!organ) return organ.error();
   step::Simulation simulation(std::move(*organ), threads);
   const auto path = folder / "hands.csv";
@@ -123,20 +98,19 @@ Status run_hands(const HandsCommand& command, const std::filesystem::path& folde
              csv.get());
   std::unique_ptr<SimJournal> journal;
   if (!journal_path.empty()) {
-    auto created = SimJournal::create(journal_path, simulation, people_of(info), false);
+    auto created =
+        SimJournal::create(journal_path, simulation, recording::recorded_hands(info), false);
     if (!created) return created.error();
     journal = std::move(*created);
   }
   Replay replay(simulation, journal.get(), csv.get());
-  Status status;
   const Status read =
-      (*source)->read_tick_records(0, info.last_tick, [&](Tick, const proto::TickRecord& message) {
-        status = replay.take(message);
-        return status.ok() && stop == 0;
+      recording::read_ticks(**source, [&](const step::TickRecord& record, bool& is_done) {
+        is_done = stop != 0;
+        return replay.take(record);
       });
   const Status closed = journal ? journal->close() : Status{};
-  if (!status) return Error{status.error().code, command.recording + ": " + status.error().message};
-  if (!read) return read;
+  if (!read) return Error{read.error().code, command.recording + ": " + read.error().message};
   if (!closed) return closed;
   const auto ticks = simulation.current_tick();
   const double seconds = static_cast<double>(ticks) / static_cast<double>(kTicksPerSecond);

@@ -7,7 +7,7 @@
 namespace trocar::app {
 namespace {
 
-// As a server does, see simulation_loop.cpp.
+// A server takes its snapshots at the same ticks, see simulation_loop.cpp.
 constexpr Tick kSnapshotPeriod = 10'000, kSnapshotPhase = kTicksPerFrame / 2;
 
 }  // namespace

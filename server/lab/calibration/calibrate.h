@@ -16,7 +16,7 @@ namespace trocar::calibration {
 
 struct Settings {
   double error = 0.03;  // asked of the contact force: mean difference over mean force in a range
-  // Of the reference itself, as a share of `error`.
+  // The reference itself may err by this share of `error`.
   double reference_error = 0.1;
   std::size_t places = 16;
   std::uint64_t seed = 1;

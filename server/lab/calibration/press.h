@@ -54,8 +54,8 @@ class PressBench {
 // A number of sweeps with which a press is converged.
 struct Reference {
   std::uint32_t sweeps = kFullSweeps;
-  // What the second half of the sweeps changes: largest difference of the force over the largest
-  // force. It is larger than what further sweeps change, since each half changes less.
+  // The second half of the sweeps changes the force by this share of its largest value. Further
+  // sweeps change it by less, since each half changes less.
   double own_error = 0;
   double tolerance = 0;
 

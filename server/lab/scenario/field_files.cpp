@@ -28,7 +28,7 @@ Status write_file(const std::filesystem::path& path, Body body) {
   return {};
 }
 
-// What is written of a mesh, of the organ's own or of what was cut of it.
+// A mesh as field files hold it: the organ's own, or the one that cuts have left.
 struct Mesh {
   std::span<const Vec3d> rest_m;
   std::span<const mesh::Tet> tets;

@@ -17,7 +17,7 @@
 
 namespace trocar::scenario {
 
-// What cuts have made of the organ's mesh: as many nodes as the field, and the tets that are left.
+// The organ's mesh after cuts has as many nodes as the field, and the tets that are left.
 struct CutMesh {
   std::vector<Vec3d> rest_m;  // per node
   std::vector<mesh::Tet> tets;

@@ -183,8 +183,8 @@ void ScenarioRun::hold_displaced() {
   if (has_held) simulation_.resume();
 }
 
-// Where tissue relaxes it is where tissue would be that has nothing left to relax; then its
-// stresses are those of having been there.
+// Tissue that relaxes is put where it would be with nothing left to relax. Its stresses are then
+// those of having been there for long.
 void ScenarioRun::settle(unsigned threads) {
   auto& world = simulation_.editable_state().world;
   if (dynamics::Relaxation::is_needed(organ())) {

@@ -19,7 +19,7 @@ void read_count(tool::TableReader& reader, std::string_view key, std::int64_t le
     value = static_cast<std::uint32_t>(*number);
 }
 
-// What a session does unless its server is told otherwise (step::TickDecisions).
+// "session" sets the keys to what a session does unless its server is told otherwise.
 void read_like(tool::TableReader& reader, RunRule& run) {
   if (!reader.choice<bool, 1>("like", {{{"session", true}}})) return;
   const step::TickDecisions session;

@@ -6,7 +6,7 @@
 
 #include "common/base/version.h"
 #include "server/organs/organ/local_reduction_file.h"
-#include "server/organs/organ/organ_file.h"
+#include "server/session/recording/recorded_session.h"
 #include "server/session/recording/verifier.h"
 
 namespace trocar::recording {
@@ -77,13 +77,8 @@ Result<VerifyReport> verify_journal(const std::string& path,
   auto journal = journal::SessionJournal::open(path);
   if (!journal) return journal.error();
   const auto& info = (*journal)->info();
-  auto message = (*journal)->organ();
-  if (!message) return message.error();
-  const std::string encoded = message->SerializeAsString();
-  auto organ = organ::decode_organ(bytes_of(std::string_view(encoded)));
-  if (!organ) return Error{organ.error().code, path + ": /organ: " + organ.error().message};
-  if (organ::organ_hash(*organ) != info.organ_hash)
-    return Error{ErrorCode::BadFile, path + ": /organ is not the organ that the session names"};
+  auto organ = recorded_organ(**journal, path);
+  if (!organ) return organ.error();
 
   VerifyReport report;
   report.is_resimulated = info.sim_version == kSimVersion && !info.has_external_loads;
