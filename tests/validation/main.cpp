@@ -32,12 +32,18 @@ cannot write, or gnuplot is missing.
 )";
 
 struct Options {
-  std::string only;
+  std::vector<std::string> only;  // prefixes; empty: all
   std::filesystem::path out = "out/validate";
   std::string commit = "unknown";
   bool is_short = false;
   bool lists = false;
 };
+
+bool is_asked_for(std::string_view name, const std::vector<std::string>& prefixes) {
+  return prefixes.empty() || std::ranges::any_of(prefixes, [&](const std::string& prefix) {
+           return name.starts_with(prefix);
+         });
+}
 
 std::string processor() {
   std::ifstream in("/proc/cpuinfo");
@@ -115,14 +121,14 @@ int run_all(const Options& options, const std::string& command) {
                 .date = today(),
                 .is_short = options.is_short};
   for (const auto& experiment : experiments()) {
-    if (!std::string(experiment.name).starts_with(options.only)) continue;
+    if (!is_asked_for(experiment.name, options.only)) continue;
     report.sections.push_back(run_one(lab, experiment));
     report.load_after = load_average();
     // Written again after each: who stops the program has what was done until then.
     if (auto s = write_report(options, report); !s) return trocar::report(kProgram, s.error());
   }
   if (report.sections.empty())
-    return trocar::report(kProgram, {ErrorCode::Usage, "--only: '" + options.only +
+    return trocar::report(kProgram, {ErrorCode::Usage, "--only: '" + options.only.front() +
                                                            "' begins no experiment, see --list"});
   std::printf("%s; %s\n", totals(report.sections).c_str(),
               (options.out / "report.html").string().c_str());
@@ -141,7 +147,8 @@ int run(int argc, char** argv) {
   app.footer(kExamples);
   app.set_version_flag("--version", std::string(kProgram) + " " + kVersion + ", sim_version " +
                                         std::to_string(kSimVersion));
-  app.add_option("--only", options.only, "only experiments whose name begins so")
+  app.add_option("--only", options.only,
+                 "only experiments whose name begins so; may be given several times")
       ->type_name("PREFIX");
   app.add_option("--out", options.out, "folder of report, results and scenarios")
       ->type_name("DIR")
@@ -160,7 +167,7 @@ int run(int argc, char** argv) {
     return trocar::report(kProgram, set.error());
   std::string command = "deploy/validate";
   if (options.is_short) command += " --short";
-  if (!options.only.empty()) command += " --only " + options.only;
+  for (const auto& prefix : options.only) command += " --only " + prefix;
   return run_all(options, command);
 }
 
