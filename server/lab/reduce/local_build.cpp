@@ -144,7 +144,7 @@ class Builder {
         for (const auto other : organ_.mesh.node_neighbours[node])
           if (is_accessible(other)) patch.reach.push_back(other);
       std::ranges::sort(patch.reach);
-      patch.reach.erase(std::ranges::unique(patch.reach).begin(), patch.reach.end());
+      patch.reach.erase(std::unique(patch.reach.begin(), patch.reach.end()), patch.reach.end());
     }
   }
 
@@ -169,7 +169,7 @@ class Builder {
       nodes.insert(nodes.end(), fields.begin(), fields.end());
     }
     std::ranges::sort(nodes);
-    nodes.erase(std::ranges::unique(nodes).begin(), nodes.end());
+    nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
     auto& greens = built_.reduction.greens;
     greens.resize(nodes.size());
     for_each(LocalStage::Greens, nodes.size(), [&](FullModel& model, std::size_t i) -> Status {

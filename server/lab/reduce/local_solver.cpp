@@ -40,7 +40,7 @@ constexpr float kNewInField = 0.05F;
 template <typename T>
 void sort_once(std::vector<T>& values) {
   std::ranges::sort(values);
-  values.erase(std::ranges::unique(values).begin(), values.end());
+  values.erase(std::unique(values.begin(), values.end()), values.end());
 }
 
 }  // namespace
@@ -153,7 +153,7 @@ struct LocalSolver::Contact {
       for (const auto& [tet, weight] : place.patch->cubature) {
         const double own = distance(tet, place.patch);
         if (std::ranges::binary_search(inner_tets, tet) ||
-            std::ranges::any_of(places, [&](const Place& other) {
+            std::ranges::any_of(places, [&, tet = tet](const Place& other) {
               const double theirs = distance(tet, other.patch);
               return theirs < own || (theirs == own && &other < &place);
             }))
