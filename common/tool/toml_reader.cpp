@@ -70,8 +70,11 @@ std::optional<toml::table> parse_toml(Document& document, std::string_view text,
   try {
     return toml::parse(text, source);
   } catch (const toml::parse_error& error) {
-    document.fail(error.source(), "",
-                  "is not TOML: " + std::string(error.description()) + ", see " + example);
+    // The description quotes what it has read, line breaks included.
+    std::string description(error.description());
+    for (char& c : description)
+      if (static_cast<unsigned char>(c) < 0x20) c = ' ';
+    document.fail(error.source(), "", "is not TOML: " + description + ", see " + example);
   } catch (const std::exception& error) {
     document.fail({}, "", "is not TOML: " + std::string(error.what()));
   }

@@ -82,7 +82,7 @@ Status check_creep(const Reduction& r) {
 
 Status validate(const Reduction& r) {
   const std::size_t modes = r.mode_count();
-  if (r.method != "dogan") return bad("is of the unknown method '" + r.method + "', must be dogan");
+  if (r.method != "dogan") return bad("is of an unknown method, must be dogan");
   if (modes == 0 || modes > organ::kMaxReducedModes)
     return bad("has " + std::to_string(modes) + " modes, must have 1 to " +
                std::to_string(organ::kMaxReducedModes));
