@@ -23,7 +23,7 @@ constexpr double kPunch_mm = 15, kPunchDepth_mm = 0.5;  // radius of the flat pu
 // to 22 %, the finer one by 2 to 10 %.
 // A few per cent are due to the closed forms.
 constexpr double kTarget = 0.05;
-constexpr double kMeshTarget = 0.05, kMeshOnRecord = 0.13;
+constexpr double kMeshTarget = 0.05;
 constexpr double kFine_mm = 20, kReach_mm = 400, kGrowth = 1.35;
 
 struct Law {
@@ -31,20 +31,24 @@ struct Law {
   const char* title;
   std::string material;
   double poisson;
-  double on_record;  // the largest error on the finest mesh, where the target is missed
-
-  Bound bound(const char* closed_form) const {
-    return validation::law(kTarget, closed_form).missed(on_record);
-  }
+  // A press is solved to this residual, N. Close to incompressible tissue balances large pressures,
+  // whose rounding in float leaves 2e-6 N; half of 1e-5 N changes its force by 0.04 %.
+  double tolerance_n;
+  // The largest errors on record where the target is missed, 0 where it is kept.
+  double round_on_record, punch_on_record, mesh_on_record;
 };
 
+Bound bound(Bound target, double on_record) {
+  return on_record > 0 ? target.missed(on_record) : target;
+}
+
 std::vector<Law> laws() {
-  return {{"springs", "springs (nu = 0.25)", "", 0.25, 0.25},
+  return {{"springs", "springs (nu = 0.25)", "", 0.25, 2e-6, 0, 0, 0.13},
           {"tensor-mass", "tensor-mass, nu = 0.25",
-           "elastic_law = \"tensor-mass\"\npoisson_ratio = 0.25\n", 0.25, 0.1},
+           "elastic_law = \"tensor-mass\"\npoisson_ratio = 0.25\n", 0.25, 2e-6, 0.1, 0.06, 0.13},
           {"neo-hookean-averaged", "neo-Hookean, averaged strain, nu = 0.4756",
            "elastic_law = \"neo-hookean\"\npoisson_ratio = 0.4756\naveraged_strain = true\n",
-           0.4756, 0.08}};
+           0.4756, 1e-5, 0, 0, 0}};
 }
 
 // Cells of size h out to kFine_mm from 0, then growing out to kReach_mm; m.
@@ -80,11 +84,11 @@ std::string common(const Law& law, const std::string& organ) {
          fmt::format("[material]\nyoung_modulus_pa = {}\n{}\n", kYoung_pa, law.material);
 }
 
-std::string static_in(int load_steps) {
+std::string static_in(const Law& law, int load_steps) {
   return fmt::format(
       "[run]\nmode = \"static\"\nseconds = 1\nload_steps = {}\nover_relaxation = 1.8\n"
-      "tolerance_n = 2e-6\nmax_sweeps = 10000\n\n",
-      load_steps);
+      "tolerance_n = {}\nmax_sweeps = 10000\n\n",
+      load_steps, law.tolerance_n);
 }
 
 // Hertz: F = 4/3 E / (1 - nu^2) sqrt(R) d^(3/2).
@@ -100,7 +104,7 @@ std::optional<Pressed> press_round(const Lab& lab, Section& section, const Law& 
       common(law, organ) +
           tool(kRadius_mm, 10, {0, 1, 0},
                {{0, {0, top_mm, 0}, "push"}, {1, {0, top_mm - kDepth_mm, 0}, "push"}}) +
-          static_in(4) + "[[probe]]\ntool = 0\nquantity = \"force\"\n");
+          static_in(law, 4) + "[[probe]]\ntool = 0\nquantity = \"force\"\n");
   if (!run) return std::nullopt;
   lab.finish(section, *run, [&](const scenario::StepReport&) {
     curve.x.push_back(kDepth_mm * run->time_s());
@@ -118,7 +122,7 @@ std::optional<Pressed> press_flat(const Lab& lab, Section& section, const Law& l
           fmt::format("[[nodes]]\nname = \"punch\"\nnearest_mm = [0, {:.9g}, 0]\nradius_mm = {}\n"
                       "surface = true\n\n",
                       top_mm, kPunch_mm + 1e-3) +
-          displace("punch", {{0, {0, -kPunchDepth_mm, 0}}}) + static_in(1) +
+          displace("punch", {{0, {0, -kPunchDepth_mm, 0}}}) + static_in(law, 1) +
           "[[probe]]\nset = \"punch\"\nquantity = \"reaction\"\n");
   if (!run) return std::nullopt;
   lab.finish(section, *run);
@@ -149,8 +153,7 @@ std::vector<std::string> row(const Law& law, const char* tool_name, double h_mm,
 void run_indentation(const Lab& lab, Section& section) {
   section.say(fmt::format(
       "A block of 0.9 m and half as deep, fine under the tool and coarse away from it, stands for "
-      "a "
-      "half-space. A round tool of {} mm radius presses {} mm deep (contact radius {:.1f} mm; "
+      "a half-space. A round tool of {} mm radius presses {} mm deep (contact radius {:.1f} mm; "
       "Hertz), and "
       "a disc of {} mm radius is moved {} mm down with the nodes bonded to it. The tool's radius "
       "is six "
@@ -170,7 +173,7 @@ void run_indentation(const Lab& lab, Section& section) {
               {"law", "tool", "element under the tool, mm", "closed form, N", "ours, N", "error"},
               {}};
   const std::vector<double> sizes =
-      lab.is_short() ? std::vector<double>{5} : std::vector<double>{5, 2.5};
+      lab.is_short() ? std::vector<double>{2.5} : std::vector<double>{5, 2.5};
   std::vector<double> tops_mm;
   const auto name_of = [](double h_mm) { return fmt::format("half-space-{:g}mm", h_mm); };
   for (const double h_mm : sizes) {
@@ -199,15 +202,15 @@ void run_indentation(const Lab& lab, Section& section) {
     }
     if (!round || !flat) continue;
     section.compare(fmt::format("hertz-{}", law.name), round->expected_n, round->ours_n,
-                    law.bound("Hertz"), "N",
+                    bound(validation::law(kTarget, "Hertz"), law.round_on_record), "N",
                     fmt::format("{}: round tool, finest mesh.", law.title));
     section.compare(fmt::format("punch-{}", law.name), flat->expected_n, flat->ours_n,
-                    law.bound("Spence 1968"), "N",
+                    bound(validation::law(kTarget, "Spence 1968"), law.punch_on_record), "N",
                     fmt::format("{}: flat punch, finest mesh.", law.title));
     if (coarser_n > 0)
       section.at_most(fmt::format("mesh-{}", law.name), "half the element size",
                       std::abs(coarser_n / round->ours_n - 1),
-                      target(kMeshTarget, "elements do not show").missed(kMeshOnRecord),
+                      bound(target(kMeshTarget, "elements do not show"), law.mesh_on_record),
                       fmt::format("{}: change of the round tool's force from {:g} to {:g} mm.",
                                   law.title, sizes.front(), sizes.back()));
     if (law.poisson != 0.25 || std::string(law.name) == "springs") {
