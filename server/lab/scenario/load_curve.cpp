@@ -17,7 +17,7 @@ Vec3d tip_at(const scenario::ResolvedScenario& resolved, std::size_t tool, doubl
                        .world_from_tool.position);
 }
 
-// The farthest from the start.
+// Returns the tip's displacement at the key that is farthest from the start, m.
 Vec3d way_of(const scenario::ResolvedScenario& resolved, std::size_t tool) {
   Vec3d result;
   for (const auto& key : resolved.scenario.tools[tool].keys) {
@@ -27,7 +27,7 @@ Vec3d way_of(const scenario::ResolvedScenario& resolved, std::size_t tool) {
   return result;
 }
 
-// Of several for one set, along an axis each for example, the one with the largest value.
+// Returns the rule for a set; of several (one per axis, say) the one with the largest value.
 template <typename Rules>
 std::optional<std::size_t> about(const Rules& rules, const std::string& set) {
   std::optional<std::size_t> found;

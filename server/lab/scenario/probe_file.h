@@ -26,7 +26,7 @@ class ProbeFile {
   void add(const ScenarioRun& run);
   // A row of one value per probe, SI, at any time; nothing for one that is not due.
   void add(double time_s, std::span<const std::optional<Vec3d>> values);
-  // What was added is in the file, whatever happens to the program.
+  // Hands all rows to the operating system, so that they survive a crash of the program.
   void flush() { std::fflush(file_.get()); }
   // Error: a row could not be written.
   Status close();

@@ -1,8 +1,8 @@
 #pragma once
 
-// What the probes saw, as pictures: probe_<name>.svg over time, components and magnitude; and
-// force_<name>.svg, force against displacement, for each curve of load_curve.h. A long run is drawn
-// with fewer points: always evenly spaced ones, at most kMaxPlotPoints. One thread.
+// These plots show the probes: probe_<name>.svg has components and magnitude over time, and
+// force_<name>.svg has force against displacement for each curve of load_curve.h. A long run is
+// drawn with fewer points: always evenly spaced ones, at most kMaxPlotPoints. One thread.
 
 #include <filesystem>
 #include <vector>

@@ -30,7 +30,7 @@ inline constexpr std::size_t kScenarioFileLimitBytes = 16u << 20;
 inline constexpr double kScenarioTimeLimit = 3600;         // s
 inline constexpr std::uint32_t kScenarioRateLimit = 1000;  // rows per second of simulated time
 
-// Where something stands in the file, for messages about it.
+// A place is where an entry stands in the file; error messages quote it.
 struct Place {
   int line = 0;
   std::string key;
@@ -38,13 +38,14 @@ struct Place {
 
 struct ScenarioOrgan {
   Place place;
-  // As load_organ() takes it, or "block"; files are relative to the scenario.
+  // The source is what load_organ() takes, "lattice" or "block". Files are relative to the
+  // scenario.
   std::string source;
   std::optional<std::array<int, 3>> lattice_nodes;  // of a lattice or block
   std::optional<double> lattice_spacing_m;
 };
 
-// What is set replaces the organ's own.
+// Values that are set here replace those of the organ's own material.
 struct MaterialChange {
   Place place;                                                              // of the table
   std::vector<Place> given;                                                 // of each key in it
@@ -56,7 +57,7 @@ struct MaterialChange {
 
   // Whether the number of this member is set.
   bool sets(double material::Material::*member) const;
-  // Of the key with this name, or of the table if it is not in it.
+  // Returns the place of the key with this name, or of the table if the key is not in it.
   const Place& place_of(std::string_view key) const;
 };
 
@@ -150,7 +151,7 @@ struct RunRule {
   Integrator integrator = Integrator::Implicit;
   std::uint32_t steps_per_tick = 1;  // 1 ms / dt
   Boundary boundary = Boundary::Whole;
-  // Of the queue, as in a session; unlimited without.
+  // These limit the queue in layers and in nodes, as in a session; without them it is unlimited.
   std::optional<std::uint32_t> depth, nodes;
   std::uint32_t sweeps = 4;
   double over_relaxation = 1.5;
@@ -210,7 +211,7 @@ struct ResolvedScenario {
   std::shared_ptr<const organ::LocalReduction> reduction;  // null: none
 };
 
-// Of a key in a list of places, or of `other` if it is not in the list.
+// Returns the place of a key in the list, or `other` if the key is not in it.
 const Place& place_of_key(const std::vector<Place>& places, std::string_view key,
                           const Place& other);
 // "file:line: key k: what", for what is found out after reading.

@@ -22,7 +22,8 @@ bool holds_an_element(const mesh::TetMesh& mesh, const NodeList& nodes) {
                            : std::ranges::any_of(mesh.tets, is_in);
 }
 
-// What the mass of each node is in proportion to.
+// Returns a weight per node to which its mass is proportional: the lumped mass, kg, or, without
+// tets, the density of the node's material, kg/m^3.
 std::vector<double> mass_weights(const organ::Organ& organ) {
   if (!organ.mesh.tets.empty()) return organ::lumped_masses(organ);
   std::vector<double> densities;

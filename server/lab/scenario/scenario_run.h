@@ -71,7 +71,7 @@ class ScenarioRun {
   std::optional<double> stable_dt_s() const {
     return explicit_ ? std::optional(explicit_->stable_dt_s()) : std::nullopt;
   }
-  // Where a tool's tip is after a step; at the origin before it has appeared.
+  // Returns where the tool's tip is after a step, m; the origin before the tool has appeared.
   Vec3d tool_tip(std::size_t tool) const {
     return to_double(
         simulation_.state().tools[ToolSlot{static_cast<std::uint8_t>(tool)}].pose.position);
@@ -109,7 +109,7 @@ class ScenarioRun {
   step::ExternalLoads loads_;
   std::vector<std::size_t> watched_;  // per probe: its number in loads_, of reactions
 
-  // Scratch of a step.
+  // Steps use these members as workspace.
   hands::TickInputs inputs_;
   std::optional<nakao::ExplicitEuler> explicit_;
   std::vector<NodeIndex> free_nodes_;  // of a static run

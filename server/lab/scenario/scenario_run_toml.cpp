@@ -112,7 +112,7 @@ RunRule read_run(tool::TableReader& reader) {
   run.over_relaxation = reader.number("over_relaxation", 1, 1.9).value_or(run.over_relaxation);
   run.self_contact = reader.boolean("self_contact").value_or(true);
   if (run.mode == RunMode::Static) {
-    // What is left out of balance adds up over all nodes, and nothing corrects it later.
+    // Residual forces add up over all nodes, and no later step of a static run corrects them.
     run.tolerance_n = 1e-7;
     run.max_sweeps = 50'000;
   }

@@ -1,4 +1,4 @@
-// The TOML form of a scenario.
+// This file reads the TOML form of a scenario.
 
 #include "common/tool/script_toml.h"
 #include "server/lab/scenario/scenario_tables.h"

@@ -8,17 +8,17 @@
 namespace trocar::blades {
 namespace {
 
-// The way over which the wound's work is counted, and how much of the blade's direction is that of
-// the newest tick.
+// The work of cutting is averaged over kWay_m of a blade's way. kNewest is the weight of the newest
+// tick in smoothed velocities and forces.
 constexpr float kWay_m = 0.005f, kNewest = 0.05f;
 // A blade this slow or slower feels in proportion less: one that stands feels nothing.
 constexpr float kSlow_m_s = 0.002f;
 constexpr float kMostForce_n = 30;
-// Friction that fades is over there.
+// Fading friction below this force counts as none.
 constexpr float kLeastForce_n = 1e-3f;
-// Of friction's spring: 1 N at 1 mm.
+// The friction spring bears 1 N at 1 mm.
 constexpr float kFriction_n_m = 1000;
-// Of a stopped blade, N/m: 10 mm on, 5 N.
+// A stopped blade is held by a spring of this stiffness, N/m, up to this force, N: 5 N at 10 mm.
 constexpr float kStop_n_m = 500, kMostStop_n = 10;
 
 }  // namespace

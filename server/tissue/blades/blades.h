@@ -39,11 +39,11 @@ class BladeTable {
   // cut no more, or have appeared elsewhere: they are to be lifted.
   std::uint32_t begin_tick(const hands::ToolTable& tools, const hands::ClaimTable& claims,
                            bool can_cut);
-  // What friction bears at most on a blade that cuts, N.
+  // Sets the most that friction bears on a blade that cuts, N.
   void set_friction(ToolSlot tool, double limit_n) {
     blades_[tool.value].measured_n = static_cast<float>(limit_n);
   }
-  // After it. work_j: of all blades; each gets its share by how far it went.
+  // Ends a tick after its cut. work_j: of all blades; each gets a share in proportion to its way.
   void end_tick(const hands::ToolTable& tools, double work_j);
   void clear() { blades_ = {}; }
 

@@ -4,7 +4,7 @@
 
 namespace trocar::blades {
 
-// What blades did in one tick.
+// This report says what blades did in one tick.
 struct CutReport {
   std::uint32_t crossed_tets = 0, splits = 0;
   double opened_area_m2 = 0;  // one side of the wound

@@ -98,7 +98,7 @@ void TissueCuts::record(cutting::CutEvents events) {
   history_.push_back(std::move(events));
 }
 
-// What has changed, with the surface as it is now.
+// Brings the surface up to date with the topology and returns what has changed.
 topology::Edit TissueCuts::edit() {
   return {topology_, new_nodes_, surface_.follow(topology_)};
 }

@@ -33,16 +33,16 @@ class TissueCuts {
   bool can_cut() const { return cutter_ != nullptr; }
   const topology::Topology& topology() const { return topology_; }
   const wire::SurfaceLayout& layout() const { return layout_; }
-  // Of the tissue on a blade, N, world frame.
+  // Returns the force of the tissue on a blade, N, world frame.
   Vec3f force_n(ToolSlot tool) const { return blades_[tool].force_n; }
 
-  // What is stretched too far around these nodes tears in the next cut().
+  // Looks for tissue around these nodes that is stretched too far; it tears in the next cut().
   void tear(const world::World& world, std::span<const NodeIndex> nodes);
   bool can_tear() const { return can_cut() && tearing_.is_possible(); }
 
-  // Blades of claims in effect go where their tools are; then what they cross is cut. An edit, if
-  // the topology has changed: it is to be handed to all who follow it, among them extend_layout();
-  // then end_edit() is due.
+  // Moves blades of claims in effect to where their tools are, then cuts what they cross. Returns
+  // an edit if the topology has changed: hand it to all who follow the topology, among them
+  // extend_layout(), then call end_edit().
   // travel_m: a sum over ticks of the farthest that any node has moved.
   std::optional<topology::Edit> cut(const hands::ToolTable& tools, const hands::ClaimTable& claims,
                                     const world::World& world, double travel_m, CutReport& report);
@@ -57,9 +57,10 @@ class TissueCuts {
   // lifted.
   void replace(const TissueCuts& before);
 
-  // After that, once: the surface as it is, which no change leads to; else null.
+  // Returns the whole surface once after replace(), because no change leads to it; otherwise null.
   std::shared_ptr<const wire::SurfaceLayout> take_new_layout();
-  // What has changed since the last call, for clients, or null. Before a frame is published.
+  // Returns the surface's changes since the last call, for clients, or null if there are none. Call
+  // it before a frame is published.
   std::shared_ptr<const wire::SurfaceChange> take_change();
 
   // History, strokes and forces. Each edit that is read goes to hand_out, as those of cut() do.

@@ -10,8 +10,8 @@ namespace {
 
 constexpr int kMaxPushesOut = 24;
 constexpr float kOutside_m = 1e-6f;
-// So much of a tool, in radii, may be left inside where the surface holds it from all sides; with
-// more it rather stays where it was.
+// This part of a tool's radius may be left inside where the surface holds it from all sides. A tool
+// that is deeper goes back to where it was, if it is less deep there.
 constexpr float kLeftInside = 0.1f;
 // A tool walks at most by what it came nearer to its hand in the tick before and a fifth, and,
 // where it presses, as deep as its force still grows; else, so that one that is far behind its hand
@@ -23,7 +23,7 @@ struct Depenetration {
   Vec3f moved;      // m, of the tool
   float depth = 0;  // m, of the point that is still deepest inside
 };
-// Out of the deepest point first, then out of what is deepest then.
+// Pushes the tool out where it is deepest, then where it is deepest after that, and so on.
 Depenetration depenetrate(const PlaneArrays& planes, const Vec3f& from) {
   Depenetration result{from};
   for (int i = 0; i <= kMaxPushesOut; ++i) {

@@ -88,7 +88,7 @@ const Vec3f& SelfContactFinder::normal(Site site, Sort sort, const world::World&
              surface_.normal(site, sort, [&](TriangleIndex t) { return up(t, world); });
 }
 
-// Of what the node is of, that which looks most against them.
+// Returns that normal of the node, of skin or wound, which is most opposed to `theirs`.
 Vec3f SelfContactFinder::normal_towards(Site site, const Vec3f& theirs, const world::World& world) {
   if (!surface_.is_of(site, Sort::Wound)) return normal(site, Sort::Skin, world);
   const Vec3f& of_wound = normal(site, Sort::Wound, world);
@@ -122,7 +122,7 @@ SelfContactFinder::ClosestPoint SelfContactFinder::closest_point(Site site, Tria
   return {triangle, w, from, length_squared(from)};
 }
 
-// Of the triangles at some nodes; the first of equals.
+// Returns the closest point on the triangles at some nodes, on the first triangle of equals.
 SelfContactFinder::ClosestPoint SelfContactFinder::closest_point_around(
     Site site, std::span<const Site> around, bool is_of_lips, const world::World& world) {
   ClosestPoint best;
@@ -199,7 +199,7 @@ bool SelfContactFinder::can_meet_other(Site site, Site across, bool is_moved,
       !surface_.is_of_any(site) || !surface_.is_of_any(across))
     return false;
   return dot(main_normal(site, world), main_normal(across, world)) <= kStaysFacing &&
-         // Else the list has no such pairs.
+         // Only cut nodes need this check: the list has no near pairs of nodes that were never cut.
          !((surface_.was_cut(site) || surface_.was_cut(across)) && surface_.is_near(site, across));
 }
 
@@ -251,8 +251,9 @@ bool SelfContactFinder::meets(Site site, std::size_t first, std::size_t end,
          (nearest != kNoSite && begins(site, nearest, least, false, world, closest, touch));
 }
 
-// Where to look on from the closest point of a triangle: at its corners. What is nearer than a
-// point on an edge or corner is there: lips that have not moved are corner on corner.
+// Returns the corners of a triangle around which the search for a nearer point goes on from its
+// closest point. With is_there_only these are the ends of the edge, or the corner, that the point
+// lies on: lips that have not moved are corner on corner.
 std::span<const SelfSurface::Site> SelfContactFinder::around(TriangleIndex triangle,
                                                              const Vec3f& weights,
                                                              bool is_there_only) {
@@ -265,7 +266,7 @@ std::span<const SelfSurface::Site> SelfContactFinder::around(TriangleIndex trian
   return corners_;
 }
 
-// Where a pair is now; false when it has come apart.
+// Finds where a pair is now; returns false when it has come apart.
 bool SelfContactFinder::stays(Site site, TriangleIndex triangle, const world::World& world,
                               ClosestPoint& closest, Touch& touch) {
   const bool is_of_lips = this->is_of_lips(site, triangle);
@@ -285,7 +286,7 @@ bool SelfContactFinder::stays(Site site, TriangleIndex triangle, const world::Wo
          lies_along(touch.aside, touch.gap);
 }
 
-// What it was when it was last looked at holds.
+// Returns whether the pair may keep its last place: it is not due for a look, its nodes are slow.
 bool SelfContactFinder::lies_still(Site site, TriangleIndex triangle,
                                    const world::World& world) const {
   if ((world.tick + site) % kLookEvery == 0 || surface_.is_gone(triangle)) return false;
@@ -333,10 +334,10 @@ void SelfContactFinder::find(const world::World& world, SelfContactTable& pairs,
   keep_list(world);
   pairs_looked_at_ = 0;
   const auto& runs = list_.runs;
-  // No two are nearer to each other than their references by more than that.
+  // Two nodes are nearer to each other than their references by no more than this, m.
   const float moved =
       2 * (kReferenceSlacks * slack_m_ + static_cast<float>(travel_ - list_.travel));
-  // What the fastest pair could reach.
+  // Nodes that are farther apart than this, m, begin no pair, however fast they approach.
   const float reach = corner_reach_m_ + margin_of(2 * last_move_m_ / kTickSeconds);
   const bool is_far = runs.empty() || list_.least_distance - moved > reach;
   if (is_far && pairs.nodes().empty()) return;

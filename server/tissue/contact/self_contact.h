@@ -50,7 +50,7 @@ inline constexpr float kSelfTicksAhead = 1.5f;
 inline constexpr float kStill_m_s = 1e-4f;
 inline constexpr Tick kLookEvery = 8;
 
-// Where on its triangle a node lies, when that was last looked at.
+// A place is where a node lay on its triangle when the pair was last looked at.
 struct SelfContactPlace {
   Vec3f weights;    // of the corners
   Vec3f normal;     // from the triangle to the node
@@ -147,8 +147,9 @@ class SelfContactFinder {
     float facing = 0, closing = 0;  // cosine of both normals; m/s
   };
 
-  // What is listed, when it began to be, and where from. Per node: a reference, see begin_list(),
-  // and whether that is not where the node was at rest.
+  // A list holds the pairs of nodes that can come near, and the travel at which it was begun. Each
+  // node has a reference position, see begin_list(), and a flag that says whether this is away from
+  // the node's rest position.
   struct List {
     std::vector<NodePair> pairs;   // ascending
     std::vector<Run> runs;         // of pairs, per node that has some; ascending
@@ -176,7 +177,7 @@ class SelfContactFinder {
   bool has_moved(Site site, float by_m, const world::World& world) const {
     return length_squared(world.displacements[site]) > by_m * by_m;
   }
-  // When its surroundings were last looked through.
+  // Returns whether the node's reference is farther than this from its rest position.
   bool was_moved(Site site, float by_m, const List& list) const {
     return length_squared(list.references[site] - surface_.rest_position(site)) > by_m * by_m;
   }
@@ -206,7 +207,7 @@ class SelfContactFinder {
   std::size_t end_of_run(std::size_t run) const {
     return run + 1 < list_.runs.size() ? list_.runs[run + 1].first : list_.pairs.size();
   }
-  // Of list_.pairs.
+  // Searches list_.pairs from `first` to `end`.
   bool meets(Site site, std::size_t first, std::size_t end, const world::World& world,
              ClosestPoint& closest, Touch& touch);
   bool stays(Site site, TriangleIndex triangle, const world::World& world, ClosestPoint& closest,
@@ -241,7 +242,8 @@ class SelfContactFinder {
   // Scratch.
   std::vector<std::uint32_t> near_stamp_;  // per node
   std::uint32_t near_current_ = 0;
-  // Of this tick, where the stamp is current: per node and sort, and per triangle.
+  // These normals are of this tick where their stamp is tick_current_. normals_ has one per node
+  // and sort; ups_ has one per triangle, as long as twice its area.
   std::vector<Vec3f> normals_, ups_;
   std::vector<std::uint32_t> normal_stamp_, up_stamp_;
   std::uint32_t tick_current_ = 0;

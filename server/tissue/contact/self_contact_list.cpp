@@ -1,4 +1,4 @@
-// Which pairs of nodes can come near.
+// This file lists the pairs of nodes that can come near.
 
 #include <algorithm>
 #include <cmath>
@@ -10,14 +10,14 @@
 namespace trocar::contact {
 namespace {
 
-// Of a list, per tick, at least.
+// Each tick takes at least so many references of a new list, or searches around so many nodes.
 constexpr std::size_t kReferencesPerTick = 512, kSitesPerTick = 32;
-// Of the work on a list, the part that taking references is.
+// Taking references is this part of the work on a list.
 constexpr double kReferencesShare = 0.3;
 constexpr std::size_t kReservedPairs = 1u << 15;
 // How far the surface may move between lists, in mean edges; in metres at most kMaxSlack_m.
 constexpr float kSlackEdges = 1, kMaxSlack_m = 0.006f;
-// The nearest corner of a triangle, from any point on it, in longest edges.
+// The nearest corner of a triangle is this far from any point on it at most, in longest edges.
 constexpr float kCornerReach = 0.6f;
 
 }  // namespace
@@ -50,7 +50,7 @@ SelfContactFinder::SelfContactFinder(const organ::Organ& organ) : surface_(organ
   grid_ = PointGrid(reach_m_ + slack_m_, sites.size());
 }
 
-// For all nodes that there are.
+// Makes room for all nodes and triangles.
 void SelfContactFinder::extend() {
   const auto count = surface_.node_count();
   is_close_at_rest_.resize(count);
@@ -71,8 +71,8 @@ void SelfContactFinder::take_reference(Site site, const world::World& world, Lis
   list.has_left[site] = has_moved(site, kListedSlacks * slack_m_, world) ? 1 : 0;
 }
 
-// What the edit has changed looks around, in the list that there is and in the one to come: what
-// that has kept or found is found there once more.
+// Adds the pairs of nodes that the edit has changed to the present list and to the next one.
+// add_to_list() drops what the next one finds twice.
 void SelfContactFinder::follow(const topology::SurfaceEdit& edit, const world::World& world) {
   const auto before = surface_.sites();
   const bool has_references = is_listing_ && sites_seen_ == before.size();
@@ -99,7 +99,7 @@ void SelfContactFinder::follow(const topology::SurfaceEdit& edit, const world::W
   next_found_.insert(next_found_.end(), found_.begin(), found_.end());
 }
 
-// Whether it may meet what does not look around itself.
+// Returns whether the node may meet nodes that do not look around themselves.
 bool SelfContactFinder::looks_around(Site site, const List& list) const {
   return list.has_left[site] == 1 || is_close_at_rest_[site] == 1 ||
          surface_.is_of(site, Sort::Wound);
@@ -138,12 +138,12 @@ void SelfContactFinder::list_edit(List& list) {
   list.least_distance = std::min(list.least_distance, std::sqrt(least_squared));
 }
 
-// What was found and the list lacks; found from both sides, some of it twice.
+// Inserts pairs that the list lacks. `found` has each from both sides, some of them twice.
 void SelfContactFinder::add_to_list(std::vector<NodePair>& found, List& list) {
   std::ranges::sort(found);
   found.erase(std::unique(found.begin(), found.end()), found.end());
   auto& pairs = list.pairs;
-  // From behind, each to its place.
+  // Entries are merged from the back, so that each moves only once.
   auto old = pairs.size(), fresh = found.size();
   pairs.resize(old + fresh);
   list.far_until.resize(old + fresh);
@@ -192,7 +192,7 @@ void SelfContactFinder::take_references(std::size_t end, const world::World& wor
   }
 }
 
-// Neighbours after one another, which look through the same cells.
+// Lists due nodes cell by cell, because neighbours look through the same cells.
 void SelfContactFinder::order_due() {
   due_.clear();
   if (due_count_ == 0) return;
@@ -207,7 +207,7 @@ void SelfContactFinder::order_due() {
   }
 }
 
-// Of the list that there is, what has not moved.
+// Copies those pairs of the present list to the next one of which neither node is due.
 void SelfContactFinder::keep_pairs() {
   const auto& references = next_list_.references;
   float least_squared = next_list_.least_distance * next_list_.least_distance;

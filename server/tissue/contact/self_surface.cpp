@@ -62,7 +62,8 @@ void SelfSurface::add_triangle(const std::array<Site, 3>& sites, Sort sort) {
   }
 }
 
-// What follows from its triangles. Skin that was there at first faces what it faced then.
+// Derives a node's sorts and rest normals from its triangles. The normal of skin is set once: skin
+// that was there at first faces what it faced then.
 void SelfSurface::take_rest(Site site) {
   const auto at_rest = [this](TriangleIndex t) {
     return up(t, [this](Site s) { return rest_positions_[s]; });

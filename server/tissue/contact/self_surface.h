@@ -38,7 +38,7 @@ class SelfSurface {
 
   std::span<const Site> sites() const { return sites_; }  // ascending
   std::size_t node_count() const { return rest_positions_.size(); }
-  // Of one that is gone as well.
+  // Returns the nodes of a triangle, also of one that is gone.
   const std::array<Site, 3>& operator[](TriangleIndex triangle) const {
     return triangles_[triangle.value];
   }
@@ -50,7 +50,7 @@ class SelfSurface {
     return (site_sorts_[site] >> static_cast<unsigned>(sort) & 1) != 0;
   }
   bool is_of_any(Site site) const { return site_sorts_[site] != 0; }
-  // Of a wound, and on one side of it.
+  // Returns whether the node is on a wound, and on one side of it only.
   bool is_on_lip(Site site) const { return length_squared(rest_wound_normals_[site]) > 0; }
 
   // Area-weighted, of one sort; zero where a wound's two sides cancel. up_of(triangle): along its
@@ -78,9 +78,10 @@ class SelfSurface {
   std::size_t triangle_count() const { return triangles_.size(); }  // with those that are gone
 
   const Vec3f& rest_position(Site site) const { return rest_positions_[site]; }
-  // Of the skin.
+  // Returns whether the skin at one node faced that at the other at rest.
   bool faced_at_rest(Site site, Site across) const;
-  // Beside each other on the same side of a wound, or of wounds side by side.
+  // Returns whether the nodes are neighbours on the same side of a wound, or of wounds side by
+  // side.
   bool share_lip_at_rest(Site site, Site across) const {
     return dot(rest_wound_normals_[site], rest_wound_normals_[across]) > 0.5f &&
            length_squared(rest_positions_[site] - rest_positions_[across]) < near_m() * near_m();
@@ -93,7 +94,7 @@ class SelfSurface {
   bool is_near(Site site, TriangleIndex triangle);  // any corner
   float near_m() const { return static_cast<float>(near_m_); }
 
-  // Of the surface as it was at first.
+  // These are edge lengths of the surface as it was at first, m.
   float mean_edge_m() const { return mean_edge_m_; }
   float longest_edge_m() const { return longest_edge_m_; }
 
@@ -104,7 +105,8 @@ class SelfSurface {
 
  private:
   enum class NearState : std::uint8_t { AsAtFirst, Unknown, Known };
-  // Of the sum of areas, what the sum of their vectors is where a wound has one side only.
+  // A wound has one side only at a node where the sum of its triangles' area vectors is longer than
+  // this part of the sum of their areas.
   static constexpr float kOneSided = 0.3f;
 
   void add_triangle(const std::array<Site, 3>& sites, Sort sort);

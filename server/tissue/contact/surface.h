@@ -52,7 +52,7 @@ class Surface {
  public:
   explicit Surface(const organ::Organ& organ);
 
-  // By boundary triangle of the mesh.
+  // Returns a triangle by its number; those of the uncut organ are numbered as in its mesh.
   const SurfaceTriangle& operator[](TriangleIndex triangle) const {
     return triangles_[triangle.value];
   }

@@ -41,7 +41,8 @@ struct PatchTriangle {
 std::optional<PatchTriangle> make_triangle(const std::array<Vec3d, 3>& corners);
 double signed_distance(const PatchTriangle& triangle, const Vec3d& p);  // to its plane
 double distance_squared(const PatchTriangle& triangle, const Vec3d& p);
-// Of a point above or below it, or outside by less than `slack` (m).
+// Returns whether the point's projection onto the triangle's plane is inside the triangle, or
+// outside by at most `slack` (m).
 bool is_inside(const PatchTriangle& triangle, const Vec3d& p, double slack);
 
 struct Strip {
@@ -49,7 +50,7 @@ struct Strip {
   bool is_first = false;
 };
 
-// Which side of each segment is the positive one; continued from strip to strip.
+// Each segment of an edge has a normal to its positive side; it goes on from strip to strip.
 using SideNormals = std::array<Vec3d, kMaxEdgePoints - 1>;
 
 // extension: m. Triangles without area are left out.

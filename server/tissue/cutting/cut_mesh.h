@@ -15,7 +15,7 @@
 
 namespace trocar::cutting {
 
-// Of nodes, where nobody has added it up: all of them are looked at.
+// This travel means that nobody has added up how far nodes moved: all nodes are looked at.
 inline constexpr double kUnknownTravel = std::numeric_limits<double>::infinity();
 
 struct CutOutput {
@@ -58,7 +58,7 @@ class CutMesh {
   void forget_places() { bundles_->forget(); }
   double h(NodeIndex n) const { return h_[n.value]; }
   double mean_h() const { return mean_h_; }
-  // Longest edge at the node in the uncut mesh, m.
+  // Returns the length of the longest edge at the node in the uncut mesh, m.
   double reach(NodeIndex n) const { return reach_[n.value]; }
   double longest_reach() const { return longest_reach_; }
   double floor_sine() const { return floor_sine_; }
@@ -69,7 +69,7 @@ class CutMesh {
   // this share of the floor.
   double sine_after_split(NodeIndex a, NodeIndex b, std::uint16_t t, double length_share = 1);
   NodeIndex split(NodeIndex a, NodeIndex b, std::uint16_t t);
-  // As can_move() says.
+  // Moves a node; can_move() must allow it.
   void move(const Move& move);
   // Faces from the side of the lower tet, ascending; the stars of their nodes, ascending, with
   // these faces cut.

@@ -130,7 +130,7 @@ void Cutter::cut(std::span<const Vec3f> displacements, CutOutput& out, double tr
   for (const auto s : order_) {
     auto budget = share;
     const bool is_done = work(strokes_[s], budget);
-    // What comes at the end of a stroke is done in calls of its own.
+    // A stroke is ended only in a call that finds nothing of it to cut.
     if (!is_done || (strokes_[s].has_ended && (budget < share || !end(strokes_[s]))))
       out.is_behind = true;
   }

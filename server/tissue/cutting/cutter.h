@@ -34,12 +34,12 @@ class Cutter {
  public:
   explicit Cutter(topology::Topology& topology, const Settings& settings = {});
 
-  // Where a blade's edge is now, m, two to kMaxEdgePoints points. False: refused; the stroke, if
-  // there is one, waits where it was.
+  // Moves a blade's edge to these points, m, two to kMaxEdgePoints of them. Returns false if they
+  // are refused; the stroke, if there is one, then waits where it was.
   bool move(std::uint32_t blade, std::span<const Vec3d> edge);
   void lift(std::uint32_t blade);
 
-  // Inner faces, each from the side of the lower tet, ascending, that the next cut() opens first.
+  // Sets the inner faces, each from the side of the lower tet, ascending, that cut() opens first.
   void tear(std::span<const TetFace> faces) { torn_.assign(faces.begin(), faces.end()); }
 
   // displacements: of the nodes from rest, m, node_count of them; none: everything is at rest.
@@ -47,7 +47,8 @@ class Cutter {
   // the blades is looked at; the edits are the same without it.
   void cut(std::span<const Vec3f> displacements, CutOutput& out, double travel_m = kUnknownTravel);
 
-  // What BladeFriction says of a line in tissue as it is now, N/m; as cut(), which it may precede.
+  // Returns BladeFriction::along() for a line in tissue as it is now, N/m. Displacements and travel
+  // are as for cut(), which it may precede.
   double friction_along(std::span<const Vec3f> displacements, double travel_m, const Vec3d& from,
                         const Vec3d& to);
 

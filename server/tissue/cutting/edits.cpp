@@ -23,8 +23,8 @@ void replace_node(topology::Topology& topology, TetIndex place, NodeIndex old, N
   topology.mark_wound_faces(place, wound);
 }
 
-// Where one end has none, that of the other. Not made as long as they are: it is exactly theirs
-// where they are equal.
+// Returns the fibre axis at t between two nodes, or the other's where one has none. It is not
+// normalised, so that it is exactly theirs where they are equal.
 Vec3d axis_along(const Vec3d& a, const Vec3d& b, std::uint16_t t) {
   if (length_squared(a) == 0 || length_squared(b) == 0) return a + b;
   return along(a, dot(a, b) < 0 ? -b : b, t);
@@ -38,12 +38,12 @@ void clear_wound(topology::Topology& topology, TetIndex tet, std::uint8_t corner
                             static_cast<std::uint8_t>(topology.wound_faces(tet) & ~bit(corner)));
 }
 
-// Of the sum of the volumes at a node that moves: rounding.
+// A node's move may change the sum of its tets' volumes by this part of it, by rounding.
 constexpr double kVolumeSlack = 1e-11;
-// Of a tet that a node moves in, against before: no more than that may go.
+// A tet must keep more than this part of its volume when one of its nodes moves.
 constexpr double kLeastVolumeLeft = 1e-4;
 
-// One event after another on a topology.
+// Replay applies events to a topology, one after another.
 class Replay {
  public:
   Replay(const CutEvents& events, topology::Topology& topology, Places& places,

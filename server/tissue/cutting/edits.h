@@ -62,7 +62,8 @@ struct TetChild {
   TetIndex parent, child;
 };
 
-// Of an edge of a tet, 0 < t. Returns the new node; children: the tet that keeps a, the new one.
+// Splits an edge of a tet at t from a to b, 0 < t. Returns the new node; `children` gets each tet
+// that keeps a with the new tet that has b.
 NodeIndex split_edge(topology::Topology& topology, Places& places, NodeIndex a, NodeIndex b,
                      std::uint16_t t, std::vector<TetChild>& children);
 
@@ -78,7 +79,7 @@ void part(topology::Topology& topology, Places& places, std::span<const Star> st
 // takes as much as it gives. No node of a wound moves, nor one that the organ holds; all tets at
 // the node are of one material and free of stress at rest.
 bool can_move(const topology::Topology& topology, const Move& move);
-// Which can be done.
+// Moves a node; can_move() must allow it.
 void move_node(topology::Topology& topology, const Move& move);
 
 // Repeats a cut. Everything is checked before it is done; after an error the edits before it have

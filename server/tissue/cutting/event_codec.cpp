@@ -14,7 +14,7 @@ enum Kind : std::uint64_t { kSplit, kOpen, kDuplicate, kMove };
 constexpr std::int64_t kMost = 0xffffffff;
 constexpr std::uint64_t kMostNumber = (std::uint64_t{1} << 42) - 1;
 
-// What the next numbers are differences from.
+// The next numbers are stored as differences from these.
 struct Last {
   std::int64_t made = 0;  // node
   std::int64_t a = 0, original = 0, face = 0, moved = 0;
@@ -27,7 +27,7 @@ std::int64_t number_of(const TetFace& face) {
   return static_cast<std::int64_t>(face.tet.value) * 4 + face.corner;
 }
 
-// The sign in the lowest bit.
+// Writes the number's difference from `last`, with the sign in the lowest bit, and updates `last`.
 void put_difference(std::int64_t number, std::int64_t& last, Bytes& out) {
   const auto difference = number - last;
   put_varint(out,

@@ -11,7 +11,7 @@
 
 namespace trocar::cutting {
 
-// The face opposite to a corner of a tet.
+// A face is given by a tet and the corner opposite to the face.
 struct TetFace {
   TetIndex tet;
   std::uint8_t corner = 0;
@@ -19,7 +19,7 @@ struct TetFace {
   auto operator<=>(const TetFace&) const = default;
 };
 
-// 0 to 3, or 4 if the tet does not have the node.
+// Returns 0 to 3, or 4 if the tet does not have the node.
 inline std::uint8_t corner_of(const mesh::Tet& tet, NodeIndex node) {
   std::uint8_t corner = 0;
   while (corner < 4 && tet[corner] != node) ++corner;
@@ -50,9 +50,9 @@ double six_volumes(const std::array<Vec3d, 4>& corners);
 double least_sine(const std::array<Vec3d, 4>& corners);
 std::array<Vec3d, 4> rest_corners(const topology::Topology& topology, const mesh::Tet& tet);
 
-// A share from 0 to 1 of an edge in 1/65536, an end short of the whole.
+// Rounds a share of an edge, 0 to 1, to units of 1/65536; the result is short of the edge's end.
 std::uint16_t quantised_share(double share);
-// t of 1/65536 from a to b.
+// Returns the point t/65536 of the way from a to b.
 inline Vec3d along(const Vec3d& a, const Vec3d& b, std::uint16_t t) {
   return a + (b - a) * (t / 65536.0);
 }

@@ -1,6 +1,6 @@
 #pragma once
 
-// Which nodes are in a box, now, without looking at every node.
+// Node bundles find the nodes that are in a box now, without looking at every node.
 //
 // Nodes are kept in bundles of neighbours, each with the box around its nodes as they were when it
 // was last looked into, which holds to as far as nodes have moved since. What is found does not

@@ -44,7 +44,8 @@ bool is_flat(const CutMesh& mesh, const Stroke& stroke, TetIndex t) {
                              [&](NodeIndex n) { return stroke.is_labelled(n); });
 }
 
-// Where no part of the path was near yet.
+// Returns a point's height above the nearest triangle of the patch, m. It stands in for
+// Stroke::height() where no part of the path was near yet.
 double height_above(const Stroke& stroke, const Vec3d& p) {
   double nearest = -1, height = 0;
   for (const auto& triangle : stroke.patch) {
@@ -72,7 +73,8 @@ int Opening::side(const CutMesh& mesh, Stroke& stroke, TetIndex t) {
   return sum < 0 ? -1 : 1;
 }
 
-// That of its larger neighbours, once and for all.
+// Decides for good the side of a tet whose nodes are all labelled: that of most of its neighbours,
+// weighted by the area of the shared faces.
 int Opening::side_of_flat(const CutMesh& mesh, Stroke& stroke, TetIndex t) {
   double sum = 0;
   for (std::uint8_t corner = 0; corner < 4; ++corner) {
@@ -232,7 +234,7 @@ void Opening::for_each_twin_breach(const Star& star, Visit&& visit) const {
     }
 }
 
-// Of the open faces at a node that are among the causes, the one that parts the fewest nodes.
+// Adds an offender: of a node's open faces among the causes, the one that parts the fewest nodes.
 template <typename Causes>
 void Opening::offend(std::size_t star, Causes&& causes) {
   std::uint32_t weakest = 0, least = 4;

@@ -19,7 +19,8 @@ class Opening {
   // Opens inner faces, whatever asks for it; those that would leave the surface not manifold stay.
   void open(CutMesh& mesh, std::span<const TetFace> faces);
 
-  // Of the path on which a tet lies, -1 or 1; decides it for a tet all of whose nodes are labelled.
+  // Returns the side of the path on which a tet lies, -1 or 1. If all nodes of the tet are
+  // labelled, its side is decided for good.
   int side(const CutMesh& mesh, Stroke& stroke, TetIndex tet);
 
   // Faces of waiting tets that are proposed again and again; and what would be wrong if all of them

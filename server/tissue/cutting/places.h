@@ -1,7 +1,8 @@
 #pragma once
 
-// Which places of nodes and tets are unused. The lowest is taken first, then the next at the end,
-// so that two who hold the same topology choose the same. Whoever removes something says so.
+// Places holds the unused places of nodes and tets. The lowest is taken first, then the next at the
+// end, so that two who hold the same topology choose the same. Whoever removes something gives its
+// place back.
 
 #include <vector>
 

@@ -9,7 +9,8 @@ constexpr std::uint32_t kRounds = 12;
 constexpr std::size_t kMostBreaches = 64;
 constexpr double kFloorShare = 0.5, kLengthShare = 0.4;
 constexpr std::uint16_t kMiddle = 32768;
-// Of tets that change sides: trials per call, and times waiting tets; tets at once.
+// Repair tries to turn tets to the other side, at most kMostTurned in a trial. A call has
+// kTrialsAndWaiting / (waiting tets) trials, but at least one and at most kTrials.
 constexpr std::uint32_t kTrials = 48, kTrialsAndWaiting = 2048;
 constexpr std::size_t kMostTurned = 32;
 constexpr double kLeastGain = 1e-4;  // h^2
@@ -162,7 +163,7 @@ bool Repair::turn_any(CutMesh& mesh, Stroke& stroke, Opening& opening) {
   return has_changed;
 }
 
-// Those farther than `beyond` (m) from the last patch.
+// Finds breaches that are farther than `beyond` (m) from the last patch.
 void Repair::find_breaches(CutMesh& mesh, Stroke& stroke, Opening& opening, double beyond) {
   breaches_.clear();
   for (const auto& breach : opening.breaches_of_all(mesh, stroke)) {

@@ -1,6 +1,7 @@
 #pragma once
 
-// What a cut may do to the mesh. Lengths are in h, the local mean edge length of the uncut mesh.
+// These settings bound what a cut may do to the mesh. Lengths are in h, the local mean edge length
+// of the uncut mesh.
 
 #include <cstdint>
 #include <memory>

@@ -1,8 +1,9 @@
 #pragma once
 
-// Which tets are of pieces too small to be cut any further (Settings::whole_volume_h3). What is
-// found out about a tet holds until clear(); so a piece is looked into once per patch, and only as
-// far as it takes to know. Cost: O(tets in that volume) for the first tet of a piece.
+// SmallPieces finds the tets of pieces that are too small to be cut any further
+// (Settings::whole_volume_h3). What is found out about a tet holds until clear(); so a piece is
+// looked into once per patch, and only as far as it takes to know. Cost: O(tets in that volume) for
+// the first tet of a piece.
 
 #include "server/tissue/cutting/cut_mesh.h"
 

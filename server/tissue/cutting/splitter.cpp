@@ -87,7 +87,7 @@ bool Splitter::is_close(NodeIndex n) const {
   return is_close_[rank_[n.value] - 1] != 0;
 }
 
-// By the plane of a triangle.
+// Returns whether some triangle's plane separates the two nodes or contains one of them.
 bool Splitter::are_parted(NodeIndex a, NodeIndex b, std::size_t triangles) const {
   const auto *heights_a = &heights_[(rank_[a.value] - 1) * triangles],
              *heights_b = &heights_[(rank_[b.value] - 1) * triangles];

@@ -1,6 +1,6 @@
 #pragma once
 
-// What the tets around one node become when some faces are cut.
+// StarAnalysis finds what the tets around one node become when some faces are cut.
 //
 // A component is a set of tets at the node that hang together over faces at the node that are not
 // cut; a fan is the same around an edge. After the cut every component gets a node of its own. Then
@@ -17,7 +17,7 @@
 
 namespace trocar::cutting {
 
-// Which faces are cut, as a mask of corners per tet, on both sides of each face.
+// CutFaces holds the faces that are cut, as a mask of corners per tet, on both sides of each face.
 class CutFaces {
  public:
   explicit CutFaces(const topology::Topology& topology) : topology_(topology) {}
@@ -53,7 +53,7 @@ struct Star {
   std::vector<std::uint16_t> bad_components;  // whose link is neither a disc nor a sphere
   std::vector<Fan> twin_fans;                 // by (other, component)
 
-  // Of a tet at the node.
+  // Returns the component of a tet at the node.
   std::uint16_t component_of(TetIndex tet) const;
 };
 

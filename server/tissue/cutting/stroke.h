@@ -20,7 +20,7 @@ class BladeMotion {
 
   // h: m. Appeared: another blade, or one that has jumped: a stroke of its own has to begin.
   Verdict move(std::span<const Vec3d> points, double h, const Settings& settings);
-  // What is left of collected motion becomes a strip.
+  // Makes a strip of the collected motion that is left.
   void finish(double h, const Settings& settings);
   void clear();
 
@@ -67,11 +67,11 @@ class Stroke {
   int side(TetIndex t) const { return t.value < sides_.size() ? sides_[t.value] : 0; }
   void decide(TetIndex tet, int side);  // 0: undecided again
 
-  // What is known of a tet that was split, of a node that was copied, holds for the new one.
+  // Passes what is known of a tet that was split, or of a node that was copied, on to the new one.
   void inherit(TetIndex parent, TetIndex child);
   void inherit(NodeIndex original, NodeIndex copy);
 
-  // Labels and heights of nodes, and sides of tets without a labelled node.
+  // Forgets labels and heights of far nodes, and sides of tets without a labelled node.
   template <typename IsFar>
   void forget_if(IsFar&& is_far, const topology::Topology& topology) {
     std::erase_if(labelled_,

@@ -36,7 +36,7 @@ class Subdivision {
 
   void find_tets(const topology::Topology& topology);
   void rank_by_length(const topology::Topology& topology);
-  // Of the parts of a tet; the smallest sine.
+  // Returns the smallest sine of a dihedral angle among the parts of a tet.
   double score(const topology::Topology& topology, const CutTet& cut_tet);
   double score_around(const topology::Topology& topology);
   bool improve(const topology::Topology& topology, const CutTet& cut_tet);

@@ -10,8 +10,8 @@
 namespace trocar::cutting {
 namespace {
 
-// Of the change of length that tears: a node is looked into if an edge at it has changed by that
-// part of its length. In a well-shaped tet F - I is at most about twice the largest of its edges'.
+// A node is examined if the relative length change of an edge at it exceeds this part of the one
+// that tears. In a well-shaped tet F - I is at most about twice the largest change of its edges.
 constexpr double kNoticed = 0.25;
 
 Principal stretch_at(const topology::Topology& topology, std::span<const Vec3f> displacements,

@@ -1,6 +1,6 @@
 #pragma once
 
-// Where tissue tears: at a node around which it is stretched beyond what its material stands
+// Tissue tears at a node around which it is stretched beyond what its material stands
 // (Material::tear_stretch), across the direction in which it is stretched most.
 //
 // The stretch at a node is that of the mean of F^T F over its tets by their volume at rest, F the

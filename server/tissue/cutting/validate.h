@@ -18,7 +18,7 @@ struct Pieces {
   std::vector<std::uint32_t> piece_of_tet;  // in the order of their first tet
   std::vector<std::uint32_t> tets;          // per piece
 };
-// Which tets hang together over faces.
+// Returns the sets of tets that hang together over faces.
 Pieces find_pieces(const topology::Topology& topology);
 
 double total_volume(const topology::Topology& topology);  // at rest, m^3

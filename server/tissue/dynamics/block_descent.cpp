@@ -38,7 +38,7 @@ namespace {
 constexpr std::uint32_t kNone = 0xffffffffu;
 // A step of one node beyond this, m, is as broken as one that is not finite.
 constexpr float kMaxNodeStep = 1.0f;
-// What goes back with a node whose step was not finite: the nodes within so many layers.
+// If a node's step was not finite, the nodes within so many layers of it are restored with it.
 constexpr int kRestoredLayers = 3;
 
 float sum(const Lanes& a) {
@@ -172,7 +172,7 @@ void BlockDescent::begin_inertia(Group group, std::span<const Vec3f> forces) {
   store(inertia_[group].momentum, momentum);
 }
 
-// What energies keep for a step, from displacements at its start.
+// Lets energies prepare, once per step, what stays constant in it, from displacements at its start.
 void BlockDescent::ask_energies(Group group, const Float4* start) {
   if (asked_stamp_[group] == current_) return;
   asked_stamp_[group] = current_;

@@ -71,7 +71,7 @@ struct AxisHold {
   Vec3f displacement;     // m; of held axes
 };
 
-// What acts from outside besides tools. Default: nothing.
+// External loads act on tissue besides tools. The default is no loads.
 struct ExternalLoads {
   std::span<const Vec3f> forces;  // N, per node of the organ; empty: none
   // Nodes put where `held_displacements` says at the end of the step, with whatever force that
@@ -114,14 +114,14 @@ class BlockDescent {
                     const SolveSettings& settings, world::World& world,
                     const ExternalLoads& loads = {});
 
-  // Force imbalance per entry of `near` in the last sweep, N.
+  // Returns the force imbalance per entry of `near` in the last sweep, N.
   std::span<const float> residuals_n() const { return residuals_; }
 
   // Force on a node of the last solve's loads.held or axis_holds that put it where it is, N: what
   // energies, damping, loads and tools leave of its mass times acceleration.
   Vec3f holding_force(const contact::ContactList& contacts, NodeIndex node) const;
 
-  // Of the elastic energy where the world is, N per node, between steps. O(nodes).
+  // Computes the gradient of the elastic energy between steps, N per node. O(nodes).
   void elastic_gradient(std::span<Vec3f> gradient);
 
   FarPlan far_plan(float dt);
@@ -160,14 +160,14 @@ class BlockDescent {
   void plan_step(std::span<const NodeIndex> near, const SolveSettings& settings, Tick tick,
                  std::span<const NodeIndex> held);
   void plan_bands(std::span<const NodeIndex> near, std::span<const SweepBand> bands);
-  // What takes part when `left` sweeps are left, this one included.
+  // Returns the groups and lanes of a sweep when `left` sweeps are left, this one included.
   const SweepPlan& plan_of(std::uint32_t left, std::span<const SweepBand> bands) const;
   void schedule_sweeps(const SolveSettings& settings);
   void begin_step(const contact::ContactList& contacts, std::span<const NodeIndex> near,
                   const SolveSettings& settings, world::World& world, const ExternalLoads& loads);
   void execute_schedule(const contact::ContactList& contacts, const SolveSettings& settings,
                         const FarFieldStep& far, SolveReport& report);
-  // How far the farthest node has moved, m.
+  // Returns how far the farthest node has moved, m.
   float write_back(const ExternalLoads& loads, world::World& world);
   float note_residuals(std::span<const NodeIndex> near);
   void resize_arrays();
@@ -201,7 +201,7 @@ class BlockDescent {
   void sweep(const SweepPlan& plan, const contact::ContactList& contacts, Relaxation omega);
   void relax(const SweepPlan& plan, Group group, const contact::ContactList& contacts,
              Relaxation omega);
-  // Of residuals in the last sweep, over these lanes, N^2.
+  // Returns the sum of squared residuals of these lanes in the last sweep, N^2.
   double sum_of_squares(const SweepPlan& plan) const;
   void write_back(const SweepPlan& plan, world::World& world);
   struct Restored {

@@ -1,4 +1,4 @@
-// What others ask of the solver between steps.
+// This file answers queries about the solver between steps.
 
 #include "common/base/assert.h"
 #include "server/tissue/dynamics/block_descent.h"

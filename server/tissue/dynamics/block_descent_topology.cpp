@@ -1,10 +1,10 @@
-// The solver after an edit of the topology.
+// This file makes the solver follow an edit of the topology.
 
 #include "server/tissue/dynamics/block_descent.h"
 
 namespace trocar::dynamics {
 
-// As many entries as there are groups and slots now; new ones are empty.
+// Resizes arrays to the groups and slots that there are now; new entries are empty.
 void BlockDescent::resize_arrays() {
   const auto& groups = tissue_.groups();
   const auto group_count = groups.group_count(), slot_count = groups.slot_count();

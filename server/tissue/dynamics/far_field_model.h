@@ -41,7 +41,7 @@ class FarFieldModel {
   // After a state was read. False: it does not fit this model.
   virtual bool resume() = 0;
 
-  // Of the last choice.
+  // Returns the figures of the last choice.
   virtual const SolverFigures& figures() const = 0;
 };
 

@@ -1,8 +1,8 @@
 #pragma once
 
-// What moves the nodes that a solver does not sweep, in fields over the whole organ: a few unknowns
-// instead of a node's three each (server/lab/reduce). It corrects what sweeping finds, swept nodes
-// included, between two sweeps.
+// A far-field solver moves the nodes that are not swept, in fields over the whole organ: a few
+// unknowns instead of three per node (server/lab/reduce). Between two sweeps it corrects what
+// sweeping finds, swept nodes included.
 
 #include <span>
 

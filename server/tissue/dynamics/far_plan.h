@@ -13,13 +13,14 @@ struct FarPlan {
   std::uint32_t sweeps = 1;
   float over_relaxation = 1.3f;
 
-  // Of an organ with these sums over its free nodes, N/m (traces of blocks over 3) and kg.
+  // Returns the plan for an organ with these sums over its free nodes: stiffness, N/m (traces of
+  // blocks over 3), and mass, kg.
   static FarPlan of(double stiffness, double mass, double dt);
-  // The same organ with another number of sweeps, 0: this one.
+  // Returns this plan with another number of sweeps; 0 keeps the number.
   FarPlan with_sweeps(std::uint32_t count) const;
-  // For sweeps in every so many steps.
+  // Returns this plan for sweeps in every so many steps.
   FarPlan with_interval(std::uint32_t steps) const;
-  // For steps of time that are shorter by this ratio.
+  // Returns this plan for steps of time that are shorter by this ratio.
   FarPlan with_steps(std::uint32_t steps_per_tick) const;
 };
 

@@ -206,7 +206,8 @@ void Groups::vacate(NodeIndex node) {
   give_up(group);
 }
 
-// Of colours that lost a node. Each removed node brings at most about one other to a new lane.
+// Empties the emptiest groups of colours that lost a node, until few lanes are vacant. Each removed
+// node brings at most about one other to a new lane.
 void Groups::part_emptiest_groups(const topology::Topology& topology) {
   for (std::size_t i = 0, count = vacated_.size(); i < count; ++i) {
     const Colour colour = colour_of_group_[vacated_[i] / kLanes];

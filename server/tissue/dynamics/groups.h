@@ -90,8 +90,8 @@ class Groups {
 
   // changed: nodes whose existence or elements have changed, ascending, distinct.
   void update(const topology::Topology& topology, std::span<const NodeIndex> changed);
-  // What the last update did: nodes that have a new slot, ascending, and slots that lost their
-  // node (some of which hold another now).
+  // These return what the last update did: nodes that have a new slot, ascending, and slots that
+  // lost their node (some of which hold another now).
   std::span<const NodeIndex> moved() const { return moved_; }
   std::span<const Slot> vacated() const { return vacated_; }
 

@@ -19,7 +19,7 @@ namespace trocar::dynamics {
 template <typename Law>
 class Hyperelastic final : public Energy {
  public:
-  // Of the tets whose material has parameters here. NodalStrain, which must outlive it: null if
+  // Acts on the tets whose material has parameters here. `strain` must outlive it; null means that
   // nothing is averaged.
   Hyperelastic(const topology::Topology& topology, const Groups& groups, const NodalStrain* strain,
                HyperelasticParameters parameters, const Law& law = {});
@@ -43,7 +43,7 @@ class Hyperelastic final : public Energy {
 
     void pad(std::size_t lane, Slot own) { b.v[lane] = c.v[lane] = d.v[lane] = own; }
   };
-  // What only laws that need I1 read.
+  // Only laws that need I1 read these rows.
   struct InvariantRow {
     Lanes wbc, wbd, wcd;   // 2 C10 V w_bc, ..., N/m
     Lanes inverse_c10_v2;  // 1 / (2 C10 V), 1/J
@@ -57,7 +57,7 @@ class Hyperelastic final : public Energy {
   double row_energy(const Row& row, const InvariantRow* extra, std::size_t lane, Slot own,
                     std::span<const Vec3d> u) const;
 
-  // A tet at a node, seen from it.
+  // This is a tet as seen from one of its nodes.
   struct At {
     mesh::Tet tet;
     double c10 = 0, bulk = 0;  // left to it, Pa

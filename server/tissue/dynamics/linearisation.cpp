@@ -18,7 +18,7 @@ void to_halves(std::array<std::uint16_t, kLanes>& halves, Float8 v) {
 float power_of_two(int exponent) {
   return std::bit_cast<float>(static_cast<std::uint32_t>(exponent + 127) << 23);
 }
-// Of the leading bit of a positive normal number.
+// Returns the exponent of the leading bit of a positive normal number.
 int exponent_of(float v) {
   return static_cast<int>(std::bit_cast<std::uint32_t>(v) >> 23 & 0xff) - 127;
 }

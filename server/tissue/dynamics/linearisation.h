@@ -23,7 +23,7 @@ namespace trocar::dynamics {
 
 class Linearisation {
  public:
-  // Of one worker, while matrices are summed.
+  // Each worker has such a buffer, in which it sums matrices.
   struct Taking {
     std::vector<std::array<Lanes, 9>> rows;
   };
@@ -64,7 +64,7 @@ class Linearisation {
     SlotLanes neighbour;
     std::array<std::array<std::uint16_t, kLanes>, 9> k;  // half floats, times the group's scale
   };
-  // Which row each lane of a call to the sink is for; kNoRow: none.
+  // Each lane of a call to the sink adds to this row; kNoRow: it has none.
   using Targets = std::array<std::uint8_t, kLanes>;
   static constexpr std::uint8_t kNoRow = 0xff;
   struct Node {

@@ -13,7 +13,8 @@
 
 namespace trocar::dynamics {
 
-// As Energy, of smoothing domains where they are.
+// This is the counterpart of Energy for smoothing domains, evaluated at the gradients that
+// NodalStrain keeps.
 class NodalStrainEnergy {
  public:
   NodalStrainEnergy() = default;
@@ -30,7 +31,7 @@ class NodalStrainEnergy {
 template <typename Law>
 class NodalHyperelastic final : public NodalStrainEnergy {
  public:
-  // Of smoothing domains whose material has this law; the smoothing domains must outlive it.
+  // Acts on the smoothing domains whose material has this law. `strain` must outlive it.
   NodalHyperelastic(const topology::Topology& topology, const Groups& groups,
                     const NodalStrain& strain, const HyperelasticParameters& of_law,
                     const Law& law = {});

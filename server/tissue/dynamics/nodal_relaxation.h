@@ -10,7 +10,7 @@
 
 namespace trocar::dynamics {
 
-// What a block of tets or smoothing domains adds to RelaxationFigures.
+// A block of tets or smoothing domains adds these shares to RelaxationFigures.
 struct RelaxationShares {
   float energy_j = 0, volume_m3 = 0, growth_m3 = 0;
   float stress_squared = 0, relaxed = 0;  // volume times stress by stress, by what has relaxed
@@ -22,25 +22,26 @@ class NodalRelaxation {
   NodalRelaxation(const topology::Topology& topology, const Groups& groups,
                   const NodalStrain& strain, const RelaxationTerms& terms);
 
-  // As Relaxation's; smoothing domains have followed.
+  // Follows an edit as Relaxation::follow() does, after the smoothing domains have.
   void follow(const topology::Topology& topology, const Groups& groups,
               std::span<const GroupLanes> lanes);
 
   std::size_t block_count() const { return blocks_.size(); }
-  // Of nodes at a slot.
+  // Returns the block of the node at a slot.
   std::uint32_t block_of(Slot slot) const { return block_of_[slot]; }
   static constexpr std::uint32_t kNoBlock = 0xffffffffu;
   // Blocks to be begun, after follow().
   std::span<const std::uint32_t> stale() const { return stale_; }
   void clear_stale() { stale_.clear(); }
 
-  // Q for the next step, from the history. Different blocks at once: allowed.
+  // Computes Q for the next step from the history. Different blocks may be begun at once.
   void begin_block(std::size_t index, const world::StressHistory& history,
                    RelaxationTerms::Constants& scratch);
-  // Advances it to where smoothing domains are. The hash's difference.
+  // Advances the history to where smoothing domains are. Returns the hash's difference.
   std::uint64_t end_block(std::size_t index, world::StressHistory& history,
                           RelaxationTerms::Constants& scratch);
-  // Tissue has been where it is for long. The hash's difference.
+  // Sets the history to that of tissue that has long been where it is. Returns the hash's
+  // difference.
   std::uint64_t settle_block(std::size_t index, world::StressHistory& history,
                              RelaxationTerms::Constants& scratch) const;
 

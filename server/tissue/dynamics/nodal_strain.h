@@ -1,9 +1,10 @@
 #pragma once
 
-// What strain is averaged over, against the locking of linear tets (node-based smoothing after
-// Dohrmann 2000 and Liu 2008). A node's smoothing domain are the tets at it of one material whose
-// strain is averaged, that with the largest volume there; each gives it a quarter of its volume. A
-// smoothing domain of stress-free volume V has the deformation gradient
+// NodalStrain averages strain over smoothing domains, against the locking of linear tets
+// (node-based smoothing after Dohrmann 2000 and Liu 2008). A node's smoothing domain consists of
+// the tets at it of one material whose strain is averaged, that with the largest volume there; each
+// tet gives it a quarter of its volume. A smoothing domain of stress-free volume V has the
+// deformation gradient
 //   F = I + 1/V sum over its nodes j of (u_j - u) b_j^T,   b_j = sum over its tets of V_t/4 grad_j,
 // which changes by b_i in one direction when node i moves. Energies of nodal strain:
 // nodal_hyperelastic.h.
@@ -28,10 +29,10 @@ namespace trocar::dynamics {
 
 class NodalStrain {
  public:
-  // Of the bracket Psi - 2 C10 (J - 1), the part that is averaged; of the volumetric term all is.
-  // With none tissue is too stiff, with all of it too soft, and nodes that move against each other
-  // by turns meet no resistance. Found on bars, Cook's membrane and pressed livers of 250 to 4,400
-  // nodes (docs/validation.md).
+  // This part of the bracket Psi - 2 C10 (J - 1) is averaged; the volumetric term is averaged as a
+  // whole. Without averaging tissue is too stiff; with all of the bracket averaged it is too soft,
+  // and nodes that move against each other by turns meet no resistance. The value was found on
+  // bars, Cook's membrane and pressed livers of 250 to 4,400 nodes (docs/validation.md).
   static constexpr double kAveragedBracket = 0.55;
 
   // A smoothing domain that a node is in: its place among gradients(), and the node's b there, m^2.
@@ -51,7 +52,7 @@ class NodalStrain {
   // Rows of V (F - I), m^3; beside them 1/V (1/m^3), 2 C10 kAveragedBracket (Pa), K (Pa). All zero
   // where there is no smoothing domain.
   using Domain = std::array<Float4, 3>;
-  // What is left to a tet: of its bracket, and of its volumetric term.
+  // These shares of a tet's bracket and of its volumetric term are left to the tet.
   struct Left {
     double bracket = 1, volumetric = 1;
   };
@@ -67,7 +68,7 @@ class NodalStrain {
   std::size_t rebuild(const topology::Topology& topology, const Groups& groups,
                       std::span<const GroupLanes> lanes);
 
-  // As organ::material_at() counts; kNone: the node has no smoothing domain.
+  // Materials are numbered as in organ::material_at(); kNone: the node has no smoothing domain.
   static constexpr std::uint16_t kNone = 0xffff;
   std::uint16_t material_of(NodeIndex node) const { return materials_[node.value]; }
   Left left_to(const topology::Topology& topology, TetIndex tet) const;
@@ -81,7 +82,7 @@ class NodalStrain {
   std::span<const Member> members(Group group) const { return members_[group]; }
   const Domain& at_rest(Slot slot) const { return at_rest_[slot]; }
   std::size_t slot_count() const { return at_rest_.size(); }
-  // Three per slot, those of a Domain.
+  // Returns the gradients as they are now: three entries per slot, laid out as a Domain.
   const Float4* gradients() const { return gradients_.data(); }
   struct Gradient {
     std::array<Vec8, 3> rows;  // of F

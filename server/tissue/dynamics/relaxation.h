@@ -66,12 +66,12 @@ class Relaxation {
     return index / kRun % turns == step % turns;
   }
 
-  // Of the stress that has relaxed: N/m per edge of each tet, along the edge as it is. load_index()
-  // of the edge between two corners of a tet; kNoLoad is zero.
+  // Returns the loads of relaxed stress: N/m per edge of each tet, along the edge as it is. The
+  // load between two corners of a tet is at load_index(); that at kNoLoad is zero.
   const float* loads() const { return loads_.data(); }
   static std::uint32_t load_index(TetIndex tet, std::size_t corner, std::size_t other);
   static constexpr std::uint32_t kNoLoad = 0;
-  // Of smoothing domains; null if none relaxes.
+  // Returns the relaxation of smoothing domains; null if none relaxes.
   const NodalRelaxation* nodal() const { return nodal_relaxation_.get(); }
 
  private:

@@ -14,7 +14,7 @@ constexpr float kLeastVolumeRatio = 0.05f;
 constexpr std::size_t kTensor = world::StressHistory::kComponents * kLanes;
 static_assert(world::StressHistory::kPlaces == kLanes);
 
-// exp(-x), the same on every machine.
+// Returns exp(-x), the same on every machine.
 double decay_in(double x) {
   if (x > 700) return 0;
   int halvings = 0;

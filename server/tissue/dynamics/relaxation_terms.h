@@ -1,8 +1,8 @@
 #pragma once
 
-// What a relaxing material does to a stress, eight places (tets, or smoothing domains) at once: the
-// stress that it would have at once, and how the parts q_k that have relaxed follow over one or
-// more steps (relaxation.h). Immutable but for set_dt(): any thread.
+// RelaxationTerms compute what a relaxing material does to a stress, for eight places (tets, or
+// smoothing domains) at a time: the instantaneous stress, and how the parts q_k that have relaxed
+// follow over one or more steps (relaxation.h). Immutable but for set_dt(): any thread.
 
 #include <array>
 #include <vector>
@@ -59,11 +59,11 @@ class RelaxationTerms {
   };
   static Response response_of(const Constants& c, const Vec8& f0, const Vec8& f1, const Vec8& f2);
 
-  // Of a block of a history: what will have relaxed at the end of the next step, Pa.
+  // Returns what will have relaxed at the end of the next step, Pa, from a block of a history.
   SymMat8 ahead(std::span<const float> block, const Constants& c) const;
-  // Brings the block to where the stress is `now`; the same of what follows.
+  // Advances the block to where the stress is `now`; returns its ahead().
   SymMat8 advance(std::span<float> block, const SymMat8& now, const Constants& c) const;
-  // The block of tissue that has had this stress for long.
+  // Sets the block to that of tissue which has long had this stress.
   void settle(std::span<float> block, const SymMat8& stress, const LaneMaterials& materials) const;
 
  private:

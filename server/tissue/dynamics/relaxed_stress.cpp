@@ -142,7 +142,7 @@ void start_relaxed(const organ::Organ& organ, world::World& world) {
   for (Group g = 0; strain && g < groups.group_count(); ++g) strain->restart_group(g, x.data());
   Relaxation relaxation(topology, groups, averaged);
   relaxation.settle(x.data(), world.relaxation);
-  // Of tissue that stays as it is the loads do not depend on the step.
+  // The loads of tissue that stays as it is do not depend on the step.
   Workers alone(1);
   relaxation.begin_step(1, world.relaxation, alone);
   RelaxedStress stress(topology, groups, relaxation, averaged);

@@ -1,11 +1,11 @@
 #pragma once
 
-// What has relaxed of the stress of measured tissue (relaxation.h), as forces on nodes: each edge
-// of a tet that relaxes bears a load that is constant in a step, in N per m of the edge. Forces are
-// taken where the tissue is between two steps, and are constant in the next; those of all nodes,
-// taken at once, balance in force and torque. Where strain is averaged, smoothing domains have
-// their part: F Q b with F as NodalStrain keeps it. O(tets and smoothing domains at the nodes) each
-// time.
+// RelaxedStress turns what has relaxed of the stress of measured tissue (relaxation.h) into forces
+// on nodes: each edge of a tet that relaxes bears a load that is constant in a step, in N per m of
+// the edge. Forces are taken where the tissue is between two steps, and are constant in the next;
+// those of all nodes, taken at once, balance in force and torque. Where strain is averaged,
+// smoothing domains have their part: F Q b with F as NodalStrain keeps it. O(tets and smoothing
+// domains at the nodes) each time.
 
 #include "server/tissue/dynamics/lanes.h"
 #include "server/tissue/dynamics/relaxation.h"
@@ -18,14 +18,14 @@ class RelaxedStress {
   RelaxedStress(const topology::Topology& topology, const Groups& groups,
                 const Relaxation& relaxation, const NodalStrain* strain);
 
-  // Forces on these nodes anew, in the state too; x: displacements per slot. Different groups at
-  // once: allowed.
+  // Computes the forces on these nodes anew, in the state too; x: displacements per slot. Different
+  // groups may be refreshed at once.
   void refresh(GroupLanes lanes, const Float4* x, world::RelaxationState& state);
-  // As they were taken last, N.
+  // Returns the forces as they were taken last, N.
   Vec8 forces(Group group) const { return load(forces_[group]); }
-  // All of them from the state.
+  // Takes the forces of all nodes from the state.
   void take_state(const world::RelaxationState& state);
-  // As energies follow edits, see Energy::rebuild().
+  // Follows an edit as energies do, see Energy::rebuild().
   void rebuild(const topology::Topology& topology, const Groups& groups,
                std::span<const GroupLanes> lanes);
 

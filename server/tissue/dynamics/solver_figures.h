@@ -1,6 +1,6 @@
 #pragma once
 
-// Which solver moved the tissue in a tick, and why: what a session tells people about it.
+// These figures tell the people in a session which solver moved the tissue in a tick, and why.
 
 #include <array>
 #include <cstdint>
@@ -47,7 +47,7 @@ struct SolverFigures {
   float largest_node_force_n = 0;
 };
 
-// From one tick to the next another solver, or patch, or reason.
+// The solver, its patches or the reason changed from the tick before to this one.
 struct SolverChange {
   Tick tick = 0;
   SolverFigures figures;

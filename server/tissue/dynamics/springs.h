@@ -44,7 +44,7 @@ class Springs final : public Energy {
 
     void pad(std::size_t, Slot) {}
   };
-  // A spring at a node.
+  // This is a spring at a node, with the node at its other end.
   struct End {
     NodeIndex other;
     organ::Spring spring;

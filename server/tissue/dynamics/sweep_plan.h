@@ -1,6 +1,6 @@
 #pragma once
 
-// Which groups and lanes a sweep goes over, colour by colour.
+// A sweep plan holds the groups and lanes that a sweep goes over, colour by colour.
 
 #include <vector>
 

@@ -53,7 +53,7 @@ class TensorMass final : public Energy {
 
   GroupRows<Row> rows_;
   std::vector<SymMat3Lanes> blocks_;  // K_ii per group
-  // N per group: of the rest pose against the stress-free one
+  // This is the gradient of each group at rest, N, from tension and the stress-free pose.
   std::vector<Vec3Lanes> rest_gradient_;
   std::vector<double> rest_energies_j_;  // per slot
   std::array<Node, kLanes> lane_nodes_;  // while rows are filled

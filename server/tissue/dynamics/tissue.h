@@ -17,7 +17,7 @@
 
 namespace trocar::dynamics {
 
-// What following a change has cost.
+// This report says what following a change has cost.
 struct FollowReport {
   std::size_t nodes_changed = 0;  // whose existence, place or elements have changed
   std::size_t nodes_moved = 0;    // to another slot
@@ -33,7 +33,7 @@ class Tissue {
   explicit Tissue(const topology::Topology& topology, std::span<const Colour> colours = {});
 
   const Groups& groups() const { return groups_; }
-  // What strain is averaged over, to be told of moves; null: nothing.
+  // Returns the averaged strain, which must be told when nodes move; null: nothing is averaged.
   NodalStrain* nodal_strain() { return nodal_strain_.get(); }
   const NodalStrain* nodal_strain() const { return nodal_strain_.get(); }
 
@@ -42,7 +42,7 @@ class Tissue {
     for (const auto& energy : energies_) energy->add(group, x, own, step);
     add_averaged(group, step);
   }
-  // Of these, energies of nodal strain alone.
+  // Adds the energies of nodal strain alone.
   void add_averaged(Group group, NodeStep8& step) const {
     for (const auto& energy : averaged_) energy->add(group, step);
   }
@@ -66,8 +66,8 @@ class Tissue {
   // that changed.
   std::span<const GroupLanes> rebuilt() const { return nodal_strain_ ? wide_ : touched_; }
 
-  // What remembers stresses, and the forces of stress that has relaxed, which no energy has; null
-  // where nothing relaxes.
+  // These return the memory of stresses, and the forces of relaxed stress, which no energy has;
+  // null where nothing relaxes.
   Relaxation* relaxation() { return relaxation_.get(); }
   RelaxedStress* relaxed_stress() { return relaxed_stress_.get(); }
   const RelaxedStress* relaxed_stress() const { return relaxed_stress_.get(); }

@@ -118,7 +118,7 @@ bool BlockSystem::factor() {
   return true;
 }
 
-// What the right side lacks in this block, with the other blocks' x.
+// Solves for one block's x, with the other blocks' x as they stand (block Gauss-Seidel).
 void BlockSystem::solve_block(std::size_t block, std::span<const double> right, std::span<double> x,
                               std::span<double> own) const {
   const auto first = begins_[block], end = begins_[block + 1];
@@ -131,7 +131,7 @@ void BlockSystem::solve_block(std::size_t block, std::span<const double> right, 
     own[i - first] = left;
   }
   for (const auto& [rows, b] : links_) {
-    // What the other blocks do at the link.
+    // The other blocks move the link by this.
     std::array<double, 3> d{};
     for (std::size_t k = 0; k < 3; ++k) {
       for (std::size_t j = 0; j < first; ++j) d[k] += static_cast<double>(rows[k][j]) * x[j];

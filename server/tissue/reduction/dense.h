@@ -23,7 +23,7 @@ class CholeskyFactor {
   void resize(std::size_t size);
   // To be filled: the upper triangle.
   double* row(std::size_t i) { return upper_.data() + i * stride_; }
-  // False: not positive definite.
+  // Factors the matrix in place; returns false if it is not positive definite.
   bool factor();
   void solve(std::span<double> x) const;
 
@@ -45,7 +45,7 @@ class BlockSystem {
   // which must outlive its use. O(sum of squares of blocks).
   void add_link(const std::array<const float*, 3>& rows, const SymMat3f& b);
   void clear_links() { links_.clear(); }
-  // False: a block is not positive definite.
+  // Factors all blocks; returns false if one is not positive definite.
   bool factor();
   // x in place of the right side. scratch: of no meaning, kept for its memory.
   void solve(std::span<double> x, std::vector<double>& scratch, int passes = 1) const;

@@ -39,7 +39,7 @@ Mat8 cofactors(const Mat8& m) {
 
 }  // namespace
 
-// Of the displacement gradient H = F - I.
+// Strain holds functions of the displacement gradient H = F - I.
 struct ElementSet::Strain {
   Mat8 h, cofactors;           // cof F
   Mat8 cofactors_less_linear;  // cof F - I - (tr H I - H^T) = cof H
@@ -181,7 +181,7 @@ void ElementSet::add_tangent(const Psi& law, const Group& group, std::span<const
   law.derivatives(s.i1, first, second);
   const Float8 c = load(group.twice_c10_v), bulk = load(group.bulk_v);
   const Float8 slope = first * c, curvature = (second + second) * c;  // 2 Psi' V, 4 Psi'' V
-  // What multiplies the change of cof F, V (K (J - 1) - 2 C10).
+  // This multiplies the change of cof F: V (K (J - 1) - 2 C10).
   const Float8 pressure = with_stress ? fma8(bulk, s.volume, all(0) - c) : all(0);
   Mat8 f = s.h;
   f.add_identity(all(1));

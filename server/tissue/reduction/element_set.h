@@ -15,7 +15,7 @@
 
 namespace trocar::reduction {
 
-// Which part of a tet's forces: all, or what is left of them without the linear response at rest.
+// ForcePart selects all of a tet's forces, or what is left without the linear response at rest.
 enum class ForcePart : std::uint8_t { Whole, Nonlinear };
 
 class ElementSet {

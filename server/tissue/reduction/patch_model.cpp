@@ -29,7 +29,8 @@ void add_scaled(float s, const float* x, float* y, std::size_t n) {
                      _mm256_fmadd_ps(factor, _mm256_loadu_ps(x + i), _mm256_loadu_ps(y + i)));
 }
 
-// Of a later patch's field, what the others have not; of any.
+// A field is kept if at least this part of its stiffness is independent of the fields before it:
+// kNewInField for fields of later patches, kLeastPivot for those of the first.
 constexpr double kNewInField = 0.01, kLeastPivot = 1e-6;
 
 BlockMatrix pattern_of(std::size_t node_count, std::initializer_list<const ElementSet*> sets) {

@@ -26,8 +26,9 @@ class PatchModel {
  public:
   PatchModel(const organ::LocalReduction& reduction, const organ::LocalPatch& patch,
              const organ::Organ& organ);
-  // Of two patches or more together: their fields one after another, without those of later ones
-  // that are nearly of the others. Tets near any of them are as they are. O(organ x fields^2).
+  // Joins two patches or more. Their fields come one after another, without fields of later patches
+  // that are nearly linear combinations of those before. Tets near any of the patches keep their
+  // nonlinear forces. O(organ x fields^2).
   PatchModel(const LocalModels& models, const PatchSet& patches);
 
   NodeIndex centre() const { return centre_; }
@@ -35,7 +36,7 @@ class PatchModel {
   std::size_t field_count() const { return fields_.size(); }
   std::size_t stride() const { return padded(field_count()); }
 
-  // Where each patch's fields begin, and the end.
+  // Returns where each patch's fields begin, and where the last one's end.
   std::span<const std::size_t> blocks() const { return blocks_; }
 
   // Nodes of its tets, ascending: its local nodes.
@@ -62,11 +63,12 @@ class PatchModel {
   std::span<const double> outer_stiffness() const { return outer_stiffness_; }
   std::span<const double> inner_stiffness() const { return inner_stiffness_; }
   std::span<const double> mass() const { return mass_; }
-  // Of the fields that move the nodes that may be free as wanted, and all else hardly: the least
-  // sum of squared differences over those nodes, by mass, and of kBeside times the mass of all
-  // others and kBeside_s2 of the outer stiffness. With a hundredth of the weight contacts err by up
-  // to 8 %, with ten times as much fields go three times as far astray. Factored; null: not
-  // positive definite, as of no reduction that was made of this organ.
+  // Returns the factored system of a least-squares fit; null if it is not positive definite, which
+  // no reduction that was made of this organ causes. The fit seeks fields that move the nodes that
+  // may be free as wanted, and all else hardly. It minimises the squared differences over those
+  // nodes, weighted by mass, plus kBeside times the sum of the other nodes' squared moves, weighted
+  // by mass, and kBeside_s2 times the energy in the outer stiffness. With a hundredth of the weight
+  // kBeside contacts err by up to 8 %; with ten times as much fields go three times as far astray.
   static constexpr double kBeside = 1000, kBeside_s2 = 1e-4;
   const BlockSystem* near_fit() const { return has_near_fit_ ? &near_fit_ : nullptr; }
 
@@ -84,13 +86,13 @@ class PatchModel {
   };
   // Ascending.
   void take_tets(const organ::Organ& organ, std::span<const TetIndex> inner);
-  // Of later patches' fields, leaves out what is nearly of those before.
+  // Drops fields that nearly are linear combinations of those before; more so of later patches.
   void drop_repeated_fields();
   void make_matrices(const organ::LocalPatch& patch);
   void fill_basis();
   void take_inner_stiffness();
   void make_near_fit();
-  // Of all nodes among the fields, and of the tets that are not inner.
+  // Projects onto the fields the masses of all nodes and the stiffness of the outer tets.
   void sum_over_nodes(const LocalModels& models, std::span<const TetIndex> inner);
 
   NodeIndex centre_;
@@ -117,7 +119,7 @@ class LocalModels {
   std::size_t size() const { return models_.size(); }
   const organ::Organ& organ() const { return organ_; }
   const organ::LocalPatch& patch(std::uint32_t number) const { return reduction_.patches[number]; }
-  // Of all tets at rest over all nodes; empty for a single patch.
+  // Returns the tangent of all tets at rest over all nodes; it is empty for a single patch.
   const BlockMatrix& rest_tangent() const { return rest_tangent_; }
   const PatchModel& operator[](std::uint32_t patch) const { return models_[patch]; }
   std::size_t node_count() const { return node_count_; }

@@ -38,15 +38,16 @@ namespace {
 constexpr double kLeastFade = 1e-4;
 // Steps from one estimate of the error to the next.
 constexpr std::uint32_t kEstimateInterval = 4;
-// Of touches, J: with less an error is not worth a word.
+// An error does not count where fields and contacts do less work than this.
 constexpr double kLeastWork_j = 1e-5;
-// Of an amplitude in one correction; the square root of an energy in J. More is as broken as what
-// is not finite: nothing is changed, and the estimate says so until the next.
+// No amplitude, the square root of an energy in J, may change by more than this in one correction.
+// More is as broken as what is not finite: nothing is changed, and the estimate says so until
+// patches take over again.
 constexpr double kMaxChange = 100;
 constexpr float kBroken = 1e6f;
-// Beside 1 of every field.
+// This is added to the stiffness of every field, which is 1.
 constexpr double kLeastStiffness = 1e-9;
-// Of the solver by blocks, when patches take over.
+// The solver by blocks makes so many passes when patches take over.
 constexpr int kPasses = 20;
 
 }  // namespace
@@ -106,7 +107,8 @@ void ReducedFarField::take_over(const PatchSet& patches, const PatchModel& model
   for (auto* values : {&s.amplitudes, &s.rates, &s.correction, &s.relaxed, &s.relaxed_next})
     values->assign(count, 0);
 
-  // What the organ resists with along the fields, and what these would have to do so.
+  // First come the forces with which the organ resists along the fields, then the amplitudes at
+  // which the fields would resist as much.
   const auto along = [&](std::span<const float> values, std::vector<double>& out) {
     std::ranges::fill(along_, 0.0f);
     model_->add_along_everywhere(0, node_count_, values, along_);
@@ -259,7 +261,7 @@ void ReducedFarField::add_contacts(const dynamics::FarFieldStep& step) {
   }
 }
 
-// Of fields with the factors of change_, at a local node.
+// Returns the sum of the fields at a local node, weighted by change_.
 Vec3f ReducedFarField::of_change(std::uint32_t local) const {
   const auto basis = model_->basis();
   std::array<float, 3> sum{};
@@ -267,8 +269,8 @@ Vec3f ReducedFarField::of_change(std::uint32_t local) const {
   return {sum[0], sum[1], sum[2]};
 }
 
-// Of near nodes, what theirs is besides that of the fields; ahead_: accelerations of the fields
-// with their drag, per s^2.
+// Adds the inertia and drag of near nodes that the fields do not have. ahead_ has the accelerations
+// of the fields with their drag, in amplitudes per s^2.
 void ReducedFarField::add_inertia(const dynamics::FarFieldStep& step) {
   const float inverse_dt = 1 / step.dt, drag = static_cast<float>(drag_per_s_);
   for (std::size_t c = 0; c < change_.size(); ++c) change_[c] = static_cast<float>(ahead_[c]);

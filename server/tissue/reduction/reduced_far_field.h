@@ -71,7 +71,7 @@ class ReducedFarField : public dynamics::FarFieldSolver {
     std::uint32_t node;  // of the organ
     float weight;
   };
-  // Of nodes beyond the organ's own.
+  // Returns the organ's nodes with which a node made by cuts moves, and their weights.
   std::span<const Share> shares_of(std::size_t follower) const {
     return std::span(shares_).subspan(share_begins_[follower],
                                       share_begins_[follower + 1] - share_begins_[follower]);
@@ -103,12 +103,12 @@ class ReducedFarField : public dynamics::FarFieldSolver {
   std::vector<std::uint32_t> share_begins_{0};
   std::vector<Share> shares_;
 
-  // Of a step. Per field:
+  // The members below are the workspace of a step. These have an entry per field:
   std::vector<double> start_, ahead_, gradient_, scratch_, solving_;
   std::vector<float> along_, change_;
   BlockSystem system_;
   bool has_factors_ = false;
-  // Per local node, x, y, z:
+  // These have x, y, z per local node:
   std::vector<float> u_, f_, moved_;
   std::vector<dynamics::Slot> slots_;
   std::vector<std::uint8_t> is_near_;

@@ -19,12 +19,13 @@ constexpr std::uint16_t kWaitTicks = 250;
 constexpr std::uint16_t kLeastTicks = 16;
 // After a cut, until what was near the wound has come to rest there.
 constexpr std::uint16_t kCutWaitTicks = 400;
-// Of the estimate of the error: where it is larger something is wrong. Errors of the force of some
+// An estimate of the error above this means that something is wrong. Errors of the force of some
 // per cent, of which the estimate says little, are far below.
 constexpr float kLargestEstimate = 0.25f;
 constexpr std::size_t kMaxLoaded = 4096;
-// Of making patches ready to act together, ticks: long enough for a thread beside the ticks to be
-// done, nearly always; the tick waits for it. In proportion to the organ.
+// Patches need kPrepareTicks ticks until they may act together, and one more per
+// kNodesPerPrepareTick nodes of the organ. A thread beside the ticks is nearly always done by then;
+// if not, the tick waits for it.
 constexpr std::uint32_t kPrepareTicks = 60, kNodesPerPrepareTick = 40;
 
 bool has_room(const PatchModel& model, std::span<const NodeIndex> nodes) {
@@ -81,7 +82,7 @@ ReducedTissue::Model ReducedTissue::model_of(const PatchSet& patches) {
   if (patches.count == 1) return {std::shared_ptr<void>(), &models_[patches.patches[0]]};
   const auto found = std::ranges::find(joints_, patches, &Joint::patches);
   if (found != joints_.end()) return found->model;
-  // Of a restored state, or the thread had no time for them.
+  // The state was restored, or the thread had no time to make this model.
   if (joints_.size() == ReducedState::kMaxReady) joints_.erase(joints_.begin());
   joints_.push_back({patches, std::make_shared<PatchModel>(models_, patches)});
   return joints_.back().model;
@@ -222,7 +223,7 @@ bool ReducedTissue::is_ready(const PatchSet& patches) {
   return true;
 }
 
-// Of what tools press and pull with.
+// Returns the largest force of contacts on a node, N.
 float ReducedTissue::largest_node_force(const contact::ContactList& contacts,
                                         const world::World& world) {
   loaded_.clear();

@@ -1,8 +1,8 @@
 #pragma once
 
-// Which solver moves the tissue: the full one, or around a patch of a local reduction sweeps and
-// beyond it the patch's fields (reduced_far_field.h). The choice is a function
-// of the state alone, made each tick.
+// ReducedTissue chooses in each tick which solver moves the tissue: the full one, or sweeps around
+// a patch of a local reduction and the patch's fields beyond it (reduced_far_field.h). The choice
+// is a function of the state alone.
 
 #include <array>
 #include <memory>

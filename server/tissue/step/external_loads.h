@@ -1,7 +1,7 @@
 #pragma once
 
-// What acts on the tissue of an experiment besides tools: nodes that are displaced, along all axes
-// or some, and nodes with forces, each as a function of simulated time. A session has none of it.
+// External loads act on the tissue of an experiment besides tools: nodes are displaced, along all
+// axes or some, and nodes have forces, each as a function of simulated time. A session has none.
 //
 // Loads are an input of a tick like the samples of hands, but one that is known beforehand: the
 // rules stay, and at() evaluates them at the end of a step of time. They keep to the organ when it
@@ -65,13 +65,13 @@ class ExternalLoads {
   ExternalLoads(const ExternalLoads&) = delete;
   ExternalLoads& operator=(const ExternalLoads&) = delete;
 
-  // At the end of a step of time; valid until the next call.
+  // Returns the loads at the end of a step of time; valid until the next call.
   dynamics::ExternalLoads at(double time_s, const world::World& world);
 
-  // The holds alone, with every held node where it is at rest.
+  // Returns the holds alone, with every held node where it is at rest.
   dynamics::ExternalLoads at_rest(const world::World& world);
 
-  // Where force enters the tissue: propagation starts there as from a contact.
+  // Returns the nodes at which force enters the tissue: propagation starts there as from a contact.
   std::span<const std::span<const NodeIndex>> seeds() const { return seeds_; }
   const LoadRules& rules() const { return rules_; }
   // Nothing is displaced, loaded or watched: a tick without it does the same.
@@ -80,7 +80,7 @@ class ExternalLoads {
   std::size_t watch(std::span<const NodeIndex> nodes);
   // After a solve with these loads, and before an edit of the topology.
   void measure(const dynamics::BlockDescent& solver, const contact::ContactList& contacts);
-  // On the tissue, N, as it was last measured; zero along axes along which a node is free.
+  // Returns the force on the tissue, N, as it was last measured; zero along axes that are free.
   Vec3d holding_force_n(std::size_t watched) const { return watched_[watched].force_n; }
 
  private:

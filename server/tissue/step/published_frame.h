@@ -1,7 +1,8 @@
 #pragma once
 
-// What leaves the simulation every 16th tick: one immutable object, shared by the replication
-// strand and the journal. Nobody outside the simulation thread sees anything else of its state.
+// A published frame leaves the simulation every 16th tick: one immutable object, shared by the
+// replication strand and the journal. Nobody outside the simulation thread sees anything else of
+// its state.
 
 #include <array>
 #include <memory>
@@ -38,14 +39,14 @@ struct ToolFrame {
   bool is_silent = false;   // lease no longer fresh
 };
 
-// What became of what an instructor asked for.
+// A mark event says what became of an instructor's request.
 struct MarkEvent {
   Tick tick = 0;
   hands::MarkAction action = hands::MarkAction::None;
   bool is_done = false;  // false: there is no mark to return to
 };
 
-// What the journal needs to simulate one tick again.
+// The journal needs this record to simulate one tick again.
 struct TickRecord {
   Tick tick = 0;
   TickDecisions decisions;
@@ -57,7 +58,7 @@ struct PublishedFrame {
   Frame frame = 0;
   Tick tick = 0;
   std::uint32_t epoch = 0;  // after `change`
-  // Of the surface since the frame before; null: none.
+  // The surface has changed by this since the frame before; null: it has not.
   std::shared_ptr<const wire::SurfaceChange> change;
   // Another surface than that of the frame before, from which no change leads to it; null: none.
   std::shared_ptr<const wire::SurfaceLayout> new_layout;

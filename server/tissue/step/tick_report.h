@@ -1,6 +1,6 @@
 #pragma once
 
-// What a tick is told (TickDecisions) and what it says about itself (TickReport).
+// A tick is told its TickDecisions, and says in a TickReport what it did.
 
 #include <array>
 #include <cstdint>
@@ -36,8 +36,9 @@ struct TickDecisions {
   world::Boundary boundary = world::Boundary::Graded;
   std::uint32_t far_sweeps = 0;  // Graded: of nodes outside the queue; 0: as the organ needs
 
-  // Of layer 1, of layer 2, and of layer 3 and deeper with nodes that have left the queue; never
-  // more than the layer before. 0: as the layer before. `sweeps` is of the touched nodes then.
+  // These are the sweeps of layer 1, of layer 2, and of layers from 3 on together with nodes that
+  // have left the queue. No number exceeds the one before; 0 repeats it. `sweeps` is then that of
+  // the touched nodes.
   std::array<std::uint32_t, 3> layer_sweeps{};
 
   // Graded: forces in the far field from the energies, not from matrices about a recent pose.
@@ -102,8 +103,8 @@ struct TickReport {
   std::uint64_t state_hash = 0;
 };
 
-// What the rate controller has to say (server/session/control); for people, never an input of a
-// tick.
+// The rate controller (server/session/control) reports this level to people; it is never an input
+// of a tick.
 enum class RateLevel : std::uint8_t {
   Fixed,       // decisions are fixed: there is no controller
   Full,        // all that was asked for

@@ -36,7 +36,7 @@ class SurfaceMesh {
     std::uint16_t material = 0;
   };
 
-  // At rest, m^2: a third of each triangle at the node.
+  // Returns the area at a node at rest, m^2: a third of each triangle there.
   double area_of(const Topology& topology, NodeIndex node) const;
   void gather_faces(const Topology& topology);
   void remove(TriangleIndex triangle);

@@ -14,7 +14,7 @@ struct TetShape {
 };
 TetShape tet_shape(std::span<const Vec3d> positions, const mesh::Tet& tet);
 
-// Of the shape in which tissue is free of stress once a tet is on its own: the topology's,
+// Returns the shape in which tissue is free of stress once a tet is on its own: the topology's,
 // stretched by
 //   A = (1 - tension) I - fibre_tension f f^T,   f the fibres' direction,
 // so that lengths are to first order those of springs under the same tension (Nakao 2003 eq. 3).

@@ -54,11 +54,11 @@ class Topology {
     for (const auto j : links_of(node)) visit(j);
   }
 
-  // As organ::material_at() counts.
+  // Returns the number of a material as organ::material_at() counts.
   std::uint16_t material_of(TetIndex tet) const { return tet_materials_[tet.value]; }
   std::uint16_t material_of(NodeIndex node) const;
   std::uint16_t material_of(NodeIndex a, NodeIndex b) const;
-  // Nakao 2003 eq. 4, kg.
+  // Returns the lumped mass of a node (Nakao 2003 eq. 4), kg.
   double lumped_mass(NodeIndex node) const;
 
   // Directions of fibres as organ::Organ::fibre_directions, of a node; of a tet or a spring the
