@@ -129,7 +129,7 @@ TEST(ScenarioSolve, MeetsTheLiveSolverUnderAnExponentialLaw) {
   std::filesystem::remove(file);
 }
 
-// Where the live solver begins what has hung for long is where this one finds it.
+// The live solver lets relaxed tissue start from the equilibrium that the off-line solver finds.
 TEST(ScenarioSolve, TissueThatRelaxesHangsWhereTheLiveSolverLetsItStart) {
   const std::string load =
       "[gravity]\nm_s2 = [0, -0.5, 0]\n[[probe]]\nset = \"top\"\nquantity = "
@@ -170,8 +170,8 @@ TEST(ScenarioSolve, MeasuredLiverRelaxesAsInTheLiveSolver) {
   EXPECT_LT(length(a - b), 0.01 * length(a));
 }
 
-// What holds the column carries its load, whatever the elements. (Under the whole of the earth's
-// gravity so soft a column falls over.)
+// The reaction of the fixed nodes balances the load, whatever the elements. (Under all of the
+// earth's gravity a column as soft as this falls over.)
 TEST(ScenarioSolve, ReactionsBalanceLoads) {
   const std::string text = kColumn + kStatic +
                            "[gravity]\nm_s2 = [0, -2, 0]\n[[force]]\nset = \"top\"\n"

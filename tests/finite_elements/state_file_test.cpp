@@ -65,7 +65,7 @@ TEST(StateFile, RefusesWhatIsCutShortChangedOrOfAnotherProblem) {
   EXPECT_NE(refused.error().message.find("another organ, material"), std::string::npos);
 }
 
-// What a program other than this one could have written: the checksum is right.
+// Another program could have written these states: one field is wrong, but the checksum is right.
 TEST(StateFile, RefusesEachFieldThatIsWrong) {
   const auto block = pulled_block();
   Solver solver(block.problem());

@@ -58,7 +58,8 @@ scenario::ResolvedScenario resolve(const std::string& text) {
   return resolved.ok() ? std::move(*resolved) : scenario::ResolvedScenario{};
 }
 
-// What a machine would record of a scenario: `noise` of the largest force, of no special form.
+// Returns what a testing machine would record of a scenario. The noise has a standard deviation of
+// `noise` times the largest force and repeats itself nowhere.
 MeasuredCurve recorded(const std::string& text, double noise) {
   const auto resolved = resolve(text);
   const auto curve = scenario::load_curves(resolved).at(0);
@@ -238,7 +239,7 @@ TEST(Fit, AMeasuredMaterialIsLeftToItsOwnIdentification) {
   }
 }
 
-// Tension and fibre tension shorten tissue by at most 0.9 together.
+// Tension and fibre tension may shorten tissue by at most 0.9 together.
 TEST(Fit, TensionStaysWhatAScenarioTakes) {
   const MeasuredCurve measured{"measured.csv", false, {{0.001, 0.1, 0, 2}, {0.002, 0.2, 0, 3}}};
   FitOptions options;

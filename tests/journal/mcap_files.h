@@ -44,7 +44,7 @@ inline void save_file(const std::string& path, BytesView bytes) {
             static_cast<std::streamsize>(bytes.size()));
 }
 
-// What a message is expected to be when read back.
+// Holds what a message must be when it is read back.
 struct Expected {
   std::string topic;
   std::uint64_t log_time = 0;
@@ -52,7 +52,7 @@ struct Expected {
   bool operator==(const Expected&) const = default;
 };
 
-// Message `i` of the small recording: compressible text and a counter.
+// Returns message `i` of the small recording: compressible text and a counter.
 inline Bytes payload_of(int i, std::size_t size) {
   Bytes data(size);
   for (std::size_t k = 0; k < size; ++k)

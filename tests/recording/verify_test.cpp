@@ -105,7 +105,7 @@ TEST_F(Verify, ASoundRecordingIsVerifiedWhole) {
   EXPECT_EQ(report.ticks_missing, 0u);
   constexpr auto kFrames = kRecordedTicks / kTicksPerFrame;
   EXPECT_EQ(report.frames_verified, kFrames);
-  // A keyframe first, then one a second beside the delta.
+  // The first frame is a keyframe; later each second adds a keyframe beside the delta.
   EXPECT_EQ(report.surfaces_verified, kFrames + 2);
   EXPECT_EQ(report.surfaces_decoded, report.surfaces_verified);
   EXPECT_EQ(report.snapshots_verified, 1 + std::size(kSnapshotTicks));

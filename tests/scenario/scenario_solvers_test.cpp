@@ -1,4 +1,4 @@
-// What a scenario asks of the solver: laws, regions, boundaries, integrators.
+// Tests what a scenario sets of the solver: laws, regions, boundaries, integrators.
 
 #include "tests/scenario/scenario_texts.h"
 
