@@ -45,7 +45,7 @@ TEST(Comments, FragmentsBecomeFewer) {
   const std::map<std::string, std::size_t> ceilings{
       {"client", 0},         {"common", 0},          {"server/app", 0},
       {"server/lab", 17},    {"server/organs", 0},   {"server/papers", 0},
-      {"server/session", 0}, {"server/tissue", 166}, {"tests", 140}};
+      {"server/session", 0}, {"server/tissue", 166}, {"tests", 0}};
   const auto wings = fragments_by_wing(read_source_tree(TROCAR_SOURCE_DIR));
   for (const auto& [wing, fragments] : wings) {
     const auto ceiling = ceilings.find(wing);
