@@ -11,9 +11,12 @@
 #include <fstream>
 
 #include "server/lab/scenario/scenario_run.h"
+#include "tests/scenario/scenario_texts.h"
 
 namespace trocar::finite_elements {
 namespace {
+
+using scenario::expect_resolved;
 
 // A column of 20 x 60 x 20 mm that stands on its lowest layer.
 const std::string kColumn = R"([organ]
@@ -50,24 +53,16 @@ set = "fixed"
 quantity = "reaction"
 )";
 
-scenario::ResolvedScenario resolved(const std::string& text) {
-  auto parsed = scenario::parse_scenario_text(text, "test.toml");
-  EXPECT_TRUE(parsed.ok()) << (parsed.ok() ? "" : parsed.error().message);
-  auto resolved = scenario::resolve(std::move(*parsed));
-  EXPECT_TRUE(resolved.ok()) << (resolved.ok() ? "" : resolved.error().message);
-  return std::move(*resolved);
-}
-
 std::unique_ptr<ScenarioSolve> solve_of(const std::string& text,
                                         const ScenarioSettings& settings = {}) {
-  auto solve = ScenarioSolve::create(resolved(text), settings);
+  auto solve = ScenarioSolve::create(expect_resolved(text), settings);
   EXPECT_TRUE(solve.ok()) << (solve.ok() ? "" : solve.error().message);
   return std::move(*solve);
 }
 
 void expect_same(const std::string& text) {
   const auto ours = solve_of(text, {.order = ElementOrder::Linear});
-  scenario::ScenarioRun live(resolved(text), scenario::Solver::Full);
+  scenario::ScenarioRun live(expect_resolved(text), scenario::Solver::Full);
   while (!ours->is_finished()) {
     EXPECT_TRUE(ours->step().is_converged);
     EXPECT_TRUE(live.step().is_converged);
@@ -140,7 +135,8 @@ TEST(ScenarioSolve, TissueThatRelaxesHangsWhereTheLiveSolverLetsItStart) {
   const std::string start =
       "[run]\nseconds = 0.01\nstart = \"equilibrium\"\n"
       "tolerance_n = 3e-7\nmax_sweeps = 50000\n";
-  scenario::ScenarioRun live(resolved(liver_column() + load + start), scenario::Solver::Full);
+  scenario::ScenarioRun live(expect_resolved(liver_column() + load + start),
+                             scenario::Solver::Full);
   live.step();
   const Vec3d a = ours->probe(0), b = live.probe(0);
   EXPECT_LT(a.y, -1e-5);
@@ -157,7 +153,7 @@ TEST(ScenarioSolve, MeasuredLiverRelaxesAsInTheLiveSolver) {
       "[[displace]]\nset = \"top\"\n[[displace.key]]\ntime_s = 0\ndisplacement_mm = [0, 0, 0]\n"
       "[[displace.key]]\ntime_s = 0.05\ndisplacement_mm = [6, 0, 0]\n";
   const auto ours = solve_of(text, {.order = ElementOrder::Linear});
-  scenario::ScenarioRun live(resolved(text), scenario::Solver::Full);
+  scenario::ScenarioRun live(expect_resolved(text), scenario::Solver::Full);
   double early = 0;
   for (int i = 0; !ours->is_finished(); ++i) {
     ASSERT_TRUE(ours->step().is_converged);
@@ -233,7 +229,7 @@ TEST(ScenarioSolve, MotionStartsAtRestOrInEquilibrium) {
   const ScenarioSettings settings{.order = ElementOrder::Linear, .dt_s = 1e-4};
   const auto ours = solve_of(text(""), settings);
   EXPECT_EQ(length(ours->probe(0)), 0) << "before the first step";
-  scenario::ScenarioRun live(resolved(text("")), scenario::Solver::Full);
+  scenario::ScenarioRun live(expect_resolved(text("")), scenario::Solver::Full);
   while (!live.is_finished()) {
     for (int i = 0; i < 10; ++i) ASSERT_TRUE(ours->step().is_converged);
     live.step();
@@ -300,7 +296,7 @@ TEST(ScenarioSolve, AStaticStateIsOfOneResponse) {
 
 TEST(ScenarioSolve, StepsThatDoNotFillTheRunAreRefused) {
   const auto steps = [](double dt_s) {
-    const auto solve = ScenarioSolve::create(resolved(swayed("[0, 0, 0]")),
+    const auto solve = ScenarioSolve::create(expect_resolved(swayed("[0, 0, 0]")),
                                              {.order = ElementOrder::Linear, .dt_s = dt_s});
     if (solve.ok()) return static_cast<int>((*solve)->step_count());
     EXPECT_EQ(solve.error().code, ErrorCode::Usage);
@@ -321,7 +317,7 @@ TEST(ScenarioSolve, StepsThatDoNotFillTheRunAreRefused) {
 TEST(ScenarioSolve, RefusesWhatItCannotDo) {
   const auto refused = [](const std::string& text, const std::string& says,
                           const ScenarioSettings& settings = {}) {
-    const auto solve = ScenarioSolve::create(resolved(text), settings);
+    const auto solve = ScenarioSolve::create(expect_resolved(text), settings);
     ASSERT_FALSE(solve.ok()) << says;
     EXPECT_NE(solve.error().message.find(says), std::string::npos) << solve.error().message;
   };
