@@ -4,19 +4,19 @@
 #include "server/lab/finite_elements/scenario_solve.h"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <cmath>
-#include <filesystem>
 #include <fstream>
 
 #include "server/lab/scenario/scenario_run.h"
 #include "tests/scenario/scenario_texts.h"
+#include "tests/support/files.h"
 
 namespace trocar::finite_elements {
 namespace {
 
 using scenario::expect_resolved;
+using trocar::testing::TemporaryFolder;
 
 // A column of 20 x 60 x 20 mm that stands on its lowest layer.
 const std::string kColumn = R"([organ]
@@ -111,17 +111,16 @@ TEST(ScenarioSolve, MeetsTheLiveSolverInMeasuredTissueThatHasNoTimeToRelax) {
 }
 
 TEST(ScenarioSolve, MeetsTheLiveSolverUnderAnExponentialLaw) {
-  const auto file = std::filesystem::temp_directory_path() /
-                    ("trocar_exponential_" + std::to_string(::getpid()) + ".toml");
+  const TemporaryFolder folder;
+  const auto file = folder.file("exponential.toml");
   std::ofstream(file) << "[hyperelastic]\nname = \"x\"\nc_i0_pa = [800]\nexponent = 3\n"
                          "bulk_modulus_pa = 8000\n";
   std::string text = liver_column();
   const std::string name = "human_liver_nava2008";
-  text.replace(text.find(name), name.size(), file.string());
+  text.replace(text.find(name), name.size(), file);
   expect_same(text + kStatic +
               "[[displace]]\nset = \"top\"\n[[displace.key]]\ntime_s = 0\ndisplacement_mm = [0, 0, "
               "0]\n[[displace.key]]\ntime_s = 1\ndisplacement_mm = [8, -6, 3]\n");
-  std::filesystem::remove(file);
 }
 
 // The live solver lets relaxed tissue start from the equilibrium that the off-line solver finds.
@@ -202,7 +201,8 @@ TEST(ScenarioSolve, DynamicRunsGoOnFromTheirState) {
                            "\"velocity\"\nrate_hz = 500\n[[force]]\nset = \"top\"\n[[force.key]]\n"
                            "time_s = 0\nforce_n = [0.1, 0, 0]\n";
   const ScenarioSettings settings{.order = ElementOrder::Linear, .dt_s = 2e-3};
-  const auto path = std::filesystem::temp_directory_path() / "trocar-scenario-solve-test.state";
+  const TemporaryFolder folder;
+  const auto path = folder.file("a.state");
   const auto whole = solve_of(text, settings), first = solve_of(text, settings),
              second = solve_of(text, settings);
   EXPECT_EQ(whole->step_count(), 10u);
@@ -215,7 +215,6 @@ TEST(ScenarioSolve, DynamicRunsGoOnFromTheirState) {
   EXPECT_EQ(whole->probe(0), second->probe(0));
   const auto other = solve_of(text, {.order = ElementOrder::Quadratic, .dt_s = 2e-3});
   EXPECT_FALSE(other->resume(path).ok());
-  std::filesystem::remove(path);
 }
 
 // A sudden load on a column at rest sets it in motion, as it does in the live solver with steps so
@@ -254,7 +253,8 @@ std::string swayed(const std::string& force, const std::string& more_run = "") {
 TEST(ScenarioSolve, AStateOfAnotherRunIsRefused) {
   const std::string text = swayed("[0.1, 0, 0]");
   const ScenarioSettings settings{.order = ElementOrder::Linear};
-  const auto path = std::filesystem::temp_directory_path() / "trocar-another-run-test.state";
+  const TemporaryFolder folder;
+  const auto path = folder.file("a.state");
   const auto first = solve_of(text, settings);
   for (int i = 0; i < 10; ++i) ASSERT_TRUE(first->step().is_converged);
   ASSERT_TRUE(first->save(path).ok());
@@ -272,7 +272,6 @@ TEST(ScenarioSolve, AStateOfAnotherRunIsRefused) {
   refused(text + "[gravity]\nm_s2 = [0, -1, 0]\n", settings, "other loads");
   refused(swayed("[0.1, 0, 0]", "start = \"equilibrium\"\n"), settings, "another start");
   refused(swayed("[0.1, 0, 0]", "mode = \"static\"\nload_steps = 20\n"), settings, "other loads");
-  std::filesystem::remove(path);
 }
 
 TEST(ScenarioSolve, AStaticStateIsOfOneResponse) {
@@ -281,7 +280,8 @@ TEST(ScenarioSolve, AStaticStateIsOfOneResponse) {
       "[[displace]]\nset = \"top\"\n[[displace.key]]\ntime_s = 0\ndisplacement_mm = [0, 0, 0]\n"
       "[[displace.key]]\ntime_s = 1\ndisplacement_mm = [2, 0, 0]\n";
   ScenarioSettings settings{.order = ElementOrder::Linear};
-  const auto path = std::filesystem::temp_directory_path() / "trocar-one-response-test.state";
+  const TemporaryFolder folder;
+  const auto path = folder.file("a.state");
   const auto first = solve_of(text, settings), second = solve_of(text, settings);
   ASSERT_TRUE(first->step().is_converged);
   ASSERT_TRUE(first->save(path).ok());
@@ -291,7 +291,6 @@ TEST(ScenarioSolve, AStaticStateIsOfOneResponse) {
   const auto status = solve_of(text, settings)->resume(path);
   ASSERT_FALSE(status.ok());
   EXPECT_NE(status.error().message.find("--response"), std::string::npos);
-  std::filesystem::remove(path);
 }
 
 TEST(ScenarioSolve, StepsThatDoNotFillTheRunAreRefused) {
