@@ -1,7 +1,7 @@
 #pragma once
 
 // Unsigned numbers in as few bytes as they need: seven bits per byte, low ones first, the high bit
-// set on all but the last (LEB128).
+// set on all but the last (LEB128). Signed numbers become unsigned by zig-zag, sign in the low bit.
 
 #include <optional>
 
@@ -23,6 +23,14 @@ inline std::optional<std::uint64_t> take_varint(ByteReader& reader, std::uint64_
     if (byte < 0x80) return reader.ok() && value <= most ? std::optional(value) : std::nullopt;
   }
   return std::nullopt;
+}
+
+inline std::uint32_t zigzag(std::int32_t v) {
+  return static_cast<std::uint32_t>(v) << 1 ^ static_cast<std::uint32_t>(v >> 31);
+}
+inline std::int32_t unzigzag(std::uint64_t v) {
+  return static_cast<std::int32_t>(static_cast<std::uint32_t>(v >> 1) ^
+                                   (0u - static_cast<std::uint32_t>(v & 1)));
 }
 
 }  // namespace trocar

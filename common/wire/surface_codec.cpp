@@ -24,13 +24,6 @@ static_assert(3 * kMaxWidth + 7 <= 64);
 
 enum Mode : unsigned { kTemporal = 0, kTemporalSpatial = 1, kAbsoluteSpatial = 2 };
 
-std::uint32_t zigzag(std::int32_t v) {
-  return static_cast<std::uint32_t>(v) << 1 ^ static_cast<std::uint32_t>(v >> 31);
-}
-std::int32_t unzigzag(std::uint64_t v) {
-  return static_cast<std::int32_t>(static_cast<std::uint32_t>(v >> 1) ^
-                                   (0u - static_cast<std::uint32_t>(v & 1)));
-}
 bool in_range(const QuantisedVertex& v) {
   const auto outside = [](std::int32_t c) {
     return int{static_cast<std::uint32_t>(c + kMaxQuanta) > 2u * kMaxQuanta};

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "common/base/varint.h"
 #include "proto/wire.pb.h"
 
 namespace trocar::wire {
@@ -13,12 +14,6 @@ Error bad(const char* message, const std::string& what) {
   return {ErrorCode::BadMessage, std::string(message) + "." + what};
 }
 
-std::uint32_t zigzag(std::int32_t v) {
-  return static_cast<std::uint32_t>(v) << 1 ^ static_cast<std::uint32_t>(v >> 31);
-}
-std::int32_t unzigzag(std::uint32_t v) {
-  return static_cast<std::int32_t>(v >> 1 ^ (0u - (v & 1)));
-}
 std::int32_t step(VertexIndex from, VertexIndex to) {
   return static_cast<std::int32_t>(to.value - from.value);
 }

@@ -40,7 +40,7 @@ void add_cell(mesh::TetMesh& mesh, int i, int j, int k) {
   }
 }
 
-mesh::TetMesh wall_mesh() {
+mesh::TetMesh chest_mesh() {
   mesh::TetMesh mesh;
   for (int k = 0; k <= kCellsZ; ++k)
     for (int j = 0; j <= kCellsY; ++j)
@@ -113,7 +113,7 @@ organ::Organ make_chest() {
   organ::Organ organ;
   organ.name = "chest";
   organ.source = "chest wall and heart, of the size of those of Nakao 2003";
-  organ.mesh = wall_mesh();
+  organ.mesh = chest_mesh();
   add_below(heart_mesh(), organ.mesh);
   mesh::renumber_along_z(organ.mesh);
   organ.mesh.build_adjacency();

@@ -62,7 +62,7 @@ void split(TetMesh& mesh, const std::vector<NodePair>& edges) {
   }
 }
 
-Result<TetMesh> wall_mesh(double spacing_m) {
+Result<TetMesh> stomach_mesh(double spacing_m) {
   auto mesh = mesh::stuff_isosurface(stomach_field, stomach_box(), spacing_m);
   if (!mesh) return mesh.error();
   if (const auto through = edges_through_the_wall(*mesh); !through.empty()) {
@@ -84,7 +84,7 @@ Result<organ::Organ> make_stomach(int target_tets) {
     return Error{ErrorCode::Usage, "stomach: " + std::to_string(target_tets) + " tets, must be " +
                                        std::to_string(kMinStomachTets) + " to " +
                                        std::to_string(kMaxStomachTets)};
-  auto mesh = mesh_with_about(target_tets, 6.2e-4, wall_mesh, "stomach");
+  auto mesh = mesh_with_about(target_tets, 6.2e-4, stomach_mesh, "stomach");
   if (!mesh) return mesh.error();
   organ::Organ organ;
   organ.name = "stomach";

@@ -8,7 +8,7 @@ namespace trocar::material {
 namespace {
 
 constexpr int kStabilityPoints = 1000;
-constexpr double kSmallestModulus_pa = 1e-3, kLargestModulus_pa = 1e12;
+constexpr double kSmallestModulus_pa = 1e-3;
 // Beyond it exp(b e) leaves the range of numbers at strains that are tested.
 constexpr double kLargestExponent = 50;
 // Incompressible in all but name; matrices get no worse than this.

@@ -32,6 +32,7 @@ namespace trocar::material {
 
 inline constexpr std::size_t kMaxPolynomialOrder = 5;
 inline constexpr std::size_t kMaxPronyTerms = 4;
+inline constexpr double kLargestModulus_pa = 1e12;
 
 enum class StrainEnergy : std::uint8_t { ReducedPolynomial = 0, Exponential = 1 };
 enum class VolumeSplit : std::uint8_t { Unsplit = 0, Isochoric = 1 };

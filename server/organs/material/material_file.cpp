@@ -6,7 +6,7 @@ namespace trocar::material {
 namespace {
 
 constexpr std::size_t kLimitBytes = 1u << 20;
-constexpr double kLargestModulus_pa = 1e12, kLongestTime_s = 1e9;
+constexpr double kLongestTime_s = 1e9;
 
 // Absent: empty. `most` numbers, each in its range.
 std::vector<double> read_list(tool::TableReader& reader, std::string_view key, std::size_t most,

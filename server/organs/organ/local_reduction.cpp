@@ -9,6 +9,7 @@
 #include "common/base/checksum.h"
 #include "common/math/cholesky.h"
 #include "server/organs/organ/any_material.h"
+#include "server/organs/organ/bad_file.h"
 
 namespace trocar::organ {
 namespace {
@@ -23,9 +24,6 @@ constexpr double kLeastPivot = 1e-12;
 // up to 1e-4.
 constexpr double kMassMargin = 0.01;
 
-Error bad(const std::string& what) {
-  return {ErrorCode::BadFile, what};
-}
 std::string number(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%g", value);

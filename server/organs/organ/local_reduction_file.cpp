@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "proto/local_reduction.pb.h"
+#include "server/organs/organ/bad_file.h"
 
 namespace trocar::organ {
 namespace {
@@ -18,10 +19,6 @@ constexpr PackedKind kKind{kLocalReductionMagic,
 
 using Numbers = google::protobuf::RepeatedField<double>;
 using Indices = google::protobuf::RepeatedField<std::uint32_t>;
-
-Error bad(const std::string& what) {
-  return {ErrorCode::BadFile, what};
-}
 
 void put(const PackedField& field, proto::PackedField& out) {
   const auto bytes = bytes_of(field.values);

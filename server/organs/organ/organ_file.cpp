@@ -3,26 +3,23 @@
 #include <algorithm>
 
 #include "proto/organ.pb.h"
+#include "server/organs/organ/bad_file.h"
 #include "server/organs/organ/packed_file.h"
 
 namespace trocar::organ {
 namespace {
 
 // An organ with directions of fibres is of a version that programs which would ignore them refuse.
-constexpr std::uint32_t kVersion = 3, kVersionWithoutFibres = 2;
-constexpr PackedKind kKind{"TROCARO1",
-                           "an .organ file",
-                           "make one with trocar-organ import",
-                           "make or import it again",
-                           kVersionWithoutFibres,
-                           kVersion};
+constexpr std::uint32_t kOrganVersion = 3, kVersionWithoutFibres = 2;
+constexpr PackedKind kOrganKind{"TROCARO1",
+                                "an .organ file",
+                                "make one with trocar-organ import",
+                                "make or import it again",
+                                kVersionWithoutFibres,
+                                kOrganVersion};
 
 std::uint32_t version_of(const Organ& organ) {
-  return organ.fibre_directions.empty() ? kVersionWithoutFibres : kVersion;
-}
-
-Error bad(const std::string& what) {
-  return {ErrorCode::BadFile, what};
+  return organ.fibre_directions.empty() ? kVersionWithoutFibres : kOrganVersion;
 }
 
 template <typename Field, std::size_t kNodes>
@@ -267,11 +264,11 @@ Result<Organ> decode_organ(BytesView bytes) {
 }
 
 Bytes pack_organ(const Organ& organ) {
-  return pack(kKind, version_of(organ), encode_organ(organ));
+  return pack(kOrganKind, version_of(organ), encode_organ(organ));
 }
 
 Result<Organ> unpack_organ(BytesView file) {
-  const auto unpacked = unpack(kKind, file);
+  const auto unpacked = unpack(kOrganKind, file);
   if (!unpacked) return unpacked.error();
   auto organ = decode_organ(unpacked->body);
   if (organ.ok() && version_of(*organ) != unpacked->version)

@@ -8,6 +8,7 @@
 #include <memory>
 
 #include "common/base/checksum.h"
+#include "server/organs/organ/bad_file.h"
 
 namespace trocar::organ {
 namespace {
@@ -15,10 +16,6 @@ namespace {
 constexpr std::size_t kHeaderBytes = 24;
 constexpr std::size_t kUnpackStepBytes = std::size_t{1} << 20;
 constexpr int kCompressionLevel = 9;
-
-Error bad(const std::string& what) {
-  return {ErrorCode::BadFile, what};
-}
 
 struct FreeZstd {
   void operator()(ZSTD_DCtx* context) const { ZSTD_freeDCtx(context); }

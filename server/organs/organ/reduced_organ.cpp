@@ -1,13 +1,10 @@
 #include "server/organs/organ/reduced_organ.h"
 
 #include "common/base/checksum.h"
+#include "server/organs/organ/bad_file.h"
 
 namespace trocar::organ {
 namespace {
-
-Error bad(const std::string& what) {
-  return {ErrorCode::BadFile, what};
-}
 
 template <typename T>
 void add(StateHasher& hasher, const std::vector<T>& values) {

@@ -11,9 +11,11 @@
 
 #include "common/base/asio.h"  // before Boost: see there
 
+#include <boost/asio/as_tuple.hpp>
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/steady_timer.hpp>
+#include <boost/asio/use_awaitable.hpp>
 #include <chrono>
 #include <deque>
 #include <functional>
@@ -23,6 +25,9 @@
 #include "server/session/net/connections.h"
 
 namespace trocar::net {
+
+// Coroutines get the error of what they await as a value, not as an exception.
+inline constexpr auto kNoThrow = asio::as_tuple(asio::use_awaitable);
 
 class Connection : public std::enable_shared_from_this<Connection> {
  public:

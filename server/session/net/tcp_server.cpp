@@ -16,7 +16,6 @@ namespace trocar::net {
 namespace {
 
 using asio::ip::tcp;
-constexpr auto kNoThrow = asio::as_tuple(asio::use_awaitable);
 // Deadlines are seconds; nobody notices a quarter of one.
 constexpr std::chrono::milliseconds kSweepPeriod{100};
 // After a failed accept (no file descriptors left): wait instead of spinning.

@@ -9,7 +9,6 @@ namespace {
 
 constexpr float kSlack_m = 0.005f;
 constexpr std::size_t kMaxPathSteps = 64;
-constexpr float kRounding_m = 1e-5f;
 constexpr std::uint32_t kNotNear = 0xffffffffu;
 
 // Returns the pose at part t of the way from a to b.

@@ -36,7 +36,6 @@ constexpr float kBeginsFacing = -0.1f, kStaysFacing = 0.2f;
 // The closest point lies along the normal, within so many gaps and a little.
 constexpr float kAsidePerGap = 1, kAside_m = 0.0005f;
 constexpr float kDeepest_m = 0.008f;
-constexpr float kRounding_m = 1e-5f;
 constexpr float kNoLimit_n = 1e6f;
 constexpr std::uint32_t kNoSite = 0xffffffffu;
 

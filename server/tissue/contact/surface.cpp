@@ -106,7 +106,6 @@ void Surface::follow(const topology::SurfaceEdit& edit, const world::World& worl
 
 void Surface::collect(const Box& box, const world::World& world, double travel_m,
                       std::vector<TriangleIndex>& found) {
-  constexpr float kRounding_m = 1e-5f;
   found.clear();
   for (auto& bundle : bundles_) {
     if (bundle.triangles == 0) continue;
