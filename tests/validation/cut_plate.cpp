@@ -117,9 +117,9 @@ void CutPlate::follow() {
     world_.rest_positions[node.value] = to_float(topology_.rest()[node.value]);
     world_.masses[node.value] = static_cast<float>(topology_.lumped_mass(node));
   }
-  solver_.follow_topology(topology_, world_);
+  solver_.update_topology(topology_, world_);
   topology_.clear_changes();
-  solver_.take_state(world_);
+  solver_.read_state(world_);
   list_nodes();
 }
 

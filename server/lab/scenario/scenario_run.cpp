@@ -272,7 +272,7 @@ void ScenarioRun::place_held(const dynamics::ExternalLoads& loads) {
   for (std::size_t i = 0; i < loads.held.size(); ++i)
     put(loads.held[i], kAllAxes, loads.held_displacements[i]);
   for (const auto& hold : loads.axis_holds) put(hold.node, hold.axes, hold.displacement);
-  context.solver.take_motion(world);
+  context.solver.read_motion(world);
   context.finder.surface_moved(largest_move_m);
 }
 
@@ -312,7 +312,7 @@ StepReport ScenarioRun::relax(const dynamics::ExternalLoads& loads) {
     const double energy_j = descends ? potential_energy_j(loads) : 0;
     if (!(energy_j <= last_energy_j + kEnergySlack * std::abs(last_energy_j))) {
       std::ranges::copy(before_stretch_, world.displacements.begin());
-      context.solver.take_motion(world);
+      context.solver.read_motion(world);
       how.over_relaxation *= kOverRelaxationStepBack;
       continue;
     }

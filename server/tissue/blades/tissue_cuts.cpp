@@ -100,7 +100,7 @@ void TissueCuts::record(cutting::CutEvents events) {
 
 // Brings the surface up to date with the topology and returns what has changed.
 topology::Edit TissueCuts::edit() {
-  return {topology_, new_nodes_, surface_.follow(topology_)};
+  return {topology_, new_nodes_, surface_.update(topology_)};
 }
 
 void TissueCuts::extend_layout(const topology::Edit& edit, const world::World& world) {

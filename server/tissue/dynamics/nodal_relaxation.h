@@ -30,7 +30,7 @@ class NodalRelaxation {
   // Returns the block of the node at a slot.
   std::uint32_t block_of(Slot slot) const { return block_of_[slot]; }
   static constexpr std::uint32_t kNoBlock = 0xffffffffu;
-  // Blocks to be begun, after follow().
+  // Blocks to be begun, after update().
   std::span<const std::uint32_t> stale() const { return stale_; }
   void clear_stale() { stale_.clear(); }
 

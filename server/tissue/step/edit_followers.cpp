@@ -18,7 +18,7 @@ void hand_out(const topology::Edit& edit, const world::World& world, StepContext
   context.active.forget();
   context.finder.follow(edit.surface, world);
   context.self_finder.follow(edit.surface, world);
-  context.solver.follow_topology(edit.topology, world);  // and with it its far field
+  context.solver.update_topology(edit.topology, world);  // and with it its far field
 }
 
 void hand_out(const topology::Edit& edit, State& state, StepContext& context) {

@@ -109,12 +109,12 @@ StepContext::StepContext(const Scene& s, unsigned workers, const world::World& u
   for (const auto& events : state.cuts.history()) {
     const auto applied = cutting::apply(events, topology, places);
     TROCAR_ASSERT(applied.ok());
-    hand_out({topology, {}, surface.follow(topology)}, state.world, *this);
+    hand_out({topology, {}, surface.update(topology)}, state.world, *this);
     topology.clear_changes();
   }
   // From now on everybody looks at the state's own topology.
   if (!state.cuts.history().empty()) hand_out({state.cuts.topology(), {}, {}}, state.world, *this);
-  solver.take_state(state.world);
+  solver.read_state(state.world);
 }
 
 namespace {

@@ -180,7 +180,7 @@ void solve(State& state, StepContext& context) {
       solve_steps(nodes, settings_of(context, modelled ? modelled->far : nullptr), state, context);
   const auto settled =
       context.active.settle(context.queue, context.solver.residuals_n(), state.world);
-  context.solver.take_state(state.world, settled);
+  context.solver.read_state(state.world, settled);
   largest_move += settled.empty() ? 0 : propagation::kQuietDisplacementMetres;
   context.finder.surface_moved(largest_move);
   context.self_finder.surface_moved(largest_move);
