@@ -56,7 +56,7 @@ struct SourceTree {
 
   // Position in `layers`, or -1.
   int layer_of(const std::string& folder) const;
-  // What `folder` links, directly or through others.
+  // Returns what `folder` links, directly or through others.
   std::set<std::string> closure_of(const std::string& folder) const;
   bool has_file(const std::string& path) const;
 };

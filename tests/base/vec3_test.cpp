@@ -46,7 +46,7 @@ TEST(SolvePositiveDefinite, InvertsTheProduct) {
 }
 
 TEST(SolvePositiveDefinite, TheSolutionDescends) {
-  // What block descent needs: a step along A^-1 f never points against f.
+  // Block descent needs this: a step along A^-1 f never points against f.
   std::mt19937 random(6);
   std::normal_distribution<float> normal;
   for (int i = 0; i < 5000; ++i) {

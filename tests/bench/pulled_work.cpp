@@ -36,7 +36,7 @@ double converged_mm(const PulledBox& box, Law law) {
   return known[key] = u * 1e3;
 }
 
-// What a pulled box's solver did by 0.1 s, filled while it is stepped.
+// Records the displacement of a pulled box's face at 0.1 s, while its solver is stepped.
 struct Pull {
   std::uint64_t step = 0;
   std::optional<double> u_mm;

@@ -87,7 +87,7 @@ std::string fastest_wall_words(const Row& row) {
   return row.wall_us ? milliseconds(*row.wall_p10_us) : "";
 }
 
-// Of a force, mean and largest; the largest may be 5/3 of what the mean may be.
+// Returns whether the mean error keeps its limit. The largest error of a force may be 5/3 of that.
 bool is_accurate(const Row& row) {
   if (!row.error_limit_percent) return true;
   const auto largest = row.more.find("force_error_max_percent");

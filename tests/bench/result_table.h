@@ -63,7 +63,7 @@ class ResultTable {
   const std::vector<Row>& rows() const { return rows_; }
 
   std::string markdown(const Machine& machine) const;
-  // bench.json, bench.csv, bench.md and plots/*.dat in an existing folder.
+  // Writes bench.json, bench.csv, bench.md and plots/*.dat into an existing folder.
   Status write(const std::filesystem::path& folder, const Machine& machine) const;
 
  private:

@@ -171,7 +171,7 @@ TEST_F(PictureTest, TheGhostIsANetOverTheTissueOfTheColourOfItsDistance) {
   const Overlays nothing{.regions = false, .arrows = false},
       ghost{.regions = false, .arrows = false, .ghost = true};
   const render::Image plain = picture_of(nothing);
-  // So far off everywhere, with every frame.
+  // Draws the ghost with each vertex this far off along x.
   const auto off_by = [&](std::int32_t quanta, const char* name) {
     ghost_quanta_ = quanta;
     return picture_of(ghost, {}, name);

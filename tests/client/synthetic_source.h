@@ -27,7 +27,7 @@ class SyntheticSource final : public replica::SessionSource {
   void queue_frame(bool as_keyframe = false);
   // Begins an epoch: the change goes out now, as the server sends it, its first frame is the next.
   void queue_change(const wire::SurfaceChange& change);
-  // What a server gives who has lost count: topology now, keyframe next.
+  // Queues what a server sends to a client that has lost count: the topology now, a keyframe next.
   void queue_topology();
   const wire::SurfaceLayout& layout() const { return layout_; }
   void queue(proto::Envelope message) { queued_.push_back(std::move(message)); }

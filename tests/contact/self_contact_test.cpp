@@ -1,4 +1,4 @@
-// Tissue against tissue of the same organ.
+// Tests contact between parts of the same organ.
 
 #include "server/tissue/contact/self_contact.h"
 
@@ -261,7 +261,7 @@ class Squeezed {
         return reaction_on(contacts, tool, simulation->state().world);
     return {};
   }
-  // Of the lower flap on the upper one.
+  // Returns the vertical force of the lower flap on the upper one, N.
   double force_between() const {
     double sum = 0;
     for (const auto& point : simulation->context().contacts.self_points()) {

@@ -12,7 +12,7 @@
 namespace trocar::contact::testing {
 namespace {
 
-// 40 x 24 x 24 mm, held at the bottom; stiff contact beside soft tissue.
+// Returns a block of 40 x 24 x 24 mm, held at the bottom, whose tissue is soft beside the contact.
 organ::Organ cube() {
   return block(11, 7, 7, 0.004, [](organ::Organ& o) {
     o.material.young_modulus_pa = 6000;
@@ -243,7 +243,7 @@ class Piece : public ::testing::Test {
     scene.put(0, upright({0, 0.3f, 0}), tool::Verb::None);
     scene.tick();
   }
-  // Of nodes that were above the cut.
+  // Returns the mean displacement of the nodes above the cut, m.
   static Vec3d moved(const HandScene& scene) {
     Vec3d sum;
     double count = 0;
@@ -284,7 +284,7 @@ TEST_F(Piece, CarriesAPlateWhereverItHasBeenPushed) {
   }
   std::printf("moved %.3f %.3f mm, deepest %.4f mm\n", 1e3 * moved(scene).x, 1e3 * moved(scene).y,
               1e3 * deepest_overlap(scene.simulation));
-  // And a plate from above: shaft along x, width along z.
+  // Then a plate presses from above, its shaft along x and its width along z.
   for (int i = 0; i <= 400; ++i) {
     const float y =
         0.012f + kPlate.radius_m + 0.0005f - 1e-5f * static_cast<float>(std::min(i, 300));

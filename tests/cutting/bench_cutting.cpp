@@ -1,6 +1,7 @@
-// What one call of Cutter::cut() costs while blades go through an organ that sways, a call per tick
-// of 1 ms: median, 99th percentile and worst CPU time of all calls and of those that cut; how far
-// the cutting stays behind the blade; and a hash of all edits, without which the times say nothing.
+// Measures what a call of Cutter::cut() costs while blades go through an organ that sways, with a
+// call per tick of 1 ms. It prints the median, the 99th percentile and the worst CPU time of all
+// calls and of those that cut, how far the cutting stays behind the blade, and a hash of all edits,
+// without which the times say nothing.
 
 #include <CLI/CLI.hpp>
 #include <algorithm>

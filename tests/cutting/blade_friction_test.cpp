@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kTau_pa = 1500, kNear_m = 0.0005;
 
-// 4 cm wide, from -2 to 2 cm.
+// Returns a cube 4 cm wide, from -2 to 2 cm along each axis.
 organ::Organ box(double jitter = 0.2) {
   auto organ = box_organ(4, 4, 4, 0.01, jitter);
   organ.material.blade_friction_pa = kTau_pa;
@@ -84,7 +84,8 @@ TEST(BladeFriction, IsNothingInAWoundThatGapes) {
   EXPECT_EQ(friction(organ, from, to), 0);
 }
 
-// What is near is looked for, not remembered: the same with any count of travel.
+// The cutter looks for tissue near the blade in each call and remembers none, so the friction is
+// the same with any count of travel.
 TEST(BladeFriction, RefusesWhatIsNoBladeAndForgetsNothing) {
   CutOrgan organ(box());
   EXPECT_EQ(friction(organ, {0, 0, 0}, {0, 0, 0}), 0);

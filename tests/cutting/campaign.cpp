@@ -14,7 +14,7 @@ namespace {
 constexpr const char* kNames[kCutKinds] = {"knife",   "crossing", "two blades",
                                            "aligned", "straight", "curved",
                                            "sawing",  "tiny",     "through"};
-// Of a hundred cuts.
+// The shares are counts in a hundred cuts.
 constexpr std::uint32_t kShares[kCutKinds] = {30, 15, 10, 10, 10, 10, 5, 5, 5};
 constexpr StrokeKind kStrokes[kCutKinds] = {
     StrokeKind::Knife,   StrokeKind::Crossing, StrokeKind::Knife,

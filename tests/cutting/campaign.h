@@ -24,7 +24,7 @@ inline constexpr std::size_t kCutKinds = 9;
 const char* name_of(CutKind kind);
 std::optional<CutKind> cut_kind_of(const std::string& name);
 
-// Of one cut; sizes of the organ are those after it.
+// A record describes one cut; sizes of the organ are those after it.
 struct CutRecord {
   std::string organ;
   std::uint64_t series = 0;

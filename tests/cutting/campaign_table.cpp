@@ -18,7 +18,7 @@ constexpr double kWide_h = 3;  // of the swept area over its perimeter
 constexpr std::uint32_t kSingleStrokes = 10;
 constexpr double kMostWaiting = 0.01;
 
-// visit(name, value) of every column.
+// Calls visit(name, value) for every column.
 template <typename Record, typename Visit>
 void for_each_column(Record& r, Visit&& visit) {
   visit("organ", r.organ);

@@ -18,7 +18,7 @@ organ::Organ organ_of(mesh::TetMesh mesh) {
   return organ;
 }
 
-// Of the cell at the origin; the odd ones are mirrored.
+// These are the five tets of the cell at the origin; every second cell is mirrored.
 constexpr int kEven[5][4] = {{0, 1, 2, 4}, {3, 2, 1, 7}, {5, 4, 7, 1}, {6, 7, 4, 2}, {1, 2, 4, 7}};
 
 }  // namespace

@@ -31,7 +31,7 @@ std::vector<Vec3f> deformed(const topology::Topology& topology) {
   return u;
 }
 
-// As if parts had the direction of their own nodes.
+// Returns the energy that would result if parts had the fibre direction of their own nodes.
 double energy_without_inheritance(const CutOrgan& box) {
   topology::Topology topology(box.organ());
   Places places(topology);
@@ -105,7 +105,7 @@ TEST(Fibres, PartsKeepTheDirectionOfTheWhole) {
     EXPECT_GT(length(topology.fibre_axis(NodeIndex(n))), 0.5);
 }
 
-// Where all is one direction, an edited organ cannot be told from one whose material says so.
+// A field of one direction gives the same energy after a cut as a material of that direction.
 TEST(Fibres, OfOneDirectionStayTheMaterialsThroughACut) {
   const Vec3d axis = normalized(Vec3d{0.2, 0.9, -0.4}, {});
   for (const auto law : {ElasticLaw::Springs, ElasticLaw::TensorMass, ElasticLaw::NeoHookean}) {

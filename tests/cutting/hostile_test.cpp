@@ -111,7 +111,7 @@ TEST(HostileEvents, AreRefused) {
   EXPECT_TRUE(refused({{Duplicate{a, b}}, {}}));
 }
 
-// As little as may be done in a call, and more strokes than that: each gets on.
+// Each call may make a single edit, and there are two strokes: both still come to their end.
 TEST(HostileBlade, StrokesEndHoweverFewEditsACallMayMake) {
   Settings settings;
   settings.edits_per_call = 1;

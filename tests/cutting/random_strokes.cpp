@@ -239,7 +239,7 @@ double InsideTest::perimeter(const Path& path, double spacing) const {
       border += length_inside(path[s - 1].back(), edge.back(), spacing);
     }
     for (std::size_t i = 0; i + 1 < edge.size(); ++i) {
-      // As many for every edge of the path.
+      // The number of samples is the same for every edge of the path.
       const double segment = length(path[0][i + 1] - path[0][i]);
       const int n = std::max(1, static_cast<int>(std::ceil(segment / spacing)));
       for (int k = 0; k < n; ++k) {

@@ -18,10 +18,10 @@ class RandomStrokes {
   // Crossing: as the last Knife or Crossing, but across it; the others somewhere inside.
   Path next(StrokeKind kind);
   StrokeKind any_kind();  // one of the first five
-  // What the last path sweeps, once: a saw goes to and fro.
+  // Returns what the last path sweeps, each place once: a saw goes to and fro.
   const Path& swept_once() const { return swept_once_; }
   trocar::testing::Random& random() { return random_; }
-  // Of the last path of kind Through.
+  // The plane is that of the last path of kind Through.
   Vec3d plane_point() const { return plane_point_; }
   Vec3d plane_normal() const { return plane_normal_; }
 

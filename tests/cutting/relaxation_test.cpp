@@ -22,9 +22,9 @@ Vec3f displacement_at(const Vec3d& p) {
   return to_float(Vec3d{3 * p.y * p.x, -2 * p.z * p.z + 0.1 * p.x, 4 * p.x * p.y});
 }
 
-// What forces of tissue are at displacements, per node, after so many steps there that advance all
-// tets, or those alone whose turn it is.
+// A step advances all tets, or only those whose turn it is.
 enum class Advance { All, InTurns };
+// Returns the energy's gradient on each node at displacements `u`, after so many steps there.
 std::vector<Vec3d> gradients(dynamics::Tissue& tissue, const std::vector<Vec3f>& u,
                              world::RelaxationState& state, int steps,
                              Advance which = Advance::All) {
@@ -69,7 +69,7 @@ TEST(CutRelaxation, PartsRememberWhatTheWholeDid) {
   std::vector<Vec3f> u;
   for (const auto& p : topology.rest()) u.push_back(displacement_at(p));
   gradients(tissue, u, state, 400);
-  // So that parts come to be among tets of another age.
+  // These steps make the tets differ in age, so that parts lie among tets of another age.
   const auto before = gradients(tissue, u, state, 5, Advance::InTurns);
   auto later_state = state;
   const auto later = gradients(tissue, u, later_state, 1);

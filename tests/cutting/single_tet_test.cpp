@@ -23,7 +23,7 @@ std::size_t tets(const CutOrgan& organ) {
   return find_pieces(organ.topology()).piece_of_tet.size();
 }
 
-// A wide sweep in the plane through `at` with edge along `edge`.
+// Returns a wide sweep through `at`: the blade's edge lies along `edge` and moves along `motion`.
 Path plane_sweep(const Vec3d& at, const Vec3d& edge, const Vec3d& motion, double step_m = 0.01) {
   const Vec3d e = normalized(edge, {}) * 0.3, m = normalized(motion, {}) * 0.3;
   return straight_path({at - e - m, at + e - m}, {at - e + m, at + e + m}, step_m);

@@ -129,7 +129,7 @@ TEST(StraightCut, TwoBladesMeetInTheMiddle) {
   EXPECT_EQ(find_pieces(box.topology()).count, 2u);
 }
 
-// What counts is where the tissue is now: a sheared box, cut straight, is cut askew at rest.
+// A blade cuts tissue where it is now: a straight cut through a sheared box is oblique at rest.
 TEST(StraightCut, MeetsTissueWhereItIs) {
   CutOrgan box(box_organ(8, 8, 8, 0.01));
   for (const auto& p : box.organ().mesh.rest_positions)
@@ -202,7 +202,7 @@ TEST(StraightCut, WorkIsBoundedAndNothingIsLost) {
   EXPECT_EQ(find_pieces(box.topology()).count, 2u);
 }
 
-// What a removed corner leaves unused is used again, by the copy alike.
+// The cutter and a copy of the topology both reuse the places of a removed corner first.
 TEST(StraightCut, UsesUnusedPlacesFirst) {
   const auto organ = box_organ(4, 4, 4, 0.01);
   topology::Topology topology(organ), copy(organ);

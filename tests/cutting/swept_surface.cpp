@@ -7,7 +7,7 @@ namespace trocar::cutting::testing {
 namespace {
 
 constexpr std::uint8_t kEdges[6][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
-// Of the edges at each corner.
+// Each mask holds the edges at one corner: bit i stands for kEdges[i].
 constexpr std::uint8_t kAtCorner[4] = {0b000111, 0b011001, 0b101010, 0b110100};
 
 }  // namespace

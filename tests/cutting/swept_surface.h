@@ -26,7 +26,7 @@ class SweptSurface {
   Box box_;
 };
 
-// Of a tet parted by its crossed edges.
+// The crossed edges part a tet in one of these ways; Front: the cut ends inside the tet.
 enum class Parting : std::uint8_t { None, Front, OneAndThree, TwoAndTwo };
 Parting parting_of(std::uint8_t crossed_edges);
 

@@ -31,7 +31,7 @@ class TornOrgan {
     for (const auto& p : organ_.topology().rest())
       organ_.displacements.push_back(to_float(field(p)));
   }
-  // What tears now; opened by the next tick.
+  // Returns the faces that tear now.
   std::span<const TetFace> find() {
     nodes_.clear();
     for (std::uint32_t n = 0; n < organ_.topology().node_count(); ++n)

@@ -405,7 +405,7 @@ TEST(FibreDirections, OfOneDirectionAreTheMaterials) {
 
 // --- Laws of Psi ---
 
-// Dogan 2011 table 1 over C10.
+// These are the coefficients of Dogan 2011, table 1, divided by C10.
 constexpr ReducedPolynomialLaw kLiverLaw{
     {1.7079f / 0.8838f, 1.4499f / 0.8838f, 2.6918f / 0.8838f, 1.7575f / 0.8838f}};
 

@@ -19,7 +19,7 @@ const material::HyperelasticMaterial& liver() {
   return *material::find_measured_material("human_liver_nava2008");
 }
 
-// As stiff at first, stiffening as Fung's laws do.
+// Returns a material that is as stiff as the liver at first and stiffens as Fung's laws do.
 material::HyperelasticMaterial exponential() {
   auto material = liver();
   material.name = "exponential";
@@ -93,7 +93,8 @@ class Specimen {
     return force;
   }
 
-  // Of stress that has relaxed, per node; so many of a group's lanes taken at a time.
+  // Returns the force of relaxed stress on each node. `lanes` is the mask of the lanes that one
+  // call refreshes; it is shifted over all lanes of a group.
   std::vector<Vec3f> forces(std::uint8_t lanes) {
     const auto& groups = tissue_.groups();
     for (Group g = 0; g < groups.group_count(); ++g)
@@ -103,7 +104,7 @@ class Specimen {
     return {state_.forces().begin(), state_.forces().end()};
   }
   RelaxationFigures figures() const { return *tissue_.relaxation_figures(); }
-  // Over that at rest.
+  // Returns the energy above that at rest.
   double energy_j() const {
     std::vector<Vec3f> u(organ_.mesh.node_count());
     const double at_rest = tissue_.energy_j(u);

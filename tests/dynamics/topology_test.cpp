@@ -129,7 +129,8 @@ struct NodeResult {
   bool operator==(const NodeResult& b) const { return std::memcmp(this, &b, sizeof b) == 0; }
 };
 
-// Of every node, by place; and displacements after sweeps over all colours, as a solver does them.
+// Holds the result of each node, by index, and the displacements after sweeps over all colours, as
+// a solver does them.
 struct Evaluated {
   std::vector<NodeResult> nodes;
   double energy = 0;
@@ -351,7 +352,7 @@ TEST(FollowTopology, FillAndMemoryStayBoundedOverThousandsOfEdits) {
       for (std::uint32_t n = 0; n < topology.node_count(); ++n)
         nodes += topology.has_node(NodeIndex(n));
       for (Group g = 0; g < groups.group_count(); ++g) in_use += groups.colour_of(g) != kNoColour;
-      // Vacant: a group of each colour and a quarter.
+      // At most a quarter of the lanes may be vacant, and two groups of each colour besides.
       ASSERT_LE(in_use * 3 / 4, nodes / kLanes + 2 * groups.colour_count());
     }
     const Tissue fresh(topology);

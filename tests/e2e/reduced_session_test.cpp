@@ -40,7 +40,7 @@ fs::path write_press_script(const fs::path& folder) {
   Vec3d size;
   for (const auto& x : organ.mesh.rest_positions)
     size = {std::max(size.x, x.x), std::max(size.y, x.y), std::max(size.z, x.z)};
-  // Of the side on which it is.
+  // The press comes from the side on which the centre lies.
   if (std::abs(centre.y) > size.y - 1e-6)
     out.y = centre.y > 0 ? 1 : -1;
   else if (std::abs(centre.x) > size.x - 1e-6)

@@ -107,8 +107,8 @@ double bracket_yy(double l, double b) {
   return 2 * psi.first - 2 * liver().coefficients_pa[0] * l;
 }
 
-// The hereditary integral by the trapezoidal rule over the whole past, once per instant: nothing of
-// the recurrence.
+// Sums the hereditary integral by the trapezoidal rule over the whole past at each instant. It does
+// not use the recurrence that is tested.
 class Volterra {
  public:
   explicit Volterra(double dt) : dt_(dt) {}
@@ -119,7 +119,7 @@ class Volterra {
     for (std::size_t i = 0; i + 1 < past_.size(); ++i)
       offset_ += mean(t - static_cast<double>(i) * dt_) * (past_[i + 1] - past_[i]);
   }
-  // One step after the last value, with `value` there.
+  // Returns the integral one step after the last value, if it is `value` there.
   double now(double value) const { return offset_ + mean(dt_) * (value - past_.back()); }
 
  private:

@@ -4,16 +4,19 @@
 #include "server/lab/finite_elements/scenario_solve.h"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <cmath>
-#include <filesystem>
 #include <fstream>
 
 #include "server/lab/scenario/scenario_run.h"
+#include "tests/scenario/scenario_texts.h"
+#include "tests/support/files.h"
 
 namespace trocar::finite_elements {
 namespace {
+
+using scenario::expect_resolved;
+using trocar::testing::TemporaryFolder;
 
 // A column of 20 x 60 x 20 mm that stands on its lowest layer.
 const std::string kColumn = R"([organ]
@@ -50,24 +53,16 @@ set = "fixed"
 quantity = "reaction"
 )";
 
-scenario::ResolvedScenario resolved(const std::string& text) {
-  auto parsed = scenario::parse_scenario_text(text, "test.toml");
-  EXPECT_TRUE(parsed.ok()) << (parsed.ok() ? "" : parsed.error().message);
-  auto resolved = scenario::resolve(std::move(*parsed));
-  EXPECT_TRUE(resolved.ok()) << (resolved.ok() ? "" : resolved.error().message);
-  return std::move(*resolved);
-}
-
 std::unique_ptr<ScenarioSolve> solve_of(const std::string& text,
                                         const ScenarioSettings& settings = {}) {
-  auto solve = ScenarioSolve::create(resolved(text), settings);
+  auto solve = ScenarioSolve::create(expect_resolved(text), settings);
   EXPECT_TRUE(solve.ok()) << (solve.ok() ? "" : solve.error().message);
   return std::move(*solve);
 }
 
 void expect_same(const std::string& text) {
   const auto ours = solve_of(text, {.order = ElementOrder::Linear});
-  scenario::ScenarioRun live(resolved(text), scenario::Solver::Full);
+  scenario::ScenarioRun live(expect_resolved(text), scenario::Solver::Full);
   while (!ours->is_finished()) {
     EXPECT_TRUE(ours->step().is_converged);
     EXPECT_TRUE(live.step().is_converged);
@@ -116,20 +111,19 @@ TEST(ScenarioSolve, MeetsTheLiveSolverInMeasuredTissueThatHasNoTimeToRelax) {
 }
 
 TEST(ScenarioSolve, MeetsTheLiveSolverUnderAnExponentialLaw) {
-  const auto file = std::filesystem::temp_directory_path() /
-                    ("trocar_exponential_" + std::to_string(::getpid()) + ".toml");
+  const TemporaryFolder folder;
+  const auto file = folder.file("exponential.toml");
   std::ofstream(file) << "[hyperelastic]\nname = \"x\"\nc_i0_pa = [800]\nexponent = 3\n"
                          "bulk_modulus_pa = 8000\n";
   std::string text = liver_column();
   const std::string name = "human_liver_nava2008";
-  text.replace(text.find(name), name.size(), file.string());
+  text.replace(text.find(name), name.size(), file);
   expect_same(text + kStatic +
               "[[displace]]\nset = \"top\"\n[[displace.key]]\ntime_s = 0\ndisplacement_mm = [0, 0, "
               "0]\n[[displace.key]]\ntime_s = 1\ndisplacement_mm = [8, -6, 3]\n");
-  std::filesystem::remove(file);
 }
 
-// Where the live solver begins what has hung for long is where this one finds it.
+// The live solver lets relaxed tissue start from the equilibrium that the off-line solver finds.
 TEST(ScenarioSolve, TissueThatRelaxesHangsWhereTheLiveSolverLetsItStart) {
   const std::string load =
       "[gravity]\nm_s2 = [0, -0.5, 0]\n[[probe]]\nset = \"top\"\nquantity = "
@@ -140,7 +134,8 @@ TEST(ScenarioSolve, TissueThatRelaxesHangsWhereTheLiveSolverLetsItStart) {
   const std::string start =
       "[run]\nseconds = 0.01\nstart = \"equilibrium\"\n"
       "tolerance_n = 3e-7\nmax_sweeps = 50000\n";
-  scenario::ScenarioRun live(resolved(liver_column() + load + start), scenario::Solver::Full);
+  scenario::ScenarioRun live(expect_resolved(liver_column() + load + start),
+                             scenario::Solver::Full);
   live.step();
   const Vec3d a = ours->probe(0), b = live.probe(0);
   EXPECT_LT(a.y, -1e-5);
@@ -157,7 +152,7 @@ TEST(ScenarioSolve, MeasuredLiverRelaxesAsInTheLiveSolver) {
       "[[displace]]\nset = \"top\"\n[[displace.key]]\ntime_s = 0\ndisplacement_mm = [0, 0, 0]\n"
       "[[displace.key]]\ntime_s = 0.05\ndisplacement_mm = [6, 0, 0]\n";
   const auto ours = solve_of(text, {.order = ElementOrder::Linear});
-  scenario::ScenarioRun live(resolved(text), scenario::Solver::Full);
+  scenario::ScenarioRun live(expect_resolved(text), scenario::Solver::Full);
   double early = 0;
   for (int i = 0; !ours->is_finished(); ++i) {
     ASSERT_TRUE(ours->step().is_converged);
@@ -170,8 +165,8 @@ TEST(ScenarioSolve, MeasuredLiverRelaxesAsInTheLiveSolver) {
   EXPECT_LT(length(a - b), 0.01 * length(a));
 }
 
-// What holds the column carries its load, whatever the elements. (Under the whole of the earth's
-// gravity so soft a column falls over.)
+// The reaction of the fixed nodes balances the load, whatever the elements. (Under all of the
+// earth's gravity a column as soft as this falls over.)
 TEST(ScenarioSolve, ReactionsBalanceLoads) {
   const std::string text = kColumn + kStatic +
                            "[gravity]\nm_s2 = [0, -2, 0]\n[[force]]\nset = \"top\"\n"
@@ -206,7 +201,8 @@ TEST(ScenarioSolve, DynamicRunsGoOnFromTheirState) {
                            "\"velocity\"\nrate_hz = 500\n[[force]]\nset = \"top\"\n[[force.key]]\n"
                            "time_s = 0\nforce_n = [0.1, 0, 0]\n";
   const ScenarioSettings settings{.order = ElementOrder::Linear, .dt_s = 2e-3};
-  const auto path = std::filesystem::temp_directory_path() / "trocar-scenario-solve-test.state";
+  const TemporaryFolder folder;
+  const auto path = folder.file("a.state");
   const auto whole = solve_of(text, settings), first = solve_of(text, settings),
              second = solve_of(text, settings);
   EXPECT_EQ(whole->step_count(), 10u);
@@ -219,7 +215,6 @@ TEST(ScenarioSolve, DynamicRunsGoOnFromTheirState) {
   EXPECT_EQ(whole->probe(0), second->probe(0));
   const auto other = solve_of(text, {.order = ElementOrder::Quadratic, .dt_s = 2e-3});
   EXPECT_FALSE(other->resume(path).ok());
-  std::filesystem::remove(path);
 }
 
 // A sudden load on a column at rest sets it in motion, as it does in the live solver with steps so
@@ -233,7 +228,7 @@ TEST(ScenarioSolve, MotionStartsAtRestOrInEquilibrium) {
   const ScenarioSettings settings{.order = ElementOrder::Linear, .dt_s = 1e-4};
   const auto ours = solve_of(text(""), settings);
   EXPECT_EQ(length(ours->probe(0)), 0) << "before the first step";
-  scenario::ScenarioRun live(resolved(text("")), scenario::Solver::Full);
+  scenario::ScenarioRun live(expect_resolved(text("")), scenario::Solver::Full);
   while (!live.is_finished()) {
     for (int i = 0; i < 10; ++i) ASSERT_TRUE(ours->step().is_converged);
     live.step();
@@ -258,7 +253,8 @@ std::string swayed(const std::string& force, const std::string& more_run = "") {
 TEST(ScenarioSolve, AStateOfAnotherRunIsRefused) {
   const std::string text = swayed("[0.1, 0, 0]");
   const ScenarioSettings settings{.order = ElementOrder::Linear};
-  const auto path = std::filesystem::temp_directory_path() / "trocar-another-run-test.state";
+  const TemporaryFolder folder;
+  const auto path = folder.file("a.state");
   const auto first = solve_of(text, settings);
   for (int i = 0; i < 10; ++i) ASSERT_TRUE(first->step().is_converged);
   ASSERT_TRUE(first->save(path).ok());
@@ -276,7 +272,6 @@ TEST(ScenarioSolve, AStateOfAnotherRunIsRefused) {
   refused(text + "[gravity]\nm_s2 = [0, -1, 0]\n", settings, "other loads");
   refused(swayed("[0.1, 0, 0]", "start = \"equilibrium\"\n"), settings, "another start");
   refused(swayed("[0.1, 0, 0]", "mode = \"static\"\nload_steps = 20\n"), settings, "other loads");
-  std::filesystem::remove(path);
 }
 
 TEST(ScenarioSolve, AStaticStateIsOfOneResponse) {
@@ -285,7 +280,8 @@ TEST(ScenarioSolve, AStaticStateIsOfOneResponse) {
       "[[displace]]\nset = \"top\"\n[[displace.key]]\ntime_s = 0\ndisplacement_mm = [0, 0, 0]\n"
       "[[displace.key]]\ntime_s = 1\ndisplacement_mm = [2, 0, 0]\n";
   ScenarioSettings settings{.order = ElementOrder::Linear};
-  const auto path = std::filesystem::temp_directory_path() / "trocar-one-response-test.state";
+  const TemporaryFolder folder;
+  const auto path = folder.file("a.state");
   const auto first = solve_of(text, settings), second = solve_of(text, settings);
   ASSERT_TRUE(first->step().is_converged);
   ASSERT_TRUE(first->save(path).ok());
@@ -295,12 +291,11 @@ TEST(ScenarioSolve, AStaticStateIsOfOneResponse) {
   const auto status = solve_of(text, settings)->resume(path);
   ASSERT_FALSE(status.ok());
   EXPECT_NE(status.error().message.find("--response"), std::string::npos);
-  std::filesystem::remove(path);
 }
 
 TEST(ScenarioSolve, StepsThatDoNotFillTheRunAreRefused) {
   const auto steps = [](double dt_s) {
-    const auto solve = ScenarioSolve::create(resolved(swayed("[0, 0, 0]")),
+    const auto solve = ScenarioSolve::create(expect_resolved(swayed("[0, 0, 0]")),
                                              {.order = ElementOrder::Linear, .dt_s = dt_s});
     if (solve.ok()) return static_cast<int>((*solve)->step_count());
     EXPECT_EQ(solve.error().code, ErrorCode::Usage);
@@ -321,7 +316,7 @@ TEST(ScenarioSolve, StepsThatDoNotFillTheRunAreRefused) {
 TEST(ScenarioSolve, RefusesWhatItCannotDo) {
   const auto refused = [](const std::string& text, const std::string& says,
                           const ScenarioSettings& settings = {}) {
-    const auto solve = ScenarioSolve::create(resolved(text), settings);
+    const auto solve = ScenarioSolve::create(expect_resolved(text), settings);
     ASSERT_FALSE(solve.ok()) << says;
     EXPECT_NE(solve.error().message.find(says), std::string::npos) << solve.error().message;
   };

@@ -6,13 +6,17 @@
 
 #include <cmath>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 
 #include "common/base/checksum.h"
 #include "tests/finite_elements/specimens.h"
+#include "tests/support/files.h"
 
 namespace trocar::finite_elements::testing {
 namespace {
+
+using trocar::testing::TemporaryFolder;
 
 Specimen pulled_block(double pull_pa = 300) {
   Specimen block({2, 2, 2}, 0.005, ElementOrder::Quadratic, liver());
@@ -65,7 +69,7 @@ TEST(StateFile, RefusesWhatIsCutShortChangedOrOfAnotherProblem) {
   EXPECT_NE(refused.error().message.find("another organ, material"), std::string::npos);
 }
 
-// What a program other than this one could have written: the checksum is right.
+// Another program could have written these states: one field is wrong, but the checksum is right.
 TEST(StateFile, RefusesEachFieldThatIsWrong) {
   const auto block = pulled_block();
   Solver solver(block.problem());
@@ -102,14 +106,15 @@ TEST(StateFile, RefusesEachFieldThatIsWrong) {
 
 // A file that claims to be large is refused by its head and its length, before it is read.
 TEST(StateFile, IsNotReadBeyondItsHeadIfItsLengthIsWrong) {
-  const auto path = std::filesystem::temp_directory_path() / "trocar-state-length-test.state";
+  const TemporaryFolder folder;
+  const auto path = folder.file("a.state");
   const auto block = pulled_block();
   Solver solver(block.problem());
   ASSERT_TRUE(write_state(path, solver).ok());
   const auto size = std::filesystem::file_size(path);
   const auto says = [&] {
     const auto state = read_state(path, solver.problem());
-    return state.ok() ? "" : state.error().message.substr(path.string().size());
+    return state.ok() ? "" : state.error().message.substr(path.size());
   };
   std::filesystem::resize_file(path, std::uintmax_t{1} << 40);  // sparse
   EXPECT_EQ(says(), ": is damaged, its length does not fit: start again without it");
@@ -121,11 +126,11 @@ TEST(StateFile, IsNotReadBeyondItsHeadIfItsLengthIsWrong) {
   EXPECT_EQ(says(), ": is no state of the off-line solver");
   std::ofstream(path) << "";
   EXPECT_EQ(says(), ": is no state of the off-line solver");
-  std::filesystem::remove(path);
 }
 
 TEST(StateFile, IsWrittenAndReadByItsPath) {
-  const auto path = std::filesystem::temp_directory_path() / "trocar-state-file-test.state";
+  const TemporaryFolder folder;
+  const auto path = folder.file("a.state");
   const auto block = pulled_block();
   Solver solver(block.problem());
   advance(solver, block, 0, 1);

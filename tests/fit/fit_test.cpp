@@ -12,9 +12,12 @@
 
 #include "server/lab/fit/fit_model.h"
 #include "server/lab/scenario/scenario_run.h"
+#include "tests/scenario/scenario_texts.h"
 
 namespace trocar::fit {
 namespace {
+
+using scenario::expect_resolved;
 
 // A cube on a plate, pulled up by 4 mm.
 std::string pulled(const std::string& material, const std::string& run) {
@@ -49,18 +52,10 @@ std::string pulled_static(const std::string& material) {
   return text;
 }
 
-scenario::ResolvedScenario resolve(const std::string& text) {
-  auto parsed = scenario::parse_scenario_text(text, "test.toml");
-  EXPECT_TRUE(parsed.ok()) << (parsed.ok() ? "" : parsed.error().message);
-  if (!parsed) return {};
-  auto resolved = scenario::resolve(std::move(*parsed));
-  EXPECT_TRUE(resolved.ok()) << (resolved.ok() ? "" : resolved.error().message);
-  return resolved.ok() ? std::move(*resolved) : scenario::ResolvedScenario{};
-}
-
-// What a machine would record of a scenario: `noise` of the largest force, of no special form.
+// Returns what a testing machine would record of a scenario. The noise has a standard deviation of
+// `noise` times the largest force and repeats itself nowhere.
 MeasuredCurve recorded(const std::string& text, double noise) {
-  const auto resolved = resolve(text);
+  const auto resolved = expect_resolved(text);
   const auto curve = scenario::load_curves(resolved).at(0);
   scenario::ScenarioRun run(resolved, scenario::Solver::Full);
   MeasuredCurve measured;
@@ -86,7 +81,8 @@ MeasuredCurve recorded(const std::string& text, double noise) {
 
 TEST(Fit, FindsTheModulusFromANoisyCurve) {
   const auto measured = recorded(pulled_static("young_modulus_pa = 6000\n"), 0.02);
-  const auto fitted = fit(resolve(pulled_static("young_modulus_pa = 1000\n")), measured, {});
+  const auto fitted =
+      fit(expect_resolved(pulled_static("young_modulus_pa = 1000\n")), measured, {});
   ASSERT_TRUE(fitted.ok()) << fitted.error().message;
   ASSERT_EQ(fitted->parameters.size(), 1u);
   const auto& modulus = fitted->parameters[0];
@@ -106,7 +102,8 @@ TEST(Fit, TheOrderOfMeasurementsDoesNotMatterInAStaticRun) {
   auto measured = recorded(pulled_static("young_modulus_pa = 6000\n"), 0);
   std::ranges::reverse(measured.points);
   measured.points.push_back(measured.points.front());
-  const auto fitted = fit(resolve(pulled_static("young_modulus_pa = 4000\n")), measured, {});
+  const auto fitted =
+      fit(expect_resolved(pulled_static("young_modulus_pa = 4000\n")), measured, {});
   ASSERT_TRUE(fitted.ok()) << fitted.error().message;
   EXPECT_NEAR(fitted->parameters[0].value, 6000, 6);
   EXPECT_LT(fitted->rms_percent, 0.1);
@@ -121,7 +118,7 @@ TEST(Fit, FindsStiffnessAndDampingFromACurveInTime) {
   const auto measured = recorded(text("6000", "0.02"), 0.01);
   FitOptions options;
   options.parameters = {"young_modulus_pa", "spring_damping_time_s"};
-  const auto fitted = fit(resolve(text("3000", "0.005")), measured, options);
+  const auto fitted = fit(expect_resolved(text("3000", "0.005")), measured, options);
   ASSERT_TRUE(fitted.ok()) << fitted.error().message;
   EXPECT_NEAR(fitted->parameters[0].value, 6000, 0.03 * 6000);
   EXPECT_NEAR(fitted->parameters[1].value, 0.02, 0.05 * 0.02);
@@ -171,7 +168,7 @@ young_modulus_pa = )") +
   const auto measured = recorded(text("6000"), 0);
   EXPECT_GT(measured.points.back().force_n, 0.02) << "pressing is positive";
   EXPECT_NEAR(measured.points.back().displacement_m, 0.002, 1e-5);
-  const auto fitted = fit(resolve(text("4000")), measured, {});
+  const auto fitted = fit(expect_resolved(text("4000")), measured, {});
   ASSERT_TRUE(fitted.ok()) << fitted.error().message;
   EXPECT_NEAR(fitted->parameters[0].value, 6000, 0.02 * 6000);
 }
@@ -190,7 +187,7 @@ TEST(Fit, TheExampleFindsWhatItsCurveWasMadeWith) {
 }
 
 TEST(Fit, WhatCannotBeFittedIsSaid) {
-  const auto resolved = resolve(pulled_static("young_modulus_pa = 1000\n"));
+  const auto resolved = expect_resolved(pulled_static("young_modulus_pa = 1000\n"));
   const auto measured = recorded(pulled_static("young_modulus_pa = 6000\n"), 0);
   const auto message = [&](const MeasuredCurve& curve, std::vector<std::string> parameters) {
     FitOptions options;
@@ -212,9 +209,10 @@ TEST(Fit, WhatCannotBeFittedIsSaid) {
   const auto no_region = fit(resolved, measured, options);
   ASSERT_FALSE(no_region.ok());
   EXPECT_NE(no_region.error().message.find("no region \"tumour\""), std::string::npos);
-  const auto no_curve = fit(resolve("[organ]\nsource = \"block\"\nnodes = [2, 2, 2]\n[run]\n"
-                                    "seconds = 1\n"),
-                            measured, {});
+  const auto no_curve =
+      fit(expect_resolved("[organ]\nsource = \"block\"\nnodes = [2, 2, 2]\n[run]\n"
+                          "seconds = 1\n"),
+          measured, {});
   ASSERT_FALSE(no_curve.ok());
   EXPECT_NE(no_curve.error().message.find("test.toml: has no force-displacement curve"),
             std::string::npos);
@@ -223,8 +221,8 @@ TEST(Fit, WhatCannotBeFittedIsSaid) {
 // Constants of a measured material are not moduli that a scenario could have.
 TEST(Fit, AMeasuredMaterialIsLeftToItsOwnIdentification) {
   const MeasuredCurve measured{"measured.csv", false, {{0.001, 0.1, 0, 2}, {0.002, 0.2, 0, 3}}};
-  const auto resolved =
-      resolve(pulled("elastic_law = \"measured\"\nmeasured = \"human_liver_nava2008\"\n", ""));
+  const auto resolved = expect_resolved(
+      pulled("elastic_law = \"measured\"\nmeasured = \"human_liver_nava2008\"\n", ""));
   for (const std::vector<std::string>& keys :
        {std::vector<std::string>{}, {"young_modulus_pa"}, {"poisson_ratio"}}) {
     FitOptions options;
@@ -238,14 +236,14 @@ TEST(Fit, AMeasuredMaterialIsLeftToItsOwnIdentification) {
   }
 }
 
-// Tension and fibre tension shorten tissue by at most 0.9 together.
+// Tension and fibre tension may shorten tissue by at most 0.9 together.
 TEST(Fit, TensionStaysWhatAScenarioTakes) {
   const MeasuredCurve measured{"measured.csv", false, {{0.001, 0.1, 0, 2}, {0.002, 0.2, 0, 3}}};
   FitOptions options;
   options.parameters = {"tension"};
   const auto model = [&](const char* fibre_tension) {
     return FitModel::create(
-        resolve(pulled_static(
+        expect_resolved(pulled_static(
             std::string("young_modulus_pa = 6000\nfibre_direction = [0, 1, 0]\nfibre_tension = ") +
             fibre_tension + "\n")),
         measured, options);

@@ -134,7 +134,7 @@ TEST(Identify, IntervalsHoldTheTruthUnderTwoPercentNoise) {
   for (const auto& [name, width] : widths) EXPECT_LT(width, widest.at(name)) << name;
 }
 
-// Where nearly nothing carries the load in the end, the search stays at its limit.
+// Nearly all stress relaxes here: the weight is just below the limit of the search, 0.995.
 TEST(Identify, TissueThatRelaxesAlmostWhollyIsIdentified) {
   auto material = table_one();
   material.coefficients_pa = {883.8};
@@ -183,7 +183,7 @@ TEST(Identify, IntervalsOfFewRowsAreStudents) {
 }
 
 TEST(Identify, SaysWhatTheDataCannotTell) {
-  // Only the ramp: nothing of the slow relaxation.
+  // The data hold only the ramp, which says nothing of the slow relaxation.
   auto ramp = generated("tension", material::TestMode::Uniaxial, 1.15, 40);
   ramp.times_s.resize(41), ramp.stretches.resize(41), ramp.stresses_pa.resize(41);
   trocar::testing::Random random(3);

@@ -218,7 +218,7 @@ TEST_F(OrganProgram, SettleWritesAnOrganThatIsAtRestUnderItsGravity) {
 
   ASSERT_EQ(settle(settled, {"-o", at("again.organ")}), 0) << log();
   EXPECT_LT(number_after(log(), "nodes moved by "), 0.01) << "its own gravity, and it rests there";
-  // Where it comes to rest under more weight does not depend on where it starts.
+  // The state of rest under more weight does not depend on where the organ starts.
   ASSERT_EQ(settle(settled, {"--gravity", "0,-6,0", "-o", at("on.organ")}), 0) << log();
   ASSERT_EQ(settle(scenario_, {"--gravity", "0,-6,0", "-o", at("at_once.organ")}), 0) << log();
   EXPECT_GT(number_after(log(), "nodes moved by "), 2.9 * largest);

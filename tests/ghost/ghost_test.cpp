@@ -189,7 +189,7 @@ TEST(Ghost, ReportsWhileSomebodyWantsIt) {
   };
   give(4);  // nobody wants it
   ghost.set_wanted(true);
-  // As in real time: it asks for a snapshot, and a frame has it.
+  // Frames come as in real time until the ghost has its snapshot and computes a frame.
   std::shared_ptr<const GhostReport> report;
   for (int i = 0; i < 200 && ghost.counters().frames == 0; ++i) {
     give(1);

@@ -1,50 +1,26 @@
 #pragma once
 
-// Files for the journal tests: whole files as bytes, a small recording, a folder that is removed.
+// Files for the journal tests: a small recording, and what is read back of one.
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
-#include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <string>
 #include <vector>
 
 #include "common/journal/mcap_reader.h"
 #include "common/journal/mcap_writer.h"
+#include "tests/support/files.h"
 
 namespace trocar::journal::testing {
 
 inline constexpr std::uint64_t kStart = 1'700'000'000'000'000'000;  // ns
 inline constexpr std::uint64_t kMillisecond = 1'000'000;
 
-class TemporaryFolder {
- public:
-  TemporaryFolder() {
-    std::string name = (std::filesystem::temp_directory_path() / "trocar-journal-XXXXXX").string();
-    path_ = mkdtemp(name.data());
-  }
-  ~TemporaryFolder() { std::filesystem::remove_all(path_); }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  std::string file(const std::string& name) const { return (path_ / name).string(); }
+using trocar::testing::load_file;
+using trocar::testing::save_file;
+using trocar::testing::TemporaryFolder;
 
- private:
-  std::filesystem::path path_;
-};
-
-inline Bytes load_file(const std::string& path) {
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
-inline void save_file(const std::string& path, BytesView bytes) {
-  std::ofstream out(path, std::ios::binary | std::ios::trunc);
-  out.write(reinterpret_cast<const char*>(bytes.data()),
-            static_cast<std::streamsize>(bytes.size()));
-}
-
-// What a message is expected to be when read back.
+// Holds what a message must be when it is read back.
 struct Expected {
   std::string topic;
   std::uint64_t log_time = 0;
@@ -52,7 +28,7 @@ struct Expected {
   bool operator==(const Expected&) const = default;
 };
 
-// Message `i` of the small recording: compressible text and a counter.
+// Returns message `i` of the small recording: compressible text and a counter.
 inline Bytes payload_of(int i, std::size_t size) {
   Bytes data(size);
   for (std::size_t k = 0; k < size; ++k)

@@ -19,7 +19,7 @@ pb::FileDescriptorSet parsed(const Bytes& bytes) {
   return set;
 }
 
-// What another program does with a schema: builds it from nothing else, files in order.
+// Builds each message type as another program would: from the schema alone, files in order.
 TEST(proto_schema, every_topic_builds_alone_and_decodes) {
   for (int i = 0; i < kJournalTopicCount; ++i) {
     const pb::Descriptor& message = topic_message(static_cast<JournalTopic>(i));

@@ -114,7 +114,8 @@ TEST_F(session_journal, every_tick_record_once_and_in_order) {
   EXPECT_TRUE(ticks_in(4000, 5000).empty());
 }
 
-// As replay does: the last keyframe, then deltas; each surface must have the CRC of its frame.
+// The surface is rebuilt as in replay: the last keyframe, then deltas. Each surface must have the
+// CRC of its frame.
 TEST_F(session_journal, surface_at_any_tick) {
   SampleSession session(path_);
   session.run(300);

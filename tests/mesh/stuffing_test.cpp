@@ -143,7 +143,7 @@ TEST(Stuffing, RefusesWhatItCannotFill) {
 }
 
 TEST(Pieces, PartsThatTouchAlongAnEdgeAreSeparated) {
-  // A tet of volume 1/6 and a larger one behind the edge (0, 1).
+  // The mesh is a tet of volume 1/6 and a larger one that touches it along the edge (0, 1).
   TetMesh mesh;
   mesh.rest_positions = {{0, 0, 0}, {0, 0, 1}, {1, 0, 0}, {0, 1, 0}, {-2, 0, 0}, {0, -2, 0}};
   mesh.tets = {{NodeIndex(0), NodeIndex(2), NodeIndex(3), NodeIndex(1)},

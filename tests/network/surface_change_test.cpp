@@ -80,7 +80,7 @@ TEST(SurfaceChanges, reach_a_slow_reader_that_skips_frames_over_several_epochs) 
       session.on_io([&] { return session.replicator().counters().frames_skipped; });
   ASSERT_GT(skipped, 10u) << "nothing was skipped: the test does not stall";
   const auto given = session.on_io([&] { return session.replicator().counters().frames_given; });
-  // What lies in the stream already: its frames stop where skipping began, its changes do not.
+  // The stream still holds the frames up to where skipping began, and all changes after them.
   while (slow.frames_followed < static_cast<int>(given)) ASSERT_TRUE(slow.follow());
   ASSERT_LT(slow.layout->epoch, session.layout().epoch);
   last = session.make_frame(50, true);

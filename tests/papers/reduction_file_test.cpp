@@ -3,10 +3,9 @@
 #include "server/papers/dogan/reduction_file.h"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <cmath>
-#include <fstream>
+#include <filesystem>
 #include <functional>
 #include <limits>
 
@@ -15,6 +14,7 @@
 #include "server/organs/organ/packed_file.h"
 #include "tests/papers/synthetic_reduction.h"
 #include "tests/reduce/small_organ.h"
+#include "tests/support/files.h"
 #include "tests/support/packed_damage.h"
 
 namespace trocar::dogan {
@@ -22,22 +22,17 @@ namespace {
 
 using reduce::testing::block;
 using testing::synthetic_reduction;
+using trocar::testing::expect_bad_file;
+using trocar::testing::save_file;
+using trocar::testing::TemporaryFolder;
 
 class ReductionFile : public ::testing::Test {
  protected:
-  ~ReductionFile() override { std::filesystem::remove(path_); }
-
   void expect_bad(BytesView file, const std::string& says) const {
-    std::ofstream(path_, std::ios::binary)
-        .write(reinterpret_cast<const char*>(file.data()),
-               static_cast<std::streamsize>(file.size()));
+    save_file(path_, file);
     const auto read = read_reduction(path_, organ_);
     ASSERT_FALSE(read.ok()) << says;
-    EXPECT_EQ(read.error().code, ErrorCode::BadFile);
-    const auto& line = read.error().message;
-    EXPECT_TRUE(line.starts_with(path_.string() + ": ")) << line;
-    EXPECT_NE(line.find(says), std::string::npos) << line;
-    EXPECT_EQ(line.find('\n'), std::string::npos) << line;
+    expect_bad_file(read.error(), path_, says);
   }
   void expect_bad(const std::function<void(Reduction&)>& change, const std::string& says) const {
     auto changed = reduction_;
@@ -47,10 +42,8 @@ class ReductionFile : public ::testing::Test {
 
   const organ::Organ organ_ = block(3, 3, 2);
   const Reduction reduction_ = synthetic_reduction(organ_, 4);
-  const std::filesystem::path path_ =
-      std::filesystem::temp_directory_path() /
-      ("trocar-" + std::to_string(::getpid()) + "-" +
-       ::testing::UnitTest::GetInstance()->current_test_info()->name() + ".reduction");
+  const TemporaryFolder folder_;
+  const std::string path_ = folder_.file("a.reduction");
 };
 
 TEST_F(ReductionFile, WhatIsWrittenIsRead) {

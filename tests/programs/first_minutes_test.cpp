@@ -1,5 +1,5 @@
-// What somebody meets in the first five minutes: help, an import with the wrong unit, a client that
-// is started before its server, an example that is at rest.
+// Tests what a new user meets in the first five minutes: help, an import with the wrong unit, a
+// client that is started before its server, an example that is at rest.
 
 #include <chrono>
 #include <cmath>

@@ -50,7 +50,7 @@ Answer answer_of(const PropagationQueue& queue, std::size_t contact_count) {
   return out;
 }
 
-// What only single nodes can tell, for every node of the organ.
+// Checks the queries of single nodes for every node of the organ.
 void expect_queries_agree(const PropagationQueue& queue, const Answer& answer,
                           std::size_t node_count) {
   std::vector<std::uint32_t> layers(node_count, kNoLayer);
@@ -138,7 +138,7 @@ class Walk {
     } else if (what < 12) {
       any_contact() = patch(any_node());
     } else if (what < 16) {
-      // Onto, or next to, another one.
+      // One contact moves onto another.
       const auto& other = any_contact();
       const auto place = other.empty() ? any_node() : other[below(other.size())];
       any_contact() = patch(place);

@@ -1,4 +1,4 @@
-// What a fill costs, in neighbour lists read: nothing when nothing changed, and otherwise a
+// Tests what a fill costs, in neighbour lists read: nothing when nothing changed, and otherwise a
 // multiple of the nodes that changed, not of the region.
 
 #include <gtest/gtest.h>
@@ -60,7 +60,7 @@ TEST_F(QueueWork, OfASurfaceNodeThatJoinsOrLeavesIsFarBelowTheRegion) {
   fill({contact}, {10, 1'000'000});
   const std::size_t region = queue.nodes().size();
   ASSERT_GT(region, 3000u);
-  // One node in front of the middle of an edge, and gone again.
+  // One node joins the contact beside the middle of its edge, and leaves it again.
   contact.push_back(lattice_node(kSize, 18, kSize.ny - 1, 14));
   EXPECT_GT(fill({contact}, {10, 1'000'000}), 0u);
   EXPECT_LT(queue.nodes_visited(), region / 10);

@@ -1,7 +1,6 @@
 #include "tests/recording/recorded_simulation.h"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <algorithm>
 
@@ -27,11 +26,6 @@ Pose pose_of(std::uint8_t hand, Tick tick, const Vec3f& top, tool::Verb& verb) {
 }
 
 }  // namespace
-
-TemporaryFolder::TemporaryFolder() {
-  std::string name = (std::filesystem::temp_directory_path() / "trocar-recording-XXXXXX").string();
-  path_ = mkdtemp(name.data());
-}
 
 void record_simulation(const std::string& path, Tick dropped_at) {
   step::Simulation simulation(*catalogue::make_liver(800));

@@ -3,7 +3,6 @@
 // A session without a server: hands press, grasp and cut a small liver, and the recorder writes it.
 // Then copies of the file, with what a test changes in them.
 
-#include <filesystem>
 #include <functional>
 #include <string>
 #include <string_view>
@@ -17,18 +16,6 @@ class Message;
 }
 
 namespace trocar::recording::testing {
-
-class TemporaryFolder {
- public:
-  TemporaryFolder();
-  ~TemporaryFolder() { std::filesystem::remove_all(path_); }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  std::string file(const std::string& name) const { return (path_ / name).string(); }
-
- private:
-  std::filesystem::path path_;
-};
 
 inline constexpr Tick kRecordedTicks = 2400;
 // Snapshots are of tick 0 and of these.

@@ -4,8 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <fstream>
-#include <iterator>
+#include <filesystem>
 
 #include "common/base/checksum.h"
 #include "common/base/exit_code.h"
@@ -14,10 +13,15 @@
 #include "proto/wire.pb.h"
 #include "server/session/recording/verify.h"
 #include "tests/recording/recorded_simulation.h"
+#include "tests/support/files.h"
 #include "tests/support/program_fixture.h"
 
 namespace trocar::recording::testing {
 namespace {
+
+using trocar::testing::load_file;
+using trocar::testing::save_file;
+using trocar::testing::TemporaryFolder;
 
 constexpr Tick kFrameTick = 1200;  // hands press, hold and cut
 
@@ -76,14 +80,8 @@ class Verify : public trocar::testing::ProgramFixture {
     for (const auto& reason : report.reasons) all += reason + "\n";
     EXPECT_NE(all.find(says), std::string::npos) << all;
   }
-  Bytes load(const std::string& path) {
-    std::ifstream in(path, std::ios::binary);
-    return {std::istreambuf_iterator<char>(in), {}};
-  }
   std::string save(const char* name, BytesView bytes) {
-    std::ofstream(at(name), std::ios::binary | std::ios::trunc)
-        .write(reinterpret_cast<const char*>(bytes.data()),
-               static_cast<std::streamsize>(bytes.size()));
+    save_file(at(name), bytes);
     return at(name);
   }
   // Exit code of trocar-journal verify; what it says is in log().
@@ -105,7 +103,7 @@ TEST_F(Verify, ASoundRecordingIsVerifiedWhole) {
   EXPECT_EQ(report.ticks_missing, 0u);
   constexpr auto kFrames = kRecordedTicks / kTicksPerFrame;
   EXPECT_EQ(report.frames_verified, kFrames);
-  // A keyframe first, then one a second beside the delta.
+  // The first frame is a keyframe; later each second adds a keyframe beside the delta.
   EXPECT_EQ(report.surfaces_verified, kFrames + 2);
   EXPECT_EQ(report.surfaces_decoded, report.surfaces_verified);
   EXPECT_EQ(report.snapshots_verified, 1 + std::size(kSnapshotTicks));
@@ -293,7 +291,7 @@ TEST_F(Verify, ADamagedChunkIsNamed) {
   ASSERT_TRUE(journal.ok());
   const auto& chunks = (*journal)->container().chunks();
   ASSERT_GT(chunks.size(), 6u);
-  auto bytes = load(sound());
+  auto bytes = load_file(sound());
   const auto& chunk = chunks[chunks.size() / 2];
   bytes[chunk.chunk_offset + chunk.chunk_length / 2] ^= 0x40;
   const auto path = save("damaged.mcap", bytes);
@@ -316,7 +314,7 @@ TEST_F(Verify, AGapIsNamed) {
 }
 
 TEST_F(Verify, AMissingEndIsNamed) {
-  auto bytes = load(sound());
+  auto bytes = load_file(sound());
   bytes.resize(bytes.size() * 2 / 3);
   const auto path = save("cut.mcap", bytes);
   const auto report = verify(path);

@@ -3,11 +3,10 @@
 #include "server/organs/organ/local_reduction_file.h"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
+#include <filesystem>
 #include <functional>
 #include <limits>
 #include <random>
@@ -15,6 +14,7 @@
 
 #include "server/organs/organ/organ_file.h"
 #include "tests/reduce/small_organ.h"
+#include "tests/support/files.h"
 #include "tests/support/packed_damage.h"
 
 namespace trocar::organ {
@@ -22,25 +22,20 @@ namespace {
 
 using reduce::testing::block;
 using reduce::testing::synthetic_local_reduction;
+using trocar::testing::expect_bad_file;
+using trocar::testing::save_file;
+using trocar::testing::TemporaryFolder;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr float kNotANumber = std::numeric_limits<float>::quiet_NaN();
 
 class LocalReductionFile : public ::testing::Test {
  protected:
-  ~LocalReductionFile() override { std::filesystem::remove(path_); }
-
   void expect_bad(BytesView file, const std::string& says) const {
-    std::ofstream(path_, std::ios::binary)
-        .write(reinterpret_cast<const char*>(file.data()),
-               static_cast<std::streamsize>(file.size()));
+    save_file(path_, file);
     const auto read = read_local_reduction(path_, organ_);
     ASSERT_FALSE(read.ok()) << says;
-    EXPECT_EQ(read.error().code, ErrorCode::BadFile);
-    const auto& line = read.error().message;
-    EXPECT_TRUE(line.starts_with(path_.string() + ": ")) << line;
-    EXPECT_NE(line.find(says), std::string::npos) << line;
-    EXPECT_EQ(line.find('\n'), std::string::npos) << line;
+    expect_bad_file(read.error(), path_, says);
   }
   void expect_bad(const std::function<void(LocalReduction&)>& change,
                   const std::string& says) const {
@@ -58,10 +53,8 @@ class LocalReductionFile : public ::testing::Test {
 
   const Organ organ_ = block(3, 3, 2);
   const LocalReduction reduction_ = synthetic_local_reduction(organ_);
-  const std::filesystem::path path_ =
-      std::filesystem::temp_directory_path() /
-      ("trocar-" + std::to_string(::getpid()) + "-" +
-       ::testing::UnitTest::GetInstance()->current_test_info()->name() + ".reduction");
+  const TemporaryFolder folder_;
+  const std::string path_ = folder_.file("a.reduction");
 };
 
 TEST_F(LocalReductionFile, WhatIsWrittenIsRead) {
@@ -145,7 +138,7 @@ TEST_F(LocalReductionFile, SessionsAskForMoreOfAnOrgan) {
   };
   says(in_a_region, "its strain is averaged");
   says([](Organ& o) { o.node_masses_kg.assign(o.node_masses_kg.size(), 1.05); },
-       path_.string() + ": is of tissue of another density");
+       path_ + ": is of tissue of another density");
   says([](Organ& o) { o.node_masses_kg[0] = std::nan(""); }, "is of tissue of another density");
   says([](Organ& o) { o.mesh.rest_positions[4].x += 1e-6; }, "is of another mesh than");
 }

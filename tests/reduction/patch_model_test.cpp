@@ -75,7 +75,7 @@ TEST_F(PatchModelOfBlock, PatchesTogetherHaveTheOrgansMatrices) {
   ASSERT_TRUE(both.add(0));
   const PatchModel joint(models_, both);
   ASSERT_EQ(joint.blocks().size(), 3u);
-  // What both have, such as vibrations, is there once.
+  // Fields that both patches have, such as vibrations, occur once.
   EXPECT_LT(joint.field_count(), models_[0].field_count() + models_[1].field_count());
   EXPECT_EQ(joint.blocks()[1], models_[0].field_count());
   const auto nodes = models_.node_count(), count = joint.field_count();

@@ -102,7 +102,7 @@ TEST(ReducedSession, GoesOnBitForBitFromASnapshot) {
   ASSERT_TRUE(first.context().report.is_reduced);
   Bytes snapshot;
   first.write_snapshot(snapshot);
-  // Of something else before, with more workers.
+  // The other simulation has run another session before, with more workers.
   for (Tick tick = 1; tick <= 150; ++tick) other.tick(Press{.patch = 1}.at(tick), {});
   ASSERT_TRUE(other.restore_snapshot(snapshot).ok());
   std::uint32_t patches = 0;
@@ -133,7 +133,7 @@ class TwoPatches : public ::testing::Test {
     inputs.samples.back().tool = tool_slot({1}, 0);
     return inputs;
   }
-  // On the top, at least 50 mm from the first.
+  // Returns a patch near the top, at least 50 mm from the first.
   static std::size_t far_patch() {
     std::size_t n = 1;
     while (length(place_of(n) - place_of(0)) < 0.05f) ++n;
@@ -190,7 +190,7 @@ TEST_F(TwoPatches, GoOnBitForBitFromSnapshots) {
   }
 }
 
-// Of as many patches, but not as many fields: another reduction of this organ.
+// Another reduction of this organ has as many patches, but fewer fields.
 TEST_F(TwoPatches, AreNotThoseOfAnotherReduction) {
   Simulation first(made().organ, 1, reduction::at_work(made().local));
   for (Tick tick = 1; tick <= 600; ++tick) first.tick(inputs_at(tick), {});
@@ -290,15 +290,15 @@ TEST_F(CutSession, GoesOnReducedElsewhere) {
   EXPECT_TRUE(reduced.context().report.is_reduced);
   const Vec3f expected = force_of(full);
   EXPECT_LT(length(force_of(reduced) - expected), 0.03f * length(expected));
-  // Bit for bit from a state with a wound.
+  // A session that is restored with a wound goes on bit for bit.
   Simulation other(made().organ, 1, reduction::at_work(made().local));
   ASSERT_TRUE(other.restore_snapshot(snapshot).ok());
   for (Tick tick = 2001; tick <= 2400; ++tick) other.tick(inputs_at(tick), {});
   EXPECT_EQ(other.state_hash(), reduced.state_hash());
 }
 
-// What moves swept nodes alone must not build up in the fields while they are swept: it would come
-// out when they are let go.
+// Motion of the swept nodes alone must not build up in the fields while they are swept: it would
+// appear when they are let go.
 TEST(ReducedSession, FieldsStayWithTheNodesThatAreSwept) {
   Simulation reduced(made().organ, 1, reduction::at_work(made().local)), full(made().organ);
   const reduction::LocalModels models(*made().local, made().organ);

@@ -1,4 +1,4 @@
-// What the server's recorder writes of a surface that is cut, played and verified.
+// Plays and verifies what the server's recorder writes of a surface that is cut.
 
 #include <gtest/gtest.h>
 

@@ -1,10 +1,5 @@
 #include "tests/replay/recorded_session.h"
 
-#include <unistd.h>
-
-#include <fstream>
-#include <iterator>
-
 #include "common/base/assert.h"
 #include "common/wire/surface_codec.h"
 #include "common/wire/surface_messages.h"
@@ -83,21 +78,6 @@ Truth::Triangles triangles_of(const wire::SurfaceLayout& layout) {
 }
 
 }  // namespace
-
-TemporaryFolder::TemporaryFolder() {
-  std::string name = (std::filesystem::temp_directory_path() / "trocar-replay-XXXXXX").string();
-  path_ = mkdtemp(name.data());
-}
-
-Bytes load_file(const std::string& path) {
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
-void save_file(const std::string& path, BytesView bytes) {
-  std::ofstream out(path, std::ios::binary | std::ios::trunc);
-  out.write(reinterpret_cast<const char*>(bytes.data()),
-            static_cast<std::streamsize>(bytes.size()));
-}
 
 Truth record_session(const std::string& path, const RecordingOptions& options) {
   Recorder recorder(path, options);

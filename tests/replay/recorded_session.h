@@ -5,7 +5,6 @@
 
 #include <gtest/gtest.h>
 
-#include <filesystem>
 #include <functional>
 #include <map>
 #include <string>
@@ -14,26 +13,16 @@
 #include "client/replay/replay_source.h"
 #include "client/replica/replica.h"
 #include "common/journal/session_journal_writer.h"
+#include "tests/support/files.h"
 
 namespace trocar::replay::testing {
 
 inline constexpr std::uint64_t kStartUtc = 1'732'200'000'000'000'000;
 inline constexpr Frame kFramesPerKey = 62;
 
-class TemporaryFolder {
- public:
-  TemporaryFolder();
-  ~TemporaryFolder() { std::filesystem::remove_all(path_); }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  std::string file(const std::string& name) const { return (path_ / name).string(); }
-
- private:
-  std::filesystem::path path_;
-};
-
-Bytes load_file(const std::string& path);
-void save_file(const std::string& path, BytesView bytes);
+using trocar::testing::load_file;
+using trocar::testing::save_file;
+using trocar::testing::TemporaryFolder;
 
 struct RecordingOptions {
   Frame frames = 400;

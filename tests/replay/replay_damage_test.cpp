@@ -1,4 +1,4 @@
-// What a damaged, cut short or foreign file does to a replay: never a wrong picture, never a crash.
+// A damaged, truncated or foreign file never gives a replay a wrong picture and never crashes it.
 
 #include <random>
 

@@ -62,7 +62,7 @@ class FieldFiles : public ::testing::Test {
     vtu_ = read(folder_ / "field_0000001ms.vtu");
     csv_ = read(folder_ / "field_0000001ms.csv");
   }
-  // What stands between a tag and its end, from the first place after `section`.
+  // Returns the text of the first array of this name after the start of `section`.
   std::string body(const std::string& section, const std::string& array) const {
     const auto begin = vtu_.find("Name=\"" + array + "\"", vtu_.find("<" + section + ">"));
     const auto end = vtu_.find("</" + section + ">");

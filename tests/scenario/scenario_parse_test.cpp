@@ -9,6 +9,7 @@
 #include <random>
 
 #include "server/lab/scenario/scenario.h"
+#include "tests/scenario/scenario_texts.h"
 
 namespace trocar::scenario {
 namespace {
@@ -272,12 +273,10 @@ TEST(ScenarioParse, WhatIsMissingIsSaid) {
 }
 
 TEST(ScenarioParse, GravityNeedsTheWholeOrgan) {
-  auto parsed = parse_scenario_text(
+  const auto resolved = resolve_text(
       "[organ]\nsource = \"lattice\"\n[run]\nseconds = 1\ndepth = 3\n[gravity]\nm_s2 = [0, -1, "
       "0]\n",
       "bad.toml");
-  ASSERT_TRUE(parsed.ok()) << parsed.error().message;
-  const auto resolved = resolve(std::move(*parsed));
   ASSERT_FALSE(resolved.ok());
   EXPECT_TRUE(resolved.error().message.starts_with("bad.toml:7: key gravity.m_s2: "))
       << resolved.error().message;
@@ -298,17 +297,15 @@ TEST(ScenarioParse, TheExampleIsRightAndHasNoToolsToPlay) {
 }
 
 TEST(ScenarioParse, SetsSelectByBoxAndByDistance) {
-  auto parsed = parse_scenario_text(std::string(kGood) +
-                                        "[[nodes]]\nname = \"near\"\nnearest_mm = [1, 10, 1]\n"
-                                        "[[nodes]]\nname = \"ball\"\nnearest_mm = [0, 10, 0]\n"
-                                        "radius_mm = 10\n"
-                                        "[[probe]]\nset = \"top\"\nquantity = \"velocity\"\n"
-                                        "[[probe]]\nset = \"near\"\nquantity = \"velocity\"\n"
-                                        "[[probe]]\nset = \"ball\"\nquantity = \"velocity\"\n"
-                                        "[[probe]]\nset = \"fixed\"\nquantity = \"reaction\"\n",
-                                    "good.toml");
-  ASSERT_TRUE(parsed.ok()) << parsed.error().message;
-  const auto resolved = resolve(std::move(*parsed));
+  const auto resolved = resolve_text(std::string(kGood) +
+                                         "[[nodes]]\nname = \"near\"\nnearest_mm = [1, 10, 1]\n"
+                                         "[[nodes]]\nname = \"ball\"\nnearest_mm = [0, 10, 0]\n"
+                                         "radius_mm = 10\n"
+                                         "[[probe]]\nset = \"top\"\nquantity = \"velocity\"\n"
+                                         "[[probe]]\nset = \"near\"\nquantity = \"velocity\"\n"
+                                         "[[probe]]\nset = \"ball\"\nquantity = \"velocity\"\n"
+                                         "[[probe]]\nset = \"fixed\"\nquantity = \"reaction\"\n",
+                                     "good.toml");
   ASSERT_TRUE(resolved.ok()) << resolved.error().message;
   EXPECT_EQ(resolved->probe_nodes[0].size(), 9u);
   EXPECT_EQ(resolved->probe_nodes[1], (NodeList{NodeIndex(16)}));
@@ -317,11 +314,9 @@ TEST(ScenarioParse, SetsSelectByBoxAndByDistance) {
 }
 
 TEST(ScenarioParse, MaterialChangesMassAndSprings) {
-  auto parsed = parse_scenario_text(
+  const auto resolved = resolve_text(
       std::string(kGood) + "[material]\ndensity_kg_m3 = 2120\nspring_stiffness_n_m = 7\n",
       "a.toml");
-  ASSERT_TRUE(parsed.ok()) << parsed.error().message;
-  const auto resolved = resolve(std::move(*parsed));
   ASSERT_TRUE(resolved.ok()) << resolved.error().message;
   double mass = 0;
   for (const double m : resolved->organ.node_masses_kg) mass += m;
@@ -329,14 +324,8 @@ TEST(ScenarioParse, MaterialChangesMassAndSprings) {
   for (const auto& s : organ::springs_of(resolved->organ)) EXPECT_EQ(s.stiffness_n_m, 7);
 }
 
-Result<ResolvedScenario> resolved_text(const std::string& text, const std::string& source) {
-  auto parsed = parse_scenario_text(text, source);
-  if (!parsed) return parsed.error();
-  return resolve(std::move(*parsed));
-}
-
 TEST(ScenarioParse, RegionsHaveTheirMaterialAndTheirMass) {
-  const auto resolved = resolved_text(
+  const auto resolved = resolve_text(
       R"([organ]
 source = "plate"
 [material]
@@ -377,7 +366,7 @@ seconds = 1
 }
 
 TEST(ScenarioParse, TractionsAreTheSurfaceIntegral) {
-  const auto resolved = resolved_text(
+  const auto resolved = resolve_text(
       std::string(kGood) +
           "[[traction]]\nset = \"top\"\n[[traction.key]]\ntime_s = 0\ntraction_pa = [50, 0, 100]\n"
           "[[traction]]\nset = \"top\"\n[[traction.key]]\ntime_s = 0\npressure_pa = 100\n"
@@ -405,9 +394,9 @@ TEST(ScenarioParse, SetsComeFromCsvFilesBesideTheScenario) {
   std::filesystem::create_directories(folder);
   const auto resolve_with = [&](const std::string& csv) {
     std::ofstream(folder / "ids.csv") << csv;
-    return resolved_text(std::string(kGood) + "[[nodes]]\nname = \"x\"\ncsv = \"ids.csv\"\n" +
-                             "[[probe]]\nset = \"x\"\nquantity = \"displacement\"\n",
-                         (folder / "a.toml").string());
+    return resolve_text(std::string(kGood) + "[[nodes]]\nname = \"x\"\ncsv = \"ids.csv\"\n" +
+                            "[[probe]]\nset = \"x\"\nquantity = \"displacement\"\n",
+                        (folder / "a.toml").string());
   };
   const auto good = resolve_with("node,rest_x_mm\r\n26,1\n# a comment\n\n3, 2\n3\n");
   ASSERT_TRUE(good.ok()) << good.error().message;
@@ -425,7 +414,7 @@ TEST(ScenarioParse, SetsComeFromCsvFilesBesideTheScenario) {
 
 TEST(ScenarioParse, GravityReplacesTheOrgansOwn) {
   const auto resolved =
-      resolved_text(std::string(kGood) + "[gravity]\nm_s2 = [0, -9.81, 0]\n", "a.toml");
+      resolve_text(std::string(kGood) + "[gravity]\nm_s2 = [0, -9.81, 0]\n", "a.toml");
   ASSERT_TRUE(resolved.ok()) << resolved.error().message;
   EXPECT_EQ(resolved->organ.gravity_m_s2, (Vec3d{0, -9.81, 0}));
 }

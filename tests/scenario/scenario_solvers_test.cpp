@@ -1,4 +1,4 @@
-// What a scenario asks of the solver: laws, regions, boundaries, integrators.
+// Tests what a scenario sets of the solver: laws, regions, boundaries, integrators.
 
 #include "tests/scenario/scenario_texts.h"
 
@@ -146,13 +146,7 @@ TEST(ScenarioRun, GradedMovesEverythingAndFrozenTheQueueOnly) {
 
 TEST(ScenarioRun, WhatTheSolverCannotDoIsRefusedWithItsLine) {
   const auto refusal = [](const std::string& text) {
-    auto parsed = scenario::parse_scenario_text(text, "test.toml");
-    EXPECT_TRUE(parsed.ok()) << (parsed.ok() ? "" : parsed.error().message);
-    if (!parsed) return std::string();
-    const auto resolved = scenario::resolve(std::move(*parsed));
-    EXPECT_TRUE(resolved.ok()) << (resolved.ok() ? "" : resolved.error().message);
-    if (!resolved) return std::string();
-    const auto supported = check_supported(*resolved);
+    const auto supported = check_supported(expect_resolved(text));
     return supported.ok() ? std::string("accepted") : supported.error().message;
   };
   EXPECT_EQ(refusal(pulled_block("", "integrator = \"explicit\"\n")),
@@ -199,8 +193,7 @@ TEST(ScenarioRun, AnUnstableExplicitStepIsRefusedWithTheOneToWrite) {
   const auto message = [](const std::string& run) {
     std::string stiff = swinging(run);
     stiff.replace(stiff.find("= 40"), 4, "= 40000");
-    const auto resolved = scenario::resolve(*scenario::parse_scenario_text(stiff, "test.toml"));
-    const auto supported = check_supported(*resolved);
+    const auto supported = check_supported(expect_resolved(stiff));
     return supported.ok() ? std::string() : supported.error().message;
   };
   std::string text = message("integrator = \"explicit\"\ndt_s = 0.001\n");
@@ -215,9 +208,8 @@ TEST(ScenarioRun, AnUnstableExplicitStepIsRefusedWithTheOneToWrite) {
 
 TEST(ScenarioRun, ThreadsChangeNothing) {
   const auto text = pulled_block("elastic_law = \"neo-hookean\"\naveraged_strain = true\n", "");
-  auto resolved = scenario::resolve(*scenario::parse_scenario_text(text, "test.toml"));
-  ASSERT_TRUE(resolved.ok());
-  ScenarioRun one(*resolved, Solver::Live, 1), two(*resolved, Solver::Live, 2);
+  ScenarioRun one(expect_resolved(text), Solver::Live, 1),
+      two(expect_resolved(text), Solver::Live, 2);
   for (int i = 0; i < 100; ++i) {
     one.step();
     two.step();

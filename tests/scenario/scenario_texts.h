@@ -1,6 +1,6 @@
 #pragma once
 
-// A scenario that several tests load, and how they make a run of a text.
+// A scenario that several tests load, and how they resolve a text and make a run of it.
 
 #include <gtest/gtest.h>
 
@@ -26,11 +26,22 @@ box_max_mm = [5, 25, 5]
 )";
 inline constexpr double kStiffness = 40, kWeight = 9.81;
 
+inline Result<ResolvedScenario> resolve_text(const std::string& text,
+                                             const std::string& source = "test.toml") {
+  auto parsed = parse_scenario_text(text, source);
+  if (!parsed) return parsed.error();
+  return resolve(std::move(*parsed));
+}
+
+// Fails the test and returns an empty scenario if the text is refused.
+inline ResolvedScenario expect_resolved(const std::string& text) {
+  auto result = resolve_text(text);
+  EXPECT_TRUE(result.ok()) << (result.ok() ? "" : result.error().message);
+  return result.ok() ? std::move(*result) : ResolvedScenario{};
+}
+
 inline std::unique_ptr<ScenarioRun> make(const std::string& text, Solver solver = Solver::Full) {
-  auto parsed = scenario::parse_scenario_text(text, "test.toml");
-  EXPECT_TRUE(parsed.ok()) << (parsed.ok() ? "" : parsed.error().message);
-  if (!parsed) return nullptr;
-  auto resolved = scenario::resolve(std::move(*parsed));
+  auto resolved = resolve_text(text);
   EXPECT_TRUE(resolved.ok()) << (resolved.ok() ? "" : resolved.error().message);
   if (!resolved) return nullptr;
   const auto supported = check_supported(*resolved);

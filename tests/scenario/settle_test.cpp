@@ -75,7 +75,7 @@ INSTANTIATE_TEST_SUITE_P(, SettleAny,
                              +[] { return measured_block(true); }),
                          name_of);
 
-// What settling finds is where tissue creeps to.
+// Settling finds the state to which tissue creeps.
 TEST(Settle, TissueThatRelaxesIsWhereItCreepsTo) {
   const auto organ = measured_block(false);
   const auto settled = settle(organ, kGravity);

@@ -1,4 +1,4 @@
-// What a hand feels on the sides of its blade.
+// Tests the friction that a hand feels on the sides of its blade.
 
 #include <gtest/gtest.h>
 

@@ -131,7 +131,7 @@ TEST_F(Blades, ARestoredStateGoesOnBitForBit) {
   }
 }
 
-// What clients are told, applied to the surface they began with, is the surface.
+// Changes that clients are told turn the surface they began with into the current one.
 TEST_F(Blades, ChangesLeadFromSurfaceToSurface) {
   Simulation simulation(liver(material::ElasticLaw::Springs));
   auto followed = simulation.layout();
@@ -174,7 +174,7 @@ TEST_F(Blades, ChangesNameTheRegionsThatAreCut) {
   EXPECT_EQ(named, std::set<std::string>{"vessel"});
 }
 
-// What has been parted moves by itself: a through cut, and the free end drawn away.
+// A piece that a through cut has separated moves by itself: the free end is drawn away.
 TEST_F(Blades, APieceThatIsCutOffCanBeCarriedAway) {
   Simulation simulation(liver(material::ElasticLaw::NeoHookean));
   Vec3f end{-1, 0, 0};

@@ -10,11 +10,11 @@
 
 namespace trocar::step::testing {
 
-// Where the first hand presses, from the place that is given to both.
+// The first hand presses here, relative to the place that both hands are given, m.
 inline constexpr Vec3f kPressedAt{-0.105f, 0, 0.004f};
 
-// That place for an organ: over the middle of the lattice's flat top, else such that the first hand
-// comes down on the highest node.
+// Returns the place for an organ: the middle of the lattice's flat top, or else the place from
+// which the first hand comes down on the highest node.
 inline Vec3f place_on(const organ::Organ& organ) {
   Vec3d highest{0, -1, 0};
   for (const auto& p : organ.mesh.rest_positions)

@@ -77,7 +77,8 @@ TEST(Marks, BringBackShapeAndTopology) {
   EXPECT_TRUE(valid.ok()) << valid.error().message;
 }
 
-// What clients are told leads them there: changes, and at a return the surface as a whole.
+// Clients follow a session with marks by what they are told: changes, and at a return the whole
+// surface.
 TEST(Marks, AreFollowedFrameByFrame) {
   Simulation simulation(liver());
   auto followed = simulation.layout();

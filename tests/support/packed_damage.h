@@ -8,8 +8,17 @@
 #include <string>
 
 #include "common/base/bytes.h"
+#include "common/base/result.h"
 
 namespace trocar::testing {
+
+// Expects one line that begins with the file's path and says what is wrong with it.
+inline void expect_bad_file(const Error& error, const std::string& path, const std::string& says) {
+  EXPECT_EQ(error.code, ErrorCode::BadFile);
+  EXPECT_TRUE(error.message.starts_with(path + ": ")) << error.message;
+  EXPECT_NE(error.message.find(says), std::string::npos) << error.message;
+  EXPECT_EQ(error.message.find('\n'), std::string::npos) << error.message;
+}
 
 // `is_read` says whether bytes are read at all, `is_equal_if_read` whether they are refused or give
 // what was written, and `expect_bad` expects a line that says what is wrong. Beyond the first 100,

@@ -23,7 +23,7 @@ class Random {
   std::uint64_t state_;
 };
 
-// Each component between -amplitude and +amplitude.
+// Returns vectors whose components lie between -amplitude and +amplitude.
 inline std::vector<Vec3f> random_vectors(std::size_t count, float amplitude, std::uint64_t seed) {
   Random random(seed);
   const auto component = [&] { return amplitude * static_cast<float>(random.between(-1, 1)); };

@@ -144,7 +144,7 @@ inline std::vector<VertexIndex> path_between(const wire::SurfaceLayout& layout, 
   return path;
 }
 
-// A split edge or a slit somewhere on the surface.
+// Returns the change of a split edge or a slit at a random place of the surface.
 inline wire::SurfaceChange random_change(const wire::SurfaceLayout& layout, Random& random) {
   const DirectedEdges edges = directed_edges(layout);
   const auto edge =

@@ -54,7 +54,7 @@ std::string mesh_of(const finite_elements::ElementMesh& mesh) {
   return text;
 }
 
-// U of *NODE PRINT: "number ux uy uz" below the last heading.
+// Reads U of *NODE PRINT: the lines "number ux uy uz" below the last heading.
 Result<Field> read_displacements(const std::filesystem::path& path, std::size_t node_count) {
   std::ifstream file(path);
   Field field(node_count);

@@ -107,7 +107,7 @@ Cost cost_of(const Lab& lab, Section& section, int depth, int steps) {
   }
   cost.step_ms = median(times);
 
-  // The same queue by itself.
+  // Then the same queue is timed by itself.
   propagation::PropagationQueue queue(run.organ().mesh.node_count());
   const std::vector<NodeIndex> touched{catalogue::lattice_node({}, 15, 14, 15)};
   const std::vector<std::span<const NodeIndex>> seeds{touched};

@@ -21,7 +21,7 @@ constexpr double kHeight_m = (kAlong - 1) * kSpacing_mm * 1e-3;
 // The cross-section that belongs to the springs, one cell each.
 constexpr double kSection_m2 = kAcross * kAcross * kSpacing_mm * kSpacing_mm * 1e-6;
 
-// So light that inertia is below the bounds: the closed forms have none.
+// Returns a column so light that inertia is below the bounds: the closed forms have no inertia.
 std::string column(double spring_damping_s, double node_damping_per_s, double density = 10) {
   return lattice_organ(kAcross, kAlong, kAcross, kSpacing_mm) +
          fmt::format(

@@ -30,13 +30,14 @@ class CutPlate {
   const topology::Topology& topology() const { return topology_; }
   Vec3d position(NodeIndex node) const;  // now, m
   ElementCounts counts() const;
-  // Of faces that cuts have opened, both sides, as they are now and as they were at rest, m^2.
+  // Both return the area of the faces that cuts have opened, on both sides, m^2: as they are now
+  // and as they were at rest.
   double wound_area() const;
   double wound_area_at_rest() const;
   // Per tet its smallest dihedral angle, or what is left of pi to its largest if that is less;
   // ascending.
   std::vector<double> dihedrals_rad() const;
-  // As printed: elastic energy before and after cut(), J.
+  // Returns the elastic energy before and after cut(), J; only springs as printed have it.
   const std::array<double, 2>& energies_j() const { return energies_j_; }
   const RemodelledSprings* springs() const { return springs_.get(); }  // null: live
   // The farthest that two nodes are apart that were one, m.

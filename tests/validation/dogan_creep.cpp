@@ -27,9 +27,9 @@ using finite_elements::ScenarioSolve;
 constexpr double kForce_n = 0.4, kRadius_mm = 15;
 constexpr std::size_t kPlaces = 3;
 constexpr std::uint64_t kSeed = 2011;
-// Of the neighbours of figure 6, from the loaded node.
+// The neighbours of figure 6 are taken at these distances from the loaded node.
 constexpr std::array<double, 3> kNeighbours_mm{15, 30, 45};
-// Where tissue has mass its load comes within this time, in so many steps off-line.
+// The load of tissue with mass rises within this time, off-line in so many steps.
 constexpr double kRamp_s = 0.02;
 constexpr int kRampSteps = 4;
 // Live and off-line are compared from here on.
@@ -39,7 +39,7 @@ constexpr double kPaper_mm = 4.5, kPaperHalf_mm = 2.1;
 // The part of the force at which tissue is linear.
 constexpr double kSmallPart = 0.01;
 
-// What sessions aim at, and what swinging tissue is known to miss it by.
+// Sessions aim at the first error; swinging tissue is known to reach the second.
 constexpr double kLiveTarget = 0.01, kLiveOnRecord = 0.03;
 // A point force on a half-space, which the held body is not.
 constexpr double kRelaxedBound = 0.05, kRelaxedOnRecord = 0.08;
@@ -49,7 +49,7 @@ struct Steps {
   int count;
   double dt_s;
 };
-// Off-line, after the load; longer by a factor.
+// Returns the steps of the off-line solver after the load, longer by a factor.
 std::vector<Steps> slow_steps(bool is_short, int factor) {
   std::vector<Steps> steps{{20 / factor, 0.05 * factor}, {4 / factor, 0.25 * factor}};
   if (!is_short)
@@ -294,7 +294,8 @@ std::vector<Creep> show_places(Section& section, const Study& study) {
   return all;
 }
 
-// What half of the force does at once, pressed and pulled, and to linear tissue.
+// Compares the displacement under half of the force with that under the whole, both at once:
+// pressed and pulled, on linear and quadratic elements.
 void show_half_force(const Lab& lab, Section& section, const Study& study) {
   Table table{fmt::format("Half of the force, at once: {}", study.liver().title),
               {"place, elements", "way", fmt::format("{} N, mm", kForce_n),
@@ -324,7 +325,7 @@ void show_half_force(const Lab& lab, Section& section, const Study& study) {
   section.add(std::move(table));
 }
 
-// Figure 7, and the live solver beside the off-line one.
+// Draws figure 7, and the live solver beside the off-line one.
 void show_two_loads(Section& section, const Study& study, const Creep& whole) {
   const double end = study.seconds();
   const auto half = study.off_line({0, kForce_n / 2}, Way::Slowly);

@@ -20,7 +20,7 @@
 namespace trocar::validation {
 namespace {
 
-// What is aimed at: 1 % and 1 ms.
+// The targets are an error of 1 % and a tick of 1 ms.
 constexpr double kErrorTarget = 0.01, kTickTarget_ms = 1, kBudget_ms = 0.8;
 constexpr double kReferenceTarget = kErrorTarget / 5;
 // Plain tets are known to miss it by little.
@@ -31,8 +31,8 @@ constexpr std::uint64_t kSeed = 2011;
 // Below this share of the largest force the tool has hardly met the tissue.
 constexpr double kLeastShare = 0.05;
 
-// Where the tip is above the surface: a press, a hold in which the tissue relaxes, a deeper press,
-// and off again. `part` of the whole run, 0 to 1.
+// Returns the height of the tip above the surface, m: it presses, holds while the tissue relaxes,
+// presses deeper and lifts off. `part` is the share of the run, 0 to 1.
 float height_m(float part) {
   struct Key {
     float part, height_m;
@@ -233,7 +233,7 @@ void measure(const Lab& lab, Section& section, const MeasuredLiver& liver, bool 
                   "the reference's {} sweeps a tick.",
                   hand.converged_sweeps()));
   const auto aim = target(kErrorTarget, "1 % of the converged solution");
-  // Of plain tets the coarse liver of the short form misses it with the force, the other with the
+  // Plain tets miss the target: in the short form's coarse liver by the force, in the other by the
   // displacement.
   const auto bound = [&](bool is_missed) {
     return is_missed && !is_averaged ? aim.missed(kPlainOnRecord) : aim;

@@ -1,5 +1,6 @@
-// What linear tets of a nearly incompressible material lose: plain, with strain averaged over each
-// node's tets (the live solver), and quadratic ones, at table 1's ratio of bulk modulus to C10.
+// Compares elements in a nearly incompressible material, at table 1's ratio of bulk modulus to C10:
+// plain linear tets, linear tets whose strain is averaged over each node's tets (the live solver),
+// and quadratic tets.
 
 #include <spdlog/fmt/fmt.h>
 
@@ -27,7 +28,7 @@ using finite_elements::ScenarioSolve;
 constexpr double kQuadraticBound = 0.05;
 // The press of the short form on its coarse mesh.
 constexpr double kShortPressOnRecord = 0.15;
-// Of averaged strain on some 4,000 nodes, and on the meshes of the short form.
+// Averaged strain keeps this bound on some 4,000 nodes and on the meshes of the short form.
 constexpr double kAveragedBound = 0.05;
 
 Bound of_mesh(const Lab& lab, const std::string& geometry) {
@@ -35,7 +36,7 @@ Bound of_mesh(const Lab& lab, const std::string& geometry) {
   return lab.is_short() && geometry == "press" ? aim.missed(kShortPressOnRecord) : aim;
 }
 
-// Of a liver: the patch that is pressed, and how far.
+// The patch of a liver that is pressed has this radius and is displaced so far.
 constexpr double kPatch_mm = 12, kPress_mm = 5;
 constexpr std::uint64_t kSeed = 2011;
 constexpr double kRoughnessBound = 0.3;
@@ -308,8 +309,8 @@ double volume_ratio(const organ::Organ& organ, const std::vector<Vec3d>& u, cons
   return six_volumes(true) / six_volumes(false);
 }
 
-// Of each tet, kPa: K (1 - J) of its own, or the mean of its corners' stars, whose F is the mean of
-// that of the tets at them.
+// Returns the pressure in each tet, kPa: K (1 - J) of its own, or the mean of that at its corners.
+// The F of a corner is the mean over the tets at it, weighted by volume.
 std::vector<double> pressures_kpa(const organ::Organ& organ, const std::vector<Vec3d>& u,
                                   bool is_averaged) {
   const double bulk = material::find_measured_material("human_liver_nava2008")->bulk_modulus_pa;

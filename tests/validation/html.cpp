@@ -89,7 +89,7 @@ std::string pill(Verdict verdict) {
   return fmt::format("<span class=\"{}\">{}</span>", style, name_of(verdict));
 }
 
-// Of an experiment: its worst.
+// Returns the worst verdict of an experiment's checks.
 Verdict verdict_of(const Section& section) {
   const auto counts = count(section.checks);
   return counts.failed > 0   ? Verdict::Broken

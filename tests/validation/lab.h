@@ -1,6 +1,6 @@
 #pragma once
 
-// Where experiments run: it turns scenario texts into running scenarios, keeps the texts and the
+// A lab runs experiments: it turns scenario texts into running scenarios, keeps the texts and the
 // organs that they need beside the report (so that trocar-sim runs the very same), and shows how
 // far a run is. A scenario that cannot run is an error of this program: it says so and ends.
 
@@ -37,7 +37,7 @@ class Lab {
   // Keeps the text as scenarios/<name>.toml and in the section, and gets it ready to run.
   RunPtr start(Section& section, const std::string& family, const std::string& name,
                const std::string& text, Solver solver = Solver::Live) const;
-  // As start(); null if the solver cannot do it yet, and then the section says so.
+  // Does the same as start(), but returns null if the solver cannot do it yet; the section says so.
   RunPtr try_start(Section& section, const std::string& family, const std::string& name,
                    const std::string& text, Solver solver = Solver::Live) const;
   // To the end, `each` after every step. The section counts steps that missed their tolerance.

@@ -25,9 +25,9 @@ struct LiveLiver {
 };
 
 reduce::LocalSettings live_settings(const Lab& lab);
-// One sentence for people.
+// Describes the training in a sentence for the report.
 std::string live_training_text(const Lab& lab);
-// As measured_livers().
+// Returns the livers of measured_livers() with their reductions, which are made only once.
 std::vector<std::shared_ptr<const LiveLiver>> live_livers(const Lab& lab);
 
 // Root of the sum of squares, m.

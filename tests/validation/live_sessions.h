@@ -54,7 +54,7 @@ struct Stroke {
   Tick down_ticks() const;
   Tick lift_ticks() const;  // 0 if it stays
   Tick ticks() const { return down_ticks() + hold_ticks + slide_ticks + lift_ticks() + free_ticks; }
-  // Of the first hand; its join in tick 1.
+  // Returns the inputs of the first hand; it joins in tick 1.
   hands::TickInputs at(Tick tick) const;
 };
 
@@ -77,7 +77,7 @@ struct Course {
   double largest_force_n() const;
 };
 
-// What a session does in each tick, numbered from 1.
+// A script says what a session does in each tick, numbered from 1.
 struct Script {
   Tick ticks = 0;
   std::function<hands::TickInputs(Tick)> inputs;
@@ -99,7 +99,7 @@ double force_error(const Course& course, const Course& reference, std::size_t ti
 // Over all nodes; of field number `field`.
 double field_error(const Course& course, const Course& reference, std::size_t field);
 
-// Of values that need not be finite; NaN without values.
+// The values may be infinite; both functions return NaN without values.
 double quantile(std::vector<double> values, double share);
 double mean(const std::vector<double>& values);
 // "mean (95th percentile, worst)", in per cent.

@@ -1,6 +1,6 @@
 #pragma once
 
-// What experiments read off a run.
+// These functions read off a run what experiments compare.
 
 #include <span>
 #include <vector>

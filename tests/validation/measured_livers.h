@@ -17,7 +17,7 @@ struct MeasuredLiver {
   organ::Organ organ;
 };
 
-// The built-in liver; in the short form a coarse one.
+// Returns the built-in liver; in the short form it is a coarse one.
 std::vector<MeasuredLiver> measured_livers(const Lab& lab);
 
 }  // namespace trocar::validation

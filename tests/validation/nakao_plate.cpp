@@ -62,7 +62,7 @@ struct Wound {
   double area_cm2() const { return areas_cm2.back(); }
 };
 
-// Through the plate, the blade standing upright.
+// Cuts through the plate with an upright blade.
 void cut_straight(CutPlate& plate, double length_m) {
   const Vec3d half = Vec3d{std::cos(kDirection_rad), 0, std::sin(kDirection_rad)} * (length_m / 2);
   const Vec3d deep{0, kReach_m, 0};
@@ -101,7 +101,7 @@ Wound cut_plate(const Way& way, double tension, Mechanics mechanics, bool is_sho
   return wound;
 }
 
-// What a cut makes of the mesh, without mechanics.
+// Returns what a cut makes of the mesh, without mechanics.
 Wound count_only(const Way& way, double length_m) {
   CutPlate plate(catalogue::make_plate(), way.settings, Mechanics::Live);
   Wound wound{.before = plate.counts()};
@@ -120,7 +120,7 @@ Way in_steps(Way way) {
   return way;
 }
 
-// From above, around the wound.
+// Draws the edges around the wound as seen from above.
 plot::Plot picture(const std::string& title, const Wound& wound) {
   const double reach_mm = kLength_m * 600;
   plot::Plot plot{.title = title,

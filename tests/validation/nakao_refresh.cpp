@@ -105,8 +105,8 @@ hands::ToolInput sample_at(const calibration::Place& place, Tick tick) {
        tool::Verb::Push}};
 }
 
-// Where a tip presses and, beside it, a blade cuts, its way turned by the angle with this sine: a
-// regular mesh has lines along which no tet need be split.
+// A tip presses at the place, and a blade cuts beside it. The blade's path is turned by the angle
+// with this sine, because a regular mesh has lines along which no tet need be split.
 struct Site {
   calibration::Place place;
   float turn = 0;
@@ -298,7 +298,7 @@ void add_controlled(Section& section, const Course& free, const Course& held) {
   for (auto* plot : {&times, &nodes, &sweeps}) section.add(std::move(*plot));
 }
 
-// Of settled ticks without a spike, the share that takes longer than the budget.
+// Returns the share of the settled ticks without a spike that take longer than the budget.
 double over_budget(const Course& course, const Phases& phases) {
   std::size_t over = 0, all = 0;
   for (std::size_t i = 0; i < course.ticks.size(); ++i) {
@@ -457,7 +457,7 @@ void run_refresh_rate(const Lab& lab, Section& section) {
   section.at_most("with-control", "no spread in time", over_budget(held, phases),
                   paper(0.02, "figure 17: no spread in time"),
                   "The same with control, from 200 cycles after each change of the machine on.");
-  // What 0.8 ms leave room for when all takes so much longer.
+  // The machine does so many node sweeps in 0.8 ms while all takes kSlowest times as long.
   const double room = (kBudget_us / kSlowest - kFixed_us) / kPerSweep_us;
   section.at_most(
       "work-when-slowest", fmt::format("{:.0f} node sweeps", room),

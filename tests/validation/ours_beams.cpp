@@ -28,8 +28,8 @@ struct Law {
   const char* title;
   std::string material;           // keys of [material]
   std::optional<double> poisson;  // springs: as the mesh makes it
-  // Of the cantilever on the finest mesh of the long and of the short form, errors on record where
-  // the target is missed.
+  // The cantilever misses the target with these errors on the finest mesh of the long and of the
+  // short form; without a value the target is kept.
   std::optional<double> on_record, short_on_record;
 
   Bound beam_bound(bool is_short) const {
@@ -58,7 +58,8 @@ struct Elastic {
   double young_pa, shear_pa, poisson;
 };
 
-// What the law is as a continuum: springs in five tets per cell are stiffer along the cell's axes.
+// Returns the constants of the law as a continuum. Springs in five tets per cell are stiffer along
+// the cell's axes.
 Elastic elastic_of(const Law& law, const organ::Organ& organ) {
   if (law.poisson) return {kYoung_pa, kYoung_pa / (2 * (1 + *law.poisson)), *law.poisson};
   const auto c = constants_of(organ);

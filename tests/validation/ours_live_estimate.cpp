@@ -1,6 +1,6 @@
-// What a local reduction estimates of its own error, beside what this is: presses of many kinds,
-// with the limit of force lifted, each beside the converged session. From which estimate on a
-// session should give a patch up.
+// Compares a local reduction's estimate of its own error with the true error: in presses of many
+// kinds, with the limit of force lifted, each beside the converged session. The result says from
+// which estimate on a session should give a patch up.
 
 #include <spdlog/fmt/fmt.h>
 
@@ -18,9 +18,10 @@ namespace {
 
 // A state is bad with more error of force than this; at most kMissed of the bad may go unseen.
 constexpr double kBad = 0.03, kMissed = 0.01;
-// What a session would have to hold the estimate against. On the built-in liver it misses some 1 %
-// of the bad states, and three of five good ones raise an alarm, as on the coarse one: of little
-// use. Sessions hold it against a larger one, as a guard (reduced_tissue.cpp).
+// A session would have to hold the estimate against this threshold. On the built-in liver it misses
+// some 1 % of the bad states, and three of five good ones raise an alarm, as on the coarse one, so
+// it is of little use. Sessions hold the estimate against a larger threshold, as a guard
+// (reduced_tissue.cpp).
 constexpr double kThreshold = 0.035, kMostAlarms = 0.2, kAlarmsOnRecord = 0.85;
 constexpr double kLeastForce_n = 0.05;
 constexpr Tick kStateTicks = 8;
@@ -62,7 +63,7 @@ double threshold_of(const std::vector<State>& states, bool only_within) {
     if (state.force > kBad && (state.is_within || !only_within)) bad.push_back(state.estimate);
   if (bad.empty()) return std::nan("");
   std::ranges::sort(bad);
-  // As many may be at or below it.
+  // At most `may` bad states may have an estimate at or below the threshold.
   const auto may =
       static_cast<std::size_t>(std::ceil(kMissed * static_cast<double>(bad.size())) - 1);
   return std::nextafter(bad[may], 0.0);
@@ -93,7 +94,8 @@ class Study {
  public:
   Study(const Lab& lab, Section& section, const LiveLiver& liver, std::string& csv)
       : section_(section), liver_(liver), is_short_(lab.is_short()), csv_(csv) {
-    // As if it were trained with the largest force that there is: nothing else reads it.
+    // The reduction claims the largest force that there is as its training force, which nothing
+    // else reads.
     auto lifted = *liver.reduction.local;
     lifted.force_n = organ::kMaxLocalForce_n;
     lifted_ = std::make_shared<organ::LocalReduction>(std::move(lifted));

@@ -21,8 +21,8 @@ constexpr Tick kShortest = 4, kSpread = 25;
 constexpr int kMostRounds = 12;
 constexpr float kBladeSpeed_m_s = 0.1f, kBladeDeep_m = 0.012f, kBladeWay_m = 0.02f;
 constexpr Tick kPressTicks = 250;  // until the blade comes
-// Of hand-overs as frequent as in sessions at most, from when the press has come to rest: the
-// tissue creeps.
+// Hand-overs come as often as in sessions at most. They begin once the press is at rest, because
+// the tissue creeps until then.
 constexpr Tick kRestTicks = 600, kShakenTicks = 8000, kShakenInterval = 16;
 constexpr double kShakenDepth_m = 0.004, kMostShaken = 0.15;
 constexpr std::size_t kLeastShakes = kShakenTicks / kShakenInterval * 4 / 5;
@@ -45,7 +45,8 @@ const char* name_of(Kind kind) {
   return "?";
 }
 
-// Of the force at tick number i, from 0: 2 is the first that has one. NaN: hardly any contact.
+// Returns the jump of the force at tick number i, from 0, relative to the force. The first jump is
+// at tick 2; NaN means hardly any contact.
 double jump_at(const Course& course, std::size_t i, double least_n) {
   const auto force = [&](std::size_t tick) { return course.ticks[tick].force_n; };
   if (i < 2 || length(force(i)) < least_n || length(force(i - 2)) < least_n) return std::nan("");
@@ -135,7 +136,7 @@ class Study {
 
   void cut_beside(const LivePlace& place, float away_m) {
     const Vec3f way = place.inward * -1.0f, across = cross(place.outward, way);
-    // Over the surface there.
+    // The blade enters at the node of the surface that is nearest to the wanted place.
     const auto& x = liver_.organ().mesh.rest_positions;
     const auto normals = mesh::surface_normals(liver_.organ().mesh);
     const Vec3f wanted = place.position + way * away_m;

@@ -23,7 +23,7 @@ namespace trocar::validation {
 
 class RemodelledSprings {
  public:
-  // Of an organ with SpringLaw::Constant; viscosity in N s/m per node.
+  // Takes an organ with SpringLaw::Constant; the viscosity is in N s/m per node.
   RemodelledSprings(const organ::Organ& organ, double viscosity_n_s_m);
 
   // Repeats what a cut of the same organ did.

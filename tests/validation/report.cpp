@@ -36,7 +36,7 @@ std::string csv_field(const std::string& text) {
   return out + "\"";
 }
 
-// A cell of a Markdown table.
+// Escapes the bar, which separates the cells of a Markdown table.
 std::string md_cell(const std::string& text) {
   std::string out;
   for (const char c : text) out += c == '|' ? std::string("\\|") : std::string(1, c);

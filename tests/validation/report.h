@@ -1,7 +1,7 @@
 #pragma once
 
-// What the validation experiments found, and the two files that say it: results.json for programs,
-// report.html for people.
+// A report holds what the validation experiments found. Two files say it: results.json for
+// programs, report.html for people.
 //
 // A check compares one number of ours with the paper's, with a closed form or with a reference
 // solution: its error is never negative and the bound is kept if error <= bound. "At least x" has
@@ -109,7 +109,7 @@ struct Section {
   // Counts and states that are so or are not.
   void exactly(const std::string& what, const std::string& expected, const std::string& ours,
                Bound bound, const std::string& note);
-  // What is worth a row and has nothing to be held against.
+  // Adds a figure that is worth a row and has nothing to be held against.
   void measured(const std::string& what, const std::string& ours, const std::string& note);
   // A row if a step did not reach its tolerance; after the last step.
   void check_convergence();
@@ -136,7 +136,7 @@ std::string shown_percent(double share);
 std::string to_json(const std::vector<Section>& sections);
 std::string run_to_json(const Report& report);
 std::string to_csv(const std::vector<Section>& sections);
-// The page of the documentation.
+// Returns the page of the documentation.
 std::string to_markdown(const Report& report);
 // Error: gnuplot is missing.
 Result<std::string> to_html(const Report& report);

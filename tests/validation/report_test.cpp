@@ -1,4 +1,4 @@
-// What counts as kept, missed and broken, and what the files say of it.
+// Tests what counts as kept, missed and broken, and what the files say of it.
 
 #include "tests/validation/report.h"
 

@@ -18,7 +18,7 @@ Result<std::uint32_t> length_of(const Bytes& frame, std::uint32_t limit) {
 }
 
 TEST(framing, exact_bytes) {
-  // Field 5 (ping), length 2; field 1 varint 7.
+  // The message is field 5 (ping) of length 2; in it field 1 is the varint 7.
   EXPECT_EQ(*encode_envelope(ping(7)), (Bytes{4, 0, 0, 0, 0x2a, 2, 0x08, 7}));
 }
 

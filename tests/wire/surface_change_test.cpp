@@ -33,13 +33,13 @@ VertexIndex nearest(const SurfaceLayout& layout, const QuantisedVertex& at) {
   return VertexIndex(static_cast<std::size_t>(
       std::ranges::min_element(layout.rest_quanta, {}, distance) - layout.rest_quanta.begin()));
 }
-// A slit along the top of the box.
+// Opens a slit along the top of the box.
 SurfaceChange slit(const SurfaceLayout& layout) {
   const auto path =
       path_between(layout, nearest(layout, {-800, 625, 0}), nearest(layout, {800, 625, 0}));
   return open_slit(layout, path, {0, -300, 0});
 }
-// What a client has of it.
+// Removes the indices of nodes, which a client does not have.
 SurfaceLayout without_nodes(SurfaceLayout layout) {
   layout.vertex_of_node.clear();
   std::ranges::fill(layout.node_of_vertex, NodeIndex{});

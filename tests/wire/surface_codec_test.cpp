@@ -177,7 +177,7 @@ TEST(surface_codec, smooth_keyframe_is_smaller_than_temporal_would_be) {
   EXPECT_LT(keyframe_of(ramp).size(), 4096u * 3 / 2);
 }
 
-// What a decoder must reject, one reason each; the surface stays as it was.
+// Each case is malformed for one reason; a decoder must reject it and leave the surface as it was.
 
 struct Malformed {
   const char* what;

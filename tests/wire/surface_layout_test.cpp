@@ -25,7 +25,7 @@ organ::Organ small_organ() {
 
 TEST(surface_layout, slots_follow_the_morton_curve) {
   const SurfaceLayout layout = world::make_surface_layout(small_organ());
-  // Origin, then x, y, z.
+  // The order is that of the Morton curve: the origin, then the nodes on x, y and z.
   EXPECT_EQ(layout.node_of_vertex,
             (std::vector{NodeIndex(3), NodeIndex(0), NodeIndex(4), NodeIndex(1)}));
   EXPECT_EQ(layout.vertex_of_node, (std::vector{VertexIndex(1), VertexIndex(3), VertexIndex(),
