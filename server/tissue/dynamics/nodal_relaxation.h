@@ -22,8 +22,8 @@ class NodalRelaxation {
   NodalRelaxation(const topology::Topology& topology, const Groups& groups,
                   const NodalStrain& strain, const RelaxationTerms& terms);
 
-  // Follows an edit as Relaxation::follow() does, after the smoothing domains have.
-  void follow(const topology::Topology& topology, const Groups& groups,
+  // Follows an edit as Relaxation::update() does, after the smoothing domains have.
+  void update(const topology::Topology& topology, const Groups& groups,
               std::span<const GroupLanes> lanes);
 
   std::size_t block_count() const { return blocks_.size(); }

@@ -18,7 +18,7 @@
 namespace trocar::dynamics {
 
 // This report says what following a change has cost.
-struct FollowReport {
+struct UpdateReport {
   std::size_t nodes_changed = 0;  // whose existence, place or elements have changed
   std::size_t nodes_moved = 0;    // to another slot
   std::size_t groups = 0;         // with lanes written

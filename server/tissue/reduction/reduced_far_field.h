@@ -72,9 +72,9 @@ class ReducedFarField : public dynamics::FarFieldSolver {
     float weight;
   };
   // Returns the organ's nodes with which a node made by cuts moves, and their weights.
-  std::span<const Share> shares_of(std::size_t follower) const {
-    return std::span(shares_).subspan(share_begins_[follower],
-                                      share_begins_[follower + 1] - share_begins_[follower]);
+  std::span<const Share> shares_of(std::size_t cut_node) const {
+    return std::span(shares_).subspan(share_begins_[cut_node],
+                                      share_begins_[cut_node + 1] - share_begins_[cut_node]);
   }
   std::size_t cut_node_count() const { return share_begins_.size() - 1; }
   // Values of the organ's nodes from `begin` to `end`, with the shares of those that follow.
