@@ -22,7 +22,7 @@ void admit_inputs(State& state, StepContext& context) {
 }
 
 void follow_contacts(State& state, StepContext& context) {
-  state.proxies.follow(context.contacts, state.world, state.tools);
+  state.proxies.update(context.contacts, state.world, state.tools);
 }
 
 void update_claims(State& state, StepContext& context) {
@@ -229,8 +229,8 @@ ToolFrame describe_tool(const State& state, const StepContext& context, ToolSlot
 }
 
 void quantise_and_publish(State& state, StepContext& context) {
-  const auto new_layout = state.cuts.take_new_layout();
-  const auto change = state.cuts.take_change();
+  const auto new_layout = state.cuts.pop_new_layout();
+  const auto change = state.cuts.pop_change();
   const auto& layout = state.cuts.layout();
   context.surface_displacements.resize(layout.vertex_count());
   for (std::size_t v = 0; v < layout.vertex_count(); ++v)
