@@ -45,7 +45,7 @@ Status Hands::send_due(const replica::Replica& replica, replica::SessionSource& 
                        std::uint64_t now_ns) {
   if (replica.newest() == nullptr || source.state() != replica::SourceState::Live) return {};
   if (mouse_)
-    if (const auto sample = mouse_->take_due(now_ns)) send(source, 0, *sample);
+    if (const auto sample = mouse_->pop_due(now_ns)) send(source, 0, *sample);
   if (script_) {
     auto hand = device::ScriptHand::make(std::move(*script_), replica.topology().rest_positions,
                                          replica.topology().triangles);

@@ -62,7 +62,7 @@ void MouseTool::update(const PointerInput& input, const ViewRays& view,
   is_valid_ = true;
 }
 
-std::optional<tool::ToolSample> MouseTool::take_due(std::uint64_t now_ns) {
+std::optional<tool::ToolSample> MouseTool::pop_due(std::uint64_t now_ns) {
   if (!is_valid_) return std::nullopt;
   const std::uint64_t since = now_ns - last_sent_ns_;
   const bool is_due = last_sent_ns_ == 0 || since >= kKeepAliveNs ||

@@ -38,7 +38,7 @@ class MouseTool {
   const tool::ToolSample& current() const { return sample_; }
   bool is_valid() const { return is_valid_; }
   // A sample if one is due.
-  std::optional<tool::ToolSample> take_due(std::uint64_t now_ns);
+  std::optional<tool::ToolSample> pop_due(std::uint64_t now_ns);
 
  private:
   tool::ToolShape shape_;

@@ -229,7 +229,7 @@ asio::awaitable<void> NetSource::Session::read_messages() {
     if (!has_header || !make_room_for(header)) break;
     const bool has_body = co_await read_exactly(body_.data(), body_.size());
     if (!has_body) break;
-    const auto message = take_message();
+    const auto message = pop_message();
     if (!message) continue;
     co_await deliver(message, header.size() + body_.size());
     end_if_final(*message);
@@ -246,7 +246,7 @@ bool NetSource::Session::make_room_for(std::span<const std::uint8_t, wire::kHead
 }
 
 // Returns the message for the render thread; null if it is this layer's own business or broken.
-std::shared_ptr<const proto::Envelope> NetSource::Session::take_message() {
+std::shared_ptr<const proto::Envelope> NetSource::Session::pop_message() {
   last_heard_ = Clock::now();
   auto message = std::make_shared<proto::Envelope>();
   if (const auto decoded = wire::decode_envelope(body_, *message); !decoded) {

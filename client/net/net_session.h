@@ -59,7 +59,7 @@ class NetSource::Session {
   void end_if_failed(const std::exception_ptr& failure);
   void begin_conversation();
   bool make_room_for(std::span<const std::uint8_t, wire::kHeaderBytes> header);
-  std::shared_ptr<const proto::Envelope> take_message();
+  std::shared_ptr<const proto::Envelope> pop_message();
   void end_if_final(const proto::Envelope& message);
   void end_after_stream();
   void say_waiting(const std::string& why) const;

@@ -65,12 +65,12 @@ class ByteReader {
   std::size_t remaining() const { return bytes_.size() - position_; }
 
   template <PlainNumber T>
-  T take() {
+  T read() {
     T value{};
-    if (const auto bytes = take_bytes(sizeof(T)); ok_) std::memcpy(&value, bytes.data(), sizeof(T));
+    if (const auto bytes = read_bytes(sizeof(T)); ok_) std::memcpy(&value, bytes.data(), sizeof(T));
     return value;
   }
-  BytesView take_bytes(std::uint64_t count) {
+  BytesView read_bytes(std::uint64_t count) {
     if (!ok_ || count > remaining()) {
       ok_ = false;
       return {};
@@ -79,8 +79,8 @@ class ByteReader {
     position_ += view.size();
     return view;
   }
-  std::string_view take_string() {
-    const auto bytes = take_bytes(take<std::uint32_t>());
+  std::string_view read_string() {
+    const auto bytes = read_bytes(read<std::uint32_t>());
     return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
   }
 

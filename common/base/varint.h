@@ -15,10 +15,10 @@ inline void put_varint(Bytes& out, std::uint64_t value) {
 }
 
 // Nothing for one that is cut short, larger than `most`, or longer than that takes.
-inline std::optional<std::uint64_t> take_varint(ByteReader& reader, std::uint64_t most) {
+inline std::optional<std::uint64_t> read_varint(ByteReader& reader, std::uint64_t most) {
   std::uint64_t value = 0;
   for (unsigned shift = 0; shift < 64 && most >> shift != 0; shift += 7) {
-    const auto byte = reader.take<std::uint8_t>();
+    const auto byte = reader.read<std::uint8_t>();
     value |= std::uint64_t{byte & 0x7fu} << shift;
     if (byte < 0x80) return reader.ok() && value <= most ? std::optional(value) : std::nullopt;
   }

@@ -29,8 +29,8 @@ struct RecordHeader {
 };
 RecordHeader record_header(BytesView bytes) {
   ByteReader reader(bytes);
-  const auto opcode = reader.take<Opcode>();
-  return {opcode, reader.take<std::uint64_t>()};
+  const auto opcode = reader.read<Opcode>();
+  return {opcode, reader.read<std::uint64_t>()};
 }
 
 }  // namespace
@@ -116,7 +116,7 @@ bool McapReader::open_summary() {
   RecordWalker walker(BytesView(*checked).first(static_cast<std::size_t>(summary_bytes)));
   bool valid = true;
   while (const auto entry = walker.next())
-    valid = valid && take_summary_record(*entry, footer->summary_start);
+    valid = valid && read_summary_record(*entry, footer->summary_start);
   if (!valid || !walker.ok()) {
     forget_index();
     return false;
@@ -125,7 +125,7 @@ bool McapReader::open_summary() {
   return true;
 }
 
-bool McapReader::take_summary_record(const RecordView& record, std::uint64_t summary_start) {
+bool McapReader::read_summary_record(const RecordView& record, std::uint64_t summary_start) {
   switch (record.opcode) {
     case Opcode::Schema: {
       auto schema = parse_schema(record.content);

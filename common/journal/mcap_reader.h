@@ -89,7 +89,7 @@ class McapReader {
   Result<Bytes> read_bytes(std::uint64_t offset, std::uint64_t length) const;
   Status open_header();
   bool open_summary();
-  bool take_summary_record(const RecordView& record, std::uint64_t summary_start);
+  bool read_summary_record(const RecordView& record, std::uint64_t summary_start);
   bool read_metadata(const McapMetadataIndex& index);
   void forget_index();
   void scan();

@@ -32,14 +32,14 @@ void put_number_map(Bytes& out, const std::map<std::uint16_t, std::uint64_t>& ma
 }
 
 std::string take_text(ByteReader& reader) {
-  return std::string(reader.take_string());
+  return std::string(reader.read_string());
 }
 Bytes take_owned(ByteReader& reader, std::uint64_t length) {
-  const BytesView view = reader.take_bytes(length);
+  const BytesView view = reader.read_bytes(length);
   return {view.begin(), view.end()};
 }
 bool take_string_map(ByteReader& reader, StringMap& map) {
-  ByteReader entries(reader.take_bytes(reader.take<std::uint32_t>()));
+  ByteReader entries(reader.read_bytes(reader.read<std::uint32_t>()));
   while (entries.ok() && entries.remaining() > 0) {
     std::string key = take_text(entries);
     map.insert_or_assign(std::move(key), take_text(entries));
@@ -47,10 +47,10 @@ bool take_string_map(ByteReader& reader, StringMap& map) {
   return entries.ok() && reader.ok();
 }
 bool take_number_map(ByteReader& reader, std::map<std::uint16_t, std::uint64_t>& map) {
-  ByteReader entries(reader.take_bytes(reader.take<std::uint32_t>()));
+  ByteReader entries(reader.read_bytes(reader.read<std::uint32_t>()));
   while (entries.ok() && entries.remaining() > 0) {
-    const auto key = entries.take<std::uint16_t>();
-    map.insert_or_assign(key, entries.take<std::uint64_t>());
+    const auto key = entries.read<std::uint16_t>();
+    map.insert_or_assign(key, entries.read<std::uint64_t>());
   }
   return entries.ok() && reader.ok();
 }
@@ -188,18 +188,18 @@ std::optional<McapHeader> parse_header(BytesView content) {
 std::optional<McapSchema> parse_schema(BytesView content) {
   ByteReader reader(content);
   McapSchema schema;
-  schema.id = reader.take<std::uint16_t>();
+  schema.id = reader.read<std::uint16_t>();
   schema.name = take_text(reader);
   schema.encoding = take_text(reader);
-  schema.data = take_owned(reader, reader.take<std::uint32_t>());
+  schema.data = take_owned(reader, reader.read<std::uint32_t>());
   if (schema.id == 0) return std::nullopt;
   return parsed(reader, std::move(schema));
 }
 std::optional<McapChannel> parse_channel(BytesView content) {
   ByteReader reader(content);
   McapChannel channel;
-  channel.id = reader.take<std::uint16_t>();
-  channel.schema_id = reader.take<std::uint16_t>();
+  channel.id = reader.read<std::uint16_t>();
+  channel.schema_id = reader.read<std::uint16_t>();
   channel.topic = take_text(reader);
   channel.message_encoding = take_text(reader);
   if (!take_string_map(reader, channel.metadata)) return std::nullopt;
@@ -208,49 +208,49 @@ std::optional<McapChannel> parse_channel(BytesView content) {
 std::optional<McapMessage> parse_message(BytesView content) {
   ByteReader reader(content);
   McapMessage message;
-  message.channel_id = reader.take<std::uint16_t>();
-  message.sequence = reader.take<std::uint32_t>();
-  message.log_time = reader.take<std::uint64_t>();
-  message.publish_time = reader.take<std::uint64_t>();
-  message.data = reader.take_bytes(reader.remaining());
+  message.channel_id = reader.read<std::uint16_t>();
+  message.sequence = reader.read<std::uint32_t>();
+  message.log_time = reader.read<std::uint64_t>();
+  message.publish_time = reader.read<std::uint64_t>();
+  message.data = reader.read_bytes(reader.remaining());
   return parsed(reader, message);
 }
 std::optional<McapChunk> parse_chunk(BytesView content) {
   ByteReader reader(content);
   McapChunk chunk;
-  chunk.start_time = reader.take<std::uint64_t>();
-  chunk.end_time = reader.take<std::uint64_t>();
-  chunk.uncompressed_size = reader.take<std::uint64_t>();
-  chunk.uncompressed_crc = reader.take<std::uint32_t>();
-  chunk.compression = reader.take_string();
-  chunk.records = reader.take_bytes(reader.take<std::uint64_t>());
+  chunk.start_time = reader.read<std::uint64_t>();
+  chunk.end_time = reader.read<std::uint64_t>();
+  chunk.uncompressed_size = reader.read<std::uint64_t>();
+  chunk.uncompressed_crc = reader.read<std::uint32_t>();
+  chunk.compression = reader.read_string();
+  chunk.records = reader.read_bytes(reader.read<std::uint64_t>());
   return parsed(reader, chunk);
 }
 std::optional<McapChunkIndex> parse_chunk_index(BytesView content) {
   ByteReader reader(content);
   McapChunkIndex index;
-  index.start_time = reader.take<std::uint64_t>();
-  index.end_time = reader.take<std::uint64_t>();
-  index.chunk_offset = reader.take<std::uint64_t>();
-  index.chunk_length = reader.take<std::uint64_t>();
+  index.start_time = reader.read<std::uint64_t>();
+  index.end_time = reader.read<std::uint64_t>();
+  index.chunk_offset = reader.read<std::uint64_t>();
+  index.chunk_length = reader.read<std::uint64_t>();
   if (!take_number_map(reader, index.message_index_offsets)) return std::nullopt;
-  index.message_index_length = reader.take<std::uint64_t>();
+  index.message_index_length = reader.read<std::uint64_t>();
   index.compression = take_text(reader);
-  index.compressed_size = reader.take<std::uint64_t>();
-  index.uncompressed_size = reader.take<std::uint64_t>();
+  index.compressed_size = reader.read<std::uint64_t>();
+  index.uncompressed_size = reader.read<std::uint64_t>();
   return parsed(reader, std::move(index));
 }
 std::optional<McapStatistics> parse_statistics(BytesView content) {
   ByteReader reader(content);
   McapStatistics statistics;
-  statistics.message_count = reader.take<std::uint64_t>();
-  statistics.schema_count = reader.take<std::uint16_t>();
-  statistics.channel_count = reader.take<std::uint32_t>();
-  statistics.attachment_count = reader.take<std::uint32_t>();
-  statistics.metadata_count = reader.take<std::uint32_t>();
-  statistics.chunk_count = reader.take<std::uint32_t>();
-  statistics.start_time = reader.take<std::uint64_t>();
-  statistics.end_time = reader.take<std::uint64_t>();
+  statistics.message_count = reader.read<std::uint64_t>();
+  statistics.schema_count = reader.read<std::uint16_t>();
+  statistics.channel_count = reader.read<std::uint32_t>();
+  statistics.attachment_count = reader.read<std::uint32_t>();
+  statistics.metadata_count = reader.read<std::uint32_t>();
+  statistics.chunk_count = reader.read<std::uint32_t>();
+  statistics.start_time = reader.read<std::uint64_t>();
+  statistics.end_time = reader.read<std::uint64_t>();
   if (!take_number_map(reader, statistics.channel_message_counts)) return std::nullopt;
   return parsed(reader, std::move(statistics));
 }
@@ -264,17 +264,17 @@ std::optional<McapMetadata> parse_metadata(BytesView content) {
 std::optional<McapMetadataIndex> parse_metadata_index(BytesView content) {
   ByteReader reader(content);
   McapMetadataIndex index;
-  index.offset = reader.take<std::uint64_t>();
-  index.length = reader.take<std::uint64_t>();
+  index.offset = reader.read<std::uint64_t>();
+  index.length = reader.read<std::uint64_t>();
   index.name = take_text(reader);
   return parsed(reader, std::move(index));
 }
 std::optional<McapFooter> parse_footer(BytesView content) {
   ByteReader reader(content);
   McapFooter footer;
-  footer.summary_start = reader.take<std::uint64_t>();
-  footer.summary_offset_start = reader.take<std::uint64_t>();
-  footer.summary_crc = reader.take<std::uint32_t>();
+  footer.summary_start = reader.read<std::uint64_t>();
+  footer.summary_offset_start = reader.read<std::uint64_t>();
+  footer.summary_crc = reader.read<std::uint32_t>();
   return parsed(reader, footer);
 }
 
@@ -282,8 +282,8 @@ std::optional<RecordView> RecordWalker::next() {
   if (!reader_.ok() || reader_.remaining() == 0) return std::nullopt;
   RecordView record;
   record.offset = reader_.position();
-  record.opcode = reader_.take<Opcode>();
-  record.content = reader_.take_bytes(reader_.take<std::uint64_t>());
+  record.opcode = reader_.read<Opcode>();
+  record.content = reader_.read_bytes(reader_.read<std::uint64_t>());
   return parsed(reader_, record);
 }
 

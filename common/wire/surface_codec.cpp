@@ -170,7 +170,7 @@ Error bad_payload(const char* what) {
 class BlockList {
  public:
   BlockList(BytesView payload, std::size_t vertices) : reader_(payload), vertices_(vertices) {
-    const auto count = take_varint(reader_, 0xffffffffu);
+    const auto count = read_varint(reader_, 0xffffffffu);
     ok_ = count && *count <= block_count_of(vertices);
     left_ = ok_ ? static_cast<std::uint32_t>(*count) : 0;
   }
@@ -179,7 +179,7 @@ class BlockList {
   bool next(std::size_t& block, std::uint64_t& mask) {
     if (left_ == 0) return false;
     --left_;
-    const auto header = take_varint(reader_, 0xffffffffu);
+    const auto header = read_varint(reader_, 0xffffffffu);
     if (!header) return fail();
     const std::uint64_t at = next_block_ + (*header >> 1);
     if (at >= block_count_of(vertices_)) return fail();
@@ -187,7 +187,7 @@ class BlockList {
     next_block_ = at + 1;
     const std::uint64_t full = full_mask(block, vertices_);
     // Two u32, low slots first, lie like one little-endian u64.
-    mask = (*header & 1) ? full : reader_.take<std::uint64_t>();
+    mask = (*header & 1) ? full : reader_.read<std::uint64_t>();
     return (reader_.ok() && mask != 0 && (mask & ~full) == 0) || fail();
   }
   bool ok() const { return ok_; }

@@ -19,10 +19,10 @@ TEST(Bytes, WritesLittleEndianAndReadsBackWhatWasWritten) {
   EXPECT_EQ(bytes, (Bytes{4, 3, 2, 1, 2, 1, 0, 0, 0xc0, 0xbf, 2, 0, 0, 0, 'a', 'b'}));
 
   ByteReader reader(bytes);
-  EXPECT_EQ(reader.take<std::uint32_t>(), 0x01020304u);
-  EXPECT_EQ(reader.take<Colour>(), Colour::Blue);
-  EXPECT_EQ(reader.take<float>(), -1.5f);
-  EXPECT_EQ(reader.take_string(), "ab");
+  EXPECT_EQ(reader.read<std::uint32_t>(), 0x01020304u);
+  EXPECT_EQ(reader.read<Colour>(), Colour::Blue);
+  EXPECT_EQ(reader.read<float>(), -1.5f);
+  EXPECT_EQ(reader.read_string(), "ab");
   EXPECT_TRUE(reader.ok());
   EXPECT_EQ(reader.remaining(), 0u);
 }
@@ -30,9 +30,9 @@ TEST(Bytes, WritesLittleEndianAndReadsBackWhatWasWritten) {
 TEST(Bytes, AReadPastTheEndFailsAndEveryLaterOneToo) {
   const Bytes bytes{1, 2, 3};
   ByteReader reader(bytes);
-  EXPECT_EQ(reader.take<std::uint32_t>(), 0u);
+  EXPECT_EQ(reader.read<std::uint32_t>(), 0u);
   EXPECT_FALSE(reader.ok());
-  EXPECT_EQ(reader.take<std::uint8_t>(), 0u) << "although one byte would fit";
+  EXPECT_EQ(reader.read<std::uint8_t>(), 0u) << "although one byte would fit";
   EXPECT_FALSE(reader.ok());
 }
 
@@ -41,10 +41,10 @@ TEST(Bytes, ALengthLargerThanTheRestIsRefusedWithoutReadingIt) {
   ByteWriter(bytes).put(std::numeric_limits<std::uint32_t>::max());
   bytes.push_back('x');
   ByteReader strings(bytes);
-  EXPECT_EQ(strings.take_string(), "");
+  EXPECT_EQ(strings.read_string(), "");
   EXPECT_FALSE(strings.ok());
   ByteReader raw(bytes);
-  EXPECT_TRUE(raw.take_bytes(std::numeric_limits<std::uint64_t>::max()).empty());
+  EXPECT_TRUE(raw.read_bytes(std::numeric_limits<std::uint64_t>::max()).empty());
   EXPECT_FALSE(raw.ok());
 }
 
@@ -56,16 +56,16 @@ TEST(Bytes, TruncationAtEveryLengthIsSeen) {
   writer.put(std::uint16_t{9});
   for (std::size_t length = 0; length <= bytes.size(); ++length) {
     ByteReader reader(BytesView(bytes).first(length));
-    reader.take<std::uint64_t>();
-    reader.take_string();
-    reader.take<std::uint16_t>();
+    reader.read<std::uint64_t>();
+    reader.read_string();
+    reader.read<std::uint16_t>();
     EXPECT_EQ(reader.ok(), length == bytes.size()) << length;
   }
 }
 
 TEST(Bytes, AnEmptyTakeSucceedsAtTheEnd) {
   ByteReader reader(BytesView{});
-  EXPECT_TRUE(reader.take_bytes(0).empty());
+  EXPECT_TRUE(reader.read_bytes(0).empty());
   EXPECT_TRUE(reader.ok());
 }
 

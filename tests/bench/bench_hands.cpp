@@ -225,7 +225,7 @@ void Session::one_tick() {
   const auto report = simulation_.tick(inputs_, decisions);
   const auto cpu_ns = thread_cpu_ns() - cpu;
   wall_.push_back(static_cast<double>(monotonic_ns() - wall) * 1e-3);
-  simulation_.take_frame();
+  simulation_.pop_frame();
   // The controller hears the CPU time, which the tick itself needs: a shared machine's other work
   // is not what is measured.
   if (controller_) controller_->observe(report, {cpu_ns, 0});

@@ -76,7 +76,7 @@ int run(const char* title, material::ElasticLaw law, const step::TickDecisions& 
       }
     const auto& report = simulation.tick(inputs, decisions);
     inputs.clear();
-    simulation.take_frame();
+    simulation.pop_frame();
     if (tick <= kWarmUp) continue;
     std::uint32_t total = 0;
     for (std::size_t s = 0; s < stages.size(); ++s) {

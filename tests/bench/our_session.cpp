@@ -65,7 +65,7 @@ TickTimes OurSession::tick() {
   sample_tools();
   report_ = simulation_.tick(inputs_, decisions_);
   inputs_.clear();
-  if (const auto frame = simulation_.take_frame())
+  if (const auto frame = simulation_.pop_frame())
     for (const auto& tool : frame->tools) forces_.push_back(tool.force_n);
   const auto seconds = [&](step::Stage stage) {
     return 1e-9 * report_.stage_cpu_ns[static_cast<std::size_t>(stage)];

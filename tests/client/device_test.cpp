@@ -75,7 +75,7 @@ class MouseToolTest : public ::testing::Test {
 };
 
 TEST_F(MouseToolTest, HoversJustAboveTheSurfaceUnderThePointer) {
-  EXPECT_FALSE(tool_.take_due(1).has_value());
+  EXPECT_FALSE(tool_.pop_due(1).has_value());
   update();
   const auto view = camera_.rays(size_);
   const auto surface = device::pick(blob_.positions, blob_.triangles, view.eye,
@@ -127,7 +127,7 @@ TEST_F(MouseToolTest, SamplesAtMostEveryEightMillisecondsAndAtLeastEveryForty) {
   for (std::uint64_t ms = 100; ms < 1100; ++ms) {
     input_.x = 600 + static_cast<float>(ms % 100);
     update();
-    if (tool_.take_due(ms * 1'000'000)) {
+    if (tool_.pop_due(ms * 1'000'000)) {
       EXPECT_TRUE(last == 0 || ms - last >= 8);
       last = ms;
       ++moving;
@@ -136,7 +136,7 @@ TEST_F(MouseToolTest, SamplesAtMostEveryEightMillisecondsAndAtLeastEveryForty) {
   EXPECT_NEAR(moving, 125, 2);
   update(100);
   for (std::uint64_t ms = 1100; ms < 2100; ++ms)
-    if (tool_.take_due(ms * 1'000'000)) {
+    if (tool_.pop_due(ms * 1'000'000)) {
       EXPECT_LE(ms - last, 40u);
       last = ms;
       ++still;

@@ -33,7 +33,7 @@ struct Bodies {
   void set_velocities(Velocity&& velocity) {
     for (std::size_t i = 0; i < world.node_count(); ++i)
       world.velocities[i] = velocity(organ.mesh.rest_positions[i]);
-    solver.take_state(world);
+    solver.read_state(world);
   }
   Vec3d momentum() const {
     Vec3d sum;

@@ -139,7 +139,7 @@ TEST(ControlledSession, EveryStepDownAndUpIsRecordedAndSimulatesAgain) {
   app::SimulationLoop loop(simulation, inbox, handover, journal->get(),
                            {.rate = RateLimits{}, .tick_count = 2000, .clock_ns = clock_ns}, [] {});
   ASSERT_TRUE(inbox.try_push_join({{0}, 1, {}}));
-  (*journal)->take_participants({{{0}, "Ada", wire::Role::Surgeon, {tool::ToolShape{}}}}, 0);
+  (*journal)->record_participants({{{0}, "Ada", wire::Role::Surgeon, {tool::ToolShape{}}}}, 0);
   for (bool is_last = false; !is_last;) {
     hands::ToolInput input{{0}, {}};
     input.sample.world_from_tool = {top - Vec3f{0, 0.004f, 0}, rotation_from_z({0, 1, 0})};

@@ -38,7 +38,7 @@ std::vector<Vec3d> gradients(dynamics::Tissue& tissue, const std::vector<Vec3f>&
     near.push_back({g, 0xff});
   if (auto* const strain = tissue.nodal_strain())
     for (Group g = 0; g < groups.group_count(); ++g) strain->restart_group(g, x.data());
-  tissue.relaxation()->take_state();
+  tissue.relaxation()->restart();
   for (int i = 0; i < steps; ++i) {
     tissue.relaxation()->begin_step(0.001f, state, workers);
     tissue.relaxation()->end_step(x.data(), near, false, state, workers);
@@ -102,7 +102,7 @@ TEST(CutRelaxation, PartsRememberWhatTheWholeDid) {
     state.add_node(a);
     for (const auto& [part, parent] : topology.parts())
       state.tets().inherit(part.value, parent.value);
-    tissue.follow_topology(topology);
+    tissue.update_topology(topology);
     topology.clear_changes();
   }
   dynamics::Tissue fresh(topology);
@@ -146,7 +146,7 @@ TEST(CutRelaxation, AveragedTissueFollowsSplitsAsIfBuiltAnew) {
     state.add_node(a);
     for (const auto& [part, parent] : topology.parts())
       state.tets().inherit(part.value, parent.value);
-    tissue.follow_topology(topology);
+    tissue.update_topology(topology);
     topology.clear_changes();
   }
   auto other_state = state;

@@ -212,10 +212,10 @@ TEST(StraightCut, UsesUnusedPlacesFirst) {
     const auto at = from.tets_of(corner);
     for (const auto tet : std::vector<TetIndex>(at.begin(), at.end())) {
       from.remove_tet(tet);
-      places.give_back(tet);
+      places.release(tet);
     }
     from.remove_node(corner);
-    places.give_back(corner);
+    places.release(corner);
   };
   remove_corner(topology, cutter.places());
   Places places(copy);

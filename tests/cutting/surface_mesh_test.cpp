@@ -74,7 +74,7 @@ TEST(SurfaceMesh, FollowsEveryEditAndKeepsItsNumbers) {
         opened += out.opened_area_m2;
         if (out.events.events.empty()) continue;
         ++edits;
-        const auto& edit = surface.follow(topology);
+        const auto& edit = surface.update(topology);
         topology.clear_changes();
         for (const auto triangle : edit.removed) {
           ASSERT_TRUE(known[triangle.value][0].is_valid()) << "removed twice";

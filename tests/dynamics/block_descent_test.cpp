@@ -77,7 +77,7 @@ TEST(BlockDescent, FreeFlightWithNodalDampingFollowsImplicitEuler) {
   organ.fixed_nodes.clear();
   Bench bench(organ);
   for (auto& v : bench.world.velocities) v = {0.2f, 0, 0};
-  bench.solver.take_state(bench.world);
+  bench.solver.read_state(bench.world);
   for (int tick = 0; tick < 100; ++tick) bench.step({.sweeps = 60});
   const double rate = bench.organ.material.node_damping_per_s;
   const double expected = 0.2 * std::pow(1.0 + rate * 1e-3, -100);
@@ -119,7 +119,7 @@ TEST(BlockDescent, EnergyNeverGrowsWithoutATool) {
   for (std::uint32_t i = 0; i < bench.world.node_count(); ++i)
     if (bench.world.node_classes[i] != world::NodeClass::Fixed)
       bench.world.velocities[i] = {0.3f * static_cast<float>(i % 3), -0.2f, 0.1f};
-  bench.solver.take_state(bench.world);
+  bench.solver.read_state(bench.world);
   const auto energy = [&] {
     double e = bench.solver.tissue().energy_j(bench.world.displacements);
     for (std::size_t i = 0; i < bench.world.node_count(); ++i)

@@ -42,10 +42,10 @@ TEST_P(LinearFarField, MatricesAreTheDerivativesOfTheGradient) {
   class Nobody final : public StiffnessSink {
     void add(const SlotLanes&, const Mat8&) override {}
   } nobody;
-  Linearisation::Taking taking;
+  Linearisation::Scratch scratch;
   double largest = 0, worst = 0;
   for (Group g = 0; g < linear.group_count(); ++g) {
-    linear.take(g, pose.data(), taking);
+    linear.renew(g, pose.data(), scratch);
     const auto gradient = [&](const NodeStep8& step) {
       Vec3Lanes lanes;
       store(lanes, step.gradient);
@@ -125,7 +125,7 @@ TEST(LinearFarField, FreeFlightIsExact) {
         organ.material.node_damping_per_s = 0;
         Session session(organ);
         for (auto& v : session.world.velocities) v = {0.2f, -0.1f, 0.05f};
-        session.solver.take_state(session.world);
+        session.solver.read_state(session.world);
         for (int i = 0; i < 300; ++i) session.step(is_linear, interval);
         double worst = 0;
         for (const auto& v : session.world.velocities)
@@ -144,7 +144,7 @@ TEST(LinearFarField, ABlowSwingsAsWithTheEnergies) {
       for (std::size_t i = 0; i < session->world.node_count(); ++i)
         if (session->world.node_classes[i] != world::NodeClass::Fixed)
           session->world.velocities[i] = {0.15f, 0, -0.1f};
-    for (auto* session : {&exact, &linear}) session->solver.take_state(session->world);
+    for (auto* session : {&exact, &linear}) session->solver.read_state(session->world);
     const double at_start = linear.energy_j();
     const double kinetic = at_start - linear.solver.tissue().energy_j(linear.world.displacements);
     double farthest = 0, apart = 0, most = at_start;
@@ -173,7 +173,7 @@ TEST(LinearFarField, LargeStrainsBetweenRenewalsAreNotLinear) {
       if (session->world.node_classes[i] != world::NodeClass::Fixed)
         session->world.velocities[i] = Vec3f{-p.y, p.x, 0.5f * p.x} * 30.0f;  // turned and sheared
     }
-    session->solver.take_state(session->world);
+    session->solver.read_state(session->world);
   }
   double farthest = 0, apart = 0;
   for (int i = 0; i < 60; ++i) {

@@ -285,7 +285,7 @@ TEST_P(LiveRelaxation, TissueUnderTensionBeginsRelaxed) {
     Workers workers(1);
     if (auto* const strain = tissue.nodal_strain())
       for (Group g = 0; g < groups.group_count(); ++g) strain->restart_group(g, x.data());
-    tissue.relaxation()->take_state();
+    tissue.relaxation()->restart();
     tissue.relaxation()->begin_step(0.001f, state, workers);
     double sum = 0;
     for (Group g = 0; g < groups.group_count(); ++g) {

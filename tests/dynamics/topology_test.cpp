@@ -224,7 +224,7 @@ TEST_P(FollowTopology, EveryEditGivesWhatBuildingAnewGives) {
     for (int edit = 0; edit < 40; ++edit) {
       SCOPED_TRACE("seed " + std::to_string(seed) + " edit " + std::to_string(edit));
       for (auto count = edited.below(3) + 1; count > 0; --count) edited.edit();
-      moved += tissue.follow_topology(topology).nodes_moved;
+      moved += tissue.update_topology(topology).nodes_moved;
       topology.clear_changes();
       expect_valid_groups(topology, tissue.groups(), coupling);
       if (edit % 4 == 3) expect_as_built_anew(edited, tissue, seed);
@@ -241,7 +241,7 @@ TEST_P(FollowTopology, WorkIsInProportionToTheChange) {
   std::vector<NodeIndex> neighbours;
   for (int edit = 0; edit < 100; ++edit) {
     edited.edit();
-    const auto report = tissue.follow_topology(topology);
+    const auto report = tissue.update_topology(topology);
     // A changed node, its neighbours if it moved or smoothing domains count, and slots left behind.
     std::set<NodeIndex> expected;
     const auto expect = [&](std::span<const NodeIndex> nodes, bool has_neighbours) {
@@ -268,7 +268,7 @@ TEST_P(FollowTopology, WorkIsInProportionToTheChange) {
 TEST_P(FollowTopology, NoChangeTouchesNothing) {
   EditedOrgan edited(GetParam().make(), 3);
   Tissue tissue(edited.topology());
-  const auto report = tissue.follow_topology(edited.topology());
+  const auto report = tissue.update_topology(edited.topology());
   EXPECT_EQ(report.lanes + report.rows + report.nodes_changed, 0u);
   EXPECT_TRUE(tissue.touched().empty());
 }
@@ -296,7 +296,7 @@ TEST(FollowTopology, LawsThatNeedTheInvariantFollowToo) {
   Hyperelastic<ReducedPolynomialLaw> energy(topology, tissue.groups(), nullptr, parameters, law);
   for (int edit = 0; edit < 30; ++edit) {
     edited.edit();
-    tissue.follow_topology(topology);
+    tissue.update_topology(topology);
     energy.rebuild(topology, tissue.groups(), tissue.touched());
     topology.clear_changes();
   }
@@ -324,7 +324,7 @@ TEST(FollowTopology, ALargeOrganIsTouchedWhereItIsEdited) {
   Tissue tissue(topology);
   for (int edit = 0; edit < 200; ++edit) {
     edited.bisect_edge();
-    const auto report = tissue.follow_topology(topology);
+    const auto report = tissue.update_topology(topology);
     EXPECT_LE(report.nodes_moved, 3u);
     EXPECT_LE(report.lanes, 60u) << "of " << topology.node_count();
     EXPECT_LE(report.rows, 2000u);
@@ -344,7 +344,7 @@ TEST(FollowTopology, FillAndMemoryStayBoundedOverThousandsOfEdits) {
         edited.edit();
       else
         edited.edit_without_growth();
-      tissue.follow_topology(topology);
+      tissue.update_topology(topology);
       topology.clear_changes();
       const auto& groups = tissue.groups();
       lowest = std::min(lowest, groups.fill());
@@ -396,14 +396,14 @@ TEST(FollowTopology, TheSolverFollowsWithAnyNumberOfWorkers) {
       for (int edit = 0; edit < 40; ++edit) {
         edited.edit();
         follow_nodes(topology, world);
-        solver.follow_topology(topology, world);
+        solver.update_topology(topology, world);
         topology.clear_changes();
         std::vector<NodeIndex> near;
         for (std::uint32_t n = 0; n < topology.node_count(); ++n)
           if (topology.has_node(NodeIndex(n)) && world.masses[n] > 0) near.emplace_back(n);
         if (edit == 0) {
           world.velocities[near[30].value] = {0.5f, 0.2f, 0};
-          solver.take_state(world, std::span(near).subspan(30, 1));
+          solver.read_state(world, std::span(near).subspan(30, 1));
         }
         const auto report = solver.solve({}, near, {}, world);
         ASSERT_EQ(report.nodes_rejected, 0u);

@@ -36,7 +36,7 @@ std::map<Tick, std::uint32_t> simulate_again(const std::filesystem::path& file) 
       0, (*journal)->info().last_tick, [&](Tick tick, const proto::TickRecord& message) {
         EXPECT_TRUE(recording::from_message(message, record).ok());
         simulation.tick(record.inputs, record.decisions);
-        if (auto frame = simulation.take_frame()) crcs[tick] = frame->surface_crc;
+        if (auto frame = simulation.pop_frame()) crcs[tick] = frame->surface_crc;
         return true;
       });
   EXPECT_TRUE(read.ok());

@@ -40,7 +40,7 @@ class Session {
     while (frames_.empty()) {
       push_samples();
       loop_.run_tick();
-      handover_.take_all(frames_);
+      handover_.pop_all(frames_);
     }
     return frames_.front();
   }
@@ -82,10 +82,10 @@ TEST(GhostFollower, IsTheFullSolutionToTheBit) {
   for (int i = 0; i < 60; ++i) {
     const auto frame = session.next_frame();
     reduced += frame->solver.is_reduced ? 1u : 0u;
-    follower.follow(*frame);
+    follower.repeat(*frame);
     ASSERT_EQ(follower.status(), GhostStatus::Follows) << i;
     for (const auto& record : frame->records) full.tick(record.inputs, {});
-    const auto own = full.take_frame();
+    const auto own = full.pop_frame();
     ASSERT_EQ(follower.simulation().state().world.displacements, full.state().world.displacements)
         << i;
     const auto report = follower.compare(*frame);
@@ -109,18 +109,18 @@ TEST(GhostFollower, BeginsFromASnapshotThatIsAskedFor) {
   Session session;
   for (int i = 0; i < 20; ++i) session.next_frame();
   GhostFollower follower(session.simulation(), {});
-  for (int i = 0; i < 5; ++i) follower.follow(*session.next_frame());
+  for (int i = 0; i < 5; ++i) follower.repeat(*session.next_frame());
   EXPECT_EQ(follower.status(), GhostStatus::Begins);
   session.loop().request_snapshot();
-  for (int i = 0; i < 3; ++i) follower.follow(*session.next_frame());
+  for (int i = 0; i < 3; ++i) follower.repeat(*session.next_frame());
   ASSERT_EQ(follower.status(), GhostStatus::Follows);
   // A frame that did not arrive.
   session.next_frame();
-  follower.follow(*session.next_frame());
+  follower.repeat(*session.next_frame());
   EXPECT_EQ(follower.status(), GhostStatus::Behind);
   EXPECT_TRUE(follower.wants_snapshot());
   session.loop().request_snapshot();
-  for (int i = 0; i < 3; ++i) follower.follow(*session.next_frame());
+  for (int i = 0; i < 3; ++i) follower.repeat(*session.next_frame());
   EXPECT_EQ(follower.status(), GhostStatus::Follows);
 }
 
@@ -131,7 +131,7 @@ TEST(GhostFollower, BeginsAgainAfterACut) {
   for (int i = 0; i < 110; ++i) {
     const auto before = follower.status();
     const auto frame = session.next_frame();
-    follower.follow(*frame);
+    follower.repeat(*frame);
     if (frame->change) {
       ++changes;
       EXPECT_EQ(follower.status(), GhostStatus::Changed);
@@ -184,7 +184,7 @@ TEST(Ghost, ReportsWhileSomebodyWantsIt) {
   const auto give = [&](int frames) {
     for (int i = 0; i < frames; ++i) {
       const auto frame = session.next_frame();
-      ghost.take_frames({&frame, 1});
+      ghost.push({&frame, 1});
     }
   };
   give(4);  // nobody wants it
@@ -218,7 +218,7 @@ TEST(Ghost, ThatIsGivenMoreThanItTakesBeginsAgain) {
   std::vector<step::SharedFrame> frames;
   for (std::size_t i = 0; i < 60; ++i) frames.push_back(session.next_frame());
   // The same again and again: only their number counts.
-  for (int i = 0; i < 100; ++i) ghost.take_frames(frames);
+  for (int i = 0; i < 100; ++i) ghost.push(frames);
   for (int i = 0; i < 400 && ghost.counters().fallen == 0; ++i)
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   EXPECT_GE(ghost.counters().fallen, 1u);

@@ -228,12 +228,12 @@ TEST(mcap, each_chunk_declares_what_it_uses_and_indexes_point_at_messages) {
       ASSERT_EQ(record->opcode, Opcode::MessageIndex);
       ++index_records;
       ByteReader entries(record->content);
-      const auto channel = entries.take<std::uint16_t>();
+      const auto channel = entries.read<std::uint16_t>();
       EXPECT_EQ(index.message_index_offsets.at(channel), index.chunk_offset + record->offset);
-      entries.take<std::uint32_t>();
+      entries.read<std::uint32_t>();
       while (entries.remaining() > 0) {
-        const auto time = entries.take<std::uint64_t>();
-        RecordWalker at(chunk->records.subspan(entries.take<std::uint64_t>()));
+        const auto time = entries.read<std::uint64_t>();
+        RecordWalker at(chunk->records.subspan(entries.read<std::uint64_t>()));
         const auto message = parse_message(at.next()->content);
         ASSERT_TRUE(message);
         EXPECT_EQ(message->channel_id, channel);

@@ -62,7 +62,7 @@ TEST_F(RecordingStates, AGapIsToldToEverybodyAndToWhoJoinsLater) {
   EXPECT_EQ(said->status(), proto::RECORDING_WHOLE);
   EXPECT_EQ(said->text(), "");
 
-  recorder_->take_frame(frame_with(recording::Recorder::kQueueBytes + 1));
+  recorder_->record_frame(frame_with(recording::Recorder::kQueueBytes + 1));
   tell();
   said = next_state(anna);
   ASSERT_TRUE(said);
@@ -70,7 +70,7 @@ TEST_F(RecordingStates, AGapIsToldToEverybodyAndToWhoJoinsLater) {
   EXPECT_EQ(said->frames_missing(), 1u);
   EXPECT_NE(said->text().find("the recording has gaps: 1 frames"), std::string::npos);
 
-  recorder_->take_frame(frame_with(16));  // all is well again, but the gap stays
+  recorder_->record_frame(frame_with(16));  // all is well again, but the gap stays
   tell();
   RawClient ben(session_.port());
   ASSERT_TRUE(ben.join("Ben", proto::ROLE_OBSERVER));
@@ -99,7 +99,7 @@ TEST_F(RecordingStates, AFullDiskIsToldToEverybody) {
     for (auto& byte : *noise) byte = static_cast<std::uint8_t>(random());
     frame->snapshot = std::move(noise);
     frame->snapshot_tick = frame->tick;
-    recorder_->take_frame(frame);
+    recorder_->record_frame(frame);
   }
   const Status closed = recorder_->close();  // waits for the writer
   ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &before), 0);

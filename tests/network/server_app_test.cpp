@@ -74,7 +74,7 @@ TEST(FrameHandover, keeps_frames_that_change_the_surface_when_it_is_full) {
   for (std::size_t i = 0; i < app::FrameHandover::kCapacity + 100; ++i) push(i % 7 == 0);
   std::vector<Frame> order, cuts;
   for (int round = 0; round < 3; ++round) {
-    handover.take_all(taken);
+    handover.pop_all(taken);
     for (const auto& frame : taken) {
       order.push_back(frame->frame);
       if (frame->change) cuts.push_back(frame->frame);
@@ -106,8 +106,8 @@ TEST(DurationHistogram, quantiles_within_two_per_cent) {
 
 // A journal that only keeps what it was given.
 struct KeepingSink final : app::JournalSink {
-  void take_frame(const step::SharedFrame& frame) override { frames.push_back(frame); }
-  void take_participants(const std::vector<participants::Participant>&, Tick) override {}
+  void record_frame(const step::SharedFrame& frame) override { frames.push_back(frame); }
+  void record_participants(const std::vector<participants::Participant>&, Tick) override {}
   Status close() override { return {}; }
   wire::RecordingState state() const override { return {}; }
   std::vector<step::SharedFrame> frames;
@@ -154,10 +154,10 @@ TEST(SimulationLoop, its_records_and_snapshot_simulate_the_session_again) {
           << "tick " << record.tick;
     }
     EXPECT_EQ(frame->state_hash, frame->records.back().state_hash);
-    EXPECT_EQ(again.take_frame()->surface_crc, frame->surface_crc);
+    EXPECT_EQ(again.pop_frame()->surface_crc, frame->surface_crc);
   }
   std::vector<step::SharedFrame> handed;
-  handover.take_all(handed);
+  handover.pop_all(handed);
   EXPECT_EQ(handed, sink.frames);
 }
 

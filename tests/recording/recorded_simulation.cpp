@@ -43,7 +43,7 @@ void record_simulation(const std::string& path, Tick dropped_at) {
         {{hand}, "Hand " + std::to_string(hand), participants::Role::Surgeon, {shape}});
     inputs.joins.push_back({.slot = {hand}, .tool_count = 1, .shapes = {shape, {}}});
   }
-  (*recorder)->take_participants(present, 0);
+  (*recorder)->record_participants(present, 0);
 
   Bytes state;
   simulation.write_snapshot(state);
@@ -65,7 +65,7 @@ void record_simulation(const std::string& path, Tick dropped_at) {
       snapshot = std::make_shared<const Bytes>(state);
       snapshot_tick = tick;
     }
-    auto frame = simulation.take_frame();
+    auto frame = simulation.pop_frame();
     if (!frame) continue;
     frame->state_hash = done.state_hash;
     frame->records = std::exchange(records, {});
@@ -75,7 +75,7 @@ void record_simulation(const std::string& path, Tick dropped_at) {
       frame->snapshot = std::make_shared<const Bytes>(Recorder::kQueueBytes + 1);
       frame->snapshot_tick = tick;
     }
-    (*recorder)->take_frame(frame);
+    (*recorder)->record_frame(frame);
   }
   const Status closed = (*recorder)->close();
   ASSERT_TRUE(closed.ok()) << closed.error().message;

@@ -39,7 +39,7 @@ TEST(ReducedTick, DoesNotAllocateAfterWarmUp) {
     const std::size_t before = allocations;
     const bool is_reduced = simulation.tick(inputs, decisions).is_reduced;
     const std::size_t count = allocations - before;
-    simulation.take_frame();
+    simulation.pop_frame();
     const bool hands_over = is_reduced != was_reduced;
     was_reduced = is_reduced;
     if (tick < 1000 || publishes_frame(tick)) continue;

@@ -49,7 +49,7 @@ class RecordedCuts : public ::testing::Test {
         frame->snapshot = std::make_shared<Bytes>(recording::Recorder::kQueueBytes + 1);
         frame->snapshot_tick = frame->tick;
       }
-      (*recorder)->take_frame(frame);
+      (*recorder)->record_frame(frame);
       truth_.push_back({frame->surface_crc, layout.epoch, layout.triangle_sum});
     }
     ASSERT_TRUE((*recorder)->close().ok());

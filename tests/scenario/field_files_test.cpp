@@ -159,7 +159,7 @@ std::vector<int> field_steps(const std::vector<double>& times_s, double step_s, 
   FieldTimes times(times_s, step_s);
   std::vector<int> steps;
   for (int i = 0; i <= count; ++i)
-    if (times.take_due(i * step_s)) steps.push_back(i);
+    if (times.pop_due(i * step_s)) steps.push_back(i);
   return steps;
 }
 

@@ -128,6 +128,8 @@ INSTANTIATE_TEST_SUITE_P(
             "a reaction needs a held set"},
         Bad{"cuts", "[[tool]]\n[[tool.key]]\ntime_s = 0\nposition_mm = [0, 0, 0]\nverb = \"cut\"",
             "organ.source", "which no [[tool]] can cut", 2},
+        Bad{"cutting_like_a_session", "cutting = \"nakao\"", "run.cutting",
+            "needs boundary = \"whole\" and self_contact = false"},
         Bad{"like_whom", "like = \"server\"", "run.like", "session"},
         Bad{"like_and_step", "like = \"session\"\ndt_s = 0.0005", "run.dt_s",
             "follows from like = \"session\", remove it"},

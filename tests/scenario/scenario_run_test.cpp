@@ -11,6 +11,7 @@
 
 #include "server/lab/scenario/field_files.h"
 #include "server/lab/scenario/probe_file.h"
+#include "server/tissue/cutting/validate.h"
 #include "tests/scenario/scenario_texts.h"
 
 namespace trocar::scenario {
@@ -525,6 +526,64 @@ rate_hz = 100
   std::getline(lines, line);
   EXPECT_TRUE(line.starts_with("0.001,") && line.ends_with(",,,")) << line;
   std::filesystem::remove_all(base);
+}
+
+// An oblique cut that ends in the tissue, by each method: as in sessions, Nakao's, and Nakao's
+// without moved nodes.
+TEST(ScenarioRun, APapersMethodCutsInPlaceOfTheSessions) {
+  std::vector<std::size_t> nodes;
+  for (const char* cutting : {"", "cutting = \"nakao\"", "cutting = \"nakao-plain\""}) {
+    const auto run = make(std::string(R"([organ]
+source = "block"
+nodes = [9, 5, 9]
+spacing_mm = 5
+[material]
+elastic_law = "neo-hookean"
+[[tool]]
+radius_mm = 1
+edge_mm = 30
+[[tool.key]]
+time_s = 0
+position_mm = [-30, -12, -3]
+shaft = [0, 1, 0]
+verb = "cut"
+[[tool.key]]
+time_s = 0.2
+position_mm = [8, -12, 7]
+[[tool.key]]
+time_s = 0.21
+position_mm = [8, -12, 7]
+verb = "none"
+[run]
+seconds = 0.25
+self_contact = false
+)") + cutting,
+                          Solver::Live);
+    ASSERT_TRUE(run);
+    const auto mass = [&] {
+      double sum = 0;
+      for (const float m : run->world().masses) sum += static_cast<double>(m);
+      return sum;
+    };
+    const double before = mass();
+    finish(*run);
+    EXPECT_NEAR(mass(), before, 1e-5 * before) << cutting;
+    const auto& cuts = run->simulation().state().cuts;
+    std::size_t moves = 0;
+    for (const auto& events : cuts.history())
+      for (const auto& event : events.events)
+        moves += std::holds_alternative<cutting::Move>(event) ? 1 : 0;
+    EXPECT_EQ(moves > 0, std::string(cutting) == "cutting = \"nakao\"") << cutting;
+    const auto valid = cutting::validate(cuts.topology());
+    EXPECT_TRUE(valid.ok()) << cutting;
+    for (std::size_t n = 0; n < run->world().node_count(); ++n) {
+      ASSERT_TRUE(is_finite(run->world().displacements[n])) << cutting << ", node " << n;
+      ASSERT_EQ(run->world().rest_positions[n], to_float(cuts.topology().rest()[n])) << cutting;
+    }
+    nodes.push_back(run->world().node_count());
+  }
+  EXPECT_GT(nodes[1], nodes[0]) << "every crossed edge is split, where a session snaps";
+  EXPECT_EQ(nodes[1], nodes[2]) << "moving adds none";
 }
 
 }  // namespace

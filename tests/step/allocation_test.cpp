@@ -30,7 +30,7 @@ TEST(Tick, DoesNotAllocateAfterWarmUp) {
     } else if (tick > 400 && tick < 1200) {
       between += count;
     }
-    simulation.take_frame();
+    simulation.pop_frame();
   }
   EXPECT_EQ(between, 0u);
   EXPECT_GT(publishing, 0u);

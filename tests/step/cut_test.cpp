@@ -119,7 +119,7 @@ TEST_F(Blades, ARestoredStateGoesOnBitForBit) {
     EXPECT_EQ(a.layout(), b.layout());
     for (int i = 0; i < 200; ++i) {
       ASSERT_EQ(run_tick(a, 2).state_hash, run_tick(b, 2).state_hash) << "tick " << i;
-      const auto frame_a = a.take_frame(), frame_b = b.take_frame();
+      const auto frame_a = a.pop_frame(), frame_b = b.pop_frame();
       ASSERT_EQ(frame_a == nullptr, frame_b == nullptr);
       if (!frame_a) continue;
       ASSERT_EQ(frame_a->change == nullptr, frame_b->change == nullptr);
@@ -137,7 +137,7 @@ TEST_F(Blades, ChangesLeadFromSurfaceToSurface) {
   auto followed = simulation.layout();
   for (int i = 0; i < 700; ++i) {
     run_tick(simulation, 2);
-    const auto frame = simulation.take_frame();
+    const auto frame = simulation.pop_frame();
     if (!frame) continue;
     EXPECT_EQ(frame->surface.size(), simulation.layout().vertex_count());
     if (!frame->change) continue;
@@ -168,7 +168,7 @@ TEST_F(Blades, ChangesNameTheRegionsThatAreCut) {
   std::set<std::string> named;
   for (int i = 0; i < 800; ++i) {
     run_tick(simulation);
-    if (const auto frame = simulation.take_frame(); frame && frame->change)
+    if (const auto frame = simulation.pop_frame(); frame && frame->change)
       named.insert(frame->change->regions.begin(), frame->change->regions.end());
   }
   EXPECT_EQ(named, std::set<std::string>{"vessel"});
@@ -236,7 +236,7 @@ TEST_F(Blades, StopAtWhatAnotherHolds) {
     add_blades(simulation, inputs);
     simulation.tick(inputs, {});
     inputs.clear();
-    if (const auto frame = simulation.take_frame()) {
+    if (const auto frame = simulation.pop_frame()) {
       for (const auto& event : frame->claim_events) {
         if (event.verb != tool::Verb::Cut) continue;
         refused += event.outcome == hands::ClaimOutcome::RefusedHeld;

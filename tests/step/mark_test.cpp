@@ -87,7 +87,7 @@ TEST(Marks, AreFollowedFrameByFrame) {
     run_tick(simulation, i == 300                ? hands::MarkAction::Set
                          : i == 700 || i == 1301 ? hands::MarkAction::Return
                                                  : hands::MarkAction::None);
-    const auto frame = simulation.take_frame();
+    const auto frame = simulation.pop_frame();
     if (!frame) continue;
     if (frame->new_layout) {
       EXPECT_GT(frame->new_layout->epoch, followed.epoch);
@@ -124,17 +124,17 @@ TEST(Marks, AreInSnapshotsAndInTheHash) {
       const auto mark =
           a.current_tick() + 1 == return_at ? hands::MarkAction::Return : hands::MarkAction::None;
       ASSERT_EQ(run_tick(a, mark).state_hash, run_tick(b, mark).state_hash) << "tick " << i;
-      const auto frame_a = a.take_frame(), frame_b = b.take_frame();
+      const auto frame_a = a.pop_frame(), frame_b = b.pop_frame();
       ASSERT_EQ(frame_a == nullptr, frame_b == nullptr);
       if (!frame_a) continue;
       ASSERT_EQ(frame_a->new_layout == nullptr, frame_b->new_layout == nullptr);
       ASSERT_EQ(frame_a->surface_crc, frame_b->surface_crc);
     }
   };
-  follow(20, 640);
+  update(20, 640);
   run(a, 3);
   run_tick(a, hands::MarkAction::Return);
-  follow(60, 0);  // between the return and the frame that tells of it
+  update(60, 0);  // between the return and the frame that tells of it
 }
 
 TEST(Marks, WithoutOneNothingHappens) {
@@ -142,7 +142,7 @@ TEST(Marks, WithoutOneNothingHappens) {
   run(a, 20), run(b, 20);
   EXPECT_EQ(run_tick(a, hands::MarkAction::Return).state_hash, run_tick(b).state_hash);
   run(a, 11), run(b, 11);
-  const auto frame = a.take_frame();
+  const auto frame = a.pop_frame();
   ASSERT_TRUE(frame);
   ASSERT_EQ(frame->mark_events.size(), 1u);
   EXPECT_FALSE(frame->mark_events[0].is_done);

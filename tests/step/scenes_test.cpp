@@ -46,7 +46,7 @@ class Operation {
              tool::sample(script_.tools[t], static_cast<double>(tick) * 1e-3, anchors_[t])});
       const auto report = simulation_.tick(inputs, {});
       ASSERT_EQ(report.nodes_rejected, 0u) << "tick " << tick;
-      simulation_.take_frame();
+      simulation_.pop_frame();
       opened_m2 += report.cut.opened_area_m2 - report.cut.torn_area_m2;
       torn_m2 += report.cut.torn_area_m2;
     }

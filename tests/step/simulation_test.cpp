@@ -36,10 +36,10 @@ TEST_F(TwoHands, FramesSayHowMuchOfTheStressHasRelaxed) {
   std::shared_ptr<PublishedFrame> frame;
   for (int i = 0; i < 320; ++i) {
     run_tick(elastic), run_tick(measured);
-    if (auto next = elastic.take_frame()) {
+    if (auto next = elastic.pop_frame()) {
       EXPECT_FALSE(next->relaxation);
     }
-    if (auto next = measured.take_frame()) frame = next;
+    if (auto next = measured.pop_frame()) frame = next;
   }
   ASSERT_TRUE(frame && frame->relaxation);
   EXPECT_GT(frame->relaxation->energy_j, 1e-6);
@@ -134,7 +134,7 @@ TEST_F(TwoHands, FramesCarryTheQuantisedSurfaceAndItsCrc) {
   Simulation simulation(catalogue::make_lattice());
   for (int i = 1; i <= 320; ++i) {
     run_tick(simulation);
-    const auto frame = simulation.take_frame();
+    const auto frame = simulation.pop_frame();
     ASSERT_EQ(frame != nullptr, i % 16 == 0);
     if (!frame) continue;
     EXPECT_EQ(frame->frame, static_cast<Frame>(i / 16));
@@ -167,7 +167,7 @@ TEST(Simulation, APushOnAHeldNodeIsFeltButDoesNotMoveIt) {
     add(1, tick < 200 ? 0.02f : -0.003f, tool::Verb::Push);
     simulation.tick(inputs, {});
     inputs.clear();
-    const auto frame = simulation.take_frame();
+    const auto frame = simulation.pop_frame();
     if (tick == 190) {
       const auto node = simulation.state().grasps[ToolSlot{0}].nodes.at(0);
       held_at = simulation.state().world.displacements[node.value];

@@ -39,7 +39,7 @@ struct Curve {
 };
 
 // Displacement of the top and the force that holds it (or the load on it).
-Curve follow(const Lab& lab, Section& section, ScenarioRun& run) {
+Curve update(const Lab& lab, Section& section, ScenarioRun& run) {
   Curve curve;
   lab.finish(section, run, [&](const scenario::StepReport&) {
     curve.time_s.push_back(run.time_s());
@@ -70,7 +70,7 @@ Curve cycle(const Lab& lab, Section& section, const std::string& name, double sp
                     fmt::format("[run]\nseconds = {}\n", kPreload_s + 4 * kHalfCycle_s) +
                     kRunToTolerance + kTopAndBase,
                 Solver::Full);
-  return follow(lab, section, *run);
+  return update(lab, section, *run);
 }
 
 // Area of the second cycle, J: the first starts from rest.
@@ -145,7 +145,7 @@ void run_creep(const Lab& lab, Section& section) {
                                  "[[probe]]\nset = \"top\"\nquantity = \"displacement\"\n\n"
                                  "[[probe]]\nset = \"fixed\"\nquantity = \"reaction\"\n",
                              Solver::Full);
-  const Curve curve = follow(lab, section, *run);
+  const Curve curve = update(lab, section, *run);
   const double final_m = kForce_n / kColumnStiffness;
   plot::Series ours{"ours", {}, {}, plot::Style::Points, {}},
       closed{"F/K (1 - exp(-t/tau))", {}, {}, plot::Style::Line, {}};
@@ -187,7 +187,7 @@ void run_relaxation(const Lab& lab, Section& section) {
       column(kTau_s, 0) + displace("top", {{0, {0, 0, 0}}, {kRamp_s, {0, kStretch_m * 1e3, 0}}}) +
           "[run]\nseconds = 0.3\n" + kRunToTolerance + kTopAndBase,
       Solver::Full);
-  const Curve curve = follow(lab, section, *run);
+  const Curve curve = update(lab, section, *run);
   const double damping = kColumnStiffness * kTau_s, speed = kStretch_m / kRamp_s;
   const auto expected = [&](double t) {
     return t <= kRamp_s ? kColumnStiffness * speed * t + damping * speed

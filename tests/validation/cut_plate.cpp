@@ -105,21 +105,21 @@ void CutPlate::cut(const std::array<Vec3d, 2>& from, const std::array<Vec3d, 2>&
     }
     add(output_, call);
     if (!springs_) continue;
-    const auto status = springs_->follow(call.events);
+    const auto status = springs_->update(call.events);
     TROCAR_ASSERT(status);
   }
   if (springs_) energies_j_[1] = springs_->energy_j();
-  follow();
+  update();
 }
 
-void CutPlate::follow() {
+void CutPlate::update() {
   for (const auto node : topology_.changed()) {
     world_.rest_positions[node.value] = to_float(topology_.rest()[node.value]);
     world_.masses[node.value] = static_cast<float>(topology_.lumped_mass(node));
   }
-  solver_.follow_topology(topology_, world_);
+  solver_.update_topology(topology_, world_);
   topology_.clear_changes();
-  solver_.take_state(world_);
+  solver_.read_state(world_);
   list_nodes();
 }
 

@@ -46,7 +46,7 @@ class CutPlate {
   std::vector<std::array<Vec3d, 2>> upper_edges(bool is_of_wound) const;
 
  private:
-  void follow();
+  void update();
   void list_nodes();
   void take_positions();
   template <typename Place>

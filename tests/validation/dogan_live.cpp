@@ -92,7 +92,7 @@ class Hand {
           inputs, controller ? controller->decisions() : decisions_of(detail, converged_sweeps_));
       const auto cpu_ns = thread_cpu_ns() - begin;
       inputs.clear();
-      simulation.take_frame();
+      simulation.pop_frame();
       if (controller) controller->observe(report, {cpu_ns, 0});
       course.tick_ms.push_back(static_cast<double>(cpu_ns) * 1e-6);
       course.forces_n.push_back(force_in(simulation));

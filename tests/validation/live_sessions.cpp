@@ -175,7 +175,7 @@ Course run_session(const organ::Organ& organ,
     const auto begin = thread_cpu_ns();
     const auto& report = simulation.tick(inputs, decisions);
     const auto cpu_ns = thread_cpu_ns() - begin;
-    simulation.take_frame();
+    simulation.pop_frame();
     LiveTick now{.force_n = force_in(simulation),
                  .us = static_cast<double>(cpu_ns) * 1e-3,
                  .is_reduced = report.is_reduced};

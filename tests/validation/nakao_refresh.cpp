@@ -156,7 +156,7 @@ Site site_on_top(const organ::Organ& organ) {
   return {{node, to_float(rest[node.value])}, 0.305f};
 }
 
-Course follow(const organ::Organ& organ, const Site& site, const step::TickDecisions& most,
+Course update(const organ::Organ& organ, const Site& site, const step::TickDecisions& most,
               const Phases& phases, bool is_controlled, Blade blade = Blade::None) {
   step::Simulation simulation(organ);
   control::RateController controller({.highest = most, .budget_us = kBudget_us});
@@ -178,7 +178,7 @@ Course follow(const organ::Organ& organ, const Site& site, const step::TickDecis
     const auto report = simulation.tick(inputs, is_controlled ? controller.decisions() : most);
     course.measured_us.push_back(static_cast<double>(thread_cpu_ns() - begin) * 1e-3);
     inputs.clear();
-    simulation.take_frame();
+    simulation.pop_frame();
     const double us = machine.tick_us(report);
     controller.observe(Machine::told(report), {static_cast<std::uint64_t>(us * 1e3), 0});
     if (tick == phases.spikes_end) course.lowered_by_spikes = controller.figures().lowered;
@@ -218,7 +218,7 @@ step::TickDecisions decisions_like(const organ::Organ& organ, const Site& site,
     const step::TickDecisions tried{.depth_limit = depth,
                                     .node_limit = static_cast<std::uint32_t>(paper.nodes_high),
                                     .boundary = world::Boundary::Frozen};
-    const auto course = follow(organ, site, tried, {.end = 300}, false);
+    const auto course = update(organ, site, tried, {.end = 300}, false);
     const double distance =
         std::abs(percentile(course.nodes, 0.5) - (paper.nodes_low + paper.nodes_high) / 2);
     if (distance >= nearest) continue;
@@ -337,9 +337,9 @@ void cut_large(const Lab& lab, const LargeCase& large, Section& section) {
   const auto four_layers = decisions_like(organ, site, kFig15),
              six_layers = decisions_like(organ, site, kFig16);
   const std::array courses{
-      std::pair{&kFig15, follow(organ, site, four_layers, phases, false, Blade::Cuts)},
-      std::pair{&kFig16, follow(organ, site, six_layers, phases, false, Blade::Cuts)},
-      std::pair{&kFig17, follow(organ, site, six_layers, phases, true, Blade::Cuts)}};
+      std::pair{&kFig15, update(organ, site, four_layers, phases, false, Blade::Cuts)},
+      std::pair{&kFig16, update(organ, site, six_layers, phases, false, Blade::Cuts)},
+      std::pair{&kFig17, update(organ, site, six_layers, phases, true, Blade::Cuts)}};
 
   Table cycles{fmt::format("{}: time per cycle while a blade cuts, ms", title),
                {"", "nodes, paper", "nodes, ours", "paper", "ours", "contact", "mechanics",
@@ -416,9 +416,9 @@ void run_refresh_rate(const Lab& lab, Section& section) {
 
   const auto four_layers = decisions_like(*organ, site, kFig15),
              six_layers = decisions_like(*organ, site, kFig16);
-  const Course four = follow(*organ, site, four_layers, {.end = 2 * unit}, false);
-  const Course free = follow(*organ, site, six_layers, phases, false);
-  const Course held = follow(*organ, site, six_layers, phases, true);
+  const Course four = update(*organ, site, four_layers, {.end = 2 * unit}, false);
+  const Course free = update(*organ, site, six_layers, phases, false);
+  const Course held = update(*organ, site, six_layers, phases, true);
 
   Table table{"Nodes and time per cycle",
               {"", "nodes, paper", "nodes, ours", "active, ours", "time, paper, ms",

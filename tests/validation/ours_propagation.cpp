@@ -61,7 +61,7 @@ struct Course {
   double active = 0, milliseconds = 0;  // means per tick
 };
 
-Course follow(const Lab& lab, Section& section, ScenarioRun& run) {
+Course update(const Lab& lab, Section& section, ScenarioRun& run) {
   Course course;
   const auto begin = thread_cpu_ns();
   lab.finish(section, run, [&](const scenario::StepReport& report) {
@@ -125,7 +125,7 @@ bool sweep_limits(const Lab& lab, Section& section, const Press& press, const Co
         section, mode, fmt::format("{}-{}-{}", mode, press.organ, nodes),
         press_scene(press, fmt::format("boundary = \"{}\"\nnodes = {}\n", mode, nodes)));
     if (!run) return false;
-    const Course course = follow(lab, section, *run);
+    const Course course = update(lab, section, *run);
     const Errors errors = compare(course, reference);
     if (nodes == kDefaultNodes) {
       at_default = errors;
@@ -146,7 +146,7 @@ void study_press(const Lab& lab, Section& section, const Press& press) {
   const auto full =
       lab.start(section, "full", fmt::format("full-{}", press.organ),
                 press_scene(press, "tolerance_n = 1e-6\nmax_sweeps = 2000\n"), Solver::Full);
-  const Course reference = follow(lab, section, *full);
+  const Course reference = update(lab, section, *full);
   const std::string title = fmt::format("{} ({} nodes)", press.organ, full->world().node_count());
   Study study{
       {.title = title + ": contact force", .x = {"time, s"}, .y = {"force, N"}, .series = {}},
@@ -161,7 +161,7 @@ void study_press(const Lab& lab, Section& section, const Press& press) {
 
   const auto whole = lab.start(section, "whole", fmt::format("whole-{}", press.organ),
                                press_scene(press, "boundary = \"whole\"\n"));
-  const Course live = follow(lab, section, *whole);
+  const Course live = update(lab, section, *whole);
   const Errors live_errors = compare(live, reference);
   add_row(study, "whole", "all", live, live_errors);
   section.at_most(fmt::format("{}-whole", press.organ), "full solve", live_errors.mean,

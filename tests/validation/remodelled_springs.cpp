@@ -123,7 +123,7 @@ void RemodelledSprings::open(std::span<const cutting::CutEvent> copies) {
   }
 }
 
-Status RemodelledSprings::follow(const cutting::CutEvents& events) {
+Status RemodelledSprings::update(const cutting::CutEvents& events) {
   const std::span all(events.events);
   for (std::size_t at = 0; at < all.size();) {
     std::size_t end = at + 1;

@@ -27,7 +27,7 @@ class RemodelledSprings {
   RemodelledSprings(const organ::Organ& organ, double viscosity_n_s_m);
 
   // Repeats what a cut of the same organ did.
-  Status follow(const cutting::CutEvents& events);
+  Status update(const cutting::CutEvents& events);
   // Advances by at least this time, in stable steps; nodes of `held` stay at their y.
   void advance(double seconds, std::span<const std::uint8_t> held);
 

@@ -19,7 +19,7 @@ class FrameHandover {
  public:
   static constexpr std::size_t kCapacity = 512;
 
-  // `wake` is called on the simulation thread, at most once until the next take_all().
+  // `wake` is called on the simulation thread, at most once until the next pop_all().
   explicit FrameHandover(std::function<void()> wake) : wake_(std::move(wake)) {}
 
   // Simulation thread.
@@ -35,7 +35,7 @@ class FrameHandover {
   }
 
   // I/O thread: everything there is, oldest first.
-  void take_all(std::vector<step::SharedFrame>& frames) {
+  void pop_all(std::vector<step::SharedFrame>& frames) {
     frames.clear();
     is_woken_.exchange(false);
     while (frames.size() <= kCapacity) {

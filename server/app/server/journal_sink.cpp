@@ -12,10 +12,10 @@ class RecordedSession : public JournalSink {
   explicit RecordedSession(std::unique_ptr<recording::Recorder> recorder)
       : recorder_(std::move(recorder)) {}
 
-  void take_frame(const step::SharedFrame& frame) override { recorder_->take_frame(frame); }
-  void take_participants(const std::vector<participants::Participant>& present,
-                         Tick tick) override {
-    recorder_->take_participants(present, tick);
+  void record_frame(const step::SharedFrame& frame) override { recorder_->record_frame(frame); }
+  void record_participants(const std::vector<participants::Participant>& present,
+                           Tick tick) override {
+    recorder_->record_participants(present, tick);
   }
   Status close() override { return recorder_->close(); }
   wire::RecordingState state() const override { return recorder_->state(); }

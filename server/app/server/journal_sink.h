@@ -22,10 +22,10 @@ class JournalSink {
   virtual ~JournalSink() = default;
   // Simulation thread: every published frame, with records of its ticks and, now and then, a
   // snapshot. The first frame has the snapshot of tick 0.
-  virtual void take_frame(const step::SharedFrame& frame) = 0;
+  virtual void record_frame(const step::SharedFrame& frame) = 0;
   // I/O thread: who is here, after each change. `tick` is that of the newest frame.
-  virtual void take_participants(const std::vector<participants::Participant>& present,
-                                 Tick tick) = 0;
+  virtual void record_participants(const std::vector<participants::Participant>& present,
+                                   Tick tick) = 0;
   // I/O thread, after the simulation thread has ended.
   virtual Status close() = 0;
   // Any thread, at any time: whether everything has been recorded so far.

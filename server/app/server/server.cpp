@@ -80,7 +80,7 @@ class Server {
 
  private:
   LoopOptions loop_options() const;
-  void take_frames();
+  void record_frames();
   void take_ghost(std::shared_ptr<const ghost::GhostReport> report);
   void warn_if_slow();
   void on_signal(int signal);
@@ -100,7 +100,7 @@ class Server {
   asio::steady_timer poll_{io_};
   std::unique_ptr<net::TcpServer> tcp_;
   std::unique_ptr<replication::Replicator> replicator_;
-  FrameHandover handover_{[this] { asio::post(io_, [this] { take_frames(); }); }};
+  FrameHandover handover_{[this] { asio::post(io_, [this] { record_frames(); }); }};
   std::vector<step::SharedFrame> frames_;
   std::atomic<std::shared_ptr<const ghost::GhostReport>> ghost_report_;  // the newest; null: taken
   std::vector<replication::BarrierResult> barrier_;
@@ -130,7 +130,7 @@ Status Server::open() {
   replication::ReplicatorOptions replication;
   if (journal_)
     replication.on_participants = [this](const auto& present, Tick tick) {
-      journal_->take_participants(present, tick);
+      journal_->record_participants(present, tick);
     };
   if (reduction_)
     replication.on_ghost_wanted = [this](bool is_wanted) { ghost_->set_wanted(is_wanted); };
@@ -195,12 +195,12 @@ void Server::on_signal(int signal) {
   signals_.clear();  // a second one ends the process at once
 }
 
-void Server::take_frames() {
+void Server::record_frames() {
   if (is_ending_) return;
   if (journal_) replicator_->set_recording(journal_->state());
-  handover_.take_all(frames_);
+  handover_.pop_all(frames_);
   replicator_->publish(frames_);
-  if (ghost_) ghost_->take_frames(frames_);
+  if (ghost_) ghost_->record_frames(frames_);
   for (const auto& frame : frames_)
     for (const auto& [tick, solver] : frame->solver_changes)
       log::debug("tick {}: solver {}", tick, replication::describe(solver));
@@ -231,7 +231,7 @@ void Server::warn_if_slow() {
 }
 
 void Server::begin_end() {
-  take_frames();
+  record_frames();
   is_ending_ = true;
   if (ghost_) ghost_->set_wanted(false);
   signals_.cancel();

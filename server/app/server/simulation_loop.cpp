@@ -92,7 +92,7 @@ SimulationLoop::SimulationLoop(step::Simulation& simulation, participants::Simul
                options_.rate ? options_.rate->nodes : 0) {
   records_.reserve(kTicksPerFrame);
   if (options_.rate) controller_.emplace(*options_.rate);
-  take_snapshot();
+  record_snapshot();
 }
 
 SimulationLoop::~SimulationLoop() {
@@ -155,8 +155,8 @@ bool SimulationLoop::run_tick() {
       report.tick % kSnapshotPeriod == kSnapshotPhase && report.tick > kSnapshotPeriod;
   if (report.tick % kTicksPerFrame == kSnapshotPhase &&
       (is_snapshot_requested_.exchange(false, std::memory_order_relaxed) || is_due))
-    take_snapshot();
-  auto frame = simulation_.take_frame();
+    record_snapshot();
+  auto frame = simulation_.pop_frame();
   if (!frame) return false;
   finish_frame(std::move(frame));
   return is_stop_requested_.load(std::memory_order_relaxed) ||
@@ -175,11 +175,11 @@ void SimulationLoop::finish_frame(std::shared_ptr<step::PublishedFrame> frame) {
   frame->statistics.rate.time_rate = time_rate_;
   report_.slow_ticks = slow_ticks_;
   report_.last_frame = frame;
-  if (journal_) journal_->take_frame(report_.last_frame);
+  if (journal_) journal_->record_frame(report_.last_frame);
   handover_.push(report_.last_frame);
 }
 
-void SimulationLoop::take_snapshot() {
+void SimulationLoop::record_snapshot() {
   Bytes bytes;
   simulation_.write_snapshot(bytes);
   snapshot_ = std::make_shared<const Bytes>(std::move(bytes));

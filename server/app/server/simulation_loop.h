@@ -4,7 +4,7 @@
 //
 //   inbox.drain -> Simulation::tick -> record -> RateController::observe, which decides the next
 //   tick; every 16th tick: complete the frame (records, hash, statistics, snapshot),
-//   journal.take_frame, handover.push
+//   journal.record_frame, handover.push
 //
 // It never waits for the I/O thread or the journal. It ends after a published frame, so the last
 // frame shows the last tick.
@@ -107,7 +107,7 @@ class SimulationLoop {
  private:
   void run();
   void finish_frame(std::shared_ptr<step::PublishedFrame> frame);
-  void take_snapshot();
+  void record_snapshot();
 
   step::Simulation& simulation_;
   participants::SimulationInbox& inbox_;

@@ -87,13 +87,13 @@ class Outputs {
     return add_due_field(solve);
   }
   // Fields until this time are there already.
-  void skip_to(const ScenarioSolve& solve) { field_times_.take_due(solve.time_s()); }
+  void skip_to(const ScenarioSolve& solve) { field_times_.pop_due(solve.time_s()); }
   Status close() { return probes_.close(); }
 
  private:
   Status add_due_field(const ScenarioSolve& solve) {
-    return field_times_.take_due(solve.time_s()) ? scenario::write_field(folder_, field_of(solve))
-                                                 : Status{};
+    return field_times_.pop_due(solve.time_s()) ? scenario::write_field(folder_, field_of(solve))
+                                                : Status{};
   }
 
   const std::filesystem::path& folder_;

@@ -46,14 +46,14 @@ class Replay {
     opened_m2 += report.cut.opened_area_m2;
     rejected += report.nodes_rejected;
     if (publishes_frame(report.tick)) {
-      auto frame = std::shared_ptr<step::PublishedFrame>(simulation_.take_frame());
+      auto frame = std::shared_ptr<step::PublishedFrame>(simulation_.pop_frame());
       write_tools(*frame, csv_);
       if (journal_ != nullptr)
         journal_->add(std::move(frame), record.inputs, record.decisions, report);
     } else if (journal_ != nullptr) {
       journal_->add(nullptr, record.inputs, record.decisions, report);
     }
-    if (journal_ != nullptr) journal_->take_due_snapshot(simulation_);
+    if (journal_ != nullptr) journal_->record_due_snapshot(simulation_);
     return {};
   }
 

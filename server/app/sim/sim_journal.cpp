@@ -20,21 +20,22 @@ Result<std::unique_ptr<SimJournal>> SimJournal::create(
                                               reduction, has_external_loads);
   if (!recorder) return recorder.error();
   std::unique_ptr<SimJournal> journal(new SimJournal(std::move(*recorder)));
-  journal->recorder_->take_participants(std::move(hands), 0);
-  journal->take_snapshot(simulation);
+  journal->recorder_->record_participants(std::move(hands), 0);
+  journal->record_snapshot(simulation);
   return journal;
 }
 
-void SimJournal::take_snapshot(const step::Simulation& simulation) {
+void SimJournal::record_snapshot(const step::Simulation& simulation) {
   Bytes bytes;
   simulation.write_snapshot(bytes);
   snapshot_ = std::make_shared<const Bytes>(std::move(bytes));
   snapshot_tick_ = simulation.current_tick();
 }
 
-void SimJournal::take_due_snapshot(const step::Simulation& simulation) {
+void SimJournal::record_due_snapshot(const step::Simulation& simulation) {
   const Tick tick = simulation.current_tick();
-  if (tick > kSnapshotPeriod && tick % kSnapshotPeriod == kSnapshotPhase) take_snapshot(simulation);
+  if (tick > kSnapshotPeriod && tick % kSnapshotPeriod == kSnapshotPhase)
+    record_snapshot(simulation);
 }
 
 void SimJournal::add(std::shared_ptr<step::PublishedFrame> frame, const hands::TickInputs& inputs,
@@ -47,7 +48,7 @@ void SimJournal::add(std::shared_ptr<step::PublishedFrame> frame, const hands::T
   frame->snapshot_tick = snapshot_tick_;
   while (recorder_->queued_bytes() > recording::Recorder::kQueueBytes / 2)
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
-  recorder_->take_frame(std::move(frame));
+  recorder_->record_frame(std::move(frame));
 }
 
 }  // namespace trocar::app

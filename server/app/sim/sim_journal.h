@@ -26,14 +26,14 @@ class SimJournal {
   void add(std::shared_ptr<step::PublishedFrame> frame, const hands::TickInputs& inputs,
            const step::TickDecisions& decisions, const step::TickReport& report);
   // After it; a snapshot goes with the next frame.
-  void take_due_snapshot(const step::Simulation& simulation);
+  void record_due_snapshot(const step::Simulation& simulation);
   // Ticks after the last frame are not in the journal.
   Status close() { return recorder_->close(); }
 
  private:
   explicit SimJournal(std::unique_ptr<recording::Recorder> recorder)
       : recorder_(std::move(recorder)) {}
-  void take_snapshot(const step::Simulation& simulation);
+  void record_snapshot(const step::Simulation& simulation);
 
   std::unique_ptr<recording::Recorder> recorder_;
   std::vector<step::TickRecord> records_;  // since the last frame

@@ -118,7 +118,7 @@ Status simulate(scenario::ScenarioRun& run, const std::filesystem::path& folder,
   if (!probes) return probes.error();
   scenario::FieldTimes field_times(run.scenario().field_times_s, kTick_s);
   const auto write_due_field = [&]() -> Status {
-    return field_times.take_due(run.time_s()) ? scenario::write_field(folder, run) : Status{};
+    return field_times.pop_due(run.time_s()) ? scenario::write_field(folder, run) : Status{};
   };
   std::optional<scenario::ProbePlots> plots;
   if (is_plotted) plots.emplace(run);
@@ -129,9 +129,9 @@ Status simulate(scenario::ScenarioRun& run, const std::filesystem::path& folder,
     totals.add(run.time_s(), report);
     if (journal != nullptr) {
       auto& simulation = run.simulation();
-      journal->add(simulation.take_frame(), run.inputs(), run.decisions(),
+      journal->add(simulation.pop_frame(), run.inputs(), run.decisions(),
                    simulation.context().report);
-      journal->take_due_snapshot(simulation);
+      journal->record_due_snapshot(simulation);
     }
     probes->add(run);
     if (plots) plots->add(run);
@@ -203,6 +203,11 @@ Result<std::unique_ptr<SimJournal>> open_sim_journal(const Options& options,
                  "--journal: records ticks, which a static run and the explicit integrator have "
                  "not: leave it out"};
   const auto& resolved = run.resolved();
+  if (run.scenario().run.cutting)
+    return Error{
+        ErrorCode::Usage,
+        "--journal: recordings know no cutting = \"nakao\", which moves nodes of the mesh: "
+        "remove one of the two"};
   std::optional<journal::ReductionDescription> reduction;
   if (resolved.reduction)
     reduction = {organ::reduction_hash(*resolved.reduction),

@@ -51,7 +51,7 @@ PressCourse PressBench::press(const Place& place, const PressPlan& plan, const D
     inputs.samples.push_back({tool_slot({0}, 0), {{tip, orientation}, tool::Verb::Push}});
     const auto& report = simulation_.tick(inputs, decide(forces));
     inputs.clear();
-    simulation_.take_frame();
+    simulation_.pop_frame();
     control::read_forces(simulation_, forces);
     const auto& context = simulation_.context();
     Vec3d force;

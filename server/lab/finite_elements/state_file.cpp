@@ -24,8 +24,8 @@ void put(ByteWriter& out, const Vector& v) {
 
 // False where the length is not `count` or a number is not finite.
 bool take(ByteReader& in, double* values, std::size_t count) {
-  if (in.take<std::uint64_t>() != count) return false;
-  const auto bytes = in.take_bytes(count * sizeof(double));
+  if (in.read<std::uint64_t>() != count) return false;
+  const auto bytes = in.read_bytes(count * sizeof(double));
   if (!in.ok()) return false;
   if (count > 0) std::memcpy(values, bytes.data(), bytes.size());
   for (std::size_t i = 0; i < count; ++i)
@@ -46,15 +46,15 @@ Error bad(const std::string& what) {
 }
 
 Status take_magic(ByteReader& in) {
-  const auto magic = in.take_bytes(kMagic.size());
+  const auto magic = in.read_bytes(kMagic.size());
   if (!std::equal(magic.begin(), magic.end(), kMagic.begin(), kMagic.end()))
     return bad("is no state of the off-line solver");
   return {};
 }
 
 Status take_version_and_problem(ByteReader& in, const Problem& problem) {
-  if (in.take<std::uint32_t>() != kVersion) return bad("is of another version of this program");
-  if (in.take<std::uint64_t>() != hash_of(problem))
+  if (in.read<std::uint32_t>() != kVersion) return bad("is of another version of this program");
+  if (in.read<std::uint64_t>() != hash_of(problem))
     return bad("is of another organ, material, boundary or order of elements");
   return {};
 }
@@ -93,14 +93,14 @@ Result<State> to_state(BytesView bytes, const Problem& problem) {
   const BytesView content = bytes.first(bytes.size() - sizeof(std::uint32_t));
   ByteReader in(content), end(bytes.subspan(content.size()));
   if (auto s = take_magic(in); !s) return s.error();
-  if (end.take<std::uint32_t>() != crc32(content))
+  if (end.read<std::uint32_t>() != crc32(content))
     return bad("is damaged, its checksum does not fit: start again without it");
   if (auto s = take_version_and_problem(in, problem); !s) return s.error();
   State state;
-  state.time_s = in.take<double>();
-  state.steps = in.take<std::uint64_t>();
-  state.path = in.take<std::uint64_t>();
-  state.is_moving = in.take<std::uint8_t>() != 0;
+  state.time_s = in.read<double>();
+  state.steps = in.read<std::uint64_t>();
+  state.path = in.read<std::uint64_t>();
+  state.is_moving = in.read<std::uint8_t>() != 0;
   const std::size_t dofs = problem.dof_count();
   bool is_good = std::isfinite(state.time_s);
   for (auto* v :

@@ -59,12 +59,12 @@ Result<CsvTable> CsvTable::parse(std::string text, std::string source, const Col
   table.source_ = std::move(source);
   if (table.text_.starts_with(kByteOrderMark)) table.position_ = kByteOrderMark.size();
   if (!table.next_cells()) return table.wrong("has no measurements");
-  if (auto s = table.take_header(columns); !s) return s.error();
+  if (auto s = table.read_header(columns); !s) return s.error();
   table.cells_.clear();  // they are in the text as it lies here
   return table;
 }
 
-Status CsvTable::take_header(const Columns& columns) {
+Status CsvTable::read_header(const Columns& columns) {
   column_count_ = cells_.size();
   for (const auto* names : {&columns.needed, &columns.optional})
     for (const auto& name : *names) {

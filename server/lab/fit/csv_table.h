@@ -41,7 +41,7 @@ class CsvTable {
  private:
   CsvTable() = default;
   bool next_cells();
-  Status take_header(const Columns& columns);
+  Status read_header(const Columns& columns);
 
   std::string text_, source_;
   std::size_t position_ = 0;  // of the next line in text_

@@ -20,10 +20,10 @@ void put_all(ByteWriter& out, const std::vector<T>& values) {
   out.put_bytes({reinterpret_cast<const std::uint8_t*>(values.data()), values.size() * sizeof(T)});
 }
 template <typename T>
-std::vector<T> take_all(ByteReader& in) {
-  const auto count = in.take<std::uint64_t>();
+std::vector<T> pop_all(ByteReader& in) {
+  const auto count = in.read<std::uint64_t>();
   if (count > kMostItems) return {};
-  const auto bytes = in.take_bytes(count * sizeof(T));
+  const auto bytes = in.read_bytes(count * sizeof(T));
   std::vector<T> values(bytes.size() / sizeof(T));
   if (!bytes.empty()) std::memcpy(values.data(), bytes.data(), bytes.size());
   return values;
@@ -73,10 +73,10 @@ std::optional<Pressed> LocalParts::read_pressed(std::size_t number,
   if (!body) return std::nullopt;
   ByteReader in(*body);
   Pressed pressed;
-  pressed.failed = in.take<std::uint64_t>();
-  const auto count = in.take<std::uint64_t>();
+  pressed.failed = in.read<std::uint64_t>();
+  const auto count = in.read<std::uint64_t>();
   for (std::uint64_t i = 0; i < count && in.ok(); ++i) {
-    const auto values = take_all<double>(in);
+    const auto values = pop_all<double>(in);
     if (values.size() != field_length) return std::nullopt;
     pressed.fields.push_back(
         Eigen::Map<const Vector>(values.data(), static_cast<Eigen::Index>(values.size())));
@@ -102,18 +102,18 @@ std::optional<FinishedPatch> LocalParts::read_patch(std::size_t number) const {
   if (!body) return std::nullopt;
   ByteReader in(*body);
   FinishedPatch patch;
-  const auto modes = in.take<std::uint64_t>();
+  const auto modes = in.read<std::uint64_t>();
   for (std::uint64_t i = 0; i < modes && in.ok(); ++i) {
     auto& mode = patch.modes.emplace_back();
-    mode.step = in.take<float>();
-    mode.values = take_all<std::int16_t>(in);
+    mode.step = in.read<float>();
+    mode.values = pop_all<std::int16_t>(in);
   }
-  const auto tets = take_all<std::uint32_t>(in);
-  const auto weights = take_all<float>(in);
-  patch.outer_stiffness = take_all<double>(in);
-  patch.mass = take_all<double>(in);
-  patch.nonlinear = in.take<double>();
-  patch.residual = in.take<double>();
+  const auto tets = pop_all<std::uint32_t>(in);
+  const auto weights = pop_all<float>(in);
+  patch.outer_stiffness = pop_all<double>(in);
+  patch.mass = pop_all<double>(in);
+  patch.nonlinear = in.read<double>();
+  patch.residual = in.read<double>();
   if (!in.ok() || in.remaining() > 0 || tets.size() != weights.size()) return std::nullopt;
   for (std::size_t i = 0; i < tets.size(); ++i)
     patch.cubature.push_back({TetIndex(tets[i]), weights[i]});

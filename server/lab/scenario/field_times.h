@@ -17,7 +17,7 @@ class FieldTimes {
       : times_s_(times_s), tolerance_s_(std::min(step_s, 1e-3) / 2) {}
 
   // Whether a time that was not due before is due now. To be asked in order of time.
-  bool take_due(double now_s) {
+  bool pop_due(double now_s) {
     const std::size_t before = next_;
     while (next_ < times_s_.size() && times_s_[next_] <= now_s + tolerance_s_) ++next_;
     return next_ > before;

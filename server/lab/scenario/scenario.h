@@ -22,6 +22,7 @@
 #include "server/organs/material/material_keys.h"
 #include "server/organs/organ/local_reduction.h"
 #include "server/organs/organ/organ.h"
+#include "server/papers/nakao/adaptive_splitter.h"
 #include "server/tissue/step/external_loads.h"
 
 namespace trocar::scenario {
@@ -158,12 +159,13 @@ struct RunRule {
   // Graded, outside the queue; without: what the organ needs.
   std::optional<std::uint32_t> far_sweeps;
   std::optional<double> far_over_relaxation;
-  bool has_linear_far_field = false;     // as in sessions
-  std::optional<std::string> reduction;  // file, relative to the scenario
-  bool self_contact = true;              // tissue does not pass through tissue; dynamic runs
-  double tolerance_n = 1e-5;             // of the full solver: residual at which a step is done
-  std::uint32_t max_sweeps = 2000;       // of the full solver
-  std::vector<Place> given;              // of each key in [run]
+  bool has_linear_far_field = false;      // as in sessions
+  std::optional<std::string> reduction;   // file, relative to the scenario
+  std::optional<nakao::Variant> cutting;  // of a paper; without: as in sessions
+  bool self_contact = true;               // tissue does not pass through tissue; dynamic runs
+  double tolerance_n = 1e-5;              // of the full solver: residual at which a step is done
+  std::uint32_t max_sweeps = 2000;        // of the full solver
+  std::vector<Place> given;               // of each key in [run]
 
   double dt_s() const { return 1e-3 / steps_per_tick; }
 };

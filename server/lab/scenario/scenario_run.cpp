@@ -37,6 +37,9 @@ constexpr int kMinContactRounds = static_cast<int>(hands::kPoseTicks) + 2;
 constexpr int kMaxContactRounds = 60;
 constexpr float kContactChange_m = 1e-5f;
 constexpr float kNoLimit_m = 10;
+// A paper's subdivision gets a patch of this many mean edges at a time: shorter ones pull the same
+// nodes again and again.
+constexpr double kPatchEdges = 1;
 
 double seconds_of(Tick tick) {
   return static_cast<double>(tick) / static_cast<double>(kTicksPerSecond);
@@ -82,6 +85,10 @@ step::TickDecisions decisions_of(const scenario::RunRule& run, Solver solver) {
     policy.max_sweeps = run.max_sweeps;
   }
   return decisions;
+}
+
+cutting::Settings cutting_of(const scenario::RunRule& run) {
+  return run.cutting ? nakao::settings_of(*run.cutting, kPatchEdges) : cutting::Settings{};
 }
 
 const scenario::Place& run_key(const scenario::Scenario& scenario, std::string_view key) {
@@ -156,7 +163,8 @@ ScenarioRun::ScenarioRun(scenario::ResolvedScenario resolved, Solver solver, uns
       solver_kind_(solver),
       decisions_(decisions_of(scenario().run, solver)),
       step_count_(steps_of(scenario().run)),
-      simulation_(resolved_.organ, threads, reduction::at_work(resolved_.reduction)),
+      simulation_(resolved_.organ, threads, reduction::at_work(resolved_.reduction),
+                  cutting_of(scenario().run)),
       loads_({resolved_.displacements, resolved_.forces}, organ().fixed_nodes,
              organ().mesh.node_count()) {
   for (std::size_t i = 0; i < scenario().probes.size(); ++i)
@@ -209,7 +217,7 @@ bool ScenarioRun::is_due(std::size_t probe) const {
   return is_static() || steps_done_ % scenario().probes[probe].every_ticks == 0;
 }
 
-void ScenarioRun::take_samples(Tick tick, double time_s, bool has_samples) {
+void ScenarioRun::sample_tools(Tick tick, double time_s, bool has_samples) {
   inputs_.clear();
   const auto& tools = scenario().tools;
   for (std::size_t i = 0; tick == 1 && i < tools.size(); i += kToolsPerHand) {
@@ -229,7 +237,7 @@ void ScenarioRun::take_samples(Tick tick, double time_s, bool has_samples) {
 StepReport ScenarioRun::step_dynamic() {
   if (explicit_) return step_explicit();
   const Tick before = simulation_.current_tick();
-  take_samples(before + 1, seconds_of(before), before % kSampleTicks == 0);
+  sample_tools(before + 1, seconds_of(before), before % kSampleTicks == 0);
   const auto& tick =
       simulation_.tick(inputs_, decisions_, has_external_loads() ? &loads_ : nullptr);
   StepReport report;
@@ -272,7 +280,7 @@ void ScenarioRun::place_held(const dynamics::ExternalLoads& loads) {
   for (std::size_t i = 0; i < loads.held.size(); ++i)
     put(loads.held[i], kAllAxes, loads.held_displacements[i]);
   for (const auto& hold : loads.axis_holds) put(hold.node, hold.axes, hold.displacement);
-  context.solver.take_motion(world);
+  context.solver.read_motion(world);
   context.finder.surface_moved(largest_move_m);
 }
 
@@ -312,7 +320,7 @@ StepReport ScenarioRun::relax(const dynamics::ExternalLoads& loads) {
     const double energy_j = descends ? potential_energy_j(loads) : 0;
     if (!(energy_j <= last_energy_j + kEnergySlack * std::abs(last_energy_j))) {
       std::ranges::copy(before_stretch_, world.displacements.begin());
-      context.solver.take_motion(world);
+      context.solver.read_motion(world);
       how.over_relaxation *= kOverRelaxationStepBack;
       continue;
     }
@@ -343,7 +351,7 @@ StepReport ScenarioRun::step_static() {
   for (int round = 0; !scenario().tools.empty() && round < kMaxContactRounds &&
                       (round < kMinContactRounds || change > kContactChange_m);
        ++round) {
-    take_samples(++world.tick, now, round == 0);
+    sample_tools(++world.tick, now, round == 0);
     context.inputs = &inputs_;
     step::admit_inputs(state, context);
     context.inputs = nullptr;

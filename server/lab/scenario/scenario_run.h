@@ -85,7 +85,7 @@ class ScenarioRun {
   bool is_static() const { return scenario().run.mode == scenario::RunMode::Static; }
   void hold_displaced();
   // The samples of the tools at this time; tools join in the first tick.
-  void take_samples(Tick tick, double time_s, bool has_samples);
+  void sample_tools(Tick tick, double time_s, bool has_samples);
   Vec3d force_on(ToolSlot tool) const;
   StepReport step_dynamic();
   StepReport step_explicit();

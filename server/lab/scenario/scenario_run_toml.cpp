@@ -46,6 +46,14 @@ void read_far_field(tool::TableReader& reader, RunRule& run) {
                 "is for boundary = \"graded\" or like = \"session\"");
 }
 
+// The paper's methods work on whole strokes of an organ that is solved whole.
+void read_cutting(tool::TableReader& reader, RunRule& run) {
+  run.cutting = reader.choice<nakao::Variant, 2>(
+      "cutting", {{{"nakao", nakao::Variant::Adaptive}, {"nakao-plain", nakao::Variant::Plain}}});
+  if (run.cutting && (run.boundary != Boundary::Whole || run.self_contact))
+    reader.fail("cutting", "needs boundary = \"whole\" and self_contact = false beside it");
+}
+
 void read_boundary(tool::TableReader& reader, RunRule& run) {
   const auto boundary = reader.choice<Boundary, 3>(
       "boundary",
@@ -83,7 +91,8 @@ void read_step(tool::TableReader& reader, RunRule& run) {
   if (run.boundary != Boundary::Whole)
     reader.fail("integrator",
                 "\"explicit\" moves the whole organ, remove boundary, depth and nodes");
-  refuse_keys(reader, {"sweeps", "over_relaxation", "tolerance_n", "max_sweeps", "self_contact"},
+  refuse_keys(reader,
+              {"sweeps", "over_relaxation", "tolerance_n", "max_sweeps", "self_contact", "cutting"},
               "is of the implicit integrator");
 }
 
@@ -111,6 +120,7 @@ RunRule read_run(tool::TableReader& reader) {
   read_count(reader, "sweeps", 1, 64, run.sweeps);
   run.over_relaxation = reader.number("over_relaxation", 1, 1.9).value_or(run.over_relaxation);
   run.self_contact = reader.boolean("self_contact").value_or(true);
+  read_cutting(reader, run);
   if (run.mode == RunMode::Static) {
     // Residual forces add up over all nodes, and no later step of a static run corrects them.
     run.tolerance_n = 1e-7;
@@ -121,7 +131,7 @@ RunRule read_run(tool::TableReader& reader) {
   if (run.mode == RunMode::Static)
     refuse_keys(reader,
                 {"start", "like", "reduction", "far_field", "boundary", "depth", "nodes",
-                 "integrator", "dt_s", "sweeps", "self_contact"},
+                 "integrator", "dt_s", "sweeps", "self_contact", "cutting"},
                 "is for mode = \"dynamic\"");
   else
     refuse_keys(reader, {"load_steps"}, "is for mode = \"static\"");

@@ -73,10 +73,10 @@ bool has_magic(BytesView file, std::string_view magic) {
 
 Result<PackedBody> unpack(const PackedKind& kind, BytesView file) {
   ByteReader reader(file);
-  reader.take_bytes(kind.magic.size());
-  const auto version = reader.take<std::uint32_t>();
-  const auto length = reader.take<std::uint64_t>();
-  const auto crc = reader.take<std::uint32_t>();
+  reader.read_bytes(kind.magic.size());
+  const auto version = reader.read<std::uint32_t>();
+  const auto length = reader.read<std::uint64_t>();
+  const auto crc = reader.read<std::uint32_t>();
   if (!has_magic(file, kind.magic))
     return bad("is not " + std::string(kind.name) + ": " + std::string(kind.remedy));
   if (!reader.ok()) return bad("is cut off in its header");

@@ -4,7 +4,7 @@
 
 namespace trocar::control {
 
-std::uint32_t DepthChooser::follow(std::uint32_t now, std::uint32_t wanted, std::uint32_t step) {
+std::uint32_t DepthChooser::approach(std::uint32_t now, std::uint32_t wanted, std::uint32_t step) {
   if (wanted >= now) {
     room_ticks_ = 0;
     return wanted;
@@ -23,14 +23,15 @@ step::TickDecisions DepthChooser::choose(const step::TickDecisions& decided,
   auto chosen = decided;
   if (decided.boundary == world::Boundary::Frozen) {
     if (!forces_n.empty())
-      nodes_ = follow(nodes_, organ::frozen_nodes_for(table_, ahead_).value_or(decided.node_limit),
-                      nodes_ / kNodeShare);
+      nodes_ =
+          approach(nodes_, organ::frozen_nodes_for(table_, ahead_).value_or(decided.node_limit),
+                   nodes_ / kNodeShare);
     chosen.node_limit =
         std::min(decided.node_limit, std::max(nodes_, std::min(least_nodes_, decided.node_limit)));
   } else {
     if (!forces_n.empty())
-      depth_ =
-          follow(depth_, organ::graded_depth_for(table_, ahead_).value_or(decided.depth_limit), 1);
+      depth_ = approach(depth_,
+                        organ::graded_depth_for(table_, ahead_).value_or(decided.depth_limit), 1);
     chosen.depth_limit = std::min(decided.depth_limit, depth_);
   }
   return chosen;

@@ -33,7 +33,7 @@ class DepthChooser {
   step::TickDecisions choose(const step::TickDecisions& decided, std::span<const double> forces_n);
 
  private:
-  std::uint32_t follow(std::uint32_t now, std::uint32_t wanted, std::uint32_t step);
+  std::uint32_t approach(std::uint32_t now, std::uint32_t wanted, std::uint32_t step);
 
   const organ::DepthTable table_;
   const std::uint32_t least_nodes_;

@@ -157,10 +157,10 @@ void RateController::lower(const step::TickReport& report) {
   auto step = next_lower(report);
   if (!step.is_any) return;
   while (step.is_any && step.change == 0) {
-    take(step);
+    apply(step);
     step = next_lower(report);
   }
-  if (step.is_any) take(step);
+  if (step.is_any) apply(step);
   if (since_raise_ < kRegret && since_lower_ > since_raise_) hold_ = std::min(kMaxHold, 2 * hold_);
   since_lower_ = 0;
   ++lowered_;
@@ -180,16 +180,16 @@ void RateController::raise(const step::TickReport& report) {
   }
   if (++room_ticks_ < hold_) return;
   while (step.is_any && step.change == 0) {
-    take(step);
+    apply(step);
     step = next_higher();
   }
-  if (has_room(step)) take(step);
+  if (has_room(step)) apply(step);
   room_ticks_ = std::max(0, hold_ - kRaiseEvery);
   since_raise_ = 0;
   ++raised_;
 }
 
-void RateController::take(const Step& step) {
+void RateController::apply(const Step& step) {
   sweeps_ = step.sweeps;
   nodes_ = step.nodes;
   far_interval_ = step.far_interval;

@@ -84,7 +84,7 @@ class RateController {
   Step next_higher() const;
   void lower(const step::TickReport& report);
   void raise(const step::TickReport& report);
-  void take(const Step& step);
+  void apply(const Step& step);
   double budget_us() const { return limits_.budget_us * budget_share_; }
 
   const RateLimits limits_;

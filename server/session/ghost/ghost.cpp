@@ -39,7 +39,7 @@ void Ghost::set_wanted(bool is_wanted) {
   wake_.notify_one();
 }
 
-void Ghost::take_frames(std::span<const step::SharedFrame> frames) {
+void Ghost::push(std::span<const step::SharedFrame> frames) {
   {
     const std::lock_guard lock(mutex_);
     if (!is_wanted_ || frames.empty()) return;
@@ -66,7 +66,7 @@ void Ghost::run() {
   while (const auto frame = next_frame()) {
     if (!follower_) follower_.emplace(session_, options_.decisions);
     const auto before = follower_->status();
-    follower_->follow(*frame);
+    follower_->repeat(*frame);
     if (before != GhostStatus::Follows && follower_->status() == GhostStatus::Follows) {
       const std::lock_guard lock(mutex_);
       ++counters_.begun;

@@ -2,7 +2,7 @@
 
 // A GhostFollower on a thread of its own, of low priority, while somebody wants to see it.
 //
-//   I/O thread --take_frames--> queue of 2 s --> ghost's thread: follow, every 4th frame publish
+//   I/O thread --push--> queue of 2 s --> ghost's thread: repeat, every 4th frame publish
 //
 // Whoever gives frames never waits for more than the queue's lock. If it does not keep up, the
 // queue is emptied and it begins again from a new snapshot of the session. While nobody wants it,
@@ -47,7 +47,7 @@ class Ghost {
 
   // All are called from one thread.
   void set_wanted(bool is_wanted);
-  void take_frames(std::span<const step::SharedFrame> frames);
+  void push(std::span<const step::SharedFrame> frames);
   // Any thread.
   GhostCounters counters() const;
 

@@ -17,7 +17,7 @@ void GhostFollower::drop(GhostStatus status) {
   status_ = status;
 }
 
-void GhostFollower::follow(const step::PublishedFrame& frame) {
+void GhostFollower::repeat(const step::PublishedFrame& frame) {
   // A snapshot in such a frame may be from before the change.
   if (frame.change || frame.new_layout || !frame.mark_events.empty()) {
     quiet_frames_ = 0;
@@ -26,7 +26,7 @@ void GhostFollower::follow(const step::PublishedFrame& frame) {
   ++quiet_frames_;
   if (status_ != GhostStatus::Follows && !begin(frame)) return;
   if (!run(frame)) return drop(GhostStatus::Behind);
-  own_ = simulation_.take_frame();
+  own_ = simulation_.pop_frame();
   // It has cut where the session has not.
   if (!own_ || own_->epoch != frame.epoch || own_->surface.size() != frame.surface.size())
     drop(GhostStatus::Changed);

@@ -38,7 +38,7 @@ class GhostFollower {
   GhostFollower(const step::Simulation& session, const step::TickDecisions& decisions);
 
   // Frames of the session one after another; afterwards status() says what became of it.
-  void follow(const step::PublishedFrame& frame);
+  void repeat(const step::PublishedFrame& frame);
   // Frames were left out.
   void lose() { drop(GhostStatus::Behind); }
   // Status Follows: how it is beside the session.

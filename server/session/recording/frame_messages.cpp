@@ -33,25 +33,25 @@ Status FrameMessages::write(const step::PublishedFrame& frame, const participant
     last_decisions_ = record.decisions;
     has_decisions_ = true;
   }
-  if (auto s = sink.take(JournalTopic::TickBatch, batch); !s) return s;
+  if (auto s = sink.write(JournalTopic::TickBatch, batch); !s) return s;
   if (auto s = write_surfaces(frame, sink); !s) return s;
   if (!frame.claim_events.empty()) {
     proto::ClaimLog claims;
     for (const auto& event : frame.claim_events)
       replication::describe(event, roster, *claims.add_event());
-    if (auto s = sink.take(JournalTopic::Claims, claims); !s) return s;
+    if (auto s = sink.write(JournalTopic::Claims, claims); !s) return s;
   }
   if (!frame.solver_changes.empty()) {
     proto::SolverLog changes;
     for (const auto& change : frame.solver_changes)
       replication::describe(change, *changes.add_change());
-    if (auto s = sink.take(JournalTopic::Solver, changes); !s) return s;
+    if (auto s = sink.write(JournalTopic::Solver, changes); !s) return s;
   }
   proto::FrameState state;
   replication::describe(frame, state);
   for (const auto& tool : state.tool())
-    if (auto s = sink.take(tool); !s) return s;
-  return sink.take(JournalTopic::FrameState, state);
+    if (auto s = sink.write(tool); !s) return s;
+  return sink.write(JournalTopic::FrameState, state);
 }
 
 Status FrameMessages::write_surfaces(const step::PublishedFrame& frame, MessageSink& sink) {
@@ -63,7 +63,7 @@ Status FrameMessages::write_surfaces(const step::PublishedFrame& frame, MessageS
     if (auto s = wire::apply(*frame.change, layout_); !s) return s;
     proto::SurfaceChange message;
     wire::write(*frame.change, layout_, message);
-    if (auto s = sink.take(JournalTopic::TopologyChange, message); !s) return s;
+    if (auto s = sink.write(JournalTopic::TopologyChange, message); !s) return s;
   }
   const bool has_key = !has_baseline_ || frame.tick - last_key_tick_ >= kKeyPeriod;
   if (has_baseline_) {
@@ -74,7 +74,7 @@ Status FrameMessages::write_surfaces(const step::PublishedFrame& frame, MessageS
   if (layout_.epoch > 0) {
     proto::SurfaceTopology topology;
     wire::write(layout_, organ_name_, topology);
-    if (auto s = sink.take(JournalTopic::Topology, topology); !s) return s;
+    if (auto s = sink.write(JournalTopic::Topology, topology); !s) return s;
   }
   return write_surface(frame, true, sink);
 }
@@ -99,7 +99,7 @@ Status FrameMessages::write_surface(const step::PublishedFrame& frame, bool is_k
   baseline_.assign(frame.surface.begin(), frame.surface.end());
   baseline_frame_ = frame.frame;
   has_baseline_ = true;
-  return sink.take(is_keyframe ? JournalTopic::SurfaceKey : JournalTopic::SurfaceDelta, message);
+  return sink.write(is_keyframe ? JournalTopic::SurfaceKey : JournalTopic::SurfaceDelta, message);
 }
 
 }  // namespace trocar::recording

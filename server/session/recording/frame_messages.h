@@ -28,8 +28,8 @@ namespace trocar::recording {
 class MessageSink {
  public:
   virtual ~MessageSink() = default;
-  virtual Status take(journal::JournalTopic topic, const google::protobuf::Message& message) = 0;
-  virtual Status take(const proto::ToolState& tool) = 0;
+  virtual Status write(journal::JournalTopic topic, const google::protobuf::Message& message) = 0;
+  virtual Status write(const proto::ToolState& tool) = 0;
 };
 
 class FrameMessages {

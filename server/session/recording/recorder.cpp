@@ -28,10 +28,10 @@ class FileSink final : public MessageSink {
  public:
   FileSink(journal::SessionJournalWriter& writer, Tick tick, std::uint64_t now_ns)
       : writer_(writer), tick_(tick), now_ns_(now_ns) {}
-  Status take(journal::JournalTopic topic, const google::protobuf::Message& message) override {
+  Status write(journal::JournalTopic topic, const google::protobuf::Message& message) override {
     return writer_.write(topic, tick_, now_ns_, message);
   }
-  Status take(const proto::ToolState& tool) override {
+  Status write(const proto::ToolState& tool) override {
     return writer_.write_tool({static_cast<std::uint8_t>(tool.tool())}, tick_, now_ns_, tool);
   }
 
@@ -76,7 +76,7 @@ Recorder::~Recorder() {
   if (thread_.joinable()) static_cast<void>(close());
 }
 
-void Recorder::take_frame(const step::SharedFrame& frame) {
+void Recorder::record_frame(const step::SharedFrame& frame) {
   const std::size_t bytes = estimated_bytes(*frame);
   const Tick first = frame->records.empty() ? frame->tick : frame->records.front().tick;
   bool is_taken = queued_bytes_.load(std::memory_order_relaxed) + bytes <= kQueueBytes;
@@ -101,7 +101,7 @@ void Recorder::take_frame(const step::SharedFrame& frame) {
   wake_ups_.notify_one();
 }
 
-void Recorder::take_participants(std::vector<participants::Participant> present, Tick tick) {
+void Recorder::record_participants(std::vector<participants::Participant> present, Tick tick) {
   // A list that does not fit is replaced by the next one; 64 changes would have to come at once.
   static_cast<void>(presences_.try_push({std::move(present), tick}));
   wake_ups_.fetch_add(1);

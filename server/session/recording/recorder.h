@@ -2,8 +2,8 @@
 
 // Writes a session's journal from a thread of its own.
 //
-//   simulation thread: take_frame ------> [frames, 8 MiB] --.
-//   I/O thread:        take_participants -> [64 lists] -----+--> writer thread -> MCAP file
+//   simulation thread: record_frame ----> [frames, 8 MiB] --.
+//   I/O thread:        record_participants -> [64 lists] -----+--> writer thread -> MCAP file
 //
 // Neither producer ever waits. When the frames' queue is full a frame is dropped, counted, and the
 // journal gets a JournalGap with the ticks that are missing; the surface goes on with topology and
@@ -53,11 +53,11 @@ class Recorder {
   ~Recorder();
 
   // Simulation thread.
-  void take_frame(const step::SharedFrame& frame);
+  void record_frame(const step::SharedFrame& frame);
   // A producer that can wait asks: near kQueueBytes the next frame may be dropped.
   std::size_t queued_bytes() const { return queued_bytes_.load(std::memory_order_relaxed); }
   // The I/O thread calls it after each change.
-  void take_participants(std::vector<participants::Participant> present, Tick tick);
+  void record_participants(std::vector<participants::Participant> present, Tick tick);
   // After both producers have ended: writes what is queued and the file's summary.
   Status close();
   // After close().

@@ -8,7 +8,7 @@
 
 namespace trocar::recording {
 
-StoredSurface::Check StoredSurface::take(const proto::SurfaceTopology& message) {
+StoredSurface::Check StoredSurface::check(const proto::SurfaceTopology& message) {
   auto layout = wire::read(message);
   if (!layout.ok()) return StoredDifference{"topology", layout.error().message, "a surface"};
   layout_ = std::move(*layout);
@@ -16,7 +16,7 @@ StoredSurface::Check StoredSurface::take(const proto::SurfaceTopology& message) 
   return {};
 }
 
-StoredSurface::Check StoredSurface::take(const proto::SurfaceChange& message) {
+StoredSurface::Check StoredSurface::check(const proto::SurfaceChange& message) {
   if (!has_layout_ || message.from_epoch() != layout_.epoch) {
     has_layout_ = has_surface_ = false;
     return {};
@@ -27,7 +27,7 @@ StoredSurface::Check StoredSurface::take(const proto::SurfaceChange& message) {
   return StoredDifference{"change", applied.error().message, "a change that fits the surface"};
 }
 
-StoredSurface::Check StoredSurface::take(const proto::SurfaceFrame& message) {
+StoredSurface::Check StoredSurface::check(const proto::SurfaceFrame& message) {
   const bool is_key = message.is_keyframe();
   const bool has_base = is_key || (has_surface_ && message.base_frame() == frame_);
   has_surface_ = has_base && has_layout_ && message.epoch() == layout_.epoch;

@@ -27,9 +27,9 @@ class StoredSurface {
   // A check returns what the stream says wrongly of itself, or nothing.
   using Check = std::optional<StoredDifference>;
 
-  Check take(const proto::SurfaceTopology& message);
-  Check take(const proto::SurfaceChange& message);
-  Check take(const proto::SurfaceFrame& message);
+  Check check(const proto::SurfaceTopology& message);
+  Check check(const proto::SurfaceChange& message);
+  Check check(const proto::SurfaceFrame& message);
   // Messages are missing before the next one.
   void skip() { has_surface_ = false; }
 

@@ -74,12 +74,12 @@ bool is_older(const std::string& protocol) {
 class Verifier::Collector final : public MessageSink {
  public:
   explicit Collector(std::vector<Expected>& into) : into_(into) {}
-  Status take(JournalTopic topic, const google::protobuf::Message& message) override {
+  Status write(JournalTopic topic, const google::protobuf::Message& message) override {
     if (topic != JournalTopic::TickBatch)  // it is what the simulation began with
       into_.push_back({journal::topic_name(topic), comparable(message)});
     return {};
   }
-  Status take(const proto::ToolState& tool) override {
+  Status write(const proto::ToolState& tool) override {
     into_.push_back({topic_of_tool(tool.tool()), comparable(tool)});
     return {};
   }
@@ -125,7 +125,7 @@ void Verifier::add_reason(std::string reason) {
     ++report_.reasons_left_out;
 }
 
-bool Verifier::take(std::string_view topic, BytesView bytes) {
+bool Verifier::check(std::string_view topic, BytesView bytes) {
   const auto counted = message_counts_.find(topic);
   if (counted != message_counts_.end())
     ++counted->second;
@@ -157,11 +157,11 @@ bool Verifier::take(std::string_view topic, BytesView bytes) {
       break;
     case JournalTopic::Snapshot:
       end_frame();
-      take_snapshot(static_cast<const proto::WorldSnapshot&>(*message));
+      check_snapshot(static_cast<const proto::WorldSnapshot&>(*message));
       break;
     case JournalTopic::TickBatch:
       end_frame();
-      take_batch(static_cast<const proto::TickBatch&>(*message));
+      check_batch(static_cast<const proto::TickBatch&>(*message));
       break;
     case JournalTopic::Participants: {
       end_frame();
@@ -178,14 +178,14 @@ bool Verifier::take(std::string_view topic, BytesView bytes) {
     }
     case JournalTopic::Gap:
       end_frame();
-      take_gap(static_cast<const proto::JournalGap&>(*message));
+      check_gap(static_cast<const proto::JournalGap&>(*message));
       break;
     case JournalTopic::SurfaceKey:
     case JournalTopic::SurfaceDelta:
     case JournalTopic::Topology:
     case JournalTopic::TopologyChange:
       compare(topic, *message);
-      take_surface(*known, *message);
+      check_surface(*known, *message);
       break;
     case JournalTopic::Claims:
     case JournalTopic::FrameState:
@@ -198,7 +198,7 @@ bool Verifier::take(std::string_view topic, BytesView bytes) {
 
 // ---- ticks ----
 
-void Verifier::take_snapshot(const proto::WorldSnapshot& snapshot) {
+void Verifier::check_snapshot(const proto::WorldSnapshot& snapshot) {
   const auto tick = snapshot.tick();
   const auto hash = xxh3_64(bytes_of(std::string_view(snapshot.state())));
   if (hash != snapshot.state_hash())
@@ -213,10 +213,10 @@ void Verifier::take_snapshot(const proto::WorldSnapshot& snapshot) {
   if (is_in_step_ && tick == simulation_.current_tick()) compare_snapshot(tick);
 }
 
-void Verifier::take_batch(const proto::TickBatch& batch) {
+void Verifier::check_batch(const proto::TickBatch& batch) {
   for (const auto& record : batch.record()) {
     if (report_.first_difference) return;
-    take_record(record);
+    check_record(record);
   }
 }
 
@@ -230,7 +230,7 @@ void Verifier::note_missing(Tick before) {
   is_in_step_ = false;
 }
 
-void Verifier::take_record(const proto::TickRecord& message) {
+void Verifier::check_record(const proto::TickRecord& message) {
   const Tick tick = message.tick();
   if (tick < next_tick_)
     return add_reason(fmt::format("tick {}: recorded after tick {}", tick, next_tick_ - 1));
@@ -258,7 +258,7 @@ void Verifier::take_record(const proto::TickRecord& message) {
   continue_snapshots(done.state_hash);
   if (report_.first_difference) return;
   if (snapshots_.contains(tick)) compare_snapshot(tick);
-  if (auto frame = simulation_.take_frame()) begin_frame(*frame);
+  if (auto frame = simulation_.pop_frame()) begin_frame(*frame);
 }
 
 bool Verifier::start_from_snapshot(Tick tick) {
@@ -325,7 +325,7 @@ void Verifier::continue_snapshots(std::uint64_t hash) {
       continuations_, [&](const Continuation& restored) { return restored.until <= record_.tick; });
 }
 
-void Verifier::take_gap(const proto::JournalGap& gap) {
+void Verifier::check_gap(const proto::JournalGap& gap) {
   gap_end_ = gap.last_tick();
   add_reason(ticks_text(gap.first_tick(), gap.last_tick()) +
              ": a marked gap, the session did not record them");
@@ -388,18 +388,18 @@ void Verifier::compare_participants(Tick tick) {
   ++report_.participants_verified;
 }
 
-void Verifier::take_surface(JournalTopic topic, const google::protobuf::Message& message) {
+void Verifier::check_surface(JournalTopic topic, const google::protobuf::Message& message) {
   StoredSurface::Check wrong;
   Tick tick = next_tick_ - 1;
   if (topic == JournalTopic::Topology) {
-    wrong = surface_.take(static_cast<const proto::SurfaceTopology&>(message));
+    wrong = surface_.check(static_cast<const proto::SurfaceTopology&>(message));
   } else if (topic == JournalTopic::TopologyChange) {
-    wrong = surface_.take(static_cast<const proto::SurfaceChange&>(message));
+    wrong = surface_.check(static_cast<const proto::SurfaceChange&>(message));
   } else {
     const auto& surface = static_cast<const proto::SurfaceFrame&>(message);
     tick = surface.tick();
     const auto decoded = surface_.decoded();
-    wrong = surface_.take(surface);
+    wrong = surface_.check(surface);
     const bool is_decoded = surface_.decoded() > decoded;
     if (!wrong && is_decoded && has_frame_ && frame_tick_ == tick) {
       if (surface.surface_crc() != frame_crc_)

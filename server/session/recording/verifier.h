@@ -24,12 +24,12 @@ class Verifier {
   ~Verifier();
 
   // Lists of participants of the whole recording, in order, and whether these are all: names and
-  // tools are compared only then. Before the first take().
+  // tools are compared only then. Before the first check().
   void add_list(Tick tick, const proto::Participants& list);
   void set_all_lists(bool has_all) { has_all_lists_ = has_all; }
 
   // False once there is a difference.
-  bool take(std::string_view topic, BytesView bytes);
+  bool check(std::string_view topic, BytesView bytes);
   // This is called after the last message.
   void finish(const journal::McapReader& container);
 
@@ -53,17 +53,17 @@ class Verifier {
 
   void differ(Difference difference);
   void add_reason(std::string reason);
-  void take_snapshot(const proto::WorldSnapshot& snapshot);
-  void take_batch(const proto::TickBatch& batch);
-  void take_record(const proto::TickRecord& message);
-  void take_gap(const proto::JournalGap& gap);
+  void check_snapshot(const proto::WorldSnapshot& snapshot);
+  void check_batch(const proto::TickBatch& batch);
+  void check_record(const proto::TickRecord& message);
+  void check_gap(const proto::JournalGap& gap);
   void note_missing(Tick before);
   bool start_from_snapshot(Tick tick);
   void compare_snapshot(Tick tick);
   void continue_snapshots(std::uint64_t hash);
   void begin_frame(step::PublishedFrame& frame);
   void compare_participants(Tick tick);
-  void take_surface(journal::JournalTopic topic, const google::protobuf::Message& message);
+  void check_surface(journal::JournalTopic topic, const google::protobuf::Message& message);
   void compare(std::string_view topic, const google::protobuf::Message& recorded);
   void end_frame();
 

@@ -121,7 +121,7 @@ Result<VerifyReport> verify_journal(const std::string& path,
       progress(tick, info.last_tick);
       next_progress = tick + kProgressPeriod;
     }
-    return verifier.take(topic, bytes);
+    return verifier.check(topic, bytes);
   });
   verifier.finish((*journal)->container());
   return report;

@@ -89,7 +89,7 @@ void Replicator::on_message(net::ConnectionId id, BytesView message) {
   const auto found = clients_.find(id);
   if (found == clients_.end()) return;
   auto& client = *found->second;
-  if (const auto ending = take_message(client, message)) end_session(client, *ending);
+  if (const auto ending = handle_message(client, message)) end_session(client, *ending);
   settle_participants();
 }
 
@@ -151,7 +151,7 @@ bool Replicator::exceeds_rate(Client& client) {
   return ++client.messages_in_window > options_.max_messages_per_second;
 }
 
-std::optional<Replicator::Ending> Replicator::take_message(Client& client, BytesView bytes) {
+std::optional<Replicator::Ending> Replicator::handle_message(Client& client, BytesView bytes) {
   const auto protocol_error = [](std::string text) {
     return Ending{EndReason::ProtocolError, std::move(text)};
   };
@@ -168,13 +168,13 @@ std::optional<Replicator::Ending> Replicator::take_message(Client& client, Bytes
     case proto::Envelope::kHello:
       return admit(client, envelope.hello());
     case proto::Envelope::kToolSample:
-      return take_sample(client, envelope.tool_sample());
+      return handle_sample(client, envelope.tool_sample());
     case proto::Envelope::kFrameAck:
-      return take_ack(client, envelope.frame_ack().frame(), envelope.frame_ack().surface_crc());
+      return handle_ack(client, envelope.frame_ack().frame(), envelope.frame_ack().surface_crc());
     case proto::Envelope::kMarkRequest:
-      return take_mark(client, envelope.mark_request().action());
+      return handle_mark(client, envelope.mark_request().action());
     case proto::Envelope::kGhostRequest:
-      take_ghost_request(client, envelope.ghost_request().is_wanted());
+      handle_ghost_request(client, envelope.ghost_request().is_wanted());
       return std::nullopt;
     case proto::Envelope::kKeyframeRequest:
       client.wants_keyframe = true;
@@ -233,8 +233,8 @@ std::optional<Replicator::Ending> Replicator::admit(Client& client, const proto:
   return std::nullopt;
 }
 
-std::optional<Replicator::Ending> Replicator::take_sample(Client& client,
-                                                          const proto::ToolSample& sample) {
+std::optional<Replicator::Ending> Replicator::handle_sample(Client& client,
+                                                            const proto::ToolSample& sample) {
   const auto& participant = *client.participant;
   if (!participants::has_tools(participant.role))
     return Ending{EndReason::Role,
@@ -252,7 +252,7 @@ std::optional<Replicator::Ending> Replicator::take_sample(Client& client,
   return std::nullopt;
 }
 
-std::optional<Replicator::Ending> Replicator::take_mark(Client& client, int action) {
+std::optional<Replicator::Ending> Replicator::handle_mark(Client& client, int action) {
   const auto role = client.participant->role;
   if (role != participants::Role::Instructor)
     return Ending{EndReason::Role,
@@ -272,15 +272,15 @@ std::optional<Replicator::Ending> Replicator::take_mark(Client& client, int acti
   return std::nullopt;
 }
 
-void Replicator::take_ghost_request(Client& client, bool is_wanted) {
+void Replicator::handle_ghost_request(Client& client, bool is_wanted) {
   client.wants_ghost = is_wanted && options_.on_ghost_wanted != nullptr;
   if (!is_wanted) return;
   // If it does not fit, the next one does; without a ghost the client asks again or waits in vain.
   send(client, options_.on_ghost_wanted ? encode_ghost({}) : encode_no_ghost());
 }
 
-std::optional<Replicator::Ending> Replicator::take_ack(Client& client, Frame frame,
-                                                       std::uint32_t crc) {
+std::optional<Replicator::Ending> Replicator::handle_ack(Client& client, Frame frame,
+                                                         std::uint32_t crc) {
   if (!client.baseline || frame > client.baseline->frame)
     return Ending{EndReason::ProtocolError,
                   "FrameAck.frame: " + std::to_string(frame) + " was not given to you yet"};

@@ -131,12 +131,12 @@ class Replicator final : public net::ConnectionHandler {
   };
 
   // These return what to end the client's session with, or nothing.
-  std::optional<Ending> take_message(Client& client, BytesView bytes);
+  std::optional<Ending> handle_message(Client& client, BytesView bytes);
   std::optional<Ending> admit(Client& client, const proto::Hello& hello);
-  std::optional<Ending> take_sample(Client& client, const proto::ToolSample& sample);
-  std::optional<Ending> take_mark(Client& client, int action);
-  void take_ghost_request(Client& client, bool is_wanted);
-  std::optional<Ending> take_ack(Client& client, Frame frame, std::uint32_t crc);
+  std::optional<Ending> handle_sample(Client& client, const proto::ToolSample& sample);
+  std::optional<Ending> handle_mark(Client& client, int action);
+  void handle_ghost_request(Client& client, bool is_wanted);
+  std::optional<Ending> handle_ack(Client& client, Frame frame, std::uint32_t crc);
   bool exceeds_rate(Client& client);
 
   // Tells everybody what begins an epoch and keeps it; an error if it does not follow.

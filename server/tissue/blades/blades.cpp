@@ -66,7 +66,7 @@ void BladeTable::end_tick(const hands::ToolTable& tools, double work_j) {
     if (!blade.is_at_work) continue;
     const Vec3f tip = tools[ToolSlot{i}].pose.position;
     const float share = blade.is_cutting && total > 0 ? length(tip - blade.tip) / total : 0;
-    follow(blade, tip, static_cast<float>(work_j) * share);
+    update_force(blade, tip, static_cast<float>(work_j) * share);
   }
 }
 
@@ -81,7 +81,7 @@ Vec3f BladeTable::friction_n(Blade& blade, const Vec3f& moved) {
   return blade.held * -kFriction_n_m;
 }
 
-void BladeTable::follow(Blade& blade, const Vec3f& tip, float work_j) {
+void BladeTable::update_force(Blade& blade, const Vec3f& tip, float work_j) {
   const Vec3f moved = tip - blade.tip;
   blade.tip = tip;
   blade.velocity += (moved / kTickSeconds - blade.velocity) * kNewest;

@@ -52,7 +52,7 @@ class BladeTable {
  private:
   // Nobody's hand goes that fast: it has appeared there, and what lies between is not cut.
   static bool has_jumped(const Blade& blade, const Vec3f& tip);
-  static void follow(Blade& blade, const Vec3f& tip, float work_j);
+  static void update_force(Blade& blade, const Vec3f& tip, float work_j);
   static Vec3f friction_n(Blade& blade, const Vec3f& moved);
 
   std::array<Blade, kMaxTools> blades_;

@@ -26,13 +26,14 @@ bool moves_nodes(const cutting::CutEvents& events) {
 
 }  // namespace
 
-TissueCuts::TissueCuts(const organ::Organ& organ)
-    : topology_(organ),
+TissueCuts::TissueCuts(const organ::Organ& organ, const cutting::Settings& settings)
+    : settings_(settings),
+      topology_(organ),
       tearing_(organ),
       surface_(organ),
       layout_(world::make_surface_layout(organ)) {
   if (!organ.mesh.tets.empty() && !topology_.has_links())
-    cutter_ = std::make_unique<cutting::Cutter>(topology_);
+    cutter_ = std::make_unique<cutting::Cutter>(topology_, settings_);
   first_pending_ = static_cast<std::uint32_t>(layout_.triangles.size());
 }
 
@@ -100,21 +101,23 @@ void TissueCuts::record(cutting::CutEvents events) {
 
 // Brings the surface up to date with the topology and returns what has changed.
 topology::Edit TissueCuts::edit() {
-  return {topology_, new_nodes_, surface_.follow(topology_)};
+  return {topology_, new_nodes_, surface_.update(topology_)};
 }
 
 void TissueCuts::extend_layout(const topology::Edit& edit, const world::World& world) {
+  const std::size_t first_new = layout_.vertex_of_node.size();
+  const std::size_t first_made = world.node_count() - world.origins.size();
   layout_.vertex_of_node.resize(topology_.node_count());
   for (const auto node : edit.surface.surfaced) {
     const VertexIndex slot(layout_.vertex_count());
     wire::NewVertex vertex{.node = node};
     vertex.rest_quanta = wire::quantise_rest(topology_.rest().subspan(node.value, 1)).front();
     vertex.is_fixed = world.node_classes[node.value] == world::NodeClass::Fixed;
-    const auto made = std::ranges::lower_bound(edit.new_nodes, node, {}, &topology::NewNode::node);
-    if (made != edit.new_nodes.end() && made->node == node) {
-      const auto a = layout_.vertex_of_node[made->a.value],
-                 b = layout_.vertex_of_node[made->b.value];
-      if (a.is_valid() && b.is_valid()) vertex.a = a, vertex.b = b, vertex.t = made->t;
+    if (node.value >= first_new) {
+      const auto& origin = world.origins[node.value - first_made];
+      const auto a = layout_.vertex_of_node[origin.a.value],
+                 b = layout_.vertex_of_node[origin.b.value];
+      if (a.is_valid() && b.is_valid()) vertex.a = a, vertex.b = b, vertex.t = origin.t;
     }
     layout_.node_of_vertex.push_back(node);
     layout_.vertex_of_node[node.value] = slot;
@@ -154,7 +157,7 @@ void TissueCuts::name_region(std::uint16_t material) {
     pending_.regions.insert(at, name);
 }
 
-std::shared_ptr<const wire::SurfaceChange> TissueCuts::take_change() {
+std::shared_ptr<const wire::SurfaceChange> TissueCuts::pop_change() {
   published_ = static_cast<std::uint32_t>(history_.size());
   if (pending_.new_vertices.empty() && pending_.removed.empty() && pending_.added.empty())
     return nullptr;
@@ -175,7 +178,7 @@ void TissueCuts::replace(const TissueCuts& before) {
   blades_.clear();
 }
 
-std::shared_ptr<const wire::SurfaceLayout> TissueCuts::take_new_layout() {
+std::shared_ptr<const wire::SurfaceLayout> TissueCuts::pop_new_layout() {
   if (!std::exchange(is_new_to_clients_, false)) return nullptr;
   published_ = static_cast<std::uint32_t>(history_.size());
   forget_pending();

@@ -28,8 +28,9 @@ namespace trocar::blades {
 
 class TissueCuts {
  public:
-  explicit TissueCuts(const organ::Organ& organ);
+  explicit TissueCuts(const organ::Organ& organ, const cutting::Settings& settings = {});
 
+  const cutting::Settings& settings() const { return settings_; }
   bool can_cut() const { return cutter_ != nullptr; }
   const topology::Topology& topology() const { return topology_; }
   const wire::SurfaceLayout& layout() const { return layout_; }
@@ -58,10 +59,10 @@ class TissueCuts {
   void replace(const TissueCuts& before);
 
   // Returns the whole surface once after replace(), because no change leads to it; otherwise null.
-  std::shared_ptr<const wire::SurfaceLayout> take_new_layout();
+  std::shared_ptr<const wire::SurfaceLayout> pop_new_layout();
   // Returns the surface's changes since the last call, for clients, or null if there are none. Call
   // it before a frame is published.
-  std::shared_ptr<const wire::SurfaceChange> take_change();
+  std::shared_ptr<const wire::SurfaceChange> pop_change();
 
   // History, strokes and forces. Each edit that is read goes to hand_out, as those of cut() do.
   using HandOut = std::function<void(const topology::Edit&)>;
@@ -76,6 +77,7 @@ class TissueCuts {
   void name_region(std::uint16_t material);
   void read_history(world::StateArchive& archive, std::uint32_t count, const HandOut& hand_out);
 
+  const cutting::Settings settings_;
   topology::Topology topology_;
   std::unique_ptr<cutting::Cutter> cutter_;
   cutting::Tearing tearing_;

@@ -241,8 +241,8 @@ ContactFinder::ContactFinder(const organ::Organ& organ)
   }
 }
 
-void ContactFinder::follow(const topology::SurfaceEdit& edit, const world::World& world) {
-  surface_.follow(edit, world);
+void ContactFinder::update(const topology::SurfaceEdit& edit, const world::World& world) {
+  surface_.update(edit, world);
   near_of_node_.resize(world.node_count(), kNotNear);
   for (auto& nearby : nearby_) nearby.is_known = false;
 }

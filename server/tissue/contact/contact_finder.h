@@ -82,7 +82,7 @@ class ContactFinder {
   void surface_moved(float at_most_m) { surface_travel_ += at_most_m; }
 
   // The world has its new nodes.
-  void follow(const topology::SurfaceEdit& edit, const world::World& world);
+  void update(const topology::SurfaceEdit& edit, const world::World& world);
 
   const Surface& surface() const { return surface_; }
   // Triangles looked at by the last find(), all tools together.

@@ -13,9 +13,9 @@ void GraspTable::anchor(ToolSlot slot, const Pose& pose) {
   grasp.anchor = pose;
 }
 
-void GraspTable::follow_claims(const world::World& world, const hands::ToolTable& tools,
-                               const hands::ClaimTable& claims,
-                               std::span<const hands::ClaimRequest> requests) {
+void GraspTable::update_holds(const world::World& world, const hands::ToolTable& tools,
+                              const hands::ClaimTable& claims,
+                              std::span<const hands::ClaimRequest> requests) {
   for (std::uint8_t i = 0; i < kMaxTools; ++i) {
     const ToolSlot slot{i};
     Grasp& grasp = grasps_[i];
@@ -48,7 +48,7 @@ void GraspTable::follow_claims(const world::World& world, const hands::ToolTable
   }
 }
 
-void GraspTable::follow_slip(const ContactList& contacts, const world::World& world,
+void GraspTable::update_slip(const ContactList& contacts, const world::World& world,
                              hands::ClaimTable& claims, std::vector<hands::ClaimEvent>& events) {
   // A node is lost this much beyond the reach within which jaws take hold, so that a hold that has
   // just begun does not end at its rim.

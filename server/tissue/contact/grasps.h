@@ -53,13 +53,12 @@ class GraspTable {
   // Before inputs change a tool: keeps the last pose of grasps that are going to fade.
   void anchor(ToolSlot slot, const Pose& pose);
   // After the claims were decided: takes hold of what was granted, lets go of what ended.
-  void follow_claims(const world::World& world, const hands::ToolTable& tools,
-                     const hands::ClaimTable& claims,
-                     std::span<const hands::ClaimRequest> requests);
+  void update_holds(const world::World& world, const hands::ToolTable& tools,
+                    const hands::ClaimTable& claims, std::span<const hands::ClaimRequest> requests);
 
   // After the solve: nodes that were pulled beyond their share of the grip have slipped. Lost nodes
   // are free; a grasp without nodes ends its claim.
-  void follow_slip(const ContactList& contacts, const world::World& world,
+  void update_slip(const ContactList& contacts, const world::World& world,
                    hands::ClaimTable& claims, std::vector<hands::ClaimEvent>& events);
 
   // A grasp that holds a node holds its copy, too.

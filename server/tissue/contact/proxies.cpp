@@ -119,7 +119,7 @@ Reaction reaction_on(const ContactList& contacts, const ToolContact& tool,
   return reaction;
 }
 
-void ProxyTable::follow(const ContactList& contacts, const world::World& world,
+void ProxyTable::update(const ContactList& contacts, const world::World& world,
                         const hands::ToolTable& tools) {
   std::array<bool, kMaxTools> pushes{};
   for (const auto& tool : contacts.tools) {

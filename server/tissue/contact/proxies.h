@@ -69,7 +69,7 @@ class ProxyTable {
 
   // After the solve: proxies go where the surface lets them, anchors follow what slid. Tools that
   // do not push lose theirs.
-  void follow(const ContactList& contacts, const world::World& world,
+  void update(const ContactList& contacts, const world::World& world,
               const hands::ToolTable& tools);
 
   void visit_state(world::StateArchive& archive);

@@ -106,7 +106,7 @@ class SelfContactFinder {
   }
 
   // The world has its new nodes.
-  void follow(const topology::SurfaceEdit& edit, const world::World& world);
+  void update(const topology::SurfaceEdit& edit, const world::World& world);
 
   // Lists made, and pairs of nodes in the last one.
   std::uint64_t lists_made() const { return lists_made_; }
@@ -163,13 +163,13 @@ class SelfContactFinder {
   void keep_list(const world::World& world);
   void begin_list();
   void go_on_listing(double share, const world::World& world);
-  void take_references(std::size_t end, const world::World& world);
+  void set_references(std::size_t end, const world::World& world);
   void keep_pairs();
   void order_due();
   void end_list();
   void list_around(Site site);
   void extend();
-  void take_reference(Site site, const world::World& world, List& list) const;
+  void set_reference(Site site, const world::World& world, List& list) const;
   void list_edit(List& list);
   static void add_to_list(std::vector<NodePair>& found, List& list);
   bool looks_around(Site site, const List& list) const;

@@ -66,26 +66,26 @@ void SelfContactFinder::extend() {
   up_stamp_.resize(surface_.triangle_count());
 }
 
-void SelfContactFinder::take_reference(Site site, const world::World& world, List& list) const {
+void SelfContactFinder::set_reference(Site site, const world::World& world, List& list) const {
   list.references[site] = position(site, world);
   list.has_left[site] = has_moved(site, kListedSlacks * slack_m_, world) ? 1 : 0;
 }
 
 // Adds the pairs of nodes that the edit has changed to the present list and to the next one.
 // add_to_list() drops what the next one finds twice.
-void SelfContactFinder::follow(const topology::SurfaceEdit& edit, const world::World& world) {
+void SelfContactFinder::update(const topology::SurfaceEdit& edit, const world::World& world) {
   const auto before = surface_.sites();
   const bool has_references = is_listing_ && sites_seen_ == before.size();
   // The first site whose reference the next list lacks.
   const Site unseen = !has_references && is_listing_ ? before[sites_seen_] : Site{0};
-  surface_.follow(edit, world);
+  surface_.update(edit, world);
   extend();
   for (const auto node : edit.touched) is_close_at_rest_[node.value] = 1;
   for (const auto node : edit.surfaced) {
     const Site s = node.value;
-    take_reference(s, world, list_);
+    set_reference(s, world, list_);
     is_due_[s] = 0;
-    if (has_references || s < unseen) take_reference(s, world, next_list_);
+    if (has_references || s < unseen) set_reference(s, world, next_list_);
   }
   if (has_list_) list_edit(list_), add_to_list(found_, list_);
   if (!is_listing_) return;
@@ -111,7 +111,7 @@ void SelfContactFinder::list_edit(List& list) {
   const float range = reach_m_ + slack_m_;
   const auto& references = list.references;
   trocar::Box<float> box;
-  for (const Site s : surface_.followed()) box.include(references[s]);
+  for (const Site s : surface_.updated()) box.include(references[s]);
   box.grow(range);
   around_.clear();
   looking_.clear();
@@ -122,7 +122,7 @@ void SelfContactFinder::list_edit(List& list) {
   }
   found_.clear();
   float least_squared = list.least_distance * list.least_distance;
-  for (const Site s : surface_.followed()) {
+  for (const Site s : surface_.updated()) {
     auto known = std::ranges::lower_bound(list.pairs, NodePair{s, 0});
     for (const Site other : looks_around(s, list) ? around_ : looking_) {
       const float squared = length_squared(references[s] - references[other]);
@@ -176,7 +176,7 @@ void SelfContactFinder::begin_list() {
   sites_seen_ = sites_listed_ = due_count_ = 0;
 }
 
-void SelfContactFinder::take_references(std::size_t end, const world::World& world) {
+void SelfContactFinder::set_references(std::size_t end, const world::World& world) {
   const float far = kReferenceSlacks * slack_m_;
   for (; sites_seen_ < end; ++sites_seen_) {
     const Site s = surface_.sites()[sites_seen_];
@@ -187,7 +187,7 @@ void SelfContactFinder::take_references(std::size_t end, const world::World& wor
       next_list_.has_left[s] = list_.has_left[s];
       continue;
     }
-    take_reference(s, world, next_list_);
+    set_reference(s, world, next_list_);
     ++due_count_;
   }
 }
@@ -238,7 +238,7 @@ void SelfContactFinder::go_on_listing(double share, const world::World& world) {
   if (sites_seen_ < surface_.sites().size()) {
     const auto end = std::max(part(share / kReferencesShare, surface_.sites().size()),
                               sites_seen_ + kReferencesPerTick);
-    take_references(std::min(end, surface_.sites().size()), world);
+    set_references(std::min(end, surface_.sites().size()), world);
     if (sites_seen_ < surface_.sites().size()) return;
     keep_pairs();
     order_due();

@@ -31,7 +31,7 @@ SelfSurface::SelfSurface(const organ::Organ& organ) {
   const auto corners = static_cast<double>(std::max<std::size_t>(1, 3 * triangles_.size()));
   mean_edge_m_ = static_cast<float>(edges / corners);
   near_m_ = kNearEdges * static_cast<double>(mean_edge_m_);
-  for (const Site s : sites_) take_rest(s);
+  for (const Site s : sites_) update_rest(s);
   list_near_at_first(organ);
 }
 
@@ -64,7 +64,7 @@ void SelfSurface::add_triangle(const std::array<Site, 3>& sites, Sort sort) {
 
 // Derives a node's sorts and rest normals from its triangles. The normal of skin is set once: skin
 // that was there at first faces what it faced then.
-void SelfSurface::take_rest(Site site) {
+void SelfSurface::update_rest(Site site) {
   const auto at_rest = [this](TriangleIndex t) {
     return up(t, [this](Site s) { return rest_positions_[s]; });
   };
@@ -169,8 +169,8 @@ bool SelfSurface::faced_at_rest(Site site, Site across) const {
   return dot(own, theirs) < 0 && dot(way, own) >= -kFacing_m && dot(way, theirs) <= kFacing_m;
 }
 
-void SelfSurface::follow(const topology::SurfaceEdit& edit, const world::World& world) {
-  followed_.clear();
+void SelfSurface::update(const topology::SurfaceEdit& edit, const world::World& world) {
+  updated_.clear();
   if (edit.touched.empty()) return;
   extend(world);
   for (const auto triangle : edit.removed) {
@@ -190,18 +190,18 @@ void SelfSurface::follow(const topology::SurfaceEdit& edit, const world::World& 
   std::inplace_merge(sites_.begin(), sites_.begin() + middle, sites_.end());
   sites_.erase(std::unique(sites_.begin(), sites_.end()), sites_.end());
   for (const auto node : edit.touched) {
-    take_rest(node.value);
-    followed_.push_back(node.value);
+    update_rest(node.value);
+    updated_.push_back(node.value);
   }
   // Whoever had one of them near, or has now: a way that has changed leads through them, and is as
   // it was up to the first.
-  reach_along_surface(followed_, near_m_ * (1 + kRounding));
+  reach_along_surface(updated_, near_m_ * (1 + kRounding));
   for (const Site s : reached_) {
-    if (near_states_[s] == NearState::AsAtFirst) followed_.push_back(s);
+    if (near_states_[s] == NearState::AsAtFirst) updated_.push_back(s);
     near_states_[s] = NearState::Unknown;
   }
-  std::ranges::sort(followed_);
-  followed_.erase(std::unique(followed_.begin(), followed_.end()), followed_.end());
+  std::ranges::sort(updated_);
+  updated_.erase(std::unique(updated_.begin(), updated_.end()), updated_.end());
   site_triangles_.tidy();
   near_now_.tidy();
 }

@@ -99,9 +99,9 @@ class SelfSurface {
   float longest_edge_m() const { return longest_edge_m_; }
 
   // The world has its new nodes.
-  void follow(const topology::SurfaceEdit& edit, const world::World& world);
+  void update(const topology::SurfaceEdit& edit, const world::World& world);
   // Sites of which the last edit has changed triangles, or that was_cut() since it; ascending.
-  std::span<const Site> followed() const { return followed_; }
+  std::span<const Site> updated() const { return updated_; }
 
  private:
   enum class NearState : std::uint8_t { AsAtFirst, Unknown, Known };
@@ -116,7 +116,7 @@ class SelfSurface {
   void list_near_at_first(const organ::Organ& organ);
   void reach_along_surface(std::span<const Site> from, double near_m);
   void extend(const world::World& world);
-  void take_rest(Site site);
+  void update_rest(Site site);
 
   std::vector<Site> sites_;
   std::vector<std::array<Site, 3>> triangles_;
@@ -131,7 +131,7 @@ class SelfSurface {
   mesh::Csr<NodeIndex, Site> near_at_first_;
   std::vector<NearState> near_states_;
   Blocks<Site> near_now_;
-  std::vector<Site> followed_;
+  std::vector<Site> updated_;
   // Scratch of reach().
   std::vector<std::uint32_t> seen_;
   std::uint32_t seen_current_ = 0;

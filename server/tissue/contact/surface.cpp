@@ -87,7 +87,7 @@ void Surface::add_bundle(std::size_t first, std::size_t last) {
   bundles_.push_back(bundle);
 }
 
-void Surface::follow(const topology::SurfaceEdit& edit, const world::World& world) {
+void Surface::update(const topology::SurfaceEdit& edit, const world::World& world) {
   for (const auto triangle : edit.removed) {
     triangles_[triangle.value] = {};
     --bundles_[bundle_of_[triangle.value]].triangles;

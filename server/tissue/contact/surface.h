@@ -61,7 +61,7 @@ class Surface {
   std::size_t triangle_count() const { return triangles_.size(); }
 
   // O(the edit).
-  void follow(const topology::SurfaceEdit& edit, const world::World& world);
+  void update(const topology::SurfaceEdit& edit, const world::World& world);
 
   // Triangles whose box, now, overlaps the given one; ascending. travel_m: a sum over ticks of the
   // farthest that any node has moved.

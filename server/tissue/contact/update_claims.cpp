@@ -13,9 +13,9 @@ void update_claims(const world::World& world, const hands::ToolTable& tools,
     requests.push_back(
         {ToolSlot{i}, tool.verb, tool.last_sample_tick, contacts.reach_of(ToolSlot{i})});
   }
-  grasps.follow_slip(contacts, world, claims, events);
+  grasps.update_slip(contacts, world, claims, events);
   claims.update(world.tick, requests, events);
-  grasps.follow_claims(world, tools, claims, requests);
+  grasps.update_holds(world, tools, claims, requests);
 }
 
 }  // namespace trocar::contact

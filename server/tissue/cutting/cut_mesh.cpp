@@ -144,7 +144,7 @@ Status CutMesh::repeat(const CutEvents& events, std::vector<topology::NewNode>& 
   made_nodes.clear();
   auto status = apply(events, topology_, places_, [&](const topology::NewNode& made) {
     made_nodes.push_back(made);
-    if (made.has_moved()) return follow_move(made);
+    if (made.has_moved()) return update_moved_node(made);
     measure_scale_of(made);
     bundles_->add(made.node, made.a, reach(made.node), 0, place);
   });
@@ -171,13 +171,13 @@ void CutMesh::move(const Move& move) {
   made_[move.node.value] = now;
   is_made_[move.node.value] = 1;
   const topology::NewNode moved{move.node, move.node, move.toward, move.t};
-  follow_move(moved);
+  update_moved_node(moved);
   out_->new_nodes.push_back(moved);
   out_->events.events.emplace_back(move);
 }
 
 // Its neighbours may reach farther now, and bundles hold for nodes that move with the tissue.
-void CutMesh::follow_move(const topology::NewNode& moved) {
+void CutMesh::update_moved_node(const topology::NewNode& moved) {
   measure_scale_of(moved);
   topology_.for_each_neighbour(moved.node, [&](NodeIndex j) {
     const double edge = length(topology_.rest()[j.value] - topology_.rest()[moved.node.value]);

@@ -83,7 +83,7 @@ class CutMesh {
   void measure_scale();
   void measure_scale_of(const topology::NewNode& node);
   void add_node(const topology::NewNode& node);
-  void follow_move(const topology::NewNode& moved);
+  void update_moved_node(const topology::NewNode& moved);
 
   topology::Topology& topology_;
   const Settings settings_;

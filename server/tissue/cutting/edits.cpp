@@ -160,7 +160,7 @@ NodeIndex split_edge(topology::Topology& topology, Places& places, NodeIndex a, 
   std::vector<std::uint16_t> regions;
   std::ranges::set_intersection(topology.regions_of(a), topology.regions_of(b),
                                 std::back_inserter(regions));
-  const auto node = places.take_node(topology);
+  const auto node = places.occupy_node(topology);
   const auto middle = [&](std::span<const Vec3d> positions) {
     return along(positions[a.value], positions[b.value], t);
   };
@@ -175,7 +175,7 @@ NodeIndex split_edge(topology::Topology& topology, Places& places, NodeIndex a, 
     child[corner_a] = node;
     replace_node(topology, parent, b, node);
     clear_wound(topology, parent, corner_a);
-    const auto place = places.take_tet(topology);
+    const auto place = places.occupy_tet(topology);
     topology.put_tet(place, child);
     topology.set_fibre_axis(place, topology.fibre_axis(parent));
     topology.add_part(place, parent);
@@ -200,7 +200,7 @@ void part(topology::Topology& topology, Places& places, std::span<const Star> st
           std::vector<Duplicate>& copies) {
   for (const auto& star : stars)
     for (std::uint16_t c = 1; c < star.component_count; ++c) {
-      const auto copy = places.take_node(topology);
+      const auto copy = places.occupy_node(topology);
       const auto regions = topology.regions_of(star.node);
       const std::vector<std::uint16_t> own(regions.begin(), regions.end());
       const auto rest = topology.rest()[star.node.value];

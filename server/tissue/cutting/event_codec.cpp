@@ -93,7 +93,7 @@ class Decoder {
   bool ok() const { return ok_ && reader_.ok(); }
 
   std::uint64_t number() {
-    const auto number = take_varint(reader_, kMostNumber);
+    const auto number = read_varint(reader_, kMostNumber);
     if (!number) ok_ = false;
     return number.value_or(0);
   }
@@ -117,7 +117,7 @@ class Decoder {
       split.a = node_after(last_.a);
       auto near = last_.a;
       split.b = node_after(near);
-      split.t = reader_.take<std::uint16_t>();
+      split.t = reader_.read<std::uint16_t>();
       split.node = node_after(last_.made);
       events_.events.emplace_back(split);
     } else if (kind == kOpen) {
@@ -130,7 +130,7 @@ class Decoder {
       move.node = node_after(last_.moved);
       auto near = last_.moved;
       move.toward = node_after(near);
-      move.t = reader_.take<std::uint16_t>();
+      move.t = reader_.read<std::uint16_t>();
       events_.events.emplace_back(move);
     }
   }

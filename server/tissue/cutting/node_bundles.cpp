@@ -47,7 +47,7 @@ void NodeBundles::put_in(NodeIndex node, std::uint32_t b) {
   bundles_[b].nodes.push_back(node);
 }
 
-void NodeBundles::take_out(NodeIndex node) {
+void NodeBundles::remove(NodeIndex node) {
   if (node.value >= bundle_of_.size() || bundle_of_[node.value] == kNone) return;
   std::erase(bundles_[bundle_of_[node.value]].nodes, node);
 }

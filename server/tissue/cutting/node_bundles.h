@@ -46,7 +46,7 @@ class NodeBundles {
   // The place may have belonged to another node.
   template <typename Place>
   void add(NodeIndex node, NodeIndex parent, double reach, double travel_m, Place&& place) {
-    take_out(node);
+    remove(node);
     const auto b = bundle_of_[parent.value];
     put_in(node, b);
     bundles_[b].reach = std::max(bundles_[b].reach, reach);
@@ -113,7 +113,7 @@ class NodeBundles {
   }
   std::uint32_t open_bundle();
   void put_in(NodeIndex node, std::uint32_t b);
-  void take_out(NodeIndex node);
+  void remove(NodeIndex node);
 
   std::vector<Bundle> bundles_;
   std::vector<std::uint32_t> bundle_of_;  // per node

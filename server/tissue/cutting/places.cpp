@@ -30,16 +30,16 @@ Places::Places(const topology::Topology& topology) {
 NodeIndex Places::next_node(const topology::Topology& topology) const {
   return nodes_.empty() ? NodeIndex(topology.node_count()) : nodes_.back();
 }
-NodeIndex Places::take_node(const topology::Topology& topology) {
+NodeIndex Places::occupy_node(const topology::Topology& topology) {
   return take(nodes_, topology.node_count());
 }
-TetIndex Places::take_tet(const topology::Topology& topology) {
+TetIndex Places::occupy_tet(const topology::Topology& topology) {
   return take(tets_, topology.tet_count());
 }
-void Places::give_back(NodeIndex node) {
+void Places::release(NodeIndex node) {
   put(nodes_, node);
 }
-void Places::give_back(TetIndex tet) {
+void Places::release(TetIndex tet) {
   put(tets_, tet);
 }
 

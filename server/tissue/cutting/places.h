@@ -15,10 +15,10 @@ class Places {
   explicit Places(const topology::Topology& topology);
 
   NodeIndex next_node(const topology::Topology& topology) const;
-  NodeIndex take_node(const topology::Topology& topology);
-  TetIndex take_tet(const topology::Topology& topology);
-  void give_back(NodeIndex node);
-  void give_back(TetIndex tet);
+  NodeIndex occupy_node(const topology::Topology& topology);
+  TetIndex occupy_tet(const topology::Topology& topology);
+  void release(NodeIndex node);
+  void release(TetIndex tet);
 
  private:
   std::vector<NodeIndex> nodes_;  // descending

@@ -54,7 +54,7 @@ bool Repair::pull_back(CutMesh& mesh, Stroke& stroke, Opening& opening,
     stroke.label(mesh.split(breach.node, other, kMiddle));
     ++mesh.out().pinch_splits;
   }
-  stroke.take_off_wound(breach.node, breach.side);
+  stroke.remove_from_wound(breach.node, breach.side);
   for (const auto t : mesh.topology().tets_of(breach.node)) stroke.decide(t, 0);
   return true;
 }
@@ -123,7 +123,7 @@ void Repair::turn(CutMesh& mesh, Stroke& stroke, Opening& opening, std::span<con
 
 void Repair::turn_back(Stroke& stroke) {
   for (const auto& [tet, side] : old_sides_) stroke.decide(tet, side);
-  for (const auto node : turned_nodes_) stroke.take_label_back(node);
+  for (const auto node : turned_nodes_) stroke.remove_label(node);
 }
 
 // The part after which least stays closed, if less does than now.

@@ -86,13 +86,13 @@ void Stroke::label(NodeIndex node) {
   fresh.push_back(node);
 }
 
-void Stroke::take_label_back(NodeIndex node) {
+void Stroke::remove_label(NodeIndex node) {
   labels_[node.value] = 0;
   std::erase(labelled_, node);
   std::erase(fresh, node);
 }
 
-void Stroke::take_off_wound(NodeIndex node, int side) {
+void Stroke::remove_from_wound(NodeIndex node, int side) {
   labels_[node.value] = 0;
   std::erase(labelled_, node);
   forget_height(node);

@@ -49,9 +49,9 @@ class Stroke {
  public:
   bool is_labelled(NodeIndex n) const { return n.value < labels_.size() && labels_[n.value] != 0; }
   void label(NodeIndex node);
-  void take_label_back(NodeIndex node);  // as if it had never been labelled
+  void remove_label(NodeIndex node);  // as if it had never been labelled
   // A labelled node belongs to one side after all.
-  void take_off_wound(NodeIndex node, int side);
+  void remove_from_wound(NodeIndex node, int side);
 
   struct Height {
     double nearest_squared = -1;  // m^2, distance from the path; negative: never measured

@@ -69,10 +69,10 @@ BlockDescent::BlockDescent(const organ::Organ& organ, const world::World& world,
       constants_[g].damping.v[lane] = mass * rate;
     }
   }
-  take_state(world);
+  read_state(world);
 }
 
-void BlockDescent::take_state(const world::World& world) {
+void BlockDescent::read_state(const world::World& world) {
   const auto& groups = tissue_.groups();
   for (Group g = 0; g < groups.group_count(); ++g) {
     free_[g] = 0;
@@ -83,12 +83,12 @@ void BlockDescent::take_state(const world::World& world) {
         free_[g] = static_cast<std::uint8_t>(free_[g] | 1u << lane);
     }
   }
-  take_motion(world);
-  if (linear_far_field_) linear_far_field_->take_state(x_.data(), world);
-  take_relaxation(world);
+  read_motion(world);
+  if (linear_far_field_) linear_far_field_->read_state(x_.data(), world);
+  read_relaxation(world);
 }
 
-void BlockDescent::take_motion(const world::World& world) {
+void BlockDescent::read_motion(const world::World& world) {
   for (Slot slot = 0; slot < x_.size(); ++slot) {
     const auto node = tissue_.groups().node_at(slot);
     if (!node.is_valid()) continue;
@@ -99,12 +99,12 @@ void BlockDescent::take_motion(const world::World& world) {
 
 void BlockDescent::use_linear_far_field(const world::World& world) {
   linear_far_field_ = std::make_unique<LinearFarField>(tissue_, world);
-  linear_far_field_->take_state(x_.data(), world);
-  takings_.resize(workers_.count());
+  linear_far_field_->read_state(x_.data(), world);
+  scratch_.resize(workers_.count());
   due_.reserve(all_groups_.size());
 }
 
-void BlockDescent::take_state(const world::World& world, std::span<const NodeIndex> nodes) {
+void BlockDescent::read_state(const world::World& world, std::span<const NodeIndex> nodes) {
   for (const auto node : nodes) {
     const Slot slot = tissue_.groups().slot_of(node);
     x_[slot] = to_float4(world.displacements[node.value]);
@@ -188,7 +188,7 @@ void BlockDescent::begin_groups(world::World& world, const ExternalLoads& loads)
     workers_.run([&](unsigned w) {
       const auto n = due_.size(), count = std::size_t{workers_.count()};
       for (auto i = n * w / count; i < n * (w + 1) / count; ++i)
-        linear_far_field_->renew(due_[i], takings_[w]);
+        linear_far_field_->renew(due_[i], scratch_[w]);
     });
   } else {
     for_each_group(far_swept_.groups, [&](Group g) { ask_energies(g, x_.data()); });

@@ -99,12 +99,12 @@ class BlockDescent {
 
   // Takes displacements, velocities and classes anew: after a restored state, or whenever somebody
   // else than solve() changed them for more than single nodes.
-  void take_state(const world::World& world);
+  void read_state(const world::World& world);
   // Displacements and velocities alone, of all nodes: whoever else moved them went on from this
   // solver's state.
-  void take_motion(const world::World& world);
+  void read_motion(const world::World& world);
   // The same for some nodes.
-  void take_state(const world::World& world, std::span<const NodeIndex> nodes);
+  void read_state(const world::World& world, std::span<const NodeIndex> nodes);
 
   // Makes ready for SolveSettings::has_linear_far_field, from the world as it is.
   void use_linear_far_field(const world::World& world);
@@ -130,7 +130,7 @@ class BlockDescent {
   // Between steps: follows topology.changed(). The world already has its nodes, their masses,
   // classes and displacements; arrays over nodes have an entry for every place of one. The
   // topology must outlive the solver.
-  FollowReport follow_topology(const topology::Topology& topology, const world::World& world);
+  UpdateReport update_topology(const topology::Topology& topology, const world::World& world);
   // After it, once there have been steps: the world's forces of stress that has relaxed, where the
   // topology changed.
   void refresh_relaxed_forces(world::World& world);
@@ -174,7 +174,7 @@ class BlockDescent {
   void link_contacts(const contact::ContactList& contacts);
   void begin_groups(world::World& world, const ExternalLoads& loads);
   // Stress that has relaxed, where something relaxes.
-  void take_relaxation(const world::World& world);
+  void read_relaxation(const world::World& world);
   void end_relaxation(world::World& world, std::span<const NodeIndex> held);
   void begin_inertia(Group group, std::span<const Vec3f> forces);
   bool coasts(Group group) const { return is_slow(group) && far_swept_.lanes[group] == 0; }
@@ -222,7 +222,7 @@ class BlockDescent {
   const topology::Topology* topology_ = nullptr;  // once there was an edit
   Tissue tissue_;
   Workers workers_;
-  std::vector<Linearisation::Taking> takings_;  // per worker
+  std::vector<Linearisation::Scratch> scratch_;  // per worker
   Vec3f gravity_;
 
   std::vector<Constants> constants_;    // per group

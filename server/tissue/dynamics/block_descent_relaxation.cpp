@@ -4,10 +4,10 @@
 
 namespace trocar::dynamics {
 
-void BlockDescent::take_relaxation(const world::World& world) {
+void BlockDescent::read_relaxation(const world::World& world) {
   if (tissue_.relaxation() == nullptr) return;
-  tissue_.relaxation()->take_state();
-  tissue_.relaxed_stress()->take_state(world.relaxation);
+  tissue_.relaxation()->restart();
+  tissue_.relaxed_stress()->read_state(world.relaxation);
 }
 
 void BlockDescent::refresh_relaxed_forces(world::World& world) {

@@ -25,10 +25,10 @@ void BlockDescent::resize_arrays() {
   first_link_.resize(slot_count);
 }
 
-FollowReport BlockDescent::follow_topology(const topology::Topology& topology,
+UpdateReport BlockDescent::update_topology(const topology::Topology& topology,
                                            const world::World& world) {
   topology_ = &topology;
-  const auto report = tissue_.follow_topology(topology);
+  const auto report = tissue_.update_topology(topology);
   const auto& groups = tissue_.groups();
   resize_arrays();
   for (const auto lanes : tissue_.touched())
@@ -47,7 +47,7 @@ FollowReport BlockDescent::follow_topology(const topology::Topology& topology,
       x_[g * kLanes + lane] = has_node ? to_float4(world.displacements[node.value]) : Float4{};
       v_[g * kLanes + lane] = has_node ? to_float4(world.velocities[node.value]) : Float4{};
     }
-  if (linear_far_field_) linear_far_field_->follow_topology(x_.data(), world);
+  if (linear_far_field_) linear_far_field_->update_topology(x_.data(), world);
   due_.reserve(groups.group_count());
   return report;
 }

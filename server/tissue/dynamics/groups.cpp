@@ -181,7 +181,7 @@ std::uint32_t Groups::nodes_in(Group group) const {
   return count;
 }
 
-void Groups::take_out(NodeIndex node) {
+void Groups::remove_node(NodeIndex node) {
   const Slot slot = slot_of(node);
   node_of_slot_[slot] = {};
   slot_of_node_[node.value] = kNoSlot;
@@ -200,7 +200,7 @@ void Groups::vacate(NodeIndex node) {
   auto& vacancies = vacancies_[colour_of_group_[group]];
   const Vacancy own{code_of_group_[group], group};
   if (nodes_in(group) == kLanes) vacancies.insert(std::ranges::lower_bound(vacancies, own), own);
-  take_out(node);
+  remove_node(node);
   if (nodes_in(group) > 0) return;
   vacancies.erase(std::ranges::lower_bound(vacancies, own));
   give_up(group);
@@ -225,7 +225,7 @@ void Groups::part_emptiest_groups(const topology::Topology& topology) {
       for (std::size_t lane = 0; lane < kLanes; ++lane) {
         const auto node = nodes_of(group)[lane];
         if (!node.is_valid()) continue;
-        take_out(node);
+        remove_node(node);
         place(node, colour, code_of(topology.rest()[node.value]));
         moved_.push_back(node);
       }

@@ -117,7 +117,7 @@ class Groups {
   void vacate(NodeIndex node);
   void place(NodeIndex node, Colour colour, std::uint64_t code);
   Group group_with_room(Colour colour, std::uint64_t code);
-  void take_out(NodeIndex node);
+  void remove_node(NodeIndex node);
   void give_up(Group group);
   void part_emptiest_groups(const topology::Topology& topology);
   std::uint32_t nodes_in(Group group) const;

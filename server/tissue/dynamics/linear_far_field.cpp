@@ -46,13 +46,13 @@ void LinearFarField::copy_pose(std::uint32_t number, const world::World& world) 
       copy[slot] = to_float4(world::displacement_of(pose[node.value]));
 }
 
-void LinearFarField::take_state(const Float4* x, const world::World& world) {
+void LinearFarField::read_state(const Float4* x, const world::World& world) {
   newest_ = world.far_poses.newest();
   age_ = world.far_poses.age();
   for (const auto number : {newest_, newest_ - 1}) copy_pose(number, world);
-  Linearisation::Taking taking;
+  Linearisation::Scratch scratch;
   for (Group g = 0; g < linear_.group_count(); ++g) {
-    renew(g, taking);
+    renew(g, scratch);
     begin_group(g, x, x, 0);
   }
 }
@@ -66,7 +66,7 @@ void LinearFarField::begin_step(const Float4* x, world::World& world) {
   for (Group g = 0; g < linear_.group_count(); ++g) begin_group(g, x, x, 0);
 }
 
-void LinearFarField::follow_topology(const Float4* x, const world::World& world) {
+void LinearFarField::update_topology(const Float4* x, const world::World& world) {
   const auto& groups = tissue_.groups();
   const auto group_count = groups.group_count();
   inverse_square_edges_.resize(group_count);
@@ -83,19 +83,19 @@ void LinearFarField::follow_topology(const Float4* x, const world::World& world)
             node.is_valid() ? to_float4(world::displacement_of(pose[node.value])) : Float4{};
       }
   }
-  Linearisation::Taking taking;
+  Linearisation::Scratch scratch;
   for (const auto lanes : tissue_.rebuilt()) {
     linear_.index(lanes.group);
     measure_edges(lanes.group, world);
-    renew(lanes.group, taking);
+    renew(lanes.group, scratch);
     begin_group(lanes.group, x, x, 0);
   }
   linear_.tidy();
 }
 
-void LinearFarField::renew(Group group, Linearisation::Taking& taking) {
+void LinearFarField::renew(Group group, Linearisation::Scratch& scratch) {
   taken_at_[group] = pose_of(group);
-  linear_.take(group, poses_[taken_at_[group] % 2].data(), taking);
+  linear_.renew(group, poses_[taken_at_[group] % 2].data(), scratch);
 }
 
 void LinearFarField::begin_group(Group group, const Float4* x, const Float4* start,

@@ -31,18 +31,18 @@ class LinearFarField {
   LinearFarField(Tissue& tissue, const world::World& world);
 
   // Displacements, per slot, are new everywhere.
-  void take_state(const Float4* x, const world::World& world);
+  void read_state(const Float4* x, const world::World& world);
 
   // The tissue has followed an edit of the topology, with displacements per slot; world.far_poses
   // has its new nodes.
-  void follow_topology(const Float4* x, const world::World& world);
+  void update_topology(const Float4* x, const world::World& world);
 
   // Before a step, in this order: begin_step(); renew() for groups that are due; begin_group() for
   // those with a node that moves, with displacements where sweeping starts and at the start of the
   // group's own step, 1/inverse_dt long.
   void begin_step(const Float4* x, world::World& world);
   bool is_due(Group group) const { return taken_at_[group] != pose_of(group); }
-  void renew(Group group, Linearisation::Taking& taking);
+  void renew(Group group, Linearisation::Scratch& scratch);
   void begin_group(Group group, const Float4* x, const Float4* start, float inverse_dt);
 
   // Adds elastic gradient, damping and block; false, and nothing is added, where one of these lanes

@@ -117,15 +117,15 @@ void Linearisation::index(Group group) {
   nodes_[group] = {};
 }
 
-void Linearisation::take(Group group, const Float4* pose, Taking& taking) {
+void Linearisation::renew(Group group, const Float4* pose, Scratch& scratch) {
   const auto rows = rows_[group];
-  taking.rows.assign(rows.size(), {});
-  Summing summing(targets_[group], taking.rows);
+  scratch.rows.assign(rows.size(), {});
+  Summing summing(targets_[group], scratch.rows);
   NodeStep8 step{zero_vec8(), zero_sym_mat8()};
   tissue_.linearise(group, pose, load_group(pose + group * kLanes), step, summing);
 
   Float8 largest = all(0);
-  for (const auto& row : taking.rows)
+  for (const auto& row : scratch.rows)
     for (const Lanes& k : row) largest = _mm256_max_ps(largest, abs8(load(k)));
   Lanes lanes;
   store(lanes, largest);
@@ -133,7 +133,7 @@ void Linearisation::take(Group group, const Float4* pose, Taking& taking) {
   const int exponent = most > 1e-30f ? exponent_of(most) - kLargestExponent : 0;
   const Float8 inverse = all(power_of_two(-exponent));
   for (std::size_t i = 0; i < rows.size(); ++i)
-    for (std::size_t k = 0; k < 9; ++k) to_halves(rows[i].k[k], load(taking.rows[i][k]) * inverse);
+    for (std::size_t k = 0; k < 9; ++k) to_halves(rows[i].k[k], load(scratch.rows[i][k]) * inverse);
 
   Node& node = nodes_[group];
   store(node.gradient, step.gradient);

@@ -8,8 +8,8 @@
 //
 // H_ij are stored as half floats (relative error 5e-4) with a power of two per group: these
 // matrices are read once per sweep and memory is what that costs. g and the nodes' own blocks are
-// floats. take() costs two to three evaluations of the energies, add() a fraction of one. Groups
-// are independent: several workers, each with its own groups and Taking.
+// floats. renew() costs two to three evaluations of the energies, add() a fraction of one. Groups
+// are independent: several workers, each with its own groups and Scratch.
 
 #include <immintrin.h>
 
@@ -24,7 +24,7 @@ namespace trocar::dynamics {
 class Linearisation {
  public:
   // Each worker has such a buffer, in which it sums matrices.
-  struct Taking {
+  struct Scratch {
     std::vector<std::array<Lanes, 9>> rows;
   };
 
@@ -32,7 +32,7 @@ class Linearisation {
   explicit Linearisation(const Tissue& tissue);
   ~Linearisation();
 
-  // Neighbours of the group's nodes anew; matrices are zero until take(). Between steps.
+  // Neighbours of the group's nodes anew; matrices are zero until renew(). Between steps.
   void index(Group group);
   // After some calls of index().
   void tidy() {
@@ -47,7 +47,7 @@ class Linearisation {
   }
 
   // pose: X, displacements per slot.
-  void take(Group group, const Float4* pose, Taking& taking);
+  void renew(Group group, const Float4* pose, Scratch& scratch);
 
   // Adds gradient and block at displacements away from the pose the group was taken at; away: x - X
   // per slot, own: of the group. Returns per lane the largest squared |(x_j - X_j) - (x_i - X_i)|.

@@ -33,7 +33,7 @@ void NodalRelaxation::set_lane(const topology::Topology& topology, const Groups&
   if (relaxes(organ::material_at(organ_, material))) block.relaxes.v[lane] = 1;
 }
 
-void NodalRelaxation::follow(const topology::Topology& topology, const Groups& groups,
+void NodalRelaxation::update(const topology::Topology& topology, const Groups& groups,
                              std::span<const GroupLanes> lanes) {
   block_of_.resize(groups.slot_count(), kNoBlock);
   relaxed_.resize(3 * groups.slot_count());

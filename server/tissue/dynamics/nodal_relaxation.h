@@ -22,15 +22,15 @@ class NodalRelaxation {
   NodalRelaxation(const topology::Topology& topology, const Groups& groups,
                   const NodalStrain& strain, const RelaxationTerms& terms);
 
-  // Follows an edit as Relaxation::follow() does, after the smoothing domains have.
-  void follow(const topology::Topology& topology, const Groups& groups,
+  // Follows an edit as Relaxation::update() does, after the smoothing domains have.
+  void update(const topology::Topology& topology, const Groups& groups,
               std::span<const GroupLanes> lanes);
 
   std::size_t block_count() const { return blocks_.size(); }
   // Returns the block of the node at a slot.
   std::uint32_t block_of(Slot slot) const { return block_of_[slot]; }
   static constexpr std::uint32_t kNoBlock = 0xffffffffu;
-  // Blocks to be begun, after follow().
+  // Blocks to be begun, after update().
   std::span<const std::uint32_t> stale() const { return stale_; }
   void clear_stale() { stale_.clear(); }
 

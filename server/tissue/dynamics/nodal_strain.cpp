@@ -34,7 +34,7 @@ NodalStrain::NodalStrain(const topology::Topology& topology, const Groups& group
   members_.end_building();
 }
 
-void NodalStrain::follow(const topology::Topology& topology, std::span<const NodeIndex> changed) {
+void NodalStrain::update(const topology::Topology& topology, std::span<const NodeIndex> changed) {
   materials_.resize(topology.node_count(), kNone);
   for (const auto node : changed) find_material(topology, node);
 }

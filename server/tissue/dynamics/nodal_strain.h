@@ -64,7 +64,7 @@ class NodalStrain {
   // The topology has changed: first the nodes whose existence, place or elements have, then, as
   // energies are rebuilt, lanes with a neighbour of one of these, too. Their smoothing domains are
   // at rest until they are restarted.
-  void follow(const topology::Topology& topology, std::span<const NodeIndex> changed);
+  void update(const topology::Topology& topology, std::span<const NodeIndex> changed);
   std::size_t rebuild(const topology::Topology& topology, const Groups& groups,
                       std::span<const GroupLanes> lanes);
 

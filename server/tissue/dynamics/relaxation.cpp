@@ -90,7 +90,7 @@ void Relaxation::set_lane(const topology::Topology& topology, const Groups& grou
     block.volume.v[lane] = static_cast<float>(shape.volume);
 }
 
-void Relaxation::follow(const topology::Topology& topology, const Groups& groups,
+void Relaxation::update(const topology::Topology& topology, const Groups& groups,
                         std::span<const GroupLanes> lanes) {
   tets_.clear();
   for (const auto group_lanes : lanes)
@@ -106,7 +106,7 @@ void Relaxation::follow(const topology::Topology& topology, const Groups& groups
     if (const auto block = tet.value / kLanes; stale_.empty() || stale_.back() != block)
       stale_.push_back(block);
   }
-  if (nodal_relaxation_) nodal_relaxation_->follow(topology, groups, lanes);
+  if (nodal_relaxation_) nodal_relaxation_->update(topology, groups, lanes);
   blocks_of_.resize(groups.slot_count());
   for (const auto group_lanes : lanes)
     for (std::size_t lane = 0; lane < kLanes; ++lane)

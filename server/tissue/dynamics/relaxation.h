@@ -42,11 +42,11 @@ class Relaxation {
 
   // Tets and smoothing domains at nodes in these lanes anew; with smoothing domains, lanes as for
   // NodalStrain::rebuild().
-  void follow(const topology::Topology& topology, const Groups& groups,
+  void update(const topology::Topology& topology, const Groups& groups,
               std::span<const GroupLanes> lanes);
 
   // The state is new everywhere.
-  void take_state() { is_stale_ = true; }
+  void restart() { is_stale_ = true; }
   // Tissue has been where it is for long. Displacements per slot.
   void settle(const Float4* x, world::RelaxationState& state);
   // Before a step of so many seconds: loads().
@@ -54,7 +54,7 @@ class Relaxation {
   // After it: advances tets at near nodes, each of them or in turns, and others whose turn it is.
   void end_step(const Float4* x, std::span<const GroupLanes> near, bool near_in_turns,
                 world::RelaxationState& state, Workers& workers);
-  // After follow(), once a step has been begun: their loads.
+  // After update(), once a step has been begun: their loads.
   void refresh(const world::RelaxationState& state);
   // O(tets / 8).
   RelaxationFigures figures() const;

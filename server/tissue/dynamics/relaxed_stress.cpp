@@ -121,7 +121,7 @@ void RelaxedStress::refresh(GroupLanes lanes, const Float4* x, world::Relaxation
   }
 }
 
-void RelaxedStress::take_state(const world::RelaxationState& state) {
+void RelaxedStress::read_state(const world::RelaxationState& state) {
   for (Group g = 0; g < groups_.group_count(); ++g)
     for (std::size_t lane = 0; lane < kLanes; ++lane)
       if (const auto node = groups_.nodes_of(g)[lane]; node.is_valid())

@@ -24,7 +24,7 @@ class RelaxedStress {
   // Returns the forces as they were taken last, N.
   Vec8 forces(Group group) const { return load(forces_[group]); }
   // Takes the forces of all nodes from the state.
-  void take_state(const world::RelaxationState& state);
+  void read_state(const world::RelaxationState& state);
   // Follows an edit as energies do, see Energy::rebuild().
   void rebuild(const topology::Topology& topology, const Groups& groups,
                std::span<const GroupLanes> lanes);

@@ -122,14 +122,14 @@ std::size_t Springs::rebuild(const topology::Topology& topology, const Groups& g
   std::size_t written = 0;
   for (const auto group_lanes : lanes) {
     written += fill(topology, groups, group_lanes);
-    if (inverse_dts_[group_lanes.group] != 0) take_step_length(group_lanes.group);
+    if (inverse_dts_[group_lanes.group] != 0) update_step_length(group_lanes.group);
   }
   rows_.tidy();
   constants_.tidy();
   return written;
 }
 
-void Springs::take_step_length(Group group) {
+void Springs::update_step_length(Group group) {
   auto constants = constants_[group].begin();
   for (Row& row : rows_[group]) {
     const Constants& c = *constants++;
@@ -142,7 +142,7 @@ void Springs::begin_group(Group group, const Float4* start, float inverse_dt) {
   if (!has_damping_) return;
   if (inverse_dts_[group] != inverse_dt) {
     inverse_dts_[group] = inverse_dt;
-    take_step_length(group);
+    update_step_length(group);
   }
   if (inverse_dt == 0) return;
   const Vec8 own = load_group(start + group * kLanes);

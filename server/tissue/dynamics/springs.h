@@ -52,7 +52,7 @@ class Springs final : public Energy {
 
   void find_springs(const topology::Topology& topology, NodeIndex node, std::vector<End>& out);
   std::size_t fill(const topology::Topology& topology, const Groups& groups, GroupLanes lanes);
-  void take_step_length(Group group);
+  void update_step_length(Group group);
 
   GroupRows<Row> rows_;
   GroupRows<Constants> constants_;

@@ -130,7 +130,7 @@ std::vector<float> Tissue::traces_at_rest(float inverse_dt, bool has_averaged) {
   return traces;
 }
 
-FollowReport Tissue::follow_topology(const topology::Topology& topology) {
+UpdateReport Tissue::update_topology(const topology::Topology& topology) {
   changed_.assign(topology.changed().begin(), topology.changed().end());
   std::ranges::sort(changed_);
   groups_.update(topology, changed_);
@@ -147,12 +147,12 @@ FollowReport Tissue::follow_topology(const topology::Topology& topology) {
   list_touched(touched_);
   wide_.clear();
   if (nodal_strain_) {
-    nodal_strain_->follow(topology, changed_);
+    nodal_strain_->update(topology, changed_);
     for (const auto node : changed_) topology.for_each_neighbour(node, touch_node);
     list_touched(wide_);
   }
 
-  FollowReport report{.nodes_changed = changed_.size(),
+  UpdateReport report{.nodes_changed = changed_.size(),
                       .nodes_moved = groups_.moved().size(),
                       .groups = touched_groups_.size()};
   for (const auto g : touched_groups_) {
@@ -163,7 +163,7 @@ FollowReport Tissue::follow_topology(const topology::Topology& topology) {
   const auto lanes = rebuilt();
   if (nodal_strain_) report.rows += nodal_strain_->rebuild(topology, groups_, lanes);
   if (relaxation_) {
-    relaxation_->follow(topology, groups_, lanes);
+    relaxation_->update(topology, groups_, lanes);
     relaxed_stress_->rebuild(topology, groups_, lanes);
   }
   for (const auto& energy : energies_) report.rows += energy->rebuild(topology, groups_, lanes);

@@ -2,7 +2,7 @@
 
 // The energies of one organ, on its nodes' colours: what a solver or integrator asks for gradients.
 //
-// After an edit of the topology, between steps, follow_topology() brings colours, groups and rows
+// After an edit of the topology, between steps, update_topology() brings colours, groups and rows
 // up to date in time that is proportional to what meets at the changed nodes. Results are bit for
 // bit those of a tissue built anew from the changed organ with the colours of this one.
 
@@ -18,7 +18,7 @@
 namespace trocar::dynamics {
 
 // This report says what following a change has cost.
-struct FollowReport {
+struct UpdateReport {
   std::size_t nodes_changed = 0;  // whose existence, place or elements have changed
   std::size_t nodes_moved = 0;    // to another slot
   std::size_t groups = 0;         // with lanes written
@@ -59,8 +59,8 @@ class Tissue {
 
   // Follows topology.changed(). The topology is the one this tissue was made from, or another of
   // the same organ with the same edits.
-  FollowReport follow_topology(const topology::Topology& topology);
-  // Lanes whose node, or what meets at it, the last follow_topology() found changed; ascending.
+  UpdateReport update_topology(const topology::Topology& topology);
+  // Lanes whose node, or what meets at it, the last update_topology() found changed; ascending.
   std::span<const GroupLanes> touched() const { return touched_; }
   // Lanes that energies had to rebuild: with averaged strain also those with a neighbour of a node
   // that changed.

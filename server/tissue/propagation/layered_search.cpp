@@ -80,13 +80,13 @@ bool LayeredSearch::retract(const Neighbours& neighbours, const SeedSet& seeds,
     }
     if (visited_ > most) return false;
   }
-  take_next_best(neighbours, seeds);
+  visit_next_best(neighbours, seeds);
   return true;
 }
 
 // Every node without a label gets the best one that its neighbours offer now. It may still fall as
 // better ones spread, so the node waits for its layer.
-void LayeredSearch::take_next_best(const Neighbours& neighbours, const SeedSet& seeds) {
+void LayeredSearch::visit_next_best(const Neighbours& neighbours, const SeedSet& seeds) {
   for (const auto node : changed_) {
     Label best = kNoLabel;
     if (const auto contact = seeds.contact_of(node); contact != SeedSet::kNoContact) {

@@ -74,7 +74,7 @@ class LayeredSearch {
   void mark(NodeIndex node);
   void lose(NodeIndex node);
   bool is_supported(const Neighbours& neighbours, NodeIndex node);
-  void take_next_best(const Neighbours& neighbours, const SeedSet& seeds);
+  void visit_next_best(const Neighbours& neighbours, const SeedSet& seeds);
   void offer(NodeIndex node, Label label);
   void expand(const Neighbours& neighbours, NodeIndex node);
   void settle_waiting(std::uint32_t layer);

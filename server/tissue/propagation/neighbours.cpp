@@ -2,7 +2,7 @@
 
 namespace trocar::propagation {
 
-void Neighbours::take_changed(const topology::Topology& topology) {
+void Neighbours::update_changed(const topology::Topology& topology) {
   for (const auto node : topology.changed()) {
     topology.neighbours_of(node, row_);
     set(node, row_);

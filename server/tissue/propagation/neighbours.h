@@ -28,7 +28,7 @@ class Neighbours {
   }
 
   // Takes the rows of topology.changed(). O(rows), and O(nodes) the first time.
-  void take_changed(const topology::Topology& topology);
+  void update_changed(const topology::Topology& topology);
 
  private:
   void set(NodeIndex node, std::span<const NodeIndex> neighbours);

@@ -61,14 +61,15 @@ void PropagationQueue::order(std::size_t contact_count, std::uint32_t node_limit
   layer_offsets_.assign(1, 0);
   share_ends_.assign(contact_count, 0xffffffffu);
   for (std::size_t layer = 0; layer < lists_.layer_count(); ++layer) {
-    take_turns(layer, contact_count, node_limit - nodes_.size());
+    fill_in_turns(layer, contact_count, node_limit - nodes_.size());
     layer_offsets_.push_back(static_cast<std::uint32_t>(nodes_.size()));
   }
   const bool is_cut = nodes_.size() < lists_.nodes().size();
   whole_end_ = kOneLayer * (is_cut ? search_.depth() : search_.depth() + 1);
 }
 
-void PropagationQueue::take_turns(std::size_t layer, std::size_t contact_count, std::size_t room) {
+void PropagationQueue::fill_in_turns(std::size_t layer, std::size_t contact_count,
+                                     std::size_t room) {
   turns_.clear();
   for (std::size_t c = 0; c < contact_count; ++c)
     if (const auto share = lists_.share(layer, c); !share.empty())

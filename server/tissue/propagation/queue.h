@@ -88,7 +88,7 @@ class PropagationQueue {
   void resize(std::size_t node_count);
   void start_anew(std::size_t contact_count);
   void order(std::size_t contact_count, std::uint32_t node_limit);
-  void take_turns(std::size_t layer, std::size_t contact_count, std::size_t room);
+  void fill_in_turns(std::size_t layer, std::size_t contact_count, std::size_t room);
 
   // Inputs of the last fill.
   bool has_history_ = false;

@@ -53,7 +53,7 @@ PatchModel::PatchModel(const organ::LocalReduction& reduction, const organ::Loca
     for (const auto& field : greens->fields) fields_.push_back({field.values.data(), field.step});
   }
   blocks_ = {0, fields_.size()};
-  take_tets(organ, patch.inner_tets);
+  select_tets(organ, patch.inner_tets);
   make_matrices(patch);
   make_near_fit();
 }
@@ -69,10 +69,10 @@ PatchModel::PatchModel(const LocalModels& models, const PatchSet& patches)
   }
   blocks_.push_back(fields_.size());
   sort_once(inner);
-  take_tets(models.organ(), inner);
+  select_tets(models.organ(), inner);
   sum_over_nodes(models, inner);
   fill_basis();
-  take_inner_stiffness();
+  fill_inner_stiffness();
   drop_repeated_fields();
   fill_basis();
   make_near_fit();
@@ -164,7 +164,7 @@ void PatchModel::drop_repeated_fields() {
   }
 }
 
-void PatchModel::take_tets(const organ::Organ& organ, std::span<const TetIndex> inner) {
+void PatchModel::select_tets(const organ::Organ& organ, std::span<const TetIndex> inner) {
   const auto& mesh = organ.mesh;
   const auto is_inner = [&](TetIndex tet) { return std::ranges::binary_search(inner, tet); };
   const auto may_be_free = [&](NodeIndex node) {
@@ -214,7 +214,7 @@ void PatchModel::fill_basis() {
             static_cast<float>(fields_[c].values[3 * nodes_[n].value + k]) * fields_[c].step;
 }
 
-void PatchModel::take_inner_stiffness() {
+void PatchModel::fill_inner_stiffness() {
   const auto count = field_count(), width = stride();
   auto tangent = pattern_of(nodes_.size(), {&inner_});
   inner_.add_rest_tangent(tangent);
@@ -270,7 +270,7 @@ void PatchModel::make_near_fit() {
 void PatchModel::make_matrices(const organ::LocalPatch& patch) {
   const auto count = field_count(), width = stride();
   fill_basis();
-  take_inner_stiffness();
+  fill_inner_stiffness();
   std::vector<double> scales;
   for (std::size_t i = 0; i < count; ++i) {
     const double own = entry(patch.outer_stiffness, i, i) + inner_stiffness_[i * width + i];

@@ -85,12 +85,12 @@ class PatchModel {
     float step;                  // with its scale
   };
   // Ascending.
-  void take_tets(const organ::Organ& organ, std::span<const TetIndex> inner);
+  void select_tets(const organ::Organ& organ, std::span<const TetIndex> inner);
   // Drops fields that nearly are linear combinations of those before; more so of later patches.
   void drop_repeated_fields();
   void make_matrices(const organ::LocalPatch& patch);
   void fill_basis();
-  void take_inner_stiffness();
+  void fill_inner_stiffness();
   void make_near_fit();
   // Projects onto the fields the masses of all nodes and the stiffness of the outer tets.
   void sum_over_nodes(const LocalModels& models, std::span<const TetIndex> inner);

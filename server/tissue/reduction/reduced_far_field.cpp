@@ -361,7 +361,7 @@ void ReducedFarField::correct(const dynamics::FarFieldStep& step) {
 // Near nodes are swept, and moved by the fields. What sweeps undo of that in every step would build
 // up, without bound, in fields that move hardly anything else, and come out when the nodes are near
 // no more: so the fields follow the near nodes where that moves nothing else.
-void ReducedFarField::follow_near(const dynamics::FarFieldStep& step) {
+void ReducedFarField::fit_to_near(const dynamics::FarFieldStep& step) {
   if (near_.empty()) return;
   auto& s = *state_;
   const auto* const near_fit = model_->near_fit();
@@ -371,7 +371,7 @@ void ReducedFarField::follow_near(const dynamics::FarFieldStep& step) {
   }
   gather(step);
   const auto count = model_->field_count();
-  const auto follow = [&](std::vector<double>& values, auto&& wanted) {
+  const auto fit = [&](std::vector<double>& values, auto&& wanted) {
     for (std::size_t c = 0; c < count; ++c) change_[c] = static_cast<float>(values[c]);
     std::ranges::fill(f_, 0.0f);
     for (std::size_t i = 0; i < near_.size(); ++i) {
@@ -391,8 +391,8 @@ void ReducedFarField::follow_near(const dynamics::FarFieldStep& step) {
     return Vec3f{u[0], u[1], u[2]};
   };
   const float inverse_dt = 1 / step.dt;
-  follow(s.amplitudes, at);
-  follow(s.rates, [&](std::size_t i) {
+  fit(s.amplitudes, at);
+  fit(s.rates, [&](std::size_t i) {
     return (at(i) - step.world.displacements[step.near[i].value]) * inverse_dt;
   });
 }
@@ -430,7 +430,7 @@ float ReducedFarField::end(const dynamics::FarFieldStep& step, dynamics::Float4*
   const auto count = model.field_count();
   const double dt = static_cast<double>(step.dt);
   for (std::size_t c = 0; c < count; ++c) s.rates[c] = (s.amplitudes[c] - start_[c]) / dt;
-  follow_near(step);
+  fit_to_near(step);
   s.fade *= 1 - dt / kFade_s;
   if (s.fade < kLeastFade) s.fade = 0;
   if (s.age % kEstimateInterval == 0 && s.estimate < kBroken)

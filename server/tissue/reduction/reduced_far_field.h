@@ -44,7 +44,7 @@ class ReducedFarField : public dynamics::FarFieldSolver {
 
   // Takes up nodes that cuts have made: they go with those that they are between. No work if there
   // are none since the last call. While no patch acts.
-  void follow_cuts(const world::World& world);
+  void add_cut_nodes(const world::World& world);
   // From now on the fields of these patches, whose model it is, move what is not near. gradient: of
   // the elastic energy, N per node, where the tissue is. Continuous in place, momentum along the
   // fields, and force.
@@ -72,15 +72,15 @@ class ReducedFarField : public dynamics::FarFieldSolver {
     float weight;
   };
   // Returns the organ's nodes with which a node made by cuts moves, and their weights.
-  std::span<const Share> shares_of(std::size_t follower) const {
-    return std::span(shares_).subspan(share_begins_[follower],
-                                      share_begins_[follower + 1] - share_begins_[follower]);
+  std::span<const Share> shares_of(std::size_t cut_node) const {
+    return std::span(shares_).subspan(share_begins_[cut_node],
+                                      share_begins_[cut_node + 1] - share_begins_[cut_node]);
   }
-  std::size_t follower_count() const { return share_begins_.size() - 1; }
+  std::size_t cut_node_count() const { return share_begins_.size() - 1; }
   // Values of the organ's nodes from `begin` to `end`, with the shares of those that follow.
   std::span<const float> gathered(std::span<const Vec3f> values, std::size_t begin,
                                   std::size_t end);
-  void place_followers(std::size_t begin, std::size_t end, const dynamics::FarFieldStep* step,
+  void place_cut_nodes(std::size_t begin, std::size_t end, const dynamics::FarFieldStep* step,
                        dynamics::Float4* velocities, world::World& world);
   void keep_rates(world::World& world);
   void set_model(const PatchModel* model);
@@ -89,7 +89,7 @@ class ReducedFarField : public dynamics::FarFieldSolver {
   Vec3f of_change(std::uint32_t local) const;
   void add_inertia(const dynamics::FarFieldStep& step);
   bool make_factors(double inertia_per_s2);
-  void follow_near(const dynamics::FarFieldStep& step);
+  void fit_to_near(const dynamics::FarFieldStep& step);
   float estimate_error(const dynamics::FarFieldStep& step, const world::World& world);
   float place(std::uint32_t turn, const dynamics::FarFieldStep* step, dynamics::Float4* velocities,
               double dt, world::World& world);

@@ -8,8 +8,8 @@
 
 namespace trocar::reduction {
 
-void ReducedFarField::follow_cuts(const world::World& world) {
-  if (follower_count() == world.origins.size()) return;
+void ReducedFarField::add_cut_nodes(const world::World& world) {
+  if (cut_node_count() == world.origins.size()) return;
   share_begins_.assign(1, 0);
   shares_.clear();
   const auto add = [&](NodeIndex node, float weight, std::size_t own) {
@@ -42,7 +42,7 @@ std::span<const float> ReducedFarField::gathered(std::span<const Vec3f> values, 
     float* const to = &gathered_[3 * (n - begin)];
     to[0] = values[n].x, to[1] = values[n].y, to[2] = values[n].z;
   }
-  for (std::size_t i = 0; i < follower_count(); ++i)
+  for (std::size_t i = 0; i < cut_node_count(); ++i)
     for (const auto& [node, weight] : shares_of(i)) {
       if (node < begin || node >= end) continue;
       const Vec3f part = values[node_count_ + i] * weight;
@@ -68,7 +68,7 @@ void ReducedFarField::keep_rates(world::World& world) {
         world.velocities[n] = {run[3 * (n - begin)], run[3 * (n - begin) + 1],
                                run[3 * (n - begin) + 2]};
   }
-  for (std::size_t i = 0; i < follower_count(); ++i) {
+  for (std::size_t i = 0; i < cut_node_count(); ++i) {
     Vec3f velocity;
     for (const auto& [node, weight] : shares_of(i)) velocity += world.velocities[node] * weight;
     if (world.node_classes[node_count_ + i] != world::NodeClass::Fixed)
@@ -122,15 +122,15 @@ float ReducedFarField::place(std::uint32_t turn, const dynamics::FarFieldStep* s
     step->x[slot] = dynamics::to_float4(now);
     velocities[slot] = dynamics::to_float4(world.velocities[n]);
   }
-  place_followers(begin, end, step, velocities, world);
+  place_cut_nodes(begin, end, step, velocities, world);
   return squared;
 }
 
 // Nodes that cuts made move by their shares of what the organ's nodes of this turn have moved by.
-void ReducedFarField::place_followers(std::size_t begin, std::size_t end,
+void ReducedFarField::place_cut_nodes(std::size_t begin, std::size_t end,
                                       const dynamics::FarFieldStep* step,
                                       dynamics::Float4* velocities, world::World& world) {
-  for (std::size_t i = 0; i < follower_count(); ++i) {
+  for (std::size_t i = 0; i < cut_node_count(); ++i) {
     const auto n = node_count_ + i;
     if (world.node_classes[n] == world::NodeClass::Fixed) continue;
     Vec3f moved, velocity;

@@ -92,14 +92,14 @@ void ReducedTissue::hand_back(dynamics::BlockDescent& solver, world::World& worl
   if (!state_.far.acts()) return;
   far_field_.hand_back(world);
   acting_ = nullptr;
-  solver.take_motion(world);
+  solver.read_motion(world);
 }
 
 std::optional<dynamics::FarFieldModel::Choice> ReducedTissue::choose(const Inputs& inputs,
                                                                      dynamics::BlockDescent& solver,
                                                                      world::World& world) {
   far_field_.use(state_.far, acting_.get());
-  far_field_.follow_cuts(world);
+  far_field_.add_cut_nodes(world);
   if (state_.wait_ticks > 0) --state_.wait_ticks;
   figures_.largest_node_force_n = largest_node_force(inputs.contacts, world);
   auto patches = state_.far.patches;

@@ -7,18 +7,19 @@ void hand_out(const topology::Edit& edit, State& state) {
   state.cuts.extend_layout(edit, state.world);
   state.quantised.resize(state.cuts.layout().vertex_count());
   for (const auto& made : edit.new_nodes) {
+    if (made.has_moved()) continue;
     state.claims.add_node(made.a, made.b);
     if (made.is_copy()) state.grasps.add_copy(made.a, made.node);
   }
 }
 
 void hand_out(const topology::Edit& edit, const world::World& world, StepContext& context) {
-  context.neighbours.take_changed(edit.topology);
+  context.neighbours.update_changed(edit.topology);
   context.queue.forget(world.node_count());
   context.active.forget();
-  context.finder.follow(edit.surface, world);
-  context.self_finder.follow(edit.surface, world);
-  context.solver.follow_topology(edit.topology, world);  // and with it its far field
+  context.finder.update(edit.surface, world);
+  context.self_finder.update(edit.surface, world);
+  context.solver.update_topology(edit.topology, world);  // and with it its far field
 }
 
 void hand_out(const topology::Edit& edit, State& state, StepContext& context) {

@@ -70,18 +70,18 @@ void ExternalLoads::start() {
   }
 }
 
-void ExternalLoads::follow(const world::World& world) {
+void ExternalLoads::update(const world::World& world) {
   if (world.node_count() < node_count_) start();  // of a state before those cuts
   if (world.node_count() == node_count_) return;
   hold_of_.resize(world.node_count(), kNone);
   axis_hold_of_.resize(world.node_count(), kNone);
   for (; node_count_ < world.node_count(); ++node_count_)
-    follow_hold(NodeIndex(node_count_), world.origins[node_count_ - organ_nodes_]);
+    add_hold(NodeIndex(node_count_), world.origins[node_count_ - organ_nodes_]);
   held_displacements_.resize(held_.size());
   if (!rules_.forces.empty()) forces_.resize(node_count_);
 }
 
-void ExternalLoads::follow_hold(NodeIndex node, const world::NodeOrigin& origin) {
+void ExternalLoads::add_hold(NodeIndex node, const world::NodeOrigin& origin) {
   const float t = static_cast<float>(origin.t) / 65536.0f;
   if (const auto a = hold_of_[origin.a.value], b = hold_of_[origin.b.value];
       a != kNone && b != kNone) {
@@ -139,14 +139,14 @@ void ExternalLoads::push(double time_s, const world::World& world) {
 }
 
 dynamics::ExternalLoads ExternalLoads::at(double time_s, const world::World& world) {
-  follow(world);
+  update(world);
   place(time_s);
   if (!forces_.empty()) push(time_s, world);
   return {forces_, held_, held_displacements_, axis_holds_};
 }
 
 dynamics::ExternalLoads ExternalLoads::at_rest(const world::World& world) {
-  follow(world);
+  update(world);
   std::ranges::fill(held_displacements_, Vec3f{});
   for (auto& hold : axis_holds_) hold.displacement = {};
   return {{}, held_, held_displacements_, axis_holds_};

@@ -96,8 +96,8 @@ class ExternalLoads {
   };
 
   void start();
-  void follow(const world::World& world);
-  void follow_hold(NodeIndex node, const world::NodeOrigin& origin);
+  void update(const world::World& world);
+  void add_hold(NodeIndex node, const world::NodeOrigin& origin);
   void place(double time_s);
   void push(double time_s, const world::World& world);
   Vec3d on_held_axes(NodeIndex node, Vec3d force_n) const;

@@ -13,8 +13,9 @@
 
 namespace trocar::step {
 
-State::State(const organ::Organ& organ, const dynamics::FarFieldModels* models)
-    : cuts(organ),
+State::State(const organ::Organ& organ, const dynamics::FarFieldModels* models,
+             const cutting::Settings& cutting)
+    : cuts(organ, cutting),
       world(organ),
       claims(organ.mesh.node_count()),
       quantised(cuts.layout().vertex_count()),
@@ -37,7 +38,7 @@ void State::set_mark() {
 
 std::unique_ptr<State> State::returned_to_mark(const organ::Organ& organ) const {
   if (!mark.is_set()) return nullptr;
-  auto marked = std::make_unique<State>(organ, far_models);
+  auto marked = std::make_unique<State>(organ, far_models, cuts.settings());
   auto archive = world::StateArchive::reading(mark.state());
   marked->visit_without_mark(archive);
   if (!archive.ok() || !archive.at_end()) return nullptr;
@@ -66,9 +67,11 @@ void State::visit_without_mark(world::StateArchive& archive) {
 namespace {
 
 std::shared_ptr<const Scene> scene_of(organ::Organ organ,
-                                      const dynamics::MakeFarFieldModels& far_models) {
+                                      const dynamics::MakeFarFieldModels& far_models,
+                                      const cutting::Settings& cutting) {
   auto scene = std::make_shared<Scene>();
   scene->organ = std::move(organ);
+  scene->cutting = cutting;
   if (far_models) scene->far_models = far_models(scene->organ);
   return scene;
 }
@@ -109,12 +112,12 @@ StepContext::StepContext(const Scene& s, unsigned workers, const world::World& u
   for (const auto& events : state.cuts.history()) {
     const auto applied = cutting::apply(events, topology, places);
     TROCAR_ASSERT(applied.ok());
-    hand_out({topology, {}, surface.follow(topology)}, state.world, *this);
+    hand_out({topology, {}, surface.update(topology)}, state.world, *this);
     topology.clear_changes();
   }
   // From now on everybody looks at the state's own topology.
   if (!state.cuts.history().empty()) hand_out({state.cuts.topology(), {}, {}}, state.world, *this);
-  solver.take_state(state.world);
+  solver.read_state(state.world);
 }
 
 namespace {
@@ -173,13 +176,14 @@ Status validate(const TickDecisions& d) {
 }
 
 Simulation::Simulation(organ::Organ organ, unsigned workers,
-                       const dynamics::MakeFarFieldModels& far_models)
-    : Simulation(scene_of(std::move(organ), far_models), workers) {}
+                       const dynamics::MakeFarFieldModels& far_models,
+                       const cutting::Settings& cutting)
+    : Simulation(scene_of(std::move(organ), far_models, cutting), workers) {}
 
 Simulation::Simulation(std::shared_ptr<const Scene> scene, unsigned workers)
     : scene_(std::move(scene)),
       workers_(workers),
-      state_(std::make_unique<State>(scene_->organ, scene_->far_models.get())),
+      state_(std::make_unique<State>(scene_->organ, scene_->far_models.get(), scene_->cutting)),
       context_(std::make_unique<StepContext>(*scene_, workers_, *state_)) {}
 
 Simulation Simulation::beside(unsigned workers) const {
@@ -236,7 +240,7 @@ std::uint64_t Simulation::state_hash() const {
 }
 
 Status Simulation::restore_snapshot(BytesView snapshot) {
-  auto restored = std::make_unique<State>(scene_->organ, scene_->far_models.get());
+  auto restored = std::make_unique<State>(scene_->organ, scene_->far_models.get(), scene_->cutting);
   auto archive = world::StateArchive::reading(snapshot);
   restored->visit(archive);
   auto context = archive.ok() && archive.at_end() ? context_of(*restored) : nullptr;

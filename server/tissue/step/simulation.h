@@ -17,21 +17,24 @@ class Simulation {
  public:
   // workers: threads that share the solver's work; results do not depend on it.
   // far_models: what may move the far field instead of sweeps; empty: nothing.
+  // cutting: how blades cut. A method that moves nodes of the mesh needs the boundary whole and no
+  // self-contact, and its states cannot be restored.
   explicit Simulation(organ::Organ organ, unsigned workers = 1,
-                      const dynamics::MakeFarFieldModels& far_models = {});
+                      const dynamics::MakeFarFieldModels& far_models = {},
+                      const cutting::Settings& cutting = {});
 
   // Another one of the same organ and far-field models, at the beginning. Shares with this one what
   // never changes, so that they may be used by two threads.
   Simulation beside(unsigned workers) const;
 
-  // Simulates one tick. After a tick that publishes, take_frame() has the frame. Returning to a
+  // Simulates one tick. After a tick that publishes, pop_frame() has the frame. Returning to a
   // mark costs as much as beginning a session. loads: what acts besides tools; null: nothing.
   const TickReport& tick(const hands::TickInputs& inputs, const TickDecisions& decisions,
                          ExternalLoads* loads = nullptr);
 
   // The frame of the last tick, or null. Not yet shared, so the caller may add what is not
   // simulation: statistics, a snapshot for the journal. Frame f shows the state after tick 16 f.
-  std::shared_ptr<PublishedFrame> take_frame() { return std::move(context_->frame); }
+  std::shared_ptr<PublishedFrame> pop_frame() { return std::move(context_->frame); }
 
   // Full state: all that the tick hash covers.
   void write_snapshot(Bytes& out) const;

@@ -22,7 +22,7 @@ void admit_inputs(State& state, StepContext& context) {
 }
 
 void follow_contacts(State& state, StepContext& context) {
-  state.proxies.follow(context.contacts, state.world, state.tools);
+  state.proxies.update(context.contacts, state.world, state.tools);
 }
 
 void update_claims(State& state, StepContext& context) {
@@ -180,7 +180,7 @@ void solve(State& state, StepContext& context) {
       solve_steps(nodes, settings_of(context, modelled ? modelled->far : nullptr), state, context);
   const auto settled =
       context.active.settle(context.queue, context.solver.residuals_n(), state.world);
-  context.solver.take_state(state.world, settled);
+  context.solver.read_state(state.world, settled);
   largest_move += settled.empty() ? 0 : propagation::kQuietDisplacementMetres;
   context.finder.surface_moved(largest_move);
   context.self_finder.surface_moved(largest_move);
@@ -229,8 +229,8 @@ ToolFrame describe_tool(const State& state, const StepContext& context, ToolSlot
 }
 
 void quantise_and_publish(State& state, StepContext& context) {
-  const auto new_layout = state.cuts.take_new_layout();
-  const auto change = state.cuts.take_change();
+  const auto new_layout = state.cuts.pop_new_layout();
+  const auto change = state.cuts.pop_change();
   const auto& layout = state.cuts.layout();
   context.surface_displacements.resize(layout.vertex_count());
   for (std::size_t v = 0; v < layout.vertex_count(); ++v)

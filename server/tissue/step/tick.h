@@ -29,7 +29,8 @@ static_assert(kSweepLayers <= dynamics::kMaxSweepBands);
 // the snapshot and what the tick hash covers.
 struct State {
   // models: null: sweeps alone move the tissue.
-  State(const organ::Organ& organ, const dynamics::FarFieldModels* models);
+  State(const organ::Organ& organ, const dynamics::FarFieldModels* models,
+        const cutting::Settings& cutting);
 
   blades::TissueCuts cuts;
   world::World world;
@@ -58,6 +59,7 @@ struct State {
 // Constant in a session: follows from the organ.
 struct Scene {
   organ::Organ organ;
+  cutting::Settings cutting;
   std::unique_ptr<const dynamics::FarFieldModels> far_models;  // of it where it stays; null: none
 };
 

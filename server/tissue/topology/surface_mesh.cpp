@@ -101,7 +101,7 @@ void SurfaceMesh::add(const Face& face) {
   edit_.added.push_back({face.nodes, face.is_wound, face.material});
 }
 
-const SurfaceEdit& SurfaceMesh::follow(const Topology& topology) {
+const SurfaceEdit& SurfaceMesh::update(const Topology& topology) {
   edit_.clear();
   is_changed_.resize(topology.node_count());
   triangles_of_.extend(topology.node_count());

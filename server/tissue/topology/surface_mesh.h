@@ -26,7 +26,7 @@ class SurfaceMesh {
   }
 
   // Follows topology.changed(). Valid until the next call.
-  const SurfaceEdit& follow(const Topology& topology);
+  const SurfaceEdit& update(const Topology& topology);
 
  private:
   struct Face {

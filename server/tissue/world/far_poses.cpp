@@ -52,11 +52,11 @@ void FarPoses::add_node(NodeIndex a, NodeIndex b, std::uint16_t t) {
 
 bool FarPoses::begin_step(std::span<const Vec3f> displacements) {
   age_ = (age_ + 1) % kInterval;
-  if (age_ == 0) take(displacements);
+  if (age_ == 0) record(displacements);
   return age_ == 0;
 }
 
-void FarPoses::take(std::span<const Vec3f> displacements) {
+void FarPoses::record(std::span<const Vec3f> displacements) {
   const auto i = ++newest_ % 2;
   taken_nodes_[i] = static_cast<std::uint32_t>(displacements.size());
   std::ranges::transform(displacements, poses_[i].begin(), [](const Vec3f& u) {

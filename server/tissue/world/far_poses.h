@@ -44,7 +44,7 @@ class FarPoses {
   void visit_state(StateArchive& archive);
 
  private:
-  void take(std::span<const Vec3f> displacements);
+  void record(std::span<const Vec3f> displacements);
   // Hashes the nodes that there were when the pose was taken, then each that was added since.
   std::uint64_t hash_of(std::uint32_t number) const;
 

@@ -30,7 +30,7 @@ void StateArchive::bytes(std::span<std::uint8_t> data) {
       out_->insert(out_->end(), data.begin(), data.end());
       return;
     case Mode::Read: {
-      const auto source = ok_ ? reader_.take_bytes(data.size()) : BytesView{};
+      const auto source = ok_ ? reader_.read_bytes(data.size()) : BytesView{};
       if (source.size() != data.size()) {
         ok_ = false;
         std::fill(data.begin(), data.end(), std::uint8_t{0});

@@ -48,9 +48,23 @@ void World::add_node(const Vec3d& rest_position, NodeIndex a, NodeIndex b, std::
   relaxation.add_node(a);
 }
 
+void World::move_node(const Vec3d& rest_position, NodeIndex node, NodeIndex toward,
+                      std::uint16_t t) {
+  const float share = static_cast<float>(t) / 65536.0f;
+  for (auto* values : {&displacements, &velocities}) {
+    Vec3f& own = (*values)[node.value];
+    own += ((*values)[toward.value] - own) * share;
+  }
+  rest_positions[node.value] = to_float(rest_position);
+}
+
 void World::apply(const topology::Edit& edit) {
   const auto& topology = edit.topology;
   for (const auto& made : edit.new_nodes) {
+    if (made.has_moved()) {
+      move_node(topology.rest()[made.node.value], made.node, made.b, made.t);
+      continue;
+    }
     TROCAR_ASSERT(made.node.value == node_count());
     add_node(topology.rest()[made.node.value], made.a, made.b, made.t);
   }

@@ -70,6 +70,9 @@ struct World {
   // A node between a and b, t/65536 of the way from a; a copy of a where b is a. Moves with them,
   // fixed where both are, with no mass and no surface yet.
   void add_node(const Vec3d& rest_position, NodeIndex a, NodeIndex b, std::uint16_t t);
+  // Moves a node t/65536 of the way toward another, with the displacement and velocity that the
+  // edge between them has there.
+  void move_node(const Vec3d& rest_position, NodeIndex node, NodeIndex toward, std::uint16_t t);
 
   void visit_state(StateArchive& archive);
 };
