@@ -83,19 +83,4 @@ std::vector<Fragment> find_fragments(const SourceFile& file) {
   return fragments;
 }
 
-std::string wing_of(const std::string& path) {
-  const auto first = path.find('/');
-  const auto wing = path.substr(0, first);
-  return wing == "server" ? path.substr(0, path.find('/', first + 1)) : wing;
-}
-
-std::map<std::string, std::vector<Fragment>> fragments_by_wing(const SourceTree& tree) {
-  std::map<std::string, std::vector<Fragment>> wings;
-  for (const auto& file : tree.files) {
-    auto& wing = wings[wing_of(file.path)];
-    std::ranges::move(find_fragments(file), std::back_inserter(wing));
-  }
-  return wings;
-}
-
 }  // namespace trocar::architecture

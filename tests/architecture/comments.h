@@ -2,7 +2,6 @@
 
 // Comments are sentences: they have a subject and a verb, and are short enough to be read once.
 
-#include <map>
 #include <string>
 #include <vector>
 
@@ -22,11 +21,5 @@ struct Fragment {
 // comments and formulas are not looked at. The rule is precise rather than complete: a noun with a
 // plural s passes for a verb.
 std::vector<Fragment> find_fragments(const SourceFile& file);
-
-// The wing that a file belongs to: "common", "server/tissue", ..., "client", "tests".
-std::string wing_of(const std::string& path);
-
-// The number of fragments by wing, over the whole tree.
-std::map<std::string, std::vector<Fragment>> fragments_by_wing(const SourceTree& tree);
 
 }  // namespace trocar::architecture

@@ -34,15 +34,9 @@ TEST(Comments, ASentenceIsNone) {
             0u);
 }
 
-TEST(Comments, AFileBelongsToItsWing) {
-  EXPECT_EQ(wing_of("common/base/a.h"), "common");
-  EXPECT_EQ(wing_of("server/tissue/step/tick.cpp"), "server/tissue");
-  EXPECT_EQ(wing_of("tests/base/a.cpp"), "tests");
-}
-
 TEST(Comments, AreSentences) {
-  for (const auto& [wing, fragments] : fragments_by_wing(read_source_tree(TROCAR_SOURCE_DIR)))
-    for (const auto& [path, line, comment] : fragments)
+  for (const auto& file : read_source_tree(TROCAR_SOURCE_DIR).files)
+    for (const auto& [path, line, comment] : find_fragments(file))
       ADD_FAILURE() << path << ":" << line << ": " << comment
                     << "\nis no sentence: begin with a subject or a verb";
 }
