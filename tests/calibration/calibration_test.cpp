@@ -85,6 +85,50 @@ TEST(Calibration, StoresTheLimitThatEveryPlaceNeeds) {
   }
 }
 
+TEST(Calibration, ReferenceReachesItsToleranceInEveryTick) {
+  const auto& reference = small_calibration().reference;
+  EXPECT_GT(reference.convergence.ticks, 0u);
+  EXPECT_EQ(reference.convergence.reached, reference.convergence.ticks);
+  EXPECT_LE(reference.convergence.largest_residual_n, reference.convergence.tolerance_n);
+  EXPECT_EQ(reference.places_missed, 0u);
+  // Something is measured, and it is less than what limits are judged by.
+  EXPECT_GT(reference.own_error, 0);
+  EXPECT_LE(reference.own_error, 0.1 * small_settings().error);
+}
+
+TEST(Convergence, ToleranceFollowsTheForceDownToWhatRoundingLeaves) {
+  Pilot pilot;
+  pilot.note({.tick = 5, .residual_n = 1}, 4);
+  pilot.note({.tick = Pilot::kPilotTicks, .residual_n = 1e-6f}, 2);
+  EXPECT_EQ(pilot.largest_force_n(), 4);
+  EXPECT_FLOAT_EQ(pilot.tolerance_n(100), 1.2e-5f);
+  EXPECT_FLOAT_EQ(pilot.tolerance_for(8, 100), 2.4e-5f);
+  EXPECT_FLOAT_EQ(pilot.tolerance_for(4, 400), 6e-6f);
+  EXPECT_FLOAT_EQ(pilot.tolerance_for(4, 100, kLooser), 1.2e-4f);
+  EXPECT_FLOAT_EQ(pilot.tolerance_for(0.1, 100), 2e-6f);
+  EXPECT_FLOAT_EQ(pilot.tolerance_for(0.1, 100, kLooser), 2e-5f);
+}
+
+TEST(Convergence, DecisionsAreValid) {
+  EXPECT_TRUE(step::validate(converged_decisions(1e-5f)).ok());
+  for (Tick tick = 1; tick <= Pilot::kPilotTicks; ++tick)
+    EXPECT_TRUE(step::validate(Pilot::decisions(tick)).ok()) << tick;
+}
+
+TEST(Convergence, OneTickThatMissedIsSeen) {
+  Convergence convergence;
+  EXPECT_FALSE(convergence.is_reached());
+  const auto decisions = converged_decisions(1e-5f);
+  convergence.note({.is_converged = true, .sweeps = 7, .residual_n = 9e-6f}, decisions);
+  EXPECT_TRUE(convergence.is_reached());
+  convergence.note({.is_converged = false, .sweeps = 500, .residual_n = 2e-5f}, decisions);
+  convergence.note({.is_converged = true}, {});
+  EXPECT_FALSE(convergence.is_reached());
+  EXPECT_EQ(convergence.words(),
+            "tolerance 1e-05 N per node, reached in 1 of 2 ticks, largest residual 2e-05 N, at "
+            "most 500 sweeps");
+}
+
 TEST(Calibration, IsDeterministic) {
   auto settings = small_settings();
   settings.places = 1;
@@ -92,9 +136,10 @@ TEST(Calibration, IsDeterministic) {
 }
 
 TEST(Calibration, KeepsItsErrorAtPlacesAndSpeedsThatWereNotUsed) {
-  const auto checks = check(small_liver(), small_calibration().table, small_settings(), 3);
+  const auto found = check(small_liver(), small_calibration().table, small_settings(), 3);
+  EXPECT_TRUE(found.reference.is_converged()) << found.reference.convergence.words();
   std::size_t compared = 0;
-  for (const auto& c : checks) {
+  for (const auto& c : found.ranges) {
     if (c.places == 0) continue;
     ++compared;
     EXPECT_LE(c.graded_mean, 0.03) << c.force_n << " N";

@@ -9,7 +9,6 @@
 
 #include "common/base/assert.h"
 #include "common/base/timing.h"
-#include "server/lab/calibration/press.h"
 #include "server/lab/reduce/local_quality.h"
 #include "server/lab/reduce/presses.h"
 #include "server/organs/organ/local_reduction_file.h"
@@ -151,18 +150,6 @@ Script script_of(const Stroke& stroke) {
   return {stroke.ticks(), [stroke](Tick tick) { return stroke.at(tick); }, {}};
 }
 
-Script converged(Script script, std::uint32_t sweeps) {
-  script.decisions = [sweeps](Tick) { return calibration::full_decisions(sweeps); };
-  return script;
-}
-
-double own_error(const Course& reference, const Course& more) {
-  double most = 0;
-  for (std::size_t i = 0; i < more.ticks.size(); ++i)
-    most = std::max(most, length(reference.ticks[i].force_n - more.ticks[i].force_n));
-  return most / more.largest_force_n();
-}
-
 Course run_session(const organ::Organ& organ,
                    const std::shared_ptr<const organ::LocalReduction>& reduction,
                    const Script& script, Tick field_ticks) {
@@ -176,6 +163,7 @@ Course run_session(const organ::Organ& organ,
     const auto& report = simulation.tick(inputs, decisions);
     const auto cpu_ns = thread_cpu_ns() - begin;
     simulation.pop_frame();
+    course.convergence.note(report, decisions);
     LiveTick now{.force_n = force_in(simulation),
                  .us = static_cast<double>(cpu_ns) * 1e-3,
                  .is_reduced = report.is_reduced};
@@ -183,6 +171,7 @@ Course run_session(const organ::Organ& organ,
       now.figures = model->figures();
       now.estimate = static_cast<const reduction::ReducedTissue&>(*model).state().far.estimate;
     }
+    course.pilot.note(report, length(now.force_n));
     if (course.lost == 0 && (report.nodes_rejected > 0 || !std::isfinite(length(now.force_n))))
       course.lost = tick;
     course.ticks.push_back(now);
@@ -192,6 +181,31 @@ Course run_session(const organ::Organ& organ,
     }
   }
   return course;
+}
+
+Course References::run(const organ::Organ& organ, Script script, Tick field_ticks) {
+  script.decisions = calibration::Pilot::decisions;
+  const auto pilot = run_session(organ, nullptr, script, 0).pilot;
+  const auto converged = [&](double looser, Tick fields) {
+    const auto tolerance = pilot.tolerance_n(organ.mesh.node_count(), looser);
+    script.decisions = [=](Tick) { return calibration::converged_decisions(tolerance); };
+    return run_session(organ, nullptr, script, fields);
+  };
+  auto course = converged(1, field_ticks);
+  const double largest = course.largest_force_n();
+  if (largest < kLeastForce_n) return course;
+  const auto loose = converged(calibration::kLooser, 0);
+  for (std::size_t i = 0; i < course.ticks.size(); ++i)
+    own_error_ =
+        std::max(own_error_, length(loose.ticks[i].force_n - course.ticks[i].force_n) / largest);
+  convergence_.add(course.convergence);
+  ++count_;
+  return course;
+}
+
+void References::check(Section& section, const std::string& name, Bound own_error) const {
+  check_reference(section, name, convergence_, count_ > 0 ? own_error_ : kNone,
+                  std::move(own_error));
 }
 
 double force_error(const Course& course, const Course& reference, std::size_t tick) {

@@ -9,10 +9,11 @@
 #include <string>
 #include <vector>
 
-#include "server/lab/calibration/press.h"
+#include "server/lab/calibration/converged.h"
 #include "server/lab/reduce/local_build.h"
 #include "server/organs/organ/local_reduction.h"
 #include "server/tissue/step/simulation.h"
+#include "tests/validation/references.h"
 #include "tests/validation/report.h"
 
 namespace trocar::validation {
@@ -70,9 +71,11 @@ struct LiveTick {
 };
 struct Course {
   std::vector<LiveTick> ticks;
-  Tick field_ticks = 1;           // from one field to the next
-  std::vector<LiveField> fields;  // fields[i] is after ticks[(i + 1) * field_ticks - 1]
-  Tick lost = 0;                  // the first in which nodes had to be put back; 0: none
+  Tick field_ticks = 1;                  // from one field to the next
+  std::vector<LiveField> fields;         // fields[i] is after ticks[(i + 1) * field_ticks - 1]
+  Tick lost = 0;                         // the first in which nodes had to be put back; 0: none
+  calibration::Convergence convergence;  // of ticks that are solved to a tolerance
+  calibration::Pilot pilot;              // of a session that ran as one
 
   double largest_force_n() const;
 };
@@ -84,14 +87,31 @@ struct Script {
   std::function<step::TickDecisions(Tick)> decisions;  // none: as sessions run by default
 };
 Script script_of(const Stroke& stroke);
-Script converged(Script script, std::uint32_t sweeps = calibration::kFullSweeps);
-// Largest difference of the forces over the largest: what more sweeps change of a reference.
-double own_error(const Course& reference, const Course& more);
 
 // reduction: null for a session without one. field_ticks 0: no fields are kept.
 Course run_session(const organ::Organ& organ,
                    const std::shared_ptr<const organ::LocalReduction>& reduction,
                    const Script& script, Tick field_ticks);
+
+// A place with less is none that the tip can come to from above.
+inline constexpr double kLeastForce_n = 0.05;
+
+// The converged sessions of an experiment and what they are worth.
+class References {
+ public:
+  // The same script without a reduction, solved to a tolerance that a pilot finds. One more run
+  // with a looser tolerance tells its own error. Neither counts if the force stays below
+  // kLeastForce_n.
+  Course run(const organ::Organ& organ, Script script, Tick field_ticks);
+
+  // As check_reference().
+  void check(Section& section, const std::string& name, Bound own_error) const;
+
+ private:
+  calibration::Convergence convergence_;
+  double own_error_ = 0;  // the largest of all sessions
+  std::size_t count_ = 0;
+};
 
 // Errors beside a converged session with the same script, in ticks in which the reference's force
 // is at least least_n. A session that was lost errs without bound from there on.

@@ -23,7 +23,6 @@ constexpr double kBad = 0.03, kMissed = 0.01;
 // it is of little use. Sessions hold the estimate against a larger threshold, as a guard
 // (reduced_tissue.cpp).
 constexpr double kThreshold = 0.035, kMostAlarms = 0.2, kAlarmsOnRecord = 0.85;
-constexpr double kLeastForce_n = 0.05;
 constexpr Tick kStateTicks = 8;
 constexpr float kForceMargin = 1.5f;  // of sessions, see server/tissue/reduction/reduced_tissue.cpp
 constexpr std::array kDepths_mm{2.0, 5.0, 8.0, 11.0, 15.0};
@@ -135,7 +134,7 @@ class Study {
     const auto script = script_of(stroke);
     const auto reduced = run_session(liver_.organ(), lifted_, script, kStateTicks);
     const auto full = run_session(liver_.organ(), nullptr, script, kStateTicks);
-    const auto reference = run_session(liver_.organ(), nullptr, converged(script), kStateTicks);
+    const auto reference = references_.run(liver_.organ(), script, kStateTicks);
     const auto& centre = lifted_->patches[place.patch].centre;
     const double off =
         1e3 * length(to_double(place.position) - liver_.organ().mesh.rest_positions[centre.value]);
@@ -258,6 +257,8 @@ class Study {
   void check() {
     const auto name = [&](const char* what) { return fmt::format("{}-{}", liver_.name(), what); };
     const auto r = rates_of(states_, kThreshold, false);
+    references_.check(section_, name("reference"),
+                      target(kBad / 5, "a fifth of what the reference judges"));
     section_.at_most(name("missed"), shown_percent(kMissed), r.missed_rate(),
                      target(kMissed, "nearly every bad state is seen"),
                      "Of states with more than 3 % error of force, those with an estimate below "
@@ -272,6 +273,7 @@ class Study {
   const bool is_short_;
   std::string& csv_;
   std::shared_ptr<const organ::LocalReduction> lifted_;
+  References references_;
   std::vector<State> states_;
   std::size_t presses_ = 0, lost_ = 0;
   std::string lost_texts_;

@@ -89,10 +89,11 @@ class Study {
     const auto reduced = run_session(organ, made.local, script, kFieldTicks),
                full = run_session(organ, nullptr, script, kFieldTicks);
     Course reference;
+    References references;
     const bool has_reference = nodes <= kMostReferenceNodes;
     if (has_reference) {
       show_progress(name + ": converged session");
-      reference = run_session(organ, nullptr, converged(script), kFieldTicks);
+      reference = references.run(organ, script, kFieldTicks);
     }
     std::vector<double> reduced_us, full_us;
     std::array<std::vector<double>, 2> force, field;
@@ -133,11 +134,8 @@ class Study {
     found_.push_back(found);
     const auto check = fmt::format("{}k", (nodes + 500) / 1000);
     if (has_reference) {
-      const auto twice =
-          run_session(organ, nullptr, converged(script, 2 * calibration::kFullSweeps), 0);
-      section_.at_most(check + "-reference", "twice the sweeps", own_error(reference, twice),
-                       target(0.03 / 5, "a fifth of what the reference judges"),
-                       "Largest change of the reference's force with twice the sweeps.");
+      references.check(section_, check + "-reference",
+                       target(0.03 / 5, "a fifth of what the reference judges"));
       section_.at_most(check + "-force", "3 %", mean(force[0]),
                        target(0.03, "3 % of the converged force"),
                        "Contact force of the reduced solver, mean over ticks in contact.");

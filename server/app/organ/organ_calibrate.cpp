@@ -97,9 +97,22 @@ void print_table(const calibration::Calibration& calibration) {
                 limit_text(row.graded_depth, " layers").c_str(), 100 * row.graded_error);
 }
 
-void print_check(const std::vector<calibration::Check>& checks) {
+void print_reference(const calibration::Reference& reference) {
+  std::printf("reference: %s\n", reference.convergence.words().c_str());
+  std::printf("reference: own error %.3g %%, by a tolerance %g times larger%s\n",
+              100 * reference.own_error, calibration::kLooser,
+              reference.own_error <= reference.allowed_error
+                  ? ""
+                  : ", which is more than a tenth of --error");
+  if (reference.places_missed > 0)
+    std::printf("reference: LEFT OUT: %zu places, where it did not reach its tolerance\n",
+                reference.places_missed);
+}
+
+void print_check(const calibration::Checks& checks) {
   std::printf("at other places, slower and aslant, with what is chosen from the force:\n");
-  for (const auto& c : checks) {
+  print_reference(checks.reference);
+  for (const auto& c : checks.ranges) {
     if (c.places == 0) continue;
     std::printf("  %8.3g N     graded %4.1f %% (largest %4.1f %%, %.0f nodes)", c.force_n,
                 100 * c.graded_mean, 100 * c.graded_largest, c.graded_nodes);
@@ -170,7 +183,9 @@ Status run_calibrate(CalibrateCommand command) {
   const auto found = calibration::calibrate(*organ, settings, progress_of("pressing, place"));
   if (found.table.empty())
     return Error{ErrorCode::BadFile,
-                 command.organ + ": no place could be pressed, try another --radius or --seed"};
+                 command.organ +
+                     ": no place could be pressed until the reference converged, try "
+                     "another --radius or --seed"};
   const double wall_s = static_cast<double>(monotonic_ns() - begin) * 1e-9;
   const double cpu_s = static_cast<double>(thread_cpu_ns() - cpu) * 1e-9;
   const auto plain_bytes = organ::pack_organ(*organ).size();
@@ -179,9 +194,7 @@ Status run_calibrate(CalibrateCommand command) {
   std::printf("%s: %u places pressed %.1f mm deep with a tip of %.1f mm, %zu left out\n",
               organ->name.c_str(), found.table.places, command.depth_mm,
               found.table.tool_radius_m * 1e3, found.places_left_out);
-  std::printf("reference: %u sweeps a tick, own error %.2f %%%s\n", found.reference.sweeps,
-              100 * found.reference.own_error,
-              found.reference.is_converged() ? "" : ", which is more than a tenth of --error");
+  print_reference(found.reference);
   print_table(found);
   if (auto s = write_text_file(folder / "table.csv", table_csv(found.table)); !s) return s;
   if (auto s = write_text_file(folder / "places.csv", calibration::to_csv(found)); !s) return s;
@@ -190,7 +203,7 @@ Status run_calibrate(CalibrateCommand command) {
     const auto checks = calibration::check(*organ, found.table, settings, command.check_places,
                                            progress_of("checking, place"));
     print_check(checks);
-    if (auto s = write_text_file(folder / "check.csv", check_csv(checks)); !s) return s;
+    if (auto s = write_text_file(folder / "check.csv", check_csv(checks.ranges)); !s) return s;
   }
   std::printf("%.0f s (%.0f s of CPU time of one thread) for %llu ticks; %zu bytes more in %s\n",
               wall_s, cpu_s, static_cast<unsigned long long>(found.ticks),

@@ -69,12 +69,39 @@ bool suffices(const std::vector<Finding::Tried>& tried, double error) {
   return !tried.empty() && tried.back().error <= error;
 }
 
+// The reference of one place, and what it is worth, added to what is known of all places. The
+// tolerance suits the smallest range. Nothing where a tick missed it: the place is left out.
+std::optional<PressCourse> reference_press(PressBench& bench, const Place& place,
+                                           const PressPlan& plan, const Ranges& ranges,
+                                           Reference& reference) {
+  const auto pilot = bench.pilot(place, plan);
+  const auto converged = [&](double looser) {
+    return bench.press(
+        place, plan,
+        converged_decisions(pilot.tolerance_for(ranges.first_n, bench.node_count(), looser)));
+  };
+  auto full = converged(1);
+  reference.convergence.add(full.convergence);
+  if (!full.convergence.is_reached()) {
+    ++reference.places_missed;
+    return std::nullopt;
+  }
+  const RangeErrors loose(converged(kLooser), full, ranges);
+  for (std::size_t range = 0; range < kMaxRanges; ++range)
+    if (loose.has(range)) reference.own_error = std::max(reference.own_error, loose.error(range));
+  return full;
+}
+
 class PlaceStudy {
  public:
   PlaceStudy(PressBench& bench, const Place& place, std::size_t number, const PressPlan& plan,
-             const Settings& settings, const step::TickDecisions& full)
-      : bench_(bench), place_(place), plan_(plan), settings_(settings), ranges_{settings.first_n} {
-    full_ = bench.press(place, plan, full);
+             const Settings& settings, PressCourse full)
+      : bench_(bench),
+        place_(place),
+        plan_(plan),
+        settings_(settings),
+        ranges_{settings.first_n},
+        full_(std::move(full)) {
     const RangeErrors reached(full_, full_, ranges_);
     for (std::size_t range = 0; range < kMaxRanges; ++range)
       if (reached.has(range))
@@ -113,7 +140,7 @@ class PlaceStudy {
   const PressPlan& plan_;
   const Settings& settings_;
   const Ranges ranges_;
-  PressCourse full_;
+  const PressCourse full_;
   std::vector<Finding> findings_;
 };
 
@@ -175,10 +202,12 @@ Calibration calibrate(const organ::Organ& organ, const Settings& settings,
   const auto places = spread_places(organ, settings.places, settings.seed);
   const auto plan = plan_of(organ, settings);
   PressBench bench(organ, settings.workers);
-  result.reference = find_reference(bench, places, plan, settings.reference_error * settings.error);
+  const Ranges ranges{settings.first_n};
+  result.reference.allowed_error = settings.reference_error * settings.error;
   for (std::size_t i = 0; i < places.size(); ++i) {
-    PlaceStudy study(bench, places[i], i, plan, settings, result.reference.decisions());
-    auto findings = study.study();
+    auto full = reference_press(bench, places[i], plan, ranges, result.reference);
+    std::vector<Finding> findings;
+    if (full) findings = PlaceStudy(bench, places[i], i, plan, settings, std::move(*full)).study();
     result.places_left_out += findings.empty();
     std::ranges::move(findings, std::back_inserter(result.findings));
     if (progress) progress(i + 1, places.size());
@@ -188,7 +217,6 @@ Calibration calibrate(const organ::Organ& organ, const Settings& settings,
   table.tool_radius_m = static_cast<double>(static_cast<float>(plan.radius_m));
   table.places = static_cast<std::uint32_t>(places.size() - result.places_left_out);
   // A force that hardly any place reached says nothing about the others.
-  const Ranges ranges{settings.first_n};
   for (std::size_t range = 0; range < kMaxRanges; ++range) {
     const double force = ranges.end_n(range);
     const auto count =
@@ -202,8 +230,8 @@ Calibration calibrate(const organ::Organ& organ, const Settings& settings,
   return result;
 }
 
-std::vector<Check> check(const organ::Organ& organ, const organ::DepthTable& table,
-                         const Settings& settings, std::size_t places, const Progress& progress) {
+Checks check(const organ::Organ& organ, const organ::DepthTable& table, const Settings& settings,
+             std::size_t places, const Progress& progress) {
   const auto used = spread_places(organ, settings.places, settings.seed);
   const auto unseen = spread_places(organ, places, settings.seed, used);
   PressPlan plan = plan_of(organ, settings);
@@ -212,19 +240,21 @@ std::vector<Check> check(const organ::Organ& organ, const organ::DepthTable& tab
   plan.slant = 0.2;
   const Ranges ranges{settings.first_n};
   PressBench bench(organ, settings.workers);
-  std::vector<Check> checks(table.rows.size());
+  Checks result;
+  auto& checks = result.ranges;
+  checks.resize(table.rows.size());
   for (std::size_t k = 0; k < checks.size(); ++k) checks[k].force_n = table.rows[k].force_n;
 
-  const auto reference =
-      find_reference(bench, unseen, plan, settings.reference_error * settings.error);
+  result.reference.allowed_error = settings.reference_error * settings.error;
   for (std::size_t i = 0; i < unseen.size(); ++i) {
-    const auto full = bench.press(unseen[i], plan, reference.decisions());
+    const auto full = reference_press(bench, unseen[i], plan, ranges, result.reference);
+    if (!full) continue;
     const auto chosen = [&](const step::TickDecisions& most) {
       control::DepthChooser chooser(table, 1);
       const auto course = bench.press(unseen[i], plan, [&](std::span<const double> forces) {
         return chooser.choose(most, forces);
       });
-      return RangeErrors(course, full, ranges);
+      return RangeErrors(course, *full, ranges);
     };
     const auto frozen = chosen(frozen_with(step::kMaxNodeLimit)), graded = chosen(graded_with(3));
     for (auto& c : checks) {
@@ -251,7 +281,7 @@ std::vector<Check> check(const organ::Organ& organ, const organ::DepthTable& tab
     c.frozen_mean /= f;
     c.frozen_nodes /= f;
   }
-  return checks;
+  return result;
 }
 
 std::string to_csv(const Calibration& calibration) {

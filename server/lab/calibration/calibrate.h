@@ -9,6 +9,7 @@
 #include <functional>
 #include <string>
 
+#include "server/lab/calibration/converged.h"
 #include "server/lab/calibration/press.h"
 #include "server/organs/organ/depth_table.h"
 
@@ -16,7 +17,7 @@ namespace trocar::calibration {
 
 struct Settings {
   double error = 0.03;  // asked of the contact force: mean difference over mean force in a range
-  // The reference itself may err by this share of `error`.
+  // The reference itself may err by this share of `error` in each range.
   double reference_error = 0.1;
   std::size_t places = 16;
   std::uint64_t seed = 1;
@@ -42,12 +43,27 @@ struct Finding {
   std::vector<Tried> frozen, graded;
 };
 
+// All errors are against this: at each place the press in which every tick is solved to a
+// tolerance.
+struct Reference {
+  Convergence convergence;
+  // A tolerance kLooser times larger changes the force by this, measured as errors of limits are:
+  // the largest over places and ranges.
+  double own_error = 0;
+  double allowed_error = 0;
+  std::size_t places_missed = 0;  // Left out, because some tick did not reach its tolerance.
+
+  bool is_converged() const {
+    return convergence.is_reached() && places_missed == 0 && own_error <= allowed_error;
+  }
+};
+
 struct Calibration {
   organ::DepthTable table;
   std::vector<Finding> findings;
-  std::size_t places_left_out = 0;  // where the tip could not press
+  std::size_t places_left_out = 0;  // where the tip could not press, or the reference missed
   std::uint64_t ticks = 0;          // simulated, all presses together
-  Reference reference;              // what all errors are against
+  Reference reference;
 };
 
 // done and all: places. Called after each.
@@ -65,9 +81,12 @@ struct Check {
   double graded_mean = 0, graded_largest = 0;
   double frozen_nodes = 0, graded_nodes = 0;  // in the queue, mean
 };
-std::vector<Check> check(const organ::Organ& organ, const organ::DepthTable& table,
-                         const Settings& settings, std::size_t places,
-                         const Progress& progress = {});
+struct Checks {
+  std::vector<Check> ranges;
+  Reference reference;
+};
+Checks check(const organ::Organ& organ, const organ::DepthTable& table, const Settings& settings,
+             std::size_t places, const Progress& progress = {});
 
 std::string to_csv(const Calibration& calibration);
 

@@ -14,18 +14,16 @@ constexpr double kStart_m = 0.001;
 
 }  // namespace
 
-step::TickDecisions full_decisions(std::uint32_t sweeps) {
-  return {.depth_limit = step::kMaxDepthLimit,
-          .node_limit = step::kMaxNodeLimit,
-          .sweeps = sweeps,
-          .boundary = world::Boundary::Graded};
-}
-
 PressBench::PressBench(const organ::Organ& organ, unsigned workers) : simulation_(organ, workers) {
   simulation_.write_snapshot(rest_);
 }
 
 PressCourse PressBench::press(const Place& place, const PressPlan& plan, const Decide& decide) {
+  return run(place, plan, decide, [](const step::TickReport&, const Vec3d&) {});
+}
+
+PressCourse PressBench::run(const Place& place, const PressPlan& plan, const Decide& decide,
+                            const Observe& observe) {
   const auto restored = simulation_.restore_snapshot(rest_);
   TROCAR_ASSERT(restored.ok());
   const auto moving = static_cast<Tick>(
@@ -49,8 +47,10 @@ PressCourse PressBench::press(const Place& place, const PressPlan& plan, const D
     const Vec3f tip =
         place.position + place.outward * out + sideways * (static_cast<float>(plan.slant * way));
     inputs.samples.push_back({tool_slot({0}, 0), {{tip, orientation}, tool::Verb::Push}});
-    const auto& report = simulation_.tick(inputs, decide(forces));
+    const auto decisions = decide(forces);
+    const auto& report = simulation_.tick(inputs, decisions);
     inputs.clear();
+    course.convergence.note(report, decisions);
     simulation_.pop_frame();
     control::read_forces(simulation_, forces);
     const auto& context = simulation_.context();
@@ -58,6 +58,7 @@ PressCourse PressBench::press(const Place& place, const PressPlan& plan, const D
     for (const auto& tool : context.contacts.tools)
       force += to_double(
           contact::reaction_on(context.contacts, tool, simulation_.state().world).force_n);
+    observe(report, force);
     course.forces_n.push_back(force);
     course.queue_nodes.push_back(report.queue_nodes);
     course.queue_depths.push_back(
@@ -72,29 +73,15 @@ PressCourse PressBench::press(const Place& place, const PressPlan& plan,
   return press(place, plan, [&](std::span<const double>) { return decisions; });
 }
 
-double force_difference(const PressCourse& a, const PressCourse& b) {
-  double most = 0, largest = 0;
-  for (std::size_t i = 0; i < b.forces_n.size(); ++i) {
-    most = std::max(most, length(a.forces_n[i] - b.forces_n[i]));
-    largest = std::max(largest, length(b.forces_n[i]));
-  }
-  return largest > 0 ? most / largest : std::nan("");
-}
-
-Reference find_reference(PressBench& bench, std::span<const Place> places, const PressPlan& plan,
-                         double tolerance) {
-  Reference reference{.own_error = std::nan(""), .tolerance = tolerance};
-  for (const auto& place : places) {
-    auto half = bench.press(place, plan, full_decisions(kFullSweeps / 2));
-    for (reference.sweeps = kFullSweeps;; reference.sweeps *= 2) {
-      auto course = bench.press(place, plan, reference.decisions());
-      reference.own_error = force_difference(half, course);
-      if (!(reference.own_error > tolerance) || 2 * reference.sweeps > step::kMaxSweeps) break;
-      half = std::move(course);
-    }
-    if (!std::isnan(reference.own_error)) break;
-  }
-  return reference;
+Pilot PressBench::pilot(const Place& place, const PressPlan& plan) {
+  Pilot pilot;
+  Tick tick = 0;
+  run(
+      place, plan, [&](std::span<const double>) { return Pilot::decisions(++tick); },
+      [&](const step::TickReport& report, const Vec3d& force_n) {
+        pilot.note(report, length(force_n));
+      });
+  return pilot;
 }
 
 }  // namespace trocar::calibration

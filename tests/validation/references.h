@@ -1,0 +1,17 @@
+#pragma once
+
+// What a reference that is solved tick by tick has to show before anything is judged by it.
+
+#include <string>
+
+#include "server/lab/calibration/converged.h"
+#include "tests/validation/report.h"
+
+namespace trocar::validation {
+
+// Two checks: that every tick reached its tolerance, and that a tolerance kLooser times larger
+// changes the contact force by no more than the bound; own_error is this change.
+void check_reference(Section& section, const std::string& name,
+                     const calibration::Convergence& convergence, double own_error, Bound bound);
+
+}  // namespace trocar::validation
