@@ -47,7 +47,7 @@ void expect_golden(const Golden& golden) {
 }
 
 bool is_touched(const Simulation&, const TickReport& report) {
-  return report.contact_nodes > 0;
+  return report.contact.nodes > 0;
 }
 
 Golden two_hands(const organ::Organ& organ, std::uint64_t hash,
@@ -126,7 +126,7 @@ TEST(Golden, MeasuredExponential) {
 TEST(Golden, BuiltInMeasuredLiver) {
   auto golden = two_hands(*catalogue::make_measured_liver(3000), 14750543675996595141u);
   golden.has_happened = [](const Simulation& simulation, const TickReport& report) {
-    return report.contact_nodes > 0 && !simulation.state().world.relaxation.is_empty();
+    return report.contact.nodes > 0 && !simulation.state().world.relaxation.is_empty();
   };
   expect_golden(golden);
 }

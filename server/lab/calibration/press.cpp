@@ -55,13 +55,13 @@ PressCourse PressBench::press(const Place& place, const PressPlan& plan, const D
     control::read_forces(simulation_, forces);
     const auto& context = simulation_.context();
     Vec3d force;
-    for (const auto& tool : context.contacts.tools)
+    for (const auto& tool : context.contact.found.tools)
       force += to_double(
-          contact::reaction_on(context.contacts, tool, simulation_.state().world).force_n);
+          contact::reaction_on(context.contact.found, tool, simulation_.state().world).force_n);
     course.forces_n.push_back(force);
-    course.queue_nodes.push_back(report.queue_nodes);
+    course.queue_nodes.push_back(report.near.queue_nodes);
     course.queue_depths.push_back(
-        static_cast<std::uint32_t>(std::max<std::size_t>(1, context.queue.layer_count()) - 1));
+        static_cast<std::uint32_t>(std::max<std::size_t>(1, context.near.queue.layer_count()) - 1));
     ++ticks_;
   }
   return course;
