@@ -5,6 +5,7 @@
 
 #include "common/base/log.h"
 #include "common/base/version.h"
+#include "common/wire/figure_messages.h"
 #include "common/wire/surface_codec.h"
 #include "common/wire/surface_messages.h"
 #include "common/wire/tool_shape.h"
@@ -60,74 +61,6 @@ bool expand_regions(const proto::FrameState& message, std::vector<std::uint16_t>
   std::fill(regions.begin() + static_cast<std::ptrdiff_t>(at), regions.end(), std::uint16_t{0});
   return true;
 }
-
-// False if a number in it cannot be.
-bool read_rate(const proto::FrameState& message, RateFigures& figures) {
-  figures = {};
-  if (!message.has_rate()) return true;  // a server before 1.2
-  const proto::RateState& rate = message.rate();
-  const auto is_sane = [](float value) { return std::isfinite(value) && value >= 0; };
-  if (!is_sane(rate.budget_us()) || !is_sane(rate.predicted_us()) || !is_sane(rate.time_rate()) ||
-      rate.layer_sweeps_size() > static_cast<int>(kMaxSweepLayers))
-    return false;
-  switch (rate.level()) {
-    case proto::RATE_FULL:
-      figures.level = RateLevel::Full;
-      break;
-    case proto::RATE_REDUCED:
-      figures.level = RateLevel::Reduced;
-      break;
-    case proto::RATE_OVERLOADED:
-      figures.level = RateLevel::Overloaded;
-      break;
-    default:  // a newer server's, of which nothing is known
-      break;
-  }
-  figures.layer_sweeps.assign(rate.layer_sweeps().begin(), rate.layer_sweeps().end());
-  figures.node_limit = rate.node_limit();
-  figures.budget_us = rate.budget_us();
-  figures.predicted_us = rate.predicted_us();
-  figures.lowered = rate.lowered();
-  figures.raised = rate.raised();
-  figures.time_rate = rate.time_rate();
-  return true;
-}
-
-// False if a number in it is not finite.
-bool read_relaxation(const proto::FrameState& message, std::optional<RelaxationFigures>& figures) {
-  figures.reset();
-  if (!message.has_relaxation()) return true;  // a server before 1.5, or nothing relaxes
-  const proto::RelaxationState& r = message.relaxation();
-  if (!std::isfinite(r.energy_j()) || !std::isfinite(r.volume_change()) ||
-      !std::isfinite(r.relaxed_share()))
-    return false;
-  figures = {r.energy_j(), r.volume_change(), r.relaxed_share()};
-  return true;
-}
-
-// False if a number in it cannot be.
-bool read_solver(const proto::FrameState& message, std::optional<SolverFigures>& figures) {
-  figures.reset();
-  if (!message.has_solver()) return true;  // a server before 1.6, or there is no reduction
-  const proto::SolverState& s = message.solver();
-  const auto is_sane = [](float value) { return std::isfinite(value) && value >= 0; };
-  if (!is_sane(s.estimate()) || !is_sane(s.largest_node_force_n())) return false;
-  // A newer server may give a reason that is not known here.
-  const bool is_known = s.reason() > 0 && s.reason() <= proto::SOLVER_PREPARING;
-  auto& read = figures.emplace();
-  read.is_reduced = s.is_reduced();
-  if (s.patch_size() > static_cast<int>(read.patches.size())) return false;
-  for (const auto patch : s.patch()) read.patches[read.patch_count++] = patch;
-  if (is_known) read.reason = static_cast<SolverReason>(s.reason());
-  read.estimate = s.estimate();
-  read.largest_node_force_n = s.largest_node_force_n();
-  return true;
-}
-
-static_assert(static_cast<int>(GhostStatus::None) == proto::GHOST_NONE &&
-              static_cast<int>(GhostStatus::Behind) == proto::GHOST_BEHIND);
-static_assert(static_cast<int>(SolverReason::Idle) == proto::SOLVER_IDLE &&
-              static_cast<int>(SolverReason::Preparing) == proto::SOLVER_PREPARING);
 
 }  // namespace
 
@@ -412,25 +345,9 @@ void Replica::apply_state(const proto::FrameState& message) {
   frame.regions.resize(topology_.rest_positions.size());
   if (!expand_regions(message, frame.regions))
     return fail("FrameState.region_runs: runs exceed the surface");
-  frame.figures.active_nodes = message.active_nodes();
-  frame.figures.queue_nodes = message.queue_nodes();
-  frame.figures.region_count = message.region_count();
-  frame.figures.sweeps = message.sweeps();
-  frame.figures.far_sweeps = message.far_sweeps();
-  frame.figures.far_interval = std::max(1u, message.far_interval());
-  frame.figures.residual_n = message.residual_n();
-  frame.figures.tick_median_us = message.tick_cpu_us();
-  frame.figures.tick_p99_us = message.tick_cpu_p99_us();
-  frame.figures.stage_median_us.assign(message.stage_cpu_us().begin(),
-                                       message.stage_cpu_us().end());
-  frame.figures.slow_ticks = message.slow_ticks();
-  frame.figures.state_hash = message.state_hash();
-  if (!read_relaxation(message, frame.figures.relaxation))
-    return fail("FrameState.relaxation: a number is not finite");
-  if (!read_solver(message, frame.figures.solver))
-    return fail("FrameState.solver: a number is negative or not finite");
-  if (!read_rate(message, frame.figures.rate))
-    return fail("FrameState.rate: a time is negative or not finite, or there are over 16 layers");
+  auto figures = wire::read(message);
+  if (!figures) return fail(figures.error().message);
+  frame.figures = *figures;
   frame.has_state = true;
 }
 
@@ -454,7 +371,7 @@ void Replica::apply_claim(const proto::ClaimEvent& message, std::uint64_t arriva
   notice.tick = message.tick();
   notice.tool.value = static_cast<std::uint8_t>(message.tool());
   notice.verb = to_verb(message.verb());
-  if (message.outcome() >= 0 && message.outcome() <= 6)
+  if (message.outcome() >= 0 && message.outcome() < wire::kClaimOutcomes)
     notice.outcome = static_cast<ClaimOutcome>(message.outcome());
   notice.text = message.text();
   notice.arrival_ns = arrival_ns;
@@ -486,7 +403,7 @@ void Replica::apply_recording(const proto::RecordingState& message) {
 }
 
 void Replica::apply_ghost(const proto::GhostFrame& message) {
-  const bool is_known = message.status() >= 0 && message.status() <= proto::GHOST_BEHIND;
+  const bool is_known = message.status() >= 0 && message.status() < wire::kGhostStatuses;
   ghost_.status = is_known ? static_cast<GhostStatus>(message.status()) : GhostStatus::Unknown;
   ghost_.offsets.clear();
   if (ghost_.status != GhostStatus::Follows) return;

@@ -57,7 +57,7 @@ struct HudModel {
   std::string organ;     // "liver, 1,553 surface vertices"
   std::string own_role;  // "surgeon", "instructor, watching", "replay"
   std::string status;    // empty when live; else what it waits for, in the middle of the screen
-  replica::FrameFigures figures;
+  wire::FrameFigures figures;
   double session_seconds = 0, round_trip_ms = 0;
   double pictures_per_second = 0, frames_per_second = 0, bytes_per_second = 0;
   std::string sync_text;  // "in step, CRC 1a2b3c4d"

@@ -39,36 +39,37 @@ ImVec4 colour_of(RateTone tone) {
   return tone == RateTone::Calm ? kGood : tone == RateTone::Notice ? kNotice : kTrouble;
 }
 
-std::string far_sweeps(const replica::FrameFigures& figures) {
-  if (figures.solver && figures.solver->is_reduced) return "by the patch";
-  if (figures.far_sweeps == 0) return "rest";
-  if (figures.far_interval > 1)
-    return format("%u in %u ticks", figures.far_sweeps, figures.far_interval);
-  return std::to_string(figures.far_sweeps);
+std::string far_sweeps(const wire::SolveFigures& solve) {
+  if (solve.is_reduced()) return "by the patch";
+  if (solve.far_sweeps == 0) return "rest";
+  if (solve.far_interval > 1) return format("%u in %u ticks", solve.far_sweeps, solve.far_interval);
+  return std::to_string(solve.far_sweeps);
 }
 
 void rate_rows(const HudModel& model) {
-  const replica::RateFigures& rate = model.figures.rate;
-  const RateText text = describe(rate);
+  const wire::FrameFigures& figures = model.figures;
+  const wire::RateFigures& rate = figures.pace.rate;
+  const RateText text = describe(figures);
   ImGui::TableNextRow();
   ImGui::TableNextColumn();
   ImGui::TextDisabled("detail");
   ImGui::TableNextColumn();
-  if (rate.level == replica::RateLevel::Fixed)
+  if (rate.level == wire::RateLevel::Fixed)
     ImGui::TextUnformatted(text.level.c_str());
   else
     ImGui::TextColored(colour_of(text.tone), "%s", text.level.c_str());
   if (!model.shows_rate) return;
-  if (!text.sweeps.empty()) row("sweeps", text.sweeps + "; others " + far_sweeps(model.figures));
-  if (rate.node_limit > 0) row("queue limit", with_thousands(rate.node_limit) + " nodes");
+  if (!text.sweeps.empty()) row("sweeps", text.sweeps + "; others " + far_sweeps(figures.solve));
+  if (figures.near.node_limit > 0)
+    row("queue limit", with_thousands(figures.near.node_limit) + " nodes");
   if (!text.load.empty()) row("next tick", text.load + " allowed");
   if (!text.changes.empty()) row("changes", text.changes);
   row("time", format("%.0f %% of real time", 100 * static_cast<double>(rate.time_rate)));
 }
 
 void solver_rows(const HudModel& model) {
-  if (!model.figures.solver) return;
-  const SolverText text = describe(*model.figures.solver);
+  if (!model.figures.solve.solver) return;
+  const SolverText text = describe(*model.figures.solve.solver);
   ImGui::TableNextRow();
   ImGui::TableNextColumn();
   ImGui::TextDisabled("solver");
@@ -106,23 +107,22 @@ void draw_session_panel(const HudModel& model, float scale) {
   if (ImGui::BeginTable("figures", 2, ImGuiTableFlags_SizingFixedFit)) {
     const auto& f = model.figures;
     row("session time", clock_text(model.session_seconds));
-    row("tick", format("%.0f us median, %.0f us p99", f.tick_median_us, f.tick_p99_us));
-    row("slow ticks", with_thousands(f.slow_ticks));
-    row("active nodes", format("%s, queue %s", with_thousands(f.active_nodes).c_str(),
-                               with_thousands(f.queue_nodes).c_str()));
+    row("tick", format("%.0f us median, %.0f us p99", f.pace.tick_median_us, f.pace.tick_p99_us));
+    row("slow ticks", with_thousands(f.pace.slow_ticks));
+    row("active nodes", format("%s, queue %s", with_thousands(f.near.active_nodes).c_str(),
+                               with_thousands(f.near.queue_nodes).c_str()));
     // With the controller's decisions open, its line says more.
-    if (!model.shows_rate || f.rate.layer_sweeps.empty())
-      row("sweeps", format("%u, all other nodes %s", f.sweeps, far_sweeps(f).c_str()));
+    if (!model.shows_rate || f.solve.layer_sweeps[0] == 0)
+      row("sweeps", format("%u, all other nodes %s", f.solve.sweeps, far_sweeps(f.solve).c_str()));
     rate_rows(model);
     solver_rows(model);
     if (!model.ghost_text.empty()) row("ghost", model.ghost_text);
-    row("residual", format("%.2g mN", static_cast<double>(f.residual_n) * 1e3));
-    row("regions", std::to_string(f.region_count));
+    row("residual", format("%.2g mN", static_cast<double>(f.solve.residual_n) * 1e3));
+    row("regions", std::to_string(f.near.region_count));
     if (f.relaxation) {
       row("elastic energy", format("%.3g mJ", f.relaxation->energy_j * 1e3));
-      row("volume", format("%+.3f %%", 100 * static_cast<double>(f.relaxation->volume_change)));
-      row("relaxed",
-          format("%.0f %% of the stress", 100 * static_cast<double>(f.relaxation->relaxed_share)));
+      row("volume", format("%+.3f %%", 100 * f.relaxation->volume_change));
+      row("relaxed", format("%.0f %% of the stress", 100 * f.relaxation->relaxed_share));
     }
     if (!model.timeline) row("round trip", format("%.1f ms", model.round_trip_ms));
     row("stream", format("%.1f frames/s, %s", model.frames_per_second,
@@ -141,7 +141,7 @@ void draw_session_panel(const HudModel& model, float scale) {
 void draw_slow_time(const HudModel& model, float scale) {
   // A recording plays at its own speed, however slow the session was.
   if (model.timeline || !model.status.empty()) return;
-  const RateText text = describe(model.figures.rate);
+  const RateText text = describe(model.figures);
   if (text.banner.empty()) return;
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
   ImGui::SetNextWindowPos({screen.x / 2, kMargin * scale}, 0, {0.5f, 0});
@@ -278,7 +278,7 @@ void draw_help(const HudModel& model, float scale) {
     help_row("A", model.shows_arrows ? "hide force arrows" : "show force arrows");
     help_row("R",
              model.shows_rate ? "hide what the server decides" : "show what the server decides");
-    if (model.figures.solver && !model.timeline)
+    if (model.figures.solve.solver && !model.timeline)
       help_row("G", model.ghost_text.empty() ? "show the full solution: a net, yellow where it is "
                                                "0.25 mm off, red from 1 mm on"
                                              : "hide the full solution");

@@ -10,8 +10,8 @@ std::string whole(float value) {
   return with_thousands(static_cast<std::uint64_t>(std::lround(std::min(value, 1e9f))));
 }
 
-std::string sweeps_text(const std::vector<std::uint32_t>& sweeps) {
-  if (sweeps.empty()) return {};
+std::string sweeps_text(const wire::LayerCounts& sweeps) {
+  if (sweeps.front() == 0) return {};
   std::string text = std::to_string(sweeps.front()) + " at the tools";
   for (std::size_t i = 1; i < sweeps.size(); ++i)
     text += (i == 1 ? ", then " : ", ") + std::to_string(sweeps[i]);
@@ -27,28 +27,29 @@ std::string with_thousands(std::uint64_t value) {
   return text;
 }
 
-RateText describe(const replica::RateFigures& rate) {
+RateText describe(const wire::FrameFigures& figures) {
+  const auto& rate = figures.pace.rate;
   RateText text;
   switch (rate.level) {
-    case replica::RateLevel::Fixed:
+    case wire::RateLevel::Fixed:
       text.level = "fixed detail";
       break;
-    case replica::RateLevel::Full:
+    case wire::RateLevel::Full:
       text.level = "full detail";
       break;
-    case replica::RateLevel::Reduced:
+    case wire::RateLevel::Reduced:
       text.level = "less detail, to keep pace";
       text.tone = RateTone::Notice;
       break;
-    case replica::RateLevel::Overloaded:
+    case wire::RateLevel::Overloaded:
       text.level = "least detail, and still too slow";
       text.tone = RateTone::Warning;
       break;
   }
-  text.sweeps = sweeps_text(rate.layer_sweeps);
+  text.sweeps = sweeps_text(figures.solve.layer_sweeps);
   if (rate.budget_us > 0)
     text.load = whole(rate.predicted_us) + " of " + whole(rate.budget_us) + " us";
-  if (rate.level != replica::RateLevel::Fixed)
+  if (rate.level != wire::RateLevel::Fixed)
     text.changes = with_thousands(rate.lowered) + " down, " + with_thousands(rate.raised) + " up";
   if (rate.time_rate < kSlowTimeRate)
     text.banner = "Slow motion: " + whole(100 * rate.time_rate) + " % of real speed";

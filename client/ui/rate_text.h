@@ -5,7 +5,7 @@
 
 #include <string>
 
-#include "client/replica/session_view.h"
+#include "common/wire/figures.h"
 
 namespace trocar::ui {
 
@@ -21,7 +21,7 @@ struct RateText {
   std::string banner;              // empty unless time is slowed: one line, for a banner
   RateTone tone = RateTone::Calm;  // of the level
 };
-RateText describe(const replica::RateFigures& rate);
+RateText describe(const wire::FrameFigures& figures);
 
 // "1,553"
 std::string with_thousands(std::uint64_t value);

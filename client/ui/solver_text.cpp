@@ -5,27 +5,27 @@
 namespace trocar::ui {
 namespace {
 
-const char* words_of(replica::SolverReason reason) {
+const char* words_of(wire::SolverReason reason) {
   switch (reason) {
-    case replica::SolverReason::Unknown:
+    case wire::SolverReason::None:
       return "";
-    case replica::SolverReason::Idle:
+    case wire::SolverReason::Idle:
       return "nothing touched yet";
-    case replica::SolverReason::Fits:
+    case wire::SolverReason::Fits:
       return "within a patch";
-    case replica::SolverReason::Frozen:
+    case wire::SolverReason::Frozen:
       return "far tissue is frozen";
-    case replica::SolverReason::Outside:
+    case wire::SolverReason::Outside:
       return "not within patches";
-    case replica::SolverReason::Force:
+    case wire::SolverReason::Force:
       return "more force than trained";
-    case replica::SolverReason::Cut:
+    case wire::SolverReason::Cut:
       return "tissue was cut";
-    case replica::SolverReason::Error:
+    case wire::SolverReason::Error:
       return "error too large";
-    case replica::SolverReason::Off:
+    case wire::SolverReason::Off:
       return "switched off";
-    case replica::SolverReason::Preparing:
+    case wire::SolverReason::Preparing:
       return "patches are being made ready";
   }
   return "";
@@ -43,13 +43,11 @@ std::string error_text(float estimate) {
 
 }  // namespace
 
-SolverText describe(const replica::SolverFigures& solver) {
+SolverText describe(const wire::SolverFigures& solver) {
   SolverText text;
   text.is_reduced = solver.is_reduced;
   if (solver.is_reduced) {
-    text.state = solver.patch_count == 1 ? "reduced, patch " : "reduced, patches ";
-    for (std::uint32_t i = 0; i < solver.patch_count; ++i)
-      text.state += (i > 0 ? " + " : "") + std::to_string(solver.patches[i]);
+    text.state = "reduced, " + wire::name_of(solver.patches);
     text.error = error_text(solver.estimate);
     return text;
   }

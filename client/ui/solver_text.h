@@ -14,7 +14,7 @@ struct SolverText {
   std::string error;  // "7 % in energy", of which a force errs by less; empty: no patch acts
   bool is_reduced = false;
 };
-SolverText describe(const replica::SolverFigures& solver);
+SolverText describe(const wire::SolverFigures& solver);
 // Describes the full solution beside it: "at most 0.21 mm away, rms 0.03 mm", or why there is none.
 std::string describe(const replica::Ghost& ghost, bool is_replay);
 

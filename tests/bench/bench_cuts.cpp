@@ -84,7 +84,7 @@ void run(organ::Organ organ, const Options& options) {
     tick_us.push_back(all);
     contacts_us.push_back(report.stage_cpu_ns[static_cast<std::size_t>(step::Stage::Contacts)] *
                           1e-3);
-    most_pairs = std::max(most_pairs, report.self_pairs);
+    most_pairs = std::max(most_pairs, report.contact.self_pairs);
     all_cut_us += us;
     if (report.cut.splits > 0 || report.cut.opened_area_m2 > 0) cut_us.push_back(us);
     area_m2 += report.cut.opened_area_m2;

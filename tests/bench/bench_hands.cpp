@@ -93,7 +93,7 @@ struct Sample {
   bool is_compared = false;
   double median_us = 0;
   std::size_t fast_ticks = 0, ticks = 0;
-  step::RateLevel level = step::RateLevel::Fixed;
+  wire::RateLevel level = wire::RateLevel::Fixed;
   step::LayerCounts sweeps{};
   std::uint32_t node_limit = 0, depth_limit = 0, queue_nodes = 0;
   bool is_good() const { return is_compared && mean <= kMeanLimit && peak <= kPeakLimit; }
@@ -109,7 +109,7 @@ double percentile(std::vector<double> values, double share) {
 
 std::array<Vec3d, kMaxTools> forces_of(const step::Simulation& simulation) {
   std::array<Vec3d, kMaxTools> forces{};
-  const auto& contacts = simulation.context().contacts;
+  const auto& contacts = simulation.context().contact.found;
   for (const auto& tool : contacts.tools)
     forces[tool.tool.value] =
         to_double(contact::reaction_on(contacts, tool, simulation.state().world).force_n);
@@ -146,7 +146,7 @@ class Session {
           options.is_frozen ? step::kFrozenDepthLimit : step::TickDecisions{}.depth_limit;
     control::RateLimits limits{.highest = decisions_, .budget_us = options.budget_ms * 1e3};
     if (!options.is_frozen) {
-      limits.layer_sweeps = simulation_.context().far_plan.sweeps;
+      limits.layer_sweeps = simulation_.context().solve.far_plan.sweeps;
       limits.far_interval = control::kLongestFarInterval;
     }
     if (!options.is_fixed) controller_.emplace(limits);
@@ -242,15 +242,15 @@ void Session::one_tick() {
     if (report.stage_cpu_ns[s] > 0) stages_[s].push_back(1e-3 * report.stage_cpu_ns[s]);
   totals_.push_back(static_cast<double>(cpu_ns) * 1e-3);
   second_totals_.push_back(totals_.back());
-  queue_.push_back(report.queue_nodes);
-  active_.push_back(report.active_nodes);
-  sweeps_.push_back(static_cast<double>(report.node_sweeps));
+  queue_.push_back(report.near.queue_nodes);
+  active_.push_back(report.near.active_nodes);
+  sweeps_.push_back(static_cast<double>(report.solve.node_sweeps));
   faults_ |= report.faults;
   now_.sweeps = step::sweeps_of_layers(decisions);
   now_.node_limit = decisions.node_limit;
   now_.depth_limit = decisions.depth_limit;
-  now_.queue_nodes = report.queue_nodes;
-  now_.level = controller_ ? controller_->figures().level : step::RateLevel::Fixed;
+  now_.queue_nodes = report.near.queue_nodes;
+  now_.level = controller_ ? controller_->figures().level : wire::RateLevel::Fixed;
   ++levels_[static_cast<std::size_t>(now_.level)];
 }
 
@@ -278,9 +278,9 @@ void Session::follow_reference(Tick tick) {
              loose =
                  calibration::converged_decisions(pilot_.tolerance_n(nodes, calibration::kLooser));
   convergence_.note(reference_->tick(inputs_, tight), tight);
-  reference_->take_frame();
+  reference_->pop_frame();
   checker_->tick(inputs_, loose);
-  checker_->take_frame();
+  checker_->pop_frame();
   if (tick % kTicksPerSecond != 0) return;
   const auto expected = forces_of(*reference_);
   const auto off = difference_of(forces_of(simulation_), expected),
@@ -326,7 +326,7 @@ void Session::print() const {
   line("active nodes", active_, "%12.0f %10.0f");
   line("node sweeps", sweeps_, "%12.0f %10.0f");
   for (std::size_t s = 0; s < stages_.size(); ++s)
-    line((std::string(step::name_of(static_cast<step::Stage>(s))) + ", us").c_str(), stages_[s],
+    line((std::string(wire::name_of(static_cast<step::Stage>(s))) + ", us").c_str(), stages_[s],
          "%12.1f %10.1f");
   line("whole tick, CPU of its thread, us", totals_, "%12.1f %10.1f");
   line("whole tick, wall, us", wall_, "%12.1f %10.1f");
@@ -382,7 +382,7 @@ void Session::write_csv(const std::string& path) const {
     std::fprintf(file, "%g,%.1f,%zu,%.4f,%.4f,%.4f,%u,%u,%u,%u,%u,%u,%u,%s\n", s.second,
                  s.median_us, s.fast_ticks, 100 * s.mean, 100 * s.peak, s.force_n, s.sweeps[0],
                  s.sweeps[1], s.sweeps[2], s.sweeps[3], s.depth_limit, s.node_limit, s.queue_nodes,
-                 step::name_of(s.level));
+                 wire::name_of(s.level));
   std::fclose(file);
 }
 

@@ -84,8 +84,8 @@ int run(const char* title, material::ElasticLaw law, const step::TickDecisions& 
       if (report.stage_cpu_ns[s] > 0) stages[s].push_back(report.stage_cpu_ns[s]);
     }
     totals.push_back(total);
-    active += report.active_nodes;
-    queued += report.queue_nodes;
+    active += report.near.active_nodes;
+    queued += report.near.queue_nodes;
   }
   const auto& organ = simulation.organ();
   std::printf(
@@ -95,7 +95,7 @@ int run(const char* title, material::ElasticLaw law, const step::TickDecisions& 
       static_cast<double>(active) / static_cast<double>(totals.size()));
   std::printf("thread CPU time per tick, us %22s %10s\n", "median", "p99");
   for (std::size_t s = 0; s < stages.size(); ++s)
-    std::printf("  %-36s %14.1f %10.1f\n", step::name_of(static_cast<step::Stage>(s)),
+    std::printf("  %-36s %14.1f %10.1f\n", wire::name_of(static_cast<step::Stage>(s)),
                 static_cast<double>(percentile(stages[s], 0.5)),
                 static_cast<double>(percentile(stages[s], 0.99)));
   std::printf("  %-36s %14.1f %10.1f\n", "whole tick", static_cast<double>(percentile(totals, 0.5)),

@@ -83,7 +83,8 @@ std::size_t OurSession::state_bytes() const {
 }
 
 TickCounts OurSession::counts() const {
-  return {report_.queue_nodes, report_.active_nodes, report_.contact_nodes, report_.faults};
+  return {report_.near.queue_nodes, report_.near.active_nodes, report_.contact.nodes,
+          report_.faults};
 }
 
 }  // namespace trocar::bench

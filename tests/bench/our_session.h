@@ -61,7 +61,7 @@ class OurSession {
   std::span<const Vec3f> displacements() const { return simulation_.state().world.displacements; }
   std::uint64_t state_hash() const { return simulation_.state_hash(); }
   std::size_t state_bytes() const;  // of a snapshot: what a later tick depends on
-  std::uint32_t far_sweeps() const { return report_.far_sweeps; }  // of the last tick
+  std::uint32_t far_sweeps() const { return report_.solve.figures.far_sweeps; }  // of the last tick
 
  private:
   void sample_tools();

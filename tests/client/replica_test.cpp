@@ -214,15 +214,15 @@ TEST_F(ReplicaTest, ToolSamplesCarryPoseAndVerb) {
 
 TEST_F(ReplicaTest, WhatTheRateControllerDecidedIsKept) {
   start();
-  RateFigures expected;
-  expected.level = RateLevel::Reduced;
-  expected.layer_sweeps = {4, 3, 2, 1};
-  expected.node_limit = 1050;
+  wire::RateFigures expected;
+  expected.level = wire::RateLevel::Reduced;
   expected.budget_us = 800;
   expected.predicted_us = 742;
   expected.lowered = 12;
   expected.raised = 7;
-  EXPECT_EQ(replica_.newest()->figures.rate, expected);
+  EXPECT_EQ(replica_.newest()->figures.pace.rate, expected);
+  EXPECT_EQ(replica_.newest()->figures.solve.layer_sweeps, (wire::LayerCounts{4, 3, 2, 1}));
+  EXPECT_EQ(replica_.newest()->figures.near.node_limit, 1050u);
 
   // A level of a newer server is as if nothing were known of it; the rest counts.
   source_.tamper = [](proto::Envelope& m) {
@@ -231,15 +231,15 @@ TEST_F(ReplicaTest, WhatTheRateControllerDecidedIsKept) {
     return true;
   };
   advance(1);
-  expected.level = RateLevel::Fixed;
-  EXPECT_EQ(replica_.newest()->figures.rate, expected);
+  expected.level = wire::RateLevel::Fixed;
+  EXPECT_EQ(replica_.newest()->figures.pace.rate, expected);
 
   source_.tamper = [](proto::Envelope& m) {
     if (m.has_frame_state()) m.mutable_frame_state()->clear_rate();
     return true;
   };
   advance(1);
-  EXPECT_EQ(replica_.newest()->figures.rate, RateFigures{});  // a server before 1.2
+  EXPECT_EQ(replica_.newest()->figures.pace.rate, wire::RateFigures{});  // a server before 1.2
   EXPECT_TRUE(replica_.fault().ok());
 }
 
@@ -255,7 +255,8 @@ TEST_F(ReplicaTest, WhatHasRelaxedIsKept) {
     return true;
   };
   advance(1);
-  EXPECT_EQ(replica_.newest()->figures.relaxation, (RelaxationFigures{0.0125, -0.002f, 0.4f}));
+  EXPECT_EQ(replica_.newest()->figures.relaxation,
+            (wire::RelaxationFigures{0.0125, -0.002f, 0.4f}));
   source_.tamper = nullptr;
   advance(1);
   EXPECT_FALSE(replica_.newest()->figures.relaxation);
@@ -264,7 +265,7 @@ TEST_F(ReplicaTest, WhatHasRelaxedIsKept) {
 
 TEST_F(ReplicaTest, WhichSolverActsIsKept) {
   start();
-  EXPECT_FALSE(replica_.newest()->figures.solver) << "there is no reduction";
+  EXPECT_FALSE(replica_.newest()->figures.solve.solver) << "there is no reduction";
   int reason = proto::SOLVER_FITS;
   source_.tamper = [&](proto::Envelope& m) {
     if (!m.has_frame_state()) return true;
@@ -278,18 +279,18 @@ TEST_F(ReplicaTest, WhichSolverActsIsKept) {
     return true;
   };
   advance(1);
-  EXPECT_EQ(replica_.newest()->figures.solver,
-            (SolverFigures{true, 1, {12}, SolverReason::Fits, 0.05f, 0.2f}));
+  EXPECT_EQ(replica_.newest()->figures.solve.solver,
+            (wire::SolverFigures{true, wire::SolverReason::Fits, {{11}, 1}, 0.05f, 0.2f}));
   // A reason of a newer server is as if none were given; the rest counts.
   for (const int newer : {10, 1000, -1}) {
     reason = newer;
     advance(1);
-    EXPECT_EQ(replica_.newest()->figures.solver,
-              (SolverFigures{true, 1, {12}, SolverReason::Unknown, 0.05f, 0.2f}));
+    EXPECT_EQ(replica_.newest()->figures.solve.solver,
+              (wire::SolverFigures{true, wire::SolverReason::None, {{11}, 1}, 0.05f, 0.2f}));
   }
   source_.tamper = nullptr;
   advance(1);
-  EXPECT_FALSE(replica_.newest()->figures.solver);
+  EXPECT_FALSE(replica_.newest()->figures.solve.solver);
   EXPECT_TRUE(replica_.fault().ok());
 }
 

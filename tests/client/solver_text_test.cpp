@@ -7,27 +7,27 @@
 namespace trocar::ui {
 namespace {
 
-using replica::SolverReason;
+using wire::SolverReason;
 
 TEST(SolverText, SaysWhichSolverActsAndWhy) {
-  const auto reduced = describe({true, 1, {12}, SolverReason::Fits, 0.055f, 0.1f});
+  const auto reduced = describe({true, SolverReason::Fits, {{11}, 1}, 0.055f, 0.1f});
   EXPECT_EQ(reduced.state, "reduced, patch 12");
   EXPECT_EQ(reduced.error, "5.5 % in energy");
   EXPECT_TRUE(reduced.is_reduced);
-  EXPECT_EQ(describe({true, 2, {3, 12}, SolverReason::Fits, 0, 0}).state,
+  EXPECT_EQ(describe({true, SolverReason::Fits, {{2, 11}, 2}, 0, 0}).state,
             "reduced, patches 3 + 12");
-  const auto full = describe({false, 0, {}, SolverReason::Cut, 0, 0.1f});
+  const auto full = describe({false, SolverReason::Cut, {}, 0, 0.1f});
   EXPECT_EQ(full.state, "full (tissue was cut)");
   EXPECT_EQ(full.error, "");
   EXPECT_FALSE(full.is_reduced);
-  EXPECT_EQ(describe({}).state, "full");
+  EXPECT_EQ(describe(wire::SolverFigures{}).state, "full");
   for (int reason = 1; reason <= static_cast<int>(SolverReason::Preparing); ++reason)
     EXPECT_GT(describe({.reason = static_cast<SolverReason>(reason)}).state.size(), 6u) << reason;
 }
 
 TEST(SolverText, ErrorsArePercentages) {
   const auto error = [](float estimate) {
-    return describe({true, 1, {1}, SolverReason::Fits, estimate, 0}).error;
+    return describe({true, SolverReason::Fits, {{0}, 1}, estimate, 0}).error;
   };
   EXPECT_EQ(error(0), "below 0.1 % in energy");
   EXPECT_EQ(error(0.02f), "2.0 % in energy");

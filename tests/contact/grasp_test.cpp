@@ -115,7 +115,7 @@ TEST(Grasp, TwoHandsPullOneFlapAndTheirForcesBalanceWhatHoldsIt) {
     auto displacements = scene.world().displacements;
     for (const auto node : organ.fixed_nodes)
       displacements[node.value].y += static_cast<float>(height);
-    return scene.simulation.context().solver.tissue().energy_j(displacements);
+    return scene.simulation.context().solve.solver.tissue().energy_j(displacements);
   };
   const double h = 1e-5, held = (energy_at(h) - energy_at(-h)) / (2 * h);
   EXPECT_NEAR(held, static_cast<double>(both), 0.02 * std::abs(static_cast<double>(both)));

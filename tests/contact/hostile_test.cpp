@@ -73,7 +73,7 @@ TEST_F(SecondHand, ThatChangesItsVerbEveryTickIsBoundedWork) {
   const float change = largest_change(1000, [&](int i) {
     const Verb verbs[] = {Verb::None, Verb::Push, Verb::Grasp};
     scene.put(1, upright({0.035f, top - 0.001f, 0}), verbs[i % 3]);
-    most = std::max(most, scene.simulation.context().finder.triangles_visited());
+    most = std::max(most, scene.simulation.context().contact.finder.triangles_visited());
   });
   EXPECT_LT(change, 0.02f * length(before));
   EXPECT_LE(most, 2 * organ.mesh.boundary_triangles.size());

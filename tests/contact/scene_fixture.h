@@ -67,7 +67,7 @@ class HandScene {
   }
 
   Reaction reaction(std::uint8_t hand) const {
-    const auto& contacts = simulation.context().contacts;
+    const auto& contacts = simulation.context().contact.found;
     for (const auto& tool : contacts.tools)
       if (tool.tool == tool_slot({hand}, 0))
         return reaction_on(contacts, tool, simulation.state().world);

@@ -255,7 +255,7 @@ class Squeezed {
     for (int i = 0; i < ticks; ++i) step(closed_);
   }
   Reaction reaction(std::uint8_t hand) const {
-    const auto& contacts = simulation->context().contacts;
+    const auto& contacts = simulation->context().contact.found;
     for (const auto& tool : contacts.tools)
       if (tool.tool == tool_slot({hand}, 0))
         return reaction_on(contacts, tool, simulation->state().world);
@@ -264,7 +264,7 @@ class Squeezed {
   // Returns the vertical force of the lower flap on the upper one, N.
   double force_between() const {
     double sum = 0;
-    for (const auto& point : simulation->context().contacts.self_points()) {
+    for (const auto& point : simulation->context().contact.found.self_points()) {
       const auto load = load_at(point, displacement_of(point, simulation->state().world));
       const bool is_upper = simulation->organ().mesh.rest_positions[point.nodes[0].value].y > 0;
       sum += static_cast<double>(load.gradient.y) * (is_upper ? -1 : 1);
@@ -290,7 +290,7 @@ TEST(Squeeze, TheFlapsStopAtEachOtherAndPassTheForceOn) {
                lower = static_cast<double>(squeezed.reaction(1).force_n.y),
                between = squeezed.force_between();
   std::printf("tools %.3f and %.3f N, between %.3f N, %zu points, deepest %.3f mm\n", upper, lower,
-              between, squeezed.simulation->context().contacts.self_points().size(),
+              between, squeezed.simulation->context().contact.found.self_points().size(),
               squeezed.deepest() * 1e3);
   EXPECT_GT(upper, 0.1);
   EXPECT_NEAR(-lower, upper, 0.1 * upper);

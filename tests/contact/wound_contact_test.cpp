@@ -62,7 +62,7 @@ double deepest_overlap(const step::Simulation& simulation) {
 
 double pressed_n(const HandScene& scene) {
   double sum = 0;
-  for (const auto& point : scene.simulation.context().contacts.self_points())
+  for (const auto& point : scene.simulation.context().contact.found.self_points())
     sum += static_cast<double>(load_at(point, displacement_of(point, scene.world())).pressed_n);
   return sum;
 }
@@ -124,7 +124,7 @@ TEST(Lips, PressedTogetherTheyCarryTheLoadOfTheUncutBlock) {
     deepest = deepest_overlap(scene.simulation);
     std::printf("%s: plates %.4f and %.4f N, between %.4f N, %zu pairs, deepest %.4f mm\n",
                 is_cut ? "cut" : "uncut", right, left, between,
-                scene.simulation.context().contacts.self_points().size(), 1e3 * deepest);
+                scene.simulation.context().contact.found.self_points().size(), 1e3 * deepest);
     load[is_cut ? 1 : 0] = right;
   }
   EXPECT_NEAR(load[1], load[0], 0.03 * load[0]);
@@ -192,7 +192,7 @@ TEST(Lips, ARestoredStateGoesOnBitForBit) {
     ASSERT_TRUE(two.simulation.restore_snapshot(snapshot).ok());
     restored = tick;
   }
-  EXPECT_GT(one.simulation.context().contacts.self_points().size(), 20u);
+  EXPECT_GT(one.simulation.context().contact.found.self_points().size(), 20u);
 }
 
 // One lip is drawn away, up and sideways, and let go.
@@ -264,7 +264,7 @@ TEST_F(Piece, RestsOnTheBlockByItsWeight) {
   whole.ticks(700), cut.ticks(700);
   std::printf("whole %.4f mm, cut %.4f mm, %zu pairs, pressed %.4f N, deepest %.4f mm\n",
               1e3 * moved(whole).y, 1e3 * moved(cut).y,
-              cut.simulation.context().contacts.self_points().size(), pressed_n(cut),
+              cut.simulation.context().contact.found.self_points().size(), pressed_n(cut),
               1e3 * deepest_overlap(cut.simulation));
   EXPECT_NEAR(moved(cut).y, moved(whole).y, 0.00005);
   EXPECT_LT(deepest_overlap(cut.simulation), 0.00005);

@@ -43,7 +43,7 @@ struct Pressed {
     inputs.samples.push_back(
         {tool_slot({0}, 0), {{tip, rotation_from_z({0, 1, 0})}, tool::Verb::Push}});
     simulation.tick(inputs, decisions);
-    const auto& contacts = simulation.context().contacts;
+    const auto& contacts = simulation.context().contact.found;
     force_n = contacts.tools.empty()
                   ? 0
                   : static_cast<double>(length(
@@ -89,7 +89,7 @@ TEST_P(ForceUnderControl, DoesNotStep) {
   if (GetParam().boundary == world::Boundary::Frozen) {
     limits.highest.depth_limit = step::kFrozenDepthLimit;
   } else {
-    limits.layer_sweeps = pressed.simulation.context().far_plan.sweeps;
+    limits.layer_sweeps = pressed.simulation.context().solve.far_plan.sweeps;
     limits.far_interval = kLongestFarInterval;
   }
   RateController controller(limits);
@@ -123,9 +123,9 @@ TEST_P(ForceUnderControl, DoesNotStep) {
     pressed.tick(tip, now);
     const auto& report = pressed.report();
     controller.observe(report, {work_ns(tick), 0});
-    ASSERT_GE(report.queue_nodes, report.contact_nodes);
-    ASSERT_TRUE(tick <= 1000 || report.layer_nodes[0] > 0) << tick;
-    touched = std::max(touched, report.contact_nodes);
+    ASSERT_GE(report.near.queue_nodes, report.contact.nodes);
+    ASSERT_TRUE(tick <= 1000 || report.solve.layer_nodes[0] > 0) << tick;
+    touched = std::max(touched, report.contact.nodes);
     peak = std::max(peak, pressed.force_n);
     if (changed == 0 || tick >= changed + RateController::kLowerEvery) continue;
     copy.tick(tip, before);

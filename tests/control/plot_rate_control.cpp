@@ -65,7 +65,7 @@ Status write_table(const std::filesystem::path& file, const std::vector<Row>& ro
     out << r.tick << ',' << r.time_us << ',' << r.contacts << ',' << r.sweeps[0] << ','
         << r.sweeps[1] << ',' << r.sweeps[2] << ',' << r.sweeps[3] << ',' << r.node_limit << ','
         << r.queue_nodes << ',' << r.node_sweeps << ',' << r.work_us << ',' << r.predicted_us << ','
-        << r.budget_us << ',' << r.slow_ticks << ',' << step::name_of(r.level) << '\n';
+        << r.budget_us << ',' << r.slow_ticks << ',' << wire::name_of(r.level) << '\n';
   out.close();
   if (!out) return Error{ErrorCode::ResourceMissing, file.string() + ": cannot be written"};
   return {};

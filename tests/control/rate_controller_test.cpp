@@ -13,7 +13,6 @@
 namespace trocar::control {
 namespace {
 
-using step::RateLevel;
 using testing::direction_changes;
 using testing::kept_share;
 using testing::Load;
@@ -21,6 +20,7 @@ using testing::Machine;
 using testing::roomy_limits;
 using testing::Row;
 using testing::run_virtual;
+using wire::RateLevel;
 
 const step::LayerCounts kAll{4, 4, 4, 4}, kLeast{2, 1, 1, 1};
 

@@ -87,13 +87,13 @@ TEST(SweepsPerLayer, AreWhatTheReportCounts) {
       const auto sweeps = sweeps_of_layers(decisions);
       std::uint64_t expected = 0, active = 0;
       for (std::size_t layer = 0; layer < kSweepLayers; ++layer) {
-        expected += std::uint64_t{report.layer_nodes[layer]} * sweeps[layer];
-        active += report.layer_nodes[layer];
+        expected += std::uint64_t{report.solve.layer_nodes[layer]} * sweeps[layer];
+        active += report.solve.layer_nodes[layer];
       }
-      expected += (free - active) * report.far_sweeps;
-      ASSERT_EQ(report.node_sweeps, expected);
-      ASSERT_EQ(active, report.active_nodes);
-      most = std::max<std::uint64_t>(most, report.layer_nodes[0]);
+      expected += (free - active) * report.solve.figures.far_sweeps;
+      ASSERT_EQ(report.solve.node_sweeps, expected);
+      ASSERT_EQ(active, report.near.active_nodes);
+      most = std::max<std::uint64_t>(most, report.solve.layer_nodes[0]);
     }
   EXPECT_GT(most, 3u) << "the tool touches";
 }
@@ -116,7 +116,7 @@ TEST(SweepsPerLayer, AreStable) {
       double most = 0;
       for (int i = 0; i < 2000; ++i) {
         const auto& report = press.tick(decisions);
-        ASSERT_EQ(report.nodes_rejected, 0u);
+        ASSERT_EQ(report.solve.nodes_rejected, 0u);
         if (i < 700) most = std::max(most, press.kinetic_energy_j());
       }
       const double left = press.kinetic_energy_j();
@@ -135,10 +135,10 @@ TEST(SweepsPerLayer, WhateverTheNodeLimitTouchedNodesAreInTheQueue) {
     std::uint32_t most = 0;
     for (int i = 0; i < 600; ++i) {
       const auto& report = press.tick(decisions);
-      ASSERT_GE(report.queue_nodes, report.contact_nodes);
-      for (const auto node : press.simulation().context().contacts.seeds)
-        ASSERT_EQ(press.simulation().context().queue.layer_of(node), 0u);
-      most = std::max(most, report.contact_nodes);
+      ASSERT_GE(report.near.queue_nodes, report.contact.nodes);
+      for (const auto node : press.simulation().context().contact.found.seeds)
+        ASSERT_EQ(press.simulation().context().near.queue.layer_of(node), 0u);
+      most = std::max(most, report.contact.nodes);
     }
     EXPECT_GT(most, 2u);
   }

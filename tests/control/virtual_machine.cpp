@@ -14,20 +14,20 @@ step::TickReport report_of(const Machine& machine, int contacts, const step::Tic
   report.tick = tick;
   const auto sweeps = step::sweeps_of_layers(d);
   const auto count = static_cast<std::uint32_t>(contacts);
-  report.contact_nodes = machine.contact_nodes[0] * count;
-  std::uint32_t room = std::max(d.node_limit, report.contact_nodes), far = machine.far_nodes;
+  report.contact.nodes = machine.contact_nodes[0] * count;
+  std::uint32_t room = std::max(d.node_limit, report.contact.nodes), far = machine.far_nodes;
   for (std::size_t layer = 0; layer < step::kSweepLayers; ++layer) {
     const auto nodes = std::min(room, machine.contact_nodes[layer] * count);
     room -= nodes;
     far -= nodes;
-    report.layer_nodes[layer] = nodes;
-    report.queue_nodes += nodes;
-    report.active_nodes += nodes;
-    report.node_sweeps += std::uint64_t{nodes} * sweeps[layer];
+    report.solve.layer_nodes[layer] = nodes;
+    report.near.queue_nodes += nodes;
+    report.near.active_nodes += nodes;
+    report.solve.node_sweeps += std::uint64_t{nodes} * sweeps[layer];
   }
-  report.far_interval = d.far_interval;
-  report.far_node_sweeps = far / d.far_interval;
-  report.node_sweeps += report.far_node_sweeps;
+  report.solve.figures.far_interval = d.far_interval;
+  report.solve.far_node_sweeps = far / d.far_interval;
+  report.solve.node_sweeps += report.solve.far_node_sweeps;
   return report;
 }
 
@@ -60,7 +60,7 @@ std::vector<Row> run_virtual(const Machine& machine, const Load& load, Tick tick
     random = random * 1664525u + 1013904223u;
     const double noise =
         1 + machine.noise * (static_cast<double>(random >> 8) / static_cast<double>(1u << 23) - 1);
-    const double solve_us = machine.per_sweep_us * static_cast<double>(report.node_sweeps);
+    const double solve_us = machine.per_sweep_us * static_cast<double>(report.solve.node_sweeps);
     const double slowness = load.slowness(tick);
     const double work_us = (machine.fixed_us + solve_us) * noise * slowness + load.spike_us(tick);
     report.stage_cpu_ns[static_cast<std::size_t>(step::Stage::Solve)] =
@@ -72,11 +72,11 @@ std::vector<Row> run_virtual(const Machine& machine, const Load& load, Tick tick
     rows.push_back({.tick = tick,
                     .contacts = contacts,
                     .sweeps = step::sweeps_of_layers(decisions),
-                    .layer_nodes = report.layer_nodes,
+                    .layer_nodes = report.solve.layer_nodes,
                     .node_limit = decisions.node_limit,
-                    .queue_nodes = report.queue_nodes,
-                    .contact_nodes = report.contact_nodes,
-                    .node_sweeps = static_cast<double>(report.node_sweeps),
+                    .queue_nodes = report.near.queue_nodes,
+                    .contact_nodes = report.contact.nodes,
+                    .node_sweeps = static_cast<double>(report.solve.node_sweeps),
                     .work_us = work_us,
                     .predicted_us = static_cast<double>(figures.predicted_us),
                     .budget_us = static_cast<double>(figures.budget_us),

@@ -37,7 +37,7 @@ struct Row {
   double node_sweeps = 0, work_us = 0, predicted_us = 0, budget_us = 0;
   double time_us = 0;  // virtual, when the tick began
   std::uint64_t slow_ticks = 0;
-  step::RateLevel level = step::RateLevel::Full;
+  wire::RateLevel level = wire::RateLevel::Full;
   step::TickDecisions decisions;
 };
 

@@ -81,7 +81,7 @@ TEST(GhostFollower, IsTheFullSolutionToTheBit) {
   float largest_m = 0;
   for (int i = 0; i < 60; ++i) {
     const auto frame = session.next_frame();
-    reduced += frame->solver.is_reduced ? 1u : 0u;
+    reduced += frame->figures.solve.is_reduced() ? 1u : 0u;
     follower.repeat(*frame);
     ASSERT_EQ(follower.status(), GhostStatus::Follows) << i;
     for (const auto& record : frame->records) full.tick(record.inputs, {});

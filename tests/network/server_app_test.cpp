@@ -153,7 +153,7 @@ TEST(SimulationLoop, its_records_and_snapshot_simulate_the_session_again) {
       ASSERT_EQ(again.tick(record.inputs, record.decisions).state_hash, record.state_hash)
           << "tick " << record.tick;
     }
-    EXPECT_EQ(frame->state_hash, frame->records.back().state_hash);
+    EXPECT_EQ(frame->figures.state_hash, frame->records.back().state_hash);
     EXPECT_EQ(again.pop_frame()->surface_crc, frame->surface_crc);
   }
   std::vector<step::SharedFrame> handed;

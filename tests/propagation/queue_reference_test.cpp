@@ -218,14 +218,14 @@ TEST(TwoContactsThatApproach, QueueMergeAndSolveEqualAnIndependentReference) {
     simulation.tick(inputs, decisions);
     inputs.clear();
 
-    const auto& contacts = simulation.context().contacts;
+    const auto& contacts = simulation.context().contact.found;
     std::vector<std::set<std::uint32_t>> seeds;
     for (const auto& tool : contacts.tools) {
       seeds.emplace_back();
       for (const auto node : contacts.seeds_of(tool)) seeds.back().insert(node.value);
     }
     const auto expected = reference_queue(graph, seeds, decisions.depth_limit);
-    const auto& queue = simulation.context().queue;
+    const auto& queue = simulation.context().near.queue;
     std::vector<std::uint32_t> order;
     for (const auto node : queue.nodes()) order.push_back(node.value);
     ASSERT_EQ(order, expected.nodes) << "queue order, tick " << tick;
@@ -241,7 +241,7 @@ TEST(TwoContactsThatApproach, QueueMergeAndSolveEqualAnIndependentReference) {
     std::vector<std::uint32_t> swept;
     for (const auto node : expected.nodes)
       if (!fixed.contains(node)) swept.push_back(node);
-    const auto active = simulation.context().active.nodes();
+    const auto active = simulation.context().near.active.nodes();
     for (std::size_t i = swept.size(); i < active.size(); ++i) swept.push_back(active[i].value);
     ASSERT_EQ(swept.size(), active.size());
     reference.step(swept, contacts, decisions.sweeps);

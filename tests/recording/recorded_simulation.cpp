@@ -67,7 +67,6 @@ void record_simulation(const std::string& path, Tick dropped_at) {
     }
     auto frame = simulation.pop_frame();
     if (!frame) continue;
-    frame->state_hash = done.state_hash;
     frame->records = std::exchange(records, {});
     frame->snapshot = std::exchange(snapshot, nullptr);
     frame->snapshot_tick = snapshot_tick;

@@ -37,7 +37,7 @@ TEST(ReducedTick, DoesNotAllocateAfterWarmUp) {
     // The full solver now and then, from ticks on that publish no frame.
     const TickDecisions decisions{.is_reduction_off = (tick + 7) % 400 < 100};
     const std::size_t before = allocations;
-    const bool is_reduced = simulation.tick(inputs, decisions).is_reduced;
+    const bool is_reduced = simulation.tick(inputs, decisions).solve.figures.is_reduced();
     const std::size_t count = allocations - before;
     simulation.pop_frame();
     const bool hands_over = is_reduced != was_reduced;

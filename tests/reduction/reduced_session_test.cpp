@@ -59,11 +59,11 @@ struct Press {
 };
 
 Vec3f force_of(const Simulation& simulation, std::size_t tool) {
-  const auto& contacts = simulation.context().contacts;
+  const auto& contacts = simulation.context().contact.found;
   return contact::reaction_on(contacts, contacts.tools[tool], simulation.state().world).force_n;
 }
 Vec3f force_of(const Simulation& simulation) {
-  const auto& contacts = simulation.context().contacts;
+  const auto& contacts = simulation.context().contact.found;
   Vec3f force;
   for (const auto& tool : contacts.tools)
     force += contact::reaction_on(contacts, tool, simulation.state().world).force_n;
@@ -87,7 +87,7 @@ TEST(ReducedSession, IsNearTheConvergedFullSolution) {
     reduced.tick(press.at(tick), {});
     ASSERT_TRUE(converged.tick(press.at(tick), kConverged).is_converged) << tick;
     if (tick < 100 || tick % 20 != 0) continue;
-    ASSERT_TRUE(reduced.context().report.is_reduced) << tick;
+    ASSERT_TRUE(reduced.context().report.solve.figures.is_reduced()) << tick;
     const Vec3f expected = force_of(converged), found = force_of(reduced);
     EXPECT_LT(length(found - expected), 0.03f * length(expected)) << tick;
     // While it swings, then at rest.
@@ -100,7 +100,7 @@ TEST(ReducedSession, GoesOnBitForBitFromASnapshot) {
       other(made().organ, 2, reduction::at_work(made().local));
   const Press press{.depth_m = 0.002f, .aside = towards(1, 0.03f)};
   for (Tick tick = 1; tick <= 237; ++tick) first.tick(press.at(tick), {});
-  ASSERT_TRUE(first.context().report.is_reduced);
+  ASSERT_TRUE(first.context().report.solve.figures.is_reduced());
   Bytes snapshot;
   first.write_snapshot(snapshot);
   // The other simulation has run another session before, with more workers.
@@ -148,7 +148,7 @@ TEST_F(TwoPatches, ActTogether) {
   for (Tick tick = 1; tick <= 900; ++tick) {
     reduced.tick(inputs_at(tick), {});
     const auto& figures = reduced.state().far_model->figures();
-    preparing += figures.reason == SolverReason::Preparing ? 1u : 0u;
+    preparing += figures.reason == wire::SolverReason::Preparing ? 1u : 0u;
     if (tick > 500) {
       EXPECT_EQ(figures.patches.count, 2u) << tick;
     }
@@ -175,12 +175,12 @@ TEST_F(TwoPatches, GoOnBitForBitFromSnapshots) {
     snapshot.clear();
     first.write_snapshot(snapshot);
   };
-  run_until([](const SolverFigures& f) { return f.reason == SolverReason::Preparing; });
+  run_until([](const wire::SolverFigures& f) { return f.reason == wire::SolverReason::Preparing; });
   // Made beside something else before.
   for (Tick tick = 1; tick <= 150; ++tick) while_preparing.tick(Press{.patch = 1}.at(tick), {});
   ASSERT_TRUE(while_preparing.restore_snapshot(snapshot).ok());
   const auto start = next;
-  run_until([](const SolverFigures& f) { return f.patches.count == 2; });
+  run_until([](const wire::SolverFigures& f) { return f.patches.count == 2; });
   for (Tick tick = start; tick < next; ++tick) while_preparing.tick(inputs_at(tick), {});
   ASSERT_TRUE(acting.restore_snapshot(snapshot).ok());
   for (; next <= 900; ++next) {
@@ -226,7 +226,7 @@ TEST(ReducedSession, HandsOverWithoutAJump) {
   for (Tick tick = 1; tick <= 1300; ++tick) {
     // On and off, at no regular times.
     const TickDecisions decisions{.is_reduction_off = tick * tick / 53 % 2 == 0};
-    const bool is_reduced = switched.tick(press.at(tick), decisions).is_reduced;
+    const bool is_reduced = switched.tick(press.at(tick), decisions).solve.figures.is_reduced();
     const Vec3f now = force_of(switched);
     if (tick > 200 && is_reduced != was_reduced) {
       ++handed_over;
@@ -278,16 +278,16 @@ TEST_F(CutSession, GoesOnReducedElsewhere) {
   for (Tick tick = 1; tick <= 2400; ++tick) {
     const auto report = reduced.tick(inputs_at(tick), {});
     full.tick(inputs_at(tick), {});
-    ASSERT_EQ(report.nodes_rejected, 0u) << tick;
+    ASSERT_EQ(report.solve.nodes_rejected, 0u) << tick;
     crossed += report.cut.crossed_tets;
     if (report.cut.splits > 0) last_cut = tick;
-    (last_cut == 0 ? reduced_before : reduced_after) += report.is_reduced ? 1u : 0u;
+    (last_cut == 0 ? reduced_before : reduced_after) += report.solve.figures.is_reduced() ? 1u : 0u;
     if (tick == 2000) reduced.write_snapshot(snapshot);
   }
   EXPECT_GT(crossed, 20u);
   EXPECT_GT(reduced_before, 200u);
   EXPECT_GT(reduced_after, 500u);
-  EXPECT_TRUE(reduced.context().report.is_reduced);
+  EXPECT_TRUE(reduced.context().report.solve.figures.is_reduced());
   const Vec3f expected = force_of(full);
   EXPECT_LT(length(force_of(reduced) - expected), 0.03f * length(expected));
   // A session that is restored with a wound goes on bit for bit.
@@ -312,7 +312,7 @@ TEST(ReducedSession, FieldsStayWithTheNodesThatAreSwept) {
     reduced.tick(inputs, {});
     full.tick(inputs, {});
     if (tick % 100 != 0 || tick < 300) continue;
-    ASSERT_TRUE(reduced.context().report.is_reduced) << tick;
+    ASSERT_TRUE(reduced.context().report.solve.figures.is_reduced()) << tick;
     const auto& tissue = static_cast<const reduction::ReducedTissue&>(*reduced.state().far_model);
     const auto& state = tissue.state().far;
     const auto& model = models[state.patches.patches[0]];

@@ -230,7 +230,7 @@ void RandomSession::count_state() {
   figures_.after_a_tear += torn_m2_ > 0;
   figures_.self_contact += !state.self_contacts.nodes().empty();
   figures_.mark += state.mark.is_set();
-  figures_.reduced += simulation_.context().report.is_reduced;
+  figures_.reduced += simulation_.context().report.solve.figures.is_reduced();
   bool has_cut = false, has_grasp = false, has_push = false;
   for (std::uint8_t i = 0; i < kMaxTools; ++i) {
     if (!state.claims.is_in_effect(ToolSlot{i})) continue;

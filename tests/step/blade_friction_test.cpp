@@ -49,7 +49,7 @@ class Hand {
     const Vec3f tip = place_(static_cast<float>(tick) * 1e-3f);
     inputs.samples.push_back(
         {tool_slot({0}, 0), {{tip, rotation_from_z({0, 1, 0})}, tool::Verb::Cut}});
-    ASSERT_EQ(simulation_.tick(inputs, {}).nodes_rejected, 0u) << "tick " << tick;
+    ASSERT_EQ(simulation_.tick(inputs, {}).solve.nodes_rejected, 0u) << "tick " << tick;
     if (tick > 1) work_j_ -= static_cast<double>(dot(force(), tip - last_));
     last_ = tip;
   }

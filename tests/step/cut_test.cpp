@@ -74,7 +74,7 @@ TEST_F(Blades, OpenAWoundInEveryKindOfTissue) {
     Vec3f force{};
     for (int i = 0; i < 700; ++i) {
       const auto report = run_tick(simulation);
-      ASSERT_EQ(report.nodes_rejected, 0u) << "tick " << i;
+      ASSERT_EQ(report.solve.nodes_rejected, 0u) << "tick " << i;
       opened += report.cut.opened_area_m2;
       if (i == 500) force = simulation.state().cuts.force_n(ToolSlot{0});
     }
@@ -197,7 +197,7 @@ TEST_F(Blades, APieceThatIsCutOffCanBeCarriedAway) {
       inputs.samples.push_back(
           {tool_slot({1}, 0), {{end + drawn, rotation_from_z({1, 0, 0})}, tool::Verb::Grasp}});
     }
-    ASSERT_EQ(simulation.tick(inputs, {}).nodes_rejected, 0u) << "tick " << tick;
+    ASSERT_EQ(simulation.tick(inputs, {}).solve.nodes_rejected, 0u) << "tick " << tick;
     inputs.clear();
   }
   const auto& state = simulation.state();

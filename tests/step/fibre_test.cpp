@@ -34,7 +34,7 @@ double gape_of(const organ::Organ& organ, const Vec3f& from, const Vec3f& to) {
     inputs.samples.push_back({tool_slot({0}, 0),
                               {{from + (to - from) * share, rotation_from_z({0, 1, 0})},
                                tick < 460 ? tool::Verb::Cut : tool::Verb::None}});
-    EXPECT_EQ(simulation.tick(inputs, {}).nodes_rejected, 0u) << "tick " << tick;
+    EXPECT_EQ(simulation.tick(inputs, {}).solve.nodes_rejected, 0u) << "tick " << tick;
     inputs.clear();
   }
   const auto& u = simulation.state().world.displacements;

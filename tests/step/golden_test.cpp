@@ -50,7 +50,7 @@ void expect_golden(const Golden& golden) {
 }
 
 bool is_touched(const Simulation&, const TickReport& report) {
-  return report.contact_nodes > 0;
+  return report.contact.nodes > 0;
 }
 
 Golden two_hands(const organ::Organ& organ, std::uint64_t hash,
@@ -129,7 +129,7 @@ TEST(Golden, MeasuredExponential) {
 TEST(Golden, BuiltInMeasuredLiver) {
   auto golden = two_hands(*catalogue::make_measured_liver(3000), 14750543675996595141u);
   golden.has_happened = [](const Simulation& simulation, const TickReport& report) {
-    return report.contact_nodes > 0 && !simulation.state().world.relaxation.is_empty();
+    return report.contact.nodes > 0 && !simulation.state().world.relaxation.is_empty();
   };
   expect_golden(golden);
 }
@@ -246,7 +246,7 @@ TEST(Golden, LocalReduction) {
                  .hands = press,
                  .has_happened =
                      [&](const Simulation&, const TickReport& report) {
-                       reduced_ticks += report.is_reduced ? 1 : 0;
+                       reduced_ticks += report.solve.figures.is_reduced() ? 1 : 0;
                        return reduced_ticks > 100;
                      },
                  .hash = 5330166478288540923u,

@@ -70,7 +70,7 @@ void walk(Walker& walker, Tick tick, const world::World& world, Random& random) 
 
 double energy_of(const Simulation& simulation) {
   const auto& world = simulation.state().world;
-  double energy = simulation.context().solver.tissue().energy_j(world.displacements);
+  double energy = simulation.context().solve.solver.tissue().energy_j(world.displacements);
   for (std::size_t n = 0; n < world.node_count(); ++n)
     energy +=
         0.5 * static_cast<double>(world.masses[n]) * length_squared(to_double(world.velocities[n]));
@@ -112,16 +112,16 @@ TEST_P(LongRun, StaysFiniteBoundedAndInPlace) {
       decisions.sweeps = 3 + random.below(4);
     }
     const auto& report = simulation.tick(inputs, decisions);
-    ASSERT_EQ(report.nodes_rejected, 0u) << "tick " << tick;
-    for (const auto& contact : simulation.context().contacts.tools) {
+    ASSERT_EQ(report.solve.nodes_rejected, 0u) << "tick " << tick;
+    for (const auto& contact : simulation.context().contact.found.tools) {
       const Vec3f tip = contact.goal.position;
       const Vec3f force =
-          contact::reaction_on(simulation.context().contacts, contact, world).force_n;
+          contact::reaction_on(simulation.context().contact.found, contact, world).force_n;
       work += std::max(0.0, -dot(to_double(force), to_double(tip - tips[contact.tool.value])));
     }
     for (std::uint8_t i = 0; i < kMaxTools; ++i)
       tips[i] = simulation.state().tools[ToolSlot{i}].pose.position;
-    for (const auto& contact : simulation.context().contacts.tools)
+    for (const auto& contact : simulation.context().contact.found.tools)
       tips[contact.tool.value] = contact.goal.position;
     if (tick % 50 != 0) continue;
     const double energy = energy_of(simulation) - rest_energy;
@@ -167,7 +167,7 @@ TEST_P(ForceAcrossDecisions, DoesNotStep) {
   inputs.joins.push_back(join);
   TickDecisions decisions;
   const auto force = [&]() -> double {
-    const auto& contacts = simulation.context().contacts;
+    const auto& contacts = simulation.context().contact.found;
     if (contacts.tools.empty()) return 0;
     return static_cast<double>(
         length(contact::reaction_on(contacts, contacts.tools[0], world).force_n));

@@ -61,7 +61,7 @@ TEST(Marks, BringBackShapeAndTopology) {
   const auto epoch = simulation.layout().epoch;
 
   const auto report = run_tick(simulation, hands::MarkAction::Return);
-  EXPECT_EQ(report.nodes_rejected, 0u);
+  EXPECT_EQ(report.solve.nodes_rejected, 0u);
   EXPECT_EQ(simulation.current_tick(), 765u) << "time goes on";
   EXPECT_EQ(simulation.layout().triangles, before.triangles);
   EXPECT_EQ(simulation.layout().rest_quanta, before.rest_quanta);

@@ -45,7 +45,7 @@ class Operation {
             {tool_slot({0}, static_cast<int>(t)),
              tool::sample(script_.tools[t], static_cast<double>(tick) * 1e-3, anchors_[t])});
       const auto report = simulation_.tick(inputs, {});
-      ASSERT_EQ(report.nodes_rejected, 0u) << "tick " << tick;
+      ASSERT_EQ(report.solve.nodes_rejected, 0u) << "tick " << tick;
       simulation_.pop_frame();
       opened_m2 += report.cut.opened_area_m2 - report.cut.torn_area_m2;
       torn_m2 += report.cut.torn_area_m2;

@@ -37,15 +37,15 @@ TEST_F(TwoHands, FramesSayHowMuchOfTheStressHasRelaxed) {
   for (int i = 0; i < 320; ++i) {
     run_tick(elastic), run_tick(measured);
     if (auto next = elastic.pop_frame()) {
-      EXPECT_FALSE(next->relaxation);
+      EXPECT_FALSE(next->figures.relaxation);
     }
     if (auto next = measured.pop_frame()) frame = next;
   }
-  ASSERT_TRUE(frame && frame->relaxation);
-  EXPECT_GT(frame->relaxation->energy_j, 1e-6);
-  EXPECT_LT(std::abs(frame->relaxation->volume_change), 0.01);
-  EXPECT_GT(frame->relaxation->relaxed_share, 0.01);
-  EXPECT_LT(frame->relaxation->relaxed_share, 0.66) << "all that the series takes";
+  ASSERT_TRUE(frame && frame->figures.relaxation);
+  EXPECT_GT(frame->figures.relaxation->energy_j, 1e-6);
+  EXPECT_LT(std::abs(frame->figures.relaxation->volume_change), 0.01);
+  EXPECT_GT(frame->figures.relaxation->relaxed_share, 0.01);
+  EXPECT_LT(frame->figures.relaxation->relaxed_share, 0.66) << "all that the series takes";
 }
 
 TEST_F(TwoHands, AnyInputChangesTheHash) {
@@ -112,8 +112,8 @@ TEST_F(TwoHands, RegionsMergeAndTissueComesToRestAgain) {
   bool was_apart = false, was_merged = false;
   for (int i = 0; i < 1500; ++i) {
     const auto report = run_tick(simulation, kFrozen);
-    was_apart |= report.region_count == 2;
-    was_merged |= report.region_count == 1 && report.contact_nodes > 6;
+    was_apart |= report.near.region_count == 2;
+    was_merged |= report.near.region_count == 1 && report.contact.nodes > 6;
   }
   EXPECT_TRUE(was_apart);
   EXPECT_TRUE(was_merged);
@@ -121,7 +121,7 @@ TEST_F(TwoHands, RegionsMergeAndTissueComesToRestAgain) {
   leave.leaves = {{0}, {1}};
   simulation.tick(leave, kFrozen);
   int ticks = 0;
-  while (simulation.context().report.active_nodes > 0 && ticks < 20'000) {
+  while (simulation.context().report.near.active_nodes > 0 && ticks < 20'000) {
     simulation.tick({}, kFrozen);
     ++ticks;
   }
@@ -208,7 +208,7 @@ TEST(Simulation, RandomInputsNeverBreakIt) {
         .depth_limit = pick(8), .node_limit = 1 + pick(400), .sweeps = 1 + pick(6)};
     decisions.boundary = pick(100) < 50 ? world::Boundary::Frozen : world::Boundary::Graded;
     const auto report = simulation.tick(inputs, decisions);
-    ASSERT_EQ(report.nodes_rejected, 0u);
+    ASSERT_EQ(report.solve.nodes_rejected, 0u);
   }
   for (const auto& u : simulation.state().world.displacements) ASSERT_TRUE(is_finite(u));
   for (std::size_t i = 0; i < simulation.state().world.node_count(); ++i)

@@ -44,7 +44,7 @@ TEST(Tears, AFlapPulledFarEnoughTearsOff) {
     double torn = 0;
     for (int i = 0; i < 1500; ++i) {
       const auto report = pull(simulation);
-      ASSERT_EQ(report.nodes_rejected, 0u) << "tick " << report.tick;
+      ASSERT_EQ(report.solve.nodes_rejected, 0u) << "tick " << report.tick;
       torn += report.cut.torn_area_m2;
     }
     const auto& state = simulation.state();

@@ -77,10 +77,11 @@ class Hand {
     step::Simulation simulation(organ_);
     std::optional<control::RateController> controller;
     if (is_controlled)
-      controller.emplace(control::RateLimits{.highest = decide(1),
-                                             .layer_sweeps = simulation.context().far_plan.sweeps,
-                                             .far_interval = control::kLongestFarInterval,
-                                             .budget_us = kBudget_ms * 1e3});
+      controller.emplace(
+          control::RateLimits{.highest = decide(1),
+                              .layer_sweeps = simulation.context().solve.far_plan.sweeps,
+                              .far_interval = control::kLongestFarInterval,
+                              .budget_us = kBudget_ms * 1e3});
     hands::TickInputs inputs;
     hands::HandJoin join{.slot = {0}};
     join.shapes[0] = {.radius_m = kToolRadius_m, .length_m = 0.3f};
@@ -123,7 +124,7 @@ class Hand {
 
   static Vec3d force_in(const step::Simulation& simulation) {
     Vec3d force;
-    const auto& contacts = simulation.context().contacts;
+    const auto& contacts = simulation.context().contact.found;
     for (const auto& tool : contacts.tools)
       force += to_double(contact::reaction_on(contacts, tool, simulation.state().world).force_n);
     return force;

@@ -23,7 +23,7 @@ constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 Vec3d force_in(const step::Simulation& simulation) {
   Vec3d force;
-  const auto& contacts = simulation.context().contacts;
+  const auto& contacts = simulation.context().contact.found;
   for (const auto& tool : contacts.tools)
     if (tool.tool == tool_slot({0}, 0))
       force += to_double(contact::reaction_on(contacts, tool, simulation.state().world).force_n);
@@ -166,13 +166,14 @@ Course run_session(const organ::Organ& organ,
     course.convergence.note(report, decisions);
     LiveTick now{.force_n = force_in(simulation),
                  .us = static_cast<double>(cpu_ns) * 1e-3,
-                 .is_reduced = report.is_reduced};
+                 .is_reduced = report.solve.figures.is_reduced()};
     if (const auto* const model = simulation.state().far_model.get()) {
       now.figures = model->figures();
       now.estimate = static_cast<const reduction::ReducedTissue&>(*model).state().far.estimate;
     }
     course.pilot.note(report, length(now.force_n));
-    if (course.lost == 0 && (report.nodes_rejected > 0 || !std::isfinite(length(now.force_n))))
+    if (course.lost == 0 &&
+        (report.solve.nodes_rejected > 0 || !std::isfinite(length(now.force_n))))
       course.lost = tick;
     course.ticks.push_back(now);
     if (field_ticks > 0 && tick % field_ticks == 0) {

@@ -66,7 +66,7 @@ struct LiveTick {
   Vec3d force_n;  // of the tissue on the first hand's tool
   double us = 0;  // CPU time
   bool is_reduced = false;
-  step::SolverFigures figures;  // of sessions with a reduction
+  wire::SolverFigures figures;  // of sessions with a reduction
   float estimate = 0;           // of the reduction's error, after this tick
 };
 struct Course {

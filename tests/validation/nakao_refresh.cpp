@@ -75,7 +75,7 @@ class Machine {
   explicit Machine(const Phases& phases) : phases_(phases) {}
 
   double tick_us(const step::TickReport& report) const {
-    const double work = kFixed_us + kPerSweep_us * static_cast<double>(report.node_sweeps);
+    const double work = kFixed_us + kPerSweep_us * static_cast<double>(report.solve.node_sweeps);
     return phases_.slowness(report.tick) * work + (Phases::has_spike(report.tick) ? kSpike_us : 0);
   }
   // The report with times of this machine in it.
@@ -83,8 +83,8 @@ class Machine {
     report.stage_cpu_ns.fill(0);
     report.stage_cpu_ns[static_cast<std::size_t>(step::Stage::Queue)] =
         static_cast<std::uint32_t>(kFixed_us * 1e3);
-    report.stage_cpu_ns[static_cast<std::size_t>(step::Stage::Solve)] =
-        static_cast<std::uint32_t>(kPerSweep_us * 1e3 * static_cast<double>(report.node_sweeps));
+    report.stage_cpu_ns[static_cast<std::size_t>(step::Stage::Solve)] = static_cast<std::uint32_t>(
+        kPerSweep_us * 1e3 * static_cast<double>(report.solve.node_sweeps));
     return report;
   }
 
@@ -183,11 +183,11 @@ Course update(const organ::Organ& organ, const Site& site, const step::TickDecis
     controller.observe(Machine::told(report), {static_cast<std::uint64_t>(us * 1e3), 0});
     if (tick == phases.spikes_end) course.lowered_by_spikes = controller.figures().lowered;
     course.ticks.push_back(static_cast<double>(tick));
-    course.nodes.push_back(report.queue_nodes);
-    course.active.push_back(report.active_nodes);
-    course.sweeps.push_back(static_cast<double>(report.node_sweeps));
+    course.nodes.push_back(report.near.queue_nodes);
+    course.active.push_back(report.near.active_nodes);
+    course.sweeps.push_back(static_cast<double>(report.solve.node_sweeps));
     course.model_us.push_back(us);
-    const auto& contacts = simulation.context().contacts;
+    const auto& contacts = simulation.context().contact.found;
     Vec3d force;
     for (const auto& tool : contacts.tools)
       force += to_double(contact::reaction_on(contacts, tool, simulation.state().world).force_n);

@@ -195,8 +195,8 @@ class Study {
 
   static Kind kind_of(const LiveTick& now, const LiveTick& before) {
     if (now.is_reduced) return before.is_reduced ? Kind::Patch : Kind::On;
-    if (now.figures.reason == step::SolverReason::Off) return Kind::Off;
-    return now.figures.reason == step::SolverReason::Cut ? Kind::Cut : Kind::Other;
+    if (now.figures.reason == wire::SolverReason::Off) return Kind::Off;
+    return now.figures.reason == wire::SolverReason::Cut ? Kind::Cut : Kind::Other;
   }
 
   static double share_above(const std::vector<double>& jumps) {

@@ -160,7 +160,7 @@ class Study {
     for (const auto& [key, ticks] : reasons_) all += ticks;
     for (const auto& [key, ticks] : reasons_)
       reasons.rows.push_back(
-          {key.first ? "reduced" : "full", step::name_of(key.second),
+          {key.first ? "reduced" : "full", wire::name_of(key.second),
            shown_percent(static_cast<double>(ticks) / static_cast<double>(all))});
     section_.add(std::move(reasons));
     section_.say(fmt::format(
@@ -178,7 +178,7 @@ class Study {
   const LiveLiver& liver_;
   const bool is_short_;
   std::array<std::array<Errors, 2>, kWays> errors_;  // [way][is trained]
-  std::map<std::pair<bool, step::SolverReason>, std::size_t> reasons_;
+  std::map<std::pair<bool, wire::SolverReason>, std::size_t> reasons_;
   std::array<std::size_t, kWays> lost_{};
   std::size_t measured_ = 0, missed_ = 0;
   References references_;

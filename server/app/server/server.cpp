@@ -154,7 +154,8 @@ LoopOptions Server::loop_options() const {
   control::RateLimits rate{.highest = decisions, .budget_us = options_.budget_ms * 1e3};
   // Nodes of the queue are not swept less than those outside it.
   if (decisions.boundary == world::Boundary::Graded) {
-    rate.layer_sweeps = simulation_.context().far_plan.with_sweeps(decisions.far_sweeps).sweeps;
+    rate.layer_sweeps =
+        simulation_.context().solve.far_plan.with_sweeps(decisions.far_sweeps).sweeps;
     rate.far_interval = control::kLongestFarInterval;
   }
   loop.rate = rate;
@@ -219,10 +220,10 @@ void Server::take_ghost(std::shared_ptr<const ghost::GhostReport> report) {
 void Server::warn_if_slow() {
   if (frames_.empty()) return;
   const auto& frame = *frames_.back();
-  const auto& rate = frame.statistics.rate;
+  const auto& rate = frame.figures.pace.rate;
   if (rate.time_rate > kSlowTimeRate || frame.tick < next_warning_) return;
   next_warning_ = frame.tick + kWarningPeriod;
-  const auto tick_ms = frame.statistics.tick_median_us * 1e-3f;
+  const auto tick_ms = frame.figures.pace.tick_median_us * 1e-3f;
   log::warn(
       "simulated time runs at {:.0f} % of real time: {}", 100 * rate.time_rate,
       tick_ms > kLongTickMs

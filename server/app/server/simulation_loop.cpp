@@ -39,19 +39,17 @@ void StageTimes::clear() {
   tick.clear();
 }
 
-step::StageStatistics StageTimes::statistics() const {
-  step::StageStatistics result;
-  for (std::size_t i = 0; i < stages.size(); ++i) {
-    result.median_us[i] = static_cast<float>(stages[i].quantile_us(0.5));
-    result.p99_us[i] = static_cast<float>(stages[i].quantile_us(0.99));
-  }
+wire::PaceFigures StageTimes::figures() const {
+  wire::PaceFigures result;
+  for (std::size_t i = 0; i < stages.size(); ++i)
+    result.stage_median_us[i] = static_cast<float>(stages[i].quantile_us(0.5));
   result.tick_median_us = static_cast<float>(tick.quantile_us(0.5));
   result.tick_p99_us = static_cast<float>(tick.quantile_us(0.99));
   return result;
 }
 
 void RateReport::add(const step::TickDecisions& decisions, bool has_contact,
-                     step::RateLevel level) {
+                     wire::RateLevel level) {
   ++ticks_at[static_cast<std::size_t>(level)];
   const auto sweeps_now = step::sweeps_of_layers(decisions);
   if (least_node_limit == 0) {
@@ -66,8 +64,7 @@ void RateReport::add(const step::TickDecisions& decisions, bool has_contact,
   contact_ticks += has_contact;
 }
 
-void SolverReport::add(const step::SolverFigures& figures) {
-  if (figures.reason == step::SolverReason::None) return;
+void SolverReport::add(const wire::SolverFigures& figures) {
   const auto reason = static_cast<std::size_t>(figures.reason);
   ++(figures.is_reduced ? reduced_ticks : full_ticks);
   ++ticks_by_reason[reason];
@@ -132,20 +129,20 @@ bool SimulationLoop::run_tick() {
   const auto begin = options_.clock_ns();
   const auto& report = simulation_.tick(inputs_, decisions);
   if (controller_) controller_->observe(report, {options_.clock_ns() - begin, lateness_ns_});
-  const auto level = controller_ ? controller_->figures().level : step::RateLevel::Fixed;
-  report_.rate.add(decisions, report.contact_nodes > 0, level);
+  const auto level = controller_ ? controller_->figures().level : wire::RateLevel::Fixed;
+  report_.rate.add(decisions, report.contact.nodes > 0, level);
   report_.rate.late_ticks += lateness_ns_ > kTickNanoseconds;
   records_.push_back({report.tick, decisions, inputs_, report.state_hash});
   second_.add(report);
   report_.times.add(report);
   report_.ticks = report.tick;
   report_.inputs_dropped += report.inputs_dropped;
-  report_.nodes_rejected += report.nodes_rejected;
+  report_.nodes_rejected += report.solve.nodes_rejected;
   report_.faults |= report.faults;
-  report_.solver.add(simulation_.context().solver_figures);
-  report_.max_active_nodes = std::max(report_.max_active_nodes, report.active_nodes);
+  if (const auto& solver = report.solve.figures.solver) report_.solver.add(*solver);
+  report_.max_active_nodes = std::max(report_.max_active_nodes, report.near.active_nodes);
   if (report.tick % kTicksPerSecond == 0) {
-    statistics_ = second_.statistics();
+    pace_ = second_.figures();
     second_.clear();
     const auto ticks = static_cast<float>(kTicksPerSecond);
     time_rate_ = ticks / (ticks + static_cast<float>(slow_ticks_ - slow_ticks_before_));
@@ -164,15 +161,14 @@ bool SimulationLoop::run_tick() {
 }
 
 void SimulationLoop::finish_frame(std::shared_ptr<step::PublishedFrame> frame) {
-  frame->state_hash = records_.back().state_hash;
   frame->records = std::exchange(records_, {});
   records_.reserve(kTicksPerFrame);
   frame->snapshot = std::exchange(snapshot_, nullptr);
   frame->snapshot_tick = snapshot_tick_;
-  frame->statistics = statistics_;
-  frame->statistics.slow_ticks = slow_ticks_;
-  if (controller_) frame->statistics.rate = controller_->figures();
-  frame->statistics.rate.time_rate = time_rate_;
+  auto& pace = frame->figures.pace = pace_;
+  pace.slow_ticks = slow_ticks_;
+  if (controller_) pace.rate = controller_->figures();
+  pace.rate.time_rate = time_rate_;
   report_.slow_ticks = slow_ticks_;
   report_.last_frame = frame;
   if (journal_) journal_->record_frame(report_.last_frame);

@@ -35,33 +35,33 @@ struct StageTimes {
 
   void add(const step::TickReport& report);
   void clear();
-  step::StageStatistics statistics() const;  // slow_ticks stays 0
+  wire::PaceFigures figures() const;  // The loop adds slow ticks and rate.
 };
 
 // The report says what the rate controller decided, over the whole run.
 struct RateReport {
-  std::array<Tick, 4> ticks_at{};                          // by step::RateLevel
+  std::array<Tick, wire::kRateLevels> ticks_at{};          // by wire::RateLevel
   std::array<std::uint64_t, step::kSweepLayers> sweeps{};  // sums over ticks in contact, by layer
   Tick contact_ticks = 0;
   step::LayerCounts least_sweeps{};
   std::uint32_t least_node_limit = 0;
   std::uint64_t late_ticks = 0;  // began more than a tick after they were due
 
-  void add(const step::TickDecisions& decisions, bool has_contact, step::RateLevel level);
+  void add(const step::TickDecisions& decisions, bool has_contact, wire::RateLevel level);
 };
 
 // The report says which solver acted, over the whole run of a session with a reduction.
 struct SolverReport {
   Tick reduced_ticks = 0, full_ticks = 0;
   std::uint64_t to_reduced = 0, to_full = 0, to_another_patch = 0;  // hand-overs
-  std::array<Tick, step::kSolverReasons> ticks_by_reason{};
-  std::array<std::uint64_t, step::kSolverReasons> to_full_by_reason{};
+  std::array<Tick, wire::kSolverReasons> ticks_by_reason{};
+  std::array<std::uint64_t, wire::kSolverReasons> to_full_by_reason{};
   float largest_estimate = 0;
 
-  void add(const step::SolverFigures& figures);
+  void add(const wire::SolverFigures& figures);
 
  private:
-  step::SolverFigures last_;
+  wire::SolverFigures last_;
 };
 
 struct LoopReport {
@@ -128,8 +128,8 @@ class SimulationLoop {
   std::vector<step::TickRecord> records_;  // since the last frame
   std::shared_ptr<const Bytes> snapshot_;  // waits for the next frame
   Tick snapshot_tick_ = 0;
-  StageTimes second_;                 // since the last statistics
-  step::StageStatistics statistics_;  // of the last full second
+  StageTimes second_;       // since the last statistics
+  wire::PaceFigures pace_;  // of the last full second
   std::uint64_t slow_ticks_ = 0;
   LoopReport report_;
   std::thread thread_;

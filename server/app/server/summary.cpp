@@ -31,7 +31,7 @@ Json participants(const std::vector<replication::BarrierResult>& results) {
 Json stages(const StageTimes& of) {
   Json list = Json::object();
   for (std::size_t i = 0; i < of.stages.size(); ++i)
-    list[step::name_of(static_cast<step::Stage>(i))] = times(of.stages[i]);
+    list[wire::name_of(static_cast<step::Stage>(i))] = times(of.stages[i]);
   return list;
 }
 
@@ -63,14 +63,14 @@ Json replication_figures(const Summary& s) {
 
 Json rate_figures(const Summary& s) {
   const auto& rate = s.loop.rate;
-  const auto& last = s.loop.last_frame->statistics.rate;
+  const auto& last = s.loop.last_frame->figures.pace.rate;
   std::array<double, step::kSweepLayers> mean_sweeps{};
   for (std::size_t i = 0; i < mean_sweeps.size(); ++i)
     mean_sweeps[i] = static_cast<double>(rate.sweeps[i]) /
                      static_cast<double>(std::max<Tick>(1, rate.contact_ticks));
   Json ticks = Json::object();
   for (std::size_t i = 0; i < rate.ticks_at.size(); ++i)
-    ticks[step::name_of(static_cast<step::RateLevel>(i))] = rate.ticks_at[i];
+    ticks[wire::name_of(static_cast<wire::RateLevel>(i))] = rate.ticks_at[i];
   return {{"ticks", ticks},
           {"late_ticks", rate.late_ticks},
           {"lowered", last.lowered},
@@ -89,7 +89,7 @@ Json solver_figures(const Summary& s) {
   const auto by_reason = [](const auto& counts) {
     Json list = Json::object();
     for (std::size_t i = 1; i < counts.size(); ++i)  // from 0, a session without a reduction
-      list[step::name_of(static_cast<step::SolverReason>(i))] = counts[i];
+      list[wire::name_of(static_cast<wire::SolverReason>(i))] = counts[i];
     return list;
   };
   return {{"reduction", s.reduction->file},
@@ -133,7 +133,7 @@ std::string to_json(const Summary& s) {
        {"slow_ticks", s.loop.slow_ticks},
        {"last_tick", last.tick},
        {"last_frame", last.frame},
-       {"state_hash", hex64(last.state_hash)},
+       {"state_hash", hex64(last.figures.state_hash)},
        {"surface_crc", hex32(last.surface_crc)},
        {"all_replicas_equal",
         std::ranges::all_of(s.barrier, &replication::BarrierResult::is_equal)},

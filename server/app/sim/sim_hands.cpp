@@ -44,7 +44,7 @@ class Replay {
                                            " are missing: its hands are not all there"};
     const auto& report = simulation_.tick(record.inputs, record.decisions);
     opened_m2 += report.cut.opened_area_m2;
-    rejected += report.nodes_rejected;
+    rejected += report.solve.nodes_rejected;
     if (publishes_frame(report.tick)) {
       auto frame = std::shared_ptr<step::PublishedFrame>(simulation_.pop_frame());
       write_tools(*frame, csv_);

@@ -42,7 +42,6 @@ void SimJournal::add(std::shared_ptr<step::PublishedFrame> frame, const hands::T
                      const step::TickDecisions& decisions, const step::TickReport& report) {
   records_.push_back({report.tick, decisions, inputs, report.state_hash});
   if (!frame) return;
-  frame->state_hash = records_.back().state_hash;
   frame->records = std::exchange(records_, {});
   frame->snapshot = std::exchange(snapshot_, nullptr);
   frame->snapshot_tick = snapshot_tick_;

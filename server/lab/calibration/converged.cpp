@@ -19,7 +19,7 @@ step::TickDecisions Pilot::decisions(Tick tick) {
 void Pilot::note(const step::TickReport& report, double force_n) {
   largest_force_n_ = std::max(largest_force_n_, force_n);
   if (report.tick % kPilotTicks == 0)
-    rounding_n_ = std::max(rounding_n_, static_cast<double>(report.residual_n));
+    rounding_n_ = std::max(rounding_n_, static_cast<double>(report.solve.figures.residual_n));
 }
 
 float Pilot::tolerance_for(double force_n, std::size_t nodes, double looser) const {
@@ -38,7 +38,8 @@ step::TickDecisions converged_decisions(float tolerance_n) {
 void Convergence::note(const step::TickReport& report, const step::TickDecisions& decisions) {
   const float tolerance = decisions.policy.residual_tolerance_n;
   if (tolerance == 0) return;
-  add({tolerance, tolerance, 1, report.is_converged ? 1u : 0u, report.residual_n, report.sweeps});
+  add({tolerance, tolerance, 1, report.solve.is_converged ? 1u : 0u,
+       report.solve.figures.residual_n, report.solve.figures.sweeps});
 }
 
 void Convergence::add(const Convergence& other) {

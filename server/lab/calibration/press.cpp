@@ -55,14 +55,14 @@ PressCourse PressBench::run(const Place& place, const PressPlan& plan, const Dec
     control::read_forces(simulation_, forces);
     const auto& context = simulation_.context();
     Vec3d force;
-    for (const auto& tool : context.contacts.tools)
+    for (const auto& tool : context.contact.found.tools)
       force += to_double(
-          contact::reaction_on(context.contacts, tool, simulation_.state().world).force_n);
+          contact::reaction_on(context.contact.found, tool, simulation_.state().world).force_n);
     observe(report, force);
     course.forces_n.push_back(force);
-    course.queue_nodes.push_back(report.queue_nodes);
+    course.queue_nodes.push_back(report.near.queue_nodes);
     course.queue_depths.push_back(
-        static_cast<std::uint32_t>(std::max<std::size_t>(1, context.queue.layer_count()) - 1));
+        static_cast<std::uint32_t>(std::max<std::size_t>(1, context.near.queue.layer_count()) - 1));
     ++ticks_;
   }
   return course;

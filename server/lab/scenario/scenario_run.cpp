@@ -6,6 +6,7 @@
 
 #include "common/base/assert.h"
 #include "server/lab/scenario/relaxed_organ.h"
+#include "server/tissue/contact/update_claims.h"
 #include "server/tissue/dynamics/relaxation.h"
 #include "server/tissue/reduction/reduced_tissue.h"
 
@@ -241,14 +242,14 @@ StepReport ScenarioRun::step_dynamic() {
   const auto& tick =
       simulation_.tick(inputs_, decisions_, has_external_loads() ? &loads_ : nullptr);
   StepReport report;
-  report.active_nodes = tick.active_nodes;
-  report.is_converged = tick.is_converged;
-  report.solve.residual_n = tick.residual_n;
-  report.solve.sweeps = tick.sweeps;
-  report.solve.node_sweeps = tick.node_sweeps;
-  report.solve.far_node_sweeps = tick.far_node_sweeps;
-  report.solve.nodes_rejected = tick.nodes_rejected;
-  report.solve.nodes_restored = tick.nodes_restored;
+  report.active_nodes = tick.near.active_nodes;
+  report.is_converged = tick.solve.is_converged;
+  report.solve.residual_n = tick.solve.figures.residual_n;
+  report.solve.sweeps = tick.solve.figures.sweeps;
+  report.solve.node_sweeps = tick.solve.node_sweeps;
+  report.solve.far_node_sweeps = tick.solve.far_node_sweeps;
+  report.solve.nodes_rejected = tick.solve.nodes_rejected;
+  report.solve.nodes_restored = tick.solve.nodes_restored;
   return report;
 }
 
@@ -280,12 +281,12 @@ void ScenarioRun::place_held(const dynamics::ExternalLoads& loads) {
   for (std::size_t i = 0; i < loads.held.size(); ++i)
     put(loads.held[i], kAllAxes, loads.held_displacements[i]);
   for (const auto& hold : loads.axis_holds) put(hold.node, hold.axes, hold.displacement);
-  context.solver.read_motion(world);
-  context.finder.surface_moved(largest_move_m);
+  context.solve.solver.read_motion(world);
+  context.contact.finder.surface_moved(largest_move_m);
 }
 
 double ScenarioRun::potential_energy_j(const dynamics::ExternalLoads& loads) const {
-  double energy_j = simulation_.context().solver.tissue().energy_j(world().displacements);
+  double energy_j = simulation_.context().solve.solver.tissue().energy_j(world().displacements);
   for (std::size_t i = 0; i < world().node_count(); ++i) {
     Vec3d load = organ().gravity_m_s2 * static_cast<double>(world().masses[i]);
     if (!loads.forces.empty()) load += to_double(loads.forces[i]);
@@ -308,19 +309,20 @@ StepReport ScenarioRun::relax(const dynamics::ExternalLoads& loads) {
   float last_residual = INFINITY;
   place_held(loads);
   // Contacts that slide have no potential energy, so that nothing can be said about its descent.
-  const bool descends = context.contacts.points.empty();
+  const bool descends = context.contact.found.points.empty();
   double last_energy_j = descends ? potential_energy_j(loads) : 0;
   do {
     if (descends) before_stretch_.assign(world.displacements.begin(), world.displacements.end());
     how.sweeps = std::min(kSweepsPerRelaxation, most - sweeps);
-    report.solve = context.solver.solve(context.contacts, free_nodes_, how, world, loads);
-    context.finder.surface_moved(report.solve.largest_move_m);
+    report.solve =
+        context.solve.solver.solve(context.contact.found, free_nodes_, how, world, loads);
+    context.contact.finder.surface_moved(report.solve.largest_move_m);
     std::ranges::fill(world.velocities, Vec3f{});
     sweeps += report.solve.sweeps;
     const double energy_j = descends ? potential_energy_j(loads) : 0;
     if (!(energy_j <= last_energy_j + kEnergySlack * std::abs(last_energy_j))) {
       std::ranges::copy(before_stretch_, world.displacements.begin());
-      context.solver.read_motion(world);
+      context.solve.solver.read_motion(world);
       how.over_relaxation *= kOverRelaxationStepBack;
       continue;
     }
@@ -352,24 +354,23 @@ StepReport ScenarioRun::step_static() {
                       (round < kMinContactRounds || change > kContactChange_m);
        ++round) {
     sample_tools(++world.tick, now, round == 0);
-    context.inputs = &inputs_;
-    step::admit_inputs(state, context);
-    context.inputs = nullptr;
+    step::admit_inputs(inputs_, world.tick, state.tools, state.claims, state.grasps);
     // Without time a tool has no speed either.
-    context.finder.find({world, state.tools, state.claims, state.grasps, state.proxies, world.tick,
-                         kNoLimit_m, kNoLimit_m},
-                        context.contacts);
+    context.contact.finder.find({world, state.tools, state.claims, state.grasps, state.proxies,
+                                 world.tick, kNoLimit_m, kNoLimit_m},
+                                context.contact.found);
     before_.assign(world.displacements.begin(), world.displacements.end());
     report = relax(loads);
     sweeps += report.solve.sweeps;
     change = 0;
     for (std::size_t i = 0; i < before_.size(); ++i)
       change = std::max(change, length(world.displacements[i] - before_[i]));
-    step::follow_contacts(state, context);
-    context.claim_events.clear();
-    step::update_claims(state, context);
+    state.proxies.update(context.contact.found, world, state.tools);
+    context.outbox.claim_events.clear();
+    contact::update_claims(world, state.tools, context.contact.found, context.contact.requests,
+                           state.claims, state.grasps, context.outbox.claim_events);
   }
-  loads_.measure(context.solver, context.contacts);
+  loads_.measure(context.solve.solver, context.contact.found);
   report.is_converged &= change <= kContactChange_m;
   report.solve.sweeps = sweeps;
   return report;
@@ -383,7 +384,7 @@ StepReport ScenarioRun::step() {
 
 Vec3d ScenarioRun::force_on(ToolSlot tool) const {
   const auto& state = simulation_.state();
-  const auto& contacts = simulation_.context().contacts;
+  const auto& contacts = simulation_.context().contact.found;
   if (state.claims.claim(tool).verb == tool::Verb::Cut) return to_double(state.cuts.force_n(tool));
   for (const auto& contact : contacts.tools)
     if (contact.tool == tool)

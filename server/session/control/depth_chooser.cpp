@@ -39,7 +39,7 @@ step::TickDecisions DepthChooser::choose(const step::TickDecisions& decided,
 
 void read_forces(const step::Simulation& simulation, std::vector<double>& forces_n) {
   forces_n.clear();
-  const auto& contacts = simulation.context().contacts;
+  const auto& contacts = simulation.context().contact.found;
   for (const auto& tool : contacts.tools)
     if (tool.begin != tool.end)
       forces_n.push_back(static_cast<double>(

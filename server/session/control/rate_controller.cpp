@@ -29,11 +29,12 @@ double solve_share(const step::TickReport& report) {
 
 // In node sweeps by energies.
 double far_work(const step::TickReport& report) {
-  return static_cast<double>(report.far_node_sweeps) *
-         (report.is_far_linear ? RateController::kLinearWork : 1.0);
+  return static_cast<double>(report.solve.far_node_sweeps) *
+         (report.solve.is_far_linear ? RateController::kLinearWork : 1.0);
 }
 double work_of(const step::TickReport& report) {
-  return static_cast<double>(report.node_sweeps - report.far_node_sweeps) + far_work(report);
+  return static_cast<double>(report.solve.node_sweeps - report.solve.far_node_sweeps) +
+         far_work(report);
 }
 
 }  // namespace
@@ -81,9 +82,9 @@ void RateController::remember_peaks(const step::TickReport& report) {
     if (peak < 1) peak = 0;
   };
   for (std::size_t layer = 0; layer < step::kSweepLayers; ++layer)
-    remember(peak_layer_nodes_[layer], report.layer_nodes[layer]);
-  remember(peak_queue_nodes_, report.queue_nodes);
-  far_work_ = far_work(report) * report.far_interval;
+    remember(peak_layer_nodes_[layer], report.solve.layer_nodes[layer]);
+  remember(peak_queue_nodes_, report.near.queue_nodes);
+  far_work_ = far_work(report) * report.solve.figures.far_interval;
 }
 
 void RateController::watch_load(const TickTiming& timing, bool can_lower) {
@@ -100,12 +101,12 @@ void RateController::watch_load(const TickTiming& timing, bool can_lower) {
 
 // The deepest layer that has sweeps to give, then nodes.
 RateController::Step RateController::next_lower(const step::TickReport& report) const {
-  Step step{sweeps_, far_interval_, nodes_, 0, report.active_nodes > 0};
+  Step step{sweeps_, far_interval_, nodes_, 0, report.near.active_nodes > 0};
   if (!step.is_any) return step;
   for (std::size_t layer = step::kSweepLayers; layer-- > 0;) {
     if (sweeps_[layer] == lowest_sweeps_[layer]) continue;
     --step.sweeps[layer];
-    step.change = -static_cast<double>(report.layer_nodes[layer]);
+    step.change = -static_cast<double>(report.solve.layer_nodes[layer]);
     return step;
   }
   if (far_interval_ < longest_interval_) {
@@ -114,9 +115,9 @@ RateController::Step RateController::next_lower(const step::TickReport& report) 
     return step;
   }
   // A limit above what the queue holds limits nothing.
-  const auto least = std::max(lowest_nodes_, report.contact_nodes);
-  if (nodes_ > std::max(least, report.queue_nodes)) {
-    step.nodes = std::max(least, report.queue_nodes);
+  const auto least = std::max(lowest_nodes_, report.contact.nodes);
+  if (nodes_ > std::max(least, report.near.queue_nodes)) {
+    step.nodes = std::max(least, report.near.queue_nodes);
   } else if (nodes_ > least) {
     step.nodes = std::max(least, nodes_ - std::max(1u, nodes_ / kNodeShare));
     step.change = -static_cast<double>(nodes_ - step.nodes);
@@ -169,7 +170,7 @@ void RateController::lower(const step::TickReport& report) {
 void RateController::raise(const step::TickReport& report) {
   double node_sweeps = work_of(report);
   for (std::size_t layer = 0; layer < step::kSweepLayers; ++layer)
-    node_sweeps += (peak_layer_nodes_[layer] - report.layer_nodes[layer]) * sweeps_[layer];
+    node_sweeps += (peak_layer_nodes_[layer] - report.solve.layer_nodes[layer]) * sweeps_[layer];
   const auto has_room = [&](const Step& step) {
     return step.is_any && model_.predict_us(node_sweeps + step.change) < kRaiseBelow * budget_us();
   };
@@ -202,8 +203,8 @@ void RateController::apply(const Step& step) {
     decisions_.layer_sweeps[layer - 1] = sweeps_[layer];
 }
 
-step::RateFigures RateController::figures() const {
-  using step::RateLevel;
+wire::RateFigures RateController::figures() const {
+  using wire::RateLevel;
   const bool is_full = decisions_ == limits_.highest;
   return {.level = is_too_much_ ? RateLevel::Overloaded
                                 : (is_full ? RateLevel::Full : RateLevel::Reduced),

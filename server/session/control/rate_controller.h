@@ -65,7 +65,7 @@ class RateController {
   // After every tick, with decisions() as they were in it, or less of the queue (DepthChooser).
   void observe(const step::TickReport& report, const TickTiming& timing);
 
-  step::RateFigures figures() const;
+  wire::RateFigures figures() const;
   const CostModel& model() const { return model_; }
 
  private:

@@ -10,16 +10,12 @@
 
 #include <optional>
 
+#include "common/wire/ghost_status.h"
 #include "server/tissue/step/simulation.h"
 
 namespace trocar::ghost {
 
-enum class GhostStatus : std::uint8_t {
-  Begins,   // waits for a state of the session to begin from
-  Follows,  // has the frame
-  Changed,  // the surface has changed: it is to begin again
-  Behind,   // did not keep up, and is to begin again
-};
+using wire::GhostStatus;
 
 struct GhostReport {
   GhostStatus status = GhostStatus::Begins;

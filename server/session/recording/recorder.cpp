@@ -18,7 +18,7 @@ std::size_t estimated_bytes(const step::PublishedFrame& frame) {
     bytes += frame.change->new_vertices.size() * sizeof(wire::NewVertex) +
              frame.change->removed.size() * sizeof(TriangleIndex) +
              frame.change->added.size() * sizeof(wire::NewTriangle);
-  bytes += frame.solver_changes.size() * sizeof(step::SolverChange);
+  bytes += frame.solver_changes.size() * sizeof(wire::SolverChange);
   for (const auto& record : frame.records)
     bytes += sizeof record + record.inputs.samples.size() * sizeof(hands::ToolInput);
   return bytes;

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "common/base/version.h"
+#include "common/wire/figure_messages.h"
 #include "common/wire/surface_messages.h"
 #include "common/wire/tool_shape.h"
 #include "server/session/recording/message_difference.h"
@@ -38,13 +39,13 @@ std::string topic_of_tool(std::uint32_t tool) {
   return fmt::format("/tool/{}", tool);
 }
 
-// A copy without what may differ: times that were measured, and surfaces as bytes, which are
-// compared as surfaces.
+// A copy without what may differ: times that were measured with what the rate controller made of
+// them, which no simulation can repeat, and surfaces as bytes, which are compared as surfaces.
 std::unique_ptr<google::protobuf::Message> comparable(const google::protobuf::Message& message) {
   std::unique_ptr<google::protobuf::Message> copy(message.New());
   copy->CopyFrom(message);
   if (auto* state = dynamic_cast<proto::FrameState*>(copy.get()))
-    replication::clear_measured(*state);
+    wire::write(wire::PaceFigures{}, *state);
   if (auto* surface = dynamic_cast<proto::SurfaceFrame*>(copy.get())) surface->clear_payload();
   return copy;
 }
@@ -336,7 +337,7 @@ void Verifier::check_gap(const proto::JournalGap& gap) {
 // ---- frames ----
 
 void Verifier::begin_frame(step::PublishedFrame& frame) {
-  frame.state_hash = report_.last_hash;
+  frame.figures.state_hash = report_.last_hash;
   frame.records = std::exchange(records_, {});
   frame_tick_ = frame.tick;
   frame_crc_ = frame.surface_crc;

@@ -1,9 +1,9 @@
 #include "server/session/replication/messages.h"
 
 #include <cmath>
-#include <limits>
 
 #include "common/base/version.h"
+#include "common/wire/figure_messages.h"
 #include "common/wire/surface_codec.h"
 #include "common/wire/surface_messages.h"
 #include "common/wire/tool_shape.h"
@@ -12,9 +12,21 @@
 namespace trocar::replication {
 namespace {
 
-static_assert(static_cast<int>(hands::ClaimOutcome::Slipped) == proto::CLAIM_SLIPPED);
+static_assert(static_cast<int>(wire::ClaimOutcome::RefusedHeld) == proto::CLAIM_REFUSED_HELD &&
+              static_cast<int>(wire::ClaimOutcome::RefusedNothingInReach) ==
+                  proto::CLAIM_REFUSED_NOTHING_IN_REACH &&
+              static_cast<int>(wire::ClaimOutcome::Released) == proto::CLAIM_RELEASED &&
+              static_cast<int>(wire::ClaimOutcome::TakenOver) == proto::CLAIM_TAKEN_OVER &&
+              static_cast<int>(wire::ClaimOutcome::Expired) == proto::CLAIM_EXPIRED &&
+              static_cast<int>(wire::ClaimOutcome::Slipped) == proto::CLAIM_SLIPPED &&
+              wire::kClaimOutcomes == proto::ClaimOutcome_ARRAYSIZE);
+static_assert(static_cast<int>(wire::GhostStatus::None) == proto::GHOST_NONE &&
+              static_cast<int>(wire::GhostStatus::Begins) == proto::GHOST_BEGINS &&
+              static_cast<int>(wire::GhostStatus::Follows) == proto::GHOST_FOLLOWS &&
+              static_cast<int>(wire::GhostStatus::Changed) == proto::GHOST_CHANGED &&
+              static_cast<int>(wire::GhostStatus::Behind) == proto::GHOST_BEHIND &&
+              wire::kGhostStatuses == proto::GhostStatus_ARRAYSIZE);
 static_assert(static_cast<int>(wire::RecordingStatus::Failed) == proto::RECORDING_FAILED);
-static_assert(static_cast<int>(step::RateLevel::Overloaded) == proto::RATE_OVERLOADED);
 
 void write(const Vec3f& from, proto::Vec3& to) {
   to.set_x(from.x);
@@ -87,76 +99,14 @@ wire::SharedBytes encode_surface_change(const wire::SurfaceChange& change,
   return wire::encode_envelope(envelope);
 }
 
-namespace {
-
-proto::SolverReason message_of(step::SolverReason reason) {
-  switch (reason) {
-    case step::SolverReason::None:
-      return proto::SOLVER_UNSPECIFIED;
-    case step::SolverReason::Idle:
-      return proto::SOLVER_IDLE;
-    case step::SolverReason::Fits:
-      return proto::SOLVER_FITS;
-    case step::SolverReason::Frozen:
-      return proto::SOLVER_FROZEN;
-    case step::SolverReason::Outside:
-      return proto::SOLVER_OUTSIDE;
-    case step::SolverReason::Force:
-      return proto::SOLVER_FORCE;
-    case step::SolverReason::Cut:
-      return proto::SOLVER_CUT;
-    case step::SolverReason::Error:
-      return proto::SOLVER_ERROR;
-    case step::SolverReason::Off:
-      return proto::SOLVER_OFF;
-    case step::SolverReason::Preparing:
-      return proto::SOLVER_PREPARING;
-  }
-  return proto::SOLVER_UNSPECIFIED;
+std::string describe(const wire::SolverFigures& solver) {
+  if (solver.is_reduced) return "reduced, " + wire::name_of(solver.patches);
+  return std::string("full, ") + wire::name_of(solver.reason);
 }
 
-// Clients take no number that is not finite.
-float finite(float value) {
-  return std::isfinite(value) ? value : std::numeric_limits<float>::max();
-}
-
-void write(const step::SolverFigures& solver, proto::SolverState& message) {
-  message.set_is_reduced(solver.is_reduced);
-  for (const auto patch : solver.patches.all()) message.add_patch(patch + 1);
-  message.set_reason(message_of(solver.reason));
-  message.set_estimate(finite(solver.estimate));
-  message.set_largest_node_force_n(finite(solver.largest_node_force_n));
-}
-
-}  // namespace
-
-proto::GhostStatus message_of(ghost::GhostStatus status) {
-  switch (status) {
-    case ghost::GhostStatus::Begins:
-      return proto::GHOST_BEGINS;
-    case ghost::GhostStatus::Follows:
-      return proto::GHOST_FOLLOWS;
-    case ghost::GhostStatus::Changed:
-      return proto::GHOST_CHANGED;
-    case ghost::GhostStatus::Behind:
-      return proto::GHOST_BEHIND;
-  }
-  return proto::GHOST_UNSPECIFIED;
-}
-
-std::string describe(const step::SolverFigures& solver) {
-  if (solver.is_reduced) {
-    std::string text = solver.patches.count == 1 ? "reduced, patch " : "reduced, patches ";
-    for (std::uint32_t i = 0; i < solver.patches.count; ++i)
-      text += (i > 0 ? " + " : "") + std::to_string(solver.patches.patches[i] + 1);
-    return text;
-  }
-  return std::string("full, ") + step::name_of(solver.reason);
-}
-
-void describe(const step::SolverChange& change, proto::SolverChange& message) {
+void describe(const wire::SolverChange& change, proto::SolverChange& message) {
   message.set_tick(change.tick);
-  write(change.figures, *message.mutable_solver());
+  wire::write(change.figures, *message.mutable_solver());
   message.set_text(describe(change.figures));
 }
 
@@ -188,49 +138,7 @@ void describe(const step::PublishedFrame& frame, proto::FrameState& state) {
     state.add_region_runs(static_cast<std::uint32_t>(end - begin));
     begin = end;
   }
-  state.set_active_nodes(frame.active_nodes);
-  state.set_queue_nodes(frame.queue_nodes);
-  state.set_region_count(frame.region_count);
-  state.set_sweeps(frame.sweeps);
-  state.set_far_sweeps(frame.far_sweeps);
-  state.set_far_interval(frame.far_interval);
-  state.set_residual_n(frame.residual_n);
-  if (frame.relaxation) {
-    auto& relaxation = *state.mutable_relaxation();
-    relaxation.set_energy_j(frame.relaxation->energy_j);
-    relaxation.set_volume_change(static_cast<float>(frame.relaxation->volume_change));
-    relaxation.set_relaxed_share(static_cast<float>(frame.relaxation->relaxed_share));
-  }
-  if (frame.solver.reason != step::SolverReason::None) write(frame.solver, *state.mutable_solver());
-  state.set_tick_cpu_us(frame.statistics.tick_median_us);
-  state.set_tick_cpu_p99_us(frame.statistics.tick_p99_us);
-  for (const float median : frame.statistics.median_us) state.add_stage_cpu_us(median);
-  state.set_slow_ticks(frame.statistics.slow_ticks);
-  state.set_state_hash(frame.state_hash);
-  const auto& figures = frame.statistics.rate;
-  auto& rate = *state.mutable_rate();
-  rate.set_level(static_cast<proto::RateLevel>(figures.level));
-  for (const auto sweeps : frame.layer_sweeps) rate.add_layer_sweeps(sweeps);
-  rate.set_node_limit(frame.node_limit);
-  rate.set_budget_us(figures.budget_us);
-  rate.set_predicted_us(figures.predicted_us);
-  rate.set_lowered(figures.lowered);
-  rate.set_raised(figures.raised);
-  rate.set_time_rate(figures.time_rate);
-}
-
-void clear_measured(proto::FrameState& state) {
-  state.clear_tick_cpu_us();
-  state.clear_tick_cpu_p99_us();
-  state.clear_stage_cpu_us();
-  state.clear_slow_ticks();
-  auto& rate = *state.mutable_rate();
-  rate.clear_level();
-  rate.clear_budget_us();
-  rate.clear_predicted_us();
-  rate.clear_lowered();
-  rate.clear_raised();
-  rate.clear_time_rate();
+  wire::write(frame.figures, state);
 }
 
 wire::SharedBytes encode_frame_state(const step::PublishedFrame& frame) {
@@ -321,7 +229,7 @@ wire::SharedBytes encode_early_mark(hands::MarkAction action, Tick tick) {
 wire::SharedBytes encode_ghost(const ghost::GhostReport& report) {
   proto::Envelope envelope;
   auto& message = *envelope.mutable_ghost_frame();
-  message.set_status(message_of(report.status));
+  message.set_status(static_cast<proto::GhostStatus>(report.status));
   if (report.status == ghost::GhostStatus::Follows) {
     Bytes payload;
     wire::encode_keyframe(report.offsets, payload);

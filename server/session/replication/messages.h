@@ -28,12 +28,9 @@ namespace trocar::replication {
 // Messages that clients and journal get alike.
 void describe(const std::vector<participants::Participant>& present, proto::Participants& message);
 void describe(const step::PublishedFrame& frame, proto::FrameState& message);
-// Clears what no simulation can repeat: times that were measured, and what the rate controller made
-// of them.
-void clear_measured(proto::FrameState& message);
 void describe(const hands::ClaimEvent& event, const participants::Roster& roster,
               proto::ClaimEvent& message);
-void describe(const step::SolverChange& change, proto::SolverChange& message);
+void describe(const wire::SolverChange& change, proto::SolverChange& message);
 
 wire::SharedBytes encode_welcome(ParticipantSlot slot, std::uint64_t organ_hash);
 wire::SharedBytes encode_participants(const std::vector<participants::Participant>& present);
@@ -58,6 +55,6 @@ wire::SharedBytes encode_goodbye(EndReason reason, const std::string& text);
 // One line for a person about what became of a claim: by whom it is held and what to do.
 std::string describe(const hands::ClaimEvent& event, const participants::Roster& roster);
 // Says which solver acts and why: "reduced, patch 12", "full, tissue was cut".
-std::string describe(const step::SolverFigures& solver);
+std::string describe(const wire::SolverFigures& solver);
 
 }  // namespace trocar::replication

@@ -29,6 +29,9 @@
 
 namespace trocar::contact {
 
+// Searches reach so much farther than distances say, for the rounding of places.
+inline constexpr float kRounding_m = 1e-5f;
+
 inline constexpr std::size_t kMaxPointsPerTool = 8192;
 inline constexpr std::size_t kMaxSelfPoints = 4096;
 inline constexpr int kMaxPointNodes = 4;

@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "common/math/morton.h"
+#include "server/tissue/contact/contact_list.h"
 
 namespace trocar::contact {
 namespace {

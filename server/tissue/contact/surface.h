@@ -31,8 +31,6 @@ namespace trocar::contact {
 using Box = trocar::Box<float>;
 
 inline constexpr std::uint32_t kMaxDivisions = 8;
-// Searches reach so much farther than distances say, for the rounding of places.
-inline constexpr float kRounding_m = 1e-5f;
 
 struct SurfaceTriangle {
   std::array<NodeIndex, 3> nodes;  // counter-clockwise seen from outside

@@ -11,8 +11,8 @@
 #include <optional>
 #include <span>
 
+#include "common/wire/figures.h"
 #include "server/tissue/dynamics/block_descent.h"
-#include "server/tissue/dynamics/solver_figures.h"
 #include "server/tissue/topology/edit.h"
 
 namespace trocar::dynamics {
@@ -42,7 +42,7 @@ class FarFieldModel {
   virtual bool resume() = 0;
 
   // Returns the figures of the last choice.
-  virtual const SolverFigures& figures() const = 0;
+  virtual const wire::SolverFigures& figures() const = 0;
 };
 
 // Makes models for simulations of one organ that share what never changes.

@@ -27,7 +27,7 @@ class LinearFarField {
   // that is taken to be linear: errors are of its square.
   static constexpr float kMaxSpread = 0.05f;
 
-  // Measures the edges at rest; take_state() must follow. The tissue must outlive it.
+  // Measures the edges at rest; read_state() must follow. The tissue must outlive it.
   LinearFarField(Tissue& tissue, const world::World& world);
 
   // Displacements, per slot, are new everywhere.

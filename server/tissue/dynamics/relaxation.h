@@ -23,11 +23,13 @@
 #include <vector>
 
 #include "common/base/workers.h"
+#include "common/wire/figures.h"
 #include "server/tissue/dynamics/nodal_relaxation.h"
-#include "server/tissue/dynamics/relaxation_figures.h"
 #include "server/tissue/world/world.h"
 
 namespace trocar::dynamics {
+
+using wire::RelaxationFigures;
 
 class Relaxation {
  public:

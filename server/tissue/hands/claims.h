@@ -21,6 +21,7 @@
 #include "common/base/index.h"
 #include "common/base/tick.h"
 #include "common/tool/tool.h"
+#include "common/wire/claim_outcome.h"
 #include "server/tissue/world/state_archive.h"
 
 namespace trocar::hands {
@@ -30,15 +31,7 @@ inline constexpr Tick kAbandonTicks = 2000;  // without a sample: the grasp star
 inline constexpr Tick kAbandonRampTicks = 500;
 inline constexpr Tick kTakeoverRampTicks = 100;  // also when the holder leaves
 
-enum class ClaimOutcome : std::uint8_t {
-  Granted = 0,
-  RefusedHeld = 1,
-  RefusedNothingInReach = 2,
-  Released = 3,
-  TakenOver = 4,
-  Expired = 5,
-  Slipped = 6,  // the tissue was pulled out of the grasp
-};
+using wire::ClaimOutcome;
 
 struct ClaimEvent {
   Tick tick = 0;

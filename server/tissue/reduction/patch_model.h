@@ -9,16 +9,16 @@
 #include <span>
 #include <vector>
 
+#include "common/wire/figures.h"
 #include "server/organs/organ/local_reduction.h"
 #include "server/organs/organ/organ.h"
-#include "server/tissue/dynamics/solver_figures.h"
 #include "server/tissue/reduction/block_matrix.h"
 #include "server/tissue/reduction/dense.h"
 #include "server/tissue/reduction/element_set.h"
 
 namespace trocar::reduction {
 
-using dynamics::PatchSet;
+using wire::PatchSet;
 
 class LocalModels;
 

@@ -55,7 +55,7 @@ void ReducedState::visit_state(world::StateArchive& archive, const LocalModels& 
   const auto are_there = [&](const PatchSet& set) {
     return std::ranges::all_of(set.all(), [&](std::uint32_t p) { return p < models.size(); });
   };
-  bool is_good = static_cast<std::uint8_t>(reason) < dynamics::kSolverReasons &&
+  bool is_good = static_cast<std::uint8_t>(reason) < wire::kSolverReasons &&
                  are_there(far.patches) && are_there(preparing);
   for (std::uint32_t i = 0; i < ready_count; ++i) is_good = is_good && are_there(ready[i]);
   if (is_good) return;

@@ -18,7 +18,7 @@
 
 namespace trocar::reduction {
 
-using dynamics::SolverReason;
+using wire::SolverReason;
 
 // In snapshot and hash of sessions with a reduction.
 struct ReducedState {
@@ -50,7 +50,7 @@ class ReducedTissue : public dynamics::FarFieldModel {
   void visit_state(world::StateArchive& archive) override { state_.visit_state(archive, models_); }
   // Makes the state's patches ready.
   bool resume() override;
-  const dynamics::SolverFigures& figures() const override { return figures_; }
+  const wire::SolverFigures& figures() const override { return figures_; }
 
   const ReducedState& state() const { return state_; }
 
@@ -76,7 +76,7 @@ class ReducedTissue : public dynamics::FarFieldModel {
   Model acting_;               // null: the full solver
   std::vector<Joint> joints_;  // some of those that are ready
   Joint making_;
-  dynamics::SolverFigures figures_;
+  wire::SolverFigures figures_;
   std::vector<NodeIndex> near_;
   std::vector<Vec3f> gradient_;
   std::vector<NodeIndex> loaded_;

@@ -13,21 +13,23 @@ void hand_out(const topology::Edit& edit, State& state) {
   }
 }
 
-void hand_out(const topology::Edit& edit, const world::World& world, StepContext& context) {
-  context.neighbours.update_changed(edit.topology);
-  context.queue.forget(world.node_count());
-  context.active.forget();
-  context.finder.update(edit.surface, world);
-  context.self_finder.update(edit.surface, world);
-  context.solver.update_topology(edit.topology, world);  // and with it its far field
+void hand_out(const topology::Edit& edit, const world::World& world, ContactWork& contact,
+              NearWork& near, SolveWork& solve) {
+  near.neighbours.update_changed(edit.topology);
+  near.queue.forget(world.node_count());
+  near.active.forget();
+  contact.finder.update(edit.surface, world);
+  contact.self_finder.update(edit.surface, world);
+  solve.solver.update_topology(edit.topology, world);  // and with it its far field
 }
 
-void hand_out(const topology::Edit& edit, State& state, StepContext& context) {
+void hand_out(const topology::Edit& edit, State& state, ContactWork& contact, NearWork& near,
+              SolveWork& solve) {
   // The far field's nodes are given back first: new ones lie between nodes where these are.
-  if (state.far_model) state.far_model->stop_for(edit, context.solver, state.world);
+  if (state.far_model) state.far_model->stop_for(edit, solve.solver, state.world);
   hand_out(edit, state);
-  hand_out(edit, state.world, context);
-  context.solver.refresh_relaxed_forces(state.world);
+  hand_out(edit, state.world, contact, near, solve);
+  solve.solver.refresh_relaxed_forces(state.world);
 }
 
 }  // namespace trocar::step

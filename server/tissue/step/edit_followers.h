@@ -8,13 +8,15 @@
 
 namespace trocar::step {
 
-// Hands the edit to all of the state; then a context made for it is out of date.
+// Hands the edit to all of the state; then the work made for it is out of date.
 void hand_out(const topology::Edit& edit, State& state);
 
-// Hands it to all that is computed from the state, whose world has it already.
-void hand_out(const topology::Edit& edit, const world::World& world, StepContext& context);
+// Hands it to the work that follows from the state, whose world has it already.
+void hand_out(const topology::Edit& edit, const world::World& world, ContactWork& contact,
+              NearWork& near, SolveWork& solve);
 
 // Hands an edit of this tick to both.
-void hand_out(const topology::Edit& edit, State& state, StepContext& context);
+void hand_out(const topology::Edit& edit, State& state, ContactWork& contact, NearWork& near,
+              SolveWork& solve);
 
 }  // namespace trocar::step

@@ -4,27 +4,21 @@
 // replication strand and the journal. Nobody outside the simulation thread sees anything else of
 // its state.
 
-#include <array>
 #include <memory>
-#include <optional>
 #include <vector>
 
 #include "common/base/bytes.h"
 #include "common/base/ids.h"
 #include "common/base/tick.h"
 #include "common/tool/tool.h"
+#include "common/wire/figures.h"
 #include "common/wire/quantise.h"
 #include "common/wire/surface_change.h"
-#include "server/tissue/dynamics/relaxation_figures.h"
-#include "server/tissue/dynamics/solver_figures.h"
 #include "server/tissue/hands/claims.h"
 #include "server/tissue/hands/inputs.h"
 #include "server/tissue/step/tick_report.h"
 
 namespace trocar::step {
-
-using dynamics::kSolverReasons, dynamics::SolverChange, dynamics::SolverFigures,
-    dynamics::SolverReason, dynamics::name_of;
 
 struct ToolFrame {
   ToolSlot tool;
@@ -74,17 +68,8 @@ struct PublishedFrame {
   // between publications: publishing changes the quantisation's hysteresis after the tick's hash.
   std::shared_ptr<const Bytes> snapshot;
   Tick snapshot_tick = 0;
-  std::uint64_t state_hash = 0;
-  std::uint32_t active_nodes = 0, queue_nodes = 0, region_count = 0;
-  std::uint32_t sweeps = 0, far_sweeps = 0;  // of active nodes and of all others
-  std::uint32_t far_interval = 1;            // ticks for which these far sweeps are
-  LayerCounts layer_sweeps{};                // of active nodes by layer
-  std::uint32_t node_limit = 0;
-  float residual_n = 0;
-  std::optional<dynamics::RelaxationFigures> relaxation;  // of tissue that relaxes
-  SolverFigures solver;                                   // of the frame's tick
-  std::vector<SolverChange> solver_changes;               // of the ticks since the frame before
-  StageStatistics statistics;  // of the last second; for people, never an input
+  std::vector<wire::SolverChange> solver_changes;  // of the ticks since the frame before
+  wire::FrameFigures figures;                      // of the frame's tick
 };
 
 using SharedFrame = std::shared_ptr<const PublishedFrame>;

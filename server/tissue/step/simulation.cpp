@@ -83,6 +83,13 @@ bool is_costly(const organ::Organ& organ) {
 
 }  // namespace
 
+SolveWork::SolveWork(const organ::Organ& organ, unsigned workers, const world::World& uncut)
+    : solver(organ, uncut, workers),
+      far_plan(solver.far_plan(kTickSeconds)),
+      has_linear_far_field(is_costly(organ)) {
+  if (has_linear_far_field) solver.use_linear_far_field(uncut);
+}
+
 // The solver begins with the organ as it was, whatever the state: plans and places follow from that
 // and from the edits since.
 StepContext::StepContext(const Scene& s, unsigned workers, const State& state)
@@ -90,34 +97,34 @@ StepContext::StepContext(const Scene& s, unsigned workers, const State& state)
 
 StepContext::StepContext(const Scene& s, unsigned workers, const world::World& uncut,
                          const State& state)
-    : scene(s),
-      finder(s.organ),
-      self_finder(s.organ),
-      neighbours(s.organ.mesh.node_neighbours),
-      queue(state.world.node_count()),
-      active(state.world.node_count()),
-      solver(s.organ, uncut, workers),
-      far_plan(solver.far_plan(kTickSeconds)),
-      has_linear_far_field(is_costly(s.organ)),
+    : contact{.finder = contact::ContactFinder(s.organ),
+              .self_finder = contact::SelfContactFinder(s.organ),
+              .found = {},
+              .requests = {}},
+      near{.neighbours = s.organ.mesh.node_neighbours,
+           .queue = propagation::PropagationQueue(state.world.node_count()),
+           .active = propagation::ActiveSet(state.world.node_count()),
+           .seeds = {}},
+      solve(s.organ, workers, uncut),
       surface_displacements(state.cuts.layout().vertex_count()) {
-  if (has_linear_far_field) solver.use_linear_far_field(uncut);
-  contacts.reserve();
-  seeds.reserve(2 * kMaxTools);
-  requests.reserve(kMaxTools);
-  claim_events.reserve(4 * kMaxTools);
-  solver_changes.reserve(4 * kTicksPerFrame);
+  contact.found.reserve();
+  contact.requests.reserve(kMaxTools);
+  near.seeds.reserve(2 * kMaxTools);
+  outbox.claim_events.reserve(4 * kMaxTools);
+  outbox.solver_changes.reserve(4 * kTicksPerFrame);
   topology::Topology topology(s.organ);
   cutting::Places places(topology);
   topology::SurfaceMesh surface(s.organ);
   for (const auto& events : state.cuts.history()) {
     const auto applied = cutting::apply(events, topology, places);
     TROCAR_ASSERT(applied.ok());
-    hand_out({topology, {}, surface.update(topology)}, state.world, *this);
+    hand_out({topology, {}, surface.update(topology)}, state.world, contact, near, solve);
     topology.clear_changes();
   }
   // From now on everybody looks at the state's own topology.
-  if (!state.cuts.history().empty()) hand_out({state.cuts.topology(), {}, {}}, state.world, *this);
-  solver.read_state(state.world);
+  if (!state.cuts.history().empty())
+    hand_out({state.cuts.topology(), {}, {}}, state.world, contact, near, solve);
+  solve.solver.read_state(state.world);
 }
 
 namespace {
@@ -193,12 +200,7 @@ Simulation Simulation::beside(unsigned workers) const {
 const TickReport& Simulation::tick(const hands::TickInputs& inputs, const TickDecisions& decisions,
                                    ExternalLoads* loads) {
   if (inputs.mark != hands::MarkAction::None) use_mark(inputs.mark);
-  context_->inputs = &inputs;
-  context_->decisions = decisions;
-  context_->loads = loads;
-  run_tick(*state_, *context_);
-  context_->inputs = nullptr;
-  context_->loads = nullptr;
+  run_tick(inputs, decisions, loads, *state_, *context_);
   return context_->report;
 }
 
@@ -206,7 +208,7 @@ void Simulation::use_mark(hands::MarkAction action) {
   MarkEvent event{state_->world.tick + 1, action, true};
   if (action == hands::MarkAction::Set) {
     state_->set_mark();
-    context_->mark_events.push_back(event);
+    context_->outbox.mark_events.push_back(event);
     return;
   }
   auto marked = state_->returned_to_mark(scene_->organ);
@@ -214,12 +216,10 @@ void Simulation::use_mark(hands::MarkAction action) {
   event.is_done = context != nullptr;
   if (event.is_done) {
     state_ = std::move(marked);
-    context->claim_events = std::move(context_->claim_events);
-    context->mark_events = std::move(context_->mark_events);
-    context->solver_changes = std::move(context_->solver_changes);
+    context->outbox = std::move(context_->outbox);
     context_ = std::move(context);
   }
-  context_->mark_events.push_back(event);
+  context_->outbox.mark_events.push_back(event);
 }
 
 std::unique_ptr<StepContext> Simulation::context_of(State& state) const {

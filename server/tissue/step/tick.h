@@ -1,7 +1,7 @@
 #pragma once
 
-// One tick: a pure function of (state, admitted inputs, decisions). tick.cpp is the table of
-// contents.
+// One tick is a pure function of (state, admitted inputs, decisions). run_tick in tick.cpp is the
+// table of contents, and each stage says in its signature what it reads and what it writes.
 
 #include <memory>
 
@@ -63,57 +63,69 @@ struct Scene {
   std::unique_ptr<const dynamics::FarFieldModels> far_models;  // of it where it stays; null: none
 };
 
-// Laid out as input, scratch and output of a tick. Scratch keeps its capacity, so that a tick does
-// not allocate after warm-up; nothing in it outlives a tick's meaning.
+// The stages keep these structs from tick to tick, so that none begins anew or allocates after
+// warm-up. Nothing in them is state: all of it follows from the state, the edits and the last tick.
+
+struct ContactWork {
+  contact::ContactFinder finder;
+  contact::SelfContactFinder self_finder;
+  contact::ContactList found;
+  std::vector<hands::ClaimRequest> requests;  // scratch of the claims, points into `found`
+};
+
+// These nodes are solved most.
+struct NearWork {
+  propagation::Neighbours neighbours;
+  propagation::PropagationQueue queue;
+  propagation::ActiveSet active;
+  // By tool, empty without contact; then tissue on tissue; then external loads.
+  std::vector<std::span<const NodeIndex>> seeds;
+};
+
+struct SolveWork {
+  SolveWork(const organ::Organ& organ, unsigned workers, const world::World& uncut);
+
+  dynamics::BlockDescent solver;
+  dynamics::FarPlan far_plan;
+  bool has_linear_far_field;
+  std::array<dynamics::SweepBand, kSweepLayers> bands{};  // of swept nodes, by layer
+};
+
+struct CutWork {
+  std::vector<NodeIndex> may_tear;
+  double travel_m = 0;  // sum over ticks of the farthest that any node has moved
+};
+
+// Events wait here for the next frame.
+struct Outbox {
+  std::vector<hands::ClaimEvent> claim_events;
+  std::vector<MarkEvent> mark_events;
+  std::vector<wire::SolverChange> solver_changes;
+};
+
 struct StepContext {
   StepContext(const Scene& scene, unsigned workers, const State& state);
   // uncut: the world of the organ as it was at first.
   StepContext(const Scene& scene, unsigned workers, const world::World& uncut, const State& state);
 
-  // Input.
-  const Scene& scene;
-  const hands::TickInputs* inputs = nullptr;
-  TickDecisions decisions;
-  ExternalLoads* loads = nullptr;  // null: only tools act
-
-  // Scratch and stage results, valid from their stage to the end of the tick.
-  contact::ContactFinder finder;
-  contact::SelfContactFinder self_finder;
-  contact::ContactList contacts;
-  propagation::Neighbours neighbours;
-  propagation::PropagationQueue queue;
-  propagation::ActiveSet active;
-  std::array<dynamics::SweepBand, kSweepLayers> sweep_bands{};  // of active nodes, by layer
-  dynamics::BlockDescent solver;
-  dynamics::FarPlan far_plan;
-  bool has_linear_far_field;
-  // By tool, empty without contact; then tissue on tissue; then external loads.
-  std::vector<std::span<const NodeIndex>> seeds;
-  std::vector<hands::ClaimRequest> requests;
-  std::vector<Vec3f> surface_displacements;
-  std::vector<NodeIndex> may_tear;
-  double travel_m = 0;  // sum over ticks of the farthest that any node has moved
+  ContactWork contact;
+  NearWork near;
+  SolveWork solve;
+  CutWork cut;
+  std::vector<Vec3f> surface_displacements;  // scratch of the publish stage
   StateHasher hasher;
-
-  // Output.
-  std::vector<hands::ClaimEvent> claim_events;  // gathered until published
-  std::vector<MarkEvent> mark_events;           // likewise
-  std::vector<SolverChange> solver_changes;     // likewise
-  SolverFigures solver_figures;                 // of the last tick
-  std::shared_ptr<PublishedFrame> frame;        // set by the publish stage
+  Outbox outbox;
+  std::shared_ptr<PublishedFrame> frame;  // set by the publish stage
   TickReport report;
 };
 
-// The stages, in order, each timed.
-void run_tick(State& state, StepContext& context);
+// The stages run in order, each timed. loads: null: only tools act.
+void run_tick(const hands::TickInputs& inputs, const TickDecisions& decisions, ExternalLoads* loads,
+              State& state, StepContext& context);
 
-// Stages that other drivers of the same state use: those that look for equilibria.
-//
-// Tools come and go, and move one step.
-void admit_inputs(State& state, StepContext& context);
-// After the solve: proxies go where the surface lets them.
-void follow_contacts(State& state, StepContext& context);
-// Who holds what from the next tick.
-void update_claims(State& state, StepContext& context);
+// Tools come and go, and move one step. Returns how many inputs were dropped. Drivers that look for
+// equilibria of the same state use it too.
+std::uint32_t admit_inputs(const hands::TickInputs& inputs, Tick tick, hands::ToolTable& tools,
+                           hands::ClaimTable& claims, contact::GraspTable& grasps);
 
 }  // namespace trocar::step

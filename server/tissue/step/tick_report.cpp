@@ -11,40 +11,15 @@ LayerCounts sweeps_of_layers(const TickDecisions& decisions) {
   return sweeps;
 }
 
-const char* name_of(RateLevel level) {
-  switch (level) {
-    case RateLevel::Fixed:
-      return "fixed";
-    case RateLevel::Full:
-      return "full";
-    case RateLevel::Reduced:
-      return "reduced";
-    case RateLevel::Overloaded:
-      return "overloaded";
-  }
-  return "?";
-}
-
-const char* name_of(Stage stage) {
-  switch (stage) {
-    case Stage::Admit:
-      return "admit";
-    case Stage::Contacts:
-      return "contacts";
-    case Stage::Queue:
-      return "queue";
-    case Stage::Solve:
-      return "solve";
-    case Stage::Cut:
-      return "cut";
-    case Stage::Claims:
-      return "claims";
-    case Stage::Hash:
-      return "hash";
-    case Stage::Publish:
-      return "publish";
-  }
-  return "?";
+std::uint32_t faults_of(const TickReport& report) {
+  std::uint32_t faults = 0;
+  if (report.inputs_dropped > 0) faults |= kFaultInputDropped;
+  if (report.contact.is_full) faults |= kFaultContactLimit;
+  if (report.contact.has_tool_inside) faults |= kFaultToolInside;
+  if (report.solve.is_stepped_down) faults |= kFaultOverRelaxation;
+  if (report.solve.nodes_rejected > 0) faults |= kFaultNonFinite;
+  if (report.cut.is_full) faults |= kFaultCutLimit;
+  return faults;
 }
 
 }  // namespace trocar::step

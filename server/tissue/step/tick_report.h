@@ -6,10 +6,13 @@
 #include <cstdint>
 
 #include "common/base/tick.h"
+#include "common/wire/figures.h"
 #include "server/tissue/blades/cut_report.h"
 #include "server/tissue/world/world.h"
 
 namespace trocar::step {
+
+using wire::kStageCount, wire::kSweepLayers, wire::LayerCounts, wire::Stage;
 
 // How exactly a tick is solved. A session has the default; an experiment may want more.
 struct TickPolicy {
@@ -51,9 +54,6 @@ struct TickDecisions {
 
   bool operator==(const TickDecisions&) const = default;
 };
-// Layers that have sweeps of their own: touched nodes, layer 1, layer 2, all beyond.
-inline constexpr std::size_t kSweepLayers = 4;
-using LayerCounts = std::array<std::uint32_t, kSweepLayers>;
 LayerCounts sweeps_of_layers(const TickDecisions& decisions);
 
 inline constexpr std::uint32_t kMaxDepthLimit = 1000;
@@ -63,10 +63,6 @@ inline constexpr std::uint32_t kMaxFarSweeps = 16;
 inline constexpr std::uint32_t kMaxFarInterval = 4;
 // Layers where nodes outside the queue stand still: shallower ones feel stiff.
 inline constexpr std::uint32_t kFrozenDepthLimit = 6;
-
-enum class Stage { Admit, Contacts, Queue, Solve, Cut, Claims, Hash, Publish };
-inline constexpr int kStageCount = 8;
-const char* name_of(Stage stage);
 
 // Error bits: what was dropped or degraded, and which limit to raise.
 enum TickFault : std::uint32_t {
@@ -78,54 +74,38 @@ enum TickFault : std::uint32_t {
   kFaultCutLimit = 1u << 5,        // the surface has as many triangles as may be: blades are blunt
 };
 
+struct ContactReport {
+  std::uint32_t nodes = 0;       // that tools touch
+  std::uint32_t self_pairs = 0;  // of tissue near tissue, see server/tissue/contact/self_contact.h
+  bool is_full = false;          // see kFaultContactLimit
+  bool has_tool_inside = false;  // see kFaultToolInside
+};
+
+struct SolveReport {
+  wire::SolveFigures figures;
+  LayerCounts layer_nodes{};          // active nodes that are not fixed, as in sweeps_of_layers()
+  std::uint64_t node_sweeps = 0;      // nodes stepped by the solver, all sweeps together
+  std::uint64_t far_node_sweeps = 0;  // of these, nodes outside the queue
+  bool is_far_linear = false;         // these were stepped by matrices
+  std::uint32_t nodes_rejected = 0;   // see kFaultNonFinite
+  std::uint32_t nodes_restored = 0;   // likewise: put back, at rest
+  bool is_stepped_down = false;       // see kFaultOverRelaxation
+  bool is_converged = true;           // unless a step missed TickPolicy's tolerance
+  float largest_move_m = 0;           // of a node in the whole tick, at most
+};
+
+// Each stage says this about itself.
 struct TickReport {
   Tick tick = 0;
   std::array<std::uint32_t, kStageCount> stage_cpu_ns{};
-  std::uint32_t contact_nodes = 0;
-  std::uint32_t self_pairs = 0;   // of tissue near tissue, see server/tissue/contact/self_contact.h
-  std::uint32_t queue_nodes = 0;  // nodes the propagation reached
-  std::uint32_t active_nodes = 0;  // queue plus nodes that have not come to rest
-  LayerCounts layer_nodes{};       // active nodes that are not fixed, as in sweeps_of_layers()
-  std::uint32_t region_count = 0;
   std::uint32_t inputs_dropped = 0;
-  std::uint32_t nodes_rejected = 0;          // see kFaultNonFinite
-  std::uint32_t nodes_restored = 0;          // likewise: put back, at rest
-  bool is_converged = true;                  // unless a step missed TickPolicy's tolerance
-  std::uint32_t sweeps = 0, far_sweeps = 0;  // of active nodes and of all others
-  std::uint64_t node_sweeps = 0;             // nodes stepped by the solver, all sweeps together
-  std::uint64_t far_node_sweeps = 0;         // of these, nodes outside the queue
-  bool is_far_linear = false;                // these were stepped by matrices
-  std::uint32_t far_interval = 1;            // in every so many ticks
-  bool is_reduced = false;                   // a patch of a reduction moved the far nodes
+  ContactReport contact;
+  wire::NearFigures near;
+  SolveReport solve;
   blades::CutReport cut;
   std::uint32_t faults = 0;  // TickFault bits
-  float residual_n = 0;      // root mean square nodal force imbalance in the last sweep
   std::uint64_t state_hash = 0;
 };
-
-// The rate controller (server/session/control) reports this level to people; it is never an input
-// of a tick.
-enum class RateLevel : std::uint8_t {
-  Fixed,       // decisions are fixed: there is no controller
-  Full,        // all that was asked for
-  Reduced,     // less, within its limits
-  Overloaded,  // the least, and still too much: simulated time slows
-};
-const char* name_of(RateLevel level);
-
-struct RateFigures {
-  RateLevel level = RateLevel::Fixed;
-  float budget_us = 0, predicted_us = 0;  // of a tick's time; what the next one will take
-  std::uint64_t lowered = 0, raised = 0;  // steps in the whole session
-  float time_rate = 1;                    // simulated time over real time, last second
-};
-
-struct StageStatistics {
-  std::array<float, kStageCount> median_us{};
-  std::array<float, kStageCount> p99_us{};
-  float tick_median_us = 0, tick_p99_us = 0;
-  std::uint64_t slow_ticks = 0;  // ticks by which simulated time fell behind real time
-  RateFigures rate;
-};
+std::uint32_t faults_of(const TickReport& report);
 
 }  // namespace trocar::step

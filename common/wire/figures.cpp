@@ -1,8 +1,8 @@
-#include "server/tissue/dynamics/solver_figures.h"
+#include "common/wire/figures.h"
 
 #include <algorithm>
 
-namespace trocar::dynamics {
+namespace trocar::wire {
 
 bool PatchSet::has(std::uint32_t patch) const {
   return std::ranges::binary_search(all(), patch);
@@ -13,6 +13,13 @@ bool PatchSet::add(std::uint32_t patch) {
   patches[count++] = patch;
   std::sort(patches.begin(), patches.begin() + count);
   return true;
+}
+
+std::string name_of(const PatchSet& patches) {
+  std::string text = patches.count == 1 ? "patch " : "patches ";
+  for (std::uint32_t i = 0; i < patches.count; ++i)
+    text += (i > 0 ? " + " : "") + std::to_string(patches.patches[i] + 1);
+  return text;
 }
 
 const char* name_of(SolverReason reason) {
@@ -41,4 +48,40 @@ const char* name_of(SolverReason reason) {
   return "?";
 }
 
-}  // namespace trocar::dynamics
+const char* name_of(RateLevel level) {
+  switch (level) {
+    case RateLevel::Fixed:
+      return "fixed";
+    case RateLevel::Full:
+      return "full";
+    case RateLevel::Reduced:
+      return "reduced";
+    case RateLevel::Overloaded:
+      return "overloaded";
+  }
+  return "?";
+}
+
+const char* name_of(Stage stage) {
+  switch (stage) {
+    case Stage::Admit:
+      return "admit";
+    case Stage::Contacts:
+      return "contacts";
+    case Stage::Queue:
+      return "queue";
+    case Stage::Solve:
+      return "solve";
+    case Stage::Cut:
+      return "cut";
+    case Stage::Claims:
+      return "claims";
+    case Stage::Hash:
+      return "hash";
+    case Stage::Publish:
+      return "publish";
+  }
+  return "?";
+}
+
+}  // namespace trocar::wire

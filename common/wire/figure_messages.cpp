@@ -1,0 +1,159 @@
+#include "common/wire/figure_messages.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "proto/wire.pb.h"
+
+namespace trocar::wire {
+
+static_assert(static_cast<int>(RateLevel::Full) == proto::RATE_FULL &&
+              static_cast<int>(RateLevel::Reduced) == proto::RATE_REDUCED &&
+              static_cast<int>(RateLevel::Overloaded) == proto::RATE_OVERLOADED &&
+              kRateLevels == proto::RateLevel_ARRAYSIZE);
+static_assert(static_cast<int>(SolverReason::None) == proto::SOLVER_UNSPECIFIED &&
+              static_cast<int>(SolverReason::Idle) == proto::SOLVER_IDLE &&
+              static_cast<int>(SolverReason::Fits) == proto::SOLVER_FITS &&
+              static_cast<int>(SolverReason::Frozen) == proto::SOLVER_FROZEN &&
+              static_cast<int>(SolverReason::Outside) == proto::SOLVER_OUTSIDE &&
+              static_cast<int>(SolverReason::Force) == proto::SOLVER_FORCE &&
+              static_cast<int>(SolverReason::Cut) == proto::SOLVER_CUT &&
+              static_cast<int>(SolverReason::Error) == proto::SOLVER_ERROR &&
+              static_cast<int>(SolverReason::Off) == proto::SOLVER_OFF &&
+              static_cast<int>(SolverReason::Preparing) == proto::SOLVER_PREPARING &&
+              kSolverReasons == proto::SolverReason_ARRAYSIZE);
+
+namespace {
+
+// Clients take no number that is not finite.
+float finite(float value) {
+  return std::isfinite(value) ? value : std::numeric_limits<float>::max();
+}
+bool is_sane(float value) {
+  return std::isfinite(value) && value >= 0;
+}
+
+Error bad(const char* what) {
+  return {ErrorCode::BadMessage, std::string("FrameState.") + what};
+}
+
+Status read(const proto::RelaxationState& message, RelaxationFigures& figures) {
+  figures = {message.energy_j(), message.volume_change(), message.relaxed_share()};
+  if (!std::isfinite(figures.energy_j) || !std::isfinite(figures.volume_change) ||
+      !std::isfinite(figures.relaxed_share))
+    return bad("relaxation: a number is not finite");
+  return {};
+}
+
+Status read(const proto::SolverState& message, SolverFigures& figures) {
+  figures.is_reduced = message.is_reduced();
+  for (const auto patch : message.patch())
+    if (patch == 0 || !figures.patches.add(patch - 1))
+      return bad("solver: a patch has the number 0, or there are over 4");
+  if (message.reason() > 0 && message.reason() < kSolverReasons)
+    figures.reason = static_cast<SolverReason>(message.reason());
+  figures.estimate = message.estimate();
+  figures.largest_node_force_n = message.largest_node_force_n();
+  if (!is_sane(figures.estimate) || !is_sane(figures.largest_node_force_n))
+    return bad("solver: a number is negative or not finite");
+  return {};
+}
+
+Status read(const proto::RateState& message, FrameFigures& figures) {
+  auto& layers = figures.solve.layer_sweeps;
+  if (message.layer_sweeps_size() > static_cast<int>(layers.size()))
+    return bad("rate: there are over 4 layers");
+  std::ranges::copy(message.layer_sweeps(), layers.begin());
+  figures.near.node_limit = message.node_limit();
+  auto& rate = figures.pace.rate;
+  if (message.level() > 0 && message.level() < static_cast<int>(kRateLevels))
+    rate.level = static_cast<RateLevel>(message.level());
+  rate.budget_us = message.budget_us();
+  rate.predicted_us = message.predicted_us();
+  rate.lowered = message.lowered();
+  rate.raised = message.raised();
+  rate.time_rate = message.time_rate();
+  if (!is_sane(rate.budget_us) || !is_sane(rate.predicted_us) || !is_sane(rate.time_rate))
+    return bad("rate: a time is negative or not finite");
+  return {};
+}
+
+}  // namespace
+
+void write(const SolverFigures& figures, proto::SolverState& message) {
+  message.set_is_reduced(figures.is_reduced);
+  message.clear_patch();
+  for (const auto patch : figures.patches.all()) message.add_patch(patch + 1);
+  message.set_reason(static_cast<proto::SolverReason>(figures.reason));
+  message.set_estimate(finite(figures.estimate));
+  message.set_largest_node_force_n(finite(figures.largest_node_force_n));
+}
+
+void write(const PaceFigures& figures, proto::FrameState& message) {
+  message.set_tick_cpu_us(figures.tick_median_us);
+  message.set_tick_cpu_p99_us(figures.tick_p99_us);
+  message.clear_stage_cpu_us();
+  for (const float median : figures.stage_median_us) message.add_stage_cpu_us(median);
+  message.set_slow_ticks(figures.slow_ticks);
+  auto& rate = *message.mutable_rate();
+  rate.set_level(static_cast<proto::RateLevel>(figures.rate.level));
+  rate.set_budget_us(figures.rate.budget_us);
+  rate.set_predicted_us(figures.rate.predicted_us);
+  rate.set_lowered(figures.rate.lowered);
+  rate.set_raised(figures.rate.raised);
+  rate.set_time_rate(figures.rate.time_rate);
+}
+
+void write(const FrameFigures& figures, proto::FrameState& message) {
+  message.set_active_nodes(figures.near.active_nodes);
+  message.set_queue_nodes(figures.near.queue_nodes);
+  message.mutable_rate()->set_node_limit(figures.near.node_limit);
+  message.set_region_count(figures.near.region_count);
+  message.set_sweeps(figures.solve.sweeps);
+  message.set_far_sweeps(figures.solve.far_sweeps);
+  message.set_far_interval(figures.solve.far_interval);
+  message.mutable_rate()->clear_layer_sweeps();
+  for (const auto sweeps : figures.solve.layer_sweeps)
+    message.mutable_rate()->add_layer_sweeps(sweeps);
+  message.set_residual_n(figures.solve.residual_n);
+  message.clear_solver();
+  if (figures.solve.solver) write(*figures.solve.solver, *message.mutable_solver());
+  message.clear_relaxation();
+  if (figures.relaxation) {
+    auto& relaxation = *message.mutable_relaxation();
+    relaxation.set_energy_j(figures.relaxation->energy_j);
+    relaxation.set_volume_change(static_cast<float>(figures.relaxation->volume_change));
+    relaxation.set_relaxed_share(static_cast<float>(figures.relaxation->relaxed_share));
+  }
+  message.set_state_hash(figures.state_hash);
+  write(figures.pace, message);
+}
+
+Result<FrameFigures> read(const proto::FrameState& message) {
+  FrameFigures figures;
+  figures.near.active_nodes = message.active_nodes();
+  figures.near.queue_nodes = message.queue_nodes();
+  figures.near.region_count = message.region_count();
+  figures.solve.sweeps = message.sweeps();
+  figures.solve.far_sweeps = message.far_sweeps();
+  figures.solve.far_interval = std::max(1u, message.far_interval());
+  figures.solve.residual_n = message.residual_n();
+  figures.state_hash = message.state_hash();
+  auto& pace = figures.pace;
+  pace.tick_median_us = message.tick_cpu_us();
+  pace.tick_p99_us = message.tick_cpu_p99_us();
+  pace.slow_ticks = message.slow_ticks();
+  const auto& stages = message.stage_cpu_us();
+  std::copy_n(stages.begin(), std::min<std::size_t>(kStageCount, stages.size()),
+              pace.stage_median_us.begin());
+  if (message.has_relaxation())
+    if (auto s = read(message.relaxation(), figures.relaxation.emplace()); !s) return s.error();
+  if (message.has_solver())
+    if (auto s = read(message.solver(), figures.solve.solver.emplace()); !s) return s.error();
+  if (message.has_rate())
+    if (auto s = read(message.rate(), figures); !s) return s.error();
+  return figures;
+}
+
+}  // namespace trocar::wire
