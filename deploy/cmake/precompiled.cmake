@@ -36,6 +36,12 @@ function(add_precompiled_headers)
     target_compile_options(trocar_${name}_headers PRIVATE -fpch-preprocess)
     # Position-independent as executables are.
     set_target_properties(trocar_${name}_headers PROPERTIES POSITION_INDEPENDENT_CODE OFF)
+    if(CCACHE_PROGRAM)
+      # A precompiled header holds the paths of what it includes: one from another checkout does not
+      # know this one's headers, which would then be read twice.
+      set_target_properties(trocar_${name}_headers PROPERTIES CXX_COMPILER_LAUNCHER
+        "${CMAKE_COMMAND};-E;env;--unset=CCACHE_NOHASHDIR;CCACHE_BASEDIR=;CCACHE_SLOPPINESS=pch_defines,time_macros;${CCACHE_PROGRAM}")
+    endif()
   endforeach()
 endfunction()
 

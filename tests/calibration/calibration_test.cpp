@@ -98,8 +98,8 @@ TEST(Calibration, ReferenceReachesItsToleranceInEveryTick) {
 
 TEST(Convergence, ToleranceFollowsTheForceDownToWhatRoundingLeaves) {
   Pilot pilot;
-  pilot.note({.tick = 5, .residual_n = 1}, 4);
-  pilot.note({.tick = Pilot::kPilotTicks, .residual_n = 1e-6f}, 2);
+  pilot.note({.tick = 5, .solve = {.figures = {.residual_n = 1}}}, 4);
+  pilot.note({.tick = Pilot::kPilotTicks, .solve = {.figures = {.residual_n = 1e-6f}}}, 2);
   EXPECT_EQ(pilot.largest_force_n(), 4);
   EXPECT_FLOAT_EQ(pilot.tolerance_n(100), 1.2e-5f);
   EXPECT_FLOAT_EQ(pilot.tolerance_for(8, 100), 2.4e-5f);
@@ -119,10 +119,13 @@ TEST(Convergence, OneTickThatMissedIsSeen) {
   Convergence convergence;
   EXPECT_FALSE(convergence.is_reached());
   const auto decisions = converged_decisions(1e-5f);
-  convergence.note({.is_converged = true, .sweeps = 7, .residual_n = 9e-6f}, decisions);
+  convergence.note({.solve = {.figures = {.sweeps = 7, .residual_n = 9e-6f}, .is_converged = true}},
+                   decisions);
   EXPECT_TRUE(convergence.is_reached());
-  convergence.note({.is_converged = false, .sweeps = 500, .residual_n = 2e-5f}, decisions);
-  convergence.note({.is_converged = true}, {});
+  convergence.note(
+      {.solve = {.figures = {.sweeps = 500, .residual_n = 2e-5f}, .is_converged = false}},
+      decisions);
+  convergence.note({.solve = {.is_converged = true}}, {});
   EXPECT_FALSE(convergence.is_reached());
   EXPECT_EQ(convergence.words(),
             "tolerance 1e-05 N per node, reached in 1 of 2 ticks, largest residual 2e-05 N, at "

@@ -80,8 +80,8 @@ class Server {
 
  private:
   LoopOptions loop_options() const;
-  void record_frames();
-  void take_ghost(std::shared_ptr<const ghost::GhostReport> report);
+  void publish_frames();
+  void show_ghost(std::shared_ptr<const ghost::GhostReport> report);
   void warn_if_slow();
   void on_signal(int signal);
   void begin_end();
@@ -100,7 +100,7 @@ class Server {
   asio::steady_timer poll_{io_};
   std::unique_ptr<net::TcpServer> tcp_;
   std::unique_ptr<replication::Replicator> replicator_;
-  FrameHandover handover_{[this] { asio::post(io_, [this] { record_frames(); }); }};
+  FrameHandover handover_{[this] { asio::post(io_, [this] { publish_frames(); }); }};
   std::vector<step::SharedFrame> frames_;
   std::atomic<std::shared_ptr<const ghost::GhostReport>> ghost_report_;  // the newest; null: taken
   std::vector<replication::BarrierResult> barrier_;
@@ -143,7 +143,7 @@ Status Server::open() {
   if (reduction_)
     ghost_ = std::make_unique<ghost::Ghost>(
         simulation_, ghost::GhostOptions{options_.decisions, [this] { loop_->request_snapshot(); },
-                                         [this](auto report) { take_ghost(std::move(report)); }});
+                                         [this](auto report) { show_ghost(std::move(report)); }});
   return {};
 }
 
@@ -196,12 +196,12 @@ void Server::on_signal(int signal) {
   signals_.clear();  // a second one ends the process at once
 }
 
-void Server::record_frames() {
+void Server::publish_frames() {
   if (is_ending_) return;
   if (journal_) replicator_->set_recording(journal_->state());
   handover_.pop_all(frames_);
   replicator_->publish(frames_);
-  if (ghost_) ghost_->record_frames(frames_);
+  if (ghost_) ghost_->push(frames_);
   for (const auto& frame : frames_)
     for (const auto& [tick, solver] : frame->solver_changes)
       log::debug("tick {}: solver {}", tick, replication::describe(solver));
@@ -209,7 +209,7 @@ void Server::record_frames() {
 }
 
 // On the ghost's thread. Of reports that the I/O thread has not seen yet the newest counts.
-void Server::take_ghost(std::shared_ptr<const ghost::GhostReport> report) {
+void Server::show_ghost(std::shared_ptr<const ghost::GhostReport> report) {
   if (ghost_report_.exchange(std::move(report))) return;
   asio::post(io_, [this] {
     const auto newest = ghost_report_.exchange(nullptr);
@@ -232,7 +232,7 @@ void Server::warn_if_slow() {
 }
 
 void Server::begin_end() {
-  record_frames();
+  publish_frames();
   is_ending_ = true;
   if (ghost_) ghost_->set_wanted(false);
   signals_.cancel();
