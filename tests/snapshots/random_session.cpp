@@ -2,8 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 
+#include "common/base/assert.h"
 #include "server/organs/catalogue/builtin_organs.h"
+#include "server/organs/organ/local_reduction_file.h"
+#include "server/organs/organ/organ_file.h"
 #include "server/tissue/reduction/reduced_tissue.h"
 
 namespace trocar::testing {
@@ -84,15 +88,33 @@ SnapshotScene random_scene(SnapshotOrgan kind, std::uint64_t seed) {
   return scene;
 }
 
+SnapshotScene reduced_scene(std::size_t patch) {
+  const std::filesystem::path folder = TROCAR_SOURCE_DIR "/tests/step/reduced_block";
+  auto organ = organ::read_organ(folder / "reduced_block.organ");
+  TROCAR_ASSERT(organ.ok());
+  auto local = organ::read_session_reduction(folder / "reduced_block.reduction", *organ);
+  TROCAR_ASSERT(local.ok());
+  const auto home = local->patches.at(patch).centre;
+  return {.organ = std::move(*organ),
+          .reduction = std::make_shared<const organ::LocalReduction>(std::move(*local)),
+          .reach_m = 0.012f,
+          .home = home,
+          .is_gentle = true};
+}
+
 RandomSession::RandomSession(SnapshotScene scene, std::uint64_t seed)
     : simulation_(std::move(scene.organ), 1, reduction::at_work(std::move(scene.reduction))),
       reach_m_(scene.reach_m),
+      is_gentle_(scene.is_gentle),
       random_(seed),
       hands_(kHands) {
   for (std::size_t i = 0; i < hands_.size(); ++i)
-    hands_[i].work = i < 2 ? Work::Scalpel : i == 2 ? Work::Forceps : Work::Finger;
+    hands_[i].work = is_gentle_ ? Work::Finger
+                     : i < 2    ? Work::Scalpel
+                     : i == 2   ? Work::Forceps
+                                : Work::Finger;
   const auto& nodes = simulation_.state().world.surface_nodes;
-  home_ = nodes[random_.below(static_cast<std::uint32_t>(nodes.size()))];
+  home_ = scene.home.value_or(nodes[random_.below(static_cast<std::uint32_t>(nodes.size()))]);
 }
 
 RandomSession::~RandomSession() = default;
@@ -124,7 +146,8 @@ void RandomSession::plan(Hand& hand, Tick now) {
   NodeIndex b = any_surface_node();
   for (int tries = 0; tries < 30 && length(at(b) - at(a)) > 0.07f; ++tries) b = any_surface_node();
   const Vec3f out = out_of(a);
-  const auto depth = static_cast<float>(random_.between(0.003, 0.02));
+  const auto depth = static_cast<float>(is_gentle_ ? random_.between(0.0003, 0.002)
+                                                   : random_.between(0.003, 0.02));
   const Vec3f away = at(a) + out * 0.03f;
   const auto orientation = rotation_from_z(out);
   using enum tool::Verb;
@@ -181,7 +204,7 @@ Pose RandomSession::pose_at(const Hand& hand, Tick now, tool::Verb& verb) const 
 void RandomSession::make_inputs() {
   const Tick now = simulation_.current_tick() + 1;
   inputs_.clear();
-  for (std::uint8_t i = 0; i < kHands; ++i) {
+  for (std::uint8_t i = 0; i < (is_gentle_ ? 1 : kHands); ++i) {
     auto& hand = hands_[i];
     if (!hand.is_present) {
       if (now > 1 && random_.below(100) != 0) continue;

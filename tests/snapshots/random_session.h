@@ -4,6 +4,7 @@
 // another simulation, and continued there: bytes and hashes must be the same. A seed names a run.
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -35,10 +36,16 @@ struct SnapshotFigures {
 struct SnapshotScene {
   organ::Organ organ;
   std::shared_ptr<const organ::LocalReduction> reduction;  // or null
-  // Below it hands stay near this place, m; 0: they go everywhere.
+  // Hands stay this near to a place, m; 0: they go everywhere.
   float reach_m = 0;
+  // The place is this node; without: any of the surface.
+  std::optional<NodeIndex> home = std::nullopt;
+  // One hand presses softly, so that a reduction need not give way.
+  bool is_gentle = false;
 };
 SnapshotScene random_scene(SnapshotOrgan organ, std::uint64_t seed);
+// Returns the block of tests/step/reduced_block with its reduction, pressed softly near a patch.
+SnapshotScene reduced_scene(std::size_t patch);
 
 class RandomSession {
  public:
@@ -78,6 +85,7 @@ class RandomSession {
 
   step::Simulation simulation_;
   const float reach_m_;
+  const bool is_gentle_;
   NodeIndex home_;
   Random random_;
   std::vector<Hand> hands_;

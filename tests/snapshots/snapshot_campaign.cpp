@@ -6,7 +6,6 @@
 #include <cstdio>
 #include <optional>
 
-#include "tests/reduce/reduced_block.h"
 #include "tests/snapshots/random_session.h"
 
 namespace trocar::testing {
@@ -49,8 +48,6 @@ int run(int argc, char** argv) {
     rows.push_back({.organ = organ, .figures = {}});
   }
   if (has_reduction) rows.push_back({});
-  std::unique_ptr<reduce::testing::ReducedBlock> block;
-  if (has_reduction) block = std::make_unique<reduce::testing::ReducedBlock>(4);
 
   std::printf(
       "| organ | sessions | states | ticks continued | in a cut | cut | torn | "
@@ -61,8 +58,7 @@ int run(int argc, char** argv) {
     const std::uint64_t wanted = (count + rows.size() - 1) / rows.size();
     for (; row.figures.snapshots < wanted; ++row.sessions) {
       const auto of_session = seed + row.sessions;
-      auto scene = row.organ ? random_scene(*row.organ, of_session)
-                             : SnapshotScene{block->organ, block->local, 0};
+      auto scene = row.organ ? random_scene(*row.organ, of_session) : reduced_scene(of_session % 2);
       RandomSession session(std::move(scene), of_session);
       const auto wrong = session.run(std::min(kPerSession, wanted - row.figures.snapshots));
       row.figures += session.figures();

@@ -34,6 +34,13 @@ TEST(Snapshots, OfRandomSessionsAreReadAndContinuedBitForBit) {
   EXPECT_GT(all.after_a_tear, 0u);
 }
 
+TEST(Snapshots, OfSessionsWithAReductionAreReadAndContinuedBitForBit) {
+  SnapshotFigures all;
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) all += run(reduced_scene(seed % 2), seed, 15);
+  EXPECT_GT(all.reduced, 10u);
+  EXPECT_LT(all.reduced, all.snapshots) << "it also gives way";
+}
+
 TEST(Snapshots, OfLargeOrgansAreReadAndContinuedBitForBit) {
   run(random_scene(SnapshotOrgan::Stomach, 1), 1, 3);
   run(random_scene(SnapshotOrgan::Chest, 1), 1, 3);
