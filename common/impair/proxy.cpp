@@ -87,6 +87,9 @@ class Proxy::Core : public std::enable_shared_from_this<Proxy::Core> {
     const tcp::endpoint endpoint(address, network->options.listen_port);
     acceptor.open(endpoint.protocol(), error);
     if (!error) acceptor.set_option(asio::socket_base::reuse_address(true), error);
+    // Accepted sockets inherit it.
+    const int buffer = receive_buffer_bytes(network->options.up);
+    if (!error) acceptor.set_option(asio::socket_base::receive_buffer_size(buffer), error);
     if (!error) acceptor.bind(endpoint, error);
     if (!error) acceptor.listen(asio::socket_base::max_listen_connections, error);
     if (error) return error;

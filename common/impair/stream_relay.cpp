@@ -9,18 +9,24 @@ namespace trocar::impair {
 namespace {
 
 using asio::ip::tcp;
-// Small, so that back-pressure is felt on the other side of the proxy and kernels hide no backlog.
+// Small, so that back-pressure is felt on the other side of the proxy.
 constexpr int kSocketBuffer = 64 * 1024;
+constexpr int kLeastReceiveBuffer = 4 * 1024;
 constexpr std::size_t kMostWritten = 64 * 1024;
 
 void prepare(tcp::socket& socket) {
   boost::system::error_code ignored;
   socket.set_option(tcp::no_delay(true), ignored);
   socket.set_option(asio::socket_base::send_buffer_size(kSocketBuffer), ignored);
-  socket.set_option(asio::socket_base::receive_buffer_size(kSocketBuffer), ignored);
 }
 
 }  // namespace
+
+int receive_buffer_bytes(const Impairment& impairment) {
+  if (impairment.rate <= 0) return kSocketBuffer;
+  const double backlog = impairment.rate * std::chrono::duration<double>(impairment.queue).count();
+  return static_cast<int>(std::clamp(backlog, double{kLeastReceiveBuffer}, double{kSocketBuffer}));
+}
 
 StreamRelay::Half::Half(Direction& direction, const Network& network, Flow flow,
                         std::uint64_t number, tcp::socket& reads, tcp::socket& writes)
@@ -69,6 +75,11 @@ void StreamRelay::finish() {
 }
 
 asio::awaitable<void> StreamRelay::connect() {
+  boost::system::error_code ignored;
+  server_.open(network_->stream_server.protocol(), ignored);
+  server_.set_option(
+      asio::socket_base::receive_buffer_size(receive_buffer_bytes(network_->down.impairment)),
+      ignored);
   const auto [error] = co_await server_.async_connect(network_->stream_server, kNoThrow);
   if (is_closed_) co_return;
   if (error) {

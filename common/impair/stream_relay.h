@@ -17,6 +17,10 @@
 
 namespace trocar::impair {
 
+// For sockets that this direction is read from: what waits unread there waits unseen before the cap
+// on the rate, so a slow link gets a small buffer. It must be set before a connection exists.
+int receive_buffer_bytes(const Impairment& impairment);
+
 class StreamRelay : public std::enable_shared_from_this<StreamRelay> {
  public:
   StreamRelay(std::shared_ptr<Network> network, asio::ip::tcp::socket client, std::uint64_t number);

@@ -229,6 +229,26 @@ TEST_F(ProxyTest, APeerThatDoesNotReadTakesNoMoreThanTheBound) {
   EXPECT_EQ(wrong, 0u);
 }
 
+// The backlog before a slow link lies with the sender, who can see it, not in the proxy.
+TEST_F(ProxyTest, ASlowLinkHoldsLittle) {
+  start({.up = {.rate = 10'000, .queue = 100ms}});
+  auto client = connect();
+  auto server = acceptor_.accept();
+  client.non_blocking(true);
+  client.set_option(asio::socket_base::send_buffer_size(4096));
+  const auto chunk = pattern(4096);
+  std::size_t sent = 0, refusals = 0;
+  boost::system::error_code error;
+  while (refusals < 20 && sent < 1u << 20) {
+    sent += client.write_some(asio::buffer(chunk), error);
+    if (error != asio::error::would_block) continue;
+    ++refusals;
+    std::this_thread::sleep_for(1ms);
+  }
+  EXPECT_LT(sent, 100'000u);
+  EXPECT_LE(ask([&] { return proxy_->stream_waiting_bytes(); }), 5'000u);
+}
+
 TEST_F(ProxyTest, OneStreamTooManyIsClosedAndCounted) {
   start({.most_streams = 2});
   auto first = connect(), second = connect();
