@@ -1,5 +1,6 @@
 #include "common/impair/proxy.h"
 
+#include <algorithm>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/io_context.hpp>
 #include <map>
@@ -76,7 +77,10 @@ class Proxy::Core : public std::enable_shared_from_this<Proxy::Core> {
       return Error{ErrorCode::ResourceMissing, "--to: no machine '" + options.server_host +
                                                    "' is known (" + error.message() +
                                                    "): write its address"};
-    network->stream_server = found.begin()->endpoint();
+    // Datagrams cannot tell which of several addresses answers, so "localhost" is 127.0.0.1.
+    const auto is_v4 = [](const auto& entry) { return entry.endpoint().address().is_v4(); };
+    const auto first_v4 = std::find_if(found.begin(), found.end(), is_v4);
+    network->stream_server = (first_v4 == found.end() ? found.begin() : first_v4)->endpoint();
     network->datagram_server = {network->stream_server.address(), options.server_port};
     return {};
   }

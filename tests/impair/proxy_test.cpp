@@ -145,7 +145,7 @@ TEST_F(ProxyTest, TheDatagramsAreLostThatTheSeedSays) {
 }
 
 TEST_F(ProxyTest, PeersOfDatagramsAreToldApart) {
-  start({.up = {.delay = 1ms}});
+  start({.server_host = "localhost", .up = {.delay = 1ms}});
   auto first = peer(), second = peer();
   udp::endpoint from_first, from_second;
   send(first, 1);
