@@ -12,7 +12,8 @@ constexpr std::array kProduct{"common/",
                               "server/tissue/",
                               "server/session/",
                               "server/app/server/",
-                              "server/app/journal/"};
+                              "server/app/journal/",
+                              "server/app/impair/"};
 constexpr std::array kApart{"server/papers/", "server/lab/"};
 
 template <std::size_t kCount>
