@@ -85,7 +85,7 @@ TEST(ReducedSession, IsNearTheConvergedFullSolution) {
   const Press press{.depth_m = 0.006f};
   for (Tick tick = 1; tick <= 500; ++tick) {
     reduced.tick(press.at(tick), {});
-    ASSERT_TRUE(converged.tick(press.at(tick), kConverged).is_converged) << tick;
+    ASSERT_TRUE(converged.tick(press.at(tick), kConverged).solve.is_converged) << tick;
     if (tick < 100 || tick % 20 != 0) continue;
     ASSERT_TRUE(reduced.context().report.solve.figures.is_reduced()) << tick;
     const Vec3f expected = force_of(converged), found = force_of(reduced);
@@ -152,7 +152,7 @@ TEST_F(TwoPatches, ActTogether) {
     if (tick > 500) {
       EXPECT_EQ(figures.patches.count, 2u) << tick;
     }
-    ASSERT_TRUE(converged.tick(inputs_at(tick), kConverged).is_converged) << tick;
+    ASSERT_TRUE(converged.tick(inputs_at(tick), kConverged).solve.is_converged) << tick;
   }
   EXPECT_GT(preparing, 20u);
   for (std::size_t tool = 0; tool < 2; ++tool) {

@@ -131,10 +131,10 @@ TEST(Marks, AreInSnapshotsAndInTheHash) {
       ASSERT_EQ(frame_a->surface_crc, frame_b->surface_crc);
     }
   };
-  update(20, 640);
+  follow(20, 640);
   run(a, 3);
   run_tick(a, hands::MarkAction::Return);
-  update(60, 0);  // between the return and the frame that tells of it
+  follow(60, 0);  // between the return and the frame that tells of it
 }
 
 TEST(Marks, WithoutOneNothingHappens) {
