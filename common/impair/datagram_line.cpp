@@ -5,8 +5,6 @@
 namespace trocar::impair {
 namespace {
 
-// The queue itself takes about so much for each datagram.
-constexpr std::size_t kOverhead = 128;
 constexpr std::chrono::milliseconds kLongestHold{100};
 
 }  // namespace

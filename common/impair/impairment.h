@@ -24,6 +24,8 @@ namespace trocar::impair {
 
 using Time = std::chrono::nanoseconds;  // since the proxy has started
 inline constexpr Time kNever = Time::max();
+// A queue itself takes about so much for each packet that waits in it.
+inline constexpr std::size_t kOverhead = 128;
 
 struct Impairment {
   Time delay{0};       // one way

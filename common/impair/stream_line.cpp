@@ -5,8 +5,6 @@
 namespace trocar::impair {
 namespace {
 
-// The queue itself takes about so much for each segment.
-constexpr std::size_t kOverhead = 128;
 constexpr std::size_t kMostChunk = 64 * 1024;
 constexpr Time kShortestTimeout = std::chrono::milliseconds(200);
 constexpr Time kLongestTimeout = std::chrono::minutes(1);

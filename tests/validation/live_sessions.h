@@ -104,7 +104,7 @@ class References {
   // kLeastForce_n.
   Course run(const organ::Organ& organ, Script script, Tick field_ticks);
 
-  // As check_reference().
+  // Adds the two checks of check_reference().
   void check(Section& section, const std::string& name, Bound own_error) const;
 
  private:

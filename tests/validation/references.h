@@ -1,6 +1,6 @@
 #pragma once
 
-// What a reference that is solved tick by tick has to show before anything is judged by it.
+// A reference that is solved tick by tick has to pass these checks before anything is judged by it.
 
 #include <string>
 
