@@ -14,6 +14,7 @@
 #include "common/base/mix.h"
 #include "server/lab/reduce/check_count.h"
 #include "server/lab/reduce/cubature.h"
+#include "server/lab/reduce/eigen_index.h"
 #include "server/lab/reduce/inertia_fields.h"
 #include "server/lab/reduce/local_parts.h"
 #include "server/lab/reduce/patch_fields.h"
@@ -36,10 +37,6 @@ constexpr std::size_t kMaxCubatureTets = 800;
 // The equations of a cubature, one per field and state, are added up with random signs to so many,
 // in which residuals are those of all within a few per cent.
 constexpr std::size_t kCubatureRows = 2048;
-
-Eigen::Index index(std::size_t i) {
-  return static_cast<Eigen::Index>(i);
-}
 
 class Builder {
  public:

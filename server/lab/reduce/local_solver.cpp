@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 
+#include "server/lab/reduce/eigen_index.h"
 #include "server/lab/reduce/karhunen_loeve.h"
 #include "server/tissue/reduction/element_set.h"
 
@@ -24,9 +25,6 @@ constexpr double kNearlySettled = 1e-3;
 // A tangent is made anew when an iteration with it leaves more than this part of the residual.
 constexpr double kSlow = 0.35;
 
-Eigen::Index index(std::size_t i) {
-  return static_cast<Eigen::Index>(i);
-}
 double entry(const std::vector<double>& lower, std::size_t i, std::size_t j) {
   return i >= j ? lower[i * (i + 1) / 2 + j] : lower[j * (j + 1) / 2 + i];
 }

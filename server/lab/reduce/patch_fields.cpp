@@ -1,5 +1,6 @@
 #include "server/lab/reduce/patch_fields.h"
 
+#include "server/lab/reduce/eigen_index.h"
 #include "server/tissue/topology/tet_shape.h"
 
 namespace trocar::reduce {
@@ -9,10 +10,6 @@ namespace {
 // above what is of third order.
 constexpr double kDifference = 0.1;
 constexpr double kLeastShare = 0.125;
-
-Eigen::Index index(std::size_t i) {
-  return static_cast<Eigen::Index>(i);
-}
 
 finite_elements::Vector6 small_strain(const Matrix3& h) {
   finite_elements::Vector6 e;

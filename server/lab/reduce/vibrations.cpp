@@ -11,8 +11,8 @@ namespace {
 
 // Beyond `count`, so that the last ones converge, too.
 constexpr std::size_t kGuardModes = 8;
-constexpr int kMaxIterations = 40;
-constexpr double kSettled = 1e-6;  // change of the squares of rates
+constexpr int kMaxVibrationIterations = 40;
+constexpr double kSettledRate = 1e-6;  // change of the squares of rates
 
 }  // namespace
 
@@ -36,7 +36,7 @@ Vibrations slowest_vibrations(FullModel& model, std::size_t count) {
                 9007199254740992.0 -
             0.5;
   Vector squares = Vector::Zero(width);
-  for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
+  for (int iteration = 0; iteration < kMaxVibrationIterations; ++iteration) {
     const Matrix loads = masses.asDiagonal() * x;
     const Matrix moved = model.linear_displacements(loads);
     // Among K^-1 M x: stiffness moved^T K moved, mass moved^T M moved.
@@ -48,7 +48,8 @@ Vibrations slowest_vibrations(FullModel& model, std::size_t count) {
     const Vector before = squares;
     squares = found.eigenvalues();
     const auto kept = static_cast<Eigen::Index>(count);
-    if ((squares - before).head(kept).cwiseAbs().maxCoeff() <= kSettled * squares[kept - 1]) break;
+    if ((squares - before).head(kept).cwiseAbs().maxCoeff() <= kSettledRate * squares[kept - 1])
+      break;
   }
   Vibrations vibrations{x.leftCols(static_cast<Eigen::Index>(count)), {}};
   for (std::size_t i = 0; i < count; ++i)
