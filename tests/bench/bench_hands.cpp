@@ -367,8 +367,9 @@ void Session::print() const {
   std::printf("  given up, in this order:\n");
   for (const auto& [tick, what] : changes_)
     std::printf("    tick %6" PRIu64 ": %s\n", tick, what.c_str());
-  std::printf("  faults %08x, state hash %016" PRIx64 "%s\n", faults_, simulation_.state_hash(),
-              controller_ ? " (with the controller it depends on times; --fixed repeats)" : "");
+  std::printf(
+      "  faults %08x, state hash %016" PRIx64 "%s\n", faults_, simulation_.state_hash(),
+      controller_ ? " (with the controller it depends on times; the option fixed repeats)" : "");
 }
 
 void Session::write_csv(const std::string& path) const {
