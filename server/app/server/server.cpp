@@ -200,7 +200,7 @@ void Server::record_frames() {
   if (journal_) replicator_->set_recording(journal_->state());
   handover_.pop_all(frames_);
   replicator_->publish(frames_);
-  if (ghost_) ghost_->record_frames(frames_);
+  if (ghost_) ghost_->push(frames_);
   for (const auto& frame : frames_)
     for (const auto& [tick, solver] : frame->solver_changes)
       log::debug("tick {}: solver {}", tick, replication::describe(solver));
