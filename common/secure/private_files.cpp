@@ -31,7 +31,8 @@ Error missing(const fs::path& path, const char* what, const char* advice) {
 
 bool others_may_read(const fs::path& path) {
   struct stat status {};
-  return ::stat(path.c_str(), &status) == 0 && (status.st_mode & kOthers) != 0;
+  if (::stat(path.c_str(), &status) != 0) return false;
+  return (status.st_mode & kOthers) != 0 || status.st_uid != ::geteuid();
 }
 
 }  // namespace
@@ -62,7 +63,8 @@ Status make_private_folder(const fs::path& folder) {
     return Error{ErrorCode::ResourceMissing,
                  folder.string() + ": is no folder: name another one with --state"};
   if (others_may_read(folder))
-    return Error{ErrorCode::BadFile, folder.string() + ": others may look into it: chmod 700"};
+    return Error{ErrorCode::BadFile,
+                 folder.string() + ": others may look into it: make it yours and chmod 700"};
   return {};
 }
 
@@ -100,7 +102,8 @@ Result<std::string> read_small_file(const fs::path& path) {
 
 Result<std::string> read_private_file(const fs::path& path) {
   if (others_may_read(path))
-    return Error{ErrorCode::BadFile, path.string() + ": others may read it: chmod 600"};
+    return Error{ErrorCode::BadFile,
+                 path.string() + ": others may read it: make it yours and chmod 600"};
   return read_small_file(path);
 }
 

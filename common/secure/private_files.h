@@ -19,7 +19,8 @@ Result<std::filesystem::path> default_state_folder();
 // then the default state folder.
 std::vector<std::filesystem::path> link_folders();
 
-// Makes it and what is missing above it; an error if others may look into it.
+// Makes it and what is missing above it; an error if it is another user's, or others may look into
+// it.
 Status make_private_folder(const std::filesystem::path& folder);
 Status write_private_file(const std::filesystem::path& path, std::string_view text);
 // An error if it is not there, larger than 1 MiB, or others may read it.

@@ -52,7 +52,9 @@ Result<CodeEntry> read_entry(const Json& json) {
   return entry;
 }
 
-Result<std::vector<CodeEntry>> parse(const std::string& text) {
+}  // namespace
+
+Result<std::vector<CodeEntry>> parse_codes(const std::string& text) {
   std::vector<CodeEntry> entries;
   try {
     const auto json = Json::parse(text);
@@ -69,8 +71,6 @@ Result<std::vector<CodeEntry>> parse(const std::string& text) {
   if (entries.size() > kMostCodes) return Error{ErrorCode::BadFile, "more than 1000 codes"};
   return entries;
 }
-
-}  // namespace
 
 CodeBook::CodeBook(std::filesystem::path state_folder, std::uint16_t port, Bytes key)
     : folder_(std::move(state_folder)),
@@ -104,7 +104,7 @@ Status CodeBook::read() {
   const auto now = stamp();
   const auto text = secure::read_private_file(file_);
   if (!text) return text.error();
-  auto entries = parse(*text);
+  auto entries = parse_codes(*text);
   if (!entries)
     return Error{ErrorCode::BadFile, file_.string() + ": is no list of codes (" +
                                          entries.error().message + "): remove it"};

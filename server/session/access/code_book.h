@@ -33,6 +33,9 @@ struct CodeEntry {
   bool is_revoked = false;
 };
 
+// Reads the text of a book's file.
+Result<std::vector<CodeEntry>> parse_codes(const std::string& text);
+
 enum class CodeState { Good, Wrong, Expired, UsedUp, Revoked };
 
 struct CodeVerdict {
