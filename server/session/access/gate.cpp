@@ -8,7 +8,6 @@
 namespace trocar::access {
 namespace {
 
-constexpr std::uint64_t kSecondNs = 1'000'000'000;
 constexpr int kMostSaidPerSecond = 10;
 
 std::string seconds_text(std::uint64_t seconds) {

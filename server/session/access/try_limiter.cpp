@@ -9,7 +9,6 @@
 namespace trocar::access {
 namespace {
 
-constexpr std::uint64_t kSecondNs = 1'000'000'000;
 constexpr int kMostDoublings = 6;  // 2^6 s is above the longest wait
 
 }  // namespace

@@ -16,6 +16,8 @@
 
 namespace trocar::access {
 
+inline constexpr std::uint64_t kSecondNs = 1'000'000'000;
+
 class TryLimiter {
  public:
   static constexpr int kFreeTries = 5;
