@@ -10,6 +10,7 @@
 #include <map>
 
 #include "common/base/version.h"
+#include "common/secure/join_code.h"
 #include "common/wire/role.h"
 
 namespace trocar::app {
@@ -19,7 +20,8 @@ constexpr const char* kExamples = R"(
 Examples:
   trocar-client
       a window; the mouse is an instrument (press H in it for the keys)
-  trocar-client --server 192.168.1.20:7690 --name "Dr. Ada" --role assistant
+  trocar-client --join trocar://192.168.1.20:7690/7K3M-9QXZ-4T2B-WN8C --role assistant
+      joins a session on another machine with the link that its server printed
   trocar-client --role observer --headless --seconds 10 --screenshot out/last.png
       watches without a display and leaves its last picture
   trocar-client --no-render --name Left --script deploy/scenes/lift.toml --summary out/left.json
@@ -95,7 +97,10 @@ Status check(const ClientOptions& options) {
   if (!options.script_file.empty() && !replica::has_tools(options.role))
     return Error{ErrorCode::Usage, "--script: an " + std::string(replica::name_of(options.role)) +
                                        " has no tools; use --role surgeon or assistant"};
-  if ((options.mark_at >= 0 || options.return_at >= 0) && options.role != replica::Role::Instructor)
+  if (options.is_insecure && !(options.join.empty() && options.ca_file.empty()))
+    return Error{ErrorCode::Usage,
+                 "--insecure-loopback: goes with neither --join nor --ca; leave one out"};
+  if ((options.mark_at >= 0 || options.return_at >= 0) && !wire::rights_of(options.role).may_mark)
     return Error{ErrorCode::Usage,
                  "--mark-at, --return-at: marks are an instructor's; use --role instructor"};
   if (options.display == Display::None && !options.screenshot_file.empty())
@@ -114,9 +119,19 @@ Result<std::optional<ClientOptions>> parse_client_command_line(int argc, char** 
   CLI::App app("Takes part in a session, watches one, or plays a recorded one.", "trocar-client");
   app.footer(kExamples);
   app.set_version_flag("--version", version_text());
-  app.add_option("--server", options.server, "where the session is")
-      ->type_name("HOST:PORT")
-      ->capture_default_str();
+  app.add_option("--join", options.join,
+                 "join code or link, as the server printed it; not needed for your own server on "
+                 "this machine")
+      ->type_name("CODE|LINK");
+  const auto* server =
+      app.add_option("--server", options.server, "where the session is, if no link says it")
+          ->type_name("HOST:PORT")
+          ->capture_default_str();
+  app.add_option("--ca", options.ca_file,
+                 "trust servers that this CA (PEM) vouches for, instead of the code's first half")
+      ->type_name("FILE");
+  app.add_flag("--insecure-loopback", options.is_insecure,
+               "without TLS and codes, for tests; servers on this machine only");
   app.add_option("--wait", options.wait_s, "how long to try while no server is there yet")
       ->type_name("S")
       ->check(CLI::Range(0.0, 3600.0))
@@ -180,6 +195,11 @@ Result<std::optional<ClientOptions>> parse_client_command_line(int argc, char** 
     return Error{ErrorCode::Usage, std::string(error.what()) + " (see --help)"};
   }
   options.role = roles.at(role);
+  if (!options.join.empty()) {
+    const auto invitation = secure::parse_invitation(options.join);
+    if (!invitation) return Error{ErrorCode::Usage, "--join: " + invitation.error().message};
+    if (server->count() == 0 && !invitation->server.empty()) options.server = invitation->server;
+  }
   if (draws_nothing)
     options.display = Display::None;
   else if (is_headless)

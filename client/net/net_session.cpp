@@ -1,23 +1,20 @@
 #include "client/net/net_session.h"
 
 #include <algorithm>
-#include <boost/asio/as_tuple.hpp>
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/post.hpp>
-#include <boost/asio/read.hpp>
-#include <boost/asio/use_awaitable.hpp>
-#include <boost/asio/write.hpp>
 
+#include "client/replica/printable_message.h"
 #include "common/base/log.h"
 #include "common/base/timing.h"
 #include "common/base/version.h"
+#include "common/secure/certificate.h"
 #include "common/wire/tool_shape.h"
 
 namespace trocar::net {
 namespace {
 
-constexpr auto kNoThrow = asio::as_tuple(asio::use_awaitable);
 constexpr std::chrono::milliseconds kCloseDeadline{200};
 // How soon a full inbound queue is looked at again: well below one frame.
 constexpr std::chrono::milliseconds kRoomRetry{2};
@@ -87,6 +84,7 @@ void NetSource::Session::end(replica::CloseKind kind, std::string text) {
 void NetSource::Session::stop_io() {
   boost::system::error_code ignored;
   socket_.close(ignored);
+  if (stream_) stream_->socket().close(ignored);
   resolver_.cancel();
   for (auto* timer : {&retry_timer_, &room_timer_, &ping_timer_, &wake_timer_, &deadline_timer_})
     timer->cancel();
@@ -123,6 +121,7 @@ wire::SharedBytes NetSource::Session::encode_hello() const {
   hello.set_protocol_minor(kProtocolMinor);
   hello.set_name(options_.participant_name);
   hello.set_role(static_cast<proto::Role>(options_.role));
+  if (secret_) hello.set_join_secret(secret_->data(), secret_->size());
   for (const auto& shape : options_.tools) {
     wire::write(shape, *hello.add_tool());
   }
@@ -188,36 +187,83 @@ asio::awaitable<bool> NetSource::Session::connect() {
   const auto deadline = Clock::now() + options_.connect_deadline;
   asio::co_spawn(context_, expire(deadline),
                  [this](std::exception_ptr failure) { end_if_failed(failure); });
-  std::string why = "no answer";
+  why_not_ = "no answer";
   bool is_said = false;
   while (!is_done_ && Clock::now() < deadline) {
     const auto [unresolved, endpoints] =
         co_await resolver_.async_resolve(options_.host, std::to_string(options_.port), kNoThrow);
-    if (unresolved) why = unresolved.message();
+    if (unresolved) why_not_ = unresolved.message();
     for (const auto& endpoint : endpoints) {
       if (is_done_ || Clock::now() >= deadline) break;
       boost::system::error_code ignored;
       socket_.close(ignored);
       const auto [error] = co_await socket_.async_connect(endpoint, kNoThrow);
-      if (!error) {
-        socket_.set_option(tcp::no_delay(true), ignored);
-        deadline_timer_.cancel();
-        co_return true;
-      }
-      if (error != asio::error::operation_aborted) why = error.message();
+      if (error && error != asio::error::operation_aborted) why_not_ = error.message();
+      if (error) continue;
+      socket_.set_option(tcp::no_delay(true), ignored);
+      stream_.emplace(std::move(socket_), options_.tls);
+      const bool is_ready = co_await secure_stream();
+      if (is_done_) co_return false;
+      if (!is_ready) continue;
+      deadline_timer_.cancel();
+      co_return true;
     }
     if (is_done_ || Clock::now() >= deadline) break;
-    if (!is_said) say_waiting(why);
+    if (!is_said) say_waiting(why_not_);
     is_said = true;
     retry_timer_.expires_after(options_.connect_retry);
     co_await retry_timer_.async_wait(kNoThrow);
   }
-  end_unreachable(why);
+  end_unreachable(why_not_);
   co_return false;
 }
 
+// False: the session has ended, or another try may help.
+asio::awaitable<bool> NetSource::Session::secure_stream() {
+  if (!stream_->has_tls()) co_return true;
+  const auto error = co_await stream_->begin_tls(options_.host);
+  if (is_done_) co_return false;
+  if (error) {
+    end_insecure(error);
+    co_return false;
+  }
+  co_return accept_server();
+}
+
+void NetSource::Session::end_insecure(const boost::system::error_code& error) {
+  if (error == asio::error::operation_aborted) return;  // the deadline, which says so
+  if (secure::may_try_again(error)) {
+    why_not_ = "it closed the connection before TLS was there";
+    return;
+  }
+  end(replica::CloseKind::Refused,
+      server_name() + ": " + secure::describe_handshake_failure(error));
+}
+
+// Nothing has been sent yet: a server that is not the right one learns neither name nor secret.
+bool NetSource::Session::accept_server() {
+  if (!options_.join_code) return true;
+  const auto code = options_.join_code();
+  if (!code) {
+    end(replica::CloseKind::Refused, code.error().message);
+    return false;
+  }
+  const bool is_right =
+      options_.trusts_ca ||
+      secure::code_of_certificate(stream_->peer_certificate_der()) == code->certificate;
+  if (!is_right) {
+    end(replica::CloseKind::Refused,
+        server_name() +
+            " is not the server of this join code, its certificate is another: nothing was sent; "
+            "check the code's first eight characters and the address");
+    return false;
+  }
+  secret_ = code->secret;
+  return true;
+}
+
 asio::awaitable<bool> NetSource::Session::read_exactly(std::uint8_t* to, std::size_t count) {
-  const auto [error, taken] = co_await asio::async_read(socket_, asio::buffer(to, count), kNoThrow);
+  const auto [error, taken] = co_await stream_->read_all(asio::buffer(to, count));
   bytes_received_.fetch_add(taken, std::memory_order_relaxed);
   co_return !error;
 }
@@ -254,6 +300,7 @@ std::shared_ptr<const proto::Envelope> NetSource::Session::pop_message() {
     return nullptr;
   }
   messages_received_.fetch_add(1, std::memory_order_relaxed);
+  replica::make_printable(*message);
   if (message->has_pong()) {
     const auto elapsed_us = monotonic_ns() / 1000 - message->pong().client_time_us();
     round_trip_seconds_ = static_cast<double>(elapsed_us) * 1e-6;
@@ -310,12 +357,12 @@ asio::awaitable<void> NetSource::Session::write_messages() {
     }
     buffers.clear();
     for (const auto& frame : in_flight_) buffers.emplace_back(frame->data(), frame->size());
-    const auto [error, written] = co_await asio::async_write(socket_, buffers, kNoThrow);
+    const auto [error, written] = co_await stream_->write_all(buffers);
     bytes_sent_.fetch_add(written, std::memory_order_relaxed);
     if (error) co_return;  // the reader sees it too and says so
     if (is_closing_ && control_.empty()) {
       boost::system::error_code ignored;
-      socket_.shutdown(tcp::socket::shutdown_send, ignored);
+      stream_->socket().shutdown(tcp::socket::shutdown_send, ignored);
       co_return;  // the server closes, or the deadline
     }
   }

@@ -17,6 +17,7 @@
 
 #include "client/net/net_source.h"
 #include "common/base/spsc_queue.h"
+#include "common/secure/stream.h"
 #include "common/wire/framing.h"
 #include "proto/wire.pb.h"
 
@@ -49,6 +50,9 @@ class NetSource::Session {
 
   asio::awaitable<void> run();
   asio::awaitable<bool> connect();
+  asio::awaitable<bool> secure_stream();
+  void end_insecure(const boost::system::error_code& error);
+  bool accept_server();
   asio::awaitable<void> read_messages();
   asio::awaitable<bool> read_exactly(std::uint8_t* to, std::size_t count);
   asio::awaitable<void> deliver(std::shared_ptr<const proto::Envelope> message, std::size_t bytes);
@@ -73,7 +77,10 @@ class NetSource::Session {
 
   const NetSourceOptions options_;
   asio::io_context context_{1};
-  tcp::socket socket_{context_};
+  tcp::socket socket_{context_};  // while it connects
+  std::optional<secure::Stream> stream_;
+  std::string why_not_;  // there is no connection yet
+  std::optional<secure::HalfCode> secret_;
   tcp::resolver resolver_{context_};
   asio::steady_timer retry_timer_{context_}, room_timer_{context_}, ping_timer_{context_};
   asio::steady_timer wake_timer_{context_}, deadline_timer_{context_};

@@ -1,17 +1,18 @@
 #pragma once
 
-// A live server as a source of messages: TCP, handshake, pings, on a thread of its own.
+// A live server as a source of messages: TCP, TLS, handshake, pings, on a thread of its own.
 //
 //   Asio thread                                             render thread
-//   connect (retry until the deadline), Hello
+//   connect (retry until the deadline), TLS, check of the certificate, Hello
 //   read frame -> decode -> inbound queue [256 messages] --> poll(sink)
 //   write <---------------- outbound queue [256 messages] <-- send(envelope)
 //   Ping every 200 ms, Pong -> round trip
 //
 // Inbound queue full: nothing is read until there is room, so TCP holds the server back and the
 // server skips frames for us; nothing is dropped and nothing grows. Outbound queue full: send()
-// says false. state() changes inside poll() only, so call poll() also while connecting.
-// See session_source.h for what each member promises.
+// says false. Text from the server is made printable before anybody sees it. state() changes inside
+// poll() only, so call poll() also while connecting. See session_source.h for what each member
+// promises.
 
 #include <chrono>
 #include <functional>
@@ -21,6 +22,8 @@
 
 #include "client/replica/session_source.h"
 #include "common/base/result.h"
+#include "common/secure/join_code.h"
+#include "common/secure/tls.h"
 #include "common/tool/tool.h"
 
 namespace trocar::net {
@@ -31,6 +34,11 @@ struct NetSourceOptions {
   std::string participant_name;
   int role = 1;                        // proto::Role
   std::vector<tool::ToolShape> tools;  // empty: one default tool for roles that have tools
+  secure::TlsContext tls;              // null: without TLS
+  // With TLS, asked once the handshake is done: whose certificate it must be, and what is sent with
+  // Hello. Empty: nothing is compared and nothing is sent.
+  std::function<Result<secure::JoinCode>()> join_code;
+  bool trusts_ca = false;  // the CA in `tls` vouches for the server, so the code need not
   std::chrono::milliseconds connect_deadline{15000};  // a server may still be starting
   std::chrono::milliseconds connect_retry{200};
   std::chrono::milliseconds ping_interval{200};

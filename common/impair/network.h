@@ -12,17 +12,14 @@
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/ip/udp.hpp>
 #include <boost/asio/steady_timer.hpp>
-#include <boost/asio/use_awaitable.hpp>
 #include <chrono>
 #include <cstdint>
 #include <string>
 
+#include "common/base/no_throw.h"
 #include "common/impair/impairment.h"
 
 namespace trocar::impair {
-
-// Coroutines get the error of what they await as a value, not as an exception.
-inline constexpr auto kNoThrow = asio::as_tuple(asio::use_awaitable);
 
 struct ProxyOptions {
   std::string listen_address = "127.0.0.1";

@@ -17,19 +17,56 @@ enum class Role : std::uint8_t {
   Observer = 4
 };
 
+// A role's rights. The server checks them; a client looks here to offer only what it may do.
+struct Rights {
+  bool has_tools = false;
+  bool may_mark = false;      // marks the organ, and returns it to the mark
+  std::uint8_t admitted = 0;  // roles that a join code for this one lets in, a bit each
+
+  constexpr bool admits(Role role) const {
+    return (admitted >> static_cast<unsigned>(role) & 1u) != 0;
+  }
+};
+constexpr std::uint8_t bit_of(Role role) {
+  return static_cast<std::uint8_t>(1u << static_cast<unsigned>(role));
+}
+
 struct NamedRole {
   Role role = Role::Unknown;
   const char* name = "";
+  Rights rights;
 };
 
-// All that can be chosen.
-inline constexpr std::array<NamedRole, 4> kRoles{{{Role::Surgeon, "surgeon"},
-                                                  {Role::Assistant, "assistant"},
-                                                  {Role::Instructor, "instructor"},
-                                                  {Role::Observer, "observer"}}};
+// The one table of who may do what: all roles that can be chosen, with their rights. A code admits
+// its own role and those that may do no more, and an observer everywhere.
+inline constexpr std::array<NamedRole, 4> kRoles{
+    {{Role::Surgeon,
+      "surgeon",
+      {.has_tools = true,
+       .may_mark = false,
+       .admitted = bit_of(Role::Surgeon) | bit_of(Role::Assistant) | bit_of(Role::Observer)}},
+     {Role::Assistant,
+      "assistant",
+      {.has_tools = true,
+       .may_mark = false,
+       .admitted = bit_of(Role::Assistant) | bit_of(Role::Observer)}},
+     {Role::Instructor,
+      "instructor",
+      {.has_tools = false,
+       .may_mark = true,
+       .admitted = bit_of(Role::Instructor) | bit_of(Role::Observer)}},
+     {Role::Observer,
+      "observer",
+      {.has_tools = false, .may_mark = false, .admitted = bit_of(Role::Observer)}}}};
 
-inline bool has_tools(Role role) {
-  return role == Role::Surgeon || role == Role::Assistant;
+// None, for a role that is none of kRoles.
+constexpr Rights rights_of(Role role) {
+  for (const auto& known : kRoles)
+    if (known.role == role) return known.rights;
+  return {};
+}
+constexpr bool has_tools(Role role) {
+  return rights_of(role).has_tools;
 }
 // "unknown role" if it is none of kRoles.
 const char* name_of(Role role);

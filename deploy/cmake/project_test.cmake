@@ -23,5 +23,7 @@ function(project_test name)
     add_dependencies(sanitized_tests ${name})
   endif()
   gtest_discover_tests(${name} TEST_PREFIX "${name}." DISCOVERY_TIMEOUT 60
-    PROPERTIES TIMEOUT ${ARG_TIMEOUT} ${labels})
+    PROPERTIES TIMEOUT ${ARG_TIMEOUT} ${labels}
+    # Servers that tests start keep certificate and codes out of the user's folders.
+    ENVIRONMENT "XDG_STATE_HOME=${PROJECT_BINARY_DIR}/state")
 endfunction()

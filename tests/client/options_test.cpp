@@ -25,6 +25,13 @@ TEST(ClientOptions, DefaultsAreAWindowAndASurgeonOnThisMachine) {
   EXPECT_LE((*options)->name.size(), 32u);
 }
 
+TEST(ClientOptions, ALinkSaysWhereTheServerIsUnlessAnOptionDoes) {
+  const std::string link = "trocar://192.168.1.20:7777/7K3M-9QXZ-4T2B-WN8C";
+  EXPECT_EQ((*parse({"--join", link}))->server, "192.168.1.20:7777");
+  EXPECT_EQ((*parse({"--join", link, "--server", "localhost:1"}))->server, "localhost:1");
+  EXPECT_EQ((*parse({"--join", "7k3m9qxz4t2bwn8c"}))->server, "127.0.0.1:7690");
+}
+
 TEST(ClientOptions, OverlaysAndViewAreAsAskedFor) {
   const auto plain = parse({});
   EXPECT_EQ((*plain)->overlays, Overlays{});
@@ -56,6 +63,9 @@ TEST(ClientOptions, EachWrongValueIsAUsageErrorThatNamesTheOption) {
       {{"--view", "10,20"}, "--view"},
       {{"--view", "10,20,0"}, "--view"},
       {{"--view", "nan,0,1"}, "--view"},
+      {{"--join", "7K3M"}, "--join"},
+      {{"--join", "trocar://nowhere"}, "--join"},
+      {{"--insecure-loopback", "--join", "7K3M-9QXZ-4T2B-WN8C"}, "--insecure-loopback"},
       {{"--no-such-option"}, "no-such-option"}};
   for (const auto& [words, name] : cases) {
     const auto options = parse(words);

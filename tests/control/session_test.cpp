@@ -28,12 +28,19 @@ struct Session {
 
 Session start(const std::vector<std::string>& extra) {
   const auto folder = e2e::test_folder();
-  std::vector<std::string> arguments{"--listen",     "127.0.0.1:0",
-                                     "--organ",      "lattice",
-                                     "--seconds",    "2",
-                                     "--journal",    (folder / "session.mcap").string(),
-                                     "--ready-file", (folder / "port").string(),
-                                     "--summary",    (folder / "server.json").string()};
+  std::vector<std::string> arguments{"--insecure-loopback",
+                                     "--listen",
+                                     "127.0.0.1:0",
+                                     "--organ",
+                                     "lattice",
+                                     "--seconds",
+                                     "2",
+                                     "--journal",
+                                     (folder / "session.mcap").string(),
+                                     "--ready-file",
+                                     (folder / "port").string(),
+                                     "--summary",
+                                     (folder / "server.json").string()};
   arguments.insert(arguments.end(), extra.begin(), extra.end());
   e2e::Program server("trocar-server", arguments, folder / "server.log");
   EXPECT_TRUE(e2e::wait_for_file(folder / "port", 60)) << e2e::read_text(folder / "server.log");

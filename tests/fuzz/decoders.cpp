@@ -8,6 +8,7 @@
 
 #include "common/base/assert.h"
 #include "common/journal/session_journal.h"
+#include "common/secure/join_code.h"
 #include "common/tool/script.h"
 #include "common/wire/framing.h"
 #include "common/wire/surface_codec.h"
@@ -21,6 +22,7 @@
 #include "server/organs/organ/local_reduction_file.h"
 #include "server/organs/organ/organ_file.h"
 #include "server/papers/dogan/reduction_file.h"
+#include "server/session/access/code_book.h"
 #include "server/tissue/world/surface_layout.h"
 
 namespace trocar::fuzz {
@@ -145,6 +147,19 @@ bool decode_material(BytesView bytes) {
   return checked(material::parse_material_text(text_of(bytes), "a.toml"));
 }
 
+// A code that is read is written and read alike.
+bool decode_invitation(BytesView bytes) {
+  const auto invitation = secure::parse_invitation(text_of(bytes));
+  if (!checked(invitation)) return false;
+  const auto again = secure::parse_join_code(secure::to_text(invitation->code));
+  TROCAR_ASSERT(again.ok() && *again == invitation->code);
+  return true;
+}
+
+bool decode_codes(BytesView bytes) {
+  return checked(access::parse_codes(std::string(text_of(bytes))));
+}
+
 constexpr Decoder kDecoders[] = {
     {"envelope", decode_envelope},
     {"surface_codec", decode_surface},
@@ -158,6 +173,8 @@ constexpr Decoder kDecoders[] = {
     {"script", decode_script},
     {"scenario", decode_scenario},
     {"material", decode_material},
+    {"invitation", decode_invitation},
+    {"codes", decode_codes},
 };
 
 }  // namespace

@@ -134,7 +134,7 @@ TEST(Handshake, names_that_are_not_1_to_32_bytes_of_printable_utf8_are_refused) 
         std::string("\x7f"), std::string("\xc2\x85"), override_rtl + "evil", std::string(" a"),
         std::string("a "), std::string("\xef\xbb\xbf"), std::string("\xf4\x8f\xbf\xbf")})
     EXPECT_EQ(refusal_of(session, make_hello(name, proto::ROLE_SURGEON)).reason(),
-              proto::GOODBYE_PROTOCOL_ERROR)
+              proto::GOODBYE_NAME_INVALID)
         << ::testing::PrintToString(name);
   for (const std::string& name :
        {std::string(32, 'a'), std::string("\xc3\x96zlem \xe6\x9d\x8e"), std::string("x")}) {

@@ -207,10 +207,11 @@ class ServerProcess : public ::testing::Test {
     std::filesystem::create_directories(folder_);
     const auto ready = folder_ / "port";
     for (const std::string& more :
-         {std::string("--listen"), std::string("127.0.0.1:0"), std::string("--journal"),
-          std::string("none"), std::string("--organ"), std::string("lattice"),
-          std::string("--log-level"), std::string("off"), std::string("--ready-file"),
-          ready.string(), std::string("--summary"), (folder_ / "summary.json").string()})
+         {std::string("--insecure-loopback"), std::string("--listen"), std::string("127.0.0.1:0"),
+          std::string("--journal"), std::string("none"), std::string("--organ"),
+          std::string("lattice"), std::string("--log-level"), std::string("off"),
+          std::string("--ready-file"), ready.string(), std::string("--summary"),
+          (folder_ / "summary.json").string()})
       arguments.push_back(more);
     std::vector<char*> argv;
     const std::string program = TROCAR_BINARY_DIR "/trocar-server";
@@ -307,7 +308,7 @@ TEST_F(ServerProcess, seconds_end_by_themselves_and_a_taken_port_is_exit_code_5)
   const auto port = start({"--seconds", "0.5"});
   ASSERT_NE(port, 0);
   const std::string second = TROCAR_BINARY_DIR
-                             "/trocar-server --organ lattice --journal none "
+                             "/trocar-server --insecure-loopback --organ lattice --journal none "
                              "--listen 127.0.0.1:" +
                              std::to_string(port) + " 2>/dev/null";
   EXPECT_EQ(WEXITSTATUS(std::system(second.c_str())), 5);
@@ -325,6 +326,9 @@ TEST(ServerProgram, wrong_options_are_2_and_unusable_organs_3) {
   EXPECT_EQ(exit_code_of("--no-such-option"), 2);
   EXPECT_EQ(exit_code_of("--omega 3"), 2);
   EXPECT_EQ(exit_code_of("--listen nowhere"), 2);
+  EXPECT_EQ(exit_code_of("--insecure-loopback --listen 0.0.0.0:0"), 2);
+  EXPECT_EQ(exit_code_of("--certificate server.crt"), 2);
+  EXPECT_EQ(exit_code_of("--code-hours 0"), 2);
   EXPECT_EQ(exit_code_of("--log-level loud --organ lattice"), 2);
   EXPECT_EQ(exit_code_of("--organ /no/such/file.organ"), 3);
 }

@@ -16,7 +16,9 @@ Examples:
   trocar-server
       the built-in liver at 127.0.0.1:7690, for programs on this machine
   trocar-server --organ lattice --listen 0.0.0.0:7690
-      a block of springs, for everybody on the network (there is no access control yet)
+      a block of springs, for everybody on the network who has one of the printed join codes
+  trocar-server --listen 0.0.0.0:7690 --revoke observer
+      nobody joins the server at that port with an observer's code any more
   trocar-server --organ liver.organ --sweeps 6 --budget 0.6
       up to six passes, as long as a tick takes no more than 0.6 ms
   trocar-server --organ liver --reduction liver.reduction
@@ -32,6 +34,42 @@ is closed. Exit codes: 0 ok, 2 command line, 3 bad file, 5 port taken or process
 std::string version_text() {
   return std::string("trocar-server ") + kVersion + ", sim_version " + std::to_string(kSimVersion) +
          ", protocol " + std::to_string(kProtocolMajor) + "." + std::to_string(kProtocolMinor);
+}
+
+void add_access_options(CLI::App& app, AccessOptions& options) {
+  auto* access = app.add_option_group("Access", "who may join");
+  access->add_option("--code-hours", options.code_hours, "how long the join codes are good")
+      ->type_name("H")
+      ->check(CLI::Range(0.01, 8760.0))
+      ->capture_default_str();
+  access->add_option("--code-uses", options.code_uses, "how often each may be used, 0: any number")
+      ->type_name("N")
+      ->check(CLI::Range(0, 1'000'000))
+      ->capture_default_str();
+  access->add_flag("--keep-codes", options.keeps_codes,
+                   "codes stay good after the end, for the next start with this option");
+  access
+      ->add_option("--revoke", options.revoke,
+                   "revoke a code, or all of a role, of the server that runs at --listen, and exit")
+      ->type_name("CODE|ROLE");
+  access
+      ->add_option("--audit", options.audit_file,
+                   "log of joins, refusals and marks [audit.jsonl in the state folder]")
+      ->type_name("FILE");
+  access
+      ->add_option("--state", options.state_folder,
+                   "folder of certificate, key and codes [~/.local/state/trocar]")
+      ->type_name("DIR");
+  auto* certificate = access
+                          ->add_option("--certificate", options.certificate_file,
+                                       "use this certificate (PEM) instead of the state folder's")
+                          ->type_name("FILE");
+  auto* key = access->add_option("--key", options.key_file, "the certificate's key (PEM)")
+                  ->type_name("FILE");
+  certificate->needs(key);
+  key->needs(certificate);
+  access->add_flag("--insecure-loopback", options.is_insecure,
+                   "without TLS and codes, for tests; 127.0.0.1 and [::1] only");
 }
 
 struct ResearchOptions {
@@ -133,6 +171,7 @@ Result<std::optional<ServerOptions>> parse_command_line(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--log-level", options.log_level, "error, warn, info, debug or off")
       ->capture_default_str();
+  add_access_options(app, options.access);
   ResearchOptions research;
   add_research_options(app, options, research);
   try {

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "common/base/result.h"
+#include "server/app/server/access_options.h"
 #include "server/tissue/step/tick_report.h"
 
 namespace trocar::app {
@@ -16,6 +17,7 @@ struct ServerOptions {
   std::string reduction_file;  // empty: the full solver alone
   std::string address = "127.0.0.1";
   std::uint16_t port = 7690;
+  AccessOptions access;
   std::string journal;            // a file, or "none"
   double seconds = 0;             // simulated; 0: until told to end
   std::string summary_file;       // empty: none

@@ -13,6 +13,7 @@
 #include <chrono>
 #include <cmath>
 #include <csignal>
+#include <cstdio>
 #include <filesystem>
 #include <functional>
 #include <vector>
@@ -20,6 +21,7 @@
 #include "common/base/log.h"
 #include "common/base/text_file.h"
 #include "common/base/timing.h"
+#include "server/app/server/admission.h"
 #include "server/app/server/simulation_loop.h"
 #include "server/app/server/summary.h"
 #include "server/organs/catalogue/load_organ.h"
@@ -67,8 +69,10 @@ Result<Reduction> read_reduction(const std::string& file, const organ::Organ& or
 
 class Server {
  public:
-  Server(const ServerOptions& options, organ::Organ organ, Reduction reduction)
+  Server(const ServerOptions& options, std::unique_ptr<Admission> admission, organ::Organ organ,
+         Reduction reduction)
       : options_(options),
+        admission_(std::move(admission)),
         reduction_(std::move(reduction.description)),
         simulation_(std::move(organ), options.workers,
                     reduction::at_work(std::move(reduction.model))) {}
@@ -91,6 +95,7 @@ class Server {
   Status finish();
 
   const ServerOptions& options_;
+  const std::unique_ptr<Admission> admission_;
   const std::optional<journal::ReductionDescription> reduction_;
   step::Simulation simulation_;
   std::unique_ptr<JournalSink> journal_;
@@ -119,6 +124,10 @@ Status Server::open() {
   // everybody after a return to a mark; cuts make the surface larger.
   const auto topology_bytes = replication::encode_topology(layout, organ.name)->size();
   tcp.outbox_bytes = std::max(tcp.outbox_bytes, 8 * topology_bytes);
+  tcp.tls = admission_->tls();
+  tcp.plain_reply = replication::encode_goodbye(
+      replication::EndReason::Version,
+      "this server speaks TLS 1.3 only: use a client of its release, without --insecure-loopback");
   auto listening = net::TcpServer::listen(io_, tcp);
   if (!listening) return listening.error();
   tcp_ = std::move(*listening);
@@ -127,7 +136,9 @@ Status Server::open() {
   if (!journal) return journal.error();
   journal_ = std::move(*journal);
 
+  if (const auto issued = admission_->issue_codes(tcp_->port()); !issued) return issued;
   replication::ReplicatorOptions replication;
+  replication.gate = admission_->gate();
   if (journal_)
     replication.on_participants = [this](const auto& present, Tick tick) {
       journal_->record_participants(present, tick);
@@ -178,6 +189,8 @@ Status Server::run() {
       return written;
   log::info("{} ({} nodes) at {}:{}, Ctrl-C ends the session", simulation_.organ().name,
             simulation_.organ().mesh.node_count(), options_.address, tcp_->port());
+  std::fputs(admission_->invitation(tcp_->port()).c_str(), stdout);
+  std::fflush(stdout);
   loop_->start();
   const Status ran = net::run(io_);
   if (!ran.ok()) {
@@ -295,6 +308,9 @@ Status Server::finish() {
 }  // namespace
 
 Status run_server(const ServerOptions& options) {
+  if (!options.access.revoke.empty()) return revoke_codes(options.access, options.port);
+  auto admission = Admission::prepare(options.access, options.address);
+  if (!admission) return admission.error();
   auto organ = catalogue::load_organ(options.organ);
   if (!organ) return organ.error();
   if (options.has_averaged_strain)
@@ -310,7 +326,8 @@ Status run_server(const ServerOptions& options) {
   auto reduction = read_reduction(options.reduction_file, *organ);
   if (!reduction) return reduction.error();
   const auto model = reduction->model;
-  const auto server = std::make_unique<Server>(options, std::move(*organ), std::move(*reduction));
+  const auto server = std::make_unique<Server>(options, std::move(*admission), std::move(*organ),
+                                               std::move(*reduction));
   if (model)
     log::info("{}: {} patches, {:.1f} MB, ready in {:.1f} s", options.reduction_file,
               model->patches.size(), static_cast<double>(file_bytes) * 1e-6,

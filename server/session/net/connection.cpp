@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/co_spawn.hpp>
-#include <boost/asio/write.hpp>
 #include <cstring>
 
 namespace trocar::net {
@@ -16,6 +15,8 @@ constexpr std::size_t kBuffersPerWrite = 16;
 
 const char* describe(ConnectionFault fault) {
   switch (fault) {
+    case ConnectionFault::TlsGreeting:
+      return "a greeting of TLS: this server speaks without it, so give --insecure-loopback too";
     case ConnectionFault::EmptyFrame:
       return "a frame of length zero";
     case ConnectionFault::OversizedFrame:
@@ -28,23 +29,68 @@ const char* describe(ConnectionFault fault) {
   return "unknown";
 }
 
-Connection::Connection(asio::ip::tcp::socket socket, std::uint32_t max_message_bytes,
-                       std::size_t outbox_bytes)
-    : socket_(std::move(socket)),
-      outbox_changed_(socket_.get_executor(), asio::steady_timer::time_point::max()),
+Connection::Connection(secure::Stream stream, std::string peer_address,
+                       std::uint32_t max_message_bytes, std::size_t outbox_bytes,
+                       wire::SharedBytes plain_reply)
+    : stream_(std::move(stream)),
+      peer_address_(std::move(peer_address)),
+      outbox_changed_(stream_.socket().get_executor(), asio::steady_timer::time_point::max()),
       max_message_bytes_(max_message_bytes),
       outbox_bytes_(outbox_bytes),
+      plain_reply_(std::move(plain_reply)),
       inbound_(kReadChunk) {}
 
 void Connection::start(Events events) {
   events_ = std::move(events);
+  if (!stream_.has_tls()) return begin();
+  const auto self = shared_from_this();
+  asio::co_spawn(stream_.socket().get_executor(), greet(),
+                 [self](std::exception_ptr failure) { rethrow(failure); });
+}
+
+asio::awaitable<void> Connection::greet() {
+  const auto greeting = co_await stream_.peek_greeting();
+  if (state_ != State::Greeting) co_return;
+  if (greeting == secure::Stream::Greeting::Other) co_await reply_plainly();
+  if (greeting != secure::Stream::Greeting::Tls) {
+    close();
+    co_return;
+  }
+  const auto error = co_await stream_.accept_tls();
+  if (error || state_ != State::Greeting)
+    close();
+  else
+    begin();
+}
+
+// It fits into the socket's buffer, so nobody can hold this up. What the peer has sent is taken
+// first: a socket that is closed with unread bytes resets, and the reply could be lost.
+asio::awaitable<void> Connection::reply_plainly() {
+  if (!plain_reply_) co_return;
+  boost::system::error_code ignored;
+  auto& socket = stream_.socket();
+  socket.non_blocking(true, ignored);
+  socket.read_some(asio::buffer(inbound_), ignored);
+  socket.write_some(asio::buffer(*plain_reply_), ignored);
+  socket.shutdown(asio::ip::tcp::socket::shutdown_send, ignored);
+  bool is_gone = false;
+  while (!is_gone) {
+    const auto [error, count] = co_await socket.async_read_some(asio::buffer(inbound_), kNoThrow);
+    is_gone = error.failed();
+  }
+}
+
+void Connection::begin() {
+  state_ = State::Open;
   // A coroutine that is a member function keeps only `this`; the lambda's copy of the pointer lives
   // in the completion handler until the coroutine has ended.
   const auto self = shared_from_this();
-  const auto executor = socket_.get_executor();
+  const auto executor = stream_.socket().get_executor();
   asio::co_spawn(executor, read_frames(), [self](std::exception_ptr failure) { rethrow(failure); });
   asio::co_spawn(executor, write_outbox(),
                  [self](std::exception_ptr failure) { rethrow(failure); });
+  const auto opened = events_.open;
+  if (opened) opened();
 }
 
 bool Connection::send(wire::SharedBytes frame) {
@@ -78,7 +124,7 @@ void Connection::close() {
   if (state_ == State::Closed) return;
   state_ = State::Closed;
   boost::system::error_code ignored;
-  socket_.close(ignored);
+  stream_.socket().close(ignored);
   outbox_.clear();  // in_flight_ stays until the writer wakes: the kernel may still read from it
   outstanding_ = 0;
   outbox_changed_.cancel();
@@ -102,8 +148,9 @@ void Connection::fail(ConnectionFault fault) {
 void Connection::check_deadlines(Clock::time_point now, Clock::duration hello,
                                  Clock::duration idle) {
   if (state_ == State::Draining && now >= drain_deadline_) return close();
-  if (state_ != State::Open) return;
   const auto quiet = now - last_message_;
+  if (state_ == State::Greeting && quiet > hello) return close();
+  if (state_ != State::Open) return;
   if (!first_message_seen_ && quiet > hello) return fail(ConnectionFault::HelloTimeout);
   if (first_message_seen_ && quiet > idle) return fail(ConnectionFault::IdleTimeout);
 }
@@ -112,6 +159,11 @@ bool Connection::deliver_frames() {
   while (state_ == State::Open && end_ - begin_ >= wire::kHeaderBytes) {
     std::uint32_t length = 0;
     std::memcpy(&length, inbound_.data() + begin_, sizeof length);
+    if (!first_message_seen_ && secure::is_tls_greeting(BytesView(inbound_).subspan(begin_, 4)) &&
+        length > max_message_bytes_) {
+      fail(ConnectionFault::TlsGreeting);
+      break;
+    }
     if (length == 0) {
       fail(ConnectionFault::EmptyFrame);
       break;
@@ -145,7 +197,7 @@ asio::awaitable<void> Connection::read_frames() {
       begin_ = 0;
     }
     const auto room = asio::buffer(inbound_.data() + end_, inbound_.size() - end_);
-    const auto [error, count] = co_await socket_.async_read_some(room, kNoThrow);
+    const auto [error, count] = co_await stream_.read_some(room);
     if (error) break;
     end_ += count;
     if (!deliver_frames()) break;
@@ -159,7 +211,7 @@ asio::awaitable<void> Connection::write_outbox() {
     if (outbox_.empty()) {
       if (state_ == State::Draining) {
         boost::system::error_code ignored;
-        socket_.shutdown(asio::ip::tcp::socket::shutdown_send, ignored);
+        stream_.socket().shutdown(asio::ip::tcp::socket::shutdown_send, ignored);
         co_return;  // the reader closes when the peer does, or the deadline
       }
       co_await outbox_changed_.async_wait(kNoThrow);
@@ -172,7 +224,7 @@ asio::awaitable<void> Connection::write_outbox() {
       outbox_.pop_front();
       buffers.emplace_back(in_flight_.back()->data(), in_flight_.back()->size());
     }
-    const auto [error, written] = co_await asio::async_write(socket_, buffers, kNoThrow);
+    const auto [error, written] = co_await stream_.write_all(buffers);
     in_flight_.clear();
     if (error || state_ == State::Closed) break;
     outstanding_ -= std::min(outstanding_, written);

@@ -3,6 +3,8 @@
 // One accepted TCP connection: a reader coroutine that cuts the stream into frames, a writer
 // coroutine that empties a bounded outbox. Used by TcpServer only.
 //
+//   Greeting --TLS is there--> Open       (without TLS it is Open at once)
+//      \--no TLS, failure, deadline--> Closed, and nobody above has heard of it
 //   Open --close_after_flush--> Draining --all sent--> (send side shut) --peer closes--> Closed
 //     \--------------------------close, error, deadline------------------------------->/
 //
@@ -11,23 +13,19 @@
 
 #include "common/base/asio.h"  // before Boost: see there
 
-#include <boost/asio/as_tuple.hpp>
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/steady_timer.hpp>
-#include <boost/asio/use_awaitable.hpp>
 #include <chrono>
 #include <deque>
 #include <functional>
 #include <memory>
 #include <vector>
 
+#include "common/secure/stream.h"
 #include "server/session/net/connections.h"
 
 namespace trocar::net {
-
-// Coroutines get the error of what they await as a value, not as an exception.
-inline constexpr auto kNoThrow = asio::as_tuple(asio::use_awaitable);
 
 class Connection : public std::enable_shared_from_this<Connection> {
  public:
@@ -35,19 +33,24 @@ class Connection : public std::enable_shared_from_this<Connection> {
 
   // The server hears of a connection through these; they are called on the I/O thread.
   struct Events {
+    std::function<void()> open;  // it can be written to from here on
     std::function<void(BytesView)> message;
     std::function<void(ConnectionFault)> fault;
     std::function<void(std::size_t)> bytes_written;
     std::function<void()> closed;
   };
 
-  Connection(asio::ip::tcp::socket socket, std::uint32_t max_message_bytes,
-             std::size_t outbox_bytes);
+  // `plain_reply`: for a peer that begins without TLS where TLS is wanted; may be null.
+  Connection(secure::Stream stream, std::string peer_address, std::uint32_t max_message_bytes,
+             std::size_t outbox_bytes, wire::SharedBytes plain_reply);
 
   void start(Events events);
 
   bool send(wire::SharedBytes frame);
   std::size_t outstanding_bytes() const { return outstanding_; }
+  const std::string& peer_address() const { return peer_address_; }
+  // True until the first message is there, which shows that the peer means it.
+  bool is_newcomer() const { return !first_message_seen_; }
   void close_after_flush(wire::SharedBytes last_words, Clock::time_point deadline);
   void close();
   // Reports `fault` once and stops delivering; the handler closes.
@@ -57,20 +60,25 @@ class Connection : public std::enable_shared_from_this<Connection> {
   void check_deadlines(Clock::time_point now, Clock::duration hello, Clock::duration idle);
 
  private:
-  enum class State { Open, Failed, Draining, Closed };
+  enum class State { Greeting, Open, Failed, Draining, Closed };
 
+  asio::awaitable<void> greet();
+  asio::awaitable<void> reply_plainly();
+  void begin();
   asio::awaitable<void> read_frames();
   asio::awaitable<void> write_outbox();
   // Delivers every complete frame in the buffer; false when nothing more is to be read.
   bool deliver_frames();
   void discard_outbox();
 
-  asio::ip::tcp::socket socket_;
+  secure::Stream stream_;
+  const std::string peer_address_;
   asio::steady_timer outbox_changed_;  // never expires; cancelled to wake the writer
   const std::uint32_t max_message_bytes_;
   const std::size_t outbox_bytes_;
+  const wire::SharedBytes plain_reply_;
   Events events_;
-  State state_ = State::Open;
+  State state_ = State::Greeting;
   bool first_message_seen_ = false;
   Clock::time_point last_message_ = Clock::now();
   Clock::time_point drain_deadline_{};

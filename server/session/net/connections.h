@@ -11,6 +11,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <string>
 
 #include "common/base/bytes.h"
 #include "common/wire/framing.h"
@@ -23,6 +24,7 @@ using ConnectionId = std::uint64_t;
 // Why the transport gives up on a peer. After a fault nothing more is read; the handler says its
 // last words and closes.
 enum class ConnectionFault {
+  TlsGreeting,     // this server speaks without TLS
   EmptyFrame,      // a frame of length zero
   OversizedFrame,  // a frame longer than the limit for messages from a client
   HelloTimeout,    // no message at all within the first deadline
@@ -49,6 +51,8 @@ class Connections {
   virtual bool send(ConnectionId id, wire::SharedBytes frame) = 0;
   // Bytes queued and not yet taken by the kernel.
   virtual std::size_t outstanding_bytes(ConnectionId id) const = 0;
+  // The peer's address without its port; empty if it is not known.
+  virtual std::string peer_address(ConnectionId id) const = 0;
   // Queues `last_words` (may be null) whatever room there is, delivers nothing more from the peer,
   // and closes when all is sent and the peer has closed too, at the latest at the flush deadline.
   virtual void close_after_flush(ConnectionId id, wire::SharedBytes last_words) = 0;

@@ -1,13 +1,12 @@
 #include "server/session/net/tcp_server.h"
 
-#include <boost/asio/as_tuple.hpp>
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/steady_timer.hpp>
-#include <boost/asio/use_awaitable.hpp>
 #include <map>
+#include <set>
 #include <vector>
 
 #include "server/session/net/connection.h"
@@ -83,6 +82,7 @@ class TcpServer::Core : public std::enable_shared_from_this<TcpServer::Core> {
   asio::steady_timer sweep, retry;
   ConnectionHandler* handler = nullptr;  // null once stopped
   std::map<ConnectionId, std::shared_ptr<Connection>> connections;
+  std::set<ConnectionId> opened;  // those that the handler has heard of
   ConnectionId next_id = 1;
   std::uint16_t port = 0;
   TcpCounters counters;
@@ -95,20 +95,40 @@ class TcpServer::Core : public std::enable_shared_from_this<TcpServer::Core> {
       socket.close(ignored);
       return;
     }
+    const auto peer = socket.remote_endpoint(ignored).address().to_string();
+    if (options.tls && has_too_many_newcomers(peer)) {
+      ++counters.rejected_newcomers;
+      socket.close(ignored);
+      return;
+    }
     ++counters.accepted;
     socket.set_option(tcp::no_delay(true), ignored);
     socket.set_option(asio::socket_base::send_buffer_size(options.send_buffer_bytes), ignored);
     const ConnectionId id = next_id++;
-    auto connection = std::make_shared<Connection>(std::move(socket), options.max_message_bytes,
-                                                   options.outbox_bytes);
+    auto connection = std::make_shared<Connection>(secure::Stream(std::move(socket), options.tls),
+                                                   peer, options.max_message_bytes,
+                                                   options.outbox_bytes, options.plain_reply);
     connections.emplace(id, connection);
     connection->start(events_of(id));
-    handler->on_open(id);
+  }
+
+  bool has_too_many_newcomers(const std::string& peer) const {
+    std::size_t all = 0, same = 0;
+    for (const auto& [id, connection] : connections) {
+      if (!connection->is_newcomer()) continue;
+      ++all;
+      if (connection->peer_address() == peer) ++same;
+    }
+    return all >= options.max_newcomers || same >= options.max_newcomers_per_address;
   }
 
   Connection::Events events_of(ConnectionId id) {
     const auto self = shared_from_this();
     Connection::Events events;
+    events.open = [self, id] {
+      self->opened.insert(id);
+      if (self->handler) self->handler->on_open(id);
+    };
     events.message = [self, id](BytesView message) {
       ++self->counters.messages_in;
       self->counters.bytes_in += message.size() + wire::kHeaderBytes;
@@ -120,7 +140,10 @@ class TcpServer::Core : public std::enable_shared_from_this<TcpServer::Core> {
     };
     events.bytes_written = [self](std::size_t count) { self->counters.bytes_out += count; };
     events.closed = [self, id] {
-      if (self->connections.erase(id) > 0 && self->handler) self->handler->on_close(id);
+      const bool was_open = self->opened.erase(id) > 0;
+      if (self->connections.erase(id) == 0) return;
+      if (!was_open) ++self->counters.handshakes_failed;
+      if (was_open && self->handler) self->handler->on_close(id);
     };
     return events;
   }
@@ -205,6 +228,11 @@ bool TcpServer::send(ConnectionId id, wire::SharedBytes frame) {
 std::size_t TcpServer::outstanding_bytes(ConnectionId id) const {
   const auto* connection = core_->find(id);
   return connection ? connection->outstanding_bytes() : 0;
+}
+
+std::string TcpServer::peer_address(ConnectionId id) const {
+  const auto* connection = core_->find(id);
+  return connection ? connection->peer_address() : std::string();
 }
 
 void TcpServer::close_after_flush(ConnectionId id, wire::SharedBytes last_words) {

@@ -1,9 +1,13 @@
 #pragma once
 
-// TCP listener and its connections. Moves framed messages and knows nothing about what they say.
+// TCP listener and its connections, with TLS or without. Moves framed messages and knows nothing
+// about what they say. With TLS the handler hears of a connection once its handshake is done.
 //
 // Bounds, so that no peer can take memory or time from the others:
 //   - connections: `max_connections`; one more is closed at once and counted;
+//   - with TLS, newcomers, who have sent no message yet: `max_newcomers` in all and
+//     `max_newcomers_per_address`; one more is closed at once and counted. Handshake and first
+//     message share one deadline;
 //   - inbound: one frame per connection is buffered, at most `max_message_bytes`;
 //   - outbound: `outbox_bytes` per connection; send() says no when full, the caller decides;
 //   - time: a first message within `hello_deadline`, then one at least every `idle_deadline`;
@@ -21,6 +25,7 @@
 #include "common/base/asio.h"
 #include "common/base/ids.h"
 #include "common/base/result.h"
+#include "common/secure/tls.h"
 #include "server/session/net/connections.h"
 
 namespace boost::asio {
@@ -33,17 +38,23 @@ struct TcpServerOptions {
   std::string address = "127.0.0.1";
   std::uint16_t port = 7690;                            // 0: any free port
   std::size_t max_connections = kMaxParticipants + 12;  // some room to tell the next one "full"
+  std::size_t max_newcomers = 48;
+  std::size_t max_newcomers_per_address = 32;  // a class may sit behind one address
   std::uint32_t max_message_bytes = wire::kMaxUpstreamBytes;
   std::size_t outbox_bytes = 1024 * 1024;
   int send_buffer_bytes = 128 * 1024;
   std::chrono::milliseconds hello_deadline{5000};
   std::chrono::milliseconds idle_deadline{10000};
   std::chrono::milliseconds flush_deadline{2000};
+  secure::TlsContext tls;         // null: without TLS
+  wire::SharedBytes plain_reply;  // with TLS: one frame for who begins without; null: none
 };
 
 struct TcpCounters {
   std::uint64_t accepted = 0;
-  std::uint64_t rejected_full = 0;  // closed at once: max_connections reached
+  std::uint64_t rejected_full = 0;       // closed at once: max_connections reached
+  std::uint64_t rejected_newcomers = 0;  // closed at once: too many who have said nothing yet
+  std::uint64_t handshakes_failed = 0;   // closed before TLS was there
   std::uint64_t faults = 0;
   std::uint64_t messages_in = 0, bytes_in = 0, bytes_out = 0;
 };
@@ -71,6 +82,7 @@ class TcpServer final : public Connections {
 
   bool send(ConnectionId id, wire::SharedBytes frame) override;
   std::size_t outstanding_bytes(ConnectionId id) const override;
+  std::string peer_address(ConnectionId id) const override;
   void close_after_flush(ConnectionId id, wire::SharedBytes last_words) override;
   void close(ConnectionId id) override;
 

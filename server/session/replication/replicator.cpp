@@ -19,7 +19,7 @@ std::string text_of_role(participants::Role role) {
 EndReason reason_of(participants::JoinRefusal refusal, participants::Role role) {
   switch (refusal) {
     case participants::JoinRefusal::NameInvalid:
-      return EndReason::ProtocolError;
+      return EndReason::NameInvalid;
     case participants::JoinRefusal::NameTaken:
       return EndReason::NameTaken;
     case participants::JoinRefusal::Full:
@@ -30,13 +30,33 @@ EndReason reason_of(participants::JoinRefusal refusal, participants::Role role) 
   return EndReason::Unspecified;
 }
 
+EndReason reason_of(access::RefusalKind refusal) {
+  switch (refusal) {
+    case access::RefusalKind::WrongCode:
+      return EndReason::CodeWrong;
+    case access::RefusalKind::Expired:
+      return EndReason::CodeExpired;
+    case access::RefusalKind::UsedUp:
+      return EndReason::CodeUsedUp;
+    case access::RefusalKind::Revoked:
+      return EndReason::CodeRevoked;
+    case access::RefusalKind::TooManyTries:
+      return EndReason::TooManyTries;
+    case access::RefusalKind::RoleNotAllowed:
+      return EndReason::CodeRole;
+  }
+  return EndReason::Unspecified;
+}
+
 }  // namespace
 
 struct Replicator::Client {
   net::ConnectionId id = 0;
+  access::Applicant applicant;                           // as the gate knows it
   std::optional<participants::Participant> participant;  // set by Hello
-  bool has_old_surface = false;                          // so that no delta helps
-  step::SharedFrame baseline;                            // the last frame this client was given
+  bool is_welcome = false;
+  bool has_old_surface = false;  // so that no delta helps
+  step::SharedFrame baseline;    // the last frame this client was given
   bool wants_keyframe = false;
   bool wants_ghost = false;
   std::uint64_t last_requested_keyframe_ns = 0;
@@ -96,8 +116,13 @@ void Replicator::on_message(net::ConnectionId id, BytesView message) {
 void Replicator::end_session(Client& client, const Ending& ending) {
   const std::string who =
       client.participant ? client.participant->name : "connection " + std::to_string(client.id);
+  // The gate bounds how many lines refusals make.
+  const bool is_refused =
+      options_.gate && !client.is_welcome && ending.reason != EndReason::ServerClosing;
   if (ending.reason == EndReason::ServerClosing)
     log::debug("{}: {}", who, ending.text);
+  else if (is_refused)
+    refuse(client, ending.text);
   else
     log::warn("session of {} ended: {}", who, ending.text);
   ++counters_.ended[static_cast<std::size_t>(ending.reason)];
@@ -106,7 +131,14 @@ void Replicator::end_session(Client& client, const Ending& ending) {
   connections_.close_after_flush(id, encode_goodbye(ending.reason, ending.text));
 }
 
+void Replicator::refuse(Client& client, const std::string& reason) {
+  if (client.applicant.address.empty())
+    client.applicant.address = connections_.peer_address(client.id);
+  options_.gate->note_refusal(client.applicant, reason);
+}
+
 void Replicator::forget(Client& client) {
+  if (options_.gate && client.is_welcome) options_.gate->note_leave(client.applicant);
   if (client.participant) {
     const auto slot = client.participant->slot;
     roster_.leave(slot);
@@ -206,9 +238,23 @@ std::optional<Replicator::Ending> Replicator::admit(Client& client, const proto:
   auto reason = EndReason::ProtocolError;
   auto request = check_hello(hello, reason);
   if (!request) return Ending{reason, request.error().message};
+  auto* gate = options_.gate;
+  if (gate) {
+    client.applicant = {connections_.peer_address(client.id), request->name, request->role};
+    if (const auto refusal = gate->check(client.applicant, request->join_secret))
+      return Ending{reason_of(refusal->kind), refusal->text};
+  }
+  if (auto ending = find_place(client, *request)) return ending;
+  const bool may_come = !gate || gate->admit(client.applicant);
+  if (!may_come)
+    return Ending{EndReason::CodeUsedUp, "join code: somebody has just taken its last use"};
+  return welcome(client);
+}
+
+std::optional<Replicator::Ending> Replicator::find_place(Client& client, HelloRequest& request) {
   auto refusal = participants::JoinRefusal::Full;
-  auto joined = roster_.join(request->name, request->role, std::move(request->tools), refusal);
-  if (!joined) return Ending{reason_of(refusal, request->role), joined.error().message};
+  auto joined = roster_.join(request.name, request.role, std::move(request.tools), refusal);
+  if (!joined) return Ending{reason_of(refusal, request.role), joined.error().message};
   const auto& participant = *joined;
   if (participant.slot.has_tools()) {
     hands::HandJoin join{participant.slot, static_cast<int>(participant.tools.size()), {}};
@@ -218,9 +264,15 @@ std::optional<Replicator::Ending> Replicator::admit(Client& client, const proto:
       return Ending{EndReason::Full, "the server is busy: try again in a second"};
     }
   }
+  client.participant = participant;
+  return std::nullopt;
+}
+
+std::optional<Replicator::Ending> Replicator::welcome(Client& client) {
+  const auto& participant = *client.participant;
   log::info("{} ({}) joined as participant {}", participant.name, text_of_role(participant.role),
             participant.slot.value);
-  client.participant = participant;
+  client.is_welcome = true;
   ++counters_.sessions;
   const Ending too_slow{EndReason::TooSlow, "the outbox is too small for the first messages"};
   if (!send(client, encode_welcome(participant.slot, organ_hash_)) ||
@@ -236,7 +288,7 @@ std::optional<Replicator::Ending> Replicator::admit(Client& client, const proto:
 std::optional<Replicator::Ending> Replicator::handle_sample(Client& client,
                                                             const proto::ToolSample& sample) {
   const auto& participant = *client.participant;
-  if (!participants::has_tools(participant.role))
+  if (!wire::rights_of(participant.role).has_tools)
     return Ending{EndReason::Role,
                   "ToolSample: an " + text_of_role(participant.role) + " watches and has no tools"};
   const auto checked = check_tool_sample(sample, participant.tools.size());
@@ -254,7 +306,7 @@ std::optional<Replicator::Ending> Replicator::handle_sample(Client& client,
 
 std::optional<Replicator::Ending> Replicator::handle_mark(Client& client, int action) {
   const auto role = client.participant->role;
-  if (role != participants::Role::Instructor)
+  if (!wire::rights_of(role).may_mark)
     return Ending{EndReason::Role,
                   "MarkRequest: marks are the instructor's, not of an " + text_of_role(role)};
   if (action != proto::MARK_SET && action != proto::MARK_RETURN)
@@ -268,6 +320,8 @@ std::optional<Replicator::Ending> Replicator::handle_mark(Client& client, int ac
     return std::nullopt;
   }
   last_mark_ns_ = now;
+  if (options_.gate)
+    options_.gate->note_action(client.applicant, action == proto::MARK_SET ? "mark" : "return");
   inbox_.push_mark(wanted);
   return std::nullopt;
 }

@@ -6,6 +6,8 @@
 //            SurfaceChange (where it begins an epoch), SurfaceFrame (delta against the last frame
 //            this client was given, whichever epoch that was), FrameState
 //
+// Who joins passes the gate (server/session/access), if there is one, and then needs a place.
+//
 // Inbound: every message is checked by role and range (validation.h); samples, joins and leaves go
 // to the simulation through the SimulationInbox. Anything malformed, oversized, too frequent or not
 // this role's to say ends that session with a Goodbye that names the reason; nobody else notices.
@@ -37,6 +39,7 @@
 #include "common/base/timing.h"
 #include "common/wire/recording_state.h"
 #include "common/wire/surface_layout.h"
+#include "server/session/access/gate.h"
 #include "server/session/ghost/ghost_follower.h"
 #include "server/session/net/connections.h"
 #include "server/session/participants/inbox.h"
@@ -61,6 +64,8 @@ struct ReplicatorOptions {
   std::function<std::uint64_t()> clock_ns = monotonic_ns;
   // Told who is here after each change, with the tick of the newest frame; may be empty.
   std::function<void(const std::vector<participants::Participant>&, Tick)> on_participants;
+  // Null: everybody may come, in any role. It outlives the replicator.
+  access::Gate* gate = nullptr;
   // Whether anybody wants the ghost, after each change; empty: the session has none.
   std::function<void(bool)> on_ghost_wanted;
 };
@@ -133,6 +138,9 @@ class Replicator final : public net::ConnectionHandler {
   // These return what to end the client's session with, or nothing.
   std::optional<Ending> handle_message(Client& client, BytesView bytes);
   std::optional<Ending> admit(Client& client, const proto::Hello& hello);
+  std::optional<Ending> find_place(Client& client, HelloRequest& request);
+  std::optional<Ending> welcome(Client& client);
+  void refuse(Client& client, const std::string& reason);
   std::optional<Ending> handle_sample(Client& client, const proto::ToolSample& sample);
   std::optional<Ending> handle_mark(Client& client, int action);
   void handle_ghost_request(Client& client, bool is_wanted);

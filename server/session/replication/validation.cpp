@@ -10,6 +10,9 @@ namespace trocar::replication {
 namespace {
 
 static_assert(static_cast<int>(EndReason::Timeout) == proto::GOODBYE_TIMEOUT);
+static_assert(static_cast<int>(EndReason::NameInvalid) == proto::GOODBYE_NAME_INVALID);
+static_assert(kEndReasonCount == proto::GoodbyeReason_ARRAYSIZE);
+constexpr std::size_t kSecretBytes = 5;
 static_assert(static_cast<int>(tool::Verb::Grasp) == proto::VERB_GRASP);
 static_assert(static_cast<int>(tool::Verb::Cut) == proto::VERB_CUT);
 static_assert(tool::kVerbCount == proto::Verb_ARRAYSIZE);
@@ -36,10 +39,14 @@ Result<HelloRequest> check_hello(const proto::Hello& hello, EndReason& reason) {
   reason = EndReason::ProtocolError;
   if (hello.tool_size() > kToolsPerHand)
     return bad("Hello.tool: " + std::to_string(hello.tool_size()) + " tools, at most 2");
+  if (!hello.join_secret().empty() && hello.join_secret().size() != kSecretBytes)
+    return bad("Hello.join_secret: " + std::to_string(hello.join_secret().size()) +
+               " bytes, a code has 5");
   HelloRequest request;
   request.protocol_minor = hello.protocol_minor();
   request.name = hello.name();
   request.role = wire::role_of(hello.role());
+  request.join_secret.assign(hello.join_secret().begin(), hello.join_secret().end());
   for (const auto& tool : hello.tool()) request.tools.push_back(wire::read(tool));
   return request;
 }

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "common/base/bytes.h"
 #include "common/base/result.h"
 #include "common/tool/tool.h"
 #include "server/session/participants/roster.h"
@@ -32,14 +33,22 @@ enum class EndReason : std::uint8_t {
   Role = 6,
   TooSlow = 7,
   Timeout = 8,
+  CodeWrong = 9,
+  CodeExpired = 10,
+  CodeUsedUp = 11,
+  CodeRevoked = 12,
+  TooManyTries = 13,
+  CodeRole = 14,
+  NameInvalid = 15,
 };
-inline constexpr int kEndReasonCount = 9;
+inline constexpr int kEndReasonCount = 16;
 
 struct HelloRequest {
   std::uint32_t protocol_minor = 0;
   std::string name;  // not yet checked: the roster does
   participants::Role role = participants::Role::Observer;
   std::vector<tool::ToolShape> tools;  // not yet checked
+  Bytes join_secret;                   // not yet checked: the gate does
 };
 // `reason` is set on error.
 Result<HelloRequest> check_hello(const proto::Hello& hello, EndReason& reason);

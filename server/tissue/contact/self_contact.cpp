@@ -24,6 +24,7 @@
 
 #include "common/base/tick.h"
 #include "server/tissue/contact/nearest_point.h"
+#include "server/tissue/contact/surface.h"
 
 namespace trocar::contact {
 namespace {

@@ -1,0 +1,40 @@
+#include "client/replica/printable_message.h"
+
+#include "common/base/printable.h"
+#include "proto/wire.pb.h"
+
+namespace trocar::replica {
+namespace {
+
+void mend(std::string* text) {
+  if (!is_printable(*text)) *text = printable(*text);
+}
+
+}  // namespace
+
+void make_printable(proto::Envelope& message) {
+  switch (message.message_case()) {
+    case proto::Envelope::kGoodbye:
+      return mend(message.mutable_goodbye()->mutable_text());
+    case proto::Envelope::kMarkEvent:
+      return mend(message.mutable_mark_event()->mutable_text());
+    case proto::Envelope::kRecordingState:
+      return mend(message.mutable_recording_state()->mutable_text());
+    case proto::Envelope::kSurfaceTopology:
+      return mend(message.mutable_surface_topology()->mutable_organ_name());
+    case proto::Envelope::kClaimEvent:
+      mend(message.mutable_claim_event()->mutable_holder_name());
+      return mend(message.mutable_claim_event()->mutable_text());
+    case proto::Envelope::kSurfaceChange:
+      for (auto& region : *message.mutable_surface_change()->mutable_region()) mend(&region);
+      return;
+    case proto::Envelope::kParticipants:
+      for (auto& participant : *message.mutable_participants()->mutable_participant())
+        mend(participant.mutable_name());
+      return;
+    default:
+      return;  // it carries no text
+  }
+}
+
+}  // namespace trocar::replica

@@ -1,0 +1,186 @@
+#include "server/app/server/admission.h"
+
+#include <arpa/inet.h>
+#include <fmt/format.h>
+#include <ifaddrs.h>
+#include <net/if.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <ctime>
+
+#include "common/base/log.h"
+#include "common/secure/certificate.h"
+#include "common/secure/loopback.h"
+#include "common/secure/private_files.h"
+
+namespace trocar::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+Result<fs::path> state_folder(const AccessOptions& options) {
+  if (!options.state_folder.empty()) return fs::absolute(options.state_folder);
+  return secure::default_state_folder();
+}
+
+// The address from which packets to other networks leave; empty without such a network. Connecting
+// a socket for datagrams sends nothing.
+std::string routed_address() {
+  sockaddr_in to{}, from{};
+  to.sin_family = AF_INET;
+  to.sin_port = htons(9);
+  ::inet_pton(AF_INET, "192.0.2.1", &to.sin_addr);  // an example of RFC 5737, which nobody has
+  socklen_t size = sizeof from;
+  const int datagrams = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  if (datagrams < 0) return {};
+  const bool is_found =
+      ::connect(datagrams, reinterpret_cast<const sockaddr*>(&to), sizeof to) == 0 &&
+      ::getsockname(datagrams, reinterpret_cast<sockaddr*>(&from), &size) == 0;
+  ::close(datagrams);
+  std::array<char, INET_ADDRSTRLEN> text{};
+  if (!is_found || !::inet_ntop(AF_INET, &from.sin_addr, text.data(), text.size())) return {};
+  return text.data();
+}
+
+// An address by which others may reach this machine; where it listens, if that is one.
+std::string public_host(const std::string& listens_at) {
+  const bool is_any = listens_at == "0.0.0.0" || listens_at == "::";
+  if (!is_any)
+    return listens_at.find(':') == std::string::npos ? listens_at : "[" + listens_at + "]";
+  if (auto routed = routed_address(); !routed.empty()) return routed;
+  std::string found = "HOST";
+  ifaddrs* all = nullptr;
+  if (::getifaddrs(&all) != 0) return found;
+  for (const auto* entry = all; entry != nullptr && found == "HOST"; entry = entry->ifa_next) {
+    const bool is_up = (entry->ifa_flags & IFF_UP) != 0 && (entry->ifa_flags & IFF_LOOPBACK) == 0;
+    if (entry->ifa_addr == nullptr || entry->ifa_addr->sa_family != AF_INET || !is_up) continue;
+    std::array<char, INET_ADDRSTRLEN> text{};
+    const auto* address = reinterpret_cast<const sockaddr_in*>(entry->ifa_addr);
+    if (::inet_ntop(AF_INET, &address->sin_addr, text.data(), text.size())) found = text.data();
+  }
+  ::freeifaddrs(all);
+  return found;
+}
+
+Result<secure::Identity> read_or_make_identity(const fs::path& state) {
+  const auto certificate_file = state / "server.crt", key_file = state / "server.key";
+  const secure::FolderLock lock(state);
+  if (!fs::exists(certificate_file) || !fs::exists(key_file)) {
+    auto made = secure::make_identity();
+    if (!made) return made.error();
+    Status written = secure::write_private_file(key_file, made->key_pem);
+    if (written) written = secure::write_private_file(certificate_file, made->certificate_pem);
+    if (!written) return written.error();
+    log::info("made a certificate: {}", certificate_file.string());
+    return made;
+  }
+  auto certificate = secure::read_private_file(certificate_file);
+  if (!certificate) return certificate.error();
+  auto key = secure::read_private_file(key_file);
+  if (!key) return key.error();
+  return secure::Identity{std::move(*certificate), std::move(*key)};
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Admission>> Admission::prepare(const AccessOptions& options,
+                                                      const std::string& address) {
+  std::unique_ptr<Admission> admission(new Admission(options, address));
+  if (options.is_insecure) {
+    if (secure::is_loopback(address)) return admission;
+    return Error{ErrorCode::Usage, "--insecure-loopback: " + address +
+                                       " can be reached from other machines: use it with "
+                                       "127.0.0.1 or [::1], or leave it out"};
+  }
+  auto state = state_folder(options);
+  if (!state) return state.error();
+  admission->state_ = std::move(*state);
+  if (const auto made = secure::make_private_folder(admission->state_); !made) return made.error();
+  if (const auto read = admission->read_identity(); !read) return read.error();
+  return admission;
+}
+
+Status Admission::read_identity() {
+  secure::Identity identity;
+  std::string name = (state_ / "server.crt").string();
+  if (options_.certificate_file.empty()) {
+    auto own = read_or_make_identity(state_);
+    if (!own) return own.error();
+    identity = std::move(*own);
+  } else {
+    auto certificate = secure::read_small_file(options_.certificate_file);
+    if (!certificate) return certificate.error();
+    auto key = secure::read_small_file(options_.key_file);
+    if (!key) return key.error();
+    identity = {std::move(*certificate), std::move(*key)};
+    name = "--certificate, --key: " + options_.certificate_file;
+  }
+  auto tls = secure::make_server_context(identity, name);
+  if (!tls) return tls.error();
+  const auto der = secure::certificate_der(identity.certificate_pem, name);
+  if (!der) return der.error();
+  tls_ = std::move(*tls);
+  certificate_code_ = secure::code_of_certificate(*der);
+  return {};
+}
+
+Status Admission::issue_codes(std::uint16_t port) {
+  if (!tls_) return {};
+  const auto now = static_cast<std::int64_t>(std::time(nullptr));
+  const auto expires = now + std::llround(options_.code_hours * 3600);
+  auto book = access::CodeBook::open(state_, port, options_.keeps_codes, now);
+  if (!book) return book.error();
+  for (const auto& role : wire::kRoles) {
+    const auto secret =
+        book->issue(role.role, expires, options_.code_uses > 0 ? options_.code_uses : -1);
+    if (!secret) return secret.error();
+    codes_[role.name] = {certificate_code_, *secret};
+  }
+  auto audit = access::AuditLog::open(options_.audit_file.empty() ? state_ / "audit.jsonl"
+                                                                  : fs::path(options_.audit_file));
+  if (!audit) return audit.error();
+  gate_ = std::make_unique<access::Gate>(std::move(*book), std::move(*audit));
+  if (auto link = secure::write_link_file(port, codes_); link)
+    link_file_ = std::move(*link);
+  else
+    log::warn("no link file, so clients on this machine need --join, too: {}",
+              link.error().message);
+  return {};
+}
+
+Admission::~Admission() {
+  std::error_code ignored;
+  if (!link_file_.empty()) fs::remove(link_file_, ignored);
+  if (gate_ && !options_.keeps_codes) gate_->book().discard();
+}
+
+std::string Admission::invitation(std::uint16_t port) const {
+  if (codes_.empty()) return {};
+  std::string text = fmt::format(
+      "Join codes, for {:g} hours (trocar-client --role ROLE --join CODE"
+      " --server HOST:PORT, or --join LINK):\n",
+      options_.code_hours);
+  const auto server = public_host(address_) + ":" + std::to_string(port);
+  for (const auto& role : wire::kRoles) {
+    const auto& code = codes_.at(role.name);
+    text += fmt::format("  {:<10}  {}  {}\n", role.name, secure::to_text(code),
+                        secure::to_link(server, code));
+  }
+  return text;
+}
+
+Status revoke_codes(const AccessOptions& options, std::uint16_t port) {
+  const auto state = state_folder(options);
+  if (!state) return state.error();
+  const auto count = access::revoke(*state, port, options.revoke);
+  if (!count) return count.error();
+  std::printf("%zu %s revoked: nobody joins with %s any more; who is in stays\n", *count,
+              *count == 1 ? "code is" : "codes are", *count == 1 ? "it" : "them");
+  return {};
+}
+
+}  // namespace trocar::app

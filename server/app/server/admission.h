@@ -1,0 +1,59 @@
+#pragma once
+
+// A server needs this before the first client comes: its identity, the codes of this run, and the
+// files that go with them. An insecure server (--insecure-loopback) has none of it.
+//
+//   state folder (0700)   server.crt, server.key, codes.key, codes-PORT.json, audit.jsonl, lock
+
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "common/base/result.h"
+#include "common/secure/link_file.h"
+#include "common/secure/tls.h"
+#include "server/app/server/access_options.h"
+#include "server/session/access/gate.h"
+
+namespace trocar::app {
+
+class Admission {
+ public:
+  // Reads or makes the identity; an error if `address` is not of this machine and the options are
+  // insecure.
+  static Result<std::unique_ptr<Admission>> prepare(const AccessOptions& options,
+                                                    const std::string& address);
+  // Removes the link file, and the codes unless they are kept.
+  ~Admission();
+  Admission(const Admission&) = delete;
+  Admission& operator=(const Admission&) = delete;
+
+  // Null: without TLS.
+  const secure::TlsContext& tls() const { return tls_; }
+  // Makes the codes once the port is known.
+  Status issue_codes(std::uint16_t port);
+  // Null: everybody may come.
+  access::Gate* gate() { return gate_.get(); }
+  // Says code and link of each role, a line each; nothing if insecure.
+  std::string invitation(std::uint16_t port) const;
+
+ private:
+  Admission(const AccessOptions& options, std::string address)
+      : options_(options), address_(std::move(address)) {}
+
+  Status read_identity();
+
+  const AccessOptions options_;
+  const std::string address_;
+  std::filesystem::path state_;
+  secure::TlsContext tls_;
+  secure::HalfCode certificate_code_{};
+  secure::CodesByRole codes_;
+  std::filesystem::path link_file_;
+  std::unique_ptr<access::Gate> gate_;
+};
+
+// Does what --revoke asks for and says so.
+Status revoke_codes(const AccessOptions& options, std::uint16_t port);
+
+}  // namespace trocar::app

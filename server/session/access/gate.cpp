@@ -1,0 +1,118 @@
+#include "server/session/access/gate.h"
+
+#include <ctime>
+
+#include "common/base/log.h"
+#include "common/base/printable.h"
+
+namespace trocar::access {
+namespace {
+
+constexpr int kMostSaidPerSecond = 10;
+
+std::string seconds_text(std::uint64_t seconds) {
+  return std::to_string(seconds) + (seconds == 1 ? " second" : " seconds");
+}
+
+std::optional<Refusal> refusal_of(CodeState state) {
+  switch (state) {
+    case CodeState::Good:
+      return std::nullopt;
+    case CodeState::Expired:
+      return Refusal{RefusalKind::Expired,
+                     "join code: this code has expired, ask the host for a new one"};
+    case CodeState::UsedUp:
+      return Refusal{RefusalKind::UsedUp,
+                     "join code: this code has been used as often as it may be, ask the host for "
+                     "another"};
+    case CodeState::Revoked:
+      return Refusal{RefusalKind::Revoked,
+                     "join code: this code was revoked, ask the host for another"};
+    case CodeState::Wrong:
+      break;
+  }
+  return Refusal{RefusalKind::WrongCode,
+                 "join code: this server knows no such code, check the last eight characters"};
+}
+
+}  // namespace
+
+Gate::Gate(CodeBook book, std::optional<AuditLog> audit, GateOptions options)
+    : book_(std::move(book)), audit_(std::move(audit)), options_(std::move(options)) {}
+
+std::optional<Refusal> Gate::check(Applicant& applicant, BytesView secret) {
+  const auto now = options_.clock_ns();
+  if (secret.empty())
+    return Refusal{RefusalKind::WrongCode,
+                   "join code: this session wants one, give --join CODE as the host's server "
+                   "printed it"};
+  if (const auto wait = limiter_.seconds_to_wait(applicant.address, now); wait > 0)
+    return Refusal{RefusalKind::TooManyTries,
+                   "join code: too many wrong codes, try again in " + seconds_text(wait)};
+  if (now - looked_ns_ >= kSecondNs) {
+    looked_ns_ = now;
+    book_.refresh();
+  }
+  const auto unix_now = options_.unix_seconds ? options_.unix_seconds() : std::time(nullptr);
+  const auto verdict = book_.check(secret, unix_now);
+  if (verdict.state == CodeState::Wrong) {
+    ++counters_.wrong_tries;
+    limiter_.record_wrong_try(applicant.address, now);
+  }
+  if (auto refusal = refusal_of(verdict.state)) return refusal;
+  if (!wire::rights_of(verdict.role).admits(applicant.role))
+    return Refusal{RefusalKind::RoleNotAllowed,
+                   std::string("join code: it is one for ") + wire::name_of(verdict.role) +
+                       "s and does not make you " + wire::name_of(applicant.role) +
+                       ", come with --role " + wire::name_of(verdict.role)};
+  applicant.code = verdict.id;
+  return std::nullopt;
+}
+
+bool Gate::admit(const Applicant& applicant) {
+  if (!book_.use(applicant.code)) return false;
+  ++counters_.joined;
+  note("join", applicant);
+  return true;
+}
+
+void Gate::note_leave(const Applicant& applicant) {
+  note("leave", applicant);
+}
+
+void Gate::note_refusal(const Applicant& applicant, const std::string& reason) {
+  ++counters_.refused;
+  const auto now = options_.clock_ns();
+  if (now - said_second_ns_ >= kSecondNs) {
+    said_second_ns_ = now;
+    said_in_second_ = 0;
+  }
+  if (said_in_second_ >= kMostSaidPerSecond) {
+    ++left_out_;
+    return;
+  }
+  ++said_in_second_;
+  log::warn("refused {} ({}) from {}: {}{}", printable(applicant.name, 64),
+            wire::name_of(applicant.role), applicant.address, reason,
+            left_out_ > 0 ? "; " + std::to_string(left_out_) + " more before it" : std::string());
+  note("refusal", applicant, reason, left_out_);
+  left_out_ = 0;
+}
+
+void Gate::note_action(const Applicant& applicant, std::string_view what) {
+  note(what, applicant);
+}
+
+void Gate::note(std::string_view event, const Applicant& applicant, std::string_view reason,
+                std::uint64_t left_out) {
+  if (!audit_) return;
+  audit_->write({.event = event,
+                 .name = std::string_view(applicant.name).substr(0, 64),
+                 .role = wire::name_of(applicant.role),
+                 .address = applicant.address,
+                 .reason = reason,
+                 .code = applicant.code,
+                 .left_out = left_out});
+}
+
+}  // namespace trocar::access
