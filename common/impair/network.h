@@ -7,7 +7,6 @@
 
 #include "common/base/asio.h"  // before Boost: see there
 
-#include <boost/asio/as_tuple.hpp>
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/ip/udp.hpp>
