@@ -43,6 +43,7 @@ class Run {
 
  private:
   Status step(std::uint64_t now_ns);
+  void measure(std::uint64_t now_ns);
   void use_marks(std::uint64_t now_ns);
   bool is_over(std::uint64_t now_ns);
   Status take_screenshot(std::uint64_t now_ns, bool is_last);
@@ -59,6 +60,9 @@ class Run {
   std::uint64_t live_ns_ = 0;  // when the first frame was there
   bool has_screenshot_ = false, has_marked_ = false, has_returned_ = false;
   std::string exit_reason_;
+  replica::TimeDistribution round_trip_, surface_age_, hand_to_visible_, cut_to_visible_;
+  std::uint64_t last_change_us_ = 0;
+  double last_round_trip_seconds_ = 0;
 };
 
 Status Run::step(std::uint64_t now_ns) {
@@ -73,6 +77,7 @@ Status Run::step(std::uint64_t now_ns) {
   }
   if (const auto sent = hands_.send_due(replica_, source_, now_ns); !sent) return sent.error();
   use_marks(now_ns);
+  measure(now_ns);
   if (picture_) picture_->observe(replica_);
   if (picture_ && now_ns >= next_picture_ns_) {
     next_picture_ns_ = std::max(next_picture_ns_ + picture_interval_ns_, now_ns);
@@ -80,6 +85,24 @@ Status Run::step(std::uint64_t now_ns) {
     if (const auto taken = take_screenshot(now_ns, false); !taken) return taken.error();
   }
   return {};
+}
+
+// The first second, in which clocks and paths are found, does not count.
+void Run::measure(std::uint64_t now_ns) {
+  if (live_ns_ == 0 || now_ns - live_ns_ < 1'000'000'000) return;
+  const auto statistics = source_.statistics();
+  if (statistics.round_trip_seconds != last_round_trip_seconds_) {
+    last_round_trip_seconds_ = statistics.round_trip_seconds;
+    round_trip_.add(last_round_trip_seconds_ * 1e3);
+  }
+  if (const auto echo = hands_.observe_echo_ms(replica_, now_ns)) hand_to_visible_.add(*echo);
+  if (!statistics.has_server_clock || replica_.barrier()) return;
+  const auto server_now_us = static_cast<double>(now_ns) * 1e-3 + statistics.server_offset_us;
+  if (const auto age = replica_.age_ms(server_now_us)) surface_age_.add(*age);
+  const auto change_us = replica_.shown_change_us();
+  if (change_us != last_change_us_)
+    cut_to_visible_.add((server_now_us - static_cast<double>(change_us)) * 1e-3);
+  last_change_us_ = change_us;
 }
 
 void Run::use_marks(std::uint64_t now_ns) {
@@ -125,7 +148,10 @@ Status Run::write_summary() const {
   summary.wall_seconds = static_cast<double>(monotonic_ns() - start_ns_) * 1e-9;
   summary.pictures = picture_ ? picture_->count() : 0;
   const auto statistics = source_.statistics();
-  summary.round_trip_ms = statistics.round_trip_seconds * 1e3;
+  summary.round_trip = round_trip_;
+  summary.surface_age = surface_age_;
+  summary.hand_to_visible = hand_to_visible_;
+  summary.cut_to_visible = cut_to_visible_;
   std::ofstream file(options_.summary_file);
   file << to_json(summary, replica_, statistics);
   file.close();
@@ -256,6 +282,7 @@ Result<ExitCode> run_client(const ClientOptions& options) {
   connection.connect_deadline =
       std::chrono::milliseconds(static_cast<std::int64_t>(options.wait_s * 1e3));
   connection.participant_name = options.name;
+  connection.wants_datagrams = options.wants_datagrams;
   connection.role = static_cast<int>(options.role);
   connection.tools = hands.shapes();
   net::NetSource source(std::move(connection));

@@ -132,6 +132,8 @@ Result<std::optional<ClientOptions>> parse_client_command_line(int argc, char** 
       ->type_name("FILE");
   app.add_flag("--insecure-loopback", options.is_insecure,
                "without TLS and codes, for tests; servers on this machine only");
+  app.add_flag("!--no-datagrams", options.wants_datagrams,
+               "frames and hands over the TCP stream alone");
   app.add_option("--wait", options.wait_s, "how long to try while no server is there yet")
       ->type_name("S")
       ->check(CLI::Range(0.0, 3600.0))

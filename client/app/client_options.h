@@ -29,8 +29,9 @@ struct ClientOptions {
   std::string join;          // code or link; empty: from the link file
   std::string ca_file;       // empty: the code says whose certificate it must be
   bool is_insecure = false;  // without TLS, on this machine only
-  double wait_s = 15;        // for a server that is not there yet
-  std::string name;          // empty: made from the login name and the process
+  bool wants_datagrams = true;
+  double wait_s = 15;  // for a server that is not there yet
+  std::string name;    // empty: made from the login name and the process
   replica::Role role = replica::Role::Surgeon;
   Display display = Display::Window;
   render::Size size{1280, 720};

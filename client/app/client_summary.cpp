@@ -3,6 +3,16 @@
 #include "common/base/json.h"
 
 namespace trocar::app {
+namespace {
+
+Json to_json(const replica::TimeDistribution& times) {
+  return {{"count", times.count()},
+          {"median", times.quantile_ms(0.5)},
+          {"p99", times.quantile_ms(0.99)},
+          {"largest", times.quantile_ms(1)}};
+}
+
+}  // namespace
 
 std::string to_json(const ClientSummary& summary, const replica::Replica& replica,
                     const replica::SourceStatistics& source) {
@@ -45,7 +55,14 @@ std::string to_json(const ClientSummary& summary, const replica::Replica& replic
                   {"changed_vertices", counters.changed_vertices},
                   {"bytes_per_changed_vertex", counters.bytes_per_changed_vertex()},
                   {"share_moved_over_1_mm", replica.share_moved()},
-                  {"round_trip_ms", summary.round_trip_ms},
+                  {"round_trip_ms", to_json(summary.round_trip)},
+                  {"surface_age_ms", to_json(summary.surface_age)},
+                  {"hand_to_visible_ms", to_json(summary.hand_to_visible)},
+                  {"cut_to_visible_ms", to_json(summary.cut_to_visible)},
+                  {"frames_by_datagram", counters.by_datagram},
+                  {"frames_late", counters.frames_late},
+                  {"datagram_bytes_received", source.datagram_bytes_received},
+                  {"datagram_bytes_sent", source.datagram_bytes_sent},
                   {"sends_dropped", source.sends_dropped},
                   {"pictures", summary.pictures}});
 }

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "client/replica/replica.h"
+#include "client/replica/time_distribution.h"
 
 namespace trocar::app {
 
@@ -13,7 +14,11 @@ struct ClientSummary {
   std::string exit_reason;  // one line
   double wall_seconds = 0;
   std::uint64_t pictures = 0;
-  double round_trip_ms = 0;
+  replica::TimeDistribution round_trip;
+  // The time since the server published the newest surface, as it was every 4 ms or so.
+  replica::TimeDistribution surface_age;
+  // From a hand's motion until a frame shows it, and from a cut on the server until it is shown.
+  replica::TimeDistribution hand_to_visible, cut_to_visible;
 };
 
 std::string to_json(const ClientSummary& summary, const replica::Replica& replica,

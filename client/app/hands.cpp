@@ -25,9 +25,22 @@ std::vector<tool::ToolShape> Hands::shapes() const {
 }
 
 void Hands::send(replica::SessionSource& source, std::uint32_t tool,
-                 const tool::ToolSample& sample) {
+                 const tool::ToolSample& sample, std::uint64_t now_ns) {
+  if (tool == 0) echo_.note_sent(sample.world_from_tool.position, now_ns);
   // Dropped when the queue is full: the next sample says more.
   replica::send_tool_sample(source, tool, ++sequence_, sample);
+}
+
+std::optional<double> Hands::observe_echo_ms(const replica::Replica& replica,
+                                             std::uint64_t now_ns) {
+  const auto own = tool_slot(replica.own_slot(), 0);
+  for (auto frame = replica.history().rbegin(); frame != replica.history().rend(); ++frame) {
+    if (!frame->has_state) continue;
+    const auto tool = std::ranges::find(frame->tools, own, &replica::Tool::slot);
+    if (tool == frame->tools.end()) return std::nullopt;
+    return echo_.observe_ms(tool->world_from_tool.position, now_ns);
+  }
+  return std::nullopt;
 }
 
 double Hands::script_seconds(const replica::SessionFrame& newest, std::uint64_t now_ns) {
@@ -45,7 +58,7 @@ Status Hands::send_due(const replica::Replica& replica, replica::SessionSource& 
                        std::uint64_t now_ns) {
   if (replica.newest() == nullptr || source.state() != replica::SourceState::Live) return {};
   if (mouse_)
-    if (const auto sample = mouse_->pop_due(now_ns)) send(source, 0, *sample);
+    if (const auto sample = mouse_->pop_due(now_ns)) send(source, 0, *sample, now_ns);
   if (script_) {
     auto hand = device::ScriptHand::make(std::move(*script_), replica.topology().rest_positions,
                                          replica.topology().triangles);
@@ -58,7 +71,8 @@ Status Hands::send_due(const replica::Replica& replica, replica::SessionSource& 
     script_sent_ns_ = now_ns;
     const double seconds = script_seconds(*replica.newest(), now_ns);
     for (std::size_t tool = 0; tool < script_hand_->tool_count(); ++tool)
-      send(source, static_cast<std::uint32_t>(tool), script_hand_->sample(tool, seconds));
+      send(source, static_cast<std::uint32_t>(tool), script_hand_->sample(tool, seconds),
+           now_ns);
   }
   return {};
 }

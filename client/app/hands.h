@@ -8,6 +8,7 @@
 
 #include "client/device/mouse_tool.h"
 #include "client/device/script_hand.h"
+#include "client/replica/hand_echo.h"
 #include "client/replica/replica.h"
 
 namespace trocar::app {
@@ -28,11 +29,14 @@ class Hands {
   // does not fit the organ.
   Status send_due(const replica::Replica& replica, replica::SessionSource& source,
                   std::uint64_t now_ns);
+  // Takes note of the first tool's position in each frame; the time since it was sent, in ms.
+  std::optional<double> observe_echo_ms(const replica::Replica& replica, std::uint64_t now_ns);
 
  private:
   // Simulated seconds since the script began; never goes back.
   double script_seconds(const replica::SessionFrame& newest, std::uint64_t now_ns);
-  void send(replica::SessionSource& source, std::uint32_t tool, const tool::ToolSample& sample);
+  void send(replica::SessionSource& source, std::uint32_t tool, const tool::ToolSample& sample,
+            std::uint64_t now_ns);
 
   std::optional<device::MouseTool> mouse_;
   tool::ToolShape mouse_shape_;
@@ -43,6 +47,7 @@ class Hands {
   double script_seconds_ = 0;
   std::uint64_t script_sent_ns_ = 0;
   std::uint32_t sequence_ = 0;
+  replica::HandEcho echo_;
 };
 
 }  // namespace trocar::app

@@ -247,7 +247,11 @@ ui::HudModel Picture::hud_model(const replica::Replica& replica, replica::Sessio
     model.figures = (is_complete ? *newest : history[history.size() - 2]).figures;
     model.session_seconds = static_cast<double>(newest->tick) * 1e-3;
   }
-  model.round_trip_ms = source.statistics().round_trip_seconds * 1e3;
+  const auto statistics = source.statistics();
+  model.round_trip_ms = statistics.round_trip_seconds * 1e3;
+  if (statistics.has_server_clock)
+    model.surface_age_ms =
+        replica.age_ms(static_cast<double>(now_ns) * 1e-3 + statistics.server_offset_us);
   model.pictures_per_second = rate_.pictures_per_second;
   model.frames_per_second = rate_.frames_per_second;
   model.bytes_per_second = rate_.bytes_per_second;

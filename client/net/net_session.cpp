@@ -40,8 +40,9 @@ NetSource::Session::~Session() {
 
 // ---- render thread ----
 
-bool NetSource::Session::try_send(wire::SharedBytes frame) {
-  if (frame->size() > wire::kMaxUpstreamBytes || !outbound_.try_push(std::move(frame))) {
+bool NetSource::Session::try_send(const proto::Envelope& message) {
+  if (message.ByteSizeLong() + wire::kHeaderBytes > wire::kMaxUpstreamBytes ||
+      !outbound_.try_push(std::make_shared<proto::Envelope>(message))) {
     sends_dropped_.fetch_add(1, std::memory_order_relaxed);
     return false;
   }
@@ -63,7 +64,13 @@ replica::SourceStatistics NetSource::Session::statistics() const {
           .messages_received = messages_received_,
           .frames_received = frames_received_,
           .sends_dropped = sends_dropped_,
-          .round_trip_seconds = round_trip_seconds_};
+          .round_trip_seconds = round_trip_seconds_,
+          .shortest_round_trip_seconds = shortest_round_trip_seconds_,
+          .datagram_bytes_received = datagram_bytes_received_,
+          .datagram_bytes_sent = datagram_bytes_sent_,
+          .slices_received = slices_received_,
+          .has_server_clock = has_server_clock_,
+          .server_offset_us = server_offset_us_};
 }
 
 std::string NetSource::Session::server_name() const {
@@ -85,6 +92,7 @@ void NetSource::Session::stop_io() {
   boost::system::error_code ignored;
   socket_.close(ignored);
   if (stream_) stream_->socket().close(ignored);
+  datagrams_.reset();
   resolver_.cancel();
   for (auto* timer : {&retry_timer_, &room_timer_, &ping_timer_, &wake_timer_, &deadline_timer_})
     timer->cancel();
@@ -121,6 +129,7 @@ wire::SharedBytes NetSource::Session::encode_hello() const {
   hello.set_protocol_minor(kProtocolMinor);
   hello.set_name(options_.participant_name);
   hello.set_role(static_cast<proto::Role>(options_.role));
+  hello.set_acks_every_frame(options_.acks_every_frame);
   if (secret_) hello.set_join_secret(secret_->data(), secret_->size());
   for (const auto& shape : options_.tools) {
     wire::write(shape, *hello.add_tool());
@@ -302,15 +311,57 @@ std::shared_ptr<const proto::Envelope> NetSource::Session::pop_message() {
   messages_received_.fetch_add(1, std::memory_order_relaxed);
   replica::make_printable(*message);
   if (message->has_pong()) {
-    const auto elapsed_us = monotonic_ns() / 1000 - message->pong().client_time_us();
-    round_trip_seconds_ = static_cast<double>(elapsed_us) * 1e-6;
+    note_pong(message->pong());
     return nullptr;
   }
   if (message->message_case() == proto::Envelope::MESSAGE_NOT_SET) return nullptr;
   if (message->has_surface_frame()) frames_received_.fetch_add(1, std::memory_order_relaxed);
   has_heard_ = true;
+  heed(*message);
   if (options_.before_message) options_.before_message();
   return message;
+}
+
+void NetSource::Session::note_pong(const proto::Pong& pong) {
+  const auto now_us = monotonic_ns() / 1000;
+  round_trip_seconds_ = static_cast<double>(now_us - pong.client_time_us()) * 1e-6;
+  if (pong.server_time_us() == 0) return;  // an older server
+  clock_.add(pong.client_time_us(), pong.server_time_us(), now_us);
+  shortest_round_trip_seconds_ = clock_.shortest_round_trip_us() * 1e-6;
+  server_offset_us_ = clock_.offset_us();
+  has_server_clock_ = true;
+}
+
+// This layer itself learns something from messages for the replica.
+void NetSource::Session::heed(const proto::Envelope& message) {
+  if (message.has_barrier()) is_barrier_ = true;
+  if (message.has_welcome() && message.welcome().has_datagrams()) begin_datagrams();
+}
+
+void NetSource::Session::begin_datagrams() {
+  if (!options_.wants_datagrams) return;
+  const auto key = stream_->datagram_key();
+  boost::system::error_code error;
+  const auto server = stream_->socket().remote_endpoint(error);
+  if (!key || error) return;
+  datagrams_ = std::make_unique<DatagramPath>(
+      context_, asio::ip::udp::endpoint(server.address(), server.port()), *key,
+      [this](std::shared_ptr<const proto::Envelope> message, std::size_t bytes) {
+        deliver_datagram(std::move(message), bytes);
+      });
+}
+
+// Datagrams wait for nobody: without room they are lost, as on the way.
+void NetSource::Session::deliver_datagram(std::shared_ptr<const proto::Envelope> message,
+                                          std::size_t bytes) {
+  datagram_bytes_received_ = datagrams_->bytes_received();
+  const bool is_expected = message->has_surface_slice() || message->has_frame_state_part() ||
+                           message->has_surface_change();
+  if (!is_expected) return;
+  if (message->has_surface_slice()) slices_received_.fetch_add(1, std::memory_order_relaxed);
+  messages_received_.fetch_add(1, std::memory_order_relaxed);
+  if (options_.before_message) options_.before_message();
+  inbound_.try_push({std::move(message), monotonic_ns(), bytes});
 }
 
 void NetSource::Session::end_if_final(const proto::Envelope& message) {
@@ -338,17 +389,23 @@ asio::awaitable<void> NetSource::Session::deliver(std::shared_ptr<const proto::E
   last_heard_ = Clock::now();
 }
 
+void NetSource::Session::take_outbound() {
+  while (in_flight_.size() < kBuffersPerWrite) {
+    const auto next = outbound_.try_pop();
+    if (!next) break;
+    const bool is_carried = datagrams_ && datagrams_->carry(**next);
+    if (!is_carried || is_barrier_) in_flight_.push_back(wire::encode_envelope(**next));
+  }
+  if (datagrams_) datagram_bytes_sent_ = datagrams_->bytes_sent();
+}
+
 asio::awaitable<void> NetSource::Session::write_messages() {
   std::vector<asio::const_buffer> buffers;
   while (!is_done_) {
     in_flight_ = std::move(control_);
     control_.clear();
     is_ping_queued_ = false;
-    while (in_flight_.size() < kBuffersPerWrite) {
-      auto next = outbound_.try_pop();
-      if (!next) break;
-      in_flight_.push_back(std::move(*next));
-    }
+    take_outbound();
     if (in_flight_.empty()) {
       // Nothing can slip in between: wakers run on this thread.
       wake_timer_.expires_at(Clock::time_point::max());

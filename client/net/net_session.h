@@ -15,7 +15,9 @@
 #include <thread>
 #include <vector>
 
+#include "client/net/datagram_path.h"
 #include "client/net/net_source.h"
+#include "client/net/server_clock.h"
 #include "common/base/spsc_queue.h"
 #include "common/secure/stream.h"
 #include "common/wire/framing.h"
@@ -36,7 +38,7 @@ class NetSource::Session {
 
   // Render thread.
   std::optional<Arrival> try_pop() { return inbound_.try_pop(); }
-  bool try_send(wire::SharedBytes frame);
+  bool try_send(const proto::Envelope& message);
   void request_close(const std::string& reason);
   // After true: everything was pushed, close_reason() does not change any more.
   bool has_ended() const { return has_ended_.load(std::memory_order_acquire); }
@@ -65,6 +67,11 @@ class NetSource::Session {
   bool make_room_for(std::span<const std::uint8_t, wire::kHeaderBytes> header);
   std::shared_ptr<const proto::Envelope> pop_message();
   void end_if_final(const proto::Envelope& message);
+  void heed(const proto::Envelope& message);
+  void note_pong(const proto::Pong& pong);
+  void begin_datagrams();
+  void deliver_datagram(std::shared_ptr<const proto::Envelope> message, std::size_t bytes);
+  void take_outbound();
   void end_after_stream();
   void say_waiting(const std::string& why) const;
   void end_unreachable(const std::string& why);
@@ -86,20 +93,27 @@ class NetSource::Session {
   asio::steady_timer wake_timer_{context_}, deadline_timer_{context_};
   std::vector<wire::SharedBytes> control_;  // Hello, Ping, Bye: at most one of each
   std::vector<wire::SharedBytes> in_flight_;
+  std::unique_ptr<DatagramPath> datagrams_;  // null: the stream carries everything
+  ServerClock clock_;
   bool is_connected_ = false, is_closing_ = false, is_done_ = false, is_stalled_ = false;
+  bool is_barrier_ = false;  // answers must arrive from here on
   bool has_heard_ = false;
   bool is_ping_queued_ = false;
   Clock::time_point last_heard_{};
   Bytes body_;
 
   SpscQueue<Arrival> inbound_;
-  SpscQueue<wire::SharedBytes> outbound_;
+  SpscQueue<std::shared_ptr<const proto::Envelope>> outbound_;
   std::atomic<bool> is_wake_posted_{false};
   std::atomic<bool> has_ended_{false};
   replica::CloseReason close_reason_;  // written before has_ended_ is set
   std::atomic<std::uint64_t> bytes_received_{0}, bytes_sent_{0}, messages_received_{0};
   std::atomic<std::uint64_t> frames_received_{0}, sends_dropped_{0};
-  std::atomic<double> round_trip_seconds_{0};
+  std::atomic<std::uint64_t> datagram_bytes_received_{0}, datagram_bytes_sent_{0};
+  std::atomic<std::uint64_t> slices_received_{0};
+  std::atomic<double> round_trip_seconds_{0}, shortest_round_trip_seconds_{0};
+  std::atomic<double> server_offset_us_{0};
+  std::atomic<bool> has_server_clock_{false};
   std::thread thread_;
 };
 

@@ -59,7 +59,7 @@ void NetSource::poll(replica::MessageSink& sink) {
 
 bool NetSource::send(const proto::Envelope& message) {
   if (state_ != replica::SourceState::Live) return false;
-  return session_->try_send(wire::encode_envelope(message));
+  return session_->try_send(message);
 }
 
 void NetSource::close(const std::string& reason) {

@@ -1,12 +1,14 @@
 #pragma once
 
-// A live server as a source of messages: TCP, TLS, handshake, pings, on a thread of its own.
+// A live server as a source of messages: TCP, TLS, handshake, pings, datagrams, on a thread of its
+// own.
 //
 //   Asio thread                                             render thread
 //   connect (retry until the deadline), TLS, check of the certificate, Hello
 //   read frame -> decode -> inbound queue [256 messages] --> poll(sink)
 //   write <---------------- outbound queue [256 messages] <-- send(envelope)
-//   Ping every 200 ms, Pong -> round trip
+//   Ping every 200 ms, Pong -> round trip, the server's clock
+//   datagram path (datagram_path.h): slices of frames in, samples and acknowledgements out
 //
 // Inbound queue full: nothing is read until there is room, so TCP holds the server back and the
 // server skips frames for us; nothing is dropped and nothing grows. Outbound queue full: send()
@@ -38,7 +40,10 @@ struct NetSourceOptions {
   // With TLS, asked once the handshake is done: whose certificate it must be, and what is sent with
   // Hello. Empty: nothing is compared and nothing is sent.
   std::function<Result<secure::JoinCode>()> join_code;
-  bool trusts_ca = false;  // the CA in `tls` vouches for the server, so the code need not
+  bool wants_datagrams = true;  // where the server has them
+  // Whoever polls acknowledges each frame, as a Replica does. Else the server does not pace frames.
+  bool acks_every_frame = true;
+  bool trusts_ca = false;       // the CA in `tls` vouches for the server, so the code need not
   std::chrono::milliseconds connect_deadline{15000};  // a server may still be starting
   std::chrono::milliseconds connect_retry{200};
   std::chrono::milliseconds ping_interval{200};

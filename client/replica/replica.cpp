@@ -65,6 +65,7 @@ bool expand_regions(const proto::FrameState& message, std::vector<std::uint16_t>
 }  // namespace
 
 Replica::Replica(Send send) : send_(std::move(send)) {}
+Replica::~Replica() = default;
 
 void Replica::fail(std::string what) {
   if (fault_.ok()) fault_ = Error{ErrorCode::BadMessage, std::move(what)};
@@ -83,8 +84,12 @@ void Replica::on_message(const proto::Envelope& message, std::uint64_t arrival_n
       return apply_change(message.surface_change(), bytes);
     case proto::Envelope::kSurfaceFrame:
       return apply_surface(message.surface_frame(), arrival_ns);
+    case proto::Envelope::kSurfaceSlice:
+      return apply_slice(message.surface_slice(), arrival_ns);
     case proto::Envelope::kFrameState:
       return apply_state(message.frame_state());
+    case proto::Envelope::kFrameStatePart:
+      return apply_state_part(message.frame_state_part());
     case proto::Envelope::kParticipants:
       return apply_participants(message.participants());
     case proto::Envelope::kClaimEvent:
@@ -113,6 +118,7 @@ void Replica::apply_welcome(const proto::Welcome& message) {
                 ", this client " + std::to_string(kProtocolMajor) + ": use the same release");
   if (message.ticks_per_frame() != kTicksPerFrame || message.tick_us() != 1000)
     return fail("Welcome: tick_us and ticks_per_frame must be 1000 and 16");
+  has_datagrams_ = message.has_datagrams();
   if (message.participant() < kMaxParticipants)
     own_slot_.value = static_cast<std::uint8_t>(message.participant());
 }
@@ -124,6 +130,8 @@ void Replica::apply_topology(const proto::SurfaceTopology& message) {
   organ_name_ = message.organ_name();
   is_layout_new_ = true;
   to_show_.clear();
+  assembler_.clear();
+  early_state_.reset();
   request_pending_ = false;
   if (sync_state_ == SyncState::WaitingForTopology) show_layout();
   if (sync_state_ != SyncState::Healing) sync_state_ = SyncState::WaitingForKeyframe;
@@ -131,6 +139,9 @@ void Replica::apply_topology(const proto::SurfaceTopology& message) {
 
 void Replica::apply_change(const proto::SurfaceChange& message, std::size_t bytes) {
   if (sync_state_ == SyncState::WaitingForTopology) return;
+  // Changes come by stream and as datagrams: each counts once, and what is missing is on its way.
+  const bool is_known = message.epoch() <= layout_.epoch;
+  if (has_datagrams_ && (is_known || message.from_epoch() > layout_.epoch)) return;
   auto change = wire::read(message, layout_);
   const Status applied = change.ok() ? wire::apply(*change, layout_) : Status(change.error());
   if (!applied.ok()) {
@@ -141,6 +152,7 @@ void Replica::apply_change(const proto::SurfaceChange& message, std::size_t byte
   }
   ++counters_.surface_changes;
   counters_.change_bytes += bytes;
+  newest_change_us_ = message.server_time_us();
   if (!is_layout_new_) to_show_.push_back(std::move(*change));
 }
 
@@ -184,6 +196,7 @@ void Replica::show_changes() {
     }
     topology_.epoch = change.epoch;
   }
+  shown_change_us_ = newest_change_us_;
   ++topology_version_;
   has_moved_.resize(std::max(has_moved_.size(), layout_.vertex_count()), 0);
   to_show_.clear();
@@ -200,6 +213,11 @@ void Replica::extend_history(const wire::QuantisedSurface& surface) {
   }
 }
 
+const wire::QuantisedSurface* Replica::find_base(Frame frame) const {
+  if (!history_.empty() && history_.back().frame == frame) return &history_.back().surface;
+  return assembler_.find(frame);
+}
+
 bool Replica::decode_surface(const proto::SurfaceFrame& message) {
   Bytes payload(message.payload().begin(), message.payload().end());
   if (!message.is_keyframe() && ++deltas_seen_ == corrupt_at_ && !payload.empty())
@@ -208,11 +226,18 @@ bool Replica::decode_surface(const proto::SurfaceFrame& message) {
     scratch_.assign(layout_.vertex_count(), {});
     if (!wire::decode_keyframe(payload, scratch_).ok()) return false;
   } else {
-    scratch_ = history_.back().surface;
+    scratch_ = *find_base(message.base_frame());
     scratch_.resize(layout_.vertex_count());  // zeros, as on the server
     if (!wire::decode_delta(payload, scratch_).ok()) return false;
   }
   return wire::surface_crc(scratch_) == message.surface_crc();
+}
+
+// Datagrams have brought a newer frame, or a change of the surface that comes after it.
+bool Replica::is_overtaken(const proto::SurfaceFrame& message) const {
+  if (!has_datagrams_) return false;
+  if (message.epoch() < layout_.epoch) return true;
+  return sync_state_ == SyncState::InStep && message.frame() <= history_.back().frame;
 }
 
 void Replica::apply_surface(const proto::SurfaceFrame& message, std::uint64_t arrival_ns) {
@@ -222,9 +247,13 @@ void Replica::apply_surface(const proto::SurfaceFrame& message, std::uint64_t ar
     ++counters_.deltas_ignored;
     return;
   }
+  if (is_overtaken(message)) {
+    ++counters_.frames_late;
+    return;
+  }
   // A keyframe of an unknown epoch is as good as none: its topology has to come first.
   if (message.epoch() != layout_.epoch ||
-      (!message.is_keyframe() && message.base_frame() != history_.back().frame)) {
+      (!message.is_keyframe() && find_base(message.base_frame()) == nullptr)) {
     ++counters_.base_mismatches;
     return need_keyframe(message.frame());
   }
@@ -232,7 +261,40 @@ void Replica::apply_surface(const proto::SurfaceFrame& message, std::uint64_t ar
     ++counters_.crc_mismatches;
     return need_keyframe(message.frame());
   }
-  accept_frame(message, arrival_ns);
+  accept_frame({.frame = message.frame(),
+                .tick = message.tick(),
+                .epoch = message.epoch(),
+                .surface_crc = message.surface_crc(),
+                .server_time_us = message.server_time_us(),
+                .is_keyframe = message.is_keyframe(),
+                .payload_bytes = message.payload().size()},
+               arrival_ns);
+}
+
+// A slice of another epoch is dropped: its change is still under way by the stream, or it is late.
+void Replica::apply_slice(const proto::SurfaceSlice& message, std::uint64_t arrival_ns) {
+  if (sync_state_ != SyncState::InStep || message.epoch() != layout_.epoch) return;
+  if (message.frame() <= history_.back().frame) return;
+  auto whole = assembler_.add(message, layout_.vertex_count());
+  if (!whole) return;
+  scratch_ = std::move(whole->surface);
+  if (++deltas_seen_ == corrupt_at_) scratch_.front().x ^= 1;
+  if (wire::surface_crc(scratch_) != whole->header.surface_crc) {
+    ++counters_.crc_mismatches;
+    return need_keyframe(message.frame());
+  }
+  ++counters_.by_datagram;
+  accept_frame(whole->header, arrival_ns);
+}
+
+void Replica::apply_state_part(const proto::FrameStatePart& message) {
+  if (sync_state_ != SyncState::InStep) return;
+  const auto state = assembler_.add(message);
+  if (!state) return;
+  if (state->frame() <= history_.back().frame)
+    apply_state(*state);
+  else
+    early_state_ = std::make_unique<proto::FrameState>(*state);
 }
 
 void Replica::count_moved() {
@@ -245,7 +307,21 @@ void Replica::count_moved() {
   }
 }
 
-void Replica::accept_frame(const proto::SurfaceFrame& message, std::uint64_t arrival_ns) {
+void Replica::accept_frame(const FrameHeader& header, std::uint64_t arrival_ns) {
+  if (has_datagrams_) assembler_.keep(header.frame, scratch_);
+  show_frame(header, arrival_ns);
+  proto::Envelope ack;
+  ack.mutable_frame_ack()->set_frame(history_.back().frame);
+  ack.mutable_frame_ack()->set_surface_crc(surface_crc_);
+  send_(ack);  // the next one says the same
+  if (early_state_ && early_state_->frame() <= header.frame) {
+    apply_state(*early_state_);
+    early_state_.reset();
+  }
+  if (barrier_ && !barrier_answered_) answer_barrier();
+}
+
+void Replica::show_frame(const FrameHeader& header, std::uint64_t arrival_ns) {
   if (is_layout_new_) {
     show_layout();
   } else if (!to_show_.empty()) {
@@ -253,18 +329,18 @@ void Replica::accept_frame(const proto::SurfaceFrame& message, std::uint64_t arr
     show_changes();
   }
   ++counters_.frames;
-  if (message.is_keyframe()) {
+  if (header.is_keyframe) {
     ++counters_.keyframes;
     if (sync_state_ == SyncState::Healing) ++counters_.healed;
     sync_state_ = SyncState::InStep;
     request_pending_ = false;
-    if (!history_.empty() && (message.tick() <= history_.back().tick ||
-                              message.tick() - history_.back().tick > kSeekTicks)) {
+    if (!history_.empty() &&
+        (header.tick <= history_.back().tick || header.tick - history_.back().tick > kSeekTicks)) {
       history_.clear();
       ++history_version_;
     }
   } else {
-    counters_.delta_bytes += message.payload().size();
+    counters_.delta_bytes += header.payload_bytes;
     const auto& before = history_.back().surface;
     for (std::size_t i = 0; i < scratch_.size(); ++i)
       counters_.changed_vertices += !(scratch_[i] == before[i]);
@@ -275,21 +351,14 @@ void Replica::accept_frame(const proto::SurfaceFrame& message, std::uint64_t arr
     next = std::move(history_.front());  // its buffers are used again
     history_.pop_front();
   }
-  next.frame = message.frame();
-  next.tick = message.tick();
+  next.frame = header.frame;
+  next.tick = header.tick;
   next.arrival_ns = arrival_ns;
+  next.server_time_us = header.server_time_us;
   next.surface = scratch_;
   next.has_state = false;
   history_.push_back(std::move(next));
-  surface_crc_ = message.surface_crc();
-
-  if (counters_.frames % kFramesPerAck == 0) {
-    proto::Envelope ack;
-    ack.mutable_frame_ack()->set_frame(message.frame());
-    ack.mutable_frame_ack()->set_surface_crc(surface_crc_);
-    send_(ack);  // the next one, 16 frames on, says the same
-  }
-  if (barrier_ && !barrier_answered_) answer_barrier();
+  surface_crc_ = header.surface_crc;
 }
 
 void Replica::need_keyframe(Frame frame) {
@@ -315,9 +384,9 @@ void Replica::answer_barrier() {
 }
 
 void Replica::apply_state(const proto::FrameState& message) {
-  if (history_.empty() || history_.back().frame != message.frame())
-    return;  // its surface was ignored
-  SessionFrame& frame = history_.back();
+  const auto found = std::ranges::find(history_, message.frame(), &SessionFrame::frame);
+  if (found == history_.end()) return;  // its surface was ignored, or is not shown any more
+  SessionFrame& frame = *found;
   frame.tools.clear();
   for (const auto& state : message.tool()) {
     if (state.tool() >= kMaxTools) return fail("FrameState.tool: slot out of range");
@@ -428,6 +497,11 @@ void Replica::apply_ghost(const proto::GhostFrame& message) {
 const Participant* Replica::find_participant(ParticipantSlot slot) const {
   const auto found = std::ranges::find(participants_, slot, &Participant::slot);
   return found == participants_.end() ? nullptr : &*found;
+}
+
+std::optional<double> Replica::age_ms(double server_now_us) const {
+  if (history_.empty() || history_.back().server_time_us == 0) return std::nullopt;
+  return (server_now_us - static_cast<double>(history_.back().server_time_us)) * 1e-3;
 }
 
 double Replica::share_moved() const {

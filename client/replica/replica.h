@@ -14,16 +14,20 @@
 // have lies there between those it was made from, or without parents as in the next frame that has
 // it; so no vertex is seen to jump because it is new.
 //
-// A frame that does not check out is never shown: the last good one stays. A keyframe may go back
-// in time (a replay that seeks), which clears the history. Barrier is answered with FrameAck for
-// exactly that frame and the replica's own CRC, after healing if need be; FrameAck also goes out
-// every 16 frames. Outside data: an invalid message sets `fault()`, after which messages are
-// ignored. Thread: render thread.
+// Frames also come as datagrams, against any frame that was acknowledged; what comes after
+// a newer one is ignored. A frame that does not check out is never shown: the last good one stays.
+// A keyframe may go back in time (a replay that seeks), which clears the history. Barrier is
+// answered with FrameAck for exactly that frame and the replica's own CRC, after healing if need
+// be; FrameAck also goes out for each frame, so that the server knows what has arrived, and when.
+// Outside data: an invalid message sets `fault()`, after which messages are ignored. Thread: render
+// thread.
 
 #include <deque>
 #include <functional>
+#include <memory>
 #include <optional>
 
+#include "client/replica/frame_assembler.h"
 #include "client/replica/session_source.h"
 #include "client/replica/session_view.h"
 #include "common/base/result.h"
@@ -39,7 +43,9 @@ class MarkEvent;
 class RecordingState;
 class Participants;
 class SurfaceChange;
+class FrameStatePart;
 class SurfaceFrame;
+class SurfaceSlice;
 class SurfaceTopology;
 class Welcome;
 }  // namespace trocar::proto
@@ -49,7 +55,6 @@ namespace trocar::replica {
 inline constexpr std::size_t kHistoryFrames = 8;  // 128 ms: covers the display delay and its jitter
 inline constexpr std::size_t kMaxNotices = 32;
 inline constexpr std::size_t kMaxRecordingText = 200;
-inline constexpr Frame kFramesPerAck = 16;
 
 enum class SyncState : std::uint8_t {
   WaitingForTopology,
@@ -61,6 +66,8 @@ enum class SyncState : std::uint8_t {
 struct ReplicaCounters {
   std::uint64_t frames = 0;          // applied, keyframes included
   std::uint64_t keyframes = 0;       // applied
+  std::uint64_t by_datagram = 0;     // applied, in slices
+  std::uint64_t frames_late = 0;     // after a newer one: ignored
   std::uint64_t deltas_ignored = 0;  // while healing
   std::uint64_t crc_mismatches = 0;  // also payloads that do not decode
   std::uint64_t base_mismatches = 0;
@@ -93,6 +100,7 @@ class Replica final : public MessageSink {
   // with the next frame.
   using Send = std::function<bool(const proto::Envelope&)>;
   explicit Replica(Send send);
+  ~Replica() override;
 
   void on_message(const proto::Envelope& message, std::uint64_t arrival_ns,
                   std::size_t bytes) override;
@@ -122,10 +130,15 @@ class Replica final : public MessageSink {
   const std::optional<BarrierOutcome>& barrier() const { return barrier_; }
   const std::string& goodbye_text() const { return goodbye_text_; }
   const ReplicaCounters& counters() const { return counters_; }
+  // When the server published the newest change of the surface that is shown; 0: none, or unknown.
+  std::uint64_t shown_change_us() const { return shown_change_us_; }
   // Share of surface vertices whose displacement exceeded 1 mm in any applied frame, 0 to 1.
   double share_moved() const;
+  // How long ago the server published the newest frame, in ms by its clock; nothing if unknown.
+  // `server_now_us`: its clock at this moment.
+  std::optional<double> age_ms(double server_now_us) const;
 
-  // For tests of healing: flips one byte of the n-th delta (from 1) before it is applied.
+  // For tests of healing: flips one bit of the n-th delta (from 1), however it came.
   void corrupt_delta(std::uint64_t n) { corrupt_at_ = n; }
 
  private:
@@ -140,8 +153,15 @@ class Replica final : public MessageSink {
   void apply_ghost(const proto::GhostFrame& message);
   void apply_recording(const proto::RecordingState& message);
   void apply_claim(const proto::ClaimEvent& message, std::uint64_t arrival_ns);
+  void apply_slice(const proto::SurfaceSlice& message, std::uint64_t arrival_ns);
+  void apply_state_part(const proto::FrameStatePart& message);
+  // Into scratch_.
   bool decode_surface(const proto::SurfaceFrame& message);
-  void accept_frame(const proto::SurfaceFrame& message, std::uint64_t arrival_ns);
+  const wire::QuantisedSurface* find_base(Frame frame) const;
+  bool is_overtaken(const proto::SurfaceFrame& message) const;
+  // scratch_ is right.
+  void accept_frame(const FrameHeader& header, std::uint64_t arrival_ns);
+  void show_frame(const FrameHeader& header, std::uint64_t arrival_ns);
   // These take the layout over from the stream to be shown: all of it, or what changed.
   void show_layout();
   void show_changes();
@@ -161,10 +181,14 @@ class Replica final : public MessageSink {
   bool is_layout_new_ = false;                // topology_ is to be replaced by it
   std::vector<wire::SurfaceChange> to_show_;  // else topology_ lacks these
   Topology topology_;
+  std::uint64_t newest_change_us_ = 0, shown_change_us_ = 0;
   std::uint64_t topology_version_ = 0;
   std::deque<SessionFrame> history_;
   std::uint64_t history_version_ = 0;
   wire::QuantisedSurface scratch_;  // the frame being reconstructed
+  bool has_datagrams_ = false;      // frames may come late
+  FrameAssembler assembler_;
+  std::unique_ptr<proto::FrameState> early_state_;  // its surface is still under way
   wire::QuantisedSurface ghost_quanta_;
   std::uint32_t surface_crc_ = 0;
   bool request_pending_ = false;  // a KeyframeRequest that could not be queued yet

@@ -11,7 +11,8 @@
 // its own hands over through common/base/spsc_queue.h only. Nothing here blocks.
 // Inbound queue full: the source stops reading (so TCP slows the server down, which then skips
 // frames for this client); it never drops a message. Outbound queue full: send() returns false.
-// Order: sink gets the messages as the server sent them, Welcome first. Goodbye is delivered like
+// Order: sink gets the messages of the stream as the server sent them, Welcome first; SurfaceSlice
+// and FrameStatePart, which come as datagrams, in between, late or never. Goodbye is delivered like
 // any other message before state() turns Closed; Ping and Pong are the source's own business.
 
 #include <cstdint>
@@ -56,9 +57,14 @@ struct SourceStatistics {
   std::uint64_t bytes_received = 0;  // length prefixes included
   std::uint64_t bytes_sent = 0;
   std::uint64_t messages_received = 0;
-  std::uint64_t frames_received = 0;  // SurfaceFrame messages
-  std::uint64_t sends_dropped = 0;    // outbound queue was full
-  double round_trip_seconds = 0;      // last Ping to Pong; 0 before the first
+  std::uint64_t frames_received = 0;       // SurfaceFrame messages
+  std::uint64_t sends_dropped = 0;         // outbound queue was full
+  double round_trip_seconds = 0;           // last Ping to Pong; 0 before the first
+  double shortest_round_trip_seconds = 0;  // of the last 16
+  std::uint64_t datagram_bytes_received = 0, datagram_bytes_sent = 0;  // sealed
+  std::uint64_t slices_received = 0;                                   // SurfaceSlice messages
+  bool has_server_clock = false;                                       // the rest is known
+  double server_offset_us = 0;  // the server's monotonic clock less this client's
 };
 
 // Controls of a recorded source. Seeking delivers, in the following polls, a SurfaceTopology when

@@ -73,6 +73,7 @@ struct SessionFrame {
   Frame frame = 0;
   Tick tick = 0;
   std::uint64_t arrival_ns = 0;        // monotonic
+  std::uint64_t server_time_us = 0;    // when the server published it, by its clock; 0: unknown
   wire::QuantisedSurface surface;      // displacements from rest, of every vertex of the topology
   bool has_state = false;              // the rest is valid: its FrameState has arrived
   std::vector<Tool> tools;             // by slot

@@ -143,6 +143,7 @@ HudActions Hud::draw(const HudModel& model) {
   draw_participants_panel(model, scale_);
   draw_slow_time(model, scale_);
   draw_recording(model, scale_);
+  draw_stale_picture(model, scale_);
   draw_messages(model, scale_);
   if (model.timeline) draw_timeline(*model.timeline, scale_, actions);
   draw_help(model, scale_);

@@ -59,6 +59,7 @@ struct HudModel {
   std::string status;    // empty when live; else what it waits for, in the middle of the screen
   wire::FrameFigures figures;
   double session_seconds = 0, round_trip_ms = 0;
+  std::optional<double> surface_age_ms;  // of a live session, once it is known
   double pictures_per_second = 0, frames_per_second = 0, bytes_per_second = 0;
   std::string sync_text;  // "in step, CRC 1a2b3c4d"
   bool is_in_step = false;

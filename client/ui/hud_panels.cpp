@@ -125,6 +125,7 @@ void draw_session_panel(const HudModel& model, float scale) {
       row("relaxed", format("%.0f %% of the stress", 100 * f.relaxation->relaxed_share));
     }
     if (!model.timeline) row("round trip", format("%.1f ms", model.round_trip_ms));
+    if (model.surface_age_ms) row("age of picture", format("%.0f ms", *model.surface_age_ms));
     row("stream", format("%.1f frames/s, %s", model.frames_per_second,
                          byte_rate(model.bytes_per_second).c_str()));
     row("display", format("%.0f pictures/s", model.pictures_per_second));
@@ -163,6 +164,20 @@ void draw_recording(const HudModel& model, float scale) {
   ImGui::PushFont(bold());
   ImGui::TextColored(kTrouble, "%s", model.recording_text.c_str());
   ImGui::PopFont();
+  ImGui::End();
+}
+
+void draw_stale_picture(const HudModel& model, float scale) {
+  constexpr double kStaleMs = 400;
+  if (!model.surface_age_ms || *model.surface_age_ms < kStaleMs) return;
+  const ImVec2 screen = ImGui::GetIO().DisplaySize;
+  constexpr float kBelowRecording = 112;
+  ImGui::SetNextWindowPos({screen.x / 2, (kMargin + kBelowRecording) * scale}, 0, {0.5f, 0});
+  ImGui::Begin("stale", nullptr, kGlass);
+  ImGui::PushFont(bold());
+  ImGui::TextColored(kTrouble, "This picture is %.1f s old.", *model.surface_age_ms * 1e-3);
+  ImGui::PopFont();
+  ImGui::TextDisabled("The connection is slow or has stopped: wait before you cut.");
   ImGui::End();
 }
 

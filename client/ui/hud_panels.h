@@ -14,6 +14,8 @@ void draw_participants_panel(const HudModel& model, float scale);
 void draw_slow_time(const HudModel& model, float scale);
 // Says what is wrong with the recording, as long as the session lasts.
 void draw_recording(const HudModel& model, float scale);
+// A banner while the picture is older than a hand can work with.
+void draw_stale_picture(const HudModel& model, float scale);
 void draw_labels(const HudModel& model, float scale);
 void draw_messages(const HudModel& model, float scale);
 void draw_timeline(const HudTimeline& timeline, float scale, HudActions& actions);

@@ -66,6 +66,19 @@ Bytes Stream::peer_certificate_der() {
   return der;
 }
 
+std::optional<DatagramKey> Stream::datagram_key() {
+  if (!has_tls()) return std::nullopt;
+  auto* ssl = std::get<1>(content_).native_handle();
+  const auto fill = [ssl](std::span<std::uint8_t> bytes, std::string_view label) {
+    return SSL_export_keying_material(ssl, bytes.data(), bytes.size(), label.data(), label.size(),
+                                      nullptr, 0, 0) == 1;
+  };
+  DatagramKey key;
+  const bool is_made = fill(key.secret, "EXPORTER-trocar-datagram-key") &&
+                       fill(key.id, "EXPORTER-trocar-datagram-id");
+  return is_made ? std::optional(key) : std::nullopt;
+}
+
 asio::awaitable<Transfer> Stream::read_some(asio::mutable_buffer to) {
   Transfer done;
   if (has_tls()) {

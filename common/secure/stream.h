@@ -13,12 +13,14 @@
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/ssl/stream.hpp>
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
 
 #include "common/base/bytes.h"
 #include "common/base/no_throw.h"
+#include "common/secure/datagram_channel.h"
 #include "common/secure/tls.h"
 
 namespace trocar::secure {
@@ -46,6 +48,10 @@ class Stream {
   asio::awaitable<boost::system::error_code> begin_tls(const std::string& host);
   // The peer's certificate; empty before the handshake.
   Bytes peer_certificate_der();
+
+  // The key of this session's datagrams, equal at both ends (RFC 8446 section 7.5); only with TLS,
+  // after the handshake.
+  std::optional<DatagramKey> datagram_key();
 
   asio::awaitable<Transfer> read_some(asio::mutable_buffer to);
   asio::awaitable<Transfer> read_all(asio::mutable_buffer to);

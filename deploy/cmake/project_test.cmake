@@ -1,9 +1,10 @@
-# project_test(<name> SOURCES x_test.cpp... DEPENDS folder... [LINK target...] [SANITIZED]): a
+# project_test(<name> SOURCES x_test.cpp... DEPENDS folder... [LINK target...] [SANITIZED] [ALONE]): a
 # GoogleTest program; each of its tests becomes one ctest test. SANITIZED: deploy/test runs it a second
-# time with address and undefined-behaviour sanitizers; for what reads outside data.
+# time with address and undefined-behaviour sanitizers; for what reads outside data. ALONE: no other
+# test runs beside it; for sessions in real time.
 add_custom_target(sanitized_tests)
 function(project_test name)
-  cmake_parse_arguments(ARG "SANITIZED" "TIMEOUT" "SOURCES;DEPENDS;LINK" ${ARGN})
+  cmake_parse_arguments(ARG "SANITIZED;ALONE" "TIMEOUT" "SOURCES;DEPENDS;LINK" ${ARGN})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 300)
   endif()
@@ -18,12 +19,16 @@ function(project_test name)
   target_compile_definitions(${name} PRIVATE
     TROCAR_SOURCE_DIR="${PROJECT_SOURCE_DIR}" TROCAR_BINARY_DIR="${PROJECT_BINARY_DIR}/bin")
   set(labels)
+  set(alone)
+  if(ARG_ALONE)
+    set(alone RUN_SERIAL TRUE)
+  endif()
   if(ARG_SANITIZED)
     set(labels LABELS sanitized)
     add_dependencies(sanitized_tests ${name})
   endif()
   gtest_discover_tests(${name} TEST_PREFIX "${name}." DISCOVERY_TIMEOUT 60
-    PROPERTIES TIMEOUT ${ARG_TIMEOUT} ${labels}
+    PROPERTIES TIMEOUT ${ARG_TIMEOUT} ${labels} ${alone}
     # Servers that tests start keep certificate and codes out of the user's folders.
     ENVIRONMENT "XDG_STATE_HOME=${PROJECT_BINARY_DIR}/state")
 endfunction()

@@ -2,37 +2,17 @@
 
 // The real programs as child processes, in a folder of their own.
 
-#include <sys/types.h>
-
 #include <filesystem>
 #include <functional>
 #include <string>
 #include <vector>
 
 #include "common/base/tick.h"
+#include "tests/support/child_program.h"
 
 namespace trocar::e2e {
 
-// A running program; killed when it goes out of scope.
-class Program {
- public:
-  // `name` in build/<preset>/bin; output goes to `log`.
-  Program(const std::string& name, const std::vector<std::string>& arguments,
-          const std::filesystem::path& log);
-  Program(Program&& other) noexcept;
-  Program& operator=(Program&&) = delete;
-  ~Program();
-
-  void signal(int number) const;
-  // Exit code, 128 + signal if one ended it, or -1 after `seconds`.
-  int wait(double seconds);
-  bool is_running();
-
- private:
-  pid_t pid_ = -1;
-  int status_ = 0;
-  bool has_ended_ = false;
-};
+using testing::Program;
 
 // A folder of this run for the current test, named after it.
 std::filesystem::path test_folder();

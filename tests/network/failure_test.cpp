@@ -10,6 +10,7 @@ struct ThrowingHandler final : net::ConnectionHandler {
   void on_message(net::ConnectionId, BytesView) override {
     throw std::runtime_error("a message too many");
   }
+  void on_datagram(net::ConnectionId, BytesView) override {}
   void on_fault(net::ConnectionId, net::ConnectionFault) override {}
   void on_close(net::ConnectionId) override {}
 };

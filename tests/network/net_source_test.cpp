@@ -76,6 +76,7 @@ TEST(NetSource, a_full_queue_stops_reading_and_loses_nothing) {
   session.publish(10);
   auto options = options_for(session.port(), "Anna");
   options.inbound_capacity = 8;
+  options.acks_every_frame = false;
   net::NetSource source(options);
   Collector sink;
   ASSERT_TRUE(

@@ -172,6 +172,7 @@ LiveSession::LiveSession(net::TcpServerOptions tcp, replication::ReplicatorOptio
   auto listening = net::TcpServer::listen(io_, tcp);
   EXPECT_TRUE(listening.ok());
   tcp_ = std::move(*listening);
+  options.has_datagrams = tcp_->has_datagrams();
   replicator_ = std::make_unique<replication::Replicator>(*tcp_, inbox, layout_, organ_.name, 42,
                                                           std::move(options));
   tcp_->start(*replicator_);

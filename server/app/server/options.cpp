@@ -152,6 +152,9 @@ Result<std::optional<ServerOptions>> parse_command_line(int argc, char** argv) {
   app.add_option("--listen", listen, "where to listen; port 0 takes any free one")
       ->type_name("ADDR:PORT")
       ->capture_default_str();
+  app.add_flag(
+      "!--no-datagrams", options.has_datagrams,
+      "frames and hands over the TCP stream alone, where lost packets hold up the picture");
   app.add_option("--journal", options.journal,
                  "file to record the session in, or none [./trocar-<UTC>.mcap]")
       ->type_name("FILE");

@@ -17,6 +17,7 @@ struct ServerOptions {
   std::string reduction_file;  // empty: the full solver alone
   std::string address = "127.0.0.1";
   std::uint16_t port = 7690;
+  bool has_datagrams = true;
   AccessOptions access;
   std::string journal;            // a file, or "none"
   double seconds = 0;             // simulated; 0: until told to end

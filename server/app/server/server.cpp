@@ -125,6 +125,7 @@ Status Server::open() {
   const auto topology_bytes = replication::encode_topology(layout, organ.name)->size();
   tcp.outbox_bytes = std::max(tcp.outbox_bytes, 8 * topology_bytes);
   tcp.tls = admission_->tls();
+  tcp.has_datagrams = options_.has_datagrams;
   tcp.plain_reply = replication::encode_goodbye(
       replication::EndReason::Version,
       "this server speaks TLS 1.3 only: use a client of its release, without --insecure-loopback");
@@ -139,6 +140,7 @@ Status Server::open() {
   if (const auto issued = admission_->issue_codes(tcp_->port()); !issued) return issued;
   replication::ReplicatorOptions replication;
   replication.gate = admission_->gate();
+  replication.has_datagrams = tcp_->has_datagrams();
   if (journal_)
     replication.on_participants = [this](const auto& present, Tick tick) {
       journal_->record_participants(present, tick);
@@ -299,6 +301,7 @@ Status Server::finish() {
                         .replication = replicator_->counters(),
                         .encoding = replicator_->encode_statistics(),
                         .tcp = tcp_->counters(),
+                        .datagrams = tcp_->datagram_counters(),
                         .inbox = inbox_.counters(),
                         .ghost = ghost_ ? ghost_->counters() : ghost::GhostCounters{}};
   const auto written = write_text_file(options_.summary_file, to_json(summary));

@@ -35,6 +35,17 @@ Json stages(const StageTimes& of) {
   return list;
 }
 
+Json datagram_figures(const Summary& s) {
+  const auto& d = s.datagrams;
+  return {{"paths", d.paths},
+          {"sent", d.sent},
+          {"received", d.received},
+          {"dropped", d.dropped},
+          {"bytes_sent", d.bytes_out},
+          {"bytes_received", d.bytes_in},
+          {"encode_slices_cpu_us", times(s.encoding.slices_cpu)}};
+}
+
 Json replication_figures(const Summary& s) {
   const auto& e = s.encoding;
   const double per_vertex = e.changed_vertices ? static_cast<double>(e.delta_payload_bytes) /
@@ -53,7 +64,9 @@ Json replication_figures(const Summary& s) {
           {"frames_lost", s.frames_lost},
           {"frames_given", r.frames_given},
           {"frames_skipped", r.frames_skipped},
+          {"frames_by_datagram", r.frames_by_datagram},
           {"keyframes_given", r.keyframes_given},
+          {"datagrams", datagram_figures(s)},
           {"buffers_shared", e.shared},
           {"deltas", e.deltas},
           {"delta_payload_bytes", e.delta_payload_bytes},

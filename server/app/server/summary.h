@@ -27,6 +27,7 @@ struct Summary {
   const replication::ReplicatorCounters& replication;
   const replication::EncodeStatistics& encoding;
   const net::TcpCounters& tcp;
+  const net::DatagramCounters datagrams;
   const participants::SimulationInbox::Counters& inbox;
   ghost::GhostCounters ghost;
 };

@@ -49,6 +49,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
   bool send(wire::SharedBytes frame);
   std::size_t outstanding_bytes() const { return outstanding_; }
   const std::string& peer_address() const { return peer_address_; }
+  std::optional<secure::DatagramKey> datagram_key() { return stream_.datagram_key(); }
   // True until the first message is there, which shows that the peer means it.
   bool is_newcomer() const { return !first_message_seen_; }
   void close_after_flush(wire::SharedBytes last_words, Clock::time_point deadline);

@@ -38,6 +38,8 @@ class ConnectionHandler {
   virtual void on_open(ConnectionId id) = 0;
   // `message` is the body of one frame, valid during the call.
   virtual void on_message(ConnectionId id, BytesView message) = 0;
+  // `message` came as a datagram: unheard, late or out of order, but of this peer.
+  virtual void on_datagram(ConnectionId id, BytesView message) = 0;
   virtual void on_fault(ConnectionId id, ConnectionFault fault) = 0;
   // This is called exactly once per connection, also after close() and close_after_flush().
   virtual void on_close(ConnectionId id) = 0;
@@ -49,6 +51,11 @@ class Connections {
   // Queues one framed message (header and body). False when the outbox has no room for it: then
   // nothing was queued. A message that is larger than the whole outbox is taken when it is empty.
   virtual bool send(ConnectionId id, wire::SharedBytes frame) = 0;
+  // True once the peer has proved where its datagrams come from.
+  virtual bool has_datagrams(ConnectionId id) const = 0;
+  // Sends a message of at most secure::kDatagramMessageBytes that may get lost; false: it was
+  // dropped here, or there is no path for it.
+  virtual bool send_datagram(ConnectionId id, BytesView message) = 0;
   // Bytes queued and not yet taken by the kernel.
   virtual std::size_t outstanding_bytes(ConnectionId id) const = 0;
   // The peer's address without its port; empty if it is not known.

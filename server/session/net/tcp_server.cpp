@@ -4,11 +4,13 @@
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/ip/udp.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <map>
 #include <set>
 #include <vector>
 
+#include "common/base/log.h"
 #include "server/session/net/connection.h"
 
 namespace trocar::net {
@@ -24,8 +26,8 @@ constexpr std::chrono::milliseconds kAcceptRetry{100};
 
 class TcpServer::Core : public std::enable_shared_from_this<TcpServer::Core> {
  public:
-  Core(asio::io_context& context, const TcpServerOptions& chosen)
-      : options(chosen), acceptor(context), sweep(context), retry(context) {}
+  Core(asio::io_context& io, const TcpServerOptions& chosen)
+      : options(chosen), context(io), acceptor(io), sweep(io), retry(io) {}
 
   Status open() {
     boost::system::error_code error;
@@ -45,7 +47,20 @@ class TcpServer::Core : public std::enable_shared_from_this<TcpServer::Core> {
                        " cannot be used (" + error.message() +
                        "): stop the program that has it or choose another with --listen"};
     port = acceptor.local_endpoint(error).port();
+    if (options.tls && options.has_datagrams)
+      open_datagrams(asio::ip::udp::endpoint(address, port));
     return {};
+  }
+
+  // Without them everything goes over the stream.
+  void open_datagrams(const asio::ip::udp::endpoint& endpoint) {
+    auto made = DatagramServer::open(context, endpoint, [this](ConnectionId id, BytesView message) {
+      if (handler) handler->on_datagram(id, message);
+    });
+    if (made)
+      datagrams = std::move(*made);
+    else
+      log::warn("{}: pictures will wait for lost packets", made.error().message);
   }
 
   void start(ConnectionHandler& to) {
@@ -66,6 +81,7 @@ class TcpServer::Core : public std::enable_shared_from_this<TcpServer::Core> {
   void stop() {
     stop_accepting();
     handler = nullptr;
+    datagrams.reset();
     sweep.cancel();
     const auto all = std::move(connections);
     connections.clear();
@@ -78,6 +94,8 @@ class TcpServer::Core : public std::enable_shared_from_this<TcpServer::Core> {
   }
 
   const TcpServerOptions options;
+  asio::io_context& context;
+  std::unique_ptr<DatagramServer> datagrams;  // null: there are none
   tcp::acceptor acceptor;
   asio::steady_timer sweep, retry;
   ConnectionHandler* handler = nullptr;  // null once stopped
@@ -122,11 +140,17 @@ class TcpServer::Core : public std::enable_shared_from_this<TcpServer::Core> {
     return all >= options.max_newcomers || same >= options.max_newcomers_per_address;
   }
 
+  void expect_datagrams(ConnectionId id) {
+    const auto key = datagrams ? find(id)->datagram_key() : std::nullopt;
+    if (key) datagrams->expect(id, *key);
+  }
+
   Connection::Events events_of(ConnectionId id) {
     const auto self = shared_from_this();
     Connection::Events events;
     events.open = [self, id] {
       self->opened.insert(id);
+      self->expect_datagrams(id);
       if (self->handler) self->handler->on_open(id);
     };
     events.message = [self, id](BytesView message) {
@@ -141,6 +165,7 @@ class TcpServer::Core : public std::enable_shared_from_this<TcpServer::Core> {
     events.bytes_written = [self](std::size_t count) { self->counters.bytes_out += count; };
     events.closed = [self, id] {
       const bool was_open = self->opened.erase(id) > 0;
+      if (self->datagrams) self->datagrams->forget(id);
       if (self->connections.erase(id) == 0) return;
       if (!was_open) ++self->counters.handshakes_failed;
       if (was_open && self->handler) self->handler->on_close(id);
@@ -173,6 +198,7 @@ class TcpServer::Core : public std::enable_shared_from_this<TcpServer::Core> {
       for (const auto& connection : all)
         connection->check_deadlines(now, options.hello_deadline, options.idle_deadline);
       all.clear();
+      if (datagrams) datagrams->sweep();
     }
   }
 };
@@ -223,6 +249,22 @@ const TcpCounters& TcpServer::counters() const {
 bool TcpServer::send(ConnectionId id, wire::SharedBytes frame) {
   auto* connection = core_->find(id);
   return connection && connection->send(std::move(frame));
+}
+
+bool TcpServer::has_datagrams() const {
+  return core_->datagrams != nullptr;
+}
+
+bool TcpServer::has_datagrams(ConnectionId id) const {
+  return core_->datagrams && core_->datagrams->has_path(id);
+}
+
+bool TcpServer::send_datagram(ConnectionId id, BytesView message) {
+  return core_->datagrams && core_->datagrams->send(id, message);
+}
+
+DatagramCounters TcpServer::datagram_counters() const {
+  return core_->datagrams ? core_->datagrams->counters() : DatagramCounters{};
 }
 
 std::size_t TcpServer::outstanding_bytes(ConnectionId id) const {

@@ -27,6 +27,7 @@
 #include "common/base/result.h"
 #include "common/secure/tls.h"
 #include "server/session/net/connections.h"
+#include "server/session/net/datagram_server.h"
 
 namespace boost::asio {
 class io_context;
@@ -48,6 +49,7 @@ struct TcpServerOptions {
   std::chrono::milliseconds flush_deadline{2000};
   secure::TlsContext tls;         // null: without TLS
   wire::SharedBytes plain_reply;  // with TLS: one frame for who begins without; null: none
+  bool has_datagrams = true;      // with TLS: at the same address and port
 };
 
 struct TcpCounters {
@@ -79,8 +81,13 @@ class TcpServer final : public Connections {
   std::uint16_t port() const;
   std::size_t connection_count() const;
   const TcpCounters& counters() const;
+  bool has_datagrams() const;
+  // All zero without datagrams.
+  DatagramCounters datagram_counters() const;
 
   bool send(ConnectionId id, wire::SharedBytes frame) override;
+  bool has_datagrams(ConnectionId id) const override;
+  bool send_datagram(ConnectionId id, BytesView message) override;
   std::size_t outstanding_bytes(ConnectionId id) const override;
   std::string peer_address(ConnectionId id) const override;
   void close_after_flush(ConnectionId id, wire::SharedBytes last_words) override;

@@ -54,7 +54,8 @@ const tool::ToolShape* find_shape(ToolSlot tool, const participants::Roster& ros
 
 }  // namespace
 
-wire::SharedBytes encode_welcome(ParticipantSlot slot, std::uint64_t organ_hash) {
+wire::SharedBytes encode_welcome(ParticipantSlot slot, std::uint64_t organ_hash,
+                                 bool has_datagrams) {
   proto::Envelope envelope;
   auto& welcome = *envelope.mutable_welcome();
   welcome.set_protocol_major(kProtocolMajor);
@@ -64,6 +65,7 @@ wire::SharedBytes encode_welcome(ParticipantSlot slot, std::uint64_t organ_hash)
   welcome.set_organ_hash(organ_hash);
   welcome.set_tick_us(static_cast<std::uint32_t>(kTickNanoseconds / 1000));
   welcome.set_ticks_per_frame(static_cast<std::uint32_t>(kTicksPerFrame));
+  welcome.set_has_datagrams(has_datagrams);
   return wire::encode_envelope(envelope);
 }
 
@@ -93,9 +95,11 @@ wire::SharedBytes encode_topology(const wire::SurfaceLayout& layout,
 }
 
 wire::SharedBytes encode_surface_change(const wire::SurfaceChange& change,
-                                        const wire::SurfaceLayout& layout) {
+                                        const wire::SurfaceLayout& layout,
+                                        std::uint64_t server_time_us) {
   proto::Envelope envelope;
   wire::write(change, layout, *envelope.mutable_surface_change());
+  envelope.mutable_surface_change()->set_server_time_us(server_time_us);
   return wire::encode_envelope(envelope);
 }
 
@@ -145,6 +149,12 @@ wire::SharedBytes encode_frame_state(const step::PublishedFrame& frame) {
   proto::Envelope envelope;
   describe(frame, *envelope.mutable_frame_state());
   return wire::encode_envelope(envelope);
+}
+
+std::string encode_frame_state_body(const step::PublishedFrame& frame) {
+  proto::FrameState message;
+  describe(frame, message);
+  return message.SerializeAsString();
 }
 
 std::string describe(const hands::ClaimEvent& event, const participants::Roster& roster) {
@@ -266,10 +276,12 @@ wire::SharedBytes encode_barrier(const step::PublishedFrame& frame) {
   return wire::encode_envelope(envelope);
 }
 
-wire::SharedBytes encode_pong(std::uint64_t client_time_us, Tick tick) {
+wire::SharedBytes encode_pong(std::uint64_t client_time_us, Tick tick,
+                              std::uint64_t server_time_us) {
   proto::Envelope envelope;
   envelope.mutable_pong()->set_client_time_us(client_time_us);
   envelope.mutable_pong()->set_tick(tick);
+  envelope.mutable_pong()->set_server_time_us(server_time_us);
   return wire::encode_envelope(envelope);
 }
 

@@ -32,13 +32,17 @@ void describe(const hands::ClaimEvent& event, const participants::Roster& roster
               proto::ClaimEvent& message);
 void describe(const wire::SolverChange& change, proto::SolverChange& message);
 
-wire::SharedBytes encode_welcome(ParticipantSlot slot, std::uint64_t organ_hash);
+wire::SharedBytes encode_welcome(ParticipantSlot slot, std::uint64_t organ_hash,
+                                 bool has_datagrams);
 wire::SharedBytes encode_participants(const std::vector<participants::Participant>& present);
 wire::SharedBytes encode_topology(const wire::SurfaceLayout& layout, const std::string& organ_name);
 // `layout`: the one that the change was applied to.
 wire::SharedBytes encode_surface_change(const wire::SurfaceChange& change,
-                                        const wire::SurfaceLayout& layout);
+                                        const wire::SurfaceLayout& layout,
+                                        std::uint64_t server_time_us);
 wire::SharedBytes encode_frame_state(const step::PublishedFrame& frame);
+// It has no envelope around it.
+std::string encode_frame_state_body(const step::PublishedFrame& frame);
 wire::SharedBytes encode_claim_event(const hands::ClaimEvent& event,
                                      const participants::Roster& roster);
 wire::SharedBytes encode_mark_event(const step::MarkEvent& event);
@@ -49,7 +53,8 @@ wire::SharedBytes encode_ghost(const ghost::GhostReport& report);
 wire::SharedBytes encode_no_ghost();
 wire::SharedBytes encode_recording(const wire::RecordingState& state);
 wire::SharedBytes encode_barrier(const step::PublishedFrame& frame);
-wire::SharedBytes encode_pong(std::uint64_t client_time_us, Tick tick);
+wire::SharedBytes encode_pong(std::uint64_t client_time_us, Tick tick,
+                              std::uint64_t server_time_us);
 wire::SharedBytes encode_goodbye(EndReason reason, const std::string& text);
 
 // One line for a person about what became of a claim: by whom it is held and what to do.

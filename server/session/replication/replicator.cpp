@@ -5,12 +5,16 @@
 
 #include "common/base/log.h"
 #include "proto/wire.pb.h"
+#include "server/session/replication/frame_feed.h"
 #include "server/session/replication/messages.h"
 
 namespace trocar::replication {
 namespace {
 
 constexpr std::uint64_t kSecondNs = 1'000'000'000;
+// It is no flood when a client or server that slept finds so much waiting.
+constexpr double kMostSecondsAtOnce = 15;
+constexpr int kMostSamplesPerDatagram = 3 * kToolsPerHand;
 
 std::string text_of_role(participants::Role role) {
   return participants::name_of(role);
@@ -51,18 +55,23 @@ EndReason reason_of(access::RefusalKind refusal) {
 }  // namespace
 
 struct Replicator::Client {
-  net::ConnectionId id = 0;
+  Client(net::Connections& connections, net::ConnectionId its_id, const ReplicatorOptions& options,
+         ReplicatorCounters& counters)
+      : id(its_id),
+        feed(connections, its_id, options, counters),
+        allowance(options.max_messages_per_second),
+        allowance_ns(options.clock_ns()) {}
+
+  const net::ConnectionId id;
   access::Applicant applicant;                           // as the gate knows it
   std::optional<participants::Participant> participant;  // set by Hello
   bool is_welcome = false;
-  bool has_old_surface = false;  // so that no delta helps
-  step::SharedFrame baseline;    // the last frame this client was given
-  bool wants_keyframe = false;
+  FrameFeed feed;
   bool wants_ghost = false;
-  std::uint64_t last_requested_keyframe_ns = 0;
+  bool has_sent_datagrams = false;
   std::array<std::optional<std::uint32_t>, kToolsPerHand> last_sequence;
-  std::uint64_t rate_window_begin_ns = 0;
-  std::uint32_t messages_in_window = 0;
+  double allowance;  // messages that it may send at this moment
+  std::uint64_t allowance_ns;
 };
 
 Replicator::Replicator(net::Connections& connections, participants::SimulationInbox& inbox,
@@ -80,10 +89,7 @@ Replicator::~Replicator() = default;
 // ---- who is here ----
 
 void Replicator::on_open(net::ConnectionId id) {
-  auto client = std::make_unique<Client>();
-  client->id = id;
-  client->rate_window_begin_ns = options_.clock_ns();
-  clients_.emplace(id, std::move(client));
+  clients_.emplace(id, std::make_unique<Client>(connections_, id, options_, counters_));
 }
 
 void Replicator::on_close(net::ConnectionId id) {
@@ -176,11 +182,12 @@ void Replicator::end_all(EndReason reason, const std::string& text) {
 
 bool Replicator::exceeds_rate(Client& client) {
   const auto now = options_.clock_ns();
-  if (now - client.rate_window_begin_ns >= kSecondNs) {
-    client.rate_window_begin_ns = now;
-    client.messages_in_window = 0;
-  }
-  return ++client.messages_in_window > options_.max_messages_per_second;
+  const double rate = options_.max_messages_per_second;
+  const double elapsed = static_cast<double>(now - client.allowance_ns) * 1e-9;
+  client.allowance = std::min(client.allowance + elapsed * rate, kMostSecondsAtOnce * rate);
+  client.allowance_ns = now;
+  client.allowance -= 1;
+  return client.allowance < 0;
 }
 
 std::optional<Replicator::Ending> Replicator::handle_message(Client& client, BytesView bytes) {
@@ -200,7 +207,7 @@ std::optional<Replicator::Ending> Replicator::handle_message(Client& client, Byt
     case proto::Envelope::kHello:
       return admit(client, envelope.hello());
     case proto::Envelope::kToolSample:
-      return handle_sample(client, envelope.tool_sample());
+      return handle_sample(client, envelope.tool_sample(), !client.has_sent_datagrams);
     case proto::Envelope::kFrameAck:
       return handle_ack(client, envelope.frame_ack().frame(), envelope.frame_ack().surface_crc());
     case proto::Envelope::kMarkRequest:
@@ -209,13 +216,13 @@ std::optional<Replicator::Ending> Replicator::handle_message(Client& client, Byt
       handle_ghost_request(client, envelope.ghost_request().is_wanted());
       return std::nullopt;
     case proto::Envelope::kKeyframeRequest:
-      client.wants_keyframe = true;
-      if (encoder_.current() && may_have_requested_keyframe(client)) give_frame(client, false);
+      client.feed.want_keyframe();
+      if (encoder_.current() && client.feed.is_keyframe_due()) give_frame(client, false);
       return std::nullopt;
     case proto::Envelope::kPing: {
       const auto tick = encoder_.current() ? encoder_.current()->tick : 0;
       // A pong that does not fit is left out: the client measures again in a moment.
-      send(client, encode_pong(envelope.ping().client_time_us(), tick));
+      send(client, encode_pong(envelope.ping().client_time_us(), tick, options_.clock_ns() / 1000));
       return std::nullopt;
     }
     case proto::Envelope::kBye: {
@@ -232,6 +239,39 @@ std::optional<Replicator::Ending> Replicator::handle_message(Client& client, Byt
   }
 }
 
+void Replicator::on_datagram(net::ConnectionId id, BytesView message) {
+  const auto found = clients_.find(id);
+  if (found == clients_.end() || !found->second->participant) return;
+  auto& client = *found->second;
+  proto::Envelope envelope;
+  const auto decoded = wire::decode_envelope(message, envelope);
+  std::optional<Ending> ending;
+  if (exceeds_rate(client))
+    ending = Ending{
+        EndReason::ProtocolError,
+        "more than " + std::to_string(options_.max_messages_per_second) + " messages in a second"};
+  else if (!decoded)
+    ending = Ending{EndReason::ProtocolError, decoded.error().message};
+  else if (envelope.has_client_datagram())
+    ending = handle_datagram(client, envelope.client_datagram());
+  if (ending) end_session(client, *ending);
+  settle_participants();
+}
+
+std::optional<Replicator::Ending> Replicator::handle_datagram(
+    Client& client, const proto::ClientDatagram& datagram) {
+  client.has_sent_datagrams = true;
+  client.feed.hear(datagram.datagrams_received());
+  if (datagram.sample_size() > kMostSamplesPerDatagram)
+    return Ending{EndReason::ProtocolError,
+                  "ClientDatagram.sample: " + std::to_string(datagram.sample_size()) +
+                      " samples, at most " + std::to_string(kMostSamplesPerDatagram)};
+  for (const auto& sample : datagram.sample())
+    if (auto ending = handle_sample(client, sample, false)) return ending;
+  if (!datagram.has_ack()) return std::nullopt;
+  return handle_ack(client, datagram.ack().frame(), datagram.ack().surface_crc());
+}
+
 std::optional<Replicator::Ending> Replicator::admit(Client& client, const proto::Hello& hello) {
   if (client.participant) return Ending{EndReason::ProtocolError, "Hello: once is enough"};
   if (barrier_) return Ending{EndReason::ServerClosing, "the session is ending"};
@@ -245,6 +285,7 @@ std::optional<Replicator::Ending> Replicator::admit(Client& client, const proto:
       return Ending{reason_of(refusal->kind), refusal->text};
   }
   if (auto ending = find_place(client, *request)) return ending;
+  if (request->acks_every_frame) client.feed.pace();
   const bool may_come = !gate || gate->admit(client.applicant);
   if (!may_come)
     return Ending{EndReason::CodeUsedUp, "join code: somebody has just taken its last use"};
@@ -275,7 +316,7 @@ std::optional<Replicator::Ending> Replicator::welcome(Client& client) {
   client.is_welcome = true;
   ++counters_.sessions;
   const Ending too_slow{EndReason::TooSlow, "the outbox is too small for the first messages"};
-  if (!send(client, encode_welcome(participant.slot, organ_hash_)) ||
+  if (!send(client, encode_welcome(participant.slot, organ_hash_, options_.has_datagrams)) ||
       !send(client, encode_participants(roster_.list())) || !send(client, topology()))
     return too_slow;
   if (encoder_.current() && !give_frame(client, true)) return too_slow;
@@ -286,7 +327,8 @@ std::optional<Replicator::Ending> Replicator::welcome(Client& client) {
 }
 
 std::optional<Replicator::Ending> Replicator::handle_sample(Client& client,
-                                                            const proto::ToolSample& sample) {
+                                                            const proto::ToolSample& sample,
+                                                            bool is_ordered) {
   const auto& participant = *client.participant;
   if (!wire::rights_of(participant.role).has_tools)
     return Ending{EndReason::Role,
@@ -294,6 +336,7 @@ std::optional<Replicator::Ending> Replicator::handle_sample(Client& client,
   const auto checked = check_tool_sample(sample, participant.tools.size());
   if (!checked) return Ending{EndReason::ProtocolError, checked.error().message};
   auto& last = client.last_sequence[static_cast<std::size_t>(checked->tool)];
+  if (last && checked->sequence <= *last && !is_ordered) return std::nullopt;  // seen, or too late
   if (last && checked->sequence <= *last)
     return Ending{EndReason::ProtocolError,
                   "ToolSample.sequence: " + std::to_string(checked->sequence) + " after " +
@@ -335,9 +378,10 @@ void Replicator::handle_ghost_request(Client& client, bool is_wanted) {
 
 std::optional<Replicator::Ending> Replicator::handle_ack(Client& client, Frame frame,
                                                          std::uint32_t crc) {
-  if (!client.baseline || frame > client.baseline->frame)
+  if (!client.feed.was_given(frame))
     return Ending{EndReason::ProtocolError,
                   "FrameAck.frame: " + std::to_string(frame) + " was not given to you yet"};
+  client.feed.acknowledge(encoder_, frame);
   if (!barrier_ || frame != barrier_->frame) return std::nullopt;
   const auto slot = client.participant->slot;
   for (auto& result : barrier_results_) {
@@ -359,19 +403,21 @@ const wire::SharedBytes& Replicator::topology() {
 
 Status Replicator::change_surface(const wire::SurfaceChange& change) {
   if (Status applied = wire::apply(change, layout_); !applied.ok()) return applied;
-  const auto bytes = encode_surface_change(change, layout_);
+  const auto bytes = encode_surface_change(change, layout_, options_.clock_ns() / 1000);
   topology_.reset();
   ++counters_.surface_changes;
   counters_.surface_change_bytes += bytes->size();
+  encoder_.add_change(change.epoch, bytes);
   broadcast(bytes);
   return {};
 }
 
-void Replicator::replace_surface(const wire::SurfaceLayout& layout) {
+void Replicator::replace_surface(const wire::SurfaceLayout& layout, Frame frame) {
   layout_ = layout;
   topology_.reset();
+  encoder_.forget_changes();
   broadcast(topology());
-  for (const auto& [id, client] : clients_) client->has_old_surface = true;
+  for (const auto& [id, client] : clients_) client->feed.forget_before(frame);
 }
 
 bool Replicator::send(Client& client, const wire::SharedBytes& bytes) {
@@ -391,42 +437,10 @@ void Replicator::broadcast(const wire::SharedBytes& bytes) {
   }
 }
 
-bool Replicator::may_have_requested_keyframe(const Client& client) const {
-  return options_.clock_ns() - client.last_requested_keyframe_ns >= options_.keyframe_interval_ns;
-}
-
-std::size_t Replicator::skip_limit() const {
-  return std::max(options_.skip_above_bytes, 2 * encoder_.typical_frame_bytes());
-}
-
 bool Replicator::give_frame(Client& client, bool is_required) {
-  const auto& frame = *encoder_.current();
-  const auto* baseline = client.baseline.get();
-  const bool is_requested = client.wants_keyframe && may_have_requested_keyframe(client);
-  if (baseline && baseline->frame == frame.frame && !is_requested) return true;
-  if (!is_required && connections_.outstanding_bytes(client.id) > skip_limit()) {
-    ++counters_.frames_skipped;
-    return false;
-  }
-  const bool is_keyframe = is_requested || !baseline || client.has_old_surface ||
-                           frame.frame - baseline->frame > options_.keyframe_after_frames;
-  // Who asks may have lost count of the surface's changes, too.
-  const bool is_lost = is_requested && frame.epoch > 0;
-  if ((is_lost && !send(client, topology())) ||
-      !send(client, is_keyframe ? encoder_.keyframe() : encoder_.delta_from(*baseline))) {
-    ++counters_.frames_skipped;
-    return false;
-  }
-  client.baseline = encoder_.current();
-  client.has_old_surface = false;
-  ++counters_.frames_given;
-  if (is_keyframe) ++counters_.keyframes_given;
-  if (is_requested) {
-    client.wants_keyframe = false;
-    client.last_requested_keyframe_ns = options_.clock_ns();
-  }
-  send(client, encoder_.state());  // figures and tools: the next frame brings newer ones
-  return true;
+  const bool is_lost = client.feed.is_keyframe_due() && encoder_.current()->epoch > 0;
+  if (is_lost && !send(client, topology())) return false;
+  return client.feed.give(encoder_, is_required);
 }
 
 void Replicator::publish(std::span<const step::SharedFrame> frames) {
@@ -435,7 +449,7 @@ void Replicator::publish(std::span<const step::SharedFrame> frames) {
   Status followed;
   for (const auto& frame : frames) {
     for (const auto& event : frame->mark_events) broadcast(encode_mark_event(event));
-    if (frame->new_layout) replace_surface(*frame->new_layout);
+    if (frame->new_layout) replace_surface(*frame->new_layout, frame->frame);
     for (const auto& event : frame->claim_events) broadcast(encode_claim_event(event, roster_));
     if (frame->change && followed.ok()) followed = change_surface(*frame->change);
   }
@@ -448,7 +462,7 @@ void Replicator::publish(std::span<const step::SharedFrame> frames) {
   }
   counters_.frames_published += frames.size();
   counters_.frames_conflated += frames.size() - 1;
-  encoder_.set_current(frames.back());
+  encoder_.set_current(frames.back(), options_.clock_ns() / 1000);
   for (const auto& [id, client] : clients_)
     if (client->participant) give_frame(*client, false);
   settle_participants();
@@ -463,7 +477,8 @@ void Replicator::publish(const ghost::GhostReport& report) {
   const auto bytes = encode_ghost(report);
   for (const auto& [id, client] : clients_) {
     if (!client->wants_ghost) continue;
-    const bool has_room = connections_.outstanding_bytes(id) <= skip_limit() / 2;
+    const auto limit = std::max(options_.skip_above_bytes, 2 * encoder_.typical_frame_bytes());
+    const bool has_room = connections_.outstanding_bytes(id) <= limit / 2;
     const bool is_given = has_room && send(*client, bytes);
     ++(is_given ? counters_.ghosts_given : counters_.ghosts_skipped);
   }

@@ -12,10 +12,8 @@
 // to the simulation through the SimulationInbox. Anything malformed, oversized, too frequent or not
 // this role's to say ends that session with a Goodbye that names the reason; nobody else notices.
 //
-// Outbound: when a client's outbox holds more than max(64 KiB, 2 frames), the frame is skipped for
-// it; the next delta is encoded against the last frame it was given, so nothing queues up and
-// nothing is lost. It gets a keyframe instead when it asks (at most 4 per second; from epoch 1 on
-// with the topology before it) and when its baseline is older than 63 frames (1 s). Participants,
+// Outbound: a frame_feed.h per client decides which frames it is given and by which path. Who asks
+// for a keyframe (at most 4 per second) gets the topology before it from epoch 1 on. Participants,
 // claim events, surface changes, topology, recording state and barrier cannot be skipped: if one
 // does not fit, the session ends as too slow.
 //
@@ -36,39 +34,24 @@
 #include <string>
 #include <vector>
 
-#include "common/base/timing.h"
 #include "common/wire/recording_state.h"
 #include "common/wire/surface_layout.h"
-#include "server/session/access/gate.h"
 #include "server/session/ghost/ghost_follower.h"
 #include "server/session/net/connections.h"
 #include "server/session/participants/inbox.h"
 #include "server/session/participants/roster.h"
 #include "server/session/replication/frame_encoder.h"
-#include "server/session/replication/validation.h"
+#include "server/session/replication/replicator_options.h"
 #include "server/tissue/step/published_frame.h"
 
 namespace trocar::proto {
 class Envelope;
+class ClientDatagram;
 class Hello;
 class ToolSample;
 }  // namespace trocar::proto
 
 namespace trocar::replication {
-
-struct ReplicatorOptions {
-  std::uint32_t max_messages_per_second = 2000;      // per connection; two tools at 250 Hz need 500
-  std::size_t skip_above_bytes = 64 * 1024;          // see above
-  Frame keyframe_after_frames = 63;                  // about 1 s
-  std::uint64_t keyframe_interval_ns = 250'000'000;  // of keyframes on request
-  std::function<std::uint64_t()> clock_ns = monotonic_ns;
-  // Told who is here after each change, with the tick of the newest frame; may be empty.
-  std::function<void(const std::vector<participants::Participant>&, Tick)> on_participants;
-  // Null: everybody may come, in any role. It outlives the replicator.
-  access::Gate* gate = nullptr;
-  // Whether anybody wants the ghost, after each change; empty: the session has none.
-  std::function<void(bool)> on_ghost_wanted;
-};
 
 struct BarrierResult {
   ParticipantSlot slot;
@@ -78,19 +61,6 @@ struct BarrierResult {
   Frame frame = 0;  // acknowledged
   std::uint32_t surface_crc = 0;
   bool is_equal = false;
-};
-
-struct ReplicatorCounters {
-  std::uint64_t sessions = 0;                          // welcomed
-  std::array<std::uint64_t, kEndReasonCount> ended{};  // by EndReason, where we ended it
-  std::uint64_t samples = 0;
-  std::uint64_t frames_published = 0;
-  std::uint64_t frames_conflated = 0;  // overtaken by a newer one before this thread saw them
-  std::uint64_t frames_given = 0, frames_skipped = 0;  // summed over clients
-  std::uint64_t keyframes_given = 0;
-  std::uint64_t surface_changes = 0, surface_change_bytes = 0;  // each counted once
-  std::uint64_t ghosts_given = 0, ghosts_skipped = 0;           // summed over clients
-  std::uint64_t bytes_queued = 0;
 };
 
 class Replicator final : public net::ConnectionHandler {
@@ -125,6 +95,7 @@ class Replicator final : public net::ConnectionHandler {
 
   void on_open(net::ConnectionId id) override;
   void on_message(net::ConnectionId id, BytesView message) override;
+  void on_datagram(net::ConnectionId id, BytesView message) override;
   void on_fault(net::ConnectionId id, net::ConnectionFault fault) override;
   void on_close(net::ConnectionId id) override;
 
@@ -141,7 +112,10 @@ class Replicator final : public net::ConnectionHandler {
   std::optional<Ending> find_place(Client& client, HelloRequest& request);
   std::optional<Ending> welcome(Client& client);
   void refuse(Client& client, const std::string& reason);
-  std::optional<Ending> handle_sample(Client& client, const proto::ToolSample& sample);
+  // `is_ordered`: it came by the stream alone, so that sequence numbers must grow.
+  std::optional<Ending> handle_sample(Client& client, const proto::ToolSample& sample,
+                                      bool is_ordered);
+  std::optional<Ending> handle_datagram(Client& client, const proto::ClientDatagram& datagram);
   std::optional<Ending> handle_mark(Client& client, int action);
   void handle_ghost_request(Client& client, bool is_wanted);
   std::optional<Ending> handle_ack(Client& client, Frame frame, std::uint32_t crc);
@@ -149,16 +123,16 @@ class Replicator final : public net::ConnectionHandler {
 
   // Tells everybody what begins an epoch and keeps it; an error if it does not follow.
   Status change_surface(const wire::SurfaceChange& change);
-  // Another one, to which no change leads: everybody gets it and a keyframe.
-  void replace_surface(const wire::SurfaceLayout& layout);
+  // Another one, to which no change leads: everybody gets it and a keyframe. No frame before
+  // `frame` helps any more.
+  void replace_surface(const wire::SurfaceLayout& layout, Frame frame);
   // Makes the message of the surface as it is now.
   const wire::SharedBytes& topology();
   bool send(Client& client, const wire::SharedBytes& bytes);
   void broadcast(const wire::SharedBytes& bytes);
-  std::size_t skip_limit() const;
-  // True if the client has the newest frame afterwards. `is_required`: do not skip.
+  // True if the client has the newest frame afterwards, or it is on its way. `is_required`: do not
+  // skip.
   bool give_frame(Client& client, bool is_required);
-  bool may_have_requested_keyframe(const Client& client) const;
   void end_session(Client& client, const Ending& ending);
   void forget(Client& client);
   // Tells everybody who is here, as often as somebody drops out while being told.

@@ -45,6 +45,7 @@ Result<HelloRequest> check_hello(const proto::Hello& hello, EndReason& reason) {
   HelloRequest request;
   request.protocol_minor = hello.protocol_minor();
   request.name = hello.name();
+  request.acks_every_frame = hello.acks_every_frame();
   request.role = wire::role_of(hello.role());
   request.join_secret.assign(hello.join_secret().begin(), hello.join_secret().end());
   for (const auto& tool : hello.tool()) request.tools.push_back(wire::read(tool));

@@ -49,6 +49,7 @@ struct HelloRequest {
   participants::Role role = participants::Role::Observer;
   std::vector<tool::ToolShape> tools;  // not yet checked
   Bytes join_secret;                   // not yet checked: the gate does
+  bool acks_every_frame = false;
 };
 // `reason` is set on error.
 Result<HelloRequest> check_hello(const proto::Hello& hello, EndReason& reason);

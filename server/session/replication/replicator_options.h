@@ -1,0 +1,47 @@
+#pragma once
+
+// A Replicator is told this, and counts that.
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "common/base/tick.h"
+#include "common/base/timing.h"
+#include "server/session/access/gate.h"
+#include "server/session/participants/roster.h"
+#include "server/session/replication/validation.h"
+
+namespace trocar::replication {
+
+struct ReplicatorOptions {
+  std::uint32_t max_messages_per_second = 2000;      // per connection; two tools at 250 Hz need 500
+  std::size_t skip_above_bytes = 64 * 1024;          // see above
+  Frame keyframe_after_frames = 63;                  // about 1 s
+  std::uint64_t keyframe_interval_ns = 250'000'000;  // of keyframes on request
+  std::function<std::uint64_t()> clock_ns = monotonic_ns;
+  // Told who is here after each change, with the tick of the newest frame; may be empty.
+  std::function<void(const std::vector<participants::Participant>&, Tick)> on_participants;
+  bool has_datagrams = false;  // the transport takes them; clients are told
+  // Null: everybody may come, in any role. It outlives the replicator.
+  access::Gate* gate = nullptr;
+  // Whether anybody wants the ghost, after each change; empty: the session has none.
+  std::function<void(bool)> on_ghost_wanted;
+};
+
+struct ReplicatorCounters {
+  std::uint64_t sessions = 0;                          // welcomed
+  std::array<std::uint64_t, kEndReasonCount> ended{};  // by EndReason, where we ended it
+  std::uint64_t samples = 0;
+  std::uint64_t frames_published = 0;
+  std::uint64_t frames_conflated = 0;  // overtaken by a newer one before this thread saw them
+  std::uint64_t frames_given = 0, frames_skipped = 0;   // summed over clients
+  std::uint64_t frames_by_datagram = 0, datagrams = 0;  // of the frames given
+  std::uint64_t keyframes_given = 0;
+  std::uint64_t surface_changes = 0, surface_change_bytes = 0;  // each counted once
+  std::uint64_t ghosts_given = 0, ghosts_skipped = 0;           // summed over clients
+  std::uint64_t bytes_queued = 0;
+};
+
+}  // namespace trocar::replication
