@@ -40,6 +40,12 @@ NetSource::Session::~Session() {
 
 // ---- render thread ----
 
+std::optional<NetSource::Session::Arrival> NetSource::Session::try_pop() {
+  auto arrival = inbound_.try_pop();
+  if (arrival) inbound_bytes_ -= arrival->bytes;
+  return arrival;
+}
+
 bool NetSource::Session::try_send(const proto::Envelope& message) {
   if (message.ByteSizeLong() + wire::kHeaderBytes > wire::kMaxUpstreamBytes ||
       !outbound_.try_push(std::make_shared<proto::Envelope>(message))) {
@@ -361,7 +367,18 @@ void NetSource::Session::deliver_datagram(std::shared_ptr<const proto::Envelope>
   if (message->has_surface_slice()) slices_received_.fetch_add(1, std::memory_order_relaxed);
   messages_received_.fetch_add(1, std::memory_order_relaxed);
   if (options_.before_message) options_.before_message();
-  inbound_.try_push({std::move(message), monotonic_ns(), bytes});
+  try_push({std::move(message), monotonic_ns(), bytes});
+}
+
+// One message fits whatever its size, as long as nothing else waits.
+bool NetSource::Session::try_push(Arrival arrival) {
+  const auto bytes = arrival.bytes;
+  const auto waiting = inbound_bytes_.load();
+  if (waiting > 0 && waiting + bytes > options_.inbound_bytes) return false;
+  inbound_bytes_ += bytes;
+  const bool is_pushed = inbound_.try_push(std::move(arrival));
+  if (!is_pushed) inbound_bytes_ -= bytes;
+  return is_pushed;
 }
 
 void NetSource::Session::end_if_final(const proto::Envelope& message) {
@@ -379,7 +396,7 @@ void NetSource::Session::end_if_final(const proto::Envelope& message) {
 asio::awaitable<void> NetSource::Session::deliver(std::shared_ptr<const proto::Envelope> message,
                                                   std::size_t bytes) {
   const Arrival arrival{std::move(message), monotonic_ns(), bytes};
-  while (!inbound_.try_push(arrival)) {
+  while (!try_push(arrival)) {
     if (is_done_ || is_closing_) co_return;
     is_stalled_ = true;
     room_timer_.expires_after(kRoomRetry);

@@ -37,7 +37,7 @@ class NetSource::Session {
   ~Session();
 
   // Render thread.
-  std::optional<Arrival> try_pop() { return inbound_.try_pop(); }
+  std::optional<Arrival> try_pop();
   bool try_send(const proto::Envelope& message);
   void request_close(const std::string& reason);
   // After true: everything was pushed, close_reason() does not change any more.
@@ -64,6 +64,7 @@ class NetSource::Session {
 
   void end_if_failed(const std::exception_ptr& failure);
   void begin_conversation();
+  bool try_push(Arrival arrival);
   bool make_room_for(std::span<const std::uint8_t, wire::kHeaderBytes> header);
   std::shared_ptr<const proto::Envelope> pop_message();
   void end_if_final(const proto::Envelope& message);
@@ -103,6 +104,7 @@ class NetSource::Session {
   Bytes body_;
 
   SpscQueue<Arrival> inbound_;
+  std::atomic<std::size_t> inbound_bytes_{0};  // in it, as they came
   SpscQueue<std::shared_ptr<const proto::Envelope>> outbound_;
   std::atomic<bool> is_wake_posted_{false};
   std::atomic<bool> has_ended_{false};

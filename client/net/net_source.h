@@ -10,11 +10,11 @@
 //   Ping every 200 ms, Pong -> round trip, the server's clock
 //   datagram path (datagram_path.h): slices of frames in, samples and acknowledgements out
 //
-// Inbound queue full: nothing is read until there is room, so TCP holds the server back and the
-// server skips frames for us; nothing is dropped and nothing grows. Outbound queue full: send()
-// says false. Text from the server is made printable before anybody sees it. state() changes inside
-// poll() only, so call poll() also while connecting. See session_source.h for what each member
-// promises.
+// Inbound queue full, by messages or by bytes: nothing is read until there is room, so TCP holds
+// the server back and the server skips frames for us; nothing is dropped and nothing grows.
+// Outbound queue full: send() says false. Text from the server is made printable before anybody
+// sees it. state() changes inside poll() only, so call poll() also while connecting. See
+// session_source.h for what each member promises.
 
 #include <chrono>
 #include <functional>
@@ -43,12 +43,13 @@ struct NetSourceOptions {
   bool wants_datagrams = true;  // where the server has them
   // Whoever polls acknowledges each frame, as a Replica does. Else the server does not pace frames.
   bool acks_every_frame = true;
-  bool trusts_ca = false;       // the CA in `tls` vouches for the server, so the code need not
+  bool trusts_ca = false;  // the CA in `tls` vouches for the server, so the code need not
   std::chrono::milliseconds connect_deadline{15000};  // a server may still be starting
   std::chrono::milliseconds connect_retry{200};
   std::chrono::milliseconds ping_interval{200};
   std::chrono::milliseconds silence_deadline{10000};  // nothing from the server: lost
   std::size_t inbound_capacity = 256;                 // messages
+  std::size_t inbound_bytes = 32 << 20;               // as they came; decoded they take more
   std::size_t outbound_capacity = 256;
   std::function<void()> before_message;  // for tests: on the Asio thread, before each is handed on
 };

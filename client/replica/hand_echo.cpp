@@ -5,19 +5,30 @@
 namespace trocar::replica {
 
 void HandEcho::note_sent(const Vec3f& position_m, std::uint64_t now_ns) {
-  if (!sent_.empty() && sent_.back().position_m == position_m) return;  // it rests
   sent_.push_back({position_m, now_ns});
-  if (sent_.size() > kMostSent) sent_.pop_front();
+  while (now_ns - sent_.front().ns > kKeptNs) sent_.pop_front();
 }
 
 std::optional<double> HandEcho::observe_ms(const Vec3f& shown_m, std::uint64_t now_ns) {
   if (last_shown_m_ && *last_shown_m_ == shown_m) return std::nullopt;
   last_shown_m_ = shown_m;
-  const auto found = std::ranges::find(sent_, shown_m, &Sent::position_m);
-  if (found == sent_.end()) return std::nullopt;
-  const auto elapsed_ns = now_ns - found->ns;
-  sent_.erase(sent_.begin(), found + 1);
-  return static_cast<double>(elapsed_ns) * 1e-6;
+  float nearest = kNear_m;
+  std::optional<double> elapsed_ms;
+  for (std::size_t i = 1; i < sent_.size(); ++i) {
+    const auto &a = sent_[i - 1], &b = sent_[i];
+    const Vec3f way = b.position_m - a.position_m;
+    const float along_m = length(way), seconds = static_cast<float>(b.ns - a.ns) * 1e-9f;
+    if (along_m < kLeastSpeed_m_s * seconds || along_m == 0) continue;
+    const float share =
+        std::clamp(dot(shown_m - a.position_m, way) / (along_m * along_m), 0.0f, 1.0f);
+    const float distance = length(shown_m - a.position_m - way * share);
+    if (distance > nearest) continue;  // of equals the last counts
+    nearest = distance;
+    const auto left_ns =
+        static_cast<double>(a.ns) + static_cast<double>(share) * static_cast<double>(b.ns - a.ns);
+    elapsed_ms = (static_cast<double>(now_ns) - left_ns) * 1e-6;
+  }
+  return elapsed_ms;
 }
 
 }  // namespace trocar::replica

@@ -1,8 +1,8 @@
 #pragma once
 
 // How long it takes from a hand to the picture: from when a reading of the first tool left until a
-// frame shows the tool at that very position. Readings are looked up by position, so only a hand
-// that moves is measured.
+// frame shows the tool there. Frames show it between readings, so the place is looked for on the
+// line through those of the last seconds. Only a hand that moves is measured.
 
 #include <cstdint>
 #include <deque>
@@ -14,11 +14,13 @@ namespace trocar::replica {
 
 class HandEcho {
  public:
-  static constexpr std::size_t kMostSent = 1024;
+  static constexpr std::uint64_t kKeptNs = 4'000'000'000;
+  static constexpr float kNear_m = 1e-4f;          // of the line; else it was pushed aside
+  static constexpr float kLeastSpeed_m_s = 0.01f;  // of the hand there
 
   void note_sent(const Vec3f& position_m, std::uint64_t now_ns);
-  // `shown_m`: where the newest frame with a state has the tool. Nothing if it has not moved since
-  // the last call, or was not sent.
+  // `shown_m`: where the newest frame with a state has the tool. Nothing if it rests there, or was
+  // never near.
   std::optional<double> observe_ms(const Vec3f& shown_m, std::uint64_t now_ns);
 
  private:

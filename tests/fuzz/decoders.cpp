@@ -8,11 +8,13 @@
 
 #include "common/base/assert.h"
 #include "common/journal/session_journal.h"
+#include "common/secure/datagram_channel.h"
 #include "common/secure/join_code.h"
 #include "common/tool/script.h"
 #include "common/wire/framing.h"
 #include "common/wire/surface_codec.h"
 #include "common/wire/surface_messages.h"
+#include "common/wire/surface_slices.h"
 #include "proto/journal.pb.h"
 #include "proto/wire.pb.h"
 #include "server/lab/scenario/scenario.h"
@@ -63,6 +65,47 @@ bool decode_surface(BytesView bytes) {
   for (const auto& v : surface)
     TROCAR_ASSERT(std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}) <= wire::kMaxQuanta);
   return is_accepted;
+}
+
+// Two numbers of 32 bits say which vertices it is of.
+bool decode_surface_slice(BytesView bytes) {
+  ByteReader reader(bytes);
+  wire::SurfaceSlice slice{reader.read<std::uint32_t>(), reader.read<std::uint32_t>(), {}};
+  if (!reader.ok()) return false;
+  const auto payload = bytes.subspan(reader.position());
+  slice.payload.assign(payload.begin(), payload.end());
+  const wire::QuantisedSurface before(700, wire::QuantisedVertex{7, 8, 9});
+  auto surface = before;
+  const bool is_accepted = checked(wire::decode_slice(slice, surface));
+  TROCAR_ASSERT(is_accepted || surface == before);
+  return is_accepted;
+}
+
+// Datagrams of a handshake, each behind its length of 16 bits: the first byte chooses between those
+// that a server gets and those that a client gets. Accepted: one of them was answered.
+bool decode_handshake(BytesView bytes) {
+  if (bytes.empty()) return false;
+  int answers = 0;
+  const auto send = [&answers](BytesView) { ++answers; };
+  const auto ignore = [](BytesView) {};
+  secure::DatagramListener listener([](const auto&) { return std::optional(secure::Digest{}); });
+  std::unique_ptr<secure::DatagramChannel> channel;
+  const bool is_client = (bytes[0] & 1) != 0;
+  if (is_client) {
+    channel = secure::DatagramChannel::make_client({}, send);
+    channel->start();
+    answers = 0;
+  }
+  ByteReader reader(bytes.subspan(1));
+  while (true) {
+    const auto datagram = reader.read_bytes(reader.read<std::uint16_t>());
+    if (!reader.ok()) break;
+    if (channel)
+      channel->receive(datagram, ignore);
+    else
+      channel = listener.receive(datagram, "192.0.2.1 5000", send);
+  }
+  return answers > 0;
 }
 
 bool decode_topology(BytesView bytes) {
@@ -163,6 +206,8 @@ bool decode_codes(BytesView bytes) {
 constexpr Decoder kDecoders[] = {
     {"envelope", decode_envelope},
     {"surface_codec", decode_surface},
+    {"surface_slice", decode_surface_slice},
+    {"handshake", decode_handshake},
     {"surface_topology", decode_topology},
     {"surface_change", decode_change},
     {"journal", decode_journal},

@@ -5,7 +5,9 @@
 #include <filesystem>
 #include <fstream>
 
+#include "common/secure/datagram_channel.h"
 #include "common/wire/surface_messages.h"
+#include "common/wire/surface_slices.h"
 #include "proto/wire.pb.h"
 #include "server/organs/catalogue/builtin_organs.h"
 #include "server/organs/organ/local_reduction_file.h"
@@ -62,6 +64,37 @@ void save_surfaces() {
   save("surface_change", "split_edge", message);
 }
 
+void save_slices() {
+  const wire::QuantisedSurface before(700, wire::QuantisedVertex{7, 8, 9});
+  auto after = before;
+  for (std::size_t i = 0; i < after.size(); i += 2)
+    after[i] += {static_cast<std::int32_t>(i * i % 900), -static_cast<std::int32_t>(i), 4};
+  const auto slices = wire::encode_slices(before, after, 500);
+  Bytes bytes;
+  ByteWriter writer(bytes);
+  writer.put(slices.back().first_vertex);
+  writer.put(slices.back().vertices);
+  bytes.insert(bytes.end(), slices.back().payload.begin(), slices.back().payload.end());
+  save("surface_slice", "last", bytes);
+}
+
+void save_datagram(const char* name, bool is_client, BytesView datagram) {
+  Bytes bytes{static_cast<std::uint8_t>(is_client)};
+  ByteWriter(bytes).put(static_cast<std::uint16_t>(datagram.size()));
+  bytes.insert(bytes.end(), datagram.begin(), datagram.end());
+  save("handshake", name, bytes);
+}
+
+void save_handshakes() {
+  secure::DatagramListener listener([](const auto&) { return std::optional(secure::Digest{}); });
+  const auto client = secure::DatagramChannel::make_client({}, [&](BytesView hello) {
+    save_datagram("hello", false, hello);
+    listener.receive(hello, "192.0.2.1 5000",
+                     [](BytesView cookie) { save_datagram("cookie", true, cookie); });
+  });
+  client->start();
+}
+
 void save_envelopes() {
   proto::Envelope hello;
   hello.mutable_hello()->set_name("Ada");
@@ -69,6 +102,10 @@ void save_envelopes() {
   proto::Envelope sample;
   sample.mutable_tool_sample()->set_sequence(1);
   save("envelope", "tool_sample", sample);
+  proto::Envelope datagram;
+  *datagram.mutable_client_datagram()->add_sample() = sample.tool_sample();
+  datagram.mutable_client_datagram()->mutable_ack()->set_frame(3);
+  save("envelope", "client_datagram", datagram);
 }
 
 }  // namespace
@@ -81,6 +118,8 @@ int main(int argc, char** argv) {
   root = argv[1];
   save_surfaces();
   save_envelopes();
+  save_slices();
+  save_handshakes();
   const auto block = reduce::testing::block(3, 3, 3);
   save("organ", "block", organ::encode_organ(block));
   save("organ", "block.organ", organ::pack_organ(block));

@@ -24,6 +24,7 @@ class Program {
   // Exit code, 128 + signal if one ended it, or -1 after `seconds`.
   int wait(double seconds);
   bool is_running();
+  pid_t process() const { return pid_; }
 
  private:
   pid_t pid_ = -1;
