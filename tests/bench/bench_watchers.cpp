@@ -1,6 +1,6 @@
-// What watchers cost: a real server with one scripted hand, and watchers that follow it in this
-// program. CPU time of the server's network thread, bytes, and the age of the watchers' surface;
-// with TLS and datagrams, with TLS alone, and without either.
+// Watchers cost a server CPU time and bytes. A real server with one scripted hand is followed by
+// watchers in this program. It prints the CPU time of the server's network thread, bytes, and the
+// age of the watchers' surface: with TLS and datagrams, with TLS alone, and without either.
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -16,6 +16,7 @@
 #include "client/net/net_source.h"
 #include "client/replica/replica.h"
 #include "client/replica/time_distribution.h"
+#include "common/base/log.h"
 #include "common/base/timing.h"
 #include "common/secure/link_file.h"
 #include "tests/support/child_program.h"
@@ -199,6 +200,7 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--threads", options.threads, "that follow them")->check(CLI::Range(1, 64));
   CLI11_PARSE(app, argc, argv);
+  if (!log::configure("bench_watchers", "error")) return 2;
   std::printf(
       "| with | watchers | network thread (%% of a core) | of it per watcher | kbit/s each | "
       "age, median (ms) | 99th | frames/s | by datagram (%%) | server's memory (MB) | lost |\n"
