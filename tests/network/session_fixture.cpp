@@ -57,6 +57,12 @@ void RawClient::shut_down_sending() {
   ::shutdown(socket_, SHUT_WR);
 }
 
+bool RawClient::is_closed() const {
+  char byte = 0;
+  const auto count = ::recv(socket_, &byte, 1, MSG_PEEK | MSG_DONTWAIT);
+  return count == 0 || (count < 0 && errno != EAGAIN);
+}
+
 bool RawClient::receive_exactly(std::uint8_t* to, std::size_t count) {
   while (count > 0) {
     const auto taken = ::recv(socket_, to, count, 0);

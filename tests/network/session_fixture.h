@@ -40,6 +40,8 @@ class RawClient {
   bool send_bytes(BytesView bytes);
   bool send(const proto::Envelope& envelope);
   void shut_down_sending();
+  // True if the peer has closed; takes nothing and does not wait.
+  bool is_closed() const;
   // Next message; nothing at the end of the stream or after 10 s.
   std::optional<proto::Envelope> receive();
   // Skips messages until one of this kind.

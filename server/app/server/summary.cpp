@@ -55,7 +55,7 @@ Json replication_figures(const Summary& s) {
   return {{"sessions", r.sessions},
           {"bytes_sent", s.tcp.bytes_out},
           {"bytes_received", s.tcp.bytes_in},
-          {"newcomers_rejected", s.tcp.rejected_newcomers},
+          {"newcomers_dropped", s.tcp.newcomers_dropped},
           {"handshakes_failed", s.tcp.handshakes_failed},
           {"samples", r.samples},
           {"samples_dropped", s.inbox.samples_dropped},

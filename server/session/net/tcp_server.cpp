@@ -114,11 +114,7 @@ class TcpServer::Core : public std::enable_shared_from_this<TcpServer::Core> {
       return;
     }
     const auto peer = socket.remote_endpoint(ignored).address().to_string();
-    if (options.tls && has_too_many_newcomers(peer)) {
-      ++counters.rejected_newcomers;
-      socket.close(ignored);
-      return;
-    }
+    if (options.tls) make_room_for_newcomer(peer);
     ++counters.accepted;
     socket.set_option(tcp::no_delay(true), ignored);
     socket.set_option(asio::socket_base::send_buffer_size(options.send_buffer_bytes), ignored);
@@ -130,14 +126,21 @@ class TcpServer::Core : public std::enable_shared_from_this<TcpServer::Core> {
     connection->start(events_of(id));
   }
 
-  bool has_too_many_newcomers(const std::string& peer) const {
+  // Who means it is done in milliseconds; so the oldest of too many is most likely one who does not.
+  void make_room_for_newcomer(const std::string& peer) {
     std::size_t all = 0, same = 0;
+    std::shared_ptr<Connection> oldest, oldest_of_same;  // numbers ascend with time
     for (const auto& [id, connection] : connections) {
       if (!connection->is_newcomer()) continue;
-      ++all;
-      if (connection->peer_address() == peer) ++same;
+      if (all++ == 0) oldest = connection;
+      if (connection->peer_address() == peer && same++ == 0) oldest_of_same = connection;
     }
-    return all >= options.max_newcomers || same >= options.max_newcomers_per_address;
+    if (same >= options.max_newcomers_per_address)
+      oldest = oldest_of_same;
+    else if (all < options.max_newcomers)
+      return;
+    ++counters.newcomers_dropped;
+    oldest->close();
   }
 
   void expect_datagrams(ConnectionId id) {
