@@ -53,6 +53,12 @@ void add_access_options(CLI::App& app, AccessOptions& options) {
                    "revoke a code, or all of a role, of the server that runs at --listen, and exit")
       ->type_name("CODE|ROLE");
   access
+      ->add_option("--return-seconds", options.return_seconds,
+                   "how long somebody's place is kept when the connection breaks, 0: not")
+      ->type_name("N")
+      ->check(CLI::Range(0, 3600))
+      ->capture_default_str();
+  access
       ->add_option("--audit", options.audit_file,
                    "log of joins, refusals and marks [audit.jsonl in the state folder]")
       ->type_name("FILE");

@@ -139,6 +139,7 @@ Status Server::open() {
   if (const auto issued = admission_->issue_codes(tcp_->port()); !issued) return issued;
   replication::ReplicatorOptions replication;
   replication.gate = admission_->gate();
+  replication.return_seconds = options_.access.return_seconds;
   if (journal_)
     replication.on_participants = [this](const auto& present, Tick tick) {
       journal_->record_participants(present, tick);

@@ -8,6 +8,11 @@
 //
 // Who joins passes the gate (server/session/access), if there is one, and then needs a place.
 //
+// Who has lost the connection without a Bye, and said in Hello that it can return, keeps the place
+// for `return_seconds`: to the others, only the tools fall silent. A Hello with the token of
+// Welcome and the same name gets the place back, even while the old connection still hangs. After
+// that time the place is given up.
+//
 // Inbound: every message is checked by role and range (validation.h); samples, joins and leaves go
 // to the simulation through the SimulationInbox. Anything malformed, oversized, too frequent or not
 // this role's to say ends that session with a Goodbye that names the reason; nobody else notices.
@@ -42,6 +47,7 @@
 #include "server/session/access/gate.h"
 #include "server/session/ghost/ghost_follower.h"
 #include "server/session/net/connections.h"
+#include "server/session/participants/absences.h"
 #include "server/session/participants/inbox.h"
 #include "server/session/participants/roster.h"
 #include "server/session/replication/frame_encoder.h"
@@ -61,6 +67,7 @@ struct ReplicatorOptions {
   std::size_t skip_above_bytes = 64 * 1024;          // see above
   Frame keyframe_after_frames = 63;                  // about 1 s
   std::uint64_t keyframe_interval_ns = 250'000'000;  // of keyframes on request
+  std::uint32_t return_seconds = 30;                 // 0: a lost connection is a leave
   std::function<std::uint64_t()> clock_ns = monotonic_ns;
   // Told who is here after each change, with the tick of the newest frame; may be empty.
   std::function<void(const std::vector<participants::Participant>&, Tick)> on_participants;
@@ -81,7 +88,8 @@ struct BarrierResult {
 };
 
 struct ReplicatorCounters {
-  std::uint64_t sessions = 0;                          // welcomed
+  std::uint64_t sessions = 0;                          // welcomed, returns left out
+  std::uint64_t lost = 0, returned = 0;                // connections of those who can return
   std::array<std::uint64_t, kEndReasonCount> ended{};  // by EndReason, where we ended it
   std::uint64_t samples = 0;
   std::uint64_t frames_published = 0;
@@ -140,6 +148,13 @@ class Replicator final : public net::ConnectionHandler {
   std::optional<Ending> admit(Client& client, const proto::Hello& hello);
   std::optional<Ending> find_place(Client& client, HelloRequest& request);
   std::optional<Ending> welcome(Client& client);
+  // Returns the place to which this Hello comes back; null: there is none.
+  const participants::Participant* find_own_place(const HelloRequest& request) const;
+  std::optional<Ending> come_back(Client& client, const participants::Participant& place);
+  // Keeps the place of who has lost the connection, if there is a way back.
+  bool keep_place(Client& client);
+  // Gives up the places of those who have been away for too long by then.
+  void end_absences(std::uint64_t now_ns);
   void refuse(Client& client, const std::string& reason);
   std::optional<Ending> handle_sample(Client& client, const proto::ToolSample& sample);
   std::optional<Ending> handle_mark(Client& client, int action);
@@ -160,6 +175,7 @@ class Replicator final : public net::ConnectionHandler {
   bool give_frame(Client& client, bool is_required);
   bool may_have_requested_keyframe(const Client& client) const;
   void end_session(Client& client, const Ending& ending);
+  void leave(Client& client);
   void forget(Client& client);
   // Tells everybody who is here, as often as somebody drops out while being told.
   void settle_participants();
@@ -173,7 +189,9 @@ class Replicator final : public net::ConnectionHandler {
   wire::SurfaceLayout layout_;  // of the newest frame
   wire::SharedBytes topology_;  // its encoding; null: not since the last change
   participants::Roster roster_;
+  participants::Absences absences_;
   std::map<net::ConnectionId, std::unique_ptr<Client>> clients_;
+  std::map<ParticipantSlot, std::unique_ptr<Client>> away_;  // without a connection
   bool participants_changed_ = false;
   bool is_ghost_wanted_ = false;
   wire::RecordingState recording_{

@@ -49,6 +49,8 @@ struct HelloRequest {
   participants::Role role = participants::Role::Observer;
   std::vector<tool::ToolShape> tools;  // not yet checked
   Bytes join_secret;                   // not yet checked: the gate does
+  bool can_return = false;
+  Bytes return_token;  // not yet checked; empty: none
 };
 // `reason` is set on error.
 Result<HelloRequest> check_hello(const proto::Hello& hello, EndReason& reason);
