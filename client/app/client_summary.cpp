@@ -47,6 +47,8 @@ std::string to_json(const ClientSummary& summary, const replica::Replica& replic
                   {"share_moved_over_1_mm", replica.share_moved()},
                   {"round_trip_ms", summary.round_trip_ms},
                   {"sends_dropped", source.sends_dropped},
+                  {"returns", source.returns},
+                  {"longest_absence_seconds", source.longest_away_seconds},
                   {"pictures", summary.pictures}});
 }
 
