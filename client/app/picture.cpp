@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "client/replica/client_messages.h"
+#include "client/ui/away_text.h"
 #include "client/ui/hud_panels.h"
 #include "client/ui/solver_text.h"
 #include "common/base/log.h"
@@ -166,6 +167,7 @@ void Picture::add_participants(const replica::Replica& replica, bool is_replay,
     ui::HudParticipant shown;
     shown.name = participant.name;
     shown.role = participant.role;
+    shown.is_away = participant.is_away;
     shown.is_self = !is_replay && participant.slot == replica.own_slot();
     shown.colour = render::colour_of_slot(participant.slot.value);
     for (const replica::Tool& tool : surface_.tools()) {
@@ -238,8 +240,12 @@ ui::HudModel Picture::hud_model(const replica::Replica& replica, replica::Sessio
                   " surface vertices";
   if (source.state() == replica::SourceState::Connecting)
     model.status = "Connecting to " + source.name() + " ...";
+  else if (source.state() == replica::SourceState::Away)
+    model.status = ui::describe_absence(source.statistics().away_seconds,
+                                        source.statistics().away_left_seconds);
   else if (!surface_.is_valid())
     model.status = "Waiting for the organ ...";
+  model.is_away = source.state() == replica::SourceState::Away;
   if (const auto* newest = replica.newest()) {
     // The state of the newest frame may still be under way; then the one before has it.
     const auto& history = replica.history();
