@@ -24,6 +24,8 @@ Examples:
   trocar-server --organ liver --reduction liver.reduction
       where the reduced model fits what is touched, it moves the tissue beyond; made with
       trocar-organ reduce liver --method local
+  trocar-server --resume lesson.mcap --journal lesson-2.mcap
+      after a crash: goes on where that recording ends, with all cuts; people come back
   trocar-server --seconds 20 --summary out/summary.json --journal out/session.mcap
       20 simulated seconds, then the replicas are compared, and the figures written
 
@@ -150,16 +152,21 @@ Result<std::optional<ServerOptions>> parse_command_line(int argc, char** argv) {
       "trocar-server");
   app.footer(kExamples);
   app.set_version_flag("--version", version_text());
-  app.add_option("--organ", options.organ,
-                 "built-in organ (liver, elastic-liver, lattice, plate, stomach, chest), an .organ "
-                 "file or a .msh mesh")
-      ->type_name("NAME|FILE")
-      ->capture_default_str();
+  const auto* organ =
+      app.add_option(
+             "--organ", options.organ,
+             "built-in organ (liver, elastic-liver, lattice, plate, stomach, chest), an .organ "
+             "file or a .msh mesh")
+          ->type_name("NAME|FILE")
+          ->capture_default_str();
   app.add_option("--listen", listen, "where to listen; port 0 takes any free one")
       ->type_name("ADDR:PORT")
       ->capture_default_str();
   app.add_option("--journal", options.journal,
                  "file to record the session in, or none [./trocar-<UTC>.mcap]")
+      ->type_name("FILE");
+  app.add_option("--resume", options.resume_file,
+                 "go on where this recording of a killed server ends; the organ is in it")
       ->type_name("FILE");
   app.add_option("--seconds", options.seconds, "end after this many simulated seconds")
       ->type_name("N")
@@ -189,6 +196,7 @@ Result<std::optional<ServerOptions>> parse_command_line(int argc, char** argv) {
     }
     return Error{ErrorCode::Usage, std::string(error.what()) + " (see --help)"};
   }
+  options.is_organ_chosen = organ->count() > 0;
   if (research.is_frozen) {
     options.decisions.boundary = world::Boundary::Frozen;
     if (research.depth->count() == 0) options.decisions.depth_limit = step::kFrozenDepthLimit;

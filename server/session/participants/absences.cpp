@@ -11,6 +11,12 @@ const ReturnToken* Absences::issue(ParticipantSlot slot) {
   return &place.token;
 }
 
+bool Absences::restore(ParticipantSlot slot, const ReturnToken& token) {
+  if (kept_seconds_ == 0 || !slot.is_valid()) return false;
+  places_[slot.value].emplace().token = token;
+  return true;
+}
+
 const ReturnToken* Absences::find(ParticipantSlot slot) const {
   return slot.is_valid() && places_[slot.value] ? &places_[slot.value]->token : nullptr;
 }

@@ -29,6 +29,8 @@ class Absences {
   // Makes the token of who has just got this place; null where places are not kept.
   const ReturnToken* issue(ParticipantSlot slot);
   const ReturnToken* find(ParticipantSlot slot) const;
+  // Gives a place the token that it had at a server before; false where places are not kept.
+  bool restore(ParticipantSlot slot, const ReturnToken& token);
   // Takes as long for a wrong token as for the right one.
   bool is_token_of(ParticipantSlot slot, BytesView token) const;
 

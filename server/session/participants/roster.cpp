@@ -64,6 +64,10 @@ Result<Participant> Roster::join(std::string_view name, Role role,
   return **free;
 }
 
+void Roster::restore(Participant who) {
+  if (who.slot.is_valid()) slots_[who.slot.value] = std::move(who);
+}
+
 void Roster::leave(ParticipantSlot slot) {
   if (slot.is_valid()) slots_[slot.value].reset();
 }

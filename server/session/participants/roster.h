@@ -41,6 +41,8 @@ class Roster {
   // none gets one default tool; a role without tools may not bring any.
   Result<Participant> join(std::string_view name, Role role, std::vector<tool::ToolShape> tools,
                            JoinRefusal& refusal);
+  // Somebody who had this place at a server before.
+  void restore(Participant who);
   void leave(ParticipantSlot slot);
   void set_away(ParticipantSlot slot, bool is_away);
 

@@ -7,6 +7,7 @@
 #include "common/base/log.h"
 #include "proto/wire.pb.h"
 #include "server/session/replication/messages.h"
+#include "server/session/replication/replicator_client.h"
 
 namespace trocar::replication {
 namespace {
@@ -50,21 +51,6 @@ EndReason reason_of(access::RefusalKind refusal) {
 }
 
 }  // namespace
-
-struct Replicator::Client {
-  net::ConnectionId id = 0;
-  access::Applicant applicant;                           // as the gate knows it
-  std::optional<participants::Participant> participant;  // set by Hello
-  bool is_welcome = false;
-  bool has_old_surface = false;  // so that no delta helps
-  step::SharedFrame baseline;    // the last frame this client was given
-  bool wants_keyframe = false;
-  bool wants_ghost = false;
-  std::uint64_t last_requested_keyframe_ns = 0;
-  std::array<std::optional<std::uint32_t>, kToolsPerHand> last_sequence;
-  std::uint64_t rate_window_begin_ns = 0;
-  std::uint32_t messages_in_window = 0;
-};
 
 Replicator::Replicator(net::Connections& connections, participants::SimulationInbox& inbox,
                        wire::SurfaceLayout layout, std::string organ_name, std::uint64_t organ_hash,
@@ -158,29 +144,6 @@ void Replicator::leave(Client& client) {
 void Replicator::forget(Client& client) {
   leave(client);
   clients_.erase(client.id);
-}
-
-bool Replicator::keep_place(Client& client) {
-  if (!client.is_welcome || barrier_) return false;
-  const auto& participant = *client.participant;
-  const auto slot = participant.slot;
-  if (!absences_.begin(slot, options_.clock_ns())) return false;
-  log::info("{} ({}) has lost the connection, the place is kept for {} s", participant.name,
-            text_of_role(participant.role), absences_.kept_seconds());
-  ++counters_.lost;
-  if (options_.gate) options_.gate->note_action(client.applicant, "lost");
-  roster_.set_away(slot, true);
-  participants_changed_ = true;
-  away_[slot] = std::move(clients_.extract(client.id).mapped());
-  return true;
-}
-
-void Replicator::end_absences(std::uint64_t now_ns) {
-  for (const auto slot : absences_.expired(now_ns)) {
-    const auto client = std::move(away_.extract(slot).mapped());
-    log::info("{} has not come back", client->participant->name);
-    leave(*client);
-  }
 }
 
 void Replicator::settle_participants() {
@@ -292,36 +255,6 @@ std::optional<Replicator::Ending> Replicator::admit(Client& client, const proto:
   ++counters_.sessions;
   log::info("{} ({}) joined as participant {}", request->name, text_of_role(request->role),
             client.participant->slot.value);
-  return welcome(client);
-}
-
-const participants::Participant* Replicator::find_own_place(const HelloRequest& request) const {
-  if (request.return_token.empty()) return nullptr;
-  const auto* place = roster_.find(request.name);
-  return place && absences_.is_token_of(place->slot, request.return_token) ? place : nullptr;
-}
-
-std::optional<Replicator::Ending> Replicator::come_back(Client& client,
-                                                        const participants::Participant& place) {
-  const auto slot = place.slot;
-  // The old connection may hang without that anybody has noticed.
-  const auto old = std::ranges::find_if(clients_, [&](const auto& entry) {
-    return entry.second->participant && entry.second->participant->slot == slot;
-  });
-  const bool hangs = old != clients_.end();
-  const auto before =
-      std::move(hangs ? clients_.extract(old).mapped() : away_.extract(slot).mapped());
-  if (hangs) connections_.close(before->id);
-  absences_.end(slot);
-  roster_.set_away(slot, false);
-  client.participant = before->participant;
-  client.applicant.role = before->applicant.role;
-  client.applicant.code = before->applicant.code;
-  client.wants_ghost = before->wants_ghost;
-  ++counters_.returned;
-  log::info("{} ({}) is back{}", place.name, text_of_role(place.role),
-            hangs ? ", the old connection still hung" : "");
-  if (options_.gate) options_.gate->note_action(client.applicant, "back");
   return welcome(client);
 }
 

@@ -108,6 +108,10 @@ class Replicator final : public net::ConnectionHandler {
              ReplicatorOptions options = {});
   ~Replicator() override;
 
+  // Before the first connection: somebody who was in the session that this one goes on with, whose
+  // tools the simulation has, and who may come back as after a loss. False: nobody may.
+  bool restore(participants::Participant who, const participants::ReturnToken& token);
+
   // Frames since the last call, oldest first, none left out. Claim events and surface changes of
   // all of them are delivered, the displacements only of the newest.
   void publish(std::span<const step::SharedFrame> frames);
@@ -128,6 +132,7 @@ class Replicator final : public net::ConnectionHandler {
 
   std::size_t session_count() const { return clients_.size(); }
   const participants::Roster& roster() const { return roster_; }
+  const participants::Absences& absences() const { return absences_; }
   const ReplicatorCounters& counters() const { return counters_; }
   const EncodeStatistics& encode_statistics() const { return encoder_.statistics(); }
 
