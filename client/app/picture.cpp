@@ -258,8 +258,8 @@ ui::HudModel Picture::hud_model(const replica::Replica& replica, replica::Sessio
   model.frames_per_second = rate_.frames_per_second;
   model.bytes_per_second = rate_.bytes_per_second;
   model.recording_text = replica.recording().text;
-  model.sync_text = sync_text(replica);
-  model.is_in_step = replica.sync_state() == replica::SyncState::InStep;
+  model.sync_text = model.is_away ? "old" : sync_text(replica);
+  model.is_in_step = !model.is_away && replica.sync_state() == replica::SyncState::InStep;
   model.shows_regions = overlays_.regions;
   model.shows_help = shows_help_;
   model.can_mark = source.playback() == nullptr && role_ == replica::Role::Instructor;

