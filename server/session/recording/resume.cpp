@@ -83,6 +83,14 @@ Result<std::uint64_t> simulate_up_to(Tick last, journal::SessionJournal& journal
   return hash;
 }
 
+// Whoever verifies the next journal begins with its snapshot, and so does this simulation: what it
+// remembers beside its state, such as the solver that it has told of last, is forgotten.
+Status begin_as_restored(step::Simulation& simulation) {
+  Bytes state;
+  simulation.write_snapshot(state);
+  return simulation.restore_snapshot(state);
+}
+
 bool has_hand(const step::Simulation& simulation, ParticipantSlot slot) {
   return simulation.state().tools[tool_slot(slot, 0)].is_present;
 }
@@ -144,6 +152,7 @@ Result<ResumedSession> resume_session(const std::string& path, const ResumeOptio
   const auto hash = simulate_up_to(*last, journal, path, session.simulation);
   if (!hash) return hash.error();
   session.state_hash = *hash;
+  if (const auto begun = begin_as_restored(session.simulation); !begun) return begun.error();
   if (const auto read = read_participants(journal, session); !read) return read.error();
   return session;
 }
