@@ -136,7 +136,10 @@ Status Admission::issue_codes(std::uint16_t port) {
   auto book = access::CodeBook::open(state_, port, options_.keeps_codes || is_resuming_, now);
   if (!book) return book.error();
   places_file_ = places_file(state_, port);
-  if (is_resuming_) {
+  if (!is_resuming_) {
+    std::error_code ignored;  // there is none, unless a server was killed
+    fs::remove(places_file_, ignored);
+  } else {
     auto places = read_places(places_file_);
     if (!places) return places.error();
     places_before_ = std::move(*places);
