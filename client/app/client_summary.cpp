@@ -64,6 +64,8 @@ std::string to_json(const ClientSummary& summary, const replica::Replica& replic
                   {"datagram_bytes_received", source.datagram_bytes_received},
                   {"datagram_bytes_sent", source.datagram_bytes_sent},
                   {"sends_dropped", source.sends_dropped},
+                  {"returns", source.returns},
+                  {"longest_absence_seconds", source.longest_away_seconds},
                   {"pictures", summary.pictures}});
 }
 

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "client/replica/client_messages.h"
+#include "client/ui/away_text.h"
 #include "client/ui/hud_panels.h"
 #include "client/ui/solver_text.h"
 #include "common/base/log.h"
@@ -166,6 +167,7 @@ void Picture::add_participants(const replica::Replica& replica, bool is_replay,
     ui::HudParticipant shown;
     shown.name = participant.name;
     shown.role = participant.role;
+    shown.is_away = participant.is_away;
     shown.is_self = !is_replay && participant.slot == replica.own_slot();
     shown.colour = render::colour_of_slot(participant.slot.value);
     for (const replica::Tool& tool : surface_.tools()) {
@@ -238,8 +240,12 @@ ui::HudModel Picture::hud_model(const replica::Replica& replica, replica::Sessio
                   " surface vertices";
   if (source.state() == replica::SourceState::Connecting)
     model.status = "Connecting to " + source.name() + " ...";
+  else if (source.state() == replica::SourceState::Away)
+    model.status = ui::describe_absence(source.statistics().away_seconds,
+                                        source.statistics().away_left_seconds);
   else if (!surface_.is_valid())
     model.status = "Waiting for the organ ...";
+  model.is_away = source.state() == replica::SourceState::Away;
   if (const auto* newest = replica.newest()) {
     // The state of the newest frame may still be under way; then the one before has it.
     const auto& history = replica.history();
@@ -256,8 +262,8 @@ ui::HudModel Picture::hud_model(const replica::Replica& replica, replica::Sessio
   model.frames_per_second = rate_.frames_per_second;
   model.bytes_per_second = rate_.bytes_per_second;
   model.recording_text = replica.recording().text;
-  model.sync_text = sync_text(replica);
-  model.is_in_step = replica.sync_state() == replica::SyncState::InStep;
+  model.sync_text = model.is_away ? "old" : sync_text(replica);
+  model.is_in_step = !model.is_away && replica.sync_state() == replica::SyncState::InStep;
   model.shows_regions = overlays_.regions;
   model.shows_help = shows_help_;
   model.can_mark = source.playback() == nullptr && role_ == replica::Role::Instructor;

@@ -4,6 +4,7 @@
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/post.hpp>
+#include <cmath>
 
 #include "client/replica/printable_message.h"
 #include "common/base/log.h"
@@ -20,6 +21,7 @@ constexpr std::chrono::milliseconds kCloseDeadline{200};
 constexpr std::chrono::milliseconds kRoomRetry{2};
 constexpr std::size_t kBuffersPerWrite = 16;
 constexpr std::size_t kMaxByeBytes = 200;
+constexpr std::chrono::milliseconds kEndPoll{1};  // of a connection's coroutines
 
 }  // namespace
 
@@ -65,6 +67,7 @@ void NetSource::Session::request_close(const std::string& reason) {
 }
 
 replica::SourceStatistics NetSource::Session::statistics() const {
+  const auto absence = comeback_.figures(monotonic_ns());
   return {.bytes_received = bytes_received_,
           .bytes_sent = bytes_sent_,
           .messages_received = messages_received_,
@@ -76,7 +79,11 @@ replica::SourceStatistics NetSource::Session::statistics() const {
           .datagram_bytes_sent = datagram_bytes_sent_,
           .slices_received = slices_received_,
           .has_server_clock = has_server_clock_,
-          .server_offset_us = server_offset_us_};
+          .server_offset_us = server_offset_us_,
+          .returns = absence.returns,
+          .longest_away_seconds = absence.longest_seconds,
+          .away_seconds = absence.away_seconds,
+          .away_left_seconds = absence.left_seconds};
 }
 
 std::string NetSource::Session::server_name() const {
@@ -120,7 +127,8 @@ void NetSource::Session::begin_close(const std::string& reason) {
 asio::awaitable<void> NetSource::Session::expire(Clock::time_point deadline) {
   deadline_timer_.expires_at(deadline);
   const auto [error] = co_await deadline_timer_.async_wait(kNoThrow);
-  if (error || is_done_) co_return;
+  const bool is_in_time = is_connected_ && !is_closing_;
+  if (error || is_done_ || is_in_time) co_return;
   if (is_closing_) {
     end(replica::CloseKind::Ended, "closed");
   } else {
@@ -136,7 +144,9 @@ wire::SharedBytes NetSource::Session::encode_hello() const {
   hello.set_name(options_.participant_name);
   hello.set_role(static_cast<proto::Role>(options_.role));
   hello.set_acks_every_frame(options_.acks_every_frame);
-  if (secret_) hello.set_join_secret(secret_->data(), secret_->size());
+  if (code_) hello.set_join_secret(code_->secret.data(), code_->secret.size());
+  hello.set_can_return(options_.can_return);
+  if (comeback_.is_allowed()) hello.set_return_token(comeback_.token());
   for (const auto& shape : options_.tools) {
     wire::write(shape, *hello.add_tool());
   }
@@ -146,11 +156,17 @@ wire::SharedBytes NetSource::Session::encode_hello() const {
 // Coroutines here hold no temporaries across a co_await and leave the text to plain functions:
 // GCC 12 miscompiles some of them otherwise (seen as a trap on resuming).
 asio::awaitable<void> NetSource::Session::run() {
-  const bool has_connected = co_await connect();
-  if (has_connected) {
+  bool has_connected = co_await connect();
+  while (has_connected) {
     begin_conversation();
     co_await read_messages();
-    end_after_stream();
+    break_connection("it was closed");
+    if (!may_come_back()) {
+      end_after_stream();
+      co_return;
+    }
+    co_await await_conversation_end();
+    has_connected = co_await come_back();
   }
 }
 
@@ -169,16 +185,84 @@ void NetSource::Session::end_if_failed(const std::exception_ptr& failure) {
 
 void NetSource::Session::begin_conversation() {
   is_connected_ = true;
+  has_heard_ = is_stalled_ = is_ping_queued_ = is_barrier_ = false;
+  clock_ = {};
+  has_server_clock_ = false;
   last_heard_ = Clock::now();
+  why_broken_.clear();
+  in_flight_.clear();
+  control_.clear();
   control_.push_back(encode_hello());
-  asio::co_spawn(context_, write_messages(),
-                 [this](std::exception_ptr failure) { end_if_failed(failure); });
-  asio::co_spawn(context_, ping(), [this](std::exception_ptr failure) { end_if_failed(failure); });
+  talkers_ = 2;
+  const auto ended = [this](std::exception_ptr failure) {
+    --talkers_;
+    end_if_failed(failure);
+  };
+  asio::co_spawn(context_, write_messages(), ended);
+  asio::co_spawn(context_, ping(), ended);
+}
+
+// A text that says why stands already if this program has broken it.
+void NetSource::Session::break_connection(std::string why) {
+  if (!is_connected_ || is_done_) return;
+  if (why_broken_.empty()) why_broken_ = std::move(why);
+  boost::system::error_code ignored;
+  stream_->socket().close(ignored);
+  if (!may_come_back()) return;
+  is_connected_ = false;
+  datagrams_.reset();
+  if (!comeback_.is_away())
+    log::warn("the connection to {} broke ({}): trying again", server_name(), why_broken_);
+  comeback_.begin(monotonic_ns());
+  for (auto* timer : {&wake_timer_, &ping_timer_, &room_timer_}) timer->cancel();
+}
+
+// The writer still looks at the stream, which the next connection replaces.
+asio::awaitable<void> NetSource::Session::await_conversation_end() {
+  while (talkers_ > 0) {
+    room_timer_.expires_after(kEndPoll);
+    co_await room_timer_.async_wait(kNoThrow);
+  }
+}
+
+asio::awaitable<bool> NetSource::Session::come_back() {
+  why_not_ = "no answer";
+  while (!is_done_ && !comeback_.is_over(monotonic_ns())) {
+    retry_timer_.expires_after(std::chrono::nanoseconds(comeback_.next_pause_ns(monotonic_ns())));
+    co_await retry_timer_.async_wait(kNoThrow);
+    if (is_done_) break;
+    const auto deadline = Clock::now() + options_.return_try;
+    asio::co_spawn(context_, expire(deadline),
+                   [this](std::exception_ptr failure) { end_if_failed(failure); });
+    const bool is_ready = co_await try_to_connect(deadline);
+    if (is_ready) co_return true;
+  }
+  end_absence();
+  co_return false;
+}
+
+void NetSource::Session::note_welcome(const proto::Welcome& welcome) {
+  const auto now = monotonic_ns();
+  if (comeback_.is_away()) {
+    log::info("back in the session at {} after {:.1f} s", server_name(),
+              comeback_.figures(now).away_seconds);
+    comeback_.end(now);
+  }
+  if (options_.can_return) comeback_.allow(welcome.return_token(), welcome.return_seconds());
 }
 
 void NetSource::Session::end_after_stream() {
   if (is_closing_) return end(replica::CloseKind::Ended, "closed");
   end(replica::CloseKind::Lost, "connection to " + server_name() + " broke: the server is gone");
+}
+
+void NetSource::Session::end_absence() {
+  const auto seconds = std::lround(comeback_.figures(monotonic_ns()).away_seconds);
+  end(replica::CloseKind::Lost, "connection to " + server_name() +
+                                    " broke, and could not be made "
+                                    "again for " +
+                                    std::to_string(seconds) + " s (" + why_not_ +
+                                    "): the server is gone, or check the network");
 }
 
 void NetSource::Session::say_waiting(const std::string& why) const {
@@ -192,7 +276,12 @@ void NetSource::Session::end_unreachable(const std::string& why) {
 }
 
 void NetSource::Session::check_silence() {
-  if (is_stalled_ || is_done_ || Clock::now() - last_heard_ <= options_.silence_deadline) return;
+  // A stream that waits for lost packets is not gone while datagrams come.
+  const bool is_alive = Clock::now() - last_datagram_ < options_.return_silence;
+  const auto longest =
+      comeback_.is_allowed() && !is_alive ? options_.return_silence : options_.silence_deadline;
+  if (is_stalled_ || !is_talking() || Clock::now() - last_heard_ <= longest) return;
+  if (may_come_back()) return break_connection("it is silent");
   end(replica::CloseKind::Lost,
       has_heard_ ? "connection to " + server_name() + " is silent: check the network"
                  : server_name() + " does not answer: is it a Trocar server?");
@@ -205,24 +294,8 @@ asio::awaitable<bool> NetSource::Session::connect() {
   why_not_ = "no answer";
   bool is_said = false;
   while (!is_done_ && Clock::now() < deadline) {
-    const auto [unresolved, endpoints] =
-        co_await resolver_.async_resolve(options_.host, std::to_string(options_.port), kNoThrow);
-    if (unresolved) why_not_ = unresolved.message();
-    for (const auto& endpoint : endpoints) {
-      if (is_done_ || Clock::now() >= deadline) break;
-      boost::system::error_code ignored;
-      socket_.close(ignored);
-      const auto [error] = co_await socket_.async_connect(endpoint, kNoThrow);
-      if (error && error != asio::error::operation_aborted) why_not_ = error.message();
-      if (error) continue;
-      socket_.set_option(tcp::no_delay(true), ignored);
-      stream_.emplace(std::move(socket_), options_.tls);
-      const bool is_ready = co_await secure_stream();
-      if (is_done_) co_return false;
-      if (!is_ready) continue;
-      deadline_timer_.cancel();
-      co_return true;
-    }
+    const bool is_ready = co_await try_to_connect(deadline);
+    if (is_ready) co_return true;
     if (is_done_ || Clock::now() >= deadline) break;
     if (!is_said) say_waiting(why_not_);
     is_said = true;
@@ -230,6 +303,29 @@ asio::awaitable<bool> NetSource::Session::connect() {
     co_await retry_timer_.async_wait(kNoThrow);
   }
   end_unreachable(why_not_);
+  co_return false;
+}
+
+// One try at each of the server's addresses. False: the session has ended, or another may help.
+asio::awaitable<bool> NetSource::Session::try_to_connect(Clock::time_point deadline) {
+  const auto [unresolved, endpoints] =
+      co_await resolver_.async_resolve(options_.host, std::to_string(options_.port), kNoThrow);
+  if (unresolved) why_not_ = unresolved.message();
+  for (const auto& endpoint : endpoints) {
+    if (is_done_ || Clock::now() >= deadline) break;
+    boost::system::error_code ignored;
+    socket_.close(ignored);
+    const auto [error] = co_await socket_.async_connect(endpoint, kNoThrow);
+    if (error && error != asio::error::operation_aborted) why_not_ = error.message();
+    if (error) continue;
+    socket_.set_option(tcp::no_delay(true), ignored);
+    stream_.emplace(std::move(socket_), options_.tls);
+    const bool is_ready = co_await secure_stream();
+    if (is_done_) co_return false;
+    if (!is_ready) continue;
+    deadline_timer_.cancel();
+    co_return true;
+  }
   co_return false;
 }
 
@@ -247,7 +343,7 @@ asio::awaitable<bool> NetSource::Session::secure_stream() {
 
 void NetSource::Session::end_insecure(const boost::system::error_code& error) {
   if (error == asio::error::operation_aborted) return;  // the deadline, which says so
-  if (secure::may_try_again(error)) {
+  if (secure::may_try_again(error) || comeback_.is_away()) {
     why_not_ = "it closed the connection before TLS was there";
     return;
   }
@@ -258,14 +354,17 @@ void NetSource::Session::end_insecure(const boost::system::error_code& error) {
 // Nothing has been sent yet: a server that is not the right one learns neither name nor secret.
 bool NetSource::Session::accept_server() {
   if (!options_.join_code) return true;
-  const auto code = options_.join_code();
-  if (!code) {
-    end(replica::CloseKind::Refused, code.error().message);
-    return false;
+  if (!code_) {
+    const auto code = options_.join_code();
+    if (!code) {
+      end(replica::CloseKind::Refused, code.error().message);
+      return false;
+    }
+    code_ = *code;
   }
   const bool is_right =
       options_.trusts_ca ||
-      secure::code_of_certificate(stream_->peer_certificate_der()) == code->certificate;
+      secure::code_of_certificate(stream_->peer_certificate_der()) == code_->certificate;
   if (!is_right) {
     end(replica::CloseKind::Refused,
         server_name() +
@@ -273,7 +372,6 @@ bool NetSource::Session::accept_server() {
             "check the code's first eight characters and the address");
     return false;
   }
-  secret_ = code->secret;
   return true;
 }
 
@@ -285,7 +383,7 @@ asio::awaitable<bool> NetSource::Session::read_exactly(std::uint8_t* to, std::si
 
 asio::awaitable<void> NetSource::Session::read_messages() {
   std::array<std::uint8_t, wire::kHeaderBytes> header{};
-  while (!is_done_) {
+  while (is_talking()) {
     const bool has_header = co_await read_exactly(header.data(), header.size());
     if (!has_header || !make_room_for(header)) break;
     const bool has_body = co_await read_exactly(body_.data(), body_.size());
@@ -338,10 +436,13 @@ void NetSource::Session::note_pong(const proto::Pong& pong) {
   has_server_clock_ = true;
 }
 
-// This layer itself learns something from messages for the replica.
+// This layer itself learns something from messages for the replica, before they are pushed: whoever
+// takes Welcome there is not away any more.
 void NetSource::Session::heed(const proto::Envelope& message) {
   if (message.has_barrier()) is_barrier_ = true;
-  if (message.has_welcome() && message.welcome().has_datagrams()) begin_datagrams();
+  if (!message.has_welcome()) return;
+  note_welcome(message.welcome());
+  if (message.welcome().has_datagrams()) begin_datagrams();
 }
 
 void NetSource::Session::begin_datagrams() {
@@ -361,6 +462,7 @@ void NetSource::Session::begin_datagrams() {
 void NetSource::Session::deliver_datagram(std::shared_ptr<const proto::Envelope> message,
                                           std::size_t bytes) {
   datagram_bytes_received_ = datagrams_->bytes_received();
+  last_datagram_ = Clock::now();
   const bool is_expected = message->has_surface_slice() || message->has_frame_state_part() ||
                            message->has_surface_change();
   if (!is_expected) return;
@@ -382,6 +484,10 @@ bool NetSource::Session::try_push(Arrival arrival) {
 }
 
 void NetSource::Session::end_if_final(const proto::Envelope& message) {
+  const bool has_timed_out =
+      message.has_goodbye() && message.goodbye().reason() == proto::GOODBYE_TIMEOUT;
+  if (has_timed_out && may_come_back())
+    return break_connection("the server has heard nothing for too long");
   if (message.has_goodbye()) {
     const bool is_over = message.goodbye().reason() == proto::GOODBYE_SERVER_CLOSING;
     end(is_over ? replica::CloseKind::Ended : replica::CloseKind::Refused,
@@ -397,7 +503,7 @@ asio::awaitable<void> NetSource::Session::deliver(std::shared_ptr<const proto::E
                                                   std::size_t bytes) {
   const Arrival arrival{std::move(message), monotonic_ns(), bytes};
   while (!try_push(arrival)) {
-    if (is_done_ || is_closing_) co_return;
+    if (!is_talking() || is_closing_) co_return;
     is_stalled_ = true;
     room_timer_.expires_after(kRoomRetry);
     co_await room_timer_.async_wait(kNoThrow);
@@ -410,6 +516,7 @@ void NetSource::Session::take_outbound() {
   while (in_flight_.size() < kBuffersPerWrite) {
     const auto next = outbound_.try_pop();
     if (!next) break;
+    if (!has_heard_) continue;  // it was meant for the connection before
     const bool is_carried = datagrams_ && datagrams_->carry(**next);
     if (!is_carried || is_barrier_) in_flight_.push_back(wire::encode_envelope(**next));
   }
@@ -418,7 +525,7 @@ void NetSource::Session::take_outbound() {
 
 asio::awaitable<void> NetSource::Session::write_messages() {
   std::vector<asio::const_buffer> buffers;
-  while (!is_done_) {
+  while (is_talking()) {
     in_flight_ = std::move(control_);
     control_.clear();
     is_ping_queued_ = false;
@@ -443,7 +550,7 @@ asio::awaitable<void> NetSource::Session::write_messages() {
 }
 
 asio::awaitable<void> NetSource::Session::ping() {
-  while (!is_done_ && !is_closing_) {
+  while (is_talking() && !is_closing_) {
     queue_ping();
     ping_timer_.expires_after(options_.ping_interval);
     co_await ping_timer_.async_wait(kNoThrow);

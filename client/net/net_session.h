@@ -15,6 +15,7 @@
 #include <thread>
 #include <vector>
 
+#include "client/net/comeback.h"
 #include "client/net/datagram_path.h"
 #include "client/net/net_source.h"
 #include "client/net/server_clock.h"
@@ -45,6 +46,7 @@ class NetSource::Session {
   const replica::CloseReason& close_reason() const { return close_reason_; }
   replica::SourceStatistics statistics() const;
   std::string server_name() const;
+  bool is_away() const { return comeback_.is_away(); }
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -52,6 +54,10 @@ class NetSource::Session {
 
   asio::awaitable<void> run();
   asio::awaitable<bool> connect();
+  asio::awaitable<bool> try_to_connect(Clock::time_point deadline);
+  // Until a connection is there again; false: it never will.
+  asio::awaitable<bool> come_back();
+  asio::awaitable<void> await_conversation_end();
   asio::awaitable<bool> secure_stream();
   void end_insecure(const boost::system::error_code& error);
   bool accept_server();
@@ -65,6 +71,11 @@ class NetSource::Session {
   void end_if_failed(const std::exception_ptr& failure);
   void begin_conversation();
   bool try_push(Arrival arrival);
+  bool is_talking() const { return is_connected_ && !is_done_; }
+  // The connection is no good any more.
+  void break_connection(std::string why);
+  void note_welcome(const proto::Welcome& welcome);
+  bool may_come_back() const { return comeback_.is_allowed() && !is_closing_ && !is_done_; }
   bool make_room_for(std::span<const std::uint8_t, wire::kHeaderBytes> header);
   std::shared_ptr<const proto::Envelope> pop_message();
   void end_if_final(const proto::Envelope& message);
@@ -74,6 +85,7 @@ class NetSource::Session {
   void deliver_datagram(std::shared_ptr<const proto::Envelope> message, std::size_t bytes);
   void take_outbound();
   void end_after_stream();
+  void end_absence();
   void say_waiting(const std::string& why) const;
   void end_unreachable(const std::string& why);
   void check_silence();
@@ -87,8 +99,11 @@ class NetSource::Session {
   asio::io_context context_{1};
   tcp::socket socket_{context_};  // while it connects
   std::optional<secure::Stream> stream_;
-  std::string why_not_;  // there is no connection yet
-  std::optional<secure::HalfCode> secret_;
+  std::string why_not_;                   // there is no connection yet
+  std::optional<secure::JoinCode> code_;  // whose certificate it must be, and what Hello sends
+  Comeback comeback_;
+  std::string why_broken_;  // the connection
+  int talkers_ = 0;         // coroutines of this connection besides the reader
   tcp::resolver resolver_{context_};
   asio::steady_timer retry_timer_{context_}, room_timer_{context_}, ping_timer_{context_};
   asio::steady_timer wake_timer_{context_}, deadline_timer_{context_};
@@ -98,9 +113,9 @@ class NetSource::Session {
   ServerClock clock_;
   bool is_connected_ = false, is_closing_ = false, is_done_ = false, is_stalled_ = false;
   bool is_barrier_ = false;  // answers must arrive from here on
-  bool has_heard_ = false;
+  bool has_heard_ = false;   // of this connection
   bool is_ping_queued_ = false;
-  Clock::time_point last_heard_{};
+  Clock::time_point last_heard_{}, last_datagram_{};
   Bytes body_;
 
   SpscQueue<Arrival> inbound_;

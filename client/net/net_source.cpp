@@ -54,6 +54,9 @@ void NetSource::poll(replica::MessageSink& sink) {
     if (arrival->message->has_welcome()) state_ = replica::SourceState::Live;
     sink.on_message(*arrival->message, arrival->arrival_ns, arrival->bytes);
   }
+  // Asked after the queue was emptied: the Welcome that ends this absence is still to be pushed.
+  if (session_->is_away() && state_ == replica::SourceState::Live)
+    state_ = replica::SourceState::Away;
   if (has_ended) state_ = replica::SourceState::Closed;
 }
 

@@ -10,6 +10,10 @@
 //   Ping every 200 ms, Pong -> round trip, the server's clock
 //   datagram path (datagram_path.h): slices of frames in, samples and acknowledgements out
 //
+// A connection that breaks, or is silent for 3 s, is made again: the source is Away meanwhile. It
+// tries for as long as the server keeps the place, and comes back with the token of Welcome; the
+// server's certificate must be the same as before. Then Welcome, topology and keyframe come anew.
+//
 // Inbound queue full, by messages or by bytes: nothing is read until there is room, so TCP holds
 // the server back and the server skips frames for us; nothing is dropped and nothing grows.
 // Outbound queue full: send() says false. Text from the server is made printable before anybody
@@ -48,6 +52,9 @@ struct NetSourceOptions {
   std::chrono::milliseconds connect_retry{200};
   std::chrono::milliseconds ping_interval{200};
   std::chrono::milliseconds silence_deadline{10000};  // nothing from the server: lost
+  bool can_return = true;                             // when the connection breaks
+  std::chrono::milliseconds return_silence{3000};     // as silence_deadline, where it can return
+  std::chrono::milliseconds return_try{3000};         // longest time for one try to connect
   std::size_t inbound_capacity = 256;                 // messages
   std::size_t inbound_bytes = 32 << 20;               // as they came; decoded they take more
   std::size_t outbound_capacity = 256;

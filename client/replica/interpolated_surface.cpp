@@ -9,6 +9,7 @@ namespace {
 constexpr std::uint64_t kPauseNs = 250'000'000;
 constexpr std::size_t kArrivalWindow = 32;  // half a second
 constexpr double kJumpTicks = 250;
+constexpr std::uint64_t kGlideNs = 300'000'000;
 constexpr double kSlewTicks = 120;  // an error of this size changes the speed by 100 %
 
 Pose between(const Pose& a, const Pose& b, float t) {
@@ -62,11 +63,7 @@ double DisplayClock::advance(std::uint64_t now_ns) {
 
 void InterpolatedSurface::update(const Replica& replica, std::uint64_t now_ns) {
   const auto& history = replica.history();
-  if (replica.history_version() != history_version_) {
-    history_version_ = replica.history_version();
-    clock_.restart();
-    has_tick_ = false;
-  }
+  if (replica.history_version() != history_version_) restart(replica, now_ns);
   if (history.empty()) {
     is_valid_ = false;
     return;
@@ -89,6 +86,27 @@ void InterpolatedSurface::update(const Replica& replica, std::uint64_t now_ns) {
   const double t = span > 0 ? (tick_ - static_cast<double>(before->tick)) / span : 1.0;
   interpolate(replica.topology(), *before, *after, static_cast<float>(std::clamp(t, 0.0, 1.0)));
   is_valid_ = true;
+  glide(now_ns);
+}
+
+void InterpolatedSurface::restart(const Replica& replica, std::uint64_t now_ns) {
+  history_version_ = replica.history_version();
+  clock_.restart();
+  has_tick_ = false;
+  const bool is_back = is_valid_ && replica.welcome_count() > welcome_count_;
+  glide_from_ = is_back ? positions_ : std::vector<Vec3f>();
+  glide_begin_ns_ = now_ns;
+  welcome_count_ = replica.welcome_count();
+}
+
+// Vertices that are new since are where they are.
+void InterpolatedSurface::glide(std::uint64_t now_ns) {
+  if (glide_from_.empty()) return;
+  const std::uint64_t since = now_ns > glide_begin_ns_ ? now_ns - glide_begin_ns_ : 0;
+  if (since >= kGlideNs || glide_from_.size() > positions_.size()) return glide_from_.clear();
+  const float share = static_cast<float>(since) / static_cast<float>(kGlideNs);
+  for (std::size_t i = 0; i < glide_from_.size(); ++i)
+    positions_[i] = glide_from_[i] * (1 - share) + positions_[i] * share;
 }
 
 void InterpolatedSurface::interpolate(const Topology& topology, const SessionFrame& before,

@@ -9,8 +9,8 @@
 // where `rate` (ticks per second) is measured over the last half second of arrivals: simulated time
 // may run slower than real time, a replay at any speed. It is slewed, never stepped back; after a
 // seek or a gap of more than 250 ticks it jumps. Nothing is extrapolated: at the newest frame the
-// picture holds still.
-// Thread: render thread.
+// picture holds still. After a return to the session (Replica::welcome_count) the tissue glides
+// from where it was shown last to where it is, in 0.3 s. Thread: render thread.
 
 #include <deque>
 
@@ -57,6 +57,8 @@ class InterpolatedSurface {
  private:
   void interpolate(const Topology& topology, const SessionFrame& before, const SessionFrame& after,
                    float t);
+  void restart(const Replica& replica, std::uint64_t now_ns);
+  void glide(std::uint64_t now_ns);
 
   DisplayClock clock_;
   std::uint64_t history_version_ = 0;
@@ -66,6 +68,9 @@ class InterpolatedSurface {
   std::vector<Vec3f> positions_;
   std::vector<Tool> tools_;
   std::vector<std::uint16_t> regions_;
+  std::uint64_t welcome_count_ = 0;
+  std::uint64_t glide_begin_ns_ = 0;
+  std::vector<Vec3f> glide_from_;  // m, per vertex slot; empty: no glide
 };
 
 }  // namespace trocar::replica

@@ -121,6 +121,16 @@ void Replica::apply_welcome(const proto::Welcome& message) {
   has_datagrams_ = message.has_datagrams();
   if (message.participant() < kMaxParticipants)
     own_slot_.value = static_cast<std::uint8_t>(message.participant());
+  if (++welcome_count_ > 1) begin_anew();
+}
+
+// Forgets what was asked for, and what came before the next topology.
+void Replica::begin_anew() {
+  request_pending_ = false;
+  to_show_.clear();
+  if (sync_state_ != SyncState::WaitingForTopology) sync_state_ = SyncState::WaitingForKeyframe;
+  ghost_ = {};
+  barrier_.reset();
 }
 
 void Replica::apply_topology(const proto::SurfaceTopology& message) {
@@ -429,6 +439,7 @@ void Replica::apply_participants(const proto::Participants& message) {
     participant.name = entry.name();
     participant.role = wire::role_of(entry.role());
     for (const auto& shape : entry.tool()) participant.tools.push_back(wire::read(shape));
+    participant.is_away = entry.is_away();
     participants_.push_back(std::move(participant));
   }
   std::ranges::sort(participants_, {}, &Participant::slot);

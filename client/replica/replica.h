@@ -14,11 +14,14 @@
 // have lies there between those it was made from, or without parents as in the next frame that has
 // it; so no vertex is seen to jump because it is new.
 //
-// Frames also come as datagrams, against any frame that was acknowledged; what comes after
-// a newer one is ignored. A frame that does not check out is never shown: the last good one stays.
-// A keyframe may go back in time (a replay that seeks), which clears the history. Barrier is
-// answered with FrameAck for exactly that frame and the replica's own CRC, after healing if need
-// be; FrameAck also goes out for each frame, so that the server knows what has arrived, and when.
+// A second Welcome begins the stream anew after the connection broke: topology and keyframe follow,
+// and until then the last picture stays.
+//
+// Frames also come as datagrams, against any frame that was acknowledged; what comes after a newer
+// one is ignored. A frame that does not check out is never shown: the last good one stays. A
+// keyframe may go back in time (a replay that seeks), which clears the history. Barrier is answered
+// with FrameAck for exactly that frame and the replica's own CRC, after healing if need be;
+// FrameAck also goes out for each frame, so that the server knows what has arrived, and when.
 // Outside data: an invalid message sets `fault()`, after which messages are ignored. Thread: render
 // thread.
 
@@ -109,6 +112,8 @@ class Replica final : public MessageSink {
   const Status& fault() const { return fault_; }
   // Invalid until Welcome.
   ParticipantSlot own_slot() const { return own_slot_; }
+  // How often the server has said Welcome: more than once after a return.
+  std::uint64_t welcome_count() const { return welcome_count_; }
   // Valid once sync_state() is past WaitingForTopology; `topology_version` counts its changes, the
   // large and the small. It only grows between two values of `history_version`.
   const Topology& topology() const { return topology_; }
@@ -143,6 +148,7 @@ class Replica final : public MessageSink {
 
  private:
   void apply_welcome(const proto::Welcome& message);
+  void begin_anew();
   void apply_topology(const proto::SurfaceTopology& message);
   void apply_change(const proto::SurfaceChange& message, std::size_t bytes);
   void apply_surface(const proto::SurfaceFrame& message, std::uint64_t arrival_ns);
@@ -176,6 +182,7 @@ class Replica final : public MessageSink {
   Status fault_;
   SyncState sync_state_ = SyncState::WaitingForTopology;
   ParticipantSlot own_slot_;
+  std::uint64_t welcome_count_ = 0;
   wire::SurfaceLayout layout_;  // of the stream; ahead of topology_ until the next frame
   std::string organ_name_;
   bool is_layout_new_ = false;                // topology_ is to be replaced by it

@@ -38,6 +38,7 @@ class MessageSink {
 enum class SourceState : std::uint8_t {
   Connecting,  // nothing heard yet
   Live,        // Welcome was received (a replay: the file is open)
+  Away,        // the connection broke and is being made again; Live with the next Welcome
   Closed,      // no message will follow, all that came were delivered; `close_reason()` says why
 };
 
@@ -46,7 +47,7 @@ enum class CloseKind : std::uint8_t {
   Ended,        // Goodbye with GOODBYE_SERVER_CLOSING, or our own close(): exit 0
   Refused,      // any other Goodbye, or a server of another version: exit 4
   Unreachable,  // no connection could be made: exit 5
-  Lost,         // connection broke, or bytes that are not our protocol: exit 5
+  Lost,         // connection broke for good, or bytes that are not our protocol: exit 5
 };
 struct CloseReason {
   CloseKind kind = CloseKind::None;
@@ -63,8 +64,12 @@ struct SourceStatistics {
   double shortest_round_trip_seconds = 0;  // of the last 16
   std::uint64_t datagram_bytes_received = 0, datagram_bytes_sent = 0;  // sealed
   std::uint64_t slices_received = 0;                                   // SurfaceSlice messages
-  bool has_server_clock = false;                                       // the rest is known
-  double server_offset_us = 0;  // the server's monotonic clock less this client's
+  bool has_server_clock = false;                                       // the offset is known
+  double server_offset_us = 0;      // the server's monotonic clock less this client's
+  std::uint64_t returns = 0;        // after the connection broke
+  double longest_away_seconds = 0;  // of all absences, with the present one
+  double away_seconds = 0;          // of the present one; 0 unless Away
+  double away_left_seconds = 0;     // until it is given up
 };
 
 // Controls of a recorded source. Seeking delivers, in the following polls, a SurfaceTopology when

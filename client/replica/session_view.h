@@ -30,6 +30,7 @@ struct Participant {
   std::string name;
   Role role = Role::Unknown;
   std::vector<tool::ToolShape> tools;
+  bool is_away = false;  // the connection is lost, the place is kept
 };
 
 struct Tool {

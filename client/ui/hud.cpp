@@ -138,6 +138,7 @@ device::PointerInput Hud::input() const {
 
 HudActions Hud::draw(const HudModel& model) {
   HudActions actions;
+  if (model.is_away) draw_away_veil();
   draw_labels(model, scale_);
   draw_session_panel(model, scale_);
   draw_participants_panel(model, scale_);

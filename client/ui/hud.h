@@ -28,6 +28,7 @@ struct HudParticipant {
   render::Colour colour;
   tool::Verb verb = tool::Verb::None;
   bool has_claim = false, is_silent = false;
+  bool is_away = false;    // the connection is lost, the place is kept
   bool is_inside = false;  // it appeared inside tissue and touches nothing
   float force_n = 0, torque_nm = 0;
   std::uint32_t contact_nodes = 0;
@@ -57,6 +58,7 @@ struct HudModel {
   std::string organ;     // "liver, 1,553 surface vertices"
   std::string own_role;  // "surgeon", "instructor, watching", "replay"
   std::string status;    // empty when live; else what it waits for, in the middle of the screen
+  bool is_away = false;  // the picture is old: it is greyed
   wire::FrameFigures figures;
   double session_seconds = 0, round_trip_ms = 0;
   std::optional<double> surface_age_ms;  // of a live session, once it is known

@@ -307,6 +307,11 @@ void draw_help(const HudModel& model, float scale) {
   ImGui::End();
 }
 
+void draw_away_veil() {
+  ImGui::GetBackgroundDrawList()->AddRectFilled({0, 0}, ImGui::GetIO().DisplaySize,
+                                                IM_COL32(104, 108, 112, 170));
+}
+
 void draw_status(const HudModel& model, float) {
   if (model.status.empty()) return;
   const ImVec2 screen = ImGui::GetIO().DisplaySize;

@@ -21,6 +21,8 @@ void draw_messages(const HudModel& model, float scale);
 void draw_timeline(const HudTimeline& timeline, float scale, HudActions& actions);
 void draw_help(const HudModel& model, float scale);
 void draw_status(const HudModel& model, float scale);
+// Greys the scene, which is no longer what the session is.
+void draw_away_veil();
 
 // "12.3 kB/s"
 std::string byte_rate(double bytes_per_second);

@@ -54,6 +54,13 @@ Status SessionJournal::read_info() {
     reduction.file = text("reduction_file");
     reduction.source = text("reduction_source");
   }
+  if (entries.contains("continues_tick")) {
+    auto& continues = info_.continues.emplace();
+    if (!parse_number(entries, "continues_tick", 10, continues.tick))
+      return Error{ErrorCode::BadFile, mcap_->path() + ": metadata " + kSessionMetadataName +
+                                           " has a continues_tick that is no number"};
+    continues.file = text("continues_file");
+  }
   info_.has_external_loads = entries.contains("external_loads");
   times_.start_utc_ns = info_.start_utc_ns;
   info_.protocol = text("protocol");

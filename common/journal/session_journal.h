@@ -29,11 +29,15 @@ struct SessionInfo {
   // The journal is of a scenario with loads besides its tools, which it does not hold: its ticks
   // cannot be simulated again.
   bool has_external_loads = false;
+  std::optional<Continuation> continues;         // with which journal's session it goes on
   Tick last_tick = 0;                            // of the last message
   std::vector<proto::Participant> participants;  // everyone who was ever in, in order of joining
   std::uint64_t gap_messages = 0;                // that the session dropped while recording
   bool is_finished = false;
   std::string summary;  // one line for people
+
+  // The tick after which this journal begins.
+  Tick begin_tick() const { return continues ? continues->tick : 0; }
 };
 
 template <typename Message>

@@ -45,6 +45,10 @@ Result<std::unique_ptr<SessionJournalWriter>> SessionJournalWriter::create(
     metadata.entries["reduction_file"] = session.reduction->file;
     metadata.entries["reduction_source"] = session.reduction->source;
   }
+  if (session.continues) {
+    metadata.entries["continues_file"] = session.continues->file;
+    metadata.entries["continues_tick"] = std::to_string(session.continues->tick);
+  }
   if (session.has_external_loads) metadata.entries["external_loads"] = "not recorded";
   if (Status written = (*mcap)->write_metadata(metadata); !written.ok()) return written.error();
   return std::unique_ptr<SessionJournalWriter>(

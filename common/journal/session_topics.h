@@ -66,6 +66,16 @@ struct ReductionDescription {
   bool operator==(const ReductionDescription&) const = default;
 };
 
+// A journal that goes on with the session of another one, after the server was killed: its first
+// snapshot is of this tick, and its ticks go on from there. The metadata say so as continues_file
+// and continues_tick; absent in a journal that has its session from the start.
+struct Continuation {
+  std::string file;  // of the other journal, without folders
+  Tick tick = 0;     // the last one that counts in it
+
+  bool operator==(const Continuation&) const = default;
+};
+
 // Log times of one session.
 struct JournalTimes {
   std::uint64_t start_utc_ns = 0;  // of tick 0

@@ -110,5 +110,33 @@ TEST(InterpolatedSurface, LiesBetweenTheFramesOnEitherSide) {
   }
 }
 
+TEST(InterpolatedSurface, GlidesToTheTissueAfterAReturnToTheSession) {
+  testing::SyntheticSource source(testing::make_blob_layout(12, 16, 0.08));
+  float lift_m = 0;
+  source.also_move = [&](std::size_t, const Vec3f&) { return Vec3f{0, lift_m, 0}; };
+  Replica replica([&](const proto::Envelope& message) { return source.send(message); });
+  InterpolatedSurface shown;
+  std::uint64_t now = monotonic_ns();
+  source.queue_start();
+  source.queue_frame();
+  source.poll(replica);
+  shown.update(replica, now);
+  const float before = shown.positions()[5].y;
+  lift_m = 0.02f;  // much happened meanwhile
+  source.queue_start();
+  source.poll(replica);
+  shown.update(replica, now += 5 * kMillisecond);
+  EXPECT_EQ(shown.positions()[5].y, before) << "the last picture stays";
+  source.queue_frame();
+  source.poll(replica);
+  float last = before;
+  for (int i = 0; i < 80; ++i) {
+    shown.update(replica, now += 5 * kMillisecond);
+    EXPECT_LT(std::abs(shown.positions()[5].y - last), 0.001f) << "a jump in picture " << i;
+    last = shown.positions()[5].y;
+  }
+  EXPECT_GT(last - before, 0.015f);
+}
+
 }  // namespace
 }  // namespace trocar::replica

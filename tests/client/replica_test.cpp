@@ -426,6 +426,42 @@ TEST_F(ReplicaTest, InvalidMessagesAreAFaultThatNamesTheField) {
             std::string::npos);
 }
 
+TEST_F(ReplicaTest, ASecondWelcomeBeginsAnewAndKeepsThePictureUntilTheKeyframe) {
+  start();
+  advance(10);
+  source_.answer_requests = false;
+  replica_.corrupt_delta(11);
+  advance(5);
+  ASSERT_EQ(replica_.sync_state(), SyncState::Healing) << "what it asked for is lost";
+  const auto shown = replica_.newest()->surface;
+  const auto version = replica_.topology_version();
+  source_.queue_start();
+  source_.poll(replica_);
+  EXPECT_EQ(replica_.welcome_count(), 2u);
+  ASSERT_NE(replica_.newest(), nullptr);
+  EXPECT_EQ(replica_.newest()->surface, shown);
+  EXPECT_EQ(replica_.topology_version(), version);
+  EXPECT_EQ(replica_.sync_state(), SyncState::WaitingForKeyframe);
+  advance(1);
+  expect_in_step();
+  EXPECT_EQ(replica_.history().size(), 1u);
+  EXPECT_EQ(replica_.counters().healed, 0u) << "it was told everything anew";
+  advance(30);
+  expect_in_step();
+  EXPECT_EQ(replica_.counters().keyframes, 2u);
+}
+
+TEST_F(ReplicaTest, KeepsWhoIsAway) {
+  start();
+  proto::Envelope message;
+  auto& entry = *message.mutable_participants()->add_participant();
+  entry.set_slot(1);
+  entry.set_is_away(true);
+  replica_.on_message(message, 0, 0);
+  ASSERT_EQ(replica_.participants().size(), 1u);
+  EXPECT_TRUE(replica_.participants()[0].is_away);
+}
+
 TEST_F(ReplicaTest, KeepsWhatTheServerSaysOfItsRecording) {
   start();
   EXPECT_EQ(replica_.recording().status, wire::RecordingStatus::Unknown);

@@ -7,7 +7,6 @@
 
 #include <csignal>
 #include <cstdlib>
-#include <sstream>
 
 #include "tests/e2e/programs.h"
 
@@ -20,10 +19,6 @@ unsigned mode_of(const fs::path& path) {
   struct stat status {};
   return ::stat(path.c_str(), &status) == 0 ? status.st_mode & 0777u : 0u;
 }
-
-struct Invitation {
-  std::string code, link;
-};
 
 class Access : public ::testing::Test {
  protected:
@@ -61,18 +56,7 @@ class Access : public ::testing::Test {
   fs::path state() const { return folder_ / "state"; }
   fs::path log() const { return folder_ / "server.log"; }
   std::string address() const { return "127.0.0.1:" + port_; }
-  Invitation invitation(const std::string& role) const {
-    std::istringstream lines(read_text(log()));
-    for (std::string line; std::getline(lines, line);) {
-      std::istringstream words(line);
-      std::string first;
-      Invitation found;
-      words >> first >> found.code >> found.link;
-      if (first == role) return found;
-    }
-    ADD_FAILURE() << "no code for " << role;
-    return {};
-  }
+  Invitation invitation(const std::string& role) const { return find_invitation(log(), role); }
 
   fs::path folder_;
   std::string port_;

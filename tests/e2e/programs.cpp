@@ -60,6 +60,25 @@ bool wait_for_file(const fs::path& file, double seconds) {
   return wait_until([&] { return fs::exists(file) && fs::file_size(file) > 0; }, seconds);
 }
 
+Invitation find_invitation(const fs::path& log, const std::string& role) {
+  std::istringstream lines(read_text(log));
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream words(line);
+    std::string first;
+    Invitation found;
+    words >> first >> found.code >> found.link;
+    if (first == role) return found;
+  }
+  ADD_FAILURE() << "no code for " << role << " in " << log;
+  return {};
+}
+
+std::string ready_address(const fs::path& ready_file) {
+  std::string port = read_text(ready_file);
+  port.erase(port.find_last_not_of(" \n") + 1);
+  return "127.0.0.1:" + port.substr(port.rfind(':') + 1);
+}
+
 namespace {
 
 std::vector<std::string> server_arguments(const fs::path& folder, const fs::path& journal,
@@ -80,9 +99,7 @@ Session::Session(const std::string& organ, const std::vector<std::string>& extra
     : server_("trocar-server", server_arguments(folder, journal, organ, extra),
               folder / "server.log") {
   EXPECT_TRUE(wait_for_file(folder / "ready", 60)) << read_text(folder / "server.log");
-  std::string port = read_text(folder / "ready");
-  port.erase(port.find_last_not_of(" \n") + 1);
-  address_ = "127.0.0.1:" + port.substr(port.rfind(':') + 1);
+  address_ = ready_address(folder / "ready");
 }
 
 Program Session::client(const std::string& name, const std::string& role,

@@ -24,12 +24,21 @@ bool wait_for_file(const std::filesystem::path& file, double seconds);
 // Asks every 20 ms; false if the answer is still no after `seconds`.
 bool wait_until(const std::function<bool()>& condition, double seconds);
 
+// A role's join code and link, as a server has printed them into its log.
+struct Invitation {
+  std::string code, link;
+};
+Invitation find_invitation(const std::filesystem::path& log, const std::string& role);
+// "127.0.0.1:PORT" of a program that has written its ready file.
+std::string ready_address(const std::filesystem::path& ready_file);
+
 // A server on a free port and clients of it, all logging into test_folder().
 class Session {
  public:
   explicit Session(const std::string& organ, const std::vector<std::string>& extra = {});
 
   Program& server() { return server_; }
+  const std::string& address() const { return address_; }
   // Extra arguments are appended; every client writes <name>.json at its end.
   Program client(const std::string& name, const std::string& role,
                  const std::vector<std::string>& extra = {});

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <csignal>
 #include <fstream>
 
 #include "common/journal/session_journal.h"
@@ -168,6 +169,37 @@ TEST(ReducedSession, IsRecordedAndSimulatesAgainWithItsReductionOnly) {
   EXPECT_EQ(code, 3);
   EXPECT_NE(said.find("is another reduction"), std::string::npos) << said;
   EXPECT_NE(said.find(hash), std::string::npos) << said;
+}
+
+TEST(ReducedSession, GoesOnWithItsReductionAfterTheServerWasKilled) {
+  const auto folder = test_folder();
+  write_made(folder);
+  const auto reduction = (folder / "block.reduction").string();
+  Session session((folder / "block.organ").string(), {"--reduction", reduction});
+  auto hand = session.hand("Hand", write_press_script(folder));
+  ASSERT_TRUE(session.wait_for_tick(1800)) << "the tool is on the tissue";
+  session.server().signal(SIGKILL);
+  EXPECT_EQ(session.server().wait(10), 128 + SIGKILL);
+  const auto next = (folder / "next.mcap").string();
+  std::vector<std::string> arguments{"--resume",  session.journal.string(),
+                                     "--listen",  session.address(),
+                                     "--journal", next,
+                                     "--seconds", "4"};
+  const auto [refused, why] = outcome("trocar-server", arguments, folder);
+  EXPECT_EQ(refused, 2);
+  EXPECT_NE(why.find("was recorded with the reduction block.reduction"), std::string::npos) << why;
+  arguments.insert(arguments.end(),
+                   {"--reduction", reduction, "--summary", (folder / "next.json").string()});
+  const auto [code, said] = outcome("trocar-server", arguments, folder);
+  EXPECT_EQ(code, 0) << said;
+  EXPECT_EQ(hand.wait(20), 0) << read_text(folder / "Hand.log");
+  const auto summary = read_text(folder / "next.json");
+  EXPECT_EQ(json_value(summary, "all_replicas_equal"), "true") << summary;
+  EXPECT_EQ(json_number(summary, "ticks"), 4000);
+  EXPECT_GT(json_number(summary, "reduced_ticks"), 100);
+  const auto verified = recording::verify_journal(next, {}, reduction);
+  ASSERT_TRUE(verified.ok()) << verified.error().message;
+  EXPECT_EQ(verified->verdict(), recording::Verdict::Verified) << verified->why();
 }
 
 TEST(ReducedSession, WithoutAReductionNothingIsAskedFor) {

@@ -174,7 +174,7 @@ TEST(SharedSession, AReturnToTheMarkIsTheSameForEverybodyAndInTheRecording) {
 }
 
 TEST(SharedSession, AKilledServerLosesAtMostHalfASecondOfItsRecording) {
-  Session session("liver");
+  Session session("liver", {"--return-seconds", "2"});
   auto lift = session.hand("Lift", kScenes / "lift.toml");
   auto observer = session.client("Observer", "observer");
   ASSERT_TRUE(session.wait_for_tick(6000));

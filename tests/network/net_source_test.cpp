@@ -130,7 +130,9 @@ TEST(NetSource, no_server_is_unreachable_and_a_broken_connection_is_lost) {
   {
     LiveSession session;
     port = session.port();
-    net::NetSource source(options_for(port, "Anna"));
+    auto options = options_for(port, "Anna");
+    options.can_return = false;
+    net::NetSource source(options);
     Collector sink;
     ASSERT_TRUE(poll_until(source, sink, [&] { return source.state() == SourceState::Live; }));
     session.on_io([&] { session.tcp().close(1); });

@@ -111,6 +111,17 @@ bool RawClient::join(const std::string& name, proto::Role role) {
   return send(make_hello(name, role)) && receive(proto::Envelope::kWelcome).has_value();
 }
 
+std::optional<proto::Welcome> RawClient::join_to_return(const std::string& name, proto::Role role,
+                                                        const std::string& token) {
+  auto hello = make_hello(name, role);
+  hello.mutable_hello()->set_can_return(true);
+  hello.mutable_hello()->set_return_token(token);
+  if (!send(hello)) return std::nullopt;
+  const auto message = receive(proto::Envelope::kWelcome);
+  if (!message) return std::nullopt;
+  return message->welcome();
+}
+
 void RawClient::take_layout_message(const proto::Envelope& message) {
   if (message.has_surface_topology()) {
     auto read = wire::read(message.surface_topology());
@@ -172,9 +183,9 @@ proto::Envelope make_sample(std::uint32_t sequence) {
 // ---- LiveSession ----
 
 LiveSession::LiveSession(net::TcpServerOptions tcp, replication::ReplicatorOptions options,
-                         catalogue::LatticeSize size)
+                         catalogue::LatticeSize size, std::uint16_t port)
     : organ_(*catalogue::make_lattice(size)), layout_(world::make_surface_layout(organ_)) {
-  tcp.port = 0;
+  tcp.port = port;
   auto listening = net::TcpServer::listen(io_, tcp);
   EXPECT_TRUE(listening.ok());
   tcp_ = std::move(*listening);

@@ -53,6 +53,9 @@ class RawClient {
 
   // Says Hello and reads up to Welcome.
   bool join(const std::string& name, proto::Role role);
+  // The same as a client that can come back, with a token of before or without; returns Welcome.
+  std::optional<proto::Welcome> join_to_return(const std::string& name, proto::Role role,
+                                               const std::string& token = {});
 
   // The client shows this; follow() keeps it up to date.
   wire::QuantisedSurface surface;
@@ -80,7 +83,7 @@ proto::Envelope make_sample(std::uint32_t sequence);
 class LiveSession {
  public:
   explicit LiveSession(net::TcpServerOptions tcp = {}, replication::ReplicatorOptions options = {},
-                       catalogue::LatticeSize size = {8, 5, 8, 0.01});
+                       catalogue::LatticeSize size = {8, 5, 8, 0.01}, std::uint16_t port = 0);
   ~LiveSession();
 
   std::uint16_t port() const { return port_; }

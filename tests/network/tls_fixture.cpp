@@ -41,7 +41,8 @@ net::TcpServerOptions tls_options(int number) {
   return options;
 }
 
-GuardedSession::GuardedSession(std::int64_t uses, net::TcpServerOptions tcp) {
+GuardedSession::GuardedSession(std::int64_t uses, net::TcpServerOptions tcp,
+                               replication::ReplicatorOptions options) {
   auto book = *access::CodeBook::open(folder.path(), kBookPort, false, unix_seconds);
   for (const auto& known : wire::kRoles)
     secrets_[known.role] = *book.issue(known.role, unix_seconds + kLifetime, uses);
@@ -50,7 +51,6 @@ GuardedSession::GuardedSession(std::int64_t uses, net::TcpServerOptions tcp) {
       std::make_unique<access::Gate>(std::move(book), std::move(*audit),
                                      access::GateOptions{[this] { return clock_ns.load(); },
                                                          [this] { return unix_seconds.load(); }});
-  replication::ReplicatorOptions options;
   options.gate = gate_.get();
   session = std::make_unique<LiveSession>(std::move(tcp), std::move(options));
 }

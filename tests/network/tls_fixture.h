@@ -33,7 +33,8 @@ net::TcpServerOptions tls_options(int number = 0);
 // A session behind TLS and a gate with one code for each role. Its clocks are the test's.
 class GuardedSession {
  public:
-  explicit GuardedSession(std::int64_t uses = -1, net::TcpServerOptions tcp = tls_options());
+  explicit GuardedSession(std::int64_t uses = -1, net::TcpServerOptions tcp = tls_options(),
+                          replication::ReplicatorOptions options = {});
 
   secure::JoinCode code(wire::Role role) const;
   access::GateCounters counters();

@@ -28,11 +28,19 @@ std::uint64_t count_of(const journal::McapReader& mcap, std::uint16_t id) {
   return count == counts.end() ? 0 : count->second;
 }
 
+double seconds_of(const journal::SessionInfo& info) {
+  return static_cast<double>(info.last_tick - info.begin_tick()) /
+         static_cast<double>(kTicksPerSecond);
+}
+
 Json json_of(const journal::SessionInfo& info, const journal::McapReader& mcap) {
   Json channels = Json::object();
   for (const auto& [id, channel] : mcap.channels()) channels[channel.topic] = count_of(mcap, id);
-  return {{"seconds", static_cast<double>(info.last_tick) / static_cast<double>(kTicksPerSecond)},
+  Json continues;
+  if (info.continues) continues = {{"file", info.continues->file}, {"tick", info.continues->tick}};
+  return {{"seconds", seconds_of(info)},
           {"last_tick", info.last_tick},
+          {"continues", continues},
           {"sim_version", info.sim_version},
           {"protocol", info.protocol},
           {"organ", info.organ_name},
@@ -47,7 +55,6 @@ int show_info(const std::string& path, bool as_json) {
   if (!journal) return report(kProgram, journal.error());
   const auto& info = (*journal)->info();
   const auto& mcap = (*journal)->container();
-  const double seconds = static_cast<double>(info.last_tick) / static_cast<double>(kTicksPerSecond);
   if (as_json) {
     std::fputs(to_text(json_of(info, mcap)).c_str(), stdout);
     return 0;
@@ -59,7 +66,11 @@ int show_info(const std::string& path, bool as_json) {
   if (info.reduction)
     std::printf("  reduction    %s (hash %016" PRIx64 "): %s\n", info.reduction->file.c_str(),
                 info.reduction->hash, info.reduction->source.c_str());
-  std::printf("  length       %.1f s, %" PRIu64 " ticks\n", seconds, info.last_tick);
+  std::printf("  length       %.1f s, %" PRIu64 " ticks\n", seconds_of(info),
+              info.last_tick - info.begin_tick());
+  if (info.continues)
+    std::printf("  continues    %s, after tick %" PRIu64 "\n", info.continues->file.c_str(),
+                info.continues->tick);
   std::printf("  sim_version  %u%s, protocol %s\n", info.sim_version,
               info.sim_version == kSimVersion ? "" : " (this program has another)",
               info.protocol.c_str());
@@ -90,6 +101,7 @@ Json json_of(const recording::VerifyReport& r) {
           {"reasons_left_out", r.reasons_left_out},
           {"first_difference", difference},
           {"resimulated", r.is_resimulated},
+          {"begin_tick", r.begin_tick},
           {"first_tick", r.first_tick},
           {"last_tick", r.last_tick},
           {"ticks_verified", r.ticks_verified},
@@ -113,9 +125,9 @@ std::string text_of(const std::string& path, const recording::VerifyReport& r) {
       "and "
       "claims, {} surfaces ({} decoded), {} snapshots ({} restored and continued), participants in "
       "{} frames\n",
-      path, r.container, r.ticks_verified, r.last_tick, r.ticks_missing, r.frames_verified,
-      r.surfaces_verified, r.surfaces_decoded, r.snapshots_verified, r.snapshots_continued,
-      r.participants_verified);
+      path, r.container, r.ticks_verified, r.last_tick - r.begin_tick, r.ticks_missing,
+      r.frames_verified, r.surfaces_verified, r.surfaces_decoded, r.snapshots_verified,
+      r.snapshots_continued, r.participants_verified);
   out += r.why();
   if (r.verdict() == recording::Verdict::Verified)
     out += fmt::format("verified to tick {}, hash {:016x}\n", r.last_tick, r.last_hash);

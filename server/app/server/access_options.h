@@ -14,8 +14,9 @@ struct AccessOptions {
   double code_hours = 12;
   std::int64_t code_uses = 0;  // 0: without limit
   bool keeps_codes = false;
-  std::string revoke;      // code or role; empty: host a session
-  std::string audit_file;  // empty: audit.jsonl in the state folder
+  std::string revoke;                 // code or role; empty: host a session
+  std::uint32_t return_seconds = 30;  // how long a place is kept after its connection broke
+  std::string audit_file;             // empty: audit.jsonl in the state folder
 };
 
 }  // namespace trocar::app

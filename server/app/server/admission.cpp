@@ -88,8 +88,9 @@ Result<secure::Identity> read_or_make_identity(const fs::path& state) {
 }  // namespace
 
 Result<std::unique_ptr<Admission>> Admission::prepare(const AccessOptions& options,
-                                                      const std::string& address) {
-  std::unique_ptr<Admission> admission(new Admission(options, address));
+                                                      const std::string& address,
+                                                      bool is_resuming) {
+  std::unique_ptr<Admission> admission(new Admission(options, address, is_resuming));
   if (options.is_insecure) {
     if (secure::is_loopback(address)) return admission;
     return Error{ErrorCode::Usage, "--insecure-loopback: " + address +
@@ -132,8 +133,17 @@ Status Admission::issue_codes(std::uint16_t port) {
   if (!tls_) return {};
   const auto now = static_cast<std::int64_t>(std::time(nullptr));
   const auto expires = now + std::llround(options_.code_hours * 3600);
-  auto book = access::CodeBook::open(state_, port, options_.keeps_codes, now);
+  auto book = access::CodeBook::open(state_, port, options_.keeps_codes || is_resuming_, now);
   if (!book) return book.error();
+  places_file_ = places_file(state_, port);
+  if (!is_resuming_) {
+    std::error_code ignored;  // there is none, unless a server was killed
+    fs::remove(places_file_, ignored);
+  } else {
+    auto places = read_places(places_file_);
+    if (!places) return places.error();
+    places_before_ = std::move(*places);
+  }
   for (const auto& role : wire::kRoles) {
     const auto secret =
         book->issue(role.role, expires, options_.code_uses > 0 ? options_.code_uses : -1);
@@ -152,8 +162,16 @@ Status Admission::issue_codes(std::uint16_t port) {
   return {};
 }
 
+void Admission::keep_places(std::vector<KeptPlace> places) {
+  if (places_file_.empty() || places == places_) return;
+  places_ = std::move(places);
+  if (const auto written = write_places(places_file_, places_); !written)
+    log::warn("{}; nobody could come back to a resumed session", written.error().message);
+}
+
 Admission::~Admission() {
   std::error_code ignored;
+  if (!places_file_.empty()) fs::remove(places_file_, ignored);
   if (!link_file_.empty()) fs::remove(link_file_, ignored);
   if (gate_ && !options_.keeps_codes) gate_->book().discard();
 }

@@ -28,9 +28,10 @@ class RecordedSession : public JournalSink {
 
 Result<std::unique_ptr<JournalSink>> open_journal(
     const std::string& path, const organ::Organ& organ, const wire::SurfaceLayout& layout,
-    const std::optional<journal::ReductionDescription>& reduction) {
+    const std::optional<journal::ReductionDescription>& reduction,
+    const std::optional<journal::Continuation>& continues) {
   if (path == "none") return std::unique_ptr<JournalSink>();
-  auto recorder = recording::Recorder::create(path, organ, layout, reduction);
+  auto recorder = recording::Recorder::create(path, organ, layout, reduction, false, continues);
   if (!recorder) return recorder.error();
   return std::unique_ptr<JournalSink>(std::make_unique<RecordedSession>(std::move(*recorder)));
 }

@@ -33,9 +33,11 @@ class JournalSink {
 };
 
 // A journal at `path`, or none for "none" (then null). reduction: of the session, if it has one.
+// continues: with which journal's session it goes on.
 Result<std::unique_ptr<JournalSink>> open_journal(
     const std::string& path, const organ::Organ& organ, const wire::SurfaceLayout& layout,
-    const std::optional<journal::ReductionDescription>& reduction = {});
+    const std::optional<journal::ReductionDescription>& reduction = {},
+    const std::optional<journal::Continuation>& continues = {});
 
 // "./trocar-20261121T135400Z.mcap"
 std::string default_journal_path();

@@ -24,6 +24,8 @@ Examples:
   trocar-server --organ liver --reduction liver.reduction
       where the reduced model fits what is touched, it moves the tissue beyond; made with
       trocar-organ reduce liver --method local
+  trocar-server --resume lesson.mcap --journal lesson-2.mcap
+      after a crash: goes on where that recording ends, with all cuts; people come back
   trocar-server --seconds 20 --summary out/summary.json --journal out/session.mcap
       20 simulated seconds, then the replicas are compared, and the figures written
 
@@ -52,6 +54,12 @@ void add_access_options(CLI::App& app, AccessOptions& options) {
       ->add_option("--revoke", options.revoke,
                    "revoke a code, or all of a role, of the server that runs at --listen, and exit")
       ->type_name("CODE|ROLE");
+  access
+      ->add_option("--return-seconds", options.return_seconds,
+                   "how long somebody's place is kept when the connection breaks, 0: not")
+      ->type_name("N")
+      ->check(CLI::Range(0, 3600))
+      ->capture_default_str();
   access
       ->add_option("--audit", options.audit_file,
                    "log of joins, refusals and marks [audit.jsonl in the state folder]")
@@ -144,11 +152,13 @@ Result<std::optional<ServerOptions>> parse_command_line(int argc, char** argv) {
       "trocar-server");
   app.footer(kExamples);
   app.set_version_flag("--version", version_text());
-  app.add_option("--organ", options.organ,
-                 "built-in organ (liver, elastic-liver, lattice, plate, stomach, chest), an .organ "
-                 "file or a .msh mesh")
-      ->type_name("NAME|FILE")
-      ->capture_default_str();
+  const auto* organ =
+      app.add_option(
+             "--organ", options.organ,
+             "built-in organ (liver, elastic-liver, lattice, plate, stomach, chest), an .organ "
+             "file or a .msh mesh")
+          ->type_name("NAME|FILE")
+          ->capture_default_str();
   app.add_option("--listen", listen, "where to listen; port 0 takes any free one")
       ->type_name("ADDR:PORT")
       ->capture_default_str();
@@ -157,6 +167,9 @@ Result<std::optional<ServerOptions>> parse_command_line(int argc, char** argv) {
       "frames and hands over the TCP stream alone, where lost packets hold up the picture");
   app.add_option("--journal", options.journal,
                  "file to record the session in, or none [./trocar-<UTC>.mcap]")
+      ->type_name("FILE");
+  app.add_option("--resume", options.resume_file,
+                 "go on where this recording of a killed server ends; the organ is in it")
       ->type_name("FILE");
   app.add_option("--seconds", options.seconds, "end after this many simulated seconds")
       ->type_name("N")
@@ -186,6 +199,7 @@ Result<std::optional<ServerOptions>> parse_command_line(int argc, char** argv) {
     }
     return Error{ErrorCode::Usage, std::string(error.what()) + " (see --help)"};
   }
+  options.is_organ_chosen = organ->count() > 0;
   if (research.is_frozen) {
     options.decisions.boundary = world::Boundary::Frozen;
     if (research.depth->count() == 0) options.decisions.depth_limit = step::kFrozenDepthLimit;

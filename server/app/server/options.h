@@ -13,6 +13,8 @@ namespace trocar::app {
 
 struct ServerOptions {
   std::string organ = "liver";
+  bool is_organ_chosen = false;  // on the command line
+  std::string resume_file;       // empty: a new session
   bool has_averaged_strain = false;
   std::string reduction_file;  // empty: the full solver alone
   std::string address = "127.0.0.1";

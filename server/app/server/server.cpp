@@ -14,7 +14,6 @@
 #include <cmath>
 #include <csignal>
 #include <cstdio>
-#include <filesystem>
 #include <functional>
 #include <vector>
 
@@ -22,16 +21,13 @@
 #include "common/base/text_file.h"
 #include "common/base/timing.h"
 #include "server/app/server/admission.h"
+#include "server/app/server/session_start.h"
 #include "server/app/server/simulation_loop.h"
 #include "server/app/server/summary.h"
-#include "server/organs/catalogue/load_organ.h"
-#include "server/organs/organ/average_strain.h"
-#include "server/organs/organ/local_reduction_file.h"
 #include "server/session/ghost/ghost.h"
 #include "server/session/net/tcp_server.h"
 #include "server/session/replication/messages.h"
 #include "server/session/replication/replicator.h"
-#include "server/tissue/reduction/reduced_tissue.h"
 
 namespace trocar::app {
 namespace {
@@ -43,39 +39,20 @@ constexpr milliseconds kPollPeriod{5};
 // Slower than this is said in the log, once in a while.
 constexpr float kSlowTimeRate = 0.98f;
 constexpr float kLongTickMs = 0.9f;
-constexpr std::uintmax_t kLongFileBytes = 50'000'000;  // takes more than a second or two
 constexpr Tick kWarningPeriod = 10 * kTicksPerSecond;
 
 Tick ticks_of(double seconds) {
   return static_cast<Tick>(std::llround(seconds * static_cast<double>(kTicksPerSecond)));
 }
 
-// A session has these of --reduction; it has neither without one.
-struct Reduction {
-  std::shared_ptr<const organ::LocalReduction> model;
-  std::optional<journal::ReductionDescription> description;
-};
-
-Result<Reduction> read_reduction(const std::string& file, const organ::Organ& organ) {
-  if (file.empty()) return Reduction();
-  auto model = organ::read_session_reduction(file, organ);
-  if (!model) return model.error();
-  journal::ReductionDescription description{organ::reduction_hash(*model),
-                                            std::filesystem::path(file).filename().string(),
-                                            model->source};
-  return Reduction{std::make_shared<organ::LocalReduction>(std::move(*model)),
-                   std::move(description)};
-}
-
 class Server {
  public:
-  Server(const ServerOptions& options, std::unique_ptr<Admission> admission, organ::Organ organ,
-         Reduction reduction)
+  Server(const ServerOptions& options, std::unique_ptr<Admission> admission, SessionStart start)
       : options_(options),
         admission_(std::move(admission)),
-        reduction_(std::move(reduction.description)),
-        simulation_(std::move(organ), options.workers,
-                    reduction::at_work(std::move(reduction.model))) {}
+        start_(std::move(start)),
+        simulation_(start_.simulation),
+        reduction_(start_.reduction) {}
 
   // Binds the port and opens the journal.
   Status open();
@@ -84,6 +61,9 @@ class Server {
 
  private:
   LoopOptions loop_options() const;
+  // Lets those who were in a session that goes on come back; other hands leave.
+  void restore_people();
+  void note_participants(const std::vector<participants::Participant>& present, Tick tick);
   void publish_frames();
   void show_ghost(std::shared_ptr<const ghost::GhostReport> report);
   void warn_if_slow();
@@ -96,8 +76,9 @@ class Server {
 
   const ServerOptions& options_;
   const std::unique_ptr<Admission> admission_;
-  const std::optional<journal::ReductionDescription> reduction_;
-  step::Simulation simulation_;
+  SessionStart start_;
+  step::Simulation& simulation_;
+  const std::optional<journal::ReductionDescription>& reduction_;
   std::unique_ptr<JournalSink> journal_;
   participants::SimulationInbox inbox_;
   asio::io_context io_{1};
@@ -133,7 +114,7 @@ Status Server::open() {
   if (!listening) return listening.error();
   tcp_ = std::move(*listening);
 
-  auto journal = open_journal(options_.journal, organ, layout, reduction_);
+  auto journal = open_journal(options_.journal, organ, layout, reduction_, start_.continues);
   if (!journal) return journal.error();
   journal_ = std::move(*journal);
 
@@ -141,15 +122,16 @@ Status Server::open() {
   replication::ReplicatorOptions replication;
   replication.gate = admission_->gate();
   replication.has_datagrams = tcp_->has_datagrams();
-  if (journal_)
-    replication.on_participants = [this](const auto& present, Tick tick) {
-      journal_->record_participants(present, tick);
-    };
+  replication.return_seconds = options_.access.return_seconds;
+  replication.on_participants = [this](const auto& present, Tick tick) {
+    note_participants(present, tick);
+  };
   if (reduction_)
     replication.on_ghost_wanted = [this](bool is_wanted) { ghost_->set_wanted(is_wanted); };
   replicator_ = std::make_unique<replication::Replicator>(
       *tcp_, inbox_, layout, organ.name, organ::organ_hash(organ), std::move(replication));
   if (journal_) replicator_->set_recording(journal_->state());
+  restore_people();
   loop_ = std::make_unique<SimulationLoop>(simulation_, inbox_, handover_, journal_.get(),
                                            loop_options(),
                                            [this] { asio::post(io_, [this] { begin_end(); }); });
@@ -160,9 +142,40 @@ Status Server::open() {
   return {};
 }
 
+void Server::restore_people() {
+  const auto& kept = admission_->places_before();
+  const auto leave = [this](ParticipantSlot slot) {
+    inbox_.note_hand();
+    inbox_.push_leave(slot);
+  };
+  std::size_t restored = 0;
+  for (const auto& who : start_.participants) {
+    const auto place = std::ranges::find_if(
+        kept, [&](const auto& one) { return one.slot == who.slot && one.name == who.name; });
+    const bool may_return = place != kept.end() && replicator_->restore(who, place->token);
+    restored += may_return;
+    if (!may_return && who.slot.has_tools()) leave(who.slot);
+  }
+  for (const auto slot : start_.unnamed_hands) leave(slot);
+  if (!start_.participants.empty())
+    log::info("{} of {} participants may come back to their places for {} s", restored,
+              start_.participants.size(), options_.access.return_seconds);
+}
+
+void Server::note_participants(const std::vector<participants::Participant>& present, Tick tick) {
+  if (journal_) journal_->record_participants(present, tick);
+  std::vector<KeptPlace> places;
+  for (const auto& who : present)
+    if (const auto* token = replicator_->absences().find(who.slot))
+      places.push_back({who.slot, who.name, *token});
+  admission_->keep_places(std::move(places));
+}
+
 LoopOptions Server::loop_options() const {
   const auto& decisions = options_.decisions;
-  LoopOptions loop{.decisions = decisions, .tick_count = ticks_of(options_.seconds)};
+  LoopOptions loop{.decisions = decisions};
+  if (options_.seconds > 0)
+    loop.tick_count = simulation_.current_tick() + ticks_of(options_.seconds);
   if (options_.has_fixed_decisions) return loop;
   control::RateLimits rate{.highest = decisions, .budget_us = options_.budget_ms * 1e3};
   // Nodes of the queue are not swept less than those outside it.
@@ -312,29 +325,12 @@ Status Server::finish() {
 
 Status run_server(const ServerOptions& options) {
   if (!options.access.revoke.empty()) return revoke_codes(options.access, options.port);
-  auto admission = Admission::prepare(options.access, options.address);
+  auto admission =
+      Admission::prepare(options.access, options.address, !options.resume_file.empty());
   if (!admission) return admission.error();
-  auto organ = catalogue::load_organ(options.organ);
-  if (!organ) return organ.error();
-  if (options.has_averaged_strain)
-    if (const auto averaged = organ::average_strain(*organ); !averaged) return averaged;
-  const auto begin = monotonic_ns();
-  std::error_code no_size;  // then reading says what is wrong
-  const auto file_bytes = options.reduction_file.empty()
-                              ? 0
-                              : std::filesystem::file_size(options.reduction_file, no_size);
-  if (!no_size && file_bytes > kLongFileBytes)
-    log::info("reading {}: {:.0f} MB", options.reduction_file,
-              static_cast<double>(file_bytes) * 1e-6);
-  auto reduction = read_reduction(options.reduction_file, *organ);
-  if (!reduction) return reduction.error();
-  const auto model = reduction->model;
-  const auto server = std::make_unique<Server>(options, std::move(*admission), std::move(*organ),
-                                               std::move(*reduction));
-  if (model)
-    log::info("{}: {} patches, {:.1f} MB, ready in {:.1f} s", options.reduction_file,
-              model->patches.size(), static_cast<double>(file_bytes) * 1e-6,
-              static_cast<double>(monotonic_ns() - begin) * 1e-9);
+  auto start = start_session(options);
+  if (!start) return start.error();
+  const auto server = std::make_unique<Server>(options, std::move(*admission), std::move(*start));
   if (const auto opened = server->open(); !opened) return opened;
   return server->run();
 }

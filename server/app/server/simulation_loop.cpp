@@ -135,7 +135,7 @@ bool SimulationLoop::run_tick() {
   records_.push_back({report.tick, decisions, inputs_, report.state_hash});
   second_.add(report);
   report_.times.add(report);
-  report_.ticks = report.tick;
+  ++report_.ticks;
   report_.inputs_dropped += report.inputs_dropped;
   report_.nodes_rejected += report.solve.nodes_rejected;
   report_.faults |= report.faults;

@@ -65,7 +65,7 @@ struct SolverReport {
 };
 
 struct LoopReport {
-  Tick ticks = 0;
+  Tick ticks = 0;  // that it has run
   std::uint64_t slow_ticks = 0;
   std::uint64_t inputs_dropped = 0, nodes_rejected = 0;
   std::uint32_t faults = 0;  // TickFault bits of all ticks

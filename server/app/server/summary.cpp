@@ -53,6 +53,8 @@ Json replication_figures(const Summary& s) {
                                                : 0.0;
   const auto& r = s.replication;
   return {{"sessions", r.sessions},
+          {"connections_lost", r.lost},
+          {"returned", r.returned},
           {"bytes_sent", s.tcp.bytes_out},
           {"bytes_received", s.tcp.bytes_in},
           {"newcomers_dropped", s.tcp.newcomers_dropped},

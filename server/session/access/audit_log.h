@@ -12,7 +12,7 @@
 namespace trocar::access {
 
 struct AuditLine {
-  std::string_view event;  // join, leave, refusal, mark, return
+  std::string_view event;  // join, leave, refusal, mark, return, lost, back
   std::string_view name, role, address;
   std::string_view reason = {};  // of a refusal
   std::uint32_t code = 0;        // number in the code book; 0: none

@@ -40,25 +40,29 @@ std::optional<Refusal> refusal_of(CodeState state) {
 Gate::Gate(CodeBook book, std::optional<AuditLog> audit, GateOptions options)
     : book_(std::move(book)), audit_(std::move(audit)), options_(std::move(options)) {}
 
-std::optional<Refusal> Gate::check(Applicant& applicant, BytesView secret) {
+void Gate::count_wrong_try(const Applicant& applicant, std::uint64_t now_ns) {
+  ++counters_.wrong_tries;
+  limiter_.record_wrong_try(applicant.address, now_ns);
+}
+
+std::optional<Refusal> Gate::check(Applicant& applicant, BytesView secret, bool has_wrong_token) {
   const auto now = options_.clock_ns();
-  if (secret.empty())
-    return Refusal{RefusalKind::WrongCode,
-                   "join code: this session wants one, give --join CODE as the host's server "
-                   "printed it"};
+  const Refusal none{RefusalKind::WrongCode,
+                     "join code: this session wants one, give --join CODE as the host's server "
+                     "printed it"};
+  if (secret.empty() && !has_wrong_token) return none;
   if (const auto wait = limiter_.seconds_to_wait(applicant.address, now); wait > 0)
     return Refusal{RefusalKind::TooManyTries,
                    "join code: too many wrong codes, try again in " + seconds_text(wait)};
+  if (has_wrong_token) count_wrong_try(applicant, now);
+  if (secret.empty()) return none;
   if (now - looked_ns_ >= kSecondNs) {
     looked_ns_ = now;
     book_.refresh();
   }
   const auto unix_now = options_.unix_seconds ? options_.unix_seconds() : std::time(nullptr);
   const auto verdict = book_.check(secret, unix_now);
-  if (verdict.state == CodeState::Wrong) {
-    ++counters_.wrong_tries;
-    limiter_.record_wrong_try(applicant.address, now);
-  }
+  if (verdict.state == CodeState::Wrong) count_wrong_try(applicant, now);
   if (auto refusal = refusal_of(verdict.state)) return refusal;
   if (!wire::rights_of(verdict.role).admits(applicant.role))
     return Refusal{RefusalKind::RoleNotAllowed,

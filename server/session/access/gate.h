@@ -48,21 +48,24 @@ class Gate {
  public:
   Gate(CodeBook book, std::optional<AuditLog> audit, GateOptions options = {});
 
-  // Returns what `applicant` is refused with, or nothing: then its code is set.
-  std::optional<Refusal> check(Applicant& applicant, BytesView secret);
+  // Returns what `applicant` is refused with, or nothing: then its code is set. has_wrong_token:
+  // the applicant has tried to come back to somebody else's place, which counts as a wrong code.
+  std::optional<Refusal> check(Applicant& applicant, BytesView secret,
+                               bool has_wrong_token = false);
   // Takes one use of the code; false if there is none left.
   bool admit(const Applicant& applicant);
 
   void note_leave(const Applicant& applicant);
   // `reason` is one line; for refusals by check() and by others alike.
   void note_refusal(const Applicant& applicant, const std::string& reason);
-  // `what`: "mark" or "return".
+  // `what`: "mark", "return", "lost" (the connection) or "back".
   void note_action(const Applicant& applicant, std::string_view what);
 
   CodeBook& book() { return book_; }
   const GateCounters& counters() const { return counters_; }
 
  private:
+  void count_wrong_try(const Applicant& applicant, std::uint64_t now_ns);
   void note(std::string_view event, const Applicant& applicant, std::string_view reason = {},
             std::uint64_t left_out = 0);
 

@@ -52,6 +52,8 @@ class Connection : public std::enable_shared_from_this<Connection> {
   std::optional<secure::DatagramKey> datagram_key() { return stream_.datagram_key(); }
   // True until the first message is there, which shows that the peer means it.
   bool is_newcomer() const { return !first_message_seen_; }
+  // Its TLS is not there yet.
+  bool is_greeting() const { return state_ == State::Greeting; }
   void close_after_flush(wire::SharedBytes last_words, Clock::time_point deadline);
   void close();
   // Reports `fault` once and stops delivering; the handler closes.

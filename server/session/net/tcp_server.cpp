@@ -1,5 +1,6 @@
 #include "server/session/net/tcp_server.h"
 
+#include <algorithm>
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/io_context.hpp>
@@ -126,21 +127,26 @@ class TcpServer::Core : public std::enable_shared_from_this<TcpServer::Core> {
     connection->start(events_of(id));
   }
 
-  // Who means it is done in milliseconds; so the oldest of too many is most likely one who does not.
+  // Who means it is done in milliseconds; so of too many the oldest is most likely one who does
+  // not, first of all if it has not got as far as TLS.
   void make_room_for_newcomer(const std::string& peer) {
-    std::size_t all = 0, same = 0;
-    std::shared_ptr<Connection> oldest, oldest_of_same;  // numbers ascend with time
+    std::vector<std::shared_ptr<Connection>> newcomers, of_same;  // numbers ascend with time
     for (const auto& [id, connection] : connections) {
       if (!connection->is_newcomer()) continue;
-      if (all++ == 0) oldest = connection;
-      if (connection->peer_address() == peer && same++ == 0) oldest_of_same = connection;
+      newcomers.push_back(connection);
+      if (connection->peer_address() == peer) of_same.push_back(connection);
     }
-    if (same >= options.max_newcomers_per_address)
-      oldest = oldest_of_same;
-    else if (all < options.max_newcomers)
-      return;
+    if (of_same.size() >= options.max_newcomers_per_address)
+      drop_oldest(of_same);
+    else if (newcomers.size() >= options.max_newcomers)
+      drop_oldest(newcomers);
+  }
+
+  void drop_oldest(const std::vector<std::shared_ptr<Connection>>& newcomers) {
     ++counters.newcomers_dropped;
-    oldest->close();
+    const auto greeting =
+        std::ranges::find_if(newcomers, [](const auto& c) { return c->is_greeting(); });
+    (greeting != newcomers.end() ? *greeting : newcomers.front())->close();
   }
 
   void expect_datagrams(ConnectionId id) {

@@ -34,6 +34,7 @@ class SimulationInbox {
   // I/O thread.
   [[nodiscard]] bool try_push_join(const hands::HandJoin& join);  // false: no room, refuse the join
   void push_leave(ParticipantSlot slot);                          // of a slot that has joined
+  void note_hand() { ++joined_hands_; }  // that the simulation has from the start
   void push_sample(const hands::ToolInput& input);
   // If two marks arrive before a drain, the newer one counts.
   void push_mark(hands::MarkAction action) { mark_.store(action, std::memory_order_relaxed); }

@@ -41,10 +41,13 @@ Result<Participant> Roster::join(std::string_view name, Role role,
     if (!tool::is_valid(shape))
       return refuse(JoinRefusal::ToolsInvalid,
                     "tools: a radius is 0.5 to 50 mm, a length 10 to 1000 mm, a reach 1 to 50 mm");
-  for (const auto& other : slots_)
-    if (other && other->name == name)
-      return refuse(JoinRefusal::NameTaken, "name: somebody called " + std::string(name) +
-                                                " is here already, choose another with --name");
+  if (const auto* other = find(name))
+    return refuse(
+        JoinRefusal::NameTaken,
+        "name: somebody called " + std::string(name) +
+            (other->is_away ? " has lost the connection, and the place is kept for a while"
+                            : " is here already") +
+            ", choose another with --name");
   if (has_tools(role) && tools.empty()) tools.emplace_back();
 
   const auto first = slots_.begin() + (has_tools(role) ? 0 : kMaxHands);
@@ -56,8 +59,13 @@ Result<Participant> Roster::join(std::string_view name, Role role,
                       ? "full: all 16 places with tools are taken, join as observer or come back"
                       : "full: all 100 places for watchers are taken, come back later");
   const auto index = static_cast<std::uint8_t>(free - slots_.begin());
-  *free = Participant{{index}, std::string(name), role, std::move(tools)};
+  *free = Participant{
+      .slot = {index}, .name = std::string(name), .role = role, .tools = std::move(tools)};
   return **free;
+}
+
+void Roster::restore(Participant who) {
+  if (who.slot.is_valid()) slots_[who.slot.value] = std::move(who);
 }
 
 void Roster::leave(ParticipantSlot slot) {
@@ -66,6 +74,16 @@ void Roster::leave(ParticipantSlot slot) {
 
 const Participant* Roster::find(ParticipantSlot slot) const {
   return slot.is_valid() && slots_[slot.value] ? &*slots_[slot.value] : nullptr;
+}
+
+const Participant* Roster::find(std::string_view name) const {
+  for (const auto& slot : slots_)
+    if (slot && slot->name == name) return &*slot;
+  return nullptr;
+}
+
+void Roster::set_away(ParticipantSlot slot, bool is_away) {
+  if (slot.is_valid() && slots_[slot.value]) slots_[slot.value]->is_away = is_away;
 }
 
 std::vector<Participant> Roster::list() const {

@@ -6,6 +6,7 @@
 #include <array>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "common/base/ids.h"
@@ -24,6 +25,7 @@ struct Participant {
   std::string name;
   Role role = Role::Observer;
   std::vector<tool::ToolShape> tools;  // 1 or 2 for roles with tools, else none
+  bool is_away = false;                // the connection is lost, the place is kept
 };
 
 enum class JoinRefusal { NameInvalid, NameTaken, Full, ToolsInvalid };
@@ -39,9 +41,13 @@ class Roster {
   // none gets one default tool; a role without tools may not bring any.
   Result<Participant> join(std::string_view name, Role role, std::vector<tool::ToolShape> tools,
                            JoinRefusal& refusal);
+  // Somebody who had this place at a server before.
+  void restore(Participant who);
   void leave(ParticipantSlot slot);
+  void set_away(ParticipantSlot slot, bool is_away);
 
   const Participant* find(ParticipantSlot slot) const;
+  const Participant* find(std::string_view name) const;
   std::vector<Participant> list() const;  // by slot
 
  private:

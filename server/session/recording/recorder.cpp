@@ -45,30 +45,35 @@ class FileSink final : public MessageSink {
 
 Result<std::unique_ptr<Recorder>> Recorder::create(
     const std::string& path, const organ::Organ& organ, const wire::SurfaceLayout& layout,
-    const std::optional<journal::ReductionDescription>& reduction, bool has_external_loads) {
+    const std::optional<journal::ReductionDescription>& reduction, bool has_external_loads,
+    const std::optional<journal::Continuation>& continues) {
+  const Tick begin_tick = continues ? continues->tick : 0;
   const std::uint64_t now = utc_ns();
   const std::uint64_t hash = organ::organ_hash(organ);
-  auto writer =
-      journal::SessionJournalWriter::create(path, {.start_utc_ns = now,
-                                                   .organ_name = organ.name,
-                                                   .organ_hash = hash,
-                                                   .reduction = reduction,
-                                                   .has_external_loads = has_external_loads});
+  auto writer = journal::SessionJournalWriter::create(
+      path, {.start_utc_ns = now - begin_tick * kTickNanoseconds,
+             .organ_name = organ.name,
+             .organ_hash = hash,
+             .reduction = reduction,
+             .has_external_loads = has_external_loads,
+             .continues = continues});
   if (!writer) return writer.error();
   if (auto s = (*writer)->write(journal::JournalTopic::Organ, 0, now, organ::encode_organ(organ));
       !s)
     return s.error();
   proto::SurfaceTopology topology;
   wire::write(layout, organ.name, topology);
-  if (auto s = (*writer)->write_topology(0, now, topology); !s) return s.error();
+  if (auto s = (*writer)->write_topology(begin_tick, now, topology); !s) return s.error();
   if (auto s = (*writer)->flush(); !s) return s.error();
-  return std::unique_ptr<Recorder>(new Recorder(std::move(*writer), organ, hash, layout));
+  return std::unique_ptr<Recorder>(
+      new Recorder(std::move(*writer), organ, hash, layout, begin_tick));
 }
 
 Recorder::Recorder(std::unique_ptr<journal::SessionJournalWriter> writer, const organ::Organ& organ,
-                   std::uint64_t organ_hash, const wire::SurfaceLayout& layout)
+                   std::uint64_t organ_hash, const wire::SurfaceLayout& layout, Tick begin_tick)
     : writer_(std::move(writer)),
       messages_(organ.name, layout),
+      last_tick_(begin_tick),
       organ_hash_(organ_hash),
       thread_([this] { run(); }) {}
 

@@ -46,10 +46,11 @@ class Recorder {
   // Creates the file with organ and topology; copies what it keeps. Fails if the file exists or
   // cannot be written. reduction: of the session; nothing: it has none. has_external_loads: more
   // acts on the tissue than the ticks' records tell, so that nobody can simulate them again.
+  // continues: with which journal's session this one goes on.
   static Result<std::unique_ptr<Recorder>> create(
       const std::string& path, const organ::Organ& organ, const wire::SurfaceLayout& layout,
       const std::optional<journal::ReductionDescription>& reduction = {},
-      bool has_external_loads = false);
+      bool has_external_loads = false, const std::optional<journal::Continuation>& continues = {});
   ~Recorder();
 
   // Simulation thread.
@@ -83,7 +84,7 @@ class Recorder {
   };
 
   Recorder(std::unique_ptr<journal::SessionJournalWriter> writer, const organ::Organ& organ,
-           std::uint64_t organ_hash, const wire::SurfaceLayout& layout);
+           std::uint64_t organ_hash, const wire::SurfaceLayout& layout, Tick begin_tick);
   void run();
   // Writes everything queued; false when both queues were empty.
   bool write_queued();

@@ -96,7 +96,10 @@ Verifier::Verifier(const journal::SessionInfo& info, organ::Organ organ,
       is_older_(is_older(info.protocol)),
       simulation_(std::move(organ), 1, reduction::at_work(std::move(reduction))),
       messages_(simulation_.organ().name, simulation_.layout()) {
+  next_tick_ = info_.begin_tick() + 1;
   if (!report_.is_resimulated) return;
+  is_in_step_ = !info_.continues;
+  if (info_.continues) return;
   proto::SurfaceTopology topology;
   wire::write(simulation_.layout(), simulation_.organ().name, topology);
   expected_.push_back({journal::topic_name(JournalTopic::Topology), comparable(topology)});
@@ -185,6 +188,11 @@ bool Verifier::check(std::string_view topic, BytesView bytes) {
     case JournalTopic::SurfaceDelta:
     case JournalTopic::Topology:
     case JournalTopic::TopologyChange:
+      if (waits_for_begin() && !first_topology_ && *known == JournalTopic::Topology) {
+        check_surface(*known, *message);
+        first_topology_ = std::move(message);
+        break;
+      }
       compare(topic, *message);
       check_surface(*known, *message);
       break;
@@ -208,6 +216,7 @@ void Verifier::check_snapshot(const proto::WorldSnapshot& snapshot) {
     return differ(
         {tick, kSnapshots, "organ_hash", hex(snapshot.organ_hash()), hex(info_.organ_hash)});
   if (!report_.is_resimulated) return;
+  if (waits_for_begin() && tick == info_.begin_tick()) return begin_from(snapshot);
   if (snapshots_.size() >= kMostPending)
     return add_reason(fmt::format("tick {}: too many snapshots wait for their tick", tick));
   snapshots_[tick] = snapshot;
@@ -286,6 +295,21 @@ bool Verifier::start_from_snapshot(Tick tick) {
     differ({tick, kSnapshots, "state_hash", hex(record_.state_hash), hex(hash)});
   ++report_.ticks_not_simulated;
   return true;
+}
+
+void Verifier::begin_from(const proto::WorldSnapshot& snapshot) {
+  const Status restored =
+      simulation_.restore_snapshot(bytes_of(std::string_view(snapshot.state())));
+  if (!restored.ok() || simulation_.current_tick() != snapshot.tick())
+    return differ({snapshot.tick(), kSnapshots, "state",
+                   restored.ok() ? "of another tick" : restored.error().message, "a state"});
+  is_in_step_ = true;
+  messages_ = FrameMessages(simulation_.organ().name, simulation_.layout());
+  if (!first_topology_) return;
+  proto::SurfaceTopology topology;
+  wire::write(simulation_.layout(), simulation_.organ().name, topology);
+  if (auto field = first_difference(*first_topology_, topology, is_older_))
+    differ({snapshot.tick(), "/topology", field->field, field->recorded, field->simulated});
 }
 
 // The simulation is at this tick, and so is a snapshot.
@@ -450,9 +474,9 @@ void Verifier::finish(const journal::McapReader& container) {
   report_.surfaces_decoded = surface_.decoded();
   if (report_.first_difference) return;
   end_frame();
-  if (next_tick_ == 1 && report_.last_tick > 0) {
+  if (next_tick_ == info_.begin_tick() + 1 && report_.last_tick > info_.begin_tick()) {
     add_reason("no tick records: nothing can be simulated again");
-    report_.ticks_missing = report_.last_tick;
+    report_.ticks_missing = report_.last_tick - info_.begin_tick();
     report_.is_resimulated = false;
   } else {
     note_missing(report_.last_tick + 1);

@@ -51,6 +51,10 @@ class Verifier {
     std::map<std::uint8_t, std::vector<tool::ToolShape>> tools;  // by slot; without watchers
   };
 
+  bool waits_for_begin() const {
+    return info_.continues && report_.is_resimulated && next_tick_ == info_.begin_tick() + 1 &&
+           !is_in_step_;
+  }
   void differ(Difference difference);
   void add_reason(std::string reason);
   void check_snapshot(const proto::WorldSnapshot& snapshot);
@@ -59,6 +63,8 @@ class Verifier {
   void check_gap(const proto::JournalGap& gap);
   void note_missing(Tick before);
   bool start_from_snapshot(Tick tick);
+  // A journal that goes on with another one begins with the state to go on from.
+  void begin_from(const proto::WorldSnapshot& snapshot);
   void compare_snapshot(Tick tick);
   void continue_snapshots(std::uint64_t hash);
   void begin_frame(step::PublishedFrame& frame);
@@ -77,7 +83,8 @@ class Verifier {
   std::vector<List> lists_;
   bool has_all_lists_ = true;
   step::TickRecord record_;
-  std::vector<step::TickRecord> records_;           // since the last frame
+  std::vector<step::TickRecord> records_;                      // since the last frame
+  std::unique_ptr<google::protobuf::Message> first_topology_;  // until there is that state
   Tick next_tick_ = 1;                              // of the record that should come next
   bool is_in_step_ = true;                          // the simulation is where the recording is
   bool is_frame_whole_ = true;                      // simulated in full since the last one

@@ -82,6 +82,7 @@ Result<VerifyReport> verify_journal(const std::string& path,
 
   VerifyReport report;
   report.is_resimulated = info.sim_version == kSimVersion && !info.has_external_loads;
+  report.begin_tick = info.begin_tick();
   report.last_tick = info.last_tick;
   report.container = (*journal)->container().summary_text();
   std::shared_ptr<const organ::LocalReduction> reduction;

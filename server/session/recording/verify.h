@@ -50,9 +50,10 @@ struct VerifyReport {
   static constexpr std::size_t kMostReasons = 32;
 
   bool is_resimulated = false;         // false: of another sim_version, or without records
+  Tick begin_tick = 0;                 // after which the recording begins
   Tick first_tick = 0, last_tick = 0;  // first tick that was verified; last of the recording
   std::uint64_t ticks_verified = 0;
-  std::uint64_t ticks_missing = 0;        // of 1 to last_tick, without a record
+  std::uint64_t ticks_missing = 0;        // up to last_tick, without a record
   std::uint64_t ticks_not_simulated = 0;  // recorded, but no snapshot led to them
   std::uint64_t frames_verified = 0;      // with tools, claims and solver changes
   std::uint64_t snapshots_verified = 0, snapshots_continued = 0;

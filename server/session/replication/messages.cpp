@@ -54,8 +54,9 @@ const tool::ToolShape* find_shape(ToolSlot tool, const participants::Roster& ros
 
 }  // namespace
 
-wire::SharedBytes encode_welcome(ParticipantSlot slot, std::uint64_t organ_hash,
-                                 bool has_datagrams) {
+wire::SharedBytes encode_welcome(ParticipantSlot slot, std::uint64_t organ_hash, bool has_datagrams,
+                                 const participants::ReturnToken* token,
+                                 std::uint32_t return_seconds) {
   proto::Envelope envelope;
   auto& welcome = *envelope.mutable_welcome();
   welcome.set_protocol_major(kProtocolMajor);
@@ -66,6 +67,10 @@ wire::SharedBytes encode_welcome(ParticipantSlot slot, std::uint64_t organ_hash,
   welcome.set_tick_us(static_cast<std::uint32_t>(kTickNanoseconds / 1000));
   welcome.set_ticks_per_frame(static_cast<std::uint32_t>(kTicksPerFrame));
   welcome.set_has_datagrams(has_datagrams);
+  if (token) {
+    welcome.set_return_token(token->data(), token->size());
+    welcome.set_return_seconds(return_seconds);
+  }
   return wire::encode_envelope(envelope);
 }
 
@@ -75,6 +80,7 @@ void describe(const std::vector<participants::Participant>& present, proto::Part
     entry.set_slot(participant.slot.value);
     entry.set_name(participant.name);
     entry.set_role(static_cast<proto::Role>(participant.role));
+    entry.set_is_away(participant.is_away);
     for (const auto& shape : participant.tools) {
       wire::write(shape, *entry.add_tool());
     }

@@ -11,6 +11,7 @@
 #include "common/wire/recording_state.h"
 #include "common/wire/surface_layout.h"
 #include "server/session/ghost/ghost_follower.h"
+#include "server/session/participants/absences.h"
 #include "server/session/participants/roster.h"
 #include "server/session/replication/validation.h"
 #include "server/tissue/hands/claims.h"
@@ -32,8 +33,10 @@ void describe(const hands::ClaimEvent& event, const participants::Roster& roster
               proto::ClaimEvent& message);
 void describe(const wire::SolverChange& change, proto::SolverChange& message);
 
-wire::SharedBytes encode_welcome(ParticipantSlot slot, std::uint64_t organ_hash,
-                                 bool has_datagrams);
+// `token`: with which the participant may come back; null: not at all.
+wire::SharedBytes encode_welcome(ParticipantSlot slot, std::uint64_t organ_hash, bool has_datagrams,
+                                 const participants::ReturnToken* token = nullptr,
+                                 std::uint32_t return_seconds = 0);
 wire::SharedBytes encode_participants(const std::vector<participants::Participant>& present);
 wire::SharedBytes encode_topology(const wire::SurfaceLayout& layout, const std::string& organ_name);
 // `layout`: the one that the change was applied to.

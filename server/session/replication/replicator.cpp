@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <limits>
 
 #include "common/base/log.h"
 #include "proto/wire.pb.h"
 #include "server/session/replication/frame_feed.h"
 #include "server/session/replication/messages.h"
+#include "server/session/replication/replicator_client.h"
 
 namespace trocar::replication {
 namespace {
@@ -54,26 +56,6 @@ EndReason reason_of(access::RefusalKind refusal) {
 
 }  // namespace
 
-struct Replicator::Client {
-  Client(net::Connections& connections, net::ConnectionId its_id, const ReplicatorOptions& options,
-         ReplicatorCounters& counters)
-      : id(its_id),
-        feed(connections, its_id, options, counters),
-        allowance(options.max_messages_per_second),
-        allowance_ns(options.clock_ns()) {}
-
-  const net::ConnectionId id;
-  access::Applicant applicant;                           // as the gate knows it
-  std::optional<participants::Participant> participant;  // set by Hello
-  bool is_welcome = false;
-  FrameFeed feed;
-  bool wants_ghost = false;
-  bool has_sent_datagrams = false;
-  std::array<std::optional<std::uint32_t>, kToolsPerHand> last_sequence;
-  double allowance;  // messages that it may send at this moment
-  std::uint64_t allowance_ns;
-};
-
 Replicator::Replicator(net::Connections& connections, participants::SimulationInbox& inbox,
                        wire::SurfaceLayout layout, std::string organ_name, std::uint64_t organ_hash,
                        ReplicatorOptions options)
@@ -82,7 +64,8 @@ Replicator::Replicator(net::Connections& connections, participants::SimulationIn
       options_(std::move(options)),
       organ_hash_(organ_hash),
       organ_name_(std::move(organ_name)),
-      layout_(std::move(layout)) {}
+      layout_(std::move(layout)),
+      absences_(options_.return_seconds) {}
 
 Replicator::~Replicator() = default;
 
@@ -95,6 +78,7 @@ void Replicator::on_open(net::ConnectionId id) {
 void Replicator::on_close(net::ConnectionId id) {
   const auto found = clients_.find(id);
   if (found == clients_.end()) return;
+  if (keep_place(*found->second)) return settle_participants();
   if (const auto& participant = found->second->participant)
     log::info("{} ({}) is gone", participant->name, text_of_role(participant->role));
   forget(*found->second);
@@ -106,8 +90,12 @@ void Replicator::on_fault(net::ConnectionId id, net::ConnectionFault fault) {
   if (found == clients_.end()) return connections_.close(id);
   const bool is_timeout =
       fault == net::ConnectionFault::HelloTimeout || fault == net::ConnectionFault::IdleTimeout;
-  end_session(*found->second,
-              {is_timeout ? EndReason::Timeout : EndReason::ProtocolError, net::describe(fault)});
+  const Ending ending{is_timeout ? EndReason::Timeout : EndReason::ProtocolError,
+                      net::describe(fault)};
+  if (is_timeout && keep_place(*found->second))
+    connections_.close_after_flush(id, encode_goodbye(ending.reason, ending.text));
+  else
+    end_session(*found->second, ending);
   settle_participants();
 }
 
@@ -143,14 +131,19 @@ void Replicator::refuse(Client& client, const std::string& reason) {
   options_.gate->note_refusal(client.applicant, reason);
 }
 
-void Replicator::forget(Client& client) {
+void Replicator::leave(Client& client) {
   if (options_.gate && client.is_welcome) options_.gate->note_leave(client.applicant);
   if (client.participant) {
     const auto slot = client.participant->slot;
     roster_.leave(slot);
+    absences_.forget(slot);
     if (slot.has_tools()) inbox_.push_leave(slot);
     participants_changed_ = true;
   }
+}
+
+void Replicator::forget(Client& client) {
+  leave(client);
   clients_.erase(client.id);
 }
 
@@ -175,6 +168,7 @@ void Replicator::settle_ghost() {
 
 void Replicator::end_all(EndReason reason, const std::string& text) {
   while (!clients_.empty()) end_session(*clients_.begin()->second, {reason, text});
+  end_absences(std::numeric_limits<std::uint64_t>::max());
   participants_changed_ = false;
 }
 
@@ -278,17 +272,25 @@ std::optional<Replicator::Ending> Replicator::admit(Client& client, const proto:
   auto reason = EndReason::ProtocolError;
   auto request = check_hello(hello, reason);
   if (!request) return Ending{reason, request.error().message};
+  if (request->acks_every_frame) client.feed.pace();
+  end_absences(options_.clock_ns());
   auto* gate = options_.gate;
+  if (gate) client.applicant = {connections_.peer_address(client.id), request->name, request->role};
+  if (const auto* place = find_own_place(*request)) return come_back(client, *place);
   if (gate) {
-    client.applicant = {connections_.peer_address(client.id), request->name, request->role};
-    if (const auto refusal = gate->check(client.applicant, request->join_secret))
+    const bool has_wrong_token =
+        !request->return_token.empty() && roster_.find(request->name) != nullptr;
+    if (const auto refusal = gate->check(client.applicant, request->join_secret, has_wrong_token))
       return Ending{reason_of(refusal->kind), refusal->text};
   }
   if (auto ending = find_place(client, *request)) return ending;
-  if (request->acks_every_frame) client.feed.pace();
   const bool may_come = !gate || gate->admit(client.applicant);
   if (!may_come)
     return Ending{EndReason::CodeUsedUp, "join code: somebody has just taken its last use"};
+  if (request->can_return) absences_.issue(client.participant->slot);
+  ++counters_.sessions;
+  log::info("{} ({}) joined as participant {}", request->name, text_of_role(request->role),
+            client.participant->slot.value);
   return welcome(client);
 }
 
@@ -310,13 +312,11 @@ std::optional<Replicator::Ending> Replicator::find_place(Client& client, HelloRe
 }
 
 std::optional<Replicator::Ending> Replicator::welcome(Client& client) {
-  const auto& participant = *client.participant;
-  log::info("{} ({}) joined as participant {}", participant.name, text_of_role(participant.role),
-            participant.slot.value);
+  const auto slot = client.participant->slot;
   client.is_welcome = true;
-  ++counters_.sessions;
   const Ending too_slow{EndReason::TooSlow, "the outbox is too small for the first messages"};
-  if (!send(client, encode_welcome(participant.slot, organ_hash_, options_.has_datagrams)) ||
+  if (!send(client, encode_welcome(slot, organ_hash_, options_.has_datagrams, absences_.find(slot),
+                                   absences_.kept_seconds())) ||
       !send(client, encode_participants(roster_.list())) || !send(client, topology()))
     return too_slow;
   if (encoder_.current() && !give_frame(client, true)) return too_slow;
@@ -446,6 +446,7 @@ bool Replicator::give_frame(Client& client, bool is_required) {
 void Replicator::publish(std::span<const step::SharedFrame> frames) {
   if (frames.empty()) return;
   TROCAR_ASSERT(!barrier_);
+  end_absences(options_.clock_ns());
   Status followed;
   for (const auto& frame : frames) {
     for (const auto& event : frame->mark_events) broadcast(encode_mark_event(event));
@@ -499,7 +500,8 @@ void Replicator::begin_barrier(const step::SharedFrame& last) {
   if (encoder_.current() != last) publish({&last, 1});
   barrier_ = last;
   for (const auto& participant : roster_.list())
-    barrier_results_.push_back({participant.slot, participant.name, participant.role});
+    if (!participant.is_away)
+      barrier_results_.push_back({participant.slot, participant.name, participant.role});
   const auto barrier = encode_barrier(*last);
   for (auto next = clients_.begin(); next != clients_.end();) {
     auto& client = *next->second;

@@ -8,6 +8,11 @@
 //
 // Who joins passes the gate (server/session/access), if there is one, and then needs a place.
 //
+// Who has lost the connection without a Bye, and said in Hello that it can return, keeps the place
+// for `return_seconds`: to the others, only the tools fall silent. A Hello with the token of
+// Welcome and the same name gets the place back, even while the old connection still hangs. After
+// that time the place is given up.
+//
 // Inbound: every message is checked by role and range (validation.h); samples, joins and leaves go
 // to the simulation through the SimulationInbox. Anything malformed, oversized, too frequent or not
 // this role's to say ends that session with a Goodbye that names the reason; nobody else notices.
@@ -38,6 +43,7 @@
 #include "common/wire/surface_layout.h"
 #include "server/session/ghost/ghost_follower.h"
 #include "server/session/net/connections.h"
+#include "server/session/participants/absences.h"
 #include "server/session/participants/inbox.h"
 #include "server/session/participants/roster.h"
 #include "server/session/replication/frame_encoder.h"
@@ -70,6 +76,10 @@ class Replicator final : public net::ConnectionHandler {
              ReplicatorOptions options = {});
   ~Replicator() override;
 
+  // Before the first connection: somebody who was in the session that this one goes on with, whose
+  // tools the simulation has, and who may come back as after a loss. False: nobody may.
+  bool restore(participants::Participant who, const participants::ReturnToken& token);
+
   // Frames since the last call, oldest first, none left out. Claim events and surface changes of
   // all of them are delivered, the displacements only of the newest.
   void publish(std::span<const step::SharedFrame> frames);
@@ -90,6 +100,7 @@ class Replicator final : public net::ConnectionHandler {
 
   std::size_t session_count() const { return clients_.size(); }
   const participants::Roster& roster() const { return roster_; }
+  const participants::Absences& absences() const { return absences_; }
   const ReplicatorCounters& counters() const { return counters_; }
   const EncodeStatistics& encode_statistics() const { return encoder_.statistics(); }
 
@@ -111,6 +122,13 @@ class Replicator final : public net::ConnectionHandler {
   std::optional<Ending> admit(Client& client, const proto::Hello& hello);
   std::optional<Ending> find_place(Client& client, HelloRequest& request);
   std::optional<Ending> welcome(Client& client);
+  // Returns the place to which this Hello comes back; null: there is none.
+  const participants::Participant* find_own_place(const HelloRequest& request) const;
+  std::optional<Ending> come_back(Client& client, const participants::Participant& place);
+  // Keeps the place of who has lost the connection, if there is a way back.
+  bool keep_place(Client& client);
+  // Gives up the places of those who have been away for too long by then.
+  void end_absences(std::uint64_t now_ns);
   void refuse(Client& client, const std::string& reason);
   // `is_ordered`: it came by the stream alone, so that sequence numbers must grow.
   std::optional<Ending> handle_sample(Client& client, const proto::ToolSample& sample,
@@ -134,6 +152,7 @@ class Replicator final : public net::ConnectionHandler {
   // skip.
   bool give_frame(Client& client, bool is_required);
   void end_session(Client& client, const Ending& ending);
+  void leave(Client& client);
   void forget(Client& client);
   // Tells everybody who is here, as often as somebody drops out while being told.
   void settle_participants();
@@ -147,7 +166,9 @@ class Replicator final : public net::ConnectionHandler {
   wire::SurfaceLayout layout_;  // of the newest frame
   wire::SharedBytes topology_;  // its encoding; null: not since the last change
   participants::Roster roster_;
+  participants::Absences absences_;
   std::map<net::ConnectionId, std::unique_ptr<Client>> clients_;
+  std::map<ParticipantSlot, std::unique_ptr<Client>> away_;  // without a connection
   bool participants_changed_ = false;
   bool is_ghost_wanted_ = false;
   wire::RecordingState recording_{

@@ -20,6 +20,7 @@ struct ReplicatorOptions {
   std::size_t skip_above_bytes = 64 * 1024;          // see above
   Frame keyframe_after_frames = 63;                  // about 1 s
   std::uint64_t keyframe_interval_ns = 250'000'000;  // of keyframes on request
+  std::uint32_t return_seconds = 30;                 // 0: a lost connection is a leave
   std::function<std::uint64_t()> clock_ns = monotonic_ns;
   // Told who is here after each change, with the tick of the newest frame; may be empty.
   std::function<void(const std::vector<participants::Participant>&, Tick)> on_participants;
@@ -31,7 +32,8 @@ struct ReplicatorOptions {
 };
 
 struct ReplicatorCounters {
-  std::uint64_t sessions = 0;                          // welcomed
+  std::uint64_t sessions = 0;                          // welcomed, returns left out
+  std::uint64_t lost = 0, returned = 0;                // connections of those who can return
   std::array<std::uint64_t, kEndReasonCount> ended{};  // by EndReason, where we ended it
   std::uint64_t samples = 0;
   std::uint64_t frames_published = 0;

@@ -5,6 +5,7 @@
 #include "common/base/version.h"
 #include "common/wire/tool_shape.h"
 #include "proto/wire.pb.h"
+#include "server/session/participants/absences.h"
 
 namespace trocar::replication {
 namespace {
@@ -42,12 +43,18 @@ Result<HelloRequest> check_hello(const proto::Hello& hello, EndReason& reason) {
   if (!hello.join_secret().empty() && hello.join_secret().size() != kSecretBytes)
     return bad("Hello.join_secret: " + std::to_string(hello.join_secret().size()) +
                " bytes, a code has 5");
+  const auto token_bytes = hello.return_token().size();
+  if (token_bytes != 0 && token_bytes != participants::kReturnTokenBytes)
+    return bad("Hello.return_token: " + std::to_string(token_bytes) + " bytes, a token has " +
+               std::to_string(participants::kReturnTokenBytes));
   HelloRequest request;
   request.protocol_minor = hello.protocol_minor();
   request.name = hello.name();
   request.acks_every_frame = hello.acks_every_frame();
   request.role = wire::role_of(hello.role());
   request.join_secret.assign(hello.join_secret().begin(), hello.join_secret().end());
+  request.can_return = hello.can_return();
+  request.return_token.assign(hello.return_token().begin(), hello.return_token().end());
   for (const auto& tool : hello.tool()) request.tools.push_back(wire::read(tool));
   return request;
 }

@@ -50,6 +50,8 @@ struct HelloRequest {
   std::vector<tool::ToolShape> tools;  // not yet checked
   Bytes join_secret;                   // not yet checked: the gate does
   bool acks_every_frame = false;
+  bool can_return = false;
+  Bytes return_token;  // not yet checked; empty: none
 };
 // `reason` is set on error.
 Result<HelloRequest> check_hello(const proto::Hello& hello, EndReason& reason);

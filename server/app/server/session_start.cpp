@@ -1,0 +1,98 @@
+#include "server/app/server/session_start.h"
+
+#include <filesystem>
+
+#include "common/base/log.h"
+#include "common/base/timing.h"
+#include "server/organs/catalogue/load_organ.h"
+#include "server/organs/organ/average_strain.h"
+#include "server/organs/organ/local_reduction_file.h"
+#include "server/organs/organ/organ_file.h"
+#include "server/session/recording/resume.h"
+#include "server/tissue/reduction/reduced_tissue.h"
+
+namespace trocar::app {
+namespace {
+
+constexpr std::uintmax_t kLongFileBytes = 50'000'000;  // takes more than a second or two
+
+double seconds_since(std::uint64_t begin_ns) {
+  return static_cast<double>(monotonic_ns() - begin_ns) * 1e-9;
+}
+
+journal::ReductionDescription describe(const std::string& file,
+                                       const organ::LocalReduction& model) {
+  return {organ::reduction_hash(model), std::filesystem::path(file).filename().string(),
+          model.source};
+}
+
+Result<organ::Organ> read_organ(const ServerOptions& options) {
+  auto organ = catalogue::load_organ(options.organ);
+  if (!organ || !options.has_averaged_strain) return organ;
+  if (const auto averaged = organ::average_strain(*organ); !averaged) return averaged.error();
+  return organ;
+}
+
+Result<SessionStart> begin(const ServerOptions& options) {
+  auto organ = read_organ(options);
+  if (!organ) return organ.error();
+  if (options.reduction_file.empty())
+    return SessionStart{.simulation = step::Simulation(std::move(*organ), options.workers)};
+  const auto begin = monotonic_ns();
+  std::error_code no_size;  // then reading says what is wrong
+  const auto file_bytes = std::filesystem::file_size(options.reduction_file, no_size);
+  if (!no_size && file_bytes > kLongFileBytes)
+    log::info("reading {}: {:.0f} MB", options.reduction_file,
+              static_cast<double>(file_bytes) * 1e-6);
+  auto read = organ::read_session_reduction(options.reduction_file, *organ);
+  if (!read) return read.error();
+  const auto model = std::make_shared<const organ::LocalReduction>(std::move(*read));
+  SessionStart start{
+      .simulation = step::Simulation(std::move(*organ), options.workers, reduction::at_work(model)),
+      .reduction = describe(options.reduction_file, *model)};
+  log::info("{}: {} patches, {:.1f} MB, ready in {:.1f} s", options.reduction_file,
+            model->patches.size(), static_cast<double>(file_bytes) * 1e-6, seconds_since(begin));
+  return start;
+}
+
+// Somebody who names an organ means that one.
+Status check_organ(const ServerOptions& options, const organ::Organ& recorded) {
+  if (!options.is_organ_chosen && !options.has_averaged_strain) return {};
+  const auto organ = read_organ(options);
+  if (!organ) return organ.error();
+  if (organ::organ_hash(*organ) == organ::organ_hash(recorded)) return {};
+  return Error{ErrorCode::Usage, "--organ: " + options.organ + " is another organ than the " +
+                                     recorded.name + " of " + options.resume_file +
+                                     ", leave out --organ and --averaged-strain"};
+}
+
+Result<SessionStart> go_on(const ServerOptions& options) {
+  const auto begin = monotonic_ns();
+  auto session = recording::resume_session(
+      options.resume_file, {.reduction_file = options.reduction_file, .workers = options.workers});
+  if (!session) return session.error();
+  if (const auto same = check_organ(options, session->simulation.organ()); !same)
+    return same.error();
+  const Tick tick = session->continuation.tick;
+  log::info(
+      "going on with {} after tick {} ({:.1f} s): restored the state of tick {}, simulated {} "
+      "ticks "
+      "again, state hash {:016x}, ready in {:.1f} s",
+      options.resume_file, tick, static_cast<double>(tick) / static_cast<double>(kTicksPerSecond),
+      session->snapshot_tick, tick - session->snapshot_tick, session->state_hash,
+      seconds_since(begin));
+  SessionStart start{.simulation = std::move(session->simulation),
+                     .continues = std::move(session->continuation),
+                     .participants = std::move(session->participants),
+                     .unnamed_hands = std::move(session->unnamed_hands)};
+  if (session->reduction) start.reduction = describe(options.reduction_file, *session->reduction);
+  return start;
+}
+
+}  // namespace
+
+Result<SessionStart> start_session(const ServerOptions& options) {
+  return options.resume_file.empty() ? begin(options) : go_on(options);
+}
+
+}  // namespace trocar::app

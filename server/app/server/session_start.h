@@ -1,0 +1,28 @@
+#pragma once
+
+// A server begins with an organ at rest, or with the state in which a recording ends.
+
+#include <optional>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/journal/session_topics.h"
+#include "server/app/server/options.h"
+#include "server/session/participants/roster.h"
+#include "server/tissue/step/simulation.h"
+
+namespace trocar::app {
+
+struct SessionStart {
+  step::Simulation simulation;
+  std::optional<journal::ReductionDescription> reduction;
+  // The rest is of a session that goes on.
+  std::optional<journal::Continuation> continues;
+  std::vector<participants::Participant> participants;  // who was in it
+  std::vector<ParticipantSlot> unnamed_hands;           // whose tools are there, nobody knows whose
+};
+
+// Reads what the options name, and says what it did where that takes long.
+Result<SessionStart> start_session(const ServerOptions& options);
+
+}  // namespace trocar::app

@@ -1,0 +1,31 @@
+#pragma once
+
+// One connection as the replicator knows it. Only the replicator's own sources include this.
+
+#include "server/session/replication/frame_feed.h"
+#include "server/session/replication/replicator.h"
+
+namespace trocar::replication {
+
+struct Replicator::Client {
+  // `its_id` 0: there is no connection at present.
+  Client(net::Connections& connections, net::ConnectionId its_id, const ReplicatorOptions& options,
+         ReplicatorCounters& counters)
+      : id(its_id),
+        feed(connections, its_id, options, counters),
+        allowance(options.max_messages_per_second),
+        allowance_ns(options.clock_ns()) {}
+
+  const net::ConnectionId id;
+  access::Applicant applicant;                           // as the gate knows it
+  std::optional<participants::Participant> participant;  // set by Hello
+  bool is_welcome = false;
+  FrameFeed feed;
+  bool wants_ghost = false;
+  bool has_sent_datagrams = false;
+  std::array<std::optional<std::uint32_t>, kToolsPerHand> last_sequence;
+  double allowance;  // messages that it may send at this moment
+  std::uint64_t allowance_ns;
+};
+
+}  // namespace trocar::replication

@@ -1,0 +1,79 @@
+// The replicator's part about who has lost the connection and comes back.
+
+#include <algorithm>
+
+#include "common/base/log.h"
+#include "server/session/replication/replicator_client.h"
+
+namespace trocar::replication {
+
+bool Replicator::keep_place(Client& client) {
+  if (!client.is_welcome || barrier_) return false;
+  const auto& participant = *client.participant;
+  const auto slot = participant.slot;
+  if (!absences_.begin(slot, options_.clock_ns())) return false;
+  log::info("{} ({}) has lost the connection, the place is kept for {} s", participant.name,
+            participants::name_of(participant.role), absences_.kept_seconds());
+  ++counters_.lost;
+  if (options_.gate) options_.gate->note_action(client.applicant, "lost");
+  roster_.set_away(slot, true);
+  participants_changed_ = true;
+  away_[slot] = std::move(clients_.extract(client.id).mapped());
+  return true;
+}
+
+bool Replicator::restore(participants::Participant who, const participants::ReturnToken& token) {
+  const auto slot = who.slot;
+  if (roster_.find(who.name) || !absences_.restore(slot, token)) return false;
+  absences_.begin(slot, options_.clock_ns());
+  who.is_away = true;
+  auto client = std::make_unique<Client>(connections_, 0, options_, counters_);
+  client->applicant = {{}, who.name, who.role};
+  client->is_welcome = true;
+  client->participant = who;
+  if (slot.has_tools()) inbox_.note_hand();
+  roster_.restore(std::move(who));
+  away_[slot] = std::move(client);
+  participants_changed_ = true;
+  return true;
+}
+
+void Replicator::end_absences(std::uint64_t now_ns) {
+  for (const auto slot : absences_.expired(now_ns)) {
+    const auto client = std::move(away_.extract(slot).mapped());
+    log::info("{} has not come back", client->participant->name);
+    leave(*client);
+  }
+}
+
+const participants::Participant* Replicator::find_own_place(const HelloRequest& request) const {
+  if (request.return_token.empty()) return nullptr;
+  const auto* place = roster_.find(request.name);
+  return place && absences_.is_token_of(place->slot, request.return_token) ? place : nullptr;
+}
+
+std::optional<Replicator::Ending> Replicator::come_back(Client& client,
+                                                        const participants::Participant& place) {
+  const auto slot = place.slot;
+  // The old connection may hang without that anybody has noticed.
+  const auto old = std::ranges::find_if(clients_, [&](const auto& entry) {
+    return entry.second->participant && entry.second->participant->slot == slot;
+  });
+  const bool hangs = old != clients_.end();
+  const auto before =
+      std::move(hangs ? clients_.extract(old).mapped() : away_.extract(slot).mapped());
+  if (hangs) connections_.close(before->id);
+  absences_.end(slot);
+  roster_.set_away(slot, false);
+  client.participant = before->participant;
+  client.applicant.role = before->applicant.role;
+  client.applicant.code = before->applicant.code;
+  client.wants_ghost = before->wants_ghost;
+  ++counters_.returned;
+  log::info("{} ({}) is back{}", place.name, participants::name_of(place.role),
+            hangs ? ", the old connection still hung" : "");
+  if (options_.gate) options_.gate->note_action(client.applicant, "back");
+  return welcome(client);
+}
+
+}  // namespace trocar::replication

@@ -1,0 +1,93 @@
+// A server is killed in the middle of a session; another one goes on with its recording. The cuts
+// are there, the clients come back by themselves, and both recordings fit together.
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <csignal>
+#include <thread>
+
+#include "tests/e2e/programs.h"
+
+namespace trocar::e2e {
+namespace {
+
+namespace fs = std::filesystem;
+
+const fs::path kScenes = fs::path(TROCAR_SOURCE_DIR) / "deploy/scenes";
+
+class Resume : public ::testing::Test {
+ protected:
+  Program resume(const std::vector<std::string>& extra = {}) {
+    std::vector<std::string> arguments{"--resume",  session_.journal.string(),
+                                       "--listen",  session_.address(),
+                                       "--journal", next_.string(),
+                                       "--summary", (session_.folder / "next.json").string()};
+    arguments.insert(arguments.end(), extra.begin(), extra.end());
+    return Program("trocar-server", arguments, log_);
+  }
+  // Runs trocar-journal; what it prints is returned.
+  std::string journal(const std::vector<std::string>& arguments, int expected) {
+    const auto log = session_.folder / "journal.log";
+    Program program("trocar-journal", arguments, log);
+    EXPECT_EQ(program.wait(200), expected) << read_text(log);
+    return read_text(log);
+  }
+  void kill_server() {
+    session_.server().signal(SIGKILL);
+    EXPECT_EQ(session_.server().wait(10), 128 + SIGKILL);
+  }
+
+  Session session_{"elastic-liver"};
+  fs::path next_ = session_.folder / "next.mcap", log_ = session_.folder / "next.log";
+};
+
+TEST_F(Resume, AKilledServersSessionGoesOnAndEverybodyComesBack) {
+  auto scalpel = session_.hand("Scalpel", kScenes / "incise.toml");
+  auto watcher = session_.client("Watcher", "observer");
+  ASSERT_TRUE(session_.wait_for_tick(11'000)) << "so that there is a snapshot after the first cuts";
+  kill_server();
+  auto server = resume();
+  ASSERT_TRUE(wait_until(
+      [&] {
+        const auto text = read_text(log_);
+        return text.find("Scalpel (surgeon) is back") != std::string::npos &&
+               text.find("Watcher (observer) is back") != std::string::npos;
+      },
+      60))
+      << read_text(log_);
+  const auto said = read_text(log_);
+  EXPECT_NE(said.find("going on with " + session_.journal.string()), std::string::npos) << said;
+  EXPECT_NE(said.find("2 of 2 participants may come back"), std::string::npos) << said;
+  const auto before = journal({"verify", session_.journal.string(), "--json"}, 6);
+  EXPECT_NE(said.find("state hash " + json_value(before, "last_hash")), std::string::npos)
+      << before;
+  std::this_thread::sleep_for(std::chrono::seconds(3));
+  server.signal(SIGTERM);
+  ASSERT_EQ(server.wait(30), 0);
+  const auto summary = read_text(session_.folder / "next.json");
+  EXPECT_EQ(json_value(summary, "all_replicas_equal"), "true") << summary;
+  EXPECT_EQ(json_number(summary, "returned"), 2);
+  EXPECT_EQ(json_number(summary, "sessions"), 0) << "nobody had to join anew";
+  EXPECT_EQ(scalpel.wait(20), 0);
+  EXPECT_EQ(watcher.wait(20), 0);
+  const auto hand = session_.summary_of("Scalpel");
+  EXPECT_EQ(json_number(hand, "returns"), 1) << hand;
+  EXPECT_EQ(json_value(hand, "equal"), "true");
+  EXPECT_GT(json_number(hand, "surface_vertices"), 1634) << "the wound is there";
+  journal({"verify", next_.string()}, 0);
+  const auto info = journal({"info", next_.string(), "--json"}, 0);
+  EXPECT_EQ(json_value(info, "file"), "session.mcap") << info;
+  EXPECT_EQ(json_value(info, "tick"), json_value(before, "last_tick"));
+}
+
+TEST_F(Resume, RefusesAnotherOrgan) {
+  ASSERT_TRUE(session_.wait_for_tick(500));
+  kill_server();
+  auto server = resume({"--organ", "lattice"});
+  EXPECT_EQ(server.wait(60), 2);
+  EXPECT_NE(read_text(log_).find("another organ"), std::string::npos) << read_text(log_);
+}
+
+}  // namespace
+}  // namespace trocar::e2e
