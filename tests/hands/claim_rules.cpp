@@ -40,10 +40,17 @@ std::string ClaimRules::check(Tick tick, const ClaimTable& table, std::size_t no
 }
 
 std::string ClaimRules::check_owners(const ClaimTable& table, std::size_t node_count) const {
+  std::array<bool, kMaxTools> owns{};
   for (std::size_t n = 0; n < node_count; ++n) {
     const auto owner = table.owner(NodeIndex(static_cast<int>(n)));
     if (owner.is_valid() && !is_exclusive(table.claim(owner)))
       return broken(owner, "owns a node without an exclusive claim in effect");
+    if (owner.is_valid()) owns[owner.value] = true;
+  }
+  for (std::uint8_t i = 0; i < kMaxTools; ++i) {
+    const Claim& claim = table.claim(ToolSlot{i});
+    if (claim.phase == ClaimPhase::Held && claim.verb == Verb::Grasp && !owns[i])
+      return broken(ToolSlot{i}, "holds a grasp of nothing");
   }
   return {};
 }
@@ -61,6 +68,9 @@ std::string ClaimRules::check_tool(Tick tick, const ClaimTable& table, ToolSlot 
   const Tick silent = tick - request->last_sample_tick;
   if (is_held && silent > (claim.verb == Verb::Grasp ? kAbandonTicks : kLeaseTicks))
     return broken(tool, "holds after its time of silence");
+  const bool is_lost = before.phase == ClaimPhase::Held && claim.phase == ClaimPhase::Ramping;
+  if (is_lost && request->verb == before.verb && is_living(tick, request))
+    return broken(tool, "lost what it held, though it lives");
   if (is_held && request->verb != claim.verb) return broken(tool, "holds what it does not want");
   const bool is_granted = is_held && (before.phase != ClaimPhase::Held || claim.verb == Verb::Cut);
   if (is_granted && is_exclusive(claim) && is_living(tick, request))
@@ -82,13 +92,17 @@ std::string ClaimRules::check_tool(Tick tick, const ClaimTable& table, ToolSlot 
 std::string ClaimRules::count_overtaking(Tick tick, const ClaimTable& table,
                                          std::span<const ClaimRequest> requests,
                                          std::span<const ClaimEvent> events) {
-  for (const auto& request : requests) {
-    auto& wait = waits_[request.tool.value];
-    const Claim& claim = table.claim(request.tool);
+  for (std::uint8_t i = 0; i < kMaxTools; ++i) {
+    const ToolSlot tool{i};
+    const auto* request = request_of(tool, requests);
+    const Claim& claim = table.claim(tool);
     const bool waits_for_one = claim.phase == ClaimPhase::Wanted && claim.verb == Verb::Grasp &&
-                               request.core.size() == 1 && is_living(tick, &request);
-    const NodeIndex node = waits_for_one ? request.core.front() : NodeIndex();
-    if (wait.node != node || !waits_for_one) wait = {node, 0};
+                               is_living(tick, request) && request->core.size() == 1;
+    auto& wait = waits_[i];
+    if (!waits_for_one)
+      wait = {};
+    else if (wait.node != request->core.front() || wait.since != claim.first_refusal_tick)
+      wait = {request->core.front(), claim.first_refusal_tick, 0};
   }
   for (const auto& event : events) {
     if (event.outcome != ClaimOutcome::Granted || event.verb != Verb::Grasp) continue;
@@ -98,7 +112,7 @@ std::string ClaimRules::count_overtaking(Tick tick, const ClaimTable& table,
       if (!wait.node.is_valid() || !std::ranges::binary_search(granted->core, wait.node)) continue;
       most_overtaken_ = std::max(most_overtaken_, ++wait.overtaken);
       // Each of the others was at most once before it in the order.
-      if (wait.overtaken >= kMaxTools)
+      if (wait.overtaken >= tool_count_)
         return broken(ToolSlot{static_cast<std::uint8_t>(i)}, "was overtaken again and again");
     }
   }

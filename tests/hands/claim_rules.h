@@ -14,7 +14,8 @@ namespace trocar::hands::testing {
 
 class ClaimRules {
  public:
-  explicit ClaimRules(const ClaimTable& table) { remember(table); }
+  // tool_count: of all hands together.
+  ClaimRules(const ClaimTable& table, int tool_count) : tool_count_(tool_count) { remember(table); }
 
   // After the update of `tick` with these requests, which told of `events`. Empty: nothing is
   // broken.
@@ -27,6 +28,7 @@ class ClaimRules {
  private:
   struct Wait {
     NodeIndex node;  // invalid: the tool does not wait for a single node
+    Tick since = 0;
     int overtaken = 0;
   };
 
@@ -38,6 +40,7 @@ class ClaimRules {
                                std::span<const ClaimEvent> events);
   void remember(const ClaimTable& table);
 
+  const int tool_count_;
   std::array<Claim, kMaxTools> before_;
   std::array<Wait, kMaxTools> waits_;
   int most_overtaken_ = 0;

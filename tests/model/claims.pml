@@ -189,7 +189,7 @@ inline take_over(tool) {
     h = owner[i];
     if
 #ifndef NO_EXCLUSION
-    :: has(core[tool], i) && h != NOBODY && h != tool -> start_ramp(h, RAMP)
+    :: has(core[tool], i) && h != NOBODY && h != tool -> assert(!is_living(h)); start_ramp(h, RAMP)
 #endif
     :: else
     fi
@@ -255,7 +255,7 @@ inline decide_all() {
   od
 }
 
-/* Ranks are numbered anew, without gaps, and forgotten is what cannot matter any more: a core is asked
+/* Ranks are numbered anew, without gaps. Forgotten is what cannot matter any more: a core is asked
  * for only by who waits, or cuts, and silence matters only to who has or wants something. */
 inline forget() {
   for (i : 1 .. TOOLS) {
@@ -275,7 +275,10 @@ inline forget() {
     fi
   }
   for (t : 0 .. TOOLS - 1) {
-    if :: phase[t] != WANTED && wants[t] != CUT && phase[t] != RAMPING && phase[t] != FREE -> core[t] = 0 :: else fi
+    if
+    :: phase[t] == SPENT || (phase[t] == HELD && wants[t] != CUT) -> core[t] = 0
+    :: else
+    fi;
     if
     :: verb[t] == NONE && phase[t] == FREE -> silent[t] = 0
     :: silent[t] > LEASE && !(phase[t] == HELD && wants[t] == GRASP) -> silent[t] = ABANDON + 1
