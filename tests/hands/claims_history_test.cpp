@@ -116,7 +116,7 @@ TEST(ClaimsHistory, OfTheTableKeepsTheRules) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     Row row(seed);
     for (int tick = 1; tick <= 200'000; ++tick) ASSERT_EQ(row.run_tick(), "") << "tick " << tick;
-    // What is to be seen was there to be seen.
+    // The history had all that the rules are about.
     for (const auto outcome :
          {ClaimOutcome::Granted, ClaimOutcome::RefusedHeld, ClaimOutcome::RefusedNothingInReach,
           ClaimOutcome::Released, ClaimOutcome::TakenOver, ClaimOutcome::Expired,

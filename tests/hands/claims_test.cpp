@@ -247,7 +247,7 @@ TEST_F(Claims, OfTwoBladesOnOneCoreTheSecondIsStopped) {
   EXPECT_TRUE(holds(0)) << "nobody waits for a silent blade";
 }
 
-// What the rules do not promise; docs/ownership-model.md.
+// The rules do not promise more than this; docs/ownership-model.md says why.
 
 TEST_F(Claims, AGraspOfTwoNodesMayStarveBetweenTwoThatTakeTurns) {
   set(0, Verb::Grasp, {1});

@@ -15,7 +15,7 @@ namespace trocar::hands::testing {
 struct HandsPlan {
   int hands = 6;
   std::uint32_t change_period = 400;  // ticks from one change of a tool to the next, on average
-  // Where a tool is and how it lies, at a place between 0 and 1.
+  // Gives where a tool is and how it lies, at a place between 0 and 1.
   std::function<Pose(double)> pose_at;
   tool::ToolShape shape;
 };
@@ -26,7 +26,7 @@ class RandomHands {
     hands_.resize(static_cast<std::size_t>(plan_.hands));
   }
 
-  // What happens before `tick`.
+  // Does what happens before `tick`.
   void act(Tick tick, participants::SimulationInbox& inbox) {
     for (std::size_t i = 0; i < hands_.size(); ++i)
       act(tick, static_cast<std::uint8_t>(i), hands_[i], inbox);

@@ -23,6 +23,8 @@ class Admission {
   // insecure.
   static Result<std::unique_ptr<Admission>> prepare(const AccessOptions& options,
                                                     const std::string& address);
+  // Says whether prepare() would succeed, without making anything.
+  static Status check(const AccessOptions& options, const std::string& address);
   // Removes the link file, and the codes unless they are kept.
   ~Admission();
   Admission(const Admission&) = delete;

@@ -1,12 +1,13 @@
 #pragma once
 
-// trocar-server's command line.
+// trocar-server's command line, and the configuration file that it may name.
 
 #include <optional>
 #include <string>
 
 #include "common/base/result.h"
 #include "server/app/server/access_options.h"
+#include "server/app/server/option_origins.h"
 #include "server/tissue/step/tick_report.h"
 
 namespace trocar::app {
@@ -27,6 +28,9 @@ struct ServerOptions {
   double budget_ms = 0.8;  // of a tick's millisecond for its work
   unsigned workers = 1;
   std::string log_level = "info";
+  std::string config_file;     // empty: none
+  bool checks_config = false;  // instead of hosting a session
+  OptionOrigins origins;
 };
 
 // Nothing if the program is done (after --help or --version).
