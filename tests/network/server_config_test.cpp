@@ -77,8 +77,7 @@ TEST_F(ServerConfig, TheExampleIsFineAndStartsAServer) {
                  "none", "--state", at("state"), "--seconds", "0.1", "--summary", at("summary")}),
             0)
       << log();
-  EXPECT_NE(read(at("summary")).find("\"lattice\""), std::string::npos)
-      << "the command line wins";
+  EXPECT_NE(read(at("summary")).find("\"lattice\""), std::string::npos) << "the command line wins";
 }
 
 TEST_F(ServerConfig, TheExampleMayBeUsedInFull) {

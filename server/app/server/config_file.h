@@ -18,8 +18,8 @@ namespace trocar::app {
 // Checks the text of one option alone: its form, its limits.
 using CheckOption = std::function<Status(const std::string& key, const std::string& text)>;
 
-// CLI11 asks this when it meets --config. It refuses unknown keys, values of the wrong kind and those
-// that `check` refuses, each with file, line and key.
+// CLI11 asks this when it meets --config. It refuses unknown keys, values of the wrong kind and
+// those that `check` refuses, each with file, line and key.
 class ConfigReader : public CLI::ConfigTOML {
  public:
   // `app` and `origins` outlive this.

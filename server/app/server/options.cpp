@@ -6,8 +6,10 @@
 #include <charconv>
 #include <memory>
 
+#include "common/base/printable.h"
 #include "common/base/version.h"
 #include "common/base/workers.h"
+#include "common/discovery/notice.h"
 #include "server/app/server/config_file.h"
 #include "server/app/server/journal_sink.h"
 #include "server/tissue/step/simulation.h"
@@ -28,6 +30,8 @@ Examples:
   trocar-server --organ liver --reduction liver.reduction
       where the reduced model fits what is touched, it moves the tissue beyond; made with
       trocar-organ reduce liver --method local
+  trocar-server --listen 0.0.0.0:7690 --announce "Lesson one"
+      trocar-client --list on another machine shows it under this name
   trocar-server --config lesson.toml --check-config
       would a start with these options succeed? deploy/trocar-server.toml.example has all of them
   trocar-server --seconds 20 --summary out/summary.json --journal out/session.mcap
@@ -51,6 +55,16 @@ CLI::Validator between(double least, double most) {
             return fmt::format("is {}, allowed are {} to {}", text, least, most);
           },
           fmt::format("in {} to {}", least, most)};
+}
+
+CLI::Validator printable_name() {
+  return {[](std::string& text) -> std::string {
+            if (is_printable(text) && !text.empty() && text.size() <= discovery::kMostNameBytes)
+              return {};
+            return fmt::format("is not a name of 1 to {} printable bytes",
+                               discovery::kMostNameBytes);
+          },
+          ""};
 }
 
 void add_access_options(CLI::App& app, AccessOptions& options) {
@@ -181,6 +195,13 @@ void CommandLine::add_session_options() {
   app_.add_option("--listen", listen_, "where to listen; port 0 takes any free one")
       ->type_name("ADDR:PORT")
       ->capture_default_str();
+  app_.add_option("--announce", options_.announced_name,
+                  "name of the session on the local network (DNS-SD) [the organ's and "
+                  "the machine's; told unless --listen is this machine only]")
+      ->type_name("NAME")
+      ->check(printable_name());
+  app_.add_flag("--no-announce", options_.is_unannounced,
+                "tell the local network nothing of the session");
   app_.add_option("--journal", options_.journal,
                   "file to record the session in, or none [./trocar-<UTC>.mcap]")
       ->type_name("FILE");

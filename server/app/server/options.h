@@ -19,6 +19,8 @@ struct ServerOptions {
   std::string address = "127.0.0.1";
   std::uint16_t port = 7690;
   AccessOptions access;
+  std::string announced_name;     // on the local network; empty: made from organ and machine
+  bool is_unannounced = false;    // otherwise it is announced where others may reach it
   std::string journal;            // a file, or "none"
   double seconds = 0;             // simulated; 0: until told to end
   std::string summary_file;       // empty: none

@@ -3,8 +3,10 @@
 #include "common/base/asio.h"  // before Boost: see there
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/post.hpp>
@@ -21,6 +23,9 @@
 #include "common/base/log.h"
 #include "common/base/text_file.h"
 #include "common/base/timing.h"
+#include "common/base/version.h"
+#include "common/discovery/announcer.h"
+#include "common/secure/loopback.h"
 #include "server/app/server/admission.h"
 #include "server/app/server/simulation_loop.h"
 #include "server/app/server/summary.h"
@@ -67,6 +72,11 @@ Result<Reduction> read_reduction(const std::string& file, const organ::Organ& or
                    std::move(description)};
 }
 
+std::string machine_name() {
+  std::array<char, 256> name{};
+  return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "this machine";
+}
+
 class Server {
  public:
   Server(const ServerOptions& options, std::unique_ptr<Admission> admission, organ::Organ organ,
@@ -84,6 +94,7 @@ class Server {
 
  private:
   LoopOptions loop_options() const;
+  void announce();
   void publish_frames();
   void show_ghost(std::shared_ptr<const ghost::GhostReport> report);
   void warn_if_slow();
@@ -104,6 +115,7 @@ class Server {
   asio::signal_set signals_{io_};
   asio::steady_timer poll_{io_};
   std::unique_ptr<net::TcpServer> tcp_;
+  std::unique_ptr<discovery::Announcer> announcer_;  // null: the session is not announced
   std::unique_ptr<replication::Replicator> replicator_;
   FrameHandover handover_{[this] { asio::post(io_, [this] { publish_frames(); }); }};
   std::vector<step::SharedFrame> frames_;
@@ -139,10 +151,10 @@ Status Server::open() {
   if (const auto issued = admission_->issue_codes(tcp_->port()); !issued) return issued;
   replication::ReplicatorOptions replication;
   replication.gate = admission_->gate();
-  if (journal_)
-    replication.on_participants = [this](const auto& present, Tick tick) {
-      journal_->record_participants(present, tick);
-    };
+  replication.on_participants = [this](const auto& present, Tick tick) {
+    if (journal_) journal_->record_participants(present, tick);
+    if (announcer_) announcer_->set_people(static_cast<int>(present.size()));
+  };
   if (reduction_)
     replication.on_ghost_wanted = [this](bool is_wanted) { ghost_->set_wanted(is_wanted); };
   replicator_ = std::make_unique<replication::Replicator>(
@@ -156,6 +168,21 @@ Status Server::open() {
         simulation_, ghost::GhostOptions{options_.decisions, [this] { loop_->request_snapshot(); },
                                          [this](auto report) { show_ghost(std::move(report)); }});
   return {};
+}
+
+// Who can only be reached from this machine has nothing to tell others, unless he is asked to.
+void Server::announce() {
+  const bool is_asked = !options_.announced_name.empty();
+  if (options_.is_unannounced || (secure::is_loopback(options_.address) && !is_asked)) return;
+  const auto& organ = simulation_.organ().name;
+  announcer_ = std::make_unique<discovery::Announcer>(
+      discovery::SessionNotice{
+          .name = is_asked ? options_.announced_name : organ + " at " + machine_name(),
+          .organ = organ,
+          .people = 0,
+          .needs_code = admission_->gate() != nullptr,
+          .protocol = fmt::format("{}.{}", kProtocolMajor, kProtocolMinor)},
+      tcp_->port());
 }
 
 LoopOptions Server::loop_options() const {
@@ -189,6 +216,7 @@ Status Server::run() {
       return written;
   log::info("{} ({} nodes) at {}:{}, Ctrl-C ends the session", simulation_.organ().name,
             simulation_.organ().mesh.node_count(), options_.address, tcp_->port());
+  announce();
   std::fputs(admission_->invitation(tcp_->port()).c_str(), stdout);
   std::fflush(stdout);
   loop_->start();
@@ -249,6 +277,7 @@ void Server::begin_end() {
   is_ending_ = true;
   if (ghost_) ghost_->set_wanted(false);
   signals_.cancel();
+  announcer_.reset();
   tcp_->stop_accepting();
   replicator_->begin_barrier(loop_->report().last_frame);
   wait_for([this] { return replicator_->is_barrier_complete(); }, kBarrierDeadline,
