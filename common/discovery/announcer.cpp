@@ -85,7 +85,9 @@ void Announcer::Service::publish() {
 
 void Announcer::Service::on_client(AvahiClient* client, AvahiClientState state, void* self) {
   auto& service = *static_cast<Service*>(self);
-  service.client = client;  // the first call comes before avahi_client_new has returned
+  // The first call comes before avahi_client_new has returned; later ones find it known, and others
+  // may read it.
+  if (service.client == nullptr) service.client = client;
   if (state == AVAHI_CLIENT_S_RUNNING) service.publish();
   if (state == AVAHI_CLIENT_CONNECTING) service.explain("no Avahi daemon runs here");
   if (state == AVAHI_CLIENT_FAILURE) service.explain(avahi_strerror(avahi_client_errno(client)));
