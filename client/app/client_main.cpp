@@ -1,17 +1,34 @@
 // trocar-client: takes part in a session.
 
+#include <cstdio>
+
 #include "client/app/client.h"
 #include "common/base/cpu.h"
 #include "common/base/log.h"
+#include "common/discovery/finder.h"
+
+namespace {
+
+constexpr const char* kProgram = "trocar-client";
+constexpr double kLookSeconds = 3;
+
+int list_sessions(double seconds) {
+  const auto found = trocar::discovery::find_sessions(seconds > 0 ? seconds : kLookSeconds);
+  if (!found) return trocar::report(kProgram, found.error());
+  std::fputs(trocar::discovery::to_table(*found).c_str(), stdout);
+  return static_cast<int>(trocar::ExitCode::Ok);
+}
+
+}  // namespace
 
 int main(int argc, char** argv) {
-  constexpr const char* kProgram = "trocar-client";
   trocar::require_cpu_features(kProgram);
   const auto options = trocar::app::parse_client_command_line(argc, argv);
   if (!options) return trocar::report(kProgram, options.error());
   if (!*options) return static_cast<int>(trocar::ExitCode::Ok);
   if (const auto set = trocar::log::configure(kProgram, (*options)->log_level); !set)
     return trocar::report(kProgram, set.error());
+  if ((*options)->lists_sessions) return list_sessions((*options)->seconds);
   trocar::app::install_signal_handlers();
   const auto run = trocar::app::run_client(**options);
   if (!run) return trocar::report(kProgram, run.error());

@@ -22,6 +22,8 @@ Examples:
       a window; the mouse is an instrument (press H in it for the keys)
   trocar-client --join trocar://192.168.1.20:7690/7K3M-9QXZ-4T2B-WN8C --role assistant
       joins a session on another machine with the link that its server printed
+  trocar-client --list
+      shows the sessions that announce themselves on this network
   trocar-client --role observer --headless --seconds 10 --screenshot out/last.png
       watches without a display and leaves its last picture
   trocar-client --no-render --name Left --script deploy/scenes/lift.toml --summary out/left.json
@@ -127,6 +129,9 @@ Result<std::optional<ClientOptions>> parse_client_command_line(int argc, char** 
       app.add_option("--server", options.server, "where the session is, if no link says it")
           ->type_name("HOST:PORT")
           ->capture_default_str();
+  app.add_flag("--list", options.lists_sessions,
+               "list the sessions that announce themselves on the local network, and exit; "
+               "--seconds says how long to look [3]");
   app.add_option("--ca", options.ca_file,
                  "trust servers that this CA (PEM) vouches for, instead of the code's first half")
       ->type_name("FILE");

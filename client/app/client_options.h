@@ -44,6 +44,7 @@ struct ClientOptions {
   double mark_at = -1, return_at = -1;  // instructor: seconds after joining; < 0: not
   std::string script_file, replay_file, summary_file;
   std::uint64_t corrupt_frame = 0;  // hidden: damages the n-th delta, to prove healing
+  bool lists_sessions = false;      // of the local network, instead of taking part in one
   std::string log_level = "info";
 };
 

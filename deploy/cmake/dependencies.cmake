@@ -11,6 +11,8 @@ find_package(Eigen3 REQUIRED)
 find_package(nlohmann_json REQUIRED)
 find_package(ZLIB REQUIRED)
 find_package(OpenSSL 3.0 REQUIRED)
+# Only its libraries: the definition that comes with them would keep out the precompiled headers.
+pkg_check_modules(avahi REQUIRED avahi-client)
 pkg_check_modules(zstd REQUIRED IMPORTED_TARGET libzstd)
 pkg_check_modules(xxhash REQUIRED IMPORTED_TARGET libxxhash)
 if(TROCAR_CLIENT)

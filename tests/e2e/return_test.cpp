@@ -39,10 +39,11 @@ class Return : public ::testing::Test {
  protected:
   // Anna's hand goes through a network that is cut from second 5 to 10 of its life.
   Program start_network() {
-    Program network("trocar-impair",
-                    {"--to", session_.address(), "--listen", "127.0.0.1:0", "--cut-stream", "5:5",
-                     "--ready-file", (session_.folder / "network").string()},
-                    session_.folder / "network.log");
+    Program network(
+        "trocar-impair",
+        {"--to", session_.address(), "--listen", "127.0.0.1:0", "--cut-stream", "5:5",
+         "--block-datagrams", "5:5", "--ready-file", (session_.folder / "network").string()},
+        session_.folder / "network.log");
     EXPECT_TRUE(wait_for_file(session_.folder / "network", 20));
     return network;
   }

@@ -247,5 +247,79 @@ TEST_F(Claims, OfTwoBladesOnOneCoreTheSecondIsStopped) {
   EXPECT_TRUE(holds(0)) << "nobody waits for a silent blade";
 }
 
+// The rules do not promise more than this; docs/ownership-model.md says why.
+
+TEST_F(Claims, AGraspOfTwoNodesMayStarveBetweenTwoThatTakeTurns) {
+  set(0, Verb::Grasp, {1});
+  set(2, Verb::Grasp, {2});
+  advance();
+  set(4, Verb::Grasp, {1, 2});
+  advance();
+  const auto let_go_and_grasp_again = [this](int tool, std::initializer_list<int> core) {
+    set(tool, Verb::None);
+    advance();
+    EXPECT_FALSE(holds(4));
+    set(tool, Verb::Grasp, core);
+    advance();
+    EXPECT_TRUE(holds(tool)) << "who waits for more than this node keeps none of it free";
+  };
+  for (int turn = 0; turn < 50; ++turn) {
+    let_go_and_grasp_again(0, {1});
+    let_go_and_grasp_again(2, {2});
+  }
+  EXPECT_FALSE(holds(4));
+  set(0, Verb::None);
+  set(2, Verb::None);
+  advance();
+  EXPECT_TRUE(holds(4)) << "both let go at once";
+}
+
+TEST_F(Claims, ABladeThatHoldsGoesBeforeWhoWaits) {
+  set(0, Verb::Cut, {1});
+  set(2, Verb::Cut);
+  advance();
+  set(4, Verb::Grasp, {1});
+  advance();
+  for (int turn = 0; turn < 50; ++turn) {
+    set(0, Verb::Cut);
+    set(2, Verb::Cut, {1});
+    advance();
+    EXPECT_EQ(owner(1), 2);
+    set(0, Verb::Cut, {1});
+    set(2, Verb::None);
+    advance();
+    EXPECT_EQ(owner(1), 0);
+    set(2, Verb::Cut);
+    advance();
+  }
+  EXPECT_FALSE(holds(4)) << "two blades pass the node to and fro";
+}
+
+TEST_F(Claims, AStoppedBladeWaitsATickForOneThatMovesAway) {
+  set(0, Verb::Cut, {1});
+  set(2, Verb::Cut, {2});
+  advance();
+  set(0, Verb::Cut, {2});
+  set(2, Verb::Cut, {3});
+  advance();
+  EXPECT_FALSE(holds(0));
+  EXPECT_EQ(owner(2), 0xff);
+  advance();
+  EXPECT_TRUE(holds(0));
+}
+
+TEST_F(Claims, TwoHandsOfTwoToolsMayWaitForEachOther) {
+  set(0, Verb::Grasp, {1});
+  set(2, Verb::Grasp, {2});
+  advance();
+  set(1, Verb::Grasp, {2});
+  set(3, Verb::Grasp, {1});
+  advance(5000);
+  EXPECT_FALSE(holds(1) || holds(3)) << "until one of them opens";
+  set(2, Verb::None);
+  advance();
+  EXPECT_TRUE(holds(1));
+}
+
 }  // namespace
 }  // namespace trocar::hands

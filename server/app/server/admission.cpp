@@ -85,17 +85,46 @@ Result<secure::Identity> read_or_make_identity(const fs::path& state) {
   return secure::Identity{std::move(*certificate), std::move(*key)};
 }
 
+Status check_loopback(const std::string& address) {
+  if (secure::is_loopback(address)) return {};
+  return Error{ErrorCode::Usage, "--insecure-loopback: " + address +
+                                     " can be reached from other machines: use it with "
+                                     "127.0.0.1 or [::1], or leave it out"};
+}
+
+// Says whether a private folder is there, or can be made.
+Status check_state_folder(const fs::path& folder) {
+  std::error_code ignored;
+  if (fs::exists(folder, ignored)) return secure::make_private_folder(folder);
+  auto above = folder.parent_path();
+  while (!above.empty() && !fs::exists(above, ignored)) above = above.parent_path();
+  if (::access(above.c_str(), W_OK | X_OK) == 0) return {};
+  return Error{ErrorCode::ResourceMissing, "--state: " + folder.string() + " cannot be made in " +
+                                               above.string() + ": name another folder"};
+}
+
 }  // namespace
+
+Status Admission::check(const AccessOptions& options, const std::string& address) {
+  if (options.is_insecure) return check_loopback(address);
+  const auto state = state_folder(options);
+  if (!state) return state.error();
+  if (const auto usable = check_state_folder(*state); !usable) return usable;
+  Admission admission(options, address, false);
+  admission.state_ = *state;
+  const bool has_identity =
+      !options.certificate_file.empty() ||
+      (fs::exists(*state / "server.crt") && fs::exists(*state / "server.key"));
+  return has_identity ? admission.read_identity() : Status();
+}
 
 Result<std::unique_ptr<Admission>> Admission::prepare(const AccessOptions& options,
                                                       const std::string& address,
                                                       bool is_resuming) {
   std::unique_ptr<Admission> admission(new Admission(options, address, is_resuming));
   if (options.is_insecure) {
-    if (secure::is_loopback(address)) return admission;
-    return Error{ErrorCode::Usage, "--insecure-loopback: " + address +
-                                       " can be reached from other machines: use it with "
-                                       "127.0.0.1 or [::1], or leave it out"};
+    if (const auto safe = check_loopback(address); !safe) return safe.error();
+    return admission;
   }
   auto state = state_folder(options);
   if (!state) return state.error();

@@ -27,6 +27,8 @@ class Admission {
   static Result<std::unique_ptr<Admission>> prepare(const AccessOptions& options,
                                                     const std::string& address,
                                                     bool is_resuming = false);
+  // Says whether prepare() would succeed, without making anything.
+  static Status check(const AccessOptions& options, const std::string& address);
   // Removes the link file and the places, and the codes unless they are kept.
   ~Admission();
   Admission(const Admission&) = delete;

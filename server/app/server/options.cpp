@@ -1,10 +1,16 @@
 #include "server/app/server/options.h"
 
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
 #include <charconv>
+#include <memory>
 
+#include "common/base/printable.h"
 #include "common/base/version.h"
 #include "common/base/workers.h"
+#include "common/discovery/notice.h"
+#include "server/app/server/config_file.h"
 #include "server/app/server/journal_sink.h"
 #include "server/tissue/step/simulation.h"
 
@@ -26,6 +32,10 @@ Examples:
       trocar-organ reduce liver --method local
   trocar-server --resume lesson.mcap --journal lesson-2.mcap
       after a crash: goes on where that recording ends, with all cuts; people come back
+  trocar-server --listen 0.0.0.0:7690 --announce "Lesson one"
+      trocar-client --list on another machine shows it under this name
+  trocar-server --config lesson.toml --check-config
+      would a start with these options succeed? deploy/trocar-server.toml.example has all of them
   trocar-server --seconds 20 --summary out/summary.json --journal out/session.mcap
       20 simulated seconds, then the replicas are compared, and the figures written
 
@@ -38,11 +48,32 @@ std::string version_text() {
          ", protocol " + std::to_string(kProtocolMajor) + "." + std::to_string(kProtocolMinor);
 }
 
+// A number, and not one that no limit refuses: CLI::Range lets "nan" through.
+CLI::Validator between(double least, double most) {
+  return {[=](std::string& text) -> std::string {
+            double value = 0;
+            if (CLI::detail::lexical_cast(text, value) && value >= least && value <= most)
+              return {};
+            return fmt::format("is {}, allowed are {} to {}", text, least, most);
+          },
+          fmt::format("in {} to {}", least, most)};
+}
+
+CLI::Validator printable_name() {
+  return {[](std::string& text) -> std::string {
+            if (is_printable(text) && !text.empty() && text.size() <= discovery::kMostNameBytes)
+              return {};
+            return fmt::format("is not a name of 1 to {} printable bytes",
+                               discovery::kMostNameBytes);
+          },
+          ""};
+}
+
 void add_access_options(CLI::App& app, AccessOptions& options) {
   auto* access = app.add_option_group("Access", "who may join");
   access->add_option("--code-hours", options.code_hours, "how long the join codes are good")
       ->type_name("H")
-      ->check(CLI::Range(0.01, 8760.0))
+      ->check(between(0.01, 8760))
       ->capture_default_str();
   access->add_option("--code-uses", options.code_uses, "how often each may be used, 0: any number")
       ->type_name("N")
@@ -100,7 +131,7 @@ void add_research_options(CLI::App& app, ServerOptions& options, ResearchOptions
   research
       ->add_option("--budget", options.budget_ms, "of each millisecond, how much the tick may take")
       ->type_name("MS")
-      ->check(CLI::Range(0.05, 1.0))
+      ->check(between(0.05, 1))
       ->capture_default_str();
   more.depth =
       research->add_option("--depth", options.decisions.depth_limit,
@@ -124,6 +155,129 @@ void add_research_options(CLI::App& app, ServerOptions& options, ResearchOptions
       ->type_name("FILE");
 }
 
+// CLI11's parser of the command line with all that it writes to.
+class CommandLine {
+ public:
+  CommandLine();
+
+  // Throws CLI::ParseError.
+  void parse(int argc, char** argv) { app_.parse(argc, argv); }
+  // Checks one option alone, as if nothing else had been given.
+  Status check(const std::string& key, const std::string& text);
+  // Checks what is left, once all options are known.
+  Status finish();
+
+  CLI::App& app() { return app_; }
+  ServerOptions& options() { return options_; }
+
+ private:
+  void add_session_options();
+  void add_config_options();
+
+  ServerOptions options_;
+  std::string listen_ = "127.0.0.1:7690";
+  ResearchOptions research_;
+  const CLI::Option* organ_ = nullptr;
+  CLI::App app_{
+      "Hosts one session: one organ, simulated 1000 times per second, shared by up to 16 "
+      "people with tools and 100 who watch.",
+      "trocar-server"};
+};
+
+CommandLine::CommandLine() {
+  app_.footer(kExamples);
+  app_.set_version_flag("--version", version_text())->configurable(false);
+  app_.get_help_ptr()->configurable(false);
+  add_session_options();
+  add_config_options();
+  add_access_options(app_, options_.access);
+  add_research_options(app_, options_, research_);
+}
+
+void CommandLine::add_session_options() {
+  organ_ =
+      app_.add_option("--organ", options_.organ,
+                      "built-in organ (liver, elastic-liver, lattice, plate, stomach, chest), an "
+                      ".organ file or a .msh mesh")
+          ->type_name("NAME|FILE")
+          ->capture_default_str();
+  app_.add_option("--listen", listen_, "where to listen; port 0 takes any free one")
+      ->type_name("ADDR:PORT")
+      ->capture_default_str();
+  app_.add_flag(
+      "--no-datagrams", options_.is_stream_only,
+      "frames and hands over the TCP stream alone, where lost packets hold up the picture");
+  app_.add_option("--announce", options_.announced_name,
+                  "name of the session on the local network (DNS-SD) [the organ's and "
+                  "the machine's; told unless --listen is this machine only]")
+      ->type_name("NAME")
+      ->check(printable_name());
+  app_.add_flag("--no-announce", options_.is_unannounced,
+                "tell the local network nothing of the session");
+  app_.add_option("--journal", options_.journal,
+                  "file to record the session in, or none [./trocar-<UTC>.mcap]")
+      ->type_name("FILE");
+  app_.add_option("--resume", options_.resume_file,
+                  "go on where this recording of a killed server ends; the organ is in it")
+      ->type_name("FILE");
+  app_.add_option("--seconds", options_.seconds, "end after this many simulated seconds")
+      ->type_name("N")
+      ->check(between(0, 1e9));
+  app_.add_option("--summary", options_.summary_file, "write figures of the run as JSON at the end")
+      ->type_name("FILE");
+  app_.add_option(
+          "--reduction", options_.reduction_file,
+          "local reduction of that organ (trocar-organ reduce --method local): moves the "
+          "tissue beyond what is touched where it fits, the full solver elsewhere; clients may "
+          "see the full solution as a ghost, which takes about a core meanwhile")
+      ->type_name("FILE");
+  app_.add_option("--workers", options_.workers, "threads that share a tick's work")
+      ->check(CLI::Range(1u, kMaxWorkers))
+      ->capture_default_str();
+  app_.add_option("--log-level", options_.log_level, "error, warn, info, debug or off")
+      ->check(CLI::IsMember({"error", "warn", "info", "debug", "off"}))
+      ->type_name("LEVEL")
+      ->capture_default_str();
+}
+
+void CommandLine::add_config_options() {
+  auto* config = app_.set_config("--config", "",
+                                 "options from this file (TOML), each without its dashes; the "
+                                 "command line wins")
+                     ->type_name("FILE");
+  app_.add_flag("--check-config", options_.checks_config,
+                "check all options and files as a start would, and exit with 0 or 2")
+      ->needs(config)
+      ->configurable(false);
+}
+
+Status CommandLine::check(const std::string& key, const std::string& text) {
+  const auto refused = [&key](const std::string& message) {
+    for (const auto& name : {"--" + key + ": ", key + ": "})
+      if (message.starts_with(name)) return Error{ErrorCode::Usage, message.substr(name.size())};
+    return Error{ErrorCode::Usage, message};
+  };
+  auto* option = app_.get_option("--" + key);
+  try {
+    option->add_result(text);
+    option->run_callback();
+  } catch (const CLI::ParseError& error) {
+    return refused(error.what());
+  }
+  const auto finished = finish();
+  return finished ? finished : refused(finished.error().message);
+}
+
+Status CommandLine::finish() {
+  options_.is_organ_chosen = organ_->count() > 0;
+  if (research_.is_frozen) {
+    options_.decisions.boundary = world::Boundary::Frozen;
+    if (research_.depth->count() == 0) options_.decisions.depth_limit = step::kFrozenDepthLimit;
+  }
+  if (const auto parsed = parse_listen_address(listen_, options_); !parsed) return parsed;
+  return step::validate(options_.decisions);
+}
+
 }  // namespace
 
 Status parse_listen_address(const std::string& text, ServerOptions& options) {
@@ -144,68 +298,31 @@ Status parse_listen_address(const std::string& text, ServerOptions& options) {
 }
 
 Result<std::optional<ServerOptions>> parse_command_line(int argc, char** argv) {
-  ServerOptions options;
-  std::string listen = "127.0.0.1:7690";
-  CLI::App app(
-      "Hosts one session: one organ, simulated 1000 times per second, shared by up to 16 "
-      "people with tools and 100 who watch.",
-      "trocar-server");
-  app.footer(kExamples);
-  app.set_version_flag("--version", version_text());
-  const auto* organ =
-      app.add_option(
-             "--organ", options.organ,
-             "built-in organ (liver, elastic-liver, lattice, plate, stomach, chest), an .organ "
-             "file or a .msh mesh")
-          ->type_name("NAME|FILE")
-          ->capture_default_str();
-  app.add_option("--listen", listen, "where to listen; port 0 takes any free one")
-      ->type_name("ADDR:PORT")
-      ->capture_default_str();
-  app.add_flag(
-      "!--no-datagrams", options.has_datagrams,
-      "frames and hands over the TCP stream alone, where lost packets hold up the picture");
-  app.add_option("--journal", options.journal,
-                 "file to record the session in, or none [./trocar-<UTC>.mcap]")
-      ->type_name("FILE");
-  app.add_option("--resume", options.resume_file,
-                 "go on where this recording of a killed server ends; the organ is in it")
-      ->type_name("FILE");
-  app.add_option("--seconds", options.seconds, "end after this many simulated seconds")
-      ->type_name("N")
-      ->check(CLI::Range(0.0, 1e9));
-  app.add_option("--summary", options.summary_file, "write figures of the run as JSON at the end")
-      ->type_name("FILE");
-  app.add_option(
-         "--reduction", options.reduction_file,
-         "local reduction of that organ (trocar-organ reduce --method local): moves the "
-         "tissue beyond what is touched where it fits, the full solver elsewhere; clients may "
-         "see the full solution as a ghost, which takes about a core meanwhile")
-      ->type_name("FILE");
-  app.add_option("--workers", options.workers, "threads that share a tick's work")
-      ->check(CLI::Range(1u, kMaxWorkers))
-      ->capture_default_str();
-  app.add_option("--log-level", options.log_level, "error, warn, info, debug or off")
-      ->capture_default_str();
-  add_access_options(app, options.access);
-  ResearchOptions research;
-  add_research_options(app, options, research);
+  CommandLine line;
+  auto& options = line.options();
+  const CheckOption check = [](const std::string& key, const std::string& text) {
+    return CommandLine().check(key, text);
+  };
+  line.app().config_formatter(std::make_shared<ConfigReader>(line.app(), check, options.origins));
+  const auto usage = [&options](const std::string& message) {
+    return Error{ErrorCode::Usage, options.origins.placed(message)};
+  };
   try {
-    app.parse(argc, argv);
+    line.parse(argc, argv);
+  } catch (const CLI::FileError& error) {
+    return usage("--config: " + std::string(error.what()) + ", name a file that is there");
+  } catch (const CLI::ConfigError& error) {
+    return usage(error.what());
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) {
-      app.exit(error);
+      line.app().exit(error);
       return std::optional<ServerOptions>();
     }
-    return Error{ErrorCode::Usage, std::string(error.what()) + " (see --help)"};
+    return usage(std::string(error.what()) + " (see --help)");
   }
-  options.is_organ_chosen = organ->count() > 0;
-  if (research.is_frozen) {
-    options.decisions.boundary = world::Boundary::Frozen;
-    if (research.depth->count() == 0) options.decisions.depth_limit = step::kFrozenDepthLimit;
-  }
-  if (const auto parsed = parse_listen_address(listen, options); !parsed) return parsed.error();
-  if (const auto valid = step::validate(options.decisions); !valid) return valid.error();
+  if (const auto finished = line.finish(); !finished) return usage(finished.error().message);
+  if (line.app().get_config_ptr()->count() > 0)
+    options.config_file = line.app().get_config_ptr()->as<std::string>();
   if (options.journal.empty()) options.journal = default_journal_path();
   return std::optional(std::move(options));
 }

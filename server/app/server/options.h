@@ -1,12 +1,13 @@
 #pragma once
 
-// trocar-server's command line.
+// trocar-server's command line, and the configuration file that it may name.
 
 #include <optional>
 #include <string>
 
 #include "common/base/result.h"
 #include "server/app/server/access_options.h"
+#include "server/app/server/option_origins.h"
 #include "server/tissue/step/tick_report.h"
 
 namespace trocar::app {
@@ -19,8 +20,10 @@ struct ServerOptions {
   std::string reduction_file;  // empty: the full solver alone
   std::string address = "127.0.0.1";
   std::uint16_t port = 7690;
-  bool has_datagrams = true;
+  bool is_stream_only = false;  // no datagrams
   AccessOptions access;
+  std::string announced_name;     // on the local network; empty: made from organ and machine
+  bool is_unannounced = false;    // otherwise it is announced where others may reach it
   std::string journal;            // a file, or "none"
   double seconds = 0;             // simulated; 0: until told to end
   std::string summary_file;       // empty: none
@@ -30,6 +33,9 @@ struct ServerOptions {
   double budget_ms = 0.8;  // of a tick's millisecond for its work
   unsigned workers = 1;
   std::string log_level = "info";
+  std::string config_file;     // empty: none
+  bool checks_config = false;  // instead of hosting a session
+  OptionOrigins origins;
 };
 
 // Nothing if the program is done (after --help or --version).

@@ -3,8 +3,10 @@
 #include "common/base/asio.h"  // before Boost: see there
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/post.hpp>
@@ -20,6 +22,9 @@
 #include "common/base/log.h"
 #include "common/base/text_file.h"
 #include "common/base/timing.h"
+#include "common/base/version.h"
+#include "common/discovery/announcer.h"
+#include "common/secure/loopback.h"
 #include "server/app/server/admission.h"
 #include "server/app/server/session_start.h"
 #include "server/app/server/simulation_loop.h"
@@ -45,6 +50,11 @@ Tick ticks_of(double seconds) {
   return static_cast<Tick>(std::llround(seconds * static_cast<double>(kTicksPerSecond)));
 }
 
+std::string machine_name() {
+  std::array<char, 256> name{};
+  return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "this machine";
+}
+
 class Server {
  public:
   Server(const ServerOptions& options, std::unique_ptr<Admission> admission, SessionStart start)
@@ -64,6 +74,7 @@ class Server {
   // Lets those who were in a session that goes on come back; other hands leave.
   void restore_people();
   void note_participants(const std::vector<participants::Participant>& present, Tick tick);
+  void announce();
   void publish_frames();
   void show_ghost(std::shared_ptr<const ghost::GhostReport> report);
   void warn_if_slow();
@@ -85,6 +96,7 @@ class Server {
   asio::signal_set signals_{io_};
   asio::steady_timer poll_{io_};
   std::unique_ptr<net::TcpServer> tcp_;
+  std::unique_ptr<discovery::Announcer> announcer_;  // null: the session is not announced
   std::unique_ptr<replication::Replicator> replicator_;
   FrameHandover handover_{[this] { asio::post(io_, [this] { publish_frames(); }); }};
   std::vector<step::SharedFrame> frames_;
@@ -106,7 +118,7 @@ Status Server::open() {
   const auto topology_bytes = replication::encode_topology(layout, organ.name)->size();
   tcp.outbox_bytes = std::max(tcp.outbox_bytes, 8 * topology_bytes);
   tcp.tls = admission_->tls();
-  tcp.has_datagrams = options_.has_datagrams;
+  tcp.has_datagrams = !options_.is_stream_only;
   tcp.plain_reply = replication::encode_goodbye(
       replication::EndReason::Version,
       "this server speaks TLS 1.3 only: use a client of its release, without --insecure-loopback");
@@ -164,11 +176,27 @@ void Server::restore_people() {
 
 void Server::note_participants(const std::vector<participants::Participant>& present, Tick tick) {
   if (journal_) journal_->record_participants(present, tick);
+  if (announcer_) announcer_->set_people(static_cast<int>(present.size()));
   std::vector<KeptPlace> places;
   for (const auto& who : present)
     if (const auto* token = replicator_->absences().find(who.slot))
       places.push_back({who.slot, who.name, *token});
   admission_->keep_places(std::move(places));
+}
+
+// Who can only be reached from this machine has nothing to tell others, unless he is asked to.
+void Server::announce() {
+  const bool is_asked = !options_.announced_name.empty();
+  if (options_.is_unannounced || (secure::is_loopback(options_.address) && !is_asked)) return;
+  const auto& organ = simulation_.organ().name;
+  announcer_ = std::make_unique<discovery::Announcer>(
+      discovery::SessionNotice{
+          .name = is_asked ? options_.announced_name : organ + " at " + machine_name(),
+          .organ = organ,
+          .people = 0,
+          .needs_code = admission_->gate() != nullptr,
+          .protocol = fmt::format("{}.{}", kProtocolMajor, kProtocolMinor)},
+      tcp_->port());
 }
 
 LoopOptions Server::loop_options() const {
@@ -204,6 +232,7 @@ Status Server::run() {
       return written;
   log::info("{} ({} nodes) at {}:{}, Ctrl-C ends the session", simulation_.organ().name,
             simulation_.organ().mesh.node_count(), options_.address, tcp_->port());
+  announce();
   std::fputs(admission_->invitation(tcp_->port()).c_str(), stdout);
   std::fflush(stdout);
   loop_->start();
@@ -264,6 +293,7 @@ void Server::begin_end() {
   is_ending_ = true;
   if (ghost_) ghost_->set_wanted(false);
   signals_.cancel();
+  announcer_.reset();
   tcp_->stop_accepting();
   replicator_->begin_barrier(loop_->report().last_frame);
   wait_for([this] { return replicator_->is_barrier_complete(); }, kBarrierDeadline,

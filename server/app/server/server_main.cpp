@@ -1,19 +1,39 @@
 // trocar-server: hosts one session.
 
+#include <cstdio>
+
 #include "common/base/cpu.h"
 #include "common/base/log.h"
+#include "server/app/server/check_start.h"
 #include "server/app/server/options.h"
 #include "server/app/server/server.h"
 
+namespace {
+
+constexpr const char* kProgram = "trocar-server";
+
+// Whatever is wrong with a configuration is an error of usage here.
+int check_config(const trocar::app::ServerOptions& options) {
+  if (const auto fine = trocar::app::check_start(options); !fine)
+    return trocar::report(kProgram, {trocar::ErrorCode::Usage, fine.error().message});
+  std::printf("%s: fine\n", options.config_file.c_str());
+  return static_cast<int>(trocar::ExitCode::Ok);
+}
+
+}  // namespace
+
 int main(int argc, char** argv) {
-  constexpr const char* kProgram = "trocar-server";
   trocar::require_cpu_features(kProgram);
-  const auto options = trocar::app::parse_command_line(argc, argv);
-  if (!options) return trocar::report(kProgram, options.error());
-  if (!*options) return static_cast<int>(trocar::ExitCode::Ok);
-  if (const auto set = trocar::log::configure(kProgram, (*options)->log_level); !set)
+  const auto parsed = trocar::app::parse_command_line(argc, argv);
+  if (!parsed) return trocar::report(kProgram, parsed.error());
+  if (!*parsed) return static_cast<int>(trocar::ExitCode::Ok);
+  const auto& options = **parsed;
+  const auto level = options.checks_config ? std::string("off") : options.log_level;
+  if (const auto set = trocar::log::configure(kProgram, level); !set)
     return trocar::report(kProgram, set.error());
-  if (const auto run = trocar::app::run_server(**options); !run)
-    return trocar::report(kProgram, run.error());
+  if (options.checks_config) return check_config(options);
+  if (const auto run = trocar::app::run_server(options); !run)
+    return trocar::report(kProgram,
+                          {run.error().code, options.origins.placed(run.error().message)});
   return static_cast<int>(trocar::ExitCode::Ok);
 }

@@ -31,13 +31,9 @@ class TcpServer::Core : public std::enable_shared_from_this<TcpServer::Core> {
       : options(chosen), context(io), acceptor(io), sweep(io), retry(io) {}
 
   Status open() {
+    if (const auto checked = check_listen_address(options.address); !checked) return checked;
     boost::system::error_code error;
-    const auto address = asio::ip::make_address(options.address, error);
-    if (error)
-      return Error{ErrorCode::Usage, "--listen: '" + options.address +
-                                         "' is not an IPv4 or IPv6 address: use 127.0.0.1 for this "
-                                         "machine only, 0.0.0.0 for any"};
-    const tcp::endpoint endpoint(address, options.port);
+    const tcp::endpoint endpoint(asio::ip::make_address(options.address, error), options.port);
     acceptor.open(endpoint.protocol(), error);
     if (!error) acceptor.set_option(asio::socket_base::reuse_address(true), error);
     if (!error) acceptor.bind(endpoint, error);
@@ -49,7 +45,7 @@ class TcpServer::Core : public std::enable_shared_from_this<TcpServer::Core> {
                        "): stop the program that has it or choose another with --listen"};
     port = acceptor.local_endpoint(error).port();
     if (options.tls && options.has_datagrams)
-      open_datagrams(asio::ip::udp::endpoint(address, port));
+      open_datagrams(asio::ip::udp::endpoint(endpoint.address(), port));
     return {};
   }
 
@@ -225,6 +221,15 @@ Status run(asio::io_context& context) {
     return failed("unknown");
   }
   return {};
+}
+
+Status check_listen_address(const std::string& address) {
+  boost::system::error_code error;
+  asio::ip::make_address(address, error);
+  if (!error) return {};
+  return Error{ErrorCode::Usage, "--listen: '" + address +
+                                     "' is not an IPv4 or IPv6 address: use 127.0.0.1 for this "
+                                     "machine only, 0.0.0.0 for any"};
 }
 
 Result<std::unique_ptr<TcpServer>> TcpServer::listen(asio::io_context& context,

@@ -65,6 +65,9 @@ struct TcpCounters {
 // them throws ends that: an error says what it was, and the context is not run again.
 Status run(asio::io_context& context);
 
+// Whether it is an IPv4 or IPv6 address, as --listen wants it.
+Status check_listen_address(const std::string& address);
+
 class TcpServer final : public Connections {
  public:
   // Binds and listens; ErrorCode::ResourceMissing when the address or port cannot be had.

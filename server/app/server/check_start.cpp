@@ -1,0 +1,84 @@
+#include "server/app/server/check_start.h"
+
+#include <unistd.h>
+
+#include <filesystem>
+#include <string>
+
+#include "common/journal/session_journal.h"
+#include "server/app/server/admission.h"
+#include "server/organs/catalogue/load_organ.h"
+#include "server/organs/organ/average_strain.h"
+#include "server/organs/organ/local_reduction_file.h"
+#include "server/session/net/tcp_server.h"
+
+namespace trocar::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+Status check_writable(const fs::path& path) {
+  std::error_code ignored;
+  if (fs::exists(path, ignored)) {
+    if (!fs::is_directory(path, ignored) && ::access(path.c_str(), W_OK) == 0) return {};
+    return Error{ErrorCode::ResourceMissing,
+                 path.string() + " cannot be written, name another file"};
+  }
+  const auto folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
+  if (fs::is_directory(folder, ignored) && ::access(folder.c_str(), W_OK | X_OK) == 0) return {};
+  return Error{ErrorCode::ResourceMissing,
+               folder.string() + " is no folder that can be written to, make it"};
+}
+
+// A recording never replaces another one; a device may take it.
+Status check_journal(const fs::path& path) {
+  std::error_code ignored;
+  if (fs::is_regular_file(path, ignored))
+    return Error{ErrorCode::ResourceMissing, path.string() + " exists already, name another file"};
+  return check_writable(path);
+}
+
+Status check_organ(const ServerOptions& options,
+                   const std::function<Status(const char*, Status)>& of) {
+  auto organ = catalogue::load_organ(options.organ);
+  if (!organ) return of("organ", organ.error());
+  if (options.has_averaged_strain)
+    if (const auto averaged = organ::average_strain(*organ); !averaged)
+      return of("averaged-strain", averaged);
+  if (options.reduction_file.empty()) return {};
+  const auto reduction = organ::read_session_reduction(options.reduction_file, *organ);
+  return reduction ? Status() : of("reduction", reduction.error());
+}
+
+}  // namespace
+
+Status check_start(const ServerOptions& options) {
+  // Puts the option's place before an error that does not have it yet.
+  const auto of = [&options](const char* key, const Status& status) -> Status {
+    if (status) return status;
+    const auto& [code, message] = status.error();
+    const auto placed = options.origins.placed(message);
+    if (message.starts_with("--")) return Error{code, placed};
+    return Error{code, options.origins.place_of(key) + ": " + message};
+  };
+  const auto& access = options.access;
+  if (!access.revoke.empty())
+    return of("revoke", Error{ErrorCode::Usage, "starts no session that could be checked"});
+  if (const auto s = net::check_listen_address(options.address); !s) return of("listen", s);
+  const char* identity = access.certificate_file.empty() ? "state" : "certificate";
+  if (const auto s = Admission::check(access, options.address); !s) return of(identity, s);
+  if (!options.resume_file.empty())
+    if (const auto s = journal::SessionJournal::open(options.resume_file); !s)
+      return of("resume", s.error());
+  if (const auto s = check_organ(options, of); !s) return s;
+  if (options.journal != "none")
+    if (const auto s = check_journal(options.journal); !s) return of("journal", s);
+  for (const auto& [key, file] : {std::pair{"audit", &access.audit_file},
+                                  {"summary", &options.summary_file},
+                                  {"ready-file", &options.ready_file}})
+    if (!file->empty())
+      if (const auto s = check_writable(*file); !s) return of(key, s);
+  return {};
+}
+
+}  // namespace trocar::app

@@ -1,0 +1,13 @@
+#pragma once
+
+#include "common/base/result.h"
+#include "server/app/server/options.h"
+
+namespace trocar::app {
+
+// Says whether a start with these options would succeed: reads every file that it would read, and
+// looks whether those that it would write can be. Binds no port, and makes nothing. An error names
+// the option and where it comes from.
+Status check_start(const ServerOptions& options);
+
+}  // namespace trocar::app

@@ -1,0 +1,84 @@
+#include "server/app/server/config_file.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <optional>
+
+#include "common/base/printable.h"
+#include "common/tool/toml_reader.h"
+
+namespace trocar::app {
+namespace {
+
+constexpr std::size_t kMostBytes = 1u << 20;
+constexpr const char* kExample = "deploy/trocar-server.toml.example";
+
+// The value as one would type it; nothing if it has no such form.
+std::optional<std::string> typed(const toml::node& node) {
+  if (const auto* text = node.as_string()) return text->get();
+  if (const auto* number = node.as_integer()) return std::to_string(number->get());
+  if (const auto* truth = node.as_boolean()) return truth->get() ? "true" : "false";
+  const auto* number = node.as_floating_point();
+  if (number == nullptr || !std::isfinite(number->get())) return std::nullopt;
+  return fmt::format("{}", number->get());
+}
+
+bool is_flag(const CLI::Option& option) {
+  return option.get_expected_min() == 0;
+}
+
+// Reads one key; `document` has the error.
+std::string read_key(const CLI::App& app, const CheckOption& check, const std::string& key,
+                     const toml::node& node, tool::Document& document) {
+  const auto fail = [&](const std::string& what) {
+    document.fail(node.source(), printable(key, 64), what);
+    return std::string();
+  };
+  const auto* option = app.get_option_no_throw("--" + key);
+  if (option == nullptr)
+    return fail(
+        "is unknown, the keys are the options of trocar-server --help without their dashes");
+  if (!option->get_configurable()) return fail("belongs on the command line, take it out");
+  if (is_flag(*option) && !node.is_boolean())
+    return fail("is not true or false, write one of them");
+  auto text = typed(node);
+  if (!text || (node.is_boolean() && !is_flag(*option)))
+    return fail("is neither a text in quotes nor a plain number, write one of them");
+  if (text->empty()) return fail("is empty, give it a value or take the line out");
+  if (const auto checked = check(key, *text); !checked) return fail(checked.error().message);
+  return *text;
+}
+
+}  // namespace
+
+std::vector<CLI::ConfigItem> ConfigReader::from_config(std::istream& input) const {
+  const auto file = app_.get_config_ptr()->as<std::string>();
+  std::string text(kMostBytes + 1, '\0');
+  input.read(text.data(), static_cast<std::streamsize>(text.size()));
+  text.resize(static_cast<std::size_t>(input.gcount()));
+  auto found = read(text, file);
+  if (!found) throw CLI::ConfigError(found.error().message);
+  return std::move(*found);
+}
+
+Result<std::vector<CLI::ConfigItem>> ConfigReader::read(const std::string& text,
+                                                        const std::string& file) const {
+  tool::Document document(file);
+  const auto table = tool::parse_toml(document, text, file, kMostBytes, "configuration", kExample);
+  std::vector<CLI::ConfigItem> values;
+  origins_.read_from(file);
+  if (table)
+    for (const auto& [name, node] : *table) {
+      const std::string key(name.str());
+      auto value = read_key(app_, check_, key, node, document);
+      if (!document.ok()) break;
+      if (!app_.get_option("--" + key)->empty()) continue;  // the command line wins
+      origins_.add(key, static_cast<int>(node.source().begin.line));
+      values.push_back({.parents = {}, .name = key, .inputs = {std::move(value)}});
+    }
+  if (!document.ok()) return document.error();
+  return values;
+}
+
+}  // namespace trocar::app
