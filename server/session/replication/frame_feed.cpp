@@ -62,12 +62,15 @@ bool FrameFeed::give(FrameEncoder& encoder, bool is_required) {
   if (is_there && !is_keyframe_due()) return true;
   const bool has_path = uses_datagrams();
   if (!has_path) probe();
-  const bool is_by_datagrams = !is_required && has_path && has_datagram_base(encoder);
+  const bool is_by_datagrams =
+      !is_required && has_path && !wants_keyframe_ && is_recent(acknowledged_, *encoder.current());
   bool is_given = false;
-  if (is_by_datagrams)
-    is_given = may_send(datagram_pacer_) && give_by_datagrams(encoder);
-  else if (is_required || !is_stream_busy(encoder))
-    is_given = give_by_stream(encoder);
+  if (is_by_datagrams && !may_send(datagram_pacer_)) {
+    ++counters_.frames_skipped;
+    return false;
+  }
+  if (is_by_datagrams) is_given = give_by_datagrams(encoder);
+  if (!is_given && (is_required || !is_stream_busy(encoder))) is_given = give_by_stream(encoder);
   ++(is_given ? counters_.frames_given : counters_.frames_skipped);
   return is_given;
 }
@@ -81,13 +84,9 @@ bool FrameFeed::is_recent(const step::SharedFrame& base, const step::PublishedFr
   return base && frame.frame - base->frame <= options_.keyframe_after_frames;
 }
 
-bool FrameFeed::has_datagram_base(FrameEncoder& encoder) const {
-  if (wants_keyframe_ || !is_recent(acknowledged_, *encoder.current())) return false;
-  return !encoder.slices_from(*acknowledged_).empty();  // else it is too large
-}
-
 bool FrameFeed::give_by_datagrams(FrameEncoder& encoder) {
   const auto& slices = encoder.slices_from(*acknowledged_);
+  if (slices.empty()) return false;  // too large
   encoder.each_change_since(acknowledged_->epoch, [this](BytesView change) { send(change); });
   for (const auto* datagrams : {&slices, &encoder.state_parts()})
     for (const auto& datagram : *datagrams) send(datagram);

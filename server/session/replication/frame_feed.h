@@ -53,7 +53,6 @@ class FrameFeed {
  private:
   bool is_stream_busy(const FrameEncoder& encoder) const;
   bool may_send(const FramePacer& pacer) const;
-  bool has_datagram_base(FrameEncoder& encoder) const;
   bool give_by_datagrams(FrameEncoder& encoder);
   bool give_by_stream(FrameEncoder& encoder);
   // Returns a recent frame that the client has or will have by the stream; null: none.
