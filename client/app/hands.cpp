@@ -24,8 +24,8 @@ std::vector<tool::ToolShape> Hands::shapes() const {
   return mouse_ ? std::vector<tool::ToolShape>{mouse_shape_} : script_shapes_;
 }
 
-void Hands::send(replica::SessionSource& source, std::uint32_t tool,
-                 const tool::ToolSample& sample, std::uint64_t now_ns) {
+void Hands::send(replica::SessionSource& source, std::uint32_t tool, const tool::ToolSample& sample,
+                 std::uint64_t now_ns) {
   if (tool == 0) echo_.note_sent(sample.world_from_tool.position, now_ns);
   // Dropped when the queue is full: the next sample says more.
   replica::send_tool_sample(source, tool, ++sequence_, sample);
@@ -71,8 +71,7 @@ Status Hands::send_due(const replica::Replica& replica, replica::SessionSource& 
     script_sent_ns_ = now_ns;
     const double seconds = script_seconds(*replica.newest(), now_ns);
     for (std::size_t tool = 0; tool < script_hand_->tool_count(); ++tool)
-      send(source, static_cast<std::uint32_t>(tool), script_hand_->sample(tool, seconds),
-           now_ns);
+      send(source, static_cast<std::uint32_t>(tool), script_hand_->sample(tool, seconds), now_ns);
   }
   return {};
 }

@@ -317,9 +317,9 @@ TEST(Access, sockets_that_say_nothing_keep_nobody_out) {
     EXPECT_TRUE(try_to_join(guarded, "Anna", Role::Surgeon, guarded.code(Role::Surgeon)).is_in);
   is_over = true;
   for (auto& thread : threads) thread.join();
-  EXPECT_GT(guarded.session->on_io(
-                [&] { return guarded.session->tcp().counters().newcomers_dropped; }),
-            0u);
+  EXPECT_GT(
+      guarded.session->on_io([&] { return guarded.session->tcp().counters().newcomers_dropped; }),
+      0u);
 }
 
 TEST(Access, the_audit_log_has_a_line_for_each_event_and_no_secret) {

@@ -6,8 +6,8 @@
 // Bounds, so that no peer can take memory or time from the others:
 //   - connections: `max_connections`; one more is closed at once and counted;
 //   - with TLS, newcomers, who have sent no message yet: `max_newcomers` in all and
-//     `max_newcomers_per_address`; for one more the oldest is closed and counted. Handshake and first
-//     message share one deadline;
+//     `max_newcomers_per_address`; for one more the oldest is closed and counted. Handshake and
+//     first message share one deadline;
 //   - inbound: one frame per connection is buffered, at most `max_message_bytes`;
 //   - outbound: `outbox_bytes` per connection; send() says no when full, the caller decides;
 //   - time: a first message within `hello_deadline`, then one at least every `idle_deadline`;
@@ -54,9 +54,9 @@ struct TcpServerOptions {
 
 struct TcpCounters {
   std::uint64_t accepted = 0;
-  std::uint64_t rejected_full = 0;       // closed at once: max_connections reached
-  std::uint64_t newcomers_dropped = 0;   // closed for others: too many who have said nothing yet
-  std::uint64_t handshakes_failed = 0;   // closed before TLS was there
+  std::uint64_t rejected_full = 0;      // closed at once: max_connections reached
+  std::uint64_t newcomers_dropped = 0;  // closed for others: too many who have said nothing yet
+  std::uint64_t handshakes_failed = 0;  // closed before TLS was there
   std::uint64_t faults = 0;
   std::uint64_t messages_in = 0, bytes_in = 0, bytes_out = 0;
 };
