@@ -95,10 +95,15 @@ void Run::measure(std::uint64_t now_ns) {
     last_round_trip_seconds_ = statistics.round_trip_seconds;
     round_trip_.add(last_round_trip_seconds_ * 1e3);
   }
-  if (const auto echo = hands_.observe_echo_ms(replica_, now_ns)) hand_to_visible_.add(*echo);
   if (!statistics.has_server_clock || replica_.barrier()) return;
   const auto server_now_us = static_cast<double>(now_ns) * 1e-3 + statistics.server_offset_us;
-  if (const auto age = replica_.age_ms(server_now_us)) surface_age_.add(*age);
+  if (const auto age = replica_.age_ms(server_now_us)) {
+    surface_age_.add(*age);
+    const double way_ms = *age + last_round_trip_seconds_ * 1e3 / 2;
+    const auto likely_ns = now_ns - static_cast<std::uint64_t>(std::max(0.0, way_ms) * 1e6);
+    if (const auto echo = hands_.observe_echo_ms(replica_, likely_ns, now_ns))
+      hand_to_visible_.add(*echo);
+  }
   const auto change_us = replica_.shown_change_us();
   if (change_us != last_change_us_)
     cut_to_visible_.add((server_now_us - static_cast<double>(change_us)) * 1e-3);

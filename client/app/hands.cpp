@@ -32,13 +32,13 @@ void Hands::send(replica::SessionSource& source, std::uint32_t tool, const tool:
 }
 
 std::optional<double> Hands::observe_echo_ms(const replica::Replica& replica,
-                                             std::uint64_t now_ns) {
+                                             std::uint64_t likely_ns, std::uint64_t now_ns) {
   const auto own = tool_slot(replica.own_slot(), 0);
   for (auto frame = replica.history().rbegin(); frame != replica.history().rend(); ++frame) {
     if (!frame->has_state) continue;
     const auto tool = std::ranges::find(frame->tools, own, &replica::Tool::slot);
     if (tool == frame->tools.end()) return std::nullopt;
-    return echo_.observe_ms(tool->world_from_tool.position, now_ns);
+    return echo_.observe_ms(tool->world_from_tool.position, likely_ns, now_ns);
   }
   return std::nullopt;
 }

@@ -30,7 +30,9 @@ class Hands {
   Status send_due(const replica::Replica& replica, replica::SessionSource& source,
                   std::uint64_t now_ns);
   // Takes note of the first tool's position in each frame; the time since it was sent, in ms.
-  std::optional<double> observe_echo_ms(const replica::Replica& replica, std::uint64_t now_ns);
+  // `likely_ns`: see HandEcho.
+  std::optional<double> observe_echo_ms(const replica::Replica& replica, std::uint64_t likely_ns,
+                                        std::uint64_t now_ns);
 
  private:
   // Simulated seconds since the script began; never goes back.

@@ -1,8 +1,7 @@
 #pragma once
 
 // The server's clock as a client knows it, from pings: half of the shortest round trip of the last
-// 16 is the best guess of the way there. Once there are 16
-// the guess is slewed, never stepped.
+// 16 is the best guess of the way there. Once there are 16 the guess is slewed, never stepped.
 
 #include <cstdint>
 #include <deque>

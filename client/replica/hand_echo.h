@@ -2,7 +2,9 @@
 
 // How long it takes from a hand to the picture: from when a reading of the first tool left until a
 // frame shows the tool there. Frames show it between readings, so the place is looked for on the
-// line through those of the last seconds. Only a hand that moves is measured.
+// line through those of the last seconds. A hand that goes to and fro was there more than once: the
+// time nearest to the one at which it is likely to have left is meant. Only a hand that moves is
+// measured.
 
 #include <cstdint>
 #include <deque>
@@ -19,9 +21,10 @@ class HandEcho {
   static constexpr float kLeastSpeed_m_s = 0.01f;  // of the hand there
 
   void note_sent(const Vec3f& position_m, std::uint64_t now_ns);
-  // `shown_m`: where the newest frame with a state has the tool. Nothing if it rests there, or was
-  // never near.
-  std::optional<double> observe_ms(const Vec3f& shown_m, std::uint64_t now_ns);
+  // `shown_m`: where the newest frame with a state has the tool. `likely_ns`: when what that frame
+  // shows is likely to have left. Nothing if the tool rests there, or was never near.
+  std::optional<double> observe_ms(const Vec3f& shown_m, std::uint64_t likely_ns,
+                                   std::uint64_t now_ns);
 
  private:
   struct Sent {

@@ -117,6 +117,18 @@ TEST_F(Access, RevokedCodesRefuseAndKeptCodesOutliveTheServer) {
     EXPECT_EQ(revoke.wait(10), 0) << read_text(folder_ / "revoke.log");
     EXPECT_EQ(join({"--join", watcher, "--server", address(), "--role", "observer"}), 4);
     EXPECT_NE(said().find("revoked"), std::string::npos) << said();
+    Program again("trocar-server",
+                  {"--listen", address(), "--state", state().string(), "--new-code", "observer"},
+                  folder_ / "again.log");
+    EXPECT_EQ(again.wait(10), 0) << read_text(folder_ / "again.log");
+    const auto link = find_invitation(folder_ / "again.log", "observer").link;
+    // The server looks at its codes once a second.
+    EXPECT_TRUE(wait_until(
+        [&] {
+          return join({"--join", link, "--role", "observer"}) == 0;
+        },
+        20))
+        << said();
     server.signal(SIGTERM);
     EXPECT_EQ(server.wait(20), 0);
   }

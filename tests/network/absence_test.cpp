@@ -16,6 +16,7 @@ class Absence : public ::testing::Test {
   static replication::ReplicatorOptions options(std::atomic<std::uint64_t>& clock_ns) {
     replication::ReplicatorOptions options;
     options.clock_ns = [&clock_ns] { return clock_ns.load(); };
+    options.participants_interval_ns = 0;
     return options;
   }
   // Until the roster says so of this name; the test fails after 10 s.

@@ -216,14 +216,41 @@ TEST(Access, each_refusal_has_a_reason_of_its_own) {
   EXPECT_EQ(reason("Anna", Role::Observer, observer), proto::GOODBYE_NAME_TAKEN);
   EXPECT_EQ(reason("Ben", Role::Surgeon, surgeon), proto::GOODBYE_CODE_USED_UP);
 
-  ASSERT_TRUE(
-      access::revoke(guarded.folder.path(), GuardedSession::kBookPort, secure::to_text(observer))
-          .ok());
+  auto book = *access::CodeBook::open_running(guarded.folder.path(), GuardedSession::kBookPort);
+  ASSERT_TRUE(book.revoke(secure::to_text(observer), false).ok());
   guarded.clock_ns += 1'000'000'000;
   EXPECT_EQ(reason("Ben", Role::Observer, observer), proto::GOODBYE_CODE_REVOKED);
   guarded.unix_seconds += GuardedSession::kLifetime;
   EXPECT_EQ(reason("Ben", Role::Instructor, guarded.code(Role::Instructor)),
             proto::GOODBYE_CODE_EXPIRED);
+}
+
+TEST(Access, who_came_with_a_code_that_puts_out_has_to_go_and_may_not_come_back) {
+  GuardedSession guarded;
+  auto& session = *guarded.session;
+  session.publish(10);
+  const auto here = [&](const std::string& name, Role role) {
+    auto options = options_for(session.port(), name, role, guarded.code(role));
+    options.can_return = true;
+    return std::make_unique<net::NetSource>(options);
+  };
+  const auto anna = here("Anna", Role::Surgeon), ben = here("Ben", Role::Observer);
+  Collector of_anna, of_ben;
+  ASSERT_TRUE(poll_until(*anna, of_anna, [&] { return anna->state() == SourceState::Live; }));
+  ASSERT_TRUE(poll_until(*ben, of_ben, [&] { return ben->state() == SourceState::Live; }));
+  auto book = *access::CodeBook::open_running(guarded.folder.path(), GuardedSession::kBookPort);
+  ASSERT_TRUE(book.revoke("observer", false).ok());
+  guarded.clock_ns += 1'000'000'000;
+  session.publish(10);
+  EXPECT_EQ(session.sessions(), 2u) << "who is in stays in";
+  ASSERT_TRUE(book.revoke("surgeon", true).ok());
+  guarded.clock_ns += 1'000'000'000;
+  session.publish(10);
+  ASSERT_TRUE(poll_until(*anna, of_anna, [&] { return anna->state() == SourceState::Closed; }));
+  EXPECT_NE(anna->close_reason().text.find("revoked"), std::string::npos)
+      << anna->close_reason().text;
+  ASSERT_TRUE(session.wait_for_sessions(1));
+  EXPECT_EQ(session.on_io([&] { return session.replicator().roster().list().size(); }), 1u);
 }
 
 TEST(Access, a_code_lets_in_roles_that_may_do_no_more) {

@@ -66,8 +66,8 @@ TEST(FramePacer, a_link_that_keeps_up_gets_every_frame) {
 
 TEST(FramePacer, a_slow_link_gets_fewer_and_they_stay_young) {
   for (const std::uint64_t per_frame_ms : {20u, 40u, 100u, 300u}) {
-    const auto outcome = run({10 * kMs, per_frame_ms * kMs, 0}, 40);
-    EXPECT_GT(outcome.arrived, 12'000 / static_cast<int>(per_frame_ms)) << per_frame_ms;
+    const auto outcome = run({10 * kMs, per_frame_ms * kMs, 0}, 400);
+    EXPECT_GT(outcome.arrived, 120'000 / static_cast<int>(per_frame_ms)) << per_frame_ms;
     // A frame waits for the one before it at most, and for what was early enough before.
     EXPECT_LE(outcome.oldest_ns, (10 + 2 * per_frame_ms + 80) * kMs) << per_frame_ms;
   }
@@ -76,6 +76,24 @@ TEST(FramePacer, a_slow_link_gets_fewer_and_they_stay_young) {
 TEST(FramePacer, losses_neither_stop_nor_slow_it) {
   const auto outcome = run({30 * kMs, 2 * kMs, 0.2}, 20);
   EXPECT_GT(outcome.arrived, 450) << "of 625, a fifth of them lost";
+}
+
+TEST(FramePacer, is_congested_when_one_frame_at_a_time_is_late_and_most_are_lost) {
+  const auto end = [](std::uint64_t late_ms, bool has_losses) {
+    FramePacer pacer;
+    std::uint64_t now = 1000 * kMs;
+    for (Frame frame = 1; frame < 200; ++frame) {
+      pacer.on_sent(frame, now);
+      now += (frame < 10 ? 20 : 20 + late_ms) * kMs;
+      if (!has_losses || frame % 4 == 0) pacer.on_acknowledged(frame, now);
+    }
+    EXPECT_EQ(pacer.is_congested(), late_ms > 60 && has_losses);
+    pacer.restart();
+    EXPECT_FALSE(pacer.is_congested());
+    return pacer.window();
+  };
+  for (const std::uint64_t late_ms : {0u, 20u, 90u})
+    for (const bool has_losses : {false, true}) EXPECT_GE(end(late_ms, has_losses), 1);
 }
 
 TEST(FramePacer, after_silence_one_frame_tries_again) {

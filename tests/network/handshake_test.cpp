@@ -186,6 +186,53 @@ TEST(Handshake, the_seventeenth_hand_is_told_full_and_may_still_watch) {
   EXPECT_TRUE(inputs.leaves.empty());
 }
 
+TEST(Handshake, the_host_may_want_fewer_hands_watchers_and_tools) {
+  replication::ReplicatorOptions options;
+  options.places = {.hands = 1, .watchers = 1, .tools = 1};
+  LiveSession session({}, options);
+  auto two_tools = make_hello("two", proto::ROLE_SURGEON);
+  for (int i = 0; i < 2; ++i) {
+    auto& tool = *two_tools.mutable_hello()->add_tool();
+    tool.set_radius_m(0.004f);
+    tool.set_length_m(0.25f);
+    tool.set_reach_m(0.012f);
+  }
+  const auto too_many = refusal_of(session, two_tools);
+  EXPECT_NE(too_many.text().find("at most 1"), std::string::npos) << too_many.text();
+  RawClient hand(session.port()), watcher(session.port());
+  ASSERT_TRUE(hand.join("hand", proto::ROLE_SURGEON));
+  ASSERT_TRUE(watcher.join("watcher", proto::ROLE_OBSERVER));
+  const auto no_hand = refusal_of(session, make_hello("second", proto::ROLE_ASSISTANT));
+  EXPECT_EQ(no_hand.reason(), proto::GOODBYE_FULL);
+  EXPECT_NE(no_hand.text().find("all 1 places with tools"), std::string::npos) << no_hand.text();
+  const auto no_watcher = refusal_of(session, make_hello("third", proto::ROLE_INSTRUCTOR));
+  EXPECT_EQ(no_watcher.reason(), proto::GOODBYE_FULL);
+}
+
+TEST(Handshake, when_many_come_at_once_those_who_are_here_are_told_once) {
+  std::atomic<std::uint64_t> clock_ns{1'000'000'000};
+  replication::ReplicatorOptions options;
+  options.clock_ns = [&clock_ns] { return clock_ns.load(); };
+  LiveSession session({}, options);
+  RawClient watcher(session.port());
+  ASSERT_TRUE(watcher.join("watcher", proto::ROLE_OBSERVER));
+  std::vector<std::unique_ptr<RawClient>> others;
+  for (int i = 0; i < 10; ++i) {
+    others.push_back(std::make_unique<RawClient>(session.port()));
+    ASSERT_TRUE(others.back()->join("other " + std::to_string(i), proto::ROLE_OBSERVER));
+  }
+  clock_ns += options.participants_interval_ns;
+  session.publish(10);
+  int told = 0, listed = 0;
+  while (listed < 11) {
+    const auto message = watcher.receive(Envelope::kParticipants);
+    ASSERT_TRUE(message);
+    listed = message->participants().participant_size();
+    ++told;
+  }
+  EXPECT_EQ(told, 3) << "with its welcome, when it was there, and when all were";
+}
+
 TEST(Handshake, connections_beyond_the_limit_are_closed_at_once_and_counted) {
   net::TcpServerOptions tcp;
   tcp.max_connections = 2;
@@ -216,7 +263,9 @@ TEST(Handshake, silence_ends_with_timeout_before_and_after_hello) {
 }
 
 TEST(Handshake, everybody_learns_who_comes_and_goes) {
-  LiveSession session;
+  replication::ReplicatorOptions options;
+  options.participants_interval_ns = 0;
+  LiveSession session({}, options);
   RawClient anna(session.port());
   ASSERT_TRUE(anna.join("Anna", proto::ROLE_SURGEON));
   {

@@ -278,5 +278,19 @@ TEST_F(Malformed, a_flood_of_messages_ends_the_session) {
   expect_watcher_undisturbed();
 }
 
+TEST(Flood, few_messages_may_be_too_many_bytes) {
+  replication::ReplicatorOptions options;
+  options.max_bytes_per_second = 5000;
+  LiveSession session({}, options);
+  RawClient client(session.port());
+  ASSERT_TRUE(client.join("flood", proto::ROLE_SURGEON));
+  auto hello = make_hello(std::string(30'000, 'x'), proto::ROLE_SURGEON);
+  for (int i = 0; i < 4; ++i) client.send(hello);
+  const auto goodbye = client.read_goodbye();
+  ASSERT_TRUE(goodbye);
+  EXPECT_NE(goodbye->text().find("5000 bytes in a second"), std::string::npos) << goodbye->text();
+  EXPECT_EQ(session.on_io([&] { return session.replicator().counters().floods; }), 1u);
+}
+
 }  // namespace
 }  // namespace trocar::testing

@@ -89,6 +89,8 @@ TEST_F(ServerConfig, TheExampleMayBeUsedInFull) {
   EXPECT_EQ((*options)->seconds, 2700);
   EXPECT_EQ((*options)->access.certificate_file, "server.pem");
   EXPECT_EQ((*options)->access.revoke, "observer");
+  EXPECT_EQ((*options)->access.new_code, "observer");
+  EXPECT_EQ((*options)->limits.places.watchers, 100);
 }
 
 TEST_F(ServerConfig, ValuesAreThoseOfTheFileUnlessTheyAreTyped) {

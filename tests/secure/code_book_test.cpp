@@ -66,17 +66,31 @@ TEST(CodeBook, revoking_a_code_or_a_role_reaches_the_server_that_runs) {
   const auto first = *book.issue(wire::Role::Surgeon, kNow + 10, -1);
   const auto second = *book.issue(wire::Role::Surgeon, kNow + 10, -1);
   const auto watcher = *book.issue(wire::Role::Observer, kNow + 10, 5);
-  EXPECT_EQ(*revoke(folder.path(), kPort, secure::to_text({{}, first})), 1u);
+  auto host = *CodeBook::open_running(folder.path(), kPort);
+  EXPECT_EQ(*host.revoke(secure::to_text({{}, first}), false), 1u);
   book.refresh();
   EXPECT_EQ(book.check(first, kNow).state, CodeState::Revoked);
   EXPECT_EQ(book.check(second, kNow).state, CodeState::Good);
-  EXPECT_EQ(*revoke(folder.path(), kPort, "surgeon"), 1u);
+  EXPECT_EQ(*host.revoke("surgeon", false), 1u);
   // A use is taken of what the file says now, so it does not undo what was revoked meanwhile.
   EXPECT_TRUE(book.use(book.check(watcher, kNow).id));
   EXPECT_EQ(book.check(second, kNow).state, CodeState::Revoked);
-  EXPECT_FALSE(revoke(folder.path(), kPort, "surgeon").ok()) << "nothing is left to revoke";
-  EXPECT_FALSE(revoke(folder.path(), kPort, "nurse").ok());
-  EXPECT_FALSE(revoke(folder.path(), 1, "surgeon").ok());
+  EXPECT_FALSE(host.revoke("surgeon", false).ok()) << "nothing is left to revoke";
+  EXPECT_FALSE(host.revoke("nurse", false).ok());
+  EXPECT_FALSE(CodeBook::open_running(folder.path(), 1).ok());
+
+  const auto spoilt = book.check(second, kNow).id;
+  EXPECT_FALSE(book.puts_out(spoilt));
+  EXPECT_EQ(*host.revoke(secure::to_text({{}, second}), true), 1u) << "revoked, but not put out";
+  book.refresh();
+  EXPECT_TRUE(book.puts_out(spoilt));
+  EXPECT_FALSE(book.puts_out(book.check(first, kNow).id));
+  EXPECT_FALSE(book.puts_out(0));
+
+  const auto another = *host.issue(wire::Role::Surgeon, kNow + 10, -1);
+  book.refresh();
+  EXPECT_EQ(book.check(another, kNow).state, CodeState::Good);
+  EXPECT_EQ(book.check(first, kNow).state, CodeState::Revoked);
 }
 
 TEST(CodeBook, a_damaged_file_revokes_and_a_damaged_start_says_so) {

@@ -15,6 +15,8 @@ struct AccessOptions {
   std::int64_t code_uses = 0;  // 0: without limit
   bool keeps_codes = false;
   std::string revoke;                 // code or role; empty: host a session
+  bool puts_out = false;              // with `revoke`: who came with it has to go
+  std::string new_code;               // role; empty: host a session
   std::uint32_t return_seconds = 30;  // how long a place is kept after its connection broke
   std::string audit_file;             // empty: audit.jsonl in the state folder
 };

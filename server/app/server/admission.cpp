@@ -7,6 +7,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -85,6 +86,28 @@ Result<secure::Identity> read_or_make_identity(const fs::path& state) {
   return secure::Identity{std::move(*certificate), std::move(*key)};
 }
 
+std::int64_t expiry(const AccessOptions& options) {
+  return static_cast<std::int64_t>(std::time(nullptr)) + std::llround(options.code_hours * 3600);
+}
+
+std::int64_t uses(const AccessOptions& options) {
+  return options.code_uses > 0 ? options.code_uses : -1;
+}
+
+std::string invitation_head(double hours) {
+  return fmt::format(
+      "Join codes, for {:g} hours (trocar-client --role ROLE --join CODE"
+      " --server HOST:PORT, or --join LINK):\n",
+      hours);
+}
+
+std::string invitation_line(const std::string& role, const secure::JoinCode& code,
+                            const std::string& address, std::uint16_t port) {
+  const auto server = public_host(address) + ":" + std::to_string(port);
+  return fmt::format("  {:<10}  {}  {}\n", role, secure::to_text(code),
+                     secure::to_link(server, code));
+}
+
 Status check_loopback(const std::string& address) {
   if (secure::is_loopback(address)) return {};
   return Error{ErrorCode::Usage, "--insecure-loopback: " + address +
@@ -161,7 +184,6 @@ Status Admission::read_identity() {
 Status Admission::issue_codes(std::uint16_t port) {
   if (!tls_) return {};
   const auto now = static_cast<std::int64_t>(std::time(nullptr));
-  const auto expires = now + std::llround(options_.code_hours * 3600);
   auto book = access::CodeBook::open(state_, port, options_.keeps_codes || is_resuming_, now);
   if (!book) return book.error();
   places_file_ = places_file(state_, port);
@@ -174,8 +196,7 @@ Status Admission::issue_codes(std::uint16_t port) {
     places_before_ = std::move(*places);
   }
   for (const auto& role : wire::kRoles) {
-    const auto secret =
-        book->issue(role.role, expires, options_.code_uses > 0 ? options_.code_uses : -1);
+    const auto secret = book->issue(role.role, expiry(options_), uses(options_));
     if (!secret) return secret.error();
     codes_[role.name] = {certificate_code_, *secret};
   }
@@ -207,26 +228,35 @@ Admission::~Admission() {
 
 std::string Admission::invitation(std::uint16_t port) const {
   if (codes_.empty()) return {};
-  std::string text = fmt::format(
-      "Join codes, for {:g} hours (trocar-client --role ROLE --join CODE"
-      " --server HOST:PORT, or --join LINK):\n",
-      options_.code_hours);
-  const auto server = public_host(address_) + ":" + std::to_string(port);
-  for (const auto& role : wire::kRoles) {
-    const auto& code = codes_.at(role.name);
-    text += fmt::format("  {:<10}  {}  {}\n", role.name, secure::to_text(code),
-                        secure::to_link(server, code));
-  }
+  std::string text = invitation_head(options_.code_hours);
+  for (const auto& role : wire::kRoles)
+    text += invitation_line(role.name, codes_.at(role.name), address_, port);
   return text;
 }
 
-Status revoke_codes(const AccessOptions& options, std::uint16_t port) {
+Status change_codes(const AccessOptions& options, const std::string& address, std::uint16_t port) {
   const auto state = state_folder(options);
   if (!state) return state.error();
-  const auto count = access::revoke(*state, port, options.revoke);
-  if (!count) return count.error();
-  std::printf("%zu %s revoked: nobody joins with %s any more; who is in stays\n", *count,
-              *count == 1 ? "code is" : "codes are", *count == 1 ? "it" : "them");
+  auto book = access::CodeBook::open_running(*state, port);
+  if (!book)
+    return Error{book.error().code,
+                 (options.revoke.empty() ? "--new-code: " : "--revoke: ") + book.error().message};
+  if (!options.revoke.empty()) {
+    const auto count = book->revoke(options.revoke, options.puts_out);
+    if (!count) return count.error();
+    std::printf("%zu %s revoked: nobody joins with %s any more; who is in %s\n", *count,
+                *count == 1 ? "code is" : "codes are", *count == 1 ? "it" : "them",
+                options.puts_out ? "has to go" : "stays (--put-out: has to go)");
+  }
+  if (options.new_code.empty()) return {};
+  const auto admission = Admission::prepare(options, address);
+  if (!admission) return admission.error();
+  const auto role = std::ranges::find(wire::kRoles, options.new_code, &wire::NamedRole::name);
+  const auto secret = book->issue(role->role, expiry(options), uses(options));
+  if (!secret) return secret.error();
+  const secure::JoinCode code{(*admission)->certificate_code(), *secret};
+  std::printf("%s%s", invitation_head(options.code_hours).c_str(),
+              invitation_line(role->name, code, address, port).c_str());
   return {};
 }
 

@@ -43,6 +43,7 @@ class Admission {
   void keep_places(std::vector<KeptPlace> places);
   // Those that the server before has left; after issue_codes().
   const std::vector<KeptPlace>& places_before() const { return places_before_; }
+  const secure::HalfCode& certificate_code() const { return certificate_code_; }
   // Null: everybody may come.
   access::Gate* gate() { return gate_.get(); }
   // Says code and link of each role, a line each; nothing if insecure.
@@ -66,7 +67,7 @@ class Admission {
   std::unique_ptr<access::Gate> gate_;
 };
 
-// Does what --revoke asks for and says so.
-Status revoke_codes(const AccessOptions& options, std::uint16_t port);
+// Does what --revoke and --new-code ask for, at the server that runs, and says so.
+Status change_codes(const AccessOptions& options, const std::string& address, std::uint16_t port);
 
 }  // namespace trocar::app

@@ -64,6 +64,8 @@ Status check_start(const ServerOptions& options) {
   const auto& access = options.access;
   if (!access.revoke.empty())
     return of("revoke", Error{ErrorCode::Usage, "starts no session that could be checked"});
+  if (!access.new_code.empty())
+    return of("new-code", Error{ErrorCode::Usage, "starts no session that could be checked"});
   if (const auto s = net::check_listen_address(options.address); !s) return of("listen", s);
   const char* identity = access.certificate_file.empty() ? "state" : "certificate";
   if (const auto s = Admission::check(access, options.address); !s) return of(identity, s);

@@ -20,8 +20,10 @@ std::filesystem::path places_file(const std::filesystem::path& state_folder, std
 Status write_places(const std::filesystem::path& file, const std::vector<KeptPlace>& places) {
   Json json = {{"version", kVersion}, {"places", Json::array()}};
   for (const auto& place : places)
-    json["places"].push_back(
-        {{"slot", place.slot.value}, {"name", place.name}, {"token", secure::to_hex(place.token)}});
+    json["places"].push_back({{"slot", place.slot.value},
+                              {"name", place.name},
+                              {"token", secure::to_hex(place.token)},
+                              {"code", place.code}});
   return secure::write_private_file(file, to_text(json));
 }
 
@@ -43,6 +45,7 @@ Result<std::vector<KeptPlace>> read_places(const std::filesystem::path& file) {
       const auto token = secure::from_hex(entry.at("token").get<std::string>());
       if (!place.slot.is_valid() || token.size() != place.token.size()) return bad("a place");
       std::ranges::copy(token, place.token.begin());
+      place.code = entry.at("code").get<std::uint32_t>();
       places.push_back(std::move(place));
     }
   } catch (const Json::exception& exception) {

@@ -3,9 +3,9 @@
 // The places of a session in a private file, with the tokens to come back to them, so that people
 // can return to a server that was killed and goes on with its recording.
 //
-//   places-PORT.json   {"version": 1, "places": [{"slot", "name", "token"}]}: `token` as
-//   hexadecimal
-//                      digits; of mode 0600, and removed when the session ends
+//   places-PORT.json   {"version": 1, "places": [{"slot", "name", "token", "code"}]}: `token` as
+//                      hexadecimal digits, `code` the number of the join code; of mode 0600, and
+//                      removed when the session ends
 
 #include <filesystem>
 #include <string>
@@ -20,6 +20,7 @@ struct KeptPlace {
   ParticipantSlot slot;
   std::string name;
   participants::ReturnToken token{};
+  std::uint32_t code = 0;
 
   bool operator==(const KeptPlace&) const = default;
 };

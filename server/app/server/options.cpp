@@ -24,7 +24,8 @@ Examples:
   trocar-server --organ lattice --listen 0.0.0.0:7690
       a block of springs, for everybody on the network who has one of the printed join codes
   trocar-server --listen 0.0.0.0:7690 --revoke observer
-      nobody joins the server at that port with an observer's code any more
+      nobody joins the server at that port with an observer's code any more; with --put-out those
+      who came with it have to go, and with --new-code observer there is another one
   trocar-server --organ liver.organ --sweeps 6 --budget 0.6
       up to six passes, as long as a tick takes no more than 0.6 ms
   trocar-server --organ liver --reduction liver.reduction
@@ -81,10 +82,20 @@ void add_access_options(CLI::App& app, AccessOptions& options) {
       ->capture_default_str();
   access->add_flag("--keep-codes", options.keeps_codes,
                    "codes stay good after the end, for the next start with this option");
+  auto* revoke = access
+                     ->add_option("--revoke", options.revoke,
+                                  "revoke a code, or all of a role, of the server that runs at "
+                                  "--listen, and exit")
+                     ->type_name("CODE|ROLE");
   access
-      ->add_option("--revoke", options.revoke,
-                   "revoke a code, or all of a role, of the server that runs at --listen, and exit")
-      ->type_name("CODE|ROLE");
+      ->add_flag("--put-out", options.puts_out,
+                 "with --revoke: who came with the code has to go, too")
+      ->needs(revoke);
+  access
+      ->add_option("--new-code", options.new_code,
+                   "make one more code of a role for the server that runs at --listen, and exit")
+      ->type_name("ROLE")
+      ->check(CLI::IsMember({"surgeon", "assistant", "instructor", "observer"}));
   access
       ->add_option("--return-seconds", options.return_seconds,
                    "how long somebody's place is kept when the connection breaks, 0: not")
@@ -109,6 +120,51 @@ void add_access_options(CLI::App& app, AccessOptions& options) {
   key->needs(certificate);
   access->add_flag("--insecure-loopback", options.is_insecure,
                    "without TLS and codes, for tests; 127.0.0.1 and [::1] only");
+}
+
+void add_limit_options(CLI::App& app, LimitOptions& options) {
+  auto* limits = app.add_option_group("Limits", "how much people and strangers may take");
+  limits->add_option("--max-hands", options.places.hands, "people with tools: surgeons, assistants")
+      ->type_name("N")
+      ->check(CLI::Range(1, kMaxHands))
+      ->capture_default_str();
+  limits->add_option("--max-watchers", options.places.watchers, "instructors and observers")
+      ->type_name("N")
+      ->check(CLI::Range(0, kMaxWatchers))
+      ->capture_default_str();
+  limits->add_option("--max-tools", options.places.tools, "tools of one person")
+      ->type_name("N")
+      ->check(CLI::Range(1, kToolsPerHand))
+      ->capture_default_str();
+  limits
+      ->add_option("--max-messages", options.messages_per_second,
+                   "messages of one client per second, or its session ends")
+      ->type_name("N")
+      ->check(CLI::Range(100u, 20'000u))
+      ->capture_default_str();
+  limits
+      ->add_option("--max-kilobytes", options.kilobytes_per_second,
+                   "kB of one client per second, or its session ends")
+      ->type_name("N")
+      ->check(CLI::Range(50u, 10'000u))
+      ->capture_default_str();
+  limits
+      ->add_option("--max-message-bytes", options.message_bytes, "bytes of one message of a client")
+      ->type_name("N")
+      ->check(CLI::Range(1024u, wire::kMaxUpstreamBytes))
+      ->capture_default_str();
+  limits
+      ->add_option("--max-newcomers", options.newcomers,
+                   "connections that have not said who they are; the oldest makes room")
+      ->type_name("N")
+      ->check(CLI::Range(4, 1000))
+      ->capture_default_str();
+  limits
+      ->add_option("--max-newcomers-per-address", options.newcomers_per_address,
+                   "of these from one address")
+      ->type_name("N")
+      ->check(CLI::Range(4, 1000))
+      ->capture_default_str();
 }
 
 struct ResearchOptions {
@@ -191,6 +247,7 @@ CommandLine::CommandLine() {
   add_session_options();
   add_config_options();
   add_access_options(app_, options_.access);
+  add_limit_options(app_, options_.limits);
   add_research_options(app_, options_, research_);
 }
 

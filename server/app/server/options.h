@@ -7,6 +7,7 @@
 
 #include "common/base/result.h"
 #include "server/app/server/access_options.h"
+#include "server/app/server/limit_options.h"
 #include "server/app/server/option_origins.h"
 #include "server/tissue/step/tick_report.h"
 
@@ -22,6 +23,7 @@ struct ServerOptions {
   std::uint16_t port = 7690;
   bool is_stream_only = false;  // no datagrams
   AccessOptions access;
+  LimitOptions limits;
   std::string announced_name;     // on the local network; empty: made from organ and machine
   bool is_unannounced = false;    // otherwise it is announced where others may reach it
   std::string journal;            // a file, or "none"

@@ -119,6 +119,12 @@ Status Server::open() {
   tcp.outbox_bytes = std::max(tcp.outbox_bytes, 8 * topology_bytes);
   tcp.tls = admission_->tls();
   tcp.has_datagrams = !options_.is_stream_only;
+  const auto& limits = options_.limits;
+  tcp.max_newcomers = limits.newcomers;
+  tcp.max_newcomers_per_address = limits.newcomers_per_address;
+  tcp.max_message_bytes = limits.message_bytes;
+  tcp.max_connections =
+      static_cast<std::size_t>(limits.places.hands + limits.places.watchers) + limits.newcomers;
   tcp.plain_reply = replication::encode_goodbye(
       replication::EndReason::Version,
       "this server speaks TLS 1.3 only: use a client of its release, without --insecure-loopback");
@@ -135,6 +141,9 @@ Status Server::open() {
   replication.gate = admission_->gate();
   replication.has_datagrams = tcp_->has_datagrams();
   replication.return_seconds = options_.access.return_seconds;
+  replication.places = limits.places;
+  replication.max_messages_per_second = limits.messages_per_second;
+  replication.max_bytes_per_second = 1000 * limits.kilobytes_per_second;
   replication.on_participants = [this](const auto& present, Tick tick) {
     note_participants(present, tick);
   };
@@ -164,7 +173,8 @@ void Server::restore_people() {
   for (const auto& who : start_.participants) {
     const auto place = std::ranges::find_if(
         kept, [&](const auto& one) { return one.slot == who.slot && one.name == who.name; });
-    const bool may_return = place != kept.end() && replicator_->restore(who, place->token);
+    const bool may_return =
+        place != kept.end() && replicator_->restore(who, place->token, place->code);
     restored += may_return;
     if (!may_return && who.slot.has_tools()) leave(who.slot);
   }
@@ -180,7 +190,7 @@ void Server::note_participants(const std::vector<participants::Participant>& pre
   std::vector<KeptPlace> places;
   for (const auto& who : present)
     if (const auto* token = replicator_->absences().find(who.slot))
-      places.push_back({who.slot, who.name, *token});
+      places.push_back({who.slot, who.name, *token, replicator_->code_of(who.slot)});
   admission_->keep_places(std::move(places));
 }
 
@@ -331,22 +341,24 @@ Status Server::finish() {
   if (options_.summary_file.empty()) return closed;
   const wire::RecordingState not_recorded{
       .status = wire::RecordingStatus::Off, .frames_missing = 0, .text = {}};
-  const Summary summary{.organ = simulation_.organ().name,
-                        .node_count = simulation_.organ().mesh.node_count(),
-                        .surface_vertex_count = simulation_.layout().vertex_count(),
-                        .wall_seconds = wall_seconds_,
-                        .journal = journal_ ? options_.journal : "none",
-                        .recording = journal_ ? journal_->state() : not_recorded,
-                        .reduction = reduction_,
-                        .frames_lost = handover_.dropped(),
-                        .loop = report,
-                        .barrier = barrier_,
-                        .replication = replicator_->counters(),
-                        .encoding = replicator_->encode_statistics(),
-                        .tcp = tcp_->counters(),
-                        .datagrams = tcp_->datagram_counters(),
-                        .inbox = inbox_.counters(),
-                        .ghost = ghost_ ? ghost_->counters() : ghost::GhostCounters{}};
+  const Summary summary{
+      .organ = simulation_.organ().name,
+      .node_count = simulation_.organ().mesh.node_count(),
+      .surface_vertex_count = simulation_.layout().vertex_count(),
+      .wall_seconds = wall_seconds_,
+      .journal = journal_ ? options_.journal : "none",
+      .recording = journal_ ? journal_->state() : not_recorded,
+      .reduction = reduction_,
+      .frames_lost = handover_.dropped(),
+      .loop = report,
+      .barrier = barrier_,
+      .replication = replicator_->counters(),
+      .encoding = replicator_->encode_statistics(),
+      .access = admission_->gate() ? admission_->gate()->counters() : access::GateCounters{},
+      .tcp = tcp_->counters(),
+      .datagrams = tcp_->datagram_counters(),
+      .inbox = inbox_.counters(),
+      .ghost = ghost_ ? ghost_->counters() : ghost::GhostCounters{}};
   const auto written = write_text_file(options_.summary_file, to_json(summary));
   return closed ? written : closed;
 }
@@ -354,7 +366,8 @@ Status Server::finish() {
 }  // namespace
 
 Status run_server(const ServerOptions& options) {
-  if (!options.access.revoke.empty()) return revoke_codes(options.access, options.port);
+  if (!options.access.revoke.empty() || !options.access.new_code.empty())
+    return change_codes(options.access, options.address, options.port);
   auto admission =
       Admission::prepare(options.access, options.address, !options.resume_file.empty());
   if (!admission) return admission.error();

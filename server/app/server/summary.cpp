@@ -57,8 +57,6 @@ Json replication_figures(const Summary& s) {
           {"returned", r.returned},
           {"bytes_sent", s.tcp.bytes_out},
           {"bytes_received", s.tcp.bytes_in},
-          {"newcomers_dropped", s.tcp.newcomers_dropped},
-          {"handshakes_failed", s.tcp.handshakes_failed},
           {"samples", r.samples},
           {"samples_dropped", s.inbox.samples_dropped},
           {"frames_published", r.frames_published},
@@ -76,6 +74,24 @@ Json replication_figures(const Summary& s) {
           {"bytes_per_changed_vertex", per_vertex},
           {"encode_delta_cpu_us", times(e.delta_cpu)},
           {"encode_keyframe_cpu_us", times(e.keyframe_cpu)}};
+}
+
+// Says who was kept out or sent away, and why.
+Json limit_figures(const Summary& s) {
+  Json ended = Json::object();
+  for (std::size_t i = 0; i < s.replication.ended.size(); ++i)
+    if (s.replication.ended[i] > 0)
+      ended[name_of(static_cast<replication::EndReason>(i))] = s.replication.ended[i];
+  return {{"connections", s.tcp.accepted},
+          {"connections_rejected", s.tcp.rejected_full},
+          {"newcomers_dropped", s.tcp.newcomers_dropped},
+          {"handshakes_failed", s.tcp.handshakes_failed},
+          {"connection_faults", s.tcp.faults},
+          {"joined", s.access.joined},
+          {"refused", s.access.refused},
+          {"wrong_codes", s.access.wrong_tries},
+          {"floods", s.replication.floods},
+          {"ended", ended}};
 }
 
 Json rate_figures(const Summary& s) {
@@ -163,6 +179,7 @@ std::string to_json(const Summary& s) {
        {"solver", solver_figures(s)},
        {"tick_cpu_us", times(s.loop.times.tick)},
        {"stage_cpu_us", stages(s.loop.times)},
+       {"limits", limit_figures(s)},
        {"replication", replication_figures(s)}});
 }
 

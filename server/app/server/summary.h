@@ -26,6 +26,7 @@ struct Summary {
   const std::vector<replication::BarrierResult>& barrier;
   const replication::ReplicatorCounters& replication;
   const replication::EncodeStatistics& encoding;
+  const access::GateCounters access;
   const net::TcpCounters& tcp;
   const net::DatagramCounters datagrams;
   const participants::SimulationInbox::Counters& inbox;

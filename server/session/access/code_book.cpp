@@ -22,6 +22,10 @@ wire::Role role_named(const std::string& name) {
   return wire::Role::Unknown;
 }
 
+std::filesystem::path book_file(const std::filesystem::path& folder, std::uint16_t port) {
+  return folder / ("codes-" + std::to_string(port) + ".json");
+}
+
 Result<Bytes> read_or_make_key(const std::filesystem::path& folder) {
   const auto file = folder / "codes.key";
   if (!std::filesystem::exists(file)) {
@@ -47,6 +51,7 @@ Result<CodeEntry> read_entry(const Json& json) {
   entry.expires = json.at("expires").get<std::int64_t>();
   entry.uses_left = json.at("uses_left").get<std::int64_t>();
   entry.is_revoked = json.at("revoked").get<bool>();
+  entry.puts_out = json.at("puts_out").get<bool>();
   if (entry.role == wire::Role::Unknown || entry.hmac.size() != sizeof(secure::Digest))
     return Error{ErrorCode::BadFile, "a code without role or hmac"};
   return entry;
@@ -73,9 +78,7 @@ Result<std::vector<CodeEntry>> parse_codes(const std::string& text) {
 }
 
 CodeBook::CodeBook(std::filesystem::path state_folder, std::uint16_t port, Bytes key)
-    : folder_(std::move(state_folder)),
-      file_(folder_ / ("codes-" + std::to_string(port) + ".json")),
-      key_(std::move(key)) {}
+    : folder_(std::move(state_folder)), file_(book_file(folder_, port)), key_(std::move(key)) {}
 
 Result<CodeBook> CodeBook::open(const std::filesystem::path& state_folder, std::uint16_t port,
                                 bool keeps_codes, std::int64_t now) {
@@ -91,6 +94,21 @@ Result<CodeBook> CodeBook::open(const std::filesystem::path& state_folder, std::
     });
   }
   if (const auto written = book.write(); !written) return written.error();
+  return book;
+}
+
+Result<CodeBook> CodeBook::open_running(const std::filesystem::path& state_folder,
+                                        std::uint16_t port) {
+  const auto file = book_file(state_folder, port);
+  if (!std::filesystem::exists(file))
+    return Error{
+        ErrorCode::BadFile,
+        file.string() + " is not there: give --listen and --state of the server that runs"};
+  const secure::FolderLock lock(state_folder);
+  auto key = read_or_make_key(state_folder);
+  if (!key) return key.error();
+  CodeBook book(state_folder, port, std::move(*key));
+  if (const auto read = book.read(); !read) return read.error();
   return book;
 }
 
@@ -121,13 +139,16 @@ Status CodeBook::write() {
                              {"hmac", secure::to_hex(entry.hmac)},
                              {"expires", entry.expires},
                              {"uses_left", entry.uses_left},
-                             {"revoked", entry.is_revoked}});
+                             {"revoked", entry.is_revoked},
+                             {"puts_out", entry.puts_out}});
   const auto written = secure::write_private_file(file_, to_text(json));
   read_stamp_ = stamp();
   return written;
 }
 
 Result<secure::HalfCode> CodeBook::issue(wire::Role role, std::int64_t expires, std::int64_t uses) {
+  const secure::FolderLock lock(folder_);
+  refresh();
   if (entries_.size() >= kMostCodes)
     return Error{ErrorCode::ResourceMissing,
                  file_.string() + ": holds 1000 codes: remove it, or start without --keep-codes"};
@@ -139,7 +160,6 @@ Result<secure::HalfCode> CodeBook::issue(wire::Role role, std::int64_t expires, 
   for (const auto& other : entries_) entry.id = std::max(entry.id, other.id);
   ++entry.id;
   entries_.push_back(std::move(entry));
-  const secure::FolderLock lock(folder_);
   if (const auto written = write(); !written) return written.error();
   return secret;
 }
@@ -188,18 +208,9 @@ void CodeBook::discard() {
   std::filesystem::remove(file_, ignored);
 }
 
-Result<std::size_t> revoke(const std::filesystem::path& state_folder, std::uint16_t port,
-                           const std::string& code_or_role) {
-  const auto file = state_folder / ("codes-" + std::to_string(port) + ".json");
-  if (!std::filesystem::exists(file))
-    return Error{ErrorCode::BadFile,
-                 "--revoke: " + file.string() +
-                     ": is not there: give --listen and --state of the server that runs"};
-  const secure::FolderLock lock(state_folder);
-  auto key = read_or_make_key(state_folder);
-  if (!key) return key.error();
-  CodeBook book(state_folder, port, std::move(*key));
-  if (const auto read = book.read(); !read) return read.error();
+Result<std::size_t> CodeBook::revoke(const std::string& code_or_role, bool puts_out) {
+  const secure::FolderLock lock(folder_);
+  refresh();
   const auto role = role_named(code_or_role);
   Bytes hmac;
   if (role == wire::Role::Unknown) {
@@ -208,24 +219,32 @@ Result<std::size_t> revoke(const std::filesystem::path& state_folder, std::uint1
       return Error{ErrorCode::Usage, "--revoke: '" + code_or_role +
                                          "' is no join code, link or role: surgeon, assistant, "
                                          "instructor, observer"};
-    const auto digest = secure::hmac_sha256(book.key_, invitation->code.secret);
+    const auto digest = secure::hmac_sha256(key_, invitation->code.secret);
     hmac.assign(digest.begin(), digest.end());
   }
   std::size_t count = 0;
-  for (auto& entry : book.entries_) {
+  for (auto& entry : entries_) {
     const bool is_meant = role != wire::Role::Unknown
                               ? entry.role == role
                               : secure::equal_in_constant_time(entry.hmac, hmac);
-    if (!is_meant || entry.is_revoked) continue;
+    // A code that was revoked may still put out who came with it.
+    if (!is_meant || (entry.is_revoked && (entry.puts_out || !puts_out))) continue;
     entry.is_revoked = true;
+    entry.puts_out = puts_out;
     ++count;
   }
   if (count == 0)
-    return Error{ErrorCode::BadFile,
-                 "--revoke: the server at port " + std::to_string(port) +
-                     " has no such code that is not revoked yet: check code, --listen and --state"};
-  if (const auto written = book.write(); !written) return written.error();
+    return Error{
+        ErrorCode::BadFile,
+        "--revoke: " + file_.string() +
+            ": has no such code that is not revoked yet: check code, --listen and --state"};
+  if (const auto written = write(); !written) return written.error();
   return count;
+}
+
+bool CodeBook::puts_out(std::uint32_t id) const {
+  const auto found = std::ranges::find(entries_, id, &CodeEntry::id);
+  return found != entries_.end() && found->puts_out;
 }
 
 }  // namespace trocar::access

@@ -5,11 +5,12 @@
 // stolen the file of codes alone can neither join with it nor find a secret.
 //
 //   codes-PORT.json   {"version": 1, "codes": [{"id", "role", "hmac", "expires", "uses_left",
-//                     "revoked"}]}: `expires` in seconds of Unix time, `uses_left` -1 without limit
+//                     "revoked", "puts_out"}]}: `expires` in seconds of Unix time, `uses_left` -1
+//                     without limit, `puts_out`: who came with it has to go
 //   codes.key         32 random bytes as hexadecimal digits
 //
-// The file may be changed meanwhile (trocar-server --revoke): it is looked at again at most once a
-// second. Every change is made under the folder's lock, of what the file says then.
+// The file may be changed meanwhile (trocar-server --revoke, --new-code): it is looked at again at
+// most once a second. Every change is made under the folder's lock, of what the file says then.
 
 #include <cstdint>
 #include <filesystem>
@@ -31,6 +32,7 @@ struct CodeEntry {
   std::int64_t expires = 0;
   std::int64_t uses_left = -1;
   bool is_revoked = false;
+  bool puts_out = false;  // likewise, and who came with it has to go
 };
 
 // Reads the text of a book's file.
@@ -51,9 +53,17 @@ class CodeBook {
   static Result<CodeBook> open(const std::filesystem::path& state_folder, std::uint16_t port,
                                bool keeps_codes, std::int64_t now);
 
+  // Opens the book of the server that runs at that port, to change it.
+  static Result<CodeBook> open_running(const std::filesystem::path& state_folder,
+                                       std::uint16_t port);
+
   // A new code's secret. `uses` -1: without limit.
   Result<secure::HalfCode> issue(wire::Role role, std::int64_t expires, std::int64_t uses);
   CodeVerdict check(BytesView secret, std::int64_t now) const;
+  // Revokes a code, or all of a role; returns how many that were. `puts_out`: see CodeEntry.
+  Result<std::size_t> revoke(const std::string& code_or_role, bool puts_out);
+  // Whether who came with this code has to go.
+  bool puts_out(std::uint32_t id) const;
   // Takes one use of a code; says whether there was one.
   bool use(std::uint32_t id);
   // Reads the file again if it is not the one that was read last.
@@ -75,18 +85,10 @@ class CodeBook {
   Status read();
   Status write();
 
-  friend Result<std::size_t> revoke(const std::filesystem::path&, std::uint16_t,
-                                    const std::string&);
-
   std::filesystem::path folder_, file_;
   Bytes key_;
   std::vector<CodeEntry> entries_;
   Stamp read_stamp_;
 };
-
-// Revokes codes of the server at that port: a code, or all codes of a role. The server notices
-// within a second. Returns how many codes that were.
-Result<std::size_t> revoke(const std::filesystem::path& state_folder, std::uint16_t port,
-                           const std::string& code_or_role);
 
 }  // namespace trocar::access

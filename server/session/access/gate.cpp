@@ -56,10 +56,7 @@ std::optional<Refusal> Gate::check(Applicant& applicant, BytesView secret, bool 
                    "join code: too many wrong codes, try again in " + seconds_text(wait)};
   if (has_wrong_token) count_wrong_try(applicant, now);
   if (secret.empty()) return none;
-  if (now - looked_ns_ >= kSecondNs) {
-    looked_ns_ = now;
-    book_.refresh();
-  }
+  refresh();
   const auto unix_now = options_.unix_seconds ? options_.unix_seconds() : std::time(nullptr);
   const auto verdict = book_.check(secret, unix_now);
   if (verdict.state == CodeState::Wrong) count_wrong_try(applicant, now);
@@ -71,6 +68,14 @@ std::optional<Refusal> Gate::check(Applicant& applicant, BytesView secret, bool 
                        ", come with --role " + wire::name_of(verdict.role)};
   applicant.code = verdict.id;
   return std::nullopt;
+}
+
+bool Gate::refresh() {
+  const auto now = options_.clock_ns();
+  if (now - looked_ns_ < kSecondNs) return false;
+  looked_ns_ = now;
+  book_.refresh();
+  return true;
 }
 
 bool Gate::admit(const Applicant& applicant) {

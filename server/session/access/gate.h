@@ -55,6 +55,11 @@ class Gate {
   // Takes one use of the code; false if there is none left.
   bool admit(const Applicant& applicant);
 
+  // Looks at the book's file again, at most once a second; true: it has.
+  bool refresh();
+  // Whether the host has put out those who came with that code.
+  bool puts_out(const Applicant& applicant) const { return book_.puts_out(applicant.code); }
+
   void note_leave(const Applicant& applicant);
   // `reason` is one line; for refusals by check() and by others alike.
   void note_refusal(const Applicant& applicant, const std::string& reason);

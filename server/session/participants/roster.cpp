@@ -34,9 +34,10 @@ Result<Participant> Roster::join(std::string_view name, Role role,
   if (!has_tools(role) && !tools.empty())
     return refuse(JoinRefusal::ToolsInvalid,
                   std::string("tools: an ") + name_of(role) + " watches and has none");
-  if (tools.size() > kToolsPerHand)
-    return refuse(JoinRefusal::ToolsInvalid,
-                  "tools: " + std::to_string(tools.size()) + " are too many, at most 2");
+  if (tools.size() > static_cast<std::size_t>(places_.tools))
+    return refuse(JoinRefusal::ToolsInvalid, "tools: " + std::to_string(tools.size()) +
+                                                 " are too many, at most " +
+                                                 std::to_string(places_.tools));
   for (const auto& shape : tools)
     if (!tool::is_valid(shape))
       return refuse(JoinRefusal::ToolsInvalid,
@@ -51,13 +52,15 @@ Result<Participant> Roster::join(std::string_view name, Role role,
   if (has_tools(role) && tools.empty()) tools.emplace_back();
 
   const auto first = slots_.begin() + (has_tools(role) ? 0 : kMaxHands);
-  const auto last = has_tools(role) ? slots_.begin() + kMaxHands : slots_.end();
+  const int places = has_tools(role) ? places_.hands : places_.watchers;
+  const auto last = first + places;
   const auto free = std::find_if(first, last, [](const auto& slot) { return !slot; });
   if (free == last)
-    return refuse(JoinRefusal::Full,
-                  has_tools(role)
-                      ? "full: all 16 places with tools are taken, join as observer or come back"
-                      : "full: all 100 places for watchers are taken, come back later");
+    return refuse(JoinRefusal::Full, "full: all " + std::to_string(places) +
+                                         (has_tools(role) ? " places with tools are taken, join as "
+                                                            "observer or come back"
+                                                          : " places for watchers are taken, come "
+                                                            "back later"));
   const auto index = static_cast<std::uint8_t>(free - slots_.begin());
   *free = Participant{
       .slot = {index}, .name = std::string(name), .role = role, .tools = std::move(tools)};

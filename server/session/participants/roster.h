@@ -28,11 +28,18 @@ struct Participant {
   bool is_away = false;                // the connection is lost, the place is kept
 };
 
+// How many there are for, at most what ids.h says.
+struct Places {
+  int hands = kMaxHands;        // surgeons and assistants
+  int watchers = kMaxWatchers;  // instructors and observers
+  int tools = kToolsPerHand;    // of each who has some
+};
+
 enum class JoinRefusal { NameInvalid, NameTaken, Full, ToolsInvalid };
 
 class Roster {
  public:
-  Roster() = default;
+  explicit Roster(const Places& places = {}) : places_(places) {}
   // The same people in the same slots, e.g. as a journal lists them.
   explicit Roster(const std::vector<Participant>& present);
 
@@ -51,6 +58,7 @@ class Roster {
   std::vector<Participant> list() const;  // by slot
 
  private:
+  Places places_;
   std::array<std::optional<Participant>, kMaxParticipants> slots_;
 };
 

@@ -13,6 +13,7 @@ namespace {
 constexpr std::uint64_t kShortestSilenceNs = 200'000'000;
 constexpr std::uint64_t kProbeIntervalNs = 250'000'000;
 constexpr std::size_t kProbeOverheadBytes = 12;
+constexpr std::uint64_t kFirstRestNs = 4'000'000'000, kLongestRestNs = 32'000'000'000;
 
 }  // namespace
 
@@ -29,8 +30,18 @@ void FrameFeed::forget_before(Frame first) {
 void FrameFeed::acknowledge(const FrameEncoder& encoder, Frame frame) {
   for (auto* pacer : {&datagram_pacer_, &stream_pacer_})
     pacer->on_acknowledged(frame, options_.clock_ns());
+  rest_if_congested();
   if (frame < first_useful_ || (acknowledged_ && frame <= acknowledged_->frame)) return;
   if (auto known = encoder.find(frame)) acknowledged_ = std::move(known);
+}
+
+void FrameFeed::rest_if_congested() {
+  if (!datagram_pacer_.is_congested()) return;
+  datagram_pacer_.restart();
+  const auto now = options_.clock_ns();
+  const bool was_long_ago = now - rest_end_ns_ > kLongestRestNs;
+  rest_ns_ = was_long_ago ? kFirstRestNs : std::min(2 * rest_ns_, kLongestRestNs);
+  rest_end_ns_ = now + rest_ns_;
 }
 
 void FrameFeed::hear(std::uint32_t received) {
@@ -41,6 +52,7 @@ void FrameFeed::hear(std::uint32_t received) {
 
 bool FrameFeed::uses_datagrams() const {
   if (!heard_ns_ || !connections_.has_datagrams(id_)) return false;
+  if (options_.clock_ns() < rest_end_ns_) return false;
   const auto silence = std::max(kShortestSilenceNs, 3 * datagram_pacer_.shortest_ns());
   return options_.clock_ns() - *heard_ns_ <= silence;
 }

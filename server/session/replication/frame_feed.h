@@ -11,7 +11,8 @@
 // A frame is left out while too many are under way (frame_pacer.h; for clients that acknowledge
 // each) or too many bytes wait for the stream. Datagrams count as heard while the client reports a
 // growing number of them. In between probes of full size are sent, so that a path which is open for
-// small ones only is not taken.
+// small ones only is not taken. Where datagrams are more than the link takes even one frame at a
+// time, they rest for some seconds: the stream finds its share of any link.
 //
 // Thread: the I/O thread.
 
@@ -60,6 +61,7 @@ class FrameFeed {
   bool is_recent(const step::SharedFrame& base, const step::PublishedFrame& frame) const;
   void send(BytesView datagram);
   void probe();
+  void rest_if_congested();
   void note_given(Frame frame, FramePacer& pacer);
 
   net::Connections& connections_;
@@ -77,6 +79,7 @@ class FrameFeed {
   std::uint32_t heard_ = 0;
   std::optional<std::uint64_t> heard_ns_;  // when that number last grew
   std::uint64_t probe_ns_ = 0;
+  std::uint64_t rest_ns_ = 0, rest_end_ns_ = 0;  // of the datagrams
 };
 
 }  // namespace trocar::replication

@@ -1,13 +1,17 @@
 #include "server/session/replication/frame_pacer.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace trocar::replication {
 namespace {
 
 constexpr std::uint64_t kPeriodNs = 10'000'000'000;
 constexpr std::uint64_t kPatienceNs = 80'000'000;
+constexpr double kFewFrames = 2;
+constexpr std::uint64_t kRiseNs = 10'000'000;
 constexpr int kMostDoublings = 4;
+constexpr double kNewestShare = 0.125;
 
 }  // namespace
 
@@ -31,18 +35,34 @@ void FramePacer::on_acknowledged(Frame frame, std::uint64_t now_ns) {
 }
 
 void FramePacer::adapt(double acknowledged, Frame frame) {
+  const bool has_losses = acknowledged > 1;  // or acknowledgements that came as one
+  arriving_ *= std::pow(1 - kNewestShare, acknowledged);
+  arriving_ += kNewestShare;
   const auto late_ns = last_ns_ - shortest_ns();
   if (late_ns < kEarlyNs) {
     window_ = std::min(kMostFrames, window_ + acknowledged / window_);
-  } else if (late_ns > kLateNs && frame > narrowed_at_) {
+  } else if ((late_ns > kLateNs || has_losses) && frame > narrowed_at_) {
     window_ = std::max(1.0, std::min(window_, static_cast<double>(sent_.size())) / 2);
     narrowed_at_ = sent_.back().frame;
   }
 }
 
+bool FramePacer::is_congested() const {
+  return window_ < kFewFrames && arriving_ < 0.6 && last_ns_ - shortest_ns() > kEarlyNs;
+}
+
+void FramePacer::restart() {
+  sent_.clear();
+  window_ = kFewFrames;
+  arriving_ = 1;
+  tries_ = 0;
+}
+
 void FramePacer::learn(std::uint64_t elapsed_ns, std::uint64_t now_ns) {
   last_ns_ = elapsed_ns;
   if (shortest_[0] == 0 || now_ns - period_begin_ns_ > kPeriodNs) {
+    // Our own frames may be what the link is never idle for: with one at a time it shows.
+    if (shortest_[1] != 0 && shortest_[0] > shortest_[1] + kRiseNs) window_ = 1;
     period_begin_ns_ = now_ns;
     shortest_[1] = shortest_[0];
     shortest_[0] = elapsed_ns;

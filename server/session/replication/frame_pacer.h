@@ -3,8 +3,9 @@
 // How many frames may be under way to one client at a time, by one path. A slow link keeps what it
 // cannot carry in queues that nobody here sees, and every picture in them grows old; but
 // acknowledgements show how late frames arrive. While they come as fast as over the idle link the
-// window grows by one frame per window; when they are late it halves, down to one frame at a time.
-// (The rule of LEDBAT, RFC 6817, in frames.)
+// window grows by one frame per window; when they are late, or less late but some are lost, it
+// halves, down to one frame at a time. (The rule of LEDBAT, RFC 6817, in frames.) Losses without
+// delay change nothing: a radio link loses what it likes.
 //
 // Times are of one monotonic clock, in ns. Frames are told in ascending order.
 
@@ -17,7 +18,7 @@ namespace trocar::replication {
 
 class FramePacer {
  public:
-  static constexpr double kMostFrames = 64, kFirstFrames = 16;
+  static constexpr double kMostFrames = 64, kFirstFrames = 6;
   // A client answers within a frame or two, however short the queue.
   static constexpr std::uint64_t kEarlyNs = 35'000'000, kLateNs = 60'000'000;
 
@@ -27,6 +28,11 @@ class FramePacer {
   // True if another frame may leave. When nothing is heard for a while one frame tries again, and
   // the while doubles each time.
   bool may_send(std::uint64_t now_ns) const;
+
+  // One frame at a time is late, and most are lost: what is sent this way stays too much.
+  bool is_congested() const;
+  // Begins anew, carefully.
+  void restart();
 
   double window() const { return window_; }
   std::size_t under_way() const { return sent_.size(); }
@@ -46,6 +52,7 @@ class FramePacer {
 
   std::deque<Sent> sent_;  // not acknowledged, ascending
   double window_ = kFirstFrames;
+  double arriving_ = 1;    // share of frames lately
   int tries_ = 0;          // beyond the window, since something was heard
   Frame narrowed_at_ = 0;  // frames up to this left before the window was narrowed
   std::uint64_t last_ns_ = 0;

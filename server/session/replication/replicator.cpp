@@ -14,8 +14,6 @@ namespace trocar::replication {
 namespace {
 
 constexpr std::uint64_t kSecondNs = 1'000'000'000;
-// It is no flood when a client or server that slept finds so much waiting.
-constexpr double kMostSecondsAtOnce = 15;
 constexpr int kMostSamplesPerDatagram = 3 * kToolsPerHand;
 
 std::string text_of_role(participants::Role role) {
@@ -65,6 +63,7 @@ Replicator::Replicator(net::Connections& connections, participants::SimulationIn
       organ_hash_(organ_hash),
       organ_name_(std::move(organ_name)),
       layout_(std::move(layout)),
+      roster_(options_.places),
       absences_(options_.return_seconds) {}
 
 Replicator::~Replicator() = default;
@@ -148,14 +147,26 @@ void Replicator::forget(Client& client) {
 }
 
 void Replicator::settle_participants() {
-  while (participants_changed_) {
-    participants_changed_ = false;
-    const auto present = roster_.list();
-    if (options_.on_participants)
-      options_.on_participants(present, encoder_.current() ? encoder_.current()->tick : 0);
-    broadcast(encode_participants(present));
-  }
+  const auto now = options_.clock_ns();
+  do {  // somebody may drop out while being told
+    if (participants_changed_) {
+      participants_changed_ = false;
+      are_participants_told_ = false;
+      if (options_.on_participants)
+        options_.on_participants(roster_.list(), encoder_.current() ? encoder_.current()->tick : 0);
+    }
+    tell_participants(now);
+  } while (participants_changed_);
   settle_ghost();
+}
+
+void Replicator::tell_participants(std::uint64_t now_ns) {
+  const bool is_early =
+      participants_told_ns_ && now_ns - *participants_told_ns_ < options_.participants_interval_ns;
+  if (are_participants_told_ || is_early) return;
+  are_participants_told_ = true;
+  participants_told_ns_ = now_ns;
+  broadcast(encode_participants(roster_.list()));
 }
 
 void Replicator::settle_ghost() {
@@ -174,23 +185,25 @@ void Replicator::end_all(EndReason reason, const std::string& text) {
 
 // ---- what they say ----
 
-bool Replicator::exceeds_rate(Client& client) {
+std::optional<Replicator::Ending> Replicator::check_rate(Client& client, std::size_t bytes) {
   const auto now = options_.clock_ns();
-  const double rate = options_.max_messages_per_second;
-  const double elapsed = static_cast<double>(now - client.allowance_ns) * 1e-9;
-  client.allowance = std::min(client.allowance + elapsed * rate, kMostSecondsAtOnce * rate);
-  client.allowance_ns = now;
-  client.allowance -= 1;
-  return client.allowance < 0;
+  const auto flood = [this](std::uint32_t limit, const char* what) {
+    ++counters_.floods;
+    return Ending{EndReason::ProtocolError,
+                  "more than " + std::to_string(limit) + " " + what +
+                      " in a second: send each tool at most 250 times per second"};
+  };
+  if (!client.messages.take(1, now)) return flood(options_.max_messages_per_second, "messages");
+  if (!client.bytes.take(static_cast<double>(bytes), now))
+    return flood(options_.max_bytes_per_second, "bytes");
+  return std::nullopt;
 }
 
 std::optional<Replicator::Ending> Replicator::handle_message(Client& client, BytesView bytes) {
   const auto protocol_error = [](std::string text) {
     return Ending{EndReason::ProtocolError, std::move(text)};
   };
-  if (exceeds_rate(client))
-    return protocol_error("more than " + std::to_string(options_.max_messages_per_second) +
-                          " messages in a second: send each tool at most 250 times per second");
+  if (auto flood = check_rate(client, bytes.size())) return flood;
   proto::Envelope envelope;
   if (const auto decoded = wire::decode_envelope(bytes, envelope); !decoded)
     return protocol_error(decoded.error().message);
@@ -238,16 +251,13 @@ void Replicator::on_datagram(net::ConnectionId id, BytesView message) {
   if (found == clients_.end() || !found->second->participant) return;
   auto& client = *found->second;
   proto::Envelope envelope;
-  const auto decoded = wire::decode_envelope(message, envelope);
-  std::optional<Ending> ending;
-  if (exceeds_rate(client))
-    ending = Ending{
-        EndReason::ProtocolError,
-        "more than " + std::to_string(options_.max_messages_per_second) + " messages in a second"};
-  else if (!decoded)
-    ending = Ending{EndReason::ProtocolError, decoded.error().message};
-  else if (envelope.has_client_datagram())
-    ending = handle_datagram(client, envelope.client_datagram());
+  auto ending = check_rate(client, message.size());
+  if (!ending) {
+    if (const auto decoded = wire::decode_envelope(message, envelope); !decoded)
+      ending = Ending{EndReason::ProtocolError, decoded.error().message};
+    else if (envelope.has_client_datagram())
+      ending = handle_datagram(client, envelope.client_datagram());
+  }
   if (ending) end_session(client, *ending);
   settle_participants();
 }
@@ -447,6 +457,7 @@ void Replicator::publish(std::span<const step::SharedFrame> frames) {
   if (frames.empty()) return;
   TROCAR_ASSERT(!barrier_);
   end_absences(options_.clock_ns());
+  put_out_revoked();
   Status followed;
   for (const auto& frame : frames) {
     for (const auto& event : frame->mark_events) broadcast(encode_mark_event(event));

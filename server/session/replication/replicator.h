@@ -78,7 +78,9 @@ class Replicator final : public net::ConnectionHandler {
 
   // Before the first connection: somebody who was in the session that this one goes on with, whose
   // tools the simulation has, and who may come back as after a loss. False: nobody may.
-  bool restore(participants::Participant who, const participants::ReturnToken& token);
+  // `code`: the number of the join code that they came with.
+  bool restore(participants::Participant who, const participants::ReturnToken& token,
+               std::uint32_t code = 0);
 
   // Frames since the last call, oldest first, none left out. Claim events and surface changes of
   // all of them are delivered, the displacements only of the newest.
@@ -101,6 +103,8 @@ class Replicator final : public net::ConnectionHandler {
   std::size_t session_count() const { return clients_.size(); }
   const participants::Roster& roster() const { return roster_; }
   const participants::Absences& absences() const { return absences_; }
+  // Number of the join code that somebody came with; 0: none.
+  std::uint32_t code_of(ParticipantSlot slot) const;
   const ReplicatorCounters& counters() const { return counters_; }
   const EncodeStatistics& encode_statistics() const { return encoder_.statistics(); }
 
@@ -129,6 +133,8 @@ class Replicator final : public net::ConnectionHandler {
   bool keep_place(Client& client);
   // Gives up the places of those who have been away for too long by then.
   void end_absences(std::uint64_t now_ns);
+  // Ends the sessions of those whose code was revoked so that they have to go.
+  void put_out_revoked();
   void refuse(Client& client, const std::string& reason);
   // `is_ordered`: it came by the stream alone, so that sequence numbers must grow.
   std::optional<Ending> handle_sample(Client& client, const proto::ToolSample& sample,
@@ -137,7 +143,8 @@ class Replicator final : public net::ConnectionHandler {
   std::optional<Ending> handle_mark(Client& client, int action);
   void handle_ghost_request(Client& client, bool is_wanted);
   std::optional<Ending> handle_ack(Client& client, Frame frame, std::uint32_t crc);
-  bool exceeds_rate(Client& client);
+  // Ends the session of who sends too much.
+  std::optional<Ending> check_rate(Client& client, std::size_t bytes);
 
   // Tells everybody what begins an epoch and keeps it; an error if it does not follow.
   Status change_surface(const wire::SurfaceChange& change);
@@ -154,8 +161,10 @@ class Replicator final : public net::ConnectionHandler {
   void end_session(Client& client, const Ending& ending);
   void leave(Client& client);
   void forget(Client& client);
-  // Tells everybody who is here, as often as somebody drops out while being told.
+  // After each change of who is here. Those who are here are told at once, but when many come and
+  // go only every tenth of a second.
   void settle_participants();
+  void tell_participants(std::uint64_t now_ns);
   void settle_ghost();
 
   net::Connections& connections_;
@@ -169,7 +178,9 @@ class Replicator final : public net::ConnectionHandler {
   participants::Absences absences_;
   std::map<net::ConnectionId, std::unique_ptr<Client>> clients_;
   std::map<ParticipantSlot, std::unique_ptr<Client>> away_;  // without a connection
-  bool participants_changed_ = false;
+  bool participants_changed_ = false;                        // since on_participants was called
+  bool are_participants_told_ = true;
+  std::optional<std::uint64_t> participants_told_ns_;
   bool is_ghost_wanted_ = false;
   wire::RecordingState recording_{
       .status = wire::RecordingStatus::Off, .frames_missing = 0, .text = {}};

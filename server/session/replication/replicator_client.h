@@ -2,6 +2,7 @@
 
 // One connection as the replicator knows it. Only the replicator's own sources include this.
 
+#include "server/session/replication/allowance.h"
 #include "server/session/replication/frame_feed.h"
 #include "server/session/replication/replicator.h"
 
@@ -13,8 +14,8 @@ struct Replicator::Client {
          ReplicatorCounters& counters)
       : id(its_id),
         feed(connections, its_id, options, counters),
-        allowance(options.max_messages_per_second),
-        allowance_ns(options.clock_ns()) {}
+        messages(options.max_messages_per_second, options.clock_ns()),
+        bytes(options.max_bytes_per_second, options.clock_ns()) {}
 
   const net::ConnectionId id;
   access::Applicant applicant;                           // as the gate knows it
@@ -24,8 +25,7 @@ struct Replicator::Client {
   bool wants_ghost = false;
   bool has_sent_datagrams = false;
   std::array<std::optional<std::uint32_t>, kToolsPerHand> last_sequence;
-  double allowance;  // messages that it may send at this moment
-  std::uint64_t allowance_ns;
+  Allowance messages, bytes;  // that it may send
 };
 
 }  // namespace trocar::replication

@@ -16,11 +16,14 @@
 namespace trocar::replication {
 
 struct ReplicatorOptions {
+  participants::Places places;
   std::uint32_t max_messages_per_second = 2000;      // per connection; two tools at 250 Hz need 500
+  std::uint32_t max_bytes_per_second = 500'000;      // likewise; they need 100 kB
   std::size_t skip_above_bytes = 64 * 1024;          // see above
   Frame keyframe_after_frames = 63;                  // about 1 s
   std::uint64_t keyframe_interval_ns = 250'000'000;  // of keyframes on request
-  std::uint32_t return_seconds = 30;                 // 0: a lost connection is a leave
+  std::uint64_t participants_interval_ns = 100'000'000;  // of telling all who is here
+  std::uint32_t return_seconds = 30;                     // 0: a lost connection is a leave
   std::function<std::uint64_t()> clock_ns = monotonic_ns;
   // Told who is here after each change, with the tick of the newest frame; may be empty.
   std::function<void(const std::vector<participants::Participant>&, Tick)> on_participants;
@@ -35,6 +38,7 @@ struct ReplicatorCounters {
   std::uint64_t sessions = 0;                          // welcomed, returns left out
   std::uint64_t lost = 0, returned = 0;                // connections of those who can return
   std::array<std::uint64_t, kEndReasonCount> ended{};  // by EndReason, where we ended it
+  std::uint64_t floods = 0;                            // sessions ended for too much at once
   std::uint64_t samples = 0;
   std::uint64_t frames_published = 0;
   std::uint64_t frames_conflated = 0;  // overtaken by a newer one before this thread saw them

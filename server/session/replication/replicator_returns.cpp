@@ -22,13 +22,14 @@ bool Replicator::keep_place(Client& client) {
   return true;
 }
 
-bool Replicator::restore(participants::Participant who, const participants::ReturnToken& token) {
+bool Replicator::restore(participants::Participant who, const participants::ReturnToken& token,
+                         std::uint32_t code) {
   const auto slot = who.slot;
   if (roster_.find(who.name) || !absences_.restore(slot, token)) return false;
   absences_.begin(slot, options_.clock_ns());
   who.is_away = true;
   auto client = std::make_unique<Client>(connections_, 0, options_, counters_);
-  client->applicant = {{}, who.name, who.role};
+  client->applicant = {{}, who.name, who.role, code};
   client->is_welcome = true;
   client->participant = who;
   if (slot.has_tools()) inbox_.note_hand();
@@ -44,6 +45,30 @@ void Replicator::end_absences(std::uint64_t now_ns) {
     log::info("{} has not come back", client->participant->name);
     leave(*client);
   }
+}
+
+std::uint32_t Replicator::code_of(ParticipantSlot slot) const {
+  if (const auto away = away_.find(slot); away != away_.end()) return away->second->applicant.code;
+  for (const auto& [id, client] : clients_)
+    if (client->participant && client->participant->slot == slot) return client->applicant.code;
+  return 0;
+}
+
+void Replicator::put_out_revoked() {
+  auto* gate = options_.gate;
+  if (!gate || !gate->refresh()) return;
+  for (auto next = clients_.begin(); next != clients_.end();) {
+    auto& client = *next->second;
+    ++next;  // ending a session erases it
+    if (client.is_welcome && gate->puts_out(client.applicant))
+      end_session(client, {EndReason::CodeRevoked,
+                           "join code: the host has revoked the code that you came with"});
+  }
+  std::erase_if(away_, [&](const auto& entry) {
+    const bool has_to_go = gate->puts_out(entry.second->applicant);
+    if (has_to_go) leave(*entry.second);
+    return has_to_go;
+  });
 }
 
 const participants::Participant* Replicator::find_own_place(const HelloRequest& request) const {

@@ -1,5 +1,6 @@
 #include "server/session/replication/validation.h"
 
+#include <array>
 #include <cmath>
 
 #include "common/base/version.h"
@@ -23,6 +24,15 @@ Error bad(std::string message) {
 }
 
 }  // namespace
+
+const char* name_of(EndReason reason) {
+  static constexpr std::array<const char*, kEndReasonCount> kNames{
+      "unspecified",  "server-closing", "protocol-error", "version",
+      "full",         "name-taken",     "role",           "too-slow",
+      "timeout",      "code-wrong",     "code-expired",   "code-used-up",
+      "code-revoked", "too-many-tries", "code-role",      "name-invalid"};
+  return kNames[static_cast<std::size_t>(reason)];
+}
 
 Result<HelloRequest> check_hello(const proto::Hello& hello, EndReason& reason) {
   if (hello.protocol_major() != kProtocolMajor) {

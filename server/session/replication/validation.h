@@ -42,6 +42,8 @@ enum class EndReason : std::uint8_t {
   NameInvalid = 15,
 };
 inline constexpr int kEndReasonCount = 16;
+// In words for figures, such as "code-wrong".
+const char* name_of(EndReason reason);
 
 struct HelloRequest {
   std::uint32_t protocol_minor = 0;
