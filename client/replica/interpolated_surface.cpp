@@ -9,6 +9,8 @@ namespace {
 constexpr std::uint64_t kPauseNs = 250'000'000;
 constexpr std::size_t kArrivalWindow = 32;  // half a second
 constexpr double kJumpTicks = 250;
+constexpr std::size_t kDelayWindow = 128, kFramesForDelay = 16;
+constexpr double kMarginTicks = 1;
 constexpr std::uint64_t kGlideNs = 300'000'000;
 constexpr double kSlewTicks = 120;  // an error of this size changes the speed by 100 %
 
@@ -21,14 +23,42 @@ Pose between(const Pose& a, const Pose& b, float t) {
 
 void DisplayClock::restart() {
   arrivals_.clear();
+  needed_ticks_.clear();
+  delay_ticks_ = kFirstDelayTicks;
   display_tick_ = -1;
 }
 
 void DisplayClock::add_arrival(Tick tick, std::uint64_t arrival_ns) {
   // A pause (of a replay, or of the server) says nothing about the rate after it.
   if (!arrivals_.empty() && arrival_ns > arrivals_.back().ns + kPauseNs) arrivals_.clear();
+  const Tick before = arrivals_.empty() ? tick : arrivals_.back().tick;
   arrivals_.push_back({tick, arrival_ns});
   if (arrivals_.size() > kArrivalWindow) arrivals_.pop_front();
+  if (arrivals_.size() > 1) adapt_delay(static_cast<double>(tick - before));
+}
+
+void DisplayClock::adapt_delay(double ticks_since_last) {
+  const auto& newest = arrivals_.back();
+  const double late = tick_without_jitter(newest.ns) - static_cast<double>(newest.tick);
+  needed_ticks_.push_back(late + ticks_since_last + kMarginTicks);
+  if (needed_ticks_.size() > kDelayWindow) needed_ticks_.pop_front();
+  if (needed_ticks_.size() < kFramesForDelay) return;
+  std::vector<double> ascending(needed_ticks_.begin(), needed_ticks_.end());
+  const auto at = ascending.begin() + static_cast<std::ptrdiff_t>(ascending.size() * 19 / 20);
+  std::nth_element(ascending.begin(), at, ascending.end());
+  const double most = kMostDelayTicks * std::max(1.0, rate() / kTicksPerSecond);
+  delay_ticks_ = std::clamp(*at, kLeastDelayTicks, most);
+}
+
+double DisplayClock::tick_without_jitter(std::uint64_t now_ns) const {
+  const double ticks_per_ns = rate() * 1e-9;
+  double furthest = 0;
+  for (const auto& arrival : arrivals_) {
+    const auto since_ns =
+        static_cast<double>(now_ns > arrival.ns ? now_ns - arrival.ns : std::uint64_t{0});
+    furthest = std::max(furthest, static_cast<double>(arrival.tick) + since_ns * ticks_per_ns);
+  }
+  return furthest;
 }
 
 double DisplayClock::rate() const {
@@ -44,8 +74,7 @@ double DisplayClock::advance(std::uint64_t now_ns) {
   const Arrival& newest = arrivals_.back();
   const auto newest_tick = static_cast<double>(newest.tick);
   const double speed = rate();
-  const double age = now_ns > newest.ns ? static_cast<double>(now_ns - newest.ns) * 1e-9 : 0.0;
-  const double target = std::min(newest_tick, newest_tick - kDisplayDelayTicks + age * speed);
+  const double target = std::min(newest_tick, tick_without_jitter(now_ns) - delay_ticks_);
   // A first frame is shown as it is.
   if (display_tick_ < 0 || std::abs(target - display_tick_) > kJumpTicks) {
     display_tick_ = arrivals_.size() == 1 ? newest_tick : target;

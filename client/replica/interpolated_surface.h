@@ -3,14 +3,15 @@
 // The surface to show now: float positions and tools between two published frames are computed
 // here.
 //
-// Frames arrive every 16 ms with jitter; the display runs about 1.5 frames (24 ticks) behind the
-// newest, so that there nearly always is a frame on either side. The display tick follows
-//   target = newest tick - 24 + (time since its arrival) x rate,   at most the newest tick,
-// where `rate` (ticks per second) is measured over the last half second of arrivals: simulated time
-// may run slower than real time, a replay at any speed. It is slewed, never stepped back; after a
-// seek or a gap of more than 250 ticks it jumps. Nothing is extrapolated: at the newest frame the
-// picture holds still. After a return to the session (Replica::welcome_count) the tissue glides
-// from where it was shown last to where it is, in 0.3 s. Thread: render thread.
+// Frames arrive every 16 ms, or less often, with jitter. The display runs behind them by as much as
+// this client needs so that 95 times in a hundred there is a frame on either side. Its tick follows
+//   target = tick that a frame without jitter would have now - delay,   at most the newest tick,
+//   delay  = 95th percentile, over the last 128 frames, of lateness + ticks since the frame before,
+// where both are in ticks, and the rate of ticks is measured over the last half second of arrivals:
+// simulated time may run slower than real time, a replay at any speed. It is slewed, never stepped
+// back; after a seek or a gap of more than 250 ticks it jumps. Nothing is extrapolated: at the
+// newest frame the picture holds still. After a return to the session (Replica::welcome_count) the
+// tissue glides from where it was shown last to where it is, in 0.3 s. Thread: render thread.
 
 #include <deque>
 
@@ -18,7 +19,8 @@
 
 namespace trocar::replica {
 
-inline constexpr double kDisplayDelayTicks = 24;
+// Of the display, at real time.
+inline constexpr double kFirstDelayTicks = 24, kLeastDelayTicks = 17, kMostDelayTicks = 120;
 
 // Estimates the display tick from arrivals. Separate from the surface so that it can be tested
 // alone.
@@ -29,6 +31,8 @@ class DisplayClock {
   void add_arrival(Tick tick, std::uint64_t arrival_ns);
   // Advances to `now_ns` and returns the display tick; monotone between restarts.
   double advance(std::uint64_t now_ns);
+  // Ticks by which the display runs behind frames that come without jitter.
+  double delay_ticks() const { return delay_ticks_; }
 
  private:
   struct Arrival {
@@ -36,8 +40,13 @@ class DisplayClock {
     std::uint64_t ns;
   };
   double rate() const;  // ticks per second
+  // Where the least delayed of the last frames say that the server is.
+  double tick_without_jitter(std::uint64_t now_ns) const;
+  void adapt_delay(double ticks_since_last);
 
   std::deque<Arrival> arrivals_;
+  std::deque<double> needed_ticks_;  // of the last frames
+  double delay_ticks_ = kFirstDelayTicks;
   double display_tick_ = -1;  // < 0: not started
   std::uint64_t last_ns_ = 0;
 };
@@ -50,6 +59,7 @@ class InterpolatedSurface {
   // False until there is a first frame.
   bool is_valid() const { return is_valid_; }
   double tick() const { return tick_; }
+  double delay_ticks() const { return clock_.delay_ticks(); }
   const std::vector<Vec3f>& positions() const { return positions_; }  // m, per vertex slot
   const std::vector<Tool>& tools() const { return tools_; }
   const std::vector<std::uint16_t>& regions() const { return regions_; }

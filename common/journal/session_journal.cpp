@@ -4,6 +4,8 @@
 #include <charconv>
 #include <limits>
 
+#include "common/journal/mcap_repair.h"
+
 namespace trocar::journal {
 namespace {
 
@@ -66,8 +68,11 @@ Status SessionJournal::read_info() {
   info_.protocol = text("protocol");
   info_.organ_name = text("organ_name");
   info_.last_tick = times_.tick(mcap_->statistics().end_time);
-  info_.is_finished = mcap_->is_finished();
+  const bool is_repaired = std::ranges::any_of(
+      all, [](const McapMetadata& m) { return m.name == kRepairedMetadataName; });
+  info_.is_finished = mcap_->is_finished() && !is_repaired;
   info_.summary = mcap_->summary_text();
+  if (is_repaired) info_.summary += ", repaired: what the writer lost is missing";
   return read_participants();
 }
 

@@ -33,8 +33,8 @@ struct SessionInfo {
   Tick last_tick = 0;                            // of the last message
   std::vector<proto::Participant> participants;  // everyone who was ever in, in order of joining
   std::uint64_t gap_messages = 0;                // that the session dropped while recording
-  bool is_finished = false;
-  std::string summary;  // one line for people
+  bool is_finished = false;                      // by its writer; not if it was repaired
+  std::string summary;                           // one line for people
 
   // The tick after which this journal begins.
   Tick begin_tick() const { return continues ? continues->tick : 0; }

@@ -34,9 +34,14 @@ fi
 rm -rf journals
 mkdir journals
 "$writer" journals
-for name in finished killed one_each empty; do
+for name in finished killed repaired one_each empty; do
   node "$source_folder/check_journal.mjs" "journals/$name.mcap" --modules .
 done
+node -e '
+  const report = JSON.parse(require("fs").readFileSync(0));
+  process.exit(report.finished && report.messages > 0 ? 0 : 1);' <<JSON
+$(node "$source_folder/check_journal.mjs" journals/repaired.mcap --modules . --json)
+JSON
 
 # The check itself must be able to fail: one flipped bit in a chunk, one in the summary.
 size=$(wc -c <journals/finished.mcap)

@@ -2,12 +2,14 @@
 // empty.
 //   finished.mcap    4 s, closed
 //   killed.mcap      the same without its end
+//   repaired.mcap    made of that
 //   one_each.mcap    one message per chunk, one larger than any chunk
 //   empty.mcap       nothing but a frame
 
 #include <cstdio>
 #include <string>
 
+#include "common/journal/mcap_repair.h"
 #include "tests/journal/session_samples.h"
 
 namespace {
@@ -38,6 +40,7 @@ int main(int argc, char** argv) {
     journal::testing::SampleSession session(folder + "killed.mcap");
     session.run(251);
   }
+  TROCAR_ASSERT(repair(folder + "killed.mcap", folder + "repaired.mcap").ok());
   auto one_each = McapWriter::create(folder + "one_each.mcap", {"", "trocar tests"});
   TROCAR_ASSERT(one_each.ok());
   const auto channel = (*one_each)->add_channel("/big", "", 0);

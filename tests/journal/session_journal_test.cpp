@@ -1,6 +1,7 @@
 #include "common/journal/session_journal.h"
 
 #include "common/base/version.h"
+#include "common/journal/mcap_repair.h"
 #include "tests/journal/mcap_files.h"
 #include "tests/journal/session_samples.h"
 
@@ -183,6 +184,59 @@ TEST_F(session_journal, killed_session_loses_at_most_the_open_chunk) {
                                       })
                   .ok());
   EXPECT_EQ(records, journal->info().last_tick + 1);
+}
+
+TEST_F(session_journal, a_repaired_one_is_whole_but_not_finished_by_its_writer) {
+  {
+    SampleSession session(path_);
+    session.run(250);
+  }
+  const auto killed = load_file(path_);
+  save_file(path_, BytesView(killed).first(killed.size() - 100));
+  const auto repaired_path = folder_.file("repaired.mcap");
+  const auto report = repair(path_, repaired_path);
+  ASSERT_TRUE(report.ok()) << report.error().message;
+  EXPECT_GT(report->dropped_bytes, 0u) << "the torn chunk";
+  const auto before = open_journal();
+  const auto after = SessionJournal::open(repaired_path);
+  ASSERT_TRUE(after.ok());
+  EXPECT_TRUE((*after)->container().is_finished());
+  EXPECT_FALSE((*after)->info().is_finished);
+  EXPECT_NE((*after)->info().summary.find("repaired"), std::string::npos);
+  EXPECT_EQ((*after)->info().last_tick, before->info().last_tick);
+  using Found = std::vector<std::tuple<std::string, Tick, Bytes>>;
+  const auto all = [](SessionJournal& journal) {
+    Found found;
+    journal.read_all([&](std::string_view topic, Tick tick, BytesView bytes) {
+      found.emplace_back(topic, tick, Bytes(bytes.begin(), bytes.end()));
+      return true;
+    });
+    return found;
+  };
+  EXPECT_EQ(all(**after), all(*before));
+  EXPECT_EQ(report->messages, all(*before).size());
+  EXPECT_FALSE(repair(path_, repaired_path).ok()) << "nothing is ever overwritten";
+}
+
+TEST_F(session_journal, repair_leaves_damaged_chunks_out_and_whole_recordings_alone) {
+  SampleSession session(path_);
+  session.run(250);
+  ASSERT_TRUE(session.writer().close().ok());
+  const auto repaired_path = folder_.file("repaired.mcap");
+  const auto whole = repair(path_, repaired_path);
+  ASSERT_FALSE(whole.ok());
+  EXPECT_NE(whole.error().message.find("nothing to repair"), std::string::npos);
+  EXPECT_FALSE(std::filesystem::exists(repaired_path));
+  Bytes bytes = load_file(path_);
+  const auto chunks = open_journal()->container().chunks();
+  bytes[chunks[chunks.size() / 2].chunk_offset + 100] ^= 1;
+  save_file(path_, bytes);
+  const auto report = repair(path_, repaired_path);
+  ASSERT_TRUE(report.ok()) << report.error().message;
+  EXPECT_EQ(report->damaged_chunks, 1u);
+  const auto after = SessionJournal::open(repaired_path);
+  ASSERT_TRUE(after.ok());
+  EXPECT_EQ((*after)->container().chunks().size(), chunks.size() - 1);
 }
 
 TEST_F(session_journal, damage_is_an_error_after_everything_else_was_read) {

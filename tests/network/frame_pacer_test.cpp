@@ -82,18 +82,27 @@ TEST(FramePacer, is_congested_when_one_frame_at_a_time_is_late_and_most_are_lost
   const auto end = [](std::uint64_t late_ms, bool has_losses) {
     FramePacer pacer;
     std::uint64_t now = 1000 * kMs;
-    for (Frame frame = 1; frame < 200; ++frame) {
+    for (Frame frame = 1; frame < 100; ++frame) {
       pacer.on_sent(frame, now);
       now += (frame < 10 ? 20 : 20 + late_ms) * kMs;
       if (!has_losses || frame % 4 == 0) pacer.on_acknowledged(frame, now);
     }
-    EXPECT_EQ(pacer.is_congested(), late_ms > 60 && has_losses);
+    EXPECT_EQ(pacer.is_congested(now), late_ms > 60 && has_losses);
     pacer.restart();
-    EXPECT_FALSE(pacer.is_congested());
+    EXPECT_FALSE(pacer.is_congested(now));
     return pacer.window();
   };
   for (const std::uint64_t late_ms : {0u, 20u, 90u})
     for (const bool has_losses : {false, true}) EXPECT_GE(end(late_ms, has_losses), 1);
+}
+
+TEST(FramePacer, is_congested_when_of_many_frames_none_arrives) {
+  FramePacer pacer;
+  for (Frame frame = 1; frame <= 10; ++frame) pacer.on_sent(frame, frame * kFrameNs);
+  EXPECT_FALSE(pacer.is_congested(10 * kFrameNs));
+  EXPECT_TRUE(pacer.is_congested(600 * kMs));
+  pacer.on_acknowledged(10, 600 * kMs);
+  EXPECT_FALSE(pacer.is_congested(600 * kMs));
 }
 
 TEST(FramePacer, after_silence_one_frame_tries_again) {

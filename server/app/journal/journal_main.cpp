@@ -13,6 +13,7 @@
 #include "common/base/log.h"
 #include "common/base/timing.h"
 #include "common/base/version.h"
+#include "common/journal/mcap_repair.h"
 #include "common/journal/session_journal.h"
 #include "common/wire/role.h"
 #include "server/session/recording/verify.h"
@@ -162,6 +163,15 @@ int verify(const std::string& path, const std::string& reduction_file, bool as_j
   return static_cast<int>(ExitCode::NotVerified);
 }
 
+int repair(const std::string& path, const std::string& to) {
+  const auto repaired = journal::repair(path, to);
+  if (!repaired) return report(kProgram, repaired.error());
+  std::printf("%s: %" PRIu64 " messages; lost: %" PRIu64 " bytes at the end, %" PRIu64
+              " damaged chunks\n",
+              to.c_str(), repaired->messages, repaired->dropped_bytes, repaired->damaged_chunks);
+  return 0;
+}
+
 int run(int argc, char** argv) {
   CLI::App app{"Looks into recorded Trocar sessions (.mcap).", kProgram};
   app.footer(
@@ -171,11 +181,12 @@ int run(int argc, char** argv) {
       "  trocar-journal verify session.mcap --reduction liver.reduction\n"
       "                                                the same for a session that had a "
       "reduction\n"
+      "  trocar-journal repair killed.mcap whole.mcap  for other programs that read MCAP\n"
       "Exit codes: 0 verified, 1 difference found, 2 usage, 3 file cannot be read, 6 not all "
       "could\n"
       "be verified, though nothing differs: the reasons are printed.");
   app.require_subcommand(1);
-  std::string log_level = "warn", path;
+  std::string log_level = "warn", path, repaired_path;
   bool as_json = false;
   app.set_version_flag("--version", std::string(kProgram) + " " + kVersion + ", sim_version " +
                                         std::to_string(kSimVersion) + ", protocol " +
@@ -186,6 +197,10 @@ int run(int argc, char** argv) {
   auto* info = app.add_subcommand("info", "Show what the journal holds");
   auto* check =
       app.add_subcommand("verify", "Simulate the session again and compare all that it says");
+  auto* mend = app.add_subcommand(
+      "repair", "Write a recording that was cut short or is damaged again, as a whole file");
+  mend->add_option("FILE", path, "the journal (.mcap)")->required();
+  mend->add_option("NEW", repaired_path, "the file to write, which must not exist")->required();
   for (auto* command : {info, check}) {
     command->add_option("FILE", path, "a journal (.mcap)")->required();
     command->add_flag("--json", as_json, "print one JSON object");
@@ -200,6 +215,7 @@ int run(int argc, char** argv) {
     return code == 0 ? 0 : static_cast<int>(ExitCode::Usage);
   }
   if (auto s = log::configure(kProgram, log_level); !s) return report(kProgram, s.error());
+  if (mend->parsed()) return repair(path, repaired_path);
   return check->parsed() ? verify(path, reduction_file, as_json) : show_info(path, as_json);
 }
 

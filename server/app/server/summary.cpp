@@ -41,6 +41,7 @@ Json datagram_figures(const Summary& s) {
           {"sent", d.sent},
           {"received", d.received},
           {"dropped", d.dropped},
+          {"rests", s.replication.datagram_rests},
           {"bytes_sent", d.bytes_out},
           {"bytes_received", d.bytes_in},
           {"encode_slices_cpu_us", times(s.encoding.slices_cpu)}};

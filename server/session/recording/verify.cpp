@@ -84,7 +84,7 @@ Result<VerifyReport> verify_journal(const std::string& path,
   report.is_resimulated = info.sim_version == kSimVersion && !info.has_external_loads;
   report.begin_tick = info.begin_tick();
   report.last_tick = info.last_tick;
-  report.container = (*journal)->container().summary_text();
+  report.container = info.summary;
   std::shared_ptr<const organ::LocalReduction> reduction;
   if (report.is_resimulated || !reduction_file.empty()) {
     auto read = reduction_of(path, info, *organ, reduction_file);

@@ -13,7 +13,9 @@ namespace {
 constexpr std::uint64_t kShortestSilenceNs = 200'000'000;
 constexpr std::uint64_t kProbeIntervalNs = 250'000'000;
 constexpr std::size_t kProbeOverheadBytes = 12;
-constexpr std::uint64_t kFirstRestNs = 4'000'000'000, kLongestRestNs = 32'000'000'000;
+constexpr std::uint64_t kFirstRestNs = 30'000'000'000, kLongestRestNs = 120'000'000'000;
+constexpr std::uint64_t kShortestRestNs = 4'000'000'000;
+constexpr double kFramesOfFreeLink = 8;
 
 }  // namespace
 
@@ -30,15 +32,22 @@ void FrameFeed::forget_before(Frame first) {
 void FrameFeed::acknowledge(const FrameEncoder& encoder, Frame frame) {
   for (auto* pacer : {&datagram_pacer_, &stream_pacer_})
     pacer->on_acknowledged(frame, options_.clock_ns());
-  rest_if_congested();
   if (frame < first_useful_ || (acknowledged_ && frame <= acknowledged_->frame)) return;
   if (auto known = encoder.find(frame)) acknowledged_ = std::move(known);
 }
 
-void FrameFeed::rest_if_congested() {
-  if (!datagram_pacer_.is_congested()) return;
-  datagram_pacer_.restart();
+bool FrameFeed::is_resting() const {
   const auto now = options_.clock_ns();
+  if (now >= rest_end_ns_) return false;
+  const bool is_free = stream_pacer_.window() >= kFramesOfFreeLink;
+  return !is_free || rest_end_ns_ - now > rest_ns_ - kShortestRestNs;
+}
+
+void FrameFeed::rest_if_congested() {
+  const auto now = options_.clock_ns();
+  if (!datagram_pacer_.is_congested(now)) return;
+  datagram_pacer_.restart();
+  ++counters_.datagram_rests;
   const bool was_long_ago = now - rest_end_ns_ > kLongestRestNs;
   rest_ns_ = was_long_ago ? kFirstRestNs : std::min(2 * rest_ns_, kLongestRestNs);
   rest_end_ns_ = now + rest_ns_;
@@ -52,7 +61,7 @@ void FrameFeed::hear(std::uint32_t received) {
 
 bool FrameFeed::uses_datagrams() const {
   if (!heard_ns_ || !connections_.has_datagrams(id_)) return false;
-  if (options_.clock_ns() < rest_end_ns_) return false;
+  if (is_resting()) return false;
   const auto silence = std::max(kShortestSilenceNs, 3 * datagram_pacer_.shortest_ns());
   return options_.clock_ns() - *heard_ns_ <= silence;
 }
@@ -72,6 +81,7 @@ bool FrameFeed::give(FrameEncoder& encoder, bool is_required) {
   const bool is_there = is_required ? streamed_ && streamed_->frame == newest
                                     : newest_given_ && *newest_given_ == newest;
   if (is_there && !is_keyframe_due()) return true;
+  rest_if_congested();
   const bool has_path = uses_datagrams();
   if (!has_path) probe();
   const bool is_by_datagrams =

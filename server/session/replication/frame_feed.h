@@ -12,7 +12,8 @@
 // each) or too many bytes wait for the stream. Datagrams count as heard while the client reports a
 // growing number of them. In between probes of full size are sent, so that a path which is open for
 // small ones only is not taken. Where datagrams are more than the link takes even one frame at a
-// time, they rest for some seconds: the stream finds its share of any link.
+// time, they rest: the stream finds its share of any link. They return when it shows that the link
+// is free again, and try after half a minute or more.
 //
 // Thread: the I/O thread.
 
@@ -62,6 +63,7 @@ class FrameFeed {
   void send(BytesView datagram);
   void probe();
   void rest_if_congested();
+  bool is_resting() const;
   void note_given(Frame frame, FramePacer& pacer);
 
   net::Connections& connections_;

@@ -9,6 +9,8 @@ namespace {
 constexpr std::uint64_t kPeriodNs = 10'000'000'000;
 constexpr std::uint64_t kPatienceNs = 80'000'000;
 constexpr double kFewFrames = 2;
+constexpr int kManyLate = 4;
+constexpr std::uint64_t kStarvedNs = 500'000'000;
 constexpr std::uint64_t kRiseNs = 10'000'000;
 constexpr int kMostDoublings = 4;
 constexpr double kNewestShare = 0.125;
@@ -39,6 +41,7 @@ void FramePacer::adapt(double acknowledged, Frame frame) {
   arriving_ *= std::pow(1 - kNewestShare, acknowledged);
   arriving_ += kNewestShare;
   const auto late_ns = last_ns_ - shortest_ns();
+  late_in_a_row_ = late_ns < kEarlyNs ? 0 : late_in_a_row_ + 1;
   if (late_ns < kEarlyNs) {
     window_ = std::min(kMostFrames, window_ + acknowledged / window_);
   } else if ((late_ns > kLateNs || has_losses) && frame > narrowed_at_) {
@@ -47,15 +50,18 @@ void FramePacer::adapt(double acknowledged, Frame frame) {
   }
 }
 
-bool FramePacer::is_congested() const {
-  return window_ < kFewFrames && arriving_ < 0.6 && last_ns_ - shortest_ns() > kEarlyNs;
+bool FramePacer::is_congested(std::uint64_t now_ns) const {
+  const bool is_starved = static_cast<int>(sent_.size()) >= kManyLate &&
+                          now_ns - sent_.front().ns > std::max(kStarvedNs, 4 * shortest_ns());
+  if (is_starved) return true;
+  return window_ < kFewFrames && arriving_ < 0.6 && late_in_a_row_ >= kManyLate;
 }
 
 void FramePacer::restart() {
   sent_.clear();
   window_ = kFewFrames;
   arriving_ = 1;
-  tries_ = 0;
+  tries_ = late_in_a_row_ = 0;
 }
 
 void FramePacer::learn(std::uint64_t elapsed_ns, std::uint64_t now_ns) {

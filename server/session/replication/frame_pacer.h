@@ -18,7 +18,7 @@ namespace trocar::replication {
 
 class FramePacer {
  public:
-  static constexpr double kMostFrames = 64, kFirstFrames = 6;
+  static constexpr double kMostFrames = 64, kFirstFrames = 16;
   // A client answers within a frame or two, however short the queue.
   static constexpr std::uint64_t kEarlyNs = 35'000'000, kLateNs = 60'000'000;
 
@@ -29,8 +29,9 @@ class FramePacer {
   // the while doubles each time.
   bool may_send(std::uint64_t now_ns) const;
 
-  // One frame at a time is late, and most are lost: what is sent this way stays too much.
-  bool is_congested() const;
+  // One frame at a time is always late, and most are lost; or of many none has arrived for long:
+  // what is sent this way stays too much.
+  bool is_congested(std::uint64_t now_ns) const;
   // Begins anew, carefully.
   void restart();
 
@@ -52,8 +53,9 @@ class FramePacer {
 
   std::deque<Sent> sent_;  // not acknowledged, ascending
   double window_ = kFirstFrames;
-  double arriving_ = 1;    // share of frames lately
-  int tries_ = 0;          // beyond the window, since something was heard
+  double arriving_ = 1;  // share of frames lately
+  int tries_ = 0;        // beyond the window, since something was heard
+  int late_in_a_row_ = 0;
   Frame narrowed_at_ = 0;  // frames up to this left before the window was narrowed
   std::uint64_t last_ns_ = 0;
   std::uint64_t shortest_[2] = {0, 0};  // of this period of 10 s, and of the one before

@@ -44,6 +44,7 @@ struct ReplicatorCounters {
   std::uint64_t frames_conflated = 0;  // overtaken by a newer one before this thread saw them
   std::uint64_t frames_given = 0, frames_skipped = 0;   // summed over clients
   std::uint64_t frames_by_datagram = 0, datagrams = 0;  // of the frames given
+  std::uint64_t datagram_rests = 0;  // times that the stream took over from too many datagrams
   std::uint64_t keyframes_given = 0;
   std::uint64_t surface_changes = 0, surface_change_bytes = 0;  // each counted once
   std::uint64_t ghosts_given = 0, ghosts_skipped = 0;           // summed over clients
