@@ -5,6 +5,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "client/replica/printable_message.h"
 #include "client/replica/replica.h"
 #include "common/base/ids.h"
 #include "common/base/log.h"
@@ -331,11 +332,12 @@ Status ReplaySource::parse(JournalTopic topic, Tick tick, BytesView data,
   return {};
 }
 
-void ReplaySource::deliver(const proto::Envelope& message, Tick tick, replica::MessageSink& sink) {
+void ReplaySource::deliver(proto::Envelope& message, Tick tick, replica::MessageSink& sink) {
   const std::size_t bytes = message.ByteSizeLong() + wire::kHeaderBytes;
   statistics_.bytes_received += bytes;
   ++statistics_.messages_received;
   if (message.has_surface_frame()) ++statistics_.frames_received;
+  replica::make_printable(message);
   sink.on_message(message, due_ns(tick), bytes);
 }
 

@@ -83,7 +83,8 @@ class ReplaySource final : public replica::SessionSource, public replica::Playba
   Status deliver_claims(const JournalStream::Entry& entry, replica::MessageSink& sink);
   Status parse(journal::JournalTopic topic, Tick tick, BytesView data,
                google::protobuf::Message& message) const;
-  void deliver(const proto::Envelope& message, Tick tick, replica::MessageSink& sink);
+  // Makes its texts printable: anybody may have written the recording.
+  void deliver(proto::Envelope& message, Tick tick, replica::MessageSink& sink);
 
   std::unique_ptr<JournalStream> stream_;
   Clock clock_;

@@ -4,6 +4,7 @@
 #include <charconv>
 #include <limits>
 
+#include "common/base/printable.h"
 #include "common/journal/mcap_repair.h"
 
 namespace trocar::journal {
@@ -41,7 +42,7 @@ Status SessionJournal::read_info() {
   const StringMap& entries = metadata->entries;
   const auto text = [&entries](const char* key) {
     const auto found = entries.find(key);
-    return found == entries.end() ? std::string() : found->second;
+    return found == entries.end() ? std::string() : printable(found->second);
   };
   if (!parse_number(entries, "start_utc_ns", 10, info_.start_utc_ns) ||
       !parse_number(entries, "sim_version", 10, info_.sim_version) ||
@@ -81,11 +82,14 @@ Status SessionJournal::read_participants() {
   const auto everything = std::numeric_limits<Tick>::max();
   const TickVisitor<proto::Participants> note = [this](Tick, const proto::Participants& list) {
     for (const proto::Participant& participant : list.participant()) {
+      const auto name = printable(participant.name());
       const bool is_known =
           std::any_of(info_.participants.begin(), info_.participants.end(), [&](const auto& known) {
-            return known.slot() == participant.slot() && known.name() == participant.name();
+            return known.slot() == participant.slot() && known.name() == name;
           });
-      if (!is_known) info_.participants.push_back(participant);
+      if (is_known) continue;
+      info_.participants.push_back(participant);
+      info_.participants.back().set_name(name);
     }
     return true;
   };

@@ -19,6 +19,7 @@
 
 namespace trocar::journal {
 
+// Its texts are printable, whoever wrote the recording.
 struct SessionInfo {
   std::uint64_t start_utc_ns = 0;
   std::uint32_t sim_version = 0;

@@ -1,6 +1,7 @@
-// Watchers cost a server CPU time and bytes. A real server with one scripted hand is followed by
-// watchers in this program. It prints the CPU time of the server's network thread, bytes, and the
-// age of the watchers' surface: with TLS and datagrams, with TLS alone, and without either.
+// Watchers cost a server CPU time and bytes. A real server with scripted hands is followed by
+// watchers in this program, and some that stop reading, which are stopped processes. It prints the
+// CPU time of the server's network thread, bytes, and the age of the watchers' surface: with TLS
+// and datagrams, with TLS alone, and without either.
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -39,6 +40,8 @@ struct Options {
   std::string organ = "lattice";
   double seconds = 10;
   std::vector<int> watchers{10, 30, 100};
+  int hands = 1, stopped = 0;
+  bool has_all_kinds = true;  // of connections
   unsigned threads = 1;
 };
 
@@ -88,17 +91,30 @@ class Session {
       std::this_thread::sleep_for(std::chrono::milliseconds(50));
       port_ = static_cast<std::uint16_t>(std::atoi(read_text(folder_ / "port").c_str()));
     }
-    std::vector<std::string> hand{
-        "--server", "127.0.0.1:" + std::to_string(port_),           "--name", "Hand", "--no-render",
-        "--script", TROCAR_SOURCE_DIR "/deploy/scenes/palpate.toml"};
-    if (kind == Kind::Plain) hand.push_back("--insecure-loopback");
-    hand_ = std::make_unique<Program>("trocar-client", hand, folder_ / "hand.log");
+    static const std::vector<std::string> kHands{"palpate", "press",   "stroke", "lift",
+                                                 "probe",   "spatula", "tug",    "slices"};
+    for (int i = 0; i < options.hands; ++i) {
+      const auto& script = kHands[static_cast<std::size_t>(i) % kHands.size()];
+      start_client("Hand " + std::to_string(i),
+                   {"--script", TROCAR_SOURCE_DIR "/deploy/scenes/" + script + ".toml"});
+    }
+    for (int i = 0; i < options.stopped; ++i)
+      start_client("Stopped " + std::to_string(i), {"--role", "observer"});
+    stopped_ = static_cast<std::size_t>(options.stopped);
   }
   ~Session() {
+    for (std::size_t i = clients_.size() - stopped_; i < clients_.size(); ++i)
+      clients_[i]->signal(SIGKILL);
     server_->signal(SIGTERM);
     server_->wait(10);
-    hand_->wait(5);
+    for (auto& client : clients_) client->wait(5);
     fs::remove_all(folder_);
+  }
+
+  // From now on they read nothing.
+  void stop_clients() {
+    for (std::size_t i = clients_.size() - stopped_; i < clients_.size(); ++i)
+      clients_[i]->signal(SIGSTOP);
   }
 
   pid_t process() const { return server_->process(); }
@@ -115,13 +131,24 @@ class Session {
   }
 
  private:
+  void start_client(const std::string& name, const std::vector<std::string>& more) {
+    std::vector<std::string> arguments{"--server", "127.0.0.1:" + std::to_string(port_), "--name",
+                                       name, "--no-render"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    if (kind_ == Kind::Plain) arguments.push_back("--insecure-loopback");
+    clients_.push_back(
+        std::make_unique<Program>("trocar-client", arguments, folder_ / (name + ".log")));
+  }
+
   const Kind kind_;
   const fs::path folder_ = [] {
     std::string name = (fs::temp_directory_path() / "trocar-watchers-XXXXXX").string();
     return fs::path(mkdtemp(name.data()));
   }();
   std::uint16_t port_ = 0;
-  std::unique_ptr<Program> server_, hand_;
+  std::unique_ptr<Program> server_;
+  std::vector<std::unique_ptr<Program>> clients_;  // hands first
+  std::size_t stopped_ = 0;
 };
 
 // Polls a share of the watchers until told to stop; ages count while `is_counting`.
@@ -154,6 +181,7 @@ void run(const Options& options, Kind kind, int count) {
     threads.emplace_back(
         [&, i] { follow(watchers, i, options.threads, is_stopped, is_counting, ages[i]); });
   std::this_thread::sleep_for(std::chrono::duration<double>(kSettleSeconds));
+  session.stop_clients();
   const auto received = [&] {
     std::uint64_t bytes = 0;
     for (const auto& watcher : watchers) {
@@ -198,6 +226,10 @@ int main(int argc, char** argv) {
   app.add_option("--seconds", options.seconds, "measured, of each session")->capture_default_str();
   app.add_option("--watchers", options.watchers, "how many, one session each")
       ->capture_default_str();
+  app.add_option("--hands", options.hands, "scripted ones")->check(CLI::Range(1, kMaxHands));
+  app.add_option("--stopped", options.stopped, "further watchers that stop reading")
+      ->check(CLI::Range(0, 10));
+  app.add_flag("!--datagrams-only", options.has_all_kinds, "not without TLS or datagrams");
   app.add_option("--threads", options.threads, "that follow them")->check(CLI::Range(1, 64));
   CLI11_PARSE(app, argc, argv);
   if (!log::configure("bench_watchers", "error")) return 2;
@@ -206,6 +238,7 @@ int main(int argc, char** argv) {
       "age, median (ms) | 99th | frames/s | by datagram (%%) | server's memory (MB) | lost |\n"
       "|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n");
   for (const int count : options.watchers)
-    for (const auto kind : {Kind::Plain, Kind::Tls, Kind::Datagrams}) run(options, kind, count);
+    for (const auto kind : {Kind::Plain, Kind::Tls, Kind::Datagrams})
+      if (kind == Kind::Datagrams || options.has_all_kinds) run(options, kind, count);
   return 0;
 }

@@ -54,6 +54,17 @@ TEST_F(session_journal, info_of_a_finished_session) {
   EXPECT_EQ(organ->rest_position_m_size(), 12500);
 }
 
+TEST_F(session_journal, names_of_strangers_give_no_orders_to_a_terminal) {
+  SampleSession session(path_);
+  session.run(251);
+  for (const Tick tick : {4016u, 4032u}) session.add_participants({"Eve\x1b[2J"}, tick);
+  ASSERT_TRUE(session.writer().close().ok());
+  const auto journal = open_journal();
+  ASSERT_TRUE(journal);
+  ASSERT_EQ(journal->info().participants.size(), 3u);
+  EXPECT_EQ(journal->info().participants.back().name(), "Eve?[2J");
+}
+
 TEST_F(session_journal, a_reduction_is_named_and_solver_changes_are_read_back) {
   const ReductionDescription reduction{0xfedcba9876543210u, "liver.reduction", "liver, 4 patches"};
   {

@@ -4,6 +4,7 @@
 
 #include <limits>
 
+#include "common/base/printable.h"
 #include "common/base/version.h"
 #include "server/organs/organ/local_reduction_file.h"
 #include "server/session/recording/recorded_session.h"
@@ -31,9 +32,9 @@ std::string Difference::text() const {
 
 std::string VerifyReport::why() const {
   std::string out;
-  for (const auto& reason : reasons) out += fmt::format("not verified: {}\n", reason);
+  for (const auto& reason : reasons) out += "not verified: " + printable(reason) + "\n";
   if (reasons_left_out > 0) out += fmt::format("not verified: {} more reasons\n", reasons_left_out);
-  if (first_difference) out += fmt::format("first difference: {}\n", first_difference->text());
+  if (first_difference) out += "first difference: " + printable(first_difference->text()) + "\n";
   return out;
 }
 
