@@ -161,12 +161,16 @@ asio::awaitable<void> NetSource::Session::run() {
     begin_conversation();
     co_await read_messages();
     break_connection("it was closed");
-    if (!may_come_back()) {
+    const bool is_away = may_come_back();
+    if (!is_away && !may_try_again()) {
       end_after_stream();
       co_return;
     }
     co_await await_conversation_end();
-    has_connected = co_await come_back();
+    if (is_away)
+      has_connected = co_await come_back();
+    else
+      has_connected = co_await connect();
   }
 }
 
@@ -208,13 +212,21 @@ void NetSource::Session::break_connection(std::string why) {
   if (why_broken_.empty()) why_broken_ = std::move(why);
   boost::system::error_code ignored;
   stream_->socket().close(ignored);
-  if (!may_come_back()) return;
+  if (!may_come_back() && !may_try_again()) return;
   is_connected_ = false;
   datagrams_.reset();
-  if (!comeback_.is_away())
-    log::warn("the connection to {} broke ({}): trying again", server_name(), why_broken_);
-  comeback_.begin(monotonic_ns());
+  why_not_ = "it closed the connection before it answered";
+  if (may_come_back()) {
+    if (!comeback_.is_away())
+      log::warn("the connection to {} broke ({}): trying again", server_name(), why_broken_);
+    comeback_.begin(monotonic_ns());
+  }
   for (auto* timer : {&wake_timer_, &ping_timer_, &room_timer_}) timer->cancel();
+}
+
+bool NetSource::Session::may_try_again() const {
+  return stream_->has_tls() && !has_heard_ && !is_closing_ && !is_done_ &&
+         Clock::now() < connect_until_;
 }
 
 // The writer still looks at the stream, which the next connection replaces.
@@ -288,19 +300,26 @@ void NetSource::Session::check_silence() {
 }
 
 asio::awaitable<bool> NetSource::Session::connect() {
-  const auto deadline = Clock::now() + options_.connect_deadline;
+  const bool is_first = connect_until_ == Clock::time_point{};
+  if (is_first) connect_until_ = Clock::now() + options_.connect_deadline;
+  const auto deadline = connect_until_;
   asio::co_spawn(context_, expire(deadline),
                  [this](std::exception_ptr failure) { end_if_failed(failure); });
-  why_not_ = "no answer";
+  if (is_first) why_not_ = "no answer";
   bool is_said = false;
   while (!is_done_ && Clock::now() < deadline) {
+    if (!is_first || is_said) {
+      // Those who were turned away together do not come again together.
+      std::uniform_int_distribution<std::int64_t> share(1, 4);
+      retry_timer_.expires_after(options_.connect_retry * share(random_));
+      co_await retry_timer_.async_wait(kNoThrow);
+      if (is_done_) break;
+    }
     const bool is_ready = co_await try_to_connect(deadline);
     if (is_ready) co_return true;
     if (is_done_ || Clock::now() >= deadline) break;
     if (!is_said) say_waiting(why_not_);
     is_said = true;
-    retry_timer_.expires_after(options_.connect_retry);
-    co_await retry_timer_.async_wait(kNoThrow);
   }
   end_unreachable(why_not_);
   co_return false;

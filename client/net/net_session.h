@@ -12,6 +12,7 @@
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <optional>
+#include <random>
 #include <thread>
 #include <vector>
 
@@ -75,6 +76,8 @@ class NetSource::Session {
   // The connection is no good any more.
   void break_connection(std::string why);
   void note_welcome(const proto::Welcome& welcome);
+  // The server closed before it answered: when many come at once it makes room for others.
+  bool may_try_again() const;
   bool may_come_back() const { return comeback_.is_allowed() && !is_closing_ && !is_done_; }
   bool make_room_for(std::span<const std::uint8_t, wire::kHeaderBytes> header);
   std::shared_ptr<const proto::Envelope> pop_message();
@@ -116,6 +119,8 @@ class NetSource::Session {
   bool has_heard_ = false;   // of this connection
   bool is_ping_queued_ = false;
   Clock::time_point last_heard_{}, last_datagram_{};
+  Clock::time_point connect_until_{};  // the first connection
+  std::minstd_rand random_{std::random_device{}()};
   Bytes body_;
 
   SpscQueue<Arrival> inbound_;

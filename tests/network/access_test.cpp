@@ -328,6 +328,28 @@ TEST(Access, half_open_handshakes_are_bounded_and_cut_by_the_deadline) {
   EXPECT_TRUE(try_to_join(guarded, "Anna", Role::Surgeon, guarded.code(Role::Surgeon)).is_in);
 }
 
+TEST(Access, a_class_that_joins_at_once_from_one_address_gets_in) {
+  auto tcp = tls_options();
+  tcp.max_newcomers_per_address = 2;
+  GuardedSession guarded(-1, tcp);
+  std::vector<std::unique_ptr<net::NetSource>> trainees;
+  for (int i = 0; i < 24; ++i) {
+    auto options = options_for(guarded.session->port(), "Trainee " + std::to_string(i),
+                               Role::Observer, guarded.code(Role::Observer));
+    options.connect_deadline = std::chrono::milliseconds(15'000);
+    options.connect_retry = std::chrono::milliseconds(50);
+    trainees.push_back(std::make_unique<net::NetSource>(options));
+  }
+  Collector sink;
+  for (const auto& trainee : trainees) {
+    EXPECT_TRUE(poll_until(*trainee, sink, [&] {
+      for (const auto& other : trainees) other->poll(sink);
+      return trainee->state() != SourceState::Connecting;
+    }));
+    EXPECT_EQ(trainee->state(), SourceState::Live) << trainee->close_reason().text;
+  }
+}
+
 TEST(Access, sockets_that_say_nothing_keep_nobody_out) {
   GuardedSession guarded;
   std::atomic<bool> is_over{false};
