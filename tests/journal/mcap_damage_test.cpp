@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <sys/resource.h>
+#include <zstd.h>
 
 #include <csignal>
 
@@ -146,6 +147,23 @@ TEST_F(mcap_damage, huge_lengths_are_not_believed) {
       EXPECT_GE(back.size(), written_before(chunks_[2].start_time).size());
       EXPECT_GT(reader->dropped_bytes(), 0u);
     }
+  }
+}
+
+TEST_F(mcap_damage, a_small_chunk_that_unpacks_to_a_large_one_is_not_unpacked) {
+  const Bytes zeros(100u << 20);
+  Bytes bomb(ZSTD_compressBound(zeros.size()));
+  bomb.resize(ZSTD_compress(bomb.data(), bomb.size(), zeros.data(), zeros.size(), 3));
+  ASSERT_LT(bomb.size(), 20'000u);
+  // It says what it is, which is over the limit, or says less.
+  for (const std::uint64_t said : {std::uint64_t{zeros.size()}, std::uint64_t{1000}}) {
+    Bytes bytes(file_.begin(), file_.begin() + static_cast<std::ptrdiff_t>(end_of(2)));
+    const auto time = chunks_[2].end_time + 1;
+    put_chunk(bytes, {time, time, said, 0, "zstd", bomb});
+    auto reader = reopen(bytes);
+    ASSERT_TRUE(reader);
+    const auto back = read_all(*reader);
+    EXPECT_EQ(back.messages, written_before(time)) << said;
   }
 }
 

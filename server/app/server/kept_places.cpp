@@ -9,7 +9,7 @@
 namespace trocar::app {
 namespace {
 
-constexpr int kVersion = 1;
+constexpr int kFileVersion = 1;
 
 }  // namespace
 
@@ -18,7 +18,7 @@ std::filesystem::path places_file(const std::filesystem::path& state_folder, std
 }
 
 Status write_places(const std::filesystem::path& file, const std::vector<KeptPlace>& places) {
-  Json json = {{"version", kVersion}, {"places", Json::array()}};
+  Json json = {{"version", kFileVersion}, {"places", Json::array()}};
   for (const auto& place : places)
     json["places"].push_back({{"slot", place.slot.value},
                               {"name", place.name},
@@ -38,7 +38,7 @@ Result<std::vector<KeptPlace>> read_places(const std::filesystem::path& file) {
   };
   try {
     const auto json = Json::parse(*text);
-    if (json.at("version").get<int>() != kVersion) return bad("another version");
+    if (json.at("version").get<int>() != kFileVersion) return bad("another version");
     for (const auto& entry : json.at("places")) {
       KeptPlace place{.slot = {entry.at("slot").get<std::uint8_t>()},
                       .name = entry.at("name").get<std::string>()};
