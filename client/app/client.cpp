@@ -8,6 +8,7 @@
 
 #include "client/app/client_summary.h"
 #include "client/app/picture.h"
+#include "client/app/start.h"
 #include "client/net/net_source.h"
 #include "client/replay/replay_source.h"
 #include "client/replica/client_messages.h"
@@ -266,7 +267,13 @@ Result<ExitCode> run_with_source(const ClientOptions& options, replica::SessionS
   return Run(options, source, hands).run();
 }
 
-Result<ExitCode> run_client(const ClientOptions& options) {
+bool is_stop_requested() {
+  return stop_requested != 0;
+}
+
+namespace {
+
+Result<ExitCode> run_chosen(const ClientOptions& options) {
   Hands hands;
   if (!options.replay_file.empty()) {
     auto source = replay::ReplaySource::open(options.replay_file);
@@ -292,6 +299,23 @@ Result<ExitCode> run_client(const ClientOptions& options) {
   connection.tools = hands.shapes();
   net::NetSource source(std::move(connection));
   return run_with_source(options, source, hands);
+}
+
+}  // namespace
+
+Result<ExitCode> run_client(const ClientOptions& options) {
+  if (!wants_start_screen(options)) return run_chosen(options);
+  ClientOptions chosen = options;
+  for (std::string message;;) {
+    auto choice = choose_session(chosen, message);
+    if (!choice) return choice.error();
+    if (!*choice) return ExitCode::Ok;
+    chosen = std::move(**choice);
+    auto ran = run_chosen(chosen);
+    if (ran || is_stop_requested()) return ran;
+    message = ran.error().message;
+    log::warn("{}", message);
+  }
 }
 
 }  // namespace trocar::app

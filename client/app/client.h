@@ -10,11 +10,13 @@ namespace trocar::app {
 
 // Set by SIGINT and SIGTERM: leave politely.
 void install_signal_handlers();
+bool is_stop_requested();
 
 // Runs with a given source until it closes, or the person, a signal or --seconds ends it.
 Result<ExitCode> run_with_source(const ClientOptions& options, replica::SessionSource& source,
                                  Hands& hands);
-// Makes source and hands from the options, then runs.
+// Makes source and hands from the options, then runs. Where it is left open which session is meant,
+// the start screen asks, again after a session that could not be joined.
 Result<ExitCode> run_client(const ClientOptions& options);
 
 }  // namespace trocar::app

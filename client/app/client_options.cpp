@@ -19,7 +19,8 @@ namespace {
 constexpr const char* kExamples = R"(
 Examples:
   trocar-client
-      a window; the mouse is an instrument (press H in it for the keys)
+      joins your own server on this machine, or asks which session; the mouse is an instrument
+      (press H in the window for the keys)
   trocar-client --join trocar://192.168.1.20:7690/7K3M-9QXZ-4T2B-WN8C --role assistant
       joins a session on another machine with the link that its server printed
   trocar-client --list
@@ -132,6 +133,8 @@ Result<std::optional<ClientOptions>> parse_client_command_line(int argc, char** 
   app.add_flag("--list", options.lists_sessions,
                "list the sessions that announce themselves on the local network, and exit; "
                "--seconds says how long to look [3]");
+  app.add_flag("--choose", options.chooses,
+               "show the start screen, even if your own server runs on this machine");
   app.add_option("--ca", options.ca_file,
                  "trust servers that this CA (PEM) vouches for, instead of the code's first half")
       ->type_name("FILE");
@@ -207,6 +210,9 @@ Result<std::optional<ClientOptions>> parse_client_command_line(int argc, char** 
     if (!invitation) return Error{ErrorCode::Usage, "--join: " + invitation.error().message};
     if (server->count() == 0 && !invitation->server.empty()) options.server = invitation->server;
   }
+  options.is_told_where = !options.join.empty() || server->count() > 0 ||
+                          !options.replay_file.empty() || !options.script_file.empty() ||
+                          options.is_insecure;
   if (draws_nothing)
     options.display = Display::None;
   else if (is_headless)

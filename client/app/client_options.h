@@ -26,9 +26,11 @@ struct StartView {
 
 struct ClientOptions {
   std::string server = "127.0.0.1:7690";
-  std::string join;          // code or link; empty: from the link file
-  std::string ca_file;       // empty: the code says whose certificate it must be
-  bool is_insecure = false;  // without TLS, on this machine only
+  std::string join;            // code or link; empty: from the link file
+  bool is_told_where = false;  // which session is meant, so that nobody need ask
+  bool chooses = false;        // the start screen asks even if a server runs on this machine
+  std::string ca_file;         // empty: the code says whose certificate it must be
+  bool is_insecure = false;    // without TLS, on this machine only
   bool wants_datagrams = true;
   double wait_s = 15;  // for a server that is not there yet
   std::string name;    // empty: made from the login name and the process

@@ -169,6 +169,12 @@ HudActions Hud::draw(const HudModel& model) {
   return actions;
 }
 
+bool Hud::take_enter() {
+  const std::vector<int> keys = std::exchange(pressed_keys(), {});
+  return std::ranges::any_of(
+      keys, [](int key) { return key == GLFW_KEY_ENTER || key == GLFW_KEY_KP_ENTER; });
+}
+
 void Hud::render() {
   glBindFramebuffer(GL_FRAMEBUFFER, context_.framebuffer());
   const render::Size size = context_.size();

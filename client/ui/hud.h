@@ -97,6 +97,8 @@ class Hud {
   void begin_frame(float seconds);
   device::PointerInput input() const;
   HudActions draw(const HudModel& model);
+  // Whether Enter went down since the last picture; for what is drawn in place of a model.
+  static bool take_enter();
   void render();  // may be repeated: the same again
 
  private:

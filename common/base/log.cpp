@@ -2,7 +2,10 @@
 
 #include <spdlog/sinks/stdout_color_sinks.h>
 
+#include <memory>
 #include <string>
+
+#include "common/base/bounded_sink.h"
 
 namespace trocar::log {
 
@@ -12,7 +15,9 @@ Status configure(std::string_view program, std::string_view level) {
   if (!known)
     return Error{ErrorCode::Usage, "--log-level: '" + std::string(level) +
                                        "' is not one of error, warn, info, debug, off"};
-  auto logger = spdlog::stderr_color_mt(std::string(program));
+  auto logger = std::make_shared<spdlog::logger>(
+      std::string(program),
+      std::make_shared<BoundedSink>(std::make_shared<spdlog::sinks::stderr_color_sink_mt>()));
   logger->set_pattern("%H:%M:%S.%e %n %^%l%$ %v");
   logger->set_level(spdlog::level::from_str(std::string(level)));
   logger->flush_on(spdlog::level::info);

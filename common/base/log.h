@@ -1,7 +1,8 @@
 #pragma once
 
 // Logging for life cycle and trouble, never from inside a tick. Levels by reader: error = data or
-// session lost, warn = degraded, info = life cycle, debug = per event. Lines go to stderr.
+// session lost, warn = degraded, info = life cycle, debug = per event. Lines go to stderr, as
+// many as bounded_sink.h lets through.
 
 #include <spdlog/spdlog.h>
 
