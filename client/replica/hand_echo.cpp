@@ -6,7 +6,7 @@
 namespace trocar::replica {
 namespace {
 
-// Of two lines close to each other the nearer one counts, even if it is that of a second later.
+// The nearer one of two close lines counts, even if it is that of a second later.
 constexpr double kNsPerMeterBeside = 1e13;
 
 }  // namespace

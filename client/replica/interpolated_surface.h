@@ -19,7 +19,7 @@
 
 namespace trocar::replica {
 
-// Of the display, at real time.
+// These hold for the display at real time.
 inline constexpr double kFirstDelayTicks = 24, kLeastDelayTicks = 17, kMostDelayTicks = 120;
 
 // Estimates the display tick from arrivals. Separate from the surface so that it can be tested
@@ -40,7 +40,7 @@ class DisplayClock {
     std::uint64_t ns;
   };
   double rate() const;  // ticks per second
-  // Where the least delayed of the last frames say that the server is.
+  // Returns where the server is, as the least delayed of the last frames say.
   double tick_without_jitter(std::uint64_t now_ns) const;
   void adapt_delay(double ticks_since_last);
 

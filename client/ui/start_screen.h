@@ -25,7 +25,7 @@ struct StartModel {
   std::string message;           // what the last try came to; empty: nothing
 };
 
-// What the person has typed and chosen.
+// Holds what the person has typed and chosen.
 struct StartChoice {
   std::string server, code, name;
   replica::Role role = replica::Role::Surgeon;

@@ -48,7 +48,7 @@ TEST(DisplayClock, IsMonotoneAndSettlesBehindTheNewestFrame) {
   }
 }
 
-// Of this network, for 5 s: the delay in the end, and how often the picture stood still.
+// Holds the delay after 5 s of a network, and how often the picture stood still.
 struct Playout {
   double delay_ticks = 0, held_share = 0;
 };

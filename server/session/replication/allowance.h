@@ -1,7 +1,7 @@
 #pragma once
 
-// What a client may send: so much per second, and what it has not used for up to 15 s. It is no
-// flood when a client or server that slept finds so much waiting.
+// This bounds what a client may send: so much per second, and what it has not used for up to 15 s.
+// It is no flood when a client or server that slept finds so much waiting.
 
 #include <algorithm>
 #include <cstdint>
