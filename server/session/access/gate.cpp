@@ -56,7 +56,7 @@ std::optional<Refusal> Gate::check(Applicant& applicant, BytesView secret, bool 
                    "join code: too many wrong codes, try again in " + seconds_text(wait)};
   if (has_wrong_token) count_wrong_try(applicant, now);
   if (secret.empty()) return none;
-  refresh();
+  book_.refresh();  // a code that has just been revoked admits nobody
   const auto unix_now = options_.unix_seconds ? options_.unix_seconds() : std::time(nullptr);
   const auto verdict = book_.check(secret, unix_now);
   if (verdict.state == CodeState::Wrong) count_wrong_try(applicant, now);
