@@ -64,7 +64,7 @@ void expect_replay_equals(const std::filesystem::path& file,
 }
 
 void run_shared_session(const std::string& organ) {
-  Session session(organ, {"--seconds", "20"});
+  Session session(organ, {"--seconds", "12"});
   auto lift = session.hand("Lift", kScenes / "lift.toml");
   auto press = session.hand("Press", kScenes / "press.toml");
   auto instructor = session.client("Instructor", "instructor");
@@ -76,7 +76,7 @@ void run_shared_session(const std::string& organ) {
 
   const auto server = read_text(session.folder / "server.json");
   EXPECT_EQ(json_value(server, "all_replicas_equal"), "true") << server;
-  EXPECT_EQ(json_number(server, "last_tick"), 20'000);
+  EXPECT_EQ(json_number(server, "last_tick"), 12'000);
   for (const char* name : {"Lift", "Press", "Instructor", "Observer"}) {
     const auto summary = session.summary_of(name);
     EXPECT_EQ(json_value(summary, "own_crc"), json_value(server, "surface_crc")) << name;
@@ -91,7 +91,7 @@ void run_shared_session(const std::string& organ) {
   ASSERT_TRUE(verified.ok()) << verified.error().message;
   EXPECT_TRUE(verified->is_resimulated);
   EXPECT_EQ(verified->verdict(), recording::Verdict::Verified) << verified->why();
-  EXPECT_EQ(verified->ticks_verified, 20'000u);
+  EXPECT_EQ(verified->ticks_verified, 12'000u);
   EXPECT_EQ(verified->ticks_missing, 0u);
   EXPECT_GE(verified->snapshots_verified, 2u);
   expect_replay_equals(session.journal, simulate_again(session.journal));

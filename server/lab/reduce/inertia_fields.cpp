@@ -6,7 +6,7 @@ namespace trocar::reduce {
 namespace {
 
 // Columns of which less than this is new are of those before.
-constexpr double kRank = 1e-8;
+constexpr double kRankThreshold = 1e-8;
 
 }  // namespace
 
@@ -19,7 +19,7 @@ Matrix inertia_modes(FullModel& model, const Matrix& fields, const Matrix& vibra
     loads.row(i) *= masses[static_cast<std::size_t>(i / 3)];
   const Matrix moved = orthogonal_to(vibrations, model.linear_displacements(loads));
   Eigen::ColPivHouseholderQR<Matrix> factors(orthogonal_to(vibrations, known));
-  factors.setThreshold(kRank);
+  factors.setThreshold(kRankThreshold);
   const Matrix taken = factors.householderQ() * Matrix::Identity(known.rows(), factors.rank());
   return karhunen_loeve(orthogonal_to(taken, moved), count).modes;
 }

@@ -6,7 +6,7 @@ namespace trocar::reduce {
 namespace {
 
 // Below, an eigenvalue is made of rounding errors of the products of snapshots.
-constexpr double kRank = 1e-14;
+constexpr double kLeastEigenvalue = 1e-14;
 
 }  // namespace
 
@@ -19,7 +19,7 @@ KarhunenLoeve karhunen_loeve(const Matrix& snapshots, std::size_t mode_count) {
   result.eigenvalues = solver.eigenvalues().reverse().cwiseMax(0);
   Eigen::Index rank = 0;
   while (rank < std::min(count, static_cast<Eigen::Index>(mode_count)) &&
-         result.eigenvalues[rank] > kRank * result.eigenvalues[0])
+         result.eigenvalues[rank] > kLeastEigenvalue * result.eigenvalues[0])
     ++rank;
   result.modes.resize(snapshots.rows(), rank);
   for (Eigen::Index i = 0; i < rank; ++i) {

@@ -9,8 +9,8 @@
 namespace trocar::reduce {
 namespace {
 
-constexpr double kSlant = 25 * std::numbers::pi / 180;
-constexpr std::array kShares{0.3, 0.85};
+constexpr double kTestSlant = 25 * std::numbers::pi / 180;
+constexpr std::array kTestShares{0.3, 0.85};
 // The first press here has this number among all, so that azimuths are not those of the training.
 constexpr std::size_t kFirst = 1001;
 constexpr double kHold_n_m = 1e4;  // some hundred times as stiff as tissue
@@ -57,11 +57,11 @@ std::vector<LocalLoad> solve_local_loads(
   for (std::size_t i = 0; i < places.size(); ++i) {
     const auto [node, is_trained] = places[i];
     // Every other one is aslant.
-    const auto directions = press_directions(normals[node.value], kFirst + i, 2, kSlant);
+    const auto directions = press_directions(normals[node.value], kFirst + i, 2, kTestSlant);
     const Vec3d force = directions[i % 2] * built.reduction.force_n;
-    auto found = model.displacements(model.forces_of({node, force}), kShares);
+    auto found = model.displacements(model.forces_of({node, force}), kTestShares);
     for (std::size_t k = 0; k < found.size(); ++k)
-      loads.push_back({{node, force * kShares[k]}, is_trained, std::move(found[k])});
+      loads.push_back({{node, force * kTestShares[k]}, is_trained, std::move(found[k])});
     if (progress) progress(i + 1, places.size());
   }
   return loads;

@@ -11,12 +11,12 @@ using namespace reduce;
 
 namespace {
 
-constexpr double kSlant = 20 * std::numbers::pi / 180;
+constexpr double kTestSlant = 20 * std::numbers::pi / 180;
 constexpr std::array kShares{0.3, 0.85};
 // The first unseen press has this number among all: its azimuths are between those of the training.
 constexpr std::size_t kFirst = 1001;
 
-Eigen::Vector3d at_node(const Vector& all, NodeIndex node) {
+Eigen::Vector3d moved_by(const Vector& all, NodeIndex node) {
   return all.segment<3>(3 * static_cast<Eigen::Index>(node.value));
 }
 
@@ -30,11 +30,11 @@ Quality::OfTangent measure(const ReducedModel& reduced, const organ::Organ& orga
   Quality::OfTangent result;
   for (const auto& [press, full] : loads) {
     const Vector u = reduced.displacements(reduced.solve(node_forces(organ, press)));
-    const auto there = at_node(full, press.node);
+    const auto there = moved_by(full, press.node);
     result.field_errors.push_back((u - full).norm() / full.norm());
-    result.contact_errors.push_back((at_node(u, press.node) - there).norm() / there.norm());
+    result.contact_errors.push_back((moved_by(u, press.node) - there).norm() / there.norm());
     result.contact_ratio +=
-        at_node(u, press.node).norm() / there.norm() / static_cast<double>(loads.size());
+        moved_by(u, press.node).norm() / there.norm() / static_cast<double>(loads.size());
   }
   result.field = errors_of(result.field_errors);
   result.contact = errors_of(result.contact_errors);
@@ -52,7 +52,8 @@ UnseenLoads solve_unseen(FullModel& model, const Training& training, const Setti
                                   settings.seed, training.places);
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     // The second of two is aslant.
-    const Vec3d direction = press_directions(normals[nodes[i].value], kFirst + i, 2, kSlant).back();
+    const Vec3d direction =
+        press_directions(normals[nodes[i].value], kFirst + i, 2, kTestSlant).back();
     const Press press{nodes[i], direction * settings.force_n, settings.radius_m};
     auto found = model.displacements(model.forces_of(press), kShares);
     unseen.failed += kShares.size() - found.size();
@@ -94,8 +95,8 @@ std::optional<CreepCheck> check_creep(FullModel& model, const Reduction& reducti
     Vector u = at_once, scaled = fields[0];
     factors.scale(press.node, check.times_s[i], u);
     factors.scale(press.node, check.times_s[i], scaled);
-    check.full_m.push_back(at_node(fields[i], press.node).norm());
-    check.reduced_m.push_back(at_node(u, press.node).norm());
+    check.full_m.push_back(moved_by(fields[i], press.node).norm());
+    check.reduced_m.push_back(moved_by(u, press.node).norm());
     check.field_errors.push_back((u - fields[i]).norm() / fields[i].norm());
     check.scaling_errors.push_back((scaled - fields[i]).norm() / fields[i].norm());
   }
