@@ -1,6 +1,6 @@
 #pragma once
 
-// What a client's hand needs to feel a tool at 1 kHz between two answers of the server: what the
+// A client's hand needs this to feel a tool at 1 kHz between two answers of the server: what the
 // tissue did to the tool at a pose that the client knows, and what the client may expect beside it.
 
 #include <array>

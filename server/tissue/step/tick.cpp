@@ -216,6 +216,10 @@ std::uint64_t hash_of(State& state, StateHasher& hasher) {
   return hasher.digest();
 }
 
+touch::TouchTable::Scene touch_scene(const State& state, const contact::ContactList& contacts) {
+  return {state.world, state.tools, state.claims, state.grasps, contacts, state.cuts};
+}
+
 ToolFrame describe_tool(const State& state, const contact::ContactList& contacts, ToolSlot slot) {
   const auto& tool = state.tools[slot];
   ToolFrame frame{.tool = slot, .world_from_tool = tool.pose, .verb = tool.verb};
@@ -239,6 +243,7 @@ ToolFrame describe_tool(const State& state, const contact::ContactList& contacts
 std::shared_ptr<PublishedFrame> publish(State& state, const contact::ContactList& contacts,
                                         const propagation::PropagationQueue& queue,
                                         const dynamics::Tissue& tissue, const TickReport& report,
+                                        touch::TouchTable& touches,
                                         std::vector<Vec3f>& displacements, Outbox& outbox) {
   auto frame = std::make_shared<PublishedFrame>();
   frame->new_layout = state.cuts.pop_new_layout();
@@ -257,8 +262,11 @@ std::shared_ptr<PublishedFrame> publish(State& state, const contact::ContactList
   frame->regions.reserve(layout.vertex_count());
   for (const auto node : layout.node_of_vertex) frame->regions.push_back(queue.region(node));
   for (std::uint8_t i = 0; i < kMaxTools; ++i)
-    if (state.tools[ToolSlot{i}].has_sample)
+    if (state.tools[ToolSlot{i}].has_sample) {
       frame->tools.push_back(describe_tool(state, contacts, ToolSlot{i}));
+      if (state.tools[ToolSlot{i}].time_us > 0)
+        frame->tools.back().touch = touches.describe(touch_scene(state, contacts), ToolSlot{i});
+    }
   frame->claim_events = outbox.claim_events;
   outbox.claim_events.clear();
   frame->mark_events = std::exchange(outbox.mark_events, {});
@@ -314,9 +322,11 @@ void run_tick(const hands::TickInputs& inputs, const TickDecisions& decisions, E
   report.state_hash = hash_of(state, context.hasher);
   report.faults = faults_of(report);
   end(Stage::Hash);
+  context.touches.update(touch_scene(state, contacts));
+  end(Stage::Contacts);
   if (!publishes_frame(world.tick)) return;
   context.frame = publish(state, contacts, queue, context.solve.solver.tissue(), report,
-                          context.surface_displacements, context.outbox);
+                          context.touches, context.surface_displacements, context.outbox);
   end(Stage::Publish);
 }
 
