@@ -31,7 +31,7 @@ struct HandSettings {
   float closes_at = 0.6f, opens_at = 0.4f;            // of the gripper
 };
 
-// What goes to the server.
+// This goes to the server.
 struct HandReading {
   Vec3d tip_m, velocity_m_s;  // world frame; velocity over the last step
   Quatf orientation;
@@ -39,7 +39,7 @@ struct HandReading {
   std::uint64_t time_us = 0;
 };
 
-// What pictures and statistics want to know.
+// Pictures and statistics are made of this.
 struct HandState {
   HandReading reading;
   Vec3d model_force_n;                 // world frame, on the tool

@@ -30,7 +30,7 @@ struct LoopTiming {
 
 class Loop {
  public:
-  // What the system granted.
+  // Says what the system granted.
   struct Granted {
     bool has_priority = false;       // SCHED_FIFO
     bool has_locked_memory = false;  // no page of the program is fetched from a disk meanwhile

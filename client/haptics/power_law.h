@@ -17,9 +17,9 @@ struct PowerLaw {
   double coefficient = 0;  // a, N/m^p
   double exponent = 1.5;   // p
 
-  // 0 at and above the surface.
+  // It is 0 at and above the surface.
   double force_n(double depth_m) const;
-  // The derivative of the force; above the surface that of the first touch.
+  // Returns the derivative of the force; above the surface that of the first touch.
   double stiffness_n_m(double depth_m) const;
 };
 

@@ -50,7 +50,7 @@ Vec3d PushElement::across(const PowerLaw& law, const ViscoSteps& steps, const Ve
   slip_m_ = slip;
   const double size = length(pull);
   if (size > limit_n) {
-    // What is over the limit is taken off all states alike: else reversals of the motion would
+    // The part over the limit is taken off all states alike: else reversals of the motion would
     // begin with a force that is wrong by a fifth.
     const Vec3d over = pull * ((size - limit_n) / (size * stiffness * steps.at_once()));
     anchor_m_ += over;

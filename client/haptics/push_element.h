@@ -3,6 +3,8 @@
 // Local tissue under one tip: a force along the surface's normal, and across it friction that
 // sticks to an anchor until Coulomb's limit, then drags the anchor along.
 
+#include <algorithm>
+
 #include "client/haptics/power_law.h"
 #include "client/haptics/visco_element.h"
 #include "common/math/vec3.h"
@@ -12,7 +14,7 @@ namespace trocar::haptics {
 // How much stiffer tissue is along the normal than across it, measured on the liver.
 inline constexpr double kAcrossOverNormal = 0.72;
 
-// What local tissue answers, before it is scaled to what the server says.
+// Local tissue answers this, before it is scaled to what the server says.
 struct Response {
   double normal_n = 0;       // along the outward normal, never negative
   Vec3d rest_n;              // across the normal; of held tissue all of it
@@ -21,7 +23,11 @@ struct Response {
 
 class PushElement {
  public:
-  void reset() { *this = {}; }
+  // Begins at a depth as if it had been pressed there at once, but slowly.
+  void start(double depth_m) {
+    *this = {};
+    depth_m_ = std::max(depth_m, 0.0);
+  }
 
   // `normal`: unit, outward. `friction`: Coulomb's coefficient.
   Response step(const PowerLaw& law, const ViscoSteps& steps, double depth_m, const Vec3d& place_m,

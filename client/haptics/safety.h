@@ -1,6 +1,6 @@
 #pragma once
 
-// What stands between a computed force and a hand, in one place and in this order:
+// This stands between a computed force and a hand, in one place and in this order:
 //
 //   1 a force, torque or place that is no number: 0 at once
 //   2 a reading of the device older than 20 ms, or one that jumped: 0 at once

@@ -6,7 +6,7 @@
 namespace trocar::haptics {
 namespace {
 
-// The variance at which force and prior weigh the same.
+// Force and prior weigh the same at this variance.
 constexpr double kPriorVariance_n2 = 0.02 * 0.02;
 constexpr double kLeastRestartForce_n = 0.02;
 

@@ -78,7 +78,7 @@ TouchOutput TouchModel::step(const TouchInput& input) {
 
   const Response& response = state.response;
   Vec3d force_n = limited_force(corrected_force(response), response);
-  if (stop_.is_on()) force_n = stopped_force(force_n, state.core_m);
+  if (stop_.is_on()) force_n = stopped_force(force_n, state.core_m, dt_s);
   force_n *= cut_drop_.step(length(force_n), static_cast<double>(patch_.cut_force_n), answer_s_,
                             input.time_us);
   if (grips()) force_n *= held_share_;
@@ -125,8 +125,8 @@ Vec3d TouchModel::limited_force(const Vec3d& force_n, const Response& response) 
   return normal_ * along_n + shortened(across(force_n, normal_), patch_.friction * along_n);
 }
 
-Vec3d TouchModel::stopped_force(const Vec3d& force_n, const Vec3d& core_m) const {
-  const double along_n = stop_.force_n(core_m, velocity_m_s_);
+Vec3d TouchModel::stopped_force(const Vec3d& force_n, const Vec3d& core_m, double dt_s) {
+  const double along_n = stop_.step(core_m, velocity_m_s_, dt_s);
   return stop_.normal() * along_n +
          shortened(across(force_n, stop_.normal()), patch_.friction * along_n);
 }

@@ -63,7 +63,8 @@ class TouchModel {
  public:
   explicit TouchModel(const tool::ToolShape& shape, const TouchSettings& settings = {});
 
-  // Patches may refer to the law from now on. More than kLaws: the oldest goes.
+  // Patches may refer to the law from now on; a new one may take an old one's number. More than
+  // kLaws: the oldest goes.
   void take(const wire::HapticLaw& law);
   // Belongs between two steps.
   void take(const wire::HapticPatch& patch);
@@ -99,14 +100,15 @@ class TouchModel {
   Vec3d model_force(const Response& response) const;
   void use_material();
 
-  // What a step makes of it.
+  // A step makes a force of it.
   void blend(double dt_s);
   void watch_jaws(const TouchInput& input, double dt_s);
   Vec3d corrected_force(const Response& response) const;
   Vec3d limited_force(const Vec3d& force_n, const Response& response) const;
-  Vec3d stopped_force(const Vec3d& force_n, const Vec3d& core_m) const;
+  Vec3d stopped_force(const Vec3d& force_n, const Vec3d& core_m, double dt_s);
 
-  // What a patch changes.
+  // A patch changes it.
+  bool is_old(const wire::HapticPatch& patch) const;
   void take_surface(bool had_surface, bool gripped);
   bool take_law();
   void take_stop();

@@ -15,6 +15,8 @@ constexpr double kGuessDepth_m = 0.005;
 constexpr double kLongestPause_s = 0.1;  // between two answers, for the fit
 constexpr double kAnswerShare = 0.1;     // of a new delay in the smoothed one
 constexpr std::size_t kMostReplayed = 1024;
+// A server that counts from the beginning again is not late: its answers are of much later poses.
+constexpr std::uint64_t kNewSession_us = 1'000'000;
 
 SymMat3<double> to_double(const SymMat3f& a) {
   return {a.xx, a.xy, a.xz, a.yy, a.yz, a.zz};
@@ -22,6 +24,16 @@ SymMat3<double> to_double(const SymMat3f& a) {
 
 SymMat3<double> scaled(const SymMat3<double>& a, double s) {
   return {a.xx * s, a.xy * s, a.xz * s, a.yy * s, a.yz * s, a.zz * s};
+}
+
+bool is_same(const wire::HapticLaw& a, const wire::HapticLaw& b) {
+  const auto is_same_term = [](const wire::HapticLaw::Term& c, const wire::HapticLaw::Term& d) {
+    return c.share == d.share && c.time_s == d.time_s;
+  };
+  return a.exponent == b.exponent && a.youngs_modulus_pa == b.youngs_modulus_pa &&
+         a.poisson_ratio == b.poisson_ratio &&
+         std::ranges::equal(a.relaxation, b.relaxation, is_same_term) &&
+         std::ranges::equal(a.fast, b.fast, is_same_term);
 }
 
 // The stiffness along a direction, which need not be of unit length.
@@ -32,15 +44,28 @@ double along(const SymMat3<double>& stiffness, const Vec3d& direction) {
 }  // namespace
 
 void TouchModel::take(const wire::HapticLaw& law) {
-  for (const Material& material : materials_)
-    if (material.is_known && material.law.number == law.number) return;
+  for (std::size_t i = 0; i < kLaws; ++i) {
+    Material& material = materials_[i];
+    if (!material.is_known || material.law.number != law.number) continue;
+    if (is_same(material.law, law)) return;
+    material = {law, true, 1};
+    if (i != material_) return;
+    use_material();
+    restart(past_.end());
+    return;
+  }
   if (next_material_ == material_) next_material_ = (next_material_ + 1) % kLaws;
   materials_[next_material_] = {law, true, 1};
   next_material_ = (next_material_ + 1) % kLaws;
 }
 
+bool TouchModel::is_old(const wire::HapticPatch& patch) const {
+  if (!has_patch_ || static_cast<std::int32_t>(patch.sequence - patch_.sequence) > 0) return false;
+  return patch.echo_time_us < patch_.echo_time_us + kNewSession_us;
+}
+
 void TouchModel::take(const wire::HapticPatch& patch) {
-  if (has_patch_ && static_cast<std::int32_t>(patch.sequence - patch_.sequence) <= 0) {
+  if (is_old(patch)) {
     ++counts_.old_patches;
     return;
   }
@@ -88,6 +113,7 @@ void TouchModel::take_surface(bool had_surface, bool gripped) {
   const Vec3d believed_grip_m = grip_point_m_ + grip_offset_m_;
   grip_point_m_ = trocar::to_double(patch_.grip_point_m);
   grip_offset_m_ = gripped ? believed_grip_m - grip_point_m_ : Vec3d{};
+  if (gripped && patch_.has_stiffness) grip_.set_stiffness(grip_stiffness());
 }
 
 bool TouchModel::take_law() {
@@ -138,24 +164,26 @@ SymMat3<double> TouchModel::grip_stiffness() const {
 
 // The local model begins anew with what it is now, at the pose that the answer belongs to.
 void TouchModel::restart(std::size_t first) {
-  push_.reset();
   if (grips()) grip_.start(grip_stiffness());
   fit_.set_slope(grips() ? 1 : materials_[material_].slope);
   fit_.clear_sums();
   slope_ = fit_.slope();
+  push_.start(kClearlyAbove_m);
   if (past_.is_empty()) return;
   first = std::max({first, past_.begin(),
                     past_.end() > kMostReplayed ? past_.end() - kMostReplayed : std::size_t{0}});
   first = std::min(first, past_.end() - 1);
+  if (has_surface()) push_.start(depth_of(past_[first].core_m, past_[first].clearance_m));
   for (std::size_t i = first; i < past_.end(); ++i) {
     const bool has_previous = i > past_.begin();
     const std::uint64_t dt_us = has_previous ? past_[i].time_us - past_[i - 1].time_us : 1000;
     answer(past_[i], static_cast<double>(dt_us) * 1e-6);
   }
+  const Response& then = past_[first].response;
   next_correction_n_ = {};
   if (touches(patch_.kind))
-    next_correction_n_ =
-        trocar::to_double(patch_.force_n) - model_force(past_[first].response) * slope_;
+    next_correction_n_ = trocar::to_double(patch_.force_n) - model_force(then) * slope_;
+  gate_force_n_ = std::max(kLeastGateForce_n, slope_ * then.normal_n);
   keep_force(past_[past_.end() - 1].response);
 }
 
@@ -178,19 +206,21 @@ Response TouchModel::with_moved_reference(const PastState& then) const {
 
 void TouchModel::correct(const PastState& then, bool is_new_structure) {
   if (patch_.kind == wire::TouchKind::Rigid) return;
-  if (!touches(patch_.kind)) {
+  // Tissue that the server's tool does not touch has given way where the local model presses.
+  const bool touched = touches(patch_.kind);
+  const Response response = with_moved_reference(then);
+  if (!touched && response.normal_n <= 0) {
     next_correction_n_ = {};
     return;
   }
-  const Response response = with_moved_reference(then);
-  const Vec3d server_n = trocar::to_double(patch_.force_n);
+  const Vec3d server_n = touched ? trocar::to_double(patch_.force_n) : Vec3d{};
   const Vec3d local_n = model_force(response);
   // The slope of a push is that along the normal; friction follows.
   const Vec3d fit_server_n = grips() ? server_n : Vec3d{dot(server_n, normal_), 0, 0};
   const Vec3d fit_local_n = grips() ? local_n : Vec3d{response.normal_n, 0, 0};
   if (is_new_structure) {
     fit_.restart(fit_server_n, fit_local_n);
-  } else if (patch_.echo_time_us > last_echo_us_) {
+  } else if (touched && patch_.echo_time_us > last_echo_us_) {
     const double dt_s =
         std::min(static_cast<double>(patch_.echo_time_us - last_echo_us_) * 1e-6, kLongestPause_s);
     fit_.add(fit_server_n, fit_local_n, dt_s, stiffness_ratio(response));

@@ -1,6 +1,6 @@
 #pragma once
 
-// What tissue makes of an elastic force f over time, for one direction or three:
+// Tissue makes this of an elastic force f over time, in one direction or three:
 //
 //   M = (1 - sum g) f + sum h + sum q
 //   h_i <- e_i h_i + g_i c_i (f - f_old),   e_i = exp(-dt / tau_i), c_i = (1 - e_i) tau_i / dt
@@ -24,7 +24,7 @@ class ViscoSteps {
   ViscoSteps(const wire::HapticLaw& law, double dt_s);
 
   double dt_s() const { return dt_s_; }
-  // Force over elastic force of a step of the motion, at once.
+  // Returns the force at once of a step of the motion, over the elastic one.
   double at_once() const { return at_once_; }
 
  private:
@@ -45,7 +45,7 @@ class ViscoSteps {
 // The share of a step's elastic force that is left after `seconds`.
 double relaxed_share(const wire::HapticLaw& law, double seconds);
 
-// Value: double or Vec3d.
+// Value is double or Vec3d.
 template <typename Value>
 class ViscoElement {
  public:

@@ -1,6 +1,6 @@
 #pragma once
 
-// Where a tool is for a place of the device, and what the device renders for a force on the tool.
+// Maps a place of the device to one of the tool, and a force on the tool to one at the device.
 //
 //   tool = anchor + view (scale (device - device anchor))      force = force scale view^-1 (force)
 //

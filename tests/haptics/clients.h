@@ -1,6 +1,6 @@
 #pragma once
 
-// What can render a force at a hand in the closed loop: the model, changed as a mutant of it, and
+// These render a force at a hand in the closed loop: the model, changed as a mutant of it, and
 // the simple schemes that it is compared with, which no product has.
 
 #include <functional>

@@ -53,7 +53,6 @@ class SurrogateTissue {
     Value elastic{}, place{}, speed{};
   };
   double elastic_force_n(double depth_m) const;
-  // What the element resists with at a place: a slope times the place, and the rest.
   template <typename Value>
   void commit(Element<Value>& element, const Value& place, const Value& elastic, double stiffness);
   double step_along(double depth_m);
