@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "client/haptics/safety.h"
+
 namespace trocar::haptics::testing {
 namespace {
 
@@ -65,6 +67,32 @@ class Scheme : public Client {
   double left_ = 0;
 };
 
+class SafeClient : public Client {
+ public:
+  explicit SafeClient(std::unique_ptr<Client> client) : client_(std::move(client)) {}
+  void take(const wire::HapticPatch& patch) override {
+    client_->take(patch);
+    patch_us_ = now_us_;
+  }
+  TouchOutput step(const TouchInput& input) override {
+    now_us_ = input.time_us;
+    TouchOutput output = client_->step(input);
+    SafetyInput given;
+    given.force_n = output.force_n;
+    given.position_m = input.tip_m;
+    given.stiffness_n_m = output.stiffness_n_m;
+    given.patch_age_s = static_cast<double>(now_us_ - patch_us_) * 1e-6;
+    given.touches = output.touches;
+    output.force_n = safety_.step(given).force_n;
+    return output;
+  }
+
+ private:
+  std::unique_ptr<Client> client_;
+  Safety safety_{{.force_n = 3.3}};
+  std::uint64_t now_us_ = 0, patch_us_ = 0;
+};
+
 Vec3d with_friction(const wire::HapticPatch& patch, const Vec3d& force_n) {
   if (patch.kind == wire::TouchKind::Grip) return force_n;
   const Vec3d normal = to_double(patch.plane_normal);
@@ -84,6 +112,10 @@ bool touches(const wire::HapticPatch& patch) {
 std::unique_ptr<Client> make_model(const tool::ToolShape& shape, const wire::HapticLaw& law,
                                    const TouchSettings& settings, const ChangePatch& change) {
   return std::make_unique<Model>(shape, law, settings, change);
+}
+
+std::unique_ptr<Client> make_safe(std::unique_ptr<Client> client) {
+  return std::make_unique<SafeClient>(std::move(client));
 }
 
 std::unique_ptr<Client> make_hold() {

@@ -4,8 +4,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <functional>
 #include <thread>
 
 #include "client/haptics/loop.h"
@@ -149,7 +151,7 @@ TEST_F(HandTest, ALostDeviceIsAnError) {
   EXPECT_FALSE(hand_.step(now_us_));
 }
 
-// A device whose readings are always new, for the loop.
+// A device whose readings are always new and go down by 5 mm, for the loop.
 class LiveDevice : public FakeDevice {
  public:
   Result<device::DeviceReading> read() override {
@@ -157,9 +159,23 @@ class LiveDevice : public FakeDevice {
         static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::microseconds>(
                                        std::chrono::steady_clock::now().time_since_epoch())
                                        .count());
+    reading.position_m.z = std::max(-0.005, reading.position_m.z - 5e-5);
     return FakeDevice::read();
   }
+  Status write(const Vec3d& force_n, const Vec3d& torque_nm) override {
+    if (length(force_n) > 0.02) is_pushed = true;
+    return FakeDevice::write(force_n, torque_nm);
+  }
+  std::atomic<bool> is_pushed{false};
 };
+
+// The surface is where the tool starts.
+void put_surface(Hand& hand) {
+  wire::HapticPatch patch;
+  patch.sequence = 1;
+  patch.kind = wire::TouchKind::Near;
+  hand.put(patch);
+}
 
 void wait_until(const std::function<bool()>& is_true) {
   for (int k = 0; k < 20'000 && !is_true(); ++k)
@@ -169,14 +185,15 @@ void wait_until(const std::function<bool()>& is_true) {
 TEST(Loop, StepsMeasuresAndEndsWithoutForce) {
   LiveDevice device;
   Hand hand(device, settings());
+  put_surface(hand);
   Loop loop(hand, {.wants_real_time = false});
   const Loop::Granted granted = loop.start();
   EXPECT_FALSE(granted.has_priority);
   EXPECT_FALSE(granted.has_locked_memory);
   EXPECT_TRUE(loop.is_running());
-  wait_until([&] { return device.reads >= 200; });
-  device.last_force_n = {9, 9, 9};
+  wait_until([&] { return device.reads >= 200 && device.is_pushed; });
   loop.stop();
+  EXPECT_TRUE(device.is_pushed);
   EXPECT_FALSE(loop.is_running());
   EXPECT_FALSE(loop.failure());
   EXPECT_GE(device.reads, 200);
@@ -201,11 +218,13 @@ TEST(Loop, RealTimeIsAskedForAndMayBeRefused) {
 TEST(Loop, ADestructorEndsItWithoutForce) {
   LiveDevice device;
   Hand hand(device, settings());
+  put_surface(hand);
   {
     Loop loop(hand, {.wants_real_time = false});
     loop.start();
-    wait_until([&] { return device.reads >= 20; });
+    wait_until([&] { return device.is_pushed.load(); });
   }
+  EXPECT_TRUE(device.is_pushed);
   const int writes = device.writes;
   EXPECT_EQ(writes, device.reads + 1);
   EXPECT_EQ(length(device.last_force_n), 0);

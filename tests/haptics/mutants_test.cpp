@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdio>
+
 #include "tests/haptics/motions.h"
 
 namespace trocar::haptics::testing {
@@ -75,6 +77,23 @@ TEST(Mutants, HoldAndPenaltyFeedTheHand) {
   EXPECT_GT(mean_of(&Outcome::cycle_mj, palpation_1hz, hold), 0);
   const auto penalty = [](const wire::HapticLaw&) { return make_penalty(); };
   EXPECT_GT(mean_of(&Outcome::rms, palpation_1hz, penalty), 3 * kMost1Hz);
+}
+
+TEST(Mutants, TheSafetyChainLeavesTheModelAlone) {
+  const auto safe = [](const wire::HapticLaw& law) { return make_safe(ours(law)); };
+  for (const auto motion : {palpation_1hz, palpation_3hz, press, release, taps})
+    EXPECT_NEAR(mean_of(&Outcome::rms, motion, safe), mean_of(&Outcome::rms, motion, ours), 0.002);
+}
+
+TEST(Mutants, TheSafetyChainTakesMostOfWhatHoldFeeds) {
+  const auto hold = [](const wire::HapticLaw&) { return make_hold(); };
+  const auto safe = [](const wire::HapticLaw&) { return make_safe(make_hold()); };
+  const double bare_mj = mean_of(&Outcome::work_mj, palpation_3hz, hold);
+  const double safe_mj = mean_of(&Outcome::work_mj, palpation_3hz, safe);
+  std::printf("hold, 3 Hz, RTT 100 ms: %.1f mJ, behind the safety chain %.1f mJ\n", bare_mj,
+              safe_mj);
+  EXPECT_GT(bare_mj, 20);
+  EXPECT_LT(safe_mj, 0.2 * bare_mj);
 }
 
 }  // namespace
