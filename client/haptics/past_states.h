@@ -30,7 +30,6 @@ class PastStates {
 
   // Times grow.
   void add(const PastState& state) { states_[count_++ % kCapacity] = state; }
-  void clear() { count_ = 0; }
 
   bool is_empty() const { return count_ == 0; }
   std::size_t begin() const { return count_ > kCapacity ? count_ - kCapacity : 0; }

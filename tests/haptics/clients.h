@@ -30,7 +30,7 @@ std::unique_ptr<Client> make_linear(double stiffness_factor);
 // A spring of 1 N/mm between the tool and the dented surface as the server had it.
 std::unique_ptr<Client> make_penalty();
 
-// Any of them behind the safety chain, on a device of 3.3 N.
+// Puts any of them behind the safety chain, on a device of 3.3 N.
 std::unique_ptr<Client> make_safe(std::unique_ptr<Client> client);
 
 }  // namespace trocar::haptics::testing

@@ -482,6 +482,31 @@ TEST_F(Touch, ATimeThatDoesNotGrowChangesNothing) {
   EXPECT_EQ(model_.step(input_).force_n, before.force_n);
 }
 
+TEST(TouchModel, IrregularStepsFeelTheSame) {
+  TouchModel regular(kShape), irregular(kShape);
+  wire::HapticPatch patch;
+  patch.plane_normal = {0, 1, 0};
+  patch.friction = 0.2f;
+  patch.kind = wire::TouchKind::Near;
+  patch.law = 1;
+  for (TouchModel* model : {&regular, &irregular}) {
+    model->take(law_of(1));
+    model->take(patch);
+  }
+  double greatest_n = 0;
+  for (int k = 0; k < 3000; ++k) {
+    TouchInput input;
+    input.orientation = rotation_from_z({0, 1, 0});
+    input.time_us = 1'000'000 + static_cast<std::uint64_t>(k) * 1000;
+    input.tip_m = {0.003 * std::sin(0.004 * k), -0.004 - 0.005 * std::cos(0.006 * k), 0};
+    const Vec3d force_n = regular.step(input).force_n;
+    // Every third step comes late, with the next one.
+    if (k % 3 == 1) continue;
+    greatest_n = std::max(greatest_n, length(irregular.step(input).force_n - force_n));
+  }
+  EXPECT_LT(greatest_n, 0.02);
+}
+
 TEST_F(Touch, ALongPauseIsSurvived) {
   press(0.006);
   input_.time_us += 30'000'000;
