@@ -1,0 +1,34 @@
+#pragma once
+
+// A device that says how fast the hand wants to go, not where it is: a stick or a cap on a spring.
+// This integrates what it says into a position within a box, and an orientation.
+
+#include <cstdint>
+
+#include "client/device/haptic_device.h"
+
+namespace trocar::device {
+
+// Returns the share of the full deflection, -1 to 1, which is 0 up to `dead_zone` of it and grows
+// from there: a stick at rest is never quite at 0. Not finite: 0.
+double deflection(double value, double full, double dead_zone);
+
+class RateControl {
+ public:
+  // Half of the box; the position begins in its middle.
+  explicit RateControl(double reach_m) : reach_m_(reach_m) {}
+
+  // Moves on to `now_us`. The speeds are those since the call before; of a pause of more than 50 ms
+  // only 50 ms count, so that a program that stood still does not throw the hand.
+  void advance(std::uint64_t now_us, const Vec3d& velocity_m_s, const Vec3d& turn_rad_s);
+
+  // Position, velocity and orientation are set, the rest is not.
+  const DeviceReading& reading() const { return reading_; }
+
+ private:
+  const double reach_m_;
+  DeviceReading reading_;
+  std::uint64_t last_us_ = 0;  // 0: never
+};
+
+}  // namespace trocar::device
