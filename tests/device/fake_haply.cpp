@@ -22,7 +22,7 @@ FakeHaply::FakeHaply(std::string inventory, Answer answer)
       thread_([this] { serve(); }) {}
 
 FakeHaply::~FakeHaply() {
-  // What the thread waits for ends.
+  // The thread waits for one of these, and they end.
   shutdown(acceptor_.native_handle(), SHUT_RDWR);
   if (socket_.is_open()) shutdown(socket_.native_handle(), SHUT_RDWR);
   thread_.join();
