@@ -29,8 +29,7 @@ using tcp = asio::ip::tcp;
 using Clock = asio::steady_timer::clock_type;
 namespace websocket = boost::beast::websocket;
 
-constexpr std::chrono::milliseconds kHaplyOpenTime{2000}, kHaplyCloseTime{500},
-    kHaplyPatience{1000}, kHaplyPace{1};
+constexpr std::chrono::milliseconds kHaplyCloseTime{2000}, kHaplyPatience{1000}, kHaplyPace{1};
 constexpr int kHaplyMostBad = 100;  // in a row
 
 // The documents that could be read name no figures; a public client of the service cuts at 2 N.
@@ -47,8 +46,8 @@ Error haply_gone(const std::string& why) {
 // All members but `exchange` belong to the thread once it runs.
 class HaplyDevice::Conversation {
  public:
-  Conversation(std::string url, HaplyAddress address)
-      : url_(std::move(url)), address_(std::move(address)) {}
+  Conversation(std::string url, HaplyAddress address, std::chrono::milliseconds patience)
+      : url_(std::move(url)), address_(std::move(address)), patience_(patience) {}
   ~Conversation() {
     asio::post(context_, [this] { close(); });
     thread_.join();
@@ -83,7 +82,7 @@ class HaplyDevice::Conversation {
   }
 
   asio::awaitable<void> run() {
-    limit(kHaplyOpenTime);
+    limit(patience_);
     co_await converse();
     is_finished_ = true;
     deadline_.cancel();
@@ -149,7 +148,7 @@ class HaplyDevice::Conversation {
                                         : "the Inverse3 " + device_id_ + " is gone"));
       return false;
     }
-    device_id_ = state->device_id;
+    if (device_id_.empty()) device_id_ = state->device_id;
     state->reading.time_us = monotonic_us();
     exchange.publish(state->reading);
     return true;
@@ -211,6 +210,7 @@ class HaplyDevice::Conversation {
 
   const std::string url_;
   const HaplyAddress address_;
+  const std::chrono::milliseconds patience_;  // while it opens
   asio::io_context context_{1};
   websocket::stream<tcp::socket> stream_{context_};
   boost::beast::flat_buffer buffer_{kHaplyMessageBytes};
@@ -227,13 +227,14 @@ HaplyDevice::HaplyDevice(std::unique_ptr<Conversation> conversation)
     : conversation_(std::move(conversation)) {}
 HaplyDevice::~HaplyDevice() = default;
 
-Result<std::unique_ptr<HapticDevice>> HaplyDevice::open(const std::string& url) {
+Result<std::unique_ptr<HapticDevice>> HaplyDevice::open(const std::string& url,
+                                                        std::chrono::milliseconds patience) {
   auto address = parse_haply_address(url);
   if (!address)
     return Error{ErrorCode::Usage,
                  "the address of the Haply service is not understood, write for example "
                  "haply:ws://localhost:10001"};
-  auto conversation = std::make_unique<Conversation>(url, std::move(*address));
+  auto conversation = std::make_unique<Conversation>(url, std::move(*address), patience);
   if (auto status = conversation->begin(); !status) return status.error();
   return std::unique_ptr<HapticDevice>(new HaplyDevice(std::move(conversation)));
 }

@@ -20,7 +20,7 @@ constexpr const char* kHdAdvice =
 constexpr unsigned kNoDevice = 0xffffffff;
 constexpr unsigned short kHdPriority = 0x7fff;       // the library's default
 constexpr unsigned kCallAgain = 1, kCallNoMore = 0;  // what a callback returns
-constexpr std::chrono::milliseconds kHdFarewell{200};
+constexpr std::chrono::milliseconds kHdFarewell{1000};
 
 enum Parameter : unsigned {
   kButtons = 0x2000,
