@@ -113,7 +113,7 @@ class ForceDimensionDevice::Servo {
     thread_.join();
   }
 
-  // Constant from here on.
+  // These two do not change after the constructor.
   std::string name;
   DeviceLimits limits;
   DeviceExchange exchange;
