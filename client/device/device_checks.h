@@ -1,7 +1,7 @@
 #pragma once
 
-// What a device says is outside data, and what it gets moves a hand: both are checked here,
-// whatever the backend.
+// A device says outside data, and gets orders that move a hand: both are checked here, whatever the
+// backend.
 
 #include <cstdint>
 #include <optional>
@@ -16,14 +16,14 @@ inline constexpr std::uint64_t kForceHoldUs = 100'000;
 // No device on a table reaches further, and no hand is faster.
 inline constexpr double kFarthestM = 2, kFastestMS = 20;
 
-// Microseconds of the monotonic clock.
+// Returns microseconds of the monotonic clock.
 std::uint64_t monotonic_us();
 
-// The reading with its orientation made a unit and its gripper between 0 and 1; nothing if a number
-// is not finite, or is beyond what a device can reach.
+// Returns the reading with its orientation made a unit and its gripper between 0 and 1; nothing if
+// a number is not finite, or is beyond what a device can reach.
 std::optional<DeviceReading> checked(DeviceReading reading);
 
-// Zero if a component is not finite; shortened to `limit`.
+// Returns zero if a component is not finite; otherwise it is shortened to `limit`.
 Vec3d checked_force(const Vec3d& force, double limit);
 
 // Takes the rows of a rotation matrix, column vectors; nothing if it is none.

@@ -8,25 +8,25 @@ namespace trocar::device {
 
 Result<DeviceReading> DeviceExchange::read() {
   if (has_failed()) return why_;
-  return reading_.take();
+  return reading_.newest();
 }
 
 Status DeviceExchange::write(const Vec3d& force_n, const Vec3d& torque_nm,
                              const DeviceLimits& limits) {
   if (has_failed()) return why_;
-  order_.publish({checked_force(force_n, limits.force_n),
-                  checked_force(torque_nm, limits.torque_nm), monotonic_us()});
+  order_.put({checked_force(force_n, limits.force_n), checked_force(torque_nm, limits.torque_nm),
+              monotonic_us()});
   return {};
 }
 
 bool DeviceExchange::publish(const DeviceReading& reading) {
   const auto plausible = checked(reading);
-  if (plausible) reading_.publish(*plausible);
+  if (plausible) reading_.put(*plausible);
   return plausible.has_value();
 }
 
 ForceOrder DeviceExchange::order(std::uint64_t now_us) {
-  const ForceOrder& newest = order_.take();
+  const ForceOrder& newest = order_.newest();
   return now_us <= newest.time_us + kForceHoldUs ? newest : ForceOrder{};
 }
 

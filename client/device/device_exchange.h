@@ -1,16 +1,20 @@
 #pragma once
 
-// Between the thread that holds a device in its program and the thread that talks to the device:
-// readings one way, forces the other, and the reason if the device is gone. Nobody waits.
+// Stands between the thread that holds a device in its program and the thread that talks to the
+// device: readings go one way, forces the other, and so does the reason if the device is gone.
+// Nobody waits.
 
 #include <atomic>
 #include <mutex>
 #include <string>
 
 #include "client/device/haptic_device.h"
-#include "client/device/newest.h"
+#include "common/base/newest.h"
 
 namespace trocar::device {
+
+// A device that fails this many times in a row, about one a millisecond, is gone.
+inline constexpr int kMostDeviceErrors = 20;
 
 struct ForceOrder {
   Vec3d force_n, torque_nm;
@@ -26,7 +30,7 @@ class DeviceExchange {
   // The device's side. A reading that is not plausible is left out, so that its time stands still;
   // true: it was taken.
   bool publish(const DeviceReading& reading);
-  // No force if the last one was written more than kForceHoldUs ago.
+  // Returns no force if the last one was written more than kForceHoldUs ago.
   ForceOrder order(std::uint64_t now_us);
   // The first reason counts. Any thread.
   void fail(Error why);

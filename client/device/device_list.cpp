@@ -46,7 +46,7 @@ Opened open_gamepad(const std::string& path, const DevicePlaces& places) {
   return GamepadDevice::open(found.front(), monotonic_us);
 }
 
-// What is opened is closed at once.
+// A device that was opened for the list is closed at once.
 ListedDevice listed(const std::string& name, const Opened& opened) {
   return {name, opened.ok(), opened.ok() ? (*opened)->description() : opened.error().message};
 }

@@ -18,7 +18,7 @@
 
 namespace trocar::device {
 
-// Where the backends look.
+// Says where the backends look.
 struct DevicePlaces {
   std::string haply_url, spacemouse_socket, input_folder;
   std::vector<std::string> dhd_libraries, hd_libraries;
@@ -33,7 +33,7 @@ struct ListedDevice {
 
 // Takes no device away from a program that uses it, and takes at most some seconds.
 std::vector<ListedDevice> list_devices(const DevicePlaces& places = usual_places());
-// For a terminal: a line for each.
+// Returns text for a terminal: a line for each.
 std::string device_table(const std::vector<ListedDevice>& devices);
 
 // `name`: as above. An error is one line that says what to do.

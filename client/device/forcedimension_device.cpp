@@ -16,53 +16,12 @@
 namespace trocar::device {
 namespace {
 
-constexpr const char* kAdvice =
+constexpr const char* kDhdAdvice =
     "install the Force Dimension SDK (forcedimension.com) and put its folder of libraries into "
     "LD_LIBRARY_PATH";
-constexpr std::chrono::milliseconds kPace{1};
+constexpr std::chrono::milliseconds kDhdPace{1};
 constexpr unsigned char kWatchdogMs = 100;
-constexpr int kMostErrors = 20;        // in a row
 constexpr double kOpenGripRad = 0.45;  // of omega.7 and sigma.7
-
-// Functions of libdhd 3. The last argument is always the device's id: in C it has no default.
-struct Dhd {
-  int (*get_device_count)() = nullptr;
-  int (*open_id)(char) = nullptr;
-  int (*close)(char) = nullptr;
-  int (*stop)(char) = nullptr;
-  int (*get_system_type)(char) = nullptr;
-  int (*enable_force)(unsigned char, char) = nullptr;
-  int (*set_watchdog)(unsigned char, char) = nullptr;
-  int (*get_position)(double*, double*, double*, char) = nullptr;
-  int (*get_linear_velocity)(double*, double*, double*, char) = nullptr;
-  int (*get_orientation_frame)(double[3][3], char) = nullptr;
-  int (*get_gripper_angle_rad)(double*, char) = nullptr;
-  int (*get_button)(int, char) = nullptr;
-  int (*set_force)(double, double, double, double, double, double, double, char) = nullptr;
-  const char* (*error_get_last_str)() = nullptr;
-};
-
-Result<Dhd> load(const std::vector<std::string>& names) {
-  auto library = SharedObject::open(names, kAdvice);
-  if (!library) return library.error();
-  Dhd dhd;
-  library->bind("dhdGetDeviceCount", dhd.get_device_count);
-  library->bind("dhdOpenID", dhd.open_id);
-  library->bind("dhdClose", dhd.close);
-  library->bind("dhdStop", dhd.stop);
-  library->bind("dhdGetSystemType", dhd.get_system_type);
-  library->bind("dhdEnableForce", dhd.enable_force);
-  library->bind("dhdSetWatchdog", dhd.set_watchdog);
-  library->bind("dhdGetPosition", dhd.get_position);
-  library->bind("dhdGetLinearVelocity", dhd.get_linear_velocity);
-  library->bind("dhdGetOrientationFrame", dhd.get_orientation_frame);
-  library->bind("dhdGetGripperAngleRad", dhd.get_gripper_angle_rad);
-  library->bind("dhdGetButton", dhd.get_button);
-  library->bind("dhdSetForceAndTorqueAndGripperForce", dhd.set_force);
-  library->bind("dhdErrorGetLastStr", dhd.error_get_last_str);
-  if (auto status = library->check(); !status) return status.error();
-  return dhd;
-}
 
 // Forces and reach as in the maker's data sheets, stiffness below what they say. `reach_m`: half of
 // the workspace, in our directions.
@@ -85,11 +44,11 @@ constexpr std::array kModels{
     Model{104, "sigma.7", true, true, 20, 0.4, 3000, {0.095, 0.095, 0.065}},
     Model{105, "sigma.7 (left)", true, true, 20, 0.4, 3000, {0.095, 0.095, 0.065}},
 };
-constexpr Model kUnknown{0, "device", false, false, 5, 0, 1000, {0.05, 0.05, 0.05}};
+constexpr Model kUnknownModel{0, "device", false, false, 5, 0, 1000, {0.05, 0.05, 0.05}};
 
-Model model_of(int type) {
+Model dhd_model_of(int type) {
   const auto* found = std::ranges::find(kModels, type, &Model::type);
-  return found == kModels.end() ? kUnknown : *found;
+  return found == kModels.end() ? kUnknownModel : *found;
 }
 
 Vec3d to_ours(const double (&v)[3]) {
@@ -98,9 +57,55 @@ Vec3d to_ours(const double (&v)[3]) {
 
 }  // namespace
 
+// Functions of libdhd 3. The last argument is always the device's id: in C it has no default.
+struct ForceDimensionDevice::Library {
+  int (*get_device_count)() = nullptr;
+  int (*open_id)(char) = nullptr;
+  int (*close)(char) = nullptr;
+  int (*stop)(char) = nullptr;
+  int (*get_system_type)(char) = nullptr;
+  int (*enable_force)(unsigned char, char) = nullptr;
+  int (*set_watchdog)(unsigned char, char) = nullptr;
+  int (*get_position)(double*, double*, double*, char) = nullptr;
+  int (*get_linear_velocity)(double*, double*, double*, char) = nullptr;
+  int (*get_orientation_frame)(double[3][3], char) = nullptr;
+  int (*get_gripper_angle_rad)(double*, char) = nullptr;
+  int (*get_button)(int, char) = nullptr;
+  int (*set_force)(double, double, double, double, double, double, double, char) = nullptr;
+  const char* (*error_get_last_str)() = nullptr;
+};
+
+Result<ForceDimensionDevice::Library> ForceDimensionDevice::load(
+    const std::vector<std::string>& names) {
+  auto library = SharedObject::open(names, kDhdAdvice);
+  if (!library) return library.error();
+  Library dhd;
+  library->bind("dhdGetDeviceCount", dhd.get_device_count);
+  library->bind("dhdOpenID", dhd.open_id);
+  library->bind("dhdClose", dhd.close);
+  library->bind("dhdStop", dhd.stop);
+  library->bind("dhdGetSystemType", dhd.get_system_type);
+  library->bind("dhdEnableForce", dhd.enable_force);
+  library->bind("dhdSetWatchdog", dhd.set_watchdog);
+  library->bind("dhdGetPosition", dhd.get_position);
+  library->bind("dhdGetLinearVelocity", dhd.get_linear_velocity);
+  library->bind("dhdGetOrientationFrame", dhd.get_orientation_frame);
+  library->bind("dhdGetGripperAngleRad", dhd.get_gripper_angle_rad);
+  library->bind("dhdGetButton", dhd.get_button);
+  library->bind("dhdSetForceAndTorqueAndGripperForce", dhd.set_force);
+  library->bind("dhdErrorGetLastStr", dhd.error_get_last_str);
+  if (auto status = library->check(); !status) return status.error();
+  return dhd;
+}
+
 class ForceDimensionDevice::Servo {
  public:
-  Servo(const Dhd& dhd, char id) : model(model_of(dhd.get_system_type(id))), dhd_(dhd), id_(id) {
+  Servo(const Library& dhd, char id) : dhd_(dhd), id_(id) {
+    const Model model = dhd_model_of(dhd.get_system_type(id));
+    name = model.name;
+    limits = {model.force_n, model.torque_nm, 1000, model.stiffness_n_m, model.reach_m};
+    has_wrist_ = model.has_wrist;
+    has_gripper_ = model.has_gripper;
     thread_ = std::thread([this] { run(); });
   }
   ~Servo() {
@@ -108,23 +113,25 @@ class ForceDimensionDevice::Servo {
     thread_.join();
   }
 
-  const Model model;
+  // These two do not change after the constructor.
+  std::string name;
+  DeviceLimits limits;
   DeviceExchange exchange;
 
  private:
   void run() {
     auto next = std::chrono::steady_clock::now();
     int errors = 0;
-    while (!is_closing_ && errors < kMostErrors) {
+    while (!is_closing_ && errors < kMostDeviceErrors) {
       errors = exchange_once() ? 0 : errors + 1;
       // No step is made up for: a device that is slower than the pace sets its own.
-      next = std::max(next + kPace, std::chrono::steady_clock::now());
+      next = std::max(next + kDhdPace, std::chrono::steady_clock::now());
       std::this_thread::sleep_until(next);
     }
     if (!is_closing_) {
       const char* why = dhd_.error_get_last_str();
       exchange.fail(
-          {ErrorCode::ResourceMissing, std::string("the ") + model.name + " is gone (" +
+          {ErrorCode::ResourceMissing, "the " + name + " is gone (" +
                                            printable(why == nullptr ? "no reason" : why, 200) +
                                            "), check its cable and its power and open it again"});
     }
@@ -154,7 +161,7 @@ class ForceDimensionDevice::Servo {
   }
 
   bool read_wrist(DeviceReading& reading) {
-    if (!model.has_wrist) return true;
+    if (!has_wrist_) return true;
     double rows[3][3]{};
     if (dhd_.get_orientation_frame(rows, id_) < 0) return false;
     const auto theirs = orientation_of(rows);
@@ -165,7 +172,7 @@ class ForceDimensionDevice::Servo {
   }
 
   bool read_gripper(DeviceReading& reading) {
-    if (!model.has_gripper) return true;
+    if (!has_gripper_) return true;
     double angle_rad = 0;
     if (dhd_.get_gripper_angle_rad(&angle_rad, id_) < 0) return false;
     // Left-handed devices count the other way.
@@ -173,8 +180,9 @@ class ForceDimensionDevice::Servo {
     return true;
   }
 
-  const Dhd dhd_;
+  const Library dhd_;
   const char id_;
+  bool has_wrist_ = false, has_gripper_ = false;
   std::atomic<bool> is_closing_{false};
   std::thread thread_;
 };
@@ -227,12 +235,11 @@ Status ForceDimensionDevice::write(const Vec3d& force_n, const Vec3d& torque_nm)
 }
 
 DeviceLimits ForceDimensionDevice::limits() const {
-  const Model& model = servo_->model;
-  return {model.force_n, model.torque_nm, 1000, model.stiffness_n_m, model.reach_m};
+  return servo_->limits;
 }
 
 std::string ForceDimensionDevice::description() const {
-  return std::string("Force Dimension ") + servo_->model.name;
+  return "Force Dimension " + servo_->name;
 }
 
 }  // namespace trocar::device

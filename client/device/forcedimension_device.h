@@ -20,13 +20,13 @@ namespace trocar::device {
 
 class ForceDimensionDevice final : public HapticDevice {
  public:
-  // What to look for, best first.
+  // These are looked for, the best first.
   static std::vector<std::string> library_names() { return {"libdhd.so.3", "libdhd.so"}; }
 
   // `index`: among the devices that the library sees, from 0.
   static Result<std::unique_ptr<HapticDevice>> open(const std::vector<std::string>& names,
                                                     int index);
-  // How many devices the library sees.
+  // Counts the devices that the library sees.
   static Result<int> count(const std::vector<std::string>& names);
   ~ForceDimensionDevice() override;
 
@@ -36,7 +36,10 @@ class ForceDimensionDevice final : public HapticDevice {
   std::string description() const override;
 
  private:
+  struct Library;
   class Servo;
+
+  static Result<Library> load(const std::vector<std::string>& names);
 
   explicit ForceDimensionDevice(std::unique_ptr<Servo> servo);
 

@@ -18,14 +18,14 @@
 namespace trocar::device {
 namespace {
 
-constexpr double kDeadZone = 0.12, kFullSpeedMS = 0.08, kFullTurnRadS = 1.2, kReachM = 0.15;
+constexpr double kStickDeadZone = 0.12;
 constexpr double kFullRumbleN = 2;
 // A rumble is renewed after half its time, and changed by steps that a hand can tell apart.
 constexpr std::uint16_t kRumbleMs = 200;
-constexpr std::uint64_t kRenewUs = 100'000, kChangeUs = 40'000;
-constexpr double kStep = 0.05;
-// What one read() takes at most; more waits in the kernel, whose buffer is bounded.
-constexpr int kMostPieces = 16;
+constexpr std::uint64_t kRumbleRenewUs = 100'000, kRumbleChangeUs = 40'000;
+constexpr double kRumbleStep = 0.05;
+// One read() takes no more than this; the rest waits in the kernel, whose buffer is bounded.
+constexpr int kMostBatches = 16;
 
 constexpr std::array kButtons{BTN_SOUTH, BTN_EAST, BTN_NORTH,  BTN_WEST,
                               BTN_TL,    BTN_TR,   BTN_SELECT, BTN_START};
@@ -54,7 +54,7 @@ bool is_gamepad(int file, const GamepadDevice::Ioctl& ioctl) {
 
 double GamepadDevice::Axis::centred() const {
   if (highest <= lowest) return 0;
-  return deflection(value - (lowest + highest) / 2, (highest - lowest) / 2, kDeadZone);
+  return deflection(value - (lowest + highest) / 2, (highest - lowest) / 2, kStickDeadZone);
 }
 
 double GamepadDevice::Axis::pressed() const {
@@ -103,8 +103,7 @@ GamepadDevice::GamepadDevice(FileDescriptor file, std::string path, Ioctl ioctl,
     : file_(std::move(file)),
       path_(std::move(path)),
       ioctl_(std::move(ioctl)),
-      clock_us_(std::move(clock_us)),
-      control_(kReachM) {
+      clock_us_(std::move(clock_us)) {
   std::array<char, 128> name{};
   ioctl_(file_.value(), EVIOCGNAME(name.size() - 1), name.data());
   name_ = printable(name.data(), 60);
@@ -124,7 +123,7 @@ GamepadDevice::GamepadDevice(FileDescriptor file, std::string path, Ioctl ioctl,
 }
 
 GamepadDevice::~GamepadDevice() {
-  // What cannot be stopped any more ends by itself.
+  // A rumble that cannot be stopped any more ends by itself.
   if (strength_ > 0) static_cast<void>(rumble(0).ok());
 }
 
@@ -164,7 +163,7 @@ void GamepadDevice::take(const input_event& event) {
 }
 
 Status GamepadDevice::take_events() {
-  for (int piece = 0; piece < kMostPieces; ++piece) {
+  for (int piece = 0; piece < kMostBatches; ++piece) {
     auto* storage = reinterpret_cast<std::byte*>(events_.data());
     const auto got = ::read(file_.value(), storage + bytes_, sizeof events_ - bytes_);
     if (got < 0 && errno == EINTR) continue;
@@ -183,8 +182,8 @@ Result<DeviceReading> GamepadDevice::read() {
   if (auto status = take_events(); !status) return status.error();
   const std::uint64_t now_us = clock_us_();
   const auto share = [&](AxisName name) { return axes_[name].centred(); };
-  const Vec3d velocity = Vec3d{share(kLeftX), -share(kRightY), share(kLeftY)} * kFullSpeedMS;
-  control_.advance(now_us, velocity, {0, -share(kRightX) * kFullTurnRadS, 0});
+  const Vec3d velocity = Vec3d{share(kLeftX), -share(kRightY), share(kLeftY)} * kStickSpeedMS;
+  control_.advance(now_us, velocity, {0, -share(kRightX) * kStickTurnRadS, 0});
   DeviceReading reading = control_.reading();
   reading.gripper = static_cast<float>(axes_[kTrigger].pressed());
   reading.buttons = buttons_;
@@ -210,17 +209,17 @@ Status GamepadDevice::rumble(double strength) {
 Status GamepadDevice::write(const Vec3d& force_n, const Vec3d&) {
   if (!has_rumble_) return {};
   const double strength = length(checked_force(force_n, kFullRumbleN)) / kFullRumbleN;
-  const double stepped = std::round(strength / kStep) * kStep;
+  const double stepped = std::round(strength / kRumbleStep) * kRumbleStep;
   const std::uint64_t since_us = clock_us_() - rumble_us_;
-  const bool is_changed = stepped != strength_ && (stepped == 0 || since_us >= kChangeUs);
-  const bool is_due = stepped > 0 && since_us >= kRenewUs;
+  const bool is_changed = stepped != strength_ && (stepped == 0 || since_us >= kRumbleChangeUs);
+  const bool is_due = stepped > 0 && since_us >= kRumbleRenewUs;
   return is_changed || is_due ? rumble(stepped) : Status{};
 }
 
 DeviceLimits GamepadDevice::limits() const {
   return {.force_n = has_rumble_ ? kFullRumbleN : 0,
           .rate_hz = 125,
-          .workspace_m = {kReachM, kReachM, kReachM}};
+          .workspace_m = {kStickReachM, kStickReachM, kStickReachM}};
 }
 
 std::string GamepadDevice::description() const {

@@ -38,7 +38,7 @@ class GamepadDevice final : public HapticDevice {
   // Takes a descriptor that is open and does not block; `path` names it in errors.
   static Result<std::unique_ptr<HapticDevice>> adopt(FileDescriptor file, const std::string& path,
                                                      Ioctl ioctl, ClockUs clock_us);
-  // The paths of the gamepads in a folder such as /dev/input.
+  // Returns the paths of the gamepads in a folder such as /dev/input.
   static std::vector<std::string> find(const std::string& folder);
   ~GamepadDevice() override;
 

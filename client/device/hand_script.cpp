@@ -24,7 +24,7 @@ Error bad(const std::string& what) {
   return {ErrorCode::Usage, what};
 }
 
-// Least jerk between rest and rest: 0 at 0, 1 at 1.
+// Goes from 0 at 0 to 1 at 1 with the least jerk, from rest to rest.
 double smooth(double t) {
   t = std::clamp(t, 0.0, 1.0);
   return t * t * t * (10 + t * (6 * t - 15));
@@ -36,7 +36,7 @@ bool is_number(std::string_view text, double& value) {
   return failure == std::errc{} && stop == end && std::isfinite(value);
 }
 
-// True if `text` is a number in `unit` within (0, most].
+// Returns true if `text` is a number in `unit` within (0, most].
 bool is_quantity(std::string_view text, std::string_view unit, double scale, double most,
                  double& value) {
   if (!text.ends_with(unit)) return false;

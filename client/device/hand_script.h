@@ -1,6 +1,6 @@
 #pragma once
 
-// Where a simulated hand wants to be at each moment, from one line of parameters or from a file.
+// Says where a simulated hand wants to be at each moment, from one line of parameters or a file.
 //
 //   still                  stays at the origin
 //   press,5mm,2s           goes in, holds, comes out and waits a second, again and again

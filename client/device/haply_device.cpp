@@ -29,14 +29,14 @@ using tcp = asio::ip::tcp;
 using Clock = asio::steady_timer::clock_type;
 namespace websocket = boost::beast::websocket;
 
-constexpr std::chrono::milliseconds kOpenTime{2000}, kCloseTime{500}, kPatience{1000}, kPace{1};
-constexpr int kMostBadMessages = 100;  // in a row
+constexpr std::chrono::milliseconds kHaplyCloseTime{2000}, kHaplyPatience{1000}, kHaplyPace{1};
+constexpr int kHaplyMostBad = 100;  // in a row
 
 // The documents that could be read name no figures; a public client of the service cuts at 2 N.
-constexpr DeviceLimits kLimits{
+constexpr DeviceLimits kHaplyLimits{
     .force_n = 2, .rate_hz = 1000, .stiffness_n_m = 800, .workspace_m = {0.15, 0.12, 0.1}};
 
-Error gone(const std::string& why) {
+Error haply_gone(const std::string& why) {
   return {ErrorCode::ResourceMissing,
           why + ", start the Haply Inverse Service (or the Haply Hub) and plug the device in"};
 }
@@ -46,8 +46,8 @@ Error gone(const std::string& why) {
 // All members but `exchange` belong to the thread once it runs.
 class HaplyDevice::Conversation {
  public:
-  Conversation(std::string url, HaplyAddress address)
-      : url_(std::move(url)), address_(std::move(address)) {}
+  Conversation(std::string url, HaplyAddress address, std::chrono::milliseconds patience)
+      : url_(std::move(url)), address_(std::move(address)), patience_(patience) {}
   ~Conversation() {
     asio::post(context_, [this] { close(); });
     thread_.join();
@@ -69,7 +69,7 @@ class HaplyDevice::Conversation {
     try {
       context_.run();
     } catch (const std::exception& failure) {
-      end(gone(std::string("the connection to the Haply service failed: ") + failure.what()));
+      end(haply_gone(std::string("the connection to the Haply service failed: ") + failure.what()));
     }
   }
 
@@ -82,7 +82,7 @@ class HaplyDevice::Conversation {
   }
 
   asio::awaitable<void> run() {
-    limit(kOpenTime);
+    limit(patience_);
     co_await converse();
     is_finished_ = true;
     deadline_.cancel();
@@ -107,7 +107,7 @@ class HaplyDevice::Conversation {
       std::tie(failure) = co_await stream_.async_handshake(address_.host, "/", kNoThrow);
     }
     if (failure) {
-      end(gone(url_ + ": " + (is_late_ ? "nobody answers" : failure.message())));
+      end(haply_gone(url_ + ": " + (is_late_ ? "nobody answers" : failure.message())));
       co_return;
     }
     const bool is_inventory = co_await read_message();
@@ -126,9 +126,9 @@ class HaplyDevice::Conversation {
     if (failure) {
       const bool is_long = failure == websocket::error::message_too_big ||
                            failure == websocket::error::buffer_overflow;
-      end(gone(is_long    ? "the Haply service sent a message without end"
-               : is_late_ ? url_ + ": nobody answers"
-                          : "the Haply service closed the connection"));
+      end(haply_gone(is_long    ? "the Haply service sent a message without end"
+                     : is_late_ ? url_ + ": nobody answers"
+                                : "the Haply service closed the connection"));
       co_return false;
     }
     co_return take(
@@ -138,17 +138,17 @@ class HaplyDevice::Conversation {
   bool take(std::string_view text) {
     auto state = read_haply_state(text, device_id_);
     if (!state) {
-      if (is_open_ && ++bad_messages_ < kMostBadMessages) return true;
+      if (is_open_ && ++bad_messages_ < kHaplyMostBad) return true;
       end(state.error());
       return false;
     }
     bad_messages_ = 0;
     if (state->device_id.empty()) {
-      end(gone(device_id_.empty() ? "the Haply service has no Inverse3"
-                                  : "the Inverse3 " + device_id_ + " is gone"));
+      end(haply_gone(device_id_.empty() ? "the Haply service has no Inverse3"
+                                        : "the Inverse3 " + device_id_ + " is gone"));
       return false;
     }
-    device_id_ = state->device_id;
+    if (device_id_.empty()) device_id_ = state->device_id;
     state->reading.time_us = monotonic_us();
     exchange.publish(state->reading);
     return true;
@@ -169,19 +169,19 @@ class HaplyDevice::Conversation {
   asio::awaitable<void> send_forces() {
     std::string text;
     for (int number = 0; !is_closing_ && !is_done_; number = 1) {
-      const auto next = Clock::now() + kPace;
+      const auto next = Clock::now() + kHaplyPace;
       text = haply_command(device_id_, exchange.order(monotonic_us()).force_n, number == 0);
       is_answered_ = false;
       const auto [failure, bytes] = co_await stream_.async_write(asio::buffer(text), kNoThrow);
       if (failure) co_return;
-      // From here to the test of its end the reader cannot come in between.
-      answer_timer_.expires_after(kPatience);
+      // The reader runs on this thread too, so it cannot answer between the test and the wait.
+      answer_timer_.expires_after(kHaplyPatience);
       if (!is_answered_ && !is_closing_ && !is_done_) co_await answer_timer_.async_wait(kNoThrow);
       pace_timer_.expires_at(next);
       if (!is_closing_ && !is_done_) co_await pace_timer_.async_wait(kNoThrow);
     }
     if (is_done_) co_return;
-    limit(kCloseTime);
+    limit(kHaplyCloseTime);
     text = haply_command(device_id_, Vec3d{}, false);
     const auto [failure, bytes] = co_await stream_.async_write(asio::buffer(text), kNoThrow);
     if (!failure) co_await stream_.async_close(websocket::close_code::normal, kNoThrow);
@@ -192,7 +192,7 @@ class HaplyDevice::Conversation {
     is_closing_ = true;
     answer_timer_.cancel();
     pace_timer_.cancel();
-    limit(kCloseTime);
+    limit(kHaplyCloseTime);
   }
 
   // Whatever is under way then ends, by the end of its socket.
@@ -210,6 +210,7 @@ class HaplyDevice::Conversation {
 
   const std::string url_;
   const HaplyAddress address_;
+  const std::chrono::milliseconds patience_;  // while it opens
   asio::io_context context_{1};
   websocket::stream<tcp::socket> stream_{context_};
   boost::beast::flat_buffer buffer_{kHaplyMessageBytes};
@@ -226,13 +227,14 @@ HaplyDevice::HaplyDevice(std::unique_ptr<Conversation> conversation)
     : conversation_(std::move(conversation)) {}
 HaplyDevice::~HaplyDevice() = default;
 
-Result<std::unique_ptr<HapticDevice>> HaplyDevice::open(const std::string& url) {
+Result<std::unique_ptr<HapticDevice>> HaplyDevice::open(const std::string& url,
+                                                        std::chrono::milliseconds patience) {
   auto address = parse_haply_address(url);
   if (!address)
     return Error{ErrorCode::Usage,
                  "the address of the Haply service is not understood, write for example "
                  "haply:ws://localhost:10001"};
-  auto conversation = std::make_unique<Conversation>(url, std::move(*address));
+  auto conversation = std::make_unique<Conversation>(url, std::move(*address), patience);
   if (auto status = conversation->begin(); !status) return status.error();
   return std::unique_ptr<HapticDevice>(new HaplyDevice(std::move(conversation)));
 }
@@ -242,11 +244,11 @@ Result<DeviceReading> HaplyDevice::read() {
 }
 
 Status HaplyDevice::write(const Vec3d& force_n, const Vec3d& torque_nm) {
-  return conversation_->exchange.write(force_n, torque_nm, kLimits);
+  return conversation_->exchange.write(force_n, torque_nm, kHaplyLimits);
 }
 
 DeviceLimits HaplyDevice::limits() const {
-  return kLimits;
+  return kHaplyLimits;
 }
 
 std::string HaplyDevice::description() const {

@@ -11,6 +11,7 @@
 // again. With nothing to feel the force is zero, which keeps the connection alive. On closing, zero
 // goes last. A thread of its own does all of it; read() and write() never wait.
 
+#include <chrono>
 #include <memory>
 
 #include "client/device/haptic_device.h"
@@ -21,8 +22,10 @@ class HaplyDevice final : public HapticDevice {
  public:
   static constexpr const char* kUrl = "ws://localhost:10001";
 
-  // Waits at most 2 s for the service.
-  static Result<std::unique_ptr<HapticDevice>> open(const std::string& url);
+  // Waits for the service no longer than `patience`; for the address of a host with a name, as long
+  // as the system does.
+  static Result<std::unique_ptr<HapticDevice>> open(
+      const std::string& url, std::chrono::milliseconds patience = std::chrono::seconds(2));
   ~HaplyDevice() override;
 
   Result<DeviceReading> read() override;

@@ -14,25 +14,25 @@ using nlohmann::json;
 constexpr Vec3d kHome{0, 0.15, 0.12};  // in our directions, from the base
 constexpr std::size_t kMostIdBytes = 64;
 
-Error bad(const std::string& what) {
+Error not_understood(const std::string& what) {
   return {ErrorCode::BadMessage, "the Haply service says what is not understood (" + what +
                                      "), update it to version 3.5 or newer"};
 }
 
 // The member if `object` is an object that has it.
-const json* find(const json& object, const char* name) {
+const json* find_member(const json& object, const char* name) {
   if (!object.is_object()) return nullptr;
   const auto found = object.find(name);
   return found == object.end() ? nullptr : &*found;
 }
 
 std::optional<Vec3d> vector_in(const json& object, const char* name) {
-  const json* member = find(object, name);
+  const json* member = find_member(object, name);
   if (member == nullptr) return std::nullopt;
   std::array<double, 3> values{};
   for (std::size_t i = 0; i < 3; ++i) {
     static constexpr std::array kNames{"x", "y", "z"};
-    const json* value = find(*member, kNames[i]);
+    const json* value = find_member(*member, kNames[i]);
     if (value == nullptr || !value->is_number()) return std::nullopt;
     values[i] = value->get<double>();
   }
@@ -41,8 +41,8 @@ std::optional<Vec3d> vector_in(const json& object, const char* name) {
 
 std::optional<Quatf> quaternion_in(const json& object) {
   const auto axis = vector_in(object, "orientation");
-  const json* member = find(object, "orientation");
-  const json* w = member == nullptr ? nullptr : find(*member, "w");
+  const json* member = find_member(object, "orientation");
+  const json* w = member == nullptr ? nullptr : find_member(*member, "w");
   if (!axis || w == nullptr || !w->is_number()) return std::nullopt;
   const Vec3f v = to_float(*axis);
   return Quatf{v.x, v.y, v.z, w->get<float>()};
@@ -54,24 +54,24 @@ bool is_true(const json* value) {
 
 // A grip has the orientation of the hand, and buttons; with a cable it has only one.
 void read_grip(const json& message, const char* kind, DeviceReading& reading) {
-  const json* grips = find(message, kind);
+  const json* grips = find_member(message, kind);
   if (grips == nullptr || !grips->is_array() || grips->empty()) return;
-  const json* state = find(grips->front(), "state");
+  const json* state = find_member(grips->front(), "state");
   if (state == nullptr) return;
   if (const auto orientation = quaternion_in(*state)) reading.orientation = *orientation;
-  if (is_true(find(*state, "button"))) reading.buttons |= 1;
-  const json* buttons = find(*state, "buttons");
+  if (is_true(find_member(*state, "button"))) reading.buttons |= 1;
+  const json* buttons = find_member(*state, "buttons");
   if (buttons == nullptr) return;
   std::uint32_t bit = 1;
   for (const char* name : {"a", "b", "c"}) {
-    if (is_true(find(*buttons, name))) reading.buttons |= bit;
+    if (is_true(find_member(*buttons, name))) reading.buttons |= bit;
     bit <<= 1;
   }
 }
 
 const json* device_in(const json& devices, const std::string& device_id, std::string& found_id) {
   for (const json& device : devices) {
-    const json* id = find(device, "device_id");
+    const json* id = find_member(device, "device_id");
     if (id == nullptr || !id->is_string()) continue;
     const auto& text = id->get_ref<const std::string&>();
     if (text.size() > kMostIdBytes || !is_printable(text)) continue;
@@ -86,19 +86,19 @@ const json* device_in(const json& devices, const std::string& device_id, std::st
 
 Result<HaplyState> read_haply_state(std::string_view text, const std::string& device_id) {
   const json message = json::parse(text, nullptr, false);
-  if (!message.is_object()) return bad("no JSON object");
-  const json* devices = find(message, "inverse3");
+  if (!message.is_object()) return not_understood("no JSON object");
+  const json* devices = find_member(message, "inverse3");
   HaplyState state;
   if (devices == nullptr) return state;
   // Version 3.0 names its devices by the members of an object.
-  if (!devices->is_array()) return bad("inverse3 is no list");
+  if (!devices->is_array()) return not_understood("inverse3 is no list");
   const json* device = device_in(*devices, device_id, state.device_id);
   if (device == nullptr) return state;
-  const json* own = find(*device, "state");
-  if (own == nullptr) return bad("a device has no state");
+  const json* own = find_member(*device, "state");
+  if (own == nullptr) return not_understood("a device has no state");
   const auto position = vector_in(*own, "cursor_position");
   const auto velocity = vector_in(*own, "cursor_velocity");
-  if (!position || !velocity) return bad("no position or no velocity");
+  if (!position || !velocity) return not_understood("no position or no velocity");
   state.reading.position_m = *position - kHome;
   state.reading.velocity_m_s = *velocity;
   read_grip(message, "verse_grip", state.reading);

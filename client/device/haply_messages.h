@@ -1,7 +1,7 @@
 #pragma once
 
-// What is said to and by the Haply Inverse Service (JSON 3.1, as of version 3.5): its messages are
-// outside data.
+// Writes and reads the messages of the Haply Inverse Service (JSON 3.1, as of version 3.5): what it
+// says is outside data.
 //
 // Frame of the device: x right, y away from the person, z up, origin in its base; the hand is at
 // home at (0, -0.12, 0.15) m. Ours has its origin there: (x, y, z) = (x', z' - 0.15, -y' - 0.12).
@@ -31,7 +31,7 @@ std::string haply_command(const std::string& device_id, const Vec3d& force_n, bo
 struct HaplyAddress {
   std::string host, port;
 };
-// From "ws://localhost:10001"; nothing if it is no such address.
+// Reads "ws://localhost:10001"; returns nothing if it is no such address.
 std::optional<HaplyAddress> parse_haply_address(std::string_view url);
 
 }  // namespace trocar::device

@@ -15,13 +15,12 @@
 namespace trocar::device {
 namespace {
 
-constexpr const char* kAdvice =
+constexpr const char* kHdAdvice =
     "install OpenHaptics and the Touch driver (3dsystems.com) and run its setup program";
 constexpr unsigned kNoDevice = 0xffffffff;
-constexpr unsigned short kPriority = 0x7fff;  // the library's default
-constexpr unsigned kAgain = 1, kDone = 0;     // what a callback returns
-constexpr int kMostErrors = 20;               // in a row
-constexpr std::chrono::milliseconds kFarewell{200};
+constexpr unsigned short kHdPriority = 0x7fff;       // the library's default
+constexpr unsigned kCallAgain = 1, kCallNoMore = 0;  // what a callback returns
+constexpr std::chrono::milliseconds kHdFarewell{1000};
 
 enum Parameter : unsigned {
   kButtons = 0x2000,
@@ -36,20 +35,26 @@ enum Parameter : unsigned {
   kForceOutput = 0x4000,
 };
 
-// The library's error is a struct of three 32-bit numbers. Some bindings read a 16-bit code, so
-// only those bits count; all codes fit.
-struct HdError {
-  unsigned code;
-  int internal;
-  unsigned device;
+Vec3d metres(const double* mm) {
+  return Vec3d{mm[0], mm[1], mm[2]} * 1e-3;
+}
 
-  unsigned short_code() const { return code & 0xffff; }
-  // Warm motors, or too much force: the library limits or stops the force, and goes on reading.
-  bool is_of_force() const { return (short_code() & 0xff00) == 0x0200; }
-};
+}  // namespace
 
 // Functions of libHD 3.
-struct Hd {
+struct OpenHapticsDevice::Library {
+  // The library's error is a struct of three 32-bit numbers. Some bindings read a 16-bit code, so
+  // only those bits count; all codes fit.
+  struct Failure {
+    unsigned code;
+    int internal;
+    unsigned device;
+
+    unsigned short_code() const { return code & 0xffff; }
+    // Warm motors, or too much force: the library limits or stops the force, and goes on reading.
+    bool is_of_force() const { return (short_code() & 0xff00) == 0x0200; }
+  };
+
   unsigned (*init_device)(const char*) = nullptr;
   void (*disable_device)(unsigned) = nullptr;
   void (*make_current_device)(unsigned) = nullptr;
@@ -64,14 +69,30 @@ struct Hd {
   void (*get_integerv)(unsigned, int*) = nullptr;
   void (*set_doublev)(unsigned, const double*) = nullptr;
   const char* (*get_string)(unsigned) = nullptr;
-  HdError (*get_error)() = nullptr;
+  Failure (*get_error)() = nullptr;
   const char* (*get_error_string)(unsigned) = nullptr;
+
+  std::string text_of(const Failure& error) const {
+    const char* text = get_error_string(error.short_code());
+    return printable(text == nullptr ? "no reason" : text, 200);
+  }
+  // Errors wait in a queue; at most this many are taken.
+  void forget_errors() const {
+    for (int i = 0; i < 100 && get_error().short_code() != 0; ++i) {
+    }
+  }
+  // Returns a value of the device, or `otherwise` if it is not within (0, most].
+  double positive(unsigned parameter, double most, double otherwise) const {
+    double value[16]{};
+    get_doublev(parameter, value);
+    return value[0] > 0 && value[0] <= most ? value[0] : otherwise;
+  }
 };
 
-Result<Hd> load(const std::vector<std::string>& names) {
-  auto library = SharedObject::open(names, kAdvice);
+Result<OpenHapticsDevice::Library> OpenHapticsDevice::load(const std::vector<std::string>& names) {
+  auto library = SharedObject::open(names, kHdAdvice);
   if (!library) return library.error();
-  Hd hd;
+  Library hd;
   library->bind("hdInitDevice", hd.init_device);
   library->bind("hdDisableDevice", hd.disable_device);
   library->bind("hdMakeCurrentDevice", hd.make_current_device);
@@ -92,37 +113,13 @@ Result<Hd> load(const std::vector<std::string>& names) {
   return hd;
 }
 
-std::string text_of(const Hd& hd, const HdError& error) {
-  const char* text = hd.get_error_string(error.short_code());
-  return printable(text == nullptr ? "no reason" : text, 200);
-}
-
-// The library's errors wait in a queue; how many are taken at most.
-void forget_errors(const Hd& hd) {
-  for (int i = 0; i < 100 && hd.get_error().short_code() != 0; ++i) {
-  }
-}
-
-// A value of the device, or `otherwise` if it is not within (0, most].
-double positive(const Hd& hd, unsigned parameter, double most, double otherwise) {
-  double value[16]{};
-  hd.get_doublev(parameter, value);
-  return value[0] > 0 && value[0] <= most ? value[0] : otherwise;
-}
-
-Vec3d metres(const double* mm) {
-  return Vec3d{mm[0], mm[1], mm[2]} * 1e-3;
-}
-
-}  // namespace
-
 class OpenHapticsDevice::Servo {
  public:
-  Servo(const Hd& hd, unsigned device) : hd_(hd), device_(device) {
+  Servo(const Library& hd, unsigned device) : hd_(hd), device_(device) {
     const char* model = hd.get_string(kModel);
     name = printable(model == nullptr ? "haptic device" : model, 60);
-    limits.force_n = positive(hd, kMaxForce, 50, 3);
-    limits.stiffness_n_m = 1000 * positive(hd, kMaxStiffness, 10, 0.5);
+    limits.force_n = hd.positive(kMaxForce, 50, 3);
+    limits.stiffness_n_m = 1000 * hd.positive(kMaxStiffness, 10, 0.5);
     limits.rate_hz = 1000;
     double corners[16]{};
     hd.get_doublev(kUsableWorkspace, corners);
@@ -131,23 +128,23 @@ class OpenHapticsDevice::Servo {
     limits.workspace_m = is_box ? half : Vec3d{0.08, 0.06, 0.035};
     if (is_box) middle_m_ = (metres(corners + 3) + metres(corners)) / 2;
     // A parameter that an older device does not know is no reason to refuse it.
-    forget_errors(hd);
+    hd.forget_errors();
   }
 
   Status start() {
     hd_.enable(kForceOutput);
-    task_ = hd_.schedule_asynchronous(&Servo::on_tick, this, kPriority);
+    task_ = hd_.schedule_asynchronous(&Servo::on_tick, this, kHdPriority);
     hd_.start_scheduler();
-    const HdError error = hd_.get_error();
+    const Library::Failure error = hd_.get_error();
     if (error.short_code() == 0) return {};
     return Error{ErrorCode::ResourceMissing, "the scheduler of OpenHaptics does not start (" +
-                                                 text_of(hd_, error) + "), " + kAdvice};
+                                                 hd_.text_of(error) + "), " + kHdAdvice};
   }
 
   // The last tick writes no force. A scheduler that is stuck is not waited for: it is stopped.
   ~Servo() {
     is_closing_ = true;
-    const auto until = std::chrono::steady_clock::now() + kFarewell;
+    const auto until = std::chrono::steady_clock::now() + kHdFarewell;
     while (!has_ended_ && std::chrono::steady_clock::now() < until)
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     hd_.stop_scheduler();
@@ -164,7 +161,7 @@ class OpenHapticsDevice::Servo {
 
   // Scheduler's thread.
   unsigned tick() {
-    const bool is_last = is_closing_ || errors_ == kMostErrors;
+    const bool is_last = is_closing_ || errors_ == kMostDeviceErrors;
     DeviceReading reading;
     hd_.begin_frame(device_);
     const bool is_read = read(reading);
@@ -174,19 +171,19 @@ class OpenHapticsDevice::Servo {
     hd_.end_frame(device_);
     if (is_last) {
       has_ended_ = true;
-      return kDone;
+      return kCallNoMore;
     }
-    const HdError error = hd_.get_error();
-    if (error.short_code() != 0) forget_errors(hd_);
+    const Library::Failure error = hd_.get_error();
+    if (error.short_code() != 0) hd_.forget_errors();
     if (error.short_code() == 0 || error.is_of_force()) {
       if (is_read) exchange.publish(reading);
       errors_ = 0;
-    } else if (++errors_ == kMostErrors) {
+    } else if (++errors_ == kMostDeviceErrors) {
       exchange.fail(
-          {ErrorCode::ResourceMissing, "the " + name + " is gone (" + text_of(hd_, error) +
+          {ErrorCode::ResourceMissing, "the " + name + " is gone (" + hd_.text_of(error) +
                                            "), check its cable and its power and open it again"});
     }
-    return kAgain;
+    return kCallAgain;
   }
 
   bool read(DeviceReading& reading) const {
@@ -209,7 +206,7 @@ class OpenHapticsDevice::Servo {
     return true;
   }
 
-  const Hd hd_;
+  const Library hd_;
   const unsigned device_;
   unsigned long task_ = 0;
   Vec3d middle_m_;
@@ -229,14 +226,14 @@ Result<std::unique_ptr<HapticDevice>> OpenHapticsDevice::open(const std::vector<
                                                               const std::string& name) {
   const auto hd = load(names);
   if (!hd) return hd.error();
-  forget_errors(*hd);
+  hd->forget_errors();
   const bool is_default = name.empty() || name == kDefaultDevice;
   const unsigned device = hd->init_device(is_default ? nullptr : name.c_str());
-  const HdError error = hd->get_error();
+  const Library::Failure error = hd->get_error();
   if (error.short_code() != 0 || device == kNoDevice) {
     if (device != kNoDevice) hd->disable_device(device);
     return Error{ErrorCode::ResourceMissing,
-                 "OpenHaptics cannot open \"" + printable(name, 60) + "\" (" + text_of(*hd, error) +
+                 "OpenHaptics cannot open \"" + printable(name, 60) + "\" (" + hd->text_of(error) +
                      "), plug it in, and set it up and name it in the maker's setup program"};
   }
   hd->make_current_device(device);

@@ -22,13 +22,13 @@ namespace trocar::device {
 class OpenHapticsDevice final : public HapticDevice {
  public:
   static constexpr const char* kDefaultDevice = "Default Device";
-  // What to look for, best first.
+  // These are looked for, the best first.
   static std::vector<std::string> library_names() { return {"libHD.so", "libHD.so.3.4"}; }
 
   // `name`: of the device, as the maker's setup program calls it.
   static Result<std::unique_ptr<HapticDevice>> open(const std::vector<std::string>& names,
                                                     const std::string& name);
-  // An error: the library is not there or not whole.
+  // Returns an error if the library is not there or not whole.
   static Status check_library(const std::vector<std::string>& names);
   ~OpenHapticsDevice() override;
 
@@ -38,7 +38,10 @@ class OpenHapticsDevice final : public HapticDevice {
   std::string description() const override;
 
  private:
+  struct Library;
   class Servo;
+
+  static Result<Library> load(const std::vector<std::string>& names);
 
   explicit OpenHapticsDevice(std::unique_ptr<Servo> servo);
 

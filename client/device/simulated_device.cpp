@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::uint64_t kStepUs = 1000, kMostStepsAtOnce = 1000;
 constexpr int kPartsOfStep = 10;
-constexpr double kStepS = 1e-3, kQuantumM = 20e-6, kForceN = 8, kReachM = 0.15;
+constexpr double kStepS = 1e-3, kQuantumM = 20e-6, kHandForceN = 8, kHandReachM = 0.15;
 
 }  // namespace
 
@@ -65,16 +65,16 @@ Result<DeviceReading> SimulatedDevice::read() {
 
 Status SimulatedDevice::write(const Vec3d& force_n, const Vec3d&) {
   advance();
-  force_n_ = checked_force(force_n, kForceN);
+  force_n_ = checked_force(force_n, kHandForceN);
   written_us_ = start_us_ + steps_ * kStepUs;
   return {};
 }
 
 DeviceLimits SimulatedDevice::limits() const {
-  return {.force_n = kForceN,
+  return {.force_n = kHandForceN,
           .rate_hz = 1e6 / static_cast<double>(kStepUs),
           .stiffness_n_m = 1000,
-          .workspace_m = {kReachM, kReachM, kReachM}};
+          .workspace_m = {kHandReachM, kHandReachM, kHandReachM}};
 }
 
 std::string SimulatedDevice::description() const {

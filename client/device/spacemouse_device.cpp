@@ -19,11 +19,10 @@ constexpr std::int32_t kDeviceRemoved = 1;
 constexpr std::uint32_t kTag = 0x7faa0000, kTagMask = 0xffff0000;
 constexpr std::uint32_t kAskForProtocol1 = kTag | 0x5500 | 1;
 
-constexpr double kFullCounts = 350, kDeadZone = 0.04;
-constexpr double kFullSpeedMS = 0.08, kFullTurnRadS = 1.2, kReachM = 0.15;
+constexpr double kFullCounts = 350, kCapDeadZone = 0.04;
 constexpr std::uint64_t kSilenceUs = 100'000;
-// What one read() takes at most; more waits in the socket, whose buffer is bounded.
-constexpr int kMostPieces = 256;
+// One read() takes no more than this; the rest waits in the socket, whose buffer is bounded.
+constexpr int kMostReads = 256;
 
 Error unreachable(const std::string& path, const std::string& why) {
   return {
@@ -35,7 +34,7 @@ Error unreachable(const std::string& path, const std::string& why) {
 }  // namespace
 
 SpaceMouseDevice::SpaceMouseDevice(FileDescriptor socket, ClockUs clock_us)
-    : socket_(std::move(socket)), clock_us_(std::move(clock_us)), control_(kReachM) {}
+    : socket_(std::move(socket)), clock_us_(std::move(clock_us)) {}
 
 Result<std::unique_ptr<HapticDevice>> SpaceMouseDevice::open(const std::string& socket_path,
                                                              ClockUs clock_us) {
@@ -59,9 +58,11 @@ Result<std::unique_ptr<HapticDevice>> SpaceMouseDevice::open(const std::string& 
 
 void SpaceMouseDevice::take(const Event& event, std::uint64_t now_us) {
   if (event[0] == kMotion) {
-    const auto share = [&](std::size_t i) { return deflection(event[i], kFullCounts, kDeadZone); };
-    velocity_m_s_ = Vec3d{share(1), share(2), -share(3)} * kFullSpeedMS;
-    turn_rad_s_ = Vec3d{share(4), share(5), -share(6)} * kFullTurnRadS;
+    const auto share = [&](std::size_t i) {
+      return deflection(event[i], kFullCounts, kCapDeadZone);
+    };
+    velocity_m_s_ = Vec3d{share(1), share(2), -share(3)} * kStickSpeedMS;
+    turn_rad_s_ = Vec3d{share(4), share(5), -share(6)} * kStickTurnRadS;
     last_event_us_ = now_us;
   } else if (event[0] == kPress || event[0] == kRelease) {
     if (event[1] < 0 || event[1] >= 32) return;
@@ -75,7 +76,7 @@ void SpaceMouseDevice::take(const Event& event, std::uint64_t now_us) {
 }
 
 Status SpaceMouseDevice::take_bytes() {
-  for (int piece = 0; piece < kMostPieces; ++piece) {
+  for (int piece = 0; piece < kMostReads; ++piece) {
     // An event is read word by word at first: the daemon's answer is one word and no event.
     const std::size_t wanted =
         bytes_ < sizeof event_[0] ? sizeof event_[0] - bytes_ : sizeof event_ - bytes_;
@@ -118,7 +119,7 @@ Status SpaceMouseDevice::write(const Vec3d&, const Vec3d&) {
 }
 
 DeviceLimits SpaceMouseDevice::limits() const {
-  return {.rate_hz = 125, .workspace_m = {kReachM, kReachM, kReachM}};
+  return {.rate_hz = 125, .workspace_m = {kStickReachM, kStickReachM, kStickReachM}};
 }
 
 std::string SpaceMouseDevice::description() const {

@@ -12,10 +12,10 @@
 #include <optional>
 
 #include "client/device/haptic_device.h"
-#include "client/haptics/newest.h"
 #include "client/haptics/safety.h"
 #include "client/haptics/touch_model.h"
 #include "client/haptics/workspace.h"
+#include "common/base/newest.h"
 #include "common/base/result.h"
 #include "common/base/spsc_queue.h"
 

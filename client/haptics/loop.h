@@ -11,8 +11,8 @@
 #include <thread>
 
 #include "client/haptics/hand.h"
-#include "client/haptics/newest.h"
 #include "client/haptics/wake_statistics.h"
+#include "common/base/newest.h"
 #include "common/base/result.h"
 
 namespace trocar::haptics {

@@ -1,6 +1,6 @@
 #pragma once
 
-// What the tests of devices share.
+// Things that the tests of devices share.
 
 #include <chrono>
 #include <filesystem>

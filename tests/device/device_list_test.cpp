@@ -11,7 +11,7 @@
 namespace trocar::device {
 namespace {
 
-// Where nothing is.
+// Names places where nothing is.
 DevicePlaces nowhere(const testing::ShortFolder& folder) {
   return {.haply_url = "ws://127.0.0.1:1",
           .spacemouse_socket = folder.file("spnav.sock"),

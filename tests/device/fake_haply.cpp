@@ -1,6 +1,7 @@
 #include "tests/device/fake_haply.h"
 
 #include <sys/socket.h>
+#include <unistd.h>
 
 #include <boost/beast/core/flat_buffer.hpp>
 #include <boost/beast/websocket/stream.hpp>
@@ -22,10 +23,12 @@ FakeHaply::FakeHaply(std::string inventory, Answer answer)
       thread_([this] { serve(); }) {}
 
 FakeHaply::~FakeHaply() {
-  // What the thread waits for ends.
+  // The thread waits for one of these, and they end.
+  is_ending_ = true;
   shutdown(acceptor_.native_handle(), SHUT_RDWR);
-  if (socket_.is_open()) shutdown(socket_.native_handle(), SHUT_RDWR);
+  shutdown(client_, SHUT_RDWR);
   thread_.join();
+  close(client_);
 }
 
 std::string FakeHaply::url() const {
@@ -47,9 +50,12 @@ std::string FakeHaply::state(double x, double y, double z) {
 
 void FakeHaply::serve() {
   boost::system::error_code failure;
-  acceptor_.accept(socket_, failure);
+  tcp::socket socket(context_);
+  acceptor_.accept(socket, failure);
   if (failure) return;
-  websocket::stream<tcp::socket&> stream(socket_);
+  client_ = dup(socket.native_handle());
+  if (is_ending_) return;
+  websocket::stream<tcp::socket&> stream(socket);
   stream.accept(failure);
   if (failure) return;
   stream.text(true);
@@ -65,7 +71,7 @@ void FakeHaply::serve() {
     }
     const auto answer = answer_(number, message);
     if (answer == "hang up") {
-      shutdown(socket_.native_handle(), SHUT_RDWR);
+      shutdown(client_, SHUT_RDWR);
       return;
     }
     if (answer) stream.write(boost::asio::buffer(*answer), failure);

@@ -41,7 +41,9 @@ class FakeHaply {
   const Answer answer_;
   boost::asio::io_context context_{1};
   boost::asio::ip::tcp::acceptor acceptor_;
-  boost::asio::ip::tcp::socket socket_{context_};
+  // The client's socket a second time: the thread may close its own at any moment. -1: none.
+  std::atomic<int> client_{-1};
+  std::atomic<bool> is_ending_{false};
   mutable std::mutex lock_;
   std::vector<std::string> messages_;
   std::atomic<bool> was_closed_{false};

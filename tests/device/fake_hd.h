@@ -1,7 +1,7 @@
 #pragma once
 
-// What the fake of libHD does, and what was done to it. It lies in the library; a test finds it by
-// the library's function fake_hd().
+// Says what the fake of libHD does, and what was done to it. It lies in the library; a test finds
+// it by the library's function fake_hd().
 
 #include <atomic>
 

@@ -25,7 +25,7 @@ Vec3d force_in(const std::string& message) {
 }
 
 std::unique_ptr<HapticDevice> open(const FakeHaply& service) {
-  auto opened = HaplyDevice::open(service.url());
+  auto opened = HaplyDevice::open(service.url(), std::chrono::seconds(30));
   EXPECT_TRUE(opened.ok()) << opened.error().message;
   return std::move(*opened);
 }
@@ -192,7 +192,8 @@ TEST(HaplyDevice, GarbageNowAndThenIsLeftOutAndGarbageAlwaysIsAnError) {
 TEST(HaplyDevice, WhatIsNoSuchServiceIsRefusedWhenOpened) {
   const auto refuses = [](const std::string& inventory) {
     const FakeHaply service(inventory);
-    const auto opened = HaplyDevice::open(service.url());
+    const std::chrono::milliseconds patience(inventory.empty() ? 50 : 30'000);
+    const auto opened = HaplyDevice::open(service.url(), patience);
     return !opened.ok() && testing::is_advice(opened.error());
   };
   EXPECT_TRUE(refuses(R"({"inverse3":[]})"));

@@ -3,10 +3,10 @@
 #include <thread>
 
 #include "client/haptics/local_events.h"
-#include "client/haptics/newest.h"
 #include "client/haptics/past_states.h"
 #include "client/haptics/slope_fit.h"
 #include "client/haptics/wake_statistics.h"
+#include "common/base/newest.h"
 
 namespace trocar::haptics {
 namespace {

@@ -56,7 +56,9 @@ void TouchTable::update(const Scene& scene) {
     auto kind = TouchKind::Free;
     contact::Reaction reaction;
     if (claim.verb == tool::Verb::Cut && scene.claims.is_in_effect(slot)) {
-      reaction.force_n = scene.cuts.force_n(slot);
+      const auto& felt = scene.cuts.felt(slot);
+      reaction.force_n = felt.force_n;
+      reaction.torque_nm = felt.torque_nm;
       if (dot(reaction.force_n, reaction.force_n) > 0) kind = TouchKind::Cut;
     } else if (const auto* contact = contacts[i]; contact && contact->begin < contact->end) {
       reaction = contact::reaction_on(scene.contacts, *contact, scene.world);

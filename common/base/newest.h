@@ -9,7 +9,7 @@
 #include <cstdint>
 #include <type_traits>
 
-namespace trocar::haptics {
+namespace trocar {
 
 template <typename Value>
 class Newest {
@@ -23,12 +23,17 @@ class Newest {
     writers_ = old & kSlot;
   }
 
-  // Reader's thread. False: nothing came since the last call, `value` is as it was.
+  // Reader's thread. The newest of all; a default one before the first.
+  const Value& newest() {
+    if ((between_.load(std::memory_order_relaxed) & kIsNew) != 0)
+      readers_ = between_.exchange(readers_, std::memory_order_acq_rel) & kSlot;
+    return slots_[readers_];
+  }
+
+  // Likewise. False: nothing came since the last call, `value` is as it was.
   bool take(Value& value) {
     if ((between_.load(std::memory_order_relaxed) & kIsNew) == 0) return false;
-    const auto old = between_.exchange(readers_, std::memory_order_acq_rel);
-    readers_ = old & kSlot;
-    value = slots_[readers_];
+    value = newest();
     return true;
   }
 
@@ -41,4 +46,4 @@ class Newest {
   alignas(64) std::uint32_t readers_ = 2;
 };
 
-}  // namespace trocar::haptics
+}  // namespace trocar
