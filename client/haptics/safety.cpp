@@ -96,8 +96,9 @@ SafeForce Safety::step(const SafetyInput& given) {
 
   const Vec3d force_in_reach = towards({}, safe.force_n, device_.force_n);
   const Vec3d torque_in_reach = towards({}, safe.torque_nm, device_.torque_nm);
-  if (!(force_in_reach == safe.force_n) || !(torque_in_reach == safe.torque_nm))
-    note(Limit::Device, safe);
+  // A device without torque is not told of as limited in each step.
+  const bool is_torque_cut = device_.torque_nm > 0 && !(torque_in_reach == safe.torque_nm);
+  if (!(force_in_reach == safe.force_n) || is_torque_cut) note(Limit::Device, safe);
   last_force_n_ = safe.force_n = force_in_reach;
   last_torque_nm_ = safe.torque_nm = torque_in_reach;
   return safe;
