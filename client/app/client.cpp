@@ -9,6 +9,7 @@
 #include "client/app/client_summary.h"
 #include "client/app/picture.h"
 #include "client/app/start.h"
+#include "client/device/device_list.h"
 #include "client/net/net_source.h"
 #include "client/replay/replay_source.h"
 #include "client/replica/client_messages.h"
@@ -26,13 +27,30 @@ volatile std::sig_atomic_t stop_requested = 0;
 constexpr std::uint64_t kPollNs = 4'000'000;       // samples leave every 8 ms
 constexpr std::uint64_t kGoodbyeNs = 400'000'000;  // time to say Bye
 
+// Hands hear what they feel, and the replica the rest.
+class Listener final : public replica::MessageSink {
+ public:
+  Listener(Hands& hands, replica::Replica& replica) : hands_(hands), replica_(replica) {}
+
+  void on_message(const proto::Envelope& message, std::uint64_t arrival_ns,
+                  std::size_t bytes) override {
+    hands_.take(message);
+    replica_.on_message(message, arrival_ns, bytes);
+  }
+
+ private:
+  Hands& hands_;
+  replica::Replica& replica_;
+};
+
 class Run {
  public:
   Run(const ClientOptions& options, replica::SessionSource& source, Hands& hands)
       : options_(options),
         source_(source),
         hands_(hands),
-        replica_([&source](const proto::Envelope& message) { return source.send(message); }) {
+        replica_([&source](const proto::Envelope& message) { return source.send(message); }),
+        listener_(hands, replica_) {
     replica_.corrupt_delta(options.corrupt_frame);
     const double rate = options.pictures_per_second > 0        ? options.pictures_per_second
                         : options.display == Display::Headless ? 15
@@ -55,6 +73,7 @@ class Run {
   replica::SessionSource& source_;
   Hands& hands_;
   replica::Replica replica_;
+  Listener listener_;
   std::unique_ptr<Picture> picture_;
   std::uint64_t picture_interval_ns_ = 0, next_picture_ns_ = 0;
   std::uint64_t start_ns_ = 0;
@@ -67,7 +86,7 @@ class Run {
 };
 
 Status Run::step(std::uint64_t now_ns) {
-  source_.poll(replica_);
+  source_.poll(listener_);
   if (!replica_.fault().ok())
     return Error{replica_.fault().error().code,
                  source_.name() + ": " + replica_.fault().error().message};
@@ -158,6 +177,7 @@ Status Run::write_summary() const {
   summary.surface_age = surface_age_;
   summary.hand_to_visible = hand_to_visible_;
   summary.cut_to_visible = cut_to_visible_;
+  for (const auto& hand : hands_.felt()) summary.hands.push_back(hand->figures());
   std::ofstream file(options_.summary_file);
   file << to_json(summary, replica_, statistics);
   file.close();
@@ -273,6 +293,18 @@ bool is_stop_requested() {
 
 namespace {
 
+Result<std::vector<std::unique_ptr<FeltHand>>> open_devices(const ClientOptions& options) {
+  std::vector<std::unique_ptr<FeltHand>> hands;
+  for (const auto& name : options.devices) {
+    auto opened = device::open_device(name);
+    if (!opened) return Error{opened.error().code, "--device: " + opened.error().message};
+    hands.push_back(std::make_unique<FeltHand>(
+        std::move(*opened), tool::ToolShape{},
+        haptics::WorkspaceScale{options.device_motion, options.device_force}));
+  }
+  return hands;
+}
+
 Result<ExitCode> run_chosen(const ClientOptions& options) {
   Hands hands;
   if (!options.replay_file.empty()) {
@@ -284,6 +316,10 @@ Result<ExitCode> run_chosen(const ClientOptions& options) {
     auto script = tool::parse_script(options.script_file);
     if (!script) return script.error();
     hands = Hands::scripted(std::move(*script));
+  } else if (!options.devices.empty()) {
+    auto felt = open_devices(options);
+    if (!felt) return felt.error();
+    hands = Hands::felt(std::move(*felt));
   } else if (options.display == Display::Window && replica::has_tools(options.role)) {
     hands = Hands::mouse(tool::ToolShape{});
   }

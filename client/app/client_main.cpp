@@ -3,6 +3,7 @@
 #include <cstdio>
 
 #include "client/app/client.h"
+#include "client/device/device_list.h"
 #include "common/base/cpu.h"
 #include "common/base/log.h"
 #include "common/discovery/finder.h"
@@ -29,6 +30,10 @@ int main(int argc, char** argv) {
   if (const auto set = trocar::log::configure(kProgram, (*options)->log_level); !set)
     return trocar::report(kProgram, set.error());
   if ((*options)->lists_sessions) return list_sessions((*options)->seconds);
+  if ((*options)->lists_devices) {
+    std::fputs(trocar::device::device_table(trocar::device::list_devices()).c_str(), stdout);
+    return static_cast<int>(trocar::ExitCode::Ok);
+  }
   trocar::app::install_signal_handlers();
   const auto run = trocar::app::run_client(**options);
   if (!run) return trocar::report(kProgram, run.error());

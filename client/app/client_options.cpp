@@ -29,6 +29,8 @@ Examples:
       watches without a display and leaves its last picture
   trocar-client --no-render --name Left --script deploy/scenes/lift.toml --summary out/left.json
       a robot: a scripted hand, no picture
+  trocar-client --device haply --device-motion 1.5
+      holds an instrument with a haptic device (--list-devices shows which there are)
   trocar-client --replay trocar-20261121T120000Z.mcap
       plays a recorded session with a free camera
 
@@ -97,6 +99,15 @@ std::string default_name() {
 Status check(const ClientOptions& options) {
   if (!options.replay_file.empty() && !options.script_file.empty())
     return Error{ErrorCode::Usage, "--replay and --script: a recording takes no tools; choose one"};
+  if (options.devices.size() > 2)
+    return Error{ErrorCode::Usage, "--device: " + std::to_string(options.devices.size()) +
+                                       " are given, and a participant has two hands"};
+  if (!options.devices.empty() && !(options.script_file.empty() && options.replay_file.empty()))
+    return Error{ErrorCode::Usage,
+                 "--device: goes with neither --script nor --replay; leave one out"};
+  if (!options.devices.empty() && !replica::has_tools(options.role))
+    return Error{ErrorCode::Usage, "--device: an " + std::string(replica::name_of(options.role)) +
+                                       " has no tools; use --role surgeon or assistant"};
   if (!options.script_file.empty() && !replica::has_tools(options.role))
     return Error{ErrorCode::Usage, "--script: an " + std::string(replica::name_of(options.role)) +
                                        " has no tools; use --role surgeon or assistant"};
@@ -189,6 +200,24 @@ Result<std::optional<ClientOptions>> parse_client_command_line(int argc, char** 
       ->check(CLI::Range(0.0, 1e6));
   app.add_option("--script", options.script_file, "scripted hand instead of the mouse (TOML)")
       ->type_name("FILE");
+  app.add_option("--device", options.devices,
+                 "hold a tool with a haptic device, and feel it; twice: one for each hand "
+                 "[the mouse]")
+      ->type_name("NAME")
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  app.add_flag("--list-devices", options.lists_devices,
+               "list the devices of this computer and what is missing for others, and exit");
+  app.add_option("--device-motion", options.device_motion,
+                 "how far the tool goes where the device goes 1")
+      ->type_name("SCALE")
+      ->check(CLI::Range(0.01, 20.0))
+      ->capture_default_str();
+  app.add_option("--device-force", options.device_force,
+                 "the force on the hand where the tool feels 1")
+      ->type_name("SCALE")
+      ->check(CLI::Range(0.0, 10.0))
+      ->capture_default_str();
   app.add_option("--replay", options.replay_file, "play a recorded session (.mcap)")
       ->type_name("FILE");
   app.add_option("--summary", options.summary_file, "write figures of the run as JSON at the end")

@@ -4,6 +4,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "client/render/gl_context.h"
 #include "client/replica/session_view.h"
@@ -45,8 +46,12 @@ struct ClientOptions {
   double seconds = 0;                   // 0: until the session ends
   double mark_at = -1, return_at = -1;  // instructor: seconds after joining; < 0: not
   std::string script_file, replay_file, summary_file;
-  std::uint64_t corrupt_frame = 0;  // hidden: damages the n-th delta, to prove healing
-  bool lists_sessions = false;      // of the local network, instead of taking part in one
+  std::vector<std::string> devices;  // as device::open_device; empty: the mouse or the script
+  double device_motion = 1;          // of the tool over the device
+  double device_force = 1;           // of the device over the tool
+  bool lists_devices = false;        // of this computer, instead of taking part
+  std::uint64_t corrupt_frame = 0;   // hidden: damages the n-th delta, to prove healing
+  bool lists_sessions = false;       // of the local network, instead of taking part in one
   std::string log_level = "info";
 };
 

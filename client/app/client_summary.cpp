@@ -12,6 +12,31 @@ Json to_json(const replica::TimeDistribution& times) {
           {"largest", times.quantile_ms(1)}};
 }
 
+Json to_json(const FeltFigures& hand) {
+  Json limited = Json::object();
+  for (std::size_t i = 0; i < haptics::kLimits; ++i)
+    limited[haptics::name_of(static_cast<haptics::Limit>(i))] = hand.state.limit_counts[i];
+  return {{"device", hand.device},
+          {"steps", hand.timing.steps},
+          {"rate_hz", hand.timing.rate_hz},
+          {"late_us",
+           {{"median", hand.timing.late_median_us},
+            {"p95", hand.timing.late_95_us},
+            {"p99", hand.timing.late_99_us}}},
+          {"overruns", hand.timing.overruns},
+          {"has_real_time_priority", hand.has_priority},
+          {"has_locked_memory", hand.has_locked_memory},
+          {"readings_sent", hand.readings_sent},
+          {"patches", hand.state.patches.patches},
+          {"patches_too_old", hand.state.patches.old_patches},
+          {"patches_of_no_known_pose", hand.state.patches.unmatched_patches},
+          {"answer_ms", hand.state.answer_s * 1e3},
+          {"slope", hand.state.slope},
+          {"largest_force_n", hand.largest_force_n},
+          {"largest_server_force_n", hand.largest_server_force_n},
+          {"steps_limited", limited}};
+}
+
 }  // namespace
 
 std::string to_json(const ClientSummary& summary, const replica::Replica& replica,
@@ -24,6 +49,8 @@ std::string to_json(const ClientSummary& summary, const replica::Replica& replic
                {"server_crc", hex32(b->server_crc)},
                {"own_crc", hex32(b->own_crc)},
                {"equal", b->server_crc == b->own_crc}};
+  Json hands = Json::array();
+  for (const auto& hand : summary.hands) hands.push_back(to_json(hand));
   return to_text({{"program", "trocar-client"},
                   {"name", summary.name},
                   {"role", summary.role},
@@ -59,6 +86,7 @@ std::string to_json(const ClientSummary& summary, const replica::Replica& replic
                   {"surface_age_ms", to_json(summary.surface_age)},
                   {"hand_to_visible_ms", to_json(summary.hand_to_visible)},
                   {"cut_to_visible_ms", to_json(summary.cut_to_visible)},
+                  {"hands", hands},
                   {"frames_by_datagram", counters.by_datagram},
                   {"frames_late", counters.frames_late},
                   {"datagram_bytes_received", source.datagram_bytes_received},

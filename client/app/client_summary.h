@@ -3,7 +3,9 @@
 // Figures of one client's run as JSON, for scripts and people.
 
 #include <string>
+#include <vector>
 
+#include "client/app/felt_hand.h"
 #include "client/replica/replica.h"
 #include "client/replica/time_distribution.h"
 
@@ -19,6 +21,7 @@ struct ClientSummary {
   replica::TimeDistribution surface_age;
   // From a hand's motion until a frame shows it, and from a cut on the server until it is shown.
   replica::TimeDistribution hand_to_visible, cut_to_visible;
+  std::vector<FeltFigures> hands;  // that feel
 };
 
 std::string to_json(const ClientSummary& summary, const replica::Replica& replica,

@@ -3,8 +3,25 @@
 #include <algorithm>
 
 #include "client/replica/client_messages.h"
+#include "common/math/box.h"
+#include "common/wire/haptic_messages.h"
+#include "proto/wire.pb.h"
 
 namespace trocar::app {
+namespace {
+
+constexpr double kBefore_m = 0.03, kApart_m = 0.06;
+
+// In front of the organ, several side by side.
+Vec3d place_before(const replica::Topology& topology, std::size_t i, std::size_t count) {
+  Box<float> box;
+  for (const auto& place : topology.rest_positions) box.include(place);
+  const Vec3d middle = to_double((box.least + box.most) * 0.5f);
+  const double aside = (static_cast<double>(i) - 0.5 * static_cast<double>(count - 1)) * kApart_m;
+  return {middle.x + aside, middle.y, static_cast<double>(box.most.z) + kBefore_m};
+}
+
+}  // namespace
 
 Hands Hands::mouse(const tool::ToolShape& shape) {
   Hands hands;
@@ -20,15 +37,62 @@ Hands Hands::scripted(tool::Script script) {
   return hands;
 }
 
+Hands Hands::felt(std::vector<std::unique_ptr<FeltHand>> felt) {
+  Hands hands;
+  hands.felt_ = std::move(felt);
+  return hands;
+}
+
 std::vector<tool::ToolShape> Hands::shapes() const {
-  return mouse_ ? std::vector<tool::ToolShape>{mouse_shape_} : script_shapes_;
+  if (mouse_) return {mouse_shape_};
+  if (felt_.empty()) return script_shapes_;
+  std::vector<tool::ToolShape> shapes;
+  for (const auto& hand : felt_) shapes.push_back(hand->shape());
+  return shapes;
+}
+
+void Hands::take(const proto::Envelope& message) {
+  if (felt_.empty()) return;
+  if (message.has_haptic_law()) {
+    const auto law = wire::read(message.haptic_law());
+    if (!law) ++refused_messages_;
+    for (const auto& hand : felt_)
+      if (law) hand->take(*law);
+  }
+  for (const auto& received : message.haptic_patches().patch()) {
+    const auto patch = wire::read(received);
+    if (patch && patch->tool < felt_.size())
+      felt_[patch->tool]->take(*patch);
+    else
+      ++refused_messages_;
+  }
+}
+
+void Hands::set_view(const Quatf& world_from_device) {
+  for (const auto& hand : felt_) hand->set_view(world_from_device);
+}
+
+Status Hands::send_felt(const replica::Replica& replica, replica::SessionSource& source,
+                        std::uint64_t now_ns) {
+  for (std::size_t i = 0; i < felt_.size(); ++i) {
+    auto& hand = *felt_[i];
+    if (!hand.is_started()) hand.start(place_before(replica.topology(), i, felt_.size()));
+    const auto due = hand.pop_due(now_ns);
+    if (!due) return due.error();
+    if (const auto& reading = *due)
+      send(source, static_cast<std::uint32_t>(i),
+           {{to_float(reading->tip_m), reading->orientation}, reading->verb}, now_ns,
+           reading->time_us);
+    hand.figures();
+  }
+  return {};
 }
 
 void Hands::send(replica::SessionSource& source, std::uint32_t tool, const tool::ToolSample& sample,
-                 std::uint64_t now_ns) {
+                 std::uint64_t now_ns, std::uint64_t time_us) {
   if (tool == 0) echo_.note_sent(sample.world_from_tool.position, now_ns);
   // Dropped when the queue is full: the next sample says more.
-  replica::send_tool_sample(source, tool, ++sequence_, sample);
+  replica::send_tool_sample(source, tool, ++sequence_, sample, time_us);
 }
 
 std::optional<double> Hands::observe_echo_ms(const replica::Replica& replica,
@@ -57,6 +121,7 @@ double Hands::script_seconds(const replica::SessionFrame& newest, std::uint64_t 
 Status Hands::send_due(const replica::Replica& replica, replica::SessionSource& source,
                        std::uint64_t now_ns) {
   if (replica.newest() == nullptr || source.state() != replica::SourceState::Live) return {};
+  if (const auto sent = send_felt(replica, source, now_ns); !sent) return sent.error();
   if (mouse_)
     if (const auto sample = mouse_->pop_due(now_ns)) send(source, 0, *sample, now_ns);
   if (script_) {

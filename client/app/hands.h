@@ -1,11 +1,13 @@
 #pragma once
 
-// The tools this client brings: a person's mouse or a script, and when their samples leave.
-// Thread: render thread.
+// The tools this client brings: a person's mouse, devices that feel, or a script, and when their
+// samples leave. Thread: render thread.
 
+#include <memory>
 #include <optional>
 #include <vector>
 
+#include "client/app/felt_hand.h"
 #include "client/device/mouse_tool.h"
 #include "client/device/script_hand.h"
 #include "client/replica/hand_echo.h"
@@ -19,9 +21,17 @@ class Hands {
   Hands() = default;
   static Hands mouse(const tool::ToolShape& shape);
   static Hands scripted(tool::Script script);
+  // One tool for each device, at most two.
+  static Hands felt(std::vector<std::unique_ptr<FeltHand>> hands);
 
   // Returns the tools to offer when joining.
   std::vector<tool::ToolShape> shapes() const;
+  const std::vector<std::unique_ptr<FeltHand>>& felt() const { return felt_; }
+  // HapticPatches and HapticLaw; what is not as it may be is dropped and counted.
+  void take(const proto::Envelope& message);
+  std::uint64_t refused_messages() const { return refused_messages_; }
+  // How the camera looks: devices move as the person sees.
+  void set_view(const Quatf& world_from_device);
   device::MouseTool* mouse_tool() { return mouse_ ? &*mouse_ : nullptr; }
 
   // Sends what is due. A script begins with the first frame this client shows and runs in simulated
@@ -38,8 +48,12 @@ class Hands {
   // Simulated seconds since the script began; never goes back.
   double script_seconds(const replica::SessionFrame& newest, std::uint64_t now_ns);
   void send(replica::SessionSource& source, std::uint32_t tool, const tool::ToolSample& sample,
-            std::uint64_t now_ns);
+            std::uint64_t now_ns, std::uint64_t time_us = 0);
+  Status send_felt(const replica::Replica& replica, replica::SessionSource& source,
+                   std::uint64_t now_ns);
 
+  std::vector<std::unique_ptr<FeltHand>> felt_;
+  std::uint64_t refused_messages_ = 0;
   std::optional<device::MouseTool> mouse_;
   tool::ToolShape mouse_shape_;
   std::optional<tool::Script> script_;  // until the surface is known

@@ -483,7 +483,7 @@ void NetSource::Session::deliver_datagram(std::shared_ptr<const proto::Envelope>
   datagram_bytes_received_ = datagrams_->bytes_received();
   last_datagram_ = Clock::now();
   const bool is_expected = message->has_surface_slice() || message->has_frame_state_part() ||
-                           message->has_surface_change();
+                           message->has_surface_change() || message->has_haptic_patches();
   if (!is_expected) return;
   if (message->has_surface_slice()) slices_received_.fetch_add(1, std::memory_order_relaxed);
   messages_received_.fetch_add(1, std::memory_order_relaxed);

@@ -5,7 +5,7 @@
 namespace trocar::replica {
 
 bool send_tool_sample(SessionSource& source, std::uint32_t tool, std::uint32_t sequence,
-                      const tool::ToolSample& sample) {
+                      const tool::ToolSample& sample, std::uint64_t time_us) {
   proto::Envelope envelope;
   auto& message = *envelope.mutable_tool_sample();
   message.set_tool(tool);
@@ -19,6 +19,7 @@ bool send_tool_sample(SessionSource& source, std::uint32_t tool, std::uint32_t s
   message.mutable_orientation()->set_z(pose.orientation.z);
   message.mutable_orientation()->set_w(pose.orientation.w);
   message.set_verb(static_cast<proto::Verb>(sample.verb));
+  message.set_client_time_us(time_us);
   return source.send(envelope);
 }
 

@@ -7,9 +7,10 @@
 
 namespace trocar::replica {
 
-// `tool` is 0 or 1; `sequence` counts up per client. False if the source dropped it.
+// `tool` is 0 or 1; `sequence` counts up per client; `time_us`: of this client's clock, if a hand
+// feels the tool. False if the source dropped it.
 bool send_tool_sample(SessionSource& source, std::uint32_t tool, std::uint32_t sequence,
-                      const tool::ToolSample& sample);
+                      const tool::ToolSample& sample, std::uint64_t time_us = 0);
 // To mark the organ as it is, or to return it to the mark. False if the source dropped it.
 bool ask_for_mark(SessionSource& source, bool is_return);
 // To be shown the full solution beside a session with a reduction, or no longer. False if the

@@ -76,7 +76,7 @@ TEST_F(Blades, OpenAWoundInEveryKindOfTissue) {
       const auto report = run_tick(simulation);
       ASSERT_EQ(report.solve.nodes_rejected, 0u) << "tick " << i;
       opened += report.cut.opened_area_m2;
-      if (i == 500) force = simulation.state().cuts.force_n(ToolSlot{0});
+      if (i == 500) force = simulation.state().cuts.felt(ToolSlot{0}).force_n;
     }
     const auto& state = simulation.state();
     EXPECT_GT(opened, 3e-4);

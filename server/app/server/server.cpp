@@ -33,6 +33,7 @@
 #include "server/session/net/tcp_server.h"
 #include "server/session/replication/messages.h"
 #include "server/session/replication/replicator.h"
+#include "server/tissue/touch/haptic_law.h"
 
 namespace trocar::app {
 namespace {
@@ -140,6 +141,7 @@ Status Server::open() {
   replication::ReplicatorOptions replication;
   replication.gate = admission_->gate();
   replication.has_datagrams = tcp_->has_datagrams();
+  replication.haptic_laws = touch::haptic_laws(organ);
   replication.return_seconds = options_.access.return_seconds;
   replication.places = limits.places;
   replication.max_messages_per_second = limits.messages_per_second;

@@ -55,7 +55,7 @@ void SimulationInbox::drain(hands::TickInputs& inputs) {
     } else if (const auto* join = std::get_if<hands::HandJoin>(&*item)) {
       changes_[join->slot.value].join = *join;
     } else if (const auto* input = std::get_if<hands::ToolInput>(&*item)) {
-      samples_[input->tool.value] = input->sample;
+      samples_[input->tool.value] = *input;
     }
   }
   for (std::uint8_t slot = 0; slot < kMaxHands; ++slot) {
@@ -65,7 +65,7 @@ void SimulationInbox::drain(hands::TickInputs& inputs) {
     change = {};
   }
   for (std::uint8_t tool = 0; tool < kMaxTools; ++tool) {
-    if (samples_[tool]) inputs.samples.push_back({{tool}, *samples_[tool]});
+    if (samples_[tool]) inputs.samples.push_back(*samples_[tool]);
     samples_[tool].reset();
   }
 }

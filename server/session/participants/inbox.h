@@ -60,7 +60,7 @@ class SimulationInbox {
     std::optional<hands::HandJoin> join;
   };
   std::array<SlotChange, kMaxHands> changes_;
-  std::array<std::optional<tool::ToolSample>, kMaxTools> samples_;
+  std::array<std::optional<hands::ToolInput>, kMaxTools> samples_;
 };
 
 }  // namespace trocar::participants

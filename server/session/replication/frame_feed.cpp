@@ -97,6 +97,13 @@ bool FrameFeed::give(FrameEncoder& encoder, bool is_required) {
   return is_given;
 }
 
+void FrameFeed::give_beside(const FrameEncoder& encoder, const wire::SharedBytes& message) {
+  if (uses_datagrams())
+    send(BytesView(*message).subspan(wire::kHeaderBytes));
+  else if (!is_stream_busy(encoder) && connections_.send(id_, message))
+    counters_.bytes_queued += message->size();
+}
+
 void FrameFeed::note_given(Frame frame, FramePacer& pacer) {
   newest_given_ = frame;
   pacer.on_sent(frame, options_.clock_ns());

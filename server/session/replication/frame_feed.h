@@ -46,6 +46,9 @@ class FrameFeed {
   // True if the client has the newest frame, or it is on its way. `is_required`: it is not left
   // out and goes over the stream.
   bool give(FrameEncoder& encoder, bool is_required);
+  // A small message that the next one makes stale: a datagram where frames are, else over the
+  // stream unless that is busy. message: as encode_envelope makes it.
+  void give_beside(const FrameEncoder& encoder, const wire::SharedBytes& message);
   bool was_given(Frame frame) const { return newest_given_ && frame <= *newest_given_; }
   void acknowledge(const FrameEncoder& encoder, Frame frame);
   // `received`: of our datagrams, as the client counts them.

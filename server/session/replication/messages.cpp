@@ -4,6 +4,7 @@
 
 #include "common/base/version.h"
 #include "common/wire/figure_messages.h"
+#include "common/wire/haptic_messages.h"
 #include "common/wire/surface_codec.h"
 #include "common/wire/surface_messages.h"
 #include "common/wire/tool_shape.h"
@@ -273,6 +274,25 @@ wire::SharedBytes encode_recording(const wire::RecordingState& state) {
   message.set_frames_missing(state.frames_missing);
   message.set_text(state.text);
   return wire::encode_envelope(envelope);
+}
+
+wire::SharedBytes encode_haptic_law(const wire::HapticLaw& law) {
+  proto::Envelope envelope;
+  wire::write(law, *envelope.mutable_haptic_law());
+  return wire::encode_envelope(envelope);
+}
+
+wire::SharedBytes encode_touch(const step::PublishedFrame& frame, ParticipantSlot slot) {
+  proto::Envelope envelope;
+  auto& patches = *envelope.mutable_haptic_patches();
+  for (const auto& tool : frame.tools) {
+    if (tool.tool.owner() != slot || tool.touch.echo_time_us == 0) continue;
+    auto patch = tool.touch;
+    patch.tool = static_cast<std::uint8_t>(tool.tool.number());
+    patch.sequence = static_cast<std::uint32_t>(frame.frame);
+    wire::write(patch, *patches.add_patch());
+  }
+  return patches.patch_size() > 0 ? wire::encode_envelope(envelope) : nullptr;
 }
 
 wire::SharedBytes encode_barrier(const step::PublishedFrame& frame) {

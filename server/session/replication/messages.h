@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/wire/framing.h"
+#include "common/wire/haptic_patch.h"
 #include "common/wire/recording_state.h"
 #include "common/wire/surface_layout.h"
 #include "server/session/ghost/ghost_follower.h"
@@ -55,6 +56,9 @@ wire::SharedBytes encode_ghost(const ghost::GhostReport& report);
 // The message says that there is no ghost in this session.
 wire::SharedBytes encode_no_ghost();
 wire::SharedBytes encode_recording(const wire::RecordingState& state);
+wire::SharedBytes encode_haptic_law(const wire::HapticLaw& law);
+// What the tools of one participant feel, as of a frame; null: none of them has a hand that feels.
+wire::SharedBytes encode_touch(const step::PublishedFrame& frame, ParticipantSlot slot);
 wire::SharedBytes encode_barrier(const step::PublishedFrame& frame);
 wire::SharedBytes encode_pong(std::uint64_t client_time_us, Tick tick,
                               std::uint64_t server_time_us);

@@ -331,6 +331,9 @@ std::optional<Replicator::Ending> Replicator::welcome(Client& client) {
     return too_slow;
   if (encoder_.current() && !give_frame(client, true)) return too_slow;
   if (!send(client, encode_recording(recording_))) return too_slow;
+  if (slot.has_tools())
+    for (const auto& law : options_.haptic_laws)
+      if (!send(client, encode_haptic_law(law))) return too_slow;
   // The others; the newcomer has it already, a second copy does no harm.
   participants_changed_ = true;
   return std::nullopt;
@@ -353,7 +356,8 @@ std::optional<Replicator::Ending> Replicator::handle_sample(Client& client,
                       std::to_string(*last) + ", it must grow"};
   last = checked->sequence;
   ++counters_.samples;
-  inbox_.push_sample({tool_slot(participant.slot, checked->tool), checked->sample});
+  inbox_.push_sample(
+      {tool_slot(participant.slot, checked->tool), checked->sample, checked->client_time_us});
   return std::nullopt;
 }
 
@@ -453,6 +457,11 @@ bool Replicator::give_frame(Client& client, bool is_required) {
   return client.feed.give(encoder_, is_required);
 }
 
+void Replicator::give_touch(Client& client) {
+  const auto bytes = encode_touch(*encoder_.current(), client.participant->slot);
+  if (bytes) client.feed.give_beside(encoder_, bytes);
+}
+
 void Replicator::publish(std::span<const step::SharedFrame> frames) {
   if (frames.empty()) return;
   TROCAR_ASSERT(!barrier_);
@@ -475,8 +484,11 @@ void Replicator::publish(std::span<const step::SharedFrame> frames) {
   counters_.frames_published += frames.size();
   counters_.frames_conflated += frames.size() - 1;
   encoder_.set_current(frames.back(), options_.clock_ns() / 1000);
-  for (const auto& [id, client] : clients_)
-    if (client->participant) give_frame(*client, false);
+  for (const auto& [id, client] : clients_) {
+    if (!client->participant) continue;
+    give_touch(*client);
+    give_frame(*client, false);
+  }
   settle_participants();
 }
 

@@ -9,6 +9,7 @@
 
 #include "common/base/tick.h"
 #include "common/base/timing.h"
+#include "common/wire/haptic_patch.h"
 #include "server/session/access/gate.h"
 #include "server/session/participants/roster.h"
 #include "server/session/replication/validation.h"
@@ -27,7 +28,8 @@ struct ReplicatorOptions {
   std::function<std::uint64_t()> clock_ns = monotonic_ns;
   // Told who is here after each change, with the tick of the newest frame; may be empty.
   std::function<void(const std::vector<participants::Participant>&, Tick)> on_participants;
-  bool has_datagrams = false;  // the transport takes them; clients are told
+  std::vector<wire::HapticLaw> haptic_laws;  // how the organ answers tools, for hands that feel it
+  bool has_datagrams = false;                // the transport takes them; clients are told
   // Null: everybody may come, in any role. It outlives the replicator.
   access::Gate* gate = nullptr;
   // Whether anybody wants the ghost, after each change; empty: the session has none.

@@ -94,6 +94,7 @@ Result<CheckedSample> check_tool_sample(const proto::ToolSample& sample, std::si
   checked.tool = static_cast<int>(sample.tool());
   checked.sequence = sample.sequence();
   checked.sample = {{position, normalized(orientation)}, static_cast<tool::Verb>(sample.verb())};
+  checked.client_time_us = sample.client_time_us();
   return checked;
 }
 

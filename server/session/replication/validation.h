@@ -62,6 +62,7 @@ struct CheckedSample {
   int tool = 0;  // number, below the participant's tool count
   std::uint32_t sequence = 0;
   tool::ToolSample sample;  // orientation of unit length
+  std::uint64_t client_time_us = 0;
 };
 Result<CheckedSample> check_tool_sample(const proto::ToolSample& sample, std::size_t tool_count);
 

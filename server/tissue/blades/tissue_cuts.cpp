@@ -14,9 +14,6 @@ namespace {
 // Numbers of triangles are used once. What is left is for the ticks up to the next frame.
 constexpr std::size_t kMostTriangles = wire::kMaxSurfaceTriangles - 500'000;
 
-// Ticks between two looks at what lies against a blade; blades take turns.
-constexpr Tick kFrictionEvery = 8;
-
 // No blade of a session moves nodes: clients hold rest positions to be constant.
 bool moves_nodes(const cutting::CutEvents& events) {
   return std::ranges::any_of(events.events, [](const cutting::CutEvent& event) {
@@ -61,33 +58,36 @@ std::optional<topology::Edit> TissueCuts::cut(const hands::ToolTable& tools,
                                     to_double(tool.pose.apply({0, 0, tool.shape.edge_m}))};
     cutter_->move(i, edge);
   }
-  measure_friction(tools, world, travel_m);
+  look_at_edges(tools, world, travel_m);
   cutter_->cut(world.displacements, output_, travel_m);
   report.crossed_tets = output_.crossed_tets;
   report.splits = output_.splits;
   report.opened_area_m2 = output_.opened_area_m2;
   report.torn_area_m2 = output_.torn_area_m2;
   report.is_behind = output_.is_behind;
-  blades_.end_tick(tools, output_.work_j);
+  std::array<BladeWound, kMaxTools> wounds;
+  for (std::uint8_t i = 0; i < kMaxTools; ++i)
+    wounds[i] = {static_cast<float>(output_.blade_work_j[i]), static_cast<float>(cutter_->h_at(i))};
+  blades_.end_tick(tools, wounds);
   if (output_.events.events.empty()) return std::nullopt;
   new_nodes_.assign(output_.new_nodes.begin(), output_.new_nodes.end());
   record(output_.events);
   return edit();
 }
 
-// On both sides of a blade that is as broad as the tool.
-void TissueCuts::measure_friction(const hands::ToolTable& tools, const world::World& world,
-                                  double travel_m) {
+// Blades take turns. Friction is on both sides of a blade that is as broad as the tool.
+void TissueCuts::look_at_edges(const hands::ToolTable& tools, const world::World& world,
+                               double travel_m) {
   for (std::uint8_t i = 0; i < kMaxTools; ++i) {
     const ToolSlot slot{i};
-    if (!blades_[slot].is_cutting || (world.tick + i) % kFrictionEvery != 0) continue;
+    if (!blades_[slot].is_cutting || (world.tick + i) % EdgeForce::kLookEvery != 0) continue;
     const auto& pose = tools[slot].pose;
     const auto& shape = tools[slot].shape;
     const auto breadth = 2 * static_cast<double>(shape.radius_m + shape.half_width_m);
-    const double along =
-        cutter_->friction_along(world.displacements, travel_m, to_double(pose.position),
-                                to_double(pose.apply({0, 0, shape.edge_m})));
-    blades_.set_friction(slot, 2 * breadth * along);
+    blades_.look(slot,
+                 cutter_->resistance_of(world.displacements, travel_m, to_double(pose.position),
+                                        to_double(pose.apply({0, 0, shape.edge_m}))),
+                 2 * breadth);
   }
 }
 

@@ -34,8 +34,8 @@ class TissueCuts {
   bool can_cut() const { return cutter_ != nullptr; }
   const topology::Topology& topology() const { return topology_; }
   const wire::SurfaceLayout& layout() const { return layout_; }
-  // Returns the force of the tissue on a blade, N, world frame.
-  Vec3f force_n(ToolSlot tool) const { return blades_[tool].force_n; }
+  // Returns what the tissue does to a blade.
+  const Wrench& felt(ToolSlot tool) const { return blades_[tool].felt; }
 
   // Looks for tissue around these nodes that is stretched too far; it tears in the next cut().
   void tear(const world::World& world, std::span<const NodeIndex> nodes);
@@ -70,7 +70,7 @@ class TissueCuts {
 
  private:
   bool is_full() const;
-  void measure_friction(const hands::ToolTable& tools, const world::World& world, double travel_m);
+  void look_at_edges(const hands::ToolTable& tools, const world::World& world, double travel_m);
   void forget_pending();
   void record(cutting::CutEvents events);
   topology::Edit edit();

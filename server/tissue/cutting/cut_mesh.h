@@ -3,6 +3,7 @@
 // The topology under the knives: where its nodes are now, its local scale, and every edit of it,
 // told to all strokes and to whoever repeats it.
 
+#include <array>
 #include <limits>
 #include <optional>
 #include <span>
@@ -18,20 +19,23 @@ namespace trocar::cutting {
 // This travel means that nobody has added up how far nodes moved: all nodes are looked at.
 inline constexpr double kUnknownTravel = std::numeric_limits<double>::infinity();
 
+inline constexpr std::uint32_t kMaxBlades = 32;
+
 struct CutOutput {
   CutEvents events;
   std::vector<topology::NewNode>
       new_nodes;               // in order: a parent may be new, too; those that moved among them
   double opened_area_m2 = 0;   // one side of the wound, at rest
   double torn_area_m2 = 0;     // part of it
-  double work_j = 0;           // of blades, by the materials' energy per area
+  double work_j = 0;           // by the materials' energy per area
   double waiting_area_m2 = 0;  // of strokes that ended: faces that could not be opened
   std::uint32_t crossed_tets = 0, splits = 0, labels = 0, refused_splits = 0, pinch_splits = 0;
   // A splitter with patterns (Nakao 2003) counts tets of its two patterns and other crossed ones,
   // and nodes outside the patch that came to its border or could not.
   std::uint32_t four_tets = 0, six_tets = 0, other_tets = 0, moved_nodes = 0, refused_moves = 0;
   std::uint32_t smoothed_nodes = 0;
-  bool is_behind = false;  // work is left for the next call
+  bool is_behind = false;                         // work is left for the next call
+  std::array<double, kMaxBlades> blade_work_j{};  // part of work_j: of blades that have not left
 
   void clear();
 };

@@ -69,6 +69,15 @@ void Cutter::clear_strokes() {
   next_id_ = 0;
 }
 
+double Cutter::h_at(std::uint32_t blade) const {
+  if (blade >= kMaxBlades || stroke_of_[blade] == kNone) return mesh_.mean_h();
+  return strokes_[stroke_of_[blade]].h;
+}
+
+std::uint32_t Cutter::blade_of(std::uint32_t place) const {
+  return static_cast<std::uint32_t>(std::ranges::find(stroke_of_, place) - stroke_of_.begin());
+}
+
 // Strokes in their order, each with its blade, or kMaxBlades for one that has ended. Their places
 // and numbers change nothing.
 void Cutter::visit_state(world::StateArchive& archive) {
@@ -91,8 +100,7 @@ void Cutter::visit_state(world::StateArchive& archive) {
 
 void Cutter::visit_stroke(world::StateArchive& archive, std::uint32_t place) {
   auto& stroke = strokes_[place];
-  const auto at = std::ranges::find(stroke_of_, place);
-  auto blade = static_cast<std::uint8_t>(at - stroke_of_.begin());
+  auto blade = static_cast<std::uint8_t>(blade_of(place));
   archive.value(blade);
   if (archive.is_reading()) {
     if (blade > kMaxBlades || (blade < kMaxBlades && stroke_of_[blade] != kNone)) archive.fail();
@@ -118,7 +126,6 @@ void Cutter::cut(std::span<const Vec3f> displacements, CutOutput& out, double tr
     opening_.open(mesh_, torn_);
     torn_.clear();
     out.torn_area_m2 = out.opened_area_m2;
-    out.work_j = 0;
   }
   order_.clear();
   for (std::uint32_t s = 0; s < strokes_.size(); ++s)
@@ -129,7 +136,10 @@ void Cutter::cut(std::span<const Vec3f> displacements, CutOutput& out, double tr
   const auto share = std::max(1u, mesh_.settings().edits_per_call / strokes);
   for (const auto s : order_) {
     auto budget = share;
+    const double work_before = out.work_j;
     const bool is_done = work(strokes_[s], budget);
+    if (const auto blade = blade_of(s); blade < kMaxBlades)
+      out.blade_work_j[blade] += out.work_j - work_before;
     // A stroke is ended only in a call that finds nothing of it to cut.
     if (!is_done || (strokes_[s].has_ended && (budget < share || !end(strokes_[s]))))
       out.is_behind = true;
@@ -137,12 +147,12 @@ void Cutter::cut(std::span<const Vec3f> displacements, CutOutput& out, double tr
   mesh_.end();
 }
 
-double Cutter::friction_along(std::span<const Vec3f> displacements, double travel_m,
-                              const Vec3d& from, const Vec3d& to) {
+EdgeResistance Cutter::resistance_of(std::span<const Vec3f> displacements, double travel_m,
+                                     const Vec3d& from, const Vec3d& to) {
   mesh_.begin(displacements, travel_m, unchanged_);
-  const double friction = friction_.along(mesh_, from, to);
+  const auto resistance = meter_.measure(mesh_, from, to);
   mesh_.end();
-  return friction;
+  return resistance;
 }
 
 // Returns whether nothing is left.

@@ -20,14 +20,13 @@
 // began. Not for organs with links. One writer; the topology is edited by nobody else between
 // construction and destruction, except that tets and nodes may be removed while no stroke is on.
 
-#include "server/tissue/cutting/blade_friction.h"
+#include "server/tissue/cutting/edge_resistance.h"
 #include "server/tissue/cutting/opening.h"
 #include "server/tissue/cutting/repair.h"
 #include "server/tissue/cutting/splitter.h"
 
 namespace trocar::cutting {
 
-inline constexpr std::uint32_t kMaxBlades = 32;
 inline constexpr std::uint32_t kMaxStrokes = 2 * kMaxBlades;
 
 class Cutter {
@@ -47,10 +46,10 @@ class Cutter {
   // the blades is looked at; the edits are the same without it.
   void cut(std::span<const Vec3f> displacements, CutOutput& out, double travel_m = kUnknownTravel);
 
-  // Returns BladeFriction::along() for a line in tissue as it is now, N/m. Displacements and travel
-  // are as for cut(), which it may precede.
-  double friction_along(std::span<const Vec3f> displacements, double travel_m, const Vec3d& from,
-                        const Vec3d& to);
+  // Measures a line in tissue as it is now. Displacements and travel are as for cut(), which it may
+  // precede.
+  EdgeResistance resistance_of(std::span<const Vec3f> displacements, double travel_m,
+                               const Vec3d& from, const Vec3d& to);
 
   // Does what another cutter did to the same topology: all its events, of all its calls, in order;
   // with no stroke on. What is wrong is refused; what comes before it has been done. made: the
@@ -69,6 +68,8 @@ class Cutter {
   bool is_idle() const;
   // How far the blade has gone since the place up to which all is cut, m.
   double behind_m(std::uint32_t blade) const;
+  // Returns the mean edge length of the uncut mesh where the blade cut last, m.
+  double h_at(std::uint32_t blade) const;
   double floor_sine() const { return mesh_.floor_sine(); }
   double mean_h() const { return mesh_.mean_h(); }
 
@@ -77,6 +78,8 @@ class Cutter {
 
   Stroke* begin_stroke(std::uint32_t blade);
   void visit_stroke(world::StateArchive& archive, std::uint32_t place);
+  // kMaxBlades: it has ended.
+  std::uint32_t blade_of(std::uint32_t place) const;
   void clear_strokes();
   void order_strokes();
   bool work(Stroke& stroke, std::uint32_t& budget);
@@ -88,7 +91,7 @@ class Cutter {
   std::unique_ptr<PatchSplitter> splitter_;
   Opening opening_;
   Repair repair_;
-  BladeFriction friction_;
+  EdgeMeter meter_;
   CutOutput unchanged_;                              // of calls that cut nothing
   std::array<std::uint32_t, kMaxBlades> stroke_of_;  // place in strokes_, or kNone
   std::uint32_t next_id_ = 0;

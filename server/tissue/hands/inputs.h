@@ -27,6 +27,7 @@ enum class MarkAction : std::uint8_t {
 struct ToolInput {
   ToolSlot tool;
   tool::ToolSample sample;
+  std::uint64_t client_time_us = 0;  // see hands::Tool; not recorded
 };
 
 // Admitted in this order: mark, leaves, joins, samples. Several samples of one tool: the last one

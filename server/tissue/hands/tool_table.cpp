@@ -5,6 +5,22 @@
 
 namespace trocar::hands {
 
+namespace {
+
+// A hand that is silent because it does not move says so at least this often.
+constexpr Tick kKeepAliveTicks = 25;
+
+// Times go as poses do. A hand that rests is where it was a millisecond later, too.
+void move_time(Tool& tool, Tick tick) {
+  if (tool.target_time_us == 0) return;
+  if (tool.steps_left > 0)
+    tool.time_us += (tool.target_time_us - tool.time_us) / tool.steps_left;
+  else if (tick - tool.last_sample_tick <= kKeepAliveTicks)
+    tool.time_us += 1000;
+}
+
+}  // namespace
+
 std::uint32_t ToolTable::admit(const hands::TickInputs& inputs, Tick tick) {
   std::uint32_t dropped = 0;
   for (const auto slot : inputs.leaves) {
@@ -19,6 +35,7 @@ std::uint32_t ToolTable::admit(const hands::TickInputs& inputs, Tick tick) {
   for (const auto& sample : inputs.samples) dropped += admit_sample(sample, tick) ? 0 : 1;
 
   for (auto& tool : tools_) {
+    move_time(tool, tick);
     if (tool.steps_left == 0) continue;
     const float t = 1.0f / static_cast<float>(tool.steps_left);
     if (--tool.steps_left == 0) {
@@ -50,6 +67,10 @@ bool ToolTable::admit_sample(const hands::ToolInput& input, Tick tick) {
   tool.target = input.sample.world_from_tool;
   tool.verb = input.sample.verb;
   tool.last_sample_tick = tick;
+  // A clock that goes back is another one.
+  if (!tool.has_sample || tool.time_us == 0 || input.client_time_us < tool.time_us)
+    tool.time_us = input.client_time_us;
+  tool.target_time_us = input.client_time_us;
   if (tool.has_sample) {
     tool.steps_left = kPoseTicks;
   } else {

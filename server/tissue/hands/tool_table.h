@@ -28,6 +28,9 @@ struct Tool {
   Pose target;                   // of the newest sample
   std::uint32_t steps_left = 0;  // until pose reaches target
   Tick last_sample_tick = 0;
+  // The client's clock at `pose` and at `target`; 0: it does not say. Not state: nothing but the
+  // client's own hand depends on it.
+  std::uint64_t time_us = 0, target_time_us = 0;
 };
 
 class ToolTable {

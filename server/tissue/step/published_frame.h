@@ -12,6 +12,7 @@
 #include "common/base/tick.h"
 #include "common/tool/tool.h"
 #include "common/wire/figures.h"
+#include "common/wire/haptic_patch.h"
 #include "common/wire/quantise.h"
 #include "common/wire/surface_change.h"
 #include "server/tissue/hands/claims.h"
@@ -31,6 +32,8 @@ struct ToolFrame {
   bool has_claim = false;   // its push or grasp is in effect
   bool is_inside = false;   // appeared inside tissue: touches nothing until it has come out
   bool is_silent = false;   // lease no longer fresh
+  // For the client whose hand feels it; of kind Free where none does. Not simulation.
+  wire::HapticPatch touch;
 };
 
 // A mark event says what became of an instructor's request.

@@ -106,6 +106,7 @@ StepContext::StepContext(const Scene& s, unsigned workers, const world::World& u
            .active = propagation::ActiveSet(state.world.node_count()),
            .seeds = {}},
       solve(s.organ, workers, uncut),
+      touches(s.organ),
       surface_displacements(state.cuts.layout().vertex_count()) {
   contact.found.reserve();
   contact.requests.reserve(kMaxTools);

@@ -216,6 +216,10 @@ std::uint64_t hash_of(State& state, StateHasher& hasher) {
   return hasher.digest();
 }
 
+touch::TouchTable::Scene touch_scene(const State& state, const contact::ContactList& contacts) {
+  return {state.world, state.tools, state.claims, state.grasps, contacts, state.cuts};
+}
+
 ToolFrame describe_tool(const State& state, const contact::ContactList& contacts, ToolSlot slot) {
   const auto& tool = state.tools[slot];
   ToolFrame frame{.tool = slot, .world_from_tool = tool.pose, .verb = tool.verb};
@@ -231,7 +235,10 @@ ToolFrame describe_tool(const State& state, const contact::ContactList& contacts
     frame.torque_nm = reaction.torque_nm;
     frame.penetration_m = reaction.penetration_m;
   }
-  if (state.claims.claim(slot).verb == tool::Verb::Cut) frame.force_n = state.cuts.force_n(slot);
+  if (state.claims.claim(slot).verb == tool::Verb::Cut) {
+    frame.force_n = state.cuts.felt(slot).force_n;
+    frame.torque_nm = state.cuts.felt(slot).torque_nm;
+  }
   return frame;
 }
 
@@ -239,6 +246,7 @@ ToolFrame describe_tool(const State& state, const contact::ContactList& contacts
 std::shared_ptr<PublishedFrame> publish(State& state, const contact::ContactList& contacts,
                                         const propagation::PropagationQueue& queue,
                                         const dynamics::Tissue& tissue, const TickReport& report,
+                                        touch::TouchTable& touches,
                                         std::vector<Vec3f>& displacements, Outbox& outbox) {
   auto frame = std::make_shared<PublishedFrame>();
   frame->new_layout = state.cuts.pop_new_layout();
@@ -257,8 +265,11 @@ std::shared_ptr<PublishedFrame> publish(State& state, const contact::ContactList
   frame->regions.reserve(layout.vertex_count());
   for (const auto node : layout.node_of_vertex) frame->regions.push_back(queue.region(node));
   for (std::uint8_t i = 0; i < kMaxTools; ++i)
-    if (state.tools[ToolSlot{i}].has_sample)
+    if (state.tools[ToolSlot{i}].has_sample) {
       frame->tools.push_back(describe_tool(state, contacts, ToolSlot{i}));
+      if (state.tools[ToolSlot{i}].time_us > 0)
+        frame->tools.back().touch = touches.describe(touch_scene(state, contacts), ToolSlot{i});
+    }
   frame->claim_events = outbox.claim_events;
   outbox.claim_events.clear();
   frame->mark_events = std::exchange(outbox.mark_events, {});
@@ -314,9 +325,11 @@ void run_tick(const hands::TickInputs& inputs, const TickDecisions& decisions, E
   report.state_hash = hash_of(state, context.hasher);
   report.faults = faults_of(report);
   end(Stage::Hash);
+  context.touches.update(touch_scene(state, contacts));
+  end(Stage::Contacts);
   if (!publishes_frame(world.tick)) return;
   context.frame = publish(state, contacts, queue, context.solve.solver.tissue(), report,
-                          context.surface_displacements, context.outbox);
+                          context.touches, context.surface_displacements, context.outbox);
   end(Stage::Publish);
 }
 

@@ -19,6 +19,7 @@
 #include "server/tissue/step/mark.h"
 #include "server/tissue/step/published_frame.h"
 #include "server/tissue/step/tick_report.h"
+#include "server/tissue/touch/touch_table.h"
 #include "server/tissue/world/world.h"
 
 namespace trocar::step {
@@ -112,6 +113,7 @@ struct StepContext {
   NearWork near;
   SolveWork solve;
   CutWork cut;
+  touch::TouchTable touches;
   std::vector<Vec3f> surface_displacements;  // scratch of the publish stage
   StateHasher hasher;
   Outbox outbox;

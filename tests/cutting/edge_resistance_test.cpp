@@ -1,15 +1,23 @@
-// How much of a blade tissue lies against.
+// Tests what the edge of a blade meets in tissue.
 
-#include "server/tissue/cutting/blade_friction.h"
+#include "server/tissue/cutting/edge_resistance.h"
 
 #include <gtest/gtest.h>
+
+#include <numeric>
 
 #include "tests/cutting/cut_organ.h"
 
 namespace trocar::cutting::testing {
 namespace {
 
-constexpr double kTau_pa = 1500, kNear_m = 0.0005;
+constexpr double kTau_pa = 1500, kNear_m = 0.00125;
+// Tissue beside an end of the edge counts for half of the way to kNear_m.
+constexpr double kEnd_m = kNear_m / 2;
+
+double sum(const std::array<double, kEdgeParts>& parts) {
+  return std::accumulate(parts.begin(), parts.end(), 0.0);
+}
 
 // Returns a cube 4 cm wide, from -2 to 2 cm along each axis.
 organ::Organ box(double jitter = 0.2) {
@@ -18,39 +26,75 @@ organ::Organ box(double jitter = 0.2) {
   return organ;
 }
 
+EdgeResistance look(CutOrgan& organ, const Vec3d& from, const Vec3d& to) {
+  return organ.cutter().resistance_of(organ.displacements, kUnknownTravel, from, to);
+}
 double friction(CutOrgan& organ, const Vec3d& from, const Vec3d& to) {
-  return organ.cutter().friction_along(organ.displacements, kUnknownTravel, from, to);
+  return sum(look(organ, from, to).friction_n_m);
+}
+// The edge is looked at in so many places, each for the way to the next.
+double spacing(const Vec3d& from, const Vec3d& to) {
+  return length(to - from) / (kEdgeParts * kEdgeSamples);
 }
 
-TEST(BladeFriction, IsOfTheLengthInTissue) {
+TEST(EdgeResistance, IsOfTheLengthInTissue) {
   CutOrgan organ(box());
   const auto expect = [&](double length, const Vec3d& from, const Vec3d& to) {
-    EXPECT_NEAR(friction(organ, from, to), kTau_pa * length, kTau_pa * 1e-9);
+    EXPECT_NEAR(friction(organ, from, to), kTau_pa * length, kTau_pa * spacing(from, to));
   };
-  expect(0.04 + 2 * kNear_m, {0.003, -0.05, 0.004}, {0.003, 0.05, 0.004});
-  expect(0.03 + kNear_m, {0.003, -0.01, 0.004}, {0.003, 0.05, 0.004});
+  expect(0.04 + 2 * kEnd_m, {0.003, -0.05, 0.004}, {0.003, 0.05, 0.004});
+  expect(0.03 + kEnd_m, {0.003, -0.01, 0.004}, {0.003, 0.05, 0.004});
   expect(0.02, {0.003, 0.01, 0.004}, {0.003, -0.01, 0.004});
   expect(0.012, {-0.004, 0.001, -0.013}, {-0.004, 0.001, -0.001});
-  expect(0, {0.021, -0.05, 0.004}, {0.021, 0.05, 0.004});
+  expect(0.04 * 0.2, {0.021, -0.02, 0.004}, {0.021, 0.02, 0.004});
+  expect(0, {0.0213, -0.05, 0.004}, {0.0213, 0.05, 0.004});
   expect(0, {0.003, 0.03, 0.004}, {0.003, 0.05, 0.004});
 }
 
-TEST(BladeFriction, MovesWithTheTissueAndChangesWithoutSteps) {
+TEST(EdgeResistance, SaysWhichPartsMeetIt) {
+  auto organ = box();
+  organ.material.cut_energy_j_m2 = 100;
+  CutOrgan cut(organ);
+  const auto met = look(cut, {0.003, -0.01, 0.004}, {0.003, 0.07, 0.004});
+  for (const std::size_t i : {0, 1, 2}) {
+    EXPECT_NEAR(met.cut_n[i], 100 * 0.01, 1e-9);
+    EXPECT_NEAR(met.friction_n_m[i], kTau_pa * 0.01, 1e-9);
+  }
+  for (const std::size_t i : {4, 5, 6, 7}) EXPECT_EQ(met.cut_n[i], 0);
+  EXPECT_EQ(met.whole_cut_n, sum(met.cut_n));
+}
+
+TEST(EdgeResistance, MovesWithTheTissueAndChangesWithoutSteps) {
   CutOrgan organ(box());
   organ.displacements.assign(organ.topology().node_count(), Vec3f{0.1f, 0, 0});
   EXPECT_EQ(friction(organ, {0, -0.05, 0}, {0, 0.05, 0}), 0);
   double last = 0, most = 0;
+  const double spaced = 0.1 / (kEdgeParts * kEdgeSamples);
   for (int i = 0; i <= 1000; ++i) {
     const double depth = -0.01 + 6e-5 * i;  // from above the box to below it
     const double now = friction(organ, {0.101, 0.02 - depth, 0.004}, {0.101, 0.12 - depth, 0.004});
-    EXPECT_LE(std::abs(now - last), kTau_pa * 6.1e-5);
+    // At most two of the places come nearer to the surface at once.
+    EXPECT_LE(std::abs(now - last), kTau_pa * 6.1e-5 * 2 * spaced / kNear_m);
     last = now;
     most = std::max(most, now);
   }
-  EXPECT_NEAR(most, kTau_pa * (0.04 + 2 * kNear_m), 1e-6);
+  EXPECT_NEAR(most, kTau_pa * (0.04 + 2 * kEnd_m), kTau_pa * spaced);
 }
 
-TEST(BladeFriction, IsOfTheMaterialsOnTheWay) {
+// It fades in and out where the whole edge comes to a flat side at once.
+TEST(EdgeResistance, FadesBesideTissue) {
+  CutOrgan organ(box());
+  double last = kTau_pa * 0.02;
+  for (int i = -10; i <= 200; ++i) {
+    const double x = 0.02 + 1e-5 * i;
+    const double now = friction(organ, {x, -0.01, 0.003}, {x, 0.01, 0.003});
+    EXPECT_NEAR(now, kTau_pa * 0.02 * std::clamp(1 - (x - 0.02) / kNear_m, 0.0, 1.0), 1e-9);
+    EXPECT_LE(now, last + 1e-12);
+    last = now;
+  }
+}
+
+TEST(EdgeResistance, IsOfTheMaterialsOnTheWay) {
   auto organ = box(0);
   auto smooth = organ.material;
   smooth.blade_friction_pa = 100;
@@ -60,17 +104,20 @@ TEST(BladeFriction, IsOfTheMaterialsOnTheWay) {
   organ.regions = {{"upper", smooth, upper}};
   CutOrgan cut(organ);
   EXPECT_NEAR(friction(cut, {0.003, -0.05, 0.004}, {0.003, 0.05, 0.004}),
-              kTau_pa * 0.02 + smooth.blade_friction_pa * 0.02, kTau_pa * 3 * kNear_m);
+              kTau_pa * 0.02 + smooth.blade_friction_pa * 0.02, kTau_pa * 2 * kNear_m);
 }
 
-TEST(BladeFriction, IsNothingInAWoundThatGapes) {
+TEST(EdgeResistance, IsNothingInAWoundThatGapes) {
   CutOrgan organ(box(0));
   organ.stroke(straight_path({{0.0005, -0.05, -0.06}, {0.0005, -0.05, 0.06}},
                              {{0.0005, 0.05, -0.06}, {0.0005, 0.05, 0.06}}, 0.002));
   ASSERT_EQ(organ.check(), "");
   ASSERT_EQ(find_pieces(organ.topology()).count, 2u);
   const Vec3d from{0.0005, -0.05, 0.004}, to{0.0005, 0.05, 0.004};
-  EXPECT_NEAR(friction(organ, from, to), kTau_pa * (0.04 + 2 * kNear_m), kTau_pa * 1e-3);
+  EXPECT_NEAR(friction(organ, from, to), kTau_pa * (0.04 + 2 * kEnd_m),
+              kTau_pa * spacing(from, to));
+  const auto met = look(organ, from, to);
+  EXPECT_LT(met.whole_cut_n, 0.1 * sum(met.cut_n)) << "it lies in the wound";
   const auto pieces = find_pieces(organ.topology());
   organ.displacements.resize(organ.topology().node_count());
   for (std::uint32_t n = 0; n < organ.displacements.size(); ++n) {
@@ -86,7 +133,7 @@ TEST(BladeFriction, IsNothingInAWoundThatGapes) {
 
 // The cutter looks for tissue near the blade in each call and remembers none, so the friction is
 // the same with any count of travel.
-TEST(BladeFriction, RefusesWhatIsNoBladeAndForgetsNothing) {
+TEST(EdgeResistance, RefusesWhatIsNoBladeAndForgetsNothing) {
   CutOrgan organ(box());
   EXPECT_EQ(friction(organ, {0, 0, 0}, {0, 0, 0}), 0);
   EXPECT_EQ(friction(organ, {0, std::nan(""), 0}, {0, 0, 0.1}), 0);
@@ -96,7 +143,7 @@ TEST(BladeFriction, RefusesWhatIsNoBladeAndForgetsNothing) {
   for (int i = 0; i < 200; ++i) {
     const Vec3d from{any(), any(), any()}, to{any(), any(), any()};
     const double first = friction(organ, from, to);
-    EXPECT_EQ(organ.cutter().friction_along({}, 0, from, to), first);
+    EXPECT_EQ(sum(organ.cutter().resistance_of({}, 0, from, to).friction_n_m), first);
     EXPECT_NEAR(friction(organ, to, from), first, kTau_pa * 1e-9);
     EXPECT_LE(first, kTau_pa * length(to - from) * (1 + 1e-12));
   }

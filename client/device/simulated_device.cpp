@@ -1,0 +1,84 @@
+#include "client/device/simulated_device.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "client/device/device_checks.h"
+
+namespace trocar::device {
+namespace {
+
+constexpr std::uint64_t kStepUs = 1000, kMostStepsAtOnce = 1000;
+constexpr int kPartsOfStep = 10;
+constexpr double kStepS = 1e-3, kQuantumM = 20e-6, kHandForceN = 8, kHandReachM = 0.15;
+
+}  // namespace
+
+SimulatedDevice::SimulatedDevice(HandScript script, ClockUs clock_us, HandModel model)
+    : script_(std::move(script)),
+      clock_us_(std::move(clock_us)),
+      model_(model),
+      start_us_(clock_us_()),
+      position_m_(script_.position_m(0)) {}
+
+void SimulatedDevice::step() {
+  const double now_s = static_cast<double>(steps_) * kStepS;
+  const Vec3d wanted = script_.position_m(now_s);
+  Vec3d& lag = lags_m_[steps_ % lags_m_.size()];  // of a reflex delay ago
+  const Vec3d reflex = lag * model_.reflex_n_m;
+  lag = wanted - position_m_;
+  const bool is_held = start_us_ + steps_ * kStepUs <= written_us_ + kForceHoldUs;
+  const Vec3d constant = reflex + (is_held ? force_n_ : Vec3d{});
+  constexpr double kPartS = kStepS / kPartsOfStep;
+  for (int part = 0; part < kPartsOfStep; ++part) {
+    const Vec3d force = constant + (wanted - position_m_) * model_.stiffness_n_m -
+                        velocity_m_s_ * model_.damping_n_s_m;
+    velocity_m_s_ += force * (kPartS / model_.mass_kg);
+    position_m_ += velocity_m_s_ * kPartS;
+  }
+  ++steps_;
+}
+
+void SimulatedDevice::advance() {
+  const std::uint64_t now_us = std::max(clock_us_(), start_us_);
+  const std::uint64_t due = (now_us - start_us_) / kStepUs;
+  if (due > steps_ + kMostStepsAtOnce) {
+    steps_ = due;
+    position_m_ = script_.position_m(static_cast<double>(due) * kStepS);
+    velocity_m_s_ = {};
+    lags_m_ = {};
+  }
+  while (steps_ < due) step();
+}
+
+Result<DeviceReading> SimulatedDevice::read() {
+  advance();
+  const auto rounded = [](double metres) { return std::round(metres / kQuantumM) * kQuantumM; };
+  DeviceReading reading;
+  reading.position_m = {rounded(position_m_.x), rounded(position_m_.y), rounded(position_m_.z)};
+  reading.velocity_m_s = velocity_m_s_;
+  reading.gripper = script_.gripper(static_cast<double>(steps_) * kStepS);
+  reading.time_us = start_us_ + steps_ * kStepUs;
+  return reading;
+}
+
+Status SimulatedDevice::write(const Vec3d& force_n, const Vec3d&) {
+  advance();
+  force_n_ = checked_force(force_n, kHandForceN);
+  written_us_ = start_us_ + steps_ * kStepUs;
+  return {};
+}
+
+DeviceLimits SimulatedDevice::limits() const {
+  return {.force_n = kHandForceN,
+          .rate_hz = 1e6 / static_cast<double>(kStepUs),
+          .stiffness_n_m = 1000,
+          .workspace_m = {kHandReachM, kHandReachM, kHandReachM}};
+}
+
+std::string SimulatedDevice::description() const {
+  return "simulated hand";
+}
+
+}  // namespace trocar::device

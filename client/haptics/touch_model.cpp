@@ -1,0 +1,134 @@
+#include "client/haptics/touch_model.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace trocar::haptics {
+namespace {
+
+constexpr double kUsualStep_s = 0.001;
+constexpr double kLongestStep_s = 0.1;
+constexpr double kVelocityTime_s = 1 / (2 * std::numbers::pi * 40);
+constexpr double kOpening_s = 0.020;  // jaws that open let go of the force
+constexpr double kFarAbove_m = -1;    // a depth, where there is no surface
+
+Vec3d across(const Vec3d& v, const Vec3d& normal) {
+  return v - normal * dot(v, normal);
+}
+
+Vec3d shortened(const Vec3d& v, double limit) {
+  const double size = length(v);
+  return size > limit ? v * (limit / size) : v;
+}
+
+}  // namespace
+
+TouchModel::TouchModel(const tool::ToolShape& shape, const TouchSettings& settings)
+    : shape_(shape), settings_(settings), fit_(settings.forget_s, settings.follow_s) {
+  use_material();
+}
+
+Vec3d TouchModel::model_force(const Response& response) const {
+  return normal_ * response.normal_n + response.rest_n;
+}
+
+double TouchModel::depth_of(const Vec3d& core_m, double clearance_m) const {
+  return dot(normal_, plane_m_ - core_m) + clearance_m;
+}
+
+PastState TouchModel::state_of(const TouchInput& input) const {
+  const Vec3d along = to_double(rotate(input.orientation, {0, 0, 1}));
+  const Vec3d sideways = to_double(rotate(input.orientation, {1, 0, 0}));
+  PastState state;
+  state.time_us = input.time_us;
+  state.tip_m = input.tip_m;
+  state.core_m = input.tip_m + along * static_cast<double>(shape_.radius_m);
+  state.clearance_m = shape_.radius_m + shape_.half_width_m * std::abs(dot(sideways, normal_));
+  return state;
+}
+
+void TouchModel::answer(PastState& state, double dt_s) {
+  if (steps_.dt_s() != dt_s) steps_ = ViscoSteps(materials_[material_].law, dt_s);
+  if (grips()) {
+    state.grip_point_m = grip_point_m_ + grip_offset_m_;
+    state.response = grip_.step(steps_, state.tip_m, state.grip_point_m);
+  } else {
+    state.depth_m =
+        has_surface() ? depth_of(state.core_m, state.clearance_m) + depth_offset_m_ : kFarAbove_m;
+    state.response = push_.step(power_law_, steps_, state.depth_m, state.core_m, normal_,
+                                static_cast<double>(patch_.friction));
+  }
+}
+
+TouchOutput TouchModel::step(const TouchInput& input) {
+  double dt_s = kUsualStep_s;
+  PastState state = state_of(input);
+  if (!past_.is_empty()) {
+    const PastState& last = past_[past_.end() - 1];
+    if (input.time_us <= last.time_us) return output_;
+    dt_s = std::min(static_cast<double>(input.time_us - last.time_us) * 1e-6, kLongestStep_s);
+    const Vec3d velocity_m_s = (state.core_m - last.core_m) / dt_s;
+    velocity_m_s_ += (velocity_m_s - velocity_m_s_) * (dt_s / (dt_s + kVelocityTime_s));
+  }
+  blend(dt_s);
+  watch_jaws(input, dt_s);
+  answer(state, dt_s);
+  past_.add(state);
+
+  const Response& response = state.response;
+  Vec3d force_n = limited_force(corrected_force(response), response);
+  if (stop_.is_on()) force_n = stopped_force(force_n, state.core_m, dt_s);
+  force_n *= cut_drop_.step(length(force_n), static_cast<double>(patch_.cut_force_n), answer_s_,
+                            input.time_us);
+  if (grips()) force_n *= held_share_;
+  output_.force_n = force_n;
+  output_.torque_nm = lever_m_ * length(force_n);
+  output_.touches = grips() || response.normal_n > 0 || stop_.is_on();
+  output_.stiffness_n_m = stop_.is_on() ? stop_.stiffness_n_m() : slope_ * response.stiffness_n_m;
+  return output_;
+}
+
+void TouchModel::blend(double dt_s) {
+  const double share = std::min(1.0, dt_s / settings_.blend_s);
+  slope_ += (fit_.slope() - slope_) * share;
+  correction_n_ += (next_correction_n_ - correction_n_) * share;
+  lever_m_ += (next_lever_m_ - lever_m_) * share;
+  depth_offset_m_ *= 1 - share;
+  grip_offset_m_ *= 1 - share;
+}
+
+void TouchModel::watch_jaws(const TouchInput& input, double dt_s) {
+  if (input.verb == tool::Verb::Grasp && verb_ != tool::Verb::Grasp)
+    jaws_closed_us_ = input.time_us;
+  if (grips() && verb_ == tool::Verb::Grasp && input.verb != tool::Verb::Grasp) is_let_go_ = true;
+  verb_ = input.verb;
+  held_share_ = is_let_go_ ? std::max(0.0, held_share_ - dt_s / kOpening_s) : 1;
+}
+
+Vec3d TouchModel::corrected_force(const Response& response) const {
+  double gate = 1;
+  if (!grips())
+    gate = std::clamp(slope_ * response.normal_n / (settings_.gate * gate_force_n_), 0.0, 1.0);
+  return model_force(response) * slope_ + correction_n_ * gate;
+}
+
+Vec3d TouchModel::limited_force(const Vec3d& force_n, const Response& response) const {
+  if (grips()) {
+    const double limit_n = patch_.grip_limit_n;
+    return limit_n > 0 ? shortened(force_n, limit_n) : force_n;
+  }
+  if (response.normal_n <= 0) return {};
+  double along_n = std::max(0.0, dot(force_n, normal_));
+  if (patch_.pressed_limit_n > 0)
+    along_n = std::min(along_n, static_cast<double>(patch_.pressed_limit_n));
+  return normal_ * along_n + shortened(across(force_n, normal_), patch_.friction * along_n);
+}
+
+Vec3d TouchModel::stopped_force(const Vec3d& force_n, const Vec3d& core_m, double dt_s) {
+  const double along_n = stop_.step(core_m, velocity_m_s_, dt_s);
+  return stop_.normal() * along_n +
+         shortened(across(force_n, stop_.normal()), patch_.friction * along_n);
+}
+
+}  // namespace trocar::haptics

@@ -1,0 +1,250 @@
+// The part of the model that takes the server's answers.
+
+#include <algorithm>
+#include <utility>
+
+#include "client/haptics/touch_model.h"
+
+namespace trocar::haptics {
+namespace {
+
+constexpr double kSlow_s = 0.050;           // the time that a patch's stiffness is of
+constexpr double kLeastGateForce_n = 0.02;  // under it the correction is gone in any case
+constexpr double kClearlyAbove_m = -0.001;  // a depth
+constexpr double kGuessDepth_m = 0.005;
+constexpr double kLongestPause_s = 0.1;  // between two answers, for the fit
+constexpr double kAnswerShare = 0.1;     // of a new delay in the smoothed one
+constexpr std::size_t kMostReplayed = 1024;
+// A server that counts from the beginning again is not late: its answers are of much later poses.
+constexpr std::uint64_t kNewSession_us = 1'000'000;
+
+SymMat3<double> to_double(const SymMat3f& a) {
+  return {a.xx, a.xy, a.xz, a.yy, a.yz, a.zz};
+}
+
+SymMat3<double> scaled(const SymMat3<double>& a, double s) {
+  return {a.xx * s, a.xy * s, a.xz * s, a.yy * s, a.yz * s, a.zz * s};
+}
+
+bool is_same(const wire::HapticLaw& a, const wire::HapticLaw& b) {
+  const auto is_same_term = [](const wire::HapticLaw::Term& c, const wire::HapticLaw::Term& d) {
+    return c.share == d.share && c.time_s == d.time_s;
+  };
+  return a.exponent == b.exponent && a.youngs_modulus_pa == b.youngs_modulus_pa &&
+         a.poisson_ratio == b.poisson_ratio &&
+         std::ranges::equal(a.relaxation, b.relaxation, is_same_term) &&
+         std::ranges::equal(a.fast, b.fast, is_same_term);
+}
+
+// The stiffness along a direction, which need not be of unit length.
+double along(const SymMat3<double>& stiffness, const Vec3d& direction) {
+  return dot(direction, stiffness * direction) / length_squared(direction);
+}
+
+}  // namespace
+
+void TouchModel::take(const wire::HapticLaw& law) {
+  for (std::size_t i = 0; i < kLaws; ++i) {
+    Material& material = materials_[i];
+    if (!material.is_known || material.law.number != law.number) continue;
+    if (is_same(material.law, law)) return;
+    material = {law, true, 1};
+    if (i != material_) return;
+    use_material();
+    restart(past_.end());
+    return;
+  }
+  if (next_material_ == material_) next_material_ = (next_material_ + 1) % kLaws;
+  materials_[next_material_] = {law, true, 1};
+  next_material_ = (next_material_ + 1) % kLaws;
+}
+
+bool TouchModel::is_old(const wire::HapticPatch& patch) const {
+  if (!has_patch_ || static_cast<std::int32_t>(patch.sequence - patch_.sequence) > 0) return false;
+  return patch.echo_time_us < patch_.echo_time_us + kNewSession_us;
+}
+
+void TouchModel::take(const wire::HapticPatch& patch) {
+  if (is_old(patch)) {
+    ++counts_.old_patches;
+    return;
+  }
+  ++counts_.patches;
+  const bool had_surface = has_surface(), gripped = grips();
+  const bool is_new_structure = has_patch_ && patch.structure != patch_.structure;
+  patch_ = patch;
+  has_patch_ = true;
+  take_surface(had_surface, gripped);
+  const bool is_new_law = take_law();
+  take_stop();
+  if (is_let_go_ &&
+      (!grips() || (verb_ == tool::Verb::Grasp && patch.echo_time_us > jaws_closed_us_)))
+    is_let_go_ = false;
+
+  const auto found = past_.find(patch.echo_time_us);
+  if (!found) {
+    ++counts_.unmatched_patches;
+    if (is_new_law || gripped != grips()) restart(past_.end());
+    return;
+  }
+  const std::uint64_t newest_us = past_[past_.end() - 1].time_us;
+  const double answer_s =
+      static_cast<double>(newest_us - std::min(patch.echo_time_us, newest_us)) * 1e-6;
+  answer_s_ += (answer_s - answer_s_) * (answer_s_ == 0 ? 1 : kAnswerShare);
+  if (is_new_law || gripped != grips()) {
+    restart(*found);
+  } else {
+    correct(*past_.at(patch.echo_time_us), is_new_structure);
+  }
+  last_echo_us_ = patch.echo_time_us;
+}
+
+void TouchModel::take_surface(bool had_surface, bool gripped) {
+  if (!has_surface()) return;
+  const PastState last = past_.is_empty() ? PastState{} : past_[past_.end() - 1];
+  const double believed_m = depth_of(last.core_m, last.clearance_m) + depth_offset_m_;
+  normal_ = normalized(trocar::to_double(patch_.plane_normal), normal_);
+  plane_m_ = trocar::to_double(patch_.plane_point_m);
+  const double newest_m = depth_of(last.core_m, last.clearance_m);
+  const bool is_far = !output_.touches && newest_m < kClearlyAbove_m;
+  depth_offset_m_ = had_surface && !is_far ? believed_m - newest_m : 0;
+
+  if (!grips()) return;
+  const Vec3d believed_grip_m = grip_point_m_ + grip_offset_m_;
+  grip_point_m_ = trocar::to_double(patch_.grip_point_m);
+  grip_offset_m_ = gripped ? believed_grip_m - grip_point_m_ : Vec3d{};
+  if (gripped && patch_.has_stiffness) grip_.set_stiffness(grip_stiffness());
+}
+
+bool TouchModel::take_law() {
+  if (materials_[material_].is_known && materials_[material_].law.number == patch_.law)
+    return false;
+  for (std::size_t i = 0; i < kLaws; ++i) {
+    if (!materials_[i].is_known || materials_[i].law.number != patch_.law) continue;
+    material_ = i;
+    use_material();
+    return true;
+  }
+  return false;  // its law has not come yet
+}
+
+void TouchModel::use_material() {
+  const Material& material = materials_[material_];
+  power_law_ = first_guess(material.law, static_cast<double>(shape_.radius_m));
+  slow_share_ = relaxed_share(material.law, kSlow_s);
+  steps_ = {};
+}
+
+void TouchModel::take_stop() {
+  const bool is_refused = patch_.kind == wire::TouchKind::Rigid;
+  if (past_.is_empty() || is_refused == stop_.is_on()) return;
+  const PastState& last = past_[past_.end() - 1];
+  if (is_refused) {
+    stop_.begin(last.core_m, normal_, depth_of(last.core_m, last.clearance_m) + depth_offset_m_,
+                std::max(0.0, dot(output_.force_n, normal_)), settings_.stop_n_m);
+  } else {
+    stop_.end();
+    keep_force(last.response);
+  }
+}
+
+// Chooses the correction so that the force goes on as it is.
+void TouchModel::keep_force(const Response& response) {
+  correction_n_ = output_.force_n - model_force(response) * slope_;
+}
+
+SymMat3<double> TouchModel::grip_stiffness() const {
+  if (patch_.has_stiffness) return scaled(to_double(patch_.stiffness_n_m), 1 / slow_share_);
+  const double k = power_law_.stiffness_n_m(kGuessDepth_m);
+  SymMat3<double> stiffness;
+  stiffness.add_identity(kAcrossOverNormal * k);
+  stiffness.add_outer(normal_, (1 - kAcrossOverNormal) * k);
+  return stiffness;
+}
+
+// The local model begins anew with what it is now, at the pose that the answer belongs to.
+void TouchModel::restart(std::size_t first) {
+  if (grips()) grip_.start(grip_stiffness());
+  fit_.set_slope(grips() ? 1 : materials_[material_].slope);
+  fit_.clear_sums();
+  slope_ = fit_.slope();
+  push_.start(kClearlyAbove_m);
+  if (past_.is_empty()) return;
+  first = std::max({first, past_.begin(),
+                    past_.end() > kMostReplayed ? past_.end() - kMostReplayed : std::size_t{0}});
+  first = std::min(first, past_.end() - 1);
+  if (has_surface()) push_.start(depth_of(past_[first].core_m, past_[first].clearance_m));
+  for (std::size_t i = first; i < past_.end(); ++i) {
+    const bool has_previous = i > past_.begin();
+    const std::uint64_t dt_us = has_previous ? past_[i].time_us - past_[i - 1].time_us : 1000;
+    answer(past_[i], static_cast<double>(dt_us) * 1e-6);
+  }
+  const Response& then = past_[first].response;
+  next_correction_n_ = {};
+  if (touches(patch_.kind))
+    next_correction_n_ = trocar::to_double(patch_.force_n) - model_force(then) * slope_;
+  gate_force_n_ = std::max(kLeastGateForce_n, slope_ * then.normal_n);
+  keep_force(past_[past_.end() - 1].response);
+}
+
+// The stiffness of held tissue acts on the pull, that of pushed tissue on the depth: by them what
+// was answered follows a reference that has moved since.
+Response TouchModel::with_moved_reference(const PastState& then) const {
+  Response response = then.response;
+  const double share = settings_.moved_share * slow_share_;
+  if (grips()) {
+    const Vec3d moved_m = grip_point_m_ - then.grip_point_m;
+    response.rest_n += grip_.stiffness() * moved_m * share;
+  } else if (response.normal_n > 0) {
+    const double deeper_m = depth_of(then.core_m, then.clearance_m) - then.depth_m;
+    response.normal_n =
+        std::max(0.0, response.normal_n + response.stiffness_n_m * deeper_m * share);
+    response.rest_n = response.rest_n - normal_ * dot(response.rest_n, normal_);
+  }
+  return response;
+}
+
+void TouchModel::correct(const PastState& then, bool is_new_structure) {
+  if (patch_.kind == wire::TouchKind::Rigid) return;
+  // Tissue that the server's tool does not touch has given way where the local model presses.
+  const bool touched = touches(patch_.kind);
+  const Response response = with_moved_reference(then);
+  if (!touched && response.normal_n <= 0) {
+    next_correction_n_ = {};
+    return;
+  }
+  const Vec3d server_n = touched ? trocar::to_double(patch_.force_n) : Vec3d{};
+  const Vec3d local_n = model_force(response);
+  // The slope of a push is that along the normal; friction follows.
+  const Vec3d fit_server_n = grips() ? server_n : Vec3d{dot(server_n, normal_), 0, 0};
+  const Vec3d fit_local_n = grips() ? local_n : Vec3d{response.normal_n, 0, 0};
+  if (is_new_structure) {
+    fit_.restart(fit_server_n, fit_local_n);
+  } else if (touched && patch_.echo_time_us > last_echo_us_) {
+    const double dt_s =
+        std::min(static_cast<double>(patch_.echo_time_us - last_echo_us_) * 1e-6, kLongestPause_s);
+    fit_.add(fit_server_n, fit_local_n, dt_s, stiffness_ratio(response));
+  }
+  if (!grips()) materials_[material_].slope = fit_.slope();
+  next_correction_n_ = server_n - local_n * fit_.slope();
+  gate_force_n_ = std::max(kLeastGateForce_n, fit_.slope() * response.normal_n);
+  if (const double force_n = length(server_n); force_n > kLeastGateForce_n)
+    next_lever_m_ = trocar::to_double(patch_.torque_nm) / force_n;
+  if (is_new_structure && cut_drop_.is_on() && patch_.echo_time_us >= cut_drop_.since_us()) {
+    cut_drop_.confirm();
+    slope_ = fit_.slope();
+    keep_force(past_[past_.end() - 1].response);
+  }
+}
+
+std::optional<double> TouchModel::stiffness_ratio(const Response& response) const {
+  if (!patch_.has_stiffness) return std::nullopt;
+  const Vec3d direction = grips() ? model_force(response) : normal_;
+  if (length(direction) < SlopeFit::kLeastForce_n) return std::nullopt;
+  const double server_n_m = along(to_double(patch_.stiffness_n_m), direction);
+  const double local_n_m = grips() ? along(grip_.stiffness(), direction) : response.stiffness_n_m;
+  if (!(local_n_m > 0)) return std::nullopt;
+  return server_n_m / (local_n_m * slow_share_);
+}
+
+}  // namespace trocar::haptics

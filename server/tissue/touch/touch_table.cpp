@@ -1,0 +1,169 @@
+#include "server/tissue/touch/touch_table.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "server/tissue/contact/proxies.h"
+#include "server/tissue/touch/haptic_law.h"
+
+namespace trocar::touch {
+namespace {
+
+using wire::TouchKind;
+
+// Across the normal, tissue is so much softer than along it (measured on the liver).
+constexpr float kAcross = 0.72f;
+constexpr float kLeastDepth_m = 0.001f;
+constexpr float kRingMiddle_m = 0.022f;  // of the ring that UndentedSurface follows
+
+bool is_touching(TouchKind kind) {
+  return kind != TouchKind::Free && kind != TouchKind::Near;
+}
+
+Vec3f shaft_of(const Pose& pose) {
+  return rotate(pose.orientation, {0, 0, 1});
+}
+
+// More than half of what it feels is tissue that somebody else holds, or a claim was refused here.
+bool is_rigid(const TouchTable::Scene& scene, const contact::ToolContact& contact) {
+  float held = 0, all = 0;
+  for (const auto& point : scene.contacts.points_of(contact)) {
+    all += point.stiffness;
+    const auto moves = static_cast<unsigned>(point.moved) & ((1u << point.node_count) - 1);
+    if (moves == 0) held += point.stiffness;
+  }
+  return held > 0.5f * all;
+}
+
+}  // namespace
+
+TouchTable::TouchTable(const organ::Organ& organ)
+    : laws_(haptic_laws(organ)), law_of_node_(organ::material_map(organ).nodes) {}
+
+void TouchTable::update(const Scene& scene) {
+  std::array<const contact::ToolContact*, kMaxTools> contacts{};
+  for (const auto& contact : scene.contacts.tools) contacts[contact.tool.value] = &contact;
+  for (std::uint8_t i = 0; i < kMaxTools; ++i) {
+    const ToolSlot slot{i};
+    const auto& tool = scene.tools[slot];
+    auto& touch = touches_[i];
+    if (!tool.has_sample || tool.time_us == 0) {  // Nobody feels it.
+      touch.kind = TouchKind::Free;
+      continue;
+    }
+    const auto& claim = scene.claims.claim(slot);
+    auto kind = TouchKind::Free;
+    contact::Reaction reaction;
+    if (claim.verb == tool::Verb::Cut && scene.claims.is_in_effect(slot)) {
+      const auto& felt = scene.cuts.felt(slot);
+      reaction.force_n = felt.force_n;
+      reaction.torque_nm = felt.torque_nm;
+      if (dot(reaction.force_n, reaction.force_n) > 0) kind = TouchKind::Cut;
+    } else if (const auto* contact = contacts[i]; contact && contact->begin < contact->end) {
+      reaction = contact::reaction_on(scene.contacts, *contact, scene.world);
+      const bool presses = dot(reaction.force_n, reaction.force_n) > 0;
+      if (contact->verb == tool::Verb::Grasp)
+        kind = TouchKind::Grip;
+      else if (presses)
+        kind = is_rigid(scene, *contact) ? TouchKind::Rigid : TouchKind::Push;
+    }
+    const bool is_refused = claim.phase == hands::ClaimPhase::Wanted &&
+                            claim.last_refusal != hands::ClaimOutcome::Granted;
+    if (is_refused && !is_touching(kind) && touch.kind != TouchKind::Free) kind = TouchKind::Rigid;
+    if (kind == TouchKind::Free && touch.surface.is_known()) kind = TouchKind::Near;
+
+    // To begin and to end to press is what depth says; the rest is another thing.
+    const auto thing = [](TouchKind k) { return is_touching(k) ? k : TouchKind::Push; };
+    if (thing(kind) != thing(touch.kind)) {
+      touch.structure = static_cast<std::uint32_t>(scene.world.tick);
+      if (kind == TouchKind::Grip) touch.grip_point = tool.pose.position;
+      touch.stiffness.clear();
+    }
+    touch.kind = kind;
+    touch.force = reaction.force_n;
+    touch.torque = reaction.torque_nm;
+    if (is_touching(kind)) touch.stiffness.add(tool.pose.position, touch.force);
+    if (kind != TouchKind::Push) continue;
+    // Torque about the tip is the force's lever along the shaft, and what little friction adds.
+    const Vec3f shaft = shaft_of(tool.pose);
+    const Vec3f turn = cross(shaft, touch.force);
+    const float turning = dot(turn, turn);
+    // A force along the shaft has no lever: it is the tip that presses.
+    const bool has_lever = turning > 0.1f * dot(touch.force, touch.force);
+    const float along = has_lever ? dot(touch.torque, turn) / turning : 0;
+    touch.along_m = std::clamp(along, 0.0f, tool.shape.length_m);
+  }
+}
+
+void TouchTable::describe_surface(const Scene& scene, const hands::Tool& tool, Touch& touch,
+                                  wire::HapticPatch& patch) {
+  const auto& layout = scene.cuts.layout();
+  auto& surface = touch.surface;
+  const Vec3f shaft = shaft_of(tool.pose);
+  const Vec3f place = tool.pose.position + shaft * touch.along_m;
+  if (!is_touching(touch.kind)) {
+    touch.along_m = 0;
+    surface.clear();
+    surface.take(scene.world, layout, place);
+  } else if (!surface.is_known() || surface.has_changed(layout, place)) {
+    if (surface.is_known()) touch.structure = static_cast<std::uint32_t>(scene.world.tick);
+    surface.clear();
+    surface.take(scene.world, layout, place);
+  }
+  if (!surface.is_known()) return;
+  if (is_touching(touch.kind)) {
+    const auto& law = laws_[touch.law];
+    // A point load on a half space: the surface at the ring sinks by so much (Boussinesq).
+    const float sinks = (1 - law.poisson_ratio * law.poisson_ratio) /
+                        (std::numbers::pi_v<float> * law.youngs_modulus_pa * kRingMiddle_m);
+    surface.follow(scene.world, layout, place, touch.force, sinks);
+  }
+  const float radius = std::max(tool.shape.radius_m, 0.004f);
+  const auto [point, normal, corner] = surface.plane(place, radius);
+  auto node = corner;
+  while (node.value >= law_of_node_.size())
+    node = scene.world.origins[node.value - law_of_node_.size()].a;
+  touch.law = law_of_node_[node.value];
+  const auto& law = laws_[touch.law];
+  // The tip is there when the tool just touches: a capsule's radius away from its core.
+  const float core_m = std::max(touch.along_m, tool.shape.radius_m);
+  patch.plane_point_m = point + normal * (tool.shape.radius_m - dot(normal, shaft) * core_m);
+  patch.plane_normal = normal;
+  const float depth = dot(normal, patch.plane_point_m - tool.pose.position);
+  if (!is_touching(touch.kind)) {
+    touch.kind = -depth < kNear_m ? TouchKind::Near : TouchKind::Free;
+    if (touch.kind == TouchKind::Free) surface.clear();
+  }
+  const float stiffness =
+      hertz_stiffness_n_m(law, tool.shape.radius_m, std::max(depth, kLeastDepth_m));
+  SymMat3f guess;
+  guess.add_identity(kAcross * stiffness);
+  guess.add_outer(normal, (1 - kAcross) * stiffness);
+  patch.stiffness_n_m = touch.stiffness.stiffness(guess);
+  patch.has_stiffness = true;
+  patch.law = law.number;
+}
+
+wire::HapticPatch TouchTable::describe(const Scene& scene, ToolSlot slot) {
+  const auto& tool = scene.tools[slot];
+  auto& touch = touches_[slot.value];
+  wire::HapticPatch patch;
+  patch.tick = scene.world.tick;
+  patch.echo_time_us = tool.time_us;
+  patch.used_position_m = tool.pose.position;
+  describe_surface(scene, tool, touch, patch);
+  patch.kind = touch.kind;
+  patch.structure = touch.structure;
+  patch.force_n = touch.force;
+  patch.torque_nm = touch.torque;
+  patch.friction = tool.shape.friction;
+  if (touch.kind == TouchKind::Grip) {
+    patch.grip_point_m = touch.grip_point;
+    patch.grip_limit_n = scene.grasps[slot].grip_n;
+  }
+  if (touch.kind == TouchKind::Cut) patch.cut_force_n = length(touch.force);
+  return patch;
+}
+
+}  // namespace trocar::touch

@@ -1,0 +1,147 @@
+#include <gtest/gtest.h>
+
+#include <thread>
+
+#include "client/haptics/local_events.h"
+#include "client/haptics/past_states.h"
+#include "client/haptics/slope_fit.h"
+#include "client/haptics/wake_statistics.h"
+#include "common/base/newest.h"
+
+namespace trocar::haptics {
+namespace {
+
+TEST(SlopeFit, FindsTheSlopeOfAnAffineRelation) {
+  SlopeFit fit(0.5, 0.01);
+  for (int k = 0; k < 200; ++k) {
+    const double local_n = 0.3 + 0.2 * std::sin(0.2 * k);
+    fit.add({1.4 * local_n + 0.1, 0, 0}, {local_n, 0, 0}, 0.016, 0.7);
+  }
+  // A ratio would be 1.4 + 0.1 / 0.3.
+  EXPECT_NEAR(fit.slope(), 1.4, 0.02);
+}
+
+TEST(SlopeFit, BelievesThePriorWhileNothingVaries) {
+  SlopeFit fit(0.5, 0.01);
+  for (int k = 0; k < 100; ++k) fit.add({0.5, 0, 0}, {0.3, 0, 0}, 0.016, 0.8);
+  EXPECT_NEAR(fit.slope(), 0.8, 1e-3);
+}
+
+TEST(SlopeFit, StaysWhereItIsWithoutForceOrPrior) {
+  SlopeFit fit(0.5, 0.01);
+  fit.set_slope(1.2);
+  for (int k = 0; k < 100; ++k) fit.add({0.5, 0, 0}, {0.3, 0, 0}, 0.016, std::nullopt);
+  EXPECT_NEAR(fit.slope(), 1.2, 1e-9);
+  for (int k = 0; k < 100; ++k) fit.add({0.5, 0, 0}, {0.005, 0, 0}, 0.016, 3);
+  EXPECT_NEAR(fit.slope(), 1.2, 1e-9);
+}
+
+TEST(SlopeFit, IsBounded) {
+  SlopeFit fit(0.5, 0.01);
+  for (int k = 0; k < 100; ++k) fit.add({9, 0, 0}, {0.3, 0, 0}, 0.016, 30);
+  EXPECT_EQ(fit.slope(), SlopeFit::kMost);
+  for (int k = 0; k < 100; ++k) fit.add({}, {0.3, 0, 0}, 0.016, 0);
+  EXPECT_EQ(fit.slope(), SlopeFit::kLeast);
+  fit.restart({}, {0.3, 0, 0});
+  EXPECT_EQ(fit.slope(), SlopeFit::kLeastAtOnce);
+  fit.restart({0.15, 0, 0}, {0.3, 0, 0});
+  EXPECT_NEAR(fit.slope(), 0.5, 1e-12);
+}
+
+TEST(PastStates, AreInterpolatedAndForgotten) {
+  PastStates past;
+  EXPECT_FALSE(past.at(1000));
+  for (std::uint64_t k = 1; k <= PastStates::kCapacity + 100; ++k) {
+    PastState state;
+    state.time_us = k * 1000;
+    state.depth_m = static_cast<double>(k);
+    past.add(state);
+  }
+  EXPECT_FALSE(past.at(100'000));
+  EXPECT_NEAR(past.at(101'000)->depth_m, 101, 1e-12);
+  EXPECT_NEAR(past.at(2'000'250)->depth_m, 2000.25, 1e-9);
+  EXPECT_NEAR(past.at(99'000'000)->depth_m, PastStates::kCapacity + 100, 1e-12);
+}
+
+TEST(LocalStop, IsAStiffDampedSpringFromWhereItBegan) {
+  LocalStop stop;
+  stop.begin({0, 0, -0.005}, {0, 0, 1}, 0.005, 0.3, 1000);
+  constexpr double kLong_s = 0.1;
+  EXPECT_NEAR(stop.step({0, 0, -0.005}, {0, 0, -0.05}, 1e-9), 0.3, 1e-6) << "begins undamped";
+  EXPECT_NEAR(stop.step({0, 0, -0.005}, {}, kLong_s), 0.3, 1e-12);
+  EXPECT_NEAR(stop.step({0.01, 0, -0.0052}, {}, kLong_s), 0.5, 1e-12);
+  EXPECT_NEAR(stop.step({0, 0, -0.0052}, {0, 0, -0.05}, kLong_s), 0.6, 1e-12);
+  EXPECT_EQ(stop.step({0, 0, 0.001}, {}, kLong_s), 0) << "above the surface";
+  EXPECT_EQ(stop.step({0, 0, -0.003}, {}, kLong_s), 0) << "it does not pull";
+}
+
+TEST(CutDrop, DropsThenComesBackUnconfirmed) {
+  CutDrop drop;
+  std::uint64_t now_us = 1'000'000;
+  const auto step = [&](double force_n) { return drop.step(force_n, 0.5, 0.05, now_us += 1000); };
+  EXPECT_EQ(step(0.4), 1);
+  step(0.6);
+  EXPECT_TRUE(drop.is_on());
+  for (int k = 0; k < 5; ++k) step(0.6);
+  EXPECT_NEAR(step(0.6), CutDrop::kLeft, 1e-12);
+  for (int k = 0; k < 130; ++k) step(0.6);
+  EXPECT_FALSE(drop.is_on()) << "after the answer's time and 80 ms";
+  for (int k = 0; k < 100; ++k) step(0.6);
+  EXPECT_NEAR(step(0.6), 1, 1e-2) << "it must fall below first";
+  step(0.4);
+  step(0.6);
+  EXPECT_TRUE(drop.is_on());
+  drop.confirm();
+  EXPECT_EQ(step(0.4), 1);
+}
+
+TEST(CutDrop, DoesNothingWithoutABlade) {
+  CutDrop drop;
+  EXPECT_EQ(drop.step(9, 0, 0.05, 1000), 1);
+}
+
+TEST(Newest, GivesTheNewestOnce) {
+  Newest<int> newest;
+  int value = 7;
+  EXPECT_FALSE(newest.take(value));
+  EXPECT_EQ(value, 7);
+  for (int k = 1; k <= 5; ++k) newest.put(k);
+  EXPECT_TRUE(newest.take(value));
+  EXPECT_EQ(value, 5);
+  EXPECT_FALSE(newest.take(value));
+}
+
+TEST(Newest, IsWholeBetweenThreads) {
+  struct Many {
+    std::array<std::uint64_t, 32> words{};
+  };
+  constexpr std::uint64_t kLast = 200'000;
+  Newest<Many> newest;
+  std::jthread writer([&] {
+    Many many;
+    for (std::uint64_t k = 1; k <= kLast; ++k) {
+      many.words.fill(k);
+      newest.put(many);
+    }
+  });
+  std::uint64_t last = 0;
+  while (last < kLast) {
+    Many many;
+    if (!newest.take(many)) continue;
+    ASSERT_GT(many.words[0], last);
+    last = many.words[0];
+    for (const auto word : many.words) ASSERT_EQ(word, last);
+  }
+}
+
+TEST(WakeStatistics, QuantilesAreWithinABin) {
+  WakeStatistics late;
+  EXPECT_EQ(late.quantile_us(0.5), 0);
+  for (int k = 1; k <= 1000; ++k) late.add(k);
+  EXPECT_NEAR(late.quantile_us(0.5) / 500, 1.05, 0.06);
+  EXPECT_NEAR(late.quantile_us(0.99) / 990, 1.05, 0.06);
+  EXPECT_EQ(late.count(), 1000u);
+}
+
+}  // namespace
+}  // namespace trocar::haptics
