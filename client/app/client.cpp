@@ -217,7 +217,8 @@ Result<ExitCode> Run::conclude(const Status& outcome) {
     }
   }
   const auto taken = take_screenshot(monotonic_ns(), true);
-  const auto written = write_summary();
+  auto written = write_trace(options_.trace_file, hands_.felt());
+  if (const auto summarised = write_summary(); written.ok()) written = summarised;
   if (!outcome.ok()) return outcome.error();
   if (!taken) return taken.error();
   if (!written) return written.error();
@@ -300,7 +301,8 @@ Result<std::vector<std::unique_ptr<FeltHand>>> open_devices(const ClientOptions&
     if (!opened) return Error{opened.error().code, "--device: " + opened.error().message};
     hands.push_back(std::make_unique<FeltHand>(
         std::move(*opened), tool::ToolShape{},
-        haptics::WorkspaceScale{options.device_motion, options.device_force}));
+        haptics::WorkspaceScale{options.device_motion, options.device_force},
+        !options.trace_file.empty()));
   }
   return hands;
 }

@@ -99,6 +99,8 @@ std::string default_name() {
 Status check(const ClientOptions& options) {
   if (!options.replay_file.empty() && !options.script_file.empty())
     return Error{ErrorCode::Usage, "--replay and --script: a recording takes no tools; choose one"};
+  if (!options.trace_file.empty() && options.devices.empty())
+    return Error{ErrorCode::Usage, "--hand-trace: is of devices; give --device too"};
   if (options.devices.size() > 2)
     return Error{ErrorCode::Usage, "--device: " + std::to_string(options.devices.size()) +
                                        " are given, and a participant has two hands"};
@@ -218,6 +220,9 @@ Result<std::optional<ClientOptions>> parse_client_command_line(int argc, char** 
       ->type_name("SCALE")
       ->check(CLI::Range(0.0, 10.0))
       ->capture_default_str();
+  app.add_option("--hand-trace", options.trace_file,
+                 "write what each device did and felt, a row for each millisecond (CSV)")
+      ->type_name("FILE");
   app.add_option("--replay", options.replay_file, "play a recorded session (.mcap)")
       ->type_name("FILE");
   app.add_option("--summary", options.summary_file, "write figures of the run as JSON at the end")

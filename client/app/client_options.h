@@ -46,6 +46,7 @@ struct ClientOptions {
   double seconds = 0;                   // 0: until the session ends
   double mark_at = -1, return_at = -1;  // instructor: seconds after joining; < 0: not
   std::string script_file, replay_file, summary_file;
+  std::string trace_file;            // of what devices did and felt
   std::vector<std::string> devices;  // as device::open_device; empty: the mouse or the script
   double device_motion = 1;          // of the tool over the device
   double device_force = 1;           // of the device over the tool

@@ -1,5 +1,10 @@
 #include "client/app/client_summary.h"
 
+#include <fmt/format.h>
+
+#include <fstream>
+#include <iterator>
+
 #include "common/base/json.h"
 
 namespace trocar::app {
@@ -38,6 +43,27 @@ Json to_json(const FeltFigures& hand) {
 }
 
 }  // namespace
+
+Status write_trace(const std::string& file, const std::vector<std::unique_ptr<FeltHand>>& hands) {
+  if (file.empty()) return {};
+  std::string text =
+      "tool,time_us,x_m,y_m,z_m,force_x_n,force_y_n,force_z_n,server_x_n,server_y_n,server_z_n,"
+      "patch_age_s,limits\n";
+  for (std::size_t tool = 0; tool < hands.size(); ++tool) {
+    const auto* trace = hands[tool]->stop();
+    for (const auto& row : trace->rows())
+      fmt::format_to(std::back_inserter(text), "{},{},{},{},{},{},{},{},{},{},{},{},{}\n", tool,
+                     row.time_us, row.tip_m.x, row.tip_m.y, row.tip_m.z, row.force_n.x,
+                     row.force_n.y, row.force_n.z, row.server_force_n.x, row.server_force_n.y,
+                     row.server_force_n.z, row.patch_age_s, row.limits);
+  }
+  std::ofstream out(file);
+  out << text;
+  out.close();
+  if (out) return {};
+  return Error{ErrorCode::ResourceMissing,
+               "--hand-trace: " + file + ": cannot be written; does the folder exist?"};
+}
 
 std::string to_json(const ClientSummary& summary, const replica::Replica& replica,
                     const replica::SourceStatistics& source) {

@@ -8,14 +8,16 @@ namespace trocar::app {
 namespace {
 
 constexpr std::uint64_t kShortestNs = 3'900'000, kKeepAliveNs = 20'000'000;
+constexpr std::size_t kMostRows = 600'000;
 constexpr double kDeadBand_m = 60e-6;
 constexpr float kDeadTurn = 0.999998f;  // of the cosine of half an angle: 4 mrad
 
 }  // namespace
 
 FeltHand::FeltHand(std::unique_ptr<device::HapticDevice> device, const tool::ToolShape& shape,
-                   const haptics::WorkspaceScale& scale)
+                   const haptics::WorkspaceScale& scale, bool has_trace)
     : device_(std::move(device)), shape_(shape), scale_(scale) {
+  if (has_trace) trace_ = std::make_unique<haptics::Trace>(kMostRows);
   figures_.device = device_->description();
 }
 
@@ -24,7 +26,7 @@ void FeltHand::start(const Vec3d& start_m) {
   settings.shape = shape_;
   settings.start_m = start_m;
   settings.scale = scale_;
-  hand_ = std::make_unique<haptics::Hand>(*device_, settings);
+  hand_ = std::make_unique<haptics::Hand>(*device_, settings, trace_.get());
   for (const auto& law : early_laws_) hand_->put(law);
   early_laws_.clear();
   loop_ = std::make_unique<haptics::Loop>(*hand_, haptics::LoopSettings{});
@@ -89,6 +91,13 @@ const FeltFigures& FeltHand::figures() {
     figures_.largest_force_n =
         std::max(figures_.largest_force_n, length(figures_.state.hand_force_n));
   return figures_;
+}
+
+const haptics::Trace* FeltHand::stop() {
+  if (loop_) loop_->stop();
+  if (trace_ && trace_->is_full())
+    log::warn("{}: the trace holds the first ten minutes only", figures_.device);
+  return trace_.get();
 }
 
 }  // namespace trocar::app

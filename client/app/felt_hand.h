@@ -15,7 +15,7 @@
 
 namespace trocar::app {
 
-// Of a run, for people and the summary.
+// People see these, and the summary has them.
 struct FeltFigures {
   std::string device;
   haptics::LoopTiming timing;
@@ -27,8 +27,9 @@ struct FeltFigures {
 
 class FeltHand {
  public:
+  // has_trace: each step is kept, for at most ten minutes.
   FeltHand(std::unique_ptr<device::HapticDevice> device, const tool::ToolShape& shape,
-           const haptics::WorkspaceScale& scale);
+           const haptics::WorkspaceScale& scale, bool has_trace);
 
   const tool::ToolShape& shape() const { return shape_; }
   bool is_started() const { return loop_ != nullptr; }
@@ -45,6 +46,8 @@ class FeltHand {
   Result<std::optional<haptics::HandReading>> pop_due(std::uint64_t now_ns);
 
   const FeltFigures& figures();
+  // Ends the loop; no force is left. Then the trace may be read; null: there is none.
+  const haptics::Trace* stop();
 
  private:
   bool is_due(const haptics::HandReading& reading, std::uint64_t now_ns) const;
@@ -53,6 +56,7 @@ class FeltHand {
   tool::ToolShape shape_;
   haptics::WorkspaceScale scale_;
   std::vector<wire::HapticLaw> early_laws_;
+  std::unique_ptr<haptics::Trace> trace_;
   std::unique_ptr<haptics::Hand> hand_;
   std::unique_ptr<haptics::Loop> loop_;
   haptics::HandReading reading_, sent_;

@@ -4,15 +4,13 @@
 
 #include "client/replica/client_messages.h"
 #include "common/math/box.h"
-#include "common/wire/haptic_messages.h"
-#include "proto/wire.pb.h"
 
 namespace trocar::app {
 namespace {
 
 constexpr double kBefore_m = 0.03, kApart_m = 0.06;
 
-// In front of the organ, several side by side.
+// Returns a place in front of the organ; several are side by side.
 Vec3d place_before(const replica::Topology& topology, std::size_t i, std::size_t count) {
   Box<float> box;
   for (const auto& place : topology.rest_positions) box.include(place);
@@ -53,18 +51,11 @@ std::vector<tool::ToolShape> Hands::shapes() const {
 
 void Hands::take(const proto::Envelope& message) {
   if (felt_.empty()) return;
-  if (message.has_haptic_law()) {
-    const auto law = wire::read(message.haptic_law());
-    if (!law) ++refused_messages_;
-    for (const auto& hand : felt_)
-      if (law) hand->take(*law);
-  }
-  for (const auto& received : message.haptic_patches().patch()) {
-    const auto patch = wire::read(received);
-    if (patch && patch->tool < felt_.size())
-      felt_[patch->tool]->take(*patch);
-    else
-      ++refused_messages_;
+  const auto news = replica::haptic_news(message);
+  refused_messages_ += news.refused;
+  for (std::size_t i = 0; i < felt_.size(); ++i) {
+    if (news.law) felt_[i]->take(*news.law);
+    if (news.patches[i]) felt_[i]->take(*news.patches[i]);
   }
 }
 

@@ -21,7 +21,7 @@ class Hands {
   Hands() = default;
   static Hands mouse(const tool::ToolShape& shape);
   static Hands scripted(tool::Script script);
-  // One tool for each device, at most two.
+  // Each device holds one tool; there are at most two.
   static Hands felt(std::vector<std::unique_ptr<FeltHand>> hands);
 
   // Returns the tools to offer when joining.

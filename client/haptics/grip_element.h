@@ -26,7 +26,9 @@ class GripElement {
     pull_ += growth;
     stretch_m_ = stretch_m;
     const double mean = (stiffness_.xx + stiffness_.yy + stiffness_.zz) / 3;
-    const Response response{0, -element_.step(steps, pull_, is_started_ ? growth : Vec3d{}), mean};
+    Response response;
+    response.rest_n = -element_.step(steps, pull_, is_started_ ? growth : Vec3d{});
+    response.stiffness_n_m = mean;
     is_started_ = true;
     return response;
   }

@@ -29,12 +29,13 @@ bool is_sound(const device::DeviceReading& reading) {
 
 }  // namespace
 
-Hand::Hand(device::HapticDevice& device, const HandSettings& settings)
+Hand::Hand(device::HapticDevice& device, const HandSettings& settings, Trace* trace)
     : device_(device),
       settings_(settings),
       workspace_(settings.start_m, settings.scale),
       model_(settings.shape, settings_for(settings, device.limits())),
       safety_(device.limits(), settings.safety),
+      trace_(trace),
       laws_(kWaitingLaws) {}
 
 void Hand::take_messages(std::uint64_t now_us) {
@@ -98,6 +99,10 @@ Status Hand::step(std::uint64_t now_us) {
   state_.patches = model_.counts();
   ++state_.steps;
   states_.put(state_);
+  if (trace_)
+    trace_->add({now_us, to_float(state_.reading.tip_m), to_float(safe.force_n),
+                 to_float(state_.server_force_n), static_cast<float>(state_.patch_age_s),
+                 safe.limits});
   return written;
 }
 

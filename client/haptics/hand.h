@@ -14,6 +14,7 @@
 #include "client/device/haptic_device.h"
 #include "client/haptics/safety.h"
 #include "client/haptics/touch_model.h"
+#include "client/haptics/trace.h"
 #include "client/haptics/workspace.h"
 #include "common/base/newest.h"
 #include "common/base/result.h"
@@ -57,7 +58,8 @@ struct HandState {
 
 class Hand {
  public:
-  Hand(device::HapticDevice& device, const HandSettings& settings);
+  // trace: gets a row in each step; null: none. It outlives the hand.
+  Hand(device::HapticDevice& device, const HandSettings& settings, Trace* trace = nullptr);
 
   void put(const wire::HapticPatch& patch) { patches_.put(patch); }
   // False: too many came at once, try again later.
@@ -84,6 +86,7 @@ class Hand {
   Workspace workspace_;
   TouchModel model_;
   Safety safety_;
+  Trace* const trace_;
 
   Newest<wire::HapticPatch> patches_;
   SpscQueue<wire::HapticLaw> laws_;

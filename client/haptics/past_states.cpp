@@ -37,6 +37,7 @@ std::optional<PastState> PastStates::at(std::uint64_t time_us) const {
   state.clearance_m = between(state.clearance_m, next.clearance_m, share);
   state.depth_m = between(state.depth_m, next.depth_m, share);
   state.grip_point_m = between(state.grip_point_m, next.grip_point_m, share);
+  state.response.elastic_n = between(state.response.elastic_n, next.response.elastic_n, share);
   state.response.normal_n = between(state.response.normal_n, next.response.normal_n, share);
   state.response.rest_n = between(state.response.rest_n, next.response.rest_n, share);
   state.response.stiffness_n_m =

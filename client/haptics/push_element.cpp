@@ -28,7 +28,8 @@ Response PushElement::step(const PowerLaw& law, const ViscoSteps& steps, double 
 
   Response response;
   response.stiffness_n_m = law.stiffness_n_m(std::max(depth, PowerLaw::kLinearDepth_m));
-  if (depth_m > 0) response.normal_n = std::max(force, 0.0);
+  if (depth_m > 0) response.normal_n = force;
+  response.elastic_n = law.force_n(depth);
   const bool touched = touches_;
   touches_ = response.normal_n > 0;
   if (touches_) {

@@ -16,7 +16,9 @@ inline constexpr double kAcrossOverNormal = 0.72;
 
 // Local tissue answers this, before it is scaled to what the server says.
 struct Response {
-  double normal_n = 0;       // along the outward normal, never negative
+  // Along the outward normal. Relaxed tissue that is let go lags behind: then this is negative.
+  double normal_n = 0;
+  double elastic_n = 0;      // likewise if nothing relaxed; 0: above the surface
   Vec3d rest_n;              // across the normal; of held tissue all of it
   double stiffness_n_m = 0;  // elastic, before anything relaxes
 };

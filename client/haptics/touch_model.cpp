@@ -84,7 +84,7 @@ TouchOutput TouchModel::step(const TouchInput& input) {
   if (grips()) force_n *= held_share_;
   output_.force_n = force_n;
   output_.torque_nm = lever_m_ * length(force_n);
-  output_.touches = grips() || response.normal_n > 0 || stop_.is_on();
+  output_.touches = grips() || length(force_n) > 0 || stop_.is_on();
   output_.stiffness_n_m = stop_.is_on() ? stop_.stiffness_n_m() : slope_ * response.stiffness_n_m;
   return output_;
 }
@@ -108,8 +108,7 @@ void TouchModel::watch_jaws(const TouchInput& input, double dt_s) {
 
 Vec3d TouchModel::corrected_force(const Response& response) const {
   double gate = 1;
-  if (!grips())
-    gate = std::clamp(slope_ * response.normal_n / (settings_.gate * gate_force_n_), 0.0, 1.0);
+  if (!grips()) gate = std::clamp(response.elastic_n / (settings_.gate * gate_force_n_), 0.0, 1.0);
   return model_force(response) * slope_ + correction_n_ * gate;
 }
 
@@ -118,7 +117,7 @@ Vec3d TouchModel::limited_force(const Vec3d& force_n, const Response& response) 
     const double limit_n = patch_.grip_limit_n;
     return limit_n > 0 ? shortened(force_n, limit_n) : force_n;
   }
-  if (response.normal_n <= 0) return {};
+  if (response.elastic_n <= 0) return {};
   double along_n = std::max(0.0, dot(force_n, normal_));
   if (patch_.pressed_limit_n > 0)
     along_n = std::min(along_n, static_cast<double>(patch_.pressed_limit_n));

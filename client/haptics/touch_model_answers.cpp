@@ -183,7 +183,7 @@ void TouchModel::restart(std::size_t first) {
   next_correction_n_ = {};
   if (touches(patch_.kind))
     next_correction_n_ = trocar::to_double(patch_.force_n) - model_force(then) * slope_;
-  gate_force_n_ = std::max(kLeastGateForce_n, slope_ * then.normal_n);
+  gate_force_n_ = std::max(kLeastGateForce_n, then.elastic_n);
   keep_force(past_[past_.end() - 1].response);
 }
 
@@ -195,10 +195,10 @@ Response TouchModel::with_moved_reference(const PastState& then) const {
   if (grips()) {
     const Vec3d moved_m = grip_point_m_ - then.grip_point_m;
     response.rest_n += grip_.stiffness() * moved_m * share;
-  } else if (response.normal_n > 0) {
+  } else if (response.elastic_n > 0) {
     const double deeper_m = depth_of(then.core_m, then.clearance_m) - then.depth_m;
-    response.normal_n =
-        std::max(0.0, response.normal_n + response.stiffness_n_m * deeper_m * share);
+    response.normal_n += response.stiffness_n_m * deeper_m * share;
+    response.elastic_n = std::max(0.0, response.elastic_n + response.stiffness_n_m * deeper_m);
     response.rest_n = response.rest_n - normal_ * dot(response.rest_n, normal_);
   }
   return response;
@@ -209,7 +209,7 @@ void TouchModel::correct(const PastState& then, bool is_new_structure) {
   // Tissue that the server's tool does not touch has given way where the local model presses.
   const bool touched = touches(patch_.kind);
   const Response response = with_moved_reference(then);
-  if (!touched && response.normal_n <= 0) {
+  if (!touched && response.elastic_n <= 0) {
     next_correction_n_ = {};
     return;
   }
@@ -227,7 +227,7 @@ void TouchModel::correct(const PastState& then, bool is_new_structure) {
   }
   if (!grips()) materials_[material_].slope = fit_.slope();
   next_correction_n_ = server_n - local_n * fit_.slope();
-  gate_force_n_ = std::max(kLeastGateForce_n, fit_.slope() * response.normal_n);
+  gate_force_n_ = std::max(kLeastGateForce_n, response.elastic_n);
   if (const double force_n = length(server_n); force_n > kLeastGateForce_n)
     next_lever_m_ = trocar::to_double(patch_.torque_nm) / force_n;
   if (is_new_structure && cut_drop_.is_on() && patch_.echo_time_us >= cut_drop_.since_us()) {

@@ -1,5 +1,6 @@
 #include "client/replica/client_messages.h"
 
+#include "common/wire/haptic_messages.h"
 #include "proto/wire.pb.h"
 
 namespace trocar::replica {
@@ -21,6 +22,25 @@ bool send_tool_sample(SessionSource& source, std::uint32_t tool, std::uint32_t s
   message.set_verb(static_cast<proto::Verb>(sample.verb));
   message.set_client_time_us(time_us);
   return source.send(envelope);
+}
+
+HapticNews haptic_news(const proto::Envelope& message) {
+  HapticNews news;
+  if (message.has_haptic_law()) {
+    const auto law = wire::read(message.haptic_law());
+    if (law)
+      news.law = *law;
+    else
+      ++news.refused;
+  }
+  for (const auto& received : message.haptic_patches().patch()) {
+    const auto patch = wire::read(received);
+    if (patch)
+      news.patches[patch->tool] = *patch;
+    else
+      ++news.refused;
+  }
+  return news;
 }
 
 bool ask_for_mark(SessionSource& source, bool is_return) {

@@ -30,7 +30,7 @@ class Newest {
     return slots_[readers_];
   }
 
-  // Likewise. False: nothing came since the last call, `value` is as it was.
+  // Takes the newest likewise. False: nothing came since the last call, `value` is as it was.
   bool take(Value& value) {
     if ((between_.load(std::memory_order_relaxed) & kIsNew) == 0) return false;
     value = newest();

@@ -12,6 +12,7 @@
 #include "common/secure/join_code.h"
 #include "common/tool/script.h"
 #include "common/wire/framing.h"
+#include "common/wire/haptic_messages.h"
 #include "common/wire/surface_codec.h"
 #include "common/wire/surface_messages.h"
 #include "common/wire/surface_slices.h"
@@ -44,6 +45,24 @@ bool checked(const Result<T>& result) {
 
 std::string_view text_of(BytesView bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+// A client's hand takes these from a server; they are written and read again alike.
+bool decode_haptics(BytesView bytes) {
+  proto::Envelope envelope;
+  if (!checked(wire::decode_envelope(bytes, envelope))) return false;
+  const auto is_read = [](const auto& message) {
+    const auto value = wire::read(message);
+    if (!checked(value)) return false;
+    std::remove_cvref_t<decltype(message)> again;
+    wire::write(*value, again);
+    TROCAR_ASSERT(wire::read(again).ok());
+    return true;
+  };
+  if (envelope.has_haptic_law()) return is_read(envelope.haptic_law());
+  bool are_read = envelope.haptic_patches().patch_size() > 0;
+  for (const auto& patch : envelope.haptic_patches().patch()) are_read &= is_read(patch);
+  return are_read;
 }
 
 bool decode_envelope(BytesView bytes) {
@@ -205,6 +224,7 @@ bool decode_codes(BytesView bytes) {
 
 constexpr Decoder kDecoders[] = {
     {"envelope", decode_envelope},
+    {"haptics", decode_haptics},
     {"surface_codec", decode_surface},
     {"surface_slice", decode_surface_slice},
     {"handshake", decode_handshake},

@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include "common/secure/datagram_channel.h"
+#include "common/wire/haptic_messages.h"
 #include "common/wire/surface_messages.h"
 #include "common/wire/surface_slices.h"
 #include "proto/wire.pb.h"
@@ -108,6 +109,24 @@ void save_envelopes() {
   save("envelope", "client_datagram", datagram);
 }
 
+void save_haptics() {
+  proto::Envelope law;
+  wire::HapticLaw liver;
+  liver.relaxation[0] = {0.5f, 0.6f};
+  liver.fast[0] = {1.2f, 0.002f};
+  wire::write(liver, *law.mutable_haptic_law());
+  save("haptics", "law", law);
+  proto::Envelope patches;
+  wire::HapticPatch patch;
+  for (const auto kind : {wire::TouchKind::Free, wire::TouchKind::Grip}) {
+    patch.kind = kind;
+    patch.echo_time_us = 1'000'000;
+    patch.has_stiffness = true;
+    wire::write(patch, *patches.mutable_haptic_patches()->add_patch());
+  }
+  save("haptics", "patches", patches);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -118,6 +137,7 @@ int main(int argc, char** argv) {
   root = argv[1];
   save_surfaces();
   save_envelopes();
+  save_haptics();
   save_slices();
   save_handshakes();
   const auto block = reduce::testing::block(3, 3, 3);

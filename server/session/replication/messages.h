@@ -57,7 +57,7 @@ wire::SharedBytes encode_ghost(const ghost::GhostReport& report);
 wire::SharedBytes encode_no_ghost();
 wire::SharedBytes encode_recording(const wire::RecordingState& state);
 wire::SharedBytes encode_haptic_law(const wire::HapticLaw& law);
-// What the tools of one participant feel, as of a frame; null: none of them has a hand that feels.
+// Returns what the tools of one participant feel in a frame; null: no hand feels any of them.
 wire::SharedBytes encode_touch(const step::PublishedFrame& frame, ParticipantSlot slot);
 wire::SharedBytes encode_barrier(const step::PublishedFrame& frame);
 wire::SharedBytes encode_pong(std::uint64_t client_time_us, Tick tick,

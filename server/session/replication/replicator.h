@@ -158,7 +158,7 @@ class Replicator final : public net::ConnectionHandler {
   // True if the client has the newest frame afterwards, or it is on its way. `is_required`: do not
   // skip.
   bool give_frame(Client& client, bool is_required);
-  // What its tools feel as of the newest frame, if a hand feels them.
+  // Tells it what its tools feel in the newest frame, if a hand feels them.
   void give_touch(Client& client);
   void end_session(Client& client, const Ending& ending);
   void leave(Client& client);

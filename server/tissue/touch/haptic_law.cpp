@@ -6,7 +6,7 @@
 namespace trocar::touch {
 namespace {
 
-// What a palpated liver of measured material showed: the force grows with this power of the depth,
+// A palpated liver of measured material showed this: the force grows with this power of the depth,
 // and tissue that gives way slowly adds these shares of the stiffness at once.
 constexpr float kExponent = 1.3f;
 constexpr wire::HapticLaw::Term kFast[] = {{1.2f, 0.002f}, {0.4f, 0.010f}};

@@ -104,8 +104,7 @@ void TouchTable::describe_surface(const Scene& scene, const hands::Tool& tool, T
   const Vec3f place = tool.pose.position + shaft * touch.along_m;
   if (!is_touching(touch.kind)) {
     touch.along_m = 0;
-    surface.clear();
-    surface.take(scene.world, layout, place);
+    surface.settle(scene.world, layout, place);
   } else if (!surface.is_known() || surface.has_changed(layout, place)) {
     if (surface.is_known()) touch.structure = static_cast<std::uint32_t>(scene.world.tick);
     surface.clear();
@@ -126,9 +125,10 @@ void TouchTable::describe_surface(const Scene& scene, const hands::Tool& tool, T
     node = scene.world.origins[node.value - law_of_node_.size()].a;
   touch.law = law_of_node_[node.value];
   const auto& law = laws_[touch.law];
-  // The tip is there when the tool just touches: a capsule's radius away from its core.
-  const float core_m = std::max(touch.along_m, tool.shape.radius_m);
-  patch.plane_point_m = point + normal * (tool.shape.radius_m - dot(normal, shaft) * core_m);
+  // Clients measure the depth of the round tip. Where the shaft touches, the plane is brought
+  // there.
+  const float beyond_tip = std::max(0.0f, touch.along_m - tool.shape.radius_m);
+  patch.plane_point_m = point - normal * (dot(normal, shaft) * beyond_tip);
   patch.plane_normal = normal;
   const float depth = dot(normal, patch.plane_point_m - tool.pose.position);
   if (!is_touching(touch.kind)) {

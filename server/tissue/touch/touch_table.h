@@ -1,7 +1,7 @@
 #pragma once
 
-// What each tool feels, for a client that renders its force between two frames. Nothing of this is
-// state: it follows from the ticks since the tool came near.
+// The table says what each tool feels, for a client that renders its force between two frames.
+// Nothing of this is state: it follows from the ticks since the tool came near.
 
 #include <array>
 #include <vector>

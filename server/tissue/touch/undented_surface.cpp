@@ -13,7 +13,8 @@ constexpr float kRing_m = 0.015f;  // the ring around a dent begins here and end
 // More is taken when the tool has slid so far from where the surface was taken.
 constexpr float kSlid_m = 0.008f;
 constexpr float kForgotten = 0.008f;  // per frame: two seconds
-constexpr float kNoise = 0.0025f;     // N^2; forces that vary less leave the guess of sinking
+constexpr float kSettled = 0.0016f;   // per frame: ten seconds, in which relaxed tissue comes back
+constexpr float kNoise = 0.0004f;     // N^2; forces that vary less leave the guess of sinking
 
 bool is_within(const Vec3f& a, const Vec3f& b, float distance) {
   const Vec3f d = a - b;
@@ -44,13 +45,35 @@ void UndentedSurface::take(const world::World& world, const wire::SurfaceLayout&
       triangle.at[k] = world.position(triangle.nodes[k]) - moved_;
     }
     if (!is_within(triangle.at[0], centre - moved_, kReach_m)) continue;
-    // What was taken before the tool was there is kept.
+    // A place that was taken before the tool was there is kept.
     if (old != kept_.end() && old->number == number) triangle.at = old->at;
-    const auto& at = triangle.at;
-    triangle.centre = (at[0] + at[1] + at[2]) * (1.0f / 3);
-    triangle.normal = cross(at[1] - at[0], at[2] - at[0]);
+    shape(triangle);
     triangles_.push_back(triangle);
   }
+}
+
+void UndentedSurface::shape(Triangle& triangle) {
+  const auto& at = triangle.at;
+  triangle.centre = (at[0] + at[1] + at[2]) * (1.0f / 3);
+  triangle.normal = cross(at[1] - at[0], at[2] - at[0]);
+}
+
+void UndentedSurface::settle(const world::World& world, const wire::SurfaceLayout& layout,
+                             const Vec3f& place) {
+  if (!is_known() || has_changed(layout, place)) {
+    clear();
+    return take(world, layout, place);
+  }
+  for (auto& triangle : triangles_) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vec3f at = triangle.at[k] + moved_;
+      triangle.at[k] = at + (world.position(triangle.nodes[k]) - at) * kSettled;
+    }
+    shape(triangle);
+  }
+  moved_ = {};
+  force_ = motion_ = 0;  // how far it sinks per force is remembered
+  if (!is_within(place, centre_, kSlid_m)) take(world, layout, place);
 }
 
 bool UndentedSurface::has_changed(const wire::SurfaceLayout& layout, const Vec3f& place) const {

@@ -25,6 +25,9 @@ class UndentedSurface {
 
   // Takes the surface around `centre` as it is now. O(triangles of the surface).
   void take(const world::World& world, const wire::SurfaceLayout& layout, const Vec3f& centre);
+  // Once a frame while the tool is near and does not touch: what was taken follows the surface
+  // slowly. A dent that a tool has left fills up meanwhile, and is none of the surface's own shape.
+  void settle(const world::World& world, const wire::SurfaceLayout& layout, const Vec3f& place);
   void clear();
   bool is_known() const { return !triangles_.empty(); }
   // Whether a triangle near `place` is gone: the surface there is another one.
@@ -47,6 +50,7 @@ class UndentedSurface {
     Vec3f centre, normal;     // as it was taken; the normal times twice the area
   };
 
+  static void shape(Triangle& triangle);
   Vec3f ring_motion(const world::World& world, const Vec3f& place) const;
 
   std::vector<Triangle> triangles_, kept_;  // ascending numbers
