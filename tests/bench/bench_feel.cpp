@@ -10,6 +10,7 @@
 #include <cmath>
 #include <complex>
 #include <cstdio>
+#include <cstdlib>
 #include <fstream>
 #include <numbers>
 #include <optional>
@@ -226,10 +227,13 @@ std::optional<std::vector<Row>> run(const Condition& condition, const std::strin
                                     const fs::path& folder, double contact_m) {
   fs::remove_all(folder);
   fs::create_directories(folder);
+  fs::permissions(folder, fs::perms::owner_all);
+  setenv("XDG_STATE_HOME", (folder / "state").c_str(), 1);
+  setenv("XDG_RUNTIME_DIR", folder.c_str(), 1);
   std::ofstream(folder / "path.txt") << path_of(contact_m);
   Program server("trocar-server",
-                 {"--insecure-loopback", "--organ", organ, "--listen", "127.0.0.1:0", "--journal",
-                  "none", "--ready-file", (folder / "port").string()},
+                 {"--organ", organ, "--listen", "127.0.0.1:0", "--journal", "none", "--ready-file",
+                  (folder / "port").string()},
                  folder / "server.log");
   const auto port = read_line(folder / "port");
   if (!port) return std::nullopt;
@@ -240,8 +244,9 @@ std::optional<std::vector<Row>> run(const Condition& condition, const std::strin
                   folder / "network.log");
   const auto way = read_line(folder / "way");
   if (!way) return std::nullopt;
-  std::vector<std::string> arguments{"--insecure-loopback",
-                                     "--server",
+  // The link file that the client joins with is found by port: it is that of the way there, too.
+  fs::copy_file(folder / "trocar" / (*port + ".json"), folder / "trocar" / (*way + ".json"));
+  std::vector<std::string> arguments{"--server",
                                      "127.0.0.1:" + *way,
                                      "--no-render",
                                      "--name",
@@ -306,6 +311,9 @@ int main(int argc, char** argv) {
   app.add_option("--out", out, "where traces and logs go")->capture_default_str();
   app.add_option("--organ", organ_name, "as trocar-server's")->capture_default_str();
   app.add_flag("--short", is_short, "two networks");
+  Condition own;
+  auto* trip = app.add_option("--round-trip", own.round_trip_ms, "this network alone, ms");
+  app.add_option("--loss", own.loss_percent, "of it, percent")->needs(trip);
   CLI11_PARSE(app, argc, argv);
   const auto organ = organ::Organ(*catalogue::load_organ(organ_name));
   Box<float> box;
@@ -316,6 +324,7 @@ int main(int argc, char** argv) {
   std::vector<Condition> conditions{{0, 0}, {100, 1}};
   if (!is_short)
     conditions = {{0, 1}, {20, 1}, {50, 1}, {100, 1}, {100, 0}, {100, 5}, {150, 1}, {50, 1, false}};
+  if (trip->count() > 0) conditions = {own};
   std::printf(
       "| round trip (ms) | lost (%%) | path | motion | rms (%%) | steady (%%) | gain | phase (deg) "
       "| "
