@@ -12,9 +12,9 @@ constexpr float kReach_m = 0.030f;
 constexpr float kRing_m = 0.015f;  // the ring around a dent begins here and ends at the reach
 // More is taken when the tool has slid so far from where the surface was taken.
 constexpr float kSlid_m = 0.008f;
-constexpr float kForgotten = 0.008f;  // per frame: two seconds
-constexpr float kSettled = 0.0016f;   // per frame: ten seconds, in which relaxed tissue comes back
-constexpr float kNoise = 0.0004f;     // N^2; forces that vary less leave the guess of sinking
+constexpr float kForgottenPerFrame = 0.008f;  // per frame: two seconds
+constexpr float kSettled = 0.0016f;  // per frame: ten seconds, in which relaxed tissue comes back
+constexpr float kForceNoise = 0.0004f;  // N^2; forces that vary less leave the guess of sinking
 
 bool is_within(const Vec3f& a, const Vec3f& b, float distance) {
   const Vec3f d = a - b;
@@ -103,12 +103,13 @@ void UndentedSurface::follow(const world::World& world, const wire::SurfaceLayou
   const Vec3f ring = ring_motion(world, place);
   const float force = dot(force_n, normal), motion = dot(ring, normal);
   const float df = force - force_, du = motion - motion_;
-  force_ += kForgotten * df;
-  motion_ += kForgotten * du;
-  variance_ += kForgotten * ((1 - kForgotten) * df * df - variance_);
-  covariance_ += kForgotten * ((1 - kForgotten) * df * du - covariance_);
+  force_ += kForgottenPerFrame * df;
+  motion_ += kForgottenPerFrame * du;
+  variance_ += kForgottenPerFrame * ((1 - kForgottenPerFrame) * df * df - variance_);
+  covariance_ += kForgottenPerFrame * ((1 - kForgottenPerFrame) * df * du - covariance_);
   // The tissue sinks against the force on the tool; it never rises with it.
-  const float sinks = std::max(0.0f, (kNoise * sinks_m_n - covariance_) / (kNoise + variance_));
+  const float sinks =
+      std::max(0.0f, (kForceNoise * sinks_m_n - covariance_) / (kForceNoise + variance_));
   moved_ = ring + normal * (sinks * force);
   if (!is_within(place, centre_, kSlid_m)) take(world, layout, place);
 }
