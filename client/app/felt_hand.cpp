@@ -55,10 +55,6 @@ void FeltHand::take(const wire::HapticPatch& patch) {
       std::max(figures_.largest_server_force_n, length(to_double(patch.force_n)));
 }
 
-void FeltHand::set_view(const Quatf& world_from_device) {
-  if (hand_) hand_->put_view(world_from_device);
-}
-
 bool FeltHand::is_due(const haptics::HandReading& reading, std::uint64_t now_ns) const {
   if (sent_.time_us == 0) return true;
   if (now_ns - sent_ns_ < kShortestNs && reading.verb == sent_.verb) return false;

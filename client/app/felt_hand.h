@@ -39,7 +39,6 @@ class FeltHand {
   // Before the start, too. Patches of before the start are dropped.
   void take(const wire::HapticLaw& law);
   void take(const wire::HapticPatch& patch);
-  void set_view(const Quatf& world_from_device);
 
   // The reading that is due at the server: at most every 4 ms; when the hand rests, every 20 ms.
   // An error: the device is gone.

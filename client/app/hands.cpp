@@ -59,10 +59,6 @@ void Hands::take(const proto::Envelope& message) {
   }
 }
 
-void Hands::set_view(const Quatf& world_from_device) {
-  for (const auto& hand : felt_) hand->set_view(world_from_device);
-}
-
 Status Hands::send_felt(const replica::Replica& replica, replica::SessionSource& source,
                         std::uint64_t now_ns) {
   for (std::size_t i = 0; i < felt_.size(); ++i) {

@@ -30,8 +30,6 @@ class Hands {
   // HapticPatches and HapticLaw; what is not as it may be is dropped and counted.
   void take(const proto::Envelope& message);
   std::uint64_t refused_messages() const { return refused_messages_; }
-  // How the camera looks: devices move as the person sees.
-  void set_view(const Quatf& world_from_device);
   device::MouseTool* mouse_tool() { return mouse_ ? &*mouse_ : nullptr; }
 
   // Sends what is due. A script begins with the first frame this client shows and runs in simulated
