@@ -1,11 +1,12 @@
 # project_library(<folder> ABOUT "What it is for." SOURCES a.cpp... HEADERS a.h... DEPENDS common/base...
-#                 USES server/x... LINK pkg...)
+#                 USES server/x... LINK pkg... [JOINED])
 # One folder, one static library: target trocar_<folder with _>, alias trocar::<folder with _>.
 # ABOUT is the folder's line in docs/folders.md. DEPENDS names the folders that its headers include
 # (public), USES those that only its sources include (private), LINK third-party targets (public).
-# tests/architecture compares DEPENDS and USES with the sources.
+# tests/architecture compares DEPENDS and USES with the sources. JOINED: its sources are compiled
+# together, where the headers of what they use (Eigen, toml++) take longest.
 function(project_library folder)
-  cmake_parse_arguments(PARSE_ARGV 1 ARG "" "ABOUT" "SOURCES;HEADERS;DEPENDS;USES;LINK")
+  cmake_parse_arguments(PARSE_ARGV 1 ARG "JOINED" "ABOUT" "SOURCES;HEADERS;DEPENDS;USES;LINK")
   if(ARG_UNPARSED_ARGUMENTS)
     message(FATAL_ERROR "project_library(${folder}): unknown arguments ${ARG_UNPARSED_ARGUMENTS}")
   endif()
@@ -24,7 +25,9 @@ function(project_library folder)
       FILES ${lone_headers})
   endif()
   set_property(GLOBAL APPEND PROPERTY TROCAR_LIBRARIES trocar_${name})
-  set_target_properties(trocar_${name} PROPERTIES UNITY_BUILD ${TROCAR_UNITY})
+  if(ARG_JOINED OR TROCAR_UNITY)
+    set_target_properties(trocar_${name} PROPERTIES UNITY_BUILD ON)
+  endif()
   target_link_libraries(trocar_${name} PUBLIC trocar_options)
   foreach(dependency IN LISTS ARG_DEPENDS)
     string(REPLACE "/" "_" dependency_name ${dependency})
@@ -38,10 +41,11 @@ function(project_library folder)
 endfunction()
 
 # project_program(<name> [ABOUT "What its folder is for."] MAIN file.cpp DEPENDS folder... LINK target...): one executable in
-# build/<preset>/bin. DEPENDS names the folders that its files include.
+# build/<preset>/bin. DEPENDS names the folders that its files include. Its files are compiled together.
 function(project_program name)
   cmake_parse_arguments(PARSE_ARGV 1 ARG "" "ABOUT" "MAIN;DEPENDS;LINK")
   add_executable(${name} ${ARG_MAIN})
+  set_target_properties(${name} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 12)
   target_link_libraries(${name} PRIVATE trocar_options ${ARG_LINK})
   foreach(dependency IN LISTS ARG_DEPENDS)
     string(REPLACE "/" "_" dependency_name ${dependency})

@@ -1,15 +1,19 @@
-# project_test(<name> SOURCES x_test.cpp... DEPENDS folder... [LINK target...] [SANITIZED] [ALONE]): a
+# project_test(<name> SOURCES x_test.cpp... DEPENDS folder... [LINK target...] [SANITIZED] [ALONE] [APART]): a
 # GoogleTest program; each of its tests becomes one ctest test. SANITIZED: deploy/test runs it a second
 # time with address and undefined-behaviour sanitizers; for what reads outside data. ALONE: no other
-# test runs beside it; for sessions in real time.
+# test runs beside it; for sessions in real time. Its sources are compiled together, a dozen at a time,
+# because their headers take longest. APART: one by one, where they define the same names.
 add_custom_target(sanitized_tests)
 function(project_test name)
-  cmake_parse_arguments(ARG "SANITIZED;ALONE" "TIMEOUT" "SOURCES;DEPENDS;LINK" ${ARGN})
+  cmake_parse_arguments(ARG "SANITIZED;ALONE;APART" "TIMEOUT" "SOURCES;DEPENDS;LINK" ${ARGN})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 300)
   endif()
   add_executable(${name} ${ARG_SOURCES})
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/tests")
+  if(NOT ARG_APART)
+    set_target_properties(${name} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 12)
+  endif()
   target_link_libraries(${name} PRIVATE trocar_options GTest::gtest_main ${ARG_LINK})
   foreach(dependency IN LISTS ARG_DEPENDS)
     string(REPLACE "/" "_" dependency_name ${dependency})

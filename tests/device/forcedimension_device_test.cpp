@@ -13,7 +13,7 @@ namespace {
 
 using testing::eventually;
 
-const std::vector<std::string> kLibrary{"libdhd-that-is-not-there.so", FAKE_DHD};
+const std::vector<std::string> kDhdLibrary{"libdhd-that-is-not-there.so", FAKE_DHD};
 
 class ForceDimensionTest : public ::testing::Test {
  protected:
@@ -25,7 +25,7 @@ class ForceDimensionTest : public ::testing::Test {
     fake_ = new (access()) testing::FakeDhd;
   }
   std::unique_ptr<HapticDevice> open() {
-    auto opened = ForceDimensionDevice::open(kLibrary, 0);
+    auto opened = ForceDimensionDevice::open(kDhdLibrary, 0);
     EXPECT_TRUE(opened.ok()) << opened.error().message;
     await_exchanges();
     return std::move(*opened);
@@ -176,13 +176,13 @@ TEST_F(ForceDimensionTest, WhatCannotBeOpenedSaysWhy) {
   };
   EXPECT_TRUE(fails({"libdhd-that-is-not-there.so"}, 0, ErrorCode::ResourceMissing));
   EXPECT_TRUE(fails({FAKE_DHD_OLD}, 0, ErrorCode::Mismatch)) << "a function is missing";
-  EXPECT_TRUE(fails(kLibrary, 1, ErrorCode::ResourceMissing));
-  EXPECT_TRUE(fails(kLibrary, -1, ErrorCode::ResourceMissing));
+  EXPECT_TRUE(fails(kDhdLibrary, 1, ErrorCode::ResourceMissing));
+  EXPECT_TRUE(fails(kDhdLibrary, -1, ErrorCode::ResourceMissing));
   fake_->may_open = false;
-  EXPECT_TRUE(fails(kLibrary, 0, ErrorCode::ResourceMissing));
+  EXPECT_TRUE(fails(kDhdLibrary, 0, ErrorCode::ResourceMissing));
   fake_->device_count = -1;
-  EXPECT_TRUE(fails(kLibrary, 0, ErrorCode::ResourceMissing));
-  EXPECT_EQ(ForceDimensionDevice::count(kLibrary).value(), 0);
+  EXPECT_TRUE(fails(kDhdLibrary, 0, ErrorCode::ResourceMissing));
+  EXPECT_EQ(ForceDimensionDevice::count(kDhdLibrary).value(), 0);
 }
 
 }  // namespace

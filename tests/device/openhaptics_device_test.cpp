@@ -13,7 +13,7 @@ namespace {
 
 using testing::eventually;
 
-const std::vector<std::string> kLibrary{"libHD-that-is-not-there.so", FAKE_HD};
+const std::vector<std::string> kHdLibrary{"libHD-that-is-not-there.so", FAKE_HD};
 constexpr unsigned kCommunicationError = 0x0302, kWarmMotors = 0x0200;
 
 class OpenHapticsTest : public ::testing::Test {
@@ -27,7 +27,7 @@ class OpenHapticsTest : public ::testing::Test {
     set_position(10, 10, 10);
   }
   std::unique_ptr<HapticDevice> open() {
-    auto opened = OpenHapticsDevice::open(kLibrary, OpenHapticsDevice::kDefaultDevice);
+    auto opened = OpenHapticsDevice::open(kHdLibrary, OpenHapticsDevice::kDefaultDevice);
     EXPECT_TRUE(opened.ok()) << opened.error().message;
     await_frames();
     return std::move(*opened);
@@ -171,11 +171,11 @@ TEST_F(OpenHapticsTest, WhatCannotBeOpenedSaysWhy) {
   EXPECT_TRUE(fails({"libHD-that-is-not-there.so"}, ErrorCode::ResourceMissing));
   EXPECT_TRUE(fails({FAKE_HD_OLD}, ErrorCode::Mismatch)) << "a function is missing";
   fake_->init_error = kCommunicationError;
-  EXPECT_TRUE(fails(kLibrary, ErrorCode::ResourceMissing));
+  EXPECT_TRUE(fails(kHdLibrary, ErrorCode::ResourceMissing));
   EXPECT_FALSE(fake_->is_default_device);
   fake_->init_error = 0;
   fake_->start_error = 0x0304;
-  EXPECT_TRUE(fails(kLibrary, ErrorCode::ResourceMissing));
+  EXPECT_TRUE(fails(kHdLibrary, ErrorCode::ResourceMissing));
   EXPECT_EQ(fake_->disables, 1) << "it was opened, and is let go";
 }
 

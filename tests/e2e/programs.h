@@ -32,6 +32,10 @@ Invitation find_invitation(const std::filesystem::path& log, const std::string& 
 // "127.0.0.1:PORT" of a program that has written its ready file.
 std::string ready_address(const std::filesystem::path& ready_file);
 
+// The scripts that come with the programs.
+inline const std::filesystem::path kScenes =
+    std::filesystem::path(TROCAR_SOURCE_DIR) / "deploy/scenes";
+
 // A server on a free port and clients of it, all logging into test_folder().
 class Session {
  public:

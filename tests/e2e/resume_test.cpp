@@ -14,8 +14,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const fs::path kScenes = fs::path(TROCAR_SOURCE_DIR) / "deploy/scenes";
-
 class Resume : public ::testing::Test {
  protected:
   Program resume(const std::vector<std::string>& extra = {}) {

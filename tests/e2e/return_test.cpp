@@ -15,7 +15,7 @@ namespace {
 namespace fs = std::filesystem;
 
 // A grasp of the lower edge that is held for a minute and drawn to and fro.
-fs::path write_grasp_script(const fs::path& folder) {
+fs::path write_drawing_script(const fs::path& folder) {
   const auto file = folder / "hold.toml";
   std::ofstream out(file);
   out << R"([[tool]]
@@ -93,7 +93,7 @@ class Return : public ::testing::Test {
   }
 
   Session session_{"lattice"};
-  fs::path script_ = write_grasp_script(session_.folder);
+  fs::path script_ = write_drawing_script(session_.folder);
 };
 
 TEST_F(Return, AConnectionThatIsCutForSecondsComesBackToItsPlaceAndItsGrasp) {

@@ -22,8 +22,6 @@
 namespace trocar::e2e {
 namespace {
 
-const std::filesystem::path kScenes = std::filesystem::path(TROCAR_SOURCE_DIR) / "deploy/scenes";
-
 // CRC of the surface at each published tick, from simulating the journal's inputs again.
 std::map<Tick, std::uint32_t> simulate_again(const std::filesystem::path& file) {
   std::map<Tick, std::uint32_t> crcs;

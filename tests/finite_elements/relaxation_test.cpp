@@ -11,7 +11,7 @@
 namespace trocar::finite_elements::testing {
 namespace {
 
-constexpr double kSide_m = 0.01;
+constexpr double kCube_m = 0.01;
 
 double relaxation(const HyperelasticMaterial& m, double t) {
   double g = m.equilibrium_share();
@@ -30,9 +30,9 @@ double after_ramp(const HyperelasticMaterial& m, double elastic, double rise, do
 }
 
 Specimen sheared_block(double shear, ElementOrder order) {
-  Specimen specimen({2, 2, 2}, kSide_m / 2, order, liver());
+  Specimen specimen({2, 2, 2}, kCube_m / 2, order, liver());
   const auto on_surface = [](const Vec3d& p) {
-    const auto is_end = [](double x) { return x < 1e-9 || x > kSide_m - 1e-9; };
+    const auto is_end = [](double x) { return x < 1e-9 || x > kCube_m - 1e-9; };
     return is_end(p.x) || is_end(p.y) || is_end(p.z);
   };
   specimen.hold_all_axes(on_surface);
@@ -46,7 +46,7 @@ double shear_stress(const Solver& solver) {
   double moment = 0;
   for (std::size_t i = 0; i < p.size(); ++i)
     moment += forces[static_cast<Eigen::Index>(3 * i)] * p[i].y;
-  return moment / (kSide_m * kSide_m * kSide_m);
+  return moment / (kCube_m * kCube_m * kCube_m);
 }
 
 // A ramp of shear in 50 ms, then held: 0.1 % of the analytic series whatever the step.
@@ -144,9 +144,9 @@ double free_side(const Volterra& yy, double l, double guess) {
 // Stretched to 1.4 in 0.2 s and held.
 TEST(Relaxation, LargeStrainsMeetTheHereditaryIntegral) {
   constexpr double kDt_s = 2e-3;
-  Specimen block({1, 1, 1}, kSide_m, ElementOrder::Linear, liver());
+  Specimen block({1, 1, 1}, kCube_m, ElementOrder::Linear, liver());
   for (int axis = 0; axis < 3; ++axis) block.hold(plane(axis, 0), axis);
-  block.hold(plane(0, kSide_m), 0, [](const Vec3d&) { return 0.4 * kSide_m; });
+  block.hold(plane(0, kCube_m), 0, [](const Vec3d&) { return 0.4 * kCube_m; });
   Solver solver(block.problem(), {.threads = 1});
   Volterra xx(kDt_s), yy(kDt_s);
   xx.add(0), yy.add(0);
@@ -157,7 +157,7 @@ TEST(Relaxation, LargeStrainsMeetTheHereditaryIntegral) {
     b = free_side(yy, l, b);
     const double j = l * b * b;
     const double nominal = l * xx.now(bracket_xx(l, b)) + liver().bulk_modulus_pa * (j - 1) * b * b;
-    ASSERT_NEAR(reaction(solver, plane(0, kSide_m), 0) / (kSide_m * kSide_m), nominal,
+    ASSERT_NEAR(reaction(solver, plane(0, kCube_m), 0) / (kCube_m * kCube_m), nominal,
                 2e-4 * std::abs(nominal))
         << i;
     xx.add(bracket_xx(l, b)), yy.add(bracket_yy(l, b));
@@ -168,9 +168,9 @@ TEST(Relaxation, LargeStrainsMeetTheHereditaryIntegral) {
 // carries it, by bisection.
 TEST(Relaxation, CreepMeetsTheHereditaryIntegral) {
   constexpr double kDt_s = 2e-3, kLoad_pa = 1500, kRise_s = 0.02;
-  Specimen block({1, 1, 1}, kSide_m, ElementOrder::Linear, liver());
+  Specimen block({1, 1, 1}, kCube_m, ElementOrder::Linear, liver());
   for (int axis = 0; axis < 3; ++axis) block.hold(plane(axis, 0), axis);
-  block.pull(plane(0, kSide_m), {kLoad_pa, 0, 0});
+  block.pull(plane(0, kCube_m), {kLoad_pa, 0, 0});
   // The far face stays even under the even load, as the closed form has it.
   Solver solver(block.problem(), {.threads = 1});
   Volterra xx(kDt_s), yy(kDt_s);
@@ -187,7 +187,7 @@ TEST(Relaxation, CreepMeetsTheHereditaryIntegral) {
           l * xx.now(bracket_xx(l, b)) + liver().bulk_modulus_pa * (l * b * b - 1) * b * b;
       (nominal < share * kLoad_pa ? low : high) = l;
     }
-    const double ours = mean_displacement(solver, plane(0, kSide_m)).x / kSide_m;
+    const double ours = mean_displacement(solver, plane(0, kCube_m)).x / kCube_m;
     ASSERT_NEAR(ours, l - 1, 3e-4 * (l - 1)) << i;
     if (i == 10) first = ours;
     xx.add(bracket_xx(l, b)), yy.add(bracket_yy(l, b));
@@ -196,7 +196,7 @@ TEST(Relaxation, CreepMeetsTheHereditaryIntegral) {
 }
 
 TEST(Relaxation, WhatIsNotLoadedDoesNotMove) {
-  Specimen block({2, 2, 2}, kSide_m / 2, ElementOrder::Quadratic, liver());
+  Specimen block({2, 2, 2}, kCube_m / 2, ElementOrder::Quadratic, liver());
   block.hold_all_axes(plane(1, 0));
   Solver solver(block.problem());
   for (const auto& settings : std::initializer_list<StepSettings>{

@@ -9,7 +9,7 @@ namespace {
 
 constexpr device::DeviceLimits kDevice{
     .force_n = 3.3, .torque_nm = 0.05, .rate_hz = 1000, .stiffness_n_m = 1000};
-constexpr double kDt_s = 0.001;
+constexpr double kStep_s = 0.001;
 
 bool has(const SafeForce& safe, Limit limit) {
   return (safe.limits & (1u << static_cast<unsigned>(limit))) != 0;
@@ -150,7 +150,7 @@ TEST_F(SafetyChain, AForceThatFeedsAMotionIsDamped) {
     double work_j = 0;
     Vec3d last_m, last_n;
     for (int k = 0; k < 3000; ++k) {
-      const double angle = 2 * M_PI * k * kDt_s;
+      const double angle = 2 * M_PI * k * kStep_s;
       SafetyInput input;
       input.position_m = {0.003 * std::sin(angle), 0, 0};
       input.force_n = {0.3 * std::cos(angle), 0, 0};
@@ -171,8 +171,8 @@ TEST_F(SafetyChain, AForceThatFeedsAMotionIsDamped) {
 TEST_F(SafetyChain, ADampedSpringIsLeftAlone) {
   Vec3d last_m;
   for (int k = 0; k < 3000; ++k) {
-    input_.position_m = {0.005 * std::sin(2 * M_PI * k * kDt_s), 0, 0};
-    const Vec3d velocity_m_s = (input_.position_m - last_m) / kDt_s;
+    input_.position_m = {0.005 * std::sin(2 * M_PI * k * kStep_s), 0, 0};
+    const Vec3d velocity_m_s = (input_.position_m - last_m) / kStep_s;
     last_m = input_.position_m;
     input_.force_n = input_.position_m * -100.0 - velocity_m_s * 0.2;
     input_.stiffness_n_m = 100;

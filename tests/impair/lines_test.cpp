@@ -8,6 +8,7 @@
 
 #include "common/impair/datagram_line.h"
 #include "common/impair/stream_line.h"
+#include "tests/impair/pattern.h"
 
 namespace trocar::impair {
 namespace {
@@ -219,12 +220,6 @@ Read read_all(StreamLine& line) {
   }
   return read;
 }
-Bytes pattern(std::size_t size) {
-  Bytes bytes(size);
-  for (std::size_t i = 0; i < size; ++i) bytes[i] = static_cast<std::uint8_t>(i * 31 + i / 251);
-  return bytes;
-}
-
 // A seed whose first segments are lost (or not) as asked.
 std::uint64_t seed_with(const std::vector<bool>& losses, double loss) {
   for (std::uint64_t seed = 0;; ++seed) {

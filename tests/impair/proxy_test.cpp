@@ -13,6 +13,7 @@
 #include <thread>
 
 #include "common/impair/stream_line.h"
+#include "tests/impair/pattern.h"
 
 namespace trocar::impair {
 namespace {
@@ -21,12 +22,6 @@ using asio::ip::tcp;
 using asio::ip::udp;
 using std::chrono::milliseconds;
 using namespace std::chrono_literals;
-
-Bytes pattern(std::size_t size) {
-  Bytes bytes(size);
-  for (std::size_t i = 0; i < size; ++i) bytes[i] = static_cast<std::uint8_t>(i * 31 + i / 251);
-  return bytes;
-}
 
 // A proxy on a thread of its own, and a server of plain sockets behind it.
 class ProxyTest : public ::testing::Test {
