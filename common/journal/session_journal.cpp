@@ -65,6 +65,7 @@ Status SessionJournal::read_info() {
     continues.file = text("continues_file");
   }
   info_.has_external_loads = entries.contains("external_loads");
+  info_.starts_from_snapshot = text("start") == "snapshot";
   times_.start_utc_ns = info_.start_utc_ns;
   info_.protocol = text("protocol");
   info_.organ_name = text("organ_name");
@@ -147,6 +148,10 @@ Result<proto::Organ> SessionJournal::organ() {
   if (!*organ)
     return Error{ErrorCode::BadFile, mcap_->path() + ": no organ; the recording ended too early"};
   return std::move(**organ);
+}
+
+Result<std::optional<proto::ExternalLoads>> SessionJournal::loads() {
+  return last<proto::ExternalLoads>(JournalTopic::Loads, 0);
 }
 
 Status SessionJournal::read_tick_records(Tick from, Tick to,

@@ -27,9 +27,11 @@ struct SessionInfo {
   std::string organ_name;
   std::uint64_t organ_hash = 0;
   std::optional<ReductionDescription> reduction;  // that the session had
-  // The journal is of a scenario with loads besides its tools, which it does not hold: its ticks
-  // cannot be simulated again.
+  // More than tools acts on the tissue. loads() has it, but for journals that were written before
+  // there were loads in them: their ticks cannot be simulated again.
   bool has_external_loads = false;
+  // A scenario began otherwise than with the organ at rest: ticks follow from the first snapshot.
+  bool starts_from_snapshot = false;
   std::optional<Continuation> continues;         // with which journal's session it goes on
   Tick last_tick = 0;                            // of the last message
   std::vector<proto::Participant> participants;  // everyone who was ever in, in order of joining
@@ -39,6 +41,8 @@ struct SessionInfo {
 
   // The tick after which this journal begins.
   Tick begin_tick() const { return continues ? continues->tick : 0; }
+  // The state after that tick is that of the first snapshot, and does not follow from the organ.
+  bool begins_with_snapshot() const { return continues || starts_from_snapshot; }
 };
 
 template <typename Message>
@@ -52,6 +56,8 @@ class SessionJournal {
   const McapReader& container() const { return *mcap_; }
 
   Result<proto::Organ> organ();
+  // Nothing if only tools act, or if the journal lacks them.
+  Result<std::optional<proto::ExternalLoads>> loads();
 
   // Records of ticks in [from, to], in order.
   Status read_tick_records(Tick from, Tick to, const TickVisitor<proto::TickRecord>& visitor);

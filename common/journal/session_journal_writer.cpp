@@ -49,7 +49,8 @@ Result<std::unique_ptr<SessionJournalWriter>> SessionJournalWriter::create(
     metadata.entries["continues_file"] = session.continues->file;
     metadata.entries["continues_tick"] = std::to_string(session.continues->tick);
   }
-  if (session.has_external_loads) metadata.entries["external_loads"] = "not recorded";
+  if (session.has_external_loads) metadata.entries["external_loads"] = "in /loads";
+  if (session.starts_from_snapshot) metadata.entries["start"] = "snapshot";
   if (Status written = (*mcap)->write_metadata(metadata); !written.ok()) return written.error();
   return std::unique_ptr<SessionJournalWriter>(
       new SessionJournalWriter(std::move(*mcap), JournalTimes{session.start_utc_ns}));

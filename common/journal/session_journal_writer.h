@@ -26,6 +26,7 @@ struct SessionDescription {
   std::uint64_t organ_hash = 0;
   std::optional<ReductionDescription> reduction;  // nothing: the session has none
   bool has_external_loads = false;                // see SessionInfo
+  bool starts_from_snapshot = false;              // likewise
   std::optional<Continuation> continues;          // nothing: it begins with the session
 };
 

@@ -3,6 +3,7 @@
 // The channels of a Trocar journal, and how ticks become times.
 //
 //   /organ           Organ            once, first
+//   /loads           ExternalLoads    of scenarios: once, at the start; what acts besides tools
 //   /world/snapshot  WorldSnapshot    full state: at start, every 10 s, at marks
 //   /tick_batch      TickBatch        one per frame: inputs, decisions, hashes of its ticks
 //   /surface/key     SurfaceFrame     1 Hz
@@ -46,8 +47,9 @@ enum class JournalTopic : std::uint8_t {
   Gap,
   TopologyChange,
   Solver,
+  Loads,
 };
-inline constexpr int kJournalTopicCount = 12;
+inline constexpr int kJournalTopicCount = 13;
 
 inline constexpr const char* kJournalProfile = "trocar";
 inline constexpr const char* kSessionMetadataName = "trocar.session";

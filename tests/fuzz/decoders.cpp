@@ -26,6 +26,7 @@
 #include "server/organs/organ/organ_file.h"
 #include "server/papers/dogan/reduction_file.h"
 #include "server/session/access/code_book.h"
+#include "server/session/recording/load_messages.h"
 #include "server/tissue/world/surface_layout.h"
 
 namespace trocar::fuzz {
@@ -151,6 +152,21 @@ bool decode_change(BytesView bytes) {
   return is_accepted;
 }
 
+// Loads on a small block; they are written and read again alike.
+Status read_loads(journal::SessionJournal& journal) {
+  static const auto kBlock = *catalogue::make_lattice({3, 3, 3, 0.01});
+  const auto message = journal.loads();
+  if (!message) return message.error();
+  if (!*message) return {};
+  const auto loads = recording::from_message(**message, kBlock);
+  if (!loads) return loads.error();
+  proto::ExternalLoads again;
+  recording::to_message(*loads, again);
+  const auto reread = recording::from_message(again, kBlock);
+  TROCAR_ASSERT(reread.ok() && *reread == *loads);
+  return {};
+}
+
 bool decode_journal(BytesView bytes) {
   const int file = memfd_create("journal", 0);
   TROCAR_ASSERT(file >= 0);
@@ -164,6 +180,7 @@ bool decode_journal(BytesView bytes) {
     constexpr Tick kLast = ~Tick{0} >> 1;
     const auto all = [](Tick, const auto&) { return true; };
     is_accepted &= checked(read.organ());
+    is_accepted &= checked(read_loads(read));
     is_accepted &= checked(read.read_tick_records(0, kLast, all));
     is_accepted &= checked(read.read_surface_deltas(0, kLast, all));
     is_accepted &= checked(read.read_topology_changes(0, kLast, all));

@@ -53,6 +53,14 @@ class SampleSession {
     for (std::size_t i = 0; i < organ_bytes / 8; ++i)
       organ.add_rest_position_m(1e-4 * static_cast<double>(i % 977));
     expect(writer_->write_organ(kSessionStart, organ));
+    proto::ExternalLoads loads;
+    auto& pulled = *loads.add_loaded();
+    pulled.add_node(13);
+    pulled.add_share(1);
+    auto& over_time = *pulled.mutable_over_time();
+    over_time.add_time_s(0);
+    for (const double force_n : {0.0, 0.5, 0.0}) over_time.add_value(force_n);
+    expect(writer_->write(JournalTopic::Loads, 0, kSessionStart, loads));
     add_participants({"Mira"}, 0);
   }
 

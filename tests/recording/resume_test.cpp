@@ -98,8 +98,9 @@ TEST_F(Resume, TheNextJournalSaysWhatItContinuesAndIsVerified) {
   ASSERT_TRUE(session.ok()) << session.error().message;
   auto& simulation = session->simulation;
   const auto next = folder_.file("next.mcap");
-  auto recorder = Recorder::create(next, simulation.organ(), simulation.layout(), {}, false,
-                                   session->continuation);
+  Beginning beginning;
+  beginning.continues = session->continuation;
+  auto recorder = Recorder::create(next, simulation.organ(), simulation.layout(), beginning);
   ASSERT_TRUE(recorder.ok()) << recorder.error().message;
   (*recorder)->record_participants(session->participants, 0);
   Bytes state;

@@ -250,17 +250,6 @@ TEST_F(SimProgram, AScenarioCutsAndItsJournalVerifies) {
   EXPECT_NE(log().find("256 ticks of its hands on liver"), std::string::npos) << log();
 }
 
-TEST_F(SimProgram, AJournalWithLoadsSaysThatItCannotBeSimulatedAgain) {
-  const auto pulls = write("pulls.toml",
-                           "[organ]\nsource = \"block\"\nnodes = [3, 3, 3]\n[[nodes]]\nname = "
-                           "\"top\"\nids = [26]\n[[force]]\nset = \"top\"\n[[force.key]]\ntime_s "
-                           "= 0\nforce_n = [0, 0.01, 0]\n[run]\nseconds = 0.032\n");
-  ASSERT_EQ(run({pulls, "--out", at("pulls"), "--journal", at("pulls.mcap")}), 0) << log();
-  EXPECT_NE(log().find("are not in a journal"), std::string::npos) << log();
-  EXPECT_EQ(run({"--hands", at("pulls.mcap"), "--out", at("again")}), 3);
-  EXPECT_NE(log().find("is of a scenario with loads"), std::string::npos) << log();
-}
-
 TEST_F(SimProgram, TissueTearsInAScenario) {
   const auto tears =
       write("tears.toml",

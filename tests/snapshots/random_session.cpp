@@ -88,6 +88,45 @@ SnapshotScene random_scene(SnapshotOrgan kind, std::uint64_t seed) {
   return scene;
 }
 
+SnapshotScene loaded_scene(std::uint64_t seed) {
+  constexpr double kPart_m = 0.025, kMost_m = 0.005, kMost_n = 0.1;
+  auto scene =
+      random_scene(seed % 2 == 0 ? SnapshotOrgan::Liver : SnapshotOrgan::MeasuredLiver, seed);
+  const auto& mesh = scene.organ.mesh;
+  Random random(seed);
+  std::vector<std::uint8_t> is_taken(mesh.node_count());
+  for (const auto node : scene.organ.fixed_nodes) is_taken[node.value] = 1;
+  const auto take_part = [&] {
+    const auto count = static_cast<std::uint32_t>(mesh.surface_nodes.size());
+    std::vector<NodeIndex> nodes;
+    while (nodes.empty()) {
+      const auto& middle = mesh.rest_positions[mesh.surface_nodes[random.below(count)].value];
+      for (std::uint32_t n = 0; n < mesh.node_count(); ++n)
+        if (is_taken[n] == 0 && length(mesh.rest_positions[n] - middle) < kPart_m)
+          nodes.emplace_back(n), is_taken[n] = 1;
+    }
+    return nodes;
+  };
+  const auto curve = [&random](double most) {
+    step::TimedVector over_time;
+    for (int key = 0; key < 20; ++key) {
+      auto& [time_s, value] = over_time.keys.emplace_back();
+      time_s = 0.2 * key;
+      for (double* part : {&value.x, &value.y, &value.z}) *part = random.between(-most, most);
+    }
+    return over_time;
+  };
+  scene.loads.displaced.push_back({take_part(), step::kAllAxes, curve(kMost_m)});
+  const auto axes = static_cast<std::uint8_t>(1 + random.below(6));
+  scene.loads.displaced.push_back({take_part(), axes, {{{0, {}}}}});
+  auto& pulled = scene.loads.forces.emplace_back();
+  pulled.nodes = take_part();
+  pulled.over_time = curve(kMost_n);
+  pulled.shares.assign(pulled.nodes.size(), 1.0 / static_cast<double>(pulled.nodes.size()));
+  TROCAR_ASSERT(step::validate(scene.loads, scene.organ).ok());
+  return scene;
+}
+
 SnapshotScene reduced_scene(std::size_t patch) {
   const std::filesystem::path folder = TROCAR_SOURCE_DIR "/tests/step/reduced_block";
   auto organ = organ::read_organ(folder / "reduced_block.organ");
@@ -103,7 +142,8 @@ SnapshotScene reduced_scene(std::size_t patch) {
 }
 
 RandomSession::RandomSession(SnapshotScene scene, std::uint64_t seed)
-    : simulation_(std::move(scene.organ), 1, reduction::at_work(std::move(scene.reduction))),
+    : simulation_(std::move(scene.organ), 1, reduction::at_work(std::move(scene.reduction)), {},
+                  std::move(scene.loads)),
       reach_m_(scene.reach_m),
       is_gentle_(scene.is_gentle),
       random_(seed),

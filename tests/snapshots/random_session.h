@@ -36,6 +36,7 @@ struct SnapshotFigures {
 struct SnapshotScene {
   organ::Organ organ;
   std::shared_ptr<const organ::LocalReduction> reduction;  // or null
+  step::LoadRules loads = {};
   // Hands stay this near to a place, m; 0: they go everywhere.
   float reach_m = 0;
   // The place is this node; without: any of the surface.
@@ -44,6 +45,9 @@ struct SnapshotScene {
   bool is_gentle = false;
 };
 SnapshotScene random_scene(SnapshotOrgan organ, std::uint64_t seed);
+// Returns a liver of which one part is drawn to and fro, another is held along some axes, and a
+// third is pulled at.
+SnapshotScene loaded_scene(std::uint64_t seed);
 // Returns the block of tests/step/reduced_block with its reduction, pressed softly near a patch.
 SnapshotScene reduced_scene(std::size_t patch);
 

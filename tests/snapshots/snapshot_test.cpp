@@ -41,6 +41,13 @@ TEST(Snapshots, OfSessionsWithAReductionAreReadAndContinuedBitForBit) {
   EXPECT_LT(all.reduced, all.snapshots) << "it also gives way";
 }
 
+TEST(Snapshots, OfScenariosWithLoadsAreReadAndContinuedBitForBit) {
+  SnapshotFigures all;
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) all += run(loaded_scene(seed), seed, 15);
+  EXPECT_GT(all.cut, 0u);
+  EXPECT_GT(all.in_a_cut, 0u);
+}
+
 TEST(Snapshots, OfLargeOrgansAreReadAndContinuedBitForBit) {
   run(random_scene(SnapshotOrgan::Stomach, 1), 1, 3);
   run(random_scene(SnapshotOrgan::Chest, 1), 1, 3);

@@ -31,7 +31,10 @@ Result<std::unique_ptr<JournalSink>> open_journal(
     const std::optional<journal::ReductionDescription>& reduction,
     const std::optional<journal::Continuation>& continues) {
   if (path == "none") return std::unique_ptr<JournalSink>();
-  auto recorder = recording::Recorder::create(path, organ, layout, reduction, false, continues);
+  recording::Beginning beginning;
+  beginning.reduction = reduction;
+  beginning.continues = continues;
+  auto recorder = recording::Recorder::create(path, organ, layout, beginning);
   if (!recorder) return recorder.error();
   return std::unique_ptr<JournalSink>(std::make_unique<RecordedSession>(std::move(*recorder)));
 }

@@ -34,14 +34,20 @@ void write_tools(const step::PublishedFrame& frame, std::FILE* csv) {
 // Drives the ticks of a recording, one after another.
 class Replay {
  public:
-  Replay(step::Simulation& simulation, SimJournal* journal, std::FILE* csv)
-      : simulation_(simulation), journal_(journal), csv_(csv) {}
+  // lists: of hands, in order.
+  Replay(step::Simulation& simulation, std::vector<recording::PresentHands> lists,
+         SimJournal* journal, std::FILE* csv)
+      : simulation_(simulation), lists_(std::move(lists)), journal_(journal), csv_(csv) {}
 
   Status take(const step::TickRecord& record) {
     if (record.tick != simulation_.current_tick() + 1)
       return Error{ErrorCode::BadFile, "ticks " + std::to_string(simulation_.current_tick() + 1) +
                                            " to " + std::to_string(record.tick - 1) +
                                            " are missing: its hands are not all there"};
+    for (; journal_ != nullptr && next_list_ < lists_.size() &&
+           lists_[next_list_].tick <= record.tick;
+         ++next_list_)
+      journal_->record_hands(lists_[next_list_].hands, lists_[next_list_].tick);
     const auto& report = simulation_.tick(record.inputs, record.decisions);
     opened_m2 += report.cut.opened_area_m2;
     rejected += report.solve.nodes_rejected;
@@ -62,9 +68,67 @@ class Replay {
 
  private:
   step::Simulation& simulation_;
+  const std::vector<recording::PresentHands> lists_;
+  std::size_t next_list_ = 0;
   SimJournal* const journal_;
   std::FILE* const csv_;
 };
+
+void warn(const std::string& recording, const char* what) {
+  std::fprintf(stderr, "trocar-sim: warning: %s: %s\n", recording.c_str(), what);
+}
+
+Status restore_start(journal::SessionJournal& source, const std::string& path,
+                     step::Simulation& simulation) {
+  const auto start = source.snapshot_before(0);
+  if (!start) return start.error();
+  if (!*start) return Error{ErrorCode::BadFile, path + ": the snapshot of its start is missing"};
+  const auto state = bytes_of(std::string_view((*start)->state()));
+  const auto restored = simulation.restore_snapshot(state);
+  return restored ? restored : Error{restored.error().code, path + ": " + restored.error().message};
+}
+
+// Its state is of this organ and these loads, and of no reduction, which hands do not bring along.
+bool has_recorded_start(const HandsCommand& command, const journal::SessionInfo& info) {
+  return info.starts_from_snapshot && command.organ.empty() && !info.reduction;
+}
+
+// The organ that the hands work on, with the recording's loads, at the start.
+Result<step::Simulation> simulation_of(const HandsCommand& command, journal::SessionJournal& source,
+                                       unsigned threads) {
+  const auto& path = command.recording;
+  const auto& info = source.info();
+  auto organ = recording::recorded_organ(source, path);
+  if (!organ) return organ.error();
+  auto loads = recording::recorded_loads(source, *organ, path);
+  if (!loads) return loads.error();
+  if (info.has_external_loads && loads->empty())
+    return Error{ErrorCode::BadFile, path +
+                                         ": is of a scenario with loads, which it does not hold: "
+                                         "run the scenario itself"};
+  if (!command.organ.empty()) {
+    auto other = catalogue::load_organ(command.organ);
+    if (!other) return other.error();
+    const bool has_loads = !loads->empty();
+    if (has_loads && other->mesh.rest_positions != organ->mesh.rest_positions) {
+      *loads = {};
+      warn(path, "its loads are of the nodes of its own organ, and are left out");
+    } else if (has_loads && !step::validate(*loads, *other)) {
+      return Error{ErrorCode::Usage,
+                   "--organ: " + command.organ + " holds nodes that the recording displaces"};
+    }
+    *organ = std::move(*other);
+  }
+  step::Simulation simulation(std::move(*organ), threads, {}, {}, std::move(*loads));
+  if (has_recorded_start(command, info)) {
+    if (auto s = restore_start(source, path, simulation); !s) return s.error();
+  } else if (info.starts_from_snapshot) {
+    warn(path,
+         "its equilibrium at the start is of another organ, or of a reduction: this one "
+         "starts at rest");
+  }
+  return simulation;
+}
 
 }  // namespace
 
@@ -83,14 +147,9 @@ Status run_hands(const HandsCommand& command, const std::filesystem::path& folde
   auto source = journal::SessionJournal::open(command.recording);
   if (!source) return source.error();
   const auto& info = (*source)->info();
-  if (info.has_external_loads)
-    return Error{ErrorCode::BadFile, command.recording +
-                                         ": is of a scenario with loads, which are "
-                                         "not recorded: run the scenario itself"};
-  auto organ = command.organ.empty() ? recording::recorded_organ(**source, command.recording)
-                                     : catalogue::load_organ(command.organ);
-  if (!organ) return organ.error();
-  step::Simulation simulation(std::move(*organ), threads);
+  auto made = simulation_of(command, **source, threads);
+  if (!made) return made.error();
+  auto& simulation = *made;
   const auto path = folder / "hands.csv";
   const File csv(std::fopen(path.c_str(), "wb"));
   if (!csv) return Error{ErrorCode::ResourceMissing, path.string() + ": cannot be written"};
@@ -98,12 +157,15 @@ Status run_hands(const HandsCommand& command, const std::filesystem::path& folde
              csv.get());
   std::unique_ptr<SimJournal> journal;
   if (!journal_path.empty()) {
-    auto created =
-        SimJournal::create(journal_path, simulation, recording::recorded_hands(info), false);
+    recording::Beginning beginning;
+    beginning.starts_from_snapshot = has_recorded_start(command, info);
+    auto created = SimJournal::create(journal_path, simulation, std::move(beginning));
     if (!created) return created.error();
     journal = std::move(*created);
   }
-  Replay replay(simulation, journal.get(), csv.get());
+  auto lists = recording::recorded_hands(**source);
+  if (!lists) return lists.error();
+  Replay replay(simulation, std::move(*lists), journal.get(), csv.get());
   const Status read =
       recording::read_ticks(**source, [&](const step::TickRecord& record, bool& is_done) {
         is_done = stop != 0;

@@ -2,7 +2,9 @@
 
 // trocar-sim --hands: the hands of a recorded session on another organ. Samples and decisions of
 // each tick are those of the recording; what the tissue does is simulated anew. Anchors do not
-// move: a tool goes where it went in the session, whatever is there.
+// move: a tool goes where it went in the session, whatever is there. A scenario's loads go along
+// where the nodes are the same, so on the same organ of another material, too. It starts in the
+// recorded equilibrium on the recording's own organ, on others at rest.
 
 #include <CLI/CLI.hpp>
 #include <csignal>

@@ -12,17 +12,27 @@ constexpr Tick kSnapshotPeriod = 10'000, kSnapshotPhase = kTicksPerFrame / 2;
 
 }  // namespace
 
-Result<std::unique_ptr<SimJournal>> SimJournal::create(
-    const std::string& path, const step::Simulation& simulation,
-    std::vector<participants::Participant> hands, bool has_external_loads,
-    const std::optional<journal::ReductionDescription>& reduction) {
-  auto recorder = recording::Recorder::create(path, simulation.organ(), simulation.layout(),
-                                              reduction, has_external_loads);
+Result<std::unique_ptr<SimJournal>> SimJournal::create(const std::string& path,
+                                                       const step::Simulation& simulation,
+                                                       recording::Beginning beginning) {
+  beginning.loads = simulation.loads().rules();
+  auto recorder =
+      recording::Recorder::create(path, simulation.organ(), simulation.layout(), beginning);
   if (!recorder) return recorder.error();
   std::unique_ptr<SimJournal> journal(new SimJournal(std::move(*recorder)));
-  journal->recorder_->record_participants(std::move(hands), 0);
   journal->record_snapshot(simulation);
   return journal;
+}
+
+void SimJournal::wait_for_writer(std::size_t most_bytes) const {
+  while (recorder_->queued_bytes() > most_bytes)
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+}
+
+// The writer has frames and lists in queues of their own: no frame may wait while a list comes.
+void SimJournal::record_hands(std::vector<participants::Participant> hands, Tick tick) {
+  wait_for_writer(0);
+  recorder_->record_participants(std::move(hands), tick);
 }
 
 void SimJournal::record_snapshot(const step::Simulation& simulation) {
@@ -45,8 +55,7 @@ void SimJournal::add(std::shared_ptr<step::PublishedFrame> frame, const hands::T
   frame->records = std::exchange(records_, {});
   frame->snapshot = std::exchange(snapshot_, nullptr);
   frame->snapshot_tick = snapshot_tick_;
-  while (recorder_->queued_bytes() > recording::Recorder::kQueueBytes / 2)
-    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  wait_for_writer(recording::Recorder::kQueueBytes / 2);
   recorder_->record_frame(std::move(frame));
 }
 

@@ -16,12 +16,13 @@ namespace trocar::app {
 
 class SimJournal {
  public:
-  // Fails if the file exists. The simulation is at tick 0. hands: who the tools belong to.
-  static Result<std::unique_ptr<SimJournal>> create(
-      const std::string& path, const step::Simulation& simulation,
-      std::vector<participants::Participant> hands, bool has_external_loads,
-      const std::optional<journal::ReductionDescription>& reduction = {});
+  // Fails if the file exists. The simulation is at tick 0 and has the loads of the recording.
+  static Result<std::unique_ptr<SimJournal>> create(const std::string& path,
+                                                    const step::Simulation& simulation,
+                                                    recording::Beginning beginning);
 
+  // Before a tick: from then on these are there.
+  void record_hands(std::vector<participants::Participant> hands, Tick tick);
   // After each tick, with what it was told and the frame that it published, or null.
   void add(std::shared_ptr<step::PublishedFrame> frame, const hands::TickInputs& inputs,
            const step::TickDecisions& decisions, const step::TickReport& report);
@@ -34,6 +35,7 @@ class SimJournal {
   explicit SimJournal(std::unique_ptr<recording::Recorder> recorder)
       : recorder_(std::move(recorder)) {}
   void record_snapshot(const step::Simulation& simulation);
+  void wait_for_writer(std::size_t most_bytes) const;
 
   std::unique_ptr<recording::Recorder> recorder_;
   std::vector<step::TickRecord> records_;  // since the last frame

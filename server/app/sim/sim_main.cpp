@@ -208,18 +208,15 @@ Result<std::unique_ptr<SimJournal>> open_sim_journal(const Options& options,
         ErrorCode::Usage,
         "--journal: recordings know no cutting = \"nakao\", which moves nodes of the mesh: "
         "remove one of the two"};
-  std::optional<journal::ReductionDescription> reduction;
+  recording::Beginning beginning;
+  beginning.starts_from_snapshot = run.scenario().run.starts_in_equilibrium;
   if (resolved.reduction)
-    reduction = {organ::reduction_hash(*resolved.reduction),
-                 std::filesystem::path(*run.scenario().run.reduction).filename().string(),
-                 resolved.reduction->source};
-  if (run.has_external_loads())
-    std::fprintf(stderr,
-                 "%s: warning: %s: loads and probed reactions are not in a journal, so that "
-                 "trocar-journal cannot simulate it again; the scenario can\n",
-                 kProgram, options.journal.c_str());
-  return SimJournal::create(options.journal, run.simulation(), hands_of(run.scenario()),
-                            run.has_external_loads(), reduction);
+    beginning.reduction = {organ::reduction_hash(*resolved.reduction),
+                           std::filesystem::path(*run.scenario().run.reduction).filename().string(),
+                           resolved.reduction->source};
+  auto journal = SimJournal::create(options.journal, run.simulation(), std::move(beginning));
+  if (journal) (*journal)->record_hands(hands_of(run.scenario()), 0);
+  return journal;
 }
 
 Result<std::filesystem::path> make_folder(const std::filesystem::path& folder) {

@@ -92,6 +92,15 @@ cutting::Settings cutting_of(const scenario::RunRule& run) {
   return run.cutting ? nakao::settings_of(*run.cutting, kPatchEdges) : cutting::Settings{};
 }
 
+bool is_reaction(const scenario::ProbeRule& probe) {
+  return probe.quantity == scenario::ProbeQuantity::Reaction;
+}
+
+step::LoadRules loads_of(const scenario::ResolvedScenario& resolved) {
+  return {resolved.displacements, resolved.forces,
+          std::ranges::any_of(resolved.scenario.probes, is_reaction)};
+}
+
 const scenario::Place& run_key(const scenario::Scenario& scenario, std::string_view key) {
   return scenario::place_of_key(scenario.run.given, key, scenario.run_place);
 }
@@ -121,7 +130,7 @@ Status check_explicit(const scenario::ResolvedScenario& resolved) {
     return scenario::scenario_error(
         scenario, place, "\"explicit\" has no tools: take \"implicit\", or displace a set");
   for (const auto& probe : scenario.probes)
-    if (probe.quantity == scenario::ProbeQuantity::Reaction)
+    if (is_reaction(probe))
       return scenario::scenario_error(scenario, probe.place,
                                       "a reaction needs integrator = \"implicit\" in [run]");
   if (dynamics::Relaxation::is_needed(resolved.organ))
@@ -165,31 +174,16 @@ ScenarioRun::ScenarioRun(scenario::ResolvedScenario resolved, Solver solver, uns
       decisions_(decisions_of(scenario().run, solver)),
       step_count_(steps_of(scenario().run)),
       simulation_(resolved_.organ, threads, reduction::at_work(resolved_.reduction),
-                  cutting_of(scenario().run)),
-      loads_({resolved_.displacements, resolved_.forces}, organ().fixed_nodes,
-             organ().mesh.node_count()) {
+                  cutting_of(scenario().run), loads_of(resolved_)) {
   for (std::size_t i = 0; i < scenario().probes.size(); ++i)
-    watched_.push_back(scenario().probes[i].quantity == scenario::ProbeQuantity::Reaction
-                           ? loads_.watch(resolved_.probe_nodes[i])
+    watched_.push_back(is_reaction(scenario().probes[i])
+                           ? simulation_.loads().watch(resolved_.probe_nodes[i])
                            : 0);
-  hold_displaced();
   if (scenario().run.integrator == scenario::Integrator::Explicit)
     explicit_.emplace(organ(), world());
   for (std::uint32_t i = 0; i < world().node_count(); ++i)
     if (world().node_classes[i] != world::NodeClass::Fixed) free_nodes_.push_back(NodeIndex(i));
   if (scenario().run.starts_in_equilibrium) settle(threads);
-}
-
-void ScenarioRun::hold_displaced() {
-  auto& classes = simulation_.editable_state().world.node_classes;
-  bool has_held = false;
-  for (const auto& load : resolved_.displacements)
-    if (load.axes == kAllAxes)
-      for (const auto node : load.nodes) {
-        classes[node.value] = world::NodeClass::Fixed;
-        has_held = true;
-      }
-  if (has_held) simulation_.resume();
 }
 
 // Tissue that relaxes is put where it would be with nothing left to relax. Its stresses are then
@@ -203,7 +197,7 @@ void ScenarioRun::settle(unsigned threads) {
     world.displacements = run.world().displacements;
     settling_ = run.settling();
   } else {
-    settling_ = relax(loads_.at_rest(world));
+    settling_ = relax(simulation_.loads().at_rest(world));
   }
   dynamics::start_relaxed(organ(), world);
   simulation_.resume();
@@ -239,8 +233,7 @@ StepReport ScenarioRun::step_dynamic() {
   if (explicit_) return step_explicit();
   const Tick before = simulation_.current_tick();
   sample_tools(before + 1, seconds_of(before), before % kSampleTicks == 0);
-  const auto& tick =
-      simulation_.tick(inputs_, decisions_, has_external_loads() ? &loads_ : nullptr);
+  const auto& tick = simulation_.tick(inputs_, decisions_);
   StepReport report;
   report.active_nodes = tick.near.active_nodes;
   report.is_converged = tick.solve.is_converged;
@@ -259,7 +252,7 @@ StepReport ScenarioRun::step_explicit() {
   const double begin_s = seconds_of(world.tick++);
   const auto& run = scenario().run;
   for (std::uint32_t i = 1; i <= run.steps_per_tick; ++i)
-    explicit_->step(run.dt_s(), world, loads_.at(begin_s + run.dt_s() * i, world));
+    explicit_->step(run.dt_s(), world, simulation_.loads().at(begin_s + run.dt_s() * i, world));
   StepReport report;
   report.active_nodes = free_nodes_.size();
   for (const auto& u : world.displacements) report.solve.nodes_rejected += is_finite(u) ? 0 : 1;
@@ -342,7 +335,7 @@ StepReport ScenarioRun::step_static() {
   auto& context = simulation_.editable_context();
   auto& world = state.world;
   const double now = scenario().run.load_times_s[steps_done_];
-  const auto loads = loads_.at(now, world);
+  const auto loads = simulation_.loads().at(now, world);
   StepReport report;
   std::uint32_t sweeps = 0;
   float change = scenario().tools.empty() ? 0 : INFINITY;
@@ -370,7 +363,7 @@ StepReport ScenarioRun::step_static() {
     contact::update_claims(world, state.tools, context.contact.found, context.contact.requests,
                            state.claims, state.grasps, context.outbox.claim_events);
   }
-  loads_.measure(context.solve.solver, context.contact.found);
+  simulation_.loads().measure(context.solve.solver, context.contact.found);
   report.is_converged &= change <= kContactChange_m;
   report.solve.sweeps = sweeps;
   return report;
@@ -406,7 +399,7 @@ Vec3d ScenarioRun::probe(std::size_t index) const {
       for (const auto node : nodes) sum += to_double(world.velocities[node.value]);
       return sum / static_cast<double>(nodes.size());
     case scenario::ProbeQuantity::Reaction:
-      return loads_.holding_force_n(watched_[index]);
+      return simulation_.loads().holding_force_n(watched_[index]);
     case scenario::ProbeQuantity::ToolForce:
       return force_on(ToolSlot{static_cast<std::uint8_t>(*rule.tool)});
   }

@@ -61,9 +61,6 @@ class ScenarioRun {
   bool has_ticks() const { return !is_static() && !explicit_; }
   step::Simulation& simulation() { return simulation_; }
   const step::Simulation& simulation() const { return simulation_; }
-  // More goes into a tick than inputs and decisions: loads, or nodes whose reaction is probed,
-  // which the solver places in each step.
-  bool has_external_loads() const { return !loads_.empty(); }
   const hands::TickInputs& inputs() const { return inputs_; }
   const step::TickDecisions& decisions() const { return decisions_; }
 
@@ -83,7 +80,6 @@ class ScenarioRun {
 
  private:
   bool is_static() const { return scenario().run.mode == scenario::RunMode::Static; }
-  void hold_displaced();
   // The samples of the tools at this time; tools join in the first tick.
   void sample_tools(Tick tick, double time_s, bool has_samples);
   Vec3d force_on(ToolSlot tool) const;
@@ -106,8 +102,7 @@ class ScenarioRun {
   std::uint64_t steps_done_ = 0;
   StepReport settling_;
   step::Simulation simulation_;
-  step::ExternalLoads loads_;
-  std::vector<std::size_t> watched_;  // per probe: its number in loads_, of reactions
+  std::vector<std::size_t> watched_;  // per probe: its number among the watched, of reactions
 
   // Steps use these members as workspace.
   hands::TickInputs inputs_;

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 
+#include "common/wire/tool_shape.h"
 #include "proto/journal.pb.h"
 #include "server/organs/organ/organ_file.h"
+#include "server/session/recording/load_messages.h"
 #include "server/session/recording/tick_records.h"
 
 namespace trocar::recording {
@@ -19,17 +21,40 @@ Result<organ::Organ> recorded_organ(journal::SessionJournal& journal, const std:
   return organ;
 }
 
-std::vector<participants::Participant> recorded_hands(const journal::SessionInfo& info) {
-  std::vector<participants::Participant> people;
-  for (const auto& person : info.participants) {
-    const ParticipantSlot slot{static_cast<std::uint8_t>(person.slot())};
-    if (!slot.has_tools()) continue;
-    const bool is_known =
-        std::ranges::any_of(people, [&](const auto& p) { return p.slot == slot; });
-    if (!is_known)
-      people.push_back({slot, person.name(), participants::Role::Surgeon, {tool::ToolShape{}}});
+Result<step::LoadRules> recorded_loads(journal::SessionJournal& journal, const organ::Organ& organ,
+                                       const std::string& path) {
+  auto message = journal.loads();
+  if (!message) return message.error();
+  if (!*message) return step::LoadRules{};
+  auto rules = from_message(**message, organ);
+  if (!rules) return Error{rules.error().code, path + ": /loads: " + rules.error().message};
+  return rules;
+}
+
+std::vector<participants::Participant> participants_of(const proto::Participants& list) {
+  std::vector<participants::Participant> present;
+  for (const auto& entry : list.participant()) {
+    if (entry.slot() >= kMaxParticipants) continue;
+    auto& participant = present.emplace_back();
+    participant.slot = {static_cast<std::uint8_t>(entry.slot())};
+    participant.name = entry.name();
+    participant.role = wire::role_of(entry.role());
+    for (const auto& shape : entry.tool()) participant.tools.push_back(wire::read(shape));
   }
-  return people;
+  return present;
+}
+
+Result<std::vector<PresentHands>> recorded_hands(journal::SessionJournal& journal) {
+  std::vector<PresentHands> lists;
+  const auto read = journal.read_participants(
+      0, journal.info().last_tick, [&](Tick tick, const proto::Participants& list) {
+        auto hands = participants_of(list);
+        std::erase_if(hands, [](const auto& who) { return !who.slot.has_tools(); });
+        lists.push_back({tick, std::move(hands)});
+        return true;
+      });
+  if (!read) return read.error();
+  return lists;
 }
 
 Status read_ticks(journal::SessionJournal& journal,

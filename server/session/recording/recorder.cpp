@@ -5,6 +5,7 @@
 #include "common/base/version.h"
 #include "common/wire/surface_messages.h"
 #include "server/organs/organ/organ_file.h"
+#include "server/session/recording/load_messages.h"
 #include "server/session/replication/messages.h"
 
 namespace trocar::recording {
@@ -43,24 +44,31 @@ class FileSink final : public MessageSink {
 
 }  // namespace
 
-Result<std::unique_ptr<Recorder>> Recorder::create(
-    const std::string& path, const organ::Organ& organ, const wire::SurfaceLayout& layout,
-    const std::optional<journal::ReductionDescription>& reduction, bool has_external_loads,
-    const std::optional<journal::Continuation>& continues) {
-  const Tick begin_tick = continues ? continues->tick : 0;
+Result<std::unique_ptr<Recorder>> Recorder::create(const std::string& path,
+                                                   const organ::Organ& organ,
+                                                   const wire::SurfaceLayout& layout,
+                                                   const Beginning& beginning) {
+  const Tick begin_tick = beginning.continues ? beginning.continues->tick : 0;
   const std::uint64_t now = utc_ns();
   const std::uint64_t hash = organ::organ_hash(organ);
   auto writer = journal::SessionJournalWriter::create(
       path, {.start_utc_ns = now - begin_tick * kTickNanoseconds,
              .organ_name = organ.name,
              .organ_hash = hash,
-             .reduction = reduction,
-             .has_external_loads = has_external_loads,
-             .continues = continues});
+             .reduction = beginning.reduction,
+             .has_external_loads = !beginning.loads.empty(),
+             .starts_from_snapshot = beginning.starts_from_snapshot,
+             .continues = beginning.continues});
   if (!writer) return writer.error();
   if (auto s = (*writer)->write(journal::JournalTopic::Organ, 0, now, organ::encode_organ(organ));
       !s)
     return s.error();
+  if (!beginning.loads.empty()) {
+    proto::ExternalLoads loads;
+    to_message(beginning.loads, loads);
+    if (auto s = (*writer)->write(journal::JournalTopic::Loads, begin_tick, now, loads); !s)
+      return s.error();
+  }
   proto::SurfaceTopology topology;
   wire::write(layout, organ.name, topology);
   if (auto s = (*writer)->write_topology(begin_tick, now, topology); !s) return s.error();

@@ -29,12 +29,22 @@
 #include "server/organs/organ/organ.h"
 #include "server/session/participants/roster.h"
 #include "server/session/recording/frame_messages.h"
+#include "server/tissue/step/external_loads.h"
 #include "server/tissue/step/published_frame.h"
 
 namespace trocar::recording {
 
 struct RecorderCounters {
   std::uint64_t frames_written = 0, frames_dropped = 0, bytes_written = 0;
+};
+
+// How a recording begins.
+struct Beginning {
+  std::optional<journal::ReductionDescription> reduction;  // of the session; nothing: it has none
+  step::LoadRules loads;                                   // of a scenario
+  // The state at the start is not that of the organ at rest: the first snapshot says what it is.
+  bool starts_from_snapshot = false;
+  std::optional<journal::Continuation> continues;  // with which journal's session it goes on
 };
 
 class Recorder {
@@ -44,13 +54,11 @@ class Recorder {
   static constexpr std::size_t kQueueParticipants = 64;
 
   // Creates the file with organ and topology; copies what it keeps. Fails if the file exists or
-  // cannot be written. reduction: of the session; nothing: it has none. has_external_loads: more
-  // acts on the tissue than the ticks' records tell, so that nobody can simulate them again.
-  // continues: with which journal's session this one goes on.
-  static Result<std::unique_ptr<Recorder>> create(
-      const std::string& path, const organ::Organ& organ, const wire::SurfaceLayout& layout,
-      const std::optional<journal::ReductionDescription>& reduction = {},
-      bool has_external_loads = false, const std::optional<journal::Continuation>& continues = {});
+  // cannot be written.
+  static Result<std::unique_ptr<Recorder>> create(const std::string& path,
+                                                  const organ::Organ& organ,
+                                                  const wire::SurfaceLayout& layout,
+                                                  const Beginning& beginning = {});
   ~Recorder();
 
   // Simulation thread.

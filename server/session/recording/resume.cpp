@@ -8,7 +8,6 @@
 
 #include "common/base/version.h"
 #include "common/journal/session_journal.h"
-#include "common/wire/tool_shape.h"
 #include "server/session/recording/recorded_session.h"
 #include "server/session/recording/verify.h"
 #include "server/tissue/reduction/reduced_tissue.h"
@@ -28,7 +27,7 @@ Status check_info(const std::string& path, const journal::SessionInfo& info) {
                                     "the release that recorded it",
                                     info.sim_version, kSimVersion));
   if (info.has_external_loads)
-    return cannot(path, "it is of a scenario with loads that are not recorded");
+    return cannot(path, "it is of a scenario with loads besides tools, which no session has");
   if (info.gap_messages > 0)
     return cannot(path,
                   fmt::format("it has a gap, {} frames were never recorded", info.gap_messages));
@@ -110,19 +109,13 @@ Status read_participants(journal::SessionJournal& journal, ResumedSession& sessi
   const auto list = journal.participants_before(kEnd);
   if (!list) return list.error();
   std::array<bool, kMaxHands> is_named{};
-  const int count = *list ? (*list)->participant_size() : 0;
-  for (int i = 0; i < count; ++i) {
-    const auto& entry = (*list)->participant(i);
-    if (entry.slot() >= kMaxParticipants) continue;
-    participants::Participant who{.slot = {static_cast<std::uint8_t>(entry.slot())},
-                                  .name = entry.name(),
-                                  .role = wire::role_of(entry.role())};
-    for (const auto& shape : entry.tool()) who.tools.push_back(wire::read(shape));
-    if (who.slot.has_tools() != wire::has_tools(who.role)) continue;
-    if (who.slot.has_tools() && !has_these_tools(session.simulation, who)) continue;
-    if (who.slot.has_tools()) is_named[who.slot.value] = true;
-    session.participants.push_back(std::move(who));
-  }
+  if (*list) session.participants = participants_of(**list);
+  std::erase_if(session.participants, [&](const auto& who) {
+    if (who.slot.has_tools() != wire::has_tools(who.role)) return true;
+    if (!who.slot.has_tools()) return false;
+    is_named[who.slot.value] = has_these_tools(session.simulation, who);
+    return !is_named[who.slot.value];
+  });
   for (std::uint8_t slot = 0; slot < kMaxHands; ++slot)
     if (!is_named[slot] && has_hand(session.simulation, {slot}))
       session.unnamed_hands.push_back({slot});

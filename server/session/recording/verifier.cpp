@@ -9,9 +9,9 @@
 #include "common/wire/surface_messages.h"
 #include "common/wire/tool_shape.h"
 #include "server/session/recording/message_difference.h"
+#include "server/session/recording/recorded_session.h"
 #include "server/session/recording/tick_records.h"
 #include "server/session/replication/messages.h"
-#include "server/tissue/reduction/reduced_tissue.h"
 
 namespace trocar::recording {
 namespace {
@@ -89,17 +89,17 @@ class Verifier::Collector final : public MessageSink {
   std::vector<Expected>& into_;
 };
 
-Verifier::Verifier(const journal::SessionInfo& info, organ::Organ organ,
-                   std::shared_ptr<const organ::LocalReduction> reduction, VerifyReport& report)
+Verifier::Verifier(const journal::SessionInfo& info, step::Simulation simulation,
+                   VerifyReport& report)
     : info_(info),
       report_(report),
       is_older_(is_older(info.protocol)),
-      simulation_(std::move(organ), 1, reduction::at_work(std::move(reduction))),
+      simulation_(std::move(simulation)),
       messages_(simulation_.organ().name, simulation_.layout()) {
   next_tick_ = info_.begin_tick() + 1;
   if (!report_.is_resimulated) return;
-  is_in_step_ = !info_.continues;
-  if (info_.continues) return;
+  is_in_step_ = !info_.begins_with_snapshot();
+  if (!is_in_step_) return;
   proto::SurfaceTopology topology;
   wire::write(simulation_.layout(), simulation_.organ().name, topology);
   expected_.push_back({journal::topic_name(JournalTopic::Topology), comparable(topology)});
@@ -159,6 +159,10 @@ bool Verifier::check(std::string_view topic, BytesView bytes) {
   switch (*known) {
     case JournalTopic::Organ:  // checked by its hash
       break;
+    case JournalTopic::Loads:  // the simulation has them
+      if (message_counts_.find(topic)->second > 1)
+        add_reason(fmt::format("{}: there are others, after tick {}", topic, next_tick_ - 1));
+      break;
     case JournalTopic::Snapshot:
       end_frame();
       check_snapshot(static_cast<const proto::WorldSnapshot&>(*message));
@@ -167,19 +171,11 @@ bool Verifier::check(std::string_view topic, BytesView bytes) {
       end_frame();
       check_batch(static_cast<const proto::TickBatch&>(*message));
       break;
-    case JournalTopic::Participants: {
+    case JournalTopic::Participants:
       end_frame();
-      std::vector<participants::Participant> present;
-      for (const auto& entry : static_cast<const proto::Participants&>(*message).participant()) {
-        if (entry.slot() >= kMaxParticipants) continue;
-        auto& participant = present.emplace_back();
-        participant.slot = {static_cast<std::uint8_t>(entry.slot())};
-        participant.name = entry.name();
-        for (const auto& shape : entry.tool()) participant.tools.push_back(wire::read(shape));
-      }
-      roster_ = participants::Roster(present);
+      roster_ =
+          participants::Roster(participants_of(static_cast<const proto::Participants&>(*message)));
       break;
-    }
     case JournalTopic::Gap:
       end_frame();
       check_gap(static_cast<const proto::JournalGap&>(*message));

@@ -18,9 +18,8 @@ namespace trocar::recording {
 
 class Verifier {
  public:
-  // `report` says whether to simulate, and is filled.
-  Verifier(const journal::SessionInfo& info, organ::Organ organ,
-           std::shared_ptr<const organ::LocalReduction> reduction, VerifyReport& report);
+  // The simulation is at its beginning. `report` says whether to simulate, and is filled.
+  Verifier(const journal::SessionInfo& info, step::Simulation simulation, VerifyReport& report);
   ~Verifier();
 
   // Lists of participants of the whole recording, in order, and whether these are all: names and
@@ -52,8 +51,8 @@ class Verifier {
   };
 
   bool waits_for_begin() const {
-    return info_.continues && report_.is_resimulated && next_tick_ == info_.begin_tick() + 1 &&
-           !is_in_step_;
+    return info_.begins_with_snapshot() && report_.is_resimulated &&
+           next_tick_ == info_.begin_tick() + 1 && !is_in_step_;
   }
   void differ(Difference difference);
   void add_reason(std::string reason);
@@ -63,7 +62,7 @@ class Verifier {
   void check_gap(const proto::JournalGap& gap);
   void note_missing(Tick before);
   bool start_from_snapshot(Tick tick);
-  // A journal that goes on with another one begins with the state to go on from.
+  // A journal that does not begin with the organ at rest begins with the state to go on from.
   void begin_from(const proto::WorldSnapshot& snapshot);
   void compare_snapshot(Tick tick);
   void continue_snapshots(std::uint64_t hash);

@@ -9,6 +9,7 @@
 #include "server/organs/organ/local_reduction_file.h"
 #include "server/session/recording/recorded_session.h"
 #include "server/session/recording/verifier.h"
+#include "server/tissue/reduction/reduced_tissue.h"
 
 namespace trocar::recording {
 namespace {
@@ -80,9 +81,12 @@ Result<VerifyReport> verify_journal(const std::string& path,
   const auto& info = (*journal)->info();
   auto organ = recorded_organ(**journal, path);
   if (!organ) return organ.error();
+  auto loads = recorded_loads(**journal, *organ, path);
+  if (!loads) return loads.error();
 
   VerifyReport report;
-  report.is_resimulated = info.sim_version == kSimVersion && !info.has_external_loads;
+  const bool lacks_loads = info.has_external_loads && loads->empty();
+  report.is_resimulated = info.sim_version == kSimVersion && !lacks_loads;
   report.begin_tick = info.begin_tick();
   report.last_tick = info.last_tick;
   report.container = info.summary;
@@ -92,11 +96,10 @@ Result<VerifyReport> verify_journal(const std::string& path,
     if (!read) return read.error();
     reduction = std::move(*read);
   }
-  if (info.has_external_loads)
+  if (lacks_loads)
     report.reasons.push_back(
-        "it is of a scenario with loads besides its tools, which are not recorded: run the "
-        "scenario "
-        "again");
+        "it is of a scenario with loads besides its tools, which it does not hold: run the "
+        "scenario again");
   else if (!report.is_resimulated)
     report.reasons.push_back(
         fmt::format("it was recorded with sim_version {}, this program has {}: it cannot be "
@@ -110,7 +113,9 @@ Result<VerifyReport> verify_journal(const std::string& path,
                                          whole.first_damage.message));
   if (!info.is_finished) report.reasons.push_back("it has no end: " + report.container);
 
-  Verifier verifier(info, std::move(*organ), std::move(reduction), report);
+  auto simulation = step::Simulation(std::move(*organ), 1, reduction::at_work(std::move(reduction)),
+                                     {}, std::move(*loads));
+  Verifier verifier(info, std::move(simulation), report);
   const auto lists = (*journal)->read_participants(0, std::numeric_limits<Tick>::max(),
                                                    [&](Tick tick, const proto::Participants& list) {
                                                      verifier.add_list(tick, list);

@@ -49,7 +49,7 @@ const char* name_of(Verdict verdict);  // "verified", "different", "not verified
 struct VerifyReport {
   static constexpr std::size_t kMostReasons = 32;
 
-  bool is_resimulated = false;         // false: of another sim_version, or without records
+  bool is_resimulated = false;         // false: of another sim_version, or without records or loads
   Tick begin_tick = 0;                 // after which the recording begins
   Tick first_tick = 0, last_tick = 0;  // first tick that was verified; last of the recording
   std::uint64_t ticks_verified = 0;

@@ -30,10 +30,9 @@ namespace trocar::contact {
 
 // Stiffness of contact per surface area, Pa/m, for tools of 8 mm radius and more: at the 1 cm^2 of
 // a node of a 4,000-node liver this is 2.5 kN/m, a hundred times the tissue's own: 0.1 N indents
-// 0.04 mm. Ten times less is visibly soft; ten times more slows the solver's convergence. It is the
-// value of the paraboloid tool in graded-exterior's measurements. What a thinner tool touches is
-// smaller in proportion to the square of its radius, and its face is stiffer by that much; of a
-// blade, in proportion to its radius and to its half width.
+// 0.04 mm. Ten times less is visibly soft; ten times more slows the solver's convergence. What a
+// thinner tool touches is smaller in proportion to the square of its radius, and its face is
+// stiffer by that much; that of a blade in proportion to its radius and to its half width.
 inline constexpr float kStiffnessPaPerM = 2.5e7f;
 inline constexpr float kStiffnessRadius_m = 0.008f;
 // Friction's elastic range: how stiff it is beside the face.

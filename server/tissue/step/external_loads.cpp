@@ -1,6 +1,8 @@
 #include "server/tissue/step/external_loads.h"
 
 #include <algorithm>
+#include <cmath>
+#include <string>
 
 namespace trocar::step {
 namespace {
@@ -13,7 +15,73 @@ void set_axes(std::uint8_t axes, const Vec3f& from, Vec3f& to) {
   if (axes & 4) to.z = from.z;
 }
 
+// These say what is wrong, or nothing.
+
+std::string wrong_nodes(std::span<const NodeIndex> nodes, std::size_t node_count) {
+  if (nodes.empty()) return "has no nodes";
+  if (std::ranges::adjacent_find(nodes, std::ranges::greater_equal{}) != nodes.end())
+    return "its nodes are not in ascending order, each once";
+  if (nodes.back().value >= node_count)
+    return "node " + std::to_string(nodes.back().value) + " is none of the organ's " +
+           std::to_string(node_count);
+  return {};
+}
+
+bool is_within(const Vec3d& v, double most) {
+  return std::abs(v.x) <= most && std::abs(v.y) <= most && std::abs(v.z) <= most;
+}
+
+std::string wrong_curve(const TimedVector& curve, double most) {
+  if (curve.keys.empty()) return "has no keys";
+  for (std::size_t i = 0; i < curve.keys.size(); ++i) {
+    const auto& [time_s, value] = curve.keys[i];
+    if (!std::isfinite(time_s) || (i > 0 && !(time_s > curve.keys[i - 1].time_s)))
+      return "the times of its keys do not increase";
+    if (!is_within(value, most))
+      return "a key's value is not within " + std::to_string(std::llround(most));
+  }
+  return {};
+}
+
+std::string wrong_displacement(const DisplacedNodes& load, std::vector<std::uint8_t>& held) {
+  if (auto wrong = wrong_nodes(load.nodes, held.size()); !wrong.empty()) return wrong;
+  if (load.axes == 0 || load.axes > kAllAxes) return "holds along no axis";
+  for (const auto node : load.nodes) {
+    if ((held[node.value] & load.axes) != 0)
+      return "node " + std::to_string(node.value) + " is held already along that axis";
+    held[node.value] |= load.axes;
+  }
+  return wrong_curve(load.over_time, kMaxDisplacementMetres);
+}
+
+std::string wrong_force(const LoadedNodes& load, std::size_t node_count) {
+  if (auto wrong = wrong_nodes(load.nodes, node_count); !wrong.empty()) return wrong;
+  const auto& areas = load.normal_areas_m2;
+  const bool is_complete = areas.empty() ? load.shares.size() == load.nodes.size()
+                                         : areas.size() == load.nodes.size() && load.shares.empty();
+  if (!is_complete) return "it needs one share, or one area, for each node";
+  const auto is_share = [](double share) { return std::abs(share) <= kMaxLoadShare; };
+  const auto is_area = [](const Vec3d& area) { return is_within(area, kMaxLoadShare); };
+  if (!std::ranges::all_of(load.shares, is_share) || !std::ranges::all_of(areas, is_area))
+    return "a node's share is not within " + std::to_string(std::llround(kMaxLoadShare));
+  return wrong_curve(load.over_time, kMaxLoad);
+}
+
 }  // namespace
+
+Status validate(const LoadRules& rules, const organ::Organ& organ) {
+  std::vector<std::uint8_t> held(organ.mesh.node_count());
+  for (const auto node : organ.fixed_nodes) held[node.value] = kAllAxes;
+  const auto check = [](const char* kind, std::size_t i, const std::string& wrong) -> Status {
+    if (wrong.empty()) return {};
+    return Error{ErrorCode::BadFile, kind + ("[" + std::to_string(i)) + "]: " + wrong};
+  };
+  for (std::size_t i = 0; i < rules.displaced.size(); ++i)
+    if (auto s = check("displaced", i, wrong_displacement(rules.displaced[i], held)); !s) return s;
+  for (std::size_t i = 0; i < rules.forces.size(); ++i)
+    if (auto s = check("loaded", i, wrong_force(rules.forces[i], held.size())); !s) return s;
+  return {};
+}
 
 Vec3d TimedVector::at(double time_s) const {
   if (time_s <= keys.front().time_s) return keys.front().value;
@@ -26,9 +94,9 @@ Vec3d TimedVector::at(double time_s) const {
   return keys.back().value;
 }
 
-ExternalLoads::ExternalLoads(LoadRules rules, std::span<const NodeIndex> fixed,
+ExternalLoads::ExternalLoads(const LoadRules& rules, std::span<const NodeIndex> fixed,
                              std::size_t node_count)
-    : rules_(std::move(rules)), fixed_(fixed.begin(), fixed.end()), organ_nodes_(node_count) {
+    : rules_(rules), fixed_(fixed.begin(), fixed.end()), organ_nodes_(node_count) {
   const auto moves = [](const auto& key) { return length(key.value) > 0; };
   for (const auto& load : rules_.displaced)
     if (std::ranges::any_of(load.over_time.keys, moves)) seeds_.push_back(load.nodes);

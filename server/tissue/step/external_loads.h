@@ -14,6 +14,7 @@
 #include <span>
 #include <vector>
 
+#include "common/base/result.h"
 #include "common/math/vec3.h"
 #include "server/tissue/dynamics/block_descent.h"
 #include "server/tissue/world/world.h"
@@ -25,18 +26,27 @@ struct TimedVector {
   struct Key {
     double time_s = 0;  // strictly increasing
     Vec3d value;
+
+    bool operator==(const Key&) const = default;
   };
   std::vector<Key> keys;  // at least one
 
   Vec3d at(double time_s) const;
+  bool operator==(const TimedVector&) const = default;
 };
 
 inline constexpr std::uint8_t kAllAxes = 7;  // bit 0: x, bit 1: y, bit 2: z
+// Beyond these a unit is wrong, or a file. Forces on nodes stay finite in float.
+inline constexpr double kMaxDisplacementMetres = 10;
+inline constexpr double kMaxLoad = 1e9;       // N or Pa
+inline constexpr double kMaxLoadShare = 100;  // 1 or m^2
 
 struct DisplacedNodes {
   std::vector<NodeIndex> nodes;  // ascending, distinct; of the uncut organ
   std::uint8_t axes = kAllAxes;  // The nodes are free along the others.
   TimedVector over_time;         // m
+
+  bool operator==(const DisplacedNodes&) const = default;
 };
 
 // The force on nodes[i] is value x shares[i], or minus value.x x normal_areas_m2[i] for a pressure.
@@ -49,19 +59,27 @@ struct LoadedNodes {
   Vec3d on_node(std::size_t i, const Vec3d& value) const {
     return normal_areas_m2.empty() ? value * shares[i] : normal_areas_m2[i] * -value.x;
   }
+  bool operator==(const LoadedNodes&) const = default;
 };
 
 struct LoadRules {
   std::vector<DisplacedNodes> displaced;  // No node is displaced twice along an axis.
   std::vector<LoadedNodes> forces;
+  // The solver places the organ's fixed nodes in each step, so that the force there can be
+  // measured. Tissue that relaxes is then advanced there in each tick, so it is part of the input.
+  bool has_measured_reactions = false;
 
-  bool empty() const { return displaced.empty() && forces.empty(); }
+  bool empty() const { return displaced.empty() && forces.empty() && !has_measured_reactions; }
+  bool operator==(const LoadRules&) const = default;
 };
+
+// Whether these are rules for that organ; error says which load is wrong, and how.
+Status validate(const LoadRules& rules, const organ::Organ& organ);
 
 class ExternalLoads {
  public:
-  // fixed: nodes that stay where they are; node_count: of the uncut organ.
-  ExternalLoads(LoadRules rules, std::span<const NodeIndex> fixed, std::size_t node_count);
+  // rules: outlive it. fixed: nodes that stay where they are; node_count: of the uncut organ.
+  ExternalLoads(const LoadRules& rules, std::span<const NodeIndex> fixed, std::size_t node_count);
   ExternalLoads(const ExternalLoads&) = delete;
   ExternalLoads& operator=(const ExternalLoads&) = delete;
 
@@ -74,9 +92,10 @@ class ExternalLoads {
   // Returns the nodes at which force enters the tissue: propagation starts there as from a contact.
   std::span<const std::span<const NodeIndex>> seeds() const { return seeds_; }
   const LoadRules& rules() const { return rules_; }
-  // Nothing is displaced, loaded or watched: a tick without it does the same.
-  bool empty() const { return rules_.empty() && watched_.empty(); }
-  // Asks for the force that holds these nodes, of the uncut organ. Returns its number.
+  // The state was replaced: what cuts have made between held nodes is looked up anew.
+  void forget_cuts() { start(); }
+  // Asks for the force that holds these nodes, of the uncut organ. Returns its number. In a tick,
+  // rules without loads need has_measured_reactions.
   std::size_t watch(std::span<const NodeIndex> nodes);
   // After a solve with these loads, and before an edit of the topology.
   void measure(const dynamics::BlockDescent& solver, const contact::ContactList& contacts);
@@ -102,7 +121,7 @@ class ExternalLoads {
   void push(double time_s, const world::World& world);
   Vec3d on_held_axes(NodeIndex node, Vec3d force_n) const;
 
-  const LoadRules rules_;
+  const LoadRules& rules_;
   const std::vector<NodeIndex> fixed_;
   const std::size_t organ_nodes_;
   std::size_t node_count_ = 0;                         // that the lists below know

@@ -13,15 +13,16 @@
 
 namespace trocar::step {
 
-State::State(const organ::Organ& organ, const dynamics::FarFieldModels* models,
-             const cutting::Settings& cutting)
-    : cuts(organ, cutting),
-      world(organ),
-      claims(organ.mesh.node_count()),
+State::State(const Scene& scene)
+    : cuts(scene.organ, scene.cutting),
+      world(scene.organ),
+      claims(scene.organ.mesh.node_count()),
       quantised(cuts.layout().vertex_count()),
-      far_models(models),
-      far_model(models != nullptr ? models->make() : nullptr) {
-  dynamics::start_relaxed(organ, world);
+      far_model(scene.far_models ? scene.far_models->make() : nullptr) {
+  dynamics::start_relaxed(scene.organ, world);
+  for (const auto& load : scene.loads.displaced)
+    if (load.axes == kAllAxes)
+      for (const auto node : load.nodes) world.node_classes[node.value] = world::NodeClass::Fixed;
 }
 
 void State::visit(world::StateArchive& archive) {
@@ -36,9 +37,9 @@ void State::set_mark() {
   mark.set(std::move(bytes));
 }
 
-std::unique_ptr<State> State::returned_to_mark(const organ::Organ& organ) const {
+std::unique_ptr<State> State::returned_to_mark(const Scene& scene) const {
   if (!mark.is_set()) return nullptr;
-  auto marked = std::make_unique<State>(organ, far_models, cuts.settings());
+  auto marked = std::make_unique<State>(scene);
   auto archive = world::StateArchive::reading(mark.state());
   marked->visit_without_mark(archive);
   if (!archive.ok() || !archive.at_end()) return nullptr;
@@ -68,10 +69,11 @@ namespace {
 
 std::shared_ptr<const Scene> scene_of(organ::Organ organ,
                                       const dynamics::MakeFarFieldModels& far_models,
-                                      const cutting::Settings& cutting) {
+                                      const cutting::Settings& cutting, LoadRules loads) {
   auto scene = std::make_shared<Scene>();
   scene->organ = std::move(organ);
   scene->cutting = cutting;
+  scene->loads = std::move(loads);
   if (far_models) scene->far_models = far_models(scene->organ);
   return scene;
 }
@@ -185,23 +187,25 @@ Status validate(const TickDecisions& d) {
 
 Simulation::Simulation(organ::Organ organ, unsigned workers,
                        const dynamics::MakeFarFieldModels& far_models,
-                       const cutting::Settings& cutting)
-    : Simulation(scene_of(std::move(organ), far_models, cutting), workers) {}
+                       const cutting::Settings& cutting, LoadRules loads)
+    : Simulation(scene_of(std::move(organ), far_models, cutting, std::move(loads)), workers) {}
 
 Simulation::Simulation(std::shared_ptr<const Scene> scene, unsigned workers)
     : scene_(std::move(scene)),
       workers_(workers),
-      state_(std::make_unique<State>(scene_->organ, scene_->far_models.get(), scene_->cutting)),
-      context_(std::make_unique<StepContext>(*scene_, workers_, *state_)) {}
+      state_(std::make_unique<State>(*scene_)),
+      context_(std::make_unique<StepContext>(*scene_, workers_, *state_)),
+      loads_(std::make_unique<ExternalLoads>(scene_->loads, scene_->organ.fixed_nodes,
+                                             scene_->organ.mesh.node_count())) {}
 
 Simulation Simulation::beside(unsigned workers) const {
   return {scene_, workers};
 }
 
-const TickReport& Simulation::tick(const hands::TickInputs& inputs, const TickDecisions& decisions,
-                                   ExternalLoads* loads) {
+const TickReport& Simulation::tick(const hands::TickInputs& inputs,
+                                   const TickDecisions& decisions) {
   if (inputs.mark != hands::MarkAction::None) use_mark(inputs.mark);
-  run_tick(inputs, decisions, loads, *state_, *context_);
+  run_tick(inputs, decisions, scene_->loads.empty() ? nullptr : loads_.get(), *state_, *context_);
   return context_->report;
 }
 
@@ -212,13 +216,14 @@ void Simulation::use_mark(hands::MarkAction action) {
     context_->outbox.mark_events.push_back(event);
     return;
   }
-  auto marked = state_->returned_to_mark(scene_->organ);
+  auto marked = state_->returned_to_mark(*scene_);
   auto context = marked ? context_of(*marked) : nullptr;
   event.is_done = context != nullptr;
   if (event.is_done) {
     state_ = std::move(marked);
     context->outbox = std::move(context_->outbox);
     context_ = std::move(context);
+    loads_->forget_cuts();
   }
   context_->outbox.mark_events.push_back(event);
 }
@@ -241,7 +246,7 @@ std::uint64_t Simulation::state_hash() const {
 }
 
 Status Simulation::restore_snapshot(BytesView snapshot) {
-  auto restored = std::make_unique<State>(scene_->organ, scene_->far_models.get(), scene_->cutting);
+  auto restored = std::make_unique<State>(*scene_);
   auto archive = world::StateArchive::reading(snapshot);
   restored->visit(archive);
   auto context = archive.ok() && archive.at_end() ? context_of(*restored) : nullptr;
@@ -252,6 +257,7 @@ Status Simulation::restore_snapshot(BytesView snapshot) {
                                          " nodes)"};
   state_ = std::move(restored);
   context_ = std::move(context);
+  loads_->forget_cuts();
   return {};
 }
 

@@ -1,8 +1,8 @@
 #pragma once
 
 // The simulation as everybody outside sees it: inputs and decisions in, reports and frames out,
-// snapshots both ways. Used by the server, by re-simulation of journals, and by tests. One thread
-// at a time.
+// snapshots both ways. Used by the server, by scenarios, by re-simulation of journals, and by
+// tests. One thread at a time.
 
 #include <memory>
 
@@ -19,18 +19,18 @@ class Simulation {
   // far_models: what may move the far field instead of sweeps; empty: nothing.
   // cutting: how blades cut. A method that moves nodes of the mesh needs the boundary whole and no
   // self-contact, and its states cannot be restored.
+  // loads: what acts besides tools, of a scenario that validate() accepts.
   explicit Simulation(organ::Organ organ, unsigned workers = 1,
                       const dynamics::MakeFarFieldModels& far_models = {},
-                      const cutting::Settings& cutting = {});
+                      const cutting::Settings& cutting = {}, LoadRules loads = {});
 
-  // Another one of the same organ and far-field models, at the beginning. Shares with this one what
-  // never changes, so that they may be used by two threads.
+  // Another one of the same organ, far-field models and loads, at the beginning. Shares with this
+  // one what never changes, so that they may be used by two threads.
   Simulation beside(unsigned workers) const;
 
   // Simulates one tick. After a tick that publishes, pop_frame() has the frame. Returning to a
-  // mark costs as much as beginning a session. loads: what acts besides tools; null: nothing.
-  const TickReport& tick(const hands::TickInputs& inputs, const TickDecisions& decisions,
-                         ExternalLoads* loads = nullptr);
+  // mark costs as much as beginning a session.
+  const TickReport& tick(const hands::TickInputs& inputs, const TickDecisions& decisions);
 
   // The frame of the last tick, or null. Not yet shared, so the caller may add what is not
   // simulation: statistics, a snapshot for the journal. Frame f shows the state after tick 16 f.
@@ -47,6 +47,9 @@ class Simulation {
   const organ::Organ& organ() const { return scene_->organ; }
   const State& state() const { return *state_; }
   const StepContext& context() const { return *context_; }
+  // Whoever is interested in reactions watches them here.
+  ExternalLoads& loads() { return *loads_; }
+  const ExternalLoads& loads() const { return *loads_; }
 
   // For drivers that move the tissue by other means than ticks, such as the search for an
   // equilibrium: they change the state, then call resume(), and ticks go on from there as from a
@@ -66,6 +69,7 @@ class Simulation {
   unsigned workers_ = 1;
   std::unique_ptr<State> state_;
   std::unique_ptr<StepContext> context_;
+  std::unique_ptr<ExternalLoads> loads_;
 };
 
 }  // namespace trocar::step

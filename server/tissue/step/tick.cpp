@@ -139,8 +139,7 @@ SolveReport solve_steps(const contact::ContactList& contacts, std::span<const No
 
 // Its fields know tools alone, and one step of time in a tick.
 bool is_reduction_off(const TickDecisions& decisions, const ExternalLoads* loads) {
-  return decisions.is_reduction_off || decisions.policy.steps_per_tick > 1 ||
-         (loads != nullptr && !loads->rules().empty());
+  return decisions.is_reduction_off || decisions.policy.steps_per_tick > 1 || loads != nullptr;
 }
 
 // far_model: null: sweeps alone move the tissue. Active nodes that have come to rest are let go.

@@ -26,12 +26,19 @@ namespace trocar::step {
 
 static_assert(kSweepLayers <= dynamics::kMaxSweepBands);
 
+// Constant in a session.
+struct Scene {
+  organ::Organ organ;
+  cutting::Settings cutting;
+  LoadRules loads;                                             // of a scenario
+  std::unique_ptr<const dynamics::FarFieldModels> far_models;  // of it where it stays; null: none
+};
+
 // Everything a later tick depends on. Each member names its arrays in visit_state; these bytes are
 // the snapshot and what the tick hash covers.
 struct State {
-  // models: null: sweeps alone move the tissue.
-  State(const organ::Organ& organ, const dynamics::FarFieldModels* models,
-        const cutting::Settings& cutting);
+  // The organ at rest, with what the scene displaces held.
+  explicit State(const Scene& scene);
 
   blades::TissueCuts cuts;
   world::World world;
@@ -42,8 +49,7 @@ struct State {
   // Last published integers: quantisation has hysteresis, so they are state.
   wire::QuantisedSurface quantised;
   contact::SelfContactTable self_contacts;
-  const dynamics::FarFieldModels* const far_models;
-  std::unique_ptr<dynamics::FarFieldModel> far_model;  // of sessions with models
+  std::unique_ptr<dynamics::FarFieldModel> far_model;  // of scenes with models
   Mark mark;
 
   void visit(world::StateArchive& archive);
@@ -51,17 +57,10 @@ struct State {
   void set_mark();
   // The organ as it was marked, with the tools as they are now, which hold nothing; time goes on.
   // Null: there is no mark.
-  std::unique_ptr<State> returned_to_mark(const organ::Organ& organ) const;
+  std::unique_ptr<State> returned_to_mark(const Scene& scene) const;
 
  private:
   void visit_without_mark(world::StateArchive& archive);
-};
-
-// Constant in a session: follows from the organ.
-struct Scene {
-  organ::Organ organ;
-  cutting::Settings cutting;
-  std::unique_ptr<const dynamics::FarFieldModels> far_models;  // of it where it stays; null: none
 };
 
 // The stages keep these structs from tick to tick, so that none begins anew or allocates after
