@@ -27,6 +27,7 @@ const TopicEntry& entry_of(JournalTopic topic) {
       {"/gap", proto::JournalGap::descriptor()},
       {"/topology/change", proto::SurfaceChange::descriptor()},
       {"/solver", proto::SolverLog::descriptor()},
+      {"/hands", proto::HandLog::descriptor()},
   }};
   return kEntries[static_cast<std::size_t>(topic)];
 }

@@ -13,6 +13,7 @@
 //   /claims          ClaimLog         frames that have claim events
 //   /solver          SolverLog        frames in which another solver took over, or gave another
 //                                     reason
+//   /hands           HandLog          what hands that feel have felt, as their clients said
 //   /frame_state     FrameState       tools, regions and figures of a frame, as a client got them
 //   /gap             JournalGap       where the queue to the writer was full
 //   /tool/<slot>     ToolState        one channel per tool, for plots in other programs
@@ -46,8 +47,9 @@ enum class JournalTopic : std::uint8_t {
   Gap,
   TopologyChange,
   Solver,
+  Hands,
 };
-inline constexpr int kJournalTopicCount = 12;
+inline constexpr int kJournalTopicCount = 13;
 
 inline constexpr const char* kJournalProfile = "trocar";
 inline constexpr const char* kSessionMetadataName = "trocar.session";
