@@ -24,24 +24,8 @@ namespace {
 
 volatile std::sig_atomic_t stop_requested = 0;
 
-constexpr std::uint64_t kPollNs = 4'000'000;       // samples leave every 8 ms
+constexpr std::uint64_t kPollNs = 4'000'000;       // samples of mouse and scripts leave every 8 ms
 constexpr std::uint64_t kGoodbyeNs = 400'000'000;  // time to say Bye
-
-// Hands hear what they feel, and the replica the rest.
-class Listener final : public replica::MessageSink {
- public:
-  Listener(Hands& hands, replica::Replica& replica) : hands_(hands), replica_(replica) {}
-
-  void on_message(const proto::Envelope& message, std::uint64_t arrival_ns,
-                  std::size_t bytes) override {
-    hands_.take(message);
-    replica_.on_message(message, arrival_ns, bytes);
-  }
-
- private:
-  Hands& hands_;
-  replica::Replica& replica_;
-};
 
 class Run {
  public:
@@ -49,8 +33,7 @@ class Run {
       : options_(options),
         source_(source),
         hands_(hands),
-        replica_([&source](const proto::Envelope& message) { return source.send(message); }),
-        listener_(hands, replica_) {
+        replica_([&source](const proto::Envelope& message) { return source.send(message); }) {
     replica_.corrupt_delta(options.corrupt_frame);
     const double rate = options.pictures_per_second > 0        ? options.pictures_per_second
                         : options.display == Display::Headless ? 15
@@ -73,7 +56,6 @@ class Run {
   replica::SessionSource& source_;
   Hands& hands_;
   replica::Replica replica_;
-  Listener listener_;
   std::unique_ptr<Picture> picture_;
   std::uint64_t picture_interval_ns_ = 0, next_picture_ns_ = 0;
   std::uint64_t start_ns_ = 0;
@@ -86,7 +68,7 @@ class Run {
 };
 
 Status Run::step(std::uint64_t now_ns) {
-  source_.poll(listener_);
+  source_.poll(replica_);
   if (!replica_.fault().ok())
     return Error{replica_.fault().error().code,
                  source_.name() + ": " + replica_.fault().error().message};
@@ -98,7 +80,7 @@ Status Run::step(std::uint64_t now_ns) {
   if (const auto sent = hands_.send_due(replica_, source_, now_ns); !sent) return sent.error();
   use_marks(now_ns);
   measure(now_ns);
-  if (picture_) picture_->observe(replica_);
+  if (picture_) picture_->observe(replica_, hands_, now_ns);
   if (picture_ && now_ns >= next_picture_ns_) {
     next_picture_ns_ = std::max(next_picture_ns_ + picture_interval_ns_, now_ns);
     picture_->draw(replica_, source_, hands_, now_ns);
@@ -335,6 +317,7 @@ Result<ExitCode> run_chosen(const ClientOptions& options) {
   connection.wants_datagrams = options.wants_datagrams;
   connection.role = static_cast<int>(options.role);
   connection.tools = hands.shapes();
+  connection.hands = hands.line();
   net::NetSource source(std::move(connection));
   return run_with_source(options, source, hands);
 }

@@ -32,13 +32,14 @@ Json to_json(const FeltFigures& hand) {
           {"has_real_time_priority", hand.has_priority},
           {"has_locked_memory", hand.has_locked_memory},
           {"readings_sent", hand.readings_sent},
+          {"reading_interval_ms", {{"median", hand.sent_median_ms}, {"p99", hand.sent_99_ms}}},
           {"patches", hand.state.patches.patches},
           {"patches_too_old", hand.state.patches.old_patches},
           {"patches_of_no_known_pose", hand.state.patches.unmatched_patches},
           {"answer_ms", hand.state.answer_s * 1e3},
           {"slope", hand.state.slope},
-          {"largest_force_n", hand.largest_force_n},
-          {"largest_server_force_n", hand.largest_server_force_n},
+          {"largest_force_n", hand.state.largest_force_n},
+          {"largest_server_force_n", hand.state.largest_server_force_n},
           {"steps_limited", limited}};
 }
 
@@ -118,6 +119,7 @@ std::string to_json(const ClientSummary& summary, const replica::Replica& replic
                   {"datagram_bytes_received", source.datagram_bytes_received},
                   {"datagram_bytes_sent", source.datagram_bytes_sent},
                   {"sends_dropped", source.sends_dropped},
+                  {"hand_messages_refused", source.hand_messages_refused},
                   {"returns", source.returns},
                   {"longest_absence_seconds", source.longest_away_seconds},
                   {"pictures", summary.pictures}});

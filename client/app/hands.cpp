@@ -1,6 +1,7 @@
 #include "client/app/hands.h"
 
 #include <algorithm>
+#include <span>
 
 #include "client/replica/client_messages.h"
 #include "common/math/box.h"
@@ -18,6 +19,40 @@ Vec3d place_before(const replica::Topology& topology, std::size_t i, std::size_t
   const double aside = (static_cast<double>(i) - 0.5 * static_cast<double>(count - 1)) * kApart_m;
   return {middle.x + aside, middle.y, static_cast<double>(box.most.z) + kBefore_m};
 }
+
+class FeltLine final : public replica::HandLine {
+ public:
+  explicit FeltLine(std::span<const std::unique_ptr<FeltHand>> hands) {
+    for (const auto& hand : hands) hands_.push_back(hand.get());
+  }
+
+  void take(const wire::HapticLaw& law) override {
+    for (auto* hand : hands_) hand->take(law);
+  }
+  void take(const wire::HapticPatch& patch) override {
+    if (patch.tool < hands_.size()) hands_[patch.tool]->take(patch);
+  }
+  std::optional<replica::HandLineReading> pop_reading(std::uint64_t now_ns) override {
+    for (std::size_t i = 0; i < hands_.size(); ++i)
+      if (const auto reading = hands_[i]->pop_reading(now_ns))
+        return replica::HandLineReading{
+            static_cast<std::uint32_t>(i),
+            {{to_float(reading->tip_m), reading->orientation}, reading->verb},
+            reading->time_us};
+    return std::nullopt;
+  }
+  std::optional<wire::HandReport> pop_report() override {
+    for (std::size_t i = 0; i < hands_.size(); ++i)
+      if (auto report = hands_[i]->pop_report()) {
+        report->tool = static_cast<std::uint8_t>(i);
+        return report;
+      }
+    return std::nullopt;
+  }
+
+ private:
+  std::vector<FeltHand*> hands_;
+};
 
 }  // namespace
 
@@ -38,6 +73,7 @@ Hands Hands::scripted(tool::Script script) {
 Hands Hands::felt(std::vector<std::unique_ptr<FeltHand>> felt) {
   Hands hands;
   hands.felt_ = std::move(felt);
+  hands.line_ = std::make_unique<FeltLine>(hands.felt_);
   return hands;
 }
 
@@ -49,37 +85,26 @@ std::vector<tool::ToolShape> Hands::shapes() const {
   return shapes;
 }
 
-void Hands::take(const proto::Envelope& message) {
-  if (felt_.empty()) return;
-  const auto news = replica::haptic_news(message);
-  refused_messages_ += news.refused;
-  for (std::size_t i = 0; i < felt_.size(); ++i) {
-    if (news.law) felt_[i]->take(*news.law);
-    if (news.patches[i]) felt_[i]->take(*news.patches[i]);
-  }
+void Hands::set_view(const Quatf& world_from_camera) {
+  for (const auto& hand : felt_) hand->set_view(world_from_camera);
 }
 
-Status Hands::send_felt(const replica::Replica& replica, replica::SessionSource& source,
-                        std::uint64_t now_ns) {
+Status Hands::tend_felt(const replica::Replica& replica) {
   for (std::size_t i = 0; i < felt_.size(); ++i) {
     auto& hand = *felt_[i];
     if (!hand.is_started()) hand.start(place_before(replica.topology(), i, felt_.size()));
-    const auto due = hand.pop_due(now_ns);
-    if (!due) return due.error();
-    if (const auto& reading = *due)
-      send(source, static_cast<std::uint32_t>(i),
-           {{to_float(reading->tip_m), reading->orientation}, reading->verb}, now_ns,
-           reading->time_us);
-    hand.figures();
+    if (const auto checked = hand.check(); !checked) return checked;
+    while (const auto sent = hand.pop_sent())
+      if (i == 0) echo_.note_sent(sent->tip_m, sent->ns);
   }
   return {};
 }
 
 void Hands::send(replica::SessionSource& source, std::uint32_t tool, const tool::ToolSample& sample,
-                 std::uint64_t now_ns, std::uint64_t time_us) {
+                 std::uint64_t now_ns) {
   if (tool == 0) echo_.note_sent(sample.world_from_tool.position, now_ns);
   // Dropped when the queue is full: the next sample says more.
-  replica::send_tool_sample(source, tool, ++sequence_, sample, time_us);
+  replica::send_tool_sample(source, tool, ++sequence_, sample);
 }
 
 std::optional<double> Hands::observe_echo_ms(const replica::Replica& replica,
@@ -108,7 +133,7 @@ double Hands::script_seconds(const replica::SessionFrame& newest, std::uint64_t 
 Status Hands::send_due(const replica::Replica& replica, replica::SessionSource& source,
                        std::uint64_t now_ns) {
   if (replica.newest() == nullptr || source.state() != replica::SourceState::Live) return {};
-  if (const auto sent = send_felt(replica, source, now_ns); !sent) return sent.error();
+  if (const auto tended = tend_felt(replica); !tended) return tended;
   if (mouse_)
     if (const auto sample = mouse_->pop_due(now_ns)) send(source, 0, *sample, now_ns);
   if (script_) {

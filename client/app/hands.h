@@ -1,7 +1,7 @@
 #pragma once
 
 // The tools this client brings: a person's mouse, devices that feel, or a script, and when their
-// samples leave. Thread: render thread.
+// samples leave. Those of devices leave by line(), beside all others. Thread: render thread.
 
 #include <memory>
 #include <optional>
@@ -11,6 +11,7 @@
 #include "client/device/mouse_tool.h"
 #include "client/device/script_hand.h"
 #include "client/replica/hand_echo.h"
+#include "client/replica/hand_line.h"
 #include "client/replica/replica.h"
 
 namespace trocar::app {
@@ -27,14 +28,15 @@ class Hands {
   // Returns the tools to offer when joining.
   std::vector<tool::ToolShape> shapes() const;
   const std::vector<std::unique_ptr<FeltHand>>& felt() const { return felt_; }
-  // HapticPatches and HapticLaw; what is not as it may be is dropped and counted.
-  void take(const proto::Envelope& message);
-  std::uint64_t refused_messages() const { return refused_messages_; }
+  // Between the devices and a source; null: there are none. It stays where it is.
+  replica::HandLine* line() { return line_.get(); }
+  // How the person looks at the scene: devices move tools as they are seen.
+  void set_view(const Quatf& world_from_camera);
   device::MouseTool* mouse_tool() { return mouse_ ? &*mouse_ : nullptr; }
 
-  // Sends what is due. A script begins with the first frame this client shows and runs in simulated
-  // time, so that it is the same script on a server that cannot keep up. An error means that it
-  // does not fit the organ.
+  // Sends what is due, and starts devices. A script begins with the first frame this client shows
+  // and runs in simulated time, so that it is the same script on a server that cannot keep up. An
+  // error means that it does not fit the organ.
   Status send_due(const replica::Replica& replica, replica::SessionSource& source,
                   std::uint64_t now_ns);
   // Takes note of the first tool's position in each frame; the time since it was sent, in ms.
@@ -46,12 +48,11 @@ class Hands {
   // Simulated seconds since the script began; never goes back.
   double script_seconds(const replica::SessionFrame& newest, std::uint64_t now_ns);
   void send(replica::SessionSource& source, std::uint32_t tool, const tool::ToolSample& sample,
-            std::uint64_t now_ns, std::uint64_t time_us = 0);
-  Status send_felt(const replica::Replica& replica, replica::SessionSource& source,
-                   std::uint64_t now_ns);
+            std::uint64_t now_ns);
+  Status tend_felt(const replica::Replica& replica);
 
   std::vector<std::unique_ptr<FeltHand>> felt_;
-  std::uint64_t refused_messages_ = 0;
+  std::unique_ptr<replica::HandLine> line_;
   std::optional<device::MouseTool> mouse_;
   tool::ToolShape mouse_shape_;
   std::optional<tool::Script> script_;  // until the surface is known

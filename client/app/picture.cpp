@@ -15,6 +15,7 @@ namespace trocar::app {
 namespace {
 
 constexpr std::uint64_t kHelpNs = 20'000'000'000;  // at the start
+constexpr std::uint64_t kFeltBinNs = 62'500'000;   // 160 of them are 10 s
 
 const replica::Participant* owner_of(const replica::Replica& replica, ToolSlot slot) {
   return replica.find_participant(slot.owner());
@@ -188,6 +189,57 @@ void Picture::add_participants(const replica::Replica& replica, bool is_replay,
   }
 }
 
+void Picture::add_own_forces(const replica::Replica& replica, ui::HudModel& model) const {
+  const auto own = replica.own_slot();
+  std::size_t count = 0;
+  for (const replica::Tool& tool : surface_.tools()) count += tool.slot.owner() == own;
+  for (const replica::Tool& tool : surface_.tools()) {
+    if (tool.slot.owner() != own) continue;
+    const std::string number = count > 1 ? " " + std::to_string(tool.slot.number() + 1) : "";
+    model.own_forces.push_back(
+        {"force on your tool" + number, render::colour_of_slot(own.value), length(tool.force_n)});
+  }
+  if (count == 0) return;
+  const auto forces = forces_.forces(own);
+  model.own_peak_n = *std::ranges::max_element(forces);
+}
+
+void Picture::observe(const replica::Replica& replica, const Hands& hands, std::uint64_t now_ns) {
+  forces_.update(replica);
+  for (std::size_t i = 0; i < hands.felt().size(); ++i) {
+    const auto& state = hands.felt()[i]->figures().state;
+    felt_forces_[i].add(now_ns / kFeltBinNs, {static_cast<float>(length(state.hand_force_n)),
+                                              static_cast<float>(length(state.server_force_n))});
+  }
+}
+
+void Picture::add_felt_hands(const Hands& hands, ui::HudModel& model) const {
+  for (std::size_t i = 0; i < hands.felt().size(); ++i) {
+    const auto& felt = hands.felt()[i]->figures();
+    const auto& state = felt.state;
+    ui::HudFeltHand shown;
+    shown.figures = {.device = felt.device,
+                     .has_priority = felt.has_priority,
+                     .rate_hz = felt.timing.rate_hz,
+                     .late_median_us = felt.timing.late_median_us,
+                     .late_95_us = felt.timing.late_95_us,
+                     .late_99_us = felt.timing.late_99_us,
+                     .overruns = felt.timing.overruns,
+                     .answer_age_ms = state.patch_age_s * 1e3,
+                     .echo_ms = state.answer_s * 1e3,
+                     .hand_n = length(state.hand_force_n),
+                     .server_n = length(state.server_force_n),
+                     .motion_scale = felt.scale.motion,
+                     .force_scale = felt.scale.force,
+                     .limited = state.limit_counts};
+    const auto hand_n = felt_forces_[i].oldest_first(0);
+    const auto server_n = felt_forces_[i].oldest_first(1);
+    shown.hand_n.assign(hand_n.begin(), hand_n.end());
+    shown.server_n.assign(server_n.begin(), server_n.end());
+    model.felt_hands.push_back(std::move(shown));
+  }
+}
+
 void Picture::add_labels(const replica::Replica& replica, const render::SceneView& scene,
                          ui::HudModel& model) const {
   for (const render::SceneTool& tool : scene.tools) {
@@ -274,6 +326,8 @@ ui::HudModel Picture::hud_model(const replica::Replica& replica, replica::Sessio
   model.shows_rate = overlays_.rate;
   if (overlays_.ghost) model.ghost_text = ui::describe(replica.ghost(), is_replay);
   add_participants(replica, is_replay, model);
+  if (!is_replay) add_own_forces(replica, model);
+  add_felt_hands(hands, model);
   add_labels(replica, scene, model);
   add_messages(replica, now_ns, model);
   if (const auto* playback = source.playback()) {
@@ -321,7 +375,7 @@ void Picture::draw(const replica::Replica& replica, replica::SessionSource& sour
   last_ns_ = now_ns;
   measure(replica, now_ns);
   surface_.update(replica, now_ns);
-  observe(replica);
+  observe(replica, hands, now_ns);
   if (surface_.is_valid() && !is_framed_) {
     if (shows_help_) help_until_ns_ = now_ns + kHelpNs;
     frame_camera(replica);
@@ -336,6 +390,7 @@ void Picture::draw(const replica::Replica& replica, replica::SessionSource& sour
   hud_.begin_frame(seconds);
   const device::PointerInput input = hud_.input();
   camera_.update(input, context_->size(), seconds);
+  hands.set_view(camera_.orientation());
   if (device::MouseTool* mouse = hands.mouse_tool(); mouse != nullptr && surface_.is_valid())
     mouse->update(input, camera_.rays(context_->size()), surface_.positions(),
                   replica.topology().triangles, seconds);

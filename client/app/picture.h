@@ -25,7 +25,7 @@ class Picture {
   void draw(const replica::Replica& replica, replica::SessionSource& source, Hands& hands,
             std::uint64_t now_ns);
   // To be called often: frames pass faster than pictures are drawn.
-  void observe(const replica::Replica& replica) { forces_.update(replica); }
+  void observe(const replica::Replica& replica, const Hands& hands, std::uint64_t now_ns);
   bool should_close() const { return context_->should_close(); }
   std::uint64_t count() const { return count_; }
   // Draws once more what was drawn last, as finely as it goes, and returns it.
@@ -41,6 +41,8 @@ class Picture {
                                Hands& hands) const;
   std::vector<render::Hold> holds(const replica::Replica& replica);
   void add_participants(const replica::Replica& replica, bool is_replay, ui::HudModel& model) const;
+  void add_own_forces(const replica::Replica& replica, ui::HudModel& model) const;
+  void add_felt_hands(const Hands& hands, ui::HudModel& model) const;
   void add_labels(const replica::Replica& replica, const render::SceneView& scene,
                   ui::HudModel& model) const;
   static void add_messages(const replica::Replica& replica, std::uint64_t now_ns,
@@ -72,6 +74,9 @@ class Picture {
   bool has_asked_for_ghost_ = false;
   std::vector<Vec3f> ghost_;  // where the full solution has the vertices of the last picture
   replica::ForceHistory forces_;
+  // What each device has rendered and what the server said, N.
+  using FeltForces = replica::PeakRings<2, ui::kFeltBins, ui::kFeltBins>;
+  std::array<FeltForces, kToolsPerHand> felt_forces_;
   replica::HeldTissue held_;
   std::uint64_t held_history_ = 0;
   Rate rate_;

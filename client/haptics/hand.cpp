@@ -44,7 +44,7 @@ void Hand::take_messages(std::uint64_t now_us) {
     model_.take(patch);
     patch_us_ = now_us;
   }
-  if (Quatf view; views_.take(view)) workspace_.set_view(view);
+  if (Quatf view; !touch_.touches && views_.take(view)) workspace_.set_view(view);
 }
 
 tool::Verb Hand::verb_of(const device::DeviceReading& reading) {
@@ -89,7 +89,12 @@ Status Hand::step(std::uint64_t now_us) {
   state_.model_force_n = touch_.force_n;
   state_.hand_force_n = safe.force_n;
   state_.hand_torque_nm = safe.torque_nm;
+  state_.hand_force_in_world_n = workspace_.in_world(safe.force_n);
+  state_.time_us = now_us;
   state_.server_force_n = to_double(model_.newest_patch().force_n);
+  state_.largest_force_n = std::max(state_.largest_force_n, length(safe.force_n));
+  state_.largest_server_force_n =
+      std::max(state_.largest_server_force_n, length(state_.server_force_n));
   state_.patch_age_s = input.patch_age_s;
   state_.answer_s = model_.answer_s();
   state_.slope = model_.slope();
@@ -99,6 +104,7 @@ Status Hand::step(std::uint64_t now_us) {
   state_.patches = model_.counts();
   ++state_.steps;
   states_.put(state_);
+  reports_.put(state_);
   if (trace_)
     trace_->add({now_us, to_float(state_.reading.tip_m), to_float(safe.force_n),
                  to_float(state_.server_force_n), static_cast<float>(state_.patch_age_s),

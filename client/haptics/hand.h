@@ -6,7 +6,8 @@
 //   device -> workspace -> touch model -> workspace -> safety -> device
 //
 // Threads: step() and stop() belong to the loop's; put() of each kind to one other thread each, and
-// so do take_reading() and take_state(). None waits for another, and step() does not allocate.
+// so do take_reading(), take_state() and take_report(). None waits for another, and step() does not
+// allocate.
 
 #include <cstdint>
 #include <optional>
@@ -42,13 +43,16 @@ struct HandReading {
 
 // Pictures and statistics are made of this.
 struct HandState {
+  std::uint64_t time_us = 0;  // of this step
   HandReading reading;
   Vec3d model_force_n;                 // world frame, on the tool
   Vec3d hand_force_n, hand_torque_nm;  // in the device's frame, as it was written
+  Vec3d hand_force_in_world_n;         // the same, turned into the world frame
   Vec3d server_force_n;                // of the newest patch, world frame
-  double patch_age_s = 0;              // since it came; 0 before the first
-  double answer_s = 0;                 // from a pose to the answer that belongs to it
-  double slope = 1;                    // of the server's tissue over the local one
+  double largest_force_n = 0, largest_server_force_n = 0;  // since the start
+  double patch_age_s = 0;                                  // since it came; 0 before the first
+  double answer_s = 0;  // from a pose to the answer that belongs to it
+  double slope = 1;     // of the server's tissue over the local one
   double reading_age_s = 0;
   std::uint32_t limits = 0;  // as in SafeForce, of this step
   Safety::Counts limit_counts{};
@@ -64,10 +68,13 @@ class Hand {
   void put(const wire::HapticPatch& patch) { patches_.put(patch); }
   // False: too many came at once, try again later.
   bool put(const wire::HapticLaw& law) { return laws_.try_push(law); }
+  // Waits while the tool touches anything: its force may not turn in a hand that holds still.
   void put_view(const Quatf& world_from_device) { views_.put(world_from_device); }
   // False: there is no newer one.
   bool take_reading(HandReading& reading) { return readings_.take(reading); }
   bool take_state(HandState& state) { return states_.take(state); }
+  // The same for a thread that makes reports of it.
+  bool take_report(HandState& state) { return reports_.take(state); }
 
   // An error: the device is gone.
   Status step(std::uint64_t now_us);
@@ -92,7 +99,7 @@ class Hand {
   SpscQueue<wire::HapticLaw> laws_;
   Newest<Quatf> views_;
   Newest<HandReading> readings_;
-  Newest<HandState> states_;
+  Newest<HandState> states_, reports_;
 
   HandState state_;
   TouchOutput touch_;

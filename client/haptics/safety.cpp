@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "common/wire/hand_report.h"
+
 namespace trocar::haptics {
 namespace {
 
@@ -24,26 +26,10 @@ Vec3d towards(const Vec3d& from, const Vec3d& to, double most) {
 
 }  // namespace
 
+static_assert(kLimits == wire::kHandLimits);
+
 const char* name_of(Limit limit) {
-  switch (limit) {
-    case Limit::NotFinite:
-      return "not finite";
-    case Limit::StaleReading:
-      return "stale reading";
-    case Limit::Jump:
-      return "jump";
-    case Limit::OldPatch:
-      return "old patch";
-    case Limit::Ramp:
-      return "ramp";
-    case Limit::Passivity:
-      return "passivity";
-    case Limit::Slew:
-      return "slew";
-    case Limit::Device:
-      return "device";
-  }
-  return "unknown";
+  return wire::kHandLimitNames[static_cast<std::size_t>(limit)];
 }
 
 void Safety::note(Limit limit, SafeForce& safe) {

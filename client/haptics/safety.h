@@ -21,6 +21,7 @@
 
 namespace trocar::haptics {
 
+// In the order of wire::kHandLimitNames.
 enum class Limit : std::uint8_t {
   NotFinite,
   StaleReading,

@@ -47,6 +47,10 @@ Vec3d Workspace::device_torque(const Vec3d& world_torque_nm) const {
   return turned(view_back_, world_torque_nm * (scale_.force / scale_.motion));
 }
 
+Vec3d Workspace::in_world(const Vec3d& device) const {
+  return turned(view_, device);
+}
+
 double Workspace::world_stiffness(double device_n_m) const {
   const double product = scale_.force * scale_.motion;
   return product > 0 ? device_n_m / product : std::numeric_limits<double>::max();

@@ -37,6 +37,8 @@ class Workspace {
   Vec3d device_force(const Vec3d& world_force_n) const;
   // The same share of the tool's work as with forces: force scale over motion scale.
   Vec3d device_torque(const Vec3d& world_torque_nm) const;
+  // A vector of the device's frame, only turned.
+  Vec3d in_world(const Vec3d& device) const;
   double device_stiffness(double world_n_m) const {
     return world_n_m * scale_.force * scale_.motion;
   }

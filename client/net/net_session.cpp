@@ -78,6 +78,7 @@ replica::SourceStatistics NetSource::Session::statistics() const {
           .datagram_bytes_received = datagram_bytes_received_,
           .datagram_bytes_sent = datagram_bytes_sent_,
           .slices_received = slices_received_,
+          .hand_messages_refused = hand_messages_refused_,
           .has_server_clock = has_server_clock_,
           .server_offset_us = server_offset_us_,
           .returns = absence.returns,
@@ -107,7 +108,8 @@ void NetSource::Session::stop_io() {
   if (stream_) stream_->socket().close(ignored);
   datagrams_.reset();
   resolver_.cancel();
-  for (auto* timer : {&retry_timer_, &room_timer_, &ping_timer_, &wake_timer_, &deadline_timer_})
+  for (auto* timer :
+       {&retry_timer_, &room_timer_, &ping_timer_, &wake_timer_, &deadline_timer_, &hands_timer_})
     timer->cancel();
 }
 
@@ -197,13 +199,16 @@ void NetSource::Session::begin_conversation() {
   in_flight_.clear();
   control_.clear();
   control_.push_back(encode_hello());
-  talkers_ = 2;
+  readings_ = {};
+  reports_.clear();
+  talkers_ = options_.hands != nullptr ? 3 : 2;
   const auto ended = [this](std::exception_ptr failure) {
     --talkers_;
     end_if_failed(failure);
   };
   asio::co_spawn(context_, write_messages(), ended);
   asio::co_spawn(context_, ping(), ended);
+  if (options_.hands != nullptr) asio::co_spawn(context_, serve_hands(), ended);
 }
 
 // A text that says why stands already if this program has broken it.
@@ -221,7 +226,7 @@ void NetSource::Session::break_connection(std::string why) {
       log::warn("the connection to {} broke ({}): trying again", server_name(), why_broken_);
     comeback_.begin(monotonic_ns());
   }
-  for (auto* timer : {&wake_timer_, &ping_timer_, &room_timer_}) timer->cancel();
+  for (auto* timer : {&wake_timer_, &ping_timer_, &room_timer_, &hands_timer_}) timer->cancel();
 }
 
 bool NetSource::Session::may_try_again() const {
@@ -458,6 +463,7 @@ void NetSource::Session::note_pong(const proto::Pong& pong) {
 // This layer itself learns something from messages for the replica, before they are pushed: whoever
 // takes Welcome there is not away any more.
 void NetSource::Session::heed(const proto::Envelope& message) {
+  pass_on_to_hands(message);
   if (message.has_barrier()) is_barrier_ = true;
   if (!message.has_welcome()) return;
   note_welcome(message.welcome());
@@ -486,6 +492,7 @@ void NetSource::Session::deliver_datagram(std::shared_ptr<const proto::Envelope>
                            message->has_surface_change() || message->has_haptic_patches();
   if (!is_expected) return;
   if (message->has_surface_slice()) slices_received_.fetch_add(1, std::memory_order_relaxed);
+  pass_on_to_hands(*message);
   messages_received_.fetch_add(1, std::memory_order_relaxed);
   if (options_.before_message) options_.before_message();
   try_push({std::move(message), monotonic_ns(), bytes});
@@ -532,6 +539,7 @@ asio::awaitable<void> NetSource::Session::deliver(std::shared_ptr<const proto::E
 }
 
 void NetSource::Session::take_outbound() {
+  take_from_hands();
   while (in_flight_.size() < kBuffersPerWrite) {
     const auto next = outbound_.try_pop();
     if (!next) break;

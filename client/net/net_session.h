@@ -50,6 +50,7 @@ class NetSource::Session {
   bool is_away() const { return comeback_.is_away(); }
 
  private:
+  static constexpr std::size_t kMostReports = 64;  // 4 s of two hands
   using Clock = std::chrono::steady_clock;
   using tcp = asio::ip::tcp;
 
@@ -87,6 +88,11 @@ class NetSource::Session {
   void begin_datagrams();
   void deliver_datagram(std::shared_ptr<const proto::Envelope> message, std::size_t bytes);
   void take_outbound();
+  void pass_on_to_hands(const proto::Envelope& message);
+  asio::awaitable<void> serve_hands();
+  void take_readings();
+  void take_reports();
+  void take_from_hands();
   void end_after_stream();
   void end_absence();
   void say_waiting(const std::string& why) const;
@@ -109,8 +115,11 @@ class NetSource::Session {
   int talkers_ = 0;         // coroutines of this connection besides the reader
   tcp::resolver resolver_{context_};
   asio::steady_timer retry_timer_{context_}, room_timer_{context_}, ping_timer_{context_};
-  asio::steady_timer wake_timer_{context_}, deadline_timer_{context_};
-  std::vector<wire::SharedBytes> control_;  // Hello, Ping, Bye: at most one of each
+  asio::steady_timer wake_timer_{context_}, deadline_timer_{context_}, hands_timer_{context_};
+  std::vector<wire::SharedBytes> control_;                 // Hello, Ping, Bye: at most one of each
+  std::array<wire::SharedBytes, kToolsPerHand> readings_;  // for the stream, by tool; null: none
+  std::vector<wire::SharedBytes> reports_;                 // likewise, at most kMostReports
+  std::uint32_t reading_sequence_ = 0;
   std::vector<wire::SharedBytes> in_flight_;
   std::unique_ptr<DatagramPath> datagrams_;  // null: the stream carries everything
   ServerClock clock_;
@@ -132,7 +141,7 @@ class NetSource::Session {
   std::atomic<std::uint64_t> bytes_received_{0}, bytes_sent_{0}, messages_received_{0};
   std::atomic<std::uint64_t> frames_received_{0}, sends_dropped_{0};
   std::atomic<std::uint64_t> datagram_bytes_received_{0}, datagram_bytes_sent_{0};
-  std::atomic<std::uint64_t> slices_received_{0};
+  std::atomic<std::uint64_t> slices_received_{0}, hand_messages_refused_{0};
   std::atomic<double> round_trip_seconds_{0}, shortest_round_trip_seconds_{0};
   std::atomic<double> server_offset_us_{0};
   std::atomic<bool> has_server_clock_{false};

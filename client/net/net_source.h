@@ -7,6 +7,8 @@
 //   connect (retry until the deadline), TLS, check of the certificate, Hello
 //   read frame -> decode -> inbound queue [256 messages] --> poll(sink)
 //   write <---------------- outbound queue [256 messages] <-- send(envelope)
+//   what hands feel ------------> HandLine (hand_line.h) -> the hands' loops
+//   write, or as datagrams <----- HandLine, asked every 4 ms
 //   Ping every 200 ms, Pong -> round trip, the server's clock
 //   datagram path (datagram_path.h): slices of frames in, samples and acknowledgements out
 //
@@ -16,8 +18,9 @@
 //
 // Inbound queue full, by messages or by bytes: nothing is read until there is room, so TCP holds
 // the server back and the server skips frames for us; nothing is dropped and nothing grows.
-// Outbound queue full: send() says false. Text from the server is made printable before anybody
-// sees it. state() changes inside poll() only, so call poll() also while connecting. See
+// Outbound queue full: send() says false. Readings of hands pass both queues: while the stream
+// takes nothing, the newest of each tool waits. Text from the server is made printable before
+// anybody sees it. state() changes inside poll() only, so call poll() also while connecting. See
 // session_source.h for what each member promises.
 
 #include <chrono>
@@ -26,6 +29,7 @@
 #include <string>
 #include <vector>
 
+#include "client/replica/hand_line.h"
 #include "client/replica/session_source.h"
 #include "common/base/result.h"
 #include "common/secure/join_code.h"
@@ -45,6 +49,8 @@ struct NetSourceOptions {
   // Hello. Empty: nothing is compared and nothing is sent.
   std::function<Result<secure::JoinCode>()> join_code;
   bool wants_datagrams = true;  // where the server has them
+  // Hands that feel, or null. It outlives the source, and is called on the Asio thread.
+  replica::HandLine* hands = nullptr;
   // Whoever polls acknowledges each frame, as a Replica does. Else the server does not pace frames.
   bool acks_every_frame = true;
   bool trusts_ca = false;  // the CA in `tls` vouches for the server, so the code need not

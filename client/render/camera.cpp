@@ -53,6 +53,12 @@ device::ViewRays OrbitCamera::rays(Size size) const {
   return view;
 }
 
+Quatf OrbitCamera::orientation() const {
+  const Quatf yaw{0, std::sin(yaw_ / 2), 0, std::cos(yaw_ / 2)};
+  const Quatf pitch{std::sin(-pitch_ / 2), 0, 0, std::cos(pitch_ / 2)};
+  return yaw * pitch;
+}
+
 Matrix4 OrbitCamera::clip_from_world(Size size) const {
   const device::ViewRays v = rays(size);
   const Matrix4 eye_from_world = {v.right.x,

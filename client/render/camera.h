@@ -7,6 +7,7 @@
 
 #include "client/device/view_rays.h"
 #include "client/render/gl_context.h"
+#include "common/math/frame.h"
 #include "common/math/vec3.h"
 
 namespace trocar::render {
@@ -27,6 +28,8 @@ class OrbitCamera {
   void zoom(float factor);
 
   device::ViewRays rays(Size size) const;
+  // World from camera: x to the right of the screen, y up, z towards the person.
+  Quatf orientation() const;
   Matrix4 clip_from_world(Size size) const;
   std::optional<ScreenPoint> project(const Vec3f& world, Size size) const;  // none behind the eye
 

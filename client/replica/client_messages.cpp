@@ -1,17 +1,17 @@
 #include "client/replica/client_messages.h"
 
+#include "common/wire/hand_report_messages.h"
 #include "common/wire/haptic_messages.h"
 #include "proto/wire.pb.h"
 
 namespace trocar::replica {
 
-bool send_tool_sample(SessionSource& source, std::uint32_t tool, std::uint32_t sequence,
-                      const tool::ToolSample& sample, std::uint64_t time_us) {
-  proto::Envelope envelope;
+void write_reading(const HandLineReading& reading, std::uint32_t sequence,
+                   proto::Envelope& envelope) {
   auto& message = *envelope.mutable_tool_sample();
-  message.set_tool(tool);
+  message.set_tool(reading.tool);
   message.set_sequence(sequence);
-  const Pose& pose = sample.world_from_tool;
+  const Pose& pose = reading.sample.world_from_tool;
   message.mutable_position_m()->set_x(pose.position.x);
   message.mutable_position_m()->set_y(pose.position.y);
   message.mutable_position_m()->set_z(pose.position.z);
@@ -19,28 +19,33 @@ bool send_tool_sample(SessionSource& source, std::uint32_t tool, std::uint32_t s
   message.mutable_orientation()->set_y(pose.orientation.y);
   message.mutable_orientation()->set_z(pose.orientation.z);
   message.mutable_orientation()->set_w(pose.orientation.w);
-  message.set_verb(static_cast<proto::Verb>(sample.verb));
-  message.set_client_time_us(time_us);
+  message.set_verb(static_cast<proto::Verb>(reading.sample.verb));
+  message.set_client_time_us(reading.time_us);
+}
+
+bool send_tool_sample(SessionSource& source, std::uint32_t tool, std::uint32_t sequence,
+                      const tool::ToolSample& sample) {
+  proto::Envelope envelope;
+  write_reading({tool, sample, 0}, sequence, envelope);
   return source.send(envelope);
 }
 
-HapticNews haptic_news(const proto::Envelope& message) {
-  HapticNews news;
-  if (message.has_haptic_law()) {
-    const auto law = wire::read(message.haptic_law());
-    if (law)
-      news.law = *law;
+void write_report(const wire::HandReport& report, proto::Envelope& envelope) {
+  wire::write(report, *envelope.mutable_hand_report());
+}
+
+std::uint32_t pass_on(const proto::Envelope& message, HandLine& hands) {
+  std::uint32_t refused = 0;
+  const auto hand_on = [&](const auto& received) {
+    const auto read = wire::read(received);
+    if (read)
+      hands.take(*read);
     else
-      ++news.refused;
-  }
-  for (const auto& received : message.haptic_patches().patch()) {
-    const auto patch = wire::read(received);
-    if (patch)
-      news.patches[patch->tool] = *patch;
-    else
-      ++news.refused;
-  }
-  return news;
+      ++refused;
+  };
+  if (message.has_haptic_law()) hand_on(message.haptic_law());
+  for (const auto& patch : message.haptic_patches().patch()) hand_on(patch);
+  return refused;
 }
 
 bool ask_for_mark(SessionSource& source, bool is_return) {

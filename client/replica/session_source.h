@@ -64,12 +64,13 @@ struct SourceStatistics {
   double shortest_round_trip_seconds = 0;  // of the last 16
   std::uint64_t datagram_bytes_received = 0, datagram_bytes_sent = 0;  // sealed
   std::uint64_t slices_received = 0;                                   // SurfaceSlice messages
-  bool has_server_clock = false;                                       // the offset is known
-  double server_offset_us = 0;      // the server's monotonic clock less this client's
-  std::uint64_t returns = 0;        // after the connection broke
-  double longest_away_seconds = 0;  // of all absences, with the present one
-  double away_seconds = 0;          // of the present one; 0 unless Away
-  double away_left_seconds = 0;     // until it is given up
+  std::uint64_t hand_messages_refused = 0;  // parts of what hands feel that were not as they may be
+  bool has_server_clock = false;            // the offset is known
+  double server_offset_us = 0;              // the server's monotonic clock less this client's
+  std::uint64_t returns = 0;                // after the connection broke
+  double longest_away_seconds = 0;          // of all absences, with the present one
+  double away_seconds = 0;                  // of the present one; 0 unless Away
+  double away_left_seconds = 0;             // until it is given up
 };
 
 // Controls of a recorded source. Seeking delivers, in the following polls, a SurfaceTopology when

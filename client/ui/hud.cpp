@@ -141,10 +141,12 @@ HudActions Hud::draw(const HudModel& model) {
   if (model.is_away) draw_away_veil();
   draw_labels(model, scale_);
   draw_session_panel(model, scale_);
-  draw_participants_panel(model, scale_);
+  const float below_participants = draw_participants_panel(model, scale_);
+  draw_felt_hands(model, below_participants, scale_);
   draw_slow_time(model, scale_);
   draw_recording(model, scale_);
   draw_stale_picture(model, scale_);
+  draw_own_forces(model, scale_);
   draw_messages(model, scale_);
   if (model.timeline) draw_timeline(*model.timeline, scale_, actions);
   draw_help(model, scale_);

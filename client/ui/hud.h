@@ -17,6 +17,7 @@
 #include "client/render/gl_context.h"
 #include "client/render/tool_mesh.h"
 #include "client/replica/session_view.h"
+#include "client/ui/felt_text.h"
 
 namespace trocar::ui {
 
@@ -53,6 +54,20 @@ struct HudTimeline {
   float speed = 1;
 };
 
+// A tool of one's own, whatever holds it.
+struct HudOwnForce {
+  std::string name;  // "force on your tool"
+  render::Colour colour;
+  float force_n = 0;
+};
+
+// A device that feels, for whoever wants to know more.
+struct HudFeltHand {
+  FeltHandFigures figures;
+  std::vector<float> hand_n, server_n;  // over the last seconds, oldest first
+};
+inline constexpr std::size_t kFeltBins = 160;  // of them at most
+
 struct HudModel {
   std::string title;     // "127.0.0.1:7690" or a file's name
   std::string organ;     // "liver, 1,553 surface vertices"
@@ -71,8 +86,11 @@ struct HudModel {
   std::optional<HudTimeline> timeline;
   float greatest_force_n = 0;  // of all participants' `forces_n`: their common scale
   bool shows_regions = true, shows_holds = false, shows_arrows = true, shows_rate = false;
-  std::string recording_text;  // empty: nothing is wrong with the recording
-  std::string ghost_text;      // empty: it is not to be shown
+  std::string recording_text;           // empty: nothing is wrong with the recording
+  std::string ghost_text;               // empty: it is not to be shown
+  std::vector<HudOwnForce> own_forces;  // of a live session
+  float own_peak_n = 0;                 // of all of them together, in the last seconds
+  std::vector<HudFeltHand> felt_hands;  // shown with the rate
   bool shows_help = false;
   bool has_own_tool = false;
   bool can_mark = false;  // an instructor's: he may mark the organ and return it to the mark

@@ -22,14 +22,6 @@ std::string format(const char* pattern, ...) {
   return text;
 }
 
-void row(const char* name, const std::string& value) {
-  ImGui::TableNextRow();
-  ImGui::TableNextColumn();
-  ImGui::TextDisabled("%s", name);
-  ImGui::TableNextColumn();
-  ImGui::TextUnformatted(value.c_str());
-}
-
 std::string clock_text(double seconds) {
   const int whole = static_cast<int>(seconds);
   return format("%d:%04.1f", whole / 60, seconds - whole / 60 * 60);
@@ -199,7 +191,8 @@ void draw_labels(const HudModel& model, float scale) {
 
 void draw_messages(const HudModel& model, float scale) {
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
-  float y = screen.y - (model.timeline ? 92 : 40) * scale;
+  const float bars = static_cast<float>(model.own_forces.size()) * 42;
+  float y = screen.y - (model.timeline ? 92 : 40 + bars) * scale;
   ImDrawList* list = ImGui::GetForegroundDrawList();
   for (auto message = model.messages.rbegin(); message != model.messages.rend(); ++message) {
     const float alpha = std::clamp(5.0f - message->age_seconds, 0.0f, 1.0f);

@@ -1,9 +1,11 @@
 #pragma once
 
-// The parts of the HUD share window flags, colours and the bold font. Only for client/ui's own .cpp
-// files, after <imgui.h>.
+// The parts of the HUD share window flags, colours, the bold font and the lines of their tables.
+// Only for client/ui's own .cpp files, after <imgui.h>.
 
 #include <imgui.h>
+
+#include <string>
 
 #include "client/render/tool_mesh.h"
 
@@ -35,6 +37,15 @@ inline void heading(const char* text) {
   ImGui::PushFont(bold());
   ImGui::TextUnformatted(text);
   ImGui::PopFont();
+}
+
+// A line of a table of two columns.
+inline void row(const char* name, const std::string& value) {
+  ImGui::TableNextRow();
+  ImGui::TableNextColumn();
+  ImGui::TextDisabled("%s", name);
+  ImGui::TableNextColumn();
+  ImGui::TextUnformatted(value.c_str());
 }
 
 }  // namespace trocar::ui

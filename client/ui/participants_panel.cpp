@@ -96,8 +96,8 @@ void draw_figures(const HudParticipant& p) {
 
 }  // namespace
 
-void draw_participants_panel(const HudModel& model, float scale) {
-  if (model.participants.empty()) return;
+float draw_participants_panel(const HudModel& model, float scale) {
+  if (model.participants.empty()) return 0;
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
   ImGui::SetNextWindowPos({screen.x - kMargin * scale, kMargin * scale}, 0, {1, 0});
   ImGui::Begin("participants", nullptr, kGlass);
@@ -128,7 +128,9 @@ void draw_participants_panel(const HudModel& model, float scale) {
     }
     ImGui::EndTable();
   }
+  const float end = ImGui::GetWindowPos().y + ImGui::GetWindowHeight();
   ImGui::End();
+  return end;
 }
 
 }  // namespace trocar::ui

@@ -192,6 +192,9 @@ Status SessionJournal::read_solver_changes(Tick from, Tick to,
                                            const TickVisitor<proto::SolverLog>& visitor) {
   return read_topic(JournalTopic::Solver, from, to, visitor);
 }
+Status SessionJournal::read_hands(Tick from, Tick to, const TickVisitor<proto::HandLog>& visitor) {
+  return read_topic(JournalTopic::Hands, from, to, visitor);
+}
 Status SessionJournal::read_snapshots(Tick from, Tick to,
                                       const TickVisitor<proto::WorldSnapshot>& visitor) {
   return read_topic(JournalTopic::Snapshot, from, to, visitor);

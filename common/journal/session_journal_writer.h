@@ -86,6 +86,9 @@ class SessionJournalWriter {
                                          const proto::FrameState& state) {
     return write(JournalTopic::FrameState, tick, now_ns, state);
   }
+  [[nodiscard]] Status write_hands(Tick tick, std::uint64_t now_ns, const proto::HandLog& hands) {
+    return write(JournalTopic::Hands, tick, now_ns, hands);
+  }
   [[nodiscard]] Status write_gap(Tick tick, std::uint64_t now_ns, const proto::JournalGap& gap) {
     return write(JournalTopic::Gap, tick, now_ns, gap);
   }

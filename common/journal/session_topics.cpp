@@ -28,6 +28,7 @@ const TopicEntry& entry_of(JournalTopic topic) {
       {"/topology/change", proto::SurfaceChange::descriptor()},
       {"/solver", proto::SolverLog::descriptor()},
       {"/loads", proto::ExternalLoads::descriptor()},
+      {"/hands", proto::HandLog::descriptor()},
   }};
   return kEntries[static_cast<std::size_t>(topic)];
 }

@@ -14,6 +14,7 @@
 //   /claims          ClaimLog         frames that have claim events
 //   /solver          SolverLog        frames in which another solver took over, or gave another
 //                                     reason
+//   /hands           HandLog          what hands that feel have felt, as their clients said
 //   /frame_state     FrameState       tools, regions and figures of a frame, as a client got them
 //   /gap             JournalGap       where the queue to the writer was full
 //   /tool/<slot>     ToolState        one channel per tool, for plots in other programs
@@ -48,8 +49,9 @@ enum class JournalTopic : std::uint8_t {
   TopologyChange,
   Solver,
   Loads,
+  Hands,
 };
-inline constexpr int kJournalTopicCount = 13;
+inline constexpr int kJournalTopicCount = 14;
 
 inline constexpr const char* kJournalProfile = "trocar";
 inline constexpr const char* kSessionMetadataName = "trocar.session";

@@ -52,6 +52,21 @@ TEST(Camera, ProjectsWhatItsRaysPassThrough) {
   }
 }
 
+TEST(Camera, ItsOrientationIsThatOfTheScreen) {
+  render::OrbitCamera camera;
+  camera.frame({}, 0.12f);
+  std::mt19937 random(5);
+  std::uniform_real_distribution<float> any(-1, 1);
+  for (int i = 0; i < 200; ++i) {
+    camera.orbit(3 * any(random), any(random));
+    const auto view = camera.rays({1280, 720});
+    const Quatf turn = camera.orientation();
+    EXPECT_LT(length(rotate(turn, {1, 0, 0}) - view.right), 1e-5f);
+    EXPECT_LT(length(rotate(turn, {0, 1, 0}) - view.up), 1e-5f);
+    EXPECT_LT(length(rotate(turn, {0, 0, -1}) - view.forward), 1e-5f);
+  }
+}
+
 class MouseToolTest : public ::testing::Test {
  protected:
   MouseToolTest() {

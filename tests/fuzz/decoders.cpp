@@ -12,6 +12,7 @@
 #include "common/secure/join_code.h"
 #include "common/tool/script.h"
 #include "common/wire/framing.h"
+#include "common/wire/hand_report_messages.h"
 #include "common/wire/haptic_messages.h"
 #include "common/wire/surface_codec.h"
 #include "common/wire/surface_messages.h"
@@ -48,7 +49,8 @@ std::string_view text_of(BytesView bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
-// A client's hand takes these from a server; they are written and read again alike.
+// A client's hand takes these from a server, and a server the last one from a client; they are
+// written and read again alike.
 bool decode_haptics(BytesView bytes) {
   proto::Envelope envelope;
   if (!checked(wire::decode_envelope(bytes, envelope))) return false;
@@ -61,6 +63,7 @@ bool decode_haptics(BytesView bytes) {
     return true;
   };
   if (envelope.has_haptic_law()) return is_read(envelope.haptic_law());
+  if (envelope.has_hand_report()) return is_read(envelope.hand_report());
   bool are_read = envelope.haptic_patches().patch_size() > 0;
   for (const auto& patch : envelope.haptic_patches().patch()) are_read &= is_read(patch);
   return are_read;

@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include "common/secure/datagram_channel.h"
+#include "common/wire/hand_report_messages.h"
 #include "common/wire/haptic_messages.h"
 #include "common/wire/surface_messages.h"
 #include "common/wire/surface_slices.h"
@@ -125,6 +126,12 @@ void save_haptics() {
     wire::write(patch, *patches.mutable_haptic_patches()->add_patch());
   }
   save("haptics", "patches", patches);
+  proto::Envelope report;
+  wire::HandReport felt;
+  for (std::uint64_t i = 1; i <= 3; ++i)
+    felt.moments.push_back({.time_us = 16'000 * i, .hand_force_n = {0, 0.5f, 0}});
+  wire::write(felt, *report.mutable_hand_report());
+  save("haptics", "hand_report", report);
 }
 
 }  // namespace

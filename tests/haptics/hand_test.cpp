@@ -85,6 +85,58 @@ TEST_F(HandTest, RendersInTheDevicesFrame) {
   EXPECT_EQ(reading.time_us, now_us_);
 }
 
+TEST_F(HandTest, AViewTurnsMotionsAndLeavesTheToolWhereItIs) {
+  HandReading before, after;
+  step(0.02);
+  ASSERT_TRUE(hand_.take_reading(before));
+  const Quatf from_the_right{0, std::sqrt(0.5f), 0, std::sqrt(0.5f)};  // right is -z of the world
+  hand_.put_view(from_the_right);
+  step(0.02);
+  ASSERT_TRUE(hand_.take_reading(after));
+  EXPECT_NEAR(length(after.tip_m - before.tip_m), 0, 1e-12);
+  device_.reading.position_m = {0.010, 0.003, 0};
+  step(0.015);
+  ASSERT_TRUE(hand_.take_reading(after));
+  const Vec3d way = after.tip_m - before.tip_m;
+  EXPECT_NEAR(way.x, -0.005, 1e-8) << "5 mm into the picture";
+  EXPECT_NEAR(way.y, 0.003, 1e-8) << "up";
+  EXPECT_NEAR(way.z, -0.010, 1e-8) << "right";
+}
+
+// A force that turned in a hand that holds still would do work out of nothing.
+TEST_F(HandTest, AViewWaitsUntilTheToolTouchesNothing) {
+  press();
+  const Vec3d before_n = device_.last_force_n;
+  HandReading before, after;
+  ASSERT_TRUE(hand_.take_reading(before));
+  const Quatf upside_down{0, 0, 1, 0};
+  hand_.put_view(upside_down);
+  for (int k = 0; k < 20; ++k) step(-0.005);
+  EXPECT_LT(length(device_.last_force_n - before_n), 0.05 * length(before_n));
+  ASSERT_TRUE(hand_.take_reading(after));
+  EXPECT_EQ(after.orientation, before.orientation);
+  for (int k = 0; k < 400; ++k) {
+    if (k % 16 == 0) touch(0);
+    step(std::min(0.02, -0.005 + 0.0005 * k));
+  }
+  EXPECT_EQ(length(device_.last_force_n), 0);
+  ASSERT_TRUE(hand_.take_reading(after));
+  EXPECT_FALSE(after.orientation == before.orientation) << "taken over in free space";
+}
+
+TEST_F(HandTest, AReportHasTheForceInTheWorld) {
+  press();
+  HandState report;
+  ASSERT_TRUE(hand_.take_report(report));
+  EXPECT_EQ(report.time_us, now_us_);
+  EXPECT_NEAR(report.hand_force_in_world_n.y, hand_force_n(), 1e-6);
+  EXPECT_NEAR(report.hand_force_in_world_n.z, 0, 1e-6);
+  EXPECT_GE(report.largest_force_n, hand_force_n());
+  EXPECT_FALSE(hand_.take_report(report)) << "once";
+  HandState state;
+  EXPECT_TRUE(hand_.take_state(state)) << "for somebody else";
+}
+
 TEST_F(HandTest, DoesNotAllocate) {
   press();
   const std::size_t before = allocations;

@@ -25,6 +25,25 @@ Pose pose_of(std::uint8_t hand, Tick tick, const Vec3f& top, tool::Verb& verb) {
   return {top + beside, rotation_from_z({0, 1, 0})};
 }
 
+// The hand of the first tool has felt what its clock says, in micronewtons along y.
+wire::HandReport report_until(std::uint64_t time_us) {
+  wire::HandReport report;
+  for (std::uint64_t i = 0; i < wire::HandReport::kMostMoments; ++i) {
+    const auto moment_us = time_us - 16'000 * (wire::HandReport::kMostMoments - 1 - i);
+    const auto felt_n = 1e-6f * static_cast<float>(moment_us - kClientStart_us);
+    report.moments.push_back({.time_us = moment_us,
+                              .hand_force_n = {0, felt_n, 0},
+                              .model_force_n = {0, 0, 2 * felt_n},
+                              .answer_age_us = 5000,
+                              .limits = 1u << 6});
+  }
+  report.echo_delay_s = 0.030f;
+  report.rate_hz = 1000;
+  report.force_scale = 0.5f;
+  report.device = "a hand, \"made up\"";
+  return report;
+}
+
 }  // namespace
 
 void record_simulation(const std::string& path, Tick dropped_at) {
@@ -54,7 +73,8 @@ void record_simulation(const std::string& path, Tick dropped_at) {
     for (std::uint8_t hand = 0; tick % 4 == 1 && hand < 3; ++hand) {
       tool::Verb verb = tool::Verb::None;
       const Pose pose = pose_of(hand, tick, top, verb);
-      inputs.samples.push_back({tool_slot({hand}, 0), {pose, verb}});
+      const std::uint64_t time_us = hand == 0 ? kClientStart_us + 1000 * tick : 0;
+      inputs.samples.push_back({tool_slot({hand}, 0), {pose, verb}, time_us});
     }
     const auto& done = simulation.tick(inputs, {});
     records.push_back({tick, {}, inputs, done.state_hash});
@@ -74,7 +94,14 @@ void record_simulation(const std::string& path, Tick dropped_at) {
       frame->snapshot = std::make_shared<const Bytes>(Recorder::kQueueBytes + 1);
       frame->snapshot_tick = tick;
     }
+    const auto echo_us = frame->tools.front().touch.echo_time_us;
     (*recorder)->record_frame(frame);
+    const bool has_report = tick >= kFirstReportTick && tick % (8 * kTicksPerFrame) == 0;
+    if (has_report)
+      (*recorder)->record_hand({.tool = tool_slot({0}, 0),
+                                .report = report_until(kClientStart_us + 1000 * tick),
+                                .tick = tick,
+                                .echo_time_us = echo_us});
   }
   const Status closed = (*recorder)->close();
   ASSERT_TRUE(closed.ok()) << closed.error().message;

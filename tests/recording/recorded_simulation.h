@@ -1,8 +1,10 @@
 #pragma once
 
 // A session without a server: hands press, grasp and cut a small liver, and the recorder writes it.
+// The first hand feels.
 // Then copies of the file, with what a test changes in them.
 
+#include <cstdint>
 #include <functional>
 #include <string>
 #include <string_view>
@@ -20,6 +22,10 @@ namespace trocar::recording::testing {
 inline constexpr Tick kRecordedTicks = 2400;
 // Snapshots are of tick 0 and of these.
 inline constexpr Tick kSnapshotTicks[] = {808, 1608};
+
+// The client of hand 0 has a clock of its own, and reports from this tick on.
+inline constexpr std::uint64_t kClientStart_us = 5'000'000;
+inline constexpr Tick kFirstReportTick = 256;
 
 // dropped_at: a frame that is too large for the recorder's queue, or 0.
 void record_simulation(const std::string& path, Tick dropped_at = 0);

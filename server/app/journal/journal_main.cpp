@@ -16,6 +16,7 @@
 #include "common/journal/mcap_repair.h"
 #include "common/journal/session_journal.h"
 #include "common/wire/role.h"
+#include "server/session/recording/force_table.h"
 #include "server/session/recording/verify.h"
 
 namespace trocar::app {
@@ -172,6 +173,19 @@ int repair(const std::string& path, const std::string& to) {
   return 0;
 }
 
+int export_forces(const std::string& path, const std::string& table) {
+  const auto counts = recording::write_force_table(path, table);
+  if (!counts) return report(kProgram, counts.error());
+  std::printf("%s: %" PRIu64 " rows, %" PRIu64 " of them felt by a hand\n", table.c_str(),
+              counts->rows, counts->felt);
+  if (counts->left_out > 0)
+    std::printf("the recording had no room for %" PRIu64 " reports of hands\n", counts->left_out);
+  if (counts->refused > 0)
+    std::printf("%" PRIu64 " reports of hands are out of their ranges: left out\n",
+                counts->refused);
+  return 0;
+}
+
 int run(int argc, char** argv) {
   CLI::App app{"Looks into recorded Trocar sessions (.mcap).", kProgram};
   app.footer(
@@ -181,6 +195,8 @@ int run(int argc, char** argv) {
       "  trocar-journal verify session.mcap --reduction liver.reduction\n"
       "                                                the same for a session that had a "
       "reduction\n"
+      "  trocar-journal export session.mcap --forces forces.csv\n"
+      "                                                forces of tools and hands as a table\n"
       "  trocar-journal repair killed.mcap whole.mcap  for other programs that read MCAP\n"
       "Exit codes: 0 verified, 1 difference found, 2 usage, 3 file cannot be read, 6 not all "
       "could\n"
@@ -199,6 +215,14 @@ int run(int argc, char** argv) {
       app.add_subcommand("verify", "Simulate the session again and compare all that it says");
   auto* mend = app.add_subcommand(
       "repair", "Write a recording that was cut short or is damaged again, as a whole file");
+  std::string force_table;
+  auto* give = app.add_subcommand("export", "Write what a recording holds as a table");
+  give->add_option("FILE", path, "a journal (.mcap)")->required();
+  give->add_option("--forces", force_table,
+                   "a row for each tool and frame: place, force of the tissue, and what a hand "
+                   "felt (CSV)")
+      ->type_name("OUT")
+      ->required();
   mend->add_option("FILE", path, "the journal (.mcap)")->required();
   mend->add_option("NEW", repaired_path, "the file to write, which must not exist")->required();
   for (auto* command : {info, check}) {
@@ -216,6 +240,7 @@ int run(int argc, char** argv) {
   }
   if (auto s = log::configure(kProgram, log_level); !s) return report(kProgram, s.error());
   if (mend->parsed()) return repair(path, repaired_path);
+  if (give->parsed()) return export_forces(path, force_table);
   return check->parsed() ? verify(path, reduction_file, as_json) : show_info(path, as_json);
 }
 

@@ -17,6 +17,7 @@ class RecordedSession : public JournalSink {
                            Tick tick) override {
     recorder_->record_participants(present, tick);
   }
+  void record_hand(wire::HandRecord record) override { recorder_->record_hand(std::move(record)); }
   Status close() override { return recorder_->close(); }
   wire::RecordingState state() const override { return recorder_->state(); }
 

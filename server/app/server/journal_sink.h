@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "common/journal/session_topics.h"
+#include "common/wire/hand_report.h"
 #include "common/wire/recording_state.h"
 #include "common/wire/surface_layout.h"
 #include "server/organs/organ/organ.h"
@@ -26,6 +27,8 @@ class JournalSink {
   // I/O thread: who is here, after each change. `tick` is that of the newest frame.
   virtual void record_participants(const std::vector<participants::Participant>& present,
                                    Tick tick) = 0;
+  // I/O thread: what a hand has felt.
+  virtual void record_hand(wire::HandRecord record) = 0;
   // I/O thread, after the simulation thread has ended.
   virtual Status close() = 0;
   // Any thread, at any time: whether everything has been recorded so far.

@@ -149,6 +149,10 @@ Status Server::open() {
   replication.on_participants = [this](const auto& present, Tick tick) {
     note_participants(present, tick);
   };
+  if (journal_)
+    replication.on_hand_report = [this](wire::HandRecord record) {
+      journal_->record_hand(std::move(record));
+    };
   if (reduction_)
     replication.on_ghost_wanted = [this](bool is_wanted) { ghost_->set_wanted(is_wanted); };
   replicator_ = std::make_unique<replication::Replicator>(

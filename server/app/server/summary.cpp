@@ -59,6 +59,7 @@ Json replication_figures(const Summary& s) {
           {"bytes_sent", s.tcp.bytes_out},
           {"bytes_received", s.tcp.bytes_in},
           {"samples", r.samples},
+          {"hand_reports", r.hand_reports},
           {"samples_dropped", s.inbox.samples_dropped},
           {"frames_published", r.frames_published},
           {"frames_conflated", r.frames_conflated},

@@ -3,6 +3,7 @@
 #include "common/base/log.h"
 #include "common/base/timing.h"
 #include "common/base/version.h"
+#include "common/wire/hand_report_messages.h"
 #include "common/wire/surface_messages.h"
 #include "server/organs/organ/organ_file.h"
 #include "server/session/recording/load_messages.h"
@@ -121,6 +122,14 @@ void Recorder::record_participants(std::vector<participants::Participant> presen
   wake_ups_.notify_one();
 }
 
+void Recorder::record_hand(wire::HandRecord record) {
+  record.left_out = hands_left_out_;
+  const bool is_taken = hands_.try_push(std::move(record));
+  hands_left_out_ = is_taken ? 0 : hands_left_out_ + 1;
+  wake_ups_.fetch_add(1);
+  wake_ups_.notify_one();
+}
+
 void Recorder::run() {
   for (;;) {
     const auto seen = wake_ups_.load();
@@ -137,6 +146,11 @@ bool Recorder::write_queued() {
     any = true;
     if (!status_.ok()) continue;
     if (auto s = write_presence(*presence); !s) fail_with(s.error());
+  }
+  while (const auto record = hands_.try_pop()) {
+    any = true;
+    if (!status_.ok()) continue;
+    if (auto s = write_hand(*record); !s) fail_with(s.error());
   }
   while (auto queued = frames_.try_pop()) {
     any = true;
@@ -161,6 +175,13 @@ Status Recorder::write_presence(const Presence& presence) {
   proto::Participants message;
   replication::describe(presence.present, message);
   return writer_->write_participants(not_before_last(presence.tick), utc_ns(), message);
+}
+
+Status Recorder::write_hand(const wire::HandRecord& record) {
+  proto::HandLog message;
+  wire::write(record, message);
+  // With the frame that was written last: frames that still wait may not become younger by it.
+  return writer_->write_hands(last_tick_, utc_ns(), message);
 }
 
 Status Recorder::write_gap(const Gap& gap) {
@@ -216,6 +237,8 @@ Status Recorder::close() {
   if (open_gap_.frames > 0 && status_.ok()) {
     if (auto s = write_gap(open_gap_); !s) fail_with(s.error());
   }
+  if (hands_left_out_ > 0)
+    log::warn("recording: the last {} reports of what hands felt are missing", hands_left_out_);
   const Status closed = writer_->close();
   if (status_.ok() && !closed.ok()) fail_with(closed.error());
   counters_.bytes_written = writer_->bytes_written();

@@ -4,6 +4,7 @@
 //
 //   simulation thread: record_frame ----> [frames, 8 MiB] --.
 //   I/O thread:        record_participants -> [64 lists] -----+--> writer thread -> MCAP file
+//   I/O thread:        record_hand ------> [512 reports] -----'
 //
 // Neither producer ever waits. When the frames' queue is full a frame is dropped, counted, and the
 // journal gets a JournalGap with the ticks that are missing; the surface goes on with topology and
@@ -24,6 +25,7 @@
 
 #include "common/base/spsc_queue.h"
 #include "common/journal/session_journal_writer.h"
+#include "common/wire/hand_report.h"
 #include "common/wire/recording_state.h"
 #include "common/wire/surface_layout.h"
 #include "server/organs/organ/organ.h"
@@ -52,6 +54,7 @@ class Recorder {
   static constexpr std::size_t kQueueBytes = 8 * 1024 * 1024;
   static constexpr std::size_t kQueueFrames = 1024;
   static constexpr std::size_t kQueueParticipants = 64;
+  static constexpr std::size_t kQueueHands = 512;  // 2 s of 32 tools
 
   // Creates the file with organ and topology; copies what it keeps. Fails if the file exists or
   // cannot be written.
@@ -67,6 +70,8 @@ class Recorder {
   std::size_t queued_bytes() const { return queued_bytes_.load(std::memory_order_relaxed); }
   // The I/O thread calls it after each change.
   void record_participants(std::vector<participants::Participant> present, Tick tick);
+  // The I/O thread calls it. What does not fit is left out, and the next that fits says how many.
+  void record_hand(wire::HandRecord record);
   // After both producers have ended: writes what is queued and the file's summary.
   Status close();
   // After close().
@@ -94,9 +99,10 @@ class Recorder {
   Recorder(std::unique_ptr<journal::SessionJournalWriter> writer, const organ::Organ& organ,
            std::uint64_t organ_hash, const wire::SurfaceLayout& layout, Tick begin_tick);
   void run();
-  // Writes everything queued; false when both queues were empty.
+  // Writes everything queued; false when all queues were empty.
   bool write_queued();
   Status write_presence(const Presence& presence);
+  Status write_hand(const wire::HandRecord& record);
   Status write_gap(const Gap& gap);
   Status write_frame(const step::PublishedFrame& frame);
   void fail_with(const Error& error);
@@ -115,6 +121,8 @@ class Recorder {
   std::atomic<std::uint64_t> frames_dropped_{0};
   SpscQueue<QueuedFrame> frames_{kQueueFrames};
   SpscQueue<Presence> presences_{kQueueParticipants};
+  SpscQueue<wire::HandRecord> hands_{kQueueHands};
+  std::uint64_t hands_left_out_ = 0;  // I/O thread
   std::atomic<std::size_t> queued_bytes_{0};
   Gap open_gap_;  // simulation thread
   std::atomic<std::uint32_t> wake_ups_{0};

@@ -6,6 +6,7 @@
 
 #include "common/base/version.h"
 #include "common/wire/figure_messages.h"
+#include "common/wire/hand_report_messages.h"
 #include "common/wire/surface_messages.h"
 #include "common/wire/tool_shape.h"
 #include "server/session/recording/message_difference.h"
@@ -191,6 +192,10 @@ bool Verifier::check(std::string_view topic, BytesView bytes) {
       }
       compare(topic, *message);
       check_surface(*known, *message);
+      break;
+    case JournalTopic::Hands:  // clients have said so: no simulation knows it
+      if (const auto read = wire::read(static_cast<const proto::HandLog&>(*message)); !read)
+        add_reason(fmt::format("after tick {}: /hands: {}", next_tick_ - 1, read.error().message));
       break;
     case JournalTopic::Claims:
     case JournalTopic::FrameState:

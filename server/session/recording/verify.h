@@ -9,6 +9,7 @@
 //   /surface/*, /topology*       decoded, by CRC; and as messages
 //   /frame_state, /tool/*        every field that is not a measured time: forces, torques, proxies
 //   /claims, /solver             every event; names are those on /participants
+//   /hands                       decoded, within their ranges; no simulation knows them
 //   /participants                slots with tools and the tools' shapes, in frames that are a
 //   second
 //                                away from any change of the list: lists come from another thread,

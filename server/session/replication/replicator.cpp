@@ -215,6 +215,8 @@ std::optional<Replicator::Ending> Replicator::handle_message(Client& client, Byt
       return admit(client, envelope.hello());
     case proto::Envelope::kToolSample:
       return handle_sample(client, envelope.tool_sample(), !client.has_sent_datagrams);
+    case proto::Envelope::kHandReport:
+      return handle_hand_report(client, envelope.hand_report());
     case proto::Envelope::kFrameAck:
       return handle_ack(client, envelope.frame_ack().frame(), envelope.frame_ack().surface_crc());
     case proto::Envelope::kMarkRequest:
@@ -358,6 +360,34 @@ std::optional<Replicator::Ending> Replicator::handle_sample(Client& client,
   ++counters_.samples;
   inbox_.push_sample(
       {tool_slot(participant.slot, checked->tool), checked->sample, checked->client_time_us});
+  return std::nullopt;
+}
+
+std::optional<Replicator::Ending> Replicator::handle_hand_report(Client& client,
+                                                                 const proto::HandReport& message) {
+  const auto& participant = *client.participant;
+  if (!wire::rights_of(participant.role).has_tools)
+    return Ending{EndReason::Role,
+                  "HandReport: an " + text_of_role(participant.role) + " watches and has no hands"};
+  auto report = check_hand_report(message, participant.tools.size());
+  if (!report) return Ending{EndReason::ProtocolError, report.error().message};
+  const auto moments = static_cast<double>(report->moments.size());
+  if (!client.hand_moments.take(moments, options_.clock_ns())) {
+    ++counters_.floods;
+    return Ending{EndReason::ProtocolError,
+                  "HandReport: more than " + std::to_string(options_.max_hand_moments_per_second) +
+                      " moments in a second: send one per frame"};
+  }
+  ++counters_.hand_reports;
+  if (!options_.on_hand_report) return std::nullopt;
+  wire::HandRecord record{.tool = tool_slot(participant.slot, report->tool),
+                          .report = std::move(*report)};
+  if (const auto& frame = encoder_.current()) {
+    record.tick = frame->tick;
+    const auto shown = std::ranges::find(frame->tools, record.tool, &step::ToolFrame::tool);
+    if (shown != frame->tools.end()) record.echo_time_us = shown->touch.echo_time_us;
+  }
+  options_.on_hand_report(std::move(record));
   return std::nullopt;
 }
 

@@ -53,6 +53,7 @@
 namespace trocar::proto {
 class Envelope;
 class ClientDatagram;
+class HandReport;
 class Hello;
 class ToolSample;
 }  // namespace trocar::proto
@@ -140,6 +141,7 @@ class Replicator final : public net::ConnectionHandler {
   std::optional<Ending> handle_sample(Client& client, const proto::ToolSample& sample,
                                       bool is_ordered);
   std::optional<Ending> handle_datagram(Client& client, const proto::ClientDatagram& datagram);
+  std::optional<Ending> handle_hand_report(Client& client, const proto::HandReport& report);
   std::optional<Ending> handle_mark(Client& client, int action);
   void handle_ghost_request(Client& client, bool is_wanted);
   std::optional<Ending> handle_ack(Client& client, Frame frame, std::uint32_t crc);

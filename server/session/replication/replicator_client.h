@@ -15,7 +15,8 @@ struct Replicator::Client {
       : id(its_id),
         feed(connections, its_id, options, counters),
         messages(options.max_messages_per_second, options.clock_ns()),
-        bytes(options.max_bytes_per_second, options.clock_ns()) {}
+        bytes(options.max_bytes_per_second, options.clock_ns()),
+        hand_moments(options.max_hand_moments_per_second, options.clock_ns()) {}
 
   const net::ConnectionId id;
   access::Applicant applicant;                           // as the gate knows it
@@ -25,7 +26,7 @@ struct Replicator::Client {
   bool wants_ghost = false;
   bool has_sent_datagrams = false;
   std::array<std::optional<std::uint32_t>, kToolsPerHand> last_sequence;
-  Allowance messages, bytes;  // that it may send
+  Allowance messages, bytes, hand_moments;  // that it may send
 };
 
 }  // namespace trocar::replication

@@ -9,6 +9,7 @@
 
 #include "common/base/tick.h"
 #include "common/base/timing.h"
+#include "common/wire/hand_report.h"
 #include "common/wire/haptic_patch.h"
 #include "server/session/access/gate.h"
 #include "server/session/participants/roster.h"
@@ -20,6 +21,7 @@ struct ReplicatorOptions {
   participants::Places places;
   std::uint32_t max_messages_per_second = 2000;      // per connection; two tools at 250 Hz need 500
   std::uint32_t max_bytes_per_second = 500'000;      // likewise; they need 100 kB
+  std::uint32_t max_hand_moments_per_second = 150;   // likewise, of HandReports; 2 x 62.5 are usual
   std::size_t skip_above_bytes = 64 * 1024;          // see above
   Frame keyframe_after_frames = 63;                  // about 1 s
   std::uint64_t keyframe_interval_ns = 250'000'000;  // of keyframes on request
@@ -28,6 +30,8 @@ struct ReplicatorOptions {
   std::function<std::uint64_t()> clock_ns = monotonic_ns;
   // Told who is here after each change, with the tick of the newest frame; may be empty.
   std::function<void(const std::vector<participants::Participant>&, Tick)> on_participants;
+  // Told what hands have felt; may be empty.
+  std::function<void(wire::HandRecord)> on_hand_report;
   std::vector<wire::HapticLaw> haptic_laws;  // how the organ answers tools, for hands that feel it
   bool has_datagrams = false;                // the transport takes them; clients are told
   // Null: everybody may come, in any role. It outlives the replicator.
@@ -42,6 +46,7 @@ struct ReplicatorCounters {
   std::array<std::uint64_t, kEndReasonCount> ended{};  // by EndReason, where we ended it
   std::uint64_t floods = 0;                            // sessions ended for too much at once
   std::uint64_t samples = 0;
+  std::uint64_t hand_reports = 0;
   std::uint64_t frames_published = 0;
   std::uint64_t frames_conflated = 0;  // overtaken by a newer one before this thread saw them
   std::uint64_t frames_given = 0, frames_skipped = 0;   // summed over clients

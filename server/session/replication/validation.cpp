@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "common/base/version.h"
+#include "common/wire/hand_report_messages.h"
 #include "common/wire/tool_shape.h"
 #include "proto/wire.pb.h"
 #include "server/session/participants/absences.h"
@@ -96,6 +97,14 @@ Result<CheckedSample> check_tool_sample(const proto::ToolSample& sample, std::si
   checked.sample = {{position, normalized(orientation)}, static_cast<tool::Verb>(sample.verb())};
   checked.client_time_us = sample.client_time_us();
   return checked;
+}
+
+Result<wire::HandReport> check_hand_report(const proto::HandReport& report,
+                                           std::size_t tool_count) {
+  if (report.tool() >= tool_count)
+    return bad("HandReport.tool: " + std::to_string(report.tool()) + ", you have " +
+               std::to_string(tool_count) + " (counted from 0)");
+  return wire::read(report);
 }
 
 }  // namespace trocar::replication

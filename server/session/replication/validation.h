@@ -10,9 +10,11 @@
 #include "common/base/bytes.h"
 #include "common/base/result.h"
 #include "common/tool/tool.h"
+#include "common/wire/hand_report.h"
 #include "server/session/participants/roster.h"
 
 namespace trocar::proto {
+class HandReport;
 class Hello;
 class ToolSample;
 }  // namespace trocar::proto
@@ -65,5 +67,7 @@ struct CheckedSample {
   std::uint64_t client_time_us = 0;
 };
 Result<CheckedSample> check_tool_sample(const proto::ToolSample& sample, std::size_t tool_count);
+
+Result<wire::HandReport> check_hand_report(const proto::HandReport& report, std::size_t tool_count);
 
 }  // namespace trocar::replication
