@@ -7,7 +7,7 @@
 #include <optional>
 #include <vector>
 
-#include "client/app/felt_hand.h"
+#include "client/app/felt_replay.h"
 #include "client/device/mouse_tool.h"
 #include "client/device/script_hand.h"
 #include "client/replica/hand_echo.h"
@@ -24,9 +24,16 @@ class Hands {
   // Each device holds one tool; there are at most two.
   static Hands felt(std::vector<std::unique_ptr<FeltHand>> hands);
 
+  // These feel what was recorded; they hold no tools.
+  static Hands replayed(std::vector<std::unique_ptr<FeltReplay>> hands);
+
   // Returns the tools to offer when joining.
   std::vector<tool::ToolShape> shapes() const;
   const std::vector<std::unique_ptr<FeltHand>>& felt() const { return felt_; }
+  // Returns those of all hands that feel, by number.
+  std::vector<FeltFigures> figures() const;
+  // From now on no hand feels anything. What each did, by number; null: it was not to be kept.
+  std::vector<const haptics::Trace*> let_go();
   // HapticPatches and HapticLaw; what is not as it may be is dropped and counted.
   void take(const proto::Envelope& message);
   std::uint64_t refused_messages() const { return refused_messages_; }
@@ -51,6 +58,7 @@ class Hands {
                    std::uint64_t now_ns);
 
   std::vector<std::unique_ptr<FeltHand>> felt_;
+  std::vector<std::unique_ptr<FeltReplay>> replayed_;
   std::uint64_t refused_messages_ = 0;
   std::optional<device::MouseTool> mouse_;
   tool::ToolShape mouse_shape_;
