@@ -40,12 +40,15 @@ function(project_library folder)
   target_link_libraries(trocar_${name} PUBLIC ${ARG_LINK})
 endfunction()
 
-# project_program(<name> [ABOUT "What its folder is for."] MAIN file.cpp DEPENDS folder... LINK target...): one executable in
-# build/<preset>/bin. DEPENDS names the folders that its files include. Its files are compiled together.
+# project_program(<name> [ABOUT "What its folder is for."] MAIN file.cpp DEPENDS folder... LINK target...
+#                 [JOINED]): one executable in build/<preset>/bin. DEPENDS names the folders that its
+# files include. JOINED: its files are compiled together.
 function(project_program name)
-  cmake_parse_arguments(PARSE_ARGV 1 ARG "" "ABOUT" "MAIN;DEPENDS;LINK")
+  cmake_parse_arguments(PARSE_ARGV 1 ARG "JOINED" "ABOUT" "MAIN;DEPENDS;LINK")
   add_executable(${name} ${ARG_MAIN})
-  set_target_properties(${name} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 12)
+  if(ARG_JOINED)
+    set_target_properties(${name} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 12)
+  endif()
   target_link_libraries(${name} PRIVATE trocar_options ${ARG_LINK})
   foreach(dependency IN LISTS ARG_DEPENDS)
     string(REPLACE "/" "_" dependency_name ${dependency})
