@@ -55,12 +55,12 @@ class FeltHand {
   // start_m: where the tool's tip is at first, world frame, if the device does not say. An error:
   // its shaft does not reach there through the port.
   Status start(const Vec3d& start_m);
-  // As in Hand::put_view; before the start, too.
+  // Does as Hand::put_view; before the start, too.
   void set_view(const Quatf& world_from_device);
   // An error: the device is gone.
   Status check() const;
   const FeltFigures& figures();
-  // Where a reading had the tip, and when it left; what nobody asks for in time is left out.
+  // Says where a reading had the tip, and when it left; what nobody asks for in time is left out.
   struct Sent {
     Vec3f tip_m;
     std::uint64_t ns = 0;
@@ -74,7 +74,7 @@ class FeltHand {
   void take(const wire::HapticPatch& patch);
   // The reading that is due at the server: a hand that rests says so every 20 ms.
   std::optional<haptics::HandReading> pop_reading(std::uint64_t now_ns);
-  // What the hand has felt, if there is enough of it for a report; without the tool's number.
+  // Tells what the hand has felt, if there is enough for a report; without the tool's number.
   std::optional<wire::HandReport> pop_report();
 
  private:

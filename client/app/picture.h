@@ -74,7 +74,7 @@ class Picture {
   bool has_asked_for_ghost_ = false;
   std::vector<Vec3f> ghost_;  // where the full solution has the vertices of the last picture
   replica::ForceHistory forces_;
-  // What each device has rendered and what the server said, N.
+  // Keeps what each device has rendered and what the server said, N.
   using FeltForces = replica::PeakRings<2, ui::kFeltBins, ui::kFeltBins>;
   std::array<FeltForces, kToolsPerHand> felt_forces_;
   replica::HeldTissue held_;

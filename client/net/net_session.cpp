@@ -33,7 +33,10 @@ NetSource::Session::Session(NetSourceOptions options)
     end_if_failed(failure);
     has_ended_.store(true, std::memory_order_release);
   });
-  thread_ = std::thread([this] { context_.run(); });
+  thread_ = std::thread([this] {
+    if (options_.hands != nullptr) take_priority();
+    context_.run();
+  });
 }
 
 NetSource::Session::~Session() {

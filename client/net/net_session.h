@@ -88,6 +88,7 @@ class NetSource::Session {
   void begin_datagrams();
   void deliver_datagram(std::shared_ptr<const proto::Envelope> message, std::size_t bytes);
   void take_outbound();
+  void take_priority();
   void pass_on_to_hands(const proto::Envelope& message);
   asio::awaitable<void> serve_hands();
   void take_readings();

@@ -1,8 +1,11 @@
 // Readings of hands that feel, and the answers to them, on the Asio thread.
 
+#include "client/net/net_session.h"
+
+#include <sched.h>
+
 #include <utility>
 
-#include "client/net/net_session.h"
 #include "client/replica/client_messages.h"
 #include "common/base/timing.h"
 
@@ -10,8 +13,17 @@ namespace trocar::net {
 namespace {
 
 constexpr std::chrono::milliseconds kHandsPeriod{4};
+constexpr int kPriority = 30;  // of 99; that of a hand's loop is higher
 
 }  // namespace
+
+// A picture that is drawn by the processors takes all of them, for longer than a reading may wait.
+// Who may not have the priority goes on without; the hand's loop says so.
+void NetSource::Session::take_priority() {
+  sched_param parameters{};
+  parameters.sched_priority = kPriority;
+  static_cast<void>(::sched_setscheduler(0, SCHED_FIFO | SCHED_RESET_ON_FORK, &parameters));
+}
 
 void NetSource::Session::pass_on_to_hands(const proto::Envelope& message) {
   if (options_.hands == nullptr) return;
@@ -44,7 +56,7 @@ void NetSource::Session::take_readings() {
   if (datagrams_) datagram_bytes_sent_ = datagrams_->bytes_sent();
 }
 
-// What waits for the stream.
+// Takes what waits for the stream.
 void NetSource::Session::take_from_hands() {
   for (auto& reading : readings_)
     if (reading) in_flight_.push_back(std::exchange(reading, nullptr));

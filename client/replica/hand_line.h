@@ -30,7 +30,7 @@ class HandLine {
   virtual void take(const wire::HapticPatch& patch) = 0;  // of the tool that it names
   // The next reading that is due at the server, of any tool; nothing: none is.
   virtual std::optional<HandLineReading> pop_reading(std::uint64_t now_ns) = 0;
-  // What a hand has felt, for the recording; nothing: there is no more at present.
+  // Tells what a hand has felt, for the recording; nothing: there is no more at present.
   virtual std::optional<wire::HandReport> pop_report() = 0;
 };
 

@@ -51,7 +51,7 @@ class PeakRings {
     return out;
   }
 
-  // Of all quantities.
+  // The greatest of all quantities.
   float greatest() const {
     float most = 0;
     for (const auto& ring : rings_) most = std::max(most, *std::ranges::max_element(ring));

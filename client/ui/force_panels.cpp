@@ -1,5 +1,5 @@
-// What one's own tools and hands feel: a bar for everybody, and for whoever looks closer what each
-// device renders beside what the server says.
+// The panels show what one's own tools and hands feel: a bar for everybody, and for whoever looks
+// closer what each device renders beside what the server says.
 
 #include <imgui.h>
 
@@ -110,10 +110,12 @@ void draw_felt_hands(const HudModel& model, float top, float scale) {
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
   ImGui::SetNextWindowPos({screen.x - kMargin * scale, top + kMargin * scale}, 0, {1, 0});
   ImGui::Begin("felt hands", nullptr, kGlass);
+  int number = 0;
   for (const auto& hand : model.felt_hands) {
     const FeltHandText said = describe(hand.figures);
+    ImGui::PushID(number++);
     heading(hand.figures.device.c_str());
-    if (ImGui::BeginTable(hand.figures.device.c_str(), 2, ImGuiTableFlags_SizingFixedFit)) {
+    if (ImGui::BeginTable("figures", 2, ImGuiTableFlags_SizingFixedFit)) {
       row("loop", said.loop);
       row("wakes late", said.lateness);
       row("answers", said.answers);
@@ -123,6 +125,7 @@ void draw_felt_hands(const HudModel& model, float top, float scale) {
       ImGui::EndTable();
     }
     draw_curves(hand, scale);
+    ImGui::PopID();
   }
   ImGui::End();
 }

@@ -11,9 +11,9 @@ namespace trocar::ui {
 void draw_session_panel(const HudModel& model, float scale);
 // Returns where on the screen it ends.
 float draw_participants_panel(const HudModel& model, float scale);
-// What one's own tools meet, as a bar at the bottom.
+// A bar at the bottom shows the force that one's own tools meet.
 void draw_own_forces(const HudModel& model, float scale);
-// What devices render; `top`: where on the screen there is room from.
+// A panel says what devices render; `top`: where on the screen there is room from.
 void draw_felt_hands(const HudModel& model, float top, float scale);
 // A banner while simulated time runs slower than real time.
 void draw_slow_time(const HudModel& model, float scale);

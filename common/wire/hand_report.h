@@ -1,7 +1,7 @@
 #pragma once
 
-// What a hand has felt, for the recording: moments of a client's force loop, a few at once. Nothing
-// that is simulated depends on it.
+// A report tells a recording what a hand has felt: moments of a client's force loop, a few at once.
+// Nothing that is simulated depends on it.
 
 #include <array>
 #include <cstdint>
@@ -14,7 +14,7 @@
 
 namespace trocar::wire {
 
-// What may change a force before a hand gets it, in the order of the bits of `limits`.
+// These safeguards may change a force before a hand gets it, in the order of the bits of `limits`.
 inline constexpr std::size_t kHandLimits = 8;
 inline constexpr std::array<const char*, kHandLimits> kHandLimitNames{
     "not finite", "stale reading", "jump", "old patch", "ramp", "passivity", "slew", "device"};

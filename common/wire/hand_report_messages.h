@@ -10,12 +10,12 @@ class HandReport;
 
 namespace trocar::wire {
 
-// What is out of the message's ranges is brought to their ends: a recording is not worth a session.
+// Brings what is out of the message's ranges to their ends: a recording is not worth a session.
 void write(const HandReport& report, proto::HandReport& message);
 // A message is outside data: an error is one line that names the field.
 Result<HandReport> read(const proto::HandReport& message);
 
-// As it stands in a recording.
+// The same as it stands in a recording.
 void write(const HandRecord& record, proto::HandLog& message);
 Result<HandRecord> read(const proto::HandLog& message);
 

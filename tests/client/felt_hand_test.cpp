@@ -11,24 +11,13 @@
 
 #include "client/app/hands.h"
 #include "common/base/timing.h"
-#include "tests/haptics/fake_device.h"
+#include "tests/client/live_device.h"
 
 namespace trocar::app {
 namespace {
 
 using namespace std::chrono_literals;
-
-// Its readings are always new; it rests, or goes to and fro by 5 mm, twice a second.
-class LiveDevice : public haptics::testing::FakeDevice {
- public:
-  Result<device::DeviceReading> read() override {
-    reading.time_us = monotonic_ns() / 1000;
-    const double turns = static_cast<double>(reading.time_us % 500'000) / 500'000;
-    reading.position_m.x = moves ? 0.005 * std::sin(6.2831853 * turns) : 0;
-    return FakeDevice::read();
-  }
-  std::atomic<bool> moves{false};
-};
+using testing::LiveDevice;
 
 struct Fixture {
   Fixture() {

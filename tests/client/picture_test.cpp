@@ -11,6 +11,7 @@
 #include "common/wire/surface_codec.h"
 #include "server/organs/catalogue/builtin_organs.h"
 #include "server/tissue/world/surface_layout.h"
+#include "tests/client/live_device.h"
 #include "tests/client/synthetic_source.h"
 #include "tests/support/surface_edits.h"
 
@@ -165,6 +166,64 @@ TEST_F(PictureTest, OverlaysChangeWhatTheyAreFor) {
   EXPECT_GT(difference(plain, picture_of(with(&Overlays::holds), {}, "holds")), 300);
   EXPECT_GT(difference(plain, picture_of(with(&Overlays::arrows))), 100);
   EXPECT_GT(difference(plain, picture_of(with(&Overlays::rate), {}, "rate")), 500);
+}
+
+TEST_F(PictureTest, TheForceOnOnesOwnToolIsABar) {
+  const Overlays overlays;
+  const auto with_force = [&](float force_n, const char* name) {
+    return picture_of(
+        overlays,
+        [force_n](proto::Envelope& m) {
+          if (m.has_welcome()) m.mutable_welcome()->set_participant(0);
+          if (!m.has_frame_state()) return true;
+          auto& force = *m.mutable_frame_state()->mutable_tool(0)->mutable_force_n();
+          force.set_x(0), force.set_y(force_n), force.set_z(0);
+          return true;
+        },
+        name);
+  };
+  const render::Image small = with_force(0.1f, "force_small"), large = with_force(1.9f, "force");
+  // The right half of the bar: 0.1 of 0.5 N do not reach it, 1.9 of 2 N do.
+  const Pixel without = mean(small, 650, 684, 720, 690), with = mean(large, 650, 684, 720, 690);
+  EXPECT_GT(with.r + with.g + with.b, without.r + without.g + without.b + 100);
+}
+
+TEST_F(PictureTest, WhatADeviceRendersIsShownWithTheRate) {
+  const Overlays rate{.regions = false, .arrows = false, .rate = true};
+  const render::Image without = picture_of(rate);
+  std::vector<std::unique_ptr<FeltHand>> felt;
+  felt.push_back(std::make_unique<FeltHand>(std::make_unique<testing::LiveDevice>(),
+                                            tool::ToolShape{}, haptics::WorkspaceScale{}, false));
+  hands_ = Hands::felt(std::move(felt));
+  EXPECT_GT(difference(without, picture_of(rate, {}, "felt_hand")), 3000);
+}
+
+TEST_F(PictureTest, ADeviceMovesItsToolAsThePictureIsSeen) {
+  options_.view = {.yaw_deg = 90, .pitch_deg = 0, .zoom = 1};
+  picture_.reset();
+  picture_ = std::move(*Picture::make(options_, "test"));
+  auto device = std::make_unique<testing::LiveDevice>();
+  device->moves = true;
+  std::vector<std::unique_ptr<FeltHand>> felt;
+  felt.push_back(std::make_unique<FeltHand>(std::move(device), tool::ToolShape{},
+                                            haptics::WorkspaceScale{}, false));
+  hands_ = Hands::felt(std::move(felt));
+  source_.queue_start();
+  draw(2);
+  auto& hand = *hands_.felt().front();
+  hand.start({});
+  Vec3d least, most;
+  const auto until = monotonic_ns() + 20'000'000'000;
+  while (most.z - least.z < 0.008 && monotonic_ns() < until) {
+    const auto reading = hand.pop_reading(monotonic_ns());
+    if (!reading) continue;
+    const Vec3d& tip = reading->tip_m;
+    least = {std::min(least.x, tip.x), std::min(least.y, tip.y), std::min(least.z, tip.z)};
+    most = {std::max(most.x, tip.x), std::max(most.y, tip.y), std::max(most.z, tip.z)};
+  }
+  EXPECT_GE(most.z - least.z, 0.008) << "the right of the screen is along z";
+  EXPECT_LT(most.x - least.x, 1e-4);
+  EXPECT_LT(most.y - least.y, 1e-4);
 }
 
 TEST_F(PictureTest, TheGhostIsANetOverTheTissueOfTheColourOfItsDistance) {

@@ -1,4 +1,5 @@
-// What hands have felt, on its way into a recording: what is handed on, and what ends a session.
+// Reports of what hands have felt, on their way into a recording: what is handed on, and what ends
+// a session.
 
 #include <functional>
 #include <mutex>

@@ -1,8 +1,8 @@
 #pragma once
 
-// What the hand of one tool has felt, over the time of the simulation. Its client has a clock of
-// its own; each report in a recording says which time of that clock the tool's pose had in one
-// tick. So the force of a tick meets what the hand felt at the same pose.
+// These are the moments that the hand of one tool has felt, over the time of the simulation. Its
+// client has a clock of its own; each report in a recording says which time of that clock the
+// tool's pose had in one tick. So the force of a tick meets what the hand felt at the same pose.
 //
 //   tick -> client's time of the pose in it, between two reports -> moments around that time
 //
@@ -26,7 +26,7 @@ struct FeltMoment {
 
 class HandMoments {
  public:
-  // In the order of the recording.
+  // Call it in the order of the recording.
   void add(const wire::HandRecord& record);
   // Between the two moments around the pose of that tick; nothing: there are none close to it.
   std::optional<FeltMoment> at(Tick tick) const;
