@@ -266,6 +266,8 @@ void install_signal_handlers() {
   const auto stop = [](int) { stop_requested = 1; };
   std::signal(SIGINT, stop);
   std::signal(SIGTERM, stop);
+  // A terminal that is closed, unless it was told to be of no account (nohup).
+  if (std::signal(SIGHUP, stop) == SIG_IGN) std::signal(SIGHUP, SIG_IGN);
 }
 
 Result<ExitCode> run_with_source(const ClientOptions& options, replica::SessionSource& source,

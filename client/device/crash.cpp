@@ -11,7 +11,10 @@
 namespace trocar::device {
 namespace {
 
-constexpr std::array kCrashSignals{SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT};
+// The first four come again with the instruction that caused them.
+constexpr std::array kCrashSignals{SIGSEGV, SIGBUS,  SIGFPE,  SIGILL, SIGABRT,
+                                   SIGSYS,  SIGQUIT, SIGXCPU, SIGPIPE};
+constexpr std::size_t kFaults = 4;
 constexpr long kCrashWaitNs = 10'000'000;
 
 struct Words {
@@ -41,10 +44,13 @@ void let_go_and_die(int signal, siginfo_t* info, void*) {
   }
   const timespec wait{0, kCrashWaitNs};
   nanosleep(&wait, nullptr);
-  for (std::size_t i = 0; i < kCrashSignals.size(); ++i)
-    if (kCrashSignals[i] == signal) sigaction(signal, &handled_before[i], nullptr);
-  // An instruction that failed fails again; what somebody has sent must be sent again.
-  if (info->si_code <= 0) raise(signal);
+  bool is_fault = false;
+  for (std::size_t i = 0; i < kCrashSignals.size(); ++i) {
+    if (kCrashSignals[i] != signal) continue;
+    sigaction(signal, &handled_before[i], nullptr);
+    is_fault = i < kFaults && info->si_code > 0;
+  }
+  if (!is_fault) raise(signal);
 }
 
 }  // namespace

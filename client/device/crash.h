@@ -17,7 +17,7 @@
 
 namespace trocar::device {
 
-// For SIGSEGV, SIGBUS, SIGFPE, SIGILL and SIGABRT, of the whole program.
+// Handles signals that end a program at once: faults, SIGABRT, SIGSYS, SIGQUIT, SIGXCPU, SIGPIPE.
 void install_crash_handlers();
 // Any thread.
 bool is_crashing();

@@ -69,7 +69,7 @@ class ExitPaths : public ::testing::Test {
 };
 
 TEST_F(ExitPaths, ASignalToStopLetsGoAndSaysGoodbye) {
-  for (const int signal : {SIGTERM, SIGINT}) {
+  for (const int signal : {SIGTERM, SIGINT, SIGHUP}) {
     HeldHaply haply;
     EXPECT_EQ(end_by(signal, haply), 0) << read_text(log());
     EXPECT_TRUE(haply.was_closed()) << "as the protocol of the service wants it";
@@ -77,7 +77,7 @@ TEST_F(ExitPaths, ASignalToStopLetsGoAndSaysGoodbye) {
 }
 
 TEST_F(ExitPaths, ACrashLetsGo) {
-  for (const int signal : {SIGSEGV, SIGABRT}) {
+  for (const int signal : {SIGSEGV, SIGABRT, SIGQUIT}) {
     HeldHaply haply;
     EXPECT_EQ(end_by(signal, haply), 128 + signal);
   }
