@@ -33,6 +33,10 @@ Vec3d TouchModel::model_force(const Response& response) const {
   return normal_ * response.normal_n + response.rest_n;
 }
 
+Vec3d TouchModel::scaled_force(const Response& response, double slope, const Vec3d& lean) const {
+  return model_force(response) * slope + across(lean, normal_) * response.normal_n;
+}
+
 double TouchModel::depth_of(const Vec3d& core_m, double clearance_m) const {
   return dot(normal_, plane_m_ - core_m) + clearance_m;
 }
@@ -92,6 +96,7 @@ TouchOutput TouchModel::step(const TouchInput& input) {
 void TouchModel::blend(double dt_s) {
   const double share = std::min(1.0, dt_s / settings_.blend_s);
   slope_ += (fit_.slope() - slope_) * share;
+  lean_ += (fit_.lean() - lean_) * share;
   correction_n_ += (next_correction_n_ - correction_n_) * share;
   lever_m_ += (next_lever_m_ - lever_m_) * share;
   depth_offset_m_ *= 1 - share;
@@ -116,7 +121,7 @@ void TouchModel::watch_jaws(const TouchInput& input, double dt_s) {
 Vec3d TouchModel::corrected_force(const Response& response) const {
   double gate = 1;
   if (!grips()) gate = std::clamp(response.elastic_n / (settings_.gate * gate_force_n_), 0.0, 1.0);
-  return model_force(response) * slope_ + correction_n_ * gate;
+  return scaled_force(response, slope_, lean_) + correction_n_ * gate;
 }
 
 Vec3d TouchModel::limited_force(const Vec3d& force_n, const Response& response) const {
@@ -127,7 +132,9 @@ Vec3d TouchModel::limited_force(const Vec3d& force_n, const Response& response) 
   if (response.elastic_n <= 0) return {};
   double along_n = std::max(0.0, dot(force_n, normal_));
   along_n = std::min(along_n, pressed_limit_n_);
-  return normal_ * along_n + shortened(across(force_n, normal_), patch_.friction * along_n);
+  const double leans_n = length(lean_) * std::max(0.0, response.normal_n);
+  return normal_ * along_n +
+         shortened(across(force_n, normal_), patch_.friction * along_n + leans_n);
 }
 
 Vec3d TouchModel::stopped_force(const Vec3d& force_n, const Vec3d& core_m, double dt_s) {

@@ -9,6 +9,8 @@
 //   c -> F_server - s M(echo)    gate: falls to 0 with the last 40 % of M, so that no force is left
 //   s -> slope of F_server over M(echo) (slope_fit.h)              in free space
 //
+// where s M stands for s M + r M_n of pushed tissue, r its lean to a side (slope_fit.h).
+//
 // c and s go to their targets within 15 ms, the height of the surface likewise, its slope at once.
 // A surface that moved is in F_server too: M(echo) is moved along, else it would count twice.
 // Where the tool may not go, a local stop takes over (local_events.h).
@@ -100,6 +102,8 @@ class TouchModel {
   void answer(PastState& state, double dt_s);
   double depth_of(const Vec3d& core_m, double clearance_m) const;
   Vec3d model_force(const Response& response) const;
+  // s M, in use, or as the fit has it.
+  Vec3d scaled_force(const Response& response, double slope, const Vec3d& lean) const;
   void use_material();
 
   // A step makes a force of it.
@@ -143,6 +147,7 @@ class TouchModel {
   SlopeFit fit_;
   std::uint64_t last_echo_us_ = 0;
   double slope_ = 1;                        // in use, behind the fit's
+  Vec3d lean_;                              // likewise
   Vec3d correction_n_, next_correction_n_;  // in use, and where it goes
   double gate_force_n_ = 0.02;              // at the echo
   double pressed_limit_n_ = kNoLimit_n;     // along the normal

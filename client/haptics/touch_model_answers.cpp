@@ -150,7 +150,7 @@ void TouchModel::take_stop() {
 
 // Chooses the correction so that the force goes on as it is.
 void TouchModel::keep_force(const Response& response) {
-  correction_n_ = output_.force_n - model_force(response) * slope_;
+  correction_n_ = output_.force_n - scaled_force(response, slope_, lean_);
 }
 
 SymMat3<double> TouchModel::grip_stiffness() const {
@@ -168,6 +168,7 @@ void TouchModel::restart(std::size_t first) {
   fit_.set_slope(grips() ? 1 : materials_[material_].slope);
   fit_.clear_sums();
   slope_ = fit_.slope();
+  lean_ = fit_.lean();
   push_.start(kClearlyAbove_m);
   if (past_.is_empty()) return;
   first = std::max({first, past_.begin(),
@@ -182,7 +183,7 @@ void TouchModel::restart(std::size_t first) {
   const Response& then = past_[first].response;
   next_correction_n_ = {};
   if (touches(patch_.kind))
-    next_correction_n_ = trocar::to_double(patch_.force_n) - model_force(then) * slope_;
+    next_correction_n_ = trocar::to_double(patch_.force_n) - scaled_force(then, slope_, lean_);
   gate_force_n_ = std::max(kLeastGateForce_n, then.elastic_n);
   keep_force(past_[past_.end() - 1].response);
 }
@@ -229,15 +230,20 @@ void TouchModel::correct(const PastState& then, bool is_new_structure) {
     const double dt_s =
         std::min(static_cast<double>(patch_.echo_time_us - last_echo_us_) * 1e-6, kLongestPause_s);
     fit_.add(fit_server_n, fit_local_n, dt_s, stiffness_ratio(response));
+    if (!grips()) {
+      const Vec3d rest_n = server_n - response.rest_n * fit_.slope();
+      fit_.add_lean(rest_n - normal_ * dot(rest_n, normal_), response.normal_n);
+    }
   }
   if (!grips()) materials_[material_].slope = fit_.slope();
-  next_correction_n_ = server_n - local_n * fit_.slope();
+  next_correction_n_ = server_n - scaled_force(response, fit_.slope(), fit_.lean());
   gate_force_n_ = std::max(kLeastGateForce_n, response.elastic_n);
   if (const double force_n = length(server_n); force_n > kLeastGateForce_n)
     next_lever_m_ = trocar::to_double(patch_.torque_nm) / force_n;
   if (is_new_structure && cut_drop_.is_on() && patch_.echo_time_us >= cut_drop_.since_us()) {
     cut_drop_.confirm();
     slope_ = fit_.slope();
+    lean_ = fit_.lean();
     keep_force(past_[past_.end() - 1].response);
   }
 }

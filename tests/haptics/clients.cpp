@@ -9,10 +9,10 @@ namespace {
 
 class Model : public Client {
  public:
-  Model(const tool::ToolShape& shape, const wire::HapticLaw& law, const TouchSettings& settings,
-        ChangePatch change)
+  Model(const tool::ToolShape& shape, const std::vector<wire::HapticLaw>& laws,
+        const TouchSettings& settings, ChangePatch change)
       : model_(shape, settings), change_(std::move(change)) {
-    model_.take(law);
+    for (const auto& law : laws) model_.take(law);
   }
   void take(const wire::HapticPatch& patch) override {
     wire::HapticPatch changed = patch;
@@ -33,7 +33,7 @@ class Model : public Client {
 // A force from the newest patch alone, blended over 15 ms when one comes.
 class Scheme : public Client {
  public:
-  using Force = std::function<Vec3d(const wire::HapticPatch&, const Vec3d& tip_m)>;
+  using Force = std::function<Vec3d(const wire::HapticPatch&, const TouchInput&)>;
   explicit Scheme(Force force) : force_(std::move(force)) {}
 
   void take(const wire::HapticPatch& patch) override {
@@ -44,7 +44,7 @@ class Scheme : public Client {
   TouchOutput step(const TouchInput& input) override {
     TouchOutput output;
     if (!has_patch_) return output;
-    Vec3d force_n = force_(patch_, input.tip_m);
+    Vec3d force_n = force_(patch_, input);
     if (is_new_) {
       jump_n_ = last_n_ - force_n;
       left_ = 1;
@@ -107,11 +107,35 @@ bool touches(const wire::HapticPatch& patch) {
   return patch.kind != wire::TouchKind::Free && patch.kind != wire::TouchKind::Near;
 }
 
+constexpr double kPenalty_n_m = 1000, kFace_n_m = 3000;
+constexpr double kVelocity_s = 0.004, kShare_s = 0.05;
+
+// How deep the tool is behind the surface that the server's tool had pressed.
+double penalty_depth(const wire::HapticPatch& patch, const Vec3d& tip_m) {
+  const Vec3d normal = to_double(patch.plane_normal), force_n = to_double(patch.force_n);
+  const Vec3d surface_m = touches(patch) ? to_double(patch.used_position_m) +
+                                               normal * (dot(force_n, normal) / kFace_n_m)
+                                         : to_double(patch.plane_point_m);
+  const double depth_m = dot(normal, surface_m - tip_m);
+  return patch.kind == wire::TouchKind::Grip ? depth_m : std::max(0.0, depth_m);
+}
+
+Vec3d penalty_force(const wire::HapticPatch& patch, const Vec3d& tip_m, double stiffness_n_m) {
+  const Vec3d normal = to_double(patch.plane_normal), force_n = to_double(patch.force_n);
+  return with_friction(patch, normal * (stiffness_n_m * penalty_depth(patch, tip_m)) +
+                                  (force_n - normal * dot(force_n, normal)));
+}
+
+SymMat3<double> symmetric(const SymMat3f& k) {
+  return {k.xx, k.xy, k.xz, k.yy, k.yz, k.zz};
+}
+
 }  // namespace
 
-std::unique_ptr<Client> make_model(const tool::ToolShape& shape, const wire::HapticLaw& law,
+std::unique_ptr<Client> make_model(const tool::ToolShape& shape,
+                                   const std::vector<wire::HapticLaw>& laws,
                                    const TouchSettings& settings, const ChangePatch& change) {
-  return std::make_unique<Model>(shape, law, settings, change);
+  return std::make_unique<Model>(shape, laws, settings, change);
 }
 
 std::unique_ptr<Client> make_safe(std::unique_ptr<Client> client) {
@@ -120,36 +144,55 @@ std::unique_ptr<Client> make_safe(std::unique_ptr<Client> client) {
 
 std::unique_ptr<Client> make_hold() {
   return std::make_unique<Scheme>(
-      [](const wire::HapticPatch& patch, const Vec3d&) { return to_double(patch.force_n); });
+      [](const wire::HapticPatch& patch, const TouchInput&) { return to_double(patch.force_n); });
 }
 
 std::unique_ptr<Client> make_linear(double stiffness_factor) {
-  return std::make_unique<Scheme>([=](const wire::HapticPatch& patch, const Vec3d& tip_m) {
-    const SymMat3f& k = patch.stiffness_n_m;
-    const SymMat3<double> stiffness{k.xx, k.xy, k.xz, k.yy, k.yz, k.zz};
+  return std::make_unique<Scheme>([=](const wire::HapticPatch& patch, const TouchInput& input) {
+    const SymMat3<double> stiffness = symmetric(patch.stiffness_n_m);
     const Vec3d normal = to_double(patch.plane_normal);
     if (!touches(patch)) {
-      const double depth_m = dot(normal, to_double(patch.plane_point_m) - tip_m);
+      const double depth_m = dot(normal, to_double(patch.plane_point_m) - input.tip_m);
       return normal * std::max(0.0, depth_m * dot(normal, stiffness * normal) * stiffness_factor);
     }
-    const Vec3d way_m = tip_m - to_double(patch.used_position_m);
+    const Vec3d way_m = input.tip_m - to_double(patch.used_position_m);
     return with_friction(patch, to_double(patch.force_n) - stiffness * way_m * stiffness_factor);
   });
 }
 
 std::unique_ptr<Client> make_penalty() {
-  return std::make_unique<Scheme>([](const wire::HapticPatch& patch, const Vec3d& tip_m) {
-    constexpr double kStiffness_n_m = 1000, kFace_n_m = 3000;
-    const Vec3d normal = to_double(patch.plane_normal), force_n = to_double(patch.force_n);
-    const Vec3d surface_m = touches(patch) ? to_double(patch.used_position_m) +
-                                                 normal * (dot(force_n, normal) / kFace_n_m)
-                                           : to_double(patch.plane_point_m);
-    const double depth_m = dot(normal, surface_m - tip_m);
-    const bool holds = patch.kind == wire::TouchKind::Grip;
-    return with_friction(patch,
-                         normal * (kStiffness_n_m * (holds ? depth_m : std::max(0.0, depth_m))) +
-                             (force_n - normal * dot(force_n, normal)));
+  return std::make_unique<Scheme>([](const wire::HapticPatch& patch, const TouchInput& input) {
+    return penalty_force(patch, input.tip_m, kPenalty_n_m);
   });
+}
+
+std::unique_ptr<Client> make_scaled_penalty() {
+  struct Motion {
+    Vec3d tip_m, velocity_m_s;
+    std::uint64_t time_us = 0;
+    double share = 1;  // of the stiffness
+  };
+  return std::make_unique<Scheme>(
+      [last = Motion{}](const wire::HapticPatch& patch, const TouchInput& input) mutable {
+        const Vec3d normal = to_double(patch.plane_normal);
+        const double dt_s = static_cast<double>(input.time_us - last.time_us) * 1e-6;
+        if (last.time_us != 0) {
+          const Vec3d velocity_m_s = (input.tip_m - last.tip_m) / dt_s;
+          last.velocity_m_s += (velocity_m_s - last.velocity_m_s) * (dt_s / (dt_s + kVelocity_s));
+          const double tissue_n_m = dot(normal, symmetric(patch.stiffness_n_m) * normal);
+          // The tissue gives way by this share of a motion, which the old surface does not show.
+          const double yields = kPenalty_n_m / (kPenalty_n_m + std::max(0.0, tissue_n_m));
+          const double inwards_m_s = std::max(0.0, -dot(normal, last.velocity_m_s));
+          const double lag_s = static_cast<double>(input.time_us - patch.echo_time_us) * 1e-6;
+          const double depth_m = std::max(1e-4, penalty_depth(patch, input.tip_m));
+          const double due_m = std::max(1e-4, (1 - yields) * depth_m);
+          const double share = due_m / (due_m + yields * inwards_m_s * lag_s);
+          last.share += (std::clamp(share, 0.05, 1.0) - last.share) * (dt_s / kShare_s);
+        }
+        last.tip_m = input.tip_m;
+        last.time_us = input.time_us;
+        return penalty_force(patch, input.tip_m, kPenalty_n_m * last.share);
+      });
 }
 
 }  // namespace trocar::haptics::testing

@@ -5,6 +5,7 @@
 
 #include <functional>
 #include <memory>
+#include <vector>
 
 #include "client/haptics/touch_model.h"
 
@@ -19,7 +20,8 @@ class Client {
 
 // Changes each patch before the model sees it; `now_us`: the time of its arrival.
 using ChangePatch = std::function<void(wire::HapticPatch&, std::uint64_t now_us)>;
-std::unique_ptr<Client> make_model(const tool::ToolShape& shape, const wire::HapticLaw& law,
+std::unique_ptr<Client> make_model(const tool::ToolShape& shape,
+                                   const std::vector<wire::HapticLaw>& laws,
                                    const TouchSettings& settings = {},
                                    const ChangePatch& change = nullptr);
 
@@ -29,6 +31,9 @@ std::unique_ptr<Client> make_hold();
 std::unique_ptr<Client> make_linear(double stiffness_factor);
 // A spring of 1 N/mm between the tool and the dented surface as the server had it.
 std::unique_ptr<Client> make_penalty();
+// The same spring is softer the faster the tool goes in and the older the surface is, so that the
+// tissue's yielding since is not felt as stiffness (after Schuwerk et al. 2015, ACM TAP 13:1).
+std::unique_ptr<Client> make_scaled_penalty();
 
 // Puts any of them behind the safety chain, on a device of 3.3 N.
 std::unique_ptr<Client> make_safe(std::unique_ptr<Client> client);

@@ -3,10 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <complex>
 #include <deque>
-#include <numbers>
-#include <random>
 #include <vector>
 
 namespace trocar::haptics::testing {
@@ -14,41 +11,6 @@ namespace {
 
 constexpr double kQuantum_m = 20e-6;  // of the device
 constexpr int kServerRamp = 10;       // ticks in which the server's tool reaches a reading
-constexpr double kStartUp_s = 0.3;
-constexpr double kClearOfTissue_m = 0.002;
-
-// Messages on their way; each is lost or comes on its own.
-template <typename Message>
-class Channel {
- public:
-  Channel(const Line& line, std::uint64_t seed) : line_(line), random_(seed) {
-    if (line_.jitter_s < 0) line_.jitter_s = 0.02 * line_.rtt_s + 0.0002;
-  }
-  void send(double now_s, const Message& message) {
-    const double delay_s =
-        line_.rtt_s / 2 +
-        line_.jitter_s * -std::log(1 - std::generate_canonical<double, 53>(random_));
-    const bool is_lost = std::generate_canonical<double, 53>(random_) < line_.loss;
-    if (!is_lost) under_way_.push_back({now_s + delay_s, message});
-  }
-  template <typename Take>
-  void deliver(double now_s, const Take& take) {
-    for (std::size_t i = 0; i < under_way_.size();) {
-      if (under_way_[i].first > now_s) {
-        ++i;
-        continue;
-      }
-      take(under_way_[i].second);
-      under_way_[i] = under_way_.back();
-      under_way_.pop_back();
-    }
-  }
-
- private:
-  Line line_;
-  std::mt19937_64 random_;
-  std::vector<std::pair<double, Message>> under_way_;
-};
 
 struct Reading {
   double s = 0;
@@ -168,73 +130,6 @@ class Server {
   std::uint32_t structure_ = 0, sequence_ = 0;
 };
 
-struct Record {
-  std::vector<Vec3d> tip_m, rendered_n, true_n;
-  double cut_s = -1;
-};
-
-void measure_cycles(const Motion& motion, const Record& record, Outcome& outcome) {
-  const std::size_t count = record.tip_m.size();
-  const double cycles = std::floor((motion.seconds - 1.5) * motion.frequency_hz);
-  const std::size_t first =
-      count - static_cast<std::size_t>(std::round(cycles / motion.frequency_hz / kDt_s));
-  std::complex<double> rendered, truth;
-  for (std::size_t k = first; k < count; ++k) {
-    const double angle =
-        2 * std::numbers::pi * motion.frequency_hz * static_cast<double>(k) * kDt_s;
-    rendered += record.rendered_n[k].z * std::polar(1.0, -angle);
-    truth += record.true_n[k].z * std::polar(1.0, -angle);
-    const Vec3d way_m = record.tip_m[k] - record.tip_m[k - 1];
-    outcome.cycle_mj += dot(record.rendered_n[k - 1], way_m) * 1e3 / cycles;
-    outcome.true_cycle_mj += dot(record.true_n[k - 1], way_m) * 1e3 / cycles;
-  }
-  outcome.gain = std::abs(rendered) / std::abs(truth);
-  outcome.phase_deg = std::arg(rendered / truth) * 180 / std::numbers::pi;
-}
-
-void measure_steady(const Motion& motion, const Record& record, Outcome& outcome) {
-  const std::size_t count = record.tip_m.size();
-  const auto first = static_cast<std::size_t>(motion.steady_from_s / kDt_s);
-  double rendered = 0, truth = 0, height = 0, wobble = 0;
-  for (std::size_t k = first; k < count; ++k) {
-    rendered += record.rendered_n[k].z;
-    truth += record.true_n[k].z;
-    height += record.tip_m[k].z / static_cast<double>(count - first);
-  }
-  for (std::size_t k = first; k < count; ++k)
-    wobble += (record.tip_m[k].z - height) * (record.tip_m[k].z - height);
-  outcome.steady = rendered / truth - 1;
-  outcome.wobble_m = std::sqrt(wobble / static_cast<double>(count - first));
-}
-
-Outcome measure(const Motion& motion, const Record& record) {
-  Outcome outcome;
-  const std::size_t count = record.tip_m.size();
-  for (const Vec3d& f : record.true_n) outcome.peak_n = std::max(outcome.peak_n, length(f));
-  double sum = 0, work_mj = 0;
-  for (std::size_t k = 1; k < count; ++k) {
-    const double s = static_cast<double>(k) * kDt_s;
-    const double miss_n = length(record.rendered_n[k] - record.true_n[k]);
-    if (s >= kStartUp_s) sum += miss_n * miss_n;
-    if (s >= kStartUp_s) outcome.greatest = std::max(outcome.greatest, miss_n / outcome.peak_n);
-    outcome.step_n =
-        std::max(outcome.step_n, length(record.rendered_n[k] - record.rendered_n[k - 1]));
-    outcome.true_step_n =
-        std::max(outcome.true_step_n, length(record.true_n[k] - record.true_n[k - 1]));
-    work_mj += dot(record.rendered_n[k - 1], record.tip_m[k] - record.tip_m[k - 1]) * 1e3;
-    outcome.work_mj = std::max(outcome.work_mj, work_mj);
-    if (record.tip_m[k].z > kClearOfTissue_m && motion.grasp_s < 0)
-      outcome.free_n = std::max(outcome.free_n, length(record.rendered_n[k]));
-    if (record.cut_s >= 0 && outcome.recovery_s < 0 && s > record.cut_s + 0.003 &&
-        miss_n < 0.15 * motion.cut_n)
-      outcome.recovery_s = s - record.cut_s;
-  }
-  outcome.rms = std::sqrt(sum / (static_cast<double>(count) - kStartUp_s / kDt_s)) / outcome.peak_n;
-  if (motion.frequency_hz > 0) measure_cycles(motion, record, outcome);
-  if (motion.steady_from_s >= 0) measure_steady(motion, record, outcome);
-  return outcome;
-}
-
 }  // namespace
 
 Frame Frame::tilted() {
@@ -246,6 +141,13 @@ Frame Frame::tilted() {
   return frame;
 }
 
+Measured measured_of(const Motion& motion) {
+  return {.frequency_hz = motion.frequency_hz,
+          .steady_from_s = motion.steady_from_s,
+          .cut_n = motion.cut_n,
+          .is_free = motion.grasp_s < 0};
+}
+
 Outcome run(const Motion& motion, TissueFigures figures, const MakeClient& make_client,
             const Line& line, const Hand& hand, std::uint64_t seed) {
   figures.bump_m = motion.bump_m;
@@ -253,8 +155,8 @@ Outcome run(const Motion& motion, TissueFigures figures, const MakeClient& make_
   Server server(motion, figures, frame);
   SurrogateTissue truth(figures);
   const auto client = make_client();
-  Channel<Readings> up(line, seed * 7 + 1);
-  Channel<wire::HapticPatch> down(line, seed * 13 + 5);
+  Channel<Readings> up(line, line.reading_hz, seed * 7 + 1);
+  Channel<wire::HapticPatch> down(line, line.patch_hz, seed * 13 + 5);
   HeldDevice device(hand);
   server.start_at(hand.place_m);
   Readings readings{{{-1, hand.place_m}, {-1, hand.place_m}, {-1, hand.place_m}}};
@@ -292,7 +194,7 @@ Outcome run(const Motion& motion, TissueFigures figures, const MakeClient& make_
     record.true_n.push_back(truth.force_n());
     device.step(motion.wanted_m(s), force_n);
   }
-  return measure(motion, record);
+  return measure(measured_of(motion), record);
 }
 
 }  // namespace trocar::haptics::testing

@@ -9,6 +9,8 @@
 #include <string>
 
 #include "tests/haptics/clients.h"
+#include "tests/haptics/line.h"
+#include "tests/haptics/record.h"
 #include "tests/haptics/surrogate_tissue.h"
 
 namespace trocar::haptics::testing {
@@ -28,31 +30,13 @@ struct Motion {
   double bump_m = 0;       // waves of the surface
 };
 
-struct Line {
-  double rtt_s = 0.05;
-  double loss = 0.01;
-  double jitter_s = -1;  // below 0: 2 % of the way and 0.2 ms
-  double patch_hz = 62.5, reading_hz = 250;
-};
+// Says what is to be measured of it.
+Measured measured_of(const Motion& motion);
 
 struct Hand {
   double mass_kg = 0.15, stiffness_n_m = 400, damping_n_s_m = 4.5;
   double reflex_n_m = 80, reflex_s = 0.06;
   Vec3d place_m{0, 0, 0.006}, speed_m_s;
-};
-
-struct Outcome {
-  double rms = 0;                      // error over the peak of the truth
-  double greatest = 0;                 // likewise
-  double step_n = 0, true_step_n = 0;  // greatest change in a millisecond
-  double gain = 1, phase_deg = 0;
-  double steady = 0;                       // error over the truth
-  double work_mj = 0;                      // the most done on the hand since the start
-  double cycle_mj = 0, true_cycle_mj = 0;  // done on the hand in a cycle
-  double wobble_m = 0;
-  double free_n = 0;       // greatest force 2 mm and more above the surface
-  double recovery_s = -1;  // from a cut until the force is right within 15 %
-  double peak_n = 0;
 };
 
 using MakeClient = std::function<std::unique_ptr<Client>()>;

@@ -23,7 +23,7 @@ Worst measure_all(const std::function<Motion(double)>& make_motion, double rtt_s
   for (const Trial& trial : trials()) {
     const wire::HapticLaw law = client_law(trial.tissue, trial.guess);
     const Outcome outcome = run(make_motion(trial.tissue.stiffness_n_m), trial.tissue,
-                                [&] { return make_model(probe(), law); }, {.rtt_s = rtt_s});
+                                [&] { return make_model(probe(), {law}); }, {.rtt_s = rtt_s});
     worst.rms += outcome.rms / static_cast<double>(trials().size());
     worst.gain_error = std::max(worst.gain_error, std::abs(outcome.gain - 1));
     worst.phase_deg = std::max(worst.phase_deg, std::abs(outcome.phase_deg));
@@ -101,7 +101,7 @@ TEST(ClosedLoop, LossesChangeLittle) {
   const wire::HapticLaw law = client_law(trial.tissue, trial.guess);
   const auto measure = [&](double loss) {
     return run(palpation(trial.tissue.stiffness_n_m, 1), trial.tissue,
-               [&] { return make_model(probe(), law); }, {.rtt_s = 0.05, .loss = loss})
+               [&] { return make_model(probe(), {law}); }, {.rtt_s = 0.05, .loss = loss})
         .rms;
   };
   EXPECT_NEAR(measure(0.05), measure(0), 0.005);
@@ -154,7 +154,7 @@ TEST(ClosedLoop, IsStableWithAnyHand) {
     for (const Hand& hand : {Hand{}, loose, barely, firm, quick_reflex, slow_reflex})
       for (const double rtt_s : {0.0, 0.05, 0.1, 0.15}) {
         const Outcome outcome = run(
-            press(stiffness_n_m), tissue, [&] { return make_model(probe(), law); },
+            press(stiffness_n_m), tissue, [&] { return make_model(probe(), {law}); },
             {.rtt_s = rtt_s}, hand);
         worst_wobble_m = std::max(worst_wobble_m, outcome.wobble_m);
         worst_work_mj = std::max(worst_work_mj, outcome.work_mj);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <sstream>
 
 namespace trocar::haptics::testing {
 namespace {
@@ -36,7 +37,9 @@ Motion press(double stiffness_n_m) {
 
 Motion palpation(double stiffness_n_m, double frequency_hz) {
   const double share = depth_share(stiffness_n_m);
-  return {.name = "palpation",
+  std::ostringstream name;
+  name << frequency_hz << " Hz";
+  return {.name = name.str(),
           .seconds = frequency_hz < 1 ? 7.5 : 5.5,
           .wanted_m =
               [=](double t) {

@@ -15,7 +15,7 @@ constexpr Line kLine{.rtt_s = 0.1};
 using Make = std::function<std::unique_ptr<Client>(const wire::HapticLaw&)>;
 
 std::unique_ptr<Client> ours(const wire::HapticLaw& law) {
-  return make_model(probe(), law);
+  return make_model(probe(), {law});
 }
 
 double mean_of(double Outcome::*figure, const std::function<Motion(double)>& motion,
@@ -45,7 +45,7 @@ TEST(Mutants, TheModelPasses) {
 
 TEST(Mutants, TimeOfArrivalForTimeOfEchoFails) {
   const auto mutant = [](const wire::HapticLaw& law) {
-    return make_model(probe(), law, {}, [](wire::HapticPatch& patch, std::uint64_t now_us) {
+    return make_model(probe(), {law}, {}, [](wire::HapticPatch& patch, std::uint64_t now_us) {
       patch.echo_time_us = now_us;
     });
   };
@@ -55,7 +55,7 @@ TEST(Mutants, TimeOfArrivalForTimeOfEchoFails) {
 TEST(Mutants, NoRelaxationFails) {
   const auto mutant = [](wire::HapticLaw law) {
     law.relaxation = {};
-    return make_model(probe(), law);
+    return make_model(probe(), {law});
   };
   EXPECT_GT(mean_of(&Outcome::rms, palpation_1hz, mutant), kMost1Hz);
 }

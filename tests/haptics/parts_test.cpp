@@ -36,6 +36,26 @@ TEST(SlopeFit, StaysWhereItIsWithoutForceOrPrior) {
   EXPECT_NEAR(fit.slope(), 1.2, 1e-9);
 }
 
+TEST(SlopeFit, FindsALean) {
+  SlopeFit fit(0.5, 0.01);
+  // The force across grows by 0.1 of that along the normal, around a constant that is no lean.
+  for (int k = 0; k < 200; ++k) {
+    const double local_n = 0.3 + 0.2 * std::sin(0.2 * k);
+    fit.add({1.3 * local_n, 0, 0}, {local_n, 0, 0}, 0.016, std::nullopt);
+    fit.add_lean({0, 0.05 - 0.1 * local_n, 0.04 * local_n}, local_n);
+  }
+  EXPECT_NEAR(fit.lean().y, -0.1, 0.005);
+  EXPECT_NEAR(fit.lean().z, 0.04, 0.005);
+  for (int k = 0; k < 200; ++k) {
+    const double local_n = 0.3 + 0.2 * std::sin(0.2 * k);
+    fit.add({1.3 * local_n, 0, 0}, {local_n, 0, 0}, 0.016, std::nullopt);
+    fit.add_lean({0, 0, 9 * local_n}, local_n);
+  }
+  EXPECT_LE(length(fit.lean()), SlopeFit::kMostLean * fit.slope() + 1e-12);
+  fit.clear_sums();
+  EXPECT_EQ(fit.lean(), Vec3d{});
+}
+
 TEST(SlopeFit, IsBounded) {
   SlopeFit fit(0.5, 0.01);
   for (int k = 0; k < 100; ++k) fit.add({9, 0, 0}, {0.3, 0, 0}, 0.016, 30);
@@ -43,7 +63,7 @@ TEST(SlopeFit, IsBounded) {
   for (int k = 0; k < 100; ++k) fit.add({}, {0.3, 0, 0}, 0.016, 0);
   EXPECT_EQ(fit.slope(), SlopeFit::kLeast);
   fit.restart({}, {0.3, 0, 0});
-  EXPECT_EQ(fit.slope(), SlopeFit::kLeastAtOnce);
+  EXPECT_EQ(fit.slope(), SlopeFit::kLeast);
   fit.restart({0.15, 0, 0}, {0.3, 0, 0});
   EXPECT_NEAR(fit.slope(), 0.5, 1e-12);
 }

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "server/tissue/contact/contact_law.h"
 #include "server/tissue/contact/proxies.h"
@@ -16,7 +15,6 @@ using wire::TouchKind;
 // Across the normal, tissue is so much softer than along it (measured on the liver).
 constexpr float kAcross = 0.72f;
 constexpr float kLeastDepth_m = 0.001f;
-constexpr float kRingMiddle_m = 0.022f;  // of the ring that UndentedSurface follows
 
 bool is_touching(TouchKind kind) {
   return kind != TouchKind::Free && kind != TouchKind::Near;
@@ -24,6 +22,20 @@ bool is_touching(TouchKind kind) {
 
 Vec3f shaft_of(const Pose& pose) {
   return rotate(pose.orientation, {0, 0, 1});
+}
+
+// Tissue that others have moved goes on for so long, as what relaxed comes back.
+constexpr Tick kActedTicks = 10'000;
+
+// Whether another tool touches, holds or cuts.
+bool do_others_act(const TouchTable::Scene& scene, ToolSlot slot) {
+  for (const auto& contact : scene.contacts.tools)
+    if (contact.tool != slot && contact.begin < contact.end) return true;
+  for (std::uint8_t i = 0; i < kMaxTools; ++i) {
+    const auto& force = scene.cuts.felt(ToolSlot{i}).force_n;
+    if (ToolSlot{i} != slot && dot(force, force) > 0) return true;
+  }
+  return false;
 }
 
 // More than half of what it feels is tissue that somebody else holds, or a claim was refused here.
@@ -114,8 +126,9 @@ void TouchTable::update(const Scene& scene) {
   }
 }
 
-void TouchTable::describe_surface(const Scene& scene, const hands::Tool& tool, Touch& touch,
-                                  wire::HapticPatch& patch) {
+void TouchTable::describe_surface(const Scene& scene, ToolSlot slot, wire::HapticPatch& patch) {
+  const auto& tool = scene.tools[slot];
+  auto& touch = touches_[slot.value];
   const auto& layout = scene.cuts.layout();
   auto& surface = touch.surface;
   const Vec3f shaft = shaft_of(tool.pose);
@@ -130,11 +143,11 @@ void TouchTable::describe_surface(const Scene& scene, const hands::Tool& tool, T
   }
   if (!surface.is_known()) return;
   if (is_touching(touch.kind)) {
-    const auto& law = laws_[touch.law];
-    // A point load on a half space: the surface at the ring sinks by so much (Boussinesq).
-    const float sinks = (1 - law.poisson_ratio * law.poisson_ratio) /
-                        (std::numbers::pi_v<float> * law.youngs_modulus_pa * kRingMiddle_m);
-    surface.follow(scene.world, layout, place, touch.force, sinks);
+    const Vec3f core = tool.pose.position + shaft * std::max(touch.along_m, tool.shape.radius_m);
+    if (do_others_act(scene, slot)) touch.others_tick = scene.world.tick;
+    const bool do_others =
+        touch.others_tick != 0 && scene.world.tick - touch.others_tick < kActedTicks;
+    surface.follow(scene.world, layout, core, tool.shape.radius_m, do_others);
   }
   const float radius = std::max(tool.shape.radius_m, 0.004f);
   const auto [point, normal, corner] = surface.plane(place, radius);
@@ -165,12 +178,12 @@ void TouchTable::describe_surface(const Scene& scene, const hands::Tool& tool, T
 
 wire::HapticPatch TouchTable::describe(const Scene& scene, ToolSlot slot) {
   const auto& tool = scene.tools[slot];
-  auto& touch = touches_[slot.value];
+  const auto& touch = touches_[slot.value];
   wire::HapticPatch patch;
   patch.tick = scene.world.tick;
   patch.echo_time_us = tool.time_us;
   patch.used_position_m = tool.pose.position;
-  describe_surface(scene, tool, touch, patch);
+  describe_surface(scene, slot, patch);
   patch.kind = touch.kind;
   patch.structure = touch.structure;
   patch.force_n = touch.force;

@@ -48,12 +48,12 @@ class TouchTable {
     float along_m = 0;      // of the middle of the contact along the shaft, from the tip
     Vec3f grip_point;       // of the tip when the jaws closed
     std::uint16_t law = 0;  // of the tissue that it touched last
+    Tick others_tick = 0;   // in which others have acted last
     StiffnessFit stiffness;
     UndentedSurface surface;
   };
 
-  void describe_surface(const Scene& scene, const hands::Tool& tool, Touch& touch,
-                        wire::HapticPatch& patch);
+  void describe_surface(const Scene& scene, ToolSlot slot, wire::HapticPatch& patch);
 
   std::vector<wire::HapticLaw> laws_;
   std::vector<std::uint16_t> law_of_node_;  // per node of the organ

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "server/tissue/contact/nearest_point.h"
 
@@ -14,7 +15,19 @@ constexpr float kRing_m = 0.015f;  // the ring around a dent begins here and end
 constexpr float kSlid_m = 0.008f;
 constexpr float kForgottenPerFrame = 0.008f;  // per frame: two seconds
 constexpr float kSettled = 0.0016f;  // per frame: ten seconds, in which relaxed tissue comes back
-constexpr float kForceNoise = 0.0004f;  // N^2; forces that vary less leave the guess of sinking
+constexpr float kRingMiddle_m = 0.022f;
+constexpr float kNoise_m2 = 1e-8f;  // sinking that varies less leaves the guess
+
+// Returns how far a half space sinks there where a ball is pressed into it, or rises where it is
+// pulled: far from it the dent is that of a point load, (1 - nu^2) F / (pi E r) (Boussinesq), and
+// Hertz's force is 4/3 E / (1 - nu^2) sqrt(R) d^(3/2). The material cancels, whether it has relaxed
+// or not.
+float half_space_sinks(float depth_m, float radius_m) {
+  const float deep = std::abs(depth_m);
+  const float sinks =
+      4 * deep * std::sqrt(deep * radius_m) / (3 * std::numbers::pi_v<float> * kRingMiddle_m);
+  return std::copysign(sinks, depth_m);
+}
 
 bool is_within(const Vec3f& a, const Vec3f& b, float distance) {
   const Vec3f d = a - b;
@@ -25,12 +38,17 @@ bool is_within(const Vec3f& a, const Vec3f& b, float distance) {
 
 void UndentedSurface::clear() {
   triangles_.clear();
-  moved_ = {};
-  force_ = motion_ = variance_ = covariance_ = 0;
+  moved_ = kept_off_ = outward_ = {};
+  sinks_ = motion_ = variance_ = covariance_ = 0;
 }
 
 void UndentedSurface::take(const world::World& world, const wire::SurfaceLayout& layout,
                            const Vec3f& centre) {
+  take(world, layout, centre, moved_);
+}
+
+void UndentedSurface::take(const world::World& world, const wire::SurfaceLayout& layout,
+                           const Vec3f& centre, const Vec3f& motion) {
   centre_ = centre;
   kept_.swap(triangles_);
   triangles_.clear();
@@ -42,7 +60,7 @@ void UndentedSurface::take(const world::World& world, const wire::SurfaceLayout&
     Triangle triangle{.number = number};
     for (std::size_t k = 0; k < 3; ++k) {
       triangle.nodes[k] = layout.node_of_vertex[layout.triangles[i][k].value];
-      triangle.at[k] = world.position(triangle.nodes[k]) - moved_;
+      triangle.at[k] = world.position(triangle.nodes[k]) - motion;
     }
     if (!is_within(triangle.at[0], centre - moved_, kReach_m)) continue;
     // A place that was taken before the tool was there is kept.
@@ -56,6 +74,10 @@ void UndentedSurface::shape(Triangle& triangle) {
   const auto& at = triangle.at;
   triangle.centre = (at[0] + at[1] + at[2]) * (1.0f / 3);
   triangle.normal = cross(at[1] - at[0], at[2] - at[0]);
+  float farthest = 0;
+  for (const auto& corner : at)
+    farthest = std::max(farthest, length_squared(corner - triangle.centre));
+  triangle.reach_m = std::sqrt(farthest);
 }
 
 void UndentedSurface::settle(const world::World& world, const wire::SurfaceLayout& layout,
@@ -71,8 +93,8 @@ void UndentedSurface::settle(const world::World& world, const wire::SurfaceLayou
     }
     shape(triangle);
   }
-  moved_ = {};
-  force_ = motion_ = 0;  // how far it sinks per force is remembered
+  moved_ = kept_off_ = outward_ = {};
+  sinks_ = motion_ = 0;  // by how much more than a half space it sinks is remembered
   if (!is_within(place, centre_, kSlid_m)) take(world, layout, place);
 }
 
@@ -98,20 +120,33 @@ Vec3f UndentedSurface::ring_motion(const world::World& world, const Vec3f& place
 }
 
 void UndentedSurface::follow(const world::World& world, const wire::SurfaceLayout& layout,
-                             const Vec3f& place, const Vec3f& force_n, float sinks_m_n) {
-  const Vec3f normal = plane(place, kRing_m).normal;
-  const Vec3f ring = ring_motion(world, place);
-  const float force = dot(force_n, normal), motion = dot(ring, normal);
-  const float df = force - force_, du = motion - motion_;
-  force_ += kForgottenPerFrame * df;
+                             const Vec3f& core, float radius_m, bool do_others_act) {
+  const auto [point, normal, node] = plane(core, kRing_m);
+  outward_ = normal;
+  const Vec3f ring = ring_motion(world, core);
+  const float sinks = half_space_sinks(radius_m + dot(normal, point - core), radius_m);
+  const float motion = dot(ring, normal);
+  const float ds = sinks - sinks_, du = motion - motion_;
+  sinks_ += kForgottenPerFrame * ds;
   motion_ += kForgottenPerFrame * du;
-  variance_ += kForgottenPerFrame * ((1 - kForgottenPerFrame) * df * df - variance_);
-  covariance_ += kForgottenPerFrame * ((1 - kForgottenPerFrame) * df * du - covariance_);
-  // The tissue sinks against the force on the tool; it never rises with it.
-  const float sinks =
-      std::max(0.0f, (kForceNoise * sinks_m_n - covariance_) / (kForceNoise + variance_));
-  moved_ = ring + normal * (sinks * force);
-  if (!is_within(place, centre_, kSlid_m)) take(world, layout, place);
+  variance_ += kForgottenPerFrame * ((1 - kForgottenPerFrame) * ds * ds - variance_);
+  covariance_ += kForgottenPerFrame * ((1 - kForgottenPerFrame) * ds * du - covariance_);
+  // The ring sinks with the tool; it never rises with it.
+  const float share = std::max(0.0f, (kNoise_m2 - covariance_) / (kNoise_m2 + variance_));
+  const Vec3f own = ring + normal * (share * sinks);
+  if (do_others_act)
+    moved_ = own - kept_off_;
+  else
+    kept_off_ = own - moved_;
+  if (is_within(core, centre_, kSlid_m)) return;
+  take(world, layout, core, ring);
+  kept_off_ = ring_motion(world, core) + normal * (share * sinks) - moved_;
+}
+
+Vec3f UndentedSurface::nearest_on(const Triangle& triangle, const Vec3f& at) {
+  const auto& [a, b, c] = triangle.at;
+  const Vec3f w = contact::nearest_weights(at, a, b, c);
+  return a * w.x + b * w.y + c * w.z;
 }
 
 UndentedSurface::Plane UndentedSurface::plane(const Vec3f& place, float radius_m) const {
@@ -120,9 +155,8 @@ UndentedSurface::Plane UndentedSurface::plane(const Vec3f& place, float radius_m
   const Triangle* of = nullptr;
   float least = 0;
   for (const auto& triangle : triangles_) {
-    const auto& [a, b, c] = triangle.at;
-    const Vec3f w = contact::nearest_weights(at, a, b, c);
-    const Vec3f point = a * w.x + b * w.y + c * w.z;
+    if (!is_outside(triangle)) continue;
+    const Vec3f point = nearest_on(triangle, at);
     const Vec3f away = at - point;
     if (const float d = dot(away, away); of == nullptr || d < least) {
       least = d;
@@ -130,10 +164,14 @@ UndentedSurface::Plane UndentedSurface::plane(const Vec3f& place, float radius_m
       of = &triangle;
     }
   }
-  Vec3f normal = of->normal;
+  if (of == nullptr)
+    return {triangles_.front().at[0] + moved_, outward_, triangles_.front().nodes[0]};
+  // Each counts by how near it comes, so that the normal turns without a jump.
+  Vec3f normal;
   for (const auto& triangle : triangles_) {
-    if (&triangle == of) continue;
-    const Vec3f away = triangle.centre - nearest;
+    if (!is_outside(triangle) || !is_within(triangle.centre, nearest, radius_m + triangle.reach_m))
+      continue;
+    const Vec3f away = nearest_on(triangle, nearest) - nearest;
     const float share = 1 - dot(away, away) / (radius_m * radius_m);
     if (share > 0) normal += triangle.normal * (share * share);
   }

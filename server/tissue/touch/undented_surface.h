@@ -1,11 +1,13 @@
 #pragma once
 
 // The surface around a tool as it would be without the tool: as it was when the tool began to
-// touch, carried along by what has moved since around the dent. A hand's depth is measured from it.
-// The dented surface would not do: it is where the tool is.
+// touch, carried along by what others have moved since around the dent. A hand's depth is measured
+// from it. The dented surface would not do: it is where the tool is.
 //
-// The tissue around a dent sinks a little with it, which is not motion of its own. How much it
-// sinks per force is fitted, and taken off.
+// The tissue around a dent sinks with it, for seconds, as relaxed tissue far away gives way. That
+// is a part of what the hand feels, and no motion of the surface's own. So it follows while others
+// act on the organ, and else stays. While they do, how much the surroundings sink with the dent is
+// taken off: by the depth, whatever has relaxed, for force would not tell.
 
 #include <array>
 #include <vector>
@@ -33,13 +35,14 @@ class UndentedSurface {
   // Whether a triangle near `place` is gone: the surface there is another one.
   bool has_changed(const wire::SurfaceLayout& layout, const Vec3f& place) const;
 
-  // Once a frame while the tool touches, with its force: follows what has moved since it was taken,
-  // and takes more of the surface where the tool has slid.
-  // sinks_m_n: a guess of how far the tissue around the dent sinks per force.
-  void follow(const world::World& world, const wire::SurfaceLayout& layout, const Vec3f& place,
-              const Vec3f& force_n, float sinks_m_n);
+  // Once a frame while the tool touches: follows what others have moved, and takes more of the
+  // surface where the tool has slid.
+  // core: in the tool's middle, where it touches; so far from its skin is radius_m.
+  void follow(const world::World& world, const wire::SurfaceLayout& layout, const Vec3f& core,
+              float radius_m, bool do_others_act);
 
-  // The nearest point of it to `place`, with the normal averaged over `radius_m` around. Known.
+  // The nearest point of it to `place` on the side from which the tool came, with the normal
+  // averaged over `radius_m` around. Known.
   Plane plane(const Vec3f& place, float radius_m) const;
 
  private:
@@ -48,16 +51,25 @@ class UndentedSurface {
     std::array<NodeIndex, 3> nodes;
     std::array<Vec3f, 3> at;  // as they were taken
     Vec3f centre, normal;     // as it was taken; the normal times twice the area
+    float reach_m = 0;        // of its corners from the centre
   };
 
   static void shape(Triangle& triangle);
+  static Vec3f nearest_on(const Triangle& triangle, const Vec3f& at);
+  // The other face of a thin wall is none that the tool could come out of.
+  bool is_outside(const Triangle& triangle) const { return dot(triangle.normal, outward_) >= 0; }
+  // motion: of the surface at places that are new.
+  void take(const world::World& world, const wire::SurfaceLayout& layout, const Vec3f& centre,
+            const Vec3f& motion);
   Vec3f ring_motion(const world::World& world, const Vec3f& place) const;
 
   std::vector<Triangle> triangles_, kept_;  // ascending numbers
   Vec3f centre_;                            // around which it was taken
-  Vec3f moved_;                             // since it was taken
-  // Means that forget, of the ring's motion along the normal over the normal force.
-  float force_ = 0, motion_ = 0, variance_ = 0, covariance_ = 0;
+  Vec3f moved_;                             // since it was taken, by others
+  Vec3f kept_off_;                          // what the ring has moved besides
+  Vec3f outward_;                           // under the tool; 0: it does not touch yet
+  // Means that forget, of the ring's motion along the normal over how far a half space would sink.
+  float sinks_ = 0, motion_ = 0, variance_ = 0, covariance_ = 0;
 };
 
 }  // namespace trocar::touch
