@@ -348,7 +348,7 @@ TEST_F(ScenarioLoads, ARemovedLoadIsFound) {
                      kTicks);
 }
 
-// So is a recording of before there were loads in them.
+// Older recordings are such.
 TEST_F(ScenarioLoads, WithoutItsLoadsARecordingCannotBeVerified) {
   const auto report = verify_changed(cut_and_pulled(), [](auto&) { return false; });
   ASSERT_TRUE(report.ok()) << report.error().message;
