@@ -2,7 +2,8 @@
 # Checks the book. Usage: check_docs.sh links|style|options|keys ROOT [FOLDER_OF_PROGRAMS]
 #
 #   links    each link, picture and anchor of README, CONTRIBUTING and docs leads somewhere, each page is
-#            in the README's table and in the site's list, each path of the source that is named exists
+#            in the README's table and in the site's list, each path and qualified name of the source
+#            that is named exists
 #   style    the README keeps 150 lines, paragraphs keep 90 words, pictures keep 150 kB
 #   options  docs/programs.md has exactly the options that the programs' --help has, and no page names
 #            an option that no program or script has
@@ -31,6 +32,15 @@ anchors() {
     sed 's/[^a-z0-9 _-]//g; s/^ *//; s/ *$//; s/ /-/g'
 }
 
+# Whether sources say it so, or declare it in the namespace of that name.
+is_name_of_source() { # SCOPE::NAME
+  local scope=${1%::*} name=${1##*::}
+  scope=${scope##*::}
+  grep -rqwF --include='*.h' --include='*.cpp' -- "$scope::$name" common server client && return
+  grep -rlE --include='*.h' "^namespace trocar::$scope " common server client |
+    xargs -r grep -qwE "(class|struct) $name"
+}
+
 check_links() {
   local page target file anchor
   for page in "${pages[@]}"; do
@@ -50,6 +60,10 @@ check_links() {
       [ -e "$target" ] || fault "$page: names $target, which does not exist"
     done < <(grep -oE '`(server|client|common|proto|tests|deploy)/[A-Za-z0-9_./-]*[A-Za-z0-9_]`' "$page" |
       tr -d '`' | sort -u)
+    # Names of the source in code spans, as scope::name.
+    while read -r target; do
+      is_name_of_source "$target" || fault "$page: names $target, which no source has"
+    done < <(grep -oE '`[A-Za-z_]+(::[A-Za-z_]+)+`' "$page" | tr -d '`' | sort -u)
   done
   for page in docs/*.md; do
     grep -qF "($page)" README.md || grep -qF "($(basename "$page"))" docs/*.md ||

@@ -35,6 +35,8 @@ fresh; printf '\n[gone](docs/limits.md#no-such-heading)\n' >>"$copy/README.md"
 expect links 'docs/limits.md has no such heading'
 fresh; printf '\nSee `server/nowhere/at_all.cpp`.\n' >>"$copy/docs/limits.md"
 expect links 'names server/nowhere/at_all.cpp'
+fresh; printf '\nAsk for `Coupling::Nowhere`.\n' >>"$copy/CONTRIBUTING.md"
+expect links 'names Coupling::Nowhere, which no source has'
 fresh; printf '# Alone\n' >"$copy/docs/alone.md"
 expect links 'no page leads to docs/alone.md'
 fresh; yes 'A line.' | head -n 200 >>"$copy/README.md"

@@ -242,6 +242,9 @@ TEST_F(ScenarioLoads, ACutUnderLoadsIsVerifiedWhole) {
   ASSERT_TRUE(journal.ok());
   EXPECT_TRUE((*journal)->info().has_external_loads);
   EXPECT_TRUE((*journal)->info().begins_with_snapshot());
+  ASSERT_EQ(run_program("trocar-journal info " + cut_and_pulled(), at("info.log")), 0);
+  for (const char* line : {"loads        of a scenario", "start        the first snapshot"})
+    EXPECT_NE(read(at("info.log")).find(line), std::string::npos) << read(at("info.log"));
   auto organ = recorded_organ(**journal, "");
   ASSERT_TRUE(organ.ok());
   auto loads = recorded_loads(**journal, *organ, "");
@@ -348,7 +351,7 @@ TEST_F(ScenarioLoads, ARemovedLoadIsFound) {
                      kTicks);
 }
 
-// So is a recording of before there were loads in them.
+// Older recordings are such.
 TEST_F(ScenarioLoads, WithoutItsLoadsARecordingCannotBeVerified) {
   const auto report = verify_changed(cut_and_pulled(), [](auto&) { return false; });
   ASSERT_TRUE(report.ok()) << report.error().message;

@@ -91,18 +91,9 @@ void CutPlate::cut(const std::array<Vec3d, 2>& from, const std::array<Vec3d, 2>&
   if (springs_) energies_j_[0] = springs_->energy_j();
   for (std::uint32_t i = 0; i < kMaxCalls && !cutter_.is_idle(); ++i) {
     cutter_.cut(world_.displacements, call);
-    for (const auto& made : call.new_nodes) {
-      if (!made.has_moved()) {
-        world_.add_node(topology_.rest()[made.node.value], made.a, made.b, made.t);
-        if (made.a == made.b) parted_.push_back({made.a, made.node});
-        continue;
-      }
-      const float share = static_cast<float>(made.t) / 65536.0f;
-      for (auto* values : {&world_.displacements, &world_.velocities}) {
-        auto& own = (*values)[made.node.value];
-        own += ((*values)[made.b.value] - own) * share;
-      }
-    }
+    world_.apply({topology_, call.new_nodes, {}});
+    for (const auto& made : call.new_nodes)
+      if (made.is_copy()) parted_.push_back({made.a, made.node});
     add(output_, call);
     if (!springs_) continue;
     const auto status = springs_->update(call.events);
@@ -113,10 +104,6 @@ void CutPlate::cut(const std::array<Vec3d, 2>& from, const std::array<Vec3d, 2>&
 }
 
 void CutPlate::update() {
-  for (const auto node : topology_.changed()) {
-    world_.rest_positions[node.value] = to_float(topology_.rest()[node.value]);
-    world_.masses[node.value] = static_cast<float>(topology_.lumped_mass(node));
-  }
   solver_.update_topology(topology_, world_);
   topology_.clear_changes();
   solver_.read_state(world_);

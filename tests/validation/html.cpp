@@ -214,8 +214,9 @@ Result<std::string> to_html(const Report& report) {
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">"
       "<title>Trocar: validation</title><style>{}</style></head><body><main>"
       "<h1>Trocar: validation</h1>"
-      "<p class=\"dim\">Every experiment is a scenario that <code>trocar-sim</code> runs too. An "
-      "error is relative to the value beside it; a bound is what the tests hold us to, and one "
+      "<p class=\"dim\">An experiment that is a scenario has it below, for "
+      "<code>trocar-sim</code>. An error is relative to the value beside it; a bound is what the "
+      "tests hold us to, and one "
       "that is not kept says so. Times are of this machine.</p>"
       "<p class=\"small dim\">{} &middot; {} &middot; <code>{}</code>{}</p>",
       kStyle, escaped(report.date), escaped(report.processor + ", " + report.compiler),

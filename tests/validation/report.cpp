@@ -7,26 +7,26 @@
 #include <fstream>
 #include <limits>
 
-#include "common/base/quote.h"
+#include "common/base/json.h"
 
 namespace trocar::validation {
 namespace {
 
-// JSON has no infinity and no NaN.
 std::string number(double value) {
   return std::isfinite(value) ? fmt::format("{:.9g}", value) : "null";
 }
 
-// A text that is a number goes out as one.
-std::string value_of(const std::string& text) {
-  if (text.empty()) return "null";
-  char* end = nullptr;
-  const double value = std::strtod(text.c_str(), &end);
-  return *end == '\0' && std::isfinite(value) ? number(value) : quote(text);
+// JSON has no infinity and no NaN.
+Json json_number(double value) {
+  return std::isfinite(value) ? Json(value) : Json();
 }
 
-std::string bound_field(const Check& check) {
-  return check.has_bound ? number(check.bound.value) : "null";
+// A text that is a number goes out as one.
+Json json_value(const std::string& text) {
+  if (text.empty()) return {};
+  char* end = nullptr;
+  const double value = std::strtod(text.c_str(), &end);
+  return *end == '\0' && std::isfinite(value) ? Json(value) : Json(text);
 }
 
 std::string csv_field(const std::string& text) {
@@ -180,41 +180,50 @@ void Section::check_convergence() {
 }
 
 std::string to_json(const std::vector<Section>& sections) {
-  std::string out = "[";
+  Json all = Json::array();
   for (const auto& section : sections)
     for (const auto& check : section.checks) {
-      out += out.size() > 1 ? ",\n " : "\n ";
-      out += fmt::format(
-          "{{\"name\": {}, \"paper\": {}, \"ours\": {}, \"error\": {}, \"bound\": {}, \"kept\": "
-          "{}, \"verdict\": {}, \"source\": {}, \"largest_missed\": {}, \"note\": {}}}",
-          quote(check.name), value_of(check.expected), value_of(check.ours), number(check.error),
-          bound_field(check), check.has_bound && check.is_kept(), quote(name_of(check.verdict())),
-          check.has_bound ? quote(check.bound.words()) : "null",
-          check.bound.largest_missed ? number(*check.bound.largest_missed) : "null",
-          quote(check.note));
+      const auto& missed = check.bound.largest_missed;
+      all.push_back({{"name", check.name},
+                     {"paper", json_value(check.expected)},
+                     {"ours", json_value(check.ours)},
+                     {"error", json_number(check.error)},
+                     {"bound", check.has_bound ? json_number(check.bound.value) : Json()},
+                     {"kept", check.has_bound && check.is_kept()},
+                     {"verdict", name_of(check.verdict())},
+                     {"source", check.has_bound ? Json(check.bound.words()) : Json()},
+                     {"largest_missed", missed ? json_number(*missed) : Json()},
+                     {"note", check.note}});
     }
-  return out + "\n]\n";
+  return to_text(all);
 }
 
 std::string run_to_json(const Report& report) {
-  std::string out = fmt::format(
-      "{{\"machine\": {{\"processor\": {}, \"compiler\": {}, \"load_before\": {:.2f}, "
-      "\"load_after\": {:.2f}}},\n \"commit\": {}, \"date\": {}, \"command\": {}, \"is_short\": "
-      "{},\n "
-      "\"experiments\": [",
-      quote(report.processor), quote(report.compiler), report.load_before, report.load_after,
-      quote(report.commit), quote(report.date), quote(report.command), report.is_short);
+  Json experiments = Json::array();
   for (const auto& section : report.sections) {
     const auto counts = count(section.checks);
-    out += fmt::format(
-        "{}\n  {{\"name\": {}, \"title\": {}, \"source\": {}, \"cpu_s\": {:.2f}, \"steps\": {}, "
-        "\"unconverged_steps\": {}, \"state_hash\": \"{:016x}\", \"kept\": {}, \"missed\": {}, "
-        "\"failed\": {}, \"measured\": {}}}",
-        &section == &report.sections.front() ? "" : ",", quote(section.name), quote(section.title),
-        quote(section.source), section.seconds, section.steps, section.unconverged_steps,
-        section.state_hash, counts.kept, counts.missed, counts.failed, counts.measured);
+    experiments.push_back({{"name", section.name},
+                           {"title", section.title},
+                           {"source", section.source},
+                           {"cpu_s", section.seconds},
+                           {"steps", section.steps},
+                           {"unconverged_steps", section.unconverged_steps},
+                           {"state_hash", hex64(section.state_hash)},
+                           {"kept", counts.kept},
+                           {"missed", counts.missed},
+                           {"failed", counts.failed},
+                           {"measured", counts.measured}});
   }
-  return out + "\n ]}\n";
+  return to_text({{"machine",
+                   {{"processor", report.processor},
+                    {"compiler", report.compiler},
+                    {"load_before", report.load_before},
+                    {"load_after", report.load_after}}},
+                  {"commit", report.commit},
+                  {"date", report.date},
+                  {"command", report.command},
+                  {"is_short", report.is_short},
+                  {"experiments", experiments}});
 }
 
 std::string to_csv(const std::vector<Section>& sections) {

@@ -6,6 +6,8 @@
 
 #include <cmath>
 
+#include "common/base/json.h"
+
 namespace trocar::validation {
 namespace {
 
@@ -67,8 +69,9 @@ TEST(Verdict, WhatHasNoBoundIsNeverCountedAsKept) {
 TEST(ReportFiles, EachBoundHasItsSource) {
   Section section{.name = "ours/some"};
   section.at_most("figure", "reference", 0.04, target(0.02, "an aim").missed(0.05), "What.");
-  EXPECT_NE(to_json({section}).find("\"verdict\": \"missed\", \"source\": \"target: an aim\""),
-            std::string::npos);
+  const auto check = Json::parse(to_json({section})).at(0);
+  EXPECT_EQ(check.at("verdict"), "missed");
+  EXPECT_EQ(check.at("source"), "target: an aim");
   EXPECT_NE(to_csv({section}).find("ours/some/figure,reference,4 % off,0.04,0.02,missed,"
                                    "target: an aim,0.05,What."),
             std::string::npos);

@@ -48,6 +48,8 @@ Json json_of(const journal::SessionInfo& info, const journal::McapReader& mcap) 
           {"organ", info.organ_name},
           {"finished", info.is_finished},
           {"gap_messages", info.gap_messages},
+          {"external_loads", info.has_external_loads},
+          {"starts_from_snapshot", info.starts_from_snapshot},
           {"reduction_hash", info.reduction ? Json(hex64(info.reduction->hash)) : Json()},
           {"channels", channels}};
 }
@@ -73,6 +75,9 @@ int show_info(const std::string& path, bool as_json) {
   if (info.continues)
     std::printf("  continues    %s, after tick %" PRIu64 "\n", info.continues->file.c_str(),
                 info.continues->tick);
+  if (info.has_external_loads) std::printf("  loads        of a scenario, besides its tools\n");
+  if (info.starts_from_snapshot)
+    std::printf("  start        the first snapshot, not the organ at rest\n");
   std::printf("  sim_version  %u%s, protocol %s\n", info.sim_version,
               info.sim_version == kSimVersion ? "" : " (this program has another)",
               info.protocol.c_str());

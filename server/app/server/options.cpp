@@ -262,15 +262,18 @@ void CommandLine::add_session_options() {
       ->type_name("ADDR:PORT")
       ->capture_default_str();
   app_.add_flag(
-      "--no-datagrams", options_.is_stream_only,
-      "frames and hands over the TCP stream alone, where lost packets hold up the picture");
+          "--no-datagrams", options_.is_stream_only,
+          "frames and hands over the TCP stream alone, where lost packets hold up the picture")
+      ->group("Network");
   app_.add_option("--announce", options_.announced_name,
                   "name of the session on the local network (DNS-SD) [the organ's and "
                   "the machine's; told unless --listen is this machine only]")
       ->type_name("NAME")
-      ->check(printable_name());
+      ->check(printable_name())
+      ->group("Network");
   app_.add_flag("--no-announce", options_.is_unannounced,
-                "tell the local network nothing of the session");
+                "tell the local network nothing of the session")
+      ->group("Network");
   app_.add_option("--journal", options_.journal,
                   "file to record the session in, or none [./trocar-<UTC>.mcap]")
       ->type_name("FILE");
@@ -287,10 +290,12 @@ void CommandLine::add_session_options() {
           "local reduction of that organ (trocar-organ reduce --method local): moves the "
           "tissue beyond what is touched where it fits, the full solver elsewhere; clients may "
           "see the full solution as a ghost, which takes about a core meanwhile")
-      ->type_name("FILE");
+      ->type_name("FILE")
+      ->group("Speed");
   app_.add_option("--workers", options_.workers, "threads that share a tick's work")
       ->check(CLI::Range(1u, kMaxWorkers))
-      ->capture_default_str();
+      ->capture_default_str()
+      ->group("Speed");
   app_.add_option("--log-level", options_.log_level, "error, warn, info, debug or off")
       ->check(CLI::IsMember({"error", "warn", "info", "debug", "off"}))
       ->type_name("LEVEL")

@@ -19,7 +19,8 @@ namespace trocar::recording {
 // The organ that the session names. `path` is the journal's, for messages.
 Result<organ::Organ> recorded_organ(journal::SessionJournal& journal, const std::string& path);
 
-// What acts on that organ besides tools; no rules if nothing does, or if the journal lacks them.
+// Reads what acts on that organ besides tools; no rules if nothing does, or if the journal lacks
+// them.
 Result<step::LoadRules> recorded_loads(journal::SessionJournal& journal, const organ::Organ& organ,
                                        const std::string& path);
 

@@ -26,7 +26,7 @@ namespace trocar::step {
 
 static_assert(kSweepLayers <= dynamics::kMaxSweepBands);
 
-// Constant in a session.
+// A scene is what is constant in a session.
 struct Scene {
   organ::Organ organ;
   cutting::Settings cutting;
