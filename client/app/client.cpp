@@ -10,7 +10,9 @@
 #include "client/app/picture.h"
 #include "client/app/start.h"
 #include "client/device/device_list.h"
+#include "client/device/returning_device.h"
 #include "client/net/net_source.h"
+#include "client/replay/recorded_hand.h"
 #include "client/replay/replay_source.h"
 #include "client/replica/client_messages.h"
 #include "common/base/log.h"
@@ -159,7 +161,7 @@ Status Run::write_summary() const {
   summary.surface_age = surface_age_;
   summary.hand_to_visible = hand_to_visible_;
   summary.cut_to_visible = cut_to_visible_;
-  for (const auto& hand : hands_.felt()) summary.hands.push_back(hand->figures());
+  summary.hands = hands_.figures();
   std::ofstream file(options_.summary_file);
   file << to_json(summary, replica_, statistics);
   file.close();
@@ -189,6 +191,7 @@ Result<ExitCode> Run::run() {
 
 Result<ExitCode> Run::conclude(const Status& outcome) {
   if (!outcome.ok()) exit_reason_ = outcome.error().message;
+  const auto traces = hands_.let_go();  // before the network is waited for
   const bool we_leave = source_.state() != replica::SourceState::Closed;
   if (we_leave) {
     source_.close(exit_reason_);
@@ -199,7 +202,7 @@ Result<ExitCode> Run::conclude(const Status& outcome) {
     }
   }
   const auto taken = take_screenshot(monotonic_ns(), true);
-  auto written = write_trace(options_.trace_file, hands_.felt());
+  auto written = write_trace(options_.trace_file, traces);
   if (const auto summarised = write_summary(); written.ok()) written = summarised;
   if (!outcome.ok()) return outcome.error();
   if (!taken) return taken.error();
@@ -263,6 +266,8 @@ void install_signal_handlers() {
   const auto stop = [](int) { stop_requested = 1; };
   std::signal(SIGINT, stop);
   std::signal(SIGTERM, stop);
+  // A terminal that is closed, unless it was told to be of no account (nohup).
+  if (std::signal(SIGHUP, stop) == SIG_IGN) std::signal(SIGHUP, SIG_IGN);
 }
 
 Result<ExitCode> run_with_source(const ClientOptions& options, replica::SessionSource& source,
@@ -276,17 +281,42 @@ bool is_stop_requested() {
 
 namespace {
 
-Result<std::vector<std::unique_ptr<FeltHand>>> open_devices(const ClientOptions& options) {
+Result<std::unique_ptr<device::HapticDevice>> open_device(const std::string& name) {
+  auto opened = device::ReturningDevice::open([name] { return device::open_device(name); });
+  if (!opened) return Error{opened.error().code, "--device: " + opened.error().message};
+  return opened;
+}
+
+Result<Hands> open_devices(const ClientOptions& options) {
   std::vector<std::unique_ptr<FeltHand>> hands;
   for (const auto& name : options.devices) {
-    auto opened = device::open_device(name);
-    if (!opened) return Error{opened.error().code, "--device: " + opened.error().message};
-    hands.push_back(std::make_unique<FeltHand>(
-        std::move(*opened), tool::ToolShape{},
-        haptics::WorkspaceScale{options.device_motion, options.device_force},
-        !options.trace_file.empty()));
+    auto opened = open_device(name);
+    if (!opened) return opened.error();
+    FeltSettings settings;
+    settings.tool = options.tool_of(hands.size());
+    settings.port_m = options.port_of(hands.size());
+    settings.scale = {options.device_motion, options.device_force};
+    settings.has_trace = !options.trace_file.empty();
+    hands.push_back(std::make_unique<FeltHand>(std::move(*opened), settings));
   }
-  return hands;
+  return Hands::felt(std::move(hands));
+}
+
+// Each device feels one hand of the recording.
+Result<Hands> open_replayed(const ClientOptions& options) {
+  std::vector<std::unique_ptr<FeltReplay>> hands;
+  for (const auto& chosen : options.feels) {
+    auto hand = replay::read_recorded_hand(options.replay_file, chosen.name, chosen.tool);
+    if (!hand) return Error{hand.error().code, "--feel: " + hand.error().message};
+    auto opened = open_device(options.devices[hands.size()]);
+    if (!opened) return opened.error();
+    haptics::PlaybackSettings settings;
+    settings.scale = {options.device_motion, options.device_force};
+    settings.pull_n_m = options.feel_pull_n_m;
+    hands.push_back(std::make_unique<FeltReplay>(std::move(*opened), std::move(*hand), settings,
+                                                 !options.trace_file.empty()));
+  }
+  return Hands::replayed(std::move(hands));
 }
 
 Result<ExitCode> run_chosen(const ClientOptions& options) {
@@ -294,7 +324,9 @@ Result<ExitCode> run_chosen(const ClientOptions& options) {
   if (!options.replay_file.empty()) {
     auto source = replay::ReplaySource::open(options.replay_file);
     if (!source) return source.error();
-    return run_with_source(options, **source, hands);
+    auto replayed = open_replayed(options);
+    if (!replayed) return replayed.error();
+    return run_with_source(options, **source, *replayed);
   }
   if (!options.script_file.empty()) {
     auto script = tool::parse_script(options.script_file);
@@ -303,7 +335,7 @@ Result<ExitCode> run_chosen(const ClientOptions& options) {
   } else if (!options.devices.empty()) {
     auto felt = open_devices(options);
     if (!felt) return felt.error();
-    hands = Hands::felt(std::move(*felt));
+    hands = std::move(*felt);
   } else if (options.display == Display::Window && replica::has_tools(options.role)) {
     hands = Hands::mouse(tool::ToolShape{});
   }

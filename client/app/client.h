@@ -8,7 +8,7 @@
 
 namespace trocar::app {
 
-// Set by SIGINT and SIGTERM: leave politely.
+// Set by SIGINT, SIGTERM and SIGHUP: leave politely.
 void install_signal_handlers();
 bool is_stop_requested();
 

@@ -3,6 +3,7 @@
 #include <cstdio>
 
 #include "client/app/client.h"
+#include "client/device/crash.h"
 #include "client/device/device_list.h"
 #include "common/base/cpu.h"
 #include "common/base/log.h"
@@ -35,6 +36,7 @@ int main(int argc, char** argv) {
     return static_cast<int>(trocar::ExitCode::Ok);
   }
   trocar::app::install_signal_handlers();
+  trocar::device::install_crash_handlers();
   const auto run = trocar::app::run_client(**options);
   if (!run) return trocar::report(kProgram, run.error());
   return static_cast<int>(*run);

@@ -3,12 +3,14 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstdlib>
 #include <iostream>
 #include <map>
 
+#include "common/base/printable.h"
 #include "common/base/version.h"
 #include "common/secure/join_code.h"
 #include "common/wire/role.h"
@@ -31,8 +33,12 @@ Examples:
       a robot: a scripted hand, no picture
   trocar-client --device haply --device-motion 1.5
       holds an instrument with a haptic device (--list-devices shows which there are)
+  trocar-client --device openhaptics --tool grasper --port 0,120,150
+      holds laparoscopic jaws that pivot at a trocar there
   trocar-client --replay trocar-20261121T120000Z.mcap
       plays a recorded session with a free camera
+  trocar-client --replay trocar-20261121T120000Z.mcap --device haply --feel Anna
+      plays it, and the hand feels what Anna felt
 
 Ends with the session, with --seconds, Ctrl-C, or the window. Exit codes: 0 ok, 2 command line,
 3 bad file, 4 refused by the server, 5 server not reached or lost, or no display.
@@ -90,6 +96,68 @@ Status parse_view(const std::vector<double>& numbers, StartView& view) {
   return {};
 }
 
+Status parse_ports(const std::vector<std::string>& texts, std::vector<Vec3d>& ports_m) {
+  for (const auto& text : texts) {
+    double mm[3]{};
+    const char* at = text.data();
+    const char* const end = at + text.size();
+    bool is_place = true;
+    for (int i = 0; i < 3 && is_place; ++i) {
+      const auto [stop, failure] = std::from_chars(at, end, mm[i]);
+      is_place = failure == std::errc{} && std::abs(mm[i]) <= 2000 &&
+                 (i == 2 ? stop == end : stop < end && *stop == ',');
+      at = stop + (i == 2 ? 0 : 1);
+    }
+    if (!is_place)
+      return Error{ErrorCode::Usage,
+                   "--port: '" + printable(text, 40) +
+                       "' is not X,Y,Z in mm, up to 2000 each, such as 0,120,150"};
+    ports_m.push_back(Vec3d{mm[0], mm[1], mm[2]} * 1e-3);
+  }
+  return {};
+}
+
+Status parse_feels(const std::vector<std::string>& texts, std::vector<replay::HandInFile>& feels) {
+  for (const auto& text : texts) {
+    auto hand = replay::parse_hand_name(text);
+    if (!hand) return Error{ErrorCode::Usage, "--feel: " + hand.error().message};
+    feels.push_back(std::move(*hand));
+  }
+  return {};
+}
+
+// Checks what belongs to devices, without opening them.
+Status check_devices(const ClientOptions& options) {
+  const std::size_t count = options.devices.size();
+  const auto fits = [&](std::size_t given) { return given <= 1 || given == count; };
+  const bool is_replay = !options.replay_file.empty();
+  if (count == 0) {
+    if (!options.trace_file.empty())
+      return Error{ErrorCode::Usage, "--hand-trace: is of devices; give --device too"};
+    if (!(options.tools.empty() && options.ports_m.empty() && options.feels.empty()))
+      return Error{ErrorCode::Usage, "--tool, --port, --feel: are of devices; give --device too"};
+    return {};
+  }
+  if (count > 2)
+    return Error{ErrorCode::Usage, "--device: " + std::to_string(count) +
+                                       " are given, and a participant has two hands"};
+  if (!options.script_file.empty())
+    return Error{ErrorCode::Usage, "--device: does not go with --script; leave one out"};
+  if (is_replay && options.feels.size() != count)
+    return Error{ErrorCode::Usage,
+                 "--device: with --replay, say with --feel NAME for each what it feels"};
+  if (!is_replay && !options.feels.empty())
+    return Error{ErrorCode::Usage, "--feel: is of a recording; give --replay too"};
+  if (is_replay && !(options.tools.empty() && options.ports_m.empty()))
+    return Error{ErrorCode::Usage, "--tool, --port: a recording takes no tools; leave them out"};
+  if (!fits(options.tools.size()) || !fits(options.ports_m.size()))
+    return Error{ErrorCode::Usage, "--tool, --port: give one, or one for each device"};
+  if (!is_replay && !replica::has_tools(options.role))
+    return Error{ErrorCode::Usage, "--device: an " + std::string(replica::name_of(options.role)) +
+                                       " has no tools; use --role surgeon or assistant"};
+  return {};
+}
+
 std::string default_name() {
   const char* login = std::getenv("USER");
   const std::string base = login != nullptr && *login != '\0' ? login : "guest";
@@ -99,17 +167,7 @@ std::string default_name() {
 Status check(const ClientOptions& options) {
   if (!options.replay_file.empty() && !options.script_file.empty())
     return Error{ErrorCode::Usage, "--replay and --script: a recording takes no tools; choose one"};
-  if (!options.trace_file.empty() && options.devices.empty())
-    return Error{ErrorCode::Usage, "--hand-trace: is of devices; give --device too"};
-  if (options.devices.size() > 2)
-    return Error{ErrorCode::Usage, "--device: " + std::to_string(options.devices.size()) +
-                                       " are given, and a participant has two hands"};
-  if (!options.devices.empty() && !(options.script_file.empty() && options.replay_file.empty()))
-    return Error{ErrorCode::Usage,
-                 "--device: goes with neither --script nor --replay; leave one out"};
-  if (!options.devices.empty() && !replica::has_tools(options.role))
-    return Error{ErrorCode::Usage, "--device: an " + std::string(replica::name_of(options.role)) +
-                                       " has no tools; use --role surgeon or assistant"};
+  if (const auto devices = check_devices(options); !devices) return devices;
   if (!options.script_file.empty() && !replica::has_tools(options.role))
     return Error{ErrorCode::Usage, "--script: an " + std::string(replica::name_of(options.role)) +
                                        " has no tools; use --role surgeon or assistant"};
@@ -125,6 +183,16 @@ Status check(const ClientOptions& options) {
 }
 
 }  // namespace
+
+const tool::ToolKind& ClientOptions::tool_of(std::size_t device) const {
+  if (tools.empty()) return tool::tool_kinds().front();
+  return *tool::find_tool_kind(tools[std::min(device, tools.size() - 1)]);
+}
+
+std::optional<Vec3d> ClientOptions::port_of(std::size_t device) const {
+  if (ports_m.empty()) return std::nullopt;
+  return ports_m[std::min(device, ports_m.size() - 1)];
+}
 
 Result<std::optional<ClientOptions>> parse_client_command_line(int argc, char** argv) {
   ClientOptions options;
@@ -210,6 +278,24 @@ Result<std::optional<ClientOptions>> parse_client_command_line(int argc, char** 
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
   app.add_flag("--list-devices", options.lists_devices,
                "list the devices of this computer and what is missing for others, and exit");
+  std::vector<std::string> tool_names;
+  std::string tool_text = "what a device holds; twice: one for each [all]:";
+  for (const auto& kind : tool::tool_kinds()) {
+    tool_names.emplace_back(kind.name);
+    tool_text += " " + tool_names.back() + " (" + std::string(kind.text) + ")";
+  }
+  app.add_option("--tool", options.tools, tool_text)
+      ->type_name("KIND")
+      ->expected(1)
+      ->check(CLI::IsMember(tool_names))
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  std::vector<std::string> ports;
+  app.add_option("--port", ports,
+                 "place that a device's shaft passes, mm, as a trocar holds a laparoscopic "
+                 "instrument; twice: one for each [free]")
+      ->type_name("X,Y,Z")
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
   app.add_option("--device-motion", options.device_motion,
                  "how far the tool goes where the device goes 1")
       ->type_name("SCALE")
@@ -225,6 +311,18 @@ Result<std::optional<ClientOptions>> parse_client_command_line(int argc, char** 
       ->type_name("FILE");
   app.add_option("--replay", options.replay_file, "play a recorded session (.mcap)")
       ->type_name("FILE");
+  std::vector<std::string> feels;
+  app.add_option("--feel", feels,
+                 "with --replay and --device: feel what this participant felt, with tool 0 or 1; "
+                 "twice: one for each device")
+      ->type_name("NAME[,tool=N]")
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  app.add_option("--feel-pull", options.feel_pull_n_m,
+                 "stiffness of the spring that leads the hand along with --feel, N/m; 0: none")
+      ->type_name("N/M")
+      ->check(CLI::Range(0.0, 500.0))
+      ->capture_default_str();
   app.add_option("--summary", options.summary_file, "write figures of the run as JSON at the end")
       ->type_name("FILE");
   app.add_option("--corrupt-frame", options.corrupt_frame, "")->group("");
@@ -257,6 +355,8 @@ Result<std::optional<ClientOptions>> parse_client_command_line(int argc, char** 
   if (const auto parsed = parse_overlays(overlays, options.overlays); !parsed)
     return parsed.error();
   if (const auto parsed = parse_view(view, options.view); !parsed) return parsed.error();
+  if (const auto parsed = parse_ports(ports, options.ports_m); !parsed) return parsed.error();
+  if (const auto parsed = parse_feels(feels, options.feels); !parsed) return parsed.error();
   if (const auto checked = check(options); !checked) return checked.error();
   return std::optional<ClientOptions>(std::move(options));
 }

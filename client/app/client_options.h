@@ -7,8 +7,11 @@
 #include <vector>
 
 #include "client/render/gl_context.h"
+#include "client/replay/recorded_hand.h"
 #include "client/replica/session_view.h"
 #include "common/base/result.h"
+#include "common/math/vec3.h"
+#include "common/tool/tool_kind.h"
 
 namespace trocar::app {
 
@@ -48,12 +51,20 @@ struct ClientOptions {
   std::string script_file, replay_file, summary_file;
   std::string trace_file;            // of what devices did and felt
   std::vector<std::string> devices;  // as device::open_device; empty: the mouse or the script
-  double device_motion = 1;          // of the tool over the device
-  double device_force = 1;           // of the device over the tool
-  bool lists_devices = false;        // of this computer, instead of taking part
-  std::uint64_t corrupt_frame = 0;   // hidden: damages the n-th delta, to prove healing
-  bool lists_sessions = false;       // of the local network, instead of taking part in one
+  // There is one for each device, or one for all; empty: tool::tool_kinds().front(), and no port.
+  std::vector<std::string> tools;
+  std::vector<Vec3d> ports_m;
+  std::vector<replay::HandInFile> feels;  // of the recording: one for each device
+  double feel_pull_n_m = 80;
+  double device_motion = 1;         // of the tool over the device
+  double device_force = 1;          // of the device over the tool
+  bool lists_devices = false;       // of this computer, instead of taking part
+  std::uint64_t corrupt_frame = 0;  // hidden: damages the n-th delta, to prove healing
+  bool lists_sessions = false;      // of the local network, instead of taking part in one
   std::string log_level = "info";
+
+  const tool::ToolKind& tool_of(std::size_t device) const;
+  std::optional<Vec3d> port_of(std::size_t device) const;
 };
 
 // No value: --help or --version was asked for and printed.

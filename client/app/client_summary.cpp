@@ -27,7 +27,8 @@ Json to_json(const FeltFigures& hand) {
           {"late_us",
            {{"median", hand.timing.late_median_us},
             {"p95", hand.timing.late_95_us},
-            {"p99", hand.timing.late_99_us}}},
+            {"p99", hand.timing.late_99_us},
+            {"worst", hand.timing.late_worst_us}}},
           {"overruns", hand.timing.overruns},
           {"has_real_time_priority", hand.has_priority},
           {"has_locked_memory", hand.has_locked_memory},
@@ -45,14 +46,13 @@ Json to_json(const FeltFigures& hand) {
 
 }  // namespace
 
-Status write_trace(const std::string& file, const std::vector<std::unique_ptr<FeltHand>>& hands) {
+Status write_trace(const std::string& file, const std::vector<const haptics::Trace*>& hands) {
   if (file.empty()) return {};
   std::string text =
       "tool,time_us,x_m,y_m,z_m,force_x_n,force_y_n,force_z_n,server_x_n,server_y_n,server_z_n,"
       "patch_age_s,limits\n";
   for (std::size_t tool = 0; tool < hands.size(); ++tool) {
-    const auto* trace = hands[tool]->stop();
-    for (const auto& row : trace->rows())
+    for (const auto& row : hands[tool]->rows())
       fmt::format_to(std::back_inserter(text), "{},{},{},{},{},{},{},{},{},{},{},{},{}\n", tool,
                      row.time_us, row.tip_m.x, row.tip_m.y, row.tip_m.z, row.force_n.x,
                      row.force_n.y, row.force_n.z, row.server_force_n.x, row.server_force_n.y,

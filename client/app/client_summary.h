@@ -24,8 +24,8 @@ struct ClientSummary {
   std::vector<FeltFigures> hands;  // that feel
 };
 
-// Writes what each hand did and felt, as CSV, and ends their loops. Empty file: nothing is written.
-Status write_trace(const std::string& file, const std::vector<std::unique_ptr<FeltHand>>& hands);
+// Writes what each hand did and felt, as CSV. Empty file: nothing is written.
+Status write_trace(const std::string& file, const std::vector<const haptics::Trace*>& hands);
 std::string to_json(const ClientSummary& summary, const replica::Replica& replica,
                     const replica::SourceStatistics& source);
 

@@ -1,38 +1,63 @@
 #include "client/app/felt_hand.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
+#include "client/haptics/fulcrum.h"
+#include "client/haptics/reading_pace.h"
 #include "common/base/log.h"
 
 namespace trocar::app {
 namespace {
 
-constexpr std::uint64_t kShortestNs = 2'000'000;  // the network asks every 4 ms, now and then late
-constexpr std::uint64_t kKeepAliveNs = 20'000'000;
 constexpr std::size_t kMostLaws = 8;  // that wait: a model keeps no more
 constexpr std::uint64_t kPublishEvery = 16;
-constexpr std::size_t kMostRows = 600'000;
-constexpr double kDeadBand_m = 60e-6;
-constexpr float kDeadTurn = 0.999998f;  // of the cosine of half an angle: 4 mrad
+// The network asks every 4 ms, now and then a little early.
+constexpr haptics::ReadingPace kPace{.shortest_ns = 2'000'000};
+
+Status check_port(const haptics::HandSettings& settings) {
+  if (!settings.port_m) return {};
+  const Vec3d& start = settings.start_m;
+  const auto length_m = static_cast<double>(settings.shape.length_m);
+  if (haptics::Fulcrum(*settings.port_m, start, length_m).is_in_reach()) return {};
+  return Error{ErrorCode::Usage,
+               fmt::format("--port: is {:.0f} mm from where the tool begins ({:.0f},{:.0f},{:.0f} "
+                           "mm), and its shaft reaches {:.0f} to {:.0f} mm; move it",
+                           1e3 * length(*settings.port_m - start), 1e3 * start.x, 1e3 * start.y,
+                           1e3 * start.z, 1e3 * haptics::Fulcrum::kLeastInside_m,
+                           1e3 * (length_m - haptics::Fulcrum::kLeastOutside_m))};
+}
+
+FeltSettings settings_for(const device::HapticDevice& device, const FeltSettings& wanted) {
+  const auto own = device.own_tool();
+  if (!own) return wanted;
+  FeltSettings settings{.has_trace = wanted.has_trace};
+  settings.tool.shape = own->shape;
+  return settings;
+}
 
 }  // namespace
 
-FeltHand::FeltHand(std::unique_ptr<device::HapticDevice> device, const tool::ToolShape& shape,
-                   const haptics::WorkspaceScale& scale, bool has_trace)
+FeltHand::FeltHand(std::unique_ptr<device::HapticDevice> device, const FeltSettings& settings)
     : device_(std::move(device)),
-      shape_(shape),
-      scale_(scale),
-      reporter_(device_->description(), scale) {
-  if (has_trace) trace_ = std::make_unique<haptics::Trace>(kMostRows);
+      settings_(settings_for(*device_, settings)),
+      reporter_(device_->description(), settings_.scale) {
+  if (settings_.has_trace) trace_ = std::make_unique<haptics::Trace>(kMostTraceRows);
   figures_.device = device_->description();
-  figures_.scale = scale_;
+  figures_.scale = settings_.scale;
 }
 
-void FeltHand::start(const Vec3d& start_m) {
+Status FeltHand::start(const Vec3d& start_m) {
+  const auto own = device_->own_tool();
   haptics::HandSettings settings;
-  settings.shape = shape_;
-  settings.start_m = start_m;
-  settings.scale = scale_;
+  settings.shape = settings_.tool.shape;
+  settings.gripper_verb = settings_.tool.gripper_verb;
+  settings.button_verb = settings_.tool.button_verb;
+  settings.start_m = own ? own->start_m : start_m;
+  settings.port_m = settings_.port_m;
+  settings.scale = settings_.scale;
+  if (const auto reached = check_port(settings); !reached) return reached;
   hand_ = std::make_unique<haptics::Hand>(*device_, settings, trace_.get());
   hand_->put_view(view_);
   loop_ = std::make_unique<haptics::Loop>(*hand_, haptics::LoopSettings{});
@@ -45,10 +70,11 @@ void FeltHand::start(const Vec3d& start_m) {
                 ? ""
                 : ", without real-time priority: forces may stutter while the machine is busy "
                   "(allow it with the limits rtprio and memlock)");
+  return {};
 }
 
 void FeltHand::set_view(const Quatf& world_from_device) {
-  if (world_from_device == view_) return;
+  if (world_from_device == view_ || device_->own_tool()) return;
   view_ = world_from_device;
   if (hand_) hand_->put_view(view_);
 }
@@ -96,14 +122,7 @@ void FeltHand::take(const wire::HapticPatch& patch) {
 }
 
 bool FeltHand::is_due(const haptics::HandReading& reading, std::uint64_t now_ns) const {
-  if (sent_.time_us == 0) return true;
-  if (now_ns - sent_ns_ < kShortestNs && reading.verb == sent_.verb) return false;
-  const float turn =
-      reading.orientation.x * sent_.orientation.x + reading.orientation.y * sent_.orientation.y +
-      reading.orientation.z * sent_.orientation.z + reading.orientation.w * sent_.orientation.w;
-  const bool rests = length(reading.tip_m - sent_.tip_m) < kDeadBand_m &&
-                     std::abs(turn) > kDeadTurn && reading.verb == sent_.verb;
-  return !rests || now_ns - sent_ns_ >= kKeepAliveNs;
+  return sent_.time_us == 0 || haptics::is_due(reading, sent_, now_ns - sent_ns_, kPace);
 }
 
 std::optional<haptics::HandReading> FeltHand::pop_reading(std::uint64_t now_ns) {

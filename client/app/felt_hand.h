@@ -14,10 +14,12 @@
 
 #include "client/app/hand_reporter.h"
 #include "client/device/haptic_device.h"
+#include "client/haptics/hand.h"
 #include "client/haptics/loop.h"
 #include "common/base/newest.h"
 #include "common/base/result.h"
 #include "common/base/spsc_queue.h"
+#include "common/tool/tool_kind.h"
 #include "common/wire/haptic_patch.h"
 
 namespace trocar::app {
@@ -33,18 +35,28 @@ struct FeltFigures {
   bool has_priority = false, has_locked_memory = false;
 };
 
+// This says what a hand holds, and how.
+struct FeltSettings {
+  tool::ToolKind tool = tool::tool_kinds().front();
+  std::optional<Vec3d> port_m;  // that its shaft passes, world frame; none: it is free
+  haptics::WorkspaceScale scale;
+  bool has_trace = false;  // each step is kept, for at most ten minutes
+};
+inline constexpr std::size_t kMostTraceRows = 600'000;
+
 class FeltHand {
  public:
-  // has_trace: each step is kept, for at most ten minutes.
-  FeltHand(std::unique_ptr<device::HapticDevice> device, const tool::ToolShape& shape,
-           const haptics::WorkspaceScale& scale, bool has_trace);
+  // A device that brings its own tool is held as that says.
+  FeltHand(std::unique_ptr<device::HapticDevice> device, const FeltSettings& settings);
 
   // Render thread.
-  const tool::ToolShape& shape() const { return shape_; }
+  const tool::ToolShape& shape() const { return settings_.tool.shape; }
   bool is_started() const { return loop_ != nullptr; }
-  // start_m: where the tool's tip is at first, world frame.
-  void start(const Vec3d& start_m);
-  // Does as Hand::put_view; before the start, too.
+  // start_m: where the tool's tip is at first, world frame, if the device does not say. An error:
+  // its shaft does not reach there through the port.
+  Status start(const Vec3d& start_m);
+  // Does as Hand::put_view; before the start, too. A device with a tool of its own moves in the
+  // world, however it is seen.
   void set_view(const Quatf& world_from_device);
   // An error: the device is gone.
   Status check() const;
@@ -79,8 +91,7 @@ class FeltHand {
   void note_sent(std::uint64_t now_ns);
 
   std::unique_ptr<device::HapticDevice> device_;
-  tool::ToolShape shape_;
-  haptics::WorkspaceScale scale_;
+  FeltSettings settings_;
   Quatf view_;
   std::unique_ptr<haptics::Trace> trace_;
   std::unique_ptr<haptics::Hand> hand_;

@@ -77,6 +77,12 @@ Hands Hands::felt(std::vector<std::unique_ptr<FeltHand>> felt) {
   return hands;
 }
 
+Hands Hands::replayed(std::vector<std::unique_ptr<FeltReplay>> replayed) {
+  Hands hands;
+  hands.replayed_ = std::move(replayed);
+  return hands;
+}
+
 std::vector<tool::ToolShape> Hands::shapes() const {
   if (mouse_) return {mouse_shape_};
   if (felt_.empty()) return script_shapes_;
@@ -89,10 +95,27 @@ void Hands::set_view(const Quatf& world_from_camera) {
   for (const auto& hand : felt_) hand->set_view(world_from_camera);
 }
 
+std::vector<FeltFigures> Hands::figures() const {
+  std::vector<FeltFigures> all;
+  for (const auto& hand : felt_) all.push_back(hand->figures());
+  for (const auto& hand : replayed_) all.push_back(hand->figures());
+  return all;
+}
+
+std::vector<const haptics::Trace*> Hands::let_go() {
+  std::vector<const haptics::Trace*> traces;
+  for (auto& hand : felt_) traces.push_back(hand->stop());
+  for (auto& hand : replayed_) traces.push_back(hand->stop());
+  return traces;
+}
+
 Status Hands::tend_felt(const replica::Replica& replica) {
   for (std::size_t i = 0; i < felt_.size(); ++i) {
     auto& hand = *felt_[i];
-    if (!hand.is_started()) hand.start(place_before(replica.topology(), i, felt_.size()));
+    if (!hand.is_started())
+      if (const auto started = hand.start(place_before(replica.topology(), i, felt_.size()));
+          !started)
+        return started;
     if (const auto checked = hand.check(); !checked) return checked;
     while (const auto sent = hand.pop_sent())
       if (i == 0) echo_.note_sent(sent->tip_m, sent->ns);
@@ -133,6 +156,9 @@ double Hands::script_seconds(const replica::SessionFrame& newest, std::uint64_t 
 Status Hands::send_due(const replica::Replica& replica, replica::SessionSource& source,
                        std::uint64_t now_ns) {
   if (replica.newest() == nullptr || source.state() != replica::SourceState::Live) return {};
+  if (const auto* playback = source.playback())
+    for (auto& hand : replayed_)
+      if (const auto updated = hand->update(*playback, now_ns); !updated) return updated;
   if (const auto tended = tend_felt(replica); !tended) return tended;
   if (mouse_)
     if (const auto sample = mouse_->pop_due(now_ns)) send(source, 0, *sample, now_ns);

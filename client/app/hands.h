@@ -7,7 +7,7 @@
 #include <optional>
 #include <vector>
 
-#include "client/app/felt_hand.h"
+#include "client/app/felt_replay.h"
 #include "client/device/mouse_tool.h"
 #include "client/device/script_hand.h"
 #include "client/replica/hand_echo.h"
@@ -25,9 +25,16 @@ class Hands {
   // Each device holds one tool; there are at most two.
   static Hands felt(std::vector<std::unique_ptr<FeltHand>> hands);
 
+  // These feel what was recorded; they hold no tools.
+  static Hands replayed(std::vector<std::unique_ptr<FeltReplay>> hands);
+
   // Returns the tools to offer when joining.
   std::vector<tool::ToolShape> shapes() const;
   const std::vector<std::unique_ptr<FeltHand>>& felt() const { return felt_; }
+  // Returns those of all hands that feel, by number.
+  std::vector<FeltFigures> figures() const;
+  // From now on no hand feels anything. What each did, by number; null: it was not to be kept.
+  std::vector<const haptics::Trace*> let_go();
   // Between the devices and a source; null: there are none. It stays where it is.
   replica::HandLine* line() { return line_.get(); }
   // How the person looks at the scene: devices move tools as they are seen.
@@ -53,6 +60,7 @@ class Hands {
 
   std::vector<std::unique_ptr<FeltHand>> felt_;
   std::unique_ptr<replica::HandLine> line_;
+  std::vector<std::unique_ptr<FeltReplay>> replayed_;
   std::optional<device::MouseTool> mouse_;
   tool::ToolShape mouse_shape_;
   std::optional<tool::Script> script_;  // until the surface is known

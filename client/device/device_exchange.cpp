@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "client/device/crash.h"
 #include "client/device/device_checks.h"
 
 namespace trocar::device {
@@ -26,6 +27,7 @@ bool DeviceExchange::publish(const DeviceReading& reading) {
 }
 
 ForceOrder DeviceExchange::order(std::uint64_t now_us) {
+  if (is_crashing()) return {};
   const ForceOrder& newest = order_.newest();
   return now_us <= newest.time_us + kForceHoldUs ? newest : ForceOrder{};
 }

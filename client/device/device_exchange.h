@@ -30,7 +30,8 @@ class DeviceExchange {
   // The device's side. A reading that is not plausible is left out, so that its time stands still;
   // true: it was taken.
   bool publish(const DeviceReading& reading);
-  // Returns no force if the last one was written more than kForceHoldUs ago.
+  // Returns no force if the last one was written more than kForceHoldUs ago, or the program
+  // crashes.
   ForceOrder order(std::uint64_t now_us);
   // The first reason counts. Any thread.
   void fail(Error why);

@@ -8,6 +8,7 @@
 #include "client/device/forcedimension_device.h"
 #include "client/device/gamepad_device.h"
 #include "client/device/haply_device.h"
+#include "client/device/journal_device.h"
 #include "client/device/openhaptics_device.h"
 #include "client/device/simulated_device.h"
 #include "client/device/spacemouse_device.h"
@@ -23,6 +24,15 @@ Opened open_simulated(const std::string& parameters) {
   if (!script) return script.error();
   return std::unique_ptr<HapticDevice>(
       std::make_unique<SimulatedDevice>(std::move(*script), monotonic_us));
+}
+
+Opened open_journal(const std::string& parameters) {
+  const auto chosen = replay::parse_hand_in_file(parameters);
+  if (!chosen) return chosen.error();
+  auto hand = replay::read_recorded_hand(chosen->path, chosen->name, chosen->tool);
+  if (!hand) return hand.error();
+  return std::unique_ptr<HapticDevice>(
+      std::make_unique<JournalDevice>(std::move(*hand), monotonic_us));
 }
 
 Opened open_forcedimension(const std::string& index, const DevicePlaces& places) {
@@ -93,6 +103,7 @@ DevicePlaces usual_places() {
 
 std::vector<ListedDevice> list_devices(const DevicePlaces& places) {
   return {{"simulated", true, "A hand that is calculated, for example simulated:palpate,1Hz,3mm"},
+          {"journal", true, "A hand of a recording, for example journal:session.mcap,name=Anna"},
           listed("haply", HaplyDevice::open(places.haply_url)),
           list_forcedimension(places),
           list_openhaptics(places),
@@ -115,6 +126,7 @@ Opened open_device(const std::string& name, const DevicePlaces& places) {
   const std::string kind = name.substr(0, colon);
   const std::string which = name.substr(std::min(colon + 1, name.size()));
   if (kind == "simulated") return open_simulated(which);
+  if (kind == "journal") return open_journal(which);
   if (kind == "haply") return HaplyDevice::open(which.empty() ? places.haply_url : which);
   if (kind == "forcedimension") return open_forcedimension(which, places);
   if (kind == "openhaptics")
@@ -124,7 +136,7 @@ Opened open_device(const std::string& name, const DevicePlaces& places) {
     return SpaceMouseDevice::open(which.empty() ? places.spacemouse_socket : which, monotonic_us);
   if (kind == "gamepad") return open_gamepad(which, places);
   return Error{ErrorCode::Usage, "\"" + printable(kind, 40) +
-                                     "\" is no kind of device, choose simulated, haply, "
+                                     "\" is no kind of device, choose simulated, journal, haply, "
                                      "forcedimension, openhaptics, spacemouse or gamepad"};
 }
 

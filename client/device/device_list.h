@@ -9,6 +9,7 @@
 //   openhaptics:Default Device    the name in the maker's setup program; this one may be left out
 //   spacemouse                    or spacemouse:/var/run/spnav.sock
 //   gamepad                       the first one, or gamepad:/dev/input/event5
+//   journal:FILE                  a recorded hand; name=NAME and tool=1 after commas choose it
 
 #include <memory>
 #include <string>

@@ -14,9 +14,11 @@
 #include <boost/beast/websocket/stream.hpp>
 #include <chrono>
 #include <future>
+#include <optional>
 #include <thread>
 #include <utility>
 
+#include "client/device/crash.h"
 #include "client/device/device_checks.h"
 #include "client/device/device_exchange.h"
 #include "client/device/haply_messages.h"
@@ -86,6 +88,11 @@ class HaplyDevice::Conversation {
     co_await converse();
     is_finished_ = true;
     deadline_.cancel();
+    hang_up();
+  }
+
+  void hang_up() {
+    last_words_.reset();
     boost::system::error_code ignored;
     socket().close(ignored);
   }
@@ -114,6 +121,8 @@ class HaplyDevice::Conversation {
     if (!is_inventory) co_return;
     deadline_.cancel();
     is_open_ = true;
+    last_words_.emplace(socket().native_handle(),
+                        websocket_frame(haply_command(device_id_, Vec3d{}, false)));
     opened_.set_value(Status{});
     asio::co_spawn(context_, read_states(), rethrow);
     co_await send_forces();
@@ -201,8 +210,7 @@ class HaplyDevice::Conversation {
     deadline_.async_wait([this](const boost::system::error_code& cancelled) {
       if (cancelled) return;
       is_late_ = true;
-      boost::system::error_code ignored;
-      socket().close(ignored);
+      hang_up();
     });
   }
 
@@ -217,6 +225,7 @@ class HaplyDevice::Conversation {
   asio::steady_timer deadline_{context_}, answer_timer_{context_}, pace_timer_{context_};
   std::promise<Status> opened_;
   std::string device_id_;
+  std::optional<LastWords> last_words_;
   int bad_messages_ = 0;
   bool is_open_ = false, is_refused_ = false, is_answered_ = false;
   bool is_closing_ = false, is_late_ = false, is_done_ = false, is_finished_ = false;

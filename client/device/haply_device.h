@@ -9,7 +9,8 @@
 // The service sends exactly one state for each message, so the pace is ours: one message each
 // millisecond, and none before the last one was answered; a second without an answer is asked
 // again. With nothing to feel the force is zero, which keeps the connection alive. On closing, zero
-// goes last. A thread of its own does all of it; read() and write() never wait.
+// goes last, and if the program crashes, too (crash.h). A thread of its own does all of it; read()
+// and write() never wait.
 
 #include <chrono>
 #include <memory>

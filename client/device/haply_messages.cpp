@@ -115,6 +115,25 @@ std::string haply_command(const std::string& device_id, const Vec3d& force_n, bo
   return command.dump(-1, ' ', false, json::error_handler_t::replace);
 }
 
+std::string websocket_frame(std::string_view text) {
+  constexpr unsigned char kWholeText = 0x81, kIsMasked = 0x80, kHasTwoBytes = 126;
+  constexpr std::array<unsigned char, 4> kMask{0x5a, 0xc3, 0x3c, 0xa5};  // any will do
+  std::string frame;
+  const auto add = [&](std::size_t byte) { frame += static_cast<char>(byte & 0xff); };
+  add(kWholeText);
+  if (text.size() < kHasTwoBytes) {
+    add(kIsMasked | text.size());
+  } else {
+    add(kIsMasked | kHasTwoBytes);
+    add(text.size() >> 8);
+    add(text.size());
+  }
+  for (const auto byte : kMask) add(byte);
+  for (std::size_t i = 0; i < text.size(); ++i)
+    add(static_cast<unsigned char>(text[i]) ^ kMask[i % kMask.size()]);
+  return frame;
+}
+
 std::optional<HaplyAddress> parse_haply_address(std::string_view url) {
   constexpr std::string_view kScheme = "ws://";
   if (!url.starts_with(kScheme)) return std::nullopt;

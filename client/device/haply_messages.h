@@ -28,6 +28,10 @@ Result<HaplyState> read_haply_state(std::string_view json, const std::string& de
 // A force in our frame. `is_first`: names this program to the service.
 std::string haply_command(const std::string& device_id, const Vec3d& force_n, bool is_first);
 
+// The text as one whole frame of a client's WebSocket (RFC 6455 section 5.2), for a socket to be
+// sent as it is. At most 64 kB.
+std::string websocket_frame(std::string_view text);
+
 struct HaplyAddress {
   std::string host, port;
 };

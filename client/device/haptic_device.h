@@ -4,13 +4,28 @@
 // of its own hides them.
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "common/base/result.h"
 #include "common/math/frame.h"
 #include "common/math/vec3.h"
+#include "common/tool/tool.h"
 
 namespace trocar::device {
+
+// A button that no hand has: its tool is asked for nothing, and touches nothing.
+inline constexpr std::uint32_t kRestsButton = 1u << 31;
+
+// Another one that no hand has: the hand has let go of the device, or has just taken it again. The
+// tool stays where it is, as with a clutch.
+inline constexpr std::uint32_t kLetGoButton = 1u << 30;
+
+// The tool of a device that brings its own, which then is where the device says.
+struct OwnTool {
+  tool::ToolShape shape;
+  Vec3d start_m;  // of the tip, world frame: where the first reading is
+};
 
 struct DeviceReading {
   Vec3d position_m;  // in the device's frame: x right, y up, z towards the person
@@ -36,6 +51,7 @@ class HapticDevice {
   // Takes what the tissue does to the hand, in the device's frame, already cut to the limits.
   virtual Status write(const Vec3d& force_n, const Vec3d& torque_nm) = 0;
   virtual DeviceLimits limits() const = 0;
+  virtual std::optional<OwnTool> own_tool() const { return std::nullopt; }
   virtual std::string description() const = 0;
 };
 

@@ -7,12 +7,24 @@ namespace trocar::haptics {
 namespace {
 
 constexpr double kUsualStep_s = 0.001;
+constexpr double kWorkingDepth_m = 0.050;  // a tool works so much deeper than it starts, or less
+
+std::optional<Fulcrum> fulcrum_of(const HandSettings& settings) {
+  if (!settings.port_m) return std::nullopt;
+  return Fulcrum(*settings.port_m, settings.start_m, settings.shape.length_m);
+}
 
 TouchSettings settings_for(const HandSettings& settings, const device::DeviceLimits& limits) {
   TouchSettings touch = settings.touch;
   if (limits.stiffness_n_m > 0) {
     const Workspace workspace(settings.start_m, settings.scale);
-    touch.stop_n_m = std::min(touch.stop_n_m, workspace.world_stiffness(limits.stiffness_n_m));
+    double rendered_n_m = workspace.world_stiffness(limits.stiffness_n_m);
+    if (auto fulcrum = fulcrum_of(settings)) {
+      const Vec3d in = *settings.port_m - fulcrum->handle_m();
+      fulcrum->move(fulcrum->handle_m() + in * (kWorkingDepth_m / length(in)), {});
+      rendered_n_m /= fulcrum->stiffening();
+    }
+    touch.stop_n_m = std::min(touch.stop_n_m, rendered_n_m);
   }
   return touch;
 }
@@ -32,7 +44,8 @@ bool is_sound(const device::DeviceReading& reading) {
 Hand::Hand(device::HapticDevice& device, const HandSettings& settings, Trace* trace)
     : device_(device),
       settings_(settings),
-      workspace_(settings.start_m, settings.scale),
+      fulcrum_(fulcrum_of(settings)),
+      workspace_(fulcrum_ ? fulcrum_->handle_m() : settings.start_m, settings.scale),
       model_(settings.shape, settings_for(settings, device.limits())),
       safety_(device.limits(), settings.safety),
       trace_(trace),
@@ -49,13 +62,20 @@ void Hand::take_messages(std::uint64_t now_us) {
 
 tool::Verb Hand::verb_of(const device::DeviceReading& reading) {
   is_closed_ = reading.gripper > (is_closed_ ? settings_.opens_at : settings_.closes_at);
-  if ((reading.buttons & settings_.cut_buttons) != 0) return tool::Verb::Cut;
-  return is_closed_ ? tool::Verb::Grasp : tool::Verb::Push;
+  if ((reading.buttons & device::kRestsButton) != 0) return tool::Verb::None;
+  const bool is_pressed = (reading.buttons & settings_.verb_buttons) != 0;
+  if (is_pressed && settings_.button_verb != tool::Verb::Push) return settings_.button_verb;
+  return is_closed_ ? settings_.gripper_verb : tool::Verb::Push;
 }
 
 void Hand::feel(const device::DeviceReading& reading, std::uint64_t now_us) {
-  const bool is_clutched = (reading.buttons & settings_.clutch_buttons) != 0;
-  const auto tip = workspace_.move(reading.position_m, reading.orientation, is_clutched);
+  const bool is_clutched =
+      (reading.buttons & (settings_.clutch_buttons | device::kLetGoButton)) != 0;
+  auto tip = workspace_.move(reading.position_m, reading.orientation, is_clutched);
+  if (fulcrum_) {
+    const auto inside = fulcrum_->move(tip.position_m, tip.orientation);
+    tip = {inside.position_m, inside.orientation};
+  }
   HandReading& sent = state_.reading;
   const double dt_s = seconds_between(last_us_, now_us);
   sent.velocity_m_s = last_us_ != 0 && dt_s > 0 ? (tip.position_m - sent.tip_m) / dt_s : Vec3d{};
@@ -65,6 +85,7 @@ void Hand::feel(const device::DeviceReading& reading, std::uint64_t now_us) {
   sent.time_us = now_us;
   readings_.put(sent);
   touch_ = model_.step({sent.tip_m, sent.orientation, sent.verb, now_us});
+  if (sent.verb == tool::Verb::None) touch_ = {};
 }
 
 Status Hand::step(std::uint64_t now_us) {
@@ -73,11 +94,14 @@ Status Hand::step(std::uint64_t now_us) {
   take_messages(now_us);
   if (is_sound(*reading)) feel(*reading, now_us);
 
+  Fulcrum::Load load{touch_.force_n, touch_.torque_nm};
+  if (fulcrum_) load = fulcrum_->at_handle(touch_.force_n, touch_.torque_nm);
   SafetyInput input;
-  input.force_n = workspace_.device_force(touch_.force_n);
-  input.torque_nm = workspace_.device_torque(touch_.torque_nm);
+  input.force_n = workspace_.device_force(load.force_n);
+  input.torque_nm = workspace_.device_torque(load.torque_nm);
   input.position_m = is_sound(*reading) ? reading->position_m : Vec3d{NAN, NAN, NAN};
-  input.stiffness_n_m = workspace_.device_stiffness(touch_.stiffness_n_m);
+  input.stiffness_n_m =
+      workspace_.device_stiffness(touch_.stiffness_n_m) * (fulcrum_ ? fulcrum_->stiffening() : 1);
   input.reading_age_s = seconds_between(reading->time_us, now_us);
   input.patch_age_s = patch_us_ == 0 ? 0 : seconds_between(patch_us_, now_us);
   input.touches = touch_.touches;

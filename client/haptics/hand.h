@@ -3,7 +3,7 @@
 // One hand on a device: what happens between reading it and writing a force to it, once a
 // millisecond.
 //
-//   device -> workspace -> touch model -> workspace -> safety -> device
+//   device -> workspace (-> fulcrum) -> touch model (-> fulcrum) -> workspace -> safety -> device
 //
 // Threads: step() and stop() belong to the loop's; put() of each kind to one other thread each, and
 // so do take_reading(), take_state() and take_report(). None waits for another, and step() does not
@@ -13,7 +13,9 @@
 #include <optional>
 
 #include "client/device/haptic_device.h"
+#include "client/haptics/fulcrum.h"
 #include "client/haptics/safety.h"
+#include "client/haptics/stepped.h"
 #include "client/haptics/touch_model.h"
 #include "client/haptics/trace.h"
 #include "client/haptics/workspace.h"
@@ -25,12 +27,15 @@ namespace trocar::haptics {
 
 struct HandSettings {
   tool::ToolShape shape;
-  Vec3d start_m;  // of the tool's tip, world frame
+  Vec3d start_m;                // of the tool's tip, world frame
+  std::optional<Vec3d> port_m;  // that the shaft passes, in reach of it (fulcrum.h); none: free
   WorkspaceScale scale;
   TouchSettings touch;
   SafetySettings safety;
-  std::uint32_t clutch_buttons = 1, cut_buttons = 2;  // bits: any of them
-  float closes_at = 0.6f, opens_at = 0.4f;            // of the gripper
+  std::uint32_t clutch_buttons = 1, verb_buttons = 2;  // bits: any of them
+  float closes_at = 0.6f, opens_at = 0.4f;             // of the gripper
+  // A closed gripper and a pressed button ask for this; Push: for nothing more.
+  tool::Verb gripper_verb = tool::Verb::Grasp, button_verb = tool::Verb::Cut;
 };
 
 // This goes to the server.
@@ -60,7 +65,7 @@ struct HandState {
   std::uint64_t steps = 0;
 };
 
-class Hand {
+class Hand final : public Stepped {
  public:
   // trace: gets a row in each step; null: none. It outlives the hand.
   Hand(device::HapticDevice& device, const HandSettings& settings, Trace* trace = nullptr);
@@ -76,10 +81,8 @@ class Hand {
   // The same for a thread that makes reports of it.
   bool take_report(HandState& state) { return reports_.take(state); }
 
-  // An error: the device is gone.
-  Status step(std::uint64_t now_us);
-  // Writes no force; the device may be gone.
-  void stop();
+  Status step(std::uint64_t now_us) override;
+  void stop() override;
 
  private:
   static constexpr std::size_t kWaitingLaws = 8;
@@ -90,6 +93,7 @@ class Hand {
 
   device::HapticDevice& device_;
   HandSettings settings_;
+  std::optional<Fulcrum> fulcrum_;
   Workspace workspace_;
   TouchModel model_;
   Safety safety_;

@@ -24,7 +24,7 @@ void sleep_until(std::uint64_t ns) {
 
 }  // namespace
 
-Loop::Loop(Hand& hand, const LoopSettings& settings) : hand_(hand), settings_(settings) {}
+Loop::Loop(Stepped& hand, const LoopSettings& settings) : hand_(hand), settings_(settings) {}
 
 Loop::Granted Loop::start() {
   if (thread_.joinable()) stop();
@@ -98,6 +98,7 @@ void Loop::publish(std::uint64_t now_ns) {
   timing_.late_median_us = late_.quantile_us(0.5);
   timing_.late_95_us = late_.quantile_us(0.95);
   timing_.late_99_us = late_.quantile_us(0.99);
+  timing_.late_worst_us = late_.worst_us();
   timings_.put(timing_);
 }
 

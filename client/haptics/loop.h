@@ -1,7 +1,8 @@
 #pragma once
 
-// Runs a hand at the device's rate on a thread of its own, by absolute time of the monotonic clock.
-// A step that ends after the next one should have begun is an overrun; what was missed is left out.
+// Runs a hand, or what else steps, at the device's rate on a thread of its own, by absolute time of
+// the monotonic clock. A step that ends after the next one should have begun is an overrun; what
+// was missed is left out.
 //
 // However the loop ends, the last thing that it writes to the device is no force.
 
@@ -10,7 +11,7 @@
 #include <optional>
 #include <thread>
 
-#include "client/haptics/hand.h"
+#include "client/haptics/stepped.h"
 #include "client/haptics/wake_statistics.h"
 #include "common/base/newest.h"
 #include "common/base/result.h"
@@ -25,6 +26,7 @@ struct LoopSettings {
 struct LoopTiming {
   double rate_hz = 0;                                         // of the last quarter of a second
   double late_median_us = 0, late_95_us = 0, late_99_us = 0;  // of a wake, since the start
+  double late_worst_us = 0;
   std::uint64_t steps = 0, overruns = 0;
 };
 
@@ -36,7 +38,7 @@ class Loop {
     bool has_locked_memory = false;  // no page of the program is fetched from a disk meanwhile
   };
 
-  Loop(Hand& hand, const LoopSettings& settings);
+  Loop(Stepped& hand, const LoopSettings& settings);
   ~Loop() { stop(); }
   Loop(const Loop&) = delete;
   Loop& operator=(const Loop&) = delete;
@@ -56,7 +58,7 @@ class Loop {
   void run() noexcept;
   void publish(std::uint64_t now_ns);
 
-  Hand& hand_;
+  Stepped& hand_;
   LoopSettings settings_;
   std::atomic<bool> is_running_{false}, must_stop_{false};
   std::atomic<int> granted_{-1};  // bits, once known

@@ -62,11 +62,16 @@ SafeForce Safety::step(const SafetyInput& given) {
   }
   observe(input);
 
-  double share = 1;
-  if (input.touches && input.patch_age_s > settings_.patch_age_s) {
-    share = std::exp(-(input.patch_age_s - settings_.patch_age_s) / settings_.patch_fall_s);
-    note(Limit::OldPatch, safe);
-  }
+  // A contact that begins while nobody answers is not felt.
+  const bool is_old = input.patch_age_s > settings_.patch_age_s;
+  if (!input.touches)
+    trust_ = is_old ? 0 : 1;
+  else if (is_old)
+    trust_ = std::max(0.0, trust_ - input.dt_s / settings_.patch_fall_s);
+  else
+    trust_ = std::min(1.0, trust_ + input.dt_s / settings_.ramp_s);
+  double share = input.touches ? trust_ : 1;
+  if (share < 1) note(Limit::OldPatch, safe);
   if (ramp_ < 1) {
     share *= ramp_;
     ramp_ = std::min(1.0, ramp_ + input.dt_s / settings_.ramp_s);
@@ -108,6 +113,7 @@ void Safety::observe(const SafetyInput& input) {
 
 Vec3d Safety::damped(const Vec3d& force_n, const SafetyInput& input, SafeForce& safe) {
   const double speed_squared = length_squared(velocity_m_s_);
+  if (settings_.most_damping_n_s_m <= 0) return force_n;
   if (work_j_ <= 0 || speed_squared < kLeastSpeedSquared) return force_n;
   note(Limit::Passivity, safe);
   const double damping_n_s_m =

@@ -4,8 +4,8 @@
 //
 //   1 a force, torque or place that is no number: 0 at once
 //   2 a reading of the device older than 20 ms, or one that jumped: 0 at once
-//   3 no answer of the server for 250 ms in contact: falls with 250 ms
-//   4 ramp: grows from 0 within 250 ms, at the start and after each of 1 and 2
+//   3 no answer of the server for 250 ms in contact: falls to 0 within 250 ms
+//   4 ramp: grows from 0 within 250 ms, at the start and after each of 1 to 3
 //   5 passivity: what was done to the hand beyond what tissue may have stored is damped away
 //   6 slew: at most 0.3 N/ms (measured: a tap at 400 mm/s needs 0.17, a grasp 0.20)
 //   7 the device's own limit
@@ -41,7 +41,7 @@ struct SafetySettings {
   double patch_age_s = 0.250, patch_fall_s = 0.250;
   double ramp_s = 0.250;
   double slew_n_s = 300, torque_slew_nm_s = 9;  // torque: that force at a lever of 30 mm
-  double most_damping_n_s_m = 6;
+  double most_damping_n_s_m = 6;  // 0: no passivity, for a hand that is led on purpose
 };
 
 struct SafetyInput {
@@ -82,7 +82,8 @@ class Safety {
   Counts counts_{};
   Vec3d last_force_n_, last_torque_nm_, last_position_m_, velocity_m_s_;
   bool has_position_ = false;
-  double ramp_ = 0;  // 0 to 1
+  double ramp_ = 0;   // 0 to 1
+  double trust_ = 1;  // 0 to 1: how fresh the server's answers are, in contact
   double work_j_ = 0;
 };
 

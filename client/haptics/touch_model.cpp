@@ -96,6 +96,13 @@ void TouchModel::blend(double dt_s) {
   lever_m_ += (next_lever_m_ - lever_m_) * share;
   depth_offset_m_ *= 1 - share;
   grip_offset_m_ *= 1 - share;
+  // A limit comes from the force that there is, and goes at once.
+  const auto limit_n = static_cast<double>(patch_.pressed_limit_n);
+  if (limit_n <= 0)
+    pressed_limit_n_ = kNoLimit_n;
+  else
+    pressed_limit_n_ = std::min(pressed_limit_n_, std::max(limit_n, length(output_.force_n)));
+  if (limit_n > 0) pressed_limit_n_ += (limit_n - pressed_limit_n_) * share;
 }
 
 void TouchModel::watch_jaws(const TouchInput& input, double dt_s) {
@@ -119,8 +126,7 @@ Vec3d TouchModel::limited_force(const Vec3d& force_n, const Response& response) 
   }
   if (response.elastic_n <= 0) return {};
   double along_n = std::max(0.0, dot(force_n, normal_));
-  if (patch_.pressed_limit_n > 0)
-    along_n = std::min(along_n, static_cast<double>(patch_.pressed_limit_n));
+  along_n = std::min(along_n, pressed_limit_n_);
   return normal_ * along_n + shortened(across(force_n, normal_), patch_.friction * along_n);
 }
 

@@ -79,6 +79,8 @@ class TouchModel {
  private:
   static constexpr std::size_t kLaws = 8;
 
+  static constexpr double kNoLimit_n = 1e9;
+
   // A material that was met, and what was learned about it.
   struct Material {
     wire::HapticLaw law;
@@ -143,6 +145,7 @@ class TouchModel {
   double slope_ = 1;                        // in use, behind the fit's
   Vec3d correction_n_, next_correction_n_;  // in use, and where it goes
   double gate_force_n_ = 0.02;              // at the echo
+  double pressed_limit_n_ = kNoLimit_n;     // along the normal
   Vec3d lever_m_, next_lever_m_;            // torque over the size of the force
   double answer_s_ = 0;
 

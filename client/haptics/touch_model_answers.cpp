@@ -215,6 +215,11 @@ void TouchModel::correct(const PastState& then, bool is_new_structure) {
   }
   const Vec3d server_n = touched ? trocar::to_double(patch_.force_n) : Vec3d{};
   const Vec3d local_n = model_force(response);
+  // A tool that is stopped says nothing of the tissue below it.
+  const double believed_n = dot(local_n * fit_.slope() + next_correction_n_, normal_);
+  if (!is_new_structure && patch_.pressed_limit_n > 0 &&
+      believed_n > static_cast<double>(patch_.pressed_limit_n))
+    return;
   // The slope of a push is that along the normal; friction follows.
   const Vec3d fit_server_n = grips() ? server_n : Vec3d{dot(server_n, normal_), 0, 0};
   const Vec3d fit_local_n = grips() ? local_n : Vec3d{response.normal_n, 0, 0};

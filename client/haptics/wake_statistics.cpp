@@ -14,6 +14,7 @@ void WakeStatistics::add(double late_us) {
   const double bin = std::floor(kBinsToOctave * std::log2(std::max(late_us, 1.0)));
   ++bins_[std::min(static_cast<std::size_t>(bin), kBins - 1)];
   ++count_;
+  worst_us_ = std::max(worst_us_, late_us);
 }
 
 double WakeStatistics::quantile_us(double share) const {

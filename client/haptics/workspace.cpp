@@ -39,6 +39,10 @@ Workspace::Tip Workspace::move(const Vec3d& device_m, const Quatf& device_orient
   return {tip_m_, normalized(view_ * device_orientation)};
 }
 
+Vec3d Workspace::device_way(const Vec3d& world_way_m) const {
+  return turned(view_back_, world_way_m / scale_.motion);
+}
+
 Vec3d Workspace::device_force(const Vec3d& world_force_n) const {
   return turned(view_back_, world_force_n * scale_.force);
 }

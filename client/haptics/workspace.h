@@ -34,6 +34,8 @@ class Workspace {
   // The first place of the device is where the tool starts.
   Tip move(const Vec3d& device_m, const Quatf& device_orientation, bool is_clutched);
 
+  // The device's way that moves the tool by this.
+  Vec3d device_way(const Vec3d& world_way_m) const;
   Vec3d device_force(const Vec3d& world_force_n) const;
   // The same share of the tool's work as with forces: force scale over motion scale.
   Vec3d device_torque(const Vec3d& world_torque_nm) const;

@@ -46,6 +46,35 @@ TEST(ClientOptions, OverlaysAndViewAreAsAskedFor) {
   EXPECT_FALSE((*none)->overlays.regions || (*none)->overlays.arrows);
 }
 
+TEST(ClientOptions, EachDeviceHasItsToolAndItsPort) {
+  const auto plain = parse({"--device", "haply", "--device", "forcedimension"});
+  ASSERT_TRUE(plain.ok()) << plain.error().message;
+  EXPECT_EQ((*plain)->tool_of(1).name, "all");
+  EXPECT_FALSE((*plain)->port_of(0).has_value());
+  const auto one =
+      parse({"--device", "a", "--device", "b", "--tool", "hook", "--port", "1,-2,3.5"});
+  ASSERT_TRUE(one.ok()) << one.error().message;
+  EXPECT_EQ((*one)->tool_of(0).name, "hook");
+  EXPECT_EQ((*one)->tool_of(1).name, "hook");
+  EXPECT_NEAR((*one)->port_of(1)->z, 0.0035, 1e-12);
+  EXPECT_NEAR((*one)->port_of(1)->y, -0.002, 1e-12);
+  const auto two = parse({"--device", "a", "--device", "b", "--tool", "hook", "--tool", "probe"});
+  ASSERT_TRUE(two.ok()) << two.error().message;
+  EXPECT_EQ((*two)->tool_of(0).name, "hook");
+  EXPECT_EQ((*two)->tool_of(1).name, "probe");
+}
+
+TEST(ClientOptions, ARecordedHandIsFelt) {
+  const auto options =
+      parse({"--replay", "x.mcap", "--device", "a", "--device", "b", "--feel", "Anna", "--feel",
+             "Anna,tool=1", "--feel-pull", "0", "--hand-trace", "t.csv"});
+  ASSERT_TRUE(options.ok()) << options.error().message;
+  ASSERT_EQ((*options)->feels.size(), 2u);
+  EXPECT_EQ((*options)->feels[1].name, "Anna");
+  EXPECT_EQ((*options)->feels[1].tool, 1u);
+  EXPECT_EQ((*options)->feel_pull_n_m, 0);
+}
+
 TEST(ClientOptions, EachWrongValueIsAUsageErrorThatNamesTheOption) {
   const std::vector<std::pair<std::vector<std::string>, std::string>> cases = {
       {{"--size", "5"}, "--size"},
@@ -65,6 +94,22 @@ TEST(ClientOptions, EachWrongValueIsAUsageErrorThatNamesTheOption) {
       {{"--view", "nan,0,1"}, "--view"},
       {{"--join", "7K3M"}, "--join"},
       {{"--join", "trocar://nowhere"}, "--join"},
+      {{"--device", "haply", "--device", "haply", "--device", "haply"}, "--device"},
+      {{"--device", "haply", "--script", "x.toml"}, "--device"},
+      {{"--device", "haply", "--replay", "x.mcap"}, "--feel"},
+      {{"--device", "haply", "--feel", "Anna"}, "--replay"},
+      {{"--replay", "x.mcap", "--feel", "Anna"}, "--device"},
+      {{"--replay", "x.mcap", "--device", "haply", "--feel", "Anna,tool=3"}, "--feel"},
+      {{"--replay", "x.mcap", "--device", "haply", "--feel", "Anna", "--tool", "hook"}, "--tool"},
+      {{"--device", "haply", "--tool", "spoon"}, "--tool"},
+      {{"--device", "haply", "--tool", "hook", "--tool", "probe"}, "--tool"},
+      {{"--tool", "hook"}, "--tool"},
+      {{"--device", "haply", "--port", "1,2"}, "--port"},
+      {{"--device", "haply", "--port", "1,2,3,4"}, "--port"},
+      {{"--device", "haply", "--port", "1,2,nan"}, "--port"},
+      {{"--device", "haply", "--port", "1,2,2001"}, "--port"},
+      {{"--port", "1,2,3"}, "--port"},
+      {{"--hand-trace", "x.csv"}, "--hand-trace"},
       {{"--insecure-loopback", "--join", "7K3M-9QXZ-4T2B-WN8C"}, "--insecure-loopback"},
       {{"--no-such-option"}, "no-such-option"}};
   for (const auto& [words, name] : cases) {

@@ -23,14 +23,15 @@ DevicePlaces nowhere(const testing::ShortFolder& folder) {
 TEST(DeviceList, ABareComputerHasASimulatedHandAndSaysHowToGetTheOthers) {
   const testing::ShortFolder folder;
   const auto devices = list_devices(nowhere(folder));
-  ASSERT_EQ(devices.size(), 6u);
+  ASSERT_EQ(devices.size(), 7u);
   for (const auto& device : devices) {
-    EXPECT_EQ(device.is_found, device.name == "simulated") << device.name;
+    EXPECT_EQ(device.is_found, device.name == "simulated" || device.name == "journal")
+        << device.name;
     EXPECT_NE(device.text.find(", "), std::string::npos) << device.text;
     EXPECT_EQ(device.text.find('\n'), std::string::npos) << device.text;
   }
   const auto table = device_table(devices);
-  EXPECT_EQ(std::ranges::count(table, '\n'), 6);
+  EXPECT_EQ(std::ranges::count(table, '\n'), 7);
   EXPECT_NE(table.find("\nhaply           missing  "), std::string::npos) << table;
 }
 
@@ -42,8 +43,8 @@ TEST(DeviceList, WhatIsThereIsFound) {
   places.dhd_libraries = {FAKE_DHD};
   places.hd_libraries = {FAKE_HD};
   const auto devices = list_devices(places);
-  EXPECT_EQ(devices[1].text, "Haply Inverse3 049D");
-  for (const int found : {0, 1, 3}) EXPECT_TRUE(devices[found].is_found) << devices[found].name;
+  EXPECT_EQ(devices[2].text, "Haply Inverse3 049D");
+  for (const int found : {0, 1, 2, 4}) EXPECT_TRUE(devices[found].is_found) << devices[found].name;
 }
 
 TEST(DeviceList, EachNameReachesItsBackend) {
@@ -70,6 +71,8 @@ TEST(DeviceList, EachNameReachesItsBackend) {
   EXPECT_TRUE(says("gamepad", "no gamepad"));
   EXPECT_TRUE(says("gamepad:/nowhere", "/nowhere"));
   EXPECT_TRUE(says("simulated:wave", "palpate"));
+  EXPECT_TRUE(says("journal", "journal:FILE"));
+  EXPECT_TRUE(says("journal:session.mcap,tool=2", "tool=1"));
   for (const char* name : {"", ":", "joystick", "\x1b[2J", "Simulated"})
     EXPECT_TRUE(says(name, "no kind of device")) << name;
 }

@@ -3,15 +3,34 @@
 
 #include "tests/device/fake_dhd.h"
 
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
 #include <chrono>
 #include <cmath>
+#include <cstdlib>
 #include <thread>
 
 namespace {
 
-trocar::testing::FakeDhd* state() {
-  static trocar::testing::FakeDhd fake;
-  return &fake;
+using trocar::testing::FakeDhd;
+
+// Maps the test's file, in which a FakeDhd was made.
+FakeDhd* shared_state(const char* name) {
+  const int file = open(name, O_RDWR | O_CLOEXEC);
+  if (file < 0) std::abort();
+  void* const memory = mmap(nullptr, sizeof(FakeDhd), PROT_READ | PROT_WRITE, MAP_SHARED, file, 0);
+  close(file);
+  if (memory == MAP_FAILED) std::abort();
+  return static_cast<FakeDhd*>(memory);
+}
+
+FakeDhd* state() {
+  static FakeDhd own;
+  static const char* const name = std::getenv("FAKE_DHD_FILE");
+  static FakeDhd* const fake = name == nullptr ? &own : shared_state(name);
+  return fake;
 }
 
 constexpr char kId = 3;  // not the index, so that a mix-up shows
@@ -98,6 +117,9 @@ int dhdSetForceAndTorqueAndGripperForce(double fx, double fy, double fz, double 
   const double values[] = {fx, fy, fz, tx, ty, tz, gripper};
   for (int i = 0; i < 7; ++i) fake.force[i] = values[i];
   fake.last_force_size = std::sqrt(fx * fx + fy * fy + fz * fz);
+  const auto now = std::chrono::steady_clock::now().time_since_epoch();
+  fake.last_force_ns =
+      static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::nanoseconds>(now).count());
   ++fake.exchanges;
   return 0;
 }

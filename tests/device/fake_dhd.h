@@ -1,10 +1,12 @@
 #pragma once
 
 // Says what the fake of libdhd does, and what was done to it. It lies in the library; a test finds
-// it by the library's function fake_dhd().
+// it by the library's function fake_dhd(). Where another program has loaded the library, it lies in
+// the file that FAKE_DHD_FILE names, made by the test.
 
 #include <atomic>
 #include <cstddef>
+#include <cstdint>
 
 namespace trocar::testing {
 
@@ -23,6 +25,7 @@ struct FakeDhd {
   std::atomic<int> watchdog_ms{0}, stops{0}, closes{0};
   std::atomic<bool> is_open{false}, is_force_enabled{false};
   std::atomic<double> last_force_size{0};
+  std::atomic<std::uint64_t> last_force_ns{0};  // monotonic clock
 };
 
 using FakeDhdAccess = FakeDhd* (*)();

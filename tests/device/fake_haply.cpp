@@ -16,9 +16,14 @@ using boost::asio::ip::tcp;
 }  // namespace
 
 FakeHaply::FakeHaply(std::string inventory, Answer answer)
+    : FakeHaply([inventory = std::move(inventory)] { return inventory; }, std::move(answer),
+                [] {}) {}
+
+FakeHaply::FakeHaply(Inventory inventory, Answer answer, std::function<void()> on_end)
     : inventory_(std::move(inventory)),
       answer_(answer ? std::move(answer)
-                     : [this](int, const std::string&) { return std::optional(inventory_); }),
+                     : [this](int, const std::string&) { return std::optional(inventory_()); }),
+      on_end_(std::move(on_end)),
       acceptor_(context_, tcp::endpoint(boost::asio::ip::address_v4::loopback(), 0)),
       thread_([this] { serve(); }) {}
 
@@ -49,18 +54,28 @@ std::string FakeHaply::state(double x, double y, double z) {
 }
 
 void FakeHaply::serve() {
+  while (!is_ending_) {
+    boost::system::error_code failure;
+    tcp::socket socket(context_);
+    acceptor_.accept(socket, failure);
+    if (failure) return;
+    const int before = client_.exchange(dup(socket.native_handle()));
+    if (before >= 0) close(before);
+    if (is_ending_) return;
+    serve_client(socket);
+    on_end_();
+  }
+}
+
+void FakeHaply::serve_client(tcp::socket& socket) {
   boost::system::error_code failure;
-  tcp::socket socket(context_);
-  acceptor_.accept(socket, failure);
-  if (failure) return;
-  client_ = dup(socket.native_handle());
-  if (is_ending_) return;
   websocket::stream<tcp::socket&> stream(socket);
   stream.accept(failure);
   if (failure) return;
   stream.text(true);
-  if (!inventory_.empty()) stream.write(boost::asio::buffer(inventory_), failure);
-  for (int number = 0; !failure; ++number) {
+  const std::string inventory = inventory_();
+  if (!inventory.empty()) stream.write(boost::asio::buffer(inventory), failure);
+  while (!failure) {
     boost::beast::flat_buffer buffer;
     stream.read(buffer, failure);
     if (failure) break;
@@ -69,7 +84,7 @@ void FakeHaply::serve() {
       const std::lock_guard guard(lock_);
       messages_.push_back(message);
     }
-    const auto answer = answer_(number, message);
+    const auto answer = answer_(number_++, message);
     if (answer == "hang up") {
       shutdown(client_, SHUT_RDWR);
       return;

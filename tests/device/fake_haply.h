@@ -23,7 +23,12 @@ class FakeHaply {
   // "hang up" ends the connection.
   using Answer = std::function<std::optional<std::string>(int number, const std::string& message)>;
 
+  // Says the inventory to each client that comes, one after another; empty: nothing.
+  using Inventory = std::function<std::string()>;
+
   explicit FakeHaply(std::string inventory, Answer answer = {});
+  // on_end: a client's connection has ended.
+  FakeHaply(Inventory inventory, Answer answer, std::function<void()> on_end);
   ~FakeHaply();
 
   std::string url() const;
@@ -36,9 +41,11 @@ class FakeHaply {
 
  private:
   void serve();
+  void serve_client(boost::asio::ip::tcp::socket& socket);
 
-  const std::string inventory_;
+  const Inventory inventory_;
   const Answer answer_;
+  const std::function<void()> on_end_;
   boost::asio::io_context context_{1};
   boost::asio::ip::tcp::acceptor acceptor_;
   // The client's socket a second time: the thread may close its own at any moment. -1: none.
@@ -46,6 +53,7 @@ class FakeHaply {
   std::atomic<bool> is_ending_{false};
   mutable std::mutex lock_;
   std::vector<std::string> messages_;
+  int number_ = 0;  // of the next message
   std::atomic<bool> was_closed_{false};
   std::thread thread_;
 };

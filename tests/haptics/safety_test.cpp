@@ -85,12 +85,31 @@ TEST_F(SafetyChain, AnOldPatchFadesInContactOnly) {
   input_.touches = true;
   input_.patch_age_s = 0.25;
   EXPECT_NEAR(settle().force_n.x, 1, 1e-12);
-  input_.patch_age_s = 0.5;
-  const SafeForce safe = settle();
-  EXPECT_NEAR(safe.force_n.x, std::exp(-1.0), 1e-9);
+  input_.patch_age_s = 0.26;
+  SafeForce safe = settle(125);
+  EXPECT_NEAR(safe.force_n.x, 0.5, 1e-9);
   EXPECT_TRUE(has(safe, Limit::OldPatch));
+  EXPECT_EQ(length(settle(126).force_n), 0) << "within 250 ms";
   input_.touches = false;
   EXPECT_NEAR(settle().force_n.x, 1, 1e-12);
+}
+
+TEST_F(SafetyChain, AnswersThatComeBackAreFeltLittleByLittle) {
+  input_.force_n = {1, 0, 0};
+  input_.touches = true;
+  input_.patch_age_s = 1;
+  EXPECT_EQ(length(settle(300).force_n), 0);
+  input_.patch_age_s = 0;
+  EXPECT_NEAR(settle(125).force_n.x, 0.5, 1e-9);
+  EXPECT_NEAR(settle(126).force_n.x, 1, 1e-9);
+}
+
+TEST_F(SafetyChain, AContactThatBeginsWhileNobodyAnswersIsNotFelt) {
+  input_.patch_age_s = 1;
+  settle(1);
+  input_.force_n = {1, 0, 0};
+  input_.touches = true;
+  EXPECT_EQ(length(settle().force_n), 0);
 }
 
 TEST_F(SafetyChain, TheForceChangesByAtMostThreeTenthsOfANewtonInAMillisecond) {

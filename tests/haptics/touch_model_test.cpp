@@ -6,6 +6,8 @@
 
 #include <cmath>
 
+#include "common/tool/tool_kind.h"
+
 namespace trocar::haptics {
 namespace {
 
@@ -385,10 +387,55 @@ TEST_F(Touch, ARefusalStopsFromTheForceThatIsThere) {
 
 TEST_F(Touch, MoreThanIsPassedOnIsNotRendered) {
   press(0.006);
+  const double before_n = output_.force_n.y;
   patch_.pressed_limit_n = 0.1f;
-  answer({0, 0.3, 0});
-  rest(50);
+  answer({0, 0.1, 0});
+  EXPECT_NEAR(step(input_.tip_m).y, before_n, 0.1 * before_n) << "no step";
+  rest(400);
   EXPECT_NEAR(output_.force_n.y, 0.1, 1e-6);
+}
+
+// The hand goes far beyond where the tool is stopped, and comes back: what was known of the tissue
+// is as it was.
+TEST_F(Touch, AToolThatIsStoppedTeachesNothing) {
+  press(0.004);
+  for (int k = 0; k < 40; ++k) {
+    answer(output_.force_n);
+    rest(16);
+  }
+  const double slope = model_.slope(), before_n = output_.force_n.y;
+  const Vec3d held_m = input_.tip_m;
+  patch_.pressed_limit_n = static_cast<float>(before_n);
+  for (int k = 0; k < 400; ++k) {
+    if (k % 16 == 0) answer({0, before_n, 0});
+    step(held_m - Vec3d{0, 0.004 * std::min(1.0, k / 200.0), 0});
+  }
+  EXPECT_NEAR(output_.force_n.y, before_n, 1e-3 * before_n) << "it grows no more";
+  EXPECT_NEAR(model_.slope(), slope, 0.01 * slope);
+}
+
+// Instruments feel different already before the server has said anything about them.
+TEST(Instruments, AWideTipIsStifferThanAThinOne) {
+  const auto force_n = [](std::string_view kind) {
+    TouchModel model(tool::find_tool_kind(kind)->shape);
+    model.take(law_of(1));
+    wire::HapticPatch patch;
+    patch.plane_normal = {0, 1, 0};
+    patch.kind = wire::TouchKind::Near;
+    patch.law = 1;
+    model.take(patch);
+    TouchInput input;
+    input.orientation = rotation_from_z({0, 1, 0});
+    TouchOutput output;
+    for (int k = 0; k <= 200; ++k) {
+      input.time_us += 1000;
+      input.tip_m.y = -0.004 * k / 200;
+      output = model.step(input);
+    }
+    return output.force_n.y;
+  };
+  // Hertz: the force grows with the root of the radius, 5 and 1.5 mm.
+  EXPECT_NEAR(force_n("probe") / force_n("scalpel"), std::sqrt(5 / 1.5), 0.1);
 }
 
 class Gripping : public Touch {

@@ -14,9 +14,9 @@ using wire::HapticPatch, wire::TouchKind;
 constexpr float kRadius_m = 0.006f;
 
 // A hand with a clock of its own comes to the foremost node of the measured liver, from the front.
-class TouchTest : public ::testing::Test {
- protected:
-  TouchTest() : simulation_(*catalogue::make_measured_liver()) {
+class Scene {
+ public:
+  Scene() : simulation_(*catalogue::make_measured_liver()) {
     Vec3d foremost{0, 0, -1};
     for (const auto& p : simulation_.organ().mesh.rest_positions)
       if (p.z > foremost.z) foremost = p;
@@ -31,7 +31,7 @@ class TouchTest : public ::testing::Test {
     hands::TickInputs inputs;
     if (next == 1) {
       hands::HandJoin join{.slot = {0}};
-      join.shapes[0] = {.radius_m = kRadius_m, .length_m = 0.3f, .reach_m = 0.012f};
+      join.shapes[0] = shape_;
       inputs.joins.push_back(join);
     }
     tip_ = front_ + aside + Vec3f{0, 0, -depth};
@@ -43,10 +43,13 @@ class TouchTest : public ::testing::Test {
     if (const auto frame = simulation_.pop_frame()) patch_ = frame->tools.at(0).touch;
   }
 
+  tool::ToolShape shape_{.radius_m = kRadius_m, .length_m = 0.3f, .reach_m = 0.012f};
   Simulation simulation_;
   Vec3f front_, tip_;
   HapticPatch patch_;
 };
+
+class TouchTest : public ::testing::Test, protected Scene {};
 
 TEST_F(TouchTest, SaysWhereTheSurfaceWouldBeWithoutTheTool) {
   for (int i = 0; i < 100; ++i) tick(-0.01f);
@@ -107,6 +110,33 @@ TEST_F(TouchTest, AHandThatLetsGoFeelsNothing) {
   EXPECT_EQ(patch_.structure, structure) << "it is the same tissue";
   for (int i = 0; i < 100; ++i) tick(-0.1f);
   EXPECT_EQ(patch_.kind, TouchKind::Free);
+}
+
+// A thin tool pressed on its tip is stopped by the greatest pressure; a blunt one is not.
+TEST_F(TouchTest, AToolThatIsStoppedSaysSo) {
+  for (int i = 0; i < 400; ++i) {
+    tick(std::min(0.006f, 0.00003f * static_cast<float>(i - 50)));
+    EXPECT_EQ(patch_.pressed_limit_n, 0) << i;
+  }
+  EXPECT_GT(length(patch_.force_n), 0.1f);
+  Scene thin;
+  thin.shape_.radius_m = 0.001f;
+  float stopped_at_m = 0, limit_n = 0;
+  for (int i = 0; i < 1200; ++i) {
+    const float depth = 0.00002f * static_cast<float>(i - 50);
+    thin.tick(std::min(0.015f, depth));
+    if (stopped_at_m == 0 && thin.patch_.pressed_limit_n > 0) {
+      stopped_at_m = depth;
+      limit_n = thin.patch_.pressed_limit_n;
+    }
+  }
+  ASSERT_GT(stopped_at_m, 0);
+  ASSERT_LT(stopped_at_m, 0.005f);
+  const float along = dot(thin.patch_.force_n, thin.patch_.plane_normal);
+  EXPECT_FLOAT_EQ(thin.patch_.pressed_limit_n, along);
+  EXPECT_NEAR(along, limit_n, 0.1f * limit_n) << "it grows no more, though the hand went on";
+  for (int i = 0; i < 300; ++i) thin.tick(-0.005f);
+  EXPECT_EQ(thin.patch_.pressed_limit_n, 0);
 }
 
 TEST_F(TouchTest, AGraspIsAnotherThing) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "server/tissue/contact/contact_law.h"
 #include "server/tissue/contact/proxies.h"
 #include "server/tissue/touch/haptic_law.h"
 
@@ -34,6 +35,23 @@ bool is_rigid(const TouchTable::Scene& scene, const contact::ToolContact& contac
     if (moves == 0) held += point.stiffness;
   }
   return held > 0.5f * all;
+}
+
+// A tool stops where one of its points presses as hard as tissue bears, and its force grows no more
+// however deep the hand goes. Returns the force along the normal then, else 0.
+float pressed_limit_n(const TouchTable::Scene& scene, ToolSlot slot, const Vec3f& force,
+                      const Vec3f& normal) {
+  constexpr float kAlmost = 0.999f;
+  for (const auto& contact : scene.contacts.tools) {
+    if (contact.tool.value != slot.value) continue;
+    const auto points = scene.contacts.points_of(contact);
+    const bool has_stopped = std::ranges::any_of(points, [&](const auto& point) {
+      const auto d = contact::displacement_of(point, scene.world);
+      return contact::load_at(point, d).pressed_n > kAlmost * point.limit_n;
+    });
+    return has_stopped ? std::max(0.0f, dot(force, normal)) : 0;
+  }
+  return 0;
 }
 
 }  // namespace
@@ -158,6 +176,8 @@ wire::HapticPatch TouchTable::describe(const Scene& scene, ToolSlot slot) {
   patch.force_n = touch.force;
   patch.torque_nm = touch.torque;
   patch.friction = tool.shape.friction;
+  if (touch.kind == TouchKind::Push)
+    patch.pressed_limit_n = pressed_limit_n(scene, slot, touch.force, patch.plane_normal);
   if (touch.kind == TouchKind::Grip) {
     patch.grip_point_m = touch.grip_point;
     patch.grip_limit_n = scene.grasps[slot].grip_n;
