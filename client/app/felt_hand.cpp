@@ -13,17 +13,8 @@ namespace {
 
 constexpr std::size_t kMostLaws = 8;  // that wait: a model keeps no more
 constexpr std::uint64_t kPublishEvery = 16;
-// The network asks every 4 ms, now and then late.
+// The network asks every 4 ms, now and then a little early.
 constexpr haptics::ReadingPace kPace{.shortest_ns = 2'000'000};
-
-// A device that brings its own tool is held as that says.
-FeltSettings settings_of(const device::HapticDevice& device, const FeltSettings& settings) {
-  const auto own = device.own_tool();
-  if (!own) return settings;
-  FeltSettings its{.has_trace = settings.has_trace};
-  its.tool.shape = own->shape;
-  return its;
-}
 
 Status check_port(const haptics::HandSettings& settings) {
   if (!settings.port_m) return {};
@@ -38,11 +29,19 @@ Status check_port(const haptics::HandSettings& settings) {
                            1e3 * (length_m - haptics::Fulcrum::kLeastOutside_m))};
 }
 
+FeltSettings settings_for(const device::HapticDevice& device, const FeltSettings& wanted) {
+  const auto own = device.own_tool();
+  if (!own) return wanted;
+  FeltSettings settings{.has_trace = wanted.has_trace};
+  settings.tool.shape = own->shape;
+  return settings;
+}
+
 }  // namespace
 
 FeltHand::FeltHand(std::unique_ptr<device::HapticDevice> device, const FeltSettings& settings)
     : device_(std::move(device)),
-      settings_(settings_of(*device_, settings)),
+      settings_(settings_for(*device_, settings)),
       reporter_(device_->description(), settings_.scale) {
   if (settings_.has_trace) trace_ = std::make_unique<haptics::Trace>(kMostTraceRows);
   figures_.device = device_->description();
@@ -75,7 +74,7 @@ Status FeltHand::start(const Vec3d& start_m) {
 }
 
 void FeltHand::set_view(const Quatf& world_from_device) {
-  if (world_from_device == view_) return;
+  if (world_from_device == view_ || device_->own_tool()) return;
   view_ = world_from_device;
   if (hand_) hand_->put_view(view_);
 }

@@ -55,7 +55,8 @@ class FeltHand {
   // start_m: where the tool's tip is at first, world frame, if the device does not say. An error:
   // its shaft does not reach there through the port.
   Status start(const Vec3d& start_m);
-  // Does as Hand::put_view; before the start, too.
+  // Does as Hand::put_view; before the start, too. A device with a tool of its own moves in the
+  // world, however it is seen.
   void set_view(const Quatf& world_from_device);
   // An error: the device is gone.
   Status check() const;

@@ -31,14 +31,14 @@ class Hands {
   // Returns the tools to offer when joining.
   std::vector<tool::ToolShape> shapes() const;
   const std::vector<std::unique_ptr<FeltHand>>& felt() const { return felt_; }
-  // Between the devices and a source; null: there are none. It stays where it is.
-  replica::HandLine* line() { return line_.get(); }
-  // How the person looks at the scene: devices move tools as they are seen.
-  void set_view(const Quatf& world_from_camera);
   // Returns those of all hands that feel, by number.
   std::vector<FeltFigures> figures() const;
   // From now on no hand feels anything. What each did, by number; null: it was not to be kept.
   std::vector<const haptics::Trace*> let_go();
+  // Between the devices and a source; null: there are none. It stays where it is.
+  replica::HandLine* line() { return line_.get(); }
+  // How the person looks at the scene: devices move tools as they are seen.
+  void set_view(const Quatf& world_from_camera);
   device::MouseTool* mouse_tool() { return mouse_ ? &*mouse_ : nullptr; }
 
   // Sends what is due, and starts devices. A script begins with the first frame this client shows

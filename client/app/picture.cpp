@@ -206,16 +206,18 @@ void Picture::add_own_forces(const replica::Replica& replica, ui::HudModel& mode
 
 void Picture::observe(const replica::Replica& replica, const Hands& hands, std::uint64_t now_ns) {
   forces_.update(replica);
-  for (std::size_t i = 0; i < hands.felt().size(); ++i) {
-    const auto& state = hands.felt()[i]->figures().state;
+  const auto felt = hands.figures();
+  for (std::size_t i = 0; i < std::min(felt.size(), felt_forces_.size()); ++i) {
+    const auto& state = felt[i].state;
     felt_forces_[i].add(now_ns / kFeltBinNs, {static_cast<float>(length(state.hand_force_n)),
                                               static_cast<float>(length(state.server_force_n))});
   }
 }
 
 void Picture::add_felt_hands(const Hands& hands, ui::HudModel& model) const {
-  for (std::size_t i = 0; i < hands.felt().size(); ++i) {
-    const auto& felt = hands.felt()[i]->figures();
+  const auto all = hands.figures();
+  for (std::size_t i = 0; i < std::min(all.size(), felt_forces_.size()); ++i) {
+    const auto& felt = all[i];
     const auto& state = felt.state;
     ui::HudFeltHand shown;
     shown.figures = {.device = felt.device,

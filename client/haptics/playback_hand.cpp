@@ -97,6 +97,9 @@ Status PlaybackHand::step(std::uint64_t now_us) {
   state_.model_force_n = state_.server_force_n = felt.force_n;
   state_.hand_force_n = safe.force_n;
   state_.hand_torque_nm = safe.torque_nm;
+  state_.largest_force_n = std::max(state_.largest_force_n, length(safe.force_n));
+  state_.largest_server_force_n =
+      std::max(state_.largest_server_force_n, length(state_.server_force_n));
   state_.reading_age_s = input.reading_age_s;
   state_.limits = safe.limits;
   state_.limit_counts = safety_.counts();

@@ -23,8 +23,7 @@ struct Fixture {
   Fixture() {
     auto device_of_hand = std::make_unique<LiveDevice>();
     device = device_of_hand.get();
-    hand = std::make_unique<FeltHand>(std::move(device_of_hand), tool::ToolShape{},
-                                      haptics::WorkspaceScale{2, 0.5}, false);
+    hand = std::make_unique<FeltHand>(std::move(device_of_hand), FeltSettings{.scale = {2, 0.5}});
   }
   LiveDevice* device;
   std::unique_ptr<FeltHand> hand;
@@ -61,14 +60,14 @@ TEST(FeltHand, BeforeTheStartThereIsNothingAndLawsAreKept) {
   fixture.hand->take(patch);
   EXPECT_FALSE(fixture.hand->pop_reading(monotonic_ns()));
   EXPECT_FALSE(fixture.hand->pop_report());
-  fixture.hand->start({});
+  ASSERT_TRUE(fixture.hand->start({}).ok());
   ASSERT_TRUE(wait_until([&] { return fixture.hand->pop_reading(monotonic_ns()).has_value(); }));
   EXPECT_EQ(fixture.hand->figures().state.largest_server_force_n, 0) << "patches are dropped";
 }
 
 TEST(FeltHand, AnAnswerReachesTheLoopWithoutTheRenderThread) {
   Fixture fixture;
-  fixture.hand->start({0, 0, 0.1});
+  ASSERT_TRUE(fixture.hand->start({0, 0, 0.1}).ok());
   wire::HapticPatch patch;
   patch.kind = wire::TouchKind::Push;
   patch.force_n = {0, 0, 0.5f};
@@ -83,7 +82,7 @@ TEST(FeltHand, AnAnswerReachesTheLoopWithoutTheRenderThread) {
 TEST(FeltHand, AHandThatMovesSpeaksAtOnceAndOneThatRestsNowAndThen) {
   Fixture fixture;
   fixture.device->moves = true;
-  fixture.hand->start({});
+  ASSERT_TRUE(fixture.hand->start({}).ok());
   const auto moving = times_of_readings(*fixture.hand, 100);
   EXPECT_GT(moving.size(), 50u) << "only where it turns round it goes less than 60 um";
   fixture.device->moves = false;
@@ -102,7 +101,7 @@ TEST(FeltHand, MovesAsItsToolIsSeen) {
   Fixture fixture;
   fixture.hand->set_view({0, std::sqrt(0.5f), 0, std::sqrt(0.5f)});  // right is -z of the world
   fixture.device->moves = true;
-  fixture.hand->start({});
+  ASSERT_TRUE(fixture.hand->start({}).ok());
   Vec3d least, most;
   ASSERT_TRUE(wait_until([&] {
     const auto reading = fixture.hand->pop_reading(monotonic_ns());

@@ -192,8 +192,8 @@ TEST_F(PictureTest, WhatADeviceRendersIsShownWithTheRate) {
   const Overlays rate{.regions = false, .arrows = false, .rate = true};
   const render::Image without = picture_of(rate);
   std::vector<std::unique_ptr<FeltHand>> felt;
-  felt.push_back(std::make_unique<FeltHand>(std::make_unique<testing::LiveDevice>(),
-                                            tool::ToolShape{}, haptics::WorkspaceScale{}, false));
+  felt.push_back(
+      std::make_unique<FeltHand>(std::make_unique<testing::LiveDevice>(), FeltSettings{}));
   hands_ = Hands::felt(std::move(felt));
   EXPECT_GT(difference(without, picture_of(rate, {}, "felt_hand")), 3000);
 }
@@ -205,13 +205,12 @@ TEST_F(PictureTest, ADeviceMovesItsToolAsThePictureIsSeen) {
   auto device = std::make_unique<testing::LiveDevice>();
   device->moves = true;
   std::vector<std::unique_ptr<FeltHand>> felt;
-  felt.push_back(std::make_unique<FeltHand>(std::move(device), tool::ToolShape{},
-                                            haptics::WorkspaceScale{}, false));
+  felt.push_back(std::make_unique<FeltHand>(std::move(device), FeltSettings{}));
   hands_ = Hands::felt(std::move(felt));
   source_.queue_start();
   draw(2);
   auto& hand = *hands_.felt().front();
-  hand.start({});
+  ASSERT_TRUE(hand.start({}).ok());
   Vec3d least, most;
   const auto until = monotonic_ns() + 20'000'000'000;
   while (most.z - least.z < 0.008 && monotonic_ns() < until) {
