@@ -76,11 +76,12 @@ SafeForce Safety::step(const SafetyInput& given) {
   }
   observe(input);
 
-  double share = 1;
-  if (input.touches && input.patch_age_s > settings_.patch_age_s) {
-    share = std::exp(-(input.patch_age_s - settings_.patch_age_s) / settings_.patch_fall_s);
-    note(Limit::OldPatch, safe);
-  }
+  const double old_s = input.touches ? input.patch_age_s - settings_.patch_age_s : 0;
+  const double trusted = old_s > 0 ? std::exp(-old_s / settings_.patch_fall_s) : 1;
+  trust_ = std::min(trusted, trust_ + input.dt_s / settings_.ramp_s);
+  if (!input.touches) trust_ = 1;
+  double share = trust_;
+  if (trust_ < 1) note(Limit::OldPatch, safe);
   if (ramp_ < 1) {
     share *= ramp_;
     ramp_ = std::min(1.0, ramp_ + input.dt_s / settings_.ramp_s);

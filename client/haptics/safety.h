@@ -4,7 +4,7 @@
 //
 //   1 a force, torque or place that is no number: 0 at once
 //   2 a reading of the device older than 20 ms, or one that jumped: 0 at once
-//   3 no answer of the server for 250 ms in contact: falls with 250 ms
+//   3 no answer of the server for 250 ms in contact: falls with 250 ms; comes back within 250 ms
 //   4 ramp: grows from 0 within 250 ms, at the start and after each of 1 and 2
 //   5 passivity: what was done to the hand beyond what tissue may have stored is damped away
 //   6 slew: at most 0.3 N/ms (measured: a tap at 400 mm/s needs 0.17, a grasp 0.20)
@@ -81,7 +81,8 @@ class Safety {
   Counts counts_{};
   Vec3d last_force_n_, last_torque_nm_, last_position_m_, velocity_m_s_;
   bool has_position_ = false;
-  double ramp_ = 0;  // 0 to 1
+  double ramp_ = 0;   // 0 to 1
+  double trust_ = 1;  // in the newest answer, likewise
   double work_j_ = 0;
 };
 

@@ -93,6 +93,23 @@ TEST_F(SafetyChain, AnOldPatchFadesInContactOnly) {
   EXPECT_NEAR(settle().force_n.x, 1, 1e-12);
 }
 
+TEST_F(SafetyChain, TheForceComesBackSlowlyWithTheAnswers) {
+  input_.force_n = {1, 0, 0};
+  input_.touches = true;
+  settle();
+  input_.patch_age_s = 3;
+  EXPECT_LT(settle().force_n.x, 1e-4);
+  input_.patch_age_s = 0;
+  double last_n = safety_.step(input_).force_n.x;
+  EXPECT_LT(last_n, 0.005);
+  for (int k = 0; k < 249; ++k) {
+    const double force_n = safety_.step(input_).force_n.x;
+    EXPECT_LT(force_n - last_n, 0.005);
+    last_n = force_n;
+  }
+  EXPECT_NEAR(settle(5).force_n.x, 1, 1e-12);
+}
+
 TEST_F(SafetyChain, TheForceChangesByAtMostThreeTenthsOfANewtonInAMillisecond) {
   input_.force_n = {2, 0, 0};
   input_.torque_nm = {0.04, 0, 0};
