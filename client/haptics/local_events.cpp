@@ -24,29 +24,4 @@ double LocalStop::step(const Vec3d& core_m, const Vec3d& velocity_m_s, double dt
   return std::max(0.0, normal_n_ + stiffness_n_m_ * deeper_m + damping_n);
 }
 
-double CutDrop::step(double force_n, double cut_force_n, double answer_s, std::uint64_t time_us) {
-  const double dt_s = last_us_ == 0 ? 0 : static_cast<double>(time_us - last_us_) * 1e-6;
-  last_us_ = time_us;
-  const bool is_over = cut_force_n > 0 && force_n > cut_force_n;
-  if (!is_over) is_armed_ = true;
-  if (!is_on_ && is_over && is_armed_) {
-    is_on_ = true;
-    is_armed_ = false;
-    since_us_ = time_us;
-  }
-  if (is_on_) {
-    const double since_s = static_cast<double>(time_us - since_us_) * 1e-6;
-    share_ = std::clamp(1 - since_s / kDrop_s, kLeft, 1.0);
-    if (since_s > answer_s + kPatience_s) is_on_ = false;
-  } else {
-    share_ += (1 - share_) * std::min(1.0, dt_s / kReturn_s);
-  }
-  return share_;
-}
-
-void CutDrop::confirm() {
-  is_on_ = false;
-  share_ = 1;
-}
-
 }  // namespace trocar::haptics

@@ -1,9 +1,6 @@
 #pragma once
 
-// A hand feels this at once, before the server confirms it: a stop where the tool may not go, and
-// tissue that gives way to a blade.
-
-#include <cstdint>
+// A hand feels this at once, before the server confirms it: a stop where the tool may not go.
 
 #include "common/math/vec3.h"
 
@@ -30,27 +27,6 @@ class LocalStop {
   bool is_on_ = false;
   Vec3d core_m_, normal_;
   double depth_m_ = 0, normal_n_ = 0, stiffness_n_m_ = 0, damping_share_ = 0;
-};
-
-// Drops the force once it passes what the blade needs to cut. Without a confirmation in time the
-// force comes back, and must first fall below that limit before it drops again.
-class CutDrop {
- public:
-  static constexpr double kDrop_s = 0.003, kReturn_s = 0.015;
-  static constexpr double kLeft = 0.05;         // of the force
-  static constexpr double kPatience_s = 0.080;  // beyond the way to the server and back
-
-  // By what the force is multiplied. `cut_force_n` 0: there is no blade in tissue.
-  double step(double force_n, double cut_force_n, double answer_s, std::uint64_t time_us);
-  bool is_on() const { return is_on_; }
-  std::uint64_t since_us() const { return since_us_; }
-  // The server's forces show it from now on.
-  void confirm();
-
- private:
-  bool is_on_ = false, is_armed_ = true;
-  std::uint64_t since_us_ = 0, last_us_ = 0;
-  double share_ = 1;
 };
 
 }  // namespace trocar::haptics

@@ -16,6 +16,7 @@ namespace trocar::haptics {
 struct PastState {
   std::uint64_t time_us = 0;
   Vec3d tip_m, core_m;     // core: the centre of the round tip
+  Vec3d axis;              // back along the shaft
   double clearance_m = 0;  // from the core's centre to the tool's surface, towards the tissue
   double depth_m = 0;      // under the surface as it was believed then
   Vec3d grip_point_m;

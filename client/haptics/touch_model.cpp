@@ -12,6 +12,7 @@ constexpr double kLongestStep_s = 0.1;
 constexpr double kVelocityTime_s = 1 / (2 * std::numbers::pi * 40);
 constexpr double kOpening_s = 0.020;  // jaws that open let go of the force
 constexpr double kFarAbove_m = -1;    // a depth, where there is no surface
+constexpr double kMostSlant = 0.2;    // of an edge's cosine to the normal
 
 Vec3d across(const Vec3d& v, const Vec3d& normal) {
   return v - normal * dot(v, normal);
@@ -45,6 +46,7 @@ PastState TouchModel::state_of(const TouchInput& input) const {
   const Vec3d along = to_double(rotate(input.orientation, {0, 0, 1}));
   const Vec3d sideways = to_double(rotate(input.orientation, {1, 0, 0}));
   PastState state;
+  state.axis = along;
   state.time_us = input.time_us;
   state.tip_m = input.tip_m;
   state.core_m = input.tip_m + along * static_cast<double>(shape_.radius_m);
@@ -57,9 +59,16 @@ void TouchModel::answer(PastState& state, double dt_s) {
   if (grips()) {
     state.grip_point_m = grip_point_m_ + grip_offset_m_;
     state.response = grip_.step(steps_, state.tip_m, state.grip_point_m);
+    return;
+  }
+  state.depth_m =
+      has_surface() ? depth_of(state.core_m, state.clearance_m) + depth_offset_m_ : kFarAbove_m;
+  if (cuts()) {
+    // The edge goes up along the shaft.
+    const double slant = std::max(kMostSlant, dot(state.axis, normal_));
+    const double length_m = std::min(state.depth_m / slant, static_cast<double>(shape_.edge_m));
+    state.response = blade_.step(state.tip_m, state.axis, length_m, dt_s);
   } else {
-    state.depth_m =
-        has_surface() ? depth_of(state.core_m, state.clearance_m) + depth_offset_m_ : kFarAbove_m;
     state.response = push_.step(power_law_, steps_, state.depth_m, state.core_m, normal_,
                                 static_cast<double>(patch_.friction));
   }
@@ -83,8 +92,6 @@ TouchOutput TouchModel::step(const TouchInput& input) {
   const Response& response = state.response;
   Vec3d force_n = limited_force(corrected_force(response), response);
   if (stop_.is_on()) force_n = stopped_force(force_n, state.core_m, dt_s);
-  force_n *= cut_drop_.step(length(force_n), static_cast<double>(patch_.cut_force_n), answer_s_,
-                            input.time_us);
   if (grips()) force_n *= held_share_;
   output_.force_n = force_n;
   output_.torque_nm = lever_m_ * length(force_n);
@@ -130,6 +137,7 @@ Vec3d TouchModel::limited_force(const Vec3d& force_n, const Response& response) 
     return limit_n > 0 ? shortened(force_n, limit_n) : force_n;
   }
   if (response.elastic_n <= 0) return {};
+  if (cuts()) return force_n;
   double along_n = std::max(0.0, dot(force_n, normal_));
   along_n = std::min(along_n, pressed_limit_n_);
   const double leans_n = length(lean_) * std::max(0.0, response.normal_n);

@@ -5,7 +5,7 @@
 // (HapticPatch) corrects it at the pose that the answer belongs to, not at the pose of its arrival
 // (a Smith predictor):
 //
-//   F = s M + c gate        M: what local tissue answers (push_element.h, grip_element.h)
+//   F = s M + c gate        M: what local tissue answers (push_, grip_, blade_element.h)
 //   c -> F_server - s M(echo)    gate: falls to 0 with the last 40 % of M, so that no force is left
 //   s -> slope of F_server over M(echo) (slope_fit.h)              in free space
 //
@@ -20,6 +20,7 @@
 #include <array>
 #include <optional>
 
+#include "client/haptics/blade_element.h"
 #include "client/haptics/grip_element.h"
 #include "client/haptics/local_events.h"
 #include "client/haptics/past_states.h"
@@ -96,6 +97,11 @@ class TouchModel {
   }
   bool has_surface() const { return has_patch_ && patch_.kind != wire::TouchKind::Free; }
   bool grips() const { return has_patch_ && patch_.kind == wire::TouchKind::Grip; }
+  bool cuts() const { return has_patch_ && patch_.kind == wire::TouchKind::Cut; }
+  enum class Element { Push, Grip, Blade };
+  Element element() const {
+    return grips() ? Element::Grip : cuts() ? Element::Blade : Element::Push;
+  }
 
   // The local model.
   PastState state_of(const TouchInput& input) const;
@@ -120,6 +126,9 @@ class TouchModel {
   void take_stop();
   void restart(std::size_t first);
   void correct(const PastState& then, bool is_new_structure);
+  double blade_slope(const Response& response) const;
+  void correct_blade(const PastState& then);
+  void take_lever();
   Response with_moved_reference(const PastState& then) const;
   std::optional<double> stiffness_ratio(const Response& response) const;
   SymMat3<double> grip_stiffness() const;
@@ -141,6 +150,7 @@ class TouchModel {
 
   PushElement push_;
   GripElement grip_;
+  BladeElement blade_;
   PastStates past_;
   Vec3d velocity_m_s_;  // smoothed
 
@@ -155,7 +165,6 @@ class TouchModel {
   double answer_s_ = 0;
 
   LocalStop stop_;
-  CutDrop cut_drop_;
   bool is_let_go_ = false;  // the jaws opened, the server does not know yet
   std::uint64_t jaws_closed_us_ = 0;
   double held_share_ = 1;

@@ -15,6 +15,8 @@ constexpr double kGuessDepth_m = 0.005;
 constexpr double kLongestPause_s = 0.1;  // between two answers, for the fit
 constexpr double kAnswerShare = 0.1;     // of a new delay in the smoothed one
 constexpr std::size_t kMostReplayed = 1024;
+constexpr std::size_t kBladeReplayed = 300;
+constexpr double kLeastBladeForce_n = 0.05, kMostBladeSlope = 30, kBladeFollow_s = 0.05;
 // A server that counts from the beginning again is not late: its answers are of much later poses.
 constexpr std::uint64_t kNewSession_us = 1'000'000;
 
@@ -71,6 +73,7 @@ void TouchModel::take(const wire::HapticPatch& patch) {
   }
   ++counts_.patches;
   const bool had_surface = has_surface(), gripped = grips();
+  const Element element_before = element();
   const bool is_new_structure = has_patch_ && patch.structure != patch_.structure;
   patch_ = patch;
   has_patch_ = true;
@@ -84,15 +87,17 @@ void TouchModel::take(const wire::HapticPatch& patch) {
   const auto found = past_.find(patch.echo_time_us);
   if (!found) {
     ++counts_.unmatched_patches;
-    if (is_new_law || gripped != grips()) restart(past_.end());
+    if (is_new_law || element_before != element()) restart(past_.end());
     return;
   }
   const std::uint64_t newest_us = past_[past_.end() - 1].time_us;
   const double answer_s =
       static_cast<double>(newest_us - std::min(patch.echo_time_us, newest_us)) * 1e-6;
   answer_s_ += (answer_s - answer_s_) * (answer_s_ == 0 ? 1 : kAnswerShare);
-  if (is_new_law || gripped != grips()) {
+  if (is_new_law || element_before != element()) {
     restart(*found);
+  } else if (cuts()) {
+    correct_blade(*past_.at(patch.echo_time_us));
   } else {
     correct(*past_.at(patch.echo_time_us), is_new_structure);
   }
@@ -165,22 +170,31 @@ SymMat3<double> TouchModel::grip_stiffness() const {
 // The local model begins anew with what it is now, at the pose that the answer belongs to.
 void TouchModel::restart(std::size_t first) {
   if (grips()) grip_.start(grip_stiffness());
-  fit_.set_slope(grips() ? 1 : materials_[material_].slope);
+  fit_.set_slope(grips() || cuts() ? 1 : materials_[material_].slope);
   fit_.clear_sums();
   slope_ = fit_.slope();
   lean_ = fit_.lean();
   push_.start(kClearlyAbove_m);
   if (past_.is_empty()) return;
+  const std::size_t answered = first;
+  // The direction of a blade is that of its way before.
+  if (cuts()) first = first > kBladeReplayed ? first - kBladeReplayed : 0;
   first = std::max({first, past_.begin(),
                     past_.end() > kMostReplayed ? past_.end() - kMostReplayed : std::size_t{0}});
   first = std::min(first, past_.end() - 1);
+  blade_.start(past_[first].tip_m);
   if (has_surface()) push_.start(depth_of(past_[first].core_m, past_[first].clearance_m));
   for (std::size_t i = first; i < past_.end(); ++i) {
     const bool has_previous = i > past_.begin();
     const std::uint64_t dt_us = has_previous ? past_[i].time_us - past_[i - 1].time_us : 1000;
     answer(past_[i], static_cast<double>(dt_us) * 1e-6);
   }
-  const Response& then = past_[first].response;
+  const PastState& then_state = past_[std::clamp(answered, first, past_.end() - 1)];
+  if (cuts()) {
+    fit_.set_slope(blade_slope(then_state.response));
+    slope_ = fit_.slope();
+  }
+  const Response& then = then_state.response;
   next_correction_n_ = {};
   if (touches(patch_.kind))
     next_correction_n_ = trocar::to_double(patch_.force_n) - scaled_force(then, slope_, lean_);
@@ -203,6 +217,34 @@ Response TouchModel::with_moved_reference(const PastState& then) const {
     response.rest_n = response.rest_n - normal_ * dot(response.rest_n, normal_);
   }
   return response;
+}
+
+// By how much the server's blade is held back more; that of before where the local one is not.
+double TouchModel::blade_slope(const Response& response) const {
+  const Vec3d server_n = trocar::to_double(patch_.force_n);
+  if (length(response.rest_n) < kLeastBladeForce_n) return fit_.slope();
+  return std::clamp(dot(server_n, response.rest_n) / length_squared(response.rest_n), 0.0,
+                    kMostBladeSlope);
+}
+
+void TouchModel::correct_blade(const PastState& then) {
+  const double dt_s =
+      patch_.echo_time_us > last_echo_us_
+          ? std::min(static_cast<double>(patch_.echo_time_us - last_echo_us_) * 1e-6,
+                     kLongestPause_s)
+          : 0;
+  const double slope = fit_.slope();
+  fit_.set_slope(slope +
+                 (blade_slope(then.response) - slope) * std::min(1.0, dt_s / kBladeFollow_s));
+  next_correction_n_ =
+      trocar::to_double(patch_.force_n) - scaled_force(then.response, fit_.slope(), {});
+  gate_force_n_ = std::max(kLeastGateForce_n, then.response.elastic_n);
+  take_lever();
+}
+
+void TouchModel::take_lever() {
+  if (const float force_n = length(patch_.force_n); force_n > kLeastGateForce_n)
+    next_lever_m_ = trocar::to_double(patch_.torque_nm) / static_cast<double>(force_n);
 }
 
 void TouchModel::correct(const PastState& then, bool is_new_structure) {
@@ -238,14 +280,7 @@ void TouchModel::correct(const PastState& then, bool is_new_structure) {
   if (!grips()) materials_[material_].slope = fit_.slope();
   next_correction_n_ = server_n - scaled_force(response, fit_.slope(), fit_.lean());
   gate_force_n_ = std::max(kLeastGateForce_n, response.elastic_n);
-  if (const double force_n = length(server_n); force_n > kLeastGateForce_n)
-    next_lever_m_ = trocar::to_double(patch_.torque_nm) / force_n;
-  if (is_new_structure && cut_drop_.is_on() && patch_.echo_time_us >= cut_drop_.since_us()) {
-    cut_drop_.confirm();
-    slope_ = fit_.slope();
-    lean_ = fit_.lean();
-    keep_force(past_[past_.end() - 1].response);
-  }
+  take_lever();
 }
 
 std::optional<double> TouchModel::stiffness_ratio(const Response& response) const {

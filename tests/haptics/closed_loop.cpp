@@ -109,7 +109,6 @@ class Server {
                                   static_cast<float>(tissue_.stiffness_along_n_m()) - across);
     patch.friction = static_cast<float>(friction_);
     patch.grip_point_m = place(tissue_.grip_point_m());
-    patch.cut_force_n = cut_s_ < 0 ? static_cast<float>(motion_.known_cut_n) : 0;
     patch.law = 1;
     return patch;
   }

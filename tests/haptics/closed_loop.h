@@ -25,9 +25,8 @@ struct Motion {
   double grasp_s = -1, release_s = -1;
   double frequency_hz = 0;  // of a palpation, measured from 1.5 s before the end
   double steady_from_s = -1;
-  double cut_n = 0;        // tissue gives way at this force
-  double known_cut_n = 0;  // the client knows of it
-  double bump_m = 0;       // waves of the surface
+  double cut_n = 0;   // tissue gives way at this force
+  double bump_m = 0;  // waves of the surface
 };
 
 // Says what is to be measured of it.

@@ -125,22 +125,6 @@ TEST(ClosedLoop, ACutShowsWithTheAnswer) {
   }
 }
 
-TEST(ClosedLoop, ACutThatIsForeseenShowsAtOnce) {
-  for (const double rtt_s : {0.0, 0.025, 0.05, 0.1, 0.15}) {
-    const Worst worst = measure_all(
-        [](double) {
-          Motion motion = cut();
-          motion.known_cut_n = motion.cut_n;
-          return motion;
-        },
-        rtt_s);
-    std::printf("foreseen cut, RTT %3.0f ms: right after %.0f ms, step %.3f N/ms\n", rtt_s * 1e3,
-                worst.recovery_s * 1e3, worst.step_n);
-    EXPECT_LT(worst.recovery_s, 0.05);
-    EXPECT_LT(worst.step_n, 0.3);
-  }
-}
-
 TEST(ClosedLoop, IsStableWithAnyHand) {
   const Hand loose{.mass_kg = 0.08, .stiffness_n_m = 80, .damping_n_s_m = 1.2, .reflex_n_m = 0};
   const Hand barely{.mass_kg = 0.08, .stiffness_n_m = 20, .damping_n_s_m = 0.3, .reflex_n_m = 0};

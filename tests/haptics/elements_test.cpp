@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "client/haptics/blade_element.h"
 #include "client/haptics/grip_element.h"
 #include "client/haptics/push_element.h"
 
@@ -189,6 +190,28 @@ TEST(GripElement, ANewStiffnessChangesNoForceThatIsThere) {
   grip.set_stiffness(stiff);
   EXPECT_NEAR(grip.step(steps, {0.002, 0, 0}, {}).rest_n.x, -0.1, 1e-9);
   EXPECT_NEAR(grip.step(steps, {0.003, 0, 0}, {}).rest_n.x, -0.2, 1e-9);
+}
+
+TEST(BladeElement, IsHeldBackAgainstItsWayByTheEdgeInTissue) {
+  constexpr Vec3d kUp{0, 0, 1};
+  constexpr double kStep_s = 0.001;
+  BladeElement blade;
+  blade.start({});
+  Vec3d tip_m;
+  const auto move = [&](const Vec3d& way_m, int steps, double length_m) {
+    Response response;
+    for (int k = 0; k < steps; ++k)
+      response = blade.step(tip_m += way_m / steps, kUp, length_m, kStep_s);
+    return response.rest_n;
+  };
+  EXPECT_EQ(move({0, 0, -0.01}, 100, 0.01), Vec3d{}) << "along its edge it cuts nothing";
+  const Vec3d there_n = move({0.02, 0, 0}, 1000, 0.01);
+  EXPECT_NEAR(there_n.x, -BladeElement::kEnergy_j_m2 * 0.01, 2e-3);
+  EXPECT_EQ(there_n.z, 0);
+  EXPECT_NEAR(move({0.0001, 0, 0}, 5, 0.005).x, there_n.x / 2, 2e-3) << "half of it is in tissue";
+  EXPECT_GT(move({-0.01, 0, 0}, 500, 0.01).x, 0.9) << "it turns back";
+  EXPECT_NEAR(length(move({}, 1000, 0.01)), 0, 1e-3) << "it stands";
+  EXPECT_EQ(move({0.01, 0, 0}, 500, -0.01), Vec3d{}) << "it is out";
 }
 
 }  // namespace

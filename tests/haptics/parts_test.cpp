@@ -95,31 +95,6 @@ TEST(LocalStop, IsAStiffDampedSpringFromWhereItBegan) {
   EXPECT_EQ(stop.step({0, 0, -0.003}, {}, kLong_s), 0) << "it does not pull";
 }
 
-TEST(CutDrop, DropsThenComesBackUnconfirmed) {
-  CutDrop drop;
-  std::uint64_t now_us = 1'000'000;
-  const auto step = [&](double force_n) { return drop.step(force_n, 0.5, 0.05, now_us += 1000); };
-  EXPECT_EQ(step(0.4), 1);
-  step(0.6);
-  EXPECT_TRUE(drop.is_on());
-  for (int k = 0; k < 5; ++k) step(0.6);
-  EXPECT_NEAR(step(0.6), CutDrop::kLeft, 1e-12);
-  for (int k = 0; k < 130; ++k) step(0.6);
-  EXPECT_FALSE(drop.is_on()) << "after the answer's time and 80 ms";
-  for (int k = 0; k < 100; ++k) step(0.6);
-  EXPECT_NEAR(step(0.6), 1, 1e-2) << "it must fall below first";
-  step(0.4);
-  step(0.6);
-  EXPECT_TRUE(drop.is_on());
-  drop.confirm();
-  EXPECT_EQ(step(0.4), 1);
-}
-
-TEST(CutDrop, DoesNothingWithoutABlade) {
-  CutDrop drop;
-  EXPECT_EQ(drop.step(9, 0, 0.05, 1000), 1);
-}
-
 TEST(Newest, GivesTheNewestOnce) {
   Newest<int> newest;
   int value = 7;
