@@ -92,6 +92,14 @@ cutting::Settings cutting_of(const scenario::RunRule& run) {
   return run.cutting ? nakao::settings_of(*run.cutting, kPatchEdges) : cutting::Settings{};
 }
 
+// Equilibria, and steps that are solved to a tolerance, have all forces implicit. Others are as in
+// a session.
+std::optional<dynamics::StrainScheme> scheme_of(const scenario::RunRule& run, Solver solver) {
+  if (run.mode == scenario::RunMode::Static || solver == Solver::Full || run.starts_in_equilibrium)
+    return dynamics::StrainScheme::Implicit;
+  return {};
+}
+
 const scenario::Place& run_key(const scenario::Scenario& scenario, std::string_view key) {
   return scenario::place_of_key(scenario.run.given, key, scenario.run_place);
 }
@@ -165,7 +173,7 @@ ScenarioRun::ScenarioRun(scenario::ResolvedScenario resolved, Solver solver, uns
       decisions_(decisions_of(scenario().run, solver)),
       step_count_(steps_of(scenario().run)),
       simulation_(resolved_.organ, threads, reduction::at_work(resolved_.reduction),
-                  cutting_of(scenario().run)),
+                  cutting_of(scenario().run), scheme_of(scenario().run, solver)),
       loads_({resolved_.displacements, resolved_.forces}, organ().fixed_nodes,
              organ().mesh.node_count()) {
   for (std::size_t i = 0; i < scenario().probes.size(); ++i)
@@ -205,7 +213,7 @@ void ScenarioRun::settle(unsigned threads) {
   } else {
     settling_ = relax(loads_.at_rest(world));
   }
-  dynamics::start_relaxed(organ(), world);
+  dynamics::start_relaxed(organ(), world, simulation_.state().strain_scheme);
   simulation_.resume();
 }
 

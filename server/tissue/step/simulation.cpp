@@ -14,14 +14,15 @@
 namespace trocar::step {
 
 State::State(const organ::Organ& organ, const dynamics::FarFieldModels* models,
-             const cutting::Settings& cutting)
+             const cutting::Settings& cutting, dynamics::StrainScheme scheme)
     : cuts(organ, cutting),
       world(organ),
       claims(organ.mesh.node_count()),
       quantised(cuts.layout().vertex_count()),
       far_models(models),
+      strain_scheme(scheme),
       far_model(models != nullptr ? models->make() : nullptr) {
-  dynamics::start_relaxed(organ, world);
+  dynamics::start_relaxed(organ, world, strain_scheme);
 }
 
 void State::visit(world::StateArchive& archive) {
@@ -38,7 +39,7 @@ void State::set_mark() {
 
 std::unique_ptr<State> State::returned_to_mark(const organ::Organ& organ) const {
   if (!mark.is_set()) return nullptr;
-  auto marked = std::make_unique<State>(organ, far_models, cuts.settings());
+  auto marked = std::make_unique<State>(organ, far_models, cuts.settings(), strain_scheme);
   auto archive = world::StateArchive::reading(mark.state());
   marked->visit_without_mark(archive);
   if (!archive.ok() || !archive.at_end()) return nullptr;
@@ -68,10 +69,14 @@ namespace {
 
 std::shared_ptr<const Scene> scene_of(organ::Organ organ,
                                       const dynamics::MakeFarFieldModels& far_models,
-                                      const cutting::Settings& cutting) {
+                                      const cutting::Settings& cutting,
+                                      std::optional<dynamics::StrainScheme> strain_scheme) {
   auto scene = std::make_shared<Scene>();
   scene->organ = std::move(organ);
   scene->cutting = cutting;
+  scene->strain_scheme =
+      strain_scheme ? *strain_scheme
+                    : dynamics::scheme_for(scene->organ, world::World(scene->organ), kTickSeconds);
   if (far_models) scene->far_models = far_models(scene->organ);
   return scene;
 }
@@ -83,10 +88,10 @@ bool is_costly(const organ::Organ& organ) {
 
 }  // namespace
 
-SolveWork::SolveWork(const organ::Organ& organ, unsigned workers, const world::World& uncut)
-    : solver(organ, uncut, workers),
+SolveWork::SolveWork(const Scene& scene, unsigned workers, const world::World& uncut)
+    : solver(scene.organ, uncut, workers, scene.strain_scheme),
       far_plan(solver.far_plan(kTickSeconds)),
-      has_linear_far_field(is_costly(organ)) {
+      has_linear_far_field(is_costly(scene.organ)) {
   if (has_linear_far_field) solver.use_linear_far_field(uncut);
 }
 
@@ -105,7 +110,7 @@ StepContext::StepContext(const Scene& s, unsigned workers, const world::World& u
            .queue = propagation::PropagationQueue(state.world.node_count()),
            .active = propagation::ActiveSet(state.world.node_count()),
            .seeds = {}},
-      solve(s.organ, workers, uncut),
+      solve(s, workers, uncut),
       touches(s.organ),
       surface_displacements(state.cuts.layout().vertex_count()) {
   contact.found.reserve();
@@ -185,13 +190,15 @@ Status validate(const TickDecisions& d) {
 
 Simulation::Simulation(organ::Organ organ, unsigned workers,
                        const dynamics::MakeFarFieldModels& far_models,
-                       const cutting::Settings& cutting)
-    : Simulation(scene_of(std::move(organ), far_models, cutting), workers) {}
+                       const cutting::Settings& cutting,
+                       std::optional<dynamics::StrainScheme> strain_scheme)
+    : Simulation(scene_of(std::move(organ), far_models, cutting, strain_scheme), workers) {}
 
 Simulation::Simulation(std::shared_ptr<const Scene> scene, unsigned workers)
     : scene_(std::move(scene)),
       workers_(workers),
-      state_(std::make_unique<State>(scene_->organ, scene_->far_models.get(), scene_->cutting)),
+      state_(std::make_unique<State>(scene_->organ, scene_->far_models.get(), scene_->cutting,
+                                     scene_->strain_scheme)),
       context_(std::make_unique<StepContext>(*scene_, workers_, *state_)) {}
 
 Simulation Simulation::beside(unsigned workers) const {
@@ -241,7 +248,8 @@ std::uint64_t Simulation::state_hash() const {
 }
 
 Status Simulation::restore_snapshot(BytesView snapshot) {
-  auto restored = std::make_unique<State>(scene_->organ, scene_->far_models.get(), scene_->cutting);
+  auto restored = std::make_unique<State>(scene_->organ, scene_->far_models.get(), scene_->cutting,
+                                          scene_->strain_scheme);
   auto archive = world::StateArchive::reading(snapshot);
   restored->visit(archive);
   auto context = archive.ok() && archive.at_end() ? context_of(*restored) : nullptr;

@@ -5,6 +5,7 @@
 // at a time.
 
 #include <memory>
+#include <optional>
 
 #include "server/tissue/step/tick.h"
 
@@ -19,9 +20,12 @@ class Simulation {
   // far_models: what may move the far field instead of sweeps; empty: nothing.
   // cutting: how blades cut. A method that moves nodes of the mesh needs the boundary whole and no
   // self-contact, and its states cannot be restored.
+  // strain_scheme: of averaged strain; empty: what dynamics::scheme_for() says for ticks of a
+  // session. Equilibria, and ticks that are solved to a tolerance, want it Implicit.
   explicit Simulation(organ::Organ organ, unsigned workers = 1,
                       const dynamics::MakeFarFieldModels& far_models = {},
-                      const cutting::Settings& cutting = {});
+                      const cutting::Settings& cutting = {},
+                      std::optional<dynamics::StrainScheme> strain_scheme = {});
 
   // Another one of the same organ and far-field models, at the beginning. Shares with this one what
   // never changes, so that they may be used by two threads.

@@ -31,7 +31,7 @@ static_assert(kSweepLayers <= dynamics::kMaxSweepBands);
 struct State {
   // models: null: sweeps alone move the tissue.
   State(const organ::Organ& organ, const dynamics::FarFieldModels* models,
-        const cutting::Settings& cutting);
+        const cutting::Settings& cutting, dynamics::StrainScheme strain_scheme);
 
   blades::TissueCuts cuts;
   world::World world;
@@ -43,6 +43,7 @@ struct State {
   wire::QuantisedSurface quantised;
   contact::SelfContactTable self_contacts;
   const dynamics::FarFieldModels* const far_models;
+  const dynamics::StrainScheme strain_scheme;  // forces of relaxed stress are as it has them
   std::unique_ptr<dynamics::FarFieldModel> far_model;  // of sessions with models
   Mark mark;
 
@@ -61,6 +62,7 @@ struct State {
 struct Scene {
   organ::Organ organ;
   cutting::Settings cutting;
+  dynamics::StrainScheme strain_scheme = dynamics::StrainScheme::Implicit;
   std::unique_ptr<const dynamics::FarFieldModels> far_models;  // of it where it stays; null: none
 };
 
@@ -84,7 +86,7 @@ struct NearWork {
 };
 
 struct SolveWork {
-  SolveWork(const organ::Organ& organ, unsigned workers, const world::World& uncut);
+  SolveWork(const Scene& scene, unsigned workers, const world::World& uncut);
 
   dynamics::BlockDescent solver;
   dynamics::FarPlan far_plan;
