@@ -66,6 +66,7 @@ Status SessionJournal::read_info() {
   }
   info_.has_external_loads = entries.contains("external_loads");
   info_.starts_from_snapshot = text("start") == "snapshot";
+  info_.has_implicit_strain = text("averaged_strain") == "implicit";
   times_.start_utc_ns = info_.start_utc_ns;
   info_.protocol = text("protocol");
   info_.organ_name = text("organ_name");

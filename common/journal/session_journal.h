@@ -32,6 +32,8 @@ struct SessionInfo {
   bool has_external_loads = false;
   // A scenario began otherwise than with the organ at rest: ticks follow from the first snapshot.
   bool starts_from_snapshot = false;
+  // A scenario solved for the forces of averaged strain, whatever a session of that organ does.
+  bool has_implicit_strain = false;
   std::optional<Continuation> continues;         // with which journal's session it goes on
   Tick last_tick = 0;                            // of the last message
   std::vector<proto::Participant> participants;  // everyone who was ever in, in order of joining

@@ -51,6 +51,7 @@ Result<std::unique_ptr<SessionJournalWriter>> SessionJournalWriter::create(
   }
   if (session.has_external_loads) metadata.entries["external_loads"] = "in /loads";
   if (session.starts_from_snapshot) metadata.entries["start"] = "snapshot";
+  if (session.has_implicit_strain) metadata.entries["averaged_strain"] = "implicit";
   if (Status written = (*mcap)->write_metadata(metadata); !written.ok()) return written.error();
   return std::unique_ptr<SessionJournalWriter>(
       new SessionJournalWriter(std::move(*mcap), JournalTimes{session.start_utc_ns}));

@@ -27,6 +27,7 @@ struct SessionDescription {
   std::optional<ReductionDescription> reduction;  // nothing: the session has none
   bool has_external_loads = false;                // see SessionInfo
   bool starts_from_snapshot = false;              // likewise
+  bool has_implicit_strain = false;               // likewise
   std::optional<Continuation> continues;          // nothing: it begins with the session
 };
 

@@ -125,8 +125,9 @@ class Session {
     if (!options.has_no_errors) {
       pilot_ = calibration::PressBench(organ, options.workers)
                    .pilot(places.front(), {.radius_m = kToolRadius_m, .depth_m = kPilotDepth_m});
-      reference_.emplace(organ, options.workers);
-      checker_.emplace(organ, options.workers);
+      for (auto* solved : {&reference_, &checker_})
+        solved->emplace(organ, options.workers, dynamics::MakeFarFieldModels{}, cutting::Settings{},
+                        step::LoadRules{}, dynamics::StrainScheme::Implicit);
     }
     for (const auto& place : places) {
       const auto number = static_cast<std::uint8_t>(hands_.size());

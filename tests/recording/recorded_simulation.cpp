@@ -120,7 +120,8 @@ void copy_journal(const std::string& from, const std::string& to, const Edit& ed
            .organ_hash = info.organ_hash,
            .reduction = info.reduction,
            .has_external_loads = info.has_external_loads,
-           .starts_from_snapshot = info.starts_from_snapshot});
+           .starts_from_snapshot = info.starts_from_snapshot,
+           .has_implicit_strain = info.has_implicit_strain});
   ASSERT_TRUE(writer.ok()) << writer.error().message;
   const auto read = (*journal)->read_all([&](std::string_view topic, Tick tick, BytesView bytes) {
     const auto known = journal::topic_of(topic);

@@ -72,9 +72,11 @@ class Hand {
       : organ_(organ), place_(calibration::spread_places(organ, 1, kSeed).at(0)), ticks_(ticks) {}
 
   using Decide = std::function<step::TickDecisions(Tick)>;
-  // is_controlled: a rate controller decides, and the first tick is its highest.
-  Course press(const Decide& decide, bool is_controlled = false) const {
-    step::Simulation simulation(organ_);
+  // is_controlled: a rate controller decides, and the first tick is its highest. scheme: of
+  // averaged strain; empty: as in a session.
+  Course press(const Decide& decide, bool is_controlled = false,
+               std::optional<dynamics::StrainScheme> scheme = {}) const {
+    step::Simulation simulation(organ_, 1, {}, {}, {}, scheme);
     std::optional<control::RateController> controller;
     if (is_controlled)
       controller.emplace(
@@ -109,9 +111,11 @@ class Hand {
   Course press(const step::TickDecisions& decisions) const {
     return press([&](Tick) { return decisions; });
   }
+  // With all forces implicit.
   Course press_converged(const calibration::Pilot& pilot, double looser = 1) const {
-    return press(
-        calibration::converged_decisions(pilot.tolerance_n(organ_.mesh.node_count(), looser)));
+    const auto decisions =
+        calibration::converged_decisions(pilot.tolerance_n(organ_.mesh.node_count(), looser));
+    return press([&](Tick) { return decisions; }, false, dynamics::StrainScheme::Implicit);
   }
 
  private:

@@ -210,6 +210,7 @@ Result<std::unique_ptr<SimJournal>> open_sim_journal(const Options& options,
         "remove one of the two"};
   recording::Beginning beginning;
   beginning.starts_from_snapshot = run.scenario().run.starts_in_equilibrium;
+  beginning.has_implicit_strain = run.has_implicit_strain();
   if (resolved.reduction)
     beginning.reduction = {organ::reduction_hash(*resolved.reduction),
                            std::filesystem::path(*run.scenario().run.reduction).filename().string(),

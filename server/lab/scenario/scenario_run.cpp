@@ -101,6 +101,14 @@ step::LoadRules loads_of(const scenario::ResolvedScenario& resolved) {
           std::ranges::any_of(resolved.scenario.probes, is_reaction)};
 }
 
+// Equilibria, and steps that are solved to a tolerance, have all forces implicit. Others are as in
+// a session.
+std::optional<dynamics::StrainScheme> scheme_of(const scenario::RunRule& run, Solver solver) {
+  if (run.mode == scenario::RunMode::Static || solver == Solver::Full || run.starts_in_equilibrium)
+    return dynamics::StrainScheme::Implicit;
+  return {};
+}
+
 const scenario::Place& run_key(const scenario::Scenario& scenario, std::string_view key) {
   return scenario::place_of_key(scenario.run.given, key, scenario.run_place);
 }
@@ -174,7 +182,8 @@ ScenarioRun::ScenarioRun(scenario::ResolvedScenario resolved, Solver solver, uns
       decisions_(decisions_of(scenario().run, solver)),
       step_count_(steps_of(scenario().run)),
       simulation_(resolved_.organ, threads, reduction::at_work(resolved_.reduction),
-                  cutting_of(scenario().run), loads_of(resolved_)) {
+                  cutting_of(scenario().run), loads_of(resolved_),
+                  scheme_of(scenario().run, solver)) {
   for (std::size_t i = 0; i < scenario().probes.size(); ++i)
     watched_.push_back(is_reaction(scenario().probes[i])
                            ? simulation_.loads().watch(resolved_.probe_nodes[i])
@@ -188,6 +197,10 @@ ScenarioRun::ScenarioRun(scenario::ResolvedScenario resolved, Solver solver, uns
 
 // Tissue that relaxes is put where it would be with nothing left to relax. Its stresses are then
 // those of having been there for long.
+bool ScenarioRun::has_implicit_strain() const {
+  return simulation_.state().strain_scheme == dynamics::StrainScheme::Implicit;
+}
+
 void ScenarioRun::settle(unsigned threads) {
   auto& world = simulation_.editable_state().world;
   if (dynamics::Relaxation::is_needed(organ())) {
@@ -199,7 +212,7 @@ void ScenarioRun::settle(unsigned threads) {
   } else {
     settling_ = relax(simulation_.loads().at_rest(world));
   }
-  dynamics::start_relaxed(organ(), world);
+  dynamics::start_relaxed(organ(), world, simulation_.state().strain_scheme);
   simulation_.resume();
 }
 

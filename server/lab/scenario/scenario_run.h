@@ -61,6 +61,8 @@ class ScenarioRun {
   bool has_ticks() const { return !is_static() && !explicit_; }
   step::Simulation& simulation() { return simulation_; }
   const step::Simulation& simulation() const { return simulation_; }
+  // Whether it solves for the forces of averaged strain where a session may not.
+  bool has_implicit_strain() const;
   const hands::TickInputs& inputs() const { return inputs_; }
   const step::TickDecisions& decisions() const { return decisions_; }
 

@@ -59,6 +59,7 @@ Result<std::unique_ptr<Recorder>> Recorder::create(const std::string& path,
              .reduction = beginning.reduction,
              .has_external_loads = !beginning.loads.empty(),
              .starts_from_snapshot = beginning.starts_from_snapshot,
+             .has_implicit_strain = beginning.has_implicit_strain,
              .continues = beginning.continues});
   if (!writer) return writer.error();
   if (auto s = (*writer)->write(journal::JournalTopic::Organ, 0, now, organ::encode_organ(organ));

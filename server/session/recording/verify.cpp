@@ -113,8 +113,10 @@ Result<VerifyReport> verify_journal(const std::string& path,
                                          whole.first_damage.message));
   if (!info.is_finished) report.reasons.push_back("it has no end: " + report.container);
 
+  std::optional<dynamics::StrainScheme> scheme;
+  if (info.has_implicit_strain) scheme = dynamics::StrainScheme::Implicit;
   auto simulation = step::Simulation(std::move(*organ), 1, reduction::at_work(std::move(reduction)),
-                                     {}, std::move(*loads));
+                                     {}, std::move(*loads), scheme);
   Verifier verifier(info, std::move(simulation), report);
   const auto lists = (*journal)->read_participants(0, std::numeric_limits<Tick>::max(),
                                                    [&](Tick tick, const proto::Participants& list) {

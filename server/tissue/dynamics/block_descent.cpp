@@ -47,8 +47,14 @@ float sum(const Lanes& a) {
 
 }  // namespace
 
-BlockDescent::BlockDescent(const organ::Organ& organ, const world::World& world, unsigned workers)
-    : organ_(organ), tissue_(organ), workers_(workers), gravity_(to_float(organ.gravity_m_s2)) {
+BlockDescent::BlockDescent(const organ::Organ& organ, const world::World& world, unsigned workers,
+                           StrainScheme scheme)
+    : organ_(organ),
+      tissue_(organ, scheme),
+      workers_(workers),
+      gravity_(to_float(organ.gravity_m_s2)) {
+  if (scheme == StrainScheme::Implicit) implicit_strain_ = tissue_.nodal_strain();
+  has_explicit_strain_ = implicit_strain_ != tissue_.nodal_strain();
   const auto& groups = tissue_.groups();
   const auto group_count = groups.group_count();
   resize_arrays();
@@ -168,7 +174,18 @@ void BlockDescent::begin_inertia(Group group, std::span<const Vec3f> forces) {
   }
   if (const auto* const stress = tissue_.relaxed_stress())
     momentum = momentum + stress->forces(group);
-  store(inertia_[group].inertia, (mass * rate + load(constants_[group].damping)) * rate);
+  Float8 inertia = (mass * rate + load(constants_[group].damping)) * rate;
+  if (has_explicit_strain_) {
+    const auto nodal = tissue_.nodal_forces(group);
+    float least = kLeastInertia * far_over_relaxation_;
+    // Forces are those of the last tick's end, so that to longer steps they are older.
+    if (is_slow(group)) least *= 3 - 2 / static_cast<float>(far_interval_);
+    const Float8 added =
+        where(moves, _mm256_max_ps(fma8(nodal.stiffness, all(least), all(0) - inertia), all(0)));
+    inertia = inertia + added;
+    momentum = fma8(ahead - start, added, momentum) - nodal.gradient;
+  }
+  store(inertia_[group].inertia, inertia);
   store(inertia_[group].momentum, momentum);
 }
 
@@ -197,6 +214,8 @@ void BlockDescent::begin_groups(world::World& world, const ExternalLoads& loads)
   for_each_group(near_.groups, [&](Group g) { ask_energies(g, x_.data()); });
   for (const auto node : loads.held)
     ask_energies(tissue_.groups().slot_of(node) / kLanes, x_.data());
+  if (has_explicit_strain_)
+    for_each_group(all_groups_, [&](Group g) { tissue_.update_nodal_stress(g, x_.data()); });
   for_each_group(begun_.groups, [&](Group g) { begin_inertia(g, loads.forces); });
   place_held(loads);
   if (is_far_linear_)
@@ -204,7 +223,7 @@ void BlockDescent::begin_groups(world::World& world, const ExternalLoads& loads)
       linear_far_field_->begin_group(g, x_.data(), start_.data(),
                                      coasts(g) ? inverse_dt_ : inverse_dt_of(g));
     });
-  restart_nodal_strain();
+  if (implicit_strain_ != nullptr) restart_nodal_strain();
   for (const auto g : begun_.groups) rejected_[g] = 0, squared_moves_[g] = 0;
 }
 
@@ -240,7 +259,8 @@ NodeStep8 BlockDescent::inertia_of(Group group, const Vec8& own) const {
 
 NodeStep8 BlockDescent::linearise(Group group, const Vec8& own) const {
   NodeStep8 step = inertia_of(group, own);
-  tissue_.add(group, x_.data(), own, step);
+  tissue_.add_elements(group, x_.data(), own, step);
+  if (implicit_strain_ != nullptr) tissue_.add_averaged(group, step);
   return step;
 }
 
@@ -305,12 +325,11 @@ void BlockDescent::relax(const SweepPlan& plan, Group group, const contact::Cont
   const bool is_linear = is_far_linear_ && near_.lanes[group] == 0 &&
                          group_stamp_[group] != current_ &&
                          linear_far_field_->add(group, lanes, inverse_dt_of(group), step);
-  if (is_linear) {
-    tissue_.add_averaged(group, step);
-  } else {
+  if (!is_linear) {
     ask_energies(group, start_.data());
-    tissue_.add(group, x_.data(), own, step);
+    tissue_.add_elements(group, x_.data(), own, step);
   }
+  if (implicit_strain_ != nullptr) tissue_.add_averaged(group, step);
   Float8 factor = _mm256_blendv_ps(all(-omega.far), all(-omega.near), mask_of(near_.lanes[group]));
   if (group_stamp_[group] == current_) {
     Lanes factors;
@@ -327,7 +346,7 @@ void BlockDescent::relax(const SweepPlan& plan, Group group, const contact::Cont
   const Float8 moves = _mm256_and_ps(swept, is_sound);
   const Vec8 moved{where(moves, dx.x), where(moves, dx.y), where(moves, dx.z)};
   store_group(x, own + moved);
-  if (auto* const strain = tissue_.nodal_strain()) strain->after_move(group, moved, lanes);
+  if (implicit_strain_ != nullptr) implicit_strain_->after_move(group, moved, lanes);
   if (is_far_linear_) linear_far_field_->after_move(group, moved, inverse_dt_of(group));
   store(squares_[group], where(moves, squared));
   const auto bad = static_cast<std::uint8_t>(lanes & ~bits_of(is_sound));
@@ -439,6 +458,7 @@ void BlockDescent::begin_step(const contact::ContactList& contacts, std::span<co
     current_ = 1;
   }
   inverse_dt_ = 1.0f / settings.dt;
+  far_over_relaxation_ = settings.far_sweeps > 0 ? settings.far_over_relaxation : 1;
   has_far_solver_ = settings.far_solver != nullptr;
   // A node that is held along an axis alone has no linear form.
   is_far_linear_ =

@@ -95,7 +95,8 @@ struct SolveReport {
 
 class BlockDescent {
  public:
-  BlockDescent(const organ::Organ& organ, const world::World& world, unsigned workers = 1);
+  BlockDescent(const organ::Organ& organ, const world::World& world, unsigned workers = 1,
+               StrainScheme scheme = StrainScheme::Implicit);
 
   // Takes displacements, velocities and classes anew: after a restored state, or whenever somebody
   // else than solve() changed them for more than single nodes.
@@ -224,6 +225,8 @@ class BlockDescent {
   Workers workers_;
   std::vector<Linearisation::Scratch> scratch_;  // per worker
   Vec3f gravity_;
+  NodalStrain* implicit_strain_ = nullptr;  // whose forces follow each move; else null
+  bool has_explicit_strain_ = false;        // its forces are taken once per step
 
   std::vector<Constants> constants_;    // per group
   std::vector<std::uint8_t> free_;      // per group: lanes of nodes that are not fixed
@@ -246,6 +249,7 @@ class BlockDescent {
   bool has_far_solver_ = false;                       // likewise
   std::uint32_t far_interval_ = 1;                    // of this step
   float inverse_dt_ = 0;                              // of this step
+  float far_over_relaxation_ = 1;                     // likewise
   std::vector<std::uint32_t> asked_stamp_;            // per group: energies have begun it
   std::vector<Group> due_;                            // to be linearised anew
   std::array<SweepPlan, kMaxSweepBands>

@@ -32,7 +32,7 @@ void BlockDescent::elastic_gradient(std::span<Vec3f> gradient) {
 }
 
 FarPlan BlockDescent::far_plan(float dt) {
-  const auto traces = tissue_.traces_at_rest(0, true);
+  const auto traces = tissue_.traces_at_rest(0, !has_explicit_strain_);
   double stiffness = 0, mass = 0;
   for (std::size_t slot = 0; slot < traces.size(); ++slot) {
     const std::size_t group = slot / kLanes, lane = slot % kLanes;

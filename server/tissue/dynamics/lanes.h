@@ -173,16 +173,28 @@ inline Vec8 load_group(const Float4* first) {
   };
   return transpose4(pair(0), pair(1), pair(2), pair(3));
 }
-inline void store_group(Float4* first, const Vec8& v) {
-  const Float8 zero = all(0);
+// Eight vectors `stride` apart, with what lies beside them.
+inline Vec8 load_strided(const Float4* first, std::size_t stride, Float8& w) {
+  const auto pair = [&](std::size_t lane) {
+    return _mm256_insertf128_ps(_mm256_castps128_ps256(_mm_load_ps(&first[lane * stride].x)),
+                                _mm_load_ps(&first[(lane + 4) * stride].x), 1);
+  };
+  const Float8 v0 = pair(0), v1 = pair(1), v2 = pair(2), v3 = pair(3);
+  w = _mm256_shuffle_ps(_mm256_unpackhi_ps(v0, v1), _mm256_unpackhi_ps(v2, v3), 0xee);
+  return transpose4(v0, v1, v2, v3);
+}
+inline void store_strided(Float4* first, std::size_t stride, const Vec8& v, Float8 w) {
   const Float8 xy_lo = _mm256_unpacklo_ps(v.x, v.y), xy_hi = _mm256_unpackhi_ps(v.x, v.y);
-  const Float8 z_lo = _mm256_unpacklo_ps(v.z, zero), z_hi = _mm256_unpackhi_ps(v.z, zero);
+  const Float8 z_lo = _mm256_unpacklo_ps(v.z, w), z_hi = _mm256_unpackhi_ps(v.z, w);
   const Float8 n[4] = {_mm256_shuffle_ps(xy_lo, z_lo, 0x44), _mm256_shuffle_ps(xy_lo, z_lo, 0xee),
                        _mm256_shuffle_ps(xy_hi, z_hi, 0x44), _mm256_shuffle_ps(xy_hi, z_hi, 0xee)};
   for (std::size_t lane = 0; lane < 4; ++lane) {
-    _mm_store_ps(&first[lane].x, _mm256_castps256_ps128(n[lane]));
-    _mm_store_ps(&first[lane + 4].x, _mm256_extractf128_ps(n[lane], 1));
+    _mm_store_ps(&first[lane * stride].x, _mm256_castps256_ps128(n[lane]));
+    _mm_store_ps(&first[(lane + 4) * stride].x, _mm256_extractf128_ps(n[lane], 1));
   }
+}
+inline void store_group(Float4* first, const Vec8& v) {
+  store_strided(first, 1, v, all(0));
 }
 inline Float8 gather(const float* values, const SlotLanes& slots) {
   const auto& s = slots.v;

@@ -70,6 +70,38 @@ void NodalHyperelastic<Law>::add(Group group, NodeStep8& step) const {
 }
 
 template <typename Law>
+void NodalHyperelastic<Law>::add_stress(Group group, const NodalStrain::Gradient& f,
+                                        NodalStress8& stress) const {
+  Float8 two_c10 = f.two_c10, bulk = f.bulk;
+  if (has_others_) {
+    Lanes own;
+    for (std::size_t lane = 0; lane < kLanes; ++lane)
+      own.v[lane] = is_own_[NodalStrain::kRows * (group * kLanes + lane)];
+    two_c10 = two_c10 * load(own), bulk = bulk * load(own);
+  }
+  const auto& [f0, f1, f2] = f.rows;
+  const Vec8 k0 = cross8(f1, f2), k1 = cross8(f2, f0), k2 = cross8(f0, f1);  // cofactors
+  const Float8 pressure = fma8(bulk, dot8(f0, k0) - all(1), all(0) - two_c10);
+  Float8 shear = two_c10, stiff = two_c10;
+  if constexpr (!Law::kIsLinear) {
+    const Float8 i1 = dot8(f0, f0) + (dot8(f1, f1) + dot8(f2, f2));
+    Float8 first, second;
+    law_.derivatives(i1 - all(3), first, second);
+    shear = two_c10 * first;
+    stiff = two_c10 * fma8(second + second, i1, first);
+  }
+  stress.rows[0] = stress.rows[0] + fma8(k0, pressure, f0 * shear);
+  stress.rows[1] = stress.rows[1] + fma8(k1, pressure, f1 * shear);
+  stress.rows[2] = stress.rows[2] + fma8(k2, pressure, f2 * shear);
+  // The largest sum of a row bounds the eigenvalues of the cofactors' products.
+  const Float8 k01 = abs8(dot8(k0, k1)), k02 = abs8(dot8(k0, k2)), k12 = abs8(dot8(k1, k2));
+  const Float8 largest =
+      _mm256_max_ps(dot8(k0, k0) + (k01 + k02),
+                    _mm256_max_ps(dot8(k1, k1) + (k01 + k12), dot8(k2, k2) + (k02 + k12)));
+  stress.stiffness = fma8(fma8(bulk, largest, stiff), f.inverse_volume, stress.stiffness);
+}
+
+template <typename Law>
 void NodalHyperelastic<Law>::add_energies_j(std::span<const Vec3d> displacements,
                                             std::span<double> energies) const {
   for (Slot own = 0; own < nodal_strain_.slot_count(); ++own) {

@@ -13,6 +13,13 @@
 
 namespace trocar::dynamics {
 
+// Eight smoothing domains have this stress.
+struct NodalStress8 {
+  std::array<Vec8, NodalStrain::kRows> rows;  // of dW/dF, W the energy per volume, Pa
+  // Times |b|^2, a node's b there, it is at least the stiffness against the node's moves, Pa/m^3.
+  Float8 stiffness;
+};
+
 // This is the counterpart of Energy for smoothing domains, evaluated at the gradients that
 // NodalStrain keeps.
 class NodalStrainEnergy {
@@ -23,6 +30,9 @@ class NodalStrainEnergy {
   virtual ~NodalStrainEnergy() = default;
 
   virtual void add(Group group, NodeStep8& step) const = 0;
+  // Adds the stress in the smoothing domains of the group's nodes, whose gradients are f.
+  virtual void add_stress(Group group, const NodalStrain::Gradient& f,
+                          NodalStress8& stress) const = 0;
   virtual void add_energies_j(std::span<const Vec3d> displacements,
                               std::span<double> energies) const = 0;
   virtual void rebuild(const Groups& groups, std::span<const GroupLanes> lanes) = 0;
@@ -37,6 +47,7 @@ class NodalHyperelastic final : public NodalStrainEnergy {
                     const Law& law = {});
 
   void add(Group group, NodeStep8& step) const override;
+  void add_stress(Group group, const NodalStrain::Gradient& f, NodalStress8& stress) const override;
   void add_energies_j(std::span<const Vec3d> displacements,
                       std::span<double> energies) const override;
   void rebuild(const Groups& groups, std::span<const GroupLanes> lanes) override;

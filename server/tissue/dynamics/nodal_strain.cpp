@@ -172,15 +172,11 @@ void NodalStrain::restart_group(Group group, const Float4* x) {
     const Vec8 u = gather(x, member.node) - own, b = load(member.part);
     h[0] = fma8(b, u.x, h[0]), h[1] = fma8(b, u.y, h[1]), h[2] = fma8(b, u.z, h[2]);
   }
+  const std::size_t first = group * kLanes;
   for (std::size_t r = 0; r < 3; ++r) {
-    Vec3Lanes lanes;
-    store(lanes, h[r]);
-    for (std::size_t lane = 0; lane < kLanes; ++lane) {
-      const std::size_t slot = group * kLanes + lane;
-      const Float4& rest = at_rest_[slot][r];
-      gradients_[3 * slot + r] = {rest.x + lanes.x.v[lane], rest.y + lanes.y.v[lane],
-                                  rest.z + lanes.z.v[lane], rest.w};
-    }
+    Float8 beside;
+    const Vec8 rest = load_strided(&at_rest_[first][r], kRows, beside);
+    store_strided(&gradients_[kRows * first + r], kRows, rest + h[r], beside);
   }
 }
 

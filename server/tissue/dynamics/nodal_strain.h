@@ -51,7 +51,8 @@ class NodalStrain {
   };
   // Rows of V (F - I), m^3; beside them 1/V (1/m^3), 2 C10 kAveragedBracket (Pa), K (Pa). All zero
   // where there is no smoothing domain.
-  using Domain = std::array<Float4, 3>;
+  static constexpr std::size_t kRows = 3;
+  using Domain = std::array<Float4, kRows>;
   // These shares of a tet's bracket and of its volumetric term are left to the tet.
   struct Left {
     double bracket = 1, volumetric = 1;
@@ -89,6 +90,8 @@ class NodalStrain {
     Float8 inverse_volume, two_c10, bulk;
   };
   [[gnu::always_inline]] inline Gradient gradient_at(const SlotLanes& places) const;
+  // Returns those of the group's own nodes.
+  [[gnu::always_inline]] inline Gradient gradient_of(Group group) const;
 
  private:
   // While rows are filled: a node's part in a smoothing domain, and the other's in the node's own.
@@ -97,6 +100,8 @@ class NodalStrain {
     Vec3d part, others_part;
   };
 
+  // Makes F of V (F - I).
+  [[gnu::always_inline]] static inline void finish(Gradient& f);
   bool has(const topology::Topology& topology, NodeIndex domain, TetIndex tet) const {
     return material_of(domain) == topology.material_of(tet);
   }
@@ -120,11 +125,25 @@ inline NodalStrain::Gradient NodalStrain::gradient_at(const SlotLanes& places) c
   f.rows[0] = gather(gradients_.data(), places, f.inverse_volume);
   f.rows[1] = gather(gradients_.data() + 1, places, f.two_c10);
   f.rows[2] = gather(gradients_.data() + 2, places, f.bulk);
+  finish(f);
+  return f;
+}
+
+inline NodalStrain::Gradient NodalStrain::gradient_of(Group group) const {
+  const Float4* const first = &gradients_[kRows * kLanes * group];
+  Gradient f;
+  f.rows[0] = load_strided(first, kRows, f.inverse_volume);
+  f.rows[1] = load_strided(first + 1, kRows, f.two_c10);
+  f.rows[2] = load_strided(first + 2, kRows, f.bulk);
+  finish(f);
+  return f;
+}
+
+inline void NodalStrain::finish(Gradient& f) {
   for (auto& row : f.rows) row = row * f.inverse_volume;
   f.rows[0].x = f.rows[0].x + all(1);
   f.rows[1].y = f.rows[1].y + all(1);
   f.rows[2].z = f.rows[2].z + all(1);
-  return f;
 }
 
 }  // namespace trocar::dynamics

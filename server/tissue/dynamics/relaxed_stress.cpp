@@ -111,7 +111,7 @@ void RelaxedStress::refresh(GroupLanes lanes, const Float4* x, world::Relaxation
   Vec3Lanes all;
   if (!are_few) store(all, forces_at(group, x));
   Vec3Lanes nodal;
-  if (relaxation_.nodal() != nullptr) store(nodal, nodal_forces(group));
+  if (nodal_strain_ != nullptr && relaxation_.nodal() != nullptr) store(nodal, nodal_forces(group));
   const auto nodes = groups_.nodes_of(group);
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     if (!lanes.has(lane)) continue;
@@ -128,7 +128,7 @@ void RelaxedStress::read_state(const world::RelaxationState& state) {
         forces_[g].set(lane, state.forces()[node.value]);
 }
 
-void start_relaxed(const organ::Organ& organ, world::World& world) {
+void start_relaxed(const organ::Organ& organ, world::World& world, StrainScheme scheme) {
   if (!Relaxation::is_needed(organ)) return;
   const topology::Topology topology(organ);
   const Groups groups(topology, Coupling::Elements);
@@ -145,7 +145,8 @@ void start_relaxed(const organ::Organ& organ, world::World& world) {
   // The loads of tissue that stays as it is do not depend on the step.
   Workers alone(1);
   relaxation.begin_step(1, world.relaxation, alone);
-  RelaxedStress stress(topology, groups, relaxation, averaged);
+  RelaxedStress stress(topology, groups, relaxation,
+                       scheme == StrainScheme::Implicit ? averaged : nullptr);
   for (Group g = 0; g < groups.group_count(); ++g)
     stress.refresh({g, 0xff}, x.data(), world.relaxation);
 }

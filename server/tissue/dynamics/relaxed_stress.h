@@ -4,17 +4,19 @@
 // on nodes: each edge of a tet that relaxes bears a load that is constant in a step, in N per m of
 // the edge. Forces are taken where the tissue is between two steps, and are constant in the next;
 // those of all nodes, taken at once, balance in force and torque. Where strain is averaged,
-// smoothing domains have their part: F Q b with F as NodalStrain keeps it. O(tets and smoothing
-// domains at the nodes) each time.
+// smoothing domains have their part: F Q b with F as NodalStrain keeps it. (StrainScheme::Explicit
+// takes that part with the stress of smoothing domains, once per step; it is not here, then.)
+// O(tets and smoothing domains at the nodes) each time.
 
 #include "server/tissue/dynamics/lanes.h"
 #include "server/tissue/dynamics/relaxation.h"
+#include "server/tissue/dynamics/strain_scheme.h"
 
 namespace trocar::dynamics {
 
 class RelaxedStress {
  public:
-  // Groups, the relaxation and the smoothing domains, null if nothing is averaged, must outlive it.
+  // Groups, the relaxation and the smoothing domains, null if they have no part, must outlive it.
   RelaxedStress(const topology::Topology& topology, const Groups& groups,
                 const Relaxation& relaxation, const NodalStrain* strain);
 
@@ -58,6 +60,7 @@ class RelaxedStress {
 };
 
 // A world that begins: its tissue has been where it is for long. Measured organs under tension.
-void start_relaxed(const organ::Organ& organ, world::World& world);
+void start_relaxed(const organ::Organ& organ, world::World& world,
+                   StrainScheme scheme = StrainScheme::Implicit);
 
 }  // namespace trocar::dynamics

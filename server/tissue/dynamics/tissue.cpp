@@ -38,13 +38,17 @@ std::optional<ExponentialLaw> law_of(const material::Material& material, Exponen
 
 }  // namespace
 
-Tissue::Tissue(const organ::Organ& organ) : Tissue(topology::Topology(organ)) {}
+Tissue::Tissue(const organ::Organ& organ, StrainScheme scheme)
+    : Tissue(topology::Topology(organ), {}, scheme) {}
 
-Tissue::Tissue(const topology::Topology& topology, std::span<const Colour> colours)
-    : groups_(
-          topology,
-          NodalStrain::are_needed(topology.organ()) ? Coupling::NodalStrain : Coupling::Elements,
-          colours) {
+Tissue::Tissue(const topology::Topology& topology, std::span<const Colour> colours,
+               StrainScheme scheme)
+    : groups_(topology,
+              NodalStrain::are_needed(topology.organ()) && scheme == StrainScheme::Implicit
+                  ? Coupling::NodalStrain
+                  : Coupling::Elements,
+              colours),
+      scheme_(scheme) {
   const auto& organ = topology.organ();
   if (NodalStrain::are_needed(organ))
     nodal_strain_ = std::make_unique<NodalStrain>(topology, groups_);
@@ -59,6 +63,46 @@ Tissue::Tissue(const topology::Topology& topology, std::span<const Colour> colou
   add_measured<ReducedPolynomialLaw>(topology);
   add_measured<ExponentialLaw>(topology);
   add_relaxation(topology);
+  resize_stresses();
+}
+
+void Tissue::resize_stresses() {
+  if (nodal_strain_ && scheme_ == StrainScheme::Explicit)
+    nodal_stresses_.resize(NodalStrain::kRows * groups_.slot_count());
+}
+
+void Tissue::update_nodal_stress(Group group, const Float4* x) {
+  constexpr auto kRows = NodalStrain::kRows;
+  nodal_strain_->restart_group(group, x);
+  const auto f = nodal_strain_->gradient_of(group);
+  NodalStress8 stress{{zero_vec8(), zero_vec8(), zero_vec8()}, all(0)};
+  for (const auto& energy : averaged_) energy->add_stress(group, f, stress);
+  const std::size_t first = kRows * kLanes * group;
+  if (const auto* const relaxation = relaxation_ ? relaxation_->nodal() : nullptr) {
+    const Float4* const q = relaxation->relaxed() + first;
+    Float8 unused;
+    const Vec8 q0 = load_strided(q, kRows, unused), q1 = load_strided(q + 1, kRows, unused),
+               q2 = load_strided(q + 2, kRows, unused);
+    for (std::size_t r = 0; r < kRows; ++r)
+      stress.rows[r] =
+          stress.rows[r] - Vec8{dot8(f.rows[r], q0), dot8(f.rows[r], q1), dot8(f.rows[r], q2)};
+  }
+  for (std::size_t r = 0; r < kRows; ++r)
+    store_strided(&nodal_stresses_[first + r], kRows, stress.rows[r], stress.stiffness);
+}
+
+Tissue::NodalForces Tissue::nodal_forces(Group group) const {
+  NodalForces forces{zero_vec8(), all(0)};
+  const Float4* const stresses = nodal_stresses_.data();
+  for (const auto& row : nodal_strain_->rows(group)) {
+    const Vec8 b = load(row.part);
+    Float8 stiffness;
+    const Vec8 p0 = gather(stresses, row.domain, stiffness), p1 = gather(stresses + 1, row.domain),
+               p2 = gather(stresses + 2, row.domain);
+    forces.gradient = forces.gradient + Vec8{dot8(p0, b), dot8(p1, b), dot8(p2, b)};
+    forces.stiffness = fma8(stiffness, dot8(b, b), forces.stiffness);
+  }
+  return forces;
 }
 
 template <typename Law>
@@ -98,8 +142,9 @@ void Tissue::add_measured(const topology::Topology& topology) {
 void Tissue::add_relaxation(const topology::Topology& topology) {
   if (!Relaxation::is_needed(topology.organ())) return;
   relaxation_ = std::make_unique<Relaxation>(topology, groups_, nodal_strain_.get());
-  relaxed_stress_ =
-      std::make_unique<RelaxedStress>(topology, groups_, *relaxation_, nodal_strain_.get());
+  relaxed_stress_ = std::make_unique<RelaxedStress>(
+      topology, groups_, *relaxation_,
+      scheme_ == StrainScheme::Implicit ? nodal_strain_.get() : nullptr);
 }
 
 void Tissue::touch(Slot slot) {
@@ -160,6 +205,7 @@ UpdateReport Tissue::update_topology(const topology::Topology& topology) {
     lanes_[g] = 0;
   }
   touched_groups_.clear();
+  resize_stresses();
   const auto lanes = rebuilt();
   if (nodal_strain_) report.rows += nodal_strain_->rebuild(topology, groups_, lanes);
   if (relaxation_) {

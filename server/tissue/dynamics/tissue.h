@@ -14,6 +14,7 @@
 #include "server/tissue/dynamics/nodal_hyperelastic.h"
 #include "server/tissue/dynamics/relaxation.h"
 #include "server/tissue/dynamics/relaxed_stress.h"
+#include "server/tissue/dynamics/strain_scheme.h"
 
 namespace trocar::dynamics {
 
@@ -28,9 +29,10 @@ struct UpdateReport {
 
 class Tissue {
  public:
-  explicit Tissue(const organ::Organ& organ);
+  explicit Tissue(const organ::Organ& organ, StrainScheme scheme = StrainScheme::Implicit);
   // colours: per place of a node, those of a tissue stored before; empty: greedy.
-  explicit Tissue(const topology::Topology& topology, std::span<const Colour> colours = {});
+  explicit Tissue(const topology::Topology& topology, std::span<const Colour> colours = {},
+                  StrainScheme scheme = StrainScheme::Implicit);
 
   const Groups& groups() const { return groups_; }
   // Returns the averaged strain, which must be told when nodes move; null: nothing is averaged.
@@ -39,13 +41,27 @@ class Tissue {
 
   void begin_group(Group group, const Float4* start, float inverse_dt);
   void add(Group group, const Float4* x, const Vec8& own, NodeStep8& step) const {
-    for (const auto& energy : energies_) energy->add(group, x, own, step);
+    add_elements(group, x, own, step);
     add_averaged(group, step);
+  }
+  // Adds all but the energies of nodal strain.
+  void add_elements(Group group, const Float4* x, const Vec8& own, NodeStep8& step) const {
+    for (const auto& energy : energies_) energy->add(group, x, own, step);
   }
   // Adds the energies of nodal strain alone.
   void add_averaged(Group group, NodeStep8& step) const {
     for (const auto& energy : averaged_) energy->add(group, step);
   }
+
+  // StrainScheme::Explicit: keeps the stress of the group's smoothing domains at displacements x
+  // per slot, less what has relaxed of it.
+  void update_nodal_stress(Group group, const Float4* x);
+  // That stress puts these on a group's nodes, in all smoothing domains that they are in.
+  struct NodalForces {
+    Vec8 gradient;     // N
+    Float8 stiffness;  // N/m, at least the largest eigenvalue of a node's block
+  };
+  NodalForces nodal_forces(Group group) const;
 
   // The elastic part at displacements x but for energies of nodal strain, see Energy::linearise().
   void linearise(Group group, const Float4* x, const Vec8& own, NodeStep8& step,
@@ -83,6 +99,9 @@ class Tissue {
   std::unique_ptr<NodalStrain> nodal_strain_;  // null: nothing is averaged
   std::vector<std::unique_ptr<Energy>> energies_;
   std::vector<std::unique_ptr<NodalStrainEnergy>> averaged_;
+  const StrainScheme scheme_;
+  // Three per slot: rows of the stress, Pa; beside the first the stiffness. Empty: Implicit.
+  std::vector<Float4> nodal_stresses_;
   std::unique_ptr<Relaxation> relaxation_;
   std::unique_ptr<RelaxedStress> relaxed_stress_;
 
@@ -92,6 +111,7 @@ class Tissue {
   template <typename Law>
   void add_measured(const topology::Topology& topology);
   void add_relaxation(const topology::Topology& topology);
+  void resize_stresses();
   void touch(Slot slot);
   void list_touched(std::vector<GroupLanes>& out);
 

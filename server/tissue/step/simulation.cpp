@@ -18,8 +18,9 @@ State::State(const Scene& scene)
       world(scene.organ),
       claims(scene.organ.mesh.node_count()),
       quantised(cuts.layout().vertex_count()),
+      strain_scheme(scene.strain_scheme),
       far_model(scene.far_models ? scene.far_models->make() : nullptr) {
-  dynamics::start_relaxed(scene.organ, world);
+  dynamics::start_relaxed(scene.organ, world, strain_scheme);
   for (const auto& load : scene.loads.displaced)
     if (load.axes == kAllAxes)
       for (const auto node : load.nodes) world.node_classes[node.value] = world::NodeClass::Fixed;
@@ -69,11 +70,15 @@ namespace {
 
 std::shared_ptr<const Scene> scene_of(organ::Organ organ,
                                       const dynamics::MakeFarFieldModels& far_models,
-                                      const cutting::Settings& cutting, LoadRules loads) {
+                                      const cutting::Settings& cutting, LoadRules loads,
+                                      std::optional<dynamics::StrainScheme> strain_scheme) {
   auto scene = std::make_shared<Scene>();
   scene->organ = std::move(organ);
   scene->cutting = cutting;
   scene->loads = std::move(loads);
+  scene->strain_scheme =
+      strain_scheme ? *strain_scheme
+                    : dynamics::scheme_for(scene->organ, world::World(scene->organ), kTickSeconds);
   if (far_models) scene->far_models = far_models(scene->organ);
   return scene;
 }
@@ -85,10 +90,10 @@ bool is_costly(const organ::Organ& organ) {
 
 }  // namespace
 
-SolveWork::SolveWork(const organ::Organ& organ, unsigned workers, const world::World& uncut)
-    : solver(organ, uncut, workers),
+SolveWork::SolveWork(const Scene& scene, unsigned workers, const world::World& uncut)
+    : solver(scene.organ, uncut, workers, scene.strain_scheme),
       far_plan(solver.far_plan(kTickSeconds)),
-      has_linear_far_field(is_costly(organ)) {
+      has_linear_far_field(is_costly(scene.organ)) {
   if (has_linear_far_field) solver.use_linear_far_field(uncut);
 }
 
@@ -107,7 +112,7 @@ StepContext::StepContext(const Scene& s, unsigned workers, const world::World& u
            .queue = propagation::PropagationQueue(state.world.node_count()),
            .active = propagation::ActiveSet(state.world.node_count()),
            .seeds = {}},
-      solve(s.organ, workers, uncut),
+      solve(s, workers, uncut),
       touches(s.organ),
       surface_displacements(state.cuts.layout().vertex_count()) {
   contact.found.reserve();
@@ -187,8 +192,10 @@ Status validate(const TickDecisions& d) {
 
 Simulation::Simulation(organ::Organ organ, unsigned workers,
                        const dynamics::MakeFarFieldModels& far_models,
-                       const cutting::Settings& cutting, LoadRules loads)
-    : Simulation(scene_of(std::move(organ), far_models, cutting, std::move(loads)), workers) {}
+                       const cutting::Settings& cutting, LoadRules loads,
+                       std::optional<dynamics::StrainScheme> strain_scheme)
+    : Simulation(scene_of(std::move(organ), far_models, cutting, std::move(loads), strain_scheme),
+                 workers) {}
 
 Simulation::Simulation(std::shared_ptr<const Scene> scene, unsigned workers)
     : scene_(std::move(scene)),

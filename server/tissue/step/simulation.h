@@ -5,6 +5,7 @@
 // tests. One thread at a time.
 
 #include <memory>
+#include <optional>
 
 #include "server/tissue/step/tick.h"
 
@@ -20,9 +21,12 @@ class Simulation {
   // cutting: how blades cut. A method that moves nodes of the mesh needs the boundary whole and no
   // self-contact, and its states cannot be restored.
   // loads: what acts besides tools, of a scenario that validate() accepts.
+  // strain_scheme: of averaged strain; empty: what dynamics::scheme_for() says for ticks of a
+  // session. Equilibria, and ticks that are solved to a tolerance, want it Implicit.
   explicit Simulation(organ::Organ organ, unsigned workers = 1,
                       const dynamics::MakeFarFieldModels& far_models = {},
-                      const cutting::Settings& cutting = {}, LoadRules loads = {});
+                      const cutting::Settings& cutting = {}, LoadRules loads = {},
+                      std::optional<dynamics::StrainScheme> strain_scheme = {});
 
   // Another one of the same organ, far-field models and loads, at the beginning. Shares with this
   // one what never changes, so that they may be used by two threads.

@@ -30,7 +30,8 @@ static_assert(kSweepLayers <= dynamics::kMaxSweepBands);
 struct Scene {
   organ::Organ organ;
   cutting::Settings cutting;
-  LoadRules loads;                                             // of a scenario
+  LoadRules loads;  // of a scenario
+  dynamics::StrainScheme strain_scheme = dynamics::StrainScheme::Implicit;
   std::unique_ptr<const dynamics::FarFieldModels> far_models;  // of it where it stays; null: none
 };
 
@@ -49,6 +50,7 @@ struct State {
   // Last published integers: quantisation has hysteresis, so they are state.
   wire::QuantisedSurface quantised;
   contact::SelfContactTable self_contacts;
+  const dynamics::StrainScheme strain_scheme;  // forces of relaxed stress are as it has them
   std::unique_ptr<dynamics::FarFieldModel> far_model;  // of scenes with models
   Mark mark;
 
@@ -83,7 +85,7 @@ struct NearWork {
 };
 
 struct SolveWork {
-  SolveWork(const organ::Organ& organ, unsigned workers, const world::World& uncut);
+  SolveWork(const Scene& scene, unsigned workers, const world::World& uncut);
 
   dynamics::BlockDescent solver;
   dynamics::FarPlan far_plan;
