@@ -4,6 +4,7 @@
 
 #include "client/haptics/local_events.h"
 #include "client/haptics/past_states.h"
+#include "client/haptics/reading_pace.h"
 #include "client/haptics/slope_fit.h"
 #include "client/haptics/wake_statistics.h"
 #include "common/base/newest.h"
@@ -136,6 +137,49 @@ TEST(WakeStatistics, QuantilesAreWithinABin) {
   EXPECT_NEAR(late.quantile_us(0.5) / 500, 1.05, 0.06);
   EXPECT_NEAR(late.quantile_us(0.99) / 990, 1.05, 0.06);
   EXPECT_EQ(late.count(), 1000u);
+}
+
+// A second of a hand that goes at this speed, and turns its verb in the end: how often it is sent,
+// and how far it is from where it was sent.
+struct Paced {
+  int count = 0;
+  double worst_m = 0;
+};
+Paced pace_for(double speed_m_s) {
+  HandReading sent;
+  std::uint64_t sent_ms = 0;
+  Paced paced{1};
+  for (std::uint64_t ms = 1; ms <= 1000; ++ms) {
+    HandReading reading;
+    reading.tip_m.x = speed_m_s * 1e-3 * static_cast<double>(ms);
+    if (is_due(reading, sent, (ms - sent_ms) * 1'000'000)) {
+      sent = reading;
+      sent_ms = ms;
+      ++paced.count;
+    }
+    paced.worst_m = std::max(paced.worst_m, length(reading.tip_m - sent.tip_m));
+  }
+  return paced;
+}
+
+TEST(ReadingPace, AHandAtRestSaysSoAndAQuickOneAsOftenAsItMay) {
+  EXPECT_EQ(pace_for(0).count, 51) << "every 20 ms";
+  EXPECT_EQ(pace_for(0.1).count, 251) << "every 4 ms";
+  const auto slow = pace_for(0.0055);
+  EXPECT_EQ(slow.count, 91) << "as often as it has gone 60 um: every 11 ms";
+  EXPECT_LE(slow.worst_m, 60e-6);
+  EXPECT_LE(pace_for(0.0001).worst_m, 2.1e-6);
+}
+
+TEST(ReadingPace, AnotherVerbOrDirectionIsNotKeptBack) {
+  HandReading sent, other;
+  other.verb = tool::Verb::Grasp;
+  EXPECT_TRUE(is_due(other, sent, 1'000'000));
+  HandReading turned;
+  turned.orientation = normalized(Quatf{0, 0.01f, 0, 1});
+  EXPECT_FALSE(is_due(turned, sent, 1'000'000));
+  EXPECT_TRUE(is_due(turned, sent, 4'000'000));
+  EXPECT_FALSE(is_due(sent, sent, 4'000'000));
 }
 
 }  // namespace
