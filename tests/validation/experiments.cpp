@@ -49,6 +49,8 @@ const std::vector<Experiment>& experiments() {
        "converged solution, our own", run_live_reduction_estimate},
       {"ours/live-reduction/sizes", "When a local reduction pays",
        "full solver and converged solution, our own", run_live_reduction_sizes},
+      {"ours/feel", "What a hand feels over a network", "the same organ without delay, our own",
+       run_feel},
       {"ours/propagation-lattice", "What a limit of nodes costs: lattice", "full solve, our own",
        run_propagation_lattice},
       {"ours/propagation-liver-4k", "What a limit of nodes costs: liver of 4,000 nodes",

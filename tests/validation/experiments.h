@@ -39,6 +39,8 @@ void run_dogan_live(const Lab& lab, Section& section);
 void run_dogan_reduction(const Lab& lab, Section& section);
 void run_local_reduction(const Lab& lab, Section& section);
 
+void run_feel(const Lab& lab, Section& section);
+
 void run_propagation_lattice(const Lab& lab, Section& section);
 void run_propagation_liver(const Lab& lab, Section& section);
 void run_propagation_large_liver(const Lab& lab, Section& section);
