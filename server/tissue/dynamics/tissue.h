@@ -56,7 +56,7 @@ class Tissue {
   // StrainScheme::Explicit: keeps the stress of the group's smoothing domains at displacements x
   // per slot, less what has relaxed of it.
   void update_nodal_stress(Group group, const Float4* x);
-  // That stress puts these on a group's nodes, in all smoothing domains that they are in.
+  // The stress puts these on a group's nodes, in all smoothing domains that they are in.
   struct NodalForces {
     Vec8 gradient;     // N
     Float8 stiffness;  // N/m, at least the largest eigenvalue of a node's block
