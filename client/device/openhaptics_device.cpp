@@ -23,7 +23,7 @@ constexpr unsigned kCallAgain = 1, kCallNoMore = 0;  // what a callback returns
 constexpr std::chrono::milliseconds kHdFarewell{1000};
 
 enum Parameter : unsigned {
-  kButtons = 0x2000,
+  kButtonState = 0x2000,
   kPosition = 0x2050,   // 3, mm
   kVelocity = 0x2051,   // 3, mm/s
   kTransform = 0x2052,  // 16, by columns, mm
@@ -192,7 +192,7 @@ class OpenHapticsDevice::Servo {
     hd_.get_doublev(kPosition, position_mm);
     hd_.get_doublev(kVelocity, velocity_mm_s);
     hd_.get_doublev(kTransform, transform);
-    hd_.get_integerv(kButtons, buttons);
+    hd_.get_integerv(kButtonState, buttons);
     double rows[3][3];
     for (int row = 0; row < 3; ++row)
       for (int column = 0; column < 3; ++column) rows[row][column] = transform[4 * column + row];

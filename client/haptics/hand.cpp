@@ -6,7 +6,7 @@
 namespace trocar::haptics {
 namespace {
 
-constexpr double kUsualStep_s = 0.001;
+constexpr double kFirstStep_s = 0.001;
 constexpr double kWorkingDepth_m = 0.050;  // a tool works so much deeper than it starts, or less
 
 std::optional<Fulcrum> fulcrum_of(const HandSettings& settings) {
@@ -105,7 +105,7 @@ Status Hand::step(std::uint64_t now_us) {
   input.reading_age_s = seconds_between(reading->time_us, now_us);
   input.patch_age_s = patch_us_ == 0 ? 0 : seconds_between(patch_us_, now_us);
   input.touches = touch_.touches;
-  input.dt_s = last_us_ == 0 ? kUsualStep_s : seconds_between(last_us_, now_us);
+  input.dt_s = last_us_ == 0 ? kFirstStep_s : seconds_between(last_us_, now_us);
   const SafeForce safe = safety_.step(input);
   last_us_ = now_us;
   Status written = device_.write(safe.force_n, safe.torque_nm);

@@ -5,7 +5,7 @@
 namespace trocar::haptics {
 namespace {
 
-constexpr double kGuessDepth_m = 0.005;
+constexpr double kStartDepth_m = 0.005;
 
 }  // namespace
 
@@ -23,9 +23,9 @@ double PowerLaw::stiffness_n_m(double depth_m) const {
 PowerLaw first_guess(const wire::HapticLaw& law, double tip_radius_m) {
   const double nu = law.poisson_ratio;
   const double plane_modulus_pa = law.youngs_modulus_pa / (1 - nu * nu);
-  const double stiffness_n_m = 2 * plane_modulus_pa * std::sqrt(tip_radius_m * kGuessDepth_m);
+  const double stiffness_n_m = 2 * plane_modulus_pa * std::sqrt(tip_radius_m * kStartDepth_m);
   const double p = law.exponent;
-  return {stiffness_n_m / (p * std::pow(kGuessDepth_m, p - 1)), p};
+  return {stiffness_n_m / (p * std::pow(kStartDepth_m, p - 1)), p};
 }
 
 }  // namespace trocar::haptics

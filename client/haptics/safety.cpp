@@ -9,7 +9,7 @@
 namespace trocar::haptics {
 namespace {
 
-constexpr double kVelocityTime_s = 1 / (2 * std::numbers::pi * 40);
+constexpr double kDampedTime_s = 1 / (2 * std::numbers::pi * 40);
 constexpr double kLeastStiffness_n_m = 50;
 constexpr double kStoreMargin = 1.3;
 constexpr double kFreeStore_j = 0.0005;
@@ -101,7 +101,7 @@ void Safety::observe(const SafetyInput& input) {
   const Vec3d way_m = has_position_ ? input.position_m - last_position_m_ : Vec3d{};
   last_position_m_ = input.position_m;
   has_position_ = true;
-  const double share = input.dt_s / (input.dt_s + kVelocityTime_s);
+  const double share = input.dt_s / (input.dt_s + kDampedTime_s);
   velocity_m_s_ += (way_m / input.dt_s - velocity_m_s_) * share;
   work_j_ += dot(last_force_n_, way_m);
   const double stiffness_n_m = std::max(kLeastStiffness_n_m, input.stiffness_n_m);
