@@ -33,7 +33,7 @@ TEST(RateText, SaysWhatIsDecidedInWordsAndFigures) {
 }
 
 TEST(RateText, WithoutAControllerThereIsLittleToSay) {
-  const auto text = describe({});
+  const auto text = describe(wire::FrameFigures{});
   EXPECT_EQ(text.level, "fixed detail");
   EXPECT_EQ(text.sweeps + text.load + text.changes + text.banner, "");
 }
