@@ -127,7 +127,7 @@ TEST(Golden, MeasuredExponential) {
 
 // The default of the programs, with what has relaxed.
 TEST(Golden, BuiltInMeasuredLiver) {
-  auto golden = two_hands(*catalogue::make_measured_liver(3000), 9098843502043118144u);
+  auto golden = two_hands(*catalogue::make_measured_liver(3000), 14750543675996595141u);
   golden.has_happened = [](const Simulation& simulation, const TickReport& report) {
     return report.contact.nodes > 0 && !simulation.state().world.relaxation.is_empty();
   };

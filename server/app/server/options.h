@@ -15,10 +15,10 @@ namespace trocar::app {
 
 struct ServerOptions {
   std::string organ = "liver";
-  bool is_organ_chosen = false;             // on the command line
-  std::string resume_file;                  // empty: a new session
-  std::optional<bool> has_averaged_strain;  // empty: as the organ has it, and plain for a reduction
-  std::string reduction_file;               // empty: the full solver alone
+  bool is_organ_chosen = false;  // on the command line
+  std::string resume_file;       // empty: a new session
+  bool has_averaged_strain = false;
+  std::string reduction_file;  // empty: the full solver alone
   std::string address = "127.0.0.1";
   std::uint16_t port = 7690;
   bool is_stream_only = false;  // no datagrams
