@@ -113,15 +113,15 @@ void copy_journal(const std::string& from, const std::string& to, const Edit& ed
   auto journal = journal::SessionJournal::open(from);
   ASSERT_TRUE(journal.ok()) << journal.error().message;
   const auto& info = (*journal)->info();
-  auto writer = journal::SessionJournalWriter::create(
-      to, {.start_utc_ns = info.start_utc_ns,
-           .sim_version = sim_version,
-           .organ_name = info.organ_name,
-           .organ_hash = info.organ_hash,
-           .reduction = info.reduction,
-           .has_external_loads = info.has_external_loads,
-           .starts_from_snapshot = info.starts_from_snapshot,
-           .has_implicit_strain = info.has_implicit_strain});
+  auto writer =
+      journal::SessionJournalWriter::create(to, {.start_utc_ns = info.start_utc_ns,
+                                                 .sim_version = sim_version,
+                                                 .organ_name = info.organ_name,
+                                                 .organ_hash = info.organ_hash,
+                                                 .reduction = info.reduction,
+                                                 .has_external_loads = info.has_external_loads,
+                                                 .starts_from_snapshot = info.starts_from_snapshot,
+                                                 .has_implicit_strain = info.has_implicit_strain});
   ASSERT_TRUE(writer.ok()) << writer.error().message;
   const auto read = (*journal)->read_all([&](std::string_view topic, Tick tick, BytesView bytes) {
     const auto known = journal::topic_of(topic);

@@ -46,7 +46,7 @@ struct Beginning {
   step::LoadRules loads;                                   // of a scenario
   // The state at the start is not that of the organ at rest: the first snapshot says what it is.
   bool starts_from_snapshot = false;
-  bool has_implicit_strain = false;  // of a scenario, see journal::SessionInfo
+  bool has_implicit_strain = false;                // of a scenario, see journal::SessionInfo
   std::optional<journal::Continuation> continues;  // with which journal's session it goes on
 };
 

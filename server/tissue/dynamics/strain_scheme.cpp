@@ -7,8 +7,8 @@
 namespace trocar::dynamics {
 namespace {
 
-// An organ swings more slowly by half of this. Contact forces of a press in half a second are off by
-// 0.8 % of the solved ones where 5 % are added, and by 4 % where 25 % are.
+// An organ swings more slowly by half of this. Contact forces of a press in half a second are off
+// by 0.8 % of the solved ones where 5 % are added, and by 4 % where 25 % are.
 constexpr double kMostAdded = 0.12;
 
 }  // namespace
