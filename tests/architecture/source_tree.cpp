@@ -49,8 +49,8 @@ std::vector<std::string> words_of_cmake(const std::string& text) {
 }
 
 Folder read_folder(const std::string& cmake_text) {
-  static const std::set<std::string> kKeywords{"ABOUT", "SOURCES", "HEADERS", "DEPENDS",
-                                               "USES",  "LINK",    "MAIN"};
+  static const std::set<std::string> kKeywords{"ABOUT", "SOURCES", "HEADERS", "DEPENDS", "USES",
+                                               "LINK",  "MAIN",    "JOINED",  "APART"};
   Folder folder;
   std::string command, keyword;
   const auto words = words_of_cmake(cmake_text);

@@ -54,8 +54,12 @@ bool is_rigid(const TouchTable::Scene& scene, const contact::ToolContact& contac
 float pressed_limit_n(const TouchTable::Scene& scene, ToolSlot slot, const Vec3f& force,
                       const Vec3f& normal) {
   constexpr float kAlmost = 0.999f;
+  constexpr float kHeldBack_m = 0.001f;  // by which the hand is deeper than the tool
   for (const auto& contact : scene.contacts.tools) {
     if (contact.tool.value != slot.value) continue;
+    // One point of a blunt tool may bear no more while the others do.
+    const Vec3f back = contact.start.position - scene.tools[slot].pose.position;
+    if (dot(back, normal) < kHeldBack_m) return 0;
     const auto points = scene.contacts.points_of(contact);
     const bool has_stopped = std::ranges::any_of(points, [&](const auto& point) {
       const auto d = contact::displacement_of(point, scene.world);
