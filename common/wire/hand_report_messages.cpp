@@ -42,7 +42,7 @@ Vec3f force_of(const Quanta& quanta, int moment) {
 }
 
 // False for what is not finite, too.
-bool is_between(float value, float least, float most) {
+bool is_within(float value, float least, float most) {
   return value >= least && value <= most;
 }
 float brought_within(float value, float most) {
@@ -107,13 +107,13 @@ Result<HandReport> read(const proto::HandReport& message) {
   report.rate_hz = message.rate_hz();
   report.motion_scale = message.motion_scale();
   report.force_scale = message.force_scale();
-  if (!is_between(report.echo_delay_s, 0, kMostDelay_s))
+  if (!is_within(report.echo_delay_s, 0, kMostDelay_s))
     return bad("echo_delay_s", "is not between 0 and 60 s");
-  if (!is_between(report.rate_hz, 0, kMostRate_hz))
+  if (!is_within(report.rate_hz, 0, kMostRate_hz))
     return bad("rate_hz", "is not between 0 and 20 kHz");
-  if (!is_between(report.motion_scale, 0, kMostScale))
+  if (!is_within(report.motion_scale, 0, kMostScale))
     return bad("motion_scale", "is not between 0 and 100");
-  if (!is_between(report.force_scale, 0, kMostScale))
+  if (!is_within(report.force_scale, 0, kMostScale))
     return bad("force_scale", "is not between 0 and 100");
   if (message.device().size() > HandReport::kMostDeviceBytes || !is_printable(message.device()))
     return bad("device", "is longer than 64 bytes or not printable");

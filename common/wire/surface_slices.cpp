@@ -8,7 +8,7 @@
 namespace trocar::wire {
 namespace {
 
-constexpr std::size_t kBlockVertices = 64;
+constexpr std::size_t kSliceBlock = 64;
 // A mask, a gap and 64 vertices of three 18-bit differences, in groups with headers.
 constexpr std::size_t kMostBlockBytes = 500;
 
@@ -29,9 +29,9 @@ class Slicer {
       slices.push_back(std::move(slice));
       return;
     }
-    const std::size_t blocks = (last - first + kBlockVertices - 1) / kBlockVertices;
+    const std::size_t blocks = (last - first + kSliceBlock - 1) / kSliceBlock;
     TROCAR_ASSERT(blocks > 1);
-    const std::size_t middle = first + blocks / 2 * kBlockVertices;
+    const std::size_t middle = first + blocks / 2 * kSliceBlock;
     add(first, middle);
     add(middle, last);
   }
@@ -63,8 +63,8 @@ std::vector<SurfaceSlice> encode_slices(std::span<const QuantisedVertex> baselin
 Status decode_slice(const SurfaceSlice& slice, std::span<QuantisedVertex> surface) {
   const std::size_t first = slice.first_vertex, count = slice.vertices;
   const bool is_inside = first <= surface.size() && count <= surface.size() - first;
-  const bool is_whole = first % kBlockVertices == 0 &&
-                        (count % kBlockVertices == 0 || first + count == surface.size());
+  const bool is_whole =
+      first % kSliceBlock == 0 && (count % kSliceBlock == 0 || first + count == surface.size());
   if (!is_inside || !is_whole)
     return Error{ErrorCode::BadMessage, "SurfaceSlice: vertices " + std::to_string(first) + " to " +
                                             std::to_string(first + count) +
