@@ -9,7 +9,7 @@
 //                 \   L - r           A small motion:  d tip = J dh,  J = u u^T - k (I - u u^T),
 //                  tip                                 k = (L - r) / r
 //
-// So sideways the tip is mirrored, and goes k times as far; along the shaft it goes with the hand.
+// Sideways the tip is mirrored, and goes k times as far; along the shaft it goes with the hand.
 // The shaft's direction follows from tip and port. About its own axis the tool turns as the device
 // does. What the tissue does to the tip comes back by virtual work: the handle's force and torque
 // do for each motion of the hand what force and torque at the tip do for the tip's.

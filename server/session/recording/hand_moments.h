@@ -6,8 +6,8 @@
 //
 //   tick -> client's time of the pose in it, between two reports -> moments around that time
 //
-// Where the clock goes back, another client has come: what was before is not mixed with it. One
-// thread.
+// A clock that goes back is that of another client: its moments are not mixed with those of before.
+// One thread.
 
 #include <optional>
 #include <string>
