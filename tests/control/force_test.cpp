@@ -156,5 +156,33 @@ INSTANTIATE_TEST_SUITE_P(
                       Case{material::ElasticLaw::Springs, true, world::Boundary::Frozen},
                       Case{material::ElasticLaw::NeoHookean, true, world::Boundary::Frozen}));
 
+class HeldTool : public ::testing::TestWithParam<std::uint32_t> {};
+
+// A law of tissue with damping: what is held comes to rest, however seldom far nodes take turns,
+// and where it rests does not depend on that.
+TEST_P(HeldTool, ComesToRest) {
+  const auto organ = *catalogue::make_measured_liver();
+  Pressed all(organ), in_turns(organ);
+  const Vec3f over = top_of(all.simulation.state().world);
+  step::TickDecisions turns;
+  turns.far_interval = GetParam();
+  for (Tick tick = 1; tick <= 2500; ++tick) {
+    const Vec3f tip = place_of(over, tick, false);
+    all.tick(tip, {});
+    in_turns.tick(tip, turns);
+  }
+  double squares = 0;
+  const auto& velocities = in_turns.simulation.state().world.velocities;
+  for (const auto& velocity : velocities) squares += static_cast<double>(length_squared(velocity));
+  const double rms_m_s = std::sqrt(squares / static_cast<double>(velocities.size()));
+  std::printf("force %.4f N, of all nodes in each tick %.4f N; speed %.5f m/s\n", in_turns.force_n,
+              all.force_n, rms_m_s);
+  EXPECT_GT(all.force_n, 0.03) << "the tool presses";
+  EXPECT_NEAR(in_turns.force_n / all.force_n, 1, 0.01);
+  EXPECT_LT(rms_m_s, 1e-3);
+}
+
+INSTANTIATE_TEST_SUITE_P(FarIntervals, HeldTool, ::testing::Values(2u, 3u, 4u));
+
 }  // namespace
 }  // namespace trocar::control

@@ -6,14 +6,14 @@ namespace trocar::participants {
 
 const ReturnToken* Absences::issue(ParticipantSlot slot) {
   if (kept_seconds_ == 0 || !slot.is_valid()) return nullptr;
-  auto& place = places_[slot.value].emplace();
+  auto& place = places_[slot.value].emplace(Place{});
   secure::fill_random(place.token);
   return &place.token;
 }
 
 bool Absences::restore(ParticipantSlot slot, const ReturnToken& token) {
   if (kept_seconds_ == 0 || !slot.is_valid()) return false;
-  places_[slot.value].emplace().token = token;
+  places_[slot.value].emplace(Place{}).token = token;
   return true;
 }
 
