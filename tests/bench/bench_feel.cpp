@@ -17,6 +17,7 @@
 #include <sstream>
 #include <thread>
 
+#include "common/journal/session_journal.h"
 #include "common/math/box.h"
 #include "server/organs/catalogue/load_organ.h"
 #include "server/tissue/contact/proxies.h"
@@ -156,6 +157,23 @@ std::vector<Row> read_trace(const fs::path& file) {
   return rows;
 }
 
+// Returns the share of the session's ticks in which the server had time for all detail.
+double full_detail_percent(const fs::path& file) {
+  const auto journal = journal::SessionJournal::open(file.string());
+  if (!journal) return 0;
+  std::string full, now;
+  double ticks = 0, full_ticks = 0;
+  const auto visit = [&](Tick, const proto::TickRecord& record) {
+    if (record.has_decisions()) now = record.decisions().SerializeAsString();
+    if (full.empty()) full = now;
+    ++ticks;
+    full_ticks += now == full;
+    return true;
+  };
+  const auto read = (*journal)->read_tick_records(0, std::numeric_limits<Tick>::max(), visit);
+  return read && ticks > 0 ? 100 * full_ticks / ticks : 0;
+}
+
 std::complex<double> at_frequency(std::span<const double> values, double hz) {
   std::complex<double> sum;
   for (std::size_t i = 0; i < values.size(); ++i)
@@ -232,8 +250,8 @@ std::optional<std::vector<Row>> run(const Condition& condition, const std::strin
   setenv("XDG_RUNTIME_DIR", folder.c_str(), 1);
   std::ofstream(folder / "path.txt") << path_of(contact_m);
   Program server("trocar-server",
-                 {"--organ", organ, "--listen", "127.0.0.1:0", "--journal", "none", "--ready-file",
-                  (folder / "port").string()},
+                 {"--organ", organ, "--listen", "127.0.0.1:0", "--journal",
+                  (folder / "session.mcap").string(), "--ready-file", (folder / "port").string()},
                  folder / "server.log");
   const auto port = read_line(folder / "port");
   if (!port) return std::nullopt;
@@ -266,11 +284,12 @@ std::optional<std::vector<Row>> run(const Condition& condition, const std::strin
 }
 
 void print(const Condition& condition, const organ::Organ& organ, std::span<const Row> rows,
-           double contact_z, const fs::path& file) {
+           double contact_z, const fs::path& folder) {
   Truth truth(organ, rows.front().tip);
   std::vector<Vec3f> forces;
   double free_n = 0;
-  std::ofstream curves(file);
+  std::ofstream curves(folder / "curves.csv");
+  const double detail_percent = full_detail_percent(folder / "session.mcap");
   curves << "time_s,depth_m,felt_n,true_n,server_n\n";
   for (const auto& row : rows) {
     forces.push_back(truth.force_at(row.tip));
@@ -289,11 +308,12 @@ void print(const Condition& condition, const organ::Organ& organ, std::span<cons
     const auto felt = compare(motion, rows.subspan(i, end - i),
                               std::span<const Vec3f>(forces).subspan(i, end - i));
     std::printf(
-        "| %g | %g | %s | %s | %.1f | %.2f | %.3f | %.1f | %.2f | %.2f | %.3f | %.3f | %.3f |\n",
+        "| %g | %g | %s | %s | %.1f | %.2f | %.3f | %.1f | %.2f | %.2f | %.3f | %.3f | %.3f | %.0f "
+        "|\n",
         condition.round_trip_ms, condition.loss_percent,
         condition.has_datagrams ? "datagrams" : "stream", motion.name, felt.rms_percent,
         felt.steady_percent, felt.gain, felt.phase_deg, felt.work_mj, felt.true_work_mj,
-        felt.step_n, felt.true_step_n, free_n);
+        felt.step_n, felt.true_step_n, free_n, detail_percent);
     i = end;
   }
   std::fflush(stdout);
@@ -329,15 +349,14 @@ int main(int argc, char** argv) {
       "| round trip (ms) | lost (%%) | path | motion | rms (%%) | steady (%%) | gain | phase (deg) "
       "| "
       "work (mJ) | true | step (N/ms) | true | free (N) "
-      "|\n|--:|--:|---|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n");
+      "| full detail (%%) |\n|--:|--:|---|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n");
   for (const auto& condition : conditions) {
     const auto rows = run(condition, organ_name, fs::absolute(out), contact_m);
     if (!rows || rows->empty()) {
       std::fprintf(stderr, "%s: a program failed, see %s\n", kProgram, out.c_str());
       return 1;
     }
-    print(condition, organ, *rows, static_cast<double>(start.z) - contact_m,
-          fs::path(out) / "curves.csv");
+    print(condition, organ, *rows, static_cast<double>(start.z) - contact_m, out);
   }
   return 0;
 }
