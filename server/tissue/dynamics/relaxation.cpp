@@ -24,10 +24,7 @@ bool Relaxation::is_needed(const organ::Organ& organ) {
 
 Relaxation::Relaxation(const topology::Topology& topology, const Groups& groups,
                        const NodalStrain* strain)
-    : organ_(topology.organ()),
-      nodal_strain_(strain),
-      terms_(topology.organ()),
-      loads_(kBlockLoads) {
+    : organ_(topology.organ()), nodal_strain_(strain), terms_(topology.organ()), loads_(kCorners) {
   if (world::RelaxationState::has_nodal(organ_))
     nodal_relaxation_ = std::make_unique<NodalRelaxation>(topology, groups, *strain, terms_);
   for (std::uint32_t t = 0; t < topology.tet_count(); ++t) set_lane(topology, groups, TetIndex(t));
@@ -47,20 +44,12 @@ void Relaxation::list_blocks_of(const topology::Topology& topology, const Groups
       list.push_back(block);
 }
 
-std::uint32_t Relaxation::load_index(TetIndex tet, std::size_t corner, std::size_t other) {
-  static constexpr std::uint32_t kEdge[4][4] = {
-      {0, 0, 1, 2}, {0, 0, 3, 4}, {1, 3, 0, 5}, {2, 4, 5, 0}};
-  const auto block = tet.value / kLanes + 1;
-  return static_cast<std::uint32_t>(block * kBlockLoads) + kEdge[corner][other] * kLanes +
-         tet.value % kLanes;
-}
-
 void Relaxation::set_lane(const topology::Topology& topology, const Groups& groups, TetIndex tet) {
   const std::size_t index = tet.value / kLanes, lane = tet.value % kLanes;
   if (index >= blocks_.size()) {
     blocks_.resize(index + 1);
     shares_.resize(index + 1);
-    loads_.resize((index + 2) * kBlockLoads);
+    loads_.resize(((index + 1) * kLanes + 1) * kCorners);
     for (std::size_t i = 0; i < kLanes; ++i)
       for (std::size_t k = 0; k < 3; ++k)
         blocks_[index].rest[k].set(
@@ -177,9 +166,11 @@ void Relaxation::set_loads(const Block& block, std::size_t index, const SymMat8&
   const Float8 bc = dot8(b, qc), bd = dot8(b, qd), cd = dot8(c, qd);
   const Float8 ab = all(0) - (dot8(b, qb) + bc + bd), ac = all(0) - (dot8(c, qc) + bc + cd),
                ad = all(0) - (dot8(d, qd) + bd + cd);
-  float* const out = &loads_[(index + 1) * kBlockLoads];
-  const Float8 edges[] = {ab, ac, ad, bc, bd, cd};
-  for (std::size_t i = 0; i < kEdges; ++i) _mm256_storeu_ps(out + i * kLanes, edges[i]);
+  Float4* const out = &loads_[(index * kLanes + 1) * kCorners];
+  store_strided(out, kCorners, {ab, ac, ad}, all(0));
+  store_strided(out + 1, kCorners, {bc, bd, ab}, all(0));
+  store_strided(out + 2, kCorners, {cd, ac, bc}, all(0));
+  store_strided(out + 3, kCorners, {ad, bd, cd}, all(0));
 }
 
 void Relaxation::begin_block(std::size_t index, const world::StressHistory& history,

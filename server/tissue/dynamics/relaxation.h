@@ -33,7 +33,7 @@ using wire::RelaxationFigures;
 
 class Relaxation {
  public:
-  static constexpr std::size_t kEdges = 6;  // of a tet: ab, ac, ad, bc, bd, cd
+  static constexpr std::size_t kCorners = 4;
   static constexpr float kNearTime_s = 0.004f, kFarTime_s = 0.008f;
 
   static bool is_needed(const organ::Organ& organ);
@@ -68,17 +68,18 @@ class Relaxation {
     return index / kRun % turns == step % turns;
   }
 
-  // Returns the loads of relaxed stress: N/m per edge of each tet, along the edge as it is. The
-  // load between two corners of a tet is at load_index(); that at kNoLoad is zero.
-  const float* loads() const { return loads_.data(); }
-  static std::uint32_t load_index(TetIndex tet, std::size_t corner, std::size_t other);
-  static constexpr std::uint32_t kNoLoad = 0;
+  // Returns the loads of relaxed stress: N/m per edge of each tet, along the edge as it is. Those
+  // from a corner c to corners c + 1, c + 2 and c + 3, modulo 4, are at loads_index(); those at
+  // kNoLoads are zero. So a node reads each of its tets in one piece.
+  const Float4* loads() const { return loads_.data(); }
+  static std::uint32_t loads_index(TetIndex tet, std::size_t corner) {
+    return static_cast<std::uint32_t>((tet.value + 1) * kCorners + corner);
+  }
+  static constexpr std::uint32_t kNoLoads = 0;
   // Returns the relaxation of smoothing domains; null if none relaxes.
   const NodalRelaxation* nodal() const { return nodal_relaxation_.get(); }
 
  private:
-  static constexpr std::size_t kBlockLoads = kEdges * kLanes;
-
   struct Block {
     std::array<SlotLanes, 4> nodes;
     std::array<Vec3Lanes, 3> gradients;  // of b, c and d, 1/m
@@ -116,7 +117,7 @@ class Relaxation {
   std::vector<std::uint32_t> due_,
       due_stamp_;  // blocks of tets, then of smoothing domains; per block
   std::uint32_t current_ = 0;
-  std::vector<float> loads_;  // [block][edge][tet], after one block of zeros
+  std::vector<Float4> loads_;  // [tet][corner], after zeros
   bool is_stale_ = true;
   std::vector<std::uint32_t> stale_;                       // blocks, unless is_stale_
   std::vector<TetIndex> tets_;                             // while it follows

@@ -7,11 +7,6 @@ namespace {
 
 constexpr int kFewLanes = 3;
 
-Float8 loads_at(const float* loads, const SlotLanes& places) {
-  return _mm256_i32gather_ps(loads, _mm256_load_si256(reinterpret_cast<const __m256i*>(places.v)),
-                             sizeof(float));
-}
-
 }  // namespace
 
 RelaxedStress::RelaxedStress(const topology::Topology& topology, const Groups& groups,
@@ -52,10 +47,10 @@ void RelaxedStress::fill(const topology::Topology& topology, const Groups& group
       const auto t = tets_[lane][i];
       const auto& tet = topology.tet(t);
       const auto own = static_cast<std::size_t>(std::ranges::find(tet, nodes[lane]) - tet.begin());
+      rows[i].loads.v[lane] = Relaxation::loads_index(t, own);
       for (std::size_t k = 0; k < 3; ++k) {
         const auto other = (own + 1 + k) % 4;
         rows[i].others[k].v[lane] = groups.slot_of(tet[other]);
-        rows[i].loads[k].v[lane] = Relaxation::load_index(t, own, other);
         rows[i].edges[k].set(lane, to_float(rest[tet[other].value] - rest[tet[own].value]));
       }
     }
@@ -76,30 +71,37 @@ Vec8 RelaxedStress::nodal_forces(Group group) const {
 
 // Along an edge a stress pulls its ends together; what has relaxed of it lets them go.
 Vec8 RelaxedStress::forces_at(Group group, const Float4* x) const {
-  const float* const loads = relaxation_.loads();
+  const Float4* const all_loads = relaxation_.loads();
   const Vec8 own = load_group(x + group * kLanes);
   Vec8 sum = zero_vec8();
-  for (const Row& row : rows_[group])
-    for (std::size_t k = 0; k < 3; ++k) {
-      const Vec8 edge = load(row.edges[k]) + (gather(x, row.others[k]) - own);
-      sum = fma8(edge, loads_at(loads, row.loads[k]), sum);
-    }
+  const auto edge = [&](const Row& row, std::size_t k) {
+    return load(row.edges[k]) + (gather(x, row.others[k]) - own);
+  };
+  for (const Row& row : rows_[group]) {
+    const Vec8 loads = gather(all_loads, row.loads);
+    sum = fma8(edge(row, 0), loads.x, sum);
+    sum = fma8(edge(row, 1), loads.y, sum);
+    sum = fma8(edge(row, 2), loads.z, sum);
+  }
   return sum;
 }
 
 // The same to the bit: where few lanes are asked for, one after another is quicker.
 Vec3f RelaxedStress::force_at(Group group, std::size_t lane, const Float4* x) const {
-  const float* const loads = relaxation_.loads();
+  const Float4* const all_loads = relaxation_.loads();
   const auto displacement = [x](Slot slot) { return _mm_load_ps(&x[slot].x); };
   const __m128 own = displacement(static_cast<Slot>(group * kLanes + lane));
   __m128 sum = _mm_setzero_ps();
-  for (const Row& row : rows_[group])
+  for (const Row& row : rows_[group]) {
+    const Float4& of_tet = all_loads[row.loads.v[lane]];
+    const float loads[] = {of_tet.x, of_tet.y, of_tet.z};
     for (std::size_t k = 0; k < 3; ++k) {
       const auto& edges = row.edges[k];
       const __m128 rest = _mm_setr_ps(edges.x.v[lane], edges.y.v[lane], edges.z.v[lane], 0);
       const __m128 edge = _mm_add_ps(rest, _mm_sub_ps(displacement(row.others[k].v[lane]), own));
-      sum = _mm_fmadd_ps(edge, _mm_set1_ps(loads[row.loads[k].v[lane]]), sum);
+      sum = _mm_fmadd_ps(edge, _mm_set1_ps(loads[k]), sum);
     }
+  }
   Float4 force;
   _mm_store_ps(&force.x, sum);
   return to_vec3(force);

@@ -34,14 +34,13 @@ class RelaxedStress {
  private:
   // A tet seen from one of its nodes: the other three, the edges there, and where their loads are.
   struct Row {
-    std::array<SlotLanes, 3> others, loads;
+    std::array<SlotLanes, 3> others;
+    SlotLanes loads;
     std::array<Vec3Lanes, 3> edges;  // rest pose, m
 
     void pad(std::size_t lane, Slot own) {
-      for (std::size_t k = 0; k < 3; ++k) {
-        others[k].v[lane] = own;
-        loads[k].v[lane] = Relaxation::kNoLoad;
-      }
+      for (auto& other : others) other.v[lane] = own;
+      loads.v[lane] = Relaxation::kNoLoads;
     }
   };
 
