@@ -110,8 +110,7 @@ Result<std::vector<FoundSession>> find_sessions(double seconds) {
   const auto same = [](const FoundSession& a, const FoundSession& b) {
     return a.notice.name == b.notice.name && a.port == b.port;
   };
-  const auto rest = std::ranges::unique(sessions, same);
-  sessions.erase(rest.begin(), rest.end());
+  sessions.erase(std::unique(sessions.begin(), sessions.end(), same), sessions.end());
   return sessions;
 }
 

@@ -17,7 +17,7 @@ using Key = std::array<NodeIndex, 3>;
 // Turned so that the lowest node is first: the same orientation gives the same key.
 Key turned(const std::array<NodeIndex, 3>& nodes) {
   Key key = nodes;
-  std::ranges::rotate(key, std::ranges::min_element(key));
+  std::rotate(key.begin(), std::ranges::min_element(key), key.end());
   return key;
 }
 

@@ -156,11 +156,9 @@ std::string table(const Table& table) {
 }
 
 // The svg element alone: a page has no place for a second XML declaration.
-Result<std::string> figure(const plot::Plot& plot) {
-  auto svg = plot::to_svg(plot);
-  if (!svg) return Error{svg.error().code, "plot '" + plot.title + "': " + svg.error().message};
-  const auto begin = svg->find("<svg");
-  return "<figure>" + (begin == std::string::npos ? *svg : svg->substr(begin)) + "</figure>";
+std::string figure(const std::string& svg) {
+  const auto begin = svg.find("<svg");
+  return "<figure>" + (begin == std::string::npos ? svg : svg.substr(begin)) + "</figure>";
 }
 
 std::string scenes(const Section& section) {
@@ -208,7 +206,7 @@ std::string summary(const Report& report) {
 
 }  // namespace
 
-Result<std::string> to_html(const Report& report) {
+std::string to_html(const Report& report) {
   std::string out = fmt::format(
       "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">"
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">"
@@ -230,15 +228,14 @@ Result<std::string> to_html(const Report& report) {
         anchor(section.name), escaped(section.title), escaped(section.name),
         escaped(section.source));
     out += checks_table(section);
+    auto svg = section.svgs.begin();
     for (const auto& part : section.parts) {
       if (const auto* paragraph = std::get_if<std::string>(&part)) {
         out += "<p>" + escaped(*paragraph) + "</p>";
       } else if (const auto* rows = std::get_if<Table>(&part)) {
         out += table(*rows);
       } else {
-        auto svg = figure(std::get<plot::Plot>(part));
-        if (!svg) return svg.error();
-        out += *svg;
+        out += figure(*svg++);
       }
     }
     out += scenes(section) + "</section>";

@@ -90,14 +90,17 @@ Section run_one(const Lab& lab, const Experiment& experiment) {
   return section;
 }
 
-Status write_report(const Options& options, const Report& report) {
+// Draws the last section, which is new.
+Status write_report(const Options& options, Report& report) {
   if (auto s = write_file(options.out / "results.json", to_json(report.sections)); !s) return s;
   if (auto s = write_file(options.out / "results.csv", to_csv(report.sections)); !s) return s;
   if (auto s = write_file(options.out / "run.json", run_to_json(report)); !s) return s;
+  auto& section = report.sections.back();
+  if (auto s = section.draw(); !s) return s;
+  if (!section.svgs.empty())
+    if (auto s = write_file(options.out / plot_file(section), section.svgs[0]); !s) return s;
   if (auto s = write_file(options.out / "validation.md", to_markdown(report)); !s) return s;
-  const auto html = to_html(report);
-  if (!html) return html.error();
-  return write_file(options.out / "report.html", *html);
+  return write_file(options.out / "report.html", to_html(report));
 }
 
 int run_all(const Options& options, const std::string& command) {
@@ -107,7 +110,8 @@ int run_all(const Options& options, const std::string& command) {
     return 0;
   }
   std::error_code failed;
-  std::filesystem::create_directories(options.out / "scenarios", failed);
+  for (const char* folder : {"scenarios", "plots"})
+    if (!failed) std::filesystem::create_directories(options.out / folder, failed);
   if (failed)
     return trocar::report(kProgram,
                           {ErrorCode::ResourceMissing, options.out.string() + ": cannot be made (" +

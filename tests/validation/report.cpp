@@ -2,6 +2,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
@@ -172,6 +173,18 @@ void Section::measured(const std::string& what, const std::string& ours, const s
   checks.push_back({name + "/" + what, "", ours, 0, {}, false, note, false});
 }
 
+Status Section::draw() {
+  svgs.clear();
+  for (const auto& part : parts) {
+    const auto* const plot = std::get_if<plot::Plot>(&part);
+    if (plot == nullptr) continue;
+    auto svg = plot::to_svg(*plot);
+    if (!svg) return Error{svg.error().code, "plot '" + plot->title + "': " + svg.error().message};
+    svgs.push_back(std::move(*svg));
+  }
+  return {};
+}
+
 void Section::check_convergence() {
   if (unconverged_steps == 0) return;
   exactly("converged", "0 steps", fmt::format("{} steps", unconverged_steps),
@@ -240,6 +253,12 @@ std::string to_csv(const std::vector<Section>& sections) {
   return out;
 }
 
+std::string plot_file(const Section& section) {
+  std::string name = section.name;
+  std::ranges::replace(name, '/', '-');
+  return "plots/" + name + ".svg";
+}
+
 std::string to_markdown(const Report& report) {
   std::string out = fmt::format(
       "# Validation\n\n"
@@ -275,6 +294,10 @@ std::string to_markdown(const Report& report) {
                          check.has_bound ? size_of(check, check.bound.value) : "",
                          check.has_bound ? md_cell(check.bound.words()) : "",
                          name_of(check.verdict()));
+    const auto first = std::ranges::find_if(
+        section.parts, [](const auto& part) { return std::holds_alternative<plot::Plot>(part); });
+    if (first != section.parts.end())
+      out += fmt::format("\n![{}]({})\n", std::get<plot::Plot>(*first).title, plot_file(section));
   }
   return out;
 }

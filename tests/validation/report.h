@@ -1,7 +1,7 @@
 #pragma once
 
-// A report holds what the validation experiments found. Two files say it: results.json for
-// programs, report.html for people.
+// A report holds what the validation experiments found. Files say it: results.json and .csv for
+// programs; report.html and validation.md, with plots, for people.
 //
 // A check compares one number of ours with the paper's, with a closed form or with a reference
 // solution: its error is never negative and the bound is kept if error <= bound. "At least x" has
@@ -91,6 +91,7 @@ struct Section {
   std::vector<Check> checks;
   using Part = std::variant<std::string, Table, plot::Plot>;  // a string is a paragraph
   std::vector<Part> parts;
+  std::vector<std::string> svgs;  // its plots in order, once draw() has been called
   std::vector<Scene> scenes;
 
   void say(std::string paragraph) { parts.emplace_back(std::move(paragraph)); }
@@ -111,6 +112,8 @@ struct Section {
                Bound bound, const std::string& note);
   // Adds a figure that is worth a row and has nothing to be held against.
   void measured(const std::string& what, const std::string& ours, const std::string& note);
+  // Draws the plots. Error: gnuplot is missing.
+  Status draw();
   // A row if a step did not reach its tolerance; after the last step.
   void check_convergence();
 };
@@ -136,10 +139,12 @@ std::string shown_percent(double share);
 std::string to_json(const std::vector<Section>& sections);
 std::string run_to_json(const Report& report);
 std::string to_csv(const std::vector<Section>& sections);
-// Returns the page of the documentation.
+// Returns the file of the first plot, beside the documentation's page: "plots/choi2002-creep.svg".
+std::string plot_file(const Section& section);
+// Returns the page of the documentation, with the first plot of each section. Sections have been
+// drawn, here and below.
 std::string to_markdown(const Report& report);
-// Error: gnuplot is missing.
-Result<std::string> to_html(const Report& report);
+std::string to_html(const Report& report);
 Status write_file(const std::filesystem::path& path, const std::string& text);
 
 }  // namespace trocar::validation

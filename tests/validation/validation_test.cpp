@@ -165,6 +165,13 @@ TEST_P(EveryExperiment, KeepsItsBoundsInShortForm) {
   }
   EXPECT_TRUE(fs::exists(out() / "results.csv"));
   EXPECT_TRUE(fs::exists(out() / "run.json"));
+  const auto page = read(out() / "validation.md");
+  std::size_t plots = 0;
+  for (const auto& file : fs::directory_iterator(out() / "plots")) {
+    EXPECT_NE(page.find("](plots/" + file.path().filename().string() + ")"), std::string::npos);
+    ++plots;
+  }
+  EXPECT_EQ(plots > 0, html.find("<svg") != std::string::npos);
 }
 
 INSTANTIATE_TEST_SUITE_P(Short, EveryExperiment, ::testing::ValuesIn(kFamilies),

@@ -18,8 +18,9 @@ TEST(SurfaceSlices, together_they_are_the_frame_in_any_order) {
   for (int round = 0; round < 300; ++round) {
     const auto vertices = 1 + random.below(4000);
     const auto baseline = testing::random_surface(random, vertices, 400);
-    const auto current = testing::moved(random, baseline, 1 + random.below(40),
-                                        static_cast<std::int32_t>(1 + random.below(200)));
+    const auto farthest = static_cast<std::int32_t>(1 + random.below(200));
+    const auto one_in = 1 + random.below(40);
+    const auto current = testing::moved(random, baseline, one_in, farthest);
     auto slices = encode_slices(baseline, current, kMostBytes);
     ASSERT_FALSE(slices.empty());
     most = std::max(most, slices.size());

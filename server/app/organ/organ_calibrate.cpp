@@ -8,6 +8,7 @@
 #include "common/base/cpu.h"
 #include "common/base/text_file.h"
 #include "common/base/timing.h"
+#include "server/app/organ/program_name.h"
 #include "server/app/organ/progress_line.h"
 #include "server/lab/plot/plot.h"
 #include "server/organs/catalogue/load_organ.h"
@@ -15,8 +16,6 @@
 
 namespace trocar::app {
 namespace {
-
-constexpr const char* kProgram = "trocar-organ";
 
 calibration::Progress progress_of(const char* stage) {
   return [stage, line = ProgressLine(kProgram)](std::size_t done, std::size_t all) mutable {

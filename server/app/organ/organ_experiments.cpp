@@ -7,6 +7,7 @@
 #include <filesystem>
 
 #include "common/base/text_file.h"
+#include "server/app/organ/program_name.h"
 #include "server/lab/fit/fit.h"
 #include "server/lab/plot/plot.h"
 #include "server/lab/scenario/settle.h"
@@ -15,8 +16,6 @@
 
 namespace trocar::app {
 namespace {
-
-constexpr const char* kProgram = "trocar-organ";
 
 std::string to_csv(const fit::MeasuredCurve& measured, const fit::Fit& fit) {
   std::string text = "displacement_mm,measured_force_n,fitted_force_n\n";
@@ -43,7 +42,7 @@ plot::Plot to_plot(const fit::MeasuredCurve& measured, const fit::Fit& fit) {
   return plot;
 }
 
-void print_progress(int run, const std::vector<fit::FittedParameter>& tried, double rms_n) {
+void print_run(int run, const std::vector<fit::FittedParameter>& tried, double rms_n) {
   if (::isatty(STDERR_FILENO) == 0) return;
   std::fprintf(stderr, "%s: run %d:", kProgram, run);
   for (const auto& p : tried) std::fprintf(stderr, " %s %.6g", p.key.c_str(), p.value);
@@ -126,7 +125,7 @@ Status run_fit(const FitCommand& command) {
                  folder.string() + ": cannot be made (" + failed.message() + "), see --out"};
   const fit::FitOptions options{command.parameters, command.region, command.curve,
                                 scenario::Solver::Full};
-  const auto fitted = fit::fit(*resolved, *measured, options, print_progress);
+  const auto fitted = fit::fit(*resolved, *measured, options, print_run);
   if (!fitted) return fitted.error();
   print_fit(*fitted);
   if (auto s = write_text_file(folder / "material.toml", fit::to_toml(*fitted, options)); !s)

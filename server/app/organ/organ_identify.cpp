@@ -4,13 +4,12 @@
 #include <filesystem>
 
 #include "common/base/text_file.h"
+#include "server/app/organ/program_name.h"
 #include "server/lab/fit/csv_table.h"
 #include "server/lab/fit/identify_report.h"
 
 namespace trocar::app {
 namespace {
-
-constexpr const char* kProgram = "trocar-organ";
 
 // "g:tau".
 Result<material::PronyTerm> parse_term(const std::string& text) {
@@ -24,7 +23,7 @@ Result<material::PronyTerm> parse_term(const std::string& text) {
   return material::PronyTerm{*weight, *time_s};
 }
 
-void print_progress(int iteration, double rms_percent) {
+void print_iteration(int iteration, double rms_percent) {
   std::fprintf(stderr, "%s: iteration %d: rms %.4g %%\n", kProgram, iteration, rms_percent);
 }
 
@@ -102,7 +101,7 @@ Status run_identify(IdentifyCommand command) {
   }
   const auto curves = fit::read_test_curves(command.curves, command.size);
   if (!curves) return curves.error();
-  const auto found = fit::identify(*curves, command.options, print_progress);
+  const auto found = fit::identify(*curves, command.options, print_iteration);
   if (!found && found.error().code == ErrorCode::Usage) return found.error();
   if (!found) return Error{found.error().code, command.curves + ": " + found.error().message};
   std::fputs(to_text(*found).c_str(), stdout);

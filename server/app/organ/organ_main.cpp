@@ -18,6 +18,7 @@
 #include "server/app/organ/organ_identify.h"
 #include "server/app/organ/organ_print.h"
 #include "server/app/organ/organ_reduce.h"
+#include "server/app/organ/program_name.h"
 #include "server/lab/scenario/scenario.h"
 #include "server/organs/catalogue/builtin_organs.h"
 #include "server/organs/catalogue/load_organ.h"
@@ -29,7 +30,6 @@
 namespace trocar::app {
 namespace {
 
-constexpr const char* kProgram = "trocar-organ";
 // From here on the work takes longer than two seconds, and a line says that it goes on.
 constexpr int kManyTets = 100'000;
 constexpr std::uintmax_t kLargeFileBytes = 20'000'000;

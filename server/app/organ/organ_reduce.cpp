@@ -8,6 +8,7 @@
 #include "common/base/text_file.h"
 #include "common/base/timing.h"
 #include "server/app/organ/organ_reduce_local.h"
+#include "server/app/organ/program_name.h"
 #include "server/app/organ/progress_line.h"
 #include "server/lab/plot/plot.h"
 #include "server/organs/catalogue/load_organ.h"
@@ -19,8 +20,6 @@ namespace {
 
 using dogan::Quality;
 using dogan::Stage;
-
-constexpr const char* kProgram = "trocar-organ";
 
 constexpr const char* kHelp = R"(
 Methods:

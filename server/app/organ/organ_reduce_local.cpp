@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "common/base/text_file.h"
+#include "server/app/organ/program_name.h"
 #include "server/app/organ/progress_line.h"
 #include "server/lab/reduce/local_quality.h"
 #include "server/organs/catalogue/load_organ.h"
@@ -15,8 +16,6 @@ namespace {
 
 using reduce::LocalErrors;
 using reduce::LocalStage;
-
-constexpr const char* kProgram = "trocar-organ";
 
 const char* name_of(LocalStage stage) {
   switch (stage) {

@@ -6,6 +6,7 @@
 #include <cinttypes>
 #include <cstdio>
 
+#include "server/app/sim/program_name.h"
 #include "server/lab/finite_elements/scenario_solve.h"
 #include "server/lab/scenario/field_files.h"
 #include "server/lab/scenario/field_times.h"
@@ -18,7 +19,6 @@ namespace {
 using finite_elements::ElementOrder;
 using finite_elements::ScenarioSolve;
 
-constexpr const char* kProgram = "trocar-sim";
 constexpr const char* kStateFile = "fem.state";
 constexpr double kUsualStep_ms = 1;
 

@@ -15,6 +15,7 @@
 #include "common/base/log.h"
 #include "common/base/timing.h"
 #include "common/base/version.h"
+#include "server/app/sim/program_name.h"
 #include "server/app/sim/sim_fem.h"
 #include "server/app/sim/sim_hands.h"
 #include "server/app/sim/sim_journal.h"
@@ -29,7 +30,6 @@
 namespace trocar::app {
 namespace {
 
-constexpr const char* kProgram = "trocar-sim";
 constexpr double kTick_s = 1e-3;
 constexpr std::uint64_t kProgressAfter_ns = 2'000'000'000, kProgressEvery_ns = 500'000'000;
 
@@ -68,9 +68,9 @@ struct Options {
   std::string log_level = "info";
 };
 
-volatile std::sig_atomic_t stop_requested = 0;
+volatile std::sig_atomic_t has_stop_signal = 0;
 extern "C" void request_stop(int) {
-  stop_requested = 1;
+  has_stop_signal = 1;
 }
 
 // On a terminal, a line on stderr is rewritten once a run has taken two seconds.
@@ -124,7 +124,7 @@ Status simulate(scenario::ScenarioRun& run, const std::filesystem::path& folder,
   if (is_plotted) plots.emplace(run);
   Progress progress;
   if (auto s = write_due_field(); !s) return s;
-  while (!run.is_finished() && stop_requested == 0) {
+  while (!run.is_finished() && has_stop_signal == 0) {
     const auto report = run.step();
     totals.add(run.time_s(), report);
     if (journal != nullptr) {
@@ -240,7 +240,7 @@ Status run_recording(const Options& options) {
       "out/" + std::filesystem::path(options.hands.recording).stem().string();
   const auto folder = make_folder(options.out.empty() ? named : std::filesystem::path(options.out));
   if (!folder) return folder.error();
-  return run_hands(options.hands, *folder, options.journal, options.threads, stop_requested);
+  return run_hands(options.hands, *folder, options.journal, options.threads, has_stop_signal);
 }
 
 Status run_scenario(const Options& options) {
@@ -283,7 +283,7 @@ Status run_scenario(const Options& options) {
                  kProgram, resolved->scenario.source.c_str());
   if (const auto made = make_folder(folder); !made) return made.error();
   if (is_fem)
-    return run_fem(options.fem, std::move(*resolved), folder, options.threads, stop_requested);
+    return run_fem(options.fem, std::move(*resolved), folder, options.threads, has_stop_signal);
   scenario::ScenarioRun run(
       std::move(*resolved),
       options.solver == "full" ? scenario::Solver::Full : scenario::Solver::Live, options.threads);

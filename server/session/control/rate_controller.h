@@ -34,8 +34,8 @@
 
 namespace trocar::control {
 
-// Beyond this, contact forces of fast hands are off by 3 % and more.
-inline constexpr std::uint32_t kLongestFarInterval = 3;
+// Beyond this, contact forces of fast hands are off by 3 % and more, and little time is saved.
+inline constexpr std::uint32_t kLongestFarInterval = 2;
 
 struct RateLimits {
   step::TickDecisions highest;  // when there is room for all

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "common/base/json.h"
 #include "common/base/version.h"
 #include "common/wire/figure_messages.h"
 #include "common/wire/hand_report_messages.h"
@@ -30,9 +31,6 @@ constexpr std::size_t kMostPending = 16;
 constexpr const char* kTickBatches = "/tick_batch";
 constexpr const char* kSnapshots = "/world/snapshot";
 
-std::string hex(std::uint64_t value) {
-  return fmt::format("{:016x}", value);
-}
 std::string ticks_text(Tick first, Tick last) {
   return first == last ? fmt::format("tick {}", first) : fmt::format("ticks {} to {}", first, last);
 }
@@ -212,10 +210,10 @@ void Verifier::check_snapshot(const proto::WorldSnapshot& snapshot) {
   const auto tick = snapshot.tick();
   const auto hash = xxh3_64(bytes_of(std::string_view(snapshot.state())));
   if (hash != snapshot.state_hash())
-    return differ({tick, kSnapshots, "hash of state", hex(snapshot.state_hash()), hex(hash)});
+    return differ({tick, kSnapshots, "hash of state", hex64(snapshot.state_hash()), hex64(hash)});
   if (snapshot.organ_hash() != info_.organ_hash)
     return differ(
-        {tick, kSnapshots, "organ_hash", hex(snapshot.organ_hash()), hex(info_.organ_hash)});
+        {tick, kSnapshots, "organ_hash", hex64(snapshot.organ_hash()), hex64(info_.organ_hash)});
   if (!report_.is_resimulated) return;
   if (waits_for_begin() && tick == info_.begin_tick()) return begin_from(snapshot);
   if (snapshots_.size() >= kMostPending)
@@ -262,7 +260,7 @@ void Verifier::check_record(const proto::TickRecord& message) {
   const auto& done = simulation_.tick(record_.inputs, record_.decisions);
   if (done.state_hash != record_.state_hash)
     return differ(
-        {tick, kTickBatches, "state_hash", hex(record_.state_hash), hex(done.state_hash)});
+        {tick, kTickBatches, "state_hash", hex64(record_.state_hash), hex64(done.state_hash)});
   if (report_.ticks_verified++ == 0) report_.first_tick = tick;
   report_.last_hash = done.state_hash;
   records_.push_back(record_);
@@ -293,7 +291,7 @@ bool Verifier::start_from_snapshot(Tick tick) {
   const auto hash = simulation_.state_hash();
   // Publishing changes the state after the hash was taken.
   if (!publishes_frame(tick) && hash != record_.state_hash)
-    differ({tick, kSnapshots, "state_hash", hex(record_.state_hash), hex(hash)});
+    differ({tick, kSnapshots, "state_hash", hex64(record_.state_hash), hex64(hash)});
   ++report_.ticks_not_simulated;
   return true;
 }
@@ -344,8 +342,8 @@ void Verifier::continue_snapshots(std::uint64_t hash) {
     const auto& done = restored.simulation.tick(record_.inputs, record_.decisions);
     if (done.state_hash != hash)
       return differ({record_.tick, kSnapshots,
-                     fmt::format("state_hash, going on from tick {}", restored.tick), hex(hash),
-                     hex(done.state_hash)});
+                     fmt::format("state_hash, going on from tick {}", restored.tick), hex64(hash),
+                     hex64(done.state_hash)});
   }
   report_.snapshots_continued += std::erase_if(
       continuations_, [&](const Continuation& restored) { return restored.until <= record_.tick; });

@@ -4,6 +4,7 @@
 
 #include <limits>
 
+#include "common/base/json.h"
 #include "common/base/printable.h"
 #include "common/base/version.h"
 #include "server/organs/organ/local_reduction_file.h"
@@ -16,12 +17,9 @@ namespace {
 
 constexpr Tick kProgressPeriod = 1000;
 
-std::string hex_of(std::uint64_t value) {
-  return fmt::format("{:016x}", value);
-}
 // "liver.reduction (hash 0123456789abcdef, liver, 16 patches)"
 std::string name_of(const journal::ReductionDescription& reduction) {
-  return reduction.file + " (hash " + hex_of(reduction.hash) + ", " + reduction.source + ")";
+  return reduction.file + " (hash " + hex64(reduction.hash) + ", " + reduction.source + ")";
 }
 
 }  // namespace
@@ -67,7 +65,7 @@ Result<std::shared_ptr<const organ::LocalReduction>> reduction_of(const std::str
   auto reduction = organ::read_session_reduction(file, organ);
   if (!reduction) return reduction.error();
   if (const auto hash = organ::reduction_hash(*reduction); hash != info.reduction->hash)
-    return Error{ErrorCode::BadFile, file + ": is another reduction (hash " + hex_of(hash) +
+    return Error{ErrorCode::BadFile, file + ": is another reduction (hash " + hex64(hash) +
                                          ") than that of " + journal + ", " +
                                          name_of(*info.reduction)};
   return Shared(std::make_shared<organ::LocalReduction>(std::move(*reduction)));
