@@ -182,32 +182,22 @@ Status check(const ClientOptions& options) {
   return {};
 }
 
-}  // namespace
-
-const tool::ToolKind& ClientOptions::tool_of(std::size_t device) const {
-  if (tools.empty()) return tool::tool_kinds().front();
-  return *tool::find_tool_kind(tools[std::min(device, tools.size() - 1)]);
-}
-
-std::optional<Vec3d> ClientOptions::port_of(std::size_t device) const {
-  if (ports_m.empty()) return std::nullopt;
-  return ports_m[std::min(device, ports_m.size() - 1)];
-}
-
-Result<std::optional<ClientOptions>> parse_client_command_line(int argc, char** argv) {
-  ClientOptions options;
-  std::string size;
+// These options are read further once all are there.
+struct GivenTexts {
+  std::string role = "surgeon", size;
+  std::map<std::string, replica::Role> roles;  // by name
   bool is_headless = false, draws_nothing = false;
-  std::map<std::string, replica::Role> roles;
-  for (const auto& known : wire::kRoles) roles[known.name] = known.role;
-  CLI::App app("Takes part in a session, watches one, or plays a recorded one.", "trocar-client");
-  app.footer(kExamples);
-  app.set_version_flag("--version", version_text());
+  std::vector<double> view;
+  std::vector<std::string> overlays, ports, feels;
+  const CLI::Option* server = nullptr;
+};
+
+void add_session_options(CLI::App& app, ClientOptions& options, GivenTexts& more) {
   app.add_option("--join", options.join,
                  "join code or link, as the server printed it; not needed for your own server on "
                  "this machine")
       ->type_name("CODE|LINK");
-  const auto* server =
+  more.server =
       app.add_option("--server", options.server, "where the session is, if no link says it")
           ->type_name("HOST:PORT")
           ->capture_default_str();
@@ -229,27 +219,28 @@ Result<std::optional<ClientOptions>> parse_client_command_line(int argc, char** 
       ->capture_default_str();
   app.add_option("--name", options.name, "how others see you, unique in the session")
       ->type_name("NAME");
-  std::string role = "surgeon";
-  app.add_option("--role", role, "surgeon, assistant (with tools), instructor, observer (watch)")
-      ->check(CLI::IsMember(roles))
+  app.add_option("--role", more.role,
+                 "surgeon, assistant (with tools), instructor, observer (watch)")
+      ->check(CLI::IsMember(more.roles))
       ->type_name("ROLE")
       ->capture_default_str();
-  app.add_flag("--headless", is_headless, "draw into memory, needs no display");
-  app.add_flag("--no-render", draws_nothing, "draw nothing: a robot or a watcher by program");
-  app.add_option("--size", size, "of the picture [1280x720]")->type_name("WxH");
+}
+
+void add_picture_options(CLI::App& app, ClientOptions& options, GivenTexts& more) {
+  app.add_flag("--headless", more.is_headless, "draw into memory, needs no display");
+  app.add_flag("--no-render", more.draws_nothing, "draw nothing: a robot or a watcher by program");
+  app.add_option("--size", more.size, "of the picture [1280x720]")->type_name("WxH");
   app.add_option("--fps", options.pictures_per_second,
                  "pictures per second [window 60, headless 15]")
       ->type_name("N")
       ->check(CLI::Range(1.0, 240.0));
-  std::vector<std::string> overlays;
   app.add_option(
-         "--show", overlays,
+         "--show", more.overlays,
          "what is drawn over the picture: regions, holds, arrows, rate, ghost, or nothing; keys "
          "change it [regions,arrows]")
       ->type_name("A,B")
       ->delimiter(',');
-  std::vector<double> view;
-  app.add_option("--view", view, "turn the camera at first, degrees, and go nearer [0,0,1]")
+  app.add_option("--view", more.view, "turn the camera at first, degrees, and go nearer [0,0,1]")
       ->type_name("YAW,PITCH,ZOOM")
       ->delimiter(',');
   app.add_option("--screenshot", options.screenshot_file, "write a picture (PNG)")
@@ -258,6 +249,9 @@ Result<std::optional<ClientOptions>> parse_client_command_line(int argc, char** 
                  "seconds after joining at which it is taken [the last picture]")
       ->type_name("S")
       ->check(CLI::Range(0.0, 1e6));
+}
+
+void add_time_options(CLI::App& app, ClientOptions& options) {
   app.add_option("--seconds", options.seconds, "leave after this many seconds")
       ->type_name("N")
       ->check(CLI::Range(0.0, 1e9));
@@ -268,6 +262,9 @@ Result<std::optional<ClientOptions>> parse_client_command_line(int argc, char** 
   app.add_option("--return-at", options.return_at, "as instructor: return it to the mark then")
       ->type_name("S")
       ->check(CLI::Range(0.0, 1e6));
+}
+
+void add_hand_options(CLI::App& app, ClientOptions& options, GivenTexts& more) {
   app.add_option("--script", options.script_file, "scripted hand instead of the mouse (TOML)")
       ->type_name("FILE");
   app.add_option("--device", options.devices,
@@ -289,8 +286,7 @@ Result<std::optional<ClientOptions>> parse_client_command_line(int argc, char** 
       ->expected(1)
       ->check(CLI::IsMember(tool_names))
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-  std::vector<std::string> ports;
-  app.add_option("--port", ports,
+  app.add_option("--port", more.ports,
                  "place that a device's shaft passes, mm, as a trocar holds a laparoscopic "
                  "instrument; twice: one for each [free]")
       ->type_name("X,Y,Z")
@@ -309,10 +305,12 @@ Result<std::optional<ClientOptions>> parse_client_command_line(int argc, char** 
   app.add_option("--hand-trace", options.trace_file,
                  "write what each device did and felt, a row for each millisecond (CSV)")
       ->type_name("FILE");
+}
+
+void add_replay_options(CLI::App& app, ClientOptions& options, GivenTexts& more) {
   app.add_option("--replay", options.replay_file, "play a recorded session (.mcap)")
       ->type_name("FILE");
-  std::vector<std::string> feels;
-  app.add_option("--feel", feels,
+  app.add_option("--feel", more.feels,
                  "with --replay and --device: feel what this participant felt, with tool 0 or 1; "
                  "twice: one for each device")
       ->type_name("NAME[,tool=N]")
@@ -323,6 +321,57 @@ Result<std::optional<ClientOptions>> parse_client_command_line(int argc, char** 
       ->type_name("N/M")
       ->check(CLI::Range(0.0, 500.0))
       ->capture_default_str();
+}
+
+Status read_further(const GivenTexts& more, ClientOptions& options) {
+  options.role = more.roles.at(more.role);
+  if (!options.join.empty()) {
+    const auto invitation = secure::parse_invitation(options.join);
+    if (!invitation) return Error{ErrorCode::Usage, "--join: " + invitation.error().message};
+    if (more.server->count() == 0 && !invitation->server.empty())
+      options.server = invitation->server;
+  }
+  options.is_told_where = !options.join.empty() || more.server->count() > 0 ||
+                          !options.replay_file.empty() || !options.script_file.empty() ||
+                          options.is_insecure;
+  if (more.draws_nothing)
+    options.display = Display::None;
+  else if (more.is_headless)
+    options.display = Display::Headless;
+  if (options.name.empty()) options.name = default_name();
+  if (!more.size.empty())
+    if (const auto parsed = parse_size(more.size, options.size); !parsed) return parsed;
+  if (const auto parsed = parse_overlays(more.overlays, options.overlays); !parsed) return parsed;
+  if (const auto parsed = parse_view(more.view, options.view); !parsed) return parsed;
+  if (const auto parsed = parse_ports(more.ports, options.ports_m); !parsed) return parsed;
+  if (const auto parsed = parse_feels(more.feels, options.feels); !parsed) return parsed;
+  return check(options);
+}
+
+}  // namespace
+
+const tool::ToolKind& ClientOptions::tool_of(std::size_t device) const {
+  if (tools.empty()) return tool::tool_kinds().front();
+  return *tool::find_tool_kind(tools[std::min(device, tools.size() - 1)]);
+}
+
+std::optional<Vec3d> ClientOptions::port_of(std::size_t device) const {
+  if (ports_m.empty()) return std::nullopt;
+  return ports_m[std::min(device, ports_m.size() - 1)];
+}
+
+Result<std::optional<ClientOptions>> parse_client_command_line(int argc, char** argv) {
+  ClientOptions options;
+  GivenTexts more;
+  for (const auto& known : wire::kRoles) more.roles[known.name] = known.role;
+  CLI::App app("Takes part in a session, watches one, or plays a recorded one.", "trocar-client");
+  app.footer(kExamples);
+  app.set_version_flag("--version", version_text());
+  add_session_options(app, options, more);
+  add_picture_options(app, options, more);
+  add_time_options(app, options);
+  add_hand_options(app, options, more);
+  add_replay_options(app, options, more);
   app.add_option("--summary", options.summary_file, "write figures of the run as JSON at the end")
       ->type_name("FILE");
   app.add_option("--corrupt-frame", options.corrupt_frame, "")->group("");
@@ -336,28 +385,7 @@ Result<std::optional<ClientOptions>> parse_client_command_line(int argc, char** 
   } catch (const CLI::ParseError& error) {
     return Error{ErrorCode::Usage, std::string(error.what()) + " (see --help)"};
   }
-  options.role = roles.at(role);
-  if (!options.join.empty()) {
-    const auto invitation = secure::parse_invitation(options.join);
-    if (!invitation) return Error{ErrorCode::Usage, "--join: " + invitation.error().message};
-    if (server->count() == 0 && !invitation->server.empty()) options.server = invitation->server;
-  }
-  options.is_told_where = !options.join.empty() || server->count() > 0 ||
-                          !options.replay_file.empty() || !options.script_file.empty() ||
-                          options.is_insecure;
-  if (draws_nothing)
-    options.display = Display::None;
-  else if (is_headless)
-    options.display = Display::Headless;
-  if (options.name.empty()) options.name = default_name();
-  if (!size.empty())
-    if (const auto parsed = parse_size(size, options.size); !parsed) return parsed.error();
-  if (const auto parsed = parse_overlays(overlays, options.overlays); !parsed)
-    return parsed.error();
-  if (const auto parsed = parse_view(view, options.view); !parsed) return parsed.error();
-  if (const auto parsed = parse_ports(ports, options.ports_m); !parsed) return parsed.error();
-  if (const auto parsed = parse_feels(feels, options.feels); !parsed) return parsed.error();
-  if (const auto checked = check(options); !checked) return checked.error();
+  if (const auto read = read_further(more, options); !read) return read.error();
   return std::optional<ClientOptions>(std::move(options));
 }
 

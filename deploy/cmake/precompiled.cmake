@@ -1,5 +1,5 @@
 # Precompiled headers. Google Test and the session's own header are most of what a test costs to
-# compile; see deploy/test for what it saves. Only for gcc: the one build with clang has few files.
+# compile. Only for gcc.
 set(TROCAR_PRECOMPILES OFF)
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   set(TROCAR_PRECOMPILES ON)
