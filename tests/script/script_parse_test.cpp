@@ -109,6 +109,7 @@ INSTANTIATE_TEST_SUITE_P(
         Refused{"Empty", "", ":1: key tool", "is missing"},
         Refused{"NotToml", "[[tool\n", ":1", "is not TOML"},
         Refused{"BadHeader", "[&", ": is not TOML", "header"},
+        Refused{"LetterOutsideQuotes", "\u00e9 = 1", ":1: is not TOML", "\u00e9"},
         Refused{"ThreeBrackets", "[[[tool]]]", ": is not TOML", "header"},
         Refused{"NotUtf8", "a = \"\xff\"", ":1", "is not TOML"},
         Refused{"UnknownTop", TOOL KEY0 "[tols]\n", ":5: key tols", "is unknown"},
