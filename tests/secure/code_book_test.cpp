@@ -93,6 +93,22 @@ TEST(CodeBook, revoking_a_code_or_a_role_reaches_the_server_that_runs) {
   EXPECT_EQ(book.check(first, kNow).state, CodeState::Revoked);
 }
 
+TEST(CodeBook, numbers_that_no_code_has_are_refused_by_name) {
+  const std::string code =
+      R"({"role": "surgeon", "hmac": ")" + std::string(64, 'a') +
+      R"(", "expires": 9, "uses_left": -1, "revoked": false, "puts_out": false, "id": )";
+  const auto read = [&](const std::string& version, const std::string& id) {
+    return parse_codes(R"({"version": )" + version + R"(, "codes": [)" + code + id + "}]}");
+  };
+  ASSERT_TRUE(read("1", "4294967295").ok()) << read("1", "4294967295").error().message;
+  for (const char* id : {"4294967296", "-1", "1.5", "1e99", "true"}) {
+    const auto entries = read("1", id);
+    ASSERT_FALSE(entries.ok()) << id;
+    EXPECT_EQ(entries.error().message, "id is no whole number in its range") << id;
+  }
+  EXPECT_FALSE(read("18888888444444444444", "1").ok());
+}
+
 TEST(CodeBook, a_damaged_file_revokes_and_a_damaged_start_says_so) {
   const testing::Folder folder;
   const auto file = folder.path() / "codes-7690.json";

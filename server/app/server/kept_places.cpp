@@ -38,17 +38,17 @@ Result<std::vector<KeptPlace>> read_places(const std::filesystem::path& file) {
   };
   try {
     const auto json = Json::parse(*text);
-    if (json.at("version").get<int>() != kFileVersion) return bad("another version");
+    if (whole_number<int>(json, "version") != kFileVersion) return bad("another version");
     for (const auto& entry : json.at("places")) {
-      KeptPlace place{.slot = {entry.at("slot").get<std::uint8_t>()},
+      KeptPlace place{.slot = {whole_number<std::uint8_t>(entry, "slot")},
                       .name = entry.at("name").get<std::string>()};
       const auto token = secure::from_hex(entry.at("token").get<std::string>());
       if (!place.slot.is_valid() || token.size() != place.token.size()) return bad("a place");
       std::ranges::copy(token, place.token.begin());
-      place.code = entry.at("code").get<std::uint32_t>();
+      place.code = whole_number<std::uint32_t>(entry, "code");
       places.push_back(std::move(place));
     }
-  } catch (const Json::exception& exception) {
+  } catch (const std::exception& exception) {
     return bad(exception.what());
   }
   return places;

@@ -45,11 +45,11 @@ Result<Bytes> read_or_make_key(const std::filesystem::path& folder) {
 
 Result<CodeEntry> read_entry(const Json& json) {
   CodeEntry entry;
-  entry.id = json.at("id").get<std::uint32_t>();
+  entry.id = whole_number<std::uint32_t>(json, "id");
   entry.role = role_named(json.at("role").get<std::string>());
   entry.hmac = secure::from_hex(json.at("hmac").get<std::string>());
-  entry.expires = json.at("expires").get<std::int64_t>();
-  entry.uses_left = json.at("uses_left").get<std::int64_t>();
+  entry.expires = whole_number<std::int64_t>(json, "expires");
+  entry.uses_left = whole_number<std::int64_t>(json, "uses_left");
   entry.is_revoked = json.at("revoked").get<bool>();
   entry.puts_out = json.at("puts_out").get<bool>();
   if (entry.role == wire::Role::Unknown || entry.hmac.size() != sizeof(secure::Digest))
@@ -63,14 +63,14 @@ Result<std::vector<CodeEntry>> parse_codes(const std::string& text) {
   std::vector<CodeEntry> entries;
   try {
     const auto json = Json::parse(text);
-    if (json.at("version").get<int>() != kVersion)
+    if (whole_number<int>(json, "version") != kVersion)
       return Error{ErrorCode::BadFile, "another version"};
     for (const auto& code : json.at("codes")) {
       auto entry = read_entry(code);
       if (!entry) return entry.error();
       entries.push_back(std::move(*entry));
     }
-  } catch (const Json::exception& exception) {
+  } catch (const std::exception& exception) {
     return Error{ErrorCode::BadFile, exception.what()};
   }
   if (entries.size() > kMostCodes) return Error{ErrorCode::BadFile, "more than 1000 codes"};
