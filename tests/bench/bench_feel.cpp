@@ -12,6 +12,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
+#include <limits>
 #include <numbers>
 #include <optional>
 #include <sstream>
@@ -157,10 +158,11 @@ std::vector<Row> read_trace(const fs::path& file) {
   return rows;
 }
 
-// Returns the share of the session's ticks in which the server had time for all detail.
+// Returns the share of the session's ticks in which the server had time for all detail; NaN if the
+// recording cannot be read.
 double full_detail_percent(const fs::path& file) {
   const auto journal = journal::SessionJournal::open(file.string());
-  if (!journal) return 0;
+  if (!journal) return std::numeric_limits<double>::quiet_NaN();
   std::string full, now;
   double ticks = 0, full_ticks = 0;
   const auto visit = [&](Tick, const proto::TickRecord& record) {
@@ -171,7 +173,7 @@ double full_detail_percent(const fs::path& file) {
     return true;
   };
   const auto read = (*journal)->read_tick_records(0, std::numeric_limits<Tick>::max(), visit);
-  return read && ticks > 0 ? 100 * full_ticks / ticks : 0;
+  return read ? 100 * full_ticks / ticks : std::numeric_limits<double>::quiet_NaN();
 }
 
 std::complex<double> at_frequency(std::span<const double> values, double hz) {
