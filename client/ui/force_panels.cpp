@@ -15,7 +15,6 @@ namespace {
 
 constexpr float kBarWidth = 330, kBarHeight = 15;
 constexpr float kCurveWidth = 300, kCurveHeight = 54;
-constexpr float kLeastScaleNewton = 0.5f;
 
 // The least of 0.5, 1, 2, 5, 10, ... N that the force fits into.
 float whole_newtons(float force_n) {

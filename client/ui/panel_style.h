@@ -18,6 +18,8 @@ inline constexpr ImGuiWindowFlags kPanel =
 // A panel that only informs lets the pointer through to the scene.
 inline constexpr ImGuiWindowFlags kGlass = kPanel | ImGuiWindowFlags_NoInputs;
 inline constexpr float kMargin = 14;
+// A scale of forces goes to this at least, in N: a trembling of millinewtons is no peak.
+inline constexpr float kLeastScaleNewton = 0.5f;
 
 inline const ImVec4 kGood = {0.42f, 0.86f, 0.58f, 1};
 inline const ImVec4 kNotice = {0.95f, 0.86f, 0.45f, 1};

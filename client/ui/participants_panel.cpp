@@ -12,7 +12,6 @@ namespace trocar::ui {
 namespace {
 
 constexpr float kPlotWidth = 96;
-constexpr float kLeastScaleNewton = 0.5f;  // a trembling of millinewtons is not drawn as a peak
 constexpr std::size_t kMaxPlotPoints = 256;
 
 void draw_dot(const HudParticipant& p, float scale) {

@@ -7,8 +7,6 @@
 namespace trocar::bench {
 namespace {
 
-constexpr std::uint32_t kAllNodes = 1'000'000;
-
 BenchTool pull_top_centre(const catalogue::LatticeSize& size, const organ::Organ& organ) {
   const auto node = catalogue::lattice_node(size, size.nx / 2, size.ny - 1, size.nz / 2);
   return {.place = to_float(organ.mesh.rest_positions[node.value]),

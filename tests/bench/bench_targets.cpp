@@ -8,9 +8,7 @@
 namespace trocar::bench {
 namespace {
 
-constexpr std::uint32_t kAllNodes = 1'000'000;
 constexpr std::uint32_t kAllLayers = 1000;
-constexpr std::uint32_t kNearDepth = 2;  // layers around a contact that get all sweeps
 
 void add_lattice(Suite& suite) {
   const auto organ = catalogue::make_lattice();

@@ -16,7 +16,7 @@
 namespace trocar::validation {
 namespace {
 
-constexpr const char* kProgram = "ccx";
+constexpr const char* kSolverProgram = "ccx";
 // Orders above the first have no volumetric term of their own.
 constexpr double kNoVolume = 1e20;
 
@@ -78,7 +78,7 @@ bool has_calculix() {
   const char* path = std::getenv("PATH");
   std::istringstream folders(path != nullptr ? path : "");
   for (std::string folder; std::getline(folders, folder, ':');)
-    if (access((folder + "/" + kProgram).c_str(), X_OK) == 0) return true;
+    if (access((folder + "/" + kSolverProgram).c_str(), X_OK) == 0) return true;
   return false;
 }
 
@@ -114,7 +114,7 @@ Result<std::string> calculix_input(const finite_elements::Problem& problem,
 Result<Field> run_calculix(const std::filesystem::path& folder, const std::string& name,
                            const std::string& input, std::size_t node_count) {
   if (auto s = write_text_file(folder / (name + ".inp"), input); !s) return s.error();
-  if (run_in(folder, {kProgram, "-i", name}) != 0)
+  if (run_in(folder, {kSolverProgram, "-i", name}) != 0)
     return Error{ErrorCode::BadFile,
                  (folder / "ccx.log").string() + ": CalculiX did not come to an end"};
   return read_displacements(folder / (name + ".dat"), node_count);

@@ -15,8 +15,8 @@ namespace trocar::validation {
 namespace {
 
 constexpr int kWhole = 0;  // stands for no limit
-constexpr int kPaperDepth = 10;
-constexpr double kPull_mm = 15, kSpacing_mm = 10;
+constexpr int kProfilePaperDepth = 10;
+constexpr double kPull_mm = 15, kProfileSpacing_mm = 10;
 constexpr double kInvisible = 0.03;  // of the pull: what the paper calls imperceptible
 constexpr const char* kAsWhole = "the depth that is offered acts as the whole";
 
@@ -65,27 +65,27 @@ std::string setting(const Lab& lab, const Material& material, int depth) {
          (depth == kWhole ? "" : beyond(lab, material.organ, name, depth));
 }
 
-constexpr const char* kStatic =
+constexpr const char* kProfileStatic =
     "[run]\nmode = \"static\"\nseconds = 1\nload_steps = 3\nover_relaxation = 1.8\n"
     "tolerance_n = 1e-5\nmax_sweeps = 6000\n\n"
     "[[probe]]\nset = \"patch\"\nquantity = \"displacement\"\n";
 
 Pulled pull_by(const Lab& lab, Section& section, const Material& material, int depth) {
-  const auto run = lab.start(section, fmt::format("{}, moved", material.name),
-                             fmt::format("fig5-{}-moved-{}", material.name, label(depth)),
-                             setting(lab, material, depth) +
-                                 displace("patch", {{0, {}}, {1, {0, kPull_mm, 0}}}) + kStatic +
-                                 "\n[[probe]]\nset = \"patch\"\nquantity = \"reaction\"\n");
+  const auto run = lab.start(
+      section, fmt::format("{}, moved", material.name),
+      fmt::format("fig5-{}-moved-{}", material.name, label(depth)),
+      setting(lab, material, depth) + displace("patch", {{0, {}}, {1, {0, kPull_mm, 0}}}) +
+          kProfileStatic + "\n[[probe]]\nset = \"patch\"\nquantity = \"reaction\"\n");
   lab.finish(section, *run);
   return {field_of(*run), run->probe(0).y * 1e3, run->probe(1).y};
 }
 
 Pulled pull_with(const Lab& lab, Section& section, const Material& material, int depth,
                  double force_n) {
-  const auto run = lab.start(
-      section, fmt::format("{}, pulled", material.name),
-      fmt::format("fig5-{}-pulled-{}", material.name, label(depth)),
-      setting(lab, material, depth) + force("patch", {{0, {}}, {1, {0, force_n, 0}}}) + kStatic);
+  const auto run = lab.start(section, fmt::format("{}, pulled", material.name),
+                             fmt::format("fig5-{}-pulled-{}", material.name, label(depth)),
+                             setting(lab, material, depth) +
+                                 force("patch", {{0, {}}, {1, {0, force_n, 0}}}) + kProfileStatic);
   lab.finish(section, *run);
   return {field_of(*run), run->probe(0).y * 1e3, force_n};
 }
@@ -184,12 +184,12 @@ void study(const Lab& lab, Section& section, const Material& material, bool has_
   const auto results = try_depths(lab, section, material, whole, whole_pulled_mm);
   const std::string prefix = material.name;
   for (std::size_t i = 1; i < results.size(); ++i)
-    if (results[i].depth == kPaperDepth)
+    if (results[i].depth == kProfilePaperDepth)
       section.at_most(prefix + "-change", "no visible change beyond an optimum", results[i].change,
                       paper(kInvisible, "figure 5: no visible change"),
                       fmt::format("Change of the profile from depth {} to {}, the paper's example, "
                                   "as a share of the pull.",
-                                  results[i - 1].depth, kPaperDepth));
+                                  results[i - 1].depth, kProfilePaperDepth));
   const Depth& last = results.back();
   const std::string at_end = fmt::format(" at depth {}.", last.depth);
   if (has_shear) {
@@ -224,7 +224,7 @@ void run_fig5_profiles(const Lab& lab, Section& section) {
       "along the diagonals of the faces too, and with them shear, as tissue has.");
   study(lab, section,
         {"lattice", "Lattice of the paper", catalogue::make_lattice(),
-         lattice_organ(30, 15, 30, kSpacing_mm)},
+         lattice_organ(30, 15, 30, kProfileSpacing_mm)},
         false);
   const auto organ = lattice_with_diagonals({});
   lab.keep_organ("lattice-with-diagonals", organ);

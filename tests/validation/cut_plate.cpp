@@ -9,7 +9,7 @@
 namespace trocar::validation {
 namespace {
 
-constexpr std::uint8_t kDepth = 2;  // the y axis
+constexpr std::uint8_t kCutDepth = 2;  // the y axis
 constexpr double kOnFace_m = 1e-6;
 constexpr std::uint32_t kMaxCalls = 10'000;
 
@@ -62,7 +62,7 @@ void CutPlate::list_nodes() {
     if (world_.node_classes[n] == world::NodeClass::Fixed) continue;
     free_.emplace_back(n);
     if (std::abs(topology_.rest()[n].y) > half_thickness_ - kOnFace_m)
-      holds_.push_back({.node = NodeIndex(n), .axes = kDepth, .displacement = {}});
+      holds_.push_back({.node = NodeIndex(n), .axes = kCutDepth, .displacement = {}});
     is_held_[n] = !holds_.empty() && holds_.back().node.value == n;
   }
 }

@@ -61,7 +61,8 @@ void sort_holds(finite_elements::Problem& problem, finite_elements::Loads& loads
 
 // A block of 60 x 30 x 60 mm, a square of 20 mm in the middle of its top pressed in by 5 mm and
 // drawn aside by 3 mm.
-void press(const organ::Organ&, finite_elements::Problem& problem, finite_elements::Loads& loads) {
+void press_calculix(const organ::Organ&, finite_elements::Problem& problem,
+                    finite_elements::Loads& loads) {
   hold(problem, loads, [](const Vec3d& p) { return p.y < -0.015 + 1e-9; }, {});
   hold(problem, loads,
        [](const Vec3d& p) {
@@ -152,8 +153,9 @@ void run_calculix_comparison(const Lab& lab, Section& section) {
     section.say("LEFT OUT: ccx is not installed (package calculix-ccx).");
     return;
   }
-  const std::vector<Setting> settings{{"press", "block, pressed", {0.06, 0.03, 0.06}, press},
-                                      {"bend", "bar, bent", {0.02, 0.08, 0.02}, bend}};
+  const std::vector<Setting> settings{
+      {"press", "block, pressed", {0.06, 0.03, 0.06}, press_calculix},
+      {"bend", "bar, bent", {0.02, 0.08, 0.02}, bend}};
   Table table{"Displacements beside CalculiX",
               {"experiment", "elements", "nodes", "ours, largest, mm", "CalculiX, mm",
                "field, relative", "unsplit form differs by"},

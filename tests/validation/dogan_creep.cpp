@@ -63,7 +63,7 @@ std::vector<Steps> steps_with_inertia(bool is_short) {
 }
 
 // How the off-line solver takes a load.
-enum class Way {
+enum class CreepWay {
   AtOnce,       // sudden, and no more
   Slowly,       // sudden, then held; no inertia
   Relaxed,      // sudden, then held until nothing changes any more
@@ -125,9 +125,9 @@ double linear_growth(const material::HyperelasticMaterial& material, double time
   return strain_of();
 }
 
-class Study {
+class CreepStudy {
  public:
-  Study(const Lab& lab, Section& section, const MeasuredLiver& liver)
+  CreepStudy(const Lab& lab, Section& section, const MeasuredLiver& liver)
       : lab_(lab),
         section_(section),
         liver_(liver),
@@ -139,11 +139,11 @@ class Study {
   std::size_t place_count() const { return places_.size(); }
   double seconds() const { return lab_.is_short() ? 2 : 20; }
 
-  Creep off_line(const Load& load, Way way, ElementOrder order = ElementOrder::Linear,
+  Creep off_line(const Load& load, CreepWay way, ElementOrder order = ElementOrder::Linear,
                  int longer = 1) const {
     show_progress(
         fmt::format("{}: place {}, {} N, off-line", liver_.name, load.place + 1, load.force_n));
-    const bool has_inertia = way == Way::WithInertia;
+    const bool has_inertia = way == CreepWay::WithInertia;
     const auto solve = problem(load, order, has_inertia);
     const auto nodes = nodes_at(load.place);
     Creep creep;
@@ -155,9 +155,9 @@ class Study {
       for (const auto node : nodes) moves.push_back(field[node.value]);
     };
     for (int i = 0; i < (has_inertia ? kRampSteps : 1); ++i) note(solve->step());
-    if (way == Way::AtOnce) return creep;
+    if (way == CreepWay::AtOnce) return creep;
     const auto loads = solve->solver().state().loads;
-    if (way == Way::Relaxed) {
+    if (way == CreepWay::Relaxed) {
       note(solve->solver().step(loads, {std::numeric_limits<double>::infinity(), false}));
       return creep;
     }
@@ -246,12 +246,12 @@ double curve_error(const Creep& ours, const Creep& reference, double begin_s) {
   return worst;
 }
 
-std::string name_of(const Study& study, const char* what) {
+std::string name_of(const CreepStudy& study, const char* what) {
   return study.liver().name + "-" + what;
 }
 
 // Figures 2 and 6: all places; the table of times.
-std::vector<Creep> show_places(Section& section, const Study& study) {
+std::vector<Creep> show_places(Section& section, const CreepStudy& study) {
   const double end = study.seconds();
   Table table{fmt::format("Creep under {} N, off-line, mm: {}", kForce_n, study.liver().title),
               {"place", "at once"},
@@ -270,7 +270,7 @@ std::vector<Creep> show_places(Section& section, const Study& study) {
                     .series = {}};
   std::vector<Creep> all;
   for (std::size_t place = 0; place < study.place_count(); ++place) {
-    const auto& creep = all.emplace_back(study.off_line({place}, Way::Slowly));
+    const auto& creep = all.emplace_back(study.off_line({place}, CreepWay::Slowly));
     auto& row = table.rows.emplace_back(1, std::to_string(place + 1));
     for (const double time : times) row.push_back(shown(creep.at_mm(time)));
     row.push_back(shown(creep.last_over_first()));
@@ -296,14 +296,14 @@ std::vector<Creep> show_places(Section& section, const Study& study) {
 
 // Compares the displacement under half of the force with that under the whole, both at once:
 // pressed and pulled, on linear and quadratic elements.
-void show_half_force(const Lab& lab, Section& section, const Study& study) {
+void show_half_force(const Lab& lab, Section& section, const CreepStudy& study) {
   Table table{fmt::format("Half of the force, at once: {}", study.liver().title),
               {"place, elements", "way", fmt::format("{} N, mm", kForce_n),
                fmt::format("{} N, mm", kForce_n / 2), "ratio"},
               {}};
   const auto ratio = [&](std::size_t place, double force_n, ElementOrder order) {
-    const double whole = study.off_line({place, force_n}, Way::AtOnce, order).at_mm(0),
-                 half = study.off_line({place, force_n / 2}, Way::AtOnce, order).at_mm(0);
+    const double whole = study.off_line({place, force_n}, CreepWay::AtOnce, order).at_mm(0),
+                 half = study.off_line({place, force_n / 2}, CreepWay::AtOnce, order).at_mm(0);
     table.rows.push_back(
         {fmt::format("{}, {}", place + 1, order == ElementOrder::Linear ? "linear" : "quadratic"),
          force_n > 0 ? "pressed" : "pulled", shown(whole), shown(half), shown(half / whole)});
@@ -326,10 +326,10 @@ void show_half_force(const Lab& lab, Section& section, const Study& study) {
 }
 
 // Draws figure 7, and the live solver beside the off-line one.
-void show_two_loads(Section& section, const Study& study, const Creep& whole) {
+void show_two_loads(Section& section, const CreepStudy& study, const Creep& whole) {
   const double end = study.seconds();
-  const auto half = study.off_line({0, kForce_n / 2}, Way::Slowly);
-  const auto moving = study.off_line({0}, Way::WithInertia);
+  const auto half = study.off_line({0, kForce_n / 2}, CreepWay::Slowly);
+  const auto moving = study.off_line({0}, CreepWay::WithInertia);
   const auto live = study.live({0}, moving.time_s);
   section.add(
       {.title = fmt::format("Place 1, two loads: {}", study.liver().title),
@@ -376,7 +376,7 @@ double relaxed_half_space(const material::HyperelasticMaterial& material) {
 }
 
 // Small displacements grow as those of a half-space, in elements that do not lock.
-void show_relaxed(const Lab& lab, Section& section, const Study& study) {
+void show_relaxed(const Lab& lab, Section& section, const CreepStudy& study) {
   const double expected = relaxed_half_space(study.liver().organ.material.measured);
   Table table{
       fmt::format("A hundredth of the force, all relaxed over at once: {}", study.liver().title),
@@ -384,7 +384,7 @@ void show_relaxed(const Lab& lab, Section& section, const Study& study) {
       {}};
   for (const auto order : {ElementOrder::Linear, ElementOrder::Quadratic}) {
     const bool is_linear = order == ElementOrder::Linear;
-    const auto creep = study.off_line({0, kSmallPart * kForce_n}, Way::Relaxed, order);
+    const auto creep = study.off_line({0, kSmallPart * kForce_n}, CreepWay::Relaxed, order);
     table.rows.push_back({is_linear ? "linear" : "quadratic",
                           shown(length(creep.moves.front()[0]) * 1e6),
                           shown(length(creep.moves.back()[0]) * 1e6),
@@ -399,8 +399,8 @@ void show_relaxed(const Lab& lab, Section& section, const Study& study) {
   section.add(std::move(table));
   if (!lab.is_short()) return;
   const double end = study.seconds();
-  const auto creep = study.off_line({0}, Way::Slowly),
-             longer = study.off_line({0}, Way::Slowly, ElementOrder::Linear, 2);
+  const auto creep = study.off_line({0}, CreepWay::Slowly),
+             longer = study.off_line({0}, CreepWay::Slowly, ElementOrder::Linear, 2);
   section.compare(name_of(study, "time-steps"), creep.at_mm(end), longer.at_mm(end),
                   target(kStepsBound, "steps of time do not show"), "mm",
                   "Off-line with steps of time twice as long.");
@@ -422,7 +422,7 @@ void run_dogan_creep(const Lab& lab, Section& section) {
       "table 1 with K = 40 C10, plain linear tets, which lock (see dogan2011/locking).",
       kForce_n, kRadius_mm));
   for (const auto& liver : measured_livers(lab)) {
-    const Study study(lab, section, liver);
+    const CreepStudy study(lab, section, liver);
     const auto places = show_places(section, study);
     show_half_force(lab, section, study);
     show_two_loads(section, study, places[0]);

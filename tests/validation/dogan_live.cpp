@@ -28,7 +28,7 @@ constexpr double kReferenceTarget = kErrorTarget / 5;
 constexpr double kPlainOnRecord = 0.015;
 constexpr float kToolRadius_m = 0.008f, kDeep_m = 0.010f, kAbove_m = 0.003f;
 constexpr Tick kSampleTicks = 8;
-constexpr std::uint64_t kSeed = 2011;
+constexpr std::uint64_t kLiveSeed = 2011;
 // Below this share of the largest force the tool has hardly met the tissue.
 constexpr double kLeastShare = 0.05;
 
@@ -53,7 +53,7 @@ float height_m(float part) {
   return kAbove_m;
 }
 
-struct Course {
+struct LiveCourse {
   std::vector<Vec3d> forces_n, moves_m;  // per tick: of the tissue on the tool, of the place
   std::vector<double> tick_ms;           // CPU time
   calibration::Convergence convergence;  // of a reference
@@ -66,16 +66,18 @@ double largest_of(const std::vector<Vec3d>& values) {
   return most;
 }
 
-class Hand {
+class LiveHand {
  public:
-  Hand(const organ::Organ& organ, Tick ticks)
-      : organ_(organ), place_(calibration::spread_places(organ, 1, kSeed).at(0)), ticks_(ticks) {}
+  LiveHand(const organ::Organ& organ, Tick ticks)
+      : organ_(organ),
+        place_(calibration::spread_places(organ, 1, kLiveSeed).at(0)),
+        ticks_(ticks) {}
 
   using Decide = std::function<step::TickDecisions(Tick)>;
   // is_controlled: a rate controller decides, and the first tick is its highest. scheme: of
   // averaged strain; empty: as in a session.
-  Course press(const Decide& decide, bool is_controlled = false,
-               std::optional<dynamics::StrainScheme> scheme = {}) const {
+  LiveCourse press(const Decide& decide, bool is_controlled = false,
+                   std::optional<dynamics::StrainScheme> scheme = {}) const {
     step::Simulation simulation(organ_, 1, {}, {}, {}, scheme);
     std::optional<control::RateController> controller;
     if (is_controlled)
@@ -88,7 +90,7 @@ class Hand {
     hands::HandJoin join{.slot = {0}};
     join.shapes[0] = {.radius_m = kToolRadius_m, .length_m = 0.3f};
     inputs.joins.push_back(join);
-    Course course;
+    LiveCourse course;
     for (Tick tick = 1; tick <= ticks_; ++tick) {
       if (tick % kSampleTicks == 1) inputs.samples.push_back(sample_at(tick));
       const auto decisions = controller ? controller->decisions() : decide(tick);
@@ -108,11 +110,11 @@ class Hand {
     return course;
   }
 
-  Course press(const step::TickDecisions& decisions) const {
+  LiveCourse press(const step::TickDecisions& decisions) const {
     return press([&](Tick) { return decisions; });
   }
   // With all forces implicit.
-  Course press_converged(const calibration::Pilot& pilot, double looser = 1) const {
+  LiveCourse press_converged(const calibration::Pilot& pilot, double looser = 1) const {
     const auto decisions =
         calibration::converged_decisions(pilot.tolerance_n(organ_.mesh.node_count(), looser));
     return press([&](Tick) { return decisions; }, false, dynamics::StrainScheme::Implicit);
@@ -172,7 +174,7 @@ Error error_of(const std::vector<Vec3d>& ours, const std::vector<Vec3d>& referen
   return {sum / reference_sum, percentile(differences, 0.95), percentile(differences, 1)};
 }
 
-struct Study {
+struct LiveStudy {
   Table table{
       "One hand on the measured liver: displacement and force at the contact against the "
       "converged solution, and CPU time of a tick",
@@ -181,8 +183,9 @@ struct Study {
       {}};
 };
 
-void add_row(Study& study, const MeasuredLiver& liver, const char* strain, const char* decisions,
-             const Course& course, const Error& move, const Error& force) {
+void add_row(LiveStudy& study, const MeasuredLiver& liver, const char* strain,
+             const char* decisions, const LiveCourse& course, const Error& move,
+             const Error& force) {
   const auto fast = std::count_if(course.tick_ms.begin(), course.tick_ms.end(),
                                   [](double ms) { return ms <= kTickTarget_ms; });
   study.table.rows.push_back(
@@ -195,17 +198,17 @@ void add_row(Study& study, const MeasuredLiver& liver, const char* strain, const
 }
 
 void measure(const Lab& lab, Section& section, const MeasuredLiver& liver, bool is_averaged,
-             Study& study) {
+             LiveStudy& study) {
   const char* strain = is_averaged ? "averaged" : "plain";
   show_progress(fmt::format("{}, {} strain", liver.name, strain));
   auto organ = liver.organ;
   organ.material.has_averaged_strain = is_averaged;
   const Tick ticks = lab.is_short() ? 400 : 1500;
-  Hand hand(organ, ticks);
+  LiveHand hand(organ, ticks);
   const auto pilot = hand.press(calibration::Pilot::decisions).pilot;
   const auto reference = hand.press_converged(pilot),
              loose = hand.press_converged(pilot, calibration::kLooser);
-  const auto errors = [&](const Course& course) {
+  const auto errors = [&](const LiveCourse& course) {
     return std::pair{error_of(course.moves_m, reference.moves_m, reference.forces_n),
                      error_of(course.forces_n, reference.forces_n, reference.forces_n)};
   };
@@ -227,14 +230,11 @@ void measure(const Lab& lab, Section& section, const MeasuredLiver& liver, bool 
                   error_of(loose.forces_n, reference.forces_n, reference.forces_n).worst,
                   target(kReferenceTarget, "a fifth of what the reference judges"));
   const auto aim = target(kErrorTarget, "1 % of the converged solution");
-  // Plain tets miss the target: in the short form's coarse liver by the force, in the other by the
-  // displacement.
-  const auto bound = [&](bool is_missed) {
-    return is_missed && !is_averaged ? aim.missed(kPlainOnRecord) : aim;
-  };
-  section.at_most(name("displacement"), "its converged solution", move.p95, bound(!lab.is_short()),
+  // Plain tets miss the target in the large liver, by the displacement.
+  const auto of_move = lab.is_short() || is_averaged ? aim : aim.missed(kPlainOnRecord);
+  section.at_most(name("displacement"), "its converged solution", move.p95, of_move,
                   "Displacement at the contact, 95th percentile over ticks.");
-  section.at_most(name("force"), "its converged solution", force.p95, bound(lab.is_short()),
+  section.at_most(name("force"), "its converged solution", force.p95, aim,
                   "Contact force, 95th percentile over ticks.");
   section.add({.title = fmt::format("Contact force, {}, {} strain", liver.title, strain),
                .x = {"time, s"},
@@ -259,7 +259,7 @@ void run_dogan_live(const Lab& lab, Section& section) {
       "(displacement and force, 95th percentile) and 1 ms; times depend on the machine and are no "
       "bound.",
       1e3 * static_cast<double>(kToolRadius_m), calibration::kResidualShare));
-  Study study;
+  LiveStudy study;
   for (const auto& liver : measured_livers(lab))
     for (const bool is_averaged : {false, true}) measure(lab, section, liver, is_averaged, study);
   section.add(std::move(study.table));

@@ -37,15 +37,15 @@ Bound of_mesh(const Lab& lab, const std::string& geometry) {
 }
 
 // The patch of a liver that is pressed has this radius and is displaced so far.
-constexpr double kPatch_mm = 12, kPress_mm = 5;
-constexpr std::uint64_t kSeed = 2011;
+constexpr double kLockingPatch_mm = 12, kLockingPress_mm = 5;
+constexpr std::uint64_t kLockingSeed = 2011;
 constexpr double kRoughnessBound = 0.3;
 
 // Young's modulus and Poisson's ratio of C10 and K of table 1 in the live solver's neo-Hookean law.
-struct Elastic {
+struct LockingElastic {
   double young_pa, poisson;
 };
-Elastic elastic() {
+LockingElastic elastic() {
   const auto& liver = *material::find_measured_material("human_liver_nava2008");
   const double mu = 2 * liver.coefficients_pa[0], lambda = liver.bulk_modulus_pa - mu;
   const double poisson = lambda / (2 * (lambda + mu));
@@ -164,9 +164,9 @@ Vec3d solve_off_line(const Lab& lab, const std::string& text, ElementOrder order
   return solve ? solve->probe(0) : Vec3d{std::nan(""), std::nan(""), std::nan("")};
 }
 
-class Study {
+class LockingStudy {
  public:
-  Study(const Lab& lab, Section& section, const Geometry& geometry)
+  LockingStudy(const Lab& lab, Section& section, const Geometry& geometry)
       : lab_(lab), section_(section), geometry_(geometry) {}
 
   double live(int cells) const {
@@ -217,8 +217,8 @@ class Study {
   const Geometry& geometry_;
 };
 
-void measure(const Lab& lab, Section& section, const Geometry& geometry) {
-  const Study study(lab, section, geometry);
+void measure_locking(const Lab& lab, Section& section, const Geometry& geometry) {
+  const LockingStudy study(lab, section, geometry);
   const int finest = lab.is_short() ? geometry.cells.back() : geometry.reference_cells;
   const double reference = study.finite_elements(finest, ElementOrder::Quadratic);
   const auto off = [&](double value) { return shown_percent(value / reference - 1); };
@@ -260,7 +260,7 @@ void measure(const Lab& lab, Section& section, const Geometry& geometry) {
 
 // A patch of a liver pressed in, on its own mesh, against quadratic elements of the same.
 void measure_liver(const Lab& lab, Section& section, const MeasuredLiver& liver, Table& table) {
-  const auto places = calibration::spread_places(liver.organ, 2, kSeed);
+  const auto places = calibration::spread_places(liver.organ, 2, kLockingSeed);
   const auto [young_pa, poisson] = elastic();
   for (std::size_t i = 0; i < places.size(); ++i) {
     const auto name = fmt::format("locking-{}-{}", liver.name, i + 1);
@@ -274,8 +274,8 @@ void measure_liver(const Lab& lab, Section& section, const MeasuredLiver& liver,
                  "seconds = 1\nload_steps = 2\nover_relaxation = 1.8\ntolerance_n = 5e-5\n"
                  "max_sweeps = 5000\n\n",
                  young_pa, poisson, is_averaged) +
-             near_set("patch", p * 1e3, kPatch_mm, true) +
-             displace("patch", {{0, {}}, {1, to_double(places[i].outward) * -kPress_mm}}) +
+             near_set("patch", p * 1e3, kLockingPatch_mm, true) +
+             displace("patch", {{0, {}}, {1, to_double(places[i].outward) * -kLockingPress_mm}}) +
              "[[probe]]\nset = \"patch\"\nquantity = \"reaction\"\n";
     };
     const auto force_of = [](const Vec3d& reaction) { return length(reaction); };
@@ -416,7 +416,7 @@ plot::Plot picture(const std::string& title, const organ::Organ& organ,
 void show_pressure(const Lab& lab, Section& section) {
   const auto& geometry = geometries().back();
   const int cells = lab.is_short() ? 2 : 4;
-  const Study study(lab, section, geometry);
+  const LockingStudy study(lab, section, geometry);
   const auto organ = geometry.organ(cells);
   const auto plain = pressures_kpa(organ, study.plain_displacements(cells), false);
   const auto averaged = pressures_kpa(organ, study.averaged_displacements(cells), true);
@@ -447,11 +447,11 @@ void run_locking(const Lab& lab, Section& section) {
       "solver's, and equal to the live solver's without averaging; quadratic ones on the finest "
       "mesh are the reference.",
       young_pa, poisson));
-  for (const auto& geometry : geometries()) measure(lab, section, geometry);
+  for (const auto& geometry : geometries()) measure_locking(lab, section, geometry);
   show_pressure(lab, section);
   if (lab.is_short()) return;  // a coarse liver's patch is a node or two
-  Table table{fmt::format("A patch of {:g} mm radius pressed in by {:g} mm: force, N", kPatch_mm,
-                          kPress_mm),
+  Table table{fmt::format("A patch of {:g} mm radius pressed in by {:g} mm: force, N",
+                          kLockingPatch_mm, kLockingPress_mm),
               {"liver", "place", "linear", "off", "averaged strain", "off", "quadratic, same mesh"},
               {}};
   for (const auto& liver : measured_livers(lab)) measure_liver(lab, section, liver, table);

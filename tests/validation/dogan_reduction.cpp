@@ -41,9 +41,9 @@ Eigen::Vector3d at_node(const Vector& all, NodeIndex node) {
   return all.segment<3>(3 * static_cast<Eigen::Index>(node.value));
 }
 
-class Study {
+class ModesStudy {
  public:
-  Study(const Lab& lab, Section& section, const MeasuredLiver& liver)
+  ModesStudy(const Lab& lab, Section& section, const MeasuredLiver& liver)
       : section_(section), liver_(liver), settings_(settings_of(lab)), is_short_(lab.is_short()) {
     auto model = FullModel::create(liver.organ);
     TROCAR_ASSERT(model.ok());
@@ -88,7 +88,7 @@ class Study {
 };
 
 // Errors over the number of modes, for each its own best tangent.
-void Study::show_modes() {
+void ModesStudy::show_modes() {
   Table table{fmt::format("{} snapshots, {} loads outside the training, mean L2 (95th percentile, "
                           "worst) of displacements: {}",
                           training_.snapshots.size(), unseen_.loads.size(), liver_.title),
@@ -145,7 +145,7 @@ void Study::show_modes() {
 }
 
 // Takes the snapshots from one constant load and applies the same load, as the paper does.
-void Study::show_own_load() {
+void ModesStudy::show_own_load() {
   Table table{fmt::format("One press and its own {} steps as snapshots, 8 modes: {}", kOwnSteps,
                           liver_.title),
               {"place", "full, mm", "initial tangent, mm", "L2", "best tangent, mm", "L2"},
@@ -192,7 +192,7 @@ void Study::show_own_load() {
 }
 
 // Eq. 14 is linear, and creep scales whatever the force: half of it is half of the displacement.
-void Study::show_half_force() {
+void ModesStudy::show_half_force() {
   const auto normals = mesh::surface_normals(liver_.organ.mesh);
   const ReducedModel reduced(eight_, TangentChoice::Best);
   Table table{fmt::format("Half of the force, loaded node, mm: {}", liver_.title),
@@ -217,7 +217,7 @@ void Study::show_half_force() {
   section_.add(std::move(table));
 }
 
-void Study::show_creep() {
+void ModesStudy::show_creep() {
   show_progress(liver_.name + ": creep");
   add_creep(*model_, settings_, eight_);
   Table table{fmt::format("Creep under loads outside the training, 8 modes: {}", liver_.title),
@@ -261,7 +261,7 @@ void Study::show_creep() {
                    "at once: L2 after 20 s, the worst load.");
 }
 
-void Study::show_time() {
+void ModesStudy::show_time() {
   const ReducedModel reduced(eight_, TangentChoice::Best);
   const auto forces = node_forces(liver_.organ, training_.snapshots.front().press);
   double sum = 0;
@@ -294,7 +294,7 @@ void run_dogan_reduction(const Lab& lab, Section& section) {
       settings.force_n, 1e3 * settings.radius_m, settings.places, settings.directions,
       settings.magnitudes));
   for (const auto& liver : measured_livers(lab)) {
-    Study study(lab, section, liver);
+    ModesStudy study(lab, section, liver);
     study.show_modes();
     study.show_own_load();
     study.show_half_force();

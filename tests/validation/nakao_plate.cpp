@@ -121,7 +121,7 @@ Way in_steps(Way way) {
 }
 
 // Draws the edges around the wound as seen from above.
-plot::Plot picture(const std::string& title, const Wound& wound) {
+plot::Plot picture_plate(const std::string& title, const Wound& wound) {
   const double reach_mm = kLength_m * 600;
   plot::Plot plot{.title = title,
                   .x = {"x, mm", false, -reach_mm, reach_mm},
@@ -382,8 +382,8 @@ void run_plate(const Lab& lab, Section& section) {
   for (const auto& [way, wounds] : printed)
     for (const auto& wound : wounds)
       if (&wound == &wounds.back() || std::string(way.name) == "adaptive")
-        section.add(
-            picture(fmt::format("From above: {}, {:g} %", way.title, wound.tension * 100), wound));
+        section.add(picture_plate(
+            fmt::format("From above: {}, {:g} %", way.title, wound.tension * 100), wound));
 }
 
 }  // namespace trocar::validation

@@ -29,8 +29,8 @@ constexpr double kFixed_us = 100, kPerSweep_us = (4100 / kScale - kFixed_us) / (
 constexpr double kSpike_us = (13700 - 4100) / kScale;
 constexpr Tick kSpikeEvery = 17;
 constexpr double kSlowest = 3;
-constexpr Tick kApproach = 60;  // until the tip has met the surface
-constexpr Tick kSettle = 200;   // ticks that a change of the machine may take to be answered
+constexpr Tick kApproach = 60;        // until the tip has met the surface
+constexpr Tick kRefreshSettle = 200;  // ticks that a change of the machine may take to be answered
 
 struct PaperCase {
   const char* title;
@@ -50,12 +50,12 @@ struct Phases {
   // The controller has had the time to answer.
   bool is_settled(Tick tick) const {
     for (const auto change : {spikes_end, slower_end, slowest_end})
-      if (tick > change && tick <= change + kSettle) return false;
-    return tick > kSettle;
+      if (tick > change && tick <= change + kRefreshSettle) return false;
+    return tick > kRefreshSettle;
   }
 };
 
-struct Course {
+struct RefreshCourse {
   std::vector<double> ticks, nodes, active, sweeps, model_us, measured_us;
   std::vector<Vec3d> forces_n;
   std::uint64_t lowered_by_spikes = 0;
@@ -128,7 +128,7 @@ hands::ToolInput blade_at(const Site& site, Tick tick) {
           {{place.position + place.outward * -0.025f + aside, orientation}, tool::Verb::Cut}};
 }
 
-void add_stages(const step::TickReport& report, Course& course) {
+void add_stages(const step::TickReport& report, RefreshCourse& course) {
   const auto us = [&](step::Stage stage) {
     return static_cast<double>(report.stage_cpu_ns[static_cast<std::size_t>(stage)]) * 1e-3;
   };
@@ -156,12 +156,13 @@ Site site_on_top(const organ::Organ& organ) {
   return {{node, to_float(rest[node.value])}, 0.305f};
 }
 
-Course update(const organ::Organ& organ, const Site& site, const step::TickDecisions& most,
-              const Phases& phases, bool is_controlled, Blade blade = Blade::None) {
+RefreshCourse update_refresh(const organ::Organ& organ, const Site& site,
+                             const step::TickDecisions& most, const Phases& phases,
+                             bool is_controlled, Blade blade = Blade::None) {
   step::Simulation simulation(organ);
   control::RateController controller({.highest = most, .budget_us = kBudget_us});
   const Machine machine(phases);
-  Course course;
+  RefreshCourse course;
   hands::TickInputs inputs;
   hands::HandJoin join{.slot = {0}};
   join.shapes[0] = {.radius_m = 0.012f, .length_m = 0.05f};
@@ -202,7 +203,7 @@ Course update(const organ::Organ& organ, const Site& site, const step::TickDecis
   return course;
 }
 
-double percentile(std::vector<double> values, double share) {
+double refresh_percentile(std::vector<double> values, double share) {
   const auto at =
       values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
   std::nth_element(values.begin(), at, values.end());
@@ -218,9 +219,9 @@ step::TickDecisions decisions_like(const organ::Organ& organ, const Site& site,
     const step::TickDecisions tried{.depth_limit = depth,
                                     .node_limit = static_cast<std::uint32_t>(paper.nodes_high),
                                     .boundary = world::Boundary::Frozen};
-    const auto course = update(organ, site, tried, {.end = 300}, false);
+    const auto course = update_refresh(organ, site, tried, {.end = 300}, false);
     const double distance =
-        std::abs(percentile(course.nodes, 0.5) - (paper.nodes_low + paper.nodes_high) / 2);
+        std::abs(refresh_percentile(course.nodes, 0.5) - (paper.nodes_low + paper.nodes_high) / 2);
     if (distance >= nearest) continue;
     nearest = distance;
     best = tried;
@@ -231,8 +232,8 @@ step::TickDecisions decisions_like(const organ::Organ& organ, const Site& site,
 // All but the first and last hundredth, once the tip has met the surface.
 std::string range(std::vector<double> values, const char* format) {
   values.erase(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(kApproach));
-  return fmt::format(fmt::runtime(format), percentile(values, 0.01)) + " to " +
-         fmt::format(fmt::runtime(format), percentile(values, 0.99));
+  return fmt::format(fmt::runtime(format), refresh_percentile(values, 0.01)) + " to " +
+         fmt::format(fmt::runtime(format), refresh_percentile(values, 0.99));
 }
 
 std::vector<double> scaled(std::vector<double> values, double by) {
@@ -244,7 +245,7 @@ plot::Series level(const std::string& name, double value, double end, int colour
   return {name, {0, end}, {value, value}, plot::Style::Dashed, colour};
 }
 
-void add_measured(Section& section, const Course& four, const Course& six) {
+void add_measured(Section& section, const RefreshCourse& four, const RefreshCourse& six) {
   constexpr std::size_t kCycles = 20;
   plot::Plot nodes{
       .title = "20 cycles: nodes in the queue", .x = {"cycle"}, .y = {"nodes"}, .series = {}};
@@ -252,7 +253,7 @@ void add_measured(Section& section, const Course& four, const Course& six) {
                    .x = {"cycle"},
                    .y = {"time per cycle, ms", true},
                    .series = {}};
-  const auto add = [&](const Course& course, const PaperCase& paper, int colour) {
+  const auto add = [&](const RefreshCourse& course, const PaperCase& paper, int colour) {
     plot::Series n{paper.title, {}, {}, plot::Style::LineAndPoints, colour}, t = n;
     for (std::size_t i = 0; i < kCycles; ++i) {
       const auto at = course.ticks.size() / 2 + i;
@@ -275,7 +276,7 @@ void add_measured(Section& section, const Course& four, const Course& six) {
   section.add(std::move(times));
 }
 
-void add_controlled(Section& section, const Course& free, const Course& held) {
+void add_controlled(Section& section, const RefreshCourse& free, const RefreshCourse& held) {
   const double end = free.ticks.back();
   plot::Plot times{.title = "Time per cycle of the machine on paper, in the paper's milliseconds",
                    .x = {"cycle"},
@@ -299,7 +300,7 @@ void add_controlled(Section& section, const Course& free, const Course& held) {
 }
 
 // Returns the share of the settled ticks without a spike that take longer than the budget.
-double over_budget(const Course& course, const Phases& phases) {
+double over_budget(const RefreshCourse& course, const Phases& phases) {
   std::size_t over = 0, all = 0;
   for (std::size_t i = 0; i < course.ticks.size(); ++i) {
     const auto tick = static_cast<Tick>(course.ticks[i]);
@@ -310,12 +311,12 @@ double over_budget(const Course& course, const Phases& phases) {
   return static_cast<double>(over) / static_cast<double>(all);
 }
 
-double largest_work(const Course& course, Tick from, Tick to) {
+double largest_work(const RefreshCourse& course, Tick from, Tick to) {
   return *std::max_element(course.sweeps.begin() + static_cast<std::ptrdiff_t>(from),
                            course.sweeps.begin() + static_cast<std::ptrdiff_t>(to));
 }
 
-double force_difference(const Course& a, const Course& b) {
+double force_difference(const RefreshCourse& a, const RefreshCourse& b) {
   double sum = 0, force = 0;
   for (std::size_t i = 0; i < a.forces_n.size(); ++i) {
     sum += length(a.forces_n[i] - b.forces_n[i]);
@@ -337,9 +338,9 @@ void cut_large(const Lab& lab, const LargeCase& large, Section& section) {
   const auto four_layers = decisions_like(organ, site, kFig15),
              six_layers = decisions_like(organ, site, kFig16);
   const std::array courses{
-      std::pair{&kFig15, update(organ, site, four_layers, phases, false, Blade::Cuts)},
-      std::pair{&kFig16, update(organ, site, six_layers, phases, false, Blade::Cuts)},
-      std::pair{&kFig17, update(organ, site, six_layers, phases, true, Blade::Cuts)}};
+      std::pair{&kFig15, update_refresh(organ, site, four_layers, phases, false, Blade::Cuts)},
+      std::pair{&kFig16, update_refresh(organ, site, six_layers, phases, false, Blade::Cuts)},
+      std::pair{&kFig17, update_refresh(organ, site, six_layers, phases, true, Blade::Cuts)}};
 
   Table cycles{fmt::format("{}: time per cycle while a blade cuts, ms", title),
                {"", "nodes, paper", "nodes, ours", "paper", "ours", "contact", "mechanics",
@@ -366,10 +367,10 @@ void cut_large(const Lab& lab, const LargeCase& large, Section& section) {
         {paper->title, fmt::format("{:.0f} to {:.0f}", paper->nodes_low, paper->nodes_high),
          range(course.nodes, "{:.0f}"),
          fmt::format("{:.1f} to {:.1f}", paper->ms_low, paper->ms_high),
-         range(scaled(cycle_us, 1e-3), "{:.3f}"), ms(percentile(course.contact_us, 0.5)),
-         ms(percentile(course.mechanics_us, 0.5)),
-         cut_us.empty() ? "none" : ms(percentile(cut_us, 0.5)),
-         cut_us.empty() ? "none" : ms(percentile(cut_us, 0.99)),
+         range(scaled(cycle_us, 1e-3), "{:.3f}"), ms(refresh_percentile(course.contact_us, 0.5)),
+         ms(refresh_percentile(course.mechanics_us, 0.5)),
+         cut_us.empty() ? "none" : ms(refresh_percentile(cut_us, 0.5)),
+         cut_us.empty() ? "none" : ms(refresh_percentile(cut_us, 0.99)),
          ms(*std::ranges::max_element(course.topology_us))});
     cuts.rows.push_back({paper->title, fmt::format("{}", course.tets_before),
                          fmt::format("{}", course.tets_after), fmt::format("{}", course.crossed),
@@ -416,15 +417,15 @@ void run_refresh_rate(const Lab& lab, Section& section) {
 
   const auto four_layers = decisions_like(*organ, site, kFig15),
              six_layers = decisions_like(*organ, site, kFig16);
-  const Course four = update(*organ, site, four_layers, {.end = 2 * unit}, false);
-  const Course free = update(*organ, site, six_layers, phases, false);
-  const Course held = update(*organ, site, six_layers, phases, true);
+  const RefreshCourse four = update_refresh(*organ, site, four_layers, {.end = 2 * unit}, false);
+  const RefreshCourse free = update_refresh(*organ, site, six_layers, phases, false);
+  const RefreshCourse held = update_refresh(*organ, site, six_layers, phases, true);
 
   Table table{"Nodes and time per cycle",
               {"", "nodes, paper", "nodes, ours", "active, ours", "time, paper, ms",
                "time, ours (measured), ms"},
               {}};
-  const auto row = [&](const PaperCase& paper, const Course& course) {
+  const auto row = [&](const PaperCase& paper, const RefreshCourse& course) {
     table.rows.push_back({paper.title,
                           fmt::format("{:.0f} to {:.0f}", paper.nodes_low, paper.nodes_high),
                           range(course.nodes, "{:.0f}"), range(course.active, "{:.0f}"),
@@ -437,8 +438,9 @@ void run_refresh_rate(const Lab& lab, Section& section) {
   row(kFig16, free);
   row(kFig17, held);
 
-  const auto outside = [](const Course& course, const PaperCase& paper) {
-    const double low = percentile(course.nodes, 0.1), high = percentile(course.nodes, 0.9);
+  const auto outside = [](const RefreshCourse& course, const PaperCase& paper) {
+    const double low = refresh_percentile(course.nodes, 0.1),
+                 high = refresh_percentile(course.nodes, 0.9);
     return std::max({0.0, (paper.nodes_low - low) / paper.nodes_low,
                      (high - paper.nodes_high) / paper.nodes_high});
   };
@@ -461,12 +463,14 @@ void run_refresh_rate(const Lab& lab, Section& section) {
   const double room = (kBudget_us / kSlowest - kFixed_us) / kPerSweep_us;
   section.at_most(
       "work-when-slowest", fmt::format("{:.0f} node sweeps", room),
-      std::max(0.0, largest_work(held, phases.slower_end + kSettle, phases.slowest_end) / room - 1),
+      std::max(
+          0.0,
+          largest_work(held, phases.slower_end + kRefreshSettle, phases.slowest_end) / room - 1),
       target(0.02, "what fits into the cycle"),
       "Largest work of a cycle while the machine is slowest, over what then fits into 5.6 ms.");
   section.at_least("work-comes-back", "as without control",
-                   percentile({held.sweeps.end() - 300, held.sweeps.end()}, 0.5) /
-                       percentile({free.sweeps.end() - 300, free.sweeps.end()}, 0.5),
+                   refresh_percentile({held.sweeps.end() - 300, held.sweeps.end()}, 0.5) /
+                       refresh_percentile({free.sweeps.end() - 300, free.sweeps.end()}, 0.5),
                    target(0.99, "control leaves no trace"),
                    "Work of the last 300 cycles, over that without control.");
   section.at_most("force", "without control", force_difference(held, free),

@@ -23,7 +23,7 @@ constexpr double kMoment_m4 = kWidth_m * kWidth_m * kWidth_m * kWidth_m / 12;
 constexpr double kLiverPoisson = 0.4756;  // K = 40 C10
 constexpr double kBarTarget = 0.03, kBeamTarget = 0.05;
 
-struct Law {
+struct BeamLaw {
   const char* name;
   const char* title;
   std::string material;           // keys of [material]
@@ -39,7 +39,7 @@ struct Law {
   }
 };
 
-std::vector<Law> laws() {
+std::vector<BeamLaw> laws() {
   const auto tets = [](const char* law, double poisson, bool is_averaged) {
     return fmt::format("elastic_law = \"{}\"\npoisson_ratio = {}\n{}", law, poisson,
                        is_averaged ? "averaged_strain = true\n" : "");
@@ -54,13 +54,13 @@ std::vector<Law> laws() {
   };
 }
 
-struct Elastic {
+struct BeamElastic {
   double young_pa, shear_pa, poisson;
 };
 
 // Returns the constants of the law as a continuum. Springs in five tets per cell are stiffer along
 // the cell's axes.
-Elastic elastic_of(const Law& law, const organ::Organ& organ) {
+BeamElastic elastic_of(const BeamLaw& law, const organ::Organ& organ) {
   if (law.poisson) return {kYoung_pa, kYoung_pa / (2 * (1 + *law.poisson)), *law.poisson};
   const auto c = constants_of(organ);
   return {c.young_modulus(), c.c44, c.poisson_ratio()};
@@ -81,7 +81,7 @@ std::string plane(const char* name, double y_mm) {
   return box_set(name, {-half_mm, y_mm, -half_mm}, {half_mm, y_mm, half_mm});
 }
 
-std::string traction(const Vec3d& pa) {
+std::string beam_traction(const Vec3d& pa) {
   return fmt::format(
       "[[traction]]\nset = \"end\"\n[[traction.key]]\ntime_s = 0\n"
       "traction_pa = [{:.9g}, {:.9g}, {:.9g}]\n\n",
@@ -95,7 +95,7 @@ std::string static_to(double tolerance_n) {
       tolerance_n);
 }
 
-std::string material_of(const Law& law) {
+std::string material_of(const BeamLaw& law) {
   return fmt::format("[material]\nyoung_modulus_pa = {}\n{}\n", kYoung_pa, law.material);
 }
 
@@ -103,7 +103,7 @@ std::string displacement_probe(const char* set) {
   return fmt::format("[[probe]]\nset = \"{}\"\nquantity = \"displacement\"\n\n", set);
 }
 
-using Refine = std::optional<double> (*)(const Lab&, Section&, const Law&, int, double&);
+using Refine = std::optional<double> (*)(const Lab&, Section&, const BeamLaw&, int, double&);
 
 // A law over mesh sizes: ours and the closed form, mm. Returns ours over the closed form on the
 // finest mesh, by law.
@@ -145,7 +145,7 @@ std::map<std::string, double> refine(const Lab& lab, Section& section, const cha
   return finest;
 }
 
-std::optional<double> stretch_bar(const Lab& lab, Section& section, const Law& law, int across,
+std::optional<double> stretch_bar(const Lab& lab, Section& section, const BeamLaw& law, int across,
                                   double& expected_mm) {
   constexpr double kStrain = 0.01;
   organ::Organ organ;
@@ -155,7 +155,7 @@ std::optional<double> stretch_bar(const Lab& lab, Section& section, const Law& l
   const auto run = lab.try_start(section, law.title, fmt::format("bar-{}-{}", law.name, across),
                                  source + material_of(law) + plane("end", kBar_m * 500) +
                                      plane("lower", -kBar_m * 250) + plane("upper", kBar_m * 250) +
-                                     traction({0, stress_pa, 0}) + static_to(1e-6) +
+                                     beam_traction({0, stress_pa, 0}) + static_to(1e-6) +
                                      displacement_probe("upper") + displacement_probe("lower"));
   if (!run) return std::nullopt;
   lab.finish(section, *run);
@@ -163,7 +163,7 @@ std::optional<double> stretch_bar(const Lab& lab, Section& section, const Law& l
   return (run->probe(0).y - run->probe(1).y) * 1e3;
 }
 
-std::optional<double> bend_beam(const Lab& lab, Section& section, const Law& law, int across,
+std::optional<double> bend_beam(const Lab& lab, Section& section, const BeamLaw& law, int across,
                                 double& expected_mm) {
   constexpr double kForce_n = 0.004;
   organ::Organ organ;
@@ -171,10 +171,10 @@ std::optional<double> bend_beam(const Lab& lab, Section& section, const Law& law
   const auto run = lab.try_start(
       section, law.title, fmt::format("cantilever-{}-{}", law.name, across),
       source + material_of(law) + plane("end", kBeam_m * 500) +
-          traction({kForce_n / kArea_m2, 0, 0}) + static_to(1e-6) + displacement_probe("end"));
+          beam_traction({kForce_n / kArea_m2, 0, 0}) + static_to(1e-6) + displacement_probe("end"));
   if (!run) return std::nullopt;
   lab.finish(section, *run);
-  const Elastic e = elastic_of(law, organ);
+  const BeamElastic e = elastic_of(law, organ);
   const double shear_factor = 10 * (1 + e.poisson) / (12 + 11 * e.poisson);
   expected_mm = (kForce_n * kBeam_m * kBeam_m * kBeam_m / (3 * e.young_pa * kMoment_m4) +
                  kForce_n * kBeam_m / (shear_factor * e.shear_pa * kArea_m2)) *

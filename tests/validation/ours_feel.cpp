@@ -20,7 +20,7 @@ namespace felt = haptics::testing;
 using felt::Outcome;
 
 constexpr tool::ToolShape kProbe{.radius_m = 0.006f, .length_m = 0.2f, .reach_m = 0.008f};
-constexpr int kShortTets = 6000;        // coarser ones are flat under the probe
+constexpr int kFeelShortTets = 6000;    // coarser ones are flat under the probe
 constexpr double kStiffness_n_m = 139;  // of tissue that the motions are made for
 
 // Errors that a round trip allows, relative; degrees.
@@ -57,14 +57,9 @@ struct Network {
 };
 constexpr Network kDrawn{.rtt_ms = 100};
 
-// The largest errors on record of bounds that are known to be missed, by the check's name.
-using Records = std::map<std::string, double>;
-const Records kFull{};
-const Records kShort{{"100-ms-release", 0.07}};
-
-class Study {
+class FeelStudy {
  public:
-  Study(const Lab& lab, Section& section, const organ::Organ& organ)
+  FeelStudy(const Lab& lab, Section& section, const organ::Organ& organ)
       : section_(section),
         is_short_(lab.is_short()),
         simulation_(organ),
@@ -136,12 +131,8 @@ class Study {
 
   void bound(const std::string& what, const std::string& expected, const std::string& ours,
              double error, double most, bool is_relative, const std::string& note) {
-    auto limit = target(most, "it is felt as without delay");
-    const auto& records = is_short_ ? kShort : kFull;
-    if (const auto found = records.find(what); found != records.end())
-      limit = limit.missed(found->second);
-    section_.checks.push_back(
-        {section_.name + "/" + what, expected, ours, error, limit, is_relative, note});
+    section_.checks.push_back({section_.name + "/" + what, expected, ours, error,
+                               target(most, "it is felt as without delay"), is_relative, note});
   }
 
   void hold_against(const Targets& targets, const Network& network, const std::string& prefix) {
@@ -271,8 +262,8 @@ class Study {
 }  // namespace
 
 void run_feel(const Lab& lab, Section& section) {
-  const auto liver =
-      catalogue::make_measured_liver(lab.is_short() ? kShortTets : catalogue::kDefaultLiverTets);
+  const auto liver = catalogue::make_measured_liver(lab.is_short() ? kFeelShortTets
+                                                                   : catalogue::kDefaultLiverTets);
   TROCAR_ASSERT(liver.ok());
   section.say(fmt::format(
       "A calculated hand (0.15 kg on 400 N/m, with a reflex) presses, palpates by 3 mm to both "
@@ -285,7 +276,7 @@ void run_feel(const Lab& lab, Section& section) {
       "times the way since; and a spring of 1 N/mm to the surface as the server had it, scaled by "
       "delay and speed after Schuwerk et al. 2015.",
       liver->mesh.node_count(), 1e3f * kProbe.radius_m));
-  Study(lab, section, *liver).run();
+  FeelStudy(lab, section, *liver).run();
 }
 
 }  // namespace trocar::validation

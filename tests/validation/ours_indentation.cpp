@@ -15,7 +15,7 @@
 namespace trocar::validation {
 namespace {
 
-constexpr double kYoung_pa = 4000;
+constexpr double kIndentationYoung_pa = 4000;
 constexpr double kRadius_mm = 30, kDepth_mm = 2;        // of the round tool
 constexpr double kPunch_mm = 15, kPunchDepth_mm = 0.5;  // radius of the flat punch
 // The circle of contact, 7.7 mm, is one and a half of the coarser elements. The tool rests on
@@ -26,7 +26,7 @@ constexpr double kTarget = 0.05;
 constexpr double kMeshTarget = 0.05;
 constexpr double kFine_mm = 20, kReach_mm = 400, kGrowth = 1.35;
 
-struct Law {
+struct IndentationLaw {
   const char* name;
   const char* title;
   std::string material;
@@ -42,7 +42,7 @@ Bound bound(Bound target, double on_record) {
   return on_record > 0 ? target.missed(on_record) : target;
 }
 
-std::vector<Law> laws() {
+std::vector<IndentationLaw> indentation_laws() {
   return {{"springs", "springs (nu = 0.25)", "", 0.25, 2e-6, 0, 0, 0.13},
           {"tensor-mass", "tensor-mass, nu = 0.25",
            "elastic_law = \"tensor-mass\"\npoisson_ratio = 0.25\n", 0.25, 2e-6, 0.1, 0.06, 0.13},
@@ -79,12 +79,12 @@ struct Pressed {
   double ours_n, expected_n;
 };
 
-std::string common(const Law& law, const std::string& organ) {
+std::string common(const IndentationLaw& law, const std::string& organ) {
   return organ_source(organ + ".organ") +
-         fmt::format("[material]\nyoung_modulus_pa = {}\n{}\n", kYoung_pa, law.material);
+         fmt::format("[material]\nyoung_modulus_pa = {}\n{}\n", kIndentationYoung_pa, law.material);
 }
 
-std::string static_in(const Law& law, int load_steps) {
+std::string static_in(const IndentationLaw& law, int load_steps) {
   return fmt::format(
       "[run]\nmode = \"static\"\nseconds = 1\nload_steps = {}\nover_relaxation = 1.8\n"
       "tolerance_n = {}\nmax_sweeps = 10000\n\n",
@@ -92,12 +92,12 @@ std::string static_in(const Law& law, int load_steps) {
 }
 
 // Hertz: F = 4/3 E / (1 - nu^2) sqrt(R) d^(3/2).
-double hertz(const Law& law, double depth_m) {
-  return 4.0 / 3 * kYoung_pa / (1 - law.poisson * law.poisson) * std::sqrt(kRadius_mm * 1e-3) *
-         depth_m * std::sqrt(depth_m);
+double hertz(const IndentationLaw& law, double depth_m) {
+  return 4.0 / 3 * kIndentationYoung_pa / (1 - law.poisson * law.poisson) *
+         std::sqrt(kRadius_mm * 1e-3) * depth_m * std::sqrt(depth_m);
 }
 
-std::optional<Pressed> press_round(const Lab& lab, Section& section, const Law& law,
+std::optional<Pressed> press_round(const Lab& lab, Section& section, const IndentationLaw& law,
                                    const std::string& organ, double top_mm, plot::Series& curve) {
   const auto run = lab.try_start(
       section, std::string("round tool, ") + law.title, fmt::format("hertz-{}-{}", law.name, organ),
@@ -114,7 +114,7 @@ std::optional<Pressed> press_round(const Lab& lab, Section& section, const Law& 
 }
 
 // Bonded rigid punch on a half-space: F = 4 mu a d ln(3 - 4 nu) / (1 - 2 nu) (Spence 1968).
-std::optional<Pressed> press_flat(const Lab& lab, Section& section, const Law& law,
+std::optional<Pressed> press_flat(const Lab& lab, Section& section, const IndentationLaw& law,
                                   const std::string& organ, double top_mm, double h_mm) {
   const auto run = lab.try_start(
       section, std::string("flat punch, ") + law.title, fmt::format("punch-{}-{}", law.name, organ),
@@ -133,12 +133,12 @@ std::optional<Pressed> press_flat(const Lab& lab, Section& section, const Law& l
     nodes += length(p) <= kPunch_mm + 1e-3 ? 1 : 0;
   }
   const double radius_m = std::sqrt(nodes * h_mm * h_mm / std::numbers::pi) * 1e-3;
-  const double mu = kYoung_pa / (2 * (1 + law.poisson));
+  const double mu = kIndentationYoung_pa / (2 * (1 + law.poisson));
   return Pressed{-run->probe(0).y, 4 * mu * radius_m * kPunchDepth_mm * 1e-3 *
                                        std::log(3 - 4 * law.poisson) / (1 - 2 * law.poisson)};
 }
 
-std::vector<std::string> row(const Law& law, const char* tool_name, double h_mm,
+std::vector<std::string> row(const IndentationLaw& law, const char* tool_name, double h_mm,
                              const Pressed& pressed) {
   return {law.title,
           tool_name,
@@ -183,7 +183,7 @@ void run_indentation(const Lab& lab, Section& section) {
     tops_mm.push_back(top * 1e3);
     lab.keep_organ(name_of(h_mm), organ);
   }
-  for (const auto& law : laws()) {
+  for (const auto& law : indentation_laws()) {
     std::optional<Pressed> round, flat;
     double coarser_n = 0;
     for (std::size_t i = 0; i < sizes.size(); ++i) {

@@ -89,9 +89,9 @@ double rank_correlation(const std::vector<double>& a, const std::vector<double>&
   return ab / aa;
 }
 
-class Study {
+class EstimateStudy {
  public:
-  Study(const Lab& lab, Section& section, const LiveLiver& liver, std::string& csv)
+  EstimateStudy(const Lab& lab, Section& section, const LiveLiver& liver, std::string& csv)
       : section_(section), liver_(liver), is_short_(lab.is_short()), csv_(csv) {
     // The reduction claims the largest force that there is as its training force, which nothing
     // else reads.
@@ -302,7 +302,7 @@ void run_live_reduction_estimate(const Lab& lab, Section& section) {
       "liver,press,patch,node,off_centre_mm,depth_mm,slant,azimuth_deg,speed_mm_s,tick,"
       "converged_force_n,force_n,largest_node_force_n,is_within_force_limit,estimate,force_error,"
       "l2_error,full_force_error\n";
-  for (const auto& liver : live_livers(lab)) Study(lab, section, *liver, csv).run();
+  for (const auto& liver : live_livers(lab)) EstimateStudy(lab, section, *liver, csv).run();
   lab.keep_file("live-estimate.csv", csv);
 }
 

@@ -15,7 +15,7 @@
 namespace trocar::validation {
 namespace {
 
-constexpr double kTarget = 0.02;
+constexpr double kHandOverTarget = 0.02;
 // Ticks from one switch to the next.
 constexpr Tick kShortest = 4, kSpread = 25;
 constexpr int kMostRounds = 12;
@@ -29,7 +29,7 @@ constexpr std::size_t kLeastShakes = kShakenTicks / kShakenInterval * 4 / 5;
 constexpr std::array<float, 2> kBladeAway_m{0.018f, 0.045f};
 
 enum class Kind { Off, On, Patch, Cut, Other };
-const char* name_of(Kind kind) {
+const char* hand_over_name_of(Kind kind) {
   switch (kind) {
     case Kind::Off:
       return "switched off";
@@ -57,9 +57,9 @@ struct Jumps {
   std::vector<double> at, without;  // where it is handed over; there, without a hand-over
 };
 
-class Study {
+class HandOverStudy {
  public:
-  Study(const Lab& lab, Section& section, const LiveLiver& liver)
+  HandOverStudy(const Lab& lab, Section& section, const LiveLiver& liver)
       : section_(section),
         liver_(liver),
         is_short_(lab.is_short()),
@@ -201,7 +201,7 @@ class Study {
 
   static double share_above(const std::vector<double>& jumps) {
     return static_cast<double>(
-               std::ranges::count_if(jumps, [](double jump) { return jump > kTarget; })) /
+               std::ranges::count_if(jumps, [](double jump) { return jump > kHandOverTarget; })) /
            static_cast<double>(jumps.size());
   }
 
@@ -217,8 +217,8 @@ class Study {
     plot.y = {"jump, % of the force", true, {}, {}};
     std::array<std::vector<double>, 2> at, without;
     for (const auto& [key, jumps] : jumps_) {
-      std::vector<std::string> row{key.first ? "cuts" : "presses and slides", name_of(key.second),
-                                   std::to_string(jumps.at.size())};
+      std::vector<std::string> row{key.first ? "cuts" : "presses and slides",
+                                   hand_over_name_of(key.second), std::to_string(jumps.at.size())};
       for (const auto* values : {&jumps.at, &jumps.without}) {
         for (const double share : {0.5, 0.95, 0.99, 1.0})
           row.push_back(shown_percent(quantile(*values, share)));
@@ -258,15 +258,15 @@ class Study {
     section_.at_least(name("count"), std::to_string(wanted_), static_cast<double>(at[0].size()),
                       target(static_cast<double>(wanted_), "enough for a 99th percentile"),
                       "Hand-overs in presses and slides.");
-    section_.at_most(name("jump"), shown_percent(kTarget), quantile(at[0], 0.99),
-                     target(kTarget, "a hand does not feel it"),
+    section_.at_most(name("jump"), shown_percent(kHandOverTarget), quantile(at[0], 0.99),
+                     target(kHandOverTarget, "a hand does not feel it"),
                      "Jump of the force, 99th percentile, presses and slides.");
     section_.at_least(
         name("cuts"), "one per session", static_cast<double>(cuts_),
         target(0.5 * static_cast<double>(cut_sessions_), "enough for a 95th percentile"),
         "Hand-overs because tissue was cut.");
-    section_.at_most(name("jump-cut"), shown_percent(kTarget), quantile(at[1], 0.95),
-                     target(kTarget, "a hand does not feel it"),
+    section_.at_most(name("jump-cut"), shown_percent(kHandOverTarget), quantile(at[1], 0.95),
+                     target(kHandOverTarget, "a hand does not feel it"),
                      "Jump of the force, 95th percentile, sessions with a cut.");
     section_.at_least(name("shaken-count"), std::to_string(kShakenTicks / kShakenInterval),
                       static_cast<double>(shaken_count_),
@@ -303,8 +303,8 @@ void run_live_reduction_hand_over(const Lab& lab, Section& section) {
       "throughout. "
       "Target: at most {}.",
       kShortest, kShortest + kSpread - 1, 1e3f * kBladeAway_m[0], 1e3f * kBladeAway_m[1],
-      1e3f * kBladeWay_m, live_training_text(lab), shown_percent(kTarget)));
-  for (const auto& liver : live_livers(lab)) Study(lab, section, *liver).run();
+      1e3f * kBladeWay_m, live_training_text(lab), shown_percent(kHandOverTarget)));
+  for (const auto& liver : live_livers(lab)) HandOverStudy(lab, section, *liver).run();
 }
 
 }  // namespace trocar::validation

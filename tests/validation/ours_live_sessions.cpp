@@ -16,14 +16,14 @@ namespace {
 constexpr double kTargetForce = 0.03;
 constexpr Tick kFieldTicks = 8;
 
-struct Errors {
+struct SessionsErrors {
   std::vector<double> force, field, after;  // in contact; once nothing touches any more
   std::vector<double> us;
 };
 
-class Study {
+class SessionsStudy {
  public:
-  Study(const Lab& lab, Section& section, const LiveLiver& liver)
+  SessionsStudy(const Lab& lab, Section& section, const LiveLiver& liver)
       : section_(section), liver_(liver), is_short_(lab.is_short()) {}
 
   void run() {
@@ -89,7 +89,7 @@ class Study {
   }
 
   // Until it was lost.
-  void add_errors(const Course& course, const Course& reference, Errors& errors) {
+  void add_errors(const Course& course, const Course& reference, SessionsErrors& errors) {
     const double least = kLeastShare * reference.largest_force_n();
     double largest = 0;
     std::size_t end = 0;
@@ -177,7 +177,7 @@ class Study {
   Section& section_;
   const LiveLiver& liver_;
   const bool is_short_;
-  std::array<std::array<Errors, 2>, kWays> errors_;  // [way][is trained]
+  std::array<std::array<SessionsErrors, 2>, kWays> errors_;  // [way][is trained]
   std::map<std::pair<bool, wire::SolverReason>, std::size_t> reasons_;
   std::array<std::size_t, kWays> lost_{};
   std::size_t measured_ = 0, missed_ = 0;
@@ -186,7 +186,7 @@ class Study {
   Table sessions_;
 };
 
-void Study::check() {
+void SessionsStudy::check() {
   const auto name = [&](const char* what) { return fmt::format("{}-{}", liver_.name(), what); };
   references_.check(section_, name("reference"),
                     target(kTargetForce / 5, "a fifth of what the reference judges"));
@@ -213,7 +213,7 @@ void run_live_reduction_sessions(const Lab& lab, Section& section) {
       "largest "
       "force; forces as vectors. Each session ran alone, thread CPU time. Target: {} of the force.",
       live_training_text(lab), 100 * kLeastShare, shown_percent(kTargetForce)));
-  for (const auto& liver : live_livers(lab)) Study(lab, section, *liver).run();
+  for (const auto& liver : live_livers(lab)) SessionsStudy(lab, section, *liver).run();
 }
 
 }  // namespace trocar::validation

@@ -18,7 +18,7 @@
 namespace trocar::validation {
 namespace {
 
-constexpr Tick kFieldTicks = 10;
+constexpr Tick kSizesFieldTicks = 10;
 // Above this the converged session takes longer than it is worth.
 constexpr std::size_t kMostReferenceNodes = 60'000;
 
@@ -62,9 +62,9 @@ struct Found {
   double nodes = 0, full_us = 0, reduced_us = 0;
 };
 
-class Study {
+class SizesStudy {
  public:
-  Study(const Lab& lab, Section& section) : section_(section), is_short_(lab.is_short()) {}
+  SizesStudy(const Lab& lab, Section& section) : section_(section), is_short_(lab.is_short()) {}
 
   void run() {
     for (std::size_t i = 0; i < (is_short_ ? kShortSizes : kSizes.size()); ++i) measure(kSizes[i]);
@@ -86,14 +86,14 @@ class Study {
     stroke.hold_ticks = is_short_ ? 100 : 200;
     const auto script = script_of(stroke);
     show_progress(name + ": sessions");
-    const auto reduced = run_session(organ, made.local, script, kFieldTicks),
-               full = run_session(organ, nullptr, script, kFieldTicks);
+    const auto reduced = run_session(organ, made.local, script, kSizesFieldTicks),
+               full = run_session(organ, nullptr, script, kSizesFieldTicks);
     Course reference;
     References references;
     const bool has_reference = nodes <= kMostReferenceNodes;
     if (has_reference) {
       show_progress(name + ": converged session");
-      reference = references.run(organ, script, kFieldTicks);
+      reference = references.run(organ, script, kSizesFieldTicks);
     }
     std::vector<double> reduced_us, full_us;
     std::array<std::vector<double>, 2> force, field;
@@ -108,8 +108,8 @@ class Study {
       if (!has_reference) continue;
       force[0].push_back(force_error(reduced, reference, i));
       force[1].push_back(force_error(full, reference, i));
-      if ((i + 1) % kFieldTicks != 0) continue;
-      const auto f = (i + 1) / kFieldTicks - 1;
+      if ((i + 1) % kSizesFieldTicks != 0) continue;
+      const auto f = (i + 1) / kSizesFieldTicks - 1;
       field[0].push_back(field_error(reduced, reference, f));
       field[1].push_back(field_error(full, reference, f));
     }
@@ -207,7 +207,7 @@ void run_live_reduction_sizes(const Lab& lab, Section& section) {
       "above {} nodes. Patches of finer meshes are smaller, so that their fields are few enough, "
       "and are trained by fewer presses; the file is of that one patch with its Green's functions.",
       kMostReferenceNodes));
-  Study(lab, section).run();
+  SizesStudy(lab, section).run();
 }
 
 }  // namespace trocar::validation

@@ -30,7 +30,7 @@ constexpr std::size_t kDoganModes = 8;
 // Two free layers, and one: nearer, and faster.
 constexpr std::array<std::uint32_t, 2> kFreeLayers{2, 1};
 
-LocalSettings settings_of(const Lab& lab) {
+LocalSettings local_settings_of(const Lab& lab) {
   LocalSettings settings{.patches = 10, .threads = 2};
   if (lab.is_short())
     settings.modes = 16, settings.directions = 2, settings.field_nodes = 5, settings.patches = 2,
@@ -38,10 +38,13 @@ LocalSettings settings_of(const Lab& lab) {
   return settings;
 }
 
-class Study {
+class LocalStudy {
  public:
-  Study(const Lab& lab, Section& section, const MeasuredLiver& liver)
-      : section_(section), liver_(liver), is_short_(lab.is_short()), settings_(settings_of(lab)) {
+  LocalStudy(const Lab& lab, Section& section, const MeasuredLiver& liver)
+      : section_(section),
+        liver_(liver),
+        is_short_(lab.is_short()),
+        settings_(local_settings_of(lab)) {
     auto model = FullModel::create(liver.organ);
     TROCAR_ASSERT(model.ok());
     model_ = std::move(*model);
@@ -185,7 +188,7 @@ class Study {
 }  // namespace
 
 void run_local_reduction(const Lab& lab, Section& section) {
-  const auto settings = settings_of(lab);
+  const auto settings = local_settings_of(lab);
   section.say(fmt::format(
       "Patches of {} mm beside each other, {} of them, each with {} modes, the fields of unit "
       "forces "
@@ -201,7 +204,7 @@ void run_local_reduction(const Lab& lab, Section& section) {
       "modes are of presses of single nodes all over the organ.",
       1e3 * settings.patch_radius_m, settings.patches, settings.modes, settings.directions,
       settings.force_n));
-  for (const auto& liver : measured_livers(lab)) Study(lab, section, liver).run();
+  for (const auto& liver : measured_livers(lab)) LocalStudy(lab, section, liver).run();
 }
 
 }  // namespace trocar::validation

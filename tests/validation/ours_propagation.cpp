@@ -55,14 +55,14 @@ std::string press_scene(const Press& press, const std::string& run) {
          "\n[[probe]]\ntool = 0\nquantity = \"force\"\n";
 }
 
-struct Course {
+struct PropagationCourse {
   std::vector<Vec3d> forces_n;          // per tick
   Field held, released;                 // at the end of the hold, and at the end
   double active = 0, milliseconds = 0;  // means per tick
 };
 
-Course update(const Lab& lab, Section& section, ScenarioRun& run) {
-  Course course;
+PropagationCourse update_propagation(const Lab& lab, Section& section, ScenarioRun& run) {
+  PropagationCourse course;
   const auto begin = thread_cpu_ns();
   lab.finish(section, run, [&](const scenario::StepReport& report) {
     course.forces_n.push_back(run.probe(0));
@@ -76,14 +76,15 @@ Course update(const Lab& lab, Section& section, ScenarioRun& run) {
   return course;
 }
 
-struct Errors {
+struct PropagationErrors {
   double mean = 0, peak = 0;  // of the contact force: over its mean, over its largest
   double field = 0;           // at the end of the hold
   double after_mm = 0;        // largest difference of any node a fifth of a second after release
 };
 
-Errors compare(const Course& course, const Course& reference) {
-  Errors errors;
+PropagationErrors compare_propagation(const PropagationCourse& course,
+                                      const PropagationCourse& reference) {
+  PropagationErrors errors;
   double sum = 0, reference_sum = 0, most = 0, largest_force = 0;
   for (std::size_t i = 0; i < reference.forces_n.size(); ++i) {
     const double difference = length(course.forces_n[i] - reference.forces_n[i]);
@@ -99,13 +100,13 @@ Errors compare(const Course& course, const Course& reference) {
   return errors;
 }
 
-struct Study {
+struct PropagationStudy {
   plot::Plot forces, errors;
   Table table;
 };
 
-void add_row(Study& study, const std::string& mode, const std::string& limit, const Course& course,
-             const Errors& errors) {
+void propagation_add_row(PropagationStudy& study, const std::string& mode, const std::string& limit,
+                         const PropagationCourse& course, const PropagationErrors& errors) {
   study.table.rows.push_back({mode, limit, fmt::format("{:.0f}", course.active),
                               shown_percent(errors.mean), shown_percent(errors.peak),
                               shown_percent(errors.field), fmt::format("{:.3g}", errors.after_mm),
@@ -113,8 +114,9 @@ void add_row(Study& study, const std::string& mode, const std::string& limit, co
 }
 
 // One mode over several limits; false if the solver has not got it.
-bool sweep_limits(const Lab& lab, Section& section, const Press& press, const Course& reference,
-                  const std::string& mode, Study& study, Errors& at_default) {
+bool sweep_limits(const Lab& lab, Section& section, const Press& press,
+                  const PropagationCourse& reference, const std::string& mode,
+                  PropagationStudy& study, PropagationErrors& at_default) {
   plot::Series mean{mode + ": contact force, mean", {}, {}, plot::Style::LineAndPoints, {}},
       field{mode + ": field at the hold", {}, {}, plot::Style::LineAndPoints, {}};
   const std::vector<int> limits = lab.is_short()
@@ -125,8 +127,8 @@ bool sweep_limits(const Lab& lab, Section& section, const Press& press, const Co
         section, mode, fmt::format("{}-{}-{}", mode, press.organ, nodes),
         press_scene(press, fmt::format("boundary = \"{}\"\nnodes = {}\n", mode, nodes)));
     if (!run) return false;
-    const Course course = update(lab, section, *run);
-    const Errors errors = compare(course, reference);
+    const PropagationCourse course = update_propagation(lab, section, *run);
+    const PropagationErrors errors = compare_propagation(course, reference);
     if (nodes == kDefaultNodes) {
       at_default = errors;
       study.forces.series.push_back(force_curve(fmt::format("{}, {} nodes", mode, nodes),
@@ -135,7 +137,7 @@ bool sweep_limits(const Lab& lab, Section& section, const Press& press, const Co
     for (auto* series : {&mean, &field}) series->x.push_back(nodes);
     mean.y.push_back(100 * errors.mean);
     field.y.push_back(100 * errors.field);
-    add_row(study, mode, std::to_string(nodes), course, errors);
+    propagation_add_row(study, mode, std::to_string(nodes), course, errors);
   }
   study.errors.series.push_back(mean);
   study.errors.series.push_back(field);
@@ -146,9 +148,9 @@ void study_press(const Lab& lab, Section& section, const Press& press) {
   const auto full =
       lab.start(section, "full", fmt::format("full-{}", press.organ),
                 press_scene(press, "tolerance_n = 1e-6\nmax_sweeps = 2000\n"), Solver::Full);
-  const Course reference = update(lab, section, *full);
+  const PropagationCourse reference = update_propagation(lab, section, *full);
   const std::string title = fmt::format("{} ({} nodes)", press.organ, full->world().node_count());
-  Study study{
+  PropagationStudy study{
       {.title = title + ": contact force", .x = {"time, s"}, .y = {"force, N"}, .series = {}},
       {.title = title + ": error against the full solve",
        .x = {"limit of nodes", true},
@@ -161,14 +163,14 @@ void study_press(const Lab& lab, Section& section, const Press& press) {
 
   const auto whole = lab.start(section, "whole", fmt::format("whole-{}", press.organ),
                                press_scene(press, "boundary = \"whole\"\n"));
-  const Course live = update(lab, section, *whole);
-  const Errors live_errors = compare(live, reference);
-  add_row(study, "whole", "all", live, live_errors);
+  const PropagationCourse live = update_propagation(lab, section, *whole);
+  const PropagationErrors live_errors = compare_propagation(live, reference);
+  propagation_add_row(study, "whole", "all", live, live_errors);
   section.at_most(fmt::format("{}-whole", press.organ), "full solve", live_errors.mean,
                   target(press.whole_mean, "1 % of the converged force"),
                   "Every node, four sweeps per tick: mean error of the contact force.");
 
-  Errors frozen, graded;
+  PropagationErrors frozen, graded;
   sweep_limits(lab, section, press, reference, "frozen", study, frozen);
   section.at_most(fmt::format("{}-frozen", press.organ), "full solve", frozen.mean,
                   press.frozen_bound(),
