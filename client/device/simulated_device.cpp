@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::uint64_t kStepUs = 1000, kMostStepsAtOnce = 1000;
 constexpr int kPartsOfStep = 10;
-constexpr double kStepS = 1e-3, kQuantumM = 20e-6, kHandForceN = 8, kHandReachM = 0.15;
+constexpr double kStepS = 1e-3, kHandForceN = 8, kHandReachM = 0.15;
 
 }  // namespace
 
@@ -54,7 +54,9 @@ void SimulatedDevice::advance() {
 
 Result<DeviceReading> SimulatedDevice::read() {
   advance();
-  const auto rounded = [](double metres) { return std::round(metres / kQuantumM) * kQuantumM; };
+  const auto rounded = [quantum_m = model_.encoder_m](double metres) {
+    return std::round(metres / quantum_m) * quantum_m;
+  };
   DeviceReading reading;
   reading.position_m = {rounded(position_m_.x), rounded(position_m_.y), rounded(position_m_.z)};
   reading.velocity_m_s = velocity_m_s_;

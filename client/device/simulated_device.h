@@ -8,8 +8,7 @@
 //
 // Steps of 1 ms are counted from the clock's first value: the same clock values and forces give the
 // same readings. Each reading costs some 10 flops for each 0.1 ms since the one before. A jump of
-// the clock by more than a second puts the hand where it wants to be. Positions are rounded to
-// 20 micrometres, as encoders do.
+// the clock by more than a second puts the hand where it wants to be.
 
 #include <array>
 #include <functional>
@@ -24,6 +23,7 @@ struct HandModel {
   double mass_kg = 0.15;
   double stiffness_n_m = 400, damping_n_s_m = 4.5;
   double reflex_n_m = 80;
+  double encoder_m = 20e-6;  // Positions are rounded to it, as the device's encoders do.
 };
 
 class SimulatedDevice final : public HapticDevice {

@@ -40,6 +40,7 @@ std::optional<PastState> PastStates::at(std::uint64_t time_us) const {
   state.response.elastic_n = between(state.response.elastic_n, next.response.elastic_n, share);
   state.response.normal_n = between(state.response.normal_n, next.response.normal_n, share);
   state.response.rest_n = between(state.response.rest_n, next.response.rest_n, share);
+  state.response.sides_n = between(state.response.sides_n, next.response.sides_n, share);
   state.response.stiffness_n_m =
       between(state.response.stiffness_n_m, next.response.stiffness_n_m, share);
   return state;

@@ -20,6 +20,7 @@ struct Response {
   double normal_n = 0;
   double elastic_n = 0;      // likewise if nothing relaxed; 0: above the surface
   Vec3d rest_n;              // across the normal; of held tissue all of it
+  Vec3d sides_n;             // friction at a blade's sides, which the server has said: never scaled
   double stiffness_n_m = 0;  // elastic, before anything relaxes
 };
 

@@ -35,7 +35,8 @@ Vec3d TouchModel::model_force(const Response& response) const {
 }
 
 Vec3d TouchModel::scaled_force(const Response& response, double slope, const Vec3d& lean) const {
-  return model_force(response) * slope + across(lean, normal_) * response.normal_n;
+  return model_force(response) * slope + across(lean, normal_) * response.normal_n +
+         response.sides_n;
 }
 
 double TouchModel::depth_of(const Vec3d& core_m, double clearance_m) const {
@@ -67,7 +68,8 @@ void TouchModel::answer(PastState& state, double dt_s) {
     // The edge goes up along the shaft.
     const double slant = std::max(kMostSlant, dot(state.axis, normal_));
     const double length_m = std::min(state.depth_m / slant, static_cast<double>(shape_.edge_m));
-    state.response = blade_.step(state.tip_m, state.axis, length_m, dt_s);
+    state.response =
+        blade_.step(state.tip_m, state.axis, length_m, side_friction_n_m_ * length_m, dt_s);
   } else {
     state.response = push_.step(power_law_, steps_, state.depth_m, state.core_m, normal_,
                                 static_cast<double>(patch_.friction));

@@ -127,6 +127,7 @@ class TouchModel {
   void restart(std::size_t first);
   void correct(const PastState& then, bool is_new_structure);
   double blade_slope(const Response& response) const;
+  void take_side_friction(const Response& then);
   void correct_blade(const PastState& then);
   void take_lever();
   Response with_moved_reference(const PastState& then) const;
@@ -162,6 +163,7 @@ class TouchModel {
   double gate_force_n_ = 0.02;              // at the echo
   double pressed_limit_n_ = kNoLimit_n;     // along the normal
   Vec3d lever_m_, next_lever_m_;            // torque over the size of the force
+  double side_friction_n_m_ = 0;            // of a blade, per length of its edge in tissue
   double answer_s_ = 0;
 
   LocalStop stop_;

@@ -193,6 +193,7 @@ void TouchModel::restart(std::size_t first) {
   if (cuts()) {
     fit_.set_slope(blade_slope(then_state.response));
     slope_ = fit_.slope();
+    take_side_friction(then_state.response);
   }
   const Response& then = then_state.response;
   next_correction_n_ = {};
@@ -219,15 +220,23 @@ Response TouchModel::with_moved_reference(const PastState& then) const {
   return response;
 }
 
-// By how much the server's blade is held back more; that of before where the local one is not.
+// By how much more the server's blade would be held back if both went on; that of before where the
+// local one is not in tissue. What the server's force is now would say less: it falls where a hand
+// stops or turns, and friction is in it.
 double TouchModel::blade_slope(const Response& response) const {
-  const Vec3d server_n = trocar::to_double(patch_.force_n);
-  if (length(response.rest_n) < kLeastBladeForce_n) return fit_.slope();
-  return std::clamp(dot(server_n, response.rest_n) / length_squared(response.rest_n), 0.0,
+  if (response.elastic_n < kLeastBladeForce_n) return fit_.slope();
+  return std::clamp(static_cast<double>(patch_.cut_force_n) / response.elastic_n, 0.0,
                     kMostBladeSlope);
 }
 
+void TouchModel::take_side_friction(const Response& then) {
+  if (then.elastic_n < kLeastBladeForce_n) return;
+  const double length_m = then.elastic_n / BladeElement::kEnergy_j_m2;
+  side_friction_n_m_ = static_cast<double>(patch_.side_friction_n) / length_m;
+}
+
 void TouchModel::correct_blade(const PastState& then) {
+  take_side_friction(then.response);
   const double dt_s =
       patch_.echo_time_us > last_echo_us_
           ? std::min(static_cast<double>(patch_.echo_time_us - last_echo_us_) * 1e-6,

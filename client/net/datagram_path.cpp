@@ -25,7 +25,15 @@ constexpr milliseconds kFreshness = 150ms;
 constexpr milliseconds kSampleGap = 12ms;
 constexpr milliseconds kKeepAlive = 100ms;
 constexpr std::size_t kRepeated = 3;
+// The pose of a hand that feels is repeated so long. A hand at rest so sends one pose, not three.
+constexpr std::uint64_t kRepeatedUs = 10'000;
 constexpr int kReceiveBufferBytes = 512 * 1024;
+
+// The server may have missed that the verb has changed since.
+bool is_worth_repeating(const proto::ToolSample& sample, const proto::ToolSample& newest) {
+  return sample.verb() != newest.verb() ||
+         sample.client_time_us() + kRepeatedUs >= newest.client_time_us();
+}
 
 }  // namespace
 
@@ -175,7 +183,8 @@ void DatagramPath::send() {
   proto::Envelope envelope;
   auto& datagram = *envelope.mutable_client_datagram();
   for (const auto& last : samples_)
-    for (const auto& sample : last) *datagram.add_sample() = sample;
+    for (const auto& sample : last)
+      if (is_worth_repeating(sample, last.back())) *datagram.add_sample() = sample;
   if (has_ack_) *datagram.mutable_ack() = ack_;
   datagram.set_datagrams_received(received_);
   const auto bytes = envelope.SerializeAsString();

@@ -88,6 +88,7 @@ void write(const HapticPatch& patch, proto::HapticPatch& message) {
   if (patch.kind == TouchKind::Grip) write(patch.grip_point_m, *message.mutable_grip_point_m());
   message.set_grip_limit_n(patch.grip_limit_n);
   message.set_cut_force_n(patch.cut_force_n);
+  message.set_side_friction_n(patch.side_friction_n);
   message.set_law(patch.law);
 }
 
@@ -134,10 +135,12 @@ Result<HapticPatch> read(const proto::HapticPatch& message) {
   patch.pressed_limit_n = message.pressed_limit_n();
   patch.grip_limit_n = message.grip_limit_n();
   patch.cut_force_n = message.cut_force_n();
+  patch.side_friction_n = message.side_friction_n();
   if (!is_between(patch.friction, 0, 10)) return fails("friction", "is not between 0 and 10");
   if (!is_between(patch.pressed_limit_n, 0, kMaxHapticForceN) ||
       !is_between(patch.grip_limit_n, 0, kMaxHapticForceN) ||
-      !is_between(patch.cut_force_n, 0, kMaxHapticForceN))
+      !is_between(patch.cut_force_n, 0, kMaxHapticForceN) ||
+      !is_between(patch.side_friction_n, 0, kMaxHapticForceN))
     return fails("limit", "is negative or over 1000 N");
   patch.law = message.law();
   return patch;

@@ -39,7 +39,10 @@ struct HapticPatch {
   float pressed_limit_n = 0;  // 0: there is no limit
   Vec3f grip_point_m;         // where the held tissue would be without this tool
   float grip_limit_n = 0;     // 0: the jaws hold it
-  float cut_force_n = 0;      // 0: it does not cut
+  // Cutting holds a blade that goes on back with it, whether it goes on now or not; 0: it does not
+  // cut.
+  float cut_force_n = 0;
+  float side_friction_n = 0;  // the most that holds a blade by its sides
   std::uint32_t law = 0;      // the number of its HapticLaw
 };
 

@@ -192,26 +192,62 @@ TEST(GripElement, ANewStiffnessChangesNoForceThatIsThere) {
   EXPECT_NEAR(grip.step(steps, {0.003, 0, 0}, {}).rest_n.x, -0.2, 1e-9);
 }
 
+constexpr Vec3d kUp{0, 0, 1};
+
 TEST(BladeElement, IsHeldBackAgainstItsWayByTheEdgeInTissue) {
-  constexpr Vec3d kUp{0, 0, 1};
-  constexpr double kStep_s = 0.001;
   BladeElement blade;
   blade.start({});
   Vec3d tip_m;
   const auto move = [&](const Vec3d& way_m, int steps, double length_m) {
     Response response;
     for (int k = 0; k < steps; ++k)
-      response = blade.step(tip_m += way_m / steps, kUp, length_m, kStep_s);
+      response = blade.step(tip_m += way_m / steps, kUp, length_m, 0, kDt_s);
     return response.rest_n;
   };
   EXPECT_EQ(move({0, 0, -0.01}, 100, 0.01), Vec3d{}) << "along its edge it cuts nothing";
   const Vec3d there_n = move({0.02, 0, 0}, 1000, 0.01);
   EXPECT_NEAR(there_n.x, -BladeElement::kEnergy_j_m2 * 0.01, 2e-3);
-  EXPECT_EQ(there_n.z, 0);
+  EXPECT_NEAR(there_n.z, 0, 1e-12);
   EXPECT_NEAR(move({0.0001, 0, 0}, 5, 0.005).x, there_n.x / 2, 2e-3) << "half of it is in tissue";
   EXPECT_GT(move({-0.01, 0, 0}, 500, 0.01).x, 0.9) << "it turns back";
   EXPECT_NEAR(length(move({}, 1000, 0.01)), 0, 1e-3) << "it stands";
   EXPECT_EQ(move({0.01, 0, 0}, 500, -0.01), Vec3d{}) << "it is out";
+}
+
+TEST(BladeElement, StepsOfAnEncoderAreNoRests) {
+  const auto felt_n = [](double step_m) {
+    BladeElement blade;
+    blade.start({});
+    Response response;
+    for (int k = 1; k <= 4000; ++k)  // at 5 mm/s
+      response = blade.step({std::round(5e-6 * k / step_m) * step_m, 0, 0}, kUp, 0.01, 0, kDt_s);
+    return -response.rest_n.x;
+  };
+  EXPECT_NEAR(felt_n(20e-6), felt_n(1e-9), 0.01 * felt_n(1e-9));
+}
+
+TEST(BladeElement, ItsSidesAreHeldUntilFrictionGivesWay) {
+  constexpr double kFriction_n = 0.2;
+  BladeElement blade;
+  blade.start({});
+  const auto sides_n = [&](double height_m) {
+    return blade.step({0, 0, height_m}, kUp, 0.01, kFriction_n, kDt_s).sides_n.z;
+  };
+  EXPECT_NEAR(sides_n(-2e-5), BladeElement::kSides_n_m * 2e-5, 1e-12) << "it sticks";
+  double work_j = 0, last_m = -2e-5;
+  const auto go_to = [&](double height_m) {
+    for (int k = 1; k <= 100; ++k) {
+      const double next_m = last_m + (height_m - last_m) / (101 - k);
+      work_j += sides_n(next_m) * (next_m - last_m);
+      last_m = next_m;
+    }
+  };
+  go_to(-0.005);
+  EXPECT_NEAR(sides_n(-0.005), kFriction_n, 1e-12);
+  go_to(0);
+  EXPECT_NEAR(sides_n(0), -kFriction_n, 1e-12);
+  EXPECT_LT(work_j, -0.9 * kFriction_n * 0.0095) << "it takes work both ways";
+  EXPECT_EQ(blade.step({0, 0, 0.001}, kUp, -0.001, 0, kDt_s).sides_n, Vec3d{}) << "it is out";
 }
 
 }  // namespace

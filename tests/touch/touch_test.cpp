@@ -205,6 +205,28 @@ TEST_F(TouchTest, AGraspIsAnotherThing) {
   EXPECT_GT(patch_.grip_limit_n, 0);
 }
 
+// A blade goes 8 mm in and 20 mm along. The server says what holds it back, and that is felt; the
+// surface stays the one that the blade has come through, not a face of the wound.
+TEST_F(TouchTest, ABladeIsToldWhatHoldsItBack) {
+  shape_ = {.radius_m = 0.001f, .length_m = 0.3f, .half_width_m = 0.001f, .edge_m = 0.03f};
+  for (int i = 0; i < 500; ++i)
+    tick(std::min(0.008f, 0.00003f * static_cast<float>(i - 100)), tool::Verb::Cut);
+  for (int i = 0; i < 500; ++i) tick(0.008f, tool::Verb::Cut);
+  ASSERT_EQ(patch_.kind, TouchKind::Cut);
+  EXPECT_GT(patch_.side_friction_n, 0.02f);
+  const float standing_n = patch_.cut_force_n;
+  EXPECT_LT(length(patch_.force_n), patch_.side_friction_n * 1.001f) << "it stands";
+  for (int i = 1; i <= 800; ++i) {
+    tick(0.008f, tool::Verb::Cut, {0.000025f * static_cast<float>(i), 0, 0});
+    if (i < 400 || !publishes_frame(simulation_.current_tick())) continue;
+    EXPECT_NEAR(length(patch_.force_n), patch_.cut_force_n, 0.3f * patch_.cut_force_n) << i;
+    EXPECT_GT(patch_.plane_normal.z, 0.7f) << i;
+  }
+  std::printf("%.2f N where it stands, %.2f N where it goes, %.2f N at its sides\n", standing_n,
+              patch_.cut_force_n, patch_.side_friction_n);
+  EXPECT_NEAR(standing_n, patch_.cut_force_n, 0.4f * patch_.cut_force_n);
+}
+
 TEST_F(TouchTest, WithoutAClockNothingIsDescribed) {
   hands::TickInputs inputs;
   hands::HandJoin join{.slot = {0}};

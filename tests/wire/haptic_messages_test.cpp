@@ -29,6 +29,7 @@ HapticPatch patch() {
   patch.grip_point_m = {0.01f, 0, 0.02f};
   patch.grip_limit_n = 2;
   patch.cut_force_n = 0.5f;
+  patch.side_friction_n = 0.25f;
   patch.law = 2;
   return patch;
 }
@@ -47,6 +48,7 @@ TEST(HapticMessages, APatchIsReadAsItWasWritten) {
   EXPECT_EQ(again.SerializeAsString(), message().SerializeAsString());
   EXPECT_EQ(read_patch->stiffness_n_m.xy, 1);
   EXPECT_EQ(read_patch->stiffness_n_m.zz, 120);
+  EXPECT_EQ(read_patch->side_friction_n, 0.25f);
   EXPECT_EQ(read_patch->kind, TouchKind::Grip);
 }
 
@@ -81,6 +83,8 @@ TEST(HapticMessages, APatchOutOfItsLimitsIsRefusedByName) {
   EXPECT_EQ(refusal([](auto& m) { m.set_friction(-1); }),
             "HapticPatch.friction: is not between 0 and 10");
   EXPECT_EQ(refusal([](auto& m) { m.set_cut_force_n(kNoNumber); }),
+            "HapticPatch.limit: is negative or over 1000 N");
+  EXPECT_EQ(refusal([](auto& m) { m.set_side_friction_n(-1); }),
             "HapticPatch.limit: is negative or over 1000 N");
   EXPECT_EQ(refusal([](auto& m) { m.set_kind(static_cast<proto::TouchKind>(9)); }),
             "HapticPatch.kind: is not known here");

@@ -143,6 +143,18 @@ void EdgeForce::follow_work(const Sums& sums, float opened_j, float moved_m, flo
   share_ += (wanted - share_) * std::min(1.0f, way_m / (kSmooth * h_m));
 }
 
+float EdgeForce::cutting_n() const {
+  float cut_n = 0;
+  for (const auto& part : parts_) cut_n += part.cut_n;
+  return std::min(cut_n * share_, kMostForce_n);
+}
+
+float EdgeForce::most_friction_n() const {
+  float grip_n = 0;
+  for (const auto& part : parts_) grip_n += part.grip_n;
+  return std::min(grip_n, kMostForce_n);
+}
+
 void EdgeForce::rest(const EdgeEnds& ends) {
   *this = EdgeForce(ends);
 }

@@ -67,6 +67,10 @@ class EdgeForce {
   Wrench move(const EdgeEnds& ends, float opened_j, float h_m);
   // It does nothing, and what it owes is forgotten.
   void rest(const EdgeEnds& ends);
+  // Returns with how much force a blade that goes on is held back by what it cuts here, N.
+  float cutting_n() const;
+  // Returns with how much friction holds it at most, N.
+  float most_friction_n() const;
 
   void visit_state(world::StateArchive& archive);
 

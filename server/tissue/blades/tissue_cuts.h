@@ -36,6 +36,7 @@ class TissueCuts {
   const wire::SurfaceLayout& layout() const { return layout_; }
   // Returns what the tissue does to a blade.
   const Wrench& felt(ToolSlot tool) const { return blades_[tool].felt; }
+  const EdgeForce& edge(ToolSlot tool) const { return blades_[tool].edge; }
 
   // Looks for tissue around these nodes that is stretched too far; it tears in the next cut().
   void tear(const world::World& world, std::span<const NodeIndex> nodes);

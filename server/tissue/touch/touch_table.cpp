@@ -142,8 +142,12 @@ void TouchTable::describe_surface(const Scene& scene, ToolSlot slot, wire::Hapti
     surface.settle(scene.world, layout, place);
   } else if (!surface.is_known() || surface.has_changed(layout, place)) {
     if (surface.is_known()) touch.structure = static_cast<std::uint32_t>(scene.world.tick);
-    surface.clear();
-    surface.take(scene.world, layout, place);
+    if (touch.kind == TouchKind::Cut) {
+      surface.take_beside_wound(scene.world, layout, place);
+    } else {
+      surface.clear();
+      surface.take(scene.world, layout, place);
+    }
   }
   if (!surface.is_known()) return;
   if (is_touching(touch.kind)) {
@@ -199,7 +203,10 @@ wire::HapticPatch TouchTable::describe(const Scene& scene, ToolSlot slot) {
     patch.grip_point_m = touch.grip_point;
     patch.grip_limit_n = scene.grasps[slot].grip_n;
   }
-  if (touch.kind == TouchKind::Cut) patch.cut_force_n = length(touch.force);
+  if (touch.kind == TouchKind::Cut) {
+    patch.cut_force_n = scene.cuts.edge(slot).cutting_n();
+    patch.side_friction_n = scene.cuts.edge(slot).most_friction_n();
+  }
   return patch;
 }
 

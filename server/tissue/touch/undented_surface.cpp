@@ -16,6 +16,7 @@ constexpr float kSlid_m = 0.008f;
 constexpr float kForgottenPerFrame = 0.008f;  // per frame: two seconds
 constexpr float kSettled = 0.0016f;  // per frame: ten seconds, in which relaxed tissue comes back
 constexpr float kRingMiddle_m = 0.022f;
+constexpr float kLeastFacing = 0.5f;
 constexpr float kNoise_m2 = 1e-8f;  // sinking that varies less leaves the guess
 
 // Returns how far a half space sinks there where a ball is pressed into it, or rises where it is
@@ -39,7 +40,22 @@ bool is_within(const Vec3f& a, const Vec3f& b, float distance) {
 void UndentedSurface::clear() {
   triangles_.clear();
   moved_ = kept_off_ = outward_ = {};
+  least_facing_ = -1;
   sinks_ = motion_ = variance_ = covariance_ = 0;
+}
+
+void UndentedSurface::take_beside_wound(const world::World& world,
+                                        const wire::SurfaceLayout& layout, const Vec3f& place) {
+  const Vec3f outward = is_known() ? plane(place, kRing_m).normal : Vec3f{};
+  clear();
+  if (length_squared(outward) > 0) {
+    outward_ = outward;
+    least_facing_ = kLeastFacing;
+    take(world, layout, place);
+  }
+  if (is_known()) return;
+  clear();
+  take(world, layout, place);
 }
 
 void UndentedSurface::take(const world::World& world, const wire::SurfaceLayout& layout,
@@ -66,6 +82,7 @@ void UndentedSurface::take(const world::World& world, const wire::SurfaceLayout&
     // A place that was taken before the tool was there is kept.
     if (old != kept_.end() && old->number == number) triangle.at = old->at;
     shape(triangle);
+    if (dot(triangle.normal, outward_) < least_facing_ * length(triangle.normal)) continue;
     triangles_.push_back(triangle);
   }
 }

@@ -27,6 +27,10 @@ class UndentedSurface {
 
   // Takes the surface around `centre` as it is now. O(triangles of the surface).
   void take(const world::World& world, const wire::SurfaceLayout& layout, const Vec3f& centre);
+  // The tool has cut what was taken: takes what there is now, without the faces of the wound. They
+  // do not face as the surface does that the blade has come through.
+  void take_beside_wound(const world::World& world, const wire::SurfaceLayout& layout,
+                         const Vec3f& place);
   // Once a frame while the tool is near and does not touch: what was taken follows the surface
   // slowly. A dent that a tool has left fills up meanwhile, and is none of the surface's own shape.
   void settle(const world::World& world, const wire::SurfaceLayout& layout, const Vec3f& place);
@@ -68,6 +72,7 @@ class UndentedSurface {
   Vec3f moved_;                             // since it was taken, by others
   Vec3f kept_off_;                          // what the ring has moved besides
   Vec3f outward_;                           // under the tool; 0: it does not touch yet
+  float least_facing_ = -1;                 // only what faces outward_ by this cosine is taken
   // Means that forget, of the ring's motion along the normal over how far a half space would sink.
   float sinks_ = 0, motion_ = 0, variance_ = 0, covariance_ = 0;
 };
