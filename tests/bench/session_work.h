@@ -7,6 +7,11 @@
 
 namespace trocar::bench {
 
+// A limit of nodes that limits nothing.
+inline constexpr std::uint32_t kAllNodes = 1'000'000;
+// Layers around a contact that are in the queue of a graded session.
+inline constexpr std::uint32_t kNearDepth = 2;
+
 // Surface places far from each other and from what is fixed, and outward normals there; the first
 // is the surface node farthest along `first`.
 std::vector<BenchTool> spread_tools(const organ::Organ& organ, std::size_t count,

@@ -159,6 +159,7 @@ INSTANTIATE_TEST_SUITE_P(
 struct Turns {
   std::uint32_t far_interval;
   double stiffness;  // of the measured liver's; the stiff one takes two sweeps
+  bool is_averaged = false;
 };
 class HeldTool : public ::testing::TestWithParam<Turns> {};
 
@@ -168,6 +169,7 @@ TEST_P(HeldTool, ComesToRest) {
   auto organ = *catalogue::make_measured_liver();
   for (auto& c : organ.material.measured.coefficients_pa) c *= GetParam().stiffness;
   organ.material.measured.bulk_modulus_pa *= GetParam().stiffness;
+  organ.material.has_averaged_strain = GetParam().is_averaged;
   Pressed all(organ), in_turns(organ);
   const Vec3f over = top_of(all.simulation.state().world);
   step::TickDecisions turns;
@@ -189,7 +191,8 @@ TEST_P(HeldTool, ComesToRest) {
 }
 
 INSTANTIATE_TEST_SUITE_P(FarIntervals, HeldTool,
-                         ::testing::Values(Turns{2, 1}, Turns{3, 1}, Turns{4, 1}, Turns{2, 10}));
+                         ::testing::Values(Turns{2, 1}, Turns{2, 1, true}, Turns{3, 1}, Turns{4, 1},
+                                           Turns{2, 10}));
 
 }  // namespace
 }  // namespace trocar::control

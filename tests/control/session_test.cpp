@@ -12,6 +12,7 @@
 #include "proto/wire.pb.h"
 #include "server/app/server/simulation_loop.h"
 #include "server/organs/catalogue/builtin_organs.h"
+#include "server/organs/catalogue/load_organ.h"
 #include "server/session/recording/tick_records.h"
 #include "server/session/recording/verify.h"
 #include "tests/e2e/programs.h"
@@ -91,6 +92,12 @@ std::vector<std::pair<Tick, step::TickDecisions>> changes_in(const std::filesyst
   return changes;
 }
 
+// The most that a session of the lattice decides.
+step::TickDecisions most_for_lattice() {
+  const step::Simulation simulation(*catalogue::load_organ("lattice"));
+  return simulation.with_sweeps_for_organ({});
+}
+
 void expect_verifies(const std::filesystem::path& file) {
   const auto verified = recording::verify_journal(file.string());
   ASSERT_TRUE(verified.ok()) << verified.error().message;
@@ -114,7 +121,7 @@ TEST(ControlledSession, WhatWasDecidedIsRecordedShownAndSimulatesAgain) {
 
   const auto changes = changes_in(session.folder / "session.mcap");
   ASSERT_GE(changes.size(), 2u);
-  EXPECT_EQ(changes.front().second, step::TickDecisions{});
+  EXPECT_EQ(changes.front().second, most_for_lattice());
   EXPECT_EQ(changes.back().second.sweeps, 2u);
   expect_verifies(session.folder / "session.mcap");
 
@@ -198,7 +205,7 @@ TEST(ControlledSession, FixedDecisionsStay) {
   EXPECT_EQ(rate.level(), proto::RATE_FIXED);
   const auto changes = changes_in(session.folder / "session.mcap");
   ASSERT_EQ(changes.size(), 1u);
-  EXPECT_EQ(changes.front().second, step::TickDecisions{});
+  EXPECT_EQ(changes.front().second, most_for_lattice());
   expect_verifies(session.folder / "session.mcap");
   const auto summary = e2e::read_text(session.folder / "server.json");
   EXPECT_EQ(e2e::json_number(summary, "fixed"), 2000);

@@ -41,7 +41,7 @@ std::vector<Vec3d> gradients(dynamics::Tissue& tissue, const std::vector<Vec3f>&
   tissue.relaxation()->restart();
   for (int i = 0; i < steps; ++i) {
     tissue.relaxation()->begin_step(0.001f, state, workers);
-    tissue.relaxation()->end_step(x.data(), near, false, state, workers);
+    tissue.relaxation()->end_step(x.data(), near, state, workers);
   }
   tissue.relaxation()->begin_step(0.001f, state, workers);
   std::vector<Vec3d> out(u.size());

@@ -88,7 +88,7 @@ class Specimen {
           force += to_double(gradients.at(lane));
       }
     }
-    relaxation.end_step(x_.data(), near_, false, state_, workers_);
+    relaxation.end_step(x_.data(), near_, state_, workers_);
     EXPECT_TRUE(is_finite(force));  // the worst of what is not a number is nothing
     return force;
   }

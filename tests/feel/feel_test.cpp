@@ -79,6 +79,20 @@ TEST(Feel, FastPalpationIsFelt) {
   EXPECT_LT(outcome.cycle_mj, 0);
 }
 
+// The model follows a server that does little as it follows one that does all.
+TEST(Feel, FastPalpationIsFeltWhereTheServerHasLittleTime) {
+  const auto felt = with_little_time();
+  const auto outcome = measure(measured_of(felt.motion), run(liver(), probe(), place(), felt, model,
+                                                             {.line = {.rtt_s = 0.05}}));
+  std::printf("%s, 50 ms: rms %.1f %%, gain %.3f, %.1f deg, %.3f mJ per cycle (truth %.3f)\n",
+              felt.motion.name.c_str(), 100 * outcome.rms, outcome.gain, outcome.phase_deg,
+              outcome.cycle_mj, outcome.true_cycle_mj);
+  EXPECT_LT(outcome.rms, 0.07);
+  EXPECT_NEAR(outcome.gain, 1, 0.15);
+  EXPECT_NEAR(outcome.phase_deg, 0, 20);
+  EXPECT_LT(outcome.cycle_mj, 0);
+}
+
 TEST(FeelMutants, StiffnessOfOneTickFails) {
   EXPECT_GT(feel(slow(), [](const auto&) { return make_linear(5); }).rms, kMost1Hz);
 }

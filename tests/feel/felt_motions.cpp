@@ -53,6 +53,21 @@ FeltMotion lifted_by_another(const step::Simulation& simulation, const Frame& pl
   return felt;
 }
 
+FeltMotion tugged_by_another(const step::Simulation& simulation, const Frame& place) {
+  constexpr double kTuggedAside_m = 0.014, kTug_m = 0.008, kTug_s = 0.1;
+  FeltMotion felt = plain(press(kLiver_n_m));
+  felt.motion.name = "tugged";
+  felt.motion.steady_from_s = -1;
+  const Frame other =
+      place_at(simulation, kJaws, place.origin + place.to_world({kTuggedAside_m, 0, 0}), place.z);
+  felt.others = [=](double s, hands::TickInputs& inputs) {
+    const double phase_s = std::fmod(s, 1.0);
+    const double up = ramp(phase_s, 0, kTug_s, 0, 1) - ramp(phase_s, 0.5, 0.5 + kTug_s, 0, 1);
+    move_other(s, other.origin + place.z * (s < 1.5 ? 0 : up * kTug_m), place, inputs);
+  };
+  return felt;
+}
+
 FeltMotion refused(const Frame& place, tool::Verb verb) {
   FeltMotion felt = plain(press(kLiver_n_m));
   felt.motion.name = "refused";
@@ -95,19 +110,39 @@ FeltMotion at_half_pace() {
   return felt;
 }
 
-FeltMotion pulled_off() {
+FeltMotion with_little_time() {
+  FeltMotion felt = plain(palpation(kLiver_n_m, 3));
+  felt.motion.name = "3 Hz, little time";
+  felt.decisions.sweeps = 2;
+  felt.decisions.layer_sweeps = {1, 1, 1};
+  felt.decisions.far_interval = 2;
+  return felt;
+}
+
+namespace {
+
+FeltMotion pulled_to(double far_m) {
   FeltMotion felt;
-  felt.motion = {
-      .name = "pull",
-      .seconds = 4,
-      .wanted_m =
-          [](double s) {
-            return Vec3d{
-                0, 0, s < 1.2 ? ramp(s, 0.3, 0.7, 0.006, -0.002) : ramp(s, 1.2, 3.2, -0.002, 0.04)};
-          },
-      .grasp_s = 1};
+  felt.motion = {.name = "pull",
+                 .seconds = 4,
+                 .wanted_m =
+                     [far_m](double s) {
+                       return Vec3d{0, 0,
+                                    s < 1.2 ? ramp(s, 0.3, 0.7, 0.006, -0.002)
+                                            : ramp(s, 1.2, 3.2, -0.002, far_m)};
+                     },
+                 .grasp_s = 1};
   felt.verb = [](double s) { return s < 1 ? tool::Verb::Push : tool::Verb::Grasp; };
   return felt;
+}
+
+}  // namespace
+
+FeltMotion pulled_off() {
+  return pulled_to(0.04);
+}
+FeltMotion torn_off() {
+  return pulled_to(0.06);
 }
 
 FeltMotion cut_through() {

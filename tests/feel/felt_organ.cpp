@@ -27,7 +27,7 @@ void FeltOrgan::tick(const ToolReading* reading) {
     const tool::ToolSample sample{{to_float(reading->tip_m), reading->orientation}, reading->verb};
     inputs_.samples.push_back({kTool, sample, reading->time_us});
   }
-  simulation_.tick(inputs_, {});
+  simulation_.tick(inputs_, decisions_);
   inputs_.clear();
 }
 

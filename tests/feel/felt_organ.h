@@ -24,6 +24,8 @@ class FeltOrgan {
 
   // Others do this in the next tick.
   hands::TickInputs& others() { return inputs_; }
+  // From the next tick on; those of a server with much time are the default.
+  void decide(const step::TickDecisions& decisions) { decisions_ = decisions; }
   // Simulates a tick. The tool goes to the reading as a session's tools do; null: none has come.
   void tick(const ToolReading* reading);
   // The tool is at the reading in this tick already.
@@ -40,6 +42,7 @@ class FeltOrgan {
 
   step::Simulation simulation_;
   hands::TickInputs inputs_;
+  step::TickDecisions decisions_;
   std::uint32_t sequence_ = 0;
 };
 

@@ -23,6 +23,7 @@
 #include "server/organs/catalogue/builtin_organs.h"
 #include "server/organs/catalogue/load_organ.h"
 #include "server/organs/material/material_file.h"
+#include "server/organs/organ/any_material.h"
 #include "server/organs/organ/average_strain.h"
 #include "server/organs/organ/fibre_rule.h"
 #include "server/organs/organ/organ_file.h"
@@ -84,7 +85,7 @@ struct Options {
   std::optional<double> young_modulus_pa, poisson_ratio;
   std::string inspected;
   bool json = false;
-  bool has_averaged_strain = false;
+  std::optional<bool> has_averaged_strain;
   FitCommand fit;
   SettleCommand settle;
   CalibrateCommand calibrate;
@@ -154,7 +155,8 @@ Status add_fibres(const Options& options, organ::Organ& organ) {
   return {};
 }
 
-Status change_organ(const Options& options, organ::Organ& organ) {
+// averages: strain is averaged unless the options say otherwise; else it is as the organ has it.
+Status change_organ(const Options& options, bool averages, organ::Organ& organ) {
   if (auto added = add_fibres(options, organ); !added) return added;
   if (options.tear_stretch.value_or(0) > 0 &&
       (organ.mesh.tets.empty() || !organ.mesh.links.empty()))
@@ -167,8 +169,12 @@ Status change_organ(const Options& options, organ::Organ& organ) {
     if (!measured) return measured.error();
     material::use_measured(*measured, material);
   }
-  if (options.has_averaged_strain)
+  const bool is_averaged = averages && organ::any_material(organ, material::is_hyperelastic);
+  if (options.has_averaged_strain.value_or(is_averaged)) {
     if (auto averaged = organ::average_strain(organ); !averaged) return averaged;
+  } else if (options.has_averaged_strain) {
+    organ::use_plain_strain(organ);
+  }
   const auto set = [](const std::optional<double>& from, double& to) { to = from.value_or(to); };
   set(options.tension, material.tension);
   set(options.fibre_tension, material.fibre_tension);
@@ -182,7 +188,8 @@ Status change_organ(const Options& options, organ::Organ& organ) {
 Status run_make(const Options& options) {
   auto organ = make_named(options.made_name, options.tets);
   if (!organ) return organ.error();
-  if (auto changed = change_organ(options, *organ); !changed) return changed;
+  if (auto changed = change_organ(options, !options.material.empty(), *organ); !changed)
+    return changed;
   const auto stem = std::filesystem::path(options.made_name).stem().string();
   return save(*organ, options.out.empty() ? stem + ".organ" : options.out);
 }
@@ -235,7 +242,7 @@ Status run_import(const Options& options) {
   auto imported = catalogue::import_organ(path, import_options);
   if (!imported) return imported.error();
   if (auto chosen = choose_law(options, imported->organ.material); !chosen) return chosen;
-  if (auto changed = change_organ(options, imported->organ); !changed) return changed;
+  if (auto changed = change_organ(options, true, imported->organ); !changed) return changed;
   say_what_was_chosen(options, imported->organ.material);
   for (const std::string& warning : imported->warnings)
     std::fprintf(stderr, "%s: warning: %s: %s\n", kProgram, options.import_file.c_str(),
@@ -327,8 +334,9 @@ void add_commands(CLI::App& app, Options& options) {
                          ", or a .toml file as identify leaves it")
         ->type_name("NAME");
     command->add_flag("--averaged-strain", options.has_averaged_strain,
-                      "average strain over nodes: tets that lock are up to 40 % too stiff; a tick "
-                      "takes three times as long");
+                      "average strain over nodes, so that tets do not lock; =false: plain tets, up "
+                      "to 50 % too stiff [averaged: liver, --material, imports that are not of "
+                      "springs or tensor-mass]");
     command->add_option("--tension", options.tension, "tissue would be shorter by this part [0]")
         ->type_name("PART");
     command
@@ -377,6 +385,12 @@ int run(int argc, char** argv) {
   add_commands(app, options);
   try {
     app.parse(argc, argv);
+    // CLI11 writes false where nobody has said anything.
+    const auto says = [&app](const char* command) {
+      return app.got_subcommand(command) &&
+             app.get_subcommand(command)->count("--averaged-strain") > 0;
+    };
+    if (!says("make") && !says("import")) options.has_averaged_strain.reset();
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error);
     return report(kProgram, {ErrorCode::Usage, std::string(error.what()) + " (see --help)"});

@@ -12,6 +12,7 @@
 #include "server/app/organ/progress_line.h"
 #include "server/lab/plot/plot.h"
 #include "server/organs/catalogue/load_organ.h"
+#include "server/organs/organ/average_strain.h"
 #include "server/papers/dogan/quality.h"
 #include "server/papers/dogan/reduction_file.h"
 
@@ -392,8 +393,9 @@ Status run_reduce(ReduceCommand command) {
   command.settings.radius_m = command.radius_mm * 1e-3;
   command.settings.influence_m = command.influence_mm * 1e-3;
   if (auto s = validate(command); !s) return s;
-  const auto organ = catalogue::load_organ(command.organ);
+  auto organ = catalogue::load_organ(command.organ);
   if (!organ) return organ.error();
+  organ::use_plain_strain(*organ);  // as sessions with a reduction do
   const auto stem = std::filesystem::path(command.organ).stem().string();
   const std::filesystem::path folder =
       command.folder.empty() ? "out/reduce-" + stem : command.folder;

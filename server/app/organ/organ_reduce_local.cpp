@@ -9,6 +9,7 @@
 #include "server/app/organ/progress_line.h"
 #include "server/lab/reduce/local_quality.h"
 #include "server/organs/catalogue/load_organ.h"
+#include "server/organs/organ/average_strain.h"
 #include "server/organs/organ/local_reduction_file.h"
 
 namespace trocar::app {
@@ -122,8 +123,9 @@ Status check(const organ::Organ& organ, const reduce::LocalBuilt& built,
 
 Status run_reduce_local(ReduceCommand command) {
   if (auto s = take_settings(command); !s) return s;
-  const auto organ = catalogue::load_organ(command.organ);
+  auto organ = catalogue::load_organ(command.organ);
   if (!organ) return organ.error();
+  organ::use_plain_strain(*organ);  // as sessions with a reduction do
   const auto stem = std::filesystem::path(command.organ).stem().string();
   const std::filesystem::path folder =
       command.folder.empty() ? "out/reduce-" + stem : command.folder;

@@ -7,8 +7,8 @@
 
 #include "common/journal/session_journal.h"
 #include "server/app/server/admission.h"
+#include "server/app/server/session_start.h"
 #include "server/organs/catalogue/load_organ.h"
-#include "server/organs/organ/average_strain.h"
 #include "server/organs/organ/local_reduction_file.h"
 #include "server/session/net/tcp_server.h"
 
@@ -42,9 +42,8 @@ Status check_organ(const ServerOptions& options,
                    const std::function<Status(const char*, Status)>& of) {
   auto organ = catalogue::load_organ(options.organ);
   if (!organ) return of("organ", organ.error());
-  if (options.has_averaged_strain)
-    if (const auto averaged = organ::average_strain(*organ); !averaged)
-      return of("averaged-strain", averaged);
+  if (const auto chosen = choose_strain(options, *organ); !chosen)
+    return of("averaged-strain", chosen);
   if (options.reduction_file.empty()) return {};
   const auto reduction = organ::read_session_reduction(options.reduction_file, *organ);
   return reduction ? Status() : of("reduction", reduction.error());

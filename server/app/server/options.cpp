@@ -169,15 +169,17 @@ void add_limit_options(CLI::App& app, LimitOptions& options) {
 
 struct ResearchOptions {
   bool is_frozen = false;
-  const CLI::Option* depth = nullptr;
+  const CLI::Option *depth = nullptr, *sweeps = nullptr, *averaged = nullptr;
 };
 
 // A lesson needs none of these, so --help shows them last, under a heading of their own.
 void add_research_options(CLI::App& app, ServerOptions& options, ResearchOptions& more) {
   auto* research = app.add_option_group("Research", "the solver's settings");
-  research->add_flag("--averaged-strain", options.has_averaged_strain,
-                     "average the strain of its tets over nodes: forces near those of refined "
-                     "elements instead of up to 40 % too stiff, at three times the time of a tick");
+  more.averaged = research->add_flag(
+      "--averaged-strain", options.has_averaged_strain,
+      "average the strain of its tets over nodes, so that they do not lock; =false: "
+      "plain tets, up to 50 % too stiff [as the organ has it; with --reduction "
+      "plain]");
   research->add_flag("--frozen", more.is_frozen,
                      "tissue beyond the limits stands still, as in the papers, "
                      "instead of moving with fewer sweeps");
@@ -191,12 +193,14 @@ void add_research_options(CLI::App& app, ServerOptions& options, ResearchOptions
       ->capture_default_str();
   more.depth =
       research->add_option("--depth", options.decisions.depth_limit,
-                           "layers around each contact that get all sweeps [3, frozen: 6]");
+                           "layers around each contact that are in the queue [3, frozen: 6]");
   research
       ->add_option("--nodes", options.decisions.node_limit, "nodes that all forces together reach")
       ->capture_default_str();
-  research->add_option("--sweeps", options.decisions.sweeps, "passes of the solver per tick")
-      ->capture_default_str();
+  more.sweeps = research->add_option(
+      "--sweeps", options.decisions.sweeps,
+      "passes of the solver per tick in the queue [4; in soft organs 3, 2 and 1, as layers lie "
+      "deeper]");
   research->add_option("--omega", options.decisions.over_relaxation, "over-relaxation, 1 to 1.9")
       ->capture_default_str();
   research
@@ -332,6 +336,9 @@ Status CommandLine::check(const std::string& key, const std::string& text) {
 
 Status CommandLine::finish() {
   options_.is_organ_chosen = organ_->count() > 0;
+  options_.are_sweeps_chosen = research_.sweeps->count() > 0;
+  // CLI11 writes false where nobody has said anything.
+  if (research_.averaged->count() == 0) options_.has_averaged_strain.reset();
   if (research_.is_frozen) {
     options_.decisions.boundary = world::Boundary::Frozen;
     if (research_.depth->count() == 0) options_.decisions.depth_limit = step::kFrozenDepthLimit;

@@ -15,22 +15,23 @@ namespace trocar::app {
 
 struct ServerOptions {
   std::string organ = "liver";
-  bool is_organ_chosen = false;  // on the command line
-  std::string resume_file;       // empty: a new session
-  bool has_averaged_strain = false;
-  std::string reduction_file;  // empty: the full solver alone
+  bool is_organ_chosen = false;             // on the command line
+  std::string resume_file;                  // empty: a new session
+  std::optional<bool> has_averaged_strain;  // empty: as the organ has it, and plain for a reduction
+  std::string reduction_file;               // empty: the full solver alone
   std::string address = "127.0.0.1";
   std::uint16_t port = 7690;
   bool is_stream_only = false;  // no datagrams
   AccessOptions access;
   LimitOptions limits;
-  std::string announced_name;     // on the local network; empty: made from organ and machine
-  bool is_unannounced = false;    // otherwise it is announced where others may reach it
-  std::string journal;            // a file, or "none"
-  double seconds = 0;             // simulated; 0: until told to end
-  std::string summary_file;       // empty: none
-  std::string ready_file;         // empty: none
-  step::TickDecisions decisions;  // fixed, or the most that the rate controller decides
+  std::string announced_name;      // on the local network; empty: made from organ and machine
+  bool is_unannounced = false;     // otherwise it is announced where others may reach it
+  std::string journal;             // a file, or "none"
+  double seconds = 0;              // simulated; 0: until told to end
+  std::string summary_file;        // empty: none
+  std::string ready_file;          // empty: none
+  step::TickDecisions decisions;   // fixed, or the most that the rate controller decides
+  bool are_sweeps_chosen = false;  // else as many as the organ needs
   bool has_fixed_decisions = false;
   double budget_ms = 0.8;  // of a tick's millisecond for its work
   unsigned workers = 1;

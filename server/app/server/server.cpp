@@ -71,6 +71,7 @@ class Server {
   Status run();
 
  private:
+  step::TickDecisions most_decisions() const;
   LoopOptions loop_options() const;
   // Lets those who were in a session that goes on come back; other hands leave.
   void restore_people();
@@ -164,7 +165,7 @@ Status Server::open() {
                                            [this] { asio::post(io_, [this] { begin_end(); }); });
   if (reduction_)
     ghost_ = std::make_unique<ghost::Ghost>(
-        simulation_, ghost::GhostOptions{options_.decisions, [this] { loop_->request_snapshot(); },
+        simulation_, ghost::GhostOptions{most_decisions(), [this] { loop_->request_snapshot(); },
                                          [this](auto report) { show_ghost(std::move(report)); }});
   return {};
 }
@@ -215,8 +216,13 @@ void Server::announce() {
       tcp_->port());
 }
 
+step::TickDecisions Server::most_decisions() const {
+  return options_.are_sweeps_chosen ? options_.decisions
+                                    : simulation_.with_sweeps_for_organ(options_.decisions);
+}
+
 LoopOptions Server::loop_options() const {
-  const auto& decisions = options_.decisions;
+  const auto decisions = most_decisions();
   LoopOptions loop{.decisions = decisions};
   if (options_.seconds > 0)
     loop.tick_count = simulation_.current_tick() + ticks_of(options_.seconds);
@@ -226,7 +232,10 @@ LoopOptions Server::loop_options() const {
   if (decisions.boundary == world::Boundary::Graded) {
     rate.layer_sweeps =
         simulation_.context().solve.far_plan.with_sweeps(decisions.far_sweeps).sweeps;
-    rate.far_interval = control::kLongestFarInterval;
+    // Where strain is averaged, turns change a fast hand's force by 2 to 10 % and save a tenth of a
+    // tick.
+    const bool is_averaged = simulation_.state().strain_scheme == dynamics::StrainScheme::Explicit;
+    if (!is_averaged) rate.far_interval = control::kLongestFarInterval;
   }
   loop.rate = rate;
   return loop;

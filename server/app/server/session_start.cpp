@@ -28,8 +28,8 @@ journal::ReductionDescription describe(const std::string& file,
 
 Result<organ::Organ> read_organ(const ServerOptions& options) {
   auto organ = catalogue::load_organ(options.organ);
-  if (!organ || !options.has_averaged_strain) return organ;
-  if (const auto averaged = organ::average_strain(*organ); !averaged) return averaged.error();
+  if (!organ) return organ;
+  if (const auto chosen = choose_strain(options, *organ); !chosen) return chosen.error();
   return organ;
 }
 
@@ -47,6 +47,7 @@ Result<SessionStart> begin(const ServerOptions& options) {
   auto read = organ::read_session_reduction(options.reduction_file, *organ);
   if (!read) return read.error();
   const auto model = std::make_shared<const organ::LocalReduction>(std::move(*read));
+  log::info("{}: strain is not averaged, the reduction is of plain tets", options.reduction_file);
   SessionStart start{
       .simulation = step::Simulation(std::move(*organ), options.workers, reduction::at_work(model)),
       .reduction = describe(options.reduction_file, *model)};
@@ -57,7 +58,7 @@ Result<SessionStart> begin(const ServerOptions& options) {
 
 // Somebody who names an organ means that one.
 Status check_organ(const ServerOptions& options, const organ::Organ& recorded) {
-  if (!options.is_organ_chosen && !options.has_averaged_strain) return {};
+  if (!options.is_organ_chosen && !options.has_averaged_strain.has_value()) return {};
   const auto organ = read_organ(options);
   if (!organ) return organ.error();
   if (organ::organ_hash(*organ) == organ::organ_hash(recorded)) return {};
@@ -90,6 +91,13 @@ Result<SessionStart> go_on(const ServerOptions& options) {
 }
 
 }  // namespace
+
+Status choose_strain(const ServerOptions& options, organ::Organ& organ) {
+  if (options.has_averaged_strain.value_or(false)) return organ::average_strain(organ);
+  if (options.has_averaged_strain || !options.reduction_file.empty())
+    organ::use_plain_strain(organ);
+  return {};
+}
 
 Result<SessionStart> start_session(const ServerOptions& options) {
   return options.resume_file.empty() ? begin(options) : go_on(options);

@@ -8,6 +8,7 @@
 #include "common/base/result.h"
 #include "common/journal/session_topics.h"
 #include "server/app/server/options.h"
+#include "server/organs/organ/organ.h"
 #include "server/session/participants/roster.h"
 #include "server/tissue/step/simulation.h"
 
@@ -21,6 +22,9 @@ struct SessionStart {
   std::vector<participants::Participant> participants;  // who was in it
   std::vector<ParticipantSlot> unnamed_hands;           // whose tools are there, nobody knows whose
 };
+
+// Strain averaged or plain, as the options say. A reduction is of plain tets.
+Status choose_strain(const ServerOptions& options, organ::Organ& organ);
 
 // Reads what the options name, and says what it did where that takes long.
 Result<SessionStart> start_session(const ServerOptions& options);

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "server/lab/scenario/scenario_resolver.h"
+#include "server/organs/organ/average_strain.h"
 #include "server/organs/organ/local_reduction_file.h"
 
 namespace trocar::scenario {
@@ -184,6 +185,13 @@ Status resolve_reduction(const Resolver& resolver, ResolvedScenario& result) {
   for (const auto& probe : resolver.scenario().probes)
     if (probe.quantity == ProbeQuantity::Reaction)
       return resolver.wrong(probe.place, "a reaction is not known where a reduction acts");
+  // A reduction is of plain tets: strain is averaged then only if somebody asks for it.
+  const auto asks = [](const MaterialChange& change) {
+    return change.has_averaged_strain.value_or(false);
+  };
+  if (!asks(resolver.scenario().material) &&
+      std::ranges::none_of(resolver.scenario().regions, asks, &RegionRule::material))
+    organ::use_plain_strain(result.organ);
   const auto path = resolver.scenario().source.parent_path() / *run.reduction;
   auto reduction = organ::read_session_reduction(path.string(), result.organ);
   if (!reduction) return resolver.wrong(place, reduction.error().message);

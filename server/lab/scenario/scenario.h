@@ -155,6 +155,7 @@ struct RunRule {
   // These limit the queue in layers and in nodes, as in a session; without them it is unlimited.
   std::optional<std::uint32_t> depth, nodes;
   std::uint32_t sweeps = 4;
+  bool has_sweeps_for_organ = false;  // as sessions do, instead
   double over_relaxation = 1.5;
   // Graded, outside the queue; without: what the organ needs.
   std::optional<std::uint32_t> far_sweeps;

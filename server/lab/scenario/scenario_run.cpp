@@ -66,7 +66,8 @@ world::Boundary boundary_of(const scenario::RunRule& run, Solver solver) {
   return world::Boundary::Whole;
 }
 
-step::TickDecisions decisions_of(const scenario::RunRule& run, Solver solver) {
+step::TickDecisions decisions_of(const scenario::RunRule& run, Solver solver,
+                                 const step::Simulation& simulation) {
   step::TickDecisions decisions;
   decisions.boundary = boundary_of(run, solver);
   decisions.sweeps = run.sweeps;
@@ -85,7 +86,7 @@ step::TickDecisions decisions_of(const scenario::RunRule& run, Solver solver) {
     policy.residual_tolerance_n = static_cast<float>(run.tolerance_n);
     policy.max_sweeps = run.max_sweeps;
   }
-  return decisions;
+  return run.has_sweeps_for_organ ? simulation.with_sweeps_for_organ(decisions) : decisions;
 }
 
 cutting::Settings cutting_of(const scenario::RunRule& run) {
@@ -179,11 +180,11 @@ Status check_supported(const scenario::ResolvedScenario& resolved) {
 ScenarioRun::ScenarioRun(scenario::ResolvedScenario resolved, Solver solver, unsigned threads)
     : resolved_(with_response(std::move(resolved))),
       solver_kind_(solver),
-      decisions_(decisions_of(scenario().run, solver)),
       step_count_(steps_of(scenario().run)),
       simulation_(resolved_.organ, threads, reduction::at_work(resolved_.reduction),
                   cutting_of(scenario().run), loads_of(resolved_),
-                  scheme_of(scenario().run, solver)) {
+                  scheme_of(scenario().run, solver)),
+      decisions_(decisions_of(scenario().run, solver, simulation_)) {
   for (std::size_t i = 0; i < scenario().probes.size(); ++i)
     watched_.push_back(is_reaction(scenario().probes[i])
                            ? simulation_.loads().watch(resolved_.probe_nodes[i])

@@ -98,12 +98,12 @@ class ScenarioRun {
 
   const scenario::ResolvedScenario resolved_;
   const Solver solver_kind_;
-  const step::TickDecisions decisions_;
   const std::uint64_t step_count_;
 
   std::uint64_t steps_done_ = 0;
   StepReport settling_;
   step::Simulation simulation_;
+  const step::TickDecisions decisions_;
   std::vector<std::size_t> watched_;  // per probe: its number among the watched, of reactions
 
   // Steps use these members as workspace.

@@ -26,7 +26,7 @@ void read_like(tool::TableReader& reader, RunRule& run) {
   run.boundary = Boundary::Graded;
   run.depth = session.depth_limit;
   run.nodes = session.node_limit;
-  run.sweeps = session.sweeps;
+  run.has_sweeps_for_organ = !reader.has("sweeps");
   run.over_relaxation = static_cast<double>(session.over_relaxation);
   run.has_linear_far_field = !session.is_far_exact;
   refuse_keys(reader, {"dt_s", "integrator", "boundary"}, "follows from like = \"session\"");

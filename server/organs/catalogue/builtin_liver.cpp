@@ -33,9 +33,10 @@ Result<organ::Organ> make_liver(int target_tets) {
 
 Result<organ::Organ> make_measured_liver(int target_tets) {
   auto organ = make_liver(target_tets);
-  if (organ)
-    material::use_measured(*material::find_measured_material("human_liver_nava2008"),
-                           organ->material);
+  if (!organ) return organ;
+  material::use_measured(*material::find_measured_material("human_liver_nava2008"),
+                         organ->material);
+  organ->material.has_averaged_strain = true;
   return organ;
 }
 

@@ -15,4 +15,9 @@ Status average_strain(Organ& organ) {
   return {};
 }
 
+void use_plain_strain(Organ& organ) {
+  organ.material.has_averaged_strain = false;
+  for (auto& region : organ.regions) region.material.has_averaged_strain = false;
+}
+
 }  // namespace trocar::organ

@@ -228,9 +228,11 @@ bool SelfContactFinder::meets(Site site, std::size_t first, std::size_t end,
   const bool is_moved = has_moved(site, kMovedSlacks * slack_m_, world);
   float least = reach_m_ * reach_m_, least_of_lips = least;
   Site nearest = kNoSite, nearest_of_lips = kNoSite;
+  const bool looks_at_all = this->looks_at_all(site, world);
   for (auto i = first; i < end; ++i) {
     if (list_.far_until[i] > passed) continue;
     const auto& pair = list_.pairs[i];
+    if (!looks_at_all && paces_[pair.across] != Pace::Moves) continue;
     const Vec3f way = position(pair.across, world) - p;
     const float squared = length_squared(way);
     if (squared > reach_m_ * reach_m_)
@@ -286,24 +288,43 @@ bool SelfContactFinder::stays(Site site, TriangleIndex triangle, const world::Wo
          lies_along(touch.aside, touch.gap);
 }
 
-// Returns whether the pair may keep its last place: it is not due for a look, its nodes are slow.
-bool SelfContactFinder::lies_still(Site site, TriangleIndex triangle,
-                                   const world::World& world) const {
-  if ((world.tick + site) % kLookEvery == 0 || surface_.is_gone(triangle)) return false;
-  const auto is_still = [&](Site s) {
-    return length_squared(world.velocities[s]) < kStill_m_s * kStill_m_s;
-  };
-  const auto& [a, b, c] = surface_[triangle];
-  return is_still(site) && is_still(a) && is_still(b) && is_still(c);
+// A node that a cut has just opened looks however slow it is.
+bool SelfContactFinder::looks_at_all(Site site, const world::World& world) const {
+  return paces_[site] == Pace::Moves ||
+         (paces_[site] == Pace::Still &&
+          (is_due(site, world) || world.node_classes[site] == world::NodeClass::Active));
 }
 
-void SelfContactFinder::add_point(Site site, TriangleIndex triangle, const Place& place,
-                                  const world::World& world, SelfContactTable& pairs,
-                                  ContactList& out) const {
+void SelfContactFinder::find_pace(const world::World& world) {
+  using world::NodeClass;
+  is_any_awake_ = false;
+  for (const Site s : surface_.sites()) {
+    const auto node_class = world.node_classes[s];
+    const float squared = length_squared(world.velocities[s]);
+    const bool is_asleep =
+        node_class == NodeClass::Asleep || (node_class == NodeClass::Fixed && squared == 0);
+    const bool moves = !(squared < kStill_m_s * kStill_m_s);
+    paces_[s] = is_asleep ? Pace::Asleep : moves ? Pace::Moves : Pace::Still;
+    is_any_awake_ |= !is_asleep;
+  }
+}
+
+SelfContactFinder::Pace SelfContactFinder::pace_of(Site site, TriangleIndex triangle) const {
+  Pace pace = paces_[site];
+  for (const Site s : surface_[triangle]) pace = std::max(pace, paces_[s]);
+  return pace;
+}
+
+void SelfContactFinder::add_pair(Site site, TriangleIndex triangle, const Place& place, Pace pace,
+                                 const world::World& world, SelfContactTable& pairs,
+                                 ContactList& out) const {
   if (pairs.nodes().size() >= kMaxSelfPoints) {
     ++out.dropped;
     return;
   }
+  const NodeIndex node(site);
+  pairs.add(node, triangle, place);
+  if (pace == Pace::Asleep) return;
   // Clang 14 lets no lambda capture a structured binding.
   const auto& corners = surface_[triangle];
   const Site a = corners[0], b = corners[1], c = corners[2];
@@ -312,9 +333,9 @@ void SelfContactFinder::add_point(Site site, TriangleIndex triangle, const Place
     return at(site) - (at(a) * w.x + at(b) * w.y + at(c) * w.z);
   };
   const Vec3f from = between([&](Site s) { return position(s, world); });
+  const bool presses = dot(place.normal, from) <= place.shift;
+  if (pace == Pace::Still && !presses) return;
   const Vec3f at_rest = between([&](Site s) -> const Vec3f& { return world.rest_positions[s]; });
-  const NodeIndex node(site);
-  pairs.add(node, triangle, place);
   ContactPoint point{
       .nodes = {node, NodeIndex(a), NodeIndex(b), NodeIndex(c)},
       .weights = {1, -w.x, -w.y, -w.z},
@@ -326,13 +347,15 @@ void SelfContactFinder::add_point(Site site, TriangleIndex triangle, const Place
       .plane = place.normal * place.shift - at_rest,
   };
   out.points.push_back(point);
-  if (dot(place.normal, from) > place.shift) return;
+  if (!presses || pace == Pace::Still) return;
   out.self_seeds.insert(out.self_seeds.end(), point.nodes.begin(), point.nodes.end());
 }
 
 void SelfContactFinder::find(const world::World& world, SelfContactTable& pairs, ContactList& out) {
   keep_list(world);
   pairs_looked_at_ = 0;
+  find_pace(world);
+  if (!is_any_awake_) return;
   const auto& runs = list_.runs;
   // Two nodes are nearer to each other than their references by no more than this, m.
   const float moved =
@@ -344,7 +367,14 @@ void SelfContactFinder::find(const world::World& world, SelfContactTable& pairs,
   if (++tick_current_ == 0) {
     std::ranges::fill(normal_stamp_, 0u);
     std::ranges::fill(up_stamp_, 0u);
+    std::ranges::fill(stirred_stamp_, 0u);
     tick_current_ = 1;
+  }
+  for (std::size_t r = 0; r < runs.size(); ++r) {
+    if (paces_[runs[r].node] != Pace::Moves) continue;
+    const auto passed = static_cast<float>(travel_ - list_.travel);
+    for (auto i = std::size_t{runs[r].first}; i < end_of_run(r); ++i)
+      if (list_.far_until[i] <= passed) stirred_stamp_[list_.pairs[i].across] = tick_current_;
   }
   std::swap(old_pairs_, pairs);
   pairs.clear();
@@ -358,17 +388,22 @@ void SelfContactFinder::find(const world::World& world, SelfContactTable& pairs,
     const bool is_old = site == of_old, is_listed = site == of_run;
     const auto i = is_old ? old++ : old;
     const auto r = is_listed ? run++ : run;
-    if (is_old && lies_still(site, old_pairs_.triangles()[i], world)) {
-      add_point(site, old_pairs_.triangles()[i], old_pairs_.places()[i], world, pairs, out);
-      continue;
+    if (is_old && !surface_.is_gone(old_pairs_.triangles()[i])) {
+      const auto triangle = old_pairs_.triangles()[i];
+      const auto pace = pace_of(site, triangle);
+      if (pace == Pace::Asleep || (pace == Pace::Still && !is_due(site, world))) {
+        add_pair(site, triangle, old_pairs_.places()[i], pace, world, pairs, out);
+        continue;
+      }
     }
+    const bool looks = stirred_stamp_[site] == tick_current_ || looks_at_all(site, world);
     ClosestPoint closest;
     Touch touch;
     if ((is_old && stays(site, old_pairs_.triangles()[i], world, closest, touch)) ||
-        (is_listed && meets(site, runs[r].first, end_of_run(r), world, closest, touch))) {
+        (is_listed && looks && meets(site, runs[r].first, end_of_run(r), world, closest, touch))) {
       ++pairs_looked_at_;
-      add_point(site, closest.triangle, {closest.weights, touch.normal, touch.shift}, world, pairs,
-                out);
+      add_pair(site, closest.triangle, {closest.weights, touch.normal, touch.shift},
+               std::max(Pace::Still, pace_of(site, closest.triangle)), world, pairs, out);
     }
   }
   std::ranges::sort(out.self_seeds);

@@ -20,8 +20,12 @@
 // their own: a node at the rim has a normal of each, and a node on a wound meets the other side of
 // wounds first. A pair whose triangle an edit has replaced goes on with what is there now.
 //
-// A pair that hardly moves stays where it lies for up to kLookEvery ticks: a node slower than
-// kStill_m_s gets less than a micrometre away from there. Where it lies is state, too.
+// Tissue at rest costs little. A pair that hardly moves stays where it lies for kLookEvery ticks:
+// a node slower than kStill_m_s gets 6 um away from there. Where it lies is state, too. Such a pair
+// is given to the solver only while it presses, and is no reason to sweep its surroundings more. A
+// node that is so slow looks for new pairs only with nodes that are faster, and for others every
+// kLookEvery ticks. Pairs of nodes that are asleep (server/tissue/pieces) stay as they are and are
+// given to nobody.
 //
 // Work: pairs of nodes that can come near are listed with slack, and again for those nodes that
 // have moved a part of it: O(surface nodes + these x their surroundings), over several ticks. Every
@@ -48,7 +52,7 @@ inline constexpr float kSelfStiffnessPaPerM = 5e7f;
 inline constexpr float kSelfMargin_m = 0.001f, kSelfMaxMargin_m = 0.003f;
 inline constexpr float kSelfTicksAhead = 1.5f;
 inline constexpr float kStill_m_s = 1e-4f;
-inline constexpr Tick kLookEvery = 8;
+inline constexpr Tick kLookEvery = 64;
 
 // A place is where a node lay on its triangle when the pair was last looked at.
 struct SelfContactPlace {
@@ -108,6 +112,9 @@ class SelfContactFinder {
   // The world has its new nodes.
   void update(const topology::SurfaceEdit& edit, const world::World& world);
 
+  // These nodes are somewhere else than surface_moved() says. Ascending, or in ascending runs.
+  void relocated(std::span<const NodeIndex> nodes, const world::World& world);
+
   // Lists made, and pairs of nodes in the last one.
   std::uint64_t lists_made() const { return lists_made_; }
   std::size_t pairs_listed() const { return list_.pairs.size(); }
@@ -122,6 +129,9 @@ class SelfContactFinder {
   // kListedSlacks + 1/2, unless it faced something this near at rest.
   static constexpr float kReferenceSlacks = 0.25f;
   static constexpr float kListedSlacks = 0.5f, kMovedSlacks = kListedSlacks + 0.5f;
+
+  // How a node moves: not at all for it is asleep, hardly, or faster.
+  enum class Pace : std::uint8_t { Asleep, Still, Moves };
 
   struct NodePair {
     Site node = 0, across = 0;
@@ -170,7 +180,8 @@ class SelfContactFinder {
   void list_around(Site site);
   void extend();
   void set_reference(Site site, const world::World& world, List& list) const;
-  void list_edit(List& list);
+  // The pairs that these nodes are in and that the list lacks, into found_.
+  void list_pairs_of(std::span<const Site> sites, List& list);
   static void add_to_list(std::vector<NodePair>& found, List& list);
   bool looks_around(Site site, const List& list) const;
   bool may_meet(Site site, Site other, const List& list) const;
@@ -212,9 +223,16 @@ class SelfContactFinder {
              ClosestPoint& closest, Touch& touch);
   bool stays(Site site, TriangleIndex triangle, const world::World& world, ClosestPoint& closest,
              Touch& touch);
-  bool lies_still(Site site, TriangleIndex triangle, const world::World& world) const;
-  void add_point(Site site, TriangleIndex triangle, const Place& place, const world::World& world,
-                 SelfContactTable& pairs, ContactList& out) const;
+  bool is_due(Site site, const world::World& world) const {
+    return (world.tick + site) % kLookEvery == 0;
+  }
+  void find_pace(const world::World& world);
+  // Returns whether the node looks for a pair with whatever is near, not only with what moves.
+  bool looks_at_all(Site site, const world::World& world) const;
+  // Returns the fastest pace of a node and a triangle's corners.
+  Pace pace_of(Site site, TriangleIndex triangle) const;
+  void add_pair(Site site, TriangleIndex triangle, const Place& place, Pace pace,
+                const world::World& world, SelfContactTable& pairs, ContactList& out) const;
 
   SelfSurface surface_;
   std::vector<std::uint8_t> is_close_at_rest_;  // per node: something may face it there
@@ -240,7 +258,11 @@ class SelfContactFinder {
   std::vector<Site> grid_sites_;      // what it numbers
 
   // Scratch.
+  std::vector<Pace> paces_;                // per node, of this tick; for surface nodes
+  bool is_any_awake_ = true;               // of these
   std::vector<std::uint32_t> near_stamp_;  // per node
+  // Per node: in this tick a node that moves is listed with it.
+  std::vector<std::uint32_t> stirred_stamp_;
   std::uint32_t near_current_ = 0;
   // These normals are of this tick where their stamp is tick_current_. normals_ has one per node
   // and sort; ups_ has one per triangle, as long as twice its area.
@@ -249,7 +271,7 @@ class SelfContactFinder {
   std::uint32_t tick_current_ = 0;
   SelfContactTable old_pairs_;
   std::vector<NodePair> found_;  // of an edit
-  std::vector<Site> around_, looking_, corners_;
+  std::vector<Site> around_, looking_, corners_, relocated_;
 };
 
 }  // namespace trocar::contact

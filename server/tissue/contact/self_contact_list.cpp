@@ -60,6 +60,8 @@ void SelfContactFinder::extend() {
   }
   is_due_.resize(count);
   near_stamp_.resize(count);
+  stirred_stamp_.resize(count);
+  paces_.resize(count);
   normals_.resize(2 * count);
   normal_stamp_.resize(2 * count);
   ups_.resize(surface_.triangle_count());
@@ -87,7 +89,7 @@ void SelfContactFinder::update(const topology::SurfaceEdit& edit, const world::W
     is_due_[s] = 0;
     if (has_references || s < unseen) set_reference(s, world, next_list_);
   }
-  if (has_list_) list_edit(list_), add_to_list(found_, list_);
+  if (has_list_) list_pairs_of(surface_.updated(), list_), add_to_list(found_, list_);
   if (!is_listing_) return;
   const auto sites = surface_.sites();
   if (!has_references) {
@@ -95,8 +97,27 @@ void SelfContactFinder::update(const topology::SurfaceEdit& edit, const world::W
     return;
   }
   sites_seen_ = sites.size();
-  list_edit(next_list_);
+  list_pairs_of(surface_.updated(), next_list_);
   next_found_.insert(next_found_.end(), found_.begin(), found_.end());
+}
+
+// Their pairs are listed from where they are now. A list that is being made is begun again.
+void SelfContactFinder::relocated(std::span<const NodeIndex> nodes, const world::World& world) {
+  is_listing_ = false;
+  if (!has_list_) return;
+  relocated_.clear();
+  for (const auto node : nodes)
+    if (surface_.is_of_any(node.value)) {
+      relocated_.push_back(node.value);
+      set_reference(node.value, world, list_);
+    }
+  std::ranges::sort(relocated_);
+  const auto is_one = [&](Site s) { return std::ranges::binary_search(relocated_, s); };
+  for (std::size_t i = 0; i < list_.pairs.size(); ++i)
+    if (is_one(list_.pairs[i].node) || is_one(list_.pairs[i].across)) list_.far_until[i] = 0;
+  list_pairs_of(relocated_, list_);
+  add_to_list(found_, list_);
+  list_.least_distance = 0;
 }
 
 // Returns whether the node may meet nodes that do not look around themselves.
@@ -105,13 +126,12 @@ bool SelfContactFinder::looks_around(Site site, const List& list) const {
          surface_.is_of(site, Sort::Wound);
 }
 
-// The pairs that nodes of the last edit are in and that the list lacks, into found_. A list has
-// each pair from both sides or not at all.
-void SelfContactFinder::list_edit(List& list) {
+// A list has each pair from both sides or not at all.
+void SelfContactFinder::list_pairs_of(std::span<const Site> sites, List& list) {
   const float range = reach_m_ + slack_m_;
   const auto& references = list.references;
   trocar::Box<float> box;
-  for (const Site s : surface_.updated()) box.include(references[s]);
+  for (const Site s : sites) box.include(references[s]);
   box.grow(range);
   around_.clear();
   looking_.clear();
@@ -122,7 +142,7 @@ void SelfContactFinder::list_edit(List& list) {
   }
   found_.clear();
   float least_squared = list.least_distance * list.least_distance;
-  for (const Site s : surface_.updated()) {
+  for (const Site s : sites) {
     auto known = std::ranges::lower_bound(list.pairs, NodePair{s, 0});
     for (const Site other : looks_around(s, list) ? around_ : looking_) {
       const float squared = length_squared(references[s] - references[other]);

@@ -28,6 +28,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "common/base/assert.h"
 #include "server/tissue/contact/contact_law.h"
@@ -46,6 +47,11 @@ float sum(const Lanes& a) {
 }
 
 }  // namespace
+
+bool BlockDescent::is_swept(NodeIndex node, const world::World& world) {
+  const auto node_class = world.node_classes[node.value];
+  return node_class != world::NodeClass::Fixed && node_class != world::NodeClass::Asleep;
+}
 
 BlockDescent::BlockDescent(const organ::Organ& organ, const world::World& world, unsigned workers,
                            StrainScheme scheme)
@@ -85,8 +91,7 @@ void BlockDescent::read_state(const world::World& world) {
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
       const auto node = groups.nodes_of(g)[lane];
       if (!node.is_valid()) continue;
-      if (world.node_classes[node.value] != world::NodeClass::Fixed)
-        free_[g] = static_cast<std::uint8_t>(free_[g] | 1u << lane);
+      if (is_swept(node, world)) free_[g] = static_cast<std::uint8_t>(free_[g] | 1u << lane);
     }
   }
   read_motion(world);
@@ -110,11 +115,24 @@ void BlockDescent::use_linear_far_field(const world::World& world) {
   due_.reserve(all_groups_.size());
 }
 
+void BlockDescent::use_energies(std::span<const NodeIndex> nodes) {
+  for (const auto g : groups_with_energies_) has_energies_[g] = 0;
+  groups_with_energies_.clear();
+  for (const auto node : nodes) {
+    const Group g = tissue_.groups().slot_of(node) / kLanes;
+    if (std::exchange(has_energies_[g], std::uint8_t{1}) == 0) groups_with_energies_.push_back(g);
+  }
+}
+
 void BlockDescent::read_state(const world::World& world, std::span<const NodeIndex> nodes) {
   for (const auto node : nodes) {
     const Slot slot = tissue_.groups().slot_of(node);
     x_[slot] = to_float4(world.displacements[node.value]);
     v_[slot] = to_float4(world.velocities[node.value]);
+    auto& free = free_[slot / kLanes];
+    const unsigned lane = slot % kLanes;
+    free =
+        static_cast<std::uint8_t>((free & ~(1u << lane)) | unsigned{is_swept(node, world)} << lane);
   }
 }
 
@@ -322,7 +340,7 @@ void BlockDescent::relax(const SweepPlan& plan, Group group, const contact::Cont
   Float4* const x = &x_[group * kLanes];
   const Vec8 own = load_group(x);
   NodeStep8 step = inertia_of(group, own);
-  const bool is_linear = is_far_linear_ && near_.lanes[group] == 0 &&
+  const bool is_linear = is_far_linear_ && near_.lanes[group] == 0 && has_energies_[group] == 0 &&
                          group_stamp_[group] != current_ &&
                          linear_far_field_->add(group, lanes, inverse_dt_of(group), step);
   if (!is_linear) {

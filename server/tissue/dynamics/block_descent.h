@@ -104,11 +104,15 @@ class BlockDescent {
   // Displacements and velocities alone, of all nodes: whoever else moved them went on from this
   // solver's state.
   void read_motion(const world::World& world);
-  // The same for some nodes.
+  // Motion and classes of some nodes.
   void read_state(const world::World& world, std::span<const NodeIndex> nodes);
 
   // Makes ready for SolveSettings::has_linear_far_field, from the world as it is.
   void use_linear_far_field(const world::World& world);
+
+  // From now on, until the next call, groups with these nodes have no linear far field: they turn
+  // from step to step, which linear forces resist.
+  void use_energies(std::span<const NodeIndex> nodes);
 
   // Advances displacements and velocities by one step. near: distinct nodes that are not fixed.
   SolveReport solve(const contact::ContactList& contacts, std::span<const NodeIndex> near,
@@ -172,6 +176,8 @@ class BlockDescent {
   float write_back(const ExternalLoads& loads, world::World& world);
   float note_residuals(std::span<const NodeIndex> near);
   void resize_arrays();
+  // Returns whether the node is neither fixed nor asleep.
+  static bool is_swept(NodeIndex node, const world::World& world);
   void link_contacts(const contact::ContactList& contacts);
   void begin_groups(world::World& world, const ExternalLoads& loads);
   // Stress that has relaxed, where something relaxes.
@@ -229,7 +235,7 @@ class BlockDescent {
   bool has_explicit_strain_ = false;        // its forces are taken once per step
 
   std::vector<Constants> constants_;    // per group
-  std::vector<std::uint8_t> free_;      // per group: lanes of nodes that are not fixed
+  std::vector<std::uint8_t> free_;      // per group: lanes of nodes that is_swept() names
   std::vector<Float4> x_;               // per slot: displacements being solved, else the world's
   std::vector<Float4> v_;               // per slot: the world's velocities
   std::vector<Float4> start_;           // per slot: at the start of the step; begun groups
@@ -246,6 +252,8 @@ class BlockDescent {
   SweepPlan last_;       // the last sweep: of near_ and far_swept_
   std::unique_ptr<LinearFarField> linear_far_field_;  // null: not used
   bool is_far_linear_ = false;                        // in this step
+  std::vector<std::uint8_t> has_energies_;            // per group: see use_energies()
+  std::vector<Group> groups_with_energies_;           // of these
   bool has_far_solver_ = false;                       // likewise
   std::uint32_t far_interval_ = 1;                    // of this step
   float inverse_dt_ = 0;                              // of this step

@@ -19,27 +19,20 @@ void BlockDescent::refresh_relaxed_forces(world::World& world) {
     tissue_.relaxed_stress()->refresh(lanes, x_.data(), world.relaxation);
 }
 
-// In sessions, where far nodes are swept roughly, near ones take turns, too.
+// In sessions, where far nodes are swept roughly, near ones take turns as these do.
 void BlockDescent::end_relaxation(world::World& world, std::span<const NodeIndex> held) {
   auto* const relaxation = tissue_.relaxation();
   if (relaxation == nullptr) return;
-  const bool in_turns = far_.node_count > 0 || has_far_solver_;
   relaxed_.clear();
-  for (const auto g : near_.groups) relaxed_.add(g, near_.lanes[g]);
+  if (far_.node_count == 0 && !has_far_solver_)
+    for (const auto g : near_.groups) relaxed_.add(g, near_.lanes[g]);
   for (const auto node : held) relaxed_.add(tissue_.groups(), node);
   relaxed_lanes_.clear();
   for (const auto g : relaxed_.groups) relaxed_lanes_.push_back({g, relaxed_.lanes[g]});
-  relaxation->end_step(x_.data(), relaxed_lanes_, in_turns, world.relaxation, workers_);
+  relaxation->end_step(x_.data(), relaxed_lanes_, world.relaxation, workers_);
 
-  const auto is_turn_of = [&](Group group, std::uint32_t turns) {
-    return dynamics::Relaxation::is_turn_of(group, turns, world.relaxation.step());
-  };
-  relaxed_.clear();
-  for (const auto lanes : relaxed_lanes_)
-    if (!in_turns || is_turn_of(lanes.group, relaxation->near_turns()))
-      relaxed_.add(lanes.group, lanes.lanes);
   for (const auto g : all_groups_)
-    if (is_turn_of(g, relaxation->far_turns())) relaxed_.add(g, 0xff);
+    if (relaxation->is_turn_of(g, world.relaxation.step())) relaxed_.add(g, 0xff);
   for_each_group(relaxed_.groups, [&](Group g) {
     tissue_.relaxed_stress()->refresh({g, relaxed_.lanes[g]}, x_.data(), world.relaxation);
   });

@@ -22,6 +22,8 @@ void BlockDescent::resize_arrays() {
   for (auto* values : {&x_, &v_, &start_}) values->resize(slot_count);
   slot_stamp_.resize(slot_count);
   squared_moves_.resize(group_count);
+  has_energies_.resize(group_count);
+  groups_with_energies_.reserve(group_count);
   first_link_.resize(slot_count);
 }
 
@@ -42,7 +44,7 @@ UpdateReport BlockDescent::update_topology(const topology::Topology& topology,
       const float mass = has_node ? world.masses[node.value] : 0;
       constants_[g].mass.v[lane] = mass;
       constants_[g].damping.v[lane] = mass * static_cast<float>(material.node_damping_per_s);
-      const bool is_free = has_node && world.node_classes[node.value] != world::NodeClass::Fixed;
+      const bool is_free = has_node && is_swept(node, world);
       free_[g] = static_cast<std::uint8_t>((free_[g] & ~(1u << lane)) | unsigned{is_free} << lane);
       x_[g * kLanes + lane] = has_node ? to_float4(world.displacements[node.value]) : Float4{};
       v_[g * kLanes + lane] = has_node ? to_float4(world.velocities[node.value]) : Float4{};

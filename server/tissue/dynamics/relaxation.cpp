@@ -106,14 +106,9 @@ void Relaxation::update(const topology::Topology& topology, const Groups& groups
 void Relaxation::set_dt(float dt) {
   terms_.set_dt(dt);
   is_stale_ = true;
-  const auto turns_in = [dt](float time_s) {
-    std::uint32_t turns = 1;
-    while (turns < RelaxationTerms::kMostSteps / 2 && 2 * static_cast<float>(turns) * dt <= time_s)
-      turns *= 2;
-    return turns;
-  };
-  near_turns_ = turns_in(kNearTime_s);
-  far_turns_ = turns_in(kFarTime_s);
+  for (turns_ = 1;
+       turns_ < RelaxationTerms::kMostSteps / 2 && 2 * static_cast<float>(turns_) * dt <= kTurn_s;)
+    turns_ *= 2;
 }
 
 RelaxationTerms::Response Relaxation::response_of(const Block& block,
@@ -241,8 +236,7 @@ void Relaxation::begin_step(float dt, const world::RelaxationState& state, Worke
   });
 }
 
-void Relaxation::list_due(std::span<const GroupLanes> near, std::uint32_t near_turns,
-                          std::uint8_t step) {
+void Relaxation::list_due(std::span<const GroupLanes> nodes, std::uint8_t step) {
   due_.clear();
   const auto tets = static_cast<std::uint32_t>(blocks_.size());
   const auto all =
@@ -254,25 +248,23 @@ void Relaxation::list_due(std::span<const GroupLanes> near, std::uint32_t near_t
     due_stamp_[block] = current_;
     due_.push_back(block);
   };
-  for (const auto group_lanes : near)
+  for (const auto group_lanes : nodes)
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
       if (!group_lanes.has(lane)) continue;
-      for (const auto block : blocks_of_[group_lanes.group * kLanes + lane])
-        if (is_turn_of(block, near_turns, step)) add(block);
-      if (!nodal_relaxation_) continue;
       const auto slot = static_cast<Slot>(group_lanes.group * kLanes + lane);
-      if (const auto block = nodal_relaxation_->block_of(slot);
-          block != NodalRelaxation::kNoBlock && is_turn_of(tets + block, near_turns, step))
+      for (const auto block : blocks_of_[slot]) add(block);
+      if (!nodal_relaxation_) continue;
+      if (const auto block = nodal_relaxation_->block_of(slot); block != NodalRelaxation::kNoBlock)
         add(tets + block);
     }
-  for (auto run = step % far_turns_ * kRun; run < all; run += far_turns_ * kRun)
+  for (auto run = step % turns_ * kRun; run < all; run += turns_ * kRun)
     for (auto i = run; i < std::min(run + kRun, all); ++i) add(i);
 }
 
-void Relaxation::end_step(const Float4* x, std::span<const GroupLanes> near, bool near_in_turns,
+void Relaxation::end_step(const Float4* x, std::span<const GroupLanes> nodes,
                           world::RelaxationState& state, Workers& workers) {
   state.begin_step();
-  list_due(near, near_in_turns ? near_turns_ : 1, state.step());
+  list_due(nodes, state.step());
   workers.run([&](unsigned w) {
     const auto n = due_.size(), count = std::size_t{workers.count()};
     std::array<std::uint64_t, 2> differences{};

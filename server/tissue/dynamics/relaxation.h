@@ -11,10 +11,10 @@
 // one step (4e-4 of it for liver at 1 ms) that is gone after it: what has relaxed by then is a
 // stress that stays the same in the step, and with it the forces on nodes (relaxed_stress.h).
 //
-// Tets may take turns, and be advanced over as many steps at once, which is as exact; until then
-// what they have relaxed acts on as it was. Near what is solved a turn comes in each step, or,
-// where the rest is solved roughly, once in kNearTime_s; elsewhere once in kFarTime_s. In 4 ms
-// liver relaxes by 0.35 % of its stress at most. A step costs O(tets whose turn it is).
+// Tets take turns, and are advanced over as many steps at once, which is as exact; until then what
+// they have relaxed acts on as it was. A turn comes once in kTurn_s, or in each step near what is
+// solved where nothing is solved roughly. In 8 ms liver relaxes by 0.7 % of its stress at most.
+// A step costs O(tets whose turn it is).
 //
 // NodalStrain, where strain is averaged, relax as tets do (nodal_relaxation.h). Between steps the
 // state is world::RelaxationState.
@@ -34,7 +34,7 @@ using wire::RelaxationFigures;
 class Relaxation {
  public:
   static constexpr std::size_t kCorners = 4;
-  static constexpr float kNearTime_s = 0.004f, kFarTime_s = 0.008f;
+  static constexpr float kTurn_s = 0.008f;
 
   static bool is_needed(const organ::Organ& organ);
 
@@ -53,19 +53,16 @@ class Relaxation {
   void settle(const Float4* x, world::RelaxationState& state);
   // Before a step of so many seconds: loads().
   void begin_step(float dt, const world::RelaxationState& state, Workers& workers);
-  // After it: advances tets at near nodes, each of them or in turns, and others whose turn it is.
-  void end_step(const Float4* x, std::span<const GroupLanes> near, bool near_in_turns,
-                world::RelaxationState& state, Workers& workers);
+  // After it: advances tets at these nodes, and others whose turn it is.
+  void end_step(const Float4* x, std::span<const GroupLanes> nodes, world::RelaxationState& state,
+                Workers& workers);
   // After update(), once a step has been begun: their loads.
   void refresh(const world::RelaxationState& state);
   // O(tets / 8).
   RelaxationFigures figures() const;
-  // Steps from one turn to the next, near and elsewhere.
-  std::uint32_t near_turns() const { return near_turns_; }
-  std::uint32_t far_turns() const { return far_turns_; }
   // Whether it is the turn of a block of tets, or group of nodes, in this step of the state.
-  static bool is_turn_of(std::size_t index, std::uint32_t turns, std::uint8_t step) {
-    return index / kRun % turns == step % turns;
+  bool is_turn_of(std::size_t index, std::uint8_t step) const {
+    return index / kRun % turns_ == step % turns_;
   }
 
   // Returns the loads of relaxed stress: N/m per edge of each tet, along the edge as it is. Those
@@ -103,7 +100,7 @@ class Relaxation {
   std::uint64_t end_block(std::size_t index, const Float4* x, world::StressHistory& history,
                           RelaxationTerms::Constants& scratch);
   void list_blocks_of(const topology::Topology& topology, const Groups& groups, Slot slot);
-  void list_due(std::span<const GroupLanes> near, std::uint32_t near_turns, std::uint8_t step);
+  void list_due(std::span<const GroupLanes> nodes, std::uint8_t step);
 
   const organ::Organ& organ_;
   const NodalStrain* const nodal_strain_;
@@ -112,7 +109,7 @@ class Relaxation {
   std::vector<Block> blocks_;
   std::vector<RelaxationShares> shares_;
   static constexpr std::uint32_t kRun = 4;  // blocks, or groups, whose turn comes together
-  std::uint32_t near_turns_ = 1, far_turns_ = 1;
+  std::uint32_t turns_ = 1;                 // steps from one turn to the next
   std::vector<std::vector<std::uint32_t>> blocks_of_;  // per slot: of tets at its node
   std::vector<std::uint32_t> due_,
       due_stamp_;  // blocks of tets, then of smoothing domains; per block

@@ -23,12 +23,20 @@ void hand_out(const topology::Edit& edit, const world::World& world, ContactWork
   solve.solver.update_topology(edit.topology, world);  // and with it its far field
 }
 
+void hand_out_pieces(const world::World& world, ContactWork& contact, SolveWork& solve) {
+  solve.solver.read_state(world, solve.pieces.changed());
+  if (!solve.pieces.landed().empty()) contact.self_finder.relocated(solve.pieces.landed(), world);
+  solve.pieces.clear_changes();
+}
+
 void hand_out(const topology::Edit& edit, State& state, ContactWork& contact, NearWork& near,
               SolveWork& solve) {
   // The far field's nodes are given back first: new ones lie between nodes where these are.
   if (state.far_model) state.far_model->stop_for(edit, solve.solver, state.world);
   hand_out(edit, state);
+  solve.pieces.update(edit, state.world);
   hand_out(edit, state.world, contact, near, solve);
+  hand_out_pieces(state.world, contact, solve);
   solve.solver.refresh_relaxed_forces(state.world);
 }
 

@@ -15,6 +15,9 @@ void hand_out(const topology::Edit& edit, State& state);
 void hand_out(const topology::Edit& edit, const world::World& world, ContactWork& contact,
               NearWork& near, SolveWork& solve);
 
+// Tells solver and contacts what pieces have moved, woken or laid to rest.
+void hand_out_pieces(const world::World& world, ContactWork& contact, SolveWork& solve);
+
 // Hands an edit of this tick to both.
 void hand_out(const topology::Edit& edit, State& state, ContactWork& contact, NearWork& near,
               SolveWork& solve);

@@ -93,17 +93,17 @@ bool is_costly(const organ::Organ& organ) {
 SolveWork::SolveWork(const Scene& scene, unsigned workers, const world::World& uncut)
     : solver(scene.organ, uncut, workers, scene.strain_scheme),
       far_plan(solver.far_plan(kTickSeconds)),
-      has_linear_far_field(is_costly(scene.organ)) {
+      has_linear_far_field(is_costly(scene.organ)),
+      pieces(scene.organ) {
   if (has_linear_far_field) solver.use_linear_far_field(uncut);
 }
 
 // The solver begins with the organ as it was, whatever the state: plans and places follow from that
 // and from the edits since.
-StepContext::StepContext(const Scene& s, unsigned workers, const State& state)
+StepContext::StepContext(const Scene& s, unsigned workers, State& state)
     : StepContext(s, workers, world::World(s.organ), state) {}
 
-StepContext::StepContext(const Scene& s, unsigned workers, const world::World& uncut,
-                         const State& state)
+StepContext::StepContext(const Scene& s, unsigned workers, const world::World& uncut, State& state)
     : contact{.finder = contact::ContactFinder(s.organ),
               .self_finder = contact::SelfContactFinder(s.organ),
               .found = {},
@@ -133,6 +133,7 @@ StepContext::StepContext(const Scene& s, unsigned workers, const world::World& u
   if (!state.cuts.history().empty())
     hand_out({state.cuts.topology(), {}, {}}, state.world, contact, near, solve);
   solve.solver.read_state(state.world);
+  solve.pieces.read_state(state.cuts.topology(), state.world);
 }
 
 namespace {
@@ -207,6 +208,14 @@ Simulation::Simulation(std::shared_ptr<const Scene> scene, unsigned workers)
 
 Simulation Simulation::beside(unsigned workers) const {
   return {scene_, workers};
+}
+
+TickDecisions Simulation::with_sweeps_for_organ(TickDecisions decisions) const {
+  const bool is_soft = context_->solve.far_plan.sweeps == 1;
+  if (decisions.boundary != world::Boundary::Graded || !is_soft) return decisions;
+  decisions.sweeps = 3;
+  decisions.layer_sweeps = {2, 1, 1};
+  return decisions;
 }
 
 const TickReport& Simulation::tick(const hands::TickInputs& inputs,

@@ -32,6 +32,11 @@ class Simulation {
   // one what never changes, so that they may be used by two threads.
   Simulation beside(unsigned workers) const;
 
+  // Returns these decisions with the sweeps that this organ needs, if they are Graded. In soft
+  // tissue a node feels its own mass more than its neighbours in a tick: three sweeps where it is
+  // touched, and fewer beyond, keep contact forces as near to the solved ones as more everywhere.
+  TickDecisions with_sweeps_for_organ(TickDecisions decisions) const;
+
   // Simulates one tick. After a tick that publishes, pop_frame() has the frame. Returning to a
   // mark costs as much as beginning a session.
   const TickReport& tick(const hands::TickInputs& inputs, const TickDecisions& decisions);

@@ -23,15 +23,36 @@ std::uint32_t admit_inputs(const hands::TickInputs& inputs, Tick tick, hands::To
 
 namespace {
 
-ContactReport find_contacts(const State& state, bool has_self_contact,
-                            contact::SelfContactTable& self_contacts, ContactWork& contact) {
+// Tissue sleeps, and pieces move as a whole, where sweeps alone move it, every tick: not in
+// scenarios that load it, and not while a reduction moves it.
+bool may_rest(const TickDecisions& decisions, const ExternalLoads* loads, const State& state) {
+  return decisions.boundary == world::Boundary::Graded && decisions.policy.steps_per_tick == 1 &&
+         loads == nullptr && state.far_model == nullptr;
+}
+
+// Tissue that is touched wakes, and its pairs are there in the same tick.
+ContactReport find_contacts(State& state, bool has_self_contact, bool may_rest,
+                            ContactWork& contact, SolveWork& solve) {
+  if (!may_rest) {
+    solve.pieces.wake(state.world);
+    hand_out_pieces(state.world, contact, solve);
+  }
   auto& found = contact.found;
   contact.finder.find(
       {state.world, state.tools, state.claims, state.grasps, state.proxies, state.world.tick},
       found);
-  if (has_self_contact) contact.self_finder.find(state.world, self_contacts, found);
+  const auto find_self = [&] {
+    if (has_self_contact) contact.self_finder.find(state.world, state.self_contacts, found);
+  };
+  find_self();
+  if (solve.pieces.wake_touched(found, state.world)) {
+    hand_out_pieces(state.world, contact, solve);
+    found.points.resize(found.self_begin);
+    found.self_seeds.clear();
+    find_self();
+  }
   return {.nodes = static_cast<std::uint32_t>(found.seeds.size()),
-          .self_pairs = static_cast<std::uint32_t>(found.self_points().size()),
+          .self_pairs = static_cast<std::uint32_t>(state.self_contacts.nodes().size()),
           .is_full = found.dropped > 0,
           .has_tool_inside = found.tools_inside > 0};
 }
@@ -168,10 +189,12 @@ SolveReport solve(const contact::ContactList& contacts, const propagation::Propa
 }
 
 // These look only at what may have moved far enough, and are told how far that is.
-void note_motion(float largest_move_m, ContactWork& contact, CutWork& cut) {
-  contact.finder.surface_moved(largest_move_m);
+// Self-contact is told where a carried piece lands, and not how far it has been carried.
+void note_motion(float largest_move_m, float carried_m, ContactWork& contact, CutWork& cut) {
   contact.self_finder.surface_moved(largest_move_m);
-  cut.travel_m += static_cast<double>(largest_move_m);
+  const float any_move_m = std::max(largest_move_m, carried_m);
+  contact.finder.surface_moved(any_move_m);
+  cut.travel_m += static_cast<double>(any_move_m);
 }
 
 void note_solver(Tick tick, const std::optional<wire::SolverFigures>& before,
@@ -192,6 +215,29 @@ void find_tears(std::span<const NodeIndex> nodes, const contact::GraspTable& gra
   for (auto i = world.tick % kTicksPerFrame; i < nodes.size(); i += kTicksPerFrame)
     if (!grasps.holds(nodes[i])) may_tear.push_back(nodes[i]);
   cuts.tear(world, may_tear);
+}
+
+// Nothing is solved where all tissue sleeps.
+SolveReport solve_awake(const contact::ContactList& contacts, bool may_rest,
+                        const TickDecisions& decisions, ExternalLoads* loads, State& state,
+                        StepContext& context) {
+  auto& work = context.solve;
+  auto& pieces = work.pieces;
+  SolveReport report;
+  const bool is_asleep = may_rest && pieces.is_all_asleep();
+  if (may_rest) pieces.begin_step(state.world);
+  work.solver.use_energies(may_rest ? pieces.turning() : std::span<const NodeIndex>{});
+  if (!is_asleep)
+    report = solve(contacts, context.near.queue, decisions, loads, state.world,
+                   state.far_model.get(), context.near.active, work);
+  pieces::Pieces::Motion motion;
+  if (may_rest) {
+    motion = pieces.end_step(contacts, state.world);
+    hand_out_pieces(state.world, context.contact, work);
+  }
+  report.largest_move_m += motion.awake_m;
+  note_motion(report.largest_move_m, motion.carried_m, context.contact, context.cut);
+  return report;
 }
 
 // An edit of the topology goes to all of the state, and to the work that follows from it.
@@ -302,16 +348,15 @@ void run_tick(const hands::TickInputs& inputs, const TickDecisions& decisions, E
     before = now;
   };
 
+  const bool has_rest = may_rest(decisions, loads, state);
   report.inputs_dropped = admit_inputs(inputs, world.tick, state.tools, state.claims, state.grasps);
   end(Stage::Admit);
-  report.contact =
-      find_contacts(state, decisions.policy.has_self_contact, state.self_contacts, context.contact);
+  report.contact = find_contacts(state, decisions.policy.has_self_contact, has_rest,
+                                 context.contact, context.solve);
   end(Stage::Contacts);
   report.near = fill_queue(contacts, loads, decisions, world, context.near);
   end(Stage::Queue);
-  report.solve = solve(contacts, queue, decisions, loads, world, state.far_model.get(),
-                       context.near.active, context.solve);
-  note_motion(report.solve.largest_move_m, context.contact, context.cut);
+  report.solve = solve_awake(contacts, has_rest, decisions, loads, state, context);
   note_solver(world.tick, solver_before, report.solve.figures.solver, context.outbox);
   end(Stage::Solve);
   state.proxies.update(contacts, world, state.tools);

@@ -13,6 +13,7 @@
 #include "server/tissue/dynamics/far_field_model.h"
 #include "server/tissue/hands/claims.h"
 #include "server/tissue/hands/tool_table.h"
+#include "server/tissue/pieces/pieces.h"
 #include "server/tissue/propagation/active_set.h"
 #include "server/tissue/propagation/queue.h"
 #include "server/tissue/step/external_loads.h"
@@ -91,6 +92,7 @@ struct SolveWork {
   dynamics::FarPlan far_plan;
   bool has_linear_far_field;
   std::array<dynamics::SweepBand, kSweepLayers> bands{};  // of swept nodes, by layer
+  pieces::Pieces pieces;
 };
 
 struct CutWork {
@@ -106,9 +108,9 @@ struct Outbox {
 };
 
 struct StepContext {
-  StepContext(const Scene& scene, unsigned workers, const State& state);
+  StepContext(const Scene& scene, unsigned workers, State& state);
   // uncut: the world of the organ as it was at first.
-  StepContext(const Scene& scene, unsigned workers, const world::World& uncut, const State& state);
+  StepContext(const Scene& scene, unsigned workers, const world::World& uncut, State& state);
 
   ContactWork contact;
   NearWork near;

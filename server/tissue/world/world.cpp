@@ -13,7 +13,8 @@ World::World(const organ::Organ& organ)
       node_classes(organ.mesh.node_count(), NodeClass::Far),
       quiet_ticks(organ.mesh.node_count()),
       far_poses(organ.mesh.node_count()),
-      relaxation(organ) {
+      relaxation(organ),
+      still_ticks(1) {
   const auto& mesh = organ.mesh;
   rest_positions.reserve(mesh.node_count());
   masses.reserve(mesh.node_count());
@@ -94,10 +95,11 @@ void World::visit_state(StateArchive& archive) {
   archive.fixed_array(quiet_ticks);
   far_poses.visit_state(archive);
   relaxation.visit_state(archive);
+  archive.sized_array(still_ticks, static_cast<std::uint32_t>(node_count() + 1));
   if (!archive.is_reading()) return;
   if (boundary > Boundary::Whole) archive.fail();
   for (std::size_t i = 0; i < node_count(); ++i)
-    if (node_classes[i] > NodeClass::Active || !is_finite(displacements[i]) ||
+    if (node_classes[i] > NodeClass::Asleep || !is_finite(displacements[i]) ||
         !is_finite(velocities[i]))
       archive.fail();
 }

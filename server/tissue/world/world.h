@@ -23,6 +23,7 @@ enum class NodeClass : std::uint8_t {
   Fixed = 0,   // held by ligaments: never moves
   Far = 1,     // away from all contacts: at rest (Frozen), or swept less (Graded)
   Active = 2,  // in the queue, or not long ago
+  Asleep = 3,  // of tissue that rests, or flies as a rigid body (server/tissue/pieces)
 };
 
 // Nodes outside the queue do one of these.
@@ -62,6 +63,8 @@ struct World {
   std::vector<std::uint16_t> quiet_ticks;  // ticks in a row below the freezing thresholds
   FarPoses far_poses;                      // about which the far field is linear
   RelaxationState relaxation;              // of stresses, per tet
+  // Ticks in a row in which the body, and each free piece, hardly moved (server/tissue/pieces).
+  std::vector<std::uint16_t> still_ticks;
 
   // Brings all arrays up to date with an edit of the topology. Nodes whose elements have changed
   // are active: what a wound sets free is swept like what is touched, for a while.

@@ -1,0 +1,258 @@
+// This program measures ticks in which nobody touches the tissue, without a network: after a blade
+// was waved in the liver, after minutes of cutting, and while a free piece falls. It prints medians
+// of thread CPU time by stage beside those of the uncut organ; the state hash says that it is the
+// same work.
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cinttypes>
+#include <cmath>
+#include <cstdio>
+
+#include "common/base/cpu.h"
+#include "common/math/box.h"
+#include "server/organs/catalogue/builtin_organs.h"
+#include "server/tissue/step/simulation.h"
+
+namespace trocar {
+namespace {
+
+constexpr const char* kProgram = "bench_rest";
+
+struct Options {
+  std::vector<std::string> scenes{"wave", "minutes", "fall"};
+  bool is_measured = false;
+  double wave_s = 15, minutes = 1, fall_s = 1;
+};
+
+Box<float> box_of(const organ::Organ& organ) {
+  Box<float> box;
+  for (const auto& p : organ.mesh.rest_positions) box.include(to_float(p));
+  return box;
+}
+
+// Ticks of one stretch of a session.
+struct Stretch {
+  std::array<std::vector<std::uint32_t>, step::kStageCount> stages;
+  std::vector<std::uint32_t> totals;
+  double active = 0, pairs = 0;
+
+  void add(const step::TickReport& report) {
+    std::uint32_t total = 0;
+    for (std::size_t s = 0; s < stages.size(); ++s) {
+      stages[s].push_back(report.stage_cpu_ns[s]);
+      total += report.stage_cpu_ns[s];
+    }
+    totals.push_back(total);
+    active += report.near.active_nodes;
+    pairs += report.contact.self_pairs;
+  }
+};
+
+double part_us(std::vector<std::uint32_t> ns, double share) {
+  std::ranges::sort(ns);
+  return ns.empty() ? 0 : 1e-3 * ns[static_cast<std::size_t>(share * double(ns.size() - 1))];
+}
+
+void print(const char* title, const Stretch& stretch) {
+  const auto count = static_cast<double>(std::max<std::size_t>(1, stretch.totals.size()));
+  const auto stage = [&](step::Stage s) {
+    return part_us(stretch.stages[static_cast<std::size_t>(s)], 0.5);
+  };
+  std::printf(
+      "  %-28s tick %6.0f p99 %6.0f worst %6.0f us: contacts %5.0f queue %4.0f solve %5.0f hash "
+      "%3.0f; %4.0f active nodes, %4.0f pairs\n",
+      title, part_us(stretch.totals, 0.5), part_us(stretch.totals, 0.99),
+      part_us(stretch.totals, 1), stage(step::Stage::Contacts), stage(step::Stage::Queue),
+      stage(step::Stage::Solve), stage(step::Stage::Hash), stretch.active / count,
+      stretch.pairs / count);
+}
+
+class Session {
+ public:
+  explicit Session(organ::Organ organ, float edge_m = 0.12f)
+      : box_(box_of(organ)), simulation_(std::move(organ)) {
+    hands::HandJoin join{.slot = {0}};
+    join.shapes[0] = {.radius_m = 0.001f, .length_m = 0.3f, .edge_m = edge_m};
+    inputs_.joins.push_back(join);
+  }
+
+  const step::Simulation& simulation() const { return simulation_; }
+  const Box<float>& box() const { return box_; }
+
+  void put(const Vec3f& tip, tool::Verb verb) {
+    inputs_.samples.push_back({tool_slot({0}, 0), {{tip, rotation_from_z({0, 1, 0})}, verb}});
+  }
+  const step::TickReport& tick() {
+    const auto& report = simulation_.tick(inputs_, {});
+    inputs_.clear();
+    simulation_.pop_frame();
+    return report;
+  }
+  Stretch run(double seconds) {
+    Stretch stretch;
+    for (int i = 0; i < static_cast<int>(1000 * seconds); ++i) stretch.add(tick());
+    return stretch;
+  }
+  void end() {
+    const auto& topology = simulation_.state().cuts.topology();
+    std::printf("  %zu nodes, %zu tets, %zu surface vertices, hash %016" PRIx64 "\n",
+                topology.node_count(), topology.tet_count(), simulation_.layout().vertex_count(),
+                simulation_.state_hash());
+    std::fflush(stdout);
+  }
+
+ private:
+  Box<float> box_;
+  step::Simulation simulation_;
+  hands::TickInputs inputs_;
+};
+
+organ::Organ liver(const Options& options) {
+  auto organ = options.is_measured ? catalogue::make_measured_liver() : catalogue::make_liver();
+  return std::move(*organ);
+}
+
+// The tip goes to and fro along x at 25 cm/s while it wanders slowly along z.
+Vec3f wave(const Box<float>& box, double seconds, double wander_hz) {
+  const auto turn = [](double phase) { return static_cast<float>(std::sin(2 * M_PI * phase)); };
+  const Vec3f mid = (box.least + box.most) * 0.5f, half = (box.most - box.least) * 0.5f;
+  return mid + Vec3f{half.x * 0.6f * turn(seconds * 0.6), half.y * 0.2f * turn(seconds * 0.31),
+                     half.z * 0.7f * turn(seconds * wander_hz)};
+}
+
+void wave(const Options& options) {
+  std::printf("a blade is waved for %.0f s, then nobody touches\n", options.wave_s);
+  Session session(liver(options));
+  session.run(0.2);
+  print("uncut", session.run(0.5));
+  const int ticks = static_cast<int>(options.wave_s * 1000);
+  for (int i = 0; i < ticks; ++i) {
+    if (i % 4 == 0) session.put(wave(session.box(), i * 1e-3, 0.23), tool::Verb::Cut);
+    session.tick();
+  }
+  session.put({0, 0.5f, 0}, tool::Verb::None);
+  session.run(1);
+  print("1 s after the blade", session.run(1));
+  session.run(2);
+  print("4 s after the blade", session.run(1));
+  session.end();
+}
+
+// Strokes of 4 cm, 2 cm deep, at 5 cm/s, one each 3 s at places all over the organ.
+void minutes(const Options& options) {
+  std::printf("one cutter for %.1f minutes\n", options.minutes);
+  Session session(liver(options));
+  session.run(0.2);
+  print("uncut", session.run(0.5));
+  const auto& box = session.box();
+  const int strokes = static_cast<int>(options.minutes * 20);
+  for (int stroke = 0; stroke < strokes; ++stroke) {
+    const float a = std::fmod(static_cast<float>(stroke) * 0.618034f, 1.0f),
+                b = std::fmod(static_cast<float>(stroke) * 0.754877f, 1.0f);
+    const Vec3f size = box.most - box.least;
+    const Vec3f place =
+        box.least + Vec3f{size.x * (0.15f + 0.7f * a), 0.6f * size.y, size.z * (0.15f + 0.7f * b)};
+    const float angle = 2.39996f * static_cast<float>(stroke);
+    const Vec3f way{std::cos(angle), 0, std::sin(angle)};
+    Stretch during;
+    for (int i = 0; i < 3000; ++i) {
+      const float along = 0.05f * static_cast<float>(i) * 1e-3f - 0.02f;
+      if (i % 4 == 0) {
+        if (i < 800)
+          session.put(place + way * along, tool::Verb::Cut);
+        else
+          session.put({0, 0.5f, 0}, tool::Verb::None);
+      }
+      during.add(session.tick());
+    }
+    if ((stroke + 1) % 20 == 0) {
+      char title[64];
+      std::snprintf(title, sizeof title, "minute %d", (stroke + 1) / 20);
+      print(title, during);
+    }
+  }
+  session.run(1);
+  print("1 s after", session.run(1));
+  // The blade presses flat, with its side, as a finger would: nothing rests.
+  const Vec3f top{0, box.most.y, 0.5f * (box.least.z + box.most.z)};
+  Stretch pressing;
+  for (int i = 0; i < 1000; ++i) {
+    const float depth = 0.01f * std::sin(0.00314159f * static_cast<float>(i));
+    if (i % 4 == 0) session.put(top - Vec3f{0, depth, 0}, tool::Verb::Push);
+    pressing.add(session.tick());
+  }
+  print("while a tool presses", pressing);
+  session.end();
+}
+
+// The lower part of the liver, cut off level, under gravity.
+void fall(const Options& options) {
+  std::printf("a piece is cut off and falls for %.1f s\n", options.fall_s);
+  auto organ = liver(options);
+  organ.gravity_m_s2 = {0, -9.81, 0};
+  Session session(std::move(organ), 0.2f);
+  const auto& box = session.box();
+  const auto lowest = [&] {
+    const auto& world = session.simulation().state().world;
+    NodeIndex found(0);
+    for (const auto node : world.surface_nodes)
+      if (world.position(node).y < world.position(found).y) found = node;
+    return found;
+  };
+  session.run(0.2);
+  print("uncut", session.run(0.5));
+  // The edge stands upright at one x and sweeps through that end along z.
+  const float x = box.least.x + 0.8f * (box.most.x - box.least.x);
+  const int ticks = static_cast<int>(10 * 1000 * (box.most.z - box.least.z + 0.04f));
+  Stretch falling;
+  float fastest = 0;
+  const auto watch = [&] {
+    const auto& report = session.tick();
+    const auto& world = session.simulation().state().world;
+    const auto node = lowest();
+    const float y = world.position(node).y, speed = -world.velocities[node.value].y;
+    if (y > box.least.y - 0.06f || speed < 0.01f) return;
+    falling.add(report);
+    fastest = std::max(fastest, speed);
+  };
+  for (int i = 0; i < ticks; ++i) {
+    if (i % 4 == 0)
+      session.put({x, box.least.y - 0.08f, box.least.z - 0.02f + 1e-4f * static_cast<float>(i)},
+                  tool::Verb::Cut);
+    watch();
+  }
+  session.put({0, 0.5f, 0}, tool::Verb::None);
+  for (int i = 0; i < static_cast<int>(1000 * options.fall_s); ++i) watch();
+  print("while the piece falls", falling);
+  print("then", session.run(0.2));
+  const auto& world = session.simulation().state().world;
+  std::printf("  it fell for %zu ms, at %.2f m/s at last; its lowest node is at %.3f m, %.3f m/s\n",
+              falling.totals.size(), static_cast<double>(fastest),
+              static_cast<double>(world.position(lowest()).y),
+              static_cast<double>(world.velocities[lowest().value].y));
+  session.end();
+}
+
+}  // namespace
+}  // namespace trocar
+
+int main(int argc, char** argv) {
+  using namespace trocar;
+  require_cpu_features(kProgram);
+  Options options;
+  CLI::App app{"CPU time of ticks in which cut tissue is at rest", kProgram};
+  app.add_option("scenes", options.scenes, "wave, minutes, fall")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"wave", "minutes", "fall"}));
+  app.add_flag("--measured", options.is_measured, "the measured liver, not the elastic one");
+  app.add_option("--wave", options.wave_s, "s of waving")->capture_default_str();
+  app.add_option("--minutes", options.minutes, "of cutting")->capture_default_str();
+  app.add_option("--fall", options.fall_s, "s of falling")->capture_default_str();
+  CLI11_PARSE(app, argc, argv);
+  for (const auto& scene : options.scenes) {
+    if (scene == "wave") wave(options);
+    if (scene == "minutes") minutes(options);
+    if (scene == "fall") fall(options);
+  }
+}
