@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <numbers>
 
+#include "client/render/drawing_priority.h"
 #include "client/replica/client_messages.h"
 #include "client/ui/away_text.h"
 #include "client/ui/hud_panels.h"
@@ -66,6 +67,10 @@ Picture::Picture(std::unique_ptr<render::GlContext> context, const ClientOptions
       overlays_(options.overlays),
       view_(options.view) {
   log::debug("drawing with {}", renderer_.description());
+  if (context_->is_software()) {
+    const int count = render::yield_to_other_work();
+    log::debug("drawing in software: {} threads yield to the tissue, the network and hands", count);
+  }
 }
 
 void Picture::frame_camera(const replica::Replica& replica) {

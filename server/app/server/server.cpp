@@ -232,7 +232,7 @@ LoopOptions Server::loop_options() const {
   if (decisions.boundary == world::Boundary::Graded) {
     rate.layer_sweeps =
         simulation_.context().solve.far_plan.with_sweeps(decisions.far_sweeps).sweeps;
-    // Where strain is averaged, turns change a fast hand's force by 2 to 10 % and save a tenth of a
+    // Turns change a fast hand's force by 2 to 10 % where strain is averaged, and save a tenth of a
     // tick.
     const bool is_averaged = simulation_.state().strain_scheme == dynamics::StrainScheme::Explicit;
     if (!is_averaged) rate.far_interval = control::kLongestFarInterval;
