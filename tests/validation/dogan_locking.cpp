@@ -10,10 +10,8 @@
 #include <map>
 #include <numeric>
 
-#include "server/lab/calibration/places.h"
-#include "server/lab/finite_elements/scenario_solve.h"
 #include "tests/validation/experiments.h"
-#include "tests/validation/measured_livers.h"
+#include "tests/validation/off_line.h"
 #include "tests/validation/organs.h"
 #include "tests/validation/scenario_text.h"
 
@@ -21,7 +19,6 @@ namespace trocar::validation {
 namespace {
 
 using finite_elements::ElementOrder;
-using finite_elements::ScenarioSolve;
 
 // How far quadratic and averaged tets may be off on the finest mesh that the live solver gets: a
 // bonded square has singular edges. In the short form the reference itself is coarse.
@@ -36,9 +33,6 @@ Bound of_mesh(const Lab& lab, const std::string& geometry) {
   return lab.is_short() && geometry == "press" ? aim.missed(kShortPressOnRecord) : aim;
 }
 
-// The patch of a liver that is pressed has this radius and is displaced so far.
-constexpr double kLockingPatch_mm = 12, kLockingPress_mm = 5;
-constexpr std::uint64_t kLockingSeed = 2011;
 constexpr double kRoughnessBound = 0.3;
 
 // Young's modulus and Poisson's ratio of C10 and K of table 1 in the live solver's neo-Hookean law.
@@ -144,26 +138,6 @@ const std::vector<Geometry>& geometries() {
   return kAll;
 }
 
-// Null where no equilibrium was found.
-std::unique_ptr<ScenarioSolve> off_line(const Lab& lab, const std::string& text,
-                                        ElementOrder order) {
-  auto parsed = scenario::parse_scenario_text(text, (lab.scenarios() / "locking.toml").string());
-  TROCAR_ASSERT(parsed.ok());
-  auto resolved = scenario::resolve(std::move(*parsed));
-  TROCAR_ASSERT(resolved.ok());
-  auto solve = ScenarioSolve::create(std::move(*resolved), {.order = order});
-  TROCAR_ASSERT(solve.ok());
-  while (!(*solve)->is_finished())
-    if (!(*solve)->step().is_converged) return nullptr;
-  return std::move(*solve);
-}
-
-// The first probe at the end; NaN where no equilibrium was found.
-Vec3d solve_off_line(const Lab& lab, const std::string& text, ElementOrder order) {
-  const auto solve = off_line(lab, text, order);
-  return solve ? solve->probe(0) : Vec3d{std::nan(""), std::nan(""), std::nan("")};
-}
-
 class LockingStudy {
  public:
   LockingStudy(const Lab& lab, Section& section, const Geometry& geometry)
@@ -180,14 +154,14 @@ class LockingStudy {
     return u;
   }
   std::vector<Vec3d> plain_displacements(int cells) const {
-    const auto solve = off_line(lab_, text(cells, false, 1), ElementOrder::Linear);
+    const auto solve = solve_off_line(lab_, text(cells, false, 1), ElementOrder::Linear);
     TROCAR_ASSERT(solve);
     return solve->displacements();
   }
 
   double finite_elements(int cells, ElementOrder order) const {
     show_progress(fmt::format("{}: {} cells, off-line", geometry_.name, cells));
-    return geometry_.value(solve_off_line(lab_, text(cells, false, 1), order)) * geometry_.per_si;
+    return geometry_.value(probe_off_line(lab_, text(cells, false, 1), order)) * geometry_.per_si;
   }
 
  private:
@@ -256,45 +230,6 @@ void measure_locking(const Lab& lab, Section& section, const Geometry& geometry)
                    std::abs(plain / reference - 1) / std::abs(averaged / reference - 1),
                    target(1.1, "averaging is worth its price"),
                    "Error of plain linear tets over that of tets with averaged strain.");
-}
-
-// A patch of a liver pressed in, on its own mesh, against quadratic elements of the same.
-void measure_liver(const Lab& lab, Section& section, const MeasuredLiver& liver, Table& table) {
-  const auto places = calibration::spread_places(liver.organ, 2, kLockingSeed);
-  const auto [young_pa, poisson] = elastic();
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    const auto name = fmt::format("locking-{}-{}", liver.name, i + 1);
-    const auto& p = liver.organ.mesh.rest_positions[places[i].node.value];
-    lab.keep_organ(name, liver.organ);
-    const auto text = [&](bool is_averaged) {
-      return organ_source(name + ".organ") +
-             fmt::format(
-                 "[material]\nelastic_law = \"neo-hookean\"\nyoung_modulus_pa = {:.9g}\n"
-                 "poisson_ratio = {:.9g}\naveraged_strain = {}\n\n[run]\nmode = \"static\"\n"
-                 "seconds = 1\nload_steps = 2\nover_relaxation = 1.8\ntolerance_n = 5e-5\n"
-                 "max_sweeps = 5000\n\n",
-                 young_pa, poisson, is_averaged) +
-             near_set("patch", p * 1e3, kLockingPatch_mm, true) +
-             displace("patch", {{0, {}}, {1, to_double(places[i].outward) * -kLockingPress_mm}}) +
-             "[[probe]]\nset = \"patch\"\nquantity = \"reaction\"\n";
-    };
-    const auto force_of = [](const Vec3d& reaction) { return length(reaction); };
-    const auto force_by = [&](ElementOrder order) {
-      show_progress(fmt::format("{}, place {}, off-line", liver.name, i + 1));
-      return force_of(solve_off_line(lab, text(false), order));
-    };
-    const double linear = force_by(ElementOrder::Linear),
-                 quadratic = force_by(ElementOrder::Quadratic);
-    const auto run = lab.start(section, "a liver, a patch pressed in", name, text(true));
-    lab.finish(section, *run);
-    const double averaged = force_of(run->probe(0));
-    const auto off = [&](double value) { return shown_percent(value / quadratic - 1); };
-    table.rows.push_back({liver.title, std::to_string(i + 1), shown(linear), off(linear),
-                          shown(averaged), off(averaged), shown(quadratic)});
-    section.compare(fmt::format("{}-{}", liver.name, i + 1), quadratic, averaged,
-                    target(kAveragedBound, "5 % of a press"), "N",
-                    "Live solver, averaged strain, against quadratic elements of the same mesh.");
-  }
 }
 
 // --- Pressure in the pressed block ---
@@ -449,13 +384,6 @@ void run_locking(const Lab& lab, Section& section) {
       young_pa, poisson));
   for (const auto& geometry : geometries()) measure_locking(lab, section, geometry);
   show_pressure(lab, section);
-  if (lab.is_short()) return;  // a coarse liver's patch is a node or two
-  Table table{fmt::format("A patch of {:g} mm radius pressed in by {:g} mm: force, N",
-                          kLockingPatch_mm, kLockingPress_mm),
-              {"liver", "place", "linear", "off", "averaged strain", "off", "quadratic, same mesh"},
-              {}};
-  for (const auto& liver : measured_livers(lab)) measure_liver(lab, section, liver, table);
-  section.add(std::move(table));
 }
 
 }  // namespace trocar::validation

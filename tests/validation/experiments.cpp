@@ -61,6 +61,7 @@ const std::vector<Experiment>& experiments() {
        run_propagation_stomach},
       {"ours/bar", "Bar in tension", "closed form: F L / (E A)", run_bar},
       {"ours/cantilever", "Thick cantilever", "closed form: Timoshenko", run_cantilever},
+      {"ours/presses", "Contact forces of four organs", "quadratic elements, our own", run_presses},
       {"ours/indentation", "Indentation of a half-space", "closed forms: Hertz; bonded flat punch",
        run_indentation},
   };

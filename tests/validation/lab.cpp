@@ -16,17 +16,13 @@ namespace {
 
 constexpr std::uint64_t kProgressEvery_ns = 300'000'000, kLogEvery_ns = 10'000'000'000;
 
-template <typename T>
-T must(Result<T> result, const std::string& name) {
-  if (!result) {
-    std::fprintf(stderr, "\ntrocar-validate: scenario %s: %s\n", name.c_str(),
-                 result.error().message.c_str());
-    std::exit(static_cast<int>(ExitCode::BadFile));
-  }
-  if constexpr (!std::is_void_v<T>) return std::move(*result);
-}
-
 }  // namespace
+
+void end_with(const std::string& scenario, const Error& error) {
+  std::fprintf(stderr, "\ntrocar-validate: scenario %s: %s\n", scenario.c_str(),
+               error.message.c_str());
+  std::exit(static_cast<int>(ExitCode::BadFile));
+}
 
 void show_progress(const std::string& text) {
   static const bool is_terminal = isatty(STDERR_FILENO) != 0;

@@ -9,6 +9,7 @@
 #include <memory>
 #include <string>
 
+#include "common/base/result.h"
 #include "server/lab/scenario/scenario_run.h"
 #include "tests/validation/report.h"
 
@@ -48,6 +49,16 @@ class Lab {
   std::filesystem::path scenarios_;
   bool is_short_;
 };
+
+// Says why the scenario cannot run, and ends the program.
+[[noreturn]] void end_with(const std::string& scenario, const Error& error);
+
+// Returns what a scenario needs, or ends the program.
+template <typename T>
+T must(Result<T> result, const std::string& scenario) {
+  if (!result) end_with(scenario, result.error());
+  if constexpr (!std::is_void_v<T>) return std::move(*result);
+}
 
 // One line on a terminal that is rewritten; nothing elsewhere.
 void show_progress(const std::string& text);

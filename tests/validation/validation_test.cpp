@@ -145,6 +145,7 @@ constexpr Family kFamilies[] = {
     {"ours/bar", "Bar", "springs"},
     {"ours/cantilever", "Cantilever", "springs"},
     {"ours/indentation", "Indentation", "hertz-springs"},
+    {"ours/presses", "Presses", "slab-worst"},
 };
 class EveryExperiment : public Validation, public ::testing::WithParamInterface<Family> {};
 
