@@ -1,0 +1,267 @@
+// This program plays a long session without a network: two blades cut all over an organ, stroke
+// after stroke, while a grasper draws the wounds open. Once a minute it prints what a tick, a frame
+// and the recording take by then. In the end it verifies the recording, jumps about in it, and says
+// how much somebody who joins late gets. Decisions are fixed, so that the hash can be repeated.
+
+#include <CLI/CLI.hpp>
+#include <cinttypes>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+
+#include "client/replay/replay_source.h"
+#include "client/replica/replica.h"
+#include "common/base/cpu.h"
+#include "common/base/log.h"
+#include "common/base/timing.h"
+#include "common/math/box.h"
+#include "server/app/server/simulation_loop.h"
+#include "server/organs/catalogue/load_organ.h"
+#include "server/session/recording/verify.h"
+#include "server/session/replication/frame_encoder.h"
+#include "server/session/replication/messages.h"
+
+namespace trocar {
+namespace {
+
+constexpr const char* kProgram = "bench_hour";
+constexpr Tick kMinute = 60'000;
+constexpr Tick kStroke = 3000, kStrokeCuts = 800;  // ticks, and those in which the blade cuts
+constexpr float kStrokeSpeed_m_s = 0.05f;
+constexpr int kHands = 3, kRetractor = 2;
+constexpr int kSeeks = 20;
+
+struct Options {
+  std::string organ = "liver", journal = "out/bench-hour.mcap";
+  int minutes = 60;
+};
+
+template <typename T>
+T must(Result<T> result) {
+  if (result) return std::move(*result);
+  std::fprintf(stderr, "%s: %s\n", kProgram, result.error().message.c_str());
+  std::exit(static_cast<int>(ExitCode::BadFile));
+}
+
+// What the program holds in memory now, MB.
+double memory_mb() {
+  std::ifstream file("/proc/self/statm");
+  std::size_t all = 0, resident = 0;
+  file >> all >> resident;
+  return static_cast<double>(resident) * 4096e-6;
+}
+
+// Where the hands are, as a function of the tick and of where the surface is.
+class Hands {
+ public:
+  explicit Hands(const step::Simulation& simulation) : simulation_(simulation) {
+    for (const auto& p : simulation.organ().mesh.rest_positions) box_.include(to_float(p));
+  }
+
+  static hands::HandJoin join_of(int hand) {
+    hands::HandJoin join{.slot = {static_cast<std::uint8_t>(hand)}};
+    join.shapes[0] = hand == kRetractor ? tool::ToolShape{}
+                                        : tool::ToolShape{.radius_m = 0.001f, .edge_m = 0.04f};
+    return join;
+  }
+
+  // Blades go by turns of half a stroke; the grasper draws at where the first blade has cut.
+  void move(Tick tick, participants::SimulationInbox& inbox) {
+    if (tick % 4 != 0) return;
+    for (int hand = 0; hand < kRetractor; ++hand) {
+      const Tick at = tick + static_cast<Tick>(hand) * kStroke / 2;
+      const auto stroke =
+          static_cast<std::uint32_t>(2 * (at / kStroke)) + static_cast<unsigned>(hand);
+      const Tick since = at % kStroke;
+      const float angle = 2.39996f * static_cast<float>(stroke);
+      const Vec3f way{std::cos(angle), 0, std::sin(angle)};
+      const float along = kStrokeSpeed_m_s * static_cast<float>(since) * 1e-3f - 0.02f;
+      const bool cuts = since < kStrokeCuts;
+      put(inbox, hand, cuts ? place_of(stroke) + way * along : Vec3f{0, 0.5f, 0},
+          cuts ? tool::Verb::Cut : tool::Verb::None);
+    }
+    draw(tick, inbox);
+  }
+
+ private:
+  Vec3f place_of(std::uint32_t stroke) const {
+    const float a = std::fmod(static_cast<float>(stroke) * 0.618034f, 1.0f),
+                b = std::fmod(static_cast<float>(stroke) * 0.754877f, 1.0f);
+    const Vec3f size = box_.most - box_.least;
+    return box_.least +
+           Vec3f{size.x * (0.15f + 0.7f * a), 0.6f * size.y, size.z * (0.15f + 0.7f * b)};
+  }
+  // After a stroke the grasper takes the nearest surface above it, and lifts it by 15 mm.
+  void draw(Tick tick, participants::SimulationInbox& inbox) {
+    const Tick since = tick % kStroke;
+    if (since < kStrokeCuts) return put(inbox, kRetractor, {0, 0.5f, 0.1f}, tool::Verb::None);
+    if (since < kStrokeCuts + 4)
+      grasped_ = nearest_above(place_of(static_cast<std::uint32_t>(2 * (tick / kStroke))));
+    const float lift =
+        0.015f * std::sin(static_cast<float>(M_PI) * static_cast<float>(since - kStrokeCuts) /
+                          static_cast<float>(kStroke - kStrokeCuts));
+    put(inbox, kRetractor, grasped_ + Vec3f{0, lift, 0}, tool::Verb::Grasp);
+  }
+  Vec3f nearest_above(const Vec3f& place) const {
+    const auto& world = simulation_.state().world;
+    Vec3f best = place;
+    float least = INFINITY;
+    for (const auto node : world.surface_nodes) {
+      const Vec3f p = world.position(node);
+      const float squared = length_squared(p - (place + Vec3f{0, 0.05f, 0}));
+      if (squared < least) least = squared, best = p;
+    }
+    return best;
+  }
+  static void put(participants::SimulationInbox& inbox, int hand, const Vec3f& tip,
+                  tool::Verb verb) {
+    inbox.push_sample({tool_slot({static_cast<std::uint8_t>(hand)}, 0),
+                       {{tip, rotation_from_z({0, 1, 0})}, verb}});
+  }
+
+  const step::Simulation& simulation_;
+  Box<float> box_;
+  Vec3f grasped_;
+};
+
+// Frames go to clients that keep up.
+class Wire {
+ public:
+  void take(const std::vector<step::SharedFrame>& frames) {
+    for (const auto& frame : frames) {
+      const auto before = encoder_.current();
+      encoder_.set_current(frame, 0);
+      ++frames_;
+      if (before) bytes_ += encoder_.delta_from(*before)->size() + encoder_.state()->size();
+    }
+  }
+  double bytes_per_frame() {
+    const double mean =
+        frames_ > 0 ? static_cast<double>(bytes_) / static_cast<double>(frames_) : 0;
+    frames_ = bytes_ = 0;
+    return mean;
+  }
+  // What somebody who joins now is sent before the first delta.
+  std::size_t join_bytes(const step::Simulation& simulation) {
+    return replication::encode_topology(simulation.layout(), simulation.organ().name)->size() +
+           encoder_.keyframe()->size();
+  }
+
+ private:
+  replication::FrameEncoder encoder_;
+  std::uint64_t frames_ = 0, bytes_ = 0;
+};
+
+void print_minute(int minute, const app::LoopReport& report, const step::Simulation& simulation,
+                  Wire& wire, double journal_mb) {
+  const auto& tick = report.times.tick;
+  const auto stage = [&](step::Stage s) {
+    return report.times.stages[static_cast<std::size_t>(s)].quantile_us(0.5);
+  };
+  const auto& topology = simulation.state().cuts.topology();
+  std::printf(
+      "| %6d | %6zu | %6zu | %5.0f | %5.0f | %6.0f | %5.0f | %5.0f | %5.0f | %5.0f | %6.2f |\n",
+      minute, topology.tet_count(), simulation.layout().vertex_count(), tick.quantile_us(0.5),
+      tick.quantile_us(0.99), tick.quantile_us(1), stage(step::Stage::Contacts),
+      stage(step::Stage::Solve), memory_mb(), wire.bytes_per_frame(), journal_mb);
+  std::fflush(stdout);
+}
+
+// Returns whether the recording is verified.
+bool verify(const Options& options) {
+  const auto begin = thread_cpu_ns();
+  const auto report = must(recording::verify_journal(options.journal));
+  const double seconds = static_cast<double>(thread_cpu_ns() - begin) * 1e-9;
+  std::printf("verify: %s, %" PRIu64 " ticks in %.1f s of CPU time: %.2f times real time %s\n",
+              recording::name_of(report.verdict()), report.ticks_verified, seconds,
+              static_cast<double>(report.ticks_verified) * 1e-3 / seconds, report.why().c_str());
+  return report.verdict() == recording::Verdict::Verified;
+}
+
+void seek(const Options& options) {
+  auto source = must(replay::ReplaySource::open(options.journal));
+  replica::Replica replica([](const proto::Envelope&) { return true; });
+  source->poll(replica);
+  source->pause();
+  std::vector<double> ms;
+  std::uint32_t random = 1;
+  for (int i = 0; i < kSeeks; ++i) {
+    random = random * 1664525u + 1013904223u;
+    const auto begin = thread_cpu_ns();
+    source->seek(random % static_cast<std::uint32_t>(source->last_tick()));
+    source->poll(replica);
+    ms.push_back(static_cast<double>(thread_cpu_ns() - begin) * 1e-6);
+  }
+  std::ranges::sort(ms);
+  std::printf("%d seeks: median %.1f ms, worst %.1f ms of CPU time; replica %s\n", kSeeks,
+              ms[ms.size() / 2], ms.back(),
+              replica.fault().ok() ? "in step" : replica.fault().error().message.c_str());
+}
+
+void play(const Options& options) {
+  const auto organ = must(catalogue::load_organ(options.organ));
+  step::Simulation simulation(organ);
+  const auto folder = std::filesystem::path(options.journal).parent_path();
+  if (!folder.empty()) std::filesystem::create_directories(folder);
+  const auto journal = must(app::open_journal(options.journal, organ, simulation.layout()));
+  participants::SimulationInbox inbox;
+  app::FrameHandover handover([] {});
+  std::vector<participants::Participant> present;
+  for (int hand = 0; hand < kHands; ++hand) {
+    const auto join = Hands::join_of(hand);
+    if (!inbox.try_push_join(join)) std::abort();
+    present.push_back(
+        {join.slot, "hand " + std::to_string(hand + 1), wire::Role::Surgeon, {join.shapes[0]}});
+  }
+  journal->record_participants(present, 0);
+  Hands hands(simulation);
+  Wire wire;
+  std::vector<step::SharedFrame> frames;
+  const auto decisions = simulation.with_sweeps_for_organ({});
+  double recorded_mb = 0;
+  std::printf("%s, two blades and a grasper; times are thread CPU time, us\n\n",
+              organ.name.c_str());
+  std::printf(
+      "| minute | tets | surface vertices | tick | 99th | worst | contacts | solve | memory "
+      "(MB) | bytes a frame | recorded (MB) |\n"
+      "|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n");
+  for (int minute = 1; minute <= options.minutes; ++minute) {
+    app::SimulationLoop loop(
+        simulation, inbox, handover, journal.get(),
+        {.decisions = decisions, .rate = {}, .tick_count = static_cast<Tick>(minute) * kMinute},
+        [] {});
+    do {
+      hands.move(simulation.current_tick(), inbox);
+      handover.pop_all(frames);
+      wire.take(frames);
+    } while (!loop.run_tick());
+    const double mb = static_cast<double>(std::filesystem::file_size(options.journal)) * 1e-6;
+    print_minute(minute, loop.report(), simulation, wire, mb - recorded_mb);
+    recorded_mb = mb;
+  }
+  std::printf("\nstate hash %016" PRIx64 "; who joins late is sent %.0f kB\n",
+              simulation.state_hash(), static_cast<double>(wire.join_bytes(simulation)) * 1e-3);
+  const auto closed = journal->close();
+  if (!closed) std::printf("recording: %s\n", closed.error().message.c_str());
+}
+
+}  // namespace
+}  // namespace trocar
+
+int main(int argc, char** argv) {
+  using namespace trocar;
+  require_cpu_features(kProgram);
+  Options options;
+  CLI::App app{"A long session of cutting: what a tick, a frame and the recording take", kProgram};
+  app.add_option("--organ", options.organ, "as trocar-server's")->capture_default_str();
+  app.add_option("--minutes", options.minutes, "simulated")
+      ->check(CLI::Range(1, 600))
+      ->capture_default_str();
+  app.add_option("--journal", options.journal, "recording to make")->capture_default_str();
+  CLI11_PARSE(app, argc, argv);
+  play(options);
+  const bool is_verified = verify(options);
+  seek(options);
+  return static_cast<int>(is_verified ? ExitCode::Ok : ExitCode::Mismatch);
+}
