@@ -132,7 +132,7 @@ class SelfContactFinder {
   static constexpr float kReferenceSlacks = 0.25f;
   static constexpr float kListedSlacks = 0.5f, kMovedSlacks = kListedSlacks + 0.5f;
 
-  // What a node does in this tick: sleeps, waits for others to look, or looks for pairs.
+  // A node sleeps, waits for others to look, or looks for pairs in this tick.
   enum class Pace : std::uint8_t { Asleep, Waits, Looks };
 
   struct NodePair {
