@@ -55,9 +55,9 @@ Tick ticks_within(float way_m, float squared_speed) {
   return ticks;
 }
 
-// Returns whether it is the node's turn, which comes after so many ticks, a power of two.
-bool is_turn(std::uint32_t site, Tick interval, const world::World& world) {
-  return ((world.tick + site) & (interval - 1)) == 0;
+// Returns whether it is the turn of what comes every so many ticks, a power of two.
+bool is_turn(std::uint32_t phase, Tick interval, const world::World& world) {
+  return ((world.tick + phase) & (interval - 1)) == 0;
 }
 
 }  // namespace
@@ -317,8 +317,8 @@ void SelfContactFinder::find_pace(const world::World& world) {
     const float squared = length_squared(world.velocities[s]);
     const bool is_asleep =
         node_class == NodeClass::Asleep || (node_class == NodeClass::Fixed && squared == 0);
-    const bool looks =
-        node_class == NodeClass::Active || is_turn(s, ticks_within(kLookDrift_m, squared), world);
+    const bool looks = node_class == NodeClass::Active ||
+                       is_turn(phases_[s], ticks_within(kLookDrift_m, squared), world);
     paces_[s] = is_asleep ? Pace::Asleep : looks ? Pace::Looks : Pace::Waits;
     is_any_awake_ |= !is_asleep;
   }
@@ -330,8 +330,8 @@ bool SelfContactFinder::is_asleep(Site site, TriangleIndex triangle) const {
          });
 }
 
-Tick SelfContactFinder::interval_of(Site site, TriangleIndex triangle, const Vec3f& weights,
-                                    const world::World& world) const {
+float SelfContactFinder::squared_drift(Site site, TriangleIndex triangle, const Vec3f& weights,
+                                       const world::World& world) const {
   const auto& corners = surface_[triangle];
   const Vec3f& own = world.velocities[site];
   const Vec3f of_corner[] = {world.velocities[corners[0]] - own, world.velocities[corners[1]] - own,
@@ -340,8 +340,15 @@ Tick SelfContactFinder::interval_of(Site site, TriangleIndex triangle, const Vec
                                  of_corner[2] * weights.z);
   for (const Vec3f& v : of_corner)
     squared = std::max(squared, length_squared(v) * (1 / (kCornerDrifts * kCornerDrifts)));
+  return squared;
+}
+
+bool SelfContactFinder::is_due(Site site, TriangleIndex triangle, const Vec3f& weights,
+                               const world::World& world) const {
   const bool is_near = world.node_classes[site] == world::NodeClass::Active;
-  return ticks_within(is_near ? kNearDrift_m : kDrift_m, squared);
+  const auto interval = ticks_within(is_near ? kNearDrift_m : kDrift_m,
+                                     squared_drift(site, triangle, weights, world));
+  return is_turn(site, interval, world);
 }
 
 void SelfContactFinder::add_pair(Site site, TriangleIndex triangle, const Place& place,
@@ -363,7 +370,7 @@ void SelfContactFinder::add_pair(Site site, TriangleIndex triangle, const Place&
   };
   const Vec3f from = between([&](Site s) { return position(s, world); });
   const bool presses = dot(place.normal, from) <= place.shift;
-  const bool is_fast = interval_of(site, triangle, w, world) == 1;
+  const bool is_fast = ticks_within(kDrift_m, squared_drift(site, triangle, w, world)) == 1;
   const bool is_awaited = is_fast || world.node_classes[site] == world::NodeClass::Active;
   if (!is_awaited && !presses) return;
   const Vec3f at_rest = between([&](Site s) -> const Vec3f& { return world.rest_positions[s]; });
@@ -422,8 +429,7 @@ void SelfContactFinder::find(const world::World& world, SelfContactTable& pairs,
     if (is_old && !surface_.is_gone(old_pairs_.triangles()[i])) {
       const auto triangle = old_pairs_.triangles()[i];
       const auto& place = old_pairs_.places()[i];
-      if (is_asleep(site, triangle) ||
-          !is_turn(site, interval_of(site, triangle, place.weights, world), world)) {
+      if (is_asleep(site, triangle) || !is_due(site, triangle, place.weights, world)) {
         add_pair(site, triangle, place, world, pairs, out);
         continue;
       }

@@ -227,16 +227,21 @@ class SelfContactFinder {
              Touch& touch);
   void find_pace(const world::World& world);
   bool is_asleep(Site site, TriangleIndex triangle) const;
-  // Returns for how many ticks the pair may stay where it is.
-  Tick interval_of(Site site, TriangleIndex triangle, const Vec3f& weights,
-                   const world::World& world) const;
+  // Returns the squared speed at which a pair leaves its place, m2/s2.
+  float squared_drift(Site site, TriangleIndex triangle, const Vec3f& weights,
+                      const world::World& world) const;
+  // Returns whether the pair is looked at in this tick.
+  bool is_due(Site site, TriangleIndex triangle, const Vec3f& weights,
+              const world::World& world) const;
   void add_pair(Site site, TriangleIndex triangle, const Place& place, const world::World& world,
                 SelfContactTable& pairs, ContactList& out) const;
 
   SelfSurface surface_;
   std::vector<std::uint8_t> is_close_at_rest_;  // per node: something may face it there
-  float slack_m_ = 0, corner_reach_m_ = 0;      // see begin_list()
-  float reach_m_ = 0;                           // with the greatest margin
+  // Per node: neighbours look in the same ticks, so that in between nobody in a place looks.
+  std::vector<std::uint8_t> phases_;
+  float slack_m_ = 0, corner_reach_m_ = 0;  // see begin_list()
+  float reach_m_ = 0;                       // with the greatest margin
 
   bool has_list_ = false;
   double travel_ = 0;
