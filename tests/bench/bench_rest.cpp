@@ -1,7 +1,7 @@
 // This program measures ticks in which nobody touches the tissue, without a network: after a blade
-// was waved in the liver, after minutes of cutting, and while a free piece falls. It prints medians
-// of thread CPU time by stage beside those of the uncut organ; the state hash says that it is the
-// same work.
+// was waved in the liver, after minutes of cutting, and while a free piece falls; and ticks in
+// which a finger presses far from old wounds. It prints medians of thread CPU time by stage beside
+// those of the uncut organ; the state hash says that it is the same work.
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -20,9 +20,10 @@ namespace {
 constexpr const char* kProgram = "bench_rest";
 
 struct Options {
-  std::vector<std::string> scenes{"wave", "minutes", "fall"};
+  std::vector<std::string> scenes{"wave", "wound", "minutes", "fall"};
   bool is_measured = false;
   double wave_s = 15, minutes = 1, fall_s = 1;
+  int wounds = 5;
 };
 
 Box<float> box_of(const organ::Organ& organ) {
@@ -75,16 +76,19 @@ class Session {
     hands::HandJoin join{.slot = {0}};
     join.shapes[0] = {.radius_m = 0.001f, .length_m = 0.3f, .edge_m = edge_m};
     inputs_.joins.push_back(join);
+    join.slot = {1};
+    join.shapes[0] = {.radius_m = 0.008f, .length_m = 0.3f};
+    inputs_.joins.push_back(join);
   }
 
   const step::Simulation& simulation() const { return simulation_; }
   const Box<float>& box() const { return box_; }
 
-  void put(const Vec3f& tip, tool::Verb verb) {
-    inputs_.samples.push_back({tool_slot({0}, 0), {{tip, rotation_from_z({0, 1, 0})}, verb}});
+  void put(const Vec3f& tip, tool::Verb verb, std::uint8_t hand = 0) {
+    inputs_.samples.push_back({tool_slot({hand}, 0), {{tip, rotation_from_z({0, 1, 0})}, verb}});
   }
   const step::TickReport& tick() {
-    const auto& report = simulation_.tick(inputs_, {});
+    const auto& report = simulation_.tick(inputs_, simulation_.with_sweeps_for_organ({}));
     inputs_.clear();
     simulation_.pop_frame();
     return report;
@@ -92,6 +96,32 @@ class Session {
   Stretch run(double seconds) {
     Stretch stretch;
     for (int i = 0; i < static_cast<int>(1000 * seconds); ++i) stretch.add(tick());
+    return stretch;
+  }
+  // A finger presses the top at this x, once a second 10 mm deep.
+  Stretch press(float x, double seconds) {
+    Vec3f top = box_.least;
+    for (const auto& p : simulation_.state().world.rest_positions)
+      if (std::abs(p.x - x) < 0.01f && p.y > top.y) top = p;
+    Stretch stretch;
+    for (int i = 0; i < static_cast<int>(1000 * seconds); ++i) {
+      const auto turn = static_cast<float>(std::sin(M_PI * 1e-3 * i));
+      const float depth = 0.01f * turn * turn - 0.008f;
+      if (i % 4 == 0) put(top - Vec3f{0, depth, 0}, tool::Verb::Push, 1);
+      stretch.add(tick());
+    }
+    put({0, 0.5f, 0}, tool::Verb::None, 1);
+    return stretch;
+  }
+  // A stroke of 4 cm at 5 cm/s, and then nothing, in 3 s.
+  Stretch stroke(const Vec3f& middle, const Vec3f& way) {
+    Stretch stretch;
+    for (int i = 0; i < 3000; ++i) {
+      const float along = 0.05f * static_cast<float>(i) * 1e-3f - 0.02f;
+      if (i % 4 == 0 && i < 800) put(middle + way * along, tool::Verb::Cut);
+      if (i == 800) put({0, 0.5f, 0}, tool::Verb::None);
+      stretch.add(tick());
+    }
     return stretch;
   }
   void end() {
@@ -139,13 +169,36 @@ void wave(const Options& options) {
   session.end();
 }
 
-// Strokes of 4 cm, 2 cm deep, at 5 cm/s, one each 3 s at places all over the organ.
+// Strokes at one end of the organ; then a finger presses at the other.
+void wound(const Options& options) {
+  std::printf("a finger presses far from %d wounds\n", options.wounds);
+  Session session(liver(options));
+  const auto& box = session.box();
+  const Vec3f size = box.most - box.least;
+  const float pressed_x = box.least.x + 0.3f * size.x;
+  session.run(0.2);
+  print("uncut, pressed", session.press(pressed_x, 2));
+  session.run(1);
+  for (int i = 0; i < options.wounds; ++i) {
+    const float z = (static_cast<float>(i) + 0.5f) / static_cast<float>(options.wounds);
+    session.stroke(box.least + Vec3f{size.x * 0.7f, 0.6f * size.y, size.z * (0.2f + 0.6f * z)},
+                   {1, 0, 0});
+  }
+  session.run(1);
+  print("at rest", session.run(0.5));
+  print("cut, pressed", session.press(pressed_x, 2));
+  session.end();
+}
+
+// Strokes 2 cm deep, one each 3 s at places all over the organ.
 void minutes(const Options& options) {
   std::printf("one cutter for %.1f minutes\n", options.minutes);
   Session session(liver(options));
   session.run(0.2);
   print("uncut", session.run(0.5));
   const auto& box = session.box();
+  print("uncut, pressed", session.press(0.5f * (box.least.x + box.most.x), 2));
+  session.run(1);
   const int strokes = static_cast<int>(options.minutes * 20);
   for (int stroke = 0; stroke < strokes; ++stroke) {
     const float a = std::fmod(static_cast<float>(stroke) * 0.618034f, 1.0f),
@@ -154,18 +207,7 @@ void minutes(const Options& options) {
     const Vec3f place =
         box.least + Vec3f{size.x * (0.15f + 0.7f * a), 0.6f * size.y, size.z * (0.15f + 0.7f * b)};
     const float angle = 2.39996f * static_cast<float>(stroke);
-    const Vec3f way{std::cos(angle), 0, std::sin(angle)};
-    Stretch during;
-    for (int i = 0; i < 3000; ++i) {
-      const float along = 0.05f * static_cast<float>(i) * 1e-3f - 0.02f;
-      if (i % 4 == 0) {
-        if (i < 800)
-          session.put(place + way * along, tool::Verb::Cut);
-        else
-          session.put({0, 0.5f, 0}, tool::Verb::None);
-      }
-      during.add(session.tick());
-    }
+    const auto during = session.stroke(place, {std::cos(angle), 0, std::sin(angle)});
     if ((stroke + 1) % 20 == 0) {
       char title[64];
       std::snprintf(title, sizeof title, "minute %d", (stroke + 1) / 20);
@@ -174,15 +216,7 @@ void minutes(const Options& options) {
   }
   session.run(1);
   print("1 s after", session.run(1));
-  // The blade presses flat, with its side, as a finger would: nothing rests.
-  const Vec3f top{0, box.most.y, 0.5f * (box.least.z + box.most.z)};
-  Stretch pressing;
-  for (int i = 0; i < 1000; ++i) {
-    const float depth = 0.01f * std::sin(0.00314159f * static_cast<float>(i));
-    if (i % 4 == 0) session.put(top - Vec3f{0, depth, 0}, tool::Verb::Push);
-    pressing.add(session.tick());
-  }
-  print("while a tool presses", pressing);
+  print("while a finger presses", session.press(0.5f * (box.least.x + box.most.x), 2));
   session.end();
 }
 
@@ -242,16 +276,18 @@ int main(int argc, char** argv) {
   require_cpu_features(kProgram);
   Options options;
   CLI::App app{"CPU time of ticks in which cut tissue is at rest", kProgram};
-  app.add_option("scenes", options.scenes, "wave, minutes, fall")
+  app.add_option("scenes", options.scenes, "wave, wound, minutes, fall")
       ->capture_default_str()
-      ->check(CLI::IsMember({"wave", "minutes", "fall"}));
+      ->check(CLI::IsMember({"wave", "wound", "minutes", "fall"}));
   app.add_flag("--measured", options.is_measured, "the measured liver, not the elastic one");
   app.add_option("--wave", options.wave_s, "s of waving")->capture_default_str();
   app.add_option("--minutes", options.minutes, "of cutting")->capture_default_str();
+  app.add_option("--wounds", options.wounds, "strokes of the scene wound")->capture_default_str();
   app.add_option("--fall", options.fall_s, "s of falling")->capture_default_str();
   CLI11_PARSE(app, argc, argv);
   for (const auto& scene : options.scenes) {
     if (scene == "wave") wave(options);
+    if (scene == "wound") wound(options);
     if (scene == "minutes") minutes(options);
     if (scene == "fall") fall(options);
   }

@@ -186,6 +186,72 @@ TEST(Rest, AWoundThatNobodyTouchesFallsAsleepAndStaysWhereItIs) {
   EXPECT_LT(worst, 0.04f * most) << "per ms, of a press within 0.24 s";
 }
 
+// The work of a press, of the whole organ that moves with it.
+struct PressWork {
+  std::size_t most_active = 0, looked_at = 0, pairs = 0;
+  std::uint64_t seeds = 0;
+};
+
+// A finger presses one end of a measured liver, at 20 mm/s at most, before and after a stroke
+// through the other end.
+PressWork press_beside(bool has_wound) {
+  auto organ = *catalogue::make_measured_liver(6000);
+  Vec3d least{1, 1, 1}, most{-1, -1, -1};
+  for (const auto& p : organ.mesh.rest_positions) {
+    least = {std::min(least.x, p.x), std::min(least.y, p.y), std::min(least.z, p.z)};
+    most = {std::max(most.x, p.x), std::max(most.y, p.y), std::max(most.z, p.z)};
+  }
+  Vec3d top = least;
+  for (const auto& p : organ.mesh.rest_positions)
+    if (std::abs(p.x - least.x - 0.3 * (most.x - least.x)) < 0.01 && p.y > top.y) top = p;
+  const Vec3f wound = to_float(
+      least + Vec3d{0.7 * (most.x - least.x), 0.6 * (most.y - least.y), 0.5 * (most.z - least.z)});
+  Simulation simulation(std::move(organ));
+  const auto decisions = simulation.with_sweeps_for_organ({});
+  PressWork work;
+  const Tick pressed = 3000;
+  for (Tick tick = 1; tick <= pressed + 1000; ++tick) {
+    hands::TickInputs inputs;
+    if (tick == 1)
+      for (std::uint8_t hand = 0; hand < 2; ++hand) {
+        hands::HandJoin join{.slot = {hand}};
+        join.shapes[0] = {
+            .radius_m = hand == 0 ? 0.001f : 0.008f, .length_m = 0.3f, .edge_m = 0.12f};
+        inputs.joins.push_back(join);
+      }
+    const auto put = [&](std::uint8_t hand, const Vec3f& tip, tool::Verb verb) {
+      inputs.samples.push_back({tool_slot({hand}, 0), {{tip, rotation_from_z({0, 1, 0})}, verb}});
+    };
+    if (tick % 4 == 1) {
+      const float t = static_cast<float>(tick) * 1e-3f;
+      if (has_wound && t < 0.8f)
+        put(0, wound + Vec3f{0.05f * t - 0.02f, 0, 0}, tool::Verb::Cut);
+      else
+        put(0, {0, 0.5f, 0}, tool::Verb::None);
+      const float turn = std::sin(3.14159f * (t - 3));
+      if (tick > pressed)
+        put(1, to_float(top) + Vec3f{0, 0.008f - 0.01f * turn * turn, 0}, tool::Verb::Push);
+    }
+    const auto& report = simulation.tick(inputs, decisions);
+    if (tick <= pressed + 100) continue;
+    const auto& contact = simulation.context().contact;
+    work.most_active = std::max<std::size_t>(work.most_active, report.near.active_nodes);
+    work.looked_at += contact.self_finder.pairs_looked_at();
+    work.seeds += contact.found.self_seeds.size();
+    work.pairs += simulation.state().self_contacts.nodes().size();
+  }
+  return work;
+}
+
+TEST(Rest, AnOldWoundFarFromAPressAddsLittleWork) {
+  const auto uncut = press_beside(false), cut = press_beside(true);
+  EXPECT_EQ(uncut.pairs, 0u);
+  EXPECT_GT(cut.pairs, 20'000u) << "of 900 ticks";
+  EXPECT_EQ(cut.seeds, 0u) << "both lips move together";
+  EXPECT_LE(cut.most_active, uncut.most_active + uncut.most_active / 10);
+  EXPECT_LT(cut.looked_at, cut.pairs / 8);
+}
+
 TEST(Rest, SnapshotsOfWhatSleepsAreReadAndContinuedBitForBit) {
   Wound wound;
   Random random(3);

@@ -33,7 +33,7 @@ namespace trocar::contact {
 inline constexpr float kRounding_m = 1e-5f;
 
 inline constexpr std::size_t kMaxPointsPerTool = 8192;
-inline constexpr std::size_t kMaxSelfPoints = 4096;
+inline constexpr std::size_t kMaxSelfPoints = 16384;
 inline constexpr int kMaxPointNodes = 4;
 
 struct ContactPoint {

@@ -39,6 +39,26 @@ constexpr float kAsidePerGap = 1, kAside_m = 0.0005f;
 constexpr float kDeepest_m = 0.008f;
 constexpr float kNoLimit_n = 1e6f;
 constexpr std::uint32_t kNoSite = 0xffffffffu;
+// A triangle's corners may move against each other so many times as far as its node may drift: its
+// normal then turns by some hundredths of a radian.
+constexpr float kCornerDrifts = 16;
+
+// Returns the most ticks, a power of two, in which what moves at this speed stays within a way.
+Tick ticks_within(float way_m, float squared_speed) {
+  const float squared_way = way_m * way_m;
+  Tick ticks = kLookEvery;
+  while (ticks > 1) {
+    const float seconds = kTickSeconds * static_cast<float>(ticks);
+    if (squared_speed * (seconds * seconds) < squared_way) break;
+    ticks /= 2;
+  }
+  return ticks;
+}
+
+// Returns whether it is the turn of what comes every so many ticks, a power of two.
+bool is_turn(std::uint32_t phase, Tick interval, const world::World& world) {
+  return ((world.tick + phase) & (interval - 1)) == 0;
+}
 
 }  // namespace
 
@@ -228,11 +248,11 @@ bool SelfContactFinder::meets(Site site, std::size_t first, std::size_t end,
   const bool is_moved = has_moved(site, kMovedSlacks * slack_m_, world);
   float least = reach_m_ * reach_m_, least_of_lips = least;
   Site nearest = kNoSite, nearest_of_lips = kNoSite;
-  const bool looks_at_all = this->looks_at_all(site, world);
+  const bool looks_at_all = paces_[site] == Pace::Looks;
   for (auto i = first; i < end; ++i) {
     if (list_.far_until[i] > passed) continue;
     const auto& pair = list_.pairs[i];
-    if (!looks_at_all && paces_[pair.across] != Pace::Moves) continue;
+    if (!looks_at_all && paces_[pair.across] != Pace::Looks) continue;
     const Vec3f way = position(pair.across, world) - p;
     const float squared = length_squared(way);
     if (squared > reach_m_ * reach_m_)
@@ -289,12 +309,6 @@ bool SelfContactFinder::stays(Site site, TriangleIndex triangle, const world::Wo
 }
 
 // A node that a cut has just opened looks however slow it is.
-bool SelfContactFinder::looks_at_all(Site site, const world::World& world) const {
-  return paces_[site] == Pace::Moves ||
-         (paces_[site] == Pace::Still &&
-          (is_due(site, world) || world.node_classes[site] == world::NodeClass::Active));
-}
-
 void SelfContactFinder::find_pace(const world::World& world) {
   using world::NodeClass;
   is_any_awake_ = false;
@@ -303,19 +317,41 @@ void SelfContactFinder::find_pace(const world::World& world) {
     const float squared = length_squared(world.velocities[s]);
     const bool is_asleep =
         node_class == NodeClass::Asleep || (node_class == NodeClass::Fixed && squared == 0);
-    const bool moves = !(squared < kStill_m_s * kStill_m_s);
-    paces_[s] = is_asleep ? Pace::Asleep : moves ? Pace::Moves : Pace::Still;
+    const bool looks = node_class == NodeClass::Active ||
+                       is_turn(phases_[s], ticks_within(kLookDrift_m, squared), world);
+    paces_[s] = is_asleep ? Pace::Asleep : looks ? Pace::Looks : Pace::Waits;
     is_any_awake_ |= !is_asleep;
   }
 }
 
-SelfContactFinder::Pace SelfContactFinder::pace_of(Site site, TriangleIndex triangle) const {
-  Pace pace = paces_[site];
-  for (const Site s : surface_[triangle]) pace = std::max(pace, paces_[s]);
-  return pace;
+bool SelfContactFinder::is_asleep(Site site, TriangleIndex triangle) const {
+  return paces_[site] == Pace::Asleep && std::ranges::all_of(surface_[triangle], [this](Site s) {
+           return paces_[s] == Pace::Asleep;
+         });
 }
 
-void SelfContactFinder::add_pair(Site site, TriangleIndex triangle, const Place& place, Pace pace,
+float SelfContactFinder::squared_drift(Site site, TriangleIndex triangle, const Vec3f& weights,
+                                       const world::World& world) const {
+  const auto& corners = surface_[triangle];
+  const Vec3f& own = world.velocities[site];
+  const Vec3f of_corner[] = {world.velocities[corners[0]] - own, world.velocities[corners[1]] - own,
+                             world.velocities[corners[2]] - own};
+  float squared = length_squared(of_corner[0] * weights.x + of_corner[1] * weights.y +
+                                 of_corner[2] * weights.z);
+  for (const Vec3f& v : of_corner)
+    squared = std::max(squared, length_squared(v) * (1 / (kCornerDrifts * kCornerDrifts)));
+  return squared;
+}
+
+bool SelfContactFinder::is_due(Site site, TriangleIndex triangle, const Vec3f& weights,
+                               const world::World& world) const {
+  const bool is_near = world.node_classes[site] == world::NodeClass::Active;
+  const auto interval = ticks_within(is_near ? kNearDrift_m : kDrift_m,
+                                     squared_drift(site, triangle, weights, world));
+  return is_turn(site, interval, world);
+}
+
+void SelfContactFinder::add_pair(Site site, TriangleIndex triangle, const Place& place,
                                  const world::World& world, SelfContactTable& pairs,
                                  ContactList& out) const {
   if (pairs.nodes().size() >= kMaxSelfPoints) {
@@ -324,7 +360,7 @@ void SelfContactFinder::add_pair(Site site, TriangleIndex triangle, const Place&
   }
   const NodeIndex node(site);
   pairs.add(node, triangle, place);
-  if (pace == Pace::Asleep) return;
+  if (is_asleep(site, triangle)) return;
   // Clang 14 lets no lambda capture a structured binding.
   const auto& corners = surface_[triangle];
   const Site a = corners[0], b = corners[1], c = corners[2];
@@ -334,7 +370,9 @@ void SelfContactFinder::add_pair(Site site, TriangleIndex triangle, const Place&
   };
   const Vec3f from = between([&](Site s) { return position(s, world); });
   const bool presses = dot(place.normal, from) <= place.shift;
-  if (pace == Pace::Still && !presses) return;
+  const bool is_fast = ticks_within(kDrift_m, squared_drift(site, triangle, w, world)) == 1;
+  const bool is_awaited = is_fast || world.node_classes[site] == world::NodeClass::Active;
+  if (!is_awaited && !presses) return;
   const Vec3f at_rest = between([&](Site s) -> const Vec3f& { return world.rest_positions[s]; });
   ContactPoint point{
       .nodes = {node, NodeIndex(a), NodeIndex(b), NodeIndex(c)},
@@ -347,7 +385,7 @@ void SelfContactFinder::add_pair(Site site, TriangleIndex triangle, const Place&
       .plane = place.normal * place.shift - at_rest,
   };
   out.points.push_back(point);
-  if (!presses || pace == Pace::Still) return;
+  if (!presses || !is_fast) return;
   out.self_seeds.insert(out.self_seeds.end(), point.nodes.begin(), point.nodes.end());
 }
 
@@ -371,7 +409,7 @@ void SelfContactFinder::find(const world::World& world, SelfContactTable& pairs,
     tick_current_ = 1;
   }
   for (std::size_t r = 0; r < runs.size(); ++r) {
-    if (paces_[runs[r].node] != Pace::Moves) continue;
+    if (paces_[runs[r].node] != Pace::Looks) continue;
     const auto passed = static_cast<float>(travel_ - list_.travel);
     for (auto i = std::size_t{runs[r].first}; i < end_of_run(r); ++i)
       if (list_.far_until[i] <= passed) stirred_stamp_[list_.pairs[i].across] = tick_current_;
@@ -390,20 +428,20 @@ void SelfContactFinder::find(const world::World& world, SelfContactTable& pairs,
     const auto r = is_listed ? run++ : run;
     if (is_old && !surface_.is_gone(old_pairs_.triangles()[i])) {
       const auto triangle = old_pairs_.triangles()[i];
-      const auto pace = pace_of(site, triangle);
-      if (pace == Pace::Asleep || (pace == Pace::Still && !is_due(site, world))) {
-        add_pair(site, triangle, old_pairs_.places()[i], pace, world, pairs, out);
+      const auto& place = old_pairs_.places()[i];
+      if (is_asleep(site, triangle) || !is_due(site, triangle, place.weights, world)) {
+        add_pair(site, triangle, place, world, pairs, out);
         continue;
       }
     }
-    const bool looks = stirred_stamp_[site] == tick_current_ || looks_at_all(site, world);
+    const bool looks = stirred_stamp_[site] == tick_current_ || paces_[site] == Pace::Looks;
     ClosestPoint closest;
     Touch touch;
     if ((is_old && stays(site, old_pairs_.triangles()[i], world, closest, touch)) ||
         (is_listed && looks && meets(site, runs[r].first, end_of_run(r), world, closest, touch))) {
       ++pairs_looked_at_;
-      add_pair(site, closest.triangle, {closest.weights, touch.normal, touch.shift},
-               std::max(Pace::Still, pace_of(site, closest.triangle)), world, pairs, out);
+      add_pair(site, closest.triangle, {closest.weights, touch.normal, touch.shift}, world, pairs,
+               out);
     }
   }
   std::ranges::sort(out.self_seeds);

@@ -20,12 +20,14 @@
 // their own: a node at the rim has a normal of each, and a node on a wound meets the other side of
 // wounds first. A pair whose triangle an edit has replaced goes on with what is there now.
 //
-// Tissue at rest costs little. A pair that hardly moves stays where it lies for kLookEvery ticks:
-// a node slower than kStill_m_s gets 6 um away from there. Where it lies is state, too. Such a pair
-// is given to the solver only while it presses, and is no reason to sweep its surroundings more. A
-// node that is so slow looks for new pairs only with nodes that are faster, and for others every
-// kLookEvery ticks. Pairs of nodes that are asleep (server/tissue/pieces) stay as they are and are
-// given to nobody.
+// What hardly moves costs little. A pair stays where it lies on its triangle until the node may
+// have drifted by kDrift_m from there (kNearDrift_m where nodes are swept most), as fast as it
+// moves against the triangle now, but for no more than kLookEvery ticks. Where it lies is state,
+// too. Where nodes are not swept most, a pair that drifts by less in a tick is given to the solver
+// only while it presses, and such a pair is no reason to sweep its surroundings more: both sides of
+// a wound may move together however fast. Nodes look for new pairs before one of them may have
+// moved by kLookDrift_m, which is little beside the margin. Pairs of nodes that are asleep
+// (server/tissue/pieces) stay as they are and are given to nobody.
 //
 // Work: pairs of nodes that can come near are listed with slack, and again for those nodes that
 // have moved a part of it: O(surface nodes + these x their surroundings), over several ticks. Every
@@ -51,8 +53,8 @@ inline constexpr float kSelfStiffnessPaPerM = 5e7f;
 // never from farther than kSelfMaxMargin_m: enough for 1.3 m/s.
 inline constexpr float kSelfMargin_m = 0.001f, kSelfMaxMargin_m = 0.003f;
 inline constexpr float kSelfTicksAhead = 1.5f;
-inline constexpr float kStill_m_s = 1e-4f;
-inline constexpr Tick kLookEvery = 64;
+inline constexpr float kDrift_m = 6.4e-6f, kNearDrift_m = 0.8e-6f, kLookDrift_m = 1e-4f;
+inline constexpr Tick kLookEvery = 64;  // a power of two
 
 // A place is where a node lay on its triangle when the pair was last looked at.
 struct SelfContactPlace {
@@ -130,8 +132,8 @@ class SelfContactFinder {
   static constexpr float kReferenceSlacks = 0.25f;
   static constexpr float kListedSlacks = 0.5f, kMovedSlacks = kListedSlacks + 0.5f;
 
-  // How a node moves: not at all for it is asleep, hardly, or faster.
-  enum class Pace : std::uint8_t { Asleep, Still, Moves };
+  // A node sleeps, waits for others to look, or looks for pairs in this tick.
+  enum class Pace : std::uint8_t { Asleep, Waits, Looks };
 
   struct NodePair {
     Site node = 0, across = 0;
@@ -223,21 +225,23 @@ class SelfContactFinder {
              ClosestPoint& closest, Touch& touch);
   bool stays(Site site, TriangleIndex triangle, const world::World& world, ClosestPoint& closest,
              Touch& touch);
-  bool is_due(Site site, const world::World& world) const {
-    return (world.tick + site) % kLookEvery == 0;
-  }
   void find_pace(const world::World& world);
-  // Returns whether the node looks for a pair with whatever is near, not only with what moves.
-  bool looks_at_all(Site site, const world::World& world) const;
-  // Returns the fastest pace of a node and a triangle's corners.
-  Pace pace_of(Site site, TriangleIndex triangle) const;
-  void add_pair(Site site, TriangleIndex triangle, const Place& place, Pace pace,
-                const world::World& world, SelfContactTable& pairs, ContactList& out) const;
+  bool is_asleep(Site site, TriangleIndex triangle) const;
+  // Returns the squared speed at which a pair leaves its place, m2/s2.
+  float squared_drift(Site site, TriangleIndex triangle, const Vec3f& weights,
+                      const world::World& world) const;
+  // Returns whether the pair is looked at in this tick.
+  bool is_due(Site site, TriangleIndex triangle, const Vec3f& weights,
+              const world::World& world) const;
+  void add_pair(Site site, TriangleIndex triangle, const Place& place, const world::World& world,
+                SelfContactTable& pairs, ContactList& out) const;
 
   SelfSurface surface_;
   std::vector<std::uint8_t> is_close_at_rest_;  // per node: something may face it there
-  float slack_m_ = 0, corner_reach_m_ = 0;      // see begin_list()
-  float reach_m_ = 0;                           // with the greatest margin
+  // Per node: neighbours look in the same ticks, so that in between nobody in a place looks.
+  std::vector<std::uint8_t> phases_;
+  float slack_m_ = 0, corner_reach_m_ = 0;  // see begin_list()
+  float reach_m_ = 0;                       // with the greatest margin
 
   bool has_list_ = false;
   double travel_ = 0;
@@ -261,7 +265,7 @@ class SelfContactFinder {
   std::vector<Pace> paces_;                // per node, of this tick; for surface nodes
   bool is_any_awake_ = true;               // of these
   std::vector<std::uint32_t> near_stamp_;  // per node
-  // Per node: in this tick a node that moves is listed with it.
+  // Per node: in this tick a node that looks is listed with it.
   std::vector<std::uint32_t> stirred_stamp_;
   std::uint32_t near_current_ = 0;
   // These normals are of this tick where their stamp is tick_current_. normals_ has one per node

@@ -19,6 +19,14 @@ constexpr std::size_t kReservedPairs = 1u << 15;
 constexpr float kSlackEdges = 1, kMaxSlack_m = 0.006f;
 // The nearest corner of a triangle is this far from any point on it at most, in longest edges.
 constexpr float kCornerReach = 0.6f;
+// Nodes in a cube of this width look for pairs in the same ticks.
+constexpr float kPhaseCube_m = 0.03f;
+
+std::uint8_t phase_at(const Vec3f& place) {
+  const auto cube = [](float x) { return static_cast<std::int32_t>(std::floor(x / kPhaseCube_m)); };
+  const auto mixed = cube(place.x) * 23 + cube(place.y) * 37 + cube(place.z) * 11;
+  return static_cast<std::uint8_t>(mixed & static_cast<std::int32_t>(kLookEvery - 1));
+}
 
 }  // namespace
 
@@ -54,6 +62,8 @@ SelfContactFinder::SelfContactFinder(const organ::Organ& organ) : surface_(organ
 void SelfContactFinder::extend() {
   const auto count = surface_.node_count();
   is_close_at_rest_.resize(count);
+  for (auto s = static_cast<Site>(phases_.size()); s < count; ++s)
+    phases_.push_back(phase_at(surface_.rest_position(s)));
   for (auto* list : {&list_, &next_list_}) {
     list->references.resize(count);
     list->has_left.resize(count);

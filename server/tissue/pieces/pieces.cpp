@@ -113,7 +113,7 @@ bool Pieces::wake_touched(const contact::ContactList& contacts, world::World& wo
         wake(place_at(point.nodes[k]), world);
   };
   for (std::size_t i = 0; i < contacts.self_begin; ++i) wake_at(contacts.points[i]);
-  constexpr float kMoves = contact::kStill_m_s * contact::kStill_m_s;
+  constexpr float kMoves = kWakes_m_s * kWakes_m_s;
   for (const auto& point : contacts.self_points()) {
     const bool moves = std::ranges::any_of(point.nodes, [&](NodeIndex node) {
       return manners_[place_at(node)] == Manner::Awake && squared_speed(node, world) >= kMoves;
@@ -229,18 +229,31 @@ bool Pieces::is_alone(std::size_t place, double slack_m) const {
   return true;
 }
 
+namespace {
+// A mean alone would let a small flap stop while it moves, and the fastest node alone would wait
+// for one that trembles.
+bool is_body_still(std::span<const NodeIndex> nodes, const world::World& world) {
+  constexpr auto kMost = static_cast<float>(kShape_m_s * kShape_m_s);
+  double sum = 0;
+  for (const auto node : nodes) {
+    const float squared = squared_speed(node, world);
+    if (!(squared < kMost)) return false;
+    sum += static_cast<double>(squared);
+  }
+  return sum < kRest_m_s * kRest_m_s * static_cast<double>(nodes.size());
+}
+}  // namespace
+
 void Pieces::look_for_rest(std::size_t place, world::World& world) {
   const auto nodes = nodes_at(place);
   const auto& load = loads_[place];
   auto& ticks = world.still_ticks[place];
-  constexpr auto kMost = static_cast<float>(kRest_m_s * kRest_m_s);
   if (load.is_touched) {
     ticks = 0;
     return;
   }
   if (place == 0) {
-    const bool is_still =
-        std::ranges::all_of(nodes, [&](NodeIndex n) { return squared_speed(n, world) < kMost; });
+    const bool is_still = is_body_still(nodes, world);
     ticks = is_still ? static_cast<std::uint16_t>(ticks + 1) : std::uint16_t{0};
     if (ticks >= kRestTicks) lay_down(place, world);
     return;
