@@ -89,6 +89,8 @@ class TouchModel {
     wire::HapticLaw law;
     bool is_known = false;
     double slope = 1;
+    double expected_slope = 1;  // by what the server said of the place before it was touched
+    bool is_felt = false;       // since then
   };
 
   static bool touches(wire::TouchKind kind) {
@@ -126,6 +128,7 @@ class TouchModel {
   void take_stop();
   void restart(std::size_t first);
   void correct(const PastState& then, bool is_new_structure);
+  void expect();
   double blade_slope(const Response& response) const;
   void take_side_friction(const Response& then);
   void correct_blade(const PastState& then);

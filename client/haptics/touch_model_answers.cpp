@@ -263,6 +263,7 @@ void TouchModel::correct(const PastState& then, bool is_new_structure) {
   const Response response = with_moved_reference(then);
   if (!touched && response.elastic_n <= 0) {
     next_correction_n_ = {};
+    expect();
     return;
   }
   const Vec3d server_n = touched ? trocar::to_double(patch_.force_n) : Vec3d{};
@@ -286,10 +287,27 @@ void TouchModel::correct(const PastState& then, bool is_new_structure) {
       fit_.add_lean(rest_n - normal_ * dot(rest_n, normal_), response.normal_n);
     }
   }
-  if (!grips()) materials_[material_].slope = fit_.slope();
+  if (!grips()) {
+    materials_[material_].slope = fit_.slope();
+    if (touched) materials_[material_].is_felt = true;
+  }
   next_correction_n_ = server_n - scaled_force(response, fit_.slope(), fit_.lean());
   gate_force_n_ = std::max(kLeastGateForce_n, response.elastic_n);
   take_lever();
+}
+
+// The server says of tissue that is near how stiff it expects it to be, as far as its shape tells.
+// What was felt elsewhere is carried over by how much stiffer this place should be than that.
+void TouchModel::expect() {
+  if (patch_.kind != wire::TouchKind::Near || !patch_.has_stiffness) return;
+  Material& material = materials_[material_];
+  const double local_n_m = power_law_.stiffness_n_m(kGuessDepth_m) * slow_share_;
+  const double expected = std::clamp(along(to_double(patch_.stiffness_n_m), normal_) / local_n_m,
+                                     SlopeFit::kLeast, SlopeFit::kMost);
+  if (!material.is_felt) material.slope *= expected / material.expected_slope;
+  material.expected_slope = expected;
+  material.is_felt = false;
+  fit_.set_slope(std::clamp(material.slope, SlopeFit::kLeast, SlopeFit::kMost));
 }
 
 std::optional<double> TouchModel::stiffness_ratio(const Response& response) const {

@@ -102,7 +102,7 @@ class Server {
     patch.plane_point_m = place(tissue_.surface_under(tip_m_));
     const Vec3d normal = frame_.to_world(tissue_.normal_at(tip_m_));
     patch.plane_normal = to_float(normal);
-    patch.has_stiffness = true;
+    patch.has_stiffness = patch.kind != wire::TouchKind::Near;  // the client guesses
     const auto across = static_cast<float>(tissue_.stiffness_across_n_m());
     patch.stiffness_n_m.add_identity(across);
     patch.stiffness_n_m.add_outer(to_float(normal),

@@ -76,6 +76,34 @@ TEST_F(Touch, FeelsNothingBeforeTheFirstPatch) {
   EXPECT_FALSE(output_.touches);
 }
 
+// The server expects tissue to be soft where a thin wall is near.
+TEST_F(Touch, TheFirstTouchIsAsStiffAsTheServerExpects) {
+  const auto expect = [&](float stiffness_n_m) {
+    patch_.kind = wire::TouchKind::Near;
+    patch_.force_n = {};
+    patch_.has_stiffness = true;
+    patch_.stiffness_n_m = {};
+    patch_.stiffness_n_m.add_identity(stiffness_n_m);
+    for (int k = 0; k < 200; ++k) {
+      step({0, 0.010, 0});
+      if (k % 16 == 0) send();
+    }
+  };
+  expect(40);
+  const double forty = model_.slope();
+  expect(10);
+  EXPECT_NEAR(model_.slope(), forty / 4, 1e-6);
+  EXPECT_NEAR(step({0, -0.005, 0}).y, output_.stiffness_n_m * 0.005 / 1.3, 0.05);
+  // It keeps what was felt, and carries it over to a place that should be twice as stiff.
+  patch_.has_stiffness = false;
+  press(0.006, 1.1);
+  expect(10);
+  const double felt = model_.slope();
+  EXPECT_GT(felt, 1.1 * forty / 4);
+  expect(20);
+  EXPECT_NEAR(model_.slope(), 2 * felt, 1e-3 * felt);
+}
+
 TEST_F(Touch, FeelsNothingWhereNoTissueIsNear) {
   patch_.kind = wire::TouchKind::Free;
   send();

@@ -101,6 +101,51 @@ TEST(TouchOfAPlate, TheOtherFaceOfAThinWallIsNoneToComeOutOf) {
   EXPECT_GT(pressed, 10);
 }
 
+// Returns the expected stiffness of tissue in front of a probe that comes from +z, along the
+// normal.
+float expected_stiffness_n_m(organ::Organ organ) {
+  Simulation simulation(std::move(organ));
+  Vec3d foremost{0, 0, -1};
+  for (const auto& p : simulation.organ().mesh.rest_positions)
+    if (p.z > foremost.z) foremost = p;
+  HapticPatch patch;
+  for (std::uint64_t i = 1; i <= 32; ++i) {
+    hands::TickInputs inputs;
+    if (i == 1) {
+      hands::HandJoin join{.slot = {0}};
+      join.shapes[0] = {.radius_m = kRadius_m, .length_m = 0.3f};
+      inputs.joins.push_back(join);
+    }
+    const Vec3f tip = to_float(foremost) + Vec3f{0, 0, 0.005f};
+    inputs.samples.push_back({tool_slot({0}, 0), {{tip, Quatf{}}, tool::Verb::Push}, 1000 * i});
+    simulation.tick(inputs, {});
+    if (const auto frame = simulation.pop_frame()) patch = frame->tools.at(0).touch;
+  }
+  EXPECT_EQ(patch.kind, TouchKind::Near);
+  return dot(patch.plane_normal, patch.stiffness_n_m * patch.plane_normal);
+}
+
+// Hertz at 5 mm, and in the stomach's wall of 7 mm, which is curved by a radius of some 40 mm,
+// Reissner's shell in a row with it.
+TEST(TouchOfAWall, IsExpectedToBend) {
+  const auto hertz_n_m = [](const organ::Organ& organ) {
+    const auto& material = organ.material;
+    const double nu = material.poisson_ratio;
+    return 2 * material.young_modulus_pa / (1 - nu * nu) * std::sqrt(0.006 * 0.005);
+  };
+  const auto liver = *catalogue::make_measured_liver();
+  EXPECT_NEAR(expected_stiffness_n_m(liver), hertz_n_m(liver), 0.01 * hertz_n_m(liver));
+  const auto stomach = *catalogue::make_stomach();
+  const double nu = stomach.material.poisson_ratio;
+  const double shell_n_m =
+      8 * stomach.material.young_modulus_pa * 0.007 * 0.007 / 0.04 / std::sqrt(12 * (1 - nu * nu));
+  const double both_n_m = 1 / (1 / shell_n_m + 1 / hertz_n_m(stomach));
+  const double expected_n_m = expected_stiffness_n_m(stomach);
+  std::printf("wall: %.1f N/m, of a sphere of 80 mm %.1f, of a solid %.1f\n", expected_n_m,
+              both_n_m, hertz_n_m(stomach));
+  EXPECT_NEAR(expected_n_m, both_n_m, 0.4 * both_n_m);
+}
+
 TEST_F(TouchTest, FollowsWhatAnotherHandLifts) {
   const auto lift = [&](float up, bool joins) {
     if (joins) {

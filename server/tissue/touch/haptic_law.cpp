@@ -11,6 +11,8 @@ namespace {
 constexpr float kExponent = 1.3f;
 constexpr wire::HapticLaw::Term kFast[] = {{1.2f, 0.002f}, {0.4f, 0.010f}};
 
+constexpr float kLeastCurvature = 10;  // 1/m
+
 }  // namespace
 
 std::vector<wire::HapticLaw> haptic_laws(const organ::Organ& organ) {
@@ -36,6 +38,13 @@ std::vector<wire::HapticLaw> haptic_laws(const organ::Organ& organ) {
 float hertz_stiffness_n_m(const wire::HapticLaw& law, float radius_m, float depth_m) {
   const float modulus = law.youngs_modulus_pa / (1 - law.poisson_ratio * law.poisson_ratio);
   return 2 * modulus * std::sqrt(radius_m * std::max(depth_m, 0.0f));
+}
+
+float wall_stiffness_n_m(const wire::HapticLaw& law, float thickness_m, float curvature) {
+  const float nu = law.poisson_ratio;
+  const float bends = std::max(kLeastCurvature, std::abs(curvature));
+  return 8 * law.youngs_modulus_pa * thickness_m * thickness_m * bends /
+         std::sqrt(12 * (1 - nu * nu));
 }
 
 }  // namespace trocar::touch

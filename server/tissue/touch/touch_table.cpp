@@ -15,6 +15,7 @@ using wire::TouchKind;
 // Across the normal, tissue is so much softer than along it (measured on the liver).
 constexpr float kAcross = 0.72f;
 constexpr float kLeastDepth_m = 0.001f;
+constexpr float kExpectedDepth_m = 0.005f;  // of a press that has not begun
 
 bool is_touching(TouchKind kind) {
   return kind != TouchKind::Free && kind != TouchKind::Near;
@@ -47,6 +48,14 @@ bool is_rigid(const TouchTable::Scene& scene, const contact::ToolContact& contac
     if (moves == 0) held += point.stiffness;
   }
   return held > 0.5f * all;
+}
+
+// A wall bends while it is dented, as two springs in a row. Returns the stiffness of both over that
+// of a solid.
+float yielding_of_wall(const wire::HapticLaw& law, const UndentedSurface::Wall& wall,
+                       float radius_m) {
+  const float bends = wall_stiffness_n_m(law, wall.thickness_m, wall.curvature);
+  return bends / (bends + hertz_stiffness_n_m(law, radius_m, kExpectedDepth_m));
 }
 
 // A tool stops where one of its points presses as hard as tissue bears, and its force grows no more
@@ -174,12 +183,17 @@ void TouchTable::describe_surface(const Scene& scene, ToolSlot slot, wire::Hapti
     touch.kind = -depth < kNear_m ? TouchKind::Near : TouchKind::Free;
     if (touch.kind == TouchKind::Free) surface.clear();
   }
-  const float stiffness =
-      hertz_stiffness_n_m(law, tool.shape.radius_m, std::max(depth, kLeastDepth_m));
+  const bool touches = is_touching(touch.kind);
+  if (!touches) {
+    const auto wall = surface.wall({point, normal, corner});
+    touch.yielding = wall ? yielding_of_wall(law, *wall, tool.shape.radius_m) : 1;
+  }
+  const float pressed_m = touches ? std::max(depth, kLeastDepth_m) : kExpectedDepth_m;
+  const float stiffness = touch.yielding * hertz_stiffness_n_m(law, tool.shape.radius_m, pressed_m);
   SymMat3f guess;
   guess.add_identity(kAcross * stiffness);
   guess.add_outer(normal, (1 - kAcross) * stiffness);
-  patch.stiffness_n_m = touch.stiffness.stiffness(guess);
+  patch.stiffness_n_m = touches ? touch.stiffness.stiffness(guess) : guess;
   patch.has_stiffness = true;
   patch.law = law.number;
 }

@@ -48,6 +48,7 @@ class TouchTable {
     float along_m = 0;      // of the middle of the contact along the shaft, from the tip
     Vec3f grip_point;       // of the tip when the jaws closed
     std::uint16_t law = 0;  // of the tissue that it touched last
+    float yielding = 1;     // stiffness of what was near, over that of a solid
     Tick others_tick = 0;   // in which others have acted last
     StiffnessFit stiffness;
     UndentedSurface surface;

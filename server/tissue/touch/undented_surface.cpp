@@ -17,7 +17,9 @@ constexpr float kForgottenPerFrame = 0.008f;  // per frame: two seconds
 constexpr float kSettled = 0.0016f;  // per frame: ten seconds, in which relaxed tissue comes back
 constexpr float kRingMiddle_m = 0.022f;
 constexpr float kLeastFacing = 0.5f;
-constexpr float kNoise_m2 = 1e-8f;  // sinking that varies less leaves the guess
+constexpr float kCurved_m = 0.012f;  // around a point, for its curvature
+constexpr float kFaces = 0.5f;       // the cosine of what counts as facing a way
+constexpr float kNoise_m2 = 1e-8f;   // sinking that varies less leaves the guess
 
 // Returns how far a half space sinks there where a ball is pressed into it, or rises where it is
 // pulled: far from it the dent is that of a point load, (1 - nu^2) F / (pi E r) (Boussinesq), and
@@ -194,6 +196,28 @@ UndentedSurface::Plane UndentedSurface::plane(const Vec3f& place, float radius_m
   }
   const float size = length(normal);
   return {nearest + moved_, size > 0 ? normal * (1 / size) : Vec3f{0, 0, 1}, of->nodes[0]};
+}
+
+std::optional<UndentedSurface::Wall> UndentedSurface::wall(const Plane& plane) const {
+  const Vec3f& normal = plane.normal;
+  const Vec3f at = plane.point - moved_;
+  float least = -1, bent = 0, weight = 0;
+  for (const auto& triangle : triangles_) {
+    const float area = length(triangle.normal), facing = dot(triangle.normal, normal);
+    if (facing > kFaces * area && is_within(triangle.centre, at, kCurved_m)) {
+      // Under a tangent plane, the surface is lower by half the curvature times the way squared.
+      const Vec3f away = triangle.centre - at;
+      const float low = -dot(away, normal), way2 = dot(away, away) - low * low;
+      bent += area * 2 * low * way2;
+      weight += area * way2 * way2;
+    } else if (facing < -kFaces * area) {
+      const Vec3f down = at - nearest_on(triangle, at);
+      const float far = length(down);
+      if (dot(down, normal) > kFaces * far && (least < 0 || far < least)) least = far;
+    }
+  }
+  if (least < 0) return std::nullopt;
+  return Wall{least, weight > 0 ? bent / weight : 0};
 }
 
 }  // namespace trocar::touch

@@ -10,6 +10,7 @@
 // taken off: by the depth, whatever has relaxed, for force would not tell.
 
 #include <array>
+#include <optional>
 #include <vector>
 
 #include "common/base/index.h"
@@ -44,6 +45,13 @@ class UndentedSurface {
   // core: in the tool's middle, where it touches; so far from its skin is radius_m.
   void follow(const world::World& world, const wire::SurfaceLayout& layout, const Vec3f& core,
               float radius_m, bool do_others_act);
+
+  // How thick the tissue is below a point of it, and how much its outer face is curved there (the
+  // mean of both directions, 1/m, positive outward). Nothing: no other face is near.
+  struct Wall {
+    float thickness_m, curvature;
+  };
+  std::optional<Wall> wall(const Plane& plane) const;
 
   // The nearest point of it to `place` on the side from which the tool came, with the normal
   // averaged over `radius_m` around. Known.
