@@ -125,7 +125,7 @@ class Hands {
   ThrownHands thrown_;
 };
 
-// What ticks took and did.
+// Says what ticks took and did.
 struct Ticks {
   std::vector<double> cut_us, all_us, contacts_us;
   std::uint32_t most_pairs = 0;
