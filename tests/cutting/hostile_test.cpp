@@ -85,6 +85,38 @@ TEST(HostileBlade, AThousandRandomStrokesBreakNothing) {
   EXPECT_LE(most, 100u + 3 * 64u);  // besides: repairs at the ends of strokes
 }
 
+// Four long blades at a metre per second: what they plan is opened later, within some ticks, and no
+// more is planned than Settings allow.
+TEST(HostileBlade, WorkIsBoundedInACallAndInTheMean) {
+  CutOrgan box(box_organ(12, 12, 12, 0.002));
+  const Settings settings;
+  const int ticks = 400, blades = 4;
+  std::uint32_t most = 0, before = 0;
+  const auto tick = [&] {
+    box.tick();
+    const auto edits = box.total().splits + box.total().labels;
+    most = std::max(most, edits - before);
+    before = edits;
+  };
+  for (int i = 0; i < ticks; ++i) {
+    for (std::uint32_t blade = 0; blade < blades; ++blade) {
+      const double x = -0.011 + 0.006 * blade + 1e-5 * i;
+      const double y = 0.018 * (i % 40 < 20 ? 0.1 * (i % 20) - 1 : 1 - 0.1 * (i % 20));
+      box.cutter().move(blade, Edge{{x, y, -0.02}, {x, y, 0.02}});
+    }
+    tick();
+  }
+  const auto all = box.total().splits + box.total().labels;
+  EXPECT_GT(all, 500u);
+  EXPECT_LE(all, settings.edits_per_call + settings.edits_in_the_mean * ticks);
+  EXPECT_LE(most, settings.edits_per_call);
+  for (std::uint32_t blade = 0; blade < blades; ++blade) box.cutter().lift(blade);
+  int later = 0;
+  for (; later < 2000 && !box.cutter().is_idle(); ++later) tick();
+  EXPECT_TRUE(box.cutter().is_idle()) << "2 s after they have left";
+  EXPECT_EQ(box.check(), "");
+}
+
 TEST(HostileEvents, AreRefused) {
   const auto organ = box_organ(3, 3, 3, 0.01);
   CutOrgan box(organ);

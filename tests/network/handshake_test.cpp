@@ -168,6 +168,35 @@ TEST(Handshake, tools_out_of_range_or_too_many_are_refused) {
   EXPECT_TRUE(client.receive(Envelope::kWelcome));
 }
 
+TEST(Handshake, a_blade_longer_than_the_session_allows_is_refused_and_told_the_limit) {
+  const auto with_edge = [](float edge_m) {
+    auto hello = make_hello("Anna", proto::ROLE_SURGEON);
+    hello.mutable_hello()->add_tool()->set_radius_m(0.001f);
+    auto& tool = *hello.mutable_hello()->mutable_tool(0);
+    tool.set_length_m(0.25f);
+    tool.set_reach_m(0.012f);
+    tool.set_edge_m(edge_m);
+    return hello;
+  };
+  for (const auto& [longest_mm, edge_m, longer_m] :
+       {std::tuple{40.0f, 0.040f, 0.0401f}, {7.5f, 0.0075f, 0.0076f}, {200.0f, 0.2f, 0.21f}}) {
+    replication::ReplicatorOptions options;
+    options.places.longest_edge_mm = longest_mm;
+    LiveSession session({}, longest_mm == 40 ? replication::ReplicatorOptions{} : options);
+    const auto refusal = refusal_of(session, with_edge(longer_m));
+    EXPECT_EQ(refusal.reason(), proto::GOODBYE_PROTOCOL_ERROR) << longest_mm;
+    EXPECT_NE(refusal.text().find("edge_m"), std::string::npos) << refusal.text();
+    if (longest_mm < 200) {
+      EXPECT_NE(refusal.text().find(longest_mm == 40 ? "the 40 mm" : "the 7.5 mm"),
+                std::string::npos)
+          << refusal.text();
+    }
+    RawClient client(session.port());
+    ASSERT_TRUE(client.send(with_edge(edge_m)));
+    EXPECT_TRUE(client.receive(Envelope::kWelcome)) << longest_mm;
+  }
+}
+
 TEST(Handshake, the_seventeenth_hand_is_told_full_and_may_still_watch) {
   LiveSession session;
   std::vector<std::unique_ptr<RawClient>> hands;

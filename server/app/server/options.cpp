@@ -137,6 +137,12 @@ void add_limit_options(CLI::App& app, LimitOptions& options) {
       ->check(CLI::Range(1, kToolsPerHand))
       ->capture_default_str();
   limits
+      ->add_option("--longest-edge", options.places.longest_edge_mm,
+                   "mm of a blade's edge; a longer one is refused")
+      ->type_name("MM")
+      ->check(CLI::Range(1, 200))
+      ->capture_default_str();
+  limits
       ->add_option("--max-messages", options.messages_per_second,
                    "messages of one client per second, or its session ends")
       ->type_name("N")

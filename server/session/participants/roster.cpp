@@ -1,6 +1,8 @@
 #include "server/session/participants/roster.h"
 
 #include <algorithm>
+#include <array>
+#include <charconv>
 
 #include "common/base/printable.h"
 
@@ -13,6 +15,12 @@ bool is_valid_name(std::string_view name) {
   if (name.empty() || name.size() > kMaxNameBytes) return false;
   if (name.front() == ' ' || name.back() == ' ') return false;
   return is_printable(name);
+}
+
+std::string print_mm(float mm) {
+  std::array<char, 32> text{};
+  const auto end = std::to_chars(text.data(), text.data() + text.size(), mm);
+  return {text.data(), end.ptr};
 }
 
 }  // namespace
@@ -38,10 +46,18 @@ Result<Participant> Roster::join(std::string_view name, Role role,
     return refuse(JoinRefusal::ToolsInvalid, "tools: " + std::to_string(tools.size()) +
                                                  " are too many, at most " +
                                                  std::to_string(places_.tools));
-  for (const auto& shape : tools)
+  for (const auto& shape : tools) {
     if (!tool::is_valid(shape))
       return refuse(JoinRefusal::ToolsInvalid,
-                    "tools: a radius is 0.5 to 50 mm, a length 10 to 1000 mm, a reach 1 to 50 mm");
+                    "tools: a radius is 0.5 to 50 mm, a length 10 to 1000 mm, a reach 1 to 50 mm, "
+                    "an edge_m 1 to 200 mm");
+    if (shape.edge_m * 1e3f > places_.longest_edge_mm)
+      return refuse(JoinRefusal::ToolsInvalid,
+                    "tools: edge_m is " + print_mm(shape.edge_m * 1e3f) + " mm, longer than the " +
+                        print_mm(places_.longest_edge_mm) +
+                        " mm that this session allows: take a shorter blade, or start the server "
+                        "with a longer --longest-edge");
+  }
   if (const auto* other = find(name))
     return refuse(
         JoinRefusal::NameTaken,

@@ -28,11 +28,12 @@ struct Participant {
   bool is_away = false;                // the connection is lost, the place is kept
 };
 
-// How many there are for, at most what ids.h says.
+// How many there are for, at most what ids.h says, and what they may bring.
 struct Places {
   int hands = kMaxHands;        // surgeons and assistants
   int watchers = kMaxWatchers;  // instructors and observers
   int tools = kToolsPerHand;    // of each who has some
+  float longest_edge_mm = 40;   // of a blade: what it cuts in a tick is in proportion
 };
 
 enum class JoinRefusal { NameInvalid, NameTaken, Full, ToolsInvalid };

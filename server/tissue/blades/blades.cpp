@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/tissue/contact/contact_finder.h"
-
 namespace trocar::blades {
 namespace {
 
 // A stopped blade is held by a spring of this stiffness, N/m, up to this force, N: 5 N at 10 mm.
 constexpr float kStop_n_m = 500, kMostStop_n = 10;
+// In a tick, of either end of an edge: 5 m/s.
+constexpr float kFastest_m = 0.005f;
 
 EdgeEnds ends_of(const hands::Tool& tool) {
   return {tool.pose.position, tool.pose.apply({0, 0, tool.shape.edge_m})};
@@ -17,8 +17,9 @@ EdgeEnds ends_of(const hands::Tool& tool) {
 
 }  // namespace
 
-bool BladeTable::has_jumped(const Blade& blade, const Vec3f& tip) {
-  return length(tip - blade.edge.ends()[0]) > contact::kJump_m;
+bool BladeTable::has_jumped(const Blade& blade, const EdgeEnds& ends) {
+  const auto& before = blade.edge.ends();
+  return std::max(length(ends[0] - before[0]), length(ends[1] - before[1])) > kFastest_m;
 }
 
 std::uint32_t BladeTable::begin_tick(const hands::ToolTable& tools, const hands::ClaimTable& claims,
@@ -29,14 +30,14 @@ std::uint32_t BladeTable::begin_tick(const hands::ToolTable& tools, const hands:
     const auto& tool = tools[ToolSlot{i}];
     const auto& claim = claims.claim(ToolSlot{i});
     Blade& blade = blades_[i];
-    const auto& tip = tool.pose.position;
     const bool is_held = claim.phase == hands::ClaimPhase::Held;
     const bool is_at_work = tool.has_sample && claim.verb == tool::Verb::Cut &&
                             (is_held || claim.phase == hands::ClaimPhase::Wanted);
+    if (!is_at_work && !blade.is_at_work) continue;
     const bool is_cutting = is_at_work && is_held && can_cut;
     const bool is_stopped =
         is_at_work && !is_held && claim.last_refusal == hands::ClaimOutcome::RefusedHeld;
-    const bool is_new = !blade.is_at_work || has_jumped(blade, tip);
+    const bool is_new = !blade.is_at_work || has_jumped(blade, ends_of(tool));
     if (blade.is_cutting && (!is_cutting || is_new)) lifted |= 1u << i;
     if (!is_at_work || is_new) blade = {.edge = EdgeForce(ends_of(tool))};
     if (is_stopped && !blade.is_stopped) {

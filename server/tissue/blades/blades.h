@@ -47,7 +47,7 @@ class BladeTable {
 
  private:
   // Nobody's hand goes that fast: it has appeared there, and what lies between is not cut.
-  static bool has_jumped(const Blade& blade, const Vec3f& tip);
+  static bool has_jumped(const Blade& blade, const EdgeEnds& ends);
   static Vec3f stop_n(const Blade& blade);
 
   std::array<Blade, kMaxTools> blades_;

@@ -4,15 +4,27 @@
 #include <numeric>
 
 namespace trocar::cutting {
+namespace {
+
+// A stroke that is served may make this part of a call's edits, however many wait: fewer would
+// hardly pay for looking at where it is.
+constexpr std::uint32_t kMostServedInFull = 4;
+
+}  // namespace
 
 Cutter::Cutter(topology::Topology& topology, const Settings& settings)
     : strokes_(kMaxStrokes),
       mesh_(topology, settings, strokes_),
-      splitter_(settings.make_splitter ? settings.make_splitter() : std::make_unique<Splitter>()) {
+      splitter_(settings.make_splitter ? settings.make_splitter() : std::make_unique<Splitter>()),
+      edits_left_(settings.edits_per_call) {
   stroke_of_.fill(kNone);
 }
 
+// None where too much is planned: this blade is too fast to cut.
 Stroke* Cutter::begin_stroke(std::uint32_t blade) {
+  std::size_t planned = 0;
+  for (const auto& stroke : strokes_) planned += stroke.is_active ? stroke.motion.strips() : 0;
+  if (planned >= mesh_.settings().most_pieces_planned) return nullptr;
   for (std::uint32_t s = 0; s < strokes_.size(); ++s) {
     if (strokes_[s].is_active) continue;
     auto& stroke = strokes_[s];
@@ -67,6 +79,8 @@ void Cutter::clear_strokes() {
   for (auto& stroke : strokes_) stroke.clear();
   stroke_of_.fill(kNone);
   next_id_ = 0;
+  edits_left_ = mesh_.settings().edits_per_call;
+  is_resting_ = false;
 }
 
 double Cutter::h_at(std::uint32_t blade) const {
@@ -95,6 +109,9 @@ void Cutter::visit_state(world::StateArchive& archive) {
     std::iota(order_.begin(), order_.end(), 0u);
   }
   for (const auto s : order_) visit_stroke(archive, s);
+  archive.value(edits_left_);
+  archive.flag(is_resting_);
+  if (archive.is_reading() && edits_left_ > mesh_.settings().edits_per_call) archive.fail();
   if (!archive.ok()) clear_strokes();
 }
 
@@ -120,6 +137,7 @@ void Cutter::order_strokes() {
 
 void Cutter::cut(std::span<const Vec3f> displacements, CutOutput& out, double travel_m) {
   out.clear();
+  refill();
   if (is_idle()) return;
   mesh_.begin(displacements, travel_m, out);
   if (!torn_.empty()) {
@@ -132,19 +150,50 @@ void Cutter::cut(std::span<const Vec3f> displacements, CutOutput& out, double tr
     if (strokes_[s].is_active && (strokes_[s].has_ended || strokes_[s].motion.has_strip()))
       order_.push_back(s);
   order_strokes();
-  const auto strokes = std::max(1u, static_cast<std::uint32_t>(order_.size()));
-  const auto share = std::max(1u, mesh_.settings().edits_per_call / strokes);
-  for (const auto s : order_) {
-    auto budget = share;
-    const double work_before = out.work_j;
-    const bool is_done = work(strokes_[s], budget);
-    if (const auto blade = blade_of(s); blade < kMaxBlades)
-      out.blade_work_j[blade] += out.work_j - work_before;
-    // A stroke is ended only in a call that finds nothing of it to cut.
-    if (!is_done || (strokes_[s].has_ended && (budget < share || !end(strokes_[s]))))
-      out.is_behind = true;
+  std::size_t served = 0;
+  for (; served < order_.size() && edits_left_ > 0 && !is_resting_; ++served) {
+    const auto waiting = static_cast<std::uint32_t>(order_.size() - served);
+    const auto share =
+        std::max({1u, edits_left_ / waiting, mesh_.settings().edits_per_call / kMostServedInFull});
+    edits_left_ -= std::min(edits_left_, serve(order_[served], share));
+  }
+  is_resting_ |= edits_left_ == 0;
+  if (served < order_.size()) {
+    out.is_behind = true;
+    let_others_go_first(std::span(order_).first(served));
   }
   mesh_.end();
+}
+
+void Cutter::refill() {
+  const auto most = mesh_.settings().edits_per_call;
+  edits_left_ = std::min(most, edits_left_ + mesh_.settings().edits_in_the_mean);
+  if (2 * edits_left_ >= most) is_resting_ = false;
+}
+
+// Returns what it took of its share.
+std::uint32_t Cutter::serve(std::uint32_t place, std::uint32_t share) {
+  auto& stroke = strokes_[place];
+  auto& out = mesh_.out();
+  auto budget = share;
+  const double work_before = out.work_j;
+  const bool is_done = work(stroke, budget);
+  if (const auto blade = blade_of(place); blade < kMaxBlades)
+    out.blade_work_j[blade] += out.work_j - work_before;
+  const bool has_cut = budget < share;
+  // A stroke is ended only in a call that finds nothing of it to cut.
+  if (!has_cut && stroke.has_ended) {
+    budget -= std::min(budget, static_cast<std::uint32_t>(stroke.waiting.size()));
+    out.is_behind |= !is_done || !end(stroke);
+  } else {
+    out.is_behind |= !is_done || stroke.has_ended;
+  }
+  return share - budget;
+}
+
+void Cutter::let_others_go_first(std::span<const std::uint32_t> places) {
+  for (const auto s : places)
+    if (strokes_[s].is_active) strokes_[s].id = next_id_++;
 }
 
 EdgeResistance Cutter::resistance_of(std::span<const Vec3f> displacements, double travel_m,

@@ -14,11 +14,13 @@
 //
 // From outside: nothing is believed. A blade that is not finite, has no length or too many points
 // is refused; one that jumps begins a new stroke. Work per call is bounded by
-// Settings::edits_per_call; what is left over follows in later calls, in order.
+// Settings::edits_per_call; what is left over is a planned surface that follows in later calls, in
+// order, and no longer than Settings says.
 //
 // Deterministic: the same calls give the same topology. Strokes are done in the order in which they
-// began. Not for organs with links. One writer; the topology is edited by nobody else between
-// construction and destruction, except that tets and nodes may be removed while no stroke is on.
+// began; where there are more than a call has time for, they take turns. Not for organs with links.
+// One writer; the topology is edited by nobody else between construction and destruction, except
+// that tets and nodes may be removed while no stroke is on.
 
 #include "server/tissue/cutting/edge_resistance.h"
 #include "server/tissue/cutting/opening.h"
@@ -57,7 +59,7 @@ class Cutter {
   Status repeat(const CutEvents& events, std::vector<topology::NewNode>& made);
 
   // Everything that later calls depend on besides topology and settings: the same bytes, the same
-  // future. One byte while no stroke is on. To be read by a cutter whose topology has had the same
+  // future. Six bytes while no stroke is on. To be read by a cutter whose topology has had the same
   // events and repeated them.
   void visit_state(world::StateArchive& archive);
 
@@ -82,6 +84,9 @@ class Cutter {
   std::uint32_t blade_of(std::uint32_t place) const;
   void clear_strokes();
   void order_strokes();
+  void refill();
+  std::uint32_t serve(std::uint32_t place, std::uint32_t share);
+  void let_others_go_first(std::span<const std::uint32_t> places);
   bool work(Stroke& stroke, std::uint32_t& budget);
   bool end(Stroke& stroke);
   void forget(Stroke& stroke);
@@ -95,6 +100,8 @@ class Cutter {
   CutOutput unchanged_;                              // of calls that cut nothing
   std::array<std::uint32_t, kMaxBlades> stroke_of_;  // place in strokes_, or kNone
   std::uint32_t next_id_ = 0;
+  std::uint32_t edits_left_;          // by Settings
+  bool is_resting_ = false;           // until there are more
   std::vector<std::uint32_t> order_;  // places in strokes_ of some, by id
   std::vector<NodeIndex> kept_;
   std::vector<TetFace> torn_;

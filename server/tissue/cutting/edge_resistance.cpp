@@ -11,6 +11,8 @@ namespace {
 
 // Tissue this far from the edge, m, does not lie against the blade.
 constexpr double kNear_m = 0.00125;
+// Beyond this distance nothing is near, whatever is rounded.
+constexpr double kAside_m = kNear_m + 1e-9;
 
 struct PlaneOfFace {
   Vec3d outward, point;
@@ -27,6 +29,27 @@ double distance_squared_to_segment(const Vec3d& from, const Vec3d& to, const Vec
 Vec3d any_across(const Vec3d& v) {
   const Vec3d axis = std::abs(v.x) < 0.5 * length(v) ? Vec3d{1, 0, 0} : Vec3d{0, 1, 0};
   return normalized(cross(v, axis), Vec3d{});
+}
+
+// Two directions across the line, and two between these.
+std::array<Vec3d, 4> directions_across(const Vec3d& line) {
+  const Vec3d a = any_across(line), b = normalized(cross(line, a), Vec3d{});
+  const double half = std::sqrt(0.5);
+  return {a, b, (a + b) * half, (a - b) * half};
+}
+
+// Whether all of a tet lies farther from the line than counts, along one of these directions.
+bool lies_aside(const std::array<Vec3d, 4>& corners, const Vec3d& on_line,
+                const std::array<Vec3d, 4>& directions) {
+  return std::ranges::any_of(directions, [&](const Vec3d& direction) {
+    double least = std::numeric_limits<double>::infinity(), most = -least;
+    for (const auto& corner : corners) {
+      const double aside = dot(direction, corner - on_line);
+      least = std::min(least, aside);
+      most = std::max(most, aside);
+    }
+    return least > kAside_m || most < -kAside_m;
+  });
 }
 
 // The outer sides of a tet's faces, of unit length.
@@ -107,10 +130,11 @@ EdgeResistance EdgeMeter::measure(CutMesh& mesh, const Vec3d& from, const Vec3d&
   find_tets(mesh, from, to);
   samples_.fill({});
   const auto& topology = mesh.topology();
+  const auto directions = directions_across(to - from);
   for (const auto tet : tets_) {
     std::array<Vec3d, 4> corners;
     for (std::size_t i = 0; i < 4; ++i) corners[i] = mesh.position(topology.tet(tet)[i]);
-    meet(corners, tet, from, to);
+    if (!lies_aside(corners, from, directions)) meet(corners, tet, from, to);
   }
   const double length_of_sample = length(to - from) / static_cast<double>(samples_.size());
   for (std::size_t i = 0; i < samples_.size(); ++i) {

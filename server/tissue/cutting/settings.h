@@ -22,16 +22,21 @@ struct Settings {
   double collect_h = 0.1;
   std::uint32_t collect_ticks = 8;
   double piece_h = 0.5;  // longer motion is cut piece by piece
-  // A blade that has gone farther at once has not moved but appeared.
-  std::uint32_t most_pieces_of_motion = 64;
+  // A blade that has gone farther at once, or since it was so many pieces ahead of the cutting, has
+  // not moved but appeared.
+  std::uint32_t most_pieces_of_motion = 16;
   // A part cut off stays with the other side if it has fewer tets, or at most four times as many
   // and less volume (in h^3; a regular tet has 0.12).
   std::uint32_t debris_tets = 4;
   double debris_volume_h3 = 0.25;
   // A piece of less volume is not cut any further.
   double whole_volume_h3 = 0.5;
-  // Splits and labels per call, all strokes together; what is left over is done in later calls.
-  std::uint32_t edits_per_call = 128;
+  // No stroke begins where all that there are have so many pieces still to be cut.
+  std::uint32_t most_pieces_planned = 64;
+  // Splits, by the tets that they bisect, and labels, all strokes together: so many in a call, and
+  // so many in the mean of many calls. Where they are used up, the cutter rests until half of them
+  // are there again, because a call that cuts costs whatever it cuts.
+  std::uint32_t edits_per_call = 64, edits_in_the_mean = 8;
   // Waiting faces this far from the blade are repaired.
   double repair_h = 1;
   // Labels farther from the blade are forgotten.

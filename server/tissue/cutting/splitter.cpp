@@ -11,7 +11,7 @@ namespace {
 constexpr double kMostStretch = 1.5;
 constexpr double kSlack_h = 1e-6;
 // A patch costs something even where there is nothing to cut; in edits.
-constexpr std::uint32_t kPatchCost = 8, kNearPerEdit = 8;
+constexpr std::uint32_t kPatchCost = 1, kNearPerEdit = 64;
 
 }  // namespace
 

@@ -7,7 +7,6 @@ namespace {
 
 // Motion shorter than this share of h is no motion, however long it takes.
 constexpr double kRest_h = 0.01;
-constexpr std::size_t kMaxStrips = 256;
 
 template <typename T>
 T& at(std::vector<T>& dense, std::uint32_t index) {
@@ -41,8 +40,7 @@ BladeMotion::Verdict BladeMotion::move(std::span<const Vec3d> points, double h,
   const bool is_due =
       motion > settings.collect_h * h || (ticks_ == settings.collect_ticks && motion > kRest_h * h);
   // A blade too far ahead of the cutting goes on collecting.
-  if (is_due && strips_.size() - next_ + settings.most_pieces_of_motion <= kMaxStrips)
-    add_strips(h, settings);
+  if (is_due && strips() < settings.most_pieces_of_motion) add_strips(h, settings);
   return Verdict::Accepted;
 }
 

@@ -30,7 +30,8 @@ class BladeMotion {
   // How far the blade has gone since the place up to which all is cut, m.
   double behind() const { return longest_motion(has_strip() ? strip().from : anchor_, now_); }
   std::uint32_t points() const { return now_.count; }  // of the edge
-  bool has_strip() const { return next_ < strips_.size(); }
+  bool has_strip() const { return strips() > 0; }
+  std::size_t strips() const { return strips_.size() - next_; }
   const Strip& strip() const { return strips_[next_]; }
   void pop();
 

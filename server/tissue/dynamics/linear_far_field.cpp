@@ -83,11 +83,10 @@ void LinearFarField::update_topology(const Float4* x, const world::World& world)
             node.is_valid() ? to_float4(world::displacement_of(pose[node.value])) : Float4{};
       }
   }
-  Linearisation::Scratch scratch;
   for (const auto lanes : tissue_.rebuilt()) {
-    linear_.index(lanes.group);
+    taken_at_[lanes.group] = pose_of(lanes.group);
+    linear_.index(lanes.group, poses_[taken_at_[lanes.group] % 2].data());
     measure_edges(lanes.group, world);
-    renew(lanes.group, scratch);
     begin_group(lanes.group, x, x, 0);
   }
   linear_.tidy();

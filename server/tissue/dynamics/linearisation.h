@@ -15,6 +15,7 @@
 
 #include <array>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "server/tissue/dynamics/tissue.h"
@@ -32,8 +33,8 @@ class Linearisation {
   explicit Linearisation(const Tissue& tissue);
   ~Linearisation();
 
-  // Neighbours of the group's nodes anew; matrices are zero until renew(). Between steps.
-  void index(Group group);
+  // Neighbours of the group's nodes anew, and matrices as renew() makes them. Between steps.
+  void index(Group group, const Float4* pose);
   // After some calls of index().
   void tidy() {
     rows_.tidy();
@@ -78,11 +79,12 @@ class Linearisation {
   class Indexing;
   class Summing;
 
+  void take(Group group, std::span<const std::array<Lanes, 9>> sums, const NodeStep8& step);
+
   const Tissue& tissue_;
   std::vector<Node> nodes_;  // per group
   Blocks<Row> rows_;
   Blocks<Targets> targets_;             // per group and call, in order
-  std::vector<Float4> rest_;            // zeros, per slot
   std::unique_ptr<Indexing> indexing_;  // scratch
 };
 
