@@ -83,6 +83,27 @@ TEST_P(FreeBlock, KeepsMomentumAndSpinAndGainsNoEnergy) {
 
 INSTANTIATE_TEST_SUITE_P(Sizes, FreeBlock, ::testing::Values(2, 3, 6));
 
+// Relaxed stress of a trapped piece of light nodes once made it move for ever, and ever faster.
+TEST(FreePiece, HasNoStressThatRelaxed) {
+  auto organ = free_block(3);
+  material::use_measured(*material::find_measured_material("human_liver_nava2008"), organ.material);
+  Simulation simulation(std::move(organ));
+  auto& begun = simulation.editable_state().world;
+  for (std::size_t n = 0; n < begun.node_count(); ++n)
+    begun.velocities[n] = begun.rest_positions[n] * 20.0f;
+  simulation.resume();
+  const auto& world = simulation.state().world;
+  ASSERT_FALSE(world.relaxation.is_empty());
+  float stretched = 0;
+  for (int tick = 0; tick < 30; ++tick) {
+    simulation.tick({}, {});
+    for (const auto& displacement : world.displacements)
+      stretched = std::max(stretched, length(displacement));
+    for (const auto& force : world.relaxation.forces()) ASSERT_EQ(force, Vec3f{});
+  }
+  EXPECT_GT(stretched, 1e-4f);
+}
+
 TEST(FreePiece, FallsAndLiesDownOnTheFloor) {
   Simulation simulation(free_block(3, {0, -9.81, 0}));
   const auto nodes = all_nodes(simulation.state().world);

@@ -114,6 +114,10 @@ class BlockDescent {
   // from step to step, which linear forces resist.
   void use_energies(std::span<const NodeIndex> nodes);
 
+  // From now on, until the next call, no relaxed stress acts on these nodes: those of free pieces.
+  // The span must stay as it is until then.
+  void let_spring(std::span<const NodeIndex> nodes) { springing_ = nodes; }
+
   // Advances displacements and velocities by one step. near: distinct nodes that are not fixed.
   SolveReport solve(const contact::ContactList& contacts, std::span<const NodeIndex> near,
                     const SolveSettings& settings, world::World& world,
@@ -254,6 +258,7 @@ class BlockDescent {
   bool is_far_linear_ = false;                        // in this step
   std::vector<std::uint8_t> has_energies_;            // per group: see use_energies()
   std::vector<Group> groups_with_energies_;           // of these
+  std::span<const NodeIndex> springing_;              // see let_spring()
   bool has_far_solver_ = false;                       // likewise
   std::uint32_t far_interval_ = 1;                    // of this step
   float inverse_dt_ = 0;                              // of this step

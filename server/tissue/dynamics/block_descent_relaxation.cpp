@@ -36,6 +36,7 @@ void BlockDescent::end_relaxation(world::World& world, std::span<const NodeIndex
   for_each_group(relaxed_.groups, [&](Group g) {
     tissue_.relaxed_stress()->refresh({g, relaxed_.lanes[g]}, x_.data(), world.relaxation);
   });
+  for (const auto node : springing_) tissue_.relaxed_stress()->release(node, world.relaxation);
 }
 
 }  // namespace trocar::dynamics

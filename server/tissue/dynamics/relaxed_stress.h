@@ -25,6 +25,12 @@ class RelaxedStress {
   void refresh(GroupLanes lanes, const Float4* x, world::RelaxationState& state);
   // Returns the forces as they were taken last, N.
   Vec8 forces(Group group) const { return load(forces_[group]); }
+  // No relaxed stress acts on this node until its forces are taken anew.
+  void release(NodeIndex node, world::RelaxationState& state) {
+    const Slot slot = groups_.slot_of(node);
+    forces_[slot / kLanes].set(slot % kLanes, {});
+    state.set_force(node, {});
+  }
   // Takes the forces of all nodes from the state.
   void read_state(const world::RelaxationState& state);
   // Follows an edit as energies do, see Energy::rebuild().

@@ -124,10 +124,12 @@ bool Pieces::wake_touched(const contact::ContactList& contacts, world::World& wo
 }
 
 void Pieces::begin_step(const world::World& world) {
+  free_.clear();
   turning_.clear();
   for (std::size_t place = 1; place < manners_.size(); ++place) {
     if (manners_[place] != Manner::Awake) continue;
     const auto nodes = nodes_at(place);
+    free_.insert(free_.end(), nodes.begin(), nodes.end());
     motions_[place] = motion_of(nodes, world);
     if (length(motions_[place].turning()) > kTurns_rad_s)
       turning_.insert(turning_.end(), nodes.begin(), nodes.end());

@@ -53,9 +53,10 @@ class Pieces {
   void wake(world::World& world);
   bool is_all_asleep() const { return is_all_asleep_; }
 
-  // Before and after the solver's step. turning(): nodes of awake pieces that turn so quickly that
-  // nothing is linear about a pose of not long ago.
+  // Before and after the solver's step. free(): nodes of awake pieces; turning(): those of them
+  // that turn so quickly that nothing is linear about a pose of not long ago.
   void begin_step(const world::World& world);
+  std::span<const NodeIndex> free() const { return free_; }
   std::span<const NodeIndex> turning() const { return turning_; }
   struct Motion {
     float awake_m = 0, carried_m = 0;  // of a node, at most, besides what the solver has moved it
@@ -111,7 +112,7 @@ class Pieces {
   std::vector<Box<float>> boxes_;
   bool has_boxes_ = false;
   bool is_all_asleep_ = false;
-  std::vector<NodeIndex> changed_, landed_, turning_;
+  std::vector<NodeIndex> changed_, landed_, free_, turning_;
 };
 
 }  // namespace trocar::pieces

@@ -227,6 +227,7 @@ SolveReport solve_awake(const contact::ContactList& contacts, bool may_rest,
   const bool is_asleep = may_rest && pieces.is_all_asleep();
   if (may_rest) pieces.begin_step(state.world);
   work.solver.use_energies(may_rest ? pieces.turning() : std::span<const NodeIndex>{});
+  work.solver.let_spring(may_rest ? pieces.free() : std::span<const NodeIndex>{});
   if (!is_asleep)
     report = solve(contacts, context.near.queue, decisions, loads, state.world,
                    state.far_model.get(), context.near.active, work);
