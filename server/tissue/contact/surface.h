@@ -31,8 +31,8 @@ namespace trocar::contact {
 using Box = trocar::Box<float>;
 
 inline constexpr std::uint32_t kMaxDivisions = 8;
-// Of a triangle that would have more than kManyDivisions: a tool that is so much thinner than the
-// elements would pass between its points.
+// A triangle that would have more than kManyDivisions gets these: a tool that is so much thinner
+// than the elements would pass between its points.
 inline constexpr std::uint32_t kFineDivisions = 16, kManyDivisions = 12;
 
 struct SurfaceTriangle {
