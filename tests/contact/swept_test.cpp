@@ -63,6 +63,55 @@ TEST(Swept, AToolAtOneMetrePerSecondDoesNotPassAOneMillimetreWall) {
   }
 }
 
+// Returns how many of 25 thrusts of a thin tool go through a wall of soft tissue, one element
+// thick.
+int thrusts_through_a_wall(float radius_m, float speed_m_s, double spacing_m) {
+  const auto organ = block(15, 2, 15, spacing_m, [&](organ::Organ& o) {
+    o.fixed_nodes.clear();
+    for (std::uint32_t n = 0; n < o.mesh.node_count(); ++n) {
+      const auto& p = o.mesh.rest_positions[n];
+      if (std::max(std::abs(p.x), std::abs(p.z)) > 6.5 * spacing_m)
+        o.fixed_nodes.push_back(NodeIndex(n));
+    }
+  });
+  int passed = 0;
+  for (int thrust = 0; thrust < 25; ++thrust) {
+    Random random(static_cast<std::uint64_t>(thrust) + 1);
+    const auto beside = [&] {
+      return static_cast<float>(random.between(-3 * spacing_m, 3 * spacing_m));
+    };
+    const float x = beside(), z = beside();
+    HandScene scene(organ);
+    scene.join(0, {.radius_m = radius_m, .length_m = 0.1f});
+    float y = 0.02f;
+    scene.hold(0, upright({x, y, z}), 8);
+    for (; y > -0.04f; y -= 1e-3f * speed_m_s) {
+      scene.put(0, upright({x, y, z}));
+      scene.tick();
+    }
+    scene.ticks(50);
+    // The wall's middle, where the tool meets it.
+    float middle = 0, nearest = 1;
+    for (const auto node : scene.world().surface_nodes) {
+      const auto p = scene.world().position(node);
+      const float aside = length(Vec3f{p.x - x, 0, p.z - z});
+      if (aside < nearest) nearest = aside, middle = p.y;
+    }
+    passed += scene.reaction(0).force_n.y <= 0 || scene.proxy(0).pose.position.y < middle - 0.006f;
+  }
+  return passed;
+}
+TEST(Swept, AThinToolPassesNoWallHoweverFast) {
+  for (const double spacing_m : {0.002, 0.003, 0.004})
+    for (const auto& [radius_m, speed_m_s] : {std::pair{0.0005f, 1.0f},
+                                              {0.0005f, 2.0f},
+                                              {0.0005f, 3.0f},
+                                              {0.001f, 2.0f},
+                                              {0.001f, 3.0f}})
+      EXPECT_EQ(thrusts_through_a_wall(radius_m, speed_m_s, spacing_m), 0)
+          << radius_m << " m at " << speed_m_s << " m/s, elements of " << spacing_m << " m";
+}
+
 // Random straight motions at 0.2 to 3 m/s across a hollow stomach, 60 mm long. Twenty share an
 // organ: `first` is a multiple of that. How many have touched.
 int sweep_across_stomach(int first, int motions) {

@@ -51,6 +51,9 @@ struct Triangle {
 // A point this far inside the tool, in radii, at the start of its way was not met from outside.
 constexpr float kMet = 0.7f;
 
+// A point is met head-on within this cosine of a tool's way.
+constexpr float kHeadOn = 0.5f;
+
 // A combination of a triangle's corners' values.
 Vec3f combine(std::span<const Vec3f> values, const std::array<std::uint32_t, 3>& corners,
               const std::array<float, 3>& weights) {
@@ -113,9 +116,27 @@ Meeting meet(std::span<const ToolSolid> path, float reach_m, const Vec3f& p, con
   return result;
 }
 
-// Points keep their ids while their triangle keeps its divisions.
+// Returns the first step of the path, of fewer than `most`, at which the tool has met the point
+// head-on: it was outside before; otherwise `most`.
+std::size_t first_meeting(std::span<const ToolSolid> path, const Vec3f& ahead, const Vec3f& p,
+                          const Vec3f& outward, std::size_t most) {
+  const float squared = path.front().radius * path.front().radius;
+  const Vec3f at_start = p - path.front().nearest_on_core(p);
+  if (dot(at_start, outward) > 0 || length_squared(at_start) < squared) return most;
+  for (std::size_t step = 1; step < most; ++step) {
+    const Vec3f from_core = p - path[step].nearest_on_core(p);
+    if (length_squared(from_core) < squared)
+      return dot(from_core, ahead) > kHeadOn * length(from_core) ? step : most;
+  }
+  return most;
+}
+
+// Points keep their ids while their triangle keeps its divisions. Those of the finest division
+// share numbers with the coarsest, to which no triangle turns within a tick.
 std::uint32_t point_id(TriangleIndex triangle, std::uint32_t divisions, std::size_t point) {
   constexpr std::uint32_t kPoints = kMaxDivisions * kMaxDivisions;
+  static_assert(kFineDivisions * kFineDivisions <= kMaxDivisions * kPoints);
+  if (divisions == kFineDivisions) divisions = 1;
   return (triangle.value * kMaxDivisions + divisions - 1) * kPoints +
          static_cast<std::uint32_t>(point);
 }
@@ -361,6 +382,29 @@ bool ContactFinder::comes_from_outside(const ContactScene& scene, ToolContact& c
   return false;
 }
 
+// A tool that is fast for its radius would part the points that it meets, and go between them: it
+// stops where it first meets one head-on.
+void ContactFinder::stop_at_meeting(const Nearby& nearby, ToolContact& contact) {
+  if (path_.size() <= 2) return;
+  const Vec3f way = contact.goal.position - contact.start.position;
+  const Vec3f ahead = normalized(way, {});
+  const float range = path_.front().radius +
+                      greatest_distance(path_.front().core_corners(), path_.back().core_corners());
+  auto most = path_.size();
+  for (const auto& near : nearby.triangles) {
+    const Triangle triangle(near, positions_);
+    if (distance_to(path_.front(), triangle.centre) > range + triangle.radius) continue;
+    const auto divisions =
+        near.surface.divisions(kPointSpacing * path_.front().radius, 2 * triangle.radius);
+    for (const auto& weights : quadrature_points(divisions))
+      most = first_meeting(path_, ahead, triangle.at(weights), triangle.outward(), most);
+  }
+  if (most == path_.size()) return;
+  const float part = static_cast<float>(most) / static_cast<float>(path_.size() - 1);
+  contact.goal = between(contact.start, contact.goal, part);
+  path_.resize(most + 1, path_.front());
+}
+
 void ContactFinder::find_push(const ContactScene& scene, float strength, ContactList& out) {
   ToolContact& contact = out.tools.back();
   plan_way(scene, contact);
@@ -371,6 +415,7 @@ void ContactFinder::find_push(const ContactScene& scene, float strength, Contact
   const bool has_walked = std::exchange(contact.is_placed, true);
   const Nearby& nearby = look_near(scene.world, contact.tool);
   triangles_visited_ += nearby.triangles.size();
+  if (has_walked) stop_at_meeting(nearby, contact);
 
   const float radius = path_.front().radius;
   const float range = radius + kMargin_m +

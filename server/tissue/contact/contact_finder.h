@@ -103,6 +103,7 @@ class ContactFinder {
   void plan_way(const ContactScene& scene, ToolContact& contact);
   void lay_path(const trocar::tool::ToolShape& shape, const ToolContact& contact, float way);
   bool comes_from_outside(const ContactScene& scene, ToolContact& contact);
+  void stop_at_meeting(const Nearby& nearby, ToolContact& contact);
   void find_push(const ContactScene& scene, float strength, ContactList& out);
   void add_grips(const ContactScene& scene, ToolSlot slot, float strength, ContactList& out) const;
   void find_reach(const ContactScene& scene, ToolSlot slot, ContactList& out);

@@ -32,8 +32,9 @@ QuadraturePoints centres(std::uint32_t n) {
   return result;
 }
 
-std::array<QuadraturePoints, kMaxDivisions> all_centres() {
-  std::array<QuadraturePoints, kMaxDivisions> result;
+std::array<QuadraturePoints, kMaxDivisions + 1> all_centres() {
+  std::array<QuadraturePoints, kMaxDivisions + 1> result;
+  result.back() = centres(kFineDivisions);
   for (std::uint32_t n = 1; n <= kMaxDivisions; ++n) result[n - 1] = centres(n);
   return result;
 }
@@ -42,7 +43,7 @@ std::array<QuadraturePoints, kMaxDivisions> all_centres() {
 
 std::span<const std::array<float, 3>> quadrature_points(std::uint32_t divisions) {
   static const auto points = all_centres();
-  return points[divisions - 1];
+  return divisions == kFineDivisions ? points.back() : points[divisions - 1];
 }
 
 namespace {

@@ -4,10 +4,10 @@
 // and the quadrature points on each at which contact acts.
 //
 // A triangle whose longest edge is e is cut into n^2 equal parts, n = ceil(e / spacing), at most
-// kMaxDivisions; the centre of each part is a quadrature point that stands for its share of the
-// area. So the pressure of a tool is an integral over the surface, and two meshes of one surface
-// agree about it (nodes alone were seen to give two answers 15 % apart). Divisions follow from the
-// rest shape, unless a triangle is stretched far.
+// kMaxDivisions, or kFineDivisions; the centre of each part is a quadrature point that stands for
+// its share of the area. So the pressure of a tool is an integral over the surface, and two meshes
+// of one surface agree about it (nodes alone were seen to give two answers 15 % apart). Divisions
+// follow from the rest shape, unless a triangle is stretched far.
 //
 // Triangles are kept in bundles along a Morton curve, each with the box around its nodes as they
 // were when it was last looked into, which holds to as far as the surface has moved since. What an
@@ -31,6 +31,9 @@ namespace trocar::contact {
 using Box = trocar::Box<float>;
 
 inline constexpr std::uint32_t kMaxDivisions = 8;
+// A triangle that would have more than kManyDivisions gets these: a tool that is so much thinner
+// than the elements would pass between its points.
+inline constexpr std::uint32_t kFineDivisions = 16, kManyDivisions = 12;
 
 struct SurfaceTriangle {
   std::array<NodeIndex, 3> nodes;  // counter-clockwise seen from outside
@@ -41,11 +44,12 @@ struct SurfaceTriangle {
   // more, so that their number does not flutter.
   std::uint32_t divisions(float spacing_m, float width_m) const {
     const float edge = std::max(longest_edge, 0.8f * width_m);
-    return std::clamp(static_cast<std::uint32_t>(std::ceil(edge / spacing_m)), 1u, kMaxDivisions);
+    const auto wanted = static_cast<std::uint32_t>(std::ceil(edge / spacing_m));
+    return wanted > kManyDivisions ? kFineDivisions : std::clamp(wanted, 1u, kMaxDivisions);
   }
 };
 
-// Barycentric centres of the n^2 parts of a triangle; sum of each is 1.
+// Barycentric centres of the n^2 parts of a triangle, n as divisions() says; sum of each is 1.
 std::span<const std::array<float, 3>> quadrature_points(std::uint32_t divisions);
 
 class Surface {
