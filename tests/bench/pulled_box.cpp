@@ -102,7 +102,7 @@ PulledBox make_pulled_box(const BoxShape& shape, const PulledMaterial& material)
   organ.material.young_modulus_pa = material.young_modulus_pa;
   organ.material.node_damping_per_s = material.node_damping_per_s;
   organ.material.poisson_ratio = material.poisson_ratio;
-  organ.material.spring_damping_time_s = 0;
+  organ.material.edge_damping_time_s = 0;
   organ.node_masses_kg = organ::lumped_masses(organ);
   for (int j = 0; j <= shape.cells[1]; ++j)
     for (int k = 0; k <= shape.cells[2]; ++k) organ.fixed_nodes.push_back(grid.node(0, j, k));

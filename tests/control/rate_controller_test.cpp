@@ -241,6 +241,52 @@ TEST(RateController, FarNodesAreSweptLessOftenBeforeTheQueueLosesNodes) {
   EXPECT_EQ(rows.back().decisions, limits.highest) << "all is taken back";
 }
 
+RateLimits limits_with_extra() {
+  auto limits = roomy_limits();
+  limits.highest.sweeps = 3;
+  limits.highest.layer_sweeps = {2, 1, 1};
+  limits.most_far_sweeps = kMostFarSweeps;
+  return limits;
+}
+
+// A small organ: the full solution of a tick has room in the budget, but only while one hand acts.
+TEST(RateController, RoomThatIsLeftGoesIntoAccuracyAndIsTheFirstToGo) {
+  const auto limits = limits_with_extra();
+  const Machine small{.per_sweep_us = 0.04, .far_nodes = 1500};
+  const Load load{.contacts = [](Tick tick) { return tick < 100 ? 0 : tick < 2000 ? 1 : 3; }};
+  const auto rows = run_virtual(small, load, 6000, limits);
+  for (const auto& row : rows) {
+    ASSERT_TRUE(step::validate(row.decisions).ok()) << row.tick;
+    ASSERT_EQ(row.level, RateLevel::Full) << row.tick;
+    ASSERT_LE(row.decisions.far_sweeps, kMostFarSweeps);
+    for (std::size_t layer = 0; layer < step::kSweepLayers; ++layer)
+      ASSERT_GE(row.sweeps[layer], step::sweeps_of_layers(limits.highest)[layer]) << row.tick;
+  }
+  EXPECT_EQ(rows[99].decisions, limits.highest) << "nobody touches";
+  EXPECT_EQ(rows[1999].decisions.far_sweeps, 6u) << "above this three quarters are full";
+  EXPECT_EQ(rows[1999].sweeps, (step::LayerCounts{12, 12, 12, 12}));
+  EXPECT_LE(rows[2020].work_us, limits.budget_us) << "three hands";
+  EXPECT_GT(rows[2020].decisions.far_sweeps, 0u) << "what fits stays";
+  EXPECT_LE(direction_changes(rows, 2100, 6000), 2);
+}
+
+TEST(RateController, AMachineWithoutRoomGetsNothingExtra) {
+  const auto limits = limits_with_extra();
+  const Machine full{.per_sweep_us = 0.06};
+  for (const auto& row : run_virtual(full, {}, 3000, limits))
+    ASSERT_EQ(row.decisions, limits.highest) << row.tick;
+}
+
+TEST(RateController, WhoeverIsLateGetsNothingExtra) {
+  const auto limits = limits_with_extra();
+  const Machine small{.per_sweep_us = 0.02, .far_nodes = 1500};
+  const Load load{.spike_us = [](Tick tick) { return tick > 500 && tick % 4 == 0 ? 3000.0 : 0.0; }};
+  const auto rows = run_virtual(small, load, 3000, limits);
+  EXPECT_EQ(rows[400].decisions.far_sweeps, kMostFarSweeps);
+  for (std::size_t i = 1000; i < rows.size(); ++i)
+    ASSERT_EQ(rows[i].decisions.far_sweeps, 0u) << rows[i].tick;
+}
+
 TEST(RateController, MinimaAboveWhatIsAskedForAreWhatIsAskedFor) {
   const RateLimits limits{.highest = {.node_limit = 50, .sweeps = 1},
                           .touched_sweeps = 3,

@@ -26,7 +26,9 @@ step::TickReport report_of(const Machine& machine, int contacts, const step::Tic
     report.solve.node_sweeps += std::uint64_t{nodes} * sweeps[layer];
   }
   report.solve.figures.far_interval = d.far_interval;
-  report.solve.far_node_sweeps = far / d.far_interval;
+  report.solve.figures.far_sweeps = std::max(1u, d.far_sweeps);
+  report.solve.far_node_sweeps =
+      std::uint64_t{far} * report.solve.figures.far_sweeps / d.far_interval;
   report.solve.node_sweeps += report.solve.far_node_sweeps;
   return report;
 }

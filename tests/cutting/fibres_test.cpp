@@ -70,7 +70,7 @@ void expect_no_change(const organ::Organ& organ) {
 TEST(Fibres, ASplitOfTetsChangesNoEnergy) {
   for (const auto law : {ElasticLaw::TensorMass, ElasticLaw::NeoHookean}) {
     auto organ = turning_box(law);
-    organ.material.spring_damping_time_s = 0;
+    organ.material.edge_damping_time_s = 0;
     expect_no_change(organ);
   }
 }

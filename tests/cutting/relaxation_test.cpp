@@ -14,7 +14,7 @@ organ::Organ measured_box(bool is_averaged = false) {
   auto organ = box_organ(3, 3, 3, 0.01);
   material::use_measured(*material::find_measured_material("human_liver_nava2008"), organ.material);
   organ.material.has_averaged_strain = is_averaged;
-  organ.material.spring_damping_time_s = 0;
+  organ.material.edge_damping_time_s = 0;
   return organ;
 }
 

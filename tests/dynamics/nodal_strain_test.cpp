@@ -23,7 +23,7 @@ organ::Organ block(bool is_averaged) {
   organ.mesh = trocar::testing::block_mesh(4, kCell_m);
   organ.material.elastic_law = material::ElasticLaw::NeoHookean;
   organ.material.poisson_ratio = 0.49;
-  organ.material.spring_damping_time_s = 0;
+  organ.material.edge_damping_time_s = 0;
   organ.material.has_averaged_strain = is_averaged;
   organ.node_masses_kg = organ::lumped_masses(organ);
   return organ;

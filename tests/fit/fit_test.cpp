@@ -112,19 +112,19 @@ TEST(Fit, TheOrderOfMeasurementsDoesNotMatterInAStaticRun) {
 TEST(Fit, FindsStiffnessAndDampingFromACurveInTime) {
   const auto text = [](const char* modulus, const char* damping) {
     return pulled(std::string("node_damping_per_s = 2\nyoung_modulus_pa = ") + modulus +
-                      "\nspring_damping_time_s = " + damping + "\n",
+                      "\nedge_damping_time_s = " + damping + "\n",
                   "tolerance_n = 1e-4\n");
   };
   const auto measured = recorded(text("6000", "0.02"), 0.01);
   FitOptions options;
-  options.parameters = {"young_modulus_pa", "spring_damping_time_s"};
+  options.parameters = {"young_modulus_pa", "edge_damping_time_s"};
   const auto fitted = fit(expect_resolved(text("3000", "0.005")), measured, options);
   ASSERT_TRUE(fitted.ok()) << fitted.error().message;
   EXPECT_NEAR(fitted->parameters[0].value, 6000, 0.03 * 6000);
   EXPECT_NEAR(fitted->parameters[1].value, 0.02, 0.05 * 0.02);
   const std::string toml = to_toml(*fitted, options);
   EXPECT_TRUE(toml.starts_with("[material]\nyoung_modulus_pa = ")) << toml;
-  EXPECT_NE(toml.find("\nspring_damping_time_s = 0.0"), std::string::npos) << toml;
+  EXPECT_NE(toml.find("\nedge_damping_time_s = 0.0"), std::string::npos) << toml;
 }
 
 TEST(Fit, RegionNamesAreQuotedAsTomlWantsThem) {
@@ -198,7 +198,7 @@ TEST(Fit, WhatCannotBeFittedIsSaid) {
   EXPECT_NE(message(measured, {"stiffness"}).find("young_modulus_pa, spring_stiffness_n_m"),
             std::string::npos);
   EXPECT_NE(message(measured, {"poisson_ratio"}).find("springs have 1/4"), std::string::npos);
-  EXPECT_NE(message(measured, {"spring_damping_time_s"}).find("no damping"), std::string::npos);
+  EXPECT_NE(message(measured, {"edge_damping_time_s"}).find("no damping"), std::string::npos);
   EXPECT_NE(message(measured, {"spring_stiffness_n_m"}).find("fit that"), std::string::npos);
   auto far = measured;
   far.points.push_back({0.009, 1, 0, 99});

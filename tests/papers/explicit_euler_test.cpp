@@ -16,7 +16,7 @@ using namespace dynamics;
 organ::Organ column(double node_damping_per_s, double spring_time_s) {
   auto organ = *catalogue::make_lattice({.nx = 2, .ny = 12, .nz = 2});
   organ.material.node_damping_per_s = node_damping_per_s;
-  organ.material.spring_damping_time_s = spring_time_s;
+  organ.material.edge_damping_time_s = spring_time_s;
   return organ;
 }
 

@@ -117,7 +117,7 @@ class ReferenceSolver {
         for (const auto j : graph[i]) {
           const Vec3d rest = organ.mesh.rest_positions[j] - organ.mesh.rest_positions[i];
           const double l0 = length(rest), k = organ.material.spring_stiffness_n_m;
-          const double b = k * organ.material.spring_damping_time_s / dt;
+          const double b = k * organ.material.edge_damping_time_s / dt;
           const Vec3d r = rest + u[j] - u[i], r0 = rest + start[j] - start[i];
           const Vec3d e = r / length(r), e0 = r0 / length(r0);
           g -= e * (k * (length(r) - l0)) + e0 * (b * dot(e0, r - r0));

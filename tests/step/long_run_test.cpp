@@ -30,7 +30,7 @@ organ::Organ random_organ(Random& random) {
     organ.material.has_averaged_strain = random.below(2) == 0;
   }
   organ.material.node_damping_per_s = random.between(2, 40);
-  organ.material.spring_damping_time_s = random.below(2) == 0 ? 0 : random.between(0, 0.003);
+  organ.material.edge_damping_time_s = random.below(2) == 0 ? 0 : random.between(0, 0.003);
   return organ;
 }
 

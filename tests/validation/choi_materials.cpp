@@ -26,7 +26,7 @@ std::string column(double spring_damping_s, double node_damping_per_s, double de
   return lattice_organ(kAcross, kAlong, kAcross, kSpacing_mm) +
          fmt::format(
              "[material]\ndensity_kg_m3 = {}\nspring_stiffness_n_m = {}\n"
-             "node_damping_per_s = {}\nspring_damping_time_s = {}\n\n",
+             "node_damping_per_s = {}\nedge_damping_time_s = {}\n\n",
              density, kStiffness_n_m, node_damping_per_s, spring_damping_s) +
          box_set("top", {-10, 20, -10}, {10, 20, 10});
 }

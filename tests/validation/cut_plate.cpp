@@ -50,7 +50,7 @@ CutPlate::CutPlate(organ::Organ organ, const cutting::Settings& settings, Mechan
   const auto& material = organ_->material;
   if (mechanics == Mechanics::AsPrinted)
     springs_ = std::make_unique<RemodelledSprings>(
-        *organ_, material.spring_damping_time_s * material.spring_stiffness_n_m);
+        *organ_, material.edge_damping_time_s * material.spring_stiffness_n_m);
   list_nodes();
 }
 

@@ -99,8 +99,8 @@ void print_material(const material::Material& m) {
   if (m.tear_stretch > 0)
     std::printf("  tears               at %.4g times its length\n", m.tear_stretch);
   std::printf("  density             %.4g kg/m^3\n", m.density_kg_m3);
-  std::printf("  damping             %.4g 1/s per node, %.4g ms along springs\n",
-              m.node_damping_per_s, m.spring_damping_time_s * 1e3);
+  std::printf("  damping             %.4g 1/s per node, %.4g ms along edges\n",
+              m.node_damping_per_s, m.edge_damping_time_s * 1e3);
 }
 
 void print_materials(const organ::Organ& organ) {

@@ -38,16 +38,17 @@ class PressBench {
   PressCourse press(const Place& place, const PressPlan& plan, const Decide& decide);
   PressCourse press(const Place& place, const PressPlan& plan,
                     const step::TickDecisions& decisions);
+  // The report of each tick goes to `observe`, with the force of the tissue on the tool.
+  using Observe = std::function<void(const step::TickReport&, const Vec3d& force_n)>;
+  PressCourse run(const Place& place, const PressPlan& plan, const Decide& decide,
+                  const Observe& observe);
   Pilot pilot(const Place& place, const PressPlan& plan);
 
+  const step::Simulation& simulation() const { return simulation_; }
   std::size_t node_count() const { return simulation_.organ().mesh.node_count(); }
   std::uint64_t ticks_done() const { return ticks_; }
 
  private:
-  using Observe = std::function<void(const step::TickReport&, const Vec3d& force_n)>;
-  PressCourse run(const Place& place, const PressPlan& plan, const Decide& decide,
-                  const Observe& observe);
-
   step::Simulation simulation_;
   Bytes rest_;
   std::uint64_t ticks_ = 0;

@@ -20,7 +20,7 @@ constexpr std::array kTunables{
     Tunable{"fibre_stiffness_ratio", &Material::fibre_stiffness_ratio, 1e-3, 1000, 0.05, false},
     Tunable{"tension", &Material::tension, 0, 0.9, 0.002, true},
     Tunable{"node_damping_per_s", &Material::node_damping_per_s, 1e-3, 1e6, 0.05, false},
-    Tunable{"spring_damping_time_s", &Material::spring_damping_time_s, 1e-6, 100, 0.05, false}};
+    Tunable{"edge_damping_time_s", &Material::edge_damping_time_s, 1e-6, 100, 0.05, false}};
 
 Error wrong(const scenario::ResolvedScenario& resolved, const std::string& what) {
   return {ErrorCode::BadFile, resolved.scenario.source.string() + ": " + what};

@@ -122,7 +122,7 @@ organ::Organ make_chest() {
   material.spring_law = material::SpringLaw::Constant;
   material.spring_stiffness_n_m = 100;
   material.young_modulus_pa = young_modulus_of_springs(organ.mesh, material.spring_stiffness_n_m);
-  material.spring_damping_time_s = 0.05 / 100;
+  material.edge_damping_time_s = 0.05 / 100;
   material.tension = 0.04;
   auto heart = material;
   heart.tension = 0;

@@ -98,7 +98,7 @@ organ::Organ make_plate() {
   organ.material.spring_law = material::SpringLaw::Constant;
   organ.material.spring_stiffness_n_m = 100;
   organ.material.young_modulus_pa = 58'000;
-  organ.material.spring_damping_time_s = 0.05 / 100;
+  organ.material.edge_damping_time_s = 0.05 / 100;
   organ.node_masses_kg = organ::lumped_masses(organ);
   for (std::size_t n = 0; n < organ.mesh.node_count(); ++n) {
     const Vec3d& p = organ.mesh.rest_positions[n];

@@ -35,9 +35,10 @@ struct Material {
   double young_modulus_pa = 4000;     // all but SpringLaw::Constant
   // Damping of each node in proportion to its velocity: d_i = rate x m_i (Choi 2002 eq. 1).
   double node_damping_per_s = 10;
-  // Damping of each edge's length: b = time x k (Kelvin-Voigt); k of the volume-consistent law
-  // where the elasticity is not of springs.
-  double spring_damping_time_s = 0.001;
+  // Damping of the length of each edge, of tets as of links: b = time x k (Kelvin-Voigt); k of the
+  // volume-consistent law where the elasticity is not of springs. Stretched within T, tissue is too
+  // stiff by about time / T while it moves.
+  double edge_damping_time_s = 0.0001;
   ElasticLaw elastic_law = ElasticLaw::Springs;
   double poisson_ratio = 0.45;  // TensorMass, NeoHookean; springs have 1/4 whatever is asked
   // Measured: a reduced polynomial, not split; young_modulus_pa and poisson_ratio say what it is to

@@ -28,7 +28,7 @@ inline constexpr std::array kNumberKeys{
               1e9},
     NumberKey{"young_modulus_pa", "Young's modulus (Pa)", &Material::young_modulus_pa, 0, 1e12},
     NumberKey{"node_damping_per_s", "node damping (1/s)", &Material::node_damping_per_s, 0, 1e6},
-    NumberKey{"spring_damping_time_s", "spring damping time (s)", &Material::spring_damping_time_s,
+    NumberKey{"edge_damping_time_s", "edge damping time (s)", &Material::edge_damping_time_s,
               0, 100},
     NumberKey{"poisson_ratio", "Poisson's ratio", &Material::poisson_ratio, 0, 0.4999},
     NumberKey{"fibre_stiffness_ratio", "fibre stiffness ratio", &Material::fibre_stiffness_ratio, 0,

@@ -161,7 +161,7 @@ std::vector<double> numbers_of(const material::Material& m) {
                               m.spring_stiffness_n_m,
                               m.young_modulus_pa,
                               m.node_damping_per_s,
-                              m.spring_damping_time_s,
+                              m.edge_damping_time_s,
                               static_cast<double>(m.elastic_law),
                               m.poisson_ratio,
                               m.has_averaged_strain ? 1.0 : 0.0,
@@ -236,7 +236,7 @@ Spring spring_along(const Vec3d& along, const material::Material& own, const Vec
       (1 - own.tension - (fibre_squared > 0 ? own.fibre_tension : 0) * cos_squared);
   const auto add = [&](const material::Material& material, double stiffness) {
     if (material.elastic_law == material::ElasticLaw::Springs) spring.stiffness_n_m += stiffness;
-    spring.damping_n_s_m += stiffness * material.spring_damping_time_s;
+    spring.damping_n_s_m += stiffness * material.edge_damping_time_s;
   };
   if (own.elastic_law == material::ElasticLaw::Springs &&
       own.spring_law == material::SpringLaw::Constant) {

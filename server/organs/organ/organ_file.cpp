@@ -81,7 +81,7 @@ void put_material(const material::Material& m, proto::Material& out) {
   out.set_spring_stiffness_n_m(m.spring_stiffness_n_m);
   out.set_young_modulus_pa(m.young_modulus_pa);
   out.set_node_damping_per_s(m.node_damping_per_s);
-  out.set_spring_damping_time_s(m.spring_damping_time_s);
+  out.set_edge_damping_time_s(m.edge_damping_time_s);
   out.set_elastic_law(static_cast<std::uint32_t>(m.elastic_law));
   out.set_poisson_ratio(m.poisson_ratio);
   out.set_has_averaged_strain(m.has_averaged_strain);
@@ -128,7 +128,7 @@ Status take_material(const proto::Material& in, material::Material& m) {
        .spring_stiffness_n_m = in.spring_stiffness_n_m(),
        .young_modulus_pa = in.young_modulus_pa(),
        .node_damping_per_s = in.node_damping_per_s(),
-       .spring_damping_time_s = in.spring_damping_time_s(),
+       .edge_damping_time_s = in.edge_damping_time_s(),
        .elastic_law = static_cast<material::ElasticLaw>(in.elastic_law()),
        .poisson_ratio = in.poisson_ratio(),
        .measured = {},

@@ -31,7 +31,7 @@ ExplicitEuler::ExplicitEuler(const organ::Organ& organ, const world::World& worl
     const auto& material = organ::material_at(organ, map.nodes[n]);
     damping_rates_.push_back(static_cast<float>(material.node_damping_per_s));
     is_free_.push_back(world.node_classes[n] != world::NodeClass::Fixed);
-    longest_time = std::max(longest_time, material.spring_damping_time_s);
+    longest_time = std::max(longest_time, material.edge_damping_time_s);
     highest_rate = std::max(highest_rate, material.node_damping_per_s);
   }
   highest_frequency_ = find_highest_frequency();

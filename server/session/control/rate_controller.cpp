@@ -8,6 +8,7 @@ namespace trocar::control {
 namespace {
 
 constexpr double kRaiseBelow = 0.9;  // of the budget
+constexpr int kExtraHaste = 16;      // A press has its peak in a quarter of a second.
 constexpr int kRegret = 500, kForget = 5000;
 constexpr int kLongAgo = 1'000'000;
 constexpr std::uint32_t kNodeShare = 16;
@@ -68,7 +69,7 @@ void RateController::observe(const step::TickReport& report, const TickTiming& t
   const bool can_lower = next_lower(report).is_any;
   watch_load(timing, can_lower);
   is_too_much_ = predicted_us_ > budget_us() && !can_lower;
-  if (predicted_us_ > budget_us()) {
+  if (predicted_us_ > budget_us() || (extra_ > 0 && is_pressed_)) {
     room_ticks_ = 0;
     lower(report);
   } else {
@@ -85,6 +86,7 @@ void RateController::remember_peaks(const step::TickReport& report) {
     remember(peak_layer_nodes_[layer], report.solve.layer_nodes[layer]);
   remember(peak_queue_nodes_, report.near.queue_nodes);
   far_work_ = far_work(report) * report.solve.figures.far_interval;
+  far_sweeps_ = std::max(1u, report.solve.figures.far_sweeps);
 }
 
 void RateController::watch_load(const TickTiming& timing, bool can_lower) {
@@ -92,17 +94,38 @@ void RateController::watch_load(const TickTiming& timing, bool can_lower) {
   load_ += kLoadGain * (std::min(work, kMaxWorkTicks) - load_);
   const double is_late = timing.lateness_ns > kTickNanoseconds ? 1 : 0;
   late_share_ += kLateGain * (is_late - late_share_);
-  const bool is_pressed = load_ > kHighLoad || late_share_ > kHighLateShare;
-  if (is_pressed && can_lower && predicted_us_ <= budget_us())
+  is_pressed_ = load_ > kHighLoad || late_share_ > kHighLateShare;
+  if (is_pressed_ && can_lower && predicted_us_ <= budget_us())
     budget_share_ = std::max(kMinBudgetShare, budget_share_ - kShrink);
   else if (load_ < kLowLoad)
     budget_share_ = std::min(1.0, budget_share_ + kGrow);
 }
 
-// The deepest layer that has sweeps to give, then nodes.
+// The first is above what the organ has by itself. Each costs a third to a half more.
+std::uint32_t RateController::extra_after(std::uint32_t extra) const {
+  if (extra > 0) return extra + (extra < 4 ? 1 : 2);
+  return std::max({2u, limits_.layer_sweeps, (highest_sweeps_.front() + 1) / 2,
+                   highest_sweeps_.back() / 2 + 1});
+}
+
+template <typename Nodes>
+double RateController::change_by(std::uint32_t extra, const Nodes& layer_nodes) const {
+  const double far_sweeps = extra > 0 ? extra : std::max(1u, limits_.layer_sweeps);
+  double change = far_work_ / far_sweeps_ * (far_sweeps - far_sweeps_);
+  for (std::size_t layer = 0; layer < step::kSweepLayers; ++layer)
+    change += layer_nodes[layer] * (static_cast<double>(sweeps_of(layer, extra)) -
+                                    static_cast<double>(sweeps_of(layer, extra_)));
+  return change;
+}
+
+// Extra, then the deepest layer that has sweeps to give, then nodes.
 RateController::Step RateController::next_lower(const step::TickReport& report) const {
-  Step step{sweeps_, far_interval_, nodes_, 0, report.near.active_nodes > 0};
+  Step step{sweeps_, far_interval_, nodes_, 0, 0, report.near.active_nodes > 0 || extra_ > 0};
   if (!step.is_any) return step;
+  if (extra_ > 0) {
+    step.change = change_by(0, report.solve.layer_nodes);
+    return step;
+  }
   for (std::size_t layer = step::kSweepLayers; layer-- > 0;) {
     if (sweeps_[layer] == lowest_sweeps_[layer]) continue;
     --step.sweeps[layer];
@@ -127,8 +150,8 @@ RateController::Step RateController::next_lower(const step::TickReport& report) 
   return step;
 }
 
-RateController::Step RateController::next_higher() const {
-  Step step{sweeps_, far_interval_, nodes_, 0, true};
+RateController::Step RateController::next_higher(const step::TickReport& report) const {
+  Step step{sweeps_, far_interval_, nodes_, extra_, 0, true};
   if (nodes_ < limits_.highest.node_limit) {
     if (peak_queue_nodes_ < nodes_) {
       step.nodes = limits_.highest.node_limit;  // there are no more
@@ -149,14 +172,32 @@ RateController::Step RateController::next_higher() const {
     step.change = peak_layer_nodes_[layer];
     return step;
   }
-  step.is_any = false;
+  step.extra = extra_after(extra_);
+  step.change = change_by(step.extra, peak_layer_nodes_);
+  step.is_any = step.extra <= limits_.most_far_sweeps && report.near.active_nodes > 0 &&
+                budget_share_ >= 1 && late_share_ < kHighLateShare / 2;
   return step;
+}
+
+// As much as fits into the budget stays, and nothing where others need the time.
+void RateController::lower_extra(const step::TickReport& report) {
+  std::uint32_t kept = 0;
+  for (auto extra = extra_after(0); !is_pressed_ && extra < extra_; extra = extra_after(extra)) {
+    const double node_sweeps = work_of(report) + change_by(extra, report.solve.layer_nodes);
+    if (model_.predict_us(node_sweeps) >= kExtraBelow * budget_us()) break;
+    kept = extra;
+  }
+  apply({sweeps_, far_interval_, nodes_, kept, 0, true});
 }
 
 void RateController::lower(const step::TickReport& report) {
   if (since_lower_ < kLowerEvery) return;
   auto step = next_lower(report);
   if (!step.is_any) return;
+  if (extra_ > 0) {
+    lower_extra(report);
+    step.is_any = false;
+  }
   while (step.is_any && step.change == 0) {
     apply(step);
     step = next_lower(report);
@@ -170,22 +211,26 @@ void RateController::lower(const step::TickReport& report) {
 void RateController::raise(const step::TickReport& report) {
   double node_sweeps = work_of(report);
   for (std::size_t layer = 0; layer < step::kSweepLayers; ++layer)
-    node_sweeps += (peak_layer_nodes_[layer] - report.solve.layer_nodes[layer]) * sweeps_[layer];
+    node_sweeps +=
+        (peak_layer_nodes_[layer] - report.solve.layer_nodes[layer]) * sweeps_of(layer, extra_);
   const auto has_room = [&](const Step& step) {
-    return step.is_any && model_.predict_us(node_sweeps + step.change) < kRaiseBelow * budget_us();
+    const double below = step.extra > 0 ? kExtraBelow : kRaiseBelow;
+    return step.is_any && model_.predict_us(node_sweeps + step.change) < below * budget_us();
   };
-  auto step = next_higher();
+  auto step = next_higher(report);
   if (!has_room(step)) {
     room_ticks_ = 0;
     return;
   }
-  if (++room_ticks_ < hold_) return;
+  const bool is_extra = step.extra > 0;
+  const int hold = is_extra ? hold_ / kExtraHaste : hold_;
+  if (++room_ticks_ < hold) return;
   while (step.is_any && step.change == 0) {
     apply(step);
-    step = next_higher();
+    step = next_higher(report);
   }
   if (has_room(step)) apply(step);
-  room_ticks_ = std::max(0, hold_ - kRaiseEvery);
+  room_ticks_ = std::max(0, hold - (is_extra ? kLowerEvery : kRaiseEvery));
   since_raise_ = 0;
   ++raised_;
 }
@@ -194,9 +239,16 @@ void RateController::apply(const Step& step) {
   sweeps_ = step.sweeps;
   nodes_ = step.nodes;
   far_interval_ = step.far_interval;
+  extra_ = step.extra;
   decisions_ = limits_.highest;
   decisions_.far_interval = far_interval_;
   decisions_.node_limit = nodes_;
+  if (extra_ > 0) {
+    decisions_.sweeps = 2 * extra_;
+    decisions_.layer_sweeps = {};
+    decisions_.far_sweeps = extra_;
+    return;
+  }
   if (sweeps_ == highest_sweeps_) return;
   decisions_.sweeps = sweeps_[0];
   for (std::size_t layer = 1; layer < step::kSweepLayers; ++layer)
@@ -205,7 +257,7 @@ void RateController::apply(const Step& step) {
 
 wire::RateFigures RateController::figures() const {
   using wire::RateLevel;
-  const bool is_full = decisions_ == limits_.highest;
+  const bool is_full = extra_ > 0 || decisions_ == limits_.highest;
   return {.level = is_too_much_ ? RateLevel::Overloaded
                                 : (is_full ? RateLevel::Full : RateLevel::Reduced),
           .budget_us = static_cast<float>(budget_us()),

@@ -37,6 +37,8 @@ namespace trocar::dynamics {
 namespace {
 
 constexpr std::uint32_t kNone = 0xffffffffu;
+// So many sweeps of a step need no more memory.
+constexpr std::size_t kUsualSweeps = 64;
 // A step of one node beyond this, m, is as broken as one that is not finite.
 constexpr float kMaxNodeStep = 1.0f;
 // If a node's step was not finite, the nodes within so many layers of it are restored with it.
@@ -66,6 +68,7 @@ BlockDescent::BlockDescent(const organ::Organ& organ, const world::World& world,
   resize_arrays();
   links_.reserve(8 * contact::kMaxPointsPerTool + contact::kMaxSelfPoints);
   residuals_.reserve(world.node_count());
+  schedule_.reserve(kUsualSweeps);
   relaxed_lanes_.reserve(group_count);
   for (auto* plan : {&near_, &far_, &far_swept_, &last_, &begun_, &relaxed_}) plan->reserve(groups);
   for (auto& band : bands_) band.reserve(groups);

@@ -8,9 +8,8 @@ namespace {
 // One far sweep is stable up to omega = 4/3 (stiff limit), two up to 1.58: 1 + 3^(-1/k).
 constexpr float kMaxFarOverRelaxationOneSweep = 1.33f;
 constexpr float kMaxFarOverRelaxationTwoSweeps = 1.5f;
-// Up to here one sweep with what is stable (1.33 for omega* up to 1.5) keeps forces as true as two:
-// 0.86 beside 0.82 % for the measured liver, in three quarters of the time.
-constexpr float kMostKappaOneSweep = 2;
+// Up to here omega* is what one sweep may have, 2 (1 + kappa) / (2 + kappa) <= 4/3.
+constexpr float kMostKappaOneSweep = 1;
 
 }  // namespace
 

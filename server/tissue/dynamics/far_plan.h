@@ -6,8 +6,8 @@ namespace trocar::dynamics {
 
 // How the far field of an organ wants to be swept at a step dt, from kappa = dt^2 D/m with D the
 // mean stiffness of a node's block and m its mean mass: one sweep with omega* = 2 (1 + kappa) /
-// (2 + kappa), for which a region that moves as a whole has its own inertia, while that is stable
-// or nearly; else two.
+// (2 + kappa), for which a region that moves as a whole has its own inertia, while that is stable;
+// else two.
 struct FarPlan {
   float kappa = 0;
   std::uint32_t sweeps = 1;

@@ -24,8 +24,9 @@ namespace trocar::dynamics {
 class LinearFarField {
  public:
   // Largest relative motion of neighbours, over the root mean square of a node's edges at rest,
-  // that is taken to be linear: errors are of its square.
-  static constexpr float kMaxSpread = 0.05f;
+  // that is taken to be linear. Errors are of its square: what turns by that much is strained by
+  // half the square, 2e-4, for no reason, which a thin wall resists much more than its bending.
+  static constexpr float kMaxSpread = 0.02f;
 
   // Measures the edges at rest; read_state() must follow. The tissue must outlive it.
   LinearFarField(Tissue& tissue, const world::World& world);
