@@ -44,7 +44,7 @@ T must(Result<T> result) {
   std::exit(static_cast<int>(ExitCode::BadFile));
 }
 
-// What the program holds in memory now, MB.
+// Returns the memory that the program holds now, MB.
 double memory_mb() {
   std::ifstream file("/proc/self/statm");
   std::size_t all = 0, resident = 0;
@@ -52,7 +52,7 @@ double memory_mb() {
   return static_cast<double>(resident) * 4096e-6;
 }
 
-// Where the hands are, as a function of the tick and of where the surface is.
+// Hands move as a function of the tick and of where the surface is.
 class Hands {
  public:
   explicit Hands(const step::Simulation& simulation) : simulation_(simulation) {
@@ -142,7 +142,7 @@ class Wire {
     frames_ = bytes_ = 0;
     return mean;
   }
-  // What somebody who joins now is sent before the first delta.
+  // Returns what somebody who joins now is sent before the first delta.
   std::size_t join_bytes(const step::Simulation& simulation) {
     return replication::encode_topology(simulation.layout(), simulation.organ().name)->size() +
            encoder_.keyframe()->size();

@@ -35,7 +35,7 @@ class VirtualSession {
   }
 
  private:
-  // Of tissue whose strain is averaged implicitly, the most costly, on one core of a server.
+  // These are costs of tissue whose strain is averaged implicitly, the most costly, on one core.
   static constexpr std::uint64_t kFixed_ns = 60'000, kNear_ns = 120, kFar_ns = 60;
   control::RateController controller_;
 };

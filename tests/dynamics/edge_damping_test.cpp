@@ -1,4 +1,4 @@
-// What damping along edges adds to the stress of tissue that moves fast.
+// Damping along edges adds to the stress of tissue that moves fast.
 
 #include <gtest/gtest.h>
 
@@ -50,8 +50,8 @@ double pull_n(const organ::Organ& organ, double before, double now) {
   return pull;
 }
 
-// As long as nobody asks for more, tissue that is stretched to 1.2 within 10 ms has the stress of
-// its law within 3 %.
+// Tissue that is stretched to 1.2 within 10 ms has the stress of its law within 3 %, unless
+// somebody asks for more damping.
 TEST_P(EdgeDamping, OfTheDefaultHardlyAddsToTheStressOfAJump) {
   organ::Organ organ;
   organ.name = "block";

@@ -42,8 +42,7 @@ TEST(Plate, HasNakaosSizeAndMaterial) {
       std::accumulate(organ.node_masses_kg.begin(), organ.node_masses_kg.end(), 0.0);
   EXPECT_NEAR(mass, 900 * 0.16 * 0.16 * 0.004, 1e-9);
   for (const auto& s : springs_of(organ)) EXPECT_DOUBLE_EQ(s.stiffness_n_m, 100);
-  EXPECT_DOUBLE_EQ(organ.material.edge_damping_time_s * organ.material.spring_stiffness_n_m,
-                   0.05);
+  EXPECT_DOUBLE_EQ(organ.material.edge_damping_time_s * organ.material.spring_stiffness_n_m, 0.05);
   const auto angles = mesh::dihedral_range(organ.mesh);
   EXPECT_GT(angles.min_deg, 30);
   EXPECT_LT(angles.max_deg, 140);

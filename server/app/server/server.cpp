@@ -237,8 +237,7 @@ LoopOptions Server::loop_options() const {
     const bool is_averaged = simulation_.state().strain_scheme == dynamics::StrainScheme::Explicit;
     if (!is_averaged) rate.far_interval = control::kLongestFarInterval;
     const bool is_asked = options_.are_sweeps_chosen || decisions.far_sweeps > 0;
-    if (!is_asked && !simulation_.state().far_model)
-      rate.most_far_sweeps = control::kMostFarSweeps;
+    if (!is_asked && !simulation_.state().far_model) rate.most_far_sweeps = control::kMostFarSweeps;
   }
   loop.rate = rate;
   return loop;

@@ -179,7 +179,7 @@ RateController::Step RateController::next_higher(const step::TickReport& report)
   return step;
 }
 
-// As much as fits into the budget stays, and nothing where others need the time.
+// Keeps what fits into the budget, and nothing where others need the time.
 void RateController::lower_extra(const step::TickReport& report) {
   std::uint32_t kept = 0;
   for (auto extra = extra_after(0); !is_pressed_ && extra < extra_; extra = extra_after(extra)) {

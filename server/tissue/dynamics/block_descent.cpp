@@ -37,7 +37,7 @@ namespace trocar::dynamics {
 namespace {
 
 constexpr std::uint32_t kNone = 0xffffffffu;
-// So many sweeps of a step need no more memory.
+// A step of up to this many sweeps allocates nothing.
 constexpr std::size_t kUsualSweeps = 64;
 // A step of one node beyond this, m, is as broken as one that is not finite.
 constexpr float kMaxNodeStep = 1.0f;

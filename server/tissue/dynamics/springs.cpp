@@ -18,8 +18,8 @@ Float8 inverse_length(Float8 length_squared) {
 }
 
 bool has_damping(const organ::Organ& organ) {
-  return organ::any_material(
-      organ, [](const material::Material& m) { return m.edge_damping_time_s > 0; });
+  return organ::any_material(organ,
+                             [](const material::Material& m) { return m.edge_damping_time_s > 0; });
 }
 
 bool has_elasticity(const organ::Organ& organ) {
