@@ -37,13 +37,21 @@ struct Way {
   cutting::Settings settings;
 };
 
+// The blade cuts the whole plate in one motion.
+cutting::Settings in_one_motion(cutting::Settings settings) {
+  settings.most_pieces_of_motion = 64;
+  return settings;
+}
+
 std::vector<Way> ways() {
   cutting::Settings faces;
   faces.snap = 0.51;  // always the nearer end: nothing is split
-  return {{"adaptive", "adaptive (Nakao)", nakao::settings_of(nakao::Variant::Adaptive)},
-          {"plain", "split, neither moved nor chosen", nakao::settings_of(nakao::Variant::Plain)},
-          {"faces", "faces of existing tets only", faces},
-          {"robust", "ours, of sessions", cutting::Settings{}}};
+  return {
+      {"adaptive", "adaptive (Nakao)", in_one_motion(nakao::settings_of(nakao::Variant::Adaptive))},
+      {"plain", "split, neither moved nor chosen",
+       in_one_motion(nakao::settings_of(nakao::Variant::Plain))},
+      {"faces", "faces of existing tets only", in_one_motion(faces)},
+      {"robust", "ours, of sessions", in_one_motion({})}};
 }
 
 struct Wound {

@@ -60,7 +60,7 @@ inline constexpr std::uint32_t kMaxDepthLimit = 1000;
 inline constexpr std::uint32_t kMaxNodeLimit = 10'000'000;
 inline constexpr std::uint32_t kMaxSweeps = 64;
 inline constexpr std::uint32_t kMaxFarSweeps = 16;
-inline constexpr std::uint32_t kMaxFarInterval = 4;
+inline constexpr std::uint32_t kMaxFarInterval = 3;
 // Layers where nodes outside the queue stand still: shallower ones feel stiff.
 inline constexpr std::uint32_t kFrozenDepthLimit = 6;
 
