@@ -158,7 +158,10 @@ void TouchTable::describe_surface(const Scene& scene, ToolSlot slot, wire::Hapti
       surface.take(scene.world, layout, place);
     }
   }
-  if (!surface.is_known()) return;
+  if (!surface.is_known()) {
+    if (!is_touching(touch.kind)) touch.kind = TouchKind::Free;
+    return;
+  }
   if (is_touching(touch.kind)) {
     const Vec3f core = tool.pose.position + shaft * std::max(touch.along_m, tool.shape.radius_m);
     if (do_others_act(scene, slot)) touch.others_tick = scene.world.tick;
@@ -167,7 +170,7 @@ void TouchTable::describe_surface(const Scene& scene, ToolSlot slot, wire::Hapti
     surface.follow(scene.world, layout, core, tool.shape.radius_m, do_others);
   }
   const float radius = std::max(tool.shape.radius_m, 0.004f);
-  const auto [point, normal, corner] = surface.plane(place, radius);
+  const auto [point, normal, corner] = surface.felt_plane(place, radius);
   auto node = corner;
   while (node.value >= law_of_node_.size())
     node = scene.world.origins[node.value - law_of_node_.size()].a;

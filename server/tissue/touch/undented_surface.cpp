@@ -19,7 +19,9 @@ constexpr float kRingMiddle_m = 0.022f;
 constexpr float kLeastFacing = 0.5f;
 constexpr float kCurved_m = 0.012f;  // around a point, for its curvature
 constexpr float kFaces = 0.5f;       // the cosine of what counts as facing a way
-constexpr float kNoise_m2 = 1e-8f;   // sinking that varies less leaves the guess
+constexpr float kClear_m = 0.001f;
+constexpr float kSame_m2 = 1e-10f;  // distances that differ less are equal
+constexpr float kNoise_m2 = 1e-8f;  // sinking that varies less leaves the guess
 
 // Returns how far a half space sinks there where a ball is pressed into it, or rises where it is
 // pulled: far from it the dent is that of a point load, (1 - nu^2) F / (pi E r) (Boussinesq), and
@@ -37,11 +39,17 @@ bool is_within(const Vec3f& a, const Vec3f& b, float distance) {
   return dot(d, d) <= distance * distance;
 }
 
+// Returns zero for a triangle without an area.
+Vec3f unit(const Vec3f& v) {
+  const float size = length(v);
+  return size > 0 ? v * (1 / size) : v;
+}
+
 }  // namespace
 
 void UndentedSurface::clear() {
   triangles_.clear();
-  moved_ = kept_off_ = outward_ = {};
+  moved_ = kept_off_ = outward_ = face_normal_ = {};
   least_facing_ = -1;
   sinks_ = motion_ = variance_ = covariance_ = 0;
 }
@@ -112,7 +120,7 @@ void UndentedSurface::settle(const world::World& world, const wire::SurfaceLayou
     }
     shape(triangle);
   }
-  moved_ = kept_off_ = outward_ = {};
+  moved_ = kept_off_ = outward_ = face_normal_ = {};
   sinks_ = motion_ = 0;  // by how much more than a half space it sinks is remembered
   if (!is_within(place, centre_, kSlid_m)) take(world, layout, place);
 }
@@ -168,34 +176,64 @@ Vec3f UndentedSurface::nearest_on(const Triangle& triangle, const Vec3f& at) {
   return a * w.x + b * w.y + c * w.z;
 }
 
-UndentedSurface::Plane UndentedSurface::plane(const Vec3f& place, float radius_m) const {
-  const Vec3f at = place - moved_;
-  Vec3f nearest;
-  const Triangle* of = nullptr;
-  float least = 0;
+UndentedSurface::Nearest UndentedSurface::nearest(const Vec3f& place) const {
+  Vec3f at = place - moved_;
+  at += face_normal_ * std::max(0.0f, dot(face_normal_, face_point_ - at));
+  Nearest nearest;
+  float least = 0, faces = 0;
   for (const auto& triangle : triangles_) {
     if (!is_outside(triangle)) continue;
     const Vec3f point = nearest_on(triangle, at);
     const Vec3f away = at - point;
-    if (const float d = dot(away, away); of == nullptr || d < least) {
-      least = d;
-      nearest = point;
-      of = &triangle;
-    }
+    const float d = dot(away, away);
+    const bool is_nearer = nearest.triangle == nullptr || d < least - kSame_m2;
+    if (!is_nearer && d > least + kSame_m2) continue;
+    const Vec3f normal = unit(triangle.normal);
+    nearest.facing = is_nearer ? normal : nearest.facing + normal;
+    // On an edge it stays on the face that it was on.
+    const float facing = dot(normal, face_normal_);
+    if (!is_nearer && facing <= faces) continue;
+    least = d;
+    faces = facing;
+    nearest = {&triangle, point, away, nearest.facing};
   }
-  if (of == nullptr)
+  return nearest;
+}
+
+UndentedSurface::Plane UndentedSurface::plane(const Vec3f& place, float radius_m) const {
+  return plane_of(nearest(place), radius_m);
+}
+
+UndentedSurface::Plane UndentedSurface::felt_plane(const Vec3f& place, float radius_m) {
+  const auto found = nearest(place);
+  if (found.triangle != nullptr) {
+    face_point_ = found.point;
+    face_normal_ = unit(found.triangle->normal);
+  }
+  return plane_of(found, radius_m);
+}
+
+UndentedSurface::Plane UndentedSurface::plane_of(const Nearest& nearest, float radius_m) const {
+  if (nearest.triangle == nullptr)
     return {triangles_.front().at[0] + moved_, outward_, triangles_.front().nodes[0]};
   // Each counts by how near it comes, so that the normal turns without a jump.
   Vec3f normal;
   for (const auto& triangle : triangles_) {
-    if (!is_outside(triangle) || !is_within(triangle.centre, nearest, radius_m + triangle.reach_m))
+    if (!is_outside(triangle) ||
+        !is_within(triangle.centre, nearest.point, radius_m + triangle.reach_m))
       continue;
-    const Vec3f away = nearest_on(triangle, nearest) - nearest;
+    const Vec3f away = nearest_on(triangle, nearest.point) - nearest.point;
     const float share = 1 - dot(away, away) / (radius_m * radius_m);
     if (share > 0) normal += triangle.normal * (share * share);
   }
+  // A thin flap's normals may cancel out, or point away from a tool that is clearly outside.
+  const bool is_clear = length_squared(outward_) == 0 &&
+                        length_squared(nearest.away) > kClear_m * kClear_m &&
+                        dot(nearest.facing, nearest.away) > 0;
+  if (is_clear && dot(normal, nearest.away) <= 0) normal = nearest.away;
   const float size = length(normal);
-  return {nearest + moved_, size > 0 ? normal * (1 / size) : Vec3f{0, 0, 1}, of->nodes[0]};
+  return {nearest.point + moved_, size > 0 ? normal * (1 / size) : Vec3f{0, 0, 1},
+          nearest.triangle->nodes[0]};
 }
 
 std::optional<UndentedSurface::Wall> UndentedSurface::wall(const Plane& plane) const {

@@ -53,9 +53,13 @@ class UndentedSurface {
   };
   std::optional<Wall> wall(const Plane& plane) const;
 
-  // The nearest point of it to `place` on the side from which the tool came, with the normal
-  // averaged over `radius_m` around. Known.
+  // The point of it that is nearest to `place` on the side from which the tool came, with the
+  // normal averaged over `radius_m` around. Known. Deep under a sharp edge another face is nearer
+  // at once, and none is from above: so what is nearest is sought from the plane of the frame
+  // before.
   Plane plane(const Vec3f& place, float radius_m) const;
+  // The same, and the next frame begins with its face.
+  Plane felt_plane(const Vec3f& place, float radius_m);
 
  private:
   struct Triangle {
@@ -68,6 +72,13 @@ class UndentedSurface {
 
   static void shape(Triangle& triangle);
   static Vec3f nearest_on(const Triangle& triangle, const Vec3f& at);
+  struct Nearest {
+    const Triangle* triangle = nullptr;  // null: there is none
+    Vec3f point, away;                   // away: from it to the place
+    Vec3f facing;  // sum of the unit normals of the triangles that are as near
+  };
+  Nearest nearest(const Vec3f& place) const;
+  Plane plane_of(const Nearest& nearest, float radius_m) const;
   // The other face of a thin wall is none that the tool could come out of.
   bool is_outside(const Triangle& triangle) const { return dot(triangle.normal, outward_) >= 0; }
   // motion: of the surface at places that are new.
@@ -80,6 +91,7 @@ class UndentedSurface {
   Vec3f moved_;                             // since it was taken, by others
   Vec3f kept_off_;                          // what the ring has moved besides
   Vec3f outward_;                           // under the tool; 0: it does not touch yet
+  Vec3f face_point_, face_normal_;          // pressed in the last frame, less moved_; 0: none
   float least_facing_ = -1;                 // only what faces outward_ by this cosine is taken
   // Means that forget, of the ring's motion along the normal over how far a half space would sink.
   float sinks_ = 0, motion_ = 0, variance_ = 0, covariance_ = 0;
