@@ -34,7 +34,7 @@ struct HapticPatch {
   Vec3f plane_point_m;          // of the surface without this tool
   Vec3f plane_normal{0, 0, 1};  // outward
   bool has_stiffness = false;
-  SymMat3f stiffness_n_m;  // change of force over 50 ms
+  SymMat3f stiffness_n_m;  // change of force over 50 ms; Near: expected of a press of 5 mm
   float friction = 0;
   float pressed_limit_n = 0;  // 0: there is no limit
   Vec3f grip_point_m;         // where the held tissue would be without this tool
