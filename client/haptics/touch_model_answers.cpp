@@ -297,7 +297,7 @@ void TouchModel::correct(const PastState& then, bool is_new_structure) {
 }
 
 // The server says of tissue that is near how stiff it expects it to be, as far as its shape tells.
-// What was felt elsewhere is carried over by how much stiffer this place should be than that.
+// A slope that was felt elsewhere is scaled by how much stiffer this place should be than that one.
 void TouchModel::expect() {
   if (patch_.kind != wire::TouchKind::Near || !patch_.has_stiffness) return;
   Material& material = materials_[material_];

@@ -308,7 +308,7 @@ bool SelfContactFinder::stays(Site site, TriangleIndex triangle, const world::Wo
          lies_along(touch.aside, touch.gap);
 }
 
-// A node that a cut has just opened looks however slow it is.
+// Active nodes look in every tick: a cut may have opened them just now, however slow they are.
 void SelfContactFinder::find_pace(const world::World& world) {
   using world::NodeClass;
   is_any_awake_ = false;

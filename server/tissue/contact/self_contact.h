@@ -20,7 +20,7 @@
 // their own: a node at the rim has a normal of each, and a node on a wound meets the other side of
 // wounds first. A pair whose triangle an edit has replaced goes on with what is there now.
 //
-// What hardly moves costs little. A pair stays where it lies on its triangle until the node may
+// Slow tissue costs little. A pair stays where it lies on its triangle until the node may
 // have drifted by kDrift_m from there (kNearDrift_m where nodes are swept most), as fast as it
 // moves against the triangle now, but for no more than kLookEvery ticks. Where it lies is state,
 // too. Where nodes are not swept most, a pair that drifts by less in a tick is given to the solver
