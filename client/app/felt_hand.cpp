@@ -13,6 +13,7 @@ namespace {
 
 constexpr std::size_t kMostLaws = 8;  // that wait: a model keeps no more
 constexpr std::uint64_t kPublishEvery = 16;
+constexpr std::uint64_t kJudgedSteps = 1000;
 // The network asks every 4 ms, now and then a little early.
 constexpr haptics::ReadingPace kPace{.shortest_ns = 2'000'000};
 
@@ -79,9 +80,29 @@ void FeltHand::set_view(const Quatf& world_from_device) {
   if (hand_) hand_->put_view(view_);
 }
 
-Status FeltHand::check() const {
-  if (!loop_ || loop_->is_running() || !loop_->failure()) return {};
+Status FeltHand::check() {
+  if (!loop_) return {};
+  judge_readings();
+  if (loop_->is_running() || !loop_->failure()) return {};
   return Error{ErrorCode::ResourceMissing, figures_.device + ": " + loop_->failure()->message};
+}
+
+// The safety chain takes the force away without a word, so somebody has to say it.
+void FeltHand::judge_readings() {
+  hand_->take_state(figures_.state);
+  const auto& state = figures_.state;
+  const auto steps = state.steps - judged_steps_;
+  if (steps < kJudgedSteps) return;
+  const auto old = state.limit_counts[static_cast<std::size_t>(haptics::Limit::StaleReading)];
+  const bool is_late = 2 * (old - judged_old_) > steps;
+  judged_steps_ = state.steps;
+  judged_old_ = old;
+  if (is_late && !has_old_readings_)
+    log::warn(
+        "{}: its readings are more than 20 ms old, so the hand feels nothing; see to its cable and "
+        "its driver, or end other programs",
+        figures_.device);
+  has_old_readings_ = is_late;
 }
 
 const FeltFigures& FeltHand::figures() {

@@ -58,8 +58,10 @@ class FeltHand {
   // Does as Hand::put_view; before the start, too. A device with a tool of its own moves in the
   // world, however it is seen.
   void set_view(const Quatf& world_from_device);
-  // An error: the device is gone.
-  Status check() const;
+  // Is called often. An error: the device is gone. It warns of readings that come too late.
+  Status check();
+  // Most readings of the second before were too old, so the hand felt nothing.
+  bool has_old_readings() const { return has_old_readings_; }
   const FeltFigures& figures();
   // Says where a reading had the tip, and when it left; what nobody asks for in time is left out.
   struct Sent {
@@ -86,6 +88,7 @@ class FeltHand {
     double median_us = 0, most_us = 0;  // 99 % are shorter
   };
 
+  void judge_readings();
   bool is_due(const haptics::HandReading& reading, std::uint64_t now_ns) const;
   void pass_on_laws();
   void note_sent(std::uint64_t now_ns);
@@ -98,6 +101,8 @@ class FeltHand {
   std::unique_ptr<haptics::Loop> loop_;
   std::atomic<bool> is_live_{false};  // the hand may be used on the network's thread
   FeltFigures figures_;
+  bool has_old_readings_ = false;
+  std::uint64_t judged_steps_ = 0, judged_old_ = 0;  // steps so far, and those with old readings
   SpscQueue<Sent> sent_places_{kSentPlaces};
   Newest<SendTimes> send_times_;
 

@@ -19,11 +19,13 @@ namespace {
 
 using Opened = Result<std::unique_ptr<HapticDevice>>;
 
+constexpr double kSearchSpeed_m_s = 0.02;  // of a hand that begins in front of the organ
+
 Opened open_simulated(const std::string& parameters) {
   auto script = HandScript::parse(parameters.empty() ? "palpate" : parameters);
   if (!script) return script.error();
-  return std::unique_ptr<HapticDevice>(
-      std::make_unique<SimulatedDevice>(std::move(*script), monotonic_us));
+  return std::unique_ptr<HapticDevice>(std::make_unique<SimulatedDevice>(
+      std::move(*script), monotonic_us, HandModel{.search_m_s = kSearchSpeed_m_s}));
 }
 
 Opened open_journal(const std::string& parameters) {

@@ -9,7 +9,8 @@
 //   path=FILE              key frames: "seconds x y z [gripper]" a line, x y z in mm, # a comment
 //
 // Parameters may follow in any order, except the two lengths of palpate. Besides: -y (or +x, ...)
-// the direction that is in, and grip: the gripper is closed. Immutable; any thread may ask.
+// the direction that is in, -z if nothing is said: away from the person; and grip: the gripper is
+// closed. Immutable; any thread may ask.
 
 #include <string>
 #include <string_view>
@@ -35,13 +36,16 @@ class HandScript {
   // Seconds since the hand began, from 0.
   Vec3d position_m(double seconds) const;
   float gripper(double seconds) const;
+  // Whether it goes in by a depth, and in which direction.
+  bool has_depth() const { return kind_ != Kind::Still && kind_ != Kind::Path; }
+  const Vec3d& inwards() const { return inwards_; }
 
  private:
   enum class Kind { Still, Press, Palpate, Tap, Path };
 
   Kind kind_ = Kind::Still;
   double depth_m_ = 0.005, mean_m_ = 0, hold_s_ = 2, rate_hz_ = 1;
-  Vec3d inwards_{0, -1, 0};
+  Vec3d inwards_{0, 0, -1};
   float gripper_ = 0;
   std::vector<Key> keys_;  // of a path, by time; never empty there
 

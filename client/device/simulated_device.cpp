@@ -12,6 +12,7 @@ namespace {
 constexpr std::uint64_t kStepUs = 1000, kMostStepsAtOnce = 1000;
 constexpr int kPartsOfStep = 10;
 constexpr double kStepS = 1e-3, kHandForceN = 8, kHandReachM = 0.15;
+constexpr double kTouchN = 0.05, kSearchM = 0.1;  // what tells of tissue; farther in it gives up
 
 }  // namespace
 
@@ -20,11 +21,23 @@ SimulatedDevice::SimulatedDevice(HandScript script, ClockUs clock_us, HandModel 
       clock_us_(std::move(clock_us)),
       model_(model),
       start_us_(clock_us_()),
+      is_searching_(model_.search_m_s > 0 && script_.has_depth()),
       position_m_(script_.position_m(0)) {}
 
+void SimulatedDevice::search() {
+  is_searching_ = dot(force_n_, script_.inwards()) > -kTouchN && reach_m_ < kSearchM;
+  found_steps_ = steps_;
+  if (is_searching_) reach_m_ += model_.search_m_s * kStepS;
+}
+
+Vec3d SimulatedDevice::wanted_m(std::uint64_t steps) const {
+  return script_.inwards() * reach_m_ +
+         script_.position_m(static_cast<double>(steps - found_steps_) * kStepS);
+}
+
 void SimulatedDevice::step() {
-  const double now_s = static_cast<double>(steps_) * kStepS;
-  const Vec3d wanted = script_.position_m(now_s);
+  if (is_searching_) search();
+  const Vec3d wanted = wanted_m(steps_);
   Vec3d& lag = lags_m_[steps_ % lags_m_.size()];  // of a reflex delay ago
   const Vec3d reflex = lag * model_.reflex_n_m;
   lag = wanted - position_m_;
@@ -45,7 +58,8 @@ void SimulatedDevice::advance() {
   const std::uint64_t due = (now_us - start_us_) / kStepUs;
   if (due > steps_ + kMostStepsAtOnce) {
     steps_ = due;
-    position_m_ = script_.position_m(static_cast<double>(due) * kStepS);
+    if (is_searching_) found_steps_ = steps_;
+    position_m_ = wanted_m(steps_);
     velocity_m_s_ = {};
     lags_m_ = {};
   }
@@ -60,7 +74,7 @@ Result<DeviceReading> SimulatedDevice::read() {
   DeviceReading reading;
   reading.position_m = {rounded(position_m_.x), rounded(position_m_.y), rounded(position_m_.z)};
   reading.velocity_m_s = velocity_m_s_;
-  reading.gripper = script_.gripper(static_cast<double>(steps_) * kStepS);
+  reading.gripper = script_.gripper(static_cast<double>(steps_ - found_steps_) * kStepS);
   reading.time_us = start_us_ + steps_ * kStepUs;
   return reading;
 }

@@ -65,6 +65,19 @@ TEST(FeltHand, BeforeTheStartThereIsNothingAndLawsAreKept) {
   EXPECT_EQ(fixture.hand->figures().state.largest_server_force_n, 0) << "patches are dropped";
 }
 
+TEST(FeltHand, SaysThatReadingsAreTooOldAndTakesItBack) {
+  Fixture fixture;
+  ASSERT_TRUE(fixture.hand->start({}).ok());
+  fixture.device->is_stuck = true;
+  const auto has_old = [&] {
+    EXPECT_TRUE(fixture.hand->check().ok());
+    return fixture.hand->has_old_readings();
+  };
+  EXPECT_TRUE(wait_until(has_old));
+  fixture.device->is_stuck = false;
+  EXPECT_TRUE(wait_until([&] { return !has_old(); }));
+}
+
 TEST(FeltHand, AnAnswerReachesTheLoopWithoutTheRenderThread) {
   Fixture fixture;
   ASSERT_TRUE(fixture.hand->start({0, 0, 0.1}).ok());

@@ -36,7 +36,7 @@ struct Spring {
 };
 
 TEST(SimulatedDevice, AFreeHandFollowsItsIntention) {
-  Bench bench("palpate,1Hz,3mm,6mm");
+  Bench bench("palpate,1Hz,3mm,6mm,-y");
   double lowest = 0, highest = -1;
   for (int ms = 0; ms < 4000; ++ms) {
     const auto reading = bench.after_ms(1);
@@ -61,7 +61,7 @@ TEST(SimulatedDevice, TheForceActsOnTheHand) {
 }
 
 TEST(SimulatedDevice, AClosedLoopOnTissueSettlesBetweenIntentionAndSurface) {
-  Bench bench("press,5mm,10s");
+  Bench bench("press,5mm,10s,-y");
   const Spring tissue;
   DeviceReading reading;
   for (int ms = 0; ms < 6000; ++ms) {
@@ -71,6 +71,25 @@ TEST(SimulatedDevice, AClosedLoopOnTissueSettlesBetweenIntentionAndSurface) {
   // 480 (x + 5 mm) = 200 (-1 mm - x)
   EXPECT_NEAR(reading.position_m.y, -(480 * 0.005 + 200 * 0.001) / 680, 4e-5);
   EXPECT_NEAR(length(reading.velocity_m_s), 0, 1e-4);
+}
+
+TEST(SimulatedDevice, ItLooksForTheTissueAndCountsDepthFromThere) {
+  Bench bench("press,5mm,10s,-y", HandModel{.search_m_s = 0.02});
+  const Spring tissue{.surface_m = -0.03};
+  DeviceReading reading;
+  for (int ms = 0; ms < 6000; ++ms) {
+    reading = bench.after_ms(1);
+    ASSERT_TRUE(bench.device.write(tissue.force(reading), {}).ok());
+  }
+  // The arm was 0.05 N / 480 N/m ahead of the place where the spring gave 0.05 N.
+  const double found_m = -0.03 - 0.05 / 200 - 0.05 / 480;
+  EXPECT_NEAR(reading.position_m.y, (480 * (found_m - 0.005) - 200 * 0.03) / 680, 5e-4);
+}
+
+TEST(SimulatedDevice, WithoutTissueItBeginsWhereItsReachEnds) {
+  Bench bench("press,5mm,10s,-y", HandModel{.search_m_s = 0.02});
+  for (int ms = 0; ms < 7900; ms += 100) bench.after_ms(100);
+  EXPECT_NEAR(bench.after_ms(100).position_m.y, -0.105, 1e-3);
 }
 
 TEST(SimulatedDevice, TheReflexComesLate) {
