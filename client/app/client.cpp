@@ -8,6 +8,7 @@
 
 #include "client/app/client_summary.h"
 #include "client/app/picture.h"
+#include "client/app/picture_pace.h"
 #include "client/app/start.h"
 #include "client/device/device_list.h"
 #include "client/device/returning_device.h"
@@ -35,12 +36,11 @@ class Run {
       : options_(options),
         source_(source),
         hands_(hands),
-        replica_([&source](const proto::Envelope& message) { return source.send(message); }) {
+        replica_([&source](const proto::Envelope& message) { return source.send(message); }),
+        pace_(options.pictures_per_second > 0        ? options.pictures_per_second
+              : options.display == Display::Headless ? 15
+                                                     : 60) {
     replica_.corrupt_delta(options.corrupt_frame);
-    const double rate = options.pictures_per_second > 0        ? options.pictures_per_second
-                        : options.display == Display::Headless ? 15
-                                                               : 60;
-    picture_interval_ns_ = static_cast<std::uint64_t>(1e9 / rate);
   }
 
   Result<ExitCode> run();
@@ -59,7 +59,7 @@ class Run {
   Hands& hands_;
   replica::Replica replica_;
   std::unique_ptr<Picture> picture_;
-  std::uint64_t picture_interval_ns_ = 0, next_picture_ns_ = 0;
+  PicturePace pace_;
   std::uint64_t start_ns_ = 0;
   std::uint64_t live_ns_ = 0;  // when the first frame was there
   bool has_screenshot_ = false, has_marked_ = false, has_returned_ = false;
@@ -83,9 +83,9 @@ Status Run::step(std::uint64_t now_ns) {
   use_marks(now_ns);
   measure(now_ns);
   if (picture_) picture_->observe(replica_, hands_, now_ns);
-  if (picture_ && now_ns >= next_picture_ns_) {
-    next_picture_ns_ = std::max(next_picture_ns_ + picture_interval_ns_, now_ns);
+  if (picture_ && pace_.is_due(now_ns)) {
     picture_->draw(replica_, source_, hands_, now_ns);
+    pace_.note_picture(now_ns, monotonic_ns());
     if (const auto taken = take_screenshot(now_ns, false); !taken) return taken.error();
   }
   return {};
@@ -177,6 +177,10 @@ Result<ExitCode> Run::run() {
     auto picture = Picture::make(options_, "Trocar: " + source_.name());
     if (!picture) return picture.error();
     picture_ = std::move(*picture);
+    // Nobody else needs the processors while a recording plays; who asks for a rate gets it.
+    if (picture_->is_software() && source_.playback() == nullptr &&
+        options_.pictures_per_second == 0)
+      pace_.yield();
   }
   for (;;) {
     const std::uint64_t now = monotonic_ns();
@@ -184,7 +188,7 @@ Result<ExitCode> Run::run() {
     if (is_over(now)) return conclude({});
     const std::uint64_t after = monotonic_ns();
     std::uint64_t wake = after + kPollNs;
-    if (picture_) wake = std::clamp(next_picture_ns_, after, wake);
+    if (picture_) wake = std::clamp(pace_.next_ns(), after, wake);
     std::this_thread::sleep_for(std::chrono::nanoseconds(wake - after));
   }
 }

@@ -231,7 +231,7 @@ void add_picture_options(CLI::App& app, ClientOptions& options, GivenTexts& more
   app.add_flag("--no-render", more.draws_nothing, "draw nothing: a robot or a watcher by program");
   app.add_option("--size", more.size, "of the picture [1280x720]")->type_name("WxH");
   app.add_option("--fps", options.pictures_per_second,
-                 "pictures per second [window 60, headless 15]")
+                 "pictures per second [window 60, headless 15, fewer in software]")
       ->type_name("N")
       ->check(CLI::Range(1.0, 240.0));
   app.add_option(

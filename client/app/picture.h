@@ -27,6 +27,7 @@ class Picture {
   // To be called often: frames pass faster than pictures are drawn.
   void observe(const replica::Replica& replica, const Hands& hands, std::uint64_t now_ns);
   bool should_close() const { return context_->should_close(); }
+  bool is_software() const { return context_->is_software(); }
   std::uint64_t count() const { return count_; }
   // Draws once more what was drawn last, as finely as it goes, and returns it.
   render::Image image();
