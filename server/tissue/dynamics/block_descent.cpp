@@ -32,6 +32,7 @@
 
 #include "common/base/assert.h"
 #include "server/tissue/contact/contact_law.h"
+#include "server/tissue/dynamics/node_move.h"
 
 namespace trocar::dynamics {
 namespace {
@@ -39,8 +40,6 @@ namespace {
 constexpr std::uint32_t kNone = 0xffffffffu;
 // A step of up to this many sweeps allocates nothing.
 constexpr std::size_t kUsualSweeps = 64;
-// A step of one node beyond this, m, is as broken as one that is not finite.
-constexpr float kMaxNodeStep = 1.0f;
 // If a node's step was not finite, the nodes within so many layers of it are restored with it.
 constexpr int kRestoredLayers = 3;
 
@@ -68,10 +67,12 @@ BlockDescent::BlockDescent(const organ::Organ& organ, const world::World& world,
   resize_arrays();
   links_.reserve(8 * contact::kMaxPointsPerTool + contact::kMaxSelfPoints);
   residuals_.reserve(world.node_count());
+  packed_slots_.reserve(world.node_count());
   schedule_.reserve(kUsualSweeps);
   relaxed_lanes_.reserve(group_count);
   for (auto* plan : {&near_, &far_, &far_swept_, &last_, &begun_, &relaxed_}) plan->reserve(groups);
-  for (auto& band : bands_) band.reserve(groups);
+  for (auto& band : bands_)
+    for (auto* plan : {&band.nodes, &band.kept, &band.packed}) plan->reserve(groups);
   const auto map = organ::material_map(organ);
   for (Group g = 0; g < group_count; ++g) {
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
@@ -217,7 +218,8 @@ void BlockDescent::ask_energies(Group group, const Float4* start) {
   tissue_.begin_group(group, start, inverse_dt_of(group));
 }
 
-void BlockDescent::begin_groups(world::World& world, const ExternalLoads& loads) {
+void BlockDescent::begin_groups(world::World& world, const ExternalLoads& loads,
+                                std::span<const SweepBand> bands) {
   if (is_far_linear_) {
     linear_far_field_->begin_step(x_.data(), world);
     due_.clear();
@@ -232,7 +234,14 @@ void BlockDescent::begin_groups(world::World& world, const ExternalLoads& loads)
     for_each_group(far_swept_.groups, [&](Group g) { ask_energies(g, x_.data()); });
   }
   // Linear groups ask when their forces do not do, which is rare.
-  for_each_group(near_.groups, [&](Group g) { ask_energies(g, x_.data()); });
+  const NearBand& all_near = last_band(bands);
+  for_each_group(has_packs_ ? all_near.kept.groups : near_.groups,
+                 [&](Group g) { ask_energies(g, x_.data()); });
+  if (has_packs_)
+    for_each_group(all_near.packed.groups, [&](Group pack) {
+      tissue_.begin_group(kFirstPack + pack, x_.data(), gather(x_.data(), packs_.slots(pack)),
+                          inverse_dt_);
+    });
   for (const auto node : loads.held)
     ask_energies(tissue_.groups().slot_of(node) / kLanes, x_.data());
   if (has_explicit_strain_)
@@ -251,22 +260,6 @@ void BlockDescent::begin_groups(world::World& world, const ExternalLoads& loads)
 void BlockDescent::restart_nodal_strain() {
   if (auto* const strain = tissue_.nodal_strain())
     for_each_group(all_groups_, [&](Group g) { strain->restart_group(g, x_.data()); });
-}
-
-void BlockDescent::place_held(const ExternalLoads& loads) {
-  const auto& groups = tissue_.groups();
-  for (std::size_t i = 0; i < loads.held.size(); ++i)
-    x_[groups.slot_of(loads.held[i])] = to_float4(loads.held_displacements[i]);
-  held_axes_.clear();
-  if (loads.axis_holds.empty()) return;
-  held_axes_.resize(groups.slot_count());
-  for (const auto& hold : loads.axis_holds) {
-    const Slot slot = groups.slot_of(hold.node);
-    held_axes_[slot] = hold.axes;
-    if (hold.axes & 1) x_[slot].x = hold.displacement.x;
-    if (hold.axes & 2) x_[slot].y = hold.displacement.y;
-    if (hold.axes & 4) x_[slot].z = hold.displacement.z;
-  }
 }
 
 NodeStep8 BlockDescent::inertia_of(Group group, const Vec8& own) const {
@@ -293,14 +286,21 @@ Vec3f BlockDescent::displacement_of(const contact::ContactPoint& point,
   return sum;
 }
 
-void BlockDescent::add_contacts(const contact::ContactList& contacts, Group group, NodeStep8& step,
-                                Lanes& omega) const {
+bool BlockDescent::is_touched(Group group, std::uint8_t lanes) const {
+  if (group_stamp_[group] != current_) return false;
+  for (std::size_t lane = 0; lane < kLanes; ++lane)
+    if ((lanes >> lane & 1) && slot_stamp_[group * kLanes + lane] == current_) return true;
+  return false;
+}
+
+void BlockDescent::add_contacts(const contact::ContactList& contacts, const SlotLanes& slots,
+                                NodeStep8& step, Lanes& omega) const {
   Vec3Lanes gradients;
   SymMat3Lanes blocks;
   store(gradients, step.gradient);
   store(blocks, step.block);
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
-    const Slot slot = static_cast<Slot>(group * kLanes + lane);
+    const Slot slot = slots.v[lane];
     if (slot_stamp_[slot] != current_) continue;
     // No over-relaxation across a contact's kink: it would cycle for ever.
     omega.v[lane] = 1.0f;
@@ -321,30 +321,14 @@ void BlockDescent::add_contacts(const contact::ContactList& contacts, Group grou
   step.block = load(blocks);
 }
 
-// Along a held axis nothing pushes and nothing couples, so that the step has no part there.
-void BlockDescent::hold_axes(Group group, NodeStep8& step) const {
-  Vec3Lanes gradients;
-  SymMat3Lanes blocks;
-  store(gradients, step.gradient);
-  store(blocks, step.block);
-  for (std::size_t lane = 0; lane < kLanes; ++lane) {
-    const auto axes = held_axes_[group * kLanes + lane];
-    if (axes & 1) gradients.x.v[lane] = 0, blocks.xy.v[lane] = 0, blocks.xz.v[lane] = 0;
-    if (axes & 2) gradients.y.v[lane] = 0, blocks.xy.v[lane] = 0, blocks.yz.v[lane] = 0;
-    if (axes & 4) gradients.z.v[lane] = 0, blocks.xz.v[lane] = 0, blocks.yz.v[lane] = 0;
-  }
-  step.gradient = load(gradients);
-  step.block = load(blocks);
-}
-
 void BlockDescent::relax(const SweepPlan& plan, Group group, const contact::ContactList& contacts,
                          Relaxation omega) {
   const auto lanes = plan.lanes[group];
   Float4* const x = &x_[group * kLanes];
   const Vec8 own = load_group(x);
   NodeStep8 step = inertia_of(group, own);
-  const bool is_linear = is_far_linear_ && near_.lanes[group] == 0 && has_energies_[group] == 0 &&
-                         group_stamp_[group] != current_ &&
+  const bool has_near = (lanes & near_.lanes[group]) != 0, touched = is_touched(group, lanes);
+  const bool is_linear = is_far_linear_ && !has_near && has_energies_[group] == 0 && !touched &&
                          linear_far_field_->add(group, lanes, inverse_dt_of(group), step);
   if (!is_linear) {
     ask_energies(group, start_.data());
@@ -352,35 +336,36 @@ void BlockDescent::relax(const SweepPlan& plan, Group group, const contact::Cont
   }
   if (implicit_strain_ != nullptr) tissue_.add_averaged(group, step);
   Float8 factor = _mm256_blendv_ps(all(-omega.far), all(-omega.near), mask_of(near_.lanes[group]));
-  if (group_stamp_[group] == current_) {
+  if (touched) {
     Lanes factors;
     store(factors, all(0) - factor);
-    add_contacts(contacts, group, step, factors);
+    add_contacts(contacts, slots_of(group), step, factors);
     factor = all(0) - load(factors);
   }
   if (!held_axes_.empty()) hold_axes(group, step);
-  const Vec8 dx = solve_positive_definite(step.block, step.gradient) * factor;
-  const Float8 squared = dot8(step.gradient, step.gradient);
-  const Float8 swept = mask_of(lanes);
-  const Float8 is_sound =
-      _mm256_and_ps(is_below(squared, 3e38f), is_below(dot8(dx, dx), kMaxNodeStep * kMaxNodeStep));
-  const Float8 moves = _mm256_and_ps(swept, is_sound);
-  const Vec8 moved{where(moves, dx.x), where(moves, dx.y), where(moves, dx.z)};
-  store_group(x, own + moved);
-  if (implicit_strain_ != nullptr) implicit_strain_->after_move(group, moved, lanes);
-  if (is_far_linear_) linear_far_field_->after_move(group, moved, inverse_dt_of(group));
-  store(squares_[group], where(moves, squared));
-  const auto bad = static_cast<std::uint8_t>(lanes & ~bits_of(is_sound));
-  rejected_[group] = static_cast<std::uint8_t>(rejected_[group] | bad);
+  const NodeMove move = move_of(step, factor, lanes);
+  store_group(x, own + move.dx);
+  if (implicit_strain_ != nullptr) implicit_strain_->after_move(group, move.dx, lanes);
+  if (is_far_linear_) linear_far_field_->after_move(group, move.dx, inverse_dt_of(group));
+  store(squares_[group], _mm256_blendv_ps(load(squares_[group]), move.squared, mask_of(lanes)));
+  rejected_[group] = static_cast<std::uint8_t>(rejected_[group] | move.rejected);
 }
 
-void BlockDescent::sweep(const SweepPlan& plan, const contact::ContactList& contacts,
+void BlockDescent::sweep(const ScheduledSweep& scheduled, const contact::ContactList& contacts,
                          Relaxation omega) {
+  const SweepPlan& plan = *scheduled.plan;
   workers_.run([&](unsigned w) {
-    for (std::size_t colour = 0; colour + 1 < plan.colour_begins.size(); ++colour) {
+    const auto count = std::size_t{workers_.count()};
+    for (std::size_t colour = 0; colour < tissue_.groups().colour_count(); ++colour) {
+      if (scheduled.packs != nullptr) {
+        const auto packs = scheduled.packs->of_colour(colour);
+        const auto n = packs.size();
+        for (auto i = n * w / count; i < n * (w + 1) / count; ++i)
+          relax_pack(scheduled.packs->lanes[packs[i]], packs[i], contacts, omega.near);
+        if (n > 0) workers_.barrier();
+      }
       const auto begin = plan.colour_begins[colour];
       const auto n = std::size_t{plan.colour_begins[colour + 1]} - begin;
-      const auto count = std::size_t{workers_.count()};
       for (auto i = n * w / count; i < n * (w + 1) / count; ++i) {
         const Group g = plan.groups[begin + i];
         if (has_serial_ && serial_stamp_[g] == current_) continue;
@@ -485,27 +470,28 @@ void BlockDescent::begin_step(const contact::ContactList& contacts, std::span<co
   is_far_linear_ =
       settings.far_sweeps > 0 && settings.has_linear_far_field && loads.axis_holds.empty();
   TROCAR_ASSERT(!is_far_linear_ || linear_far_field_);
-  plan_step(near, settings, world.tick, loads.held);
-  plan_bands(near, settings.bands);
-  schedule_sweeps(settings);
   link_contacts(contacts);
+  plan_step(near, settings, world.tick, loads);
+  plan_bands(near, settings.bands);
+  plan_last_sweep(settings);
+  schedule_sweeps(settings);
   if (auto* const relaxation = tissue_.relaxation())
     relaxation->begin_step(settings.dt, world.relaxation, workers_);
-  begin_groups(world, loads);
+  begin_groups(world, loads, settings.bands);
 }
 
 void BlockDescent::execute_schedule(const contact::ContactList& contacts,
                                     const SolveSettings& settings, const FarFieldStep& far,
                                     SolveReport& report) {
   // Growth is judged by the nodes that every sweep has.
-  const SweepPlan& judged = plan_of(settings.sweeps, settings.bands);
+  const SweepPlan& judged = band_of(settings.sweeps, settings.bands).nodes;
   const auto tolerance = static_cast<double>(settings.residual_tolerance_n);
   const auto enough = tolerance * tolerance * static_cast<double>(far.near.size());
   float omega = settings.over_relaxation;
   double last_squares = INFINITY;
   for (const auto& scheduled : schedule_) {
     if (scheduled.corrects_far) settings.far_solver->correct(far);
-    sweep(*scheduled.plan, contacts,
+    sweep(scheduled, contacts,
           {std::min(omega, scheduled.max_over_relaxation), settings.far_over_relaxation});
     if (!scheduled.is_near) continue;
     report.node_sweeps += scheduled.near_nodes;

@@ -10,7 +10,7 @@
 // all other free nodes get that many, with an over-relaxation of their own, the last one together
 // with the near nodes' last; there is no residual tolerance then. With far_sweeps = 0 the others
 // stand still. Near nodes may come in bands with fewer sweeps each (SweepBand): these take part in
-// the last ones.
+// the last ones. Near nodes that are few in their groups are swept in packs (lane_packs.h).
 //
 // Results do not depend on the number of workers. Work: sweeps x groups with a swept node x rows;
 // no allocation after the first steps. One caller at a time.
@@ -25,6 +25,7 @@
 #include "server/tissue/contact/contact_list.h"
 #include "server/tissue/dynamics/far_field_solver.h"
 #include "server/tissue/dynamics/far_plan.h"
+#include "server/tissue/dynamics/lane_packs.h"
 #include "server/tissue/dynamics/linear_far_field.h"
 #include "server/tissue/dynamics/sweep_plan.h"
 #include "server/tissue/dynamics/tissue.h"
@@ -155,22 +156,35 @@ class BlockDescent {
   };
   // One sweep of the step's schedule.
   struct ScheduledSweep {
-    const SweepPlan* plan = nullptr;  // groups and lanes that it steps
-    std::uint64_t near_nodes = 0;     // of these
-    float max_over_relaxation = 1;    // of near nodes
-    bool is_near = false;             // counts as a sweep of near nodes, and is judged
-    bool corrects_far = false;        // the far-field solver goes first
+    const SweepPlan* plan = nullptr;   // groups and lanes that it steps
+    const SweepPlan* packs = nullptr;  // of each colour packs go first; null: none
+    std::uint64_t near_nodes = 0;      // of these
+    float max_over_relaxation = 1;     // of near nodes
+    bool is_near = false;              // counts as a sweep of near nodes, and is judged
+    bool corrects_far = false;         // the far-field solver goes first
   };
   struct PointLinks {
     std::array<Slot, contact::kMaxPointNodes> slots;
     std::array<std::uint32_t, contact::kMaxPointNodes> next;  // of the same slot's links
   };
 
+  // Near nodes of bands 0 to its own.
+  struct NearBand {
+    SweepPlan nodes;  // all of them
+    // How they are swept where there are packs: by groups, and by packs.
+    SweepPlan kept, packed;
+  };
+
   void plan_step(std::span<const NodeIndex> near, const SolveSettings& settings, Tick tick,
-                 std::span<const NodeIndex> held);
+                 const ExternalLoads& loads);
   void plan_bands(std::span<const NodeIndex> near, std::span<const SweepBand> bands);
-  // Returns the groups and lanes of a sweep when `left` sweeps are left, this one included.
-  const SweepPlan& plan_of(std::uint32_t left, std::span<const SweepBand> bands) const;
+  void plan_packs(std::span<const NodeIndex> near, std::span<const SweepBand> bands);
+  void plan_last_sweep(const SolveSettings& settings);
+  // Returns the band whose nodes are swept when `left` sweeps are left, this one included.
+  const NearBand& band_of(std::uint32_t left, std::span<const SweepBand> bands) const;
+  const NearBand& last_band(std::span<const SweepBand> bands) const {
+    return bands_[std::max<std::size_t>(bands.size(), 1) - 1];
+  }
   void schedule_sweeps(const SolveSettings& settings);
   void begin_step(const contact::ContactList& contacts, std::span<const NodeIndex> near,
                   const SolveSettings& settings, world::World& world, const ExternalLoads& loads);
@@ -183,7 +197,8 @@ class BlockDescent {
   // Returns whether the node is neither fixed nor asleep.
   static bool is_swept(NodeIndex node, const world::World& world);
   void link_contacts(const contact::ContactList& contacts);
-  void begin_groups(world::World& world, const ExternalLoads& loads);
+  void begin_groups(world::World& world, const ExternalLoads& loads,
+                    std::span<const SweepBand> bands);
   // Stress that has relaxed, where something relaxes.
   void read_relaxation(const world::World& world);
   void end_relaxation(world::World& world, std::span<const NodeIndex> held);
@@ -197,9 +212,12 @@ class BlockDescent {
     return is_slow(group) ? inverse_dt_ / static_cast<float>(far_interval_) : inverse_dt_;
   }
   [[gnu::always_inline]] inline NodeStep8 inertia_of(Group group, const Vec8& own) const;
+  NodeStep8 inertia_at(const SlotLanes& slots, const Vec8& own) const;
   NodeStep8 linearise(Group group, const Vec8& own) const;
   Vec3f displacement_of(const contact::ContactPoint& point, const PointLinks& links) const;
-  void add_contacts(const contact::ContactList& contacts, Group group, NodeStep8& step,
+  // Whether a contact acts on one of these lanes.
+  bool is_touched(Group group, std::uint8_t lanes) const;
+  void add_contacts(const contact::ContactList& contacts, const SlotLanes& slots, NodeStep8& step,
                     Lanes& omega) const;
   void ask_energies(Group group, const Float4* start);
   void hold_axes(Group group, NodeStep8& step) const;
@@ -209,9 +227,12 @@ class BlockDescent {
   struct Relaxation {
     float near = 1, far = 1;
   };
-  void sweep(const SweepPlan& plan, const contact::ContactList& contacts, Relaxation omega);
+  void sweep(const ScheduledSweep& scheduled, const contact::ContactList& contacts,
+             Relaxation omega);
   void relax(const SweepPlan& plan, Group group, const contact::ContactList& contacts,
              Relaxation omega);
+  void relax_pack(std::uint8_t lanes, Group pack, const contact::ContactList& contacts,
+                  float omega);
   // Returns the sum of squared residuals of these lanes in the last sweep, N^2.
   double sum_of_squares(const SweepPlan& plan) const;
   void write_back(const SweepPlan& plan, world::World& world);
@@ -265,8 +286,10 @@ class BlockDescent {
   float far_over_relaxation_ = 1;                     // likewise
   std::vector<std::uint32_t> asked_stamp_;            // per group: energies have begun it
   std::vector<Group> due_;                            // to be linearised anew
-  std::array<SweepPlan, kMaxSweepBands>
-      bands_;                               // [b]: near nodes of bands 0 to b; the last is near_
+  std::array<NearBand, kMaxSweepBands> bands_;
+  LanePacks packs_;
+  bool has_packs_ = false;                  // in this step
+  std::vector<Slot> packed_slots_;          // likewise
   std::vector<std::uint32_t> begun_stamp_;  // per group
   std::vector<float> residuals_;
   // Contact points of a node as a linked list in contact order; valid where the stamp is current.

@@ -11,7 +11,7 @@ Vec3f BlockDescent::holding_force(const contact::ContactList& contacts, NodeInde
   TROCAR_ASSERT_HOT(begun_stamp_[group] == current_);
   NodeStep8 step = linearise(group, load_group(&x_[group * kLanes]));
   Lanes omega;
-  if (group_stamp_[group] == current_) add_contacts(contacts, group, step, omega);
+  if (group_stamp_[group] == current_) add_contacts(contacts, slots_of(group), step, omega);
   Vec3Lanes gradients;
   store(gradients, step.gradient);
   return gradients.at(slot % kLanes);

@@ -16,7 +16,9 @@ void BlockDescent::resize_arrays() {
   for (auto* lanes : {&free_, &rejected_, &near_.lanes, &far_.lanes, &far_swept_.lanes,
                       &last_.lanes, &begun_.lanes, &relaxed_.lanes})
     lanes->resize(group_count);
-  for (auto& band : bands_) band.lanes.resize(group_count);
+  for (auto& band : bands_)
+    for (auto* plan : {&band.nodes, &band.kept}) plan->lanes.resize(group_count);
+  packs_.extend(groups);
   for (auto* stamps : {&begun_stamp_, &group_stamp_, &serial_stamp_, &asked_stamp_})
     stamps->resize(group_count);
   for (auto* values : {&x_, &v_, &start_}) values->resize(slot_count);
@@ -49,6 +51,9 @@ UpdateReport BlockDescent::update_topology(const topology::Topology& topology,
       x_[g * kLanes + lane] = has_node ? to_float4(world.displacements[node.value]) : Float4{};
       v_[g * kLanes + lane] = has_node ? to_float4(world.velocities[node.value]) : Float4{};
     }
+  for (const auto lanes : tissue_.rebuilt())
+    for (std::uint32_t lane = 0; lane < kLanes; ++lane)
+      if (lanes.has(lane)) packs_.remove(lanes.group * kLanes + lane);
   if (linear_far_field_) linear_far_field_->update_topology(x_.data(), world);
   due_.reserve(groups.group_count());
   return report;

@@ -39,12 +39,17 @@ class Energy {
   Energy& operator=(const Energy&) = delete;
   virtual ~Energy() = default;
 
-  // Once per step for every group that will be swept: what stays constant in the step, from the
-  // displacements at its start (per slot). inverse_dt: 1/dt of the group's step, or 0 for no
-  // damping. Several workers at once, each with its own groups.
-  virtual void begin_group(Group, const Float4* /*start*/, float /*inverse_dt*/) {}
+  // Once per step for every group or pack that will be swept: what stays constant in the step, from
+  // the displacements at its start (per slot; own: of the group). inverse_dt: 1/dt of the group's
+  // step, or 0 for no damping. Several workers at once, each with its own groups.
+  virtual void begin_group(Group, const Float4* /*start*/, const Vec8& /*own*/,
+                           float /*inverse_dt*/) {}
 
-  // Adds the group's gradients and blocks at displacements x (per slot). own: those of the group.
+  // Lanes of a pack hold other slots; begin_group() is still to come.
+  virtual void pack(const PackedLanes& pack) = 0;
+
+  // Adds the group's or pack's gradients and blocks at displacements x (per slot). own: those of
+  // the group.
   virtual void add(Group group, const Float4* x, const Vec8& own, NodeStep8& step) const = 0;
 
   // The elastic part (no damping) at displacements x: adds gradient and block as add() would, and

@@ -45,6 +45,8 @@ using Group = std::uint32_t;
 using Colour = std::uint32_t;
 inline constexpr Slot kNoSlot = 0xffffffffu;
 inline constexpr Colour kNoColour = 0xffffffffu;
+// Groups from this number on are packs: lanes of other groups, copied (lane_packs.h).
+inline constexpr Group kFirstPack = 0x80000000u;
 
 enum class Coupling : std::uint8_t { Elements, NodalStrain };
 
@@ -141,6 +143,31 @@ class Groups {
   std::uint32_t stamp_ = 0;
 };
 
+inline SlotLanes slots_of(Group group) {
+  SlotLanes slots;
+  for (std::uint32_t lane = 0; lane < kLanes; ++lane) slots.v[lane] = group * kLanes + lane;
+  return slots;
+}
+
+// What a pack's lanes are to be copies of.
+struct PackedLanes {
+  Group group = kFirstPack;
+  const SlotLanes& slots;
+  std::uint8_t changed = 0, held = 0;  // lanes: to be copied; that hold a slot
+
+  bool holds(std::size_t lane) const { return held >> lane & 1; }
+};
+
+// T is made of Lanes and SlotLanes alone.
+template <typename T>
+void copy_lane(const T& from, std::size_t from_lane, T& to, std::size_t to_lane) {
+  static_assert(std::is_trivially_copyable_v<T> && sizeof(T) % sizeof(Lanes) == 0);
+  const auto* const source = reinterpret_cast<const std::uint8_t*>(&from) + from_lane * 4;
+  auto* const target = reinterpret_cast<std::uint8_t*>(&to) + to_lane * 4;
+  for (std::size_t at = 0; at < sizeof(T); at += sizeof(Lanes))
+    std::memcpy(target + at, source + at, 4);
+}
+
 // Rows of an energy: one entry per lane and incidence (a spring, a tet at the node). A group has as
 // many rows as its node with the most incidences. Lanes that have fewer hold what Row{} has, must
 // contribute nothing, and are told their own slot by pad(lane, slot) so that they read no other's.
@@ -148,8 +175,12 @@ class Groups {
 template <typename Row>
 class GroupRows {
  public:
-  std::span<const Row> operator[](Group g) const { return rows_[g]; }
-  std::span<Row> operator[](Group g) { return rows_[g]; }
+  GroupRows() { packed_.end_building(); }
+
+  std::span<const Row> operator[](Group g) const {
+    return g < kFirstPack ? rows_[g] : packed_[g - kFirstPack];
+  }
+  std::span<Row> operator[](Group g) { return g < kFirstPack ? rows_[g] : packed_[g - kFirstPack]; }
   std::size_t group_count() const { return rows_.count(); }
 
   // bound(node): at least as many as its incidences. Before the first reshape().
@@ -190,6 +221,32 @@ class GroupRows {
       }
     return rows;
   }
+  // These lanes of a pack become copies of their slots, padding where they hold none.
+  void pack(const PackedLanes& pack) {
+    const std::size_t index = pack.group - kFirstPack;
+    packed_.extend(index + 1);
+    packed_counts_.resize(std::max(packed_counts_.size(), (index + 1) * kLanes));
+    std::uint32_t most = 0;
+    for (std::uint32_t lane = 0; lane < kLanes; ++lane) {
+      auto& count = packed_counts_[index * kLanes + lane];
+      if (pack.changed >> lane & 1) count = pack.holds(lane) ? counts_[pack.slots.v[lane]] : 0;
+      most = std::max(most, count);
+    }
+    const auto old = packed_[index].size();
+    const auto rows = packed_.resize(index, most);
+    for (std::uint32_t lane = 0; lane < kLanes; ++lane) {
+      const Slot slot = pack.slots.v[lane];
+      const bool is_changed = pack.changed >> lane & 1;
+      const auto from = rows_[slot / kLanes];
+      const std::size_t count = is_changed ? packed_counts_[index * kLanes + lane] : old;
+      for (std::size_t i = 0; is_changed && i < count; ++i)
+        copy_lane(from[i], slot % kLanes, rows[i], lane);
+      for (std::size_t i = count; i < rows.size(); ++i) {
+        if (i < old) clear(rows[i], lane);
+        rows[i].pad(lane, slot);
+      }
+    }
+  }
   void tidy() { rows_.tidy(); }
   // Rows in groups, and what there is memory for.
   std::size_t live() const { return rows_.live(); }
@@ -203,8 +260,32 @@ class GroupRows {
       std::memset(bytes + at, 0, sizeof(float));
   }
 
-  Blocks<Row> rows_;
-  std::vector<std::uint32_t> counts_;  // per slot
+  Blocks<Row> rows_, packed_;
+  std::vector<std::uint32_t> counts_, packed_counts_;  // per slot
+};
+
+// Values of groups, made of Lanes alone.
+template <typename T>
+class GroupValues {
+ public:
+  const T& operator[](Group g) const {
+    return g < kFirstPack ? values_[g] : packed_[g - kFirstPack];
+  }
+  T& operator[](Group g) { return g < kFirstPack ? values_[g] : packed_[g - kFirstPack]; }
+  std::size_t size() const { return values_.size(); }  // without packs
+  void resize(std::size_t group_count) { values_.resize(group_count); }
+  void pack(const PackedLanes& pack) {
+    const std::size_t index = pack.group - kFirstPack;
+    packed_.resize(std::max(packed_.size(), index + 1));
+    for (std::uint32_t lane = 0; lane < kLanes; ++lane) {
+      const Slot slot = pack.slots.v[lane];
+      if (pack.changed >> lane & 1)
+        copy_lane(values_[slot / kLanes], slot % kLanes, packed_[index], lane);
+    }
+  }
+
+ private:
+  std::vector<T> values_, packed_;
 };
 
 }  // namespace trocar::dynamics

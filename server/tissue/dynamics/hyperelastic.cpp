@@ -159,6 +159,17 @@ typename Hyperelastic<Law>::RowShape Hyperelastic<Law>::shape(const Row& row, co
 }
 
 template <typename Law>
+void Hyperelastic<Law>::pack(const PackedLanes& pack) {
+  rows_.pack(pack);
+  if constexpr (Law::kIsLinear) {
+    constant_gradient_.pack(pack);
+    constant_block_.pack(pack);
+  } else {
+    invariant_rows_.pack(pack);
+  }
+}
+
+template <typename Law>
 void Hyperelastic<Law>::add(Group group, const Float4* x, const Vec8& own, NodeStep8& step) const {
   const auto rows = rows_[group];
   [[maybe_unused]] std::span<const InvariantRow> invariant_rows;

@@ -24,6 +24,7 @@ class Hyperelastic final : public Energy {
   Hyperelastic(const topology::Topology& topology, const Groups& groups, const NodalStrain* strain,
                HyperelasticParameters parameters, const Law& law = {});
 
+  void pack(const PackedLanes& pack) override;
   void add(Group group, const Float4* x, const Vec8& own, NodeStep8& step) const override;
   void linearise(Group group, const Float4* x, const Vec8& own, NodeStep8& step,
                  StiffnessSink& sink) const override;
@@ -74,8 +75,8 @@ class Hyperelastic final : public Energy {
   const HyperelasticParameters parameters_;
   GroupRows<Row> rows_;
   GroupRows<InvariantRow> invariant_rows_;    // empty for a linear law
-  std::vector<Vec3Lanes> constant_gradient_;  // N per group; linear laws
-  std::vector<Lanes> constant_block_;         // N/m per group; linear laws
+  GroupValues<Vec3Lanes> constant_gradient_;  // N per group; linear laws
+  GroupValues<Lanes> constant_block_;         // N/m per group; linear laws
   // While rows are filled.
   std::array<std::vector<At>, kLanes> tets_;
 };

@@ -196,6 +196,13 @@ inline void store_strided(Float4* first, std::size_t stride, const Vec8& v, Floa
 inline void store_group(Float4* first, const Vec8& v) {
   store_strided(first, 1, v, all(0));
 }
+// The other way round, in these lanes.
+inline void scatter(Float4* values, const SlotLanes& slots, const Vec8& v, std::uint8_t lanes) {
+  std::array<Float4, kLanes> moved;
+  store_group(moved.data(), v);
+  for (std::size_t lane = 0; lane < kLanes; ++lane)
+    if (lanes >> lane & 1) values[slots.v[lane]] = moved[lane];
+}
 inline Float8 gather(const float* values, const SlotLanes& slots) {
   const auto& s = slots.v;
   return _mm256_setr_ps(values[s[0]], values[s[1]], values[s[2]], values[s[3]], values[s[4]],

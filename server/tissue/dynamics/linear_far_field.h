@@ -50,8 +50,10 @@ class LinearFarField {
   // has left the range.
   [[gnu::always_inline]] inline bool add(Group group, std::uint8_t lanes, float inverse_dt,
                                          NodeStep8& step) const;
-  // Nodes of the group have moved by dx, in whatever sweep.
+  // Nodes of the group, or of these slots, have moved by dx, in whatever sweep.
   void after_move(Group group, const Vec8& dx, float inverse_dt);
+
+  void after_move(const SlotLanes& slots, std::uint8_t lanes, const Vec8& dx, float inverse_dt);
 
   float damping_time_s() const { return damping_time_s_; }
 
@@ -91,6 +93,13 @@ inline bool LinearFarField::add(Group group, std::uint8_t lanes, float inverse_d
   step.block.yz = fma8(linear.block.yz, factor, step.block.yz);
   step.block.zz = fma8(linear.block.zz, factor, step.block.zz);
   return true;
+}
+
+inline void LinearFarField::after_move(const SlotLanes& slots, std::uint8_t lanes, const Vec8& dx,
+                                       float inverse_dt) {
+  const Float8 factor = all(1 + damping_time_s_ * inverse_dt);
+  for (auto& away : away_)
+    scatter(away.data(), slots, fma8(dx, factor, gather(away.data(), slots)), lanes);
 }
 
 inline void LinearFarField::after_move(Group group, const Vec8& dx, float inverse_dt) {

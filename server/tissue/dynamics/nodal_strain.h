@@ -74,9 +74,12 @@ class NodalStrain {
   std::uint16_t material_of(NodeIndex node) const { return materials_[node.value]; }
   Left left_to(const topology::Topology& topology, TetIndex tet) const;
 
+  // Lanes of a pack hold other slots.
+  void pack(const PackedLanes& pack) { rows_.pack(pack); }
+
   // At these displacements (per slot): of a group's nodes.
   void restart_group(Group group, const Float4* x);
-  // Nodes of a group, in these lanes, have moved by dx.
+  // Nodes of a group or pack, in these lanes, have moved by dx.
   void after_move(Group group, const Vec8& dx, std::uint8_t lanes);
 
   std::span<const Row> rows(Group group) const { return rows_[group]; }

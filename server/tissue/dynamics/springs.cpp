@@ -122,7 +122,7 @@ std::size_t Springs::rebuild(const topology::Topology& topology, const Groups& g
   std::size_t written = 0;
   for (const auto group_lanes : lanes) {
     written += fill(topology, groups, group_lanes);
-    if (inverse_dts_[group_lanes.group] != 0) update_step_length(group_lanes.group);
+    if (inverse_dt_of(group_lanes.group) != 0) update_step_length(group_lanes.group);
   }
   rows_.tidy();
   constants_.tidy();
@@ -133,19 +133,26 @@ void Springs::update_step_length(Group group) {
   auto constants = constants_[group].begin();
   for (Row& row : rows_[group]) {
     const Constants& c = *constants++;
-    store(row.stiffness, fma8(load(c.damping), all(inverse_dts_[group]), load(c.stiffness)));
+    store(row.stiffness, fma8(load(c.damping), all(inverse_dt_of(group)), load(c.stiffness)));
     store(row.pull, load(c.stiffness) * load(c.rest_length));
   }
 }
 
-void Springs::begin_group(Group group, const Float4* start, float inverse_dt) {
+void Springs::pack(const PackedLanes& pack) {
+  rows_.pack(pack);
+  constants_.pack(pack);
+  const std::size_t index = pack.group - kFirstPack;
+  packed_inverse_dts_.resize(std::max(packed_inverse_dts_.size(), index + 1));
+  if (has_damping_) update_step_length(pack.group);
+}
+
+void Springs::begin_group(Group group, const Float4* start, const Vec8& own, float inverse_dt) {
   if (!has_damping_) return;
-  if (inverse_dts_[group] != inverse_dt) {
-    inverse_dts_[group] = inverse_dt;
+  if (inverse_dt_of(group) != inverse_dt) {
+    inverse_dt_of(group) = inverse_dt;
     update_step_length(group);
   }
   if (inverse_dt == 0) return;
-  const Vec8 own = load_group(start + group * kLanes);
   auto constants = constants_[group].begin();
   for (Row& row : rows_[group]) {
     const Constants& c = *constants++;

@@ -19,7 +19,8 @@ class Springs final : public Energy {
   // False: no material of the organ can have any.
   static bool are_needed(const organ::Organ& organ);
 
-  void begin_group(Group group, const Float4* start, float inverse_dt) override;
+  void begin_group(Group group, const Float4* start, const Vec8& own, float inverse_dt) override;
+  void pack(const PackedLanes& pack) override;
   void add(Group group, const Float4* x, const Vec8& own, NodeStep8& step) const override;
   void linearise(Group group, const Float4* x, const Vec8& own, NodeStep8& step,
                  StiffnessSink& sink) const override;
@@ -57,7 +58,11 @@ class Springs final : public Energy {
   GroupRows<Row> rows_;
   GroupRows<Constants> constants_;
   const bool has_damping_, has_elasticity_;
-  std::vector<float> inverse_dts_;  // per group: in the stiffness of its rows
+  float& inverse_dt_of(Group group) {
+    return group < kFirstPack ? inverse_dts_[group] : packed_inverse_dts_[group - kFirstPack];
+  }
+
+  std::vector<float> inverse_dts_, packed_inverse_dts_;  // per group: in the stiffness of its rows
   // While rows are filled.
   std::array<std::vector<End>, kLanes> ends_;
   std::vector<std::pair<NodeIndex, TetIndex>> tets_beside_;

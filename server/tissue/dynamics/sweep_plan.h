@@ -1,7 +1,8 @@
 #pragma once
 
-// A sweep plan holds the groups and lanes that a sweep goes over, colour by colour.
+// A sweep plan holds the groups, or packs, and lanes that a sweep goes over, colour by colour.
 
+#include <span>
 #include <vector>
 
 #include "server/tissue/dynamics/groups.h"
@@ -35,7 +36,16 @@ struct SweepPlan {
     const Slot slot = all.slot_of(node);
     add(slot / kLanes, static_cast<std::uint8_t>(1u << slot % kLanes));
   }
-  void finish(const Groups& all) { all.order_by_colour(groups, colour_begins); }
+  std::span<const Group> of_colour(std::size_t colour) const {
+    if (colour + 1 >= colour_begins.size()) return {};
+    return std::span(groups).subspan(colour_begins[colour],
+                                     colour_begins[colour + 1] - colour_begins[colour]);
+  }
+  // Of groups, or of packs (LanePacks).
+  template <typename Coloured>
+  void finish(const Coloured& all) {
+    all.order_by_colour(groups, colour_begins);
+  }
 };
 
 }  // namespace trocar::dynamics

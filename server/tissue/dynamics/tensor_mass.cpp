@@ -152,6 +152,12 @@ std::size_t TensorMass::rebuild(const topology::Topology& topology, const Groups
   return written;
 }
 
+void TensorMass::pack(const PackedLanes& pack) {
+  rows_.pack(pack);
+  blocks_.pack(pack);
+  rest_gradient_.pack(pack);
+}
+
 void TensorMass::add(Group group, const Float4* x, const Vec8& own, NodeStep8& step) const {
   Vec8 g = step.gradient + load(rest_gradient_[group]);
   for (const Row& row : rows_[group]) {

@@ -14,6 +14,7 @@ class TensorMass final : public Energy {
  public:
   TensorMass(const topology::Topology& topology, const Groups& groups);
 
+  void pack(const PackedLanes& pack) override;
   void add(Group group, const Float4* x, const Vec8& own, NodeStep8& step) const override;
   void linearise(Group group, const Float4* x, const Vec8& own, NodeStep8& step,
                  StiffnessSink& sink) const override;
@@ -52,9 +53,9 @@ class TensorMass final : public Energy {
   void set_node(const Node& node, Slot slot);
 
   GroupRows<Row> rows_;
-  std::vector<SymMat3Lanes> blocks_;  // K_ii per group
+  GroupValues<SymMat3Lanes> blocks_;  // K_ii per group
   // This is the gradient of each group at rest, N, from tension and the stress-free pose.
-  std::vector<Vec3Lanes> rest_gradient_;
+  GroupValues<Vec3Lanes> rest_gradient_;
   std::vector<double> rest_energies_j_;  // per slot
   std::array<Node, kLanes> lane_nodes_;  // while rows are filled
 };

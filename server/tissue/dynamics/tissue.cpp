@@ -217,9 +217,15 @@ UpdateReport Tissue::update_topology(const topology::Topology& topology) {
   return report;
 }
 
-void Tissue::begin_group(Group group, const Float4* start, float inverse_dt) {
-  for (const auto& energy : energies_) energy->begin_group(group, start, inverse_dt);
+void Tissue::begin_group(Group group, const Float4* start, const Vec8& own, float inverse_dt) {
+  for (const auto& energy : energies_) energy->begin_group(group, start, own, inverse_dt);
 }
+
+void Tissue::pack(const PackedLanes& pack) {
+  for (const auto& energy : energies_) energy->pack(pack);
+  if (nodal_strain_ && scheme_ == StrainScheme::Implicit) nodal_strain_->pack(pack);
+}
+
 double Tissue::energy_j(std::span<const Vec3f> displacements) const {
   std::vector<Vec3d> per_slot(groups_.slot_count());
   std::vector<double> energies(groups_.slot_count());

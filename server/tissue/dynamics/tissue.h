@@ -39,7 +39,13 @@ class Tissue {
   NodalStrain* nodal_strain() { return nodal_strain_.get(); }
   const NodalStrain* nodal_strain() const { return nodal_strain_.get(); }
 
-  void begin_group(Group group, const Float4* start, float inverse_dt);
+  void begin_group(Group group, const Float4* start, float inverse_dt) {
+    begin_group(group, start, load_group(start + group * kLanes), inverse_dt);
+  }
+  // Of a group or pack; own: its displacements.
+  void begin_group(Group group, const Float4* start, const Vec8& own, float inverse_dt);
+  // Lanes of a pack hold other slots.
+  void pack(const PackedLanes& pack);
   void add(Group group, const Float4* x, const Vec8& own, NodeStep8& step) const {
     add_elements(group, x, own, step);
     add_averaged(group, step);
