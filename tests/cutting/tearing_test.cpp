@@ -140,6 +140,8 @@ TEST(Tearing, LeavesASoundSolidWhateverPulls) {
       }
     }
     EXPECT_GT(area, 1e-4) << "seed " << seed;
+    const auto pieces = find_pieces(torn.organ().topology());
+    EXPECT_GE(*std::ranges::min_element(pieces.tets), kLeastTorn) << "seed " << seed;
   }
 }
 

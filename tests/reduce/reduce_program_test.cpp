@@ -104,6 +104,8 @@ TEST_F(ReduceProgram, LeavesALocalReductionAndHowFarItIsOff) {
   EXPECT_GT(read(folder_ / "out" / "local.csv").size(), 100u);
   ASSERT_EQ(make("2", "again.reduction"), 0) << log();
   EXPECT_EQ(read(folder_ / "again.reduction"), read(folder_ / "small.reduction"));
+  ASSERT_TRUE(reduction->force_error.has_value());
+  EXPECT_LT(*reduction->force_error, organ::kTrueForceError);
   // Options of one method are not of the other.
   EXPECT_EQ(run({"reduce", "liver", "--method", "local", "--tangents", "3"}), 2);
   expect_line("--tangents: is of --method dogan");
@@ -111,6 +113,39 @@ TEST_F(ReduceProgram, LeavesALocalReductionAndHowFarItIsOff) {
   expect_line("--patches: is of --method local");
   EXPECT_EQ(run({"reduce", "liver", "--method", "local", "--residual", "0.5"}), 2);
   expect_line("--residual: must be from 0 to 0.1");
+}
+
+// Under forty times the force of the test above, nodes move so far that no few fields follow.
+TEST_F(ReduceProgram, RefusesALocalReductionThatIsNotTrue) {
+  ASSERT_EQ(run({"make", "liver", "--tets", "1000", "--out", at("small.organ")}), 0) << log();
+  const auto make = [&](std::vector<std::string> more) {
+    std::vector<std::string> arguments{"reduce",          at("small.organ"),
+                                       "--method",        "local",
+                                       "--patches",       "2",
+                                       "--patch-radius",  "25",
+                                       "--modes",         "12",
+                                       "--inertia-modes", "3",
+                                       "--directions",    "2",
+                                       "--field-nodes",   "4",
+                                       "--force",         "8",
+                                       "--check",         "2",
+                                       "--out",           at("small.reduction"),
+                                       "--results",       at("out")};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run(arguments);
+  };
+  EXPECT_EQ(make({}), 1) << log();
+  EXPECT_NE(log().find("small.reduction: is not written, for contact forces err by "),
+            std::string::npos)
+      << log();
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "small.reduction"));
+  // Whoever wants it all the same has it at once, and the file says how it is.
+  ASSERT_EQ(make({"--resume", "--accept-error", "1000"}), 0) << log();
+  const auto organ = organ::read_organ(folder_ / "small.organ");
+  ASSERT_TRUE(organ.ok());
+  const auto reduction = organ::read_local_reduction(folder_ / "small.reduction", *organ);
+  ASSERT_TRUE(reduction.ok()) << reduction.error().message;
+  EXPECT_GT(reduction->force_error.value_or(0), organ::kTrueForceError);
 }
 
 TEST_F(ReduceProgram, HelpTeachesTheMethod) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "server/organs/catalogue/builtin_organs.h"
+#include "server/tissue/cutting/tearing.h"
 #include "server/tissue/cutting/validate.h"
 #include "server/tissue/step/simulation.h"
 
@@ -16,8 +17,8 @@ organ::Organ liver(material::ElasticLaw law, double tear_stretch) {
   return organ;
 }
 
-// Takes hold of the end of the left lobe and draws it away, 10 cm/s.
-TickReport pull(Simulation& simulation) {
+// Takes hold of the end of the left lobe and draws it away, 10 cm/s, until then.
+TickReport pull(Simulation& simulation, float until_s = 10) {
   const Tick tick = simulation.current_tick() + 1;
   Vec3f end{-1, 0, 0};
   for (const auto& p : simulation.organ().mesh.rest_positions)
@@ -29,7 +30,7 @@ TickReport pull(Simulation& simulation) {
     inputs.joins.push_back(join);
   }
   if (tick % 4 == 1) {
-    const float t = static_cast<float>(tick) * 1e-3f;
+    const float t = std::min(until_s, static_cast<float>(tick) * 1e-3f);
     const Vec3f drawn{0.1f * std::max(0.0f, t - 0.2f), 0, 0};
     inputs.samples.push_back(
         {tool_slot({0}, 0), {{end + drawn, rotation_from_z({1, 0, 0})}, tool::Verb::Grasp}});
@@ -53,6 +54,25 @@ TEST(Tears, AFlapPulledFarEnoughTearsOff) {
     EXPECT_GT(torn, 1e-5) << static_cast<int>(law);
     EXPECT_GT(cutting::find_pieces(state.cuts.topology()).count, 1u) << static_cast<int>(law);
     EXPECT_FALSE(state.grasps[tool_slot({0}, 0)].nodes.empty()) << "the hand still holds its part";
+  }
+}
+
+// What is torn is not crumbled: no piece is of fewer tets than Tearing says, and nothing tears half
+// a second after the hand has stopped, although what it holds swings.
+TEST(Tears, LeaveNoDebrisAndEndWithTheHand) {
+  for (const double tear_stretch : {1.2, 1.4}) {
+    Simulation simulation(liver(material::ElasticLaw::NeoHookean, tear_stretch));
+    double torn = 0, torn_after = 0;
+    for (int i = 0; i < 3000; ++i) {
+      const auto report = pull(simulation, 1.2f);
+      torn += report.cut.torn_area_m2;
+      if (i > 1700) torn_after += report.cut.torn_area_m2;
+    }
+    EXPECT_GT(torn, 1e-3);
+    EXPECT_EQ(torn_after, 0);
+    const auto pieces = cutting::find_pieces(simulation.state().cuts.topology());
+    EXPECT_GT(pieces.count, 1u);
+    EXPECT_GE(*std::ranges::min_element(pieces.tets), cutting::kLeastTorn) << tear_stretch;
   }
 }
 

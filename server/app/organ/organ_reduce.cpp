@@ -50,8 +50,9 @@ What local does:
      the others is summed over a few, with weights that leave --residual.
   Expect errors of a few per cent anywhere, at once; in sessions tissue relaxes as without it.
 
-Both are compared with the full model on loads outside the training. Sessions take files of local:
-trocar-server --reduction FILE.
+Both are compared with the full model on loads outside the training. A file of local whose contact
+forces err by more than --accept-error in 5 of 100 of these is not written. Sessions take files of
+local: trocar-server --reduction FILE.
 
 Examples:
   trocar-organ reduce liver
@@ -378,6 +379,9 @@ void add_reduce_command(CLI::App& app, ReduceCommand& command) {
   number("--residual", l.residual, "local: what weighted tets may leave of the forces; 0: all tets",
          "SHARE");
   number("--patches", l.patches, "local: made at most, from the first outwards; 0: all", "N");
+  number("--accept-error", command.accepted_percent,
+         "local: a file whose check finds more than this error of contact forces is not written",
+         "PERCENT");
   sub->add_flag("--resume", command.is_resumed,
                 "local: go on from the parts beside the file that an interrupted run has left");
   number("--seed", s.seed, "chooses the first place", "S");
@@ -386,8 +390,9 @@ void add_reduce_command(CLI::App& app, ReduceCommand& command) {
 
 Status run_reduce(ReduceCommand command) {
   if (command.method == "local") return run_reduce_local(std::move(command));
-  for (const char* option : {"--patch-radius", "--inertia-modes", "--vibrations", "--free-layers",
-                             "--field-nodes", "--residual", "--patches", "--resume"})
+  for (const char* option :
+       {"--patch-radius", "--inertia-modes", "--vibrations", "--free-layers", "--field-nodes",
+        "--residual", "--patches", "--resume", "--accept-error"})
     if (command.app->count(option) > 0)
       return Error{ErrorCode::Usage, std::string(option) + ": is of --method local"};
   command.settings.radius_m = command.radius_mm * 1e-3;

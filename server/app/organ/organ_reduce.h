@@ -21,6 +21,7 @@ struct ReduceCommand {
   dogan::Settings settings;
   double patch_radius_mm = 12;
   bool is_resumed = false;
+  double accepted_percent = 100 * organ::kTrueForceError;  // of the contact force, by the check
   reduce::LocalSettings local;
   CLI::App* app = nullptr;
 };

@@ -1,6 +1,7 @@
 #include "server/app/organ/organ_reduce_local.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 
@@ -45,6 +46,8 @@ Status take_settings(ReduceCommand& command) {
   local.patch_radius_m = command.patch_radius_mm * 1e-3;
   if (command.check_places > kMaxCheckPlaces)
     return Error{ErrorCode::Usage, "--check: at most " + std::to_string(kMaxCheckPlaces)};
+  if (!(command.accepted_percent >= 0 && command.accepted_percent <= 1000))
+    return Error{ErrorCode::Usage, "--accept-error: must be from 0 to 1000"};
   return reduce::validate(local);
 }
 
@@ -100,8 +103,16 @@ void print_patches(const organ::Organ& organ, const reduce::LocalBuilt& built) {
     std::printf("  left out            %zu presses without an equilibrium\n", built.failed);
 }
 
-Status check(const organ::Organ& organ, const reduce::LocalBuilt& built,
-             const ReduceCommand& command, const std::filesystem::path& folder) {
+// The larger of both groups' errors of force in all but 5 of 100 loads. A load that is not solved
+// is as wrong as can be.
+double force_error_of(const LocalErrors& trained, const LocalErrors& unseen) {
+  if (trained.unsolved + unseen.unsolved > 0) return 1;
+  return std::max(reduce::errors_of(trained.force).high, reduce::errors_of(unseen.force).high);
+}
+
+// Finds the reduction's force_error.
+Status check(const organ::Organ& organ, reduce::LocalBuilt& built, const ReduceCommand& command,
+             const std::filesystem::path& folder) {
   auto model = reduce::FullModel::create(organ);
   if (!model) return model.error();
   ProgressLine line(kProgram);
@@ -113,10 +124,25 @@ Status check(const organ::Organ& organ, const reduce::LocalBuilt& built,
   const auto unseen = errors_of_local(built.reduction, organ, loads, false);
   print("places of the training, under other forces", trained);
   print("places at least 8 mm from all of these", unseen);
+  built.reduction.force_error = force_error_of(trained, unseen);
   const auto rate = reduce::rate_of_local(built.reduction, organ, loads.back().press);
   std::printf("  unknowns            %zu; a step of a press %.0f us, at worst %.0f us\n",
               unseen.largest.unknowns(), rate.median_us, rate.worst_us);
   return write_text_file(folder / "local.csv", csv_of(loads, trained, unseen));
+}
+
+// A reduction that is not true is refused; its parts stay, so that it can be had all the same.
+Status accept(const reduce::LocalBuilt& built, const ReduceCommand& command,
+              const std::string& out) {
+  const double percent = 100 * built.reduction.force_error.value_or(0);
+  if (percent <= command.accepted_percent) return {};
+  char text[400];
+  std::snprintf(text, sizeof text,
+                "%s: is not written, for contact forces err by %.0f %% in 5 of 100 presses of its "
+                "check, more than %.3g %%: make it with a smaller --force, or as it is with "
+                "--resume --accept-error %.0f",
+                out.c_str(), percent, command.accepted_percent, std::ceil(percent));
+  return Error{ErrorCode::Mismatch, text};
 }
 
 }  // namespace
@@ -137,17 +163,18 @@ Status run_reduce_local(ReduceCommand command) {
                                        ": is left of an interrupted run: go on from it with "
                                        "--resume, or remove it"};
   ProgressLine line(kProgram);
-  const auto built = reduce::build_local(*organ, command.local,
-                                         [&](LocalStage stage, std::size_t done, std::size_t all) {
-                                           line.show(name_of(stage), done, all);
-                                         });
+  auto built = reduce::build_local(*organ, command.local,
+                                   [&](LocalStage stage, std::size_t done, std::size_t all) {
+                                     line.show(name_of(stage), done, all);
+                                   });
   if (!built) return built.error();
-  if (auto s = organ::write_local_reduction(out, built->reduction); !s) return s;
-  std::error_code ignored;
-  std::filesystem::remove_all(command.local.parts, ignored);
   print_patches(*organ, *built);
   if (command.check_places > 0)
     if (auto s = check(*organ, *built, command, folder); !s) return s;
+  if (auto s = accept(*built, command, out); !s) return s;
+  if (auto s = organ::write_local_reduction(out, built->reduction); !s) return s;
+  std::error_code ignored;
+  std::filesystem::remove_all(command.local.parts, ignored);
   std::printf("%s, %ju bytes; tables in %s\n", out.c_str(),
               static_cast<std::uintmax_t>(std::filesystem::file_size(out, ignored)),
               folder.c_str());

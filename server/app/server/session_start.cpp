@@ -26,6 +26,15 @@ journal::ReductionDescription describe(const std::string& file,
           model.source};
 }
 
+// What a reduction's maker knew of its error, people are told where it acts.
+void tell_error(const std::string& file, const organ::LocalReduction& model) {
+  if (!model.force_error)
+    log::warn("{}: nobody has checked how far its contact forces are off", file);
+  else if (*model.force_error > organ::kTrueForceError)
+    log::warn("{}: contact forces err by {:.0f} % in 5 of 100 presses of its check", file,
+              100 * *model.force_error);
+}
+
 Result<organ::Organ> read_organ(const ServerOptions& options) {
   auto organ = catalogue::load_organ(options.organ);
   if (!organ) return organ;
@@ -47,6 +56,7 @@ Result<SessionStart> begin(const ServerOptions& options) {
   auto read = organ::read_session_reduction(options.reduction_file, *organ);
   if (!read) return read.error();
   const auto model = std::make_shared<const organ::LocalReduction>(std::move(*read));
+  tell_error(options.reduction_file, *model);
   log::info("{}: strain is not averaged, the reduction is of plain tets", options.reduction_file);
   SessionStart start{
       .simulation = step::Simulation(std::move(*organ), options.workers, reduction::at_work(model)),

@@ -288,6 +288,9 @@ Status validate(const LocalReduction& r) {
   if (!(r.force_n > 0 && r.force_n <= kMaxLocalForce_n))
     return bad("its force is " + number(r.force_n) + " N, must be above 0 and at most " +
                number(kMaxLocalForce_n));
+  if (r.force_error && !(*r.force_error >= 0 && *r.force_error < kMostForceError))
+    return bad("its check found an error of " + number(*r.force_error) +
+               ", must be from 0 to below " + number(kMostForceError));
   if (r.free_layers > kMaxFreeLayers)
     return bad("has " + std::to_string(r.free_layers) + " free layers, may have " +
                std::to_string(kMaxFreeLayers));

@@ -12,6 +12,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -27,6 +28,9 @@ inline constexpr std::size_t kMaxGreensFunctions = 100000;
 inline constexpr std::uint32_t kMaxFreeLayers = 3;
 inline constexpr double kMaxLocalForce_n = 100;
 inline constexpr float kMaxCubatureWeight = 1e6f;
+inline constexpr double kMostForceError = 1e6;
+// A reduction is true when contact forces err by no more than this part.
+inline constexpr double kTrueForceError = 0.03;
 // A field's step is at most this: with it, displacements per force reach 33 km/N.
 inline constexpr float kMaxFieldStep = 1;
 // Largest deviation of a patch's modes' products from 1 and 0. Packing makes up to 3e-5 of exactly
@@ -77,6 +81,9 @@ struct LocalReduction {
   std::uint32_t node_count = 0;
   double force_n = 0;             // largest of the training, at a node
   std::uint32_t free_layers = 0;  // of nodes around those that are touched
+  // Of contact forces, in all but 5 of 100 presses of the check at its making, as a part of them;
+  // none: it was not checked.
+  std::optional<double> force_error;
   std::vector<PackedField> vibrations;
   std::vector<GreensFunction> greens;  // ascending nodes
   std::vector<LocalPatch> patches;
@@ -102,8 +109,8 @@ Status check_reducible(const Organ& organ);
 Status check_masses(const LocalReduction& reduction, const Organ& organ);
 
 // XXH3-64 over all that makes a difference to a session, in the order of LocalReduction's members,
-// each array preceded by its length (u64): names a reduction for recordings. Its source is left
-// out.
+// each array preceded by its length (u64): names a reduction for recordings. Its source and its
+// check are left out.
 std::uint64_t reduction_hash(const LocalReduction& reduction);
 
 }  // namespace trocar::organ

@@ -83,6 +83,7 @@ void put(const LocalReduction& r, proto::LocalReduction& message) {
   message.set_node_count(r.node_count);
   message.set_force_n(r.force_n);
   message.set_free_layers(r.free_layers);
+  if (r.force_error) message.set_force_error(*r.force_error);
   for (const auto& [node, fields] : r.greens) {
     auto& entry = *message.add_greens();
     entry.set_node(node.value);
@@ -105,6 +106,7 @@ Result<LocalReduction> decode(BytesView bytes) {
   r.node_count = message.node_count();
   r.force_n = message.force_n();
   r.free_layers = message.free_layers();
+  if (message.has_force_error()) r.force_error = message.force_error();
   for (const auto& entry : message.greens()) {
     auto& greens = r.greens.emplace_back();
     greens.node = NodeIndex(entry.node());

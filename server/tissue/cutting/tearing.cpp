@@ -80,11 +80,34 @@ std::span<const TetFace> Tearing::find(const topology::Topology& topology,
     if (torn == kMostTears) break;
     const auto before = faces_.size();
     part(topology, tear);
+    if (leaves_debris(topology, std::span(faces_).subspan(before))) faces_.resize(before);
     torn += faces_.size() > before;  // where all tets are on one side, it has torn already
   }
   std::sort(faces_.begin(), faces_.end());
   faces_.erase(std::unique(faces_.begin(), faces_.end()), faces_.end());
   return faces_;
+}
+
+// Faces of tears before count as parted, too. What is opened are these or fewer, and pieces that
+// share no more than nodes and edges are parted with them.
+bool Tearing::leaves_debris(const topology::Topology& topology, std::span<const TetFace> faces) {
+  parted_ = faces_;
+  std::ranges::sort(parted_);
+  return std::ranges::any_of(faces, [&](const TetFace& face) {
+    return is_debris(topology, face.tet) || is_debris(topology, across(topology, face)->tet);
+  });
+}
+
+bool Tearing::is_debris(const topology::Topology& topology, TetIndex tet) {
+  piece_.assign(1, tet);
+  for (std::size_t i = 0; i < piece_.size() && piece_.size() < kLeastTorn; ++i)
+    for (std::uint8_t corner = 0; corner < 4; ++corner) {
+      const TetFace face{piece_[i], corner};
+      const auto other = across(topology, face);
+      if (!other || std::ranges::binary_search(parted_, std::min(face, *other))) continue;
+      if (std::ranges::find(piece_, other->tet) == piece_.end()) piece_.push_back(other->tet);
+    }
+  return piece_.size() < kLeastTorn;
 }
 
 void Tearing::part(const topology::Topology& topology, const Tear& tear) {

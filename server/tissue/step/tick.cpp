@@ -205,16 +205,38 @@ void note_solver(Tick tick, const std::optional<wire::SolverFigures>& before,
     outbox.solver_changes.push_back({tick, *now});
 }
 
+// Free pieces that tools hold, each as often as tools hold it.
+void find_held(const contact::GraspTable& grasps, const pieces::PieceList& pieces,
+               std::vector<std::uint32_t>& held) {
+  held.clear();
+  if (pieces.size() == 0) return;
+  for (std::uint8_t i = 0; i < kMaxTools; ++i) {
+    const auto begin = static_cast<std::ptrdiff_t>(held.size());
+    for (const auto node : grasps[ToolSlot{i}].nodes) {
+      const auto piece = pieces.piece_of(node);
+      if (piece != pieces::PieceList::kBody &&
+          std::find(held.begin() + begin, held.end(), piece) == held.end())
+        held.push_back(piece);
+    }
+  }
+}
+
 // Each active node once a frame: what has been stretched for that long tears. Not where it is held:
-// there it would find no relief.
+// there it would find no relief. Nor does a free piece but between two tools: nothing else pulls at
+// it from two sides, and what swings after a tear would go on tearing.
 void find_tears(std::span<const NodeIndex> nodes, const contact::GraspTable& grasps,
-                const world::World& world, blades::TissueCuts& cuts,
-                std::vector<NodeIndex>& may_tear) {
+                const pieces::PieceList& pieces, const world::World& world,
+                blades::TissueCuts& cuts, CutWork& work) {
   if (!cuts.can_tear()) return;
-  may_tear.clear();
+  find_held(grasps, pieces, work.held_pieces);
+  const auto is_pulled = [&](NodeIndex node) {
+    const auto piece = pieces.piece_of(node);
+    return piece == pieces::PieceList::kBody || std::ranges::count(work.held_pieces, piece) > 1;
+  };
+  work.may_tear.clear();
   for (auto i = world.tick % kTicksPerFrame; i < nodes.size(); i += kTicksPerFrame)
-    if (!grasps.holds(nodes[i])) may_tear.push_back(nodes[i]);
-  cuts.tear(world, may_tear);
+    if (is_pulled(nodes[i]) && !grasps.holds(nodes[i])) work.may_tear.push_back(nodes[i]);
+  cuts.tear(world, work.may_tear);
 }
 
 // Nothing is solved where all tissue sleeps.
@@ -245,7 +267,7 @@ SolveReport solve_awake(const contact::ContactList& contacts, bool may_rest,
 blades::CutReport cut_tissue(State& state, CutWork& cut, ContactWork& contact, NearWork& near,
                              SolveWork& solve) {
   auto& cuts = state.cuts;
-  find_tears(near.active.nodes(), state.grasps, state.world, cuts, cut.may_tear);
+  find_tears(near.active.nodes(), state.grasps, solve.pieces.list(), state.world, cuts, cut);
   blades::CutReport report;
   const auto edit = cuts.cut(state.tools, state.claims, state.world, cut.travel_m, report);
   if (edit) {

@@ -97,7 +97,8 @@ struct SolveWork {
 
 struct CutWork {
   std::vector<NodeIndex> may_tear;
-  double travel_m = 0;  // sum over ticks of the farthest that any node has moved
+  std::vector<std::uint32_t> held_pieces;  // each as often as tools hold it
+  double travel_m = 0;                     // sum over ticks of the farthest that any node has moved
 };
 
 // Events wait here for the next frame.
