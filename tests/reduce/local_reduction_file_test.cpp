@@ -68,6 +68,7 @@ TEST_F(LocalReductionFile, WhatIsWrittenIsRead) {
   auto without_cubature = reduction_;
   without_cubature.patches[0].cubature.clear();
   without_cubature.free_layers = 0;
+  without_cubature.force_error = 0.02;
   const auto unpacked = unpack_local_reduction(*pack_local_reduction(without_cubature));
   ASSERT_TRUE(unpacked.ok()) << unpacked.error().message;
   EXPECT_EQ(*unpacked, without_cubature);
@@ -237,6 +238,8 @@ TEST_F(LocalReductionFile, CountsAndScalarsHaveLimits) {
   expect_bad([](auto& r) { r.patches.resize(4097); }, "has 4097 patches");
   for (const double force : {0.0, -1.0, 100.5, kInfinity, std::nan("")})
     expect_bad([&](auto& r) { r.force_n = force; }, "N, must be above 0 and at most 100");
+  for (const double error : {-0.01, 1e6, std::nan("")})
+    expect_bad([&](auto& r) { r.force_error = error; }, "must be from 0 to below 1");
   expect_bad([](auto& r) { r.free_layers = 4; }, "has 4 free layers, may have 3");
   expect_bad([](auto& r) { r.greens.resize(100001); }, "has 100001 Green's functions");
   expect_bad_patch([](auto& p) { p.modes.clear(); }, "patch 2 has 0 modes, must have 1 to 64");

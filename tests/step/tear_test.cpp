@@ -57,8 +57,8 @@ TEST(Tears, AFlapPulledFarEnoughTearsOff) {
   }
 }
 
-// What is torn is not crumbled: no piece is of fewer tets than Tearing says, and nothing tears half
-// a second after the hand has stopped, although what it holds swings.
+// Tissue that tears does not crumble: no piece is of fewer tets than Tearing says. Nothing tears
+// half a second after the hand has stopped, although what it holds swings.
 TEST(Tears, LeaveNoDebrisAndEndWithTheHand) {
   for (const double tear_stretch : {1.2, 1.4}) {
     Simulation simulation(liver(material::ElasticLaw::NeoHookean, tear_stretch));

@@ -26,7 +26,7 @@ journal::ReductionDescription describe(const std::string& file,
           model.source};
 }
 
-// What a reduction's maker knew of its error, people are told where it acts.
+// People are told where a reduction acts that is not true, or of which nobody knows.
 void tell_error(const std::string& file, const organ::LocalReduction& model) {
   if (!model.force_error)
     log::warn("{}: nobody has checked how far its contact forces are off", file);

@@ -81,8 +81,8 @@ struct LocalReduction {
   std::uint32_t node_count = 0;
   double force_n = 0;             // largest of the training, at a node
   std::uint32_t free_layers = 0;  // of nodes around those that are touched
-  // Of contact forces, in all but 5 of 100 presses of the check at its making, as a part of them;
-  // none: it was not checked.
+  // This part of a contact force is the error in all but 5 of 100 presses of the check at its
+  // making; none: it was not checked.
   std::optional<double> force_error;
   std::vector<PackedField> vibrations;
   std::vector<GreensFunction> greens;  // ascending nodes

@@ -133,9 +133,10 @@ const Vec3f& SelfContactFinder::up(TriangleIndex triangle, const world::World& w
 }
 
 bool SelfContactFinder::can_meet(Site site, TriangleIndex triangle, const world::World& world) {
+  if (surface_.is_behind(site, triangle)) return false;
   if (!is_of_lips(site, triangle)) return !surface_.is_near(site, triangle);
-  return std::ranges::find(surface_[triangle], site) == surface_[triangle].end() &&
-         dot(up(triangle, world), normal(site, Sort::Wound, world)) < 0;
+  return dot(up(triangle, world), normal(site, Sort::Wound, world)) < 0 &&
+         !surface_.shares_side(site, triangle);
 }
 
 SelfContactFinder::ClosestPoint SelfContactFinder::closest_point(Site site, TriangleIndex triangle,

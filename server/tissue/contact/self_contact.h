@@ -13,6 +13,7 @@
 // tick's motion. That node and triangle then stay a pair while the node is near, however deep it is
 // pressed and wherever it slides, so that nothing flips: pairs are state. What is near a node in
 // the tissue (self_surface.h) never meets it: its neighbourhood, and the other face of a thin wall.
+// Above all not the face across from it in a tet: a pair of these would hold a tet inside out.
 // What touches or overlaps at rest may stay as it is.
 //
 // Cuts: the two sides of a wound are face to face from the start, and pairs like any others, which
@@ -115,7 +116,7 @@ class SelfContactFinder {
   }
 
   // The world has its new nodes.
-  void update(const topology::SurfaceEdit& edit, const world::World& world);
+  void update(const topology::Edit& edit, const world::World& world);
 
   // These nodes are somewhere else than surface_moved() says. Ascending, or in ascending runs.
   void relocated(std::span<const NodeIndex> nodes, const world::World& world);

@@ -85,15 +85,15 @@ void SelfContactFinder::set_reference(Site site, const world::World& world, List
 
 // Adds the pairs of nodes that the edit has changed to the present list and to the next one.
 // add_to_list() drops what the next one finds twice.
-void SelfContactFinder::update(const topology::SurfaceEdit& edit, const world::World& world) {
+void SelfContactFinder::update(const topology::Edit& edit, const world::World& world) {
   const auto before = surface_.sites();
   const bool has_references = is_listing_ && sites_seen_ == before.size();
   // The first site whose reference the next list lacks.
   const Site unseen = !has_references && is_listing_ ? before[sites_seen_] : Site{0};
   surface_.update(edit, world);
   extend();
-  for (const auto node : edit.touched) is_close_at_rest_[node.value] = 1;
-  for (const auto node : edit.surfaced) {
+  for (const auto node : edit.surface.touched) is_close_at_rest_[node.value] = 1;
+  for (const auto node : edit.surface.surfaced) {
     const Site s = node.value;
     set_reference(s, world, list_);
     is_due_[s] = 0;

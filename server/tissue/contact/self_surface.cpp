@@ -26,6 +26,7 @@ SelfSurface::SelfSurface(const organ::Organ& organ) {
     }
     add_triangle(sites, Sort::Skin);
   }
+  find_apexes(organ);
   site_triangles_.end_building();
   near_now_.end_building();
   const auto corners = static_cast<double>(std::max<std::size_t>(1, 3 * triangles_.size()));
@@ -56,9 +57,49 @@ void SelfSurface::add_triangle(const std::array<Site, 3>& sites, Sort sort) {
   triangles_.push_back(sites);
   sorts_.push_back(sort);
   is_gone_.push_back(0);
+  apexes_.push_back(kNoSite);
   for (const Site s : sites) {
     const auto count = static_cast<std::uint32_t>(site_triangles_[s].size());
     site_triangles_.resize(s, count + 1).back() = triangle;
+  }
+}
+
+void SelfSurface::find_apexes(const organ::Organ& organ) {
+  struct Face {
+    std::array<Site, 3> key;  // ascending
+    Site apex;
+  };
+  std::vector<Face> faces;
+  faces.reserve(4 * organ.mesh.tets.size());
+  for (const auto& tet : organ.mesh.tets)
+    for (std::size_t apex = 0; apex < 4; ++apex) {
+      Face face{.apex = tet[apex].value};
+      for (std::size_t i = 0, at = 0; i < 4; ++i)
+        if (i != apex) face.key[at++] = tet[i].value;
+      std::ranges::sort(face.key);
+      faces.push_back(face);
+    }
+  std::ranges::sort(faces, {}, &Face::key);
+  for (std::size_t t = 0; t < triangles_.size(); ++t) {
+    auto key = triangles_[t];
+    std::ranges::sort(key);
+    const auto face = std::ranges::lower_bound(faces, key, {}, &Face::key);
+    if (face != faces.end() && face->key == key) apexes_[t] = face->apex;
+  }
+}
+
+void SelfSurface::find_apex(const topology::Topology& topology, TriangleIndex triangle) {
+  const auto& sites = triangles_[triangle.value];
+  for (const auto t : topology.tets_of(NodeIndex(sites[0]))) {
+    const auto& tet = topology.tet(t);
+    Site apex = kNoSite;
+    std::size_t shared = 0;
+    for (const auto node : tet)
+      if (std::ranges::find(sites, node.value) != sites.end())
+        ++shared;
+      else
+        apex = node.value;
+    if (shared == 3) apexes_[triangle.value] = apex;
   }
 }
 
@@ -163,13 +204,32 @@ bool SelfSurface::is_near(Site site, TriangleIndex triangle) {
   });
 }
 
+bool SelfSurface::shares_side(Site site, TriangleIndex triangle) const {
+  const auto is_beside = [&](Site corner) {
+    const auto around = site_triangles_[corner];
+    return is_on_lip(corner) && std::any_of(around.begin(), around.end(), [&](TriangleIndex t) {
+             return std::ranges::find(triangles_[t.value], site) != triangles_[t.value].end();
+           });
+  };
+  const auto& corners = triangles_[triangle.value];
+  return std::ranges::find(corners, site) != corners.end() ||
+         std::ranges::any_of(corners, is_beside);
+}
+
 bool SelfSurface::faced_at_rest(Site site, Site across) const {
   const Vec3f way = rest_positions_[across] - rest_positions_[site];
   const Vec3f &own = rest_normals_[site], &theirs = rest_normals_[across];
   return dot(own, theirs) < 0 && dot(way, own) >= -kFacing_m && dot(way, theirs) <= kFacing_m;
 }
 
-void SelfSurface::update(const topology::SurfaceEdit& edit, const world::World& world) {
+void SelfSurface::update(const topology::Edit& edit, const world::World& world) {
+  follow(edit.surface, world);
+  for (const auto node : edit.topology.changed())
+    if (node.value < node_count())
+      for (const auto triangle : site_triangles_[node.value]) find_apex(edit.topology, triangle);
+}
+
+void SelfSurface::follow(const topology::SurfaceEdit& edit, const world::World& world) {
   updated_.clear();
   if (edit.touched.empty()) return;
   extend(world);

@@ -10,7 +10,8 @@
 //
 // Near: within kNearLayers, or so many edges' length, through the tissue; where cuts have been,
 // along the surface that there is now, so that what they have parted is not near. Both sides of a
-// wound start face to face: there only a node's own triangles are near it.
+// wound start face to face: there only a node's own triangles are near it, those beside them on the
+// same side, and those of tets that it is in.
 //
 // What follows from the edits is a function of them: who follows them has the same. O(what is
 // near the edit) each.
@@ -44,6 +45,13 @@ class SelfSurface {
   }
   bool is_gone(TriangleIndex triangle) const { return is_gone_[triangle.value] != 0; }
   Sort sort_of(TriangleIndex triangle) const { return sorts_[triangle.value]; }
+  // Returns whether the node is the fourth one of the tet behind the triangle.
+  bool is_behind(Site site, TriangleIndex triangle) const {
+    return apexes_[triangle.value] == site;
+  }
+  // Returns whether the node is on the same side of the wound as its triangle, for all that one
+  // step along the surface says: it is a corner, or beside one that is not on the front.
+  bool shares_side(Site site, TriangleIndex triangle) const;
   // Ascending.
   std::span<const TriangleIndex> triangles_of(Site site) const { return site_triangles_[site]; }
   bool is_of(Site site, Sort sort) const {
@@ -99,7 +107,7 @@ class SelfSurface {
   float longest_edge_m() const { return longest_edge_m_; }
 
   // The world has its new nodes.
-  void update(const topology::SurfaceEdit& edit, const world::World& world);
+  void update(const topology::Edit& edit, const world::World& world);
   // Sites of which the last edit has changed triangles, or that was_cut() since it; ascending.
   std::span<const Site> updated() const { return updated_; }
 
@@ -109,12 +117,17 @@ class SelfSurface {
   // this part of the sum of their areas.
   static constexpr float kOneSided = 0.3f;
 
+  static constexpr Site kNoSite = 0xffffffffu;
+
   void add_triangle(const std::array<Site, 3>& sites, Sort sort);
+  void find_apexes(const organ::Organ& organ);
+  void find_apex(const topology::Topology& topology, TriangleIndex triangle);
   template <typename Neighbours, typename Length>
   void reach(std::span<const Site> from, double near_m, Neighbours&& neighbours,
              Length&& length_between);
   void list_near_at_first(const organ::Organ& organ);
   void reach_along_surface(std::span<const Site> from, double near_m);
+  void follow(const topology::SurfaceEdit& edit, const world::World& world);
   void extend(const world::World& world);
   void update_rest(Site site);
 
@@ -122,6 +135,7 @@ class SelfSurface {
   std::vector<std::array<Site, 3>> triangles_;
   std::vector<Sort> sorts_;            // per triangle
   std::vector<std::uint8_t> is_gone_;  // per triangle
+  std::vector<Site> apexes_;           // per triangle; kNoSite where there are no tets
   // Per node.
   Blocks<TriangleIndex> site_triangles_;
   std::vector<std::uint8_t> site_sorts_;  // bits

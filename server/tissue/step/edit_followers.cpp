@@ -19,7 +19,7 @@ void hand_out(const topology::Edit& edit, const world::World& world, ContactWork
   near.queue.forget(world.node_count());
   near.active.forget();
   contact.finder.update(edit.surface, world);
-  contact.self_finder.update(edit.surface, world);
+  contact.self_finder.update(edit, world);
   solve.solver.update_topology(edit.topology, world);  // and with it its far field
 }
 
