@@ -1,4 +1,4 @@
-// What external loads hold in place, in the solver.
+// This file puts in place what external loads hold.
 
 #include "server/tissue/dynamics/block_descent.h"
 

@@ -1,4 +1,4 @@
-// The solver's packs: near nodes that are few in their groups are swept eight together.
+// This file sweeps near nodes that are few in their groups eight together.
 
 #include <atomic>
 
@@ -7,8 +7,8 @@
 
 namespace trocar::dynamics {
 
-// Where nodes of one colour share a contact point, it matters which of them are swept at once:
-// those are swept in their groups.
+// Nodes of one colour that share a contact point are swept in their groups, for there it matters
+// which of them are swept at once.
 void BlockDescent::plan_packs(std::span<const NodeIndex> near, std::span<const SweepBand> bands) {
   const auto& groups = tissue_.groups();
   packed_slots_.clear();

@@ -149,7 +149,7 @@ inline SlotLanes slots_of(Group group) {
   return slots;
 }
 
-// What a pack's lanes are to be copies of.
+// This says what a pack's lanes are to be copies of.
 struct PackedLanes {
   Group group = kFirstPack;
   const SlotLanes& slots;

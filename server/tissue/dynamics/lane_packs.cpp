@@ -61,7 +61,7 @@ void LanePacks::find_used(const Groups& groups, std::span<const Slot> slots) {
   }
 }
 
-// Where a colour's nodes are spread over twice as many packs as they need, those of one wait again.
+// The nodes of one pack wait again where a colour is spread over twice as many as it needs.
 void LanePacks::dissolve_emptiest() {
   for (Colour colour = 0; colour < packs_of_.size(); ++colour) {
     std::size_t active = 0;

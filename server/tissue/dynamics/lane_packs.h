@@ -28,7 +28,7 @@ class LanePacks {
   // Lanes whose slot is another than before the last place(), or none; by pack. These slots have
   // to be copied, and eight slots of a pack are valid to be read whatever its lanes hold.
   std::span<const GroupLanes> changed() const { return changed_; }
-  // What is in this slot has changed, or has left it.
+  // The slot's node has changed, or has left it.
   void remove(Slot slot);
 
   // Lane pack * 8 + lane of a slot that was placed.

@@ -41,7 +41,7 @@ struct SweepPlan {
     return std::span(groups).subspan(colour_begins[colour],
                                      colour_begins[colour + 1] - colour_begins[colour]);
   }
-  // Of groups, or of packs (LanePacks).
+  // Sorts groups, or packs (LanePacks), by colour.
   template <typename Coloured>
   void finish(const Coloured& all) {
     all.order_by_colour(groups, colour_begins);

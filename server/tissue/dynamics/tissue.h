@@ -42,7 +42,7 @@ class Tissue {
   void begin_group(Group group, const Float4* start, float inverse_dt) {
     begin_group(group, start, load_group(start + group * kLanes), inverse_dt);
   }
-  // Of a group or pack; own: its displacements.
+  // Begins a group or pack; own: its displacements.
   void begin_group(Group group, const Float4* start, const Vec8& own, float inverse_dt);
   // Lanes of a pack hold other slots.
   void pack(const PackedLanes& pack);
