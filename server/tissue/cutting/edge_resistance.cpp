@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "server/organs/organ/organ.h"
 
@@ -29,6 +30,13 @@ double distance_squared_to_segment(const Vec3d& from, const Vec3d& to, const Vec
 Vec3d any_across(const Vec3d& v) {
   const Vec3d axis = std::abs(v.x) < 0.5 * length(v) ? Vec3d{1, 0, 0} : Vec3d{0, 1, 0};
   return normalized(cross(v, axis), Vec3d{});
+}
+
+std::array<Vec3d, 4> corners_of(const CutMesh& mesh, TetIndex tet) {
+  std::array<Vec3d, 4> corners;
+  const auto& nodes = mesh.topology().tet(tet);
+  for (std::size_t i = 0; i < 4; ++i) corners[i] = mesh.position(nodes[i]);
+  return corners;
 }
 
 // Two directions across the line, and two between these.
@@ -84,6 +92,8 @@ double distance_to(const std::array<Vec3d, 4>& corners, const std::array<PlaneOf
 void EdgeMeter::find_tets(CutMesh& mesh, const Vec3d& from, const Vec3d& to) {
   nodes_.clear();
   tets_.clear();
+  const auto& topology = mesh.topology();
+  is_found_.resize(topology.tet_count());
   const auto strip = make_triangle({from, to, (from + to) * 0.5 + any_across(to - from) * kNear_m});
   if (!strip) return;
   mesh.collect({&*strip, 1}, 1, nodes_);
@@ -94,11 +104,18 @@ void EdgeMeter::find_tets(CutMesh& mesh, const Vec3d& from, const Vec3d& to) {
     // state.
     const double reach = mesh.reach(node);
     if (distance_squared_to_segment(from, to, mesh.position(node)) > reach * reach) continue;
-    const auto tets = mesh.topology().tets_of(node);
-    tets_.insert(tets_.end(), tets.begin(), tets.end());
+    for (const auto tet : topology.tets_of(node))
+      if (std::exchange(is_found_[tet.value], std::uint8_t{1}) == 0) tets_.push_back(tet);
   }
+  for (const auto tet : tets_) is_found_[tet.value] = 0;
+}
+
+// Of several tets that are equally near the lowest counts, so these are looked at in their order.
+void EdgeMeter::drop_aside(const CutMesh& mesh, const Vec3d& from, const Vec3d& to) {
+  const auto directions = directions_across(to - from);
+  std::erase_if(tets_,
+                [&](TetIndex tet) { return lies_aside(corners_of(mesh, tet), from, directions); });
   std::sort(tets_.begin(), tets_.end());
-  tets_.erase(std::unique(tets_.begin(), tets_.end()), tets_.end());
 }
 
 // Looks at the places on the line that are within kNear_m of all of the tet's planes. Beyond a
@@ -128,14 +145,10 @@ EdgeResistance EdgeMeter::measure(CutMesh& mesh, const Vec3d& from, const Vec3d&
   EdgeResistance sums;
   if (!is_blade(std::array{from, to})) return sums;
   find_tets(mesh, from, to);
+  drop_aside(mesh, from, to);
   samples_.fill({});
   const auto& topology = mesh.topology();
-  const auto directions = directions_across(to - from);
-  for (const auto tet : tets_) {
-    std::array<Vec3d, 4> corners;
-    for (std::size_t i = 0; i < 4; ++i) corners[i] = mesh.position(topology.tet(tet)[i]);
-    if (!lies_aside(corners, from, directions)) meet(corners, tet, from, to);
-  }
+  for (const auto tet : tets_) meet(corners_of(mesh, tet), tet, from, to);
   const double length_of_sample = length(to - from) / static_cast<double>(samples_.size());
   for (std::size_t i = 0; i < samples_.size(); ++i) {
     const auto& [nearness, tet] = samples_[i];

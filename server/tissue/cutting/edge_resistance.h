@@ -40,10 +40,12 @@ class EdgeMeter {
   };
 
   void find_tets(CutMesh& mesh, const Vec3d& from, const Vec3d& to);
+  void drop_aside(const CutMesh& mesh, const Vec3d& from, const Vec3d& to);
   void meet(const std::array<Vec3d, 4>& corners, TetIndex tet, const Vec3d& from, const Vec3d& to);
 
   std::vector<NodeIndex> nodes_;
   std::vector<TetIndex> tets_;
+  std::vector<std::uint8_t> is_found_;  // per tet
   std::array<Sample, kEdgeParts * kEdgeSamples> samples_;
 };
 

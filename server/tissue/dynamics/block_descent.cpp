@@ -33,6 +33,7 @@
 #include "common/base/assert.h"
 #include "server/tissue/contact/contact_law.h"
 #include "server/tissue/dynamics/node_move.h"
+#include "server/tissue/dynamics/room.h"
 
 namespace trocar::dynamics {
 namespace {
@@ -64,6 +65,9 @@ BlockDescent::BlockDescent(const organ::Organ& organ, const world::World& world,
   has_explicit_strain_ = implicit_strain_ != tissue_.nodal_strain();
   const auto& groups = tissue_.groups();
   const auto group_count = groups.group_count();
+  for (auto* values : {&x_, &v_, &start_}) values->reserve(with_room(groups.slot_count()));
+  constants_.reserve(with_room(group_count));
+  inertia_.reserve(with_room(group_count));
   resize_arrays();
   links_.reserve(8 * contact::kMaxPointsPerTool + contact::kMaxSelfPoints);
   residuals_.reserve(world.node_count());

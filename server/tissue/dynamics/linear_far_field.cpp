@@ -1,5 +1,7 @@
 #include "server/tissue/dynamics/linear_far_field.h"
 
+#include "server/tissue/dynamics/room.h"
+
 namespace trocar::dynamics {
 namespace {
 
@@ -19,7 +21,10 @@ LinearFarField::LinearFarField(Tissue& tissue, const world::World& world)
   if (elastic > 0) damping_time_s_ = static_cast<float>((damped - elastic) / elastic);
   inverse_square_edges_.resize(group_count);
   taken_at_.resize(group_count);
-  for (auto* values : {&poses_[0], &poses_[1], &away_[0], &away_[1]}) values->resize(slots);
+  for (auto* values : {&poses_[0], &poses_[1], &away_[0], &away_[1]}) {
+    values->reserve(with_room(slots));
+    values->resize(slots);
+  }
   for (Group g = 0; g < group_count; ++g) measure_edges(g, world);
 }
 

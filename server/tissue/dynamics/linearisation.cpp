@@ -3,6 +3,7 @@
 #include <bit>
 
 #include "common/base/assert.h"
+#include "server/tissue/dynamics/room.h"
 
 namespace trocar::dynamics {
 namespace {
@@ -95,6 +96,7 @@ Linearisation::~Linearisation() = default;
 Linearisation::Linearisation(const Tissue& tissue)
     : tissue_(tissue), indexing_(std::make_unique<Indexing>()) {
   const std::vector<Float4> rest(tissue.groups().slot_count());
+  nodes_.reserve(with_room(tissue.groups().group_count()));
   for (Group g = 0; g < tissue.groups().group_count(); ++g) index(g, rest.data());
   rows_.end_building();
   targets_.end_building();
