@@ -10,7 +10,6 @@
 namespace trocar::haptics::testing {
 namespace {
 
-constexpr std::uint64_t kClockStart_us = 5'000'000;
 // A client sends its readings so.
 constexpr double kShortest_s = 0.0039, kKeepAlive_s = 0.020, kDeadBand_m = 60e-6;
 constexpr double kAbove_m = 0.02;

@@ -35,6 +35,8 @@ struct FeelRecord : Record {
   std::vector<Vec3d> server_n;  // of the newest patch that had come
 };
 
+inline constexpr std::uint64_t kClockStart_us = 5'000'000;  // of the client's clock
+
 struct FeelSettings {
   Line line;
   device::HandModel hand;

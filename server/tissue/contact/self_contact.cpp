@@ -5,12 +5,6 @@
 // A the node's share of the surface; half of it, because nodes of both sides meet each other's
 // triangles. Minus f goes to the corners by their weights, so that forces and torques balance.
 //
-// What has been pressed in is also damped, by T = kSelfDamping_s times the rate at which the depth
-// changes, but never drawn back. Against a thin flap of a wound the spring alone is a thousand
-// times stiffer than the flap's inertia: within one tick it would throw the flap out, with the
-// depth over a tick as its speed, into whatever is across. Places that change then shake flaps of
-// few tets ever faster, and with them the organ.
-//
 // A force from the present gap alone knows no side: tissue that is pressed through a thin fold
 // would be pushed out behind it. Continuous collision detection finds the side, but asks for a
 // search along each path in each tick. Here a pair begins before node and triangle can touch, while
@@ -376,23 +370,20 @@ void SelfContactFinder::add_pair(Site site, TriangleIndex triangle, const Place&
     return at(site) - (at(a) * w.x + at(b) * w.y + at(c) * w.z);
   };
   const Vec3f from = between([&](Site s) { return position(s, world); });
-  const float gap = dot(place.normal, from) - place.shift;
-  const bool presses = gap <= 0;
+  const bool presses = dot(place.normal, from) <= place.shift;
   const bool is_fast = ticks_within(kDrift_m, squared_drift(site, triangle, w, world)) == 1;
   const bool is_awaited = is_fast || world.node_classes[site] == world::NodeClass::Active;
   if (!is_awaited && !presses) return;
   const Vec3f at_rest = between([&](Site s) -> const Vec3f& { return world.rest_positions[s]; });
-  // Spring and dashpot are one spring that is stiffer and ends nearer to where the node is.
-  const float steps = presses ? kSelfDamping_s / kTickSeconds : 0;
   ContactPoint point{
       .nodes = {node, NodeIndex(a), NodeIndex(b), NodeIndex(c)},
       .weights = {1, -w.x, -w.y, -w.z},
       .node_count = 4,
       .id = static_cast<std::uint32_t>(pairs.nodes().size() - 1),
-      .stiffness = 0.5f * kSelfStiffnessPaPerM * world.surface_areas[node.value] * (1 + steps),
+      .stiffness = 0.5f * kSelfStiffnessPaPerM * world.surface_areas[node.value],
       .limit_n = kNoLimit_n,
       .normal = place.normal,
-      .plane = place.normal * (place.shift + gap * steps / (1 + steps)) - at_rest,
+      .plane = place.normal * place.shift - at_rest,
   };
   out.points.push_back(point);
   if (!presses || !is_fast) return;

@@ -110,7 +110,7 @@ void EdgeMeter::find_tets(CutMesh& mesh, const Vec3d& from, const Vec3d& to) {
   for (const auto tet : tets_) is_found_[tet.value] = 0;
 }
 
-// Of several tets that are equally near the lowest counts, so these are looked at in their order.
+// Tets are looked at in their order, for the lowest of those that are equally near counts.
 void EdgeMeter::drop_aside(const CutMesh& mesh, const Vec3d& from, const Vec3d& to) {
   const auto directions = directions_across(to - from);
   std::erase_if(tets_,
