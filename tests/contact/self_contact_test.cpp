@@ -178,37 +178,6 @@ TEST(Points, AddNothingToTheWhole) {
   EXPECT_GT(pressed, 0.01);
 }
 
-// The force where the tick begins is the spring's; what comes out in the tick meets the dashpot.
-TEST(Points, PressAsASpringAndADashpotThatNeverDrawsBack) {
-  Bodies bodies(make_flaps({.hinge = 0}));
-  bodies.set_velocities([](const Vec3d& p) { return Vec3f{0, p.y > 0 ? -0.25f : 0.25f, 0}; });
-  int pressing = 0;
-  for (int i = 0; i < 120 && pressing == 0; ++i) {
-    bodies.tick();
-    bodies.contacts.clear();
-    bodies.finder.find(bodies.world, bodies.pairs, bodies.contacts);
-    for (const auto& point : bodies.contacts.points) {
-      const auto& place = bodies.pairs.places()[point.id];
-      const Vec3f u = displacement_of(point, bodies.world);
-      const float depth =
-          place.shift - dot(place.normal, rest_position_of(point, bodies.world) + u);
-      if (depth < 2e-6f) continue;
-      ++pressing;
-      const float spring =
-          0.5f * kSelfStiffnessPaPerM * bodies.world.surface_areas[point.nodes[0].value];
-      const auto pressed_after = [&](float way) {
-        return load_at(point, u + place.normal * way).pressed_n;
-      };
-      const float way = 0.1f * depth, speed = way / kTickSeconds,
-                  tolerance = 5e-3f * spring * depth;
-      EXPECT_NEAR(pressed_after(0), spring * depth, tolerance);
-      EXPECT_NEAR(pressed_after(way), spring * (depth - way - kSelfDamping_s * speed), tolerance);
-      EXPECT_EQ(pressed_after(0.6f * depth), 0);
-    }
-  }
-  EXPECT_GT(pressing, 0);
-}
-
 TEST(Rest, BuiltInOrgansDoNotTouchThemselves) {
   const organ::Organ organs[] = {*catalogue::make_liver(), *catalogue::make_stomach(),
                                  catalogue::make_lattice(), catalogue::make_plate()};

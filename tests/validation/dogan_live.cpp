@@ -26,7 +26,7 @@ constexpr double kErrorTarget = 0.01, kTickTarget_ms = 1, kBudget_ms = 0.8;
 constexpr double kReferenceTarget = kErrorTarget / 5;
 // Plain tets are known to miss it by little.
 constexpr double kPlainOnRecord = 0.015;
-// So is averaged strain in the small liver, by the force.
+// Averaged strain misses it by little in the small liver, by the force.
 constexpr double kAveragedForceOnRecord = 0.0115;
 constexpr float kToolRadius_m = 0.008f, kDeep_m = 0.010f, kAbove_m = 0.003f;
 constexpr Tick kSampleTicks = 8;

@@ -50,9 +50,6 @@ namespace trocar::contact {
 // Pa/m, of both sides together: twice a tool's (contact_finder.h), for there is no hand that could
 // back off. 10 kPa press walls 0.2 mm into each other.
 inline constexpr float kSelfStiffnessPaPerM = 5e7f;
-// This damps what presses, so that it comes out over a tick more: that calms a flap, and hardly
-// makes the contact harder to solve.
-inline constexpr float kSelfDamping_s = kTickSeconds;
 // Pairs are made when this near, or so many ticks before they touch at their present speed, but
 // never from farther than kSelfMaxMargin_m: enough for 1.3 m/s.
 inline constexpr float kSelfMargin_m = 0.001f, kSelfMaxMargin_m = 0.003f;
