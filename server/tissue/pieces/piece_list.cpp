@@ -60,7 +60,7 @@ void PieceList::update(const topology::Edit& edit, const world::World& world) {
     for (auto* stamps : {&seen_, &held_, &tets_seen_}) std::ranges::fill(*stamps, 0u);
     current_ = 1;
   }
-  bool has_changed = false;
+  bool has_changed = piece_of_.size() != before;
   for (const auto node : topology.changed()) {
     const auto old = piece_of_[node.value];
     if (old != kBody && !pieces_[old].nodes.empty()) {
@@ -76,11 +76,7 @@ void PieceList::update(const topology::Edit& edit, const world::World& world) {
     pieces_.push_back({found_});
     has_changed = true;
   }
-  if (!has_changed) {
-    for (auto n = static_cast<std::uint32_t>(before); n < piece_of_.size(); ++n)
-      if (is_of_body(topology, world, NodeIndex(n))) body_.push_back(NodeIndex(n));
-    return;
-  }
+  if (!has_changed) return;
   std::erase_if(pieces_, [](const Piece& piece) { return piece.nodes.empty(); });
   std::ranges::sort(pieces_, {}, [](const Piece& piece) { return piece.nodes.front(); });
   number(topology, world);
@@ -101,13 +97,9 @@ void PieceList::number(const topology::Topology& topology, const world::World& w
   }
   body_.clear();
   for (std::uint32_t n = 0; n < piece_of_.size(); ++n)
-    if (is_of_body(topology, world, NodeIndex(n))) body_.push_back(NodeIndex(n));
-}
-
-bool PieceList::is_of_body(const topology::Topology& topology, const world::World& world,
-                           NodeIndex node) const {
-  return piece_of_[node.value] == kBody && topology.has_node(node) &&
-         world.node_classes[node.value] != NodeClass::Fixed;
+    if (piece_of_[n] == kBody && topology.has_node(NodeIndex(n)) &&
+        world.node_classes[n] != NodeClass::Fixed)
+      body_.push_back(NodeIndex(n));
 }
 
 }  // namespace trocar::pieces

@@ -40,8 +40,6 @@ class PieceList {
  private:
   bool reaches_body(const topology::Topology& topology, const world::World& world, NodeIndex from);
   void number(const topology::Topology& topology, const world::World& world);
-  bool is_of_body(const topology::Topology& topology, const world::World& world,
-                  NodeIndex node) const;
 
   std::vector<Piece> pieces_;
   std::vector<std::uint32_t> piece_of_;
