@@ -39,7 +39,7 @@ void BlockDescent::plan_step(std::span<const NodeIndex> near, const SolveSetting
   for (const auto node : loads.held) begun_.add(groups.slot_of(node) / kLanes, 0xff);
   for (const auto g : begun_.groups) begun_stamp_[g] = current_;
   // A node that is held along an axis is asked for its force by its group.
-  // What is cheap to evaluate is not worth a pack.
+  // A pack is not worth its copies where energies are cheap to evaluate.
   has_packs_ = linear_far_field_ != nullptr && loads.axis_holds.empty() &&
                near_.groups.size() * kLanes > kSparseGroups * near_.node_count;
 }
