@@ -136,13 +136,13 @@ Status accept(const reduce::LocalBuilt& built, const ReduceCommand& command,
               const std::string& out) {
   const double percent = 100 * built.reduction.force_error.value_or(0);
   if (percent <= command.accepted_percent) return {};
-  char text[400];
+  char text[300];
   std::snprintf(text, sizeof text,
-                "%s: is not written, for contact forces err by %.0f %% in 5 of 100 presses of its "
+                ": is not written, for contact forces err by %.0f %% in 5 of 100 presses of its "
                 "check, more than %.3g %%: make it with a smaller --force, or as it is with "
                 "--resume --accept-error %.0f",
-                out.c_str(), percent, command.accepted_percent, std::ceil(percent));
-  return Error{ErrorCode::Mismatch, text};
+                percent, command.accepted_percent, std::ceil(percent));
+  return Error{ErrorCode::Mismatch, out + text};
 }
 
 }  // namespace
