@@ -4,8 +4,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
+#include <random>
 
 #include "common/base/bytes.h"
 #include "server/tissue/contact/contact_law.h"
@@ -176,6 +178,49 @@ TEST(Points, AddNothingToTheWhole) {
     EXPECT_LE(length(torque), 2e-4 * n) << "0.2 mm beside it";
   }
   EXPECT_GT(pressed, 0.01);
+}
+
+// Tissue is crumpled at random, deep into itself: pairs slide from triangle to triangle. Where they
+// are looked at anew, none presses harder than it already did there, but for what comes back.
+TEST(Points, PressNoHarderForBeingLookedAtAnew) {
+  Bodies bodies(make_flaps({.hinge = 0, .offset_m = 0.0013}));
+  crash(bodies, 0.3f, 30);
+  ASSERT_GT(bodies.contacts.points.size(), 20u);
+  std::mt19937 random(7);
+  std::uniform_real_distribution<float> step(-2e-4f, 2e-4f);
+  const auto gap_at = [&](const ContactPoint& point) {
+    return dot(point.normal, displacement_of(point, bodies.world) - point.plane);
+  };
+  int pressed = 0, moved_on = 0;
+  for (int i = 0; i < 300; ++i) {
+    const auto before = bodies.contacts.points;
+    const auto pairs_before = bodies.pairs;
+    for (std::size_t n = 0; n < bodies.world.node_count(); ++n) {
+      const Vec3f way{step(random),
+                      step(random) + (bodies.organ.mesh.rest_positions[n].y > 0 ? -1e-5f : 1e-5f),
+                      step(random)};
+      bodies.world.displacements[n] += way;
+      bodies.world.velocities[n] = way * 1000.0f;
+    }
+    ++bodies.world.tick;
+    bodies.finder.surface_moved(4e-4f);
+    bodies.contacts.clear();
+    bodies.finder.find(bodies.world, bodies.pairs, bodies.contacts);
+    for (const auto& point : bodies.contacts.self_points()) {
+      const float gap = gap_at(point);
+      if (gap >= 0) continue;
+      ++pressed;
+      const auto old = std::ranges::find(before, point.nodes[0],
+                                         [](const ContactPoint& p) { return p.nodes[0]; });
+      ASSERT_NE(old, before.end()) << "a pair begins before it presses";
+      moved_on += old->nodes != point.nodes;
+      // 1 % of the way of one node against another, at most 0.7 mm, comes back.
+      EXPECT_GE(gap, std::min(0.0f, gap_at(*old)) - 8e-6f);
+    }
+  }
+  std::printf("%d points pressed, %d of them on another triangle than before\n", pressed, moved_on);
+  EXPECT_GT(pressed, 1000);
+  EXPECT_GT(moved_on, 100);
 }
 
 TEST(Rest, BuiltInOrgansDoNotTouchThemselves) {
@@ -377,7 +422,7 @@ TEST(Squeeze, DamagedPairsAreRefused) {
 TEST(Squeeze, PairsThatLieStillAreSeldomLookedAt) {
   Squeezed squeezed;
   squeezed.close(kPressed, 100);
-  squeezed.hold(2000);
+  squeezed.hold(3000);
   world::World world = squeezed.simulation->state().world;
   SelfContactTable pairs = squeezed.simulation->state().self_contacts;
   const auto count = pairs.nodes().size();

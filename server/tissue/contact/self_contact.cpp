@@ -12,6 +12,12 @@
 // is pressed. The normal n is the mean of both sides', interpolated by w, so that it turns smoothly
 // while the pair slides over edges; the closest point is that of Ericson 2005, sec. 5.1.5.
 //
+// Where a pair is looked at anew, point and normal change, and with them the gap. Tissue has not
+// moved meanwhile: a node that lies deeper behind its new triangle than it did behind the old one
+// would get energy from nowhere, and crumpled flaps shook for ever with it. So a pair presses no
+// harder after a look than before. The rest of the overlap is in its shift, and comes back slowly
+// (eased_shift()), as solvers of rigid contact bound the speed at which they part bodies.
+//
 // Neighbours in the tissue are near each other without touching. They never meet: neither within
 // kNearLayers of edges through the tissue, nor, where cuts have parted the tissue, within as many
 // edges' length along the surface that there is now (self_surface.h).
@@ -37,6 +43,11 @@ constexpr float kBeginsFacing = -0.1f, kStaysFacing = 0.2f;
 // The closest point lies along the normal, within so many gaps and a little.
 constexpr float kAsidePerGap = 1, kAside_m = 0.0005f;
 constexpr float kDeepest_m = 0.008f;
+// Of an overlap that is not pressed this share comes back in a look, but no more than so far and
+// such a share of the way in a tick: what trembles gets less than friction would take from it.
+constexpr float kComesBack = 1e-3f, kComesBack_m = 5e-8f, kComesBackPerWay = 0.01f;
+// A pair whose triangle an edit has replaced presses no deeper than this.
+constexpr float kDeepestAnew_m = 2e-5f;
 constexpr float kNoLimit_n = 1e6f;
 constexpr std::uint32_t kNoSite = 0xffffffffu;
 // A triangle's corners may move against each other so many times as far as its node may drift: its
@@ -73,7 +84,7 @@ bool is_place(const SelfContactPlace& place) {
   const auto& w = place.weights;
   return w.x >= 0 && w.y >= 0 && w.z >= 0 && std::abs(w.x + w.y + w.z - 1) < 1e-4f &&
          std::abs(length_squared(place.normal) - 1) < 1e-3f &&
-         std::abs(place.shift) <= 2 * kOverlapAtRest_m;
+         std::abs(place.shift) <= 2 * (kOverlapAtRest_m + kDeepest_m);
 }
 }  // namespace
 
@@ -352,6 +363,26 @@ bool SelfContactFinder::is_due(Site site, TriangleIndex triangle, const Vec3f& w
   return is_turn(site, interval, world);
 }
 
+// Returns the shift of a pair after a look at it; place: where it was before.
+float SelfContactFinder::eased_shift(Site site, TriangleIndex triangle, const Place& place,
+                                     const ClosestPoint& closest, const Touch& touch,
+                                     const world::World& world) const {
+  float least = -kDeepestAnew_m;
+  if (!surface_.is_gone(triangle)) {
+    const auto& corners = surface_[triangle];
+    const auto& w = place.weights;
+    const Vec3f from = position(site, world) -
+                       (position(corners[0], world) * w.x + position(corners[1], world) * w.y +
+                        position(corners[2], world) * w.z);
+    const float way =
+        kTickSeconds * std::sqrt(squared_drift(site, closest.triangle, closest.weights, world));
+    const float comes_back = std::min(kComesBack * std::max(0.0f, touch.shift - place.shift),
+                                      kComesBack_m + kComesBackPerWay * way);
+    least = std::min(0.0f, dot(place.normal, from) - place.shift) - comes_back;
+  }
+  return touch.shift + std::min(0.0f, touch.gap - least);
+}
+
 void SelfContactFinder::add_pair(Site site, TriangleIndex triangle, const Place& place,
                                  const world::World& world, SelfContactTable& pairs,
                                  ContactList& out) const {
@@ -438,12 +469,15 @@ void SelfContactFinder::find(const world::World& world, SelfContactTable& pairs,
     const bool looks = stirred_stamp_[site] == tick_current_ || paces_[site] == Pace::Looks;
     ClosestPoint closest;
     Touch touch;
-    if ((is_old && stays(site, old_pairs_.triangles()[i], world, closest, touch)) ||
-        (is_listed && looks && meets(site, runs[r].first, end_of_run(r), world, closest, touch))) {
-      ++pairs_looked_at_;
-      add_pair(site, closest.triangle, {closest.weights, touch.normal, touch.shift}, world, pairs,
-               out);
-    }
+    if (is_old && stays(site, old_pairs_.triangles()[i], world, closest, touch))
+      touch.shift = eased_shift(site, old_pairs_.triangles()[i], old_pairs_.places()[i], closest,
+                                touch, world);
+    else if (!is_listed || !looks ||
+             !meets(site, runs[r].first, end_of_run(r), world, closest, touch))
+      continue;
+    ++pairs_looked_at_;
+    add_pair(site, closest.triangle, {closest.weights, touch.normal, touch.shift}, world, pairs,
+             out);
   }
   std::ranges::sort(out.self_seeds);
   out.self_seeds.erase(std::unique(out.self_seeds.begin(), out.self_seeds.end()),

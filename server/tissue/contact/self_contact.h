@@ -234,6 +234,9 @@ class SelfContactFinder {
   // Returns whether the pair is looked at in this tick.
   bool is_due(Site site, TriangleIndex triangle, const Vec3f& weights,
               const world::World& world) const;
+  float eased_shift(Site site, TriangleIndex triangle, const Place& place,
+                    const ClosestPoint& closest, const Touch& touch,
+                    const world::World& world) const;
   void add_pair(Site site, TriangleIndex triangle, const Place& place, const world::World& world,
                 SelfContactTable& pairs, ContactList& out) const;
 

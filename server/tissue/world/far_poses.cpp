@@ -7,7 +7,7 @@
 namespace trocar::world {
 namespace {
 
-constexpr float kPerMetre = 1 << 20, kMost = 1 << 30;
+constexpr float kPerMetre = 1 << 24, kMost = 1 << 30;
 
 std::int32_t to_grid(float metres) {
   const float v = std::clamp(metres * kPerMetre, -kMost, kMost);
