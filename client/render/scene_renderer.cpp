@@ -7,12 +7,15 @@
 
 #include "client/render/ghost_net.h"
 #include "client/render/gl.h"
-#include "client/render/noise.h"
 #include "client/render/shader.h"
 #include "client/render/shader_sources.h"
-#include "client/render/smooth_surface.h"
+#include "client/shape/noise.h"
+#include "client/shape/smooth_surface.h"
 
 namespace trocar::render {
+
+using namespace shape;
+
 namespace {
 
 constexpr int kMaxShadows = 8;

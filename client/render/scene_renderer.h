@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "client/render/camera.h"
-#include "client/render/tool_mesh.h"
+#include "client/shape/tool_mesh.h"
 #include "common/base/ids.h"
 #include "common/math/frame.h"
 #include "common/tool/tool.h"

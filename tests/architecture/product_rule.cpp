@@ -11,6 +11,7 @@ constexpr std::array kProduct{"common/",
                               "server/organs/",
                               "server/tissue/",
                               "server/session/",
+                              "server/app/config/",
                               "server/app/server/",
                               "server/app/journal/",
                               "server/app/impair/"};

@@ -1,11 +1,11 @@
-#include "client/render/tool_mesh.h"
+#include "client/shape/tool_mesh.h"
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <span>
 
-namespace trocar::render {
+namespace trocar::shape {
 namespace {
 
 using Material = std::array<std::uint8_t, 4>;
@@ -222,4 +222,4 @@ MeshVertices make_arrow(float length, float radius, Colour colour) {
   return out;
 }
 
-}  // namespace trocar::render
+}  // namespace trocar::shape

@@ -10,7 +10,7 @@
 #include "common/math/vec3.h"
 #include "common/tool/tool.h"
 
-namespace trocar::render {
+namespace trocar::shape {
 
 struct Colour {
   std::uint8_t r = 255, g = 255, b = 255;
@@ -40,4 +40,4 @@ MeshVertices make_ghost(float length, Colour colour);
 // Along +z from the origin, `length` long including its head.
 MeshVertices make_arrow(float length, float radius, Colour colour);
 
-}  // namespace trocar::render
+}  // namespace trocar::shape
