@@ -13,6 +13,8 @@ constexpr std::array kProduct{"common/",
                               "server/session/",
                               "server/app/config/",
                               "server/app/server/",
+                              "server/app/web/",
+                              "server/web/",
                               "server/app/journal/",
                               "server/app/impair/"};
 constexpr std::array kApart{"server/papers/", "server/lab/"};
