@@ -198,6 +198,7 @@ struct WebServer::Core : std::enable_shared_from_this<WebServer::Core> {
           co_return;
         }
         ++counters.forbidden;
+        request.keep_alive(false);
         Answer refusal = refuse(request, http::status::forbidden,
                                 "Only the page of this server may open this.\n");
         co_await send(stream, request, refusal);
