@@ -24,7 +24,7 @@ export function People(props: { people: Participant[]; tools: Tool[]; own: numbe
           const has = p.tool.length > 0, state = p.isAway ? 'connection lost' : has ? doing(tools) : 'watches';
           return (
             <li key={p.slot} class={p.isAway ? 'away' : ''}>
-              <span class="dot" ref={el => el?.style.setProperty('--own', hex(props.colourOf(p.slot)))} aria-hidden="true" />
+              <span class={has ? 'dot' : 'dot none'} ref={el => el?.style.setProperty('--own', hex(props.colourOf(p.slot)))} aria-hidden="true" />
               <span class="who"><b>{p.name}</b>{props.own === p.slot && ' (you)'}<small>{kRoles[p.role] ?? 'unknown role'}</small></span>
               <span class="does">{state}</span>
               {has && <span class="force">{newtons(newton)}</span>}
@@ -96,7 +96,7 @@ export function ForcePlot(props: PlotProps): JSX.Element {
         cursor: { drag: { x: false, y: false }, points: { show: false } },
         scales: { x: { time: false }, y: { range: (_u, _min, max) => [0, Math.max(0.5, (max ?? 0) * 1.1)] } },
         axes: [{ ...axis, values: (_u, ticks) => ticks.map(s => clock(s).replace(/\.0$/, '')) }, { ...axis, values: (_u, ticks) => ticks.map(n => `${n} N`), size: 46 }],
-        series: [{}, ...slots.map((slot, i) => ({ label: nameOf(slot), stroke: hex(colourOf(slot)), width: 1.5, dash: kDashes[(i >> 1) % kDashes.length] ?? [], points: { show: false } }))],
+        series: [{}, ...slots.map((slot, i) => ({ label: nameOf(slot), stroke: hex(colourOf(slot)), width: 1.5, dash: kDashes[(i >> 1) % kDashes.length] ?? [], points: { show: false }, spanGaps: true }))],
         hooks: { draw: [u => line(u, latest.current.now / 1000, text)] },
       }, data, box.current!);
       drawn.current = series;

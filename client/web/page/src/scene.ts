@@ -115,7 +115,7 @@ export class Picture {
   draw(nowMs: number): boolean {
     const begin = performance.now();
     const seconds = Math.min(0.25, Math.max(0.001, (nowMs - this.lastMs) / 1000));
-    if (!this.replica.update(nowMs, this.quality > 0 ? 8_000 : 100_000, this.overlay)) return false;
+    if (!this.replica.update(nowMs, [100_000, 16_000, 8_000][this.quality] ?? 8_000, this.overlay)) return false;
     this.judge(nowMs - this.lastMs);
     this.lastMs = nowMs;
     if (this.replica.geometryVersion !== this.version) this.loadGeometry();
