@@ -163,6 +163,9 @@ render::SceneView Picture::scene_view(const replica::Replica& replica, Hands& ha
   scene.holds = holds(replica);
   for (const replica::Tool& tool : surface_.tools())
     scene.tools.push_back(scene_tool(replica, tool, hands));
+  for (const replica::Pointer& pointer : replica.pointers(last_ns_))
+    scene.pointers.push_back(
+        {pointer.position_m, shape::colour_of_pointer(pointer.participant.value)});
   return scene;
 }
 
@@ -259,6 +262,13 @@ void Picture::add_labels(const replica::Replica& replica, const render::SceneVie
       std::snprintf(force, sizeof force, "  %.2f N", length(tool.force_n));
     model.labels.push_back(
         {at->x, at->y, owner->name + force, shape::colour_of_slot(tool.slot.owner().value)});
+  }
+  for (const replica::Pointer& pointer : replica.pointers(last_ns_)) {
+    const auto* owner = replica.find_participant(pointer.participant);
+    const auto at = camera_.project(pointer.position_m, context_->size());
+    if (owner == nullptr || !at) continue;
+    model.labels.push_back({at->x, at->y, owner->name + " points here",
+                            shape::colour_of_pointer(pointer.participant.value)});
   }
 }
 

@@ -79,6 +79,12 @@ Colour colour_of_slot(int slot) {
   return kColours[static_cast<std::size_t>(slot) % kColours.size()];
 }
 
+Colour colour_of_pointer(int slot) {
+  static constexpr std::array<Colour, 4> kColours = {
+      {{255, 255, 255}, {255, 240, 120}, {150, 255, 220}, {255, 190, 240}}};
+  return kColours[static_cast<std::size_t>(slot) % kColours.size()];
+}
+
 Colour colour_of_region(int region) {
   static constexpr std::array<Colour, 6> kColours = {{{0, 205, 255},
                                                       {255, 170, 20},

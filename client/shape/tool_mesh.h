@@ -17,6 +17,8 @@ struct Colour {
 };
 // Sixteen well-separated colours, one per participant slot with tools.
 Colour colour_of_slot(int slot);
+// Bright ones that no hand has, for who points.
+Colour colour_of_pointer(int slot);
 // One per merged region, different from each other for neighbours in number.
 Colour colour_of_region(int region);
 

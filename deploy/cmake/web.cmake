@@ -5,9 +5,6 @@ option(TROCAR_WEB "Build the page for browsers (needs clang for WebAssembly, Nod
 # web_tools(<variable>): the names of what is missing, empty if nothing is.
 function(web_tools variable)
   set(missing)
-  if(TROCAR_SANITIZE)
-    list(APPEND missing "a build without sanitizers")
-  endif()
   find_program(TROCAR_WASM_CXX NAMES clang++-19)
   find_program(TROCAR_WASM_LINKER NAMES wasm-ld-19)
   find_program(TROCAR_NODE NAMES node)
@@ -34,7 +31,10 @@ function(web_tools variable)
   set(${variable} "${missing}" PARENT_SCOPE)
 endfunction()
 
-if(TROCAR_WEB)
+if(TROCAR_WEB AND TROCAR_SANITIZE)
+  message(STATUS "The page for browsers is not built with sanitizers")
+  set(TROCAR_WEB OFF)
+elseif(TROCAR_WEB)
   web_tools(missing)
   if(missing)
     list(JOIN missing ", " missing)
@@ -43,8 +43,8 @@ if(TROCAR_WEB)
   endif()
 endif()
 
-# wasm_module(<name> SOURCES file...): one WebAssembly module in <build>/web, compiled from sources that
-# the native programs have, too. DEFINES the target <name>.
+# wasm_module(<name> SOURCES file...): the target <name>, a WebAssembly module in <build>/web, compiled from
+# sources that the native programs have, too.
 function(wasm_module name)
   cmake_parse_arguments(PARSE_ARGV 1 ARG "" "" "SOURCES")
   set(work "${CMAKE_CURRENT_BINARY_DIR}")

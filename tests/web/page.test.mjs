@@ -5,6 +5,7 @@ import { spawn } from 'node:child_process';
 import fs from 'node:fs';
 import http from 'node:http';
 import https from 'node:https';
+import net from 'node:net';
 import { createRequire } from 'node:module';
 import { after, before, test } from 'node:test';
 
@@ -112,6 +113,26 @@ test('an instructor joins by a link, sees a cut, marks the organ and returns it'
   await close(page);
 });
 
+test('an instructor points, and others see where', async () => {
+  const sees = await openPage(link(server.codes.observer, 'observer', 'Sees'));
+  await live(sees);
+  const page = await openPage(link(server.codes.instructor, 'instructor', 'Points'));
+  await live(page);
+  assert.equal(await sees.getByRole('button', { name: 'Point' }).count(), 0);
+  await page.getByRole('button', { name: 'Point' }).click();
+  const box = await page.locator('canvas').boundingBox();
+  const seen = await until('a pointer', async () => {
+    await page.mouse.move(box.x + box.width / 2 + Math.random() * 4, box.y + box.height / 2);
+    return sees.evaluate(() => window.trocar.replica.pointers()[0]);
+  });
+  assert.ok(Math.hypot(...seen.position) < 0.3, seen.position.join());
+  await sees.locator('.label.pointer', { hasText: 'Points points here' }).waitFor({ timeout: kPatience });
+  await page.getByRole('button', { name: 'Point' }).click();
+  await until('no pointer', () => sees.evaluate(() => window.trocar.replica.pointers().length === 0));
+  await close(page);
+  await close(sees);
+});
+
 test('wrong codes, and a role that the code does not give, are refused with a reason', async () => {
   const other = '0000-0000-0000-0000', right = server.codes.observer;
   for (const [code, role, words] of [[other, 'observer', /not of this session/], ['nonsense', 'observer', /join code/], [right, 'instructor', /role|instructor/]]) {
@@ -203,6 +224,31 @@ test('pages of other sites, odd paths and requests without a key get nothing', a
   assert.equal((await ask('/recordings/lesson.mcap', { ...bearer, Range: 'bytes=999999999999-' })).status, 416);
   assert.equal(await ask('/', { 'X-Long': 'x'.repeat(10_000) }).then(a => a?.status ?? null), null);
   assert.equal((await ask('/session', { ...kUpgrade, Origin: own })).status, 101);
+});
+
+// A text frame of a client, masked with zeros.
+const frameOf = text => Buffer.concat([Buffer.from([0x81, 0xfe, text.length >> 8, text.length & 255, 0, 0, 0, 0]), Buffer.from(text)]);
+const memoryKb = child => Number(fs.readFileSync(`/proc/${child.pid}/status`, 'utf8').match(/VmRSS:\s+(\d+)/)[1]);
+
+test('a browser that does not read holds up nobody, and nothing piles up for it', async () => {
+  const reads = await openPage(link(server.codes.observer, 'observer', 'Reads'));
+  await live(reads);
+  const before = memoryKb(web), stalled = [];
+  for (let i = 0; i < 4; i++) {
+    const socket = net.connect(web.port, '127.0.0.1');
+    socket.on('error', () => undefined);
+    socket.write(`GET /session HTTP/1.1\r\nHost: 127.0.0.1:${web.port}\r\nOrigin: http://127.0.0.1:${web.port}\r\n${Object.entries(kUpgrade).map(([k, v]) => `${k}: ${v}\r\n`).join('')}\r\n`);
+    await new Promise(resolve => socket.once('data', resolve));
+    socket.pause();
+    socket.write(frameOf(JSON.stringify({ code: server.codes.observer, name: `Stalled ${i}`, role: 'observer', more: 'x'.repeat(100) })));
+    stalled.push(socket);
+  }
+  const frames = await reads.evaluate(() => window.trocar.replica.frames);
+  await sleep(6000);
+  assert.ok(await reads.evaluate(n => window.trocar.replica.frames > n + 10, frames));
+  assert.ok(memoryKb(web) < before + 30_000, `${before} kB, then ${memoryKb(web)} kB`);
+  for (const socket of stalled) socket.destroy();
+  await close(reads);
 });
 
 test('guesses of codes from one address have to wait', async () => {

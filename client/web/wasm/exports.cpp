@@ -149,6 +149,12 @@ TROCAR_EXPORT(tools) std::size_t trocar_tools() {
 TROCAR_EXPORT(tools_at) const void* trocar_tools_at() {
   return model().tools().data();
 }
+TROCAR_EXPORT(pointers) std::size_t trocar_pointers() {
+  return model().pointers().size();
+}
+TROCAR_EXPORT(pointers_at) const void* trocar_pointers_at() {
+  return model().pointers().data();
+}
 
 // Colours are 0xrrggbb; each of the three gives a place of MeshVertex, mesh_vertices() how many.
 TROCAR_EXPORT(make_tool)
@@ -171,6 +177,11 @@ TROCAR_EXPORT(jaw_length) float trocar_jaw_length(float radius_m) {
 }
 TROCAR_EXPORT(slot_colour) std::uint32_t trocar_slot_colour(int slot) {
   const auto colour = shape::colour_of_slot(slot < 0 ? 0 : slot);
+  return static_cast<std::uint32_t>(colour.r) << 16 | static_cast<std::uint32_t>(colour.g) << 8 |
+         colour.b;
+}
+TROCAR_EXPORT(pointer_colour) std::uint32_t trocar_pointer_colour(int slot) {
+  const auto colour = shape::colour_of_pointer(slot < 0 ? 0 : slot);
   return static_cast<std::uint32_t>(colour.r) << 16 | static_cast<std::uint32_t>(colour.g) << 8 |
          colour.b;
 }

@@ -192,6 +192,9 @@ bool PageModel::update(double now_ms, std::size_t triangle_budget, Overlay overl
   if (shown_->positions().size() != smooth_.coarse_vertex_count()) return false;
   smooth_.update(shown_->positions());
   update_tools();
+  pointers_.clear();
+  for (const auto& pointer : replica_->pointers(to_ns(now_ms)))
+    pointers_.push_back({static_cast<float>(pointer.participant.value), pointer.position_m});
   update_overlay(overlay);
   return true;
 }

@@ -38,6 +38,12 @@ struct PageTool {
 };
 static_assert(sizeof(PageTool) == 23 * sizeof(float));
 
+struct PagePointer {
+  float participant = 0;  // slot
+  Vec3f position;         // m
+};
+static_assert(sizeof(PagePointer) == 4 * sizeof(float));
+
 class PageModel {
  public:
   PageModel();
@@ -69,6 +75,7 @@ class PageModel {
   std::span<const std::array<float, 4>> rest() const { return rest_; }
   std::span<const std::array<std::uint8_t, 4>> overlay() const { return overlay_; }
   std::span<const PageTool> tools() const { return tools_; }
+  std::span<const PagePointer> pointers() const { return pointers_; }
 
   // Vertices of a tool that is drawn in one piece (a blade), or of its shaft and one jaw.
   const shape::MeshVertices& make_tool(const tool::ToolShape& form, shape::Colour colour);
@@ -92,6 +99,7 @@ class PageModel {
   std::vector<std::array<float, 4>> tints_;  // colour weighted by the fourth
   std::vector<std::array<std::uint8_t, 4>> overlay_;
   std::vector<PageTool> tools_;
+  std::vector<PagePointer> pointers_;
   shape::MeshVertices mesh_;
   Bytes outbox_;
   std::string error_;

@@ -246,6 +246,7 @@ bool Watcher::may_pass(BytesView bytes) const {
     case proto::Envelope::kPing:
     case proto::Envelope::kKeyframeRequest:
     case proto::Envelope::kMarkRequest:
+    case proto::Envelope::kPointRequest:
     case proto::Envelope::kGhostRequest:
     case proto::Envelope::kBye:
       return true;

@@ -91,7 +91,7 @@ export function Live(props: { link: Link; replica: Replica; onEnd(why: string): 
         <button onClick={session.leave}>Leave</button>
       </header>
       <main>
-        <Stage replica={replica} guide={guide} isOld={isOld} follows={follows} people={people.current} onFollow={setFollows} onPicture={() => undefined} onReady={p => { picture.current = p; }}>
+        <Stage replica={replica} guide={guide} isOld={isOld} follows={follows} people={people.current} onFollow={setFollows} onPicture={() => undefined} onReady={p => { picture.current = p; }} {...(mayMark ? { onPoint: place => session.point(place) } : {})}>
           {session.state === 'away' && <p class="banner" role="alert">{session.why} The picture is old; the page comes back by itself.</p>}
           {session.state === 'joining' && <p class="banner">Joining the session</p>}
           {session.state === 'live' && replica.frames === 0 && <p class="banner">Waiting for the organ</p>}

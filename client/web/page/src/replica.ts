@@ -32,6 +32,9 @@ interface Exports {
   overlay_at(): number;
   tools(): number;
   tools_at(): number;
+  pointers(): number;
+  pointers_at(): number;
+  pointer_colour(slot: number): number;
   make_tool(radiusM: number, lengthM: number, halfWidthM: number, colour: number): number;
   make_jaw(radiusM: number, lengthM: number): number;
   make_arrow(lengthM: number, radiusM: number, colour: number): number;
@@ -59,6 +62,8 @@ export interface Tool {
   torqueNm: Vec3;
   penetrationM: number;
 }
+
+export interface Pointer { participant: number; position: Vec3 } // slot; m
 
 export interface Mesh { positions: Float32Array; normals: Float32Array; materials: Uint8Array }
 
@@ -146,6 +151,13 @@ export class Replica {
       });
     return out;
   }
+
+  // Who points where.
+  pointers(): Pointer[] {
+    const count = this.e.pointers(), f = this.floats(this.e.pointers_at(), count * 4);
+    return Array.from({ length: count }, (_, i) => ({ participant: f[i * 4] ?? 0, position: [f[i * 4 + 1] ?? 0, f[i * 4 + 2] ?? 0, f[i * 4 + 3] ?? 0] }));
+  }
+  pointerColour(slot: number): number { return this.e.pointer_colour(slot) >>> 0; }
 
   makeTool(radiusM: number, lengthM: number, halfWidthM: number, colour: number): Mesh {
     return this.mesh(this.e.make_tool(radiusM, lengthM, halfWidthM, colour));

@@ -3,11 +3,11 @@
 import {
   BufferAttribute, BufferGeometry, ConstantAlphaFactor, CustomBlending, Data3DTexture, DynamicDrawUsage, GLSL3, Group,
   LinearFilter, Matrix4, Mesh, NormalBlending, OneMinusConstantAlphaFactor, PerspectiveCamera, Quaternion,
-  RawShaderMaterial, RepeatWrapping, Scene, Vector3, Vector4, WebGLRenderer, type IUniform,
+  RawShaderMaterial, Raycaster, RepeatWrapping, Scene, Vector2, Vector3, Vector4, WebGLRenderer, type IUniform,
 } from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 import { lightingSource, organFragmentSource, organVertexSource, toolFragmentSource, toolVertexSource } from './gen/shaders';
-import { Overlay, Verb, type Mesh as PlainMesh, type Replica, type Tool } from './replica';
+import { Overlay, Verb, type Mesh as PlainMesh, type Pointer, type Replica, type Tool, type Vec3 } from './replica';
 
 export interface Shape { radiusM: number; lengthM: number; halfWidthM: number }
 export interface Label { text: string; colour: number }
@@ -15,10 +15,11 @@ export interface Label { text: string; colour: number }
 export interface Guide {
   shapeOf(slot: number): Shape; // of a tool
   labelOf(tool: Tool): Label;
+  pointerLabel(participant: number): string;
 }
 
 const kMetresPerNewton = 0.02, kMostArrow = 0.1, kLeastNewton = 0.05, kShadows = 8;
-const kOpenJaws = 0.34, kHoldingJaws = 0.12, kJawSeconds = 0.08, kNoise = 32;
+const kPointerLength = 0.035, kOpenJaws = 0.34, kHoldingJaws = 0.12, kJawSeconds = 0.08, kNoise = 32;
 const kSlowMs = 45, kJudged = 40; // pictures, before quality is lowered
 
 interface DrawnTool {
@@ -33,11 +34,14 @@ interface DrawnTool {
   shape: string; // its figures, to see a change
 }
 
+interface DrawnPointer { group: Group; label: HTMLElement }
+
 export class Picture {
   readonly camera = new PerspectiveCamera(32.0, 1, 0.02, 6);
   overlay: Overlay = Overlay.Regions;
   showsArrows = true;
   follows: number | null = null; // a participant's slot
+  onLetGo: () => void = () => undefined; // the person moves the view, so that it follows nobody
   pictures = 0;
   drawMs = 0; // of the last picture
   private readonly renderer: WebGLRenderer;
@@ -46,6 +50,7 @@ export class Picture {
   private readonly organ: Mesh<BufferGeometry, RawShaderMaterial>;
   private readonly uniforms: Record<string, IUniform>;
   private readonly tools = new Map<number, DrawnTool>();
+  private readonly pointers = new Map<number, DrawnPointer>();
   private version = -1;
   private isFramed = false;
   private lastMs = 0;
@@ -56,15 +61,20 @@ export class Picture {
   private height = 1;
 
   constructor(canvas: HTMLCanvasElement, private readonly labels: HTMLElement, private readonly replica: Replica, private readonly guide: Guide) {
-    const isSoftware = rendersInSoftware();
-    this.quality = isSoftware ? 1 : 0;
-    this.renderer = new WebGLRenderer({ canvas, antialias: !isSoftware, alpha: true, powerPreference: 'high-performance' });
+    const gl = canvas.getContext('webgl2', { antialias: !isSlow(), alpha: true, powerPreference: 'high-performance' });
+    if (!gl) throw new Error('This browser cannot draw here: it has no WebGL 2.');
+    this.quality = rendersInSoftware(gl) ? 1 : 0;
+    this.renderer = new WebGLRenderer({ canvas, context: gl });
     this.renderer.setClearColor(0, 0);
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.enableDamping = false;
     this.controls.minDistance = 0.04;
     this.controls.maxDistance = 2.5;
-    this.controls.addEventListener('start', () => { this.follows = null; });
+    this.controls.addEventListener('start', () => {
+      if (this.follows === null) return;
+      this.follows = null;
+      this.onLetGo();
+    });
     const noise = new Data3DTexture(replica.noise(kNoise), kNoise, kNoise, kNoise);
     noise.wrapS = noise.wrapT = noise.wrapR = RepeatWrapping;
     noise.magFilter = noise.minFilter = LinearFilter;
@@ -98,7 +108,7 @@ export class Picture {
   dispose(): void {
     this.controls.dispose();
     this.renderer.dispose();
-    for (const tool of this.tools.values()) tool.label.remove();
+    for (const drawn of [...this.tools.values(), ...this.pointers.values()]) drawn.label.remove();
   }
 
   resize(width: number, height: number): void {
@@ -125,12 +135,25 @@ export class Picture {
     this.follow(tools, seconds);
     this.controls.update();
     this.place(tools, seconds);
+    this.placePointers(this.replica.pointers());
     this.light();
     this.renderer.render(this.scene, this.camera);
     this.placeLabels(tools);
     this.pictures++;
     this.drawMs = performance.now() - begin;
     return true;
+  }
+
+  // Dragging turns the view, unless it points.
+  set turns(value: boolean) { this.controls.enabled = value; }
+
+  // Where a ray through a place of the canvas (0 to 1 from its upper left) meets the surface.
+  pick(x: number, y: number): Vec3 | null {
+    const ray = new Raycaster();
+    ray.setFromCamera(new Vector2(x * 2 - 1, 1 - y * 2), this.camera);
+    this.organ.geometry.computeBoundingSphere();
+    const hit = ray.intersectObject(this.organ, false)[0];
+    return hit ? [hit.point.x, hit.point.y, hit.point.z] : null;
   }
 
   private setQuality(quality: number): void {
@@ -208,6 +231,18 @@ export class Picture {
     return mesh;
   }
 
+  // Two meshes: one that shows faintly through tissue, one where nothing is before it.
+  private arrowGroup(arrow: PlainMesh): { group: Group; meshes: Mesh[] } {
+    const through = this.meshOf(arrow, { value: 1 }, 1), before = this.meshOf(arrow, { value: 1 }, 0.55), group = new Group();
+    Object.assign(through.material, { depthTest: false, depthWrite: false, transparent: true, blending: CustomBlending, blendSrc: ConstantAlphaFactor, blendDst: OneMinusConstantAlphaFactor, blendAlpha: 0.35 });
+    before.material.blending = NormalBlending;
+    before.material.transparent = true; // after what shows through
+    through.renderOrder = 1;
+    before.renderOrder = 2;
+    group.add(through, before);
+    return { group, meshes: [through, before] };
+  }
+
   private drawnTool(tool: Tool): DrawnTool {
     const shape = this.guide.shapeOf(tool.slot), text = JSON.stringify(shape), known = this.tools.get(tool.slot);
     if (known && known.shape === text) return known;
@@ -233,15 +268,9 @@ export class Picture {
       made.upper = hung(false);
       made.lower = hung(true);
     }
-    const arrow = this.replica.makeArrow(0.02, 0.0016, colour);
-    const through = this.meshOf(arrow, { value: 1 }, 1), before = this.meshOf(arrow, { value: 1 }, 0.55);
-    Object.assign(through.material, { depthTest: false, depthWrite: false, transparent: true, blending: CustomBlending, blendSrc: ConstantAlphaFactor, blendDst: OneMinusConstantAlphaFactor, blendAlpha: 0.35 });
-    before.material.blending = NormalBlending;
-    before.renderOrder = 2;
-    through.renderOrder = 1;
-    before.material.transparent = true; // after what shows through
-    made.arrows = [through, before];
-    made.arrowGroup.add(through, before);
+    const arrow = this.arrowGroup(this.replica.makeArrow(0.02, 0.0016, colour));
+    made.arrows = arrow.meshes;
+    made.arrowGroup = arrow.group;
     made.label.className = 'label';
     this.labels.append(made.label);
     this.scene.add(group, made.arrowGroup);
@@ -284,6 +313,30 @@ export class Picture {
     drawn.arrowGroup.quaternion.copy(new Quaternion().setFromUnitVectors(new Vector3(0, 0, 1), force.normalize()));
   }
 
+  private placePointers(pointers: Pointer[]): void {
+    const shown = new Map(pointers.map(p => [p.participant, p]));
+    for (const [who, drawn] of this.pointers) drawn.group.visible = !(drawn.label.hidden = !shown.has(who));
+    // From above the place and from before it, as the viewer sees it.
+    const m = this.camera.matrixWorld.elements, along = new Vector3(-m[8], -m[9], -m[10]).multiplyScalar(0.45).sub(new Vector3(m[4], m[5], m[6])).normalize();
+    for (const { participant, position } of pointers) {
+      let drawn = this.pointers.get(participant);
+      if (!drawn) {
+        drawn = { group: this.arrowGroup(this.replica.makeArrow(kPointerLength, 0.0022, this.replica.pointerColour(participant))).group, label: document.createElement('div') };
+        drawn.label.className = 'label pointer';
+        this.labels.append(drawn.label);
+        this.scene.add(drawn.group);
+        this.pointers.set(participant, drawn);
+      }
+      const at = new Vector3(...position);
+      drawn.group.position.copy(at).addScaledVector(along, -kPointerLength);
+      drawn.group.quaternion.setFromUnitVectors(new Vector3(0, 0, 1), along);
+      drawn.label.textContent = this.guide.pointerLabel(participant);
+      drawn.label.style.setProperty('--own', `#${this.replica.pointerColour(participant).toString(16).padStart(6, '0')}`);
+      at.project(this.camera);
+      drawn.label.style.transform = `translate(${((at.x + 1) / 2 * this.width).toFixed(1)}px, ${((1 - at.y) / 2 * this.height).toFixed(1)}px)`;
+    }
+  }
+
   private light(): void {
     this.camera.updateMatrixWorld();
     this.scene.updateMatrixWorld();
@@ -320,11 +373,13 @@ function dynamic(attribute: BufferAttribute): BufferAttribute {
   return attribute;
 }
 
-function rendersInSoftware(): boolean {
-  const gl = document.createElement('canvas').getContext('webgl2');
-  if (!gl) throw new Error('This browser cannot draw here: it has no WebGL 2.');
+// A browser says so before it makes a context, which takes long in software.
+function isSlow(): boolean {
+  return document.createElement('canvas').getContext('webgl2', { failIfMajorPerformanceCaveat: true }) === null;
+}
+
+function rendersInSoftware(gl: WebGLRenderingContext | WebGL2RenderingContext): boolean {
   const info = gl.getExtension('WEBGL_debug_renderer_info');
   const name = info ? String(gl.getParameter(info.UNMASKED_RENDERER_WEBGL)) : '';
-  gl.getExtension('WEBGL_lose_context')?.loseContext();
   return /swiftshader|llvmpipe|software/i.test(name);
 }

@@ -2,9 +2,9 @@
 // and comes back when the connection breaks.
 
 import { create, fromBinary, toBinary } from '@bufbuild/protobuf';
-import { EnvelopeSchema, GoodbyeReason, MarkAction, type Envelope } from './gen/proto/wire_pb';
+import { EnvelopeSchema, GoodbyeReason, MarkAction, PointRequestSchema, Vec3Schema, type Envelope } from './gen/proto/wire_pb';
 import type { Link } from './link';
-import type { Replica } from './replica';
+import type { Replica, Vec3 } from './replica';
 
 export type State = 'joining' | 'live' | 'away' | 'ended';
 export interface Hooks {
@@ -15,7 +15,7 @@ export interface Hooks {
 
 const kPingMs = 1000, kSilenceMs = 4000, kRoundTrips = 16;
 // Numbers of Envelope's fields, as they begin a message: the surface is the replica's business alone.
-const kSurfaceFields = new Set([2, 3, 8, 18, 26, 29, 30, 31, 32, 33]);
+const kSurfaceFields = new Set([2, 3, 8, 18, 26, 29, 30, 31, 32, 33, 36]);
 
 export class Session {
   state: State = 'joining';
@@ -55,6 +55,12 @@ export class Session {
 
   mark(returns: boolean): void {
     this.say({ case: 'markRequest', value: { $typeName: 'trocar.proto.MarkRequest', action: returns ? MarkAction.MARK_RETURN : MarkAction.MARK_SET } });
+  }
+
+  // Shows everybody a place (m), or none any more.
+  point(place: Vec3 | null): void {
+    const positionM = place === null ? {} : { positionM: create(Vec3Schema, { x: place[0], y: place[1], z: place[2] }) };
+    this.say({ case: 'pointRequest', value: create(PointRequestSchema, positionM) });
   }
 
   leave = (): void => {

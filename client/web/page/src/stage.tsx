@@ -4,7 +4,7 @@ import { useEffect, useRef, useState } from 'preact/hooks';
 import type { ComponentChildren, JSX } from 'preact';
 import { ToolShapeSchema, type Participant, type ToolShape } from './gen/proto/wire_pb';
 import { create } from '@bufbuild/protobuf';
-import { Overlay, Verb, type Replica, type Tool } from './replica';
+import { Overlay, Verb, type Replica, type Tool, type Vec3 } from './replica';
 import { Picture, type Guide, type Shape } from './scene';
 
 export function forceOf(tool: Tool): number { return Math.hypot(...tool.forceN); }
@@ -24,6 +24,9 @@ export function guideOf(people: () => Participant[], colourOf: (slot: number) =>
     labelOf(tool) {
       const name = owner(tool.slot)?.name ?? `hand ${(tool.slot >> 1) + 1}`, newton = forceOf(tool);
       return { text: newton >= 0.05 ? `${name}  ${newtons(newton)}` : name, colour: colourOf(tool.slot >> 1) };
+    },
+    pointerLabel(participant) {
+      return `${people().find(p => p.slot === participant)?.name ?? 'somebody'} points here`;
     },
   };
 }
@@ -47,13 +50,16 @@ interface StageProps {
   onFollow(slot: number | null): void;
   onPicture(nowMs: number): void; // before each picture
   onReady(picture: Picture): void;
+  // Where this person points, if the role may; null: nowhere any more.
+  onPoint?: (place: Vec3 | null) => void;
   children?: ComponentChildren;
 }
 
 export function Stage(props: StageProps): JSX.Element {
   const canvas = useRef<HTMLCanvasElement>(null), labels = useRef<HTMLDivElement>(null), box = useRef<HTMLDivElement>(null);
   const picture = useRef<Picture | null>(null), latest = useRef(props);
-  const [overlay, setOverlay] = useState(Overlay.Holds), [arrows, setArrows] = useState(true), [fault, setFault] = useState('');
+  const [overlay, setOverlay] = useState(Overlay.Holds), [arrows, setArrows] = useState(true), [fault, setFault] = useState(''), [points, setPoints] = useState(false);
+  const place = useRef<[number, number] | null>(null), hasPointed = useRef(false);
   latest.current = props;
 
   useEffect(() => {
@@ -65,15 +71,14 @@ export function Stage(props: StageProps): JSX.Element {
       return undefined;
     }
     picture.current = drawn;
+    drawn.onLetGo = () => latest.current.onFollow(null);
     props.onReady(drawn);
     const size = new ResizeObserver(() => { if (box.current) drawn.resize(box.current.clientWidth, box.current.clientHeight); });
     size.observe(box.current!);
     const step = (now: number): void => {
       id = requestAnimationFrame(step);
       latest.current.onPicture(now);
-      const before = drawn.follows;
       if (drawn.draw(performance.now())) canvas.current?.setAttribute('data-drawn', '1');
-      if (before !== drawn.follows) latest.current.onFollow(drawn.follows);
     };
     id = requestAnimationFrame(step);
     return () => {
@@ -88,6 +93,28 @@ export function Stage(props: StageProps): JSX.Element {
     picture.current.overlay = overlay;
     picture.current.showsArrows = arrows;
   }, [overlay, arrows]);
+  // While the pointer is on the organ, its place goes to everybody ten times a second: tissue moves
+  // under it.
+  useEffect(() => {
+    if (picture.current) picture.current.turns = !points;
+    if (!points) return undefined;
+    const timer = window.setInterval(() => {
+      const at = place.current && picture.current ? picture.current.pick(...place.current) : null;
+      if (at !== null || hasPointed.current) latest.current.onPoint?.(at);
+      hasPointed.current = at !== null;
+    }, 100);
+    return () => {
+      window.clearInterval(timer);
+      if (hasPointed.current) latest.current.onPoint?.(null);
+      hasPointed.current = false;
+    };
+  }, [points]);
+  const onMove = (event: PointerEvent): void => {
+    const rect = (event.currentTarget as HTMLElement).getBoundingClientRect();
+    place.current = [(event.clientX - rect.left) / rect.width, (event.clientY - rect.top) / rect.height];
+  };
+  const mayPoint = props.onPoint !== undefined;
+  useEffect(() => { if (!mayPoint) setPoints(false); }, [mayPoint]);
   useEffect(() => { if (picture.current) picture.current.follows = props.follows; }, [props.follows]);
 
   const reset = (): void => {
@@ -99,7 +126,7 @@ export function Stage(props: StageProps): JSX.Element {
     if (!p || event.ctrlKey || event.metaKey || event.altKey) return;
     const acts: Record<string, () => void> = {
       ArrowLeft: () => p.turn(-step, 0), ArrowRight: () => p.turn(step, 0), ArrowUp: () => p.turn(0, step), ArrowDown: () => p.turn(0, -step),
-      '+': () => p.zoom(0.9), '=': () => p.zoom(0.9), '-': () => p.zoom(1 / 0.9), c: reset,
+      '+': () => p.zoom(0.9), '=': () => p.zoom(0.9), '-': () => p.zoom(1 / 0.9), c: reset, ...(mayPoint ? { p: () => setPoints(!points) } : {}),
       l: () => setOverlay(overlay === Overlay.Holds ? Overlay.None : Overlay.Holds),
       o: () => setOverlay(overlay === Overlay.Regions ? Overlay.None : Overlay.Regions), a: () => setArrows(!arrows),
     };
@@ -111,8 +138,9 @@ export function Stage(props: StageProps): JSX.Element {
   };
 
   return (
-    <div class={props.isOld ? 'stage old' : 'stage'} ref={box}>
+    <div class={`stage${props.isOld ? ' old' : ''}${points ? ' points' : ''}`} ref={box}>
       <canvas ref={canvas} tabIndex={0} onKeyDown={onKey} role="img"
+        onPointerMove={onMove} onPointerDown={onMove} onPointerLeave={() => { place.current = null; }}
         aria-label="The organ and the instruments. Arrow keys turn the view, plus and minus zoom, C resets it." />
       <div class="labels" ref={labels} aria-hidden="true" />
       {fault && <p class="banner fault" role="alert">{fault}</p>}
@@ -127,6 +155,7 @@ export function Stage(props: StageProps): JSX.Element {
         </label>
         <button aria-pressed={overlay === Overlay.Holds} onClick={() => setOverlay(overlay === Overlay.Holds ? Overlay.None : Overlay.Holds)} title="Who holds what (L)">Holds</button>
         <button aria-pressed={overlay === Overlay.Regions} onClick={() => setOverlay(overlay === Overlay.Regions ? Overlay.None : Overlay.Regions)} title="How far each force reaches (O)">Reach</button>
+        {mayPoint && <button aria-pressed={points} onClick={() => setPoints(!points)} title="Show everybody the place under the pointer (P)">Point</button>}
         <button aria-pressed={arrows} onClick={() => setArrows(!arrows)} title="Force arrows, 20 mm per newton (A)">Arrows</button>
       </div>
     </div>
