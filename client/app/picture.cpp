@@ -163,6 +163,9 @@ render::SceneView Picture::scene_view(const replica::Replica& replica, Hands& ha
   scene.holds = holds(replica);
   for (const replica::Tool& tool : surface_.tools())
     scene.tools.push_back(scene_tool(replica, tool, hands));
+  for (const replica::Pointer& pointer : replica.pointers(last_ns_))
+    scene.pointers.push_back(
+        {pointer.position_m, shape::colour_of_pointer(pointer.participant.value)});
   return scene;
 }
 
@@ -175,7 +178,7 @@ void Picture::add_participants(const replica::Replica& replica, bool is_replay,
     shown.role = participant.role;
     shown.is_away = participant.is_away;
     shown.is_self = !is_replay && participant.slot == replica.own_slot();
-    shown.colour = render::colour_of_slot(participant.slot.value);
+    shown.colour = shape::colour_of_slot(participant.slot.value);
     for (const replica::Tool& tool : surface_.tools()) {
       if (tool.slot.owner() != participant.slot) continue;
       shown.has_tool = true;
@@ -202,7 +205,7 @@ void Picture::add_own_forces(const replica::Replica& replica, ui::HudModel& mode
     if (tool.slot.owner() != own) continue;
     const std::string number = count > 1 ? " " + std::to_string(tool.slot.number() + 1) : "";
     model.own_forces.push_back(
-        {"force on your tool" + number, render::colour_of_slot(own.value), length(tool.force_n)});
+        {"force on your tool" + number, shape::colour_of_slot(own.value), length(tool.force_n)});
   }
   if (count == 0) return;
   const auto forces = forces_.forces(own);
@@ -258,7 +261,14 @@ void Picture::add_labels(const replica::Replica& replica, const render::SceneVie
     if (length(tool.force_n) >= render::kMinArrowNewton)
       std::snprintf(force, sizeof force, "  %.2f N", length(tool.force_n));
     model.labels.push_back(
-        {at->x, at->y, owner->name + force, render::colour_of_slot(tool.slot.owner().value)});
+        {at->x, at->y, owner->name + force, shape::colour_of_slot(tool.slot.owner().value)});
+  }
+  for (const replica::Pointer& pointer : replica.pointers(last_ns_)) {
+    const auto* owner = replica.find_participant(pointer.participant);
+    const auto at = camera_.project(pointer.position_m, context_->size());
+    if (owner == nullptr || !at) continue;
+    model.labels.push_back({at->x, at->y, owner->name + " points here",
+                            shape::colour_of_pointer(pointer.participant.value)});
   }
 }
 

@@ -7,12 +7,15 @@
 
 #include "client/render/ghost_net.h"
 #include "client/render/gl.h"
-#include "client/render/noise.h"
 #include "client/render/shader.h"
 #include "client/render/shader_sources.h"
-#include "client/render/smooth_surface.h"
+#include "client/shape/noise.h"
+#include "client/shape/smooth_surface.h"
 
 namespace trocar::render {
+
+using namespace shape;
+
 namespace {
 
 constexpr int kMaxShadows = 8;
@@ -166,6 +169,7 @@ struct SceneRenderer::Parts {
   void draw_tool(const SceneTool& shown, float seconds);
   void draw_ghost(const SceneTool& shown);
   void draw_arrow(const SceneTool& shown);
+  void draw_pointer(const ScenePointer& shown, const OrbitCamera& camera);
   // First faintly without the depth test, so that it shows through tissue, then where in front.
   void draw_through(const MeshVertices& mesh, const Matrix4& world_from_model, float faint,
                     float dim);
@@ -391,6 +395,15 @@ void SceneRenderer::Parts::draw_arrow(const SceneTool& shown) {
   draw_through(make_arrow(length(along), 0.0016f, colour), matrix_of(pose), 0.35f, 1);
 }
 
+// It comes from above the place and from before it, as the viewer sees it.
+void SceneRenderer::Parts::draw_pointer(const ScenePointer& shown, const OrbitCamera& camera) {
+  constexpr float kLength = 0.035f, kRadius = 0.0022f;
+  const device::ViewRays view = camera.rays(size);
+  const Vec3f along = normalized(view.forward * 0.45f - view.up, Vec3f{0, -1, 0});
+  const Pose pose{shown.position - along * kLength, rotation_from_z(along)};
+  draw_through(make_arrow(kLength, kRadius, shown.colour), matrix_of(pose), 0.6f, 1);
+}
+
 void SceneRenderer::Parts::draw_tools(const SceneView& scene, const OrbitCamera& camera) {
   tool.use();
   set_lights(tool, camera);
@@ -398,6 +411,7 @@ void SceneRenderer::Parts::draw_tools(const SceneView& scene, const OrbitCamera&
   glBindBuffer(GL_ARRAY_BUFFER, tool_array.buffer);
   for (const SceneTool& shown : scene.tools) draw_tool(shown, scene.seconds);
   for (const SceneTool& shown : scene.tools) draw_ghost(shown);
+  for (const ScenePointer& shown : scene.pointers) draw_pointer(shown, camera);
   if (!scene.shows_arrows) return;
   for (const SceneTool& shown : scene.tools) draw_arrow(shown);
 }

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "client/render/camera.h"
-#include "client/render/tool_mesh.h"
+#include "client/shape/tool_mesh.h"
 #include "common/base/ids.h"
 #include "common/math/frame.h"
 #include "common/tool/tool.h"
@@ -43,6 +43,12 @@ struct Hold {
   bool is_firm = false;
 };
 
+// A place that somebody shows: a bright arrow ends there.
+struct ScenePointer {
+  Vec3f position;
+  shape::Colour colour;
+};
+
 struct SceneView {
   std::uint64_t topology_version = 0;  // changes when rest positions and triangles do
   std::span<const Vec3f> rest_positions;
@@ -55,6 +61,7 @@ struct SceneView {
   std::span<const Vec3f> ghost_positions;  // of another solution, as many; empty: none
   bool shows_regions = true, shows_arrows = true;
   std::vector<SceneTool> tools;
+  std::vector<ScenePointer> pointers;
   float seconds = 0;  // since the last picture
 };
 

@@ -100,6 +100,8 @@ void Replica::on_message(const proto::Envelope& message, std::uint64_t arrival_n
       return apply_ghost(message.ghost_frame());
     case proto::Envelope::kRecordingState:
       return apply_recording(message.recording_state());
+    case proto::Envelope::kPointEvent:
+      return apply_point(message.point_event(), arrival_ns);
     case proto::Envelope::kBarrier:
       barrier_ = BarrierOutcome{message.barrier().frame(), message.barrier().surface_crc(), 0};
       barrier_answered_ = false;
@@ -480,6 +482,23 @@ void Replica::apply_recording(const proto::RecordingState& message) {
                                : wire::RecordingStatus::Unknown;
   recording_.frames_missing = message.frames_missing();
   recording_.text = message.text().substr(0, kMaxRecordingText);
+}
+
+void Replica::apply_point(const proto::PointEvent& message, std::uint64_t arrival_ns) {
+  if (message.participant() >= kMaxParticipants) return fail("PointEvent: slot out of range");
+  const ParticipantSlot who{static_cast<std::uint8_t>(message.participant())};
+  std::erase_if(pointers_, [who](const Pointer& known) { return known.participant == who; });
+  if (!message.has_position_m()) return;
+  const Vec3f place = to_vec3(message.position_m());
+  if (!is_finite(place)) return fail("PointEvent.position_m: not finite");
+  pointers_.push_back({who, place, arrival_ns});
+}
+
+std::vector<Pointer> Replica::pointers(std::uint64_t now_ns) const {
+  std::vector<Pointer> shown;
+  for (const auto& pointer : pointers_)
+    if (now_ns < pointer.arrival_ns + kPointerNs) shown.push_back(pointer);
+  return shown;
 }
 
 void Replica::apply_ghost(const proto::GhostFrame& message) {

@@ -45,6 +45,7 @@ class GhostFrame;
 class MarkEvent;
 class RecordingState;
 class Participants;
+class PointEvent;
 class SurfaceChange;
 class FrameStatePart;
 class SurfaceFrame;
@@ -58,6 +59,7 @@ namespace trocar::replica {
 inline constexpr std::size_t kHistoryFrames = 8;  // 128 ms: covers the display delay and its jitter
 inline constexpr std::size_t kMaxNotices = 32;
 inline constexpr std::size_t kMaxRecordingText = 200;
+inline constexpr std::uint64_t kPointerNs = 1'500'000'000;  // as long a pointer stays without news
 
 enum class SyncState : std::uint8_t {
   WaitingForTopology,
@@ -130,6 +132,8 @@ class Replica final : public MessageSink {
   std::uint64_t notice_count() const { return notice_count_; }
   // The full solution, for whoever has asked, is of the surface that is shown if the epochs agree.
   const Ghost& ghost() const { return ghost_; }
+  // Who points where at `now_ns` (monotonic), one entry for each participant.
+  std::vector<Pointer> pointers(std::uint64_t now_ns) const;
   // Returns what the server last said of its recording.
   const wire::RecordingState& recording() const { return recording_; }
   const std::optional<BarrierOutcome>& barrier() const { return barrier_; }
@@ -158,6 +162,7 @@ class Replica final : public MessageSink {
   void add_notice(Notice notice);
   void apply_ghost(const proto::GhostFrame& message);
   void apply_recording(const proto::RecordingState& message);
+  void apply_point(const proto::PointEvent& message, std::uint64_t arrival_ns);
   void apply_claim(const proto::ClaimEvent& message, std::uint64_t arrival_ns);
   void apply_slice(const proto::SurfaceSlice& message, std::uint64_t arrival_ns);
   void apply_state_part(const proto::FrameStatePart& message);
@@ -204,6 +209,7 @@ class Replica final : public MessageSink {
   std::uint64_t notice_count_ = 0;
   Ghost ghost_;
   wire::RecordingState recording_;
+  std::vector<Pointer> pointers_;  // one of a participant at most
   std::optional<BarrierOutcome> barrier_;
   bool barrier_answered_ = false;
   std::string goodbye_text_;

@@ -82,6 +82,13 @@ struct SessionFrame {
   wire::FrameFigures figures;
 };
 
+// A place that a participant shows to everybody.
+struct Pointer {
+  ParticipantSlot participant;
+  Vec3f position_m;
+  std::uint64_t arrival_ns = 0;
+};
+
 struct Notice {
   Tick tick = 0;
   ToolSlot tool;

@@ -15,8 +15,8 @@
 
 #include "client/device/view_rays.h"
 #include "client/render/gl_context.h"
-#include "client/render/tool_mesh.h"
 #include "client/replica/session_view.h"
+#include "client/shape/tool_mesh.h"
 #include "client/ui/felt_text.h"
 
 namespace trocar::ui {
@@ -26,7 +26,7 @@ struct HudParticipant {
   replica::Role role = replica::Role::Unknown;
   bool is_self = false;
   bool has_tool = false;  // the rest is valid
-  render::Colour colour;
+  shape::Colour colour;
   tool::Verb verb = tool::Verb::None;
   bool has_claim = false, is_silent = false;
   bool is_away = false;    // the connection is lost, the place is kept
@@ -39,7 +39,7 @@ struct HudParticipant {
 struct HudLabel {
   float x = 0, y = 0;  // pixels; the text stands to the right
   std::string text;
-  render::Colour colour;
+  shape::Colour colour;
 };
 
 struct HudMessage {
@@ -57,7 +57,7 @@ struct HudTimeline {
 // A tool of one's own, whatever holds it.
 struct HudOwnForce {
   std::string name;  // "force on your tool"
-  render::Colour colour;
+  shape::Colour colour;
   float force_n = 0;
 };
 

@@ -7,7 +7,7 @@
 
 #include <string>
 
-#include "client/render/tool_mesh.h"
+#include "client/shape/tool_mesh.h"
 
 namespace trocar::ui {
 
@@ -25,7 +25,7 @@ inline const ImVec4 kGood = {0.42f, 0.86f, 0.58f, 1};
 inline const ImVec4 kNotice = {0.95f, 0.86f, 0.45f, 1};
 inline const ImVec4 kTrouble = {1.0f, 0.66f, 0.30f, 1};
 
-inline ImVec4 to_imgui(render::Colour c, float alpha = 1) {
+inline ImVec4 to_imgui(shape::Colour c, float alpha = 1) {
   return {static_cast<float>(c.r) / 255, static_cast<float>(c.g) / 255,
           static_cast<float>(c.b) / 255, alpha};
 }

@@ -34,7 +34,7 @@ Status decode_envelope(BytesView body, proto::Envelope& envelope) {
     return Error{ErrorCode::BadMessage, "frame: " + std::to_string(body.size()) +
                                             " bytes that are not an Envelope; close the stream"};
   // A newer minor version may send messages that we do not know: they leave unknown fields.
-  const bool is_unknown = !envelope.GetReflection()->GetUnknownFields(envelope).empty();
+  const bool is_unknown = envelope.ByteSizeLong() > 0;
   if (envelope.message_case() == proto::Envelope::MESSAGE_NOT_SET && !is_unknown)
     return Error{ErrorCode::BadMessage, "frame: Envelope without a message; close the stream"};
   return {};

@@ -21,6 +21,7 @@ enum class Role : std::uint8_t {
 struct Rights {
   bool has_tools = false;
   bool may_mark = false;      // marks the organ, and returns it to the mark
+  bool may_point = false;     // shows everybody a place
   std::uint8_t admitted = 0;  // roles that a join code for this one lets in, a bit each
 
   constexpr bool admits(Role role) const {
@@ -44,20 +45,26 @@ inline constexpr std::array<NamedRole, 4> kRoles{
       "surgeon",
       {.has_tools = true,
        .may_mark = false,
+       .may_point = false,
        .admitted = bit_of(Role::Surgeon) | bit_of(Role::Assistant) | bit_of(Role::Observer)}},
      {Role::Assistant,
       "assistant",
       {.has_tools = true,
        .may_mark = false,
+       .may_point = false,
        .admitted = bit_of(Role::Assistant) | bit_of(Role::Observer)}},
      {Role::Instructor,
       "instructor",
       {.has_tools = false,
        .may_mark = true,
+       .may_point = true,
        .admitted = bit_of(Role::Instructor) | bit_of(Role::Observer)}},
      {Role::Observer,
       "observer",
-      {.has_tools = false, .may_mark = false, .admitted = bit_of(Role::Observer)}}}};
+      {.has_tools = false,
+       .may_mark = false,
+       .may_point = false,
+       .admitted = bit_of(Role::Observer)}}}};
 
 // None, for a role that is none of kRoles.
 constexpr Rights rights_of(Role role) {

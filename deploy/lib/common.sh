@@ -38,15 +38,17 @@ absolute() {
 }
 
 # All programs, as deploy/build and deploy/demo build them.
-all_programs=(trocar-server trocar-client trocar-organ trocar-sim trocar-journal trocar-impair)
+all_programs=(trocar-server trocar-client trocar-organ trocar-sim trocar-journal trocar-impair trocar-web)
 
 # build PRESET [TARGET...]: configures if needed and builds. Tests are there if the script sets
-# with_tests=true, after deploy/setup --with-tests.
+# with_tests=true, after deploy/setup --with-tests; the page for browsers if its tools are there, which a
+# script looks for again with with_web=true.
 build() {
   local preset=$1 tests=OFF
   shift
   if ${with_tests:-false}; then tests=ON; fi
   if [ ! -e "$root/build/$preset/build.ninja" ] ||
+    { ${with_web:-false} && [ "$preset" = release ] && ! grep -q web_page "$root/build/$preset/build.ninja"; } ||
     { [ $tests = ON ] && ! grep -q '^TROCAR_TESTS:BOOL=ON' "$root/build/$preset/CMakeCache.txt"; }; then
     (cd "$root" && cmake --preset "$preset" -DTROCAR_TESTS=$tests >"$root/build-$preset.log" 2>&1) || {
       cat "$root/build-$preset.log" >&2

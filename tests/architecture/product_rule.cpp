@@ -11,7 +11,10 @@ constexpr std::array kProduct{"common/",
                               "server/organs/",
                               "server/tissue/",
                               "server/session/",
+                              "server/app/config/",
                               "server/app/server/",
+                              "server/app/web/",
+                              "server/web/",
                               "server/app/journal/",
                               "server/app/impair/"};
 constexpr std::array kApart{"server/papers/", "server/lab/"};

@@ -21,10 +21,12 @@ const std::set<std::string> kProtobufFolders{"proto",
                                              "server/session/participants",
                                              "server/session/replication",
                                              "server/session/recording",
+                                             "server/web/bridge",
                                              "server/papers/dogan",
                                              "client/net",
                                              "client/replica",
-                                             "client/replay"};
+                                             "client/replay",
+                                             "client/web/wasm"};
 const std::set<std::string> kGraphicsFolders{"client/render", "client/ui", "client/app"};
 bool is_library_code(const SourceFile& file) {
   return file.path.starts_with("common/") || file.path.starts_with("server/") ||

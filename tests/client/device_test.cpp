@@ -6,7 +6,7 @@
 
 #include "client/device/mouse_tool.h"
 #include "client/render/camera.h"
-#include "client/render/smooth_surface.h"
+#include "client/shape/smooth_surface.h"
 #include "tests/client/synthetic_source.h"
 #include "tests/support/surface_edits.h"
 
@@ -175,7 +175,7 @@ TEST_F(MouseToolTest, NeverLeavesTheSpaceThatTheServerAccepts) {
 
 TEST(SmoothSurface, KeepsTheServersVerticesAndRoundsWhatLiesBetween) {
   const Blob blob;
-  render::SmoothSurface surface;
+  shape::SmoothSurface surface;
   surface.build(blob.positions.size(), blob.triangles, {}, 16 * blob.triangles.size());
   surface.update(blob.positions);
   EXPECT_EQ(surface.triangles().size(), 16 * blob.triangles.size());
@@ -199,14 +199,14 @@ TEST(SmoothSurface, TheRimOfAWoundIsSharpAndHasNoCrack) {
   for (const auto& q : layout.rest_quanta)
     positions.push_back(wire::to_metres(q) +
                         Vec3f{0, 0, static_cast<float>(random.between(-1e-3, 1e-3))});
-  std::vector<render::TriangleCorners> triangles;
+  std::vector<shape::TriangleCorners> triangles;
   for (std::size_t i = 0; i < layout.triangles.size(); ++i) {
     const auto& t = layout.triangles[i];
     triangles.push_back({});
     if (layout.has_triangle(TriangleIndex(i)))
       triangles.back() = {t[0].value, t[1].value, t[2].value};
   }
-  render::SmoothSurface surface;
+  shape::SmoothSurface surface;
   for (const std::size_t budget : {std::size_t{0}, 4 * triangles.size(), 16 * triangles.size()}) {
     surface.build(positions.size(), triangles, layout.is_wound, budget);
     surface.update(positions);
@@ -242,9 +242,9 @@ TEST(SmoothSurface, TheRimOfAWoundIsSharpAndHasNoCrack) {
 TEST(SmoothSurface, MidpointsOfASphereLieNearerToItThanChords) {
   std::vector<Vec3f> octahedron = {{1, 0, 0},  {-1, 0, 0}, {0, 1, 0},
                                    {0, -1, 0}, {0, 0, 1},  {0, 0, -1}};
-  const std::vector<render::TriangleCorners> faces = {{0, 2, 4}, {2, 1, 4}, {1, 3, 4}, {3, 0, 4},
-                                                      {2, 0, 5}, {1, 2, 5}, {3, 1, 5}, {0, 3, 5}};
-  render::SmoothSurface surface;
+  const std::vector<shape::TriangleCorners> faces = {{0, 2, 4}, {2, 1, 4}, {1, 3, 4}, {3, 0, 4},
+                                                     {2, 0, 5}, {1, 2, 5}, {3, 1, 5}, {0, 3, 5}};
+  shape::SmoothSurface surface;
   surface.build(6, faces, {}, 32);
   surface.update(octahedron);
   ASSERT_EQ(surface.vertex_count(), 18u);

@@ -462,6 +462,25 @@ TEST_F(ReplicaTest, KeepsWhoIsAway) {
   EXPECT_TRUE(replica_.participants()[0].is_away);
 }
 
+TEST_F(ReplicaTest, APointerStaysAsLongAsThereIsNewsOfIt) {
+  proto::Envelope message;
+  message.mutable_point_event()->set_participant(17);
+  message.mutable_point_event()->mutable_position_m()->set_y(0.02f);
+  constexpr std::uint64_t kNow = 5'000'000'000;
+  replica_.on_message(message, kNow, 20);
+  replica_.on_message(message, kNow + 1, 20);
+  ASSERT_EQ(replica_.pointers(kNow + 2).size(), 1u);
+  EXPECT_EQ(replica_.pointers(kNow + 2)[0].participant.value, 17);
+  EXPECT_FLOAT_EQ(replica_.pointers(kNow + 2)[0].position_m.y, 0.02f);
+  EXPECT_TRUE(replica_.pointers(kNow + 1 + kPointerNs).empty());
+  message.mutable_point_event()->clear_position_m();
+  replica_.on_message(message, kNow + 2, 20);
+  EXPECT_TRUE(replica_.pointers(kNow + 2).empty());
+  message.mutable_point_event()->set_participant(kMaxParticipants);
+  replica_.on_message(message, kNow + 3, 20);
+  EXPECT_FALSE(replica_.fault().ok());
+}
+
 TEST_F(ReplicaTest, KeepsWhatTheServerSaysOfItsRecording) {
   start();
   EXPECT_EQ(replica_.recording().status, wire::RecordingStatus::Unknown);

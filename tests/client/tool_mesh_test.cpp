@@ -1,11 +1,11 @@
-#include "client/render/tool_mesh.h"
+#include "client/shape/tool_mesh.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 
-namespace trocar::render {
+namespace trocar::shape {
 namespace {
 
 // How far p is from the surface of the solid that the simulation uses for a blade.
@@ -52,4 +52,4 @@ TEST(ToolMesh, AGhostReachesFromTheToolToTheHand) {
 }
 
 }  // namespace
-}  // namespace trocar::render
+}  // namespace trocar::shape

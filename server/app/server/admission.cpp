@@ -15,6 +15,7 @@
 
 #include "common/base/log.h"
 #include "common/secure/certificate.h"
+#include "common/secure/kept_identity.h"
 #include "common/secure/loopback.h"
 #include "common/secure/private_files.h"
 
@@ -65,25 +66,6 @@ std::string public_host(const std::string& listens_at) {
   }
   ::freeifaddrs(all);
   return found;
-}
-
-Result<secure::Identity> read_or_make_identity(const fs::path& state) {
-  const auto certificate_file = state / "server.crt", key_file = state / "server.key";
-  const secure::FolderLock lock(state);
-  if (!fs::exists(certificate_file) || !fs::exists(key_file)) {
-    auto made = secure::make_identity();
-    if (!made) return made.error();
-    Status written = secure::write_private_file(key_file, made->key_pem);
-    if (written) written = secure::write_private_file(certificate_file, made->certificate_pem);
-    if (!written) return written.error();
-    log::info("made a certificate: {}", certificate_file.string());
-    return made;
-  }
-  auto certificate = secure::read_private_file(certificate_file);
-  if (!certificate) return certificate.error();
-  auto key = secure::read_private_file(key_file);
-  if (!key) return key.error();
-  return secure::Identity{std::move(*certificate), std::move(*key)};
 }
 
 std::int64_t expiry(const AccessOptions& options) {
@@ -161,7 +143,7 @@ Status Admission::read_identity() {
   secure::Identity identity;
   std::string name = (state_ / "server.crt").string();
   if (options_.certificate_file.empty()) {
-    auto own = read_or_make_identity(state_);
+    auto own = secure::read_or_make_identity(state_, "server");
     if (!own) return own.error();
     identity = std::move(*own);
   } else {

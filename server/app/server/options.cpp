@@ -10,13 +10,14 @@
 #include "common/base/version.h"
 #include "common/base/workers.h"
 #include "common/discovery/notice.h"
-#include "server/app/server/config_file.h"
+#include "server/app/config/config_file.h"
 #include "server/app/server/journal_sink.h"
 #include "server/tissue/step/simulation.h"
 
 namespace trocar::app {
 namespace {
 
+constexpr const char* kExampleFile = "deploy/trocar-server.toml.example";
 constexpr const char* kExamples = R"(
 Examples:
   trocar-server
@@ -378,7 +379,8 @@ Result<std::optional<ServerOptions>> parse_command_line(int argc, char** argv) {
   const CheckOption check = [](const std::string& key, const std::string& text) {
     return CommandLine().check(key, text);
   };
-  line.app().config_formatter(std::make_shared<ConfigReader>(line.app(), check, options.origins));
+  line.app().config_formatter(
+      std::make_shared<ConfigReader>(line.app(), check, options.origins, kExampleFile));
   const auto usage = [&options](const std::string& message) {
     return Error{ErrorCode::Usage, options.origins.placed(message)};
   };

@@ -6,9 +6,9 @@
 #include <string>
 
 #include "common/base/result.h"
+#include "server/app/config/option_origins.h"
 #include "server/app/server/access_options.h"
 #include "server/app/server/limit_options.h"
-#include "server/app/server/option_origins.h"
 #include "server/tissue/step/tick_report.h"
 
 namespace trocar::app {

@@ -213,6 +213,14 @@ wire::SharedBytes encode_claim_event(const hands::ClaimEvent& event,
   return wire::encode_envelope(envelope);
 }
 
+wire::SharedBytes encode_point(ParticipantSlot participant, const proto::PointRequest& request) {
+  proto::Envelope envelope;
+  envelope.mutable_point_event()->set_participant(participant.value);
+  if (request.has_position_m())
+    *envelope.mutable_point_event()->mutable_position_m() = request.position_m();
+  return wire::encode_envelope(envelope);
+}
+
 namespace {
 
 wire::SharedBytes encode_mark_event(const step::MarkEvent& event, const char* text) {

@@ -22,6 +22,7 @@ namespace trocar::proto {
 class ClaimEvent;
 class FrameState;
 class Participants;
+class PointRequest;
 class SolverChange;
 }  // namespace trocar::proto
 
@@ -50,6 +51,8 @@ std::string encode_frame_state_body(const step::PublishedFrame& frame);
 wire::SharedBytes encode_claim_event(const hands::ClaimEvent& event,
                                      const participants::Roster& roster);
 wire::SharedBytes encode_mark_event(const step::MarkEvent& event);
+// Says where `participant` points, or that he does no more.
+wire::SharedBytes encode_point(ParticipantSlot participant, const proto::PointRequest& request);
 // To who asked too soon after another request; nothing has been done.
 wire::SharedBytes encode_early_mark(hands::MarkAction action, Tick tick);
 wire::SharedBytes encode_ghost(const ghost::GhostReport& report);

@@ -221,6 +221,8 @@ std::optional<Replicator::Ending> Replicator::handle_message(Client& client, Byt
       return handle_ack(client, envelope.frame_ack().frame(), envelope.frame_ack().surface_crc());
     case proto::Envelope::kMarkRequest:
       return handle_mark(client, envelope.mark_request().action());
+    case proto::Envelope::kPointRequest:
+      return handle_point(client, envelope.point_request());
     case proto::Envelope::kGhostRequest:
       handle_ghost_request(client, envelope.ghost_request().is_wanted());
       return std::nullopt;

@@ -55,6 +55,7 @@ class Envelope;
 class ClientDatagram;
 class HandReport;
 class Hello;
+class PointRequest;
 class ToolSample;
 }  // namespace trocar::proto
 
@@ -144,6 +145,7 @@ class Replicator final : public net::ConnectionHandler {
   std::optional<Ending> handle_hand_report(Client& client, const proto::HandReport& report);
   std::optional<Ending> handle_mark(Client& client, int action);
   void handle_ghost_request(Client& client, bool is_wanted);
+  std::optional<Ending> handle_point(Client& client, const proto::PointRequest& request);
   std::optional<Ending> handle_ack(Client& client, Frame frame, std::uint32_t crc);
   // Ends the session of who sends too much.
   std::optional<Ending> check_rate(Client& client, std::size_t bytes);

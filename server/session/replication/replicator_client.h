@@ -25,6 +25,7 @@ struct Replicator::Client {
   FrameFeed feed;
   bool wants_ghost = false;
   bool has_sent_datagrams = false;
+  std::uint64_t pointed_ns = 0;  // when it pointed last; 0: it does not
   std::array<std::optional<std::uint32_t>, kToolsPerHand> last_sequence;
   Allowance messages, bytes, hand_moments;  // that it may send
 };

@@ -70,6 +70,16 @@ Result<HelloRequest> check_hello(const proto::Hello& hello, EndReason& reason) {
   return request;
 }
 
+Status check_place(const proto::Vec3& place) {
+  const Vec3f position{place.x(), place.y(), place.z()};
+  if (!is_finite(position)) return Error{ErrorCode::BadMessage, "not finite"};
+  // Compared as |p|^2 in double: a float would overflow for large coordinates.
+  const Vec3d wide = to_double(position);
+  if (length_squared(wide) > double{kMaxDistanceFromOriginM} * kMaxDistanceFromOriginM)
+    return Error{ErrorCode::BadMessage, "farther than 2 m from the origin"};
+  return {};
+}
+
 Result<CheckedSample> check_tool_sample(const proto::ToolSample& sample, std::size_t tool_count) {
   if (sample.tool() >= tool_count)
     return bad("ToolSample.tool: " + std::to_string(sample.tool()) + ", you have " +
@@ -79,11 +89,8 @@ Result<CheckedSample> check_tool_sample(const proto::ToolSample& sample, std::si
   const auto& p = sample.position_m();
   const auto& q = sample.orientation();
   const Vec3f position{p.x(), p.y(), p.z()};
-  if (!is_finite(position)) return bad("ToolSample.position_m: not finite");
-  // Compared as |p|^2 in double: a float would overflow for large coordinates.
-  const Vec3d wide = to_double(position);
-  if (length_squared(wide) > double{kMaxDistanceFromOriginM} * kMaxDistanceFromOriginM)
-    return bad("ToolSample.position_m: farther than 2 m from the origin");
+  if (const auto placed = check_place(p); !placed)
+    return bad("ToolSample.position_m: " + placed.error().message);
   const Quatf orientation{q.x(), q.y(), q.z(), q.w()};
   // Not finite fails here too: every comparison with NaN is false.
   if (!(std::abs(norm(orientation) - 1.0f) <= kMaxQuaternionError))

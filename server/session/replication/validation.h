@@ -17,6 +17,7 @@ namespace trocar::proto {
 class HandReport;
 class Hello;
 class ToolSample;
+class Vec3;
 }  // namespace trocar::proto
 
 namespace trocar::replication {
@@ -67,6 +68,9 @@ struct CheckedSample {
   std::uint64_t client_time_us = 0;
 };
 Result<CheckedSample> check_tool_sample(const proto::ToolSample& sample, std::size_t tool_count);
+
+// An error if it is not finite, or beyond kMaxDistanceFromOriginM.
+Status check_place(const proto::Vec3& place);
 
 Result<wire::HandReport> check_hand_report(const proto::HandReport& report, std::size_t tool_count);
 

@@ -1,11 +1,11 @@
-#include "client/render/tool_mesh.h"
+#include "client/shape/tool_mesh.h"
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <span>
 
-namespace trocar::render {
+namespace trocar::shape {
 namespace {
 
 using Material = std::array<std::uint8_t, 4>;
@@ -76,6 +76,12 @@ Colour colour_of_slot(int slot) {
                                                        {200, 90, 160},
                                                        {200, 200, 210},
                                                        {190, 150, 110}}};
+  return kColours[static_cast<std::size_t>(slot) % kColours.size()];
+}
+
+Colour colour_of_pointer(int slot) {
+  static constexpr std::array<Colour, 4> kColours = {
+      {{255, 255, 255}, {255, 240, 120}, {150, 255, 220}, {255, 190, 240}}};
   return kColours[static_cast<std::size_t>(slot) % kColours.size()];
 }
 
@@ -222,4 +228,4 @@ MeshVertices make_arrow(float length, float radius, Colour colour) {
   return out;
 }
 
-}  // namespace trocar::render
+}  // namespace trocar::shape

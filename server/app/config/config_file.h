@@ -1,6 +1,6 @@
 #pragma once
 
-// The configuration file of trocar-server (--config): TOML whose keys are the long options of the
+// The configuration file of a program (--config): TOML whose keys are the long options of the
 // command line, without their dashes. CLI11 gives each value to its option as if it had been typed,
 // unless the command line has that option, too. CLI11's own reader takes anything for TOML, so that
 // toml++ reads the file here.
@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "common/base/result.h"
-#include "server/app/server/option_origins.h"
+#include "server/app/config/option_origins.h"
 
 namespace trocar::app {
 
@@ -22,9 +22,9 @@ using CheckOption = std::function<Status(const std::string& key, const std::stri
 // those that `check` refuses, each with file, line and key.
 class ConfigReader : public CLI::ConfigTOML {
  public:
-  // `app` and `origins` outlive this.
-  ConfigReader(const CLI::App& app, CheckOption check, OptionOrigins& origins)
-      : app_(app), check_(std::move(check)), origins_(origins) {}
+  // `app` and `origins` outlive this. `example`: a file that errors point at.
+  ConfigReader(const CLI::App& app, CheckOption check, OptionOrigins& origins, const char* example)
+      : app_(app), check_(std::move(check)), origins_(origins), example_(example) {}
 
   // Throws CLI::ConfigError, as CLI11 wants it.
   std::vector<CLI::ConfigItem> from_config(std::istream& input) const override;
@@ -35,6 +35,7 @@ class ConfigReader : public CLI::ConfigTOML {
   const CLI::App& app_;
   const CheckOption check_;
   OptionOrigins& origins_;
+  const char* const example_;
 };
 
 }  // namespace trocar::app

@@ -1,9 +1,9 @@
-#include "client/render/noise.h"
+#include "client/shape/noise.h"
 
 #include <algorithm>
 #include <cmath>
 
-namespace trocar::render {
+namespace trocar::shape {
 namespace {
 
 float lattice(int x, int y, int z, int period, std::uint32_t seed) {
@@ -72,4 +72,4 @@ std::vector<std::uint8_t> make_tissue_noise(int size) {
   return texels;
 }
 
-}  // namespace trocar::render
+}  // namespace trocar::shape

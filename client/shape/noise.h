@@ -6,9 +6,9 @@
 #include <cstdint>
 #include <vector>
 
-namespace trocar::render {
+namespace trocar::shape {
 
 // size^3 RGBA8 texels: slope in rgb (0.5 = flat), height in a. `size` is a power of two >= 16.
 std::vector<std::uint8_t> make_tissue_noise(int size);
 
-}  // namespace trocar::render
+}  // namespace trocar::shape

@@ -1,4 +1,4 @@
-#include "server/app/server/option_origins.h"
+#include "server/app/config/option_origins.h"
 
 #include <fmt/format.h>
 

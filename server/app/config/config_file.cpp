@@ -1,4 +1,4 @@
-#include "server/app/server/config_file.h"
+#include "server/app/config/config_file.h"
 
 #include <fmt/format.h>
 
@@ -12,7 +12,6 @@ namespace trocar::app {
 namespace {
 
 constexpr std::size_t kMostBytes = 1u << 20;
-constexpr const char* kExample = "deploy/trocar-server.toml.example";
 
 // The value as one would type it; nothing if it has no such form.
 std::optional<std::string> typed(const toml::node& node) {
@@ -37,8 +36,7 @@ std::string read_key(const CLI::App& app, const CheckOption& check, const std::s
   };
   const auto* option = app.get_option_no_throw("--" + key);
   if (option == nullptr)
-    return fail(
-        "is unknown, the keys are the options of trocar-server --help without their dashes");
+    return fail("is unknown, the keys are the options of --help without their dashes");
   if (!option->get_configurable()) return fail("belongs on the command line, take it out");
   if (is_flag(*option) && !node.is_boolean())
     return fail("is not true or false, write one of them");
@@ -65,7 +63,7 @@ std::vector<CLI::ConfigItem> ConfigReader::from_config(std::istream& input) cons
 Result<std::vector<CLI::ConfigItem>> ConfigReader::read(const std::string& text,
                                                         const std::string& file) const {
   tool::Document document(file);
-  const auto table = tool::parse_toml(document, text, file, kMostBytes, "configuration", kExample);
+  const auto table = tool::parse_toml(document, text, file, kMostBytes, "configuration", example_);
   std::vector<CLI::ConfigItem> values;
   origins_.read_from(file);
   if (table)

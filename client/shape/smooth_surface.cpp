@@ -1,9 +1,9 @@
-#include "client/render/smooth_surface.h"
+#include "client/shape/smooth_surface.h"
 
 #include <algorithm>
 #include <bit>
 
-namespace trocar::render {
+namespace trocar::shape {
 
 void compute_normals(std::span<const Vec3f> positions, std::span<const TriangleCorners> triangles,
                      std::vector<Vec3f>& normals) {
@@ -131,4 +131,4 @@ void SmoothSurface::update(std::span<const Vec3f> coarse_positions) {
   }
 }
 
-}  // namespace trocar::render
+}  // namespace trocar::shape

@@ -21,7 +21,7 @@
 
 #include "common/math/vec3.h"
 
-namespace trocar::render {
+namespace trocar::shape {
 
 using TriangleCorners = std::array<std::uint32_t, 3>;
 
@@ -100,4 +100,4 @@ class SmoothSurface {
   std::vector<Vec3f> positions_, normals_;
 };
 
-}  // namespace trocar::render
+}  // namespace trocar::shape

@@ -10,13 +10,15 @@
 #include "common/math/vec3.h"
 #include "common/tool/tool.h"
 
-namespace trocar::render {
+namespace trocar::shape {
 
 struct Colour {
   std::uint8_t r = 255, g = 255, b = 255;
 };
 // Sixteen well-separated colours, one per participant slot with tools.
 Colour colour_of_slot(int slot);
+// Bright ones that no hand has, for who points.
+Colour colour_of_pointer(int slot);
 // One per merged region, different from each other for neighbours in number.
 Colour colour_of_region(int region);
 
@@ -40,4 +42,4 @@ MeshVertices make_ghost(float length, Colour colour);
 // Along +z from the origin, `length` long including its head.
 MeshVertices make_arrow(float length, float radius, Colour colour);
 
-}  // namespace trocar::render
+}  // namespace trocar::shape

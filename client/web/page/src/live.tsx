@@ -1,0 +1,118 @@
+// A session that runs: watch it, and as instructor mark the organ and return it.
+
+import type { JSX } from 'preact';
+import { useEffect, useMemo, useRef, useState } from 'preact/hooks';
+import { MarkAction, RecordingStatus, type Envelope, type Participant, type Participants } from './gen/proto/wire_pb';
+import { Forces } from './forces';
+import type { Link } from './link';
+import { Events, ForcePlot, People } from './panels';
+import { changesOf, kindOf, type EventKind, type RecordedEvent } from './recording';
+import type { Replica } from './replica';
+import type { Picture } from './scene';
+import { Session } from './session';
+import { clock, forceOf, guideOf, Stage } from './stage';
+
+const kPanelMs = 100, kShownTicks = 30_000, kMostEvents = 500;
+
+export function Live(props: { link: Link; replica: Replica; onEnd(why: string): void }): JSX.Element {
+  const { replica } = props;
+  const [, redraw] = useState(0), [follows, setFollows] = useState<number | null>(null), [asks, setAsks] = useState<MarkAction | null>(null);
+  const people = useRef<Participant[]>([]), list = useRef<Participants | null>(null), events = useRef<RecordedEvent[]>([]);
+  const forces = useMemo(() => new Forces(), []), own = useRef<number | null>(null), recording = useRef(''), crc = useRef('');
+  const picture = useRef<Picture | null>(null);
+  const guide = useMemo(() => guideOf(() => people.current, slot => replica.slotColour(slot)), []);
+
+  const session = useMemo(() => {
+    const note = (tick: number, kind: EventKind, text: string): void => {
+      if (text === '') return;
+      const last = events.current.at(-1);
+      if (last?.text === text && kind === 'refusal') return; // a refused grasp is tried again and again
+      events.current.push({ tick, kind, text });
+      if (events.current.length > kMostEvents) events.current.shift();
+    };
+    const onMessage = (envelope: Envelope, tick: number): void => {
+      const { case: kind, value } = envelope.message;
+      if (kind === 'welcome') own.current = value.participant;
+      if (kind === 'participants') {
+        for (const text of changesOf(list.current, value)) note(tick, 'people', text);
+        list.current = value;
+        people.current = [...value.participant].sort((a, b) => a.slot - b.slot);
+      }
+      if (kind === 'claimEvent') note(Number(value.tick), kindOf(value.outcome), value.text);
+      if (kind === 'markEvent') note(Number(value.tick), value.isDone ? 'cut' : 'refusal', value.text);
+      if (kind === 'recordingState') {
+        const isWhole = value.status === RecordingStatus.RECORDING_WHOLE || value.status === RecordingStatus.RECORDING_OFF;
+        recording.current = isWhole ? '' : value.text;
+      }
+      if (kind === 'barrier') crc.current = replica.ownCrc === value.surfaceCrc >>> 0 ? 'same' : 'other';
+    };
+    return new Session(props.link, replica, { onMessage, onChange: () => redraw(n => n + 1) });
+  }, []);
+
+  useEffect(() => {
+    const timer = window.setInterval(() => {
+      for (const tool of replica.tools()) forces.add(replica.newestTick, tool.slot >> 1, forceOf(tool));
+      forces.forget(replica.newestTick - 2 * kShownTicks);
+      redraw(n => n + 1);
+    }, kPanelMs);
+    return () => {
+      window.clearInterval(timer);
+      session.leave();
+    };
+  }, []);
+  useEffect(() => { if (session.state === 'ended') props.onEnd(session.why); }, [session.state]);
+  // Tests and curious people read figures here.
+  useEffect(() => {
+    Object.assign(window, { trocar: { replica, session, picture: () => picture.current, barrier: () => crc.current } });
+  }, []);
+
+  const now = Math.max(0, replica.newestTick), age = session.shownAgeMs;
+  const isOld = session.state === 'away' || (age !== null && age > 1000), isLate = age !== null && age > session.oldAfterMs;
+  const mayMark = props.link.role === 'instructor' && session.state === 'live';
+  const confirm = (): void => {
+    if (asks !== null) session.mark(asks === MarkAction.MARK_RETURN);
+    setAsks(null);
+  };
+  const onKey = (event: KeyboardEvent): void => {
+    if (event.key === 'Escape') setAsks(null);
+  };
+  return (
+    <div class="layout" onKeyDown={onKey}>
+      <header>
+        <h1>Trocar</h1>
+        <span class="time">{clock(now / 1000)}</span>
+        <span class={`age${isOld ? ' old' : isLate ? ' late' : ''}`} role="status" title="How old the picture is that you see">
+          {session.state === 'joining' ? 'joining' : session.state === 'away' ? `old since ${Math.round((performance.now() - session.awaySince) / 1000)} s` : age === null ? 'live' : `${Math.max(0, Math.round(age))} ms old`}
+        </span>
+        {recording.current && <span class="age late">{recording.current}</span>}
+        <span class="space" />
+        {mayMark && <button onClick={() => setAsks(MarkAction.MARK_SET)}>Mark organ</button>}
+        {mayMark && <button onClick={() => setAsks(MarkAction.MARK_RETURN)}>Return to mark</button>}
+        <button onClick={session.leave}>Leave</button>
+      </header>
+      <main>
+        <Stage replica={replica} guide={guide} isOld={isOld} follows={follows} people={people.current} onFollow={setFollows} onPicture={() => undefined} onReady={p => { picture.current = p; }} {...(mayMark ? { onPoint: place => session.point(place) } : {})}>
+          {session.state === 'away' && <p class="banner" role="alert">{session.why} The picture is old; the page comes back by itself.</p>}
+          {session.state === 'joining' && <p class="banner">Joining the session</p>}
+          {session.state === 'live' && replica.frames === 0 && <p class="banner">Waiting for the organ</p>}
+        </Stage>
+        {asks !== null && (
+          <div class="ask" role="alertdialog" aria-label="Are you sure?">
+            <p>{asks === MarkAction.MARK_RETURN ? 'Return the organ to the mark, for everybody? Cuts made since then are undone.' : 'Mark the organ as it is now? An earlier mark is replaced.'}</p>
+            <button class="main" onClick={confirm} ref={el => el?.focus()}>{asks === MarkAction.MARK_RETURN ? 'Return' : 'Mark'}</button>
+            <button onClick={() => setAsks(null)}>Cancel</button>
+          </div>
+        )}
+      </main>
+      <aside>
+        <People people={people.current} tools={replica.tools()} own={own.current} colourOf={slot => replica.slotColour(slot)} follows={follows} onFollow={setFollows} />
+        <section aria-labelledby="forces">
+          <h2 id="forces">Forces <small>last 30 s</small></h2>
+          <ForcePlot forces={forces} from={Math.max(0, now - kShownTicks)} to={now} now={now} height={130}
+            nameOf={slot => people.current.find(p => p.slot === slot)?.name ?? `hand ${slot + 1}`} colourOf={slot => replica.slotColour(slot)} />
+        </section>
+        <Events events={events.current} now={now} empty="Nothing has happened yet." />
+      </aside>
+    </div>
+  );
+}

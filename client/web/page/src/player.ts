@@ -1,0 +1,119 @@
+// Plays a recording into the replica: a clock of ticks, and what falls due.
+
+import { fromBinary } from '@bufbuild/protobuf';
+import { ParticipantsSchema, type Participants } from './gen/proto/wire_pb';
+import { kDamaged, type Item, type Recording } from './recording';
+import type { Replica } from './replica';
+
+export const kSpeeds = [0.1, 0.25, 0.5, 1, 2, 4, 8, 16];
+const kAheadItems = 400, kParticipantsField = 19;
+
+export class Player {
+  tick: number;
+  isPlaying = false;
+  isSeeking = false;
+  speed = 1;
+  people: Participants | null = null;
+  fault = ''; // one line for people
+  seekMs = 0; // that the last seek took
+  private waiting: Item[] = [];
+  private stream: AsyncGenerator<Item> | null = null;
+  private isReading = false;
+  private hasEnded = false;
+  private generation = 0;
+  private wanted: number | null = null;
+  private lastMs = performance.now();
+
+  constructor(readonly recording: Recording, private readonly replica: Replica, private readonly onChange: () => void) {
+    this.tick = recording.firstTick;
+  }
+
+  play(): void {
+    if (this.tick >= this.recording.lastTick - 1) void this.seek(this.recording.firstTick);
+    this.isPlaying = true;
+    this.onChange();
+  }
+  pause(): void {
+    this.isPlaying = false;
+    this.onChange();
+  }
+
+  // Shows the last frame at or before `tick`. While one seek runs, only the newest wish waits.
+  async seek(tick: number): Promise<void> {
+    this.wanted = Math.max(this.recording.firstTick, Math.min(this.recording.lastTick, tick));
+    this.tick = this.wanted;
+    if (this.isSeeking) return;
+    this.isSeeking = true;
+    while (this.wanted !== null) {
+      const to: number = this.wanted, begin = performance.now();
+      this.wanted = null;
+      this.generation++;
+      this.stream = null;
+      this.waiting = [];
+      this.hasEnded = false;
+      try {
+        const items = await this.recording.seek(to);
+        for (const item of items) this.feed(item);
+        this.stream = this.recording.follow(to);
+      } catch (error) {
+        this.fail(error);
+      }
+      this.seekMs = performance.now() - begin;
+    }
+    this.isSeeking = false;
+    this.lastMs = performance.now();
+    this.onChange();
+  }
+
+  // Once per picture.
+  advance(nowMs: number): void {
+    const passed = Math.min(250, nowMs - this.lastMs);
+    this.lastMs = nowMs;
+    if (this.isSeeking || this.stream === null) return;
+    void this.readAhead();
+    if (!this.isPlaying) return;
+    const next = this.tick + passed * this.speed;
+    // What has not been loaded yet is waited for.
+    const loaded = this.hasEnded ? this.recording.lastTick : this.waiting.at(-1)?.tick ?? this.tick;
+    this.tick = Math.min(next, Math.max(this.tick, loaded));
+    let due = 0;
+    while (due < this.waiting.length && (this.waiting[due]?.tick ?? Infinity) <= this.tick) due++;
+    try {
+      for (const item of this.waiting.splice(0, due)) this.feed(item);
+    } catch (error) {
+      this.fail(error);
+    }
+    if (this.tick >= this.recording.lastTick) this.pause();
+  }
+
+  private feed(item: Item): void {
+    if (item.field === kParticipantsField) this.people = fromBinary(ParticipantsSchema, item.data);
+    if (item.field !== 0) this.replica.receiveBare(item.field, item.data, performance.now());
+    this.replica.takeOutbox(); // a recording answers nobody
+  }
+  private async readAhead(): Promise<void> {
+    if (this.isReading || this.hasEnded || this.waiting.length >= kAheadItems) return;
+    this.isReading = true;
+    const { generation, stream } = this;
+    try {
+      while (stream !== null && generation === this.generation && this.waiting.length < kAheadItems) {
+        const next = await stream.next();
+        if (generation !== this.generation) break;
+        if (next.done) {
+          this.hasEnded = true;
+          break;
+        }
+        this.waiting.push(next.value);
+      }
+    } catch (error) {
+      this.fail(error);
+    }
+    this.isReading = false;
+  }
+  private fail(error: unknown): void {
+    this.isPlaying = false;
+    this.fault = error instanceof Error && / recording/i.test(error.message) ? error.message : kDamaged;
+    this.stream = null;
+    this.onChange();
+  }
+}

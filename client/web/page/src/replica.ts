@@ -1,0 +1,197 @@
+// The native client's replica as a WebAssembly module (client/web/wasm): messages go in, arrays to
+// draw come out. Views of the module's memory hold until the next call of any function here.
+
+interface Exports {
+  memory: WebAssembly.Memory;
+  _initialize(): void;
+  restart(): void;
+  input(bytes: number): number;
+  receive(bytes: number, nowMs: number): number;
+  receive_bare(field: number, bytes: number, nowMs: number): number;
+  error(): number;
+  outbox(): number;
+  outbox_size(): number;
+  outbox_clear(): void;
+  frames(): number;
+  mismatches(): number;
+  surface_crc(): number;
+  own_crc(): number;
+  is_in_step(): number;
+  newest_tick(): number;
+  newest_frame(): number;
+  newest_server_us(): number;
+  shown_tick(): number;
+  update(nowMs: number, triangleBudget: number, overlay: number): number;
+  geometry_version(): number;
+  vertices(): number;
+  triangles(): number;
+  triangles_at(): number;
+  positions_at(): number;
+  normals_at(): number;
+  rest_at(): number;
+  overlay_at(): number;
+  tools(): number;
+  tools_at(): number;
+  pointers(): number;
+  pointers_at(): number;
+  pointer_colour(slot: number): number;
+  make_tool(radiusM: number, lengthM: number, halfWidthM: number, colour: number): number;
+  make_jaw(radiusM: number, lengthM: number): number;
+  make_arrow(lengthM: number, radiusM: number, colour: number): number;
+  mesh_vertices(): number;
+  jaw_length(radiusM: number): number;
+  slot_colour(slot: number): number;
+  noise(size: number): number;
+}
+
+export type Vec3 = [number, number, number];
+export const enum Overlay { None = 0, Regions = 1, Holds = 2 }
+export const enum Verb { None = 0, Push = 1, Grasp = 2, Cut = 3 }
+
+export interface Tool {
+  slot: number;
+  verb: Verb;
+  hasClaim: boolean;
+  isSilent: boolean;
+  isInside: boolean;
+  contactNodes: number;
+  tip: Vec3; // m, where the tissue lets it be
+  orientation: [number, number, number, number];
+  hand: Vec3; // m, where the hand has it
+  forceN: Vec3; // of the tissue on the tool
+  torqueNm: Vec3;
+  penetrationM: number;
+}
+
+export interface Pointer { participant: number; position: Vec3 } // slot; m
+
+export interface Mesh { positions: Float32Array; normals: Float32Array; materials: Uint8Array }
+
+const kToolFloats = 23, kMeshBytes = 28;
+const kDiverged = 'the module ended: reload the page';
+
+export class Replica {
+  private constructor(private readonly e: Exports) {}
+
+  // `source`: the module's bytes, or the answer that brings them.
+  static async load(source: BufferSource | Promise<Response>): Promise<Replica> {
+    const wasi = new Proxy({}, {
+      get: (_, name) => () => {
+        if (name === 'proc_exit') throw new Error(kDiverged);
+        return 52; // there is no such thing here
+      },
+    });
+    const imports = { wasi_snapshot_preview1: wasi as WebAssembly.ModuleImports };
+    const { instance } = source instanceof Promise
+      ? await WebAssembly.instantiateStreaming(source, imports)
+      : await WebAssembly.instantiate(source, imports);
+    const e = instance.exports as unknown as Exports;
+    e._initialize();
+    e.restart();
+    return new Replica(e);
+  }
+
+  restart(): void { this.e.restart(); }
+
+  // One Envelope. Throws, with a line for people, if it cannot be right.
+  receive(envelope: Uint8Array, nowMs: number): void {
+    this.put(envelope);
+    if (!this.e.receive(envelope.length, nowMs)) throw new Error(this.error());
+  }
+  // A message as a recording has it; `field`: its number in Envelope.
+  receiveBare(field: number, message: Uint8Array, nowMs: number): void {
+    this.put(message);
+    if (!this.e.receive_bare(field, message.length, nowMs)) throw new Error(this.error());
+  }
+  // Envelopes for the server.
+  takeOutbox(): Uint8Array[] {
+    const size = this.e.outbox_size();
+    if (size === 0) return [];
+    const all = new Uint8Array(this.e.memory.buffer, this.e.outbox(), size).slice();
+    this.e.outbox_clear();
+    const view = new DataView(all.buffer), out: Uint8Array[] = [];
+    for (let at = 0; at < size;) {
+      const length = view.getUint32(at, true);
+      out.push(all.subarray(at + 4, at + 4 + length));
+      at += 4 + length;
+    }
+    return out;
+  }
+
+  get frames(): number { return this.e.frames(); }
+  get mismatches(): number { return this.e.mismatches(); }
+  get crc(): number { return this.e.surface_crc() >>> 0; }
+  get ownCrc(): number { return this.e.own_crc() >>> 0; }
+  get isInStep(): boolean { return this.e.is_in_step() !== 0; }
+  get newestTick(): number { return this.e.newest_tick(); }
+  get newestFrame(): number { return this.e.newest_frame(); }
+  get newestServerUs(): number { return this.e.newest_server_us(); }
+  get shownTick(): number { return this.e.shown_tick(); }
+
+  // Computes the picture of this moment; false until there is one.
+  update(nowMs: number, triangleBudget: number, overlay: Overlay): boolean {
+    return this.e.update(nowMs, triangleBudget, overlay) !== 0;
+  }
+  get geometryVersion(): number { return this.e.geometry_version(); }
+  get vertexCount(): number { return this.e.vertices(); }
+  positions(): Float32Array { return this.floats(this.e.positions_at(), this.e.vertices() * 3); }
+  normals(): Float32Array { return this.floats(this.e.normals_at(), this.e.vertices() * 3); }
+  rest(): Float32Array { return this.floats(this.e.rest_at(), this.e.vertices() * 4); }
+  overlay(): Uint8Array { return new Uint8Array(this.e.memory.buffer, this.e.overlay_at(), this.e.vertices() * 4); }
+  triangles(): Uint32Array { return new Uint32Array(this.e.memory.buffer, this.e.triangles_at(), this.e.triangles() * 3); }
+
+  tools(): Tool[] {
+    const count = this.e.tools(), f = this.floats(this.e.tools_at(), count * kToolFloats), out: Tool[] = [];
+    const at = (i: number): number => f[i] ?? 0, three = (i: number): Vec3 => [at(i), at(i + 1), at(i + 2)];
+    for (let i = 0; i < f.length; i += kToolFloats)
+      out.push({
+        slot: at(i), verb: at(i + 1), hasClaim: at(i + 2) > 0, isSilent: at(i + 3) > 0, isInside: at(i + 4) > 0,
+        contactNodes: at(i + 5), tip: three(i + 6), orientation: [at(i + 9), at(i + 10), at(i + 11), at(i + 12)],
+        hand: three(i + 13), forceN: three(i + 16), torqueNm: three(i + 19), penetrationM: at(i + 22),
+      });
+    return out;
+  }
+
+  // Who points where.
+  pointers(): Pointer[] {
+    const count = this.e.pointers(), f = this.floats(this.e.pointers_at(), count * 4);
+    return Array.from({ length: count }, (_, i) => ({ participant: f[i * 4] ?? 0, position: [f[i * 4 + 1] ?? 0, f[i * 4 + 2] ?? 0, f[i * 4 + 3] ?? 0] }));
+  }
+  pointerColour(slot: number): number { return this.e.pointer_colour(slot) >>> 0; }
+
+  makeTool(radiusM: number, lengthM: number, halfWidthM: number, colour: number): Mesh {
+    return this.mesh(this.e.make_tool(radiusM, lengthM, halfWidthM, colour));
+  }
+  makeJaw(radiusM: number, lengthM: number): Mesh { return this.mesh(this.e.make_jaw(radiusM, lengthM)); }
+  makeArrow(lengthM: number, radiusM: number, colour: number): Mesh { return this.mesh(this.e.make_arrow(lengthM, radiusM, colour)); }
+  jawLength(radiusM: number): number { return this.e.jaw_length(radiusM); }
+  // 0xrrggbb, of a participant.
+  slotColour(slot: number): number { return this.e.slot_colour(slot) >>> 0; }
+  noise(size: number): Uint8Array {
+    const at = this.e.noise(size); // first the call: memory that grows takes its views away
+    return new Uint8Array(this.e.memory.buffer, at, size ** 3 * 4).slice();
+  }
+
+  private floats(at: number, count: number): Float32Array { return new Float32Array(this.e.memory.buffer, at, count); }
+  private put(data: Uint8Array): void {
+    const at = this.e.input(data.length);
+    if (at === 0) throw new Error(`a message of ${data.length} bytes is larger than any may be`);
+    new Uint8Array(this.e.memory.buffer, at, data.length).set(data);
+  }
+  private error(): string {
+    const bytes = new Uint8Array(this.e.memory.buffer), at = this.e.error();
+    return new TextDecoder().decode(bytes.slice(at, bytes.indexOf(0, at)));
+  }
+  private mesh(at: number): Mesh {
+    const count = this.e.mesh_vertices(), view = new DataView(this.e.memory.buffer, at, count * kMeshBytes);
+    const out: Mesh = { positions: new Float32Array(count * 3), normals: new Float32Array(count * 3), materials: new Uint8Array(count * 4) };
+    for (let i = 0; i < count; i++)
+      for (let k = 0; k < 3; k++) {
+        out.positions[i * 3 + k] = view.getFloat32(i * kMeshBytes + k * 4, true);
+        out.normals[i * 3 + k] = view.getFloat32(i * kMeshBytes + 12 + k * 4, true);
+      }
+    for (let i = 0; i < count; i++)
+      for (let k = 0; k < 4; k++) out.materials[i * 4 + k] = view.getUint8(i * kMeshBytes + 24 + k);
+    return out;
+  }
+}

@@ -1,0 +1,385 @@
+// The picture: geometry of the module, drawn with the native client's shaders.
+
+import {
+  BufferAttribute, BufferGeometry, ConstantAlphaFactor, CustomBlending, Data3DTexture, DynamicDrawUsage, GLSL3, Group,
+  LinearFilter, Matrix4, Mesh, NormalBlending, OneMinusConstantAlphaFactor, PerspectiveCamera, Quaternion,
+  RawShaderMaterial, Raycaster, RepeatWrapping, Scene, Vector2, Vector3, Vector4, WebGLRenderer, type IUniform,
+} from 'three';
+import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
+import { lightingSource, organFragmentSource, organVertexSource, toolFragmentSource, toolVertexSource } from './gen/shaders';
+import { Overlay, Verb, type Mesh as PlainMesh, type Pointer, type Replica, type Tool, type Vec3 } from './replica';
+
+export interface Shape { radiusM: number; lengthM: number; halfWidthM: number }
+export interface Label { text: string; colour: number }
+// What the picture asks of who shows it.
+export interface Guide {
+  shapeOf(slot: number): Shape; // of a tool
+  labelOf(tool: Tool): Label;
+  pointerLabel(participant: number): string;
+}
+
+const kMetresPerNewton = 0.02, kMostArrow = 0.1, kLeastNewton = 0.05, kShadows = 8;
+const kPointerLength = 0.035, kOpenJaws = 0.34, kHoldingJaws = 0.12, kJawSeconds = 0.08, kNoise = 32;
+const kSlowMs = 45, kJudged = 40; // pictures, before quality is lowered
+
+interface DrawnTool {
+  group: Group;
+  upper: Group | null;
+  lower: Group | null;
+  opening: number;
+  dim: IUniform<number>;
+  arrows: Mesh[];
+  arrowGroup: Group;
+  label: HTMLElement;
+  shape: string; // its figures, to see a change
+}
+
+interface DrawnPointer { group: Group; label: HTMLElement }
+
+export class Picture {
+  readonly camera = new PerspectiveCamera(32.0, 1, 0.02, 6);
+  overlay: Overlay = Overlay.Regions;
+  showsArrows = true;
+  follows: number | null = null; // a participant's slot
+  onLetGo: () => void = () => undefined; // the person moves the view, so that it follows nobody
+  pictures = 0;
+  drawMs = 0; // of the last picture
+  private readonly renderer: WebGLRenderer;
+  private readonly scene = new Scene();
+  private readonly controls: OrbitControls;
+  private readonly organ: Mesh<BufferGeometry, RawShaderMaterial>;
+  private readonly uniforms: Record<string, IUniform>;
+  private readonly tools = new Map<number, DrawnTool>();
+  private readonly pointers = new Map<number, DrawnPointer>();
+  private version = -1;
+  private isFramed = false;
+  private lastMs = 0;
+  private gaps: number[] = [];
+  private quality: number; // 0 best, 1 plain, 2 fewer pixels
+  private head = '';
+  private width = 1;
+  private height = 1;
+
+  constructor(canvas: HTMLCanvasElement, private readonly labels: HTMLElement, private readonly replica: Replica, private readonly guide: Guide) {
+    const gl = canvas.getContext('webgl2', { antialias: !isSlow(), alpha: true, powerPreference: 'high-performance' });
+    if (!gl) throw new Error('This browser cannot draw here: it has no WebGL 2.');
+    this.quality = rendersInSoftware(gl) ? 1 : 0;
+    this.renderer = new WebGLRenderer({ canvas, context: gl });
+    this.renderer.setClearColor(0, 0);
+    this.controls = new OrbitControls(this.camera, canvas);
+    this.controls.enableDamping = false;
+    this.controls.minDistance = 0.04;
+    this.controls.maxDistance = 2.5;
+    this.controls.addEventListener('start', () => {
+      if (this.follows === null) return;
+      this.follows = null;
+      this.onLetGo();
+    });
+    const noise = new Data3DTexture(replica.noise(kNoise), kNoise, kNoise, kNoise);
+    noise.wrapS = noise.wrapT = noise.wrapR = RepeatWrapping;
+    noise.magFilter = noise.minFilter = LinearFilter;
+    noise.needsUpdate = true;
+    const four = (): Vector4[] => Array.from({ length: kShadows }, () => new Vector4());
+    this.uniforms = {
+      clip_from_world: { value: new Matrix4() }, eye: { value: new Vector3() }, key_direction: { value: new Vector3(0, 1, 0) },
+      fill_direction: { value: new Vector3(0, 1, 0) }, noise: { value: noise }, shadow_count: { value: 0 },
+      shadow_tip: { value: four() }, shadow_shaft: { value: four() },
+    };
+    this.organ = new Mesh(new BufferGeometry(), new RawShaderMaterial({ glslVersion: GLSL3, vertexShader: organVertexSource, uniforms: this.uniforms }));
+    this.organ.frustumCulled = false;
+    this.scene.add(this.organ);
+    this.setQuality(this.quality);
+  }
+
+  get isPlain(): boolean { return this.quality > 0; }
+  // As at the beginning.
+  resetView(): void { this.isFramed = false; this.follows = null; }
+  // Turns the view by so many radians, for keys.
+  turn(yaw: number, pitch: number): void {
+    const offset = this.camera.position.clone().sub(this.controls.target), length = offset.length();
+    const to = Math.asin(Math.max(-1, Math.min(1, offset.y / length))) + pitch, around = Math.atan2(offset.x, offset.z) + yaw;
+    const up = Math.max(-1.5, Math.min(1.5, to));
+    offset.set(Math.sin(around) * Math.cos(up), Math.sin(up), Math.cos(around) * Math.cos(up)).multiplyScalar(length);
+    this.camera.position.copy(this.controls.target).add(offset);
+  }
+  zoom(factor: number): void {
+    this.camera.position.sub(this.controls.target).multiplyScalar(factor).add(this.controls.target);
+  }
+  dispose(): void {
+    this.controls.dispose();
+    this.renderer.dispose();
+    for (const drawn of [...this.tools.values(), ...this.pointers.values()]) drawn.label.remove();
+  }
+
+  resize(width: number, height: number): void {
+    this.width = Math.max(1, width);
+    this.height = Math.max(1, height);
+    const ratio = Math.min(2, window.devicePixelRatio || 1) * (this.quality === 2 ? 0.6 : this.quality === 1 ? Math.min(1, 1 / (window.devicePixelRatio || 1)) : 1);
+    this.renderer.setPixelRatio(ratio);
+    this.renderer.setSize(this.width, this.height, false);
+    this.camera.aspect = this.width / this.height;
+    this.camera.updateProjectionMatrix();
+  }
+
+  // Draws this moment; false while there is nothing to draw.
+  draw(nowMs: number): boolean {
+    const begin = performance.now();
+    const seconds = Math.min(0.25, Math.max(0.001, (nowMs - this.lastMs) / 1000));
+    if (!this.replica.update(nowMs, [100_000, 16_000, 8_000][this.quality] ?? 8_000, this.overlay)) return false;
+    this.judge(nowMs - this.lastMs);
+    this.lastMs = nowMs;
+    if (this.replica.geometryVersion !== this.version) this.loadGeometry();
+    this.loadPositions();
+    if (!this.isFramed) this.frame();
+    const tools = this.replica.tools();
+    this.follow(tools, seconds);
+    this.controls.update();
+    this.place(tools, seconds);
+    this.placePointers(this.replica.pointers());
+    this.light();
+    this.renderer.render(this.scene, this.camera);
+    this.placeLabels(tools);
+    this.pictures++;
+    this.drawMs = performance.now() - begin;
+    return true;
+  }
+
+  // Dragging turns the view, unless it points.
+  set turns(value: boolean) { this.controls.enabled = value; }
+
+  // Where a ray through a place of the canvas (0 to 1 from its upper left) meets the surface.
+  pick(x: number, y: number): Vec3 | null {
+    const ray = new Raycaster();
+    ray.setFromCamera(new Vector2(x * 2 - 1, 1 - y * 2), this.camera);
+    this.organ.geometry.computeBoundingSphere();
+    const hit = ray.intersectObject(this.organ, false)[0];
+    return hit ? [hit.point.x, hit.point.y, hit.point.z] : null;
+  }
+
+  private setQuality(quality: number): void {
+    this.quality = quality;
+    this.head = 'precision highp float;\nprecision highp sampler3D;\n' + (quality === 0 ? '#define FINE 1\n' : '');
+    this.organ.material.fragmentShader = this.head + lightingSource + organFragmentSource;
+    this.organ.material.needsUpdate = true;
+    this.resize(this.width, this.height);
+  }
+  // Lowers the quality by itself when pictures take long.
+  private judge(gapMs: number): void {
+    if (gapMs > 500 || document.hidden) return; // it was not the drawing
+    this.gaps.push(gapMs);
+    if (this.gaps.length < kJudged) return;
+    const median = this.gaps.sort((a, b) => a - b)[kJudged >> 1] ?? 0;
+    this.gaps = [];
+    if (median > kSlowMs && this.quality < 2) this.setQuality(this.quality + 1);
+  }
+
+  private frame(): void {
+    const p = this.replica.rest(), low = new Vector3(1e9, 1e9, 1e9), high = new Vector3(-1e9, -1e9, -1e9), at = new Vector3();
+    for (let i = 0; i + 3 < p.length; i += 4) {
+      at.set(p[i] ?? 0, p[i + 1] ?? 0, p[i + 2] ?? 0);
+      low.min(at);
+      high.max(at);
+    }
+    const centre = low.clone().add(high).multiplyScalar(0.5), radius = high.distanceTo(low) / 2;
+    const distance = radius / 0.2867 * 0.9 / Math.min(1, this.camera.aspect * 0.9), pitch = 0.42;
+    this.controls.target.copy(centre);
+    this.camera.position.set(centre.x, centre.y + Math.sin(pitch) * distance, centre.z + Math.cos(pitch) * distance);
+    this.isFramed = true;
+  }
+
+  private follow(tools: Tool[], seconds: number): void {
+    const tool = tools.find(t => t.slot >> 1 === this.follows);
+    if (!tool) return;
+    const wanted = new Vector3(...tool.tip), step = wanted.sub(this.controls.target).multiplyScalar(1 - Math.exp(-seconds / 0.15));
+    this.controls.target.add(step);
+    this.camera.position.add(step);
+  }
+
+  private loadGeometry(): void {
+    const r = this.replica, n = r.vertexCount, g = this.organ.geometry;
+    g.dispose();
+    for (const [name, size] of [['position', 3], ['normal', 3]] as const)
+      g.setAttribute(name, dynamic(new BufferAttribute(new Float32Array(n * size), size)));
+    g.setAttribute('rest', new BufferAttribute(r.rest().slice(), 4));
+    g.setAttribute('overlay', dynamic(new BufferAttribute(new Uint8Array(n * 4), 4, true)));
+    g.setIndex(new BufferAttribute(r.triangles().slice(), 1));
+    this.version = r.geometryVersion;
+  }
+  private loadPositions(): void {
+    const g = this.organ.geometry;
+    for (const [name, values] of [['position', this.replica.positions()], ['normal', this.replica.normals()], ['overlay', this.replica.overlay()]] as const) {
+      const attribute = g.getAttribute(name) as BufferAttribute;
+      attribute.array.set(values);
+      attribute.needsUpdate = true;
+    }
+  }
+
+  private toolMaterial(object: Mesh<BufferGeometry, RawShaderMaterial>, dim: IUniform<number>, glow: number): void {
+    object.material = new RawShaderMaterial({
+      glslVersion: GLSL3, vertexShader: toolVertexSource, fragmentShader: this.head + lightingSource + toolFragmentSource,
+      uniforms: { ...this.uniforms, world_from_model: { value: object.matrixWorld }, glow: { value: glow }, dim },
+    });
+  }
+  private meshOf(plain: PlainMesh, dim: IUniform<number>, glow = 0): Mesh<BufferGeometry, RawShaderMaterial> {
+    const geometry = new BufferGeometry();
+    geometry.setAttribute('position', new BufferAttribute(plain.positions, 3));
+    geometry.setAttribute('normal', new BufferAttribute(plain.normals, 3));
+    geometry.setAttribute('material', new BufferAttribute(plain.materials, 4, true));
+    const mesh = new Mesh<BufferGeometry, RawShaderMaterial>(geometry);
+    mesh.frustumCulled = false;
+    this.toolMaterial(mesh, dim, glow);
+    return mesh;
+  }
+
+  // Two meshes: one that shows faintly through tissue, one where nothing is before it.
+  private arrowGroup(arrow: PlainMesh): { group: Group; meshes: Mesh[] } {
+    const through = this.meshOf(arrow, { value: 1 }, 1), before = this.meshOf(arrow, { value: 1 }, 0.55), group = new Group();
+    Object.assign(through.material, { depthTest: false, depthWrite: false, transparent: true, blending: CustomBlending, blendSrc: ConstantAlphaFactor, blendDst: OneMinusConstantAlphaFactor, blendAlpha: 0.35 });
+    before.material.blending = NormalBlending;
+    before.material.transparent = true; // after what shows through
+    through.renderOrder = 1;
+    before.renderOrder = 2;
+    group.add(through, before);
+    return { group, meshes: [through, before] };
+  }
+
+  private drawnTool(tool: Tool): DrawnTool {
+    const shape = this.guide.shapeOf(tool.slot), text = JSON.stringify(shape), known = this.tools.get(tool.slot);
+    if (known && known.shape === text) return known;
+    if (known) {
+      this.scene.remove(known.group, known.arrowGroup);
+      known.label.remove();
+    }
+    const colour = this.replica.slotColour(tool.slot >> 1), dim: IUniform<number> = { value: 1 }, group = new Group();
+    group.add(this.meshOf(this.replica.makeTool(shape.radiusM, shape.lengthM, shape.halfWidthM, colour), dim));
+    const made: DrawnTool = { group, upper: null, lower: null, opening: 0, dim, arrows: [], arrowGroup: new Group(), label: document.createElement('div'), shape: text };
+    if (shape.halfWidthM === 0) {
+      const hinge = this.replica.jawLength(shape.radiusM), jaw = this.replica.makeJaw(shape.radiusM, shape.lengthM);
+      const hung = (isLower: boolean): Group => {
+        const turned = new Group(), pivot = new Group(), mesh = this.meshOf(jaw, dim);
+        turned.rotation.z = isLower ? Math.PI : 0;
+        pivot.position.z = hinge;
+        mesh.position.z = -hinge;
+        pivot.add(mesh);
+        turned.add(pivot);
+        group.add(turned);
+        return pivot;
+      };
+      made.upper = hung(false);
+      made.lower = hung(true);
+    }
+    const arrow = this.arrowGroup(this.replica.makeArrow(0.02, 0.0016, colour));
+    made.arrows = arrow.meshes;
+    made.arrowGroup = arrow.group;
+    made.label.className = 'label';
+    this.labels.append(made.label);
+    this.scene.add(group, made.arrowGroup);
+    this.tools.set(tool.slot, made);
+    return made;
+  }
+
+  private place(tools: Tool[], seconds: number): void {
+    const shown = new Set(tools.map(t => t.slot));
+    for (const [slot, drawn] of this.tools) drawn.group.visible = drawn.arrowGroup.visible = shown.has(slot);
+    const tips = this.uniforms['shadow_tip']?.value as Vector4[], shafts = this.uniforms['shadow_shaft']?.value as Vector4[];
+    this.uniforms['shadow_count']!.value = Math.min(kShadows, tools.length);
+    tools.forEach((tool, i) => {
+      const drawn = this.drawnTool(tool), shape = this.guide.shapeOf(tool.slot);
+      drawn.group.position.set(...tool.tip);
+      drawn.group.quaternion.set(...tool.orientation);
+      drawn.dim.value = tool.isSilent ? 0.45 : 1;
+      const wanted = tool.verb !== Verb.Grasp ? 0 : tool.hasClaim ? kHoldingJaws : kOpenJaws;
+      drawn.opening += (wanted - drawn.opening) * (1 - Math.exp(-seconds / kJawSeconds));
+      if (drawn.upper) drawn.upper.rotation.x = drawn.opening;
+      if (drawn.lower) drawn.lower.rotation.x = drawn.opening;
+      this.placeArrow(drawn, tool);
+      if (i >= kShadows) return;
+      const along = new Vector3(0, 0, 1).applyQuaternion(drawn.group.quaternion);
+      tips[i]?.set(...tool.tip, shape.radiusM + 0.5 * shape.halfWidthM);
+      shafts[i]?.set(along.x, along.y, along.z, shape.lengthM);
+    });
+  }
+  private placeArrow(drawn: DrawnTool, tool: Tool): void {
+    const force = new Vector3(...tool.forceN), newton = force.length();
+    drawn.arrowGroup.visible = this.showsArrows && newton >= kLeastNewton;
+    if (!drawn.arrowGroup.visible) return;
+    const made = this.replica.makeArrow(Math.min(newton * kMetresPerNewton, kMostArrow), 0.0016, this.replica.slotColour(tool.slot >> 1));
+    for (const mesh of drawn.arrows) {
+      const position = mesh.geometry.getAttribute('position') as BufferAttribute;
+      position.array.set(made.positions);
+      position.needsUpdate = true;
+    }
+    drawn.arrowGroup.position.set(...tool.tip);
+    drawn.arrowGroup.quaternion.copy(new Quaternion().setFromUnitVectors(new Vector3(0, 0, 1), force.normalize()));
+  }
+
+  private placePointers(pointers: Pointer[]): void {
+    const shown = new Map(pointers.map(p => [p.participant, p]));
+    for (const [who, drawn] of this.pointers) drawn.group.visible = !(drawn.label.hidden = !shown.has(who));
+    // From above the place and from before it, as the viewer sees it.
+    const m = this.camera.matrixWorld.elements, along = new Vector3(-m[8], -m[9], -m[10]).multiplyScalar(0.45).sub(new Vector3(m[4], m[5], m[6])).normalize();
+    for (const { participant, position } of pointers) {
+      let drawn = this.pointers.get(participant);
+      if (!drawn) {
+        drawn = { group: this.arrowGroup(this.replica.makeArrow(kPointerLength, 0.0022, this.replica.pointerColour(participant))).group, label: document.createElement('div') };
+        drawn.label.className = 'label pointer';
+        this.labels.append(drawn.label);
+        this.scene.add(drawn.group);
+        this.pointers.set(participant, drawn);
+      }
+      const at = new Vector3(...position);
+      drawn.group.position.copy(at).addScaledVector(along, -kPointerLength);
+      drawn.group.quaternion.setFromUnitVectors(new Vector3(0, 0, 1), along);
+      drawn.label.textContent = this.guide.pointerLabel(participant);
+      drawn.label.style.setProperty('--own', `#${this.replica.pointerColour(participant).toString(16).padStart(6, '0')}`);
+      at.project(this.camera);
+      drawn.label.style.transform = `translate(${((at.x + 1) / 2 * this.width).toFixed(1)}px, ${((1 - at.y) / 2 * this.height).toFixed(1)}px)`;
+    }
+  }
+
+  private light(): void {
+    this.camera.updateMatrixWorld();
+    this.scene.updateMatrixWorld();
+    const m = this.camera.matrixWorld.elements, u = this.uniforms;
+    const direction = (right: number, up: number, back: number): Vector3 =>
+      new Vector3(m[0], m[1], m[2]).multiplyScalar(right).addScaledVector(new Vector3(m[4], m[5], m[6]), up)
+        .addScaledVector(new Vector3(m[8], m[9], m[10]), back).normalize();
+    (u['eye']!.value as Vector3).copy(this.camera.position);
+    (u['key_direction']!.value as Vector3).copy(direction(0.42, 0.88, 0.55));
+    (u['fill_direction']!.value as Vector3).copy(direction(-0.9, 0.15, 0.35));
+    (u['clip_from_world']!.value as Matrix4).multiplyMatrices(this.camera.projectionMatrix, this.camera.matrixWorldInverse);
+  }
+
+  private placeLabels(tools: Tool[]): void {
+    const shown = new Set<number>();
+    for (const tool of tools) {
+      const drawn = this.tools.get(tool.slot);
+      if (!drawn) continue;
+      const shape = this.guide.shapeOf(tool.slot);
+      const at = new Vector3(0, 0, shape.radiusM * 7).applyQuaternion(drawn.group.quaternion).add(drawn.group.position).project(this.camera);
+      if (at.z > 1 || Math.abs(at.x) > 1.05 || Math.abs(at.y) > 1.05) continue;
+      shown.add(tool.slot);
+      const { text, colour } = this.guide.labelOf(tool);
+      if (drawn.label.textContent !== text) drawn.label.textContent = text;
+      drawn.label.style.setProperty('--own', `#${colour.toString(16).padStart(6, '0')}`);
+      drawn.label.style.transform = `translate(${((at.x + 1) / 2 * this.width).toFixed(1)}px, ${((1 - at.y) / 2 * this.height).toFixed(1)}px)`;
+    }
+    for (const [slot, drawn] of this.tools) drawn.label.hidden = !shown.has(slot);
+  }
+}
+
+function dynamic(attribute: BufferAttribute): BufferAttribute {
+  attribute.usage = DynamicDrawUsage;
+  return attribute;
+}
+
+// A browser says so before it makes a context, which takes long in software.
+function isSlow(): boolean {
+  return document.createElement('canvas').getContext('webgl2', { failIfMajorPerformanceCaveat: true }) === null;
+}
+
+function rendersInSoftware(gl: WebGLRenderingContext | WebGL2RenderingContext): boolean {
+  const info = gl.getExtension('WEBGL_debug_renderer_info');
+  const name = info ? String(gl.getParameter(info.UNMASKED_RENDERER_WEBGL)) : '';
+  return /swiftshader|llvmpipe|software/i.test(name);
+}

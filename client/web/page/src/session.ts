@@ -1,0 +1,190 @@
+// A live session over a WebSocket: joins, keeps the replica fed, measures how old the picture is,
+// and comes back when the connection breaks.
+
+import { create, fromBinary, toBinary } from '@bufbuild/protobuf';
+import { EnvelopeSchema, GoodbyeReason, MarkAction, PointRequestSchema, Vec3Schema, type Envelope } from './gen/proto/wire_pb';
+import type { Link } from './link';
+import type { Replica, Vec3 } from './replica';
+
+export type State = 'joining' | 'live' | 'away' | 'ended';
+export interface Hooks {
+  // Every message that is not of the surface; `tick` of the session when it came.
+  onMessage(message: Envelope, tick: number): void;
+  onChange(): void; // of `state` or `why`
+}
+
+const kPingMs = 1000, kSilenceMs = 4000, kRoundTrips = 16;
+// Numbers of Envelope's fields, as they begin a message: the surface is the replica's business alone.
+const kSurfaceFields = new Set([2, 3, 8, 18, 26, 29, 30, 31, 32, 33, 36]);
+
+export class Session {
+  state: State = 'joining';
+  why = ''; // one line for people, when it is away or has ended
+  refusal: GoodbyeReason | null = null;
+  bytes = 0;
+  roundTripMs = 0;
+  awaySince = 0;
+  private keepSeconds = 0;
+  private socket: WebSocket | null = null;
+  private token = '';
+  private heardMs = 0;
+  private offsets: { roundTrip: number; offset: number }[] = [];
+  private timer = 0;
+  private retryMs = 200;
+  private hasLeft = false;
+
+  constructor(private readonly link: Link, private readonly replica: Replica, private readonly hooks: Hooks) {
+    this.connect();
+    this.timer = window.setInterval(() => this.tick(), kPingMs);
+    window.addEventListener('pagehide', this.leave);
+    window.addEventListener('online', this.retryNow);
+  }
+
+  // How old the newest frame is, in ms by the server's clock; nothing while that is unknown.
+  get newestAgeMs(): number | null {
+    const published = this.replica.newestServerUs, offset = this.offset;
+    return published === 0 || offset === null ? null : (performance.now() * 1000 + offset - published) / 1000;
+  }
+  // The same of what is shown, which follows the newest frame by a few.
+  get shownAgeMs(): number | null {
+    const age = this.newestAgeMs;
+    return age === null ? null : age + Math.max(0, this.replica.newestTick - this.replica.shownTick);
+  }
+  // Beyond this the picture is old: half a round trip, three frames and 250 ms.
+  get oldAfterMs(): number { return this.roundTripMs / 2 + 48 + 250; }
+
+  mark(returns: boolean): void {
+    this.say({ case: 'markRequest', value: { $typeName: 'trocar.proto.MarkRequest', action: returns ? MarkAction.MARK_RETURN : MarkAction.MARK_SET } });
+  }
+
+  // Shows everybody a place (m), or none any more.
+  point(place: Vec3 | null): void {
+    const positionM = place === null ? {} : { positionM: create(Vec3Schema, { x: place[0], y: place[1], z: place[2] }) };
+    this.say({ case: 'pointRequest', value: create(PointRequestSchema, positionM) });
+  }
+
+  leave = (): void => {
+    if (this.hasLeft) return;
+    this.hasLeft = true;
+    window.clearInterval(this.timer);
+    window.removeEventListener('pagehide', this.leave);
+    window.removeEventListener('online', this.retryNow);
+    this.socket?.close(1000);
+    this.end('You have left the session.');
+  };
+
+  private get offset(): number | null {
+    const best = this.offsets.reduce<{ roundTrip: number; offset: number } | null>((a, b) => (a === null || b.roundTrip < a.roundTrip ? b : a), null);
+    return best === null ? null : best.offset;
+  }
+
+  private connect(): void {
+    const scheme = location.protocol === 'https:' ? 'wss' : 'ws';
+    const socket = new WebSocket(`${scheme}://${location.host}/session`);
+    socket.binaryType = 'arraybuffer';
+    this.socket = socket;
+    this.heardMs = performance.now();
+    socket.onopen = () => {
+      const { code, name, role, session } = this.link;
+      socket.send(JSON.stringify({ code, name, role, session, token: this.token }));
+    };
+    socket.onmessage = event => {
+      if (socket === this.socket && event.data instanceof ArrayBuffer) this.take(new Uint8Array(event.data));
+    };
+    socket.onclose = () => { if (socket === this.socket) this.lost('The connection broke.'); };
+  }
+
+  private take(bytes: Uint8Array): void {
+    const now = performance.now();
+    this.heardMs = now;
+    this.bytes += bytes.length;
+    try {
+      this.replica.receive(bytes, now);
+      for (const answer of this.replica.takeOutbox()) this.send(answer);
+      if (!kSurfaceFields.has(fieldOf(bytes))) this.heed(fromBinary(EnvelopeSchema, bytes), now);
+    } catch (error) {
+      this.end(`This page cannot go on: ${error instanceof Error ? error.message : String(error)}`);
+      this.socket?.close(1000);
+    }
+  }
+
+  private heed(message: Envelope, now: number): void {
+    const { case: kind, value } = message.message;
+    if (kind === 'pong') {
+      const roundTrip = now - Number(value.clientTimeUs) / 1000;
+      this.roundTripMs = roundTrip;
+      if (value.serverTimeUs > 0n) {
+        this.offsets.push({ roundTrip, offset: Number(value.serverTimeUs) - (now - roundTrip / 2) * 1000 });
+        if (this.offsets.length > kRoundTrips) this.offsets.shift();
+      }
+      return;
+    }
+    if (kind === 'welcome') {
+      this.token = Array.from(value.returnToken, b => b.toString(16).padStart(2, '0')).join('');
+      this.keepSeconds = value.returnSeconds;
+      this.retryMs = 200;
+      this.offsets = [];
+      this.set('live', '');
+      this.ping();
+    }
+    if (kind === 'goodbye') {
+      // A place that hangs from the connection before is free in a moment.
+      const comesBack = this.state === 'away' && value.reason === GoodbyeReason.GOODBYE_TIMEOUT;
+      if (!comesBack) {
+        this.refusal = value.reason;
+        this.end(value.text || 'The session has ended.');
+      }
+    }
+    this.hooks.onMessage(message, Math.max(0, this.replica.newestTick));
+  }
+
+  private lost(why: string): void {
+    this.socket = null;
+    if (this.state === 'ended') return;
+    if (this.state === 'joining') return this.end('The server does not answer: is it running, and is the link right?');
+    const now = performance.now();
+    if (this.state !== 'away') this.awaySince = now;
+    if (now - this.awaySince > (this.keepSeconds + 5) * 1000)
+      return this.end('The connection was lost for too long. Open the link again.');
+    this.set('away', why);
+    window.setTimeout(this.retryNow, this.retryMs);
+    this.retryMs = Math.min(2000, this.retryMs * 2);
+  }
+  private retryNow = (): void => {
+    if (this.state === 'away' && this.socket === null) this.connect();
+  };
+
+  private tick(): void {
+    if (this.socket === null) return;
+    if (performance.now() - this.heardMs > kSilenceMs && this.state !== 'ended') {
+      const silent = this.socket;
+      this.lost('Nothing has come for too long.');
+      silent.close(4000); // not in order: the session keeps the place
+      return;
+    }
+    if (this.state === 'live') this.ping();
+  }
+  private ping(): void {
+    this.say({ case: 'ping', value: { $typeName: 'trocar.proto.Ping', clientTimeUs: BigInt(Math.round(performance.now() * 1000)) } });
+  }
+  private say(message: Envelope['message']): void {
+    const envelope = create(EnvelopeSchema);
+    envelope.message = message;
+    this.send(toBinary(EnvelopeSchema, envelope));
+  }
+  private send(bytes: Uint8Array): void {
+    if (this.socket?.readyState === WebSocket.OPEN) this.socket.send(new Uint8Array(bytes));
+  }
+  private end(why: string): void { if (this.state !== 'ended') this.set('ended', why); }
+  private set(state: State, why: string): void {
+    this.state = state;
+    this.why = why;
+    this.hooks.onChange();
+  }
+}
+
+// The number of the field with which an Envelope begins.
+function fieldOf(bytes: Uint8Array): number {
+  const first = bytes[0] ?? 0;
+  return first < 0x80 ? first >> 3 : ((first & 0x7f) | ((bytes[1] ?? 0) << 7)) >> 3;
+}

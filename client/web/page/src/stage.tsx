@@ -1,0 +1,163 @@
+// The picture with what lies on it: labels, overlays, keys and buttons of the view.
+
+import { useEffect, useRef, useState } from 'preact/hooks';
+import type { ComponentChildren, JSX } from 'preact';
+import { ToolShapeSchema, type Participant, type ToolShape } from './gen/proto/wire_pb';
+import { create } from '@bufbuild/protobuf';
+import { Overlay, Verb, type Replica, type Tool, type Vec3 } from './replica';
+import { Picture, type Guide, type Shape } from './scene';
+
+export function forceOf(tool: Tool): number { return Math.hypot(...tool.forceN); }
+export const newtons = (n: number): string => `${n.toFixed(n < 10 ? 2 : 1)} N`;
+export const clock = (seconds: number): string => `${Math.floor(seconds / 60)}:${(seconds % 60).toFixed(1).padStart(4, '0')}`;
+
+const kPlain: ToolShape = create(ToolShapeSchema, { radiusM: 0.005, lengthM: 0.3 });
+
+// What the picture asks about people, from the newest list of them.
+export function guideOf(people: () => Participant[], colourOf: (slot: number) => number): Guide {
+  const owner = (slot: number): Participant | undefined => people().find(p => p.slot === slot >> 1);
+  return {
+    shapeOf(slot): Shape {
+      const shape = owner(slot)?.tool[slot & 1] ?? kPlain;
+      return { radiusM: shape.radiusM, lengthM: shape.lengthM, halfWidthM: shape.halfWidthM ?? 0 };
+    },
+    labelOf(tool) {
+      const name = owner(tool.slot)?.name ?? `hand ${(tool.slot >> 1) + 1}`, newton = forceOf(tool);
+      return { text: newton >= 0.05 ? `${name}  ${newtons(newton)}` : name, colour: colourOf(tool.slot >> 1) };
+    },
+    pointerLabel(participant) {
+      return `${people().find(p => p.slot === participant)?.name ?? 'somebody'} points here`;
+    },
+  };
+}
+
+export function doing(tools: Tool[]): string {
+  const tool = tools.find(t => t.verb !== Verb.None) ?? tools[0];
+  if (!tool) return '';
+  if (tool.isSilent) return 'silent';
+  if (tool.isInside) return 'inside tissue';
+  const what = { [Verb.None]: '', [Verb.Push]: 'pushes', [Verb.Grasp]: 'grasps', [Verb.Cut]: 'cuts' }[tool.verb] ?? '';
+  if (what === '') return tool.contactNodes > 0 ? 'touches' : 'free';
+  return tool.hasClaim ? (tool.verb === Verb.Grasp ? 'holds' : what) : tool.verb === Verb.Grasp ? 'wants to grasp' : what;
+}
+
+interface StageProps {
+  replica: Replica;
+  guide: Guide;
+  isOld: boolean; // the picture is not of now
+  follows: number | null;
+  people: Participant[];
+  onFollow(slot: number | null): void;
+  onPicture(nowMs: number): void; // before each picture
+  onReady(picture: Picture): void;
+  // Where this person points, if the role may; null: nowhere any more.
+  onPoint?: (place: Vec3 | null) => void;
+  children?: ComponentChildren;
+}
+
+export function Stage(props: StageProps): JSX.Element {
+  const canvas = useRef<HTMLCanvasElement>(null), labels = useRef<HTMLDivElement>(null), box = useRef<HTMLDivElement>(null);
+  const picture = useRef<Picture | null>(null), latest = useRef(props);
+  const [overlay, setOverlay] = useState(Overlay.Holds), [arrows, setArrows] = useState(true), [fault, setFault] = useState(''), [points, setPoints] = useState(false);
+  const place = useRef<[number, number] | null>(null), hasPointed = useRef(false);
+  latest.current = props;
+
+  useEffect(() => {
+    let id = 0, drawn: Picture;
+    try {
+      drawn = new Picture(canvas.current!, labels.current!, props.replica, props.guide);
+    } catch (error) {
+      setFault(error instanceof Error ? error.message : String(error));
+      return undefined;
+    }
+    picture.current = drawn;
+    drawn.onLetGo = () => latest.current.onFollow(null);
+    props.onReady(drawn);
+    const size = new ResizeObserver(() => { if (box.current) drawn.resize(box.current.clientWidth, box.current.clientHeight); });
+    size.observe(box.current!);
+    const step = (now: number): void => {
+      id = requestAnimationFrame(step);
+      latest.current.onPicture(now);
+      if (drawn.draw(performance.now())) canvas.current?.setAttribute('data-drawn', '1');
+    };
+    id = requestAnimationFrame(step);
+    return () => {
+      cancelAnimationFrame(id);
+      size.disconnect();
+      drawn.dispose();
+    };
+  }, []);
+
+  useEffect(() => {
+    if (!picture.current) return;
+    picture.current.overlay = overlay;
+    picture.current.showsArrows = arrows;
+  }, [overlay, arrows]);
+  // While the pointer is on the organ, its place goes to everybody ten times a second: tissue moves
+  // under it.
+  useEffect(() => {
+    if (picture.current) picture.current.turns = !points;
+    if (!points) return undefined;
+    const timer = window.setInterval(() => {
+      const at = place.current && picture.current ? picture.current.pick(...place.current) : null;
+      if (at !== null || hasPointed.current) latest.current.onPoint?.(at);
+      hasPointed.current = at !== null;
+    }, 100);
+    return () => {
+      window.clearInterval(timer);
+      if (hasPointed.current) latest.current.onPoint?.(null);
+      hasPointed.current = false;
+    };
+  }, [points]);
+  const onMove = (event: PointerEvent): void => {
+    const rect = (event.currentTarget as HTMLElement).getBoundingClientRect();
+    place.current = [(event.clientX - rect.left) / rect.width, (event.clientY - rect.top) / rect.height];
+  };
+  const mayPoint = props.onPoint !== undefined;
+  useEffect(() => { if (!mayPoint) setPoints(false); }, [mayPoint]);
+  useEffect(() => { if (picture.current) picture.current.follows = props.follows; }, [props.follows]);
+
+  const reset = (): void => {
+    picture.current?.resetView();
+    props.onFollow(null);
+  };
+  const onKey = (event: KeyboardEvent): void => {
+    const p = picture.current, step = event.shiftKey ? 0.02 : 0.1;
+    if (!p || event.ctrlKey || event.metaKey || event.altKey) return;
+    const acts: Record<string, () => void> = {
+      ArrowLeft: () => p.turn(-step, 0), ArrowRight: () => p.turn(step, 0), ArrowUp: () => p.turn(0, step), ArrowDown: () => p.turn(0, -step),
+      '+': () => p.zoom(0.9), '=': () => p.zoom(0.9), '-': () => p.zoom(1 / 0.9), c: reset, ...(mayPoint ? { p: () => setPoints(!points) } : {}),
+      l: () => setOverlay(overlay === Overlay.Holds ? Overlay.None : Overlay.Holds),
+      o: () => setOverlay(overlay === Overlay.Regions ? Overlay.None : Overlay.Regions), a: () => setArrows(!arrows),
+    };
+    const act = acts[event.key.length === 1 ? event.key.toLowerCase() : event.key];
+    if (!act) return;
+    act();
+    event.preventDefault();
+    event.stopPropagation();
+  };
+
+  return (
+    <div class={`stage${props.isOld ? ' old' : ''}${points ? ' points' : ''}`} ref={box}>
+      <canvas ref={canvas} tabIndex={0} onKeyDown={onKey} role="img"
+        onPointerMove={onMove} onPointerDown={onMove} onPointerLeave={() => { place.current = null; }}
+        aria-label="The organ and the instruments. Arrow keys turn the view, plus and minus zoom, C resets it." />
+      <div class="labels" ref={labels} aria-hidden="true" />
+      {fault && <p class="banner fault" role="alert">{fault}</p>}
+      {props.children}
+      <div class="view" role="toolbar" aria-label="View">
+        <button onClick={reset} title="The view as at the start (C)">Reset view</button>
+        <label class="choice">Follow
+          <select value={props.follows === null ? '' : String(props.follows)} onChange={e => props.onFollow(e.currentTarget.value === '' ? null : Number(e.currentTarget.value))}>
+            <option value="">nobody</option>
+            {props.people.filter(p => p.tool.length > 0).map(p => <option key={p.slot} value={String(p.slot)}>{p.name}</option>)}
+          </select>
+        </label>
+        <button aria-pressed={overlay === Overlay.Holds} onClick={() => setOverlay(overlay === Overlay.Holds ? Overlay.None : Overlay.Holds)} title="Who holds what (L)">Holds</button>
+        <button aria-pressed={overlay === Overlay.Regions} onClick={() => setOverlay(overlay === Overlay.Regions ? Overlay.None : Overlay.Regions)} title="How far each force reaches (O)">Reach</button>
+        {mayPoint && <button aria-pressed={points} onClick={() => setPoints(!points)} title="Show everybody the place under the pointer (P)">Point</button>}
+        <button aria-pressed={arrows} onClick={() => setArrows(!arrows)} title="Force arrows, 20 mm per newton (A)">Arrows</button>
+      </div>
+    </div>
+  );
+}

@@ -1,0 +1,193 @@
+// The functions that JavaScript calls, client/web/page/src/replica.ts: numbers and places in the
+// module's memory. A page has one model.
+
+#include "client/shape/noise.h"
+#include "client/web/wasm/page_model.h"
+
+#ifdef __wasm__
+#define TROCAR_EXPORT(name) extern "C" __attribute__((export_name(#name), used))
+#else
+#define TROCAR_EXPORT(name) extern "C"
+#endif
+
+namespace trocar::wasm {
+namespace {
+
+// A message is at most this large; the page asks for no more room.
+constexpr std::size_t kMostInput = 16 * 1024 * 1024 + 4;
+
+Bytes input_bytes;
+std::vector<std::uint8_t> noise_texels;
+
+PageModel& model() {
+  static PageModel the_model;
+  return the_model;
+}
+
+BytesView input_view(std::size_t bytes) {
+  return BytesView(input_bytes).first(std::min(bytes, input_bytes.size()));
+}
+
+tool::ToolShape form_of(float radius_m, float length_m, float half_width_m) {
+  tool::ToolShape form;
+  form.radius_m = radius_m;
+  form.length_m = length_m;
+  form.half_width_m = half_width_m;
+  return form;
+}
+
+shape::Colour colour_of(std::uint32_t rgb) {
+  return {static_cast<std::uint8_t>(rgb >> 16), static_cast<std::uint8_t>(rgb >> 8),
+          static_cast<std::uint8_t>(rgb)};
+}
+
+std::size_t mesh_count = 0;
+
+const void* hand_out(const shape::MeshVertices& mesh) {
+  mesh_count = mesh.size();
+  return mesh.data();
+}
+
+}  // namespace
+
+TROCAR_EXPORT(restart) void trocar_restart() {
+  model().restart();
+}
+// Null: a message of that size is refused.
+TROCAR_EXPORT(input) std::uint8_t* trocar_input(std::size_t bytes) {
+  if (bytes > kMostInput) return nullptr;
+  if (input_bytes.size() < bytes) input_bytes.resize(bytes);
+  return input_bytes.data();
+}
+TROCAR_EXPORT(receive) int trocar_receive(std::size_t bytes, double now_ms) {
+  return model().receive(input_view(bytes), now_ms);
+}
+TROCAR_EXPORT(receive_bare)
+int trocar_receive_bare(std::uint32_t field, std::size_t bytes, double now_ms) {
+  return model().receive_bare(field, input_view(bytes), now_ms);
+}
+TROCAR_EXPORT(error) const char* trocar_error() {
+  return model().error().c_str();
+}
+TROCAR_EXPORT(outbox) const std::uint8_t* trocar_outbox() {
+  return model().outbox().data();
+}
+TROCAR_EXPORT(outbox_size) std::size_t trocar_outbox_size() {
+  return model().outbox().size();
+}
+TROCAR_EXPORT(outbox_clear) void trocar_outbox_clear() {
+  model().clear_outbox();
+}
+
+TROCAR_EXPORT(frames) double trocar_frames() {
+  return static_cast<double>(model().replica().counters().frames);
+}
+TROCAR_EXPORT(mismatches) double trocar_mismatches() {
+  const auto& counters = model().replica().counters();
+  return static_cast<double>(counters.crc_mismatches + counters.base_mismatches +
+                             counters.change_mismatches);
+}
+TROCAR_EXPORT(surface_crc) std::uint32_t trocar_surface_crc() {
+  return model().replica().surface_crc();
+}
+TROCAR_EXPORT(own_crc) std::uint32_t trocar_own_crc() {
+  return model().own_crc();
+}
+TROCAR_EXPORT(is_in_step) int trocar_is_in_step() {
+  return model().replica().sync_state() == replica::SyncState::InStep;
+}
+TROCAR_EXPORT(newest_tick) double trocar_newest_tick() {
+  const auto* newest = model().replica().newest();
+  return newest == nullptr ? -1 : static_cast<double>(newest->tick);
+}
+TROCAR_EXPORT(newest_frame) double trocar_newest_frame() {
+  const auto* newest = model().replica().newest();
+  return newest == nullptr ? -1 : static_cast<double>(newest->frame);
+}
+// The server's clock when it published the newest frame, us; 0: unknown.
+TROCAR_EXPORT(newest_server_us) double trocar_newest_server_us() {
+  const auto* newest = model().replica().newest();
+  return newest == nullptr ? 0 : static_cast<double>(newest->server_time_us);
+}
+TROCAR_EXPORT(shown_tick) double trocar_shown_tick() {
+  return model().shown_tick();
+}
+
+TROCAR_EXPORT(update) int trocar_update(double now_ms, std::size_t triangle_budget, int overlay) {
+  return model().update(now_ms, triangle_budget, static_cast<Overlay>(overlay));
+}
+TROCAR_EXPORT(geometry_version) double trocar_geometry_version() {
+  return static_cast<double>(model().geometry_version());
+}
+TROCAR_EXPORT(vertices) std::size_t trocar_vertices() {
+  return model().surface().vertex_count();
+}
+TROCAR_EXPORT(coarse_vertices) std::size_t trocar_coarse_vertices() {
+  return model().surface().coarse_vertex_count();
+}
+TROCAR_EXPORT(triangles) std::size_t trocar_triangles() {
+  return model().surface().triangles().size();
+}
+TROCAR_EXPORT(triangles_at) const void* trocar_triangles_at() {
+  return model().surface().triangles().data();
+}
+TROCAR_EXPORT(positions_at) const void* trocar_positions_at() {
+  return model().surface().positions().data();
+}
+TROCAR_EXPORT(normals_at) const void* trocar_normals_at() {
+  return model().surface().normals().data();
+}
+TROCAR_EXPORT(rest_at) const void* trocar_rest_at() {
+  return model().rest().data();
+}
+TROCAR_EXPORT(overlay_at) const void* trocar_overlay_at() {
+  return model().overlay().data();
+}
+TROCAR_EXPORT(tools) std::size_t trocar_tools() {
+  return model().tools().size();
+}
+TROCAR_EXPORT(tools_at) const void* trocar_tools_at() {
+  return model().tools().data();
+}
+TROCAR_EXPORT(pointers) std::size_t trocar_pointers() {
+  return model().pointers().size();
+}
+TROCAR_EXPORT(pointers_at) const void* trocar_pointers_at() {
+  return model().pointers().data();
+}
+
+// Colours are 0xrrggbb; each of the three gives a place of MeshVertex, mesh_vertices() how many.
+TROCAR_EXPORT(make_tool)
+const void* trocar_make_tool(float radius_m, float length_m, float half_width_m,
+                             std::uint32_t colour) {
+  return hand_out(model().make_tool(form_of(radius_m, length_m, half_width_m), colour_of(colour)));
+}
+TROCAR_EXPORT(make_jaw) const void* trocar_make_jaw(float radius_m, float length_m) {
+  return hand_out(model().make_jaw(form_of(radius_m, length_m, 0)));
+}
+TROCAR_EXPORT(make_arrow)
+const void* trocar_make_arrow(float length_m, float radius_m, std::uint32_t colour) {
+  return hand_out(model().make_arrow(length_m, radius_m, colour_of(colour)));
+}
+TROCAR_EXPORT(mesh_vertices) std::size_t trocar_mesh_vertices() {
+  return mesh_count;
+}
+TROCAR_EXPORT(jaw_length) float trocar_jaw_length(float radius_m) {
+  return shape::jaw_length(form_of(radius_m, 0.3f, 0));
+}
+TROCAR_EXPORT(slot_colour) std::uint32_t trocar_slot_colour(int slot) {
+  const auto colour = shape::colour_of_slot(slot < 0 ? 0 : slot);
+  return static_cast<std::uint32_t>(colour.r) << 16 | static_cast<std::uint32_t>(colour.g) << 8 |
+         colour.b;
+}
+TROCAR_EXPORT(pointer_colour) std::uint32_t trocar_pointer_colour(int slot) {
+  const auto colour = shape::colour_of_pointer(slot < 0 ? 0 : slot);
+  return static_cast<std::uint32_t>(colour.r) << 16 | static_cast<std::uint32_t>(colour.g) << 8 |
+         colour.b;
+}
+TROCAR_EXPORT(noise) const std::uint8_t* trocar_noise(int size) {
+  noise_texels = shape::make_tissue_noise(size);
+  return noise_texels.data();
+}
+
+}  // namespace trocar::wasm

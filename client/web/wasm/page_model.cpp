@@ -1,0 +1,217 @@
+#include "client/web/wasm/page_model.h"
+
+#include <algorithm>
+
+#include "common/wire/framing.h"
+#include "proto/wire.pb.h"
+
+namespace trocar::wasm {
+namespace {
+
+// The native picture has the same.
+constexpr float kRegionStrength = 0.50f, kFirmHoldStrength = 0.95f, kTouchStrength = 0.60f;
+constexpr std::size_t kMostOutboxBytes = 64 * 1024;
+
+using Tint = std::array<float, 4>;
+
+Tint tint_of(shape::Colour colour, float strength) {
+  const auto linear = [strength](std::uint8_t value) {
+    const float x = static_cast<float>(value) / 255;
+    return x * x * strength;
+  };
+  return {linear(colour.r), linear(colour.g), linear(colour.b), strength};
+}
+
+std::uint64_t to_ns(double ms) {
+  return ms > 0 && ms < 1e12 ? static_cast<std::uint64_t>(ms * 1e6) : 0;
+}
+
+float flag(bool value) {
+  return value ? 1.0f : 0.0f;
+}
+
+}  // namespace
+
+PageModel::PageModel() {
+  restart();
+}
+
+void PageModel::restart() {
+  outbox_.clear();
+  error_.clear();
+  tools_.clear();
+  held_.clear();
+  replica_.emplace([this](const proto::Envelope& message) {
+    const auto frame = wire::encode_envelope(message);
+    if (outbox_.size() + frame->size() > kMostOutboxBytes) return false;
+    outbox_.insert(outbox_.end(), frame->begin(), frame->end());
+    return true;
+  });
+  shown_.emplace();
+  built_version_ = 0;
+}
+
+bool PageModel::accept(const proto::Envelope& envelope, double now_ms, std::size_t bytes) {
+  replica_->on_message(envelope, to_ns(now_ms), bytes);
+  if (replica_->fault().ok()) return true;
+  error_ = replica_->fault().error().message;
+  return false;
+}
+
+bool PageModel::receive(BytesView message, double now_ms) {
+  proto::Envelope envelope;
+  const auto decoded = wire::decode_envelope(message, envelope);
+  if (decoded.ok()) return accept(envelope, now_ms, message.size() + wire::kHeaderBytes);
+  error_ = decoded.error().message;
+  return false;
+}
+
+bool PageModel::receive_bare(std::uint32_t field, BytesView message, double now_ms) {
+  proto::Envelope envelope;
+  const auto parse = [&](google::protobuf::MessageLite* part) {
+    return message.size() <= wire::kMaxDownstreamBytes &&
+           part->ParseFromArray(message.data(), static_cast<int>(message.size()));
+  };
+  bool is_parsed = false;
+  switch (field) {
+    case proto::Envelope::kSurfaceFrameFieldNumber:
+      is_parsed = parse(envelope.mutable_surface_frame());
+      break;
+    case proto::Envelope::kFrameStateFieldNumber:
+      is_parsed = parse(envelope.mutable_frame_state());
+      break;
+    case proto::Envelope::kSurfaceChangeFieldNumber:
+      is_parsed = parse(envelope.mutable_surface_change());
+      break;
+    case proto::Envelope::kSurfaceTopologyFieldNumber:
+      is_parsed = parse(envelope.mutable_surface_topology());
+      break;
+    case proto::Envelope::kParticipantsFieldNumber:
+      is_parsed = parse(envelope.mutable_participants());
+      break;
+    default:
+      break;
+  }
+  if (is_parsed) return accept(envelope, now_ms, message.size());
+  error_ = "a message of the recording cannot be read: the file is damaged";
+  return false;
+}
+
+std::uint32_t PageModel::own_crc() const {
+  const auto* newest = replica_->newest();
+  return newest == nullptr ? 0 : wire::surface_crc(newest->surface);
+}
+
+void PageModel::build_surface(std::size_t triangle_budget) {
+  const auto& topology = replica_->topology();
+  smooth_.build(topology.rest_positions.size(), topology.triangles, topology.is_wound,
+                triangle_budget);
+  smooth_.update(topology.rest_positions);
+  built_version_ = replica_->topology_version();
+  built_budget_ = triangle_budget;
+  ++geometry_version_;
+  rest_.resize(smooth_.vertex_count());
+  for (std::size_t i = 0; i < rest_.size(); ++i) {
+    const Vec3f& p = smooth_.positions()[i];
+    const float side =
+        static_cast<float>(smooth_.is_wound()[i]) - static_cast<float>(smooth_.is_rim()[i]);
+    rest_[i] = {p.x, p.y, p.z, side};
+  }
+}
+
+void PageModel::update_tools() {
+  tools_.clear();
+  for (const auto& tool : shown_->tools()) {
+    PageTool out;
+    out.slot = static_cast<float>(tool.slot.value);
+    out.verb = static_cast<float>(static_cast<int>(tool.verb));
+    out.has_claim = flag(tool.has_claim);
+    out.is_silent = flag(tool.is_silent);
+    out.is_inside = flag(tool.is_inside);
+    out.contact_nodes = static_cast<float>(tool.contact_nodes);
+    out.tip = tool.world_from_proxy.position;
+    out.orientation = tool.world_from_proxy.orientation;
+    out.hand = tool.world_from_tool.position;
+    out.force_n = tool.force_n;
+    out.torque_nm = tool.torque_nm;
+    out.penetration_m = tool.penetration_m;
+    tools_.push_back(out);
+  }
+}
+
+void PageModel::update_overlay(Overlay overlay) {
+  std::vector<tool::ToolShape> shapes;
+  for (const auto& tool : shown_->tools()) {
+    const auto* owner = replica_->find_participant(tool.slot.owner());
+    const auto number = static_cast<std::size_t>(tool.slot.number());
+    shapes.push_back(owner != nullptr && number < owner->tools.size() ? owner->tools[number]
+                                                                      : tool::ToolShape{});
+  }
+  if (held_history_ != replica_->history_version()) held_.clear();
+  held_history_ = replica_->history_version();
+  // While hidden, too: which tissue a grasp took is seen when it takes it.
+  held_.update(shown_->positions(), shown_->tools(), shapes);
+  tints_.assign(smooth_.vertex_count(), Tint{});
+  overlay_.assign(smooth_.vertex_count(), {});
+  if (overlay == Overlay::None) return;
+  const auto& holdings = held_.holdings();
+  const auto& regions = shown_->regions();
+  for (std::size_t i = 0; i < smooth_.coarse_vertex_count(); ++i) {
+    if (overlay == Overlay::Holds && i < holdings.size() &&
+        holdings[i].owner != replica::kHeldByNobody)
+      tints_[i] = tint_of(shape::colour_of_slot(holdings[i].owner),
+                          holdings[i].is_grasp ? kFirmHoldStrength : kTouchStrength);
+    if (overlay == Overlay::Regions && i < regions.size() && regions[i] != 0)
+      tints_[i] = tint_of(shape::colour_of_region(regions[i]), kRegionStrength);
+  }
+  struct Mixed {
+    Tint t;
+    Mixed operator+(const Mixed& o) const {
+      return {{t[0] + o.t[0], t[1] + o.t[1], t[2] + o.t[2], t[3] + o.t[3]}};
+    }
+    Mixed operator*(float s) const { return {{t[0] * s, t[1] * s, t[2] * s, t[3] * s}}; }
+  };
+  std::vector<Mixed> mixed(tints_.size());
+  for (std::size_t i = 0; i < smooth_.coarse_vertex_count(); ++i) mixed[i].t = tints_[i];
+  smooth_.extend_values(mixed);
+  const auto byte = [](float value) {
+    return static_cast<std::uint8_t>(std::clamp(value, 0.0f, 1.0f) * 255);
+  };
+  for (std::size_t i = 0; i < mixed.size(); ++i) {
+    const Tint& t = mixed[i].t;
+    const float whole = t[3] > 1e-3f ? 1 / t[3] : 0.0f;
+    overlay_[i] = {byte(t[0] * whole), byte(t[1] * whole), byte(t[2] * whole), byte(t[3])};
+  }
+}
+
+bool PageModel::update(double now_ms, std::size_t triangle_budget, Overlay overlay) {
+  shown_->update(*replica_, to_ns(now_ms));
+  if (!shown_->is_valid()) return false;
+  if (built_version_ != replica_->topology_version() || built_budget_ != triangle_budget)
+    build_surface(triangle_budget);
+  if (shown_->positions().size() != smooth_.coarse_vertex_count()) return false;
+  smooth_.update(shown_->positions());
+  update_tools();
+  pointers_.clear();
+  for (const auto& pointer : replica_->pointers(to_ns(now_ms)))
+    pointers_.push_back({static_cast<float>(pointer.participant.value), pointer.position_m});
+  update_overlay(overlay);
+  return true;
+}
+
+const shape::MeshVertices& PageModel::make_tool(const tool::ToolShape& form, shape::Colour colour) {
+  mesh_ = form.half_width_m > 0 ? shape::make_blade(form, colour) : shape::make_shaft(form, colour);
+  return mesh_;
+}
+
+const shape::MeshVertices& PageModel::make_jaw(const tool::ToolShape& form) {
+  mesh_ = shape::make_jaw(form);
+  return mesh_;
+}
+
+const shape::MeshVertices& PageModel::make_arrow(float length, float radius, shape::Colour colour) {
+  mesh_ = shape::make_arrow(length, radius, colour);
+  return mesh_;
+}
+
+}  // namespace trocar::wasm

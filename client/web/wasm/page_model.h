@@ -1,0 +1,108 @@
+#pragma once
+
+// A page in a browser knows a session by the replica of the native client, and this says what there
+// is to draw. Bytes of messages go in; arrays that a graphics processor takes come out.
+//
+// Outside data: a message that cannot be right is refused, and error() says why. Times are the
+// page's clock in ms. Thread: the page's only one. Spans and pointers hold until the next call.
+
+#include <array>
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "client/replica/held_tissue.h"
+#include "client/replica/interpolated_surface.h"
+#include "client/replica/replica.h"
+#include "client/shape/smooth_surface.h"
+#include "client/shape/tool_mesh.h"
+#include "common/base/bytes.h"
+
+namespace trocar::wasm {
+
+enum class Overlay : int { None = 0, Regions = 1, Holds = 2 };
+
+// A tool as the page draws it, in floats: JavaScript reads them as one array.
+struct PageTool {
+  float slot = 0, verb = 0;
+  float has_claim = 0, is_silent = 0, is_inside = 0, contact_nodes = 0;  // 0 or 1, but for the last
+  Vec3f tip;          // m, where the tissue lets it be
+  Quatf orientation;  // likewise
+  Vec3f hand;         // m, where the hand has its tip
+  Vec3f force_n;      // of the tissue on the tool, world frame
+  Vec3f torque_nm;    // about the tip
+  float penetration_m = 0;
+};
+static_assert(sizeof(PageTool) == 23 * sizeof(float));
+
+struct PagePointer {
+  float participant = 0;  // slot
+  Vec3f position;         // m
+};
+static_assert(sizeof(PagePointer) == 4 * sizeof(float));
+
+class PageModel {
+ public:
+  PageModel();
+  // Forgets everything.
+  void restart();
+
+  // Takes one Envelope without its length. False: it is refused, and so is all that follows.
+  bool receive(BytesView envelope, double now_ms);
+  // Takes a message as a recording stores it, without its Envelope; `field`: its number there.
+  bool receive_bare(std::uint32_t field, BytesView message, double now_ms);
+  const std::string& error() const { return error_; }
+  // Messages for the server, each with its length before it.
+  const Bytes& outbox() const { return outbox_; }
+  void clear_outbox() { outbox_.clear(); }
+
+  const replica::Replica& replica() const { return *replica_; }
+  // CRC-32 of the newest frame, computed anew from what is held; 0 before the first.
+  std::uint32_t own_crc() const;
+  // Ticks by which the picture is behind frames without jitter.
+  double shown_tick() const { return shown_->tick(); }
+
+  // Computes the picture at `now_ns`. At most `triangle_budget` triangles where rounding would make
+  // more. False until there is one.
+  bool update(double now_ms, std::size_t triangle_budget, Overlay overlay);
+  // Changes with the number and the order of vertices and triangles.
+  std::uint64_t geometry_version() const { return geometry_version_; }
+  const shape::SmoothSurface& surface() const { return smooth_; }
+  // x, y, z at rest, and 1 on faces that a blade made, -1 on their rim outside, else 0.
+  std::span<const std::array<float, 4>> rest() const { return rest_; }
+  std::span<const std::array<std::uint8_t, 4>> overlay() const { return overlay_; }
+  std::span<const PageTool> tools() const { return tools_; }
+  std::span<const PagePointer> pointers() const { return pointers_; }
+
+  // Vertices of a tool that is drawn in one piece (a blade), or of its shaft and one jaw.
+  const shape::MeshVertices& make_tool(const tool::ToolShape& form, shape::Colour colour);
+  const shape::MeshVertices& make_jaw(const tool::ToolShape& form);
+  const shape::MeshVertices& make_arrow(float length, float radius, shape::Colour colour);
+
+ private:
+  bool accept(const proto::Envelope& envelope, double now_ms, std::size_t bytes);
+  void build_surface(std::size_t triangle_budget);
+  void update_tools();
+  void update_overlay(Overlay overlay);
+
+  std::optional<replica::Replica> replica_;
+  std::optional<replica::InterpolatedSurface> shown_;
+  replica::HeldTissue held_;
+  std::uint64_t held_history_ = 0;
+  shape::SmoothSurface smooth_;
+  std::uint64_t built_version_ = 0, geometry_version_ = 0;
+  std::size_t built_budget_ = 0;
+  std::vector<std::array<float, 4>> rest_;
+  std::vector<std::array<float, 4>> tints_;  // colour weighted by the fourth
+  std::vector<std::array<std::uint8_t, 4>> overlay_;
+  std::vector<PageTool> tools_;
+  std::vector<PagePointer> pointers_;
+  shape::MeshVertices mesh_;
+  Bytes outbox_;
+  std::string error_;
+};
+
+}  // namespace trocar::wasm

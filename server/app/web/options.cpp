@@ -1,0 +1,230 @@
+#include "server/app/web/options.h"
+
+#include <CLI/CLI.hpp>
+#include <charconv>
+#include <memory>
+
+#include "common/base/version.h"
+#include "common/secure/loopback.h"
+#include "server/app/config/config_file.h"
+
+namespace trocar::app {
+namespace {
+
+constexpr const char* kExampleFile = "deploy/trocar-web.toml.example";
+constexpr const char* kExamples = R"(
+Examples:
+  trocar-web --insecure-loopback
+      the page for your own server on this machine; prints links for a browser here
+  trocar-web --listen 0.0.0.0:7691 --certificate page.crt --key page.key
+      for everybody on the network, with a certificate that their browsers trust
+  trocar-web --session 10.0.0.5:7690 --session 10.0.0.6:7690
+      two sessions; a link says which: https://HOST:7691/#join=CODE&session=10.0.0.6:7690
+  trocar-web --recordings lessons
+      also the recordings in that folder, to who has the link that is printed
+  trocar-web --recordings lessons --new-recordings-key
+      the links to recordings that were given away before are good no more
+  trocar-web --config web.toml --check-config
+      would a start with these options succeed? deploy/trocar-web.toml.example has all of them
+
+Who watches needs a join code of the session, as trocar-server prints them. In the link it stands
+behind the #, which no browser sends to a server.
+Exit codes: 0 ok, also after Ctrl-C, 2 command line, 3 bad file, 5 port taken or page missing.
+)";
+
+Error bad_place(const char* option, const std::string& text) {
+  return {ErrorCode::Usage,
+          std::string(option) + ": '" + text + "' is not HOST:PORT, such as 127.0.0.1:7690"};
+}
+
+Status parse_place(const char* option, const std::string& text, std::string& host,
+                   std::uint16_t& port) {
+  const auto colon = text.rfind(':');
+  if (colon == std::string::npos || colon == 0) return bad_place(option, text);
+  host = text.substr(0, colon);
+  if (host.starts_with('[') && host.ends_with(']')) host = host.substr(1, host.size() - 2);
+  const char* end = text.data() + text.size();
+  const auto parsed = std::from_chars(text.data() + colon + 1, end, port);
+  if (host.empty() || parsed.ec != std::errc{} || parsed.ptr != end) return bad_place(option, text);
+  return {};
+}
+
+class CommandLine {
+ public:
+  CommandLine();
+
+  CLI::App& app() { return app_; }
+  WebOptions& options() { return options_; }
+  // Checks one option alone, as if nothing else had been given.
+  Status check(const std::string& key, const std::string& text);
+  Status finish();
+
+ private:
+  void add_access_options();
+  void add_limit_options();
+
+  WebOptions options_;
+  std::string listen_ = "127.0.0.1:7691", metrics_;
+  std::vector<std::string> sessions_{"127.0.0.1:7690"};
+  CLI::App app_{"Serves the page on which people watch sessions and recordings in a browser.",
+                "trocar-web"};
+};
+
+CommandLine::CommandLine() {
+  app_.footer(kExamples);
+  app_.set_version_flag("--version", std::string("trocar-web ") + kVersion + ", protocol " +
+                                         std::to_string(kProtocolMajor) + "." +
+                                         std::to_string(kProtocolMinor))
+      ->configurable(false);
+  app_.get_help_ptr()->configurable(false);
+  app_.add_option("--session", sessions_,
+                  "a session that may be watched; the first one if a link "
+                  "names none; may be given several times")
+      ->type_name("HOST:PORT")
+      ->capture_default_str();
+  app_.add_option("--listen", listen_, "where browsers reach it; port 0 takes any free one")
+      ->type_name("ADDR:PORT")
+      ->capture_default_str();
+  app_.add_option("--public-name", options_.public_name,
+                  "how links name this machine, if not by the address")
+      ->type_name("HOST[:PORT]");
+  app_.add_option("--recordings", options_.recordings_folder,
+                  "folder whose recordings may be watched [none]")
+      ->type_name("DIR");
+  app_.add_option("--page", options_.page_folder, "folder of the page's files [beside the program]")
+      ->type_name("DIR");
+  app_.add_option("--metrics", metrics_,
+                  "where figures are read, in the format of Prometheus "
+                  "[nowhere]")
+      ->type_name("ADDR:PORT");
+  app_.add_option("--seconds", options_.seconds, "end after this many seconds [Ctrl-C]")
+      ->type_name("N")
+      ->check(CLI::Range(0.0, 1e9));
+  app_.add_option("--ready-file", options_.ready_file, "write the port to this file when listening")
+      ->type_name("FILE");
+  app_.add_option("--log-level", options_.log_level, "error, warn, info, debug or off")
+      ->check(CLI::IsMember({"error", "warn", "info", "debug", "off"}))
+      ->type_name("LEVEL")
+      ->capture_default_str();
+  auto* config = app_.set_config("--config", "",
+                                 "options from this file (TOML), each without its dashes; the "
+                                 "command line wins")
+                     ->type_name("FILE");
+  app_.add_flag("--check-config", options_.checks_config,
+                "check all options and files as a start would, and exit with 0 or 2")
+      ->needs(config)
+      ->configurable(false);
+  add_access_options();
+  add_limit_options();
+}
+
+void CommandLine::add_access_options() {
+  auto* access = app_.add_option_group("Access", "TLS and keys");
+  access
+      ->add_option("--state", options_.state_folder,
+                   "folder of certificate and keys [~/.local/state/trocar]")
+      ->type_name("DIR");
+  auto* certificate = access
+                          ->add_option("--certificate", options_.certificate_file,
+                                       "use this certificate (PEM) instead of one of its own, "
+                                       "which browsers warn of")
+                          ->type_name("FILE");
+  auto* key = access->add_option("--key", options_.key_file, "the certificate's key (PEM)")
+                  ->type_name("FILE");
+  certificate->needs(key);
+  key->needs(certificate);
+  access->add_flag("--insecure-loopback", options_.is_insecure,
+                   "without TLS towards browsers; 127.0.0.1 and [::1] only");
+  access
+      ->add_flag("--new-recordings-key", options_.makes_new_key,
+                 "links to recordings from before are good no more")
+      ->configurable(false);
+}
+
+void CommandLine::add_limit_options() {
+  auto* limits = app_.add_option_group("Limits", "how much strangers may take");
+  limits->add_option("--max-connections", options_.most_connections, "connections of browsers")
+      ->type_name("N")
+      ->check(CLI::Range(4, 10'000))
+      ->capture_default_str();
+  limits
+      ->add_option("--max-connections-per-address", options_.most_per_address,
+                   "of these from one address")
+      ->type_name("N")
+      ->check(CLI::Range(4, 10'000))
+      ->capture_default_str();
+}
+
+Status CommandLine::check(const std::string& key, const std::string& text) {
+  const auto refused = [&key](const std::string& message) {
+    for (const auto& name : {"--" + key + ": ", key + ": "})
+      if (message.starts_with(name)) return Error{ErrorCode::Usage, message.substr(name.size())};
+    return Error{ErrorCode::Usage, message};
+  };
+  auto* option = app_.get_option("--" + key);
+  try {
+    option->add_result(text);
+    option->run_callback();
+  } catch (const CLI::ParseError& error) {
+    return refused(error.what());
+  }
+  // Whether TLS may be left out depends on another option.
+  if (key == "insecure-loopback") return {};
+  const auto finished = finish();
+  return finished ? finished : refused(finished.error().message);
+}
+
+Status CommandLine::finish() {
+  if (auto s = parse_place("--listen", listen_, options_.address, options_.port); !s) return s;
+  if (!metrics_.empty())
+    if (auto s =
+            parse_place("--metrics", metrics_, options_.metrics_address, options_.metrics_port);
+        !s)
+      return s;
+  options_.sessions.clear();
+  for (const auto& text : sessions_) {
+    bridge::SessionAddress session;
+    session.name = text;
+    if (auto s = parse_place("--session", text, session.host, session.port); !s) return s;
+    options_.sessions.push_back(std::move(session));
+  }
+  if (options_.is_insecure && !secure::is_loopback(options_.address))
+    return Error{ErrorCode::Usage, "--insecure-loopback: " + options_.address +
+                                       " can be reached from other machines: use it with "
+                                       "127.0.0.1 or [::1], or leave it out"};
+  return {};
+}
+
+}  // namespace
+
+Result<std::optional<WebOptions>> parse_web_command_line(int argc, char** argv) {
+  CommandLine line;
+  auto& options = line.options();
+  const CheckOption check = [](const std::string& key, const std::string& text) {
+    return CommandLine().check(key, text);
+  };
+  line.app().config_formatter(
+      std::make_shared<ConfigReader>(line.app(), check, options.origins, kExampleFile));
+  const auto usage = [&options](const std::string& message) {
+    return Error{ErrorCode::Usage, options.origins.placed(message)};
+  };
+  try {
+    line.app().parse(argc, argv);
+  } catch (const CLI::FileError& error) {
+    return usage("--config: " + std::string(error.what()) + ", name a file that is there");
+  } catch (const CLI::ConfigError& error) {
+    return usage(error.what());
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) {
+      line.app().exit(error);
+      return std::optional<WebOptions>();
+    }
+    return usage(std::string(error.what()) + " (see --help)");
+  }
+  if (const auto finished = line.finish(); !finished) return usage(finished.error().message);
+  if (line.app().get_config_ptr()->count() > 0)
+    options.config_file = line.app().get_config_ptr()->as<std::string>();
+  return std::optional(std::move(options));
+}
+
+}  // namespace trocar::app

@@ -1,0 +1,39 @@
+#pragma once
+
+// trocar-web's command line, and the configuration file that it may name.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "server/app/config/option_origins.h"
+#include "server/web/bridge/watcher.h"
+
+namespace trocar::app {
+
+struct WebOptions {
+  std::string address = "127.0.0.1";
+  std::uint16_t port = 7691;
+  std::vector<bridge::SessionAddress> sessions;
+  std::string recordings_folder;  // empty: none
+  std::string page_folder;        // empty: beside the program
+  std::string metrics_address;    // empty: no figures
+  std::uint16_t metrics_port = 0;
+  std::string public_name;  // HOST[:PORT] in links; empty: the address
+  std::string state_folder, certificate_file, key_file;
+  bool is_insecure = false;
+  bool makes_new_key = false;
+  int most_connections = 600, most_per_address = 200;
+  double seconds = 0;  // 0: until told to end
+  std::string ready_file;
+  std::string log_level = "info";
+  bool checks_config = false;
+  std::string config_file;
+  OptionOrigins origins;
+};
+
+// Nothing if the program is done (after --help or --version).
+Result<std::optional<WebOptions>> parse_web_command_line(int argc, char** argv);
+
+}  // namespace trocar::app

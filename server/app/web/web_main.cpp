@@ -1,0 +1,96 @@
+// trocar-web: serves the page on which people watch sessions and recordings in a browser.
+
+#include "common/base/asio.h"  // before Boost: see there
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/signal_set.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <cmath>
+#include <csignal>
+#include <cstdio>
+
+#include "common/base/cpu.h"
+#include "common/base/log.h"
+#include "common/base/text_file.h"
+#include "server/app/web/web_start.h"
+
+namespace trocar::app {
+namespace {
+
+constexpr const char* kProgram = "trocar-web";
+
+// Everybody is cut; a second later the program ends whatever is still there.
+void end_in_order(asio::io_context& context, WebServer& server, asio::steady_timer& timer) {
+  server.stop();
+  timer.expires_after(std::chrono::seconds(1));
+  timer.async_wait([&context](boost::system::error_code) { context.stop(); });
+}
+
+Status run_web(const WebOptions& options) {
+  auto start = prepare_web(options);
+  if (!start) return start.error();
+  const auto key = start->content.recordings_key;
+  asio::io_context context{1};
+  auto listening =
+      WebServer::listen(context, options, std::move(start->content), std::move(start->tls));
+  if (!listening) return listening.error();
+  auto& server = **listening;
+  server.start();
+  asio::signal_set signals(context, SIGINT, SIGTERM);
+  asio::steady_timer end(context), last(context);
+  signals.async_wait([&](boost::system::error_code error, int) {
+    if (!error) end_in_order(context, server, last);
+  });
+  if (options.seconds > 0) {
+    end.expires_after(std::chrono::nanoseconds(std::llround(options.seconds * 1e9)));
+    end.async_wait([&](boost::system::error_code error) {
+      if (!error) end_in_order(context, server, last);
+    });
+  }
+  if (!options.ready_file.empty())
+    if (auto written = write_text_file(options.ready_file, std::to_string(server.port()) + "\n");
+        !written)
+      return written;
+  std::fputs(describe_links(options, server.port(), key).c_str(), stdout);
+  std::fflush(stdout);
+  log::info("listening at {}:{}, Ctrl-C ends it", options.address, server.port());
+  if (server.metrics_port() != 0)
+    log::info("figures at {}:{}/metrics", options.metrics_address, server.metrics_port());
+  try {
+    context.run();
+  } catch (const std::exception& exception) {
+    return Error{
+        ErrorCode::ResourceMissing,
+        std::string("the page has ended: its network thread failed (") + exception.what() + ")"};
+  }
+  return {};
+}
+
+int check_config(const WebOptions& options) {
+  if (const auto fine = check_web_start(options); !fine)
+    return report(kProgram, {ErrorCode::Usage, options.origins.placed(fine.error().message)});
+  std::printf("%s: fine\n", options.config_file.c_str());
+  return static_cast<int>(ExitCode::Ok);
+}
+
+int run(int argc, char** argv) {
+  const auto parsed = parse_web_command_line(argc, argv);
+  if (!parsed) return report(kProgram, parsed.error());
+  if (!*parsed) return static_cast<int>(ExitCode::Ok);
+  const auto& options = **parsed;
+  if (const auto set = log::configure(kProgram, options.checks_config ? "off" : options.log_level);
+      !set)
+    return report(kProgram, set.error());
+  if (options.checks_config) return check_config(options);
+  if (const auto ran = run_web(options); !ran)
+    return report(kProgram, {ran.error().code, options.origins.placed(ran.error().message)});
+  return static_cast<int>(ExitCode::Ok);
+}
+
+}  // namespace
+}  // namespace trocar::app
+
+int main(int argc, char** argv) {
+  trocar::require_cpu_features(trocar::app::kProgram);
+  return trocar::app::run(argc, argv);
+}

@@ -1,0 +1,473 @@
+#include "server/app/web/web_server.h"
+
+#include <fmt/format.h>
+#include <algorithm>
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/beast/http.hpp>
+#include <map>
+#include <set>
+
+#include "common/base/log.h"
+#include "common/base/timing.h"
+#include "common/secure/digest.h"
+#include "server/app/web/web_socket.h"
+#include "server/web/site/request_rules.h"
+
+namespace trocar::app {
+namespace {
+
+namespace http = beast::http;
+using tcp = asio::ip::tcp;
+using Request = http::request<http::string_body>;
+
+constexpr std::chrono::seconds kRequestDeadline{10}, kAnswerDeadline{30}, kHandshakeDeadline{5};
+constexpr std::chrono::milliseconds kAcceptRetry{200};
+constexpr std::uint32_t kMostHeaderBytes = 8 * 1024;
+constexpr std::size_t kPieceBytes = 64 * 1024;
+// Old bytes wait in the kernel: few fit.
+constexpr int kSendBufferBytes = 64 * 1024;
+constexpr std::string_view kRecordingsPath = "/recordings";
+
+// An answer: what goes before its body, and where the body is.
+struct Answer {
+  http::response_header<> head;
+  BytesView body;                                  // of a file of the page
+  std::string text;                                // else of what was made for it
+  std::unique_ptr<site::OpenRecording> recording;  // else a part of a recording
+  site::ByteRange range;
+  std::uint64_t length = 0;
+};
+
+std::string plain_host(const tcp::socket& socket) {
+  boost::system::error_code error;
+  const auto peer = socket.remote_endpoint(error);
+  return error ? std::string() : peer.address().to_string();
+}
+
+bool takes_gzip(const Request& request) {
+  return request[http::field::accept_encoding].find("gzip") != beast::string_view::npos;
+}
+
+std::string_view view_of(beast::string_view text) {
+  return {text.data(), text.size()};
+}
+
+}  // namespace
+
+struct WebServer::Core : std::enable_shared_from_this<WebServer::Core> {
+  asio::io_context& context;
+  const WebOptions options;
+  WebContent content;
+  const secure::TlsContext tls;
+  bridge::Bridge bridge;
+  tcp::acceptor acceptor{context}, metrics_acceptor{context};
+  access::TryLimiter key_limiter;
+  WebCounters counters;
+  std::map<std::string, int> open_by_address;
+  // Whoever is connected can be cut: by closing its socket, or its watcher.
+  std::uint64_t next_id = 1;
+  std::map<std::uint64_t, std::function<void()>> cuts;
+  bool is_stopping = false;
+
+  Core(asio::io_context& io, const WebOptions& given, WebContent what, secure::TlsContext with)
+      : context(io),
+        options(given),
+        content(std::move(what)),
+        tls(std::move(with)),
+        bridge(given.sessions) {}
+
+  Status open(tcp::acceptor& listener, const char* option, const std::string& address,
+              std::uint16_t port) const {
+    boost::system::error_code error;
+    const auto ip = asio::ip::make_address(address, error);
+    if (error)
+      return Error{ErrorCode::Usage, std::string(option) + ": '" + address +
+                                         "' is not an IPv4 or IPv6 address: use 127.0.0.1 for this "
+                                         "machine only, 0.0.0.0 for any"};
+    const tcp::endpoint endpoint(ip, port);
+    listener.open(endpoint.protocol(), error);
+    if (!error) listener.set_option(tcp::acceptor::reuse_address(true), error);
+    if (!error) listener.bind(endpoint, error);
+    if (!error) listener.listen(asio::socket_base::max_listen_connections, error);
+    if (!error) return {};
+    return Error{ErrorCode::ResourceMissing, std::string(option) + ": " + address + ":" +
+                                                 std::to_string(port) + ": " + error.message() +
+                                                 ", choose another port"};
+  }
+
+  bool admit(const std::string& peer) {
+    auto& from_there = open_by_address[access::counted_as(peer)];
+    if (counters.open >= static_cast<std::size_t>(options.most_connections) ||
+        from_there >= options.most_per_address) {
+      ++counters.refused_full;
+      if (from_there == 0) open_by_address.erase(access::counted_as(peer));
+      return false;
+    }
+    ++from_there;
+    ++counters.open;
+    ++counters.connections;
+    return true;
+  }
+
+  void forget(const std::string& peer) {
+    --counters.open;
+    const auto found = open_by_address.find(access::counted_as(peer));
+    if (found != open_by_address.end() && --found->second <= 0) open_by_address.erase(found);
+  }
+
+  asio::awaitable<void> accept(tcp::acceptor& listener, bool is_for_metrics) {
+    asio::steady_timer retry(context);
+    while (!is_stopping) {
+      auto [error, socket] = co_await listener.async_accept(kNoThrow);
+      if (is_stopping || !listener.is_open()) co_return;
+      if (error) {
+        retry.expires_after(kAcceptRetry);
+        co_await retry.async_wait(kNoThrow);
+        continue;
+      }
+      begin(std::move(socket), is_for_metrics);
+    }
+  }
+
+  void begin(tcp::socket socket, bool is_for_metrics) {
+    const auto peer = plain_host(socket);
+    if (!admit(peer)) return;
+    boost::system::error_code ignored;
+    socket.set_option(tcp::no_delay(true), ignored);
+    socket.set_option(asio::socket_base::send_buffer_size(kSendBufferBytes), ignored);
+    const auto self = shared_from_this();
+    const auto ended = [self, peer](std::exception_ptr failure) {
+      self->forget(peer);
+      rethrow(failure);
+    };
+    if (is_for_metrics)
+      asio::co_spawn(context, serve_metrics(beast::tcp_stream(std::move(socket))), ended);
+    else if (tls)
+      asio::co_spawn(context,
+                     serve_tls(beast::ssl_stream<beast::tcp_stream>(
+                                   beast::tcp_stream(std::move(socket)), *tls),
+                               peer),
+                     ended);
+    else
+      asio::co_spawn(context, serve(beast::tcp_stream(std::move(socket)), peer), ended);
+  }
+
+  asio::awaitable<void> serve_tls(beast::ssl_stream<beast::tcp_stream> stream, std::string peer) {
+    beast::get_lowest_layer(stream).expires_after(kHandshakeDeadline);
+    const auto [error] = co_await stream.async_handshake(asio::ssl::stream_base::server, kNoThrow);
+    if (error) co_return;
+    co_await serve(std::move(stream), std::move(peer));
+  }
+
+  template <typename Stream>
+  asio::awaitable<bool> read_request(Stream& stream, beast::flat_buffer& buffer, Request& request) {
+    http::request_parser<http::string_body> parser;
+    parser.header_limit(kMostHeaderBytes);
+    parser.body_limit(0);
+    beast::get_lowest_layer(stream).expires_after(kRequestDeadline);
+    const auto [error, count] = co_await http::async_read(stream, buffer, parser, kNoThrow);
+    if (error) {
+      if (error.category() == http::make_error_code(http::error::bad_version).category() &&
+          error != http::error::end_of_stream)
+        ++counters.malformed;
+      co_return false;
+    }
+    request = parser.release();
+    ++counters.requests;
+    co_return true;
+  }
+
+  template <typename Stream>
+  asio::awaitable<void> serve(Stream stream, std::string peer) {
+    const auto id = next_id++;
+    beast::flat_buffer buffer(kMostHeaderBytes + 4096);
+    bool goes_on = true;
+    while (goes_on && !is_stopping) {
+      Request request;
+      cuts[id] = [&stream] { beast::get_lowest_layer(stream).close(); };
+      const bool is_read = co_await read_request(stream, buffer, request);
+      if (!is_read) break;
+      if (beast::websocket::is_upgrade(request) && view_of(request.target()) == "/session") {
+        const bool is_own =
+            site::is_own_origin(view_of(request[http::field::origin]),
+                                view_of(request[http::field::host]), tls != nullptr);
+        if (is_own) {
+          co_await bridge_to_session(std::move(stream), peer, request, id);
+          cuts.erase(id);
+          co_return;
+        }
+        ++counters.forbidden;
+        request.keep_alive(false);
+        Answer refusal = refuse(request, http::status::forbidden,
+                                "Only the page of this server may open this.\n");
+        co_await send(stream, request, refusal);
+        break;
+      }
+      Answer answer = answer_to(request, peer);
+      goes_on = co_await send(stream, request, answer);
+      goes_on = goes_on && request.keep_alive();
+    }
+    cuts.erase(id);
+    beast::get_lowest_layer(stream).close();
+  }
+
+  template <typename Stream>
+  asio::awaitable<void> bridge_to_session(Stream stream, std::string peer, const Request& request,
+                                          std::uint64_t id) {
+    auto socket = std::make_unique<WebSocket<Stream>>(std::move(stream), peer);
+    auto* below = socket.get();
+    cuts[id] = [below] { below->cut(); };
+    const bool is_open = co_await below->accept(request);
+    if (!is_open) co_return;
+    const auto watcher = std::make_shared<bridge::Watcher>(std::move(socket), bridge);
+    cuts[id] = [watcher] { watcher->cut(); };
+    co_await watcher->run();
+  }
+
+  Answer make_answer(const Request& request, http::status status, std::string_view type) {
+    Answer answer;
+    auto& head = answer.head;
+    head.version(request.version());
+    head.result(status);
+    head.set(http::field::content_type, {type.data(), type.size()});
+    head.set(http::field::cache_control, "no-cache");
+    for (const auto& [name, value] : site::safety_headers(tls != nullptr))
+      head.set({name.data(), name.size()}, {value.data(), value.size()});
+    return answer;
+  }
+
+  Answer refuse(const Request& request, http::status status, std::string text) {
+    Answer answer = make_answer(request, status, "text/plain; charset=utf-8");
+    answer.text = std::move(text);
+    answer.length = answer.text.size();
+    return answer;
+  }
+
+  Answer answer_to(const Request& request, const std::string& peer) {
+    if (request.method() != http::verb::get && request.method() != http::verb::head) {
+      Answer answer = refuse(request, http::status::method_not_allowed, "Only GET and HEAD.\n");
+      answer.head.set(http::field::allow, "GET, HEAD");
+      return answer;
+    }
+    auto path = view_of(request.target());
+    path = path.substr(0, path.find('?'));
+    if (path == kRecordingsPath ||
+        (path.starts_with(kRecordingsPath) && path[kRecordingsPath.size()] == '/'))
+      return answer_recordings(request, path.substr(kRecordingsPath.size()), peer);
+    const auto* file = content.page.find(path);
+    if (file == nullptr) {
+      ++counters.not_found;
+      return refuse(request, http::status::not_found, "There is no such page.\n");
+    }
+    return answer_file(request, *file);
+  }
+
+  Answer answer_file(const Request& request, const site::PageFile& file) {
+    Answer answer = make_answer(request, http::status::ok, file.type);
+    answer.head.set(http::field::etag, file.etag);
+    answer.head.set(http::field::vary, "Accept-Encoding");
+    if (view_of(request[http::field::if_none_match]) == file.etag) {
+      answer.head.result(http::status::not_modified);
+      return answer;
+    }
+    const bool is_packed = !file.gzip.empty() && takes_gzip(request);
+    if (is_packed) answer.head.set(http::field::content_encoding, "gzip");
+    answer.body = is_packed ? BytesView(file.gzip) : BytesView(file.plain);
+    answer.length = answer.body.size();
+    return answer;
+  }
+
+  bool has_key(const Request& request) const {
+    constexpr std::string_view kScheme = "Bearer ";
+    auto given = view_of(request[http::field::authorization]);
+    if (!given.starts_with(kScheme)) return false;
+    given.remove_prefix(kScheme.size());
+    return secure::equal_in_constant_time(bytes_of(given), bytes_of(content.recordings_key));
+  }
+
+  Answer answer_recordings(const Request& request, std::string_view rest, const std::string& peer) {
+    if (!content.recordings) {
+      ++counters.not_found;
+      return refuse(request, http::status::not_found,
+                    "No recordings are served here (--recordings).\n");
+    }
+    if (const auto wait = key_limiter.seconds_to_wait(peer, monotonic_ns()); wait > 0) {
+      ++counters.forbidden;
+      return refuse(request, http::status::too_many_requests,
+                    "Too many wrong keys: wait " + std::to_string(wait) + " s.\n");
+    }
+    if (!has_key(request)) {
+      ++counters.forbidden;
+      if (request.find(http::field::authorization) != request.end())
+        key_limiter.record_wrong_try(peer, monotonic_ns());
+      return refuse(request, http::status::forbidden,
+                    "Recordings need the key of their link: ask for a new link.\n");
+    }
+    if (rest.empty()) {
+      Answer answer = make_answer(request, http::status::ok, "application/json");
+      answer.text = content.recordings->list();
+      answer.length = answer.text.size();
+      return answer;
+    }
+    auto recording = content.recordings->find(rest.substr(1));
+    if (!recording) {
+      ++counters.not_found;
+      return refuse(request, http::status::not_found, "There is no such recording.\n");
+    }
+    return answer_part(request, std::move(recording));
+  }
+
+  Answer answer_part(const Request& request, std::unique_ptr<site::OpenRecording> recording) {
+    const auto size = recording->size();
+    const auto asked = site::read_range(view_of(request[http::field::range]), size);
+    if (asked.kind == site::RangeKind::Unsatisfiable) {
+      Answer answer =
+          refuse(request, http::status::range_not_satisfiable, "It ends before that.\n");
+      answer.head.set(http::field::content_range, fmt::format("bytes */{}", size));
+      return answer;
+    }
+    const bool is_part = asked.kind == site::RangeKind::Part;
+    Answer answer = make_answer(request, is_part ? http::status::partial_content : http::status::ok,
+                                "application/octet-stream");
+    answer.head.set(http::field::accept_ranges, "bytes");
+    answer.range = is_part ? asked.range : site::ByteRange{0, size};
+    if (is_part)
+      answer.head.set(http::field::content_range,
+                      fmt::format("bytes {}-{}/{}", answer.range.first,
+                                  answer.range.first + answer.range.length - 1, size));
+    answer.recording = std::move(recording);
+    answer.length = answer.range.length;
+    return answer;
+  }
+
+  template <typename Stream>
+  asio::awaitable<bool> send(Stream& stream, const Request& request, Answer& answer) {
+    http::response<http::empty_body> head(std::move(answer.head));
+    head.content_length(answer.length);
+    head.keep_alive(request.keep_alive());
+    http::response_serializer<http::empty_body> serializer(head);
+    beast::get_lowest_layer(stream).expires_after(kAnswerDeadline);
+    const auto [failed, count] = co_await http::async_write_header(stream, serializer, kNoThrow);
+    if (failed) co_return false;
+    if (request.method() == http::verb::head) co_return true;
+    std::uint64_t at = 0;
+    std::string piece;
+    while (at < answer.length) {
+      const auto bytes =
+          static_cast<std::size_t>(std::min<std::uint64_t>(kPieceBytes, answer.length - at));
+      asio::const_buffer buffer(answer.body.data() + at, bytes);
+      if (answer.recording) {
+        piece = answer.recording->read(answer.range.first + at, bytes);
+        if (piece.size() < bytes) co_return false;  // it has become shorter: the answer breaks off
+        buffer = asio::buffer(piece);
+        counters.recording_bytes += bytes;
+      } else if (answer.body.empty()) {
+        buffer = asio::const_buffer(answer.text.data() + at, bytes);
+      }
+      beast::get_lowest_layer(stream).expires_after(kAnswerDeadline);
+      const auto [error, written] = co_await asio::async_write(stream, buffer, kNoThrow);
+      if (error) co_return false;
+      at += bytes;
+    }
+    co_return true;
+  }
+
+  asio::awaitable<void> serve_metrics(beast::tcp_stream stream) {
+    beast::flat_buffer buffer(kMostHeaderBytes + 4096);
+    Request request;
+    const bool is_read = co_await read_request(stream, buffer, request);
+    if (!is_read) co_return;
+    Answer answer = refuse(request, http::status::not_found, "Figures are at /metrics.\n");
+    if (view_of(request.target()) == "/metrics") {
+      answer = refuse(request, http::status::ok, metrics());
+      answer.head.set(http::field::content_type, "text/plain; version=0.0.4");
+    }
+    request.keep_alive(false);
+    co_await send(stream, request, answer);
+  }
+
+  std::string metrics() const {
+    const auto& b = bridge.counters;
+    std::string text;
+    const auto add = [&text](const char* name, const char* kind, const char* help, auto value) {
+      text +=
+          fmt::format("# HELP trocar_web_{0} {2}\n# TYPE trocar_web_{0} {1}\ntrocar_web_{0} {3}\n",
+                      name, kind, help, value);
+    };
+    add("connections_open", "gauge", "Connections of browsers now.", counters.open);
+    add("connections_total", "counter", "Connections taken.", counters.connections);
+    add("connections_refused_total", "counter", "Connections beyond a limit.",
+        counters.refused_full);
+    add("requests_total", "counter", "Requests read.", counters.requests);
+    add("requests_not_found_total", "counter", "Requests for what is not there.",
+        counters.not_found);
+    add("requests_forbidden_total", "counter", "Requests without key, or of another site.",
+        counters.forbidden);
+    add("requests_malformed_total", "counter", "Requests that are none.", counters.malformed);
+    add("recording_bytes_total", "counter", "Bytes of recordings sent.", counters.recording_bytes);
+    add("watchers", "gauge", "People who watch a session now.", b.watchers);
+    add("joins_total", "counter", "Joins that reached a session.", b.joins);
+    add("joins_refused_total", "counter", "Joins refused here.", b.refused);
+    add("wrong_codes_total", "counter", "Wrong join codes.", b.wrong_codes);
+    add("sessions_unreachable_total", "counter", "Sessions that did not answer.", b.unreachable);
+    add("messages_down_total", "counter", "Messages to browsers.", b.messages_down);
+    add("bytes_down_total", "counter", "Bytes of these.", b.bytes_down);
+    add("messages_up_total", "counter", "Messages from browsers.", b.messages_up);
+    add("bytes_up_total", "counter", "Bytes of these.", b.bytes_up);
+    return text;
+  }
+};
+
+Result<std::unique_ptr<WebServer>> WebServer::listen(asio::io_context& context,
+                                                     const WebOptions& options, WebContent content,
+                                                     secure::TlsContext tls) {
+  auto core = std::make_shared<Core>(context, options, std::move(content), std::move(tls));
+  if (auto opened = core->open(core->acceptor, "--listen", options.address, options.port); !opened)
+    return opened.error();
+  if (!options.metrics_address.empty())
+    if (auto opened = core->open(core->metrics_acceptor, "--metrics", options.metrics_address,
+                                 options.metrics_port);
+        !opened)
+      return opened.error();
+  return std::unique_ptr<WebServer>(new WebServer(std::move(core)));
+}
+
+WebServer::~WebServer() {
+  stop();
+}
+
+std::uint16_t WebServer::port() const {
+  boost::system::error_code ignored;
+  return core_->acceptor.local_endpoint(ignored).port();
+}
+
+std::uint16_t WebServer::metrics_port() const {
+  boost::system::error_code ignored;
+  return core_->metrics_acceptor.is_open() ? core_->metrics_acceptor.local_endpoint(ignored).port()
+                                           : std::uint16_t{0};
+}
+
+void WebServer::start() {
+  const auto core = core_;
+  const auto ended = [core](std::exception_ptr failure) { rethrow(failure); };
+  asio::co_spawn(core->context, core->accept(core->acceptor, false), ended);
+  if (core->metrics_acceptor.is_open())
+    asio::co_spawn(core->context, core->accept(core->metrics_acceptor, true), ended);
+}
+
+void WebServer::stop() {
+  if (core_->is_stopping) return;
+  core_->is_stopping = true;
+  boost::system::error_code ignored;
+  core_->acceptor.close(ignored);
+  core_->metrics_acceptor.close(ignored);
+  auto cuts = core_->cuts;  // a copy: cutting takes entries out
+  for (const auto& [id, cut] : cuts) cut();
+}
+
+std::string WebServer::metrics() const {
+  return core_->metrics();
+}
+
+}  // namespace trocar::app

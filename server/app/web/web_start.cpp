@@ -1,0 +1,138 @@
+#include "server/app/web/web_start.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <filesystem>
+
+#include "common/base/printable.h"
+#include "common/secure/digest.h"
+#include "common/secure/kept_identity.h"
+#include "common/secure/link_file.h"
+#include "common/secure/loopback.h"
+#include "common/secure/private_files.h"
+
+namespace trocar::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kKeyBytes = 16;
+constexpr const char* kKeyFile = "web-recordings.key";
+
+Result<fs::path> state_folder(const WebOptions& options) {
+  if (!options.state_folder.empty()) return fs::absolute(options.state_folder);
+  return secure::default_state_folder();
+}
+
+fs::path page_folder(const WebOptions& options) {
+  if (!options.page_folder.empty()) return options.page_folder;
+  std::error_code error;
+  const auto program = fs::read_symlink("/proc/self/exe", error).parent_path().parent_path();
+  const auto installed = program / "share/trocar/web";
+  return fs::exists(installed, error) ? installed : program / "web/page";
+}
+
+Result<secure::TlsContext> read_certificate(const WebOptions& options, const fs::path& state) {
+  secure::Identity identity;
+  std::string name = "--certificate, --key: " + options.certificate_file;
+  if (options.certificate_file.empty()) {
+    auto own = secure::read_or_make_identity(state, "web");
+    if (!own) return own.error();
+    identity = std::move(*own);
+    name = (state / "web.crt").string();
+  } else {
+    auto certificate = secure::read_small_file(options.certificate_file);
+    if (!certificate) return certificate.error();
+    auto key = secure::read_small_file(options.key_file);
+    if (!key) return key.error();
+    identity = {std::move(*certificate), std::move(*key)};
+  }
+  return secure::make_server_context(identity, name);
+}
+
+Result<std::string> read_or_make_key(const fs::path& state, bool makes_new) {
+  const auto file = state / kKeyFile;
+  std::error_code ignored;
+  if (!makes_new && fs::exists(file, ignored)) {
+    auto text = secure::read_private_file(file);
+    if (!text || text->size() == 2 * kKeyBytes) return text;
+    return Error{ErrorCode::BadFile, file.string() + ": holds no key: remove it"};
+  }
+  std::array<std::uint8_t, kKeyBytes> random{};
+  secure::fill_random(random);
+  const auto key = secure::to_hex(random);
+  if (const auto written = secure::write_private_file(file, key); !written) return written.error();
+  return key;
+}
+
+std::string link_head(const WebOptions& options, std::uint16_t port) {
+  const std::string scheme = options.is_insecure ? "http://" : "https://";
+  if (!options.public_name.empty()) return scheme + options.public_name + "/";
+  const bool is_any = options.address == "0.0.0.0" || options.address == "::";
+  const bool is_ipv6 = options.address.find(':') != std::string::npos;
+  const std::string host = is_any    ? "HOST"
+                           : is_ipv6 ? "[" + options.address + "]"
+                                     : options.address;
+  return scheme + host + ":" + std::to_string(port) + "/";
+}
+
+}  // namespace
+
+Result<WebStart> prepare_web(const WebOptions& options) {
+  WebStart start;
+  auto page = site::PageFiles::read(page_folder(options));
+  if (!page) return Error{page.error().code, "--page: " + page.error().message};
+  start.content.page = std::move(*page);
+  const auto state = state_folder(options);
+  if (!state) return state.error();
+  const bool needs_state = !options.is_insecure || !options.recordings_folder.empty();
+  if (needs_state)
+    if (const auto made = secure::make_private_folder(*state); !made) return made.error();
+  if (!options.is_insecure) {
+    auto tls = read_certificate(options, *state);
+    if (!tls) return tls.error();
+    start.tls = std::move(*tls);
+  }
+  if (options.recordings_folder.empty()) return start;
+  auto recordings = site::Recordings::open(options.recordings_folder);
+  if (!recordings) return recordings.error();
+  auto key = read_or_make_key(*state, options.makes_new_key);
+  if (!key) return key.error();
+  start.content.recordings = std::move(*recordings);
+  start.content.recordings_key = std::move(*key);
+  return start;
+}
+
+Status check_web_start(const WebOptions& options) {
+  const auto page = site::PageFiles::read(page_folder(options));
+  if (!page) return Error{page.error().code, "--page: " + page.error().message};
+  if (!options.recordings_folder.empty())
+    if (const auto recordings = site::Recordings::open(options.recordings_folder); !recordings)
+      return recordings.error();
+  if (options.certificate_file.empty()) return {};
+  const auto tls = read_certificate(options, {});
+  return tls ? Status() : Status(tls.error());
+}
+
+std::string describe_links(const WebOptions& options, std::uint16_t port,
+                           const std::string& recordings_key) {
+  const auto head = link_head(options, port);
+  std::string text = "Links for a browser:\n";
+  for (std::size_t i = 0; i < options.sessions.size(); ++i) {
+    const auto& session = options.sessions[i];
+    const std::string which = i == 0 ? "" : "&session=" + session.name;
+    for (const auto* role : {"instructor", "observer"}) {
+      std::string code = "CODE";
+      if (secure::is_loopback(session.host))
+        if (const auto known = secure::read_link_file(session.port, role); known)
+          code = secure::to_text(*known);
+      text += fmt::format("  {:<10}  {}#join={}&role={}{}\n", role, head, code, role, which);
+    }
+  }
+  if (!recordings_key.empty())
+    text += fmt::format("  {:<10}  {}#recordings={}\n", "recordings", head, recordings_key);
+  return text;
+}
+
+}  // namespace trocar::app

@@ -1,0 +1,59 @@
+#!/bin/bash
+# run_web.sh recording|codec|page|figures BUILD_FOLDER WORK_FOLDER: one of the tests of the page. Exit code 77:
+# skipped, with the reason.
+set -euo pipefail
+test=$1 build=$2 work=$3
+here=$(cd "$(dirname "$0")" && pwd)
+root=$(cd "$here/../.." && pwd)
+bin=$build/bin
+export TROCAR_BUILD=$build TROCAR_ROOT=$root TROCAR_MODULES=$build/client/web/page
+export TROCAR_RECORDING=$build/tests/web/recording/lesson.mcap TROCAR_CRCS=$build/tests/web/recording/crcs
+
+skip() {
+  echo "SKIPPED: $1"
+  exit 77
+}
+[ -e "$build/web/replica_module.wasm" ] || skip "the page is not built: deploy/setup --with-web, then build again"
+command -v node >/dev/null || skip "node is not installed"
+[ -e "$TROCAR_MODULES/node_modules" ] || skip "npm could not reach its registry when the page was built"
+
+rm -rf "$work"
+mkdir -p "$work"
+export TROCAR_WORK=$work XDG_STATE_HOME=$work/state XDG_RUNTIME_DIR=$work/run
+mkdir -m 700 "$XDG_RUNTIME_DIR"
+
+record() {
+  local pids=()
+  trap 'kill "${pids[@]}" 2>/dev/null || true' EXIT
+  "$bin/trocar-server" --insecure-loopback --listen 127.0.0.1:0 --no-announce --seconds 9 --journal "$TROCAR_RECORDING" \
+    --ready-file "$work/port" >"$work/server.log" 2>&1 &
+  pids+=($!)
+  for _ in $(seq 200); do [ -s "$work/port" ] && break; sleep 0.1; done
+  [ -s "$work/port" ] || { cat "$work/server.log"; exit 1; }
+  for hand in incise retract; do
+    "$bin/trocar-client" --insecure-loopback --server "127.0.0.1:$(cat "$work/port")" --name "$hand" --no-render \
+      --script "$root/deploy/scenes/$hand.toml" >"$work/$hand.log" 2>&1 &
+    pids+=($!)
+  done
+  wait "${pids[0]}"
+  "$build/tests/frame_crcs" "$TROCAR_RECORDING" >"$TROCAR_CRCS"
+  # There is something to compare, and the surface has changed.
+  [ "$(wc -l <"$TROCAR_CRCS")" -gt 300 ]
+}
+
+case $test in
+  recording) record ;;
+  codec) node --test "$here/codec.test.mjs" ;;
+  page | figures)
+    chromium=$(command -v chromium || command -v chromium-browser || command -v google-chrome) ||
+      skip "Chromium is not installed: deploy/setup --with-web"
+    [ -e "$build/web/page/index.html" ] || skip "the page is not built"
+    export TROCAR_CHROMIUM=$chromium
+    if [ "$test" = page ]; then
+      node --test "$here/page.test.mjs"
+    else
+      [ -e "$TROCAR_RECORDING" ] || skip "there is no recording: run_web.sh recording makes it"
+      node --experimental-websocket --no-warnings "$here/figures.mjs"
+    fi
+    ;;
+esac
