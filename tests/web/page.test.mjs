@@ -7,7 +7,7 @@ import http from 'node:http';
 import https from 'node:https';
 import net from 'node:net';
 import { createRequire } from 'node:module';
-import { after, before, test } from 'node:test';
+import { after, afterEach, before, test } from 'node:test';
 
 const { TROCAR_MODULES, TROCAR_BUILD, TROCAR_ROOT, TROCAR_WORK, TROCAR_CHROMIUM, TROCAR_RECORDING, TROCAR_CRCS } = process.env;
 const { chromium } = createRequire(`${TROCAR_MODULES}/`)('playwright-core');
@@ -82,6 +82,10 @@ before(async () => {
   fs.copyFileSync(TROCAR_RECORDING, `${TROCAR_WORK}/recordings/lesson.mcap`);
   web = await startWeb(0, ['--insecure-loopback', '--recordings', `${TROCAR_WORK}/recordings`]);
 });
+// What a failed test leaves would take the processor from the next one.
+afterEach(async () => {
+  for (const page of context.pages()) await page.close();
+});
 after(async () => {
   await browser?.close();
   for (const child of children) child.kill('SIGKILL');
@@ -120,7 +124,7 @@ test('an instructor points, and others see where', async () => {
   await live(page);
   assert.equal(await sees.getByRole('button', { name: 'Point' }).count(), 0);
   await page.getByRole('button', { name: 'Point' }).click();
-  const box = await page.locator('canvas').boundingBox();
+  const box = await page.locator('.stage canvas').boundingBox();
   const seen = await until('a pointer', async () => {
     await page.mouse.move(box.x + box.width / 2 + Math.random() * 4, box.y + box.height / 2);
     return sees.evaluate(() => window.trocar.replica.pointers()[0]);
