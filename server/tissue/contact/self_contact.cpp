@@ -43,7 +43,7 @@ constexpr float kBeginsFacing = -0.1f, kStaysFacing = 0.2f;
 // The closest point lies along the normal, within so many gaps and a little.
 constexpr float kAsidePerGap = 1, kAside_m = 0.0005f;
 constexpr float kDeepest_m = 0.008f;
-// Of an overlap that is not pressed this share comes back in a look, but no more than so far and
+// In a look this share of the overlap that is not pressed comes back, but no more than so far and
 // such a share of the way in a tick: what trembles gets less than friction would take from it.
 constexpr float kComesBack = 1e-3f, kComesBack_m = 5e-8f, kComesBackPerWay = 0.01f;
 // A pair whose triangle an edit has replaced presses no deeper than this.

@@ -32,7 +32,7 @@ inline constexpr std::uint16_t kRestTicks = 64;
 // A body is at rest when the mean square of its speeds is below that of kRest_m_s and no node is
 // faster than kShape_m_s; one that creeps is then some hundredths of a millimetre from where it
 // would stop. Awake tissue faster than kWakes_m_s wakes what it touches.
-inline constexpr double kRest_m_s = 2e-5;
+inline constexpr double kRest_m_s = 1e-5;
 inline constexpr float kWakes_m_s = 1e-4f;
 // The shape of a free piece is at rest when its nodes move slower than this against the whole.
 inline constexpr double kShape_m_s = 5e-4;
