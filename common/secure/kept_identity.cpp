@@ -7,7 +7,9 @@ namespace trocar::secure {
 
 namespace fs = std::filesystem;
 
-Result<Identity> read_or_make_identity(const fs::path& folder, const std::string& name) {
+namespace {
+
+Result<Identity> read_or_make_own(const fs::path& folder, const std::string& name) {
   const auto certificate_file = folder / (name + ".crt"), key_file = folder / (name + ".key");
   const FolderLock lock(folder);
   std::error_code ignored;
@@ -25,6 +27,24 @@ Result<Identity> read_or_make_identity(const fs::path& folder, const std::string
   auto key = read_private_file(key_file);
   if (!key) return key.error();
   return Identity{std::move(*certificate), std::move(*key)};
+}
+
+}  // namespace
+
+Result<KeptIdentity> read_or_make_identity(const std::string& certificate_file,
+                                           const std::string& key_file, const fs::path& folder,
+                                           const std::string& name) {
+  if (certificate_file.empty()) {
+    auto own = read_or_make_own(folder, name);
+    if (!own) return own.error();
+    return KeptIdentity{std::move(*own), (folder / (name + ".crt")).string()};
+  }
+  auto certificate = read_small_file(certificate_file);
+  if (!certificate) return certificate.error();
+  auto key = read_small_file(key_file);
+  if (!key) return key.error();
+  return KeptIdentity{{std::move(*certificate), std::move(*key)},
+                      "--certificate, --key: " + certificate_file};
 }
 
 }  // namespace trocar::secure

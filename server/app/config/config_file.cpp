@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <memory>
 #include <optional>
 
 #include "common/base/printable.h"
@@ -12,6 +13,26 @@ namespace trocar::app {
 namespace {
 
 constexpr std::size_t kMostBytes = 1u << 20;
+
+// CLI11 asks this when it meets --config. It refuses unknown keys, values of the wrong kind and
+// those that `check` refuses, each with file, line and key.
+class ConfigReader : public CLI::ConfigTOML {
+ public:
+  // `app` and `origins` outlive this. `example`: a file that errors point at.
+  ConfigReader(const CLI::App& app, CheckOption check, OptionOrigins& origins, const char* example)
+      : app_(app), check_(std::move(check)), origins_(origins), example_(example) {}
+
+  // Throws CLI::ConfigError, as CLI11 wants it.
+  std::vector<CLI::ConfigItem> from_config(std::istream& input) const override;
+
+ private:
+  Result<std::vector<CLI::ConfigItem>> read(const std::string& text, const std::string& file) const;
+
+  const CLI::App& app_;
+  const CheckOption check_;
+  OptionOrigins& origins_;
+  const char* const example_;
+};
 
 // The value as one would type it; nothing if it has no such form.
 std::optional<std::string> typed(const toml::node& node) {
@@ -48,8 +69,6 @@ std::string read_key(const CLI::App& app, const CheckOption& check, const std::s
   return *text;
 }
 
-}  // namespace
-
 std::vector<CLI::ConfigItem> ConfigReader::from_config(std::istream& input) const {
   const auto file = app_.get_config_ptr()->as<std::string>();
   std::string text(kMostBytes + 1, '\0');
@@ -77,6 +96,33 @@ Result<std::vector<CLI::ConfigItem>> ConfigReader::read(const std::string& text,
     }
   if (!document.ok()) return document.error();
   return values;
+}
+
+}  // namespace
+
+Result<bool> parse_with_config(CLI::App& app, int argc, char** argv, CheckOption check,
+                               OptionOrigins& origins, const char* example) {
+  app.config_formatter(std::make_shared<ConfigReader>(app, std::move(check), origins, example));
+  const auto usage = [&origins](const std::string& message) {
+    return Error{ErrorCode::Usage, origins.placed(message)};
+  };
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::FileError& error) {
+    return usage("--config: " + std::string(error.what()) + ", name a file that is there");
+  } catch (const CLI::ConfigError& error) {
+    return usage(error.what());
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() != 0) return usage(std::string(error.what()) + " (see --help)");
+    app.exit(error);
+    return false;
+  }
+  return true;
+}
+
+std::string config_file_of(const CLI::App& app) {
+  const auto* option = app.get_config_ptr();
+  return option->count() > 0 ? option->as<std::string>() : std::string();
 }
 
 }  // namespace trocar::app

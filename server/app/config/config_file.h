@@ -8,7 +8,6 @@
 #include <CLI/CLI.hpp>
 #include <functional>
 #include <string>
-#include <vector>
 
 #include "common/base/result.h"
 #include "server/app/config/option_origins.h"
@@ -18,24 +17,14 @@ namespace trocar::app {
 // Checks the text of one option alone: its form, its limits.
 using CheckOption = std::function<Status(const std::string& key, const std::string& text)>;
 
-// CLI11 asks this when it meets --config. It refuses unknown keys, values of the wrong kind and
-// those that `check` refuses, each with file, line and key.
-class ConfigReader : public CLI::ConfigTOML {
- public:
-  // `app` and `origins` outlive this. `example`: a file that errors point at.
-  ConfigReader(const CLI::App& app, CheckOption check, OptionOrigins& origins, const char* example)
-      : app_(app), check_(std::move(check)), origins_(origins), example_(example) {}
+// Parses a command line that may name such a file, into the options of `app`. Returns false if the
+// program is done (after --help or --version). The file may not have unknown keys, values of the
+// wrong kind and those that `check` refuses; errors name file, line and key, and point at
+// `example`.
+Result<bool> parse_with_config(CLI::App& app, int argc, char** argv, CheckOption check,
+                               OptionOrigins& origins, const char* example);
 
-  // Throws CLI::ConfigError, as CLI11 wants it.
-  std::vector<CLI::ConfigItem> from_config(std::istream& input) const override;
-
- private:
-  Result<std::vector<CLI::ConfigItem>> read(const std::string& text, const std::string& file) const;
-
-  const CLI::App& app_;
-  const CheckOption check_;
-  OptionOrigins& origins_;
-  const char* const example_;
-};
+// Returns the file of --config, empty if none was named.
+std::string config_file_of(const CLI::App& app);
 
 }  // namespace trocar::app

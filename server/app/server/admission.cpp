@@ -140,23 +140,12 @@ Result<std::unique_ptr<Admission>> Admission::prepare(const AccessOptions& optio
 }
 
 Status Admission::read_identity() {
-  secure::Identity identity;
-  std::string name = (state_ / "server.crt").string();
-  if (options_.certificate_file.empty()) {
-    auto own = secure::read_or_make_identity(state_, "server");
-    if (!own) return own.error();
-    identity = std::move(*own);
-  } else {
-    auto certificate = secure::read_small_file(options_.certificate_file);
-    if (!certificate) return certificate.error();
-    auto key = secure::read_small_file(options_.key_file);
-    if (!key) return key.error();
-    identity = {std::move(*certificate), std::move(*key)};
-    name = "--certificate, --key: " + options_.certificate_file;
-  }
-  auto tls = secure::make_server_context(identity, name);
+  const auto kept =
+      secure::read_or_make_identity(options_.certificate_file, options_.key_file, state_, "server");
+  if (!kept) return kept.error();
+  auto tls = secure::make_server_context(kept->identity, kept->source);
   if (!tls) return tls.error();
-  const auto der = secure::certificate_der(identity.certificate_pem, name);
+  const auto der = secure::certificate_der(kept->identity.certificate_pem, kept->source);
   if (!der) return der.error();
   tls_ = std::move(*tls);
   certificate_code_ = secure::code_of_certificate(*der);

@@ -4,7 +4,6 @@
 
 #include <CLI/CLI.hpp>
 #include <charconv>
-#include <memory>
 
 #include "common/base/printable.h"
 #include "common/base/version.h"
@@ -227,8 +226,6 @@ class CommandLine {
  public:
   CommandLine();
 
-  // Throws CLI::ParseError.
-  void parse(int argc, char** argv) { app_.parse(argc, argv); }
   // Checks one option alone, as if nothing else had been given.
   Status check(const std::string& key, const std::string& text);
   // Checks what is left, once all options are known.
@@ -379,27 +376,13 @@ Result<std::optional<ServerOptions>> parse_command_line(int argc, char** argv) {
   const CheckOption check = [](const std::string& key, const std::string& text) {
     return CommandLine().check(key, text);
   };
-  line.app().config_formatter(
-      std::make_shared<ConfigReader>(line.app(), check, options.origins, kExampleFile));
-  const auto usage = [&options](const std::string& message) {
-    return Error{ErrorCode::Usage, options.origins.placed(message)};
-  };
-  try {
-    line.parse(argc, argv);
-  } catch (const CLI::FileError& error) {
-    return usage("--config: " + std::string(error.what()) + ", name a file that is there");
-  } catch (const CLI::ConfigError& error) {
-    return usage(error.what());
-  } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) {
-      line.app().exit(error);
-      return std::optional<ServerOptions>();
-    }
-    return usage(std::string(error.what()) + " (see --help)");
-  }
-  if (const auto finished = line.finish(); !finished) return usage(finished.error().message);
-  if (line.app().get_config_ptr()->count() > 0)
-    options.config_file = line.app().get_config_ptr()->as<std::string>();
+  const auto parsed =
+      parse_with_config(line.app(), argc, argv, check, options.origins, kExampleFile);
+  if (!parsed) return parsed.error();
+  if (!*parsed) return std::optional<ServerOptions>();
+  if (const auto finished = line.finish(); !finished)
+    return Error{ErrorCode::Usage, options.origins.placed(finished.error().message)};
+  options.config_file = config_file_of(line.app());
   if (options.journal.empty()) options.journal = default_journal_path();
   return std::optional(std::move(options));
 }

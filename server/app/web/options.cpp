@@ -2,7 +2,6 @@
 
 #include <CLI/CLI.hpp>
 #include <charconv>
-#include <memory>
 
 #include "common/base/version.h"
 #include "common/secure/loopback.h"
@@ -203,27 +202,13 @@ Result<std::optional<WebOptions>> parse_web_command_line(int argc, char** argv) 
   const CheckOption check = [](const std::string& key, const std::string& text) {
     return CommandLine().check(key, text);
   };
-  line.app().config_formatter(
-      std::make_shared<ConfigReader>(line.app(), check, options.origins, kExampleFile));
-  const auto usage = [&options](const std::string& message) {
-    return Error{ErrorCode::Usage, options.origins.placed(message)};
-  };
-  try {
-    line.app().parse(argc, argv);
-  } catch (const CLI::FileError& error) {
-    return usage("--config: " + std::string(error.what()) + ", name a file that is there");
-  } catch (const CLI::ConfigError& error) {
-    return usage(error.what());
-  } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) {
-      line.app().exit(error);
-      return std::optional<WebOptions>();
-    }
-    return usage(std::string(error.what()) + " (see --help)");
-  }
-  if (const auto finished = line.finish(); !finished) return usage(finished.error().message);
-  if (line.app().get_config_ptr()->count() > 0)
-    options.config_file = line.app().get_config_ptr()->as<std::string>();
+  const auto parsed =
+      parse_with_config(line.app(), argc, argv, check, options.origins, kExampleFile);
+  if (!parsed) return parsed.error();
+  if (!*parsed) return std::optional<WebOptions>();
+  if (const auto finished = line.finish(); !finished)
+    return Error{ErrorCode::Usage, options.origins.placed(finished.error().message)};
+  options.config_file = config_file_of(line.app());
   return std::optional(std::move(options));
 }
 

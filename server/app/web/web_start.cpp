@@ -34,21 +34,10 @@ fs::path page_folder(const WebOptions& options) {
 }
 
 Result<secure::TlsContext> read_certificate(const WebOptions& options, const fs::path& state) {
-  secure::Identity identity;
-  std::string name = "--certificate, --key: " + options.certificate_file;
-  if (options.certificate_file.empty()) {
-    auto own = secure::read_or_make_identity(state, "web");
-    if (!own) return own.error();
-    identity = std::move(*own);
-    name = (state / "web.crt").string();
-  } else {
-    auto certificate = secure::read_small_file(options.certificate_file);
-    if (!certificate) return certificate.error();
-    auto key = secure::read_small_file(options.key_file);
-    if (!key) return key.error();
-    identity = {std::move(*certificate), std::move(*key)};
-  }
-  return secure::make_server_context(identity, name);
+  const auto kept =
+      secure::read_or_make_identity(options.certificate_file, options.key_file, state, "web");
+  if (!kept) return kept.error();
+  return secure::make_server_context(kept->identity, kept->source);
 }
 
 Result<std::string> read_or_make_key(const fs::path& state, bool makes_new) {

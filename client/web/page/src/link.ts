@@ -1,4 +1,4 @@
-// What a link says behind its #, which no browser sends to a server.
+// A link names session, role and code behind its #, which no browser sends to a server.
 
 export interface Link {
   code: string; // empty: not given

@@ -73,7 +73,7 @@ export class Player {
     void this.readAhead();
     if (!this.isPlaying) return;
     const next = this.tick + passed * this.speed;
-    // What has not been loaded yet is waited for.
+    // The clock waits for frames that have not been loaded yet.
     const loaded = this.hasEnded ? this.recording.lastTick : this.waiting.at(-1)?.tick ?? this.tick;
     this.tick = Math.min(next, Math.max(this.tick, loaded));
     let due = 0;

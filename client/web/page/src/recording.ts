@@ -110,7 +110,7 @@ export class Recording {
     return undefined;
   }
 
-  // What it takes to show `tick`: people, surface, keyframe, and all after it up to there.
+  // Returns what a replica needs to show `tick`: people, surface, keyframe, and all after it up to there.
   async seek(tick: number): Promise<Item[]> {
     const key = await this.last('/surface/key', tick), out: Item[] = [];
     if (!key) return out;
@@ -122,7 +122,7 @@ export class Recording {
     }
     return out;
   }
-  // What comes after `tick`, in order.
+  // Yields what comes after `tick`, in order.
   async *follow(tick: number): AsyncGenerator<Item> {
     for await (const m of this.reader.readMessages({ topics: kShown, startTime: this.time(tick + 1) })) yield this.item(m);
   }

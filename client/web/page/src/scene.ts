@@ -11,7 +11,7 @@ import { Overlay, Verb, type Mesh as PlainMesh, type Pointer, type Replica, type
 
 export interface Shape { radiusM: number; lengthM: number; halfWidthM: number }
 export interface Label { text: string; colour: number }
-// What the picture asks of who shows it.
+// The picture asks this for shapes and names, which it does not know.
 export interface Guide {
   shapeOf(slot: number): Shape; // of a tool
   labelOf(tool: Tool): Label;
@@ -92,7 +92,7 @@ export class Picture {
   }
 
   get isPlain(): boolean { return this.quality > 0; }
-  // As at the beginning.
+  // Sets the view as it was at the beginning.
   resetView(): void { this.isFramed = false; this.follows = null; }
   // Turns the view by so many radians, for keys.
   turn(yaw: number, pitch: number): void {
@@ -147,7 +147,7 @@ export class Picture {
   // Dragging turns the view, unless it points.
   set turns(value: boolean) { this.controls.enabled = value; }
 
-  // Where a ray through a place of the canvas (0 to 1 from its upper left) meets the surface.
+  // Returns where a ray through a place of the canvas (0 to 1 from its upper left) meets the surface.
   pick(x: number, y: number): Vec3 | null {
     const ray = new Raycaster();
     ray.setFromCamera(new Vector2(x * 2 - 1, 1 - y * 2), this.camera);

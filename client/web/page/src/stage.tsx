@@ -13,7 +13,7 @@ export const clock = (seconds: number): string => `${Math.floor(seconds / 60)}:$
 
 const kPlain: ToolShape = create(ToolShapeSchema, { radiusM: 0.005, lengthM: 0.3 });
 
-// What the picture asks about people, from the newest list of them.
+// Answers the picture about people, from the newest list of them.
 export function guideOf(people: () => Participant[], colourOf: (slot: number) => number): Guide {
   const owner = (slot: number): Participant | undefined => people().find(p => p.slot === slot >> 1);
   return {
