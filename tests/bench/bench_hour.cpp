@@ -28,6 +28,10 @@ namespace {
 constexpr const char* kProgram = "bench_hour";
 constexpr Tick kMinute = 60'000;
 constexpr Tick kStroke = 3000, kStrokeCuts = 800;  // ticks, and those in which the blade cuts
+// Ticks after a stroke's beginning: the blade is out, and above the next place; the grasper grasps,
+// and lets go.
+constexpr Tick kLifted = 1200, kCarried = 2600, kGrasps = 1600, kLetsGo = 2700;
+constexpr float kLift_m = 0.08f;
 constexpr float kStrokeSpeed_m_s = 0.05f;
 constexpr int kHands = 3, kRetractor = 2;
 constexpr int kSeeks = 20;
@@ -52,7 +56,8 @@ double memory_mb() {
   return static_cast<double>(resident) * 4096e-6;
 }
 
-// Hands move as a function of the tick and of where the surface is.
+// Hands move as a function of the tick and of where the surface is, and nowhere faster than hands
+// do.
 class Hands {
  public:
   explicit Hands(const step::Simulation& simulation) : simulation_(simulation) {
@@ -73,18 +78,32 @@ class Hands {
       const Tick at = tick + static_cast<Tick>(hand) * kStroke / 2;
       const auto stroke =
           static_cast<std::uint32_t>(2 * (at / kStroke)) + static_cast<unsigned>(hand);
-      const Tick since = at % kStroke;
-      const float angle = 2.39996f * static_cast<float>(stroke);
-      const Vec3f way{std::cos(angle), 0, std::sin(angle)};
-      const float along = kStrokeSpeed_m_s * static_cast<float>(since) * 1e-3f - 0.02f;
-      const bool cuts = since < kStrokeCuts;
-      put(inbox, hand, cuts ? place_of(stroke) + way * along : Vec3f{0, 0.5f, 0},
-          cuts ? tool::Verb::Cut : tool::Verb::None);
+      cut(hand, stroke, at % kStroke, inbox);
     }
     draw(tick, inbox);
   }
 
  private:
+  // The blade cuts, is lifted out, is carried over, and goes in by cutting at the next place.
+  void cut(int hand, std::uint32_t stroke, Tick since, participants::SimulationInbox& inbox) {
+    const auto along = [](std::uint32_t s, Tick ticks) {
+      const float angle = 2.39996f * static_cast<float>(s);
+      return Vec3f{std::cos(angle), 0, std::sin(angle)} *
+             (kStrokeSpeed_m_s * static_cast<float>(ticks) * 1e-3f - 0.02f);
+    };
+    const Vec3f end = place_of(stroke) + along(stroke, kStrokeCuts),
+                next = place_of(stroke + 2) + along(stroke + 2, 0);
+    const auto share = [since](Tick from, Tick to) {
+      return std::clamp(
+          (static_cast<float>(since) - static_cast<float>(from)) / static_cast<float>(to - from),
+          0.0f, 1.0f);
+    };
+    Vec3f tip = since < kStrokeCuts ? place_of(stroke) + along(stroke, since)
+                                    : end + (next - end) * share(kLifted, kCarried);
+    tip.y += kLift_m * (share(kStrokeCuts, kLifted) - share(kCarried, kStroke));
+    put(inbox, hand, tip,
+        since < kStrokeCuts || since >= kCarried ? tool::Verb::Cut : tool::Verb::None);
+  }
   Vec3f place_of(std::uint32_t stroke) const {
     const float a = std::fmod(static_cast<float>(stroke) * 0.618034f, 1.0f),
                 b = std::fmod(static_cast<float>(stroke) * 0.754877f, 1.0f);
@@ -92,16 +111,30 @@ class Hands {
     return box_.least +
            Vec3f{size.x * (0.15f + 0.7f * a), 0.6f * size.y, size.z * (0.15f + 0.7f * b)};
   }
-  // After a stroke the grasper takes the nearest surface above it, and lifts it by 15 mm.
+  // When the blade is out, the grasper comes down to the nearest surface, lifts it by 15 mm and
+  // lets it down again. While the blade cuts, it is carried to above the next place.
   void draw(Tick tick, participants::SimulationInbox& inbox) {
     const Tick since = tick % kStroke;
-    if (since < kStrokeCuts) return put(inbox, kRetractor, {0, 0.5f, 0.1f}, tool::Verb::None);
-    if (since < kStrokeCuts + 4)
+    const Vec3f above{0, kLift_m, 0};
+    if (since < kLifted) {
+      const Vec3f next =
+          nearest_above(place_of(static_cast<std::uint32_t>(2 * (tick / kStroke)))) + above;
+      if (since == 0) left_ = tick == 0 ? next : grasped_ + above;
+      return put(inbox, kRetractor, left_ + (next - left_) * (static_cast<float>(since) / kLifted),
+                 tool::Verb::None);
+    }
+    if (since < kLifted + 4)
       grasped_ = nearest_above(place_of(static_cast<std::uint32_t>(2 * (tick / kStroke))));
-    const float lift =
-        0.015f * std::sin(static_cast<float>(M_PI) * static_cast<float>(since - kStrokeCuts) /
-                          static_cast<float>(kStroke - kStrokeCuts));
-    put(inbox, kRetractor, grasped_ + Vec3f{0, lift, 0}, tool::Verb::Grasp);
+    const auto part = [since](Tick from, Tick to) {
+      return std::clamp(
+          (static_cast<float>(since) - static_cast<float>(from)) / static_cast<float>(to - from),
+          0.0f, 1.0f);
+    };
+    const bool grasps = since >= kGrasps && since < kLetsGo;
+    const float height = kLift_m * (1 - part(kLifted, kGrasps) + part(kLetsGo, kStroke)) +
+                         0.015f * std::sin(static_cast<float>(M_PI) * part(kGrasps, kLetsGo));
+    put(inbox, kRetractor, grasped_ + Vec3f{0, height, 0},
+        grasps ? tool::Verb::Grasp : tool::Verb::None);
   }
   Vec3f nearest_above(const Vec3f& place) const {
     const auto& world = simulation_.state().world;
@@ -122,7 +155,7 @@ class Hands {
 
   const step::Simulation& simulation_;
   Box<float> box_;
-  Vec3f grasped_;
+  Vec3f grasped_, left_;
 };
 
 // Frames go to clients that keep up.

@@ -320,17 +320,23 @@ bool SelfContactFinder::stays(Site site, TriangleIndex triangle, const world::Wo
          lies_along(touch.aside, touch.gap);
 }
 
-// Active nodes look in every tick: a cut may have opened them just now, however slow they are.
-void SelfContactFinder::find_pace(const world::World& world) {
+// Active nodes of wounds that have no pair look in every tick: a cut may have opened them just now,
+// however slow they are.
+void SelfContactFinder::find_pace(const world::World& world, std::span<const NodeIndex> paired) {
   using world::NodeClass;
   is_any_awake_ = false;
+  auto pair = paired.begin();
   for (const Site s : surface_.sites()) {
+    const bool has_pair = pair != paired.end() && pair->value == s;
+    if (has_pair) ++pair;
     const auto node_class = world.node_classes[s];
     const float squared = length_squared(world.velocities[s]);
     const bool is_asleep =
         node_class == NodeClass::Asleep || (node_class == NodeClass::Fixed && squared == 0);
-    const bool looks = node_class == NodeClass::Active ||
-                       is_turn(phases_[s], ticks_within(kLookDrift_m, squared), world);
+    const bool may_be_fresh =
+        node_class == NodeClass::Active && !has_pair && surface_.is_of(s, Sort::Wound);
+    const bool looks =
+        may_be_fresh || is_turn(phases_[s], ticks_within(kLookDrift_m, squared), world);
     paces_[s] = is_asleep ? Pace::Asleep : looks ? Pace::Looks : Pace::Waits;
     is_any_awake_ |= !is_asleep;
   }
@@ -402,7 +408,8 @@ void SelfContactFinder::add_pair(Site site, TriangleIndex triangle, const Place&
   };
   const Vec3f from = between([&](Site s) { return position(s, world); });
   const bool presses = dot(place.normal, from) <= place.shift;
-  const bool is_fast = ticks_within(kDrift_m, squared_drift(site, triangle, w, world)) == 1;
+  const float squared = squared_drift(site, triangle, w, world);
+  const bool is_fast = ticks_within(kDrift_m, squared) == 1;
   const bool is_awaited = is_fast || world.node_classes[site] == world::NodeClass::Active;
   if (!is_awaited && !presses) return;
   const Vec3f at_rest = between([&](Site s) -> const Vec3f& { return world.rest_positions[s]; });
@@ -417,14 +424,14 @@ void SelfContactFinder::add_pair(Site site, TriangleIndex triangle, const Place&
       .plane = place.normal * place.shift - at_rest,
   };
   out.points.push_back(point);
-  if (!presses || !is_fast) return;
+  if (!presses || ticks_within(kSeedDrift_m, squared) > 1) return;
   out.self_seeds.insert(out.self_seeds.end(), point.nodes.begin(), point.nodes.end());
 }
 
 void SelfContactFinder::find(const world::World& world, SelfContactTable& pairs, ContactList& out) {
   keep_list(world);
   pairs_looked_at_ = 0;
-  find_pace(world);
+  find_pace(world, pairs.nodes());
   if (!is_any_awake_) return;
   const auto& runs = list_.runs;
   // Two nodes are nearer to each other than their references by no more than this, m.

@@ -55,6 +55,8 @@ inline constexpr float kSelfStiffnessPaPerM = 5e7f;
 inline constexpr float kSelfMargin_m = 0.001f, kSelfMaxMargin_m = 0.003f;
 inline constexpr float kSelfTicksAhead = 1.5f;
 inline constexpr float kDrift_m = 6.4e-6f, kNearDrift_m = 0.8e-6f, kLookDrift_m = 1e-4f;
+// A pair that presses and drifts by so much in a tick is swept most.
+inline constexpr float kSeedDrift_m = 1.28e-5f;
 inline constexpr Tick kLookEvery = 64;  // a power of two
 
 // A place is where a node lay on its triangle when the pair was last looked at.
@@ -226,7 +228,7 @@ class SelfContactFinder {
              ClosestPoint& closest, Touch& touch);
   bool stays(Site site, TriangleIndex triangle, const world::World& world, ClosestPoint& closest,
              Touch& touch);
-  void find_pace(const world::World& world);
+  void find_pace(const world::World& world, std::span<const NodeIndex> paired);
   bool is_asleep(Site site, TriangleIndex triangle) const;
   // Returns the squared speed at which a pair leaves its place, m2/s2.
   float squared_drift(Site site, TriangleIndex triangle, const Vec3f& weights,

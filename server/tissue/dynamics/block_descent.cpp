@@ -332,7 +332,7 @@ void BlockDescent::relax(const SweepPlan& plan, Group group, const contact::Cont
   const Vec8 own = load_group(x);
   NodeStep8 step = inertia_of(group, own);
   const bool has_near = (lanes & near_.lanes[group]) != 0, touched = is_touched(group, lanes);
-  const bool is_linear = is_far_linear_ && !has_near && has_energies_[group] == 0 && !touched &&
+  const bool is_linear = is_far_linear_ && !has_near && has_energies_[group] == 0 &&
                          linear_far_field_->add(group, lanes, inverse_dt_of(group), step);
   if (!is_linear) {
     ask_energies(group, start_.data());
