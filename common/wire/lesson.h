@@ -1,6 +1,6 @@
 #pragma once
 
-// What people say and show in a lesson, on its way into a recording; and its bounds.
+// People say and show this in a lesson; here it is on its way into a recording, with its bounds.
 
 #include <cstddef>
 #include <cstdint>

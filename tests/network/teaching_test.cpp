@@ -1,5 +1,5 @@
-// What an instructor does with people and their tools, and what people say and draw: who may, what
-// everybody is told, and what is recorded.
+// Teaching: what an instructor does with people and their tools, and what people say and draw. Who
+// may, what everybody is told, and what is recorded.
 
 #include "common/wire/lesson.h"
 #include "proto/journal.pb.h"
@@ -61,7 +61,7 @@ class Teaching : public ::testing::Test {
         if (participant.slot() == slot && is(participant)) return true;
     return false;
   }
-  // What the simulation is given once `count` samples have been seen.
+  // Returns what the simulation is given once `count` samples have been seen.
   hands::TickInputs drain_after(std::uint64_t count) {
     for (int i = 0; i < 5000; ++i) {
       const auto seen = session_.on_io([&] { return session_.replicator().counters().samples; });

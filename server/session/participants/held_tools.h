@@ -1,7 +1,7 @@
 #pragma once
 
-// What an instructor does to tools of others, between the samples of their hands and the
-// simulation.
+// An instructor holds tools of others still, or opens their jaws: this stands between the samples
+// of their hands and the simulation.
 //
 //   free --freeze--> frozen: last pose and verb, whatever the hand does
 //   frozen --release--> returning: to the hand, at most at kReturnSpeed and kReturnTurn --> free
@@ -28,7 +28,7 @@ inline constexpr float kReturnTurn = 2.0f;    // rad/s
 
 class HeldTools {
  public:
-  // What the simulation gets in place of a sample; nothing: the tool is frozen, and is nowhere yet.
+  // Returns what the simulation gets in place of a sample; nothing: the tool is frozen, and is nowhere yet.
   std::optional<hands::ToolInput> apply(const hands::ToolInput& wanted, std::uint64_t now_ns);
 
   void freeze(ParticipantSlot slot);

@@ -1,7 +1,8 @@
 #pragma once
 
-// What is drawn on the surface in a session: lines of points that stand by where they are on the
-// surface at rest, which no motion and no cut changes. Bounded by wire::kMostDrawingPoints.
+// The board keeps what is drawn on the surface in a session: lines of points that stand by where
+// they are on the surface at rest, which no motion and no cut changes. wire::kMostDrawingPoints
+// bounds it.
 
 #include <optional>
 #include <span>

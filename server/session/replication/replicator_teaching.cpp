@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::uint64_t kLeastMarkGapNs = 1'000'000'000;
 
-// What everybody reads. `who`: of whom it is about, where it is about one.
+// Makes the line that everybody reads. `who`: whom it is about, where it is about one.
 std::string words_of(const TeachOrder& order, const std::string& by, const std::string& who) {
   switch (order.action) {
     case TeachAction::Freeze:
