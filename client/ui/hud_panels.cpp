@@ -176,8 +176,9 @@ void draw_stale_picture(const HudModel& model, float scale) {
 void draw_lesson(const HudModel& model, float scale) {
   if (model.frozen_text.empty() && model.view_text.empty()) return;
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
-  constexpr float kBelowStale = 170;
-  ImGui::SetNextWindowPos({screen.x / 2, (kMargin + kBelowStale) * scale}, 0, {0.5f, 0});
+  // At the left, above the hint or the timeline, where it covers no organ.
+  const float bottom = screen.y - (model.timeline ? 118 : kMargin + 48) * scale;
+  ImGui::SetNextWindowPos({kMargin * scale, bottom}, 0, {0, 1});
   ImGui::Begin("lesson", nullptr, kGlass);
   if (!model.frozen_text.empty()) {
     ImGui::PushFont(bold());

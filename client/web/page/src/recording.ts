@@ -1,11 +1,11 @@
 // A recording, over HTTP ranges or from a dropped file. Only what is shown is loaded: whole blocks,
 // of which the last ones used are kept.
 
-import { fromBinary } from '@bufbuild/protobuf';
+import { fromBinary, toBinary } from '@bufbuild/protobuf';
 import { McapIndexedReader, type McapTypes } from '@mcap/core';
 import { decompress } from 'fzstd';
 import { ClaimLogSchema, JournalGapSchema, LessonRecordSchema } from './gen/proto/journal_pb';
-import { ClaimOutcome, FrameStateSchema, ParticipantsSchema, TeachAction, type FrameState, type Participants } from './gen/proto/wire_pb';
+import { ClaimOutcome, FrameStateSchema, ParticipantsSchema, PointEventSchema, TeachAction, type FrameState, type Participants } from './gen/proto/wire_pb';
 
 const kBlock = 64 * 1024, kBlocks = 256, kMostChunk = 64 * 1024 * 1024;
 export const kDamaged = 'This file is no whole Trocar recording: it is damaged, cut short, or something else.';
@@ -69,7 +69,7 @@ export interface RecordedEvent { tick: number; kind: EventKind; text: string }
 
 // Fields of Envelope, by channel.
 const kFields: Record<string, number> = { '/surface/key': 2, '/surface/delta': 2, '/frame_state': 3, '/topology/change': 8, '/topology': 18, '/participants': 19, '/drawing': 40 };
-const kShown = ['/surface/delta', '/frame_state', '/topology/change', '/participants', '/drawing'];
+const kShown = ['/surface/delta', '/frame_state', '/topology/change', '/participants', '/drawing', '/lesson'];
 const kNothingDrawn = new Uint8Array([0x10, 0]); // a Drawing without strokes, which replaces what was
 type Message = McapTypes.TypedMcapRecords['Message'];
 
@@ -126,7 +126,15 @@ export class Recording {
   }
   // Yields what comes after `tick`, in order.
   async *follow(tick: number): AsyncGenerator<Item> {
-    for await (const m of this.reader.readMessages({ topics: kShown, startTime: this.time(tick + 1) })) yield this.item(m);
+    for await (const m of this.reader.readMessages({ topics: kShown, startTime: this.time(tick + 1) })) {
+      if (this.topic(m) !== '/lesson') yield this.item(m);
+      else yield* this.pointing(m);
+    }
+  }
+  // What the replica shows of a lesson besides the drawing.
+  private *pointing(m: Message): Generator<Item> {
+    const { entry } = fromBinary(LessonRecordSchema, m.data);
+    if (entry.case === 'point') yield { field: 36, tick: this.item(m).tick, data: toBinary(PointEventSchema, entry.value) };
   }
   // Forces over all of it, a frame at a time.
   async *states(from: number, to: number): AsyncGenerator<{ tick: number; state: FrameState }> {
