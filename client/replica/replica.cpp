@@ -456,6 +456,7 @@ void Replica::apply_participants(const proto::Participants& message) {
     participants_.push_back(std::move(participant));
   }
   std::ranges::sort(participants_, {}, &Participant::slot);
+  if (std::ranges::none_of(participants_, &Participant::leads_view)) led_view_.reset();
 }
 
 void Replica::apply_claim(const proto::ClaimEvent& message, std::uint64_t arrival_ns) {

@@ -16,8 +16,7 @@
 //                                     reason
 //   /hands           HandLog          what hands that feel have felt, as their clients said
 //   /lesson          LessonRecord     what instructors did with people, what people said, where
-//   they
-//                                     pointed, and the view to follow
+//                                     they pointed, and the view to follow
 //   /drawing         Drawing          all that is drawn on the surface, on change
 //   /frame_state     FrameState       tools, regions and figures of a frame, as a client got them
 //   /gap             JournalGap       where the queue to the writer was full

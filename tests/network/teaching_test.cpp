@@ -162,6 +162,22 @@ TEST_F(Teaching, AFrozenToolStaysUntilItIsReleased) {
   EXPECT_EQ(recorded().size(), 2u);
 }
 
+TEST_F(Teaching, NoToolStaysFrozenWithoutAnInstructor) {
+  RawClient ian(session_.port());
+  ASSERT_TRUE(ian.join("Ian", proto::ROLE_INSTRUCTOR));
+  ASSERT_TRUE(sam_.send(make_sample(1)));
+  drain_after(1);
+  ASSERT_TRUE(ivy_.send(teach(proto::TEACH_FREEZE, 0, "Sam")));
+  EXPECT_TRUE(sees_participant(sam_, 0, [](const auto& who) { return who.frozen_by() == "Ivy"; }));
+  Envelope bye;
+  bye.mutable_bye();
+  ASSERT_TRUE(ivy_.send(bye));
+  EXPECT_TRUE(sees_participant(sam_, 0, [](const auto& who) { return who.frozen_by() == "Ivy"; }))
+      << "Ian can release it";
+  ASSERT_TRUE(ian.send(bye));
+  EXPECT_TRUE(sees_participant(sam_, 0, [](const auto& who) { return who.frozen_by().empty(); }));
+}
+
 TEST_F(Teaching, AClaimThatIsTakenEndsAtOnce) {
   auto grasp = make_sample(1);
   grasp.mutable_tool_sample()->set_verb(proto::VERB_GRASP);
@@ -325,7 +341,8 @@ TEST_F(Teaching, ALineOnTheOrganIsSeenByAllAndByWhoComesLater) {
   const auto entries = recorded();
   ASSERT_EQ(entries.size(), 3u);
   EXPECT_EQ(entries[0].kind, wire::LessonKind::Drawing);
-  EXPECT_EQ(entries[2].kind, wire::LessonKind::Said);
+  EXPECT_EQ(entries[1].kind, wire::LessonKind::Said);
+  EXPECT_EQ(entries[2].kind, wire::LessonKind::Drawing);
 }
 
 TEST_F(Teaching, ADrawingHasAnEnd) {

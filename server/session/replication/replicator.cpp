@@ -138,6 +138,7 @@ void Replicator::leave(Client& client) {
     absences_.forget(slot);
     held_tools_.forget(slot);
     if (slot.has_tools()) inbox_.push_leave(slot);
+    if (wire::rights_of(client.participant->role).may_teach) release_unless_led();
     participants_changed_ = true;
   }
 }
@@ -305,7 +306,7 @@ std::optional<Replicator::Ending> Replicator::admit(Client& client, const proto:
   }
   if (participants::is_valid_name(request->name))
     if (const auto wait = door_.check(client.applicant)) {
-      participants_changed_ = true;  // it is seen who waits
+      are_participants_told_ = false;  // it is seen who waits
       return Ending{EndReason::Closed, *wait};
     }
   if (auto ending = find_place(client, *request)) return ending;

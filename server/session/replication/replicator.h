@@ -165,6 +165,8 @@ class Replicator final : public net::ConnectionHandler {
   // Whoever has that place, away or not; null: nobody.
   Client* client_of(ParticipantSlot slot) const;
   void put_out(ParticipantSlot slot, const std::string& words);
+  // After somebody has left: without any instructor no tool stays frozen.
+  void release_unless_led();
   void describe_teaching(const TeachOrder& order, ParticipantSlot by, bool is_done,
                          const std::string& text, proto::TeachEvent& message) const;
   void describe_drawing(proto::Drawing& message) const;

@@ -113,7 +113,9 @@ std::optional<Replicator::Ending> Replicator::handle_teach(Client& client,
   *event.mutable_teach_event() = record.teach();
   record_lesson(record);
   broadcast(wire::encode_envelope(event));
+  // Telling people may have ended anybody's session: `client` is not used from here on.
   if (order->action == TeachAction::Expel) put_out(order->participant, words);
+  if (order->action == TeachAction::Wipe) wipe_drawing();
   return std::nullopt;
 }
 
@@ -127,7 +129,8 @@ void Replicator::describe_teaching(const TeachOrder& order, ParticipantSlot by, 
   message.set_text(text);
 }
 
-// Returns why it cannot be done; empty: it is done, but for putting people out, who are told first.
+// Returns why it cannot be done; empty: it is done. What makes people leave, or sends more than can
+// be skipped, is left to do once everybody is told.
 std::string Replicator::carry_out(const TeachOrder& order, Client& client,
                                   const std::string& words) {
   const auto* whom = roster_.find(order.participant);
@@ -149,8 +152,9 @@ std::string Replicator::carry_out(const TeachOrder& order, Client& client,
       for (const auto& input : held_tools_.open(whom->slot)) inbox_.push_sample(input);
       return {};
     case TeachAction::Expel:
-      return wire::rights_of(whom->role).may_teach ? "not done: nobody puts out an instructor"
-                                                   : std::string();
+      if (wire::rights_of(whom->role).may_teach) return "not done: nobody puts out an instructor";
+      door_.put_out(client_of(whom->slot)->applicant);
+      return {};
     case TeachAction::Rename: {
       if (const auto renamed = roster_.rename(order.participant, order.text); !renamed)
         return "not done: " + renamed.error().message;
@@ -160,12 +164,12 @@ std::string Replicator::carry_out(const TeachOrder& order, Client& client,
     }
     case TeachAction::Admit:
       if (!door_.admit(order.text)) return "not done: nobody called " + order.text + " waits";
-      participants_changed_ = true;
+      are_participants_told_ = false;
       return {};
     case TeachAction::Close:
     case TeachAction::Open:
       door_.set_closed(order.action == TeachAction::Close);
-      participants_changed_ = true;
+      are_participants_told_ = false;
       return {};
     case TeachAction::End:
       if (!options_.on_end_wanted) return "not done: this session ends by itself";
@@ -178,14 +182,24 @@ std::string Replicator::carry_out(const TeachOrder& order, Client& client,
       participants_changed_ = true;
       return {};
     case TeachAction::Wipe:
-      wipe_drawing();
-      return {};
     case TeachAction::Note:
     case TeachAction::Chat:
     case TeachAction::None:
       return {};
   }
   return {};
+}
+
+// Nobody else could release these tools.
+void Replicator::release_unless_led() {
+  const auto present = roster_.list();
+  if (std::ranges::any_of(present,
+                          [](const auto& who) { return wire::rights_of(who.role).may_teach; }))
+    return;
+  for (const auto& who : present) {
+    held_tools_.release(who.slot);
+    roster_.set_frozen_by(who.slot, {});
+  }
 }
 
 Replicator::Client* Replicator::client_of(ParticipantSlot slot) const {
@@ -198,7 +212,6 @@ Replicator::Client* Replicator::client_of(ParticipantSlot slot) const {
 void Replicator::put_out(ParticipantSlot slot, const std::string& words) {
   auto* client = client_of(slot);
   if (client == nullptr) return;  // it was too slow for what was said of it
-  door_.put_out(client->applicant);
   if (away_.contains(slot)) {
     leave(*client);
     away_.erase(slot);

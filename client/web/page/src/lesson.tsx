@@ -11,6 +11,8 @@ const kMostText = 500, kMostReason = 200, kMostName = 32;
 const kPieceMs = 250, kPiecePoints = 32, kLeastPixels = 5, kViewMs = 100;
 
 const bytesOf = (text: string): number => new TextEncoder().encode(text).length;
+// What the server takes: a pasted text may hold characters that cannot be seen.
+const lineOf = (text: string): string => text.replace(/[\p{C}\u2028\u2029\u{E0000}-\u{10FFFF}]/gu, ' ').trim();
 
 // One thing that has to be asked before it is done; `field`: what the person types for it.
 export interface Question { title: string; verb: string; field?: { label: string; value: string; most: number }; act(text: string): void }
@@ -19,11 +21,11 @@ export function Ask(props: { question: Question; onDone(): void }): JSX.Element 
   const { question } = props, [text, setText] = useState(question.field?.value ?? '');
   const first = useRef<HTMLInputElement & HTMLButtonElement>(null);
   useEffect(() => first.current?.focus(), []);
-  const fits = !question.field || (text.trim() !== '' && bytesOf(text.trim()) <= question.field.most);
+  const fits = !question.field || (lineOf(text) !== '' && bytesOf(lineOf(text)) <= question.field.most);
   const submit = (event: Event): void => {
     event.preventDefault();
     if (!fits) return;
-    question.act(text.trim());
+    question.act(lineOf(text));
     props.onDone();
   };
   return (
@@ -76,10 +78,10 @@ export function Door(props: { session: Session; list: Participants | null }): JS
 }
 
 export function Say(props: { session: Session; mayNote: boolean }): JSX.Element {
-  const [text, setText] = useState(''), size = bytesOf(text.trim()), fits = size > 0 && size <= kMostText;
+  const [text, setText] = useState(''), size = bytesOf(lineOf(text)), fits = size > 0 && size <= kMostText;
   const send = (action: TeachAction): void => {
     if (!fits) return;
-    props.session.teach(action, null, text.trim());
+    props.session.teach(action, null, lineOf(text));
     setText('');
   };
   return (
