@@ -7,6 +7,7 @@
 
 #include "client/render/drawing_priority.h"
 #include "client/replica/client_messages.h"
+#include "client/shape/ribbon.h"
 #include "client/ui/away_text.h"
 #include "client/ui/hud_panels.h"
 #include "client/ui/solver_text.h"
@@ -16,6 +17,8 @@ namespace trocar::app {
 namespace {
 
 constexpr std::uint64_t kHelpNs = 20'000'000'000;  // at the start
+constexpr std::uint64_t kViewNs = 100'000'000;     // between two words on where a view is
+constexpr float kLineHalfWidth = 0.0009f;          // m, as in a browser
 constexpr std::uint64_t kFeltBinNs = 62'500'000;   // 160 of them are 10 s
 
 const replica::Participant* owner_of(const replica::Replica& replica, ToolSlot slot) {
@@ -163,6 +166,15 @@ render::SceneView Picture::scene_view(const replica::Replica& replica, Hands& ha
   scene.holds = holds(replica);
   for (const replica::Tool& tool : surface_.tools())
     scene.tools.push_back(scene_tool(replica, tool, hands));
+  lines_.update(replica, scene.positions);
+  drawing_.clear();
+  for (const auto& line : lines_.lines()) {
+    std::vector<shape::RibbonPoint> points;
+    for (const auto& point : line.points) points.push_back({point.position, point.normal});
+    shape::add_ribbon(points, kLineHalfWidth, shape::colour_of_pointer(line.participant.value),
+                      drawing_);
+  }
+  scene.drawing = drawing_;
   for (const replica::Pointer& pointer : replica.pointers(last_ns_))
     scene.pointers.push_back(
         {pointer.position_m, shape::colour_of_pointer(pointer.participant.value)});
@@ -177,6 +189,7 @@ void Picture::add_participants(const replica::Replica& replica, bool is_replay,
     shown.name = participant.name;
     shown.role = participant.role;
     shown.is_away = participant.is_away;
+    shown.is_frozen = !participant.frozen_by.empty();
     shown.is_self = !is_replay && participant.slot == replica.own_slot();
     shown.colour = shape::colour_of_slot(participant.slot.value);
     for (const replica::Tool& tool : surface_.tools()) {
@@ -314,6 +327,15 @@ ui::HudModel Picture::hud_model(const replica::Replica& replica, replica::Sessio
                                         source.statistics().away_left_seconds);
   else if (!surface_.is_valid())
     model.status = "Waiting for the organ ...";
+  if (own != nullptr && !own->frozen_by.empty())
+    model.frozen_text = own->frozen_by + " keeps your tools where they are.";
+  const auto& people = replica.participants();
+  const auto leader = std::ranges::find_if(people, &replica::Participant::leads_view);
+  if (leader != people.end() && leader->slot == replica.own_slot())
+    model.view_text = "Others may follow your view.";
+  else if (leader != people.end())
+    model.view_text = follows_view_ ? "You follow the view of " + leader->name + ": V ends that."
+                                    : "V follows the view of " + leader->name + ".";
   model.is_away = source.state() == replica::SourceState::Away;
   if (const auto* newest = replica.newest()) {
     // The state of the newest frame may still be under way; then the one before has it.
@@ -369,6 +391,7 @@ void Picture::act(const ui::HudActions& actions, const replica::Replica& replica
   if (actions.toggle_ghost) overlays_.ghost = !overlays_.ghost;
   if (actions.reset_camera) frame_camera(replica);
   if (actions.screenshot) wants_screenshot_ = true;
+  if (actions.toggle_follow) follows_view_ = !follows_view_;
   // A wish that cannot be sent is lost: whoever presses the key asks again.
   if (actions.set_mark) replica::ask_for_mark(source, false);
   if (actions.return_to_mark) replica::ask_for_mark(source, true);
@@ -378,6 +401,22 @@ void Picture::act(const ui::HudActions& actions, const replica::Replica& replica
   if (actions.speed) playback->set_speed(*actions.speed);
   if (actions.seek_seconds)
     playback->seek(static_cast<Tick>(std::llround(std::max(0.0, *actions.seek_seconds) * 1e3)));
+}
+
+void Picture::share_view(const replica::Replica& replica, replica::SessionSource& source,
+                         const device::PointerInput& input) {
+  const auto* own = replica.find_participant(replica.own_slot());
+  if (own != nullptr && own->leads_view) {
+    follows_view_ = false;
+    if (last_ns_ - view_sent_ns_ < kViewNs || !is_framed_) return;
+    view_sent_ns_ = last_ns_;
+    replica::send_view(source, camera_.rays(context_->size()).eye, camera_.centre());
+    return;
+  }
+  // Whoever moves the view follows nobody.
+  if (input.right || input.middle || (input.control && input.wheel != 0)) follows_view_ = false;
+  const auto& led = replica.led_view();
+  if (follows_view_ && led) camera_.look(led->eye_m, led->target_m);
 }
 
 void Picture::ask_for_ghost(replica::SessionSource& source) {
@@ -407,6 +446,7 @@ void Picture::draw(const replica::Replica& replica, replica::SessionSource& sour
   hud_.begin_frame(seconds);
   const device::PointerInput input = hud_.input();
   camera_.update(input, context_->size(), seconds);
+  share_view(replica, source, input);
   hands.set_view(camera_.orientation());
   if (device::MouseTool* mouse = hands.mouse_tool(); mouse != nullptr && surface_.is_valid())
     mouse->update(input, camera_.rays(context_->size()), surface_.positions(),

@@ -9,6 +9,7 @@
 #include "client/app/client_options.h"
 #include "client/app/hands.h"
 #include "client/render/scene_renderer.h"
+#include "client/replica/drawn_lines.h"
 #include "client/replica/force_history.h"
 #include "client/replica/held_tissue.h"
 #include "client/replica/interpolated_surface.h"
@@ -50,6 +51,9 @@ class Picture {
                            ui::HudModel& model);
   ui::HudModel hud_model(const replica::Replica& replica, replica::SessionSource& source,
                          const render::SceneView& scene, Hands& hands, std::uint64_t now_ns) const;
+  // Follows the view of who has it, if the person wants to, or says where one's own is.
+  void share_view(const replica::Replica& replica, replica::SessionSource& source,
+                  const device::PointerInput& input);
   void ask_for_ghost(replica::SessionSource& source);
   void act(const ui::HudActions& actions, const replica::Replica& replica,
            replica::SessionSource& source);
@@ -78,6 +82,10 @@ class Picture {
   // Keeps what each device has rendered and what the server said, N.
   using FeltForces = replica::PeakRings<2, ui::kFeltBins, ui::kFeltBins>;
   std::array<FeltForces, kToolsPerHand> felt_forces_;
+  bool follows_view_ = false;
+  std::uint64_t view_sent_ns_ = 0;
+  replica::DrawnLines lines_;
+  shape::MeshVertices drawing_;  // of the last picture
   replica::HeldTissue held_;
   std::uint64_t held_history_ = 0;
   Rate rate_;

@@ -29,6 +29,14 @@ void OrbitCamera::zoom(float factor) {
   distance_ = std::clamp(distance_ * factor, radius_ * 0.8f, radius_ * 12);
 }
 
+void OrbitCamera::look(const Vec3f& eye, const Vec3f& target) {
+  const Vec3f back = eye - target;
+  centre_ = target;
+  distance_ = std::clamp(length(back), radius_ * 0.2f, radius_ * 40);
+  yaw_ = std::atan2(back.x, back.z);
+  pitch_ = std::clamp(std::atan2(back.y, std::hypot(back.x, back.z)), -1.5f, 1.5f);
+}
+
 void OrbitCamera::update(const device::PointerInput& input, Size size, float seconds) {
   if (input.right) orbit(-input.dx * kOrbitPerPixel, input.dy * kOrbitPerPixel);
   if (input.middle) {

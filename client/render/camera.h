@@ -26,6 +26,9 @@ class OrbitCamera {
   void update(const device::PointerInput& input, Size size, float seconds);
   void orbit(float yaw, float pitch);  // rad
   void zoom(float factor);
+  // Stands at `eye` and turns about `target`, as far as this camera can: its up is up.
+  void look(const Vec3f& eye, const Vec3f& target);
+  const Vec3f& centre() const { return centre_; }
 
   device::ViewRays rays(Size size) const;
   // World from camera: x to the right of the screen, y up, z towards the person.

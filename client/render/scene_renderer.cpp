@@ -18,6 +18,7 @@ using namespace shape;
 
 namespace {
 
+constexpr float kDrawingGlow = 0.8f;  // lines are seen in the shadow, too
 constexpr int kMaxShadows = 8;
 constexpr float kOverlayStrength = 0.50f;
 constexpr float kFirmHoldStrength = 0.95f, kTouchStrength = 0.60f;
@@ -173,7 +174,8 @@ struct SceneRenderer::Parts {
   // First faintly without the depth test, so that it shows through tissue, then where in front.
   void draw_through(const MeshVertices& mesh, const Matrix4& world_from_model, float faint,
                     float dim);
-  void draw_mesh(const MeshVertices& mesh, const Matrix4& world_from_model, float glow, float dim);
+  void draw_mesh(std::span<const MeshVertex> mesh, const Matrix4& world_from_model, float glow,
+                 float dim);
 };
 
 SceneRenderer::Parts::Parts(const GlContext& context)
@@ -330,8 +332,8 @@ void SceneRenderer::Parts::draw_organ(const SceneView& scene, const OrbitCamera&
   glDisable(GL_CULL_FACE);
 }
 
-void SceneRenderer::Parts::draw_mesh(const MeshVertices& mesh, const Matrix4& world_from_model,
-                                     float glow, float dim) {
+void SceneRenderer::Parts::draw_mesh(std::span<const MeshVertex> mesh,
+                                     const Matrix4& world_from_model, float glow, float dim) {
   tool.set("world_from_model", world_from_model);
   tool.set("glow", glow);
   tool.set("dim", dim);
@@ -411,6 +413,7 @@ void SceneRenderer::Parts::draw_tools(const SceneView& scene, const OrbitCamera&
   glBindBuffer(GL_ARRAY_BUFFER, tool_array.buffer);
   for (const SceneTool& shown : scene.tools) draw_tool(shown, scene.seconds);
   for (const SceneTool& shown : scene.tools) draw_ghost(shown);
+  if (!scene.drawing.empty()) draw_mesh(scene.drawing, matrix_of(Pose{}), kDrawingGlow, 1);
   for (const ScenePointer& shown : scene.pointers) draw_pointer(shown, camera);
   if (!scene.shows_arrows) return;
   for (const SceneTool& shown : scene.tools) draw_arrow(shown);

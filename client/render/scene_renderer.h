@@ -62,7 +62,8 @@ struct SceneView {
   bool shows_regions = true, shows_arrows = true;
   std::vector<SceneTool> tools;
   std::vector<ScenePointer> pointers;
-  float seconds = 0;  // since the last picture
+  std::span<const shape::MeshVertex> drawing;  // in the world frame; lies on the surface
+  float seconds = 0;                           // since the last picture
 };
 
 // Live: with samples only where a graphics processor does it. Best: always, for a picture to keep.

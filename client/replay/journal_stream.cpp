@@ -17,10 +17,10 @@ constexpr std::size_t kMaxTickBytes = 64u << 20;
 // How far back a search past damage looks first; four times as far each time.
 constexpr Tick kFirstSearchTicks = 4 * kTicksPerSecond;
 
-constexpr std::array kShownTopics{JournalTopic::SurfaceKey,   JournalTopic::SurfaceDelta,
-                                  JournalTopic::Topology,     JournalTopic::TopologyChange,
-                                  JournalTopic::Participants, JournalTopic::Claims,
-                                  JournalTopic::FrameState};
+constexpr std::array kShownTopics{
+    JournalTopic::SurfaceKey,     JournalTopic::SurfaceDelta, JournalTopic::Topology,
+    JournalTopic::TopologyChange, JournalTopic::Participants, JournalTopic::Claims,
+    JournalTopic::FrameState,     JournalTopic::Lesson,       JournalTopic::Drawing};
 
 }  // namespace
 

@@ -167,6 +167,12 @@ Status ReplaySource::run_seek(Tick target, replica::MessageSink& sink) {
         !parsed.ok())
       return parsed;
   deliver(other_, target, sink);
+  // An empty drawing replaces another one, too.
+  const auto drawing = stream_->last_before(JournalTopic::Drawing, target);
+  if (Status done = deliver_lesson(JournalTopic::Drawing, target,
+                                   drawing ? BytesView(drawing->data) : BytesView{}, sink);
+      !done.ok())
+    return done;
 
   constexpr Tick kHistoryTicks = replica::kHistoryFrames * kTicksPerFrame;
   states_from_ = target > kHistoryTicks ? target - kHistoryTicks : 0;
@@ -239,6 +245,11 @@ Status ReplaySource::deliver_tick(Entries entries, replica::MessageSink& sink) {
   if (done.ok() && !is_seeking_)
     done =
         each(JournalTopic::Claims, [&](const auto& entry) { return deliver_claims(entry, sink); });
+  for (const auto topic : {JournalTopic::Lesson, JournalTopic::Drawing})
+    if (done.ok() && !is_seeking_)
+      done = each(topic, [&](const auto& entry) {
+        return deliver_lesson(topic, entry.tick, stream_->bytes_of(entry), sink);
+      });
   return done;
 }
 
@@ -321,6 +332,28 @@ Status ReplaySource::deliver_claims(const JournalStream::Entry& entry, replica::
     other_.mutable_claim_event()->Swap(&event);
     deliver(other_, entry.tick, sink);
   }
+  return {};
+}
+
+Status ReplaySource::deliver_lesson(JournalTopic topic, Tick tick, BytesView data,
+                                    replica::MessageSink& sink) {
+  if (topic == JournalTopic::Drawing) {
+    if (Status parsed = parse(topic, tick, data, *other_.mutable_drawing()); !parsed.ok())
+      return parsed;
+    deliver(other_, tick, sink);
+    return {};
+  }
+  proto::LessonRecord record;
+  if (Status parsed = parse(topic, tick, data, record); !parsed.ok()) return parsed;
+  if (record.has_teach())
+    other_.mutable_teach_event()->Swap(record.mutable_teach());
+  else if (record.has_point())
+    other_.mutable_point_event()->Swap(record.mutable_point());
+  else if (record.has_view())
+    other_.mutable_view_event()->Swap(record.mutable_view());
+  else
+    return {};
+  deliver(other_, tick, sink);
   return {};
 }
 

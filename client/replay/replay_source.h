@@ -80,6 +80,9 @@ class ReplaySource final : public replica::SessionSource, public replica::Playba
   Status deliver_change(const JournalStream::Entry& entry, replica::MessageSink& sink);
   Status deliver_surface(Entries entries, replica::MessageSink& sink);
   Status deliver_state(const JournalStream::Entry& entry, replica::MessageSink& sink);
+  // Hands on a Drawing where `topic` is that, else what a LessonRecord holds.
+  Status deliver_lesson(journal::JournalTopic topic, Tick tick, BytesView data,
+                        replica::MessageSink& sink);
   Status deliver_claims(const JournalStream::Entry& entry, replica::MessageSink& sink);
   Status parse(journal::JournalTopic topic, Tick tick, BytesView data,
                google::protobuf::Message& message) const;

@@ -54,6 +54,18 @@ bool ask_for_mark(SessionSource& source, bool is_return) {
   return source.send(envelope);
 }
 
+bool send_view(SessionSource& source, const Vec3f& eye_m, const Vec3f& target_m) {
+  const auto write_place = [](const Vec3f& from, proto::Vec3& to) {
+    to.set_x(from.x);
+    to.set_y(from.y);
+    to.set_z(from.z);
+  };
+  proto::Envelope envelope;
+  write_place(eye_m, *envelope.mutable_view_request()->mutable_eye_m());
+  write_place(target_m, *envelope.mutable_view_request()->mutable_target_m());
+  return source.send(envelope);
+}
+
 bool ask_for_ghost(SessionSource& source, bool is_wanted) {
   proto::Envelope envelope;
   envelope.mutable_ghost_request()->set_is_wanted(is_wanted);

@@ -24,6 +24,8 @@ std::uint32_t pass_on(const proto::Envelope& message, HandLine& hands);
 
 // To mark the organ as it is, or to return it to the mark. False if the source dropped it.
 bool ask_for_mark(SessionSource& source, bool is_return);
+// To say where one's own view is, as who has the view to follow. False if the source dropped it.
+bool send_view(SessionSource& source, const Vec3f& eye_m, const Vec3f& target_m);
 // To be shown the full solution beside a session with a reduction, or no longer. False if the
 // source dropped it.
 bool ask_for_ghost(SessionSource& source, bool is_wanted);

@@ -18,6 +18,8 @@ void make_printable(proto::Envelope& message) {
       return mend(message.mutable_goodbye()->mutable_text());
     case proto::Envelope::kMarkEvent:
       return mend(message.mutable_mark_event()->mutable_text());
+    case proto::Envelope::kTeachEvent:
+      return mend(message.mutable_teach_event()->mutable_text());
     case proto::Envelope::kRecordingState:
       return mend(message.mutable_recording_state()->mutable_text());
     case proto::Envelope::kSurfaceTopology:
@@ -29,8 +31,10 @@ void make_printable(proto::Envelope& message) {
       for (auto& region : *message.mutable_surface_change()->mutable_region()) mend(&region);
       return;
     case proto::Envelope::kParticipants:
-      for (auto& participant : *message.mutable_participants()->mutable_participant())
+      for (auto& participant : *message.mutable_participants()->mutable_participant()) {
         mend(participant.mutable_name());
+        mend(participant.mutable_frozen_by());
+      }
       return;
     default:
       return;  // it carries no text

@@ -102,6 +102,12 @@ void Replica::on_message(const proto::Envelope& message, std::uint64_t arrival_n
       return apply_recording(message.recording_state());
     case proto::Envelope::kPointEvent:
       return apply_point(message.point_event(), arrival_ns);
+    case proto::Envelope::kTeachEvent:
+      return apply_teach(message.teach_event(), arrival_ns);
+    case proto::Envelope::kDrawing:
+      return apply_drawing(message.drawing());
+    case proto::Envelope::kViewEvent:
+      return apply_view(message.view_event(), arrival_ns);
     case proto::Envelope::kBarrier:
       barrier_ = BarrierOutcome{message.barrier().frame(), message.barrier().surface_crc(), 0};
       barrier_answered_ = false;
@@ -132,6 +138,9 @@ void Replica::begin_anew() {
   to_show_.clear();
   if (sync_state_ != SyncState::WaitingForTopology) sync_state_ = SyncState::WaitingForKeyframe;
   ghost_ = {};
+  strokes_.clear();
+  ++drawing_version_;
+  led_view_.reset();
   barrier_.reset();
 }
 
@@ -442,9 +451,12 @@ void Replica::apply_participants(const proto::Participants& message) {
     participant.role = wire::role_of(entry.role());
     for (const auto& shape : entry.tool()) participant.tools.push_back(wire::read(shape));
     participant.is_away = entry.is_away();
+    participant.frozen_by = entry.frozen_by();
+    participant.leads_view = entry.leads_view();
     participants_.push_back(std::move(participant));
   }
   std::ranges::sort(participants_, {}, &Participant::slot);
+  if (std::ranges::none_of(participants_, &Participant::leads_view)) led_view_.reset();
 }
 
 void Replica::apply_claim(const proto::ClaimEvent& message, std::uint64_t arrival_ns) {
@@ -460,16 +472,6 @@ void Replica::apply_claim(const proto::ClaimEvent& message, std::uint64_t arriva
   add_notice(std::move(notice));
 }
 
-void Replica::apply_mark(const proto::MarkEvent& message, std::uint64_t arrival_ns) {
-  Notice notice;
-  notice.tick = message.tick();
-  notice.text = message.text();
-  notice.arrival_ns = arrival_ns;
-  notice.is_for_all = true;
-  counters_.marks += message.is_done() ? 1 : 0;
-  add_notice(std::move(notice));
-}
-
 void Replica::add_notice(Notice notice) {
   notices_.push_back(std::move(notice));
   if (notices_.size() > kMaxNotices) notices_.pop_front();
@@ -482,23 +484,6 @@ void Replica::apply_recording(const proto::RecordingState& message) {
                                : wire::RecordingStatus::Unknown;
   recording_.frames_missing = message.frames_missing();
   recording_.text = message.text().substr(0, kMaxRecordingText);
-}
-
-void Replica::apply_point(const proto::PointEvent& message, std::uint64_t arrival_ns) {
-  if (message.participant() >= kMaxParticipants) return fail("PointEvent: slot out of range");
-  const ParticipantSlot who{static_cast<std::uint8_t>(message.participant())};
-  std::erase_if(pointers_, [who](const Pointer& known) { return known.participant == who; });
-  if (!message.has_position_m()) return;
-  const Vec3f place = to_vec3(message.position_m());
-  if (!is_finite(place)) return fail("PointEvent.position_m: not finite");
-  pointers_.push_back({who, place, arrival_ns});
-}
-
-std::vector<Pointer> Replica::pointers(std::uint64_t now_ns) const {
-  std::vector<Pointer> shown;
-  for (const auto& pointer : pointers_)
-    if (now_ns < pointer.arrival_ns + kPointerNs) shown.push_back(pointer);
-  return shown;
 }
 
 void Replica::apply_ghost(const proto::GhostFrame& message) {

@@ -40,6 +40,7 @@
 namespace trocar::proto {
 class Barrier;
 class ClaimEvent;
+class Drawing;
 class FrameState;
 class GhostFrame;
 class MarkEvent;
@@ -51,6 +52,8 @@ class FrameStatePart;
 class SurfaceFrame;
 class SurfaceSlice;
 class SurfaceTopology;
+class TeachEvent;
+class ViewEvent;
 class Welcome;
 }  // namespace trocar::proto
 
@@ -134,6 +137,11 @@ class Replica final : public MessageSink {
   const Ghost& ghost() const { return ghost_; }
   // Who points where at `now_ns` (monotonic), one entry for each participant.
   std::vector<Pointer> pointers(std::uint64_t now_ns) const;
+  // Returns what is drawn on the organ; `drawing_version` changes unless lines were only added.
+  const std::vector<Stroke>& strokes() const { return strokes_; }
+  std::uint64_t drawing_version() const { return drawing_version_; }
+  // Returns where the view to follow was last, if somebody has had it.
+  const std::optional<LedView>& led_view() const { return led_view_; }
   // Returns what the server last said of its recording.
   const wire::RecordingState& recording() const { return recording_; }
   const std::optional<BarrierOutcome>& barrier() const { return barrier_; }
@@ -159,6 +167,10 @@ class Replica final : public MessageSink {
   void apply_state(const proto::FrameState& message);
   void apply_participants(const proto::Participants& message);
   void apply_mark(const proto::MarkEvent& message, std::uint64_t arrival_ns);
+  void apply_teach(const proto::TeachEvent& message, std::uint64_t arrival_ns);
+  void apply_drawing(const proto::Drawing& message);
+  void apply_view(const proto::ViewEvent& message, std::uint64_t arrival_ns);
+  void tell_all(Tick tick, const std::string& text, std::uint64_t arrival_ns);
   void add_notice(Notice notice);
   void apply_ghost(const proto::GhostFrame& message);
   void apply_recording(const proto::RecordingState& message);
@@ -210,6 +222,9 @@ class Replica final : public MessageSink {
   Ghost ghost_;
   wire::RecordingState recording_;
   std::vector<Pointer> pointers_;  // one of a participant at most
+  std::vector<Stroke> strokes_;
+  std::uint64_t drawing_version_ = 0;
+  std::optional<LedView> led_view_;
   std::optional<BarrierOutcome> barrier_;
   bool barrier_answered_ = false;
   std::string goodbye_text_;

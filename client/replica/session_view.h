@@ -30,7 +30,9 @@ struct Participant {
   std::string name;
   Role role = Role::Unknown;
   std::vector<tool::ToolShape> tools;
-  bool is_away = false;  // the connection is lost, the place is kept
+  bool is_away = false;     // the connection is lost, the place is kept
+  std::string frozen_by;    // who keeps the tools where they are; empty: nobody
+  bool leads_view = false;  // the view to follow is this one's
 };
 
 struct Tool {
@@ -86,6 +88,19 @@ struct SessionFrame {
 struct Pointer {
   ParticipantSlot participant;
   Vec3f position_m;
+  std::uint64_t arrival_ns = 0;
+};
+
+// A line that somebody has drawn, by where its points are on the surface at rest.
+struct Stroke {
+  ParticipantSlot participant;
+  std::vector<Vec3f> rest_m;
+};
+
+// The view of who was given it.
+struct LedView {
+  ParticipantSlot participant;
+  Vec3f eye_m, target_m;
   std::uint64_t arrival_ns = 0;
 };
 

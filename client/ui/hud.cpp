@@ -146,6 +146,7 @@ HudActions Hud::draw(const HudModel& model) {
   draw_slow_time(model, scale_);
   draw_recording(model, scale_);
   draw_stale_picture(model, scale_);
+  draw_lesson(model, scale_);
   draw_own_forces(model, scale_);
   draw_messages(model, scale_);
   if (model.timeline) draw_timeline(*model.timeline, scale_, actions);
@@ -163,6 +164,7 @@ HudActions Hud::draw(const HudModel& model) {
   actions.toggle_ghost = pressed(GLFW_KEY_G);
   actions.reset_camera = pressed(GLFW_KEY_C);
   actions.screenshot = pressed(GLFW_KEY_F12);
+  actions.toggle_follow = !model.view_text.empty() && pressed(GLFW_KEY_V);
   actions.set_mark = model.can_mark && pressed(GLFW_KEY_M);
   actions.return_to_mark = model.can_mark && pressed(GLFW_KEY_BACKSPACE);
   if (model.timeline && pressed(GLFW_KEY_SPACE)) actions.toggle_play = true;

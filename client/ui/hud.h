@@ -30,6 +30,7 @@ struct HudParticipant {
   tool::Verb verb = tool::Verb::None;
   bool has_claim = false, is_silent = false;
   bool is_away = false;    // the connection is lost, the place is kept
+  bool is_frozen = false;  // an instructor keeps the tools where they are
   bool is_inside = false;  // it appeared inside tissue and touches nothing
   float force_n = 0, torque_nm = 0;
   std::uint32_t contact_nodes = 0;
@@ -87,6 +88,8 @@ struct HudModel {
   float greatest_force_n = 0;  // of all participants' `forces_n`: their common scale
   bool shows_regions = true, shows_holds = false, shows_arrows = true, shows_rate = false;
   std::string recording_text;           // empty: nothing is wrong with the recording
+  std::string frozen_text;              // empty: one's own tools follow one's hands
+  std::string view_text;                // empty: there is no view to follow
   std::string ghost_text;               // empty: it is not to be shown
   std::vector<HudOwnForce> own_forces;  // of a live session
   float own_peak_n = 0;                 // of all of them together, in the last seconds
@@ -100,7 +103,7 @@ struct HudActions {
   bool toggle_help = false, toggle_regions = false, toggle_holds = false, toggle_arrows = false;
   bool toggle_rate = false, toggle_ghost = false, reset_camera = false, screenshot = false;
   bool toggle_play = false;
-  bool set_mark = false, return_to_mark = false;
+  bool set_mark = false, return_to_mark = false, toggle_follow = false;
   std::optional<double> seek_seconds;
   std::optional<float> speed;
 };

@@ -173,6 +173,23 @@ void draw_stale_picture(const HudModel& model, float scale) {
   ImGui::End();
 }
 
+void draw_lesson(const HudModel& model, float scale) {
+  if (model.frozen_text.empty() && model.view_text.empty()) return;
+  const ImVec2 screen = ImGui::GetIO().DisplaySize;
+  // At the left, above the hint or the timeline, where it covers no organ.
+  const float bottom = screen.y - (model.timeline ? 118 : kMargin + 48) * scale;
+  ImGui::SetNextWindowPos({kMargin * scale, bottom}, 0, {0, 1});
+  ImGui::Begin("lesson", nullptr, kGlass);
+  if (!model.frozen_text.empty()) {
+    ImGui::PushFont(bold());
+    ImGui::TextColored(kNotice, "%s", model.frozen_text.c_str());
+    ImGui::PopFont();
+    ImGui::TextDisabled("They come back to your hands slowly when they are released.");
+  }
+  if (!model.view_text.empty()) ImGui::TextUnformatted(model.view_text.c_str());
+  ImGui::End();
+}
+
 void draw_labels(const HudModel& model, float scale) {
   ImDrawList* list = ImGui::GetBackgroundDrawList();
   for (const HudLabel& label : model.labels) {
@@ -273,6 +290,7 @@ void draw_help(const HudModel& model, float scale) {
       help_row("M", "mark the organ as it is");
       help_row("Backspace", "return it to the mark, for everybody");
     }
+    if (!model.view_text.empty()) help_row("V", "follow the view that was given, or do not");
     if (model.timeline) {
       help_row("Space", "play or pause");
       help_row("left, right", "two seconds back or on");

@@ -21,6 +21,8 @@ void draw_slow_time(const HudModel& model, float scale);
 void draw_recording(const HudModel& model, float scale);
 // A banner while the picture is older than a hand can work with.
 void draw_stale_picture(const HudModel& model, float scale);
+// Who keeps one's tools where they are, and whose view there is to follow.
+void draw_lesson(const HudModel& model, float scale);
 void draw_labels(const HudModel& model, float scale);
 void draw_messages(const HudModel& model, float scale);
 void draw_timeline(const HudTimeline& timeline, float scale, HudActions& actions);

@@ -196,6 +196,10 @@ Status SessionJournal::read_solver_changes(Tick from, Tick to,
 Status SessionJournal::read_hands(Tick from, Tick to, const TickVisitor<proto::HandLog>& visitor) {
   return read_topic(JournalTopic::Hands, from, to, visitor);
 }
+Status SessionJournal::read_lessons(Tick from, Tick to,
+                                    const TickVisitor<proto::LessonRecord>& visitor) {
+  return read_topic(JournalTopic::Lesson, from, to, visitor);
+}
 Status SessionJournal::read_snapshots(Tick from, Tick to,
                                       const TickVisitor<proto::WorldSnapshot>& visitor) {
   return read_topic(JournalTopic::Snapshot, from, to, visitor);

@@ -72,6 +72,7 @@ class SessionJournal {
   Status read_claims(Tick from, Tick to, const TickVisitor<proto::ClaimLog>& visitor);
   Status read_solver_changes(Tick from, Tick to, const TickVisitor<proto::SolverLog>& visitor);
   Status read_hands(Tick from, Tick to, const TickVisitor<proto::HandLog>& visitor);
+  Status read_lessons(Tick from, Tick to, const TickVisitor<proto::LessonRecord>& visitor);
   Status read_snapshots(Tick from, Tick to, const TickVisitor<proto::WorldSnapshot>& visitor);
 
   // Every message there is, in the order in which they were recorded, with its channel's topic.

@@ -29,6 +29,8 @@ const TopicEntry& entry_of(JournalTopic topic) {
       {"/solver", proto::SolverLog::descriptor()},
       {"/loads", proto::ExternalLoads::descriptor()},
       {"/hands", proto::HandLog::descriptor()},
+      {"/lesson", proto::LessonRecord::descriptor()},
+      {"/drawing", proto::Drawing::descriptor()},
   }};
   return kEntries[static_cast<std::size_t>(topic)];
 }

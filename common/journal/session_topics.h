@@ -15,6 +15,9 @@
 //   /solver          SolverLog        frames in which another solver took over, or gave another
 //                                     reason
 //   /hands           HandLog          what hands that feel have felt, as their clients said
+//   /lesson          LessonRecord     what instructors did with people, what people said, where
+//                                     they pointed, and the view to follow
+//   /drawing         Drawing          all that is drawn on the surface, on change
 //   /frame_state     FrameState       tools, regions and figures of a frame, as a client got them
 //   /gap             JournalGap       where the queue to the writer was full
 //   /tool/<slot>     ToolState        one channel per tool, for plots in other programs
@@ -50,8 +53,10 @@ enum class JournalTopic : std::uint8_t {
   Solver,
   Loads,
   Hands,
+  Lesson,
+  Drawing,
 };
-inline constexpr int kJournalTopicCount = 14;
+inline constexpr int kJournalTopicCount = 16;
 
 inline constexpr const char* kJournalProfile = "trocar";
 inline constexpr const char* kSessionMetadataName = "trocar.session";

@@ -21,7 +21,8 @@ enum class Role : std::uint8_t {
 struct Rights {
   bool has_tools = false;
   bool may_mark = false;      // marks the organ, and returns it to the mark
-  bool may_point = false;     // shows everybody a place
+  bool may_point = false;     // shows everybody a place, and draws on the surface
+  bool may_teach = false;     // freezes tools, takes claims, puts people out: see TeachAction
   std::uint8_t admitted = 0;  // roles that a join code for this one lets in, a bit each
 
   constexpr bool admits(Role role) const {
@@ -46,24 +47,28 @@ inline constexpr std::array<NamedRole, 4> kRoles{
       {.has_tools = true,
        .may_mark = false,
        .may_point = false,
+       .may_teach = false,
        .admitted = bit_of(Role::Surgeon) | bit_of(Role::Assistant) | bit_of(Role::Observer)}},
      {Role::Assistant,
       "assistant",
       {.has_tools = true,
        .may_mark = false,
        .may_point = false,
+       .may_teach = false,
        .admitted = bit_of(Role::Assistant) | bit_of(Role::Observer)}},
      {Role::Instructor,
       "instructor",
       {.has_tools = false,
        .may_mark = true,
        .may_point = true,
+       .may_teach = true,
        .admitted = bit_of(Role::Instructor) | bit_of(Role::Observer)}},
      {Role::Observer,
       "observer",
       {.has_tools = false,
        .may_mark = false,
        .may_point = false,
+       .may_teach = false,
        .admitted = bit_of(Role::Observer)}}}};
 
 // None, for a role that is none of kRoles.

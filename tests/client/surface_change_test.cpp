@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "client/replica/drawn_lines.h"
 #include "client/replica/interpolated_surface.h"
 #include "client/replica/replica.h"
 #include "common/base/timing.h"
@@ -60,6 +61,36 @@ class SurfaceChangeTest : public ::testing::Test {
   testing::Random random_{5};
   Replica replica_{[this](const proto::Envelope& message) { return source_.send(message); }};
 };
+
+// Points go to the triangles that have their place, and leave none behind.
+TEST_F(SurfaceChangeTest, DrawnLinesStayWhereTheyAreAcrossCuts) {
+  start();
+  proto::Envelope message;
+  const auto& layout = source_.layout();
+  for (std::size_t i = 0; i < layout.triangles.size(); i += 7) {
+    auto& stroke = *message.mutable_drawing()->add_stroke();
+    wire::QuantisedVertex centre{};
+    for (const auto corner : layout.triangles[i]) centre += layout.rest_quanta[corner.value];
+    for (const auto value : {centre.x, centre.y, centre.z}) stroke.add_rest_quanta(value / 3);
+  }
+  source_.queue(message);
+  advance(1);
+  DrawnLines lines;
+  const auto rest = [&] { return std::span<const Vec3f>(replica_.topology().rest_positions); };
+  lines.update(replica_, rest());
+  for (int i = 0; i < 40; ++i) {
+    cut();
+    advance(1);
+    ASSERT_NO_FATAL_FAILURE(expect_in_step());
+    lines.update(replica_, rest());
+    ASSERT_EQ(lines.lines().size(), replica_.strokes().size());
+    for (std::size_t k = 0; k < lines.lines().size(); ++k) {
+      const auto& point = lines.lines()[k].points[0];
+      if (point.normal == Vec3f{}) continue;  // its tissue is gone
+      ASSERT_LT(length(point.position - replica_.strokes()[k].rest_m[0]), 0.0041f);
+    }
+  }
+}
 
 TEST_F(SurfaceChangeTest, EveryFrameMayBeginAnEpoch) {
   start();

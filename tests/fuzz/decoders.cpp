@@ -28,6 +28,7 @@
 #include "server/papers/dogan/reduction_file.h"
 #include "server/session/access/code_book.h"
 #include "server/session/recording/load_messages.h"
+#include "server/session/replication/validation.h"
 #include "server/tissue/world/surface_layout.h"
 
 namespace trocar::fuzz {
@@ -67,6 +68,17 @@ bool decode_haptics(BytesView bytes) {
   bool are_read = envelope.haptic_patches().patch_size() > 0;
   for (const auto& patch : envelope.haptic_patches().patch()) are_read &= is_read(patch);
   return are_read;
+}
+
+// A server takes these from a client.
+bool decode_teaching(BytesView bytes) {
+  proto::Envelope envelope;
+  if (!checked(wire::decode_envelope(bytes, envelope))) return false;
+  if (envelope.has_teach_request())
+    return checked(replication::check_teach(envelope.teach_request()));
+  if (envelope.has_stroke_request())
+    return checked(replication::check_stroke(envelope.stroke_request()));
+  return envelope.has_view_request() && checked(replication::check_view(envelope.view_request()));
 }
 
 bool decode_envelope(BytesView bytes) {
@@ -245,6 +257,7 @@ bool decode_codes(BytesView bytes) {
 constexpr Decoder kDecoders[] = {
     {"envelope", decode_envelope},
     {"haptics", decode_haptics},
+    {"teaching", decode_teaching},
     {"surface_codec", decode_surface},
     {"surface_slice", decode_surface_slice},
     {"handshake", decode_handshake},

@@ -110,6 +110,30 @@ void save_envelopes() {
   save("envelope", "client_datagram", datagram);
 }
 
+void save_teaching() {
+  proto::Envelope note;
+  note.mutable_teach_request()->set_action(proto::TEACH_NOTE);
+  note.mutable_teach_request()->set_text("Look at this later.");
+  save("teaching", "note", note);
+  proto::Envelope rename;
+  auto& order = *rename.mutable_teach_request();
+  order.set_action(proto::TEACH_RENAME);
+  order.set_participant(2);
+  order.set_name("Ada");
+  order.set_text("Ada B");
+  save("teaching", "rename", rename);
+  proto::Envelope stroke;
+  for (const std::uint32_t triangle : {5u, 6u}) {
+    stroke.mutable_stroke_request()->add_triangle(triangle);
+    for (const float weight : {0.25f, 0.5f}) stroke.mutable_stroke_request()->add_weight(weight);
+  }
+  save("teaching", "stroke", stroke);
+  proto::Envelope view;
+  view.mutable_view_request()->mutable_eye_m()->set_z(0.4f);
+  view.mutable_view_request()->mutable_target_m()->set_y(0.02f);
+  save("teaching", "view", view);
+}
+
 void save_haptics() {
   proto::Envelope law;
   wire::HapticLaw liver;
@@ -145,6 +169,7 @@ int main(int argc, char** argv) {
   save_surfaces();
   save_envelopes();
   save_haptics();
+  save_teaching();
   save_slices();
   save_handshakes();
   const auto block = reduce::testing::block(3, 3, 3);

@@ -109,6 +109,7 @@ struct KeepingSink final : app::JournalSink {
   void record_frame(const step::SharedFrame& frame) override { frames.push_back(frame); }
   void record_participants(const std::vector<participants::Participant>&, Tick) override {}
   void record_hand(wire::HandRecord) override {}
+  void record_lesson(wire::LessonEntry) override {}
   Status close() override { return {}; }
   wire::RecordingState state() const override { return {}; }
   std::vector<step::SharedFrame> frames;

@@ -122,8 +122,8 @@ test('an instructor points, and others see where', async () => {
   await live(sees);
   const page = await openPage(link(server.codes.instructor, 'instructor', 'Points'));
   await live(page);
-  assert.equal(await sees.getByRole('button', { name: 'Point' }).count(), 0);
-  await page.getByRole('button', { name: 'Point' }).click();
+  assert.equal(await sees.getByRole('button', { name: 'Point', exact: true }).count(), 0);
+  await page.getByRole('button', { name: 'Point', exact: true }).click();
   const box = await page.locator('.stage canvas').boundingBox();
   const seen = await until('a pointer', async () => {
     await page.mouse.move(box.x + box.width / 2 + Math.random() * 4, box.y + box.height / 2);
@@ -131,7 +131,7 @@ test('an instructor points, and others see where', async () => {
   });
   assert.ok(Math.hypot(...seen.position) < 0.3, seen.position.join());
   await sees.locator('.label.pointer', { hasText: 'Points points here' }).waitFor({ timeout: kPatience });
-  await page.getByRole('button', { name: 'Point' }).click();
+  await page.getByRole('button', { name: 'Point', exact: true }).click();
   await until('no pointer', () => sees.evaluate(() => window.trocar.replica.pointers().length === 0));
   await close(page);
   await close(sees);

@@ -156,6 +156,14 @@ TROCAR_EXPORT(pointers_at) const void* trocar_pointers_at() {
   return model().pointers().data();
 }
 
+// Vertices of all that is drawn; then mesh_vertices() says how many.
+TROCAR_EXPORT(drawing_at) const void* trocar_drawing_at() {
+  return hand_out(model().drawing());
+}
+TROCAR_EXPORT(attach) const float* trocar_attach(float x, float y, float z) {
+  return model().attach({x, y, z});
+}
+
 // Colours are 0xrrggbb; each of the three gives a place of MeshVertex, mesh_vertices() how many.
 TROCAR_EXPORT(make_tool)
 const void* trocar_make_tool(float radius_m, float length_m, float half_width_m,

@@ -10,6 +10,7 @@ namespace {
 
 // The native picture has the same.
 constexpr float kRegionStrength = 0.50f, kFirmHoldStrength = 0.95f, kTouchStrength = 0.60f;
+constexpr float kLineHalfWidth = 0.0009f;  // m
 constexpr std::size_t kMostOutboxBytes = 64 * 1024;
 
 using Tint = std::array<float, 4>;
@@ -41,6 +42,8 @@ void PageModel::restart() {
   error_.clear();
   tools_.clear();
   held_.clear();
+  lines_ = {};
+  drawing_.clear();
   replica_.emplace([this](const proto::Envelope& message) {
     const auto frame = wire::encode_envelope(message);
     if (outbox_.size() + frame->size() > kMostOutboxBytes) return false;
@@ -88,6 +91,12 @@ bool PageModel::receive_bare(std::uint32_t field, BytesView message, double now_
       break;
     case proto::Envelope::kParticipantsFieldNumber:
       is_parsed = parse(envelope.mutable_participants());
+      break;
+    case proto::Envelope::kDrawingFieldNumber:
+      is_parsed = parse(envelope.mutable_drawing());
+      break;
+    case proto::Envelope::kPointEventFieldNumber:
+      is_parsed = parse(envelope.mutable_point_event());
       break;
     default:
       break;
@@ -184,6 +193,26 @@ void PageModel::update_overlay(Overlay overlay) {
   }
 }
 
+void PageModel::update_drawing() {
+  lines_.update(*replica_, shown_->positions());
+  drawing_.clear();
+  for (const auto& line : lines_.lines()) {
+    ribbon_.clear();
+    for (const auto& point : line.points) ribbon_.push_back({point.position, point.normal});
+    shape::add_ribbon(ribbon_, kLineHalfWidth, shape::colour_of_pointer(line.participant.value),
+                      drawing_);
+  }
+}
+
+const float* PageModel::attach(const Vec3f& place) {
+  const auto& topology = replica_->topology();
+  if (shown_->positions().size() != topology.rest_positions.size()) return nullptr;
+  const auto found = replica::attach(place, topology, shown_->positions());
+  if (found.triangle == replica::kNoTriangle) return nullptr;
+  attached_ = {static_cast<float>(found.triangle), found.weight[0], found.weight[1]};
+  return attached_.data();
+}
+
 bool PageModel::update(double now_ms, std::size_t triangle_budget, Overlay overlay) {
   shown_->update(*replica_, to_ns(now_ms));
   if (!shown_->is_valid()) return false;
@@ -196,6 +225,7 @@ bool PageModel::update(double now_ms, std::size_t triangle_budget, Overlay overl
   for (const auto& pointer : replica_->pointers(to_ns(now_ms)))
     pointers_.push_back({static_cast<float>(pointer.participant.value), pointer.position_m});
   update_overlay(overlay);
+  update_drawing();
   return true;
 }
 

@@ -14,9 +14,11 @@
 #include <string>
 #include <vector>
 
+#include "client/replica/drawn_lines.h"
 #include "client/replica/held_tissue.h"
 #include "client/replica/interpolated_surface.h"
 #include "client/replica/replica.h"
+#include "client/shape/ribbon.h"
 #include "client/shape/smooth_surface.h"
 #include "client/shape/tool_mesh.h"
 #include "common/base/bytes.h"
@@ -77,6 +79,12 @@ class PageModel {
   std::span<const PageTool> tools() const { return tools_; }
   std::span<const PagePointer> pointers() const { return pointers_; }
 
+  // All that is drawn on the organ, as one mesh in the world frame.
+  const shape::MeshVertices& drawing() const { return drawing_; }
+  // The triangle number and the two weights with which the server is told of a place on the
+  // picture; null: there is no organ yet.
+  const float* attach(const Vec3f& place);
+
   // Vertices of a tool that is drawn in one piece (a blade), or of its shaft and one jaw.
   const shape::MeshVertices& make_tool(const tool::ToolShape& form, shape::Colour colour);
   const shape::MeshVertices& make_jaw(const tool::ToolShape& form);
@@ -87,6 +95,7 @@ class PageModel {
   void build_surface(std::size_t triangle_budget);
   void update_tools();
   void update_overlay(Overlay overlay);
+  void update_drawing();
 
   std::optional<replica::Replica> replica_;
   std::optional<replica::InterpolatedSurface> shown_;
@@ -100,7 +109,10 @@ class PageModel {
   std::vector<std::array<std::uint8_t, 4>> overlay_;
   std::vector<PageTool> tools_;
   std::vector<PagePointer> pointers_;
-  shape::MeshVertices mesh_;
+  replica::DrawnLines lines_;
+  std::vector<shape::RibbonPoint> ribbon_;
+  std::array<float, 3> attached_{};
+  shape::MeshVertices mesh_, drawing_;
   Bytes outbox_;
   std::string error_;
 };

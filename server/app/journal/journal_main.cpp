@@ -17,6 +17,7 @@
 #include "common/journal/session_journal.h"
 #include "common/wire/role.h"
 #include "server/session/recording/force_table.h"
+#include "server/session/recording/lesson_table.h"
 #include "server/session/recording/verify.h"
 
 namespace trocar::app {
@@ -191,6 +192,15 @@ int export_forces(const std::string& path, const std::string& table) {
   return 0;
 }
 
+int export_lesson(const std::string& path, const std::string& table) {
+  const auto counts = recording::write_lesson_table(path, table);
+  if (!counts) return report(kProgram, counts.error());
+  std::printf("%s: %" PRIu64 " rows\n", table.c_str(), counts->rows);
+  if (counts->left_out > 0)
+    std::printf("the recording had no room for %" PRIu64 " of them\n", counts->left_out);
+  return 0;
+}
+
 int run(int argc, char** argv) {
   CLI::App app{"Looks into recorded Trocar sessions (.mcap).", kProgram};
   app.footer(
@@ -202,6 +212,9 @@ int run(int argc, char** argv) {
       "reduction\n"
       "  trocar-journal export session.mcap --forces forces.csv\n"
       "                                                forces of tools and hands as a table\n"
+      "  trocar-journal export session.mcap --lesson lesson.csv\n"
+      "                                                what instructors did, notes, talk, "
+      "pointing\n"
       "  trocar-journal repair killed.mcap whole.mcap  for other programs that read MCAP\n"
       "Exit codes: 0 verified, 1 difference found, 2 usage, 3 file cannot be read, 6 not all "
       "could\n"
@@ -220,14 +233,17 @@ int run(int argc, char** argv) {
       app.add_subcommand("verify", "Simulate the session again and compare all that it says");
   auto* mend = app.add_subcommand(
       "repair", "Write a recording that was cut short or is damaged again, as a whole file");
-  std::string force_table;
+  std::string force_table, lesson_table;
   auto* give = app.add_subcommand("export", "Write what a recording holds as a table");
   give->add_option("FILE", path, "a journal (.mcap)")->required();
   give->add_option("--forces", force_table,
                    "a row for each tool and frame: place, force of the tissue, and what a hand "
                    "felt (CSV)")
-      ->type_name("OUT")
-      ->required();
+      ->type_name("OUT");
+  give->add_option("--lesson", lesson_table,
+                   "a row for each thing that an instructor did, or that somebody said or showed "
+                   "(CSV)")
+      ->type_name("OUT");
   mend->add_option("FILE", path, "the journal (.mcap)")->required();
   mend->add_option("NEW", repaired_path, "the file to write, which must not exist")->required();
   for (auto* command : {info, check}) {
@@ -245,7 +261,14 @@ int run(int argc, char** argv) {
   }
   if (auto s = log::configure(kProgram, log_level); !s) return report(kProgram, s.error());
   if (mend->parsed()) return repair(path, repaired_path);
-  if (give->parsed()) return export_forces(path, force_table);
+  if (give->parsed()) {
+    if (force_table.empty() && lesson_table.empty())
+      return report(kProgram, Error{ErrorCode::Usage,
+                                    "export: say what, with --forces OUT or "
+                                    "--lesson OUT"});
+    const int forces = force_table.empty() ? 0 : export_forces(path, force_table);
+    return forces != 0 || lesson_table.empty() ? forces : export_lesson(path, lesson_table);
+  }
   return check->parsed() ? verify(path, reduction_file, as_json) : show_info(path, as_json);
 }
 

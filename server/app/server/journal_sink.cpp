@@ -18,6 +18,9 @@ class RecordedSession : public JournalSink {
     recorder_->record_participants(present, tick);
   }
   void record_hand(wire::HandRecord record) override { recorder_->record_hand(std::move(record)); }
+  void record_lesson(wire::LessonEntry entry) override {
+    recorder_->record_lesson(std::move(entry));
+  }
   Status close() override { return recorder_->close(); }
   wire::RecordingState state() const override { return recorder_->state(); }
 

@@ -10,6 +10,7 @@
 
 #include "common/journal/session_topics.h"
 #include "common/wire/hand_report.h"
+#include "common/wire/lesson.h"
 #include "common/wire/recording_state.h"
 #include "common/wire/surface_layout.h"
 #include "server/organs/organ/organ.h"
@@ -29,6 +30,8 @@ class JournalSink {
                                    Tick tick) = 0;
   // I/O thread: what a hand has felt.
   virtual void record_hand(wire::HandRecord record) = 0;
+  // I/O thread: what people have said and shown.
+  virtual void record_lesson(wire::LessonEntry entry) = 0;
   // I/O thread, after the simulation thread has ended.
   virtual Status close() = 0;
   // Any thread, at any time: whether everything has been recorded so far.

@@ -104,6 +104,7 @@ class Server {
   std::vector<step::SharedFrame> frames_;
   std::atomic<std::shared_ptr<const ghost::GhostReport>> ghost_report_;  // the newest; null: taken
   std::vector<replication::BarrierResult> barrier_;
+  std::string goodbye_ = "the session is over";
   bool is_ending_ = false;
   Tick next_warning_ = 0;
   double wall_seconds_ = 0;
@@ -150,10 +151,18 @@ Status Server::open() {
   replication.on_participants = [this](const auto& present, Tick tick) {
     note_participants(present, tick);
   };
-  if (journal_)
+  if (journal_) {
     replication.on_hand_report = [this](wire::HandRecord record) {
       journal_->record_hand(std::move(record));
     };
+    replication.on_lesson = [this](wire::LessonEntry entry) {
+      journal_->record_lesson(std::move(entry));
+    };
+  }
+  replication.on_end_wanted = [this](const std::string& words) {
+    goodbye_ = words;
+    loop_->request_stop();
+  };
   if (reduction_)
     replication.on_ghost_wanted = [this](bool is_wanted) { ghost_->set_wanted(is_wanted); };
   replicator_ = std::make_unique<replication::Replicator>(
@@ -329,7 +338,7 @@ void Server::begin_end() {
 
 void Server::say_goodbye() {
   barrier_ = replicator_->barrier_results();
-  replicator_->end_all(replication::EndReason::ServerClosing, "the session is over");
+  replicator_->end_all(replication::EndReason::ServerClosing, goodbye_);
   wait_for([this] { return tcp_->connection_count() == 0; }, kGoodbyeDeadline,
            [this] { io_.stop(); });
 }

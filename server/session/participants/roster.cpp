@@ -11,12 +11,6 @@ namespace {
 
 constexpr std::size_t kMaxNameBytes = 32;
 
-bool is_valid_name(std::string_view name) {
-  if (name.empty() || name.size() > kMaxNameBytes) return false;
-  if (name.front() == ' ' || name.back() == ' ') return false;
-  return is_printable(name);
-}
-
 std::string print_mm(float mm) {
   std::array<char, 32> text{};
   const auto end = std::to_chars(text.data(), text.data() + text.size(), mm);
@@ -24,6 +18,12 @@ std::string print_mm(float mm) {
 }
 
 }  // namespace
+
+bool is_valid_name(std::string_view name) {
+  if (name.empty() || name.size() > kMaxNameBytes) return false;
+  if (name.front() == ' ' || name.back() == ' ') return false;
+  return is_printable(name);
+}
 
 Roster::Roster(const std::vector<Participant>& present) {
   for (const auto& participant : present)
@@ -36,9 +36,7 @@ Result<Participant> Roster::join(std::string_view name, Role role,
     refusal = why;
     return Error{ErrorCode::Refused, std::move(message)};
   };
-  if (!is_valid_name(name))
-    return refuse(JoinRefusal::NameInvalid,
-                  "name: 1 to 32 bytes of printable UTF-8 without a space at either end, please");
+  if (!is_valid_name(name)) return refuse(JoinRefusal::NameInvalid, kNameRule);
   if (!has_tools(role) && !tools.empty())
     return refuse(JoinRefusal::ToolsInvalid,
                   std::string("tools: an ") + name_of(role) + " watches and has none");
@@ -103,6 +101,24 @@ const Participant* Roster::find(std::string_view name) const {
 
 void Roster::set_away(ParticipantSlot slot, bool is_away) {
   if (slot.is_valid() && slots_[slot.value]) slots_[slot.value]->is_away = is_away;
+}
+
+void Roster::set_frozen_by(ParticipantSlot slot, std::string who) {
+  if (slot.is_valid() && slots_[slot.value]) slots_[slot.value]->frozen_by = std::move(who);
+}
+
+void Roster::set_leader(ParticipantSlot slot) {
+  for (auto& participant : slots_)
+    if (participant) participant->leads_view = participant->slot == slot;
+}
+
+Status Roster::rename(ParticipantSlot slot, std::string_view name) {
+  if (!is_valid_name(name)) return Error{ErrorCode::Refused, kNameRule};
+  const auto* other = find(name);
+  if (other != nullptr && other->slot != slot)
+    return Error{ErrorCode::Refused, "name: somebody else is called " + std::string(name)};
+  if (slot.is_valid() && slots_[slot.value]) slots_[slot.value]->name = name;
+  return {};
 }
 
 std::vector<Participant> Roster::list() const {

@@ -26,6 +26,8 @@ struct Participant {
   Role role = Role::Observer;
   std::vector<tool::ToolShape> tools;  // 1 or 2 for roles with tools, else none
   bool is_away = false;                // the connection is lost, the place is kept
+  std::string frozen_by;               // who keeps the tools where they are; empty: nobody
+  bool leads_view = false;             // the view to follow is this one's
 };
 
 // How many there are for, at most what ids.h says, and what they may bring.
@@ -35,6 +37,11 @@ struct Places {
   int tools = kToolsPerHand;    // of each who has some
   float longest_edge_mm = 40;   // of a blade: what it cuts in a tick is in proportion
 };
+
+// 1 to 32 bytes of printable UTF-8 without a space at either end.
+bool is_valid_name(std::string_view name);
+inline constexpr const char* kNameRule =
+    "name: 1 to 32 bytes of printable UTF-8 without a space at either end, please";
 
 enum class JoinRefusal { NameInvalid, NameTaken, Full, ToolsInvalid };
 
@@ -53,6 +60,11 @@ class Roster {
   void restore(Participant who);
   void leave(ParticipantSlot slot);
   void set_away(ParticipantSlot slot, bool is_away);
+  void set_frozen_by(ParticipantSlot slot, std::string who);
+  // Nobody else leads then; an invalid slot: nobody at all.
+  void set_leader(ParticipantSlot slot);
+  // An error if the name is not valid, or somebody else has it.
+  Status rename(ParticipantSlot slot, std::string_view name);
 
   const Participant* find(ParticipantSlot slot) const;
   const Participant* find(std::string_view name) const;

@@ -9,9 +9,9 @@
 #include <map>
 #include <optional>
 
-#include "common/base/printable.h"
 #include "common/journal/session_journal.h"
 #include "common/wire/hand_report_messages.h"
+#include "server/session/recording/csv_text.h"
 #include "server/session/recording/hand_moments.h"
 
 namespace trocar::recording {
@@ -23,15 +23,6 @@ constexpr const char* kHeader =
     "model_x_n,model_y_n,model_z_n,limits,answer_age_s,echo_delay_s,rate_hz,motion_scale,"
     "force_scale,device\n";
 constexpr const char* kNotFelt = ",,,,,,,,,,,,";
-
-std::string quoted(const std::string& text) {
-  std::string out = "\"";
-  for (const char c : printable(text)) {
-    if (c == '"') out += '"';
-    out += c;
-  }
-  return out + '"';
-}
 
 std::string names_of(std::uint32_t limits) {
   std::string names;
@@ -58,14 +49,14 @@ void add_row(Tick tick, const proto::ToolState& tool, const std::string& name,
   const auto& force = tool.force_n();
   fmt::format_to(to, "{:.3f},{},{},{},{},{},{},{},{},{},",
                  static_cast<double>(tick) / static_cast<double>(kTicksPerSecond), tick,
-                 tool.tool(), quoted(name), at.x(), at.y(), at.z(), force.x(), force.y(),
+                 tool.tool(), csv_text(name), at.x(), at.y(), at.z(), force.x(), force.y(),
                  force.z());
   if (felt)
     fmt::format_to(to, "{},{},{},{},{},{},{},{},{},{},{},{},{}", felt->hand_force_n.x,
                    felt->hand_force_n.y, felt->hand_force_n.z, felt->model_force_n.x,
                    felt->model_force_n.y, felt->model_force_n.z, names_of(felt->limits),
                    felt->answer_age_s, felt->echo_delay_s, felt->rate_hz, felt->motion_scale,
-                   felt->force_scale, quoted(felt->device));
+                   felt->force_scale, csv_text(felt->device));
   else
     text += kNotFelt;
   text += '\n';

@@ -131,6 +131,13 @@ void Recorder::record_hand(wire::HandRecord record) {
   wake_ups_.notify_one();
 }
 
+void Recorder::record_lesson(wire::LessonEntry entry) {
+  const bool is_taken = lessons_.try_push({std::move(entry), lessons_left_out_});
+  lessons_left_out_ = is_taken ? 0 : lessons_left_out_ + 1;
+  wake_ups_.fetch_add(1);
+  wake_ups_.notify_one();
+}
+
 void Recorder::run() {
   for (;;) {
     const auto seen = wake_ups_.load();
@@ -152,6 +159,11 @@ bool Recorder::write_queued() {
     any = true;
     if (!status_.ok()) continue;
     if (auto s = write_hand(*record); !s) fail_with(s.error());
+  }
+  while (const auto lesson = lessons_.try_pop()) {
+    any = true;
+    if (!status_.ok()) continue;
+    if (auto s = write_lesson(*lesson); !s) fail_with(s.error());
   }
   while (auto queued = frames_.try_pop()) {
     any = true;
@@ -183,6 +195,20 @@ Status Recorder::write_hand(const wire::HandRecord& record) {
   wire::write(record, message);
   // With the frame that was written last: frames that still wait may not become younger by it.
   return writer_->write_hands(last_tick_, utc_ns(), message);
+}
+
+Status Recorder::write_lesson(const QueuedLesson& lesson) {
+  const auto& [kind, message] = lesson.entry;
+  // With the frame that was written last, as hands are.
+  const Tick written = last_tick_;
+  if (kind == wire::LessonKind::Drawing)
+    return writer_->write(journal::JournalTopic::Drawing, written, utc_ns(), message);
+  if (lesson.left_out == 0)
+    return writer_->write(journal::JournalTopic::Lesson, written, utc_ns(), message);
+  proto::LessonRecord record;
+  record.ParseFromArray(message.data(), static_cast<int>(message.size()));
+  record.set_left_out(lesson.left_out);
+  return writer_->write(journal::JournalTopic::Lesson, written, utc_ns(), record);
 }
 
 Status Recorder::write_gap(const Gap& gap) {
@@ -240,6 +266,9 @@ Status Recorder::close() {
   }
   if (hands_left_out_ > 0)
     log::warn("recording: the last {} reports of what hands felt are missing", hands_left_out_);
+  if (lessons_left_out_ > 0)
+    log::warn("recording: the last {} things that people said or showed are missing",
+              lessons_left_out_);
   const Status closed = writer_->close();
   if (status_.ok() && !closed.ok()) fail_with(closed.error());
   counters_.bytes_written = writer_->bytes_written();

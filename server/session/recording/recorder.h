@@ -4,7 +4,8 @@
 //
 //   simulation thread: record_frame ----> [frames, 8 MiB] --.
 //   I/O thread:        record_participants -> [64 lists] -----+--> writer thread -> MCAP file
-//   I/O thread:        record_hand ------> [512 reports] -----'
+//   I/O thread:        record_hand ------> [512 reports] -----+
+//   I/O thread:        record_lesson ----> [256 entries] -----'
 //
 // Neither producer ever waits. When the frames' queue is full a frame is dropped, counted, and the
 // journal gets a JournalGap with the ticks that are missing; the surface goes on with topology and
@@ -26,6 +27,7 @@
 #include "common/base/spsc_queue.h"
 #include "common/journal/session_journal_writer.h"
 #include "common/wire/hand_report.h"
+#include "common/wire/lesson.h"
 #include "common/wire/recording_state.h"
 #include "common/wire/surface_layout.h"
 #include "server/organs/organ/organ.h"
@@ -55,7 +57,8 @@ class Recorder {
   static constexpr std::size_t kQueueBytes = 8 * 1024 * 1024;
   static constexpr std::size_t kQueueFrames = 1024;
   static constexpr std::size_t kQueueParticipants = 64;
-  static constexpr std::size_t kQueueHands = 512;  // 2 s of 32 tools
+  static constexpr std::size_t kQueueHands = 512;    // 2 s of 32 tools
+  static constexpr std::size_t kQueueLessons = 256;  // 5 s of two who point
 
   // Creates the file with organ and topology; copies what it keeps. Fails if the file exists or
   // cannot be written.
@@ -73,6 +76,8 @@ class Recorder {
   void record_participants(std::vector<participants::Participant> present, Tick tick);
   // The I/O thread calls it. What does not fit is left out, and the next that fits says how many.
   void record_hand(wire::HandRecord record);
+  // The I/O thread calls it; likewise.
+  void record_lesson(wire::LessonEntry entry);
   // After both producers have ended: writes what is queued and the file's summary.
   Status close();
   // After close().
@@ -84,6 +89,10 @@ class Recorder {
   struct Presence {
     std::vector<participants::Participant> present;
     Tick tick = 0;
+  };
+  struct QueuedLesson {
+    wire::LessonEntry entry;
+    std::uint64_t left_out = 0;  // before it
   };
   struct Gap {
     Tick first_tick = 0, last_tick = 0;
@@ -104,6 +113,7 @@ class Recorder {
   bool write_queued();
   Status write_presence(const Presence& presence);
   Status write_hand(const wire::HandRecord& record);
+  Status write_lesson(const QueuedLesson& lesson);
   Status write_gap(const Gap& gap);
   Status write_frame(const step::PublishedFrame& frame);
   void fail_with(const Error& error);
@@ -123,7 +133,8 @@ class Recorder {
   SpscQueue<QueuedFrame> frames_{kQueueFrames};
   SpscQueue<Presence> presences_{kQueueParticipants};
   SpscQueue<wire::HandRecord> hands_{kQueueHands};
-  std::uint64_t hands_left_out_ = 0;  // I/O thread
+  SpscQueue<QueuedLesson> lessons_{kQueueLessons};
+  std::uint64_t hands_left_out_ = 0, lessons_left_out_ = 0;  // I/O thread
   std::atomic<std::size_t> queued_bytes_{0};
   Gap open_gap_;  // simulation thread
   std::atomic<std::uint32_t> wake_ups_{0};

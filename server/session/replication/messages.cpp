@@ -82,15 +82,21 @@ void describe(const std::vector<participants::Participant>& present, proto::Part
     entry.set_name(participant.name);
     entry.set_role(static_cast<proto::Role>(participant.role));
     entry.set_is_away(participant.is_away);
+    entry.set_frozen_by(participant.frozen_by);
+    entry.set_leads_view(participant.leads_view);
     for (const auto& shape : participant.tools) {
       wire::write(shape, *entry.add_tool());
     }
   }
 }
 
-wire::SharedBytes encode_participants(const std::vector<participants::Participant>& present) {
+wire::SharedBytes encode_participants(const std::vector<participants::Participant>& present,
+                                      bool is_closed, std::span<const std::string> waiting) {
   proto::Envelope envelope;
-  describe(present, *envelope.mutable_participants());
+  auto& list = *envelope.mutable_participants();
+  describe(present, list);
+  list.set_is_closed(is_closed);
+  for (const auto& name : waiting) list.add_waiting(name);
   return wire::encode_envelope(envelope);
 }
 
@@ -210,14 +216,6 @@ wire::SharedBytes encode_claim_event(const hands::ClaimEvent& event,
                                      const participants::Roster& roster) {
   proto::Envelope envelope;
   describe(event, roster, *envelope.mutable_claim_event());
-  return wire::encode_envelope(envelope);
-}
-
-wire::SharedBytes encode_point(ParticipantSlot participant, const proto::PointRequest& request) {
-  proto::Envelope envelope;
-  envelope.mutable_point_event()->set_participant(participant.value);
-  if (request.has_position_m())
-    *envelope.mutable_point_event()->mutable_position_m() = request.position_m();
   return wire::encode_envelope(envelope);
 }
 

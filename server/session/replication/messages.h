@@ -22,7 +22,6 @@ namespace trocar::proto {
 class ClaimEvent;
 class FrameState;
 class Participants;
-class PointRequest;
 class SolverChange;
 }  // namespace trocar::proto
 
@@ -39,7 +38,8 @@ void describe(const wire::SolverChange& change, proto::SolverChange& message);
 wire::SharedBytes encode_welcome(ParticipantSlot slot, std::uint64_t organ_hash, bool has_datagrams,
                                  const participants::ReturnToken* token = nullptr,
                                  std::uint32_t return_seconds = 0);
-wire::SharedBytes encode_participants(const std::vector<participants::Participant>& present);
+wire::SharedBytes encode_participants(const std::vector<participants::Participant>& present,
+                                      bool is_closed, std::span<const std::string> waiting);
 wire::SharedBytes encode_topology(const wire::SurfaceLayout& layout, const std::string& organ_name);
 // `layout`: the one that the change was applied to.
 wire::SharedBytes encode_surface_change(const wire::SurfaceChange& change,
@@ -51,8 +51,6 @@ std::string encode_frame_state_body(const step::PublishedFrame& frame);
 wire::SharedBytes encode_claim_event(const hands::ClaimEvent& event,
                                      const participants::Roster& roster);
 wire::SharedBytes encode_mark_event(const step::MarkEvent& event);
-// Says where `participant` points, or that he does no more.
-wire::SharedBytes encode_point(ParticipantSlot participant, const proto::PointRequest& request);
 // To who asked too soon after another request; nothing has been done.
 wire::SharedBytes encode_early_mark(hands::MarkAction action, Tick tick);
 wire::SharedBytes encode_ghost(const ghost::GhostReport& report);

@@ -136,7 +136,9 @@ void Replicator::leave(Client& client) {
     const auto slot = client.participant->slot;
     roster_.leave(slot);
     absences_.forget(slot);
+    held_tools_.forget(slot);
     if (slot.has_tools()) inbox_.push_leave(slot);
+    if (wire::rights_of(client.participant->role).may_teach) release_unless_led();
     participants_changed_ = true;
   }
 }
@@ -152,8 +154,7 @@ void Replicator::settle_participants() {
     if (participants_changed_) {
       participants_changed_ = false;
       are_participants_told_ = false;
-      if (options_.on_participants)
-        options_.on_participants(roster_.list(), encoder_.current() ? encoder_.current()->tick : 0);
+      if (options_.on_participants) options_.on_participants(roster_.list(), newest_tick());
     }
     tell_participants(now);
   } while (participants_changed_);
@@ -166,7 +167,7 @@ void Replicator::tell_participants(std::uint64_t now_ns) {
   if (are_participants_told_ || is_early) return;
   are_participants_told_ = true;
   participants_told_ns_ = now_ns;
-  broadcast(encode_participants(roster_.list()));
+  broadcast(encode_participants(roster_.list(), door_.is_closed(), door_.waiting()));
 }
 
 void Replicator::settle_ghost() {
@@ -223,6 +224,12 @@ std::optional<Replicator::Ending> Replicator::handle_message(Client& client, Byt
       return handle_mark(client, envelope.mark_request().action());
     case proto::Envelope::kPointRequest:
       return handle_point(client, envelope.point_request());
+    case proto::Envelope::kStrokeRequest:
+      return handle_stroke(client, envelope.stroke_request());
+    case proto::Envelope::kViewRequest:
+      return handle_view(client, envelope.view_request());
+    case proto::Envelope::kTeachRequest:
+      return handle_teach(client, envelope.teach_request());
     case proto::Envelope::kGhostRequest:
       handle_ghost_request(client, envelope.ghost_request().is_wanted());
       return std::nullopt;
@@ -231,9 +238,9 @@ std::optional<Replicator::Ending> Replicator::handle_message(Client& client, Byt
       if (encoder_.current() && client.feed.is_keyframe_due()) give_frame(client, false);
       return std::nullopt;
     case proto::Envelope::kPing: {
-      const auto tick = encoder_.current() ? encoder_.current()->tick : 0;
       // A pong that does not fit is left out: the client measures again in a moment.
-      send(client, encode_pong(envelope.ping().client_time_us(), tick, options_.clock_ns() / 1000));
+      send(client, encode_pong(envelope.ping().client_time_us(), newest_tick(),
+                               options_.clock_ns() / 1000));
       return std::nullopt;
     }
     case proto::Envelope::kBye: {
@@ -289,7 +296,7 @@ std::optional<Replicator::Ending> Replicator::admit(Client& client, const proto:
   if (request->acks_every_frame) client.feed.pace();
   end_absences(options_.clock_ns());
   auto* gate = options_.gate;
-  if (gate) client.applicant = {connections_.peer_address(client.id), request->name, request->role};
+  client.applicant = {connections_.peer_address(client.id), request->name, request->role};
   if (const auto* place = find_own_place(*request)) return come_back(client, *place);
   if (gate) {
     const bool has_wrong_token =
@@ -297,10 +304,16 @@ std::optional<Replicator::Ending> Replicator::admit(Client& client, const proto:
     if (const auto refusal = gate->check(client.applicant, request->join_secret, has_wrong_token))
       return Ending{reason_of(refusal->kind), refusal->text};
   }
+  if (participants::is_valid_name(request->name))
+    if (const auto wait = door_.check(client.applicant)) {
+      are_participants_told_ = false;  // it is seen who waits
+      return Ending{EndReason::Closed, *wait};
+    }
   if (auto ending = find_place(client, *request)) return ending;
   const bool may_come = !gate || gate->admit(client.applicant);
   if (!may_come)
     return Ending{EndReason::CodeUsedUp, "join code: somebody has just taken its last use"};
+  door_.note_entry(request->name);
   if (request->can_return) absences_.issue(client.participant->slot);
   ++counters_.sessions;
   log::info("{} ({}) joined as participant {}", request->name, text_of_role(request->role),
@@ -331,10 +344,11 @@ std::optional<Replicator::Ending> Replicator::welcome(Client& client) {
   const Ending too_slow{EndReason::TooSlow, "the outbox is too small for the first messages"};
   if (!send(client, encode_welcome(slot, organ_hash_, options_.has_datagrams, absences_.find(slot),
                                    absences_.kept_seconds())) ||
-      !send(client, encode_participants(roster_.list())) || !send(client, topology()))
+      !send(client, encode_participants(roster_.list(), door_.is_closed(), door_.waiting())) ||
+      !send(client, topology()))
     return too_slow;
   if (encoder_.current() && !give_frame(client, true)) return too_slow;
-  if (!send(client, encode_recording(recording_))) return too_slow;
+  if (!send(client, encode_recording(recording_)) || !show_lesson(client)) return too_slow;
   if (slot.has_tools())
     for (const auto& law : options_.haptic_laws)
       if (!send(client, encode_haptic_law(law))) return too_slow;
@@ -360,8 +374,9 @@ std::optional<Replicator::Ending> Replicator::handle_sample(Client& client,
                       std::to_string(*last) + ", it must grow"};
   last = checked->sequence;
   ++counters_.samples;
-  inbox_.push_sample(
-      {tool_slot(participant.slot, checked->tool), checked->sample, checked->client_time_us});
+  const hands::ToolInput wanted{tool_slot(participant.slot, checked->tool), checked->sample,
+                                checked->client_time_us};
+  if (const auto given = held_tools_.apply(wanted, options_.clock_ns())) inbox_.push_sample(*given);
   return std::nullopt;
 }
 
@@ -390,28 +405,6 @@ std::optional<Replicator::Ending> Replicator::handle_hand_report(Client& client,
     if (shown != frame->tools.end()) record.echo_time_us = shown->touch.echo_time_us;
   }
   options_.on_hand_report(std::move(record));
-  return std::nullopt;
-}
-
-std::optional<Replicator::Ending> Replicator::handle_mark(Client& client, int action) {
-  const auto role = client.participant->role;
-  if (!wire::rights_of(role).may_mark)
-    return Ending{EndReason::Role,
-                  "MarkRequest: marks are the instructor's, not of an " + text_of_role(role)};
-  if (action != proto::MARK_SET && action != proto::MARK_RETURN)
-    return Ending{EndReason::ProtocolError, "MarkRequest.action: " + std::to_string(action) +
-                                                " is not 1 (set) or 2 (return)"};
-  const auto wanted = static_cast<hands::MarkAction>(action);
-  // Returning takes the simulation as long as beginning: what comes too soon is refused.
-  const auto now = options_.clock_ns();
-  if (last_mark_ns_ && now - *last_mark_ns_ < kSecondNs) {
-    send(client, encode_early_mark(wanted, encoder_.current() ? encoder_.current()->tick : 0));
-    return std::nullopt;
-  }
-  last_mark_ns_ = now;
-  if (options_.gate)
-    options_.gate->note_action(client.applicant, action == proto::MARK_SET ? "mark" : "return");
-  inbox_.push_mark(wanted);
   return std::nullopt;
 }
 

@@ -22,6 +22,9 @@
 // claim events, surface changes, topology, recording state and barrier cannot be skipped: if one
 // does not fit, the session ends as too slow.
 //
+// Lesson: instructors hold tools still and open their jaws (held_tools.h), put people out and let
+// them in (door.h), rename them, and end the session. Everybody is told of it, and the recording.
+//
 // Ghost: who has asked gets what the ghost's thread reports, if the outbox is less than half as
 // full as it may be for frames: these come first.
 //
@@ -41,11 +44,14 @@
 
 #include "common/wire/recording_state.h"
 #include "common/wire/surface_layout.h"
+#include "server/session/access/door.h"
 #include "server/session/ghost/ghost_follower.h"
 #include "server/session/net/connections.h"
 #include "server/session/participants/absences.h"
+#include "server/session/participants/held_tools.h"
 #include "server/session/participants/inbox.h"
 #include "server/session/participants/roster.h"
+#include "server/session/replication/drawing_board.h"
 #include "server/session/replication/frame_encoder.h"
 #include "server/session/replication/replicator_options.h"
 #include "server/tissue/step/published_frame.h"
@@ -53,10 +59,16 @@
 namespace trocar::proto {
 class Envelope;
 class ClientDatagram;
+class Drawing;
 class HandReport;
 class Hello;
+class LessonRecord;
 class PointRequest;
+class StrokeRequest;
+class TeachEvent;
+class TeachRequest;
 class ToolSample;
+class ViewRequest;
 }  // namespace trocar::proto
 
 namespace trocar::replication {
@@ -146,6 +158,23 @@ class Replicator final : public net::ConnectionHandler {
   std::optional<Ending> handle_mark(Client& client, int action);
   void handle_ghost_request(Client& client, bool is_wanted);
   std::optional<Ending> handle_point(Client& client, const proto::PointRequest& request);
+  std::optional<Ending> handle_stroke(Client& client, const proto::StrokeRequest& request);
+  std::optional<Ending> handle_view(Client& client, const proto::ViewRequest& request);
+  std::optional<Ending> handle_teach(Client& client, const proto::TeachRequest& request);
+  std::string carry_out(const TeachOrder& order, Client& client, const std::string& words);
+  // Whoever has that place, away or not; null: nobody.
+  Client* client_of(ParticipantSlot slot) const;
+  void put_out(ParticipantSlot slot, const std::string& words);
+  // After somebody has left: without any instructor no tool stays frozen.
+  void release_unless_led();
+  void describe_teaching(const TeachOrder& order, ParticipantSlot by, bool is_done,
+                         const std::string& text, proto::TeachEvent& message) const;
+  void describe_drawing(proto::Drawing& message) const;
+  void wipe_drawing();
+  void record_drawing();
+  void record_lesson(const proto::LessonRecord& record);
+  // Gives a newcomer what is drawn, and the view to follow; false: it does not fit.
+  bool show_lesson(Client& client);
   std::optional<Ending> handle_ack(Client& client, Frame frame, std::uint32_t crc);
   // Ends the session of who sends too much.
   std::optional<Ending> check_rate(Client& client, std::size_t bytes);
@@ -155,6 +184,7 @@ class Replicator final : public net::ConnectionHandler {
   // Another one, to which no change leads: everybody gets it and a keyframe. No frame before
   // `frame` helps any more.
   void replace_surface(const wire::SurfaceLayout& layout, Frame frame);
+  Tick newest_tick() const { return encoder_.current() ? encoder_.current()->tick : 0; }
   // Makes the message of the surface as it is now.
   const wire::SharedBytes& topology();
   bool send(Client& client, const wire::SharedBytes& bytes);
@@ -192,6 +222,10 @@ class Replicator final : public net::ConnectionHandler {
       .status = wire::RecordingStatus::Off, .frames_missing = 0, .text = {}};
   std::uint64_t recording_told_ns_ = 0;
   std::optional<std::uint64_t> last_mark_ns_;
+  participants::HeldTools held_tools_;
+  access::Door door_;
+  DrawingBoard board_;
+  wire::SharedBytes last_view_;  // null: none since the view was given to somebody
   FrameEncoder encoder_;
   step::SharedFrame barrier_;
   std::vector<BarrierResult> barrier_results_;

@@ -5,12 +5,14 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <string>
 #include <vector>
 
 #include "common/base/tick.h"
 #include "common/base/timing.h"
 #include "common/wire/hand_report.h"
 #include "common/wire/haptic_patch.h"
+#include "common/wire/lesson.h"
 #include "server/session/access/gate.h"
 #include "server/session/participants/roster.h"
 #include "server/session/replication/validation.h"
@@ -32,6 +34,10 @@ struct ReplicatorOptions {
   std::function<void(const std::vector<participants::Participant>&, Tick)> on_participants;
   // Told what hands have felt; may be empty.
   std::function<void(wire::HandRecord)> on_hand_report;
+  // Told what people say and show; may be empty.
+  std::function<void(wire::LessonEntry)> on_lesson;
+  // Told, in words, that an instructor wants the session to end; empty: nobody can.
+  std::function<void(const std::string& words)> on_end_wanted;
   std::vector<wire::HapticLaw> haptic_laws;  // how the organ answers tools, for hands that feel it
   bool has_datagrams = false;                // the transport takes them; clients are told
   // Null: everybody may come, in any role. It outlives the replicator.

@@ -48,10 +48,8 @@ void Replicator::end_absences(std::uint64_t now_ns) {
 }
 
 std::uint32_t Replicator::code_of(ParticipantSlot slot) const {
-  if (const auto away = away_.find(slot); away != away_.end()) return away->second->applicant.code;
-  for (const auto& [id, client] : clients_)
-    if (client->participant && client->participant->slot == slot) return client->applicant.code;
-  return 0;
+  const auto* client = client_of(slot);
+  return client == nullptr ? 0 : client->applicant.code;
 }
 
 void Replicator::put_out_revoked() {
@@ -73,8 +71,18 @@ void Replicator::put_out_revoked() {
 
 const participants::Participant* Replicator::find_own_place(const HelloRequest& request) const {
   if (request.return_token.empty()) return nullptr;
-  const auto* place = roster_.find(request.name);
-  return place && absences_.is_token_of(place->slot, request.return_token) ? place : nullptr;
+  // The client knows the name that it came with, whatever it was renamed to.
+  const participants::Participant* own = nullptr;
+  const auto look_at = [&](const Client& client) {
+    if (!client.participant) return;
+    const bool is_named =
+        client.applicant.name == request.name || client.participant->name == request.name;
+    const auto slot = client.participant->slot;
+    if (is_named && absences_.is_token_of(slot, request.return_token)) own = roster_.find(slot);
+  };
+  for (const auto& [id, client] : clients_) look_at(*client);
+  for (const auto& [slot, client] : away_) look_at(*client);
+  return own;
 }
 
 std::optional<Replicator::Ending> Replicator::come_back(Client& client,
@@ -92,6 +100,7 @@ std::optional<Replicator::Ending> Replicator::come_back(Client& client,
   roster_.set_away(slot, false);
   client.participant = before->participant;
   client.applicant.role = before->applicant.role;
+  client.applicant.name = before->applicant.name;
   client.applicant.code = before->applicant.code;
   client.wants_ghost = before->wants_ghost;
   ++counters_.returned;

@@ -3,8 +3,10 @@
 #include <array>
 #include <cmath>
 
+#include "common/base/printable.h"
 #include "common/base/version.h"
 #include "common/wire/hand_report_messages.h"
+#include "common/wire/lesson.h"
 #include "common/wire/tool_shape.h"
 #include "proto/wire.pb.h"
 #include "server/session/participants/absences.h"
@@ -14,7 +16,10 @@ namespace {
 
 static_assert(static_cast<int>(EndReason::Timeout) == proto::GOODBYE_TIMEOUT);
 static_assert(static_cast<int>(EndReason::NameInvalid) == proto::GOODBYE_NAME_INVALID);
+static_assert(static_cast<int>(EndReason::Closed) == proto::GOODBYE_CLOSED);
 static_assert(kEndReasonCount == proto::GoodbyeReason_ARRAYSIZE);
+static_assert(static_cast<int>(TeachAction::Wipe) == proto::TEACH_WIPE &&
+              kTeachActions == proto::TeachAction_ARRAYSIZE);
 constexpr std::size_t kSecretBytes = 5;
 static_assert(static_cast<int>(tool::Verb::Grasp) == proto::VERB_GRASP);
 static_assert(static_cast<int>(tool::Verb::Cut) == proto::VERB_CUT);
@@ -28,10 +33,10 @@ Error bad(std::string message) {
 
 const char* name_of(EndReason reason) {
   static constexpr std::array<const char*, kEndReasonCount> kNames{
-      "unspecified",  "server-closing", "protocol-error", "version",
-      "full",         "name-taken",     "role",           "too-slow",
-      "timeout",      "code-wrong",     "code-expired",   "code-used-up",
-      "code-revoked", "too-many-tries", "code-role",      "name-invalid"};
+      "unspecified",  "server-closing", "protocol-error", "version",        "full",
+      "name-taken",   "role",           "too-slow",       "timeout",        "code-wrong",
+      "code-expired", "code-used-up",   "code-revoked",   "too-many-tries", "code-role",
+      "name-invalid", "put-out",        "closed"};
   return kNames[static_cast<std::size_t>(reason)];
 }
 
@@ -104,6 +109,104 @@ Result<CheckedSample> check_tool_sample(const proto::ToolSample& sample, std::si
   checked.sample = {{position, normalized(orientation)}, static_cast<tool::Verb>(sample.verb())};
   checked.client_time_us = sample.client_time_us();
   return checked;
+}
+
+const char* name_of(TeachAction action) {
+  static constexpr std::array<const char*, kTeachActions> kNames{
+      "none", "freeze", "release", "take-claim", "expel",     "rename",   "admit", "close",
+      "open", "end",    "note",    "chat",       "give-view", "end-view", "wipe"};
+  return kNames[static_cast<std::size_t>(action)];
+}
+
+bool is_about_one(TeachAction action) {
+  switch (action) {
+    case TeachAction::Freeze:
+    case TeachAction::Release:
+    case TeachAction::TakeClaim:
+    case TeachAction::Expel:
+    case TeachAction::Rename:
+    case TeachAction::GiveView:
+      return true;
+    default:
+      return false;
+  }
+}
+
+namespace {
+
+// Most bytes of its text; 0: it has none.
+std::size_t most_text(TeachAction action) {
+  switch (action) {
+    case TeachAction::Expel:
+      return wire::kMostReason;
+    case TeachAction::Rename:
+    case TeachAction::Admit:
+    case TeachAction::Note:
+    case TeachAction::Chat:
+      return wire::kMostLessonText;
+    default:
+      return 0;
+  }
+}
+
+}  // namespace
+
+Result<TeachOrder> check_teach(const proto::TeachRequest& request) {
+  const int action = request.action();
+  if (action <= 0 || action >= kTeachActions)
+    return bad("TeachRequest.action: " + std::to_string(action) + " is none of 1 to " +
+               std::to_string(kTeachActions - 1));
+  TeachOrder order{.action = static_cast<TeachAction>(action),
+                   .participant = {},
+                   .name = request.name(),
+                   .text = request.text()};
+  if (is_about_one(order.action)) {
+    if (request.participant() >= kMaxParticipants)
+      return bad("TeachRequest.participant: " + std::to_string(request.participant()) +
+                 " is no slot, the last is " + std::to_string(kMaxParticipants - 1));
+    order.participant = {static_cast<std::uint8_t>(request.participant())};
+  }
+  const auto most = most_text(order.action);
+  if (order.text.size() > most || (most > 0 && order.text.empty()))
+    return bad("TeachRequest.text: " + std::to_string(order.text.size()) + " bytes, " +
+               (most > 0 ? "1 to " + std::to_string(most) + " are allowed"
+                         : std::string("this action has no text")));
+  if (!is_printable(order.text))
+    return bad("TeachRequest.text: it must be printable UTF-8, in one line");
+  return order;
+}
+
+Status check_view(const proto::ViewRequest& request) {
+  const Vec3f eye{request.eye_m().x(), request.eye_m().y(), request.eye_m().z()};
+  const Vec3f target{request.target_m().x(), request.target_m().y(), request.target_m().z()};
+  const auto is_near = [](const Vec3f& place) {
+    return is_finite(place) && length_squared(to_double(place)) <=
+                                   double{wire::kMostViewDistanceM} * wire::kMostViewDistanceM;
+  };
+  if (!is_near(eye) || !is_near(target))
+    return bad("ViewRequest: eye_m and target_m must be finite and within 10 m of the origin");
+  if (!(length(eye - target) >= wire::kLeastViewM))
+    return bad("ViewRequest: eye_m and target_m must be at least 1 mm apart");
+  return {};
+}
+
+Result<std::vector<SurfacePoint>> check_stroke(const proto::StrokeRequest& request) {
+  const auto count = static_cast<std::size_t>(request.triangle_size());
+  if (count == 0 || count > wire::kMostStrokePoints)
+    return bad("StrokeRequest.triangle: " + std::to_string(count) + " points, 1 to " +
+               std::to_string(wire::kMostStrokePoints) + " are allowed");
+  if (static_cast<std::size_t>(request.weight_size()) != 2 * count)
+    return bad("StrokeRequest.weight: " + std::to_string(request.weight_size()) +
+               " numbers, each point has two");
+  std::vector<SurfacePoint> points;
+  for (int i = 0; i < request.triangle_size(); ++i) {
+    const float b = request.weight(2 * i), c = request.weight(2 * i + 1);
+    if (!(b >= 0 && c >= 0 && b + c <= 1.0001f))
+      return bad("StrokeRequest.weight: of point " + std::to_string(i) +
+                 ": weights are 0 to 1, and together at most 1");
+    points.push_back({request.triangle(i), {b, c}});
+  }
+  return points;
 }
 
 Result<wire::HandReport> check_hand_report(const proto::HandReport& report,

@@ -4,6 +4,7 @@
 // from a socket passes here first; what is wrong with it is an error line that goes back to the
 // client, and the reason its session ends with.
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -16,8 +17,11 @@
 namespace trocar::proto {
 class HandReport;
 class Hello;
+class StrokeRequest;
+class TeachRequest;
 class ToolSample;
 class Vec3;
+class ViewRequest;
 }  // namespace trocar::proto
 
 namespace trocar::replication {
@@ -43,8 +47,10 @@ enum class EndReason : std::uint8_t {
   TooManyTries = 13,
   CodeRole = 14,
   NameInvalid = 15,
+  PutOut = 16,
+  Closed = 17,
 };
-inline constexpr int kEndReasonCount = 16;
+inline constexpr int kEndReasonCount = 18;
 // In words for figures, such as "code-wrong".
 const char* name_of(EndReason reason);
 
@@ -71,6 +77,48 @@ Result<CheckedSample> check_tool_sample(const proto::ToolSample& sample, std::si
 
 // An error if it is not finite, or beyond kMaxDistanceFromOriginM.
 Status check_place(const proto::Vec3& place);
+
+// Values of proto::TeachAction.
+enum class TeachAction : std::uint8_t {
+  None = 0,
+  Freeze = 1,
+  Release = 2,
+  TakeClaim = 3,
+  Expel = 4,
+  Rename = 5,
+  Admit = 6,
+  Close = 7,
+  Open = 8,
+  End = 9,
+  Note = 10,
+  Chat = 11,
+  GiveView = 12,
+  EndView = 13,
+  Wipe = 14,
+};
+inline constexpr int kTeachActions = 15;
+// For the audit log, such as "take-claim".
+const char* name_of(TeachAction action);
+// Whether it is about one participant.
+bool is_about_one(TeachAction action);
+
+struct TeachOrder {
+  TeachAction action = TeachAction::None;
+  ParticipantSlot participant;  // valid where it is about one
+  std::string name;             // that participant's, as the client knows it
+  std::string text;             // printable; empty where the action has none
+};
+Result<TeachOrder> check_teach(const proto::TeachRequest& request);
+
+// Both places finite, within kMostViewDistanceM, and kLeastViewM apart.
+Status check_view(const proto::ViewRequest& request);
+
+struct SurfacePoint {
+  std::uint32_t triangle = 0;
+  std::array<float, 2> weight{};  // of the second and third corner
+};
+// Returns 1 to kMostStrokePoints points; triangles need not exist.
+Result<std::vector<SurfacePoint>> check_stroke(const proto::StrokeRequest& request);
 
 Result<wire::HandReport> check_hand_report(const proto::HandReport& report, std::size_t tool_count);
 

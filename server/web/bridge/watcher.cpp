@@ -247,6 +247,9 @@ bool Watcher::may_pass(BytesView bytes) const {
     case proto::Envelope::kKeyframeRequest:
     case proto::Envelope::kMarkRequest:
     case proto::Envelope::kPointRequest:
+    case proto::Envelope::kStrokeRequest:
+    case proto::Envelope::kTeachRequest:
+    case proto::Envelope::kViewRequest:
     case proto::Envelope::kGhostRequest:
     case proto::Envelope::kBye:
       return true;

@@ -2,11 +2,12 @@
 
 import type { JSX } from 'preact';
 import { useEffect, useMemo, useRef, useState } from 'preact/hooks';
-import { MarkAction, RecordingStatus, type Envelope, type Participant, type Participants } from './gen/proto/wire_pb';
+import { MarkAction, RecordingStatus, TeachAction, type Envelope, type Participant, type Participants } from './gen/proto/wire_pb';
 import { Forces } from './forces';
+import { Ask, Door, Manage, Say, ViewTools, type Question } from './lesson';
 import type { Link } from './link';
 import { Events, ForcePlot, People } from './panels';
-import { changesOf, kindOf, type EventKind, type RecordedEvent } from './recording';
+import { changesOf, kindOf, kindOfTeaching, type EventKind, type RecordedEvent } from './recording';
 import type { Replica } from './replica';
 import type { Picture } from './scene';
 import { Session } from './session';
@@ -16,7 +17,7 @@ const kPanelMs = 100, kShownTicks = 30_000, kMostEvents = 500;
 
 export function Live(props: { link: Link; replica: Replica; onEnd(why: string): void }): JSX.Element {
   const { replica } = props;
-  const [, redraw] = useState(0), [follows, setFollows] = useState<number | null>(null), [asks, setAsks] = useState<MarkAction | null>(null);
+  const [, redraw] = useState(0), [follows, setFollows] = useState<number | null>(null), [asks, setAsks] = useState<Question | null>(null);
   const people = useRef<Participant[]>([]), list = useRef<Participants | null>(null), events = useRef<RecordedEvent[]>([]);
   const forces = useMemo(() => new Forces(), []), own = useRef<number | null>(null), recording = useRef(''), crc = useRef('');
   const picture = useRef<Picture | null>(null);
@@ -40,6 +41,7 @@ export function Live(props: { link: Link; replica: Replica; onEnd(why: string): 
       }
       if (kind === 'claimEvent') note(Number(value.tick), kindOf(value.outcome), value.text);
       if (kind === 'markEvent') note(Number(value.tick), value.isDone ? 'cut' : 'refusal', value.text);
+      if (kind === 'teachEvent') note(Number(value.tick), value.isDone ? kindOfTeaching(value.action) : 'refusal', value.text);
       if (kind === 'recordingState') {
         const isWhole = value.status === RecordingStatus.RECORDING_WHOLE || value.status === RecordingStatus.RECORDING_OFF;
         recording.current = isWhole ? '' : value.text;
@@ -69,10 +71,12 @@ export function Live(props: { link: Link; replica: Replica; onEnd(why: string): 
   const now = Math.max(0, replica.newestTick), age = session.shownAgeMs;
   const isOld = session.state === 'away' || (age !== null && age > 1000), isLate = age !== null && age > session.oldAfterMs;
   const mayMark = props.link.role === 'instructor' && session.state === 'live';
-  const confirm = (): void => {
-    if (asks !== null) session.mark(asks === MarkAction.MARK_RETURN);
-    setAsks(null);
+  const leader = people.current.find(p => p.leadsView);
+  const mark = (action: MarkAction): void => {
+    const returns = action === MarkAction.MARK_RETURN;
+    setAsks({ title: returns ? 'Return the organ to the mark, for everybody? Cuts made since then are undone.' : 'Mark the organ as it is now? An earlier mark is replaced.', verb: returns ? 'Return' : 'Mark', act: () => session.mark(returns) });
   };
+  const end = (): void => setAsks({ title: 'End the session for everybody? The recording is closed.', verb: 'End for everybody', act: () => session.teach(TeachAction.TEACH_END) });
   const onKey = (event: KeyboardEvent): void => {
     if (event.key === 'Escape') setAsks(null);
   };
@@ -86,32 +90,31 @@ export function Live(props: { link: Link; replica: Replica; onEnd(why: string): 
         </span>
         {recording.current && <span class="age late">{recording.current}</span>}
         <span class="space" />
-        {mayMark && <button onClick={() => setAsks(MarkAction.MARK_SET)}>Mark organ</button>}
-        {mayMark && <button onClick={() => setAsks(MarkAction.MARK_RETURN)}>Return to mark</button>}
+        {mayMark && <button onClick={() => mark(MarkAction.MARK_SET)}>Mark organ</button>}
+        {mayMark && <button onClick={() => mark(MarkAction.MARK_RETURN)}>Return to mark</button>}
+        {mayMark && <button class="bad" onClick={end}>End session</button>}
         <button onClick={session.leave}>Leave</button>
       </header>
       <main>
-        <Stage replica={replica} guide={guide} isOld={isOld} follows={follows} people={people.current} onFollow={setFollows} onPicture={() => undefined} onReady={p => { picture.current = p; }} {...(mayMark ? { onPoint: place => session.point(place) } : {})}>
+        <Stage replica={replica} guide={guide} isOld={isOld} follows={follows} people={people.current} onFollow={setFollows} onPicture={() => undefined} onReady={p => { picture.current = p; }}
+          tools={session.state === 'live' && <ViewTools session={session} replica={replica} picture={picture} mayDraw={mayMark} leader={leader} own={own.current} />} {...(mayMark ? { onPoint: place => session.point(place) } : {})}>
           {session.state === 'away' && <p class="banner" role="alert">{session.why} The picture is old; the page comes back by itself.</p>}
           {session.state === 'joining' && <p class="banner">Joining the session</p>}
           {session.state === 'live' && replica.frames === 0 && <p class="banner">Waiting for the organ</p>}
         </Stage>
-        {asks !== null && (
-          <div class="ask" role="alertdialog" aria-label="Are you sure?">
-            <p>{asks === MarkAction.MARK_RETURN ? 'Return the organ to the mark, for everybody? Cuts made since then are undone.' : 'Mark the organ as it is now? An earlier mark is replaced.'}</p>
-            <button class="main" onClick={confirm} ref={el => el?.focus()}>{asks === MarkAction.MARK_RETURN ? 'Return' : 'Mark'}</button>
-            <button onClick={() => setAsks(null)}>Cancel</button>
-          </div>
-        )}
+        {asks !== null && <Ask key={asks.title} question={asks} onDone={() => setAsks(null)} />}
       </main>
       <aside>
-        <People people={people.current} tools={replica.tools()} own={own.current} colourOf={slot => replica.slotColour(slot)} follows={follows} onFollow={setFollows} />
+        <People people={people.current} tools={replica.tools()} own={own.current} colourOf={slot => replica.slotColour(slot)} follows={follows} onFollow={setFollows}
+          {...(mayMark ? { extra: person => <Manage session={session} person={person} own={own.current} onAsk={setAsks} /> } : {})} />
+        {mayMark && <Door session={session} list={list.current} />}
         <section aria-labelledby="forces">
           <h2 id="forces">Forces <small>last 30 s</small></h2>
           <ForcePlot forces={forces} from={Math.max(0, now - kShownTicks)} to={now} now={now} height={130}
             nameOf={slot => people.current.find(p => p.slot === slot)?.name ?? `hand ${slot + 1}`} colourOf={slot => replica.slotColour(slot)} />
         </section>
         <Events events={events.current} now={now} empty="Nothing has happened yet." />
+        {session.state === 'live' && <Say session={session} mayNote={mayMark} />}
       </aside>
     </div>
   );

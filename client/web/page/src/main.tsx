@@ -38,7 +38,7 @@ function Start(props: { link: Link; why: string; onJoin(link: Link): void; onFil
       <fieldset>
         <legend>You are</legend>
         {(['observer', 'instructor'] as const).map(kind => (
-          <label key={kind} class="radio"><input type="radio" name="role" value={kind} checked={role === kind} onChange={() => setRole(kind)} />{kind === 'observer' ? 'an observer: you watch' : 'an instructor: you watch, mark and return the organ'}</label>
+          <label key={kind} class="radio"><input type="radio" name="role" value={kind} checked={role === kind} onChange={() => setRole(kind)} />{kind === 'observer' ? 'an observer: you watch' : 'an instructor: you watch and lead the lesson'}</label>
         ))}
       </fieldset>
       {fault && <p class="fault" role="alert">{fault}</p>}

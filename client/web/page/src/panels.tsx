@@ -1,6 +1,6 @@
 // Lists beside the picture: who is here and does what, what happened, forces over time.
 
-import type { JSX } from 'preact';
+import type { ComponentChildren, JSX } from 'preact';
 import { useEffect, useRef } from 'preact/hooks';
 import uPlot from 'uplot';
 import { Role, type Participant } from './gen/proto/wire_pb';
@@ -14,14 +14,14 @@ export const hex = (colour: number): string => `#${colour.toString(16).padStart(
 // Lines differ by more than colour.
 const kDashes: number[][] = [[], [8, 4], [2, 3], [10, 3, 2, 3]];
 
-export function People(props: { people: Participant[]; tools: Tool[]; own: number | null; colourOf(slot: number): number; follows: number | null; onFollow(slot: number | null): void }): JSX.Element {
+export function People(props: { people: Participant[]; tools: Tool[]; own: number | null; colourOf(slot: number): number; follows: number | null; onFollow(slot: number | null): void; extra?: (person: Participant) => ComponentChildren }): JSX.Element {
   return (
     <section aria-labelledby="people">
       <h2 id="people">People <small>{props.people.length}</small></h2>
       <ul class="people">
         {props.people.map(p => {
           const tools = props.tools.filter(t => t.slot >> 1 === p.slot), newton = tools.reduce((sum, t) => sum + forceOf(t), 0);
-          const has = p.tool.length > 0, state = p.isAway ? 'connection lost' : has ? doing(tools) : 'watches';
+          const has = p.tool.length > 0, state = p.isAway ? 'connection lost' : p.frozenBy !== '' ? `held still by ${p.frozenBy}` : has ? doing(tools) : 'watches';
           return (
             <li key={p.slot} class={p.isAway ? 'away' : ''}>
               <span class={has ? 'dot' : 'dot none'} ref={el => el?.style.setProperty('--own', hex(props.colourOf(p.slot)))} aria-hidden="true" />
@@ -29,6 +29,7 @@ export function People(props: { people: Participant[]; tools: Tool[]; own: numbe
               <span class="does">{state}</span>
               {has && <span class="force">{newtons(newton)}</span>}
               {has && <button aria-pressed={props.follows === p.slot} onClick={() => props.onFollow(props.follows === p.slot ? null : p.slot)} aria-label={`Follow ${p.name}`}>Follow</button>}
+              {props.extra?.(p)}
             </li>
           );
         })}

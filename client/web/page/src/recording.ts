@@ -1,11 +1,11 @@
 // A recording, over HTTP ranges or from a dropped file. Only what is shown is loaded: whole blocks,
 // of which the last ones used are kept.
 
-import { fromBinary } from '@bufbuild/protobuf';
+import { fromBinary, toBinary } from '@bufbuild/protobuf';
 import { McapIndexedReader, type McapTypes } from '@mcap/core';
 import { decompress } from 'fzstd';
-import { ClaimLogSchema, JournalGapSchema } from './gen/proto/journal_pb';
-import { ClaimOutcome, FrameStateSchema, ParticipantsSchema, type FrameState, type Participants } from './gen/proto/wire_pb';
+import { ClaimLogSchema, JournalGapSchema, LessonRecordSchema } from './gen/proto/journal_pb';
+import { ClaimOutcome, FrameStateSchema, ParticipantsSchema, PointEventSchema, TeachAction, type FrameState, type Participants } from './gen/proto/wire_pb';
 
 const kBlock = 64 * 1024, kBlocks = 256, kMostChunk = 64 * 1024 * 1024;
 export const kDamaged = 'This file is no whole Trocar recording: it is damaged, cut short, or something else.';
@@ -64,12 +64,13 @@ export function ofFile(file: Blob): Bytes {
 }
 
 export interface Item { field: number; tick: number; data: Uint8Array }
-export type EventKind = 'people' | 'grant' | 'refusal' | 'end' | 'cut' | 'gap';
+export type EventKind = 'people' | 'grant' | 'refusal' | 'end' | 'cut' | 'gap' | 'said' | 'note' | 'lesson';
 export interface RecordedEvent { tick: number; kind: EventKind; text: string }
 
 // Fields of Envelope, by channel.
-const kFields: Record<string, number> = { '/surface/key': 2, '/surface/delta': 2, '/frame_state': 3, '/topology/change': 8, '/topology': 18, '/participants': 19 };
-const kShown = ['/surface/delta', '/frame_state', '/topology/change', '/participants'];
+const kFields: Record<string, number> = { '/surface/key': 2, '/surface/delta': 2, '/frame_state': 3, '/topology/change': 8, '/topology': 18, '/participants': 19, '/drawing': 40 };
+const kShown = ['/surface/delta', '/frame_state', '/topology/change', '/participants', '/drawing', '/lesson'];
+const kNothingDrawn = new Uint8Array([0x10, 0]); // a Drawing without strokes, which replaces what was
 type Message = McapTypes.TypedMcapRecords['Message'];
 
 export class Recording {
@@ -114,6 +115,7 @@ export class Recording {
   async seek(tick: number): Promise<Item[]> {
     const key = await this.last('/surface/key', tick), out: Item[] = [];
     if (!key) return out;
+    out.push(await this.last('/drawing', tick) ?? { field: 40, tick: key.tick, data: kNothingDrawn });
     for (const before of [await this.last('/participants', tick), await this.last('/topology', key.tick), key]) if (before) out.push(before);
     for await (const m of this.reader.readMessages({ topics: ['/surface/delta', '/frame_state', '/topology/change'], startTime: this.time(key.tick), endTime: this.time(tick) })) {
       const item = this.item(m);
@@ -124,7 +126,15 @@ export class Recording {
   }
   // Yields what comes after `tick`, in order.
   async *follow(tick: number): AsyncGenerator<Item> {
-    for await (const m of this.reader.readMessages({ topics: kShown, startTime: this.time(tick + 1) })) yield this.item(m);
+    for await (const m of this.reader.readMessages({ topics: kShown, startTime: this.time(tick + 1) })) {
+      if (this.topic(m) !== '/lesson') yield this.item(m);
+      else yield* this.pointing(m);
+    }
+  }
+  // What the replica shows of a lesson besides the drawing.
+  private *pointing(m: Message): Generator<Item> {
+    const { entry } = fromBinary(LessonRecordSchema, m.data);
+    if (entry.case === 'point') yield { field: 36, tick: this.item(m).tick, data: toBinary(PointEventSchema, entry.value) };
   }
   // Forces over all of it, a frame at a time.
   async *states(from: number, to: number): AsyncGenerator<{ tick: number; state: FrameState }> {
@@ -136,7 +146,7 @@ export class Recording {
   async events(): Promise<RecordedEvent[]> {
     const out: RecordedEvent[] = [];
     let people: Participants | null = null, lastCut = -1e9;
-    for await (const m of this.reader.readMessages({ topics: ['/participants', '/claims', '/topology/change', '/gap'] })) {
+    for await (const m of this.reader.readMessages({ topics: ['/participants', '/claims', '/topology/change', '/gap', '/lesson'] })) {
       const tick = this.item(m).tick, topic = this.topic(m);
       if (topic === '/participants') {
         const now = fromBinary(ParticipantsSchema, m.data);
@@ -144,6 +154,9 @@ export class Recording {
         people = now;
       } else if (topic === '/claims') {
         for (const event of fromBinary(ClaimLogSchema, m.data).event) out.push({ tick: Number(event.tick), kind: kindOf(event.outcome), text: event.text });
+      } else if (topic === '/lesson') {
+        const { entry } = fromBinary(LessonRecordSchema, m.data);
+        if (entry.case === 'teach') out.push({ tick: Number(entry.value.tick), kind: kindOfTeaching(entry.value.action), text: entry.value.text });
       } else if (topic === '/gap') {
         out.push({ tick, kind: 'gap', text: `${fromBinary(JournalGapSchema, m.data).messages} messages are missing here` });
       } else {
@@ -165,13 +178,18 @@ export function kindOf(outcome: ClaimOutcome): EventKind {
   }
 }
 
+export function kindOfTeaching(action: TeachAction): EventKind {
+  return action === TeachAction.TEACH_CHAT ? 'said' : action === TeachAction.TEACH_NOTE ? 'note' : 'lesson';
+}
+
 // Who came, went, broke off and came back.
 export function changesOf(before: Participants | null, now: Participants): string[] {
   const out: string[] = [], known = new Map((before?.participant ?? []).map(p => [p.slot, p]));
   for (const p of now.participant) {
     const was = known.get(p.slot);
     known.delete(p.slot);
-    if (!was || was.name !== p.name) out.push(`${p.name} has joined`);
+    if (!was) out.push(`${p.name} has joined`);
+    else if (was.name !== p.name) out.push(`${was.name} is now ${p.name}`);
     else if (was.isAway !== p.isAway) out.push(p.isAway ? `${p.name} has lost the connection` : `${p.name} is back`);
   }
   for (const gone of known.values()) out.push(`${gone.name} has left`);

@@ -35,6 +35,8 @@ interface Exports {
   pointers(): number;
   pointers_at(): number;
   pointer_colour(slot: number): number;
+  drawing_at(): number;
+  attach(x: number, y: number, z: number): number;
   make_tool(radiusM: number, lengthM: number, halfWidthM: number, colour: number): number;
   make_jaw(radiusM: number, lengthM: number): number;
   make_arrow(lengthM: number, radiusM: number, colour: number): number;
@@ -158,6 +160,16 @@ export class Replica {
     return Array.from({ length: count }, (_, i) => ({ participant: f[i * 4] ?? 0, position: [f[i * 4 + 1] ?? 0, f[i * 4 + 2] ?? 0, f[i * 4 + 3] ?? 0] }));
   }
   pointerColour(slot: number): number { return this.e.pointer_colour(slot) >>> 0; }
+
+  // All that is drawn on the organ.
+  drawing(): Mesh { return this.mesh(this.e.drawing_at()); }
+  // How the server is told of a place on the organ; null: there is none yet.
+  attach(place: Vec3): { triangle: number; weights: [number, number] } | null {
+    const at = this.e.attach(...place);
+    if (at === 0) return null;
+    const [triangle = 0, b = 0, c = 0] = this.floats(at, 3);
+    return { triangle, weights: [b, c] };
+  }
 
   makeTool(radiusM: number, lengthM: number, halfWidthM: number, colour: number): Mesh {
     return this.mesh(this.e.make_tool(radiusM, lengthM, halfWidthM, colour));

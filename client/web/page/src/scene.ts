@@ -42,6 +42,7 @@ export class Picture {
   showsArrows = true;
   follows: number | null = null; // a participant's slot
   onLetGo: () => void = () => undefined; // the person moves the view, so that it follows nobody
+  onTurn: () => void = () => undefined; // likewise, whatever it follows
   pictures = 0;
   drawMs = 0; // of the last picture
   private readonly renderer: WebGLRenderer;
@@ -51,6 +52,7 @@ export class Picture {
   private readonly uniforms: Record<string, IUniform>;
   private readonly tools = new Map<number, DrawnTool>();
   private readonly pointers = new Map<number, DrawnPointer>();
+  private drawing: Mesh | null = null;
   private version = -1;
   private isFramed = false;
   private lastMs = 0;
@@ -60,7 +62,7 @@ export class Picture {
   private width = 1;
   private height = 1;
 
-  constructor(canvas: HTMLCanvasElement, private readonly labels: HTMLElement, private readonly replica: Replica, private readonly guide: Guide) {
+  constructor(readonly canvas: HTMLCanvasElement, private readonly labels: HTMLElement, private readonly replica: Replica, private readonly guide: Guide) {
     const gl = canvas.getContext('webgl2', { antialias: !isSlow(), alpha: true, powerPreference: 'high-performance' });
     if (!gl) throw new Error('This browser cannot draw here: it has no WebGL 2.');
     this.quality = rendersInSoftware(gl) ? 1 : 0;
@@ -71,6 +73,7 @@ export class Picture {
     this.controls.minDistance = 0.04;
     this.controls.maxDistance = 2.5;
     this.controls.addEventListener('start', () => {
+      this.onTurn();
       if (this.follows === null) return;
       this.follows = null;
       this.onLetGo();
@@ -105,6 +108,16 @@ export class Picture {
   zoom(factor: number): void {
     this.camera.position.sub(this.controls.target).multiplyScalar(factor).add(this.controls.target);
   }
+  // Where the view is, m: for others, who follow it.
+  view(): { eye: Vec3; target: Vec3 } {
+    const { x, y, z } = this.camera.position, to = this.controls.target;
+    return { eye: [x, y, z], target: [to.x, to.y, to.z] };
+  }
+  look(eye: Vec3, target: Vec3): void {
+    this.isFramed = true;
+    this.camera.position.set(...eye);
+    this.controls.target.set(...target);
+  }
   dispose(): void {
     this.controls.dispose();
     this.renderer.dispose();
@@ -136,6 +149,7 @@ export class Picture {
     this.controls.update();
     this.place(tools, seconds);
     this.placePointers(this.replica.pointers());
+    this.placeDrawing();
     this.light();
     this.renderer.render(this.scene, this.camera);
     this.placeLabels(tools);
@@ -334,6 +348,26 @@ export class Picture {
       drawn.label.style.setProperty('--own', `#${this.replica.pointerColour(participant).toString(16).padStart(6, '0')}`);
       at.project(this.camera);
       drawn.label.style.transform = `translate(${((at.x + 1) / 2 * this.width).toFixed(1)}px, ${((1 - at.y) / 2 * this.height).toFixed(1)}px)`;
+    }
+  }
+
+  private placeDrawing(): void {
+    const plain = this.replica.drawing(), count = plain.positions.length / 3, known = this.drawing?.geometry.getAttribute('position');
+    if (this.drawing && known?.count !== count) {
+      this.scene.remove(this.drawing);
+      this.drawing.geometry.dispose();
+      this.drawing = null;
+    }
+    if (count === 0) return;
+    if (!this.drawing) {
+      this.drawing = this.meshOf(plain, { value: 1 }, 0.8);
+      this.scene.add(this.drawing);
+      return;
+    }
+    for (const [name, values] of [['position', plain.positions], ['normal', plain.normals]] as const) {
+      const attribute = this.drawing.geometry.getAttribute(name) as BufferAttribute;
+      attribute.array.set(values);
+      attribute.needsUpdate = true;
     }
   }
 

@@ -2,11 +2,12 @@
 // and comes back when the connection breaks.
 
 import { create, fromBinary, toBinary } from '@bufbuild/protobuf';
-import { EnvelopeSchema, GoodbyeReason, MarkAction, PointRequestSchema, Vec3Schema, type Envelope } from './gen/proto/wire_pb';
+import { EnvelopeSchema, GoodbyeReason, MarkAction, PointRequestSchema, StrokeRequestSchema, TeachRequestSchema, Vec3Schema, ViewRequestSchema, type Envelope, type Participant, type TeachAction } from './gen/proto/wire_pb';
 import type { Link } from './link';
 import type { Replica, Vec3 } from './replica';
 
 export type State = 'joining' | 'live' | 'away' | 'ended';
+export interface View { eye: Vec3; target: Vec3 } // m
 export interface Hooks {
   // Every message that is not of the surface; `tick` of the session when it came.
   onMessage(message: Envelope, tick: number): void;
@@ -15,7 +16,7 @@ export interface Hooks {
 
 const kPingMs = 1000, kSilenceMs = 4000, kRoundTrips = 16;
 // Numbers of Envelope's fields, as they begin a message: the surface is the replica's business alone.
-const kSurfaceFields = new Set([2, 3, 8, 18, 26, 29, 30, 31, 32, 33, 36]);
+const kSurfaceFields = new Set([2, 3, 8, 18, 26, 29, 30, 31, 32, 33, 36, 40]);
 
 export class Session {
   state: State = 'joining';
@@ -24,6 +25,8 @@ export class Session {
   bytes = 0;
   roundTripMs = 0;
   awaySince = 0;
+  lastView: View | null = null; // of who has the view to follow
+  onView: (view: View) => void = () => undefined;
   private keepSeconds = 0;
   private socket: WebSocket | null = null;
   private token = '';
@@ -61,6 +64,20 @@ export class Session {
   point(place: Vec3 | null): void {
     const positionM = place === null ? {} : { positionM: create(Vec3Schema, { x: place[0], y: place[1], z: place[2] }) };
     this.say({ case: 'pointRequest', value: create(PointRequestSchema, positionM) });
+  }
+
+  // What an instructor does; `whom`: with whom, `text`: what the action needs.
+  teach(action: TeachAction, whom: Participant | null = null, text = ''): void {
+    this.say({ case: 'teachRequest', value: create(TeachRequestSchema, { action, text, participant: whom?.slot ?? 0, name: whom?.name ?? '' }) });
+  }
+  // A line on the organ, or a piece of it.
+  stroke(points: { triangle: number; weights: [number, number] }[]): void {
+    this.say({ case: 'strokeRequest', value: create(StrokeRequestSchema, { triangle: points.map(p => p.triangle), weight: points.flatMap(p => p.weights) }) });
+  }
+  // Where this person's view is, as who has the one to follow.
+  view(eye: Vec3, target: Vec3): void {
+    const place = (v: Vec3) => create(Vec3Schema, { x: v[0], y: v[1], z: v[2] });
+    this.say({ case: 'viewRequest', value: create(ViewRequestSchema, { eyeM: place(eye), targetM: place(target) }) });
   }
 
   leave = (): void => {
@@ -126,6 +143,10 @@ export class Session {
       this.offsets = [];
       this.set('live', '');
       this.ping();
+    }
+    if (kind === 'viewEvent' && value.eyeM && value.targetM) {
+      this.lastView = { eye: [value.eyeM.x, value.eyeM.y, value.eyeM.z], target: [value.targetM.x, value.targetM.y, value.targetM.z] };
+      this.onView(this.lastView);
     }
     if (kind === 'goodbye') {
       // A place that hangs from the connection before is free in a moment.

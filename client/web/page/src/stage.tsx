@@ -52,6 +52,7 @@ interface StageProps {
   onReady(picture: Picture): void;
   // Where this person points, if the role may; null: nowhere any more.
   onPoint?: (place: Vec3 | null) => void;
+  tools?: ComponentChildren; // more buttons of the view
   children?: ComponentChildren;
 }
 
@@ -157,6 +158,7 @@ export function Stage(props: StageProps): JSX.Element {
         <button aria-pressed={overlay === Overlay.Regions} onClick={() => setOverlay(overlay === Overlay.Regions ? Overlay.None : Overlay.Regions)} title="How far each force reaches (O)">Reach</button>
         {mayPoint && <button aria-pressed={points} onClick={() => setPoints(!points)} title="Show everybody the place under the pointer (P)">Point</button>}
         <button aria-pressed={arrows} onClick={() => setArrows(!arrows)} title="Force arrows, 20 mm per newton (A)">Arrows</button>
+        {props.tools}
       </div>
     </div>
   );

@@ -1,0 +1,54 @@
+#pragma once
+
+// An instructor holds tools of others still, or opens their jaws: this stands between the samples
+// of their hands and the simulation.
+//
+//   free --freeze--> frozen: last pose and verb, whatever the hand does
+//   frozen --release--> returning: to the hand, at most at kReturnSpeed and kReturnTurn --> free
+//   any --open--> jaws are open and the blade is up, until the hand's own verb has ended
+//
+// A tool that returns holds what it held if its hand does, too; it neither pushes nor cuts on the
+// way. Until it is back its samples carry no time of the client's clock: so the hand feels nothing,
+// and its safeguards fade the force out and in again.
+//
+// The simulation, and so the recording, gets what comes out of here, and nothing else of the hand.
+// Thread: the I/O thread.
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "server/tissue/hands/inputs.h"
+
+namespace trocar::participants {
+
+inline constexpr float kReturnSpeed = 0.15f;  // m/s, of the tip
+inline constexpr float kReturnTurn = 2.0f;    // rad/s
+
+class HeldTools {
+ public:
+  // Returns what the simulation gets in place of a sample; nothing: the tool is frozen, and is nowhere yet.
+  std::optional<hands::ToolInput> apply(const hands::ToolInput& wanted, std::uint64_t now_ns);
+
+  void freeze(ParticipantSlot slot);
+  void release(ParticipantSlot slot);
+  bool is_frozen(ParticipantSlot slot) const { return slot.has_tools() && is_frozen_[slot.value]; }
+  // Returns what the simulation gets at once: hands that are silent have to let go, too.
+  std::vector<hands::ToolInput> open(ParticipantSlot slot);
+  // The place is free.
+  void forget(ParticipantSlot slot);
+
+ private:
+  struct Tool {
+    std::optional<tool::ToolSample> last;  // that the simulation was given
+    std::uint64_t last_ns = 0;
+    bool is_returning = false;
+    bool is_opened = false;  // until the hand's own verb ends
+  };
+
+  std::array<Tool, kMaxTools> tools_;
+  std::array<bool, kMaxHands> is_frozen_{};
+};
+
+}  // namespace trocar::participants

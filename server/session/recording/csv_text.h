@@ -1,0 +1,19 @@
+#pragma once
+
+#include <string>
+
+#include "common/base/printable.h"
+
+namespace trocar::recording {
+
+// Makes a cell of a table (CSV): printable, in quotation marks.
+inline std::string csv_text(const std::string& text) {
+  std::string out = "\"";
+  for (const char c : printable(text)) {
+    if (c == '"') out += '"';
+    out += c;
+  }
+  return out + '"';
+}
+
+}  // namespace trocar::recording

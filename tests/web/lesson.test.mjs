@@ -1,0 +1,184 @@
+// A lesson in headless Chromium, against the real programs: what an instructor does on the page, what
+// others see of it, and that the recording of it verifies.
+import assert from 'node:assert/strict';
+import { spawn } from 'node:child_process';
+import fs from 'node:fs';
+import { createRequire } from 'node:module';
+import { after, before, test } from 'node:test';
+
+const { TROCAR_MODULES, TROCAR_BUILD, TROCAR_ROOT, TROCAR_WORK, TROCAR_CHROMIUM, TROCAR_PICTURES } = process.env;
+const { chromium } = createRequire(`${TROCAR_MODULES}/`)('playwright-core');
+const kPatience = 60_000, kTest = { timeout: 120_000 };
+const children = new Set();
+let browser, context, server, web, hand, ivy, olga;
+
+const sleep = ms => new Promise(resolve => setTimeout(resolve, ms));
+async function until(what, condition) {
+  const end = Date.now() + kPatience;
+  for (;;) {
+    const value = await condition();
+    if (value) return value;
+    if (Date.now() > end) throw new Error(`${what}: has not come about within ${kPatience / 1000} s`);
+    await sleep(100);
+  }
+}
+function launch(name, args) {
+  const child = spawn(`${TROCAR_BUILD}/bin/${name}`, args, { stdio: ['ignore', 'pipe', 'pipe'] });
+  child.text = '';
+  child.ended = new Promise(resolve => child.on('exit', code => { child.hasEnded = true; children.delete(child); resolve(code); }));
+  for (const stream of [child.stdout, child.stderr]) stream.on('data', data => { child.text += data; });
+  children.add(child);
+  return child;
+}
+async function portOf(child, file) {
+  await until(file, () => fs.existsSync(file) || child.hasEnded);
+  if (!fs.existsSync(file)) throw new Error(child.text);
+  return Number(fs.readFileSync(file, 'utf8'));
+}
+async function openPage(role, name) {
+  const page = await context.newPage();
+  page.faults = [];
+  page.on('pageerror', error => page.faults.push(error.message));
+  await page.goto(`http://127.0.0.1:${web.port}/#${new URLSearchParams({ join: server.codes[role], role, name })}`);
+  return page;
+}
+const live = page => page.waitForSelector('canvas[data-drawn]', { timeout: kPatience });
+const sees = (page, text) => page.locator('.events').getByText(text).first().waitFor({ timeout: kPatience });
+const press = (page, name, exact = true) => page.getByRole('button', { name, exact }).click({ timeout: kPatience });
+const tip = page => page.evaluate(() => window.trocar.replica.tools()[0]?.hand);
+const apart = (a, b) => Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
+async function manage(name, what) {
+  const row = ivy.locator('.people li', { has: ivy.getByText(name, { exact: true }) });
+  const more = row.getByRole('button', { name: `Manage ${name}` });
+  if (await more.getAttribute('aria-expanded') !== 'true') await more.click({ timeout: kPatience });
+  await row.getByRole('button', { name: what, exact: true }).click({ timeout: kPatience });
+}
+const picture = async (page, name) => { if (TROCAR_PICTURES) await page.screenshot({ path: `${TROCAR_PICTURES}/${name}.png` }); };
+
+before(async () => {
+  browser = await chromium.launch({ executablePath: TROCAR_CHROMIUM, args: ['--no-sandbox', '--use-angle=swiftshader',
+    '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist', '--disable-dev-shm-usage'] });
+  context = await browser.newContext({ viewport: { width: 1280, height: 720 } });
+  server = launch('trocar-server', ['--listen', '127.0.0.1:0', '--no-announce', '--organ', 'liver',
+    '--journal', `${TROCAR_WORK}/lesson.mcap`, '--ready-file', `${TROCAR_WORK}/server.port`]);
+  server.port = await portOf(server, `${TROCAR_WORK}/server.port`);
+  await until('join codes', () => /observer\s+\S{19}/.test(server.text));
+  server.codes = Object.fromEntries([...server.text.matchAll(/^ {2}(\w+) +(\S{19}) /gm)].map(m => [m[1], m[2]]));
+  web = launch('trocar-web', ['--listen', '127.0.0.1:0', '--session', `127.0.0.1:${server.port}`, '--insecure-loopback',
+    '--ready-file', `${TROCAR_WORK}/web.port`]);
+  web.port = await portOf(web, `${TROCAR_WORK}/web.port`);
+  ivy = await openPage('instructor', 'Ivy');
+  await live(ivy);
+  olga = await openPage('observer', 'Olga');
+  await live(olga);
+}, { timeout: 120_000 });
+after(async () => {
+  await browser?.close();
+  for (const child of children) child.kill('SIGKILL');
+});
+
+test('a tool that is frozen stays, and goes back when it is released', kTest, async () => {
+  hand = launch('trocar-client', ['--server', `127.0.0.1:${server.port}`, '--name', 'Sam', '--no-render', '--join', server.codes.surgeon,
+    '--script', `${TROCAR_ROOT}/deploy/scenes/palpate.toml`]);
+  await until('a hand', () => tip(ivy));
+  const begin = await tip(ivy);
+  await until('it moves', async () => apart(await tip(ivy), begin) > 0.005);
+  await manage('Sam', 'Freeze tools');
+  await sees(olga, 'Ivy keeps the tools of Sam where they are');
+  await olga.getByText('held still by Ivy').waitFor({ timeout: kPatience });
+  await sleep(500);
+  const frozen = await tip(olga);
+  await sleep(1500);
+  assert.ok(apart(await tip(olga), frozen) < 1e-5, 'it moved while it was frozen');
+  await picture(ivy, 'frozen');
+  await manage('Sam', 'Release tools');
+  await until('it moves again', async () => apart(await tip(olga), frozen) > 0.005);
+  await manage('Sam', 'Take claim away');
+  await sees(olga, 'Ivy has taken away what Sam holds');
+});
+
+test('lines and notes are read by all, and an observer has no other buttons', kTest, async () => {
+  for (const name of ['Note', 'Draw', 'End session', 'Close to newcomers']) assert.equal(await olga.getByRole('button', { name }).count(), 0, name);
+  assert.equal(await olga.getByRole('button', { name: /^Manage/ }).count(), 0);
+  await olga.getByRole('textbox', { name: 'A line for everybody' }).fill('Where is <b>the</b> vein?');
+  await press(olga, 'Send');
+  await sees(ivy, 'Olga: Where is <b>the</b> vein?');
+  await ivy.getByRole('textbox', { name: 'A line for everybody' }).fill('Look at this cut later.');
+  await press(ivy, 'Note');
+  await sees(olga, 'note by Ivy: Look at this cut later.');
+});
+
+test('what an instructor draws is on everybody\'s organ until it is wiped', kTest, async () => {
+  await press(ivy, 'Draw');
+  const box = await ivy.locator('.stage canvas').boundingBox();
+  await ivy.mouse.move(box.x + box.width * 0.42, box.y + box.height * 0.5);
+  await ivy.mouse.down();
+  for (let i = 1; i <= 24; i++) await ivy.mouse.move(box.x + box.width * (0.42 + i * 0.006), box.y + box.height * (0.5 + 0.04 * Math.sin(i / 3)));
+  await ivy.mouse.up();
+  const triangles = page => page.evaluate(() => window.trocar.replica.drawing().positions.length / 9);
+  await until('a line', async () => await triangles(olga) > 10);
+  await until('both see the same', async () => await triangles(olga) === await triangles(ivy));
+  await picture(ivy, 'drawn');
+  const late = await openPage('observer', 'Late');
+  await live(late);
+  await until('a late one sees it', async () => await triangles(late) === await triangles(ivy));
+  await late.evaluate(() => window.trocar.session.leave());
+  await late.close();
+  await press(ivy, 'Draw');
+  await press(ivy, 'Wipe');
+  await until('it is wiped', async () => await triangles(olga) === 0);
+});
+
+test('the view that was given is followed', kTest, async () => {
+  await manage('Ivy', 'Give the view');
+  await press(olga, 'View of Ivy');
+  await ivy.locator('.stage canvas').focus();
+  for (let i = 0; i < 6; i++) await ivy.keyboard.press('ArrowLeft');
+  const eye = page => page.evaluate(() => window.trocar.picture().view().eye);
+  await until('it is the same view', async () => apart(await eye(ivy), await eye(olga)) < 1e-4);
+  await manage('Ivy', 'End the view');
+  await olga.getByRole('button', { name: 'View of Ivy' }).waitFor({ state: 'detached', timeout: kPatience });
+});
+
+test('a closed session lets in who is admitted, and a renamed one is seen by the new name', kTest, async () => {
+  await press(ivy, 'Close to newcomers');
+  const guest = await openPage('observer', 'Guest');
+  await guest.getByRole('alert').getByText('closed to newcomers').waitFor({ timeout: kPatience });
+  await press(ivy, 'Admit Guest');
+  await sees(ivy, 'Ivy lets Guest in');
+  await guest.reload();
+  await live(guest);
+  await manage('Guest', 'Rename');
+  await ivy.getByRole('textbox', { name: 'New name' }).fill('Gustav');
+  await press(ivy, 'Rename', true).catch(() => ivy.locator('.ask').getByRole('button', { name: 'Rename' }).click());
+  await olga.locator('.people b', { hasText: 'Gustav' }).waitFor({ timeout: kPatience });
+  await manage('Gustav', 'Put out');
+  await picture(ivy, 'put-out');
+  await ivy.getByRole('textbox', { name: /Reason/ }).fill('Come back after the break.');
+  await ivy.locator('.ask').getByRole('button', { name: 'Put out' }).click();
+  await guest.getByRole('alert').getByText('Come back after the break.').waitFor({ timeout: kPatience });
+  await sees(olga, 'Ivy has put Gustav out: Come back after the break.');
+  await guest.close();
+});
+
+test('the session ends in the instructor\'s words, and its recording verifies and tells of the lesson', kTest, async () => {
+  if (TROCAR_PICTURES) {
+    await ivy.setViewportSize({ width: 390, height: 844 });
+    await sleep(500);
+    await ivy.screenshot({ path: `${TROCAR_PICTURES}/phone.png`, fullPage: true });
+    await ivy.setViewportSize({ width: 1280, height: 720 });
+  }
+  await press(ivy, 'End session');
+  await press(ivy, 'End for everybody');
+  await olga.getByRole('alert').getByText('Ivy has ended the session').waitFor({ timeout: kPatience });
+  assert.equal(await server.ended, 0, server.text);
+  assert.equal(await hand.ended, 0, hand.text);
+  const verify = launch('trocar-journal', ['verify', `${TROCAR_WORK}/lesson.mcap`]);
+  assert.equal(await verify.ended, 0, verify.text);
+  await ivy.goto(`http://127.0.0.1:${web.port}/`);
+  await ivy.reload();
+  await ivy.locator('input[type=file]').setInputFiles(`${TROCAR_WORK}/lesson.mcap`);
+  await live(ivy);
+  for (const text of ['Ivy keeps the tools of Sam where they are', 'note by Ivy: Look at this cut later.', 'Ivy has ended the session']) await sees(ivy, text);
+  assert.deepEqual(ivy.faults, []);
+});
