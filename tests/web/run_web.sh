@@ -43,14 +43,15 @@ record() {
 
 case $test in
   recording) record ;;
-  codec) node --test "$here/codec.test.mjs" ;;
+  codec) node --test-reporter=spec "$here/codec.test.mjs" ;;
   page | lesson | figures)
     chromium=$(command -v chromium || command -v chromium-browser || command -v google-chrome) ||
       skip "Chromium is not installed: deploy/setup --with-web"
     [ -e "$build/web/page/index.html" ] || skip "the page is not built"
     export TROCAR_CHROMIUM=$chromium
     if [ "$test" != figures ]; then
-      node --test --test-reporter=spec "$here/$test.test.mjs"
+      # As one process, which prints each test as it ends.
+      node --test-reporter=spec "$here/$test.test.mjs"
     else
       [ -e "$TROCAR_RECORDING" ] || skip "there is no recording: run_web.sh recording makes it"
       node --experimental-websocket --no-warnings "$here/figures.mjs"
