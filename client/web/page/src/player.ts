@@ -55,6 +55,7 @@ export class Player {
         const items = await this.recording.seek(to);
         for (const item of items) this.feed(item);
         this.stream = this.recording.follow(to);
+        this.fault = '';
       } catch (error) {
         this.fail(error);
       }
