@@ -352,7 +352,7 @@ Result<ExitCode> run_chosen(const ClientOptions& options) {
     if (!felt) return felt.error();
     hands = std::move(*felt);
   } else if (options.display == Display::Window && replica::has_tools(options.role)) {
-    hands = Hands::mouse(tool::ToolShape{});
+    hands = Hands::mouse(options.instruments(), options.tool_of(0), options.mouse_hands);
   }
   net::NetSourceOptions connection;
   if (const auto parsed = net::parse_server_address(options.server, connection); !parsed)

@@ -126,6 +126,18 @@ Status parse_feels(const std::vector<std::string>& texts, std::vector<replay::Ha
   return {};
 }
 
+// Says which ones there are.
+Status check_tools(const ClientOptions& options) {
+  for (const auto& name : options.tools) {
+    if (tool::find_instrument(options.instruments(), name) != nullptr) continue;
+    std::string known;
+    for (const auto& instrument : options.instruments())
+      known += (known.empty() ? "" : ", ") + instrument.name;
+    return Error{ErrorCode::Usage, "--tool: " + name + " is none of " + known};
+  }
+  return {};
+}
+
 // Checks what belongs to devices, without opening them.
 Status check_devices(const ClientOptions& options) {
   const std::size_t count = options.devices.size();
@@ -134,8 +146,13 @@ Status check_devices(const ClientOptions& options) {
   if (count == 0) {
     if (!options.trace_file.empty())
       return Error{ErrorCode::Usage, "--hand-trace: is of devices; give --device too"};
-    if (!(options.tools.empty() && options.ports_m.empty() && options.feels.empty()))
-      return Error{ErrorCode::Usage, "--tool, --port, --feel: are of devices; give --device too"};
+    if (!(options.ports_m.empty() && options.feels.empty()))
+      return Error{ErrorCode::Usage, "--port, --feel: are of devices; give --device too"};
+    if (options.tools.size() > 1)
+      return Error{ErrorCode::Usage,
+                   "--tool: give one; other instruments are in the window's tray"};
+    if (!options.script_file.empty() && !options.tools.empty())
+      return Error{ErrorCode::Usage, "--tool: a script says what its hands hold; leave it out"};
     return {};
   }
   if (count > 2)
@@ -167,6 +184,7 @@ std::string default_name() {
 Status check(const ClientOptions& options) {
   if (!options.replay_file.empty() && !options.script_file.empty())
     return Error{ErrorCode::Usage, "--replay and --script: a recording takes no tools; choose one"};
+  if (const auto tools = check_tools(options); !tools) return tools;
   if (const auto devices = check_devices(options); !devices) return devices;
   if (!options.script_file.empty() && !replica::has_tools(options.role))
     return Error{ErrorCode::Usage, "--script: an " + std::string(replica::name_of(options.role)) +
@@ -189,6 +207,7 @@ struct GivenTexts {
   bool is_headless = false, draws_nothing = false;
   std::vector<double> view;
   std::vector<std::string> overlays, ports, feels;
+  std::string instruments;
   const CLI::Option* server = nullptr;
 };
 
@@ -275,17 +294,19 @@ void add_hand_options(CLI::App& app, ClientOptions& options, GivenTexts& more) {
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
   app.add_flag("--list-devices", options.lists_devices,
                "list the devices of this computer and what is missing for others, and exit");
-  std::vector<std::string> tool_names;
-  std::string tool_text = "what a device holds; twice: one for each [all]:";
-  for (const auto& kind : tool::tool_kinds()) {
-    tool_names.emplace_back(kind.name);
-    tool_text += " " + tool_names.back() + " (" + std::string(kind.text) + ")";
-  }
+  std::string tool_text = "what a hand holds first; twice: one for each device [all]:";
+  for (const auto& instrument : tool::instruments())
+    tool_text += " " + instrument.name + " (" + instrument.text + ")";
   app.add_option("--tool", options.tools, tool_text)
-      ->type_name("KIND")
+      ->type_name("NAME")
       ->expected(1)
-      ->check(CLI::IsMember(tool_names))
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  app.add_option("--instruments", more.instruments,
+                 "instruments of your own instead of these (TOML, as common/tool/instruments.toml)")
+      ->type_name("FILE");
+  app.add_option("--hands", options.mouse_hands, "hands of a person with a mouse")
+      ->check(CLI::Range(1, kToolsPerHand))
+      ->capture_default_str();
   app.add_option("--port", more.ports,
                  "place that a device's shaft passes, mm, as a trocar holds a laparoscopic "
                  "instrument; twice: one for each [free]")
@@ -345,14 +366,23 @@ Status read_further(const GivenTexts& more, ClientOptions& options) {
   if (const auto parsed = parse_view(more.view, options.view); !parsed) return parsed;
   if (const auto parsed = parse_ports(more.ports, options.ports_m); !parsed) return parsed;
   if (const auto parsed = parse_feels(more.feels, options.feels); !parsed) return parsed;
+  if (!more.instruments.empty()) {
+    auto table = tool::read_instruments(more.instruments);
+    if (!table) return Error{table.error().code, "--instruments: " + table.error().message};
+    options.own_instruments = std::move(*table);
+  }
   return check(options);
 }
 
 }  // namespace
 
-const tool::ToolKind& ClientOptions::tool_of(std::size_t device) const {
-  if (tools.empty()) return tool::tool_kinds().front();
-  return *tool::find_tool_kind(tools[std::min(device, tools.size() - 1)]);
+std::span<const tool::Instrument> ClientOptions::instruments() const {
+  return own_instruments.empty() ? tool::instruments() : own_instruments;
+}
+
+const tool::Instrument& ClientOptions::tool_of(std::size_t device) const {
+  if (tools.empty()) return instruments().front();
+  return *tool::find_instrument(instruments(), tools[std::min(device, tools.size() - 1)]);
 }
 
 std::optional<Vec3d> ClientOptions::port_of(std::size_t device) const {

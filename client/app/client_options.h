@@ -11,7 +11,7 @@
 #include "client/replica/session_view.h"
 #include "common/base/result.h"
 #include "common/math/vec3.h"
-#include "common/tool/tool_kind.h"
+#include "common/tool/instrument.h"
 
 namespace trocar::app {
 
@@ -51,7 +51,8 @@ struct ClientOptions {
   std::string script_file, replay_file, summary_file;
   std::string trace_file;            // of what devices did and felt
   std::vector<std::string> devices;  // as device::open_device; empty: the mouse or the script
-  // There is one for each device, or one for all; empty: tool::tool_kinds().front(), and no port.
+  std::vector<tool::Instrument> own_instruments;  // empty: those of tool::instruments()
+  // There is one for each device, or one for all; empty: the table's first, and no port.
   std::vector<std::string> tools;
   std::vector<Vec3d> ports_m;
   std::vector<replay::HandInFile> feels;  // of the recording: one for each device
@@ -63,7 +64,10 @@ struct ClientOptions {
   bool lists_sessions = false;      // of the local network, instead of taking part in one
   std::string log_level = "info";
 
-  const tool::ToolKind& tool_of(std::size_t device) const;
+  int mouse_hands = 2;  // of a person with a mouse
+  std::span<const tool::Instrument> instruments() const;
+  // Returns one of instruments(), for a device or, 0, a mouse.
+  const tool::Instrument& tool_of(std::size_t device) const;
   std::optional<Vec3d> port_of(std::size_t device) const;
 };
 

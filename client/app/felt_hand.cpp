@@ -53,8 +53,8 @@ Status FeltHand::start(const Vec3d& start_m) {
   const auto own = device_->own_tool();
   haptics::HandSettings settings;
   settings.shape = settings_.tool.shape;
-  settings.gripper_verb = settings_.tool.gripper_verb;
-  settings.button_verb = settings_.tool.button_verb;
+  settings.gripper_verb = settings_.tool.grip_verb();
+  settings.button_verb = settings_.tool.button_verb();
   settings.start_m = own ? own->start_m : start_m;
   settings.port_m = settings_.port_m;
   settings.scale = settings_.scale;

@@ -19,7 +19,7 @@
 #include "common/base/newest.h"
 #include "common/base/result.h"
 #include "common/base/spsc_queue.h"
-#include "common/tool/tool_kind.h"
+#include "common/tool/instrument.h"
 #include "common/wire/haptic_patch.h"
 
 namespace trocar::app {
@@ -37,7 +37,7 @@ struct FeltFigures {
 
 // This says what a hand holds, and how.
 struct FeltSettings {
-  tool::ToolKind tool = tool::tool_kinds().front();
+  tool::Instrument tool = tool::instruments().front();
   std::optional<Vec3d> port_m;  // that its shaft passes, world frame; none: it is free
   haptics::WorkspaceScale scale;
   bool has_trace = false;  // each step is kept, for at most ten minutes

@@ -56,10 +56,15 @@ class FeltLine final : public replica::HandLine {
 
 }  // namespace
 
-Hands Hands::mouse(const tool::ToolShape& shape) {
+Hands Hands::mouse(std::span<const tool::Instrument> table, const tool::Instrument& first,
+                   int count) {
+  using Side = device::MouseTool::Side;
+  const auto chosen = static_cast<std::size_t>(&first - table.data());
   Hands hands;
-  hands.mouse_.emplace(shape);
-  hands.mouse_shape_ = shape;
+  hands.table_ = table;
+  for (int i = 0; i < count; ++i)
+    hands.mouse_.push_back(
+        {device::MouseTool(first.shape, i == 0 ? Side::Right : Side::Left), chosen});
   return hands;
 }
 
@@ -84,11 +89,38 @@ Hands Hands::replayed(std::vector<std::unique_ptr<FeltReplay>> replayed) {
 }
 
 std::vector<tool::ToolShape> Hands::shapes() const {
-  if (mouse_) return {mouse_shape_};
-  if (felt_.empty()) return script_shapes_;
+  if (felt_.empty() && mouse_.empty()) return script_shapes_;
   std::vector<tool::ToolShape> shapes;
+  for (const auto& hand : mouse_) shapes.push_back(hand.tool.shape());
   for (const auto& hand : felt_) shapes.push_back(hand->shape());
   return shapes;
+}
+
+const device::MouseTool* Hands::mouse_tool(int number) const {
+  const auto at = static_cast<std::size_t>(number);
+  return at < mouse_.size() ? &mouse_[at].tool : nullptr;
+}
+
+Hands::Choice Hands::choice() const {
+  if (mouse_.empty()) return {};
+  return {table_, mouse_[moved_].instrument, moved_, mouse_.size()};
+}
+
+void Hands::take(std::size_t instrument, replica::SessionSource& source) {
+  if (mouse_.empty() || instrument >= table_.size()) return;
+  auto& hand = mouse_[moved_];
+  if (hand.instrument == instrument) return;
+  const auto& shape = table_[instrument].shape;
+  if (!replica::send_tool_change(source, static_cast<std::uint32_t>(moved_), shape)) return;
+  hand.instrument = instrument;
+  hand.tool.take(shape);
+}
+
+void Hands::switch_hand(const device::PointerInput& input, const device::ViewRays& view) {
+  if (mouse_.size() < 2) return;
+  mouse_[moved_].tool.leave();
+  moved_ = (moved_ + 1) % mouse_.size();
+  mouse_[moved_].tool.come_back(input, view);
 }
 
 void Hands::set_view(const Quatf& world_from_camera) {
@@ -160,8 +192,9 @@ Status Hands::send_due(const replica::Replica& replica, replica::SessionSource& 
     for (auto& hand : replayed_)
       if (const auto updated = hand->update(*playback, now_ns); !updated) return updated;
   if (const auto tended = tend_felt(replica); !tended) return tended;
-  if (mouse_)
-    if (const auto sample = mouse_->pop_due(now_ns)) send(source, 0, *sample, now_ns);
+  for (std::size_t i = 0; i < mouse_.size(); ++i)
+    if (const auto sample = mouse_[i].tool.pop_due(now_ns))
+      send(source, static_cast<std::uint32_t>(i), *sample, now_ns);
   if (script_) {
     auto hand = device::ScriptHand::make(std::move(*script_), replica.topology().rest_positions,
                                          replica.topology().triangles);

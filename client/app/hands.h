@@ -5,6 +5,7 @@
 
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "client/app/felt_replay.h"
@@ -13,6 +14,7 @@
 #include "client/replica/hand_echo.h"
 #include "client/replica/hand_line.h"
 #include "client/replica/replica.h"
+#include "common/tool/instrument.h"
 
 namespace trocar::app {
 
@@ -20,7 +22,10 @@ class Hands {
  public:
   // No hands at all: a watcher.
   Hands() = default;
-  static Hands mouse(const tool::ToolShape& shape);
+  // One or two hands of a person with a mouse, one of which moves; each has an instrument of the
+  // table, which has to live on: `first` of it, at first.
+  static Hands mouse(std::span<const tool::Instrument> table, const tool::Instrument& first,
+                     int count);
   static Hands scripted(tool::Script script);
   // Each device holds one tool; there are at most two.
   static Hands felt(std::vector<std::unique_ptr<FeltHand>> hands);
@@ -39,7 +44,21 @@ class Hands {
   replica::HandLine* line() { return line_.get(); }
   // How the person looks at the scene: devices move tools as they are seen.
   void set_view(const Quatf& world_from_camera);
-  device::MouseTool* mouse_tool() { return mouse_ ? &*mouse_ : nullptr; }
+  // The hand that the pointer moves, or null.
+  device::MouseTool* mouse_tool() { return mouse_.empty() ? nullptr : &mouse_[moved_].tool; }
+  // The hand with this number, or null.
+  const device::MouseTool* mouse_tool(int number) const;
+  struct Choice {
+    std::span<const tool::Instrument> table;
+    std::size_t chosen = 0;  // by the hand that moves
+    std::size_t hand = 0, hands = 0;
+  };
+  // Returns that of a mouse; no hands: there is none.
+  Choice choice() const;
+  // The hand that moves takes another instrument. A wish that cannot be sent is lost.
+  void take(std::size_t instrument, replica::SessionSource& source);
+  // The pointer moves the person's other hand.
+  void switch_hand(const device::PointerInput& input, const device::ViewRays& view);
 
   // Sends what is due, and starts devices. A script begins with the first frame this client shows
   // and runs in simulated time, so that it is the same script on a server that cannot keep up. An
@@ -61,8 +80,13 @@ class Hands {
   std::vector<std::unique_ptr<FeltHand>> felt_;
   std::unique_ptr<replica::HandLine> line_;
   std::vector<std::unique_ptr<FeltReplay>> replayed_;
-  std::optional<device::MouseTool> mouse_;
-  tool::ToolShape mouse_shape_;
+  struct MouseHand {
+    device::MouseTool tool;
+    std::size_t instrument = 0;
+  };
+  std::vector<MouseHand> mouse_;
+  std::size_t moved_ = 0;  // of them
+  std::span<const tool::Instrument> table_;
   std::optional<tool::Script> script_;  // until the surface is known
   std::optional<device::ScriptHand> script_hand_;
   std::vector<tool::ToolShape> script_shapes_;

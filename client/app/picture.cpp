@@ -106,6 +106,15 @@ void Picture::measure(const replica::Replica& replica, std::uint64_t now_ns) {
   rate_.bytes = counters.bytes;
 }
 
+ui::HudTray tray_of(const Hands::Choice& choice) {
+  ui::HudTray tray{.chosen = choice.chosen, .hand = choice.hand, .hands = choice.hands};
+  for (const auto& instrument : choice.table) {
+    tray.names.push_back(instrument.name);
+    tray.texts.push_back(instrument.text);
+  }
+  return tray;
+}
+
 render::SceneTool Picture::scene_tool(const replica::Replica& replica, const replica::Tool& tool,
                                       Hands& hands) const {
   render::SceneTool shown;
@@ -119,7 +128,7 @@ render::SceneTool Picture::scene_tool(const replica::Replica& replica, const rep
   shown.force_n = tool.force_n;
   // A person sees the own hand where it is, not where it was a round trip ago, and the tool as far
   // from it as tissue last kept it.
-  const device::MouseTool* mouse = hands.mouse_tool();
+  const device::MouseTool* mouse = hands.mouse_tool(tool.slot.number());
   if (mouse != nullptr && mouse->is_valid() && tool.slot.owner() == replica.own_slot()) {
     const Pose hand = mouse->current().world_from_tool;
     const Vec3f held_back = tool.world_from_proxy.position - tool.world_from_tool.position;
@@ -362,6 +371,7 @@ ui::HudModel Picture::hud_model(const replica::Replica& replica, replica::Sessio
   model.shows_help = shows_help_;
   model.can_mark = source.playback() == nullptr && role_ == replica::Role::Instructor;
   model.has_own_tool = hands.mouse_tool() != nullptr;
+  model.tray = tray_of(hands.choice());
 
   model.shows_holds = overlays_.holds;
   model.shows_arrows = overlays_.arrows;
@@ -458,7 +468,10 @@ void Picture::draw(const replica::Replica& replica, replica::SessionSource& sour
     mouse->update(input, camera_.rays(context_->size()), surface_.positions(),
                   replica.topology().triangles, seconds);
   scene_ = scene_view(replica, hands, seconds);
-  act(hud_.draw(hud_model(replica, source, scene_, hands, now_ns)), replica, source);
+  const auto actions = hud_.draw(hud_model(replica, source, scene_, hands, now_ns));
+  act(actions, replica, source);
+  if (actions.take_instrument) hands.take(*actions.take_instrument, source);
+  if (actions.switch_hand) hands.switch_hand(input, camera_.rays(context_->size()));
   renderer_.draw(scene_, camera_);
   hud_.render();
   if (std::exchange(wants_screenshot_, false)) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace trocar::device {
 namespace {
@@ -12,36 +13,87 @@ constexpr float kFineFactor = 0.25f;     // with Shift
 constexpr float kSettleSeconds = 0.06f;  // hovering follows the relief this softly
 // How far below the surface each verb begins, m, and how fast the tip goes there, m/s.
 constexpr float kPushDepth = 0.006f, kGraspDepth = 0.001f, kCutDepth = 0.012f;
+constexpr float kHookDepth = 0.004f;
+constexpr float kRollSpeed = 1.6f;      // rad/s
+constexpr float kAsideSeconds = 0.15f;  // a tip that is free comes to the pointer this softly
 constexpr float kPushSpeed = 0.04f, kReachSpeed = 0.1f;
 constexpr float kMinDepth = 0.02f, kMaxDepth = 1.8f;
 
-float depth_of(tool::Verb verb) {
+}  // namespace
+
+float MouseTool::depth_of(tool::Verb verb) const {
   switch (verb) {
     case tool::Verb::Push:
       return kPushDepth;
     case tool::Verb::Grasp:
       return kGraspDepth;
     case tool::Verb::Cut:
-      return kCutDepth;
+      return shape_.form == tool::Form::Hook ? kHookDepth : kCutDepth;
     case tool::Verb::None:
       break;
   }
   return 0;
 }
 
-}  // namespace
+bool MouseTool::is_reaching() const {
+  const bool waits = wanted_ == tool::Verb::Grasp ||
+                     (wanted_ == tool::Verb::Cut && shape_.form == tool::Form::Scissors);
+  return waits && ahead_ > 0;
+}
 
-void MouseTool::update(const PointerInput& input, const ViewRays& view,
-                       std::span<const Vec3f> positions, Triangles triangles, float seconds) {
-  const bool is_camera = input.right || input.middle;
-  tool::Verb verb = tool::Verb::None;
+void MouseTool::take(const tool::ToolShape& shape) {
+  shape_ = shape;
+  wanted_ = sample_.verb = tool::Verb::None;
+  ahead_ = 0;
+  is_latched_ = false;
+}
+
+void MouseTool::leave() {
+  is_latched_ = wanted_ == tool::Verb::Grasp && !is_reaching();
+  if (is_latched_) return;
+  wanted_ = sample_.verb = tool::Verb::None;
+  ahead_ = 0;
+}
+
+void MouseTool::come_back(const PointerInput& input, const ViewRays& view) {
+  was_pressed_ = is_for_other_hand_ = input.left || input.push || input.grasp || input.cut;
+  if (!is_valid_) return;
+  const auto seen = view.pixel_of(sample_.world_from_tool.position);
+  aside_ = {seen[0] - input.x, seen[1] - input.y};
+  depth_ = dot(sample_.world_from_tool.position - view.eye, view.forward);
+}
+
+tool::Verb MouseTool::verb_of(const PointerInput& input) {
+  const bool is_left = input.left && (input.is_over_scene || wanted_ != tool::Verb::None);
+  const bool is_pressed = is_left || input.push || input.grasp || input.cut;
+  const bool was_pressed = std::exchange(was_pressed_, is_pressed);
+  if (is_pressed && !was_pressed) is_latched_ = false;
+  if (!is_pressed) is_for_other_hand_ = false;
+  if (is_latched_) return tool::Verb::Grasp;
+  auto verb = tool::Verb::None;
+  if (is_for_other_hand_) return verb;
   if (input.cut)
     verb = tool::Verb::Cut;
   else if (input.grasp)
     verb = tool::Verb::Grasp;
-  else if (input.push || (input.left && (input.is_over_scene || wanted_ == tool::Verb::Push)))
+  else if (input.push)
     verb = tool::Verb::Push;
+  else if (is_left)
+    verb = tool::main_verb(shape_);
+  return tool::possible(shape_, verb);
+}
 
+void MouseTool::turn(const PointerInput& input, float seconds) {
+  const float way = (input.shift ? kFineFactor : 1.0f) * kRollSpeed * seconds;
+  if (input.roll_left) roll_ += way;
+  if (input.roll_right) roll_ -= way;
+}
+
+void MouseTool::update(const PointerInput& input, const ViewRays& view,
+                       std::span<const Vec3f> positions, Triangles triangles, float seconds) {
+  const bool is_camera = input.right || input.middle;
+  const tool::Verb verb = verb_of(input);
+  turn(input, seconds);
   const bool begins = verb != tool::Verb::None && wanted_ == tool::Verb::None;
   wanted_ = verb;
   if (begins) ahead_ = std::max(0.0f, hover_ + depth_of(verb));
@@ -53,7 +105,9 @@ void MouseTool::update(const PointerInput& input, const ViewRays& view,
     depth_ = dot(sample_.world_from_tool.position - view.eye, view.forward);
     return;
   }
-  const Vec3f ray = view.ray_through(input.x, input.y);
+  if (verb == tool::Verb::None)
+    for (auto& pixels : aside_) pixels *= std::exp(-seconds / kAsideSeconds);
+  const Vec3f ray = view.ray_through(input.x + aside_[0], input.y + aside_[1]);
   const float fine = input.shift ? kFineFactor : 1.0f;
   float advance = input.control ? 0.0f : input.wheel * kWheelMetres * fine;
   if (input.deeper) advance += kKeyMetresPerSecond * fine * seconds;
@@ -77,9 +131,10 @@ void MouseTool::update(const PointerInput& input, const ViewRays& view,
   const Vec3f tip = view.eye + ray * depth_;
   if (length(tip) > 1.9f) return;  // the server ends a session for poses beyond 2 m
   // The shaft goes through a port above the camera, on the side of the hand.
-  const Vec3f port = view.eye + view.up * 0.16f + view.right * 0.14f;
+  const Vec3f port = view.eye + view.up * 0.16f + view.right * (side_ * 0.14f);
   sample_.world_from_tool.position = tip;
-  sample_.world_from_tool.orientation = rotation_from_z(normalized(port - tip, Vec3f{0, 0, 1}));
+  sample_.world_from_tool.orientation = rotation_from_z(normalized(port - tip, Vec3f{0, 0, 1})) *
+                                        Quatf{0, 0, std::sin(0.5f * roll_), std::cos(0.5f * roll_)};
   sample_.verb = is_reaching() ? tool::Verb::None : verb;
   is_valid_ = true;
 }

@@ -4,17 +4,26 @@
 //
 //   no verb held     the tip follows the pointer and hovers above the tissue under it; the wheel
 //                    sets the height
-//   left button, F   push: the tip goes down and presses 6 mm in; it moves in the view plane, and
+//   left button      what the instrument is for: a grasper grasps, what has an edge cuts, and all
+//                    others push
+//   F                push: the tip goes down and presses 6 mm in; it moves in the view plane, and
 //                    wheel or W/S press in and draw back
 //   Space            grasp: the tip goes down, closes where the surface is, and moves like that
-//   X                cut: the blade goes in 12 mm and follows the pointer, wheel or W/S change that
+//   X                cut: the edge goes in and follows the pointer, wheel or W/S change how deep;
+//                    scissors and grasps begin once they are there
+//   Q, E             turn it about its shaft
 //   right or middle  the camera's; the tip stays where it is
+//
+// A person with two hands moves one at a time. The other stays, and goes on holding what it holds;
+// when the pointer comes back to it, it moves from where it is, and holds until it is told to again
+// and let go.
 //
 // Depth is measured along the view direction. The shaft runs from the tip towards a fixed port
 // above and beside the camera, as an instrument through a trocar does. Samples leave at most every
 // 8 ms while something changes, else every 40 ms (the server's lease wants one at least every 50
 // ms). Thread: render thread.
 
+#include <array>
 #include <optional>
 #include <span>
 
@@ -29,7 +38,16 @@ inline constexpr std::uint64_t kKeepAliveNs = 40'000'000;
 
 class MouseTool {
  public:
-  explicit MouseTool(const tool::ToolShape& shape) : shape_(shape) {}
+  enum class Side { Right, Left };
+  explicit MouseTool(const tool::ToolShape& shape, Side side = Side::Right)
+      : shape_(shape), side_(side == Side::Right ? 1.0f : -1.0f) {}
+
+  // It lets go of everything and is another instrument.
+  void take(const tool::ToolShape& shape);
+  const tool::ToolShape& shape() const { return shape_; }
+  // The pointer leaves it for the person's other hand, and comes back to it.
+  void leave();
+  void come_back(const PointerInput& input, const ViewRays& view);
 
   // Once per display frame; `seconds` since the last one. Positions are those on the screen.
   void update(const PointerInput& input, const ViewRays& view, std::span<const Vec3f> positions,
@@ -41,10 +59,14 @@ class MouseTool {
   std::optional<tool::ToolSample> pop_due(std::uint64_t now_ns);
 
  private:
-  // Jaws stay open on the way to the surface.
-  bool is_reaching() const { return wanted_ == tool::Verb::Grasp && ahead_ > 0; }
+  tool::Verb verb_of(const PointerInput& input);
+  float depth_of(tool::Verb verb) const;
+  // Jaws and scissors stay open on the way to the surface.
+  bool is_reaching() const;
+  void turn(const PointerInput& input, float seconds);
 
   tool::ToolShape shape_;
+  float side_;  // 1: its port is at the right of the view, -1: at the left
   tool::ToolSample sample_;
   tool::ToolSample last_sent_;
   std::uint64_t last_sent_ns_ = 0;
@@ -53,6 +75,11 @@ class MouseTool {
   float depth_ = 0;                       // m along the view direction
   float ahead_ = 0;                       // m, still to go down for what is wanted
   float hover_ = 0.008f;                  // m above the tissue while no verb is held
+  bool is_latched_ = false;               // it goes on holding without a key
+  bool was_pressed_ = false;
+  bool is_for_other_hand_ = false;  // what is pressed was pressed before it came back
+  std::array<float, 2> aside_{};    // pixels, from the pointer to where the tip goes
+  float roll_ = 0;                  // rad, about the shaft
 };
 
 }  // namespace trocar::device

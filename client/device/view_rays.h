@@ -2,6 +2,9 @@
 
 // How the screen lies in the world: what a pointing device needs from a camera.
 
+#include <algorithm>
+#include <array>
+
 #include "common/math/vec3.h"
 
 namespace trocar::device {
@@ -19,6 +22,14 @@ struct ViewRays {
     const float v = (1 - 2 * y / height) * tan_half_height;
     return forward + right * u + up * v;
   }
+  // Returns where a point before the eye is seen, in pixels.
+  std::array<float, 2> pixel_of(const Vec3f& point) const {
+    const Vec3f to = point - eye;
+    const float depth = std::max(dot(to, forward), 1e-4f);
+    const float u = dot(to, right) / depth, v = dot(to, up) / depth;
+    return {(u * height / (tan_half_height * width) + 1) * width / 2,
+            (1 - v / tan_half_height) * height / 2};
+  }
 };
 
 // A person's mouse and keyboard are read into this once per display frame.
@@ -31,6 +42,7 @@ struct PointerInput {
   bool control = false, shift = false;
   bool push = false, grasp = false, cut = false;  // keys held
   bool deeper = false, nearer = false;
+  bool roll_left = false, roll_right = false;
   bool zoom_in = false, zoom_out = false;
 };
 

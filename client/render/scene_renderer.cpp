@@ -9,6 +9,7 @@
 #include "client/render/gl.h"
 #include "client/render/shader.h"
 #include "client/render/shader_sources.h"
+#include "client/shape/instrument_mesh.h"
 #include "client/shape/noise.h"
 #include "client/shape/smooth_surface.h"
 
@@ -24,7 +25,6 @@ constexpr float kOverlayStrength = 0.50f;
 constexpr float kFirmHoldStrength = 0.95f, kTouchStrength = 0.60f;
 constexpr float kOverlayFadeSeconds = 0.12f;
 // Jaws: open while a grasp looks for tissue, parted by what it holds, else closed. Radians.
-constexpr float kOpenJaws = 0.34f, kHoldingJaws = 0.12f, kJawSeconds = 0.08f;
 constexpr std::size_t kTriangleBudgetSoftware = 16'000, kTriangleBudget = 100'000;
 
 struct Tint {
@@ -346,19 +346,14 @@ void SceneRenderer::Parts::draw_tool(const SceneTool& shown, float seconds) {
   const Colour colour = colour_of_slot(shown.slot.owner().value);
   const Matrix4 world = matrix_of(shown.world_from_tool);
   const float dim = shown.is_silent ? 0.45f : 1.0f;
-  if (shown.shape.half_width_m > 0) {
-    draw_mesh(make_blade(shown.shape, colour), world, 0, dim);
-    return;
-  }
-  draw_mesh(make_shaft(shown.shape, colour), world, 0, dim);
-  const float wanted = shown.verb != tool::Verb::Grasp ? 0.0f
-                       : shown.has_claim               ? kHoldingJaws
-                                                       : kOpenJaws;
+  const InstrumentMesh mesh = make_instrument(shown.shape, colour);
+  draw_mesh(mesh.body, world, 0, dim);
+  const JawMotion motion = jaw_motion(shown.shape.form, shown.verb, shown.has_claim);
   float& opening = jaw_openings[shown.slot.value % kMaxTools];
-  opening += (wanted - opening) * (1 - std::exp(-seconds / kJawSeconds));
-  const MeshVertices jaw = make_jaw(shown.shape);
+  opening += (motion.opening - opening) * (1 - std::exp(-seconds / motion.seconds));
+  if (mesh.jaw.empty()) return;
   for (const bool is_lower : {false, true})
-    draw_mesh(jaw, multiply(world, jaw_matrix(jaw_length(shown.shape), opening, is_lower)), 0, dim);
+    draw_mesh(mesh.jaw, multiply(world, jaw_matrix(mesh.hinge_m, opening, is_lower)), 0, dim);
 }
 
 void SceneRenderer::Parts::draw_through(const MeshVertices& mesh, const Matrix4& world_from_model,

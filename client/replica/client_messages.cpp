@@ -2,6 +2,7 @@
 
 #include "common/wire/hand_report_messages.h"
 #include "common/wire/haptic_messages.h"
+#include "common/wire/tool_shape.h"
 #include "proto/wire.pb.h"
 
 namespace trocar::replica {
@@ -27,6 +28,14 @@ bool send_tool_sample(SessionSource& source, std::uint32_t tool, std::uint32_t s
                       const tool::ToolSample& sample) {
   proto::Envelope envelope;
   write_reading({tool, sample, 0}, sequence, envelope);
+  return source.send(envelope);
+}
+
+bool send_tool_change(SessionSource& source, std::uint32_t tool, const tool::ToolShape& shape) {
+  proto::Envelope envelope;
+  auto& change = *envelope.mutable_tool_change();
+  change.set_tool(tool);
+  wire::write(shape, *change.mutable_shape());
   return source.send(envelope);
 }
 

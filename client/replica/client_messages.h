@@ -12,7 +12,9 @@ namespace trocar::replica {
 // `tool` is 0 or 1; `sequence` counts up per client. False if the source dropped it.
 bool send_tool_sample(SessionSource& source, std::uint32_t tool, std::uint32_t sequence,
                       const tool::ToolSample& sample);
-// The same message, of a hand that feels.
+// To take another instrument. False if the source dropped it.
+bool send_tool_change(SessionSource& source, std::uint32_t tool, const tool::ToolShape& shape);
+// The message of a reading, of a hand that feels.
 void write_reading(const HandLineReading& reading, std::uint32_t sequence,
                    proto::Envelope& envelope);
 

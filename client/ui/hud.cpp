@@ -131,6 +131,8 @@ device::PointerInput Hud::input() const {
   input.cut = key(GLFW_KEY_X);
   input.deeper = key(GLFW_KEY_W);
   input.nearer = key(GLFW_KEY_S);
+  input.roll_left = key(GLFW_KEY_Q);
+  input.roll_right = key(GLFW_KEY_E);
   input.zoom_in = key(GLFW_KEY_EQUAL) || key(GLFW_KEY_KP_ADD);
   input.zoom_out = key(GLFW_KEY_MINUS) || key(GLFW_KEY_KP_SUBTRACT);
   return input;
@@ -149,6 +151,7 @@ HudActions Hud::draw(const HudModel& model) {
   draw_lesson(model, scale_);
   draw_own_forces(model, scale_);
   draw_messages(model, scale_);
+  if (model.tray.hands > 0) draw_tray(model.tray, scale_, actions);
   if (model.timeline) draw_timeline(*model.timeline, scale_, actions);
   draw_help(model, scale_);
   draw_status(model, scale_);
@@ -164,6 +167,10 @@ HudActions Hud::draw(const HudModel& model) {
   actions.toggle_ghost = pressed(GLFW_KEY_G);
   actions.reset_camera = pressed(GLFW_KEY_C);
   actions.screenshot = pressed(GLFW_KEY_F12);
+  actions.switch_hand = model.tray.hands > 1 && pressed(GLFW_KEY_TAB);
+  for (std::size_t i = 0;
+       model.tray.hands > 0 && i < std::min<std::size_t>(model.tray.names.size(), 9); ++i)
+    if (pressed(GLFW_KEY_1 + static_cast<int>(i))) actions.take_instrument = i;
   actions.toggle_follow = !model.view_text.empty() && pressed(GLFW_KEY_V);
   actions.set_mark = model.can_mark && pressed(GLFW_KEY_M);
   actions.return_to_mark = model.can_mark && pressed(GLFW_KEY_BACKSPACE);

@@ -55,6 +55,13 @@ struct HudTimeline {
   float speed = 1;
 };
 
+// The instruments that a hand may take; hands 0: there is nothing to choose.
+struct HudTray {
+  std::vector<std::string> names, texts;
+  std::size_t chosen = 0;
+  std::size_t hand = 0, hands = 0;  // that the pointer moves; of so many
+};
+
 // A tool of one's own, whatever holds it.
 struct HudOwnForce {
   std::string name;  // "force on your tool"
@@ -96,6 +103,7 @@ struct HudModel {
   std::vector<HudFeltHand> felt_hands;  // shown with the rate
   bool shows_help = false;
   bool has_own_tool = false;
+  HudTray tray;
   bool can_mark = false;  // an instructor's: he may mark the organ and return it to the mark
 };
 
@@ -104,6 +112,8 @@ struct HudActions {
   bool toggle_rate = false, toggle_ghost = false, reset_camera = false, screenshot = false;
   bool toggle_play = false;
   bool set_mark = false, return_to_mark = false, toggle_follow = false;
+  bool switch_hand = false;
+  std::optional<std::size_t> take_instrument;
   std::optional<double> seek_seconds;
   std::optional<float> speed;
 };

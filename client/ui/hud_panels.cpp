@@ -284,7 +284,7 @@ void draw_help(const HudModel& model, float scale) {
   ImGui::Begin("help", nullptr, kGlass);
   if (!model.shows_help) {
     ImGui::TextDisabled(model.has_own_tool
-                            ? "left button push   Space grasp   X cut   wheel depth   H help"
+                            ? "1-9 instrument   left button use it   wheel depth   Q E turn   H help"
                             : "right drag turn   Ctrl+wheel zoom   H help");
     ImGui::End();
     return;
@@ -294,9 +294,11 @@ void draw_help(const HudModel& model, float scale) {
   if (ImGui::BeginTable("keys", 2, ImGuiTableFlags_SizingFixedFit)) {
     if (model.has_own_tool) {
       help_row("move", "the tip follows the pointer, just above the tissue");
-      help_row("left button, F", "push: hold; wheel or W / S for more or less");
-      help_row("Space", "grasp: hold, lift by moving the mouse");
-      help_row("X", "cut: hold and draw the blade along, wheel or W / S for depth");
+      help_row("1 to 9", "take another instrument");
+      help_row("left button", "use it: a grasper holds, an edge cuts, others push");
+      help_row("F, Space, X", "push, grasp, cut, where the instrument can");
+      help_row("Q, E", "turn it about its shaft");
+      if (model.tray.hands > 1) help_row("Tab", "the other hand; this one goes on holding");
       help_row("wheel, W / S", "depth along the view; Shift: finer");
     }
     if (model.can_mark) {

@@ -25,6 +25,8 @@ void draw_stale_picture(const HudModel& model, float scale);
 void draw_lesson(const HudModel& model, float scale);
 void draw_labels(const HudModel& model, float scale);
 void draw_messages(const HudModel& model, float scale);
+// The instruments of one's own, to be chosen from, at the left edge.
+void draw_tray(const HudTray& tray, float scale, HudActions& actions);
 void draw_timeline(const HudTimeline& timeline, float scale, HudActions& actions);
 void draw_help(const HudModel& model, float scale);
 void draw_status(const HudModel& model, float scale);

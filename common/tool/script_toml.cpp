@@ -2,6 +2,8 @@
 
 #include "common/tool/script_toml.h"
 
+#include "common/tool/instrument.h"
+
 namespace trocar::tool {
 namespace {
 
@@ -12,7 +14,22 @@ constexpr std::array<std::string_view, 12> kScenarioTables{
     "organ", "material", "nodes",   "region", "fix",   "displace",
     "force", "traction", "gravity", "run",    "probe", "output"};
 
+// The shape of an instrument, which other keys then change.
+void read_instrument(TableReader& reader, ToolShape& shape) {
+  const auto name = reader.string("instrument");
+  if (!name) return;
+  if (const auto* instrument = find_instrument(*name)) {
+    shape = instrument->shape;
+    return;
+  }
+  std::string known;
+  for (const auto& instrument : instruments())
+    known += (known.empty() ? "" : ", ") + instrument.name;
+  reader.fail("instrument", "is none of the known ones, write one of " + known);
+}
+
 void read_shape(TableReader& reader, ToolShape& shape) {
+  read_instrument(reader, shape);
   const auto set = [&](std::string_view key, float& value_m, double least_mm, double most_mm) {
     if (const auto mm = reader.number(key, least_mm, most_mm))
       value_m = static_cast<float>(*mm * 1e-3);

@@ -16,6 +16,7 @@ inline void write(const tool::ToolShape& shape, proto::ToolShape& message) {
   message.set_friction(shape.friction);
   message.set_grip_n(shape.grip_n);
   message.set_edge_m(shape.edge_m);
+  message.set_form(static_cast<proto::ToolForm>(shape.form));
 }
 
 inline tool::ToolShape read(const proto::ToolShape& message) {
@@ -24,6 +25,10 @@ inline tool::ToolShape read(const proto::ToolShape& message) {
   if (message.has_friction()) shape.friction = message.friction();
   if (message.has_grip_n()) shape.grip_n = message.grip_n();
   if (message.has_edge_m()) shape.edge_m = message.edge_m();
+  // A form that is not known here is none that is_valid() knows.
+  const int form = message.form();
+  shape.form =
+      static_cast<tool::Form>(form >= 0 && form < tool::kFormCount ? form : tool::kFormCount);
   return shape;
 }
 

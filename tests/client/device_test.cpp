@@ -7,6 +7,7 @@
 #include "client/device/mouse_tool.h"
 #include "client/render/camera.h"
 #include "client/shape/smooth_surface.h"
+#include "common/tool/instrument.h"
 #include "tests/client/synthetic_source.h"
 #include "tests/support/surface_edits.h"
 
@@ -49,6 +50,9 @@ TEST(Camera, ProjectsWhatItsRaysPassThrough) {
     ASSERT_TRUE(at.has_value());
     EXPECT_NEAR(at->x, x, 0.05f);
     EXPECT_NEAR(at->y, y, 0.05f);
+    const auto pixel = view.pixel_of(view.eye + view.ray_through(x, y) * 0.3f);
+    EXPECT_NEAR(pixel[0], x, 0.05f);
+    EXPECT_NEAR(pixel[1], y, 0.05f);
   }
 }
 
@@ -141,6 +145,111 @@ TEST_F(MouseToolTest, JawsCloseWhereTheSurfaceIs) {
   update();
   EXPECT_EQ(tool_.current().verb, tool::Verb::Push);
   EXPECT_NEAR(depth(), surface + 0.001f, 1e-4f) << "from one verb to another it stays";
+}
+
+TEST_F(MouseToolTest, TheLeftButtonDoesWhatTheInstrumentIsFor) {
+  update(30);
+  const auto verb_of = [&](std::string_view name) {
+    input_.left = false;
+    update();
+    tool_.take(tool::find_instrument(name)->shape);
+    EXPECT_EQ(tool_.current().verb, tool::Verb::None);
+    input_.left = true;
+    update(60);
+    return tool_.current().verb;
+  };
+  using enum tool::Verb;
+  EXPECT_EQ(verb_of("all"), Push);
+  EXPECT_EQ(verb_of("probe"), Push);
+  EXPECT_EQ(verb_of("grasper"), Grasp);
+  EXPECT_EQ(verb_of("scissors"), Cut);
+  EXPECT_EQ(verb_of("hook"), Cut);
+  // A key asks for what an instrument cannot do: it presses.
+  input_.left = false;
+  update();
+  tool_.take(tool::find_instrument("probe")->shape);
+  input_.cut = true;
+  update();
+  EXPECT_EQ(tool_.current().verb, Push);
+}
+
+TEST_F(MouseToolTest, ScissorsStayOpenUntilTheyAreInTheTissue) {
+  update(30);
+  tool_.take(tool::find_instrument("scissors")->shape);
+  const float before = depth();
+  input_.left = true;
+  update(3);
+  EXPECT_EQ(tool_.current().verb, tool::Verb::None);
+  update(60);
+  EXPECT_EQ(tool_.current().verb, tool::Verb::Cut);
+  EXPECT_NEAR(depth() - before, 0.020f, 0.001f) << "8 mm above the surface to 12 mm below";
+}
+
+TEST_F(MouseToolTest, TurnsAboutItsShaft) {
+  update(30);
+  const auto pose = tool_.current().world_from_tool;
+  const Vec3f shaft = rotate(pose.orientation, {0, 0, 1}),
+              side = rotate(pose.orientation, {1, 0, 0});
+  input_.roll_left = true;
+  update(30);
+  const auto turned = tool_.current().world_from_tool;
+  EXPECT_LT(length(rotate(turned.orientation, {0, 0, 1}) - shaft), 1e-4f);
+  EXPECT_NEAR(dot(rotate(turned.orientation, {1, 0, 0}), side), std::cos(30 * 0.016f * 1.6f), 1e-3);
+}
+
+// The other hand has the pointer meanwhile, which is elsewhere when it comes back.
+TEST_F(MouseToolTest, AHandThatThePointerLeavesGoesOnHolding) {
+  update(30);
+  tool_.take(tool::find_instrument("grasper")->shape);
+  input_.left = true;
+  update(60);
+  ASSERT_EQ(tool_.current().verb, tool::Verb::Grasp);
+  const Vec3f held_at = tool_.current().world_from_tool.position;
+  tool_.leave();
+  EXPECT_EQ(tool_.current().verb, tool::Verb::Grasp);
+  input_.left = false;
+  input_.x += 150, input_.y -= 80;
+  tool_.come_back(input_, camera_.rays(size_));
+  update();
+  EXPECT_EQ(tool_.current().verb, tool::Verb::Grasp) << "nobody has let go";
+  EXPECT_LT(length(tool_.current().world_from_tool.position - held_at), 1e-4f)
+      << "it leaps nowhere";
+  input_.x += 40;
+  update();
+  EXPECT_GT(length(tool_.current().world_from_tool.position - held_at), 1e-3f) << "it moves";
+  // It lets go as a hand does: press, and release.
+  input_.left = true;
+  update();
+  EXPECT_EQ(tool_.current().verb, tool::Verb::Grasp);
+  input_.left = false;
+  update();
+  EXPECT_EQ(tool_.current().verb, tool::Verb::None);
+  update(60);
+  const auto view = camera_.rays(size_);
+  const auto pixel = view.pixel_of(tool_.current().world_from_tool.position);
+  EXPECT_NEAR(pixel[0], input_.x, 2) << "free, it comes to the pointer";
+}
+
+TEST_F(MouseToolTest, AButtonThatWasPressedForOneHandDoesNothingInTheOther) {
+  update(30);
+  input_.left = true;
+  tool_.come_back(input_, camera_.rays(size_));
+  update(10);
+  EXPECT_EQ(tool_.current().verb, tool::Verb::None);
+  input_.left = false;
+  update();
+  input_.left = true;
+  update();
+  EXPECT_EQ(tool_.current().verb, tool::Verb::Push);
+}
+
+TEST_F(MouseToolTest, AHandThatHoldsNothingStopsWhenThePointerLeavesIt) {
+  update(30);
+  input_.push = true;
+  update(30);
+  ASSERT_EQ(tool_.current().verb, tool::Verb::Push);
+  tool_.leave();
+  EXPECT_EQ(tool_.current().verb, tool::Verb::None);
 }
 
 TEST_F(MouseToolTest, TipStaysWhileTheCameraTurns) {

@@ -62,6 +62,10 @@ TEST(ClientOptions, EachDeviceHasItsToolAndItsPort) {
   ASSERT_TRUE(two.ok()) << two.error().message;
   EXPECT_EQ((*two)->tool_of(0).name, "hook");
   EXPECT_EQ((*two)->tool_of(1).name, "probe");
+  const auto mouse = parse({"--tool", "scissors", "--hands", "1"});
+  ASSERT_TRUE(mouse.ok()) << mouse.error().message;
+  EXPECT_EQ((*mouse)->tool_of(0).name, "scissors");
+  EXPECT_EQ((*mouse)->mouse_hands, 1);
 }
 
 TEST(ClientOptions, ARecordedHandIsFelt) {
@@ -103,7 +107,10 @@ TEST(ClientOptions, EachWrongValueIsAUsageErrorThatNamesTheOption) {
       {{"--replay", "x.mcap", "--device", "haply", "--feel", "Anna", "--tool", "hook"}, "--tool"},
       {{"--device", "haply", "--tool", "spoon"}, "--tool"},
       {{"--device", "haply", "--tool", "hook", "--tool", "probe"}, "--tool"},
-      {{"--tool", "hook"}, "--tool"},
+      {{"--tool", "spoon"}, "--tool"},
+      {{"--tool", "hook", "--tool", "probe"}, "--tool"},
+      {{"--script", "x.toml", "--tool", "hook"}, "--tool"},
+      {{"--hands", "3"}, "--hands"},
       {{"--device", "haply", "--port", "1,2"}, "--port"},
       {{"--device", "haply", "--port", "1,2,3,4"}, "--port"},
       {{"--device", "haply", "--port", "1,2,nan"}, "--port"},

@@ -1,9 +1,11 @@
-#include "client/shape/tool_mesh.h"
+#include "client/shape/instrument_mesh.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
+
+#include "common/tool/instrument.h"
 
 namespace trocar::shape {
 namespace {
@@ -40,6 +42,39 @@ TEST(ToolMesh, ABladeIsTheSolidOfTheSimulation) {
   EXPECT_NEAR(high.x, shape.half_width_m + shape.radius_m, 1e-6);
   EXPECT_NEAR(low.x, -high.x, 1e-6);
   EXPECT_NEAR(high.y, shape.radius_m, 1e-6);
+}
+
+TEST(ToolMesh, EachInstrumentHasItsFacesOutside) {
+  for (const auto& instrument : tool::instruments()) {
+    const auto mesh = make_instrument(instrument.shape, {});
+    ASSERT_FALSE(mesh.body.empty()) << instrument.name;
+    for (const auto* part : {&mesh.body, &mesh.jaw}) {
+      ASSERT_EQ(part->size() % 3, 0u);
+      for (std::size_t i = 0; i < part->size(); i += 3) {
+        const auto* const v = &(*part)[i];
+        const Vec3f face = cross(v[1].position - v[0].position, v[2].position - v[0].position);
+        if (length(face) < 1e-12f) continue;
+        EXPECT_GT(dot(face, v[0].normal + v[1].normal + v[2].normal), 0)
+            << instrument.name << ", triangle " << i / 3;
+      }
+    }
+  }
+}
+
+TEST(ToolMesh, WhatCutsIsWhereTheSimulationHasIt) {
+  const auto extent = [](const MeshVertices& mesh, float Vec3f::*axis) {
+    float most = -1;
+    for (const auto& vertex : mesh) most = std::max(most, vertex.position.*axis);
+    return most;
+  };
+  const auto& hook = tool::find_instrument("hook")->shape;
+  EXPECT_NEAR(extent(make_instrument(hook, {}).body, &Vec3f::y), hook.edge_m, 0.002f);
+  const auto scissors = make_instrument(tool::find_instrument("scissors")->shape, {});
+  EXPECT_FLOAT_EQ(scissors.hinge_m, 0.02f);
+  EXPECT_EQ(jaw_motion(tool::Form::Scissors, tool::Verb::Cut, true).opening, 0);
+  // Each blade is turned by so much: its tip is a quarter of its length from the axis.
+  EXPECT_NEAR(std::tan(jaw_motion(tool::Form::Scissors, tool::Verb::None, false).opening), 0.25f,
+              0.001f);
 }
 
 TEST(ToolMesh, AGhostReachesFromTheToolToTheHand) {

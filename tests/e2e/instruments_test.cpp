@@ -11,7 +11,7 @@
 #include "client/replay/recorded_hand.h"
 #include "common/journal/session_journal.h"
 #include "common/math/box.h"
-#include "common/tool/tool_kind.h"
+#include "common/tool/instrument.h"
 #include "server/organs/catalogue/load_organ.h"
 #include "tests/e2e/programs.h"
 
@@ -119,14 +119,14 @@ TEST_F(Instruments, JawsGraspAndHoldAsMuchAsTheirOwn) {
     return use(kind, {{2, 0, 10, 0}, {3, 0, -3, 0}, {3.3, 0, -3, 1}, {6, 0, 45, 1}, {7, 0, 45, 1}});
   };
   const auto grasper = pull("grasper"), hook = pull("hook");
-  EXPECT_EQ(grasper.hand.shape, tool::find_tool_kind("grasper")->shape);
-  EXPECT_EQ(hook.hand.shape, tool::find_tool_kind("hook")->shape);
+  EXPECT_EQ(grasper.hand.shape, tool::find_instrument("grasper")->shape);
+  EXPECT_EQ(hook.hand.shape, tool::find_instrument("hook")->shape);
   EXPECT_TRUE(has(grasper, tool::Verb::Grasp));
   EXPECT_TRUE(has(hook, tool::Verb::Grasp));
   EXPECT_EQ(grasper.cuts + hook.cuts, 0);
   std::printf("grasper %.2f N, hook %.2f N\n", grasper.greatest_n, hook.greatest_n);
   const auto limit_n = [](const char* kind) {
-    return static_cast<double>(tool::find_tool_kind(kind)->shape.grip_n);
+    return static_cast<double>(tool::find_instrument(kind)->shape.grip_n);
   };
   EXPECT_LE(hook.greatest_n, 1.05 * limit_n("hook")) << "it slips";
   EXPECT_GT(grasper.greatest_n, limit_n("hook")) << "it holds";
@@ -136,7 +136,7 @@ TEST_F(Instruments, JawsGraspAndHoldAsMuchAsTheirOwn) {
 TEST_F(Instruments, AScalpelCutsByItsEdge) {
   const auto scalpel = use(
       "scalpel", {{2, 0, 10, 0}, {2.5, 0, 10, 1}, {4, 0, -10, 1}, {6, 25, -10, 1}, {7, 25, 15, 1}});
-  EXPECT_EQ(scalpel.hand.shape, tool::find_tool_kind("scalpel")->shape);
+  EXPECT_EQ(scalpel.hand.shape, tool::find_instrument("scalpel")->shape);
   EXPECT_TRUE(has(scalpel, tool::Verb::Cut));
   EXPECT_FALSE(has(scalpel, tool::Verb::Grasp));
   EXPECT_GT(scalpel.cuts, 0);

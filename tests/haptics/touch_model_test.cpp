@@ -6,7 +6,7 @@
 
 #include <cmath>
 
-#include "common/tool/tool_kind.h"
+#include "common/tool/instrument.h"
 
 namespace trocar::haptics {
 namespace {
@@ -446,7 +446,7 @@ TEST_F(Touch, AToolThatIsStoppedTeachesNothing) {
 // Instruments feel different already before the server has said anything about them.
 TEST(Instruments, AWideTipIsStifferThanAThinOne) {
   const auto force_n = [](std::string_view kind) {
-    TouchModel model(tool::find_tool_kind(kind)->shape);
+    TouchModel model(tool::find_instrument(kind)->shape);
     model.take(law_of(1));
     wire::HapticPatch patch;
     patch.plane_normal = {0, 1, 0};

@@ -26,15 +26,21 @@ hands::ToolInput sample_of(std::uint8_t tool, float tag) {
   return input;
 }
 
-// Tenants by their tag, and the newest sample of each tool since its tenant came.
+// Tenants by their tag, the newest change of each tool, and the newest sample since that.
 struct Model {
   std::map<int, float> tenants;
-  std::map<int, float> samples;
+  std::map<int, float> changes, samples;
 
+  void change(int tool, float tag) {
+    changes[tool] = tag;
+    samples.erase(tool);
+  }
   void leave(int slot) {
     tenants.erase(slot);
-    samples.erase(slot * kToolsPerHand);
-    samples.erase(slot * kToolsPerHand + 1);
+    for (int tool = slot * kToolsPerHand; tool < (slot + 1) * kToolsPerHand; ++tool) {
+      changes.erase(tool);
+      samples.erase(tool);
+    }
   }
   bool operator==(const Model&) const = default;
 };
@@ -56,6 +62,10 @@ TEST(Inbox, a_tick_sees_the_same_as_one_who_saw_every_item) {
         } else if (random() % 4 == 0) {
           inbox.push_leave({slot});
           truth.leave(slot);
+        } else if (random() % 4 == 0) {
+          const auto tool = static_cast<std::uint8_t>(slot * kToolsPerHand + random() % 2);
+          ASSERT_TRUE(inbox.try_push_change({{tool}, {.radius_m = tag}}));
+          truth.change(tool, tag);
         } else {
           const auto tool = static_cast<std::uint8_t>(slot * kToolsPerHand + random() % 2);
           inbox.push_sample(sample_of(tool, tag));
@@ -63,7 +73,7 @@ TEST(Inbox, a_tick_sees_the_same_as_one_who_saw_every_item) {
         }
       }
       inbox.drain(inputs);
-      std::set<int> left, joined, sampled;
+      std::set<int> left, joined, changed, sampled;
       for (const auto slot : inputs.leaves) {
         ASSERT_TRUE(left.insert(slot.value).second) << "twice in one tick";
         ASSERT_TRUE(admitted.tenants.contains(slot.value)) << "a leave of nobody";
@@ -73,6 +83,10 @@ TEST(Inbox, a_tick_sees_the_same_as_one_who_saw_every_item) {
         ASSERT_TRUE(joined.insert(join.slot.value).second);
         ASSERT_FALSE(admitted.tenants.contains(join.slot.value)) << "a join into a taken slot";
         admitted.tenants[join.slot.value] = join.shapes[0].radius_m;
+      }
+      for (const auto& change : inputs.changes) {
+        ASSERT_TRUE(changed.insert(change.tool.value).second);
+        admitted.change(change.tool.value, change.shape.radius_m);
       }
       for (const auto& sample : inputs.samples) {
         ASSERT_TRUE(sampled.insert(sample.tool.value).second);

@@ -241,6 +241,15 @@ Pose RandomSession::pose_at(const Hand& hand, Tick now, tool::Verb& verb) const 
   return {from.pose.position + (to.pose.position - from.pose.position) * t, to.pose.orientation};
 }
 
+tool::ToolShape RandomSession::random_edge() {
+  constexpr std::array kForms{tool::Form::Scissors, tool::Form::Hook, tool::Form::Scalpel};
+  return {.radius_m = 0.0015f,
+          .length_m = 0.2f,
+          .reach_m = 0.008f,
+          .edge_m = static_cast<float>(random_.between(0.004, 0.045)),
+          .form = kForms[random_.below(kForms.size())]};
+}
+
 void RandomSession::make_inputs() {
   const Tick now = simulation_.current_tick() + 1;
   inputs_.clear();
@@ -266,6 +275,8 @@ void RandomSession::make_inputs() {
       hand.is_present = false;
       continue;
     }
+    if (hand.work == Work::Scalpel && random_.below(3000) == 0)
+      inputs_.changes.push_back({tool_slot({i}, 0), random_edge()});
     if (hand.keys.empty() || hand.keys.back().tick < now) plan(hand, now);
     if ((now + i) % 4 != 0) continue;
     tool::Verb verb = tool::Verb::None;

@@ -79,6 +79,7 @@ class RandomSession {
     Tick tick = 0, until = 0;
   };
 
+  tool::ToolShape random_edge();
   void make_inputs();
   void plan(Hand& hand, Tick now);
   Pose pose_at(const Hand& hand, Tick now, tool::Verb& verb) const;

@@ -102,6 +102,36 @@ TEST_F(Blades, WorkersDoNotChangeTheHash) {
   }
 }
 
+// A blade may cut tissue that sleeps, before any step has been solved since it was read.
+TEST_F(Blades, CutTissueThatWasReadAsleep) {
+  using enum material::ElasticLaw;
+  for (const auto& [law, is_averaged] : {std::pair{Springs, false},
+                                         {NeoHookean, false},
+                                         {NeoHookean, true},
+                                         {Measured, false},
+                                         {Measured, true}}) {
+    auto organ = liver(law, is_averaged);
+    organ.material.tension = 0;
+    Simulation a(organ), b(organ);
+    std::uint32_t awake = 1;
+    for (int i = 0; i < 300; ++i) awake = a.tick({}, {}).near.active_nodes;
+    ASSERT_EQ(awake, 0u);
+    Bytes snapshot;
+    a.write_snapshot(snapshot);
+    ASSERT_TRUE(b.restore_snapshot(snapshot).ok());
+    double opened = 0;
+    for (int i = 0; i < 400; ++i) {
+      hands::TickInputs inputs;
+      if (i == 0) inputs.joins.push_back({.slot = {0}, .shapes = {{{.radius_m = 0.002f}}}});
+      add_blades(a, inputs);
+      const auto report = a.tick(inputs, {});
+      opened += report.cut.opened_area_m2;
+      ASSERT_EQ(b.tick(inputs, {}).state_hash, report.state_hash) << "tick " << i;
+    }
+    EXPECT_GT(opened, 0);
+  }
+}
+
 TEST_F(Blades, ARestoredStateGoesOnBitForBit) {
   using enum material::ElasticLaw;
   for (const auto& [law, is_averaged] : {std::pair{Springs, false},

@@ -28,12 +28,15 @@ BytesView input_view(std::size_t bytes) {
   return BytesView(input_bytes).first(std::min(bytes, input_bytes.size()));
 }
 
-tool::ToolShape form_of(float radius_m, float length_m, float half_width_m) {
-  tool::ToolShape form;
-  form.radius_m = radius_m;
-  form.length_m = length_m;
-  form.half_width_m = half_width_m;
-  return form;
+tool::ToolShape shape_of(float radius_m, float length_m, float half_width_m, float edge_m,
+                         std::uint32_t form) {
+  tool::ToolShape shape;
+  shape.radius_m = radius_m;
+  shape.length_m = length_m;
+  shape.half_width_m = half_width_m;
+  shape.edge_m = edge_m;
+  shape.form = static_cast<tool::Form>(form);
+  return shape;
 }
 
 shape::Colour colour_of(std::uint32_t rgb) {
@@ -166,12 +169,29 @@ TROCAR_EXPORT(attach) const float* trocar_attach(float x, float y, float z) {
 
 // Colours are 0xrrggbb; each of the three gives a place of MeshVertex, mesh_vertices() how many.
 TROCAR_EXPORT(make_tool)
-const void* trocar_make_tool(float radius_m, float length_m, float half_width_m,
-                             std::uint32_t colour) {
-  return hand_out(model().make_tool(form_of(radius_m, length_m, half_width_m), colour_of(colour)));
+const void* trocar_make_tool(float radius_m, float length_m, float half_width_m, float edge_m,
+                             std::uint32_t form, std::uint32_t colour) {
+  return hand_out(model().make_tool(shape_of(radius_m, length_m, half_width_m, edge_m, form),
+                                    colour_of(colour)));
 }
-TROCAR_EXPORT(make_jaw) const void* trocar_make_jaw(float radius_m, float length_m) {
-  return hand_out(model().make_jaw(form_of(radius_m, length_m, 0)));
+// These are of the tool that was made last: what moves about its hinge, and how far that is from
+// the tip, m.
+TROCAR_EXPORT(jaw) const void* trocar_jaw() {
+  return hand_out(model().jaw());
+}
+TROCAR_EXPORT(hinge) float trocar_hinge() {
+  return model().hinge_m();
+}
+// See shape::jaw_motion.
+TROCAR_EXPORT(jaw_opening)
+float trocar_jaw_opening(std::uint32_t form, std::uint32_t verb, bool has_claim) {
+  return shape::jaw_motion(static_cast<tool::Form>(form), static_cast<tool::Verb>(verb), has_claim)
+      .opening;
+}
+TROCAR_EXPORT(jaw_seconds)
+float trocar_jaw_seconds(std::uint32_t form, std::uint32_t verb, bool has_claim) {
+  return shape::jaw_motion(static_cast<tool::Form>(form), static_cast<tool::Verb>(verb), has_claim)
+      .seconds;
 }
 TROCAR_EXPORT(make_arrow)
 const void* trocar_make_arrow(float length_m, float radius_m, std::uint32_t colour) {
@@ -179,9 +199,6 @@ const void* trocar_make_arrow(float length_m, float radius_m, std::uint32_t colo
 }
 TROCAR_EXPORT(mesh_vertices) std::size_t trocar_mesh_vertices() {
   return mesh_count;
-}
-TROCAR_EXPORT(jaw_length) float trocar_jaw_length(float radius_m) {
-  return shape::jaw_length(form_of(radius_m, 0.3f, 0));
 }
 TROCAR_EXPORT(slot_colour) std::uint32_t trocar_slot_colour(int slot) {
   const auto colour = shape::colour_of_slot(slot < 0 ? 0 : slot);

@@ -229,14 +229,10 @@ bool PageModel::update(double now_ms, std::size_t triangle_budget, Overlay overl
   return true;
 }
 
-const shape::MeshVertices& PageModel::make_tool(const tool::ToolShape& form, shape::Colour colour) {
-  mesh_ = form.half_width_m > 0 ? shape::make_blade(form, colour) : shape::make_shaft(form, colour);
-  return mesh_;
-}
-
-const shape::MeshVertices& PageModel::make_jaw(const tool::ToolShape& form) {
-  mesh_ = shape::make_jaw(form);
-  return mesh_;
+const shape::MeshVertices& PageModel::make_tool(const tool::ToolShape& shape,
+                                                shape::Colour colour) {
+  instrument_ = shape::make_instrument(shape, colour);
+  return instrument_.body;
 }
 
 const shape::MeshVertices& PageModel::make_arrow(float length, float radius, shape::Colour colour) {

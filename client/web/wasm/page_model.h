@@ -18,6 +18,7 @@
 #include "client/replica/held_tissue.h"
 #include "client/replica/interpolated_surface.h"
 #include "client/replica/replica.h"
+#include "client/shape/instrument_mesh.h"
 #include "client/shape/ribbon.h"
 #include "client/shape/smooth_surface.h"
 #include "client/shape/tool_mesh.h"
@@ -86,8 +87,10 @@ class PageModel {
   const float* attach(const Vec3f& place);
 
   // Vertices of a tool that is drawn in one piece (a blade), or of its shaft and one jaw.
-  const shape::MeshVertices& make_tool(const tool::ToolShape& form, shape::Colour colour);
-  const shape::MeshVertices& make_jaw(const tool::ToolShape& form);
+  const shape::MeshVertices& make_tool(const tool::ToolShape& shape, shape::Colour colour);
+  // Returns that of the tool that was made last.
+  const shape::MeshVertices& jaw() const { return instrument_.jaw; }
+  float hinge_m() const { return instrument_.hinge_m; }
   const shape::MeshVertices& make_arrow(float length, float radius, shape::Colour colour);
 
  private:
@@ -113,6 +116,7 @@ class PageModel {
   std::vector<shape::RibbonPoint> ribbon_;
   std::array<float, 3> attached_{};
   shape::MeshVertices mesh_, drawing_;
+  shape::InstrumentMesh instrument_;
   Bytes outbox_;
   std::string error_;
 };

@@ -25,6 +25,13 @@ void SimulationInbox::push_leave(ParticipantSlot slot) {
   --joined_hands_;
 }
 
+bool SimulationInbox::try_push_change(const hands::ToolChange& change) {
+  TROCAR_ASSERT(change.tool.is_valid());
+  if (pending_.load(std::memory_order_acquire) >= kCapacity - kReservedForJoins) return false;
+  push(change);
+  return true;
+}
+
 void SimulationInbox::push_sample(const hands::ToolInput& input) {
   TROCAR_ASSERT(input.tool.is_valid());
   if (pending_.load(std::memory_order_acquire) >= kCapacity - kReservedForJoins) {
@@ -50,10 +57,16 @@ void SimulationInbox::drain(hands::TickInputs& inputs) {
         change.join.reset();
       else
         change.leaves = true;
-      for (int number = 0; number < kToolsPerHand; ++number)
-        samples_[tool_slot(*slot, number).value].reset();
+      for (int number = 0; number < kToolsPerHand; ++number) {
+        const auto tool = tool_slot(*slot, number).value;
+        tool_changes_[tool].reset();
+        samples_[tool].reset();
+      }
     } else if (const auto* join = std::get_if<hands::HandJoin>(&*item)) {
       changes_[join->slot.value].join = *join;
+    } else if (const auto* tool = std::get_if<hands::ToolChange>(&*item)) {
+      tool_changes_[tool->tool.value] = *tool;
+      samples_[tool->tool.value].reset();
     } else if (const auto* input = std::get_if<hands::ToolInput>(&*item)) {
       samples_[input->tool.value] = *input;
     }
@@ -65,6 +78,8 @@ void SimulationInbox::drain(hands::TickInputs& inputs) {
     change = {};
   }
   for (std::uint8_t tool = 0; tool < kMaxTools; ++tool) {
+    if (tool_changes_[tool]) inputs.changes.push_back(*tool_changes_[tool]);
+    tool_changes_[tool].reset();
     if (samples_[tool]) inputs.samples.push_back(*samples_[tool]);
     samples_[tool].reset();
   }

@@ -2,13 +2,13 @@
 
 // The way of inputs from the I/O thread into the simulation: a bounded queue without locks.
 //
-//   I/O thread: try_push_join / push_leave / push_sample --> [1024] --> drain: simulation thread
+//   I/O thread: try_push_join, push_leave, try_push_change, push_sample --> [1024] --> drain
 //
 // When full: samples are dropped and counted (the next one of that tool replaces it anyway). Joins
 // and leaves have reserved room: a join is taken only if there is also room for everybody present
 // to leave, so a leave always fits. drain() gives one tick's inputs in the order a tick admits them
-// (leaves, joins, samples): only the newest sample of each tool, and none that an earlier tenant of
-// a slot left behind. So a new tenant never starts with somebody else's pose.
+// (leaves, joins, changes, samples): only the newest sample and change of each tool, and none that
+// an earlier tenant of a slot left behind. So a new tenant never starts with somebody else's pose.
 
 #include <array>
 #include <atomic>
@@ -35,6 +35,8 @@ class SimulationInbox {
   [[nodiscard]] bool try_push_join(const hands::HandJoin& join);  // false: no room, refuse the join
   void push_leave(ParticipantSlot slot);                          // of a slot that has joined
   void note_hand() { ++joined_hands_; }  // that the simulation has from the start
+  // Samples before it are of the instrument before. False: no room.
+  [[nodiscard]] bool try_push_change(const hands::ToolChange& change);
   void push_sample(const hands::ToolInput& input);
   // If two marks arrive before a drain, the newer one counts.
   void push_mark(hands::MarkAction action) { mark_.store(action, std::memory_order_relaxed); }
@@ -44,7 +46,8 @@ class SimulationInbox {
   void drain(hands::TickInputs& inputs);
 
  private:
-  using Item = std::variant<std::monostate, ParticipantSlot, hands::HandJoin, hands::ToolInput>;
+  using Item = std::variant<std::monostate, ParticipantSlot, hands::HandJoin, hands::ToolChange,
+                            hands::ToolInput>;
 
   void push(Item item);
 
@@ -60,6 +63,7 @@ class SimulationInbox {
     std::optional<hands::HandJoin> join;
   };
   std::array<SlotChange, kMaxHands> changes_;
+  std::array<std::optional<hands::ToolChange>, kMaxTools> tool_changes_;
   std::array<std::optional<hands::ToolInput>, kMaxTools> samples_;
 };
 

@@ -30,6 +30,29 @@ Roster::Roster(const std::vector<Participant>& present) {
     if (participant.slot.is_valid()) slots_[participant.slot.value] = participant;
 }
 
+Status Roster::check_shape(const tool::ToolShape& shape) const {
+  if (!tool::is_valid(shape))
+    return Error{ErrorCode::Refused,
+                 "tools: a radius is 0.5 to 50 mm, a length 10 to 1000 mm, a reach 1 to 50 mm, an "
+                 "edge_m 1 to 200 mm or 0, a grip_n 0.1 to 100 or 0"};
+  if (shape.edge_m * 1e3f > places_.longest_edge_mm)
+    return Error{ErrorCode::Refused,
+                 "tools: edge_m is " + print_mm(shape.edge_m * 1e3f) + " mm, longer than the " +
+                     print_mm(places_.longest_edge_mm) +
+                     " mm that this session allows: take a shorter blade, or start the server "
+                     "with a longer --longest-edge"};
+  return {};
+}
+
+Status Roster::change_tool(ParticipantSlot slot, std::size_t number, const tool::ToolShape& shape) {
+  auto& who = slots_[slot.value];
+  if (!who || number >= who->tools.size())
+    return Error{ErrorCode::Refused, "tools: there is no tool " + std::to_string(number)};
+  if (auto checked = check_shape(shape); !checked) return checked;
+  who->tools[number] = shape;
+  return {};
+}
+
 Result<Participant> Roster::join(std::string_view name, Role role,
                                  std::vector<tool::ToolShape> tools, JoinRefusal& refusal) {
   const auto refuse = [&refusal](JoinRefusal why, std::string message) {
@@ -44,18 +67,9 @@ Result<Participant> Roster::join(std::string_view name, Role role,
     return refuse(JoinRefusal::ToolsInvalid, "tools: " + std::to_string(tools.size()) +
                                                  " are too many, at most " +
                                                  std::to_string(places_.tools));
-  for (const auto& shape : tools) {
-    if (!tool::is_valid(shape))
-      return refuse(JoinRefusal::ToolsInvalid,
-                    "tools: a radius is 0.5 to 50 mm, a length 10 to 1000 mm, a reach 1 to 50 mm, "
-                    "an edge_m 1 to 200 mm");
-    if (shape.edge_m * 1e3f > places_.longest_edge_mm)
-      return refuse(JoinRefusal::ToolsInvalid,
-                    "tools: edge_m is " + print_mm(shape.edge_m * 1e3f) + " mm, longer than the " +
-                        print_mm(places_.longest_edge_mm) +
-                        " mm that this session allows: take a shorter blade, or start the server "
-                        "with a longer --longest-edge");
-  }
+  for (const auto& shape : tools)
+    if (auto checked = check_shape(shape); !checked)
+      return refuse(JoinRefusal::ToolsInvalid, checked.error().message);
   if (const auto* other = find(name))
     return refuse(
         JoinRefusal::NameTaken,

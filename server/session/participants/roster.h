@@ -56,6 +56,8 @@ class Roster {
   // none gets one default tool; a role without tools may not bring any.
   Result<Participant> join(std::string_view name, Role role, std::vector<tool::ToolShape> tools,
                            JoinRefusal& refusal);
+  // The participant takes this instrument; an error: no such tool, or the shape may not be here.
+  Status change_tool(ParticipantSlot slot, std::size_t number, const tool::ToolShape& shape);
   // Somebody who had this place at a server before.
   void restore(Participant who);
   void leave(ParticipantSlot slot);
@@ -71,6 +73,8 @@ class Roster {
   std::vector<Participant> list() const;  // by slot
 
  private:
+  Status check_shape(const tool::ToolShape& shape) const;
+
   Places places_;
   std::array<std::optional<Participant>, kMaxParticipants> slots_;
 };

@@ -63,6 +63,11 @@ void to_message(const step::TickRecord& record, const step::TickDecisions* previ
       wire::write(shape, *entry.add_tool());
     }
   }
+  for (const auto& change : record.inputs.changes) {
+    auto& entry = *message.add_change();
+    entry.set_tool(change.tool.value);
+    wire::write(change.shape, *entry.mutable_shape());
+  }
   for (const auto& sample : record.inputs.samples) {
     auto& entry = *message.add_sample();
     entry.set_tool(sample.tool.value);
@@ -127,6 +132,12 @@ Status from_message(const proto::TickRecord& message, step::TickRecord& record) 
       if (!tool::is_valid(shape)) return bad(record.tick, "join: a tool has an impossible shape");
     }
     record.inputs.joins.push_back(join);
+  }
+  for (const auto& entry : message.change()) {
+    if (entry.tool() >= kMaxTools) return bad(record.tick, "change: tool out of range");
+    const auto shape = wire::read(entry.shape());
+    if (!tool::is_valid(shape)) return bad(record.tick, "change: a tool has an impossible shape");
+    record.inputs.changes.push_back({{static_cast<std::uint8_t>(entry.tool())}, shape});
   }
   for (const auto& entry : message.sample()) {
     hands::ToolInput input{.tool = {static_cast<std::uint8_t>(entry.tool())}};

@@ -191,8 +191,9 @@ std::string describe(const hands::ClaimEvent& event, const participants::Roster&
     case hands::ClaimOutcome::TakenOver:
       return who + " was silent: " + holder + " took over";
     case hands::ClaimOutcome::Expired:
+      if (!is_grasp) return who + " was silent: the " + (is_cut ? "cut" : "push") + " has ended";
       return who + " was silent for " + std::to_string(hands::kAbandonTicks / kTicksPerSecond) +
-             (is_grasp ? " s: the grasp was let go" : " s: the claim has ended");
+             " s: the grasp was let go";
     case hands::ClaimOutcome::Slipped:
       return who + " lost the grasp: the tissue was pulled out of the jaws";
   }

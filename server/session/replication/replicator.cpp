@@ -216,6 +216,8 @@ std::optional<Replicator::Ending> Replicator::handle_message(Client& client, Byt
       return admit(client, envelope.hello());
     case proto::Envelope::kToolSample:
       return handle_sample(client, envelope.tool_sample(), !client.has_sent_datagrams);
+    case proto::Envelope::kToolChange:
+      return handle_tool_change(client, envelope.tool_change());
     case proto::Envelope::kHandReport:
       return handle_hand_report(client, envelope.hand_report());
     case proto::Envelope::kFrameAck:
@@ -354,57 +356,6 @@ std::optional<Replicator::Ending> Replicator::welcome(Client& client) {
       if (!send(client, encode_haptic_law(law))) return too_slow;
   // The others; the newcomer has it already, a second copy does no harm.
   participants_changed_ = true;
-  return std::nullopt;
-}
-
-std::optional<Replicator::Ending> Replicator::handle_sample(Client& client,
-                                                            const proto::ToolSample& sample,
-                                                            bool is_ordered) {
-  const auto& participant = *client.participant;
-  if (!wire::rights_of(participant.role).has_tools)
-    return Ending{EndReason::Role,
-                  "ToolSample: an " + text_of_role(participant.role) + " watches and has no tools"};
-  const auto checked = check_tool_sample(sample, participant.tools.size());
-  if (!checked) return Ending{EndReason::ProtocolError, checked.error().message};
-  auto& last = client.last_sequence[static_cast<std::size_t>(checked->tool)];
-  if (last && checked->sequence <= *last && !is_ordered) return std::nullopt;  // seen, or too late
-  if (last && checked->sequence <= *last)
-    return Ending{EndReason::ProtocolError,
-                  "ToolSample.sequence: " + std::to_string(checked->sequence) + " after " +
-                      std::to_string(*last) + ", it must grow"};
-  last = checked->sequence;
-  ++counters_.samples;
-  const hands::ToolInput wanted{tool_slot(participant.slot, checked->tool), checked->sample,
-                                checked->client_time_us};
-  if (const auto given = held_tools_.apply(wanted, options_.clock_ns())) inbox_.push_sample(*given);
-  return std::nullopt;
-}
-
-std::optional<Replicator::Ending> Replicator::handle_hand_report(Client& client,
-                                                                 const proto::HandReport& message) {
-  const auto& participant = *client.participant;
-  if (!wire::rights_of(participant.role).has_tools)
-    return Ending{EndReason::Role,
-                  "HandReport: an " + text_of_role(participant.role) + " watches and has no hands"};
-  auto report = check_hand_report(message, participant.tools.size());
-  if (!report) return Ending{EndReason::ProtocolError, report.error().message};
-  const auto moments = static_cast<double>(report->moments.size());
-  if (!client.hand_moments.take(moments, options_.clock_ns())) {
-    ++counters_.floods;
-    return Ending{EndReason::ProtocolError,
-                  "HandReport: more than " + std::to_string(options_.max_hand_moments_per_second) +
-                      " moments in a second: send one per frame"};
-  }
-  ++counters_.hand_reports;
-  if (!options_.on_hand_report) return std::nullopt;
-  wire::HandRecord record{.tool = tool_slot(participant.slot, report->tool),
-                          .report = std::move(*report)};
-  if (const auto& frame = encoder_.current()) {
-    record.tick = frame->tick;
-    const auto shown = std::ranges::find(frame->tools, record.tool, &step::ToolFrame::tool);
-    if (shown != frame->tools.end()) record.echo_time_us = shown->touch.echo_time_us;
-  }
-  options_.on_hand_report(std::move(record));
   return std::nullopt;
 }
 

@@ -67,6 +67,7 @@ class PointRequest;
 class StrokeRequest;
 class TeachEvent;
 class TeachRequest;
+class ToolChange;
 class ToolSample;
 class ViewRequest;
 }  // namespace trocar::proto
@@ -157,6 +158,7 @@ class Replicator final : public net::ConnectionHandler {
   std::optional<Ending> handle_hand_report(Client& client, const proto::HandReport& report);
   std::optional<Ending> handle_mark(Client& client, int action);
   void handle_ghost_request(Client& client, bool is_wanted);
+  std::optional<Ending> handle_tool_change(Client& client, const proto::ToolChange& change);
   std::optional<Ending> handle_point(Client& client, const proto::PointRequest& request);
   std::optional<Ending> handle_stroke(Client& client, const proto::StrokeRequest& request);
   std::optional<Ending> handle_view(Client& client, const proto::ViewRequest& request);

@@ -18,7 +18,8 @@ struct Replicator::Client {
         bytes(options.max_bytes_per_second, options.clock_ns()),
         hand_moments(options.max_hand_moments_per_second, options.clock_ns()),
         sayings(1, options.clock_ns()),
-        strokes(10, options.clock_ns()) {}
+        strokes(10, options.clock_ns()),
+        changes(5, options.clock_ns()) {}
 
   const net::ConnectionId id;
   access::Applicant applicant;                           // with the name of its Hello
@@ -30,7 +31,7 @@ struct Replicator::Client {
   std::uint64_t pointed_ns = 0;  // when it pointed last; 0: it does not
   std::uint64_t viewed_ns = 0;   // when it said last where its view is
   std::array<std::optional<std::uint32_t>, kToolsPerHand> last_sequence;
-  Allowance messages, bytes, hand_moments, sayings, strokes;  // that it may send
+  Allowance messages, bytes, hand_moments, sayings, strokes, changes;  // that it may send
 };
 
 }  // namespace trocar::replication

@@ -11,10 +11,6 @@ constexpr float kStop_n_m = 500, kMostStop_n = 10;
 // In a tick, of either end of an edge: 5 m/s.
 constexpr float kFastest_m = 0.005f;
 
-EdgeEnds ends_of(const hands::Tool& tool) {
-  return {tool.pose.position, tool.pose.apply({0, 0, tool.shape.edge_m})};
-}
-
 }  // namespace
 
 bool BladeTable::has_jumped(const Blade& blade, const EdgeEnds& ends) {
@@ -34,12 +30,12 @@ std::uint32_t BladeTable::begin_tick(const hands::ToolTable& tools, const hands:
     const bool is_at_work = tool.has_sample && claim.verb == tool::Verb::Cut &&
                             (is_held || claim.phase == hands::ClaimPhase::Wanted);
     if (!is_at_work && !blade.is_at_work) continue;
-    const bool is_cutting = is_at_work && is_held && can_cut;
+    const bool is_cutting = is_at_work && is_held && can_cut && hands::can_cut(tool);
     const bool is_stopped =
         is_at_work && !is_held && claim.last_refusal == hands::ClaimOutcome::RefusedHeld;
-    const bool is_new = !blade.is_at_work || has_jumped(blade, ends_of(tool));
+    const bool is_new = !blade.is_at_work || has_jumped(blade, hands::edge_of(tool));
     if (blade.is_cutting && (!is_cutting || is_new)) lifted |= 1u << i;
-    if (!is_at_work || is_new) blade = {.edge = EdgeForce(ends_of(tool))};
+    if (!is_at_work || is_new) blade = {.edge = EdgeForce(hands::edge_of(tool))};
     if (is_stopped && !blade.is_stopped) {
       blade.stop = blade.edge.ends()[0];
       blade.ahead = blade.edge.direction();
@@ -57,12 +53,16 @@ void BladeTable::end_tick(const hands::ToolTable& tools,
   for (std::uint8_t i = 0; i < kMaxTools; ++i) {
     Blade& blade = blades_[i];
     if (!blade.is_at_work) continue;
-    const auto ends = ends_of(tools[ToolSlot{i}]);
+    const auto ends = hands::edge_of(tools[ToolSlot{i}]);
     if (blade.is_stopped) {
       blade.edge.rest(ends);
       blade.felt = {.force_n = stop_n(blade)};
+    } else if (tools[ToolSlot{i}].shape.form == tool::Form::Scissors) {
+      blade.edge.rest(ends);
+      blade.felt = {};
     } else {
-      blade.felt = blade.edge.move(ends, wounds[i].energy_j, wounds[i].h_m);
+      const float share = hands_share(tools[ToolSlot{i}].shape.form);
+      blade.felt = blade.edge.move(ends, share * wounds[i].energy_j, wounds[i].h_m);
     }
   }
 }

@@ -3,7 +3,8 @@
 // The blades of a session: which of them cut in this tick, and what hands feel of them.
 //
 // A blade cuts while its claim is held, and feels what edge_force.h says. Where a claim is refused
-// the blade is stopped: a hand that goes on feels a spring from there, which lets it back.
+// the blade is stopped: a hand that goes on feels a spring from there, which lets it back. Of
+// scissors a hand feels nothing: what they cut, their closing works for.
 
 #include <array>
 
@@ -20,6 +21,11 @@ struct Blade {
   Vec3f stop, ahead;  // stopped: where the tip was, and towards what, of length 1 or 0
   Wrench felt;
 };
+
+// The hand does this part of the work that opens a wound; an energised edge burns its way.
+inline float hands_share(tool::Form form) {
+  return form == tool::Form::Hook ? 0.1f : 1.0f;
+}
 
 // The wound that a blade has opened in a tick.
 struct BladeWound {

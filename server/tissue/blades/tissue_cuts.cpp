@@ -53,10 +53,8 @@ std::optional<topology::Edit> TissueCuts::cut(const hands::ToolTable& tools,
   for (std::uint8_t i = 0; i < kMaxTools; ++i) {
     if ((lifted >> i & 1) != 0) cutter_->lift(i);
     if (!blades_[ToolSlot{i}].is_cutting) continue;
-    const auto& tool = tools[ToolSlot{i}];
-    const std::array<Vec3d, 2> edge{to_double(tool.pose.position),
-                                    to_double(tool.pose.apply({0, 0, tool.shape.edge_m}))};
-    cutter_->move(i, edge);
+    const auto edge = hands::edge_of(tools[ToolSlot{i}]);
+    cutter_->move(i, std::array{to_double(edge[0]), to_double(edge[1])});
   }
   look_at_edges(tools, world, travel_m);
   cutter_->cut(world.displacements, output_, travel_m);
@@ -81,13 +79,14 @@ void TissueCuts::look_at_edges(const hands::ToolTable& tools, const world::World
   for (std::uint8_t i = 0; i < kMaxTools; ++i) {
     const ToolSlot slot{i};
     if (!blades_[slot].is_cutting || (world.tick + i) % EdgeForce::kLookEvery != 0) continue;
-    const auto& pose = tools[slot].pose;
     const auto& shape = tools[slot].shape;
     const auto breadth = 2 * static_cast<double>(shape.radius_m + shape.half_width_m);
-    blades_.look(slot,
-                 cutter_->resistance_of(world.displacements, travel_m, to_double(pose.position),
-                                        to_double(pose.apply({0, 0, shape.edge_m}))),
-                 2 * breadth);
+    const auto edge = hands::edge_of(tools[slot]);
+    auto resistance = cutter_->resistance_of(world.displacements, travel_m, to_double(edge[0]),
+                                             to_double(edge[1]));
+    for (auto& cut_n : resistance.cut_n) cut_n *= static_cast<double>(hands_share(shape.form));
+    resistance.whole_cut_n *= static_cast<double>(hands_share(shape.form));
+    blades_.look(slot, resistance, 2 * breadth);
   }
 }
 

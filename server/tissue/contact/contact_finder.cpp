@@ -270,8 +270,10 @@ void ContactFinder::update(const topology::SurfaceEdit& edit, const world::World
 
 const ContactFinder::Nearby& ContactFinder::look_near(const world::World& world, ToolSlot slot) {
   Nearby& nearby = nearby_[slot.value];
-  if (!nearby.is_known || nearer_by(nearby) > nearby.slack) {
+  const bool is_other_tool = nearby.radius_m != path_.front().radius;
+  if (!nearby.is_known || is_other_tool || nearer_by(nearby) > nearby.slack) {
     nearby.is_known = true;
+    nearby.radius_m = path_.front().radius;
     nearby.corners = path_.front().core_corners();
     nearby.surface_travel = surface_travel_;
     nearby.slack = kSlack_m + nearer_by(nearby);
@@ -465,7 +467,7 @@ void ContactFinder::find_reach(const ContactScene& scene, ToolSlot slot, Contact
   const auto& tool = scene.tools[slot];
   const bool cuts = tool.verb == trocar::tool::Verb::Cut;
   const float reach = cuts ? kCutCore_m : tool.shape.reach_m;
-  const Vec3f edge = cuts ? rotate(tool.pose.orientation, {0, 0, tool.shape.edge_m}) : Vec3f{};
+  const Vec3f edge = cuts ? hands::cut_line_of(tool) : Vec3f{};
   const float edge_squared = std::max(length_squared(edge), 1e-12f);
   Box box;
   box.include(tool.pose.position);

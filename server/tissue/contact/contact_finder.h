@@ -91,6 +91,7 @@ class ContactFinder {
   // The list holds what a tool can meet while nothing has come nearer to it by more than the slack.
   struct Nearby {
     bool is_known = false;
+    float radius_m = 0;  // of the tool
     std::array<Vec3f, 4> corners;
     float slack = 0;
     double surface_travel = 0;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "common/base/assert.h"
+#include "common/base/tick.h"
 #include "server/tissue/dynamics/psi.h"
 #include "server/tissue/topology/tet_shape.h"
 
@@ -201,8 +202,27 @@ void Relaxation::settle(const Float4* x, world::RelaxationState& state) {
   is_stale_ = true;
 }
 
+void Relaxation::begin_all(const world::RelaxationState& state, unsigned w, unsigned count) {
+  const auto of_worker = [&](std::size_t n, auto&& task) {
+    for (auto i = n * w / count; i < n * (w + 1) / count; ++i) task(i);
+  };
+  of_worker(blocks_.size(), [&](std::size_t i) { begin_block(i, state.tets(), scratch_[w]); });
+  if (nodal_relaxation_)
+    of_worker(nodal_relaxation_->block_count(), [&](std::size_t i) {
+      nodal_relaxation_->begin_block(i, state.nodal(), scratch_[w]);
+    });
+}
+
 void Relaxation::refresh(const world::RelaxationState& state) {
-  TROCAR_ASSERT(terms_.dt() > 0);
+  if (is_stale_) {  // it was read while all slept, and no step has begun since
+    if (terms_.dt() == 0) set_dt(kTickSeconds);
+    scratch_.resize(std::max<std::size_t>(scratch_.size(), 1));
+    begin_all(state, 0, 1);
+    is_stale_ = false;
+    stale_.clear();
+    if (nodal_relaxation_) nodal_relaxation_->clear_stale();
+    return;
+  }
   for (const auto block : stale_) begin_block(block, state.tets(), scratch_[0]);
   stale_.clear();
   if (!nodal_relaxation_) return;
@@ -223,17 +243,7 @@ void Relaxation::begin_step(float dt, const world::RelaxationState& state, Worke
   is_stale_ = false;
   stale_.clear();
   if (nodal_relaxation_) nodal_relaxation_->clear_stale();
-  workers.run([&](unsigned w) {
-    const auto of_worker = [&](std::size_t n, auto&& task) {
-      const auto count = std::size_t{workers.count()};
-      for (auto i = n * w / count; i < n * (w + 1) / count; ++i) task(i);
-    };
-    of_worker(blocks_.size(), [&](std::size_t i) { begin_block(i, state.tets(), scratch_[w]); });
-    if (nodal_relaxation_)
-      of_worker(nodal_relaxation_->block_count(), [&](std::size_t i) {
-        nodal_relaxation_->begin_block(i, state.nodal(), scratch_[w]);
-      });
-  });
+  workers.run([&](unsigned w) { begin_all(state, w, workers.count()); });
 }
 
 void Relaxation::list_due(std::span<const GroupLanes> nodes, std::uint8_t step) {

@@ -17,6 +17,12 @@ struct HandJoin {
   std::array<tool::ToolShape, kToolsPerHand> shapes;
 };
 
+// A hand takes another instrument.
+struct ToolChange {
+  ToolSlot tool;
+  tool::ToolShape shape;
+};
+
 // An instructor may do this to the organ as a whole.
 enum class MarkAction : std::uint8_t {
   None = 0,
@@ -30,23 +36,25 @@ struct ToolInput {
   std::uint64_t client_time_us = 0;  // see hands::Tool; not recorded
 };
 
-// Admitted in this order: mark, leaves, joins, samples. Several samples of one tool: the last one
-// counts.
-// Everything is validated before (server/session/replication); the tick drops what does not fit its
-// state, such as a sample for an empty slot, and counts it.
+// Admitted in this order: mark, leaves, joins, changes, samples. Several samples of one tool: the
+// last one counts. Everything is validated before (server/session/replication); the tick drops what
+// does not fit its state, such as a sample for an empty slot, and counts it.
 struct TickInputs {
   MarkAction mark = MarkAction::None;
   std::vector<ParticipantSlot> leaves;
   std::vector<HandJoin> joins;
+  std::vector<ToolChange> changes;
   std::vector<ToolInput> samples;
 
   bool empty() const {
-    return mark == MarkAction::None && leaves.empty() && joins.empty() && samples.empty();
+    return mark == MarkAction::None && leaves.empty() && joins.empty() && changes.empty() &&
+           samples.empty();
   }
   void clear() {
     mark = MarkAction::None;
     leaves.clear();
     joins.clear();
+    changes.clear();
     samples.clear();
   }
 };

@@ -28,10 +28,25 @@ struct Tool {
   Pose target;                   // of the newest sample
   std::uint32_t steps_left = 0;  // until pose reaches target
   Tick last_sample_tick = 0;
+  float closed = 0;  // scissors: 0 open, 1 closed
   // The client's clock at `pose` and at `target`; 0: it does not say. Not state: nothing but the
   // client's own hand depends on it.
   std::uint64_t time_us = 0, target_time_us = 0;
 };
+
+// Returns where the edge of a tool that cuts is, m, world frame: its tip first, where it has one.
+// Scissors cut where their blades meet, across, as wide as they are open at the tip's side of that.
+std::array<Vec3f, 2> edge_of(const Tool& tool);
+// Returns what of a tool that cuts claims tissue, from its tip on, m: an edge, or blades' length.
+Vec3f cut_line_of(const Tool& tool);
+// Scissors that have closed cut no more until they have opened.
+inline bool can_cut(const Tool& tool) {
+  return tool.shape.form != tool::Form::Scissors || tool.closed < 1;
+}
+// Opened blades of scissors are this far apart at their tips, as a part of their length.
+inline constexpr float kScissorsOpening = 0.5f;
+// Ticks in which they close, and in which they open.
+inline constexpr float kScissorsCloseTicks = 300, kScissorsOpenTicks = 150;
 
 class ToolTable {
  public:
@@ -45,6 +60,7 @@ class ToolTable {
 
  private:
   bool admit_join(const hands::HandJoin& join, Tick tick);
+  bool admit_change(const hands::ToolChange& change, Tick tick);
   bool admit_sample(const hands::ToolInput& input, Tick tick);
 
   std::array<Tool, kMaxTools> tools_;

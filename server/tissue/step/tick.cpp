@@ -18,6 +18,11 @@ std::uint32_t admit_inputs(const hands::TickInputs& inputs, Tick tick, hands::To
       grasps.anchor(tool, tools[tool].pose);
       claims.leave(tool, tick);
     }
+  for (const auto& change : inputs.changes) {
+    if (!change.tool.is_valid()) continue;
+    grasps.anchor(change.tool, tools[change.tool].pose);
+    claims.leave(change.tool, tick);
+  }
   return tools.admit(inputs, tick);
 }
 

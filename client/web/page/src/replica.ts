@@ -37,11 +37,13 @@ interface Exports {
   pointer_colour(slot: number): number;
   drawing_at(): number;
   attach(x: number, y: number, z: number): number;
-  make_tool(radiusM: number, lengthM: number, halfWidthM: number, colour: number): number;
-  make_jaw(radiusM: number, lengthM: number): number;
+  make_tool(radiusM: number, lengthM: number, halfWidthM: number, edgeM: number, form: number, colour: number): number;
+  jaw(): number;
+  hinge(): number;
+  jaw_opening(form: number, verb: number, hasClaim: boolean): number;
+  jaw_seconds(form: number, verb: number, hasClaim: boolean): number;
   make_arrow(lengthM: number, radiusM: number, colour: number): number;
   mesh_vertices(): number;
-  jaw_length(radiusM: number): number;
   slot_colour(slot: number): number;
   noise(size: number): number;
 }
@@ -67,6 +69,8 @@ export interface Tool {
 
 export interface Pointer { participant: number; position: Vec3 } // slot; m
 
+// What an instrument looks like is made from this.
+export interface Shape { radiusM: number; lengthM: number; halfWidthM: number; edgeM: number; form: number }
 export interface Mesh { positions: Float32Array; normals: Float32Array; materials: Uint8Array }
 
 const kToolFloats = 23, kMeshBytes = 28;
@@ -171,12 +175,17 @@ export class Replica {
     return { triangle, weights: [b, c] };
   }
 
-  makeTool(radiusM: number, lengthM: number, halfWidthM: number, colour: number): Mesh {
-    return this.mesh(this.e.make_tool(radiusM, lengthM, halfWidthM, colour));
+  // The jaw moves about a line along x, `hinge` from the tip; null: nothing moves.
+  makeTool(shape: Shape, colour: number): { body: Mesh; jaw: Mesh | null; hinge: number } {
+    const body = this.mesh(this.e.make_tool(shape.radiusM, shape.lengthM, shape.halfWidthM, shape.edgeM, shape.form, colour));
+    const jaw = this.mesh(this.e.jaw());
+    return { body, jaw: jaw.materials.length > 0 ? jaw : null, hinge: this.e.hinge() };
   }
-  makeJaw(radiusM: number, lengthM: number): Mesh { return this.mesh(this.e.make_jaw(radiusM, lengthM)); }
+  // How far each jaw is opened, rad, and how many seconds it takes to get there.
+  jawMotion(form: number, verb: number, hasClaim: boolean): { opening: number; seconds: number } {
+    return { opening: this.e.jaw_opening(form, verb, hasClaim), seconds: this.e.jaw_seconds(form, verb, hasClaim) };
+  }
   makeArrow(lengthM: number, radiusM: number, colour: number): Mesh { return this.mesh(this.e.make_arrow(lengthM, radiusM, colour)); }
-  jawLength(radiusM: number): number { return this.e.jaw_length(radiusM); }
   // 0xrrggbb, of a participant.
   slotColour(slot: number): number { return this.e.slot_colour(slot) >>> 0; }
   noise(size: number): Uint8Array {

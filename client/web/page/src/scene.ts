@@ -7,9 +7,8 @@ import {
 } from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 import { lightingSource, organFragmentSource, organVertexSource, toolFragmentSource, toolVertexSource } from './gen/shaders';
-import { Overlay, Verb, type Mesh as PlainMesh, type Pointer, type Replica, type Tool, type Vec3 } from './replica';
+import { Overlay, type Mesh as PlainMesh, type Pointer, type Replica, type Shape, type Tool, type Vec3 } from './replica';
 
-export interface Shape { radiusM: number; lengthM: number; halfWidthM: number }
 export interface Label { text: string; colour: number }
 // The picture asks this for shapes and names, which it does not know.
 export interface Guide {
@@ -19,7 +18,7 @@ export interface Guide {
 }
 
 const kMetresPerNewton = 0.02, kMostArrow = 0.1, kLeastNewton = 0.05, kShadows = 8;
-const kPointerLength = 0.035, kOpenJaws = 0.34, kHoldingJaws = 0.12, kJawSeconds = 0.08, kNoise = 32;
+const kPointerLength = 0.035, kNoise = 32;
 const kSlowMs = 45, kJudged = 40; // pictures, before quality is lowered
 
 interface DrawnTool {
@@ -265,10 +264,10 @@ export class Picture {
       known.label.remove();
     }
     const colour = this.replica.slotColour(tool.slot >> 1), dim: IUniform<number> = { value: 1 }, group = new Group();
-    group.add(this.meshOf(this.replica.makeTool(shape.radiusM, shape.lengthM, shape.halfWidthM, colour), dim));
+    const { body, jaw, hinge } = this.replica.makeTool(shape, colour);
+    group.add(this.meshOf(body, dim));
     const made: DrawnTool = { group, upper: null, lower: null, opening: 0, dim, arrows: [], arrowGroup: new Group(), label: document.createElement('div'), shape: text };
-    if (shape.halfWidthM === 0) {
-      const hinge = this.replica.jawLength(shape.radiusM), jaw = this.replica.makeJaw(shape.radiusM, shape.lengthM);
+    if (jaw) {
       const hung = (isLower: boolean): Group => {
         const turned = new Group(), pivot = new Group(), mesh = this.meshOf(jaw, dim);
         turned.rotation.z = isLower ? Math.PI : 0;
@@ -302,8 +301,8 @@ export class Picture {
       drawn.group.position.set(...tool.tip);
       drawn.group.quaternion.set(...tool.orientation);
       drawn.dim.value = tool.isSilent ? 0.45 : 1;
-      const wanted = tool.verb !== Verb.Grasp ? 0 : tool.hasClaim ? kHoldingJaws : kOpenJaws;
-      drawn.opening += (wanted - drawn.opening) * (1 - Math.exp(-seconds / kJawSeconds));
+      const motion = this.replica.jawMotion(shape.form, tool.verb, tool.hasClaim);
+      drawn.opening += (motion.opening - drawn.opening) * (1 - Math.exp(-seconds / motion.seconds));
       if (drawn.upper) drawn.upper.rotation.x = drawn.opening;
       if (drawn.lower) drawn.lower.rotation.x = drawn.opening;
       this.placeArrow(drawn, tool);

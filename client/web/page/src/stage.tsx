@@ -4,8 +4,8 @@ import { useEffect, useRef, useState } from 'preact/hooks';
 import type { ComponentChildren, JSX } from 'preact';
 import { ToolShapeSchema, type Participant, type ToolShape } from './gen/proto/wire_pb';
 import { create } from '@bufbuild/protobuf';
-import { Overlay, Verb, type Replica, type Tool, type Vec3 } from './replica';
-import { Picture, type Guide, type Shape } from './scene';
+import { Overlay, Verb, type Replica, type Shape, type Tool, type Vec3 } from './replica';
+import { Picture, type Guide } from './scene';
 
 export function forceOf(tool: Tool): number { return Math.hypot(...tool.forceN); }
 export const newtons = (n: number): string => `${n.toFixed(n < 10 ? 2 : 1)} N`;
@@ -19,7 +19,7 @@ export function guideOf(people: () => Participant[], colourOf: (slot: number) =>
   return {
     shapeOf(slot): Shape {
       const shape = owner(slot)?.tool[slot & 1] ?? kPlain;
-      return { radiusM: shape.radiusM, lengthM: shape.lengthM, halfWidthM: shape.halfWidthM ?? 0 };
+      return { radiusM: shape.radiusM, lengthM: shape.lengthM, halfWidthM: shape.halfWidthM ?? 0, edgeM: shape.edgeM ?? 0.02, form: shape.form };
     },
     labelOf(tool) {
       const name = owner(tool.slot)?.name ?? `hand ${(tool.slot >> 1) + 1}`, newton = forceOf(tool);
