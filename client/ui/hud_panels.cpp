@@ -283,9 +283,9 @@ void draw_help(const HudModel& model, float scale) {
   ImGui::SetNextWindowBgAlpha(model.shows_help ? 0.86f : 0.45f);
   ImGui::Begin("help", nullptr, kGlass);
   if (!model.shows_help) {
-    ImGui::TextDisabled(model.has_own_tool
-                            ? "1-9 instrument   left button use it   wheel depth   Q E turn   H help"
-                            : "right drag turn   Ctrl+wheel zoom   H help");
+    ImGui::TextDisabled(
+        model.has_own_tool ? "1-9 instrument   left button use it   wheel depth   Q E turn   H help"
+                           : "right drag turn   Ctrl+wheel zoom   H help");
     ImGui::End();
     return;
   }

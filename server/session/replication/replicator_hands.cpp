@@ -16,8 +16,9 @@ std::optional<Replicator::Ending> Replicator::handle_sample(Client& client,
                                                             bool is_ordered) {
   const auto& participant = *client.participant;
   if (!wire::rights_of(participant.role).has_tools)
-    return Ending{EndReason::Role,
-                  std::string("ToolSample: an ") + participants::name_of(participant.role) + " watches and has no tools"};
+    return Ending{EndReason::Role, std::string("ToolSample: an ") +
+                                       participants::name_of(participant.role) +
+                                       " watches and has no tools"};
   const auto checked = check_tool_sample(sample, participant.tools.size());
   if (!checked) return Ending{EndReason::ProtocolError, checked.error().message};
   auto& last = client.last_sequence[static_cast<std::size_t>(checked->tool)];
@@ -38,8 +39,9 @@ std::optional<Replicator::Ending> Replicator::handle_hand_report(Client& client,
                                                                  const proto::HandReport& message) {
   const auto& participant = *client.participant;
   if (!wire::rights_of(participant.role).has_tools)
-    return Ending{EndReason::Role,
-                  std::string("HandReport: an ") + participants::name_of(participant.role) + " watches and has no hands"};
+    return Ending{EndReason::Role, std::string("HandReport: an ") +
+                                       participants::name_of(participant.role) +
+                                       " watches and has no hands"};
   auto report = check_hand_report(message, participant.tools.size());
   if (!report) return Ending{EndReason::ProtocolError, report.error().message};
   const auto moments = static_cast<double>(report->moments.size());
