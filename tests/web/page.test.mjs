@@ -1,103 +1,23 @@
 // The page in headless Chromium, against the real programs. Rates are not asserted: a software
 // rasteriser on a busy machine draws as it can.
 import assert from 'node:assert/strict';
-import { spawn } from 'node:child_process';
 import fs from 'node:fs';
 import http from 'node:http';
 import https from 'node:https';
 import net from 'node:net';
-import { createRequire } from 'node:module';
-import { after, afterEach, before, test } from 'node:test';
+import { base, close, kPatience, launch, link, live, openPage, prepare, sleep, startWeb, test, until, world } from './browser.mjs';
 
-const { TROCAR_MODULES, TROCAR_BUILD, TROCAR_ROOT, TROCAR_WORK, TROCAR_CHROMIUM, TROCAR_RECORDING, TROCAR_CRCS } = process.env;
-const { chromium } = createRequire(`${TROCAR_MODULES}/`)('playwright-core');
-const kPatience = 60_000;
-const children = new Set();
-let browser, server, web, context;
-
-const sleep = ms => new Promise(resolve => setTimeout(resolve, ms));
-async function until(what, condition, patience = kPatience) {
-  const end = Date.now() + patience;
-  for (;;) {
-    const value = await condition();
-    if (value) return value;
-    if (Date.now() > end) throw new Error(`${what}: has not come about within ${patience / 1000} s`);
-    await sleep(100);
-  }
-}
-
-function launch(name, args) {
-  const child = spawn(`${TROCAR_BUILD}/bin/${name}`, args, { stdio: ['ignore', 'pipe', 'pipe'] });
-  child.text = '';
-  child.ended = new Promise(resolve => child.on('exit', code => { child.hasEnded = true; children.delete(child); resolve(code); }));
-  for (const stream of [child.stdout, child.stderr]) stream.on('data', data => { child.text += data; });
-  children.add(child);
-  return child;
-}
-async function portOf(child, file) {
-  await until(`${file} of ${child.spawnfile}`, () => fs.existsSync(file) || child.hasEnded);
-  if (!fs.existsSync(file)) throw new Error(child.text);
-  return Number(fs.readFileSync(file, 'utf8'));
-}
-async function startServer(name, more) {
-  const ready = `${TROCAR_WORK}/${name}.port`, child = launch('trocar-server', ['--listen', '127.0.0.1:0', '--no-announce',
-    '--journal', `${TROCAR_WORK}/${name}.mcap`, '--summary', `${TROCAR_WORK}/${name}.json`, '--ready-file', ready, ...more]);
-  child.port = await portOf(child, ready);
-  await until('join codes', () => /observer\s+\S{19}/.test(child.text));
-  child.codes = Object.fromEntries([...child.text.matchAll(/^ {2}(\w+) +(\S{19}) /gm)].map(m => [m[1], m[2]]));
-  child.hand = (hand, scene) => launch('trocar-client', ['--server', `127.0.0.1:${child.port}`, '--name', hand, '--no-render',
-    '--join', child.codes.surgeon, '--script', `${TROCAR_ROOT}/deploy/scenes/${scene}.toml`]);
-  return child;
-}
-async function startWeb(port, more = []) {
-  const ready = `${TROCAR_WORK}/web.port`;
-  fs.rmSync(ready, { force: true });
-  const child = launch('trocar-web', ['--listen', `127.0.0.1:${port}`, '--session', `127.0.0.1:${server.port}`, '--ready-file', ready, ...more]);
-  child.port = await portOf(child, ready);
-  await until('links', () => /\n {2}observer/.test(child.text));
-  return child;
-}
-const base = () => `http://127.0.0.1:${web.port}/`;
-const link = (code, role, name) => `${base()}#${new URLSearchParams({ join: code, role, name })}`;
-async function openPage(url) {
-  const page = await context.newPage();
-  page.faults = [];
-  page.on('pageerror', error => page.faults.push(error.message));
-  page.on('console', message => { if (message.type() === 'error') page.faults.push(message.text()); });
-  await page.goto(url);
-  return page;
-}
-const live = page => page.waitForSelector('canvas[data-drawn]', { timeout: kPatience });
-const close = async page => {
-  await page.evaluate(() => window.trocar?.session?.leave());
-  await page.close();
-};
-
-before(async () => {
-  browser = await chromium.launch({ executablePath: TROCAR_CHROMIUM, args: ['--no-sandbox', '--use-angle=swiftshader',
-    '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist', '--disable-dev-shm-usage'] });
-  context = await browser.newContext({ viewport: { width: 900, height: 600 } });
-  server = await startServer('lesson', ['--organ', 'liver']);
-  fs.mkdirSync(`${TROCAR_WORK}/recordings`);
-  fs.copyFileSync(TROCAR_RECORDING, `${TROCAR_WORK}/recordings/lesson.mcap`);
-  web = await startWeb(0, ['--insecure-loopback', '--recordings', `${TROCAR_WORK}/recordings`]);
-});
-// What a failed test leaves would take the processor from the next one.
-afterEach(async () => {
-  for (const page of context.pages()) await page.close();
-});
-after(async () => {
-  await browser?.close();
-  for (const child of children) child.kill('SIGKILL');
-});
+const { TROCAR_CRCS, TROCAR_RECORDING, TROCAR_WORK } = process.env;
+const kRecordings = ['--insecure-loopback', '--recordings', `${TROCAR_WORK}/recordings`];
+prepare(['--organ', 'liver'], kRecordings);
 
 test('an instructor joins by a link, sees a cut, marks the organ and returns it', async () => {
-  const page = await openPage(link(server.codes.instructor, 'instructor', '<b>Ivy</b> & "Co"'));
+  const page = await openPage(link(world.server.codes.instructor, 'instructor', '<b>Ivy</b> & "Co"'));
   await live(page);
-  const before_cut = await page.evaluate(() => window.trocar.replica.vertexCount);
-  const hand = server.hand('Scalpel', 'incise');
+  const hand = world.server.hand('Scalpel', 'incise');
   await page.getByRole('list').getByText('Scalpel', { exact: true }).first().waitFor({ timeout: kPatience });
-  await until('a cut', () => page.evaluate(n => window.trocar.replica.vertexCount > n, before_cut));
+  // Counts of vertices say nothing: a slow picture gets fewer.
+  await until('a cut', () => page.evaluate(() => window.trocar.replica.rest().some((value, i) => i % 4 === 3 && value === 1)));
   await page.locator('.events').getByText('Scalpel cuts').first().waitFor({ timeout: kPatience });
   // A name is text, whatever it holds.
   assert.equal(await page.locator('.people b', { hasText: '<b>Ivy</b> & "Co"' }).count(), 1);
@@ -118,9 +38,9 @@ test('an instructor joins by a link, sees a cut, marks the organ and returns it'
 });
 
 test('an instructor points, and others see where', async () => {
-  const sees = await openPage(link(server.codes.observer, 'observer', 'Sees'));
+  const sees = await openPage(link(world.server.codes.observer, 'observer', 'Sees'));
   await live(sees);
-  const page = await openPage(link(server.codes.instructor, 'instructor', 'Points'));
+  const page = await openPage(link(world.server.codes.instructor, 'instructor', 'Points'));
   await live(page);
   assert.equal(await sees.getByRole('button', { name: 'Point', exact: true }).count(), 0);
   await page.getByRole('button', { name: 'Point', exact: true }).click();
@@ -138,7 +58,7 @@ test('an instructor points, and others see where', async () => {
 });
 
 test('wrong codes, and a role that the code does not give, are refused with a reason', async () => {
-  const other = '0000-0000-0000-0000', right = server.codes.observer;
+  const other = '0000-0000-0000-0000', right = world.server.codes.observer;
   for (const [code, role, words] of [[other, 'observer', /not of this session/], ['nonsense', 'observer', /join code/], [right, 'instructor', /role|instructor/]]) {
     const page = await openPage(link(code, role, 'Guest'));
     await page.getByRole('alert').getByText(words).waitFor({ timeout: kPatience });
@@ -147,7 +67,7 @@ test('wrong codes, and a role that the code does not give, are refused with a re
 });
 
 test('a watcher who tries what an instructor may is put out by the server', async () => {
-  const page = await openPage(link(server.codes.observer, 'observer', 'Olga'));
+  const page = await openPage(link(world.server.codes.observer, 'observer', 'Olga'));
   await live(page);
   assert.equal(await page.getByRole('button', { name: 'Mark organ' }).count(), 0);
   await page.evaluate(() => window.trocar.session.mark(true));
@@ -157,10 +77,10 @@ test('a watcher who tries what an instructor may is put out by the server', asyn
 });
 
 test('messages that are too large or of another kind end that watcher, and nobody else', async () => {
-  const quiet = await openPage(link(server.codes.observer, 'observer', 'Quiet'));
+  const quiet = await openPage(link(world.server.codes.observer, 'observer', 'Quiet'));
   await live(quiet);
   for (const [name, send] of [['Large', s => s.send(new Uint8Array(100_000))], ['Odd', s => s.send(new Uint8Array([0x0a, 2, 8, 0]))], ['Text', s => s.send('{}')]]) {
-    const page = await openPage(link(server.codes.observer, 'observer', name));
+    const page = await openPage(link(world.server.codes.observer, 'observer', name));
     await live(page);
     await page.evaluate(`(${send})(window.trocar.session.socket)`);
     await until(`${name} is out`, () => page.evaluate(() => window.trocar.session.state !== 'live').catch(() => true));
@@ -171,13 +91,13 @@ test('messages that are too large or of another kind end that watcher, and nobod
 });
 
 test('who loses the connection comes back to the same place', async () => {
-  const page = await openPage(link(server.codes.observer, 'observer', 'Bea'));
+  const page = await openPage(link(world.server.codes.observer, 'observer', 'Bea'));
   await live(page);
-  web.kill('SIGKILL');
+  world.web.kill('SIGKILL');
   await page.locator('.stage.old').waitFor({ timeout: kPatience });
   await page.getByRole('alert').getByText('comes back by itself').waitFor();
-  await web.ended;
-  web = await startWeb(web.port, ['--insecure-loopback', '--recordings', `${TROCAR_WORK}/recordings`]);
+  await world.web.ended;
+  world.web = await startWeb(world.web.port, kRecordings);
   await until('back', () => page.evaluate(() => window.trocar.session.state === 'live'));
   const frames = await page.evaluate(() => window.trocar.replica.frames);
   await until('new frames', () => page.evaluate(n => window.trocar.replica.frames > n + 5, frames));
@@ -197,6 +117,7 @@ function ask(path, headers = {}, from = base()) {
     });
     request.on('upgrade', answer => { request.destroy(); resolve({ status: answer.statusCode, headers: answer.headers, text: '' }); });
     request.on('error', () => resolve(null));
+    request.on('close', () => resolve(null)); // also in the middle of an answer
     request.setTimeout(15_000, () => request.destroy());
     request.end();
   });
@@ -204,9 +125,9 @@ function ask(path, headers = {}, from = base()) {
 const kUpgrade = { Connection: 'Upgrade', Upgrade: 'websocket', 'Sec-WebSocket-Version': '13', 'Sec-WebSocket-Key': 'dGhlIHNhbXBsZSBub25jZQ==' };
 
 test('pages of other sites, odd paths and requests without a key get nothing', async () => {
-  const host = `127.0.0.1:${web.port}`, own = `http://${host}`;
+  const host = `127.0.0.1:${world.web.port}`, own = `http://${host}`;
   assert.equal((await ask('/session', { ...kUpgrade, Origin: own })).status, 101);
-  for (const origin of [undefined, 'null', 'http://evil.example', `https://${host}`, `${own}.evil.example`, `http://evil.example:${web.port}`])
+  for (const origin of [undefined, 'null', 'http://evil.example', `https://${host}`, `${own}.evil.example`, `http://evil.example:${world.web.port}`])
     assert.equal((await ask('/session', { ...kUpgrade, ...(origin ? { Origin: origin } : {}) })).status, 403, String(origin));
   const page = await ask('/');
   assert.equal(page.status, 200);
@@ -216,7 +137,7 @@ test('pages of other sites, odd paths and requests without a key get nothing', a
   assert.equal((await ask('/main.js', { 'Accept-Encoding': 'gzip' })).headers['content-encoding'], 'gzip');
   for (const path of ['/../index.html', '/%2e%2e/index.html', '/index.html%00', '//etc/passwd', '/recordings.key', '/web-recordings.key', '/session/'])
     assert.equal((await ask(path)).status, 404, path);
-  const key = web.text.match(/#recordings=(\w+)/)[1], bearer = { Authorization: `Bearer ${key}` };
+  const key = world.web.text.match(/#recordings=(\w+)/)[1], bearer = { Authorization: `Bearer ${key}` };
   assert.equal((await ask('/recordings')).status, 403);
   assert.equal((await ask('/recordings', { Authorization: 'Bearer 00' })).status, 403);
   assert.equal((await ask('/recordings', bearer)).status, 200);
@@ -235,22 +156,22 @@ const frameOf = text => Buffer.concat([Buffer.from([0x81, 0xfe, text.length >> 8
 const memoryKb = child => Number(fs.readFileSync(`/proc/${child.pid}/status`, 'utf8').match(/VmRSS:\s+(\d+)/)[1]);
 
 test('a browser that does not read holds up nobody, and nothing piles up for it', async () => {
-  const reads = await openPage(link(server.codes.observer, 'observer', 'Reads'));
+  const reads = await openPage(link(world.server.codes.observer, 'observer', 'Reads'));
   await live(reads);
-  const before = memoryKb(web), stalled = [];
+  const before = memoryKb(world.web), stalled = [];
   for (let i = 0; i < 4; i++) {
-    const socket = net.connect(web.port, '127.0.0.1');
+    const socket = net.connect(world.web.port, '127.0.0.1');
     socket.on('error', () => undefined);
-    socket.write(`GET /session HTTP/1.1\r\nHost: 127.0.0.1:${web.port}\r\nOrigin: http://127.0.0.1:${web.port}\r\n${Object.entries(kUpgrade).map(([k, v]) => `${k}: ${v}\r\n`).join('')}\r\n`);
-    await new Promise(resolve => socket.once('data', resolve));
+    socket.write(`GET /session HTTP/1.1\r\nHost: 127.0.0.1:${world.web.port}\r\nOrigin: http://127.0.0.1:${world.web.port}\r\n${Object.entries(kUpgrade).map(([k, v]) => `${k}: ${v}\r\n`).join('')}\r\n`);
+    await new Promise((resolve, reject) => socket.once('data', resolve).once('close', () => reject(new Error('trocar-web has closed'))));
     socket.pause();
-    socket.write(frameOf(JSON.stringify({ code: server.codes.observer, name: `Stalled ${i}`, role: 'observer', more: 'x'.repeat(100) })));
+    socket.write(frameOf(JSON.stringify({ code: world.server.codes.observer, name: `Stalled ${i}`, role: 'observer', more: 'x'.repeat(100) })));
     stalled.push(socket);
   }
   const frames = await reads.evaluate(() => window.trocar.replica.frames);
   await sleep(6000);
   assert.ok(await reads.evaluate(n => window.trocar.replica.frames > n + 10, frames));
-  assert.ok(memoryKb(web) < before + 30_000, `${before} kB, then ${memoryKb(web)} kB`);
+  assert.ok(memoryKb(world.web) < before + 30_000, `${before} kB, then ${memoryKb(world.web)} kB`);
   for (const socket of stalled) socket.destroy();
   await close(reads);
 });
@@ -275,7 +196,7 @@ test('guesses of codes from one address have to wait', async () => {
 });
 
 test('a recording opens by its link, and 20 random times show what the native replay shows', async () => {
-  const key = web.text.match(/#recordings=(\w+)/)[1];
+  const key = world.web.text.match(/#recordings=(\w+)/)[1];
   const crcs = new Map(fs.readFileSync(TROCAR_CRCS, 'utf8').trim().split('\n').map(line => { const [frame, , crc] = line.split(' '); return [frame, crc]; }));
   const list = await openPage(`${base()}#recordings=${key}`);
   await list.getByRole('button', { name: /lesson\.mcap/ }).click();
@@ -326,22 +247,22 @@ test('a damaged file gives one clear sentence', async () => {
 test('over TLS; a code that is revoked puts its watcher out; at the end all surfaces are equal', async () => {
   const secure = await startWeb(0), url = `https://127.0.0.1:${secure.port}/`;
   assert.match((await ask('/', {}, url)).headers['strict-transport-security'], /max-age/);
-  const trusting = await browser.newContext({ ignoreHTTPSErrors: true, viewport: { width: 900, height: 600 } });
+  const trusting = await world.browser.newContext({ ignoreHTTPSErrors: true, viewport: { width: 900, height: 600 } });
   const page = await trusting.newPage(), stays = await trusting.newPage();
-  await page.goto(`${url}#${new URLSearchParams({ join: server.codes.observer, role: 'observer', name: 'Out' })}`);
-  await stays.goto(`${url}#${new URLSearchParams({ join: server.codes.instructor, role: 'instructor', name: 'Stays' })}`);
+  await page.goto(`${url}#${new URLSearchParams({ join: world.server.codes.observer, role: 'observer', name: 'Out' })}`);
+  await stays.goto(`${url}#${new URLSearchParams({ join: world.server.codes.instructor, role: 'instructor', name: 'Stays' })}`);
   await live(page);
   await live(stays);
-  const revoking = launch('trocar-server', ['--listen', `127.0.0.1:${server.port}`, '--revoke', 'observer', '--put-out']);
+  const revoking = launch('trocar-server', ['--listen', `127.0.0.1:${world.server.port}`, '--revoke', 'observer', '--put-out']);
   assert.equal(await revoking.ended, 0, revoking.text);
   await page.getByRole('alert').waitFor({ timeout: kPatience });
   await page.reload();
   assert.match(await page.getByRole('alert').innerText({ timeout: kPatience }), /revoked/);
   await stays.evaluate(() => { const ended = setInterval(() => { if (window.trocar.barrier()) { window.atEnd = window.trocar.barrier(); clearInterval(ended); } }, 5); });
-  server.kill('SIGTERM');
+  world.server.kill('SIGTERM');
   await stays.getByRole('alert').waitFor({ timeout: kPatience });
   assert.equal(await stays.evaluate(() => window.atEnd ?? window.trocar.barrier()), 'same');
-  assert.equal(await server.ended, 0, server.text);
+  assert.equal(await world.server.ended, 0, world.server.text);
   const summary = JSON.parse(fs.readFileSync(`${TROCAR_WORK}/lesson.json`, 'utf8'));
   assert.equal(summary.all_replicas_equal, true);
   await trusting.close();

@@ -49,8 +49,11 @@ case $test in
       skip "Chromium is not installed: deploy/setup --with-web"
     [ -e "$build/web/page/index.html" ] || skip "the page is not built"
     export TROCAR_CHROMIUM=$chromium
-    if [ "$test" != figures ]; then
-      node --test --test-reporter=spec "$here/$test.test.mjs"
+    if [ "$test" = page ]; then
+      # As one process, which prints each test as it ends.
+      node --test-reporter=spec "$here/page.test.mjs"
+    elif [ "$test" = lesson ]; then
+      node --test --test-reporter=spec "$here/lesson.test.mjs"
     else
       [ -e "$TROCAR_RECORDING" ] || skip "there is no recording: run_web.sh recording makes it"
       node --experimental-websocket --no-warnings "$here/figures.mjs"
