@@ -1,5 +1,5 @@
 #!/bin/bash
-# run_web.sh recording|codec|page|lesson|figures BUILD_FOLDER WORK_FOLDER: one of the tests of the page. Exit code 77:
+# run_web.sh recording|codec|page|lesson|debrief|figures BUILD_FOLDER WORK_FOLDER: one of the tests of the page. Exit code 77:
 # skipped, with the reason.
 set -euo pipefail
 test=$1 build=$2 work=$3
@@ -43,17 +43,15 @@ record() {
 
 case $test in
   recording) record ;;
-  codec) node --test "$here/codec.test.mjs" ;;
-  page | lesson | figures)
+  codec) node --test-reporter=spec "$here/codec.test.mjs" ;;
+  page | lesson | debrief | figures)
     chromium=$(command -v chromium || command -v chromium-browser || command -v google-chrome) ||
       skip "Chromium is not installed: deploy/setup --with-web"
     [ -e "$build/web/page/index.html" ] || skip "the page is not built"
     export TROCAR_CHROMIUM=$chromium
-    if [ "$test" = page ]; then
+    if [ "$test" != figures ]; then
       # As one process, which prints each test as it ends.
-      node --test-reporter=spec "$here/page.test.mjs"
-    elif [ "$test" = lesson ]; then
-      node --test --test-reporter=spec "$here/lesson.test.mjs"
+      node --test-reporter=spec "$here/$test.test.mjs"
     else
       [ -e "$TROCAR_RECORDING" ] || skip "there is no recording: run_web.sh recording makes it"
       node --experimental-websocket --no-warnings "$here/figures.mjs"
