@@ -50,6 +50,7 @@ class Run {
   void measure(std::uint64_t now_ns);
   void use_marks(std::uint64_t now_ns);
   bool is_over(std::uint64_t now_ns);
+  bool stays_open() const;
   Status take_screenshot(std::uint64_t now_ns, bool is_last);
   Status write_summary() const;
   Result<ExitCode> conclude(const Status& outcome);
@@ -124,17 +125,27 @@ void Run::use_marks(std::uint64_t now_ns) {
   ask_at(options_.return_at, has_returned_, true);
 }
 
+// A window that closed by itself would leave a person without a word: it says what happened, over
+// the last picture, until it is closed. Where the start screen comes back, that says it.
+bool Run::stays_open() const {
+  return options_.display == Display::Window && picture_ && !picture_->should_close() &&
+         stop_requested == 0 && options_.seconds == 0 && !wants_start_screen(options_);
+}
+
 bool Run::is_over(std::uint64_t now_ns) {
-  if (source_.state() == replica::SourceState::Closed)
+  if (source_.state() == replica::SourceState::Closed) {
+    if (exit_reason_.empty()) log::info("the session is over: {}", source_.close_reason().text);
     exit_reason_ = source_.close_reason().text;
-  else if (stop_requested != 0)
+    return !stays_open();
+  }
+  if (stop_requested != 0)
     exit_reason_ = "stopped by a signal";
   else if (picture_ && picture_->should_close())
     exit_reason_ = "window closed";
   else if (options_.seconds > 0 && live_ns_ != 0 &&
            static_cast<double>(now_ns - live_ns_) * 1e-9 >= options_.seconds)
     exit_reason_ = "end of --seconds";
-  return !exit_reason_.empty() || source_.state() == replica::SourceState::Closed;
+  return !exit_reason_.empty();
 }
 
 Status Run::take_screenshot(std::uint64_t now_ns, bool is_last) {

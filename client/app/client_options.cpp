@@ -67,7 +67,7 @@ Status parse_size(const std::string& text, render::Size& size) {
 
 Status parse_overlays(const std::vector<std::string>& names, Overlays& overlays) {
   if (names.empty()) return {};
-  overlays = {.regions = false, .arrows = false};
+  overlays = {.arrows = false};
   const std::map<std::string, bool Overlays::*> known = {{"regions", &Overlays::regions},
                                                          {"holds", &Overlays::holds},
                                                          {"arrows", &Overlays::arrows},

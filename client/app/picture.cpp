@@ -325,6 +325,8 @@ ui::HudModel Picture::hud_model(const replica::Replica& replica, replica::Sessio
   else if (source.state() == replica::SourceState::Away)
     model.status = ui::describe_absence(source.statistics().away_seconds,
                                         source.statistics().away_left_seconds);
+  else if (source.state() == replica::SourceState::Closed)
+    model.status = source.close_reason().text + "\nClose this window to leave.";
   else if (!surface_.is_valid())
     model.status = "Waiting for the organ ...";
   if (own != nullptr && !own->frozen_by.empty())
@@ -336,7 +338,8 @@ ui::HudModel Picture::hud_model(const replica::Replica& replica, replica::Sessio
   else if (leader != people.end())
     model.view_text = follows_view_ ? "You follow the view of " + leader->name + ": V ends that."
                                     : "V follows the view of " + leader->name + ".";
-  model.is_away = source.state() == replica::SourceState::Away;
+  model.is_away = source.state() == replica::SourceState::Away ||
+                  source.state() == replica::SourceState::Closed;
   if (const auto* newest = replica.newest()) {
     // The state of the newest frame may still be under way; then the one before has it.
     const auto& history = replica.history();
@@ -437,7 +440,10 @@ void Picture::draw(const replica::Replica& replica, replica::SessionSource& sour
     frame_camera(replica);
     is_framed_ = true;
   }
-  if (help_until_ns_ != 0 && now_ns > help_until_ns_) {
+  // Whoever uses the tool has read enough, and wants to see the organ.
+  const auto* own = hands.mouse_tool();
+  const bool acts = own != nullptr && own->current().verb != tool::Verb::None;
+  if (help_until_ns_ != 0 && (acts || now_ns > help_until_ns_)) {
     shows_help_ = false;
     help_until_ns_ = 0;
   }

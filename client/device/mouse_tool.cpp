@@ -10,8 +10,24 @@ constexpr float kWheelMetres = 0.003f;  // per notch
 constexpr float kKeyMetresPerSecond = 0.05f;
 constexpr float kFineFactor = 0.25f;     // with Shift
 constexpr float kSettleSeconds = 0.06f;  // hovering follows the relief this softly
-constexpr float kCutDepth = 0.012f;      // below the surface, where a cut begins
+// How far below the surface each verb begins, m, and how fast the tip goes there, m/s.
+constexpr float kPushDepth = 0.006f, kGraspDepth = 0.001f, kCutDepth = 0.012f;
+constexpr float kPushSpeed = 0.04f, kReachSpeed = 0.1f;
 constexpr float kMinDepth = 0.02f, kMaxDepth = 1.8f;
+
+float depth_of(tool::Verb verb) {
+  switch (verb) {
+    case tool::Verb::Push:
+      return kPushDepth;
+    case tool::Verb::Grasp:
+      return kGraspDepth;
+    case tool::Verb::Cut:
+      return kCutDepth;
+    case tool::Verb::None:
+      break;
+  }
+  return 0;
+}
 
 }  // namespace
 
@@ -23,12 +39,17 @@ void MouseTool::update(const PointerInput& input, const ViewRays& view,
     verb = tool::Verb::Cut;
   else if (input.grasp)
     verb = tool::Verb::Grasp;
-  else if (input.push || (input.left && (input.is_over_scene || sample_.verb == tool::Verb::Push)))
+  else if (input.push || (input.left && (input.is_over_scene || wanted_ == tool::Verb::Push)))
     verb = tool::Verb::Push;
+
+  const bool begins = verb != tool::Verb::None && wanted_ == tool::Verb::None;
+  wanted_ = verb;
+  if (begins) ahead_ = std::max(0.0f, hover_ + depth_of(verb));
+  if (verb == tool::Verb::None) ahead_ = 0;
 
   if (is_camera || (!input.is_over_scene && verb == tool::Verb::None)) {
     // A verb that is held goes on holding; the depth is that of the tip seen from the new view.
-    sample_.verb = is_valid_ ? verb : tool::Verb::None;
+    sample_.verb = is_valid_ && !is_reaching() ? verb : tool::Verb::None;
     depth_ = dot(sample_.world_from_tool.position - view.eye, view.forward);
     return;
   }
@@ -47,9 +68,10 @@ void MouseTool::update(const PointerInput& input, const ViewRays& view,
       depth_ = std::max(-dot(view.eye, view.forward), kMinDepth);  // the organ's centre
     }
   } else {
-    const bool begins = sample_.verb == tool::Verb::None;
-    if (begins && verb == tool::Verb::Cut) depth_ += hover_ + kCutDepth;
-    depth_ += advance;
+    const float speed = verb == tool::Verb::Push ? kPushSpeed : kReachSpeed;
+    const float step = std::min(ahead_, speed * seconds);
+    ahead_ -= step;
+    depth_ += advance + step;
   }
   depth_ = std::clamp(depth_, kMinDepth, kMaxDepth);
   const Vec3f tip = view.eye + ray * depth_;
@@ -58,7 +80,7 @@ void MouseTool::update(const PointerInput& input, const ViewRays& view,
   const Vec3f port = view.eye + view.up * 0.16f + view.right * 0.14f;
   sample_.world_from_tool.position = tip;
   sample_.world_from_tool.orientation = rotation_from_z(normalized(port - tip, Vec3f{0, 0, 1}));
-  sample_.verb = verb;
+  sample_.verb = is_reaching() ? tool::Verb::None : verb;
   is_valid_ = true;
 }
 

@@ -3,10 +3,10 @@
 // Mouse and keyboard as an instrument.
 //
 //   no verb held     the tip follows the pointer and hovers above the tissue under it; the wheel
-//   sets
-//                    the height
-//   left button, F   push: the tip moves in the view plane, wheel or W/S press in and draw back
-//   Space            grasp, with the same motions: lift by moving the mouse
+//                    sets the height
+//   left button, F   push: the tip goes down and presses 6 mm in; it moves in the view plane, and
+//                    wheel or W/S press in and draw back
+//   Space            grasp: the tip goes down, closes where the surface is, and moves like that
 //   X                cut: the blade goes in 12 mm and follows the pointer, wheel or W/S change that
 //   right or middle  the camera's; the tip stays where it is
 //
@@ -41,13 +41,18 @@ class MouseTool {
   std::optional<tool::ToolSample> pop_due(std::uint64_t now_ns);
 
  private:
+  // Jaws stay open on the way to the surface.
+  bool is_reaching() const { return wanted_ == tool::Verb::Grasp && ahead_ > 0; }
+
   tool::ToolShape shape_;
   tool::ToolSample sample_;
   tool::ToolSample last_sent_;
   std::uint64_t last_sent_ns_ = 0;
   bool is_valid_ = false;
-  float depth_ = 0;       // m along the view direction
-  float hover_ = 0.008f;  // m above the tissue while no verb is held
+  tool::Verb wanted_ = tool::Verb::None;  // what keys and buttons ask for
+  float depth_ = 0;                       // m along the view direction
+  float ahead_ = 0;                       // m, still to go down for what is wanted
+  float hover_ = 0.008f;                  // m above the tissue while no verb is held
 };
 
 }  // namespace trocar::device

@@ -50,7 +50,6 @@ void rate_rows(const HudModel& model) {
     ImGui::TextUnformatted(text.level.c_str());
   else
     ImGui::TextColored(colour_of(text.tone), "%s", text.level.c_str());
-  if (!model.shows_rate) return;
   if (!text.sweeps.empty()) row("sweeps", text.sweeps + "; others " + far_sweeps(figures.solve));
   if (figures.near.node_limit > 0)
     row("queue limit", with_thousands(figures.near.node_limit) + " nodes");
@@ -88,6 +87,37 @@ std::string byte_rate(double bytes_per_second) {
   return format("%.2f MB/s", bytes_per_second / 1e6);
 }
 
+namespace {
+
+constexpr double kOldPictureMs = 250;
+
+// These are for whoever studies the solver or the network.
+void figure_rows(const HudModel& model) {
+  const auto& f = model.figures;
+  row("tick", format("%.0f us median, %.0f us p99", f.pace.tick_median_us, f.pace.tick_p99_us));
+  row("slow ticks", with_thousands(f.pace.slow_ticks));
+  row("active nodes", format("%s, queue %s", with_thousands(f.near.active_nodes).c_str(),
+                             with_thousands(f.near.queue_nodes).c_str()));
+  // The line of the controller says more, where it decides.
+  if (f.solve.layer_sweeps[0] == 0)
+    row("sweeps", format("%u, all other nodes %s", f.solve.sweeps, far_sweeps(f.solve).c_str()));
+  rate_rows(model);
+  solver_rows(model);
+  row("residual", format("%.2g mN", static_cast<double>(f.solve.residual_n) * 1e3));
+  row("regions", std::to_string(f.near.region_count));
+  if (f.relaxation) {
+    row("elastic energy", format("%.3g mJ", f.relaxation->energy_j * 1e3));
+    row("volume", format("%+.3f %%", 100 * f.relaxation->volume_change));
+    row("relaxed", format("%.0f %% of the stress", 100 * f.relaxation->relaxed_share));
+  }
+  if (!model.timeline) row("round trip", format("%.1f ms", model.round_trip_ms));
+  row("stream", format("%.1f frames/s, %s", model.frames_per_second,
+                       byte_rate(model.bytes_per_second).c_str()));
+  row("display", format("%.0f pictures/s", model.pictures_per_second));
+}
+
+}  // namespace
+
 void draw_session_panel(const HudModel& model, float scale) {
   ImGui::SetNextWindowPos({kMargin * scale, kMargin * scale});
   ImGui::SetNextWindowSizeConstraints({300 * scale, 0}, {600 * scale, 2000 * scale});
@@ -97,35 +127,18 @@ void draw_session_panel(const HudModel& model, float scale) {
   ImGui::TextDisabled("%s", model.organ.c_str());
   ImGui::Separator();
   if (ImGui::BeginTable("figures", 2, ImGuiTableFlags_SizingFixedFit)) {
-    const auto& f = model.figures;
     row("session time", clock_text(model.session_seconds));
-    row("tick", format("%.0f us median, %.0f us p99", f.pace.tick_median_us, f.pace.tick_p99_us));
-    row("slow ticks", with_thousands(f.pace.slow_ticks));
-    row("active nodes", format("%s, queue %s", with_thousands(f.near.active_nodes).c_str(),
-                               with_thousands(f.near.queue_nodes).c_str()));
-    // With the controller's decisions open, its line says more.
-    if (!model.shows_rate || f.solve.layer_sweeps[0] == 0)
-      row("sweeps", format("%u, all other nodes %s", f.solve.sweeps, far_sweeps(f.solve).c_str()));
-    rate_rows(model);
-    solver_rows(model);
     if (!model.ghost_text.empty()) row("ghost", model.ghost_text);
-    row("residual", format("%.2g mN", static_cast<double>(f.solve.residual_n) * 1e3));
-    row("regions", std::to_string(f.near.region_count));
-    if (f.relaxation) {
-      row("elastic energy", format("%.3g mJ", f.relaxation->energy_j * 1e3));
-      row("volume", format("%+.3f %%", 100 * f.relaxation->volume_change));
-      row("relaxed", format("%.0f %% of the stress", 100 * f.relaxation->relaxed_share));
+    if (model.shows_rate) figure_rows(model);
+    if (model.surface_age_ms && (model.shows_rate || *model.surface_age_ms > kOldPictureMs))
+      row("age of picture", format("%.0f ms", *model.surface_age_ms));
+    if (model.shows_rate || !model.is_in_step) {
+      ImGui::TableNextRow();
+      ImGui::TableNextColumn();
+      ImGui::TextDisabled("surface");
+      ImGui::TableNextColumn();
+      ImGui::TextColored(model.is_in_step ? kGood : kTrouble, "%s", model.sync_text.c_str());
     }
-    if (!model.timeline) row("round trip", format("%.1f ms", model.round_trip_ms));
-    if (model.surface_age_ms) row("age of picture", format("%.0f ms", *model.surface_age_ms));
-    row("stream", format("%.1f frames/s, %s", model.frames_per_second,
-                         byte_rate(model.bytes_per_second).c_str()));
-    row("display", format("%.0f pictures/s", model.pictures_per_second));
-    ImGui::TableNextRow();
-    ImGui::TableNextColumn();
-    ImGui::TextDisabled("surface");
-    ImGui::TableNextColumn();
-    ImGui::TextColored(model.is_in_step ? kGood : kTrouble, "%s", model.sync_text.c_str());
     ImGui::EndTable();
   }
   ImGui::End();
@@ -281,8 +294,8 @@ void draw_help(const HudModel& model, float scale) {
   if (ImGui::BeginTable("keys", 2, ImGuiTableFlags_SizingFixedFit)) {
     if (model.has_own_tool) {
       help_row("move", "the tip follows the pointer, just above the tissue");
-      help_row("left button, F", "push: hold, then wheel or W / S for depth");
-      help_row("Space", "grasp: hold near the surface, lift by moving");
+      help_row("left button, F", "push: hold; wheel or W / S for more or less");
+      help_row("Space", "grasp: hold, lift by moving the mouse");
       help_row("X", "cut: hold and draw the blade along, wheel or W / S for depth");
       help_row("wheel, W / S", "depth along the view; Shift: finer");
     }
@@ -303,7 +316,7 @@ void draw_help(const HudModel& model, float scale) {
     help_row("L", model.shows_holds ? "hide who holds what" : "show who holds what");
     help_row("A", model.shows_arrows ? "hide force arrows" : "show force arrows");
     help_row("R",
-             model.shows_rate ? "hide what the server decides" : "show what the server decides");
+             model.shows_rate ? "hide the figures for research" : "show the figures for research");
     if (model.figures.solve.solver && !model.timeline)
       help_row("G", model.ghost_text.empty() ? "show the full solution: a net, yellow where it is "
                                                "0.25 mm off, red from 1 mm on"

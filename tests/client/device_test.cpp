@@ -104,24 +104,43 @@ TEST_F(MouseToolTest, HoversJustAboveTheSurfaceUnderThePointer) {
   EXPECT_GT(dot(shaft, view.up), 0.1f);
 }
 
-TEST_F(MouseToolTest, PushKeepsItsDepthUntilTheWheelTurns) {
+TEST_F(MouseToolTest, TheLeftButtonAlonePressesAndKeepsItsDepthUntilTheWheelTurns) {
   update(10);
-  const float before = depth();
+  const float surface = depth() + 0.008f;
   input_.left = true;
+  update();
+  EXPECT_EQ(tool_.current().verb, tool::Verb::Push);
+  EXPECT_LT(depth(), surface) << "it goes down at a bounded speed";
+  update(30);
+  EXPECT_NEAR(depth(), surface + 0.006f, 1e-4f);
   for (int i = 0; i < 30; ++i) {
     input_.x += 5;
     update();
   }
-  EXPECT_EQ(tool_.current().verb, tool::Verb::Push);
-  EXPECT_NEAR(depth(), before, 1e-5f);
+  EXPECT_NEAR(depth(), surface + 0.006f, 1e-4f);
   input_.wheel = 2;
   update();
-  EXPECT_NEAR(depth(), before + 0.006f, 1e-5f);
+  EXPECT_NEAR(depth(), surface + 0.012f, 1e-4f);
   input_.wheel = 0;
   input_.left = false;
+  update(30);
+  EXPECT_EQ(tool_.current().verb, tool::Verb::None);
+}
+
+TEST_F(MouseToolTest, JawsCloseWhereTheSurfaceIs) {
+  update(10);
+  const float surface = depth() + 0.008f;
   input_.grasp = true;
   update();
+  EXPECT_EQ(tool_.current().verb, tool::Verb::None) << "the tip is still above";
+  update(10);
   EXPECT_EQ(tool_.current().verb, tool::Verb::Grasp);
+  EXPECT_NEAR(depth(), surface + 0.001f, 1e-4f);
+  input_.grasp = false;
+  input_.left = true;
+  update();
+  EXPECT_EQ(tool_.current().verb, tool::Verb::Push);
+  EXPECT_NEAR(depth(), surface + 0.001f, 1e-4f) << "from one verb to another it stays";
 }
 
 TEST_F(MouseToolTest, TipStaysWhileTheCameraTurns) {

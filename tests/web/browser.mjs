@@ -33,7 +33,7 @@ export function launch(name, args) {
   return child;
 }
 export async function portOf(child, file) {
-  await until(file, () => fs.existsSync(file) || child.hasEnded);
+  await until(`${file} of ${child.spawnfile}`, () => fs.existsSync(file) || child.hasEnded);
   if (!fs.existsSync(file)) throw new Error(child.text);
   return Number(fs.readFileSync(file, 'utf8'));
 }

@@ -244,6 +244,25 @@ test('a damaged file gives one clear sentence', async () => {
   await page.close();
 });
 
+test('a damaged place in a recording is said, and a seek to a good place shows it', async () => {
+  const bytes = fs.readFileSync(TROCAR_RECORDING), middle = bytes.length >> 1, page = await openPage(base());
+  for (let i = 0; i < 64; i++) bytes[middle + i] ^= 0x5a;
+  await page.locator('input[type=file]').setInputFiles({ name: 'middle.mcap', mimeType: 'application/octet-stream', buffer: bytes });
+  await live(page);
+  const faults = await page.evaluate(async () => {
+    const { player, recording } = window.trocar, said = [];
+    for (let tick = recording.firstTick; tick < recording.lastTick; tick += 200) {
+      await player.seek(tick);
+      said.push(player.fault);
+    }
+    await player.seek(recording.firstTick);
+    return { said, after: player.fault };
+  });
+  assert.ok(faults.said.some(fault => /damaged/.test(fault)), faults.said.join());
+  assert.equal(faults.after, '');
+  await page.close();
+});
+
 test('over TLS; a code that is revoked puts its watcher out; at the end all surfaces are equal', async () => {
   const secure = await startWeb(0), url = `https://127.0.0.1:${secure.port}/`;
   assert.match((await ask('/', {}, url)).headers['strict-transport-security'], /max-age/);

@@ -28,7 +28,8 @@ inline constexpr float kReturnTurn = 2.0f;    // rad/s
 
 class HeldTools {
  public:
-  // Returns what the simulation gets in place of a sample; nothing: the tool is frozen, and is nowhere yet.
+  // Returns what the simulation gets in place of a sample; nothing: the tool is frozen, and is
+  // nowhere yet.
   std::optional<hands::ToolInput> apply(const hands::ToolInput& wanted, std::uint64_t now_ns);
 
   void freeze(ParticipantSlot slot);
