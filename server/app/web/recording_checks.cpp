@@ -146,7 +146,7 @@ void RecordingChecks::look() {
 void RecordingChecks::fail(const Task& task, const std::string& why) {
   log::warn("{}: {}", printable(task.name, 128), why);
   if (failed_.size() >= kMostWaiting) failed_.clear();
-  failed_[task.name] = answer("unknown", why);
+  failed_[task.name] = answer("failed", why);
 }
 
 void RecordingChecks::keep(const Task& task, const CheckProcess::Outcome& outcome) {

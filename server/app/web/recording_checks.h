@@ -10,8 +10,9 @@
 // has changed within 5 s is still being written and is not checked. Thread: that of the I/O
 // context.
 //
-// Answers are a JSON object: "state" is not asked, waiting, running, growing, verified, different
-// or unknown; "text" is one line for people; "tick" is that of the first difference, else null.
+// Answers are a JSON object: "state" is not asked, waiting, running, growing, failed (it came
+// to no end), verified, different or unknown; "text" is one line for people; "tick" is that of the
+// first difference, else null.
 
 #include "common/base/asio.h"  // before Boost: see there
 
@@ -37,7 +38,7 @@ class RecordingChecks {
   RecordingChecks(asio::io_context& context, std::filesystem::path state_folder,
                   std::chrono::seconds limit);
 
-  // What is known of a recording.
+  // Says what is known of a recording.
   std::string known(const std::string& name, const site::OpenRecording& recording) const;
   // The same; a recording that has not been checked is from now on.
   std::string ask(const std::string& name, std::unique_ptr<site::OpenRecording> recording);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "server/session/replication/messages.h"
 
@@ -10,6 +11,7 @@ namespace {
 
 constexpr Tick kChangePeriod = 1000;
 constexpr std::uint32_t kHasClaim = 8;
+constexpr std::size_t kEventOverhead = 16;  // a bound of what an entry takes besides its message
 
 template <typename Whole>
 Whole scaled(float value, double by) {
@@ -30,7 +32,7 @@ void OverviewBuilder::begin_at(Tick tick) {
   overview_.set_bin_ticks(kBinTicks);
   bin_end_ = tick + kBinTicks;
   index_of_.fill(-1);
-  events_ = 0;
+  event_bytes_ = 0;
 }
 
 void OverviewBuilder::skip_to(Tick tick) {
@@ -38,9 +40,9 @@ void OverviewBuilder::skip_to(Tick tick) {
   last_tip_.fill(std::nullopt);
 }
 
-bool OverviewBuilder::has_room() {
-  if (events_ < kMostEvents) {
-    ++events_;
+bool OverviewBuilder::has_room(std::size_t bytes) {
+  if (event_bytes_ + bytes + kEventOverhead <= kMostEventBytes) {
+    event_bytes_ += bytes + kEventOverhead;
     return true;
   }
   overview_.set_left_out(overview_.left_out() + 1);
@@ -48,26 +50,30 @@ bool OverviewBuilder::has_room() {
 }
 
 void OverviewBuilder::add_presence(Tick tick, const proto::Participants& present) {
-  if (!has_room()) return;
+  if (!has_room(present.ByteSizeLong())) return;
   auto& presence = *overview_.add_presence();
   presence.set_tick(tick);
   *presence.mutable_participants() = present;
 }
 
 void OverviewBuilder::add_gap(const proto::JournalGap& gap) {
-  if (has_room()) *overview_.add_gap() = gap;
+  if (has_room(gap.ByteSizeLong())) *overview_.add_gap() = gap;
 }
 
 void OverviewBuilder::add_lesson(const proto::TeachEvent& event) {
-  if (has_room()) *overview_.add_lesson() = event;
+  if (has_room(event.ByteSizeLong())) *overview_.add_lesson() = event;
 }
 
 void OverviewBuilder::add_frame(const step::PublishedFrame& frame,
                                 const participants::Roster& roster) {
-  for (const auto& event : frame.claim_events)
-    if (has_room()) replication::describe(event, roster, *overview_.add_claim());
+  for (const auto& event : frame.claim_events) {
+    proto::ClaimEvent message;
+    replication::describe(event, roster, message);
+    if (has_room(message.ByteSizeLong())) *overview_.add_claim() = std::move(message);
+  }
   const bool has_changed = frame.change || frame.new_layout;
-  if (has_changed && (!last_change_ || frame.tick - *last_change_ >= kChangePeriod) && has_room()) {
+  if (has_changed && (!last_change_ || frame.tick - *last_change_ >= kChangePeriod) &&
+      has_room(0)) {
     overview_.add_change_tick(frame.tick);
     last_change_ = frame.tick;
   }

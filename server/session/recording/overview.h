@@ -2,10 +2,11 @@
 
 // Makes the Overview messages of a recording from what is recorded anyway: per bin of 256 ticks and
 // tool the greatest force, the tip, its way and what it does, and all events. Frames come in order.
-// A message ends where the frames of a whole bin were dropped. Bounds: 120 bins and 2,000 events a
-// message; events beyond are counted. One thread.
+// A message ends where the frames of a whole bin were dropped. Bounds: 120 bins and 256 KiB of
+// events a message; events beyond are counted. One thread.
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -23,7 +24,7 @@ class OverviewBuilder {
  public:
   static constexpr Tick kBinTicks = 256;
   static constexpr std::uint32_t kMostBins = 120;
-  static constexpr int kMostEvents = 2000;
+  static constexpr std::size_t kMostEventBytes = 256 * 1024;
 
   // begin: the tick after which the recording begins.
   explicit OverviewBuilder(Tick begin);
@@ -39,8 +40,8 @@ class OverviewBuilder {
 
   // Its bins are all there: take() it before the next frame.
   bool is_full() const { return overview_.bins() >= kMostBins; }
-  bool is_empty() const { return overview_.bins() == 0 && bin_tools_.empty() && events_ == 0; }
-  // What there is, with the bin that is open. It begins again after that.
+  bool is_empty() const { return overview_.bins() == 0 && bin_tools_.empty() && event_bytes_ == 0; }
+  // Returns what there is, with the bin that is open, and begins again after it.
   proto::Overview take();
 
  private:
@@ -52,7 +53,7 @@ class OverviewBuilder {
   };
   void close_bin();
   void begin_at(Tick tick);
-  bool has_room();
+  bool has_room(std::size_t bytes);
 
   proto::Overview overview_;
   std::array<int, kMaxTools> index_of_{};  // in overview_.tool, -1: none
@@ -61,7 +62,7 @@ class OverviewBuilder {
   std::vector<BinTool> bin_tools_;                        // of the open bin
   Tick bin_end_ = 0;
   std::optional<Tick> last_change_;
-  int events_ = 0;
+  std::size_t event_bytes_ = 0;
 };
 
 }  // namespace trocar::recording

@@ -1,16 +1,22 @@
 // A recording: choose one, play it, go to what happened.
 
+import { fromBinary } from '@bufbuild/protobuf';
 import type { JSX } from 'preact';
 import { useEffect, useMemo, useRef, useState } from 'preact/hooks';
 import { Bookmarks } from './debrief/bookmarks';
 import { Check } from './debrief/check';
 import { joined, keepBookmarks, keptBookmarks, readBookmarks, bookmarksText, type Bookmark } from './debrief/marks';
 import { Controls, keyActs, Timeline, type Clock } from './debrief/transport';
-import { Forces } from './forces';
+import { Course } from './debrief/course';
+import { eventsTable, forcesTable, Still } from './debrief/export';
+import { useOverlays } from './debrief/measuring';
+import { Plots, type ToolGuide } from './debrief/plots';
+import { Take } from './debrief/take';
+import { FrameStateSchema } from './gen/proto/wire_pb';
 import { recordingLink, type Link, type Moment } from './link';
-import { Events, ForcePlot, People } from './panels';
+import { Events, hex, People } from './panels';
 import { kSpeeds, Player } from './player';
-import { EventLog, traffic, type Recording } from './recording';
+import { EventLog, traffic, type Item, type Recording } from './recording';
 import type { Replica } from './replica';
 import type { Picture } from './scene';
 import { guideOf, Stage } from './stage';
@@ -54,20 +60,29 @@ interface DebriefProps { replica: Replica; recording: Recording; name: string; l
 export function Debrief(props: DebriefProps): JSX.Element {
   const { replica, recording } = props;
   const [, redraw] = useState(0), [follows, setFollows] = useState<number | null>(null), [copied, setCopied] = useState('');
-  const [marks, setMarks] = useState<Bookmark[]>([]), [fault, setFault] = useState('');
-  const forces = useMemo(() => new Forces(), []), log = useMemo(() => new EventLog(), []), picture = useRef<Picture | null>(null);
+  const [marks, setMarks] = useState<Bookmark[]>([]), [fault, setFault] = useState(''), [isWhole, setIsWhole] = useState(false);
+  const still = useMemo(() => new Still(), []);
+  const course = useMemo(() => new Course(), []), log = useMemo(() => new EventLog(), []), picture = useRef<Picture | null>(null);
   const player = useMemo(() => {
     replica.restart();
     const made = new Player(recording, replica, () => redraw(n => n + 1));
-    made.onItem = item => log.addItem(item);
     if (props.link.speed !== null && kSpeeds.includes(props.link.speed)) made.speed = props.link.speed;
     return made;
   }, []);
   const people = player.people?.participant ?? [];
+  const toolGuide = useMemo((): ToolGuide => ({
+    nameOf: tool => (log.names.get(tool >> 1) ?? `hand ${(tool >> 1) + 1}`) + ((tool & 1) === 1 ? ', second tool' : ''),
+    colourOf: tool => hex(replica.slotColour(tool >> 1)),
+  }), []);
+  const overlays = useOverlays(replica, course, () => picture.current, toolGuide, recording.firstTick, () => player.tick);
   const guide = useMemo(() => guideOf(() => player.people?.participant ?? [], slot => replica.slotColour(slot)), []);
 
   useEffect(() => {
     let isGone = false;
+    const take = (item: Item): void => {
+      log.addItem(item);
+      if (item.topic === '/frame_state') course.addState(item.tick, fromBinary(FrameStateSchema, item.data));
+    };
     Object.assign(window, { trocar: { replica, player, recording, traffic, picture: () => picture.current } });
     try {
       setMarks(joined(keptBookmarks(recording.startNs), props.link.bookmarks ? readBookmarks(props.link.bookmarks) : []));
@@ -82,25 +97,28 @@ export function Debrief(props: DebriefProps): JSX.Element {
         for await (const overview of recording.overviews()) {
           if (isGone) return;
           log.addOverview(overview);
-          forces.addOverview(overview);
+          course.addOverview(overview);
           known = Number(overview.firstTick) + overview.bins * overview.binTicks;
         }
         const left = recording.lastTick - Math.max(known, recording.firstTick);
-        if (left <= 0 || recording.bytes * left / Math.max(1, recording.lastTick - recording.firstTick) > kWholeBytes) return;
+        if (left <= 0) return setIsWhole(true);
+        if (recording.bytes * left / Math.max(1, recording.lastTick - recording.firstTick) > kWholeBytes) {
+          player.onItem = take;
+          return;
+        }
         let count = 0;
-        for await (const { tick, state, item } of recording.survey(known)) {
+        for await (const item of recording.survey(known)) {
           if (isGone) return;
-          if (item) log.addItem(item);
-          for (const tool of state?.tool ?? []) forces.add(tick, tool.tool >> 1, Math.hypot(tool.forceN?.x ?? 0, tool.forceN?.y ?? 0, tool.forceN?.z ?? 0));
+          take(item);
           // The picture goes before the plot.
           if (++count % 64 === 0) await new Promise(resolve => setTimeout(resolve, 0));
         }
+        setIsWhole(true);
       } catch (error) {
         setFault(error instanceof Error ? error.message : String(error));
       }
     })();
     const timer = window.setInterval(() => {
-      for (const tool of replica.tools()) forces.add(Math.max(0, replica.newestTick), tool.slot >> 1, Math.hypot(...tool.forceN));
       redraw(n => n + 1);
     }, 100);
     return () => {
@@ -137,7 +155,6 @@ export function Debrief(props: DebriefProps): JSX.Element {
     }
   };
   const here = (): Partial<Moment> => ({ view: picture.current?.view() ?? null, speed: player.speed });
-  const nameOf = (slot: number): string => log.names.get(slot) ?? `hand ${slot + 1}`;
   return (
     <div class="layout debrief" onKeyDown={onKey}>
       <header>
@@ -148,10 +165,14 @@ export function Debrief(props: DebriefProps): JSX.Element {
         <button onClick={props.onClose}>Close</button>
       </header>
       <main>
-        <Stage replica={replica} guide={guide} isOld={false} follows={follows} people={people} onFollow={setFollows} onPicture={now => player.advance(now)} onReady={p => {
+        <Stage replica={replica} guide={guide} isOld={false} follows={follows} people={people} onFollow={setFollows} onPicture={now => player.advance(now)} onPlace={overlays.onPlace} onDrawn={drawn => {
+          overlays.draw(drawn);
+          still.drawn(drawn, overlays.lines(), replica.tools(), guide);
+        }} onReady={p => {
           picture.current = p;
           if (props.link.view) p.look(props.link.view.eye, props.link.view.target);
         }}>
+          {overlays.canvas}
           {(player.fault || fault) && <p class="banner fault" role="alert">{player.fault || fault}</p>}
           {copied && <p class="banner" role="status" onClick={() => setCopied('')}>{copied}</p>}
         </Stage>
@@ -160,10 +181,12 @@ export function Debrief(props: DebriefProps): JSX.Element {
         <People people={people} tools={replica.tools()} own={null} colourOf={slot => replica.slotColour(slot)} follows={follows} onFollow={setFollows} />
         <Events events={log.events} now={player.tick} onSeek={seek} empty="Looking for events" />
         <Bookmarks marks={marks} now={player.tick} name={props.name} onChange={change} onSeek={seek} onCopy={props.link.recordingsKey ? all => void share({ bookmarks: bookmarksText(all) }) : null} />
+        {overlays.panels}
+        <Take name={props.name} isWhole={isWhole} still={still} forces={() => forcesTable(course, tool => toolGuide.nameOf(tool))} events={() => eventsTable(log.events)} />
         {props.link.recordingsKey && <Check name={props.name} recordingsKey={props.link.recordingsKey} onSeek={seek} />}
       </aside>
       <footer>
-        <ForcePlot forces={forces} from={recording.firstTick} to={recording.lastTick} now={player.tick} height={110} nameOf={nameOf} colourOf={slot => replica.slotColour(slot)} onSeek={seek} />
+        <Plots course={course} from={recording.firstTick} to={recording.lastTick} now={player.tick} range={player.range} guide={toolGuide} onSeek={seek} />
         <Timeline clock={time} events={log.events} marks={marks} />
         <Controls clock={time} />
       </footer>

@@ -1,7 +1,5 @@
 // Forces over time: bins of 64 ms with the greatest of each, per participant's slot.
 
-import type { Overview } from './gen/proto/journal_pb';
-
 export const kBinTicks = 64;
 
 export class Forces {
@@ -16,13 +14,6 @@ export class Forces {
     if (known !== undefined && known >= newton) return;
     of.set(bin, newton);
     this.version++;
-  }
-  // Throws, with one line, if it cannot be right.
-  addOverview(overview: Overview): void {
-    if (overview.bins > 120 || overview.binTicks === 0) throw new Error('The overview of this recording cannot be read.');
-    for (const tool of overview.tool)
-      for (let i = 0; i < Math.min(overview.bins, tool.state.length); i++)
-        if (tool.state[i] !== 0) this.add(Number(overview.firstTick) + i * overview.binTicks, tool.tool >> 1, (tool.forceMn[i] ?? 0) / 1000);
   }
   get slots(): number[] { return [...this.bins.keys()].sort((a, b) => a - b); }
   // Drops what is older than `tick`: a session that goes on for hours keeps its last part.

@@ -5,7 +5,7 @@ import { fromBinary, toBinary } from '@bufbuild/protobuf';
 import { McapIndexedReader, type McapTypes } from '@mcap/core';
 import { decompress } from 'fzstd';
 import { ClaimLogSchema, JournalGapSchema, LessonRecordSchema, OverviewSchema, type JournalGap, type Overview } from './gen/proto/journal_pb';
-import { ClaimOutcome, FrameStateSchema, ParticipantsSchema, PointEventSchema, TeachAction, type ClaimEvent, type FrameState, type Participants, type TeachEvent } from './gen/proto/wire_pb';
+import { ClaimOutcome, ParticipantsSchema, PointEventSchema, TeachAction, type ClaimEvent, type Participants, type TeachEvent } from './gen/proto/wire_pb';
 
 const kBlock = 64 * 1024, kBlocks = 256, kMostChunk = 64 * 1024 * 1024;
 export const kDamaged = 'This file is no whole Trocar recording: it is damaged, cut short, or something else.';
@@ -76,6 +76,7 @@ export interface RecordedEvent { tick: number; kind: EventKind; text: string }
 // Fields of Envelope, by channel.
 const kFields: Record<string, number> = { '/surface/key': 2, '/surface/delta': 2, '/frame_state': 3, '/topology/change': 8, '/topology': 18, '/participants': 19, '/drawing': 40 };
 const kEventTopics = ['/participants', '/claims', '/topology/change', '/gap', '/lesson'], kMostEvents = 5000;
+const kCutPause = 1500; // ticks after which a cut is another one; an overview names one tick a second
 const kShown = ['/surface/delta', '/frame_state', '/drawing', ...kEventTopics];
 const kNothingDrawn = new Uint8Array([0x10, 0]); // a Drawing without strokes, which replaces what was
 type Message = McapTypes.TypedMcapRecords['Message'];
@@ -157,14 +158,10 @@ export class Recording {
     }
   }
   // What an overview holds, from the recording itself, after a tick: reads all of it.
-  async *survey(after: number): AsyncGenerator<Surveyed> {
-    for await (const m of this.reader.readMessages({ topics: [...kEventTopics, '/frame_state'], startTime: this.time(after + 1) })) {
-      const item = this.item(m);
-      yield item.topic === '/frame_state' ? { tick: item.tick, state: fromBinary(FrameStateSchema, item.data) } : { tick: item.tick, item };
-    }
+  async *survey(after: number): AsyncGenerator<Item> {
+    for await (const m of this.reader.readMessages({ topics: [...kEventTopics, '/frame_state'], startTime: this.time(after + 1) })) yield this.item(m);
   }
 }
-export interface Surveyed { tick: number; state?: FrameState; item?: Item }
 
 // Collects what happened, from whatever is read: items in the order of their ticks, or overviews.
 // What is known is not added again.
@@ -206,7 +203,7 @@ export class EventLog {
   private addLesson(event: TeachEvent): void { this.add({ tick: Number(event.tick), kind: kindOfTeaching(event.action), text: event.text }); }
   private addGap(gap: JournalGap): void { this.add({ tick: Number(gap.firstTick), kind: 'gap', text: `${gap.messages} messages are missing here` }); }
   private addCut(tick: number): void {
-    if (tick - this.lastCut > 1000 || tick < this.lastCut) this.add({ tick, kind: 'cut', text: 'Tissue is cut or tears' });
+    if (tick - this.lastCut > kCutPause || tick < this.lastCut) this.add({ tick, kind: 'cut', text: 'Tissue is cut or tears' });
     this.lastCut = tick;
   }
   private add(event: RecordedEvent): void {

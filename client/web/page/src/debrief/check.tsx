@@ -37,14 +37,14 @@ export function Check(props: { name: string; recordingsKey: string; onSeek(tick:
   const tick = answer?.tick ?? null;
   const said = answer === null ? '' : {
     verified: `Verified: ${answer.text}.`, different: `It differs at ${clock((tick ?? 0) / 1000)}, tick ${tick}: ${answer.text}.`,
-    unknown: `It cannot be told, because ${answer.text}.`, 'not asked': '',
+    unknown: `It cannot be told: ${answer.text}.`, failed: `The check came to no end: ${answer.text}.`, 'not asked': '',
   }[answer.state] ?? answer.text;
   return (
     <section aria-labelledby="check" class="check">
       <h2 id="check">Does it verify?</h2>
       <p role="status" class={answer?.state === 'different' ? 'fault' : answer?.state ?? ''}>{fault || said || 'The server can simulate it again and compare all that it says.'}</p>
       {tick !== null && <button onClick={() => props.onSeek(tick)}>Go there</button>}
-      {(answer === null || answer.state === 'not asked' || answer.state === 'unknown') && <button onClick={() => void ask('check')}>Check it</button>}
+      {(answer === null || answer.state === 'not asked' || answer.state === 'failed') && <button onClick={() => void ask('check')}>Check it</button>}
     </section>
   );
 }
