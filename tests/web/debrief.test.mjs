@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import fs from 'node:fs';
 import { base, kPatience, live, openPage, prepare, test, until, world } from './browser.mjs';
 
-const { TROCAR_WORK } = process.env;
+const { TROCAR_WORK, TROCAR_PICTURES } = process.env;
 prepare(null, ['--insecure-loopback', '--recordings', `${TROCAR_WORK}/recordings`]);
 
 const keyOf = () => world.web.text.match(/#recordings=(\w+)/)[1];
@@ -91,6 +91,8 @@ test('bookmarks stay in the browser and go on as a link; a link opens time and v
   await page.reload();
   await live(page);
   await page.locator('.bookmarks').getByText('The <b>cut</b>').waitFor({ timeout: kPatience });
+  await button(page, 'Remove The <b>cut</b>').click();
+  await page.locator('.bookmarks').getByText('The <b>cut</b>').waitFor({ state: 'detached', timeout: kPatience });
   await page.close();
   const other = await open('lesson.mcap', `&bookmarks=${encodeURIComponent('[[5,"Late"]]')}`);
   await other.locator('.bookmarks').getByText('Late').click();
@@ -196,6 +198,56 @@ test('plots are of force, speed, way and holds; ways of tips are on the picture'
   assert.equal(await inked(), 0);
   await button(page, 'Show').click();
   await until('ways are drawn', async () => await inked() > 100);
+  assert.deepEqual(page.faults, []);
+  await page.close();
+});
+
+test('a report for paper has events, plots, and pictures of bookmarks', async () => {
+  const page = await open('lesson.mcap', `&t=1&bookmarks=${encodeURIComponent('[[2,"First"],[5,"<i>Later</i>"]]')}`);
+  await page.locator('.take .none').waitFor({ state: 'detached', timeout: kPatience });
+  await button(page, 'Report for paper').click();
+  const report = page.getByRole('dialog', { name: 'Report' });
+  await report.waitFor({ timeout: kPatience });
+  await report.getByText('<i>Later</i>').waitFor({ timeout: kPatience });
+  assert.equal(await report.locator('.shots img').count(), 2);
+  const urls = await report.locator('.shots img').evaluateAll(images => images.map(image => image.src.length));
+  assert.ok(urls.every(length => length > 5000), urls.join());
+  assert.equal(await report.locator('figure svg[role=img]').count(), 3);
+  await report.getByText('incise cuts').waitFor({ timeout: kPatience });
+  const paper = await page.pdf({ format: 'A4', preferCSSPageSize: true, ...(TROCAR_PICTURES ? { path: `${TROCAR_PICTURES}/report.pdf` } : {}) });
+  assert.equal(paper.subarray(0, 4).toString(), '%PDF');
+  assert.ok(paper.length > 20_000, `${paper.length} bytes`);
+  await page.keyboard.press('Escape');
+  await report.waitFor({ state: 'detached', timeout: kPatience });
+  assert.equal(await tick(page), 1000);
+  assert.deepEqual(page.faults, []);
+  await page.close();
+});
+
+test('another recording stands beside, on one clock or by an event of each', async () => {
+  const page = await open('lesson.mcap', '&t=2'), ticks = () => page.evaluate(() => [window.trocar.player.tick, window.trocarBeside.player.tick]);
+  await page.locator('.take .none').waitFor({ state: 'detached', timeout: kPatience });
+  await page.getByRole('combobox', { name: 'Recording', exact: true }).selectOption('lesson.mcap');
+  await page.locator('.half + .half canvas[data-drawn]').waitFor({ timeout: kPatience });
+  await page.evaluate(() => window.trocar.player.seek(4000));
+  await until('both are there', async () => (await ticks()).every(t => t === 4000));
+  await until('both surfaces are equal', () => page.evaluate(() => window.trocar.replica.crc === window.trocarBeside.replica.crc));
+  await button(page, 'Play').click();
+  await until('both play', async () => (await ticks()).every(t => t > 5000));
+  await button(page, 'Pause').click();
+  const choose = async (label, text) => {
+    const choice = page.getByRole('combobox', { name: label, exact: true }), value = await choice.locator('option', { hasText: text }).first().getAttribute('value');
+    await choice.selectOption(value);
+    return page.evaluate(text => { // its tick
+      for (const button of document.querySelectorAll('.events button')) if (button.textContent.includes(text)) button.click();
+      return window.trocar.player.tick;
+    }, text);
+  };
+  const here = await choose('Where the first has', 'retract has a grasp'), there = await choose('this one has', 'incise stopped cutting');
+  await page.evaluate(tick => window.trocar.player.seek(tick), here + 100);
+  await until('events come together', async () => { const [first, second] = await ticks(); return first === here + 100 && Math.abs(second - there - 100) <= 16; });
+  await button(page, 'Take it away').click();
+  await page.locator('.half + .half').waitFor({ state: 'detached', timeout: kPatience });
   assert.deepEqual(page.faults, []);
   await page.close();
 });

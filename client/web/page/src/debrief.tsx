@@ -1,29 +1,26 @@
 // A recording: choose one, play it, go to what happened.
 
-import { fromBinary } from '@bufbuild/protobuf';
 import type { JSX } from 'preact';
 import { useEffect, useMemo, useRef, useState } from 'preact/hooks';
+import { Beside, BesideChoice, type Other } from './debrief/beside';
 import { Bookmarks } from './debrief/bookmarks';
 import { Check } from './debrief/check';
 import { joined, keepBookmarks, keptBookmarks, readBookmarks, bookmarksText, type Bookmark } from './debrief/marks';
 import { Controls, keyActs, Timeline, type Clock } from './debrief/transport';
-import { Course } from './debrief/course';
+import { Course, type Quantity } from './debrief/course';
 import { eventsTable, forcesTable, Still } from './debrief/export';
 import { useOverlays } from './debrief/measuring';
-import { Plots, type ToolGuide } from './debrief/plots';
+import { courseData, kQuantities, Plots, type ToolGuide } from './debrief/plots';
+import { readAll, take } from './debrief/reading';
+import { kMostShots, Report, type ReportContent, type Shot } from './debrief/report';
 import { Take } from './debrief/take';
-import { FrameStateSchema } from './gen/proto/wire_pb';
 import { recordingLink, type Link, type Moment } from './link';
 import { Events, hex, People } from './panels';
 import { kSpeeds, Player } from './player';
-import { EventLog, traffic, type Item, type Recording } from './recording';
+import { EventLog, traffic, type Recording } from './recording';
 import type { Replica } from './replica';
 import type { Picture } from './scene';
 import { guideOf, Stage } from './stage';
-
-// Larger parts of a recording without an overview are not read for list and plot: they show what was
-// played.
-const kWholeBytes = 100e6;
 
 export function RecordingList(props: { link: Link; onChoose(name: string): void }): JSX.Element {
   const [list, setList] = useState<{ name: string; bytes: number; changed: number }[] | null>(null), [fault, setFault] = useState('');
@@ -60,7 +57,7 @@ interface DebriefProps { replica: Replica; recording: Recording; name: string; l
 export function Debrief(props: DebriefProps): JSX.Element {
   const { replica, recording } = props;
   const [, redraw] = useState(0), [follows, setFollows] = useState<number | null>(null), [copied, setCopied] = useState('');
-  const [marks, setMarks] = useState<Bookmark[]>([]), [fault, setFault] = useState(''), [isWhole, setIsWhole] = useState(false);
+  const [marks, setMarks] = useState<Bookmark[]>([]), [fault, setFault] = useState(''), [isWhole, setIsWhole] = useState(false), [other, setOther] = useState<Other | null>(null), [report, setReport] = useState<ReportContent | null>(null);
   const still = useMemo(() => new Still(), []);
   const course = useMemo(() => new Course(), []), log = useMemo(() => new EventLog(), []), picture = useRef<Picture | null>(null);
   const player = useMemo(() => {
@@ -79,10 +76,6 @@ export function Debrief(props: DebriefProps): JSX.Element {
 
   useEffect(() => {
     let isGone = false;
-    const take = (item: Item): void => {
-      log.addItem(item);
-      if (item.topic === '/frame_state') course.addState(item.tick, fromBinary(FrameStateSchema, item.data));
-    };
     Object.assign(window, { trocar: { replica, player, recording, traffic, picture: () => picture.current } });
     try {
       setMarks(joined(keptBookmarks(recording.startNs), props.link.bookmarks ? readBookmarks(props.link.bookmarks) : []));
@@ -93,27 +86,8 @@ export function Debrief(props: DebriefProps): JSX.Element {
     void (async () => {
       await player.seek(props.link.seconds === null ? recording.firstTick : props.link.seconds * 1000);
       try {
-        let known = -1;
-        for await (const overview of recording.overviews()) {
-          if (isGone) return;
-          log.addOverview(overview);
-          course.addOverview(overview);
-          known = Number(overview.firstTick) + overview.bins * overview.binTicks;
-        }
-        const left = recording.lastTick - Math.max(known, recording.firstTick);
-        if (left <= 0) return setIsWhole(true);
-        if (recording.bytes * left / Math.max(1, recording.lastTick - recording.firstTick) > kWholeBytes) {
-          player.onItem = take;
-          return;
-        }
-        let count = 0;
-        for await (const item of recording.survey(known)) {
-          if (isGone) return;
-          take(item);
-          // The picture goes before the plot.
-          if (++count % 64 === 0) await new Promise(resolve => setTimeout(resolve, 0));
-        }
-        setIsWhole(true);
+        if (await readAll(recording, log, course, () => isGone)) setIsWhole(true);
+        else player.onItem = item => take(item, log, course);
       } catch (error) {
         setFault(error instanceof Error ? error.message : String(error));
       }
@@ -154,9 +128,23 @@ export function Debrief(props: DebriefProps): JSX.Element {
       setCopied(link);
     }
   };
+  // Goes to each bookmark for its picture, and back.
+  const makeReport = async (): Promise<void> => {
+    const before = player.tick, shots: Shot[] = [];
+    player.pause();
+    for (const mark of marks.slice(0, kMostShots)) {
+      await player.seek(mark.tick);
+      await still.next();
+      shots.push({ title: mark.name, tick: mark.tick, url: still.canvas.toDataURL('image/jpeg', 0.9) });
+    }
+    await player.seek(before);
+    const plots = (Object.keys(kQuantities) as Quantity[]).map(what => courseData(course, what, recording.firstTick, recording.lastTick, toolGuide));
+    const owners = [...new Set(course.slots.map(tool => toolGuide.nameOf(tool & ~1)))];
+    setReport({ name: props.name, organ: recording.organ, startMs: Number(recording.startNs / 1_000_000n), lastTick: recording.lastTick, people: owners, events: log.events, plots, shots });
+  };
   const here = (): Partial<Moment> => ({ view: picture.current?.view() ?? null, speed: player.speed });
   return (
-    <div class="layout debrief" onKeyDown={onKey}>
+    <div class={`layout debrief${other ? ' two' : ''}`} onKeyDown={onKey}>
       <header>
         <h1>Trocar</h1>
         <span class="file" title={recording.organ}>{props.name}</span>
@@ -165,24 +153,28 @@ export function Debrief(props: DebriefProps): JSX.Element {
         <button onClick={props.onClose}>Close</button>
       </header>
       <main>
-        <Stage replica={replica} guide={guide} isOld={false} follows={follows} people={people} onFollow={setFollows} onPicture={now => player.advance(now)} onPlace={overlays.onPlace} onDrawn={drawn => {
-          overlays.draw(drawn);
-          still.drawn(drawn, overlays.lines(), replica.tools(), guide);
-        }} onReady={p => {
-          picture.current = p;
-          if (props.link.view) p.look(props.link.view.eye, props.link.view.target);
-        }}>
-          {overlays.canvas}
-          {(player.fault || fault) && <p class="banner fault" role="alert">{player.fault || fault}</p>}
-          {copied && <p class="banner" role="status" onClick={() => setCopied('')}>{copied}</p>}
-        </Stage>
+        <div class="half">
+          <Stage replica={replica} guide={guide} isOld={false} follows={follows} people={people} onFollow={setFollows} onPicture={now => player.advance(now)} onPlace={overlays.onPlace} onDrawn={drawn => {
+            overlays.draw(drawn);
+            still.drawn(drawn, overlays.lines(), replica.tools(), guide);
+          }} onReady={p => {
+            picture.current = p;
+            if (props.link.view) p.look(props.link.view.eye, props.link.view.target);
+          }}>
+            {overlays.canvas}
+            {(player.fault || fault) && <p class="banner fault" role="alert">{player.fault || fault}</p>}
+            {copied && <p class="banner" role="status" onClick={() => setCopied('')}>{copied}</p>}
+          </Stage>
+        </div>
+        {other && <Beside key={other.name} other={other} first={player} firstEvents={log.events} />}
       </main>
       <aside>
         <People people={people} tools={replica.tools()} own={null} colourOf={slot => replica.slotColour(slot)} follows={follows} onFollow={setFollows} />
         <Events events={log.events} now={player.tick} onSeek={seek} empty="Looking for events" />
         <Bookmarks marks={marks} now={player.tick} name={props.name} onChange={change} onSeek={seek} onCopy={props.link.recordingsKey ? all => void share({ bookmarks: bookmarksText(all) }) : null} />
         {overlays.panels}
-        <Take name={props.name} isWhole={isWhole} still={still} forces={() => forcesTable(course, tool => toolGuide.nameOf(tool))} events={() => eventsTable(log.events)} />
+        <Take name={props.name} isWhole={isWhole} still={still} forces={() => forcesTable(course, tool => toolGuide.nameOf(tool))} events={() => eventsTable(log.events)} onReport={makeReport} />
+        <BesideChoice recordingsKey={props.link.recordingsKey} other={other} onOther={setOther} />
         {props.link.recordingsKey && <Check name={props.name} recordingsKey={props.link.recordingsKey} onSeek={seek} />}
       </aside>
       <footer>
@@ -190,6 +182,7 @@ export function Debrief(props: DebriefProps): JSX.Element {
         <Timeline clock={time} events={log.events} marks={marks} />
         <Controls clock={time} />
       </footer>
+      {report && <Report content={report} onClose={() => setReport(null)} />}
     </div>
   );
 }

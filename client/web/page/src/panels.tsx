@@ -74,6 +74,6 @@ interface PlotProps {
 // Forces over time; a click goes there.
 export function ForcePlot(props: PlotProps): JSX.Element {
   const { forces } = props, [seconds, ...values] = forces.columns(props.from, props.to, 600);
-  const series = forces.slots.map((slot, i) => ({ name: props.nameOf(slot), colour: hex(props.colourOf(slot)), dash: kDashes[(i >> 1) % kDashes.length] ?? [], values: values[i] ?? [] }));
+  const series = forces.slots.map((slot, i) => ({ name: props.nameOf(slot), colour: hex(props.colourOf(slot)), dash: kDashes[i % kDashes.length] ?? [], values: values[i] ?? [] }));
   return <Plot data={{ seconds, series, unit: 'N', what: 'Force', version: forces.version }} now={props.now} height={props.height} onSeek={props.onSeek} />;
 }

@@ -35,7 +35,7 @@ export function Plot(props: { data: PlotData; now: number; range?: [number, numb
       width: box.current?.clientWidth ?? 300, height: props.height, legend: { show: false }, padding: [8, 8, 0, 0],
       cursor: { drag: { x: false, y: false }, points: { show: false } },
       scales: { x: { time: false }, y: { range: (_u, _min, max) => [0, Math.max(data.unit === 'N' ? 0.5 : 5, (max ?? 0) * 1.1)] } },
-      axes: [{ ...axis, values: (_u, ticks) => ticks.map(s => clock(s).replace(/\.0$/, '')) }, { ...axis, values: (_u, ticks) => ticks.map(n => `${n} ${data.unit}`), size: data.unit === 'N' ? 46 : 66 }],
+      axes: [{ ...axis, values: (_u, ticks) => ticks.map(s => clock(s).replace(/\.0$/, '')) }, { ...axis, values: (_u, ticks) => ticks.map(n => (data.unit === 'N' ? `${n} N` : String(n))), size: 46 }],
       series: [{}, ...data.series.map(s => ({ label: s.name, stroke: s.colour, width: 1.5, dash: s.dash, points: { show: false }, spanGaps: true }))],
       hooks: { drawClear: [u => band(u, latest.current.range ?? null)], draw: [u => line(u, latest.current.now / 1000, text)] },
     }, columns, box.current!);

@@ -5,9 +5,8 @@ import type { Tool } from '../replica';
 import type { Guide, Picture } from '../scene';
 import { hex } from '../panels';
 import { kBinTicks, type Course } from './course';
-import { label, sketch, type Line } from './sketch';
+import { kLabelAbove, label, sketch, type Line } from './sketch';
 
-const kLabelAbove = 18; // pixels
 const kVerbNames = ['none', 'push', 'grasp', 'cut'];
 
 // A canvas with the picture, names, forces and lines, for files that a person takes along.

@@ -2,7 +2,7 @@
 // measures.
 
 import type { JSX } from 'preact';
-import { useEffect, useRef, useState } from 'preact/hooks';
+import { useRef, useState } from 'preact/hooks';
 import type { Replica } from '../replica';
 import type { Picture } from '../scene';
 import type { Course } from './course';
@@ -25,7 +25,10 @@ export interface Overlays {
 export function useOverlays(replica: Replica, course: Course, picture: () => Picture | null, guide: ToolGuide, from: number, now: () => number): Overlays {
   const [kind, setKind] = useState<MeasureKind>('off'), [, redraw] = useState(0), [hasPaths, setHasPaths] = useState(false), [seconds, setSeconds] = useState(15);
   const measure = useRef(new Measure(replica)), over = useRef<HTMLCanvasElement>(null);
-  useEffect(() => { measure.current.clear(); }, [kind === 'off']);
+  const choose = (to: MeasureKind): void => {
+    if (to === 'off') measure.current.clear();
+    setKind(to);
+  };
   const said = (): string => {
     const places = measure.current.positions();
     if (kind === 'distance') return places.length < 2 ? '' : `${(lengthOf(places) * 1e3).toFixed(1)} mm`;
@@ -61,7 +64,7 @@ export function useOverlays(replica: Replica, course: Course, picture: () => Pic
     canvas: <canvas class="sketch" ref={over} aria-hidden="true" />,
     panels: (
       <>
-        <MeasurePanel kind={kind} count={measure.current.count} said={said()} onKind={setKind} onUndo={() => change(() => measure.current.removeLast())} onClear={() => change(() => measure.current.clear())} />
+        <MeasurePanel kind={kind} count={measure.current.count} said={said()} onKind={choose} onUndo={() => change(() => measure.current.removeLast())} onClear={() => change(() => measure.current.clear())} />
         <PathsPanel isShown={hasPaths} seconds={seconds} onShow={setHasPaths} onSeconds={setSeconds} />
       </>
     ),

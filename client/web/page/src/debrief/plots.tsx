@@ -11,14 +11,14 @@ import type { Range } from './transport';
 const kRows = 600, kMostHolds = 600, kHeight = 110;
 const kUnits: Record<Quantity, string> = { force: 'N', speed: 'mm/s', path: 'mm' };
 export const kQuantities: Record<Quantity, string> = { force: 'Force', speed: 'Speed of the tip', path: 'Way of the tip' };
-const kChoices = { ...kQuantities, holds: 'Who holds what' };
+const kChoices = { force: 'Force, N', speed: 'Speed of the tip, mm/s', path: 'Way of the tip, mm', holds: 'Who holds what' };
 
 // Names and colours of tools, by their slots.
 export interface ToolGuide { nameOf(tool: number): string; colourOf(tool: number): string }
 
 export function courseData(course: Course, what: Quantity, from: number, to: number, guide: ToolGuide): PlotData {
   const [seconds, ...values] = course.columns(what, from, to, kRows);
-  const series = course.slots.map((tool, i) => ({ name: guide.nameOf(tool), colour: guide.colourOf(tool), dash: kDashes[(i >> 1 & 1) * 2 + (tool & 1)] ?? [], values: values[i] ?? [] }));
+  const series = course.slots.map((tool, i) => ({ name: guide.nameOf(tool), colour: guide.colourOf(tool), dash: kDashes[i % kDashes.length] ?? [], values: values[i] ?? [] }));
   return { seconds, series, unit: kUnits[what], what: kQuantities[what], version: course.version };
 }
 
@@ -57,7 +57,7 @@ function Holds(props: { holds: Hold[]; tools: number[]; from: number; to: number
                 ref={el => {
                   if (!el) return;
                   el.style.left = share(hold.from);
-                  el.style.width = share(hold.to - hold.from + props.from);
+                  el.style.width = share(Math.min(hold.to, props.to) - hold.from + props.from);
                   el.style.setProperty('--own', props.guide.colourOf(tool));
                 }} />
             ))}

@@ -6,6 +6,7 @@ import type { Picture } from '../scene';
 
 export interface Line { places: (Vec3 | null)[]; colour: string; dash: number[]; isClosed?: boolean; hasDots?: boolean; text?: string }
 
+export const kLabelAbove = 18; // pixels
 const kDot = 4, kWidth = 2, kFont = '600 14px system-ui, sans-serif';
 
 // `scale`: pixels of the canvas for one of the page.
@@ -46,7 +47,7 @@ export function sketch(to: CanvasRenderingContext2D, picture: Picture, lines: Li
       to.stroke();
     }
     if (line.text && seen.length > 0) {
-      const x = seen.reduce((sum, p) => sum + p[0], 0) / seen.length, y = seen.reduce((sum, p) => sum + p[1], 0) / seen.length;
+      const x = seen.reduce((sum, p) => sum + p[0], 0) / seen.length, y = Math.min(...seen.map(p => p[1])) - kLabelAbove;
       label(to, line.text, x, y, line.colour);
     }
   }

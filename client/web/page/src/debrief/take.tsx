@@ -1,4 +1,4 @@
-// What a person takes along: the picture, a clip, tables of forces and events.
+// What a person takes along: the picture, a clip, tables of forces and events, a report.
 
 import type { JSX } from 'preact';
 import { useEffect, useRef, useState } from 'preact/hooks';
@@ -15,14 +15,20 @@ interface Props {
   still: Still;
   forces(): string; // tables
   events(): string;
+  onReport(): Promise<void>;
 }
 
 const clipKind = (): string | undefined => (typeof MediaRecorder === 'undefined' ? undefined : kClipKinds.find(kind => MediaRecorder.isTypeSupported(kind)));
 
 export function Take(props: Props): JSX.Element {
-  const [fault, setFault] = useState(''), [isRecording, setIsRecording] = useState(false), recorder = useRef<MediaRecorder | null>(null);
+  const [fault, setFault] = useState(''), [isRecording, setIsRecording] = useState(false), [isMaking, setIsMaking] = useState(false), recorder = useRef<MediaRecorder | null>(null);
   const base = props.name.replace(/\.mcap$/, '');
   const table = (text: string): Blob => new Blob(['\ufeff', text], { type: 'text/csv' });
+  const report = async (): Promise<void> => {
+    setIsMaking(true);
+    await props.onReport();
+    setIsMaking(false);
+  };
   const takePicture = async (): Promise<void> => {
     await props.still.next();
     props.still.canvas.toBlob(blob => (blob ? save(`${base}.png`, blob) : setFault('This browser makes no PNG.')), 'image/png');
@@ -63,6 +69,7 @@ export function Take(props: Props): JSX.Element {
         <button aria-pressed={isRecording} onClick={() => (isRecording ? stop() : void begin())}>{isRecording ? 'End the clip' : 'Clip'}</button>
         <button onClick={() => save(`${base}.forces.csv`, table(props.forces()))}>Forces as a table</button>
         <button onClick={() => save(`${base}.events.csv`, table(props.events()))}>Events as a table</button>
+        <button disabled={isMaking} onClick={() => void report()}>Report for paper</button>
       </div>
       {fault && <p class="fault" role="alert">{fault}</p>}
       {!props.isWhole && <p class="none">The tables hold what has been read so far.</p>}
