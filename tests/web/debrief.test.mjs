@@ -235,6 +235,7 @@ test('another recording stands beside, on one clock or by an event of each', asy
   await button(page, 'Play').click();
   await until('both play', async () => (await ticks()).every(t => t > 5000));
   await button(page, 'Pause').click();
+  await page.locator('.aligned summary').click();
   const choose = async (label, text) => {
     const choice = page.getByRole('combobox', { name: label, exact: true }), value = await choice.locator('option', { hasText: text }).first().getAttribute('value');
     await choice.selectOption(value);

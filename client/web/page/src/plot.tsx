@@ -57,6 +57,7 @@ function line(u: uPlot, seconds: number, colour: string): void {
   u.ctx.save();
   u.ctx.strokeStyle = colour;
   u.ctx.lineWidth = 1.5;
+  u.ctx.setLineDash([]);
   u.ctx.beginPath();
   u.ctx.moveTo(x, u.bbox.top);
   u.ctx.lineTo(x, u.bbox.top + u.bbox.height);

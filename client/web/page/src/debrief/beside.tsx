@@ -104,11 +104,11 @@ export function Beside(props: { other: Other; first: Player; firstEvents: Record
         keepUp(player, props.first, offset);
         player.advance(now);
       }}>
-        <div class="aligned">
-          <b>{name}</b> <span class="time">{clock(player.tick / 1000)}</span>
+        <details class="aligned">
+          <summary><b>{name}</b> <span class="time">{clock(player.tick / 1000)}</span> Align</summary>
           <EventChoice label="Where the first has" events={props.firstEvents} onTick={setHere} />
           <EventChoice label="this one has" events={log.events} onTick={setThere} />
-        </div>
+        </details>
         {(player.fault || fault) && <p class="banner fault" role="alert">{player.fault || fault}</p>}
       </Stage>
     </div>
