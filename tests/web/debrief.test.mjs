@@ -1,9 +1,10 @@
 // A recording in headless Chromium: what a person does with it besides playing.
 import assert from 'node:assert/strict';
 import fs from 'node:fs';
+import { createRequire } from 'node:module';
 import { base, kPatience, live, openPage, prepare, test, until, world } from './browser.mjs';
 
-const { TROCAR_WORK, TROCAR_PICTURES } = process.env;
+const { TROCAR_MODULES, TROCAR_RECORDING, TROCAR_WORK, TROCAR_PICTURES } = process.env;
 prepare(null, ['--insecure-loopback', '--recordings', `${TROCAR_WORK}/recordings`]);
 
 const keyOf = () => world.web.text.match(/#recordings=(\w+)/)[1];
@@ -251,4 +252,48 @@ test('another recording stands beside, on one clock or by an event of each', asy
   await page.locator('.half + .half').waitFor({ state: 'detached', timeout: kPatience });
   assert.deepEqual(page.faults, []);
   await page.close();
+});
+
+// The recording again, with what `change` makes of each message; null leaves it out.
+async function rewritten(change) {
+  const require = createRequire(`${TROCAR_MODULES}/`), { McapIndexedReader, McapWriter } = require('@mcap/core'), { decompress } = require('fzstd');
+  const from = fs.readFileSync(TROCAR_RECORDING), parts = [];
+  const readable = { size: async () => BigInt(from.length), read: async (at, size) => new Uint8Array(from.subarray(Number(at), Number(at + size))) };
+  const reader = await McapIndexedReader.Initialize({ readable, decompressHandlers: { zstd: (packed, size) => decompress(packed, new Uint8Array(Number(size))) } });
+  let length = 0;
+  const writer = new McapWriter({ writable: { position: () => BigInt(length), write: async bytes => { parts.push(Buffer.from(bytes)); length += bytes.length; } } }), channels = new Map();
+  await writer.start({ profile: 'trocar', library: 'test' });
+  for await (const metadata of reader.readMetadata()) await writer.addMetadata(metadata);
+  for await (const message of reader.readMessages()) {
+    const channel = reader.channelsById.get(message.channelId), to = change(channel.topic, message);
+    if (to === null) continue;
+    if (!channels.has(channel.id)) channels.set(channel.id, await writer.registerChannel({ topic: channel.topic, messageEncoding: channel.messageEncoding, schemaId: 0, metadata: channel.metadata }));
+    await writer.addMessage({ ...message, ...to, channelId: channels.get(channel.id) });
+  }
+  await writer.end();
+  return Buffer.concat(parts);
+}
+const dropped = async bytes => {
+  const page = await openPage(base());
+  await page.locator('input[type=file]').setInputFiles({ name: 'made.mcap', mimeType: 'application/octet-stream', buffer: bytes });
+  return page;
+};
+
+test('an older recording without overview is read itself; a wrong overview or time is one sentence', async () => {
+  const older = await dropped(await rewritten(topic => (topic === '/overview' ? null : {})));
+  await older.locator('.take .none').waitFor({ state: 'detached', timeout: kPatience });
+  await older.locator('.events').getByText('incise cuts').waitFor({ timeout: kPatience });
+  await older.getByRole('img', { name: /^Force over time. Greatest: .*incise [1-9][\d.]* N/ }).waitFor({ timeout: kPatience });
+  assert.deepEqual(older.faults, []);
+  await older.close();
+  for (const data of [Buffer.from([0x10, 0x80, 0x02, 0x18, 0x88, 0x27]), Buffer.alloc(300, 0xff)]) { // 5,000 bins; no message
+    const page = await dropped(await rewritten(topic => (topic === '/overview' ? { data } : {})));
+    await page.getByRole('alert').getByText('The overview of this recording cannot be read.').waitFor({ timeout: kPatience });
+    await live(page);
+    assert.deepEqual(page.faults, []);
+    await page.close();
+  }
+  const late = await dropped(await rewritten((topic, message) => (topic === '/overview' ? { logTime: message.logTime + 10n ** 17n } : {})));
+  await late.getByRole('alert').getByText(/This file is no whole Trocar recording/).waitFor({ timeout: kPatience });
+  await late.close();
 });

@@ -7,7 +7,7 @@ import { decompress } from 'fzstd';
 import { ClaimLogSchema, JournalGapSchema, LessonRecordSchema, OverviewSchema, type JournalGap, type Overview } from './gen/proto/journal_pb';
 import { ClaimOutcome, ParticipantsSchema, PointEventSchema, TeachAction, type ClaimEvent, type Participants, type TeachEvent } from './gen/proto/wire_pb';
 
-const kBlock = 64 * 1024, kBlocks = 256, kMostChunk = 64 * 1024 * 1024;
+const kBlock = 64 * 1024, kBlocks = 256, kMostChunk = 64 * 1024 * 1024, kMostTicks = 1e9;
 export const kDamaged = 'This file is no whole Trocar recording: it is damaged, cut short, or something else.';
 const kCutShort = 'This recording was cut short and has no index: make it whole with "trocar-journal repair".';
 
@@ -99,6 +99,7 @@ export class Recording {
         organ = m.metadata.get('organ_name') ?? '';
       }
       const recording = new Recording(reader, readable, start, 0, Number(((reader.statistics?.messageEndTime ?? start) - start) / 1_000_000n), organ, bytes);
+      if (!(recording.lastTick >= 0 && recording.lastTick <= kMostTicks)) throw new Error(kDamaged);
       // A picture needs a keyframe: the first one is where the recording begins.
       let first = 0;
       for await (const m of reader.readMessages({ topics: ['/surface/key'] })) { first = recording.item(m).tick; break; }
@@ -152,7 +153,7 @@ export class Recording {
   async *overviews(): AsyncGenerator<Overview> {
     this.readable.isSparse = true;
     try {
-      for await (const m of this.reader.readMessages({ topics: ['/overview'] })) yield fromBinary(OverviewSchema, m.data);
+      for await (const m of this.reader.readMessages({ topics: ['/overview'] })) yield readOverview(m.data);
     } finally {
       this.readable.isSparse = false;
     }
@@ -161,6 +162,11 @@ export class Recording {
   async *survey(after: number): AsyncGenerator<Item> {
     for await (const m of this.reader.readMessages({ topics: [...kEventTopics, '/frame_state'], startTime: this.time(after + 1) })) yield this.item(m);
   }
+}
+
+export const kBadOverview = 'The overview of this recording cannot be read.';
+function readOverview(data: Uint8Array): Overview {
+  try { return fromBinary(OverviewSchema, data); } catch { throw new Error(kBadOverview); }
 }
 
 // Collects what happened, from whatever is read: items in the order of their ticks, or overviews.

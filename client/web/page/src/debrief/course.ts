@@ -3,6 +3,7 @@
 
 import type { Overview } from '../gen/proto/journal_pb';
 import type { FrameState, Vec3 as WireVec3 } from '../gen/proto/wire_pb';
+import { kBadOverview } from '../recording';
 import { Verb, type Vec3 } from '../replica';
 
 export const kBinTicks = 256; // as overviews have it
@@ -41,7 +42,7 @@ export class Course {
 
   // Throws, with one line, if it cannot be right.
   addOverview(overview: Overview): void {
-    if (overview.binTicks !== kBinTicks || overview.bins > kMostBins) throw new Error('The overview of this recording cannot be read.');
+    if (overview.binTicks !== kBinTicks || overview.bins > kMostBins) throw new Error(kBadOverview);
     const first = Number(overview.firstTick);
     for (const tool of overview.tool) {
       const bins = this.binsOf(tool.tool), at: Vec3 = [0, 0, 0];

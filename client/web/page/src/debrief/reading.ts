@@ -19,8 +19,8 @@ export async function readAll(recording: Recording, log: EventLog, course: Cours
   let known = -1, count = 0;
   for await (const overview of recording.overviews()) {
     if (isGone()) return true;
+    course.addOverview(overview); // it checks it
     log.addOverview(overview);
-    course.addOverview(overview);
     known = Number(overview.firstTick) + overview.bins * overview.binTicks;
   }
   const left = recording.lastTick - Math.max(known, recording.firstTick);
