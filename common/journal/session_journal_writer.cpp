@@ -86,6 +86,14 @@ Status SessionJournalWriter::write(JournalTopic topic, Tick tick, std::uint64_t 
   return write(topic, tick, publish_time_ns, scratch_);
 }
 
+Status SessionJournalWriter::write_overview(Tick tick, std::uint64_t now_ns,
+                                            const proto::Overview& overview) {
+  if (Status flushed = flush(); !flushed.ok()) return flushed;
+  if (Status written = write(JournalTopic::Overview, tick, now_ns, overview); !written.ok())
+    return written;
+  return flush();
+}
+
 Status SessionJournalWriter::write_tool(ToolSlot tool, Tick tick, std::uint64_t publish_time_ns,
                                         const proto::ToolState& state) {
   TROCAR_ASSERT(tool.is_valid());

@@ -94,6 +94,10 @@ class SessionJournalWriter {
     return write(JournalTopic::Gap, tick, now_ns, gap);
   }
 
+  // In a chunk of its own, so that who reads overviews loads nothing else.
+  [[nodiscard]] Status write_overview(Tick tick, std::uint64_t now_ns,
+                                      const proto::Overview& overview);
+
   [[nodiscard]] Status flush() { return mcap_->flush(); }
   [[nodiscard]] Status close() { return mcap_->close(); }  // once, at the session's end
   std::uint64_t bytes_written() const { return mcap_->bytes_written(); }

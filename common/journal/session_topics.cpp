@@ -31,6 +31,7 @@ const TopicEntry& entry_of(JournalTopic topic) {
       {"/hands", proto::HandLog::descriptor()},
       {"/lesson", proto::LessonRecord::descriptor()},
       {"/drawing", proto::Drawing::descriptor()},
+      {"/overview", proto::Overview::descriptor()},
   }};
   return kEntries[static_cast<std::size_t>(topic)];
 }

@@ -19,6 +19,7 @@
 //                                     they pointed, and the view to follow
 //   /drawing         Drawing          all that is drawn on the surface, on change
 //   /frame_state     FrameState       tools, regions and figures of a frame, as a client got them
+//   /overview        Overview         every 30 s, in a chunk of its own: what a page plots of them
 //   /gap             JournalGap       where the queue to the writer was full
 //   /tool/<slot>     ToolState        one channel per tool, for plots in other programs
 //
@@ -55,8 +56,9 @@ enum class JournalTopic : std::uint8_t {
   Hands,
   Lesson,
   Drawing,
+  Overview,
 };
-inline constexpr int kJournalTopicCount = 16;
+inline constexpr int kJournalTopicCount = 17;
 
 inline constexpr const char* kJournalProfile = "trocar";
 inline constexpr const char* kSessionMetadataName = "trocar.session";

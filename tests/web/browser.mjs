@@ -32,7 +32,7 @@ export function launch(name, args) {
   children.add(child);
   return child;
 }
-async function portOf(child, file) {
+export async function portOf(child, file) {
   await until(`${file} of ${child.spawnfile}`, () => fs.existsSync(file) || child.hasEnded);
   if (!fs.existsSync(file)) throw new Error(child.text);
   return Number(fs.readFileSync(file, 'utf8'));
@@ -71,12 +71,19 @@ export const close = async page => {
   await page.close();
 };
 
+export const openBrowser = () => chromium.launch({ executablePath: TROCAR_CHROMIUM, timeout: kPatience, args: ['--no-sandbox', '--use-angle=swiftshader',
+  '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist', '--disable-dev-shm-usage'] });
+// The programs first: a browser that hangs must not keep them.
+export async function endAll(browser) {
+  for (const child of children) child.kill('SIGKILL');
+  await browser?.close();
+}
+
 // Before the tests of a file: a browser, trocar-web with a folder of recordings that holds one, and, unless
 // `session` is null, a server with these arguments.
 export function prepare(session, web) {
   before(async () => {
-    world.browser = await chromium.launch({ executablePath: TROCAR_CHROMIUM, timeout: kPatience, args: ['--no-sandbox', '--use-angle=swiftshader',
-      '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist', '--disable-dev-shm-usage'] });
+    world.browser = await openBrowser();
     world.context = await world.browser.newContext({ viewport: { width: 900, height: 600 } });
     if (session) world.server = await startServer('lesson', session);
     fs.mkdirSync(`${TROCAR_WORK}/recordings`);
@@ -87,10 +94,7 @@ export function prepare(session, web) {
   afterEach(async () => {
     for (const context of world.browser?.contexts() ?? []) for (const page of context.pages()) await page.close();
   }, { timeout: kEndMs });
-  after(async () => {
-    for (const child of children) child.kill('SIGKILL');
-    await world.browser?.close();
-  }, { timeout: kEndMs });
+  after(() => endAll(world.browser), { timeout: kEndMs });
 }
 // However this process ends, no program outlives it.
 process.on('exit', () => { for (const child of children) child.kill('SIGKILL'); });

@@ -1,40 +1,13 @@
 // A lesson in headless Chromium, against the real programs: what an instructor does on the page, what
 // others see of it, and that the recording of it verifies.
 import assert from 'node:assert/strict';
-import { spawn } from 'node:child_process';
-import fs from 'node:fs';
-import { createRequire } from 'node:module';
 import { after, before, test } from 'node:test';
+import { endAll, kPatience, launch, live, openBrowser, portOf, sleep, until } from './browser.mjs';
 
-const { TROCAR_MODULES, TROCAR_BUILD, TROCAR_ROOT, TROCAR_WORK, TROCAR_CHROMIUM, TROCAR_PICTURES } = process.env;
-const { chromium } = createRequire(`${TROCAR_MODULES}/`)('playwright-core');
-const kPatience = 60_000, kTest = { timeout: 120_000 };
-const children = new Set();
+const { TROCAR_ROOT, TROCAR_WORK, TROCAR_PICTURES } = process.env;
+const kTest = { timeout: 120_000 };
 let browser, context, server, web, hand, ivy, olga;
 
-const sleep = ms => new Promise(resolve => setTimeout(resolve, ms));
-async function until(what, condition) {
-  const end = Date.now() + kPatience;
-  for (;;) {
-    const value = await condition();
-    if (value) return value;
-    if (Date.now() > end) throw new Error(`${what}: has not come about within ${kPatience / 1000} s`);
-    await sleep(100);
-  }
-}
-function launch(name, args) {
-  const child = spawn(`${TROCAR_BUILD}/bin/${name}`, args, { stdio: ['ignore', 'pipe', 'pipe'] });
-  child.text = '';
-  child.ended = new Promise(resolve => child.on('exit', code => { child.hasEnded = true; children.delete(child); resolve(code); }));
-  for (const stream of [child.stdout, child.stderr]) stream.on('data', data => { child.text += data; });
-  children.add(child);
-  return child;
-}
-async function portOf(child, file) {
-  await until(file, () => fs.existsSync(file) || child.hasEnded);
-  if (!fs.existsSync(file)) throw new Error(child.text);
-  return Number(fs.readFileSync(file, 'utf8'));
-}
 async function openPage(role, name) {
   const page = await context.newPage();
   page.faults = [];
@@ -42,7 +15,6 @@ async function openPage(role, name) {
   await page.goto(`http://127.0.0.1:${web.port}/#${new URLSearchParams({ join: server.codes[role], role, name })}`);
   return page;
 }
-const live = page => page.waitForSelector('canvas[data-drawn]', { timeout: kPatience });
 const sees = (page, text) => page.locator('.events').getByText(text).first().waitFor({ timeout: kPatience });
 const press = (page, name, exact = true) => page.getByRole('button', { name, exact }).click({ timeout: kPatience });
 const tip = page => page.evaluate(() => window.trocar.replica.tools()[0]?.hand);
@@ -56,8 +28,7 @@ async function manage(name, what) {
 const picture = async (page, name) => { if (TROCAR_PICTURES) await page.screenshot({ path: `${TROCAR_PICTURES}/${name}.png` }); };
 
 before(async () => {
-  browser = await chromium.launch({ executablePath: TROCAR_CHROMIUM, args: ['--no-sandbox', '--use-angle=swiftshader',
-    '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist', '--disable-dev-shm-usage'] });
+  browser = await openBrowser();
   context = await browser.newContext({ viewport: { width: 1280, height: 720 } });
   server = launch('trocar-server', ['--listen', '127.0.0.1:0', '--no-announce', '--organ', 'liver',
     '--journal', `${TROCAR_WORK}/lesson.mcap`, '--ready-file', `${TROCAR_WORK}/server.port`]);
@@ -72,10 +43,7 @@ before(async () => {
   olga = await openPage('observer', 'Olga');
   await live(olga);
 }, { timeout: 120_000 });
-after(async () => {
-  await browser?.close();
-  for (const child of children) child.kill('SIGKILL');
-});
+after(() => endAll(browser), { timeout: 30_000 });
 
 test('a tool that is frozen stays, and goes back when it is released', kTest, async () => {
   hand = launch('trocar-client', ['--server', `127.0.0.1:${server.port}`, '--name', 'Sam', '--no-render', '--join', server.codes.surgeon,

@@ -117,6 +117,7 @@ function ask(path, headers = {}, from = base()) {
     });
     request.on('upgrade', answer => { request.destroy(); resolve({ status: answer.statusCode, headers: answer.headers, text: '' }); });
     request.on('error', () => resolve(null));
+    request.on('close', () => resolve(null)); // also in the middle of an answer
     request.setTimeout(15_000, () => request.destroy());
     request.end();
   });
@@ -162,7 +163,7 @@ test('a browser that does not read holds up nobody, and nothing piles up for it'
     const socket = net.connect(world.web.port, '127.0.0.1');
     socket.on('error', () => undefined);
     socket.write(`GET /session HTTP/1.1\r\nHost: 127.0.0.1:${world.web.port}\r\nOrigin: http://127.0.0.1:${world.web.port}\r\n${Object.entries(kUpgrade).map(([k, v]) => `${k}: ${v}\r\n`).join('')}\r\n`);
-    await new Promise(resolve => socket.once('data', resolve));
+    await new Promise((resolve, reject) => socket.once('data', resolve).once('close', () => reject(new Error('trocar-web has closed'))));
     socket.pause();
     socket.write(frameOf(JSON.stringify({ code: world.server.codes.observer, name: `Stalled ${i}`, role: 'observer', more: 'x'.repeat(100) })));
     stalled.push(socket);

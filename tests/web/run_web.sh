@@ -1,5 +1,5 @@
 #!/bin/bash
-# run_web.sh recording|codec|page|lesson|figures BUILD_FOLDER WORK_FOLDER: one of the tests of the page. Exit code 77:
+# run_web.sh recording|codec|page|lesson|debrief|figures BUILD_FOLDER WORK_FOLDER: one of the tests of the page. Exit code 77:
 # skipped, with the reason.
 set -euo pipefail
 test=$1 build=$2 work=$3
@@ -44,7 +44,7 @@ record() {
 case $test in
   recording) record ;;
   codec) node --test-reporter=spec "$here/codec.test.mjs" ;;
-  page | lesson | figures)
+  page | lesson | debrief | figures)
     chromium=$(command -v chromium || command -v chromium-browser || command -v google-chrome) ||
       skip "Chromium is not installed: deploy/setup --with-web"
     [ -e "$build/web/page/index.html" ] || skip "the page is not built"

@@ -152,6 +152,12 @@ void CommandLine::add_limit_options() {
       ->type_name("N")
       ->check(CLI::Range(4, 10'000))
       ->capture_default_str();
+  limits
+      ->add_option("--check-limit", options_.check_limit_s,
+                   "seconds after which the check of a recording is given up")
+      ->type_name("N")
+      ->check(CLI::Range(1, 86'400))
+      ->capture_default_str();
 }
 
 Status CommandLine::check(const std::string& key, const std::string& text) {

@@ -25,7 +25,8 @@ struct WebOptions {
   bool is_insecure = false;
   bool makes_new_key = false;
   int most_connections = 600, most_per_address = 200;
-  double seconds = 0;  // 0: until told to end
+  int check_limit_s = 3600;  // of one recording's check
+  double seconds = 0;        // 0: until told to end
   std::string ready_file;
   std::string log_level = "info";
   bool checks_config = false;

@@ -11,6 +11,7 @@
 #include "common/base/log.h"
 #include "common/base/timing.h"
 #include "common/secure/digest.h"
+#include "server/app/web/recording_checks.h"
 #include "server/app/web/web_socket.h"
 #include "server/web/site/request_rules.h"
 
@@ -63,6 +64,7 @@ struct WebServer::Core : std::enable_shared_from_this<WebServer::Core> {
   bridge::Bridge bridge;
   tcp::acceptor acceptor{context}, metrics_acceptor{context};
   access::TryLimiter key_limiter;
+  std::optional<RecordingChecks> checks;  // where there are recordings
   WebCounters counters;
   std::map<std::string, int> open_by_address;
   // Whoever is connected can be cut: by closing its socket, or its watcher.
@@ -75,7 +77,10 @@ struct WebServer::Core : std::enable_shared_from_this<WebServer::Core> {
         options(given),
         content(std::move(what)),
         tls(std::move(with)),
-        bridge(given.sessions) {}
+        bridge(given.sessions) {
+    if (content.recordings)
+      checks.emplace(io, content.state_folder, std::chrono::seconds(given.check_limit_s));
+  }
 
   Status open(tcp::acceptor& listener, const char* option, const std::string& address,
               std::uint16_t port) const {
@@ -310,12 +315,19 @@ struct WebServer::Core : std::enable_shared_from_this<WebServer::Core> {
       answer.length = answer.text.size();
       return answer;
     }
-    auto recording = content.recordings->find(rest.substr(1));
-    if (!recording) {
+    const auto name = rest.substr(1, rest.find('/', 1) - 1);
+    const auto about = rest.substr(1 + name.size());
+    auto recording = content.recordings->find(name);
+    if (!recording || !(about.empty() || about == "/check" || about == "/checked")) {
       ++counters.not_found;
       return refuse(request, http::status::not_found, "There is no such recording.\n");
     }
-    return answer_part(request, std::move(recording));
+    if (about.empty()) return answer_part(request, std::move(recording));
+    Answer answer = make_answer(request, http::status::ok, "application/json");
+    answer.text = about == "/check" ? checks->ask(std::string(name), std::move(recording))
+                                    : checks->known(std::string(name), *recording);
+    answer.length = answer.text.size();
+    return answer;
   }
 
   Answer answer_part(const Request& request, std::unique_ptr<site::OpenRecording> recording) {
@@ -462,6 +474,7 @@ void WebServer::stop() {
   boost::system::error_code ignored;
   core_->acceptor.close(ignored);
   core_->metrics_acceptor.close(ignored);
+  if (core_->checks) core_->checks->stop();
   auto cuts = core_->cuts;  // a copy: cutting takes entries out
   for (const auto& [id, cut] : cuts) cut();
 }

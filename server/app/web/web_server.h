@@ -3,8 +3,10 @@
 // trocar-web's listeners: one for browsers, one for figures (metrics), on one I/O thread.
 //
 // Requests: GET and HEAD of the page's files, /recordings (a list), /recordings/NAME (with ranges),
-// and the WebSocket /session. Recordings need the key of their link. Bounds: connections in all and
-// from one address, 8 KiB of header, no body, 10 s for a request, 30 s for 64 KiB of an answer.
+// /recordings/NAME/check (asks whether it verifies) and /recordings/NAME/checked (what is known of
+// that), and the WebSocket /session. Recordings need the key of their link. Bounds: connections in
+// all and from one address, 8 KiB of header, no body, 10 s for a request, 30 s for 64 KiB of an
+// answer.
 
 #include "common/base/asio.h"  // before Boost: see there
 
@@ -32,6 +34,7 @@ struct WebCounters {
 struct WebContent {
   site::PageFiles page;
   std::optional<site::Recordings> recordings;
+  std::filesystem::path state_folder;  // where there are recordings
   std::string recordings_key;  // that a request has to name; never empty where there are recordings
 };
 

@@ -90,6 +90,7 @@ Result<WebStart> prepare_web(const WebOptions& options) {
   if (!key) return key.error();
   start.content.recordings = std::move(*recordings);
   start.content.recordings_key = std::move(*key);
+  start.content.state_folder = *state;
   return start;
 }
 

@@ -83,6 +83,7 @@ Recorder::Recorder(std::unique_ptr<journal::SessionJournalWriter> writer, const 
                    std::uint64_t organ_hash, const wire::SurfaceLayout& layout, Tick begin_tick)
     : writer_(std::move(writer)),
       messages_(organ.name, layout),
+      overview_(begin_tick),
       last_tick_(begin_tick),
       organ_hash_(organ_hash),
       thread_([this] { run(); }) {}
@@ -187,6 +188,7 @@ Status Recorder::write_presence(const Presence& presence) {
   roster_ = participants::Roster(presence.present);
   proto::Participants message;
   replication::describe(presence.present, message);
+  overview_.add_presence(not_before_last(presence.tick), message);
   return writer_->write_participants(not_before_last(presence.tick), utc_ns(), message);
 }
 
@@ -203,10 +205,11 @@ Status Recorder::write_lesson(const QueuedLesson& lesson) {
   const Tick written = last_tick_;
   if (kind == wire::LessonKind::Drawing)
     return writer_->write(journal::JournalTopic::Drawing, written, utc_ns(), message);
-  if (lesson.left_out == 0)
-    return writer_->write(journal::JournalTopic::Lesson, written, utc_ns(), message);
   proto::LessonRecord record;
   record.ParseFromArray(message.data(), static_cast<int>(message.size()));
+  if (record.has_teach()) overview_.add_lesson(record.teach());
+  if (lesson.left_out == 0)
+    return writer_->write(journal::JournalTopic::Lesson, written, utc_ns(), message);
   record.set_left_out(lesson.left_out);
   return writer_->write(journal::JournalTopic::Lesson, written, utc_ns(), record);
 }
@@ -220,7 +223,12 @@ Status Recorder::write_gap(const Gap& gap) {
   message.set_first_tick(gap.first_tick);
   message.set_last_tick(gap.last_tick);
   message.set_messages(gap.frames);
-  return writer_->write_gap(not_before_last(gap.last_tick), utc_ns(), message);
+  overview_.add_gap(message);
+  if (auto s = writer_->write_gap(not_before_last(gap.last_tick), utc_ns(), message); !s) return s;
+  if (!overview_.is_behind(gap.last_tick)) return {};
+  if (auto s = write_overview(); !s) return s;
+  overview_.skip_to(gap.last_tick);
+  return {};
 }
 
 Status Recorder::write_frame(const step::PublishedFrame& frame) {
@@ -238,7 +246,12 @@ Status Recorder::write_frame(const step::PublishedFrame& frame) {
   FileSink sink(*writer_, not_before_last(frame.tick), now);
   if (auto s = messages_.write(frame, roster_, sink); !s) return s;
   ++counters_.frames_written;
-  return {};
+  overview_.add_frame(frame, roster_);
+  return overview_.is_full() ? write_overview() : Status{};
+}
+
+Status Recorder::write_overview() {
+  return writer_->write_overview(last_tick_, utc_ns(), overview_.take());
 }
 
 wire::RecordingState Recorder::state() const {
@@ -263,6 +276,9 @@ Status Recorder::close() {
   thread_.join();
   if (open_gap_.frames > 0 && status_.ok()) {
     if (auto s = write_gap(open_gap_); !s) fail_with(s.error());
+  }
+  if (!overview_.is_empty() && status_.ok()) {
+    if (auto s = write_overview(); !s) fail_with(s.error());
   }
   if (hands_left_out_ > 0)
     log::warn("recording: the last {} reports of what hands felt are missing", hands_left_out_);

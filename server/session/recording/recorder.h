@@ -13,6 +13,8 @@
 // disk error ends the recording, is logged once, and close() returns it. Both show in state() at
 // once, so that the session can tell everybody.
 //
+// Every 30 s an Overview follows, in a chunk of its own.
+//
 // Changes of the surface are written with their frame. From epoch 1 on each keyframe (1 Hz) follows
 // a full SurfaceTopology of its tick, so that a seek, or what comes after damage, starts right.
 
@@ -33,6 +35,7 @@
 #include "server/organs/organ/organ.h"
 #include "server/session/participants/roster.h"
 #include "server/session/recording/frame_messages.h"
+#include "server/session/recording/overview.h"
 #include "server/tissue/step/external_loads.h"
 #include "server/tissue/step/published_frame.h"
 
@@ -116,6 +119,7 @@ class Recorder {
   Status write_lesson(const QueuedLesson& lesson);
   Status write_gap(const Gap& gap);
   Status write_frame(const step::PublishedFrame& frame);
+  Status write_overview();
   void fail_with(const Error& error);
   Tick not_before_last(Tick tick) { return last_tick_ = std::max(last_tick_, tick); }
 
@@ -123,6 +127,7 @@ class Recorder {
   std::unique_ptr<journal::SessionJournalWriter> writer_;
   participants::Roster roster_;  // names for claim events
   FrameMessages messages_;
+  OverviewBuilder overview_;
   Tick last_tick_ = 0;
   std::uint64_t organ_hash_ = 0;
   RecorderCounters counters_;

@@ -101,7 +101,9 @@ std::unique_ptr<OpenRecording> Recordings::find(std::string_view name) const {
   if (file < 0) return nullptr;
   struct stat status {};
   if (::fstat(file, &status) == 0 && S_ISREG(status.st_mode))
-    return std::make_unique<OpenRecording>(file, static_cast<std::uint64_t>(status.st_size));
+    return std::make_unique<OpenRecording>(
+        file, static_cast<std::uint64_t>(status.st_size),
+        std::int64_t{status.st_mtim.tv_sec} * 1'000'000'000 + status.st_mtim.tv_nsec);
   ::close(file);
   return nullptr;
 }

@@ -20,18 +20,22 @@ bool is_recording_name(std::string_view name);
 // A recording that is open, for as long as somebody reads it. It may grow meanwhile.
 class OpenRecording {
  public:
-  OpenRecording(int file, std::uint64_t size) : file_(file), size_(size) {}
+  OpenRecording(int file, std::uint64_t size, std::int64_t changed_ns)
+      : file_(file), size_(size), changed_ns_(changed_ns) {}
   ~OpenRecording();
   OpenRecording(const OpenRecording&) = delete;
   OpenRecording& operator=(const OpenRecording&) = delete;
 
-  std::uint64_t size() const { return size_; }  // bytes, when it was opened
+  std::uint64_t size() const { return size_; }             // bytes, when it was opened
+  std::int64_t changed_ns() const { return changed_ns_; }  // since 1970, when it was opened
+  int file() const { return file_; }  // its descriptor, for as long as this lives
   // Reads at most `bytes` from `offset`; shorter at the end, empty if the file cannot be read.
   std::string read(std::uint64_t offset, std::size_t bytes) const;
 
  private:
   int file_;
   std::uint64_t size_;
+  std::int64_t changed_ns_;
 };
 
 class Recordings {

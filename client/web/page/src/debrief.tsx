@@ -2,17 +2,25 @@
 
 import type { JSX } from 'preact';
 import { useEffect, useMemo, useRef, useState } from 'preact/hooks';
-import { Forces } from './forces';
-import { recordingLink, type Link } from './link';
-import { Events, ForcePlot, People } from './panels';
+import { Beside, BesideChoice, type Other } from './debrief/beside';
+import { Bookmarks } from './debrief/bookmarks';
+import { Check } from './debrief/check';
+import { joined, keepBookmarks, keptBookmarks, readBookmarks, bookmarksText, type Bookmark } from './debrief/marks';
+import { Controls, keyActs, Timeline, type Clock } from './debrief/transport';
+import { Course, type Quantity } from './debrief/course';
+import { eventsTable, forcesTable, Still } from './debrief/export';
+import { useOverlays } from './debrief/measuring';
+import { courseData, kQuantities, Plots, type ToolGuide } from './debrief/plots';
+import { readAll, take } from './debrief/reading';
+import { kMostShots, Report, type ReportContent, type Shot } from './debrief/report';
+import { Take } from './debrief/take';
+import { recordingLink, type Link, type Moment } from './link';
+import { Events, hex, People } from './panels';
 import { kSpeeds, Player } from './player';
-import { traffic, type RecordedEvent, type Recording } from './recording';
+import { EventLog, traffic, type Recording } from './recording';
 import type { Replica } from './replica';
 import type { Picture } from './scene';
-import { clock, guideOf, Stage } from './stage';
-
-// Larger recordings are not read whole for the plot: it shows what was played.
-const kWholeBytes = 100e6;
+import { guideOf, Stage } from './stage';
 
 export function RecordingList(props: { link: Link; onChoose(name: string): void }): JSX.Element {
   const [list, setList] = useState<{ name: string; bytes: number; changed: number }[] | null>(null), [fault, setFault] = useState('');
@@ -48,37 +56,43 @@ interface DebriefProps { replica: Replica; recording: Recording; name: string; l
 
 export function Debrief(props: DebriefProps): JSX.Element {
   const { replica, recording } = props;
-  const [, redraw] = useState(0), [follows, setFollows] = useState<number | null>(null), [events, setEvents] = useState<RecordedEvent[]>([]), [copied, setCopied] = useState('');
-  const forces = useMemo(() => new Forces(), []), picture = useRef<Picture | null>(null);
+  const [, redraw] = useState(0), [follows, setFollows] = useState<number | null>(null), [copied, setCopied] = useState('');
+  const [marks, setMarks] = useState<Bookmark[]>([]), [fault, setFault] = useState(''), [isWhole, setIsWhole] = useState(false), [other, setOther] = useState<Other | null>(null), [report, setReport] = useState<ReportContent | null>(null);
+  const still = useMemo(() => new Still(), []);
+  const course = useMemo(() => new Course(), []), log = useMemo(() => new EventLog(), []), picture = useRef<Picture | null>(null);
   const player = useMemo(() => {
     replica.restart();
-    return new Player(recording, replica, () => redraw(n => n + 1));
+    const made = new Player(recording, replica, () => redraw(n => n + 1));
+    if (props.link.speed !== null && kSpeeds.includes(props.link.speed)) made.speed = props.link.speed;
+    return made;
   }, []);
   const people = player.people?.participant ?? [];
+  const toolGuide = useMemo((): ToolGuide => ({
+    nameOf: tool => (log.names.get(tool >> 1) ?? `hand ${(tool >> 1) + 1}`) + ((tool & 1) === 1 ? ', second tool' : ''),
+    colourOf: tool => hex(replica.slotColour(tool >> 1)),
+  }), []);
+  const overlays = useOverlays(replica, course, () => picture.current, toolGuide, recording.firstTick, () => player.tick);
   const guide = useMemo(() => guideOf(() => player.people?.participant ?? [], slot => replica.slotColour(slot)), []);
 
   useEffect(() => {
     let isGone = false;
     Object.assign(window, { trocar: { replica, player, recording, traffic, picture: () => picture.current } });
+    try {
+      setMarks(joined(keptBookmarks(recording.startNs), props.link.bookmarks ? readBookmarks(props.link.bookmarks) : []));
+    } catch (error) {
+      setMarks(keptBookmarks(recording.startNs));
+      setFault(error instanceof Error ? error.message : String(error));
+    }
     void (async () => {
       await player.seek(props.link.seconds === null ? recording.firstTick : props.link.seconds * 1000);
       try {
-        const all = await recording.events();
-        if (isGone) return;
-        setEvents(all);
-        if (recording.bytes > kWholeBytes) return;
-        for await (const { tick, state } of recording.states(0, recording.lastTick)) {
-          if (isGone) return;
-          for (const tool of state.tool) forces.add(tick, tool.tool >> 1, Math.hypot(tool.forceN?.x ?? 0, tool.forceN?.y ?? 0, tool.forceN?.z ?? 0));
-          // The picture goes before the plot.
-          if (tick % 1024 === 0) await new Promise(resolve => setTimeout(resolve, 0));
-        }
+        if (await readAll(recording, log, course, () => isGone)) setIsWhole(true);
+        else player.onItem = item => take(item, log, course);
       } catch (error) {
-        player.fault = error instanceof Error ? error.message : String(error);
+        setFault(error instanceof Error ? error.message : String(error));
       }
     })();
     const timer = window.setInterval(() => {
-      for (const tool of replica.tools()) forces.add(Math.max(0, replica.newestTick), tool.slot >> 1, Math.hypot(...tool.forceN));
       redraw(n => n + 1);
     }, 100);
     return () => {
@@ -88,28 +102,25 @@ export function Debrief(props: DebriefProps): JSX.Element {
   }, []);
 
   const seek = (tick: number): void => void player.seek(tick);
-  const toggle = (): void => (player.isPlaying ? player.pause() : player.play());
-  const faster = (by: number): void => {
-    player.speed = kSpeeds[Math.max(0, Math.min(kSpeeds.length - 1, kSpeeds.indexOf(player.speed) + by))] ?? 1;
-    redraw(n => n + 1);
+  const change = (to: Bookmark[]): void => {
+    setMarks(to);
+    setFault(keepBookmarks(recording.startNs, to) ? '' : 'This browser keeps no bookmarks: copy them as a link, or save them as a file.');
   };
-  const onKey = (event: KeyboardEvent): void => {
-    const target = event.target as HTMLElement;
-    if (event.ctrlKey || event.metaKey || event.altKey || target.tagName === 'SELECT') return;
-    const isButton = target.tagName === 'BUTTON';
-    const acts: Record<string, () => void> = {
-      k: toggle, ',': () => seek(player.tick - 16), '.': () => seek(player.tick + 16), j: () => seek(player.tick - 2000), ';': () => seek(player.tick + 2000),
-      Home: () => seek(recording.firstTick), End: () => seek(recording.lastTick), '<': () => faster(-1), '>': () => faster(1),
-      ...(isButton ? {} : { ' ': toggle }),
-      ...(target.tagName === 'INPUT' ? {} : { ArrowLeft: () => seek(player.tick - 2000), ArrowRight: () => seek(player.tick + 2000) }),
-    };
-    const act = acts[event.key];
-    if (!act) return;
-    act();
-    event.preventDefault();
+  const time: Clock = {
+    tick: player.tick, isPlaying: player.isPlaying, speed: player.speed, range: player.range, first: recording.firstTick, last: recording.lastTick, seek,
+    toggle: () => (player.isPlaying ? player.pause() : player.play()),
+    setSpeed(speed) {
+      player.speed = speed;
+      redraw(n => n + 1);
+    },
+    setRange(range) {
+      player.range = range;
+      redraw(n => n + 1);
+    },
   };
-  const share = async (): Promise<void> => {
-    const link = recordingLink(props.link.recordingsKey, props.name, player.tick / 1000);
+  const onKey = (event: KeyboardEvent): void => { if (keyActs(time, event)) event.preventDefault(); };
+  const share = async (more: Partial<Moment>): Promise<void> => {
+    const link = recordingLink(props.link.recordingsKey, props.name, { seconds: player.tick / 1000, ...more });
     try {
       await navigator.clipboard.writeText(link);
       setCopied('The link is copied.');
@@ -117,48 +128,61 @@ export function Debrief(props: DebriefProps): JSX.Element {
       setCopied(link);
     }
   };
-  const length = recording.lastTick - recording.firstTick;
-  const nameOf = (slot: number): string => people.find(p => p.slot === slot)?.name ?? `hand ${slot + 1}`;
+  // Goes to each bookmark for its picture, and back.
+  const makeReport = async (): Promise<void> => {
+    const before = player.tick, shots: Shot[] = [];
+    player.pause();
+    for (const mark of marks.slice(0, kMostShots)) {
+      await player.seek(mark.tick);
+      await still.next();
+      shots.push({ title: mark.name, tick: mark.tick, url: still.canvas.toDataURL('image/jpeg', 0.9) });
+    }
+    await player.seek(before);
+    const plots = (Object.keys(kQuantities) as Quantity[]).map(what => courseData(course, what, recording.firstTick, recording.lastTick, toolGuide));
+    const owners = [...new Set(course.slots.map(tool => toolGuide.nameOf(tool & ~1)))];
+    setReport({ name: props.name, organ: recording.organ, startMs: Number(recording.startNs / 1_000_000n), lastTick: recording.lastTick, people: owners, events: log.events, plots, shots });
+  };
+  const here = (): Partial<Moment> => ({ view: picture.current?.view() ?? null, speed: player.speed });
   return (
-    <div class="layout debrief" onKeyDown={onKey}>
+    <div class={`layout debrief${other ? ' two' : ''}`} onKeyDown={onKey}>
       <header>
         <h1>Trocar</h1>
         <span class="file" title={recording.organ}>{props.name}</span>
         <span class="space" />
-        {props.link.recordingsKey && <button onClick={() => void share()}>Copy link to this moment</button>}
+        {props.link.recordingsKey && <button onClick={() => void share(here())}>Copy link to this moment</button>}
         <button onClick={props.onClose}>Close</button>
       </header>
       <main>
-        <Stage replica={replica} guide={guide} isOld={false} follows={follows} people={people} onFollow={setFollows} onPicture={now => player.advance(now)} onReady={p => { picture.current = p; }}>
-          {player.fault && <p class="banner fault" role="alert">{player.fault}</p>}
-          {copied && <p class="banner" role="status" onClick={() => setCopied('')}>{copied}</p>}
-        </Stage>
+        <div class="half">
+          <Stage replica={replica} guide={guide} isOld={false} follows={follows} people={people} onFollow={setFollows} onPicture={now => player.advance(now)} onPlace={overlays.onPlace} onDrawn={drawn => {
+            overlays.draw(drawn);
+            still.drawn(drawn, overlays.lines(), replica.tools(), guide);
+          }} onReady={p => {
+            picture.current = p;
+            if (props.link.view) p.look(props.link.view.eye, props.link.view.target);
+          }}>
+            {overlays.canvas}
+            {(player.fault || fault) && <p class="banner fault" role="alert">{player.fault || fault}</p>}
+            {copied && <p class="banner" role="status" onClick={() => setCopied('')}>{copied}</p>}
+          </Stage>
+        </div>
+        {other && <Beside key={other.name} other={other} first={player} firstEvents={log.events} />}
       </main>
       <aside>
         <People people={people} tools={replica.tools()} own={null} colourOf={slot => replica.slotColour(slot)} follows={follows} onFollow={setFollows} />
-        <Events events={events} now={player.tick} onSeek={seek} empty="Looking for events" />
+        <Events events={log.events} now={player.tick} onSeek={seek} empty="Looking for events" />
+        <Bookmarks marks={marks} now={player.tick} name={props.name} onChange={change} onSeek={seek} onCopy={props.link.recordingsKey ? all => void share({ bookmarks: bookmarksText(all) }) : null} />
+        {overlays.panels}
+        <Take name={props.name} isWhole={isWhole} still={still} forces={() => forcesTable(course, tool => toolGuide.nameOf(tool))} events={() => eventsTable(log.events)} onReport={makeReport} />
+        <BesideChoice recordingsKey={props.link.recordingsKey} other={other} onOther={setOther} />
+        {props.link.recordingsKey && <Check name={props.name} recordingsKey={props.link.recordingsKey} onSeek={seek} />}
       </aside>
       <footer>
-        <ForcePlot forces={forces} from={recording.firstTick} to={recording.lastTick} now={player.tick} height={110} nameOf={nameOf} colourOf={slot => replica.slotColour(slot)} onSeek={seek} />
-        <div class="timeline">
-          <div class="marks" aria-hidden="true">
-            {length > 0 && events.slice(0, 600).map((event, i) => <i key={i} class={event.kind} ref={el => { if (el) el.style.left = `${((event.tick - recording.firstTick) / length) * 100}%`; }} />)}
-          </div>
-          <input type="range" min={recording.firstTick} max={recording.lastTick} step={16} value={player.tick} aria-label="Time" aria-valuetext={clock(player.tick / 1000)}
-            onInput={event => seek(Number(event.currentTarget.value))} />
-        </div>
-        <div class="controls">
-          <button class="main" onClick={toggle} title="Space">{player.isPlaying ? 'Pause' : 'Play'}</button>
-          <button onClick={() => seek(player.tick - 2000)} title="Left arrow">− 2 s</button>
-          <button onClick={() => seek(player.tick + 2000)} title="Right arrow">+ 2 s</button>
-          <label class="choice">Speed
-            <select value={String(player.speed)} onChange={event => { player.speed = Number(event.currentTarget.value); redraw(n => n + 1); }}>
-              {kSpeeds.map(speed => <option key={speed} value={String(speed)}>{speed}×</option>)}
-            </select>
-          </label>
-          <span class="time">{clock(player.tick / 1000)} / {clock(recording.lastTick / 1000)}</span>
-        </div>
+        <Plots course={course} from={recording.firstTick} to={recording.lastTick} now={player.tick} range={player.range} guide={toolGuide} onSeek={seek} />
+        <Timeline clock={time} events={log.events} marks={marks} />
+        <Controls clock={time} />
       </footer>
+      {report && <Report content={report} onClose={() => setReport(null)} />}
     </div>
   );
 }

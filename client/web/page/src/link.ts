@@ -8,13 +8,28 @@ export interface Link {
   recordingsKey: string;
   file: string; // of the recordings
   seconds: number | null; // where in it to begin
+  view: View | null;
+  speed: number | null;
+  bookmarks: string; // to be read by readBookmarks; empty: none
 }
 
-const kName = 'trocar-name';
+// From where the picture is seen, m.
+export interface View { eye: [number, number, number]; target: [number, number, number] }
+
+const kName = 'trocar-name', kFarthest = 5;
+
+// Six numbers; null if they cannot be a view.
+function readView(text: string | null): View | null {
+  const n = (text ?? '').split(',').map(Number);
+  if (n.length !== 6 || n.some(x => !Number.isFinite(x) || Math.abs(x) > kFarthest)) return null;
+  const [a = 0, b = 0, c = 0, d = 0, e = 0, f = 0] = n;
+  return Math.hypot(a - d, b - e, c - f) < 1e-3 ? null : { eye: [a, b, c], target: [d, e, f] };
+}
+const writeView = (view: View): string => [...view.eye, ...view.target].map(x => x.toFixed(4)).join(',');
 
 export function readLink(hash: string): Link {
   const given = new URLSearchParams(hash.replace(/^#/, ''));
-  const seconds = Number(given.get('t') ?? 'none');
+  const seconds = Number(given.get('t') ?? 'none'), speed = Number(given.get('speed') ?? 'none');
   return {
     code: given.get('join') === 'CODE' ? '' : given.get('join') ?? '',
     role: given.get('role') === 'instructor' ? 'instructor' : 'observer',
@@ -23,11 +38,19 @@ export function readLink(hash: string): Link {
     recordingsKey: given.get('recordings') ?? '',
     file: given.get('file') ?? '',
     seconds: Number.isFinite(seconds) && seconds >= 0 ? seconds : null,
+    view: readView(given.get('view')),
+    speed: Number.isFinite(speed) && speed > 0 ? speed : null,
+    bookmarks: given.get('bookmarks') ?? '',
   };
 }
 
-export function recordingLink(key: string, file: string, seconds: number): string {
-  const what = new URLSearchParams({ recordings: key, file, t: seconds.toFixed(2) });
+// What a link to a recording may say besides its time.
+export interface Moment { seconds: number; view?: View | null; speed?: number; bookmarks?: string }
+export function recordingLink(key: string, file: string, moment: Moment): string {
+  const what = new URLSearchParams({ recordings: key, file, t: moment.seconds.toFixed(2) });
+  if (moment.view) what.set('view', writeView(moment.view));
+  if (moment.speed && moment.speed !== 1) what.set('speed', String(moment.speed));
+  if (moment.bookmarks) what.set('bookmarks', moment.bookmarks);
   return `${location.origin}${location.pathname}#${what}`;
 }
 

@@ -13,6 +13,8 @@ export class Player {
   isPlaying = false;
   isSeeking = false;
   speed = 1;
+  range: [number, number] | null = null; // ticks; played again and again
+  onItem: (item: Item) => void = () => undefined; // each that is shown
   people: Participants | null = null;
   fault = ''; // one line for people
   seekMs = 0; // that the last seek took
@@ -29,7 +31,8 @@ export class Player {
   }
 
   play(): void {
-    if (this.tick >= this.recording.lastTick - 1) void this.seek(this.recording.firstTick);
+    const [from, to] = this.range ?? [this.recording.firstTick, this.recording.lastTick - 1];
+    if (this.tick >= to) void this.seek(from);
     this.isPlaying = true;
     this.onChange();
   }
@@ -73,7 +76,7 @@ export class Player {
     if (this.isSeeking || this.stream === null) return;
     void this.readAhead();
     if (!this.isPlaying) return;
-    const next = this.tick + passed * this.speed;
+    const before = this.tick, next = before + passed * this.speed;
     // The clock waits for frames that have not been loaded yet.
     const loaded = this.hasEnded ? this.recording.lastTick : this.waiting.at(-1)?.tick ?? this.tick;
     this.tick = Math.min(next, Math.max(this.tick, loaded));
@@ -84,13 +87,15 @@ export class Player {
     } catch (error) {
       this.fail(error);
     }
-    if (this.tick >= this.recording.lastTick) this.pause();
+    if (this.range && before < this.range[1] && this.tick >= this.range[1]) void this.seek(this.range[0]);
+    else if (this.tick >= this.recording.lastTick) this.pause();
   }
 
   private feed(item: Item): void {
     if (item.field === kParticipantsField) this.people = fromBinary(ParticipantsSchema, item.data);
     if (item.field !== 0) this.replica.receiveBare(item.field, item.data, performance.now());
     this.replica.takeOutbox(); // a recording answers nobody
+    this.onItem(item);
   }
   private async readAhead(): Promise<void> {
     if (this.isReading || this.hasEnded || this.waiting.length >= kAheadItems) return;

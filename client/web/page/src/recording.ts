@@ -4,24 +4,30 @@
 import { fromBinary, toBinary } from '@bufbuild/protobuf';
 import { McapIndexedReader, type McapTypes } from '@mcap/core';
 import { decompress } from 'fzstd';
-import { ClaimLogSchema, JournalGapSchema, LessonRecordSchema } from './gen/proto/journal_pb';
-import { ClaimOutcome, FrameStateSchema, ParticipantsSchema, PointEventSchema, TeachAction, type FrameState, type Participants } from './gen/proto/wire_pb';
+import { ClaimLogSchema, JournalGapSchema, LessonRecordSchema, OverviewSchema, type JournalGap, type Overview } from './gen/proto/journal_pb';
+import { ClaimOutcome, ParticipantsSchema, PointEventSchema, TeachAction, type ClaimEvent, type Participants, type TeachEvent } from './gen/proto/wire_pb';
 
-const kBlock = 64 * 1024, kBlocks = 256, kMostChunk = 64 * 1024 * 1024;
+const kBlock = 64 * 1024, kBlocks = 256, kMostChunk = 64 * 1024 * 1024, kMostTicks = 1e9;
 export const kDamaged = 'This file is no whole Trocar recording: it is damaged, cut short, or something else.';
 const kCutShort = 'This recording was cut short and has no index: make it whole with "trocar-journal repair".';
 
-export interface Bytes { size(): Promise<bigint>; read(offset: bigint, size: bigint): Promise<Uint8Array> }
+export interface Bytes {
+  size(): Promise<bigint>;
+  read(offset: bigint, size: bigint): Promise<Uint8Array>;
+  isSparse: boolean; // while it is, small parts from all over the file are read
+}
 export const traffic = { requests: 0, bytes: 0 };
 
 // Loads whole blocks through `load`, each once as long as it is kept.
 class Blocks implements Bytes {
+  isSparse = false;
   private readonly kept = new Map<number, Promise<Uint8Array>>();
   constructor(private readonly length: number, private readonly load: (from: number, to: number) => Promise<Uint8Array>) {}
   size(): Promise<bigint> { return Promise.resolve(BigInt(this.length)); }
   async read(offset: bigint, size: bigint): Promise<Uint8Array> {
     const from = Number(offset), length = Number(size);
     if (from < 0 || length < 0 || from + length > this.length) throw new Error(kDamaged);
+    if (this.isSparse && length > 0 && length < kBlock / 2) return this.load(from, from + length);
     const out = new Uint8Array(length), first = Math.floor(from / kBlock), last = Math.floor((from + length - 1) / kBlock);
     const parts = await Promise.all(Array.from({ length: Math.max(0, last - first + 1) }, (_, i) => this.block(first + i)));
     parts.forEach((bytes, i) => {
@@ -63,18 +69,20 @@ export function ofFile(file: Blob): Bytes {
   return new Blocks(file.size, async (from, to) => new Uint8Array(await file.slice(from, to).arrayBuffer()));
 }
 
-export interface Item { field: number; tick: number; data: Uint8Array }
+export interface Item { field: number; tick: number; topic: string; data: Uint8Array }
 export type EventKind = 'people' | 'grant' | 'refusal' | 'end' | 'cut' | 'gap' | 'said' | 'note' | 'lesson';
 export interface RecordedEvent { tick: number; kind: EventKind; text: string }
 
 // Fields of Envelope, by channel.
 const kFields: Record<string, number> = { '/surface/key': 2, '/surface/delta': 2, '/frame_state': 3, '/topology/change': 8, '/topology': 18, '/participants': 19, '/drawing': 40 };
-const kShown = ['/surface/delta', '/frame_state', '/topology/change', '/participants', '/drawing', '/lesson'];
+const kEventTopics = ['/participants', '/claims', '/topology/change', '/gap', '/lesson'], kMostEvents = 5000;
+const kCutPause = 1500; // ticks after which a cut is another one; an overview names one tick a second
+const kShown = ['/surface/delta', '/frame_state', '/drawing', ...kEventTopics];
 const kNothingDrawn = new Uint8Array([0x10, 0]); // a Drawing without strokes, which replaces what was
 type Message = McapTypes.TypedMcapRecords['Message'];
 
 export class Recording {
-  private constructor(private readonly reader: McapIndexedReader, private readonly startNs: bigint, readonly firstTick: number, readonly lastTick: number, readonly organ: string, readonly bytes: number) {}
+  private constructor(private readonly reader: McapIndexedReader, private readonly readable: Bytes, readonly startNs: bigint, readonly firstTick: number, readonly lastTick: number, readonly organ: string, readonly bytes: number) {}
 
   // Throws, with one sentence for people, if it is none.
   static async open(readable: Bytes): Promise<Recording> {
@@ -90,12 +98,13 @@ export class Recording {
         start = BigInt(m.metadata.get('start_utc_ns') ?? start);
         organ = m.metadata.get('organ_name') ?? '';
       }
-      const recording = new Recording(reader, start, 0, Number(((reader.statistics?.messageEndTime ?? start) - start) / 1_000_000n), organ, bytes);
+      const recording = new Recording(reader, readable, start, 0, Number(((reader.statistics?.messageEndTime ?? start) - start) / 1_000_000n), organ, bytes);
+      if (!(recording.lastTick >= 0 && recording.lastTick <= kMostTicks)) throw new Error(kDamaged);
       // A picture needs a keyframe: the first one is where the recording begins.
       let first = 0;
       for await (const m of reader.readMessages({ topics: ['/surface/key'] })) { first = recording.item(m).tick; break; }
       if (![...reader.channelsById.values()].some(channel => channel.topic === '/surface/key')) throw new Error(kDamaged);
-      return new Recording(reader, start, first, recording.lastTick, organ, bytes);
+      return new Recording(reader, readable, start, first, recording.lastTick, organ, bytes);
     } catch (error) {
       const text = error instanceof Error ? error.message : '';
       if (/footer|Footer|trailing|not indexed|no index/.test(text)) throw new Error(kCutShort);
@@ -104,7 +113,10 @@ export class Recording {
   }
 
   private time(tick: number): bigint { return this.startNs + BigInt(Math.max(0, Math.floor(tick))) * 1_000_000n; }
-  private item(m: Message): Item { return { field: kFields[this.topic(m)] ?? 0, tick: Number((m.logTime - this.startNs) / 1_000_000n), data: m.data }; }
+  private item(m: Message): Item {
+    const topic = this.topic(m);
+    return { field: kFields[topic] ?? 0, tick: Number((m.logTime - this.startNs) / 1_000_000n), topic, data: m.data };
+  }
   private topic(m: Message): string { return this.reader.channelsById.get(m.channelId)?.topic ?? ''; }
   private async last(topic: string, tick: number): Promise<Item | undefined> {
     for await (const m of this.reader.readMessages({ topics: [topic], endTime: this.time(tick), reverse: true })) return this.item(m);
@@ -115,7 +127,7 @@ export class Recording {
   async seek(tick: number): Promise<Item[]> {
     const key = await this.last('/surface/key', tick), out: Item[] = [];
     if (!key) return out;
-    out.push(await this.last('/drawing', tick) ?? { field: 40, tick: key.tick, data: kNothingDrawn });
+    out.push(await this.last('/drawing', tick) ?? { field: 40, tick: key.tick, topic: '/drawing', data: kNothingDrawn });
     for (const before of [await this.last('/participants', tick), await this.last('/topology', key.tick), key]) if (before) out.push(before);
     for await (const m of this.reader.readMessages({ topics: ['/surface/delta', '/frame_state', '/topology/change'], startTime: this.time(key.tick), endTime: this.time(tick) })) {
       const item = this.item(m);
@@ -127,45 +139,86 @@ export class Recording {
   // Yields what comes after `tick`, in order.
   async *follow(tick: number): AsyncGenerator<Item> {
     for await (const m of this.reader.readMessages({ topics: kShown, startTime: this.time(tick + 1) })) {
-      if (this.topic(m) !== '/lesson') yield this.item(m);
-      else yield* this.pointing(m);
+      yield this.item(m);
+      if (this.topic(m) === '/lesson') yield* this.pointing(m);
     }
   }
   // What the replica shows of a lesson besides the drawing.
   private *pointing(m: Message): Generator<Item> {
     const { entry } = fromBinary(LessonRecordSchema, m.data);
-    if (entry.case === 'point') yield { field: 36, tick: this.item(m).tick, data: toBinary(PointEventSchema, entry.value) };
+    if (entry.case === 'point') yield { field: 36, tick: this.item(m).tick, topic: '/point', data: toBinary(PointEventSchema, entry.value) };
   }
-  // Forces over all of it, a frame at a time.
-  async *states(from: number, to: number): AsyncGenerator<{ tick: number; state: FrameState }> {
-    for await (const m of this.reader.readMessages({ topics: ['/frame_state'], startTime: this.time(from), endTime: this.time(to) }))
-      yield { tick: this.item(m).tick, state: fromBinary(FrameStateSchema, m.data) };
+  // The overview, a message at a time; nothing in recordings that have none. It is small parts of the
+  // file: an hour takes about a megabyte.
+  async *overviews(): AsyncGenerator<Overview> {
+    this.readable.isSparse = true;
+    try {
+      for await (const m of this.reader.readMessages({ topics: ['/overview'] })) yield readOverview(m.data);
+    } finally {
+      this.readable.isSparse = false;
+    }
+  }
+  // What an overview holds, from the recording itself, after a tick: reads all of it.
+  async *survey(after: number): AsyncGenerator<Item> {
+    for await (const m of this.reader.readMessages({ topics: [...kEventTopics, '/frame_state'], startTime: this.time(after + 1) })) yield this.item(m);
+  }
+}
+
+export const kBadOverview = 'The overview of this recording cannot be read.';
+function readOverview(data: Uint8Array): Overview {
+  try { return fromBinary(OverviewSchema, data); } catch { throw new Error(kBadOverview); }
+}
+
+// Collects what happened, from whatever is read: items in the order of their ticks, or overviews.
+// What is known is not added again.
+export class EventLog {
+  readonly events: RecordedEvent[] = [];
+  readonly names = new Map<number, string>(); // by a participant's slot: the newest
+  private readonly known = new Set<string>();
+  private people: Participants | null = null;
+  private peopleTick = -1;
+  private lastCut = -1e9;
+
+  addItem(item: Item): void {
+    if (item.topic === '/participants') this.addPeople(item.tick, fromBinary(ParticipantsSchema, item.data));
+    else if (item.topic === '/claims') for (const event of fromBinary(ClaimLogSchema, item.data).event) this.addClaim(event);
+    else if (item.topic === '/gap') this.addGap(fromBinary(JournalGapSchema, item.data));
+    else if (item.topic === '/topology/change') this.addCut(item.tick);
+    else if (item.topic === '/lesson') {
+      const { entry } = fromBinary(LessonRecordSchema, item.data);
+      if (entry.case === 'teach') this.addLesson(entry.value);
+    }
+  }
+  addOverview(overview: Overview): void {
+    for (const { tick, participants } of overview.presence) if (participants) this.addPeople(Number(tick), participants);
+    overview.claim.forEach(event => this.addClaim(event));
+    overview.gap.forEach(gap => this.addGap(gap));
+    overview.lesson.forEach(event => this.addLesson(event));
+    overview.changeTick.forEach(tick => this.addCut(Number(tick)));
+    if (overview.leftOut > 0) this.add({ tick: Number(overview.firstTick), kind: 'gap', text: `${overview.leftOut} events had no room in the overview` });
   }
 
-  // Everything that happened, in order.
-  async events(): Promise<RecordedEvent[]> {
-    const out: RecordedEvent[] = [];
-    let people: Participants | null = null, lastCut = -1e9;
-    for await (const m of this.reader.readMessages({ topics: ['/participants', '/claims', '/topology/change', '/gap', '/lesson'] })) {
-      const tick = this.item(m).tick, topic = this.topic(m);
-      if (topic === '/participants') {
-        const now = fromBinary(ParticipantsSchema, m.data);
-        out.push(...changesOf(people, now).map(text => ({ tick, kind: 'people' as const, text })));
-        people = now;
-      } else if (topic === '/claims') {
-        for (const event of fromBinary(ClaimLogSchema, m.data).event) out.push({ tick: Number(event.tick), kind: kindOf(event.outcome), text: event.text });
-      } else if (topic === '/lesson') {
-        const { entry } = fromBinary(LessonRecordSchema, m.data);
-        if (entry.case === 'teach') out.push({ tick: Number(entry.value.tick), kind: kindOfTeaching(entry.value.action), text: entry.value.text });
-      } else if (topic === '/gap') {
-        out.push({ tick, kind: 'gap', text: `${fromBinary(JournalGapSchema, m.data).messages} messages are missing here` });
-      } else {
-        if (tick - lastCut > 1000) out.push({ tick, kind: 'cut', text: 'Tissue is cut or tears' });
-        lastCut = tick;
-      }
-      if (out.length > 5000) break;
-    }
-    return out.filter(event => event.text !== '');
+  private addPeople(tick: number, now: Participants): void {
+    if (tick < this.peopleTick) return;
+    for (const text of changesOf(this.people, now)) this.add({ tick, kind: 'people', text });
+    for (const p of now.participant) this.names.set(p.slot, p.name);
+    this.people = now;
+    this.peopleTick = tick;
+  }
+  private addClaim(event: ClaimEvent): void { this.add({ tick: Number(event.tick), kind: kindOf(event.outcome), text: event.text }); }
+  private addLesson(event: TeachEvent): void { this.add({ tick: Number(event.tick), kind: kindOfTeaching(event.action), text: event.text }); }
+  private addGap(gap: JournalGap): void { this.add({ tick: Number(gap.firstTick), kind: 'gap', text: `${gap.messages} messages are missing here` }); }
+  private addCut(tick: number): void {
+    if (tick - this.lastCut > kCutPause || tick < this.lastCut) this.add({ tick, kind: 'cut', text: 'Tissue is cut or tears' });
+    this.lastCut = tick;
+  }
+  private add(event: RecordedEvent): void {
+    const key = `${event.tick} ${event.kind} ${event.text}`;
+    if (event.text === '' || this.known.has(key) || this.events.length >= kMostEvents) return;
+    this.known.add(key);
+    let at = this.events.length;
+    while (at > 0 && (this.events[at - 1]?.tick ?? 0) > event.tick) at--;
+    this.events.splice(at, 0, event);
   }
 }
 

@@ -3,12 +3,14 @@
 import {
   BufferAttribute, BufferGeometry, ConstantAlphaFactor, CustomBlending, Data3DTexture, DynamicDrawUsage, GLSL3, Group,
   LinearFilter, Matrix4, Mesh, NormalBlending, OneMinusConstantAlphaFactor, PerspectiveCamera, Quaternion,
-  RawShaderMaterial, Raycaster, RepeatWrapping, Scene, Vector2, Vector3, Vector4, WebGLRenderer, type IUniform,
+  RawShaderMaterial, Raycaster, RepeatWrapping, Scene, Vector2, Vector3, Vector4, WebGLRenderer, type Intersection, type IUniform,
 } from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 import { lightingSource, organFragmentSource, organVertexSource, toolFragmentSource, toolVertexSource } from './gen/shaders';
 import { Overlay, type Mesh as PlainMesh, type Pointer, type Replica, type Shape, type Tool, type Vec3 } from './replica';
 
+// A place of the surface: shares of the corners of a triangle, which are numbers of vertices.
+export interface SurfacePlace { corners: Vec3; shares: Vec3 }
 export interface Label { text: string; colour: number }
 // The picture asks this for shapes and names, which it does not know.
 export interface Guide {
@@ -162,11 +164,23 @@ export class Picture {
 
   // Returns where a ray through a place of the canvas (0 to 1 from its upper left) meets the surface.
   pick(x: number, y: number): Vec3 | null {
+    const hit = this.hit(x, y);
+    return hit ? [hit.point.x, hit.point.y, hit.point.z] : null;
+  }
+  pickSurface(x: number, y: number): SurfacePlace | null {
+    const hit = this.hit(x, y), face = hit?.face, shares = hit?.barycoord;
+    return face && shares ? { corners: [face.a, face.b, face.c], shares: [shares.x, shares.y, shares.z] } : null;
+  }
+  // Where a place in the world lies on the canvas, in pixels of the page; null: behind the viewer.
+  project(place: Vec3): [number, number] | null {
+    const at = new Vector3(...place).project(this.camera);
+    return at.z > 1 ? null : [(at.x + 1) / 2 * this.width, (1 - at.y) / 2 * this.height];
+  }
+  private hit(x: number, y: number): Intersection | undefined {
     const ray = new Raycaster();
     ray.setFromCamera(new Vector2(x * 2 - 1, 1 - y * 2), this.camera);
     this.organ.geometry.computeBoundingSphere();
-    const hit = ray.intersectObject(this.organ, false)[0];
-    return hit ? [hit.point.x, hit.point.y, hit.point.z] : null;
+    return ray.intersectObject(this.organ, false)[0];
   }
 
   private setQuality(quality: number): void {

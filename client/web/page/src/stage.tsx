@@ -11,6 +11,7 @@ export function forceOf(tool: Tool): number { return Math.hypot(...tool.forceN);
 export const newtons = (n: number): string => `${n.toFixed(n < 10 ? 2 : 1)} N`;
 export const clock = (seconds: number): string => `${Math.floor(seconds / 60)}:${(seconds % 60).toFixed(1).padStart(4, '0')}`;
 
+const kClickPixels = 5;
 const kPlain: ToolShape = create(ToolShapeSchema, { radiusM: 0.005, lengthM: 0.3 });
 
 // Answers the picture about people, from the newest list of them.
@@ -49,6 +50,9 @@ interface StageProps {
   people: Participant[];
   onFollow(slot: number | null): void;
   onPicture(nowMs: number): void; // before each picture
+  onDrawn?: (picture: Picture) => void; // while its pixels are there
+  // Where this person clicks, as a share of the canvas from its upper left; then a click takes a place.
+  onPlace?: ((x: number, y: number) => void) | undefined;
   onReady(picture: Picture): void;
   // Where this person points, if the role may; null: nowhere any more.
   onPoint?: (place: Vec3 | null) => void;
@@ -79,7 +83,9 @@ export function Stage(props: StageProps): JSX.Element {
     const step = (now: number): void => {
       id = requestAnimationFrame(step);
       latest.current.onPicture(now);
-      if (drawn.draw(performance.now())) canvas.current?.setAttribute('data-drawn', '1');
+      if (!drawn.draw(performance.now())) return;
+      canvas.current?.setAttribute('data-drawn', '1');
+      latest.current.onDrawn?.(drawn);
     };
     id = requestAnimationFrame(step);
     return () => {
@@ -114,6 +120,17 @@ export function Stage(props: StageProps): JSX.Element {
     const rect = (event.currentTarget as HTMLElement).getBoundingClientRect();
     place.current = [(event.clientX - rect.left) / rect.width, (event.clientY - rect.top) / rect.height];
   };
+  // A drag turns the view: only a click that stays where it began takes a place.
+  const pressed = useRef<[number, number] | null>(null);
+  const onPress = (event: PointerEvent): void => {
+    onMove(event);
+    pressed.current = event.button === 0 ? [event.clientX, event.clientY] : null;
+  };
+  const onRelease = (event: PointerEvent): void => {
+    const from = pressed.current;
+    pressed.current = null;
+    if (from && place.current && Math.hypot(event.clientX - from[0], event.clientY - from[1]) < kClickPixels) props.onPlace?.(...place.current);
+  };
   const mayPoint = props.onPoint !== undefined;
   useEffect(() => { if (!mayPoint) setPoints(false); }, [mayPoint]);
   useEffect(() => { if (picture.current) picture.current.follows = props.follows; }, [props.follows]);
@@ -127,7 +144,7 @@ export function Stage(props: StageProps): JSX.Element {
     if (!p || event.ctrlKey || event.metaKey || event.altKey) return;
     const acts: Record<string, () => void> = {
       ArrowLeft: () => p.turn(-step, 0), ArrowRight: () => p.turn(step, 0), ArrowUp: () => p.turn(0, step), ArrowDown: () => p.turn(0, -step),
-      '+': () => p.zoom(0.9), '=': () => p.zoom(0.9), '-': () => p.zoom(1 / 0.9), c: reset, ...(mayPoint ? { p: () => setPoints(!points) } : {}),
+      ...(props.onPlace ? { Enter: () => props.onPlace?.(0.5, 0.5) } : {}), '+': () => p.zoom(0.9), '=': () => p.zoom(0.9), '-': () => p.zoom(1 / 0.9), c: reset, ...(mayPoint ? { p: () => setPoints(!points) } : {}),
       l: () => setOverlay(overlay === Overlay.Holds ? Overlay.None : Overlay.Holds),
       o: () => setOverlay(overlay === Overlay.Regions ? Overlay.None : Overlay.Regions), a: () => setArrows(!arrows),
     };
@@ -139,9 +156,9 @@ export function Stage(props: StageProps): JSX.Element {
   };
 
   return (
-    <div class={`stage${props.isOld ? ' old' : ''}${points ? ' points' : ''}`} ref={box}>
+    <div class={`stage${props.isOld ? ' old' : ''}${points || props.onPlace ? ' points' : ''}`} ref={box}>
       <canvas ref={canvas} tabIndex={0} onKeyDown={onKey} role="img"
-        onPointerMove={onMove} onPointerDown={onMove} onPointerLeave={() => { place.current = null; }}
+        onPointerMove={onMove} onPointerDown={onPress} onPointerUp={onRelease} onPointerLeave={() => { place.current = null; }}
         aria-label="The organ and the instruments. Arrow keys turn the view, plus and minus zoom, C resets it." />
       <div class="labels" ref={labels} aria-hidden="true" />
       {fault && <p class="banner fault" role="alert">{fault}</p>}
