@@ -9,7 +9,8 @@
 #include "client/replica/client_messages.h"
 #include "client/shape/ribbon.h"
 #include "client/ui/away_text.h"
-#include "client/ui/hud_panels.h"
+#include "client/ui/banner_text.h"
+#include "client/ui/rate_text.h"
 #include "client/ui/solver_text.h"
 #include "common/base/log.h"
 
@@ -65,7 +66,7 @@ Picture::Picture(std::unique_ptr<render::GlContext> context, const ClientOptions
     : role_(options.role),
       context_(std::move(context)),
       renderer_(*context_),
-      hud_(*context_),
+      hud_(*context_, options.scale),
       shows_help_(options.display == Display::Window),
       overlays_(options.overlays),
       view_(options.view) {
@@ -298,10 +299,11 @@ void Picture::add_messages(const replica::Replica& replica, std::uint64_t now_ns
                                         notice.outcome == replica::ClaimOutcome::Expired ||
                                         notice.outcome == replica::ClaimOutcome::Slipped);
     if (age > 5 || notice.text.empty() || !is_news) continue;
+    const std::string text =
+        ui::describe_notice(notice, is_own, shape_of(replica, notice.tool).reach_m);
     // A claim is retried while the verb is held: the same words once.
-    if (!model.messages.empty() && model.messages.back().text == notice.text)
-      model.messages.pop_back();
-    model.messages.push_back({notice.text, static_cast<float>(age), true});
+    if (!model.messages.empty() && model.messages.back().text == text) model.messages.pop_back();
+    model.messages.push_back({text, static_cast<float>(age), true});
   }
   if (model.messages.size() > 3)
     model.messages.erase(model.messages.begin(), model.messages.end() - 3);
@@ -322,12 +324,14 @@ ui::HudModel Picture::hud_model(const replica::Replica& replica, replica::Sessio
                   " surface vertices";
   if (source.state() == replica::SourceState::Connecting)
     model.status = "Connecting to " + source.name() + " ...";
-  else if (source.state() == replica::SourceState::Away)
+  else if (source.state() == replica::SourceState::Away) {
     model.status = ui::describe_absence(source.statistics().away_seconds,
                                         source.statistics().away_left_seconds);
-  else if (source.state() == replica::SourceState::Closed)
-    model.status = source.close_reason().text + "\nClose this window to leave.";
-  else if (!surface_.is_valid())
+    model.status_advice = "Wait. If it lasts, check the network of this computer.";
+  } else if (source.state() == replica::SourceState::Closed) {
+    model.status = source.close_reason().text;
+    model.status_advice = ui::advice_after(source.close_reason().kind);
+  } else if (!surface_.is_valid())
     model.status = "Waiting for the organ ...";
   if (own != nullptr && !own->frozen_by.empty())
     model.frozen_text = own->frozen_by + " keeps your tools where they are.";
@@ -356,6 +360,7 @@ ui::HudModel Picture::hud_model(const replica::Replica& replica, replica::Sessio
   model.frames_per_second = rate_.frames_per_second;
   model.bytes_per_second = rate_.bytes_per_second;
   model.recording_text = replica.recording().text;
+  model.has_recording_ended = replica.recording().status == wire::RecordingStatus::Failed;
   model.sync_text = model.is_away ? "old" : sync_text(replica);
   model.is_in_step = !model.is_away && replica.sync_state() == replica::SyncState::InStep;
   model.shows_regions = overlays_.regions;

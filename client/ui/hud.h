@@ -18,8 +18,12 @@
 #include "client/replica/session_view.h"
 #include "client/shape/tool_mesh.h"
 #include "client/ui/felt_text.h"
+#include "client/ui/fonts.h"
 
 namespace trocar::ui {
+
+// Of words and panels, pixels per pixel of the design.
+inline constexpr float kLeastScale = 0.75f, kMostScale = 3;
 
 struct HudParticipant {
   std::string name;
@@ -70,11 +74,12 @@ struct HudFeltHand {
 inline constexpr std::size_t kFeltBins = 160;  // of them at most
 
 struct HudModel {
-  std::string title;     // "127.0.0.1:7690" or a file's name
-  std::string organ;     // "liver, 1,553 surface vertices"
-  std::string own_role;  // "surgeon", "instructor, watching", "replay"
-  std::string status;    // empty when live; else what it waits for, in the middle of the screen
-  bool is_away = false;  // the picture is old: it is greyed
+  std::string title;          // "127.0.0.1:7690" or a file's name
+  std::string organ;          // "liver, 1,553 surface vertices"
+  std::string own_role;       // "surgeon", "instructor, watching", "replay"
+  std::string status;         // empty when live; else what it waits for, or why it is over
+  std::string status_advice;  // what to do then
+  bool is_away = false;       // the picture is old: it is greyed
   wire::FrameFigures figures;
   double session_seconds = 0, round_trip_ms = 0;
   std::optional<double> surface_age_ms;  // of a live session, once it is known
@@ -88,6 +93,7 @@ struct HudModel {
   float greatest_force_n = 0;  // of all participants' `forces_n`: their common scale
   bool shows_regions = true, shows_holds = false, shows_arrows = true, shows_rate = false;
   std::string recording_text;           // empty: nothing is wrong with the recording
+  bool has_recording_ended = false;     // while the session goes on
   std::string frozen_text;              // empty: one's own tools follow one's hands
   std::string view_text;                // empty: there is no view to follow
   std::string ghost_text;               // empty: it is not to be shown
@@ -110,7 +116,9 @@ struct HudActions {
 
 class Hud {
  public:
-  explicit Hud(render::GlContext& context);
+  // `scale`: of words and panels, kLeastScale to kMostScale; 0: as the monitor says. It is less
+  // where the window is too small for it, and the log says so.
+  explicit Hud(render::GlContext& context, double scale = 0);
   ~Hud();
   Hud(const Hud&) = delete;
   Hud& operator=(const Hud&) = delete;
@@ -121,9 +129,16 @@ class Hud {
   // Whether Enter went down since the last picture; for what is drawn in place of a model.
   static bool take_enter();
   void render();  // may be repeated: the same again
+  // What is drawn in place of a model says which texts it shows; their letters are there with the
+  // next picture.
+  void need(std::string_view text) { fonts_->need(text); }
+  const Fonts& fonts() const { return *fonts_; }
 
  private:
+  void need_letters(const HudModel& model);
+
   render::GlContext& context_;
+  std::optional<Fonts> fonts_;
   float scale_ = 1;
 };
 

@@ -96,8 +96,8 @@ void draw_figures(const HudParticipant& p) {
 
 }  // namespace
 
-float draw_participants_panel(const HudModel& model, float scale) {
-  if (model.participants.empty()) return 0;
+Box draw_participants_panel(const HudModel& model, float scale) {
+  if (model.participants.empty()) return {};
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
   ImGui::SetNextWindowPos({screen.x - kMargin * scale, kMargin * scale}, 0, {1, 0});
   ImGui::Begin("participants", nullptr, kGlass);
@@ -128,9 +128,9 @@ float draw_participants_panel(const HudModel& model, float scale) {
     }
     ImGui::EndTable();
   }
-  const float end = ImGui::GetWindowPos().y + ImGui::GetWindowHeight();
+  const Box box = box_of_window();
   ImGui::End();
-  return end;
+  return box;
 }
 
 }  // namespace trocar::ui
