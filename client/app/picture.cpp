@@ -379,9 +379,12 @@ ui::HudModel Picture::hud_model(const replica::Replica& replica, replica::Sessio
   add_messages(replica, now_ns, model);
   if (const auto* playback = source.playback()) {
     const auto seconds = [](Tick tick) { return static_cast<double>(tick) * 1e-3; };
-    model.timeline =
-        ui::HudTimeline{seconds(playback->first_tick()), seconds(playback->last_tick()),
-                        seconds(playback->position()), playback->is_playing(), playback->speed()};
+    model.timeline = ui::HudTimeline{seconds(playback->first_tick()),
+                                     seconds(playback->last_tick()),
+                                     seconds(playback->position()),
+                                     playback->is_playing(),
+                                     playback->speed(),
+                                     playback->story()};
   }
   return model;
 }
@@ -406,6 +409,7 @@ void Picture::act(const ui::HudActions& actions, const replica::Replica& replica
   replica::PlaybackControl* playback = source.playback();
   if (playback == nullptr) return;
   if (actions.toggle_play) playback->is_playing() ? playback->pause() : playback->play();
+  if (actions.pause) playback->pause();
   if (actions.speed) playback->set_speed(*actions.speed);
   if (actions.seek_seconds)
     playback->seek(static_cast<Tick>(std::llround(std::max(0.0, *actions.seek_seconds) * 1e3)));

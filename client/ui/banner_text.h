@@ -21,7 +21,7 @@ struct Banner {
 // At most kMostBanners. A session that is over or away has one: the rest is of no use then.
 std::vector<Banner> banners_of(const HudModel& model);
 
-// What a person can do when a connection has ended so.
+// Says what a person can do when a connection has ended so.
 const char* advice_after(replica::CloseKind kind);
 
 // Says what became of a claim; `reach_m` is of one's own tool. Others' claims keep the server's

@@ -19,8 +19,8 @@ namespace trocar::ui {
 namespace {
 
 constexpr float kFontPixels = 14.0f;
-// The panels need this much room at scale 1, in pixels: then none covers another.
-constexpr float kLayoutWidth = 980, kLayoutHeight = 560;
+// The panels need this much room at scale 1, in pixels: then none covers another, nor the middle.
+constexpr float kLayoutWidth = 1160, kLayoutHeight = 620;
 
 // Keys that went down since the last picture. Dear ImGui samples keys once per picture and would
 // miss a short press at a low rate. GLFW callbacks carry no context of ours, and there is one Hud.
@@ -32,7 +32,7 @@ void remember_key(GLFWwindow*, int key, int, int action, int) {
   if (action == GLFW_PRESS) pressed_keys().push_back(key);
 }
 
-// What is asked for, or what the monitor says, as far as the panels fit into the window.
+// It is what is asked for, or what the monitor says, as far as the panels fit into the window.
 float scale_of(render::GlContext& context, double asked) {
   const render::Size size = context.size();
   auto scale = static_cast<float>(asked);
@@ -107,6 +107,10 @@ void Hud::need_letters(const HudModel& model) {
     fonts_->need(*text);
   for (const HudParticipant& participant : model.participants) fonts_->need(participant.name);
   for (const HudMessage& message : model.messages) fonts_->need(message.text);
+  const auto* story = model.timeline ? model.timeline->story.get() : nullptr;
+  if (story != nullptr && story != read_story_)
+    for (const auto& event : story->events) fonts_->need(event.text);
+  read_story_ = story;
 }
 
 void Hud::begin_frame(float seconds) {
@@ -188,6 +192,15 @@ HudActions Hud::draw(const HudModel& model) {
   if (model.timeline && pressed(GLFW_KEY_SPACE)) actions.toggle_play = true;
   if (model.timeline && (pressed(GLFW_KEY_LEFT) || pressed(GLFW_KEY_RIGHT)))
     actions.seek_seconds = model.timeline->position_seconds + (pressed(GLFW_KEY_LEFT) ? -2.0 : 2.0);
+  if (model.timeline && (pressed(GLFW_KEY_COMMA) || pressed(GLFW_KEY_PERIOD))) {
+    constexpr double kPictureSeconds = static_cast<double>(kTicksPerFrame) / kTicksPerSecond;
+    actions.pause = true;
+    actions.seek_seconds = model.timeline->position_seconds +
+                           (pressed(GLFW_KEY_COMMA) ? -kPictureSeconds : kPictureSeconds);
+  }
+  if (model.timeline && (pressed(GLFW_KEY_PAGE_UP) || pressed(GLFW_KEY_PAGE_DOWN)))
+    if (const auto at = event_beside(*model.timeline, pressed(GLFW_KEY_PAGE_DOWN)))
+      actions.seek_seconds = at;
   return actions;
 }
 

@@ -9,12 +9,14 @@
 // one context).
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "client/device/view_rays.h"
 #include "client/render/gl_context.h"
+#include "client/replica/session_source.h"
 #include "client/replica/session_view.h"
 #include "client/shape/tool_mesh.h"
 #include "client/ui/felt_text.h"
@@ -22,7 +24,7 @@
 
 namespace trocar::ui {
 
-// Of words and panels, pixels per pixel of the design.
+// The scale of words and panels is in pixels per pixel of the design.
 inline constexpr float kLeastScale = 0.75f, kMostScale = 3;
 
 struct HudParticipant {
@@ -57,7 +59,11 @@ struct HudTimeline {
   double first_seconds = 0, last_seconds = 0, position_seconds = 0;
   bool is_playing = false;
   float speed = 1;
+  std::shared_ptr<const replica::PlaybackStory> story;  // null: still searched
 };
+// When the next event after where the recording is takes place, or the one before it; nothing if
+// there is none. While it plays, an event just passed is not the one before.
+std::optional<double> event_beside(const HudTimeline& timeline, bool is_next);
 
 // A tool of one's own, whatever holds it.
 struct HudOwnForce {
@@ -108,7 +114,7 @@ struct HudModel {
 struct HudActions {
   bool toggle_help = false, toggle_regions = false, toggle_holds = false, toggle_arrows = false;
   bool toggle_rate = false, toggle_ghost = false, reset_camera = false, screenshot = false;
-  bool toggle_play = false;
+  bool toggle_play = false, pause = false;
   bool set_mark = false, return_to_mark = false, toggle_follow = false;
   std::optional<double> seek_seconds;
   std::optional<float> speed;
@@ -129,8 +135,8 @@ class Hud {
   // Whether Enter went down since the last picture; for what is drawn in place of a model.
   static bool take_enter();
   void render();  // may be repeated: the same again
-  // What is drawn in place of a model says which texts it shows; their letters are there with the
-  // next picture.
+  // Is told the texts of what is drawn in place of a model; their letters are there with the next
+  // picture.
   void need(std::string_view text) { fonts_->need(text); }
   const Fonts& fonts() const { return *fonts_; }
 
@@ -139,6 +145,7 @@ class Hud {
 
   render::GlContext& context_;
   std::optional<Fonts> fonts_;
+  const replica::PlaybackStory* read_story_ = nullptr;  // whose letters are there
   float scale_ = 1;
 };
 

@@ -24,11 +24,6 @@ std::string format(const char* pattern, ...) {
   return text;
 }
 
-std::string clock_text(double seconds) {
-  const int whole = static_cast<int>(seconds);
-  return format("%d:%04.1f", whole / 60, seconds - whole / 60 * 60);
-}
-
 ImVec4 colour_of(RateTone tone) {
   return tone == RateTone::Calm ? kGood : tone == RateTone::Notice ? kNotice : kTrouble;
 }
@@ -83,6 +78,11 @@ void help_row(const char* key, const char* what) {
 }
 
 }  // namespace
+
+std::string clock_text(double seconds) {
+  const int whole = static_cast<int>(seconds);
+  return format("%d:%04.1f", whole / 60, seconds - whole / 60 * 60);
+}
 
 std::string byte_rate(double bytes_per_second) {
   if (bytes_per_second < 1e6) return format("%.1f kB/s", bytes_per_second / 1e3);
@@ -199,37 +199,9 @@ void draw_labels(const HudModel& model, const Box& banners, float scale) {
   }
 }
 
-void draw_timeline(const HudTimeline& timeline, float scale, HudActions& actions) {
-  const ImVec2 screen = ImGui::GetIO().DisplaySize;
-  const float width = std::min(screen.x - 2 * kMargin * scale, 900 * scale);
-  ImGui::SetNextWindowPos({screen.x / 2, screen.y - kMargin * scale}, 0, {0.5f, 1});
-  ImGui::SetNextWindowSize({width, 0});
-  ImGui::Begin("timeline", nullptr, kPanel & ~ImGuiWindowFlags_AlwaysAutoResize);
-  if (ImGui::Button(timeline.is_playing ? "Pause" : "Play", {70 * scale, 0}))
-    actions.toggle_play = true;
-  ImGui::SameLine();
-  auto position = static_cast<float>(timeline.position_seconds);
-  const std::string text =
-      clock_text(timeline.position_seconds) + " / " + clock_text(timeline.last_seconds);
-  ImGui::SetNextItemWidth(width - 290 * scale);
-  if (ImGui::SliderFloat("##seek", &position, static_cast<float>(timeline.first_seconds),
-                         static_cast<float>(timeline.last_seconds), text.c_str(),
-                         ImGuiSliderFlags_AlwaysClamp | ImGuiSliderFlags_NoInput))
-    actions.seek_seconds = position;
-  for (const float speed : {0.25f, 1.0f, 4.0f}) {
-    ImGui::SameLine();
-    const bool is_current = timeline.speed == speed;
-    if (is_current)
-      ImGui::PushStyleColor(ImGuiCol_Button, ImGui::GetStyle().Colors[ImGuiCol_ButtonActive]);
-    if (ImGui::Button(format("%gx", speed).c_str(), {52 * scale, 0})) actions.speed = speed;
-    if (is_current) ImGui::PopStyleColor();
-  }
-  ImGui::End();
-}
-
 void draw_help(const HudModel& model, float scale) {
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
-  const float bottom = screen.y - (model.timeline ? 70 : kMargin) * scale;
+  const float bottom = screen.y - (model.timeline ? 132 : kMargin) * scale;
   // Under the panel of people: the bar of one's own force is at the left.
   ImGui::SetNextWindowPos({screen.x - kMargin * scale, bottom}, 0, {1, 1});
   ImGui::SetNextWindowBgAlpha(model.shows_help ? 0.86f : 0.45f);
@@ -259,6 +231,8 @@ void draw_help(const HudModel& model, float scale) {
     if (model.timeline) {
       help_row("Space", "play or pause");
       help_row("left, right", "two seconds back or on");
+      help_row(", .", "one picture back or on");
+      help_row("Page Up, Page Down", "to the event before or after");
     }
     help_row("right drag", "turn the view");
     help_row("middle drag", "move the view");

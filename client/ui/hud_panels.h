@@ -29,6 +29,8 @@ void draw_help(const HudModel& model, float scale);
 // Greys the scene, which is no longer what the session is.
 void draw_away_veil();
 
+// "1:02.5"
+std::string clock_text(double seconds);
 // "12.3 kB/s"
 std::string byte_rate(double bytes_per_second);
 

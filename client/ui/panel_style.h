@@ -40,7 +40,7 @@ inline ImFont* bold() {
   return fonts[fonts.Size - 1];
 }
 
-// Of the window that is being drawn.
+// This is where the window stands that is being drawn.
 inline Box box_of_window() {
   const ImVec2 at = ImGui::GetWindowPos(), size = ImGui::GetWindowSize();
   return {at.x, at.y, at.x + size.x, at.y + size.y};
