@@ -10,6 +10,7 @@
 #include <iostream>
 #include <map>
 
+#include "client/ui/hud.h"
 #include "common/base/printable.h"
 #include "common/base/version.h"
 #include "common/secure/join_code.h"
@@ -249,6 +250,10 @@ void add_picture_options(CLI::App& app, ClientOptions& options, GivenTexts& more
   app.add_flag("--headless", more.is_headless, "draw into memory, needs no display");
   app.add_flag("--no-render", more.draws_nothing, "draw nothing: a robot or a watcher by program");
   app.add_option("--size", more.size, "of the picture [1280x720]")->type_name("WxH");
+  app.add_option("--scale", options.scale,
+                 "how large words and panels are, as far as they fit [as the monitor says]")
+      ->type_name("FACTOR")
+      ->check(CLI::Range(double{ui::kLeastScale}, double{ui::kMostScale}));
   app.add_option("--fps", options.pictures_per_second,
                  "pictures per second [window 60, headless 15, fewer in software]")
       ->type_name("N")

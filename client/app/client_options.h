@@ -42,6 +42,7 @@ struct ClientOptions {
   Display display = Display::Window;
   render::Size size{1280, 720};
   double pictures_per_second = 0;  // 0: 60 in a window, 15 headless
+  double scale = 0;                // of words and panels; 0: as the monitor says
   Overlays overlays;
   StartView view;
   std::string screenshot_file;

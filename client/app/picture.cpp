@@ -9,7 +9,8 @@
 #include "client/replica/client_messages.h"
 #include "client/shape/ribbon.h"
 #include "client/ui/away_text.h"
-#include "client/ui/hud_panels.h"
+#include "client/ui/banner_text.h"
+#include "client/ui/rate_text.h"
 #include "client/ui/solver_text.h"
 #include "common/base/log.h"
 
@@ -65,7 +66,7 @@ Picture::Picture(std::unique_ptr<render::GlContext> context, const ClientOptions
     : role_(options.role),
       context_(std::move(context)),
       renderer_(*context_),
-      hud_(*context_),
+      hud_(*context_, options.scale),
       shows_help_(options.display == Display::Window),
       overlays_(options.overlays),
       view_(options.view) {
@@ -307,10 +308,11 @@ void Picture::add_messages(const replica::Replica& replica, std::uint64_t now_ns
                                         notice.outcome == replica::ClaimOutcome::Expired ||
                                         notice.outcome == replica::ClaimOutcome::Slipped);
     if (age > 5 || notice.text.empty() || !is_news) continue;
+    const std::string text =
+        ui::describe_notice(notice, is_own, shape_of(replica, notice.tool).reach_m);
     // A claim is retried while the verb is held: the same words once.
-    if (!model.messages.empty() && model.messages.back().text == notice.text)
-      model.messages.pop_back();
-    model.messages.push_back({notice.text, static_cast<float>(age), true});
+    if (!model.messages.empty() && model.messages.back().text == text) model.messages.pop_back();
+    model.messages.push_back({text, static_cast<float>(age), true});
   }
   if (model.messages.size() > 3)
     model.messages.erase(model.messages.begin(), model.messages.end() - 3);
@@ -331,12 +333,14 @@ ui::HudModel Picture::hud_model(const replica::Replica& replica, replica::Sessio
                   " surface vertices";
   if (source.state() == replica::SourceState::Connecting)
     model.status = "Connecting to " + source.name() + " ...";
-  else if (source.state() == replica::SourceState::Away)
+  else if (source.state() == replica::SourceState::Away) {
     model.status = ui::describe_absence(source.statistics().away_seconds,
                                         source.statistics().away_left_seconds);
-  else if (source.state() == replica::SourceState::Closed)
-    model.status = source.close_reason().text + "\nClose this window to leave.";
-  else if (!surface_.is_valid())
+    model.status_advice = "Wait. If it lasts, check the network of this computer.";
+  } else if (source.state() == replica::SourceState::Closed) {
+    model.status = source.close_reason().text;
+    model.status_advice = ui::advice_after(source.close_reason().kind);
+  } else if (!surface_.is_valid())
     model.status = "Waiting for the organ ...";
   if (own != nullptr && !own->frozen_by.empty())
     model.frozen_text = own->frozen_by + " keeps your tools where they are.";
@@ -365,6 +369,7 @@ ui::HudModel Picture::hud_model(const replica::Replica& replica, replica::Sessio
   model.frames_per_second = rate_.frames_per_second;
   model.bytes_per_second = rate_.bytes_per_second;
   model.recording_text = replica.recording().text;
+  model.has_recording_ended = replica.recording().status == wire::RecordingStatus::Failed;
   model.sync_text = model.is_away ? "old" : sync_text(replica);
   model.is_in_step = !model.is_away && replica.sync_state() == replica::SyncState::InStep;
   model.shows_regions = overlays_.regions;
@@ -384,9 +389,12 @@ ui::HudModel Picture::hud_model(const replica::Replica& replica, replica::Sessio
   add_messages(replica, now_ns, model);
   if (const auto* playback = source.playback()) {
     const auto seconds = [](Tick tick) { return static_cast<double>(tick) * 1e-3; };
-    model.timeline =
-        ui::HudTimeline{seconds(playback->first_tick()), seconds(playback->last_tick()),
-                        seconds(playback->position()), playback->is_playing(), playback->speed()};
+    model.timeline = ui::HudTimeline{seconds(playback->first_tick()),
+                                     seconds(playback->last_tick()),
+                                     seconds(playback->position()),
+                                     playback->is_playing(),
+                                     playback->speed(),
+                                     playback->story()};
   }
   return model;
 }
@@ -411,6 +419,7 @@ void Picture::act(const ui::HudActions& actions, const replica::Replica& replica
   replica::PlaybackControl* playback = source.playback();
   if (playback == nullptr) return;
   if (actions.toggle_play) playback->is_playing() ? playback->pause() : playback->play();
+  if (actions.pause) playback->pause();
   if (actions.speed) playback->set_speed(*actions.speed);
   if (actions.seek_seconds)
     playback->seek(static_cast<Tick>(std::llround(std::max(0.0, *actions.seek_seconds) * 1e3)));

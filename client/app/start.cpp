@@ -102,7 +102,7 @@ Result<std::optional<ClientOptions>> choose_session(ClientOptions options,
                                                     const std::string& message) {
   auto context = render::make_window_context(options.size, "Trocar");
   if (!context) return context.error();
-  ui::Hud hud(**context);
+  ui::Hud hud(**context, options.scale);
   const bool has_tried = !message.empty();
   ui::StartScreen screen(
       {has_tried ? options.server : "", options.join, options.name, options.role});
@@ -113,6 +113,11 @@ Result<std::optional<ClientOptions>> choose_session(ClientOptions options,
     lookout.update(model);
     (*context)->poll_events();
     hud.begin_frame(1.0f / 60);
+    for (const auto& session : model.sessions) {
+      hud.need(session.name);
+      hud.need(session.organ);
+    }
+    hud.need(screen.name());
     const auto choice = screen.draw(model, ui::Hud::take_enter());
     hud.render();
     (*context)->present();

@@ -58,6 +58,7 @@ Result<std::unique_ptr<ReplaySource>> ReplaySource::open(const std::string& path
 ReplaySource::ReplaySource(std::unique_ptr<JournalStream> stream, Clock clock)
     : stream_(std::move(stream)),
       clock_(std::move(clock)),
+      events_(stream_->path()),
       position_(stream_->first_tick()),
       seek_target_(stream_->first_tick()) {}
 

@@ -26,13 +26,14 @@
 #include <string>
 
 #include "client/replay/journal_stream.h"
+#include "client/replay/recorded_events.h"
 #include "client/replica/session_source.h"
 #include "common/base/timing.h"
 #include "proto/wire.pb.h"
 
 namespace trocar::replay {
 
-inline constexpr float kMinSpeed = 0.1f, kMaxSpeed = 10.0f;
+inline constexpr float kMinSpeed = 0.1f, kMaxSpeed = 16.0f;
 
 class ReplaySource final : public replica::SessionSource, public replica::PlaybackControl {
  public:
@@ -63,6 +64,7 @@ class ReplaySource final : public replica::SessionSource, public replica::Playba
   void pause() override;
   void seek(Tick tick) override;
   void set_speed(float speed) override;
+  std::shared_ptr<const replica::PlaybackStory> story() const override { return events_.story(); }
 
  private:
   using Entries = std::span<const JournalStream::Entry>;
@@ -91,6 +93,7 @@ class ReplaySource final : public replica::SessionSource, public replica::Playba
 
   std::unique_ptr<JournalStream> stream_;
   Clock clock_;
+  RecordedEvents events_;
   replica::SourceState state_ = replica::SourceState::Live;
   replica::CloseReason close_reason_;
   replica::SourceStatistics statistics_;

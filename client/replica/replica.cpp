@@ -467,6 +467,7 @@ void Replica::apply_claim(const proto::ClaimEvent& message, std::uint64_t arriva
   notice.verb = to_verb(message.verb());
   if (message.outcome() >= 0 && message.outcome() < wire::kClaimOutcomes)
     notice.outcome = static_cast<ClaimOutcome>(message.outcome());
+  notice.holder = message.holder_name();
   notice.text = message.text();
   notice.arrival_ns = arrival_ns;
   add_notice(std::move(notice));

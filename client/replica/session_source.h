@@ -16,7 +16,9 @@
 // any other message before state() turns Closed; Ping and Pong are the source's own business.
 
 #include <cstdint>
+#include <memory>
 #include <string>
+#include <vector>
 
 #include "common/base/tick.h"
 
@@ -73,6 +75,19 @@ struct SourceStatistics {
   double away_left_seconds = 0;             // until it is given up
 };
 
+enum class PlaybackEventKind : std::uint8_t { Person, Grasp, Cut, Refusal, Lesson, Gap };
+struct PlaybackEvent {
+  Tick tick = 0;
+  PlaybackEventKind kind = PlaybackEventKind::Person;
+  std::string text;  // one line for people
+};
+// This is what happened in a recording.
+struct PlaybackStory {
+  std::vector<PlaybackEvent> events;  // by tick
+  // The greatest force on any tool, N, in equal parts of the time from tick 0 to the last.
+  std::vector<float> forces_n;
+};
+
 // Controls of a recorded source. Seeking delivers, in the following polls, a SurfaceTopology when
 // the epoch differs, a keyframe at or before the target and what follows up to it; frame numbers
 // may so go back. At the end it pauses and stays Live.
@@ -83,11 +98,13 @@ class PlaybackControl {
   virtual Tick last_tick() const = 0;
   virtual Tick position() const = 0;  // tick up to which messages were delivered
   virtual bool is_playing() const = 0;
-  virtual float speed() const = 0;  // simulated seconds per second, 0.1 to 10
+  virtual float speed() const = 0;  // simulated seconds per second, 0.1 to 16
   virtual void play() = 0;          // at the end: from the start again
   virtual void pause() = 0;
   virtual void seek(Tick tick) = 0;  // clamped to the range; keeps playing or paused
   virtual void set_speed(float speed) = 0;
+  // Null while the recording is still searched.
+  virtual std::shared_ptr<const PlaybackStory> story() const = 0;
 };
 
 class SessionSource {

@@ -109,7 +109,8 @@ struct Notice {
   ToolSlot tool;
   tool::Verb verb = tool::Verb::None;
   ClaimOutcome outcome = ClaimOutcome::Granted;
-  std::string text;  // one line for the person
+  std::string holder;  // the name of who holds the tissue; empty: nobody
+  std::string text;    // one line for the person
   std::uint64_t arrival_ns = 0;
   bool is_for_all = false;  // not of a tool: what the instructor has done
 };

@@ -83,7 +83,7 @@ void draw_curves(const HudFeltHand& hand, float scale) {
 void draw_own_forces(const HudModel& model, float scale) {
   if (model.own_forces.empty()) return;
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
-  ImGui::SetNextWindowPos({screen.x / 2, screen.y - kMargin * scale}, 0, {0.5f, 1});
+  ImGui::SetNextWindowPos({kMargin * scale, screen.y - kMargin * scale}, 0, {0, 1});
   ImGui::Begin("own forces", nullptr, kGlass);
   float most_n = model.own_peak_n;
   for (const auto& own : model.own_forces) most_n = std::max(most_n, own.force_n);

@@ -1,7 +1,6 @@
 #include "client/ui/hud.h"
 
 #include <algorithm>
-#include <filesystem>
 #include <utility>
 
 #include "client/render/gl.h"
@@ -13,12 +12,15 @@
 #include <backends/imgui_impl_opengl3.h>
 #include <imgui.h>
 
+#include "client/ui/panel_style.h"
+#include "common/base/log.h"
+
 namespace trocar::ui {
 namespace {
 
-constexpr const char* kFont = "/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf";
-constexpr const char* kBoldFont = "/usr/share/fonts/truetype/dejavu/DejaVuSans-Bold.ttf";
 constexpr float kFontPixels = 14.0f;
+// The panels need this much room at scale 1, in pixels: then none covers another, nor the middle.
+constexpr float kLayoutWidth = 1160, kLayoutHeight = 620;
 
 // Keys that went down since the last picture. Dear ImGui samples keys once per picture and would
 // miss a short press at a low rate. GLFW callbacks carry no context of ours, and there is one Hud.
@@ -28,6 +30,25 @@ std::vector<int>& pressed_keys() {
 }
 void remember_key(GLFWwindow*, int key, int, int action, int) {
   if (action == GLFW_PRESS) pressed_keys().push_back(key);
+}
+
+// It is what is asked for, or what the monitor says, as far as the panels fit into the window.
+float scale_of(render::GlContext& context, double asked) {
+  const render::Size size = context.size();
+  auto scale = static_cast<float>(asked);
+  if (asked <= 0) {
+    float x = 1, y = 1;
+    if (GLFWwindow* window = context.window()) glfwGetWindowContentScale(window, &x, &y);
+    scale = std::max(x, 1.0f);
+    if (size.height > 1300) scale = std::max(scale, static_cast<float>(size.height) / 1080.0f);
+  }
+  const float room = std::min(static_cast<float>(size.width) / kLayoutWidth,
+                              static_cast<float>(size.height) / kLayoutHeight);
+  const float fitting = std::clamp(scale, kLeastScale, std::clamp(room, kLeastScale, kMostScale));
+  if (asked > 0 && fitting < scale)
+    log::warn("--scale {} is too large for a window of {}x{}: it is {:.2f}", asked, size.width,
+              size.height, fitting);
+  return fitting;
 }
 
 void set_style(float scale) {
@@ -41,7 +62,7 @@ void set_style(float scale) {
   style.ItemSpacing = {8, 5};
   style.CellPadding = {5, 2};
   ImVec4* colours = style.Colors;
-  colours[ImGuiCol_WindowBg] = {0.035f, 0.050f, 0.066f, 0.80f};
+  colours[ImGuiCol_WindowBg] = to_imgui(kPanelGround, 0.80f);
   colours[ImGuiCol_Border] = {0.55f, 0.70f, 0.80f, 0.16f};
   colours[ImGuiCol_Text] = {0.87f, 0.91f, 0.94f, 1};
   colours[ImGuiCol_TextDisabled] = {0.52f, 0.60f, 0.66f, 1};
@@ -59,29 +80,18 @@ void set_style(float scale) {
 
 }  // namespace
 
-Hud::Hud(render::GlContext& context) : context_(context) {
+Hud::Hud(render::GlContext& context, double scale) : context_(context) {
   IMGUI_CHECKVERSION();
   ImGui::CreateContext();
   ImGuiIO& io = ImGui::GetIO();
   io.IniFilename = nullptr;
   if (GLFWwindow* window = context.window()) {
-    float x = 1, y = 1;
-    glfwGetWindowContentScale(window, &x, &y);
-    scale_ = std::clamp(x, 1.0f, 3.0f);
     glfwSetKeyCallback(window, remember_key);  // Dear ImGui's calls it in turn
     ImGui_ImplGlfw_InitForOpenGL(window, true);
   }
-  const int height = context.size().height;
-  if (height > 1300) scale_ = std::max(scale_, static_cast<float>(height) / 1080.0f);
+  scale_ = scale_of(context, scale);
   ImGui_ImplOpenGL3_Init("#version 330 core");
-  if (std::filesystem::exists(kFont) && std::filesystem::exists(kBoldFont)) {
-    io.Fonts->AddFontFromFileTTF(kFont, kFontPixels * scale_);
-    io.Fonts->AddFontFromFileTTF(kBoldFont, kFontPixels * scale_);
-  } else {
-    ImFontConfig config;
-    config.SizePixels = 13 * scale_;
-    io.Fonts->AddFontDefault(&config);
-  }
+  fonts_.emplace(kFontPixels * scale_);
   set_style(scale_);
 }
 
@@ -91,7 +101,23 @@ Hud::~Hud() {
   ImGui::DestroyContext();
 }
 
+void Hud::need_letters(const HudModel& model) {
+  for (const std::string* text : {&model.title, &model.organ, &model.own_role, &model.status,
+                                  &model.recording_text, &model.frozen_text, &model.view_text})
+    fonts_->need(*text);
+  for (const HudParticipant& participant : model.participants) fonts_->need(participant.name);
+  for (const HudMessage& message : model.messages) fonts_->need(message.text);
+  const auto* story = model.timeline ? model.timeline->story.get() : nullptr;
+  if (story != nullptr && story != read_story_)
+    for (const auto& event : story->events) fonts_->need(event.text);
+  read_story_ = story;
+}
+
 void Hud::begin_frame(float seconds) {
+  if (fonts_->update()) {
+    ImGui_ImplOpenGL3_DestroyFontsTexture();
+    ImGui_ImplOpenGL3_CreateFontsTexture();
+  }
   ImGui_ImplOpenGL3_NewFrame();
   if (context_.window() != nullptr) {
     ImGui_ImplGlfw_NewFrame();
@@ -140,21 +166,17 @@ device::PointerInput Hud::input() const {
 
 HudActions Hud::draw(const HudModel& model) {
   HudActions actions;
+  need_letters(model);  // for the next picture
   if (model.is_away) draw_away_veil();
-  draw_labels(model, scale_);
-  draw_session_panel(model, scale_);
-  const float below_participants = draw_participants_panel(model, scale_);
-  draw_felt_hands(model, below_participants, scale_);
-  draw_slow_time(model, scale_);
-  draw_recording(model, scale_);
-  draw_stale_picture(model, scale_);
-  draw_lesson(model, scale_);
+  const Box session = draw_session_panel(model, scale_);
+  const Box people = draw_participants_panel(model, scale_);
+  const Box banners = draw_banners(model, session, people, scale_);
+  draw_labels(model, banners, scale_);
+  draw_felt_hands(model, people.bottom, scale_);
   draw_own_forces(model, scale_);
-  draw_messages(model, scale_);
   if (model.tray.hands > 0) draw_tray(model.tray, scale_, actions);
   if (model.timeline) draw_timeline(*model.timeline, scale_, actions);
   draw_help(model, scale_);
-  draw_status(model, scale_);
   ImGui::Render();
   const std::vector<int> keys = std::exchange(pressed_keys(), {});
   if (ImGui::GetIO().WantTextInput) return actions;
@@ -177,6 +199,15 @@ HudActions Hud::draw(const HudModel& model) {
   if (model.timeline && pressed(GLFW_KEY_SPACE)) actions.toggle_play = true;
   if (model.timeline && (pressed(GLFW_KEY_LEFT) || pressed(GLFW_KEY_RIGHT)))
     actions.seek_seconds = model.timeline->position_seconds + (pressed(GLFW_KEY_LEFT) ? -2.0 : 2.0);
+  if (model.timeline && (pressed(GLFW_KEY_COMMA) || pressed(GLFW_KEY_PERIOD))) {
+    constexpr double kPictureSeconds = static_cast<double>(kTicksPerFrame) / kTicksPerSecond;
+    actions.pause = true;
+    actions.seek_seconds = model.timeline->position_seconds +
+                           (pressed(GLFW_KEY_COMMA) ? -kPictureSeconds : kPictureSeconds);
+  }
+  if (model.timeline && (pressed(GLFW_KEY_PAGE_UP) || pressed(GLFW_KEY_PAGE_DOWN)))
+    if (const auto at = event_beside(*model.timeline, pressed(GLFW_KEY_PAGE_DOWN)))
+      actions.seek_seconds = at;
   return actions;
 }
 

@@ -9,17 +9,23 @@
 // one context).
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "client/device/view_rays.h"
 #include "client/render/gl_context.h"
+#include "client/replica/session_source.h"
 #include "client/replica/session_view.h"
 #include "client/shape/tool_mesh.h"
 #include "client/ui/felt_text.h"
+#include "client/ui/fonts.h"
 
 namespace trocar::ui {
+
+// The scale of words and panels is in pixels per pixel of the design.
+inline constexpr float kLeastScale = 0.75f, kMostScale = 3;
 
 struct HudParticipant {
   std::string name;
@@ -53,7 +59,11 @@ struct HudTimeline {
   double first_seconds = 0, last_seconds = 0, position_seconds = 0;
   bool is_playing = false;
   float speed = 1;
+  std::shared_ptr<const replica::PlaybackStory> story;  // null: still searched
 };
+// When the next event after where the recording is takes place, or the one before it; nothing if
+// there is none. While it plays, an event just passed is not the one before.
+std::optional<double> event_beside(const HudTimeline& timeline, bool is_next);
 
 // The instruments that a hand may take; hands 0: there is nothing to choose.
 struct HudTray {
@@ -77,11 +87,12 @@ struct HudFeltHand {
 inline constexpr std::size_t kFeltBins = 160;  // of them at most
 
 struct HudModel {
-  std::string title;     // "127.0.0.1:7690" or a file's name
-  std::string organ;     // "liver, 1,553 surface vertices"
-  std::string own_role;  // "surgeon", "instructor, watching", "replay"
-  std::string status;    // empty when live; else what it waits for, in the middle of the screen
-  bool is_away = false;  // the picture is old: it is greyed
+  std::string title;          // "127.0.0.1:7690" or a file's name
+  std::string organ;          // "liver, 1,553 surface vertices"
+  std::string own_role;       // "surgeon", "instructor, watching", "replay"
+  std::string status;         // empty when live; else what it waits for, or why it is over
+  std::string status_advice;  // what to do then
+  bool is_away = false;       // the picture is old: it is greyed
   wire::FrameFigures figures;
   double session_seconds = 0, round_trip_ms = 0;
   std::optional<double> surface_age_ms;  // of a live session, once it is known
@@ -95,6 +106,7 @@ struct HudModel {
   float greatest_force_n = 0;  // of all participants' `forces_n`: their common scale
   bool shows_regions = true, shows_holds = false, shows_arrows = true, shows_rate = false;
   std::string recording_text;           // empty: nothing is wrong with the recording
+  bool has_recording_ended = false;     // while the session goes on
   std::string frozen_text;              // empty: one's own tools follow one's hands
   std::string view_text;                // empty: there is no view to follow
   std::string ghost_text;               // empty: it is not to be shown
@@ -110,7 +122,7 @@ struct HudModel {
 struct HudActions {
   bool toggle_help = false, toggle_regions = false, toggle_holds = false, toggle_arrows = false;
   bool toggle_rate = false, toggle_ghost = false, reset_camera = false, screenshot = false;
-  bool toggle_play = false;
+  bool toggle_play = false, pause = false;
   bool set_mark = false, return_to_mark = false, toggle_follow = false;
   bool switch_hand = false;
   std::optional<std::size_t> take_instrument;
@@ -120,7 +132,9 @@ struct HudActions {
 
 class Hud {
  public:
-  explicit Hud(render::GlContext& context);
+  // `scale`: of words and panels, kLeastScale to kMostScale; 0: as the monitor says. It is less
+  // where the window is too small for it, and the log says so.
+  explicit Hud(render::GlContext& context, double scale = 0);
   ~Hud();
   Hud(const Hud&) = delete;
   Hud& operator=(const Hud&) = delete;
@@ -131,9 +145,17 @@ class Hud {
   // Whether Enter went down since the last picture; for what is drawn in place of a model.
   static bool take_enter();
   void render();  // may be repeated: the same again
+  // Is told the texts of what is drawn in place of a model; their letters are there with the next
+  // picture.
+  void need(std::string_view text) { fonts_->need(text); }
+  const Fonts& fonts() const { return *fonts_; }
 
  private:
+  void need_letters(const HudModel& model);
+
   render::GlContext& context_;
+  std::optional<Fonts> fonts_;
+  const replica::PlaybackStory* read_story_ = nullptr;  // whose letters are there
   float scale_ = 1;
 };
 

@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <cstdarg>
 #include <cstdio>
+#include <utility>
 
+#include "client/ui/banner_text.h"
 #include "client/ui/panel_style.h"
 #include "client/ui/solver_text.h"
 
@@ -20,11 +22,6 @@ std::string format(const char* pattern, ...) {
   std::vsnprintf(text, sizeof text, pattern, arguments);
   va_end(arguments);
   return text;
-}
-
-std::string clock_text(double seconds) {
-  const int whole = static_cast<int>(seconds);
-  return format("%d:%04.1f", whole / 60, seconds - whole / 60 * 60);
 }
 
 ImVec4 colour_of(RateTone tone) {
@@ -82,6 +79,11 @@ void help_row(const char* key, const char* what) {
 
 }  // namespace
 
+std::string clock_text(double seconds) {
+  const int whole = static_cast<int>(seconds);
+  return format("%d:%04.1f", whole / 60, seconds - whole / 60 * 60);
+}
+
 std::string byte_rate(double bytes_per_second) {
   if (bytes_per_second < 1e6) return format("%.1f kB/s", bytes_per_second / 1e3);
   return format("%.2f MB/s", bytes_per_second / 1e6);
@@ -118,7 +120,7 @@ void figure_rows(const HudModel& model) {
 
 }  // namespace
 
-void draw_session_panel(const HudModel& model, float scale) {
+Box draw_session_panel(const HudModel& model, float scale) {
   ImGui::SetNextWindowPos({kMargin * scale, kMargin * scale});
   ImGui::SetNextWindowSizeConstraints({300 * scale, 0}, {600 * scale, 2000 * scale});
   ImGui::Begin("session", nullptr, kGlass);
@@ -141,74 +143,52 @@ void draw_session_panel(const HudModel& model, float scale) {
     }
     ImGui::EndTable();
   }
+  const Box box = box_of_window();
   ImGui::End();
+  return box;
 }
 
-void draw_slow_time(const HudModel& model, float scale) {
-  // A recording plays at its own speed, however slow the session was.
-  if (model.timeline || !model.status.empty()) return;
-  const RateText text = describe(model.figures);
-  if (text.banner.empty()) return;
-  const ImVec2 screen = ImGui::GetIO().DisplaySize;
-  ImGui::SetNextWindowPos({screen.x / 2, kMargin * scale}, 0, {0.5f, 0});
-  ImGui::Begin("slow", nullptr, kGlass);
-  ImGui::PushFont(bold());
-  ImGui::TextColored(kTrouble, "%s", text.banner.c_str());
-  ImGui::PopFont();
-  ImGui::TextDisabled("%s", model.has_own_tool ? "the server cannot keep up: move slowly"
-                                               : "the server cannot keep up");
-  ImGui::End();
-}
-
-void draw_recording(const HudModel& model, float scale) {
-  if (model.recording_text.empty()) return;
-  const ImVec2 screen = ImGui::GetIO().DisplaySize;
-  constexpr float kBelowSlowTime = 64;
-  ImGui::SetNextWindowPos({screen.x / 2, (kMargin + kBelowSlowTime) * scale}, 0, {0.5f, 0});
-  ImGui::Begin("recording", nullptr, kGlass);
-  ImGui::PushFont(bold());
-  ImGui::TextColored(kTrouble, "%s", model.recording_text.c_str());
-  ImGui::PopFont();
-  ImGui::End();
-}
-
-void draw_stale_picture(const HudModel& model, float scale) {
-  constexpr double kStaleMs = 400;
-  if (!model.surface_age_ms || *model.surface_age_ms < kStaleMs) return;
-  const ImVec2 screen = ImGui::GetIO().DisplaySize;
-  constexpr float kBelowRecording = 112;
-  ImGui::SetNextWindowPos({screen.x / 2, (kMargin + kBelowRecording) * scale}, 0, {0.5f, 0});
-  ImGui::Begin("stale", nullptr, kGlass);
-  ImGui::PushFont(bold());
-  ImGui::TextColored(kTrouble, "This picture is %.1f s old.", *model.surface_age_ms * 1e-3);
-  ImGui::PopFont();
-  ImGui::TextDisabled("The connection is slow or has stopped: wait before you cut.");
-  ImGui::End();
-}
-
-void draw_lesson(const HudModel& model, float scale) {
-  if (model.frozen_text.empty() && model.view_text.empty()) return;
-  const ImVec2 screen = ImGui::GetIO().DisplaySize;
-  // At the left, above the hint or the timeline, where it covers no organ.
-  const float bottom = screen.y - (model.timeline ? 118 : kMargin + 48) * scale;
-  ImGui::SetNextWindowPos({kMargin * scale, bottom}, 0, {0, 1});
-  ImGui::Begin("lesson", nullptr, kGlass);
-  if (!model.frozen_text.empty()) {
+Box draw_banners(const HudModel& model, const Box& session, const Box& people, float scale) {
+  const std::vector<Banner> banners = banners_of(model);
+  if (banners.empty() && model.messages.empty()) return {};
+  constexpr float kLeastWidth = 300;
+  const float right = people.right > 0 ? people.left : ImGui::GetIO().DisplaySize.x;
+  const float width = std::max(right - session.right - 2 * kMargin * scale, kLeastWidth * scale);
+  const ImVec2 pad = ImGui::GetStyle().WindowPadding;
+  ImGui::SetNextWindowPos({(session.right + right) / 2, kMargin * scale}, 0, {0.5f, 0});
+  ImGui::Begin("banners", nullptr, kGlass);
+  ImGui::PushTextWrapPos(width - pad.x);
+  bool is_first = true;
+  for (const Banner& banner : banners) {
+    if (!std::exchange(is_first, false)) ImGui::Separator();
     ImGui::PushFont(bold());
-    ImGui::TextColored(kNotice, "%s", model.frozen_text.c_str());
+    ImGui::TextColored(colour_of(banner.tone), "%s", banner.text.c_str());
     ImGui::PopFont();
-    ImGui::TextDisabled("They come back to your hands slowly when they are released.");
+    if (!banner.advice.empty()) ImGui::TextUnformatted(banner.advice.c_str());
   }
-  if (!model.view_text.empty()) ImGui::TextUnformatted(model.view_text.c_str());
+  for (const HudMessage& message : model.messages) {
+    const float alpha = std::clamp(5.0f - message.age_seconds, 0.0f, 1.0f);
+    if (alpha <= 0) continue;
+    if (!std::exchange(is_first, false)) ImGui::Separator();
+    ImVec4 colour = message.is_trouble ? kTrouble : kGood;
+    colour.w = alpha;
+    ImGui::TextColored(colour, "%s", message.text.c_str());
+  }
+  ImGui::PopTextWrapPos();
+  const Box box = box_of_window();
   ImGui::End();
+  return box;
 }
 
-void draw_labels(const HudModel& model, float scale) {
+void draw_labels(const HudModel& model, const Box& banners, float scale) {
   ImDrawList* list = ImGui::GetBackgroundDrawList();
   for (const HudLabel& label : model.labels) {
     const ImVec2 size = ImGui::CalcTextSize(label.text.c_str());
-    const ImVec2 from = {label.x + 12 * scale, label.y - size.y / 2};
     const ImVec2 pad = {7 * scale, 3 * scale};
+    ImVec2 from = {label.x + 12 * scale, label.y - size.y / 2};
+    const bool is_covered =
+        from.y - pad.y < banners.bottom && from.x < banners.right && from.x + size.x > banners.left;
+    if (is_covered) from.y = banners.bottom + 2 * pad.y;
     list->AddRectFilled({from.x - pad.x, from.y - pad.y},
                         {from.x + size.x + pad.x, from.y + size.y + pad.y},
                         IM_COL32(8, 12, 16, 170), 6 * scale);
@@ -219,67 +199,11 @@ void draw_labels(const HudModel& model, float scale) {
   }
 }
 
-void draw_messages(const HudModel& model, float scale) {
-  const ImVec2 screen = ImGui::GetIO().DisplaySize;
-  const float bars = static_cast<float>(model.own_forces.size()) * 42;
-  float y = screen.y - (model.timeline ? 92 : 40 + bars) * scale;
-  ImDrawList* list = ImGui::GetForegroundDrawList();
-  for (auto message = model.messages.rbegin(); message != model.messages.rend(); ++message) {
-    const float alpha = std::clamp(5.0f - message->age_seconds, 0.0f, 1.0f);
-    if (alpha <= 0) continue;
-    const ImVec2 size = ImGui::CalcTextSize(message->text.c_str());
-    const ImVec2 pad = {14 * scale, 7 * scale};
-    const ImVec2 from = {(screen.x - size.x) / 2, y - size.y};
-    const auto fade = [&](int a) { return static_cast<int>(static_cast<float>(a) * alpha); };
-    const ImU32 edge = message->is_trouble ? IM_COL32(255, 160, 70, fade(190))
-                                           : IM_COL32(110, 190, 230, fade(120));
-    list->AddRectFilled({from.x - pad.x, from.y - pad.y},
-                        {from.x + size.x + pad.x, from.y + size.y + pad.y},
-                        IM_COL32(9, 13, 17, fade(215)), 9 * scale);
-    list->AddRect({from.x - pad.x, from.y - pad.y},
-                  {from.x + size.x + pad.x, from.y + size.y + pad.y}, edge, 9 * scale, 0,
-                  1.5f * scale);
-    list->AddText(from, IM_COL32(238, 242, 245, fade(255)), message->text.c_str());
-    y -= size.y + 3 * pad.y;
-  }
-}
-
-void draw_timeline(const HudTimeline& timeline, float scale, HudActions& actions) {
-  const ImVec2 screen = ImGui::GetIO().DisplaySize;
-  const float width = std::min(screen.x - 2 * kMargin * scale, 900 * scale);
-  ImGui::SetNextWindowPos({screen.x / 2, screen.y - kMargin * scale}, 0, {0.5f, 1});
-  ImGui::SetNextWindowSize({width, 0});
-  ImGui::Begin("timeline", nullptr, kPanel & ~ImGuiWindowFlags_AlwaysAutoResize);
-  if (ImGui::Button(timeline.is_playing ? "Pause" : "Play", {70 * scale, 0}))
-    actions.toggle_play = true;
-  ImGui::SameLine();
-  auto position = static_cast<float>(timeline.position_seconds);
-  const std::string text =
-      clock_text(timeline.position_seconds) + " / " + clock_text(timeline.last_seconds);
-  ImGui::SetNextItemWidth(width - 290 * scale);
-  if (ImGui::SliderFloat("##seek", &position, static_cast<float>(timeline.first_seconds),
-                         static_cast<float>(timeline.last_seconds), text.c_str(),
-                         ImGuiSliderFlags_AlwaysClamp | ImGuiSliderFlags_NoInput))
-    actions.seek_seconds = position;
-  for (const float speed : {0.25f, 1.0f, 4.0f}) {
-    ImGui::SameLine();
-    const bool is_current = timeline.speed == speed;
-    if (is_current)
-      ImGui::PushStyleColor(ImGuiCol_Button, ImGui::GetStyle().Colors[ImGuiCol_ButtonActive]);
-    if (ImGui::Button(format("%gx", speed).c_str(), {52 * scale, 0})) actions.speed = speed;
-    if (is_current) ImGui::PopStyleColor();
-  }
-  ImGui::End();
-}
-
 void draw_help(const HudModel& model, float scale) {
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
-  const float bottom = screen.y - (model.timeline ? 70 : kMargin) * scale;
-  // The hint is at the left; the whole list, which is tall, under the shorter panel.
-  if (model.shows_help)
-    ImGui::SetNextWindowPos({screen.x - kMargin * scale, bottom}, 0, {1, 1});
-  else
-    ImGui::SetNextWindowPos({kMargin * scale, bottom}, 0, {0, 1});
+  const float bottom = screen.y - (model.timeline ? 132 : kMargin) * scale;
+  // Under the panel of people: the bar of one's own force is at the left.
+  ImGui::SetNextWindowPos({screen.x - kMargin * scale, bottom}, 0, {1, 1});
   ImGui::SetNextWindowBgAlpha(model.shows_help ? 0.86f : 0.45f);
   ImGui::Begin("help", nullptr, kGlass);
   if (!model.shows_help) {
@@ -309,6 +233,8 @@ void draw_help(const HudModel& model, float scale) {
     if (model.timeline) {
       help_row("Space", "play or pause");
       help_row("left, right", "two seconds back or on");
+      help_row(", .", "one picture back or on");
+      help_row("Page Up, Page Down", "to the event before or after");
     }
     help_row("right drag", "turn the view");
     help_row("middle drag", "move the view");
@@ -336,15 +262,6 @@ void draw_help(const HudModel& model, float scale) {
 void draw_away_veil() {
   ImGui::GetBackgroundDrawList()->AddRectFilled({0, 0}, ImGui::GetIO().DisplaySize,
                                                 IM_COL32(104, 108, 112, 170));
-}
-
-void draw_status(const HudModel& model, float) {
-  if (model.status.empty()) return;
-  const ImVec2 screen = ImGui::GetIO().DisplaySize;
-  ImGui::SetNextWindowPos({screen.x / 2, screen.y / 2}, 0, {0.5f, 0.5f});
-  ImGui::Begin("status", nullptr, kGlass);
-  ImGui::TextUnformatted(model.status.c_str());
-  ImGui::End();
 }
 
 }  // namespace trocar::ui

@@ -8,6 +8,8 @@
 #include <string>
 
 #include "client/shape/tool_mesh.h"
+#include "client/ui/hud_panels.h"
+#include "client/ui/palette.h"
 
 namespace trocar::ui {
 
@@ -21,9 +23,12 @@ inline constexpr float kMargin = 14;
 // A scale of forces goes to this at least, in N: a trembling of millinewtons is no peak.
 inline constexpr float kLeastScaleNewton = 0.5f;
 
-inline const ImVec4 kGood = {0.42f, 0.86f, 0.58f, 1};
-inline const ImVec4 kNotice = {0.95f, 0.86f, 0.45f, 1};
-inline const ImVec4 kTrouble = {1.0f, 0.66f, 0.30f, 1};
+inline ImVec4 to_imgui(const PaletteColour& c, float alpha = 1) {
+  return {c[0], c[1], c[2], alpha};
+}
+inline const ImVec4 kGood = to_imgui(kSkyBlue);
+inline const ImVec4 kNotice = to_imgui(kYellow);
+inline const ImVec4 kTrouble = to_imgui(kOrange);
 
 inline ImVec4 to_imgui(shape::Colour c, float alpha = 1) {
   return {static_cast<float>(c.r) / 255, static_cast<float>(c.g) / 255,
@@ -33,6 +38,12 @@ inline ImVec4 to_imgui(shape::Colour c, float alpha = 1) {
 inline ImFont* bold() {
   const auto& fonts = ImGui::GetIO().Fonts->Fonts;
   return fonts[fonts.Size - 1];
+}
+
+// This is where the window stands that is being drawn.
+inline Box box_of_window() {
+  const ImVec2 at = ImGui::GetWindowPos(), size = ImGui::GetWindowSize();
+  return {at.x, at.y, at.x + size.x, at.y + size.y};
 }
 
 inline void heading(const char* text) {

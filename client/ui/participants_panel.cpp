@@ -78,14 +78,18 @@ float width_of_figures(const HudModel& model) {
   for (const HudParticipant& p : model.participants)
     if (p.has_tool)
       width = std::max(
-          width,
-          ImGui::CalcTextSize(p.is_self ? "00.00 N  000 mN m  000 nodes" : "00.00 N  000 nodes").x);
+          width, ImGui::CalcTextSize(model.shows_rate ? p.is_self ? "00.00 N  000 mN m  000 nodes"
+                                                                  : "00.00 N  000 nodes"
+                                                      : "00.00 N")
+                     .x);
   return width;
 }
 
-void draw_figures(const HudParticipant& p) {
+// Torque and nodes are figures for research.
+void draw_figures(const HudParticipant& p, bool shows_all) {
   if (!p.has_tool || (p.contact_nodes == 0 && p.force_n < 0.005f)) return;
   ImGui::Text("%.2f N", static_cast<double>(p.force_n));
+  if (!shows_all) return;
   ImGui::SameLine();
   if (p.is_self && p.torque_nm >= 0.5e-3f) {
     ImGui::Text("%.0f mN m", static_cast<double>(p.torque_nm) * 1e3);
@@ -96,8 +100,8 @@ void draw_figures(const HudParticipant& p) {
 
 }  // namespace
 
-float draw_participants_panel(const HudModel& model, float scale) {
-  if (model.participants.empty()) return 0;
+Box draw_participants_panel(const HudModel& model, float scale) {
+  if (model.participants.empty()) return {};
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
   ImGui::SetNextWindowPos({screen.x - kMargin * scale, kMargin * scale}, 0, {1, 0});
   ImGui::Begin("participants", nullptr, kGlass);
@@ -124,13 +128,13 @@ float draw_participants_panel(const HudModel& model, float scale) {
       ImGui::TableNextColumn();
       draw_plot(p, model.greatest_force_n, scale);
       ImGui::TableNextColumn();
-      draw_figures(p);
+      draw_figures(p, model.shows_rate);
     }
     ImGui::EndTable();
   }
-  const float end = ImGui::GetWindowPos().y + ImGui::GetWindowHeight();
+  const Box box = box_of_window();
   ImGui::End();
-  return end;
+  return box;
 }
 
 }  // namespace trocar::ui

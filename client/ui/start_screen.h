@@ -40,6 +40,7 @@ class StartScreen {
   std::optional<StartChoice> draw(const StartModel& model, bool is_entered);
   // Whether the person has done anything here.
   bool is_touched() const { return is_touched_; }
+  const char* name() const { return name_.data(); }  // as typed so far
 
  private:
   void draw_sessions(const StartModel& model);

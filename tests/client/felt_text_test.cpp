@@ -36,7 +36,7 @@ TEST(FeltText, SaysWhatALoopDoesInWordsAndFigures) {
 }
 
 TEST(FeltText, BeforeTheFirstAnswerThereIsNone) {
-  EXPECT_EQ(describe({}).answers, "none yet");
+  EXPECT_EQ(describe(FeltHandFigures{}).answers, "none yet");
 }
 
 }  // namespace

@@ -184,7 +184,7 @@ TEST_F(PictureTest, TheForceOnOnesOwnToolIsABar) {
   };
   const render::Image small = with_force(0.1f, "force_small"), large = with_force(1.9f, "force");
   // The right half of the bar: 0.1 of 0.5 N do not reach it, 1.9 of 2 N do.
-  const Pixel without = mean(small, 650, 684, 720, 690), with = mean(large, 650, 684, 720, 690);
+  const Pixel without = mean(small, 230, 684, 300, 690), with = mean(large, 230, 684, 300, 690);
   EXPECT_GT(with.r + with.g + with.b, without.r + without.g + without.b + 100);
 }
 

@@ -233,7 +233,7 @@ TEST_F(ReplaySourceTest, SpeedIsClampedAndKeepsThePlace) {
   player.step(32);
   EXPECT_EQ(player.source->position(), 16u + 160 + 16);
   player.source->set_speed(100);
-  EXPECT_EQ(player.source->speed(), 10.0f);
+  EXPECT_EQ(player.source->speed(), 16.0f);
   player.source->set_speed(0);
   EXPECT_EQ(player.source->speed(), 0.1f);
   player.source->set_speed(std::nanf(""));

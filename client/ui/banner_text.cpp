@@ -1,0 +1,94 @@
+#include "client/ui/banner_text.h"
+
+#include <cmath>
+
+namespace trocar::ui {
+namespace {
+
+constexpr double kStaleMs = 400;
+
+std::string tenths(double value) {
+  const long whole = std::lround(value * 10);
+  return std::to_string(whole / 10) + "." + std::to_string(whole % 10);
+}
+
+}  // namespace
+
+std::vector<Banner> banners_of(const HudModel& model) {
+  std::vector<Banner> banners;
+  if (!model.status.empty()) {
+    banners.push_back(
+        {model.status, model.status_advice, model.is_away ? RateTone::Warning : RateTone::Calm});
+    return banners;
+  }
+  if (!model.frozen_text.empty())
+    banners.push_back({model.frozen_text,
+                       "Wait: they come back to your hands slowly when they are released.",
+                       RateTone::Notice});
+  if (model.surface_age_ms && *model.surface_age_ms >= kStaleMs)
+    banners.push_back({"This picture is " + tenths(*model.surface_age_ms * 1e-3) + " s old.",
+                       "The connection is slow or has stopped: wait before you cut.",
+                       RateTone::Warning});
+  // A recording plays at its own speed, however slow the session was.
+  if (const auto slow = describe(model.figures).banner; !slow.empty() && !model.timeline)
+    banners.push_back({slow,
+                       model.has_own_tool ? "The server cannot keep up: move slowly."
+                                          : "The server cannot keep up.",
+                       RateTone::Warning});
+  if (!model.recording_text.empty())
+    banners.push_back({model.recording_text,
+                       model.has_recording_ended
+                           ? "The lesson goes on without it. Tell the host to make room on the "
+                             "disk, and to start the session again."
+                           : "The lesson goes on. Tell the host that the disk is too slow.",
+                       RateTone::Warning});
+  if (!model.view_text.empty()) banners.push_back({model.view_text, "", RateTone::Calm});
+  if (banners.size() > kMostBanners) banners.resize(kMostBanners);
+  return banners;
+}
+
+const char* advice_after(replica::CloseKind kind) {
+  switch (kind) {
+    case replica::CloseKind::None:
+    case replica::CloseKind::Ended:
+      return "Close this window to leave.";
+    case replica::CloseKind::Refused:
+      return "Ask the host of the session, or close this window to leave.";
+    case replica::CloseKind::Unreachable:
+      return "Check the address and the network, and ask the host whether the session runs. Close "
+             "this window to leave.";
+    case replica::CloseKind::Lost:
+      return "Ask the host to start the session again, and join again. Close this window to leave.";
+  }
+  return "";
+}
+
+std::string describe_notice(const replica::Notice& notice, bool is_own, float reach_m) {
+  if (!is_own || notice.is_for_all) return notice.text;
+  const std::string& holder = notice.holder;
+  switch (notice.outcome) {
+    case replica::ClaimOutcome::RefusedHeld:
+      if (holder.empty()) return notice.text;
+      return (notice.verb == tool::Verb::Cut
+                  ? "The blade is stopped: " + holder + " holds the tissue ahead."
+                  : holder + " holds this tissue.") +
+             " Wait, or ask " + holder + " to let go.";
+    case replica::ClaimOutcome::RefusedNothingInReach:
+      return "Nothing is in reach. Bring the tip within " +
+             std::to_string(std::lround(reach_m * 1000)) + " mm of the surface.";
+    case replica::ClaimOutcome::TakenOver:
+      if (holder.empty()) return notice.text;
+      return holder + " has taken your tissue, because your hand was silent. Ask " + holder +
+             " to let go.";
+    case replica::ClaimOutcome::Expired:
+      return "Your tool let go, because your hand was silent for too long. Grasp or push again.";
+    case replica::ClaimOutcome::Slipped:
+      return "The tissue slipped out of your jaws. Grasp again, and pull less.";
+    case replica::ClaimOutcome::Granted:
+    case replica::ClaimOutcome::Released:
+      break;
+  }
+  return notice.text;
+}
+
+}  // namespace trocar::ui

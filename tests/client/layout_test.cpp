@@ -1,0 +1,50 @@
+#include <gtest/gtest.h>
+
+#include "client/ui/hud.h"
+
+// Draws without a display, over black: what is lit is a panel.
+
+namespace trocar::ui {
+namespace {
+
+// All that can stand in the window of a surgeon at once.
+HudModel full_model() {
+  HudModel model;
+  model.title = "operating-theatre-4.hospital.example:7690";
+  model.organ = "liver, 12,345 surface vertices";
+  model.own_role = "instructor, Maximiliane";
+  model.frozen_text = "Maximiliane keeps your tools where they are.";
+  model.surface_age_ms = 1200;
+  model.figures.pace.rate.time_rate = 0.4f;
+  model.shows_help = model.has_own_tool = model.can_mark = model.shows_rate = true;
+  model.own_forces.push_back({"force on your tool", {}, 1.2f});
+  model.messages.push_back({"Bo holds this tissue. Wait, or ask Bo to let go.", 1, true});
+  for (const char* name : {"Maximiliane", "Bo", "Konstantinos", "Ada"})
+    model.participants.push_back(
+        {.name = name, .role = replica::Role::Surgeon, .has_tool = true, .force_n = 1});
+  return model;
+}
+
+TEST(Layout, TheMiddleOfTheOrganStaysFree) {
+  for (const render::Size size : {render::Size{1280, 720}, {1920, 1080}, {3840, 2160}})
+    for (const double scale : {0.0, 0.75, 1.0, 3.0}) {
+      auto context = render::make_headless_context(size);
+      ASSERT_TRUE(context.ok()) << context.error().message;
+      Hud hud(**context, scale);
+      for (int i = 0; i < 3; ++i) {
+        hud.begin_frame(1.0f / 60);
+        hud.draw(full_model());
+        hud.render();
+      }
+      const auto image = (*context)->read_image();
+      int lit = 0;
+      // A tenth of the window each way, about its middle.
+      for (int y = size.height * 9 / 20; y < size.height * 11 / 20; ++y)
+        for (int x = size.width * 9 / 20; x < size.width * 11 / 20; ++x)
+          lit += image.rgb[static_cast<std::size_t>(y * size.width + x) * 3 + 1] > 3;
+      EXPECT_EQ(lit, 0) << size.width << "x" << size.height << " at scale " << scale;
+    }
+}
+
+}  // namespace
+}  // namespace trocar::ui
