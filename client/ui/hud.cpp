@@ -174,7 +174,7 @@ HudActions Hud::draw(const HudModel& model) {
   draw_labels(model, banners, scale_);
   draw_felt_hands(model, people.bottom, scale_);
   draw_own_forces(model, scale_);
-  if (model.tray.hands > 0) draw_tray(model.tray, scale_, actions);
+  if (model.tray.hands > 0) draw_tray(model, session, scale_, actions);
   if (model.timeline) draw_timeline(*model.timeline, scale_, actions);
   draw_help(model, scale_);
   ImGui::Render();

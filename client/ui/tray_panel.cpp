@@ -5,14 +5,15 @@
 
 namespace trocar::ui {
 
-void draw_tray(const HudTray& tray, float scale, HudActions& actions) {
-  const ImVec2 screen = ImGui::GetIO().DisplaySize;
-  ImGui::SetNextWindowPos({kMargin * scale, 0.52f * screen.y}, 0, {0, 0.5f});
-  ImGui::Begin("tray", nullptr, kPanel);
+void draw_tray(const HudModel& model, const Box& session, float scale, HudActions& actions) {
+  const HudTray& tray = model.tray;
+  ImGui::SetNextWindowPos({kMargin * scale, session.bottom + kMargin * scale});
+  ImGui::Begin("tray", nullptr, model.shows_rate ? kGlass : kPanel);
   if (tray.hands > 1)
     ImGui::TextDisabled("%s hand   Tab: other", tray.hand == 0 ? "right" : "left");
   for (std::size_t i = 0; i < tray.names.size(); ++i) {
     const bool is_chosen = i == tray.chosen;
+    if (model.shows_rate && !is_chosen) continue;
     const std::string key = i < 9 ? std::to_string(i + 1) : " ";
     if (ImGui::Selectable((key + "  " + tray.names[i]).c_str(), is_chosen, 0, {120 * scale, 0}))
       actions.take_instrument = i;

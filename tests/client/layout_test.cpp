@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <utility>
+
 #include "client/ui/hud.h"
 
 // Draws without a display, over black: what is lit is a panel.
@@ -17,7 +19,11 @@ HudModel full_model() {
   model.surface_age_ms = 1200;
   model.figures.pace.rate.time_rate = 0.4f;
   model.shows_help = model.has_own_tool = model.can_mark = model.shows_rate = true;
-  model.own_forces.push_back({"force on your tool", {}, 1.2f});
+  for (const char* name : {"force on your tool 1", "force on your tool 2"})
+    model.own_forces.push_back({name, {}, 1.2f});
+  model.tray = {.names = {"all", "probe", "grasper", "toothed", "scissors", "scalpel", "hook"},
+                .texts = {"", "", "", "", "", "", ""},
+                .hands = 2};
   model.messages.push_back({"Bo holds this tissue. Wait, or ask Bo to let go.", 1, true});
   for (const char* name : {"Maximiliane", "Bo", "Konstantinos", "Ada"})
     model.participants.push_back(
@@ -27,13 +33,20 @@ HudModel full_model() {
 
 TEST(Layout, TheMiddleOfTheOrganStaysFree) {
   for (const render::Size size : {render::Size{1280, 720}, {1920, 1080}, {3840, 2160}})
-    for (const double scale : {0.0, 0.75, 1.0, 3.0}) {
+    for (const auto& [scale, is_research] : {std::pair{0.0, true},
+                                             {0.75, true},
+                                             {1.0, true},
+                                             {1.0, false},
+                                             {3.0, true},
+                                             {3.0, false}}) {
       auto context = render::make_headless_context(size);
       ASSERT_TRUE(context.ok()) << context.error().message;
       Hud hud(**context, scale);
       for (int i = 0; i < 3; ++i) {
         hud.begin_frame(1.0f / 60);
-        hud.draw(full_model());
+        auto model = full_model();
+        model.shows_rate = is_research;
+        hud.draw(model);
         hud.render();
       }
       const auto image = (*context)->read_image();
