@@ -371,18 +371,21 @@ Result<ExitCode> run_chosen(const ClientOptions& options) {
 
 }  // namespace
 
+// Who hosts a lesson comes back to it from a session, and ends it there.
 Result<ExitCode> run_client(const ClientOptions& options) {
   if (!wants_start_screen(options)) return run_chosen(options);
   ClientOptions chosen = options;
+  std::unique_ptr<OwnServer> own;
   for (std::string message;;) {
-    auto choice = choose_session(chosen, message);
+    auto choice = choose_session(chosen, message, own);
     if (!choice) return choice.error();
     if (!*choice) return ExitCode::Ok;
     chosen = std::move(**choice);
     auto ran = run_chosen(chosen);
-    if (ran || is_stop_requested()) return ran;
-    message = ran.error().message;
-    log::warn("{}", message);
+    if (own && !own->settings().is_for_network) own.reset();
+    if (is_stop_requested() || (ran && !own)) return ran;
+    message = ran ? "" : ran.error().message;
+    if (!ran) log::warn("{}", message);
   }
 }
 

@@ -364,6 +364,7 @@ Status read_further(const GivenTexts& more, ClientOptions& options) {
     options.display = Display::None;
   else if (more.is_headless)
     options.display = Display::Headless;
+  options.is_told_who = !options.name.empty();
   if (options.name.empty()) options.name = default_name();
   if (!more.size.empty())
     if (const auto parsed = parse_size(more.size, options.size); !parsed) return parsed;

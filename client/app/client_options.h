@@ -32,6 +32,7 @@ struct ClientOptions {
   std::string server = "127.0.0.1:7690";
   std::string join;            // code or link; empty: from the link file
   bool is_told_where = false;  // which session is meant, so that nobody need ask
+  bool is_told_who = false;    // the name was given
   bool chooses = false;        // the start screen asks even if a server runs on this machine
   std::string ca_file;         // empty: the code says whose certificate it must be
   bool is_insecure = false;    // without TLS, on this machine only

@@ -1,11 +1,19 @@
 #include "client/app/start.h"
 
+#include <unistd.h>
+
 #include <algorithm>
+#include <array>
 #include <chrono>
+#include <ctime>
+#include <filesystem>
+#include <functional>
 #include <mutex>
 #include <thread>
+#include <utility>
 
 #include "client/app/client.h"
+#include "client/app/remembered.h"
 #include "client/net/net_source.h"
 #include "client/ui/hud.h"
 #include "client/ui/start_screen.h"
@@ -14,9 +22,13 @@
 #include "common/discovery/finder.h"
 #include "common/secure/join_code.h"
 #include "common/secure/link_file.h"
+#include "common/secure/private_files.h"
+#include "common/wire/role.h"
 
 namespace trocar::app {
 namespace {
+
+namespace fs = std::filesystem;
 
 constexpr const char* kOwnServer = "127.0.0.1:7690";
 constexpr std::uint16_t kOwnPort = 7690;
@@ -91,6 +103,110 @@ Status apply(const ui::StartChoice& choice, ClientOptions& options) {
   return net::parse_server_address(options.server, parsed);
 }
 
+// Recordings of the current folder, newest first.
+std::vector<std::string> recordings_at_hand() {
+  constexpr std::size_t kMost = 12;
+  std::vector<std::pair<fs::file_time_type, std::string>> found;
+  std::error_code error;
+  for (fs::directory_iterator at(".", error), end; !error && at != end; at.increment(error)) {
+    std::error_code gone;
+    const auto time = at->last_write_time(gone);
+    if (!gone && at->path().extension() == ".mcap")
+      found.emplace_back(time, at->path().filename().string());
+  }
+  std::ranges::sort(found, std::greater{});
+  std::vector<std::string> names;
+  for (auto& [time, name] : found)
+    if (names.size() < kMost) names.push_back(std::move(name));
+  return names;
+}
+
+std::string own_code() {
+  const auto code = secure::read_link_file(kOwnPort, "observer");
+  return code ? secure::to_text(*code) : std::string();
+}
+
+fs::path new_recording() {
+  const auto now = std::chrono::floor<std::chrono::seconds>(std::chrono::system_clock::now());
+  const auto time = std::chrono::system_clock::to_time_t(now);
+  std::tm utc{};
+  gmtime_r(&time, &utc);
+  std::array<char, 64> name{};
+  std::strftime(name.data(), name.size(), "trocar-%Y%m%d-%H%M%S.mcap", &utc);
+  std::error_code error;
+  return fs::absolute(name.data(), error);
+}
+
+Status start_own(const ui::StartChoice& choice, std::unique_ptr<OwnServer>& own) {
+  const auto folder = secure::default_state_folder();
+  if (!folder) return folder.error();
+  if (const auto made = secure::make_private_folder(*folder); !made) return made;
+  OwnServer::Settings settings{.organ = choice.organ,
+                               .is_for_network = choice.deed == ui::StartDeed::Host};
+  if (choice.is_recorded) settings.recording = new_recording();
+  auto started = OwnServer::start(settings, *folder / "own-server.log");
+  if (!started) return started.error();
+  own = std::move(*started);
+  return {};
+}
+
+ui::StartLesson lesson_of(const OwnServer& own) {
+  std::array<char, 256> host{};
+  ::gethostname(host.data(), host.size() - 1);
+  ui::StartLesson lesson{.address = std::string(host.data()) + ":" + std::to_string(kOwnPort),
+                         .codes = {},
+                         .recording = own.settings().recording.string()};
+  for (const auto& known : wire::kRoles)
+    if (const auto code = secure::read_link_file(kOwnPort, known.name))
+      lesson.codes.push_back(std::string(known.name) + ": " + secure::to_text(*code));
+  return lesson;
+}
+
+// This is the server that the person starts on this machine, from the wish to where it can be
+// joined.
+class OwnStart {
+ public:
+  explicit OwnStart(std::unique_ptr<OwnServer>& own) : own_(own), is_up_(own != nullptr) {}
+
+  Status begin(const ui::StartChoice& choice) {
+    code_before_ = own_code();  // a server that was killed has left one
+    is_up_ = false;
+    return start_own(choice, own_);
+  }
+  void end() { own_.reset(); }
+  bool is_running() { return own_ && own_->is_running(); }
+  // Brings `model` up to date. Returns whether there is a place to practise, just now.
+  bool update(ui::StartModel& model) {
+    model.lesson.reset();
+    if (own_ && !own_->is_running()) {
+      model.message = own_->last_words();
+      own_.reset();
+    }
+    if (!own_) return false;
+    const auto code = own_code();
+    const bool was_up = std::exchange(is_up_, is_up_ || (!code.empty() && code != code_before_));
+    if (!is_up_) {
+      model.message = "The server starts, with " + own_->settings().organ + " ...";
+      return false;
+    }
+    if (!was_up) model.message.clear();
+    if (own_->settings().is_for_network) model.lesson = lesson_of(*own_);
+    return !was_up && !own_->settings().is_for_network;
+  }
+
+ private:
+  std::unique_ptr<OwnServer>& own_;
+  std::string code_before_;
+  bool is_up_;
+};
+
+void use_own(const ui::StartChoice& choice, ClientOptions& options) {
+  options.server = kOwnServer;
+  options.join.clear();
+  if (!choice.name.empty()) options.name = choice.name;
+  options.role = choice.deed == ui::StartDeed::Practise ? replica::Role::Surgeon : choice.role;
+}
+
 }  // namespace
 
 bool wants_start_screen(const ClientOptions& options) {
@@ -99,18 +215,29 @@ bool wants_start_screen(const ClientOptions& options) {
 }
 
 Result<std::optional<ClientOptions>> choose_session(ClientOptions options,
-                                                    const std::string& message) {
+                                                    const std::string& message,
+                                                    std::unique_ptr<OwnServer>& own) {
   auto context = render::make_window_context(options.size, "Trocar");
   if (!context) return context.error();
   ui::Hud hud(**context, options.scale);
-  const bool has_tried = !message.empty();
-  ui::StartScreen screen(
-      {has_tried ? options.server : "", options.join, options.name, options.role});
+  const bool has_tried = !message.empty() || own != nullptr;
+  options.replay_file.clear();
+  if (const auto person = remembered_person(); person && !options.is_told_who && !has_tried) {
+    options.name = person->name;
+    options.role = person->role;
+  }
+  ui::StartScreen screen({.server = has_tried && !own ? options.server : "",
+                          .code = options.join,
+                          .name = options.name,
+                          .role = options.role});
   Lookout lookout;
-  ui::StartModel model{.sessions = {}, .no_sessions_text = {}, .message = message};
+  OwnStart own_start(own);
+  ui::StartModel model{.recordings = recordings_at_hand(), .message = message};
+  ui::StartChoice practice;
   while (!(*context)->should_close() && !is_stop_requested()) {
     const auto begin = monotonic_ns();
     lookout.update(model);
+    const bool can_practise = own_start.update(model);
     (*context)->poll_events();
     hud.begin_frame(1.0f / 60);
     for (const auto& session : model.sessions) {
@@ -125,10 +252,41 @@ Result<std::optional<ClientOptions>> choose_session(ClientOptions options,
                                  !model.sessions.empty() &&
                                  model.sessions.front().server == kOwnServer;
     if (joins_by_itself) return std::optional(std::move(options));
+    if (can_practise) {
+      use_own(practice, options);
+      return std::optional(std::move(options));
+    }
     if (choice) {
-      const auto applied = apply(*choice, options);
-      if (applied) return std::optional(std::move(options));
-      model.message = applied.error().message;
+      const auto done = [&]() -> Result<bool> {  // true: there is a session to go to
+        switch (choice->deed) {
+          case ui::StartDeed::Practise:
+          case ui::StartDeed::Host:
+            remember({choice->name, choice->role});
+            practice = *choice;
+            if (own_start.is_running()) return false;
+            if (const auto begun = own_start.begin(*choice); !begun) return begun.error();
+            return false;
+          case ui::StartDeed::EndLesson:
+            own_start.end();
+            return false;
+          case ui::StartDeed::TakePart:
+            remember({choice->name, choice->role});
+            use_own(*choice, options);
+            return true;
+          case ui::StartDeed::Watch:
+            if (choice->recording.empty())
+              return Error{ErrorCode::Usage, "choose a recording, or write its file's name"};
+            options.replay_file = choice->recording;
+            return true;
+          case ui::StartDeed::Join:
+            break;
+        }
+        if (const auto applied = apply(*choice, options); !applied) return applied.error();
+        remember({choice->name, choice->role});
+        return true;
+      }();
+      if (done && *done) return std::optional(std::move(options));
+      model.message = done ? "" : done.error().message;
     }
     const auto taken = monotonic_ns() - begin;
     if (taken < kPictureNs)

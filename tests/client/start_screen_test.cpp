@@ -37,7 +37,10 @@ class StartScreenTest : public ::testing::Test {
   std::unique_ptr<render::GlContext> context_;
   std::optional<Hud> hud_;
   StartModel model_;
-  StartScreen screen_{{"10.0.0.7:7690", "7K3M-9QXZ-4T2B-WN8C", "Ada", replica::Role::Instructor}};
+  StartScreen screen_{{.server = "10.0.0.7:7690",
+                       .code = "7K3M-9QXZ-4T2B-WN8C",
+                       .name = "Ada",
+                       .role = replica::Role::Instructor}};
 };
 
 TEST_F(StartScreenTest, EnterJoinsWithWhatStandsInTheFields) {
@@ -45,6 +48,7 @@ TEST_F(StartScreenTest, EnterJoinsWithWhatStandsInTheFields) {
   EXPECT_FALSE(screen_.is_touched());
   const auto choice = draw(true);
   ASSERT_TRUE(choice);
+  EXPECT_EQ(choice->deed, StartDeed::Join);
   EXPECT_EQ(choice->server, "10.0.0.7:7690");
   EXPECT_EQ(choice->code, "7K3M-9QXZ-4T2B-WN8C");
   EXPECT_EQ(choice->name, "Ada");
@@ -69,6 +73,23 @@ TEST_F(StartScreenTest, ShowsSessionsAndWhyATryFailed) {
   if (const char* folder = std::getenv("TROCAR_PICTURES")) {
     const auto saved =
         render::write_png(context_->read_image(), std::string(folder) + "/start.png");
+    EXPECT_TRUE(saved.ok());
+  }
+}
+
+// The lesson that runs is shown at once, with its codes, and Enter takes part in it.
+TEST_F(StartScreenTest, TurnsToTheLessonThatRuns) {
+  for (int i = 0; i < 3; ++i) draw();
+  model_.lesson = StartLesson{.address = "theatre-1:7690",
+                              .codes = {"surgeon: 7K3M-9QXZ-4T2B-WN8C"},
+                              .recording = "lesson.mcap"};
+  for (int i = 0; i < 3; ++i) EXPECT_FALSE(draw());
+  const auto choice = draw(true);
+  ASSERT_TRUE(choice);
+  EXPECT_EQ(choice->deed, StartDeed::TakePart);
+  if (const char* folder = std::getenv("TROCAR_PICTURES")) {
+    const auto saved =
+        render::write_png(context_->read_image(), std::string(folder) + "/lesson.png");
     EXPECT_TRUE(saved.ok());
   }
 }

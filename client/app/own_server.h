@@ -1,0 +1,48 @@
+#pragma once
+
+// A server that this client has started, for practice or for a lesson that it hosts. It ends with
+// the client, however that ends.
+
+#include <sys/types.h>
+
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "common/base/result.h"
+
+namespace trocar::app {
+
+class OwnServer {
+ public:
+  struct Settings {
+    std::string organ = "liver";
+    bool is_for_network = false;      // otherwise for this machine alone
+    std::filesystem::path recording;  // empty: none
+  };
+  static constexpr std::uint16_t kPort = 7690;
+
+  // Starts the trocar-server beside this program, or the one on the path. What it says goes to
+  // `log`, a new file.
+  static Result<std::unique_ptr<OwnServer>> start(const Settings& settings,
+                                                  const std::filesystem::path& log);
+  // Asks it to end, which closes its session and its recording, and waits for that.
+  ~OwnServer();
+  OwnServer(const OwnServer&) = delete;
+  OwnServer& operator=(const OwnServer&) = delete;
+
+  const Settings& settings() const { return settings_; }
+  // False: it has ended, and last_words() says why.
+  bool is_running();
+  std::string last_words() const;
+
+ private:
+  OwnServer(pid_t pid, Settings settings, std::filesystem::path log)
+      : pid_(pid), settings_(std::move(settings)), log_(std::move(log)) {}
+
+  pid_t pid_;  // -1: it has ended
+  Settings settings_;
+  std::filesystem::path log_;
+};
+
+}  // namespace trocar::app
