@@ -483,12 +483,16 @@ void Picture::draw(const replica::Replica& replica, replica::SessionSource& sour
   if (actions.switch_hand) hands.switch_hand(input, camera_.rays(context_->size()));
   renderer_.draw(scene_, camera_);
   hud_.render();
-  if (std::exchange(wants_screenshot_, false)) {
+  if (wants_screenshot_ && !saving_.is_busy()) {
+    wants_screenshot_ = false;
     const std::string file = "trocar-" + std::to_string(now_ns / 1'000'000) + ".png";
-    if (const auto saved = save(file); !saved)
-      log::warn("{}", saved.error().message);
-    else
-      log::info("screenshot: {}", file);
+    // Hands would fall silent meanwhile.
+    saving_.start([image = image(), file] {
+      if (const auto saved = render::write_png(image, file); !saved)
+        log::warn("{}", saved.error().message);
+      else
+        log::info("screenshot: {}", file);
+    });
   }
   context_->present();
   ++count_;

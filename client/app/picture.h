@@ -14,6 +14,7 @@
 #include "client/replica/held_tissue.h"
 #include "client/replica/interpolated_surface.h"
 #include "client/ui/hud.h"
+#include "common/base/background.h"
 
 namespace trocar::app {
 
@@ -90,6 +91,7 @@ class Picture {
   std::uint64_t held_history_ = 0;
   Rate rate_;
   render::SceneView scene_;  // of the last picture; its spans need the replica
+  Background saving_;        // writes screenshots
 };
 
 }  // namespace trocar::app
