@@ -64,6 +64,7 @@ class Run {
   std::uint64_t start_ns_ = 0;
   std::uint64_t live_ns_ = 0;  // when the first frame was there
   bool has_screenshot_ = false, has_marked_ = false, has_returned_ = false;
+  bool has_answered_ = false;
   std::string exit_reason_;
   replica::TimeDistribution round_trip_, surface_age_, hand_to_visible_, cut_to_visible_;
   std::uint64_t last_change_us_ = 0;
@@ -121,6 +122,9 @@ void Run::use_marks(std::uint64_t now_ns) {
     if (has_asked || seconds < 0 || static_cast<double>(now_ns - live_ns_) * 1e-9 < seconds) return;
     has_asked = replica::ask_for_mark(source_, is_return);
   };
+  const double seconds = static_cast<double>(now_ns - live_ns_) * 1e-9;
+  if (!has_answered_ && options_.answer_at >= 0 && seconds >= options_.answer_at)
+    has_answered_ = replica::send_lesson_wish(source_, replica::LessonWish::Answer);
   ask_at(options_.mark_at, has_marked_, false);
   ask_at(options_.return_at, has_returned_, true);
 }

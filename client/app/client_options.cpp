@@ -279,6 +279,10 @@ void add_time_options(CLI::App& app, ClientOptions& options) {
   app.add_option("--seconds", options.seconds, "leave after this many seconds")
       ->type_name("N")
       ->check(CLI::Range(0.0, 1e9));
+  app.add_option("--answer-at", options.answer_at,
+                 "in a lesson: say that it is here so many seconds after joining")
+      ->type_name("S")
+      ->check(CLI::Range(0.0, 1e6));
   app.add_option("--mark-at", options.mark_at,
                  "as instructor: mark the organ so many seconds after joining")
       ->type_name("S")

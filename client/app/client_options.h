@@ -49,6 +49,7 @@ struct ClientOptions {
   std::string screenshot_file;
   double screenshot_at = -1;            // seconds after joining; < 0: the last picture
   double seconds = 0;                   // 0: until the session ends
+  double answer_at = -1;                // of a lesson: likewise
   double mark_at = -1, return_at = -1;  // instructor: seconds after joining; < 0: not
   std::string script_file, replay_file, summary_file;
   std::string trace_file;            // of what devices did and felt

@@ -19,8 +19,9 @@ namespace {
 
 constexpr std::uint64_t kHelpNs = 20'000'000'000;  // at the start
 constexpr std::uint64_t kViewNs = 100'000'000;     // between two words on where a view is
-constexpr float kLineHalfWidth = 0.0009f;          // m, as in a browser
-constexpr std::uint64_t kFeltBinNs = 62'500'000;   // 160 of them are 10 s
+constexpr shape::Colour kLessonColour{240, 228, 66};
+constexpr float kLineHalfWidth = 0.0009f;         // m, as in a browser
+constexpr std::uint64_t kFeltBinNs = 62'500'000;  // 160 of them are 10 s
 
 const replica::Participant* owner_of(const replica::Replica& replica, ToolSlot slot) {
   return replica.find_participant(slot.owner());
@@ -188,6 +189,8 @@ render::SceneView Picture::scene_view(const replica::Replica& replica, Hands& ha
   for (const replica::Pointer& pointer : replica.pointers(last_ns_))
     scene.pointers.push_back(
         {pointer.position_m, shape::colour_of_pointer(pointer.participant.value)});
+  if (const auto target = lesson_target(replica))
+    scene.pointers.push_back({*target, kLessonColour});
   return scene;
 }
 
@@ -377,6 +380,7 @@ ui::HudModel Picture::hud_model(const replica::Replica& replica, replica::Sessio
   model.can_mark = source.playback() == nullptr && role_ == replica::Role::Instructor;
   model.has_own_tool = hands.mouse_tool() != nullptr;
   model.tray = tray_of(hands.choice());
+  add_lesson(replica, is_replay, model);
 
   model.shows_holds = overlays_.holds;
   model.shows_arrows = overlays_.arrows;
@@ -416,6 +420,8 @@ void Picture::act(const ui::HudActions& actions, const replica::Replica& replica
   // A wish that cannot be sent is lost: whoever presses the key asks again.
   if (actions.set_mark) replica::ask_for_mark(source, false);
   if (actions.return_to_mark) replica::ask_for_mark(source, true);
+  if (actions.next_stage) replica::send_lesson_wish(source, replica::LessonWish::Next);
+  if (actions.restart_lesson) replica::send_lesson_wish(source, replica::LessonWish::Restart);
   replica::PlaybackControl* playback = source.playback();
   if (playback == nullptr) return;
   if (actions.toggle_play) playback->is_playing() ? playback->pause() : playback->play();
@@ -480,6 +486,9 @@ void Picture::draw(const replica::Replica& replica, replica::SessionSource& sour
   const auto actions = hud_.draw(hud_model(replica, source, scene_, hands, now_ns));
   act(actions, replica, source);
   if (actions.take_instrument) hands.take(*actions.take_instrument, source);
+  if (actions.answer)
+    replica::send_lesson_wish(source, replica::LessonWish::Answer,
+                              static_cast<std::uint32_t>(hands.choice().hand));
   if (actions.switch_hand) hands.switch_hand(input, camera_.rays(context_->size()));
   renderer_.draw(scene_, camera_);
   hud_.render();

@@ -46,6 +46,9 @@ class Picture {
   void add_participants(const replica::Replica& replica, bool is_replay, ui::HudModel& model) const;
   void add_own_forces(const replica::Replica& replica, ui::HudModel& model) const;
   void add_felt_hands(const Hands& hands, ui::HudModel& model) const;
+  void add_lesson(const replica::Replica& replica, bool is_replay, ui::HudModel& model) const;
+  // Returns where the point is that a lesson's hands follow.
+  static std::optional<Vec3f> lesson_target(const replica::Replica& replica);
   void add_labels(const replica::Replica& replica, const render::SceneView& scene,
                   ui::HudModel& model) const;
   static void add_messages(const replica::Replica& replica, std::uint64_t now_ns,

@@ -63,6 +63,14 @@ bool ask_for_mark(SessionSource& source, bool is_return) {
   return source.send(envelope);
 }
 
+bool send_lesson_wish(SessionSource& source, LessonWish wish, std::uint32_t tool) {
+  proto::Envelope envelope;
+  auto& request = *envelope.mutable_lesson_request();
+  request.set_action(static_cast<proto::LessonAction>(wish));
+  request.set_tool(tool);
+  return source.send(envelope);
+}
+
 bool send_view(SessionSource& source, const Vec3f& eye_m, const Vec3f& target_m) {
   const auto write_place = [](const Vec3f& from, proto::Vec3& to) {
     to.set_x(from.x);

@@ -26,6 +26,9 @@ std::uint32_t pass_on(const proto::Envelope& message, HandLine& hands);
 
 // To mark the organ as it is, or to return it to the mark. False if the source dropped it.
 bool ask_for_mark(SessionSource& source, bool is_return);
+// To say something in a lesson, as a hand or an instructor. False if the source dropped it.
+enum class LessonWish : std::uint8_t { Answer = 1, Next = 2, Restart = 3 };
+bool send_lesson_wish(SessionSource& source, LessonWish wish, std::uint32_t tool = 0);
 // To say where one's own view is, as who has the view to follow. False if the source dropped it.
 bool send_view(SessionSource& source, const Vec3f& eye_m, const Vec3f& target_m);
 // To be shown the full solution beside a session with a reduction, or no longer. False if the

@@ -20,6 +20,17 @@ void make_printable(proto::Envelope& message) {
       return mend(message.mutable_mark_event()->mutable_text());
     case proto::Envelope::kTeachEvent:
       return mend(message.mutable_teach_event()->mutable_text());
+    case proto::Envelope::kLessonStage: {
+      auto& stage = *message.mutable_lesson_stage();
+      for (auto* text : {stage.mutable_title(), stage.mutable_name(), stage.mutable_text(),
+                         stage.mutable_hint()})
+        mend(text);
+      for (auto& result : *stage.mutable_result()) {
+        mend(result.mutable_name());
+        for (auto& line : *result.mutable_line()) mend(&line);
+      }
+      return;
+    }
     case proto::Envelope::kRecordingState:
       return mend(message.mutable_recording_state()->mutable_text());
     case proto::Envelope::kSurfaceTopology:

@@ -108,6 +108,10 @@ void Replica::on_message(const proto::Envelope& message, std::uint64_t arrival_n
       return apply_drawing(message.drawing());
     case proto::Envelope::kViewEvent:
       return apply_view(message.view_event(), arrival_ns);
+    case proto::Envelope::kLessonStage:
+      return apply_lesson(message.lesson_stage());
+    case proto::Envelope::kLessonProgress:
+      return apply_progress(message.lesson_progress());
     case proto::Envelope::kBarrier:
       barrier_ = BarrierOutcome{message.barrier().frame(), message.barrier().surface_crc(), 0};
       barrier_answered_ = false;

@@ -43,6 +43,8 @@ class ClaimEvent;
 class Drawing;
 class FrameState;
 class GhostFrame;
+class LessonProgress;
+class LessonStage;
 class MarkEvent;
 class RecordingState;
 class Participants;
@@ -140,6 +142,8 @@ class Replica final : public MessageSink {
   // Returns what is drawn on the organ; `drawing_version` changes unless lines were only added.
   const std::vector<Stroke>& strokes() const { return strokes_; }
   std::uint64_t drawing_version() const { return drawing_version_; }
+  // The lesson that the session gives, if it does.
+  const std::optional<LessonView>& lesson() const { return lesson_; }
   // Returns where the view to follow was last, if somebody has had it.
   const std::optional<LedView>& led_view() const { return led_view_; }
   // Returns what the server last said of its recording.
@@ -169,6 +173,8 @@ class Replica final : public MessageSink {
   void apply_mark(const proto::MarkEvent& message, std::uint64_t arrival_ns);
   void apply_teach(const proto::TeachEvent& message, std::uint64_t arrival_ns);
   void apply_drawing(const proto::Drawing& message);
+  void apply_lesson(const proto::LessonStage& message);
+  void apply_progress(const proto::LessonProgress& message);
   void apply_view(const proto::ViewEvent& message, std::uint64_t arrival_ns);
   void tell_all(Tick tick, const std::string& text, std::uint64_t arrival_ns);
   void add_notice(Notice notice);
@@ -225,6 +231,8 @@ class Replica final : public MessageSink {
   std::vector<Stroke> strokes_;
   std::uint64_t drawing_version_ = 0;
   std::optional<LedView> led_view_;
+  std::optional<LessonView> lesson_;
+  std::size_t lesson_strokes_ = 0;  // of strokes_, the first ones: the line of a stage
   std::optional<BarrierOutcome> barrier_;
   bool barrier_answered_ = false;
   std::string goodbye_text_;

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <span>
 
 #include "client/replica/replica.h"
 #include "common/wire/lesson.h"
@@ -17,7 +19,84 @@ Vec3f place_of(const proto::Vec3& v) {
   return {v.x(), v.y(), v.z()};
 }
 
+// The points of a line that is to lie on the surface, near enough for its bends.
+std::vector<Vec3f> dense(std::span<const Vec3f> line) {
+  constexpr float kStepM = 0.002f;
+  std::vector<Vec3f> points;
+  for (std::size_t i = 0; i + 1 < line.size(); ++i) {
+    const auto along = line[i + 1] - line[i];
+    const auto steps = std::clamp(static_cast<int>(length(along) / kStepM), 1, 1000);
+    for (int k = 0; k < steps; ++k)
+      points.push_back(line[i] + along * (static_cast<float>(k) / static_cast<float>(steps)));
+  }
+  points.push_back(line.back());
+  return points;
+}
+
 }  // namespace
+
+std::optional<Vec3f> LessonView::target_m(Tick now) const {
+  if (is_over || goal != Goal::Follow || line_m.empty() || !(lap_s > 0)) return std::nullopt;
+  float whole = 0;
+  for (std::size_t i = 0; i + 1 < line_m.size(); ++i) whole += length(line_m[i + 1] - line_m[i]);
+  const double since_s =
+      now > begin_tick ? static_cast<double>(now - begin_tick) * double{kTickSeconds} : 0.0;
+  const auto part = static_cast<float>(std::fmod(since_s / double{lap_s}, 1.0));
+  float way = whole * (part < 0.5f ? 2 * part : 2 - 2 * part);
+  for (std::size_t i = 0; i + 1 < line_m.size(); ++i) {
+    const auto along = line_m[i + 1] - line_m[i];
+    const float span = length(along);
+    if (way < span) return line_m[i] + along * (way / span);
+    way -= span;
+  }
+  return line_m.back();
+}
+
+void Replica::apply_lesson(const proto::LessonStage& message) {
+  constexpr int kMostLine = 64, kMostResults = 64, kMostLines = 32;
+  if (message.line_m_size() > kMostLine || message.result_size() > kMostResults)
+    return fail("LessonStage: too many points or results");
+  LessonView view;
+  view.title = message.title();
+  view.stage = message.stage(), view.stages = message.stages();
+  view.name = message.name(), view.text = message.text(), view.hint = message.hint();
+  const int goal = message.goal();
+  for (const auto known :
+       {LessonView::Goal::Find, LessonView::Goal::Follow, LessonView::Goal::Incise})
+    if (goal == static_cast<int>(known)) view.goal = known;
+  view.begin_tick = message.begin_tick();
+  view.limit_s = message.limit_s(), view.force_limit_n = message.force_limit_n();
+  view.lap_s = message.lap_s(), view.tolerance_m = message.tolerance_m();
+  for (const auto& place : message.line_m()) {
+    const Vec3f at = place_of(place);
+    if (!is_finite(at) || length(at) > wire::kMostViewDistanceM)
+      return fail("LessonStage.line_m: not finite, or too far away");
+    view.line_m.push_back(at);
+  }
+  for (const auto& entry : message.result()) {
+    if (entry.line_size() > kMostLines) return fail("LessonStage.result: too many lines");
+    view.results.push_back({entry.name(),
+                            entry.is_reached(),
+                            entry.seconds(),
+                            entry.points(),
+                            {entry.line().begin(), entry.line().end()}});
+  }
+  view.is_over = message.is_over(), view.points = message.points();
+  if (lesson_ && lesson_->stage == view.stage && lesson_->begin_tick == view.begin_tick)
+    view.progress = lesson_->progress, view.seconds = lesson_->seconds;
+  strokes_.erase(strokes_.begin(), strokes_.begin() + static_cast<std::ptrdiff_t>(lesson_strokes_));
+  lesson_strokes_ = view.goal == LessonView::Goal::Incise && !view.is_over && !view.line_m.empty();
+  if (lesson_strokes_ > 0) strokes_.insert(strokes_.begin(), Stroke{{}, dense(view.line_m)});
+  ++drawing_version_;
+  lesson_ = std::move(view);
+}
+
+void Replica::apply_progress(const proto::LessonProgress& message) {
+  if (!lesson_) return;
+  lesson_->progress = std::clamp(message.progress(), 0.0f, 1.0f);
+  lesson_->seconds = std::max(0.0f, message.seconds());
+  lesson_->is_too_strong = message.is_too_strong();
+}
 
 void Replica::apply_mark(const proto::MarkEvent& message, std::uint64_t arrival_ns) {
   counters_.marks += message.is_done() ? 1 : 0;
@@ -55,7 +134,8 @@ std::vector<Pointer> Replica::pointers(std::uint64_t now_ns) const {
 }
 
 void Replica::apply_drawing(const proto::Drawing& message) {
-  auto strokes = message.is_addition() ? strokes_ : std::vector<Stroke>{};
+  auto strokes = strokes_;
+  if (!message.is_addition()) strokes.resize(lesson_strokes_);
   std::size_t points = 0;
   for (const auto& stroke : strokes) points += stroke.rest_m.size();
   for (const auto& entry : message.stroke()) {

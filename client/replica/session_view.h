@@ -97,6 +97,33 @@ struct Stroke {
   std::vector<Vec3f> rest_m;
 };
 
+// The stage of the session's lesson.
+struct LessonResult {
+  std::string name;
+  bool is_reached = false;
+  float seconds = 0, points = 0;
+  std::vector<std::string> lines;  // what was measured
+};
+struct LessonView {
+  enum class Goal : std::uint8_t { Other = 0, Find = 1, Follow = 2, Incise = 5 };
+  std::string title, name, text, hint;  // hint: empty until it is time
+  std::uint32_t stage = 0, stages = 0;  // from 0
+  Goal goal = Goal::Other;
+  Tick begin_tick = 0;
+  float limit_s = 0, force_limit_n = 0;
+  std::vector<Vec3f> line_m;
+  float lap_s = 0, tolerance_m = 0;
+  std::vector<LessonResult> results;  // of stages that are over
+  bool is_over = false;
+  float points = 0;
+  // Told more often.
+  float progress = 0, seconds = 0;
+  bool is_too_strong = false;
+
+  // Returns where the point to follow is; nothing: there is none.
+  std::optional<Vec3f> target_m(Tick now) const;
+};
+
 // The view of who was given it.
 struct LedView {
   ParticipantSlot participant;

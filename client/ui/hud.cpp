@@ -107,6 +107,15 @@ void Hud::need_letters(const HudModel& model) {
     fonts_->need(*text);
   for (const HudParticipant& participant : model.participants) fonts_->need(participant.name);
   for (const HudMessage& message : model.messages) fonts_->need(message.text);
+  if (model.lesson) {
+    for (const auto* text :
+         {&model.lesson->title, &model.lesson->stage, &model.lesson->text, &model.lesson->hint})
+      fonts_->need(*text);
+    for (const auto& [head, lines] : model.lesson->results) {
+      fonts_->need(head);
+      for (const auto& line : lines) fonts_->need(line);
+    }
+  }
   const auto* story = model.timeline ? model.timeline->story.get() : nullptr;
   if (story != nullptr && story != read_story_)
     for (const auto& event : story->events) fonts_->need(event.text);
@@ -172,7 +181,8 @@ HudActions Hud::draw(const HudModel& model) {
   const Box people = draw_participants_panel(model, scale_);
   const Box banners = draw_banners(model, session, people, scale_);
   draw_labels(model, banners, scale_);
-  draw_felt_hands(model, people.bottom, scale_);
+  const Box right = model.lesson ? draw_lesson(*model.lesson, people, scale_) : people;
+  draw_felt_hands(model, right.bottom, scale_);
   draw_own_forces(model, scale_);
   if (model.tray.hands > 0) draw_tray(model, session, scale_, actions);
   if (model.timeline) draw_timeline(*model.timeline, scale_, actions);
@@ -189,6 +199,12 @@ HudActions Hud::draw(const HudModel& model) {
   actions.toggle_ghost = pressed(GLFW_KEY_G);
   actions.reset_camera = pressed(GLFW_KEY_C);
   actions.screenshot = pressed(GLFW_KEY_F12);
+  if (model.lesson) {
+    actions.answer =
+        model.lesson->can_answer && (pressed(GLFW_KEY_ENTER) || pressed(GLFW_KEY_KP_ENTER));
+    actions.next_stage = model.lesson->can_lead && pressed(GLFW_KEY_N);
+    actions.restart_lesson = model.lesson->can_lead && pressed(GLFW_KEY_K);
+  }
   actions.switch_hand = model.tray.hands > 1 && pressed(GLFW_KEY_TAB);
   for (std::size_t i = 0;
        model.tray.hands > 0 && i < std::min<std::size_t>(model.tray.names.size(), 9); ++i)

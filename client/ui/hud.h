@@ -12,6 +12,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "client/device/view_rays.h"
@@ -72,6 +73,19 @@ struct HudTray {
   std::size_t hand = 0, hands = 0;  // that the pointer moves; of so many
 };
 
+// The stage of a lesson, or how it has ended.
+struct HudLesson {
+  std::string title, stage, text, hint;  // "2 of 3: Search"; hint: empty: not yet
+  float progress = 0;                    // 0 to 1
+  double seconds = 0, limit_s = 0;
+  float force_limit_n = 0;  // 0: there is none
+  bool is_too_strong = false;
+  bool can_answer = false, can_lead = false;  // with Enter; N and K
+  bool is_over = false;
+  float points = 0;
+  std::vector<std::pair<std::string, std::vector<std::string>>> results;  // head and lines
+};
+
 // A tool of one's own, whatever holds it.
 struct HudOwnForce {
   std::string name;  // "force on your tool"
@@ -116,6 +130,7 @@ struct HudModel {
   bool shows_help = false;
   bool has_own_tool = false;
   HudTray tray;
+  std::optional<HudLesson> lesson;
   bool can_mark = false;  // an instructor's: he may mark the organ and return it to the mark
 };
 
@@ -125,6 +140,7 @@ struct HudActions {
   bool toggle_play = false, pause = false;
   bool set_mark = false, return_to_mark = false, toggle_follow = false;
   bool switch_hand = false;
+  bool answer = false, next_stage = false, restart_lesson = false;
   std::optional<std::size_t> take_instrument;
   std::optional<double> seek_seconds;
   std::optional<float> speed;

@@ -21,6 +21,8 @@ constexpr const char* kExamples = R"(
 Examples:
   trocar-server
       the built-in liver at 127.0.0.1:7690, for programs on this machine
+  trocar-server --lesson find-the-lump
+      a lesson with goals and points; trocar-journal assess reads its recording
   trocar-server --organ lattice --listen 0.0.0.0:7690
       a block of springs, for everybody on the network who has one of the printed join codes
   trocar-server --listen 0.0.0.0:7690 --revoke observer
@@ -266,6 +268,10 @@ void CommandLine::add_session_options() {
                       ".organ file or a .msh mesh")
           ->type_name("NAME|FILE")
           ->capture_default_str();
+  app_.add_option(
+          "--lesson", options_.lesson_file,
+          "give this lesson: " + lesson::list_lessons() + ", or a file; it brings its organ")
+      ->type_name("NAME|FILE");
   app_.add_option("--listen", listen_, "where to listen; port 0 takes any free one")
       ->type_name("ADDR:PORT")
       ->capture_default_str();
@@ -370,6 +376,21 @@ Status parse_listen_address(const std::string& text, ServerOptions& options) {
   return {};
 }
 
+namespace {
+
+Status read_lesson(ServerOptions& options) {
+  if (options.lesson_file.empty()) return {};
+  if (options.is_organ_chosen)
+    return Error{ErrorCode::Usage, "--lesson: the lesson brings its organ, leave out --organ"};
+  auto lesson = lesson::find_lesson(options.lesson_file);
+  if (!lesson) return Error{lesson.error().code, "--lesson: " + lesson.error().message};
+  options.organ = lesson->organ;
+  options.lesson = *std::move(lesson);
+  return {};
+}
+
+}  // namespace
+
 Result<std::optional<ServerOptions>> parse_command_line(int argc, char** argv) {
   CommandLine line;
   auto& options = line.options();
@@ -382,6 +403,8 @@ Result<std::optional<ServerOptions>> parse_command_line(int argc, char** argv) {
   if (!*parsed) return std::optional<ServerOptions>();
   if (const auto finished = line.finish(); !finished)
     return Error{ErrorCode::Usage, options.origins.placed(finished.error().message)};
+  if (const auto read = read_lesson(options); !read)
+    return Error{read.error().code, options.origins.placed(read.error().message)};
   options.config_file = config_file_of(line.app());
   if (options.journal.empty()) options.journal = default_journal_path();
   return std::optional(std::move(options));

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "common/base/result.h"
+#include "common/lesson/lesson.h"
 #include "server/app/config/option_origins.h"
 #include "server/app/server/access_options.h"
 #include "server/app/server/limit_options.h"
@@ -16,6 +17,8 @@ namespace trocar::app {
 struct ServerOptions {
   std::string organ = "liver";
   bool is_organ_chosen = false;             // on the command line
+  std::string lesson_file;                  // empty: none
+  std::optional<lesson::Lesson> lesson;     // read from it
   std::string resume_file;                  // empty: a new session
   std::optional<bool> has_averaged_strain;  // empty: as the organ has it, and plain for a reduction
   std::string reduction_file;               // empty: the full solver alone

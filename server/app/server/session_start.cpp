@@ -4,6 +4,7 @@
 
 #include "common/base/log.h"
 #include "common/base/timing.h"
+#include "server/organs/catalogue/hidden_structures.h"
 #include "server/organs/catalogue/load_organ.h"
 #include "server/organs/organ/average_strain.h"
 #include "server/organs/organ/local_reduction_file.h"
@@ -38,6 +39,9 @@ void tell_error(const std::string& file, const organ::LocalReduction& model) {
 Result<organ::Organ> read_organ(const ServerOptions& options) {
   auto organ = catalogue::load_organ(options.organ);
   if (!organ) return organ;
+  if (options.lesson)
+    if (const auto hidden = catalogue::add_structures(*options.lesson, *organ); !hidden)
+      return hidden.error();
   if (const auto chosen = choose_strain(options, *organ); !chosen) return chosen.error();
   return organ;
 }

@@ -64,7 +64,9 @@ Replicator::Replicator(net::Connections& connections, participants::SimulationIn
       organ_name_(std::move(organ_name)),
       layout_(std::move(layout)),
       roster_(options_.places),
-      absences_(options_.return_seconds) {}
+      absences_(options_.return_seconds) {
+  if (options_.lesson) course_.emplace(*options_.lesson);
+}
 
 Replicator::~Replicator() = default;
 
@@ -230,6 +232,8 @@ std::optional<Replicator::Ending> Replicator::handle_message(Client& client, Byt
       return handle_stroke(client, envelope.stroke_request());
     case proto::Envelope::kViewRequest:
       return handle_view(client, envelope.view_request());
+    case proto::Envelope::kLessonRequest:
+      return handle_lesson(client, envelope.lesson_request());
     case proto::Envelope::kTeachRequest:
       return handle_teach(client, envelope.teach_request());
     case proto::Envelope::kGhostRequest:
@@ -449,6 +453,7 @@ void Replicator::publish(std::span<const step::SharedFrame> frames) {
     if (frame->new_layout) replace_surface(*frame->new_layout, frame->frame);
     for (const auto& event : frame->claim_events) broadcast(encode_claim_event(event, roster_));
     if (frame->change && followed.ok()) followed = change_surface(*frame->change);
+    if (course_ && followed.ok()) observe_lesson(*frame);
   }
   const auto& newest = *frames.back();
   if (newest.epoch != layout_.epoch || newest.surface.size() != layout_.vertex_count()) {

@@ -22,8 +22,11 @@
 // claim events, surface changes, topology, recording state and barrier cannot be skipped: if one
 // does not fit, the session ends as too slow.
 //
-// Lesson: instructors hold tools still and open their jaws (held_tools.h), put people out and let
+// Teaching: instructors hold tools still and open their jaws (held_tools.h), put people out and let
 // them in (door.h), rename them, and end the session. Everybody is told of it, and the recording.
+//
+// Lesson: a course (common/lesson) looks at every frame from when somebody with a tool is there.
+// What it finds is told to all and recorded, with the answers and orders that people gave.
 //
 // Ghost: who has asked gets what the ghost's thread reports, if the outbox is less than half as
 // full as it may be for frames: these come first.
@@ -42,6 +45,7 @@
 #include <string>
 #include <vector>
 
+#include "common/lesson/course.h"
 #include "common/wire/recording_state.h"
 #include "common/wire/surface_layout.h"
 #include "server/session/access/door.h"
@@ -63,6 +67,7 @@ class Drawing;
 class HandReport;
 class Hello;
 class LessonRecord;
+class LessonRequest;
 class PointRequest;
 class StrokeRequest;
 class TeachEvent;
@@ -163,6 +168,11 @@ class Replicator final : public net::ConnectionHandler {
   std::optional<Ending> handle_stroke(Client& client, const proto::StrokeRequest& request);
   std::optional<Ending> handle_view(Client& client, const proto::ViewRequest& request);
   std::optional<Ending> handle_teach(Client& client, const proto::TeachRequest& request);
+  std::optional<Ending> handle_lesson(Client& client, const proto::LessonRequest& request);
+  // The lesson's own part of a frame, once somebody with a tool is there.
+  void observe_lesson(const step::PublishedFrame& frame);
+  void tell_stage();
+  void tell_line(const std::string& words);
   std::string carry_out(const TeachOrder& order, Client& client, const std::string& words);
   // Whoever has that place, away or not; null: nobody.
   Client* client_of(ParticipantSlot slot) const;
@@ -227,6 +237,9 @@ class Replicator final : public net::ConnectionHandler {
   participants::HeldTools held_tools_;
   access::Door door_;
   DrawingBoard board_;
+  std::optional<lesson::Course> course_;  // of the lesson that the session gives, if it does
+  bool has_course_begun_ = false, is_hint_told_ = false;
+  std::vector<lesson::Tip> tips_;
   wire::SharedBytes last_view_;  // null: none since the view was given to somebody
   FrameEncoder encoder_;
   step::SharedFrame barrier_;

@@ -5,11 +5,13 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "common/base/tick.h"
 #include "common/base/timing.h"
+#include "common/lesson/lesson.h"
 #include "common/wire/hand_report.h"
 #include "common/wire/haptic_patch.h"
 #include "common/wire/lesson.h"
@@ -38,6 +40,7 @@ struct ReplicatorOptions {
   std::function<void(wire::LessonEntry)> on_lesson;
   // Told, in words, that an instructor wants the session to end; empty: nobody can.
   std::function<void(const std::string& words)> on_end_wanted;
+  std::optional<lesson::Lesson> lesson;      // empty: the session gives none
   std::vector<wire::HapticLaw> haptic_laws;  // how the organ answers tools, for hands that feel it
   bool has_datagrams = false;                // the transport takes them; clients are told
   // Null: everybody may come, in any role. It outlives the replicator.

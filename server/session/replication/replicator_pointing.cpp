@@ -2,6 +2,7 @@
 
 #include "proto/journal.pb.h"
 #include "proto/wire.pb.h"
+#include "server/session/replication/lesson_messages.h"
 #include "server/session/replication/messages.h"
 #include "server/session/replication/replicator_client.h"
 #include "server/session/replication/validation.h"
@@ -136,6 +137,11 @@ bool Replicator::show_lesson(Client& client) {
   if (!board_.strokes().empty()) {
     proto::Envelope event;
     describe_drawing(*event.mutable_drawing());
+    if (!send(client, wire::encode_envelope(event))) return false;
+  }
+  if (course_) {
+    proto::Envelope event;
+    describe(*course_, *event.mutable_lesson_stage());
     if (!send(client, wire::encode_envelope(event))) return false;
   }
   return !last_view_ || send(client, last_view_);

@@ -1,0 +1,70 @@
+#include "common/lesson/lesson.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace trocar::lesson {
+namespace {
+
+struct MeasureText {
+  const char* key;
+  const char* words;
+  const char* unit;
+  double shown_per_unit;
+  int digits;
+};
+
+constexpr std::array<MeasureText, kMeasures> kTexts{
+    {{"time_s", "time", "s", 1, 1},
+     {"peak_force_n", "greatest force", "N", 1, 2},
+     {"mean_force_n", "mean force", "N", 1, 2},
+     {"time_above_limit_s", "time with too much force", "s", 1, 1},
+     {"path_m", "way of all tips", "m", 1, 2},
+     {"wrong_answers", "wrong answers", "", 1, 0},
+     {"error_mm", "mean distance from it", "mm", 1e3, 1},
+     {"stray_wound_cm2", "cut beside the line", "cm²", 1e4, 2},
+     {"missing_margin_mm", "margin too small by", "mm", 1e3, 1},
+     {"volume_cm3", "taken out", "cm³", 1e6, 1},
+     {"harm_cm2", "cut into what is to be spared", "cm²", 1e4, 2},
+     {"refusals", "refused or lost grasps", "", 1, 0}}};
+
+}  // namespace
+
+const char* name_of(Goal goal) {
+  constexpr std::array<const char*, kGoals> kNames{"find", "follow", "lift",
+                                                   "hold", "incise", "remove"};
+  return kNames[static_cast<std::size_t>(goal)];
+}
+
+const char* key_of(Measure measure) {
+  return kTexts[static_cast<std::size_t>(measure)].key;
+}
+
+const char* words_of(Measure measure) {
+  return kTexts[static_cast<std::size_t>(measure)].words;
+}
+
+std::string text_of(Measure measure, double value) {
+  const auto& text = kTexts[static_cast<std::size_t>(measure)];
+  const auto number = fmt::format("{:.{}f}", value * text.shown_per_unit, text.digits);
+  return *text.unit == '\0' ? number : number + " " + text.unit;
+}
+
+double Score::points(double value) const {
+  return std::clamp((none - value) / (none - full), 0.0, 1.0);
+}
+
+double Structure::distance_m(const Vec3d& place_m) const {
+  const auto along = to_m - from_m;
+  const double squared = length_squared(along);
+  const double t = squared > 0 ? std::clamp(dot(place_m - from_m, along) / squared, 0.0, 1.0) : 0.0;
+  return length(place_m - (from_m + along * t)) - radius_m;
+}
+
+const Structure* Lesson::find_structure(std::string_view name) const {
+  const auto found = std::ranges::find(structures, name, &Structure::name);
+  return found == structures.end() ? nullptr : &*found;
+}
+
+}  // namespace trocar::lesson

@@ -1,0 +1,129 @@
+// The replicator's part about the lesson that a session gives: its goals, and what people answer.
+
+#include "common/base/log.h"
+#include "proto/journal.pb.h"
+#include "proto/wire.pb.h"
+#include "server/session/replication/lesson_messages.h"
+#include "server/session/replication/messages.h"
+#include "server/session/replication/replicator_client.h"
+
+namespace trocar::replication {
+namespace {
+
+constexpr Frame kFramesPerProgress = 16;  // about four a second
+
+const char* words_of(lesson::Answer answer) {
+  switch (answer) {
+    case lesson::Answer::NotAsked:
+      return "nothing is to be found in this stage";
+    case lesson::Answer::NoTissue:
+      return "put the tip on the tissue first";
+    case lesson::Answer::Wrong:
+      return "it is not there";
+    case lesson::Answer::Right:
+      return "that is right";
+  }
+  return "";
+}
+
+}  // namespace
+
+void Replicator::observe_lesson(const step::PublishedFrame& frame) {
+  bool is_first = false;
+  if (!has_course_begun_) {
+    if (frame.tools.empty()) return;
+    is_first = has_course_begun_ = true;
+    proto::LessonRecord record;
+    record.mutable_lesson()->set_source(course_->lesson().source);
+    record_lesson(record);
+  }
+  for (const auto& event : frame.claim_events)
+    if (wire::is_refusal(event.outcome) || event.outcome == wire::ClaimOutcome::Slipped)
+      course_->note_refusal();
+  const bool is_stage_over = course_->observe(moment_of(frame, layout_, tips_));
+  if (is_stage_over) tell_line(words_of_last_stage(*course_));
+  const bool is_hint_due = course_->shows_hint() && !is_hint_told_;
+  if (is_stage_over || is_first || is_hint_due) tell_stage();
+  if (frame.frame % kFramesPerProgress != 0 || course_->is_over()) return;
+  proto::Envelope event;
+  describe(*course_, *event.mutable_lesson_progress());
+  const auto bytes = wire::encode_envelope(event);
+  for (const auto& [id, client] : clients_)
+    if (client->participant) send(*client, bytes);
+}
+
+void Replicator::tell_stage() {
+  is_hint_told_ = course_->shows_hint();
+  proto::LessonRecord record;
+  describe(*course_, *record.mutable_stage());
+  record_lesson(record);
+  proto::Envelope event;
+  *event.mutable_lesson_stage() = record.stage();
+  broadcast(wire::encode_envelope(event));
+}
+
+void Replicator::tell_line(const std::string& words) {
+  log::info("{}", words);
+  proto::Envelope event;
+  event.mutable_teach_event()->set_tick(newest_tick());
+  event.mutable_teach_event()->set_is_done(true);
+  event.mutable_teach_event()->set_text(words);
+  broadcast(wire::encode_envelope(event));
+}
+
+std::optional<Replicator::Ending> Replicator::handle_lesson(Client& client,
+                                                            const proto::LessonRequest& request) {
+  const auto role = client.participant->role;
+  const auto rights = wire::rights_of(role);
+  const auto slot = client.participant->slot;
+  const int action = request.action();
+  const bool answers = action == proto::LESSON_ANSWER;
+  if (!answers && action != proto::LESSON_NEXT && action != proto::LESSON_RESTART)
+    return Ending{EndReason::ProtocolError, "LessonRequest.action: " + std::to_string(action) +
+                                                " is not 1 (answer), 2 (next) or 3 (restart)"};
+  if (answers ? !rights.has_tools : !rights.may_teach)
+    return Ending{EndReason::Role, std::string("LessonRequest: ") +
+                                       (answers ? "who answers has a tool, not an "
+                                                : "stages are the instructor's, not of an ") +
+                                       participants::name_of(role)};
+  if (answers && request.tool() >= client.participant->tools.size())
+    return Ending{EndReason::ProtocolError,
+                  "LessonRequest.tool: " + std::to_string(request.tool()) + ", you have " +
+                      std::to_string(client.participant->tools.size()) + " (counted from 0)"};
+  const auto refuse = [&](const std::string& why) {
+    proto::Envelope answer;
+    describe_teaching({}, slot, false, "not done: " + why, *answer.mutable_teach_event());
+    send(client, wire::encode_envelope(answer));
+    return std::nullopt;
+  };
+  if (!course_) return refuse("this session gives no lesson");
+  if (!client.sayings.take(0.5, options_.clock_ns())) return refuse("wait a second");
+  if (!has_course_begun_) return refuse("the lesson begins when somebody has a tool");
+  const auto tool = tool_slot(slot, static_cast<int>(request.tool()));
+  proto::LessonRecord record;
+  record.mutable_input()->set_tick(newest_tick());
+  record.mutable_input()->set_action(request.action());
+  if (answers) record.mutable_input()->set_tool(tool.value);
+  if (answers) {
+    const auto answer = course_->answer(tool, moment_of(*encoder_.current(), layout_, tips_));
+    if (answer == lesson::Answer::NotAsked || answer == lesson::Answer::NoTissue)
+      return refuse(words_of(answer));
+    record_lesson(record);
+    tell_line(client.participant->name + " says that it is here: " + words_of(answer));
+    if (answer == lesson::Answer::Wrong) return std::nullopt;
+    tell_line(words_of_last_stage(*course_));
+  } else {
+    action == proto::LESSON_NEXT ? course_->skip() : course_->restart();
+    record_lesson(record);
+    if (options_.gate)
+      options_.gate->note_action(client.applicant,
+                                 action == proto::LESSON_NEXT ? "next-stage" : "restart-lesson");
+    tell_line(client.participant->name + (action == proto::LESSON_NEXT
+                                              ? " goes on to the next stage"
+                                              : " begins the lesson anew"));
+  }
+  tell_stage();
+  return std::nullopt;
+}
+
+}  // namespace trocar::replication
