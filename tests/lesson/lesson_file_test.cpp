@@ -1,0 +1,73 @@
+#include <gtest/gtest.h>
+
+#include "common/lesson/lesson.h"
+#include "common/lesson/lesson_texts.h"
+
+namespace trocar::lesson {
+namespace {
+
+constexpr const char* kHead = "title = \"T\"\ntext = \"What to do.\"\n";
+constexpr const char* kBall =
+    "[[structure]]\nname = \"lump\"\ncentre_mm = [0, 0, 0]\nradius_mm = 9\n";
+constexpr const char* kFind =
+    "[[stage]]\nname = \"S\"\ntext = \"Find it.\"\ngoal = \"find\"\nstructure = \"lump\"\n";
+
+std::string error_of(const std::string& text) {
+  const auto lesson = read_lesson_text(text, "x.toml");
+  return lesson ? "" : lesson.error().message;
+}
+
+TEST(LessonFile, AllThatShipAreGood) {
+  EXPECT_EQ(lesson_texts().size(), 6u);
+  for (const auto& [name, text] : lesson_texts()) {
+    const auto lesson = read_lesson_text(text, name);
+    ASSERT_TRUE(lesson) << lesson.error().message;
+    for (const auto& stage : lesson->stages) EXPECT_FALSE(stage.scores.empty()) << name;
+  }
+}
+
+TEST(LessonFile, ReadsLengthsInMillimetres) {
+  const auto lesson = read_lesson_text(
+      std::string(kHead) + kBall + kFind +
+          "tolerance_mm = 4\n[[stage.score]]\nmeasure = \"error_mm\"\nfull = 1\nnone = 5\n",
+      "x.toml");
+  ASSERT_TRUE(lesson) << lesson.error().message;
+  EXPECT_DOUBLE_EQ(lesson->structures[0].radius_m, 0.009);
+  EXPECT_DOUBLE_EQ(lesson->stages[0].tolerance_m, 0.004);
+  const auto& score = lesson->stages[0].scores[0];
+  EXPECT_DOUBLE_EQ(score.points(0.0005), 1);
+  EXPECT_DOUBLE_EQ(score.points(0.003), 0.5);
+  EXPECT_DOUBLE_EQ(score.points(0.006), 0);
+}
+
+TEST(LessonFile, SaysWhatIsWrongAndWhere) {
+  const std::string head = kHead, whole = head + kBall + kFind;
+  EXPECT_EQ(error_of(whole), "");
+  EXPECT_EQ(error_of(head), "x.toml:1: key stage: is missing, add a [[stage]] with a goal");
+  EXPECT_NE(error_of(head + kFind).find("no [[structure]] above has that name"), std::string::npos);
+  EXPECT_NE(error_of(whole + "lap_s = 3\n").find("key stage[0].lap_s: is unknown"),
+            std::string::npos);
+  EXPECT_NE(error_of(whole + "limit_s = -1\n").find("x.toml:12: key stage[0].limit_s: is -1"),
+            std::string::npos);
+  EXPECT_NE(
+      error_of(whole + "[[stage.score]]\nmeasure = \"beauty\"\n").find("is not one of time_s"),
+      std::string::npos);
+  EXPECT_NE(error_of(whole + "[[stage.score]]\nmeasure = \"time_s\"\nfull = 9\nnone = 3\n")
+                .find("which has to be more than full"),
+            std::string::npos);
+  EXPECT_NE(
+      error_of(whole + "[[stage]]\nname = \"L\"\ntext = \"t\"\ngoal = \"follow\"\nline_mm = 3\n")
+          .find("is not a list of places"),
+      std::string::npos);
+  EXPECT_NE(error_of(head + kBall + kBall + kFind).find("is that of another one above"),
+            std::string::npos);
+}
+
+TEST(LessonFile, TooManyStagesAreRefused) {
+  std::string text = std::string(kHead) + kBall;
+  for (std::size_t i = 0; i <= kMostStages; ++i) text += kFind;
+  EXPECT_NE(error_of(text).find("is one too many, there may be 16"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace trocar::lesson
