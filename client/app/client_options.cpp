@@ -267,6 +267,10 @@ void add_picture_options(CLI::App& app, ClientOptions& options, GivenTexts& more
   app.add_option("--view", more.view, "turn the camera at first, degrees, and go nearer [0,0,1]")
       ->type_name("YAW,PITCH,ZOOM")
       ->delimiter(',');
+  app.add_option("--see-with", options.sees_with,
+                 "see through this participant's endoscope; in a recording also from behind the "
+                 "tip of another tool")
+      ->type_name("NAME");
   app.add_option("--screenshot", options.screenshot_file, "write a picture (PNG)")
       ->type_name("FILE");
   app.add_option("--screenshot-at", options.screenshot_at,

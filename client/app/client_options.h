@@ -46,6 +46,7 @@ struct ClientOptions {
   double scale = 0;                // of words and panels; 0: as the monitor says
   Overlays overlays;
   StartView view;
+  std::string sees_with;  // the name of who holds the tool that one sees with; empty: own eyes
   std::string screenshot_file;
   double screenshot_at = -1;            // seconds after joining; < 0: the last picture
   double seconds = 0;                   // 0: until the session ends

@@ -59,4 +59,17 @@ void main() {
 }
 )";
 
+// An endoscope's picture is a disc, darker towards its edge. It lies over what was drawn.
+inline constexpr const char* kScopeMaskSource = R"(#version 330 core
+in vec3 ray;  // x and y: from -1 to 1 across the picture
+out vec4 colour;
+uniform float aspect;
+void main() {
+  float r = length(ray.xy * vec2(aspect, 1.0));
+  float edge = fwidth(r) * 1.5;
+  float dark = 0.45 * smoothstep(0.35, 1.0, r);
+  colour = vec4(0.0, 0.0, 0.0, max(dark, smoothstep(0.97 - edge, 0.97 + edge, r)));
+}
+)";
+
 }  // namespace trocar::render

@@ -25,6 +25,8 @@ constexpr int kMaxShadows = 8;
 constexpr float kOverlayStrength = 0.50f;
 constexpr float kFirmHoldStrength = 0.95f, kTouchStrength = 0.60f;
 constexpr float kOverlayFadeSeconds = 0.12f;
+// The light of an endoscope does not reach far.
+constexpr float kScopeClearMetres = 0.05f, kScopeHazePerMetre = 4.0f;
 constexpr float kHazePerMiddle = 0.55f;  // over the distance of what one looks at
 constexpr float kSeamMetres = 0.004f, kDeepMetres = 0.022f;  // widths of what a rim changes
 constexpr std::size_t kTriangleBudgetSoftware = 24'000, kTriangleBudget = 100'000;
@@ -144,6 +146,7 @@ struct SceneRenderer::Parts {
   Shader plain_organ{kOrganVertexSource, lit(kPlainHead, kOrganFragmentSource).c_str()};
   Shader tool{kToolVertexSource, lit(kFineHead, kToolFragmentSource).c_str()};
   Shader field{kFieldVertexSource, lit(kPlainHead, kFieldFragmentSource).c_str()};
+  Shader scope_mask{kFieldVertexSource, kScopeMaskSource};
   GhostNet ghost_net;
   VertexArray organ_array, tool_array, field_array;
   GLuint rest_buffer = 0, index_buffer = 0, noise = 0;
@@ -173,6 +176,7 @@ struct SceneRenderer::Parts {
   void set_lights(const Shader& shader, const OrbitCamera& camera) const;
   void draw_field(const OrbitCamera& camera);
   void draw_backdrop(const OrbitCamera& camera);
+  void draw_scope_mask();
   void measure_organ(std::span<const Vec3f> rest_positions);
   void draw_organ(const SceneView& scene, const OrbitCamera& camera, const Shader& organ);
   void draw_tools(const SceneView& scene, const OrbitCamera& camera);
@@ -314,7 +318,9 @@ void SceneRenderer::Parts::set_lights(const Shader& shader, const OrbitCamera& c
   const auto direction = [&](float right, float up, float back) {
     return normalized(view.right * right + view.up * up - view.forward * back, Vec3f{0, 1, 0});
   };
-  shader.set("key_direction", direction(0.42f, 0.88f, 0.55f));
+  const bool is_scope = camera.lens() && camera.lens()->is_endoscope;
+  shader.set("key_direction",
+             is_scope ? direction(0.05f, 0.12f, 1) : direction(0.42f, 0.88f, 0.55f));
   shader.set("fill_direction", direction(-0.9f, 0.15f, 0.35f));
 }
 
@@ -326,7 +332,10 @@ void SceneRenderer::Parts::draw_organ(const SceneView& scene, const OrbitCamera&
   set_lights(organ, camera);
   organ.set("noise", 0);
   const float middle = length(camera.centre() - camera.rays(size).eye);
-  organ.set("haze", middle, kHazePerMiddle / middle);
+  if (camera.lens() && camera.lens()->is_endoscope)
+    organ.set("haze", kScopeClearMetres, kScopeHazePerMetre);
+  else
+    organ.set("haze", middle, kHazePerMiddle / middle);
   glActiveTexture(GL_TEXTURE0);
   glBindTexture(GL_TEXTURE_3D, noise);
   std::vector<float> tips, shafts;
@@ -463,6 +472,19 @@ void SceneRenderer::Parts::draw_field(const OrbitCamera& camera) {
   glDrawArrays(GL_TRIANGLES, 0, 3);
 }
 
+void SceneRenderer::Parts::draw_scope_mask() {
+  scope_mask.use();
+  scope_mask.set("forward", Vec3f{});
+  scope_mask.set("right", Vec3f{1, 0, 0});
+  scope_mask.set("up", Vec3f{0, 1, 0});
+  scope_mask.set("aspect", static_cast<float>(size.width) / static_cast<float>(size.height));
+  glEnable(GL_BLEND);
+  glBlendFunc(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA);
+  glBindVertexArray(field_array.array);
+  glDrawArrays(GL_TRIANGLES, 0, 3);
+  glDisable(GL_BLEND);
+}
+
 void SceneRenderer::Parts::draw_backdrop(const OrbitCamera& camera) {
   const Matrix4 view = camera.clip_from_world(size);
   const bool is_new = backdrop.resize(size);
@@ -504,6 +526,7 @@ void SceneRenderer::draw(const SceneView& scene, const OrbitCamera& camera, Qual
                          camera.clip_from_world(parts.size), camera.rays(parts.size).eye);
   parts.draw_tools(scene, camera);
   glDisable(GL_DEPTH_TEST);
+  if (camera.lens() && camera.lens()->is_endoscope) parts.draw_scope_mask();
   glBindVertexArray(0);
   blit(target.framebuffer, context_.framebuffer(), parts.size);
   glBindFramebuffer(GL_FRAMEBUFFER, context_.framebuffer());

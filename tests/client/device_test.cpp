@@ -301,6 +301,27 @@ TEST_F(MouseToolTest, NeverLeavesTheSpaceThatTheServerAccepts) {
   }
 }
 
+// The handle goes where the mouse goes, the tip the other way, and the shaft passes the port.
+TEST_F(MouseToolTest, AnEndoscopeThatIsSteeredPivotsAtItsPort) {
+  tool_.take({.radius_m = 0.005f, .form = tool::Form::Endoscope});
+  update();
+  const auto view = camera_.rays(size_);
+  const auto tip = [&] { return tool_.current().world_from_tool.position; };
+  const auto back = [&] { return rotate(tool_.current().world_from_tool.orientation, {0, 0, 1}); };
+  const Vec3f before = tip(), port = before + back() * 0.14f;
+  input_.dx = 40;
+  tool_.steer(input_, view, 0.016f);
+  EXPECT_LT(dot(tip() - before, view.right), -0.002f);
+  EXPECT_LT(length(tip() + back() * length(port - tip()) - port), 1e-4f);
+  EXPECT_NEAR(length(port - tip()), 0.14f, 1e-4f);
+  input_.dx = 0, input_.wheel = 2;
+  tool_.steer(input_, view, 0.016f);
+  EXPECT_GT(length(port - tip()), 0.141f);
+  input_.wheel = 1000;
+  tool_.steer(input_, view, 0.016f);
+  EXPECT_LT(length(port - tip()), tool_.shape().length_m);
+}
+
 TEST(SmoothSurface, KeepsTheServersVerticesAndRoundsWhatLiesBetween) {
   const Blob blob;
   shape::SmoothSurface surface;

@@ -1,11 +1,11 @@
 // This shows what a wound looks like after a real operation, without drawing it: the triangles at
 // its rim must be shaded as one smooth lip.
 //
-// The bounds are what an eye tells apart: facets that meet at less than 30 degrees pass as one round
-// surface, which is also where modelling programs cease to smooth. Within one triangle light may
-// turn by a right angle, from a wall to the outside; what turns farther glitters. Normals that lean
-// away from their triangle are counted, too: walls of two cuts share them at a fold, and the shader
-// leans them back.
+// The bounds are what an eye tells apart: facets that meet at less than 30 degrees pass as one
+// round surface, which is also where modelling programs cease to smooth. Within one triangle light
+// may turn by a right angle, from a wall to the outside; what turns farther glitters. Normals that
+// lean away from their triangle are counted, too: walls of two cuts share them at a fold, and the
+// shader leans them back.
 
 #include <gtest/gtest.h>
 
