@@ -9,6 +9,7 @@
 #include "client/app/client_summary.h"
 #include "client/app/picture.h"
 #include "client/app/picture_pace.h"
+#include "client/app/picture_series.h"
 #include "client/app/start.h"
 #include "client/device/device_list.h"
 #include "client/device/returning_device.h"
@@ -340,6 +341,10 @@ Result<Hands> open_replayed(const ClientOptions& options) {
 
 Result<ExitCode> run_chosen(const ClientOptions& options) {
   Hands hands;
+  if (!options.series_folder.empty()) {
+    if (const auto written = write_picture_series(options); !written) return written.error();
+    return ExitCode::Ok;
+  }
   if (!options.replay_file.empty()) {
     auto source = replay::ReplaySource::open(options.replay_file);
     if (!source) return source.error();

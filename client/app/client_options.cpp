@@ -185,6 +185,8 @@ std::string default_name() {
 Status check(const ClientOptions& options) {
   if (!options.replay_file.empty() && !options.script_file.empty())
     return Error{ErrorCode::Usage, "--replay and --script: a recording takes no tools; choose one"};
+  if (!options.series_folder.empty() && options.replay_file.empty())
+    return Error{ErrorCode::Usage, "--pictures: is of a recording; give --replay too"};
   if (const auto tools = check_tools(options); !tools) return tools;
   if (const auto devices = check_devices(options); !devices) return devices;
   if (!options.script_file.empty() && !replica::has_tools(options.role))
@@ -267,6 +269,10 @@ void add_picture_options(CLI::App& app, ClientOptions& options, GivenTexts& more
   app.add_option("--view", more.view, "turn the camera at first, degrees, and go nearer [0,0,1]")
       ->type_name("YAW,PITCH,ZOOM")
       ->delimiter(',');
+  app.add_option("--see-with", options.sees_with,
+                 "see through this participant's endoscope; in a recording also from behind the "
+                 "tip of another tool")
+      ->type_name("NAME");
   app.add_option("--screenshot", options.screenshot_file, "write a picture (PNG)")
       ->type_name("FILE");
   app.add_option("--screenshot-at", options.screenshot_at,
@@ -340,6 +346,20 @@ void add_hand_options(CLI::App& app, ClientOptions& options, GivenTexts& more) {
 void add_replay_options(CLI::App& app, ClientOptions& options, GivenTexts& more) {
   app.add_option("--replay", options.replay_file, "play a recorded session (.mcap)")
       ->type_name("FILE");
+  app.add_option("--pictures", options.series_folder,
+                 "with --replay: write numbered pictures (PNG) of it instead of playing it")
+      ->type_name("FOLDER");
+  app.add_option("--from", options.series_from_s, "with --pictures: first second of the recording")
+      ->type_name("S")
+      ->check(CLI::Range(0.0, 1e6));
+  app.add_option("--to", options.series_to_s, "with --pictures: last second; 0: the end")
+      ->type_name("S")
+      ->check(CLI::Range(0.0, 1e6));
+  app.add_option("--rate", options.series_rate,
+                 "with --pictures: of them per second of the recording")
+      ->type_name("N")
+      ->check(CLI::Range(0.1, 120.0))
+      ->capture_default_str();
   app.add_option("--feel", more.feels,
                  "with --replay and --device: feel what this participant felt, with tool 0 or 1; "
                  "twice: one for each device")

@@ -46,13 +46,16 @@ struct ClientOptions {
   double scale = 0;                // of words and panels; 0: as the monitor says
   Overlays overlays;
   StartView view;
+  std::string sees_with;  // the name of who holds the tool that one sees with; empty: own eyes
   std::string screenshot_file;
   double screenshot_at = -1;            // seconds after joining; < 0: the last picture
   double seconds = 0;                   // 0: until the session ends
   double answer_at = -1;                // of a lesson: likewise
   double mark_at = -1, return_at = -1;  // instructor: seconds after joining; < 0: not
   std::string script_file, replay_file, summary_file;
-  std::string trace_file;            // of what devices did and felt
+  std::string series_folder;  // for pictures of the recording; empty: it is played
+  double series_from_s = 0, series_to_s = 0, series_rate = 25;  // to 0: the end
+  std::string trace_file;                                       // of what devices did and felt
   std::vector<std::string> devices;  // as device::open_device; empty: the mouse or the script
   std::vector<tool::Instrument> own_instruments;  // empty: those of tool::instruments()
   // There is one for each device, or one for all; empty: the table's first, and no port.

@@ -20,6 +20,7 @@ namespace {
 constexpr std::uint64_t kHelpNs = 20'000'000'000;  // at the start
 constexpr std::uint64_t kViewNs = 100'000'000;     // between two words on where a view is
 constexpr shape::Colour kLessonColour{240, 228, 66};
+constexpr float kLentTargetMetres = 0.1f;         // before the lens: what others turn about
 constexpr float kLineHalfWidth = 0.0009f;         // m, as in a browser
 constexpr std::uint64_t kFeltBinNs = 62'500'000;  // 160 of them are 10 s
 
@@ -70,7 +71,8 @@ Picture::Picture(std::unique_ptr<render::GlContext> context, const ClientOptions
       hud_(*context_, options.scale),
       shows_help_(options.display == Display::Window),
       overlays_(options.overlays),
-      view_(options.view) {
+      view_(options.view),
+      sees_with_(options.sees_with) {
   log::debug("drawing with {}", renderer_.description());
   if (context_->is_software()) {
     const int count = render::yield_to_other_work();
@@ -386,6 +388,7 @@ ui::HudModel Picture::hud_model(const replica::Replica& replica, replica::Sessio
   model.shows_arrows = overlays_.arrows;
   model.shows_rate = overlays_.rate;
   if (overlays_.ghost) model.ghost_text = ui::describe(replica.ghost(), is_replay);
+  add_lent_view(replica, is_replay, model);
   add_participants(replica, is_replay, model);
   if (!is_replay) add_own_forces(replica, model);
   add_felt_hands(hands, model);
@@ -416,6 +419,7 @@ void Picture::act(const ui::HudActions& actions, const replica::Replica& replica
   if (actions.toggle_ghost) overlays_.ghost = !overlays_.ghost;
   if (actions.reset_camera) frame_camera(replica);
   if (actions.screenshot) wants_screenshot_ = true;
+  if (actions.next_lent_view) lent_.next(scene_.tools, source.playback() != nullptr);
   if (actions.toggle_follow) follows_view_ = !follows_view_;
   // A wish that cannot be sent is lost: whoever presses the key asks again.
   if (actions.set_mark) replica::ask_for_mark(source, false);
@@ -436,15 +440,63 @@ void Picture::share_view(const replica::Replica& replica, replica::SessionSource
   const auto* own = replica.find_participant(replica.own_slot());
   if (own != nullptr && own->leads_view) {
     follows_view_ = false;
+    if (input.right || input.middle) lent_.leave();
     if (last_ns_ - view_sent_ns_ < kViewNs || !is_framed_) return;
     view_sent_ns_ = last_ns_;
-    replica::send_view(source, camera_.rays(context_->size()).eye, camera_.centre());
+    const auto view = camera_.rays(context_->size());
+    const Vec3f target =
+        camera_.lens() ? view.eye + view.forward * kLentTargetMetres : camera_.centre();
+    replica::send_view(source, view.eye, target);
     return;
   }
   // Whoever moves the view follows nobody.
-  if (input.right || input.middle || (input.control && input.wheel != 0)) follows_view_ = false;
+  if (input.right || input.middle || (input.control && input.wheel != 0)) {
+    follows_view_ = false;
+    lent_.leave();
+  }
   const auto& led = replica.led_view();
   if (follows_view_ && led) camera_.look(led->eye_m, led->target_m);
+}
+
+void Picture::move_mouse_tool(const replica::Replica& replica, Hands& hands,
+                              const device::PointerInput& input, float seconds) {
+  device::MouseTool* const mouse = hands.mouse_tool();
+  if (mouse == nullptr) return;
+  const auto view = camera_.rays(context_->size());
+  const bool is_own = lent_.slot() && lent_.slot()->owner() == replica.own_slot() &&
+                      hands.mouse_tool(lent_.slot()->number()) == mouse;
+  if (is_own && camera_.lens() && tool::is_endoscope(mouse->shape().form)) {
+    mouse->steer(input, view, seconds);
+    return;
+  }
+  mouse->cease_to_steer();
+  mouse->update(input, view, surface_.positions(), replica.topology().triangles, seconds);
+}
+
+void Picture::find_lent_view(const replica::Replica& replica, bool is_recording) {
+  if (sees_with_.empty()) return;
+  for (const auto& shown : scene_.tools) {
+    const auto* owner = owner_of(replica, shown.slot);
+    if (owner == nullptr || owner->name != sees_with_) continue;
+    if (!is_recording && !tool::is_endoscope(shown.shape.form)) continue;
+    lent_.choose(shown.slot);
+    sees_with_.clear();
+    return;
+  }
+}
+
+void Picture::add_lent_view(const replica::Replica& replica, bool is_replay,
+                            ui::HudModel& model) const {
+  for (const replica::Tool& tool : surface_.tools())
+    model.can_lend_view |= is_replay || tool::is_endoscope(shape_of(replica, tool.slot).form);
+  if (!camera_.lens() || !lent_.slot()) return;
+  const auto* owner = owner_of(replica, *lent_.slot());
+  const std::string name = owner != nullptr ? owner->name : "somebody";
+  const bool is_own = !is_replay && lent_.slot()->owner() == replica.own_slot();
+  const std::string whose = is_own ? "your endoscope" : "the endoscope of " + name;
+  model.lent_text = camera_.lens()->is_endoscope
+                        ? "You see through " + whose + ": T goes on, right drag ends that."
+                        : "You see from behind the tool of " + name + ": T goes on.";
 }
 
 void Picture::ask_for_ghost(replica::SessionSource& source) {
@@ -478,11 +530,13 @@ void Picture::draw(const replica::Replica& replica, replica::SessionSource& sour
   const device::PointerInput input = hud_.input();
   camera_.update(input, context_->size(), seconds);
   share_view(replica, source, input);
-  hands.set_view(camera_.orientation());
-  if (device::MouseTool* mouse = hands.mouse_tool(); mouse != nullptr && surface_.is_valid())
-    mouse->update(input, camera_.rays(context_->size()), surface_.positions(),
-                  replica.topology().triangles, seconds);
+  // A hand that held its own camera and moved as that sees would chase itself.
+  if (!lent_.slot() || lent_.slot()->owner() != replica.own_slot())
+    hands.set_view(camera_.orientation());
+  if (surface_.is_valid()) move_mouse_tool(replica, hands, input, seconds);
   scene_ = scene_view(replica, hands, seconds);
+  find_lent_view(replica, source.playback() != nullptr);
+  lent_.apply(scene_, camera_, source.playback() != nullptr);
   const auto actions = hud_.draw(hud_model(replica, source, scene_, hands, now_ns));
   act(actions, replica, source);
   if (actions.take_instrument) hands.take(*actions.take_instrument, source);

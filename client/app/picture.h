@@ -8,6 +8,7 @@
 
 #include "client/app/client_options.h"
 #include "client/app/hands.h"
+#include "client/app/lent_view.h"
 #include "client/render/scene_renderer.h"
 #include "client/replica/drawn_lines.h"
 #include "client/replica/force_history.h"
@@ -58,6 +59,10 @@ class Picture {
   // Follows the view of who has it, if the person wants to, or says where one's own is.
   void share_view(const replica::Replica& replica, replica::SessionSource& source,
                   const device::PointerInput& input);
+  void move_mouse_tool(const replica::Replica& replica, Hands& hands,
+                       const device::PointerInput& input, float seconds);
+  void add_lent_view(const replica::Replica& replica, bool is_replay, ui::HudModel& model) const;
+  void find_lent_view(const replica::Replica& replica, bool is_recording);
   void ask_for_ghost(replica::SessionSource& source);
   void act(const ui::HudActions& actions, const replica::Replica& replica,
            replica::SessionSource& source);
@@ -87,6 +92,8 @@ class Picture {
   using FeltForces = replica::PeakRings<2, ui::kFeltBins, ui::kFeltBins>;
   std::array<FeltForces, kToolsPerHand> felt_forces_;
   bool follows_view_ = false;
+  LentView lent_;
+  std::string sees_with_;  // a participant's name, until there is a tool to see with
   std::uint64_t view_sent_ns_ = 0;
   replica::DrawnLines lines_;
   shape::MeshVertices drawing_;  // of the last picture

@@ -17,6 +17,8 @@ constexpr float kHookDepth = 0.004f;
 constexpr float kRollSpeed = 1.6f;      // rad/s
 constexpr float kAsideSeconds = 0.15f;  // a tip that is free comes to the pointer this softly
 constexpr float kPushSpeed = 0.04f, kReachSpeed = 0.1f;
+constexpr float kPortMetres = 0.14f, kLeastInside = 0.03f;  // of a steered shaft
+constexpr float kSwingPerPixel = 0.0022f;                   // rad
 constexpr float kMinDepth = 0.02f, kMaxDepth = 1.8f;
 
 }  // namespace
@@ -46,6 +48,7 @@ void MouseTool::take(const tool::ToolShape& shape) {
   wanted_ = sample_.verb = tool::Verb::None;
   ahead_ = 0;
   is_latched_ = false;
+  port_.reset();
 }
 
 void MouseTool::leave() {
@@ -132,11 +135,35 @@ void MouseTool::update(const PointerInput& input, const ViewRays& view,
   if (length(tip) > 1.9f) return;  // the server ends a session for poses beyond 2 m
   // The shaft goes through a port above the camera, on the side of the hand.
   const Vec3f port = view.eye + view.up * 0.16f + view.right * (side_ * 0.14f);
+  point_shaft(tip, port);
+  sample_.verb = is_reaching() ? tool::Verb::None : verb;
+  is_valid_ = true;
+}
+
+void MouseTool::point_shaft(const Vec3f& tip, const Vec3f& port) {
   sample_.world_from_tool.position = tip;
   sample_.world_from_tool.orientation = rotation_from_z(normalized(port - tip, Vec3f{0, 0, 1})) *
                                         Quatf{0, 0, std::sin(0.5f * roll_), std::cos(0.5f * roll_)};
-  sample_.verb = is_reaching() ? tool::Verb::None : verb;
-  is_valid_ = true;
+}
+
+void MouseTool::steer(const PointerInput& input, const ViewRays& view, float seconds) {
+  if (!is_valid_) return;
+  const Vec3f tip = sample_.world_from_tool.position;
+  const Vec3f back = rotate(sample_.world_from_tool.orientation, {0, 0, 1});
+  if (!port_) port_ = tip + back * kPortMetres;
+  turn(input, seconds);
+  wanted_ = sample_.verb = tool::Verb::None;
+  const float fine = input.shift ? kFineFactor : 1.0f;
+  float advance = input.control ? 0.0f : input.wheel * kWheelMetres * fine;
+  if (input.deeper) advance += kKeyMetresPerSecond * fine * seconds;
+  if (input.nearer) advance -= kKeyMetresPerSecond * fine * seconds;
+  const float inside =
+      std::clamp(length(*port_ - tip) + advance, kLeastInside, shape_.length_m - kLeastInside);
+  const float swing = input.is_over_scene ? kSwingPerPixel * fine : 0.0f;
+  const Vec3f handle = back + view.right * (input.dx * swing) - view.up * (input.dy * swing);
+  const Vec3f moved = *port_ - normalized(handle, back) * inside;
+  if (length(moved) > 1.9f) return;
+  point_shaft(moved, *port_);
 }
 
 std::optional<tool::ToolSample> MouseTool::pop_due(std::uint64_t now_ns) {

@@ -18,6 +18,10 @@
 // when the pointer comes back to it, it moves from where it is, and holds until it is told to again
 // and let go.
 //
+// Whoever looks through the own endoscope holds it outside, behind the port that its shaft passes:
+// moving the mouse to the right moves that handle to the right, and so the picture to the left. The
+// wheel, or W and S, go in and out, and Q and E turn it.
+//
 // Depth is measured along the view direction. The shaft runs from the tip towards a fixed port
 // above and beside the camera, as an instrument through a trocar does. Samples leave at most every
 // 8 ms while something changes, else every 40 ms (the server's lease wants one at least every 50
@@ -52,6 +56,10 @@ class MouseTool {
   // Once per display frame; `seconds` since the last one. Positions are those on the screen.
   void update(const PointerInput& input, const ViewRays& view, std::span<const Vec3f> positions,
               Triangles triangles, float seconds);
+  // Does so once per display frame for a holder who looks through it.
+  void steer(const PointerInput& input, const ViewRays& view, float seconds);
+  // The holder looks at it from outside again.
+  void cease_to_steer() { port_.reset(); }
   // The pose and verb now; invalid until the pointer was over the scene once.
   const tool::ToolSample& current() const { return sample_; }
   bool is_valid() const { return is_valid_; }
@@ -64,6 +72,7 @@ class MouseTool {
   // Jaws and scissors stay open on the way to the surface.
   bool is_reaching() const;
   void turn(const PointerInput& input, float seconds);
+  void point_shaft(const Vec3f& tip, const Vec3f& port);
 
   tool::ToolShape shape_;
   float side_;  // 1: its port is at the right of the view, -1: at the left
@@ -80,6 +89,7 @@ class MouseTool {
   bool is_for_other_hand_ = false;  // what is pressed was pressed before it came back
   std::array<float, 2> aside_{};    // pixels, from the pointer to where the tip goes
   float roll_ = 0;                  // rad, about the shaft
+  std::optional<Vec3f> port_;       // that an endoscope's shaft passes while it is steered
 };
 
 }  // namespace trocar::device

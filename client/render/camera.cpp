@@ -7,7 +7,7 @@ namespace trocar::render {
 namespace {
 
 constexpr float kTanHalfHeight = 0.2867f;  // 32 degrees of vertical field of view
-constexpr float kNear = 0.02f, kFar = 6.0f;
+constexpr float kNear = 0.02f, kLensNear = 0.003f, kFar = 6.0f;
 constexpr float kOrbitPerPixel = 0.006f;
 
 }  // namespace
@@ -50,18 +50,33 @@ void OrbitCamera::update(const device::PointerInput& input, Size size, float sec
 
 device::ViewRays OrbitCamera::rays(Size size) const {
   device::ViewRays view;
+  view.width = static_cast<float>(std::max(size.width, 1));
+  view.height = static_cast<float>(std::max(size.height, 1));
+  if (lens_) {
+    view.eye = lens_->eye;
+    view.forward = lens_->forward;
+    view.up = lens_->up;
+    view.right = cross(view.forward, view.up);
+    view.tan_half_height = lens_->tan_half_height;
+    return view;
+  }
   view.forward = Vec3f{-std::sin(yaw_) * std::cos(pitch_), -std::sin(pitch_),
                        -std::cos(yaw_) * std::cos(pitch_)};
   view.right = {std::cos(yaw_), 0, -std::sin(yaw_)};
   view.up = cross(view.right, view.forward);
   view.eye = centre_ - view.forward * distance_;
   view.tan_half_height = kTanHalfHeight;
-  view.width = static_cast<float>(std::max(size.width, 1));
-  view.height = static_cast<float>(std::max(size.height, 1));
   return view;
 }
 
 Quatf OrbitCamera::orientation() const {
+  if (lens_) {
+    const Quatf back = rotation_from_z(-lens_->forward);
+    const Vec3f right = cross(lens_->forward, lens_->up);
+    const float turn =
+        0.5f * std::atan2(dot(right, rotate(back, {0, 1, 0})), dot(right, rotate(back, {1, 0, 0})));
+    return back * Quatf{0, 0, std::sin(turn), std::cos(turn)};
+  }
   const Quatf yaw{0, std::sin(yaw_ / 2), 0, std::cos(yaw_ / 2)};
   const Quatf pitch{std::sin(-pitch_ / 2), 0, 0, std::cos(pitch_ / 2)};
   return yaw * pitch;
@@ -85,7 +100,7 @@ Matrix4 OrbitCamera::clip_from_world(Size size) const {
                                   -dot(v.up, v.eye),
                                   dot(v.forward, v.eye),
                                   1};
-  const float f = 1 / v.tan_half_height;
+  const float f = 1 / v.tan_half_height, near = lens_ ? kLensNear : kNear;
   const Matrix4 clip_from_eye = {f * v.height / v.width,
                                  0,
                                  0,
@@ -96,11 +111,11 @@ Matrix4 OrbitCamera::clip_from_world(Size size) const {
                                  0,
                                  0,
                                  0,
-                                 (kFar + kNear) / (kNear - kFar),
+                                 (kFar + near) / (near - kFar),
                                  -1,
                                  0,
                                  0,
-                                 2 * kFar * kNear / (kNear - kFar),
+                                 2 * kFar * near / (near - kFar),
                                  0};
   return multiply(clip_from_eye, eye_from_world);
 }

@@ -7,6 +7,7 @@
 
 #include "client/device/view_rays.h"
 #include "client/render/gl_context.h"
+#include "client/render/lens.h"
 #include "common/math/frame.h"
 #include "common/math/vec3.h"
 
@@ -29,6 +30,9 @@ class OrbitCamera {
   // Stands at `eye` and turns about `target`, as far as this camera can: its up is up.
   void look(const Vec3f& eye, const Vec3f& target);
   const Vec3f& centre() const { return centre_; }
+  // Sees as this lens does, until told otherwise; without one from where the orbit is.
+  void look_through(const std::optional<Lens>& lens) { lens_ = lens; }
+  const std::optional<Lens>& lens() const { return lens_; }
 
   device::ViewRays rays(Size size) const;
   // World from camera: x to the right of the screen, y up, z towards the person.
@@ -40,6 +44,7 @@ class OrbitCamera {
   Vec3f centre_;
   float radius_ = 0.12f;
   float yaw_ = 0, pitch_ = 0.42f, distance_ = 0.5f;
+  std::optional<Lens> lens_;
 };
 
 Matrix4 multiply(const Matrix4& a, const Matrix4& b);

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <string>
 
+#include "client/render/field_source.h"
 #include "client/render/ghost_net.h"
 #include "client/render/gl.h"
 #include "client/render/shader.h"
@@ -24,8 +25,11 @@ constexpr int kMaxShadows = 8;
 constexpr float kOverlayStrength = 0.50f;
 constexpr float kFirmHoldStrength = 0.95f, kTouchStrength = 0.60f;
 constexpr float kOverlayFadeSeconds = 0.12f;
-// Jaws: open while a grasp looks for tissue, parted by what it holds, else closed. Radians.
-constexpr std::size_t kTriangleBudgetSoftware = 16'000, kTriangleBudget = 100'000;
+// The light of an endoscope does not reach far.
+constexpr float kScopeClearMetres = 0.05f, kScopeHazePerMetre = 4.0f;
+constexpr float kHazePerMiddle = 0.55f;  // over the distance of what one looks at
+constexpr float kSeamMetres = 0.004f, kDeepMetres = 0.022f;  // widths of what a rim changes
+constexpr std::size_t kTriangleBudgetSoftware = 24'000, kTriangleBudget = 100'000;
 
 struct Tint {
   float r = 0, g = 0, b = 0, a = 0;  // colour weighted by a
@@ -44,11 +48,12 @@ Tint tint_of(Colour c) {
 struct OrganVertex {
   Vec3f position, normal;
   std::array<std::uint8_t, 4> tint;
+  std::array<std::int8_t, 4> lip;  // a normal
 };
 
 struct RestVertex {
   Vec3f position;
-  float is_wound = 0;  // -1: on its rim, outside
+  float rim = 0;  // as the shader says
 };
 
 Matrix4 matrix_of(const Pose& pose) {
@@ -140,12 +145,16 @@ struct SceneRenderer::Parts {
   Shader fine_organ{kOrganVertexSource, lit(kFineHead, kOrganFragmentSource).c_str()};
   Shader plain_organ{kOrganVertexSource, lit(kPlainHead, kOrganFragmentSource).c_str()};
   Shader tool{kToolVertexSource, lit(kFineHead, kToolFragmentSource).c_str()};
-  Shader background{kBackgroundVertexSource, kBackgroundFragmentSource};
+  Shader field{kFieldVertexSource, lit(kPlainHead, kFieldFragmentSource).c_str()};
+  Shader scope_mask{kFieldVertexSource, kScopeMaskSource};
   GhostNet ghost_net;
-  VertexArray organ_array, tool_array, background_array;
+  VertexArray organ_array, tool_array, field_array;
   GLuint rest_buffer = 0, index_buffer = 0, noise = 0;
   Target sharp, plain;  // with and without samples
-  Target backdrop;      // the background alone, drawn when the size changes
+  Target backdrop;      // the field alone, drawn when the view changes
+  Matrix4 backdrop_view{};
+  std::array<Vec3f, 2> backdrop_organ;
+  Vec3f organ_centre, organ_size;  // of the field's cloth: as its shader says
   Size size;
   bool is_software = false;
   std::string renderer_name;
@@ -155,6 +164,7 @@ struct SceneRenderer::Parts {
   std::vector<Tint> tints;  // coarse vertices keep their fading state, the others follow
   std::size_t tinted = 0;   // coarse vertices from here on are new: they do not fade in
   std::vector<RestVertex> rest_vertices;
+  std::vector<float> rim_distances;
   std::vector<OrganVertex> vertices;
   std::array<float, kMaxTools> jaw_openings{};
 
@@ -164,7 +174,10 @@ struct SceneRenderer::Parts {
   void upload_organ(const SceneView& scene);
   void fade_tints(const SceneView& scene);
   void set_lights(const Shader& shader, const OrbitCamera& camera) const;
-  void draw_background();
+  void draw_field(const OrbitCamera& camera);
+  void draw_backdrop(const OrbitCamera& camera);
+  void draw_scope_mask();
+  void measure_organ(std::span<const Vec3f> rest_positions);
   void draw_organ(const SceneView& scene, const OrbitCamera& camera, const Shader& organ);
   void draw_tools(const SceneView& scene, const OrbitCamera& camera);
   void draw_tool(const SceneTool& shown, float seconds);
@@ -192,10 +205,11 @@ SceneRenderer::Parts::Parts(const GlContext& context)
   glVertexAttribPointer(1, 3, GL_FLOAT, GL_FALSE, kStride, offset(offsetof(OrganVertex, normal)));
   glVertexAttribPointer(2, 4, GL_UNSIGNED_BYTE, GL_TRUE, kStride,
                         offset(offsetof(OrganVertex, tint)));
+  glVertexAttribPointer(4, 4, GL_BYTE, GL_TRUE, kStride, offset(offsetof(OrganVertex, lip)));
   glGenBuffers(1, &rest_buffer);
   glBindBuffer(GL_ARRAY_BUFFER, rest_buffer);
   glVertexAttribPointer(3, 4, GL_FLOAT, GL_FALSE, sizeof(RestVertex), offset(0));
-  for (GLuint i = 0; i < 4; ++i) glEnableVertexAttribArray(i);
+  for (GLuint i = 0; i < 5; ++i) glEnableVertexAttribArray(i);
   glGenBuffers(1, &index_buffer);
   glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, index_buffer);
 
@@ -243,9 +257,13 @@ void SceneRenderer::Parts::load_topology(const SceneView& scene) {
   tinted = known;
   vertices.resize(surface.vertex_count());
   rest_vertices.resize(surface.vertex_count());
-  for (std::size_t i = 0; i < rest_vertices.size(); ++i)
-    rest_vertices[i] = {surface.positions()[i], static_cast<float>(surface.is_wound()[i]) -
-                                                    static_cast<float>(surface.is_rim()[i])};
+  surface.measure_rim(kDeepMetres, rim_distances);
+  for (std::size_t i = 0; i < rest_vertices.size(); ++i) {
+    const float inside = 1 + rim_distances[i] / kDeepMetres;
+    const float outside = std::min(rim_distances[i] / kSeamMetres, 1.0f) - 1;
+    rest_vertices[i] = {surface.positions()[i], surface.is_wound()[i] != 0 ? inside : outside};
+  }
+  measure_organ(scene.rest_positions);
   const auto bytes = [](std::size_t count, std::size_t each) {
     return static_cast<GLsizeiptr>(count * each);
   };
@@ -280,10 +298,13 @@ void SceneRenderer::Parts::upload_organ(const SceneView& scene) {
   };
   for (std::size_t i = 0; i < vertices.size(); ++i) {
     const Tint& t = tints[i];
+    const Vec3f lip = surface.lips()[i] * 127;
     const float whole = t.a > 1e-3f ? 1 / t.a : 0.0f;
     vertices[i] = {surface.positions()[i],
                    surface.normals()[i],
-                   {byte(t.r * whole), byte(t.g * whole), byte(t.b * whole), byte(t.a)}};
+                   {byte(t.r * whole), byte(t.g * whole), byte(t.b * whole), byte(t.a)},
+                   {static_cast<std::int8_t>(lip.x), static_cast<std::int8_t>(lip.y),
+                    static_cast<std::int8_t>(lip.z), 0}};
   }
   glBindBuffer(GL_ARRAY_BUFFER, organ_array.buffer);
   glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(vertices.size() * sizeof(OrganVertex)),
@@ -297,18 +318,24 @@ void SceneRenderer::Parts::set_lights(const Shader& shader, const OrbitCamera& c
   const auto direction = [&](float right, float up, float back) {
     return normalized(view.right * right + view.up * up - view.forward * back, Vec3f{0, 1, 0});
   };
-  shader.set("key_direction", direction(0.42f, 0.88f, 0.55f));
+  const bool is_scope = camera.lens() && camera.lens()->is_endoscope;
+  shader.set("key_direction",
+             is_scope ? direction(0.05f, 0.12f, 1) : direction(0.42f, 0.88f, 0.55f));
   shader.set("fill_direction", direction(-0.9f, 0.15f, 0.35f));
 }
 
 void SceneRenderer::Parts::draw_organ(const SceneView& scene, const OrbitCamera& camera,
                                       const Shader& organ) {
-  if (scene.topology_version != topology_version) load_topology(scene);
   if (scene.positions.empty() || scene.positions.size() != surface.coarse_vertex_count()) return;
   upload_organ(scene);
   organ.use();
   set_lights(organ, camera);
   organ.set("noise", 0);
+  const float middle = length(camera.centre() - camera.rays(size).eye);
+  if (camera.lens() && camera.lens()->is_endoscope)
+    organ.set("haze", kScopeClearMetres, kScopeHazePerMetre);
+  else
+    organ.set("haze", middle, kHazePerMiddle / middle);
   glActiveTexture(GL_TEXTURE0);
   glBindTexture(GL_TEXTURE_3D, noise);
   std::vector<float> tips, shafts;
@@ -419,12 +446,54 @@ SceneRenderer::SceneRenderer(const GlContext& context)
 
 SceneRenderer::~SceneRenderer() = default;
 
-void SceneRenderer::Parts::draw_background() {
-  if (backdrop.resize(size)) {
-    background.use();
-    glBindVertexArray(background_array.array);
-    glDrawArrays(GL_TRIANGLES, 0, 3);
+// The cloth lies where the organ was lowest before anybody touched it.
+void SceneRenderer::Parts::measure_organ(std::span<const Vec3f> rest_positions) {
+  if (rest_positions.empty()) return;
+  Vec3f low = rest_positions.front(), high = low;
+  for (const Vec3f& p : rest_positions) {
+    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
+    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
   }
+  const Vec3f centre = (low + high) * 0.5f, extent = high - low;
+  organ_centre = {centre.x, low.y - 0.1f * extent.y, centre.z};
+  organ_size = extent * 0.5f;
+}
+
+void SceneRenderer::Parts::draw_field(const OrbitCamera& camera) {
+  const device::ViewRays view = camera.rays(size);
+  field.use();
+  set_lights(field, camera);
+  field.set("forward", view.forward);
+  field.set("right", view.right * (view.tan_half_height * view.width / view.height));
+  field.set("up", view.up * view.tan_half_height);
+  field.set("organ_centre", organ_centre);
+  field.set("organ_size", organ_size);
+  glBindVertexArray(field_array.array);
+  glDrawArrays(GL_TRIANGLES, 0, 3);
+}
+
+void SceneRenderer::Parts::draw_scope_mask() {
+  scope_mask.use();
+  scope_mask.set("forward", Vec3f{});
+  scope_mask.set("right", Vec3f{1, 0, 0});
+  scope_mask.set("up", Vec3f{0, 1, 0});
+  scope_mask.set("aspect", static_cast<float>(size.width) / static_cast<float>(size.height));
+  glEnable(GL_BLEND);
+  glBlendFunc(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA);
+  glBindVertexArray(field_array.array);
+  glDrawArrays(GL_TRIANGLES, 0, 3);
+  glDisable(GL_BLEND);
+}
+
+void SceneRenderer::Parts::draw_backdrop(const OrbitCamera& camera) {
+  const Matrix4 view = camera.clip_from_world(size);
+  const bool is_new = backdrop.resize(size);
+  const std::array organ{organ_centre, organ_size};
+  if (!is_new && view == backdrop_view && backdrop_organ == organ) return;
+  backdrop_view = view;
+  backdrop_organ = organ;
+  glBindFramebuffer(GL_FRAMEBUFFER, backdrop.framebuffer);
+  draw_field(camera);
 }
 
 void SceneRenderer::draw(const SceneView& scene, const OrbitCamera& camera, Quality quality) {
@@ -436,16 +505,15 @@ void SceneRenderer::draw(const SceneView& scene, const OrbitCamera& camera, Qual
   glDisable(GL_SCISSOR_TEST);
   glDisable(GL_DEPTH_TEST);
   glViewport(0, 0, width, height);
+  if (scene.topology_version != parts.topology_version) parts.load_topology(scene);
   const bool is_sharp = quality == Quality::Best || !parts.is_software;
   Target& target = is_sharp ? parts.sharp : parts.plain;
   target.resize(parts.size);
   if (is_sharp) {
     glBindFramebuffer(GL_FRAMEBUFFER, target.framebuffer);
-    parts.background.use();
-    glBindVertexArray(parts.background_array.array);
-    glDrawArrays(GL_TRIANGLES, 0, 3);
+    parts.draw_field(camera);
   } else {
-    parts.draw_background();
+    parts.draw_backdrop(camera);
     blit(parts.backdrop.framebuffer, target.framebuffer, parts.size);
     glBindFramebuffer(GL_FRAMEBUFFER, target.framebuffer);
   }
@@ -458,6 +526,7 @@ void SceneRenderer::draw(const SceneView& scene, const OrbitCamera& camera, Qual
                          camera.clip_from_world(parts.size), camera.rays(parts.size).eye);
   parts.draw_tools(scene, camera);
   glDisable(GL_DEPTH_TEST);
+  if (camera.lens() && camera.lens()->is_endoscope) parts.draw_scope_mask();
   glBindVertexArray(0);
   blit(target.framebuffer, context_.framebuffer(), parts.size);
   glBindFramebuffer(GL_FRAMEBUFFER, context_.framebuffer());

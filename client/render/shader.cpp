@@ -49,6 +49,9 @@ void Shader::use() const {
 void Shader::set(const char* name, float value) const {
   glUniform1f(glGetUniformLocation(program_, name), value);
 }
+void Shader::set(const char* name, float x, float y) const {
+  glUniform2f(glGetUniformLocation(program_, name), x, y);
+}
 void Shader::set(const char* name, int value) const {
   glUniform1i(glGetUniformLocation(program_, name), value);
 }

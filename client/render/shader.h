@@ -19,6 +19,7 @@ class Shader {
   void use() const;
   void set(const char* name, float value) const;
   void set(const char* name, int value) const;
+  void set(const char* name, float x, float y) const;
   void set(const char* name, const Vec3f& value) const;
   void set(const char* name, const Matrix4& value) const;
   // The uniform is an array of vec4.

@@ -40,34 +40,36 @@ inline constexpr const char* kOrganVertexSource = R"(#version 330 core
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec3 normal;
 layout(location = 2) in vec4 overlay;
-layout(location = 3) in vec4 rest;  // w: 1 on faces that a blade made, -1 on their rim outside
+// w: outside 0, and -1 on the rim of a wound; inside 1 at the rim, 2 where the wound is deep.
+layout(location = 3) in vec4 rest;
+layout(location = 4) in vec3 lip;  // the normal of a rim, elsewhere as the other one
 uniform mat4 clip_from_world;
-out vec3 world_position, world_normal, rest_position;
-out float wound, seam;
+out vec3 world_position, world_normal, rest_position, lip_normal;
+out float rim;
 out vec4 tint;
 void main() {
   world_position = position;
   world_normal = normal;
   rest_position = rest.xyz;
-  wound = max(rest.w, 0.0);
-  seam = max(-rest.w, 0.0);
+  rim = rest.w;
+  lip_normal = lip;
   tint = overlay;
   gl_Position = clip_from_world * vec4(position, 1.0);
 }
 )";
 
 inline constexpr const char* kOrganFragmentSource = R"(
-in vec3 world_position, world_normal, rest_position;
-in float wound;  // 0 outside, 1 where a blade has opened it; no triangle has both
-in float seam;   // 1 outside on the rim of a wound, where blood seeps out
+in vec3 world_position, world_normal, rest_position, lip_normal;
+in float rim;
 in vec4 tint;
 out vec4 colour;
 uniform sampler3D noise;       // rgb: slope of the relief, a: its height
+uniform vec2 haze;             // from this distance on (m), so much per metre; 0: none
 uniform int shadow_count;
 uniform vec4 shadow_tip[8];    // xyz tip, w radius
 uniform vec4 shadow_shaft[8];  // xyz direction, w length
 
-// Light that a tool takes away at p: the key lamp's shadow, and (fine) a soft one where it touches.
+// Light that a tool takes away at p: the key lamp's shadow, and a soft one where it touches.
 float tool_shadow(vec3 p) {
   float light = 1.0;
   for (int i = 0; i < shadow_count; ++i) {
@@ -83,56 +85,88 @@ float tool_shadow(vec3 p) {
     float far = 1.0 / (1.0 + 5.0 * s);
     float inside = clamp(1.25 - dot(gap, gap) / (radius * radius * (1.6 + 90.0 * s)), 0.0, 1.0);
     light *= 1.0 - 0.66 * far * inside * inside;
-#ifdef FINE
-    float touch = length(w - a * clamp(wa, 0.0, shadow_shaft[i].w)) / radius;
-    light *= 0.62 + 0.38 * smoothstep(0.8, 2.6, touch);
-#endif
+    vec3 off = w - a * clamp(wa, 0.0, shadow_shaft[i].w);
+    float touch = clamp(1.0 - dot(off, off) / (7.0 * radius * radius), 0.0, 1.0);
+    light *= 1.0 - 0.42 * touch * touch;
   }
   return light;
 }
 
 void main() {
+  vec3 to_eye = eye - world_position;
+  float apart = length(to_eye);
+  vec3 view = to_eye / apart;
+  bool is_inside = rim > 0.5;
+  float depth = is_inside ? rim - 1.0 : 0.0;
+  float seam = is_inside ? 0.0 : -rim;
+  // How much of a lip this is: all of it at the rim, nothing a millimetre away.
+  float lip = is_inside ? 1.0 - min(depth * 18.0, 1.0) : max(seam * 3.5 - 2.5, 0.0);
 #ifdef FINE
-  vec4 coarse = texture(noise, rest_position * mix(11.0, 33.0, wound));
-  vec4 fine = texture(noise, rest_position * mix(58.0, 131.0, wound) + 0.37);
+  vec4 coarse = texture(noise, rest_position * (is_inside ? 27.0 : 11.0));
+  vec4 fine = texture(noise, rest_position * (is_inside ? 83.0 : 58.0) + 0.37);
 #else
-  vec4 coarse = texture(noise, rest_position * mix(24.0, 61.0, wound));
-  vec4 fine = mix(vec4(0.5), coarse, mix(0.3, 0.7, wound));
+  vec4 coarse = texture(noise, rest_position * (is_inside ? 47.0 : 24.0));
+  vec4 fine = mix(vec4(0.5), coarse, is_inside ? 0.7 : 0.3);
 #endif
-  vec3 n = normalize(world_normal);
-  n = normalize(n + mix(0.10, 0.24, wound) * (coarse.rgb + fine.rgb - 1.0));
-  vec3 view = normalize(eye - world_position);
+  vec3 n = normalize(mix(world_normal, lip_normal, lip * lip * (2.7 - 1.8 * lip)));
+  // A normal between two walls may lean away from this triangle: it is leant back.
+  vec3 face = cross(dFdx(world_position), dFdy(world_position));
+  face *= inversesqrt(max(dot(face, face), 1e-30)) * sign(dot(face, view));
+  n = normalize(n + face * max(0.2 - dot(n, face), 0.0));
+  // Relief that is smaller than a pixel would only glitter.
+  float relief = (is_inside ? 0.16 : 0.10) * min(1.0, 0.35 / apart);
+  n = normalize(n + relief * (coarse.rgb + fine.rgb - 1.0));
   float facing = max(dot(n, view), 0.0);
 
-  // Red-brown parenchyma, broad clouds with a fine grain under the capsule.
-  float mottle = clamp(0.70 * coarse.a + 0.30 * fine.a, 0.0, 1.0);
-  vec3 albedo = mix(vec3(0.068, 0.0115, 0.0090), vec3(0.138, 0.0245, 0.0165), mottle);
-  albedo *= 0.93 + 0.14 * fine.a;
-  // Inside no capsule: darker and of a purer red, grained by lobules, under a film of blood.
-  float grain = clamp(0.55 * abs(2.0 * coarse.a - 1.0) + 0.6 * fine.a, 0.0, 1.0);
-  albedo = mix(albedo, vec3(0.012, 0.0006, 0.0006), seam * seam * (0.65 + 0.35 * coarse.a));
-  albedo = mix(albedo, mix(vec3(0.026, 0.0012, 0.0013), vec3(0.080, 0.0052, 0.0042), grain), wound);
+  vec3 albedo;
+  float wet;
+  if (is_inside) {
+    // Parenchyma: brown-red lobules of about a millimetre, and paler lines between them. The
+    // deeper, the more blood stands on it.
+    float line = 1.0 - min(abs(2.0 * fine.a - 1.0) * 3.2, 1.0);
+    float grain = 0.65 * fine.a + 0.35 * coarse.a;
+    albedo = mix(vec3(0.055, 0.0062, 0.0050), vec3(0.150, 0.0260, 0.0190), grain);
+    albedo = mix(albedo, vec3(0.205, 0.062, 0.046), 0.42 * line * line);
+    albedo = mix(albedo, vec3(0.030, 0.0016, 0.0016), 0.75 * depth * (2.0 - depth));
+    wet = 0.45 + 0.35 * coarse.a;
+  } else {
+    // Red-brown parenchyma, broad clouds with a fine grain under the capsule.
+    float mottle = clamp(0.70 * coarse.a + 0.30 * fine.a, 0.0, 1.0);
+    albedo = mix(vec3(0.068, 0.0115, 0.0090), vec3(0.138, 0.0245, 0.0165), mottle);
+    albedo *= 0.93 + 0.14 * fine.a;
+    // At a wound's lip the capsule ends, and a thin line of blood seeps out.
+    float edge = seam * seam;
+    edge *= edge;
+    albedo = mix(albedo, vec3(0.040, 0.0022, 0.0020), edge * edge * (0.45 + 0.35 * coarse.a));
+    wet = 0.75 + 0.5 * coarse.a;
+  }
 
   float shade = tool_shadow(world_position);
+  // Little light comes down into a wound.
+  float open = 1.0 - 0.72 * depth * (2.0 - depth);
   // Light wraps around the edge of the shadow, red farthest: it has been under the surface.
   vec3 wrap = vec3(0.38, 0.14, 0.10);
-  vec3 key = clamp((vec3(dot(n, key_direction)) + wrap) / (1.0 + wrap), 0.0, 1.0) * shade;
-  vec3 fill = clamp((vec3(dot(n, fill_direction)) + wrap) / (1.0 + wrap), 0.0, 1.0);
-  vec3 lit = albedo * (key_colour * key * key + fill_colour * fill + hemisphere(n) * (0.6 + 0.4 * shade));
-  lit += vec3(0.050, 0.007, 0.005) * (1.0 - wound) * (1.0 - facing) * (1.0 - facing) * shade;  // thin at the rim
+  vec3 key = clamp((vec3(dot(n, key_direction)) + wrap) / (1.0 + wrap), 0.0, 1.0) * shade * open;
+  vec3 fill = clamp((vec3(dot(n, fill_direction)) + wrap) / (1.0 + wrap), 0.0, 1.0) * open;
+  vec3 sky = hemisphere(n) * ((0.6 + 0.4 * shade) * open);
+  vec3 lit = albedo * (key_colour * key * key + fill_colour * fill + sky);
+  if (!is_inside) lit += vec3(0.050, 0.007, 0.005) * (1.0 - facing) * (1.0 - facing) * shade;  // thin at the rim
 
   float fresnel = 0.035 + 0.965 * power5(1.0 - facing);
-  // Outside a film with broad highlights, inside many small glints of blood.
-  float wet = mix(0.75 + 0.5 * coarse.a, 0.25 + 1.1 * coarse.a * fine.a, wound);
-  vec2 key_film = highlights(n, view, key_direction);
-  vec3 film = key_colour * shade * (0.80 * key_film.y + 0.038 * key_film.x) * wet;
-  film += fill_colour * (0.26 * highlights(n, view, fill_direction).y + 0.06 * highlights(n, view, fill_direction).x) * wet;
-  film += hemisphere(reflect(-view, n)) * fresnel * 0.55 * (0.5 + 0.5 * shade);
+  vec2 key_film = highlights(n, view, key_direction), fill_film = highlights(n, view, fill_direction);
+  // Inside, the film is broken by the grain: it shines broadly, without a sharp glint.
+  vec2 share = is_inside ? vec2(0.034, 0.05) : vec2(0.038, 0.62);
+  vec3 film = key_colour * (shade * open * (share.y * key_film.y + share.x * key_film.x) * wet);
+  film *= 1.0 - 0.8 * lip;
+  film += fill_colour * ((0.26 * fill_film.y + 0.06 * fill_film.x) * wet * open);
+  film += hemisphere(reflect(-view, n)) * (fresnel * (is_inside ? 0.22 : 0.55) * (0.5 + 0.5 * shade) * open);
 
   // The overlay glows through: tissue darkens and takes the region's colour, the film stays.
   lit = mix(lit, lit * 0.35 + tint.rgb * (0.035 + 0.11 * key.g + 0.07 * fill.g), tint.a);
   lit += tint.rgb * 0.13 * smoothstep(0.55, 0.9, tint.a);  // what is held firmly shines by itself
-  colour = encode(lit + film);
+  // Haze lies over what is farther away.
+  float far = clamp((apart - haze.x) * haze.y, 0.0, 0.6);
+  colour = encode(mix(lit + film, vec3(0.020, 0.030, 0.036), far));
 }
 )";
 
@@ -201,27 +235,6 @@ void main() {
   vec3 same = vec3(0.35, 0.80, 1.0), apart = vec3(1.0, 0.85, 0.25), far = vec3(1.0, 0.25, 0.45);
   vec3 c = mix(same, apart, clamp(distance_mm / 0.25, 0.0, 1.0));
   colour = vec4(mix(c, far, clamp((distance_mm - 0.25) / 0.75, 0.0, 1.0)), strength);
-}
-)";
-
-inline constexpr const char* kBackgroundVertexSource = R"(#version 330 core
-out vec2 at;
-void main() {
-  at = vec2((gl_VertexID << 1) & 2, gl_VertexID & 2);
-  gl_Position = vec4(at * 2.0 - 1.0, 1.0, 1.0);
-}
-)";
-
-inline constexpr const char* kBackgroundFragmentSource = R"(#version 330 core
-in vec2 at;
-out vec4 colour;
-void main() {
-  vec2 q = (at - vec2(0.5, 0.56)) * vec2(1.15, 1.0);
-  float centre = 1.0 - smoothstep(0.05, 0.85, length(q));
-  vec3 c = mix(vec3(0.043, 0.055, 0.070), vec3(0.150, 0.195, 0.232), centre * centre);
-  // One step of dither, so that the slow gradient shows no bands.
-  float grain = fract(sin(dot(gl_FragCoord.xy, vec2(12.9898, 78.233))) * 43758.5453) - 0.5;
-  colour = vec4(c + grain / 255.0, 1.0);
 }
 )";
 

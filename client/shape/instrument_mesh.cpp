@@ -118,6 +118,20 @@ InstrumentMesh make_hook(const tool::ToolShape& shape, Colour colour) {
   return mesh;
 }
 
+// A tube with glass in its end, around it the ring that the light comes from.
+InstrumentMesh make_endoscope(const tool::ToolShape& shape, Colour colour) {
+  const float r = shape.radius_m;
+  constexpr Material kGlass = {18, 22, 40, 120}, kLight = {250, 246, 224, 0};
+  const ProfilePoint front[] = {{-r, 0, kGlass},         {-r, 0.55f * r, kGlass},
+                                {-r, 0.55f * r, kLight}, {-r, 0.85f * r, kLight},
+                                {-r, 0.85f * r, kSteel}, {-0.9f * r, r, kSteel},
+                                {0.5f * r, r, kSteel}};
+  InstrumentMesh mesh;
+  revolve(front, 24, 0, 2 * kPi, mesh.body);
+  add_shaft(shape, 0.4f * r, r, colour, mesh.body);
+  return mesh;
+}
+
 }  // namespace
 
 InstrumentMesh make_instrument(const tool::ToolShape& shape, Colour colour) {
@@ -130,6 +144,9 @@ InstrumentMesh make_instrument(const tool::ToolShape& shape, Colour colour) {
       return make_scalpel(shape, colour);
     case tool::Form::Hook:
       return make_hook(shape, colour);
+    case tool::Form::Endoscope:
+    case tool::Form::Endoscope30:
+      return make_endoscope(shape, colour);
     default:
       break;
   }

@@ -5,9 +5,14 @@
 // (curved PN triangles, Vlachos et al. 2001, evaluated at edge midpoints). The vertices that the
 // server sent stay exactly where they are; only what lies between them is drawn rounder.
 //
-// Wound faces are smooth among each other and meet the outside at a sharp rim: a vertex of both is
-// drawn twice, with a normal for either side. Along the rim the outside decides where midpoints
-// lie, the wound takes them over, so that there is no crack.
+// Wound faces are smooth among each other and meet the outside at a rim: a vertex of both is drawn
+// twice, with a normal for either side. At the rim itself light sees a round lip, for which both
+// copies have one normal more, between the two. Walls of a wound are cut through tets and rough, so
+// their normals are averages over more triangles.
+//
+// The rim is a curve: a midpoint on it lies on the cubic through its four neighbours along the rim
+// (Dyn, Levin and Gregory 1987), as far as the rim goes on there without a corner. The outside
+// decides where it lies and the wound takes it over, so that there is no crack.
 //
 //   vertices: [coarse, as given][rim vertices again, for the wound][midpoints, level by level]
 //
@@ -48,8 +53,13 @@ class SmoothSurface {
 
   // Fills positions() and normals() from the coarse positions.
   void update(std::span<const Vec3f> coarse_positions);
+  // Per vertex: how far the nearest rim is in the positions of the last update, m, at most
+  // `most_m`; measured along the side of the rim that the vertex is on.
+  void measure_rim(float most_m, std::vector<float>& distances) const;
   const std::vector<Vec3f>& positions() const { return positions_; }
   const std::vector<Vec3f>& normals() const { return normals_; }
+  // Those of lips where a vertex is on a rim, elsewhere normals().
+  const std::vector<Vec3f>& lips() const { return lips_; }
 
   // Extends per-vertex values to rim and midpoints, these by averaging; `values` has vertex_count()
   // entries of which the coarse ones are set.
@@ -66,6 +76,10 @@ class SmoothSurface {
   struct Midpoint {
     std::uint32_t a = 0, b = 0;     // parents
     std::uint32_t same_as = kNone;  // on the rim: the outside's midpoint
+  };
+  // The rim goes on to `before` beyond a, to `after` beyond b; kNone: it ends, or there is a fork.
+  struct RimMidpoint {
+    std::uint32_t vertex = 0, a = 0, b = 0, before = kNone, after = kNone;
   };
   // Edges to midpoints, open addressing.
   class EdgeTable {
@@ -87,6 +101,13 @@ class SmoothSurface {
   void split_rim(std::span<const TriangleCorners> triangles,
                  std::span<const std::uint8_t> is_wound);
   void halve_edges();
+  void follow_rim(std::size_t first_midpoint);
+  void compute_coarse_normals();
+  void average_walls();
+  std::span<const TriangleCorners> walls() const {
+    return std::span(coarse_triangles_).subspan(first_wound_triangle_);
+  }
+  Vec3f rim_position(const RimMidpoint& m) const;
   std::uint32_t midpoint(std::uint32_t a, std::uint32_t b);
 
   std::size_t coarse_vertex_count_ = 0;
@@ -95,9 +116,14 @@ class SmoothSurface {
   std::vector<std::uint32_t> wound_of_;  // per coarse vertex: as which it is drawn on wound faces
   std::vector<std::uint32_t> outer_of_;  // per vertex: its place on the outside, kNone: not there
   std::vector<Midpoint> midpoints_;      // level by level
+  std::vector<RimMidpoint> rim_midpoints_;  // of the outside, in the order of midpoints_
+  std::vector<std::array<std::uint32_t, 2>> along_rim_;  // per vertex of the outside, while built
+  std::size_t first_wound_triangle_ = 0;                 // of the coarse ones
   std::vector<std::uint8_t> vertex_is_wound_, is_rim_;
   EdgeTable edges_;
-  std::vector<Vec3f> positions_, normals_;
+  std::vector<Vec3f> positions_, normals_, lips_;
+  std::vector<Vec3f> bends_;   // normals that midpoints bulge by
+  std::vector<Vec3f> spread_;  // averages of the wound's normals
 };
 
 }  // namespace trocar::shape

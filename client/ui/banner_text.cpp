@@ -42,6 +42,7 @@ std::vector<Banner> banners_of(const HudModel& model) {
                              "disk, and to start the session again."
                            : "The lesson goes on. Tell the host that the disk is too slow.",
                        RateTone::Warning});
+  if (!model.lent_text.empty()) banners.push_back({model.lent_text, "", RateTone::Calm});
   if (!model.view_text.empty()) banners.push_back({model.view_text, "", RateTone::Calm});
   if (banners.size() > kMostBanners) banners.resize(kMostBanners);
   return banners;

@@ -102,8 +102,9 @@ Hud::~Hud() {
 }
 
 void Hud::need_letters(const HudModel& model) {
-  for (const std::string* text : {&model.title, &model.organ, &model.own_role, &model.status,
-                                  &model.recording_text, &model.frozen_text, &model.view_text})
+  for (const std::string* text :
+       {&model.title, &model.organ, &model.own_role, &model.status, &model.recording_text,
+        &model.frozen_text, &model.view_text, &model.lent_text})
     fonts_->need(*text);
   for (const HudParticipant& participant : model.participants) fonts_->need(participant.name);
   for (const HudMessage& message : model.messages) fonts_->need(message.text);
@@ -209,6 +210,9 @@ HudActions Hud::draw(const HudModel& model) {
   for (std::size_t i = 0;
        model.tray.hands > 0 && i < std::min<std::size_t>(model.tray.names.size(), 9); ++i)
     if (pressed(GLFW_KEY_1 + static_cast<int>(i))) actions.take_instrument = i;
+  if (model.tray.hands > 0 && model.tray.names.size() > 9 && pressed(GLFW_KEY_0))
+    actions.take_instrument = 9;
+  actions.next_lent_view = model.can_lend_view && pressed(GLFW_KEY_T);
   actions.toggle_follow = !model.view_text.empty() && pressed(GLFW_KEY_V);
   actions.set_mark = model.can_mark && pressed(GLFW_KEY_M);
   actions.return_to_mark = model.can_mark && pressed(GLFW_KEY_BACKSPACE);

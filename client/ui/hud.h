@@ -123,6 +123,8 @@ struct HudModel {
   bool has_recording_ended = false;     // while the session goes on
   std::string frozen_text;              // empty: one's own tools follow one's hands
   std::string view_text;                // empty: there is no view to follow
+  std::string lent_text;                // empty: one sees with one's own eyes
+  bool can_lend_view = false;           // there is a tool to see with
   std::string ghost_text;               // empty: it is not to be shown
   std::vector<HudOwnForce> own_forces;  // of a live session
   float own_peak_n = 0;                 // of all of them together, in the last seconds
@@ -139,6 +141,7 @@ struct HudActions {
   bool toggle_rate = false, toggle_ghost = false, reset_camera = false, screenshot = false;
   bool toggle_play = false, pause = false;
   bool set_mark = false, return_to_mark = false, toggle_follow = false;
+  bool next_lent_view = false;
   bool switch_hand = false;
   bool answer = false, next_stage = false, restart_lesson = false;
   std::optional<std::size_t> take_instrument;

@@ -218,7 +218,7 @@ void draw_help(const HudModel& model, float scale) {
   if (ImGui::BeginTable("keys", 2, ImGuiTableFlags_SizingFixedFit)) {
     if (model.has_own_tool) {
       help_row("move", "the tip follows the pointer, just above the tissue");
-      help_row("1 to 9", "take another instrument");
+      help_row("1 to 9, 0", "take another instrument");
       help_row("left button", "use it: a grasper holds, an edge cuts, others push");
       help_row("F, Space, X", "push, grasp, cut, where the instrument can");
       help_row("Q, E", "turn it about its shaft");
@@ -229,6 +229,9 @@ void draw_help(const HudModel& model, float scale) {
       help_row("M", "mark the organ as it is");
       help_row("Backspace", "return it to the mark, for everybody");
     }
+    if (model.can_lend_view)
+      help_row("T",
+               model.timeline ? "see with the next tool" : "see through an endoscope, or the next");
     if (!model.view_text.empty()) help_row("V", "follow the view that was given, or do not");
     if (model.timeline) {
       help_row("Space", "play or pause");

@@ -22,8 +22,13 @@ enum class Form : std::uint8_t {
   Scalpel = 4,
   Hook = 5,  // an energised edge from the tip along the tool's y
   Spatula = 6,
+  Endoscope = 7,    // looks along its shaft
+  Endoscope30 = 8,  // looks 30 degrees from it, towards the tool's y
 };
-inline constexpr int kFormCount = 7;
+inline constexpr int kFormCount = 9;
+inline constexpr bool is_endoscope(Form form) {
+  return form == Form::Endoscope || form == Form::Endoscope30;
+}
 const char* name_of(Form form);
 
 // A capsule: tip at the tool frame's origin, shaft along +z. With a half width it is a flat blade

@@ -301,6 +301,27 @@ TEST_F(MouseToolTest, NeverLeavesTheSpaceThatTheServerAccepts) {
   }
 }
 
+// The handle goes where the mouse goes, the tip the other way, and the shaft passes the port.
+TEST_F(MouseToolTest, AnEndoscopeThatIsSteeredPivotsAtItsPort) {
+  tool_.take({.radius_m = 0.005f, .form = tool::Form::Endoscope});
+  update();
+  const auto view = camera_.rays(size_);
+  const auto tip = [&] { return tool_.current().world_from_tool.position; };
+  const auto back = [&] { return rotate(tool_.current().world_from_tool.orientation, {0, 0, 1}); };
+  const Vec3f before = tip(), port = before + back() * 0.14f;
+  input_.dx = 40;
+  tool_.steer(input_, view, 0.016f);
+  EXPECT_LT(dot(tip() - before, view.right), -0.002f);
+  EXPECT_LT(length(tip() + back() * length(port - tip()) - port), 1e-4f);
+  EXPECT_NEAR(length(port - tip()), 0.14f, 1e-4f);
+  input_.dx = 0, input_.wheel = 2;
+  tool_.steer(input_, view, 0.016f);
+  EXPECT_GT(length(port - tip()), 0.141f);
+  input_.wheel = 1000;
+  tool_.steer(input_, view, 0.016f);
+  EXPECT_LT(length(port - tip()), tool_.shape().length_m);
+}
+
 TEST(SmoothSurface, KeepsTheServersVerticesAndRoundsWhatLiesBetween) {
   const Blob blob;
   shape::SmoothSurface surface;
@@ -317,8 +338,8 @@ TEST(SmoothSurface, KeepsTheServersVerticesAndRoundsWhatLiesBetween) {
 }
 
 // Drawn finely, a surface with slits is as closed as it came: along the rim both sides have the
-// same points, with normals of their own.
-TEST(SmoothSurface, TheRimOfAWoundIsSharpAndHasNoCrack) {
+// same points, and one normal, so that the lip looks round.
+TEST(SmoothSurface, TheRimOfAWoundIsARoundLipAndHasNoCrack) {
   auto layout = testing::make_blob_layout(16, 24, 0.08);
   testing::Random random(2);
   for (int i = 0; i < 25; ++i)
@@ -357,14 +378,49 @@ TEST(SmoothSurface, TheRimOfAWoundIsSharpAndHasNoCrack) {
     }
     for (const auto& [ends, sum] : edges) ASSERT_EQ(sum, 0) << "a crack, budget " << budget;
     std::map<std::array<float, 3>, std::uint32_t> outer;
-    int sharp = 0;
+    int round = 0;
     for (std::uint32_t v = 0; v < surface.vertex_count(); ++v)
       if (surface.is_wound()[v] == 0) outer.emplace(point(v), v);
     for (std::uint32_t v = 0; v < surface.vertex_count(); ++v)
       if (const auto rim = outer.find(point(v)); surface.is_wound()[v] != 0 && rim != outer.end())
-        sharp += dot(surface.normals()[v], surface.normals()[rim->second]) < 0.8f;
-    EXPECT_GT(sharp, 40);
+        round += dot(surface.lips()[v], surface.lips()[rim->second]) > 0.999f;
+    EXPECT_GT(round, 40);
   }
+}
+
+TEST(SmoothSurface, DistancesFromARimGrowAwayFromItOnBothSides) {
+  auto layout = testing::make_blob_layout(16, 24, 0.08);
+  testing::Random random(3);
+  ASSERT_TRUE(wire::apply(testing::random_change(layout, random), layout).ok());
+  std::vector<Vec3f> positions;
+  for (const auto& q : layout.rest_quanta) positions.push_back(wire::to_metres(q));
+  std::vector<shape::TriangleCorners> triangles(layout.triangles.size());
+  for (std::size_t i = 0; i < triangles.size(); ++i)
+    for (std::size_t k = 0; k < 3 && layout.has_triangle(TriangleIndex(i)); ++k)
+      triangles[i][k] = layout.triangles[i][k].value;
+  shape::SmoothSurface surface;
+  surface.build(positions.size(), triangles, layout.is_wound, 4 * triangles.size());
+  surface.update(positions);
+  constexpr float kMost = 0.03f;
+  std::vector<float> distances;
+  surface.measure_rim(kMost, distances);
+  ASSERT_EQ(distances.size(), surface.vertex_count());
+  std::vector<Vec3f> rim;
+  for (std::size_t v = 0; v < distances.size(); ++v) {
+    if (surface.is_rim()[v] == 0) continue;
+    EXPECT_EQ(distances[v], 0);
+    rim.push_back(surface.positions()[v]);
+  }
+  ASSERT_FALSE(rim.empty());
+  std::size_t near = 0;
+  for (std::size_t v = 0; v < distances.size(); ++v) {
+    float least = kMost;
+    for (const Vec3f& p : rim) least = std::min(least, length(surface.positions()[v] - p));
+    EXPECT_GE(distances[v], least - 1e-6f);
+    EXPECT_LE(distances[v], std::min(kMost, 1.5f * least + 1e-6f));
+    near += distances[v] < kMost;
+  }
+  EXPECT_GT(near, rim.size());
 }
 
 TEST(SmoothSurface, MidpointsOfASphereLieNearerToItThanChords) {

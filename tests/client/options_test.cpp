@@ -90,6 +90,8 @@ TEST(ClientOptions, EachWrongValueIsAUsageErrorThatNamesTheOption) {
       {{"--screenshot-at", "-3"}, "--screenshot-at"},
       {{"--role", "observer", "--script", "x.toml"}, "--script"},
       {{"--replay", "x.mcap", "--script", "x.toml"}, "--replay"},
+      {{"--pictures", "out"}, "--replay"},
+      {{"--replay", "x.mcap", "--pictures", "out", "--rate", "0"}, "--rate"},
       {{"--no-render", "--screenshot", "x.png"}, "--screenshot"},
       {{"--show", "regions,shadows"}, "--show"},
       {{"--show", "nothing,arrows"}, "--show"},
