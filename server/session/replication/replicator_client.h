@@ -13,6 +13,7 @@ struct Replicator::Client {
   Client(net::Connections& connections, net::ConnectionId its_id, const ReplicatorOptions& options,
          ReplicatorCounters& counters)
       : id(its_id),
+        carrier(connections.carrier_of(its_id)),
         feed(connections, its_id, options, counters),
         messages(options.max_messages_per_second, options.clock_ns()),
         bytes(options.max_bytes_per_second, options.clock_ns()),
@@ -21,8 +22,13 @@ struct Replicator::Client {
         strokes(10, options.clock_ns()),
         changes(5, options.clock_ns()) {}
 
+  // True for who is told what everybody is told, and given frames.
+  bool listens() const { return is_carrier || (participant && carrier == 0); }
+
   const net::ConnectionId id;
-  access::Applicant applicant;                           // with the name of its Hello
+  const net::ConnectionId carrier;  // of a guest (replicator_guests.cpp), else 0
+  bool is_carrier = false;          // it has carried a guest who was welcome
+  access::Applicant applicant;      // with the name of its Hello
   std::optional<participants::Participant> participant;  // set by Hello
   bool is_welcome = false;
   FrameFeed feed;
