@@ -191,6 +191,61 @@ TEST_F(Guests, a_lost_connection_keeps_the_places_of_all) {
   EXPECT_TRUE(inner.has_welcome());
 }
 
+TEST_F(Guests, too_many_in_a_second_end_the_connection) {
+  ASSERT_TRUE(join(1, "Ann"));
+  Envelope ping;
+  ping.mutable_ping();
+  for (std::uint32_t guest = 2; guest < 3000; ++guest)
+    if (!carrier_.send(wrap(guest, ping))) break;
+  EXPECT_TRUE(carrier_.reads_to_end());
+}
+
+// Takes what is sent, and remembers the last.
+struct Carriers final : net::Connections {
+  bool send(net::ConnectionId, wire::SharedBytes frame) override {
+    last = std::move(frame);
+    return true;
+  }
+  bool has_datagrams(net::ConnectionId) const override { return false; }
+  bool send_datagram(net::ConnectionId, BytesView) override { return false; }
+  std::size_t outstanding_bytes(net::ConnectionId) const override { return 0; }
+  std::string peer_address(net::ConnectionId) const override { return {}; }
+  void close_after_flush(net::ConnectionId, wire::SharedBytes) override {}
+  void close(net::ConnectionId) override {}
+
+  wire::SharedBytes last;
+};
+
+struct Above final : net::ConnectionHandler {
+  void on_open(net::ConnectionId) override { ++opened; }
+  void on_message(net::ConnectionId, BytesView) override {}
+  void on_datagram(net::ConnectionId, BytesView) override {}
+  void on_fault(net::ConnectionId, net::ConnectionFault) override {}
+  void on_close(net::ConnectionId) override { ++closed; }
+
+  std::size_t opened = 0, closed = 0;
+};
+
+TEST(GuestConnections, carry_256_and_refuse_one_more) {
+  Carriers carriers;
+  Above above;
+  guests::GuestConnections connections(carriers);
+  connections.set_handler(above);
+  for (std::uint32_t guest = 1; guest <= guests::GuestConnections::kMostGuests + 1; ++guest) {
+    const auto text = wrap(guest, make_hello("Ann", proto::ROLE_OBSERVER)).SerializeAsString();
+    connections.on_message(7, bytes_of(std::string_view(text)));
+  }
+  EXPECT_EQ(above.opened, guests::GuestConnections::kMostGuests);
+  ASSERT_TRUE(carriers.last);
+  Envelope answer, inner;
+  ASSERT_TRUE(
+      wire::decode_envelope(BytesView(*carriers.last).subspan(wire::kHeaderBytes), answer).ok());
+  ASSERT_TRUE(inner.ParseFromString(answer.guest_message().envelope()));
+  EXPECT_EQ(inner.goodbye().reason(), proto::GOODBYE_FULL);
+  connections.on_close(7);
+  EXPECT_EQ(above.closed, guests::GuestConnections::kMostGuests + 1) << "the carrier's, too";
+}
+
 TEST_F(Guests, each_answers_for_the_last_frame) {
   session_.publish(10);
   ASSERT_TRUE(join(1, "Ann"));

@@ -2,7 +2,7 @@
 
 // One connection as the replicator knows it. Only the replicator's own sources include this.
 
-#include "server/session/replication/allowance.h"
+#include "server/session/pacing/allowance.h"
 #include "server/session/replication/frame_feed.h"
 #include "server/session/replication/replicator.h"
 
@@ -37,7 +37,7 @@ struct Replicator::Client {
   std::uint64_t pointed_ns = 0;  // when it pointed last; 0: it does not
   std::uint64_t viewed_ns = 0;   // when it said last where its view is
   std::array<std::optional<std::uint32_t>, kToolsPerHand> last_sequence;
-  Allowance messages, bytes, hand_moments, sayings, strokes, changes;  // that it may send
+  pacing::Allowance messages, bytes, hand_moments, sayings, strokes, changes;  // that it may send
 };
 
 }  // namespace trocar::replication

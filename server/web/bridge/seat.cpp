@@ -19,6 +19,7 @@ constexpr std::chrono::seconds kWelcomeDeadline{5};
 // While a frame is held back, so often it is seen whether it may go.
 constexpr std::chrono::milliseconds kPaceInterval{10};
 constexpr int kTries = 2;
+constexpr double kMostMessagesPerSecond = 300;  // a page acknowledges 63 frames a second
 
 }  // namespace
 
@@ -26,6 +27,7 @@ Seat::Seat(BrowserSocket& browser, Bridge& bridge, const JoinRequest& request)
     : browser_(browser),
       bridge_(bridge),
       request_(request),
+      messages_(kMostMessagesPerSecond, monotonic_ns()),
       news_(browser.executor()),
       up_ended_(browser.executor(), asio::steady_timer::time_point::max()) {}
 
@@ -280,6 +282,10 @@ asio::awaitable<void> Seat::read_up() {
     if (message.kind != Kind::Binary) break;
     ++bridge_.counters.messages_up;
     bridge_.counters.bytes_up += message.bytes.size();
+    if (!messages_.take(1, monotonic_ns())) {
+      why_ = "its page said too much in a second";
+      break;
+    }
     const auto verdict = heed(message.bytes);
     if (verdict == Verdict::Forbidden) {
       why_ = "its page said something that a page may not say";

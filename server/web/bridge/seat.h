@@ -5,9 +5,11 @@
 //
 // To the browser: what he is told, in order, then the newest frame, as a difference from the last
 // that this browser was given. Frames never queue: while the socket is busy, or the browser's
-// acknowledgements say that frames reach it late, they are skipped, for this one alone. Bounds:
-// 1 MiB of messages that cannot be skipped (one that is larger alone); beyond that the connection
-// is cut, and the page comes back to a fresh picture. Thread: that of the browser's executor.
+// acknowledgements say that frames reach it late, they are skipped, for this one alone.
+//
+// Bounds: 1 MiB of messages that cannot be skipped (one that is larger alone); beyond that the
+// connection is cut, and the page comes back to a fresh picture. The browser may send 300 messages
+// a second. Thread: that of the browser's executor.
 
 #include "common/base/asio.h"  // before Boost: see there
 
@@ -18,6 +20,7 @@
 #include <optional>
 #include <string>
 
+#include "server/session/pacing/allowance.h"
 #include "server/session/pacing/frame_pacer.h"
 #include "server/web/bridge/bridge.h"
 #include "server/web/bridge/browser_socket.h"
@@ -80,6 +83,7 @@ class Seat : public std::enable_shared_from_this<Seat> {
   wire::SharedBytes barrier_;
   std::uint64_t keyframe_ns_ = 0;
   pacing::FramePacer pacer_;
+  pacing::Allowance messages_;  // that the browser may send
   asio::steady_timer news_, up_ended_;
   std::string why_;
 };
