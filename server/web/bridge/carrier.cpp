@@ -8,6 +8,7 @@
 #include "common/base/printable.h"
 #include "common/base/timing.h"
 #include "proto/wire.pb.h"
+#include "server/web/bridge/page_messages.h"
 #include "server/web/bridge/seat.h"
 
 namespace trocar::bridge {
@@ -164,14 +165,27 @@ bool Carrier::take(const Bytes& body) {
                   message.pong().server_time_us());
       return true;
     case proto::Envelope::kGoodbye:
-      why_ = message.goodbye().text();
-      log::warn("the session at {} has ended: {}", session_.name, printable(why_, 200));
-      for (const auto& [number, seat] : seats_) seat->take(body, true);
+      say_goodbye(message.goodbye());
       return false;
     default:
       if (!std::exchange(is_carrying_, true)) next_ping_.cancel();
       return spread(message, framed(body));
   }
+}
+
+// What ends this connection alone, the pages survive: they come back over the next one.
+void Carrier::say_goodbye(const proto::Goodbye& goodbye) {
+  const bool is_old = !is_carrying_ && goodbye.reason() == proto::GOODBYE_PROTOCOL_ERROR;
+  why_ =
+      is_old ? "the server is older than this page: use the same release for both" : goodbye.text();
+  log::warn("the session at {} ends the connection: {}", session_.name, printable(why_, 200));
+  const bool is_lost = goodbye.reason() == proto::GOODBYE_TOO_SLOW ||
+                       goodbye.reason() == proto::GOODBYE_TIMEOUT ||
+                       goodbye.reason() == proto::GOODBYE_PROTOCOL_ERROR;
+  if (is_lost && !is_old) return;
+  const auto words = encode_goodbye(goodbye.reason(), why_);
+  for (const auto& [number, seat] : seats_)
+    seat->take(BytesView(*words).subspan(wire::kHeaderBytes), true);
 }
 
 bool Carrier::spread(const proto::Envelope& message, const wire::SharedBytes& bytes) {

@@ -32,7 +32,8 @@
 
 namespace trocar::proto {
 class Envelope;
-}
+class Goodbye;
+}  // namespace trocar::proto
 
 namespace trocar::bridge {
 
@@ -69,6 +70,7 @@ class Carrier : public std::enable_shared_from_this<Carrier> {
   asio::awaitable<void> write_all();
   asio::awaitable<void> ping_often();
   bool take(const Bytes& body);
+  void say_goodbye(const proto::Goodbye& goodbye);
   bool spread(const proto::Envelope& message, const wire::SharedBytes& framed);
   void queue(const proto::Envelope& message);
   void end();

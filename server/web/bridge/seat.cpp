@@ -11,7 +11,7 @@
 namespace trocar::bridge {
 namespace {
 
-constexpr std::size_t kMostWaitingBytes = 1024 * 1024;
+constexpr std::size_t kSurfacesWaiting = 4;  // as many fit, however large the organ is
 constexpr std::size_t kMuchWaitingBytes =
     64 * 1024;  // then what the next one makes stale is left out
 constexpr std::uint64_t kKeyframeGapNs = 250'000'000;
@@ -122,7 +122,7 @@ void Seat::refuse(int reason, const std::string& text) {
 }
 
 void Seat::tell(const wire::SharedBytes& framed) {
-  if (!waiting_.empty() && waiting_bytes_ + framed->size() > kMostWaitingBytes) {
+  if (!waiting_.empty() && waiting_bytes_ + framed->size() > most_waiting_) {
     why_ = "what cannot be skipped has piled up";
     browser_.cut();
     return cut();
@@ -153,6 +153,7 @@ void Seat::take(BytesView envelope, bool is_last) {
 }
 
 void Seat::hear(News news, const wire::SharedBytes& framed) {
+  if (news == News::LastFrame) barrier_ = framed;
   if (!has_begun_) return wake();  // all of it comes at once
   switch (news) {
     case News::NewSurface:
@@ -164,8 +165,6 @@ void Seat::hear(News news, const wire::SharedBytes& framed) {
       if (waiting_bytes_ < kMuchWaitingBytes) tell(framed);
       return;
     case News::LastFrame:
-      barrier_ = framed;
-      return wake();
     case News::Frame:
     case News::Nothing:
       return wake();
@@ -180,7 +179,9 @@ void Seat::lose() {
 void Seat::begin() {
   has_begun_ = true;
   given_.reset();
-  for (const auto& message : carrier_->copy().all_but_frames()) tell(message);
+  auto& copy = carrier_->copy();
+  most_waiting_ = std::max(kMostWaitingBytes, kSurfacesWaiting * copy.topology()->size());
+  for (const auto& message : copy.all_but_frames()) tell(message);
 }
 
 wire::SharedBytes Seat::next_message() {

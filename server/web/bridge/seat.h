@@ -7,7 +7,7 @@
 // that this browser was given. Frames never queue: while the socket is busy, or the browser's
 // acknowledgements say that frames reach it late, they are skipped, for this one alone.
 //
-// Bounds: 1 MiB of messages that cannot be skipped (one that is larger alone); beyond that the
+// Bounds: 1 MiB of messages that cannot be skipped, or four whole surfaces; beyond that the
 // connection is cut, and the page comes back to a fresh picture. The browser may send 300 messages
 // a second. Thread: that of the browser's executor.
 
@@ -51,6 +51,7 @@ class Seat : public std::enable_shared_from_this<Seat> {
 
  private:
   static constexpr std::uint32_t kNoSlot = ~0u;
+  static constexpr std::size_t kMostWaitingBytes = 1024 * 1024;
 
   asio::awaitable<bool> join(const SessionAddress& session);
   asio::awaitable<bool> say_hello();
@@ -77,7 +78,7 @@ class Seat : public std::enable_shared_from_this<Seat> {
   bool is_last_ = false;  // nothing is to follow what waits
   bool is_lost_ = false, is_cut_ = false, is_up_running_ = false;
   std::deque<wire::SharedBytes> waiting_;
-  std::size_t waiting_bytes_ = 0;
+  std::size_t waiting_bytes_ = 0, most_waiting_ = kMostWaitingBytes;
   std::optional<Frame> given_;
   bool is_state_told_ = true;
   wire::SharedBytes barrier_;
