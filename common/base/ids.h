@@ -10,7 +10,7 @@ namespace trocar {
 inline constexpr int kMaxHands = 16;     // participants with tools (surgeons and assistants)
 inline constexpr int kToolsPerHand = 2;  // tools of one participant
 inline constexpr int kMaxTools = kMaxHands * kToolsPerHand;
-inline constexpr int kMaxWatchers = 100;  // instructors and observers
+inline constexpr int kMaxWatchers = 200;  // instructors and observers
 inline constexpr int kMaxParticipants = kMaxHands + kMaxWatchers;
 
 // Participant slot: [0, kMaxHands) have tools, the rest watch.

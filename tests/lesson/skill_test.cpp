@@ -20,7 +20,7 @@ Track track_of(
   return track;
 }
 
-// Minimum jerk from 0 to 1 (Flash and Hogan 1985).
+// Returns minimum jerk from 0 to 1 (Flash and Hogan 1985).
 double minimum_jerk(double s) {
   s = std::clamp(s, 0.0, 1.0);
   return s * s * s * (10 - 15 * s + 6 * s * s);
@@ -111,7 +111,7 @@ TEST(Skill, SpectralArcLengthSeesSubmovements) {
   };
   EXPECT_LT(arc_of(2), arc_of(1) - 0.2);
   EXPECT_LT(arc_of(4), arc_of(2) - 0.2);
-  // Neither scale nor unit matters.
+  // The scale does not matter.
   std::vector<double> twice;
   for (int i = 0; i <= 100; ++i) twice.push_back(60.0 * i * i * (100 - i) * (100 - i));
   EXPECT_NEAR(spectral_arc_length(twice, 100), arc_of(1), 1e-6);

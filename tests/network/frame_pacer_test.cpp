@@ -1,13 +1,13 @@
 // The pacer against a model of a link: a rate, a delay, a queue, losses. Time is the test's.
 
-#include "server/session/replication/frame_pacer.h"
+#include "server/session/pacing/frame_pacer.h"
 
 #include <gtest/gtest.h>
 
 #include <deque>
 #include <random>
 
-namespace trocar::replication {
+namespace trocar::pacing {
 namespace {
 
 constexpr std::uint64_t kMs = 1'000'000, kFrameNs = 16 * kMs;
@@ -122,4 +122,4 @@ TEST(FramePacer, after_silence_one_frame_tries_again) {
 }
 
 }  // namespace
-}  // namespace trocar::replication
+}  // namespace trocar::pacing

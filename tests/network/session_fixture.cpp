@@ -190,9 +190,11 @@ LiveSession::LiveSession(net::TcpServerOptions tcp, replication::ReplicatorOptio
   EXPECT_TRUE(listening.ok());
   tcp_ = std::move(*listening);
   options.has_datagrams = tcp_->has_datagrams();
-  replicator_ = std::make_unique<replication::Replicator>(*tcp_, inbox, layout_, organ_.name, 42,
-                                                          std::move(options));
-  tcp_->start(*replicator_);
+  connections_ = std::make_unique<guests::GuestConnections>(*tcp_);
+  replicator_ = std::make_unique<replication::Replicator>(*connections_, inbox, layout_,
+                                                          organ_.name, 42, std::move(options));
+  connections_->set_handler(*replicator_);
+  tcp_->start(*connections_);
   port_ = tcp_->port();
   surface_.resize(layout_.vertex_count());
   thread_ = std::thread([this] { io_.run(); });

@@ -29,9 +29,9 @@ async function started(name, args) {
   await sleep(300);
   return child;
 }
-// CPU seconds of a process so far.
-function cpu(child) {
-  const fields = fs.readFileSync(`/proc/${child.pid}/stat`, 'utf8').split(') ')[1].split(' ');
+// CPU seconds so far, of a process or of its first thread, which is the server's for the network.
+function cpu(child, thread = '') {
+  const fields = fs.readFileSync(`/proc/${child.pid}${thread && `/task/${child.pid}`}/stat`, 'utf8').split(') ')[1].split(' ');
   return (Number(fields[11]) + Number(fields[12])) / 100;
 }
 function memoryMb(child) {
@@ -195,19 +195,25 @@ async function measureNetworks(web, code) {
   }
 }
 
+// Bytes that the program has had from sessions so far.
+async function sessionBytes(web) {
+  const port = web.text.match(/figures at 127.0.0.1:(\d+)/)[1], text = await (await fetch(`http://127.0.0.1:${port}/metrics`)).text();
+  return Number((text.match(/session_bytes_total (\d+)/) ?? text.match(/bytes_down_total (\d+)/))[1]);
+}
+
 async function measureWatchers(web, server, code) {
   result.watchers = [];
-  for (const count of [1, 10, 40, 90]) {
+  for (const count of (process.env.TROCAR_WATCHERS ?? '1 20 100 200').split(' ').map(Number)) {
     const watchers = [];
     for (let i = 0; i < count; i++) {
       watchers.push(new Watcher(web.port, code, `Watcher ${count}-${i}`, null));
       await sleep(60);
     }
     await sleep(3000);
-    const before = [cpu(web), cpu(server), watchers.map(w => w.frames), performance.now()];
+    const before = [cpu(web), cpu(server), watchers.map(w => w.frames), performance.now(), await sessionBytes(web), cpu(server, 'network')];
     await sleep(8000);
     const seconds = (performance.now() - before[3]) / 1000, rates = watchers.map((w, i) => (w.frames - before[2][i]) / seconds);
-    result.watchers.push({ count, joined: watchers.filter(w => w.frames > 0).length, webCpu: (cpu(web) - before[0]) / seconds, serverCpu: (cpu(server) - before[1]) / seconds, framesPerSecond: quantile(rates, 0.5), least: Math.min(...rates), webMb: memoryMb(web) });
+    result.watchers.push({ count, joined: watchers.filter(w => w.frames > 0).length, webCpu: (cpu(web) - before[0]) / seconds, serverCpu: (cpu(server) - before[1]) / seconds, networkCpu: (cpu(server, 'network') - before[5]) / seconds, framesPerSecond: quantile(rates, 0.5), least: Math.min(...rates), webMb: memoryMb(web), sessionMbit: (await sessionBytes(web) - before[4]) * 8e-6 / seconds });
     for (const watcher of watchers) watcher.close();
     await sleep(1000);
   }
@@ -222,19 +228,19 @@ function table() {
     `| seek in a recording by HTTP ranges | median ${n(quantile(r.seeks.map(s => s[0]), 0.5))} ms, longest of 40 ${n(Math.max(...r.seeks.map(s => s[0])))} ms |`, '',
     '| round trip | loss | rate | age, median | age, 99 % | frames per second |', '|---|---|---|---|---|---|',
     ...r.networks.map(c => `| ${c.roundTrip} ms | ${c.loss} % | ${c.rate ? `${c.rate / 1000} Mbit/s` : 'no cap'} | ${n(c.median)} ms | ${n(c.p99)} ms | ${n(c.framesPerSecond)} |`), '',
-    '| watchers | of the program, CPU | of the server, CPU | frames per second, median and least | memory |', '|---|---|---|---|---|',
-    ...r.watchers.map(w => `| ${w.joined} | ${n(w.webCpu * 100)} % | ${n(w.serverCpu * 100)} % | ${n(w.framesPerSecond)}, ${n(w.least)} | ${n(w.webMb)} MB |`)];
+    '| watchers | of the program, CPU | of the server, CPU | its network | from the session | frames per second, median | least | memory |', '|---|---|---|---|---|---|---|---|',
+    ...r.watchers.map(w => `| ${w.joined} | ${n(w.webCpu * 100)} % | ${n(w.serverCpu * 100)} % | ${n(w.networkCpu * 100, 1)} % | ${n(w.sessionMbit, 1)} Mbit/s | ${n(w.framesPerSecond)} | ${n(w.least)} | ${n(w.webMb)} MB |`)];
   return lines.join('\n') + '\n';
 }
 
-const server = await started('trocar-server', ['--listen', '127.0.0.1:0', '--no-announce', '--journal', `${TROCAR_WORK}/figures.mcap`]);
+const server = await started('trocar-server', ['--listen', '127.0.0.1:0', '--no-announce', '--journal', `${TROCAR_WORK}/figures.mcap`, ...(process.env.TROCAR_SERVER_OPTIONS ?? '--max-watchers 200').split(' ').filter(Boolean)]);
 while (!/observer\s+\S{19}/.test(server.text)) await sleep(100);
 const codes = Object.fromEntries([...server.text.matchAll(/^ {2}(\w+) +(\S{19}) /gm)].map(m => [m[1], m[2]]));
 for (const scene of ['lift', 'press'])
   launch('trocar-client', ['--server', `127.0.0.1:${server.port}`, '--name', scene, '--no-render', '--join', codes.surgeon, '--script', `${TROCAR_ROOT}/deploy/scenes/${scene}.toml`]);
 fs.mkdirSync(`${TROCAR_WORK}/recordings`, { recursive: true });
 fs.copyFileSync(TROCAR_RECORDING, `${TROCAR_WORK}/recordings/lesson.mcap`);
-const web = await started('trocar-web', ['--insecure-loopback', '--listen', '127.0.0.1:0', '--session', `127.0.0.1:${server.port}`, '--recordings', `${TROCAR_WORK}/recordings`]);
+const web = await started('trocar-web', ['--insecure-loopback', '--listen', '127.0.0.1:0', '--session', `127.0.0.1:${server.port}`, '--recordings', `${TROCAR_WORK}/recordings`, '--metrics', '127.0.0.1:0', '--max-connections-per-address', '400']);
 const key = web.text.match(/#recordings=(\w+)/)[1], base = `http://127.0.0.1:${web.port}/`;
 try {
   await measureSize();

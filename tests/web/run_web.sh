@@ -1,5 +1,5 @@
 #!/bin/bash
-# run_web.sh recording|codec|page|lesson|debrief|figures BUILD_FOLDER WORK_FOLDER: one of the tests of the page. Exit code 77:
+# run_web.sh recording|codec|page|lesson|debrief|access|hostile|figures|hour BUILD_FOLDER WORK_FOLDER: one of the tests of the page. Exit code 77:
 # skipped, with the reason.
 set -euo pipefail
 test=$1 build=$2 work=$3
@@ -43,15 +43,21 @@ record() {
 
 case $test in
   recording) record ;;
+  hour)
+    chromium=$(command -v chromium) || skip "Chromium is not installed: deploy/setup --with-web"
+    export TROCAR_CHROMIUM=$chromium TROCAR_HOUR=$work/hour.mcap
+    "$bin/trocar-sim" "$here/hour.toml" --journal "$TROCAR_HOUR" --out "$work/hour"
+    node "$here/hour.mjs"
+    ;;
   codec) node --test-reporter=spec "$here/codec.test.mjs" ;;
-  page | lesson | debrief | figures)
+  page | lesson | debrief | access | hostile | figures)
     chromium=$(command -v chromium || command -v chromium-browser || command -v google-chrome) ||
       skip "Chromium is not installed: deploy/setup --with-web"
     [ -e "$build/web/page/index.html" ] || skip "the page is not built"
     export TROCAR_CHROMIUM=$chromium
     if [ "$test" != figures ]; then
       # As one process, which prints each test as it ends.
-      node --test-reporter=spec "$here/$test.test.mjs"
+      node --experimental-websocket --no-warnings --test-reporter=spec "$here/$test.test.mjs"
     else
       [ -e "$TROCAR_RECORDING" ] || skip "there is no recording: run_web.sh recording makes it"
       node --experimental-websocket --no-warnings "$here/figures.mjs"

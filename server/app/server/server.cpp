@@ -30,6 +30,7 @@
 #include "server/app/server/simulation_loop.h"
 #include "server/app/server/summary.h"
 #include "server/session/ghost/ghost.h"
+#include "server/session/guests/guest_connections.h"
 #include "server/session/net/tcp_server.h"
 #include "server/session/replication/messages.h"
 #include "server/session/replication/replicator.h"
@@ -98,7 +99,8 @@ class Server {
   asio::signal_set signals_{io_};
   asio::steady_timer poll_{io_};
   std::unique_ptr<net::TcpServer> tcp_;
-  std::unique_ptr<discovery::Announcer> announcer_;  // null: the session is not announced
+  std::unique_ptr<guests::GuestConnections> connections_;  // all of them, guests as well
+  std::unique_ptr<discovery::Announcer> announcer_;        // null: the session is not announced
   std::unique_ptr<replication::Replicator> replicator_;
   FrameHandover handover_{[this] { asio::post(io_, [this] { publish_frames(); }); }};
   std::vector<step::SharedFrame> frames_;
@@ -134,6 +136,7 @@ Status Server::open() {
   auto listening = net::TcpServer::listen(io_, tcp);
   if (!listening) return listening.error();
   tcp_ = std::move(*listening);
+  connections_ = std::make_unique<guests::GuestConnections>(*tcp_);
 
   auto journal = open_journal(options_.journal, organ, layout, reduction_, start_.continues);
   if (!journal) return journal.error();
@@ -167,7 +170,7 @@ Status Server::open() {
   if (reduction_)
     replication.on_ghost_wanted = [this](bool is_wanted) { ghost_->set_wanted(is_wanted); };
   replicator_ = std::make_unique<replication::Replicator>(
-      *tcp_, inbox_, layout, organ.name, organ::organ_hash(organ), std::move(replication));
+      *connections_, inbox_, layout, organ.name, organ::organ_hash(organ), std::move(replication));
   if (journal_) replicator_->set_recording(journal_->state());
   restore_people();
   loop_ = std::make_unique<SimulationLoop>(simulation_, inbox_, handover_, journal_.get(),
@@ -261,7 +264,8 @@ Status Server::run() {
   signals_.async_wait([this](boost::system::error_code error, int signal) {
     if (!error) on_signal(signal);
   });
-  tcp_->start(*replicator_);
+  connections_->set_handler(*replicator_);
+  tcp_->start(*connections_);
   if (!options_.ready_file.empty())
     if (const auto written =
             write_text_file(options_.ready_file, std::to_string(tcp_->port()) + "\n");

@@ -423,6 +423,11 @@ struct WebServer::Core : std::enable_shared_from_this<WebServer::Core> {
     add("joins_refused_total", "counter", "Joins refused here.", b.refused);
     add("wrong_codes_total", "counter", "Wrong join codes.", b.wrong_codes);
     add("sessions_unreachable_total", "counter", "Sessions that did not answer.", b.unreachable);
+    add("carriers", "gauge", "Connections to sessions that many share, now.", b.carriers);
+    add("session_messages_total", "counter", "Messages from sessions.", b.session_messages);
+    add("session_bytes_total", "counter", "Bytes of these.", b.session_bytes);
+    add("frames_skipped_total", "counter", "Frames left out for those who share a connection.",
+        b.frames_skipped);
     add("messages_down_total", "counter", "Messages to browsers.", b.messages_down);
     add("bytes_down_total", "counter", "Bytes of these.", b.bytes_down);
     add("messages_up_total", "counter", "Messages from browsers.", b.messages_up);

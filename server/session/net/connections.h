@@ -60,6 +60,8 @@ class Connections {
   virtual std::size_t outstanding_bytes(ConnectionId id) const = 0;
   // The peer's address without its port; empty if it is not known.
   virtual std::string peer_address(ConnectionId id) const = 0;
+  // The connection that carries this one together with others; 0: it has its own.
+  virtual ConnectionId carrier_of(ConnectionId) const { return 0; }
   // Queues `last_words` (may be null) whatever room there is, delivers nothing more from the peer,
   // and closes when all is sent and the peer has closed too, at the latest at the flush deadline.
   virtual void close_after_flush(ConnectionId id, wire::SharedBytes last_words) = 0;

@@ -32,10 +32,10 @@ struct Participant {
 
 // How many there are for, at most what ids.h says, and what they may bring.
 struct Places {
-  int hands = kMaxHands;        // surgeons and assistants
-  int watchers = kMaxWatchers;  // instructors and observers
-  int tools = kToolsPerHand;    // of each who has some
-  float longest_edge_mm = 40;   // of a blade: what it cuts in a tick is in proportion
+  int hands = kMaxHands;       // surgeons and assistants
+  int watchers = 100;          // instructors and observers
+  int tools = kToolsPerHand;   // of each who has some
+  float longest_edge_mm = 40;  // of a blade: what it cuts in a tick is in proportion
 };
 
 // 1 to 32 bytes of printable UTF-8 without a space at either end.

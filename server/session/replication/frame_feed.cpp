@@ -66,7 +66,7 @@ bool FrameFeed::uses_datagrams() const {
   return options_.clock_ns() - *heard_ns_ <= silence;
 }
 
-bool FrameFeed::may_send(const FramePacer& pacer) const {
+bool FrameFeed::may_send(const pacing::FramePacer& pacer) const {
   return !is_paced_ || pacer.may_send(options_.clock_ns());
 }
 
@@ -104,7 +104,7 @@ void FrameFeed::give_beside(const FrameEncoder& encoder, const wire::SharedBytes
     counters_.bytes_queued += message->size();
 }
 
-void FrameFeed::note_given(Frame frame, FramePacer& pacer) {
+void FrameFeed::note_given(Frame frame, pacing::FramePacer& pacer) {
   newest_given_ = frame;
   pacer.on_sent(frame, options_.clock_ns());
 }

@@ -20,8 +20,8 @@
 #include <optional>
 
 #include "server/session/net/connections.h"
+#include "server/session/pacing/frame_pacer.h"
 #include "server/session/replication/frame_encoder.h"
-#include "server/session/replication/frame_pacer.h"
 #include "server/session/replication/replicator_options.h"
 
 namespace trocar::replication {
@@ -57,7 +57,7 @@ class FrameFeed {
 
  private:
   bool is_stream_busy(const FrameEncoder& encoder) const;
-  bool may_send(const FramePacer& pacer) const;
+  bool may_send(const pacing::FramePacer& pacer) const;
   bool give_by_datagrams(FrameEncoder& encoder);
   bool give_by_stream(FrameEncoder& encoder);
   // Returns a recent frame that the client has or will have by the stream; null: none.
@@ -67,13 +67,13 @@ class FrameFeed {
   void probe();
   void rest_if_congested();
   bool is_resting() const;
-  void note_given(Frame frame, FramePacer& pacer);
+  void note_given(Frame frame, pacing::FramePacer& pacer);
 
   net::Connections& connections_;
   const net::ConnectionId id_;
   const ReplicatorOptions& options_;
   ReplicatorCounters& counters_;
-  FramePacer datagram_pacer_, stream_pacer_;
+  pacing::FramePacer datagram_pacer_, stream_pacer_;
   bool is_paced_ = false;
   bool wants_keyframe_ = false;
   std::uint64_t last_requested_keyframe_ns_ = 0;

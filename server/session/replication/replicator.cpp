@@ -210,6 +210,9 @@ std::optional<Replicator::Ending> Replicator::handle_message(Client& client, Byt
   proto::Envelope envelope;
   if (const auto decoded = wire::decode_envelope(bytes, envelope); !decoded)
     return protocol_error(decoded.error().message);
+  if (client.is_carrier) return handle_carrier(client, envelope);
+  if (client.carrier != 0)
+    if (auto ending = check_guest(client, envelope)) return ending;
   if (!client.participant && !envelope.has_hello())
     return protocol_error("the first message must be Hello");
 
@@ -223,7 +226,11 @@ std::optional<Replicator::Ending> Replicator::handle_message(Client& client, Byt
     case proto::Envelope::kHandReport:
       return handle_hand_report(client, envelope.hand_report());
     case proto::Envelope::kFrameAck:
-      return handle_ack(client, envelope.frame_ack().frame(), envelope.frame_ack().surface_crc());
+      if (client.carrier == 0)
+        return handle_ack(client, envelope.frame_ack().frame(), envelope.frame_ack().surface_crc());
+      note_answer(client.participant->slot, envelope.frame_ack().frame(),
+                  envelope.frame_ack().surface_crc());
+      return std::nullopt;
     case proto::Envelope::kMarkRequest:
       return handle_mark(client, envelope.mark_request().action());
     case proto::Envelope::kPointRequest:
@@ -240,6 +247,7 @@ std::optional<Replicator::Ending> Replicator::handle_message(Client& client, Byt
       handle_ghost_request(client, envelope.ghost_request().is_wanted());
       return std::nullopt;
     case proto::Envelope::kKeyframeRequest:
+      if (client.carrier != 0) return std::nullopt;  // the carrier asks for those that it needs
       client.feed.want_keyframe();
       if (encoder_.current() && client.feed.is_keyframe_due()) give_frame(client, false);
       return std::nullopt;
@@ -349,18 +357,24 @@ std::optional<Replicator::Ending> Replicator::welcome(Client& client) {
   client.is_welcome = true;
   const Ending too_slow{EndReason::TooSlow, "the outbox is too small for the first messages"};
   if (!send(client, encode_welcome(slot, organ_hash_, options_.has_datagrams, absences_.find(slot),
-                                   absences_.kept_seconds())) ||
-      !send(client, encode_participants(roster_.list(), door_.is_closed(), door_.waiting())) ||
-      !send(client, topology()))
+                                   absences_.kept_seconds())))
     return too_slow;
-  if (encoder_.current() && !give_frame(client, true)) return too_slow;
-  if (!send(client, encode_recording(recording_)) || !show_lesson(client)) return too_slow;
+  if (auto ending = client.carrier == 0 ? show_all(client) : welcome_guest(client)) return ending;
   if (slot.has_tools())
     for (const auto& law : options_.haptic_laws)
       if (!send(client, encode_haptic_law(law))) return too_slow;
   // The others; the newcomer has it already, a second copy does no harm.
   participants_changed_ = true;
   return std::nullopt;
+}
+
+std::optional<Replicator::Ending> Replicator::show_all(Client& client) {
+  const bool is_shown =
+      send(client, encode_participants(roster_.list(), door_.is_closed(), door_.waiting())) &&
+      send(client, topology()) && (!encoder_.current() || give_frame(client, true)) &&
+      send(client, encode_recording(recording_)) && show_lesson(client);
+  if (is_shown) return std::nullopt;
+  return Ending{EndReason::TooSlow, "the outbox is too small for the first messages"};
 }
 
 void Replicator::handle_ghost_request(Client& client, bool is_wanted) {
@@ -376,8 +390,12 @@ std::optional<Replicator::Ending> Replicator::handle_ack(Client& client, Frame f
     return Ending{EndReason::ProtocolError,
                   "FrameAck.frame: " + std::to_string(frame) + " was not given to you yet"};
   client.feed.acknowledge(encoder_, frame);
-  if (!barrier_ || frame != barrier_->frame) return std::nullopt;
-  const auto slot = client.participant->slot;
+  if (client.participant) note_answer(client.participant->slot, frame, crc);
+  return std::nullopt;
+}
+
+void Replicator::note_answer(ParticipantSlot slot, Frame frame, std::uint32_t crc) {
+  if (!barrier_ || frame != barrier_->frame) return;
   for (auto& result : barrier_results_) {
     if (result.slot != slot) continue;
     result.has_answered = true;
@@ -385,7 +403,6 @@ std::optional<Replicator::Ending> Replicator::handle_ack(Client& client, Frame f
     result.surface_crc = crc;
     result.is_equal = crc == barrier_->surface_crc;
   }
-  return std::nullopt;
 }
 
 // ---- what they are given ----
@@ -424,7 +441,7 @@ void Replicator::broadcast(const wire::SharedBytes& bytes) {
   for (auto next = clients_.begin(); next != clients_.end();) {
     auto& client = *next->second;
     ++next;  // ending a session erases it
-    if (client.participant && !send(client, bytes))
+    if (client.listens() && !send(client, bytes))
       end_session(client,
                   {EndReason::TooSlow,
                    "your connection is too slow: messages that cannot be skipped piled up"});
@@ -466,8 +483,8 @@ void Replicator::publish(std::span<const step::SharedFrame> frames) {
   counters_.frames_conflated += frames.size() - 1;
   encoder_.set_current(frames.back(), options_.clock_ns() / 1000);
   for (const auto& [id, client] : clients_) {
-    if (!client->participant) continue;
-    give_touch(*client);
+    if (!client->listens()) continue;
+    if (client->participant) give_touch(*client);
     give_frame(*client, false);
   }
   settle_participants();
@@ -510,7 +527,7 @@ void Replicator::begin_barrier(const step::SharedFrame& last) {
   for (auto next = clients_.begin(); next != clients_.end();) {
     auto& client = *next->second;
     ++next;
-    if (!client.participant) continue;
+    if (!client.listens()) continue;
     if (!give_frame(client, true) || !send(client, barrier))
       end_session(client, {EndReason::TooSlow, "your connection is too slow for the last frame"});
   }

@@ -28,6 +28,9 @@
 // Lesson: a course (common/lesson) looks at every frame from when somebody with a tool is there.
 // What it finds is told to all and recorded, with the answers and orders that people gave.
 //
+// Guests of a carrier (server/session/guests) are let in as anybody is; what is for everybody goes
+// to the carrier once instead of to each of them.
+//
 // Ghost: who has asked gets what the ghost's thread reports, if the outbox is less than half as
 // full as it may be for frames: these come first.
 //
@@ -146,6 +149,14 @@ class Replicator final : public net::ConnectionHandler {
   std::optional<Ending> admit(Client& client, const proto::Hello& hello);
   std::optional<Ending> find_place(Client& client, HelloRequest& request);
   std::optional<Ending> welcome(Client& client);
+  // Gives the client all that there is to see; an ending: it does not fit.
+  std::optional<Ending> show_all(Client& client);
+  // Says of a guest's message what a connection of its own would not have said; nothing: go on.
+  std::optional<Ending> check_guest(Client& guest, const proto::Envelope& message);
+  std::optional<Ending> welcome_guest(Client& guest);
+  // Handles what a carrier says for itself.
+  std::optional<Ending> handle_carrier(Client& carrier, const proto::Envelope& message);
+  void note_answer(ParticipantSlot slot, Frame frame, std::uint32_t crc);
   // Returns the place to which this Hello comes back; null: there is none.
   const participants::Participant* find_own_place(const HelloRequest& request) const;
   std::optional<Ending> come_back(Client& client, const participants::Participant& place);

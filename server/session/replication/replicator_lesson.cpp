@@ -49,7 +49,7 @@ void Replicator::observe_lesson(const step::PublishedFrame& frame) {
   describe(*course_, *event.mutable_lesson_progress());
   const auto bytes = wire::encode_envelope(event);
   for (const auto& [id, client] : clients_)
-    if (client->participant) send(*client, bytes);
+    if (client->listens()) send(*client, bytes);
 }
 
 void Replicator::tell_stage() {

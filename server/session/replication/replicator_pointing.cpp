@@ -52,7 +52,7 @@ std::optional<Replicator::Ending> Replicator::handle_point(Client& client,
   record_lesson(record);
   const auto bytes = wire::encode_envelope(event);
   for (const auto& [id, other] : clients_)
-    if (other->participant) send(*other, bytes);
+    if (other->listens()) send(*other, bytes);
   return std::nullopt;
 }
 
@@ -129,7 +129,7 @@ std::optional<Replicator::Ending> Replicator::handle_view(Client& client,
   record_lesson(record);
   last_view_ = wire::encode_envelope(event);
   for (const auto& [id, other] : clients_)
-    if (other->participant && other.get() != &client) send(*other, last_view_);
+    if (other->listens() && other.get() != &client) send(*other, last_view_);
   return std::nullopt;
 }
 

@@ -36,7 +36,7 @@ export function RecordingList(props: { link: Link; onChoose(name: string): void 
     })();
   }, []);
   return (
-    <div class="sheet">
+    <main class="sheet">
       <h1>Recordings</h1>
       {fault && <p class="fault" role="alert">{fault}</p>}
       {list === null && !fault && <p>Loading the list</p>}
@@ -48,7 +48,7 @@ export function RecordingList(props: { link: Link; onChoose(name: string): void 
           </li>
         ))}
       </ul>
-    </div>
+    </main>
   );
 }
 

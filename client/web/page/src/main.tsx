@@ -30,24 +30,26 @@ function Start(props: { link: Link; why: string; onJoin(link: Link): void; onFil
     props.onJoin({ ...props.link, code: pasted, name: name.trim(), role });
   };
   return (
-    <form class="sheet" onSubmit={submit}>
-      <h1>Watch a session</h1>
-      {props.why && <p class="fault" role="alert">{props.why}</p>}
-      <label>Your name<input name="name" value={name} maxLength={32} autocomplete="nickname" onInput={e => setName(e.currentTarget.value)} autofocus={name === ''} /></label>
-      <label>Join code<input name="code" value={code} autocomplete="off" spellcheck={false} placeholder="7K3M-9QXZ-4T2B-WN8C" onInput={e => setCode(e.currentTarget.value)} /></label>
-      <fieldset>
-        <legend>You are</legend>
-        {(['observer', 'instructor'] as const).map(kind => (
-          <label key={kind} class="radio"><input type="radio" name="role" value={kind} checked={role === kind} onChange={() => setRole(kind)} />{kind === 'observer' ? 'an observer: you watch' : 'an instructor: you watch and lead the lesson'}</label>
-        ))}
-      </fieldset>
-      {fault && <p class="fault" role="alert">{fault}</p>}
-      <button class="main">Watch</button>
-      <hr />
-      <label class="drop">Or open a recording: drop a file here, or choose one
-        <input type="file" accept=".mcap" onChange={e => { const file = e.currentTarget.files?.[0]; if (file) props.onFile(file); }} />
-      </label>
-    </form>
+    <main>
+      <form class="sheet" onSubmit={submit}>
+        <h1>Watch a session</h1>
+        {props.why && <p class="fault" role="alert">{props.why}</p>}
+        <label>Your name<input name="name" value={name} maxLength={32} autocomplete="nickname" onInput={e => setName(e.currentTarget.value)} autofocus={name === ''} /></label>
+        <label>Join code<input name="code" value={code} autocomplete="off" spellcheck={false} placeholder="7K3M-9QXZ-4T2B-WN8C" onInput={e => setCode(e.currentTarget.value)} /></label>
+        <fieldset>
+          <legend>You are</legend>
+          {(['observer', 'instructor'] as const).map(kind => (
+            <label key={kind} class="radio"><input type="radio" name="role" value={kind} checked={role === kind} onChange={() => setRole(kind)} />{kind === 'observer' ? 'an observer: you watch' : 'an instructor: you watch and lead the lesson'}</label>
+          ))}
+        </fieldset>
+        {fault && <p class="fault" role="alert">{fault}</p>}
+        <button class="main">Watch</button>
+        <hr />
+        <label class="drop">Or open a recording: drop a file here, or choose one
+          <input type="file" accept=".mcap" onChange={e => { const file = e.currentTarget.files?.[0]; if (file) props.onFile(file); }} />
+        </label>
+      </form>
+    </main>
   );
 }
 
@@ -95,7 +97,7 @@ function Page(props: { replica: Replica }): JSX.Element {
     case 'list':
       return <RecordingList link={link} onChoose={choose} />;
     case 'loading':
-      return <div class="sheet"><h1>{where.name}</h1><p>Opening the recording</p></div>;
+      return <main class="sheet"><h1>{where.name}</h1><p role="status">Opening the recording</p></main>;
     case 'debrief':
       return <Debrief key={where.name} replica={props.replica} recording={where.recording} name={where.name} link={link}
         onClose={() => setWhere(link.recordingsKey ? { is: 'list' } : { is: 'start', why: '' })} />;

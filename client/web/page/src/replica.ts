@@ -98,6 +98,7 @@ export class Replica {
   }
 
   restart(): void { this.e.restart(); }
+  get memoryBytes(): number { return this.e.memory.buffer.byteLength; }
 
   // One Envelope. Throws, with a line for people, if it cannot be right.
   receive(envelope: Uint8Array, nowMs: number): void {

@@ -2,11 +2,12 @@
 
 import {
   BufferAttribute, BufferGeometry, ConstantAlphaFactor, CustomBlending, Data3DTexture, DynamicDrawUsage, GLSL3, Group,
-  LinearFilter, Matrix4, Mesh, NormalBlending, OneMinusConstantAlphaFactor, PerspectiveCamera, Quaternion,
-  RawShaderMaterial, Raycaster, RepeatWrapping, Scene, Vector2, Vector3, Vector4, WebGLRenderer, type Intersection, type IUniform,
+  LinearFilter, Matrix4, Mesh, NormalBlending, OneMinusConstantAlphaFactor, Quaternion,
+  RawShaderMaterial, Raycaster, RepeatWrapping, Scene, Vector2, Vector3, Vector4, WebGLRenderer, type Intersection, type IUniform, type PerspectiveCamera,
 } from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 import { lightingSource, organFragmentSource, organVertexSource, toolFragmentSource, toolVertexSource } from './gen/shaders';
+import { Pane, partsOf, type Part, type ViewCount } from './pane';
 import { Overlay, type Mesh as PlainMesh, type Pointer, type Replica, type Shape, type Tool, type Vec3 } from './replica';
 
 // A place of the surface: shares of the corners of a triangle, which are numbers of vertices.
@@ -21,6 +22,8 @@ export interface Guide {
 
 const kMetresPerNewton = 0.02, kMostArrow = 0.1, kLeastNewton = 0.05, kShadows = 8;
 const kPointerLength = 0.035, kNoise = 32;
+const kPitch = 0.42; // of the views at the start: from the front, a side, the back, and above
+const kStarts: [number, number][] = [[0, kPitch], [Math.PI / 2, kPitch], [Math.PI, kPitch], [0, 1.45]];
 const kSlowMs = 45, kJudged = 40; // pictures, before quality is lowered
 
 interface DrawnTool {
@@ -38,24 +41,25 @@ interface DrawnTool {
 interface DrawnPointer { group: Group; label: HTMLElement }
 
 export class Picture {
-  readonly camera = new PerspectiveCamera(32.0, 1, 0.02, 6);
   overlay: Overlay = Overlay.Regions;
   showsArrows = true;
-  follows: number | null = null; // a participant's slot
-  onLetGo: () => void = () => undefined; // the person moves the view, so that it follows nobody
-  onTurn: () => void = () => undefined; // likewise, whatever it follows
+  onLetGo: (view: number) => void = () => undefined; // the person moves a view, so that it follows nobody
+  onTurn: () => void = () => undefined; // likewise of the first, whatever it follows
+  onActive: (view: number) => void = () => undefined; // another one is moved from now on
   pictures = 0;
   drawMs = 0; // of the last picture
   private readonly renderer: WebGLRenderer;
   private readonly scene = new Scene();
   private readonly controls: OrbitControls;
+  private readonly panes = kStarts.map(([yaw, pitch]) => new Pane(yaw, pitch));
+  private count: ViewCount = 1;
+  private active = 0; // of the views: which one mouse and keys move
   private readonly organ: Mesh<BufferGeometry, RawShaderMaterial>;
   private readonly uniforms: Record<string, IUniform>;
   private readonly tools = new Map<number, DrawnTool>();
   private readonly pointers = new Map<number, DrawnPointer>();
   private drawing: Mesh | null = null;
   private version = -1;
-  private isFramed = false;
   private lastMs = 0;
   private gaps: number[] = [];
   private quality: number; // 0 best, 1 plain, 2 fewer pixels
@@ -73,12 +77,15 @@ export class Picture {
     this.controls.enableDamping = false;
     this.controls.minDistance = 0.04;
     this.controls.maxDistance = 2.5;
+    this.controls.target = this.main.target;
     this.controls.addEventListener('start', () => {
-      this.onTurn();
-      if (this.follows === null) return;
-      this.follows = null;
-      this.onLetGo();
+      if (this.active === 0) this.onTurn();
+      if (this.moved.follows === null) return;
+      this.moved.follows = null;
+      this.onLetGo(this.active);
     });
+    // Before the controls: they move the view that was touched.
+    for (const kind of ['pointerdown', 'wheel'] as const) canvas.addEventListener(kind, this.touch, true);
     const noise = new Data3DTexture(replica.noise(kNoise), kNoise, kNoise, kNoise);
     noise.wrapS = noise.wrapT = noise.wrapR = RepeatWrapping;
     noise.magFilter = noise.minFilter = LinearFilter;
@@ -96,30 +103,52 @@ export class Picture {
   }
 
   get isPlain(): boolean { return this.quality > 0; }
+  get views(): ViewCount { return this.count; }
+  get parts(): Part[] { return this.panes.slice(0, this.count).map(pane => pane.part); }
+  // How many views there are; the first is always there.
+  set views(count: ViewCount) {
+    this.count = count;
+    if (this.active >= count) this.activate(0);
+    this.resize(this.width, this.height);
+  }
+  // Mouse and keys move that view.
+  activate(view: number): void {
+    if (view >= this.count) return;
+    this.active = view;
+    this.controls.object = this.moved.camera;
+    this.controls.target = this.moved.target;
+    this.onActive(view);
+  }
+  // Whom a view follows; null: nobody. `isAlong`: it looks along that one's tool.
+  follow(view: number, participant: number | null, isAlong = false): void {
+    Object.assign(this.panes[view] ?? {}, { follows: participant, isAlong });
+  }
   // Sets the view as it was at the beginning.
-  resetView(): void { this.isFramed = false; this.follows = null; }
-  // Turns the view by so many radians, for keys.
-  turn(yaw: number, pitch: number): void {
-    const offset = this.camera.position.clone().sub(this.controls.target), length = offset.length();
-    const to = Math.asin(Math.max(-1, Math.min(1, offset.y / length))) + pitch, around = Math.atan2(offset.x, offset.z) + yaw;
-    const up = Math.max(-1.5, Math.min(1.5, to));
-    offset.set(Math.sin(around) * Math.cos(up), Math.sin(up), Math.cos(around) * Math.cos(up)).multiplyScalar(length);
-    this.camera.position.copy(this.controls.target).add(offset);
-  }
-  zoom(factor: number): void {
-    this.camera.position.sub(this.controls.target).multiplyScalar(factor).add(this.controls.target);
-  }
-  // Where the view is, m: for others, who follow it.
+  resetView(): void { Object.assign(this.moved, { isFramed: false, follows: null }); }
+  turn(yaw: number, pitch: number): void { this.moved.turn(yaw, pitch); }
+  zoom(factor: number): void { this.moved.zoom(factor); }
+  // Where the first view is, m: for others, who follow it.
   view(): { eye: Vec3; target: Vec3 } {
-    const { x, y, z } = this.camera.position, to = this.controls.target;
+    const { x, y, z } = this.camera.position, to = this.main.target;
     return { eye: [x, y, z], target: [to.x, to.y, to.z] };
   }
   look(eye: Vec3, target: Vec3): void {
-    this.isFramed = true;
+    this.main.isFramed = true;
     this.camera.position.set(...eye);
-    this.controls.target.set(...target);
+    this.main.target.set(...target);
   }
+  // Where each view looks from, m.
+  places(): Vec3[] { return this.panes.slice(0, this.count).map(({ camera: { position: p } }) => [p.x, p.y, p.z]); }
+  private get main(): Pane { return this.panes[0]!; }
+  private get moved(): Pane { return this.panes[this.active] ?? this.main; }
+  private get camera(): PerspectiveCamera { return this.main.camera; }
+  private readonly touch = (event: MouseEvent): void => {
+    const rect = this.canvas.getBoundingClientRect(), x = (event.clientX - rect.left) / rect.width, y = (event.clientY - rect.top) / rect.height;
+    const view = this.panes.findIndex((pane, i) => i < this.count && pane.has(x, y));
+    if (view >= 0 && view !== this.active) this.activate(view);
+  };
   dispose(): void {
+    for (const kind of ['pointerdown', 'wheel'] as const) this.canvas.removeEventListener(kind, this.touch, true);
     this.controls.dispose();
     this.renderer.dispose();
     for (const drawn of [...this.tools.values(), ...this.pointers.values()]) drawn.label.remove();
@@ -131,8 +160,12 @@ export class Picture {
     const ratio = Math.min(2, window.devicePixelRatio || 1) * (this.quality === 2 ? 0.6 : this.quality === 1 ? Math.min(1, 1 / (window.devicePixelRatio || 1)) : 1);
     this.renderer.setPixelRatio(ratio);
     this.renderer.setSize(this.width, this.height, false);
-    this.camera.aspect = this.width / this.height;
-    this.camera.updateProjectionMatrix();
+    partsOf(this.count, this.height > this.width).forEach((part, i) => {
+      const pane = this.panes[i]!;
+      pane.part = part;
+      pane.camera.aspect = this.width * part[2] / (this.height * part[3]);
+      pane.camera.updateProjectionMatrix();
+    });
   }
 
   // Draws this moment; false while there is nothing to draw.
@@ -144,15 +177,25 @@ export class Picture {
     this.lastMs = nowMs;
     if (this.replica.geometryVersion !== this.version) this.loadGeometry();
     this.loadPositions();
-    if (!this.isFramed) this.frame();
-    const tools = this.replica.tools();
-    this.follow(tools, seconds);
+    const tools = this.replica.tools(), shown = this.panes.slice(0, this.count);
+    for (const pane of shown) {
+      if (!pane.isFramed) this.frame(pane);
+      pane.follow(tools, seconds);
+      pane.camera.lookAt(pane.target);
+    }
     this.controls.update();
     this.place(tools, seconds);
     this.placePointers(this.replica.pointers());
     this.placeDrawing();
-    this.light();
-    this.renderer.render(this.scene, this.camera);
+    this.renderer.setScissorTest(this.count > 1);
+    for (const pane of shown) {
+      const [left, top, width, height] = pane.part;
+      const box = [left * this.width, (1 - top - height) * this.height, width * this.width, height * this.height] as const;
+      this.renderer.setViewport(...box);
+      this.renderer.setScissor(...box);
+      this.light(pane.camera);
+      this.renderer.render(this.scene, pane.camera);
+    }
     this.placeLabels(tools);
     this.pictures++;
     this.drawMs = performance.now() - begin;
@@ -174,11 +217,16 @@ export class Picture {
   // Where a place in the world lies on the canvas, in pixels of the page; null: behind the viewer.
   project(place: Vec3): [number, number] | null {
     const at = new Vector3(...place).project(this.camera);
-    return at.z > 1 ? null : [(at.x + 1) / 2 * this.width, (1 - at.y) / 2 * this.height];
+    return at.z > 1 ? null : this.onCanvas(at);
+  }
+  // From what project() gives, of the first view.
+  private onCanvas(at: Vector3): [number, number] {
+    const [left, top, width, height] = this.main.part;
+    return [(left + (at.x + 1) / 2 * width) * this.width, (top + (1 - at.y) / 2 * height) * this.height];
   }
   private hit(x: number, y: number): Intersection | undefined {
-    const ray = new Raycaster();
-    ray.setFromCamera(new Vector2(x * 2 - 1, 1 - y * 2), this.camera);
+    const ray = new Raycaster(), pane = this.panes.find((one, i) => i < this.count && one.has(x, y)) ?? this.main, [u, v] = pane.inside(x, y);
+    ray.setFromCamera(new Vector2(u * 2 - 1, 1 - v * 2), pane.camera);
     this.organ.geometry.computeBoundingSphere();
     return ray.intersectObject(this.organ, false)[0];
   }
@@ -200,26 +248,14 @@ export class Picture {
     if (median > kSlowMs && this.quality < 2) this.setQuality(this.quality + 1);
   }
 
-  private frame(): void {
+  private frame(pane: Pane): void {
     const p = this.replica.rest(), low = new Vector3(1e9, 1e9, 1e9), high = new Vector3(-1e9, -1e9, -1e9), at = new Vector3();
     for (let i = 0; i + 3 < p.length; i += 4) {
       at.set(p[i] ?? 0, p[i + 1] ?? 0, p[i + 2] ?? 0);
       low.min(at);
       high.max(at);
     }
-    const centre = low.clone().add(high).multiplyScalar(0.5), radius = high.distanceTo(low) / 2;
-    const distance = radius / 0.2867 * 0.9 / Math.min(1, this.camera.aspect * 0.9), pitch = 0.42;
-    this.controls.target.copy(centre);
-    this.camera.position.set(centre.x, centre.y + Math.sin(pitch) * distance, centre.z + Math.cos(pitch) * distance);
-    this.isFramed = true;
-  }
-
-  private follow(tools: Tool[], seconds: number): void {
-    const tool = tools.find(t => t.slot >> 1 === this.follows);
-    if (!tool) return;
-    const wanted = new Vector3(...tool.tip), step = wanted.sub(this.controls.target).multiplyScalar(1 - Math.exp(-seconds / 0.15));
-    this.controls.target.add(step);
-    this.camera.position.add(step);
+    pane.frame(low.clone().add(high).multiplyScalar(0.5), high.distanceTo(low) / 2);
   }
 
   private loadGeometry(): void {
@@ -360,7 +396,7 @@ export class Picture {
       drawn.label.textContent = this.guide.pointerLabel(participant);
       drawn.label.style.setProperty('--own', `#${this.replica.pointerColour(participant).toString(16).padStart(6, '0')}`);
       at.project(this.camera);
-      drawn.label.style.transform = `translate(${((at.x + 1) / 2 * this.width).toFixed(1)}px, ${((1 - at.y) / 2 * this.height).toFixed(1)}px)`;
+      drawn.label.style.transform = `translate(${this.onCanvas(at).map(n => `${n.toFixed(1)}px`).join(', ')})`;
     }
   }
 
@@ -384,17 +420,17 @@ export class Picture {
     }
   }
 
-  private light(): void {
-    this.camera.updateMatrixWorld();
+  private light(camera: PerspectiveCamera): void {
+    camera.updateMatrixWorld();
     this.scene.updateMatrixWorld();
-    const m = this.camera.matrixWorld.elements, u = this.uniforms;
+    const m = camera.matrixWorld.elements, u = this.uniforms;
     const direction = (right: number, up: number, back: number): Vector3 =>
       new Vector3(m[0], m[1], m[2]).multiplyScalar(right).addScaledVector(new Vector3(m[4], m[5], m[6]), up)
         .addScaledVector(new Vector3(m[8], m[9], m[10]), back).normalize();
-    (u['eye']!.value as Vector3).copy(this.camera.position);
+    (u['eye']!.value as Vector3).copy(camera.position);
     (u['key_direction']!.value as Vector3).copy(direction(0.42, 0.88, 0.55));
     (u['fill_direction']!.value as Vector3).copy(direction(-0.9, 0.15, 0.35));
-    (u['clip_from_world']!.value as Matrix4).multiplyMatrices(this.camera.projectionMatrix, this.camera.matrixWorldInverse);
+    (u['clip_from_world']!.value as Matrix4).multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse);
   }
 
   private placeLabels(tools: Tool[]): void {
@@ -409,7 +445,7 @@ export class Picture {
       const { text, colour } = this.guide.labelOf(tool);
       if (drawn.label.textContent !== text) drawn.label.textContent = text;
       drawn.label.style.setProperty('--own', `#${colour.toString(16).padStart(6, '0')}`);
-      drawn.label.style.transform = `translate(${((at.x + 1) / 2 * this.width).toFixed(1)}px, ${((1 - at.y) / 2 * this.height).toFixed(1)}px)`;
+      drawn.label.style.transform = `translate(${this.onCanvas(at).map(n => `${n.toFixed(1)}px`).join(', ')})`;
     }
     for (const [slot, drawn] of this.tools) drawn.label.hidden = !shown.has(slot);
   }

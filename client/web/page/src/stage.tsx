@@ -5,13 +5,16 @@ import type { ComponentChildren, JSX } from 'preact';
 import { ToolShapeSchema, type Participant, type ToolShape } from './gen/proto/wire_pb';
 import { create } from '@bufbuild/protobuf';
 import { Overlay, Verb, type Replica, type Shape, type Tool, type Vec3 } from './replica';
+import type { Part, ViewCount } from './pane';
 import { Picture, type Guide } from './scene';
+import { PaneChoices } from './views';
 
 export function forceOf(tool: Tool): number { return Math.hypot(...tool.forceN); }
 export const newtons = (n: number): string => `${n.toFixed(n < 10 ? 2 : 1)} N`;
 export const clock = (seconds: number): string => `${Math.floor(seconds / 60)}:${(seconds % 60).toFixed(1).padStart(4, '0')}`;
 
 const kClickPixels = 5;
+const kLeastForViews = 480; // pixels: on a phone there is one view
 const kPlain: ToolShape = create(ToolShapeSchema, { radiusM: 0.005, lengthM: 0.3 });
 
 // Answers the picture about people, from the newest list of them.
@@ -64,6 +67,7 @@ export function Stage(props: StageProps): JSX.Element {
   const canvas = useRef<HTMLCanvasElement>(null), labels = useRef<HTMLDivElement>(null), box = useRef<HTMLDivElement>(null);
   const picture = useRef<Picture | null>(null), latest = useRef(props);
   const [overlay, setOverlay] = useState(Overlay.Holds), [arrows, setArrows] = useState(true), [fault, setFault] = useState(''), [points, setPoints] = useState(false);
+  const [views, setViews] = useState<ViewCount>(1), [active, setActive] = useState(0), [parts, setParts] = useState<Part[]>([]);
   const place = useRef<[number, number] | null>(null), hasPointed = useRef(false);
   latest.current = props;
 
@@ -76,9 +80,15 @@ export function Stage(props: StageProps): JSX.Element {
       return undefined;
     }
     picture.current = drawn;
-    drawn.onLetGo = () => latest.current.onFollow(null);
+    drawn.onLetGo = view => { if (view === 0) latest.current.onFollow(null); };
+    drawn.onActive = setActive;
     props.onReady(drawn);
-    const size = new ResizeObserver(() => { if (box.current) drawn.resize(box.current.clientWidth, box.current.clientHeight); });
+    const size = new ResizeObserver(() => {
+      if (!box.current) return;
+      if (box.current.clientWidth < kLeastForViews) setViews(1);
+      drawn.resize(box.current.clientWidth, box.current.clientHeight);
+      setParts(drawn.parts);
+    });
     size.observe(box.current!);
     const step = (now: number): void => {
       id = requestAnimationFrame(step);
@@ -133,11 +143,17 @@ export function Stage(props: StageProps): JSX.Element {
   };
   const mayPoint = props.onPoint !== undefined;
   useEffect(() => { if (!mayPoint) setPoints(false); }, [mayPoint]);
-  useEffect(() => { if (picture.current) picture.current.follows = props.follows; }, [props.follows]);
+  useEffect(() => picture.current?.follow(0, props.follows), [props.follows]);
+  useEffect(() => {
+    if (!picture.current) return;
+    picture.current.views = views;
+    setParts(picture.current.parts);
+  }, [views]);
+  const mayDivide = (box.current?.clientWidth ?? 0) >= kLeastForViews;
 
   const reset = (): void => {
     picture.current?.resetView();
-    props.onFollow(null);
+    if (active === 0) props.onFollow(null);
   };
   const onKey = (event: KeyboardEvent): void => {
     const p = picture.current, step = event.shiftKey ? 0.02 : 0.1;
@@ -147,6 +163,8 @@ export function Stage(props: StageProps): JSX.Element {
       ...(props.onPlace ? { Enter: () => props.onPlace?.(0.5, 0.5) } : {}), '+': () => p.zoom(0.9), '=': () => p.zoom(0.9), '-': () => p.zoom(1 / 0.9), c: reset, ...(mayPoint ? { p: () => setPoints(!points) } : {}),
       l: () => setOverlay(overlay === Overlay.Holds ? Overlay.None : Overlay.Holds),
       o: () => setOverlay(overlay === Overlay.Regions ? Overlay.None : Overlay.Regions), a: () => setArrows(!arrows),
+      ...(mayDivide ? { v: () => setViews(views === 1 ? 2 : views === 2 ? 4 : 1) } : {}),
+      ...(views > 1 ? Object.fromEntries(parts.map((_, i) => [String(i + 1), () => p.activate(i)])) : {}),
     };
     const act = acts[event.key.length === 1 ? event.key.toLowerCase() : event.key];
     if (!act) return;
@@ -159,8 +177,9 @@ export function Stage(props: StageProps): JSX.Element {
     <div class={`stage${props.isOld ? ' old' : ''}${points || props.onPlace ? ' points' : ''}`} ref={box}>
       <canvas ref={canvas} tabIndex={0} onKeyDown={onKey} role="img"
         onPointerMove={onMove} onPointerDown={onPress} onPointerUp={onRelease} onPointerLeave={() => { place.current = null; }}
-        aria-label="The organ and the instruments. Arrow keys turn the view, plus and minus zoom, C resets it." />
+        aria-label={`The organ and the instruments. Arrow keys turn the view, plus and minus zoom, C resets it.${views > 1 ? ` View ${active + 1} of ${views} is moved; ${views === 2 ? '1 and 2' : '1 to 4'} choose another.` : ''}`} />
       <div class="labels" ref={labels} aria-hidden="true" />
+      {views > 1 && picture.current && <PaneChoices picture={picture.current} parts={parts} active={active} people={props.people} />}
       {fault && <p class="banner fault" role="alert">{fault}</p>}
       {props.children}
       <div class="view" role="toolbar" aria-label="View">
@@ -175,6 +194,13 @@ export function Stage(props: StageProps): JSX.Element {
         <button aria-pressed={overlay === Overlay.Regions} onClick={() => setOverlay(overlay === Overlay.Regions ? Overlay.None : Overlay.Regions)} title="How far each force reaches (O)">Reach</button>
         {mayPoint && <button aria-pressed={points} onClick={() => setPoints(!points)} title="Show everybody the place under the pointer (P)">Point</button>}
         <button aria-pressed={arrows} onClick={() => setArrows(!arrows)} title="Force arrows, 20 mm per newton (A)">Arrows</button>
+        {mayDivide && (
+          <label class="choice" title="Several views at once (V)">Views
+            <select value={String(views)} onChange={e => setViews(Number(e.currentTarget.value) as ViewCount)}>
+              {[1, 2, 4].map(n => <option key={n} value={String(n)}>{n}</option>)}
+            </select>
+          </label>
+        )}
         {props.tools}
       </div>
     </div>

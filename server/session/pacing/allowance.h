@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cstdint>
 
-namespace trocar::replication {
+namespace trocar::pacing {
 
 class Allowance {
  public:
@@ -28,4 +28,4 @@ class Allowance {
   std::uint64_t last_ns_;
 };
 
-}  // namespace trocar::replication
+}  // namespace trocar::pacing

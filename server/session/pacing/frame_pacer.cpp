@@ -1,9 +1,9 @@
-#include "server/session/replication/frame_pacer.h"
+#include "server/session/pacing/frame_pacer.h"
 
 #include <algorithm>
 #include <cmath>
 
-namespace trocar::replication {
+namespace trocar::pacing {
 namespace {
 
 constexpr std::uint64_t kPeriodNs = 10'000'000'000;
@@ -90,4 +90,4 @@ bool FramePacer::may_send(std::uint64_t now_ns) const {
   return now_ns - sent_.back().ns > patience;
 }
 
-}  // namespace trocar::replication
+}  // namespace trocar::pacing

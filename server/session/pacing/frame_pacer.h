@@ -14,7 +14,7 @@
 
 #include "common/base/tick.h"
 
-namespace trocar::replication {
+namespace trocar::pacing {
 
 class FramePacer {
  public:
@@ -62,4 +62,4 @@ class FramePacer {
   std::uint64_t period_begin_ns_ = 0;
 };
 
-}  // namespace trocar::replication
+}  // namespace trocar::pacing

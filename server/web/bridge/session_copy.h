@@ -1,0 +1,100 @@
+#pragma once
+
+// A session's surface and lists as its messages tell them, so that somebody who comes late is shown
+// everything at once, and somebody who is slow gets a difference from what he has instead of all
+// that came since. (The replica of a client, without what a picture needs.)
+//
+// The last 64 frames are kept. What goes to several is encoded once. Outside data: a message that
+// does not fit makes the copy wait for a keyframe, which needs_keyframe() says once; a message that
+// cannot be right is an error. Thread: one.
+
+#include <array>
+#include <map>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "common/base/tick.h"
+#include "common/wire/framing.h"
+#include "common/wire/surface_layout.h"
+
+namespace trocar::proto {
+class Drawing;
+class Envelope;
+class SurfaceChange;
+class SurfaceFrame;
+class SurfaceTopology;
+}  // namespace trocar::proto
+
+namespace trocar::bridge {
+
+// A message means one of these to those who watch.
+enum class News {
+  Nothing,
+  Frame,       // there is another one to give
+  Event,       // it goes to everybody, in order
+  Fleeting,    // likewise, unless too much waits already
+  NewSurface,  // likewise, and no frame before it is of use any more
+  LastFrame    // likewise, once the newest frame has been given
+};
+
+class SessionCopy {
+ public:
+  SessionCopy();
+  ~SessionCopy();
+
+  // `framed`: the same message with its length.
+  Result<News> take(const proto::Envelope& message, const wire::SharedBytes& framed);
+  // True once for each time that the session has to be asked for a keyframe.
+  bool needs_keyframe();
+
+  // There is a frame, and it is of the surface as it was told last.
+  bool has_frame() const { return current_ != nullptr && current_->epoch == layout_.epoch; }
+  // These are of the newest frame.
+  Frame frame() const { return current_->frame; }
+  Tick tick() const { return current_ ? current_->tick : 0; }
+  std::uint32_t surface_crc() const { return current_->surface_crc; }
+  // The session's last, once it has said that.
+  std::optional<Frame> last_frame() const { return last_frame_; }
+  wire::SharedBytes keyframe();
+  // Null: `base` is not kept, or it is of another surface.
+  wire::SharedBytes delta_from(Frame base);
+  // FrameState; null: it has not come yet.
+  const wire::SharedBytes& state() const { return state_; }
+
+  // For who comes late, before the first frame: participants, surface, recording, drawing, stage,
+  // view.
+  std::vector<wire::SharedBytes> all_but_frames();
+  const wire::SharedBytes& topology();
+
+ private:
+  static constexpr std::size_t kKeptFrames = 64;
+  struct Kept {
+    Frame frame = 0;
+    Tick tick = 0;
+    std::uint32_t epoch = 0, surface_crc = 0;
+    std::uint64_t server_time_us = 0;
+    wire::QuantisedSurface surface;
+  };
+
+  Status take_topology(const proto::SurfaceTopology& message);
+  bool take_change(const proto::SurfaceChange& message);
+  bool take_frame(const proto::SurfaceFrame& message);
+  void take_drawing(const proto::Drawing& message);
+  const Kept* find(Frame frame) const;
+  void lose_count();
+  wire::SharedBytes wrap(const Kept* base, const Bytes& payload) const;
+
+  wire::SurfaceLayout layout_;
+  bool has_layout_ = false, wants_keyframe_ = false, has_asked_ = false;
+  std::string organ_name_;
+  std::array<std::shared_ptr<Kept>, kKeptFrames> kept_;  // by frame number
+  std::shared_ptr<Kept> current_;                        // null: waits for a keyframe
+  wire::SharedBytes topology_, keyframe_, state_;        // null: not encoded, or not there
+  std::map<Frame, wire::SharedBytes> deltas_;            // by base
+  wire::SharedBytes participants_, recording_, stage_, view_;
+  std::unique_ptr<proto::Drawing> drawing_;
+  std::optional<Frame> last_frame_;
+};
+
+}  // namespace trocar::bridge

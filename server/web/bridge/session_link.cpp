@@ -1,0 +1,100 @@
+#include "server/web/bridge/session_link.h"
+
+#include <array>
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/detached.hpp>
+#include <boost/asio/ip/tcp.hpp>
+
+#include "common/base/no_throw.h"
+#include "server/web/bridge/bridge.h"
+
+namespace trocar::bridge {
+namespace {
+
+using tcp = asio::ip::tcp;
+
+constexpr std::chrono::seconds kReachDeadline{5};
+// Small, so that old frames wait at the session, which leaves them out, and not on the way.
+constexpr int kReceiveBytes = 64 * 1024;
+
+}  // namespace
+
+SessionLink::SessionLink(asio::any_io_executor executor, Bridge& bridge)
+    : executor_(std::move(executor)), bridge_(bridge), deadline_(executor_) {}
+
+void SessionLink::cut() {
+  is_cut_ = true;
+  boost::system::error_code ignored;
+  if (stream_) stream_->socket().close(ignored);
+}
+
+// Coroutines here hold no temporaries across a co_await: GCC 12 miscompiles some of them otherwise.
+asio::awaitable<bool> SessionLink::open(const SessionAddress& session) {
+  deadline_.expires_after(kReachDeadline);
+  deadline_.async_wait([this](boost::system::error_code error) {
+    boost::system::error_code ignored;
+    if (!error && stream_) stream_->socket().close(ignored);
+  });
+  const bool is_there = co_await connect(session);
+  bool is_open = false;
+  if (is_there) is_open = co_await begin_tls(session);
+  deadline_.cancel();
+  co_return is_open && !is_cut_;
+}
+
+asio::awaitable<bool> SessionLink::connect(const SessionAddress& session) {
+  tcp::resolver resolver(executor_);
+  const std::string port = std::to_string(session.port);
+  const auto [unresolved, endpoints] =
+      co_await resolver.async_resolve(session.host, port, kNoThrow);
+  if (!unresolved) {
+    for (const auto& entry : endpoints) {
+      if (is_cut_) break;
+      tcp::socket socket(executor_);
+      boost::system::error_code ignored;
+      const tcp::endpoint endpoint = entry.endpoint();
+      socket.open(endpoint.protocol(), ignored);
+      socket.set_option(asio::socket_base::receive_buffer_size(kReceiveBytes), ignored);
+      stream_.emplace(std::move(socket), bridge_.tls());
+      const auto [error] = co_await stream_->socket().async_connect(endpoint, kNoThrow);
+      if (error) continue;
+      stream_->socket().set_option(tcp::no_delay(true), ignored);
+      co_return true;
+    }
+  }
+  why_ = "the session at " + session.name + " cannot be reached: is it running?";
+  co_return false;
+}
+
+asio::awaitable<bool> SessionLink::begin_tls(const SessionAddress& session) {
+  const auto error = co_await stream_->begin_tls(session.host);
+  if (error) {
+    why_ = session.name + ": " + secure::describe_handshake_failure(error);
+    co_return false;
+  }
+  const Bytes der = stream_->peer_certificate_der();
+  code_ = bridge_.code_of(der);
+  co_return true;
+}
+
+asio::awaitable<bool> SessionLink::read(Bytes& body) {
+  std::array<std::uint8_t, wire::kHeaderBytes> header{};
+  const auto head = co_await stream_->read_all(asio::buffer(header));
+  if (head.error) co_return false;
+  const auto length = wire::decode_length(header, wire::kMaxDownstreamBytes);
+  if (!length) co_return false;
+  body.resize(*length);
+  const auto rest = co_await stream_->read_all(asio::buffer(body));
+  if (rest.error) co_return false;
+  ++bridge_.counters.session_messages;
+  bridge_.counters.session_bytes += body.size() + wire::kHeaderBytes;
+  co_return true;
+}
+
+asio::awaitable<bool> SessionLink::write(BytesView framed) {
+  const std::vector<asio::const_buffer> buffers{asio::buffer(framed.data(), framed.size())};
+  const auto sent = co_await stream_->write_all(buffers);
+  co_return !sent.error;
+}
+
+}  // namespace trocar::bridge

@@ -1,0 +1,190 @@
+// The copy of a session from which those who share a connection are given their pictures.
+
+#include "server/web/bridge/session_copy.h"
+
+#include <gtest/gtest.h>
+
+#include "common/wire/surface_codec.h"
+#include "common/wire/surface_messages.h"
+#include "proto/wire.pb.h"
+#include "server/web/bridge/server_clock.h"
+
+namespace trocar::bridge {
+namespace {
+
+using proto::Envelope;
+using wire::QuantisedSurface;
+
+// A triangle whose corners move, told as a server tells it.
+class Session {
+ public:
+  Session() {
+    layout_.rest_quanta = {{0, 0, 0}, {100, 0, 0}, {0, 100, 0}};
+    layout_.triangles = {{VertexIndex(0), VertexIndex(1), VertexIndex(2)}};
+    layout_.is_wound = {0};
+    layout_.node_of_vertex.resize(3);
+    layout_.triangle_sum = layout_.compute_triangle_sum();
+    surface_.resize(3);
+  }
+  Envelope topology() const {
+    Envelope envelope;
+    wire::write(layout_, "triangle", *envelope.mutable_surface_topology());
+    return envelope;
+  }
+  // The next frame, as a difference from the one before, or whole.
+  Envelope frame(bool is_keyframe) {
+    const auto before = surface_;
+    ++frame_;
+    surface_[frame_ % 3].x += 5;
+    Envelope envelope;
+    auto& message = *envelope.mutable_surface_frame();
+    message.set_frame(frame_);
+    message.set_tick(16 * frame_);
+    message.set_is_keyframe(is_keyframe);
+    if (!is_keyframe) message.set_base_frame(frame_ - 1);
+    Bytes payload;
+    if (is_keyframe)
+      wire::encode_keyframe(surface_, payload);
+    else
+      wire::encode_delta(before, surface_, payload);
+    message.set_payload(payload.data(), payload.size());
+    message.set_surface_crc(wire::surface_crc(surface_));
+    return envelope;
+  }
+  const QuantisedSurface& surface() const { return surface_; }
+  Frame number() const { return frame_; }
+
+ private:
+  wire::SurfaceLayout layout_;
+  QuantisedSurface surface_;
+  Frame frame_ = 0;
+};
+
+News take(SessionCopy& copy, const Envelope& envelope) {
+  const auto news = copy.take(envelope, wire::encode_envelope(envelope));
+  EXPECT_TRUE(news.ok());
+  return news.ok() ? *news : News::Nothing;
+}
+
+proto::SurfaceFrame read(const wire::SharedBytes& framed) {
+  Envelope envelope;
+  EXPECT_TRUE(wire::decode_envelope(BytesView(*framed).subspan(wire::kHeaderBytes), envelope).ok());
+  return envelope.surface_frame();
+}
+
+Bytes payload_of(const proto::SurfaceFrame& frame) {
+  return {frame.payload().begin(), frame.payload().end()};
+}
+
+TEST(SessionCopy, shows_who_comes_late_the_newest_frame_whole) {
+  Session session;
+  SessionCopy copy;
+  EXPECT_FALSE(copy.has_frame());
+  EXPECT_EQ(take(copy, session.topology()), News::NewSurface);
+  EXPECT_EQ(take(copy, session.frame(true)), News::Frame);
+  for (int i = 0; i < 5; ++i) EXPECT_EQ(take(copy, session.frame(false)), News::Frame);
+  ASSERT_TRUE(copy.has_frame());
+  EXPECT_EQ(copy.frame(), session.number());
+  const auto whole = read(copy.keyframe());
+  QuantisedSurface shown(3);
+  ASSERT_TRUE(whole.is_keyframe());
+  ASSERT_TRUE(wire::decode_keyframe(payload_of(whole), shown).ok());
+  EXPECT_EQ(shown, session.surface());
+  EXPECT_EQ(copy.keyframe(), copy.keyframe()) << "it is encoded once";
+}
+
+TEST(SessionCopy, tells_the_difference_from_any_of_the_last_64_frames) {
+  Session session;
+  SessionCopy copy;
+  take(copy, session.topology());
+  take(copy, session.frame(true));
+  std::vector<QuantisedSurface> all(2);
+  all[1] = session.surface();
+  for (int i = 0; i < 80; ++i) {
+    take(copy, session.frame(false));
+    all.push_back(session.surface());
+  }
+  for (Frame base = session.number() - 63; base < session.number(); ++base) {
+    const auto delta = copy.delta_from(base);
+    ASSERT_TRUE(delta) << base;
+    auto shown = all[base];
+    ASSERT_TRUE(wire::decode_delta(payload_of(read(delta)), shown).ok());
+    EXPECT_EQ(shown, session.surface());
+  }
+  EXPECT_FALSE(copy.delta_from(session.number() - 64));
+  EXPECT_FALSE(copy.delta_from(session.number())) << "there is no difference from itself";
+}
+
+TEST(SessionCopy, asks_once_for_a_keyframe_when_it_has_lost_count) {
+  Session session;
+  SessionCopy copy;
+  take(copy, session.topology());
+  take(copy, session.frame(true));
+  auto damaged = session.frame(false);
+  damaged.mutable_surface_frame()->set_surface_crc(1);
+  EXPECT_EQ(take(copy, damaged), News::Nothing);
+  EXPECT_FALSE(copy.has_frame());
+  EXPECT_TRUE(copy.needs_keyframe());
+  EXPECT_FALSE(copy.needs_keyframe());
+  EXPECT_EQ(take(copy, session.frame(false)), News::Nothing) << "its base is not known";
+  EXPECT_FALSE(copy.needs_keyframe());
+  EXPECT_EQ(take(copy, session.frame(true)), News::Frame);
+  EXPECT_TRUE(copy.has_frame());
+}
+
+TEST(SessionCopy, refuses_a_surface_that_cannot_be) {
+  SessionCopy copy;
+  Envelope envelope;
+  envelope.mutable_surface_topology()->add_triangle(7);
+  EXPECT_FALSE(copy.take(envelope, wire::encode_envelope(envelope)).ok());
+}
+
+TEST(SessionCopy, a_new_surface_makes_old_frames_useless) {
+  Session session;
+  SessionCopy copy;
+  take(copy, session.topology());
+  take(copy, session.frame(true));
+  take(copy, session.frame(false));
+  take(copy, session.topology());
+  EXPECT_FALSE(copy.has_frame());
+  take(copy, session.frame(true));
+  EXPECT_FALSE(copy.delta_from(session.number() - 1));
+}
+
+TEST(SessionCopy, keeps_lists_and_lines_for_who_comes_late) {
+  Session session;
+  SessionCopy copy;
+  take(copy, session.topology());
+  Envelope people, line, more;
+  people.mutable_participants()->add_participant()->set_name("Ann");
+  line.mutable_drawing()->add_stroke()->set_participant(17);
+  more.mutable_drawing()->add_stroke()->set_participant(18);
+  more.mutable_drawing()->set_is_addition(true);
+  EXPECT_EQ(take(copy, people), News::Event);
+  take(copy, line);
+  take(copy, more);
+  int strokes = 0, lists = 0;
+  for (const auto& framed : copy.all_but_frames()) {
+    Envelope envelope;
+    ASSERT_TRUE(
+        wire::decode_envelope(BytesView(*framed).subspan(wire::kHeaderBytes), envelope).ok());
+    strokes += envelope.drawing().stroke_size();
+    lists += envelope.has_participants();
+  }
+  EXPECT_EQ(strokes, 2);
+  EXPECT_EQ(lists, 1);
+}
+
+TEST(ServerClock, takes_the_shortest_of_the_last_round_trips) {
+  ServerClock clock;
+  EXPECT_EQ(clock.at(1000), 0u);
+  clock.note(1000, 1100, 5050);  // there and back in 100: 5050 was when it was 1050 here
+  EXPECT_EQ(clock.at(2000), 6000u);
+  clock.note(2000, 4000, 6500);  // slow, and off by 500
+  EXPECT_EQ(clock.at(2000), 6000u);
+  clock.note(5000, 4000, 1);  // cannot be
+  EXPECT_EQ(clock.at(2000), 6000u);
+}
+
+}  // namespace
+}  // namespace trocar::bridge
