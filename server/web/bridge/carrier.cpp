@@ -173,7 +173,7 @@ bool Carrier::take(const Bytes& body) {
   }
 }
 
-// What ends this connection alone, the pages survive: they come back over the next one.
+// The pages survive what ends this connection alone: they come back over the next one.
 void Carrier::say_goodbye(const proto::Goodbye& goodbye) {
   const bool is_old = !is_carrying_ && goodbye.reason() == proto::GOODBYE_PROTOCOL_ERROR;
   why_ =
