@@ -380,10 +380,11 @@ namespace {
 
 Status read_lesson(ServerOptions& options) {
   if (options.lesson_file.empty()) return {};
-  if (options.is_organ_chosen)
-    return Error{ErrorCode::Usage, "--lesson: the lesson brings its organ, leave out --organ"};
   auto lesson = lesson::find_lesson(options.lesson_file);
   if (!lesson) return Error{lesson.error().code, "--lesson: " + lesson.error().message};
+  if (options.is_organ_chosen && options.organ != lesson->organ)
+    return Error{ErrorCode::Usage, "--lesson: its organ is " + lesson->organ + " and not " +
+                                       options.organ + ", leave out --organ"};
   options.organ = lesson->organ;
   options.lesson = *std::move(lesson);
   return {};
