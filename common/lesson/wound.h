@@ -2,6 +2,7 @@
 
 // Wounds and free pieces are measured here, on the surface at rest.
 
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>

@@ -2,6 +2,7 @@
 // let in, listed and put out as anybody; frames, events and lists go to the carrier, once.
 
 #include "proto/wire.pb.h"
+#include "server/session/replication/messages.h"
 #include "server/session/replication/replicator_client.h"
 
 namespace trocar::replication {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "common/wire/tool_shape.h"
 #include "proto/wire.pb.h"
 #include "server/session/replication/messages.h"
 #include "server/session/replication/replicator_client.h"
