@@ -45,8 +45,8 @@ Result<std::unique_ptr<OwnServer>> OwnServer::start(const Settings& settings, co
   const auto program = program_path();
   const std::string address = settings.is_for_network ? "0.0.0.0" : "127.0.0.1";
   std::vector<std::string> words{program,
-                                 "--organ",
-                                 settings.organ,
+                                 settings.lesson.empty() ? "--organ" : "--lesson",
+                                 settings.lesson.empty() ? settings.organ : settings.lesson,
                                  "--listen",
                                  address + ":" + std::to_string(kPort),
                                  "--journal",

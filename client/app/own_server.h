@@ -17,6 +17,7 @@ class OwnServer {
  public:
   struct Settings {
     std::string organ = "liver";
+    std::string lesson;               // brings its organ; empty: none
     bool is_for_network = false;      // otherwise for this machine alone
     std::filesystem::path recording;  // empty: none
   };

@@ -20,6 +20,8 @@
 #include "common/base/background.h"
 #include "common/base/timing.h"
 #include "common/discovery/finder.h"
+#include "common/lesson/lesson.h"
+#include "common/lesson/lesson_texts.h"
 #include "common/secure/join_code.h"
 #include "common/secure/link_file.h"
 #include "common/secure/private_files.h"
@@ -142,12 +144,21 @@ Status start_own(const ui::StartChoice& choice, std::unique_ptr<OwnServer>& own)
   if (!folder) return folder.error();
   if (const auto made = secure::make_private_folder(*folder); !made) return made;
   OwnServer::Settings settings{.organ = choice.organ,
+                               .lesson = choice.task,
                                .is_for_network = choice.deed == ui::StartDeed::Host};
   if (choice.is_recorded) settings.recording = new_recording();
   auto started = OwnServer::start(settings, *folder / "own-server.log");
   if (!started) return started.error();
   own = std::move(*started);
   return {};
+}
+
+std::vector<ui::StartTask> tasks() {
+  std::vector<ui::StartTask> tasks;
+  for (const auto& each : lesson::lesson_texts())
+    if (const auto lesson = lesson::read_lesson_text(each.text, each.name))
+      tasks.push_back({each.name, lesson->title, lesson->text});
+  return tasks;
 }
 
 ui::StartLesson lesson_of(const OwnServer& own) {
@@ -186,7 +197,9 @@ class OwnStart {
     const auto code = own_code();
     const bool was_up = std::exchange(is_up_, is_up_ || (!code.empty() && code != code_before_));
     if (!is_up_) {
-      model.message = "The server starts, with " + own_->settings().organ + " ...";
+      const auto& settings = own_->settings();
+      model.message = "The server starts, with " +
+                      (settings.lesson.empty() ? settings.organ : settings.lesson) + " ...";
       return false;
     }
     if (!was_up) model.message.clear();
@@ -232,7 +245,7 @@ Result<std::optional<ClientOptions>> choose_session(ClientOptions options,
                           .role = options.role});
   Lookout lookout;
   OwnStart own_start(own);
-  ui::StartModel model{.recordings = recordings_at_hand(), .message = message};
+  ui::StartModel model{.tasks = tasks(), .recordings = recordings_at_hand(), .message = message};
   ui::StartChoice practice;
   while (!(*context)->should_close() && !is_stop_requested()) {
     const auto begin = monotonic_ns();

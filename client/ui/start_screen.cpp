@@ -46,6 +46,7 @@ StartScreen::StartScreen(const StartChoice& preset) : role_(preset.role) {
 StartChoice StartScreen::choice(StartDeed deed) const {
   return {.deed = deed,
           .organ = kOrgans[organ_].name,
+          .task = task_,
           .is_recorded = is_recorded_,
           .recording = recording_.data(),
           .server = server_.data(),
@@ -138,15 +139,32 @@ void StartScreen::draw_lesson(const StartLesson& lesson) {
     wanted_ = StartDeed::EndLesson;
 }
 
+void StartScreen::draw_task(const StartModel& model) {
+  const auto chosen = std::ranges::find(model.tasks, task_, &StartTask::name);
+  if (ImGui::BeginCombo(
+          "task", chosen == model.tasks.end() ? "None: do what you like" : chosen->title.c_str())) {
+    if (ImGui::Selectable("None: do what you like", task_.empty())) task_.clear();
+    for (const auto& task : model.tasks)
+      if (ImGui::Selectable(task.title.c_str(), task.name == task_)) task_ = task.name;
+    ImGui::EndCombo();
+  }
+  if (chosen == model.tasks.end()) return;
+  ImGui::PushStyleColor(ImGuiCol_Text, ImGui::GetStyleColorVec4(ImGuiCol_TextDisabled));
+  ImGui::TextWrapped("%s", chosen->text.c_str());
+  ImGui::PopStyleColor();
+}
+
 void StartScreen::draw_own(StartDeed deed, const StartModel& model) {
   const bool is_lesson = deed == StartDeed::Host;
   if (is_lesson && model.lesson) return draw_lesson(*model.lesson);
-  ImGui::TextWrapped("%s", is_lesson
-                               ? "This machine becomes the server of a lesson, to which others "
-                                 "come over the local network. It ends with this window."
-                               : "You alone with an organ, on this machine.");
+  ImGui::TextWrapped(
+      "%s", is_lesson ? "This machine becomes the server of a lesson, to which others "
+                        "come over the local network. It ends with this window."
+                      : "You alone with an organ, on this machine. A task has goals and points.");
   ImGui::Spacing();
-  if (ImGui::BeginCombo("organ", kOrgans[organ_].text)) {
+  draw_task(model);
+  // A task brings its organ.
+  if (task_.empty() && ImGui::BeginCombo("organ", kOrgans[organ_].text)) {
     for (std::size_t i = 0; i < kOrgans.size(); ++i)
       if (ImGui::Selectable(kOrgans[i].text, i == organ_)) organ_ = i;
     ImGui::EndCombo();

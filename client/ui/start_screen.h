@@ -20,6 +20,12 @@ struct StartSession {
   bool needs_code = true;
 };
 
+// Something to do with goals and points, on an organ of its own.
+struct StartTask {
+  std::string name;  // as trocar-server --lesson takes it
+  std::string title, text;
+};
+
 // A lesson that this window hosts, and how others get in.
 struct StartLesson {
   std::string address;             // "theatre-1:7690"
@@ -29,6 +35,7 @@ struct StartLesson {
 
 struct StartModel {
   std::vector<StartSession> sessions;
+  std::vector<StartTask> tasks;
   std::vector<std::string> recordings;  // files that are at hand, newest first
   std::optional<StartLesson> lesson;    // runs
   std::string no_sessions_text;         // why there are none, if it is known
@@ -41,6 +48,7 @@ enum class StartDeed { Join, Practise, Host, Watch, TakePart, EndLesson };
 struct StartChoice {
   StartDeed deed = StartDeed::Join;
   std::string organ = "liver";  // to practise on, or of the lesson
+  std::string task;             // instead of an organ; empty: none
   bool is_recorded = true;      // likewise
   std::string recording;        // to watch
   std::string server, code, name;
@@ -62,6 +70,7 @@ class StartScreen {
   void draw_sessions(const StartModel& model);
   void draw_join(const StartModel& model);
   void draw_own(StartDeed deed, const StartModel& model);
+  void draw_task(const StartModel& model);
   void draw_lesson(const StartLesson& lesson);
   void draw_recordings(const StartModel& model);
   void draw_person();
@@ -75,6 +84,7 @@ class StartScreen {
   std::array<char, 512> recording_{};
   replica::Role role_;
   std::size_t organ_ = 0;
+  std::string task_;
   bool is_recorded_ = true;
   bool has_turned_to_lesson_ = false;
   std::optional<StartDeed> wanted_;  // a button was pressed

@@ -79,6 +79,10 @@ double Course::seconds() const {
   return tick_ ? seconds_of(*tick_ - begin_) : 0;
 }
 
+double Course::harm_m2() const {
+  return meter_->harm_m2;
+}
+
 bool Course::shows_hint() const {
   return !is_over() && !stage().hint.empty() && seconds() >= stage().hint_after_s;
 }

@@ -80,6 +80,9 @@ class Course {
   double progress() const { return progress_; }  // of its goal, 0 to 1
   bool shows_hint() const;
   bool is_too_strong() const { return is_too_strong_; }  // in the newest frame
+  // Returns the wound within what is to be spared, m^2, of the stage so far as it was last looked
+  // at.
+  double harm_m2() const;
   // Returns where the point to follow is; nothing: there is none.
   std::optional<Vec3d> target_m() const;
   const std::vector<StageResult>& results() const { return results_; }  // of stages that are over

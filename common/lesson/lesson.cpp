@@ -45,10 +45,22 @@ const char* words_of(Measure measure) {
   return kTexts[static_cast<std::size_t>(measure)].words;
 }
 
+const char* unit_of(Measure measure) {
+  return kTexts[static_cast<std::size_t>(measure)].unit;
+}
+
+double in_unit(Measure measure, double value) {
+  return value * kTexts[static_cast<std::size_t>(measure)].shown_per_unit;
+}
+
+int digits_of(Measure measure) {
+  return kTexts[static_cast<std::size_t>(measure)].digits;
+}
+
 std::string text_of(Measure measure, double value) {
-  const auto& text = kTexts[static_cast<std::size_t>(measure)];
-  const auto number = fmt::format("{:.{}f}", value * text.shown_per_unit, text.digits);
-  return *text.unit == '\0' ? number : number + " " + text.unit;
+  const std::string unit = unit_of(measure);
+  const auto number = fmt::format("{:.{}f}", in_unit(measure, value), digits_of(measure));
+  return unit.empty() ? number : number + " " + unit;
 }
 
 double Score::points(double value) const {

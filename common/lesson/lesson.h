@@ -63,6 +63,10 @@ const char* key_of(Measure measure);
 const char* words_of(Measure measure);
 // A number as people read it: "12.3 s", "4.1 mm".
 std::string text_of(Measure measure, double value);
+// Its unit there, "mm", empty for a count; a value in that unit, which is the key's; its digits.
+const char* unit_of(Measure measure);
+double in_unit(Measure measure, double value);
+int digits_of(Measure measure);
 
 // Points for a measure: all of them up to `full`, none from `none` on, linear between.
 struct Score {

@@ -68,22 +68,6 @@ Structure read_structure(TableReader& reader) {
   return structure;
 }
 
-// Thresholds are in the unit of the measure's key.
-double unit_of(Measure measure) {
-  switch (measure) {
-    case Measure::Error:
-    case Measure::MissingMargin:
-      return 1e-3;
-    case Measure::StrayWound:
-    case Measure::Harm:
-      return 1e-4;
-    case Measure::Volume:
-      return 1e-6;
-    default:
-      return 1;
-  }
-}
-
 Score read_score(TableReader& reader) {
   Score score;
   const auto key = reader.string("measure");
@@ -101,7 +85,7 @@ Score read_score(TableReader& reader) {
   if (!none) reader.fail_missing("none", "say from where on there are no points");
   if (full && none && !(*full < *none))
     reader.fail("none", "is " + shown(*none) + ", which has to be more than full");
-  const double unit = unit_of(score.measure);
+  const double unit = 1 / in_unit(score.measure, 1);  // of the key
   score.full = full.value_or(0) * unit, score.none = none.value_or(1) * unit;
   reader.finish();
   return score;

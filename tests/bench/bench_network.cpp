@@ -18,7 +18,7 @@
 #include <sstream>
 #include <thread>
 
-#include "server/lab/plot/plot.h"
+#include "common/plot/plot.h"
 #include "tests/support/child_program.h"
 
 namespace trocar {

@@ -6,7 +6,7 @@
 #include <fstream>
 #include <map>
 
-#include "server/lab/plot/plot.h"
+#include "common/plot/plot.h"
 #include "tests/control/virtual_machine.h"
 
 namespace trocar::control {

@@ -5,8 +5,9 @@
 #include <csignal>
 #include <fstream>
 #include <limits>
-#include <optional>
+#include <vector>
 
+#include "common/base/json.h"
 #include "common/journal/session_journal.h"
 #include "tests/e2e/programs.h"
 
@@ -16,9 +17,23 @@ namespace {
 const std::filesystem::path kHands =
     std::filesystem::path(TROCAR_SOURCE_DIR) / "tests/e2e/lesson_hands";
 
+struct Hand {
+  std::string name, script;
+};
+
 struct Played {
-  std::optional<proto::LessonResult> first;  // of the first stage; nothing: it is not over
+  std::vector<proto::LessonResult> results;  // of stages that are over
   int answers = 0;
+  Json assessed;  // by trocar-journal
+
+  // Returns a number of a stage, as it was assessed.
+  double measure(int stage, const char* key) const {
+    return assessed["stages"][static_cast<std::size_t>(stage)]["measures"][key].get<double>();
+  }
+  // Returns a number of the only hand in the first stage.
+  double skill(const char* key) const {
+    return assessed["stages"][0]["hands"][0][key].get<double>();
+  }
 };
 
 Played read(const std::filesystem::path& file) {
@@ -26,8 +41,8 @@ Played read(const std::filesystem::path& file) {
   auto journal = journal::SessionJournal::open(file);
   EXPECT_TRUE(journal.ok());
   const auto visit = [&](Tick, const proto::LessonRecord& record) {
-    if (record.has_stage() && record.stage().result_size() > 0)
-      played.first = record.stage().result(0);
+    if (record.has_stage())
+      played.results = {record.stage().result().begin(), record.stage().result().end()};
     played.answers += record.has_input();
     return true;
   };
@@ -35,59 +50,123 @@ Played read(const std::filesystem::path& file) {
   return played;
 }
 
-// Plays a hand for so many seconds, or until the first stage is over.
-Played play(const std::string& lesson, const std::string& hand, int seconds,
+// The report has to give what people were told.
+void assess(const std::filesystem::path& file, Played& played) {
+  const auto log = test_folder() / "assessed.json";
+  Program program("trocar-journal", {"assess", file, "--json"}, log);
+  ASSERT_EQ(program.wait(60), 0) << read_text(log);
+  played.assessed = Json::parse(read_text(log));
+  EXPECT_TRUE(played.assessed["notes"].empty()) << played.assessed["notes"];
+  for (std::size_t i = 0; i < played.results.size(); ++i) {
+    const auto& told = played.results[i];
+    const auto& stage = played.assessed["stages"][i];
+    EXPECT_EQ(stage["is_reached"], told.is_reached());
+    EXPECT_NEAR(stage["points"].get<double>(), told.points(), 0.01);
+  }
+}
+
+// Plays a lesson until so many stages are over, or for so many seconds.
+Played play(const std::string& lesson, const std::vector<Hand>& hands, int stages, int seconds,
             const std::vector<std::string>& extra = {}) {
   Session session("liver", {"--lesson", lesson});
-  std::vector<std::string> arguments{"--script", kHands / (hand + ".toml"), "--no-render"};
-  arguments.insert(arguments.end(), extra.begin(), extra.end());
-  auto client = session.client("Anna", "surgeon", arguments);
+  std::vector<Program> clients;
+  for (const auto& hand : hands) {
+    std::vector<std::string> arguments{"--script", kHands / (hand.script + ".toml"), "--no-render"};
+    arguments.insert(arguments.end(), extra.begin(), extra.end());
+    clients.push_back(session.client(hand.name, "surgeon", arguments));
+  }
   wait_until(
-      [&] { return read_text(session.folder / "server.log").find("points") != std::string::npos; },
+      [&] {
+        const auto log = read_text(session.folder / "server.log");
+        int over = 0;
+        for (auto at = log.find(" points"); at != std::string::npos;
+             at = log.find(" points", at + 1))
+          over += log.compare(at - 4, 4, " 100") == 0;
+        return over >= stages;
+      },
       seconds);
   session.server().signal(SIGTERM);
   EXPECT_EQ(session.server().wait(30), 0);
-  client.wait(30);
+  for (auto& client : clients) client.wait(30);
   Program verify("trocar-journal", {"verify", session.journal}, session.folder / "verify.log");
   EXPECT_EQ(verify.wait(300), 0) << read_text(session.folder / "verify.log");
-  std::filesystem::rename(session.journal, session.folder / (hand + ".mcap"));
+  const auto file = session.folder / (hands.back().script + ".mcap");
+  std::filesystem::rename(session.journal, file);
   std::filesystem::remove(session.folder / "ready");  // another session may follow in this folder
-  return read(session.folder / (hand + ".mcap"));
+  auto played = read(file);
+  assess(file, played);
+  return played;
 }
 
 TEST(Lessons, WhoFeelsTheLumpFindsIt) {
-  const auto well = play("find-the-lump", "find-well", 60, {"--answer-at", "8"});
-  ASSERT_TRUE(well.first);
-  EXPECT_TRUE(well.first->is_reached());
-  EXPECT_GT(well.first->points(), 90);
+  const auto well = play("find-the-lump", {{"Anna", "find-well"}}, 1, 60, {"--answer-at", "8"});
+  ASSERT_EQ(well.results.size(), 1u);
+  EXPECT_TRUE(well.results[0].is_reached());
+  EXPECT_GT(well.results[0].points(), 90);
   EXPECT_EQ(well.answers, 1);
-  const auto badly = play("find-the-lump", "find-badly", 14, {"--answer-at", "8"});
-  EXPECT_FALSE(badly.first);
+  EXPECT_EQ(well.measure(0, "wrong_answers"), 0);
+  const auto badly = play("find-the-lump", {{"Anna", "find-badly"}}, 1, 14, {"--answer-at", "8"});
+  EXPECT_TRUE(badly.results.empty());
   EXPECT_EQ(badly.answers, 1);
+  EXPECT_EQ(badly.assessed["stages"][0]["moments"][0]["text"], "gave a wrong answer");
 }
 
 TEST(Lessons, WhoKeepsOnThePointFollowsIt) {
-  const auto well = play("follow-the-point", "follow-well", 60);
-  ASSERT_TRUE(well.first);
-  EXPECT_TRUE(well.first->is_reached());
-  EXPECT_GT(well.first->points(), 90);
-  EXPECT_FALSE(play("follow-the-point", "follow-badly", 16).first);
+  const auto well = play("follow-the-point", {{"Anna", "follow-well"}}, 1, 60);
+  ASSERT_EQ(well.results.size(), 1u);
+  EXPECT_TRUE(well.results[0].is_reached());
+  EXPECT_GT(well.results[0].points(), 90);
+  EXPECT_TRUE(play("follow-the-point", {{"Anna", "follow-badly"}}, 1, 16).results.empty());
 }
 
 TEST(Lessons, WhoCutsAlongTheLineReachesItsEnd) {
-  const auto well = play("along-the-line", "incise-well", 60);
-  ASSERT_TRUE(well.first);
-  EXPECT_TRUE(well.first->is_reached());
-  EXPECT_GT(well.first->points(), 60);
-  EXPECT_FALSE(play("along-the-line", "incise-badly", 16).first);
+  const auto well = play("along-the-line", {{"Anna", "incise-well"}}, 1, 60);
+  ASSERT_EQ(well.results.size(), 1u);
+  EXPECT_TRUE(well.results[0].is_reached());
+  EXPECT_GT(well.results[0].points(), 60);
+  EXPECT_TRUE(play("along-the-line", {{"Anna", "incise-badly"}}, 1, 16).results.empty());
 }
 
 TEST(Lessons, WhoPullsGentlyGetsMorePoints) {
-  const auto well = play("lift-gently", "lift-well", 60);
-  const auto badly = play("lift-gently", "lift-badly", 60);
-  ASSERT_TRUE(well.first && badly.first);
-  EXPECT_TRUE(well.first->is_reached());
-  EXPECT_GT(well.first->points(), badly.first->points() + 10);
+  const auto well = play("lift-gently", {{"Anna", "lift-well"}}, 1, 60);
+  const auto badly = play("lift-gently", {{"Anna", "lift-badly"}}, 1, 60);
+  ASSERT_TRUE(well.results.size() == 1 && badly.results.size() == 1);
+  EXPECT_TRUE(well.results[0].is_reached());
+  EXPECT_GT(well.results[0].points(), badly.results[0].points() + 10);
+  for (const char* key : {"peak_force_n", "mean_force_n", "time_above_limit_s", "work_mj"})
+    EXPECT_LT(well.skill(key), badly.skill(key)) << key;
+}
+
+TEST(Lessons, ThreeHoldAndCutTogether) {
+  const auto well = play(
+      "hold-for-another",
+      {{"Anna", "hold-left"}, {"Ben", "hold-right-well"}, {"Carla", "cut-between-well"}}, 2, 90);
+  ASSERT_EQ(well.results.size(), 2u);
+  EXPECT_TRUE(well.results[0].is_reached());
+  EXPECT_TRUE(well.results[1].is_reached());
+  EXPECT_EQ(well.measure(0, "refusals"), 0);
+  EXPECT_EQ(well.assessed["stages"][1]["hands"].size(), 3u);
+  // Ben asks three times for what Anna holds, and then pulls.
+  const auto badly =
+      play("hold-for-another", {{"Anna", "hold-left"}, {"Ben", "hold-right-badly"}}, 1, 60);
+  ASSERT_EQ(badly.results.size(), 1u);
+  EXPECT_LT(badly.results[0].points(), well.results[0].points() - 10);
+  EXPECT_EQ(badly.measure(0, "refusals"), 3);
+  EXPECT_GT(badly.measure(0, "peak_force_n"), well.measure(0, "peak_force_n"));
+}
+
+TEST(Lessons, WhoCutsFarFromTheLumpTakesItOutWithItsMargin) {
+  const auto well = play("take-it-out", {{"Anna", "remove-well"}}, 2, 120, {"--answer-at", "4"});
+  ASSERT_EQ(well.results.size(), 2u);
+  EXPECT_TRUE(well.results[0].is_reached());
+  EXPECT_TRUE(well.results[1].is_reached());
+  EXPECT_EQ(well.measure(1, "missing_margin_mm"), 0);
+  EXPECT_EQ(well.measure(1, "harm_cm2"), 0);
+  // The next one cuts through the lump.
+  const auto badly = play("take-it-out", {{"Anna", "remove-badly"}}, 2, 120, {"--answer-at", "4"});
+  ASSERT_EQ(badly.results.size(), 2u);
+  EXPECT_LT(badly.results[1].points(), well.results[1].points() - 10);
+  EXPECT_GT(badly.measure(1, "missing_margin_mm"), 3);
 }
 
 // Clients are told nothing of what lies in the organ.

@@ -1,7 +1,7 @@
 // Plots as a person gets them: what was asked for is in the SVG, and no text is taken for a
 // command.
 
-#include "server/lab/plot/plot.h"
+#include "common/plot/plot.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -9,7 +9,7 @@
 #include <cmath>
 #include <fstream>
 
-#include "server/lab/plot/gnuplot.h"
+#include "common/plot/gnuplot.h"
 
 namespace trocar::plot {
 namespace {

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "server/lab/plot/plot.h"
+#include "common/plot/plot.h"
 #include "server/lab/scenario/scenario_run.h"
 
 namespace trocar::validation {

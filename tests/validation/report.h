@@ -20,7 +20,7 @@
 #include <vector>
 
 #include "common/base/result.h"
-#include "server/lab/plot/plot.h"
+#include "common/plot/plot.h"
 
 namespace trocar::validation {
 

@@ -16,14 +16,14 @@
 #include "common/journal/mcap_repair.h"
 #include "common/journal/session_journal.h"
 #include "common/wire/role.h"
+#include "server/app/journal/assess_command.h"
+#include "server/app/journal/program_name.h"
 #include "server/session/recording/force_table.h"
 #include "server/session/recording/lesson_table.h"
 #include "server/session/recording/verify.h"
 
 namespace trocar::app {
 namespace {
-
-constexpr const char* kProgram = "trocar-journal";
 
 std::uint64_t count_of(const journal::McapReader& mcap, std::uint16_t id) {
   const auto& counts = mcap.statistics().channel_message_counts;
@@ -215,6 +215,9 @@ int run(int argc, char** argv) {
       "  trocar-journal export session.mcap --lesson lesson.csv\n"
       "                                                what instructors did, notes, talk, "
       "pointing\n"
+      "  trocar-journal assess session.mcap --html report.html\n"
+      "                                                measure what people did, stage by stage\n"
+      "  trocar-journal assess out/ --html curves.html learning curves over a folder of sessions\n"
       "  trocar-journal repair killed.mcap whole.mcap  for other programs that read MCAP\n"
       "Exit codes: 0 verified, 1 difference found, 2 usage, 3 file cannot be read, 6 not all "
       "could\n"
@@ -233,6 +236,9 @@ int run(int argc, char** argv) {
       app.add_subcommand("verify", "Simulate the session again and compare all that it says");
   auto* mend = app.add_subcommand(
       "repair", "Write a recording that was cut short or is damaged again, as a whole file");
+  AssessOptions assess_options;
+  auto* measure = app.add_subcommand("assess", "Measure what people did, and report it");
+  add_options(*measure, assess_options);
   std::string force_table, lesson_table;
   auto* give = app.add_subcommand("export", "Write what a recording holds as a table");
   give->add_option("FILE", path, "a journal (.mcap)")->required();
@@ -260,6 +266,7 @@ int run(int argc, char** argv) {
     return code == 0 ? 0 : static_cast<int>(ExitCode::Usage);
   }
   if (auto s = log::configure(kProgram, log_level); !s) return report(kProgram, s.error());
+  if (measure->parsed()) return assess(assess_options);
   if (mend->parsed()) return repair(path, repaired_path);
   if (give->parsed()) {
     if (force_table.empty() && lesson_table.empty())

@@ -8,9 +8,9 @@
 #include "common/base/cpu.h"
 #include "common/base/text_file.h"
 #include "common/base/timing.h"
+#include "common/plot/plot.h"
 #include "server/app/organ/program_name.h"
 #include "server/app/organ/progress_line.h"
-#include "server/lab/plot/plot.h"
 #include "server/organs/catalogue/load_organ.h"
 #include "server/organs/organ/organ_file.h"
 

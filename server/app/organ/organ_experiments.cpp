@@ -7,9 +7,9 @@
 #include <filesystem>
 
 #include "common/base/text_file.h"
+#include "common/plot/plot.h"
 #include "server/app/organ/program_name.h"
 #include "server/lab/fit/fit.h"
-#include "server/lab/plot/plot.h"
 #include "server/lab/scenario/settle.h"
 #include "server/organs/catalogue/load_organ.h"
 #include "server/organs/organ/organ_file.h"

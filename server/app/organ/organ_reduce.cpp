@@ -7,10 +7,10 @@
 
 #include "common/base/text_file.h"
 #include "common/base/timing.h"
+#include "common/plot/plot.h"
 #include "server/app/organ/organ_reduce_local.h"
 #include "server/app/organ/program_name.h"
 #include "server/app/organ/progress_line.h"
-#include "server/lab/plot/plot.h"
 #include "server/organs/catalogue/load_organ.h"
 #include "server/organs/organ/average_strain.h"
 #include "server/papers/dogan/quality.h"

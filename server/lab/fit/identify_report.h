@@ -3,8 +3,8 @@
 // An identification leaves these for people and programs: the constants as text and as TOML, each
 // measured force beside the material's, and two pictures.
 
+#include "common/plot/plot.h"
 #include "server/lab/fit/identify.h"
-#include "server/lab/plot/plot.h"
 
 namespace trocar::fit {
 

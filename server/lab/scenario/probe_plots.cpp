@@ -1,6 +1,6 @@
 #include "server/lab/scenario/probe_plots.h"
 
-#include "server/lab/plot/plot.h"
+#include "common/plot/plot.h"
 
 namespace trocar::scenario {
 namespace {

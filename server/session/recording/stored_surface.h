@@ -33,6 +33,10 @@ class StoredSurface {
   // Messages are missing before the next one.
   void skip() { has_surface_ = false; }
 
+  // The newest surface; null where there is none.
+  const wire::SurfaceLayout* layout() const { return has_surface_ ? &layout_ : nullptr; }
+  const wire::QuantisedSurface& surface() const { return surface_; }
+
   std::uint64_t decoded() const { return decoded_; }
   // Surfaces that could not be decoded, because something before them is missing.
   std::uint64_t undecodable() const { return undecodable_; }

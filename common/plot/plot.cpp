@@ -1,4 +1,4 @@
-#include "server/lab/plot/plot.h"
+#include "common/plot/plot.h"
 
 #include <algorithm>
 #include <array>
@@ -8,7 +8,7 @@
 
 #include "common/base/assert.h"
 #include "common/base/text_file.h"
-#include "server/lab/plot/gnuplot.h"
+#include "common/plot/gnuplot.h"
 
 namespace trocar::plot {
 namespace {

@@ -1,4 +1,4 @@
-#include "server/lab/plot/gnuplot.h"
+#include "common/plot/gnuplot.h"
 
 #include <fcntl.h>
 #include <spawn.h>

@@ -1,0 +1,395 @@
+#include "server/session/assessment/assessment.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+
+#include "common/base/printable.h"
+#include "common/journal/session_journal.h"
+#include "common/wire/claim_outcome.h"
+#include "server/session/assessment/hand_meter.h"
+#include "server/session/recording/stored_surface.h"
+
+namespace trocar::assessment {
+namespace {
+
+using journal::JournalTopic;
+
+constexpr Tick kAll = std::numeric_limits<Tick>::max();
+constexpr Tick kHarmPeriod = 1000;  // ticks between two moments of harm that are told
+
+Vec3d read(const proto::Vec3& v) {
+  return {v.x(), v.y(), v.z()};
+}
+
+// Reads a recording frame by frame, and measures as it goes.
+class Assessor {
+ public:
+  Assessor(journal::SessionJournal& journal, const Options& options, Assessment& out)
+      : journal_(journal), options_(options), out_(out) {}
+
+  Status run() {
+    if (auto s = read_people(); !s) return s;
+    if (auto s = read_lesson(); !s) return s;
+    out_.whole.name = "Whole session";
+    out_.whole.begin = journal_.info().begin_tick();
+    whole_.limit_n = options_.force_limit_n;
+    begin_stage(out_.whole.begin);
+    const auto report =
+        journal_.read_all([this](std::string_view topic, Tick tick, BytesView bytes) {
+          return take(topic, tick, bytes);
+        });
+    if (!status_) return status_;
+    if (const auto status = report.status(); !status) out_.notes.push_back(status.error().message);
+    finish();
+    return {};
+  }
+
+ private:
+  // A time with a force above the stage's limit.
+  struct Excess {
+    Tick begin = 0, peak = 0;
+    double peak_n = 0;
+    std::string person;
+  };
+
+  Status read_people() {
+    return journal_.read_participants(0, kAll, [&](Tick tick, const proto::Participants& list) {
+      for (const auto& entry : list.participant())
+        people_[entry.slot()][tick] = printable(entry.name(), 64);
+      return true;
+    });
+  }
+
+  Status read_lesson() {
+    Status status;
+    const auto visit = [&](Tick, const proto::LessonRecord& record) {
+      if (record.left_out() > 0)
+        out_.notes.push_back("the recording had no room for some of what the lesson told");
+      if (record.has_lesson() && !course_) {
+        auto lesson = lesson::read_lesson_text(record.lesson().source(), out_.file + ": /lesson");
+        if (!lesson) {
+          status = lesson.error();
+          return false;
+        }
+        out_.lesson = *lesson;
+        course_.emplace(std::move(*lesson));
+      }
+      if (record.has_input()) inputs_.push_back(record.input());
+      if (record.has_stage()) told_ = record.stage();
+      return true;
+    };
+    if (auto s = journal_.read_lessons(0, kAll, visit); !s) return s;
+    return status;
+  }
+
+  const std::string& person_of(ToolSlot tool, Tick tick) {
+    static const std::string kNobody;
+    const auto lists = people_.find(tool.value / kToolsPerHand);
+    if (lists == people_.end()) return kNobody;
+    const auto next = lists->second.upper_bound(tick);
+    return next == lists->second.begin() ? next->second : std::prev(next)->second;
+  }
+
+  bool take(std::string_view topic, Tick tick, BytesView bytes) {
+    const auto known = journal::topic_of(topic);
+    if (!known) return true;
+    const auto parse = [&](auto& message) {
+      if (message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) return true;
+      status_ = Error{ErrorCode::BadFile, fmt::format("{}: {} at tick {} is no message of its kind",
+                                                      out_.file, topic, tick)};
+      return false;
+    };
+    const auto check = [&](auto message) {
+      if (!parse(message)) return false;
+      if (const auto wrong = surface_.check(message))
+        note_once(fmt::format("the surface at tick {} does not fit: {} is {}", tick, wrong->field,
+                              wrong->recorded));
+      return true;
+    };
+    switch (*known) {
+      case JournalTopic::Topology:
+        return check(proto::SurfaceTopology());
+      case JournalTopic::TopologyChange:
+        return check(proto::SurfaceChange());
+      case JournalTopic::SurfaceKey:
+      case JournalTopic::SurfaceDelta:
+        return check(proto::SurfaceFrame());
+      case JournalTopic::Gap:
+        surface_.skip();
+        note_once("frames were dropped while recording: measures may differ from those told");
+        return true;
+      case JournalTopic::Claims: {
+        proto::ClaimLog log;
+        if (!parse(log)) return false;
+        for (const auto& event : log.event())
+          if (event.tool() < kMaxTools) claims_.push_back(event);
+        return true;
+      }
+      case JournalTopic::FrameState: {
+        proto::FrameState state;
+        if (!parse(state)) return false;
+        observe(state);
+        return true;
+      }
+      default:
+        return true;
+    }
+  }
+
+  void note_once(std::string note) {
+    if (std::ranges::find(out_.notes, note) == out_.notes.end() && out_.notes.size() < kMostMoments)
+      out_.notes.push_back(std::move(note));
+  }
+
+  void tell(Tick tick, const std::string& person, const std::string& text) {
+    for (auto* part : {&stage_, &out_.whole}) {
+      if (part->moments.size() < kMostMoments)
+        part->moments.push_back({tick, person, text});
+      else
+        ++part->moments_left_out;
+    }
+  }
+
+  void observe(const proto::FrameState& state) {
+    const Tick tick = state.tick();
+    // A lesson begins when somebody with a tool is there.
+    if (course_ && !has_begun_ && state.tool_size() > 0) {
+      has_begun_ = true;
+      begin_stage(tick);
+    }
+    tips_.clear();
+    for (const auto& tool : state.tool()) {
+      if (tool.tool() >= kMaxTools || tool.is_silent()) continue;
+      const auto slot = ToolSlot{static_cast<std::uint8_t>(tool.tool())};
+      const auto tip =
+          read(tool.has_proxy_position_m() ? tool.proxy_position_m() : tool.position_m());
+      const auto force = read(tool.force_n());
+      tips_.push_back({.tool = slot,
+                       .position_m = tip,
+                       .force_n = length(force),
+                       .verb = static_cast<tool::Verb>(tool.verb()),
+                       .has_claim = tool.has_claim()});
+      const auto& person = person_of(slot, tick);
+      hands_.add(slot, person, tick, tip, force);
+      whole_.add(slot, person, tick, tip, force);
+      add_to_curve(slot, person, tick, tip, length(force));
+    }
+    take_claims(tick);
+    if (has_begun_) observe_lesson(tick);
+    last_tick_ = tick;
+  }
+
+  void take_claims(Tick tick) {
+    for (const auto& event : claims_) {
+      const auto tool = ToolSlot{static_cast<std::uint8_t>(event.tool())};
+      const auto outcome = static_cast<wire::ClaimOutcome>(event.outcome());
+      hands_.note(tool, static_cast<tool::Verb>(event.verb()), outcome, event.tick());
+      whole_.note(tool, static_cast<tool::Verb>(event.verb()), outcome, event.tick());
+      const bool slipped = outcome == wire::ClaimOutcome::Slipped;
+      if (!wire::is_refusal(outcome) && !slipped) continue;
+      if (has_begun_) course_->note_refusal();
+      tell(event.tick(), person_of(tool, tick),
+           slipped                                      ? "tissue slipped out of the grasp"
+           : outcome == wire::ClaimOutcome::RefusedHeld ? "was refused what somebody else holds"
+                                                        : "took hold of nothing");
+    }
+    claims_.clear();
+    for (auto* meter : {&hands_, &whole_}) meter->end_waits(tips_, tick);
+  }
+
+  void observe_lesson(Tick tick) {
+    const auto moment = lesson::Moment{.tick = tick,
+                                       .tips = tips_,
+                                       .displacements = surface_.surface(),
+                                       .layout = surface_.layout()};
+    const auto before = course_->results().size();
+    const bool is_over = course_->is_over();
+    course_->observe(moment);
+    if (!is_over && course_->results().size() == before) note_losses(tick);
+    end_stages(before, tick);
+    for (; next_input_ < inputs_.size() && inputs_[next_input_].tick() <= tick; ++next_input_)
+      apply(inputs_[next_input_], moment);
+  }
+
+  void apply(const proto::LessonInput& input, const lesson::Moment& moment) {
+    const auto before = course_->results().size();
+    switch (input.action()) {
+      case proto::LESSON_ANSWER: {
+        if (input.tool() >= kMaxTools) return;
+        const auto tool = ToolSlot{static_cast<std::uint8_t>(input.tool())};
+        if (course_->answer(tool, moment) == lesson::Answer::Wrong)
+          tell(moment.tick, person_of(tool, moment.tick), "gave a wrong answer");
+        break;
+      }
+      case proto::LESSON_NEXT:
+        course_->skip();
+        break;
+      case proto::LESSON_RESTART:
+        course_->restart();
+        excess_.reset();
+        out_.stages.clear();
+        out_.notes.push_back(
+            fmt::format("the lesson was begun anew at {:.1f} s: stages are those after it",
+                        seconds_of(moment.tick)));
+        begin_stage(moment.tick);
+        return;
+      default:
+        return;
+    }
+    end_stages(before, moment.tick);
+  }
+
+  // Tells once of each time that a limit of the lesson was passed.
+  void note_losses(Tick tick) {
+    if (course_->is_too_strong()) {
+      const auto strongest = std::ranges::max_element(tips_, {}, &lesson::Tip::force_n);
+      if (!excess_) excess_ = Excess{.begin = tick};
+      if (strongest->force_n > excess_->peak_n)
+        excess_->peak_n = strongest->force_n, excess_->peak = tick,
+        excess_->person = person_of(strongest->tool, tick);
+    } else {
+      end_excess(tick);
+    }
+    if (course_->harm_m2() <= harm_m2_ || tick - harm_tick_ < kHarmPeriod) return;
+    harm_m2_ = course_->harm_m2(), harm_tick_ = tick;
+    tell(tick, "", fmt::format("{:.2f} cm² of what is to be spared is cut", harm_m2_ * 1e4));
+  }
+
+  void end_excess(Tick tick) {
+    if (!excess_) return;
+    tell(excess_->peak, excess_->person,
+         fmt::format("passed the limit of force for {:.1f} s, {:.1f} N at this moment",
+                     seconds_of(tick - excess_->begin), excess_->peak_n));
+    excess_.reset();
+  }
+
+  void begin_stage(Tick tick) {
+    stage_ = {};
+    stage_.begin = stage_.end = tick;
+    hands_ = {};
+    harm_m2_ = 0, harm_tick_ = 0;
+    if (!course_ || course_->is_over()) return;
+    stage_.stage = course_->stage_number();
+    stage_.name = course_->stage().name;
+    const double limit_n = course_->stage().force_limit_n;
+    hands_.limit_n = limit_n > 0 ? limit_n : options_.force_limit_n;
+  }
+
+  void end_stages(std::size_t before, Tick tick) {
+    if (course_->results().size() == before) return;
+    stage_.result = course_->results().back();
+    end_part(tick);
+    begin_stage(tick);
+  }
+
+  void end_part(Tick tick) {
+    end_excess(tick);
+    stage_.end = tick;
+    stage_.hands = hands_.hands();
+    out_.stages.push_back(std::move(stage_));
+  }
+
+  void add_to_curve(ToolSlot tool, const std::string& person, Tick tick, const Vec3d& tip,
+                    double newton) {
+    constexpr double kPeriodS = 0.25;
+    const double time_s = seconds_of(tick);
+    auto [found, is_new] = curves_.try_emplace(tool.value);
+    auto& curve = found->second;
+    if (is_new) curve.tool = tool, curve.person = person;
+    if (curve.time_s.empty() || time_s - curve.time_s.back() >= kPeriodS) {
+      curve.time_s.push_back(time_s);
+      curve.force_n.push_back(newton);
+      curve.tip_m.push_back(tip);
+    }
+    curve.force_n.back() = std::max(curve.force_n.back(), newton);
+  }
+
+  void finish() {
+    if (has_begun_ && !course_->is_over() && last_tick_ > stage_.begin) end_part(last_tick_);
+    out_.whole.end = last_tick_;
+    out_.whole.hands = whole_.hands();
+    for (auto& [tool, curve] : curves_) out_.curves.push_back(std::move(curve));
+    if (!course_) return;
+    out_.is_over = course_->is_over();
+    out_.points = course_->points();
+    if (!has_begun_) out_.notes.push_back("the lesson did not begin: nobody had a tool");
+    compare_with_told();
+  }
+
+  // People were told of results as they came; the recording must give the same again.
+  void compare_with_told() {
+    if (!told_) return;
+    const auto& results = course_->results();
+    bool is_same = static_cast<std::size_t>(told_->result_size()) == results.size();
+    for (std::size_t i = 0; is_same && i < results.size(); ++i) {
+      const auto& told = told_->result(static_cast<int>(i));
+      is_same = told.is_reached() == results[i].is_reached &&
+                std::abs(told.points() - results[i].points) < 0.01;
+    }
+    if (!is_same)
+      out_.notes.push_back(
+          fmt::format("people were told of {} stages with {:.1f} points, the recording gives {} "
+                      "with {:.1f}",
+                      told_->result_size(), told_->points(), results.size(), course_->points()));
+  }
+
+  journal::SessionJournal& journal_;
+  const Options& options_;
+  Assessment& out_;
+  Status status_;
+  std::map<std::uint32_t, std::map<Tick, std::string>> people_;  // by slot, from a tick on
+  std::optional<lesson::Course> course_;
+  std::vector<proto::LessonInput> inputs_;
+  std::size_t next_input_ = 0;
+  std::optional<proto::LessonStage> told_;  // the newest
+  recording::StoredSurface surface_;
+  std::vector<proto::ClaimEvent> claims_;  // of the frame that comes
+  std::vector<lesson::Tip> tips_;
+  bool has_begun_ = false;
+  Part stage_;
+  HandMeter hands_, whole_;  // of the stage, of the session
+  std::map<std::uint8_t, Curve> curves_;
+  std::optional<Excess> excess_;  // that goes on
+  double harm_m2_ = 0;
+  Tick harm_tick_ = 0, last_tick_ = 0;
+};
+
+}  // namespace
+
+Result<Assessment> assess(const std::string& path, const Options& options) {
+  auto journal = journal::SessionJournal::open(path);
+  if (!journal) return journal.error();
+  Assessment out;
+  out.file = path;
+  out.organ = (*journal)->info().organ_name;
+  out.start_utc_ns = (*journal)->info().start_utc_ns;
+  if (auto s = Assessor(**journal, options, out).run(); !s) return s.error();
+  if (!(*journal)->info().is_finished)
+    out.notes.push_back("the recording was cut short: what came after its end is not here");
+  return out;
+}
+
+void give_pseudonyms(std::vector<Assessment>& sessions) {
+  std::map<std::string, std::string> pseudonyms;
+  const auto pseudonym_of = [&](const std::string& name) {
+    if (name.empty()) return name;
+    const auto [found, is_new] = pseudonyms.try_emplace(name);
+    if (is_new) found->second = "Person " + std::to_string(pseudonyms.size());
+    return found->second;
+  };
+  for (auto& session : sessions) {
+    for (auto& curve : session.curves) curve.person = pseudonym_of(curve.person);
+    const auto hide = [&](Part& part) {
+      for (auto& hand : part.hands) hand.person = pseudonym_of(hand.person);
+      for (auto& moment : part.moments) moment.person = pseudonym_of(moment.person);
+    };
+    for (auto& stage : session.stages) hide(stage);
+    hide(session.whole);
+  }
+}
+
+}  // namespace trocar::assessment
