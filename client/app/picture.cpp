@@ -317,7 +317,8 @@ void Picture::add_messages(const replica::Replica& replica, std::uint64_t now_ns
         ui::describe_notice(notice, is_own, shape_of(replica, notice.tool).reach_m);
     // A claim is retried while the verb is held: the same words once.
     if (!model.messages.empty() && model.messages.back().text == text) model.messages.pop_back();
-    model.messages.push_back({text, static_cast<float>(age), true});
+    model.messages.push_back(
+        {text, static_cast<float>(age), !notice.is_for_all || notice.is_refused});
   }
   if (model.messages.size() > 3)
     model.messages.erase(model.messages.begin(), model.messages.end() - 3);

@@ -20,6 +20,7 @@ constexpr float kPushSpeed = 0.04f, kReachSpeed = 0.1f;
 constexpr float kPortMetres = 0.14f, kLeastInside = 0.03f;  // of a steered shaft
 constexpr float kSwingPerPixel = 0.0022f;                   // rad
 constexpr float kMinDepth = 0.02f, kMaxDepth = 1.8f;
+constexpr float kLeastHover = 0.001f;  // m
 
 }  // namespace
 
@@ -116,7 +117,8 @@ void MouseTool::update(const PointerInput& input, const ViewRays& view,
   if (input.deeper) advance += kKeyMetresPerSecond * fine * seconds;
   if (input.nearer) advance -= kKeyMetresPerSecond * fine * seconds;
   if (verb == tool::Verb::None) {
-    hover_ = std::clamp(hover_ - advance, -0.03f, 0.15f);
+    // Without a verb it stays out of the tissue: in there it would touch nothing.
+    hover_ = std::clamp(hover_ - advance, kLeastHover, 0.15f);
     if (const auto depth = pick(positions, triangles, view.eye, ray)) {
       const float wanted = *depth - hover_;
       const float share = is_valid_ ? 1 - std::exp(-seconds / kSettleSeconds) : 1.0f;

@@ -176,7 +176,7 @@ class Replica final : public MessageSink {
   void apply_lesson(const proto::LessonStage& message);
   void apply_progress(const proto::LessonProgress& message);
   void apply_view(const proto::ViewEvent& message, std::uint64_t arrival_ns);
-  void tell_all(Tick tick, const std::string& text, std::uint64_t arrival_ns);
+  void tell_all(Tick tick, const std::string& text, bool is_refused, std::uint64_t arrival_ns);
   void add_notice(Notice notice);
   void apply_ghost(const proto::GhostFrame& message);
   void apply_recording(const proto::RecordingState& message);

@@ -100,19 +100,21 @@ void Replica::apply_progress(const proto::LessonProgress& message) {
 
 void Replica::apply_mark(const proto::MarkEvent& message, std::uint64_t arrival_ns) {
   counters_.marks += message.is_done() ? 1 : 0;
-  tell_all(message.tick(), message.text(), arrival_ns);
+  tell_all(message.tick(), message.text(), !message.is_done(), arrival_ns);
 }
 
 void Replica::apply_teach(const proto::TeachEvent& message, std::uint64_t arrival_ns) {
-  tell_all(message.tick(), message.text(), arrival_ns);
+  tell_all(message.tick(), message.text(), !message.is_done(), arrival_ns);
 }
 
-void Replica::tell_all(Tick tick, const std::string& text, std::uint64_t arrival_ns) {
+void Replica::tell_all(Tick tick, const std::string& text, bool is_refused,
+                       std::uint64_t arrival_ns) {
   Notice notice;
   notice.tick = tick;
   notice.text = text;
   notice.arrival_ns = arrival_ns;
   notice.is_for_all = true;
+  notice.is_refused = is_refused;
   add_notice(std::move(notice));
 }
 

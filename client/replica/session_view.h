@@ -139,7 +139,8 @@ struct Notice {
   std::string holder;  // the name of who holds the tissue; empty: nobody
   std::string text;    // one line for the person
   std::uint64_t arrival_ns = 0;
-  bool is_for_all = false;  // not of a tool: what the instructor has done
+  bool is_for_all = false;  // not of a tool: what the instructor or the lesson has done
+  bool is_refused = false;  // likewise: it was not done
 };
 
 }  // namespace trocar::replica

@@ -1,5 +1,6 @@
 #include "client/ui/banner_text.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace trocar::ui {
@@ -25,6 +26,10 @@ std::vector<Banner> banners_of(const HudModel& model) {
     banners.push_back({model.frozen_text,
                        "Wait: they come back to your hands slowly when they are released.",
                        RateTone::Notice});
+  if (std::ranges::any_of(model.participants,
+                          [](const auto& who) { return who.is_self && who.is_inside; }))
+    banners.push_back({"Your instrument is inside the tissue, and touches nothing.",
+                       "Draw it out with the wheel, or move it off the organ.", RateTone::Notice});
   if (model.surface_age_ms && *model.surface_age_ms >= kStaleMs)
     banners.push_back({"This picture is " + tenths(*model.surface_age_ms * 1e-3) + " s old.",
                        "The connection is slow or has stopped: wait before you cut.",

@@ -63,6 +63,7 @@ void set_style(float scale) {
   style.CellPadding = {5, 2};
   ImVec4* colours = style.Colors;
   colours[ImGuiCol_WindowBg] = to_imgui(kPanelGround, 0.80f);
+  colours[ImGuiCol_PopupBg] = to_imgui(kPanelGround, 1);
   colours[ImGuiCol_Border] = {0.55f, 0.70f, 0.80f, 0.16f};
   colours[ImGuiCol_Text] = {0.87f, 0.91f, 0.94f, 1};
   colours[ImGuiCol_TextDisabled] = {0.52f, 0.60f, 0.66f, 1};

@@ -21,6 +21,15 @@ TEST(BannerText, EachStateSaysWhatToDo) {
   EXPECT_EQ(banners[0].text, "Eva keeps your tools where they are.");
   EXPECT_EQ(banners[0].advice, "Wait: they come back to your hands slowly when they are released.");
 
+  // It can be in there where tissue has closed over it.
+  model = {};
+  model.participants.resize(2);
+  model.participants[1].is_inside = true;
+  EXPECT_TRUE(banners_of(model).empty());
+  model.participants[1].is_self = true;
+  EXPECT_EQ(banners_of(model).at(0).advice,
+            "Draw it out with the wheel, or move it off the organ.");
+
   model = {};
   model.surface_age_ms = 399;
   EXPECT_TRUE(banners_of(model).empty());

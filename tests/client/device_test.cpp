@@ -131,6 +131,19 @@ TEST_F(MouseToolTest, TheLeftButtonAlonePressesAndKeepsItsDepthUntilTheWheelTurn
   EXPECT_EQ(tool_.current().verb, tool::Verb::None);
 }
 
+TEST_F(MouseToolTest, TheWheelAloneDoesNotPutItIntoTissue) {
+  update(10);
+  const float surface = depth() + 0.008f;
+  input_.wheel = 20;
+  update(10);
+  input_.wheel = 0;
+  update(30);
+  EXPECT_LT(depth(), surface);
+  input_.left = true;
+  update(30);
+  EXPECT_NEAR(depth(), surface + 0.006f, 1e-4f);
+}
+
 TEST_F(MouseToolTest, JawsCloseWhereTheSurfaceIs) {
   update(10);
   const float surface = depth() + 0.008f;

@@ -183,7 +183,7 @@ class Replicator final : public net::ConnectionHandler {
   // The lesson's own part of a frame, once somebody with a tool is there.
   void observe_lesson(const step::PublishedFrame& frame);
   void tell_stage();
-  void tell_line(const std::string& words);
+  void tell_line(const std::string& words, bool is_good = true);
   std::string carry_out(const TeachOrder& order, Client& client, const std::string& words);
   // Whoever has that place, away or not; null: nobody.
   Client* client_of(ParticipantSlot slot) const;

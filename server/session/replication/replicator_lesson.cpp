@@ -41,7 +41,7 @@ void Replicator::observe_lesson(const step::PublishedFrame& frame) {
     if (wire::is_refusal(event.outcome) || event.outcome == wire::ClaimOutcome::Slipped)
       course_->note_refusal();
   const bool is_stage_over = course_->observe(moment_of(frame, layout_, tips_));
-  if (is_stage_over) tell_line(words_of_last_stage(*course_));
+  if (is_stage_over) tell_line(words_of_last_stage(*course_), course_->results().back().is_reached);
   const bool is_hint_due = course_->shows_hint() && !is_hint_told_;
   if (is_stage_over || is_first || is_hint_due) tell_stage();
   if (frame.frame % kFramesPerProgress != 0 || course_->is_over()) return;
@@ -62,11 +62,11 @@ void Replicator::tell_stage() {
   broadcast(wire::encode_envelope(event));
 }
 
-void Replicator::tell_line(const std::string& words) {
+void Replicator::tell_line(const std::string& words, bool is_good) {
   log::info("{}", words);
   proto::Envelope event;
   event.mutable_teach_event()->set_tick(newest_tick());
-  event.mutable_teach_event()->set_is_done(true);
+  event.mutable_teach_event()->set_is_done(is_good);
   event.mutable_teach_event()->set_text(words);
   broadcast(wire::encode_envelope(event));
 }
@@ -109,7 +109,8 @@ std::optional<Replicator::Ending> Replicator::handle_lesson(Client& client,
     if (answer == lesson::Answer::NotAsked || answer == lesson::Answer::NoTissue)
       return refuse(words_of(answer));
     record_lesson(record);
-    tell_line(client.participant->name + " says that it is here: " + words_of(answer));
+    tell_line(client.participant->name + " says that it is here: " + words_of(answer),
+              answer == lesson::Answer::Right);
     if (answer == lesson::Answer::Wrong) return std::nullopt;
     tell_line(words_of_last_stage(*course_));
   } else {
