@@ -18,6 +18,7 @@
 #include "server/app/journal/run_program.h"
 #include "server/session/assessment/assessment.h"
 #include "server/session/assessment/report.h"
+#include "server/session/assessment/strain.h"
 #include "server/session/assessment/tables.h"
 
 namespace trocar::app {
@@ -93,6 +94,21 @@ Result<std::vector<std::string>> files_of(const std::string& path) {
   return files;
 }
 
+Result<assessment::StrainDamage> measure(const std::string& file,
+                                         const assessment::Assessment& session,
+                                         const AssessOptions& options) {
+  const bool is_terminal = ::isatty(STDERR_FILENO) != 0;
+  auto strain = assessment::measure_strain(
+      file, options.strain_limit, session.lesson ? &*session.lesson : nullptr,
+      [&](Tick tick, Tick last) {
+        if (is_terminal)
+          std::fprintf(stderr, "\r%s: simulated again: %.0f of %.0f s", kProgram,
+                       assessment::seconds_of(tick), assessment::seconds_of(last));
+      });
+  if (is_terminal) std::fprintf(stderr, "\n");
+  return strain;
+}
+
 // Reads all; says how far it is where people wait.
 Result<std::vector<assessment::Assessment>> read_all(const std::vector<std::string>& files,
                                                      const AssessOptions& options) {
@@ -102,6 +118,11 @@ Result<std::vector<assessment::Assessment>> read_all(const std::vector<std::stri
       std::fprintf(stderr, "%s: %zu of %zu\n", kProgram, sessions.size() + 1, files.size());
     auto session = assessment::assess(file, {.force_limit_n = options.force_limit_n});
     if (!session) return session.error();
+    if (options.measures_strain) {
+      auto strain = measure(file, *session, options);
+      if (!strain) return strain.error();
+      session->strain = std::move(*strain);
+    }
     sessions.push_back(std::move(*session));
   }
   return sessions;
@@ -170,6 +191,13 @@ void add_options(CLI::App& command, AssessOptions& options) {
       .add_option("--force-limit", options.force_limit_n,
                   "in N, where a stage has no limit of its own")
       ->check(CLI::Range(0.01, 100.0))
+      ->capture_default_str();
+  command.add_flag("--strain", options.measures_strain,
+                   "how much tissue was strained too far: simulates the session again");
+  command
+      .add_option("--strain-limit", options.strain_limit,
+                  "with --strain: the greatest principal strain that tissue bears")
+      ->check(CLI::Range(0.01, 2.0))
       ->capture_default_str();
   command.add_flag("--pseudonyms", options.has_pseudonyms, "write Person 1, 2, ... for names");
   command.add_flag("--json", options.as_json, "print one JSON object");

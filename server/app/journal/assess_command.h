@@ -16,8 +16,8 @@ struct AssessOptions {
   std::vector<std::string> experts;
   std::string html, pdf, csv, xapi;
   std::string home_page = "http://localhost/trocar";
-  double force_limit_n = 2;
-  bool as_json = false, has_pictures = false, has_pseudonyms = false;
+  double force_limit_n = 2, strain_limit = 0.3;
+  bool as_json = false, measures_strain = false, has_pictures = false, has_pseudonyms = false;
 };
 
 void add_options(CLI::App& command, AssessOptions& options);

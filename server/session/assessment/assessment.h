@@ -61,6 +61,19 @@ struct Curve {
   std::vector<Vec3d> tip_m;     // world frame
 };
 
+// Tissue that was strained beyond what it bears, at any time of the session.
+struct StrainDamage {
+  double limit = 0;  // strain
+  double volume_m3 = 0;
+  struct Part {
+    std::string structure;
+    double volume_m3 = 0;
+  };
+  std::vector<Part> structures;  // of the lesson
+  double greatest = 0;           // strain
+  Tick greatest_tick = 0;
+};
+
 struct Assessment {
   std::string file, organ;
   std::uint64_t start_utc_ns = 0;
@@ -69,7 +82,8 @@ struct Assessment {
   double points = 0;                     // mean of the stages that are over
   std::vector<Part> stages;              // that are over; the last one may not be
   Part whole;
-  std::vector<Curve> curves;       // by tool
+  std::vector<Curve> curves;  // by tool
+  std::optional<StrainDamage> strain;
   std::vector<std::string> notes;  // why not everything could be measured, a line each
 };
 

@@ -72,7 +72,9 @@ std::vector<Figure> figures_of(const Hand& hand) {
       {"refusals", "refused", "", static_cast<double>(hand.refusals), 0},
       {"lost_grasps", "lost grasps", "", static_cast<double>(hand.losses), 0},
       {"waited_s", "waited for others", "s", hand.waited_s, 1}};
-  const auto insert = [&](Figure figure) { figures.insert(figures.begin() + 3, std::move(figure)); };
+  const auto insert = [&](Figure figure) {
+    figures.insert(figures.begin() + 3, std::move(figure));
+  };
   if (skill.smoothness)
     insert({"smoothness", "smoothness", "", *skill.smoothness, 2, Better::More});
   // A hand at rest has no economy.

@@ -232,6 +232,8 @@ Result<std::string> report_of(const Assessment& session, const std::vector<Stand
         "<div class=\"pair\">" + figure(*front, "Way of the tips, seen from the front") +
         figure(*above, "The same, seen from above") + "</div>\n";
   }
+  if (session.strain)
+    for (const auto& line : lines_of(*session.strain)) body += "<p>" + html_text(line) + ".</p>\n";
   if (session.stages.empty()) body += moments_list(session.whole);
   body += hands_table(session.whole, {}) + kNotClinical;
   return html_page(title, body);

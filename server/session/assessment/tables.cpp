@@ -99,6 +99,17 @@ std::string short_name(const std::string& file) {
   return std::filesystem::path(file).filename().string();
 }
 
+std::vector<std::string> lines_of(const StrainDamage& strain) {
+  std::vector<std::string> lines{fmt::format("{:.2f} ml of tissue were strained beyond {:.0f} %",
+                                             strain.volume_m3 * 1e6, strain.limit * 100)};
+  for (const auto& part : strain.structures)
+    lines.push_back(fmt::format("{:.2f} ml of it within {}", part.volume_m3 * 1e6, part.structure));
+  if (strain.greatest > 0)
+    lines.push_back(fmt::format("the greatest strain was {:.0f} %, at {:.1f} s",
+                                strain.greatest * 100, seconds_of(strain.greatest_tick)));
+  return lines;
+}
+
 std::string summary_of(const Assessment& session, const std::vector<Standing>& standings) {
   const auto standing_of = [&](const Part& part, Figure figure) -> std::string {
     for (const auto& standing : standings) {
@@ -141,6 +152,9 @@ std::string summary_of(const Assessment& session, const std::vector<Standing>& s
   };
   for (const auto& stage : session.stages) show(stage);
   if (session.stages.empty()) show(session.whole);
+  if (session.strain) line("");
+  if (session.strain)
+    for (const auto& text : lines_of(*session.strain)) line(text);
   for (const auto& note : session.notes) line("note: " + note);
   return out;
 }
@@ -169,6 +183,11 @@ std::string csv_of(const std::vector<Assessment>& sessions) {
     };
     for (const auto& stage : session.stages) add_part(stage);
     add_part(session.whole);
+    if (session.strain) {
+      add(session.whole.name, "", "", "strained_ml", session.strain->volume_m3 * 1e6);
+      for (const auto& part : session.strain->structures)
+        add(session.whole.name, "", "", "strained_ml_" + part.structure, part.volume_m3 * 1e6);
+    }
     if (session.lesson) add("", "", "", "points", session.points);
   }
   return out;
@@ -185,6 +204,16 @@ std::string json_of(const Assessment& session, const std::vector<Standing>& stan
   for (const auto& stage : session.stages) stages.push_back(json_of(stage));
   json["stages"] = stages;
   json["whole"] = json_of(session.whole);
+  if (session.strain) {
+    Json structures = Json::object();
+    for (const auto& part : session.strain->structures)
+      structures[part.structure] = part.volume_m3 * 1e6;
+    json["strain"] = {{"limit", session.strain->limit},
+                      {"volume_ml", session.strain->volume_m3 * 1e6},
+                      {"structures_ml", structures},
+                      {"greatest", session.strain->greatest},
+                      {"greatest_time_s", seconds_of(session.strain->greatest_tick)}};
+  }
   Json experts = Json::array();
   for (const auto& standing : standings)
     experts.push_back({{"stage", standing.stage},

@@ -15,6 +15,8 @@ std::string iso_time(std::uint64_t utc_ns);
 // Returns a file's name without its folder.
 std::string short_name(const std::string& file);
 
+// "12.3 ml of tissue were strained beyond 30 %, ...", a line each.
+std::vector<std::string> lines_of(const StrainDamage& strain);
 std::string summary_of(const Assessment& session, const std::vector<Standing>& standings);
 // Returns a row for each figure: file, lesson, stage, person, tool, measure, value.
 std::string csv_of(const std::vector<Assessment>& sessions);
