@@ -8,8 +8,10 @@
 
 #include "common/base/assert.h"
 #include "common/journal/session_journal.h"
+#include "common/lesson/course.h"
 #include "common/secure/datagram_channel.h"
 #include "common/secure/join_code.h"
+#include "common/tool/instrument.h"
 #include "common/tool/script.h"
 #include "common/wire/framing.h"
 #include "common/wire/hand_report_messages.h"
@@ -237,6 +239,20 @@ bool decode_script(BytesView bytes) {
 bool decode_scenario(BytesView bytes) {
   return checked(scenario::parse_scenario_text(text_of(bytes), "a.toml"));
 }
+bool decode_lesson(BytesView bytes) {
+  const auto lesson = lesson::read_lesson_text(text_of(bytes), "a.toml");
+  if (!checked(lesson)) return false;
+  // What is accepted can be given.
+  lesson::Course course(*lesson);
+  std::vector<lesson::Tip> tips{{.tool = ToolSlot{0}, .position_m = {0, 0.1, 0}}};
+  for (Tick tick = 16; tick < 160; tick += 16) course.observe({.tick = tick, .tips = tips});
+  while (!course.is_over()) course.skip();
+  TROCAR_ASSERT(course.points() >= 0 && course.points() <= 100);
+  return true;
+}
+bool decode_instruments(BytesView bytes) {
+  return checked(tool::read_instruments_text(text_of(bytes), "a.toml"));
+}
 bool decode_material(BytesView bytes) {
   return checked(material::parse_material_text(text_of(bytes), "a.toml"));
 }
@@ -270,6 +286,8 @@ constexpr Decoder kDecoders[] = {
     {"gmsh", decode_gmsh},
     {"script", decode_script},
     {"scenario", decode_scenario},
+    {"lesson", decode_lesson},
+    {"instruments", decode_instruments},
     {"material", decode_material},
     {"invitation", decode_invitation},
     {"codes", decode_codes},
