@@ -19,7 +19,7 @@ TEST(Instruments, ArePossibleAndToldApart) {
     EXPECT_EQ(possible(kind.shape, kind.button_verb()), kind.button_verb()) << kind.name;
     EXPECT_EQ(possible(kind.shape, main_verb(kind.shape)), main_verb(kind.shape)) << kind.name;
   }
-  EXPECT_EQ(names.size(), 10u);
+  EXPECT_EQ(names.size(), 13u);
   EXPECT_EQ(find_instrument("spoon"), nullptr);
   EXPECT_EQ(instruments().front().shape, ToolShape{}) << "what has always been";
 }
