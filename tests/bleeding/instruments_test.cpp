@@ -4,6 +4,7 @@
 
 #include "server/session/bleeding/bleeding.h"
 #include "tests/bleeding/height_field.h"
+#include "tests/support/counted_allocations.h"
 
 namespace trocar::bleeding {
 namespace {
@@ -113,6 +114,15 @@ TEST(Instruments, CoagulationSealsForGood) {
   const auto during = plate.run(1, tool::Verb::Push);
   EXPECT_LT(during.sources, open.sources);
   EXPECT_EQ(plate.run(50, tool::Verb::None).sources, during.sources);
+}
+
+// A frame itself has three: its surface, its tools, its levels.
+TEST(Instruments, OnceWarmAFrameAllocatesNothingButItsOwnArrays) {
+  Plate plate(kSuction);
+  plate.run(200, tool::Verb::Push);
+  const std::size_t before = allocations;
+  plate.run(100, tool::Verb::Push);
+  EXPECT_EQ(allocations - before, 300u);
 }
 
 Rules with_vessel() {
