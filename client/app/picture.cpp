@@ -169,6 +169,7 @@ render::SceneView Picture::scene_view(const replica::Replica& replica, Hands& ha
   scene.is_wound = replica.topology().is_wound;
   scene.positions = surface_.positions();
   scene.regions = surface_.regions();
+  scene.blood = surface_.blood();
   const auto& ghost = replica.ghost();
   ghost_.clear();
   if (overlays_.ghost && ghost.epoch == replica.topology().epoch &&

@@ -13,7 +13,7 @@ constexpr float kFineFactor = 0.25f;     // with Shift
 constexpr float kSettleSeconds = 0.06f;  // hovering follows the relief this softly
 // How far below the surface each verb begins, m, and how fast the tip goes there, m/s.
 constexpr float kPushDepth = 0.006f, kGraspDepth = 0.001f, kCutDepth = 0.012f;
-constexpr float kHookDepth = 0.004f;
+constexpr float kHookDepth = 0.004f, kTouchDepth = 0.001f;
 constexpr float kRollSpeed = 1.6f;      // rad/s
 constexpr float kAsideSeconds = 0.15f;  // a tip that is free comes to the pointer this softly
 constexpr float kPushSpeed = 0.04f, kReachSpeed = 0.1f;
@@ -27,7 +27,9 @@ constexpr float kLeastHover = 0.001f;  // m
 float MouseTool::depth_of(tool::Verb verb) const {
   switch (verb) {
     case tool::Verb::Push:
-      return kPushDepth;
+      return shape_.form == tool::Form::Suction || shape_.form == tool::Form::Coagulator
+                 ? kTouchDepth
+                 : kPushDepth;
     case tool::Verb::Grasp:
       return kGraspDepth;
     case tool::Verb::Cut:

@@ -13,6 +13,7 @@
 #include "client/shape/instrument_mesh.h"
 #include "client/shape/noise.h"
 #include "client/shape/smooth_surface.h"
+#include "common/wire/blood_codec.h"
 
 namespace trocar::render {
 
@@ -29,6 +30,8 @@ constexpr float kOverlayFadeSeconds = 0.12f;
 constexpr float kScopeClearMetres = 0.05f, kScopeHazePerMetre = 4.0f;
 constexpr float kHazePerMiddle = 0.55f;  // over the distance of what one looks at
 constexpr float kSeamMetres = 0.004f, kDeepMetres = 0.022f;  // widths of what a rim changes
+// This depth of blood hides all but a third of what is below it.
+constexpr float kCoveringMetres = 60e-6f;
 constexpr std::size_t kTriangleBudgetSoftware = 24'000, kTriangleBudget = 100'000;
 
 struct Tint {
@@ -48,7 +51,7 @@ Tint tint_of(Colour c) {
 struct OrganVertex {
   Vec3f position, normal;
   std::array<std::uint8_t, 4> tint;
-  std::array<std::int8_t, 4> lip;  // a normal
+  std::array<std::int8_t, 4> lip;  // a normal; w: how much of the surface blood covers
 };
 
 struct RestVertex {
@@ -165,6 +168,7 @@ struct SceneRenderer::Parts {
   std::size_t tinted = 0;   // coarse vertices from here on are new: they do not fade in
   std::vector<RestVertex> rest_vertices;
   std::vector<float> rim_distances;
+  std::vector<float> covers;  // by blood, 0 to 1
   std::vector<OrganVertex> vertices;
   std::array<float, kMaxTools> jaw_openings{};
 
@@ -173,6 +177,7 @@ struct SceneRenderer::Parts {
   void load_topology(const SceneView& scene);
   void upload_organ(const SceneView& scene);
   void fade_tints(const SceneView& scene);
+  void cover_with_blood(const SceneView& scene);
   void set_lights(const Shader& shader, const OrbitCamera& camera) const;
   void draw_field(const OrbitCamera& camera);
   void draw_backdrop(const OrbitCamera& camera);
@@ -290,9 +295,20 @@ void SceneRenderer::Parts::fade_tints(const SceneView& scene) {
   surface.extend_values(tints);
 }
 
+// Light is lost in blood by the law of Beer and Lambert.
+void SceneRenderer::Parts::cover_with_blood(const SceneView& scene) {
+  covers.assign(surface.vertex_count(), 0);
+  if (scene.blood.size() != surface.coarse_vertex_count()) return;
+  constexpr float kPerLevel = static_cast<float>(wire::kBloodLevelMetres) / kCoveringMetres;
+  for (std::size_t i = 0; i < scene.blood.size(); ++i)
+    if (scene.blood[i] > 0) covers[i] = 1 - std::exp(-kPerLevel * scene.blood[i]);
+  surface.extend_values(covers);
+}
+
 void SceneRenderer::Parts::upload_organ(const SceneView& scene) {
   surface.update(scene.positions);
   fade_tints(scene);
+  cover_with_blood(scene);
   const auto byte = [](float v) {
     return static_cast<std::uint8_t>(std::clamp(v, 0.0f, 1.0f) * 255);
   };
@@ -304,7 +320,7 @@ void SceneRenderer::Parts::upload_organ(const SceneView& scene) {
                    surface.normals()[i],
                    {byte(t.r * whole), byte(t.g * whole), byte(t.b * whole), byte(t.a)},
                    {static_cast<std::int8_t>(lip.x), static_cast<std::int8_t>(lip.y),
-                    static_cast<std::int8_t>(lip.z), 0}};
+                    static_cast<std::int8_t>(lip.z), static_cast<std::int8_t>(covers[i] * 127)}};
   }
   glBindBuffer(GL_ARRAY_BUFFER, organ_array.buffer);
   glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(vertices.size() * sizeof(OrganVertex)),

@@ -42,17 +42,19 @@ layout(location = 1) in vec3 normal;
 layout(location = 2) in vec4 overlay;
 // w: outside 0, and -1 on the rim of a wound; inside 1 at the rim, 2 where the wound is deep.
 layout(location = 3) in vec4 rest;
-layout(location = 4) in vec3 lip;  // the normal of a rim, elsewhere as the other one
+// The normal of a rim, elsewhere as the other one; w: how much of the surface blood covers.
+layout(location = 4) in vec4 lip;
 uniform mat4 clip_from_world;
 out vec3 world_position, world_normal, rest_position, lip_normal;
-out float rim;
+out float rim, covered;
 out vec4 tint;
 void main() {
   world_position = position;
   world_normal = normal;
   rest_position = rest.xyz;
   rim = rest.w;
-  lip_normal = lip;
+  lip_normal = lip.xyz;
+  covered = max(lip.w, 0.0);
   tint = overlay;
   gl_Position = clip_from_world * vec4(position, 1.0);
 }
@@ -60,7 +62,7 @@ void main() {
 
 inline constexpr const char* kOrganFragmentSource = R"(
 in vec3 world_position, world_normal, rest_position, lip_normal;
-in float rim;
+in float rim, covered;
 in vec4 tint;
 out vec4 colour;
 uniform sampler3D noise;       // rgb: slope of the relief, a: its height
@@ -113,8 +115,10 @@ void main() {
   vec3 face = cross(dFdx(world_position), dFdy(world_position));
   face *= inversesqrt(max(dot(face, face), 1e-30)) * sign(dot(face, view));
   n = normalize(n + face * max(0.2 - dot(n, face), 0.0));
+  // Blood has an edge, which the grain below it draws.
+  float blood = smoothstep(0.08, 0.50, covered * (0.35 + 0.9 * coarse.a + 0.4 * fine.a));
   // Relief that is smaller than a pixel would only glitter.
-  float relief = (is_inside ? 0.16 : 0.10) * min(1.0, 0.35 / apart);
+  float relief = (is_inside ? 0.16 : 0.10) * min(1.0, 0.35 / apart) * (1.0 - 0.55 * blood);
   n = normalize(n + relief * (coarse.rgb + fine.rgb - 1.0));
   float facing = max(dot(n, view), 0.0);
 
@@ -141,6 +145,11 @@ void main() {
     wet = 0.75 + 0.5 * coarse.a;
   }
 
+  // A film of blood hides what it covers; where it is deep it is nearly black.
+  float deep = covered * covered;
+  albedo = mix(albedo, mix(vec3(0.190, 0.0060, 0.0050), vec3(0.090, 0.0016, 0.0015), deep), blood);
+  wet = mix(wet, 1.5, blood);
+
   float shade = tool_shadow(world_position);
   // Little light comes down into a wound.
   float open = 1.0 - 0.72 * depth * (2.0 - depth);
@@ -156,10 +165,12 @@ void main() {
   vec2 key_film = highlights(n, view, key_direction), fill_film = highlights(n, view, fill_direction);
   // Inside, the film is broken by the grain: it shines broadly, without a sharp glint.
   vec2 share = is_inside ? vec2(0.034, 0.05) : vec2(0.038, 0.62);
+  share = mix(share, vec2(0.030, 0.85), blood);
   vec3 film = key_colour * (shade * open * (share.y * key_film.y + share.x * key_film.x) * wet);
-  film *= 1.0 - 0.8 * lip;
+  film *= 1.0 - 0.8 * lip * (1.0 - blood);
   film += fill_colour * ((0.26 * fill_film.y + 0.06 * fill_film.x) * wet * open);
-  film += hemisphere(reflect(-view, n)) * (fresnel * (is_inside ? 0.22 : 0.55) * (0.5 + 0.5 * shade) * open);
+  float mirror = mix(is_inside ? 0.22 : 0.55, 1.1, blood);
+  film += hemisphere(reflect(-view, n)) * (fresnel * mirror * (0.5 + 0.5 * shade) * open);
 
   // The overlay glows through: tissue darkens and takes the region's colour, the film stays.
   lit = mix(lit, lit * 0.35 + tint.rgb * (0.035 + 0.11 * key.g + 0.07 * fill.g), tint.a);

@@ -6,15 +6,17 @@
 
 namespace trocar::replica {
 
-void FrameAssembler::keep(Frame frame, const wire::QuantisedSurface& surface) {
+void FrameAssembler::keep(Frame frame, const wire::QuantisedSurface& surface,
+                          const wire::BloodLevels& blood) {
   auto& place = kept_[frame % kKept];
   place.frame = frame;
   place.surface = surface;
+  place.blood = blood;
 }
 
-const wire::QuantisedSurface* FrameAssembler::find(Frame frame) const {
+const FrameAssembler::Kept* FrameAssembler::find(Frame frame) const {
   const auto& place = kept_[frame % kKept];
-  return place.frame == frame && !place.surface.empty() ? &place.surface : nullptr;
+  return place.frame == frame && !place.surface.empty() ? &place : nullptr;
 }
 
 void FrameAssembler::clear() {
@@ -28,25 +30,32 @@ FrameAssembler::Unfinished* FrameAssembler::find_or_begin(const proto::SurfaceSl
   const auto found = std::ranges::find_if(
       unfinished_, [&slice](const auto& u) { return u.header.frame == slice.frame(); });
   if (found != unfinished_.end()) {
-    const bool is_same = found->base == slice.base_frame() && found->slices == slice.slices() &&
-                         found->header.epoch == slice.epoch() &&
-                         found->header.surface_crc == slice.surface_crc() &&
-                         found->surface.size() == vertex_count;
+    const bool is_same =
+        found->base == slice.base_frame() && found->slices == slice.slices() &&
+        found->header.epoch == slice.epoch() && found->header.surface_crc == slice.surface_crc() &&
+        found->header.bleeds == slice.has_blood() && found->header.blood_crc == slice.blood_crc() &&
+        found->surface.size() == vertex_count;
     return is_same ? &*found : nullptr;
   }
   const auto* base = find(slice.base_frame());
-  if (base == nullptr || base->size() > vertex_count) return nullptr;
+  if (base == nullptr || base->surface.size() > vertex_count) return nullptr;
   if (unfinished_.size() >= kUnfinished) unfinished_.pop_front();
   Unfinished begun;
   begun.header = {.frame = slice.frame(),
                   .tick = slice.tick(),
                   .epoch = slice.epoch(),
                   .surface_crc = slice.surface_crc(),
+                  .bleeds = slice.has_blood(),
+                  .blood_crc = slice.blood_crc(),
                   .server_time_us = slice.server_time_us()};
   begun.base = slice.base_frame();
   begun.slices = slice.slices();
-  begun.surface = *base;
+  begun.surface = base->surface;
   begun.surface.resize(vertex_count);  // zeros, as on the server
+  if (begun.header.bleeds) {
+    begun.blood = base->blood;
+    begun.blood.resize(vertex_count, 0);
+  }
   unfinished_.push_back(std::move(begun));
   return &unfinished_.back();
 }
@@ -58,15 +67,16 @@ std::optional<FrameAssembler::Whole> FrameAssembler::add(const proto::SurfaceSli
   auto* frame = find_or_begin(slice, vertex_count);
   const std::uint64_t bit = std::uint64_t{1} << slice.slice();
   if (frame == nullptr || (frame->present & bit) != 0) return std::nullopt;
-  wire::SurfaceSlice part{slice.first_vertex(), slice.vertices(), {}};
+  wire::SurfaceSlice part{slice.first_vertex(), slice.vertices(), {}, {}};
   part.payload.assign(slice.payload().begin(), slice.payload().end());
-  if (!wire::decode_slice(part, frame->surface)) return std::nullopt;
+  part.blood.assign(slice.blood().begin(), slice.blood().end());
+  if (!wire::decode_slice(part, frame->surface, frame->blood)) return std::nullopt;
   frame->present |= bit;
   frame->header.payload_bytes += part.payload.size();
   const auto all =
       slice.slices() == 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << slice.slices()) - 1;
   if (frame->present != all) return std::nullopt;
-  Whole whole{frame->header, std::move(frame->surface)};
+  Whole whole{frame->header, std::move(frame->surface), std::move(frame->blood)};
   // Older ones would come too late to be shown.
   const auto newest = whole.header.frame;
   std::erase_if(unfinished_, [newest](const auto& u) { return u.header.frame <= newest; });

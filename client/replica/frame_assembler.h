@@ -14,6 +14,7 @@
 #include <string>
 
 #include "common/base/tick.h"
+#include "common/wire/blood_codec.h"
 #include "common/wire/quantise.h"
 #include "common/wire/surface_slices.h"
 
@@ -31,6 +32,8 @@ struct FrameHeader {
   Tick tick = 0;
   std::uint32_t epoch = 0;
   std::uint32_t surface_crc = 0;
+  bool bleeds = false;  // it has levels of blood, with this CRC
+  std::uint32_t blood_crc = 0;
   std::uint64_t server_time_us = 0;  // 0: not said
   bool is_keyframe = false;
   std::size_t payload_bytes = 0;
@@ -42,15 +45,22 @@ class FrameAssembler {
   static constexpr std::uint32_t kMaxStateParts = 16;
 
   // Remembers a frame that is known to be right.
-  void keep(Frame frame, const wire::QuantisedSurface& surface);
+  void keep(Frame frame, const wire::QuantisedSurface& surface,
+            const wire::BloodLevels& blood = {});
+  struct Kept {
+    Frame frame = 0;
+    wire::QuantisedSurface surface;  // empty: nothing is kept here
+    wire::BloodLevels blood;         // empty: the session does not bleed
+  };
   // Null: it is not known, or too old.
-  const wire::QuantisedSurface* find(Frame frame) const;
+  const Kept* find(Frame frame) const;
   // Nothing of before is of use: another surface.
   void clear();
 
   struct Whole {
     FrameHeader header;
     wire::QuantisedSurface surface;  // not yet compared with the CRC
+    wire::BloodLevels blood;         // likewise
   };
   // `vertex_count`: of the epoch, which must be the slice's.
   std::optional<Whole> add(const proto::SurfaceSlice& slice, std::size_t vertex_count);
@@ -64,10 +74,7 @@ class FrameAssembler {
     std::uint32_t slices = 0;
     std::uint64_t present = 0;  // bit per slice
     wire::QuantisedSurface surface;
-  };
-  struct Kept {
-    Frame frame = 0;
-    wire::QuantisedSurface surface;  // empty: nothing is kept here
+    wire::BloodLevels blood;
   };
   struct State {
     Frame frame = 0;

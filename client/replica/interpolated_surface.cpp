@@ -150,6 +150,11 @@ void InterpolatedSurface::interpolate(const Topology& topology, const SessionFra
                      rest[i].y + from * static_cast<float>(a.y) + to * static_cast<float>(b.y),
                      rest[i].z + from * static_cast<float>(a.z) + to * static_cast<float>(b.z)};
   }
+  const bool bleeds = before.blood.size() == rest.size() && after.blood.size() == rest.size();
+  blood_.resize(bleeds ? rest.size() : 0);
+  for (std::size_t i = 0; i < blood_.size(); ++i)
+    blood_[i] =
+        (1 - t) * static_cast<float>(before.blood[i]) + t * static_cast<float>(after.blood[i]);
   // A frame whose FrameState is still under way shows what was known before it.
   const SessionFrame& known = after.has_state ? after : before;
   if (!known.has_state) return;

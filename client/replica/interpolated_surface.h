@@ -61,6 +61,8 @@ class InterpolatedSurface {
   double tick() const { return tick_; }
   double delay_ticks() const { return clock_.delay_ticks(); }
   const std::vector<Vec3f>& positions() const { return positions_; }  // m, per vertex slot
+  // Depth of blood in levels, per vertex slot; empty: the session does not bleed.
+  const std::vector<float>& blood() const { return blood_; }
   const std::vector<Tool>& tools() const { return tools_; }
   const std::vector<std::uint16_t>& regions() const { return regions_; }
 
@@ -76,6 +78,7 @@ class InterpolatedSurface {
   bool has_tick_ = false, is_valid_ = false;
   double tick_ = 0;
   std::vector<Vec3f> positions_;
+  std::vector<float> blood_;
   std::vector<Tool> tools_;
   std::vector<std::uint16_t> regions_;
   std::uint64_t welcome_count_ = 0;

@@ -235,12 +235,25 @@ void Replica::extend_history(const wire::QuantisedSurface& surface) {
         known.push_back(vertex.has_parents()
                             ? wire::between(known[vertex.a.value], known[vertex.b.value], vertex.t)
                             : surface[known.size()]);
+    if (!frame.blood.empty()) frame.blood.resize(known.size(), 0);
   }
 }
 
-const wire::QuantisedSurface* Replica::find_base(Frame frame) const {
-  if (!history_.empty() && history_.back().frame == frame) return &history_.back().surface;
-  return assembler_.find(frame);
+Replica::Base Replica::find_base(Frame frame) const {
+  if (!history_.empty() && history_.back().frame == frame)
+    return {&history_.back().surface, &history_.back().blood};
+  const auto* kept = assembler_.find(frame);
+  return kept != nullptr ? Base{&kept->surface, &kept->blood} : Base{};
+}
+
+bool Replica::decode_blood(const proto::SurfaceFrame& message, const wire::BloodLevels& base) {
+  scratch_blood_.clear();
+  if (!message.has_blood()) return true;
+  scratch_blood_ = base;
+  scratch_blood_.resize(layout_.vertex_count(), 0);  // dry, as on the server
+  const auto payload = bytes_of(std::string_view(message.blood()));
+  return wire::decode_blood(payload, scratch_blood_).ok() &&
+         wire::blood_crc(scratch_blood_) == message.blood_crc();
 }
 
 bool Replica::decode_surface(const proto::SurfaceFrame& message) {
@@ -249,9 +262,11 @@ bool Replica::decode_surface(const proto::SurfaceFrame& message) {
     payload[payload.size() / 2] ^= 0x10u;
   if (message.is_keyframe()) {
     scratch_.assign(layout_.vertex_count(), {});
-    if (!wire::decode_keyframe(payload, scratch_).ok()) return false;
+    if (!wire::decode_keyframe(payload, scratch_).ok() || !decode_blood(message, {})) return false;
   } else {
-    scratch_ = *find_base(message.base_frame());
+    const Base base = find_base(message.base_frame());
+    if (!decode_blood(message, *base.blood)) return false;
+    scratch_ = *base.surface;
     scratch_.resize(layout_.vertex_count());  // zeros, as on the server
     if (!wire::decode_delta(payload, scratch_).ok()) return false;
   }
@@ -278,7 +293,7 @@ void Replica::apply_surface(const proto::SurfaceFrame& message, std::uint64_t ar
   }
   // A keyframe of an unknown epoch is as good as none: its topology has to come first.
   if (message.epoch() != layout_.epoch ||
-      (!message.is_keyframe() && find_base(message.base_frame()) == nullptr)) {
+      (!message.is_keyframe() && find_base(message.base_frame()).surface == nullptr)) {
     ++counters_.base_mismatches;
     return need_keyframe(message.frame());
   }
@@ -290,6 +305,8 @@ void Replica::apply_surface(const proto::SurfaceFrame& message, std::uint64_t ar
                 .tick = message.tick(),
                 .epoch = message.epoch(),
                 .surface_crc = message.surface_crc(),
+                .bleeds = message.has_blood(),
+                .blood_crc = message.blood_crc(),
                 .server_time_us = message.server_time_us(),
                 .is_keyframe = message.is_keyframe(),
                 .payload_bytes = message.payload().size()},
@@ -303,8 +320,11 @@ void Replica::apply_slice(const proto::SurfaceSlice& message, std::uint64_t arri
   auto whole = assembler_.add(message, layout_.vertex_count());
   if (!whole) return;
   scratch_ = std::move(whole->surface);
+  scratch_blood_ = std::move(whole->blood);
   if (++deltas_seen_ == corrupt_at_) scratch_.front().x ^= 1;
-  if (wire::surface_crc(scratch_) != whole->header.surface_crc) {
+  const bool has_right_blood =
+      !whole->header.bleeds || wire::blood_crc(scratch_blood_) == whole->header.blood_crc;
+  if (wire::surface_crc(scratch_) != whole->header.surface_crc || !has_right_blood) {
     ++counters_.crc_mismatches;
     return need_keyframe(message.frame());
   }
@@ -333,11 +353,12 @@ void Replica::count_moved() {
 }
 
 void Replica::accept_frame(const FrameHeader& header, std::uint64_t arrival_ns) {
-  if (has_datagrams_) assembler_.keep(header.frame, scratch_);
+  if (has_datagrams_) assembler_.keep(header.frame, scratch_, scratch_blood_);
   show_frame(header, arrival_ns);
   proto::Envelope ack;
   ack.mutable_frame_ack()->set_frame(history_.back().frame);
   ack.mutable_frame_ack()->set_surface_crc(surface_crc_);
+  if (header.bleeds) ack.mutable_frame_ack()->set_blood_crc(header.blood_crc);
   send_(ack);  // the next one says the same
   if (early_state_ && early_state_->frame() <= header.frame) {
     apply_state(*early_state_);
@@ -381,6 +402,7 @@ void Replica::show_frame(const FrameHeader& header, std::uint64_t arrival_ns) {
   next.arrival_ns = arrival_ns;
   next.server_time_us = header.server_time_us;
   next.surface = scratch_;
+  next.blood = scratch_blood_;
   next.has_state = false;
   history_.push_back(std::move(next));
   surface_crc_ = header.surface_crc;
@@ -402,6 +424,7 @@ void Replica::answer_barrier() {
     proto::Envelope ack;
     ack.mutable_frame_ack()->set_frame(barrier_->frame);
     ack.mutable_frame_ack()->set_surface_crc(barrier_->own_crc);
+    if (!last->blood.empty()) ack.mutable_frame_ack()->set_blood_crc(wire::blood_crc(last->blood));
     barrier_answered_ = send_(ack);
   } else if (sync_state_ == SyncState::InStep && last != nullptr && last->frame < barrier_->frame) {
     need_keyframe(barrier_->frame);

@@ -184,11 +184,17 @@ class Replica final : public MessageSink {
   void apply_claim(const proto::ClaimEvent& message, std::uint64_t arrival_ns);
   void apply_slice(const proto::SurfaceSlice& message, std::uint64_t arrival_ns);
   void apply_state_part(const proto::FrameStatePart& message);
-  // Into scratch_.
+  // Decodes into scratch_ and scratch_blood_.
   bool decode_surface(const proto::SurfaceFrame& message);
-  const wire::QuantisedSurface* find_base(Frame frame) const;
+  // On the levels of its base.
+  bool decode_blood(const proto::SurfaceFrame& message, const wire::BloodLevels& base);
+  struct Base {
+    const wire::QuantisedSurface* surface = nullptr;  // null: it is not known
+    const wire::BloodLevels* blood = nullptr;
+  };
+  Base find_base(Frame frame) const;
   bool is_overtaken(const proto::SurfaceFrame& message) const;
-  // scratch_ is right.
+  // scratch_ and scratch_blood_ are right.
   void accept_frame(const FrameHeader& header, std::uint64_t arrival_ns);
   void show_frame(const FrameHeader& header, std::uint64_t arrival_ns);
   // These take the layout over from the stream to be shown: all of it, or what changed.
@@ -216,7 +222,8 @@ class Replica final : public MessageSink {
   std::deque<SessionFrame> history_;
   std::uint64_t history_version_ = 0;
   wire::QuantisedSurface scratch_;  // the frame being reconstructed
-  bool has_datagrams_ = false;      // frames may come late
+  wire::BloodLevels scratch_blood_;
+  bool has_datagrams_ = false;  // frames may come late
   FrameAssembler assembler_;
   std::unique_ptr<proto::FrameState> early_state_;  // its surface is still under way
   wire::QuantisedSurface ghost_quanta_;

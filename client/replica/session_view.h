@@ -10,6 +10,7 @@
 #include "common/base/ids.h"
 #include "common/base/tick.h"
 #include "common/tool/tool.h"
+#include "common/wire/blood_codec.h"
 #include "common/wire/claim_outcome.h"
 #include "common/wire/figures.h"
 #include "common/wire/ghost_status.h"
@@ -78,6 +79,7 @@ struct SessionFrame {
   std::uint64_t arrival_ns = 0;        // monotonic
   std::uint64_t server_time_us = 0;    // when the server published it, by its clock; 0: unknown
   wire::QuantisedSurface surface;      // displacements from rest, of every vertex of the topology
+  wire::BloodLevels blood;             // of every vertex; empty: the session does not bleed
   bool has_state = false;              // the rest is valid: its FrameState has arrived
   std::vector<Tool> tools;             // by slot
   std::vector<std::uint16_t> regions;  // per vertex slot: 0 not active, else merged region

@@ -132,6 +132,46 @@ InstrumentMesh make_endoscope(const tool::ToolShape& shape, Colour colour) {
   return mesh;
 }
 
+// A tube whose end is open, with holes around it.
+InstrumentMesh make_suction(const tool::ToolShape& shape, Colour colour) {
+  const float r = shape.radius_m;
+  constexpr Material kHole = {14, 10, 12, 0};
+  const ProfilePoint front[] = {{3 * r, 0, kHole},
+                                {-0.6f * r, 0.62f * r, kHole},
+                                {-r, 0.72f * r, kSteel},
+                                {-0.9f * r, r, kSteel},
+                                {0.2f * r, r, kSteel},
+                                {0.2f * r, 0.97f * r, kHole},
+                                {0.7f * r, 0.97f * r, kHole},
+                                {0.7f * r, r, kSteel},
+                                {1.6f * r, r, kSteel},
+                                {1.6f * r, 0.97f * r, kHole},
+                                {2.1f * r, 0.97f * r, kHole},
+                                {2.1f * r, r, kSteel},
+                                {4 * r, r, kSteel}};
+  InstrumentMesh mesh;
+  revolve(front, 24, 0, 2 * kPi, mesh.body);
+  add_shaft(shape, 3.9f * r, r, colour, mesh.body);
+  return mesh;
+}
+
+// A hot ball sits on a thin neck.
+InstrumentMesh make_coagulator(const tool::ToolShape& shape, Colour colour) {
+  const float r = shape.radius_m;
+  constexpr Material kHot = {224, 150, 84, 200};
+  std::vector<ProfilePoint> profile;
+  constexpr int kRings = 12;
+  for (int i = 0; i <= kRings; ++i) {
+    const float a = 0.9f * kPi * static_cast<float>(i) / kRings;
+    profile.push_back({-r * std::cos(a), r * std::sin(a), kHot, true});
+  }
+  profile.push_back({3 * r, 0.35f * r, kSteel});
+  InstrumentMesh mesh;
+  revolve(profile, 24, 0, 2 * kPi, mesh.body);
+  add_shaft(shape, 3 * r, 0.8f * r, colour, mesh.body);
+  return mesh;
+}
+
 }  // namespace
 
 InstrumentMesh make_instrument(const tool::ToolShape& shape, Colour colour) {
@@ -147,6 +187,10 @@ InstrumentMesh make_instrument(const tool::ToolShape& shape, Colour colour) {
     case tool::Form::Endoscope:
     case tool::Form::Endoscope30:
       return make_endoscope(shape, colour);
+    case tool::Form::Suction:
+      return make_suction(shape, colour);
+    case tool::Form::Coagulator:
+      return make_coagulator(shape, colour);
     default:
       break;
   }

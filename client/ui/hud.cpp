@@ -183,7 +183,9 @@ HudActions Hud::draw(const HudModel& model) {
   const Box people = draw_participants_panel(model, scale_);
   const Box banners = draw_banners(model, session, people, scale_);
   draw_labels(model, banners, scale_);
-  const Box right = model.lesson ? draw_lesson(*model.lesson, people, scale_) : people;
+  Box right = model.lesson ? draw_lesson(*model.lesson, people, scale_) : people;
+  if (model.figures.blood && model.figures.blood->shed_nl > 0)
+    right = draw_blood(*model.figures.blood, right, scale_);
   draw_felt_hands(model, right.bottom, scale_);
   draw_own_forces(model, scale_);
   if (model.tray.hands > 0) draw_tray(model, session, scale_, actions);

@@ -20,6 +20,8 @@ Box draw_participants_panel(const HudModel& model, float scale);
 Box draw_banners(const HudModel& model, const Box& session, const Box& people, float scale);
 // The lesson's stage, under the panel of people; returns where both are.
 Box draw_lesson(const HudLesson& lesson, const Box& people, float scale);
+// Blood lost, under the panels above; returns where all of them are.
+Box draw_blood(const wire::BloodFigures& blood, const Box& above, float scale);
 // A bar at the bottom shows the force that one's own tools meet.
 void draw_own_forces(const HudModel& model, float scale);
 // A panel says what devices render; `top`: where on the screen there is room from.

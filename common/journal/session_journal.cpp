@@ -155,6 +155,10 @@ Result<std::optional<proto::ExternalLoads>> SessionJournal::loads() {
   return last<proto::ExternalLoads>(JournalTopic::Loads, 0);
 }
 
+Result<std::optional<proto::BleedingRules>> SessionJournal::bleeding() {
+  return last<proto::BleedingRules>(JournalTopic::Bleeding, info_.begin_tick());
+}
+
 Status SessionJournal::read_tick_records(Tick from, Tick to,
                                          const TickVisitor<proto::TickRecord>& visitor) {
   // A batch carries the tick of its frame, the last of its records.

@@ -60,6 +60,8 @@ class SessionJournal {
   Result<proto::Organ> organ();
   // Nothing if only tools act, or if the journal lacks them.
   Result<std::optional<proto::ExternalLoads>> loads();
+  // Nothing if the session did not bleed.
+  Result<std::optional<proto::BleedingRules>> bleeding();
 
   // Records of ticks in [from, to], in order.
   Status read_tick_records(Tick from, Tick to, const TickVisitor<proto::TickRecord>& visitor);

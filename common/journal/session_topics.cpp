@@ -32,6 +32,7 @@ const TopicEntry& entry_of(JournalTopic topic) {
       {"/lesson", proto::LessonRecord::descriptor()},
       {"/drawing", proto::Drawing::descriptor()},
       {"/overview", proto::Overview::descriptor()},
+      {"/bleeding", proto::BleedingRules::descriptor()},
   }};
   return kEntries[static_cast<std::size_t>(topic)];
 }

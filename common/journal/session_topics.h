@@ -20,6 +20,7 @@
 //   /drawing         Drawing          all that is drawn on the surface, on change
 //   /frame_state     FrameState       tools, regions and figures of a frame, as a client got them
 //   /overview        Overview         every 30 s, in a chunk of its own: what a page plots of them
+//   /bleeding        BleedingRules    once, at the start, of a session that bleeds
 //   /gap             JournalGap       where the queue to the writer was full
 //   /tool/<slot>     ToolState        one channel per tool, for plots in other programs
 //
@@ -57,8 +58,9 @@ enum class JournalTopic : std::uint8_t {
   Lesson,
   Drawing,
   Overview,
+  Bleeding,
 };
-inline constexpr int kJournalTopicCount = 17;
+inline constexpr int kJournalTopicCount = 18;
 
 inline constexpr const char* kJournalProfile = "trocar";
 inline constexpr const char* kSessionMetadataName = "trocar.session";

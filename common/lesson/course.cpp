@@ -45,6 +45,7 @@ struct Course::Meter {
   double off_ms = 0, off_s = 0;  // integral of the distance from the point, and over which time
   double wrong = 0, refusals = 0;
   double answer_error_m = kNotMeasured;
+  std::optional<double> blood_before_m3, blood_m3;  // lost before the stage, and so far
   // The wound.
   bool is_looked_at = false;
   std::uint32_t epoch = 0;
@@ -107,8 +108,10 @@ void Course::begin_stage(Tick tick) {
   progress_ = 0;
   is_too_strong_ = false;
   auto tips = std::move(meter_->tips);
+  const auto blood_m3 = meter_->blood_m3;
   *meter_ = Meter{};
   meter_->tips = std::move(tips);
+  meter_->blood_before_m3 = meter_->blood_m3 = blood_m3;
 }
 
 void Course::restart() {
@@ -138,6 +141,8 @@ void Course::end_stage(bool is_reached) {
   if (stage.force_limit_n > 0) set(Measure::TimeAbove, meter.above_s);
   set(Measure::Path, meter.path_m);
   set(Measure::Refusals, meter.refusals);
+  // A return to the instructor's mark gives blood back.
+  if (meter.blood_m3) set(Measure::Blood, std::max(0.0, *meter.blood_m3 - *meter.blood_before_m3));
   if (stage.goal == Goal::Find) {
     set(Measure::WrongAnswers, meter.wrong);
     set(Measure::Error, meter.answer_error_m);
@@ -182,6 +187,8 @@ void Course::measure(const Moment& moment, double dt_s) {
   }
   meter.tips = std::move(tips);
   meter.peak_n = std::max(meter.peak_n, strongest);
+  meter.blood_m3 = moment.blood_m3;
+  if (!meter.blood_before_m3) meter.blood_before_m3 = moment.blood_m3;
   if (strongest > kFeltN) meter.touched_ns += strongest * dt_s, meter.touched_s += dt_s;
   is_too_strong_ = stage().force_limit_n > 0 && strongest > stage().force_limit_n;
   if (is_too_strong_) meter.above_s += dt_s;

@@ -36,6 +36,7 @@ struct Moment {
   std::span<const Tip> tips;  // by slot
   std::span<const wire::QuantisedVertex> displacements;
   const wire::SurfaceLayout* layout = nullptr;
+  std::optional<double> blood_m3;  // lost since the session began; nothing: it does not bleed
 };
 
 struct StageResult {

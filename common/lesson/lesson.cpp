@@ -27,7 +27,8 @@ constexpr std::array<MeasureText, kMeasures> kTexts{
      {"missing_margin_mm", "margin too small by", "mm", 1e3, 1},
      {"volume_cm3", "taken out", "cm³", 1e6, 1},
      {"harm_cm2", "cut into what is to be spared", "cm²", 1e4, 2},
-     {"refusals", "refused or lost grasps", "", 1, 0}}};
+     {"refusals", "refused or lost grasps", "", 1, 0},
+     {"blood_ml", "blood lost", "ml", 1e6, 1}}};
 
 }  // namespace
 

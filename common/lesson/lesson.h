@@ -25,6 +25,8 @@ struct Structure {
   Vec3d from_m, to_m;  // at rest, world frame; equal: a ball
   double radius_m = 0.01;
   double young_modulus_pa = 30e3, poisson_ratio = 0.47;
+  // Blood stands in it so, where the lesson bleeds; 0: it is no vessel. The flow feeds it at most.
+  double vessel_pressure_pa = 0, vessel_flow_m3_s = 100e-6 / 60;
 
   // The distance of a place at rest from its surface, negative within.
   double distance_m(const Vec3d& place_m) const;
@@ -55,8 +57,9 @@ enum class Measure : std::uint8_t {
   Volume,         // m^3 taken out
   Harm,           // m^2 of wound within structures that are to be spared
   Refusals,       // grasps and cuts that were refused, slipped or were lost
+  Blood,          // m^3 lost
 };
-inline constexpr int kMeasures = 12;
+inline constexpr int kMeasures = 13;
 // "time_s": as in files.
 const char* key_of(Measure measure);
 // "greatest force".
@@ -98,6 +101,7 @@ struct Stage {
 struct Lesson {
   std::string title, text;
   std::string organ = "liver";  // a built-in one's name, or a file's path
+  bool bleeds = false;
   std::vector<Structure> structures;
   std::vector<Stage> stages;  // 1 to kMostStages
   std::string source;         // the file's text, for recordings

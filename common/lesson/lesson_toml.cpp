@@ -13,6 +13,7 @@ using tool::TableReader;
 
 constexpr double kFarthestMm = 1000, kLongestS = 3600, kMostPoints = 1e6;
 constexpr std::size_t kMostText = 500;  // bytes
+constexpr double kPascalPerMmHg = 133.322;
 
 constexpr std::array<std::pair<std::string_view, Goal>, kGoals> kGoalNames{
     {{"find", Goal::Find},
@@ -64,6 +65,13 @@ Structure read_structure(TableReader& reader) {
   read_length(reader, "radius_mm", structure.radius_m, 1, 100);
   read_number(reader, "young_modulus_pa", structure.young_modulus_pa, 100, 1e6);
   read_number(reader, "poisson_ratio", structure.poisson_ratio, 0, 0.49);
+  if (const auto mmhg = reader.number("vessel_pressure_mmhg", 1, 300))
+    structure.vessel_pressure_pa = *mmhg * kPascalPerMmHg;
+  if (const auto flow = reader.number("vessel_flow_ml_min", 1, 5000)) {
+    structure.vessel_flow_m3_s = *flow * 1e-6 / 60;
+    if (structure.vessel_pressure_pa == 0)
+      reader.fail("vessel_flow_ml_min", "is of a vessel, say vessel_pressure_mmhg as well");
+  }
   reader.finish();
   return structure;
 }
@@ -194,6 +202,7 @@ Result<Lesson> read_lesson_text(std::string_view text, std::string_view source) 
   lesson.title = read_text(root, "title", true);
   lesson.text = read_text(root, "text", true);
   if (const auto organ = root.string("organ")) lesson.organ = *organ;
+  lesson.bleeds = root.boolean("bleeding").value_or(false);
   for (const auto* entry : root.tables("structure")) {
     TableReader reader(document, *entry,
                        "structure[" + std::to_string(lesson.structures.size()) + "]");

@@ -37,16 +37,18 @@ Instrument read_instrument(TableReader& reader) {
   instrument.text = reader.string("text").value_or("");
   if (instrument.text.size() > kTextLimit)
     reader.fail("text", "is longer than " + std::to_string(kTextLimit) + " bytes, shorten it");
-  const auto form =
-      reader.choice<Form, kFormCount>("form", {{{"plain", Form::Plain},
-                                                {"probe", Form::Probe},
-                                                {"grasper", Form::Grasper},
-                                                {"scissors", Form::Scissors},
-                                                {"scalpel", Form::Scalpel},
-                                                {"hook", Form::Hook},
-                                                {"spatula", Form::Spatula},
-                                                {"endoscope", Form::Endoscope},
-                                                {"endoscope-30", Form::Endoscope30}}});
+  const auto form = reader.choice<Form, kFormCount>("form", {{{"plain", Form::Plain},
+                                                              {"probe", Form::Probe},
+                                                              {"grasper", Form::Grasper},
+                                                              {"scissors", Form::Scissors},
+                                                              {"scalpel", Form::Scalpel},
+                                                              {"hook", Form::Hook},
+                                                              {"spatula", Form::Spatula},
+                                                              {"endoscope", Form::Endoscope},
+                                                              {"endoscope-30", Form::Endoscope30},
+                                                              {"suction", Form::Suction},
+                                                              {"clipper", Form::Clipper},
+                                                              {"coagulator", Form::Coagulator}}});
   shape.form = form.value_or(Form::Plain);
   read_length(reader, "radius_mm", shape.radius_m, 0.5, 50);
   read_length(reader, "length_mm", shape.length_m, 10, 1000);

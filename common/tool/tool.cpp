@@ -20,8 +20,9 @@ const char* name_of(Verb verb) {
 }
 
 const char* name_of(Form form) {
-  static constexpr std::array kNames{"plain", "probe",   "grasper",   "scissors",    "scalpel",
-                                     "hook",  "spatula", "endoscope", "endoscope-30"};
+  static constexpr std::array kNames{"plain",        "probe",   "grasper", "scissors",
+                                     "scalpel",      "hook",    "spatula", "endoscope",
+                                     "endoscope-30", "suction", "clipper", "coagulator"};
   static_assert(kNames.size() == kFormCount);
   const auto number = static_cast<std::size_t>(form);
   return number < kNames.size() ? kNames[number] : "unknown";

@@ -24,8 +24,11 @@ enum class Form : std::uint8_t {
   Spatula = 6,
   Endoscope = 7,    // looks along its shaft
   Endoscope30 = 8,  // looks 30 degrees from it, towards the tool's y
+  Suction = 9,      // a tube; pushing, it takes blood away
+  Clipper = 10,     // jaws that set a clip on a vessel as they close
+  Coagulator = 11,  // a ball; pushing, it seals what oozes
 };
-inline constexpr int kFormCount = 9;
+inline constexpr int kFormCount = 12;
 inline constexpr bool is_endoscope(Form form) {
   return form == Form::Endoscope || form == Form::Endoscope30;
 }

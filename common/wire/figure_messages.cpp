@@ -60,6 +60,26 @@ Status read(const proto::SolverState& message, SolverFigures& figures) {
   return {};
 }
 
+BloodFigures read(const proto::BloodState& message) {
+  return {.shed_nl = message.shed_nl(),
+          .on_surface_nl = message.on_surface_nl(),
+          .dripped_nl = message.dripped_nl(),
+          .sucked_nl = message.sucked_nl(),
+          .rate_nl_s = message.rate_nl_s(),
+          .sources = message.sources(),
+          .open_vessels = message.open_vessels()};
+}
+
+void write(const BloodFigures& figures, proto::BloodState& message) {
+  message.set_shed_nl(figures.shed_nl);
+  message.set_on_surface_nl(figures.on_surface_nl);
+  message.set_dripped_nl(figures.dripped_nl);
+  message.set_sucked_nl(figures.sucked_nl);
+  message.set_rate_nl_s(figures.rate_nl_s);
+  message.set_sources(figures.sources);
+  message.set_open_vessels(figures.open_vessels);
+}
+
 Status read(const proto::RateState& message, FrameFigures& figures) {
   auto& layers = figures.solve.layer_sweeps;
   if (message.layer_sweeps_size() > static_cast<int>(layers.size()))
@@ -126,6 +146,8 @@ void write(const FrameFigures& figures, proto::FrameState& message) {
     relaxation.set_volume_change(static_cast<float>(figures.relaxation->volume_change));
     relaxation.set_relaxed_share(static_cast<float>(figures.relaxation->relaxed_share));
   }
+  message.clear_blood();
+  if (figures.blood) write(*figures.blood, *message.mutable_blood());
   message.set_state_hash(figures.state_hash);
   write(figures.pace, message);
 }
@@ -149,6 +171,7 @@ Result<FrameFigures> read(const proto::FrameState& message) {
               pace.stage_median_us.begin());
   if (message.has_relaxation())
     if (auto s = read(message.relaxation(), figures.relaxation.emplace()); !s) return s.error();
+  if (message.has_blood()) figures.blood = read(message.blood());
   if (message.has_solver())
     if (auto s = read(message.solver(), figures.solve.solver.emplace()); !s) return s.error();
   if (message.has_rate())

@@ -106,6 +106,20 @@ struct RelaxationFigures {
   bool operator==(const RelaxationFigures&) const = default;
 };
 
+// These say what has bled, in a session that does. Volumes are whole nanolitres, rounded down, of
+// sums that are exact: shed = on the surface + dripped + sucked.
+struct BloodFigures {
+  std::uint64_t shed_nl = 0;        // out of wounds and vessels: the loss
+  std::uint64_t on_surface_nl = 0;  // lies or runs there
+  std::uint64_t dripped_nl = 0;     // has fallen off
+  std::uint64_t sucked_nl = 0;
+  std::uint64_t rate_nl_s = 0;     // that is shed now
+  std::uint32_t sources = 0;       // vertices that bleed now
+  std::uint32_t open_vessels = 0;  // cut open and neither clipped nor pressed shut
+
+  bool operator==(const BloodFigures&) const = default;
+};
+
 // The level says what the server's rate controller does. The numbers are those of proto::RateLevel.
 enum class RateLevel : std::uint8_t {
   Fixed,       // decisions are fixed: there is no controller
@@ -141,6 +155,7 @@ struct FrameFigures {
   NearFigures near;
   SolveFigures solve;
   std::optional<RelaxationFigures> relaxation;  // of tissue that relaxes
+  std::optional<BloodFigures> blood;            // of sessions that bleed
   std::uint64_t state_hash = 0;                 // after the frame's tick
   PaceFigures pace;
 

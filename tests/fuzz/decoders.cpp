@@ -13,6 +13,7 @@
 #include "common/secure/join_code.h"
 #include "common/tool/instrument.h"
 #include "common/tool/script.h"
+#include "common/wire/blood_codec.h"
 #include "common/wire/framing.h"
 #include "common/wire/hand_report_messages.h"
 #include "common/wire/haptic_messages.h"
@@ -29,6 +30,7 @@
 #include "server/organs/organ/organ_file.h"
 #include "server/papers/dogan/reduction_file.h"
 #include "server/session/access/code_book.h"
+#include "server/session/bleeding/bleeding.h"
 #include "server/session/recording/load_messages.h"
 #include "server/session/replication/validation.h"
 #include "server/tissue/world/surface_layout.h"
@@ -116,6 +118,24 @@ bool decode_surface_slice(BytesView bytes) {
   const bool is_accepted = checked(wire::decode_slice(slice, surface));
   TROCAR_ASSERT(is_accepted || surface == before);
   return is_accepted;
+}
+
+bool decode_blood(BytesView bytes) {
+  const wire::BloodLevels before(700, 9);
+  auto levels = before;
+  const bool is_accepted = checked(wire::decode_blood(bytes, levels));
+  TROCAR_ASSERT(is_accepted || levels == before);
+  return is_accepted;
+}
+
+// The blood of a snapshot. A state that is accepted is written as it was read.
+bool decode_bleeding(BytesView bytes) {
+  bleeding::Bleeding bleeding(bleeding::Rules{});
+  if (!checked(bleeding.restore_state(bytes))) return false;
+  Bytes again;
+  bleeding.write_state(again);
+  TROCAR_ASSERT(std::ranges::equal(again, bytes));
+  return true;
 }
 
 // Datagrams of a handshake, each behind its length of 16 bits: the first byte chooses between those
@@ -276,6 +296,8 @@ constexpr Decoder kDecoders[] = {
     {"teaching", decode_teaching},
     {"surface_codec", decode_surface},
     {"surface_slice", decode_surface_slice},
+    {"blood", decode_blood},
+    {"bleeding", decode_bleeding},
     {"handshake", decode_handshake},
     {"surface_topology", decode_topology},
     {"surface_change", decode_change},

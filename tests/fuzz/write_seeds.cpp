@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include "common/secure/datagram_channel.h"
+#include "common/wire/blood_codec.h"
 #include "common/wire/hand_report_messages.h"
 #include "common/wire/haptic_messages.h"
 #include "common/wire/surface_messages.h"
@@ -15,6 +16,7 @@
 #include "server/organs/organ/local_reduction_file.h"
 #include "server/organs/organ/organ_file.h"
 #include "server/papers/dogan/reduction_file.h"
+#include "server/session/bleeding/blood.h"
 #include "server/tissue/world/surface_layout.h"
 #include "tests/journal/session_samples.h"
 #include "tests/papers/synthetic_reduction.h"
@@ -78,6 +80,26 @@ void save_slices() {
   writer.put(slices.back().vertices);
   bytes.insert(bytes.end(), slices.back().payload.begin(), slices.back().payload.end());
   save("surface_slice", "last", bytes);
+}
+
+void save_blood() {
+  wire::BloodLevels levels(700);
+  for (std::size_t i = 100; i < 300; i += 3) levels[i] = static_cast<std::uint8_t>(i);
+  Bytes payload;
+  wire::encode_blood({}, levels, payload);
+  save("blood", "film", payload);
+  bleeding::Blood blood;
+  blood.resize(20);
+  blood.volume_pl[3] = 700, blood.open[3] = 5, blood.was_wound[3] = 1, blood.levels[3] = 2;
+  blood.shed_pl = 1000, blood.dripped_pl = 200, blood.sucked_pl = 100;
+  blood.clip_vessel = {0}, blood.clip_place_m = {{0.1, 0.2, 0.3}}, blood.clip_reach_m = {0.01};
+  Bytes state;
+  auto archive = world::StateArchive::writing(state);
+  blood.visit_state(archive);
+  bool has_mark = true;
+  archive.flag(has_mark);
+  blood.visit_state(archive);
+  save("bleeding", "clipped", state);
 }
 
 void save_datagram(const char* name, bool is_client, BytesView datagram) {
@@ -171,6 +193,7 @@ int main(int argc, char** argv) {
   save_haptics();
   save_teaching();
   save_slices();
+  save_blood();
   save_handshakes();
   const auto block = reduce::testing::block(3, 3, 3);
   save("organ", "block", organ::encode_organ(block));

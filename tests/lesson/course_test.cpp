@@ -64,6 +64,26 @@ TEST(Course, FindTakesThePlaceAtRestUnderTheTip) {
   EXPECT_EQ(play.course.answer(kTool, play.moment()), Answer::NotAsked);
 }
 
+TEST(Course, BloodIsCountedFromTheBeginningOfTheStage) {
+  Stage stage{.name = "S", .text = "t", .goal = Goal::Find, .structure = "lump"};
+  stage.limit_s = 2;
+  Play play(stage, {{.name = "lump"}});
+  auto moment = play.moment();
+  for (const double ml : {5.0, 6.0, 17.0}) {
+    moment.tick += kTicksPerFrame;
+    moment.blood_m3 = ml * 1e-6;
+    play.course.observe(moment);
+  }
+  moment.tick += 3000;
+  play.course.observe(moment);
+  ASSERT_TRUE(play.course.is_over());
+  EXPECT_NEAR(play.course.results()[0].value(Measure::Blood), 12e-6, 1e-12);
+  Play dry(stage, {{.name = "lump"}});
+  dry.seconds(3);
+  ASSERT_TRUE(dry.course.is_over());
+  EXPECT_TRUE(std::isnan(dry.course.results()[0].value(Measure::Blood))) << "nothing bleeds";
+}
+
 TEST(Course, FollowMeasuresTheDistanceFromThePoint) {
   Stage stage{.name = "F", .text = "t", .goal = Goal::Follow};
   stage.line_m = {{0, 0.1, 0}, {0.04, 0.1, 0}};

@@ -40,6 +40,29 @@ TEST(LessonFile, ReadsLengthsInMillimetres) {
   EXPECT_DOUBLE_EQ(score.points(0.006), 0);
 }
 
+TEST(LessonFile, ReadsWhatBleeds) {
+  const auto dry = read_lesson_text(std::string(kHead) + kBall + kFind, "x.toml");
+  ASSERT_TRUE(dry) << dry.error().message;
+  EXPECT_FALSE(dry->bleeds);
+  EXPECT_EQ(dry->structures[0].vessel_pressure_pa, 0);
+  const auto lesson =
+      read_lesson_text(std::string(kHead) + "bleeding = true\n" + kBall +
+                           "vessel_pressure_mmhg = 75\nvessel_flow_ml_min = 120\n" + kFind +
+                           "[[stage.score]]\nmeasure = \"blood_ml\"\nfull = 10\nnone = 30\n",
+                       "x.toml");
+  ASSERT_TRUE(lesson) << lesson.error().message;
+  EXPECT_TRUE(lesson->bleeds);
+  EXPECT_NEAR(lesson->structures[0].vessel_pressure_pa, 10'000, 1);
+  EXPECT_NEAR(lesson->structures[0].vessel_flow_m3_s, 2e-6, 1e-12);
+  EXPECT_NEAR(lesson->stages[0].scores[0].points(20e-6), 0.5, 1e-9);
+  EXPECT_NE(error_of(std::string(kHead) + kBall + "vessel_flow_ml_min = 120\n" + kFind)
+                .find("say vessel_pressure_mmhg as well"),
+            std::string::npos);
+  EXPECT_NE(error_of(std::string(kHead) + kBall + "vessel_pressure_mmhg = 900\n" + kFind)
+                .find("vessel_pressure_mmhg: is 900"),
+            std::string::npos);
+}
+
 TEST(LessonFile, SaysWhatIsWrongAndWhere) {
   const std::string head = kHead, whole = head + kBall + kFind;
   EXPECT_EQ(error_of(whole), "");

@@ -27,8 +27,8 @@ inline constexpr Tick kSnapshotTicks[] = {808, 1608};
 inline constexpr std::uint64_t kClientStart_us = 5'000'000;
 inline constexpr Tick kFirstReportTick = 256;
 
-// dropped_at: a frame that is too large for the recorder's queue, or 0.
-void record_simulation(const std::string& path, Tick dropped_at = 0);
+// dropped_at: a frame that is too large for the recorder's queue, or 0. bleeds: what is cut does.
+void record_simulation(const std::string& path, Tick dropped_at = 0, bool bleeds = false);
 
 // A message of a recording while it is copied. False: it is left out.
 using Edit = std::function<bool(std::string_view topic, google::protobuf::Message& message)>;

@@ -19,7 +19,7 @@ TEST(Instruments, ArePossibleAndToldApart) {
     EXPECT_EQ(possible(kind.shape, kind.button_verb()), kind.button_verb()) << kind.name;
     EXPECT_EQ(possible(kind.shape, main_verb(kind.shape)), main_verb(kind.shape)) << kind.name;
   }
-  EXPECT_EQ(names.size(), 10u);
+  EXPECT_EQ(names.size(), 13u);
   EXPECT_EQ(find_instrument("spoon"), nullptr);
   EXPECT_EQ(instruments().front().shape, ToolShape{}) << "what has always been";
 }
@@ -40,6 +40,9 @@ TEST(Instruments, DoWhatTheirNamesSay) {
   EXPECT_TRUE(does("spatula", Push, Push, Push));
   EXPECT_TRUE(does("endoscope", Push, Push, Push));
   EXPECT_TRUE(does("endoscope-30", Push, Push, Push));
+  EXPECT_TRUE(does("suction", Push, Push, Push));
+  EXPECT_TRUE(does("clips", Grasp, Grasp, Grasp));
+  EXPECT_TRUE(does("coagulator", Push, Push, Push));
   EXPECT_LT(find_instrument("hook")->shape.grip_n, find_instrument("grasper")->shape.grip_n);
   EXPECT_LT(find_instrument("scalpel")->shape.radius_m, find_instrument("probe")->shape.radius_m);
 }

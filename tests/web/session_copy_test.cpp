@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "common/wire/blood_codec.h"
 #include "common/wire/surface_codec.h"
 #include "common/wire/surface_messages.h"
 #include "proto/wire.pb.h"
@@ -74,6 +75,39 @@ proto::SurfaceFrame read(const wire::SharedBytes& framed) {
 
 Bytes payload_of(const proto::SurfaceFrame& frame) {
   return {frame.payload().begin(), frame.payload().end()};
+}
+
+// Adds levels of blood to a frame; `before`: those of its base.
+void bleed(Envelope& frame, const wire::BloodLevels& before, const wire::BloodLevels& levels) {
+  auto& message = *frame.mutable_surface_frame();
+  Bytes payload;
+  wire::encode_blood(message.is_keyframe() ? BytesView() : BytesView(before), levels, payload);
+  message.set_blood(payload.data(), payload.size());
+  message.set_blood_crc(wire::blood_crc(levels));
+}
+
+TEST(SessionCopy, hands_blood_on_and_believes_no_wrong_levels) {
+  Session session;
+  SessionCopy copy;
+  take(copy, session.topology());
+  auto first = session.frame(true);
+  bleed(first, {}, {0, 7, 0});
+  EXPECT_EQ(take(copy, first), News::Frame);
+  auto second = session.frame(false);
+  bleed(second, {0, 7, 0}, {1, 7, 200});
+  EXPECT_EQ(take(copy, second), News::Frame);
+  for (const bool is_late : {true, false}) {
+    const auto given = read(is_late ? copy.keyframe() : copy.delta_from(session.number() - 1));
+    wire::BloodLevels levels = is_late ? wire::BloodLevels(3) : wire::BloodLevels{0, 7, 0};
+    ASSERT_TRUE(wire::decode_blood(bytes_of(std::string_view(given.blood())), levels).ok());
+    EXPECT_EQ(levels, (wire::BloodLevels{1, 7, 200}));
+    EXPECT_EQ(given.blood_crc(), wire::blood_crc(levels));
+  }
+  auto wrong = session.frame(false);
+  bleed(wrong, {1, 7, 200}, {2, 7, 200});
+  wrong.mutable_surface_frame()->set_blood_crc(1);
+  EXPECT_EQ(take(copy, wrong), News::Nothing);
+  EXPECT_TRUE(copy.needs_keyframe());
 }
 
 TEST(SessionCopy, shows_who_comes_late_the_newest_frame_whole) {

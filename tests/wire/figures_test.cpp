@@ -18,7 +18,7 @@ FrameFigures distinct_figures() {
   const auto set = [&last](auto&... fields) {
     ((fields = static_cast<std::remove_reference_t<decltype(fields)>>(++last)), ...);
   };
-  auto& [near, solve, relaxation, state_hash, pace] = figures;
+  auto& [near, solve, relaxation, blood, state_hash, pace] = figures;
   set(state_hash);
   {
     auto& [active_nodes, queue_nodes, node_limit, region_count] = near;
@@ -37,6 +37,10 @@ FrameFigures distinct_figures() {
   {
     auto& [energy_j, volume_change, relaxed_share] = relaxation.emplace();
     set(energy_j, volume_change, relaxed_share);
+  }
+  {
+    auto& [shed, on_surface, dripped, sucked, rate, sources, vessels] = blood.emplace();
+    set(shed, on_surface, dripped, sucked, rate, sources, vessels);
   }
   auto& [stage_median_us, tick_median_us, tick_p99_us, slow_ticks, rate] = pace;
   for (auto& median : stage_median_us) set(median);

@@ -117,6 +117,7 @@ Json json_of(const recording::VerifyReport& r) {
           {"ticks_not_simulated", r.ticks_not_simulated},
           {"frames_verified", r.frames_verified},
           {"surfaces_verified", r.surfaces_verified},
+          {"bled_surfaces", r.bled_surfaces},
           {"surfaces_decoded", r.surfaces_decoded},
           {"snapshots_verified", r.snapshots_verified},
           {"snapshots_continued", r.snapshots_continued},
@@ -136,6 +137,7 @@ std::string text_of(const std::string& path, const recording::VerifyReport& r) {
       path, r.container, r.ticks_verified, r.last_tick - r.begin_tick, r.ticks_missing,
       r.frames_verified, r.surfaces_verified, r.surfaces_decoded, r.snapshots_verified,
       r.snapshots_continued, r.participants_verified);
+  if (r.bled_surfaces > 0) out += fmt::format("{} of these surfaces with blood\n", r.bled_surfaces);
   out += r.why();
   if (r.verdict() == recording::Verdict::Verified)
     out += fmt::format("verified to tick {}, hash {:016x}\n", r.last_tick, r.last_hash);

@@ -33,11 +33,13 @@ class RecordedSession : public JournalSink {
 Result<std::unique_ptr<JournalSink>> open_journal(
     const std::string& path, const organ::Organ& organ, const wire::SurfaceLayout& layout,
     const std::optional<journal::ReductionDescription>& reduction,
-    const std::optional<journal::Continuation>& continues) {
+    const std::optional<journal::Continuation>& continues,
+    const std::optional<bleeding::Rules>& bleeding) {
   if (path == "none") return std::unique_ptr<JournalSink>();
   recording::Beginning beginning;
   beginning.reduction = reduction;
   beginning.continues = continues;
+  beginning.bleeding = bleeding;
   auto recorder = recording::Recorder::create(path, organ, layout, beginning);
   if (!recorder) return recorder.error();
   return std::unique_ptr<JournalSink>(std::make_unique<RecordedSession>(std::move(*recorder)));

@@ -14,6 +14,7 @@
 #include "common/wire/recording_state.h"
 #include "common/wire/surface_layout.h"
 #include "server/organs/organ/organ.h"
+#include "server/session/bleeding/rules.h"
 #include "server/session/participants/roster.h"
 #include "server/tissue/step/published_frame.h"
 
@@ -39,11 +40,12 @@ class JournalSink {
 };
 
 // A journal at `path`, or none for "none" (then null). reduction: of the session, if it has one.
-// continues: with which journal's session it goes on.
+// continues: with which journal's session it goes on. bleeding: of a session that bleeds.
 Result<std::unique_ptr<JournalSink>> open_journal(
     const std::string& path, const organ::Organ& organ, const wire::SurfaceLayout& layout,
     const std::optional<journal::ReductionDescription>& reduction = {},
-    const std::optional<journal::Continuation>& continues = {});
+    const std::optional<journal::Continuation>& continues = {},
+    const std::optional<bleeding::Rules>& bleeding = {});
 
 // "./trocar-20261121T135400Z.mcap"
 std::string default_journal_path();

@@ -272,6 +272,8 @@ void CommandLine::add_session_options() {
           "--lesson", options_.lesson_file,
           "give this lesson: " + lesson::list_lessons() + ", or a file; it brings its organ")
       ->type_name("NAME|FILE");
+  app_.add_flag("--bleeding", options_.bleeds,
+                "cut tissue bleeds, also without a lesson that bleeds");
   app_.add_option("--listen", listen_, "where to listen; port 0 takes any free one")
       ->type_name("ADDR:PORT")
       ->capture_default_str();

@@ -19,6 +19,7 @@ struct ServerOptions {
   bool is_organ_chosen = false;             // on the command line
   std::string lesson_file;                  // empty: none
   std::optional<lesson::Lesson> lesson;     // read from it
+  bool bleeds = false;                      // asked for, besides what a lesson says
   std::string resume_file;                  // empty: a new session
   std::optional<bool> has_averaged_strain;  // empty: as the organ has it, and plain for a reduction
   std::string reduction_file;               // empty: the full solver alone

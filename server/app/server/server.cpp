@@ -73,7 +73,7 @@ class Server {
 
  private:
   step::TickDecisions most_decisions() const;
-  LoopOptions loop_options() const;
+  LoopOptions loop_options();
   // Lets those who were in a session that goes on come back; other hands leave.
   void restore_people();
   void note_participants(const std::vector<participants::Participant>& present, Tick tick);
@@ -138,7 +138,10 @@ Status Server::open() {
   tcp_ = std::move(*listening);
   connections_ = std::make_unique<guests::GuestConnections>(*tcp_);
 
-  auto journal = open_journal(options_.journal, organ, layout, reduction_, start_.continues);
+  const auto bleeding =
+      start_.bleeding ? std::optional(start_.bleeding->rules()) : std::optional<bleeding::Rules>();
+  auto journal =
+      open_journal(options_.journal, organ, layout, reduction_, start_.continues, bleeding);
   if (!journal) return journal.error();
   journal_ = std::move(*journal);
 
@@ -234,9 +237,10 @@ step::TickDecisions Server::most_decisions() const {
                                     : simulation_.with_sweeps_for_organ(options_.decisions);
 }
 
-LoopOptions Server::loop_options() const {
+LoopOptions Server::loop_options() {
   const auto decisions = most_decisions();
   LoopOptions loop{.decisions = decisions};
+  if (start_.bleeding) loop.bleeding = &*start_.bleeding;
   if (options_.seconds > 0)
     loop.tick_count = simulation_.current_tick() + ticks_of(options_.seconds);
   if (options_.has_fixed_decisions) return loop;

@@ -46,7 +46,14 @@ Result<organ::Organ> read_organ(const ServerOptions& options) {
   return organ;
 }
 
-Result<SessionStart> begin(const ServerOptions& options) {
+// A session bleeds if its lesson does, or if it is asked to; vessels are the lesson's.
+std::optional<bleeding::Bleeding> begin_bleeding(const ServerOptions& options) {
+  if (!options.bleeds && !(options.lesson && options.lesson->bleeds)) return {};
+  return bleeding::Bleeding(options.lesson ? bleeding::rules_of(*options.lesson)
+                                           : bleeding::Rules{});
+}
+
+Result<SessionStart> begin_tissue(const ServerOptions& options) {
   auto organ = read_organ(options);
   if (!organ) return organ.error();
   if (options.reduction_file.empty())
@@ -67,6 +74,12 @@ Result<SessionStart> begin(const ServerOptions& options) {
       .reduction = describe(options.reduction_file, *model)};
   log::info("{}: {} patches, {:.1f} MB, ready in {:.1f} s", options.reduction_file,
             model->patches.size(), static_cast<double>(file_bytes) * 1e-6, seconds_since(begin));
+  return start;
+}
+
+Result<SessionStart> begin(const ServerOptions& options) {
+  auto start = begin_tissue(options);
+  if (start) start->bleeding = begin_bleeding(options);
   return start;
 }
 
@@ -100,6 +113,10 @@ Result<SessionStart> go_on(const ServerOptions& options) {
                      .continues = std::move(session->continuation),
                      .participants = std::move(session->participants),
                      .unnamed_hands = std::move(session->unnamed_hands)};
+  if (options.bleeds && !session->bleeding)
+    return Error{ErrorCode::Usage, "--bleeding: the session of " + options.resume_file +
+                                       " does not bleed, leave out --bleeding"};
+  start.bleeding = std::move(session->bleeding);
   if (session->reduction) start.reduction = describe(options.reduction_file, *session->reduction);
   return start;
 }

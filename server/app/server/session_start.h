@@ -9,6 +9,7 @@
 #include "common/journal/session_topics.h"
 #include "server/app/server/options.h"
 #include "server/organs/organ/organ.h"
+#include "server/session/bleeding/bleeding.h"
 #include "server/session/participants/roster.h"
 #include "server/tissue/step/simulation.h"
 
@@ -17,6 +18,7 @@ namespace trocar::app {
 struct SessionStart {
   step::Simulation simulation;
   std::optional<journal::ReductionDescription> reduction;
+  std::optional<bleeding::Bleeding> bleeding;  // of a session that bleeds
   // The rest is of a session that goes on.
   std::optional<journal::Continuation> continues;
   std::vector<participants::Participant> participants;  // who was in it

@@ -3,7 +3,7 @@
 // The simulation thread: 1 kHz by absolute time, inputs in, frames out.
 //
 //   inbox.drain -> Simulation::tick -> record -> RateController::observe, which decides the next
-//   tick; every 16th tick: complete the frame (records, hash, statistics, snapshot),
+//   tick; every 16th tick: complete the frame (blood, records, hash, statistics, snapshot),
 //   journal.record_frame, handover.push
 //
 // It never waits for the I/O thread or the journal. It ends after a published frame, so the last
@@ -20,6 +20,7 @@
 #include "server/app/server/frame_handover.h"
 #include "server/app/server/journal_sink.h"
 #include "server/app/server/pacer.h"
+#include "server/session/bleeding/bleeding.h"
 #include "server/session/control/depth_chooser.h"
 #include "server/session/control/rate_controller.h"
 #include "server/session/participants/inbox.h"
@@ -73,13 +74,15 @@ struct LoopReport {
   RateReport rate;
   SolverReport solver;
   step::SharedFrame last_frame;
-  StageTimes times;  // of the whole run
+  StageTimes times;                               // of the whole run
+  replication::DurationHistogram bleeding_times;  // thread CPU time of a frame's blood
 };
 
 struct LoopOptions {
   step::TickDecisions decisions;  // without a rate controller
   std::optional<control::RateLimits> rate;
   Tick tick_count = 0;  // end at the first frame at or after this; 0: when told to
+  bleeding::Bleeding* bleeding = nullptr;  // of a session that bleeds; outlives the loop
   std::function<std::uint64_t()> clock_ns = monotonic_ns;  // of what ticks take; tests have others
 };
 
@@ -127,6 +130,7 @@ class SimulationLoop {
   hands::TickInputs inputs_;
   std::vector<step::TickRecord> records_;  // since the last frame
   std::shared_ptr<const Bytes> snapshot_;  // waits for the next frame
+  std::shared_ptr<const Bytes> bleeding_snapshot_;
   Tick snapshot_tick_ = 0;
   StageTimes second_;       // since the last statistics
   wire::PaceFigures pace_;  // of the last full second

@@ -144,6 +144,22 @@ Json solver_figures(const Summary& s) {
             {"largest_mm", 1e3 * static_cast<double>(s.ghost.largest_m)}}}};
 }
 
+// Says what has bled; null in a session that does not.
+Json blood_figures(const Summary& s) {
+  const auto& last = *s.loop.last_frame;
+  if (!last.figures.blood) return nullptr;
+  const auto ml = [](std::uint64_t nl) { return static_cast<double>(nl) * 1e-6; };
+  const auto& blood = *last.figures.blood;
+  return {{"shed_ml", ml(blood.shed_nl)},
+          {"on_surface_ml", ml(blood.on_surface_nl)},
+          {"dripped_ml", ml(blood.dripped_nl)},
+          {"sucked_ml", ml(blood.sucked_nl)},
+          {"sources", blood.sources},
+          {"open_vessels", blood.open_vessels},
+          {"levels_crc", hex32(last.blood_crc)},
+          {"frame_cpu_us", times(s.loop.bleeding_times)}};
+}
+
 }  // namespace
 
 std::string to_json(const Summary& s) {
@@ -179,6 +195,7 @@ std::string to_json(const Summary& s) {
        {"nodes_rejected", s.loop.nodes_rejected},
        {"rate", rate_figures(s)},
        {"solver", solver_figures(s)},
+       {"blood", blood_figures(s)},
        {"tick_cpu_us", times(s.loop.times.tick)},
        {"stage_cpu_us", stages(s.loop.times)},
        {"limits", limit_figures(s)},

@@ -179,6 +179,8 @@ class Assessor {
       add_to_curve(slot, person, tick, tip, length(force));
     }
     take_claims(tick);
+    blood_m3_.reset();
+    if (state.has_blood()) blood_m3_ = static_cast<double>(state.blood().shed_nl()) * 1e-12;
     if (has_begun_) observe_lesson(tick);
     last_tick_ = tick;
   }
@@ -205,7 +207,8 @@ class Assessor {
     const auto moment = lesson::Moment{.tick = tick,
                                        .tips = tips_,
                                        .displacements = surface_.surface(),
-                                       .layout = surface_.layout()};
+                                       .layout = surface_.layout(),
+                                       .blood_m3 = blood_m3_};
     const auto before = course_->results().size();
     const bool is_over = course_->is_over();
     course_->observe(moment);
@@ -349,6 +352,7 @@ class Assessor {
   recording::StoredSurface surface_;
   std::vector<proto::ClaimEvent> claims_;  // of the frame that comes
   std::vector<lesson::Tip> tips_;
+  std::optional<double> blood_m3_;  // lost so far
   bool has_begun_ = false;
   Part stage_;
   HandMeter hands_, whole_;  // of the stage, of the session

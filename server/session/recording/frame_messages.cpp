@@ -1,5 +1,6 @@
 #include "server/session/recording/frame_messages.h"
 
+#include "common/wire/blood_codec.h"
 #include "common/wire/surface_codec.h"
 #include "common/wire/surface_messages.h"
 #include "proto/journal.pb.h"
@@ -96,6 +97,13 @@ Status FrameMessages::write_surface(const step::PublishedFrame& frame, bool is_k
     wire::encode_delta(baseline_, frame.surface, payload);
   }
   message.set_payload(payload.data(), payload.size());
+  if (!frame.blood.empty()) {
+    Bytes blood;
+    wire::encode_blood(is_keyframe ? BytesView() : BytesView(blood_baseline_), frame.blood, blood);
+    message.set_blood(blood.data(), blood.size());
+    message.set_blood_crc(frame.blood_crc);
+    blood_baseline_.assign(frame.blood.begin(), frame.blood.end());
+  }
   baseline_.assign(frame.surface.begin(), frame.surface.end());
   baseline_frame_ = frame.frame;
   has_baseline_ = true;

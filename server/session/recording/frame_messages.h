@@ -53,6 +53,7 @@ class FrameMessages {
   std::string organ_name_;
   wire::SurfaceLayout layout_;       // of the last frame
   wire::QuantisedSurface baseline_;  // the last surface written
+  wire::BloodLevels blood_baseline_;
   Frame baseline_frame_ = 0;
   bool has_baseline_ = false;
   Tick last_key_tick_ = 0;

@@ -6,6 +6,7 @@
 #include "common/wire/hand_report_messages.h"
 #include "common/wire/surface_messages.h"
 #include "server/organs/organ/organ_file.h"
+#include "server/session/recording/bleeding_messages.h"
 #include "server/session/recording/load_messages.h"
 #include "server/session/replication/messages.h"
 
@@ -15,7 +16,9 @@ namespace {
 std::size_t estimated_bytes(const step::PublishedFrame& frame) {
   std::size_t bytes = sizeof frame + frame.surface.size() * sizeof(wire::QuantisedVertex) +
                       frame.regions.size() * sizeof(std::uint16_t);
+  bytes += frame.blood.size();
   if (frame.snapshot) bytes += frame.snapshot->size();
+  if (frame.bleeding_snapshot) bytes += frame.bleeding_snapshot->size();
   if (frame.change)
     bytes += frame.change->new_vertices.size() * sizeof(wire::NewVertex) +
              frame.change->removed.size() * sizeof(TriangleIndex) +
@@ -69,6 +72,12 @@ Result<std::unique_ptr<Recorder>> Recorder::create(const std::string& path,
     proto::ExternalLoads loads;
     to_message(beginning.loads, loads);
     if (auto s = (*writer)->write(journal::JournalTopic::Loads, begin_tick, now, loads); !s)
+      return s.error();
+  }
+  if (beginning.bleeding) {
+    proto::BleedingRules rules;
+    to_message(*beginning.bleeding, rules);
+    if (auto s = (*writer)->write(journal::JournalTopic::Bleeding, begin_tick, now, rules); !s)
       return s.error();
   }
   proto::SurfaceTopology topology;
@@ -240,6 +249,8 @@ Status Recorder::write_frame(const step::PublishedFrame& frame) {
     message.set_organ_hash(organ_hash_);
     message.set_state_hash(xxh3_64(*frame.snapshot));
     message.set_state(frame.snapshot->data(), frame.snapshot->size());
+    if (frame.bleeding_snapshot)
+      message.set_bleeding(frame.bleeding_snapshot->data(), frame.bleeding_snapshot->size());
     if (auto s = writer_->write_snapshot(not_before_last(frame.snapshot_tick), now, message); !s)
       return s;
   }

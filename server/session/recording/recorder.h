@@ -33,6 +33,7 @@
 #include "common/wire/recording_state.h"
 #include "common/wire/surface_layout.h"
 #include "server/organs/organ/organ.h"
+#include "server/session/bleeding/rules.h"
 #include "server/session/participants/roster.h"
 #include "server/session/recording/frame_messages.h"
 #include "server/session/recording/overview.h"
@@ -53,6 +54,7 @@ struct Beginning {
   bool starts_from_snapshot = false;
   bool has_implicit_strain = false;                // of a scenario, see journal::SessionInfo
   std::optional<journal::Continuation> continues;  // with which journal's session it goes on
+  std::optional<bleeding::Rules> bleeding;         // of a session that bleeds
 };
 
 class Recorder {

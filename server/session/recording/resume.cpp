@@ -8,6 +8,7 @@
 
 #include "common/base/version.h"
 #include "common/journal/session_journal.h"
+#include "server/session/recording/bleeding_messages.h"
 #include "server/session/recording/recorded_session.h"
 #include "server/session/recording/verify.h"
 #include "server/tissue/reduction/reduced_tissue.h"
@@ -52,19 +53,26 @@ Result<Tick> last_whole_tick(journal::SessionJournal& journal, const std::string
 
 // Restores the last snapshot up to that tick; returns its tick.
 Result<Tick> restore_before(Tick tick, journal::SessionJournal& journal, const std::string& path,
-                            step::Simulation& simulation) {
+                            ResumedSession& session) {
+  auto& simulation = session.simulation;
   const auto snapshot = journal.snapshot_before(tick);
   if (!snapshot) return snapshot.error();
   if (!*snapshot) return cannot(path, "it has no snapshot");
   const auto restored =
       simulation.restore_snapshot(bytes_of(std::string_view((*snapshot)->state())));
   if (!restored) return cannot(path, restored.error().message);
+  if (session.bleeding) {
+    const auto blood =
+        session.bleeding->restore_state(bytes_of(std::string_view((*snapshot)->bleeding())));
+    if (!blood) return cannot(path, blood.error().message);
+  }
   return simulation.current_tick();
 }
 
 // Simulates the recorded ticks after the one that it is at; returns the hash of the last.
 Result<std::uint64_t> simulate_up_to(Tick last, journal::SessionJournal& journal,
-                                     const std::string& path, step::Simulation& simulation) {
+                                     const std::string& path, ResumedSession& session) {
+  auto& simulation = session.simulation;
   std::uint64_t hash = 0;
   const Status read =
       read_ticks(journal, [&](const step::TickRecord& record, bool& stop) -> Status {
@@ -72,7 +80,8 @@ Result<std::uint64_t> simulate_up_to(Tick last, journal::SessionJournal& journal
         hash = record.state_hash;
         if (record.tick <= simulation.current_tick()) return {};
         const auto& done = simulation.tick(record.inputs, record.decisions);
-        static_cast<void>(simulation.pop_frame());
+        if (const auto frame = simulation.pop_frame(); frame && session.bleeding)
+          session.bleeding->observe(*frame, simulation.layout(), simulation.state().tools);
         if (done.state_hash == hash) return {};
         return cannot(path, fmt::format("tick {} has another state than was recorded, see "
                                         "trocar-journal verify",
@@ -135,14 +144,18 @@ Result<ResumedSession> resume_session(const std::string& path, const ResumeOptio
   if (!reduction) return reduction.error();
   const auto last = last_whole_tick(journal, path);
   if (!last) return last.error();
+  auto bleeding = recorded_bleeding(journal, path);
+  if (!bleeding) return bleeding.error();
   ResumedSession session{.simulation = step::Simulation(std::move(*organ), options.workers,
                                                         reduction::at_work(*reduction)),
+                         .bleeding = {},
                          .reduction = *reduction,
                          .continuation = {std::filesystem::path(path).filename().string(), *last}};
-  const auto from = restore_before(*last, journal, path, session.simulation);
+  if (*bleeding) session.bleeding.emplace(std::move(**bleeding));
+  const auto from = restore_before(*last, journal, path, session);
   if (!from) return from.error();
   session.snapshot_tick = *from;
-  const auto hash = simulate_up_to(*last, journal, path, session.simulation);
+  const auto hash = simulate_up_to(*last, journal, path, session);
   if (!hash) return hash.error();
   session.state_hash = *hash;
   if (const auto begun = begin_as_restored(session.simulation); !begun) return begun.error();

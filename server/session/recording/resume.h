@@ -5,12 +5,14 @@
 // hash of each compared. So the session goes on from exactly the state that verification finds.
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "common/base/result.h"
 #include "common/journal/session_topics.h"
 #include "server/organs/organ/local_reduction.h"
+#include "server/session/bleeding/bleeding.h"
 #include "server/session/participants/roster.h"
 #include "server/tissue/step/simulation.h"
 
@@ -23,6 +25,7 @@ struct ResumeOptions {
 
 struct ResumedSession {
   step::Simulation simulation;
+  std::optional<bleeding::Bleeding> bleeding;              // of a session that bleeds
   std::shared_ptr<const organ::LocalReduction> reduction;  // null: none
   journal::Continuation continuation;                      // what a new journal has to say
   Tick snapshot_tick = 0;                                  // simulated again from here on

@@ -43,8 +43,24 @@ StoredSurface::Check StoredSurface::check(const proto::SurfaceFrame& message) {
   frame_ = message.frame();
   ++decoded_;
   const auto crc = wire::surface_crc(surface_);
-  if (crc == message.surface_crc()) return {};
+  if (crc == message.surface_crc()) return check_blood(message);
   return StoredDifference{"surface_crc", fmt::format("{:08x}", message.surface_crc()),
+                          fmt::format("{:08x}", crc)};
+}
+
+StoredSurface::Check StoredSurface::check_blood(const proto::SurfaceFrame& message) {
+  if (!message.has_blood()) {
+    blood_.clear();
+    return {};
+  }
+  if (message.is_keyframe()) blood_.clear();
+  blood_.resize(surface_.size(), 0);
+  const Status decoded = wire::decode_blood(bytes_of(std::string_view(message.blood())), blood_);
+  if (!decoded.ok()) return StoredDifference{"blood", decoded.error().message, "levels"};
+  ++bled_;
+  const auto crc = wire::blood_crc(blood_);
+  if (crc == message.blood_crc()) return {};
+  return StoredDifference{"blood_crc", fmt::format("{:08x}", message.blood_crc()),
                           fmt::format("{:08x}", crc)};
 }
 

@@ -8,6 +8,7 @@
 
 #include "common/base/result.h"
 #include "common/base/tick.h"
+#include "common/wire/blood_codec.h"
 #include "common/wire/surface_layout.h"
 
 namespace trocar::proto {
@@ -38,15 +39,19 @@ class StoredSurface {
   const wire::QuantisedSurface& surface() const { return surface_; }
 
   std::uint64_t decoded() const { return decoded_; }
+  std::uint64_t bled() const { return bled_; }  // of those, with blood on them
   // Surfaces that could not be decoded, because something before them is missing.
   std::uint64_t undecodable() const { return undecodable_; }
 
  private:
+  Check check_blood(const proto::SurfaceFrame& message);
+
   wire::SurfaceLayout layout_;
   wire::QuantisedSurface surface_;
+  wire::BloodLevels blood_;
   Frame frame_ = 0;
   bool has_layout_ = false, has_surface_ = false;
-  std::uint64_t decoded_ = 0, undecodable_ = 0;
+  std::uint64_t decoded_ = 0, undecodable_ = 0, bled_ = 0;
 };
 
 }  // namespace trocar::recording

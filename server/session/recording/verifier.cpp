@@ -89,12 +89,13 @@ class Verifier::Collector final : public MessageSink {
 };
 
 Verifier::Verifier(const journal::SessionInfo& info, step::Simulation simulation,
-                   VerifyReport& report)
+                   std::optional<bleeding::Rules> bleeding, VerifyReport& report)
     : info_(info),
       report_(report),
       is_older_(is_older(info.protocol)),
       simulation_(std::move(simulation)),
       messages_(simulation_.organ().name, simulation_.layout()) {
+  if (bleeding) bleeding_.emplace(std::move(*bleeding));
   next_tick_ = info_.begin_tick() + 1;
   if (!report_.is_resimulated) return;
   is_in_step_ = !info_.begins_with_snapshot();
@@ -158,7 +159,8 @@ bool Verifier::check(std::string_view topic, BytesView bytes) {
   switch (*known) {
     case JournalTopic::Organ:  // checked by its hash
       break;
-    case JournalTopic::Loads:  // the simulation has them
+    case JournalTopic::Loads:  // the simulation has them, and these
+    case JournalTopic::Bleeding:
       if (message_counts_.find(topic)->second > 1)
         add_reason(fmt::format("{}: there are others, after tick {}", topic, next_tick_ - 1));
       break;
@@ -271,7 +273,10 @@ void Verifier::check_record(const proto::TickRecord& message) {
   continue_snapshots(done.state_hash);
   if (report_.first_difference) return;
   if (snapshots_.contains(tick)) compare_snapshot(tick);
-  if (auto frame = simulation_.pop_frame()) begin_frame(*frame);
+  if (auto frame = simulation_.pop_frame()) {
+    if (bleeding_) bleeding_->observe(*frame, simulation_.layout(), simulation_.state().tools);
+    begin_frame(*frame);
+  }
 }
 
 bool Verifier::start_from_snapshot(Tick tick) {
@@ -286,6 +291,7 @@ bool Verifier::start_from_snapshot(Tick tick) {
             "a state"});
     return false;
   }
+  if (!restore_blood(found->second)) return false;
   report_.last_hash = record_.state_hash;
   is_in_step_ = true;
   has_key_schedule_ = false;
@@ -300,12 +306,22 @@ bool Verifier::start_from_snapshot(Tick tick) {
   return true;
 }
 
+bool Verifier::restore_blood(const proto::WorldSnapshot& snapshot) {
+  if (!bleeding_) return true;
+  const auto bytes = bytes_of(std::string_view(snapshot.bleeding()));
+  const Status restored = bleeding_->restore_state(bytes);
+  if (!restored.ok())
+    differ({snapshot.tick(), kSnapshots, "bleeding", restored.error().message, "a state"});
+  return restored.ok();
+}
+
 void Verifier::begin_from(const proto::WorldSnapshot& snapshot) {
   const Status restored =
       simulation_.restore_snapshot(bytes_of(std::string_view(snapshot.state())));
   if (!restored.ok() || simulation_.current_tick() != snapshot.tick())
     return differ({snapshot.tick(), kSnapshots, "state",
                    restored.ok() ? "of another tick" : restored.error().message, "a state"});
+  if (!restore_blood(snapshot)) return;
   is_in_step_ = true;
   messages_ = FrameMessages(simulation_.organ().name, simulation_.layout());
   if (!first_topology_) return;
@@ -330,6 +346,12 @@ void Verifier::compare_snapshot(Tick tick) {
     return differ({tick, kSnapshots, fmt::format("byte {} of state", in_state - state.begin()),
                    text(in_recorded, recorded.end()), text(in_state, state.end())});
   }
+  Bytes blood;
+  if (bleeding_) bleeding_->write_state(blood);
+  const auto recorded_blood = bytes_of(std::string_view(found->second.bleeding()));
+  if (!std::ranges::equal(recorded_blood, blood))
+    return differ({tick, kSnapshots, "bleeding", fmt::format("{} bytes", recorded_blood.size()),
+                   fmt::format("{} others", blood.size())});
   ++report_.snapshots_verified;
   if (continuations_.size() >= kMostPending)
     return add_reason(fmt::format("tick {}: too many snapshots at once to go on from", tick));
@@ -475,6 +497,7 @@ void Verifier::end_frame() {
 
 void Verifier::finish(const journal::McapReader& container) {
   report_.surfaces_decoded = surface_.decoded();
+  report_.bled_surfaces = surface_.bled();
   if (report_.first_difference) return;
   end_frame();
   if (next_tick_ == info_.begin_tick() + 1 && report_.last_tick > info_.begin_tick()) {

@@ -8,6 +8,7 @@
 #include "common/base/printable.h"
 #include "common/base/version.h"
 #include "server/organs/organ/local_reduction_file.h"
+#include "server/session/recording/bleeding_messages.h"
 #include "server/session/recording/recorded_session.h"
 #include "server/session/recording/verifier.h"
 #include "server/tissue/reduction/reduced_tissue.h"
@@ -82,6 +83,9 @@ Result<VerifyReport> verify_journal(const std::string& path,
   auto loads = recorded_loads(**journal, *organ, path);
   if (!loads) return loads.error();
 
+  auto bleeding = recorded_bleeding(**journal, path);
+  if (!bleeding) return bleeding.error();
+
   VerifyReport report;
   const bool lacks_loads = info.has_external_loads && loads->empty();
   report.is_resimulated = info.sim_version == kSimVersion && !lacks_loads;
@@ -115,7 +119,7 @@ Result<VerifyReport> verify_journal(const std::string& path,
   if (info.has_implicit_strain) scheme = dynamics::StrainScheme::Implicit;
   auto simulation = step::Simulation(std::move(*organ), 1, reduction::at_work(std::move(reduction)),
                                      {}, std::move(*loads), scheme);
-  Verifier verifier(info, std::move(simulation), report);
+  Verifier verifier(info, std::move(simulation), std::move(*bleeding), report);
   const auto lists = (*journal)->read_participants(0, std::numeric_limits<Tick>::max(),
                                                    [&](Tick tick, const proto::Participants& list) {
                                                      verifier.add_list(tick, list);

@@ -9,6 +9,8 @@
 //   /surface/*, /topology*       decoded, by CRC; and as messages
 //   /frame_state, /tool/*        every field that is not a measured time: forces, torques, proxies
 //   /claims, /solver             every event; names are those on /participants
+//   /bleeding                    the rules by which blood is simulated again; its levels are in
+//                                /surface/*, its figures in /frame_state, its state in snapshots
 //   /hands                       decoded, within their ranges; no simulation knows them
 //   /participants                slots with tools and the tools' shapes, in frames that are a
 //   second
@@ -60,6 +62,7 @@ struct VerifyReport {
   std::uint64_t snapshots_verified = 0, snapshots_continued = 0;
   std::uint64_t surfaces_decoded = 0,
                 surfaces_verified = 0;      // by their CRC; equal to the simulation
+  std::uint64_t bled_surfaces = 0;          // of those decoded, with levels of blood
   std::uint64_t participants_verified = 0;  // frames in which they were compared
   std::uint64_t damaged_chunks = 0;
   std::optional<Difference> first_difference;

@@ -3,6 +3,7 @@
 #include "common/base/assert.h"
 #include "common/base/timing.h"
 #include "common/secure/datagram_channel.h"
+#include "common/wire/blood_codec.h"
 #include "common/wire/surface_codec.h"
 #include "common/wire/surface_slices.h"
 #include "proto/wire.pb.h"
@@ -37,6 +38,12 @@ wire::SharedBytes FrameEncoder::wrap(const step::PublishedFrame* baseline,
   message.set_payload(payload.data(), payload.size());
   message.set_surface_crc(frame.surface_crc);
   message.set_server_time_us(server_time_us_);
+  if (!frame.blood.empty()) {
+    Bytes blood;
+    wire::encode_blood(baseline ? BytesView(baseline->blood) : BytesView(), frame.blood, blood);
+    message.set_blood(blood.data(), blood.size());
+    message.set_blood_crc(frame.blood_crc);
+  }
   return wire::encode_envelope(envelope);
 }
 
@@ -107,7 +114,8 @@ const FrameEncoder::Datagrams& FrameEncoder::slices_from(const step::PublishedFr
   }
   const auto begin = thread_cpu_ns();
   const auto slices = wire::encode_slices(extend(baseline), current_->surface,
-                                          secure::kDatagramMessageBytes - kSliceOverheadBytes);
+                                          secure::kDatagramMessageBytes - kSliceOverheadBytes,
+                                          {.baseline = baseline.blood, .current = current_->blood});
   for (std::size_t i = 0; i < slices.size(); ++i) {
     proto::Envelope envelope;
     auto& message = *envelope.mutable_surface_slice();
@@ -122,6 +130,10 @@ const FrameEncoder::Datagrams& FrameEncoder::slices_from(const step::PublishedFr
     message.set_vertices(slices[i].vertices);
     message.set_payload(slices[i].payload.data(), slices[i].payload.size());
     message.set_server_time_us(server_time_us_);
+    if (!current_->blood.empty()) {
+      message.set_blood(slices[i].blood.data(), slices[i].blood.size());
+      message.set_blood_crc(current_->blood_crc);
+    }
     cached->second.push_back(serialise(envelope));
   }
   statistics_.slices_cpu.add(thread_cpu_ns() - begin);

@@ -36,7 +36,11 @@ lesson::Moment moment_of(const step::PublishedFrame& frame, const wire::SurfaceL
                       .force_n = length(to_double(tool.force_n)),
                       .verb = tool.verb,
                       .has_claim = tool.has_claim});
-  return {.tick = frame.tick, .tips = tips, .displacements = frame.surface, .layout = &layout};
+  lesson::Moment moment{
+      .tick = frame.tick, .tips = tips, .displacements = frame.surface, .layout = &layout};
+  if (frame.figures.blood)
+    moment.blood_m3 = static_cast<double>(frame.figures.blood->shed_nl) * 1e-12;
+  return moment;
 }
 
 void describe(const lesson::Course& course, proto::LessonStage& message) {

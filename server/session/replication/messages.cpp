@@ -306,6 +306,7 @@ wire::SharedBytes encode_barrier(const step::PublishedFrame& frame) {
   proto::Envelope envelope;
   envelope.mutable_barrier()->set_frame(frame.frame);
   envelope.mutable_barrier()->set_surface_crc(frame.surface_crc);
+  if (!frame.blood.empty()) envelope.mutable_barrier()->set_blood_crc(frame.blood_crc);
   return wire::encode_envelope(envelope);
 }
 

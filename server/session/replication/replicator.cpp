@@ -226,10 +226,8 @@ std::optional<Replicator::Ending> Replicator::handle_message(Client& client, Byt
     case proto::Envelope::kHandReport:
       return handle_hand_report(client, envelope.hand_report());
     case proto::Envelope::kFrameAck:
-      if (client.carrier == 0)
-        return handle_ack(client, envelope.frame_ack().frame(), envelope.frame_ack().surface_crc());
-      note_answer(client.participant->slot, envelope.frame_ack().frame(),
-                  envelope.frame_ack().surface_crc());
+      if (client.carrier == 0) return handle_ack(client, envelope.frame_ack());
+      note_answer(client.participant->slot, envelope.frame_ack());
       return std::nullopt;
     case proto::Envelope::kMarkRequest:
       return handle_mark(client, envelope.mark_request().action());
@@ -298,7 +296,7 @@ std::optional<Replicator::Ending> Replicator::handle_datagram(
   for (const auto& sample : datagram.sample())
     if (auto ending = handle_sample(client, sample, false)) return ending;
   if (!datagram.has_ack()) return std::nullopt;
-  return handle_ack(client, datagram.ack().frame(), datagram.ack().surface_crc());
+  return handle_ack(client, datagram.ack());
 }
 
 std::optional<Replicator::Ending> Replicator::admit(Client& client, const proto::Hello& hello) {
@@ -384,24 +382,26 @@ void Replicator::handle_ghost_request(Client& client, bool is_wanted) {
   send(client, options_.on_ghost_wanted ? encode_ghost({}) : encode_no_ghost());
 }
 
-std::optional<Replicator::Ending> Replicator::handle_ack(Client& client, Frame frame,
-                                                         std::uint32_t crc) {
+std::optional<Replicator::Ending> Replicator::handle_ack(Client& client,
+                                                         const proto::FrameAck& ack) {
+  const Frame frame = ack.frame();
   if (!client.feed.was_given(frame))
     return Ending{EndReason::ProtocolError,
                   "FrameAck.frame: " + std::to_string(frame) + " was not given to you yet"};
   client.feed.acknowledge(encoder_, frame);
-  if (client.participant) note_answer(client.participant->slot, frame, crc);
+  if (client.participant) note_answer(client.participant->slot, ack);
   return std::nullopt;
 }
 
-void Replicator::note_answer(ParticipantSlot slot, Frame frame, std::uint32_t crc) {
-  if (!barrier_ || frame != barrier_->frame) return;
+void Replicator::note_answer(ParticipantSlot slot, const proto::FrameAck& ack) {
+  if (!barrier_ || ack.frame() != barrier_->frame) return;
   for (auto& result : barrier_results_) {
     if (result.slot != slot) continue;
     result.has_answered = true;
-    result.frame = frame;
-    result.surface_crc = crc;
-    result.is_equal = crc == barrier_->surface_crc;
+    result.frame = ack.frame();
+    result.surface_crc = ack.surface_crc();
+    result.is_equal = ack.surface_crc() == barrier_->surface_crc &&
+                      (barrier_->blood.empty() || ack.blood_crc() == barrier_->blood_crc);
   }
 }
 

@@ -67,6 +67,7 @@ namespace trocar::proto {
 class Envelope;
 class ClientDatagram;
 class Drawing;
+class FrameAck;
 class HandReport;
 class Hello;
 class LessonRecord;
@@ -156,7 +157,7 @@ class Replicator final : public net::ConnectionHandler {
   std::optional<Ending> welcome_guest(Client& guest);
   // Handles what a carrier says for itself.
   std::optional<Ending> handle_carrier(Client& carrier, const proto::Envelope& message);
-  void note_answer(ParticipantSlot slot, Frame frame, std::uint32_t crc);
+  void note_answer(ParticipantSlot slot, const proto::FrameAck& ack);
   // Returns the place to which this Hello comes back; null: there is none.
   const participants::Participant* find_own_place(const HelloRequest& request) const;
   std::optional<Ending> come_back(Client& client, const participants::Participant& place);
@@ -198,7 +199,7 @@ class Replicator final : public net::ConnectionHandler {
   void record_lesson(const proto::LessonRecord& record);
   // Gives a newcomer what is drawn, and the view to follow; false: it does not fit.
   bool show_lesson(Client& client);
-  std::optional<Ending> handle_ack(Client& client, Frame frame, std::uint32_t crc);
+  std::optional<Ending> handle_ack(Client& client, const proto::FrameAck& ack);
   // Ends the session of who sends too much.
   std::optional<Ending> check_rate(Client& client, std::size_t bytes);
 

@@ -40,7 +40,7 @@ std::optional<Replicator::Ending> Replicator::handle_carrier(Client& carrier,
                                                              const proto::Envelope& message) {
   switch (message.message_case()) {
     case proto::Envelope::kFrameAck:
-      return handle_ack(carrier, message.frame_ack().frame(), message.frame_ack().surface_crc());
+      return handle_ack(carrier, message.frame_ack());
     case proto::Envelope::kKeyframeRequest:
       carrier.feed.want_keyframe();
       if (encoder_.current() && carrier.feed.is_keyframe_due()) give_frame(carrier, false);

@@ -11,6 +11,7 @@
 #include "common/base/ids.h"
 #include "common/base/tick.h"
 #include "common/tool/tool.h"
+#include "common/wire/blood_codec.h"
 #include "common/wire/figures.h"
 #include "common/wire/haptic_patch.h"
 #include "common/wire/quantise.h"
@@ -61,6 +62,9 @@ struct PublishedFrame {
   std::shared_ptr<const wire::SurfaceLayout> new_layout;
   wire::QuantisedSurface surface;  // displacements from rest, per vertex slot
   std::uint32_t surface_crc = 0;
+  // It has a level per slot where the session bleeds (common/wire/blood_codec.h), and else none.
+  wire::BloodLevels blood;
+  std::uint32_t blood_crc = 0;
   std::vector<std::uint16_t>
       regions;                   // per vertex slot: 0 not active, else merged region 1, 2, ...
   std::vector<ToolFrame> tools;  // occupied tools, by slot
@@ -71,6 +75,8 @@ struct PublishedFrame {
   // between publications: publishing changes the quantisation's hysteresis after the tick's hash.
   std::shared_ptr<const Bytes> snapshot;
   Tick snapshot_tick = 0;
+  // With a snapshot of a session that bleeds: its blood, as of the last frame before.
+  std::shared_ptr<const Bytes> bleeding_snapshot;
   std::vector<wire::SolverChange> solver_changes;  // of the ticks since the frame before
   wire::FrameFigures figures;                      // of the frame's tick
 };

@@ -1,5 +1,6 @@
 #include "server/web/bridge/session_copy.h"
 
+#include "common/wire/blood_codec.h"
 #include "common/wire/surface_codec.h"
 #include "common/wire/surface_messages.h"
 #include "proto/wire.pb.h"
@@ -107,12 +108,14 @@ bool SessionCopy::take_frame(const proto::SurfaceFrame& message) {
   bool is_decoded = false;
   if (message.epoch() == layout_.epoch && message.is_keyframe()) {
     next->surface.assign(layout_.vertex_count(), {});
-    is_decoded = wire::decode_keyframe(payload, next->surface).ok();
+    is_decoded =
+        wire::decode_keyframe(payload, next->surface).ok() && take_blood(message, nullptr, *next);
   } else if (const auto* base = find(message.base_frame());
              base != nullptr && message.epoch() == layout_.epoch) {
     next->surface = base->surface;
     next->surface.resize(layout_.vertex_count());  // zeros, as on the server
-    is_decoded = wire::decode_delta(payload, next->surface).ok();
+    is_decoded =
+        wire::decode_delta(payload, next->surface).ok() && take_blood(message, base, *next);
   }
   if (!is_decoded || wire::surface_crc(next->surface) != message.surface_crc()) {
     lose_count();
@@ -130,6 +133,15 @@ bool SessionCopy::take_frame(const proto::SurfaceFrame& message) {
   state_.reset();
   deltas_.clear();
   return true;
+}
+
+bool SessionCopy::take_blood(const proto::SurfaceFrame& message, const Kept* base, Kept& next) {
+  if (!message.has_blood()) return true;
+  if (base != nullptr) next.blood = base->blood;
+  next.blood.resize(next.surface.size(), 0);
+  const auto payload = bytes_of(std::string_view(message.blood()));
+  return wire::decode_blood(payload, next.blood).ok() &&
+         wire::blood_crc(next.blood) == message.blood_crc();
 }
 
 void SessionCopy::take_drawing(const proto::Drawing& message) {
@@ -151,6 +163,13 @@ wire::SharedBytes SessionCopy::wrap(const Kept* base, const Bytes& payload) cons
   message.set_payload(payload.data(), payload.size());
   message.set_surface_crc(current_->surface_crc);
   message.set_server_time_us(current_->server_time_us);
+  if (!current_->blood.empty()) {
+    Bytes blood;
+    wire::encode_blood(base != nullptr ? BytesView(base->blood) : BytesView(), current_->blood,
+                       blood);
+    message.set_blood(blood.data(), blood.size());
+    message.set_blood_crc(wire::blood_crc(current_->blood));
+  }
   return wire::encode_envelope(envelope);
 }
 

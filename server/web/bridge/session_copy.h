@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "common/base/tick.h"
+#include "common/wire/blood_codec.h"
 #include "common/wire/framing.h"
 #include "common/wire/surface_layout.h"
 
@@ -75,7 +76,10 @@ class SessionCopy {
     std::uint32_t epoch = 0, surface_crc = 0;
     std::uint64_t server_time_us = 0;
     wire::QuantisedSurface surface;
+    wire::BloodLevels blood;  // empty: the session does not bleed
   };
+  // Fills the blood of `next` from that of its base (null: dry); false: the message is wrong.
+  static bool take_blood(const proto::SurfaceFrame& message, const Kept* base, Kept& next);
 
   Status take_topology(const proto::SurfaceTopology& message);
   bool take_change(const proto::SurfaceChange& message);

@@ -1,0 +1,59 @@
+#include "server/session/bleeding/rules.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace trocar::bleeding {
+namespace {
+
+bool is_within(double value, double least, double most) {
+  return value >= least && value <= most;  // false for what is not a number
+}
+
+Error wrong(const std::string& field, const char* range) {
+  return {ErrorCode::BadFile, field + ": is outside " + range};
+}
+
+}  // namespace
+
+double Vessel::distance_m(const Vec3d& place_m) const {
+  const auto along = to_m - from_m;
+  const double squared = length_squared(along);
+  const double t = squared > 0 ? std::clamp(dot(place_m - from_m, along) / squared, 0.0, 1.0) : 0.0;
+  return length(place_m - (from_m + along * t)) - radius_m;
+}
+
+Status validate(const Rules& rules) {
+  if (!is_within(rules.ooze_m_s, 0, kMostOoze)) return wrong("ooze_m_s", "0 to 0.1 m/s");
+  if (!is_within(rules.clotting_time_s, 1, kMostClottingSeconds))
+    return wrong("clotting_time_s", "1 to 100000 s");
+  if (!is_within(rules.ooze_pressure_pa, 0, kMostPressurePa))
+    return wrong("ooze_pressure_pa", "0 to 100000 Pa");
+  if (rules.vessels.size() > lesson::kMostStructures) return wrong("vessel", "0 to 16 of them");
+  for (const auto& vessel : rules.vessels) {
+    const bool is_near = is_finite(vessel.from_m) && is_finite(vessel.to_m) &&
+                         length(vessel.from_m) <= 2 && length(vessel.to_m) <= 2;
+    if (!is_near) return wrong("vessel.from_m, to_m", "2 m around the origin");
+    if (!is_within(vessel.radius_m, 1e-4, 0.1)) return wrong("vessel.radius_m", "0.1 to 100 mm");
+    if (!is_within(vessel.pressure_pa, 1, kMostPressurePa))
+      return wrong("vessel.pressure_pa", "1 to 100000 Pa");
+    if (!is_within(vessel.most_flow_m3_s, 1e-9, kMostFlow))
+      return wrong("vessel.most_flow_m3_s", "1e-9 to 1e-3 m^3/s");
+  }
+  return {};
+}
+
+Rules rules_of(const lesson::Lesson& lesson) {
+  Rules rules;
+  for (const auto& structure : lesson.structures)
+    if (structure.vessel_pressure_pa > 0)
+      rules.vessels.push_back({.name = structure.name,
+                               .from_m = structure.from_m,
+                               .to_m = structure.to_m,
+                               .radius_m = structure.radius_m,
+                               .pressure_pa = structure.vessel_pressure_pa,
+                               .most_flow_m3_s = structure.vessel_flow_m3_s});
+  return rules;
+}
+
+}  // namespace trocar::bleeding
