@@ -21,11 +21,12 @@ std::vector<Banner> banners_of(const HudModel& model) {
         {model.status, model.status_advice, model.is_away ? RateTone::Warning : RateTone::Calm});
     return banners;
   }
+  if (!model.pace_text.empty()) banners.push_back({model.pace_text, "", RateTone::Calm});
   if (!model.frozen_text.empty())
     banners.push_back({model.frozen_text,
                        "Wait: they come back to your hands slowly when they are released.",
                        RateTone::Notice});
-  if (model.surface_age_ms && *model.surface_age_ms >= kStaleMs)
+  if (!model.is_paused && model.surface_age_ms && *model.surface_age_ms >= kStaleMs)
     banners.push_back({"This picture is " + tenths(*model.surface_age_ms * 1e-3) + " s old.",
                        "The connection is slow or has stopped: wait before you cut.",
                        RateTone::Warning});

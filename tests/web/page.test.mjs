@@ -17,7 +17,7 @@ test('an instructor joins by a link, sees a cut, marks the organ and returns it'
   const hand = world.server.hand('Scalpel', 'incise');
   await page.getByRole('list').getByText('Scalpel', { exact: true }).first().waitFor({ timeout: kPatience });
   // Counts of vertices say nothing: a slow picture gets fewer.
-  await until('a cut', () => page.evaluate(() => window.trocar.replica.rest().some((value, i) => i % 4 === 3 && value === 1)));
+  await until('a cut', () => page.evaluate(() => window.trocar.replica.rest().some((value, i) => i % 4 === 3 && value >= 1)));
   await page.locator('.events').getByText('Scalpel cuts').first().waitFor({ timeout: kPatience });
   // A name is text, whatever it holds.
   assert.equal(await page.locator('.people b', { hasText: '<b>Ivy</b> & "Co"' }).count(), 1);
