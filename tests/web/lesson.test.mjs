@@ -54,9 +54,14 @@ test('a tool that is frozen stays, and goes back when it is released', kTest, as
   await manage('Sam', 'Freeze tools');
   await sees(olga, 'Ivy keeps the tools of Sam where they are');
   await olga.getByText('held still by Ivy').waitFor({ timeout: kPatience });
-  await sleep(500);
+  // The picture follows the frames, by however long.
+  const shown = () => olga.evaluate(() => window.trocar.replica.shownTick), passes = async ticks => {
+    const from = await olga.evaluate(() => window.trocar.replica.newestTick);
+    await until(`${ticks} ticks are shown`, async () => await shown() > from + ticks);
+  };
+  await passes(500);
   const frozen = await tip(olga);
-  await sleep(1500);
+  await passes(1500);
   assert.ok(apart(await tip(olga), frozen) < 1e-5, 'it moved while it was frozen');
   await picture(ivy, 'frozen');
   await manage('Sam', 'Release tools');
@@ -236,7 +241,7 @@ test('the session ends in the instructor\'s words, and its recording verifies an
   assert.deepEqual(stages.map(one => one.name), [1, 2, 1, 2, 'over']);
   await at(stages[3].tick + 50);
   await says(ivy, 'Stage 2 of 2');
-  assert.notEqual(await target(ivy), null);
+  await until('a point', async () => await target(ivy) !== null);
   await at(stages[2].tick + 50);
   await says(ivy, 'Stage 1 of 2');
   await at(stages[4].tick + 50);
