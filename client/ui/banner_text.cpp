@@ -31,7 +31,8 @@ std::vector<Banner> banners_of(const HudModel& model) {
                        "The connection is slow or has stopped: wait before you cut.",
                        RateTone::Warning});
   // A recording plays at its own speed, however slow the session was.
-  if (const auto slow = describe(model.figures).banner; !slow.empty() && !model.timeline)
+  if (const auto slow = describe(model.figures).banner;
+      !slow.empty() && !model.timeline && !model.is_paused)
     banners.push_back({slow,
                        model.has_own_tool ? "The server cannot keep up: move slowly."
                                           : "The server cannot keep up.",
