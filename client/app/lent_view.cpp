@@ -25,7 +25,7 @@ void LentView::apply(render::SceneView& scene, render::OrbitCamera& camera, bool
   if (!slot_) return;
   const auto shown = std::ranges::find(scene.tools, *slot_, &render::SceneTool::slot);
   if (shown == scene.tools.end() || !can_see(*shown, is_recording)) return;
-  camera.look_through(render::lens_of(shown->world_from_tool, shown->shape));
+  camera.look_through(shape::lens_of(shown->world_from_tool, shown->shape));
   if (tool::is_endoscope(shown->shape.form)) scene.tools.erase(shown);
 }
 

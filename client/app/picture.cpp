@@ -385,6 +385,7 @@ ui::HudModel Picture::hud_model(const replica::Replica& replica, replica::Sessio
   model.has_own_tool = hands.mouse_tool() != nullptr;
   model.tray = tray_of(hands.choice());
   add_lesson(replica, is_replay, model);
+  add_pace(replica, is_replay, model);
 
   model.shows_holds = overlays_.holds;
   model.shows_arrows = overlays_.arrows;
@@ -426,6 +427,7 @@ void Picture::act(const ui::HudActions& actions, const replica::Replica& replica
   // A wish that cannot be sent is lost: whoever presses the key asks again.
   if (actions.set_mark) replica::ask_for_mark(source, false);
   if (actions.return_to_mark) replica::ask_for_mark(source, true);
+  lead(actions, source);
   if (actions.next_stage) replica::send_lesson_wish(source, replica::LessonWish::Next);
   if (actions.restart_lesson) replica::send_lesson_wish(source, replica::LessonWish::Restart);
   replica::PlaybackControl* playback = source.playback();

@@ -48,6 +48,8 @@ class Picture {
   void add_own_forces(const replica::Replica& replica, ui::HudModel& model) const;
   void add_felt_hands(const Hands& hands, ui::HudModel& model) const;
   void add_lesson(const replica::Replica& replica, bool is_replay, ui::HudModel& model) const;
+  void add_pace(const replica::Replica& replica, bool is_replay, ui::HudModel& model) const;
+  static void lead(const ui::HudActions& actions, replica::SessionSource& source);
   // Returns where the point is that a lesson's hands follow.
   static std::optional<Vec3f> lesson_target(const replica::Replica& replica);
   void add_labels(const replica::Replica& replica, const render::SceneView& scene,

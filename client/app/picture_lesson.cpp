@@ -27,7 +27,12 @@ void Picture::add_lesson(const replica::Replica& replica, bool is_replay,
                       .is_too_strong = lesson->is_too_strong,
                       .is_over = lesson->is_over,
                       .points = lesson->points};
-  if (!is_replay) {
+  if (is_replay) {
+    const Tick now = replica.newest() != nullptr ? replica.newest()->tick : 0;
+    shown.progress.reset();
+    shown.seconds =
+        static_cast<double>(now > lesson->begin_tick ? now - lesson->begin_tick : 0) * 1e-3;
+  } else {
     shown.can_answer = lesson->goal == replica::LessonView::Goal::Find && replica::has_tools(role_);
     shown.can_lead = role_ == replica::Role::Instructor;
   }
@@ -39,6 +44,32 @@ void Picture::add_lesson(const replica::Replica& replica, bool is_replay,
     shown.results.emplace_back(result.name + points, result.lines);
   }
   model.lesson = std::move(shown);
+}
+
+void Picture::add_pace(const replica::Replica& replica, bool is_replay, ui::HudModel& model) const {
+  if (is_replay) return;
+  const auto& pace = replica.pace();
+  model.is_paused = pace.is_paused;
+  if (pace.is_paused) {
+    model.pace_text = (pace.by.empty() ? "Somebody" : pace.by) + " has paused the session.";
+  } else if (pace.rate < 1) {
+    char text[48];
+    std::snprintf(text, sizeof text, "Time goes at %.0f %%.", 100 * static_cast<double>(pace.rate));
+    model.pace_text = text;
+  }
+  if (!model.can_mark || !replica.has_pace()) return;
+  ui::HudConduct conduct{
+      .is_paused = pace.is_paused, .rate = pace.rate, .marks = replica.marks(), .hands = {}};
+  for (const auto& who : replica.participants())
+    if (!who.tools.empty()) conduct.hands.push_back({who.slot, who.name, !who.frozen_by.empty()});
+  model.conduct = std::move(conduct);
+}
+
+// A wish that cannot be sent is lost: whoever asked asks again.
+void Picture::lead(const ui::HudActions& actions, replica::SessionSource& source) {
+  if (actions.lead) replica::send_lead_wish(source, *actions.lead);
+  if (actions.mark_named) replica::ask_for_mark(source, false, *actions.mark_named);
+  if (actions.return_to_named) replica::ask_for_mark(source, true, *actions.return_to_named);
 }
 
 }  // namespace trocar::app

@@ -7,11 +7,13 @@
 
 #include "client/device/view_rays.h"
 #include "client/render/gl_context.h"
-#include "client/render/lens.h"
+#include "client/shape/lens.h"
 #include "common/math/frame.h"
 #include "common/math/vec3.h"
 
 namespace trocar::render {
+
+using shape::Lens;
 
 using Matrix4 = std::array<float, 16>;  // column by column
 

@@ -29,7 +29,6 @@ constexpr float kOverlayFadeSeconds = 0.12f;
 // The light of an endoscope does not reach far.
 constexpr float kScopeClearMetres = 0.05f, kScopeHazePerMetre = 4.0f;
 constexpr float kHazePerMiddle = 0.55f;  // over the distance of what one looks at
-constexpr float kSeamMetres = 0.004f, kDeepMetres = 0.022f;  // widths of what a rim changes
 // This depth of blood hides all but a third of what is below it.
 constexpr float kCoveringMetres = 60e-6f;
 constexpr std::size_t kTriangleBudgetSoftware = 24'000, kTriangleBudget = 100'000;
@@ -263,11 +262,9 @@ void SceneRenderer::Parts::load_topology(const SceneView& scene) {
   vertices.resize(surface.vertex_count());
   rest_vertices.resize(surface.vertex_count());
   surface.measure_rim(kDeepMetres, rim_distances);
-  for (std::size_t i = 0; i < rest_vertices.size(); ++i) {
-    const float inside = 1 + rim_distances[i] / kDeepMetres;
-    const float outside = std::min(rim_distances[i] / kSeamMetres, 1.0f) - 1;
-    rest_vertices[i] = {surface.positions()[i], surface.is_wound()[i] != 0 ? inside : outside};
-  }
+  for (std::size_t i = 0; i < rest_vertices.size(); ++i)
+    rest_vertices[i] = {surface.positions()[i],
+                        rim_of(rim_distances[i], surface.is_wound()[i] != 0)};
   measure_organ(scene.rest_positions);
   const auto bytes = [](std::size_t count, std::size_t each) {
     return static_cast<GLsizeiptr>(count * each);

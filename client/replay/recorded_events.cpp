@@ -30,16 +30,16 @@ class Reader {
     if (done) done = read_lesson();
     if (done && journal_.info().gap_messages > 0) read_gaps();
     if (done) done = read_forces();
-    std::ranges::stable_sort(story_.events, {}, &PlaybackEvent::tick);
+    std::ranges::stable_sort(told_.story.events, {}, &PlaybackEvent::tick);
     return done;
   }
-  replica::PlaybackStory take() { return std::move(story_); }
+  RecordedStory take() { return std::move(told_); }
 
  private:
   void add(Tick tick, Kind kind, const std::string& text) {
     if (text.empty()) return;
-    if (story_.events.size() < kMostEvents)
-      story_.events.push_back({tick, kind, printable(text, 200)});
+    if (told_.story.events.size() < kMostEvents)
+      told_.story.events.push_back({tick, kind, printable(text, 200)});
     else if (!std::exchange(is_full_, true))
       log::warn("the recording has more than {} events: the rest are not on the time bar",
                 kMostEvents);
@@ -94,8 +94,21 @@ class Reader {
     return journal_.read_lessons(0, last_, [&](Tick tick, const proto::LessonRecord& record) {
       if (record.has_teach() && record.teach().is_done())
         add(tick, Kind::Lesson, record.teach().text());
+      if (record.has_stage()) add_stage(tick, record.stage());
       return !is_stopping_;
     });
+  }
+
+  void add_stage(Tick tick, const proto::LessonStage& stage) {
+    if (told_.stages.size() >= kMostEvents) return;
+    const bool is_known = !told_.stages.empty() &&
+                          told_.stages.back().stage.name() == stage.name() &&
+                          told_.stages.back().stage.begin_tick() == stage.begin_tick();
+    if (stage.is_over())
+      add(tick, Kind::Lesson, "the lesson is over");
+    else if (!is_known)
+      add(tick, Kind::Lesson, "stage: " + stage.name());
+    told_.stages.push_back({tick, stage});
   }
 
   void read_gaps() {
@@ -110,13 +123,13 @@ class Reader {
   }
 
   Status read_forces() {
-    story_.forces_n.assign(kForceBins, 0);
+    told_.story.forces_n.assign(kForceBins, 0);
     return journal_.read_frame_states(0, last_, [&](Tick tick, const proto::FrameState& state) {
       const auto bin = static_cast<std::size_t>(tick * (kForceBins - 1) / std::max<Tick>(last_, 1));
       for (const auto& tool : state.tool()) {
         const float force = std::hypot(tool.force_n().x(), tool.force_n().y(), tool.force_n().z());
         if (std::isfinite(force) && bin < kForceBins)
-          story_.forces_n[bin] = std::max(story_.forces_n[bin], force);
+          told_.story.forces_n[bin] = std::max(told_.story.forces_n[bin], force);
       }
       return !is_stopping_;
     });
@@ -126,12 +139,17 @@ class Reader {
   const std::atomic<bool>& is_stopping_;
   Tick last_;
   bool is_full_ = false;
-  replica::PlaybackStory story_;
+  RecordedStory told_;
 };
 
 }  // namespace
 
-replica::PlaybackStory read_story(const std::string& path, const std::atomic<bool>& is_stopping) {
+const RecordedStage* RecordedStory::stage_at(Tick tick) const {
+  const auto after = std::ranges::upper_bound(stages, tick, {}, &RecordedStage::tick);
+  return after == stages.begin() ? nullptr : &*(after - 1);
+}
+
+RecordedStory read_story(const std::string& path, const std::atomic<bool>& is_stopping) {
   auto journal = journal::SessionJournal::open(path);
   if (!journal) {
     log::warn("{}: the time bar has no events", journal.error().message);
@@ -145,13 +163,13 @@ replica::PlaybackStory read_story(const std::string& path, const std::atomic<boo
 
 RecordedEvents::RecordedEvents(const std::string& path) {
   reading_.start([this, path] {
-    auto story = std::make_shared<const replica::PlaybackStory>(read_story(path, is_stopping_));
+    auto story = std::make_shared<const RecordedStory>(read_story(path, is_stopping_));
     const std::lock_guard lock(mutex_);
     story_ = std::move(story);
   });
 }
 
-std::shared_ptr<const replica::PlaybackStory> RecordedEvents::story() const {
+std::shared_ptr<const RecordedStory> RecordedEvents::story() const {
   const std::lock_guard lock(mutex_);
   return story_;
 }

@@ -81,7 +81,7 @@ void ReplaySource::poll(replica::MessageSink& sink) {
     done = run_until(target, sink);
     if (target == last_tick()) is_playing_ = false;
   }
-  if (done.ok()) return;
+  if (done.ok()) return deliver_stage(sink);
   is_playing_ = false;
   state_ = replica::SourceState::Closed;
   close_reason_ = {replica::CloseKind::Lost, done.error().message};
@@ -356,6 +356,24 @@ Status ReplaySource::deliver_lesson(JournalTopic topic, Tick tick, BytesView dat
     return {};
   deliver(other_, tick, sink);
   return {};
+}
+
+void ReplaySource::deliver_stage(replica::MessageSink& sink) {
+  const auto told = events_.story();
+  if (!told) return;
+  const RecordedStage* now = told->stage_at(position_);
+  if (now == stage_) return;
+  stage_ = now;
+  auto& message = *other_.mutable_lesson_stage();
+  message.Clear();
+  if (now != nullptr) message = now->stage;
+  deliver(other_, position_, sink);
+}
+
+std::shared_ptr<const replica::PlaybackStory> ReplaySource::story() const {
+  auto told = events_.story();
+  if (!told) return nullptr;
+  return {told, &told->story};
 }
 
 Status ReplaySource::parse(JournalTopic topic, Tick tick, BytesView data,

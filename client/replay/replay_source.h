@@ -64,7 +64,7 @@ class ReplaySource final : public replica::SessionSource, public replica::Playba
   void pause() override;
   void seek(Tick tick) override;
   void set_speed(float speed) override;
-  std::shared_ptr<const replica::PlaybackStory> story() const override { return events_.story(); }
+  std::shared_ptr<const replica::PlaybackStory> story() const override;
 
  private:
   using Entries = std::span<const JournalStream::Entry>;
@@ -85,6 +85,9 @@ class ReplaySource final : public replica::SessionSource, public replica::Playba
   // Hands on a Drawing where `topic` is that, else what a LessonRecord holds.
   Status deliver_lesson(journal::JournalTopic topic, Tick tick, BytesView data,
                         replica::MessageSink& sink);
+  // Says which stage of a lesson was on, where it is another one than the sink was told of. The
+  // stages are known once the file is read.
+  void deliver_stage(replica::MessageSink& sink);
   Status deliver_claims(const JournalStream::Entry& entry, replica::MessageSink& sink);
   Status parse(journal::JournalTopic topic, Tick tick, BytesView data,
                google::protobuf::Message& message) const;
@@ -107,6 +110,7 @@ class ReplaySource final : public replica::SessionSource, public replica::Playba
 
   // The members below say what the sink holds.
   bool has_welcomed_ = false;
+  const RecordedStage* stage_ = nullptr;
   std::optional<std::uint32_t> epoch_;  // none: it needs a topology, too
   Frame frame_ = 0;
   bool needs_key_ = true;

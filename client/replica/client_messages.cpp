@@ -57,9 +57,22 @@ std::uint32_t pass_on(const proto::Envelope& message, HandLine& hands) {
   return refused;
 }
 
-bool ask_for_mark(SessionSource& source, bool is_return) {
+bool send_lead_wish(SessionSource& source, const LeadWish& wish) {
+  proto::Envelope envelope;
+  auto& request = *envelope.mutable_teach_request();
+  request.set_action(static_cast<proto::TeachAction>(wish.action));
+  if (!wish.name.empty()) {
+    request.set_participant(wish.participant.value);
+    request.set_name(wish.name);
+  }
+  request.set_rate(wish.rate);
+  return source.send(envelope);
+}
+
+bool ask_for_mark(SessionSource& source, bool is_return, const std::string& name) {
   proto::Envelope envelope;
   envelope.mutable_mark_request()->set_action(is_return ? proto::MARK_RETURN : proto::MARK_SET);
+  envelope.mutable_mark_request()->set_name(name);
   return source.send(envelope);
 }
 

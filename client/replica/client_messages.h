@@ -5,6 +5,7 @@
 
 #include "client/replica/hand_line.h"
 #include "client/replica/session_source.h"
+#include "common/base/ids.h"
 #include "common/tool/tool.h"
 
 namespace trocar::replica {
@@ -24,8 +25,27 @@ void write_report(const wire::HandReport& report, proto::Envelope& envelope);
 // left out; returns how many such parts there were.
 std::uint32_t pass_on(const proto::Envelope& message, HandLine& hands);
 
-// To mark the organ as it is, or to return it to the mark. False if the source dropped it.
-bool ask_for_mark(SessionSource& source, bool is_return);
+// To mark the organ as it is, or to return it to the mark; `name`: of several marks. False if the
+// source dropped it.
+bool ask_for_mark(SessionSource& source, bool is_return, const std::string& name = {});
+// An instructor does this with the session, or with a participant's tools. The values are those of
+// proto::TeachAction.
+enum class LeadAction : std::uint8_t {
+  Freeze = 1,
+  Release = 2,
+  TakeClaim = 3,
+  End = 9,
+  Pause = 15,
+  GoOn = 16,
+  Slow = 17,
+};
+struct LeadWish {
+  LeadAction action = LeadAction::Pause;
+  ParticipantSlot participant;  // whose tools; with the name that others read
+  std::string name;
+  float rate = 0;  // of Slow
+};
+bool send_lead_wish(SessionSource& source, const LeadWish& wish);
 // To say something in a lesson, as a hand or an instructor. False if the source dropped it.
 enum class LessonWish : std::uint8_t { Answer = 1, Next = 2, Restart = 3 };
 bool send_lesson_wish(SessionSource& source, LessonWish wish, std::uint32_t tool = 0);

@@ -17,7 +17,13 @@ void make_printable(proto::Envelope& message) {
     case proto::Envelope::kGoodbye:
       return mend(message.mutable_goodbye()->mutable_text());
     case proto::Envelope::kMarkEvent:
+      mend(message.mutable_mark_event()->mutable_name());
       return mend(message.mutable_mark_event()->mutable_text());
+    case proto::Envelope::kMarkList:
+      for (auto& name : *message.mutable_mark_list()->mutable_name()) mend(&name);
+      return;
+    case proto::Envelope::kSessionPace:
+      return mend(message.mutable_session_pace()->mutable_by());
     case proto::Envelope::kTeachEvent:
       return mend(message.mutable_teach_event()->mutable_text());
     case proto::Envelope::kLessonStage: {

@@ -108,6 +108,10 @@ void Replica::on_message(const proto::Envelope& message, std::uint64_t arrival_n
       return apply_drawing(message.drawing());
     case proto::Envelope::kViewEvent:
       return apply_view(message.view_event(), arrival_ns);
+    case proto::Envelope::kSessionPace:
+      return apply_pace(message.session_pace());
+    case proto::Envelope::kMarkList:
+      return apply_marks(message.mark_list());
     case proto::Envelope::kLessonStage:
       return apply_lesson(message.lesson_stage());
     case proto::Envelope::kLessonProgress:
@@ -131,6 +135,7 @@ void Replica::apply_welcome(const proto::Welcome& message) {
   if (message.ticks_per_frame() != kTicksPerFrame || message.tick_us() != 1000)
     return fail("Welcome: tick_us and ticks_per_frame must be 1000 and 16");
   has_datagrams_ = message.has_datagrams();
+  server_minor_ = message.protocol_minor();
   if (message.participant() < kMaxParticipants)
     own_slot_.value = static_cast<std::uint8_t>(message.participant());
   if (++welcome_count_ > 1) begin_anew();
@@ -143,6 +148,10 @@ void Replica::begin_anew() {
   if (sync_state_ != SyncState::WaitingForTopology) sync_state_ = SyncState::WaitingForKeyframe;
   ghost_ = {};
   strokes_.clear();
+  lesson_strokes_ = 0;
+  lesson_.reset();
+  pace_ = {};
+  marks_.clear();
   ++drawing_version_;
   led_view_.reset();
   barrier_.reset();

@@ -49,6 +49,8 @@ class MarkEvent;
 class RecordingState;
 class Participants;
 class PointEvent;
+class MarkList;
+class SessionPace;
 class SurfaceChange;
 class FrameStatePart;
 class SurfaceFrame;
@@ -144,6 +146,11 @@ class Replica final : public MessageSink {
   std::uint64_t drawing_version() const { return drawing_version_; }
   // The lesson that the session gives, if it does.
   const std::optional<LessonView>& lesson() const { return lesson_; }
+  const SessionPace& pace() const { return pace_; }
+  // Whether the server knows pauses, slow time and marks with names.
+  bool has_pace() const { return server_minor_ >= 18; }
+  // The marks that the organ can be returned to; an empty text is the one without a name.
+  const std::vector<std::string>& marks() const { return marks_; }
   // Returns where the view to follow was last, if somebody has had it.
   const std::optional<LedView>& led_view() const { return led_view_; }
   // Returns what the server last said of its recording.
@@ -175,6 +182,8 @@ class Replica final : public MessageSink {
   void apply_drawing(const proto::Drawing& message);
   void apply_lesson(const proto::LessonStage& message);
   void apply_progress(const proto::LessonProgress& message);
+  void apply_pace(const proto::SessionPace& message);
+  void apply_marks(const proto::MarkList& message);
   void apply_view(const proto::ViewEvent& message, std::uint64_t arrival_ns);
   void tell_all(Tick tick, const std::string& text, bool is_refused, std::uint64_t arrival_ns);
   void add_notice(Notice notice);
@@ -238,6 +247,9 @@ class Replica final : public MessageSink {
   std::vector<Stroke> strokes_;
   std::uint64_t drawing_version_ = 0;
   std::optional<LedView> led_view_;
+  SessionPace pace_;
+  std::uint32_t server_minor_ = 0;
+  std::vector<std::string> marks_;
   std::optional<LessonView> lesson_;
   std::size_t lesson_strokes_ = 0;  // of strokes_, the first ones: the line of a stage
   std::optional<BarrierOutcome> barrier_;

@@ -82,13 +82,15 @@ void Replica::apply_lesson(const proto::LessonStage& message) {
                             {entry.line().begin(), entry.line().end()}});
   }
   view.is_over = message.is_over(), view.points = message.points();
+  const bool is_given = message.stages() > 0;
   if (lesson_ && lesson_->stage == view.stage && lesson_->begin_tick == view.begin_tick)
     view.progress = lesson_->progress, view.seconds = lesson_->seconds;
   strokes_.erase(strokes_.begin(), strokes_.begin() + static_cast<std::ptrdiff_t>(lesson_strokes_));
   lesson_strokes_ = view.goal == LessonView::Goal::Incise && !view.is_over && !view.line_m.empty();
   if (lesson_strokes_ > 0) strokes_.insert(strokes_.begin(), Stroke{{}, dense(view.line_m)});
   ++drawing_version_;
-  lesson_ = std::move(view);
+  lesson_.reset();
+  if (is_given) lesson_ = std::move(view);
 }
 
 void Replica::apply_progress(const proto::LessonProgress& message) {
@@ -101,6 +103,17 @@ void Replica::apply_progress(const proto::LessonProgress& message) {
 void Replica::apply_mark(const proto::MarkEvent& message, std::uint64_t arrival_ns) {
   counters_.marks += message.is_done() ? 1 : 0;
   tell_all(message.tick(), message.text(), !message.is_done(), arrival_ns);
+}
+
+void Replica::apply_pace(const proto::SessionPace& message) {
+  if (!(message.rate() > 0 && message.rate() <= 1)) return fail("SessionPace.rate: over 0, to 1");
+  pace_ = {message.rate(), message.is_paused(), message.by()};
+}
+
+void Replica::apply_marks(const proto::MarkList& message) {
+  if (message.name_size() > static_cast<int>(wire::kMostMarks))
+    return fail("MarkList: too many marks");
+  marks_.assign(message.name().begin(), message.name().end());
 }
 
 void Replica::apply_teach(const proto::TeachEvent& message, std::uint64_t arrival_ns) {

@@ -126,6 +126,13 @@ struct LessonView {
   std::optional<Vec3f> target_m(Tick now) const;
 };
 
+// How fast time goes in the session.
+struct SessionPace {
+  float rate = 1;  // simulated time over real time
+  bool is_paused = false;
+  std::string by;  // who decided so last; empty: nobody
+};
+
 // The view of who was given it.
 struct LedView {
   ParticipantSlot participant;

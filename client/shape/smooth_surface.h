@@ -34,6 +34,15 @@ using TriangleCorners = std::array<std::uint32_t, 3>;
 void compute_normals(std::span<const Vec3f> positions, std::span<const TriangleCorners> triangles,
                      std::vector<Vec3f>& normals);
 
+// Widths of what a wound's rim changes on either side of it.
+inline constexpr float kSeamMetres = 0.004f, kDeepMetres = 0.022f;
+// Returns what the shaders take as `rest.w` of a vertex that is so far from the nearest rim:
+// outside 0, and -1 on the rim; inside 1 at the rim, 2 where the wound is deep.
+inline float rim_of(float distance_m, bool is_wound) {
+  if (is_wound) return 1 + distance_m / kDeepMetres;
+  return distance_m < kSeamMetres ? distance_m / kSeamMetres - 1 : 0.0f;
+}
+
 class SmoothSurface {
  public:
   // Halves edges while the result has at most `triangle_budget` triangles, at most twice. Triangles

@@ -22,6 +22,7 @@ std::vector<Banner> banners_of(const HudModel& model) {
         {model.status, model.status_advice, model.is_away ? RateTone::Warning : RateTone::Calm});
     return banners;
   }
+  if (!model.pace_text.empty()) banners.push_back({model.pace_text, "", RateTone::Calm});
   if (!model.frozen_text.empty())
     banners.push_back({model.frozen_text,
                        "Wait: they come back to your hands slowly when they are released.",
@@ -30,12 +31,13 @@ std::vector<Banner> banners_of(const HudModel& model) {
                           [](const auto& who) { return who.is_self && who.is_inside; }))
     banners.push_back({"Your instrument is inside the tissue, and touches nothing.",
                        "Draw it out with the wheel, or move it off the organ.", RateTone::Notice});
-  if (model.surface_age_ms && *model.surface_age_ms >= kStaleMs)
+  if (!model.is_paused && model.surface_age_ms && *model.surface_age_ms >= kStaleMs)
     banners.push_back({"This picture is " + tenths(*model.surface_age_ms * 1e-3) + " s old.",
                        "The connection is slow or has stopped: wait before you cut.",
                        RateTone::Warning});
   // A recording plays at its own speed, however slow the session was.
-  if (const auto slow = describe(model.figures).banner; !slow.empty() && !model.timeline)
+  if (const auto slow = describe(model.figures).banner;
+      !slow.empty() && !model.timeline && !model.is_paused)
     banners.push_back({slow,
                        model.has_own_tool ? "The server cannot keep up: move slowly."
                                           : "The server cannot keep up.",

@@ -105,10 +105,12 @@ Hud::~Hud() {
 void Hud::need_letters(const HudModel& model) {
   for (const std::string* text :
        {&model.title, &model.organ, &model.own_role, &model.status, &model.recording_text,
-        &model.frozen_text, &model.view_text, &model.lent_text})
+        &model.frozen_text, &model.view_text, &model.lent_text, &model.pace_text})
     fonts_->need(*text);
   for (const HudParticipant& participant : model.participants) fonts_->need(participant.name);
   for (const HudMessage& message : model.messages) fonts_->need(message.text);
+  if (model.conduct)
+    for (const auto& mark : model.conduct->marks) fonts_->need(mark);
   if (model.lesson) {
     for (const auto* text :
          {&model.lesson->title, &model.lesson->stage, &model.lesson->text, &model.lesson->hint})
@@ -189,6 +191,7 @@ HudActions Hud::draw(const HudModel& model) {
   draw_felt_hands(model, right.bottom, scale_);
   draw_own_forces(model, scale_);
   if (model.tray.hands > 0) draw_tray(model, session, scale_, actions);
+  if (model.conduct) draw_conduct(*model.conduct, session, scale_, actions);
   if (model.timeline) draw_timeline(*model.timeline, scale_, actions);
   draw_help(model, scale_);
   ImGui::Render();
@@ -209,6 +212,10 @@ HudActions Hud::draw(const HudModel& model) {
     actions.next_stage = model.lesson->can_lead && pressed(GLFW_KEY_N);
     actions.restart_lesson = model.lesson->can_lead && pressed(GLFW_KEY_K);
   }
+  if (model.conduct && pressed(GLFW_KEY_P))
+    actions.lead = replica::LeadWish{
+        .action = model.conduct->is_paused ? replica::LeadAction::GoOn : replica::LeadAction::Pause,
+        .name = {}};
   actions.switch_hand = model.tray.hands > 1 && pressed(GLFW_KEY_TAB);
   for (std::size_t i = 0;
        model.tray.hands > 0 && i < std::min<std::size_t>(model.tray.names.size(), 9); ++i)

@@ -17,6 +17,7 @@
 
 #include "client/device/view_rays.h"
 #include "client/render/gl_context.h"
+#include "client/replica/client_messages.h"
 #include "client/replica/session_source.h"
 #include "client/replica/session_view.h"
 #include "client/shape/tool_mesh.h"
@@ -76,7 +77,7 @@ struct HudTray {
 // The stage of a lesson, or how it has ended.
 struct HudLesson {
   std::string title, stage, text, hint;  // "2 of 3: Search"; hint: empty: not yet
-  float progress = 0;                    // 0 to 1
+  std::optional<float> progress;         // 0 to 1; nothing: a recording does not say
   double seconds = 0, limit_s = 0;
   float force_limit_n = 0;  // 0: there is none
   bool is_too_strong = false;
@@ -84,6 +85,19 @@ struct HudLesson {
   bool is_over = false;
   float points = 0;
   std::vector<std::pair<std::string, std::vector<std::string>>> results;  // head and lines
+};
+
+// An instructor leads with these.
+struct HudHand {
+  ParticipantSlot slot;
+  std::string name;
+  bool is_frozen = false;
+};
+struct HudConduct {
+  bool is_paused = false;
+  float rate = 1;                  // simulated time over real time
+  std::vector<std::string> marks;  // an empty one has no name
+  std::vector<HudHand> hands;      // who has tools
 };
 
 // A tool of one's own, whatever holds it.
@@ -133,6 +147,9 @@ struct HudModel {
   bool has_own_tool = false;
   HudTray tray;
   std::optional<HudLesson> lesson;
+  std::string pace_text;              // empty: time goes as usual
+  bool is_paused = false;             // no newer picture is to be expected
+  std::optional<HudConduct> conduct;  // an instructor's
   bool can_mark = false;  // an instructor's: he may mark the organ and return it to the mark
 };
 
@@ -144,6 +161,8 @@ struct HudActions {
   bool next_lent_view = false;
   bool switch_hand = false;
   bool answer = false, next_stage = false, restart_lesson = false;
+  std::optional<std::string> mark_named, return_to_named;
+  std::optional<replica::LeadWish> lead;
   std::optional<std::size_t> take_instrument;
   std::optional<double> seek_seconds;
   std::optional<float> speed;

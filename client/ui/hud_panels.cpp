@@ -132,7 +132,8 @@ Box draw_session_panel(const HudModel& model, float scale) {
     row("session time", clock_text(model.session_seconds));
     if (!model.ghost_text.empty()) row("ghost", model.ghost_text);
     if (model.shows_rate) figure_rows(model);
-    if (model.surface_age_ms && (model.shows_rate || *model.surface_age_ms > kOldPictureMs))
+    if (!model.is_paused && model.surface_age_ms &&
+        (model.shows_rate || *model.surface_age_ms > kOldPictureMs))
       row("age of picture", format("%.0f ms", *model.surface_age_ms));
     if (model.shows_rate || !model.is_in_step) {
       ImGui::TableNextRow();
@@ -228,6 +229,7 @@ void draw_help(const HudModel& model, float scale) {
     if (model.can_mark) {
       help_row("M", "mark the organ as it is");
       help_row("Backspace", "return it to the mark, for everybody");
+      help_row("P", "pause the session for everybody, or let it go on");
     }
     if (model.can_lend_view)
       help_row("T",

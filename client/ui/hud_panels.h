@@ -31,6 +31,8 @@ void draw_labels(const HudModel& model, const Box& banners, float scale);
 // The instruments of one's own, to be chosen from, under the session's panel. Where that one is
 // tall, with the figures for research, only what the hand has.
 void draw_tray(const HudModel& model, const Box& session, float scale, HudActions& actions);
+// An instructor's buttons, under the session's panel.
+void draw_conduct(const HudConduct& conduct, const Box& session, float scale, HudActions& actions);
 void draw_timeline(const HudTimeline& timeline, float scale, HudActions& actions);
 void draw_help(const HudModel& model, float scale);
 // Greys the scene, which is no longer what the session is.

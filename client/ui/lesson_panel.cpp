@@ -11,8 +11,10 @@ namespace {
 void draw_stage(const HudLesson& lesson, float scale) {
   ImGui::TextDisabled("%s", lesson.stage.c_str());
   ImGui::TextUnformatted(lesson.text.c_str());
-  const auto percent = std::to_string(static_cast<int>(lesson.progress * 100)) + " %";
-  ImGui::ProgressBar(lesson.progress, {-1, 14 * scale}, percent.c_str());
+  if (lesson.progress) {
+    const auto percent = std::to_string(static_cast<int>(*lesson.progress * 100)) + " %";
+    ImGui::ProgressBar(*lesson.progress, {-1, 14 * scale}, percent.c_str());
+  }
   ImGui::TextDisabled("%s of %s", clock_text(lesson.seconds).c_str(),
                       clock_text(lesson.limit_s).c_str());
   if (lesson.force_limit_n > 0) {

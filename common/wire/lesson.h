@@ -16,6 +16,10 @@ inline constexpr std::size_t kMostDrawingPoints = 2048;  // of all strokes toget
 inline constexpr float kMostViewDistanceM = 10;          // of an eye from the origin
 inline constexpr float kLeastViewM = 0.001f;             // from the eye to what it looks at
 
+inline constexpr std::size_t kMostMarks = 4;      // with the one without a name
+inline constexpr std::size_t kMostMarkName = 32;  // bytes
+inline constexpr float kLeastPace = 0.25f;        // simulated time over real time
+
 enum class LessonKind : std::uint8_t { Said, Drawing };
 
 // A message as the journal holds it: proto::LessonRecord or, of all that is drawn, proto::Drawing.

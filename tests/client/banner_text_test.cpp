@@ -62,6 +62,18 @@ TEST(BannerText, EachStateSaysWhatToDo) {
             "The lesson goes on. Tell the host that the disk is too slow.");
 }
 
+// A picture may be old and time may stand still: that is what a pause is.
+TEST(BannerText, APauseExplainsItself) {
+  HudModel model;
+  model.pace_text = "Ivy has paused the session.";
+  model.is_paused = true;
+  model.surface_age_ms = 60'000;
+  model.figures.pace.rate.time_rate = 0.5f;
+  const auto banners = banners_of(model);
+  ASSERT_EQ(banners.size(), 1u);
+  EXPECT_EQ(banners[0].text, model.pace_text);
+}
+
 TEST(BannerText, AClosedSessionHasOneBannerAlone) {
   HudModel model;
   model.status = "connection to 10.0.0.7:7690 broke: the server is gone";

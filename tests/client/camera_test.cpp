@@ -9,6 +9,8 @@
 namespace trocar::render {
 namespace {
 
+using shape::lens_of;
+
 TEST(OrbitCamera, StandsWhereAnotherViewStands) {
   constexpr Size kSize{1280, 720};
   OrbitCamera leads, follows;

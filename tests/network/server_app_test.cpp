@@ -41,6 +41,17 @@ TEST(Pacer, after_a_stall_two_ticks_run_back_to_back_and_the_rest_is_given_up) {
   EXPECT_EQ(pacer.due_ns(), late + kTickNanoseconds);
 }
 
+TEST(Pacer, a_rate_stretches_the_time_between_ticks) {
+  app::Pacer pacer(0);
+  pacer.begin_tick(0);
+  pacer.restart(7'000'000, 0.25f);
+  for (std::uint64_t i = 0; i < 100; ++i) {
+    EXPECT_EQ(pacer.due_ns(), 7'000'000 + 4 * i * kTickNanoseconds);
+    pacer.begin_tick(pacer.due_ns());
+  }
+  EXPECT_EQ(pacer.slow_ticks(), 0u) << "that is no lateness";
+}
+
 TEST(Pacer, random_stalls_keep_the_books) {
   for (unsigned seed = 0; seed < 100; ++seed) {
     std::mt19937 random(seed);
@@ -114,6 +125,39 @@ struct KeepingSink final : app::JournalSink {
   wire::RecordingState state() const override { return {}; }
   std::vector<step::SharedFrame> frames;
 };
+
+TEST(SimulationLoop, a_pause_stops_at_a_frame_and_changes_no_tick) {
+  const auto organ = *catalogue::make_lattice({8, 5, 8, 0.01});
+  std::vector<std::uint64_t> hashes;
+  for (const bool pauses : {false, true}) {
+    step::Simulation simulation(organ);
+    participants::SimulationInbox inbox;
+    std::atomic<std::size_t> frames{0};
+    app::FrameHandover handover([&frames] { ++frames; });
+    app::SimulationLoop loop(simulation, inbox, handover, nullptr, {.tick_count = 160}, [] {});
+    if (pauses) loop.set_rate(0);
+    loop.start();
+    std::vector<step::SharedFrame> taken;
+    if (pauses) {
+      // More than its queue holds arrives meanwhile, and nobody is refused.
+      for (std::uint8_t round = 0; round < 200; ++round) {
+        while (!inbox.try_push_join({.slot = {0}})) std::this_thread::yield();
+        inbox.push_leave({0});
+      }
+      handover.pop_all(taken);
+      EXPECT_TRUE(taken.empty());
+      loop.set_rate(0.5f);
+    }
+    while (taken.empty() || taken.back()->tick < 160) {
+      handover.pop_all(taken);
+      std::this_thread::yield();
+    }
+    loop.stop();
+    EXPECT_EQ(loop.report().ticks, 160u);
+    hashes.push_back(simulation.state_hash());
+  }
+  EXPECT_EQ(hashes[0], hashes[1]);
+}
 
 TEST(SimulationLoop, its_records_and_snapshot_simulate_the_session_again) {
   const auto organ = *catalogue::make_lattice({8, 5, 8, 0.01});

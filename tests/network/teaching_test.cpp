@@ -1,6 +1,8 @@
 // Teaching: what an instructor does with people and their tools, and what people say and draw. Who
 // may, what everybody is told, and what is recorded.
 
+#include <limits>
+
 #include "common/wire/lesson.h"
 #include "proto/journal.pb.h"
 #include "server/session/access/door.h"
@@ -45,6 +47,7 @@ class Teaching : public ::testing::Test {
     options.clock_ns = [this] { return clock_ns_.load(); };
     options.participants_interval_ns = 0;
     options.on_lesson = [this](wire::LessonEntry entry) { recorded_.push_back(std::move(entry)); };
+    options.on_pace = [this](float rate) { rates_.push_back(rate); };
     options.on_end_wanted = [this](const std::string& words) { end_words_ = words; };
     return options;
   }
@@ -80,6 +83,7 @@ class Teaching : public ::testing::Test {
   std::atomic<std::uint64_t> clock_ns_{1'000'000'000'000};
   std::vector<wire::LessonEntry> recorded_;  // I/O thread
   std::string end_words_;                    // I/O thread
+  std::vector<float> rates_;                 // I/O thread
   LiveSession session_{{}, options()};
   RawClient ivy_{session_.port()}, sam_{session_.port()};
 };
@@ -92,8 +96,10 @@ TEST_F(Teaching, IsForInstructorsAlone) {
       ASSERT_TRUE(client.join("Eve", role));
       const bool has_text = action >= proto::TEACH_EXPEL && action <= proto::TEACH_ADMIT;
       const bool is_note = action == proto::TEACH_NOTE;
-      ASSERT_TRUE(client.send(teach(static_cast<proto::TeachAction>(action), 0, "Sam",
-                                    has_text || is_note ? "because" : "")));
+      auto request = teach(static_cast<proto::TeachAction>(action), 0, "Sam",
+                           has_text || is_note ? "because" : "");
+      if (action == proto::TEACH_SLOW) request.mutable_teach_request()->set_rate(0.5f);
+      ASSERT_TRUE(client.send(request));
       const auto goodbye = client.read_goodbye();
       ASSERT_TRUE(goodbye) << action;
       EXPECT_EQ(goodbye->reason(), proto::GOODBYE_ROLE) << goodbye->text();
@@ -110,7 +116,7 @@ TEST_F(Teaching, IsForInstructorsAlone) {
 TEST_F(Teaching, WhatIsNotAsItMayBeEndsTheSession) {
   const std::string long_text(501, 'x'), long_reason(201, 'x');
   for (const auto& request :
-       {teach(proto::TEACH_NONE), teach(static_cast<proto::TeachAction>(15)),
+       {teach(proto::TEACH_NONE), teach(static_cast<proto::TeachAction>(18)),
         teach(proto::TEACH_NOTE), teach(proto::TEACH_NOTE, long_text),
         teach(proto::TEACH_NOTE, "two\nlines"), teach(proto::TEACH_NOTE, "\x1b[2J"),
         teach(proto::TEACH_END, "text"), teach(proto::TEACH_EXPEL, 0, "Sam", long_reason),
@@ -310,6 +316,143 @@ TEST_F(Teaching, TheSessionIsEndedInTheInstructorsWords) {
   ASSERT_TRUE(ivy_.send(teach(proto::TEACH_END)));
   EXPECT_EQ(told(sam_).text(), "Ivy has ended the session");
   EXPECT_EQ(session_.on_io([&] { return end_words_; }), "Ivy has ended the session");
+}
+
+TEST_F(Teaching, APauseHoldsToolsAndIsKnownToAll) {
+  const auto slow = [](float rate) {
+    auto request = teach(proto::TEACH_SLOW);
+    request.mutable_teach_request()->set_rate(rate);
+    return request;
+  };
+  const auto pace_of = [](RawClient& client) {
+    const auto message = client.receive(Envelope::kSessionPace);
+    EXPECT_TRUE(message);
+    return message ? message->session_pace() : proto::SessionPace();
+  };
+  ASSERT_TRUE(sam_.send(make_sample(1)));
+  drain_after(1);
+  ASSERT_TRUE(ivy_.send(teach(proto::TEACH_PAUSE)));
+  // The pace is told before the words.
+  const auto paused = pace_of(sam_);
+  EXPECT_TRUE(paused.is_paused());
+  EXPECT_EQ(paused.by(), "Ivy");
+  EXPECT_EQ(told(sam_).text(), "Ivy has paused the session");
+  auto moved = make_sample(2);
+  moved.mutable_tool_sample()->mutable_position_m()->set_x(0.3f);
+  ASSERT_TRUE(sam_.send(moved));
+  EXPECT_EQ(drain_after(2).samples.at(0).sample.world_from_tool.position, (Vec3f{0, 0.1f, 0}));
+  RawClient late(session_.port());
+  ASSERT_TRUE(late.join("Late", proto::ROLE_OBSERVER));
+  EXPECT_TRUE(pace_of(late).is_paused());
+
+  ASSERT_TRUE(ivy_.send(teach(proto::TEACH_PAUSE)));
+  while (true) {
+    const auto event = told(ivy_);
+    if (event.is_done()) continue;
+    EXPECT_EQ(event.text(), "not done: it is paused already");
+    break;
+  }
+  pass_seconds(1);
+  ASSERT_TRUE(ivy_.send(slow(0.25f)));
+  const auto slowed = pace_of(sam_);
+  EXPECT_TRUE(slowed.is_paused()) << "slow time begins when it goes on";
+  EXPECT_EQ(slowed.rate(), 0.25f);
+  EXPECT_EQ(told(sam_).text(), "Ivy has slowed time down to 25 %");
+  ASSERT_TRUE(ivy_.send(teach(proto::TEACH_GO_ON)));
+  EXPECT_FALSE(pace_of(sam_).is_paused());
+  EXPECT_EQ(session_.on_io([&] { return rates_; }), (std::vector<float>{0, 0, 0.25f}));
+  pass_seconds(1);
+  moved.mutable_tool_sample()->set_sequence(3);
+  ASSERT_TRUE(sam_.send(moved));
+  const auto inputs = drain_after(3);
+  const float x = inputs.samples.at(0).sample.world_from_tool.position.x;
+  EXPECT_GT(x, 0.0f);
+  EXPECT_LE(x, 0.05f * participants::kReturnSpeed * 1.001f) << "it goes back slowly";
+  EXPECT_EQ(recorded().size(), 3u) << "what was refused is not recorded";
+}
+
+TEST_F(Teaching, TimeGoesOnWithoutAnInstructor) {
+  ASSERT_TRUE(ivy_.send(teach(proto::TEACH_PAUSE)));
+  ASSERT_TRUE(sam_.receive(Envelope::kSessionPace));
+  Envelope bye;
+  bye.mutable_bye();
+  ASSERT_TRUE(ivy_.send(bye));
+  const auto message = sam_.receive(Envelope::kSessionPace);
+  ASSERT_TRUE(message);
+  EXPECT_FALSE(message->session_pace().is_paused());
+  EXPECT_EQ(message->session_pace().rate(), 1.0f);
+  EXPECT_EQ(session_.on_io([&] { return rates_; }), (std::vector<float>{0, 1}));
+}
+
+TEST_F(Teaching, ARateBeyondItsBoundsEndsTheSession) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  for (const auto& [action, rate] :
+       {std::pair{proto::TEACH_SLOW, 0.0f}, std::pair{proto::TEACH_SLOW, 0.249f},
+        std::pair{proto::TEACH_SLOW, 1.01f}, std::pair{proto::TEACH_SLOW, -1.0f},
+        std::pair{proto::TEACH_SLOW, nan}, std::pair{proto::TEACH_PAUSE, 0.5f}}) {
+    RawClient client(session_.port());
+    ASSERT_TRUE(client.join("Ian", proto::ROLE_INSTRUCTOR));
+    auto request = teach(action);
+    request.mutable_teach_request()->set_rate(rate);
+    ASSERT_TRUE(client.send(request));
+    const auto goodbye = client.read_goodbye();
+    ASSERT_TRUE(goodbye);
+    EXPECT_EQ(goodbye->reason(), proto::GOODBYE_PROTOCOL_ERROR);
+    EXPECT_NE(goodbye->text().find("TeachRequest.rate"), std::string::npos) << goodbye->text();
+  }
+  EXPECT_TRUE(session_.on_io([&] { return rates_; }).empty());
+}
+
+TEST_F(Teaching, MarksStandSideBySideByTheirNames) {
+  const auto ask = [&](proto::MarkAction action, const std::string& name) {
+    pass_seconds(2);
+    Envelope request, ping;
+    request.mutable_mark_request()->set_action(action);
+    request.mutable_mark_request()->set_name(name);
+    ping.mutable_ping();
+    EXPECT_TRUE(ivy_.send(request) && ivy_.send(ping));
+    std::string refusal;
+    for (auto message = ivy_.receive(); message && !message->has_pong(); message = ivy_.receive())
+      if (message->has_mark_event()) refusal = message->mark_event().text();
+    hands::TickInputs inputs;
+    session_.on_io([&] { session_.inbox.drain(inputs); });
+    return inputs.mark == hands::MarkAction::None ? refusal : std::to_string(inputs.mark_number);
+  };
+  session_.publish(10);
+  EXPECT_EQ(ask(proto::MARK_SET, ""), "0");
+  EXPECT_EQ(ask(proto::MARK_SET, "before"), "1");
+  EXPECT_EQ(ask(proto::MARK_SET, "first cut"), "2");
+  EXPECT_EQ(ask(proto::MARK_SET, "before"), "1");
+  EXPECT_EQ(ask(proto::MARK_RETURN, "first cut"), "2");
+  EXPECT_EQ(ask(proto::MARK_SET, "third"), "3");
+  EXPECT_NE(ask(proto::MARK_SET, "fourth").find("3 marks with names already"), std::string::npos);
+  EXPECT_NE(ask(proto::MARK_RETURN, "fourth").find("no mark called fourth"), std::string::npos);
+
+  auto frame = std::make_shared<step::PublishedFrame>(*session_.make_frame(1));
+  frame->mark_events.push_back({frame->tick, hands::MarkAction::Set, true, 2});
+  session_.publish_all({frame});
+  const auto event = sam_.receive(Envelope::kMarkEvent);
+  ASSERT_TRUE(event);
+  EXPECT_EQ(event->mark_event().name(), "first cut");
+  EXPECT_NE(event->mark_event().text().find("first cut"), std::string::npos);
+  const auto list = sam_.receive(Envelope::kMarkList);
+  ASSERT_TRUE(list);
+  ASSERT_EQ(list->mark_list().name_size(), 1);
+  EXPECT_EQ(list->mark_list().name(0), "first cut");
+  RawClient late(session_.port());
+  ASSERT_TRUE(late.join("Late", proto::ROLE_OBSERVER));
+  EXPECT_TRUE(late.receive(Envelope::kMarkList));
+  EXPECT_EQ(recorded().size(), 1u);
+
+  for (const std::string& bad : {std::string(33, 'a'), std::string("a\nb"), std::string("\xff")}) {
+    RawClient client(session_.port());
+    ASSERT_TRUE(client.join("Ian", proto::ROLE_INSTRUCTOR));
+    Envelope request;
+    request.mutable_mark_request()->set_action(proto::MARK_SET);
+    request.mutable_mark_request()->set_name(bad);
+    ASSERT_TRUE(client.send(request));
+    EXPECT_EQ(client.read_goodbye()->reason(), proto::GOODBYE_PROTOCOL_ERROR);
+  }
 }
 
 TEST_F(Teaching, ALineOnTheOrganIsSeenByAllAndByWhoComesLater) {

@@ -11,7 +11,7 @@ TEST(RecordedEvents, TellWhoCameAndWhoWasRefused) {
   const TemporaryFolder folder;
   const std::string path = folder.file("told.mcap");
   record_session(path, {.frames = 200, .claim_at = 100, .join_at = 50});
-  const auto story = read_story(path, kGoesOn);
+  const auto story = read_story(path, kGoesOn).story;
   ASSERT_EQ(story.events.size(), 3u);
   EXPECT_EQ(story.events[0].text, "Mira joined");
   EXPECT_EQ(story.events[1].text, "Jonas joined");
@@ -26,7 +26,7 @@ TEST(RecordedEvents, AFileThatIsNoRecordingHasNone) {
   const TemporaryFolder folder;
   const std::string path = folder.file("none.mcap");
   save_file(path, Bytes(100, 7));
-  EXPECT_TRUE(read_story(path, kGoesOn).events.empty());
+  EXPECT_TRUE(read_story(path, kGoesOn).story.events.empty());
 }
 
 TEST(RecordedEvents, MessagesThatDoNotParseEndTheListAndNothingElse) {
@@ -38,7 +38,7 @@ TEST(RecordedEvents, MessagesThatDoNotParseEndTheListAndNothingElse) {
     return true;
   };
   record_session(path, options);
-  EXPECT_EQ(read_story(path, kGoesOn).events.size(), 2u);
+  EXPECT_EQ(read_story(path, kGoesOn).story.events.size(), 2u);
 }
 
 TEST(RecordedEvents, ComeWhileTheRecordingPlays) {

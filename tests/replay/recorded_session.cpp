@@ -59,6 +59,16 @@ class Recorder {
     event.set_text("grasp refused: Mira holds this tissue");
     write(JournalTopic::Claims, frame, log);
   }
+  void write_stage(Frame frame, bool is_over) {
+    proto::LessonRecord record;
+    auto& stage = *record.mutable_stage();
+    stage.set_title("Find the lump");
+    stage.set_stages(1);
+    stage.set_name("Search");
+    stage.set_begin_tick(frame * kTicksPerFrame);
+    stage.set_is_over(is_over);
+    write(JournalTopic::Lesson, frame, record);
+  }
   void finish() {
     const Status ended = options_.is_finished ? writer_->close() : writer_->flush();
     TROCAR_ASSERT(ended.ok());
@@ -134,6 +144,8 @@ Truth record_session(const std::string& path, const RecordingOptions& options) {
       recorder.write(JournalTopic::SurfaceKey, frame, surface);
     }
     if (frame == options.claim_at) recorder.write_claim(frame);
+    if (options.stage_at > 0 && frame == options.stage_at) recorder.write_stage(frame, false);
+    if (options.stage_at > 0 && frame == options.stage_at + 100) recorder.write_stage(frame, true);
     truth.crc.push_back(wire::surface_crc(session.surface()));
     truth.epoch.push_back(topology.epoch());
     truth.triangles.push_back(triangles_of(session.layout()));

@@ -30,6 +30,7 @@ struct RecordingOptions {
   Frame cut_every = 0;  // every so many frames a blade changes the surface, as a server records it
   Frame claim_at = 0;   // a refusal in this frame
   Frame join_at = 0;    // from one participant to two
+  Frame stage_at = 0;   // a lesson's stage begins in this frame, and the lesson ends 100 later
   bool is_finished = true;
   journal::McapWriterOptions container;
   std::uint32_t protocol_major = kProtocolMajor;

@@ -1,8 +1,10 @@
 #include "client/replay/replay_source.h"
 
+#include <chrono>
 #include <cmath>
 #include <limits>
 #include <random>
+#include <thread>
 
 #include "tests/replay/recorded_session.h"
 
@@ -255,6 +257,24 @@ TEST_F(ReplaySourceTest, WhatTheReplicaCouldNotUseHealsAtTheNextKeyframe) {
     ASSERT_EQ(player.replica.newest()->frame, is_healing ? 20u : frame);
   }
   EXPECT_EQ(player.replica.counters().healed, 1u);
+}
+
+TEST_F(ReplaySourceTest, SaysWhichStageOfALessonWasOn) {
+  record({.frames = 400, .stage_at = 100});
+  Player player(path_);
+  player.step(0);
+  player.source->pause();
+  while (!player.source->story()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  for (const Frame frame : {150u, 250u, 50u, 100u, 99u, 200u}) {
+    player.source->seek(frame * kTicksPerFrame);
+    player.step(3);
+    ASSERT_TRUE(player.replica.fault().ok()) << player.replica.fault().error().message;
+    const auto& lesson = player.replica.lesson();
+    ASSERT_EQ(lesson.has_value(), frame >= 100) << frame;
+    if (!lesson) continue;
+    EXPECT_EQ(lesson->name, "Search");
+    EXPECT_EQ(lesson->is_over, frame >= 200) << frame;
+  }
 }
 
 TEST_F(ReplaySourceTest, ClosesOnRequestAndSwallowsWhatIsSent) {

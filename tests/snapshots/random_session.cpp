@@ -303,7 +303,7 @@ void RandomSession::count_state() {
   figures_.cut += !state.cuts.history().empty();
   figures_.after_a_tear += torn_m2_ > 0;
   figures_.self_contact += !state.self_contacts.nodes().empty();
-  figures_.mark += state.mark.is_set();
+  figures_.mark += state.marks.is_set();
   figures_.reduced += simulation_.context().report.solve.figures.is_reduced();
   bool has_cut = false, has_grasp = false, has_push = false;
   for (std::uint8_t i = 0; i < kMaxTools; ++i) {

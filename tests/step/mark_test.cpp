@@ -16,7 +16,8 @@ organ::Organ liver() {
 }
 
 // A blade along the top, 10 cm/s; and a hand that holds and lifts the end of a lobe.
-TickReport run_tick(Simulation& simulation, hands::MarkAction mark = hands::MarkAction::None) {
+TickReport run_tick(Simulation& simulation, hands::MarkAction mark = hands::MarkAction::None,
+                    std::uint8_t number = 0) {
   const Tick tick = simulation.current_tick() + 1;
   Vec3f top{0, -1, 0}, end{-1, 0, 0};
   for (const auto& p : simulation.organ().mesh.rest_positions) {
@@ -25,6 +26,7 @@ TickReport run_tick(Simulation& simulation, hands::MarkAction mark = hands::Mark
   }
   hands::TickInputs inputs;
   inputs.mark = mark;
+  inputs.mark_number = number;
   if (tick == 1)
     for (std::uint8_t hand = 0; hand < 2; ++hand) {
       hands::HandJoin join{.slot = {hand}};
@@ -75,6 +77,41 @@ TEST(Marks, BringBackShapeAndTopology) {
   run(simulation, 200);
   const auto valid = cutting::validate(simulation.state().cuts.topology());
   EXPECT_TRUE(valid.ok()) << valid.error().message;
+}
+
+TEST(Marks, StandSideBySideAndAreInSnapshots) {
+  Simulation simulation(liver());
+  run(simulation, 463);
+  const auto first = simulation.layout().triangles;
+  run_tick(simulation, hands::MarkAction::Set);
+  const auto with_one = simulation.state_hash();
+  run(simulation, 300);
+  const auto second = simulation.layout().triangles;
+  ASSERT_LT(first.size(), second.size());
+  run_tick(simulation, hands::MarkAction::Set, 2);
+  EXPECT_NE(simulation.state_hash(), with_one);
+  Bytes snapshot;
+  simulation.write_snapshot(snapshot);
+  run(simulation, 100);
+  run_tick(simulation, hands::MarkAction::Return);
+  EXPECT_EQ(simulation.layout().triangles, first);
+  run_tick(simulation, hands::MarkAction::Return, 2);
+  EXPECT_EQ(simulation.layout().triangles, second);
+  run_tick(simulation, hands::MarkAction::Return, 1);
+  EXPECT_FALSE(simulation.state().marks.is_set(1)) << "there is no such mark";
+
+  Simulation other(liver());
+  ASSERT_TRUE(other.restore_snapshot(snapshot).ok());
+  EXPECT_TRUE(other.state().marks.is_set(0) && other.state().marks.is_set(2));
+  run_tick(other, hands::MarkAction::Return);
+  EXPECT_EQ(other.layout().triangles, first);
+  run_tick(other, hands::MarkAction::Return, 2);
+  EXPECT_EQ(other.layout().triangles, second);
+  // Bytes that are cut short or wrong are no snapshot.
+  auto wrong = snapshot;
+  wrong[100] ^= 1;
+  EXPECT_FALSE(other.restore_snapshot(wrong).ok());
+  EXPECT_FALSE(other.restore_snapshot(BytesView(snapshot).first(snapshot.size() / 2)).ok());
 }
 
 // Clients follow a session with marks by what they are told: changes, and at a return the whole

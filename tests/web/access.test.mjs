@@ -8,7 +8,7 @@ import { base, close, kPatience, link, live, prepare, test, until, world } from 
 const { TROCAR_MODULES, TROCAR_PICTURES, TROCAR_WORK } = process.env;
 const kAxe = fs.readFileSync(createRequire(`${TROCAR_MODULES}/`).resolve('axe-core/axe.min.js'), 'utf8');
 const kTags = ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa', 'best-practice'];
-prepare(['--organ', 'liver'], ['--insecure-loopback', '--recordings', `${TROCAR_WORK}/recordings`]);
+prepare(['--lesson', 'along-the-line'], ['--insecure-loopback', '--recordings', `${TROCAR_WORK}/recordings`]);
 
 async function open(url, width = 1280, height = 720, colorScheme = 'dark') {
   const context = await world.browser.newContext({ viewport: { width, height }, colorScheme, hasTouch: width < 600 });
@@ -45,6 +45,7 @@ for (const scheme of ['dark', 'light'])
       await live(page);
       const hand = world.server.hand(`Sam ${size} ${scheme}`, 'palpate');
       await page.getByRole('button', { name: /Manage Sam/ }).click({ timeout: kPatience });
+      await page.getByRole('heading', { name: 'Cut along the line' }).waitFor({ timeout: kPatience });
       await check(page, name('lesson'));
       await page.getByRole('button', { name: 'End session' }).click();
       await check(page, name('asks'));

@@ -30,7 +30,7 @@ const picture = async (page, name) => { if (TROCAR_PICTURES) await page.screensh
 before(async () => {
   browser = await openBrowser();
   context = await browser.newContext({ viewport: { width: 1280, height: 720 } });
-  server = launch('trocar-server', ['--listen', '127.0.0.1:0', '--no-announce', '--organ', 'liver',
+  server = launch('trocar-server', ['--listen', '127.0.0.1:0', '--no-announce', '--lesson', 'follow-the-point',
     '--journal', `${TROCAR_WORK}/lesson.mcap`, '--ready-file', `${TROCAR_WORK}/server.port`]);
   server.port = await portOf(server, `${TROCAR_WORK}/server.port`);
   await until('join codes', () => /observer\s+\S{19}/.test(server.text));
@@ -54,15 +54,101 @@ test('a tool that is frozen stays, and goes back when it is released', kTest, as
   await manage('Sam', 'Freeze tools');
   await sees(olga, 'Ivy keeps the tools of Sam where they are');
   await olga.getByText('held still by Ivy').waitFor({ timeout: kPatience });
-  await sleep(500);
+  // The picture follows the frames, by however long.
+  const shown = () => olga.evaluate(() => window.trocar.replica.shownTick), passes = async ticks => {
+    const from = await olga.evaluate(() => window.trocar.replica.newestTick);
+    await until(`${ticks} ticks are shown`, async () => await shown() > from + ticks);
+  };
+  await passes(500);
   const frozen = await tip(olga);
-  await sleep(1500);
+  await passes(1500);
   assert.ok(apart(await tip(olga), frozen) < 1e-5, 'it moved while it was frozen');
   await picture(ivy, 'frozen');
   await manage('Sam', 'Release tools');
   await until('it moves again', async () => apart(await tip(olga), frozen) > 0.005);
   await manage('Sam', 'Take claim away');
   await sees(olga, 'Ivy has taken away what Sam holds');
+});
+
+const panel = page => page.getByRole('region', { name: 'Follow the point' });
+const says = (page, text) => panel(page).getByText(text).first().waitFor({ timeout: kPatience });
+const target = page => page.evaluate(() => window.trocar.replica.lessonTarget());
+
+test('the panel of the lesson says what to do, and an instructor leads through its stages', kTest, async () => {
+  for (const page of [ivy, olga]) {
+    await says(page, 'Stage 1 of 2');
+    await says(page, 'Keep the tip within the ring');
+    await says(page, /of 1:30/);
+    await says(page, /0\.3 N/);
+    await panel(page).getByRole('progressbar', { name: 'How far the goal is' }).waitFor({ timeout: kPatience });
+  }
+  const before = await target(olga);
+  await until('the point moves', async () => apart(await target(olga), before) > 0.002);
+  assert.equal(await panel(olga).getByRole('button').count(), 0);
+  await picture(olga, 'panel');
+  await press(ivy, 'Next stage');
+  await says(olga, 'Stage 2 of 2');
+  await says(olga, 'Along a line: not reached, 0 points');
+  const late = await openPage('observer', 'Late');
+  await live(late);
+  await says(late, 'Stage 2 of 2');
+  await late.evaluate(() => window.trocar.session.leave());
+  await late.close();
+  await sleep(1100);
+  await press(ivy, 'Restart lesson');
+  await press(ivy, 'Restart');
+  await says(olga, 'Stage 1 of 2');
+  for (const stage of ['Stage 2 of 2', 'The lesson is over: 0 of 100 points']) {
+    await sleep(1100);
+    await press(ivy, 'Next stage');
+    await says(olga, stage);
+  }
+  assert.equal(await target(olga), null);
+  await picture(olga, 'results');
+});
+
+test('time stands still for all, and goes slower', kTest, async () => {
+  const tick = page => page.evaluate(() => window.trocar.replica.newestTick);
+  assert.equal(await olga.getByRole('button', { name: 'Pause all' }).count(), 0);
+  await press(ivy, 'Pause all');
+  await olga.getByText('Ivy has paused the session.').first().waitFor({ timeout: kPatience });
+  await until('no more frames', async () => {
+    const then = await tick(olga);
+    await sleep(300);
+    return await tick(olga) === then;
+  });
+  const paused = await tick(olga);
+  const guest = await openPage('observer', 'Newcomer');
+  await live(guest);
+  await sees(olga, 'Newcomer has joined');
+  await sleep(1500);
+  assert.equal(await tick(olga), paused);
+  assert.equal(await olga.locator('.stage.old').count(), 0, 'the picture is as new as it can be');
+  await picture(ivy, 'paused');
+  await guest.evaluate(() => window.trocar.session.leave());
+  await guest.close();
+  await press(ivy, 'Go on');
+  await until('it goes on', async () => await tick(olga) > paused + 100);
+  await ivy.getByLabel('Time', { exact: true }).selectOption('0.25');
+  await olga.getByText('time at 25 %').waitFor({ timeout: kPatience });
+  await picture(ivy, 'slow');
+  await ivy.getByLabel('Time', { exact: true }).selectOption('1');
+  await olga.getByText('time at 25 %').waitFor({ state: 'detached', timeout: kPatience });
+});
+
+test('marks have names, and the organ returns to each', kTest, async () => {
+  for (const name of ['before', 'after']) {
+    await sleep(1100);
+    await press(ivy, 'Mark organ');
+    await ivy.getByRole('textbox', { name: 'Name, or nothing' }).fill(name);
+    await press(ivy, 'Mark');
+    await sees(olga, `the instructor has marked the organ as it is: "${name}"`);
+  }
+  await sleep(1100);
+  await ivy.getByLabel('Which mark').selectOption('after');
+  await press(ivy, 'Return to mark');
+  await press(ivy, 'Return');
+  await sees(olga, 'the instructor has returned the organ to the mark "after"');
 });
 
 test('lines and notes are read by all, and an observer has no other buttons', kTest, async () => {
@@ -147,6 +233,22 @@ test('the session ends in the instructor\'s words, and its recording verifies an
   await ivy.reload();
   await ivy.locator('input[type=file]').setInputFiles(`${TROCAR_WORK}/lesson.mcap`);
   await live(ivy);
-  for (const text of ['Ivy keeps the tools of Sam where they are', 'note by Ivy: Look at this cut later.', 'Ivy has ended the session']) await sees(ivy, text);
+  for (const text of ['Ivy keeps the tools of Sam where they are', 'note by Ivy: Look at this cut later.', 'Ivy has paused the session', 'the instructor has marked the organ as it is: "before"', 'Stage 2 of 2: In depth', 'Ivy has ended the session']) await sees(ivy, text);
+  // The panel says which stage was on at the time that is shown.
+  const at = async tick => ivy.evaluate(to => window.trocar.player.seek(to), tick);
+  const told = await ivy.evaluate(() => window.trocar.log.stages.map(({ tick, stage }) => ({ tick, name: stage.isOver ? 'over' : stage.stage + 1 })));
+  const stages = told.filter((one, i) => one.name !== told[i - 1]?.name); // a hint is told, too
+  assert.deepEqual(stages.map(one => one.name), [1, 2, 1, 2, 'over']);
+  await at(stages[3].tick + 50);
+  await says(ivy, 'Stage 2 of 2');
+  await until('a point', async () => await target(ivy) !== null);
+  await at(stages[2].tick + 50);
+  await says(ivy, 'Stage 1 of 2');
+  await at(stages[4].tick + 50);
+  await says(ivy, 'The lesson is over');
+  await until('no point', async () => await target(ivy) === null);
+  await at(0);
+  await panel(ivy).waitFor({ state: 'detached', timeout: kPatience });
+  await picture(ivy, 'debrief');
   assert.deepEqual(ivy.faults, []);
 });

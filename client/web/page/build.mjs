@@ -10,21 +10,22 @@ const [root, out, wasm] = process.argv.slice(2);
 if (!wasm) throw new Error('usage: node build.mjs SOURCE_ROOT OUT_FOLDER REPLICA_WASM');
 
 // The native client's own GLSL, so that both pictures look alike.
-function extractShaders(header, to) {
-  const text = fs.readFileSync(header, 'utf8');
+function extractShaders(headers, to) {
+  const text = headers.map(header => fs.readFileSync(header, 'utf8')).join('\n');
   const take = name => {
     const found = text.match(new RegExp(`k${name} = R"\\(([\\s\\S]*?)\\)";`));
-    if (!found) throw new Error(`${header}: has no ${name}`);
+    if (!found) throw new Error(`${headers.join(', ')}: no ${name}`);
     return found[1].replace('#version 330 core\n', '');
   };
-  const names = ['LightingSource', 'OrganVertexSource', 'OrganFragmentSource', 'ToolVertexSource', 'ToolFragmentSource'];
+  const names = ['LightingSource', 'OrganVertexSource', 'OrganFragmentSource', 'ToolVertexSource', 'ToolFragmentSource',
+    'FieldVertexSource', 'FieldFragmentSource', 'ScopeMaskSource'];
   const lines = names.map(name => `export const ${name[0].toLowerCase()}${name.slice(1)} = ${JSON.stringify(take(name))};`);
   fs.writeFileSync(to, lines.join('\n') + '\n');
 }
 
 fs.rmSync('src/gen', { recursive: true, force: true });
 fs.mkdirSync('src/gen', { recursive: true });
-extractShaders(path.join(root, 'client/render/shader_sources.h'), 'src/gen/shaders.ts');
+extractShaders(['shader_sources.h', 'field_source.h'].map(name => path.join(root, 'client/render', name)), 'src/gen/shaders.ts');
 execFileSync('protoc', [`--proto_path=${root}`, '--plugin=protoc-gen-es=node_modules/.bin/protoc-gen-es',
   '--es_out=src/gen', '--es_opt=target=ts', 'proto/wire.proto', 'proto/journal.proto'], { stdio: 'inherit' });
 execFileSync('node_modules/.bin/tsc', ['--noEmit'], { stdio: 'inherit' });

@@ -45,6 +45,7 @@ shape::Colour colour_of(std::uint32_t rgb) {
 }
 
 std::size_t mesh_count = 0;
+std::array<float, 11> lens_figures{};
 
 const void* hand_out(const shape::MeshVertices& mesh) {
   mesh_count = mesh.size();
@@ -59,7 +60,7 @@ TROCAR_EXPORT(restart) void trocar_restart() {
 // Null: a message of that size is refused.
 TROCAR_EXPORT(input) std::uint8_t* trocar_input(std::size_t bytes) {
   if (bytes > kMostInput) return nullptr;
-  if (input_bytes.size() < bytes) input_bytes.resize(bytes);
+  if (input_bytes.size() <= bytes) input_bytes.resize(bytes + 1);  // a message may be empty
   return input_bytes.data();
 }
 TROCAR_EXPORT(receive) int trocar_receive(std::size_t bytes, double now_ms) {
@@ -140,6 +141,9 @@ TROCAR_EXPORT(positions_at) const void* trocar_positions_at() {
 TROCAR_EXPORT(normals_at) const void* trocar_normals_at() {
   return model().surface().normals().data();
 }
+TROCAR_EXPORT(lips_at) const void* trocar_lips_at() {
+  return model().surface().lips().data();
+}
 TROCAR_EXPORT(rest_at) const void* trocar_rest_at() {
   return model().rest().data();
 }
@@ -159,6 +163,9 @@ TROCAR_EXPORT(pointers_at) const void* trocar_pointers_at() {
   return model().pointers().data();
 }
 
+TROCAR_EXPORT(lesson_target) const float* trocar_lesson_target() {
+  return model().lesson_target();
+}
 // Vertices of all that is drawn; then mesh_vertices() says how many.
 TROCAR_EXPORT(drawing_at) const void* trocar_drawing_at() {
   return hand_out(model().drawing());
@@ -192,6 +199,25 @@ TROCAR_EXPORT(jaw_seconds)
 float trocar_jaw_seconds(std::uint32_t form, std::uint32_t verb, bool has_claim) {
   return shape::jaw_motion(static_cast<tool::Form>(form), static_cast<tool::Verb>(verb), has_claim)
       .seconds;
+}
+// Eye, forward and up, the tangent of half the angle of view, and 1 if it is an endoscope.
+TROCAR_EXPORT(lens) const float* trocar_lens(int slot, float radius_m, std::uint32_t form) {
+  tool::ToolShape shape;
+  shape.radius_m = radius_m;
+  shape.form = static_cast<tool::Form>(form);
+  const auto lens = model().lens_of(static_cast<std::uint8_t>(slot), shape);
+  lens_figures = {lens.eye.x,
+                  lens.eye.y,
+                  lens.eye.z,
+                  lens.forward.x,
+                  lens.forward.y,
+                  lens.forward.z,
+                  lens.up.x,
+                  lens.up.y,
+                  lens.up.z,
+                  lens.tan_half_height,
+                  lens.is_endoscope ? 1.0f : 0.0f};
+  return lens_figures.data();
 }
 TROCAR_EXPORT(make_arrow)
 const void* trocar_make_arrow(float length_m, float radius_m, std::uint32_t colour) {

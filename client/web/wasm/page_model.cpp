@@ -95,6 +95,9 @@ bool PageModel::receive_bare(std::uint32_t field, BytesView message, double now_
     case proto::Envelope::kDrawingFieldNumber:
       is_parsed = parse(envelope.mutable_drawing());
       break;
+    case proto::Envelope::kLessonStageFieldNumber:
+      is_parsed = parse(envelope.mutable_lesson_stage());
+      break;
     case proto::Envelope::kPointEventFieldNumber:
       is_parsed = parse(envelope.mutable_point_event());
       break;
@@ -120,11 +123,10 @@ void PageModel::build_surface(std::size_t triangle_budget) {
   built_budget_ = triangle_budget;
   ++geometry_version_;
   rest_.resize(smooth_.vertex_count());
+  smooth_.measure_rim(shape::kDeepMetres, rim_distances_);
   for (std::size_t i = 0; i < rest_.size(); ++i) {
     const Vec3f& p = smooth_.positions()[i];
-    const float side =
-        static_cast<float>(smooth_.is_wound()[i]) - static_cast<float>(smooth_.is_rim()[i]);
-    rest_[i] = {p.x, p.y, p.z, side};
+    rest_[i] = {p.x, p.y, p.z, shape::rim_of(rim_distances_[i], smooth_.is_wound()[i] != 0)};
   }
 }
 
@@ -204,6 +206,15 @@ void PageModel::update_drawing() {
   }
 }
 
+const float* PageModel::lesson_target() {
+  const auto& lesson = replica_->lesson();
+  const auto* newest = replica_->newest();
+  const auto target = lesson && newest != nullptr ? lesson->target_m(newest->tick) : std::nullopt;
+  if (!target) return nullptr;
+  target_ = {target->x, target->y, target->z};
+  return target_.data();
+}
+
 const float* PageModel::attach(const Vec3f& place) {
   const auto& topology = replica_->topology();
   if (shown_->positions().size() != topology.rest_positions.size()) return nullptr;
@@ -233,6 +244,13 @@ const shape::MeshVertices& PageModel::make_tool(const tool::ToolShape& shape,
                                                 shape::Colour colour) {
   instrument_ = shape::make_instrument(shape, colour);
   return instrument_.body;
+}
+
+shape::Lens PageModel::lens_of(std::uint8_t slot, const tool::ToolShape& shape) const {
+  Pose world_from_tool;
+  for (const auto& tool : shown_->tools())
+    if (tool.slot.value == slot) world_from_tool = tool.world_from_proxy;
+  return shape::lens_of(world_from_tool, shape);
 }
 
 const shape::MeshVertices& PageModel::make_arrow(float length, float radius, shape::Colour colour) {

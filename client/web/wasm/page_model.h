@@ -19,6 +19,7 @@
 #include "client/replica/interpolated_surface.h"
 #include "client/replica/replica.h"
 #include "client/shape/instrument_mesh.h"
+#include "client/shape/lens.h"
 #include "client/shape/ribbon.h"
 #include "client/shape/smooth_surface.h"
 #include "client/shape/tool_mesh.h"
@@ -74,12 +75,14 @@ class PageModel {
   // Changes with the number and the order of vertices and triangles.
   std::uint64_t geometry_version() const { return geometry_version_; }
   const shape::SmoothSurface& surface() const { return smooth_; }
-  // x, y, z at rest, and 1 on faces that a blade made, -1 on their rim outside, else 0.
+  // Returns x, y, z at rest, and shape::rim_of.
   std::span<const std::array<float, 4>> rest() const { return rest_; }
   std::span<const std::array<std::uint8_t, 4>> overlay() const { return overlay_; }
   std::span<const PageTool> tools() const { return tools_; }
   std::span<const PagePointer> pointers() const { return pointers_; }
 
+  // Returns where the point is that a lesson's hands follow, x, y, z in m; null: there is none.
+  const float* lesson_target();
   // All that is drawn on the organ, as one mesh in the world frame.
   const shape::MeshVertices& drawing() const { return drawing_; }
   // The triangle number and the two weights with which the server is told of a place on the
@@ -91,6 +94,8 @@ class PageModel {
   // Returns that of the tool that was made last.
   const shape::MeshVertices& jaw() const { return instrument_.jaw; }
   float hinge_m() const { return instrument_.hinge_m; }
+  // Returns how somebody sees with the tool in that slot, where it is shown now.
+  shape::Lens lens_of(std::uint8_t slot, const tool::ToolShape& shape) const;
   const shape::MeshVertices& make_arrow(float length, float radius, shape::Colour colour);
 
  private:
@@ -108,13 +113,14 @@ class PageModel {
   std::uint64_t built_version_ = 0, geometry_version_ = 0;
   std::size_t built_budget_ = 0;
   std::vector<std::array<float, 4>> rest_;
+  std::vector<float> rim_distances_;
   std::vector<std::array<float, 4>> tints_;  // colour weighted by the fourth
   std::vector<std::array<std::uint8_t, 4>> overlay_;
   std::vector<PageTool> tools_;
   std::vector<PagePointer> pointers_;
   replica::DrawnLines lines_;
   std::vector<shape::RibbonPoint> ribbon_;
-  std::array<float, 3> attached_{};
+  std::array<float, 3> attached_{}, target_{};
   shape::MeshVertices mesh_, drawing_;
   shape::InstrumentMesh instrument_;
   Bytes outbox_;

@@ -14,26 +14,32 @@ class Pacer {
  public:
   explicit Pacer(std::uint64_t now_ns) : due_ns_(now_ns) {}
 
+  // From now on ticks come at this rate of real time, over 0; nothing is to be caught up with.
+  void restart(std::uint64_t now_ns, float rate) {
+    due_ns_ = now_ns;
+    period_ns_ = static_cast<std::uint64_t>(static_cast<float>(kTickNanoseconds) / rate);
+  }
+
   // Returns the absolute time of the next tick.
   std::uint64_t due_ns() const { return due_ns_; }
 
   // The next tick begins at `now_ns` >= due_ns().
   void begin_tick(std::uint64_t now_ns) {
-    const std::uint64_t due_count = (now_ns - due_ns_) / kTickNanoseconds + 1;
+    const std::uint64_t due_count = (now_ns - due_ns_) / period_ns_ + 1;
     if (due_count > kBackToBack) {
       slow_ticks_ += due_count - kBackToBack;
-      due_ns_ += (due_count - kBackToBack) * kTickNanoseconds;
+      due_ns_ += (due_count - kBackToBack) * period_ns_;
     }
-    due_ns_ += kTickNanoseconds;
+    due_ns_ += period_ns_;
   }
 
-  // Ticks by which simulated time has fallen behind real time.
+  // Ticks by which simulated time has fallen behind real time at that rate.
   std::uint64_t slow_ticks() const { return slow_ticks_; }
 
  private:
   static constexpr std::uint64_t kBackToBack = 2;
 
-  std::uint64_t due_ns_;
+  std::uint64_t due_ns_, period_ns_ = kTickNanoseconds;
   std::uint64_t slow_ticks_ = 0;
 };
 

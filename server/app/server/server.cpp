@@ -43,6 +43,7 @@ using std::chrono::milliseconds;
 constexpr milliseconds kBarrierDeadline{2000};
 constexpr milliseconds kGoodbyeDeadline{2500};  // a little more than the flush deadline
 constexpr milliseconds kPollPeriod{5};
+constexpr milliseconds kAttentionPeriod{50};
 // Slower than this is said in the log, once in a while.
 constexpr float kSlowTimeRate = 0.98f;
 constexpr float kLongTickMs = 0.9f;
@@ -82,6 +83,7 @@ class Server {
   void show_ghost(std::shared_ptr<const ghost::GhostReport> report);
   void warn_if_slow();
   void on_signal(int signal);
+  void attend();
   void begin_end();
   // Calls `then` when `is_done` holds, at the latest after `deadline`.
   void wait_for(std::function<bool()> is_done, milliseconds deadline, std::function<void()> then);
@@ -97,7 +99,7 @@ class Server {
   participants::SimulationInbox inbox_;
   asio::io_context io_{1};
   asio::signal_set signals_{io_};
-  asio::steady_timer poll_{io_};
+  asio::steady_timer poll_{io_}, attention_{io_};
   std::unique_ptr<net::TcpServer> tcp_;
   std::unique_ptr<guests::GuestConnections> connections_;  // all of them, guests as well
   std::unique_ptr<discovery::Announcer> announcer_;        // null: the session is not announced
@@ -107,7 +109,7 @@ class Server {
   std::atomic<std::shared_ptr<const ghost::GhostReport>> ghost_report_;  // the newest; null: taken
   std::vector<replication::BarrierResult> barrier_;
   std::string goodbye_ = "the session is over";
-  bool is_ending_ = false;
+  bool is_ending_ = false, is_paused_ = false;
   Tick next_warning_ = 0;
   double wall_seconds_ = 0;
   std::unique_ptr<SimulationLoop> loop_;  // its thread uses what stands above
@@ -169,6 +171,11 @@ Status Server::open() {
   replication.on_end_wanted = [this](const std::string& words) {
     goodbye_ = words;
     loop_->request_stop();
+  };
+  replication.on_pace = [this](float rate) {
+    loop_->set_rate(rate);
+    is_paused_ = rate == 0;
+    if (is_paused_) attend();
   };
   if (reduction_)
     replication.on_ghost_wanted = [this](bool is_wanted) { ghost_->set_wanted(is_wanted); };
@@ -289,6 +296,16 @@ Status Server::run() {
   wall_seconds_ = static_cast<double>(monotonic_ns() - begin) * 1e-9;
   const Status finished = finish();
   return ran.ok() ? finished : ran;
+}
+
+// While no frames come, people come and go all the same.
+void Server::attend() {
+  attention_.expires_after(kAttentionPeriod);
+  attention_.async_wait([this](boost::system::error_code error) {
+    if (error || !is_paused_ || is_ending_) return;
+    replicator_->attend();
+    attend();
+  });
 }
 
 void Server::on_signal(int signal) {

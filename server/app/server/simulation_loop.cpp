@@ -13,6 +13,7 @@ namespace {
 constexpr Tick kSnapshotPeriod = 10'000;
 constexpr Tick kSnapshotPhase = kTicksPerFrame / 2;
 constexpr unsigned long kTimerSlackNs = 1000;
+constexpr std::uint64_t kPauseNapNs = 5'000'000;
 
 void sleep_until(std::uint64_t monotonic) {
   const timespec until{static_cast<time_t>(monotonic / 1'000'000'000),
@@ -110,7 +111,18 @@ void SimulationLoop::run() {
   prctl(PR_SET_TIMERSLACK, kTimerSlackNs, 0, 0, 0);
   Pacer pacer(monotonic_ns());
   bool is_last = false;
+  float paced = 1;
   while (!is_last) {
+    const bool is_stopping = is_stop_requested_.load(std::memory_order_relaxed);
+    const float rate = is_stopping ? 1.0f : rate_.load(std::memory_order_relaxed);
+    const bool is_shown = publishes_frame(simulation_.current_tick());
+    if (rate == 0 && is_shown) {
+      inbox_.gather();
+      sleep_until(monotonic_ns() + kPauseNapNs);
+      paced = 0;
+      continue;
+    }
+    if (rate != paced && rate > 0) pacer.restart(monotonic_ns(), paced = rate);
     sleep_until(pacer.due_ns());
     const auto now = monotonic_ns();
     lateness_ns_ = now - pacer.due_ns();

@@ -99,6 +99,9 @@ class SimulationLoop {
   // Asks for a snapshot soon, in a frame; any thread may call it.
   void request_snapshot() { is_snapshot_requested_.store(true, std::memory_order_relaxed); }
   void request_stop() { is_stop_requested_.store(true, std::memory_order_relaxed); }  // any thread
+  // Simulated time over real time, for ticks to come; 0: none comes after the next frame, until the
+  // rate is another or the loop is to end. Any thread.
+  void set_rate(float rate) { rate_.store(rate, std::memory_order_relaxed); }
   // Ends the loop at its next frame and waits for that.
   void stop();
   // After `ended` was called, or stop(), or start() never was.
@@ -119,6 +122,7 @@ class SimulationLoop {
   const LoopOptions options_;
   const std::function<void()> ended_;
   std::atomic<bool> is_stop_requested_{false}, is_snapshot_requested_{false};
+  std::atomic<float> rate_{1};
 
   // Simulation thread.
   std::optional<control::RateController> controller_;

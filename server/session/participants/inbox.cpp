@@ -43,8 +43,26 @@ void SimulationInbox::push_sample(const hands::ToolInput& input) {
 }
 
 void SimulationInbox::drain(hands::TickInputs& inputs) {
+  gather();
   inputs.clear();
-  inputs.mark = mark_.exchange(hands::MarkAction::None, std::memory_order_relaxed);
+  const auto mark = mark_.exchange(Mark{}, std::memory_order_relaxed);
+  inputs.mark = mark.action;
+  inputs.mark_number = mark.number;
+  for (std::uint8_t slot = 0; slot < kMaxHands; ++slot) {
+    auto& change = changes_[slot];
+    if (change.leaves) inputs.leaves.push_back({slot});
+    if (change.join) inputs.joins.push_back(*change.join);
+    change = {};
+  }
+  for (std::uint8_t tool = 0; tool < kMaxTools; ++tool) {
+    if (tool_changes_[tool]) inputs.changes.push_back(*tool_changes_[tool]);
+    tool_changes_[tool].reset();
+    if (samples_[tool]) inputs.samples.push_back(*samples_[tool]);
+    samples_[tool].reset();
+  }
+}
+
+void SimulationInbox::gather() {
   for (std::size_t taken = 0; taken < kCapacity; ++taken) {
     const auto item = queue_.try_pop();
     if (!item) break;
@@ -70,18 +88,6 @@ void SimulationInbox::drain(hands::TickInputs& inputs) {
     } else if (const auto* input = std::get_if<hands::ToolInput>(&*item)) {
       samples_[input->tool.value] = *input;
     }
-  }
-  for (std::uint8_t slot = 0; slot < kMaxHands; ++slot) {
-    auto& change = changes_[slot];
-    if (change.leaves) inputs.leaves.push_back({slot});
-    if (change.join) inputs.joins.push_back(*change.join);
-    change = {};
-  }
-  for (std::uint8_t tool = 0; tool < kMaxTools; ++tool) {
-    if (tool_changes_[tool]) inputs.changes.push_back(*tool_changes_[tool]);
-    tool_changes_[tool].reset();
-    if (samples_[tool]) inputs.samples.push_back(*samples_[tool]);
-    samples_[tool].reset();
   }
 }
 

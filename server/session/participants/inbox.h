@@ -39,9 +39,14 @@ class SimulationInbox {
   [[nodiscard]] bool try_push_change(const hands::ToolChange& change);
   void push_sample(const hands::ToolInput& input);
   // If two marks arrive before a drain, the newer one counts.
-  void push_mark(hands::MarkAction action) { mark_.store(action, std::memory_order_relaxed); }
+  void push_mark(hands::MarkAction action, std::uint8_t number = 0) {
+    mark_.store({action, number}, std::memory_order_relaxed);
+  }
   const Counters& counters() const { return counters_; }
 
+  // Simulation thread. While no tick comes: takes what is queued, so that there is room; the next
+  // drain() gives it.
+  void gather();
   // Simulation thread. Replaces the content of `inputs`; at most kCapacity items per call.
   void drain(hands::TickInputs& inputs);
 
@@ -53,7 +58,11 @@ class SimulationInbox {
 
   SpscQueue<Item> queue_{kCapacity};
   std::atomic<std::size_t> pending_{0};  // never less than what is in queue_
-  std::atomic<hands::MarkAction> mark_{hands::MarkAction::None};
+  struct Mark {
+    hands::MarkAction action = hands::MarkAction::None;
+    std::uint8_t number = 0;
+  };
+  std::atomic<Mark> mark_{Mark{}};
   std::size_t joined_hands_ = 0;  // I/O thread
   Counters counters_;             // I/O thread
 

@@ -64,6 +64,13 @@ void OverviewBuilder::add_lesson(const proto::TeachEvent& event) {
   if (has_room(event.ByteSizeLong())) *overview_.add_lesson() = event;
 }
 
+void OverviewBuilder::add_stage(Tick tick, const proto::LessonStage& stage) {
+  if (!has_room(stage.ByteSizeLong())) return;
+  auto& entry = *overview_.add_stage();
+  entry.set_tick(tick);
+  *entry.mutable_stage() = stage;
+}
+
 void OverviewBuilder::add_frame(const step::PublishedFrame& frame,
                                 const participants::Roster& roster) {
   for (const auto& event : frame.claim_events) {

@@ -34,6 +34,7 @@ class OverviewBuilder {
   void add_presence(Tick tick, const proto::Participants& present);
   void add_gap(const proto::JournalGap& gap);
   void add_lesson(const proto::TeachEvent& event);
+  void add_stage(Tick tick, const proto::LessonStage& stage);
   // The gap ends behind the open bin: take() it, and skip_to() the gap's last tick.
   bool is_behind(Tick tick) const { return tick >= bin_end_; }
   void skip_to(Tick tick);

@@ -217,6 +217,7 @@ Status Recorder::write_lesson(const QueuedLesson& lesson) {
   proto::LessonRecord record;
   record.ParseFromArray(message.data(), static_cast<int>(message.size()));
   if (record.has_teach()) overview_.add_lesson(record.teach());
+  if (record.has_stage()) overview_.add_stage(written, record.stage());
   if (lesson.left_out == 0)
     return writer_->write(journal::JournalTopic::Lesson, written, utc_ns(), message);
   record.set_left_out(lesson.left_out);

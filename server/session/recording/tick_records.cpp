@@ -54,6 +54,7 @@ void to_message(const step::TickRecord& record, const step::TickDecisions* previ
     }
   }
   message.set_mark(static_cast<proto::MarkAction>(record.inputs.mark));
+  message.set_mark_number(record.inputs.mark_number);
   for (const auto slot : record.inputs.leaves) message.add_leave()->set_slot(slot.value);
   for (const auto& join : record.inputs.joins) {
     auto& entry = *message.add_join();
@@ -115,7 +116,10 @@ Status from_message(const proto::TickRecord& message, step::TickRecord& record) 
   }
   if (message.mark() < 0 || message.mark() > proto::MARK_RETURN)
     return bad(record.tick, "unknown mark");
+  if (message.mark_number() >= hands::kMostMarks)
+    return bad(record.tick, "mark_number: there are marks 0 to 3");
   record.inputs.mark = static_cast<hands::MarkAction>(message.mark());
+  record.inputs.mark_number = static_cast<std::uint8_t>(message.mark_number());
   for (const auto& leave : message.leave()) {
     if (leave.slot() >= kMaxHands) return bad(record.tick, "leave: slot out of range");
     record.inputs.leaves.push_back({static_cast<std::uint8_t>(leave.slot())});

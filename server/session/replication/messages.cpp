@@ -220,34 +220,29 @@ wire::SharedBytes encode_claim_event(const hands::ClaimEvent& event,
   return wire::encode_envelope(envelope);
 }
 
-namespace {
-
-wire::SharedBytes encode_mark_event(const step::MarkEvent& event, const char* text) {
-  proto::Envelope envelope;
-  auto& message = *envelope.mutable_mark_event();
+void describe(const step::MarkEvent& event, const std::string& name, proto::MarkEvent& message) {
+  const bool is_return = event.action == hands::MarkAction::Return;
   message.set_tick(event.tick);
   message.set_action(static_cast<proto::MarkAction>(event.action));
   message.set_is_done(event.is_done);
-  message.set_text(text);
+  message.set_name(name);
+  const std::string end = name.empty() ? "" : " \"" + name + "\"";
+  message.set_text(!event.is_done ? "there is no mark to return to: set one first"
+                   : is_return    ? "the instructor has returned the organ to the mark" + end
+                   : name.empty() ? "the instructor has marked the organ as it is"
+                                  : "the instructor has marked the organ as it is:" + end);
+}
+
+wire::SharedBytes encode_mark_refusal(hands::MarkAction action, Tick tick, const std::string& name,
+                                      const std::string& why) {
+  proto::Envelope envelope;
+  auto& message = *envelope.mutable_mark_event();
+  message.set_tick(tick);
+  message.set_action(static_cast<proto::MarkAction>(action));
+  message.set_name(name);
+  const bool is_return = action == hands::MarkAction::Return;
+  message.set_text((is_return ? "not returned to the mark: " : "not marked: ") + why);
   return wire::encode_envelope(envelope);
-}
-
-}  // namespace
-
-wire::SharedBytes encode_mark_event(const step::MarkEvent& event) {
-  const bool is_return = event.action == hands::MarkAction::Return;
-  return encode_mark_event(event, !event.is_done ? "there is no mark to return to: set one first"
-                                  : is_return ? "the instructor has returned the organ to the mark"
-                                              : "the instructor has marked the organ as it is");
-}
-
-wire::SharedBytes encode_early_mark(hands::MarkAction action, Tick tick) {
-  return encode_mark_event(
-      {tick, action, false},
-      action == hands::MarkAction::Return
-          ? "not returned to the mark: less than a second after the last "
-            "request, ask again"
-          : "not marked: less than a second after the last request, ask again");
 }
 
 wire::SharedBytes encode_ghost(const ghost::GhostReport& report) {

@@ -50,9 +50,11 @@ wire::SharedBytes encode_frame_state(const step::PublishedFrame& frame);
 std::string encode_frame_state_body(const step::PublishedFrame& frame);
 wire::SharedBytes encode_claim_event(const hands::ClaimEvent& event,
                                      const participants::Roster& roster);
-wire::SharedBytes encode_mark_event(const step::MarkEvent& event);
-// To who asked too soon after another request; nothing has been done.
-wire::SharedBytes encode_early_mark(hands::MarkAction action, Tick tick);
+// `name`: of the mark; empty: it has none.
+void describe(const step::MarkEvent& event, const std::string& name, proto::MarkEvent& message);
+// To who asked; nothing has been done.
+wire::SharedBytes encode_mark_refusal(hands::MarkAction action, Tick tick, const std::string& name,
+                                      const std::string& why);
 wire::SharedBytes encode_ghost(const ghost::GhostReport& report);
 // The message says that there is no ghost in this session.
 wire::SharedBytes encode_no_ghost();

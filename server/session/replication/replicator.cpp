@@ -230,7 +230,7 @@ std::optional<Replicator::Ending> Replicator::handle_message(Client& client, Byt
       note_answer(client.participant->slot, envelope.frame_ack());
       return std::nullopt;
     case proto::Envelope::kMarkRequest:
-      return handle_mark(client, envelope.mark_request().action());
+      return handle_mark(client, envelope.mark_request());
     case proto::Envelope::kPointRequest:
       return handle_point(client, envelope.point_request());
     case proto::Envelope::kStrokeRequest:
@@ -466,7 +466,7 @@ void Replicator::publish(std::span<const step::SharedFrame> frames) {
   put_out_revoked();
   Status followed;
   for (const auto& frame : frames) {
-    for (const auto& event : frame->mark_events) broadcast(encode_mark_event(event));
+    for (const auto& event : frame->mark_events) note_mark(event);
     if (frame->new_layout) replace_surface(*frame->new_layout, frame->frame);
     for (const auto& event : frame->claim_events) broadcast(encode_claim_event(event, roster_));
     if (frame->change && followed.ok()) followed = change_surface(*frame->change);
@@ -487,6 +487,15 @@ void Replicator::publish(std::span<const step::SharedFrame> frames) {
     if (client->participant) give_touch(*client);
     give_frame(*client, false);
   }
+  settle_participants();
+}
+
+void Replicator::attend() {
+  end_absences(options_.clock_ns());
+  put_out_revoked();
+  if (encoder_.current() && !barrier_)
+    for (const auto& [id, client] : clients_)
+      if (client->listens()) give_frame(*client, false);
   settle_participants();
 }
 

@@ -72,6 +72,7 @@ class HandReport;
 class Hello;
 class LessonRecord;
 class LessonRequest;
+class MarkRequest;
 class PointRequest;
 class StrokeRequest;
 class TeachEvent;
@@ -111,6 +112,9 @@ class Replicator final : public net::ConnectionHandler {
   void publish(std::span<const step::SharedFrame> frames);
 
   void publish(const ghost::GhostReport& report);
+
+  // While no frame comes: sees to people, and gives the newest frame to who lacks it.
+  void attend();
 
   // Everybody is told of another status at once, of more missing frames at most once a second; who
   // joins is told what it is.
@@ -173,7 +177,13 @@ class Replicator final : public net::ConnectionHandler {
                                       bool is_ordered);
   std::optional<Ending> handle_datagram(Client& client, const proto::ClientDatagram& datagram);
   std::optional<Ending> handle_hand_report(Client& client, const proto::HandReport& report);
-  std::optional<Ending> handle_mark(Client& client, int action);
+  std::optional<Ending> handle_mark(Client& client, const proto::MarkRequest& request);
+  // Tells everybody, and the recording, what became of a mark.
+  void note_mark(const step::MarkEvent& event);
+  wire::SharedBytes mark_list() const;
+  wire::SharedBytes pace_message() const;
+  // Holds all tools, or lets them go on unless an instructor holds them; tells everybody.
+  void set_pace(const std::string& by);
   void handle_ghost_request(Client& client, bool is_wanted);
   std::optional<Ending> handle_tool_change(Client& client, const proto::ToolChange& change);
   std::optional<Ending> handle_point(Client& client, const proto::PointRequest& request);
@@ -246,6 +256,12 @@ class Replicator final : public net::ConnectionHandler {
       .status = wire::RecordingStatus::Off, .frames_missing = 0, .text = {}};
   std::uint64_t recording_told_ns_ = 0;
   std::optional<std::uint64_t> last_mark_ns_;
+  std::array<std::string, hands::kMostMarks> mark_names_;  // that of the first is empty
+  std::array<bool, hands::kMostMarks> is_marked_{};
+  bool is_mark_pending_ = false;  // the simulation has not said yet what became of it
+  float rate_ = 1;                // of time, before it was paused
+  bool is_paused_ = false;
+  std::string paced_by_;
   participants::HeldTools held_tools_;
   access::Door door_;
   DrawingBoard board_;

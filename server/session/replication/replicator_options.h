@@ -40,6 +40,8 @@ struct ReplicatorOptions {
   std::function<void(wire::LessonEntry)> on_lesson;
   // Told, in words, that an instructor wants the session to end; empty: nobody can.
   std::function<void(const std::string& words)> on_end_wanted;
+  // Told how fast time is to go, simulated over real time, 0: not at all; empty: nobody can say.
+  std::function<void(float rate)> on_pace;
   std::optional<lesson::Lesson> lesson;      // empty: the session gives none
   std::vector<wire::HapticLaw> haptic_laws;  // how the organ answers tools, for hands that feel it
   bool has_datagrams = false;                // the transport takes them; clients are told

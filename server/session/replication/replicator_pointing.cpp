@@ -134,6 +134,9 @@ std::optional<Replicator::Ending> Replicator::handle_view(Client& client,
 }
 
 bool Replicator::show_lesson(Client& client) {
+  const bool is_as_usual = !is_paused_ && rate_ == 1 && paced_by_.empty();
+  if (!is_as_usual && !send(client, pace_message())) return false;
+  if (std::ranges::count(is_marked_, true) > 0 && !send(client, mark_list())) return false;
   if (!board_.strokes().empty()) {
     proto::Envelope event;
     describe_drawing(*event.mutable_drawing());

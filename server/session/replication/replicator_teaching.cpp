@@ -2,6 +2,7 @@
 // with their tools, and about what people say.
 
 #include <algorithm>
+#include <cstdio>
 
 #include "common/base/log.h"
 #include "common/base/printable.h"
@@ -13,8 +14,6 @@
 
 namespace trocar::replication {
 namespace {
-
-constexpr std::uint64_t kLeastMarkGapNs = 1'000'000'000;
 
 // Makes the line that everybody reads. `who`: whom it is about, where it is about one.
 std::string words_of(const TeachOrder& order, const std::string& by, const std::string& who) {
@@ -47,6 +46,16 @@ std::string words_of(const TeachOrder& order, const std::string& by, const std::
       return by + " has ended the view to follow";
     case TeachAction::Wipe:
       return by + " has wiped the drawing";
+    case TeachAction::Pause:
+      return by + " has paused the session";
+    case TeachAction::GoOn:
+      return by + " lets the session go on";
+    case TeachAction::Slow: {
+      char share[32];
+      std::snprintf(share, sizeof share, "%.0f %%", 100 * static_cast<double>(order.rate));
+      return order.rate < 1 ? by + " has slowed time down to " + share
+                            : by + " lets time go as fast as it does";
+    }
     case TeachAction::None:
       break;
   }
@@ -54,29 +63,6 @@ std::string words_of(const TeachOrder& order, const std::string& by, const std::
 }
 
 }  // namespace
-
-std::optional<Replicator::Ending> Replicator::handle_mark(Client& client, int action) {
-  const auto role = client.participant->role;
-  if (!wire::rights_of(role).may_mark)
-    return Ending{EndReason::Role,
-                  std::string("MarkRequest: marks are the instructor's, not of an ") +
-                      participants::name_of(role)};
-  if (action != proto::MARK_SET && action != proto::MARK_RETURN)
-    return Ending{EndReason::ProtocolError, "MarkRequest.action: " + std::to_string(action) +
-                                                " is not 1 (set) or 2 (return)"};
-  const auto wanted = static_cast<hands::MarkAction>(action);
-  // Returning takes the simulation as long as beginning: what comes too soon is refused.
-  const auto now = options_.clock_ns();
-  if (last_mark_ns_ && now - *last_mark_ns_ < kLeastMarkGapNs) {
-    send(client, encode_early_mark(wanted, newest_tick()));
-    return std::nullopt;
-  }
-  last_mark_ns_ = now;
-  if (options_.gate)
-    options_.gate->note_action(client.applicant, action == proto::MARK_SET ? "mark" : "return");
-  inbox_.push_mark(wanted);
-  return std::nullopt;
-}
 
 std::optional<Replicator::Ending> Replicator::handle_teach(Client& client,
                                                            const proto::TeachRequest& request) {
@@ -181,6 +167,16 @@ std::string Replicator::carry_out(const TeachOrder& order, Client& client,
       last_view_.reset();
       participants_changed_ = true;
       return {};
+    case TeachAction::Pause:
+    case TeachAction::GoOn:
+    case TeachAction::Slow:
+      if (!options_.on_pace) return "not done: this session keeps its own pace";
+      if (order.action == TeachAction::Slow) rate_ = order.rate;
+      if (order.action == TeachAction::Pause && is_paused_) return "not done: it is paused already";
+      if (order.action == TeachAction::GoOn && !is_paused_) return "not done: it goes on already";
+      if (order.action != TeachAction::Slow) is_paused_ = order.action == TeachAction::Pause;
+      set_pace(client.participant->name);
+      return {};
     case TeachAction::Wipe:
     case TeachAction::Note:
     case TeachAction::Chat:
@@ -190,7 +186,7 @@ std::string Replicator::carry_out(const TeachOrder& order, Client& client,
   return {};
 }
 
-// Nobody else could release these tools.
+// Nobody else could release these tools, or let time go on.
 void Replicator::release_unless_led() {
   const auto present = roster_.list();
   if (std::ranges::any_of(present,
@@ -200,6 +196,10 @@ void Replicator::release_unless_led() {
     held_tools_.release(who.slot);
     roster_.set_frozen_by(who.slot, {});
   }
+  if (!is_paused_ && rate_ == 1) return;
+  is_paused_ = false;
+  rate_ = 1;
+  set_pace({});
 }
 
 Replicator::Client* Replicator::client_of(ParticipantSlot slot) const {

@@ -18,7 +18,7 @@ static_assert(static_cast<int>(EndReason::Timeout) == proto::GOODBYE_TIMEOUT);
 static_assert(static_cast<int>(EndReason::NameInvalid) == proto::GOODBYE_NAME_INVALID);
 static_assert(static_cast<int>(EndReason::Closed) == proto::GOODBYE_CLOSED);
 static_assert(kEndReasonCount == proto::GoodbyeReason_ARRAYSIZE);
-static_assert(static_cast<int>(TeachAction::Wipe) == proto::TEACH_WIPE &&
+static_assert(static_cast<int>(TeachAction::Slow) == proto::TEACH_SLOW &&
               kTeachActions == proto::TeachAction_ARRAYSIZE);
 constexpr std::size_t kSecretBytes = 5;
 static_assert(static_cast<int>(tool::Verb::Grasp) == proto::VERB_GRASP);
@@ -113,8 +113,8 @@ Result<CheckedSample> check_tool_sample(const proto::ToolSample& sample, std::si
 
 const char* name_of(TeachAction action) {
   static constexpr std::array<const char*, kTeachActions> kNames{
-      "none", "freeze", "release", "take-claim", "expel",     "rename",   "admit", "close",
-      "open", "end",    "note",    "chat",       "give-view", "end-view", "wipe"};
+      "none", "freeze", "release", "take-claim", "expel",    "rename", "admit", "close", "open",
+      "end",  "note",   "chat",    "give-view",  "end-view", "wipe",   "pause", "go-on", "slow"};
   return kNames[static_cast<std::size_t>(action)];
 }
 
@@ -159,7 +159,8 @@ Result<TeachOrder> check_teach(const proto::TeachRequest& request) {
   TeachOrder order{.action = static_cast<TeachAction>(action),
                    .participant = {},
                    .name = request.name(),
-                   .text = request.text()};
+                   .text = request.text(),
+                   .rate = 0};
   if (is_about_one(order.action)) {
     if (request.participant() >= kMaxParticipants)
       return bad("TeachRequest.participant: " + std::to_string(request.participant()) +
@@ -173,6 +174,11 @@ Result<TeachOrder> check_teach(const proto::TeachRequest& request) {
                          : std::string("this action has no text")));
   if (!is_printable(order.text))
     return bad("TeachRequest.text: it must be printable UTF-8, in one line");
+  const bool is_slow = order.action == TeachAction::Slow;
+  if (is_slow && !(request.rate() >= wire::kLeastPace && request.rate() <= 1))
+    return bad("TeachRequest.rate: it must be from 0.25 to 1");
+  if (!is_slow && request.rate() != 0) return bad("TeachRequest.rate: this action has no rate");
+  order.rate = request.rate();
   return order;
 }
 

@@ -95,8 +95,11 @@ enum class TeachAction : std::uint8_t {
   GiveView = 12,
   EndView = 13,
   Wipe = 14,
+  Pause = 15,
+  GoOn = 16,
+  Slow = 17,
 };
-inline constexpr int kTeachActions = 15;
+inline constexpr int kTeachActions = 18;
 // For the audit log, such as "take-claim".
 const char* name_of(TeachAction action);
 // Whether it is about one participant.
@@ -107,6 +110,7 @@ struct TeachOrder {
   ParticipantSlot participant;  // valid where it is about one
   std::string name;             // that participant's, as the client knows it
   std::string text;             // printable; empty where the action has none
+  float rate = 0;               // of slow time
 };
 Result<TeachOrder> check_teach(const proto::TeachRequest& request);
 

@@ -30,6 +30,9 @@ enum class MarkAction : std::uint8_t {
   Return = 2,  // makes it what it was when it was marked
 };
 
+// This many marks stand side by side.
+inline constexpr std::uint8_t kMostMarks = 4;
+
 struct ToolInput {
   ToolSlot tool;
   tool::ToolSample sample;
@@ -41,6 +44,7 @@ struct ToolInput {
 // does not fit its state, such as a sample for an empty slot, and counts it.
 struct TickInputs {
   MarkAction mark = MarkAction::None;
+  std::uint8_t mark_number = 0;  // less than kMostMarks
   std::vector<ParticipantSlot> leaves;
   std::vector<HandJoin> joins;
   std::vector<ToolChange> changes;
@@ -52,6 +56,7 @@ struct TickInputs {
   }
   void clear() {
     mark = MarkAction::None;
+    mark_number = 0;
     leaves.clear();
     joins.clear();
     changes.clear();

@@ -41,7 +41,8 @@ struct ToolFrame {
 struct MarkEvent {
   Tick tick = 0;
   hands::MarkAction action = hands::MarkAction::None;
-  bool is_done = false;  // false: there is no mark to return to
+  bool is_done = false;     // false: there is no mark to return to
+  std::uint8_t number = 0;  // of the mark
 };
 
 // The journal needs this record to simulate one tick again.

@@ -27,22 +27,22 @@ State::State(const Scene& scene)
 }
 
 void State::visit(world::StateArchive& archive) {
-  mark.visit_state(archive);
-  visit_without_mark(archive);  // ends with what may take no bytes
+  marks.visit_state(archive);
+  visit_without_marks(archive);  // ends with what may take no bytes
 }
 
-void State::set_mark() {
+void State::set_mark(std::uint8_t number) {
   Bytes bytes;
   auto archive = world::StateArchive::writing(bytes);
-  visit_without_mark(archive);
-  mark.set(std::move(bytes));
+  visit_without_marks(archive);
+  marks.set(number, std::move(bytes));
 }
 
-std::unique_ptr<State> State::returned_to_mark(const Scene& scene) const {
-  if (!mark.is_set()) return nullptr;
+std::unique_ptr<State> State::returned_to_mark(std::uint8_t number, const Scene& scene) const {
+  if (!marks.is_set(number)) return nullptr;
   auto marked = std::make_unique<State>(scene);
-  auto archive = world::StateArchive::reading(mark.state());
-  marked->visit_without_mark(archive);
+  auto archive = world::StateArchive::reading(marks.state(number));
+  marked->visit_without_marks(archive);
   if (!archive.ok() || !archive.at_end()) return nullptr;
   marked->cuts.replace(cuts);
   marked->world.tick = world.tick;
@@ -50,11 +50,11 @@ std::unique_ptr<State> State::returned_to_mark(const Scene& scene) const {
   marked->claims.let_go(claims);
   marked->grasps = {};
   marked->proxies = {};
-  marked->mark = mark;
+  marked->marks = marks;
   return marked;
 }
 
-void State::visit_without_mark(world::StateArchive& archive) {
+void State::visit_without_marks(world::StateArchive& archive) {
   cuts.visit_state(archive, [this](const topology::Edit& edit) { hand_out(edit, *this); });
   world.visit_state(archive);
   tools.visit_state(archive);
@@ -220,19 +220,19 @@ TickDecisions Simulation::with_sweeps_for_organ(TickDecisions decisions) const {
 
 const TickReport& Simulation::tick(const hands::TickInputs& inputs,
                                    const TickDecisions& decisions) {
-  if (inputs.mark != hands::MarkAction::None) use_mark(inputs.mark);
+  if (inputs.mark != hands::MarkAction::None) use_mark(inputs.mark, inputs.mark_number);
   run_tick(inputs, decisions, scene_->loads.empty() ? nullptr : loads_.get(), *state_, *context_);
   return context_->report;
 }
 
-void Simulation::use_mark(hands::MarkAction action) {
-  MarkEvent event{state_->world.tick + 1, action, true};
+void Simulation::use_mark(hands::MarkAction action, std::uint8_t number) {
+  MarkEvent event{state_->world.tick + 1, action, true, number};
   if (action == hands::MarkAction::Set) {
-    state_->set_mark();
+    state_->set_mark(number);
     context_->outbox.mark_events.push_back(event);
     return;
   }
-  auto marked = state_->returned_to_mark(*scene_);
+  auto marked = state_->returned_to_mark(number, *scene_);
   auto context = marked ? context_of(*marked) : nullptr;
   event.is_done = context != nullptr;
   if (event.is_done) {

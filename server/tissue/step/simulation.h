@@ -70,7 +70,7 @@ class Simulation {
  private:
   Simulation(std::shared_ptr<const Scene> scene, unsigned workers);
 
-  void use_mark(hands::MarkAction action);
+  void use_mark(hands::MarkAction action, std::uint8_t number);
   // Null: the state is of another far-field model.
   std::unique_ptr<StepContext> context_of(State& state) const;
 

@@ -53,17 +53,17 @@ struct State {
   contact::SelfContactTable self_contacts;
   const dynamics::StrainScheme strain_scheme;  // forces of relaxed stress are as it has them
   std::unique_ptr<dynamics::FarFieldModel> far_model;  // of scenes with models
-  Mark mark;
+  Marks marks;
 
   void visit(world::StateArchive& archive);
 
-  void set_mark();
+  void set_mark(std::uint8_t number);
   // The organ as it was marked, with the tools as they are now, which hold nothing; time goes on.
-  // Null: there is no mark.
-  std::unique_ptr<State> returned_to_mark(const Scene& scene) const;
+  // Null: there is no such mark.
+  std::unique_ptr<State> returned_to_mark(std::uint8_t number, const Scene& scene) const;
 
  private:
-  void visit_without_mark(world::StateArchive& archive);
+  void visit_without_marks(world::StateArchive& archive);
 };
 
 // The stages keep these structs from tick to tick, so that none begins anew or allocates after

@@ -68,6 +68,11 @@ class StateArchive {
   void sized_array(std::vector<T>& values, std::uint32_t limit) {
     auto count = static_cast<std::uint32_t>(values.size());
     value(count);
+    counted_array(values, count, limit);
+  }
+  // An array of `count` elements, a number that was visited before.
+  template <typename T>
+  void counted_array(std::vector<T>& values, std::uint32_t count, std::uint32_t limit) {
     if (is_reading()) {
       // Before memory is asked for: a few wrong bytes must not take gigabytes.
       if (count > limit || count * sizeof(T) > reader_.remaining()) fail();

@@ -46,6 +46,12 @@ Result<News> SessionCopy::take(const proto::Envelope& message, const wire::Share
     case proto::Envelope::kLessonStage:
       stage_ = framed;
       return News::Event;
+    case proto::Envelope::kSessionPace:
+      pace_ = framed;
+      return News::Event;
+    case proto::Envelope::kMarkList:
+      marks_ = framed;
+      return News::Event;
     case proto::Envelope::kPointEvent:
     case proto::Envelope::kLessonProgress:
       return News::Fleeting;
@@ -213,8 +219,8 @@ std::vector<wire::SharedBytes> SessionCopy::all_but_frames() {
     *envelope.mutable_drawing() = *drawing_;
     all.push_back(wire::encode_envelope(envelope));
   }
-  if (stage_) all.push_back(stage_);
-  if (view_) all.push_back(view_);
+  for (const auto& kept : {pace_, marks_, stage_, view_})
+    if (kept) all.push_back(kept);
   return all;
 }
 

@@ -63,8 +63,8 @@ class SessionCopy {
   // FrameState; null: it has not come yet.
   const wire::SharedBytes& state() const { return state_; }
 
-  // For who comes late, before the first frame: participants, surface, recording, drawing, stage,
-  // view.
+  // For who comes late, before the first frame: participants, surface, recording, drawing, pace,
+  // marks, stage, view.
   std::vector<wire::SharedBytes> all_but_frames();
   const wire::SharedBytes& topology();
 
@@ -96,7 +96,7 @@ class SessionCopy {
   std::shared_ptr<Kept> current_;                        // null: waits for a keyframe
   wire::SharedBytes topology_, keyframe_, state_;        // null: not encoded, or not there
   std::map<Frame, wire::SharedBytes> deltas_;            // by base
-  wire::SharedBytes participants_, recording_, stage_, view_;
+  wire::SharedBytes participants_, recording_, pace_, marks_, stage_, view_;
   std::unique_ptr<proto::Drawing> drawing_;
   std::optional<Frame> last_frame_;
 };

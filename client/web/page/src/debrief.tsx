@@ -3,6 +3,7 @@
 import type { JSX } from 'preact';
 import { useEffect, useMemo, useRef, useState } from 'preact/hooks';
 import { Beside, BesideChoice, type Other } from './debrief/beside';
+import { toBinary } from '@bufbuild/protobuf';
 import { Bookmarks } from './debrief/bookmarks';
 import { Check } from './debrief/check';
 import { joined, keepBookmarks, keptBookmarks, readBookmarks, bookmarksText, type Bookmark } from './debrief/marks';
@@ -14,6 +15,8 @@ import { courseData, kQuantities, Plots, type ToolGuide } from './debrief/plots'
 import { readAll, take } from './debrief/reading';
 import { kMostShots, Report, type ReportContent, type Shot } from './debrief/report';
 import { Take } from './debrief/take';
+import { LessonStageSchema } from './gen/proto/wire_pb';
+import { LessonPanel } from './goals';
 import { recordingLink, type Link, type Moment } from './link';
 import { Events, hex, People } from './panels';
 import { kSpeeds, Player } from './player';
@@ -52,6 +55,8 @@ export function RecordingList(props: { link: Link; onChoose(name: string): void 
   );
 }
 
+const kStageField = 62; // of Envelope
+
 interface DebriefProps { replica: Replica; recording: Recording; name: string; link: Link; onClose(): void }
 
 export function Debrief(props: DebriefProps): JSX.Element {
@@ -67,6 +72,15 @@ export function Debrief(props: DebriefProps): JSX.Element {
     return made;
   }, []);
   const people = player.people?.participant ?? [];
+  // The replica draws what belongs to the stage that was on.
+  const stage = log.stageAt(player.tick);
+  useEffect(() => {
+    try {
+      replica.receiveBare(kStageField, stage ? toBinary(LessonStageSchema, stage) : new Uint8Array(), performance.now());
+    } catch (error) {
+      setFault(error instanceof Error ? error.message : String(error));
+    }
+  }, [stage]);
   const toolGuide = useMemo((): ToolGuide => ({
     nameOf: tool => (log.names.get(tool >> 1) ?? `hand ${(tool >> 1) + 1}`) + ((tool & 1) === 1 ? ', second tool' : ''),
     colourOf: tool => hex(replica.slotColour(tool >> 1)),
@@ -76,7 +90,7 @@ export function Debrief(props: DebriefProps): JSX.Element {
 
   useEffect(() => {
     let isGone = false;
-    Object.assign(window, { trocar: { replica, player, recording, traffic, picture: () => picture.current } });
+    Object.assign(window, { trocar: { replica, player, recording, log, traffic, picture: () => picture.current } });
     try {
       setMarks(joined(keptBookmarks(recording.startNs), props.link.bookmarks ? readBookmarks(props.link.bookmarks) : []));
     } catch (error) {
@@ -154,7 +168,7 @@ export function Debrief(props: DebriefProps): JSX.Element {
       </header>
       <main>
         <div class="half">
-          <Stage replica={replica} guide={guide} isOld={false} follows={follows} people={people} onFollow={setFollows} onPicture={now => player.advance(now)} onPlace={overlays.onPlace} onDrawn={drawn => {
+          <Stage replica={replica} guide={guide} isOld={false} isRecording follows={follows} people={people} onFollow={setFollows} onPicture={now => player.advance(now)} onPlace={overlays.onPlace} onDrawn={drawn => {
             overlays.draw(drawn);
             still.drawn(drawn, overlays.lines(), replica.tools(), guide);
           }} onReady={p => {
@@ -169,6 +183,7 @@ export function Debrief(props: DebriefProps): JSX.Element {
         {other && <Beside key={other.name} other={other} first={player} firstEvents={log.events} />}
       </main>
       <aside>
+        {stage && <LessonPanel goal={{ stage, progress: null, seconds: Math.max(0, player.tick - Number(stage.beginTick)) / 1000 }} />}
         <People people={people} tools={replica.tools()} own={null} colourOf={slot => replica.slotColour(slot)} follows={follows} onFollow={setFollows} />
         <Events events={log.events} now={player.tick} onSeek={seek} empty="Looking for events" />
         <Bookmarks marks={marks} now={player.tick} name={props.name} onChange={change} onSeek={seek} onCopy={props.link.recordingsKey ? all => void share({ bookmarks: bookmarksText(all) }) : null} />

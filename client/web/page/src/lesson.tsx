@@ -15,13 +15,13 @@ const bytesOf = (text: string): number => new TextEncoder().encode(text).length;
 const lineOf = (text: string): string => text.replace(/[\p{C}\u2028\u2029\u{E0000}-\u{10FFFF}]/gu, ' ').trim();
 
 // One thing that has to be asked before it is done; `field`: what the person types for it.
-export interface Question { title: string; verb: string; field?: { label: string; value: string; most: number }; act(text: string): void }
+export interface Question { title: string; verb: string; field?: { label: string; value: string; most: number; mayBeEmpty?: boolean }; act(text: string): void }
 
 export function Ask(props: { question: Question; onDone(): void }): JSX.Element {
   const { question } = props, [text, setText] = useState(question.field?.value ?? '');
   const first = useRef<HTMLInputElement & HTMLButtonElement>(null);
   useEffect(() => first.current?.focus(), []);
-  const fits = !question.field || (lineOf(text) !== '' && bytesOf(lineOf(text)) <= question.field.most);
+  const fits = !question.field || ((lineOf(text) !== '' || question.field.mayBeEmpty === true) && bytesOf(lineOf(text)) <= question.field.most);
   const submit = (event: Event): void => {
     event.preventDefault();
     if (!fits) return;

@@ -2,8 +2,10 @@
 
 import type { JSX } from 'preact';
 import { useEffect, useMemo, useRef, useState } from 'preact/hooks';
-import { MarkAction, RecordingStatus, TeachAction, type Envelope, type Participant, type Participants } from './gen/proto/wire_pb';
+import { LessonAction, RecordingStatus, TeachAction, type Envelope, type LessonProgress, type LessonStage, type Participant, type Participants, type SessionPace } from './gen/proto/wire_pb';
 import { Forces } from './forces';
+import { LessonPanel } from './goals';
+import { Marks, Pace } from './conduct';
 import { Ask, Door, Manage, Say, ViewTools, type Question } from './lesson';
 import type { Link } from './link';
 import { Events, ForcePlot, People } from './panels';
@@ -20,7 +22,8 @@ export function Live(props: { link: Link; replica: Replica; onEnd(why: string): 
   const [, redraw] = useState(0), [follows, setFollows] = useState<number | null>(null), [asks, setAsks] = useState<Question | null>(null);
   const people = useRef<Participant[]>([]), list = useRef<Participants | null>(null), events = useRef<RecordedEvent[]>([]);
   const forces = useMemo(() => new Forces(), []), own = useRef<number | null>(null), recording = useRef(''), crc = useRef('');
-  const picture = useRef<Picture | null>(null);
+  const picture = useRef<Picture | null>(null), stage = useRef<LessonStage | null>(null), progress = useRef<LessonProgress | null>(null);
+  const pace = useRef<SessionPace | null>(null), marks = useRef<string[]>([]), mayPace = useRef(false);
   const guide = useMemo(() => guideOf(() => people.current, slot => replica.slotColour(slot)), []);
 
   const session = useMemo(() => {
@@ -33,7 +36,12 @@ export function Live(props: { link: Link; replica: Replica; onEnd(why: string): 
     };
     const onMessage = (envelope: Envelope, tick: number): void => {
       const { case: kind, value } = envelope.message;
-      if (kind === 'welcome') own.current = value.participant;
+      if (kind === 'welcome') {
+        own.current = value.participant;
+        mayPace.current = value.protocolMinor >= 18;
+        pace.current = null; // what differs from the usual is told anew
+        marks.current = [];
+      }
       if (kind === 'participants') {
         for (const text of changesOf(list.current, value)) note(tick, 'people', text);
         list.current = value;
@@ -42,6 +50,13 @@ export function Live(props: { link: Link; replica: Replica; onEnd(why: string): 
       if (kind === 'claimEvent') note(Number(value.tick), kindOf(value.outcome), value.text);
       if (kind === 'markEvent') note(Number(value.tick), value.isDone ? 'cut' : 'refusal', value.text);
       if (kind === 'teachEvent') note(Number(value.tick), value.isDone ? kindOfTeaching(value.action) : 'refusal', value.text);
+      if (kind === 'lessonStage') {
+        if (stage.current?.beginTick !== value.beginTick) progress.current = null;
+        stage.current = value;
+      }
+      if (kind === 'sessionPace') pace.current = value;
+      if (kind === 'markList') marks.current = value.name;
+      if (kind === 'lessonProgress') progress.current = value;
       if (kind === 'recordingState') {
         const isWhole = value.status === RecordingStatus.RECORDING_WHOLE || value.status === RecordingStatus.RECORDING_OFF;
         recording.current = isWhole ? '' : value.text;
@@ -69,14 +84,15 @@ export function Live(props: { link: Link; replica: Replica; onEnd(why: string): 
   }, []);
 
   const now = Math.max(0, replica.newestTick), age = session.shownAgeMs;
-  const isOld = session.state === 'away' || (age !== null && age > 1000), isLate = age !== null && age > session.oldAfterMs;
+  const isPaused = session.state === 'live' && (pace.current?.isPaused ?? false), rate = pace.current?.rate ?? 1;
+  const isOld = session.state === 'away' || (!isPaused && age !== null && age > 1000), isLate = !isPaused && age !== null && age > session.oldAfterMs;
   const mayMark = props.link.role === 'instructor' && session.state === 'live';
   const leader = people.current.find(p => p.leadsView);
-  const mark = (action: MarkAction): void => {
-    const returns = action === MarkAction.MARK_RETURN;
-    setAsks({ title: returns ? 'Return the organ to the mark, for everybody? Cuts made since then are undone.' : 'Mark the organ as it is now? An earlier mark is replaced.', verb: returns ? 'Return' : 'Mark', act: () => session.mark(returns) });
-  };
   const end = (): void => setAsks({ title: 'End the session for everybody? The recording is closed.', verb: 'End for everybody', act: () => session.teach(TeachAction.TEACH_END) });
+  const lead = {
+    next: () => session.lead(LessonAction.LESSON_NEXT),
+    restart: () => setAsks({ title: 'Begin the lesson anew, from its first stage? The tissue stays as it is.', verb: 'Restart', act: () => session.lead(LessonAction.LESSON_RESTART) }),
+  };
   const onKey = (event: KeyboardEvent): void => {
     if (event.key === 'Escape') setAsks(null);
   };
@@ -86,12 +102,13 @@ export function Live(props: { link: Link; replica: Replica; onEnd(why: string): 
         <h1>Trocar</h1>
         <span class="time">{clock(now / 1000)}</span>
         <span class={`age${isOld ? ' old' : isLate ? ' late' : ''}`} role="status" title="How old the picture is that you see">
-          {session.state === 'joining' ? 'joining' : session.state === 'away' ? `old since ${Math.round((performance.now() - session.awaySince) / 1000)} s` : age === null ? 'live' : `${Math.max(0, Math.round(age))} ms old`}
+          {session.state === 'joining' ? 'joining' : session.state === 'away' ? `old since ${Math.round((performance.now() - session.awaySince) / 1000)} s` : isPaused ? 'paused' : age === null ? 'live' : `${Math.max(0, Math.round(age))} ms old`}
         </span>
+        {session.state === 'live' && rate < 1 && <span class="age late" role="status">{`time at ${Math.round(rate * 100)} %`}</span>}
         {recording.current && <span class="age late">{recording.current}</span>}
         <span class="space" />
-        {mayMark && <button onClick={() => mark(MarkAction.MARK_SET)}>Mark organ</button>}
-        {mayMark && <button onClick={() => mark(MarkAction.MARK_RETURN)}>Return to mark</button>}
+        {mayMark && mayPace.current && <Pace session={session} pace={pace.current} />}
+        {mayMark && <Marks session={session} marks={marks.current} onAsk={setAsks} />}
         {mayMark && <button class="bad" onClick={end}>End session</button>}
         <button onClick={session.leave}>Leave</button>
       </header>
@@ -99,12 +116,14 @@ export function Live(props: { link: Link; replica: Replica; onEnd(why: string): 
         <Stage replica={replica} guide={guide} isOld={isOld} follows={follows} people={people.current} onFollow={setFollows} onPicture={() => undefined} onReady={p => { picture.current = p; }}
           tools={session.state === 'live' && <ViewTools session={session} replica={replica} picture={picture} mayDraw={mayMark} leader={leader} own={own.current} />} {...(mayMark ? { onPoint: place => session.point(place) } : {})}>
           {session.state === 'away' && <p class="banner" role="alert">{session.why} The picture is old; the page comes back by itself.</p>}
+          {isPaused && <p class="banner" role="status">{`${pace.current?.by || 'Somebody'} has paused the session.`}</p>}
           {session.state === 'joining' && <p class="banner">Joining the session</p>}
           {session.state === 'live' && replica.frames === 0 && <p class="banner">Waiting for the organ</p>}
         </Stage>
         {asks !== null && <Ask key={asks.title} question={asks} onDone={() => setAsks(null)} />}
       </main>
       <aside>
+        {stage.current && <LessonPanel goal={{ stage: stage.current, progress: progress.current, seconds: progress.current?.seconds ?? 0 }} {...(mayMark ? { lead } : {})} />}
         <People people={people.current} tools={replica.tools()} own={own.current} colourOf={slot => replica.slotColour(slot)} follows={follows} onFollow={setFollows}
           {...(mayMark ? { extra: person => <Manage session={session} person={person} own={own.current} onAsk={setAsks} /> } : {})} />
         {mayMark && <Door session={session} list={list.current} />}

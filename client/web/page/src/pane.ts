@@ -1,7 +1,7 @@
 // One of the views of a picture: a part of the canvas, where it looks from, and whom it follows.
 
 import { PerspectiveCamera, Quaternion, Vector3 } from 'three';
-import type { Tool } from './replica';
+import type { Lens, Tool } from './replica';
 
 const kSettleSeconds = 0.15;
 const kBehind = 0.24, kAbove = 0.07; // m from the tip, of a view along a tool
@@ -24,9 +24,28 @@ export class Pane {
   follows: number | null = null; // a participant's slot
   isAlong = false; // it looks along that one's tool, instead of keeping its direction
   isFramed = false;
+  seesWith: number | null = null; // the slot of a tool, in place of its own camera
+  private readonly lensCamera = new PerspectiveCamera(70, 1, 0.003, 6);
+  private lens: Lens | null = null;
 
   // `yaw` turns a view around the organ, so that several differ; `pitch` is how far from above.
   constructor(private readonly yaw: number, private readonly pitch: number) {}
+
+  // The camera that draws.
+  get drawn(): PerspectiveCamera { return this.lens ? this.lensCamera : this.camera; }
+  get isEndoscope(): boolean { return this.lens?.isEndoscope ?? false; }
+  // Sees as a lens does; null: from its own place.
+  lookThrough(lens: Lens | null): void {
+    this.lens = lens;
+    if (!lens) return;
+    const { lensCamera: c } = this;
+    c.position.set(...lens.eye);
+    c.up.set(...lens.up);
+    c.lookAt(c.position.clone().add(new Vector3(...lens.forward)));
+    c.fov = Math.atan(lens.tanHalfHeight) * 360 / Math.PI;
+    c.aspect = this.camera.aspect;
+    c.updateProjectionMatrix();
+  }
 
   has(x: number, y: number): boolean {
     const [left, top, width, height] = this.part;

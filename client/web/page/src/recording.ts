@@ -5,7 +5,7 @@ import { fromBinary, toBinary } from '@bufbuild/protobuf';
 import { McapIndexedReader, type McapTypes } from '@mcap/core';
 import { decompress } from 'fzstd';
 import { ClaimLogSchema, JournalGapSchema, LessonRecordSchema, OverviewSchema, type JournalGap, type Overview } from './gen/proto/journal_pb';
-import { ClaimOutcome, ParticipantsSchema, PointEventSchema, TeachAction, type ClaimEvent, type Participants, type TeachEvent } from './gen/proto/wire_pb';
+import { ClaimOutcome, ParticipantsSchema, PointEventSchema, TeachAction, type ClaimEvent, type LessonStage, type Participants, type TeachEvent } from './gen/proto/wire_pb';
 
 const kBlock = 64 * 1024, kBlocks = 256, kMostChunk = 64 * 1024 * 1024, kMostTicks = 1e9;
 export const kDamaged = 'This file is no whole Trocar recording: it is damaged, cut short, or something else.';
@@ -173,6 +173,7 @@ function readOverview(data: Uint8Array): Overview {
 // What is known is not added again.
 export class EventLog {
   readonly events: RecordedEvent[] = [];
+  readonly stages: { tick: number; stage: LessonStage }[] = []; // of a lesson, by tick
   readonly names = new Map<number, string>(); // by a participant's slot: the newest
   private readonly known = new Set<string>();
   private people: Participants | null = null;
@@ -187,13 +188,19 @@ export class EventLog {
     else if (item.topic === '/lesson') {
       const { entry } = fromBinary(LessonRecordSchema, item.data);
       if (entry.case === 'teach') this.addLesson(entry.value);
+      if (entry.case === 'stage') this.addStage(item.tick, entry.value);
     }
+  }
+  // The stage that was on at a tick; null: none was yet.
+  stageAt(tick: number): LessonStage | null {
+    return this.stages.findLast(told => told.tick <= tick)?.stage ?? null;
   }
   addOverview(overview: Overview): void {
     for (const { tick, participants } of overview.presence) if (participants) this.addPeople(Number(tick), participants);
     overview.claim.forEach(event => this.addClaim(event));
     overview.gap.forEach(gap => this.addGap(gap));
     overview.lesson.forEach(event => this.addLesson(event));
+    for (const { tick, stage } of overview.stage) if (stage) this.addStage(Number(tick), stage);
     overview.changeTick.forEach(tick => this.addCut(Number(tick)));
     if (overview.leftOut > 0) this.add({ tick: Number(overview.firstTick), kind: 'gap', text: `${overview.leftOut} events had no room in the overview` });
   }
@@ -207,6 +214,17 @@ export class EventLog {
   }
   private addClaim(event: ClaimEvent): void { this.add({ tick: Number(event.tick), kind: kindOf(event.outcome), text: event.text }); }
   private addLesson(event: TeachEvent): void { this.add({ tick: Number(event.tick), kind: kindOfTeaching(event.action), text: event.text }); }
+  private addStage(tick: number, stage: LessonStage): void {
+    const key = `${tick} stage ${stage.stage} ${stage.beginTick} ${stage.hint} ${stage.isOver}`;
+    if (this.known.has(key) || this.stages.length >= kMostEvents) return;
+    this.known.add(key);
+    const before = this.stageAt(tick), isNew = before === null || before.stage !== stage.stage || before.beginTick !== stage.beginTick;
+    let at = this.stages.length;
+    while (at > 0 && (this.stages[at - 1]?.tick ?? 0) > tick) at--;
+    this.stages.splice(at, 0, { tick, stage });
+    if (stage.isOver) this.add({ tick, kind: 'lesson', text: `The lesson is over: ${stage.points.toFixed(0)} of 100 points` });
+    else if (isNew) this.add({ tick, kind: 'lesson', text: `Stage ${stage.stage + 1} of ${stage.stages}: ${stage.name}` });
+  }
   private addGap(gap: JournalGap): void { this.add({ tick: Number(gap.firstTick), kind: 'gap', text: `${gap.messages} messages are missing here` }); }
   private addCut(tick: number): void {
     if (tick - this.lastCut > kCutPause || tick < this.lastCut) this.add({ tick, kind: 'cut', text: 'Tissue is cut or tears' });

@@ -28,6 +28,7 @@ interface Exports {
   triangles_at(): number;
   positions_at(): number;
   normals_at(): number;
+  lips_at(): number;
   rest_at(): number;
   overlay_at(): number;
   tools(): number;
@@ -35,6 +36,7 @@ interface Exports {
   pointers(): number;
   pointers_at(): number;
   pointer_colour(slot: number): number;
+  lesson_target(): number;
   drawing_at(): number;
   attach(x: number, y: number, z: number): number;
   make_tool(radiusM: number, lengthM: number, halfWidthM: number, edgeM: number, form: number, colour: number): number;
@@ -42,6 +44,7 @@ interface Exports {
   hinge(): number;
   jaw_opening(form: number, verb: number, hasClaim: boolean): number;
   jaw_seconds(form: number, verb: number, hasClaim: boolean): number;
+  lens(slot: number, radiusM: number, form: number): number;
   make_arrow(lengthM: number, radiusM: number, colour: number): number;
   mesh_vertices(): number;
   slot_colour(slot: number): number;
@@ -69,6 +72,8 @@ export interface Tool {
 
 export interface Pointer { participant: number; position: Vec3 } // slot; m
 
+// The view of who sees with a tool: metres and unit vectors in the world.
+export interface Lens { eye: Vec3; forward: Vec3; up: Vec3; tanHalfHeight: number; isEndoscope: boolean }
 // What an instrument looks like is made from this.
 export interface Shape { radiusM: number; lengthM: number; halfWidthM: number; edgeM: number; form: number }
 export interface Mesh { positions: Float32Array; normals: Float32Array; materials: Uint8Array }
@@ -143,6 +148,8 @@ export class Replica {
   get vertexCount(): number { return this.e.vertices(); }
   positions(): Float32Array { return this.floats(this.e.positions_at(), this.e.vertices() * 3); }
   normals(): Float32Array { return this.floats(this.e.normals_at(), this.e.vertices() * 3); }
+  // The normals of wounds' rims, elsewhere as normals().
+  lips(): Float32Array { return this.floats(this.e.lips_at(), this.e.vertices() * 3); }
   rest(): Float32Array { return this.floats(this.e.rest_at(), this.e.vertices() * 4); }
   overlay(): Uint8Array { return new Uint8Array(this.e.memory.buffer, this.e.overlay_at(), this.e.vertices() * 4); }
   triangles(): Uint32Array { return new Uint32Array(this.e.memory.buffer, this.e.triangles_at(), this.e.triangles() * 3); }
@@ -166,6 +173,13 @@ export class Replica {
   }
   pointerColour(slot: number): number { return this.e.pointer_colour(slot) >>> 0; }
 
+  // Where the point is that a lesson's hands follow; null: there is none.
+  lessonTarget(): Vec3 | null {
+    const at = this.e.lesson_target();
+    if (at === 0) return null;
+    const [x = 0, y = 0, z = 0] = this.floats(at, 3);
+    return [x, y, z];
+  }
   // All that is drawn on the organ.
   drawing(): Mesh { return this.mesh(this.e.drawing_at()); }
   // How the server is told of a place on the organ; null: there is none yet.
@@ -185,6 +199,11 @@ export class Replica {
   // How far each jaw is opened, rad, and how many seconds it takes to get there.
   jawMotion(form: number, verb: number, hasClaim: boolean): { opening: number; seconds: number } {
     return { opening: this.e.jaw_opening(form, verb, hasClaim), seconds: this.e.jaw_seconds(form, verb, hasClaim) };
+  }
+  // How somebody sees with the tool in that slot.
+  lens(slot: number, shape: Shape): Lens {
+    const f = this.floats(this.e.lens(slot, shape.radiusM, shape.form), 11), at = (i: number): number => f[i] ?? 0;
+    return { eye: [at(0), at(1), at(2)], forward: [at(3), at(4), at(5)], up: [at(6), at(7), at(8)], tanHalfHeight: at(9), isEndoscope: at(10) > 0 };
   }
   makeArrow(lengthM: number, radiusM: number, colour: number): Mesh { return this.mesh(this.e.make_arrow(lengthM, radiusM, colour)); }
   // 0xrrggbb, of a participant.

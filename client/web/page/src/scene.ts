@@ -7,6 +7,7 @@ import {
 } from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 import { lightingSource, organFragmentSource, organVertexSource, toolFragmentSource, toolVertexSource } from './gen/shaders';
+import { Field } from './field';
 import { Pane, partsOf, type Part, type ViewCount } from './pane';
 import { Overlay, type Mesh as PlainMesh, type Pointer, type Replica, type Shape, type Tool, type Vec3 } from './replica';
 
@@ -21,7 +22,9 @@ export interface Guide {
 }
 
 const kMetresPerNewton = 0.02, kMostArrow = 0.1, kLeastNewton = 0.05, kShadows = 8;
-const kPointerLength = 0.035, kNoise = 32;
+const kLessonPoint = -1, kLessonColour = 0xf0e442; // the point to follow, among who points
+const kPointerLength = 0.035, kNoise = 64;
+const kHazePerMiddle = 0.55, kScopeHaze: [number, number] = [0.05, 4]; // as in the native picture
 const kPitch = 0.42; // of the views at the start: from the front, a side, the back, and above
 const kStarts: [number, number][] = [[0, kPitch], [Math.PI / 2, kPitch], [Math.PI, kPitch], [0, 1.45]];
 const kSlowMs = 45, kJudged = 40; // pictures, before quality is lowered
@@ -55,6 +58,7 @@ export class Picture {
   private count: ViewCount = 1;
   private active = 0; // of the views: which one mouse and keys move
   private readonly organ: Mesh<BufferGeometry, RawShaderMaterial>;
+  private readonly field: Field;
   private readonly uniforms: Record<string, IUniform>;
   private readonly tools = new Map<number, DrawnTool>();
   private readonly pointers = new Map<number, DrawnPointer>();
@@ -80,9 +84,7 @@ export class Picture {
     this.controls.target = this.main.target;
     this.controls.addEventListener('start', () => {
       if (this.active === 0) this.onTurn();
-      if (this.moved.follows === null) return;
-      this.moved.follows = null;
-      this.onLetGo(this.active);
+      this.letGo();
     });
     // Before the controls: they move the view that was touched.
     for (const kind of ['pointerdown', 'wheel'] as const) canvas.addEventListener(kind, this.touch, true);
@@ -93,12 +95,13 @@ export class Picture {
     const four = (): Vector4[] => Array.from({ length: kShadows }, () => new Vector4());
     this.uniforms = {
       clip_from_world: { value: new Matrix4() }, eye: { value: new Vector3() }, key_direction: { value: new Vector3(0, 1, 0) },
-      fill_direction: { value: new Vector3(0, 1, 0) }, noise: { value: noise }, shadow_count: { value: 0 },
+      fill_direction: { value: new Vector3(0, 1, 0) }, haze: { value: new Vector2() }, noise: { value: noise }, shadow_count: { value: 0 },
       shadow_tip: { value: four() }, shadow_shaft: { value: four() },
     };
     this.organ = new Mesh(new BufferGeometry(), new RawShaderMaterial({ glslVersion: GLSL3, vertexShader: organVertexSource, uniforms: this.uniforms }));
     this.organ.frustumCulled = false;
-    this.scene.add(this.organ);
+    this.field = new Field(this.uniforms);
+    this.scene.add(this.organ, this.field.backdrop, this.field.scopeEdge);
     this.setQuality(this.quality);
   }
 
@@ -123,10 +126,26 @@ export class Picture {
   follow(view: number, participant: number | null, isAlong = false): void {
     Object.assign(this.panes[view] ?? {}, { follows: participant, isAlong });
   }
+  // A view sees with the tool in a slot, as long as it is there; null: from its own place.
+  seeWith(view: number, slot: number | null): void { Object.assign(this.panes[view] ?? {}, { seesWith: slot }); }
   // Sets the view as it was at the beginning.
-  resetView(): void { Object.assign(this.moved, { isFramed: false, follows: null }); }
-  turn(yaw: number, pitch: number): void { this.moved.turn(yaw, pitch); }
-  zoom(factor: number): void { this.moved.zoom(factor); }
+  resetView(): void {
+    this.letGo();
+    this.moved.isFramed = false;
+  }
+  turn(yaw: number, pitch: number): void {
+    this.letGo();
+    this.moved.turn(yaw, pitch);
+  }
+  zoom(factor: number): void {
+    this.letGo();
+    this.moved.zoom(factor);
+  }
+  private letGo(): void {
+    if (this.moved.follows === null && this.moved.seesWith === null) return;
+    Object.assign(this.moved, { follows: null, seesWith: null });
+    this.onLetGo(this.active);
+  }
   // Where the first view is, m: for others, who follow it.
   view(): { eye: Vec3; target: Vec3 } {
     const { x, y, z } = this.camera.position, to = this.main.target;
@@ -150,6 +169,7 @@ export class Picture {
   dispose(): void {
     for (const kind of ['pointerdown', 'wheel'] as const) this.canvas.removeEventListener(kind, this.touch, true);
     this.controls.dispose();
+    this.field.dispose();
     this.renderer.dispose();
     for (const drawn of [...this.tools.values(), ...this.pointers.values()]) drawn.label.remove();
   }
@@ -182,19 +202,27 @@ export class Picture {
       if (!pane.isFramed) this.frame(pane);
       pane.follow(tools, seconds);
       pane.camera.lookAt(pane.target);
+      const lender = tools.find(tool => tool.slot === pane.seesWith);
+      pane.lookThrough(lender ? this.replica.lens(lender.slot, this.guide.shapeOf(lender.slot)) : null);
     }
     this.controls.update();
     this.place(tools, seconds);
-    this.placePointers(this.replica.pointers());
+    const target = this.replica.lessonTarget();
+    this.placePointers([...this.replica.pointers(), ...(target ? [{ participant: kLessonPoint, position: target }] : [])]);
     this.placeDrawing();
     this.renderer.setScissorTest(this.count > 1);
-    for (const pane of shown) {
+    for (const [view, pane] of shown.entries()) {
       const [left, top, width, height] = pane.part;
       const box = [left * this.width, (1 - top - height) * this.height, width * this.width, height * this.height] as const;
       this.renderer.setViewport(...box);
       this.renderer.setScissor(...box);
-      this.light(pane.camera);
-      this.renderer.render(this.scene, pane.camera);
+      this.light(pane);
+      this.field.look(this.renderer, view, pane.drawn, pane.isEndoscope, box);
+      // An endoscope is not in its own picture.
+      const own = pane.isEndoscope ? this.tools.get(pane.seesWith ?? -1)?.group : undefined;
+      if (own) own.visible = false;
+      this.renderer.render(this.scene, pane.drawn);
+      if (own) own.visible = true;
     }
     this.placeLabels(tools);
     this.pictures++;
@@ -216,7 +244,7 @@ export class Picture {
   }
   // Where a place in the world lies on the canvas, in pixels of the page; null: behind the viewer.
   project(place: Vec3): [number, number] | null {
-    const at = new Vector3(...place).project(this.camera);
+    const at = new Vector3(...place).project(this.main.drawn);
     return at.z > 1 ? null : this.onCanvas(at);
   }
   // From what project() gives, of the first view.
@@ -226,7 +254,7 @@ export class Picture {
   }
   private hit(x: number, y: number): Intersection | undefined {
     const ray = new Raycaster(), pane = this.panes.find((one, i) => i < this.count && one.has(x, y)) ?? this.main, [u, v] = pane.inside(x, y);
-    ray.setFromCamera(new Vector2(u * 2 - 1, 1 - v * 2), pane.camera);
+    ray.setFromCamera(new Vector2(u * 2 - 1, 1 - v * 2), pane.drawn);
     this.organ.geometry.computeBoundingSphere();
     return ray.intersectObject(this.organ, false)[0];
   }
@@ -248,29 +276,34 @@ export class Picture {
     if (median > kSlowMs && this.quality < 2) this.setQuality(this.quality + 1);
   }
 
-  private frame(pane: Pane): void {
+  private box(): [Vector3, Vector3] {
     const p = this.replica.rest(), low = new Vector3(1e9, 1e9, 1e9), high = new Vector3(-1e9, -1e9, -1e9), at = new Vector3();
     for (let i = 0; i + 3 < p.length; i += 4) {
       at.set(p[i] ?? 0, p[i + 1] ?? 0, p[i + 2] ?? 0);
       low.min(at);
       high.max(at);
     }
+    return [low, high];
+  }
+  private frame(pane: Pane): void {
+    const [low, high] = this.box();
     pane.frame(low.clone().add(high).multiplyScalar(0.5), high.distanceTo(low) / 2);
   }
 
   private loadGeometry(): void {
     const r = this.replica, n = r.vertexCount, g = this.organ.geometry;
     g.dispose();
-    for (const [name, size] of [['position', 3], ['normal', 3]] as const)
+    for (const [name, size] of [['position', 3], ['normal', 3], ['lip', 3]] as const)
       g.setAttribute(name, dynamic(new BufferAttribute(new Float32Array(n * size), size)));
     g.setAttribute('rest', new BufferAttribute(r.rest().slice(), 4));
     g.setAttribute('overlay', dynamic(new BufferAttribute(new Uint8Array(n * 4), 4, true)));
     g.setIndex(new BufferAttribute(r.triangles().slice(), 1));
+    this.field.measure(...this.box());
     this.version = r.geometryVersion;
   }
   private loadPositions(): void {
     const g = this.organ.geometry;
-    for (const [name, values] of [['position', this.replica.positions()], ['normal', this.replica.normals()], ['overlay', this.replica.overlay()]] as const) {
+    for (const [name, values] of [['position', this.replica.positions()], ['normal', this.replica.normals()], ['lip', this.replica.lips()], ['overlay', this.replica.overlay()]] as const) {
       const attribute = g.getAttribute(name) as BufferAttribute;
       attribute.array.set(values);
       attribute.needsUpdate = true;
@@ -376,15 +409,16 @@ export class Picture {
     drawn.arrowGroup.quaternion.copy(new Quaternion().setFromUnitVectors(new Vector3(0, 0, 1), force.normalize()));
   }
 
+  private pointerColour(participant: number): number { return participant === kLessonPoint ? kLessonColour : this.replica.pointerColour(participant); }
   private placePointers(pointers: Pointer[]): void {
     const shown = new Map(pointers.map(p => [p.participant, p]));
     for (const [who, drawn] of this.pointers) drawn.group.visible = !(drawn.label.hidden = !shown.has(who));
     // From above the place and from before it, as the viewer sees it.
-    const m = this.camera.matrixWorld.elements, along = new Vector3(-m[8], -m[9], -m[10]).multiplyScalar(0.45).sub(new Vector3(m[4], m[5], m[6])).normalize();
+    const m = this.main.drawn.matrixWorld.elements, along = new Vector3(-m[8], -m[9], -m[10]).multiplyScalar(0.45).sub(new Vector3(m[4], m[5], m[6])).normalize();
     for (const { participant, position } of pointers) {
       let drawn = this.pointers.get(participant);
       if (!drawn) {
-        drawn = { group: this.arrowGroup(this.replica.makeArrow(kPointerLength, 0.0022, this.replica.pointerColour(participant))).group, label: document.createElement('div') };
+        drawn = { group: this.arrowGroup(this.replica.makeArrow(kPointerLength, 0.0022, this.pointerColour(participant))).group, label: document.createElement('div') };
         drawn.label.className = 'label pointer';
         this.labels.append(drawn.label);
         this.scene.add(drawn.group);
@@ -393,9 +427,9 @@ export class Picture {
       const at = new Vector3(...position);
       drawn.group.position.copy(at).addScaledVector(along, -kPointerLength);
       drawn.group.quaternion.setFromUnitVectors(new Vector3(0, 0, 1), along);
-      drawn.label.textContent = this.guide.pointerLabel(participant);
-      drawn.label.style.setProperty('--own', `#${this.replica.pointerColour(participant).toString(16).padStart(6, '0')}`);
-      at.project(this.camera);
+      drawn.label.textContent = participant === kLessonPoint ? 'Follow this point' : this.guide.pointerLabel(participant);
+      drawn.label.style.setProperty('--own', `#${this.pointerColour(participant).toString(16).padStart(6, '0')}`);
+      at.project(this.main.drawn);
       drawn.label.style.transform = `translate(${this.onCanvas(at).map(n => `${n.toFixed(1)}px`).join(', ')})`;
     }
   }
@@ -420,7 +454,8 @@ export class Picture {
     }
   }
 
-  private light(camera: PerspectiveCamera): void {
+  private light(pane: Pane): void {
+    const camera = pane.drawn;
     camera.updateMatrixWorld();
     this.scene.updateMatrixWorld();
     const m = camera.matrixWorld.elements, u = this.uniforms;
@@ -428,8 +463,10 @@ export class Picture {
       new Vector3(m[0], m[1], m[2]).multiplyScalar(right).addScaledVector(new Vector3(m[4], m[5], m[6]), up)
         .addScaledVector(new Vector3(m[8], m[9], m[10]), back).normalize();
     (u['eye']!.value as Vector3).copy(camera.position);
-    (u['key_direction']!.value as Vector3).copy(direction(0.42, 0.88, 0.55));
+    (u['key_direction']!.value as Vector3).copy(pane.isEndoscope ? direction(0.05, 0.12, 1) : direction(0.42, 0.88, 0.55));
     (u['fill_direction']!.value as Vector3).copy(direction(-0.9, 0.15, 0.35));
+    const middle = camera.position.distanceTo(pane.target);
+    (u['haze']!.value as Vector2).set(...(pane.isEndoscope ? kScopeHaze : [middle, kHazePerMiddle / middle] as const));
     (u['clip_from_world']!.value as Matrix4).multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse);
   }
 
@@ -439,7 +476,7 @@ export class Picture {
       const drawn = this.tools.get(tool.slot);
       if (!drawn) continue;
       const shape = this.guide.shapeOf(tool.slot);
-      const at = new Vector3(0, 0, shape.radiusM * 7).applyQuaternion(drawn.group.quaternion).add(drawn.group.position).project(this.camera);
+      const at = new Vector3(0, 0, shape.radiusM * 7).applyQuaternion(drawn.group.quaternion).add(drawn.group.position).project(this.main.drawn);
       if (at.z > 1 || Math.abs(at.x) > 1.05 || Math.abs(at.y) > 1.05) continue;
       shown.add(tool.slot);
       const { text, colour } = this.guide.labelOf(tool);

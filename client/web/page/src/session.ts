@@ -2,7 +2,7 @@
 // and comes back when the connection breaks.
 
 import { create, fromBinary, toBinary } from '@bufbuild/protobuf';
-import { EnvelopeSchema, GoodbyeReason, MarkAction, PointRequestSchema, StrokeRequestSchema, TeachRequestSchema, Vec3Schema, ViewRequestSchema, type Envelope, type Participant, type TeachAction } from './gen/proto/wire_pb';
+import { EnvelopeSchema, GoodbyeReason, LessonRequestSchema, MarkRequestSchema, PointRequestSchema, StrokeRequestSchema, TeachAction, TeachRequestSchema, Vec3Schema, ViewRequestSchema, type Envelope, type LessonAction, type MarkAction, type Participant } from './gen/proto/wire_pb';
 import type { Link } from './link';
 import type { Replica, Vec3 } from './replica';
 
@@ -56,8 +56,9 @@ export class Session {
   // Beyond this the picture is old: half a round trip, three frames and 250 ms.
   get oldAfterMs(): number { return this.roundTripMs / 2 + 48 + 250; }
 
-  mark(returns: boolean): void {
-    this.say({ case: 'markRequest', value: { $typeName: 'trocar.proto.MarkRequest', action: returns ? MarkAction.MARK_RETURN : MarkAction.MARK_SET } });
+  // Marks the organ, or returns it; `name`: of several marks.
+  mark(action: MarkAction, name: string): void {
+    this.say({ case: 'markRequest', value: create(MarkRequestSchema, { action, name }) });
   }
 
   // Shows everybody a place (m), or none any more.
@@ -69,6 +70,14 @@ export class Session {
   // What an instructor does; `whom`: with whom, `text`: what the action needs.
   teach(action: TeachAction, whom: Participant | null = null, text = ''): void {
     this.say({ case: 'teachRequest', value: create(TeachRequestSchema, { action, text, participant: whom?.slot ?? 0, name: whom?.name ?? '' }) });
+  }
+  // Goes on in the lesson, or back to its beginning.
+  lead(action: LessonAction): void {
+    this.say({ case: 'lessonRequest', value: create(LessonRequestSchema, { action }) });
+  }
+  // Lets simulated time go so fast, as a share of real time.
+  slow(rate: number): void {
+    this.say({ case: 'teachRequest', value: create(TeachRequestSchema, { action: TeachAction.TEACH_SLOW, rate }) });
   }
   // A line on the organ, or a piece of it.
   stroke(points: { triangle: number; weights: [number, number] }[]): void {

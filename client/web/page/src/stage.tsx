@@ -2,7 +2,7 @@
 
 import { useEffect, useRef, useState } from 'preact/hooks';
 import type { ComponentChildren, JSX } from 'preact';
-import { ToolShapeSchema, type Participant, type ToolShape } from './gen/proto/wire_pb';
+import { ToolForm, ToolShapeSchema, type Participant, type ToolShape } from './gen/proto/wire_pb';
 import { create } from '@bufbuild/protobuf';
 import { Overlay, Verb, type Replica, type Shape, type Tool, type Vec3 } from './replica';
 import type { Part, ViewCount } from './pane';
@@ -45,10 +45,22 @@ export function doing(tools: Tool[]): string {
   return tool.hasClaim ? (tool.verb === Verb.Grasp ? 'holds' : what) : tool.verb === Verb.Grasp ? 'wants to grasp' : what;
 }
 
+// Who lends a view: in a session an endoscope, in a recording any tool.
+export interface Lender { slot: number; text: string }
+export function lendersOf(people: Participant[], tools: Tool[], isRecording: boolean): Lender[] {
+  return tools.flatMap(({ slot }) => {
+    const owner = people.find(p => p.slot === slot >> 1), form = owner?.tool[slot & 1]?.form, second = (slot & 1) === 1 ? ', second hand' : '';
+    const isEndoscope = form === ToolForm.ENDOSCOPE || form === ToolForm.ENDOSCOPE_30;
+    if (!owner || !(isEndoscope || isRecording)) return [];
+    return [{ slot, text: `${isEndoscope ? `the ${form === ToolForm.ENDOSCOPE ? 0 : 30}° endoscope` : 'the tool'} of ${owner.name}${second}` }];
+  });
+}
+
 interface StageProps {
   replica: Replica;
   guide: Guide;
   isOld: boolean; // the picture is not of now
+  isRecording?: boolean;
   follows: number | null;
   people: Participant[];
   onFollow(slot: number | null): void;
@@ -66,7 +78,7 @@ interface StageProps {
 export function Stage(props: StageProps): JSX.Element {
   const canvas = useRef<HTMLCanvasElement>(null), labels = useRef<HTMLDivElement>(null), box = useRef<HTMLDivElement>(null);
   const picture = useRef<Picture | null>(null), latest = useRef(props);
-  const [overlay, setOverlay] = useState(Overlay.Holds), [arrows, setArrows] = useState(true), [fault, setFault] = useState(''), [points, setPoints] = useState(false);
+  const [overlay, setOverlay] = useState(Overlay.Holds), [arrows, setArrows] = useState(true), [fault, setFault] = useState(''), [points, setPoints] = useState(false), [sees, setSees] = useState<number | null>(null);
   const [views, setViews] = useState<ViewCount>(1), [active, setActive] = useState(0), [parts, setParts] = useState<Part[]>([]);
   const place = useRef<[number, number] | null>(null), hasPointed = useRef(false);
   latest.current = props;
@@ -80,7 +92,11 @@ export function Stage(props: StageProps): JSX.Element {
       return undefined;
     }
     picture.current = drawn;
-    drawn.onLetGo = view => { if (view === 0) latest.current.onFollow(null); };
+    drawn.onLetGo = view => {
+      if (view !== 0) return;
+      latest.current.onFollow(null);
+      setSees(null);
+    };
     drawn.onActive = setActive;
     props.onReady(drawn);
     const size = new ResizeObserver(() => {
@@ -144,6 +160,7 @@ export function Stage(props: StageProps): JSX.Element {
   const mayPoint = props.onPoint !== undefined;
   useEffect(() => { if (!mayPoint) setPoints(false); }, [mayPoint]);
   useEffect(() => picture.current?.follow(0, props.follows), [props.follows]);
+  useEffect(() => picture.current?.seeWith(0, sees), [sees]);
   useEffect(() => {
     if (!picture.current) return;
     picture.current.views = views;
@@ -153,8 +170,12 @@ export function Stage(props: StageProps): JSX.Element {
 
   const reset = (): void => {
     picture.current?.resetView();
-    if (active === 0) props.onFollow(null);
+    if (active !== 0) return;
+    props.onFollow(null);
+    setSees(null);
   };
+  const lenders = lendersOf(props.people, props.replica.tools(), props.isRecording ?? false);
+  const seeWithNext = (): void => setSees(lenders[lenders.findIndex(one => one.slot === sees) + 1]?.slot ?? null);
   const onKey = (event: KeyboardEvent): void => {
     const p = picture.current, step = event.shiftKey ? 0.02 : 0.1;
     if (!p || event.ctrlKey || event.metaKey || event.altKey) return;
@@ -162,7 +183,7 @@ export function Stage(props: StageProps): JSX.Element {
       ArrowLeft: () => p.turn(-step, 0), ArrowRight: () => p.turn(step, 0), ArrowUp: () => p.turn(0, step), ArrowDown: () => p.turn(0, -step),
       ...(props.onPlace ? { Enter: () => props.onPlace?.(0.5, 0.5) } : {}), '+': () => p.zoom(0.9), '=': () => p.zoom(0.9), '-': () => p.zoom(1 / 0.9), c: reset, ...(mayPoint ? { p: () => setPoints(!points) } : {}),
       l: () => setOverlay(overlay === Overlay.Holds ? Overlay.None : Overlay.Holds),
-      o: () => setOverlay(overlay === Overlay.Regions ? Overlay.None : Overlay.Regions), a: () => setArrows(!arrows),
+      o: () => setOverlay(overlay === Overlay.Regions ? Overlay.None : Overlay.Regions), a: () => setArrows(!arrows), ...(lenders.length > 0 ? { t: seeWithNext } : {}),
       ...(mayDivide ? { v: () => setViews(views === 1 ? 2 : views === 2 ? 4 : 1) } : {}),
       ...(views > 1 ? Object.fromEntries(parts.map((_, i) => [String(i + 1), () => p.activate(i)])) : {}),
     };
@@ -179,7 +200,7 @@ export function Stage(props: StageProps): JSX.Element {
         onPointerMove={onMove} onPointerDown={onPress} onPointerUp={onRelease} onPointerLeave={() => { place.current = null; }}
         aria-label={`The organ and the instruments. Arrow keys turn the view, plus and minus zoom, C resets it.${views > 1 ? ` View ${active + 1} of ${views} is moved; ${views === 2 ? '1 and 2' : '1 to 4'} choose another.` : ''}`} />
       <div class="labels" ref={labels} aria-hidden="true" />
-      {views > 1 && picture.current && <PaneChoices picture={picture.current} parts={parts} active={active} people={props.people} />}
+      {views > 1 && picture.current && <PaneChoices picture={picture.current} parts={parts} active={active} people={props.people} lenders={lenders} />}
       {fault && <p class="banner fault" role="alert">{fault}</p>}
       {props.children}
       <div class="view" role="toolbar" aria-label="View">
@@ -190,6 +211,14 @@ export function Stage(props: StageProps): JSX.Element {
             {props.people.filter(p => p.tool.length > 0).map(p => <option key={p.slot} value={String(p.slot)}>{p.name}</option>)}
           </select>
         </label>
+        {(lenders.length > 0 || sees !== null) && (
+          <label class="choice" title="See through an endoscope (T)">See with
+            <select value={sees === null ? '' : String(sees)} onChange={e => setSees(e.currentTarget.value === '' ? null : Number(e.currentTarget.value))}>
+              <option value="">own eyes</option>
+              {lenders.map(one => <option key={one.slot} value={String(one.slot)}>{one.text}</option>)}
+            </select>
+          </label>
+        )}
         <button aria-pressed={overlay === Overlay.Holds} onClick={() => setOverlay(overlay === Overlay.Holds ? Overlay.None : Overlay.Holds)} title="Who holds what (L)">Holds</button>
         <button aria-pressed={overlay === Overlay.Regions} onClick={() => setOverlay(overlay === Overlay.Regions ? Overlay.None : Overlay.Regions)} title="How far each force reaches (O)">Reach</button>
         {mayPoint && <button aria-pressed={points} onClick={() => setPoints(!points)} title="Show everybody the place under the pointer (P)">Point</button>}

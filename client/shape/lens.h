@@ -3,11 +3,10 @@
 // This is the view of who sees with a tool: through an endoscope, or from behind the tip of any
 // other instrument.
 
-#include "client/device/view_rays.h"
 #include "common/math/frame.h"
 #include "common/tool/tool.h"
 
-namespace trocar::render {
+namespace trocar::shape {
 
 struct Lens {
   Vec3f eye;          // m, world frame
@@ -20,4 +19,4 @@ struct Lens {
 // keeps it so; with 30 degrees it then looks another way. `up` of the world is y.
 Lens lens_of(const Pose& world_from_tool, const tool::ToolShape& shape);
 
-}  // namespace trocar::render
+}  // namespace trocar::shape

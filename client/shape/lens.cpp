@@ -1,8 +1,8 @@
-#include "client/render/lens.h"
+#include "client/shape/lens.h"
 
 #include <cmath>
 
-namespace trocar::render {
+namespace trocar::shape {
 namespace {
 
 constexpr float kTanHalfScope = 0.7002f;  // 70 degrees
@@ -29,4 +29,4 @@ Lens lens_of(const Pose& world_from_tool, const tool::ToolShape& shape) {
   return lens;
 }
 
-}  // namespace trocar::render
+}  // namespace trocar::shape
