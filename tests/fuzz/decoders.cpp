@@ -25,6 +25,8 @@
 #include "server/organs/catalogue/builtin_organs.h"
 #include "server/organs/formats/mesh_file.h"
 #include "server/organs/formats/tetgen_reader.h"
+#include "server/organs/label_map/label_solid.h"
+#include "server/organs/label_map/nifti_reader.h"
 #include "server/organs/material/material_file.h"
 #include "server/organs/organ/local_reduction_file.h"
 #include "server/organs/organ/organ_file.h"
@@ -249,6 +251,11 @@ bool decode_mesh(BytesView bytes) {
 constexpr char kGmsh[] = "a.msh", kVtk[] = "a.vtk", kVtu[] = "a.vtu", kMedit[] = "a.mesh",
                kAbaqus[] = "a.inp", kStl[] = "a.stl", kObj[] = "a.obj", kPly[] = "a.ply";
 
+bool decode_nifti(BytesView bytes) {
+  auto map = label_map::parse_nifti(text_of(bytes), std::nullopt, "a.nii");
+  return checked(map) && checked(label_map::LabelSolid::make(std::move(*map), {}, "a.nii"));
+}
+
 // A zero stands between the two files.
 bool decode_tetgen(BytesView bytes) {
   const auto text = text_of(bytes);
@@ -303,6 +310,7 @@ constexpr Decoder kDecoders[] = {
     {"stl", decode_mesh<kStl>},
     {"obj", decode_mesh<kObj>},
     {"ply", decode_mesh<kPly>},
+    {"nifti", decode_nifti},
     {"script", decode_script},
     {"scenario", decode_scenario},
     {"material", decode_material},

@@ -58,6 +58,8 @@ Examples:
       the same mesh, in metres, of neo-Hookean tets of 6 kPa
   trocar-organ import spleen.stl --unit mm --nodes 2000
       a closed surface, filled with tets
+  trocar-organ import scan.nii.gz --labels 1:liver,2:tumour
+      two structures of a segmented scan, as one organ of two regions
   trocar-organ inspect spleen.organ --json
       its figures, for other programs
   trocar-organ settle spleen.organ --gravity 0,-9.81,0
@@ -87,6 +89,8 @@ struct Options {
   std::string fix = "bottom:0.2";
   std::string import_name;
   std::optional<int> import_nodes;
+  std::string import_labels;
+  bool unit_is_said = false;
   std::string law;
   std::optional<double> young_modulus_pa, poisson_ratio;
   std::string inspected;
@@ -242,7 +246,11 @@ Status run_import(const Options& options) {
   if (!unit) return unit.error();
   catalogue::ImportOptions import_options;
   import_options.unit = *unit;
+  import_options.unit_is_said = options.unit_is_said;
   import_options.nodes = options.import_nodes;
+  const auto labels = catalogue::parse_labels(options.import_labels);
+  if (!labels) return labels.error();
+  import_options.labels = *labels;
   if (options.fix.starts_with(kFixSet)) {
     import_options.fix_set = options.fix.substr(kFixSet.size());
   } else {
@@ -272,7 +280,8 @@ Status run_import(const Options& options) {
   if (imported->organ.fixed_nodes.empty())
     std::fprintf(stderr, "%s: warning: %s: nothing holds this organ, a push moves all of it\n",
                  kProgram, options.import_file.c_str());
-  return save(imported->organ, options.out.empty() ? path.stem().string() + ".organ" : options.out);
+  return save(imported->organ,
+              options.out.empty() ? catalogue::imported_name(path) + ".organ" : options.out);
 }
 
 Status run_inspect(const Options& options) {
@@ -318,20 +327,27 @@ void add_commands(CLI::App& app, Options& options) {
       ->type_name("N");
   make->add_option("--out", options.out, "file to write [NAME.organ]")->type_name("FILE");
 
-  auto* import = app.add_subcommand("import", "turn a mesh or a closed surface into an organ");
+  auto* import =
+      app.add_subcommand("import", "turn a mesh, a closed surface or a label map into an organ");
   import
       ->add_option("FILE", options.import_file,
                    "tetrahedra: Gmsh .msh, VTK .vtk or .vtu, TetGen .ele beside "
                    ".node, MEDIT .mesh, "
-                   "Abaqus .inp; surfaces: .stl, .obj, .ply, .vtk")
+                   "Abaqus .inp; surfaces: .stl, .obj, .ply, .vtk; label maps: .nii, .nii.gz")
       ->required();
   import
       ->add_option(
           "--nodes", options.import_nodes,
-          "of a surface: how many nodes its mesh has, met within 15 %, " +
+          "of a surface or a label map: how many nodes its mesh has, met within 15 %, " +
               range(mesh::kMinFillNodes, mesh::kMaxFillNodes, catalogue::kDefaultFillNodes))
       ->type_name("N");
-  import->add_option("--unit", options.unit, "length unit of the file: m, cm or mm")
+  import
+      ->add_option("--labels", options.import_labels,
+                   "of a label map: which make the organ, such as 1:liver,2:tumour [all but 0]")
+      ->type_name("LIST");
+  import
+      ->add_option("--unit", options.unit,
+                   "length unit of the file: m, cm or mm; a label map says its own")
       ->type_name("UNIT")
       ->capture_default_str();
   import
@@ -430,6 +446,8 @@ int run(int argc, char** argv) {
       return app.got_subcommand(command) &&
              app.get_subcommand(command)->count("--averaged-strain") > 0;
     };
+    options.unit_is_said =
+        app.got_subcommand("import") && app.get_subcommand("import")->count("--unit") > 0;
     if (!says("make") && !says("import")) options.has_averaged_strain.reset();
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error);

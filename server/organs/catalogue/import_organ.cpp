@@ -3,9 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <variant>
 
 #include "server/organs/formats/mesh_file.h"
+#include "server/organs/label_map/label_mesh.h"
+#include "server/organs/label_map/nifti_reader.h"
 #include "server/organs/mesh/fill_field.h"
 #include "server/organs/surface/closed_surface.h"
 #include "server/organs/surface/signed_distance.h"
@@ -56,19 +59,43 @@ mesh::Box box_around(const std::vector<Vec3d>& positions) {
   return box;
 }
 
-// Fills a surface; the notes say with what, and how well it fits.
-Result<mesh::ImportedMesh> fill(surface::RawSurface raw, const ImportOptions& options,
-                                const std::string& name, std::vector<std::string>& notes) {
+Result<int> nodes_of(const ImportOptions& options) {
   const int nodes = options.nodes.value_or(kDefaultFillNodes);
   if (nodes < mesh::kMinFillNodes || nodes > mesh::kMaxFillNodes)
     return Error{ErrorCode::Usage, fmt::format("--nodes: {} must be {} to {}", nodes,
                                                mesh::kMinFillNodes, mesh::kMaxFillNodes)};
+  return nodes;
+}
+
+Result<mesh::ImportedMesh> fill_labels(const std::filesystem::path& path,
+                                       const ImportOptions& options,
+                                       std::vector<std::string>& notes) {
+  const auto nodes = nodes_of(options);
+  if (!nodes) return nodes.error();
+  auto map = label_map::read_nifti(
+      path, options.unit_is_said ? std::optional(options.unit) : std::nullopt);
+  if (!map) return map.error();
+  std::vector<std::uint16_t> labels;
+  for (const auto& [label, name] : options.labels) labels.push_back(label);
+  const auto solid = label_map::LabelSolid::make(std::move(*map), labels, path.string());
+  if (!solid) return solid.error();
+  auto filled = label_map::mesh_labels(*solid, *nodes, options.labels, path.string());
+  if (!filled) return filled.error();
+  notes = std::move(filled->notes);
+  return std::move(filled->imported);
+}
+
+// Fills a surface; the notes say with what, and how well it fits.
+Result<mesh::ImportedMesh> fill(surface::RawSurface raw, const ImportOptions& options,
+                                const std::string& name, std::vector<std::string>& notes) {
+  const auto nodes = nodes_of(options);
+  if (!nodes) return nodes.error();
   auto solid = surface::check_surface(std::move(raw), options.unit, name);
   if (!solid) return solid.error();
   const surface::SignedDistance distance(*solid);
   auto filled =
       mesh::fill_field([&](const Vec3d& p) { return distance(p); }, box_around(solid->positions),
-                       solid->volume_m3, solid->area_m2, nodes);
+                       solid->volume_m3, solid->area_m2, *nodes);
   if (!filled) return Error{ErrorCode::BadFile, name + ": " + filled.error().message};
   mesh::ImportedMesh imported{
       std::move(filled->mesh), solid->offset_m, std::move(solid->warnings), {}, {}};
@@ -87,6 +114,25 @@ Result<mesh::ImportedMesh> fill(surface::RawSurface raw, const ImportOptions& op
   return imported;
 }
 
+Result<mesh::ImportedMesh> read_mesh(const std::filesystem::path& path,
+                                     const ImportOptions& options,
+                                     std::vector<std::string>& notes) {
+  const std::string name = path.string();
+  if (label_map::is_nifti_file(path)) return fill_labels(path, options, notes);
+  if (!options.labels.empty())
+    return Error{ErrorCode::Usage, name + ": --labels does not apply, the file is no label map"};
+  if (!formats::is_mesh_file(path))
+    return Error{ErrorCode::BadFile, name + ": is of no kind that can be imported: " +
+                                         formats::kMeshEndings + ", .nii, .nii.gz"};
+  auto file = formats::read_mesh_file(path);
+  if (!file) return file.error();
+  if (auto* surface = std::get_if<surface::RawSurface>(&*file))
+    return fill(std::move(*surface), options, name, notes);
+  if (options.nodes)
+    return Error{ErrorCode::Usage, name + ": --nodes does not apply, the file has tetrahedra"};
+  return mesh::make_mesh(std::get<mesh::RawTets>(std::move(*file)), options.unit, name);
+}
+
 std::string names_of(const std::vector<mesh::NamedNodes>& sets) {
   std::string text;
   for (const auto& set : sets) {
@@ -100,8 +146,7 @@ std::string names_of(const std::vector<mesh::NamedNodes>& sets) {
 // region that holds all of its nodes.
 Status add_regions(std::vector<mesh::NamedNodes> regions, ImportedOrgan& result) {
   if (regions.empty()) return {};
-  result.notes.push_back(
-      fmt::format("has {} regions: {}", regions.size(), plain(names_of(regions))));
+  result.notes.push_back("regions: " + plain(names_of(regions)));
   for (auto& region : regions)
     result.organ.regions.push_back(
         {plain(region.name), result.organ.material, std::move(region.nodes)});
@@ -110,9 +155,7 @@ Status add_regions(std::vector<mesh::NamedNodes> regions, ImportedOrgan& result)
 
 Status hold(const ImportOptions& options, const std::vector<mesh::NamedNodes>& sets,
             ImportedOrgan& result) {
-  if (!sets.empty())
-    result.notes.push_back(
-        fmt::format("has {} sets of nodes: {}", sets.size(), plain(names_of(sets))));
+  if (!sets.empty()) result.notes.push_back("sets of nodes: " + plain(names_of(sets)));
   if (!options.fix_set) {
     result.organ.fixed_nodes = organ::nodes_held_by(options.fix, result.organ.mesh);
     return {};
@@ -128,26 +171,46 @@ Status hold(const ImportOptions& options, const std::vector<mesh::NamedNodes>& s
 
 }  // namespace
 
+std::string imported_name(const std::filesystem::path& path) {
+  const auto stem = path.stem();
+  return (stem.extension() == ".nii" ? stem.stem() : stem).string();
+}
+
+bool can_be_imported(const std::filesystem::path& path) {
+  return formats::is_mesh_file(path) || label_map::is_nifti_file(path);
+}
+
+Result<std::vector<std::pair<std::uint16_t, std::string>>> parse_labels(std::string_view text) {
+  std::vector<std::pair<std::uint16_t, std::string>> labels;
+  while (!text.empty()) {
+    const auto comma = std::min(text.find(','), text.size());
+    const auto part = text.substr(0, comma);
+    text.remove_prefix(std::min(comma + 1, text.size()));
+    const auto colon = std::min(part.find(':'), part.size());
+    int label = 0;
+    const auto [end, error] = std::from_chars(part.data(), part.data() + colon, label);
+    if (error != std::errc{} || end != part.data() + colon || label < 1 || label > 65535)
+      return Error{ErrorCode::Usage, "--labels: '" + plain(std::string(part)) +
+                                         "' is no label, such as 2 or 2:tumour, from 1 to 65535"};
+    labels.emplace_back(static_cast<std::uint16_t>(label),
+                        colon < part.size() ? plain(std::string(part.substr(colon + 1)))
+                                            : "label " + std::to_string(label));
+  }
+  return labels;
+}
+
 Result<ImportedOrgan> import_organ(const std::filesystem::path& path,
                                    const ImportOptions& options) {
   const std::string name = path.string();
-  if (!formats::is_mesh_file(path))
-    return Error{ErrorCode::BadFile,
-                 name + ": is of no kind that can be imported: " + formats::kMeshEndings};
-  auto file = formats::read_mesh_file(path);
-  if (!file) return file.error();
   ImportedOrgan result;
-  auto* surface = std::get_if<surface::RawSurface>(&*file);
-  if (!surface && options.nodes)
-    return Error{ErrorCode::Usage, name + ": --nodes does not apply, the file has tetrahedra"};
-  auto imported =
-      surface ? fill(std::move(*surface), options, name, result.notes)
-              : mesh::make_mesh(std::move(std::get<mesh::RawTets>(*file)), options.unit, name);
+  auto imported = read_mesh(path, options, result.notes);
   if (!imported) return imported.error();
   result.warnings = std::move(imported->warnings);
   organ::Organ& organ = result.organ;
-  organ.name = plain(options.name.value_or(path.stem().string()));
-  organ.source = plain(path.filename().string()) + ", unit " + name_of(options.unit) + ", fix " +
+  organ.name = plain(options.name.value_or(imported_name(path)));
+  const bool has_own_unit = label_map::is_nifti_file(path) && !options.unit_is_said;
+  organ.source = plain(path.filename().string()) +
+                 (has_own_unit ? "" : std::string(", unit ") + name_of(options.unit)) + ", fix " +
                  (options.fix_set ? "set:" + plain(*options.fix_set) : to_text(options.fix));
   organ.mesh = std::move(imported->mesh);
   if (auto warning = size_warning(organ.mesh, options.unit); !warning.empty())

@@ -2,7 +2,6 @@
 
 #include "common/base/log.h"
 #include "server/organs/catalogue/builtin_organs.h"
-#include "server/organs/formats/mesh_file.h"
 #include "server/organs/organ/organ_file.h"
 
 namespace trocar::catalogue {
@@ -16,7 +15,7 @@ Result<organ::Organ> load_organ(const std::string& spec) {
   if (spec == "chest") return make_chest();
   const std::filesystem::path path(spec);
   if (path.extension() == ".organ") return organ::read_organ(path);
-  if (formats::is_mesh_file(path)) {
+  if (can_be_imported(path)) {
     auto imported = import_organ(path, {});
     if (!imported) return imported.error();
     for (const std::string& note : imported->notes) log::info("{}: {}", spec, note);

@@ -10,10 +10,11 @@ namespace trocar::mesh {
 namespace {
 
 constexpr double kNodesPerCube = 2;
-constexpr double kGoodCount = 0.02, kAcceptableCount = 0.15;  // shares of the asked number
+constexpr double kGoodCount = 0.05, kAcceptableCount = 0.15;  // shares of the asked number
 constexpr double kGoodVolume = 0.001;
 constexpr double kLostVolume = 0.3;  // share at which no growing outward helps
-constexpr int kMaxSpacings = 12, kMaxGrowths = 6;
+constexpr int kMaxAttempts = 16;
+constexpr double kFiner = 0.93;  // step to a finer lattice where meshing failed
 // Steps outward beyond this share of the spacing would close gaps.
 constexpr double kMaxGrowth = 0.5;
 constexpr double kMaxPlaces = 4e7;  // of the lattice: 2.5 GB
@@ -54,64 +55,57 @@ Error too_thin(int nodes, double needed) {
 Result<FilledSolid> fill_field(const SignedField& distance, const Box& box, double volume_m3,
                                double surface_m2, int nodes) {
   TROCAR_ASSERT(nodes >= kMinFillNodes && nodes <= kMaxFillNodes);
-  double spacing = std::cbrt(kNodesPerCube * volume_m3 / nodes), low = 0, high = 1e9;
-  std::optional<TetMesh> best;
-  double best_error = 1e9, best_spacing = 0;
+  // A wall that thin is lost for certain.
+  if (needed_nodes(volume_m3, surface_m2) > 8.0 * nodes)
+    return too_thin(nodes, needed_nodes(volume_m3, surface_m2));
+  double spacing = std::cbrt(kNodesPerCube * volume_m3 / nodes), grown = 0;
+  std::optional<FilledSolid> best;
+  double best_score = 1e9;
   std::string failure = "nothing of the solid is inside";
-  for (int i = 0; i < kMaxSpacings && best_error > kGoodCount; ++i) {
+  for (int i = 0; i < kMaxAttempts; ++i) {
     if (places_of(box, spacing) > kMaxPlaces)
       return Error{ErrorCode::BadFile, "is too thin to be filled with " + std::to_string(nodes) +
                                            " nodes: ask for fewer (--nodes)"};
-    auto mesh = stuff_isosurface(distance, box, spacing);
+    const Vec3d margin = Vec3d{1, 1, 1} * std::max(grown, 0.0);
+    auto mesh = stuff_isosurface([&](const Vec3d& p) { return distance(p) - grown; },
+                                 {box.low - margin, box.high + margin}, spacing);
     if (!mesh) {
       failure = mesh.error().message;
-      high = spacing;
-      spacing = std::max(spacing * 0.9, (low + spacing) / 2);
+      spacing *= kFiner;
       continue;
     }
-    // The first guess is finer than needed: what it loses, a coarser one would lose, too.
-    if (!best && std::abs(total_volume(*mesh) / volume_m3 - 1) > kLostVolume)
-      return too_thin(nodes, needed_nodes(volume_m3, surface_m2));
-    const double ratio = static_cast<double>(mesh->node_count()) / nodes;
-    if (std::abs(ratio - 1) < best_error) {
-      best_error = std::abs(ratio - 1);
-      best_spacing = spacing;
-      best = std::move(*mesh);
-    }
-    (ratio > 1 ? low : high) = spacing;
-    const double next = spacing * std::cbrt(ratio);
-    spacing = next > low && next < high ? next : (low + std::min(high, 2 * low + spacing)) / 2;
-  }
-  if (!best || best_error > kAcceptableCount)
-    return Error{ErrorCode::BadFile,
-                 "cannot be filled with about " + std::to_string(nodes) + " nodes" +
-                     (best ? ", the nearest number is " + std::to_string(best->node_count())
-                           : ": " + failure) +
-                     ": ask for another number (--nodes)"};
-  FilledSolid filled{std::move(*best), best_spacing, 0};
-  double error = total_volume(filled.mesh) / volume_m3 - 1;
-  double grown = 0, slope = surface_area(filled.mesh), previous_volume = total_volume(filled.mesh);
-  for (int i = 0; i < kMaxGrowths && std::abs(error) > kGoodVolume; ++i) {
-    const double step = (volume_m3 - previous_volume) / slope;
-    const double next =
-        std::clamp(grown + step, -kMaxGrowth * best_spacing, kMaxGrowth * best_spacing);
-    if (next == grown) break;
-    const Vec3d margin = Vec3d{1, 1, 1} * std::max(next, 0.0);
-    auto mesh = stuff_isosurface([&](const Vec3d& p) { return distance(p) - next; },
-                                 {box.low - margin, box.high + margin}, best_spacing);
-    if (!mesh) break;
     const double volume = total_volume(*mesh);
-    // A secant, where it is believable: a solid grows outward.
-    const double measured = (volume - previous_volume) / (next - grown);
-    if (measured > slope / 4 && measured < slope * 4) slope = measured;
-    grown = next, previous_volume = volume;
-    if (std::abs(volume / volume_m3 - 1) >= std::abs(error)) continue;
-    error = volume / volume_m3 - 1;
-    filled = {std::move(*mesh), best_spacing, next};
+    const double count_error = static_cast<double>(mesh->node_count()) / nodes - 1;
+    const double volume_error = volume / volume_m3 - 1;
+    // The first guess is finer than needed: what it loses, a coarser one would lose, too.
+    if (!best && std::abs(volume_error) > kLostVolume)
+      return too_thin(nodes, needed_nodes(volume_m3, surface_m2));
+    const double step = (volume_m3 - volume) / surface_area(*mesh);
+    const double score = std::max(std::abs(count_error) / kAcceptableCount,
+                                  std::abs(volume_error) / kFillVolumeTolerance);
+    if (score < best_score) {
+      best_score = score;
+      best = {std::move(*mesh), spacing, grown};
+    }
+    const bool is_count_good = std::abs(count_error) < kGoodCount;
+    if (is_count_good && std::abs(volume_error) < kGoodVolume) break;
+    // Nodes are inversely proportional to the cube of the spacing; half steps end a swing between
+    // two lattices.
+    const double power = i < kMaxAttempts / 2 ? 1 : 0.5;
+    if (!is_count_good) spacing *= std::cbrt(1 + power * count_error);
+    grown = std::clamp(grown + step, -kMaxGrowth * spacing, kMaxGrowth * spacing);
   }
-  if (std::abs(error) > kFillVolumeTolerance)
+  if (!best)
+    return Error{ErrorCode::BadFile, "cannot be filled with about " + std::to_string(nodes) +
+                                         " nodes: " + failure + ": ask for another number"};
+  if (std::abs(total_volume(best->mesh) / volume_m3 - 1) > kFillVolumeTolerance)
     return too_thin(nodes, std::max(needed_nodes(volume_m3, surface_m2), nodes * 1.5));
-  return filled;
+  if (best_score > 1)
+    return Error{ErrorCode::BadFile, "cannot be filled with about " + std::to_string(nodes) +
+                                         " nodes, the nearest number is " +
+                                         std::to_string(best->mesh.node_count()) +
+                                         ": ask for another number (--nodes)"};
+  return std::move(*best);
 }
 
 }  // namespace trocar::mesh

@@ -5,7 +5,8 @@
 //
 // Stuffing cuts corners off where the surface bends: a mesh of flat faces between nodes on a convex
 // surface lies inside it. The isosurface is therefore moved outward by a constant, a part of the
-// spacing, until the volumes agree; the constant is found by secants. Same numbers, same mesh.
+// spacing, until the volumes agree; the constant and the spacing are found together. Same numbers,
+// same mesh.
 
 #include "common/base/result.h"
 #include "server/organs/mesh/stuffing.h"
