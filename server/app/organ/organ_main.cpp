@@ -15,6 +15,7 @@
 #include "common/base/version.h"
 #include "server/app/organ/organ_calibrate.h"
 #include "server/app/organ/organ_experiments.h"
+#include "server/app/organ/organ_export.h"
 #include "server/app/organ/organ_identify.h"
 #include "server/app/organ/organ_print.h"
 #include "server/app/organ/organ_reduce.h"
@@ -62,6 +63,10 @@ Examples:
       two structures of a segmented scan, as one organ of two regions
   trocar-organ inspect spleen.organ --json
       its figures, for other programs
+  trocar-organ inspect spleen.organ --picture spleen.png
+      its figures, and how it looks from three sides
+  trocar-organ export spleen.organ --out spleen.vtu --unit mm
+      its mesh, for ParaView
   trocar-organ settle spleen.organ --gravity 0,-9.81,0
       its rest pose under gravity, in which it starts without sagging, into spleen-settled.organ
   trocar-organ fit deploy/scenes/stretch.toml deploy/scenes/stretch.csv
@@ -95,7 +100,9 @@ struct Options {
   std::optional<double> young_modulus_pa, poisson_ratio;
   std::string inspected;
   bool json = false;
+  std::string picture;
   std::optional<bool> has_averaged_strain;
+  ExportCommand exported;
   FitCommand fit;
   SettleCommand settle;
   CalibrateCommand calibrate;
@@ -288,7 +295,7 @@ Status run_inspect(const Options& options) {
   const auto organ = catalogue::load_organ(options.inspected);
   if (!organ) return organ.error();
   options.json ? print_json(*organ) : print_text(*organ);
-  return {};
+  return options.picture.empty() ? Status{} : draw(*organ, options.picture);
 }
 
 std::string version_text() {
@@ -381,6 +388,11 @@ void add_commands(CLI::App& app, Options& options) {
                    "built-in organ's name")
       ->required();
   inspect->add_flag("--json", options.json, "print JSON");
+  inspect
+      ->add_option("--picture", options.picture,
+                   "also draw it from three sides, into this .png file")
+      ->type_name("FILE");
+  add_export_command(app, options.exported);
   for (auto* command : {make, import}) {
     command
         ->add_option("--material", options.material,
@@ -460,6 +472,8 @@ int run(int argc, char** argv) {
     status = run_make(options);
   else if (app.got_subcommand("import"))
     status = run_import(options);
+  else if (app.got_subcommand("export"))
+    status = run_export(options.exported);
   else if (app.got_subcommand("fit"))
     status = run_fit(options.fit);
   else if (app.got_subcommand("settle"))
