@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <string>
+#include <utility>
+#include <variant>
 
 #include "common/base/assert.h"
 #include "common/journal/session_journal.h"
@@ -24,10 +26,14 @@
 #include "proto/wire.pb.h"
 #include "server/lab/scenario/scenario.h"
 #include "server/organs/catalogue/builtin_organs.h"
+#include "server/organs/formats/mesh_file.h"
+#include "server/organs/formats/tetgen_reader.h"
+#include "server/organs/label_map/label_solid.h"
+#include "server/organs/label_map/nifti_reader.h"
 #include "server/organs/material/material_file.h"
-#include "server/organs/mesh/gmsh_reader.h"
 #include "server/organs/organ/local_reduction_file.h"
 #include "server/organs/organ/organ_file.h"
+#include "server/organs/surface/closed_surface.h"
 #include "server/papers/dogan/reduction_file.h"
 #include "server/session/access/code_book.h"
 #include "server/session/bleeding/bleeding.h"
@@ -250,8 +256,36 @@ bool decode_reduction(BytesView bytes) {
 bool decode_local_reduction(BytesView bytes) {
   return decode_packed(bytes, organ::kLocalReductionMagic, 2, organ::unpack_local_reduction);
 }
-bool decode_gmsh(BytesView bytes) {
-  return checked(mesh::parse_gmsh(text_of(bytes), mesh::Unit::Metre, "a.msh"));
+// Readers of mesh files, and what makes a valid mesh or a closed surface of what they read.
+bool make_solid(Result<formats::TetsOrSurface> read, const std::string& name) {
+  if (!checked(read)) return false;
+  if (auto* raw = std::get_if<surface::RawSurface>(&*read))
+    return checked(surface::check_surface(std::move(*raw), mesh::Unit::Metre, name));
+  const auto mesh =
+      mesh::make_mesh(std::get<mesh::RawTets>(std::move(*read)), mesh::Unit::Metre, name);
+  TROCAR_ASSERT(!mesh.ok() || mesh::validate(mesh->mesh).ok());
+  return checked(mesh);
+}
+template <const char* kName>
+bool decode_mesh(BytesView bytes) {
+  return make_solid(formats::parse_mesh(text_of(bytes), kName), kName);
+}
+constexpr char kGmsh[] = "a.msh", kVtk[] = "a.vtk", kVtu[] = "a.vtu", kMedit[] = "a.mesh",
+               kAbaqus[] = "a.inp", kStl[] = "a.stl", kObj[] = "a.obj", kPly[] = "a.ply";
+
+bool decode_nifti(BytesView bytes) {
+  auto map = label_map::parse_nifti(text_of(bytes), std::nullopt, "a.nii");
+  return checked(map) && checked(label_map::LabelSolid::make(std::move(*map), {}, "a.nii"));
+}
+
+// A zero stands between the two files.
+bool decode_tetgen(BytesView bytes) {
+  const auto text = text_of(bytes);
+  const auto split = std::min(text.find('\0'), text.size());
+  const auto elements = text.substr(std::min(split + 1, text.size()));
+  auto tets = formats::parse_tetgen(text.substr(0, split), "a.node", elements, "a.ele");
+  if (!checked(tets)) return false;
+  return make_solid(formats::TetsOrSurface(std::move(*tets)), "a.ele");
 }
 bool decode_script(BytesView bytes) {
   return checked(tool::parse_script_text(text_of(bytes), "a.toml"));
@@ -305,7 +339,16 @@ constexpr Decoder kDecoders[] = {
     {"organ", decode_organ},
     {"reduction", decode_reduction},
     {"local_reduction", decode_local_reduction},
-    {"gmsh", decode_gmsh},
+    {"gmsh", decode_mesh<kGmsh>},
+    {"vtk", decode_mesh<kVtk>},
+    {"vtu", decode_mesh<kVtu>},
+    {"medit", decode_mesh<kMedit>},
+    {"abaqus", decode_mesh<kAbaqus>},
+    {"tetgen", decode_tetgen},
+    {"stl", decode_mesh<kStl>},
+    {"obj", decode_mesh<kObj>},
+    {"ply", decode_mesh<kPly>},
+    {"nifti", decode_nifti},
     {"script", decode_script},
     {"scenario", decode_scenario},
     {"lesson", decode_lesson},

@@ -7,6 +7,7 @@
 #include <functional>
 #include <set>
 
+#include "server/organs/mesh/quality.h"
 #include "tests/mesh/block_mesh.h"
 
 namespace trocar::mesh {
@@ -276,6 +277,18 @@ INSTANTIATE_TEST_SUITE_P(
 
 TEST(Validate, AcceptsASurfaceHeldByLinks) {
   EXPECT_TRUE(validate(pillow())) << validate(pillow()).error().message;
+}
+
+TEST(Quality, CountsTetsByTheirSmallestDihedralAngle) {
+  // A corner of a cube has angles of 90 and 54.7 degrees, a regular tet 70.5.
+  TetMesh mesh;
+  mesh.rest_positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1},
+                         {5, 5, 5}, {6, 6, 5}, {6, 5, 6}, {5, 6, 6}};
+  mesh.tets = {{NodeIndex(0), NodeIndex(1), NodeIndex(2), NodeIndex(3)},
+               {NodeIndex(4), NodeIndex(5), NodeIndex(6), NodeIndex(7)}};
+  const auto counts = dihedral_histogram(mesh);
+  EXPECT_EQ(counts[5], 1u);
+  EXPECT_EQ(counts[7], 1u);
 }
 
 }  // namespace

@@ -13,6 +13,7 @@
 #include "proto/organ.pb.h"
 #include "server/organs/catalogue/builtin_organs.h"
 #include "server/organs/catalogue/load_organ.h"
+#include "server/organs/organ/packed_file.h"
 #include "tests/support/shared.h"
 
 namespace trocar::organ {
@@ -258,6 +259,42 @@ TEST(OrganFile, AnnouncedLengthsTakeNoMemory) {
   EXPECT_NE(unpack_organ(file).error().message.find("512 MiB"), std::string::npos);
   announce(10);
   EXPECT_FALSE(unpack_organ(file).ok());
+}
+
+// Few bytes that stand for much: packed lists of zeros, empty messages, fields of no meaning.
+TEST(OrganFile, SmallFilesBuildLittle) {
+  constexpr PackedKind kKind{"TROCARO1", "an .organ file", "", "", 2, 3};
+  // Numbers of fields, as bytes before a length: 4 is the tets, 11 a region, 14 and 4 a row, 100 is
+  // none.
+  const auto repeated = [](std::string_view one, std::size_t count) {
+    Bytes bytes;
+    for (std::size_t i = 0; i < count; ++i) bytes.insert(bytes.end(), one.begin(), one.end());
+    return bytes;
+  };
+  Bytes zeros{0x22, 0x80, 0x80, 0x80, 0x1e};  // 60 MiB of tets
+  zeros.resize(zeros.size() + (std::size_t{60} << 20));
+  rusage before{}, after{};
+  getrusage(RUSAGE_SELF, &before);
+  const auto file = pack(kKind, 2, zeros);
+  zeros = {};
+  EXPECT_LT(file.size(), 16u << 10);
+  const auto result = unpack_organ(file);
+  ASSERT_FALSE(result.ok());
+  EXPECT_NE(result.error().message.find("16 times its size"), std::string::npos)
+      << result.error().message;
+  for (const auto& body : {repeated(std::string_view("\x5a\0", 2), 4'000'000),
+                           repeated(std::string_view("\x72\x02\x22\0", 4), 2'000'000),
+                           repeated(std::string_view("\xa2\x06\0", 3), 3'000'000)}) {
+    const auto small = unpack_organ(pack(kKind, 2, body));
+    ASSERT_FALSE(small.ok());
+    EXPECT_NE(small.error().message.find("16 times its size"), std::string::npos)
+        << small.error().message;
+    // The same without packing counts against its own size.
+    EXPECT_FALSE(decode_organ(body).ok());
+  }
+  getrusage(RUSAGE_SELF, &after);
+  // The test's own body of 60 MiB is the most.
+  EXPECT_LT(after.ru_maxrss - before.ru_maxrss, 400 * 1024) << "KiB";
 }
 
 TEST(OrganFile, OtherVersionsAreNamed) {

@@ -15,14 +15,17 @@
 #include "common/base/version.h"
 #include "server/app/organ/organ_calibrate.h"
 #include "server/app/organ/organ_experiments.h"
+#include "server/app/organ/organ_export.h"
 #include "server/app/organ/organ_identify.h"
 #include "server/app/organ/organ_print.h"
 #include "server/app/organ/organ_reduce.h"
 #include "server/app/organ/program_name.h"
 #include "server/lab/scenario/scenario.h"
 #include "server/organs/catalogue/builtin_organs.h"
+#include "server/organs/catalogue/import_organ.h"
 #include "server/organs/catalogue/load_organ.h"
 #include "server/organs/material/material_file.h"
+#include "server/organs/mesh/fill_field.h"
 #include "server/organs/organ/any_material.h"
 #include "server/organs/organ/average_strain.h"
 #include "server/organs/organ/fibre_rule.h"
@@ -34,6 +37,7 @@ namespace {
 // From here on the work takes longer than two seconds, and a line says that it goes on.
 constexpr int kManyTets = 100'000;
 constexpr std::uintmax_t kLargeFileBytes = 20'000'000;
+constexpr std::string_view kFixSet = "set:";
 
 constexpr const char* kExamples = R"(
 Examples:
@@ -53,8 +57,16 @@ Examples:
       a mesh in millimetres, held at the hindmost tenth, into spleen.organ
   trocar-organ import spleen.msh --law neo-hookean --young-modulus 6000
       the same mesh, in metres, of neo-Hookean tets of 6 kPa
+  trocar-organ import spleen.stl --unit mm --nodes 2000
+      a closed surface, filled with tets
+  trocar-organ import scan.nii.gz --labels 1:liver,2:tumour
+      two structures of a segmented scan, as one organ of two regions
   trocar-organ inspect spleen.organ --json
       its figures, for other programs
+  trocar-organ inspect spleen.organ --picture spleen.png
+      its figures, and how it looks from three sides
+  trocar-organ export spleen.organ --out spleen.vtu --unit mm
+      its mesh, for ParaView
   trocar-organ settle spleen.organ --gravity 0,-9.81,0
       its rest pose under gravity, in which it starts without sagging, into spleen-settled.organ
   trocar-organ fit deploy/scenes/stretch.toml deploy/scenes/stretch.csv
@@ -81,11 +93,16 @@ struct Options {
   std::string unit = "m";
   std::string fix = "bottom:0.2";
   std::string import_name;
+  std::optional<int> import_nodes;
+  std::string import_labels;
+  bool unit_is_said = false;
   std::string law;
   std::optional<double> young_modulus_pa, poisson_ratio;
   std::string inspected;
   bool json = false;
+  std::string picture;
   std::optional<bool> has_averaged_strain;
+  ExportCommand exported;
   FitCommand fit;
   SettleCommand settle;
   CalibrateCommand calibrate;
@@ -226,12 +243,28 @@ void say_what_was_chosen(const Options& options, const material::Material& m) {
                m.young_modulus_pa / 1e3);
 }
 
+// Imported regions differ in name only; scenarios give them materials of their own.
+void give_regions_its_material(organ::Organ& organ) {
+  for (auto& region : organ.regions) region.material = organ.material;
+}
+
 Status run_import(const Options& options) {
   const auto unit = mesh::parse_unit(options.unit);
   if (!unit) return unit.error();
-  const auto fix = organ::parse_fix_rule(options.fix);
-  if (!fix) return fix.error();
-  catalogue::ImportOptions import_options{*unit, *fix, std::nullopt};
+  catalogue::ImportOptions import_options;
+  import_options.unit = *unit;
+  import_options.unit_is_said = options.unit_is_said;
+  import_options.nodes = options.import_nodes;
+  const auto labels = catalogue::parse_labels(options.import_labels);
+  if (!labels) return labels.error();
+  import_options.labels = *labels;
+  if (options.fix.starts_with(kFixSet)) {
+    import_options.fix_set = options.fix.substr(kFixSet.size());
+  } else {
+    const auto fix = organ::parse_fix_rule(options.fix);
+    if (!fix) return fix.error();
+    import_options.fix = *fix;
+  }
   if (!options.import_name.empty()) import_options.name = options.import_name;
   const std::filesystem::path path(options.import_file);
   std::error_code missing;
@@ -242,7 +275,11 @@ Status run_import(const Options& options) {
   auto imported = catalogue::import_organ(path, import_options);
   if (!imported) return imported.error();
   if (auto chosen = choose_law(options, imported->organ.material); !chosen) return chosen;
+  give_regions_its_material(imported->organ);
   if (auto changed = change_organ(options, true, imported->organ); !changed) return changed;
+  give_regions_its_material(imported->organ);
+  for (const std::string& note : imported->notes)
+    std::fprintf(stderr, "%s: %s: %s\n", kProgram, options.import_file.c_str(), note.c_str());
   say_what_was_chosen(options, imported->organ.material);
   for (const std::string& warning : imported->warnings)
     std::fprintf(stderr, "%s: warning: %s: %s\n", kProgram, options.import_file.c_str(),
@@ -250,19 +287,24 @@ Status run_import(const Options& options) {
   if (imported->organ.fixed_nodes.empty())
     std::fprintf(stderr, "%s: warning: %s: nothing holds this organ, a push moves all of it\n",
                  kProgram, options.import_file.c_str());
-  return save(imported->organ, options.out.empty() ? path.stem().string() + ".organ" : options.out);
+  return save(imported->organ,
+              options.out.empty() ? catalogue::imported_name(path) + ".organ" : options.out);
 }
 
 Status run_inspect(const Options& options) {
   const auto organ = catalogue::load_organ(options.inspected);
   if (!organ) return organ.error();
   options.json ? print_json(*organ) : print_text(*organ);
-  return {};
+  return options.picture.empty() ? Status{} : draw(*organ, options.picture);
 }
 
 std::string version_text() {
   return std::string(kProgram) + " " + kVersion + ", sim_version " + std::to_string(kSimVersion) +
          ", protocol " + std::to_string(kProtocolMajor) + "." + std::to_string(kProtocolMinor);
+}
+
+std::string range(int low, int high, int usual) {
+  return std::to_string(low) + " to " + std::to_string(high) + " [" + std::to_string(usual) + "]";
 }
 
 void add_commands(CLI::App& app, Options& options) {
@@ -282,9 +324,6 @@ void add_commands(CLI::App& app, Options& options) {
                ": is neither liver, elastic-liver, stomach, lattice, plate or chest nor a "
                ".toml file of a scenario";
       });
-  const auto range = [](int low, int high, int usual) {
-    return std::to_string(low) + " to " + std::to_string(high) + " [" + std::to_string(usual) + "]";
-  };
   make->add_option("--tets", options.tets,
                    "how many tets, met within 5 %: liver " +
                        range(catalogue::kMinLiverTets, catalogue::kMaxLiverTets,
@@ -295,15 +334,34 @@ void add_commands(CLI::App& app, Options& options) {
       ->type_name("N");
   make->add_option("--out", options.out, "file to write [NAME.organ]")->type_name("FILE");
 
-  auto* import = app.add_subcommand("import", "turn a Gmsh 2.2 ASCII mesh into an organ");
-  import->add_option("FILE", options.import_file, ".msh file")->required();
-  import->add_option("--unit", options.unit, "length unit of the file: m, cm or mm")
+  auto* import =
+      app.add_subcommand("import", "turn a mesh, a closed surface or a label map into an organ");
+  import
+      ->add_option("FILE", options.import_file,
+                   "tetrahedra: Gmsh .msh, VTK .vtk or .vtu, TetGen .ele beside "
+                   ".node, MEDIT .mesh, "
+                   "Abaqus .inp; surfaces: .stl, .obj, .ply, .vtk; label maps: .nii, .nii.gz")
+      ->required();
+  import
+      ->add_option(
+          "--nodes", options.import_nodes,
+          "of a surface or a label map: how many nodes its mesh has, met within 15 %, " +
+              range(mesh::kMinFillNodes, mesh::kMaxFillNodes, catalogue::kDefaultFillNodes))
+      ->type_name("N");
+  import
+      ->add_option("--labels", options.import_labels,
+                   "of a label map: which make the organ, such as 1:liver,2:tumour [all but 0]")
+      ->type_name("LIST");
+  import
+      ->add_option("--unit", options.unit,
+                   "length unit of the file: m, cm or mm; a label map says its own")
       ->type_name("UNIT")
       ->capture_default_str();
   import
       ->add_option("--fix", options.fix,
-                   "which surface nodes are held: bottom:F, top:F, back:F (share of the height or "
-                   "depth), or none")
+                   "which surface nodes are held: bottom:F, top:F, back:F (share "
+                   "of the height or "
+                   "depth), set:NAME (a set of the file), or none")
       ->type_name("RULE")
       ->capture_default_str();
   import->add_option("--name", options.import_name, "name of the organ [the file's]")
@@ -324,9 +382,17 @@ void add_commands(CLI::App& app, Options& options) {
       ->check(CLI::Range(0.0, 0.4999));
 
   auto* inspect = app.add_subcommand("inspect", "check an organ and print its figures");
-  inspect->add_option("FILE", options.inspected, ".organ or .msh file, or a built-in organ's name")
+  inspect
+      ->add_option("FILE", options.inspected,
+                   ".organ file, a mesh or surface as import reads it, or a "
+                   "built-in organ's name")
       ->required();
   inspect->add_flag("--json", options.json, "print JSON");
+  inspect
+      ->add_option("--picture", options.picture,
+                   "also draw it from three sides, into this .png file")
+      ->type_name("FILE");
+  add_export_command(app, options.exported);
   for (auto* command : {make, import}) {
     command
         ->add_option("--material", options.material,
@@ -334,7 +400,8 @@ void add_commands(CLI::App& app, Options& options) {
                          ", or a .toml file as identify leaves it")
         ->type_name("NAME");
     command->add_flag("--averaged-strain", options.has_averaged_strain,
-                      "average strain over nodes, so that tets do not lock; =false: plain tets, up "
+                      "average strain over nodes, so that tets do not lock; =false: plain tets, "
+                      "up "
                       "to 50 % too stiff [averaged: liver, --material, imports that are not of "
                       "springs or tensor-mass]");
     command->add_option("--tension", options.tension, "tissue would be shorter by this part [0]")
@@ -351,7 +418,8 @@ void add_commands(CLI::App& app, Options& options) {
         ->type_name("TAU");
     command
         ->add_option("--fibres", options.fibres,
-                     "where fibres run: x, y or z; around:x, around:y or around:z; or a .csv file "
+                     "where fibres run: x, y or z; around:x, around:y or "
+                     "around:z; or a .csv file "
                      "with id,x,y,z for every node")
         ->type_name("RULE");
     command
@@ -390,6 +458,8 @@ int run(int argc, char** argv) {
       return app.got_subcommand(command) &&
              app.get_subcommand(command)->count("--averaged-strain") > 0;
     };
+    options.unit_is_said =
+        app.got_subcommand("import") && app.get_subcommand("import")->count("--unit") > 0;
     if (!says("make") && !says("import")) options.has_averaged_strain.reset();
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error);
@@ -402,6 +472,8 @@ int run(int argc, char** argv) {
     status = run_make(options);
   else if (app.got_subcommand("import"))
     status = run_import(options);
+  else if (app.got_subcommand("export"))
+    status = run_export(options.exported);
   else if (app.got_subcommand("fit"))
     status = run_fit(options.fit);
   else if (app.got_subcommand("settle"))

@@ -7,6 +7,7 @@
 
 #include "common/base/json.h"
 #include "server/organs/material/material_keys.h"
+#include "server/organs/mesh/quality.h"
 #include "server/organs/organ/organ_file.h"
 
 namespace trocar::app {
@@ -118,6 +119,17 @@ void print_materials(const organ::Organ& organ) {
     std::printf("  rest pose           settled, in equilibrium\n");
 }
 
+// How many tets have their smallest dihedral angle in each class, with a bar of at most 40 signs.
+void print_quality(const mesh::TetMesh& mesh) {
+  const auto counts = mesh::dihedral_histogram(mesh);
+  const std::size_t most = std::max<std::size_t>(*std::ranges::max_element(counts), 1);
+  for (std::size_t c = 0; c < counts.size(); ++c)
+    if (counts[c] > 0)
+      std::printf("    smallest %2zu to %2zu  %9s %s\n", 10 * c, 10 * (c + 1),
+                  grouped(counts[c]).c_str(),
+                  std::string((40 * counts[c] + most - 1) / most, '#').c_str());
+}
+
 Json array_of(const Vec3d& v) {
   return {v.x, v.y, v.z};
 }
@@ -179,6 +191,7 @@ void print_text(const organ::Organ& organ) {
   if (!mesh.tets.empty()) {
     const auto angles = mesh::dihedral_range(mesh);
     std::printf("  dihedral angles     %.1f to %.1f degrees\n", angles.min_deg, angles.max_deg);
+    print_quality(mesh);
   }
   print_materials(organ);
   std::printf("  fixed nodes         %s (%.1f %%)\n", grouped(organ.fixed_nodes.size()).c_str(),
@@ -206,6 +219,7 @@ void print_json(const organ::Organ& organ) {
   if (!mesh.tets.empty()) {
     const auto angles = mesh::dihedral_range(mesh);
     json["dihedral_deg"] = {{"min", angles.min_deg}, {"max", angles.max_deg}};
+    json["smallest_dihedral_per_10_deg"] = mesh::dihedral_histogram(mesh);
   }
   add_material(organ.material, json);
   json["fibre_nodes"] = nodes_with_fibres(organ);

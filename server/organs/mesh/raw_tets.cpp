@@ -23,11 +23,14 @@ class Builder {
 
   Result<ImportedMesh> run() {
     if (raw_.tets.empty())
-      return error("has no tetrahedra: mesh the volume (Gmsh: -3), a surface is not enough");
+      return error(
+          "has no tetrahedra: mesh the volume (Gmsh: -3), or import the surface as STL, OBJ or "
+          "PLY");
     for (auto step : {&Builder::scale, &Builder::drop_unused, &Builder::centre, &Builder::weld,
                       &Builder::check_nodes_of_tets, &Builder::drop_repeated_tets, &Builder::orient,
                       &Builder::check_overlaps, &Builder::count_pieces})
       if (auto status = (this->*step)(); !status) return status.error();
+    name_regions();
     out_.mesh.rest_positions = std::move(raw_.positions);
     out_.mesh.tets = std::move(raw_.tets);
     out_.mesh.build_adjacency();
@@ -81,6 +84,10 @@ class Builder {
     raw_.node_ids.resize(kept);
     for (Tet& tet : raw_.tets)
       for (NodeIndex& node : tet) node = NodeIndex(new_index[node.value]);
+    for (NamedNodes& set : raw_.node_sets) {
+      std::erase_if(set.nodes, [&](NodeIndex node) { return !keep[node.value]; });
+      for (NodeIndex& node : set.nodes) node = NodeIndex(new_index[node.value]);
+    }
   }
 
   Status centre() {
@@ -137,6 +144,8 @@ class Builder {
     if (welded == 0) return {};
     for (Tet& tet : raw_.tets)
       for (NodeIndex& node : tet) node = NodeIndex(first[node.value]);
+    for (NamedNodes& set : raw_.node_sets)
+      for (NodeIndex& node : set.nodes) node = NodeIndex(first[node.value]);
     keep_nodes(keep);
     warn("welded " + std::to_string(welded) + " nodes to others at exactly the same place");
     return {};
@@ -175,12 +184,14 @@ class Builder {
     for (std::size_t t = 0; t < raw_.tets.size(); ++t) {
       if (repeated[t]) continue;
       raw_.tets[kept] = raw_.tets[t];
+      if (!raw_.tet_regions.empty()) raw_.tet_regions[kept] = raw_.tet_regions[t];
       raw_.element_ids[kept++] = raw_.element_ids[t];
     }
     if (kept < raw_.tets.size())
       warn("dropped " + std::to_string(raw_.tets.size() - kept) + " tets that were listed twice");
     raw_.tets.resize(kept);
     raw_.element_ids.resize(kept);
+    if (!raw_.tet_regions.empty()) raw_.tet_regions.resize(kept);
     return {};
   }
 
@@ -262,6 +273,30 @@ class Builder {
     return {};
   }
 
+  void name_regions() {
+    const auto tidy = [](NamedNodes& set) {
+      std::sort(set.nodes.begin(), set.nodes.end());
+      set.nodes.erase(std::unique(set.nodes.begin(), set.nodes.end()), set.nodes.end());
+    };
+    std::map<std::int64_t, NamedNodes> regions;
+    for (std::size_t t = 0; t < raw_.tet_regions.size(); ++t) {
+      auto& nodes = regions[raw_.tet_regions[t]].nodes;
+      nodes.insert(nodes.end(), raw_.tets[t].begin(), raw_.tets[t].end());
+    }
+    if (regions.size() > 1)
+      for (auto& [number, region] : regions) {
+        const auto named = raw_.region_names.find(number);
+        region.name =
+            named != raw_.region_names.end() ? named->second : "region " + std::to_string(number);
+        tidy(region);
+        out_.regions.push_back(std::move(region));
+      }
+    for (NamedNodes& set : raw_.node_sets) {
+      tidy(set);
+      if (!set.nodes.empty()) out_.node_sets.push_back(std::move(set));
+    }
+  }
+
   RawTets raw_;
   Unit unit_;
   const std::string& name_;
@@ -284,6 +319,7 @@ double metres_of(Unit unit) {
 Result<ImportedMesh> make_mesh(RawTets raw, Unit unit, const std::string& name) {
   TROCAR_ASSERT(raw.positions.size() == raw.node_ids.size());
   TROCAR_ASSERT(raw.tets.size() == raw.element_ids.size());
+  TROCAR_ASSERT(raw.tet_regions.empty() || raw.tets.size() == raw.tet_regions.size());
   return Builder(std::move(raw), unit, name).run();
 }
 

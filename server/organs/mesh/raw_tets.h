@@ -11,6 +11,7 @@
 // measured, so a mesh far from the origin loses nothing more than its file has lost.
 
 #include <cstdint>
+#include <map>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -25,17 +26,30 @@ enum class Unit : std::uint8_t { Metre, Centimetre, Millimetre };
 Result<Unit> parse_unit(std::string_view text);
 double metres_of(Unit unit);
 
+struct NamedNodes {
+  std::string name;
+  std::vector<NodeIndex> nodes;  // ascending, distinct
+};
+
 struct RawTets {
   std::vector<Vec3d> positions;           // in the file's unit
   std::vector<std::int64_t> node_ids;     // the file's number of each node
   std::vector<Tet> tets;                  // valid indices into `positions`
   std::vector<std::int64_t> element_ids;  // the file's number of each tet
+  // The file's number of each tet's region; empty: the file has none.
+  std::vector<std::int64_t> tet_regions;
+  std::map<std::int64_t, std::string> region_names;  // of some of them
+  std::vector<NamedNodes> node_sets;                 // in any order and number
 };
 
 struct ImportedMesh {
   TetMesh mesh;    // adjacency built, valid, rest bounding box centred on the origin
   Vec3d offset_m;  // add to a rest position to get the file's place
   std::vector<std::string> warnings;  // one line each: what was repaired, and how often
+  // Each region by name with the nodes of its tets, if the file has two regions or more; those at
+  // an interface belong to both.
+  std::vector<NamedNodes> regions;
+  std::vector<NamedNodes> node_sets;  // that have nodes left
 };
 
 // `name` starts each error, usually the file's path.

@@ -4,6 +4,7 @@
 
 #include "proto/organ.pb.h"
 #include "server/organs/organ/bad_file.h"
+#include "server/organs/organ/message_budget.h"
 #include "server/organs/organ/packed_file.h"
 
 namespace trocar::organ {
@@ -226,10 +227,15 @@ Bytes encode_organ(const Organ& organ) {
   return bytes;
 }
 
-Result<Organ> decode_organ(BytesView bytes) {
+namespace {
+
+// file_bytes: as many came from outside, packed or not.
+Result<Organ> decode_within(BytesView bytes, std::size_t file_bytes) {
   proto::Organ message;
-  if (bytes.size() > kMaxPackedBodyBytes ||
-      !message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())))
+  if (bytes.size() > kMaxPackedBodyBytes) return bad("organ: is larger than 512 MiB");
+  if (auto s = check_budget(*proto::Organ::descriptor(), bytes, build_budget(file_bytes)); !s)
+    return bad("organ: " + s.error().message);
+  if (!message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())))
     return bad("organ: is not an organ message");
   Organ organ;
   organ.name = message.name();
@@ -263,6 +269,12 @@ Result<Organ> decode_organ(BytesView bytes) {
   return organ;
 }
 
+}  // namespace
+
+Result<Organ> decode_organ(BytesView bytes) {
+  return decode_within(bytes, bytes.size());
+}
+
 Bytes pack_organ(const Organ& organ) {
   return pack(kOrganKind, version_of(organ), encode_organ(organ));
 }
@@ -270,7 +282,7 @@ Bytes pack_organ(const Organ& organ) {
 Result<Organ> unpack_organ(BytesView file) {
   const auto unpacked = unpack(kOrganKind, file);
   if (!unpacked) return unpacked.error();
-  auto organ = decode_organ(unpacked->body);
+  auto organ = decode_within(unpacked->body, file.size());
   if (organ.ok() && version_of(*organ) != unpacked->version)
     return bad("says version " + std::to_string(unpacked->version) + ", but holds version " +
                std::to_string(version_of(*organ)) + ": it is damaged");

@@ -9,6 +9,7 @@
 
 #include "common/base/checksum.h"
 #include "server/organs/organ/bad_file.h"
+#include "server/organs/organ/message_budget.h"
 
 namespace trocar::organ {
 namespace {
@@ -22,7 +23,8 @@ struct FreeZstd {
 };
 
 // Grows with what is really there: a short file that announces 512 MiB takes no such memory.
-Result<Bytes> unpack_body(BytesView packed, std::uint64_t announced) {
+// It also ends where it has grown beyond what a file of its size may build.
+Result<Bytes> unpack_body(BytesView packed, std::uint64_t announced, std::size_t budget) {
   const std::unique_ptr<ZSTD_DCtx, FreeZstd> context(ZSTD_createDCtx());
   TROCAR_ASSERT(context != nullptr);
   Bytes body;
@@ -33,6 +35,9 @@ Result<Bytes> unpack_body(BytesView packed, std::uint64_t announced) {
     // One byte more than announced, to notice a body that is longer.
     const auto room = std::min<std::uint64_t>(kUnpackStepBytes, announced + 1 - before);
     if (room == 0) return bad("body is longer than announced");
+    if (before > budget)
+      return bad("unpacks to more than " + std::to_string(budget >> 20) +
+                 " MiB, 16 times its size and 16 MiB: it is damaged or made to harm");
     body.resize(before + static_cast<std::size_t>(room));
     ZSTD_outBuffer out{body.data() + before, body.size() - before, 0};
     const std::size_t read_before = in.pos;
@@ -87,7 +92,7 @@ Result<PackedBody> unpack(const PackedKind& kind, BytesView file) {
                     : "s " + std::to_string(kind.first_version) + " and ") +
                std::to_string(kind.last_version) + ": " + std::string(kind.again));
   if (length > kMaxPackedBodyBytes) return bad("announces more than 512 MiB");
-  auto body = unpack_body(file.subspan(kHeaderBytes), length);
+  auto body = unpack_body(file.subspan(kHeaderBytes), length, build_budget(file.size()));
   if (!body) return body.error();
   if (crc32(*body) != crc) return bad("is damaged, its checksum does not fit");
   return PackedBody{version, std::move(*body)};

@@ -3,7 +3,7 @@
 // Files of Protocol Buffers look alike, whatever is in them: 8 bytes that say what they are, u32
 // version, u64 length of the body when unpacked (at most 512 MiB), u32 CRC-32 of the unpacked body,
 // then the body packed by zstd; numbers little-endian. No memory is taken for a length before that
-// many bytes are there.
+// many bytes are there, and a file unpacks to 16 times its size and 16 MiB at most.
 
 #include <filesystem>
 #include <string_view>

@@ -1,0 +1,66 @@
+#include "server/app/organ/organ_export.h"
+
+#include <cstdio>
+#include <filesystem>
+
+#include "common/base/text_file.h"
+#include "server/app/organ/organ_print.h"
+#include "server/organs/catalogue/load_organ.h"
+#include "server/organs/formats/mesh_writer.h"
+#include "server/organs/picture/organ_picture.h"
+
+namespace trocar::app {
+
+void add_export_command(CLI::App& app, ExportCommand& command) {
+  auto* sub = app.add_subcommand("export", "write an organ's mesh for other programs");
+  sub->add_option("ORGAN", command.organ, ".organ file, or what inspect takes")->required();
+  sub->add_option("--out", command.out,
+                  "file to write: .msh (Gmsh 2.2) and .vtu with tets, regions and held nodes; .stl "
+                  "and .glb with the surface")
+      ->type_name("FILE")
+      ->required();
+  sub->add_option("--unit", command.unit, "length unit of the file: m, cm or mm; GLB is in m")
+      ->type_name("UNIT")
+      ->capture_default_str();
+}
+
+Status run_export(const ExportCommand& command) {
+  const auto unit = mesh::parse_unit(command.unit);
+  if (!unit) return unit.error();
+  const auto ending = std::filesystem::path(command.out).extension();
+  const bool has_tets = ending == ".msh" || ending == ".vtu";
+  if (!has_tets && ending != ".stl" && ending != ".glb")
+    return Error{ErrorCode::Usage,
+                 "--out: " + command.out + ": the file must end with .msh, .vtu, .stl or .glb"};
+  const auto organ = catalogue::load_organ(command.organ);
+  if (!organ) return organ.error();
+  if (has_tets && organ->mesh.tets.empty())
+    return Error{ErrorCode::Usage, command.organ + ": has no tetrahedra, only .stl and .glb apply"};
+  formats::WrittenMesh written{.mesh = organ->mesh,
+                               .name = organ->name,
+                               .offset_m = organ->source_offset_m,
+                               .unit = *unit,
+                               .tet_regions = organ::material_map(*organ).tets,
+                               .region_names = {organ->name},
+                               .held_nodes = organ->fixed_nodes};
+  for (const auto& region : organ->regions) written.region_names.push_back(region.name);
+  const auto text = ending == ".msh"   ? formats::to_gmsh(written)
+                    : ending == ".vtu" ? formats::to_vtu(written)
+                    : ending == ".stl" ? formats::to_stl(written)
+                                       : formats::to_glb(written);
+  if (auto status = write_text_file(command.out, text); !status) return status;
+  std::printf("%s: %s bytes\n", command.out.c_str(), grouped(text.size()).c_str());
+  return {};
+}
+
+Status draw(const organ::Organ& organ, const std::string& path) {
+  std::vector<std::uint8_t> is_held(organ.mesh.node_count(), 0);
+  for (const NodeIndex node : organ.fixed_nodes) is_held[node.value] = 1;
+  const auto picture = picture::draw_organ(organ.mesh, organ::material_map(organ).nodes, is_held);
+  if (auto status = write_text_file(path, picture::to_png(picture)); !status) return status;
+  std::fprintf(stderr, "%s: seen from the front, the left and above; the bar is %.3g mm long\n",
+               path.c_str(), 1e3 * picture::scale_bar_m(organ.mesh));
+  return {};
+}
+
+}  // namespace trocar::app

@@ -1,0 +1,227 @@
+#include "server/organs/catalogue/import_organ.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <variant>
+
+#include "server/organs/formats/mesh_file.h"
+#include "server/organs/label_map/label_mesh.h"
+#include "server/organs/label_map/nifti_reader.h"
+#include "server/organs/mesh/fill_field.h"
+#include "server/organs/surface/closed_surface.h"
+#include "server/organs/surface/signed_distance.h"
+
+namespace trocar::catalogue {
+namespace {
+
+// Names travel in messages and file headers, which must be plain text.
+std::string plain(const std::string& text) {
+  std::string out = text.substr(0, 200);
+  for (char& c : out)
+    if (c < 32 || c > 126) c = '_';
+  return out.empty() ? "organ" : out;
+}
+
+const char* name_of(mesh::Unit unit) {
+  return unit == mesh::Unit::Metre ? "m" : unit == mesh::Unit::Centimetre ? "cm" : "mm";
+}
+
+// A tool's tip is 10 mm thick: what is smaller than that in every direction is hardly an organ.
+constexpr double kSmallestOrgan_m = 0.010;
+
+// Empty if the size is plausible; else one line with the size and what to do. An organ that is too
+// large is refused by the reader of meshes.
+std::string size_warning(const mesh::TetMesh& mesh, mesh::Unit unit) {
+  Vec3d half{};  // the box around the organ is centred on the origin
+  for (const Vec3d& p : mesh.rest_positions)
+    half = {std::max(half.x, p.x), std::max(half.y, p.y), std::max(half.z, p.z)};
+  const double largest_m = 2 * std::max({half.x, half.y, half.z});
+  if (largest_m >= kSmallestOrgan_m) return {};
+  std::string text =
+      fmt::format("the organ is only {:.3g} x {:.3g} x {:.3g} mm with --unit {}: ", 2e3 * half.x,
+                  2e3 * half.y, 2e3 * half.z, name_of(unit));
+  const double in_file = largest_m / metres_of(unit);
+  for (const auto other : {mesh::Unit::Metre, mesh::Unit::Centimetre})
+    if (const double m = in_file * metres_of(other); m >= kSmallestOrgan_m && m <= 2)
+      return text + fmt::format("with trocar-organ import --unit {} it would be {:.3g} mm long",
+                                name_of(other), 1e3 * m);
+  return text + "check the unit of the file";
+}
+
+mesh::Box box_around(const std::vector<Vec3d>& positions) {
+  mesh::Box box{positions.front(), positions.front()};
+  for (const Vec3d& p : positions) {
+    box.low = {std::min(box.low.x, p.x), std::min(box.low.y, p.y), std::min(box.low.z, p.z)};
+    box.high = {std::max(box.high.x, p.x), std::max(box.high.y, p.y), std::max(box.high.z, p.z)};
+  }
+  return box;
+}
+
+Result<int> nodes_of(const ImportOptions& options) {
+  const int nodes = options.nodes.value_or(kDefaultFillNodes);
+  if (nodes < mesh::kMinFillNodes || nodes > mesh::kMaxFillNodes)
+    return Error{ErrorCode::Usage, fmt::format("--nodes: {} must be {} to {}", nodes,
+                                               mesh::kMinFillNodes, mesh::kMaxFillNodes)};
+  return nodes;
+}
+
+Result<mesh::ImportedMesh> fill_labels(const std::filesystem::path& path,
+                                       const ImportOptions& options,
+                                       std::vector<std::string>& notes) {
+  const auto nodes = nodes_of(options);
+  if (!nodes) return nodes.error();
+  auto map = label_map::read_nifti(
+      path, options.unit_is_said ? std::optional(options.unit) : std::nullopt);
+  if (!map) return map.error();
+  std::vector<std::uint16_t> labels;
+  for (const auto& [label, name] : options.labels) labels.push_back(label);
+  const auto solid = label_map::LabelSolid::make(std::move(*map), labels, path.string());
+  if (!solid) return solid.error();
+  auto filled = label_map::mesh_labels(*solid, *nodes, options.labels, path.string());
+  if (!filled) return filled.error();
+  notes = std::move(filled->notes);
+  return std::move(filled->imported);
+}
+
+// Fills a surface; the notes say with what, and how well it fits.
+Result<mesh::ImportedMesh> fill(surface::RawSurface raw, const ImportOptions& options,
+                                const std::string& name, std::vector<std::string>& notes) {
+  const auto nodes = nodes_of(options);
+  if (!nodes) return nodes.error();
+  auto solid = surface::check_surface(std::move(raw), options.unit, name);
+  if (!solid) return solid.error();
+  const surface::SignedDistance distance(*solid);
+  auto filled =
+      mesh::fill_field([&](const Vec3d& p) { return distance(p); }, box_around(solid->positions),
+                       solid->volume_m3, solid->area_m2, *nodes);
+  if (!filled) return Error{ErrorCode::BadFile, name + ": " + filled.error().message};
+  mesh::ImportedMesh imported{
+      std::move(filled->mesh), solid->offset_m, std::move(solid->warnings), {}, {}};
+  imported.offset_m += centre_on_origin(imported.mesh);
+  const double volume = total_volume(imported.mesh);
+  const auto angles = dihedral_range(imported.mesh);
+  notes.push_back(fmt::format(
+      "filled {} triangles{} with {} nodes and {} tets, spacing {:.2f} mm", solid->triangles.size(),
+      solid->cavities == 0 ? "" : fmt::format(" and {} cavities", solid->cavities),
+      imported.mesh.node_count(), imported.mesh.tets.size(), 1e3 * filled->spacing_m));
+  notes.push_back(fmt::format(
+      "volume {:.4g} ml, {:+.2f} % of the surface's {:.4g} ml; dihedral angles {:.1f} to {:.1f} "
+      "degrees",
+      1e6 * volume, 100 * (volume / solid->volume_m3 - 1), 1e6 * solid->volume_m3, angles.min_deg,
+      angles.max_deg));
+  return imported;
+}
+
+Result<mesh::ImportedMesh> read_mesh(const std::filesystem::path& path,
+                                     const ImportOptions& options,
+                                     std::vector<std::string>& notes) {
+  const std::string name = path.string();
+  if (label_map::is_nifti_file(path)) return fill_labels(path, options, notes);
+  if (!options.labels.empty())
+    return Error{ErrorCode::Usage, name + ": --labels does not apply, the file is no label map"};
+  if (!formats::is_mesh_file(path))
+    return Error{ErrorCode::BadFile, name + ": is of no kind that can be imported: " +
+                                         formats::kMeshEndings + ", .nii, .nii.gz"};
+  auto file = formats::read_mesh_file(path);
+  if (!file) return file.error();
+  if (auto* surface = std::get_if<surface::RawSurface>(&*file))
+    return fill(std::move(*surface), options, name, notes);
+  if (options.nodes)
+    return Error{ErrorCode::Usage, name + ": --nodes does not apply, the file has tetrahedra"};
+  return mesh::make_mesh(std::get<mesh::RawTets>(std::move(*file)), options.unit, name);
+}
+
+std::string names_of(const std::vector<mesh::NamedNodes>& sets) {
+  std::string text;
+  for (const auto& set : sets) {
+    if (text.size() > 200) return text + ", ...";
+    text += (text.empty() ? "" : ", ") + set.name;
+  }
+  return text;
+}
+
+// Regions of the organ's own material, for others to be given; an element belongs to the last
+// region that holds all of its nodes.
+Status add_regions(std::vector<mesh::NamedNodes> regions, ImportedOrgan& result) {
+  if (regions.empty()) return {};
+  result.notes.push_back("regions: " + plain(names_of(regions)));
+  for (auto& region : regions)
+    result.organ.regions.push_back(
+        {plain(region.name), result.organ.material, std::move(region.nodes)});
+  return {};
+}
+
+Status hold(const ImportOptions& options, const std::vector<mesh::NamedNodes>& sets,
+            ImportedOrgan& result) {
+  if (!sets.empty()) result.notes.push_back("sets of nodes: " + plain(names_of(sets)));
+  if (!options.fix_set) {
+    result.organ.fixed_nodes = organ::nodes_held_by(options.fix, result.organ.mesh);
+    return {};
+  }
+  const auto set = std::ranges::find(sets, *options.fix_set, &mesh::NamedNodes::name);
+  if (set == sets.end())
+    return Error{ErrorCode::Usage,
+                 "--fix: the file has no set '" + plain(*options.fix_set) +
+                     (sets.empty() ? "', it has none" : "', it has: " + plain(names_of(sets)))};
+  result.organ.fixed_nodes = set->nodes;
+  return {};
+}
+
+}  // namespace
+
+std::string imported_name(const std::filesystem::path& path) {
+  const auto stem = path.stem();
+  return (stem.extension() == ".nii" ? stem.stem() : stem).string();
+}
+
+bool can_be_imported(const std::filesystem::path& path) {
+  return formats::is_mesh_file(path) || label_map::is_nifti_file(path);
+}
+
+Result<std::vector<std::pair<std::uint16_t, std::string>>> parse_labels(std::string_view text) {
+  std::vector<std::pair<std::uint16_t, std::string>> labels;
+  while (!text.empty()) {
+    const auto comma = std::min(text.find(','), text.size());
+    const auto part = text.substr(0, comma);
+    text.remove_prefix(std::min(comma + 1, text.size()));
+    const auto colon = std::min(part.find(':'), part.size());
+    int label = 0;
+    const auto [end, error] = std::from_chars(part.data(), part.data() + colon, label);
+    if (error != std::errc{} || end != part.data() + colon || label < 1 || label > 65535)
+      return Error{ErrorCode::Usage, "--labels: '" + plain(std::string(part)) +
+                                         "' is no label, such as 2 or 2:tumour, from 1 to 65535"};
+    labels.emplace_back(static_cast<std::uint16_t>(label),
+                        colon < part.size() ? plain(std::string(part.substr(colon + 1)))
+                                            : "label " + std::to_string(label));
+  }
+  return labels;
+}
+
+Result<ImportedOrgan> import_organ(const std::filesystem::path& path,
+                                   const ImportOptions& options) {
+  const std::string name = path.string();
+  ImportedOrgan result;
+  auto imported = read_mesh(path, options, result.notes);
+  if (!imported) return imported.error();
+  result.warnings = std::move(imported->warnings);
+  organ::Organ& organ = result.organ;
+  organ.name = plain(options.name.value_or(imported_name(path)));
+  const bool has_own_unit = label_map::is_nifti_file(path) && !options.unit_is_said;
+  organ.source = plain(path.filename().string()) +
+                 (has_own_unit ? "" : std::string(", unit ") + name_of(options.unit)) + ", fix " +
+                 (options.fix_set ? "set:" + plain(*options.fix_set) : to_text(options.fix));
+  organ.mesh = std::move(imported->mesh);
+  if (auto warning = size_warning(organ.mesh, options.unit); !warning.empty())
+    result.warnings.push_back(std::move(warning));
+  organ.source_offset_m = imported->offset_m;
+  if (auto s = add_regions(std::move(imported->regions), result); !s) return s.error();
+  if (auto s = hold(options, imported->node_sets, result); !s) return s.error();
+  organ.node_masses_kg = organ::lumped_masses(organ);
+  if (auto status = validate(organ); !status)
+    return Error{ErrorCode::BadFile, name + ": " + status.error().message};
+  return result;
+}
+
+}  // namespace trocar::catalogue

@@ -1,0 +1,132 @@
+#include "server/organs/formats/gmsh_mesh.h"
+
+#include <utility>
+
+namespace trocar::formats {
+namespace {
+
+struct GmshKind {
+  std::int64_t type;
+  int nodes, dimension;
+};
+constexpr GmshKind kGmshKinds[] = {{15, 1, 0}, {1, 2, 1}, {2, 3, 2}, {4, 4, 3}};
+
+const GmshKind* find_gmsh_kind(std::int64_t type) {
+  for (const GmshKind& kind : kGmshKinds)
+    if (kind.type == type) return &kind;
+  return nullptr;
+}
+
+const char* unsupported_gmsh_name(std::int64_t type) {
+  switch (type) {
+    case 3:
+      return " (quadrangle)";
+    case 5:
+      return " (hexahedron)";
+    case 6:
+      return " (prism)";
+    case 7:
+      return " (pyramid)";
+    case 11:
+      return " (tetrahedron of second order)";
+    default:
+      return "";
+  }
+}
+
+}  // namespace
+
+Status GmshMesh::begin_nodes() {
+  if (has_nodes_) return in_.error("a second $Nodes section: a file must have one");
+  has_nodes_ = true;
+  return {};
+}
+
+Status GmshMesh::add_node(std::int64_t id, const Vec3d& position) {
+  if (id < 1)
+    return in_.error("node number " + std::to_string(id) + " must be a whole number from 1 on");
+  if (!is_finite(position))
+    return in_.error("node " + std::to_string(id) + ": a coordinate is not a finite number");
+  raw_.positions.push_back(position);
+  raw_.node_ids.push_back(id);
+  return {};
+}
+
+Status GmshMesh::end_nodes() {
+  return numbers_.index(raw_.node_ids, in_);
+}
+
+Status GmshMesh::begin_elements() {
+  if (!has_nodes_) return in_.error("$Elements comes before $Nodes");
+  if (has_elements_) return in_.error("a second $Elements section: a file must have one");
+  has_elements_ = true;
+  return {};
+}
+
+Result<int> GmshMesh::node_count_of(const std::string& element, std::int64_t type) const {
+  if (const GmshKind* kind = find_gmsh_kind(type)) return kind->nodes;
+  return in_.error(element + " has type " + std::to_string(type) + unsupported_gmsh_name(type) +
+                   ", which is not supported: mesh with tetrahedra of four nodes (type 4)");
+}
+
+std::string GmshMesh::element_name(std::int64_t id, std::int64_t type) const {
+  const std::string name = "element " + std::to_string(id);
+  return type == 4 ? "tet " + std::to_string(raw_.tets.size() + 1) + " (" + name + ")" : name;
+}
+
+Status GmshMesh::add_element(std::int64_t id, std::int64_t type, std::int64_t physical,
+                             std::span<const std::int64_t> nodes) {
+  const GmshKind* kind = find_gmsh_kind(type);
+  TROCAR_ASSERT(kind != nullptr && nodes.size() == static_cast<std::size_t>(kind->nodes));
+  mesh::Tet tet;
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    const auto found = numbers_.find(nodes[i]);
+    if (found < 0)
+      return in_.error(element_name(id, type) + " refers to node '" + std::to_string(nodes[i]) +
+                       "', which is not in $Nodes");
+    tet[i] = NodeIndex(static_cast<std::uint32_t>(found));
+    for (std::size_t j = 0; j < i; ++j)
+      if (tet[j] == tet[i])
+        return in_.error(element_name(id, type) + " uses node " + std::to_string(nodes[i]) +
+                         " twice");
+  }
+  if (type == 4) {
+    raw_.tets.push_back(tet);
+    raw_.element_ids.push_back(id);
+    raw_.tet_regions.push_back(physical);
+    has_region_ = has_region_ || physical != 0;
+  } else if (physical != 0) {
+    auto& group = groups_[{kind->dimension, physical}];
+    group.insert(group.end(), tet.begin(), tet.begin() + kind->nodes);
+  }
+  return {};
+}
+
+Status GmshMesh::add_physical_name(std::int64_t dimension, std::int64_t number,
+                                   std::string_view quoted) {
+  if (dimension < 0 || dimension > 3)
+    return in_.error("a physical group has dimension " + std::to_string(dimension) +
+                     ", must be 0 to 3");
+  if (quoted.size() < 2 || quoted.front() != '"' || quoted.back() != '"')
+    return in_.error("the name of a physical group must stand in quotation marks");
+  const std::string name = plain_name(quoted.substr(1, quoted.size() - 2));
+  if (dimension == 3)
+    raw_.region_names[number] = name;
+  else
+    names_[{dimension, number}] = name;
+  return {};
+}
+
+Result<mesh::RawTets> GmshMesh::finish() {
+  if (!has_nodes_) return in_.error("the file ends without a $Nodes section");
+  if (!has_elements_) return in_.error("the file ends without an $Elements section");
+  if (!has_region_) raw_.tet_regions.clear();
+  for (auto& [key, nodes] : groups_) {
+    const auto named = names_.find(key);
+    raw_.node_sets.push_back(
+        {named != names_.end() ? named->second : std::to_string(key.second), std::move(nodes)});
+  }
+  return std::move(raw_);
+}
+
+}  // namespace trocar::formats

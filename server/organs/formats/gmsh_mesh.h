@@ -1,0 +1,65 @@
+#pragma once
+
+// A mesh as the versions of the Gmsh format give it, while it is read: elements are checked against
+// the nodes, physical groups are collected by dimension and number.
+
+#include <cstdint>
+#include <map>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "common/base/result.h"
+#include "server/organs/formats/text_reader.h"
+#include "server/organs/mesh/raw_tets.h"
+
+namespace trocar::formats {
+
+inline constexpr std::int64_t kMaxGmshTags = 1000;  // of an element
+
+class GmshMesh {
+ public:
+  explicit GmshMesh(TextReader& reader) : in_(reader) {}
+
+  bool has_nodes() const { return has_nodes_; }
+  Status begin_nodes();
+  Status add_node(std::int64_t id, const Vec3d& position);
+  Status end_nodes();  // needed before the first element
+
+  Status begin_elements();
+  // Nodes of an element of that type. Error: unknown or of no use here.
+  Result<int> node_count_of(const std::string& element, std::int64_t type) const;
+  // physical: the number of its group, 0 without one. Nodes by the file's numbers.
+  Status add_element(std::int64_t id, std::int64_t type, std::int64_t physical,
+                     std::span<const std::int64_t> nodes);
+  // "tet 11 (element 705)", or "element 705" of another type; of the element that comes next.
+  std::string element_name(std::int64_t id, std::int64_t type) const;
+
+  // Dimension, number and "name" in quotation marks, as a line of $PhysicalNames.
+  Status add_physical_name(std::int64_t dimension, std::int64_t number, std::string_view quoted);
+
+  Result<mesh::RawTets> finish();
+
+ private:
+  TextReader& in_;
+  bool has_nodes_ = false, has_elements_ = false, has_region_ = false;
+  mesh::RawTets raw_;
+  NodeNumbers numbers_;
+  std::map<std::pair<std::int64_t, std::int64_t>, std::string> names_;  // by dimension and number
+  std::map<std::pair<std::int64_t, std::int64_t>, std::vector<NodeIndex>> groups_;
+};
+
+// Versions 1 and 2.2 as text, from the line behind the format line on.
+Status read_gmsh_lines(TextReader& reader, int version, GmshMesh& mesh);
+// Version 2.2 as binary.
+Status read_gmsh_binary2(TextReader& reader, GmshMesh& mesh);
+// Version 4.1, either way.
+Status read_gmsh4(TextReader& reader, bool is_binary, GmshMesh& mesh);
+// Reads a section that is about nothing of interest, up to its $End line.
+Status skip_gmsh_section(TextReader& reader);
+// The lines of $PhysicalNames.
+Status read_physical_names(TextReader& reader, GmshMesh& mesh);
+
+}  // namespace trocar::formats

@@ -1,0 +1,35 @@
+#pragma once
+
+// A volume image whose numbers say to which structure each voxel belongs.
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "common/math/vec3.h"
+
+namespace trocar::label_map {
+
+struct LabelMap {
+  std::array<int, 3> size{};          // voxels along i, j, k
+  std::vector<std::uint16_t> labels;  // i fastest, then j; 0: none
+  // Centre of voxel (0, 0, 0) and the steps to its neighbours, m: x to the patient's left, y to the
+  // head, z to the front. The steps are at right angles to one another.
+  Vec3d origin_m;
+  std::array<Vec3d, 3> steps_m{};
+  std::string orientation;  // towards which sides i, j and k run, such as "RAS" or "LPS"
+  std::vector<std::string> warnings;
+
+  std::size_t index(int i, int j, int k) const {
+    return static_cast<std::size_t>(i) +
+           static_cast<std::size_t>(size[0]) *
+               (static_cast<std::size_t>(j) +
+                static_cast<std::size_t>(size[1]) * static_cast<std::size_t>(k));
+  }
+  double voxel_volume_m3() const {
+    return length(steps_m[0]) * length(steps_m[1]) * length(steps_m[2]);
+  }
+};
+
+}  // namespace trocar::label_map

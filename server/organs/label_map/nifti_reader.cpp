@@ -1,0 +1,277 @@
+#include "server/organs/label_map/nifti_reader.h"
+
+#include <zlib.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "server/organs/formats/mesh_file.h"
+
+namespace trocar::label_map {
+namespace {
+
+constexpr std::size_t kHeaderBytes = 348;
+constexpr std::size_t kMaxBytes = std::size_t{512} << 20;
+constexpr int kMaxLabel = 65535;
+constexpr double kSkew = 1e-3;  // cosine between two steps from which on they are skewed
+constexpr double kMinVoxel_m = 1e-6, kMaxVoxel_m = 0.1;
+
+struct StoredType {
+  int code, bytes;
+  const char* name;
+};
+constexpr StoredType kStoredTypes[] = {{2, 1, "uint8"},    {4, 2, "int16"},    {8, 4, "int32"},
+                                       {16, 4, "float32"}, {64, 8, "float64"}, {256, 1, "int8"},
+                                       {512, 2, "uint16"}, {768, 4, "uint32"}, {1024, 8, "int64"}};
+
+Result<std::string> gunzip(std::string_view packed, const std::string& name) {
+  z_stream stream{};
+  if (inflateInit2(&stream, 16 + MAX_WBITS) != Z_OK)
+    return Error{ErrorCode::BadFile, name + ": zlib cannot be started"};
+  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(packed.data()));
+  stream.avail_in = static_cast<uInt>(packed.size());
+  std::string out;
+  char chunk[65536];
+  int result = Z_OK;
+  while (result == Z_OK && out.size() <= kMaxBytes) {
+    stream.next_out = reinterpret_cast<Bytef*>(chunk);
+    stream.avail_out = sizeof chunk;
+    result = inflate(&stream, Z_NO_FLUSH);
+    out.append(chunk, sizeof chunk - stream.avail_out);
+  }
+  inflateEnd(&stream);
+  if (out.size() > kMaxBytes)
+    return Error{ErrorCode::BadFile, name + ": unpacks to more than 512 MiB: crop or coarsen it"};
+  if (result != Z_STREAM_END)
+    return Error{ErrorCode::BadFile, name + ": packed data are damaged or cut off"};
+  return out;
+}
+
+class NiftiReader {
+ public:
+  NiftiReader(std::string_view bytes, std::optional<mesh::Unit> unit, const std::string& name)
+      : bytes_(bytes), unit_(unit), name_(name) {}
+
+  Result<LabelMap> run() {
+    for (auto step : {&NiftiReader::check_header, &NiftiReader::read_size, &NiftiReader::read_unit,
+                      &NiftiReader::read_place, &NiftiReader::read_labels})
+      if (auto s = (this->*step)(); !s) return s.error();
+    return std::move(map_);
+  }
+
+ private:
+  Error error(const std::string& what) const { return {ErrorCode::BadFile, name_ + ": " + what}; }
+
+  template <typename T>
+  T at(std::size_t offset) const {
+    T value{};
+    std::memcpy(&value, bytes_.data() + offset, sizeof value);
+    return value;
+  }
+
+  Status check_header() {
+    if (bytes_.size() < kHeaderBytes)
+      return error("has " + std::to_string(bytes_.size()) + " bytes, a header has 348");
+    const auto size = at<std::int32_t>(0);
+    if (size == 540) return error("is NIfTI-2: save it as NIfTI-1");
+    if (size == 0x5c010000)
+      return error("is big-endian: save it in the byte order of this machine");
+    if (size != static_cast<std::int32_t>(kHeaderBytes))
+      return error("sizeof_hdr is " + std::to_string(size) + ", must be 348: it is no NIfTI file");
+    if (bytes_.substr(344, 4) == std::string_view("ni1\0", 4))
+      return error("holds its image in another file: save both as one .nii");
+    if (bytes_.substr(344, 4) != std::string_view("n+1\0", 4))
+      return error("magic is not n+1: it is no NIfTI file");
+    const auto slope = at<float>(112), inter = at<float>(116);
+    if (!((slope == 0 || slope == 1) && inter == 0))
+      return error("scl_slope and scl_inter scale the values: a label map has whole labels");
+    return {};
+  }
+
+  Status read_size() {
+    const auto dimensions = at<std::int16_t>(40);
+    if (dimensions < 3 || dimensions > 7)
+      return error("dim[0] is " + std::to_string(dimensions) + ", must be 3");
+    for (std::size_t d = 1; d <= static_cast<std::size_t>(dimensions); ++d) {
+      const auto count = at<std::int16_t>(40 + 2 * d);
+      if (count < 1 || (d > 3 && count != 1))
+        return error("dim[" + std::to_string(d) + "] is " + std::to_string(count) +
+                     (d > 3 ? ", a label map has one volume" : ", must be 1 or more"));
+      if (d <= 3) map_.size[d - 1] = count;
+    }
+    const auto code = at<std::int16_t>(70);
+    const auto type = std::ranges::find(kStoredTypes, code, &StoredType::code);
+    if (type == std::end(kStoredTypes))
+      return error("datatype " + std::to_string(code) + " holds no labels: save whole numbers");
+    type_ = *type;
+    const auto offset = at<float>(108);
+    if (!(offset >= 348 && offset <= 1e6f) || offset != std::floor(offset))
+      return error("vox_offset must be a whole number from 348 to 1,000,000");
+    begin_ = static_cast<std::size_t>(offset);
+    count_ =
+        std::uint64_t(map_.size[0]) * std::uint64_t(map_.size[1]) * std::uint64_t(map_.size[2]);
+    const auto there = bytes_.size() > begin_ ? bytes_.size() - begin_ : 0;
+    if (count_ > there / static_cast<std::uint64_t>(type_.bytes))
+      return error("announces " + std::to_string(map_.size[0]) + " x " +
+                   std::to_string(map_.size[1]) + " x " + std::to_string(map_.size[2]) +
+                   " voxels, " + std::to_string(there / static_cast<std::size_t>(type_.bytes)) +
+                   " follow: it is cut off");
+    return {};
+  }
+
+  Status read_unit() {
+    const auto units = static_cast<unsigned char>(bytes_[123]) & 7;
+    if (units == 0) {
+      scale_ = mesh::metres_of(unit_.value_or(mesh::Unit::Millimetre));
+      if (!unit_)
+        map_.warnings.push_back("xyzt_units says no unit of length, taken as mm (--unit)");
+      return {};
+    }
+    if (units > 3) return error("xyzt_units " + std::to_string(units) + " is no unit of length");
+    scale_ = units == 1 ? 1 : units == 2 ? 1e-3 : 1e-6;
+    if (unit_ && mesh::metres_of(*unit_) != scale_)
+      return error(std::string("xyzt_units says ") +
+                   (units == 1   ? "m"
+                    : units == 2 ? "mm"
+                                 : "micrometres") +
+                   ", --unit another: leave --unit out");
+    return {};
+  }
+
+  // Columns of the matrix from voxels to the file's coordinates, and its last column.
+  Status read_place() {
+    std::array<Vec3d, 3> columns;
+    Vec3d origin;
+    const auto sform = at<std::int16_t>(254), qform = at<std::int16_t>(252);
+    const std::array<double, 3> sizes{at<float>(80), at<float>(84), at<float>(88)};
+    if (sform > 0) {
+      const auto row = [&](std::size_t r, std::size_t c) {
+        return double{at<float>(280 + 16 * r + 4 * c)};
+      };
+      for (std::size_t c = 0; c < 3; ++c) columns[c] = {row(0, c), row(1, c), row(2, c)};
+      origin = {row(0, 3), row(1, 3), row(2, 3)};
+    } else if (qform > 0) {
+      if (auto s = rotation(sizes, columns); !s) return s;
+      origin = {at<float>(268), at<float>(272), at<float>(276)};
+    } else {
+      columns = {Vec3d{sizes[0], 0, 0}, Vec3d{0, sizes[1], 0}, Vec3d{0, 0, sizes[2]}};
+      map_.warnings.push_back(
+          "has neither sform nor qform: which side is left is not known, taken as RAS");
+    }
+    if (!is_finite(origin) || !(length(origin) < 1e9)) return error("its origin is not finite");
+    for (std::size_t c = 0; c < 3; ++c) {
+      const double size = length(columns[c]) * scale_;
+      if (!(size >= kMinVoxel_m && size <= kMaxVoxel_m))
+        return error("voxels are " + std::to_string(size * 1e3) + " mm along dimension " +
+                     std::to_string(c + 1) + ", must be 0.001 to 100: check unit and spacing");
+      for (std::size_t d = 0; d < c; ++d)
+        if (std::abs(dot(columns[c], columns[d])) > kSkew * length(columns[c]) * length(columns[d]))
+          return error("its axes are skewed: resample it at right angles");
+    }
+    map_.orientation = orientation_of(columns);
+    // From right, front, head to left, head, front.
+    const auto turned = [&](const Vec3d& v) { return Vec3d{-v.x, v.z, v.y} * scale_; };
+    map_.origin_m = turned(origin);
+    for (std::size_t c = 0; c < 3; ++c) map_.steps_m[c] = turned(columns[c]);
+    return {};
+  }
+
+  Status rotation(const std::array<double, 3>& sizes, std::array<Vec3d, 3>& columns) const {
+    const double b = at<float>(256), c = at<float>(260), d = at<float>(264);
+    const double rest = 1 - (b * b + c * c + d * d);
+    if (!(rest > -1e-5)) return error("the quaternion of its qform is longer than 1");
+    const double a = std::sqrt(std::max(rest, 0.0));
+    // pixdim[0] is the sign of the third axis; 0 counts as 1.
+    const double side = at<float>(76) < 0 ? -1 : 1;
+    columns = {
+        Vec3d{a * a + b * b - c * c - d * d, 2 * (b * c + a * d), 2 * (b * d - a * c)} * sizes[0],
+        Vec3d{2 * (b * c - a * d), a * a + c * c - b * b - d * d, 2 * (c * d + a * b)} * sizes[1],
+        Vec3d{2 * (b * d + a * c), 2 * (c * d - a * b), a * a + d * d - c * c - b * b} *
+            (sizes[2] * side)};
+    return {};
+  }
+
+  static std::string orientation_of(const std::array<Vec3d, 3>& columns) {
+    std::string text;
+    for (const Vec3d& c : columns) {
+      const double x = std::abs(c.x), y = std::abs(c.y), z = std::abs(c.z);
+      text += x >= y && x >= z ? (c.x > 0 ? 'R' : 'L')
+              : y >= z         ? (c.y > 0 ? 'A' : 'P')
+                               : (c.z > 0 ? 'S' : 'I');
+    }
+    return text;
+  }
+
+  double value(std::size_t i) const {
+    const std::size_t offset = begin_ + i * static_cast<std::size_t>(type_.bytes);
+    switch (type_.code) {
+      case 2:
+        return at<std::uint8_t>(offset);
+      case 4:
+        return at<std::int16_t>(offset);
+      case 8:
+        return at<std::int32_t>(offset);
+      case 16:
+        return at<float>(offset);
+      case 64:
+        return at<double>(offset);
+      case 256:
+        return at<std::int8_t>(offset);
+      case 512:
+        return at<std::uint16_t>(offset);
+      case 768:
+        return at<std::uint32_t>(offset);
+      default:
+        return static_cast<double>(at<std::int64_t>(offset));
+    }
+  }
+
+  Status read_labels() {
+    map_.labels.resize(count_);
+    for (std::size_t i = 0; i < count_; ++i) {
+      const double label = value(i);
+      if (!(label >= 0 && label <= kMaxLabel && label == std::floor(label))) {
+        const auto nx = static_cast<std::size_t>(map_.size[0]),
+                   ny = static_cast<std::size_t>(map_.size[1]);
+        return error("voxel (" + std::to_string(i % nx) + ", " + std::to_string(i / nx % ny) +
+                     ", " + std::to_string(i / nx / ny) +
+                     ") is no label: labels are whole numbers from 0 to 65535");
+      }
+      map_.labels[i] = static_cast<std::uint16_t>(label);
+    }
+    return {};
+  }
+
+  std::string_view bytes_;
+  std::optional<mesh::Unit> unit_;
+  const std::string& name_;
+  StoredType type_{};
+  std::size_t begin_ = 0;
+  std::uint64_t count_ = 0;
+  double scale_ = 1;  // metres in a unit of the file
+  LabelMap map_;
+};
+
+}  // namespace
+
+bool is_nifti_file(const std::filesystem::path& path) {
+  const std::string name = path.string();
+  return name.ends_with(".nii") || name.ends_with(".nii.gz");
+}
+
+Result<LabelMap> parse_nifti(std::string_view bytes, std::optional<mesh::Unit> unit,
+                             const std::string& name) {
+  if (!bytes.starts_with("\x1f\x8b")) return NiftiReader(bytes, unit, name).run();
+  const auto unpacked = gunzip(bytes, name);
+  if (!unpacked) return unpacked.error();
+  return NiftiReader(*unpacked, unit, name).run();
+}
+
+Result<LabelMap> read_nifti(const std::filesystem::path& path, std::optional<mesh::Unit> unit) {
+  const auto bytes = formats::read_foreign_file(path);
+  if (!bytes) return bytes.error();
+  return parse_nifti(*bytes, unit, path.string());
+}
+
+}  // namespace trocar::label_map

@@ -1,0 +1,23 @@
+#pragma once
+
+// An organ from three sides: from the front (along -z, x to the right, y up), from its left (along
+// -x) and from above (along -y), all at the same scale, with the edges of its triangles.
+//
+// Regions have colours of their own, held nodes are dark. The bar below the first view has a length
+// of 1, 2 or 5 times a power of ten, which scale_bar_m() tells. Drawn by depth buffer,
+// orthographic; the same organ gives the same picture.
+
+#include <cstdint>
+#include <vector>
+
+#include "server/organs/mesh/tet_mesh.h"
+#include "server/organs/picture/png.h"
+
+namespace trocar::picture {
+
+// region_of_node: one a node, 0 for the organ's own; is_held: one a node.
+Picture draw_organ(const mesh::TetMesh& mesh, const std::vector<std::uint16_t>& region_of_node,
+                   const std::vector<std::uint8_t>& is_held);
+double scale_bar_m(const mesh::TetMesh& mesh);
+
+}  // namespace trocar::picture

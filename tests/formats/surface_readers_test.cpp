@@ -1,0 +1,111 @@
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "server/organs/formats/obj_reader.h"
+#include "server/organs/formats/ply_reader.h"
+#include "server/organs/formats/stl_reader.h"
+#include "server/organs/surface/closed_surface.h"
+#include "tests/formats/reader_samples.h"
+
+namespace trocar::formats {
+namespace {
+
+using testing::changed;
+using testing::error_of;
+using testing::kObj;
+using testing::kPly;
+using testing::kStl;
+
+// The solid is a corner of the unit cube, a sixth of it.
+void expect_the_solid(Result<surface::RawSurface> raw) {
+  ASSERT_TRUE(raw.ok()) << raw.error().message;
+  EXPECT_EQ(raw->positions.size(), 4u);
+  EXPECT_EQ(raw->triangles.size(), 4u);
+  const auto solid = surface::check_surface(std::move(*raw), mesh::Unit::Metre, "a");
+  ASSERT_TRUE(solid.ok()) << solid.error().message;
+  EXPECT_TRUE(solid->warnings.empty());
+  EXPECT_NEAR(solid->volume_m3, 1.0 / 6, 1e-15);
+}
+
+template <typename T>
+void put(std::string& out, T value, bool is_big_endian = false) {
+  std::string bytes(reinterpret_cast<const char*>(&value), sizeof value);
+  if (is_big_endian) bytes.assign(bytes.rbegin(), bytes.rend());
+  out += bytes;
+}
+
+std::string binary_stl() {
+  std::string text = "solid of a program that writes this into binary files";
+  text.resize(80, ' ');
+  put(text, std::uint32_t{4});
+  const float corners[4][9] = {{0, 0, 0, 0, 1, 0, 1, 0, 0},
+                               {0, 0, 0, 1, 0, 0, 0, 0, 1},
+                               {1, 0, 0, 0, 1, 0, 0, 0, 1},
+                               {0, 0, 0, 0, 0, 1, 0, 1, 0}};
+  for (const auto& triangle : corners) {
+    for (int i = 0; i < 3; ++i) put(text, 0.0f);
+    for (const float c : triangle) put(text, c);
+    put(text, std::uint16_t{0});
+  }
+  return text;
+}
+
+TEST(SurfaceReaders, ReadTheSameSolid) {
+  expect_the_solid(parse_obj(kObj, "a.obj"));
+  expect_the_solid(parse_ply(kPly, "a.ply"));
+  expect_the_solid(parse_stl(kStl, "a.stl"));
+  expect_the_solid(parse_stl(binary_stl(), "a.stl"));
+}
+
+TEST(SurfaceReaders, ReadBinaryPlyOfEitherOrder) {
+  for (const bool is_big : {false, true}) {
+    std::string text = changed(kPly.substr(0, kPly.find("end_header")), "ascii",
+                               is_big ? "binary_big_endian" : "binary_little_endian") +
+                       "end_header\n";
+    const float points[4][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+    for (const auto& point : points) {
+      for (const float c : point) put(text, c, is_big);
+      put(text, std::uint8_t{1});
+    }
+    const std::int32_t faces[4][3] = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {0, 3, 2}};
+    for (const auto& face : faces) {
+      put(text, std::uint8_t{3});
+      for (const auto i : face) put(text, i, is_big);
+    }
+    expect_the_solid(parse_ply(text, "a.ply"));
+    for (std::size_t n = 0; n < text.size(); ++n)
+      EXPECT_FALSE(parse_ply(std::string_view(text).substr(0, n), "a.ply").ok()) << n;
+  }
+}
+
+TEST(SurfaceReaders, SplitFacesOfMoreCorners) {
+  const auto raw = parse_obj("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\nf 1 2 3\n", "a.obj");
+  ASSERT_TRUE(raw.ok()) << raw.error().message;
+  EXPECT_EQ(raw->face_numbers, (std::vector<std::int64_t>{1, 1, 2}));
+}
+
+TEST(SurfaceReaders, ErrorsSayWhereAndWhat) {
+  const auto expect = [](const std::string& text, const std::string& name, const char* part) {
+    ASSERT_FALSE(text.empty()) << part;
+    EXPECT_NE(error_of(text, name).find(part), std::string::npos) << error_of(text, name);
+  };
+  expect(changed(kObj, "f 1 2 4", "f 1 2 5"), "a.obj", "a.obj:9: face 2 refers to vertex 5");
+  expect(changed(kObj, "f 1 2 4", "f 1 2 0"), "a.obj", "must be a whole number other than 0");
+  expect(changed(kObj, "f 1 2 4", "f 1 2"), "a.obj", "face 2 has 2 corners");
+  expect(changed(kObj, "v 1 0 0", "v 1 0"), "a.obj", "a.obj:4: vertex 2: coordinate ''");
+  expect(changed(kObj, "vn 0", "curv 0"), "a.obj", "'curv' is not known");
+  expect(changed(kPly, "element vertex 4", "element vertex 4000000000"), "a.ply",
+         "announces 4000000000 vertex");
+  expect(changed(kPly, "3 0 2 1", "3 0 2 7"), "a.ply", "face 1 refers to vertex 8");
+  expect(changed(kPly, "3 0 2 1", "9999 0 2 1"), "a.ply", "has a length that is not 0 to 1000");
+  expect(changed(kPly, "property float x", "property float u"), "a.ply",
+         "vertices need the properties x, y and z");
+  expect(changed(kStl, "vertex 1 0 0", "vertex 1 0 nan"), "a.stl",
+         "triangle 1: coordinate 'nan' is not a finite number");
+  expect(changed(kStl, "endloop", "vertex"), "a.stl", "expected 'endloop'");
+  expect(binary_stl().substr(0, 200), "a.stl", "announces 4 triangles, 116 bytes follow");
+}
+
+}  // namespace
+}  // namespace trocar::formats

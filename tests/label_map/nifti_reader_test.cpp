@@ -1,0 +1,125 @@
+#include "server/organs/label_map/nifti_reader.h"
+
+#include <gtest/gtest.h>
+#include <zlib.h>
+
+#include <cmath>
+#include <limits>
+
+#include "tests/label_map/nifti_sample.h"
+
+namespace trocar::label_map {
+namespace {
+
+using testing::nifti;
+using testing::put;
+
+std::string small() {
+  return nifti({3, 4, 5}, 2, [](int i, int j, int k) { return i + 3 * j + 12 * k; });
+}
+Result<LabelMap> parse(const std::string& file, std::optional<mesh::Unit> unit = {}) {
+  return parse_nifti(file, unit, "a.nii");
+}
+std::string error_of(const std::string& file, std::optional<mesh::Unit> unit = {}) {
+  const auto result = parse(file, unit);
+  return result.ok() ? "accepted" : result.error().message;
+}
+
+TEST(NiftiReader, ReadsLabelsPlaceAndUnit) {
+  const auto map = parse(small());
+  ASSERT_TRUE(map.ok()) << map.error().message;
+  EXPECT_EQ(map->size, (std::array{3, 4, 5}));
+  EXPECT_EQ(map->labels[map->index(1, 2, 3)], 1 + 6 + 36);
+  EXPECT_EQ(map->orientation, "RAS");
+  EXPECT_TRUE(map->warnings.empty());
+  // The file's right is at -x, its front at z, its head at y.
+  EXPECT_NEAR(length(map->origin_m - Vec3d{-0.01, 0, 0}), 0, 1e-9);
+  EXPECT_NEAR(length(map->steps_m[0] - Vec3d{-0.002, 0, 0}), 0, 1e-9);
+  EXPECT_NEAR(length(map->steps_m[1] - Vec3d{0, 0, 0.002}), 0, 1e-9);
+  EXPECT_NEAR(length(map->steps_m[2] - Vec3d{0, 0.002, 0}), 0, 1e-9);
+}
+
+TEST(NiftiReader, TheQformTurnsVoxelsAsTheSformDoes) {
+  auto file = small();
+  put(file, 254, std::int16_t{0});
+  put(file, 252, std::int16_t{1});
+  // A half turn around the head's axis: quaternion (0, 0, 0, 1), that is d = 1.
+  put(file, 264, 1.0f);
+  put(file, 268, 10.0f);
+  const auto map = parse(file);
+  ASSERT_TRUE(map.ok()) << map.error().message;
+  EXPECT_EQ(map->orientation, "LPS");
+  EXPECT_NEAR(length(map->steps_m[0] - Vec3d{0.002, 0, 0}), 0, 1e-9);
+  put(file, 76, -1.0f);
+  EXPECT_EQ(parse(file)->orientation, "LPI");
+}
+
+TEST(NiftiReader, SaysWhatTheFileLeavesOpen) {
+  auto file = small();
+  put(file, 254, std::int16_t{0});
+  put(file, 123, char{0});
+  const auto map = parse(file);
+  ASSERT_TRUE(map.ok()) << map.error().message;
+  ASSERT_EQ(map->warnings.size(), 2u);
+  EXPECT_NE(map->warnings[0].find("no unit of length, taken as mm"), std::string::npos);
+  EXPECT_NE(map->warnings[1].find("which side is left is not known"), std::string::npos);
+  EXPECT_EQ(parse(file, mesh::Unit::Centimetre)->warnings.size(), 1u);
+}
+
+TEST(NiftiReader, ReadsGzipAndOtherTypes) {
+  const auto file = small();
+  std::string packed(compressBound(file.size()) + 64, '\0');
+  z_stream stream{};
+  ASSERT_EQ(deflateInit2(&stream, 9, Z_DEFLATED, 16 + MAX_WBITS, 8, Z_DEFAULT_STRATEGY), Z_OK);
+  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(file.data()));
+  stream.avail_in = static_cast<uInt>(file.size());
+  stream.next_out = reinterpret_cast<Bytef*>(packed.data());
+  stream.avail_out = static_cast<uInt>(packed.size());
+  ASSERT_EQ(deflate(&stream, Z_FINISH), Z_STREAM_END);
+  packed.resize(stream.total_out);
+  deflateEnd(&stream);
+  const auto map = parse(packed);
+  ASSERT_TRUE(map.ok()) << map.error().message;
+  EXPECT_EQ(map->labels, parse(file)->labels);
+  EXPECT_NE(error_of(packed.substr(0, packed.size() / 2)).find("damaged or cut off"),
+            std::string::npos);
+
+  auto floats = file.substr(0, 352);
+  put(floats, 70, std::int16_t{16});
+  for (std::size_t i = 352; i < file.size(); ++i) {
+    const auto value = static_cast<float>(file[i]);
+    floats.append(reinterpret_cast<const char*>(&value), sizeof value);
+  }
+  EXPECT_EQ(parse(floats)->labels, parse(file)->labels);
+  put(floats, 352 + 4 * 5, 2.5f);
+  EXPECT_NE(error_of(floats).find("voxel (2, 1, 0) is no label"), std::string::npos);
+}
+
+TEST(NiftiReader, ErrorsNameTheField) {
+  const auto expect = [](std::size_t offset, auto value, const char* part) {
+    auto file = small();
+    put(file, offset, value);
+    EXPECT_NE(error_of(file).find(part), std::string::npos) << error_of(file);
+    EXPECT_EQ(error_of(file).find('\n'), std::string::npos);
+  };
+  expect(0, std::int32_t{540}, "is NIfTI-2");
+  expect(0, std::int32_t{0x5c010000}, "is big-endian");
+  expect(0, std::int32_t{7}, "sizeof_hdr is 7, must be 348");
+  expect(344, std::int32_t{0}, "magic is not n+1");
+  expect(40, std::int16_t{2}, "dim[0] is 2");
+  expect(42, std::int16_t{-3}, "dim[1] is -3");
+  expect(46, std::int16_t{32767}, "voxels, 60 follow: it is cut off");
+  expect(70, std::int16_t{128}, "datatype 128 holds no labels");
+  expect(108, 1e9f, "vox_offset must be");
+  expect(112, 2.0f, "scl_slope and scl_inter");
+  expect(123, char{5}, "xyzt_units 5");
+  expect(280, 2000.0f, "voxels are 2000");
+  expect(280, std::numeric_limits<float>::quiet_NaN(), "must be 0.001 to 100");
+  expect(296, 1.0f, "its axes are skewed");
+  EXPECT_NE(error_of(small(), mesh::Unit::Metre).find("--unit another"), std::string::npos);
+  const auto file = small();
+  for (std::size_t n = 0; n < file.size(); ++n) EXPECT_FALSE(parse(file.substr(0, n)).ok()) << n;
+}
+
+}  // namespace
+}  // namespace trocar::label_map

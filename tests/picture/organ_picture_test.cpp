@@ -1,0 +1,71 @@
+#include "server/organs/picture/organ_picture.h"
+
+#include <gtest/gtest.h>
+#include <zlib.h>
+
+#include <algorithm>
+
+namespace trocar::picture {
+namespace {
+
+// The tetrahedron is 0.2 m wide and lies around the origin.
+mesh::TetMesh tetrahedron() {
+  mesh::TetMesh mesh;
+  mesh.rest_positions = {
+      {-0.1, -0.1, -0.1}, {0.1, -0.1, -0.1}, {-0.1, 0.1, -0.1}, {-0.1, -0.1, 0.1}};
+  mesh.tets = {{NodeIndex(0), NodeIndex(1), NodeIndex(2), NodeIndex(3)}};
+  mesh.build_adjacency();
+  return mesh;
+}
+
+TEST(OrganPicture, ShowsTheOrganOnceInEachView) {
+  const auto mesh = tetrahedron();
+  auto picture = draw_organ(mesh, {0, 0, 0, 0}, {0, 0, 0, 0});
+  ASSERT_EQ(picture.width % 3, 0);
+  const int view = picture.width / 3;
+  const Colour ground{255, 255, 255};
+  for (int v = 0; v < 3; ++v) {
+    int drawn = 0;
+    for (int y = 0; y < view; ++y)
+      for (int x = v * view; x < (v + 1) * view; ++x) drawn += picture.at(x, y) != ground;
+    // Each view shows half of the square around the tetrahedron, which leaves a margin.
+    EXPECT_GT(drawn, view * view / 4);
+    EXPECT_LT(drawn, view * view / 2);
+  }
+}
+
+TEST(OrganPicture, HeldNodesAreDarkerAndRegionsOfOtherColours) {
+  const auto mesh = tetrahedron();
+  const auto plain = draw_organ(mesh, {0, 0, 0, 0}, {0, 0, 0, 0});
+  const auto held = draw_organ(mesh, {0, 0, 0, 0}, {1, 1, 1, 1});
+  const auto region = draw_organ(mesh, {1, 1, 1, 1}, {0, 0, 0, 0});
+  const auto sum = [](const Picture& picture) {
+    std::uint64_t all = 0;
+    for (const Colour& c : picture.pixels) all += c[0] + c[1] + c[2];
+    return all;
+  };
+  EXPECT_LT(sum(held), sum(plain));
+  EXPECT_NE(region.pixels, plain.pixels);
+  EXPECT_EQ(draw_organ(mesh, {0, 0, 0, 0}, {0, 0, 0, 0}).pixels, plain.pixels);
+  EXPECT_EQ(scale_bar_m(mesh), 0.1);
+}
+
+TEST(Png, HoldsTheRowsPacked) {
+  const Picture picture{2, 2, {{1, 2, 3}, {4, 5, 6}, {7, 8, 9}, {10, 11, 12}}};
+  const std::string png = to_png(picture);
+  EXPECT_TRUE(png.starts_with("\x89PNG\r\n\x1a\n"));
+  EXPECT_EQ(png.substr(12, 4), "IHDR");
+  EXPECT_EQ(png.substr(png.size() - 8, 4), "IEND");
+  const auto at = png.find("IDAT");
+  ASSERT_NE(at, std::string::npos);
+  std::string rows(14, '\0');
+  uLongf size = rows.size();
+  ASSERT_EQ(
+      uncompress(reinterpret_cast<Bytef*>(rows.data()), &size,
+                 reinterpret_cast<const Bytef*>(png.data() + at + 4), png.size() - at - 4 - 16),
+      Z_OK);
+  EXPECT_EQ(rows, std::string("\0\1\2\3\4\5\6\0\7\10\11\12\13\14", 14));
+}
+
+}  // namespace
+}  // namespace trocar::picture
