@@ -149,6 +149,33 @@ TEST(SessionCopy, tells_the_difference_from_any_of_the_last_64_frames) {
   EXPECT_FALSE(copy.delta_from(session.number())) << "there is no difference from itself";
 }
 
+TEST(SessionCopy, tells_who_comes_late_of_stage_pace_and_marks) {
+  Session session;
+  SessionCopy copy;
+  take(copy, session.topology());
+  Envelope stage, pace, marks, progress;
+  stage.mutable_lesson_stage()->set_name("Search");
+  pace.mutable_session_pace()->set_is_paused(true);
+  marks.mutable_mark_list()->add_name("before");
+  progress.mutable_lesson_progress()->set_progress(0.5f);
+  for (const auto& message : {stage, pace, marks}) EXPECT_EQ(take(copy, message), News::Event);
+  EXPECT_EQ(take(copy, progress), News::Fleeting);
+  pace.mutable_session_pace()->set_is_paused(false);
+  take(copy, pace);
+  int stages = 0, paces = 0, lists = 0;
+  for (const auto& framed : copy.all_but_frames()) {
+    Envelope told;
+    ASSERT_TRUE(wire::decode_envelope(BytesView(*framed).subspan(wire::kHeaderBytes), told).ok());
+    stages += told.lesson_stage().name() == "Search";
+    paces += told.has_session_pace() && !told.session_pace().is_paused();
+    lists += told.mark_list().name_size() == 1;
+    EXPECT_FALSE(told.has_lesson_progress());
+  }
+  EXPECT_EQ(stages, 1);
+  EXPECT_EQ(paces, 1);
+  EXPECT_EQ(lists, 1);
+}
+
 TEST(SessionCopy, asks_once_for_a_keyframe_when_it_has_lost_count) {
   Session session;
   SessionCopy copy;

@@ -223,6 +223,10 @@ TROCAR_EXPORT(make_arrow)
 const void* trocar_make_arrow(float length_m, float radius_m, std::uint32_t colour) {
   return hand_out(model().make_arrow(length_m, radius_m, colour_of(colour)));
 }
+TROCAR_EXPORT(make_hand_line)
+const void* trocar_make_hand_line(float length_m, std::uint32_t colour) {
+  return hand_out(model().make_hand_line(length_m, colour_of(colour)));
+}
 TROCAR_EXPORT(mesh_vertices) std::size_t trocar_mesh_vertices() {
   return mesh_count;
 }

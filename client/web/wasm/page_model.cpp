@@ -253,6 +253,11 @@ shape::Lens PageModel::lens_of(std::uint8_t slot, const tool::ToolShape& shape) 
   return shape::lens_of(world_from_tool, shape);
 }
 
+const shape::MeshVertices& PageModel::make_hand_line(float length, shape::Colour colour) {
+  mesh_ = shape::make_ghost(length, colour);
+  return mesh_;
+}
+
 const shape::MeshVertices& PageModel::make_arrow(float length, float radius, shape::Colour colour) {
   mesh_ = shape::make_arrow(length, radius, colour);
   return mesh_;

@@ -94,6 +94,8 @@ class PageModel {
   // Returns that of the tool that was made last.
   const shape::MeshVertices& jaw() const { return instrument_.jaw; }
   float hinge_m() const { return instrument_.hinge_m; }
+  // The line from a tool to the hand, which the tissue keeps it from.
+  const shape::MeshVertices& make_hand_line(float length, shape::Colour colour);
   // Returns how somebody sees with the tool in that slot, where it is shown now.
   shape::Lens lens_of(std::uint8_t slot, const tool::ToolShape& shape) const;
   const shape::MeshVertices& make_arrow(float length, float radius, shape::Colour colour);

@@ -27,10 +27,11 @@ std::string row_of(Tick recorded, const proto::LessonRecord& record) {
   };
   if (record.has_teach()) {
     const int action = record.teach().action();
-    if (action <= 0 || action >= replication::kTeachActions) return {};
-    return row(record.teach().tick(),
-               replication::name_of(static_cast<replication::TeachAction>(action)), ",,",
-               csv_text(record.teach().text()));
+    if (action < 0 || action >= replication::kTeachActions) return {};
+    // Without an action it tells of a mark.
+    const auto* what =
+        action == 0 ? "mark" : replication::name_of(static_cast<replication::TeachAction>(action));
+    return row(record.teach().tick(), what, ",,", csv_text(record.teach().text()));
   }
   if (record.has_point()) {
     const bool points = record.point().has_position_m();

@@ -46,6 +46,7 @@ interface Exports {
   jaw_seconds(form: number, verb: number, hasClaim: boolean): number;
   lens(slot: number, radiusM: number, form: number): number;
   make_arrow(lengthM: number, radiusM: number, colour: number): number;
+  make_hand_line(lengthM: number, colour: number): number;
   mesh_vertices(): number;
   slot_colour(slot: number): number;
   noise(size: number): number;
@@ -206,6 +207,8 @@ export class Replica {
     return { eye: [at(0), at(1), at(2)], forward: [at(3), at(4), at(5)], up: [at(6), at(7), at(8)], tanHalfHeight: at(9), isEndoscope: at(10) > 0 };
   }
   makeArrow(lengthM: number, radiusM: number, colour: number): Mesh { return this.mesh(this.e.make_arrow(lengthM, radiusM, colour)); }
+  // From a tool to the hand, along +z.
+  makeHandLine(lengthM: number, colour: number): Mesh { return this.mesh(this.e.make_hand_line(lengthM, colour)); }
   // 0xrrggbb, of a participant.
   slotColour(slot: number): number { return this.e.slot_colour(slot) >>> 0; }
   noise(size: number): Uint8Array {

@@ -22,6 +22,7 @@ export interface Guide {
 }
 
 const kMetresPerNewton = 0.02, kMostArrow = 0.1, kLeastNewton = 0.05, kShadows = 8;
+const kApart = 0.001; // m: hand and tool farther apart are joined by a line
 const kLessonPoint = -1, kLessonColour = 0xf0e442; // the point to follow, among who points
 const kPointerLength = 0.035, kNoise = 64;
 const kHazePerMiddle = 0.55, kScopeHaze: [number, number] = [0.05, 4]; // as in the native picture
@@ -37,6 +38,8 @@ interface DrawnTool {
   dim: IUniform<number>;
   arrows: Mesh[];
   arrowGroup: Group;
+  handLine: Mesh[];
+  handGroup: Group;
   label: HTMLElement;
   shape: string; // its figures, to see a change
 }
@@ -343,13 +346,13 @@ export class Picture {
     const shape = this.guide.shapeOf(tool.slot), text = JSON.stringify(shape), known = this.tools.get(tool.slot);
     if (known && known.shape === text) return known;
     if (known) {
-      this.scene.remove(known.group, known.arrowGroup);
+      this.scene.remove(known.group, known.arrowGroup, known.handGroup);
       known.label.remove();
     }
     const colour = this.replica.slotColour(tool.slot >> 1), dim: IUniform<number> = { value: 1 }, group = new Group();
     const { body, jaw, hinge } = this.replica.makeTool(shape, colour);
     group.add(this.meshOf(body, dim));
-    const made: DrawnTool = { group, upper: null, lower: null, opening: 0, dim, arrows: [], arrowGroup: new Group(), label: document.createElement('div'), shape: text };
+    const made: DrawnTool = { group, upper: null, lower: null, opening: 0, dim, arrows: [], arrowGroup: new Group(), handLine: [], handGroup: new Group(), label: document.createElement('div'), shape: text };
     if (jaw) {
       const hung = (isLower: boolean): Group => {
         const turned = new Group(), pivot = new Group(), mesh = this.meshOf(jaw, dim);
@@ -367,16 +370,19 @@ export class Picture {
     const arrow = this.arrowGroup(this.replica.makeArrow(0.02, 0.0016, colour));
     made.arrows = arrow.meshes;
     made.arrowGroup = arrow.group;
+    const line = this.arrowGroup(this.replica.makeHandLine(0.02, colour));
+    made.handLine = line.meshes;
+    made.handGroup = line.group;
     made.label.className = 'label';
     this.labels.append(made.label);
-    this.scene.add(group, made.arrowGroup);
+    this.scene.add(group, made.arrowGroup, made.handGroup);
     this.tools.set(tool.slot, made);
     return made;
   }
 
   private place(tools: Tool[], seconds: number): void {
     const shown = new Set(tools.map(t => t.slot));
-    for (const [slot, drawn] of this.tools) drawn.group.visible = drawn.arrowGroup.visible = shown.has(slot);
+    for (const [slot, drawn] of this.tools) drawn.group.visible = drawn.arrowGroup.visible = drawn.handGroup.visible = shown.has(slot);
     const tips = this.uniforms['shadow_tip']?.value as Vector4[], shafts = this.uniforms['shadow_shaft']?.value as Vector4[];
     this.uniforms['shadow_count']!.value = Math.min(kShadows, tools.length);
     tools.forEach((tool, i) => {
@@ -389,6 +395,7 @@ export class Picture {
       if (drawn.upper) drawn.upper.rotation.x = drawn.opening;
       if (drawn.lower) drawn.lower.rotation.x = drawn.opening;
       this.placeArrow(drawn, tool);
+      this.placeHandLine(drawn, tool);
       if (i >= kShadows) return;
       const along = new Vector3(0, 0, 1).applyQuaternion(drawn.group.quaternion);
       tips[i]?.set(...tool.tip, shape.radiusM + 0.5 * shape.halfWidthM);
@@ -400,13 +407,18 @@ export class Picture {
     drawn.arrowGroup.visible = this.showsArrows && newton >= kLeastNewton;
     if (!drawn.arrowGroup.visible) return;
     const made = this.replica.makeArrow(Math.min(newton * kMetresPerNewton, kMostArrow), 0.0016, this.replica.slotColour(tool.slot >> 1));
-    for (const mesh of drawn.arrows) {
-      const position = mesh.geometry.getAttribute('position') as BufferAttribute;
-      position.array.set(made.positions);
-      position.needsUpdate = true;
-    }
+    reshape(drawn.arrows, made);
     drawn.arrowGroup.position.set(...tool.tip);
     drawn.arrowGroup.quaternion.copy(new Quaternion().setFromUnitVectors(new Vector3(0, 0, 1), force.normalize()));
+  }
+
+  private placeHandLine(drawn: DrawnTool, tool: Tool): void {
+    const apart = new Vector3(...tool.hand).sub(new Vector3(...tool.tip)), length = apart.length();
+    drawn.handGroup.visible = length > kApart;
+    if (!drawn.handGroup.visible) return;
+    reshape(drawn.handLine, this.replica.makeHandLine(length, this.replica.slotColour(tool.slot >> 1)));
+    drawn.handGroup.position.set(...tool.tip);
+    drawn.handGroup.quaternion.copy(new Quaternion().setFromUnitVectors(new Vector3(0, 0, 1), apart.normalize()));
   }
 
   private pointerColour(participant: number): number { return participant === kLessonPoint ? kLessonColour : this.replica.pointerColour(participant); }
@@ -485,6 +497,14 @@ export class Picture {
       drawn.label.style.transform = `translate(${this.onCanvas(at).map(n => `${n.toFixed(1)}px`).join(', ')})`;
     }
     for (const [slot, drawn] of this.tools) drawn.label.hidden = !shown.has(slot);
+  }
+}
+
+function reshape(meshes: Mesh[], to: PlainMesh): void {
+  for (const mesh of meshes) {
+    const position = mesh.geometry.getAttribute('position') as BufferAttribute;
+    position.array.set(to.positions);
+    position.needsUpdate = true;
   }
 }
 
