@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "common/base/printable.h"
+#include "common/budget/message_budget.h"
 #include "common/journal/mcap_repair.h"
 
 namespace trocar::journal {
@@ -20,6 +21,7 @@ bool parse_number(const StringMap& entries, const char* key, int base, Number& v
 }
 bool parse_message_bytes(BytesView bytes, google::protobuf::Message& message) {
   return bytes.size() <= kMaxChunkBytes &&
+         check_budget(*message.GetDescriptor(), bytes, build_budget(bytes.size())).ok() &&
          message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
 }
 

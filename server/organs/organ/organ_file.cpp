@@ -2,9 +2,9 @@
 
 #include <algorithm>
 
+#include "common/budget/message_budget.h"
 #include "proto/organ.pb.h"
 #include "server/organs/organ/bad_file.h"
-#include "server/organs/organ/message_budget.h"
 #include "server/organs/organ/packed_file.h"
 
 namespace trocar::organ {

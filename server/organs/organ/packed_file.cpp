@@ -8,8 +8,8 @@
 #include <memory>
 
 #include "common/base/checksum.h"
+#include "common/budget/message_budget.h"
 #include "server/organs/organ/bad_file.h"
-#include "server/organs/organ/message_budget.h"
 
 namespace trocar::organ {
 namespace {

@@ -1,11 +1,9 @@
-#include "server/organs/organ/message_budget.h"
+#include "common/budget/message_budget.h"
 
 #include <google/protobuf/io/coded_stream.h>
 #include <google/protobuf/wire_format_lite.h>
 
-#include "server/organs/organ/bad_file.h"
-
-namespace trocar::organ {
+namespace trocar {
 namespace {
 
 using google::protobuf::FieldDescriptor;
@@ -78,9 +76,10 @@ Status check_budget(const google::protobuf::Descriptor& type, BytesView message,
                     std::size_t budget_bytes) {
   Walk walk(budget_bytes);
   if (walk.message(type, message, 0)) return {};
-  if (!walk.is_spent()) return bad("is not a sound message");
-  return bad("would take more than " + std::to_string(budget_bytes >> 20) +
-             " MiB, 16 times its size and 16 MiB: it is damaged or made to harm");
+  if (!walk.is_spent()) return Error{ErrorCode::BadFile, "is not a sound message"};
+  return Error{ErrorCode::BadFile,
+               "would take more than " + std::to_string(budget_bytes >> 20) +
+                   " MiB, 16 times its size and 16 MiB: it is damaged or made to harm"};
 }
 
-}  // namespace trocar::organ
+}  // namespace trocar

@@ -14,7 +14,7 @@
 #include "common/base/bytes.h"
 #include "common/base/result.h"
 
-namespace trocar::organ {
+namespace trocar {
 
 // Sixteen times a file's or message's bytes, and 16 MiB.
 constexpr std::size_t build_budget(std::size_t bytes) {
@@ -25,4 +25,4 @@ constexpr std::size_t build_budget(std::size_t bytes) {
 Status check_budget(const google::protobuf::Descriptor& type, BytesView message,
                     std::size_t budget_bytes);
 
-}  // namespace trocar::organ
+}  // namespace trocar
