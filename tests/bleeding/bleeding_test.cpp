@@ -5,6 +5,8 @@
 
 #include <gtest/gtest.h>
 
+#include <optional>
+
 #include "tests/bleeding/cut_liver.h"
 
 namespace trocar::bleeding {
@@ -90,22 +92,31 @@ TEST(Bleeding, BytesThatAreNoStateAreRefused) {
   EXPECT_TRUE(other.restore_state(whole).ok());
 }
 
-TEST(Bleeding, AReturnToTheMarkBringsItsBloodBack) {
+// Two marks stand side by side; a return to the first is not one to the second.
+TEST(Bleeding, AReturnToAMarkBringsItsBloodBack) {
   Bleeding bleeding(Rules{});
-  std::int64_t marked = -1;
-  cut_liver(2, 1600, [&](step::PublishedFrame& frame, step::Simulation& simulation) {
-    const bool is_mark = frame.frame == 50, is_return = frame.frame == 90;
-    if (is_mark) marked = bleeding.blood().shed_pl;
-    if (is_mark) frame.mark_events.push_back({frame.tick, hands::MarkAction::Set, true});
-    if (is_return) frame.mark_events.push_back({frame.tick, hands::MarkAction::Return, true});
+  std::optional<std::int64_t> first_pl, second_pl;
+  cut_liver(2, 2400, [&](step::PublishedFrame& frame, step::Simulation& simulation) {
     const auto before = bleeding.blood().shed_pl;
+    const auto add = [&](hands::MarkAction action, std::uint8_t number) {
+      frame.mark_events.push_back({frame.tick, action, true, number});
+    };
+    if (frame.frame == 60) add(hands::MarkAction::Set, 0), first_pl = before;
+    if (frame.frame == 90) add(hands::MarkAction::Set, 3), second_pl = before;
+    if (frame.frame == 110) add(hands::MarkAction::Return, 0);
+    if (frame.frame == 130) add(hands::MarkAction::Return, 3);
     bleeding.observe(frame, simulation.layout(), simulation.state().tools);
-    if (is_return) {
-      EXPECT_LT(bleeding.blood().shed_pl, before);
-      EXPECT_GE(bleeding.blood().shed_pl, marked);
+    const auto after = bleeding.blood().shed_pl;
+    if (frame.frame == 110) {
+      EXPECT_GE(after, *first_pl);
+      EXPECT_LT(after, *second_pl);
+    }
+    if (frame.frame == 130) {
+      EXPECT_GE(after, *second_pl);
     }
   });
-  ASSERT_GE(marked, 0);
+  ASSERT_TRUE(first_pl && second_pl);
+  EXPECT_GT(*second_pl, *first_pl);
 }
 
 }  // namespace

@@ -296,7 +296,7 @@ bool decode_scenario(BytesView bytes) {
 bool decode_lesson(BytesView bytes) {
   const auto lesson = lesson::read_lesson_text(text_of(bytes), "a.toml");
   if (!checked(lesson)) return false;
-  // What is accepted can be given.
+  // A lesson that is accepted can be given.
   lesson::Course course(*lesson);
   std::vector<lesson::Tip> tips{{.tool = ToolSlot{0}, .position_m = {0, 0.1, 0}}};
   for (Tick tick = 16; tick < 160; tick += 16) course.observe({.tick = tick, .tips = tips});

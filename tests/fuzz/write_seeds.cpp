@@ -96,9 +96,10 @@ void save_blood() {
   Bytes state;
   auto archive = world::StateArchive::writing(state);
   blood.visit_state(archive);
-  bool has_mark = true;
-  archive.flag(has_mark);
-  blood.visit_state(archive);
+  for (bool has_mark : {true, false, false, true}) {
+    archive.flag(has_mark);
+    if (has_mark) blood.visit_state(archive);
+  }
   save("bleeding", "clipped", state);
 }
 

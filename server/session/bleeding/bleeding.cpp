@@ -43,9 +43,10 @@ void Bleeding::observe(step::PublishedFrame& frame, const wire::SurfaceLayout& l
 void Bleeding::use_marks(const step::PublishedFrame& frame) {
   for (const auto& event : frame.mark_events) {
     if (!event.is_done) continue;
-    if (event.action == hands::MarkAction::Set) marked_ = blood_;
+    auto& marked = marked_[event.number];
+    if (event.action == hands::MarkAction::Set) marked = blood_;
     if (event.action != hands::MarkAction::Return) continue;
-    blood_ = marked_.value_or(Blood{});
+    blood_ = marked.value_or(Blood{});
     epoch_.reset();
   }
 }
@@ -156,14 +157,13 @@ void Bleeding::publish(step::PublishedFrame& frame, std::int64_t shed_before_pl,
 
 void Bleeding::visit_state(world::StateArchive& archive) {
   blood_.visit_state(archive);
-  bool has_mark = marked_.has_value();
-  archive.flag(has_mark);
-  if (!has_mark) {
-    marked_.reset();
-    return;
+  for (auto& marked : marked_) {
+    bool has_mark = marked.has_value();
+    archive.flag(has_mark);
+    if (!has_mark) marked.reset();
+    if (has_mark && !marked) marked.emplace();
+    if (marked) marked->visit_state(archive);
   }
-  if (!marked_) marked_.emplace();
-  marked_->visit_state(archive);
 }
 
 void Bleeding::write_state(Bytes& out) {

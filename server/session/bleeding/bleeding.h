@@ -10,6 +10,7 @@
 // Cost: proportional to the vertices that are wet or bleed, and to the surface where it was
 // replaced. No allocation once its arrays have ceased to grow, but for the frame's own levels.
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -54,7 +55,8 @@ class Bleeding {
 
   Rules rules_;
   Blood blood_;
-  std::optional<Blood> marked_;  // the blood of the organ that an instructor has marked
+  // The blood of the organ as an instructor has marked it, by the mark's number.
+  std::array<std::optional<Blood>, hands::kMostMarks> marked_;
   // The rest follows from these and the layout.
   std::optional<std::uint32_t> epoch_;  // of graph_; nothing: it is to be built
   std::size_t triangles_ = 0;           // numbers that graph_ and vessels_ know
