@@ -43,7 +43,8 @@ Status write_picture_series(const ClientOptions& options) {
     if (recording.state() == replica::SourceState::Closed)
       return Error{ErrorCode::BadFile, recording.close_reason().text};
     // Panels that have never been drawn do not know their size yet.
-    if (count == 0) (*picture)->draw(replica, recording, hands, now_ns);
+    if (count == 0)
+      for (int i = 0; i < 3; ++i) (*picture)->draw(replica, recording, hands, now_ns);
     (*picture)->draw(replica, recording, hands, now_ns);
     char name[32];
     std::snprintf(name, sizeof name, "/%06d.png", ++count);

@@ -148,7 +148,7 @@ void main() {
   // A film of blood hides what it covers; where it is deep it is nearly black.
   float deep = covered * covered;
   albedo = mix(albedo, mix(vec3(0.190, 0.0060, 0.0050), vec3(0.090, 0.0016, 0.0015), deep), blood);
-  wet = mix(wet, 1.5, blood);
+  wet = mix(wet, 1.2, blood);
 
   float shade = tool_shadow(world_position);
   // Little light comes down into a wound.
@@ -165,11 +165,12 @@ void main() {
   vec2 key_film = highlights(n, view, key_direction), fill_film = highlights(n, view, fill_direction);
   // Inside, the film is broken by the grain: it shines broadly, without a sharp glint.
   vec2 share = is_inside ? vec2(0.034, 0.05) : vec2(0.038, 0.62);
-  share = mix(share, vec2(0.030, 0.85), blood);
+  // The walls of a wound are facets, which a sharp glint would fill.
+  share = mix(share, vec2(0.028, is_inside ? 0.12 : 0.60), blood);
   vec3 film = key_colour * (shade * open * (share.y * key_film.y + share.x * key_film.x) * wet);
   film *= 1.0 - 0.8 * lip * (1.0 - blood);
   film += fill_colour * ((0.26 * fill_film.y + 0.06 * fill_film.x) * wet * open);
-  float mirror = mix(is_inside ? 0.22 : 0.55, 1.1, blood);
+  float mirror = mix(is_inside ? 0.22 : 0.55, is_inside ? 0.4 : 0.9, blood);
   film += hemisphere(reflect(-view, n)) * (fresnel * mirror * (0.5 + 0.5 * shade) * open);
 
   // The overlay glows through: tissue darkens and takes the region's colour, the film stays.

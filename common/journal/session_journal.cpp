@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <limits>
+#include <set>
 
 #include "common/base/printable.h"
 #include "common/budget/message_budget.h"
@@ -84,14 +85,11 @@ Status SessionJournal::read_info() {
 // Damage here costs names, not the journal.
 Status SessionJournal::read_participants() {
   const auto everything = std::numeric_limits<Tick>::max();
-  const TickVisitor<proto::Participants> note = [this](Tick, const proto::Participants& list) {
+  std::set<std::pair<std::uint32_t, std::string>> known;
+  const TickVisitor<proto::Participants> note = [&](Tick, const proto::Participants& list) {
     for (const proto::Participant& participant : list.participant()) {
       const auto name = printable(participant.name());
-      const bool is_known =
-          std::any_of(info_.participants.begin(), info_.participants.end(), [&](const auto& known) {
-            return known.slot() == participant.slot() && known.name() == name;
-          });
-      if (is_known) continue;
+      if (!known.emplace(participant.slot(), name).second) continue;
       info_.participants.push_back(participant);
       info_.participants.back().set_name(name);
     }

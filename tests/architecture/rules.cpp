@@ -16,6 +16,7 @@ constexpr const char* kStageTimers = "server/tissue/step/tick.cpp";
 const std::set<std::string> kProtobufFolders{"proto",
                                              "server/organs/organ",
                                              "server/papers/dogan",
+                                             "common/budget",
                                              "common/wire",
                                              "common/journal",
                                              "server/session/participants",
