@@ -10,6 +10,7 @@
 #include "client/render/gl.h"
 #include "client/render/shader.h"
 #include "client/render/shader_sources.h"
+#include "client/shape/blood_film.h"
 #include "client/shape/instrument_mesh.h"
 #include "client/shape/noise.h"
 #include "client/shape/smooth_surface.h"
@@ -29,8 +30,6 @@ constexpr float kOverlayFadeSeconds = 0.12f;
 // The light of an endoscope does not reach far.
 constexpr float kScopeClearMetres = 0.05f, kScopeHazePerMetre = 4.0f;
 constexpr float kHazePerMiddle = 0.55f;  // over the distance of what one looks at
-// This depth of blood hides all but a third of what is below it.
-constexpr float kCoveringMetres = 60e-6f;
 constexpr std::size_t kTriangleBudgetSoftware = 24'000, kTriangleBudget = 100'000;
 
 struct Tint {
@@ -176,7 +175,6 @@ struct SceneRenderer::Parts {
   void load_topology(const SceneView& scene);
   void upload_organ(const SceneView& scene);
   void fade_tints(const SceneView& scene);
-  void cover_with_blood(const SceneView& scene);
   void set_lights(const Shader& shader, const OrbitCamera& camera) const;
   void draw_field(const OrbitCamera& camera);
   void draw_backdrop(const OrbitCamera& camera);
@@ -292,32 +290,20 @@ void SceneRenderer::Parts::fade_tints(const SceneView& scene) {
   surface.extend_values(tints);
 }
 
-// Light is lost in blood by the law of Beer and Lambert.
-void SceneRenderer::Parts::cover_with_blood(const SceneView& scene) {
-  covers.assign(surface.vertex_count(), 0);
-  if (scene.blood.size() != surface.coarse_vertex_count()) return;
-  constexpr float kPerLevel = static_cast<float>(wire::kBloodLevelMetres) / kCoveringMetres;
-  for (std::size_t i = 0; i < scene.blood.size(); ++i)
-    if (scene.blood[i] > 0) covers[i] = 1 - std::exp(-kPerLevel * scene.blood[i]);
-  surface.extend_values(covers);
-}
-
 void SceneRenderer::Parts::upload_organ(const SceneView& scene) {
   surface.update(scene.positions);
   fade_tints(scene);
-  cover_with_blood(scene);
+  cover_with_blood(surface, scene.blood, static_cast<float>(wire::kBloodLevelMetres), covers);
   const auto byte = [](float v) {
     return static_cast<std::uint8_t>(std::clamp(v, 0.0f, 1.0f) * 255);
   };
   for (std::size_t i = 0; i < vertices.size(); ++i) {
     const Tint& t = tints[i];
-    const Vec3f lip = surface.lips()[i] * 127;
     const float whole = t.a > 1e-3f ? 1 / t.a : 0.0f;
     vertices[i] = {surface.positions()[i],
                    surface.normals()[i],
                    {byte(t.r * whole), byte(t.g * whole), byte(t.b * whole), byte(t.a)},
-                   {static_cast<std::int8_t>(lip.x), static_cast<std::int8_t>(lip.y),
-                    static_cast<std::int8_t>(lip.z), static_cast<std::int8_t>(covers[i] * 127)}};
+                   lip_bytes(surface.lips()[i], covers[i])};
   }
   glBindBuffer(GL_ARRAY_BUFFER, organ_array.buffer);
   glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(vertices.size() * sizeof(OrganVertex)),

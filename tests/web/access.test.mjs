@@ -1,13 +1,9 @@
 // The page as people use it who see, hear or move otherwise: axe-core's rules on every screen, several
 // views by keys alone, and what a phone shows.
 import assert from 'node:assert/strict';
-import fs from 'node:fs';
-import { createRequire } from 'node:module';
-import { base, close, kPatience, link, live, prepare, test, until, world } from './browser.mjs';
+import { base, breaksNoRule as check, close, kPatience, link, live, prepare, test, until, world } from './browser.mjs';
 
-const { TROCAR_MODULES, TROCAR_PICTURES, TROCAR_WORK } = process.env;
-const kAxe = fs.readFileSync(createRequire(`${TROCAR_MODULES}/`).resolve('axe-core/axe.min.js'), 'utf8');
-const kTags = ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa', 'best-practice'];
+const { TROCAR_WORK } = process.env;
 prepare(['--lesson', 'along-the-line'], ['--insecure-loopback', '--recordings', `${TROCAR_WORK}/recordings`]);
 
 async function open(url, width = 1280, height = 720, colorScheme = 'dark') {
@@ -17,19 +13,6 @@ async function open(url, width = 1280, height = 720, colorScheme = 'dark') {
   page.on('pageerror', error => page.faults.push(error.message));
   await page.goto(url);
   return page;
-}
-const picture = async (page, name) => { if (TROCAR_PICTURES) await page.screenshot({ path: `${TROCAR_PICTURES}/${name}.png` }); };
-// Fails with a line for each place that breaks a rule.
-async function check(page, screen) {
-  await picture(page, screen);
-  await page.evaluate(kAxe);
-  const found = await page.evaluate(async tags => {
-    const result = await window.axe.run(document, { runOnly: tags });
-    return result.violations.flatMap(v => v.nodes.map(n => `${v.id} (${v.impact}): ${n.target.join(' ')} ${n.any.concat(n.all, n.none).map(c => c.message).join('; ')}`));
-  }, kTags);
-  assert.deepEqual(found, [], `${screen}:\n${found.join('\n')}`);
-  const wide = await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth);
-  assert.ok(wide <= 0, `${screen}: it is ${wide} pixels wider than the window`);
 }
 const kSizes = [['desk', 1280, 720], ['phone', 390, 844]];
 

@@ -1,12 +1,14 @@
 // What tests of the page share: the real programs, headless Chromium, and patience that ends. Whatever
 // hangs ends as a failure with a name: each test and each hook has a limit.
+import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
 import fs from 'node:fs';
 import { createRequire } from 'node:module';
 import { after, afterEach, before, test as nodeTest } from 'node:test';
 
-const { TROCAR_MODULES, TROCAR_BUILD, TROCAR_ROOT, TROCAR_WORK, TROCAR_CHROMIUM, TROCAR_RECORDING } = process.env;
-const { chromium } = createRequire(`${TROCAR_MODULES}/`)('playwright-core');
+const { TROCAR_MODULES, TROCAR_BUILD, TROCAR_ROOT, TROCAR_WORK, TROCAR_CHROMIUM, TROCAR_RECORDING, TROCAR_PICTURES } = process.env;
+const need = createRequire(`${TROCAR_MODULES}/`), { chromium } = need('playwright-core');
+const kTags = ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa', 'best-practice'];
 export const kPatience = 60_000;
 const kTestMs = 150_000, kStartMs = 120_000, kEndMs = 30_000;
 const children = new Set();
@@ -70,6 +72,20 @@ export const close = async page => {
   await page.evaluate(() => window.trocar?.session?.leave());
   await page.close();
 };
+
+export const picture = async (page, name) => { if (TROCAR_PICTURES) await page.screenshot({ path: `${TROCAR_PICTURES}/${name}.png` }); };
+// Fails with a line for each place that breaks a rule of axe-core.
+export async function breaksNoRule(page, screen) {
+  await picture(page, screen);
+  await page.evaluate(fs.readFileSync(need.resolve('axe-core/axe.min.js'), 'utf8'));
+  const found = await page.evaluate(async tags => {
+    const result = await window.axe.run(document, { runOnly: tags });
+    return result.violations.flatMap(v => v.nodes.map(n => `${v.id} (${v.impact}): ${n.target.join(' ')} ${n.any.concat(n.all, n.none).map(c => c.message).join('; ')}`));
+  }, kTags);
+  assert.deepEqual(found, [], `${screen}:\n${found.join('\n')}`);
+  const wide = await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth);
+  assert.ok(wide <= 0, `${screen}: it is ${wide} pixels wider than the window`);
+}
 
 export const openBrowser = () => chromium.launch({ executablePath: TROCAR_CHROMIUM, timeout: kPatience, args: ['--no-sandbox', '--use-angle=swiftshader',
   '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist', '--disable-dev-shm-usage'] });

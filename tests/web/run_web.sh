@@ -1,5 +1,5 @@
 #!/bin/bash
-# run_web.sh recording|codec|page|lesson|debrief|access|hostile|figures|hour BUILD_FOLDER WORK_FOLDER: one of the tests of the page. Exit code 77:
+# run_web.sh recording|codec|page|lesson|blood|debrief|access|hostile|figures|hour BUILD_FOLDER WORK_FOLDER: one of the tests of the page. Exit code 77:
 # skipped, with the reason.
 set -euo pipefail
 test=$1 build=$2 work=$3
@@ -50,7 +50,7 @@ case $test in
     node "$here/hour.mjs"
     ;;
   codec) node --test-reporter=spec "$here/codec.test.mjs" ;;
-  page | lesson | debrief | access | hostile | figures)
+  page | lesson | blood | debrief | access | hostile | figures)
     chromium=$(command -v chromium || command -v chromium-browser || command -v google-chrome) ||
       skip "Chromium is not installed: deploy/setup --with-web"
     [ -e "$build/web/page/index.html" ] || skip "the page is not built"

@@ -142,13 +142,17 @@ TROCAR_EXPORT(normals_at) const void* trocar_normals_at() {
   return model().surface().normals().data();
 }
 TROCAR_EXPORT(lips_at) const void* trocar_lips_at() {
-  return model().surface().lips().data();
+  return model().lips().data();
 }
 TROCAR_EXPORT(rest_at) const void* trocar_rest_at() {
   return model().rest().data();
 }
 TROCAR_EXPORT(overlay_at) const void* trocar_overlay_at() {
   return model().overlay().data();
+}
+// Null: the session does not bleed. Else the numbers of PageBlood.
+TROCAR_EXPORT(blood) const void* trocar_blood() {
+  return model().blood();
 }
 TROCAR_EXPORT(tools) std::size_t trocar_tools() {
   return model().tools().size();

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "common/wire/blood_codec.h"
 #include "common/wire/framing.h"
 #include "proto/wire.pb.h"
 
@@ -41,6 +42,7 @@ void PageModel::restart() {
   outbox_.clear();
   error_.clear();
   tools_.clear();
+  blood_.reset();
   held_.clear();
   lines_ = {};
   drawing_.clear();
@@ -128,6 +130,26 @@ void PageModel::build_surface(std::size_t triangle_budget) {
     const Vec3f& p = smooth_.positions()[i];
     rest_[i] = {p.x, p.y, p.z, shape::rim_of(rim_distances_[i], smooth_.is_wound()[i] != 0)};
   }
+}
+
+void PageModel::update_blood() {
+  shape::cover_with_blood(smooth_, shown_->blood(), static_cast<float>(wire::kBloodLevelMetres),
+                          covers_);
+  lips_.resize(smooth_.vertex_count());
+  for (std::size_t i = 0; i < lips_.size(); ++i)
+    lips_[i] = shape::lip_bytes(smooth_.lips()[i], covers_[i]);
+  const auto* newest = replica_->newest();
+  if (newest == nullptr || !newest->has_state) return;  // its figures come in a moment
+  blood_.reset();
+  if (!newest->figures.blood) return;
+  const wire::BloodFigures& figures = *newest->figures.blood;
+  const auto ml = [](std::uint64_t nl) { return static_cast<double>(nl) * 1e-6; };
+  blood_ = {.shed_ml = ml(figures.shed_nl),
+            .on_surface_ml = ml(figures.on_surface_nl),
+            .dripped_ml = ml(figures.dripped_nl),
+            .sucked_ml = ml(figures.sucked_nl),
+            .rate_ml_min = 60 * ml(figures.rate_nl_s),
+            .open_vessels = static_cast<double>(figures.open_vessels)};
 }
 
 void PageModel::update_tools() {
@@ -231,6 +253,7 @@ bool PageModel::update(double now_ms, std::size_t triangle_budget, Overlay overl
     build_surface(triangle_budget);
   if (shown_->positions().size() != smooth_.coarse_vertex_count()) return false;
   smooth_.update(shown_->positions());
+  update_blood();
   update_tools();
   pointers_.clear();
   for (const auto& pointer : replica_->pointers(to_ns(now_ms)))

@@ -18,6 +18,7 @@
 #include "client/replica/held_tissue.h"
 #include "client/replica/interpolated_surface.h"
 #include "client/replica/replica.h"
+#include "client/shape/blood_film.h"
 #include "client/shape/instrument_mesh.h"
 #include "client/shape/lens.h"
 #include "client/shape/ribbon.h"
@@ -47,6 +48,14 @@ struct PagePointer {
   Vec3f position;         // m
 };
 static_assert(sizeof(PagePointer) == 4 * sizeof(float));
+
+// These say what has bled so far, from whole nanolitres (wire::BloodFigures).
+struct PageBlood {
+  double shed_ml = 0, on_surface_ml = 0, dripped_ml = 0, sucked_ml = 0;
+  double rate_ml_min = 0;
+  double open_vessels = 0;
+};
+static_assert(sizeof(PageBlood) == 6 * sizeof(double));
 
 class PageModel {
  public:
@@ -78,6 +87,10 @@ class PageModel {
   // Returns x, y, z at rest, and shape::rim_of.
   std::span<const std::array<float, 4>> rest() const { return rest_; }
   std::span<const std::array<std::uint8_t, 4>> overlay() const { return overlay_; }
+  // Returns shape::lip_bytes, with the blood of this moment.
+  std::span<const std::array<std::int8_t, 4>> lips() const { return lips_; }
+  // Returns what the newest frame says of blood; null: the session does not bleed.
+  const PageBlood* blood() const { return blood_ ? &*blood_ : nullptr; }
   std::span<const PageTool> tools() const { return tools_; }
   std::span<const PagePointer> pointers() const { return pointers_; }
 
@@ -103,6 +116,7 @@ class PageModel {
  private:
   bool accept(const proto::Envelope& envelope, double now_ms, std::size_t bytes);
   void build_surface(std::size_t triangle_budget);
+  void update_blood();
   void update_tools();
   void update_overlay(Overlay overlay);
   void update_drawing();
@@ -118,6 +132,9 @@ class PageModel {
   std::vector<float> rim_distances_;
   std::vector<std::array<float, 4>> tints_;  // colour weighted by the fourth
   std::vector<std::array<std::uint8_t, 4>> overlay_;
+  std::vector<float> covers_;  // by blood, 0 to 1
+  std::vector<std::array<std::int8_t, 4>> lips_;
+  std::optional<PageBlood> blood_;
   std::vector<PageTool> tools_;
   std::vector<PagePointer> pointers_;
   replica::DrawnLines lines_;

@@ -2,6 +2,7 @@
 
 import type { JSX } from 'preact';
 import { useEffect, useMemo, useRef, useState } from 'preact/hooks';
+import { BloodPanel } from './blood';
 import { Beside, BesideChoice, type Other } from './debrief/beside';
 import { toBinary } from '@bufbuild/protobuf';
 import { Bookmarks } from './debrief/bookmarks';
@@ -184,6 +185,7 @@ export function Debrief(props: DebriefProps): JSX.Element {
       </main>
       <aside>
         {stage && <LessonPanel goal={{ stage, progress: null, seconds: Math.max(0, player.tick - Number(stage.beginTick)) / 1000 }} />}
+        <BloodPanel blood={replica.blood()} />
         <People people={people} tools={replica.tools()} own={null} colourOf={slot => replica.slotColour(slot)} follows={follows} onFollow={setFollows} />
         <Events events={log.events} now={player.tick} onSeek={seek} empty="Looking for events" />
         <Bookmarks marks={marks} now={player.tick} name={props.name} onChange={change} onSeek={seek} onCopy={props.link.recordingsKey ? all => void share({ bookmarks: bookmarksText(all) }) : null} />

@@ -4,6 +4,7 @@ import type { JSX } from 'preact';
 import { useEffect, useMemo, useRef, useState } from 'preact/hooks';
 import { LessonAction, RecordingStatus, TeachAction, type Envelope, type LessonProgress, type LessonStage, type Participant, type Participants, type SessionPace } from './gen/proto/wire_pb';
 import { Forces } from './forces';
+import { BloodPanel } from './blood';
 import { LessonPanel } from './goals';
 import { Marks, Pace } from './conduct';
 import { Ask, Door, Manage, Say, ViewTools, type Question } from './lesson';
@@ -124,6 +125,7 @@ export function Live(props: { link: Link; replica: Replica; onEnd(why: string): 
       </main>
       <aside>
         {stage.current && <LessonPanel goal={{ stage: stage.current, progress: progress.current, seconds: progress.current?.seconds ?? 0 }} {...(mayMark ? { lead } : {})} />}
+        <BloodPanel blood={replica.blood()} />
         <People people={people.current} tools={replica.tools()} own={own.current} colourOf={slot => replica.slotColour(slot)} follows={follows} onFollow={setFollows}
           {...(mayMark ? { extra: person => <Manage session={session} person={person} own={own.current} onAsk={setAsks} /> } : {})} />
         {mayMark && <Door session={session} list={list.current} />}

@@ -31,6 +31,7 @@ interface Exports {
   lips_at(): number;
   rest_at(): number;
   overlay_at(): number;
+  blood(): number;
   tools(): number;
   tools_at(): number;
   pointers(): number;
@@ -72,6 +73,9 @@ export interface Tool {
 }
 
 export interface Pointer { participant: number; position: Vec3 } // slot; m
+
+// Lost is what was shed: it lies on the organ, has dripped off, or was sucked off.
+export interface Blood { shedMl: number; onSurfaceMl: number; drippedMl: number; suckedMl: number; mlPerMinute: number; openVessels: number }
 
 // The view of who sees with a tool: metres and unit vectors in the world.
 export interface Lens { eye: Vec3; forward: Vec3; up: Vec3; tanHalfHeight: number; isEndoscope: boolean }
@@ -149,8 +153,8 @@ export class Replica {
   get vertexCount(): number { return this.e.vertices(); }
   positions(): Float32Array { return this.floats(this.e.positions_at(), this.e.vertices() * 3); }
   normals(): Float32Array { return this.floats(this.e.normals_at(), this.e.vertices() * 3); }
-  // The normals of wounds' rims, elsewhere as normals().
-  lips(): Float32Array { return this.floats(this.e.lips_at(), this.e.vertices() * 3); }
+  // The normals of wounds' rims, elsewhere as normals(), and how much blood covers, in shares of 127.
+  lips(): Int8Array { return new Int8Array(this.e.memory.buffer, this.e.lips_at(), this.e.vertices() * 4); }
   rest(): Float32Array { return this.floats(this.e.rest_at(), this.e.vertices() * 4); }
   overlay(): Uint8Array { return new Uint8Array(this.e.memory.buffer, this.e.overlay_at(), this.e.vertices() * 4); }
   triangles(): Uint32Array { return new Uint32Array(this.e.memory.buffer, this.e.triangles_at(), this.e.triangles() * 3); }
@@ -165,6 +169,14 @@ export class Replica {
         hand: three(i + 13), forceN: three(i + 16), torqueNm: three(i + 19), penetrationM: at(i + 22),
       });
     return out;
+  }
+
+  // What has bled so far; null: the session does not bleed.
+  blood(): Blood | null {
+    const at = this.e.blood();
+    if (at === 0) return null;
+    const [shedMl = 0, onSurfaceMl = 0, drippedMl = 0, suckedMl = 0, mlPerMinute = 0, openVessels = 0] = new Float64Array(this.e.memory.buffer, at, 6);
+    return { shedMl, onSurfaceMl, drippedMl, suckedMl, mlPerMinute, openVessels };
   }
 
   // Who points where.

@@ -296,8 +296,9 @@ export class Picture {
   private loadGeometry(): void {
     const r = this.replica, n = r.vertexCount, g = this.organ.geometry;
     g.dispose();
-    for (const [name, size] of [['position', 3], ['normal', 3], ['lip', 3]] as const)
+    for (const [name, size] of [['position', 3], ['normal', 3]] as const)
       g.setAttribute(name, dynamic(new BufferAttribute(new Float32Array(n * size), size)));
+    g.setAttribute('lip', dynamic(new BufferAttribute(new Int8Array(n * 4), 4, true)));
     g.setAttribute('rest', new BufferAttribute(r.rest().slice(), 4));
     g.setAttribute('overlay', dynamic(new BufferAttribute(new Uint8Array(n * 4), 4, true)));
     g.setIndex(new BufferAttribute(r.triangles().slice(), 1));

@@ -3,6 +3,7 @@
 
 import type { JSX } from 'preact';
 import { useEffect, useMemo, useState } from 'preact/hooks';
+import { millilitres } from '../blood';
 import { Player } from '../player';
 import { EventLog, ofFile, overHttp, Recording, type RecordedEvent } from '../recording';
 import { Replica } from '../replica';
@@ -90,6 +91,7 @@ export function Beside(props: { other: Other; first: Player; firstEvents: Record
   const player = useMemo(() => new Player(recording, replica, () => redraw(n => n + 1)), []);
   const guide = useMemo(() => guideOf(() => player.people?.participant ?? [], slot => replica.slotColour(slot)), []);
   const [follows, setFollows] = useState<number | null>(null);
+  const blood = replica.blood();
   const offset = (there ?? recording.firstTick) - (here ?? props.first.recording.firstTick);
   useEffect(() => {
     let isGone = false;
@@ -105,7 +107,7 @@ export function Beside(props: { other: Other; first: Player; firstEvents: Record
         player.advance(now);
       }}>
         <details class="aligned">
-          <summary><b>{name}</b> <span class="time">{clock(player.tick / 1000)}</span> Align</summary>
+          <summary><b>{name}</b> <span class="time">{clock(player.tick / 1000)}</span>{blood && blood.shedMl > 0 && <span class="time">{` blood lost ${millilitres(blood.shedMl)}`}</span>} Align</summary>
           <EventChoice label="Where the first has" events={props.firstEvents} onTick={setHere} />
           <EventChoice label="this one has" events={log.events} onTick={setThere} />
         </details>
