@@ -194,5 +194,34 @@ nothing_left() {
   [ -z "$(traces)" ]
 }
 check "nothing is left" nothing_left
+
+# ---- Under systemd ----
+# A script in the root is a unit that runs at its start and ends it; each line of its result is a check.
+if ! command -v systemd-nspawn >/dev/null; then
+  echo "skipped: services, because systemd-nspawn is missing (systemd-container)"
+else
+  cp "$(dirname "$0")/services.sh" "$root/packages"
+  rm -f "$root/packages"/*.service
+  cat >"$root/etc/systemd/system/check.service" <<'UNIT'
+[Service]
+Type=idle
+ExecStart=/packages/services.sh
+[Install]
+WantedBy=multi-user.target
+UNIT
+  inside systemctl --quiet enable check.service
+  check "the packages once more" install_all
+  umount "$root/proc"
+  timeout 300 systemd-nspawn --quiet --register=no --keep-unit --private-network --directory "$root" --boot \
+    >"$work/boot" 2>&1
+  if [ -s "$root/packages/result" ]; then
+    while read -r outcome name; do check "$name" test "$outcome" = passed; done <"$root/packages/result"
+    if grep -q '^failed' "$root/packages/result"; then cat "$root/packages/services.log"; fi
+    rm "$root/etc/systemd/system/check.service" "$root"/etc/systemd/system/multi-user.target.wants/check.service
+    check "nothing is left of services" nothing_left
+  else
+    echo "skipped: services, because systemd does not start in a container here"
+  fi
+fi
 echo "$((count - failures)) passed, $failures failed"
 [ $failures -eq 0 ]
