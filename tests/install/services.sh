@@ -31,13 +31,27 @@ joins() {
   runuser -u ada -- env HOME=/home/ada trocar-client --join "$code" --role observer --name Ada --no-render --seconds 1
 }
 page() {
-  sed -i 's/^# recordings/recordings/' /etc/trocar/web.toml
+  # Without TLS, so that this shell can speak to it.
+  sed -i 's/^# recordings/recordings/; $a insecure-loopback = true' /etc/trocar/web.toml
   systemctl start trocar-web && logs trocar-web '^ *recordings ' && logs trocar-web 'listening' &&
     systemctl is-active trocar-web
 }
 closed() {
   systemctl stop trocar@lesson && [ "$(systemctl show -P Result trocar@lesson)" = success ] &&
     trocar-journal verify "$recordings"/*.mcap
+}
+# The page lets trocar-journal simulate a recording again, within the service's own sandbox.
+page_checks() {
+  local key name
+  key=$(logs trocar-web '^ *recordings ' | sed 's/.*=//')
+  name=$(basename "$recordings"/*.mcap)
+  sleep 6  # what has just changed is still being written, to the page
+  exec 3<>/dev/tcp/127.0.0.1/7691
+  printf 'GET /recordings/%s/check HTTP/1.1\r\nHost: 127.0.0.1:7691\r\nAuthorization: Bearer %s\r\nConnection: close\r\n\r\n' \
+    "$name" "$key" >&3
+  cat <&3
+  exec 3>&-
+  logs trocar-web "$name: verified"
 }
 private() {
   ! runuser -u ada -- ls "$recordings" && ! runuser -u ada -- ls /var/lib/trocar/state &&
@@ -77,6 +91,7 @@ check "a session starts as a service" session
 check "its log has the codes, and somebody joins with one" joins
 check "the page starts as a service, with recordings" page
 check "a stop closes the recording, which verifies" closed
+check "the page checks that recording, too" page_checks
 check "other users see no code and no recording" private
 check "systemd finds trocar@ exposed below 2 of 10" hardened trocar@lesson
 check "systemd finds trocar-web exposed below 2 of 10" hardened trocar-web
