@@ -13,7 +13,7 @@ command -v mmdebstrap >/dev/null || fail 5 "mmdebstrap is missing: deploy/setup 
 work=$(mktemp -d)
 root=$work/root
 chmod 755 "$work"
-# The lists of packages are this machine's, without what is not Debian's.
+# A bare one has what Debian calls essential, and apt.
 if [ ! -e "${base:=$work/base.tar}" ]; then
   echo "making a bare Debian 12..."
   mmdebstrap --quiet --variant=minbase bookworm "$base" >"$work/log" 2>&1 ||
