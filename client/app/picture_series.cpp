@@ -42,7 +42,7 @@ Status write_picture_series(const ClientOptions& options) {
     if (!replica.fault().ok()) return replica.fault().error();
     if (recording.state() == replica::SourceState::Closed)
       return Error{ErrorCode::BadFile, recording.close_reason().text};
-    // Panels that have never been drawn do not know their size yet.
+    // Panels that have never been drawn do not know their size yet, nor those beside them.
     if (count == 0)
       for (int i = 0; i < 3; ++i) (*picture)->draw(replica, recording, hands, now_ns);
     (*picture)->draw(replica, recording, hands, now_ns);
