@@ -7,14 +7,14 @@
 namespace trocar::mesh {
 
 std::array<std::size_t, kDihedralClasses> dihedral_histogram(const TetMesh& mesh) {
-  constexpr std::size_t kFaces[4][3] = {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
+  constexpr std::size_t kOutwardFaces[4][3] = {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
   std::array<std::size_t, kDihedralClasses> counts{};
   for (const Tet& tet : mesh.tets) {
     std::array<Vec3d, 4> normals;  // outward, of length 1
     for (std::size_t f = 0; f < 4; ++f) {
-      const Vec3d& o = mesh.rest_positions[tet[kFaces[f][0]].value];
-      normals[f] = normalized(cross(mesh.rest_positions[tet[kFaces[f][1]].value] - o,
-                                    mesh.rest_positions[tet[kFaces[f][2]].value] - o),
+      const Vec3d& o = mesh.rest_positions[tet[kOutwardFaces[f][0]].value];
+      normals[f] = normalized(cross(mesh.rest_positions[tet[kOutwardFaces[f][1]].value] - o,
+                                    mesh.rest_positions[tet[kOutwardFaces[f][2]].value] - o),
                               Vec3d{});
     }
     // The angle inside between two faces is 180 degrees less the angle between outward normals.

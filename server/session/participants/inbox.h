@@ -58,7 +58,7 @@ class SimulationInbox {
 
   SpscQueue<Item> queue_{kCapacity};
   std::atomic<std::size_t> pending_{0};  // never less than what is in queue_
-  struct Mark {
+  struct alignas(2) Mark {               // in one lock-free store
     hands::MarkAction action = hands::MarkAction::None;
     std::uint8_t number = 0;
   };
