@@ -375,8 +375,12 @@ ui::HudModel Picture::hud_model(const replica::Replica& replica, replica::Sessio
   model.pictures_per_second = rate_.pictures_per_second;
   model.frames_per_second = rate_.frames_per_second;
   model.bytes_per_second = rate_.bytes_per_second;
+  using Status = wire::RecordingStatus;
+  const auto recorded = replica.recording().status;
+  if (!is_replay && recorded != Status::Unknown)
+    model.is_recorded = recorded == Status::Whole || recorded == Status::Gapped;
   model.recording_text = replica.recording().text;
-  model.has_recording_ended = replica.recording().status == wire::RecordingStatus::Failed;
+  model.has_recording_ended = recorded == Status::Failed;
   model.sync_text = model.is_away ? "old" : sync_text(replica);
   model.is_in_step = !model.is_away && replica.sync_state() == replica::SyncState::InStep;
   model.shows_regions = overlays_.regions;

@@ -133,6 +133,7 @@ struct HudModel {
   std::optional<HudTimeline> timeline;
   float greatest_force_n = 0;  // of all participants' `forces_n`: their common scale
   bool shows_regions = true, shows_holds = false, shows_arrows = true, shows_rate = false;
+  std::optional<bool> is_recorded;      // of a live session; nothing: it is not known
   std::string recording_text;           // empty: nothing is wrong with the recording
   bool has_recording_ended = false;     // while the session goes on
   std::string frozen_text;              // empty: one's own tools follow one's hands

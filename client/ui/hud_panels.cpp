@@ -130,6 +130,7 @@ Box draw_session_panel(const HudModel& model, float scale) {
   ImGui::Separator();
   if (ImGui::BeginTable("figures", 2, ImGuiTableFlags_SizingFixedFit)) {
     row("session time", clock_text(model.session_seconds));
+    if (model.is_recorded) row("recorded", *model.is_recorded ? "yes" : "no");
     if (!model.ghost_text.empty()) row("ghost", model.ghost_text);
     if (model.shows_rate) figure_rows(model);
     if (!model.is_paused && model.surface_age_ms &&

@@ -14,6 +14,7 @@ prepare(['--organ', 'liver'], kRecordings);
 test('an instructor joins by a link, sees a cut, marks the organ and returns it', async () => {
   const page = await openPage(link(world.server.codes.instructor, 'instructor', '<b>Ivy</b> & "Co"'));
   await live(page);
+  await page.locator('header').getByText('recorded', { exact: true }).waitFor({ timeout: kPatience });
   const hand = world.server.hand('Scalpel', 'incise');
   await page.getByRole('list').getByText('Scalpel', { exact: true }).first().waitFor({ timeout: kPatience });
   // Counts of vertices say nothing: a slow picture gets fewer.

@@ -22,7 +22,7 @@ export function Live(props: { link: Link; replica: Replica; onEnd(why: string): 
   const { replica } = props;
   const [, redraw] = useState(0), [follows, setFollows] = useState<number | null>(null), [asks, setAsks] = useState<Question | null>(null);
   const people = useRef<Participant[]>([]), list = useRef<Participants | null>(null), events = useRef<RecordedEvent[]>([]);
-  const forces = useMemo(() => new Forces(), []), own = useRef<number | null>(null), recording = useRef(''), crc = useRef('');
+  const forces = useMemo(() => new Forces(), []), own = useRef<number | null>(null), recording = useRef(''), isRecorded = useRef<boolean | null>(null), crc = useRef('');
   const picture = useRef<Picture | null>(null), stage = useRef<LessonStage | null>(null), progress = useRef<LessonProgress | null>(null);
   const pace = useRef<SessionPace | null>(null), marks = useRef<string[]>([]), mayPace = useRef(false);
   const guide = useMemo(() => guideOf(() => people.current, slot => replica.slotColour(slot)), []);
@@ -61,6 +61,7 @@ export function Live(props: { link: Link; replica: Replica; onEnd(why: string): 
       if (kind === 'recordingState') {
         const isWhole = value.status === RecordingStatus.RECORDING_WHOLE || value.status === RecordingStatus.RECORDING_OFF;
         recording.current = isWhole ? '' : value.text;
+        isRecorded.current = value.status === RecordingStatus.RECORDING_WHOLE || value.status === RecordingStatus.RECORDING_GAPPED;
       }
       if (kind === 'barrier') crc.current = replica.ownCrc === value.surfaceCrc >>> 0 ? 'same' : 'other';
     };
@@ -106,6 +107,7 @@ export function Live(props: { link: Link; replica: Replica; onEnd(why: string): 
           {session.state === 'joining' ? 'joining' : session.state === 'away' ? `old since ${Math.round((performance.now() - session.awaySince) / 1000)} s` : isPaused ? 'paused' : age === null ? 'live' : `${Math.max(0, Math.round(age))} ms old`}
         </span>
         {session.state === 'live' && rate < 1 && <span class="age late" role="status">{`time at ${Math.round(rate * 100)} %`}</span>}
+        {isRecorded.current !== null && <span class="age">{isRecorded.current ? 'recorded' : 'not recorded'}</span>}
         {recording.current && <span class="age late">{recording.current}</span>}
         <span class="space" />
         {mayMark && mayPace.current && <Pace session={session} pace={pace.current} />}
