@@ -56,6 +56,15 @@ void add_shaft(const tool::ToolShape& shape, float from_m, float radius_m, Colou
   revolve(profile, 24, 0, 2 * kPi, out);
 }
 
+// A tip of a revolved profile, on a shaft from there on.
+InstrumentMesh revolved(std::span<const ProfilePoint> profile, const tool::ToolShape& shape,
+                        float shaft_from_m, float shaft_radius_m, Colour colour) {
+  InstrumentMesh mesh;
+  revolve(profile, 24, 0, 2 * kPi, mesh.body);
+  add_shaft(shape, shaft_from_m, shaft_radius_m, colour, mesh.body);
+  return mesh;
+}
+
 InstrumentMesh make_probe(const tool::ToolShape& shape, Colour colour) {
   const float r = shape.radius_m;
   std::vector<ProfilePoint> profile;
@@ -66,10 +75,7 @@ InstrumentMesh make_probe(const tool::ToolShape& shape, Colour colour) {
   }
   const float neck = profile.back().radius;
   profile.push_back({4 * r, neck, kSteel});
-  InstrumentMesh mesh;
-  revolve(profile, 24, 0, 2 * kPi, mesh.body);
-  add_shaft(shape, 4 * r, std::max(0.7f * r, neck), colour, mesh.body);
-  return mesh;
+  return revolved(profile, shape, 4 * r, std::max(0.7f * r, neck), colour);
 }
 
 InstrumentMesh make_scissors(const tool::ToolShape& shape, Colour colour) {
@@ -126,10 +132,7 @@ InstrumentMesh make_endoscope(const tool::ToolShape& shape, Colour colour) {
                                 {-r, 0.55f * r, kLight}, {-r, 0.85f * r, kLight},
                                 {-r, 0.85f * r, kSteel}, {-0.9f * r, r, kSteel},
                                 {0.5f * r, r, kSteel}};
-  InstrumentMesh mesh;
-  revolve(front, 24, 0, 2 * kPi, mesh.body);
-  add_shaft(shape, 0.4f * r, r, colour, mesh.body);
-  return mesh;
+  return revolved(front, shape, 0.4f * r, r, colour);
 }
 
 // A tube whose end is open, with holes around it.
@@ -149,10 +152,7 @@ InstrumentMesh make_suction(const tool::ToolShape& shape, Colour colour) {
                                 {2.1f * r, 0.97f * r, kHole},
                                 {2.1f * r, r, kSteel},
                                 {4 * r, r, kSteel}};
-  InstrumentMesh mesh;
-  revolve(front, 24, 0, 2 * kPi, mesh.body);
-  add_shaft(shape, 3.9f * r, r, colour, mesh.body);
-  return mesh;
+  return revolved(front, shape, 3.9f * r, r, colour);
 }
 
 // A hot ball sits on a thin neck.
@@ -166,10 +166,7 @@ InstrumentMesh make_coagulator(const tool::ToolShape& shape, Colour colour) {
     profile.push_back({-r * std::cos(a), r * std::sin(a), kHot, true});
   }
   profile.push_back({3 * r, 0.35f * r, kSteel});
-  InstrumentMesh mesh;
-  revolve(profile, 24, 0, 2 * kPi, mesh.body);
-  add_shaft(shape, 3 * r, 0.8f * r, colour, mesh.body);
-  return mesh;
+  return revolved(profile, shape, 3 * r, 0.8f * r, colour);
 }
 
 }  // namespace

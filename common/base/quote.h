@@ -9,4 +9,7 @@ namespace trocar {
 // holds.
 std::string quote(std::string_view text);
 
+// A text as it stands in HTML, in an attribute, too: no character of it is read as markup.
+std::string html_escaped(std::string_view text);
+
 }  // namespace trocar

@@ -298,7 +298,7 @@ Answer Course::answer(ToolSlot tool, const Moment& moment) {
   std::optional<Vec3d> place;
   const auto vertices = std::min(layout.vertex_count(), moment.displacements.size());
   for (std::uint32_t v = 0; v < vertices; ++v) {
-    const auto rest = rest_m(layout, VertexIndex(v));
+    const auto rest = layout.rest_m(VertexIndex(v));
     const auto now = rest + to_double(wire::to_metres(moment.displacements[v]));
     if (const double distance = length(now - tip->position_m); distance < nearest)
       nearest = distance, place = rest;

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "common/math/tube.h"
+
 namespace trocar::lesson {
 namespace {
 
@@ -69,10 +71,7 @@ double Score::points(double value) const {
 }
 
 double Structure::distance_m(const Vec3d& place_m) const {
-  const auto along = to_m - from_m;
-  const double squared = length_squared(along);
-  const double t = squared > 0 ? std::clamp(dot(place_m - from_m, along) / squared, 0.0, 1.0) : 0.0;
-  return length(place_m - (from_m + along * t)) - radius_m;
+  return distance_from_tube(place_m, from_m, to_m, radius_m);
 }
 
 const Structure* Lesson::find_structure(std::string_view name) const {

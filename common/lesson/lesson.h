@@ -18,6 +18,7 @@ namespace trocar::lesson {
 inline constexpr std::size_t kFileLimitBytes = 64 * 1024;
 inline constexpr std::size_t kMostStages = 16, kMostStructures = 16, kMostScores = 12;
 inline constexpr std::size_t kMostLinePoints = 32;
+inline constexpr double kPascalPerMmHg = 133.322;
 
 // Something in the organ that nobody sees: a ball, or a tube between two points with round ends.
 struct Structure {

@@ -13,7 +13,6 @@ using tool::TableReader;
 
 constexpr double kFarthestMm = 1000, kLongestS = 3600, kMostPoints = 1e6;
 constexpr std::size_t kMostText = 500;  // bytes
-constexpr double kPascalPerMmHg = 133.322;
 
 constexpr std::array<std::pair<std::string_view, Goal>, kGoals> kGoalNames{
     {{"find", Goal::Find},

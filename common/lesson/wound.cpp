@@ -19,7 +19,7 @@ struct Triangle {
 };
 
 Triangle triangle_of(const wire::SurfaceLayout& layout, const wire::Corners& corners) {
-  return {{rest_m(layout, corners[0]), rest_m(layout, corners[1]), rest_m(layout, corners[2])}};
+  return {{layout.rest_m(corners[0]), layout.rest_m(corners[1]), layout.rest_m(corners[2])}};
 }
 
 template <typename Visit>
@@ -89,10 +89,6 @@ class Components {
 };
 
 }  // namespace
-
-Vec3d rest_m(const wire::SurfaceLayout& layout, VertexIndex vertex) {
-  return to_double(wire::to_metres(layout.rest_quanta[vertex.value]));
-}
 
 Incision measure_incision(const wire::SurfaceLayout& layout, std::span<const Vec3d> line_m,
                           double depth_m, double tolerance_m) {

@@ -12,8 +12,6 @@
 
 namespace trocar::lesson {
 
-Vec3d rest_m(const wire::SurfaceLayout& layout, VertexIndex vertex);
-
 // A line on the surface, cut into cells of about 2 mm. "Deep" is towards the organ's centre.
 struct Incision {
   double covered = 0;   // part of the line that is cut to the depth within the tolerance, 0 to 1

@@ -27,6 +27,9 @@ struct SurfaceLayout {
   std::uint64_t triangle_sum = 0;            // see SurfaceChange::sum
 
   std::size_t vertex_count() const { return rest_quanta.size(); }
+  Vec3d rest_m(VertexIndex vertex) const {  // world frame
+    return to_double(to_metres(rest_quanta[vertex.value]));
+  }
   bool has_triangle(TriangleIndex number) const { return triangles[number.value][0].is_valid(); }
   // Computes the sum from the first triangle on.
   std::uint64_t compute_triangle_sum() const;

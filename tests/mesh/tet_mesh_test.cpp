@@ -7,7 +7,6 @@
 #include <functional>
 #include <set>
 
-#include "server/organs/mesh/quality.h"
 #include "tests/mesh/block_mesh.h"
 
 namespace trocar::mesh {

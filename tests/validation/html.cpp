@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/quote.h"
 #include "tests/validation/report.h"
 
 namespace trocar::validation {
@@ -52,29 +53,6 @@ pre { background: var(--ground); border: 1px solid var(--line); border-radius: 6
 @media print { section { break-inside: avoid-page; } }
 )";
 
-std::string escaped(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      default:
-        out += c;
-    }
-  }
-  return out;
-}
-
 std::string anchor(const std::string& name) {
   std::string out = name;
   std::replace(out.begin(), out.end(), '/', '-');
@@ -104,7 +82,7 @@ bool is_number(const std::string& text) {
 
 std::string cell(const std::string& text, const char* tag = "td") {
   return fmt::format("<{0}{1}>{2}</{0}>", tag, is_number(text) ? " class=\"number\"" : "",
-                     escaped(text));
+                     html_escaped(text));
 }
 
 std::string size_of(double value, bool is_relative) {
@@ -116,7 +94,7 @@ std::string size_of(double value, bool is_relative) {
 std::string short_cell(const std::string& text) {
   constexpr std::size_t kShort = 18;
   return fmt::format("<td{}>{}</td>", text.size() <= kShort ? " class=\"short\"" : "",
-                     escaped(text));
+                     html_escaped(text));
 }
 
 std::string checks_table(const Section& section) {
@@ -130,21 +108,21 @@ std::string checks_table(const Section& section) {
         "<tr><td><code>{}</code><br><span class=\"small dim\">{}</span></td>{}{}"
         "<td class=\"number\">{}</td><td class=\"number\">{}</td><td "
         "class=\"small\">{}</td><td>{}</td></tr>",
-        escaped(what), escaped(check.note), short_cell(check.expected), short_cell(check.ours),
-        check.has_bound ? size_of(check.error, check.is_relative) : "",
+        html_escaped(what), html_escaped(check.note), short_cell(check.expected),
+        short_cell(check.ours), check.has_bound ? size_of(check.error, check.is_relative) : "",
         check.has_bound ? size_of(check.bound.value, check.is_relative) : "",
-        check.has_bound ? escaped(check.bound.words()) : "", pill(check.verdict()));
+        check.has_bound ? html_escaped(check.bound.words()) : "", pill(check.verdict()));
   }
   return out + "</table></div>";
 }
 
 std::string table(const Table& table) {
   std::string out =
-      "<h3>" + escaped(table.title) + "</h3><div class=\"table\"><table class=\"data\"><tr>";
+      "<h3>" + html_escaped(table.title) + "</h3><div class=\"table\"><table class=\"data\"><tr>";
   for (std::size_t i = 0; i < table.head.size(); ++i) {
     const bool is_numeric = !table.rows.empty() && is_number(table.rows.front()[i]);
     out += is_numeric ? "<th class=\"number\">" : "<th>";
-    out += escaped(table.head[i]) + "</th>";
+    out += html_escaped(table.head[i]) + "</th>";
   }
   out += "</tr>";
   for (const auto& row : table.rows) {
@@ -176,13 +154,13 @@ std::string scenes(const Section& section) {
       if (scene.family != family) continue;
       if (text.empty())
         text = fmt::format("<summary><code>{}.toml</code></summary><pre>{}</pre>",
-                           escaped(scene.name), escaped(scene.text));
+                           html_escaped(scene.name), html_escaped(scene.text));
       else
         others += (others.empty() ? "" : ", ") + scene.name + ".toml";
     }
     if (!others.empty())
-      text += "<p class=\"small dim\">and the same with other values: <code>" + escaped(others) +
-              "</code></p>";
+      text += "<p class=\"small dim\">and the same with other values: <code>" +
+              html_escaped(others) + "</code></p>";
     out += "<details>" + text + "</details>";
   }
   return out;
@@ -193,13 +171,13 @@ std::string summary(const Report& report) {
       "<div class=\"summary\"><h2>{}</h2><div class=\"table\"><table>"
       "<tr><th>experiment</th><th>what</th><th class=\"number\">checks</th>"
       "<th class=\"number\">CPU time</th><th></th></tr>",
-      escaped(totals(report.sections)));
+      html_escaped(totals(report.sections)));
   for (const auto& section : report.sections) {
     out += fmt::format(
         "<tr><td><a href=\"#{}\"><code>{}</code></a></td><td>{}</td><td class=\"number\">{}</td>"
         "<td class=\"number\">{:.1f} s</td><td>{}</td></tr>",
-        anchor(section.name), escaped(section.name), escaped(section.title), section.checks.size(),
-        section.seconds, pill(verdict_of(section)));
+        anchor(section.name), html_escaped(section.name), html_escaped(section.title),
+        section.checks.size(), section.seconds, pill(verdict_of(section)));
   }
   return out + "</table></div></div>";
 }
@@ -217,21 +195,21 @@ std::string to_html(const Report& report) {
       "tests hold us to, and one "
       "that is not kept says so. Times are of this machine.</p>"
       "<p class=\"small dim\">{} &middot; {} &middot; <code>{}</code>{}</p>",
-      kStyle, escaped(report.date), escaped(report.processor + ", " + report.compiler),
-      escaped(report.command),
+      kStyle, html_escaped(report.date), html_escaped(report.processor + ", " + report.compiler),
+      html_escaped(report.command),
       report.is_short ? " &middot; short form: coarser meshes, fewer points" : "");
   out += summary(report);
   for (const auto& section : report.sections) {
     out += fmt::format(
         "<section id=\"{0}\"><h2><a href=\"#{0}\">{1}</a></h2>"
         "<p class=\"small dim\"><code>{2}</code> &middot; {3}</p>",
-        anchor(section.name), escaped(section.title), escaped(section.name),
-        escaped(section.source));
+        anchor(section.name), html_escaped(section.title), html_escaped(section.name),
+        html_escaped(section.source));
     out += checks_table(section);
     auto svg = section.svgs.begin();
     for (const auto& part : section.parts) {
       if (const auto* paragraph = std::get_if<std::string>(&part)) {
-        out += "<p>" + escaped(*paragraph) + "</p>";
+        out += "<p>" + html_escaped(*paragraph) + "</p>";
       } else if (const auto* rows = std::get_if<Table>(&part)) {
         out += table(*rows);
       } else {

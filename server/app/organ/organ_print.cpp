@@ -7,7 +7,6 @@
 
 #include "common/base/json.h"
 #include "server/organs/material/material_keys.h"
-#include "server/organs/mesh/quality.h"
 #include "server/organs/organ/organ_file.h"
 
 namespace trocar::app {

@@ -51,11 +51,8 @@ std::string size_warning(const mesh::TetMesh& mesh, mesh::Unit unit) {
 }
 
 mesh::Box box_around(const std::vector<Vec3d>& positions) {
-  mesh::Box box{positions.front(), positions.front()};
-  for (const Vec3d& p : positions) {
-    box.low = {std::min(box.low.x, p.x), std::min(box.low.y, p.y), std::min(box.low.z, p.z)};
-    box.high = {std::max(box.high.x, p.x), std::max(box.high.y, p.y), std::max(box.high.z, p.z)};
-  }
+  mesh::Box box;
+  for (const Vec3d& p : positions) box.include(p);
   return box;
 }
 

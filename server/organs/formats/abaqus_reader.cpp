@@ -199,14 +199,10 @@ class AbaqusReader {
 
   Status add_tets() {
     if (auto s = tets_.end_nodes(in_); !s) return s;
-    for (const Element& element : elements_)
-      if (auto s = tets_.add_tet(element.number, element.nodes, in_); !s) {
-        // The reader is at the end of the file; the element's own line is the place.
-        auto text = s.error().message;
-        const auto colon = text.find(": ", in_.name().size());
-        return Error{ErrorCode::BadFile, in_.name() + ":" + std::to_string(element.line) +
-                                             text.substr(std::min(colon, text.size()))};
-      }
+    for (const Element& element : elements_) {
+      in_.speak_of_line(element.line);
+      if (auto s = tets_.add_tet(element.number, element.nodes, in_); !s) return s;
+    }
     auto ids = tets_.raw.element_ids;
     std::sort(ids.begin(), ids.end());
     const auto twice = std::adjacent_find(ids.begin(), ids.end());

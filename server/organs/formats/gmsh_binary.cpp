@@ -31,12 +31,6 @@ class Numbers {
       if (auto s = read(); !s) return s;
     return {};
   }
-  Status end(const char* section) {
-    if (auto s = in_.need_line(section); !s) return s;
-    const std::string end = std::string("$End") + (section + 1);
-    if (in_.line() != end) return in_.error("expected " + end + ", found " + shown(in_.line()));
-    return {};
-  }
 
  private:
   template <typename Stored, typename Value>
@@ -80,20 +74,10 @@ class Version2 {
   }
 
  private:
-  Status count_line(const char* section, const char* what, std::int64_t least_bytes,
-                    std::int64_t& count) {
-    if (auto s = in_.need_line(section); !s) return s;
-    const std::string text(in_.line());
-    if (!parse_whole(in_.word(), count) || !in_.word().empty())
-      return in_.error(std::string("number of ") + what + " is " + shown(text) +
-                       ", must be a whole number");
-    return in_.check_count(count, least_bytes, what);
-  }
-
   Status nodes() {
     if (auto s = mesh_.begin_nodes(); !s) return s;
     std::int64_t count = 0;
-    if (auto s = count_line("$Nodes", "nodes", 28, count); !s) return s;
+    if (auto s = read_gmsh_count(in_, "$Nodes", "nodes", 28, count); !s) return s;
     auto status = numbers_.repeat(count, [&]() -> Status {
       std::int64_t id = 0;
       Vec3d p;
@@ -103,14 +87,14 @@ class Version2 {
       return mesh_.add_node(id, p);
     });
     if (!status) return status;
-    if (auto s = numbers_.end("$Nodes"); !s) return s;
+    if (auto s = need_gmsh_end(in_, "$EndNodes"); !s) return s;
     return mesh_.end_nodes();
   }
 
   Status elements() {
     if (auto s = mesh_.begin_elements(); !s) return s;
     std::int64_t count = 0, found = 0;
-    if (auto s = count_line("$Elements", "elements", 8, count); !s) return s;
+    if (auto s = read_gmsh_count(in_, "$Elements", "elements", 8, count); !s) return s;
     while (found < count) {
       std::int64_t type = 0, in_block = 0, tags = 0;
       if (auto s = numbers_.whole32("the type of elements", type); !s) return s;
@@ -128,7 +112,7 @@ class Version2 {
       if (!status) return status;
       found += in_block;
     }
-    return numbers_.end("$Elements");
+    return need_gmsh_end(in_, "$EndElements");
   }
 
   Status element(std::int64_t type, std::int64_t tags, int node_count) {
@@ -178,7 +162,7 @@ class Version4 {
       auto status = numbers_.repeat(counts[dimension], [&] { return entity(dimension); });
       if (!status) return status;
     }
-    return numbers_.end("$Entities");
+    return need_gmsh_end(in_, "$EndEntities");
   }
 
   Status entity(int dimension) {
@@ -206,35 +190,37 @@ class Version4 {
     });
   }
 
-  // The four numbers that open $Nodes and $Elements: blocks, in all, and the range of numbers.
-  Status counts(const char* what, std::int64_t least_bytes, std::int64_t& blocks,
-                std::int64_t& total) {
-    std::int64_t ignored = 0;
-    if (auto s = numbers_.whole64("the number of blocks", blocks); !s) return s;
-    if (auto s = in_.check_count(blocks, 8, "blocks"); !s) return s;
-    if (auto s = numbers_.whole64(what, total); !s) return s;
-    if (auto s = in_.check_count(total, least_bytes, what); !s) return s;
-    if (auto s = numbers_.whole64("the least number", ignored); !s) return s;
-    return numbers_.whole64("the greatest number", ignored);
-  }
-
   Status open(const char* section) {
     // Numbers follow on lines as text, and at once as bytes.
     return numbers_.is_binary() ? Status{} : in_.need_line(section);
   }
 
+  // Blocks of a section: four numbers open it, how many blocks, how many in all, and the range of
+  // numbers. `read` takes how many are announced, and counts those that it finds.
+  template <typename Read>
+  Status blocks(const std::string& section, const char* what, std::int64_t least_bytes,
+                const Read& read) {
+    if (auto s = open(section.c_str()); !s) return s;
+    std::int64_t count = 0, total = 0, found = 0, ignored = 0;
+    if (auto s = numbers_.whole64("the number of blocks", count); !s) return s;
+    if (auto s = in_.check_count(count, 8, "blocks"); !s) return s;
+    if (auto s = numbers_.whole64(what, total); !s) return s;
+    if (auto s = in_.check_count(total, least_bytes, what); !s) return s;
+    if (auto s = numbers_.whole64("the least number", ignored); !s) return s;
+    if (auto s = numbers_.whole64("the greatest number", ignored); !s) return s;
+    for (std::int64_t b = 0; b < count; ++b)
+      if (auto s = read(total, found); !s) return s;
+    if (found != total)
+      return in_.error("announced " + std::to_string(total) + " " + what + ", found " +
+                       std::to_string(found));
+    return need_gmsh_end(in_, "$End" + section.substr(1));
+  }
+
   Status nodes() {
     if (auto s = mesh_.begin_nodes(); !s) return s;
-    if (auto s = open("$Nodes"); !s) return s;
-    std::int64_t blocks = 0, total = 0, found = 0;
-    if (auto s = counts("nodes", numbers_.is_binary() ? 32 : 8, blocks, total); !s) return s;
-    for (std::int64_t b = 0; b < blocks; ++b)
-      if (auto s = node_block(total, found); !s) return s;
-    if (found != total)
-      return in_.error("announced " + std::to_string(total) + " nodes, found " +
-                       std::to_string(found));
-    if (auto s = numbers_.end("$Nodes"); !s) return s;
-    return mesh_.end_nodes();
+    auto status = blocks("$Nodes", "nodes", numbers_.is_binary() ? 32 : 8,
+                         [this](auto total, auto& found) { return node_block(total, found); });
+    return status ? mesh_.end_nodes() : status;
   }
 
   Status block_header(const char* what, std::int64_t& dimension, std::int64_t& tag,
@@ -280,15 +266,8 @@ class Version4 {
 
   Status elements() {
     if (auto s = mesh_.begin_elements(); !s) return s;
-    if (auto s = open("$Elements"); !s) return s;
-    std::int64_t blocks = 0, total = 0, found = 0;
-    if (auto s = counts("elements", numbers_.is_binary() ? 16 : 4, blocks, total); !s) return s;
-    for (std::int64_t b = 0; b < blocks; ++b)
-      if (auto s = element_block(total, found); !s) return s;
-    if (found != total)
-      return in_.error("announced " + std::to_string(total) + " elements, found " +
-                       std::to_string(found));
-    return numbers_.end("$Elements");
+    return blocks("$Elements", "elements", numbers_.is_binary() ? 16 : 4,
+                  [this](auto total, auto& found) { return element_block(total, found); });
   }
 
   Status element_block(std::int64_t total, std::int64_t& found) {

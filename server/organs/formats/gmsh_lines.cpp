@@ -36,22 +36,12 @@ class LineReader {
   }
 
  private:
-  Status count_line(const char* section, const char* what, std::int64_t least_bytes,
-                    std::int64_t& count) {
-    if (auto s = in_.need_line(section); !s) return s;
-    const std::string text(in_.line());
-    if (!parse_whole(in_.word(), count) || !in_.word().empty())
-      return in_.error(std::string("number of ") + what + " is " + shown(text) +
-                       ", must be a whole number");
-    return in_.check_count(count, least_bytes, what);
-  }
-
   // Reads `what` line by line up to the section's end, which must come after as many as announced.
   template <typename Read>
   Status read_list(const std::string& section, const char* what, std::int64_t least_bytes,
                    const Read& read) {
     std::int64_t count = 0, found = 0;
-    if (auto s = count_line(section.c_str(), what, least_bytes, count); !s) return s;
+    if (auto s = read_gmsh_count(in_, section, what, least_bytes, count); !s) return s;
     while (true) {
       if (auto s = in_.need_line(section); !s) return s;
       if (in_.line()[0] == '$') break;
@@ -64,9 +54,7 @@ class LineReader {
     if (found != count)
       return in_.error("announced " + std::to_string(count) + " " + what + ", found " +
                        std::to_string(found) + " before " + shown(in_.line()));
-    const std::string end = (version_ == 1 ? "$END" : "$End") + section.substr(1);
-    if (in_.line() != end) return in_.error("expected " + end + ", found " + shown(in_.line()));
-    return {};
+    return need_gmsh_end(in_, (version_ == 1 ? "$END" : "$End") + section.substr(1), false);
   }
 
   Status nodes() {

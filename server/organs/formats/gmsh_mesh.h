@@ -57,6 +57,11 @@ Status read_gmsh_lines(TextReader& reader, int version, GmshMesh& mesh);
 Status read_gmsh_binary2(TextReader& reader, GmshMesh& mesh);
 // Version 4.1, either way.
 Status read_gmsh4(TextReader& reader, bool is_binary, GmshMesh& mesh);
+// A line with the number of `what`, which take `least_bytes` each at least.
+Status read_gmsh_count(TextReader& reader, std::string_view section, std::string_view what,
+                       std::int64_t least_bytes, std::int64_t& count);
+// The line that closes a section; `end`: "$EndNodes". Behind: it is the next line, not this one.
+Status need_gmsh_end(TextReader& reader, std::string_view end, bool is_behind = true);
 // Reads a section that is about nothing of interest, up to its $End line.
 Status skip_gmsh_section(TextReader& reader);
 // The lines of $PhysicalNames.

@@ -28,14 +28,29 @@ Status read_format(TextReader& in, GmshMesh& mesh) {
     if (one != std::string_view("\1\0\0\0", 4))
       return in.error("the byte order is not that of this machine: save the file as text");
   }
-  if (auto s = in.need_line("$MeshFormat"); !s) return s;
-  if (in.line() != "$EndMeshFormat")
-    return in.error("expected $EndMeshFormat, found " + shown(in.line()));
+  if (auto s = need_gmsh_end(in, "$EndMeshFormat"); !s) return s;
   if (is_version4) return read_gmsh4(in, is_binary, mesh);
   return is_binary ? read_gmsh_binary2(in, mesh) : read_gmsh_lines(in, 2, mesh);
 }
 
 }  // namespace
+
+Status read_gmsh_count(TextReader& in, std::string_view section, std::string_view what,
+                       std::int64_t least_bytes, std::int64_t& count) {
+  if (auto s = in.need_line(section); !s) return s;
+  const std::string text(in.line());
+  if (!parse_whole(in.word(), count) || !in.word().empty())
+    return in.error("number of " + std::string(what) + " is " + shown(text) +
+                    ", must be a whole number");
+  return in.check_count(count, least_bytes, what);
+}
+
+Status need_gmsh_end(TextReader& in, std::string_view end, bool is_behind) {
+  if (is_behind)
+    if (auto s = in.need_line("$" + std::string(end.substr(4))); !s) return s;
+  if (in.line() == end) return {};
+  return in.error("expected " + std::string(end) + ", found " + shown(in.line()));
+}
 
 Status skip_gmsh_section(TextReader& in) {
   const std::string name(in.line().substr(std::min<std::size_t>(1, in.line().size())));
@@ -60,10 +75,7 @@ Status read_physical_names(TextReader& in, GmshMesh& mesh) {
     const auto begin = std::min(in.line().find('"'), in.line().size());
     if (auto s = mesh.add_physical_name(dimension, number, in.line().substr(begin)); !s) return s;
   }
-  if (auto s = in.need_line("$PhysicalNames"); !s) return s;
-  if (in.line() != "$EndPhysicalNames")
-    return in.error("expected $EndPhysicalNames, found " + shown(in.line()));
-  return {};
+  return need_gmsh_end(in, "$EndPhysicalNames");
 }
 
 Result<mesh::RawTets> parse_gmsh(std::string_view text, const std::string& name) {

@@ -25,6 +25,8 @@ class TextReader {
   const std::string& name() const { return name_; }
   std::string_view text() const { return text_; }
   int line_number() const { return line_number_; }
+  // Makes errors speak of a line that was read before.
+  void speak_of_line(int number) { line_number_ = number; }
   std::size_t remaining() const { return position_ < text_.size() ? text_.size() - position_ : 0; }
 
   // "name:line: what", or "name: byte N: what" once bytes were taken.

@@ -1,12 +1,11 @@
 #include "server/organs/formats/vtu_array.h"
 
-#include <zlib.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <limits>
 
+#include "common/base/inflate.h"
 #include "server/organs/formats/text_reader.h"
 
 namespace trocar::formats {
@@ -60,25 +59,6 @@ struct Header {
   }
 };
 
-Status inflate_block(std::string_view packed, std::size_t limit, std::string& out) {
-  z_stream stream{};
-  if (inflateInit(&stream) != Z_OK) return bad("zlib cannot be started");
-  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(packed.data()));
-  stream.avail_in = static_cast<uInt>(packed.size());
-  int result = Z_OK;
-  char chunk[65536];
-  while (result == Z_OK && out.size() <= limit) {
-    stream.next_out = reinterpret_cast<Bytef*>(chunk);
-    stream.avail_out = sizeof chunk;
-    result = inflate(&stream, Z_NO_FLUSH);
-    out.append(chunk, sizeof chunk - stream.avail_out);
-  }
-  inflateEnd(&stream);
-  if (out.size() > limit) return bad("data unpack to more than 16 times the file and 16 MiB");
-  if (result != Z_STREAM_END) return bad("packed data are damaged");
-  return {};
-}
-
 // The bytes of the numbers, from decoded ones that begin with their lengths.
 Result<std::string> unframe(const VtuSource& source, std::string_view framed) {
   Header header{framed, source.has_wide_header};
@@ -101,7 +81,9 @@ Result<std::string> unframe(const VtuSource& source, std::string_view framed) {
   std::string out;
   for (const auto size : sizes) {
     if (size > header.bytes.size()) return bad("a packed block is cut off");
-    if (auto s = inflate_block(header.bytes.substr(0, size), limit, out); !s) return s.error();
+    if (auto s = inflate_into(header.bytes.substr(0, size), Packing::Zlib, limit, out); !s)
+      return bad(out.size() > limit ? "data unpack to more than 16 times the file and 16 MiB"
+                                    : s.error().message);
     header.bytes.remove_prefix(size);
   }
   const auto expected = blocks == 0 ? 0 : (blocks - (last_bytes != 0)) * block_bytes + last_bytes;

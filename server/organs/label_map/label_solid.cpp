@@ -254,13 +254,12 @@ std::uint16_t LabelSolid::label_at(const Vec3d& p) const {
 
 mesh::Box LabelSolid::box() const {
   // Corners of the cut map, whose axes may be turned.
-  mesh::Box box{map_.origin_m, map_.origin_m};
+  mesh::Box box;
   for (int corner = 0; corner < 8; ++corner) {
     Vec3d p = map_.origin_m;
     for (std::size_t d = 0; d < 3; ++d)
       if (corner >> d & 1) p += map_.steps_m[d] * double(map_.size[d] - 1);
-    box.low = {std::min(box.low.x, p.x), std::min(box.low.y, p.y), std::min(box.low.z, p.z)};
-    box.high = {std::max(box.high.x, p.x), std::max(box.high.y, p.y), std::max(box.high.z, p.z)};
+    box.include(p);
   }
   return box;
 }

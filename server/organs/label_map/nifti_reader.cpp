@@ -1,11 +1,10 @@
 #include "server/organs/label_map/nifti_reader.h"
 
-#include <zlib.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstring>
 
+#include "common/base/inflate.h"
 #include "server/organs/formats/mesh_file.h"
 
 namespace trocar::label_map {
@@ -26,25 +25,11 @@ constexpr StoredType kStoredTypes[] = {{2, 1, "uint8"},    {4, 2, "int16"},    {
                                        {512, 2, "uint16"}, {768, 4, "uint32"}, {1024, 8, "int64"}};
 
 Result<std::string> gunzip(std::string_view packed, const std::string& name) {
-  z_stream stream{};
-  if (inflateInit2(&stream, 16 + MAX_WBITS) != Z_OK)
-    return Error{ErrorCode::BadFile, name + ": zlib cannot be started"};
-  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(packed.data()));
-  stream.avail_in = static_cast<uInt>(packed.size());
   std::string out;
-  char chunk[65536];
-  int result = Z_OK;
-  while (result == Z_OK && out.size() <= kMaxBytes) {
-    stream.next_out = reinterpret_cast<Bytef*>(chunk);
-    stream.avail_out = sizeof chunk;
-    result = inflate(&stream, Z_NO_FLUSH);
-    out.append(chunk, sizeof chunk - stream.avail_out);
-  }
-  inflateEnd(&stream);
+  auto s = inflate_into(packed, Packing::Gzip, kMaxBytes, out);
   if (out.size() > kMaxBytes)
     return Error{ErrorCode::BadFile, name + ": unpacks to more than 512 MiB: crop or coarsen it"};
-  if (result != Z_STREAM_END)
-    return Error{ErrorCode::BadFile, name + ": packed data are damaged or cut off"};
+  if (!s) return Error{ErrorCode::BadFile, name + ": " + s.error().message};
   return out;
 }
 

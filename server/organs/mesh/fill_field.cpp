@@ -29,7 +29,7 @@ double surface_area(const TetMesh& mesh) {
 }
 
 double places_of(const Box& box, double spacing) {
-  const Vec3d size = box.high - box.low;
+  const Vec3d size = box.most - box.least;
   return (2 * size.x / spacing + 7) * (2 * size.y / spacing + 7) * (2 * size.z / spacing + 7);
 }
 
@@ -68,7 +68,7 @@ Result<FilledSolid> fill_field(const SignedField& distance, const Box& box, doub
                                            " nodes: ask for fewer (--nodes)"};
     const Vec3d margin = Vec3d{1, 1, 1} * std::max(grown, 0.0);
     auto mesh = stuff_isosurface([&](const Vec3d& p) { return distance(p) - grown; },
-                                 {box.low - margin, box.high + margin}, spacing);
+                                 {box.least - margin, box.most + margin}, spacing);
     if (!mesh) {
       failure = mesh.error().message;
       spacing *= kFiner;

@@ -5,13 +5,12 @@
 #include <numeric>
 
 #include "server/organs/mesh/pieces.h"
+#include "server/organs/mesh/places.h"
 
 namespace trocar::mesh {
 namespace {
 
-constexpr double kMaxSize_m = 2.0;
 constexpr double kMaxCoordinate_m = 1e9;  // from here on a double cannot hold an organ's shape
-constexpr double kFar_m = 10;             // worth a warning: a body frame is nearer
 // A tet with less volume than this share of its longest edge cubed is flat: a regular one has
 // 0.118, one with dihedral angles of one degree about 0.001.
 constexpr double kFlat = 1e-6;
@@ -91,63 +90,22 @@ class Builder {
   }
 
   Status centre() {
-    Vec3d low = raw_.positions.front(), high = low;
-    for (const Vec3d& p : raw_.positions) {
-      low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
-      high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
-    }
-    const Vec3d size = high - low;
-    const double largest = std::max({size.x, size.y, size.z});
-    if (largest > kMaxSize_m) {
-      char text[160];
-      const double in_file_unit = largest / metres_of(unit_);
-      const bool may_be_mm = unit_ == Unit::Metre && in_file_unit <= kMaxSize_m * 1000;
-      std::snprintf(
-          text, sizeof text, "is %.4g m wide, larger than 2 m: %s", largest,
-          may_be_mm ? "if the file is in millimetres, import it with trocar-organ import --unit mm"
-                    : "scale it, or give the unit with --unit m, cm or mm");
-      return error(text);
-    }
-    if (largest == 0) return error("all nodes are at the same place");
-    out_.offset_m = low + size * 0.5;
-    for (Vec3d& p : raw_.positions) p -= out_.offset_m;
-    if (length(out_.offset_m) > kFar_m) {
-      char text[160];
-      std::snprintf(text, sizeof text,
-                    "centred: it was at (%.3f, %.3f, %.3f) m, far from the origin", out_.offset_m.x,
-                    out_.offset_m.y, out_.offset_m.z);
-      warn(text);
-    }
+    auto done = mesh::centre(raw_.positions, unit_, "nodes");
+    if (!done) return error(done.error().message);
+    out_.offset_m = done->offset_m;
+    if (!done->warning.empty()) warn(std::move(done->warning));
     return {};
   }
 
   Status weld() {
-    std::vector<std::uint32_t> order(raw_.positions.size());
-    std::iota(order.begin(), order.end(), std::uint32_t{0});
-    const auto key = [&](std::uint32_t i) {
-      const Vec3d& p = raw_.positions[i];
-      return std::array{p.x, p.y, p.z};
-    };
-    std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
-      const auto ka = key(a), kb = key(b);
-      return ka != kb ? ka < kb : a < b;
-    });
-    std::vector<std::uint32_t> first(order.size());
-    std::vector<std::uint8_t> keep(order.size(), 1);
-    std::size_t welded = 0;
-    for (std::size_t i = 0; i < order.size(); ++i) {
-      const bool same = i > 0 && raw_.positions[order[i]] == raw_.positions[order[i - 1]];
-      first[order[i]] = same ? first[order[i - 1]] : order[i];
-      keep[order[i]] = !same;
-      welded += same;
-    }
-    if (welded == 0) return {};
+    const auto welding = mesh::weld(raw_.positions);
+    if (welding.welded == 0) return {};
     for (Tet& tet : raw_.tets)
-      for (NodeIndex& node : tet) node = NodeIndex(first[node.value]);
+      for (NodeIndex& node : tet) node = NodeIndex(welding.first[node.value]);
     for (NamedNodes& set : raw_.node_sets)
-      for (NodeIndex& node : set.nodes) node = NodeIndex(first[node.value]);
-    keep_nodes(keep);
-    warn("welded " + std::to_string(welded) + " nodes to others at exactly the same place");
+      for (NodeIndex& node : set.nodes) node = NodeIndex(welding.first[node.value]);
+    keep_nodes(welding.keep);
+    warn("welded " + std::to_string(welding.welded) + " nodes to others at exactly the same place");
     return {};
   }
 

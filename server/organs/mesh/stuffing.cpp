@@ -39,7 +39,7 @@ class Stuffing {
  public:
   Stuffing(const SignedField& field, const Box& box, double spacing_m)
       : field_(field), half_spacing_(spacing_m / 2) {
-    const Vec3d size = box.high - box.low, centre = (box.low + box.high) * 0.5;
+    const Vec3d size = box.most - box.least, centre = (box.least + box.most) * 0.5;
     const auto cells = [&](double length) { return static_cast<int>(length / spacing_m) + 3; };
     const int cx = cells(size.x), cy = cells(size.y), cz = cells(size.z);
     nx_ = 2 * cx + 1, ny_ = 2 * cy + 1, nz_ = 2 * cz + 1;
@@ -330,7 +330,7 @@ class Stuffing {
 }  // namespace
 
 Result<TetMesh> stuff_isosurface(const SignedField& field, const Box& box, double spacing_m) {
-  const Vec3d size = box.high - box.low;
+  const Vec3d size = box.most - box.least;
   if (!is_finite(size) || !(size.x > 0 && size.y > 0 && size.z > 0) || !(spacing_m > 0))
     return Error{ErrorCode::Usage,
                  "stuffing: needs a box with positive sides and a positive spacing"};

@@ -23,6 +23,7 @@
 #include <functional>
 
 #include "common/base/result.h"
+#include "common/math/box.h"
 #include "common/math/vec3.h"
 #include "server/organs/mesh/tet_mesh.h"
 
@@ -33,9 +34,7 @@ using SignedField = std::function<double(const Vec3d&)>;
 inline constexpr double kStuffingMinDihedral_deg = 12;
 inline constexpr double kStuffingMaxDihedral_deg = 156;
 
-struct Box {
-  Vec3d low, high;  // m
-};
+using Box = trocar::Box<double>;  // m
 
 Result<TetMesh> stuff_isosurface(const SignedField& field, const Box& box, double spacing_m);
 

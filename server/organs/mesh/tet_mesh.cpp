@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "common/math/box.h"
+
 namespace trocar::mesh {
 namespace {
 
@@ -124,12 +126,9 @@ double total_volume(const TetMesh& mesh) {
 }
 
 Vec3d centre_on_origin(TetMesh& mesh) {
-  Vec3d low = mesh.rest_positions.front(), high = low;
-  for (const Vec3d& p : mesh.rest_positions) {
-    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
-    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
-  }
-  const Vec3d centre = low + (high - low) * 0.5;
+  trocar::Box<double> box;
+  for (const Vec3d& p : mesh.rest_positions) box.include(p);
+  const Vec3d centre = box.least + (box.most - box.least) * 0.5;
   for (Vec3d& p : mesh.rest_positions) p -= centre;
   return centre;
 }
@@ -148,29 +147,45 @@ std::vector<Vec3d> surface_normals(const TetMesh& mesh) {
   return normals;
 }
 
-DihedralRange dihedral_range(const TetMesh& mesh) {
+DihedralRange dihedral_range(const TetMesh& mesh, const Tet& tet) {
   double largest_cosine = -1, smallest_cosine = 1;
-  for (const Tet& tet : mesh.tets) {
-    Vec3d normals[4];
-    for (int f = 0; f < 4; ++f) {
-      const auto& [i, j, k] = kTetFaces[f];
-      const Vec3d& origin = mesh.rest_positions[tet[i].value];
-      normals[f] = normalized(cross(mesh.rest_positions[tet[j].value] - origin,
-                                    mesh.rest_positions[tet[k].value] - origin),
-                              Vec3d{});
-    }
-    // The angle inside between two faces is 180 degrees less the angle between outward normals.
-    for (const auto& [i, j] : kTetEdges) {
-      const double cosine = -dot(normals[i], normals[j]);
-      largest_cosine = std::max(largest_cosine, cosine);
-      smallest_cosine = std::min(smallest_cosine, cosine);
-    }
+  Vec3d normals[4];
+  for (int f = 0; f < 4; ++f) {
+    const auto& [i, j, k] = kTetFaces[f];
+    const Vec3d& origin = mesh.rest_positions[tet[i].value];
+    normals[f] = normalized(cross(mesh.rest_positions[tet[j].value] - origin,
+                                  mesh.rest_positions[tet[k].value] - origin),
+                            Vec3d{});
   }
-  if (mesh.tets.empty()) return {};
+  // The angle inside between two faces is 180 degrees less the angle between outward normals.
+  for (const auto& [i, j] : kTetEdges) {
+    const double cosine = -dot(normals[i], normals[j]);
+    largest_cosine = std::max(largest_cosine, cosine);
+    smallest_cosine = std::min(smallest_cosine, cosine);
+  }
   const auto degrees = [](double cosine) {
     return std::acos(std::clamp(cosine, -1.0, 1.0)) * 180 / std::numbers::pi;
   };
   return {degrees(largest_cosine), degrees(smallest_cosine)};
+}
+
+DihedralRange dihedral_range(const TetMesh& mesh) {
+  DihedralRange all;
+  for (const Tet& tet : mesh.tets) {
+    const auto range = dihedral_range(mesh, tet);
+    all.min_deg = std::min(all.min_deg, range.min_deg);
+    all.max_deg = std::max(all.max_deg, range.max_deg);
+  }
+  return all;
+}
+
+std::array<std::size_t, kDihedralClasses> dihedral_histogram(const TetMesh& mesh) {
+  std::array<std::size_t, kDihedralClasses> counts{};
+  for (const Tet& tet : mesh.tets) {
+    const double angle = dihedral_range(mesh, tet).min_deg;
+    ++counts[std::min(static_cast<std::size_t>(angle / 10), kDihedralClasses - 1)];
+  }
+  return counts;
 }
 
 }  // namespace trocar::mesh

@@ -74,5 +74,10 @@ struct DihedralRange {
   double min_deg = 180, max_deg = 0;
 };
 DihedralRange dihedral_range(const TetMesh& mesh);
+DihedralRange dihedral_range(const TetMesh& mesh, const Tet& tet);
+// How many tets have their smallest dihedral angle in each class of 10 degrees; that of a regular
+// tet is 70.5 degrees.
+inline constexpr std::size_t kDihedralClasses = 8;
+std::array<std::size_t, kDihedralClasses> dihedral_histogram(const TetMesh& mesh);
 
 }  // namespace trocar::mesh

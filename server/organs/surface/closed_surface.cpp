@@ -7,15 +7,14 @@
 #include <numbers>
 #include <numeric>
 
+#include "server/organs/mesh/places.h"
 #include "server/organs/surface/intersection.h"
 #include "server/organs/surface/triangle_tree.h"
 
 namespace trocar::surface {
 namespace {
 
-constexpr double kMaxSize_m = 2.0;
 constexpr double kMaxCoordinate_m = 1e9;
-constexpr double kFar_m = 10;
 constexpr double kNegligible = 0.01;  // share of the volume
 constexpr std::size_t kMaxShells = 1000;
 
@@ -115,55 +114,21 @@ class Checker {
   }
 
   Status centre() {
-    Vec3d low = raw_.positions.front(), high = low;
-    for (const Vec3d& p : raw_.positions) {
-      low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
-      high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
-    }
-    const Vec3d size = high - low;
-    const double largest = std::max({size.x, size.y, size.z});
-    if (largest == 0) return error("all vertices are at the same place");
-    if (largest > kMaxSize_m) {
-      char text[160];
-      const bool may_be_mm = unit_ == mesh::Unit::Metre && largest <= kMaxSize_m * 1000;
-      std::snprintf(
-          text, sizeof text, "is %.4g m wide, larger than 2 m: %s", largest,
-          may_be_mm ? "if the file is in millimetres, import it with trocar-organ import --unit mm"
-                    : "scale it, or give the unit with --unit m, cm or mm");
-      return error(text);
-    }
-    out_.offset_m = low + size * 0.5;
-    for (Vec3d& p : raw_.positions) p -= out_.offset_m;
-    if (length(out_.offset_m) > kFar_m)
-      warn("centred: it was at " + place({}) + ", far from the origin");
+    auto done = mesh::centre(raw_.positions, unit_, "vertices");
+    if (!done) return error(done.error().message);
+    out_.offset_m = done->offset_m;
+    if (!done->warning.empty()) warn(std::move(done->warning));
     return {};
   }
 
   Status weld() {
-    std::vector<std::uint32_t> order(raw_.positions.size());
-    std::iota(order.begin(), order.end(), std::uint32_t{0});
-    const auto key = [&](std::uint32_t i) {
-      const Vec3d& p = raw_.positions[i];
-      return std::array{p.x, p.y, p.z};
-    };
-    std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
-      const auto ka = key(a), kb = key(b);
-      return ka != kb ? ka < kb : a < b;
-    });
-    std::vector<std::uint32_t> first(order.size());
-    std::vector<std::uint8_t> keep(order.size(), 1);
-    std::size_t welded = 0;
-    for (std::size_t i = 0; i < order.size(); ++i) {
-      const bool same = i > 0 && raw_.positions[order[i]] == raw_.positions[order[i - 1]];
-      first[order[i]] = same ? first[order[i - 1]] : order[i];
-      keep[order[i]] = !same;
-      welded += same;
-    }
-    if (welded == 0) return {};
+    const auto welding = mesh::weld(raw_.positions);
+    if (welding.welded == 0) return {};
     for (auto& triangle : raw_.triangles)
-      for (NodeIndex& node : triangle) node = NodeIndex(first[node.value]);
-    keep_vertices(keep);
-    warn("welded " + std::to_string(welded) + " vertices to others at exactly the same place");
+      for (NodeIndex& node : triangle) node = NodeIndex(welding.first[node.value]);
+    keep_vertices(welding.keep);
+    warn("welded " + std::to_string(welding.welded) +
+         " vertices to others at exactly the same place");
     return {};
   }
 

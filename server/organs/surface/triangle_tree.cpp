@@ -54,36 +54,27 @@ TriangleTree::TriangleTree(std::span<const Vec3d> positions,
 }
 
 TriangleTree::Box TriangleTree::box_of(std::size_t triangle) const {
-  Box box{positions_[triangles_[triangle][0].value], positions_[triangles_[triangle][0].value]};
-  for (const NodeIndex corner : triangles_[triangle]) {
-    const Vec3d& p = positions_[corner.value];
-    box.low = {std::min(box.low.x, p.x), std::min(box.low.y, p.y), std::min(box.low.z, p.z)};
-    box.high = {std::max(box.high.x, p.x), std::max(box.high.y, p.y), std::max(box.high.z, p.z)};
-  }
+  Box box;
+  for (const NodeIndex corner : triangles_[triangle]) box.include(positions_[corner.value]);
   return box;
 }
 
 std::uint32_t TriangleTree::build(std::uint32_t first, std::uint32_t count) {
   const auto number = static_cast<std::uint32_t>(nodes_.size());
   nodes_.emplace_back();
-  Box box = box_of(order_[first]);
-  for (std::uint32_t i = first; i < first + count; ++i) {
-    const Box b = box_of(order_[i]);
-    box.low = {std::min(box.low.x, b.low.x), std::min(box.low.y, b.low.y),
-               std::min(box.low.z, b.low.z)};
-    box.high = {std::max(box.high.x, b.high.x), std::max(box.high.y, b.high.y),
-                std::max(box.high.z, b.high.z)};
-  }
+  Box box;
+  for (std::uint32_t i = first; i < first + count; ++i)
+    for (const NodeIndex corner : triangles_[order_[i]]) box.include(positions_[corner.value]);
   nodes_[number].box = box;
   if (count <= kLeafTriangles) {
     nodes_[number].first = first, nodes_[number].count = count;
     return number;
   }
-  const Vec3d size = box.high - box.low;
+  const Vec3d size = box.most - box.least;
   const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
   const auto key = [&](std::uint32_t triangle) {
     Box b = box_of(triangle);
-    return at(b.low, axis) + at(b.high, axis);
+    return at(b.least, axis) + at(b.most, axis);
   };
   const auto begin = order_.begin() + first;
   std::nth_element(begin, begin + count / 2, begin + count, [&](std::uint32_t a, std::uint32_t b) {
@@ -100,14 +91,9 @@ double TriangleTree::distance_squared(const Box& box, const Vec3d& p) {
   const auto beyond = [](double low, double high, double value) {
     return std::max({low - value, value - high, 0.0});
   };
-  const double x = beyond(box.low.x, box.high.x, p.x), y = beyond(box.low.y, box.high.y, p.y),
-               z = beyond(box.low.z, box.high.z, p.z);
+  const double x = beyond(box.least.x, box.most.x, p.x), y = beyond(box.least.y, box.most.y, p.y),
+               z = beyond(box.least.z, box.most.z, p.z);
   return x * x + y * y + z * z;
-}
-
-bool TriangleTree::touch(const Box& a, const Box& b) {
-  return a.low.x <= b.high.x && b.low.x <= a.high.x && a.low.y <= b.high.y && b.low.y <= a.high.y &&
-         a.low.z <= b.high.z && b.low.z <= a.high.z;
 }
 
 NearestPoint TriangleTree::nearest(const Vec3d& p) const {
@@ -148,11 +134,11 @@ void TriangleTree::close_pairs(std::uint32_t a, std::uint32_t b,
                                const std::function<void(std::size_t, std::size_t)>& visit) const {
   const Node& first = nodes_[a];
   const Node& second = nodes_[b];
-  if (a != b && !touch(first.box, second.box)) return;
+  if (a != b && !first.box.overlaps(second.box)) return;
   if (first.count > 0 && second.count > 0) {
     for (std::uint32_t i = first.first; i < first.first + first.count; ++i)
       for (std::uint32_t j = a == b ? i + 1 : second.first; j < second.first + second.count; ++j)
-        if (touch(box_of(order_[i]), box_of(order_[j])))
+        if (box_of(order_[i]).overlaps(box_of(order_[j])))
           visit(std::min(order_[i], order_[j]), std::max(order_[i], order_[j]));
     return;
   }

@@ -12,6 +12,7 @@
 #include <span>
 #include <vector>
 
+#include "common/math/box.h"
 #include "common/math/vec3.h"
 #include "server/organs/mesh/tet_mesh.h"
 
@@ -39,9 +40,7 @@ class TriangleTree {
   void for_each_close_pair(const std::function<void(std::size_t, std::size_t)>& visit) const;
 
  private:
-  struct Box {
-    Vec3d low, high;
-  };
+  using Box = trocar::Box<double>;
   struct Node {
     Box box;
     std::uint32_t first = 0, count = 0;  // triangles of a leaf in order_
@@ -54,7 +53,6 @@ class TriangleTree {
                    const std::function<void(std::size_t, std::size_t)>& visit) const;
   Box box_of(std::size_t triangle) const;
   static double distance_squared(const Box& box, const Vec3d& p);
-  static bool touch(const Box& a, const Box& b);
 
   std::span<const Vec3d> positions_;
   std::span<const mesh::Triangle> triangles_;

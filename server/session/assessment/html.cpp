@@ -3,6 +3,7 @@
 #include <openssl/evp.h>
 
 #include "common/base/printable.h"
+#include "common/base/quote.h"
 
 namespace trocar::assessment {
 namespace {
@@ -42,26 +43,7 @@ std::string base64_of(std::string_view bytes) {
 }  // namespace
 
 std::string html_text(std::string_view text) {
-  std::string out;
-  for (const char c : printable(text, 20'000)) {
-    switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      default:
-        out += c;
-    }
-  }
-  return out;
+  return html_escaped(printable(text, 20'000));
 }
 
 std::string html_image(std::string_view type, std::string_view bytes, const std::string& words) {

@@ -24,9 +24,6 @@ class SurfacePlaces {
     return Vec3d{static_cast<double>(q.x), static_cast<double>(q.y), static_cast<double>(q.z)} *
            static_cast<double>(wire::kQuantumMetres);
   }
-  Vec3d rest(std::uint32_t vertex) const {
-    return to_double(wire::to_metres(layout_.rest_quanta[vertex]));
-  }
 
  private:
   const wire::SurfaceLayout& layout_;

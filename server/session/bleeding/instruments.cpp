@@ -1,11 +1,11 @@
 #include "server/session/bleeding/instruments.h"
 
 #include <algorithm>
+#include <numbers>
 
 namespace trocar::bleeding {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 // A vertex this far beside a tip is still under it: tissue is pressed there, too.
 constexpr double kBesideM = 0.003;
 constexpr double kHookSealsM = 0.004;  // around the tip of an energised hook
@@ -35,7 +35,7 @@ void Instruments::read(std::span<const step::ToolFrame> frame, const hands::Tool
     const bool holds_or_cuts = tool.verb == tool::Verb::Grasp || tool.verb == tool::Verb::Cut;
     const double force_n = length(to_double(tool.force_n));
     if (holds_or_cuts || force_n == 0) continue;
-    const double area = kPi * radius * radius + 4 * radius * half_width;
+    const double area = std::numbers::pi * radius * radius + 4 * radius * half_width;
     presses.push_back({tip, radius + half_width + kBesideM, force_n / area});
   }
 }

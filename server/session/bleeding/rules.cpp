@@ -1,7 +1,6 @@
 #include "server/session/bleeding/rules.h"
 
-#include <algorithm>
-#include <cmath>
+#include "common/math/tube.h"
 
 namespace trocar::bleeding {
 namespace {
@@ -17,10 +16,7 @@ Error wrong(const std::string& field, const char* range) {
 }  // namespace
 
 double Vessel::distance_m(const Vec3d& place_m) const {
-  const auto along = to_m - from_m;
-  const double squared = length_squared(along);
-  const double t = squared > 0 ? std::clamp(dot(place_m - from_m, along) / squared, 0.0, 1.0) : 0.0;
-  return length(place_m - (from_m + along * t)) - radius_m;
+  return distance_from_tube(place_m, from_m, to_m, radius_m);
 }
 
 Status validate(const Rules& rules) {

@@ -18,7 +18,6 @@ inline constexpr double kBloodDensity = 1060;      // kg/m^3
 inline constexpr double kBloodViscosity = 3.5e-3;  // Pa s, as it flows fast
 inline constexpr double kGravity = 9.81;           // m/s^2, towards -y
 inline constexpr double kOrificeCoefficient = 0.6;
-inline constexpr double kPascalPerMmHg = 133.322;
 // A film of this depth stays where blood has been.
 inline constexpr double kStayingFilmM = 30e-6;
 // A film that hangs falls off in drops once it is as deep as this.
@@ -29,7 +28,7 @@ struct Vessel {
   std::string name;
   Vec3d from_m, to_m;
   double radius_m = 0.002;
-  double pressure_pa = 80 * kPascalPerMmHg;
+  double pressure_pa = 80 * lesson::kPascalPerMmHg;
   double most_flow_m3_s = 100e-6 / 60;  // as much comes after if it lies open wide
 
   double distance_m(const Vec3d& place_m) const;  // at rest, negative within
@@ -38,7 +37,8 @@ struct Vessel {
 struct Rules {
   double ooze_m_s = 0.05e-2;  // of fresh parenchyma, volume by area and time: 0.05 ml/s per cm^2
   double clotting_time_s = 80;
-  double ooze_pressure_pa = 10 * kPascalPerMmHg;  // pressed harder, parenchyma bleeds no more
+  double ooze_pressure_pa =
+      10 * lesson::kPascalPerMmHg;  // pressed harder, parenchyma bleeds no more
   std::vector<Vessel> vessels;
 };
 

@@ -3,14 +3,6 @@
 #include <algorithm>
 
 namespace trocar::bleeding {
-namespace {
-
-Vec3d rest_m(const wire::SurfaceLayout& layout, VertexIndex vertex) {
-  return to_double(wire::to_metres(layout.rest_quanta[vertex.value]));
-}
-
-}  // namespace
-
 void SurfaceGraph::add(std::uint32_t triangle) {
   for (std::uint32_t corner = 0; corner < 3; ++corner) {
     const auto vertex = triangles_[triangle][corner].value;
@@ -44,11 +36,11 @@ void SurfaceGraph::measure_changed(const wire::SurfaceLayout& layout) {
   for (const auto vertex : changed_) {
     is_changed_[vertex] = 0;
     double area = 0, wound = 0;
-    const Vec3d here = rest_m(layout, VertexIndex(vertex));
+    const Vec3d here = layout.rest_m(VertexIndex(vertex));
     for (std::uint32_t at = first_[vertex]; at != kNone; at = next_[at]) {
       const auto& corners = triangles_[at / 3];
-      const Vec3d a = rest_m(layout, corners[(at + 1) % 3]) - here;
-      const Vec3d b = rest_m(layout, corners[(at + 2) % 3]) - here;
+      const Vec3d a = layout.rest_m(corners[(at + 1) % 3]) - here;
+      const Vec3d b = layout.rest_m(corners[(at + 2) % 3]) - here;
       const double share = length(cross(a, b)) / 6;
       area += share;
       if (layout.is_wound[at / 3] != 0) wound += share;

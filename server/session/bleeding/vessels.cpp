@@ -54,13 +54,11 @@ double outflow_m3_s(const Vessel& vessel, double area_m2) {
 }
 
 void OpenVessels::add(const Rules& rules, const wire::SurfaceLayout& layout, std::size_t first) {
-  const auto rest = [&](VertexIndex vertex) {
-    return to_double(wire::to_metres(layout.rest_quanta[vertex.value]));
-  };
   for (std::size_t triangle = first; triangle < layout.triangles.size(); ++triangle) {
     if (layout.is_wound[triangle] == 0 || !layout.has_triangle(TriangleIndex(triangle))) continue;
     const auto& corners = layout.triangles[triangle];
-    const Vec3d a = rest(corners[0]), b = rest(corners[1]), c = rest(corners[2]);
+    const Vec3d a = layout.rest_m(corners[0]), b = layout.rest_m(corners[1]),
+                c = layout.rest_m(corners[2]);
     const Vec3d middle = (a + b + c) / 3;
     const double around = std::max({length(a - middle), length(b - middle), length(c - middle)});
     for (std::uint32_t vessel = 0; vessel < rules.vessels.size(); ++vessel) {

@@ -1,5 +1,5 @@
-// What is around the organ, drawn with the native client's shaders: the cloth that it lies on, and the
-// edge of an endoscope's picture. The cloth is drawn when the view changes, and kept: in software it
+// The native client's shaders draw what is around the organ: the cloth that it lies on, and the edge of
+// an endoscope's picture. The cloth is drawn when the view changes, and kept: in software it
 // takes long.
 
 import { BufferGeometry, GLSL3, Mesh, NormalBlending, RawShaderMaterial, Scene, Vector2, Vector3, WebGLRenderTarget, type IUniform, type PerspectiveCamera, type WebGLRenderer } from 'three';
@@ -18,7 +18,7 @@ function whole(fragmentShader: string, uniforms: Record<string, IUniform>, order
   return mesh;
 }
 
-// Of what was drawn before, pixel by pixel.
+// Copies what was drawn before, pixel by pixel.
 const kCopySource = `in vec3 ray;
 out vec4 colour;
 uniform sampler2D drawn;

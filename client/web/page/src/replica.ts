@@ -171,7 +171,7 @@ export class Replica {
     return out;
   }
 
-  // What has bled so far; null: the session does not bleed.
+  // Says how much has bled so far; null: the session does not bleed.
   blood(): Blood | null {
     const at = this.e.blood();
     if (at === 0) return null;
@@ -186,7 +186,7 @@ export class Replica {
   }
   pointerColour(slot: number): number { return this.e.pointer_colour(slot) >>> 0; }
 
-  // Where the point is that a lesson's hands follow; null: there is none.
+  // Returns the point that a lesson's hands follow; null: there is none.
   lessonTarget(): Vec3 | null {
     const at = this.e.lesson_target();
     if (at === 0) return null;
