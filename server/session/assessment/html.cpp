@@ -22,9 +22,9 @@ th, td { text-align: left; padding: .2rem .9rem .2rem 0; border-bottom: 1px soli
 td.number, th.number { text-align: right; font-variant-numeric: tabular-nums; }
 img { max-width: 100%; height: auto; }
 figure { margin: 1rem 0; }
-figure.plot img { width: 44rem; }
-.pair { display: grid; grid-template-columns: 1fr 1fr; gap: 1rem; }
-.pictures { display: grid; grid-template-columns: repeat(auto-fill, minmax(17rem, 1fr)); gap: 1rem; }
+figure.plot img { width: 44rem; max-width: 100%; }
+.pair figure { display: inline-block; width: 48%; vertical-align: top; }
+.pictures figure { display: inline-block; width: 31%; vertical-align: top; }
 .wide { overflow-x: auto; }
 @media print { body { margin: 0; max-width: none; font-size: 11px; }
                h2 { break-after: avoid; } table, figure, li { break-inside: avoid; } }

@@ -88,11 +88,12 @@ std::string hands_table(const Part& part, const std::vector<Standing>& standings
     if (!standings.empty())
       out += "<th class=\"number\">experts' median</th><th class=\"number\">better than</th>";
     auto& column = columns.emplace_back();
-    for (const auto& figure : figures_of(hand)) {
-      if (std::ranges::none_of(rows, [&](const auto& row) { return row.first == figure.key; }))
-        rows.emplace_back(figure.key, figure.words);
-      column[figure.key] = figure;
-    }
+    const auto figures = figures_of(hand);
+    for (const auto& figure : figures) column[figure.key] = figure;
+    // Hands differ in what could not be measured: the fullest list has the order.
+    if (figures.size() <= rows.size()) continue;
+    rows.clear();
+    for (const auto& figure : figures) rows.emplace_back(figure.key, figure.words);
   }
   out += "</tr>\n";
   for (const auto& [key, words] : rows) {
