@@ -68,8 +68,16 @@ export async function openPage(url) {
   return page;
 }
 export const live = page => page.waitForSelector('canvas[data-drawn]', { timeout: kPatience });
+// Says goodbye, and waits until it was heard: a page that is closed at once takes it with it, and its
+// name is then kept for a while.
 export const close = async page => {
-  await page.evaluate(() => window.trocar?.session?.leave());
+  await page.evaluate(() => new Promise(resolve => {
+    const session = window.trocar?.session, socket = session?.socket;
+    if (!socket || socket.readyState === WebSocket.CLOSED) return resolve();
+    socket.addEventListener('close', resolve);
+    window.setTimeout(resolve, 10_000);
+    return session.leave();
+  }));
   await page.close();
 };
 

@@ -2,7 +2,7 @@
 // others see of it, and that the recording of it verifies.
 import assert from 'node:assert/strict';
 import { after, before, test } from 'node:test';
-import { endAll, kPatience, launch, live, openBrowser, portOf, sleep, until } from './browser.mjs';
+import { close, endAll, kPatience, launch, live, openBrowser, portOf, sleep, until } from './browser.mjs';
 
 const { TROCAR_ROOT, TROCAR_WORK, TROCAR_PICTURES } = process.env;
 const kTest = { timeout: 120_000 };
@@ -92,8 +92,7 @@ test('the panel of the lesson says what to do, and an instructor leads through i
   const late = await openPage('observer', 'Late');
   await live(late);
   await says(late, 'Stage 2 of 2');
-  await late.evaluate(() => window.trocar.session.leave());
-  await late.close();
+  await close(late);
   await sleep(1100);
   await press(ivy, 'Restart lesson');
   await press(ivy, 'Restart');
@@ -125,8 +124,7 @@ test('time stands still for all, and goes slower', kTest, async () => {
   assert.equal(await tick(olga), paused);
   assert.equal(await olga.locator('.stage.old').count(), 0, 'the picture is as new as it can be');
   await picture(ivy, 'paused');
-  await guest.evaluate(() => window.trocar.session.leave());
-  await guest.close();
+  await close(guest);
   await press(ivy, 'Go on');
   await until('it goes on', async () => await tick(olga) > paused + 100);
   await ivy.getByLabel('Time', { exact: true }).selectOption('0.25');
@@ -176,8 +174,7 @@ test('what an instructor draws is on everybody\'s organ until it is wiped', kTes
   const late = await openPage('observer', 'Late');
   await live(late);
   await until('a late one sees it', async () => await triangles(late) === await triangles(ivy));
-  await late.evaluate(() => window.trocar.session.leave());
-  await late.close();
+  await close(late);
   await press(ivy, 'Draw');
   await press(ivy, 'Wipe');
   await until('it is wiped', async () => await triangles(olga) === 0);
