@@ -103,16 +103,20 @@ export async function endAll(browser) {
   await browser?.close();
 }
 
-// Before the tests of a file: a browser, trocar-web with a folder of recordings that holds one, and, unless
-// `session` is null, a server with these arguments.
+// trocar-web with a folder of recordings that holds one, and, unless `session` is null, a server with
+// these arguments.
+export async function startPrograms(session, web) {
+  if (session) world.server = await startServer('lesson', session);
+  fs.mkdirSync(`${TROCAR_WORK}/recordings`);
+  fs.copyFileSync(TROCAR_RECORDING, `${TROCAR_WORK}/recordings/lesson.mcap`);
+  world.web = await startWeb(0, web);
+}
+// Before the tests of a file: a browser and the programs.
 export function prepare(session, web) {
   before(async () => {
     world.browser = await openBrowser();
     world.context = await world.browser.newContext({ viewport: { width: 900, height: 600 } });
-    if (session) world.server = await startServer('lesson', session);
-    fs.mkdirSync(`${TROCAR_WORK}/recordings`);
-    fs.copyFileSync(TROCAR_RECORDING, `${TROCAR_WORK}/recordings/lesson.mcap`);
-    world.web = await startWeb(0, web);
+    await startPrograms(session, web);
   }, { timeout: kStartMs });
   // What a failed test leaves would take the processor from the next one.
   afterEach(async () => {

@@ -1,5 +1,5 @@
 #!/bin/bash
-# run_web.sh recording|codec|page|lesson|blood|debrief|access|hostile|figures|hour BUILD_FOLDER WORK_FOLDER: one of the tests of the page. Exit code 77:
+# run_web.sh recording|codec|page|lesson|blood|debrief|access|hostile|firefox|figures|hour BUILD_FOLDER WORK_FOLDER: one of the tests of the page. Exit code 77:
 # skipped, with the reason.
 set -euo pipefail
 test=$1 build=$2 work=$3
@@ -48,6 +48,12 @@ case $test in
     export TROCAR_CHROMIUM=$chromium TROCAR_HOUR=$work/hour.mcap
     "$bin/trocar-sim" "$here/hour.toml" --journal "$TROCAR_HOUR" --out "$work/hour"
     node "$here/hour.mjs"
+    ;;
+  firefox)
+    firefox=$(command -v firefox-esr || command -v firefox) || skip "Firefox is not installed: deploy/setup --with-web"
+    command -v xvfb-run >/dev/null || skip "Firefox draws in a window alone: deploy/setup --with-tests installs xvfb"
+    export TROCAR_FIREFOX=$firefox
+    xvfb-run -a -s "-screen 0 1400x900x24" node --experimental-websocket --no-warnings --test-reporter=spec "$here/firefox.test.mjs"
     ;;
   codec) node --test-reporter=spec "$here/codec.test.mjs" ;;
   page | lesson | blood | debrief | access | hostile | figures)
