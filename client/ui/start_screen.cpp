@@ -17,7 +17,7 @@ struct RoleText {
 constexpr std::array<RoleText, 4> kRoleTexts{
     {{replica::Role::Surgeon, "Surgeon: holds instruments"},
      {replica::Role::Assistant, "Assistant: holds instruments"},
-     {replica::Role::Instructor, "Instructor: watches, marks and returns the organ"},
+     {replica::Role::Instructor, "Instructor: watches, and leads the lesson"},
      {replica::Role::Observer, "Observer: watches"}}};
 
 struct OrganText {
@@ -53,6 +53,17 @@ StartChoice StartScreen::choice(StartDeed deed) const {
           .code = code_.data(),
           .name = name_.data(),
           .role = role_};
+}
+
+void StartScreen::draw_title() {
+  ImGui::SetWindowFontScale(2);
+  ImGui::TextUnformatted("Trocar");
+  ImGui::SetWindowFontScale(1);
+  ImGui::TextDisabled(
+      "Practise on soft tissue, alone or with others. For training and research, not for clinical "
+      "use.");
+  ImGui::Spacing();
+  ImGui::Spacing();
 }
 
 void StartScreen::draw_sessions(const StartModel& model) {
@@ -202,6 +213,7 @@ std::optional<StartChoice> StartScreen::draw(const StartModel& model, bool is_en
   const float width = std::min(io.DisplaySize.x - 2 * kMargin, ImGui::GetFontSize() * 46);
   ImGui::SetCursorPos({(io.DisplaySize.x - width) / 2, io.DisplaySize.y * 0.08f});
   ImGui::BeginChild("form", {width, io.DisplaySize.y * 0.88f});
+  draw_title();
   ImGui::PushItemWidth(width * 0.6f);
   wanted_.reset();
   // A lesson that has begun is what the person wants to see first.

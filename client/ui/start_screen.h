@@ -67,6 +67,7 @@ class StartScreen {
   const char* name() const { return name_.data(); }  // as typed so far
 
  private:
+  static void draw_title();
   void draw_sessions(const StartModel& model);
   void draw_join(const StartModel& model);
   void draw_own(StartDeed deed, const StartModel& model);
