@@ -24,6 +24,7 @@
 #include "server/organs/catalogue/builtin_organs.h"
 #include "server/organs/catalogue/import_organ.h"
 #include "server/organs/catalogue/load_organ.h"
+#include "server/organs/dicom/dicom_reader.h"
 #include "server/organs/material/material_file.h"
 #include "server/organs/mesh/fill_field.h"
 #include "server/organs/organ/any_material.h"
@@ -248,6 +249,16 @@ void give_regions_its_material(organ::Organ& organ) {
   for (auto& region : organ.regions) region.material = organ.material;
 }
 
+Result<catalogue::ImportedOrgan> read(const std::filesystem::path& path,
+                                      const catalogue::ImportOptions& options) {
+  if (!dicom::is_dicom(path)) return catalogue::import_organ(path, options);
+  if (options.unit_is_said)
+    return Error{ErrorCode::Usage, path.string() + ": --unit does not apply, DICOM is in mm"};
+  auto map = dicom::read_dicom(path);
+  if (!map) return map.error();
+  return catalogue::import_labels(std::move(*map), path, options);
+}
+
 Status run_import(const Options& options) {
   const auto unit = mesh::parse_unit(options.unit);
   if (!unit) return unit.error();
@@ -266,13 +277,14 @@ Status run_import(const Options& options) {
     import_options.fix = *fix;
   }
   if (!options.import_name.empty()) import_options.name = options.import_name;
-  const std::filesystem::path path(options.import_file);
+  std::filesystem::path path(options.import_file);
+  if (!path.has_filename()) path = path.parent_path();  // of a folder with a slash at its end
   std::error_code missing;
   if (const auto bytes = std::filesystem::file_size(path, missing);
       !missing && bytes >= kLargeFileBytes)
     std::fprintf(stderr, "%s: reading %s, %s MB, this takes some seconds\n", kProgram,
                  options.import_file.c_str(), grouped(bytes / 1'000'000).c_str());
-  auto imported = catalogue::import_organ(path, import_options);
+  auto imported = read(path, import_options);
   if (!imported) return imported.error();
   if (auto chosen = choose_law(options, imported->organ.material); !chosen) return chosen;
   give_regions_its_material(imported->organ);
@@ -340,7 +352,8 @@ void add_commands(CLI::App& app, Options& options) {
       ->add_option("FILE", options.import_file,
                    "tetrahedra: Gmsh .msh, VTK .vtk or .vtu, TetGen .ele beside "
                    ".node, MEDIT .mesh, "
-                   "Abaqus .inp; surfaces: .stl, .obj, .ply, .vtk; label maps: .nii, .nii.gz")
+                   "Abaqus .inp; surfaces: .stl, .obj, .ply, .vtk; label maps: .nii, .nii.gz, "
+                   "a DICOM segmentation, or the folder of a DICOM series")
       ->required();
   import
       ->add_option(
@@ -350,7 +363,8 @@ void add_commands(CLI::App& app, Options& options) {
       ->type_name("N");
   import
       ->add_option("--labels", options.import_labels,
-                   "of a label map: which make the organ, such as 1:liver,2:tumour [all but 0]")
+                   "of a label map: which make the organ, such as 1:liver,2:tumour, or by the "
+                   "names that the file gives them [all but 0]")
       ->type_name("LIST");
   import
       ->add_option("--unit", options.unit,

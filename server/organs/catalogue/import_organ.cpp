@@ -64,19 +64,45 @@ Result<int> nodes_of(const ImportOptions& options) {
   return nodes;
 }
 
-Result<mesh::ImportedMesh> fill_labels(const std::filesystem::path& path,
+// The labels that are wanted, with the numbers and names that the map gives them.
+using Labels = std::vector<std::pair<std::uint16_t, std::string>>;
+Result<Labels> find_labels(const Labels& wanted, const Labels& there, const std::string& file) {
+  Labels labels;
+  for (const auto& want : wanted.empty() ? there : wanted) {
+    const auto& [label, name] = want;
+    const auto known = std::ranges::find_if(there, [&want](const auto& one) {
+      return want.first == 0 ? plain(one.second) == want.second : one.first == want.first;
+    });
+    if (label == 0 && known == there.end()) {
+      std::string text;
+      for (const auto& [number, known_name] : there)
+        text += fmt::format("{} {}:{}", text.empty() ? "" : ",", number, plain(known_name));
+      return Error{ErrorCode::Usage, fmt::format("--labels: {} has no label '{}', {}", file, name,
+                                                 there.empty() ? "and names none: choose by number"
+                                                               : "it has" + text)};
+    }
+    const bool has_name = known != there.end() && name.empty();
+    labels.emplace_back(label == 0 ? known->first : label, has_name ? plain(known->second)
+                                                           : name.empty()
+                                                               ? fmt::format("label {}", label)
+                                                               : plain(name));
+  }
+  return labels;
+}
+
+Result<mesh::ImportedMesh> fill_labels(label_map::LabelMap map, const std::string& file,
                                        const ImportOptions& options,
                                        std::vector<std::string>& notes) {
   const auto nodes = nodes_of(options);
   if (!nodes) return nodes.error();
-  auto map = label_map::read_nifti(
-      path, options.unit_is_said ? std::optional(options.unit) : std::nullopt);
-  if (!map) return map.error();
-  std::vector<std::uint16_t> labels;
-  for (const auto& [label, name] : options.labels) labels.push_back(label);
-  const auto solid = label_map::LabelSolid::make(std::move(*map), labels, path.string());
+  const auto labels = find_labels(options.labels, map.names, file);
+  if (!labels) return labels.error();
+  std::vector<std::uint16_t> numbers;
+  if (!options.labels.empty())
+    for (const auto& [label, name] : *labels) numbers.push_back(label);
+  const auto solid = label_map::LabelSolid::make(std::move(map), numbers, file);
   if (!solid) return solid.error();
-  auto filled = label_map::mesh_labels(*solid, *nodes, options.labels, path.string());
+  auto filled = label_map::mesh_labels(*solid, *nodes, *labels, file);
   if (!filled) return filled.error();
   notes = std::move(filled->notes);
   return std::move(filled->imported);
@@ -115,7 +141,6 @@ Result<mesh::ImportedMesh> read_mesh(const std::filesystem::path& path,
                                      const ImportOptions& options,
                                      std::vector<std::string>& notes) {
   const std::string name = path.string();
-  if (label_map::is_nifti_file(path)) return fill_labels(path, options, notes);
   if (!options.labels.empty())
     return Error{ErrorCode::Usage, name + ": --labels does not apply, the file is no label map"};
   if (!formats::is_mesh_file(path))
@@ -166,6 +191,28 @@ Status hold(const ImportOptions& options, const std::vector<mesh::NamedNodes>& s
   return {};
 }
 
+// has_unit: the file's numbers were in options.unit.
+Result<ImportedOrgan> make_organ(mesh::ImportedMesh imported, const std::filesystem::path& path,
+                                 const ImportOptions& options, bool has_unit,
+                                 ImportedOrgan result) {
+  result.warnings = std::move(imported.warnings);
+  organ::Organ& organ = result.organ;
+  organ.name = plain(options.name.value_or(imported_name(path)));
+  organ.source = plain(path.filename().string()) +
+                 (has_unit ? std::string(", unit ") + name_of(options.unit) : "") + ", fix " +
+                 (options.fix_set ? "set:" + plain(*options.fix_set) : to_text(options.fix));
+  organ.mesh = std::move(imported.mesh);
+  if (auto warning = size_warning(organ.mesh, options.unit); !warning.empty())
+    result.warnings.push_back(std::move(warning));
+  organ.source_offset_m = imported.offset_m;
+  if (auto s = add_regions(std::move(imported.regions), result); !s) return s.error();
+  if (auto s = hold(options, imported.node_sets, result); !s) return s.error();
+  organ.node_masses_kg = organ::lumped_masses(organ);
+  if (auto status = validate(organ); !status)
+    return Error{ErrorCode::BadFile, path.string() + ": " + status.error().message};
+  return result;
+}
+
 }  // namespace
 
 std::string imported_name(const std::filesystem::path& path) {
@@ -184,41 +231,42 @@ Result<std::vector<std::pair<std::uint16_t, std::string>>> parse_labels(std::str
     const auto part = text.substr(0, comma);
     text.remove_prefix(std::min(comma + 1, text.size()));
     const auto colon = std::min(part.find(':'), part.size());
+    // A name alone: the map says its number.
+    if (colon == part.size() && !part.empty() && (part[0] < '0' || part[0] > '9')) {
+      labels.emplace_back(std::uint16_t{0}, plain(std::string(part)));
+      continue;
+    }
     int label = 0;
     const auto [end, error] = std::from_chars(part.data(), part.data() + colon, label);
     if (error != std::errc{} || end != part.data() + colon || label < 1 || label > 65535)
-      return Error{ErrorCode::Usage, "--labels: '" + plain(std::string(part)) +
-                                         "' is no label, such as 2 or 2:tumour, from 1 to 65535"};
+      return Error{ErrorCode::Usage,
+                   fmt::format("--labels: '{}' is no label, such as 2 or 2:tumour, from 1 to 65535",
+                               part.empty() ? "" : plain(std::string(part)))};
     labels.emplace_back(static_cast<std::uint16_t>(label),
-                        colon < part.size() ? plain(std::string(part.substr(colon + 1)))
-                                            : "label " + std::to_string(label));
+                        std::string(part.substr(std::min(colon + 1, part.size()))));
   }
   return labels;
 }
 
+Result<ImportedOrgan> import_labels(label_map::LabelMap map, const std::filesystem::path& path,
+                                    const ImportOptions& options) {
+  ImportedOrgan result;
+  auto imported = fill_labels(std::move(map), path.string(), options, result.notes);
+  if (!imported) return imported.error();
+  return make_organ(std::move(*imported), path, options, options.unit_is_said, std::move(result));
+}
+
 Result<ImportedOrgan> import_organ(const std::filesystem::path& path,
                                    const ImportOptions& options) {
-  const std::string name = path.string();
+  if (label_map::is_nifti_file(path)) {
+    auto map = label_map::read_nifti(
+        path, options.unit_is_said ? std::optional(options.unit) : std::nullopt);
+    return map ? import_labels(std::move(*map), path, options) : map.error();
+  }
   ImportedOrgan result;
   auto imported = read_mesh(path, options, result.notes);
   if (!imported) return imported.error();
-  result.warnings = std::move(imported->warnings);
-  organ::Organ& organ = result.organ;
-  organ.name = plain(options.name.value_or(imported_name(path)));
-  const bool has_own_unit = label_map::is_nifti_file(path) && !options.unit_is_said;
-  organ.source = plain(path.filename().string()) +
-                 (has_own_unit ? "" : std::string(", unit ") + name_of(options.unit)) + ", fix " +
-                 (options.fix_set ? "set:" + plain(*options.fix_set) : to_text(options.fix));
-  organ.mesh = std::move(imported->mesh);
-  if (auto warning = size_warning(organ.mesh, options.unit); !warning.empty())
-    result.warnings.push_back(std::move(warning));
-  organ.source_offset_m = imported->offset_m;
-  if (auto s = add_regions(std::move(imported->regions), result); !s) return s.error();
-  if (auto s = hold(options, imported->node_sets, result); !s) return s.error();
-  organ.node_masses_kg = organ::lumped_masses(organ);
-  if (auto status = validate(organ); !status)
-    return Error{ErrorCode::BadFile, name + ": " + status.error().message};
-  return result;
+  return make_organ(std::move(*imported), path, options, true, std::move(result));
 }
 
 }  // namespace trocar::catalogue

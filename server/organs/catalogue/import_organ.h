@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "common/base/result.h"
+#include "server/organs/label_map/label_map.h"
 #include "server/organs/mesh/raw_tets.h"
 #include "server/organs/organ/fix_rule.h"
 #include "server/organs/organ/organ.h"
@@ -28,7 +29,8 @@ struct ImportOptions {
   std::optional<std::string> name;     // instead of the file's stem
   // A surface or a label map is filled with so many, mesh::kMinFillNodes to mesh::kMaxFillNodes.
   std::optional<int> nodes;
-  // These labels of a label map make the organ, and have names; none: all but 0.
+  // These labels of a label map make the organ; none: all but 0. Number 0: the label of that name;
+  // no name: that of the map.
   std::vector<std::pair<std::uint16_t, std::string>> labels;
 };
 
@@ -38,13 +40,16 @@ struct ImportedOrgan {
   std::vector<std::string> notes;     // one line each: how a surface was filled, regions, sets
 };
 
-// "2", "1,2" or "1:liver,2:tumour". Error: names the part that is none.
+// "2", "1,2", "1:liver,2:tumour" or "liver,tumour". Error: names the part that is none.
 Result<std::vector<std::pair<std::uint16_t, std::string>>> parse_labels(std::string_view text);
 
 // Reads a mesh file (formats/mesh_file.h) or a label map (.nii, .nii.gz) and gives it the default
 // material, in each of its regions, too. Error: of a surface where `nodes` is out of range, of tets
 // where it is given.
 Result<ImportedOrgan> import_organ(const std::filesystem::path& path, const ImportOptions& options);
+// The same from a label map that was read elsewhere; `path` names it.
+Result<ImportedOrgan> import_labels(label_map::LabelMap map, const std::filesystem::path& path,
+                                    const ImportOptions& options);
 // The name of an organ from that file: the file's without its ends.
 std::string imported_name(const std::filesystem::path& path);
 // Whether it would read a file of that name.

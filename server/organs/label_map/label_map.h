@@ -5,8 +5,10 @@
 #include <array>
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "common/base/result.h"
 #include "common/math/vec3.h"
 
 namespace trocar::label_map {
@@ -19,6 +21,7 @@ struct LabelMap {
   Vec3d origin_m;
   std::array<Vec3d, 3> steps_m{};
   std::string orientation;  // towards which sides i, j and k run, such as "RAS" or "LPS"
+  std::vector<std::pair<std::uint16_t, std::string>> names;  // that the file gives to labels
   std::vector<std::string> warnings;
 
   std::size_t index(int i, int j, int k) const {
@@ -31,5 +34,9 @@ struct LabelMap {
     return length(steps_m[0]) * length(steps_m[1]) * length(steps_m[2]);
   }
 };
+
+// Sets origin, steps and orientation. Error, without the file's name: a value is not finite, a step
+// is not 0.001 to 100 mm long, or the steps are not at right angles.
+Status set_place(const Vec3d& origin_m, const std::array<Vec3d, 3>& steps_m, LabelMap& map);
 
 }  // namespace trocar::label_map

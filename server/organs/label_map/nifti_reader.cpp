@@ -13,8 +13,6 @@ namespace {
 constexpr std::size_t kHeaderBytes = 348;
 constexpr std::size_t kMaxBytes = std::size_t{512} << 20;
 constexpr int kMaxLabel = 65535;
-constexpr double kSkew = 1e-3;  // cosine between two steps from which on they are skewed
-constexpr double kMinVoxel_m = 1e-6, kMaxVoxel_m = 0.1;
 
 struct StoredType {
   int code, bytes;
@@ -144,21 +142,11 @@ class NiftiReader {
       map_.warnings.push_back(
           "has neither sform nor qform: which side is left is not known, taken as RAS");
     }
-    if (!is_finite(origin) || !(length(origin) < 1e9)) return error("its origin is not finite");
-    for (std::size_t c = 0; c < 3; ++c) {
-      const double size = length(columns[c]) * scale_;
-      if (!(size >= kMinVoxel_m && size <= kMaxVoxel_m))
-        return error("voxels are " + std::to_string(size * 1e3) + " mm along dimension " +
-                     std::to_string(c + 1) + ", must be 0.001 to 100: check unit and spacing");
-      for (std::size_t d = 0; d < c; ++d)
-        if (std::abs(dot(columns[c], columns[d])) > kSkew * length(columns[c]) * length(columns[d]))
-          return error("its axes are skewed: resample it at right angles");
-    }
-    map_.orientation = orientation_of(columns);
     // From right, front, head to left, head, front.
     const auto turned = [&](const Vec3d& v) { return Vec3d{-v.x, v.z, v.y} * scale_; };
-    map_.origin_m = turned(origin);
-    for (std::size_t c = 0; c < 3; ++c) map_.steps_m[c] = turned(columns[c]);
+    std::array<Vec3d, 3> steps;
+    for (std::size_t c = 0; c < 3; ++c) steps[c] = turned(columns[c]);
+    if (auto s = set_place(turned(origin), steps, map_); !s) return error(s.error().message);
     return {};
   }
 
@@ -175,17 +163,6 @@ class NiftiReader {
         Vec3d{2 * (b * d + a * c), 2 * (c * d - a * b), a * a + d * d - c * c - b * b} *
             (sizes[2] * side)};
     return {};
-  }
-
-  static std::string orientation_of(const std::array<Vec3d, 3>& columns) {
-    std::string text;
-    for (const Vec3d& c : columns) {
-      const double x = std::abs(c.x), y = std::abs(c.y), z = std::abs(c.z);
-      text += x >= y && x >= z ? (c.x > 0 ? 'R' : 'L')
-              : y >= z         ? (c.y > 0 ? 'A' : 'P')
-                               : (c.z > 0 ? 'S' : 'I');
-    }
-    return text;
   }
 
   double value(std::size_t i) const {

@@ -1,0 +1,269 @@
+#include "server/organs/dicom/dicom_reader.h"
+
+#include <dcmtk/dcmdata/dctk.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <functional>
+#include <random>
+
+#include "tests/support/files.h"
+
+namespace trocar::dicom {
+namespace {
+
+namespace fs = std::filesystem;
+constexpr int kColumns = 9, kRows = 7, kSlices = 5;
+
+// Label 1 fills a box, label 2 a smaller one in it.
+int label_at(int i, int j, int k) {
+  const bool is_in = i > 0 && i < 8 && j > 0 && j < 6 && k > 0 && k < 4;
+  return is_in ? i == 4 && j > 2 ? 2 : 1 : 0;
+}
+
+void put(DcmItem& item, const DcmTagKey& key, const std::string& text) {
+  ASSERT_TRUE(item.putAndInsertString(key, text.c_str()).good());
+}
+void put(DcmItem& item, const DcmTagKey& key, int value) {
+  ASSERT_TRUE(item.putAndInsertUint16(key, static_cast<Uint16>(value)).good());
+}
+DcmItem* add(DcmItem& item, const DcmTagKey& sequence, long at) {
+  DcmItem* added = nullptr;
+  EXPECT_TRUE(item.findOrCreateSequenceItem(sequence, added, at).good());
+  return added;
+}
+std::string place(int k) {
+  return "10\\20\\" + std::to_string(30 + 2 * k);
+}
+
+void put_image(DcmItem& data, const char* kind) {
+  put(data, DCM_SOPClassUID, kind);
+  put(data, DCM_SOPInstanceUID, "1.2.3.4");
+  put(data, DCM_Rows, kRows);
+  put(data, DCM_Columns, kColumns);
+  put(data, DCM_SamplesPerPixel, 1);
+}
+
+// Slices without a voxel are left out, as programs do.
+void make_segmentation(DcmItem& data) {
+  put_image(data, UID_SegmentationStorage);
+  put(data, DCM_SegmentationType, "BINARY");
+  put(data, DCM_BitsAllocated, 1);
+  for (int n = 1; n <= 2; ++n) {
+    auto* segment = add(data, DCM_SegmentSequence, n - 1);
+    put(*segment, DCM_SegmentNumber, n);
+    put(*segment, DCM_SegmentLabel, n == 1 ? "Liver" : "Tumour");
+  }
+  auto* shared = add(data, DCM_SharedFunctionalGroupsSequence, 0);
+  put(*add(*shared, DCM_PlaneOrientationSequence, 0), DCM_ImageOrientationPatient,
+      "1\\0\\0\\0\\1\\0");
+  auto* measures = add(*shared, DCM_PixelMeasuresSequence, 0);
+  put(*measures, DCM_PixelSpacing, "1.5\\1");
+  put(*measures, DCM_SpacingBetweenSlices, "2");
+  std::vector<Uint8> bits;
+  std::size_t at = 0;
+  long frames = 0;
+  for (int n = 1; n <= 2; ++n)
+    for (int k = 1; k < 4; ++k) {
+      auto* frame = add(data, DCM_PerFrameFunctionalGroupsSequence, frames++);
+      put(*add(*frame, DCM_PlanePositionSequence, 0), DCM_ImagePositionPatient, place(k));
+      put(*add(*frame, DCM_SegmentIdentificationSequence, 0), DCM_ReferencedSegmentNumber, n);
+      for (int j = 0; j < kRows; ++j)
+        for (int i = 0; i < kColumns; ++i, ++at) {
+          if (at % 8 == 0) bits.push_back(0);
+          if (label_at(i, j, k) == n) bits.back() = static_cast<Uint8>(bits.back() | 1 << (at % 8));
+        }
+    }
+  bits.resize(bits.size() + bits.size() % 2);
+  ASSERT_TRUE(data.putAndInsertUint8Array(DCM_PixelData, bits.data(), bits.size()).good());
+}
+
+void make_slice(DcmItem& data, int k) {
+  put_image(data, UID_CTImageStorage);
+  put(data, DCM_SeriesInstanceUID, "1.2.3");
+  put(data, DCM_BitsAllocated, 16);
+  put(data, DCM_ImageOrientationPatient, "1\\0\\0\\0\\1\\0");
+  put(data, DCM_ImagePositionPatient, place(k));
+  put(data, DCM_PixelSpacing, "1.5\\1");
+  std::vector<Uint16> pixels;
+  for (int j = 0; j < kRows; ++j)
+    for (int i = 0; i < kColumns; ++i) pixels.push_back(static_cast<Uint16>(label_at(i, j, k)));
+  ASSERT_TRUE(data.putAndInsertUint16Array(DCM_PixelData, pixels.data(), pixels.size()).good());
+}
+
+class DicomReader : public ::testing::Test {
+ protected:
+  // Changes may end what would be right.
+  fs::path segmentation(const std::function<void(DcmItem&)>& change = [](DcmItem&) {}) {
+    return write("seg.dcm", [&](DcmItem& data) {
+      make_segmentation(data);
+      change(data);
+    });
+  }
+  void series(
+      int skipped = -1, const std::function<void(DcmItem&, int)>& change = [](DcmItem&, int) {}) {
+    for (int k = 0; k < kSlices; ++k)
+      if (k != skipped)
+        write("s" + std::to_string(k * 3 % kSlices), [&](DcmItem& data) {
+          make_slice(data, k);
+          change(data, k);
+        });
+  }
+  fs::path write(const std::string& name, const std::function<void(DcmItem&)>& make) {
+    DcmFileFormat file;
+    make(*file.getDataset());
+    const auto path = folder_ / name;
+    EXPECT_TRUE(file.saveFile(path.c_str(), EXS_LittleEndianExplicit).good());
+    return path;
+  }
+  static std::string error_of(const fs::path& path) {
+    const auto map = read_dicom(path);
+    if (map.ok()) return "accepted";
+    const std::string& text = map.error().message;
+    return text.substr(text.rfind("/") == std::string::npos ? 0 : text.find(": ") + 2);
+  }
+  static void expect_phantom(const label_map::LabelMap& map, int from) {
+    for (int k = 0; k < map.size[2]; ++k)
+      for (int j = 0; j < kRows; ++j)
+        for (int i = 0; i < kColumns; ++i)
+          ASSERT_EQ(map.labels[map.index(i, j, k)], label_at(i, j, k + from)) << i << j << k;
+    EXPECT_EQ(map.orientation, "LPS");
+    // The patient's left, back and head are at x, -z and y here.
+    EXPECT_NEAR(length(map.origin_m - Vec3d{0.010, 0.030 + 0.002 * from, -0.020}), 0, 1e-9);
+    EXPECT_NEAR(length(map.steps_m[0] - Vec3d{0.001, 0, 0}), 0, 1e-9);
+    EXPECT_NEAR(length(map.steps_m[1] - Vec3d{0, 0, -0.0015}), 0, 1e-9);
+    EXPECT_NEAR(length(map.steps_m[2] - Vec3d{0, 0.002, 0}), 0, 1e-9);
+  }
+
+  void empty() {
+    for (const auto& entry : fs::directory_iterator(folder_)) fs::remove(entry);
+  }
+
+  const trocar::testing::TemporaryFolder temporary_;
+  const fs::path folder_ = fs::path(temporary_.file("a")).parent_path();
+};
+
+TEST_F(DicomReader, ReadsTheSegmentsOfASegmentationWithTheirNames) {
+  const auto path = segmentation();
+  EXPECT_TRUE(is_dicom(path));
+  const auto map = read_dicom(path);
+  ASSERT_TRUE(map.ok()) << map.error().message;
+  EXPECT_EQ(map->size, (std::array{kColumns, kRows, 3}));
+  expect_phantom(*map, 1);
+  const std::vector<std::pair<std::uint16_t, std::string>> names{{1, "Liver"}, {2, "Tumour"}};
+  EXPECT_EQ(map->names, names);
+}
+
+TEST_F(DicomReader, ReadsAFolderOfLabelSlicesInWhateverOrder) {
+  series();
+  std::ofstream(folder_ / "notes.txt") << "no DICOM";
+  const auto map = read_dicom(folder_);
+  ASSERT_TRUE(map.ok()) << map.error().message;
+  EXPECT_EQ(map->size, (std::array{kColumns, kRows, kSlices}));
+  expect_phantom(*map, 0);
+}
+
+TEST_F(DicomReader, AVoxelOfTwoSegmentsBelongsToTheHigherAndThatIsSaid) {
+  const auto path = segmentation([](DcmItem& data) {
+    const Uint8* bits = nullptr;
+    unsigned long count = 0;
+    ASSERT_TRUE(data.findAndGetUint8Array(DCM_PixelData, bits, &count).good());
+    std::vector<Uint8> all(count, 0xff);
+    ASSERT_TRUE(data.putAndInsertUint8Array(DCM_PixelData, all.data(), count).good());
+  });
+  const auto map = read_dicom(path);
+  ASSERT_TRUE(map.ok()) << map.error().message;
+  EXPECT_EQ(std::ranges::count(map->labels, 2), kColumns * kRows * 3);
+  ASSERT_EQ(map->warnings.size(), 1u);
+  EXPECT_EQ(map->warnings[0], "segments overlap in 189 voxels, which the higher number has");
+}
+
+TEST_F(DicomReader, AFractionalSegmentIsInFromHalfItsGreatestValueOn) {
+  const auto path = segmentation([](DcmItem& data) {
+    put(data, DCM_SegmentationType, "FRACTIONAL");
+    put(data, DCM_BitsAllocated, 8);
+    put(data, DCM_MaximumFractionalValue, 200);
+    std::vector<Uint8> all(kColumns * kRows * 6, 99);
+    all[5] = 100;
+    ASSERT_TRUE(data.putAndInsertUint8Array(DCM_PixelData, all.data(), all.size()).good());
+  });
+  const auto map = read_dicom(path);
+  ASSERT_TRUE(map.ok()) << map.error().message;
+  EXPECT_EQ(std::ranges::count(map->labels, 0), kColumns * kRows * 3 - 1);
+  EXPECT_EQ(map->labels[5], 1);
+}
+
+TEST_F(DicomReader, SaysWhatIsWrongWithASegmentation) {
+  const auto error = [&](const std::function<void(DcmItem&)>& change) {
+    return error_of(segmentation(change));
+  };
+  EXPECT_EQ(error([](DcmItem& d) { delete d.remove(DCM_PixelData); }), "PixelData is missing");
+  EXPECT_EQ(error([](DcmItem& d) { delete d.remove(DCM_SegmentSequence); }),
+            "SegmentSequence is empty");
+  EXPECT_EQ(error([](DcmItem& d) { put(d, DCM_Rows, 8); }),
+            "PixelData has 48 bytes, 54 are needed: it is cut off");
+  EXPECT_EQ(error([](DcmItem& d) { put(d, DCM_Columns, 0); }), "Columns is 0, must be 1 to 65535");
+  EXPECT_EQ(error([](DcmItem& d) { put(d, DCM_SegmentationType, "LABELMAP"); }),
+            "SegmentationType is neither BINARY nor FRACTIONAL");
+  EXPECT_EQ(error([](DcmItem& d) {
+              put(*add(*add(d, DCM_PerFrameFunctionalGroupsSequence, 2),
+                       DCM_SegmentIdentificationSequence, 0),
+                  DCM_ReferencedSegmentNumber, 7);
+            }),
+            "frame 3: there is no segment 7");
+  EXPECT_EQ(
+      error([](DcmItem& d) {
+        put(*add(*add(d, DCM_SharedFunctionalGroupsSequence, 0), DCM_PlaneOrientationSequence, 0),
+            DCM_ImageOrientationPatient, "1\\0\\0\\0.5\\0.5\\0");
+      }),
+      "its axes are skewed: resample it at right angles");
+}
+
+TEST_F(DicomReader, SaysWhatIsWrongWithASeries) {
+  EXPECT_EQ(error_of(folder_), "holds no DICOM file");
+  series(2);
+  EXPECT_EQ(error_of(folder_), "a slice is missing between 32.00 and 36.00 mm");
+  empty();
+  series(-1, [](DcmItem& data, int k) {
+    if (k == 3) put(data, DCM_SeriesInstanceUID, "1.2.9");
+  });
+  EXPECT_EQ(error_of(folder_), "is of another series than the files before: give each a folder");
+  empty();
+  series(-1, [](DcmItem& data, int) { put(data, DCM_RescaleIntercept, "-1024"); });
+  EXPECT_NE(error_of(folder_).find("it holds grey values, not labels"), std::string::npos);
+  empty();
+  series(-1, [](DcmItem& data, int k) { put(data, DCM_ImagePositionPatient, place(k / 2)); });
+  EXPECT_EQ(error_of(folder_), "5 slices stand at 3 places: it is more than one series");
+  empty();
+  write("one", [](DcmItem& data) { make_slice(data, 0); });
+  EXPECT_EQ(error_of(folder_ / "one"),
+            "is one image: import the folder of its series, or a segmentation");
+}
+
+// Each of these ends in a map or in one line.
+TEST_F(DicomReader, ChangedBytesAreRefusedOrRead) {
+  const auto path = segmentation();
+  std::ifstream in(path, std::ios::binary);
+  const std::string right((std::istreambuf_iterator<char>(in)), {});
+  std::mt19937 random(5);
+  int read = 0, refused = 0;
+  for (int n = 0; n < 400; ++n) {
+    std::string bytes = right;
+    for (int i = 0; i < 1 + n % 4; ++i)
+      bytes[132 + random() % (bytes.size() - 132)] = static_cast<char>(random());
+    if (n % 5 == 0) bytes.resize(132 + random() % (bytes.size() - 132));
+    std::ofstream(path, std::ios::binary) << bytes;
+    const auto map = read_dicom(path);
+    if (map.ok()) {
+      ++read;
+    } else {
+      ++refused;
+      EXPECT_EQ(map.error().message.find('\n'), std::string::npos);
+    }
+  }
+  EXPECT_GT(read, 20);
+  EXPECT_GT(refused, 100);
+}
+
+}  // namespace
+}  // namespace trocar::dicom

@@ -1,0 +1,66 @@
+// Labels of a map make the organ, chosen by number or by name.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "server/organs/catalogue/import_organ.h"
+
+namespace trocar::catalogue {
+namespace {
+
+// A block of 20 x 20 x 20 voxels of 3 mm: label 4 below, label 7 above.
+label_map::LabelMap two_halves() {
+  label_map::LabelMap map;
+  map.size = {24, 24, 24};
+  map.labels.resize(24 * 24 * 24);
+  for (int k = 2; k < 22; ++k)
+    for (int j = 2; j < 22; ++j)
+      for (int i = 2; i < 22; ++i) map.labels[map.index(i, j, k)] = j < 12 ? 4 : 7;
+  EXPECT_TRUE(
+      set_place({}, {Vec3d{0.003, 0, 0}, Vec3d{0, 0.003, 0}, Vec3d{0, 0, 0.003}}, map).ok());
+  map.names = {{4, "Liver"}, {7, "Left kidney"}};
+  return map;
+}
+
+std::vector<std::string> regions_of(const std::string& labels,
+                                    label_map::LabelMap map = two_halves()) {
+  const auto parsed = parse_labels(labels);
+  if (!parsed) return {parsed.error().message};
+  ImportOptions options;
+  options.labels = *parsed;
+  options.nodes = 300;
+  const auto imported = import_labels(std::move(map), "map.dcm", options);
+  if (!imported) return {imported.error().message};
+  std::vector<std::string> names;
+  for (const auto& region : imported->organ.regions) names.push_back(region.name);
+  if (names.empty())
+    names.push_back(fmt::format("one of {:.0f} ml", 1e6 * total_volume(imported->organ.mesh)));
+  return names;
+}
+
+using Names = std::vector<std::string>;
+
+TEST(Labels, HaveTheNamesThatSomebodySaysOrElseTheMaps) {
+  EXPECT_EQ(regions_of(""), (Names{"Liver", "Left kidney"}));
+  EXPECT_EQ(regions_of("4:spleen,7"), (Names{"spleen", "Left kidney"}));
+  auto map = two_halves();
+  map.names.clear();
+  EXPECT_EQ(regions_of("4,7", map), (Names{"label 4", "label 7"}));
+}
+
+TEST(Labels, AreChosenByNumberOrByName) {
+  EXPECT_EQ(regions_of("Liver"), (Names{"one of 108 ml"}));
+  EXPECT_EQ(regions_of("7"), (Names{"one of 108 ml"}));
+  EXPECT_EQ(regions_of("Left kidney,4"), (Names{"Liver", "Left kidney"}));
+}
+
+TEST(Labels, WhatTheMapDoesNotHaveIsRefusedWithWhatItHas) {
+  EXPECT_EQ(regions_of("Tumour"),
+            (Names{"--labels: map.dcm has no label 'Tumour', it has 4:Liver, 7:Left kidney"}));
+  EXPECT_EQ(regions_of("0"),
+            (Names{"--labels: '0' is no label, such as 2 or 2:tumour, from 1 to 65535"}));
+  EXPECT_EQ(regions_of("4,,7"),
+            (Names{"--labels: '' is no label, such as 2 or 2:tumour, from 1 to 65535"}));
+}
+
+}  // namespace
+}  // namespace trocar::catalogue
