@@ -18,6 +18,7 @@
 #include "common/wire/role.h"
 #include "server/app/journal/assess_command.h"
 #include "server/app/journal/program_name.h"
+#include "server/session/recording/anonymise.h"
 #include "server/session/recording/force_table.h"
 #include "server/session/recording/lesson_table.h"
 #include "server/session/recording/verify.h"
@@ -181,6 +182,17 @@ int repair(const std::string& path, const std::string& to) {
   return 0;
 }
 
+int take_names_out(const std::string& path, const std::string& to, bool keeps_words) {
+  const auto report_of = recording::anonymise(path, to, keeps_words);
+  if (!report_of) return report(kProgram, report_of.error());
+  std::printf("%s: %zu people have pseudonyms; %" PRIu64
+              " lines of talk, notes and reasons are %s\n",
+              to.c_str(), report_of->people, report_of->words,
+              keeps_words ? "kept: read them before you give this away" : "taken out");
+  std::printf("Motions and the date stay, and may tell who it was.\n");
+  return 0;
+}
+
 int export_forces(const std::string& path, const std::string& table) {
   const auto counts = recording::write_force_table(path, table);
   if (!counts) return report(kProgram, counts.error());
@@ -221,6 +233,8 @@ int run(int argc, char** argv) {
       "                                                measure what people did, stage by stage\n"
       "  trocar-journal assess out/ --html curves.html learning curves over a folder of sessions\n"
       "  trocar-journal repair killed.mcap whole.mcap  for other programs that read MCAP\n"
+      "  trocar-journal anonymise session.mcap shared.mcap\n"
+      "                                                a copy without names, which verifies\n"
       "Exit codes: 0 verified, 1 difference found, 2 usage, 3 file cannot be read, 6 not all "
       "could\n"
       "be verified, though nothing differs: the reasons are printed.");
@@ -238,6 +252,14 @@ int run(int argc, char** argv) {
       app.add_subcommand("verify", "Simulate the session again and compare all that it says");
   auto* mend = app.add_subcommand(
       "repair", "Write a recording that was cut short or is damaged again, as a whole file");
+  auto* hide = app.add_subcommand(
+      "anonymise",
+      "Write a recording again with pseudonyms for names, and without what people typed");
+  bool keeps_words = false;
+  hide->add_option("FILE", path, "the journal (.mcap)")->required();
+  hide->add_option("NEW", repaired_path, "the file to write, which must not exist")->required();
+  hide->add_flag("--keep-words", keeps_words,
+                 "keep talk, notes and reasons, but for names in them");
   AssessOptions assess_options;
   auto* measure = app.add_subcommand("assess", "Measure what people did, and report it");
   add_options(*measure, assess_options);
@@ -270,6 +292,7 @@ int run(int argc, char** argv) {
   if (auto s = log::configure(kProgram, log_level); !s) return report(kProgram, s.error());
   if (measure->parsed()) return assess(assess_options);
   if (mend->parsed()) return repair(path, repaired_path);
+  if (hide->parsed()) return take_names_out(path, repaired_path, keeps_words);
   if (give->parsed()) {
     if (force_table.empty() && lesson_table.empty())
       return report(kProgram, Error{ErrorCode::Usage,

@@ -1,0 +1,120 @@
+// A copy without names verifies, and nobody finds a name in it.
+
+#include "server/session/recording/anonymise.h"
+
+#include <gtest/gtest.h>
+
+#include "common/journal/session_journal_writer.h"
+#include "server/session/recording/verify.h"
+#include "tests/recording/recorded_simulation.h"
+#include "tests/support/files.h"
+
+namespace trocar::recording::testing {
+namespace {
+
+using trocar::testing::TemporaryFolder;
+
+// All texts that a copy holds, one per line.
+std::string all_bytes(const std::string& path) {
+  std::string text;
+  auto reader = journal::McapReader::open(path);
+  EXPECT_TRUE(reader.ok());
+  (*reader)->read({}, {}, [&](const journal::McapMessage& message) {
+    text.append(reinterpret_cast<const char*>(message.data.data()), message.data.size());
+    text += '\n';
+    return true;
+  });
+  return text;
+}
+
+TEST(anonymise, a_session_verifies_without_its_names) {
+  const TemporaryFolder folder;
+  record_simulation(folder.file("a.mcap"));
+  copy_journal(folder.file("a.mcap"), folder.file("b.mcap"), [](auto, auto&) { return true; });
+  const std::string before = all_bytes(folder.file("b.mcap"));
+  ASSERT_NE(before.find("Hand 0"), std::string::npos);
+  const auto report = anonymise(folder.file("b.mcap"), folder.file("c.mcap"), false);
+  ASSERT_TRUE(report.ok()) << report.error().message;
+  EXPECT_GE(report->people, 2u);
+  EXPECT_EQ(report->words, 0u);
+  const std::string after = all_bytes(folder.file("c.mcap"));
+  EXPECT_EQ(after.find("Hand 0"), std::string::npos);
+  EXPECT_NE(after.find("Person 1"), std::string::npos);
+  const auto was = verify_journal(folder.file("b.mcap")),
+             is = verify_journal(folder.file("c.mcap"));
+  ASSERT_TRUE(was.ok() && is.ok());
+  EXPECT_EQ(is->verdict(), Verdict::Verified) << is->why();
+  EXPECT_EQ(is->ticks_verified, was->ticks_verified);
+}
+
+// Writes a session of people who talk.
+std::string talk(const std::string& path) {
+  auto created =
+      journal::SessionJournalWriter::create(path, {.start_utc_ns = 1, .organ_name = "liver"});
+  EXPECT_TRUE(created.ok());
+  auto& writer = *created;
+  proto::Participants people;
+  const auto join = [&](std::uint32_t slot, const std::string& name) {
+    auto* person = people.add_participant();
+    person->set_slot(slot);
+    person->set_name(name);
+  };
+  join(0, "Ann");
+  join(1, "Ann Müller");
+  people.mutable_participant(0)->set_frozen_by("Ivy");
+  people.add_waiting("Zoë");
+  EXPECT_TRUE(writer->write_participants(0, 1, people).ok());
+  const auto say = [&](proto::TeachAction action, const std::string& text) {
+    proto::LessonRecord record;
+    record.mutable_teach()->set_action(action);
+    record.mutable_teach()->set_text(text);
+    EXPECT_TRUE(writer->write(journal::JournalTopic::Lesson, 1, 1, record).ok());
+  };
+  say(proto::TEACH_CHAT, "Ann Müller: ask Ann, or Annabel: she knows");
+  say(proto::TEACH_EXPEL, "Ivy has put Zoë out: come back later");
+  say(proto::TEACH_FREEZE, "Ivy keeps the tools of Ann where they are");
+  EXPECT_TRUE(writer->close().ok());
+  return path;
+}
+
+TEST(anonymise, words_that_people_typed_are_taken_out) {
+  const TemporaryFolder folder;
+  const auto report = anonymise(talk(folder.file("a.mcap")), folder.file("b.mcap"), false);
+  ASSERT_TRUE(report.ok()) << report.error().message;
+  EXPECT_EQ(report->people, 4u);
+  EXPECT_EQ(report->words, 2u);
+  const std::string text = all_bytes(folder.file("b.mcap"));
+  for (const char* name : {"Ann", "Ivy", "Zo", "later", "knows"})
+    EXPECT_EQ(text.find(name), std::string::npos) << name;
+  EXPECT_NE(text.find("Person 3: (words taken out)"), std::string::npos) << text;
+  EXPECT_NE(text.find("Person 2 has put Person 4 out: (words taken out)"), std::string::npos)
+      << text;
+  EXPECT_NE(text.find("Person 2 keeps the tools of Person 1 where they are"), std::string::npos)
+      << text;
+}
+
+TEST(anonymise, kept_words_lose_names_alone) {
+  const TemporaryFolder folder;
+  ASSERT_TRUE(anonymise(talk(folder.file("a.mcap")), folder.file("b.mcap"), true).ok());
+  const std::string text = all_bytes(folder.file("b.mcap"));
+  EXPECT_NE(text.find("Person 3: ask Person 1, or Annabel: she knows"), std::string::npos) << text;
+}
+
+TEST(anonymise, it_overwrites_nothing) {
+  const TemporaryFolder folder;
+  const auto path = talk(folder.file("a.mcap"));
+  const auto before = trocar::testing::load_file(path);
+  const auto report = anonymise(path, path, false);
+  ASSERT_FALSE(report.ok());
+  EXPECT_EQ(trocar::testing::load_file(path), before);
+  auto bytes = before;
+  bytes.resize(bytes.size() - 20);
+  trocar::testing::save_file(folder.file("cut.mcap"), bytes);
+  const auto cut = anonymise(folder.file("cut.mcap"), folder.file("b.mcap"), false);
+  ASSERT_FALSE(cut.ok());
+  EXPECT_NE(cut.error().message.find("is cut short or damaged"), std::string::npos);
+  EXPECT_FALSE(anonymise(folder.file("none.mcap"), folder.file("b.mcap"), false).ok());
+}
+
+}  // namespace
+}  // namespace trocar::recording::testing
