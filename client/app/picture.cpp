@@ -218,7 +218,11 @@ void Picture::add_participants(const replica::Replica& replica, bool is_replay,
       shown.has_tool = true;
       shown.is_silent = tool.is_silent;
       shown.is_inside = shown.is_inside || tool.is_inside;
-      if (tool.verb != tool::Verb::None) shown.verb = tool.verb, shown.has_claim = tool.has_claim;
+      if (tool.verb != tool::Verb::None) {
+        shown.verb = tool.verb;
+        shown.form = shape_of(replica, tool.slot).form;
+        shown.has_claim = tool.has_claim;
+      }
       shown.force_n += length(tool.force_n);
       shown.torque_nm += length(tool.torque_nm);
       shown.contact_nodes += tool.contact_nodes;

@@ -36,6 +36,7 @@ struct HudParticipant {
   bool has_tool = false;  // the rest is valid
   shape::Colour colour;
   tool::Verb verb = tool::Verb::None;
+  tool::Form form = tool::Form::Plain;  // of the tool with that verb
   bool has_claim = false, is_silent = false;
   bool is_away = false;    // the connection is lost, the place is kept
   bool is_frozen = false;  // an instructor keeps the tools where they are
