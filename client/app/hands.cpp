@@ -64,7 +64,7 @@ Hands Hands::mouse(std::span<const tool::Instrument> table, const tool::Instrume
   hands.table_ = table;
   for (int i = 0; i < count; ++i)
     hands.mouse_.push_back(
-        {device::MouseTool(first.shape, i == 0 ? Side::Right : Side::Left), chosen});
+        {device::MouseTool(first.shape, i == 0 ? Side::Right : Side::Left), chosen, {}});
   return hands;
 }
 
@@ -114,6 +114,28 @@ void Hands::take(std::size_t instrument, replica::SessionSource& source) {
   if (!replica::send_tool_change(source, static_cast<std::uint32_t>(moved_), shape)) return;
   hand.instrument = instrument;
   hand.tool.take(shape);
+  hand.asked.push_back(shape);
+}
+
+// Instruments that it has asked for itself appear in the list later, in the same order.
+void Hands::take_what_is_listed(const replica::Replica& replica) {
+  const auto* own = replica.find_participant(replica.own_slot());
+  for (std::size_t i = 0; own != nullptr && i < std::min(mouse_.size(), own->tools.size()); ++i) {
+    auto& hand = mouse_[i];
+    const auto& shape = own->tools[i];
+    const bool is_new = hand.listed && *hand.listed != shape;
+    hand.listed = shape;
+    if (!is_new) continue;
+    const auto asked = std::ranges::find(hand.asked, shape);
+    if (asked != hand.asked.end()) {
+      hand.asked.erase(hand.asked.begin(), asked + 1);
+      continue;
+    }
+    hand.asked.clear();
+    hand.tool.take(shape);
+    const auto known = std::ranges::find(table_, shape, &tool::Instrument::shape);
+    if (known != table_.end()) hand.instrument = static_cast<std::size_t>(known - table_.begin());
+  }
 }
 
 void Hands::switch_hand(const device::PointerInput& input, const device::ViewRays& view) {
@@ -192,6 +214,7 @@ Status Hands::send_due(const replica::Replica& replica, replica::SessionSource& 
     for (auto& hand : replayed_)
       if (const auto updated = hand->update(*playback, now_ns); !updated) return updated;
   if (const auto tended = tend_felt(replica); !tended) return tended;
+  take_what_is_listed(replica);
   for (std::size_t i = 0; i < mouse_.size(); ++i)
     if (const auto sample = mouse_[i].tool.pop_due(now_ns))
       send(source, static_cast<std::uint32_t>(i), *sample, now_ns);

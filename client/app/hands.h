@@ -83,7 +83,11 @@ class Hands {
   struct MouseHand {
     device::MouseTool tool;
     std::size_t instrument = 0;
+    std::vector<tool::ToolShape> asked;       // for these, and the list has not had them yet
+    std::optional<tool::ToolShape> listed{};  // as the session had it last
   };
+  // A hand that was given another instrument has it from then on.
+  void take_what_is_listed(const replica::Replica& replica);
   std::vector<MouseHand> mouse_;
   std::size_t moved_ = 0;  // of them
   std::span<const tool::Instrument> table_;

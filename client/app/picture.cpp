@@ -133,7 +133,12 @@ render::SceneTool Picture::scene_tool(const replica::Replica& replica, const rep
   // A person sees the own hand where it is, not where it was a round trip ago, and the tool as far
   // from it as tissue last kept it.
   const device::MouseTool* mouse = hands.mouse_tool(tool.slot.number());
-  if (mouse != nullptr && mouse->is_valid() && tool.slot.owner() == replica.own_slot()) {
+  // A tool that is held still, or lent, is not where its hand is.
+  const auto* own = replica.find_participant(replica.own_slot());
+  const bool follows_hand = own == nullptr || (own->frozen_by.empty() &&
+                                               (own->lent_tools >> tool.slot.number() & 1u) == 0);
+  if (follows_hand && mouse != nullptr && mouse->is_valid() &&
+      tool.slot.owner() == replica.own_slot()) {
     const Pose hand = mouse->current().world_from_tool;
     const Vec3f held_back = tool.world_from_proxy.position - tool.world_from_tool.position;
     shown.world_from_tool = {hand.position + held_back, hand.orientation};
@@ -213,7 +218,11 @@ void Picture::add_participants(const replica::Replica& replica, bool is_replay,
       shown.has_tool = true;
       shown.is_silent = tool.is_silent;
       shown.is_inside = shown.is_inside || tool.is_inside;
-      if (tool.verb != tool::Verb::None) shown.verb = tool.verb, shown.has_claim = tool.has_claim;
+      if (tool.verb != tool::Verb::None) {
+        shown.verb = tool.verb;
+        shown.form = shape_of(replica, tool.slot).form;
+        shown.has_claim = tool.has_claim;
+      }
       shown.force_n += length(tool.force_n);
       shown.torque_nm += length(tool.torque_nm);
       shown.contact_nodes += tool.contact_nodes;
@@ -351,6 +360,7 @@ ui::HudModel Picture::hud_model(const replica::Replica& replica, replica::Sessio
     model.status = "Waiting for the organ ...";
   if (own != nullptr && !own->frozen_by.empty())
     model.frozen_text = own->frozen_by + " keeps your tools where they are.";
+  model.has_loan = own != nullptr && own->lent_tools != 0;
   const auto& people = replica.participants();
   const auto leader = std::ranges::find_if(people, &replica::Participant::leads_view);
   if (leader != people.end() && leader->slot == replica.own_slot())

@@ -1,10 +1,24 @@
 // The picture's part about the lesson that the session gives.
 
+#include <algorithm>
 #include <cstdio>
 
 #include "client/app/picture.h"
+#include "common/tool/instrument.h"
 
 namespace trocar::app {
+namespace {
+
+std::vector<std::string> instruments_of(const std::vector<tool::ToolShape>& shapes) {
+  std::vector<std::string> names;
+  for (const auto& shape : shapes) {
+    const auto known = std::ranges::find(tool::instruments(), shape, &tool::Instrument::shape);
+    names.push_back(known != tool::instruments().end() ? known->name : "instrument");
+  }
+  return names;
+}
+
+}  // namespace
 
 std::optional<Vec3f> Picture::lesson_target(const replica::Replica& replica) {
   if (!replica.lesson() || replica.newest() == nullptr) return std::nullopt;
@@ -61,7 +75,9 @@ void Picture::add_pace(const replica::Replica& replica, bool is_replay, ui::HudM
   ui::HudConduct conduct{
       .is_paused = pace.is_paused, .rate = pace.rate, .marks = replica.marks(), .hands = {}};
   for (const auto& who : replica.participants())
-    if (!who.tools.empty()) conduct.hands.push_back({who.slot, who.name, !who.frozen_by.empty()});
+    if (!who.tools.empty())
+      conduct.hands.push_back(
+          {who.slot, who.name, !who.frozen_by.empty(), instruments_of(who.tools)});
   model.conduct = std::move(conduct);
 }
 

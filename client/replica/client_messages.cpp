@@ -66,6 +66,11 @@ bool send_lead_wish(SessionSource& source, const LeadWish& wish) {
     request.set_name(wish.name);
   }
   request.set_rate(wish.rate);
+  if (wish.action == LeadAction::HandOver) {
+    request.set_tool(static_cast<std::uint32_t>(wish.tool));
+    request.set_receiver(wish.receiver.value);
+    request.set_receiver_name(wish.receiver_name);
+  }
   return source.send(envelope);
 }
 

@@ -38,12 +38,17 @@ enum class LeadAction : std::uint8_t {
   Pause = 15,
   GoOn = 16,
   Slow = 17,
+  HandOver = 18,
 };
 struct LeadWish {
   LeadAction action = LeadAction::Pause;
   ParticipantSlot participant;  // whose tools; with the name that others read
   std::string name;
   float rate = 0;  // of Slow
+  // HandOver gives this tool to this participant.
+  int tool = 0;
+  ParticipantSlot receiver;
+  std::string receiver_name;
 };
 bool send_lead_wish(SessionSource& source, const LeadWish& wish);
 // To say something in a lesson, as a hand or an instructor. False if the source dropped it.

@@ -488,6 +488,7 @@ void Replica::apply_participants(const proto::Participants& message) {
     for (const auto& shape : entry.tool()) participant.tools.push_back(wire::read(shape));
     participant.is_away = entry.is_away();
     participant.frozen_by = entry.frozen_by();
+    participant.lent_tools = entry.lent_tools();
     participant.leads_view = entry.leads_view();
     participants_.push_back(std::move(participant));
   }

@@ -117,7 +117,7 @@ void Replica::apply_marks(const proto::MarkList& message) {
 }
 
 void Replica::apply_teach(const proto::TeachEvent& message, std::uint64_t arrival_ns) {
-  tell_all(message.tick(), message.text(), !message.is_done(), arrival_ns);
+  tell_all(message.tick(), message.text(), !message.is_done() || message.is_trouble(), arrival_ns);
 }
 
 void Replica::tell_all(Tick tick, const std::string& text, bool is_refused,

@@ -31,9 +31,10 @@ struct Participant {
   std::string name;
   Role role = Role::Unknown;
   std::vector<tool::ToolShape> tools;
-  bool is_away = false;     // the connection is lost, the place is kept
-  std::string frozen_by;    // who keeps the tools where they are; empty: nobody
-  bool leads_view = false;  // the view to follow is this one's
+  bool is_away = false;          // the connection is lost, the place is kept
+  std::string frozen_by;         // who keeps the tools where they are; empty: nobody
+  std::uint32_t lent_tools = 0;  // a bit each: handed over, it moves beside its hand's place
+  bool leads_view = false;       // the view to follow is this one's
 };
 
 struct Tool {

@@ -27,6 +27,11 @@ std::vector<Banner> banners_of(const HudModel& model) {
     banners.push_back({model.frozen_text,
                        "Wait: they come back to your hands slowly when they are released.",
                        RateTone::Notice});
+  if (model.has_loan && model.frozen_text.empty())
+    banners.push_back(
+        {"You have been handed an instrument that holds tissue.",
+         "It moves from where it is as your hand moves. To open it, press and let go.",
+         RateTone::Notice});
   if (std::ranges::any_of(model.participants,
                           [](const auto& who) { return who.is_self && who.is_inside; }))
     banners.push_back({"Your instrument is inside the tissue, and touches nothing.",

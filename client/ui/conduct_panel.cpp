@@ -48,6 +48,25 @@ void draw_marks(const HudConduct& conduct, float scale, HudActions& actions) {
   }
 }
 
+// A line says which instrument goes to whom.
+void draw_handover(const HudConduct& conduct, const HudHand& hand, HudActions& actions) {
+  if (ImGui::SmallButton("Hand over")) ImGui::OpenPopup("hand over");
+  if (!ImGui::BeginPopup("hand over")) return;
+  for (const auto& receiver : conduct.hands)
+    for (std::size_t i = 0; receiver.slot != hand.slot && i < hand.instruments.size(); ++i) {
+      const auto line =
+          hand.instruments[i] + " (" + std::to_string(i + 1) + ") to " + receiver.name;
+      if (!ImGui::Selectable(line.c_str())) continue;
+      actions.lead = LeadWish{.action = LeadAction::HandOver,
+                              .participant = hand.slot,
+                              .name = hand.name,
+                              .tool = static_cast<int>(i),
+                              .receiver = receiver.slot,
+                              .receiver_name = receiver.name};
+    }
+  ImGui::EndPopup();
+}
+
 void draw_hands(const HudConduct& conduct, HudActions& actions) {
   for (const auto& hand : conduct.hands) {
     ImGui::PushID(hand.slot.value);
@@ -60,6 +79,10 @@ void draw_hands(const HudConduct& conduct, HudActions& actions) {
       act(hand.is_frozen ? LeadAction::Release : LeadAction::Freeze);
     ImGui::SameLine();
     if (ImGui::SmallButton("Take claim")) act(LeadAction::TakeClaim);
+    if (conduct.hands.size() > 1) {
+      ImGui::SameLine();
+      draw_handover(conduct, hand, actions);
+    }
     ImGui::PopID();
   }
 }

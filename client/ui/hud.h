@@ -36,6 +36,7 @@ struct HudParticipant {
   bool has_tool = false;  // the rest is valid
   shape::Colour colour;
   tool::Verb verb = tool::Verb::None;
+  tool::Form form = tool::Form::Plain;  // of the tool with that verb
   bool has_claim = false, is_silent = false;
   bool is_away = false;    // the connection is lost, the place is kept
   bool is_frozen = false;  // an instructor keeps the tools where they are
@@ -92,6 +93,7 @@ struct HudHand {
   ParticipantSlot slot;
   std::string name;
   bool is_frozen = false;
+  std::vector<std::string> instruments;  // by number
 };
 struct HudConduct {
   bool is_paused = false;
@@ -137,6 +139,7 @@ struct HudModel {
   std::string recording_text;           // empty: nothing is wrong with the recording
   bool has_recording_ended = false;     // while the session goes on
   std::string frozen_text;              // empty: one's own tools follow one's hands
+  bool has_loan = false;                // an instrument that was handed over and grasps
   std::string view_text;                // empty: there is no view to follow
   std::string lent_text;                // empty: one sees with one's own eyes
   bool can_lend_view = false;           // there is a tool to see with

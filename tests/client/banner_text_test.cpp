@@ -21,6 +21,14 @@ TEST(BannerText, EachStateSaysWhatToDo) {
   EXPECT_EQ(banners[0].text, "Eva keeps your tools where they are.");
   EXPECT_EQ(banners[0].advice, "Wait: they come back to your hands slowly when they are released.");
 
+  model = {};
+  model.has_loan = true;
+  banners = banners_of(model);
+  ASSERT_EQ(banners.size(), 1u);
+  EXPECT_EQ(banners[0].text, "You have been handed an instrument that holds tissue.");
+  model.frozen_text = "Eva keeps your tools where they are.";
+  EXPECT_EQ(banners_of(model).size(), 1u) << "it does not move then";
+
   // It can be in there where tissue has closed over it.
   model = {};
   model.participants.resize(2);

@@ -5,8 +5,12 @@
 
 #include <chrono>
 #include <csignal>
+#include <fstream>
+#include <limits>
 #include <thread>
 
+#include "common/journal/session_journal.h"
+#include "proto/wire.pb.h"
 #include "tests/e2e/programs.h"
 
 namespace trocar::e2e {
@@ -77,6 +81,76 @@ TEST_F(Resume, AKilledServersSessionGoesOnAndEverybodyComesBack) {
   const auto info = journal({"info", next_.string(), "--json"}, 0);
   EXPECT_EQ(json_value(info, "file"), "session.mcap") << info;
   EXPECT_EQ(json_value(info, "tick"), json_value(before, "last_tick"));
+}
+
+std::vector<proto::LessonStage> stages_in(const fs::path& file) {
+  std::vector<proto::LessonStage> stages;
+  auto journal = journal::SessionJournal::open(file.string());
+  if (!journal.ok()) return stages;  // nothing is recorded yet
+  (void)(*journal)->read_lessons(0, std::numeric_limits<Tick>::max(),
+                                 [&](Tick, const proto::LessonRecord& record) {
+                                   if (record.has_stage()) stages.push_back(record.stage());
+                                   return true;
+                                 });
+  return stages;
+}
+
+// Two stages: the hand reaches the first, and is in the second when the server dies.
+constexpr const char* kTwoStages = R"(title = "Two"
+text = "t"
+organ = "elastic-liver"
+[[stage]]
+name = "Hold"
+text = "t"
+goal = "hold"
+hold_s = 1
+[[stage.score]]
+measure = "time_s"
+full = 1
+none = 60
+[[stage]]
+name = "Hold on"
+text = "t"
+hint = "a hint"
+hint_after_s = 1
+goal = "hold"
+hands = 2
+)";
+
+TEST(ResumedLesson, GoesOnWithStageTimeAndPoints) {
+  const auto folder = test_folder();
+  std::ofstream(folder / "two.toml") << kTwoStages;
+  std::ofstream(folder / "hold.toml")
+      << "[[tool]]\nreach_mm = 16\nanchor = [0, -1, 0.9]\nanchor_on = \"extreme\"\n"
+         "[[tool.key]]\ntime_s = 0\nposition_mm = [0, 0, 0]\nshaft = [-0.6, -0.25, 1]\n"
+         "verb = \"grasp\"\n[[tool.key]]\ntime_s = 120\nposition_mm = [0, 0, 0]\n";
+  Session session("elastic-liver", {"--lesson", folder / "two.toml"});
+  auto anna = session.hand("Anna", folder / "hold.toml");
+  ASSERT_TRUE(wait_until(
+      [&] {
+        const auto told = stages_in(session.journal);
+        return !told.empty() && told.back().stage() == 1 && !told.back().hint().empty();
+      },
+      60));
+  session.server().signal(SIGKILL);
+  EXPECT_EQ(session.server().wait(10), 128 + SIGKILL);
+  const auto before = stages_in(session.journal).back();
+  const auto next = folder / "next.mcap", log = folder / "next.log";
+  Program server("trocar-server",
+                 {"--resume", session.journal, "--listen", session.address(), "--journal", next},
+                 log);
+  ASSERT_TRUE(wait_until([&] { return !stages_in(next).empty(); }, 60)) << read_text(log);
+  const auto after = stages_in(next).front();
+  EXPECT_EQ(after.SerializeAsString(), before.SerializeAsString())
+      << after.ShortDebugString() << "\n"
+      << before.ShortDebugString();
+  EXPECT_NE(read_text(log).find("the lesson goes on: Two, stage 2 of 2"), std::string::npos)
+      << read_text(log);
+  EXPECT_TRUE(wait_until(
+      [&] { return read_text(log).find("Anna (surgeon) is back") != std::string::npos; }, 30));
+  server.signal(SIGTERM);
+  EXPECT_EQ(server.wait(30), 0);
+  EXPECT_EQ(anna.wait(20), 0);
 }
 
 TEST_F(Resume, RefusesAnotherOrgan) {

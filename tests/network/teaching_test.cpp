@@ -116,7 +116,7 @@ TEST_F(Teaching, IsForInstructorsAlone) {
 TEST_F(Teaching, WhatIsNotAsItMayBeEndsTheSession) {
   const std::string long_text(501, 'x'), long_reason(201, 'x');
   for (const auto& request :
-       {teach(proto::TEACH_NONE), teach(static_cast<proto::TeachAction>(18)),
+       {teach(proto::TEACH_NONE), teach(static_cast<proto::TeachAction>(19)),
         teach(proto::TEACH_NOTE), teach(proto::TEACH_NOTE, long_text),
         teach(proto::TEACH_NOTE, "two\nlines"), teach(proto::TEACH_NOTE, "\x1b[2J"),
         teach(proto::TEACH_END, "text"), teach(proto::TEACH_EXPEL, 0, "Sam", long_reason),

@@ -152,6 +152,7 @@ Status Server::open() {
   replication.gate = admission_->gate();
   replication.has_datagrams = tcp_->has_datagrams();
   replication.lesson = options_.lesson;
+  replication.course = std::move(start_.course);
   replication.haptic_laws = touch::haptic_laws(organ);
   replication.return_seconds = options_.access.return_seconds;
   replication.places = limits.places;

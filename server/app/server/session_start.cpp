@@ -113,6 +113,16 @@ Result<SessionStart> go_on(const ServerOptions& options) {
                      .continues = std::move(session->continuation),
                      .participants = std::move(session->participants),
                      .unnamed_hands = std::move(session->unnamed_hands)};
+  if (session->course) {
+    const auto& course = *session->course;
+    if (options.lesson && options.lesson->source != course.lesson().source)
+      return Error{ErrorCode::Usage, "--lesson: the session of " + options.resume_file +
+                                         " gives another lesson, leave out --lesson"};
+    log::info("the lesson goes on: {}, stage {} of {} since {:.1f} s, {:.0f} points so far",
+              course.lesson().title, course.stage_number() + 1, course.lesson().stages.size(),
+              course.seconds(), course.points());
+    start.course = std::make_shared<lesson::Course>(*std::move(session->course));
+  }
   if (options.bleeds && !session->bleeding)
     return Error{ErrorCode::Usage, "--bleeding: the session of " + options.resume_file +
                                        " does not bleed, leave out --bleeding"};

@@ -2,11 +2,13 @@
 
 // A server begins with an organ at rest, or with the state in which a recording ends.
 
+#include <memory>
 #include <optional>
 #include <vector>
 
 #include "common/base/result.h"
 #include "common/journal/session_topics.h"
+#include "common/lesson/course.h"
 #include "server/app/server/options.h"
 #include "server/organs/organ/organ.h"
 #include "server/session/bleeding/bleeding.h"
@@ -21,6 +23,7 @@ struct SessionStart {
   std::optional<bleeding::Bleeding> bleeding;  // of a session that bleeds
   // The rest is of a session that goes on.
   std::optional<journal::Continuation> continues;
+  std::shared_ptr<lesson::Course> course;               // null: no lesson had begun
   std::vector<participants::Participant> participants;  // who was in it
   std::vector<ParticipantSlot> unnamed_hands;           // whose tools are there, nobody knows whose
 };

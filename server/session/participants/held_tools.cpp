@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace trocar::participants {
 namespace {
@@ -42,6 +43,8 @@ std::optional<hands::ToolInput> HeldTools::apply(const hands::ToolInput& wanted,
     if (!tool.last) return std::nullopt;
     given.sample = *tool.last;
     given.client_time_us = 0;
+  } else if (tool.loan) {
+    apply_loan(wanted.sample, tool, given);
   } else if (tool.is_returning) {
     given.sample.world_from_tool =
         step_towards(tool.last->world_from_tool, wanted.sample.world_from_tool, seconds);
@@ -57,6 +60,45 @@ std::optional<hands::ToolInput> HeldTools::apply(const hands::ToolInput& wanted,
   return given;
 }
 
+// A tool whose hand would move it out of the session's room stays where it is.
+void HeldTools::apply_loan(const ToolSample& wanted, Tool& tool, hands::ToolInput& given) {
+  constexpr float kRoom_m = 2;
+  auto& loan = *tool.loan;
+  const Pose& hand = wanted.world_from_tool;
+  const bool grasps = wanted.verb == Verb::Grasp;
+  if (!loan.hand) loan.hand = hand;
+  Pose pose{
+      loan.tool.position + (hand.position - loan.hand->position),
+      normalized(hand.orientation * conjugate(loan.hand->orientation) * loan.tool.orientation)};
+  if (length_squared(pose.position) > kRoom_m * kRoom_m) pose = tool.last->world_from_tool;
+  given.client_time_us = 0;
+  given.sample = {.world_from_tool = pose, .verb = Verb::Grasp};
+  if (loan.stage == Loan::Stage::HandGrasps && !grasps) {
+    given.sample.verb = Verb::None;
+    tool.loan.reset();
+    tool.is_returning = true;
+  } else if (loan.stage == Loan::Stage::HandMayGrasp && !grasps) {
+    loan.stage = Loan::Stage::HandIsOpen;
+  } else if (loan.stage == Loan::Stage::HandIsOpen && grasps) {
+    loan.stage = Loan::Stage::HandGrasps;
+  }
+}
+
+void HeldTools::hand_over(const hands::Handover& handover) {
+  std::swap(tools_[handover.from.value], tools_[handover.to.value]);
+  for (const auto slot : {handover.from, handover.to}) {
+    auto& tool = tools_[slot.value];
+    tool.loan.reset();
+    tool.is_returning = tool.last.has_value();
+    tool.is_opened = true;
+    if (!tool.last) continue;
+    if (tool.last->verb == Verb::Cut) tool.last->verb = Verb::None;
+    if (slot != handover.to || tool.last->verb != Verb::Grasp) continue;
+    tool.is_returning = tool.is_opened = false;
+    tool.loan = Loan{.tool = tool.last->world_from_tool, .hand = {}};
+  }
+}
+
 void HeldTools::freeze(ParticipantSlot slot) {
   if (slot.has_tools()) is_frozen_[slot.value] = true;
 }
@@ -66,7 +108,10 @@ void HeldTools::release(ParticipantSlot slot) {
   is_frozen_[slot.value] = false;
   for (int number = 0; number < kToolsPerHand; ++number) {
     auto& tool = tools_[tool_slot(slot, number).value];
-    tool.is_returning = tool.last.has_value();
+    if (tool.loan)  // It goes on from where it was held still.
+      tool.loan = Loan{.tool = tool.last->world_from_tool, .hand = {}, .stage = tool.loan->stage};
+    else
+      tool.is_returning = tool.last.has_value();
   }
 }
 
@@ -76,6 +121,8 @@ std::vector<hands::ToolInput> HeldTools::open(ParticipantSlot slot) {
     auto& tool = tools_[tool_slot(slot, number).value];
     if (!tool.last) continue;
     tool.is_opened = true;
+    if (tool.loan) tool.is_returning = true;
+    tool.loan.reset();
     tool.last->verb = Verb::None;
     inputs.push_back({tool_slot(slot, number), *tool.last, 0});
   }

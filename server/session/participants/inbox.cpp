@@ -1,5 +1,8 @@
 #include "server/session/participants/inbox.h"
 
+#include <algorithm>
+#include <utility>
+
 #include "common/base/assert.h"
 
 namespace trocar::participants {
@@ -32,6 +35,13 @@ bool SimulationInbox::try_push_change(const hands::ToolChange& change) {
   return true;
 }
 
+bool SimulationInbox::try_push_handover(const hands::Handover& handover) {
+  TROCAR_ASSERT(handover.from.is_valid() && handover.to.is_valid());
+  if (pending_.load(std::memory_order_acquire) >= kCapacity - kReservedForJoins) return false;
+  push(handover);
+  return true;
+}
+
 void SimulationInbox::push_sample(const hands::ToolInput& input) {
   TROCAR_ASSERT(input.tool.is_valid());
   if (pending_.load(std::memory_order_acquire) >= kCapacity - kReservedForJoins) {
@@ -48,6 +58,7 @@ void SimulationInbox::drain(hands::TickInputs& inputs) {
   const auto mark = mark_.exchange(Mark{}, std::memory_order_relaxed);
   inputs.mark = mark.action;
   inputs.mark_number = mark.number;
+  inputs.handover = std::exchange(handover_, {});
   for (std::uint8_t slot = 0; slot < kMaxHands; ++slot) {
     auto& change = changes_[slot];
     if (change.leaves) inputs.leaves.push_back({slot});
@@ -62,7 +73,18 @@ void SimulationInbox::drain(hands::TickInputs& inputs) {
   }
 }
 
+bool SimulationInbox::is_fresh() const {
+  const auto is_set = [](const auto& entry) { return entry.has_value(); };
+  return !handover_ && std::ranges::none_of(tool_changes_, is_set) &&
+         std::ranges::none_of(samples_, is_set) &&
+         std::ranges::none_of(changes_, [](const auto& slot) { return slot.leaves || slot.join; });
+}
+
 void SimulationInbox::gather() {
+  if (next_handover_) {
+    if (!is_fresh()) return;
+    handover_ = std::exchange(next_handover_, {});
+  }
   for (std::size_t taken = 0; taken < kCapacity; ++taken) {
     const auto item = queue_.try_pop();
     if (!item) break;
@@ -80,6 +102,9 @@ void SimulationInbox::gather() {
         tool_changes_[tool].reset();
         samples_[tool].reset();
       }
+    } else if (const auto* handover = std::get_if<hands::Handover>(&*item)) {
+      (is_fresh() ? handover_ : next_handover_) = *handover;
+      if (next_handover_) break;
     } else if (const auto* join = std::get_if<hands::HandJoin>(&*item)) {
       changes_[join->slot.value].join = *join;
     } else if (const auto* tool = std::get_if<hands::ToolChange>(&*item)) {

@@ -7,8 +7,9 @@
 // When full: samples are dropped and counted (the next one of that tool replaces it anyway). Joins
 // and leaves have reserved room: a join is taken only if there is also room for everybody present
 // to leave, so a leave always fits. drain() gives one tick's inputs in the order a tick admits them
-// (leaves, joins, changes, samples): only the newest sample and change of each tool, and none that
-// an earlier tenant of a slot left behind. So a new tenant never starts with somebody else's pose.
+// (handover, leaves, joins, changes, samples): only the newest sample and change of each tool, and
+// none that an earlier tenant of a slot left behind. So a new tenant never starts with somebody
+// else's pose. A handover begins a tick: what came before it goes to the tick before.
 
 #include <array>
 #include <atomic>
@@ -37,6 +38,8 @@ class SimulationInbox {
   void note_hand() { ++joined_hands_; }  // that the simulation has from the start
   // Samples before it are of the instrument before. False: no room.
   [[nodiscard]] bool try_push_change(const hands::ToolChange& change);
+  // Samples after it are of the hands that the tools have by then. False: no room.
+  [[nodiscard]] bool try_push_handover(const hands::Handover& handover);
   void push_sample(const hands::ToolInput& input);
   // If two marks arrive before a drain, the newer one counts.
   void push_mark(hands::MarkAction action, std::uint8_t number = 0) {
@@ -52,9 +55,11 @@ class SimulationInbox {
 
  private:
   using Item = std::variant<std::monostate, ParticipantSlot, hands::HandJoin, hands::ToolChange,
-                            hands::ToolInput>;
+                            hands::ToolInput, hands::Handover>;
 
   void push(Item item);
+  // Nothing has been gathered for the next tick.
+  bool is_fresh() const;
 
   SpscQueue<Item> queue_{kCapacity};
   std::atomic<std::size_t> pending_{0};  // never less than what is in queue_
@@ -74,6 +79,7 @@ class SimulationInbox {
   std::array<SlotChange, kMaxHands> changes_;
   std::array<std::optional<hands::ToolChange>, kMaxTools> tool_changes_;
   std::array<std::optional<hands::ToolInput>, kMaxTools> samples_;
+  std::optional<hands::Handover> handover_, next_handover_;  // next: of the tick after
 };
 
 }  // namespace trocar::participants

@@ -121,6 +121,14 @@ void Roster::set_frozen_by(ParticipantSlot slot, std::string who) {
   if (slot.is_valid() && slots_[slot.value]) slots_[slot.value]->frozen_by = std::move(who);
 }
 
+void Roster::set_lent(ToolSlot tool, bool is_lent) {
+  const auto owner = tool.owner();
+  if (!owner.is_valid() || !slots_[owner.value]) return;
+  const auto bit = static_cast<std::uint8_t>(1u << tool.number());
+  auto& lent = slots_[owner.value]->lent_tools;
+  lent = static_cast<std::uint8_t>(is_lent ? lent | bit : lent & ~bit);
+}
+
 void Roster::set_leader(ParticipantSlot slot) {
   for (auto& participant : slots_)
     if (participant) participant->leads_view = participant->slot == slot;

@@ -9,6 +9,7 @@
 #include "common/base/version.h"
 #include "common/journal/session_journal.h"
 #include "server/session/recording/bleeding_messages.h"
+#include "server/session/recording/recorded_course.h"
 #include "server/session/recording/recorded_session.h"
 #include "server/session/recording/verify.h"
 #include "server/tissue/reduction/reduced_tissue.h"
@@ -160,6 +161,9 @@ Result<ResumedSession> resume_session(const std::string& path, const ResumeOptio
   session.state_hash = *hash;
   if (const auto begun = begin_as_restored(session.simulation); !begun) return begun.error();
   if (const auto read = read_participants(journal, session); !read) return read.error();
+  auto course = recorded_course(journal, path);
+  if (!course) return course.error();
+  session.course = std::move(*course);
   return session;
 }
 

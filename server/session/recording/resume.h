@@ -11,6 +11,7 @@
 
 #include "common/base/result.h"
 #include "common/journal/session_topics.h"
+#include "common/lesson/course.h"
 #include "server/organs/organ/local_reduction.h"
 #include "server/session/bleeding/bleeding.h"
 #include "server/session/participants/roster.h"
@@ -30,6 +31,7 @@ struct ResumedSession {
   journal::Continuation continuation;                      // what a new journal has to say
   Tick snapshot_tick = 0;                                  // simulated again from here on
   std::uint64_t state_hash = 0;                            // of the last tick, as recorded
+  std::optional<lesson::Course> course;                    // of a lesson that had begun
   // Those who were in the session. A hand is among them if the simulation has its tools, and else
   // it never came.
   std::vector<participants::Participant> participants;

@@ -55,6 +55,10 @@ void to_message(const step::TickRecord& record, const step::TickDecisions* previ
   }
   message.set_mark(static_cast<proto::MarkAction>(record.inputs.mark));
   message.set_mark_number(record.inputs.mark_number);
+  if (const auto& handover = record.inputs.handover) {
+    message.mutable_handover()->set_from(handover->from.value);
+    message.mutable_handover()->set_to(handover->to.value);
+  }
   for (const auto slot : record.inputs.leaves) message.add_leave()->set_slot(slot.value);
   for (const auto& join : record.inputs.joins) {
     auto& entry = *message.add_join();
@@ -120,6 +124,13 @@ Status from_message(const proto::TickRecord& message, step::TickRecord& record) 
     return bad(record.tick, "mark_number: there are marks 0 to 3");
   record.inputs.mark = static_cast<hands::MarkAction>(message.mark());
   record.inputs.mark_number = static_cast<std::uint8_t>(message.mark_number());
+  if (message.has_handover()) {
+    const auto from = message.handover().from(), to = message.handover().to();
+    if (from >= kMaxTools || to >= kMaxTools)
+      return bad(record.tick, "handover: tool out of range");
+    record.inputs.handover =
+        hands::Handover{{static_cast<std::uint8_t>(from)}, {static_cast<std::uint8_t>(to)}};
+  }
   for (const auto& leave : message.leave()) {
     if (leave.slot() >= kMaxHands) return bad(record.tick, "leave: slot out of range");
     record.inputs.leaves.push_back({static_cast<std::uint8_t>(leave.slot())});

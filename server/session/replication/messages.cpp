@@ -83,6 +83,7 @@ void describe(const std::vector<participants::Participant>& present, proto::Part
     entry.set_role(static_cast<proto::Role>(participant.role));
     entry.set_is_away(participant.is_away);
     entry.set_frozen_by(participant.frozen_by);
+    entry.set_lent_tools(participant.lent_tools);
     entry.set_leads_view(participant.leads_view);
     for (const auto& shape : participant.tools) {
       wire::write(shape, *entry.add_tool());

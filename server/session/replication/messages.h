@@ -21,6 +21,7 @@
 namespace trocar::proto {
 class ClaimEvent;
 class FrameState;
+class MarkEvent;
 class Participants;
 class SolverChange;
 }  // namespace trocar::proto

@@ -65,7 +65,10 @@ Replicator::Replicator(net::Connections& connections, participants::SimulationIn
       layout_(std::move(layout)),
       roster_(options_.places),
       absences_(options_.return_seconds) {
-  if (options_.lesson) course_.emplace(*options_.lesson);
+  if (options_.course)
+    course_.emplace(std::move(*options_.course));
+  else if (options_.lesson)
+    course_.emplace(*options_.lesson);
 }
 
 Replicator::~Replicator() = default;

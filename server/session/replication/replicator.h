@@ -22,8 +22,9 @@
 // claim events, surface changes, topology, recording state and barrier cannot be skipped: if one
 // does not fit, the session ends as too slow.
 //
-// Teaching: instructors hold tools still and open their jaws (held_tools.h), put people out and let
-// them in (door.h), rename them, and end the session. Everybody is told of it, and the recording.
+// Teaching: instructors hold tools still, open their jaws and hand them over (held_tools.h), put
+// people out and let them in (door.h), rename them, and end the session. Everybody is told of it,
+// and the recording.
 //
 // Lesson: a course (common/lesson) looks at every frame from when somebody with a tool is there.
 // What it finds is told to all and recorded, with the answers and orders that people gave.
@@ -196,6 +197,12 @@ class Replicator final : public net::ConnectionHandler {
   void tell_stage();
   void tell_line(const std::string& words, bool is_good = true);
   std::string carry_out(const TeachOrder& order, Client& client, const std::string& words);
+  // Returns the receiver's tool for which the instrument is changed; an error, in words for who
+  // asked: there is none, or nothing to give.
+  Result<ToolSlot> find_receiving_tool(const TeachOrder& order) const;
+  std::string hand_over(const hands::Handover& handover);
+  // Everybody is told whether the tool moves beside its hand's place.
+  void note_loan(ToolSlot tool);
   // Whoever has that place, away or not; null: nobody.
   Client* client_of(ParticipantSlot slot) const;
   void put_out(ParticipantSlot slot, const std::string& words);

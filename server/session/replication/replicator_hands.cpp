@@ -32,7 +32,9 @@ std::optional<Replicator::Ending> Replicator::handle_sample(Client& client,
   ++counters_.samples;
   const hands::ToolInput wanted{tool_slot(participant.slot, checked->tool), checked->sample,
                                 checked->client_time_us};
+  const bool was_lent = held_tools_.is_lent(wanted.tool);
   if (const auto given = held_tools_.apply(wanted, options_.clock_ns())) inbox_.push_sample(*given);
+  if (was_lent && !held_tools_.is_lent(wanted.tool)) note_loan(wanted.tool);
   return std::nullopt;
 }
 

@@ -66,7 +66,8 @@ void Replicator::tell_line(const std::string& words, bool is_good) {
   log::info("{}", words);
   proto::Envelope event;
   event.mutable_teach_event()->set_tick(newest_tick());
-  event.mutable_teach_event()->set_is_done(is_good);
+  event.mutable_teach_event()->set_is_done(true);
+  event.mutable_teach_event()->set_is_trouble(!is_good);
   event.mutable_teach_event()->set_text(words);
   broadcast(wire::encode_envelope(event));
 }

@@ -11,7 +11,7 @@
 
 #include "common/base/tick.h"
 #include "common/base/timing.h"
-#include "common/lesson/lesson.h"
+#include "common/lesson/course.h"
 #include "common/wire/hand_report.h"
 #include "common/wire/haptic_patch.h"
 #include "common/wire/lesson.h"
@@ -43,6 +43,7 @@ struct ReplicatorOptions {
   // Told how fast time is to go, simulated over real time, 0: not at all; empty: nobody can say.
   std::function<void(float rate)> on_pace;
   std::optional<lesson::Lesson> lesson;      // empty: the session gives none
+  std::shared_ptr<lesson::Course> course;    // of a session that goes on; null: from the beginning
   std::vector<wire::HapticLaw> haptic_laws;  // how the organ answers tools, for hands that feel it
   bool has_datagrams = false;                // the transport takes them; clients are told
   // Null: everybody may come, in any role. It outlives the replicator.

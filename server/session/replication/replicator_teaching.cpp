@@ -56,6 +56,10 @@ std::string words_of(const TeachOrder& order, const std::string& by, const std::
       return order.rate < 1 ? by + " has slowed time down to " + share
                             : by + " lets time go as fast as it does";
     }
+    case TeachAction::HandOver:
+      return by + " hands an instrument of " + who + " to " + order.receiver_name +
+             ": what grasps goes on grasping, and moves with the hand of " + order.receiver_name +
+             ", who opens it by closing once";
     case TeachAction::None:
       break;
   }
@@ -86,15 +90,27 @@ std::optional<Replicator::Ending> Replicator::handle_teach(Client& client,
   const auto* whom = roster_.find(order->participant);
   if (is_about_one(order->action) && (whom == nullptr || whom->name != order->name))
     return refuse("not done: " + printable(order->name, 32) + " is not here any more");
+  std::optional<ToolSlot> received;
+  if (order->action == TeachAction::HandOver) {
+    auto found = find_receiving_tool(*order);
+    if (!found) return refuse("not done: " + found.error().message);
+    received = *found;
+  }
   const auto words =
       words_of(*order, client.participant->name, whom == nullptr ? std::string() : whom->name);
-  if (const auto why = carry_out(*order, client, words); !why.empty()) return refuse(why);
+  const auto why = received ? hand_over({tool_slot(order->participant, order->tool), *received})
+                            : carry_out(*order, client, words);
+  if (!why.empty()) return refuse(why);
   if (!is_chat) {
     log::info("{}", words);
     if (options_.gate) options_.gate->note_action(client.applicant, name_of(order->action));
   }
   proto::LessonRecord record;
   describe_teaching(*order, slot, true, words, *record.mutable_teach());
+  if (received) {
+    record.mutable_teach()->set_tool(tool_slot(order->participant, order->tool).value);
+    record.mutable_teach()->set_receiver_tool(received->value);
+  }
   proto::Envelope event;
   *event.mutable_teach_event() = record.teach();
   record_lesson(record);
@@ -135,7 +151,10 @@ std::string Replicator::carry_out(const TeachOrder& order, Client& client,
     }
     case TeachAction::TakeClaim:
       if (auto why = whose_tools(" holds nothing"); !why.empty()) return why;
-      for (const auto& input : held_tools_.open(whom->slot)) inbox_.push_sample(input);
+      for (const auto& input : held_tools_.open(whom->slot)) {
+        inbox_.push_sample(input);
+        note_loan(input.tool);
+      }
       return {};
     case TeachAction::Expel:
       if (wire::rights_of(whom->role).may_teach) return "not done: nobody puts out an instructor";
@@ -180,6 +199,7 @@ std::string Replicator::carry_out(const TeachOrder& order, Client& client,
     case TeachAction::Wipe:
     case TeachAction::Note:
     case TeachAction::Chat:
+    case TeachAction::HandOver:
     case TeachAction::None:
       return {};
   }

@@ -18,7 +18,7 @@ static_assert(static_cast<int>(EndReason::Timeout) == proto::GOODBYE_TIMEOUT);
 static_assert(static_cast<int>(EndReason::NameInvalid) == proto::GOODBYE_NAME_INVALID);
 static_assert(static_cast<int>(EndReason::Closed) == proto::GOODBYE_CLOSED);
 static_assert(kEndReasonCount == proto::GoodbyeReason_ARRAYSIZE);
-static_assert(static_cast<int>(TeachAction::Slow) == proto::TEACH_SLOW &&
+static_assert(static_cast<int>(TeachAction::HandOver) == proto::TEACH_HAND_OVER &&
               kTeachActions == proto::TeachAction_ARRAYSIZE);
 constexpr std::size_t kSecretBytes = 5;
 static_assert(static_cast<int>(tool::Verb::Grasp) == proto::VERB_GRASP);
@@ -113,8 +113,9 @@ Result<CheckedSample> check_tool_sample(const proto::ToolSample& sample, std::si
 
 const char* name_of(TeachAction action) {
   static constexpr std::array<const char*, kTeachActions> kNames{
-      "none", "freeze", "release", "take-claim", "expel",    "rename", "admit", "close", "open",
-      "end",  "note",   "chat",    "give-view",  "end-view", "wipe",   "pause", "go-on", "slow"};
+      "none",  "freeze", "release", "take-claim", "expel",    "rename",    "admit",
+      "close", "open",   "end",     "note",       "chat",     "give-view", "end-view",
+      "wipe",  "pause",  "go-on",   "slow",       "hand-over"};
   return kNames[static_cast<std::size_t>(action)];
 }
 
@@ -126,6 +127,7 @@ bool is_about_one(TeachAction action) {
     case TeachAction::Expel:
     case TeachAction::Rename:
     case TeachAction::GiveView:
+    case TeachAction::HandOver:
       return true;
     default:
       return false;
@@ -160,7 +162,10 @@ Result<TeachOrder> check_teach(const proto::TeachRequest& request) {
                    .participant = {},
                    .name = request.name(),
                    .text = request.text(),
-                   .rate = 0};
+                   .rate = 0,
+                   .tool = 0,
+                   .receiver = {},
+                   .receiver_name = {}};
   if (is_about_one(order.action)) {
     if (request.participant() >= kMaxParticipants)
       return bad("TeachRequest.participant: " + std::to_string(request.participant()) +
@@ -179,6 +184,15 @@ Result<TeachOrder> check_teach(const proto::TeachRequest& request) {
     return bad("TeachRequest.rate: it must be from 0.25 to 1");
   if (!is_slow && request.rate() != 0) return bad("TeachRequest.rate: this action has no rate");
   order.rate = request.rate();
+  if (order.action != TeachAction::HandOver) return order;
+  if (request.tool() >= static_cast<std::uint32_t>(kToolsPerHand))
+    return bad("TeachRequest.tool: " + std::to_string(request.tool()) + ", a hand has 0 and 1");
+  if (request.receiver() >= kMaxParticipants)
+    return bad("TeachRequest.receiver: " + std::to_string(request.receiver()) +
+               " is no slot, the last is " + std::to_string(kMaxParticipants - 1));
+  order.tool = static_cast<int>(request.tool());
+  order.receiver = {static_cast<std::uint8_t>(request.receiver())};
+  order.receiver_name = request.receiver_name();
   return order;
 }
 

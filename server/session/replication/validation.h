@@ -98,8 +98,9 @@ enum class TeachAction : std::uint8_t {
   Pause = 15,
   GoOn = 16,
   Slow = 17,
+  HandOver = 18,
 };
-inline constexpr int kTeachActions = 18;
+inline constexpr int kTeachActions = 19;
 // For the audit log, such as "take-claim".
 const char* name_of(TeachAction action);
 // Whether it is about one participant.
@@ -111,6 +112,10 @@ struct TeachOrder {
   std::string name;             // that participant's, as the client knows it
   std::string text;             // printable; empty where the action has none
   float rate = 0;               // of slow time
+  // A handover gives this tool of the participant to this one, as the client knows them.
+  int tool = 0;
+  ParticipantSlot receiver;
+  std::string receiver_name;
 };
 Result<TeachOrder> check_teach(const proto::TeachRequest& request);
 

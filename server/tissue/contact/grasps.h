@@ -10,6 +10,7 @@
 
 #include <array>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "server/tissue/contact/contact_list.h"
@@ -49,6 +50,9 @@ class GraspTable {
 
   // O(tools x log(nodes held)).
   bool holds(NodeIndex node) const;
+
+  // Two tools have changed hands.
+  void hand_over(ToolSlot from, ToolSlot to) { std::swap(grasps_[from.value], grasps_[to.value]); }
 
   // Before inputs change a tool: keeps the last pose of grasps that are going to fade.
   void anchor(ToolSlot slot, const Pose& pose);

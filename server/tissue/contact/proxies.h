@@ -10,6 +10,7 @@
 // dragged along where the point slides.
 
 #include <array>
+#include <utility>
 #include <vector>
 
 #include "server/tissue/contact/contact_list.h"
@@ -71,6 +72,11 @@ class ProxyTable {
   // do not push lose theirs.
   void update(const ContactList& contacts, const world::World& world,
               const hands::ToolTable& tools);
+
+  // Two tools have changed hands.
+  void hand_over(ToolSlot from, ToolSlot to) {
+    std::swap(proxies_[from.value], proxies_[to.value]);
+  }
 
   void visit_state(world::StateArchive& archive);
 

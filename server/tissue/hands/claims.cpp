@@ -1,6 +1,7 @@
 #include "server/tissue/hands/claims.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "common/base/assert.h"
 
@@ -119,6 +120,25 @@ ToolSlot ClaimTable::holder_of(Tick tick, const ClaimRequest& request,
     if (!is_silent) return holder;
   }
   return {};
+}
+
+void ClaimTable::hand_over(ToolSlot from, ToolSlot to, Tick tick, std::vector<ClaimEvent>& events) {
+  const auto other = [&](ToolSlot tool) { return tool == from ? to : tool == to ? from : tool; };
+  for (const auto tool : {from, to}) {
+    Claim& c = claims_[tool.value];
+    if (c.verb == Verb::Cut) {
+      release_core(tool);
+      if (c.phase == ClaimPhase::Held)
+        events.push_back({tick, tool, Verb::Cut, ClaimOutcome::Released, {}});
+      c = {};
+    } else if (c.phase == ClaimPhase::Held) {
+      events.push_back({tick, tool, c.verb, ClaimOutcome::Released, {}});
+      events.push_back({tick, other(tool), c.verb, ClaimOutcome::Granted, {}});
+    }
+  }
+  std::swap(claims_[from.value], claims_[to.value]);
+  for (auto& owner : owners_) owner = other(owner);
+  for (auto& claim : claims_) claim.last_holder = other(claim.last_holder);
 }
 
 void ClaimTable::let_go(const ClaimTable& before) {

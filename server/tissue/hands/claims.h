@@ -90,6 +90,10 @@ class ClaimTable {
   // A hand left: its grasps free their core now and fade out; its other claims end.
   void leave(ToolSlot tool, Tick tick);
 
+  // Two tools have changed hands: grasps and pushes go with them, cuts end. What each holds is told
+  // as the new hand's.
+  void hand_over(ToolSlot from, ToolSlot to, Tick tick, std::vector<ClaimEvent>& events);
+
   // A grasp lost one of its nodes, or the last of them.
   void release_node(ToolSlot tool, NodeIndex node);
   void slip_off(ToolSlot tool, Tick tick, std::vector<ClaimEvent>& events);

@@ -4,6 +4,7 @@
 // say to the simulation; with TickDecisions it determines the next state to the bit.
 
 #include <array>
+#include <optional>
 #include <vector>
 
 #include "common/base/ids.h"
@@ -23,6 +24,12 @@ struct ToolChange {
   tool::ToolShape shape;
 };
 
+// Two hands change instruments as they are: each goes on, where it is, with what it holds, as that
+// of the other hand. A blade is lifted.
+struct Handover {
+  ToolSlot from, to;  // of two participants
+};
+
 // An instructor may do this to the organ as a whole.
 enum class MarkAction : std::uint8_t {
   None = 0,
@@ -39,24 +46,26 @@ struct ToolInput {
   std::uint64_t client_time_us = 0;  // see hands::Tool; not recorded
 };
 
-// Admitted in this order: mark, leaves, joins, changes, samples. Several samples of one tool: the
-// last one counts. Everything is validated before (server/session/replication); the tick drops what
-// does not fit its state, such as a sample for an empty slot, and counts it.
+// Admitted in this order: mark, handover, leaves, joins, changes, samples. Several samples of one
+// tool: the last one counts. Everything is validated before (server/session/replication); the tick
+// drops what does not fit its state, such as a sample for an empty slot, and counts it.
 struct TickInputs {
   MarkAction mark = MarkAction::None;
   std::uint8_t mark_number = 0;  // less than kMostMarks
+  std::optional<Handover> handover;
   std::vector<ParticipantSlot> leaves;
   std::vector<HandJoin> joins;
   std::vector<ToolChange> changes;
   std::vector<ToolInput> samples;
 
   bool empty() const {
-    return mark == MarkAction::None && leaves.empty() && joins.empty() && changes.empty() &&
-           samples.empty();
+    return mark == MarkAction::None && !handover && leaves.empty() && joins.empty() &&
+           changes.empty() && samples.empty();
   }
   void clear() {
     mark = MarkAction::None;
     mark_number = 0;
+    handover.reset();
     leaves.clear();
     joins.clear();
     changes.clear();

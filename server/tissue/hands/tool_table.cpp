@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <span>
+#include <utility>
 
 namespace trocar::hands {
 
@@ -78,6 +79,22 @@ std::uint32_t ToolTable::admit(const hands::TickInputs& inputs, Tick tick) {
     }
   }
   return dropped;
+}
+
+// Both have a tick without a sample of their new hands ahead of them, so their leases begin anew.
+bool ToolTable::hand_over(const hands::Handover& handover, Tick tick) {
+  const auto [from, to] = handover;
+  if (!from.is_valid() || !to.is_valid() || from.owner() == to.owner()) return false;
+  Tool& given = tools_[from.value];
+  Tool& taken = tools_[to.value];
+  if (!given.is_present || !taken.is_present) return false;
+  std::swap(given, taken);
+  for (Tool* tool : {&given, &taken}) {
+    if (tool->verb == tool::Verb::Cut) tool->verb = tool::Verb::None;
+    tool->last_sample_tick = tick;
+    tool->time_us = tool->target_time_us = 0;
+  }
+  return true;
 }
 
 bool ToolTable::admit_join(const hands::HandJoin& join, Tick tick) {

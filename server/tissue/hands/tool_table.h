@@ -56,6 +56,10 @@ class ToolTable {
   // state (an empty slot, a taken one) and were dropped.
   std::uint32_t admit(const hands::TickInputs& inputs, Tick tick);
 
+  // Before the tick's other inputs: two present tools of two hands change their places as they are,
+  // but for blades, which are lifted. False: they are not such, and nothing has changed.
+  bool hand_over(const hands::Handover& handover, Tick tick);
+
   void visit_state(world::StateArchive& archive);
 
  private:

@@ -28,6 +28,16 @@ std::uint32_t admit_inputs(const hands::TickInputs& inputs, Tick tick, hands::To
 
 namespace {
 
+// A tool takes along what it holds and where it presses. False: the input was dropped.
+bool hand_over(const hands::Handover& handover, State& state, Outbox& outbox) {
+  const Tick tick = state.world.tick;
+  if (!state.tools.hand_over(handover, tick)) return false;
+  state.claims.hand_over(handover.from, handover.to, tick, outbox.claim_events);
+  state.grasps.hand_over(handover.from, handover.to);
+  state.proxies.hand_over(handover.from, handover.to);
+  return true;
+}
+
 // Tissue sleeps, and pieces move as a whole, where sweeps alone move it, every tick: not in
 // scenarios that load it, and not while a reduction moves it.
 bool may_rest(const TickDecisions& decisions, const ExternalLoads* loads, const State& state) {
@@ -377,7 +387,10 @@ void run_tick(const hands::TickInputs& inputs, const TickDecisions& decisions, E
   };
 
   const bool has_rest = may_rest(decisions, loads, state);
-  report.inputs_dropped = admit_inputs(inputs, world.tick, state.tools, state.claims, state.grasps);
+  const bool is_refused = inputs.handover && !hand_over(*inputs.handover, state, context.outbox);
+  report.inputs_dropped =
+      admit_inputs(inputs, world.tick, state.tools, state.claims, state.grasps) +
+      (is_refused ? 1 : 0);
   end(Stage::Admit);
   report.contact = find_contacts(state, decisions.policy.has_self_contact, has_rest,
                                  context.contact, context.solve);

@@ -41,10 +41,16 @@ export function Ask(props: { question: Question; onDone(): void }): JSX.Element 
 }
 
 // What may be done with one person, beside the name.
-export function Manage(props: { session: Session; person: Participant; own: number | null; onAsk(question: Question): void }): JSX.Element | null {
+export function Manage(props: { session: Session; person: Participant; people: Participant[]; own: number | null; onAsk(question: Question): void }): JSX.Element | null {
   const { session, person: p } = props, [isOpen, setIsOpen] = useState(false);
   const act = (action: TeachAction, text = ''): void => session.teach(action, p, text);
   const hasTools = p.tool.length > 0, isFrozen = p.frozenBy !== '';
+  const receivers = props.people.filter(one => one.slot !== p.slot && one.tool.length > 0);
+  const handOver = (choice: string): void => {
+    const [slot, tool] = choice.split(' ').map(Number), receiver = receivers.find(one => one.slot === slot);
+    if (receiver !== undefined && tool !== undefined) session.handOver(p, tool, receiver);
+    setIsOpen(false);
+  };
   const rename = (): void => props.onAsk({ title: `Rename ${p.name}, for everybody?`, verb: 'Rename', field: { label: 'New name', value: p.name, most: kMostName }, act: text => act(TeachAction.TEACH_RENAME, text) });
   const expel = (): void => props.onAsk({ title: `Put ${p.name} out of the session? The join code lets nobody in again until you admit them.`, verb: 'Put out', field: { label: 'Reason, which everybody reads', value: '', most: kMostReason }, act: text => act(TeachAction.TEACH_EXPEL, text) });
   return (
@@ -54,6 +60,12 @@ export function Manage(props: { session: Session; person: Participant; own: numb
         <div class="acts">
           {hasTools && <button aria-pressed={isFrozen} onClick={() => act(isFrozen ? TeachAction.TEACH_RELEASE : TeachAction.TEACH_FREEZE)} title="The tools stay where they are, whatever the hands do">{isFrozen ? 'Release tools' : 'Freeze tools'}</button>}
           {hasTools && <button onClick={() => act(TeachAction.TEACH_TAKE_CLAIM)} title="Jaws open and blades go up, until the hand has let go">Take claim away</button>}
+          {hasTools && receivers.length > 0 && (
+            <select aria-label={`Hand over an instrument of ${p.name}`} title="It goes on holding, and moves with the receiver's hand" value="" onChange={e => handOver(e.currentTarget.value)}>
+              <option value="">Hand over ...</option>
+              {receivers.flatMap(r => p.tool.map((_, i) => <option key={`${r.slot} ${i}`} value={`${r.slot} ${i}`}>{`${p.tool.length > 1 ? `instrument ${i + 1} ` : ''}to ${r.name}`}</option>))}
+            </select>
+          )}
           <button aria-pressed={p.leadsView} onClick={() => act(p.leadsView ? TeachAction.TEACH_END_VIEW : TeachAction.TEACH_GIVE_VIEW)} title="Everybody may follow this person's view">{p.leadsView ? 'End the view' : 'Give the view'}</button>
           <button onClick={rename}>Rename</button>
           {props.own !== p.slot && p.role !== 3 && <button class="bad" onClick={expel}>Put out</button>}

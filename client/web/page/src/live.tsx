@@ -50,7 +50,7 @@ export function Live(props: { link: Link; replica: Replica; onEnd(why: string): 
       }
       if (kind === 'claimEvent') note(Number(value.tick), kindOf(value.outcome), value.text);
       if (kind === 'markEvent') note(Number(value.tick), value.isDone ? 'cut' : 'refusal', value.text);
-      if (kind === 'teachEvent') note(Number(value.tick), value.isDone ? kindOfTeaching(value.action) : 'refusal', value.text);
+      if (kind === 'teachEvent') note(Number(value.tick), value.isDone && !value.isTrouble ? kindOfTeaching(value.action) : 'refusal', value.text);
       if (kind === 'lessonStage') {
         if (stage.current?.beginTick !== value.beginTick) progress.current = null;
         stage.current = value;
@@ -129,7 +129,7 @@ export function Live(props: { link: Link; replica: Replica; onEnd(why: string): 
         {stage.current && <LessonPanel goal={{ stage: stage.current, progress: progress.current, seconds: progress.current?.seconds ?? 0 }} {...(mayMark ? { lead } : {})} />}
         <BloodPanel blood={replica.blood()} />
         <People people={people.current} tools={replica.tools()} own={own.current} colourOf={slot => replica.slotColour(slot)} follows={follows} onFollow={setFollows}
-          {...(mayMark ? { extra: person => <Manage session={session} person={person} own={own.current} onAsk={setAsks} /> } : {})} />
+          {...(mayMark ? { extra: person => <Manage session={session} person={person} people={people.current} own={own.current} onAsk={setAsks} /> } : {})} />
         {mayMark && <Door session={session} list={list.current} />}
         <section aria-labelledby="forces">
           <h2 id="forces">Forces <small>last 30 s</small></h2>

@@ -71,6 +71,10 @@ export class Session {
   teach(action: TeachAction, whom: Participant | null = null, text = ''): void {
     this.say({ case: 'teachRequest', value: create(TeachRequestSchema, { action, text, participant: whom?.slot ?? 0, name: whom?.name ?? '' }) });
   }
+  // One's tool and a free one of the receiver change hands, with what it holds.
+  handOver(giver: Participant, tool: number, receiver: Participant): void {
+    this.say({ case: 'teachRequest', value: create(TeachRequestSchema, { action: TeachAction.TEACH_HAND_OVER, participant: giver.slot, name: giver.name, tool, receiver: receiver.slot, receiverName: receiver.name }) });
+  }
   // Goes on in the lesson, or back to its beginning.
   lead(action: LessonAction): void {
     this.say({ case: 'lessonRequest', value: create(LessonRequestSchema, { action }) });

@@ -35,12 +35,14 @@ export function guideOf(people: () => Participant[], colourOf: (slot: number) =>
   };
 }
 
-export function doing(tools: Tool[]): string {
+// `shapes`: of the person's tools, by number.
+export function doing(tools: Tool[], shapes: Participant['tool']): string {
   const tool = tools.find(t => t.verb !== Verb.None) ?? tools[0];
   if (!tool) return '';
   if (tool.isSilent) return 'silent';
   if (tool.isInside) return 'inside tissue';
-  const what = { [Verb.None]: '', [Verb.Push]: 'pushes', [Verb.Grasp]: 'grasps', [Verb.Cut]: 'cuts' }[tool.verb] ?? '';
+  const form = shapes[tool.slot & 1]?.form, pushes = form === ToolForm.SUCTION ? 'sucks' : form === ToolForm.COAGULATOR ? 'seals' : 'pushes';
+  const what = { [Verb.None]: '', [Verb.Push]: pushes, [Verb.Grasp]: 'grasps', [Verb.Cut]: 'cuts' }[tool.verb] ?? '';
   if (what === '') return tool.contactNodes > 0 ? 'touches' : 'free';
   return tool.hasClaim ? (tool.verb === Verb.Grasp ? 'holds' : what) : tool.verb === Verb.Grasp ? 'wants to grasp' : what;
 }
