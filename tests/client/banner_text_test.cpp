@@ -59,7 +59,7 @@ TEST(BannerText, EachStateSaysWhatToDo) {
             "the session again.");
   model.has_recording_ended = false;
   EXPECT_EQ(banners_of(model)[0].advice,
-            "The lesson goes on. Tell the host that the disk is too slow.");
+            "The lesson goes on. Tell the host to see to the disk.");
 }
 
 // A picture may be old and time may stand still: that is what a pause is.
