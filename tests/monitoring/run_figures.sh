@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# run_monitoring.sh BUILD OUT: a real server is asked for health and figures; promtool checks these, and the
+# run_figures.sh BUILD OUT: a real server is asked for health and figures; promtool checks these, and the
 # alerts of deploy/monitoring. Every name that alerts and dashboard use is one that the server tells.
 # Exit code 77: promtool (Debian: prometheus) is missing; all else has been checked.
 set -euo pipefail
