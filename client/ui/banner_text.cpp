@@ -52,7 +52,7 @@ std::vector<Banner> banners_of(const HudModel& model) {
                        model.has_recording_ended
                            ? "The lesson goes on without it. Tell the host to make room on the "
                              "disk, and to start the session again."
-                           : "The lesson goes on. Tell the host that the disk is too slow.",
+                           : "The lesson goes on. Tell the host to see to the disk.",
                        RateTone::Warning});
   if (!model.lent_text.empty()) banners.push_back({model.lent_text, "", RateTone::Calm});
   if (!model.view_text.empty()) banners.push_back({model.view_text, "", RateTone::Calm});

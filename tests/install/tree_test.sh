@@ -20,7 +20,8 @@ done
 for file in lib/systemd/system/trocar@.service lib/systemd/system/trocar-web.service \
   share/applications/trocar-join.desktop share/mime/packages/trocar.xml share/icons/hicolor/scalable/apps/trocar.svg \
   share/trocar/scenes/incise.toml share/doc/trocar/LICENSE share/doc/trocar/docs/install.md \
-  share/doc/trocar-server/examples/trocar-server.toml share/doc/trocar-web/examples/trocar-web.toml; do
+  share/doc/trocar-server/examples/trocar-server.toml \
+  share/doc/trocar-server/examples/monitoring/alerts.yml share/doc/trocar-web/examples/trocar-web.toml; do
   [ -s "$work/usr/$file" ] || fault "$file is missing"
 done
 [ ! -e "$work/usr/etc" ] && [ ! -e "$work/etc" ] || fault "files of /etc are there, which only packages have"

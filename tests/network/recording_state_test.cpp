@@ -5,7 +5,9 @@
 
 #include <csignal>
 #include <filesystem>
+#include <thread>
 
+#include "common/journal/mcap_repair.h"
 #include "server/session/recording/recorder.h"
 #include "server/tissue/world/surface_layout.h"
 #include "tests/network/session_fixture.h"
@@ -111,6 +113,23 @@ TEST_F(RecordingStates, AFullDiskIsToldToEverybody) {
   ASSERT_TRUE(said);
   EXPECT_EQ(said->status(), proto::RECORDING_FAILED);
   EXPECT_NE(said->text().find("the recording has ended"), std::string::npos) << said->text();
+}
+
+TEST_F(RecordingStates, ARecordingThatEndsEarlyIsWhole) {
+  recorder_->record_frame(frame_with(16));
+  const auto path = (folder_ / "session.mcap").string();
+  recorder_->end_early(path + ": the disk is nearly full");
+  recorder_->end_early("another reason");
+  while (recorder_->state().status != RecordingStatus::Failed) std::this_thread::yield();
+  EXPECT_EQ(recorder_->state().text,
+            "the recording has ended: " + path + ": the disk is nearly full");
+  const auto bytes = std::filesystem::file_size(path);
+  recorder_->record_frame(frame_with(16));  // too late
+  EXPECT_FALSE(recorder_->close().ok());
+  EXPECT_EQ(std::filesystem::file_size(path), bytes);
+  const auto again = journal::repair(path, (folder_ / "again.mcap").string());
+  ASSERT_FALSE(again.ok());
+  EXPECT_EQ(again.error().code, ErrorCode::Usage) << "nothing is to be repaired";
 }
 
 }  // namespace

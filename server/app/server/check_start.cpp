@@ -10,6 +10,7 @@
 #include "server/app/server/session_start.h"
 #include "server/organs/catalogue/load_organ.h"
 #include "server/organs/organ/local_reduction_file.h"
+#include "server/session/monitoring/figures_server.h"
 #include "server/session/net/tcp_server.h"
 
 namespace trocar::app {
@@ -66,6 +67,9 @@ Status check_start(const ServerOptions& options) {
   if (!access.new_code.empty())
     return of("new-code", Error{ErrorCode::Usage, "starts no session that could be checked"});
   if (const auto s = net::check_listen_address(options.address); !s) return of("listen", s);
+  if (!options.metrics_address.empty())
+    if (const auto s = monitoring::check_figures_address(options.metrics_address); !s)
+      return of("metrics", s);
   const char* identity = access.certificate_file.empty() ? "state" : "certificate";
   if (const auto s = Admission::check(access, options.address); !s) return of(identity, s);
   if (!options.resume_file.empty())

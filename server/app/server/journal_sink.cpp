@@ -21,6 +21,8 @@ class RecordedSession : public JournalSink {
   void record_lesson(wire::LessonEntry entry) override {
     recorder_->record_lesson(std::move(entry));
   }
+  void end_early(const std::string& reason) override { recorder_->end_early(reason); }
+  std::size_t queued_bytes() const override { return recorder_->queued_bytes(); }
   Status close() override { return recorder_->close(); }
   wire::RecordingState state() const override { return recorder_->state(); }
 

@@ -33,6 +33,10 @@ class JournalSink {
   virtual void record_hand(wire::HandRecord record) = 0;
   // I/O thread: what people have said and shown.
   virtual void record_lesson(wire::LessonEntry entry) = 0;
+  // I/O thread: what has been taken is written, with an index, and nothing more. `reason` is said.
+  virtual void end_early(const std::string& /*reason*/) {}
+  // Any thread may ask how many bytes were taken and are not written yet.
+  virtual std::size_t queued_bytes() const { return 0; }
   // I/O thread, after the simulation thread has ended.
   virtual Status close() = 0;
   // Any thread, at any time: whether everything has been recorded so far.

@@ -241,7 +241,7 @@ class CommandLine {
   void add_config_options();
 
   ServerOptions options_;
-  std::string listen_ = "127.0.0.1:7690";
+  std::string listen_ = "127.0.0.1:7690", metrics_;
   ResearchOptions research_;
   const CLI::Option* organ_ = nullptr;
   CLI::App app_{
@@ -280,6 +280,10 @@ void CommandLine::add_session_options() {
   app_.add_flag(
           "--no-datagrams", options_.is_stream_only,
           "frames and hands over the TCP stream alone, where lost packets hold up the picture")
+      ->group("Network");
+  app_.add_option("--metrics", metrics_,
+                  "where monitoring reads /healthz, /readyz and /metrics, without TLS [nowhere]")
+      ->type_name("ADDR:PORT")
       ->group("Network");
   app_.add_option("--announce", options_.announced_name,
                   "name of the session on the local network (DNS-SD) [the organ's and "
@@ -356,26 +360,42 @@ Status CommandLine::finish() {
     if (research_.depth->count() == 0) options_.decisions.depth_limit = step::kFrozenDepthLimit;
   }
   if (const auto parsed = parse_listen_address(listen_, options_); !parsed) return parsed;
+  if (const auto parsed = parse_metrics_address(metrics_, options_); !parsed) return parsed;
   return step::validate(options_.decisions);
 }
 
 }  // namespace
 
-Status parse_listen_address(const std::string& text, ServerOptions& options) {
+namespace {
+
+Status parse_place(const char* option, const char* example, const std::string& text,
+                   std::string& host, std::uint16_t& port) {
   const Error bad{ErrorCode::Usage,
-                  "--listen: '" + text + "' is not ADDRESS:PORT, such as 127.0.0.1:7690"};
+                  fmt::format("{}: '{}' is not ADDRESS:PORT, such as {}", option, text, example)};
   const auto colon = text.rfind(':');
   if (colon == std::string::npos || colon == 0) return bad;
   std::string address = text.substr(0, colon);
   if (address.starts_with('[') && address.ends_with(']'))
     address = address.substr(1, address.size() - 2);
-  std::uint16_t port = 0;
+  std::uint16_t number = 0;
   const char* end = text.data() + text.size();
-  const auto parsed = std::from_chars(text.data() + colon + 1, end, port);
+  const auto parsed = std::from_chars(text.data() + colon + 1, end, number);
   if (address.empty() || parsed.ec != std::errc{} || parsed.ptr != end) return bad;
-  options.address = std::move(address);
-  options.port = port;
+  host = std::move(address);
+  port = number;
   return {};
+}
+
+}  // namespace
+
+Status parse_listen_address(const std::string& text, ServerOptions& options) {
+  return parse_place("--listen", "127.0.0.1:7690", text, options.address, options.port);
+}
+
+Status parse_metrics_address(const std::string& text, ServerOptions& options) {
+  if (text.empty()) return {};
+  return parse_place("--metrics", "127.0.0.1:7693", text, options.metrics_address,
+                     options.metrics_port);
 }
 
 namespace {

@@ -26,6 +26,8 @@ struct ServerOptions {
   std::string address = "127.0.0.1";
   std::uint16_t port = 7690;
   bool is_stream_only = false;  // no datagrams
+  std::string metrics_address;  // empty: no figures for monitoring
+  std::uint16_t metrics_port = 0;
   AccessOptions access;
   LimitOptions limits;
   std::string announced_name;      // on the local network; empty: made from organ and machine
@@ -50,5 +52,7 @@ Result<std::optional<ServerOptions>> parse_command_line(int argc, char** argv);
 
 // "ADDR:PORT" or "[IPV6]:PORT"; the port may be 0 (any free one).
 Status parse_listen_address(const std::string& text, ServerOptions& options);
+// Reads --metrics likewise; an empty text is none.
+Status parse_metrics_address(const std::string& text, ServerOptions& options);
 
 }  // namespace trocar::app

@@ -16,6 +16,7 @@
 #include <cmath>
 #include <csignal>
 #include <cstdio>
+#include <filesystem>
 #include <functional>
 #include <vector>
 
@@ -26,11 +27,14 @@
 #include "common/discovery/announcer.h"
 #include "common/secure/loopback.h"
 #include "server/app/server/admission.h"
+#include "server/app/server/server_figures.h"
 #include "server/app/server/session_start.h"
 #include "server/app/server/simulation_loop.h"
 #include "server/app/server/summary.h"
 #include "server/session/ghost/ghost.h"
 #include "server/session/guests/guest_connections.h"
+#include "server/session/monitoring/disk_watch.h"
+#include "server/session/monitoring/figures_server.h"
 #include "server/session/net/tcp_server.h"
 #include "server/session/replication/messages.h"
 #include "server/session/replication/replicator.h"
@@ -44,6 +48,9 @@ constexpr milliseconds kBarrierDeadline{2000};
 constexpr milliseconds kGoodbyeDeadline{2500};  // a little more than the flush deadline
 constexpr milliseconds kPollPeriod{5};
 constexpr milliseconds kAttentionPeriod{50};
+constexpr std::chrono::seconds kDiskPeriod{5};
+// A simulation that shows nothing for longer than this stands still.
+constexpr double kStillAfter_s = 10;
 // Slower than this is said in the log, once in a while.
 constexpr float kSlowTimeRate = 0.98f;
 constexpr float kLongTickMs = 0.9f;
@@ -82,6 +89,15 @@ class Server {
   void publish_frames();
   void show_ghost(std::shared_ptr<const ghost::GhostReport> report);
   void warn_if_slow();
+  Status open_figures();
+  wire::RecordingState recording_state() const;
+  // Looks at the disk of the recording now and then, warns, and ends the recording before it is
+  // full.
+  void watch_disk();
+  double frame_age_s() const;
+  std::string ill() const;
+  std::string not_ready() const;
+  std::string metrics() const;
   void on_signal(int signal);
   void attend();
   void begin_end();
@@ -99,13 +115,17 @@ class Server {
   participants::SimulationInbox inbox_;
   asio::io_context io_{1};
   asio::signal_set signals_{io_};
-  asio::steady_timer poll_{io_}, attention_{io_};
+  asio::steady_timer poll_{io_}, attention_{io_}, disk_timer_{io_};
   std::unique_ptr<net::TcpServer> tcp_;
   std::unique_ptr<guests::GuestConnections> connections_;  // all of them, guests as well
   std::unique_ptr<discovery::Announcer> announcer_;        // null: the session is not announced
   std::unique_ptr<replication::Replicator> replicator_;
+  std::unique_ptr<monitoring::FiguresServer> figures_;  // null: not asked for
+  monitoring::DiskWatch disk_;
   FrameHandover handover_{[this] { asio::post(io_, [this] { publish_frames(); }); }};
   std::vector<step::SharedFrame> frames_;
+  step::SharedFrame newest_;
+  std::uint64_t newest_ns_ = 0;                                          // when it came
   std::atomic<std::shared_ptr<const ghost::GhostReport>> ghost_report_;  // the newest; null: taken
   std::vector<replication::BarrierResult> barrier_;
   std::string goodbye_ = "the session is over";
@@ -182,7 +202,7 @@ Status Server::open() {
     replication.on_ghost_wanted = [this](bool is_wanted) { ghost_->set_wanted(is_wanted); };
   replicator_ = std::make_unique<replication::Replicator>(
       *connections_, inbox_, layout, organ.name, organ::organ_hash(organ), std::move(replication));
-  if (journal_) replicator_->set_recording(journal_->state());
+  if (journal_) replicator_->set_recording(recording_state());
   restore_people();
   loop_ = std::make_unique<SimulationLoop>(simulation_, inbox_, handover_, journal_.get(),
                                            loop_options(),
@@ -191,7 +211,7 @@ Status Server::open() {
     ghost_ = std::make_unique<ghost::Ghost>(
         simulation_, ghost::GhostOptions{most_decisions(), [this] { loop_->request_snapshot(); },
                                          [this](auto report) { show_ghost(std::move(report)); }});
-  return {};
+  return open_figures();
 }
 
 void Server::restore_people() {
@@ -286,8 +306,10 @@ Status Server::run() {
   log::info("{} ({} nodes) at {}:{}, Ctrl-C ends the session", simulation_.organ().name,
             simulation_.organ().mesh.node_count(), options_.address, tcp_->port());
   announce();
+  watch_disk();
   std::fputs(admission_->invitation(tcp_->port()).c_str(), stdout);
   std::fflush(stdout);
+  newest_ns_ = monotonic_ns();
   loop_->start();
   const Status ran = net::run(io_);
   if (!ran.ok()) {
@@ -318,8 +340,12 @@ void Server::on_signal(int signal) {
 
 void Server::publish_frames() {
   if (is_ending_) return;
-  if (journal_) replicator_->set_recording(journal_->state());
+  if (journal_) replicator_->set_recording(recording_state());
   handover_.pop_all(frames_);
+  if (!frames_.empty()) {
+    newest_ = frames_.back();
+    newest_ns_ = monotonic_ns();
+  }
   replicator_->publish(frames_);
   if (ghost_) ghost_->push(frames_);
   for (const auto& frame : frames_)
@@ -351,12 +377,82 @@ void Server::warn_if_slow() {
           : std::string("ticks are held up, perhaps by other programs"));
 }
 
+Status Server::open_figures() {
+  if (options_.metrics_address.empty()) return {};
+  auto listening = monitoring::FiguresServer::listen(
+      io_, options_.metrics_address, options_.metrics_port,
+      {[this] { return ill(); }, [this] { return not_ready(); }, [this] { return metrics(); }});
+  if (!listening) return listening.error();
+  figures_ = std::move(*listening);
+  log::info("figures at {}:{}/metrics", options_.metrics_address, figures_->port());
+  return {};
+}
+
+wire::RecordingState Server::recording_state() const {
+  auto state =
+      journal_ ? journal_->state() : wire::RecordingState{wire::RecordingStatus::Off, 0, {}};
+  if (state.status == wire::RecordingStatus::Whole) state.text = disk_.warning();
+  return state;
+}
+
+void Server::watch_disk() {
+  std::error_code failed;
+  const std::filesystem::path path = options_.journal;
+  if (!journal_ || !std::filesystem::is_regular_file(path, failed)) return;
+  const auto recorded = std::filesystem::file_size(path, failed);
+  const auto room = failed ? std::filesystem::space_info{}
+                           : std::filesystem::space(std::filesystem::absolute(path), failed);
+  if (!failed && disk_.add({static_cast<double>(monotonic_ns()) * 1e-9, recorded, room.available}))
+    log::warn("{}: {}: free some space", options_.journal, disk_.warning());
+  if (disk_.must_end())
+    journal_->end_early(options_.journal +
+                        ": the disk is nearly full; the file is whole so far; free some space");
+  disk_timer_.expires_after(kDiskPeriod);
+  disk_timer_.async_wait([this](boost::system::error_code error) {
+    if (!error && !is_ending_) watch_disk();
+  });
+}
+
+double Server::frame_age_s() const {
+  return static_cast<double>(monotonic_ns() - newest_ns_) * 1e-9;
+}
+
+std::string Server::ill() const {
+  if (is_paused_ || is_ending_ || frame_age_s() < kStillAfter_s) return {};
+  return fmt::format("the simulation has shown nothing for {:.0f} s", frame_age_s());
+}
+
+std::string Server::not_ready() const {
+  if (is_ending_) return "the session ends";
+  if (!newest_ && !is_paused_) return "the simulation has not begun";
+  return ill();
+}
+
+std::string Server::metrics() const {
+  const auto* gate = admission_->gate();
+  return to_exposition({.newest = newest_.get(),
+                        .frame_age_s = frame_age_s(),
+                        .is_paused = is_paused_,
+                        .frames_lost = handover_.dropped(),
+                        .people = replicator_->roster().list(),
+                        .connections = tcp_->connection_count(),
+                        .tcp = tcp_->counters(),
+                        .datagrams = tcp_->datagram_counters(),
+                        .replication = replicator_->counters(),
+                        .inbox = inbox_.counters(),
+                        .access = gate ? gate->counters() : access::GateCounters{},
+                        .recording = recording_state(),
+                        .recording_queued_bytes = journal_ ? journal_->queued_bytes() : 0,
+                        .disk = disk_});
+}
+
 void Server::begin_end() {
   publish_frames();
   is_ending_ = true;
   if (ghost_) ghost_->set_wanted(false);
   signals_.cancel();
   announcer_.reset();
+  disk_timer_.cancel();
   tcp_->stop_accepting();
   replicator_->begin_barrier(loop_->report().last_frame);
   wait_for([this] { return replicator_->is_barrier_complete(); }, kBarrierDeadline,

@@ -152,7 +152,13 @@ void Recorder::run() {
   for (;;) {
     const auto seen = wake_ups_.load();
     const bool is_closing = is_closing_.load();
-    if (write_queued()) continue;
+    const bool ends_early = ends_early_.load(std::memory_order_acquire) && status_.ok();
+    if (write_queued() && !ends_early) continue;
+    if (ends_early) {
+      const Status finished = finish_file();
+      fail_with(finished ? Error{ErrorCode::ResourceMissing, early_reason_} : finished.error());
+      continue;
+    }
     if (is_closing) return;
     wake_ups_.wait(seen);
   }
@@ -185,6 +191,21 @@ bool Recorder::write_queued() {
     queued_bytes_.fetch_sub(queued->bytes, std::memory_order_relaxed);
   }
   return any;
+}
+
+void Recorder::end_early(const std::string& reason) {
+  if (ends_early_.load(std::memory_order_relaxed)) return;
+  early_reason_ = reason;
+  ends_early_.store(true, std::memory_order_release);
+  wake_ups_.fetch_add(1);
+  wake_ups_.notify_one();
+}
+
+Status Recorder::finish_file() {
+  is_finished_ = true;
+  if (!overview_.is_empty())
+    if (auto s = write_overview(); !s) return s;
+  return writer_->close();
 }
 
 void Recorder::fail_with(const Error& error) {
@@ -297,7 +318,7 @@ Status Recorder::close() {
   if (lessons_left_out_ > 0)
     log::warn("recording: the last {} things that people said or showed are missing",
               lessons_left_out_);
-  const Status closed = writer_->close();
+  const Status closed = is_finished_ ? Status{} : writer_->close();
   if (status_.ok() && !closed.ok()) fail_with(closed.error());
   counters_.bytes_written = writer_->bytes_written();
   return status_;

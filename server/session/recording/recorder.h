@@ -83,6 +83,9 @@ class Recorder {
   void record_hand(wire::HandRecord record);
   // The I/O thread calls it; likewise.
   void record_lesson(wire::LessonEntry entry);
+  // I/O thread, before close(): what is queued is written, and the file's summary; nothing after
+  // that. The recording counts as failed, for this reason. Only the first call counts.
+  void end_early(const std::string& reason);
   // After both producers have ended: writes what is queued and the file's summary.
   Status close();
   // After close().
@@ -123,6 +126,8 @@ class Recorder {
   Status write_frame(const step::PublishedFrame& frame);
   Status write_overview();
   void fail_with(const Error& error);
+  // Writes what a whole file ends with.
+  Status finish_file();
   Tick not_before_last(Tick tick) { return last_tick_ = std::max(last_tick_, tick); }
 
   // Writer thread, or the caller's after it has ended.
@@ -135,6 +140,9 @@ class Recorder {
   RecorderCounters counters_;
   Status status_;
   std::atomic<bool> has_failed_{false};  // status_ is an error, and changes no more
+  bool is_finished_ = false;             // the file has its summary
+  std::string early_reason_;             // I/O thread, until `ends_early_`
+  std::atomic<bool> ends_early_{false};
 
   std::atomic<std::uint64_t> frames_dropped_{0};
   SpscQueue<QueuedFrame> frames_{kQueueFrames};

@@ -59,8 +59,7 @@ export function Live(props: { link: Link; replica: Replica; onEnd(why: string): 
       if (kind === 'markList') marks.current = value.name;
       if (kind === 'lessonProgress') progress.current = value;
       if (kind === 'recordingState') {
-        const isWhole = value.status === RecordingStatus.RECORDING_WHOLE || value.status === RecordingStatus.RECORDING_OFF;
-        recording.current = isWhole ? '' : value.text;
+        recording.current = value.text;  // empty while nothing is wrong
         isRecorded.current = value.status === RecordingStatus.RECORDING_WHOLE || value.status === RecordingStatus.RECORDING_GAPPED;
       }
       if (kind === 'barrier') crc.current = replica.ownCrc === value.surfaceCrc >>> 0 ? 'same' : 'other';
