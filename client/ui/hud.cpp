@@ -24,12 +24,16 @@ constexpr float kLayoutWidth = 1160, kLayoutHeight = 620;
 
 // Keys that went down since the last picture. Dear ImGui samples keys once per picture and would
 // miss a short press at a low rate. GLFW callbacks carry no context of ours, and there is one Hud.
-std::vector<int>& pressed_keys() {
-  static std::vector<int> keys;
+struct PressedKey {
+  int code = 0;
+  bool has_shift = false;
+};
+std::vector<PressedKey>& pressed_keys() {
+  static std::vector<PressedKey> keys;
   return keys;
 }
-void remember_key(GLFWwindow*, int key, int, int action, int) {
-  if (action == GLFW_PRESS) pressed_keys().push_back(key);
+void remember_key(GLFWwindow*, int key, int, int action, int modifiers) {
+  if (action == GLFW_PRESS) pressed_keys().push_back({key, (modifiers & GLFW_MOD_SHIFT) != 0});
 }
 
 // It is what is asked for, or what the monitor says, as far as the panels fit into the window.
@@ -195,9 +199,11 @@ HudActions Hud::draw(const HudModel& model) {
   if (model.timeline) draw_timeline(*model.timeline, scale_, actions);
   draw_help(model, scale_);
   ImGui::Render();
-  const std::vector<int> keys = std::exchange(pressed_keys(), {});
+  const auto keys = std::exchange(pressed_keys(), {});
   if (ImGui::GetIO().WantTextInput) return actions;
-  const auto pressed = [&](int code) { return std::ranges::find(keys, code) != keys.end(); };
+  const auto pressed = [&](int code) {
+    return std::ranges::find(keys, code, &PressedKey::code) != keys.end();
+  };
   actions.toggle_help = pressed(GLFW_KEY_H) || pressed(GLFW_KEY_F1);
   actions.toggle_regions = pressed(GLFW_KEY_O);
   actions.toggle_holds = pressed(GLFW_KEY_L);
@@ -217,11 +223,12 @@ HudActions Hud::draw(const HudModel& model) {
         .action = model.conduct->is_paused ? replica::LeadAction::GoOn : replica::LeadAction::Pause,
         .name = {}};
   actions.switch_hand = model.tray.hands > 1 && pressed(GLFW_KEY_TAB);
-  for (std::size_t i = 0;
-       model.tray.hands > 0 && i < std::min<std::size_t>(model.tray.names.size(), 9); ++i)
-    if (pressed(GLFW_KEY_1 + static_cast<int>(i))) actions.take_instrument = i;
-  if (model.tray.hands > 0 && model.tray.names.size() > 9 && pressed(GLFW_KEY_0))
-    actions.take_instrument = 9;
+  for (const auto& key : keys) {
+    if (model.tray.hands == 0 || key.code < GLFW_KEY_0 || key.code > GLFW_KEY_9) continue;
+    const int digit = key.code == GLFW_KEY_0 ? 9 : key.code - GLFW_KEY_1;
+    const auto number = static_cast<std::size_t>(digit + (key.has_shift ? 10 : 0));
+    if (number < model.tray.names.size()) actions.take_instrument = number;
+  }
   actions.next_lent_view = model.can_lend_view && pressed(GLFW_KEY_T);
   actions.toggle_follow = !model.view_text.empty() && pressed(GLFW_KEY_V);
   actions.set_mark = model.can_mark && pressed(GLFW_KEY_M);
@@ -242,9 +249,10 @@ HudActions Hud::draw(const HudModel& model) {
 }
 
 bool Hud::take_enter() {
-  const std::vector<int> keys = std::exchange(pressed_keys(), {});
-  return std::ranges::any_of(
-      keys, [](int key) { return key == GLFW_KEY_ENTER || key == GLFW_KEY_KP_ENTER; });
+  const auto keys = std::exchange(pressed_keys(), {});
+  return std::ranges::any_of(keys, [](const PressedKey& key) {
+    return key.code == GLFW_KEY_ENTER || key.code == GLFW_KEY_KP_ENTER;
+  });
 }
 
 void Hud::render() {

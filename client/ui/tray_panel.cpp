@@ -14,7 +14,8 @@ void draw_tray(const HudModel& model, const Box& session, float scale, HudAction
   for (std::size_t i = 0; i < tray.names.size(); ++i) {
     const bool is_chosen = i == tray.chosen;
     if (model.shows_rate && !is_chosen) continue;
-    const std::string key = i < 10 ? std::to_string((i + 1) % 10) : " ";
+    const std::string digit = std::to_string((i + 1) % 10);
+    const std::string key = i < 10 ? digit : i < 20 ? "Shift " + digit : " ";
     if (ImGui::Selectable((key + "  " + tray.names[i]).c_str(), is_chosen, 0, {120 * scale, 0}))
       actions.take_instrument = i;
     if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", tray.texts[i].c_str());
