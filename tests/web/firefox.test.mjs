@@ -66,7 +66,15 @@ class Firefox {
 
 before(async () => {
   await startPrograms(['--organ', 'liver'], ['--insecure-loopback', '--recordings', `${TROCAR_WORK}/recordings`]);
-  firefox = await Firefox.launch();
+  // The machine may have a Firefox that does not start, or without WebGL: that says nothing about the page.
+  const why = await Firefox.launch().then(async one => {
+    firefox = one;
+    return await one.evaluate('document.createElement("canvas").getContext("webgl2") !== null') ? '' : 'Firefox has no WebGL 2 here';
+  }, error => error.message);
+  if (why !== '') {
+    console.log(`SKIPPED: ${why}`);
+    process.exit(77);
+  }
 }, { timeout: 120_000 });
 after(async () => {
   firefox?.process.kill('SIGKILL');

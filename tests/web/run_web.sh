@@ -51,9 +51,14 @@ case $test in
     ;;
   firefox)
     firefox=$(command -v firefox-esr || command -v firefox) || skip "Firefox is not installed: deploy/setup --with-web"
-    command -v xvfb-run >/dev/null || skip "Firefox draws in a window alone: deploy/setup --with-tests installs xvfb"
+    command -v Xvfb >/dev/null || skip "Firefox draws in a window alone: deploy/setup --with-tests installs xvfb"
     export TROCAR_FIREFOX=$firefox
-    xvfb-run -a -s "-screen 0 1400x900x24" node --experimental-websocket --no-warnings --test-reporter=spec "$here/firefox.test.mjs"
+    Xvfb -displayfd 1 -screen 0 1400x900x24 -nolisten tcp >"$work/display" 2>"$work/xvfb.log" &
+    display=$!
+    trap 'kill "$display" 2>/dev/null || true' EXIT
+    for _ in $(seq 100); do [ -s "$work/display" ] && break; sleep 0.1; done
+    [ -s "$work/display" ] || skip "Xvfb did not start: $(tail -1 "$work/xvfb.log")"
+    DISPLAY=:$(cat "$work/display") node --experimental-websocket --no-warnings --test-reporter=spec "$here/firefox.test.mjs"
     ;;
   codec) node --test-reporter=spec "$here/codec.test.mjs" ;;
   page | lesson | blood | debrief | access | hostile | figures)
