@@ -5,7 +5,7 @@ import fs from 'node:fs';
 import http from 'node:http';
 import https from 'node:https';
 import net from 'node:net';
-import { base, close, kPatience, launch, link, live, openPage, prepare, sleep, startWeb, test, until, world } from './browser.mjs';
+import { base, close, kPatience, launch, link, live, openPage, picture, prepare, sleep, startWeb, test, until, world } from './browser.mjs';
 
 const { TROCAR_CRCS, TROCAR_RECORDING, TROCAR_WORK } = process.env;
 const kRecordings = ['--insecure-loopback', '--recordings', `${TROCAR_WORK}/recordings`];
@@ -35,6 +35,24 @@ test('an instructor joins by a link, sees a cut, marks the organ and returns it'
   assert.ok(state.age !== null && state.age > -50, `age ${state.age}`);
   assert.deepEqual(page.faults, []);
   hand.kill();
+  await close(page);
+});
+
+test('an instructor hands what one person holds to another', async () => {
+  const page = await openPage(link(world.server.codes.instructor, 'instructor', 'Ivy'));
+  await live(page);
+  const giver = world.server.hand('Anna', 'retract'), receiver = world.server.hand('Ben', 'palpate');
+  await page.locator('.events').getByText('Anna has a grasp').first().waitFor({ timeout: kPatience });
+  await page.locator('.events').getByText('Ben pushes').first().waitFor({ timeout: kPatience });
+  await page.getByRole('button', { name: 'Manage Anna' }).click();
+  const choice = page.getByLabel('Hand over an instrument of Anna');
+  const option = await until('a receiver', () => choice.locator('option', { hasText: 'Ben' }).first().getAttribute('value').catch(() => null));
+  await choice.selectOption(option);
+  await page.locator('.events').getByText('Ivy hands an instrument of Anna to Ben').first().waitFor({ timeout: kPatience });
+  await page.locator('.events').getByText('Ben has a grasp').first().waitFor({ timeout: kPatience });
+  await picture(page, 'handed-over');
+  assert.deepEqual(page.faults, []);
+  for (const hand of [giver, receiver]) hand.kill();
   await close(page);
 });
 
