@@ -11,19 +11,13 @@
 #include "common/journal/session_journal.h"
 #include "common/wire/claim_outcome.h"
 #include "server/session/assessment/hand_meter.h"
-#include "server/session/recording/stored_surface.h"
+#include "server/session/recording/lesson_frames.h"
 
 namespace trocar::assessment {
 namespace {
 
-using journal::JournalTopic;
-
 constexpr Tick kAll = std::numeric_limits<Tick>::max();
 constexpr Tick kHarmPeriod = 1000;  // ticks between two moments of harm that are told
-
-Vec3d read(const proto::Vec3& v) {
-  return {v.x(), v.y(), v.z()};
-}
 
 // Reads a recording frame by frame, and measures as it goes.
 class Assessor {
@@ -38,12 +32,10 @@ class Assessor {
     out_.whole.begin = journal_.info().begin_tick();
     whole_.limit_n = options_.force_limit_n;
     begin_stage(out_.whole.begin);
-    const auto report =
-        journal_.read_all([this](std::string_view topic, Tick tick, BytesView bytes) {
-          return take(topic, tick, bytes);
-        });
-    if (!status_) return status_;
-    if (const auto status = report.status(); !status) out_.notes.push_back(status.error().message);
+    const auto read = recording::read_lesson_frames(
+        journal_, out_.file, [this](const recording::LessonFrame& frame) { observe(frame); },
+        [this](std::string note) { note_once(std::move(note)); });
+    if (!read) return read;
     finish();
     return {};
   }
@@ -65,25 +57,15 @@ class Assessor {
   }
 
   Status read_lesson() {
-    Status status;
-    const auto visit = [&](Tick, const proto::LessonRecord& record) {
-      if (record.left_out() > 0)
-        out_.notes.push_back("the recording had no room for some of what the lesson told");
-      if (record.has_lesson() && !course_) {
-        auto lesson = lesson::read_lesson_text(record.lesson().source(), out_.file + ": /lesson");
-        if (!lesson) {
-          status = lesson.error();
-          return false;
-        }
-        out_.lesson = *lesson;
-        course_.emplace(std::move(*lesson));
-      }
-      if (record.has_input()) inputs_.push_back(record.input());
-      if (record.has_stage()) told_ = record.stage();
-      return true;
-    };
-    if (auto s = journal_.read_lessons(0, kAll, visit); !s) return s;
-    return status;
+    auto lesson = recording::read_recorded_lesson(journal_, out_.file);
+    if (!lesson) return lesson.error();
+    if (lesson->has_left_out)
+      out_.notes.push_back("the recording had no room for some of what the lesson told");
+    recorded_ = std::move(*lesson);
+    if (!recorded_.lesson) return {};
+    out_.lesson = *recorded_.lesson;
+    course_.emplace(*recorded_.lesson);
+    return {};
   }
 
   const std::string& person_of(ToolSlot tool, Tick tick) {
@@ -92,52 +74,6 @@ class Assessor {
     if (lists == people_.end()) return kNobody;
     const auto next = lists->second.upper_bound(tick);
     return next == lists->second.begin() ? next->second : std::prev(next)->second;
-  }
-
-  bool take(std::string_view topic, Tick tick, BytesView bytes) {
-    const auto known = journal::topic_of(topic);
-    if (!known) return true;
-    const auto parse = [&](auto& message) {
-      if (message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) return true;
-      status_ = Error{ErrorCode::BadFile, fmt::format("{}: {} at tick {} is no message of its kind",
-                                                      out_.file, topic, tick)};
-      return false;
-    };
-    const auto check = [&](auto message) {
-      if (!parse(message)) return false;
-      if (const auto wrong = surface_.check(message))
-        note_once(fmt::format("the surface at tick {} does not fit: {} is {}", tick, wrong->field,
-                              wrong->recorded));
-      return true;
-    };
-    switch (*known) {
-      case JournalTopic::Topology:
-        return check(proto::SurfaceTopology());
-      case JournalTopic::TopologyChange:
-        return check(proto::SurfaceChange());
-      case JournalTopic::SurfaceKey:
-      case JournalTopic::SurfaceDelta:
-        return check(proto::SurfaceFrame());
-      case JournalTopic::Gap:
-        surface_.skip();
-        note_once("frames were dropped while recording: measures may differ from those told");
-        return true;
-      case JournalTopic::Claims: {
-        proto::ClaimLog log;
-        if (!parse(log)) return false;
-        for (const auto& event : log.event())
-          if (event.tool() < kMaxTools) claims_.push_back(event);
-        return true;
-      }
-      case JournalTopic::FrameState: {
-        proto::FrameState state;
-        if (!parse(state)) return false;
-        observe(state);
-        return true;
-      }
-      default:
-        return true;
-    }
   }
 
   void note_once(std::string note) {
@@ -154,102 +90,73 @@ class Assessor {
     }
   }
 
-  void observe(const proto::FrameState& state) {
-    const Tick tick = state.tick();
-    // A lesson begins when somebody with a tool is there.
-    if (course_ && !has_begun_ && state.tool_size() > 0) {
+  void observe(const recording::LessonFrame& frame) {
+    const Tick tick = frame.moment.tick;
+    if (course_ && !has_begun_ && frame.has_tools) {
       has_begun_ = true;
       begin_stage(tick);
     }
-    tips_.clear();
-    for (const auto& tool : state.tool()) {
-      if (tool.tool() >= kMaxTools || tool.is_silent()) continue;
-      const auto slot = ToolSlot{static_cast<std::uint8_t>(tool.tool())};
-      const auto tip =
-          read(tool.has_proxy_position_m() ? tool.proxy_position_m() : tool.position_m());
-      const auto force = read(tool.force_n());
-      tips_.push_back({.tool = slot,
-                       .position_m = tip,
-                       .force_n = length(force),
-                       .verb = static_cast<tool::Verb>(tool.verb()),
-                       .has_claim = tool.has_claim()});
-      const auto& person = person_of(slot, tick);
-      hands_.add(slot, person, tick, tip, force);
-      whole_.add(slot, person, tick, tip, force);
-      add_to_curve(slot, person, tick, tip, length(force));
+    for (std::size_t i = 0; i < frame.moment.tips.size(); ++i) {
+      const auto& tip = frame.moment.tips[i];
+      const auto& person = person_of(tip.tool, tick);
+      hands_.add(tip.tool, person, tick, tip.position_m, frame.forces_n[i]);
+      whole_.add(tip.tool, person, tick, tip.position_m, frame.forces_n[i]);
+      add_to_curve(tip.tool, person, tick, tip.position_m, tip.force_n);
     }
-    take_claims(tick);
-    blood_m3_.reset();
-    if (state.has_blood()) blood_m3_ = static_cast<double>(state.blood().shed_nl()) * 1e-12;
-    if (has_begun_) observe_lesson(tick);
+    take_claims(frame);
+    if (has_begun_) observe_lesson(frame.moment);
     last_tick_ = tick;
   }
 
-  void take_claims(Tick tick) {
-    for (const auto& event : claims_) {
+  void take_claims(const recording::LessonFrame& frame) {
+    const Tick tick = frame.moment.tick;
+    for (const auto& event : frame.claims) {
       const auto tool = ToolSlot{static_cast<std::uint8_t>(event.tool())};
       const auto outcome = static_cast<wire::ClaimOutcome>(event.outcome());
       hands_.note(tool, static_cast<tool::Verb>(event.verb()), outcome, event.tick());
       whole_.note(tool, static_cast<tool::Verb>(event.verb()), outcome, event.tick());
-      const bool slipped = outcome == wire::ClaimOutcome::Slipped;
-      if (!wire::is_refusal(outcome) && !slipped) continue;
+      if (!recording::is_loss(event)) continue;
       if (has_begun_) course_->note_refusal();
       tell(event.tick(), person_of(tool, tick),
-           slipped                                      ? "tissue slipped out of the grasp"
+           outcome == wire::ClaimOutcome::Slipped       ? "tissue slipped out of the grasp"
            : outcome == wire::ClaimOutcome::RefusedHeld ? "was refused what somebody else holds"
                                                         : "took hold of nothing");
     }
-    claims_.clear();
-    for (auto* meter : {&hands_, &whole_}) meter->end_waits(tips_, tick);
+    for (auto* meter : {&hands_, &whole_}) meter->end_waits(frame.moment.tips, tick);
   }
 
-  void observe_lesson(Tick tick) {
-    const auto moment = lesson::Moment{.tick = tick,
-                                       .tips = tips_,
-                                       .displacements = surface_.surface(),
-                                       .layout = surface_.layout(),
-                                       .blood_m3 = blood_m3_};
+  void observe_lesson(const lesson::Moment& moment) {
     const auto before = course_->results().size();
     const bool is_over = course_->is_over();
     course_->observe(moment);
-    if (!is_over && course_->results().size() == before) note_losses(tick);
-    end_stages(before, tick);
-    for (; next_input_ < inputs_.size() && inputs_[next_input_].tick() <= tick; ++next_input_)
-      apply(inputs_[next_input_], moment);
+    if (!is_over && course_->results().size() == before) note_losses(moment);
+    end_stages(before, moment.tick);
+    for (; next_input_ < recorded_.inputs.size() &&
+           recorded_.inputs[next_input_].tick() <= moment.tick;
+         ++next_input_)
+      apply(recorded_.inputs[next_input_], moment);
   }
 
   void apply(const proto::LessonInput& input, const lesson::Moment& moment) {
     const auto before = course_->results().size();
-    switch (input.action()) {
-      case proto::LESSON_ANSWER: {
-        if (input.tool() >= kMaxTools) return;
-        const auto tool = ToolSlot{static_cast<std::uint8_t>(input.tool())};
-        if (course_->answer(tool, moment) == lesson::Answer::Wrong)
-          tell(moment.tick, person_of(tool, moment.tick), "gave a wrong answer");
-        break;
-      }
-      case proto::LESSON_NEXT:
-        course_->skip();
-        break;
-      case proto::LESSON_RESTART:
-        course_->restart();
-        excess_.reset();
-        out_.stages.clear();
-        out_.notes.push_back(
-            fmt::format("the lesson was begun anew at {:.1f} s: stages are those after it",
-                        seconds_of(moment.tick)));
-        begin_stage(moment.tick);
-        return;
-      default:
-        return;
-    }
-    end_stages(before, moment.tick);
+    const auto answer = recording::apply(input, moment, *course_);
+    if (answer == lesson::Answer::Wrong)
+      tell(moment.tick, person_of(ToolSlot{static_cast<std::uint8_t>(input.tool())}, moment.tick),
+           "gave a wrong answer");
+    if (input.action() != proto::LESSON_RESTART) return end_stages(before, moment.tick);
+    excess_.reset();
+    out_.stages.clear();
+    out_.notes.push_back(
+        fmt::format("the lesson was begun anew at {:.1f} s: stages are those after it",
+                    seconds_of(moment.tick)));
+    begin_stage(moment.tick);
   }
 
   // Tells once of each time that a limit of the lesson was passed.
-  void note_losses(Tick tick) {
+  void note_losses(const lesson::Moment& moment) {
+    const Tick tick = moment.tick;
     if (course_->is_too_strong()) {
-      const auto strongest = std::ranges::max_element(tips_, {}, &lesson::Tip::force_n);
+      const auto strongest = std::ranges::max_element(moment.tips, {}, &lesson::Tip::force_n);
       if (!excess_) excess_ = Excess{.begin = tick};
       if (strongest->force_n > excess_->peak_n)
         excess_->peak_n = strongest->force_n, excess_->peak = tick,
@@ -325,11 +232,11 @@ class Assessor {
 
   // People were told of results as they came; the recording must give the same again.
   void compare_with_told() {
-    if (!told_) return;
+    if (!recorded_.told) return;
     const auto& results = course_->results();
-    bool is_same = static_cast<std::size_t>(told_->result_size()) == results.size();
+    bool is_same = static_cast<std::size_t>(recorded_.told->result_size()) == results.size();
     for (std::size_t i = 0; is_same && i < results.size(); ++i) {
-      const auto& told = told_->result(static_cast<int>(i));
+      const auto& told = recorded_.told->result(static_cast<int>(i));
       is_same = told.is_reached() == results[i].is_reached &&
                 std::abs(told.points() - results[i].points) < 0.01;
     }
@@ -337,22 +244,17 @@ class Assessor {
       out_.notes.push_back(
           fmt::format("people were told of {} stages with {:.1f} points, the recording gives {} "
                       "with {:.1f}",
-                      told_->result_size(), told_->points(), results.size(), course_->points()));
+                      recorded_.told->result_size(), recorded_.told->points(), results.size(),
+                      course_->points()));
   }
 
   journal::SessionJournal& journal_;
   const Options& options_;
   Assessment& out_;
-  Status status_;
   std::map<std::uint32_t, std::map<Tick, std::string>> people_;  // by slot, from a tick on
   std::optional<lesson::Course> course_;
-  std::vector<proto::LessonInput> inputs_;
+  recording::RecordedLesson recorded_;
   std::size_t next_input_ = 0;
-  std::optional<proto::LessonStage> told_;  // the newest
-  recording::StoredSurface surface_;
-  std::vector<proto::ClaimEvent> claims_;  // of the frame that comes
-  std::vector<lesson::Tip> tips_;
-  std::optional<double> blood_m3_;  // lost so far
   bool has_begun_ = false;
   Part stage_;
   HandMeter hands_, whole_;  // of the stage, of the session
