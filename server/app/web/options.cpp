@@ -93,8 +93,7 @@ CommandLine::CommandLine() {
   app_.add_option("--page", options_.page_folder, "folder of the page's files [beside the program]")
       ->type_name("DIR");
   app_.add_option("--metrics", metrics_,
-                  "where figures are read, in the format of Prometheus "
-                  "[nowhere]")
+                  "where monitoring reads /healthz, /readyz and /metrics, without TLS [nowhere]")
       ->type_name("ADDR:PORT");
   app_.add_option("--seconds", options_.seconds, "end after this many seconds [Ctrl-C]")
       ->type_name("N")

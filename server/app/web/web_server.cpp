@@ -13,6 +13,8 @@
 #include "common/secure/digest.h"
 #include "server/app/web/recording_checks.h"
 #include "server/app/web/web_socket.h"
+#include "server/session/monitoring/exposition.h"
+#include "server/session/monitoring/figures_server.h"
 #include "server/web/site/request_rules.h"
 
 namespace trocar::app {
@@ -62,7 +64,8 @@ struct WebServer::Core : std::enable_shared_from_this<WebServer::Core> {
   WebContent content;
   const secure::TlsContext tls;
   bridge::Bridge bridge;
-  tcp::acceptor acceptor{context}, metrics_acceptor{context};
+  tcp::acceptor acceptor{context};
+  std::unique_ptr<monitoring::FiguresServer> figures;  // null: not asked for
   access::TryLimiter key_limiter;
   std::optional<RecordingChecks> checks;  // where there are recordings
   WebCounters counters;
@@ -82,23 +85,35 @@ struct WebServer::Core : std::enable_shared_from_this<WebServer::Core> {
       checks.emplace(io, content.state_folder, std::chrono::seconds(given.check_limit_s));
   }
 
-  Status open(tcp::acceptor& listener, const char* option, const std::string& address,
-              std::uint16_t port) const {
+  Status open() {
     boost::system::error_code error;
-    const auto ip = asio::ip::make_address(address, error);
+    const auto ip = asio::ip::make_address(options.address, error);
     if (error)
-      return Error{ErrorCode::Usage, std::string(option) + ": '" + address +
+      return Error{ErrorCode::Usage, "--listen: '" + options.address +
                                          "' is not an IPv4 or IPv6 address: use 127.0.0.1 for this "
                                          "machine only, 0.0.0.0 for any"};
-    const tcp::endpoint endpoint(ip, port);
-    listener.open(endpoint.protocol(), error);
-    if (!error) listener.set_option(tcp::acceptor::reuse_address(true), error);
-    if (!error) listener.bind(endpoint, error);
-    if (!error) listener.listen(asio::socket_base::max_listen_connections, error);
+    const tcp::endpoint endpoint(ip, options.port);
+    acceptor.open(endpoint.protocol(), error);
+    if (!error) acceptor.set_option(tcp::acceptor::reuse_address(true), error);
+    if (!error) acceptor.bind(endpoint, error);
+    if (!error) acceptor.listen(asio::socket_base::max_listen_connections, error);
     if (!error) return {};
-    return Error{ErrorCode::ResourceMissing, std::string(option) + ": " + address + ":" +
-                                                 std::to_string(port) + ": " + error.message() +
-                                                 ", choose another port"};
+    return Error{ErrorCode::ResourceMissing, "--listen: " + options.address + ":" +
+                                                 std::to_string(options.port) + ": " +
+                                                 error.message() + ", choose another port"};
+  }
+
+  // Whoever gets an answer knows that the program is well.
+  Status open_figures() {
+    if (options.metrics_address.empty()) return {};
+    auto listening = monitoring::FiguresServer::listen(
+        context, options.metrics_address, options.metrics_port,
+        {[] { return std::string(); },
+         [this] { return std::string(is_stopping ? "the page ends" : ""); },
+         [this] { return metrics(); }});
+    if (!listening) return listening.error();
+    figures = std::move(*listening);
+    return {};
   }
 
   bool admit(const std::string& peer) {
@@ -121,21 +136,21 @@ struct WebServer::Core : std::enable_shared_from_this<WebServer::Core> {
     if (found != open_by_address.end() && --found->second <= 0) open_by_address.erase(found);
   }
 
-  asio::awaitable<void> accept(tcp::acceptor& listener, bool is_for_metrics) {
+  asio::awaitable<void> accept() {
     asio::steady_timer retry(context);
     while (!is_stopping) {
-      auto [error, socket] = co_await listener.async_accept(kNoThrow);
-      if (is_stopping || !listener.is_open()) co_return;
+      auto [error, socket] = co_await acceptor.async_accept(kNoThrow);
+      if (is_stopping) co_return;
       if (error) {
         retry.expires_after(kAcceptRetry);
         co_await retry.async_wait(kNoThrow);
         continue;
       }
-      begin(std::move(socket), is_for_metrics);
+      begin(std::move(socket));
     }
   }
 
-  void begin(tcp::socket socket, bool is_for_metrics) {
+  void begin(tcp::socket socket) {
     const auto peer = plain_host(socket);
     if (!admit(peer)) return;
     boost::system::error_code ignored;
@@ -146,9 +161,7 @@ struct WebServer::Core : std::enable_shared_from_this<WebServer::Core> {
       self->forget(peer);
       rethrow(failure);
     };
-    if (is_for_metrics)
-      asio::co_spawn(context, serve_metrics(beast::tcp_stream(std::move(socket))), ended);
-    else if (tls)
+    if (tls)
       asio::co_spawn(context,
                      serve_tls(beast::ssl_stream<beast::tcp_stream>(
                                    beast::tcp_stream(std::move(socket)), *tls),
@@ -385,54 +398,38 @@ struct WebServer::Core : std::enable_shared_from_this<WebServer::Core> {
     co_return true;
   }
 
-  asio::awaitable<void> serve_metrics(beast::tcp_stream stream) {
-    beast::flat_buffer buffer(kMostHeaderBytes + 4096);
-    Request request;
-    const bool is_read = co_await read_request(stream, buffer, request);
-    if (!is_read) co_return;
-    Answer answer = refuse(request, http::status::not_found, "Figures are at /metrics.\n");
-    if (view_of(request.target()) == "/metrics") {
-      answer = refuse(request, http::status::ok, metrics());
-      answer.head.set(http::field::content_type, "text/plain; version=0.0.4");
-    }
-    request.keep_alive(false);
-    co_await send(stream, request, answer);
-  }
-
   std::string metrics() const {
     const auto& b = bridge.counters;
-    std::string text;
-    const auto add = [&text](const char* name, const char* kind, const char* help, auto value) {
-      text +=
-          fmt::format("# HELP trocar_web_{0} {2}\n# TYPE trocar_web_{0} {1}\ntrocar_web_{0} {3}\n",
-                      name, kind, help, value);
-    };
-    add("connections_open", "gauge", "Connections of browsers now.", counters.open);
-    add("connections_total", "counter", "Connections taken.", counters.connections);
-    add("connections_refused_total", "counter", "Connections beyond a limit.",
-        counters.refused_full);
-    add("requests_total", "counter", "Requests read.", counters.requests);
-    add("requests_not_found_total", "counter", "Requests for what is not there.",
-        counters.not_found);
-    add("requests_forbidden_total", "counter", "Requests without key, or of another site.",
-        counters.forbidden);
-    add("requests_malformed_total", "counter", "Requests that are none.", counters.malformed);
-    add("recording_bytes_total", "counter", "Bytes of recordings sent.", counters.recording_bytes);
-    add("watchers", "gauge", "People who watch a session now.", b.watchers);
-    add("joins_total", "counter", "Joins that reached a session.", b.joins);
-    add("joins_refused_total", "counter", "Joins refused here.", b.refused);
-    add("wrong_codes_total", "counter", "Wrong join codes.", b.wrong_codes);
-    add("sessions_unreachable_total", "counter", "Sessions that did not answer.", b.unreachable);
-    add("carriers", "gauge", "Connections to sessions that many share, now.", b.carriers);
-    add("session_messages_total", "counter", "Messages from sessions.", b.session_messages);
-    add("session_bytes_total", "counter", "Bytes of these.", b.session_bytes);
-    add("frames_skipped_total", "counter", "Frames left out for those who share a connection.",
-        b.frames_skipped);
-    add("messages_down_total", "counter", "Messages to browsers.", b.messages_down);
-    add("bytes_down_total", "counter", "Bytes of these.", b.bytes_down);
-    add("messages_up_total", "counter", "Messages from browsers.", b.messages_up);
-    add("bytes_up_total", "counter", "Bytes of these.", b.bytes_up);
-    return text;
+    monitoring::Exposition text("trocar_web_");
+    const auto number = [](std::uint64_t count) { return static_cast<double>(count); };
+    text.gauge("connections_open", "Connections of browsers now.", number(counters.open));
+    text.counter("connections_total", "Connections taken.", number(counters.connections));
+    text.counter("connections_refused_total", "Connections beyond a limit.",
+                 number(counters.refused_full));
+    text.counter("requests_total", "Requests read.", number(counters.requests));
+    text.counter("requests_not_found_total", "Requests for what is not there.",
+                 number(counters.not_found));
+    text.counter("requests_forbidden_total", "Requests without key, or of another site.",
+                 number(counters.forbidden));
+    text.counter("requests_malformed_total", "Requests that are none.", number(counters.malformed));
+    text.counter("recording_bytes_total", "Bytes of recordings sent.",
+                 number(counters.recording_bytes));
+    text.gauge("watchers", "People who watch a session now.", number(b.watchers));
+    text.counter("joins_total", "Joins that reached a session.", number(b.joins));
+    text.counter("joins_refused_total", "Joins refused here.", number(b.refused));
+    text.counter("wrong_codes_total", "Wrong join codes.", number(b.wrong_codes));
+    text.counter("sessions_unreachable_total", "Sessions that did not answer.",
+                 number(b.unreachable));
+    text.gauge("carriers", "Connections to sessions that many share, now.", number(b.carriers));
+    text.counter("session_messages_total", "Messages from sessions.", number(b.session_messages));
+    text.counter("session_bytes_total", "Bytes of these.", number(b.session_bytes));
+    text.counter("frames_skipped_total", "Frames left out for those who share a connection.",
+                 number(b.frames_skipped));
+    text.counter("messages_down_total", "Messages to browsers.", number(b.messages_down));
+    text.counter("bytes_down_total", "Bytes of these.", number(b.bytes_down));
+    text.counter("messages_up_total", "Messages from browsers.", number(b.messages_up));
+    text.counter("bytes_up_total", "Bytes of these.", number(b.bytes_up));
+    return text.text();
   }
 };
 
@@ -440,13 +437,8 @@ Result<std::unique_ptr<WebServer>> WebServer::listen(asio::io_context& context,
                                                      const WebOptions& options, WebContent content,
                                                      secure::TlsContext tls) {
   auto core = std::make_shared<Core>(context, options, std::move(content), std::move(tls));
-  if (auto opened = core->open(core->acceptor, "--listen", options.address, options.port); !opened)
-    return opened.error();
-  if (!options.metrics_address.empty())
-    if (auto opened = core->open(core->metrics_acceptor, "--metrics", options.metrics_address,
-                                 options.metrics_port);
-        !opened)
-      return opened.error();
+  for (const auto open : {&Core::open, &Core::open_figures})
+    if (auto opened = (*core.*open)(); !opened) return opened.error();
   return std::unique_ptr<WebServer>(new WebServer(std::move(core)));
 }
 
@@ -460,17 +452,13 @@ std::uint16_t WebServer::port() const {
 }
 
 std::uint16_t WebServer::metrics_port() const {
-  boost::system::error_code ignored;
-  return core_->metrics_acceptor.is_open() ? core_->metrics_acceptor.local_endpoint(ignored).port()
-                                           : std::uint16_t{0};
+  return core_->figures ? core_->figures->port() : std::uint16_t{0};
 }
 
 void WebServer::start() {
   const auto core = core_;
-  const auto ended = [core](std::exception_ptr failure) { rethrow(failure); };
-  asio::co_spawn(core->context, core->accept(core->acceptor, false), ended);
-  if (core->metrics_acceptor.is_open())
-    asio::co_spawn(core->context, core->accept(core->metrics_acceptor, true), ended);
+  asio::co_spawn(core->context, core->accept(),
+                 [core](std::exception_ptr failure) { rethrow(failure); });
 }
 
 void WebServer::stop() {
@@ -478,14 +466,10 @@ void WebServer::stop() {
   core_->is_stopping = true;
   boost::system::error_code ignored;
   core_->acceptor.close(ignored);
-  core_->metrics_acceptor.close(ignored);
+  if (core_->figures) core_->figures->stop();
   if (core_->checks) core_->checks->stop();
   auto cuts = core_->cuts;  // a copy: cutting takes entries out
   for (const auto& [id, cut] : cuts) cut();
-}
-
-std::string WebServer::metrics() const {
-  return core_->metrics();
 }
 
 }  // namespace trocar::app

@@ -1,6 +1,6 @@
 #pragma once
 
-// trocar-web's listeners: one for browsers, one for figures (metrics), on one I/O thread.
+// trocar-web's listeners: one for browsers, one for monitoring, on one I/O thread.
 //
 // Requests: GET and HEAD of the page's files, /recordings (a list), /recordings/NAME (with ranges),
 // /recordings/NAME/check (asks whether it verifies) and /recordings/NAME/checked (what is known of
@@ -52,8 +52,6 @@ class WebServer {
   void start();
   // Ends all connections.
   void stop();
-  // Figures in the text format of Prometheus.
-  std::string metrics() const;
 
  private:
   struct Core;

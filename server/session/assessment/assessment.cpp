@@ -12,6 +12,7 @@
 #include "common/wire/claim_outcome.h"
 #include "server/session/assessment/hand_meter.h"
 #include "server/session/recording/lesson_frames.h"
+#include "server/session/recording/pseudonyms.h"
 
 namespace trocar::assessment {
 namespace {
@@ -280,12 +281,10 @@ Result<Assessment> assess(const std::string& path, const Options& options) {
 }
 
 void give_pseudonyms(std::vector<Assessment>& sessions) {
-  std::map<std::string, std::string> pseudonyms;
+  recording::Pseudonyms pseudonyms;
   const auto pseudonym_of = [&](const std::string& name) {
-    if (name.empty()) return name;
-    const auto [found, is_new] = pseudonyms.try_emplace(name);
-    if (is_new) found->second = "Person " + std::to_string(pseudonyms.size());
-    return found->second;
+    pseudonyms.add(name);
+    return pseudonyms.of_name(name);
   };
   for (auto& session : sessions) {
     for (auto& curve : session.curves) curve.person = pseudonym_of(curve.person);

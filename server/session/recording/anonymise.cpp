@@ -3,7 +3,6 @@
 #include <google/protobuf/message.h>
 
 #include <algorithm>
-#include <map>
 #include <memory>
 #include <vector>
 
@@ -12,6 +11,7 @@
 #include "common/journal/session_topics.h"
 #include "proto/journal.pb.h"
 #include "proto/wire.pb.h"
+#include "server/session/recording/pseudonyms.h"
 
 namespace trocar::recording {
 namespace {
@@ -59,53 +59,6 @@ void each_text(Message& message, const Visitor& visit) {
     }
   }
 }
-
-bool belongs_to_word(char c) {
-  const auto byte = static_cast<unsigned char>(c);
-  return byte >= 0x80 || std::isalnum(byte) != 0;
-}
-
-class Pseudonyms {
- public:
-  void add(const std::string& name) {
-    if (name.empty() || names_.contains(name)) return;
-    names_[name] = "Person " + std::to_string(names_.size() + 1);
-    by_length_.push_back(name);
-    std::ranges::stable_sort(by_length_, std::greater{}, &std::string::size);
-  }
-  std::size_t count() const { return names_.size(); }
-
-  std::string of_name(const std::string& name) const {
-    const auto known = names_.find(name);
-    return known == names_.end() ? name : known->second;
-  }
-  // Replaces whole words alone; the longest name goes first.
-  std::string within(const std::string& text) const {
-    std::string out;
-    for (std::size_t at = 0; at < text.size();) {
-      const auto name = std::ranges::find_if(
-          by_length_, [&](const std::string& one) { return stands_at(text, at, one); });
-      if (name == by_length_.end()) {
-        out += text[at++];
-      } else {
-        out += names_.at(*name);
-        at += name->size();
-      }
-    }
-    return out;
-  }
-
- private:
-  static bool stands_at(const std::string& text, std::size_t at, const std::string& name) {
-    const std::size_t end = at + name.size();
-    return text.compare(at, name.size(), name) == 0 &&
-           (at == 0 || !belongs_to_word(text[at - 1]) || !belongs_to_word(name.front())) &&
-           (end == text.size() || !belongs_to_word(text[end]) || !belongs_to_word(name.back()));
-  }
-
-  std::map<std::string, std::string> names_;
-  std::vector<std::string> by_length_;
-};
 
 // Talk, notes and reasons stand behind the first colon of a line, which says whose they are.
 bool has_words(const proto::TeachEvent& event) {
