@@ -148,6 +148,10 @@ TEST_F(HandoverTest, TheInstrumentGoesOnGraspingWhereItIsUntilItsNewHandOpens) {
   input = given(Verb::None, -0.28f);
   EXPECT_NEAR(input.sample.world_from_tool.position.x, 0.12f, 1e-6f) << "as the hand moves";
   EXPECT_EQ(input.sample.verb, Verb::Grasp);
+  input = given(Verb::None, 0.4f);
+  EXPECT_NEAR(input.sample.world_from_tool.position.x, 0.12f, 1e-6f) << "a jump moves nothing";
+  input = given(Verb::None, 0.41f);
+  EXPECT_NEAR(input.sample.world_from_tool.position.x, 0.13f, 1e-6f);
   EXPECT_EQ(given(Verb::Grasp, -0.28f).sample.verb, Verb::Grasp);
   clock_ns_ += 8'000'000;
   EXPECT_EQ(given(Verb::None, -0.28f).sample.verb, Verb::None) << "the hand has opened it";

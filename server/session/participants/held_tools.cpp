@@ -60,17 +60,21 @@ std::optional<hands::ToolInput> HeldTools::apply(const hands::ToolInput& wanted,
   return given;
 }
 
-// A tool whose hand would move it out of the session's room stays where it is.
+// A hand that jumps, as a pointer does that comes back from elsewhere, takes nothing along. A tool
+// whose hand would move it out of the session's room stays where it is.
 void HeldTools::apply_loan(const ToolSample& wanted, Tool& tool, hands::ToolInput& given) {
-  constexpr float kRoom_m = 2;
+  constexpr float kRoom_m = 2, kJump_m = 0.05f;
   auto& loan = *tool.loan;
   const Pose& hand = wanted.world_from_tool;
   const bool grasps = wanted.verb == Verb::Grasp;
-  if (!loan.hand) loan.hand = hand;
-  Pose pose{
-      loan.tool.position + (hand.position - loan.hand->position),
-      normalized(hand.orientation * conjugate(loan.hand->orientation) * loan.tool.orientation)};
-  if (length_squared(pose.position) > kRoom_m * kRoom_m) pose = tool.last->world_from_tool;
+  Pose pose = tool.last->world_from_tool;
+  if (loan.hand) {
+    const Vec3f way = hand.position - loan.hand->position, moved = pose.position + way;
+    if (length_squared(way) < kJump_m * kJump_m && length_squared(moved) < kRoom_m * kRoom_m)
+      pose = {moved,
+              normalized(hand.orientation * conjugate(loan.hand->orientation) * pose.orientation)};
+  }
+  loan.hand = hand;
   given.client_time_us = 0;
   given.sample = {.world_from_tool = pose, .verb = Verb::Grasp};
   if (loan.stage == Loan::Stage::HandGrasps && !grasps) {
@@ -95,7 +99,7 @@ void HeldTools::hand_over(const hands::Handover& handover) {
     if (tool.last->verb == Verb::Cut) tool.last->verb = Verb::None;
     if (slot != handover.to || tool.last->verb != Verb::Grasp) continue;
     tool.is_returning = tool.is_opened = false;
-    tool.loan = Loan{.tool = tool.last->world_from_tool, .hand = {}};
+    tool.loan.emplace();
   }
 }
 
@@ -109,7 +113,7 @@ void HeldTools::release(ParticipantSlot slot) {
   for (int number = 0; number < kToolsPerHand; ++number) {
     auto& tool = tools_[tool_slot(slot, number).value];
     if (tool.loan)  // It goes on from where it was held still.
-      tool.loan = Loan{.tool = tool.last->world_from_tool, .hand = {}, .stage = tool.loan->stage};
+      tool.loan->hand.reset();
     else
       tool.is_returning = tool.last.has_value();
   }

@@ -56,8 +56,7 @@ class HeldTools {
   struct Loan {
     enum class Stage : std::uint8_t { HandMayGrasp, HandIsOpen, HandGrasps };
 
-    Pose tool;                 // world_from_tool, when it began
-    std::optional<Pose> hand;  // then; nothing: it has not said
+    std::optional<Pose> hand;  // at its newest sample; nothing: it has given none
     Stage stage = Stage::HandMayGrasp;
   };
   struct Tool {
