@@ -99,7 +99,7 @@ void HeldTools::hand_over(const hands::Handover& handover) {
     if (tool.last->verb == Verb::Cut) tool.last->verb = Verb::None;
     if (slot != handover.to || tool.last->verb != Verb::Grasp) continue;
     tool.is_returning = tool.is_opened = false;
-    tool.loan.emplace();
+    tool.loan = Loan{};
   }
 }
 

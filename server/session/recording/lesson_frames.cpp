@@ -133,7 +133,8 @@ Result<RecordedLesson> read_recorded_lesson(journal::SessionJournal& journal,
     out.lesson = std::move(*lesson);
     return true;
   };
-  if (auto s = journal.read_lessons(0, std::numeric_limits<Tick>::max(), visit); !s) return s.error();
+  if (auto s = journal.read_lessons(0, std::numeric_limits<Tick>::max(), visit); !s)
+    return s.error();
   if (!status) return status.error();
   return out;
 }
