@@ -36,7 +36,9 @@ std::vector<Vec3f> dense(std::span<const Vec3f> line) {
 }  // namespace
 
 std::optional<Vec3f> LessonView::target_m(Tick now) const {
-  if (is_over || goal != Goal::Follow || line_m.empty() || !(lap_s > 0)) return std::nullopt;
+  if (is_over || line_m.empty()) return std::nullopt;
+  if (goal == Goal::Carry) return line_m.back();
+  if (goal != Goal::Follow || !(lap_s > 0)) return std::nullopt;
   float whole = 0;
   for (std::size_t i = 0; i + 1 < line_m.size(); ++i) whole += length(line_m[i + 1] - line_m[i]);
   const double since_s =
@@ -61,8 +63,8 @@ void Replica::apply_lesson(const proto::LessonStage& message) {
   view.stage = message.stage(), view.stages = message.stages();
   view.name = message.name(), view.text = message.text(), view.hint = message.hint();
   const int goal = message.goal();
-  for (const auto known :
-       {LessonView::Goal::Find, LessonView::Goal::Follow, LessonView::Goal::Incise})
+  for (const auto known : {LessonView::Goal::Find, LessonView::Goal::Follow,
+                           LessonView::Goal::Incise, LessonView::Goal::Carry})
     if (goal == static_cast<int>(known)) view.goal = known;
   view.begin_tick = message.begin_tick();
   view.limit_s = message.limit_s(), view.force_limit_n = message.force_limit_n();

@@ -108,7 +108,7 @@ struct LessonResult {
   std::vector<std::string> lines;  // what was measured
 };
 struct LessonView {
-  enum class Goal : std::uint8_t { Other = 0, Find = 1, Follow = 2, Incise = 5 };
+  enum class Goal : std::uint8_t { Other = 0, Find = 1, Follow = 2, Incise = 5, Carry = 7 };
   std::string title, name, text, hint;  // hint: empty until it is time
   std::uint32_t stage = 0, stages = 0;  // from 0
   Goal goal = Goal::Other;
@@ -123,7 +123,7 @@ struct LessonView {
   float progress = 0, seconds = 0;
   bool is_too_strong = false;
 
-  // Returns where the point to follow is; nothing: there is none.
+  // Returns where the point to follow is, or a piece has to be; nothing: there is none.
   std::optional<Vec3f> target_m(Tick now) const;
 };
 

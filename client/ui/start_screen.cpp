@@ -23,12 +23,13 @@ constexpr std::array<RoleText, 4> kRoleTexts{
 struct OrganText {
   const char *name, *text;
 };
-constexpr std::array<OrganText, 6> kOrgans{{{"liver", "Liver, of a measured material"},
+constexpr std::array<OrganText, 7> kOrgans{{{"liver", "Liver, of a measured material"},
                                             {"elastic-liver", "Liver, elastic: for slow machines"},
                                             {"stomach", "Stomach, hollow"},
                                             {"chest", "Chest: several organs, one on another"},
                                             {"lattice", "Block of springs"},
-                                            {"plate", "Plate"}}};
+                                            {"plate", "Plate"},
+                                            {"pegs", "Board with rings to move"}}};
 
 template <std::size_t Size>
 void set_text(std::array<char, Size>& to, const std::string& text) {

@@ -5,6 +5,8 @@
 #include <map>
 #include <numeric>
 
+#include "common/lesson/loose_piece.h"
+
 namespace trocar::lesson {
 namespace {
 
@@ -14,6 +16,7 @@ constexpr double kTouchM = 0.015;   // from the surface: an answer there means t
 constexpr double kCovered = 0.9;    // of a line that counts as cut
 constexpr Tick kWoundPeriod = 250;  // ticks between two looks at the wound
 constexpr double kFeltN = 0.05;     // less is not a touch
+constexpr double kInHandM = 0.015;  // from a grasping tip to the piece that it holds
 
 double seconds_of(Tick ticks) {
   return static_cast<double>(ticks) / static_cast<double>(kTicksPerSecond);
@@ -54,6 +57,12 @@ struct Course::Meter {
   Incision incision;
   std::optional<Specimen> specimen;
   double harm_m2 = 0;
+  // The loose piece.
+  std::optional<std::uint32_t> piece_epoch;
+  std::vector<TriangleIndex> piece;
+  bool is_in_hand = false;
+  int most_hands = 0;  // that held it at the same time
+  double drops = 0, off_m = kNotMeasured;
 };
 
 std::vector<std::string> lines_of(const StageResult& result) {
@@ -89,7 +98,9 @@ bool Course::shows_hint() const {
 }
 
 std::optional<Vec3d> Course::target_m() const {
-  if (is_over() || stage().goal != Goal::Follow) return std::nullopt;
+  if (is_over()) return std::nullopt;
+  if (stage().goal == Goal::Carry) return stage().line_m.back();
+  if (stage().goal != Goal::Follow) return std::nullopt;
   // The point goes there and back in one lap.
   const double part = std::fmod(seconds() / stage().lap_s, 1.0);
   const double way = way_of(stage().line_m) * (part < 0.5 ? 2 * part : 2 - 2 * part);
@@ -149,6 +160,10 @@ void Course::end_stage(bool is_reached) {
   }
   if (stage.goal == Goal::Follow && meter.off_s > 0)
     set(Measure::Error, meter.off_ms / meter.off_s);
+  if (stage.goal == Goal::Carry) {
+    set(Measure::Error, meter.off_m);
+    set(Measure::Drops, meter.drops);
+  }
   if (stage.goal == Goal::Incise) {
     set(Measure::Error, meter.incision.error_m);
     set(Measure::StrayWound, meter.incision.stray_m2);
@@ -253,6 +268,35 @@ bool Course::holds(const Moment& moment, double dt_s) {
   return meter.held_s >= stage().hold_s;
 }
 
+bool Course::carries(const Moment& moment, double dt_s) {
+  auto& meter = *meter_;
+  if (moment.layout == nullptr) return false;
+  const auto& layout = *moment.layout;
+  const auto &from = stage().line_m.front(), &to = stage().line_m.back();
+  if (meter.piece_epoch != layout.epoch) {
+    meter.piece_epoch = layout.epoch;
+    meter.piece = find_loose_piece(layout, from);
+  }
+  if (meter.piece.empty()) return false;
+  const auto piece = place_piece(layout, moment.displacements, meter.piece);
+  const auto holding = std::ranges::count_if(moment.tips, [&](const Tip& tip) {
+    return tip.verb == tool::Verb::Grasp && tip.has_claim &&
+           std::ranges::any_of(piece.corners, [&](const Vec3d& corner) {
+             return length(corner - tip.position_m) < kInHandM;
+           });
+  });
+  meter.off_m = length(piece.centre_m - to);
+  const bool is_there = meter.off_m <= stage().tolerance_m;
+  if (meter.is_in_hand && holding == 0 && !is_there) meter.drops += 1;
+  meter.is_in_hand = holding > 0;
+  meter.most_hands = std::max(meter.most_hands, static_cast<int>(holding));
+  const bool is_given = meter.most_hands >= stage().hands;
+  meter.held_s = is_there && holding == 0 && is_given ? meter.held_s + dt_s : 0;
+  const double near = std::clamp(1 - meter.off_m / length(from - to), 0.0, 1.0);
+  progress_ = std::min(1.0, 0.5 * near + 0.5 * meter.held_s / stage().hold_s);
+  return meter.held_s >= stage().hold_s;
+}
+
 bool Course::is_reached(const Moment& moment, double dt_s) {
   switch (stage().goal) {
     case Goal::Find:
@@ -263,6 +307,8 @@ bool Course::is_reached(const Moment& moment, double dt_s) {
       return lifts(moment, dt_s);
     case Goal::Hold:
       return holds(moment, dt_s);
+    case Goal::Carry:
+      return carries(moment, dt_s);
     case Goal::Incise:
       progress_ = std::min(1.0, meter_->incision.covered / kCovered);
       return meter_->incision.covered >= kCovered;

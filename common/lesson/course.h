@@ -84,7 +84,7 @@ class Course {
   // Returns the wound within what is to be spared, m^2, of the stage so far as it was last looked
   // at.
   double harm_m2() const;
-  // Returns where the point to follow is; nothing: there is none.
+  // Returns where the point to follow is, or a piece has to be; nothing: there is none.
   std::optional<Vec3d> target_m() const;
   const std::vector<StageResult>& results() const { return results_; }  // of stages that are over
   double points() const;                                                // mean of all stages so far
@@ -100,6 +100,7 @@ class Course {
   bool follows(const Moment& moment, double dt_s);
   bool lifts(const Moment& moment, double dt_s);
   bool holds(const Moment& moment, double dt_s);
+  bool carries(const Moment& moment, double dt_s);
 
   Lesson lesson_;
   std::vector<StageResult> results_;

@@ -30,13 +30,14 @@ constexpr std::array<MeasureText, kMeasures> kTexts{
      {"volume_cm3", "taken out", "cm³", 1e6, 1},
      {"harm_cm2", "cut into what is to be spared", "cm²", 1e4, 2},
      {"refusals", "refused or lost grasps", "", 1, 0},
-     {"blood_ml", "blood lost", "ml", 1e6, 1}}};
+     {"blood_ml", "blood lost", "ml", 1e6, 1},
+     {"drops", "let go elsewhere", "", 1, 0}}};
 
 }  // namespace
 
 const char* name_of(Goal goal) {
-  constexpr std::array<const char*, kGoals> kNames{"find", "follow", "lift",
-                                                   "hold", "incise", "remove"};
+  constexpr std::array<const char*, kGoals> kNames{"find",   "follow", "lift", "hold",
+                                                   "incise", "remove", "carry"};
   return kNames[static_cast<std::size_t>(goal)];
 }
 

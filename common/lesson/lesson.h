@@ -40,8 +40,9 @@ enum class Goal : std::uint8_t {
   Hold,    // several hands hold tissue at the same time
   Incise,  // cut along a line, to a depth
   Remove,  // cut a structure out whole
+  Carry,   // move a loose piece to a place
 };
-inline constexpr int kGoals = 6;
+inline constexpr int kGoals = 7;
 const char* name_of(Goal goal);
 
 // These are measured in each stage, as docs/lessons.md defines it. Less is better in all of them.
@@ -59,8 +60,9 @@ enum class Measure : std::uint8_t {
   Harm,           // m^2 of wound within structures that are to be spared
   Refusals,       // grasps and cuts that were refused, slipped or were lost
   Blood,          // m^3 lost
+  Drops,          // times that a piece was let go elsewhere than at its place
 };
-inline constexpr int kMeasures = 13;
+inline constexpr int kMeasures = 14;
 // "time_s": as in files.
 const char* key_of(Measure measure);
 // "greatest force".
@@ -86,13 +88,14 @@ struct Stage {
   double limit_s = 300;       // then the next stage begins
   double force_limit_n = 0;   // more is told and counted; 0: there is no limit
   std::string structure;      // to find or remove
-  double tolerance_m = 0.01;  // of an answer, the tip's distance, a wound beside the line
-  double hold_s = 3;          // how long a point is followed, tissue lifted or held
+  double tolerance_m = 0.01;  // of an answer, the tip, a wound beside the line, a piece's place
+  double hold_s = 3;  // how long a point is followed, tissue lifted or held, a piece left alone
   double lift_m = 0.02;
-  int hands = 1;           // that hold
+  int hands = 1;           // that hold at the same time
   double depth_m = 0.005;  // of an incision
   double margin_m = 0;     // of what is removed, around the structure
-  // The way of the point to follow, or the line to cut along, on the surface at rest.
+  // The way of the point to follow, or the line to cut along, on the surface at rest; where a piece
+  // is at rest, and where it is to be.
   std::vector<Vec3d> line_m;
   double lap_s = 10;               // the point's time along the line and back
   std::vector<std::string> spare;  // names of structures

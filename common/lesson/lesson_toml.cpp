@@ -20,7 +20,8 @@ constexpr std::array<std::pair<std::string_view, Goal>, kGoals> kGoalNames{
      {"lift", Goal::Lift},
      {"hold", Goal::Hold},
      {"incise", Goal::Incise},
-     {"remove", Goal::Remove}}};
+     {"remove", Goal::Remove},
+     {"carry", Goal::Carry}}};
 
 void read_length(TableReader& reader, std::string_view key, double& to_m, double least_mm,
                  double most_mm) {
@@ -126,6 +127,16 @@ void read_line(TableReader& reader, Stage& stage, Document& document) {
   if (document.ok() && way < 1e-3) reader.fail("line_mm", "is shorter than a millimetre");
 }
 
+void read_way(TableReader& reader, Stage& stage) {
+  const auto from = read_place(reader, "from_mm"), to = read_place(reader, "to_mm");
+  if (!from) reader.fail_missing("from_mm", "say where the piece is at rest");
+  if (!to) reader.fail_missing("to_mm", "say where its middle has to be");
+  if (!from || !to) return;
+  if (length(*from - *to) < 1e-3)
+    reader.fail("to_mm", "is less than a millimetre from from_mm: nothing is to be carried");
+  stage.line_m = {*from, *to};
+}
+
 void read_goal(TableReader& reader, Stage& stage, const Lesson& lesson, Document& document) {
   const auto is = [&](std::initializer_list<Goal> goals) {
     return std::ranges::find(goals, stage.goal) != goals.end();
@@ -138,14 +149,15 @@ void read_goal(TableReader& reader, Stage& stage, const Lesson& lesson, Document
     stage.structure = read_text(reader, "structure", true);
     if (!stage.structure.empty()) known(stage.structure, "structure");
   }
-  if (is({Goal::Find, Goal::Follow, Goal::Incise}))
+  if (is({Goal::Find, Goal::Follow, Goal::Incise, Goal::Carry}))
     read_length(reader, "tolerance_mm", stage.tolerance_m, 0.5, 100);
-  if (is({Goal::Follow, Goal::Lift, Goal::Hold}))
+  if (is({Goal::Follow, Goal::Lift, Goal::Hold, Goal::Carry}))
     read_number(reader, "hold_s", stage.hold_s, 0.1, kLongestS);
   if (is({Goal::Follow, Goal::Incise})) read_line(reader, stage, document);
   if (is({Goal::Follow})) read_number(reader, "lap_s", stage.lap_s, 1, kLongestS);
   if (is({Goal::Lift})) read_length(reader, "lift_mm", stage.lift_m, 1, 500);
-  if (is({Goal::Hold}))
+  if (is({Goal::Carry})) read_way(reader, stage);
+  if (is({Goal::Hold, Goal::Carry}))
     if (const auto hands = reader.integer("hands", 1, 16)) stage.hands = static_cast<int>(*hands);
   if (is({Goal::Incise})) read_length(reader, "depth_mm", stage.depth_m, 0.5, 100);
   if (is({Goal::Remove})) read_length(reader, "margin_mm", stage.margin_m, 0, 50);

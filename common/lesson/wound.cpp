@@ -4,8 +4,9 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <numeric>
 #include <optional>
+
+#include "common/lesson/loose_piece.h"
 
 namespace trocar::lesson {
 namespace {
@@ -67,26 +68,6 @@ double solid_angle(const Triangle& triangle, const Vec3d& place) {
   const double below = la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb;
   return 2 * std::atan2(dot(a, cross(b, c)), below);
 }
-
-class Components {
- public:
-  explicit Components(const wire::SurfaceLayout& layout) : parent_(layout.vertex_count()) {
-    std::iota(parent_.begin(), parent_.end(), 0u);
-    for (const auto& corners : layout.triangles) {
-      if (!corners[0].is_valid()) continue;
-      join(corners[0].value, corners[1].value);
-      join(corners[0].value, corners[2].value);
-    }
-  }
-  std::uint32_t of(std::uint32_t vertex) {
-    while (parent_[vertex] != vertex) vertex = parent_[vertex] = parent_[parent_[vertex]];
-    return vertex;
-  }
-
- private:
-  void join(std::uint32_t a, std::uint32_t b) { parent_[of(a)] = of(b); }
-  std::vector<std::uint32_t> parent_;
-};
 
 }  // namespace
 

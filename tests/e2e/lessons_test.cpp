@@ -67,8 +67,8 @@ void assess(const std::filesystem::path& file, Played& played) {
 
 // Plays a lesson until so many stages are over, or for so many seconds.
 Played play(const std::string& lesson, const std::vector<Hand>& hands, int stages, int seconds,
-            const std::vector<std::string>& extra = {}) {
-  Session session("liver", {"--lesson", lesson});
+            const std::vector<std::string>& extra = {}, const std::string& organ = "liver") {
+  Session session(organ, {"--lesson", lesson});
   std::vector<Program> clients;
   for (const auto& hand : hands) {
     std::vector<std::string> arguments{"--script", kHands / (hand.script + ".toml"), "--no-render"};
@@ -167,6 +167,21 @@ TEST(Lessons, WhoCutsFarFromTheLumpTakesItOutWithItsMargin) {
   ASSERT_EQ(badly.results.size(), 2u);
   EXPECT_LT(badly.results[1].points(), well.results[1].points() - 10);
   EXPECT_GT(badly.measure(1, "missing_margin_mm"), 3);
+}
+
+TEST(Lessons, WhoLetsNoRingFallGetsMorePoints) {
+  const auto well = play("move-the-rings", {{"Anna", "carry-well"}}, 3, 90, {}, "pegs");
+  ASSERT_EQ(well.results.size(), 3u);
+  for (int stage = 0; stage < 3; ++stage) {
+    EXPECT_TRUE(well.results[stage].is_reached());
+    EXPECT_GT(well.results[stage].points(), 80);
+    EXPECT_EQ(well.measure(stage, "drops"), 0);
+  }
+  const auto badly = play("move-the-rings", {{"Anna", "carry-badly"}}, 1, 60, {}, "pegs");
+  ASSERT_EQ(badly.results.size(), 1u);
+  EXPECT_TRUE(badly.results[0].is_reached());
+  EXPECT_EQ(badly.measure(0, "drops"), 1);
+  EXPECT_LT(badly.results[0].points(), well.results[0].points() - 10);
 }
 
 // Clients are told nothing of what lies in the organ.

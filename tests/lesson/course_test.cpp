@@ -194,6 +194,62 @@ TEST(Course, InciseAndRemoveFollowTheSurface) {
   EXPECT_EQ(other.course.results()[0].value(Measure::MissingMargin), 0);
 }
 
+// A loose cube of 20 mm stands beside the box, and is to be 0.1 m farther right.
+TEST(Course, APieceIsCarriedFromHandToHandToItsPlaceAndLetGo) {
+  Stage stage{.name = "C", .text = "t", .goal = Goal::Carry};
+  stage.line_m = {{0.1, 0, 0}, {0.2, 0, 0}};
+  stage.tolerance_m = 0.004, stage.hold_s = 1, stage.hands = 2;
+  Play play(stage);
+  add_box(play.layout, {0.09, -0.01, -0.01}, {0.11, 0.01, 0.01}, false, false);
+  play.displacements.resize(play.layout.vertex_count());
+  const auto move_piece = [&](double x) {
+    for (std::size_t v = 8; v < 16; ++v) play.displacements[v] = quanta_of({x, 0, 0});
+  };
+  const auto grasp = [](ToolSlot tool, double x) {
+    return Tip{
+        .tool = tool, .position_m = {x, 0.01, 0.01}, .verb = tool::Verb::Grasp, .has_claim = true};
+  };
+  // Lying at its place does not count before two hands have held it.
+  move_piece(0.1);
+  play.seconds(3);
+  EXPECT_FALSE(play.course.is_over());
+  EXPECT_NEAR(length(*play.course.target_m() - Vec3d{0.2, 0, 0}), 0, 1e-12);
+  move_piece(0);
+  play.tips = {grasp(kTool, 0.09)};
+  play.seconds(0.5);
+  move_piece(0.05);
+  play.tips = {grasp(kTool, 0.14), grasp(kOther, 0.16)};
+  play.seconds(0.5);
+  play.tips = {grasp(kOther, 0.16)};
+  play.seconds(0.5);
+  play.tips = {{.tool = kOther, .position_m = {0.16, 0.01, 0.01}}};
+  play.seconds(0.5);  // it is let go on the way
+  play.tips = {grasp(kOther, 0.16)};
+  play.frame();
+  move_piece(0.098);
+  play.tips = {grasp(kOther, 0.21)};
+  play.seconds(2);
+  EXPECT_FALSE(play.course.is_over()) << "it is still held";
+  play.tips = {{.tool = kOther, .position_m = {0.21, 0.03, 0.01}}};
+  play.seconds(0.9);
+  EXPECT_FALSE(play.course.is_over());
+  play.seconds(0.2);
+  ASSERT_TRUE(play.course.is_over());
+  const auto& result = play.course.results()[0];
+  EXPECT_TRUE(result.is_reached);
+  EXPECT_EQ(result.value(Measure::Drops), 1);
+  EXPECT_NEAR(result.value(Measure::Error), 0.002, 48e-6) << "to quanta of the wire";
+}
+
+TEST(Course, WhatIsHeldIsNotALoosePiece) {
+  Stage stage{.name = "C", .text = "t", .goal = Goal::Carry};
+  stage.line_m = {{0, 0, 0}, {0, 0, 0.001}};
+  stage.hold_s = 0.1;
+  Play play(stage);
+  play.seconds(1);
+  EXPECT_FALSE(play.course.is_over()) << "the box is fixed";
+}
+
 TEST(Course, PointsAreTheMeanOfWhatIsScored) {
   Stage stage{.name = "L", .text = "t", .goal = Goal::Lift};
   stage.lift_m = 0.01, stage.hold_s = 0.5;

@@ -18,7 +18,7 @@ std::string error_of(const std::string& text) {
 }
 
 TEST(LessonFile, AllThatShipAreGood) {
-  EXPECT_EQ(lesson_texts().size(), 6u);
+  EXPECT_EQ(lesson_texts().size(), 7u);
   for (const auto& [name, text] : lesson_texts()) {
     const auto lesson = read_lesson_text(text, name);
     ASSERT_TRUE(lesson) << lesson.error().message;
@@ -38,6 +38,22 @@ TEST(LessonFile, ReadsLengthsInMillimetres) {
   EXPECT_DOUBLE_EQ(score.points(0.0005), 1);
   EXPECT_DOUBLE_EQ(score.points(0.003), 0.5);
   EXPECT_DOUBLE_EQ(score.points(0.006), 0);
+}
+
+TEST(LessonFile, ReadsWhereAPieceIsCarried) {
+  const std::string stage =
+      std::string(kHead) + "[[stage]]\nname = \"S\"\ntext = \"Carry it.\"\ngoal = \"carry\"\n";
+  const auto lesson = read_lesson_text(
+      stage + "from_mm = [1, 2, 3]\nto_mm = [40, 0, 0]\nhands = 2\nhold_s = 1\n", "x.toml");
+  ASSERT_TRUE(lesson) << lesson.error().message;
+  EXPECT_EQ(lesson->stages[0].hands, 2);
+  ASSERT_EQ(lesson->stages[0].line_m.size(), 2u);
+  EXPECT_DOUBLE_EQ(lesson->stages[0].line_m[1].x, 0.04);
+  EXPECT_NE(error_of(stage + "from_mm = [1, 2, 3]\n").find("to_mm: is missing, say where"),
+            std::string::npos)
+      << error_of(stage + "from_mm = [1, 2, 3]\n");
+  EXPECT_NE(error_of(stage + "from_mm = [1, 2, 3]\nto_mm = [1, 2, 3]\n").find("to_mm"),
+            std::string::npos);
 }
 
 TEST(LessonFile, ReadsWhatBleeds) {

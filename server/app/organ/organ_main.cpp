@@ -141,10 +141,10 @@ Result<organ::Organ> make_named(const std::string& name, const std::optional<int
       return Error{ErrorCode::Usage, "make lattice: --tets does not apply, a lattice has none"};
     return catalogue::make_lattice();
   }
-  if (name == "plate" || name == "chest") {
+  if (name == "plate" || name == "chest" || name == "pegs") {
     if (tets)
       return Error{ErrorCode::Usage, "make " + name + ": --tets does not apply, its mesh is given"};
-    return name == "plate" ? catalogue::make_plate() : catalogue::make_chest();
+    return *catalogue::load_organ(name);
   }
   if (tets.value_or(0) >= kManyTets)
     std::fprintf(stderr, "%s: meshing a %s of about %s tets, this takes some seconds\n", kProgram,
@@ -324,17 +324,17 @@ void add_commands(CLI::App& app, Options& options) {
   make->add_option("NAME", options.made_name,
                    "liver (human_liver_nava2008), elastic-liver (neo-Hookean), stomach, lattice "
                    "(Choi's 30 x 15 x 30 nodes), plate (Nakao's 16 x 16 x "
-                   "0.4 cm) or "
-                   "chest (wall and heart, the size of Nakao's); or a scenario's .toml file: its "
+                   "0.4 cm), chest (wall and heart, the size of Nakao's) or pegs (a board with "
+                   "three rings to move); or a scenario's .toml file: its "
                    "organ with its materials, regions and held nodes")
       ->required()
       ->check([](const std::string& name) -> std::string {
-        static constexpr std::array<std::string_view, 6> kNames{
-            "liver", "elastic-liver", "stomach", "lattice", "plate", "chest"};
+        static constexpr std::array<std::string_view, 7> kNames{
+            "liver", "elastic-liver", "stomach", "lattice", "plate", "chest", "pegs"};
         if (name.ends_with(".toml") || std::ranges::find(kNames, name) != kNames.end()) return {};
         return name +
-               ": is neither liver, elastic-liver, stomach, lattice, plate or chest nor a "
-               ".toml file of a scenario";
+               ": is neither liver, elastic-liver, stomach, lattice, plate, chest or pegs nor "
+               "a .toml file of a scenario";
       });
   make->add_option("--tets", options.tets,
                    "how many tets, met within 5 %: liver " +

@@ -264,7 +264,7 @@ CommandLine::CommandLine() {
 void CommandLine::add_session_options() {
   organ_ =
       app_.add_option("--organ", options_.organ,
-                      "built-in organ (liver, elastic-liver, lattice, plate, stomach, chest), an "
+                      "built-in organ (liver, elastic-liver, lattice, plate, stomach, chest, pegs), an "
                       ".organ file or a .msh mesh")
           ->type_name("NAME|FILE")
           ->capture_default_str();

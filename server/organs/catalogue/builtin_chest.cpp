@@ -5,6 +5,7 @@
 
 #include "server/organs/catalogue/builtin_organs.h"
 #include "server/organs/catalogue/builtin_search.h"
+#include "server/organs/catalogue/five_tets.h"
 #include "server/organs/mesh/pieces.h"
 #include "server/organs/mesh/stuffing.h"
 
@@ -23,23 +24,6 @@ int wall_node(int i, int j, int k) {
   return i + (kCellsX + 1) * (j + (kCellsY + 1) * k);
 }
 
-// Five tets; the odd cells are mirrored, so that diagonals of neighbours meet.
-void add_cell(mesh::TetMesh& mesh, int i, int j, int k) {
-  // Corners: bit 0 greater x, bit 1 greater y, bit 2 greater z.
-  constexpr int kFive[5][4] = {
-      {0, 1, 2, 4}, {3, 2, 1, 7}, {5, 4, 7, 1}, {6, 7, 4, 2}, {1, 2, 4, 7}};
-  const int odd = (i + j + k) % 2;
-  for (const auto& corners : kFive) {
-    mesh::Tet tet;
-    for (std::size_t c = 0; c < 4; ++c)
-      tet[c] = NodeIndex(wall_node(i + ((corners[c] & 1) ^ odd), j + (corners[c] >> 1 & 1),
-                                   k + (corners[c] >> 2 & 1)));
-    const auto at = [&](std::size_t c) { return mesh.rest_positions[tet[c].value]; };
-    if (dot(cross(at(1) - at(0), at(2) - at(0)), at(3) - at(0)) < 0) std::swap(tet[0], tet[1]);
-    mesh.tets.push_back(tet);
-  }
-}
-
 mesh::TetMesh chest_mesh() {
   mesh::TetMesh mesh;
   for (int k = 0; k <= kCellsZ; ++k)
@@ -50,7 +34,9 @@ mesh::TetMesh chest_mesh() {
                                        (static_cast<double>(k) / kCellsZ - 0.5) * kWall_m.z});
   for (int k = 0; k < kCellsZ; ++k)
     for (int j = 0; j < kCellsY; ++j)
-      for (int i = 0; i < kCellsX; ++i) add_cell(mesh, i, j, k);
+      for (int i = 0; i < kCellsX; ++i)
+        add_five_tets(mesh, i, j, k,
+                      [](int x, int y, int z) { return NodeIndex(wall_node(x, y, z)); });
   return mesh;
 }
 

@@ -69,4 +69,9 @@ Result<organ::Organ> make_stomach(int target_tets = kDefaultStomachTets);
 // s.
 organ::Organ make_chest();
 
+// A board, 150 x 5 x 90 mm, with six pegs of 6 x 20 x 6 mm, three on the left and three on the
+// right; around each of those on the left lies a ring, 24 x 10 x 24 mm with a hole of 12 mm, which
+// nothing holds. Neo-Hookean rubber of 50 kPa under gravity; the board is held at its lower face.
+organ::Organ make_pegs();
+
 }  // namespace trocar::catalogue

@@ -3,14 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/organs/catalogue/smooth_min.h"
+
 namespace trocar::catalogue {
 namespace {
 
-// Polynomial smooth minimum: rounds the crease over a width of about k.
-double smooth_min(double a, double b, double k) {
-  const double h = std::max(k - std::abs(a - b), 0.0) / k;
-  return std::min(a, b) - h * h * k * 0.25;
-}
 double smooth_max(double a, double b, double k) {
   return -smooth_min(-a, -b, k);
 }

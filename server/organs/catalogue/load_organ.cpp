@@ -13,6 +13,7 @@ Result<organ::Organ> load_organ(const std::string& spec) {
   if (spec == "plate") return make_plate();
   if (spec == "stomach") return make_stomach();
   if (spec == "chest") return make_chest();
+  if (spec == "pegs") return make_pegs();
   const std::filesystem::path path(spec);
   if (path.extension() == ".organ") return organ::read_organ(path);
   if (can_be_imported(path)) {
@@ -24,8 +25,8 @@ Result<organ::Organ> load_organ(const std::string& spec) {
   }
   return Error{ErrorCode::BadFile,
                "organ '" + spec +
-                   "' is neither liver, elastic-liver, lattice, plate, stomach nor chest, nor an "
-                   ".organ file or a mesh that can be imported"};
+                   "' is neither liver, elastic-liver, lattice, plate, stomach, chest nor pegs, nor "
+                   "an .organ file or a mesh that can be imported"};
 }
 
 }  // namespace trocar::catalogue

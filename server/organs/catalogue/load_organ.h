@@ -10,7 +10,7 @@
 
 namespace trocar::catalogue {
 
-// "liver" (measured), "elastic-liver", "lattice", "plate", "stomach", "chest", or the path of an
+// "liver" (measured), "elastic-liver", "lattice", "plate", "stomach", "chest", "pegs", or the path of an
 // .organ file or of a mesh (import_organ.h). A mesh is imported with the default options, and its
 // warnings are logged.
 Result<organ::Organ> load_organ(const std::string& spec);

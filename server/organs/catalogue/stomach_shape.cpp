@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "server/organs/catalogue/smooth_min.h"
+
 namespace trocar::catalogue {
 namespace {
 
@@ -87,11 +89,6 @@ double chain(const Vec3d& p, const std::array<Piece, n>& pieces) {
       least = std::min(least, length(offset - piece.along * t) - (piece.r + piece.widening * t));
     }
   return least;
-}
-
-double smooth_min(double a, double b, double k) {
-  const double h = std::max(k - std::abs(a - b), 0.0) / k;
-  return std::min(a, b) - h * h * k * 0.25;
 }
 
 // A flat cut through a tube.
