@@ -360,7 +360,7 @@ Result<ExitCode> run_chosen(const ClientOptions& options) {
     auto felt = open_devices(options);
     if (!felt) return felt.error();
     hands = std::move(*felt);
-  } else if (options.display == Display::Window && replica::has_tools(options.role)) {
+  } else if (options.display == Display::Window && options.has_tools()) {
     hands = Hands::mouse(options.instruments(), options.tool_of(0), options.mouse_hands);
   }
   net::NetSourceOptions connection;

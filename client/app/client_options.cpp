@@ -140,6 +140,12 @@ Status check_tools(const ClientOptions& options) {
 }
 
 // Checks what belongs to devices, without opening them.
+Error lacks_tools(const std::string& option, replica::Role role) {
+  const bool may = wire::rights_of(role).may_have_tools;
+  return {ErrorCode::Usage, option + ": an " + replica::name_of(role) + " has no tools; " +
+                                (may ? "add --with-tools" : "use --role surgeon or assistant")};
+}
+
 Status check_devices(const ClientOptions& options) {
   const std::size_t count = options.devices.size();
   const auto fits = [&](std::size_t given) { return given <= 1 || given == count; };
@@ -170,9 +176,7 @@ Status check_devices(const ClientOptions& options) {
     return Error{ErrorCode::Usage, "--tool, --port: a recording takes no tools; leave them out"};
   if (!fits(options.tools.size()) || !fits(options.ports_m.size()))
     return Error{ErrorCode::Usage, "--tool, --port: give one, or one for each device"};
-  if (!is_replay && !replica::has_tools(options.role))
-    return Error{ErrorCode::Usage, "--device: an " + std::string(replica::name_of(options.role)) +
-                                       " has no tools; use --role surgeon or assistant"};
+  if (!is_replay && !options.has_tools()) return lacks_tools("--device", options.role);
   return {};
 }
 
@@ -189,9 +193,10 @@ Status check(const ClientOptions& options) {
     return Error{ErrorCode::Usage, "--pictures: is of a recording; give --replay too"};
   if (const auto tools = check_tools(options); !tools) return tools;
   if (const auto devices = check_devices(options); !devices) return devices;
-  if (!options.script_file.empty() && !replica::has_tools(options.role))
-    return Error{ErrorCode::Usage, "--script: an " + std::string(replica::name_of(options.role)) +
-                                       " has no tools; use --role surgeon or assistant"};
+  if (!options.script_file.empty() && !options.has_tools())
+    return lacks_tools("--script", options.role);
+  if (options.brings_tools && !wire::rights_of(options.role).may_have_tools)
+    return lacks_tools("--with-tools", options.role);
   if (options.is_insecure && !(options.join.empty() && options.ca_file.empty()))
     return Error{ErrorCode::Usage,
                  "--insecure-loopback: goes with neither --join nor --ca; leave one out"};
@@ -246,6 +251,9 @@ void add_session_options(CLI::App& app, ClientOptions& options, GivenTexts& more
       ->check(CLI::IsMember(more.roles))
       ->type_name("ROLE")
       ->capture_default_str();
+  app.add_flag(
+      "--with-tools", options.brings_tools,
+      "as instructor: hold instruments, too, to show how, and to take over those of others");
 }
 
 void add_picture_options(CLI::App& app, ClientOptions& options, GivenTexts& more) {

@@ -40,6 +40,7 @@ struct ClientOptions {
   double wait_s = 15;  // for a server that is not there yet
   std::string name;    // empty: made from the login name and the process
   replica::Role role = replica::Role::Surgeon;
+  bool brings_tools = false;  // of a role that may have tools, and need not
   Display display = Display::Window;
   render::Size size{1280, 720};
   double pictures_per_second = 0;  // 0: 60 in a window, 15 headless
@@ -71,6 +72,7 @@ struct ClientOptions {
   std::string log_level = "info";
 
   int mouse_hands = 2;  // of a person with a mouse
+  bool has_tools() const { return replica::has_tools(role) || brings_tools; }
   std::span<const tool::Instrument> instruments() const;
   // Returns one of instruments(), for a device or, 0, a mouse.
   const tool::Instrument& tool_of(std::size_t device) const;

@@ -47,7 +47,8 @@ void Picture::add_lesson(const replica::Replica& replica, bool is_replay,
     shown.seconds =
         static_cast<double>(now > lesson->begin_tick ? now - lesson->begin_tick : 0) * 1e-3;
   } else {
-    shown.can_answer = lesson->goal == replica::LessonView::Goal::Find && replica::has_tools(role_);
+    shown.can_answer =
+        lesson->goal == replica::LessonView::Goal::Find && replica.own_slot().has_tools();
     shown.can_lead = role_ == replica::Role::Instructor;
   }
   for (const auto& result : lesson->results) {
@@ -72,8 +73,11 @@ void Picture::add_pace(const replica::Replica& replica, bool is_replay, ui::HudM
     model.pace_text = text;
   }
   if (!model.can_mark || !replica.has_pace()) return;
-  ui::HudConduct conduct{
-      .is_paused = pace.is_paused, .rate = pace.rate, .marks = replica.marks(), .hands = {}};
+  ui::HudConduct conduct{.is_paused = pace.is_paused,
+                         .rate = pace.rate,
+                         .marks = replica.marks(),
+                         .hands = {},
+                         .own = replica.own_slot()};
   for (const auto& who : replica.participants())
     if (!who.tools.empty())
       conduct.hands.push_back(

@@ -94,6 +94,7 @@ Status apply(const ui::StartChoice& choice, ClientOptions& options) {
   options.server = trimmed(choice.server);
   options.name = trimmed(choice.name);
   options.role = choice.role;
+  options.brings_tools = choice.brings_tools;
   if (!options.join.empty()) {
     const auto invitation = secure::parse_invitation(options.join);
     if (!invitation) return invitation.error();
@@ -218,6 +219,7 @@ void use_own(const ui::StartChoice& choice, ClientOptions& options) {
   options.join.clear();
   if (!choice.name.empty()) options.name = choice.name;
   options.role = choice.deed == ui::StartDeed::Practise ? replica::Role::Surgeon : choice.role;
+  options.brings_tools = choice.brings_tools && options.role == choice.role;
 }
 
 }  // namespace
@@ -242,7 +244,8 @@ Result<std::optional<ClientOptions>> choose_session(ClientOptions options,
   ui::StartScreen screen({.server = has_tried && !own ? options.server : "",
                           .code = options.join,
                           .name = options.name,
-                          .role = options.role});
+                          .role = options.role,
+                          .brings_tools = options.brings_tools});
   Lookout lookout;
   OwnStart own_start(own);
   ui::StartModel model{.tasks = tasks(), .recordings = recordings_at_hand(), .message = message};

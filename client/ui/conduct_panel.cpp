@@ -48,14 +48,15 @@ void draw_marks(const HudConduct& conduct, float scale, HudActions& actions) {
   }
 }
 
-// A line says which instrument goes to whom.
+// A line says which instrument goes to whom; what goes to the instructor is taken over.
 void draw_handover(const HudConduct& conduct, const HudHand& hand, HudActions& actions) {
   if (ImGui::SmallButton("Hand over")) ImGui::OpenPopup("hand over");
   if (!ImGui::BeginPopup("hand over")) return;
   for (const auto& receiver : conduct.hands)
     for (std::size_t i = 0; receiver.slot != hand.slot && i < hand.instruments.size(); ++i) {
-      const auto line =
-          hand.instruments[i] + " (" + std::to_string(i + 1) + ") to " + receiver.name;
+      const auto instrument = hand.instruments[i] + " (" + std::to_string(i + 1) + ")";
+      const auto line = receiver.slot == conduct.own ? "take over " + instrument
+                                                     : instrument + " to " + receiver.name;
       if (!ImGui::Selectable(line.c_str())) continue;
       actions.lead = LeadWish{.action = LeadAction::HandOver,
                               .participant = hand.slot,
@@ -89,7 +90,7 @@ void draw_hands(const HudConduct& conduct, HudActions& actions) {
 
 }  // namespace
 
-void draw_conduct(const HudConduct& conduct, const Box& session, float scale, HudActions& actions) {
+Box draw_conduct(const HudConduct& conduct, const Box& session, float scale, HudActions& actions) {
   ImGui::SetNextWindowPos({kMargin * scale, session.bottom + kMargin * scale});
   ImGui::Begin("conduct", nullptr, kPanel);
   heading("Lead");
@@ -108,7 +109,9 @@ void draw_conduct(const HudConduct& conduct, const Box& session, float scale, Hu
     }
     ImGui::EndPopup();
   }
+  const Box box = box_of_window();
   ImGui::End();
+  return box;
 }
 
 }  // namespace trocar::ui

@@ -194,8 +194,8 @@ HudActions Hud::draw(const HudModel& model) {
     right = draw_blood(*model.figures.blood, right, scale_);
   draw_felt_hands(model, right.bottom, scale_);
   draw_own_forces(model, scale_);
-  if (model.tray.hands > 0) draw_tray(model, session, scale_, actions);
-  if (model.conduct) draw_conduct(*model.conduct, session, scale_, actions);
+  const Box left = model.conduct ? draw_conduct(*model.conduct, session, scale_, actions) : session;
+  if (model.tray.hands > 0) draw_tray(model, left, scale_, actions);
   if (model.timeline) draw_timeline(*model.timeline, scale_, actions);
   draw_help(model, scale_);
   ImGui::Render();

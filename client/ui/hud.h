@@ -100,6 +100,7 @@ struct HudConduct {
   float rate = 1;                  // simulated time over real time
   std::vector<std::string> marks;  // an empty one has no name
   std::vector<HudHand> hands;      // who has tools
+  ParticipantSlot own;             // the instructor's
 };
 
 // A tool of one's own, whatever holds it.

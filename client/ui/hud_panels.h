@@ -28,11 +28,11 @@ void draw_own_forces(const HudModel& model, float scale);
 void draw_felt_hands(const HudModel& model, float top, float scale);
 // Names at tools; one that the banners would cover stands under them.
 void draw_labels(const HudModel& model, const Box& banners, float scale);
-// The instruments of one's own, to be chosen from, under the session's panel. Where that one is
+// The instruments of one's own, to be chosen from, under the panels above. Where the session's is
 // tall, with the figures for research, only what the hand has.
-void draw_tray(const HudModel& model, const Box& session, float scale, HudActions& actions);
+void draw_tray(const HudModel& model, const Box& above, float scale, HudActions& actions);
 // An instructor's buttons, under the session's panel.
-void draw_conduct(const HudConduct& conduct, const Box& session, float scale, HudActions& actions);
+Box draw_conduct(const HudConduct& conduct, const Box& session, float scale, HudActions& actions);
 void draw_timeline(const HudTimeline& timeline, float scale, HudActions& actions);
 void draw_help(const HudModel& model, float scale);
 // Greys the scene, which is no longer what the session is.

@@ -38,7 +38,8 @@ void set_text(std::array<char, Size>& to, const std::string& text) {
 
 }  // namespace
 
-StartScreen::StartScreen(const StartChoice& preset) : role_(preset.role) {
+StartScreen::StartScreen(const StartChoice& preset)
+    : role_(preset.role), brings_tools_(preset.brings_tools) {
   set_text(server_, preset.server);
   set_text(code_, preset.code);
   set_text(name_, preset.name);
@@ -53,7 +54,8 @@ StartChoice StartScreen::choice(StartDeed deed) const {
           .server = server_.data(),
           .code = code_.data(),
           .name = name_.data(),
-          .role = role_};
+          .role = role_,
+          .brings_tools = brings_tools_ && role_ == replica::Role::Instructor};
 }
 
 void StartScreen::draw_title() {
@@ -106,6 +108,10 @@ void StartScreen::draw_role() {
       role_ = known.role;
       is_touched_ = true;
     }
+  if (role_ != replica::Role::Instructor) return;
+  ImGui::Indent();
+  ImGui::Checkbox("and holds instruments, to show how and to take over", &brings_tools_);
+  ImGui::Unindent();
 }
 
 bool StartScreen::big_button(const char* text) {

@@ -53,6 +53,7 @@ struct StartChoice {
   std::string recording;        // to watch
   std::string server, code, name;
   replica::Role role = replica::Role::Surgeon;
+  bool brings_tools = false;  // an instructor who holds instruments, too
 };
 
 class StartScreen {
@@ -84,6 +85,7 @@ class StartScreen {
   std::array<char, 33> name_{};
   std::array<char, 512> recording_{};
   replica::Role role_;
+  bool brings_tools_ = false;
   std::size_t organ_ = 0;
   std::string task_;
   bool is_recorded_ = true;

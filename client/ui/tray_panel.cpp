@@ -5,9 +5,9 @@
 
 namespace trocar::ui {
 
-void draw_tray(const HudModel& model, const Box& session, float scale, HudActions& actions) {
+void draw_tray(const HudModel& model, const Box& above, float scale, HudActions& actions) {
   const HudTray& tray = model.tray;
-  ImGui::SetNextWindowPos({kMargin * scale, session.bottom + kMargin * scale});
+  ImGui::SetNextWindowPos({kMargin * scale, above.bottom + kMargin * scale});
   ImGui::Begin("tray", nullptr, model.shows_rate ? kGlass : kPanel);
   if (tray.hands > 1)
     ImGui::TextDisabled("%s hand   Tab: other", tray.hand == 0 ? "right" : "left");

@@ -20,10 +20,11 @@ enum class Role : std::uint8_t {
 // A role's rights. The server checks them; a client looks here to offer only what it may do.
 struct Rights {
   bool has_tools = false;
-  bool may_mark = false;      // marks the organ, and returns it to the mark
-  bool may_point = false;     // shows everybody a place, and draws on the surface
-  bool may_teach = false;     // freezes tools, takes claims, puts people out: see TeachAction
-  std::uint8_t admitted = 0;  // roles that a join code for this one lets in, a bit each
+  bool may_have_tools = false;  // brings instruments if it wishes, and then has a place for them
+  bool may_mark = false;        // marks the organ, and returns it to the mark
+  bool may_point = false;       // shows everybody a place, and draws on the surface
+  bool may_teach = false;       // freezes tools, takes claims, puts people out: see TeachAction
+  std::uint8_t admitted = 0;    // roles that a join code for this one lets in, a bit each
 
   constexpr bool admits(Role role) const {
     return (admitted >> static_cast<unsigned>(role) & 1u) != 0;
@@ -45,6 +46,7 @@ inline constexpr std::array<NamedRole, 4> kRoles{
     {{Role::Surgeon,
       "surgeon",
       {.has_tools = true,
+       .may_have_tools = true,
        .may_mark = false,
        .may_point = false,
        .may_teach = false,
@@ -52,6 +54,7 @@ inline constexpr std::array<NamedRole, 4> kRoles{
      {Role::Assistant,
       "assistant",
       {.has_tools = true,
+       .may_have_tools = true,
        .may_mark = false,
        .may_point = false,
        .may_teach = false,
@@ -59,6 +62,7 @@ inline constexpr std::array<NamedRole, 4> kRoles{
      {Role::Instructor,
       "instructor",
       {.has_tools = false,
+       .may_have_tools = true,
        .may_mark = true,
        .may_point = true,
        .may_teach = true,
@@ -66,6 +70,7 @@ inline constexpr std::array<NamedRole, 4> kRoles{
      {Role::Observer,
       "observer",
       {.has_tools = false,
+       .may_have_tools = false,
        .may_mark = false,
        .may_point = false,
        .may_teach = false,

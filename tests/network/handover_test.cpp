@@ -165,6 +165,34 @@ TEST_F(HandoverTest, TheInstrumentGoesOnGraspingWhereItIsUntilItsNewHandOpens) {
   }
 }
 
+TEST_F(HandoverTest, AnInstructorWithInstrumentsTakesOver) {
+  RawClient ida(session_.port());
+  auto hello = make_hello("Ida", proto::ROLE_INSTRUCTOR);
+  auto& shape = *hello.mutable_hello()->add_tool();
+  shape.set_radius_m(0.005f);
+  shape.set_length_m(0.3f);
+  shape.set_reach_m(0.01f);
+  ASSERT_TRUE(ida.send(hello));
+  const auto welcome = ida.receive(Envelope::kWelcome);
+  ASSERT_TRUE(welcome);
+  constexpr ToolSlot kIdas{4};
+  EXPECT_EQ(welcome->welcome().participant(), kIdas.owner().value) << "a place with tools";
+  auto frame = std::make_shared<step::PublishedFrame>(*session_.make_frame(0));
+  frame->tools.push_back({.tool = kSams, .verb = Verb::Grasp, .has_claim = true});
+  frame->tools.push_back({.tool = kIdas, .verb = Verb::None});
+  session_.publish_all({frame});
+  send_sample(ida, 1, Verb::None, 0.2f);
+  drain();
+  ASSERT_TRUE(ida.send(wish(0, "Sam", kIdas.owner().value, "Ida")));
+  const auto event = told(sam_);
+  EXPECT_TRUE(event.is_done());
+  EXPECT_TRUE(event.text().starts_with("Ida takes over an instrument of Sam: ")) << event.text();
+  const auto inputs = drain();
+  ASSERT_TRUE(inputs.handover);
+  EXPECT_EQ(inputs.handover->from, kSams);
+  EXPECT_EQ(inputs.handover->to, kIdas);
+}
+
 TEST_F(HandoverTest, SaysWhatStandsAgainstIt) {
   EXPECT_EQ(refusal(wish(0, "Sam", 1, "Bea")),
             "not done: nobody has seen that instrument of Sam yet");

@@ -24,6 +24,7 @@ TEST(Roles, AnUnknownNumberIsUnknownAndHasNoTools) {
   for (const int number : {-1, 0, 5, 256, 257}) {
     EXPECT_EQ(role_of(number), Role::Unknown) << number;
     EXPECT_FALSE(has_tools(role_of(number))) << number;
+    EXPECT_FALSE(rights_of(role_of(number)).may_have_tools) << number;
   }
   EXPECT_STREQ(name_of(Role::Unknown), "unknown role");
 }

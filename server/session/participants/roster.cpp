@@ -60,7 +60,7 @@ Result<Participant> Roster::join(std::string_view name, Role role,
     return Error{ErrorCode::Refused, std::move(message)};
   };
   if (!is_valid_name(name)) return refuse(JoinRefusal::NameInvalid, kNameRule);
-  if (!has_tools(role) && !tools.empty())
+  if (!wire::rights_of(role).may_have_tools && !tools.empty())
     return refuse(JoinRefusal::ToolsInvalid,
                   std::string("tools: an ") + name_of(role) + " watches and has none");
   if (tools.size() > static_cast<std::size_t>(places_.tools))
@@ -79,16 +79,17 @@ Result<Participant> Roster::join(std::string_view name, Role role,
             ", choose another with --name");
   if (has_tools(role) && tools.empty()) tools.emplace_back();
 
-  const auto first = slots_.begin() + (has_tools(role) ? 0 : kMaxHands);
-  const int places = has_tools(role) ? places_.hands : places_.watchers;
+  const bool has_hands = !tools.empty();
+  const auto first = slots_.begin() + (has_hands ? 0 : kMaxHands);
+  const int places = has_hands ? places_.hands : places_.watchers;
   const auto last = first + places;
   const auto free = std::find_if(first, last, [](const auto& slot) { return !slot; });
   if (free == last)
     return refuse(JoinRefusal::Full, "full: all " + std::to_string(places) +
-                                         (has_tools(role) ? " places with tools are taken, join as "
-                                                            "observer or come back"
-                                                          : " places for watchers are taken, come "
-                                                            "back later"));
+                                         (has_hands ? " places with tools are taken, join as "
+                                                      "observer or come back"
+                                                    : " places for watchers are taken, come "
+                                                      "back later"));
   const auto index = static_cast<std::uint8_t>(free - slots_.begin());
   *free = Participant{
       .slot = {index}, .name = std::string(name), .role = role, .tools = std::move(tools)};

@@ -16,7 +16,7 @@ std::optional<Replicator::Ending> Replicator::handle_sample(Client& client,
                                                             const proto::ToolSample& sample,
                                                             bool is_ordered) {
   const auto& participant = *client.participant;
-  if (!wire::rights_of(participant.role).has_tools)
+  if (!participant.slot.has_tools())
     return Ending{EndReason::Role, std::string("ToolSample: an ") +
                                        participants::name_of(participant.role) +
                                        " watches and has no tools"};
@@ -41,7 +41,7 @@ std::optional<Replicator::Ending> Replicator::handle_sample(Client& client,
 std::optional<Replicator::Ending> Replicator::handle_hand_report(Client& client,
                                                                  const proto::HandReport& message) {
   const auto& participant = *client.participant;
-  if (!wire::rights_of(participant.role).has_tools)
+  if (!participant.slot.has_tools())
     return Ending{EndReason::Role, std::string("HandReport: an ") +
                                        participants::name_of(participant.role) +
                                        " watches and has no hands"};
@@ -71,7 +71,7 @@ std::optional<Replicator::Ending> Replicator::handle_hand_report(Client& client,
 std::optional<Replicator::Ending> Replicator::handle_tool_change(Client& client,
                                                                  const proto::ToolChange& change) {
   auto& participant = *client.participant;
-  if (!wire::rights_of(participant.role).has_tools)
+  if (!participant.slot.has_tools())
     return Ending{EndReason::Role, std::string("ToolChange: an ") +
                                        participants::name_of(participant.role) +
                                        " watches and has no tools"};

@@ -75,14 +75,13 @@ void Replicator::tell_line(const std::string& words, bool is_good) {
 std::optional<Replicator::Ending> Replicator::handle_lesson(Client& client,
                                                             const proto::LessonRequest& request) {
   const auto role = client.participant->role;
-  const auto rights = wire::rights_of(role);
   const auto slot = client.participant->slot;
   const int action = request.action();
   const bool answers = action == proto::LESSON_ANSWER;
   if (!answers && action != proto::LESSON_NEXT && action != proto::LESSON_RESTART)
     return Ending{EndReason::ProtocolError, "LessonRequest.action: " + std::to_string(action) +
                                                 " is not 1 (answer), 2 (next) or 3 (restart)"};
-  if (answers ? !rights.has_tools : !rights.may_teach)
+  if (answers ? !slot.has_tools() : !wire::rights_of(role).may_teach)
     return Ending{EndReason::Role, std::string("LessonRequest: ") +
                                        (answers ? "who answers has a tool, not an "
                                                 : "stages are the instructor's, not of an ") +

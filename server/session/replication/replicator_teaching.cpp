@@ -57,7 +57,9 @@ std::string words_of(const TeachOrder& order, const std::string& by, const std::
                             : by + " lets time go as fast as it does";
     }
     case TeachAction::HandOver:
-      return by + " hands an instrument of " + who + " to " + order.receiver_name +
+      return (order.receiver_name == by
+                  ? by + " takes over an instrument of " + who
+                  : by + " hands an instrument of " + who + " to " + order.receiver_name) +
              ": what grasps goes on grasping, and moves with the hand of " + order.receiver_name +
              ", who opens it by closing once";
     case TeachAction::None:
