@@ -113,6 +113,18 @@ TEST_F(Assess, CountsWhatBecameOfGraspsAndHowLongAHandWaited) {
   EXPECT_EQ(session.whole.moments[0].person, "Ben");
 }
 
+TEST_F(Assess, BloodIsACurveOverTime) {
+  const auto bled = assess({}, [](step::PublishedFrame& frame) {
+    frame.figures.blood.emplace();
+    frame.figures.blood->shed_nl = 5'000 * frame.tick;  // 5 ml a second
+  });
+  const auto& [time_s, lost_ml] = bled.blood;
+  ASSERT_EQ(time_s.size(), lost_ml.size());
+  ASSERT_NEAR(static_cast<double>(time_s.size()), 16, 1) << "four seconds, four times a second";
+  for (std::size_t i = 0; i < time_s.size(); ++i) EXPECT_NEAR(lost_ml[i], 5 * time_s[i], 1e-9);
+  EXPECT_TRUE(assess({}, [](step::PublishedFrame&) {}).blood.time_s.empty());
+}
+
 // On the point for 1 s with 2 N: reached, and half of the points. The second stage is not over.
 TEST_F(Assess, StagesOfALessonAreMeasuredByThemselves) {
   Session session;

@@ -40,6 +40,19 @@ TEST_F(AssessCommand, PrintsASummaryAndWritesAReportThatLoadsNothing) {
   EXPECT_NE(read(at("all.csv")).find("peak_force_n,2\n"), std::string::npos);
 }
 
+TEST_F(AssessCommand, PlotsBloodWhereSomeWasLost) {
+  const auto write = [&](const char* name, std::uint64_t nl_per_tick) {
+    record(at(name), {}, [&](step::PublishedFrame& frame) {
+      frame.tools = {tool_at(ToolSlot{0}, {0, 0.2f, 0})};
+      frame.figures.blood.emplace().shed_nl = nl_per_tick * frame.tick;
+    });
+    EXPECT_EQ(run({"assess", at(name), "--html", at("report.html")}), 0) << log();
+    return read(at("report.html")).find("Blood lost since the session began") != std::string::npos;
+  };
+  EXPECT_TRUE(write("bled.mcap", 5'000));
+  EXPECT_FALSE(write("dry.mcap", 0));
+}
+
 TEST_F(AssessCommand, ComparesWithExpertsAndHidesNames) {
   const auto file = recorded("one.mcap", 2);
   const auto better = recorded("expert.mcap", 0.5f), worse = recorded("other.mcap", 2.5f);

@@ -86,6 +86,8 @@ TEST(MeasureStrain, OfASessionThatPressesGraspsAndCuts) {
   EXPECT_GT(damage->greatest, 0.05);
   EXPECT_GT(damage->volume_m3, 1e-7);
   EXPECT_LT(damage->volume_m3, 1.6e-3);  // the whole liver
+  EXPECT_GT(damage->cut_m2, 1e-5);
+  EXPECT_EQ(damage->torn_m2, 0) << "its tissue does not tear";
   // One hash is another.
   recording::testing::copy_journal(file, other, [](std::string_view topic, auto& message) {
     if (topic != "/tick_batch") return true;

@@ -9,6 +9,7 @@
 #include <limits>
 #include <thread>
 
+#include "common/base/json.h"
 #include "common/journal/session_journal.h"
 #include "proto/wire.pb.h"
 #include "tests/e2e/programs.h"
@@ -148,9 +149,37 @@ TEST(ResumedLesson, GoesOnWithStageTimeAndPoints) {
       << read_text(log);
   EXPECT_TRUE(wait_until(
       [&] { return read_text(log).find("Anna (surgeon) is back") != std::string::npos; }, 30));
-  server.signal(SIGTERM);
-  EXPECT_EQ(server.wait(30), 0);
+  // A second time, from the recording that knows the second half alone.
+  server.signal(SIGKILL);
+  EXPECT_EQ(server.wait(10), 128 + SIGKILL);
+  const auto told_last = stages_in(next).back();
+  const auto last = folder / "last.mcap", last_log = folder / "last.log";
+  Program third("trocar-server",
+                {"--resume", next, "--listen", session.address(), "--journal", last}, last_log);
+  ASSERT_TRUE(wait_until([&] { return !stages_in(last).empty(); }, 60)) << read_text(last_log);
+  EXPECT_EQ(stages_in(last).front().SerializeAsString(), told_last.SerializeAsString());
+  EXPECT_TRUE(wait_until(
+      [&] { return read_text(last_log).find("Anna (surgeon) is back") != std::string::npos; }, 30));
+  third.signal(SIGTERM);
+  EXPECT_EQ(third.wait(30), 0);
   EXPECT_EQ(anna.wait(20), 0);
+  // The report of the last part is of the whole session; without the others it says what it lacks.
+  const auto assess = [&](const std::filesystem::path& file) {
+    const auto output = folder / "assessed.json";
+    Program program("trocar-journal", {"assess", file, "--json"}, output);
+    EXPECT_EQ(program.wait(60), 0) << read_text(output);
+    return Json::parse(read_text(output));
+  };
+  const auto whole = assess(last);
+  EXPECT_TRUE(whole["notes"].empty()) << whole["notes"];
+  ASSERT_EQ(whole["stages"].size(), 2u);
+  EXPECT_NEAR(whole["stages"][0]["points"].get<double>(), before.result(0).points(), 0.01);
+  std::filesystem::rename(next, folder / "elsewhere.mcap");
+  const auto part = assess(last);
+  ASSERT_FALSE(part["notes"].empty());
+  EXPECT_NE(part["notes"][0].get<std::string>().find("next.mcap, which has to lie beside it"),
+            std::string::npos)
+      << part["notes"];
 }
 
 TEST_F(Resume, RefusesAnotherOrgan) {

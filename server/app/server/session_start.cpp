@@ -121,6 +121,9 @@ Result<SessionStart> go_on(const ServerOptions& options) {
     log::info("the lesson goes on: {}, stage {} of {} since {:.1f} s, {:.0f} points so far",
               course.lesson().title, course.stage_number() + 1, course.lesson().stages.size(),
               course.seconds(), course.points());
+    if (!session->course_lacks.empty())
+      log::warn("{}: {}, and stages are counted from there", options.resume_file,
+                session->course_lacks);
     start.course = std::make_shared<lesson::Course>(*std::move(session->course));
   }
   if (options.bleeds && !session->bleeding)

@@ -4,11 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <map>
 
 #include "common/base/printable.h"
-#include "common/journal/session_journal.h"
 #include "common/wire/claim_outcome.h"
 #include "server/session/assessment/hand_meter.h"
 #include "server/session/recording/lesson_frames.h"
@@ -17,24 +15,24 @@
 namespace trocar::assessment {
 namespace {
 
-constexpr Tick kAll = std::numeric_limits<Tick>::max();
+constexpr double kCurvePeriodS = 0.25;
 constexpr Tick kHarmPeriod = 1000;  // ticks between two moments of harm that are told
 
 // Reads a recording frame by frame, and measures as it goes.
 class Assessor {
  public:
-  Assessor(journal::SessionJournal& journal, const Options& options, Assessment& out)
-      : journal_(journal), options_(options), out_(out) {}
+  Assessor(const recording::SessionParts& session, const Options& options, Assessment& out)
+      : session_(session), options_(options), out_(out) {}
 
   Status run() {
     if (auto s = read_people(); !s) return s;
     if (auto s = read_lesson(); !s) return s;
     out_.whole.name = "Whole session";
-    out_.whole.begin = journal_.info().begin_tick();
+    out_.whole.begin = session_.parts.front().journal->info().begin_tick();
     whole_.limit_n = options_.force_limit_n;
     begin_stage(out_.whole.begin);
     const auto read = recording::read_lesson_frames(
-        journal_, out_.file, [this](const recording::LessonFrame& frame) { observe(frame); },
+        session_, [this](const recording::LessonFrame& frame) { observe(frame); },
         [this](std::string note) { note_once(std::move(note)); });
     if (!read) return read;
     finish();
@@ -50,15 +48,18 @@ class Assessor {
   };
 
   Status read_people() {
-    return journal_.read_participants(0, kAll, [&](Tick tick, const proto::Participants& list) {
+    const auto visit = [&](Tick tick, const proto::Participants& list) {
       for (const auto& entry : list.participant())
         people_[entry.slot()][tick] = printable(entry.name(), 64);
       return true;
-    });
+    };
+    for (const auto& part : session_.parts)
+      if (auto read = part.journal->read_participants(0, part.until, visit); !read) return read;
+    return {};
   }
 
   Status read_lesson() {
-    auto lesson = recording::read_recorded_lesson(journal_, out_.file);
+    auto lesson = recording::read_recorded_lesson(session_);
     if (!lesson) return lesson.error();
     if (lesson->has_left_out)
       out_.notes.push_back("the recording had no room for some of what the lesson told");
@@ -104,6 +105,7 @@ class Assessor {
       whole_.add(tip.tool, person, tick, tip.position_m, frame.forces_n[i]);
       add_to_curve(tip.tool, person, tick, tip.position_m, tip.force_n);
     }
+    add_to_blood(frame.moment);
     take_claims(frame);
     if (has_begun_) observe_lesson(frame.moment);
     last_tick_ = tick;
@@ -206,17 +208,24 @@ class Assessor {
 
   void add_to_curve(ToolSlot tool, const std::string& person, Tick tick, const Vec3d& tip,
                     double newton) {
-    constexpr double kPeriodS = 0.25;
     const double time_s = seconds_of(tick);
     auto [found, is_new] = curves_.try_emplace(tool.value);
     auto& curve = found->second;
     if (is_new) curve.tool = tool, curve.person = person;
-    if (curve.time_s.empty() || time_s - curve.time_s.back() >= kPeriodS) {
+    if (curve.time_s.empty() || time_s - curve.time_s.back() >= kCurvePeriodS) {
       curve.time_s.push_back(time_s);
       curve.force_n.push_back(newton);
       curve.tip_m.push_back(tip);
     }
     curve.force_n.back() = std::max(curve.force_n.back(), newton);
+  }
+
+  void add_to_blood(const lesson::Moment& moment) {
+    auto& [time_s, lost_ml] = out_.blood;
+    const double now_s = seconds_of(moment.tick);
+    if (!moment.blood_m3 || (!time_s.empty() && now_s - time_s.back() < kCurvePeriodS)) return;
+    time_s.push_back(now_s);
+    lost_ml.push_back(*moment.blood_m3 * 1e6);
   }
 
   void finish() {
@@ -249,7 +258,7 @@ class Assessor {
                       course_->points()));
   }
 
-  journal::SessionJournal& journal_;
+  const recording::SessionParts& session_;
   const Options& options_;
   Assessment& out_;
   std::map<std::uint32_t, std::map<Tick, std::string>> people_;  // by slot, from a tick on
@@ -268,14 +277,15 @@ class Assessor {
 }  // namespace
 
 Result<Assessment> assess(const std::string& path, const Options& options) {
-  auto journal = journal::SessionJournal::open(path);
-  if (!journal) return journal.error();
+  const auto session = recording::open_session_parts(path);
+  if (!session) return session.error();
   Assessment out;
   out.file = path;
-  out.organ = (*journal)->info().organ_name;
-  out.start_utc_ns = (*journal)->info().start_utc_ns;
-  if (auto s = Assessor(**journal, options, out).run(); !s) return s.error();
-  if (!(*journal)->info().is_finished)
+  const auto& first = session->parts.front().journal->info();
+  out.organ = first.organ_name;
+  out.start_utc_ns = first.start_utc_ns;
+  if (auto s = Assessor(*session, options, out).run(); !s) return s.error();
+  if (!session->parts.back().journal->info().is_finished)
     out.notes.push_back("the recording was cut short: what came after its end is not here");
   return out;
 }

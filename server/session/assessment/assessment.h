@@ -72,6 +72,12 @@ struct StrainDamage {
   std::vector<Part> structures;  // of the lesson
   double greatest = 0;           // strain
   Tick greatest_tick = 0;
+  double cut_m2 = 0, torn_m2 = 0;  // of wound, one side, at rest: by blades, and by pulling
+};
+
+// Blood lost since the session began, four times a second; empty where nothing bleeds.
+struct BloodCurve {
+  std::vector<double> time_s, lost_ml;
 };
 
 struct Assessment {
@@ -83,6 +89,7 @@ struct Assessment {
   std::vector<Part> stages;              // that are over; the last one may not be
   Part whole;
   std::vector<Curve> curves;  // by tool
+  BloodCurve blood;
   std::optional<StrainDamage> strain;
   std::vector<std::string> notes;  // why not everything could be measured, a line each
 };

@@ -146,6 +146,13 @@ Result<std::string> force_plot(const Assessment& session) {
   return plot::to_svg(plot);
 }
 
+Result<std::string> blood_plot(const Assessment& session) {
+  plot::Plot plot{.x = {.label = "time (s)"}, .y = {.label = "blood lost (ml)", .low = 0}};
+  plot.height_px = 300;
+  plot.series.push_back({.name = {}, .x = session.blood.time_s, .y = session.blood.lost_ml});
+  return plot::to_svg(plot);
+}
+
 // Scales are equal; `up` is the world's axis that the plot has upwards.
 Result<std::string> way_plot(const Assessment& session, const std::string& label, double Vec3d::*up,
                              double sign) {
@@ -232,6 +239,11 @@ Result<std::string> report_of(const Assessment& session, const std::vector<Stand
         figure(*forces, "Force of the tissue on each tool, the greatest of each quarter second") +
         "<div class=\"pair\">" + figure(*front, "Way of the tips, seen from the front") +
         figure(*above, "The same, seen from above") + "</div>\n";
+  }
+  if (!session.blood.lost_ml.empty() && session.blood.lost_ml.back() > 0) {
+    const auto blood = blood_plot(session);
+    if (!blood) return blood.error();
+    body += figure(*blood, "Blood lost since the session began");
   }
   if (session.strain)
     for (const auto& line : lines_of(*session.strain)) body += "<p>" + html_text(line) + ".</p>\n";

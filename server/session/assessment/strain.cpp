@@ -131,10 +131,13 @@ Result<StrainDamage> measure_strain(const std::string& path, double limit,
   if (!organ) return organ.error();
   StrainMap map(*organ, limit);
   step::Simulation simulation(std::move(*organ));
+  StrainDamage damage{.limit = limit};
   const auto read =
       recording::read_ticks(**journal, [&](const step::TickRecord& record, bool&) -> Status {
         const auto& done = simulation.tick(record.inputs, record.decisions);
         simulation.pop_frame();
+        damage.cut_m2 += done.cut.opened_area_m2 - done.cut.torn_area_m2;
+        damage.torn_m2 += done.cut.torn_area_m2;
         if (record.tick != simulation.current_tick() || done.state_hash != record.state_hash)
           return refuse(fmt::format("tick {} does not come out again", record.tick));
         if (record.tick % kPeriod == 0) map.look(simulation);
@@ -142,11 +145,8 @@ Result<StrainDamage> measure_strain(const std::string& path, double limit,
         return {};
       });
   if (!read) return read.error();
-  StrainDamage damage{.limit = limit,
-                      .volume_m3 = map.volume_m3(),
-                      .structures = {},
-                      .greatest = map.greatest(),
-                      .greatest_tick = map.greatest_tick()};
+  damage.volume_m3 = map.volume_m3();
+  damage.greatest = map.greatest(), damage.greatest_tick = map.greatest_tick();
   if (lesson != nullptr)
     for (const auto& structure : lesson->structures)
       damage.structures.push_back({structure.name, map.volume_within_m3(structure)});

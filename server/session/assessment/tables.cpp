@@ -107,6 +107,10 @@ std::vector<std::string> lines_of(const StrainDamage& strain) {
   if (strain.greatest > 0)
     lines.push_back(fmt::format("the greatest strain was {:.0f} %, at {:.1f} s",
                                 strain.greatest * 100, seconds_of(strain.greatest_tick)));
+  if (strain.cut_m2 + strain.torn_m2 > 0)
+    lines.push_back(
+        fmt::format("{:.2f} cm² of wound were cut, and {:.2f} cm² torn, one side of each",
+                    strain.cut_m2 * 1e4, strain.torn_m2 * 1e4));
   return lines;
 }
 
@@ -185,6 +189,8 @@ std::string csv_of(const std::vector<Assessment>& sessions) {
     add_part(session.whole);
     if (session.strain) {
       add(session.whole.name, "", "", "strained_ml", session.strain->volume_m3 * 1e6);
+      add(session.whole.name, "", "", "cut_cm2", session.strain->cut_m2 * 1e4);
+      add(session.whole.name, "", "", "torn_cm2", session.strain->torn_m2 * 1e4);
       for (const auto& part : session.strain->structures)
         add(session.whole.name, "", "", "strained_ml_" + part.structure, part.volume_m3 * 1e6);
     }
@@ -212,6 +218,8 @@ std::string json_of(const Assessment& session, const std::vector<Standing>& stan
                       {"volume_ml", session.strain->volume_m3 * 1e6},
                       {"structures_ml", structures},
                       {"greatest", session.strain->greatest},
+                      {"cut_cm2", session.strain->cut_m2 * 1e4},
+                      {"torn_cm2", session.strain->torn_m2 * 1e4},
                       {"greatest_time_s", seconds_of(session.strain->greatest_tick)}};
   }
   Json experts = Json::array();

@@ -2,10 +2,8 @@
 
 #include <fmt/format.h>
 
-#include <limits>
 #include <utility>
 
-#include "common/journal/session_journal.h"
 #include "common/wire/claim_outcome.h"
 #include "server/session/recording/stored_surface.h"
 
@@ -20,12 +18,12 @@ Vec3d read(const proto::Vec3& v) {
 
 class FrameReader {
  public:
-  FrameReader(const std::string& name, const LessonFrameVisitor& visit, const NoteVisitor& note)
-      : name_(name), visit_(visit), note_(note) {}
+  FrameReader(const SessionPart& part, const LessonFrameVisitor& visit, const NoteVisitor& note)
+      : part_(part), visit_(visit), note_(note) {}
 
-  Status run(journal::SessionJournal& journal) {
+  Status run() {
     const auto report =
-        journal.read_all([this](std::string_view topic, Tick tick, BytesView bytes) {
+        part_.journal->read_all([this](std::string_view topic, Tick tick, BytesView bytes) {
           return take(topic, tick, bytes);
         });
     if (!status_) return status_;
@@ -40,7 +38,7 @@ class FrameReader {
     const auto parse = [&](auto& message) {
       if (message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) return true;
       status_ = Error{ErrorCode::BadFile, fmt::format("{}: {} at tick {} is no message of its kind",
-                                                      name_, topic, tick)};
+                                                      part_.path, topic, tick)};
       return false;
     };
     const auto follow = [&](auto message) {
@@ -81,6 +79,7 @@ class FrameReader {
   }
 
   void show(const proto::FrameState& state) {
+    if (state.tick() > part_.until) return;
     tips_.clear();
     frame_.forces_n.clear();
     for (const auto& tool : state.tool()) {
@@ -105,7 +104,7 @@ class FrameReader {
     frame_.claims.clear();
   }
 
-  const std::string& name_;
+  const SessionPart& part_;
   const LessonFrameVisitor& visit_;
   const NoteVisitor& note_;
   StoredSurface surface_;
@@ -116,16 +115,16 @@ class FrameReader {
 
 }  // namespace
 
-Result<RecordedLesson> read_recorded_lesson(journal::SessionJournal& journal,
-                                            const std::string& name) {
+Result<RecordedLesson> read_recorded_lesson(const SessionParts& session) {
   RecordedLesson out;
   Status status;
+  std::string path;
   const auto visit = [&](Tick, const proto::LessonRecord& record) {
     out.has_left_out |= record.left_out() > 0;
     if (record.has_input()) out.inputs.push_back(record.input());
     if (record.has_stage()) out.told = record.stage();
     if (!record.has_lesson() || out.lesson) return true;
-    auto lesson = lesson::read_lesson_text(record.lesson().source(), name + ": /lesson");
+    auto lesson = lesson::read_lesson_text(record.lesson().source(), path + ": /lesson");
     if (!lesson) {
       status = lesson.error();
       return false;
@@ -133,15 +132,20 @@ Result<RecordedLesson> read_recorded_lesson(journal::SessionJournal& journal,
     out.lesson = std::move(*lesson);
     return true;
   };
-  if (auto s = journal.read_lessons(0, std::numeric_limits<Tick>::max(), visit); !s)
-    return s.error();
-  if (!status) return status.error();
+  for (const auto& part : session.parts) {
+    path = part.path;
+    if (auto s = part.journal->read_lessons(0, part.until, visit); !s) return s.error();
+    if (!status) return status.error();
+  }
   return out;
 }
 
-Status read_lesson_frames(journal::SessionJournal& journal, const std::string& name,
-                          const LessonFrameVisitor& visit, const NoteVisitor& note) {
-  return FrameReader(name, visit, note).run(journal);
+Status read_lesson_frames(const SessionParts& session, const LessonFrameVisitor& visit,
+                          const NoteVisitor& note) {
+  if (!session.missing.empty()) note(session.missing);
+  for (const auto& part : session.parts)
+    if (auto read = FrameReader(part, visit, note).run(); !read) return read;
+  return {};
 }
 
 bool is_loss(const proto::ClaimEvent& event) {

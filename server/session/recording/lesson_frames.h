@@ -1,6 +1,6 @@
 #pragma once
 
-// The frames of a recording as a lesson's course sees them, and the lesson that it holds. The
+// The frames of a session as a lesson's course sees them, and the lesson that it gave. The
 // server shows its course the same frames, answers and orders while people learn.
 
 #include <functional>
@@ -12,10 +12,7 @@
 #include "common/lesson/course.h"
 #include "proto/journal.pb.h"
 #include "proto/wire.pb.h"
-
-namespace trocar::journal {
-class SessionJournal;
-}
+#include "server/session/recording/session_parts.h"
 
 namespace trocar::recording {
 
@@ -26,9 +23,7 @@ struct RecordedLesson {
   bool has_left_out = false;               // the recording had no room for some of it
 };
 
-// `name` begins each error.
-Result<RecordedLesson> read_recorded_lesson(journal::SessionJournal& journal,
-                                            const std::string& name);
+Result<RecordedLesson> read_recorded_lesson(const SessionParts& session);
 
 struct LessonFrame {
   lesson::Moment moment;
@@ -40,9 +35,9 @@ using LessonFrameVisitor = std::function<void(const LessonFrame&)>;
 using NoteVisitor =
     std::function<void(std::string)>;  // a line about what is missing or does not fit
 
-// Reads the whole file; simulates nothing. Error: a message cannot be decoded.
-Status read_lesson_frames(journal::SessionJournal& journal, const std::string& name,
-                          const LessonFrameVisitor& visit, const NoteVisitor& note);
+// Reads all files whole; simulates nothing. Error: a message cannot be decoded.
+Status read_lesson_frames(const SessionParts& session, const LessonFrameVisitor& visit,
+                          const NoteVisitor& note);
 
 bool is_loss(const proto::ClaimEvent& event);  // refused, or slipped out of the grasp
 // Gives the course an answer or an order; what became of an answer.

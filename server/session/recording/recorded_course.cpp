@@ -6,16 +6,18 @@
 
 namespace trocar::recording {
 
-Result<std::optional<lesson::Course>> recorded_course(journal::SessionJournal& journal,
-                                                      const std::string& path) {
-  auto recorded = read_recorded_lesson(journal, path);
+Result<RecordedCourse> recorded_course(const std::string& path, Tick until) {
+  auto session = open_session_parts(path);
+  if (!session) return session.error();
+  session->parts.back().until = until;
+  auto recorded = read_recorded_lesson(*session);
   if (!recorded) return recorded.error();
-  if (!recorded->lesson) return std::optional<lesson::Course>();
+  if (!recorded->lesson) return RecordedCourse{};
   lesson::Course course(*std::move(recorded->lesson));
   auto input = recorded->inputs.cbegin();
   bool has_begun = false;
   const auto read = read_lesson_frames(
-      journal, path,
+      *session,
       [&](const LessonFrame& frame) {
         has_begun |= frame.has_tools;
         if (!has_begun) return;
@@ -27,7 +29,7 @@ Result<std::optional<lesson::Course>> recorded_course(journal::SessionJournal& j
       },
       [](const std::string&) {});
   if (!read) return read.error();
-  return std::optional<lesson::Course>(std::move(course));
+  return RecordedCourse{std::move(course), std::move(session->missing)};
 }
 
 }  // namespace trocar::recording

@@ -121,7 +121,8 @@ Status read_participants(journal::SessionJournal& journal, ResumedSession& sessi
   std::array<bool, kMaxHands> is_named{};
   if (*list) session.participants = participants_of(**list);
   std::erase_if(session.participants, [&](const auto& who) {
-    if (who.slot.has_tools() != wire::has_tools(who.role)) return true;
+    const auto rights = wire::rights_of(who.role);
+    if (who.slot.has_tools() ? !rights.may_have_tools : rights.has_tools) return true;
     if (!who.slot.has_tools()) return false;
     is_named[who.slot.value] = has_these_tools(session.simulation, who);
     return !is_named[who.slot.value];
@@ -161,9 +162,10 @@ Result<ResumedSession> resume_session(const std::string& path, const ResumeOptio
   session.state_hash = *hash;
   if (const auto begun = begin_as_restored(session.simulation); !begun) return begun.error();
   if (const auto read = read_participants(journal, session); !read) return read.error();
-  auto course = recorded_course(journal, path);
-  if (!course) return course.error();
-  session.course = std::move(*course);
+  auto recorded = recorded_course(path, *last);
+  if (!recorded) return recorded.error();
+  session.course = std::move(recorded->course);
+  session.course_lacks = std::move(recorded->missing);
   return session;
 }
 

@@ -32,6 +32,7 @@ struct ResumedSession {
   Tick snapshot_tick = 0;                                  // simulated again from here on
   std::uint64_t state_hash = 0;                            // of the last tick, as recorded
   std::optional<lesson::Course> course;                    // of a lesson that had begun
+  std::string course_lacks;  // a line: why it does not know all that came before
   // Those who were in the session. A hand is among them if the simulation has its tools, and else
   // it never came.
   std::vector<participants::Participant> participants;

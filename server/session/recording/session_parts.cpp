@@ -1,0 +1,46 @@
+#include "server/session/recording/session_parts.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <utility>
+
+namespace trocar::recording {
+
+Result<SessionParts> open_session_parts(const std::string& path) {
+  auto journal = journal::SessionJournal::open(path);
+  if (!journal) return journal.error();
+  SessionParts session;
+  session.parts.push_back({.path = path, .journal = std::move(*journal)});
+  const auto folder = std::filesystem::path(path).parent_path();
+  while (const auto& continues = session.parts.back().journal->info().continues) {
+    const auto& info = session.parts.back().journal->info();
+    // A name alone: a recording leads to no other folder.
+    const auto name = std::filesystem::path(continues->file).filename();
+    const auto lacks = [&](const std::string& why) {
+      session.missing =
+          "it goes on with " + name.string() + ", " + why + ": what came before is not here";
+    };
+    if (session.parts.size() == kMostParts) {
+      lacks("and is the " + std::to_string(kMostParts) + "th part");
+      break;
+    }
+    auto before = journal::SessionJournal::open((folder / name).string());
+    if (!before) {
+      lacks("which has to lie beside it");
+      break;
+    }
+    const auto& earlier = (*before)->info();
+    if (earlier.organ_hash != info.organ_hash || earlier.begin_tick() >= continues->tick ||
+        earlier.last_tick < continues->tick) {
+      lacks("and the file of that name is of another session");
+      break;
+    }
+    const Tick until = continues->tick;
+    session.parts.push_back(
+        {.path = (folder / name).string(), .journal = std::move(*before), .until = until});
+  }
+  std::ranges::reverse(session.parts);
+  return session;
+}
+
+}  // namespace trocar::recording
