@@ -174,6 +174,14 @@ TEST(ResumedLesson, GoesOnWithStageTimeAndPoints) {
   EXPECT_TRUE(whole["notes"].empty()) << whole["notes"];
   ASSERT_EQ(whole["stages"].size(), 2u);
   EXPECT_NEAR(whole["stages"][0]["points"].get<double>(), before.result(0).points(), 0.01);
+  const auto parts = folder / "parts", table = folder / "all.csv";
+  std::filesystem::create_directory(parts);
+  for (const auto& file : {session.journal, next, last})
+    std::filesystem::copy(file, parts / file.filename());
+  Program curves("trocar-journal", {"assess", parts, "--csv", table}, folder / "curves.log");
+  EXPECT_EQ(curves.wait(60), 0) << read_text(folder / "curves.log");
+  EXPECT_NE(read_text(table).find("last.mcap"), std::string::npos);
+  EXPECT_EQ(read_text(table).find("next.mcap"), std::string::npos) << "it is a part of the last";
   std::filesystem::rename(next, folder / "elsewhere.mcap");
   const auto part = assess(last);
   ASSERT_FALSE(part["notes"].empty());

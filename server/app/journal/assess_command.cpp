@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <set>
 
 #include "common/base/exit_code.h"
 #include "common/base/log.h"
@@ -58,10 +59,10 @@ Result<std::vector<assessment::Picture>> draw_pictures(const assessment::Assessm
     const auto folder = (scratch.path() / std::to_string(pictures.size())).string();
     const auto at = fmt::format("{:.3f}", static_cast<double>(moment.tick) * 1e-3);
     const auto until = fmt::format("{:.3f}", static_cast<double>(moment.tick) * 1e-3 + 0.001);
-    if (auto s =
-            run_program({"trocar-client", "--replay", session.file, "--pictures", folder, "--from",
-                         at, "--to", until, "--size", "960x540", "--log-level", "warn"},
-                        "--pictures needs the client of this release");
+    if (auto s = run_program(
+            {"trocar-client", "--replay", file_at(session, moment.tick), "--pictures", folder,
+             "--from", at, "--to", until, "--size", "960x540", "--log-level", "warn"},
+            "--pictures needs the client of this release");
         !s)
       return s.error();
     std::ifstream in(folder + "/000001.png", std::ios::binary);
@@ -125,6 +126,11 @@ Result<std::vector<assessment::Assessment>> read_all(const std::vector<std::stri
     }
     sessions.push_back(std::move(*session));
   }
+  // The last recording of a session stands for all of it.
+  std::set<std::string> earlier;
+  for (const auto& session : sessions)
+    for (const auto& part : session.earlier) earlier.insert(part.file);
+  std::erase_if(sessions, [&](const auto& session) { return earlier.contains(session.file); });
   return sessions;
 }
 

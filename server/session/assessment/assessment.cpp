@@ -276,12 +276,25 @@ class Assessor {
 
 }  // namespace
 
+const std::string& file_at(const Assessment& session, Tick tick) {
+  if (session.earlier.empty() || tick > session.file_begin) return session.file;
+  const std::string* file = &session.earlier.front().file;
+  for (const auto& part : session.earlier)
+    if (part.begin < tick) file = &part.file;
+  return *file;
+}
+
 Result<Assessment> assess(const std::string& path, const Options& options) {
   const auto session = recording::open_session_parts(path);
   if (!session) return session.error();
   Assessment out;
   out.file = path;
   const auto& first = session->parts.front().journal->info();
+  for (const auto& part : session->parts)
+    if (&part == &session->parts.back())
+      out.file_begin = part.journal->info().begin_tick();
+    else
+      out.earlier.push_back({part.journal->info().begin_tick(), part.path});
   out.organ = first.organ_name;
   out.start_utc_ns = first.start_utc_ns;
   if (auto s = Assessor(*session, options, out).run(); !s) return s.error();

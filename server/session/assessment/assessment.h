@@ -82,6 +82,13 @@ struct BloodCurve {
 
 struct Assessment {
   std::string file, organ;
+  // A session that went on after a crash has earlier recordings, each from a tick on.
+  struct Earlier {
+    Tick begin = 0;
+    std::string file;
+  };
+  std::vector<Earlier> earlier;  // in order of time
+  Tick file_begin = 0;           // of `file`
   std::uint64_t start_utc_ns = 0;
   std::optional<lesson::Lesson> lesson;  // nothing: the session gave none
   bool is_over = false;                  // its last stage
@@ -93,6 +100,9 @@ struct Assessment {
   std::optional<StrainDamage> strain;
   std::vector<std::string> notes;  // why not everything could be measured, a line each
 };
+
+// Returns the recording that has the tick.
+const std::string& file_at(const Assessment& session, Tick tick);
 
 struct Options {
   double force_limit_n = 2;  // of what is told as time above the limit where a stage has none
