@@ -555,6 +555,7 @@ void Picture::draw(const replica::Replica& replica, replica::SessionSource& sour
   scene_ = scene_view(replica, hands, seconds);
   find_lent_view(replica, source.playback() != nullptr);
   lent_.apply(scene_, camera_, source.playback() != nullptr);
+  load_lesson_image(replica);
   const auto actions = hud_.draw(hud_model(replica, source, scene_, hands, now_ns));
   act(actions, replica, source);
   if (actions.take_instrument) hands.take(*actions.take_instrument, source);

@@ -9,6 +9,7 @@
 #include "client/app/client_options.h"
 #include "client/app/hands.h"
 #include "client/app/lent_view.h"
+#include "client/render/image_texture.h"
 #include "client/render/scene_renderer.h"
 #include "client/replica/drawn_lines.h"
 #include "client/replica/force_history.h"
@@ -48,6 +49,7 @@ class Picture {
   void add_own_forces(const replica::Replica& replica, ui::HudModel& model) const;
   void add_felt_hands(const Hands& hands, ui::HudModel& model) const;
   void add_lesson(const replica::Replica& replica, bool is_replay, ui::HudModel& model) const;
+  void load_lesson_image(const replica::Replica& replica);
   void add_pace(const replica::Replica& replica, bool is_replay, ui::HudModel& model) const;
   static void lead(const ui::HudActions& actions, replica::SessionSource& source);
   // Returns where the point is that a lesson's hands follow.
@@ -102,8 +104,10 @@ class Picture {
   replica::HeldTissue held_;
   std::uint64_t held_history_ = 0;
   Rate rate_;
-  render::SceneView scene_;  // of the last picture; its spans need the replica
-  Background saving_;        // writes screenshots
+  render::ImageTexture lesson_image_;
+  std::string lesson_image_file_;  // that it was made from
+  render::SceneView scene_;        // of the last picture; its spans need the replica
+  Background saving_;              // writes screenshots
 };
 
 }  // namespace trocar::app

@@ -4,6 +4,7 @@
 #include <cstdio>
 
 #include "client/app/picture.h"
+#include "common/base/log.h"
 #include "common/tool/instrument.h"
 
 namespace trocar::app {
@@ -51,6 +52,11 @@ void Picture::add_lesson(const replica::Replica& replica, bool is_replay,
         lesson->goal == replica::LessonView::Goal::Find && replica.own_slot().has_tools();
     shown.can_lead = role_ == replica::Role::Instructor;
   }
+  if (lesson_image_.name() != 0) {
+    shown.picture = lesson_image_.name();
+    shown.picture_aspect =
+        static_cast<float>(lesson_image_.height()) / static_cast<float>(lesson_image_.width());
+  }
   for (const auto& result : lesson->results) {
     char points[48];
     std::snprintf(points, sizeof points, ": %s, %.0f points",
@@ -59,6 +65,18 @@ void Picture::add_lesson(const replica::Replica& replica, bool is_replay,
     shown.results.emplace_back(result.name + points, result.lines);
   }
   model.lesson = std::move(shown);
+}
+
+void Picture::load_lesson_image(const replica::Replica& replica) {
+  static const std::string kNone;
+  const auto& file =
+      replica.lesson() && !replica.lesson()->is_over ? replica.lesson()->picture : kNone;
+  if (file == lesson_image_file_) return;
+  lesson_image_file_ = file;
+  lesson_image_.clear();
+  if (file.empty()) return;
+  if (const auto loaded = lesson_image_.load(file); !loaded)
+    log::warn("the lesson's {}", loaded.error().message);
 }
 
 void Picture::add_pace(const replica::Replica& replica, bool is_replay, ui::HudModel& model) const {

@@ -58,6 +58,8 @@ void Replica::apply_lesson(const proto::LessonStage& message) {
   constexpr int kMostLine = 64, kMostResults = 64, kMostLines = 32;
   if (message.line_m_size() > kMostLine || message.result_size() > kMostResults)
     return fail("LessonStage: too many points or results");
+  if (message.picture().size() > wire::kMostPictureBytes)
+    return fail("LessonStage.picture: too large");
   LessonView view;
   view.title = message.title();
   view.stage = message.stage(), view.stages = message.stages();
@@ -66,6 +68,7 @@ void Replica::apply_lesson(const proto::LessonStage& message) {
   for (const auto known : {LessonView::Goal::Find, LessonView::Goal::Follow,
                            LessonView::Goal::Incise, LessonView::Goal::Carry})
     if (goal == static_cast<int>(known)) view.goal = known;
+  view.picture = message.picture();
   view.begin_tick = message.begin_tick();
   view.limit_s = message.limit_s(), view.force_limit_n = message.force_limit_n();
   view.lap_s = message.lap_s(), view.tolerance_m = message.tolerance_m();

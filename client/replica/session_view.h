@@ -116,6 +116,7 @@ struct LessonView {
   float limit_s = 0, force_limit_n = 0;
   std::vector<Vec3f> line_m;
   float lap_s = 0, tolerance_m = 0;
+  std::string picture;                // an image file; empty: none
   std::vector<LessonResult> results;  // of stages that are over
   bool is_over = false;
   float points = 0;

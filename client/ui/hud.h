@@ -86,6 +86,8 @@ struct HudLesson {
   bool is_over = false;
   float points = 0;
   std::vector<std::pair<std::string, std::vector<std::string>>> results;  // head and lines
+  unsigned picture = 0;      // a texture's name; 0: there is none
+  float picture_aspect = 1;  // height over width
 };
 
 // An instructor leads with these.

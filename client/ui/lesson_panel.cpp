@@ -1,6 +1,7 @@
 // The lesson: what to do, how far it is, and in the end how it went.
 
 #include <algorithm>
+#include <cstdint>
 
 #include "client/ui/hud_panels.h"
 #include "client/ui/panel_style.h"
@@ -8,9 +9,18 @@
 namespace trocar::ui {
 namespace {
 
+constexpr float kMostPictureHeight = 110;
+
 void draw_stage(const HudLesson& lesson, float scale) {
   ImGui::TextDisabled("%s", lesson.stage.c_str());
   ImGui::TextUnformatted(lesson.text.c_str());
+  if (lesson.picture != 0) {
+    // The organ is to be seen beside it.
+    const float width = std::min(ImGui::GetContentRegionAvail().x,
+                                 kMostPictureHeight * scale / lesson.picture_aspect);
+    ImGui::Image(reinterpret_cast<ImTextureID>(static_cast<std::uintptr_t>(lesson.picture)),
+                 {width, width * lesson.picture_aspect});
+  }
   if (lesson.progress) {
     const auto percent = std::to_string(static_cast<int>(*lesson.progress * 100)) + " %";
     ImGui::ProgressBar(*lesson.progress, {-1, 14 * scale}, percent.c_str());

@@ -80,4 +80,22 @@ const Structure* Lesson::find_structure(std::string_view name) const {
   return found == structures.end() ? nullptr : &*found;
 }
 
+const Picture* Lesson::find_picture(std::string_view name) const {
+  const auto found = std::ranges::find(pictures, name, &Picture::name);
+  return found == pictures.end() ? nullptr : &*found;
+}
+
+Status add_picture(Lesson& lesson, Picture picture, std::string_view source) {
+  const auto bad = [&](const std::string& why) {
+    return Error{ErrorCode::BadFile, fmt::format("{}: picture {}: {}", source, picture.name, why)};
+  };
+  if (picture.bytes.size() > kPictureLimitBytes)
+    return bad(
+        fmt::format("has {} bytes, allowed are {}", picture.bytes.size(), kPictureLimitBytes));
+  if (!picture.bytes.starts_with("\x89PNG\r\n\x1a\n") && !picture.bytes.starts_with("\xff\xd8\xff"))
+    return bad("is neither a PNG nor a JPEG file");
+  if (lesson.find_picture(picture.name) == nullptr) lesson.pictures.push_back(std::move(picture));
+  return {};
+}
+
 }  // namespace trocar::lesson

@@ -15,7 +15,7 @@
 
 namespace trocar::lesson {
 
-inline constexpr std::size_t kFileLimitBytes = 64 * 1024;
+inline constexpr std::size_t kFileLimitBytes = 64 * 1024, kPictureLimitBytes = 64 * 1024;
 inline constexpr std::size_t kMostStages = 16, kMostStructures = 16, kMostScores = 12;
 inline constexpr std::size_t kMostLinePoints = 32;
 inline constexpr double kPascalPerMmHg = 133.322;
@@ -83,6 +83,7 @@ struct Score {
 
 struct Stage {
   std::string name, text, hint;
+  std::string picture;  // its file's name, beside the lesson; empty: none
   double hint_after_s = 30;
   Goal goal = Goal::Find;
   double limit_s = 300;       // then the next stage begins
@@ -102,16 +103,23 @@ struct Stage {
   std::vector<Score> scores;
 };
 
+// A picture that people see beside what they are to do: a PNG or JPEG file, as it is.
+struct Picture {
+  std::string name, bytes;
+};
+
 struct Lesson {
   std::string title, text;
   std::string organ = "liver";  // a built-in one's name, or a file's path
   bool bleeds = false;
   std::vector<Structure> structures;
-  std::vector<Stage> stages;  // 1 to kMostStages
-  std::string source;         // the file's text, for recordings
+  std::vector<Stage> stages;      // 1 to kMostStages
+  std::string source;             // the file's text, for recordings
+  std::vector<Picture> pictures;  // that stages name, a name once
 
   // Null: there is no such structure.
   const Structure* find_structure(std::string_view name) const;
+  const Picture* find_picture(std::string_view name) const;
 };
 
 // A lesson that the programs bring, by its name, or one's own, by its path.
@@ -120,6 +128,9 @@ Result<Lesson> find_lesson(const std::string& name_or_file);
 std::string list_lessons();
 // Errors are one line, with file, line and key.
 Result<Lesson> read_lesson(const std::filesystem::path& file);
+// Pictures are not read.
 Result<Lesson> read_lesson_text(std::string_view text, std::string_view source);
+// Error: it is too large, or no PNG or JPEG file; `source` begins the line.
+Status add_picture(Lesson& lesson, Picture picture, std::string_view source);
 
 }  // namespace trocar::lesson

@@ -14,4 +14,11 @@ struct LessonText {
 };
 std::span<const LessonText> lesson_texts();  // by name
 
+// Their pictures: common/lesson/lessons/*.jpg.
+struct LessonPicture {
+  std::string name;
+  std::string_view bytes;
+};
+std::span<const LessonPicture> lesson_pictures();
+
 }  // namespace trocar::lesson

@@ -174,6 +174,11 @@ Stage read_stage(TableReader& reader, const Lesson& lesson, Document& document,
   stage.name = read_text(reader, "name", true);
   stage.text = read_text(reader, "text", true);
   stage.hint = read_text(reader, "hint", false);
+  stage.picture = read_text(reader, "picture", false);
+  if (stage.picture.find('/') != std::string::npos || stage.picture.starts_with('.'))
+    reader.fail("picture",
+                "is \"" + stage.picture +
+                    "\", write the name of a file beside the lesson's, without a folder");
   read_number(reader, "hint_after_s", stage.hint_after_s, 0, kLongestS);
   read_number(reader, "limit_s", stage.limit_s, 1, kLongestS);
   read_number(reader, "force_limit_n", stage.force_limit_n, 0.05, 100);
@@ -237,9 +242,36 @@ Result<Lesson> read_lesson_text(std::string_view text, std::string_view source) 
   return lesson;
 }
 
+namespace {
+
+// find(name): a picture's bytes, or why there are none.
+template <typename Find>
+Result<Lesson> with_pictures(Result<Lesson> lesson, const std::string& source, Find find) {
+  if (!lesson) return lesson;
+  for (const auto& stage : lesson->stages) {
+    if (stage.picture.empty()) continue;
+    Result<std::string> bytes = find(stage.picture);
+    if (!bytes) return bytes.error();
+    if (auto added = add_picture(*lesson, {stage.picture, std::move(*bytes)}, source); !added)
+      return added.error();
+  }
+  return lesson;
+}
+
+}  // namespace
+
 Result<Lesson> find_lesson(const std::string& name_or_file) {
-  for (const auto& [name, text] : lesson_texts())
-    if (name == name_or_file) return read_lesson_text(text, name + ".toml");
+  for (const auto& [name, text] : lesson_texts()) {
+    if (name != name_or_file) continue;
+    const auto source = name + ".toml";
+    return with_pictures(read_lesson_text(text, source), source,
+                         [&](const std::string& wanted) -> Result<std::string> {
+                           for (const auto& picture : lesson_pictures())
+                             if (picture.name == wanted) return std::string(picture.bytes);
+                           return Error{ErrorCode::ResourceMissing,
+                                        source + ": picture " + wanted + ": is not there"};
+                         });
+  }
   if (name_or_file.find_first_of("./") == std::string::npos)
     return Error{ErrorCode::Usage, "there is no lesson \"" + name_or_file + "\", the lessons are " +
                                        list_lessons() + ", or name a file"};
@@ -255,7 +287,10 @@ std::string list_lessons() {
 Result<Lesson> read_lesson(const std::filesystem::path& file) {
   const auto text = tool::read_text_file(file, kFileLimitBytes, "lesson");
   if (!text) return text.error();
-  return read_lesson_text(*text, file.string());
+  return with_pictures(
+      read_lesson_text(*text, file.string()), file.string(), [&](const std::string& wanted) {
+        return tool::read_text_file(file.parent_path() / wanted, kPictureLimitBytes, "picture");
+      });
 }
 
 }  // namespace trocar::lesson

@@ -9,6 +9,7 @@
 
 namespace trocar::wire {
 
+inline constexpr std::size_t kMostPictureBytes = 64 * 1024;
 inline constexpr std::size_t kMostLessonText = 500;  // bytes, of a note or a line
 inline constexpr std::size_t kMostReason = 200;      // bytes, of why somebody is put out
 inline constexpr std::size_t kMostStrokePoints = 64;

@@ -1,7 +1,10 @@
 #include <gtest/gtest.h>
 
+#include <fstream>
+
 #include "common/lesson/lesson.h"
 #include "common/lesson/lesson_texts.h"
+#include "tests/support/files.h"
 
 namespace trocar::lesson {
 namespace {
@@ -38,6 +41,37 @@ TEST(LessonFile, ReadsLengthsInMillimetres) {
   EXPECT_DOUBLE_EQ(score.points(0.0005), 1);
   EXPECT_DOUBLE_EQ(score.points(0.003), 0.5);
   EXPECT_DOUBLE_EQ(score.points(0.006), 0);
+}
+
+TEST(LessonFile, AStageHasAPictureBesideTheFile) {
+  const trocar::testing::TemporaryFolder folder;
+  const auto file = folder.file("own.toml");
+  const auto write = [](const std::string& path, const std::string& bytes) {
+    std::ofstream(path, std::ios::binary) << bytes;
+  };
+  const auto error_with = [&](const std::string& picture) {
+    write(file, std::string(kHead) + kBall + kFind + "picture = \"" + picture + "\"\n");
+    const auto lesson = read_lesson(file);
+    return lesson ? "" : lesson.error().message;
+  };
+  write(folder.file("a.png"), "\x89PNG\r\n\x1a\n and so on");
+  EXPECT_EQ(error_with("a.png"), "");
+  const auto lesson = read_lesson(file);
+  ASSERT_TRUE(lesson);
+  ASSERT_NE(lesson->find_picture("a.png"), nullptr);
+  EXPECT_TRUE(lesson->find_picture("a.png")->bytes.ends_with("so on"));
+  write(folder.file("a.txt"), "words");
+  EXPECT_EQ(error_with("a.txt"), file + ": picture a.txt: is neither a PNG nor a JPEG file");
+  EXPECT_NE(error_with("b.png").find("b.png"), std::string::npos);
+  EXPECT_NE(error_with("../a.png").find("without a folder"), std::string::npos);
+  write(folder.file("large.png"), std::string(kPictureLimitBytes + 1, 'x'));
+  EXPECT_NE(error_with("large.png").find("allowed"), std::string::npos) << error_with("large.png");
+}
+
+TEST(LessonFile, ThoseThatShipHaveTheirPictures) {
+  const auto rings = find_lesson("move-the-rings");
+  ASSERT_TRUE(rings) << rings.error().message;
+  EXPECT_EQ(rings->pictures.size(), 1u);
 }
 
 TEST(LessonFile, ReadsWhereAPieceIsCarried) {

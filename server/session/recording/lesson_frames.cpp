@@ -129,6 +129,11 @@ Result<RecordedLesson> read_recorded_lesson(const SessionParts& session) {
       status = lesson.error();
       return false;
     }
+    for (const auto& picture : record.lesson().picture())
+      if (status =
+              lesson::add_picture(*lesson, {picture.name(), picture.image()}, path + ": /lesson");
+          !status)
+        return false;
     out.lesson = std::move(*lesson);
     return true;
   };

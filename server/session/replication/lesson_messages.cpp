@@ -52,6 +52,8 @@ void describe(const lesson::Course& course, proto::LessonStage& message) {
   message.set_name(stage.name);
   message.set_text(stage.text);
   if (course.shows_hint()) message.set_hint(stage.hint);
+  if (const auto* picture = lesson.find_picture(stage.picture); picture && !course.is_over())
+    message.set_picture(picture->bytes);
   message.set_goal(static_cast<proto::LessonGoal>(static_cast<int>(stage.goal) + 1));
   message.set_begin_tick(course.begin());
   message.set_limit_s(static_cast<float>(stage.limit_s));

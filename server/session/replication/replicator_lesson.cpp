@@ -35,6 +35,11 @@ void Replicator::observe_lesson(const step::PublishedFrame& frame) {
     is_first = has_course_begun_ = true;
     proto::LessonRecord record;
     record.mutable_lesson()->set_source(course_->lesson().source);
+    for (const auto& picture : course_->lesson().pictures) {
+      auto& recorded = *record.mutable_lesson()->add_picture();
+      recorded.set_name(picture.name);
+      recorded.set_image(picture.bytes);
+    }
     record_lesson(record);
   }
   for (const auto& event : frame.claim_events)

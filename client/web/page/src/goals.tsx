@@ -1,6 +1,7 @@
 // The panel of a lesson: its stage, what to do, how far that is, and in the end what was measured.
 
 import type { JSX } from 'preact';
+import { useEffect, useState } from 'preact/hooks';
 import type { LessonProgress, LessonStage } from './gen/proto/wire_pb';
 
 export interface Goal {
@@ -24,6 +25,16 @@ function Progress(props: { goal: Goal }): JSX.Element {
       </dl>
     </>
   );
+}
+
+function StagePicture(props: { bytes: Uint8Array }): JSX.Element {
+  const { bytes } = props, [address, setAddress] = useState('');
+  useEffect(() => {
+    const made = URL.createObjectURL(new Blob([bytes.slice()], { type: bytes[0] === 0x89 ? 'image/png' : 'image/jpeg' }));
+    setAddress(made);
+    return () => URL.revokeObjectURL(made);
+  }, [bytes]);
+  return <img class="shown" src={address} alt="What to do, as a picture" />;
 }
 
 function Results(props: { stage: LessonStage }): JSX.Element | null {
@@ -55,6 +66,7 @@ export function LessonPanel(props: { goal: Goal; lead?: { next(): void; restart(
           : <>
               <p class="now"><small>{`Stage ${stage.stage + 1} of ${stage.stages}`}</small> <b>{stage.name}</b></p>
               <p>{stage.text}</p>
+              {stage.picture.length > 0 && <StagePicture bytes={stage.picture} />}
               {stage.hint !== '' && <p class="hint">{`Hint: ${stage.hint}`}</p>}
             </>}
       </div>
