@@ -8,12 +8,8 @@
 
 #include "client/app/client_options.h"
 #include "client/app/hands.h"
-#include "client/app/lent_view.h"
-#include "client/render/scene_renderer.h"
-#include "client/replica/drawn_lines.h"
-#include "client/replica/force_history.h"
-#include "client/replica/held_tissue.h"
-#include "client/replica/interpolated_surface.h"
+#include "client/app/pane.h"
+#include "client/replica/peak_rings.h"
 #include "client/ui/hud.h"
 #include "common/base/background.h"
 
@@ -40,35 +36,28 @@ class Picture {
   explicit Picture(std::unique_ptr<render::GlContext> context, const ClientOptions& options);
 
   void measure(const replica::Replica& replica, std::uint64_t now_ns);
-  render::SceneView scene_view(const replica::Replica& replica, Hands& hands, float seconds);
-  render::SceneTool scene_tool(const replica::Replica& replica, const replica::Tool& tool,
-                               Hands& hands) const;
-  std::vector<render::Hold> holds(const replica::Replica& replica);
   void add_participants(const replica::Replica& replica, bool is_replay, ui::HudModel& model) const;
   void add_own_forces(const replica::Replica& replica, ui::HudModel& model) const;
   void add_felt_hands(const Hands& hands, ui::HudModel& model) const;
   void add_lesson(const replica::Replica& replica, bool is_replay, ui::HudModel& model) const;
   void add_pace(const replica::Replica& replica, bool is_replay, ui::HudModel& model) const;
   static void lead(const ui::HudActions& actions, replica::SessionSource& source);
-  // Returns where the point is that a lesson's hands follow.
-  static std::optional<Vec3f> lesson_target(const replica::Replica& replica);
-  void add_labels(const replica::Replica& replica, const render::SceneView& scene,
-                  ui::HudModel& model) const;
   static void add_messages(const replica::Replica& replica, std::uint64_t now_ns,
                            ui::HudModel& model);
   ui::HudModel hud_model(const replica::Replica& replica, replica::SessionSource& source,
-                         const render::SceneView& scene, Hands& hands, std::uint64_t now_ns) const;
+                         Hands& hands, std::uint64_t now_ns) const;
   // Follows the view of who has it, if the person wants to, or says where one's own is.
   void share_view(const replica::Replica& replica, replica::SessionSource& source,
                   const device::PointerInput& input);
   void move_mouse_tool(const replica::Replica& replica, Hands& hands,
                        const device::PointerInput& input, float seconds);
   void add_lent_view(const replica::Replica& replica, bool is_replay, ui::HudModel& model) const;
-  void find_lent_view(const replica::Replica& replica, bool is_recording);
+  // Takes the click that measures out of the input.
+  void take_measure(const replica::Replica& replica, device::PointerInput& input);
+  void add_measure(ui::HudModel& model) const;
   void ask_for_ghost(replica::SessionSource& source);
   void act(const ui::HudActions& actions, const replica::Replica& replica,
            replica::SessionSource& source);
-  void frame_camera(const replica::Replica& replica);
 
   struct Rate {  // over the last second
     std::uint64_t start_ns = 0, pictures = 0, frames = 0, bytes = 0;
@@ -77,33 +66,22 @@ class Picture {
 
   replica::Role role_;
   std::unique_ptr<render::GlContext> context_;
-  render::SceneRenderer renderer_;
+  Pane pane_;
   ui::Hud hud_;
-  render::OrbitCamera camera_;
-  replica::InterpolatedSurface surface_;
-  bool is_framed_ = false;  // the camera, when there is an organ
   std::uint64_t last_ns_ = 0, count_ = 0;
   std::uint64_t help_until_ns_ = 0;  // shown at first, then until asked for; 0: as the person wants
   bool shows_help_ = false, wants_screenshot_ = false;
   Overlays overlays_;
   StartView view_;
   bool has_asked_for_ghost_ = false;
-  std::vector<Vec3f> ghost_;  // where the full solution has the vertices of the last picture
-  replica::ForceHistory forces_;
+  bool is_measuring_ = false, was_left_ = false;
   // Keeps what each device has rendered and what the server said, N.
   using FeltForces = replica::PeakRings<2, ui::kFeltBins, ui::kFeltBins>;
   std::array<FeltForces, kToolsPerHand> felt_forces_;
   bool follows_view_ = false;
-  LentView lent_;
-  std::string sees_with_;  // a participant's name, until there is a tool to see with
   std::uint64_t view_sent_ns_ = 0;
-  replica::DrawnLines lines_;
-  shape::MeshVertices drawing_;  // of the last picture
-  replica::HeldTissue held_;
-  std::uint64_t held_history_ = 0;
   Rate rate_;
-  render::SceneView scene_;  // of the last picture; its spans need the replica
-  Background saving_;        // writes screenshots
+  Background saving_;  // writes screenshots
 };
 
 }  // namespace trocar::app

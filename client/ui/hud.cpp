@@ -189,6 +189,7 @@ HudActions Hud::draw(const HudModel& model) {
   const Box people = draw_participants_panel(model, scale_);
   const Box banners = draw_banners(model, session, people, scale_);
   draw_labels(model, banners, scale_);
+  for (const HudRuler& ruler : model.rulers) draw_ruler(ruler, scale_);
   Box right = model.lesson ? draw_lesson(*model.lesson, people, scale_) : people;
   if (model.figures.blood && model.figures.blood->shed_nl > 0)
     right = draw_blood(*model.figures.blood, right, scale_);
@@ -212,6 +213,8 @@ HudActions Hud::draw(const HudModel& model) {
   actions.toggle_ghost = pressed(GLFW_KEY_G);
   actions.reset_camera = pressed(GLFW_KEY_C);
   actions.screenshot = pressed(GLFW_KEY_F12);
+  if (pressed(GLFW_KEY_D)) actions.toggle_measure = true;
+  actions.end_measure = pressed(GLFW_KEY_ESCAPE);
   if (model.lesson) {
     actions.answer =
         model.lesson->can_answer && (pressed(GLFW_KEY_ENTER) || pressed(GLFW_KEY_KP_ENTER));

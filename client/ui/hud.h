@@ -52,6 +52,15 @@ struct HudLabel {
   shape::Colour colour;
 };
 
+// A length that is measured: a line between two ends, or one end.
+struct HudRuler {
+  struct End {
+    float x = 0, y = 0;  // pixels
+  };
+  std::vector<End> ends;
+  std::string text;  // "12.3 mm"
+};
+
 struct HudMessage {
   std::string text;
   float age_seconds = 0;  // fades between 4 and 5 s
@@ -63,6 +72,7 @@ struct HudTimeline {
   bool is_playing = false;
   float speed = 1;
   std::shared_ptr<const replica::PlaybackStory> story;  // null: still searched
+  bool is_measuring = false;
 };
 // When the next event after where the recording is takes place, or the one before it; nothing if
 // there is none. While it plays, an event just passed is not the one before.
@@ -132,6 +142,8 @@ struct HudModel {
   std::vector<HudParticipant> participants;
   std::vector<HudLabel> labels;
   std::vector<HudMessage> messages;
+  std::vector<HudRuler> rulers;
+  std::string measure_text;  // empty: nobody measures
   std::optional<HudTimeline> timeline;
   float greatest_force_n = 0;  // of all participants' `forces_n`: their common scale
   bool shows_regions = true, shows_holds = false, shows_arrows = true, shows_rate = false;
@@ -163,6 +175,7 @@ struct HudActions {
   bool toggle_play = false, pause = false;
   bool set_mark = false, return_to_mark = false, toggle_follow = false;
   bool next_lent_view = false;
+  bool toggle_measure = false, end_measure = false;
   bool switch_hand = false;
   bool answer = false, next_stage = false, restart_lesson = false;
   std::optional<std::string> mark_named, return_to_named;

@@ -182,25 +182,6 @@ Box draw_banners(const HudModel& model, const Box& session, const Box& people, f
   return box;
 }
 
-void draw_labels(const HudModel& model, const Box& banners, float scale) {
-  ImDrawList* list = ImGui::GetBackgroundDrawList();
-  for (const HudLabel& label : model.labels) {
-    const ImVec2 size = ImGui::CalcTextSize(label.text.c_str());
-    const ImVec2 pad = {7 * scale, 3 * scale};
-    ImVec2 from = {label.x + 12 * scale, label.y - size.y / 2};
-    const bool is_covered =
-        from.y - pad.y < banners.bottom && from.x < banners.right && from.x + size.x > banners.left;
-    if (is_covered) from.y = banners.bottom + 2 * pad.y;
-    list->AddRectFilled({from.x - pad.x, from.y - pad.y},
-                        {from.x + size.x + pad.x, from.y + size.y + pad.y},
-                        IM_COL32(8, 12, 16, 170), 6 * scale);
-    list->AddRectFilled({from.x - pad.x, from.y - pad.y},
-                        {from.x - pad.x + 3 * scale, from.y + size.y + pad.y},
-                        ImGui::GetColorU32(to_imgui(label.colour)), 2 * scale);
-    list->AddText({from.x + 2 * scale, from.y}, IM_COL32(232, 240, 245, 255), label.text.c_str());
-  }
-}
-
 void draw_help(const HudModel& model, float scale) {
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
   const float bottom = screen.y - (model.timeline ? 132 : kMargin) * scale;
@@ -242,6 +223,7 @@ void draw_help(const HudModel& model, float scale) {
       help_row(", .", "one picture back or on");
       help_row("Page Up, Page Down", "to the event before or after");
     }
+    help_row("D", "measure: click two places; D or Esc ends that");
     help_row("right drag", "turn the view");
     help_row("middle drag", "move the view");
     help_row("Ctrl+wheel, + -", "zoom");

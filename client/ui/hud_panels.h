@@ -28,6 +28,7 @@ void draw_own_forces(const HudModel& model, float scale);
 void draw_felt_hands(const HudModel& model, float top, float scale);
 // Names at tools; one that the banners would cover stands under them.
 void draw_labels(const HudModel& model, const Box& banners, float scale);
+void draw_ruler(const HudRuler& ruler, float scale);
 // The instruments of one's own, to be chosen from, under the session's panel. Where that one is
 // tall, with the figures for research, only what the hand has.
 void draw_tray(const HudModel& model, const Box& session, float scale, HudActions& actions);

@@ -17,7 +17,7 @@ using Kind = replica::PlaybackEventKind;
 
 constexpr float kCurveHeight = 26, kMarkHeight = 9, kReach = 4;  // pixels of the design
 constexpr std::array<float, 5> kSpeeds{0.1f, 0.25f, 1, 4, 16};
-constexpr float kSpeedWidth = 46;
+constexpr float kSpeedWidth = 46, kMeasureWidth = 74;
 constexpr double kJustPassedSeconds = 1;
 
 ImVec4 colour_of(Kind kind) {
@@ -37,6 +37,15 @@ ImVec4 colour_of(Kind kind) {
 
 double seconds_of(const replica::PlaybackEvent& event) {
   return static_cast<double>(event.tick) / kTicksPerSecond;
+}
+
+// A button that is drawn as pressed while it is on.
+bool pressed_button(const char* name, float width, bool is_on) {
+  if (is_on)
+    ImGui::PushStyleColor(ImGuiCol_Button, ImGui::GetStyle().Colors[ImGuiCol_ButtonActive]);
+  const bool is_clicked = ImGui::Button(name, {width, 0});
+  if (is_on) ImGui::PopStyleColor();
+  return is_clicked;
 }
 
 // Draws the story under the slider, from `left` and `width` wide. Returns the event to tell: the
@@ -123,7 +132,8 @@ void draw_timeline(const HudTimeline& timeline, float scale, HudActions& actions
   const float left = ImGui::GetCursorScreenPos().x;
   const float gap = ImGui::GetStyle().ItemSpacing.x;
   const float bar = ImGui::GetContentRegionAvail().x -
-                    static_cast<float>(kSpeeds.size()) * (kSpeedWidth * scale + gap);
+                    static_cast<float>(kSpeeds.size()) * (kSpeedWidth * scale + gap) -
+                    kMeasureWidth * scale - gap;
   ImGui::SetNextItemWidth(bar);
   if (ImGui::SliderFloat("##seek", &position, static_cast<float>(timeline.first_seconds),
                          static_cast<float>(timeline.last_seconds), text.c_str(),
@@ -131,14 +141,13 @@ void draw_timeline(const HudTimeline& timeline, float scale, HudActions& actions
     actions.seek_seconds = position;
   for (const float speed : kSpeeds) {
     ImGui::SameLine();
-    const bool is_current = timeline.speed == speed;
-    if (is_current)
-      ImGui::PushStyleColor(ImGuiCol_Button, ImGui::GetStyle().Colors[ImGuiCol_ButtonActive]);
     char name[16];
     std::snprintf(name, sizeof name, "%gx", static_cast<double>(speed));
-    if (ImGui::Button(name, {kSpeedWidth * scale, 0})) actions.speed = speed;
-    if (is_current) ImGui::PopStyleColor();
+    if (pressed_button(name, kSpeedWidth * scale, timeline.speed == speed)) actions.speed = speed;
   }
+  ImGui::SameLine();
+  if (pressed_button("Measure", kMeasureWidth * scale, timeline.is_measuring))
+    actions.toggle_measure = true;
   const auto* told = draw_story(timeline, left, bar, scale);
   if (told != nullptr)
     ImGui::TextColored(colour_of(told->kind), "%s  %s", clock_text(seconds_of(*told)).c_str(),
