@@ -11,6 +11,7 @@ namespace trocar::app {
 namespace {
 
 constexpr shape::Colour kLessonColour{240, 228, 66};
+constexpr float kFittingAspect = 1.3f;     // of a picture that an organ fits into
 constexpr float kLineHalfWidth = 0.0009f;  // m, as in a browser
 
 }  // namespace
@@ -27,7 +28,7 @@ tool::ToolShape shape_of(const replica::Replica& replica, ToolSlot slot) {
 }
 
 Pane::Pane(const render::GlContext& context, std::string sees_with)
-    : context_(context), renderer_(context), sees_with_(std::move(sees_with)) {}
+    : region_{0, 0, context.size()}, renderer_(context), sees_with_(std::move(sees_with)) {}
 
 bool Pane::update(const replica::Replica& replica, const StartView& view, std::uint64_t now_ns) {
   now_ns_ = now_ns;
@@ -51,6 +52,10 @@ void Pane::frame_camera(const replica::Replica& replica, const StartView& view) 
   camera_.orbit(static_cast<float>(view.yaw_deg) * kRadians,
                 static_cast<float>(view.pitch_deg) * kRadians);
   camera_.zoom(static_cast<float>(1 / view.zoom));
+  // A narrow picture sees all of it from farther away.
+  const float aspect =
+      static_cast<float>(region_.size.width) / static_cast<float>(std::max(region_.size.height, 1));
+  if (aspect < kFittingAspect) camera_.zoom(kFittingAspect / std::max(aspect, 0.2f));
 }
 
 render::SceneTool Pane::scene_tool(const replica::Replica& replica, const replica::Tool& tool,
@@ -160,7 +165,7 @@ void Pane::find_lent_view(const replica::Replica& replica, bool is_recording) {
 }
 
 void Pane::draw(render::Quality quality) {
-  renderer_.draw(scene_, camera_, quality);
+  renderer_.draw(scene_, camera_, region_, quality);
 }
 
 bool Pane::measure_at(const replica::Replica& replica, float x, float y) {
@@ -177,9 +182,11 @@ bool Pane::measure_at(const replica::Replica& replica, float x, float y) {
 
 ui::HudRuler Pane::ruler() const {
   ui::HudRuler ruler;
+  const auto left = static_cast<float>(region_.left);
   for (const auto& place : measured_.positions()) {
     if (!place) continue;
-    if (const auto at = camera_.project(*place, size())) ruler.ends.push_back({at->x, at->y});
+    if (const auto at = camera_.project(*place, size()))
+      ruler.ends.push_back({at->x + left, at->y});
   }
   const auto metres = measured_.distance_m();
   if (!metres) return ruler;
@@ -191,6 +198,7 @@ ui::HudRuler Pane::ruler() const {
 
 std::vector<ui::HudLabel> Pane::labels(const replica::Replica& replica) const {
   std::vector<ui::HudLabel> labels;
+  const auto left = static_cast<float>(region_.left);
   for (const render::SceneTool& tool : scene_.tools) {
     const auto* owner = owner_of(replica, tool.slot);
     const Vec3f collar = tool.world_from_tool.apply({0, 0, tool.shape.radius_m * 7});
@@ -200,13 +208,13 @@ std::vector<ui::HudLabel> Pane::labels(const replica::Replica& replica) const {
     if (length(tool.force_n) >= render::kMinArrowNewton)
       std::snprintf(force, sizeof force, "  %.2f N", static_cast<double>(length(tool.force_n)));
     labels.push_back(
-        {at->x, at->y, owner->name + force, shape::colour_of_slot(tool.slot.owner().value)});
+        {at->x + left, at->y, owner->name + force, shape::colour_of_slot(tool.slot.owner().value)});
   }
   for (const replica::Pointer& pointer : replica.pointers(now_ns_)) {
     const auto* owner = replica.find_participant(pointer.participant);
     const auto at = camera_.project(pointer.position_m, size());
     if (owner == nullptr || !at) continue;
-    labels.push_back({at->x, at->y, owner->name + " points here",
+    labels.push_back({at->x + left, at->y, owner->name + " points here",
                       shape::colour_of_pointer(pointer.participant.value)});
   }
   return labels;

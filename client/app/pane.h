@@ -42,18 +42,23 @@ class Pane {
     bool is_recording = false;
   };
   void make_scene(const replica::Replica& replica, const Hands& hands, const Look& look);
+  // Draws into its region.
   void draw(render::Quality quality);
+  // The region is the part of the window that it covers.
+  void set_region(const render::Region& region) { region_ = region; }
+  const render::Region& region() const { return region_; }
   // No time passes from here on.
   void stand_still() { scene_.seconds = 0; }
 
-  // Measures from or to the place under the pointer. False: there is no tissue.
+  // Measures from or to the place at this pixel of the region. False: there is no tissue.
   bool measure_at(const replica::Replica& replica, float x, float y);
   replica::MeasuredPlaces& measured() { return measured_; }
   const replica::MeasuredPlaces& measured() const { return measured_; }
+  // These stand in pixels of the window.
   ui::HudRuler ruler() const;
   std::vector<ui::HudLabel> labels(const replica::Replica& replica) const;
 
-  render::Size size() const { return context_.size(); }
+  render::Size size() const { return region_.size; }
   render::OrbitCamera& camera() { return camera_; }
   const render::OrbitCamera& camera() const { return camera_; }
   bool is_framed() const { return is_framed_; }
@@ -73,7 +78,7 @@ class Pane {
   // Returns where the point is that a lesson's hands follow.
   static std::optional<Vec3f> lesson_target(const replica::Replica& replica);
 
-  const render::GlContext& context_;
+  render::Region region_;
   render::SceneRenderer renderer_;
   render::OrbitCamera camera_;
   replica::InterpolatedSurface surface_;

@@ -88,9 +88,9 @@ ui::HudTray tray_of(const Hands::Choice& choice) {
   return tray;
 }
 
-void Picture::add_participants(const replica::Replica& replica, bool is_replay,
-                               ui::HudModel& model) const {
-  model.greatest_force_n = pane_.forces().greatest();
+std::vector<ui::HudParticipant> Picture::participants_of(const replica::Replica& replica,
+                                                         const Pane& pane, bool is_replay) {
+  std::vector<ui::HudParticipant> participants;
   for (const auto& participant : replica.participants()) {
     ui::HudParticipant shown;
     shown.name = participant.name;
@@ -99,7 +99,7 @@ void Picture::add_participants(const replica::Replica& replica, bool is_replay,
     shown.is_frozen = !participant.frozen_by.empty();
     shown.is_self = !is_replay && participant.slot == replica.own_slot();
     shown.colour = shape::colour_of_slot(participant.slot.value);
-    for (const replica::Tool& tool : pane_.surface().tools()) {
+    for (const replica::Tool& tool : pane.surface().tools()) {
       if (tool.slot.owner() != participant.slot) continue;
       shown.has_tool = true;
       shown.is_silent = tool.is_silent;
@@ -114,11 +114,12 @@ void Picture::add_participants(const replica::Replica& replica, bool is_replay,
       shown.contact_nodes += tool.contact_nodes;
     }
     if (shown.has_tool) {
-      const auto forces = pane_.forces().forces(participant.slot);
+      const auto forces = pane.forces().forces(participant.slot);
       shown.forces_n.assign(forces.begin(), forces.end());
     }
-    model.participants.push_back(std::move(shown));
+    participants.push_back(std::move(shown));
   }
+  return participants;
 }
 
 void Picture::add_own_forces(const replica::Replica& replica, ui::HudModel& model) const {
@@ -138,6 +139,7 @@ void Picture::add_own_forces(const replica::Replica& replica, ui::HudModel& mode
 
 void Picture::observe(const replica::Replica& replica, const Hands& hands, std::uint64_t now_ns) {
   pane_.observe(replica);
+  observe_beside();
   const auto felt = hands.figures();
   for (std::size_t i = 0; i < std::min(felt.size(), felt_forces_.size()); ++i) {
     const auto& state = felt[i].state;
@@ -269,11 +271,13 @@ ui::HudModel Picture::hud_model(const replica::Replica& replica, replica::Sessio
   model.shows_rate = overlays_.rate;
   if (overlays_.ghost) model.ghost_text = ui::describe(replica.ghost(), is_replay);
   add_lent_view(replica, is_replay, model);
-  add_participants(replica, is_replay, model);
+  model.greatest_force_n = pane_.forces().greatest();
+  model.participants = participants_of(replica, pane_, is_replay);
   if (!is_replay) add_own_forces(replica, model);
   add_felt_hands(hands, model);
   model.labels = pane_.labels(replica);
   add_measure(model);
+  add_halves(replica, model);
   add_messages(replica, now_ns, model);
   if (const auto* playback = source.playback()) {
     const auto seconds = [](Tick tick) { return static_cast<double>(tick) * 1e-3; };
@@ -301,15 +305,13 @@ void Picture::act(const ui::HudActions& actions, const replica::Replica& replica
   if (actions.toggle_ghost) overlays_.ghost = !overlays_.ghost;
   if (actions.reset_camera) pane_.frame_camera(replica, view_);
   if (actions.screenshot) wants_screenshot_ = true;
-  if (actions.toggle_measure || (actions.end_measure && is_measuring_)) {
-    is_measuring_ = !is_measuring_;
-    pane_.measured().clear();
-  }
+  if (actions.toggle_measure || (actions.end_measure && is_measuring_)) toggle_measure();
   if (actions.next_lent_view) pane_.lent().next(pane_.scene().tools, source.playback() != nullptr);
   if (actions.toggle_follow) follows_view_ = !follows_view_;
   // A wish that cannot be sent is lost: whoever presses the key asks again.
   if (actions.set_mark) replica::ask_for_mark(source, false);
   if (actions.return_to_mark) replica::ask_for_mark(source, true);
+  act_beside(actions);
   lead(actions, source);
   if (actions.next_stage) replica::send_lesson_wish(source, replica::LessonWish::Next);
   if (actions.restart_lesson) replica::send_lesson_wish(source, replica::LessonWish::Restart);
@@ -330,7 +332,7 @@ void Picture::share_view(const replica::Replica& replica, replica::SessionSource
     if (input.right || input.middle) pane_.lent().leave();
     if (last_ns_ - view_sent_ns_ < kViewNs || !pane_.is_framed()) return;
     view_sent_ns_ = last_ns_;
-    const auto view = pane_.camera().rays(context_->size());
+    const auto view = pane_.camera().rays(pane_.size());
     const Vec3f target = pane_.camera().lens() ? view.eye + view.forward * kLentTargetMetres
                                                : pane_.camera().centre();
     replica::send_view(source, view.eye, target);
@@ -339,7 +341,7 @@ void Picture::share_view(const replica::Replica& replica, replica::SessionSource
   // Whoever moves the view follows nobody.
   if (input.right || input.middle || (input.control && input.wheel != 0)) {
     follows_view_ = false;
-    pane_.lent().leave();
+    leave_lent_views();
   }
   const auto& led = replica.led_view();
   if (follows_view_ && led) pane_.camera().look(led->eye_m, led->target_m);
@@ -349,7 +351,7 @@ void Picture::move_mouse_tool(const replica::Replica& replica, Hands& hands,
                               const device::PointerInput& input, float seconds) {
   device::MouseTool* const mouse = hands.mouse_tool();
   if (mouse == nullptr) return;
-  const auto view = pane_.camera().rays(context_->size());
+  const auto view = pane_.camera().rays(pane_.size());
   const bool is_own = pane_.lent().slot() && pane_.lent().slot()->owner() == replica.own_slot() &&
                       hands.mouse_tool(pane_.lent().slot()->number()) == mouse;
   if (is_own && pane_.camera().lens() && tool::is_endoscope(mouse->shape().form)) {
@@ -374,27 +376,6 @@ void Picture::add_lent_view(const replica::Replica& replica, bool is_replay,
                         : "You see from behind the tool of " + name + ": T goes on.";
 }
 
-// While somebody measures, the left button does that alone.
-void Picture::take_measure(const replica::Replica& replica, device::PointerInput& input) {
-  const bool is_click = input.left && !was_left_ && input.is_over_scene;
-  was_left_ = input.left;
-  if (!is_measuring_) return;
-  if (is_click) pane_.measure_at(replica, input.x, input.y);
-  input.left = false;
-}
-
-void Picture::add_measure(ui::HudModel& model) const {
-  if (!is_measuring_) return;
-  const auto& measured = pane_.measured();
-  const auto ruler = pane_.ruler();
-  model.measure_text =
-      measured.count() == 0   ? "Measure: click a place on the organ. D or Esc ends that."
-      : measured.count() == 1 ? "Click the other place."
-      : ruler.text.empty()    ? "A measured place has no tissue at this time."
-                           : ruler.text + " in a straight line. A click begins anew, D ends that.";
-  model.rulers.push_back(ruler);
-}
-
 void Picture::ask_for_ghost(replica::SessionSource& source) {
   if (source.playback() != nullptr || overlays_.ghost == has_asked_for_ghost_) return;
   if (replica::ask_for_ghost(source, overlays_.ghost)) has_asked_for_ghost_ = overlays_.ghost;
@@ -407,6 +388,8 @@ void Picture::draw(const replica::Replica& replica, replica::SessionSource& sour
   last_ns_ = now_ns;
   measure(replica, now_ns);
   observe(replica, hands, now_ns);
+  lay_out();
+  update_beside(now_ns);
   if (pane_.update(replica, view_, now_ns) && shows_help_) help_until_ns_ = now_ns + kHelpNs;
   // Whoever uses the tool has read enough, and wants to see the organ.
   const auto* own = hands.mouse_tool();
@@ -419,7 +402,7 @@ void Picture::draw(const replica::Replica& replica, replica::SessionSource& sour
   context_->poll_events();
   hud_.begin_frame(seconds);
   device::PointerInput input = hud_.input();
-  pane_.camera().update(input, context_->size(), seconds);
+  move_cameras(input, seconds);
   share_view(replica, source, input);
   // A hand that held its own camera and moved as that sees would chase itself.
   if (!pane_.lent().slot() || pane_.lent().slot()->owner() != replica.own_slot())
@@ -427,14 +410,15 @@ void Picture::draw(const replica::Replica& replica, replica::SessionSource& sour
   take_measure(replica, input);
   if (pane_.surface().is_valid()) move_mouse_tool(replica, hands, input, seconds);
   pane_.make_scene(replica, hands, {overlays_, seconds, source.playback() != nullptr});
+  make_beside_scene(seconds);
   const auto actions = hud_.draw(hud_model(replica, source, hands, now_ns));
   act(actions, replica, source);
   if (actions.take_instrument) hands.take(*actions.take_instrument, source);
   if (actions.answer)
     replica::send_lesson_wish(source, replica::LessonWish::Answer,
                               static_cast<std::uint32_t>(hands.choice().hand));
-  if (actions.switch_hand) hands.switch_hand(input, pane_.camera().rays(context_->size()));
-  pane_.draw(render::Quality::Live);
+  if (actions.switch_hand) hands.switch_hand(input, pane_.camera().rays(pane_.size()));
+  draw_panes(render::Quality::Live);
   hud_.render();
   if (wants_screenshot_ && !saving_.is_busy()) {
     wants_screenshot_ = false;
@@ -452,8 +436,8 @@ void Picture::draw(const replica::Replica& replica, replica::SessionSource& sour
 }
 
 render::Image Picture::image() {
-  pane_.stand_still();
-  pane_.draw(render::Quality::Best);
+  stand_still();
+  draw_panes(render::Quality::Best);
   hud_.render();
   return context_->read_image();
 }

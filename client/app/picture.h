@@ -9,6 +9,7 @@
 #include "client/app/client_options.h"
 #include "client/app/hands.h"
 #include "client/app/pane.h"
+#include "client/replay/paired_source.h"
 #include "client/replica/peak_rings.h"
 #include "client/ui/hud.h"
 #include "common/base/background.h"
@@ -19,6 +20,11 @@ class Picture {
  public:
   static Result<std::unique_ptr<Picture>> make(const ClientOptions& options,
                                                const std::string& title);
+
+  // Shows the second recording beside the first: `second` is what the pair's second has sent.
+  // Both outlive the picture.
+  void stand_beside(const ClientOptions& options, replay::PairedSource& pair,
+                    const replica::Replica& second);
 
   // Draws the session as it is at `now_ns` and acts on what the person does.
   void draw(const replica::Replica& replica, replica::SessionSource& source, Hands& hands,
@@ -36,7 +42,8 @@ class Picture {
   explicit Picture(std::unique_ptr<render::GlContext> context, const ClientOptions& options);
 
   void measure(const replica::Replica& replica, std::uint64_t now_ns);
-  void add_participants(const replica::Replica& replica, bool is_replay, ui::HudModel& model) const;
+  static std::vector<ui::HudParticipant> participants_of(const replica::Replica& replica,
+                                                         const Pane& pane, bool is_replay);
   void add_own_forces(const replica::Replica& replica, ui::HudModel& model) const;
   void add_felt_hands(const Hands& hands, ui::HudModel& model) const;
   void add_lesson(const replica::Replica& replica, bool is_replay, ui::HudModel& model) const;
@@ -55,6 +62,19 @@ class Picture {
   // Takes the click that measures out of the input.
   void take_measure(const replica::Replica& replica, device::PointerInput& input);
   void add_measure(ui::HudModel& model) const;
+  void toggle_measure();
+  // The parts below are about a second recording, if there is one.
+  void lay_out();
+  void observe_beside();
+  void update_beside(std::uint64_t now_ns);
+  void move_cameras(const device::PointerInput& input, float seconds);
+  void make_beside_scene(float seconds);
+  void draw_panes(render::Quality quality);
+  void stand_still();
+  void act_beside(const ui::HudActions& actions);
+  void leave_lent_views();
+  ui::HudHalf half(std::size_t number, const Pane& pane, const replica::Replica& replica) const;
+  void add_halves(const replica::Replica& replica, ui::HudModel& model) const;
   void ask_for_ghost(replica::SessionSource& source);
   void act(const ui::HudActions& actions, const replica::Replica& replica,
            replica::SessionSource& source);
@@ -67,6 +87,14 @@ class Picture {
   replica::Role role_;
   std::unique_ptr<render::GlContext> context_;
   Pane pane_;
+  struct Beside {
+    replay::PairedSource& pair;
+    const replica::Replica& replica;
+    Pane pane;
+    bool has_own_view = false;
+    bool is_pointed_at = false;  // the pointer is there, or its button went down there
+  };
+  std::unique_ptr<Beside> beside_;  // null: there is one session
   ui::Hud hud_;
   std::uint64_t last_ns_ = 0, count_ = 0;
   std::uint64_t help_until_ns_ = 0;  // shown at first, then until asked for; 0: as the person wants

@@ -8,6 +8,7 @@
 // the context's framebuffer, render(). Thread: render thread. One Hud per process (Dear ImGui keeps
 // one context).
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -126,6 +127,27 @@ struct HudFeltHand {
 };
 inline constexpr std::size_t kFeltBins = 160;  // of them at most
 
+// One of two recordings beside each other.
+struct HudHalf {
+  std::string name;   // of the file
+  std::string organ;  // empty: not known yet
+  double seconds = 0, last_seconds = 0;
+  std::string stage;    // of a lesson; empty: there is none
+  std::string blood;    // lost; empty: none
+  std::string notice;   // that it has ended or waits; empty: it plays
+  std::string stopped;  // why it cannot go on; empty: it can
+  std::vector<HudParticipant> participants;
+  std::vector<HudLabel> labels;
+  HudRuler ruler;
+  float left = 0, width = 0;  // of its picture, pixels
+};
+struct HudPair {
+  std::array<HudHalf, 2> halves;
+  bool is_by_stage = false;
+  std::optional<bool> has_stages;  // to align by; nothing: it is not known yet
+  bool has_own_views = false;
+};
+
 struct HudModel {
   std::string title;          // "127.0.0.1:7690" or a file's name
   std::string organ;          // "liver, 1,553 surface vertices"
@@ -145,7 +167,8 @@ struct HudModel {
   std::vector<HudRuler> rulers;
   std::string measure_text;  // empty: nobody measures
   std::optional<HudTimeline> timeline;
-  float greatest_force_n = 0;  // of all participants' `forces_n`: their common scale
+  std::optional<HudPair> pair;  // stands in place of the panels of one session
+  float greatest_force_n = 0;   // of all participants' `forces_n`: their common scale
   bool shows_regions = true, shows_holds = false, shows_arrows = true, shows_rate = false;
   std::optional<bool> is_recorded;      // of a live session; nothing: it is not known
   std::string recording_text;           // empty: nothing is wrong with the recording
@@ -176,6 +199,7 @@ struct HudActions {
   bool set_mark = false, return_to_mark = false, toggle_follow = false;
   bool next_lent_view = false;
   bool toggle_measure = false, end_measure = false;
+  bool toggle_alignment = false, toggle_own_views = false;
   bool switch_hand = false;
   bool answer = false, next_stage = false, restart_lesson = false;
   std::optional<std::string> mark_named, return_to_named;
@@ -207,6 +231,8 @@ class Hud {
 
  private:
   void need_letters(const HudModel& model);
+  // All panels of one session.
+  void draw_session(const HudModel& model, HudActions& actions);
 
   render::GlContext& context_;
   std::optional<Fonts> fonts_;

@@ -150,14 +150,15 @@ Box draw_session_panel(const HudModel& model, float scale) {
   return box;
 }
 
-Box draw_banners(const HudModel& model, const Box& session, const Box& people, float scale) {
+Box draw_banners(const HudModel& model, const Box& session, const Box& people, float scale,
+                 float top) {
   const std::vector<Banner> banners = banners_of(model);
   if (banners.empty() && model.messages.empty()) return {};
   constexpr float kLeastWidth = 300;
   const float right = people.right > 0 ? people.left : ImGui::GetIO().DisplaySize.x;
   const float width = std::max(right - session.right - 2 * kMargin * scale, kLeastWidth * scale);
   const ImVec2 pad = ImGui::GetStyle().WindowPadding;
-  ImGui::SetNextWindowPos({(session.right + right) / 2, kMargin * scale}, 0, {0.5f, 0});
+  ImGui::SetNextWindowPos({(session.right + right) / 2, top + kMargin * scale}, 0, {0.5f, 0});
   ImGui::Begin("banners", nullptr, kGlass);
   ImGui::PushTextWrapPos(width - pad.x);
   bool is_first = true;
@@ -182,9 +183,9 @@ Box draw_banners(const HudModel& model, const Box& session, const Box& people, f
   return box;
 }
 
-void draw_help(const HudModel& model, float scale) {
+void draw_help(const HudModel& model, const Box& timeline, float scale) {
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
-  const float bottom = screen.y - (model.timeline ? 132 : kMargin) * scale;
+  const float bottom = (timeline.top > 0 ? timeline.top : screen.y) - kMargin * scale;
   // Under the panel of people: the bar of one's own force is at the left.
   ImGui::SetNextWindowPos({screen.x - kMargin * scale, bottom}, 0, {1, 1});
   ImGui::SetNextWindowBgAlpha(model.shows_help ? 0.86f : 0.45f);
@@ -222,6 +223,11 @@ void draw_help(const HudModel& model, float scale) {
       help_row("left, right", "two seconds back or on");
       help_row(", .", "one picture back or on");
       help_row("Page Up, Page Down", "to the event before or after");
+    }
+    if (model.pair) {
+      help_row("U", model.pair->has_own_views ? "one view for both" : "a view for each");
+      if (model.pair->has_stages.value_or(false))
+        help_row("B", model.pair->is_by_stage ? "both from their start" : "stage by stage");
     }
     help_row("D", "measure: click two places; D or Esc ends that");
     help_row("right drag", "turn the view");

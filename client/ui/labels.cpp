@@ -7,9 +7,9 @@
 
 namespace trocar::ui {
 
-void draw_labels(const HudModel& model, const Box& banners, float scale) {
+void draw_labels(std::span<const HudLabel> labels, const Box& banners, float scale) {
   ImDrawList* list = ImGui::GetBackgroundDrawList();
-  for (const HudLabel& label : model.labels) {
+  for (const HudLabel& label : labels) {
     const ImVec2 size = ImGui::CalcTextSize(label.text.c_str());
     const ImVec2 pad = {7 * scale, 3 * scale};
     ImVec2 from = {label.x + 12 * scale, label.y - size.y / 2};

@@ -17,7 +17,7 @@ using Kind = replica::PlaybackEventKind;
 
 constexpr float kCurveHeight = 26, kMarkHeight = 9, kReach = 4;  // pixels of the design
 constexpr std::array<float, 5> kSpeeds{0.1f, 0.25f, 1, 4, 16};
-constexpr float kSpeedWidth = 46, kMeasureWidth = 74;
+constexpr float kSpeedWidth = 46, kMeasureWidth = 74, kChoiceWidth = 118;
 constexpr double kJustPassedSeconds = 1;
 
 ImVec4 colour_of(Kind kind) {
@@ -103,6 +103,25 @@ const replica::PlaybackEvent* draw_story(const HudTimeline& timeline, float left
   return pointed != nullptr ? pointed : last;
 }
 
+void draw_pair_choices(const HudPair& pair, float scale, HudActions& actions) {
+  const bool has_stages = pair.has_stages.value_or(false);
+  if (has_stages) {
+    if (pressed_button("From the start", kChoiceWidth * scale, !pair.is_by_stage) &&
+        pair.is_by_stage)
+      actions.toggle_alignment = true;
+    ImGui::SameLine();
+    if (pressed_button("Stage by stage", kChoiceWidth * scale, pair.is_by_stage) &&
+        !pair.is_by_stage)
+      actions.toggle_alignment = true;
+    ImGui::SameLine();
+  }
+  if (pressed_button("Own views", kChoiceWidth * scale, pair.has_own_views))
+    actions.toggle_own_views = true;
+  if (has_stages || !pair.has_stages) return;
+  ImGui::SameLine();
+  ImGui::TextDisabled("They have no stages of a lesson in common: both run from their start.");
+}
+
 }  // namespace
 
 std::optional<double> event_beside(const HudTimeline& timeline, bool is_next) {
@@ -117,7 +136,8 @@ std::optional<double> event_beside(const HudTimeline& timeline, bool is_next) {
   return before;
 }
 
-void draw_timeline(const HudTimeline& timeline, float scale, HudActions& actions) {
+Box draw_timeline(const HudModel& model, float scale, HudActions& actions) {
+  const HudTimeline& timeline = *model.timeline;
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
   const float width = std::min(screen.x - 2 * kMargin * scale, 900 * scale);
   ImGui::SetNextWindowPos({screen.x / 2, screen.y - kMargin * scale}, 0, {0.5f, 1});
@@ -154,7 +174,10 @@ void draw_timeline(const HudTimeline& timeline, float scale, HudActions& actions
                        told->text.c_str());
   else
     ImGui::TextDisabled("Page Up and Page Down go from event to event.");
+  if (model.pair) draw_pair_choices(*model.pair, scale, actions);
+  const Box box = box_of_window();
   ImGui::End();
+  return box;
 }
 
 }  // namespace trocar::ui
