@@ -85,7 +85,8 @@ void set_style(float scale) {
 
 }  // namespace
 
-Hud::Hud(render::GlContext& context, double scale) : context_(context) {
+Hud::Hud(render::GlContext& context, double scale)
+    : context_(context), help_(std::make_unique<Box>()) {
   IMGUI_CHECKVERSION();
   ImGui::CreateContext();
   ImGuiIO& io = ImGui::GetIO();
@@ -187,7 +188,7 @@ device::PointerInput Hud::input() const {
   return input;
 }
 
-void Hud::draw_session(const HudModel& model, HudActions& actions) {
+Sides Hud::draw_session(const HudModel& model, HudActions& actions) {
   if (model.is_away) draw_away_veil();
   const Box session = draw_session_panel(model, scale_);
   const Box people = draw_participants_panel(model, scale_);
@@ -201,18 +202,20 @@ void Hud::draw_session(const HudModel& model, HudActions& actions) {
   draw_own_forces(model, scale_);
   if (model.tray.hands > 0) draw_tray(model, session, scale_, actions);
   if (model.conduct) draw_conduct(*model.conduct, session, scale_, actions);
+  return {session, right};
 }
 
 HudActions Hud::draw(const HudModel& model) {
   HudActions actions;
   need_letters(model);  // for the next picture
+  Sides sides;
   if (model.pair)
     draw_pair(model, scale_);
   else
-    draw_session(model, actions);
+    sides = draw_session(model, actions);
   Box timeline;
   if (model.timeline) timeline = draw_timeline(model, scale_, actions);
-  draw_help(model, timeline, scale_);
+  *help_ = draw_help(model, timeline, sides, *help_, scale_);
   ImGui::Render();
   const auto keys = std::exchange(pressed_keys(), {});
   if (ImGui::GetIO().WantTextInput) return actions;

@@ -27,6 +27,9 @@
 
 namespace trocar::ui {
 
+struct Box;  // a part of the screen
+struct Sides;
+
 // The scale of words and panels is in pixels per pixel of the design.
 inline constexpr float kLeastScale = 0.75f, kMostScale = 3;
 
@@ -231,13 +234,14 @@ class Hud {
 
  private:
   void need_letters(const HudModel& model);
-  // All panels of one session.
-  void draw_session(const HudModel& model, HudActions& actions);
+  // Draws all panels of one session; returns where they are.
+  Sides draw_session(const HudModel& model, HudActions& actions);
 
   render::GlContext& context_;
   std::optional<Fonts> fonts_;
   const replica::PlaybackStory* read_story_ = nullptr;  // whose letters are there
   float scale_ = 1;
+  std::unique_ptr<Box> help_;  // where the keys stood in the last picture
 };
 
 }  // namespace trocar::ui

@@ -183,19 +183,25 @@ Box draw_banners(const HudModel& model, const Box& session, const Box& people, f
   return box;
 }
 
-void draw_help(const HudModel& model, const Box& timeline, float scale) {
+Box draw_help(const HudModel& model, const Box& timeline, const Sides& sides, const Box& before,
+              float scale) {
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
   const float bottom = (timeline.top > 0 ? timeline.top : screen.y) - kMargin * scale;
   // Under the panel of people: the bar of one's own force is at the left.
-  ImGui::SetNextWindowPos({screen.x - kMargin * scale, bottom}, 0, {1, 1});
+  const bool covers = bottom - (before.bottom - before.top) < sides.right.bottom;
+  if (model.timeline && covers && sides.left.bottom < sides.right.bottom)
+    ImGui::SetNextWindowPos({kMargin * scale, bottom}, 0, {0, 1});
+  else
+    ImGui::SetNextWindowPos({screen.x - kMargin * scale, bottom}, 0, {1, 1});
   ImGui::SetNextWindowBgAlpha(model.shows_help ? 0.86f : 0.45f);
   ImGui::Begin("help", nullptr, kGlass);
   if (!model.shows_help) {
     ImGui::TextDisabled(
         model.has_own_tool ? "1-9 instrument   left button use it   wheel depth   Q E turn   H help"
                            : "right drag turn   Ctrl+wheel zoom   H help");
+    const Box box = box_of_window();
     ImGui::End();
-    return;
+    return box;
   }
   heading("Mouse and keyboard");
   ImGui::Separator();
@@ -250,7 +256,9 @@ void draw_help(const HudModel& model, const Box& timeline, float scale) {
   ImGui::TextDisabled("Arrows: force of the tissue on a tool, 20 mm per N.");
   ImGui::TextDisabled("A line from a tool to a small ball: where the hand is, when");
   ImGui::TextDisabled("tissue keeps the tool from it.");
+  const Box box = box_of_window();
   ImGui::End();
+  return box;
 }
 
 void draw_away_veil() {

@@ -45,8 +45,15 @@ void draw_tray(const HudModel& model, const Box& session, float scale, HudAction
 void draw_conduct(const HudConduct& conduct, const Box& session, float scale, HudActions& actions);
 // Needs a model with a timeline; returns where it is.
 Box draw_timeline(const HudModel& model, float scale, HudActions& actions);
-// Above the timeline, if there is one.
-void draw_help(const HudModel& model, const Box& timeline, float scale);
+// These are the panels of one session at both sides.
+struct Sides {
+  Box left, right;
+};
+// Stands at the right above the timeline, if there is one. Of a recording it goes to the left,
+// where as tall as it was `before` it would cover the panels at the right, and less at the left.
+// Returns where it is.
+Box draw_help(const HudModel& model, const Box& timeline, const Sides& sides, const Box& before,
+              float scale);
 // Greys the scene, which is no longer what the session is.
 void draw_away_veil();
 

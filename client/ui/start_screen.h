@@ -51,6 +51,7 @@ struct StartChoice {
   std::string task;             // instead of an organ; empty: none
   bool is_recorded = true;      // likewise
   std::string recording;        // to watch
+  std::string beside;           // a second one; empty: none
   std::string server, code, name;
   replica::Role role = replica::Role::Surgeon;
 };
@@ -83,6 +84,7 @@ class StartScreen {
   std::array<char, 160> code_{};
   std::array<char, 33> name_{};
   std::array<char, 512> recording_{};
+  std::string beside_;
   replica::Role role_;
   std::size_t organ_ = 0;
   std::string task_;

@@ -59,6 +59,36 @@ TEST(Layout, TheMiddleOfTheOrganStaysFree) {
     }
 }
 
+// A recorded lesson with all its results at the right, with or without the keys.
+render::Image recorded_lesson(bool shows_help) {
+  auto context = render::make_headless_context({1280, 720});
+  EXPECT_TRUE(context.ok());
+  Hud hud(**context, 1);
+  HudModel model;
+  model.shows_help = shows_help;
+  model.timeline = HudTimeline{.last_seconds = 60};
+  model.participants.push_back({.name = "Mira", .role = replica::Role::Surgeon, .has_tool = true});
+  model.lesson = HudLesson{.title = "Cut along the line", .is_over = true, .points = 92};
+  model.lesson->results.emplace_back("Incision", std::vector<std::string>(12, "a measure: 1.0 N"));
+  for (int i = 0; i < 3; ++i) {
+    hud.begin_frame(1.0f / 60);
+    hud.draw(model);
+    hud.render();
+  }
+  return (*context)->read_image();
+}
+
+TEST(Layout, TheKeysOfARecordingDoNotCoverItsLesson) {
+  const auto without = recorded_lesson(false), with = recorded_lesson(true);
+  int changed = 0;
+  for (int y = 0; y < 380; ++y)
+    for (int x = 1280 - 290; x < 1280; ++x) {
+      const auto at = static_cast<std::size_t>(y * 1280 + x) * 3;
+      changed += without.rgb[at + 1] != with.rgb[at + 1];
+    }
+  EXPECT_EQ(changed, 0);
+}
+
 // Two recordings of long names, with all that their panels can say.
 HudModel pair_model(render::Size size) {
   HudModel model;
