@@ -70,9 +70,11 @@ AlignedTime::Place AlignedTime::place_in(std::size_t recording, Tick time) const
   if (part != parts_.begin()) --part;
   const Tick begin = part->begin[recording], end = part->end[recording];
   const Tick in_part = time - std::min(time, part->time);
-  const bool is_waiting = in_part > end - begin;
-  return {is_waiting ? end : begin + in_part, is_waiting,
-          is_waiting && end == parts_.back().end[recording]};
+  if (part + 1 == parts_.end() && in_part == end - begin) return {end, false, false};
+  if (in_part < end - begin) return {begin + in_part, false, false};
+  // Before the next stage begins.
+  const bool has_ended = end == parts_.back().end[recording];
+  return {has_ended || end == begin ? end : end - 1, true, has_ended};
 }
 
 Tick AlignedTime::time_of(std::size_t recording, Tick tick) const {

@@ -6,12 +6,8 @@
 namespace trocar::replay {
 namespace {
 
-constexpr Tick kApartTicks = 400;   // at real time; farther apart it is moved
-constexpr double kMostHurry = 0.2;  // it plays faster or slower by this share at most
-
-Tick distance(Tick a, Tick b) {
-  return a > b ? a - b : b - a;
-}
+constexpr double kApartTicks = 400;  // at real time; farther apart it is moved
+constexpr double kMostHurry = 0.2;   // it plays faster or slower by this share at most
 
 }  // namespace
 
@@ -119,23 +115,26 @@ void PairedSource::tell_story() {
   story_ = std::move(story);
 }
 
-void PairedSource::steer(std::size_t i) {
+// Its last round has brought a half to where it was wanted at `before`.
+void PairedSource::steer(std::size_t i, Tick before) {
   ReplaySource& half = *halves_[i];
   if (half.state() != replica::SourceState::Live) return;
   const auto wanted = place(i);
   const Tick at = half.position();
-  const bool is_running = is_playing_ && !wanted.is_waiting && wanted.tick < half.last_tick();
-  const auto most_apart =
-      is_running  ? static_cast<Tick>(static_cast<float>(kApartTicks) * std::max(1.0f, speed_))
-      : is_moved_ ? Tick{0}
-                  : kTicksPerFrame;
-  if (is_moved_ || distance(at, wanted.tick) > most_apart) half.seek(wanted.tick);
-  if (!is_running) return half.pause();
-  const double behind = (static_cast<double>(wanted.tick) - static_cast<double>(at)) * 1e-3;
-  const double hurry = is_moved_ ? 0.0 : std::clamp(behind, -kMostHurry, kMostHurry);
+  if (!is_playing_ || wanted.is_waiting || wanted.tick >= half.last_tick()) {
+    half.pause();
+    // Where it has just been paused, a part of a frame is not worth a seek.
+    const bool is_held = !is_moved_ && !wanted.is_waiting && wanted.tick < half.last_tick();
+    const Tick apart = at > wanted.tick ? at - wanted.tick : wanted.tick - at;
+    if (apart > (is_held ? kTicksPerFrame : 0)) half.seek(wanted.tick);
+    return;
+  }
+  const auto was_wanted = time_line_.place_in(i, before);
+  const double apart = static_cast<double>(was_wanted.tick) - static_cast<double>(at);
+  const bool is_lost = std::abs(apart) > kApartTicks * std::max(1.0, double{speed_});
+  if (is_moved_ || is_lost || !half.is_playing()) half.seek(wanted.tick);
+  const double hurry = is_moved_ ? 0.0 : std::clamp(apart * 1e-3, -kMostHurry, kMostHurry);
   half.set_speed(speed_ * static_cast<float>(1 + hurry));
-  if (half.is_playing()) return;
-  if (at == half.last_tick()) half.seek(wanted.tick);  // else it would begin again
   half.play();
 }
 
@@ -152,11 +151,11 @@ void PairedSource::advance(std::uint64_t now_ns) {
 void PairedSource::poll(replica::MessageSink& sink) {
   read_stories();
   *round_ns_ = clock_();
-  // Both are where the round before has left them: that is what their time is compared with.
   if (is_moved_) last_ns_ = *round_ns_;
-  for (std::size_t i = 0; i < kPair; ++i) steer(i);
-  is_moved_ = false;
+  const Tick before = position_;
   advance(*round_ns_);
+  for (std::size_t i = 0; i < kPair; ++i) steer(i, before);
+  is_moved_ = false;
   halves_[0]->poll(sink);
 }
 

@@ -69,7 +69,7 @@ class PairedSource final : public replica::SessionSource, public replica::Playba
   AlignedTime::Spans spans() const;
   void read_stories();
   void tell_story();
-  void steer(std::size_t i);
+  void steer(std::size_t i, Tick before);
   void advance(std::uint64_t now_ns);
 
   Halves halves_;

@@ -72,6 +72,7 @@ TEST(AlignedTime, StagesBeginTogetherAndTheFasterOneWaits) {
   EXPECT_EQ(time->place_in(0, 300).tick, 300u);
   EXPECT_EQ(time->place_in(1, 300).tick, 150u);
   EXPECT_TRUE(time->place_in(0, 500).is_waiting) << "its stage took 100";
+  EXPECT_EQ(time->place_in(0, 500).tick, 399u) << "the next has not begun";
   EXPECT_EQ(time->place_in(0, 750).tick, 400u);
   EXPECT_EQ(time->place_in(1, 750).tick, 600u);
   EXPECT_TRUE(time->place_in(1, 1200).has_ended);

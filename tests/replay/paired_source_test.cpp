@@ -122,6 +122,10 @@ TEST_F(PairedSourceTest, StagesBeginTogetherWhereBothHaveThem) {
   while (pair_->is_playing()) {
     step(16);
     expect_aligned();
+    if (pair_->place(0).is_waiting && pair_->place(0).tick < 60 * kTicksPerFrame) {
+      step(0);
+      EXPECT_FALSE(replicas_[0]->lesson()) << "its stage has not begun";
+    }
     has_waited = has_waited || (pair_->place(0).is_waiting && !pair_->place(0).has_ended);
     const auto lessons = std::array{replicas_[0]->lesson(), replicas_[1]->lesson()};
     if (pair_->position() % kTicksPerFrame == 0 && lessons[0] && lessons[1]) {
