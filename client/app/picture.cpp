@@ -278,7 +278,7 @@ ui::HudModel Picture::hud_model(const replica::Replica& replica, replica::Sessio
   model.labels = pane_.labels(replica);
   add_measure(model);
   add_halves(replica, model);
-  add_messages(replica, now_ns, model);
+  if (!beside_) add_messages(replica, now_ns, model);
   if (const auto* playback = source.playback()) {
     const auto seconds = [](Tick tick) { return static_cast<double>(tick) * 1e-3; };
     model.timeline = ui::HudTimeline{seconds(playback->first_tick()),

@@ -123,7 +123,7 @@ void PairedSource::steer(std::size_t i, Tick before) {
   const Tick at = half.position();
   if (!is_playing_ || wanted.is_waiting || wanted.tick >= half.last_tick()) {
     half.pause();
-    // Where it has just been paused, a part of a frame is not worth a seek.
+    // A part of a frame is not worth a seek where it has just been paused.
     const bool is_held = !is_moved_ && !wanted.is_waiting && wanted.tick < half.last_tick();
     const Tick apart = at > wanted.tick ? at - wanted.tick : wanted.tick - at;
     if (apart > (is_held ? kTicksPerFrame : 0)) half.seek(wanted.tick);
