@@ -33,11 +33,14 @@ constexpr std::uint64_t kGoodbyeNs = 400'000'000;  // time to say Bye
 
 class Run {
  public:
-  Run(const ClientOptions& options, replica::SessionSource& source, Hands& hands)
+  Run(const ClientOptions& options, replica::SessionSource& source, Hands& hands,
+      replay::PairedSource* pair = nullptr)
       : options_(options),
         source_(source),
         hands_(hands),
+        pair_(pair),
         replica_([&source](const proto::Envelope& message) { return source.send(message); }),
+        second_([pair](const proto::Envelope& message) { return pair->half(1).send(message); }),
         pace_(options.pictures_per_second > 0        ? options.pictures_per_second
               : options.display == Display::Headless ? 15
                                                      : 60) {
@@ -48,6 +51,7 @@ class Run {
 
  private:
   Status step(std::uint64_t now_ns);
+  Status poll();
   void measure(std::uint64_t now_ns);
   void use_marks(std::uint64_t now_ns);
   bool is_over(std::uint64_t now_ns);
@@ -59,7 +63,9 @@ class Run {
   const ClientOptions& options_;
   replica::SessionSource& source_;
   Hands& hands_;
+  replay::PairedSource* pair_;  // null: there is one session
   replica::Replica replica_;
+  replica::Replica second_;  // of the pair
   std::unique_ptr<Picture> picture_;
   PicturePace pace_;
   std::uint64_t start_ns_ = 0;
@@ -72,11 +78,22 @@ class Run {
   double last_round_trip_seconds_ = 0;
 };
 
-Status Run::step(std::uint64_t now_ns) {
+// A recording that is not what it says stops, and one beside it goes on.
+Status Run::poll() {
   source_.poll(replica_);
-  if (!replica_.fault().ok())
+  if (pair_ == nullptr) {
+    if (replica_.fault().ok()) return {};
     return Error{replica_.fault().error().code,
                  source_.name() + ": " + replica_.fault().error().message};
+  }
+  pair_->poll_second(second_);
+  if (!replica_.fault().ok()) pair_->stop(0, replica_.fault().error().message);
+  if (!second_.fault().ok()) pair_->stop(1, second_.fault().error().message);
+  return {};
+}
+
+Status Run::step(std::uint64_t now_ns) {
+  if (const auto polled = poll(); !polled) return polled.error();
   if (live_ns_ == 0 && replica_.newest() != nullptr) {
     live_ns_ = now_ns;
     log::info("in the session: {}, {} surface vertices", replica_.topology().organ_name,
@@ -193,6 +210,7 @@ Result<ExitCode> Run::run() {
     auto picture = Picture::make(options_, "Trocar: " + source_.name());
     if (!picture) return picture.error();
     picture_ = std::move(*picture);
+    if (pair_ != nullptr) picture_->stand_beside(options_, *pair_, second_);
     // Nobody else needs the processors while a recording plays; who asks for a rate gets it.
     if (picture_->is_software() && source_.playback() == nullptr &&
         options_.pictures_per_second == 0)
@@ -295,6 +313,11 @@ Result<ExitCode> run_with_source(const ClientOptions& options, replica::SessionS
   return Run(options, source, hands).run();
 }
 
+Result<ExitCode> run_pair(const ClientOptions& options, replay::PairedSource& pair) {
+  Hands hands;
+  return Run(options, pair, hands, &pair).run();
+}
+
 bool is_stop_requested() {
   return stop_requested != 0;
 }
@@ -344,6 +367,11 @@ Result<ExitCode> run_chosen(const ClientOptions& options) {
   if (!options.series_folder.empty()) {
     if (const auto written = write_picture_series(options); !written) return written.error();
     return ExitCode::Ok;
+  }
+  if (!options.beside_file.empty()) {
+    auto pair = replay::PairedSource::open(options.replay_file, options.beside_file, options.align);
+    if (!pair) return pair.error();
+    return run_pair(options, **pair);
   }
   if (!options.replay_file.empty()) {
     auto source = replay::ReplaySource::open(options.replay_file);

@@ -15,6 +15,8 @@ bool is_stop_requested();
 // Runs with a given source until it closes, or the person, a signal or --seconds ends it.
 Result<ExitCode> run_with_source(const ClientOptions& options, replica::SessionSource& source,
                                  Hands& hands);
+// Runs two recordings beside each other.
+Result<ExitCode> run_pair(const ClientOptions& options, replay::PairedSource& pair);
 // Makes source and hands from the options, then runs. Where it is left open which session is meant,
 // the start screen asks, again after a session that could not be joined.
 Result<ExitCode> run_client(const ClientOptions& options);

@@ -38,6 +38,8 @@ Examples:
       holds laparoscopic jaws that pivot at a trocar there
   trocar-client --replay trocar-20261121T120000Z.mcap
       plays a recorded session with a free camera
+  trocar-client --replay before.mcap --beside after.mcap
+      plays two of them beside each other, with one time bar
   trocar-client --replay trocar-20261121T120000Z.mcap --device haply --feel Anna
       plays it, and the hand feels what Anna felt
 
@@ -186,9 +188,27 @@ std::string default_name() {
   return base.substr(0, 20) + "-" + std::to_string(getpid() % 10000);
 }
 
+Status check_beside(const ClientOptions& options) {
+  if (options.beside_file.empty()) {
+    if (!options.align && !options.has_own_views) return {};
+    return Error{ErrorCode::Usage,
+                 "--align, --own-views: are of two recordings; give --beside too"};
+  }
+  if (options.replay_file.empty())
+    return Error{ErrorCode::Usage, "--beside: is a second recording; give --replay too"};
+  if (!options.series_folder.empty())
+    return Error{ErrorCode::Usage, "--beside: --pictures are of one recording; leave one out"};
+  if (!options.devices.empty())
+    return Error{ErrorCode::Usage, "--beside: a device feels one recording; leave one out"};
+  if (options.display == Display::None)
+    return Error{ErrorCode::Usage, "--beside: --no-render draws nothing; use --headless"};
+  return {};
+}
+
 Status check(const ClientOptions& options) {
   if (!options.replay_file.empty() && !options.script_file.empty())
     return Error{ErrorCode::Usage, "--replay and --script: a recording takes no tools; choose one"};
+  if (const auto beside = check_beside(options); !beside) return beside;
   if (!options.series_folder.empty() && options.replay_file.empty())
     return Error{ErrorCode::Usage, "--pictures: is of a recording; give --replay too"};
   if (const auto tools = check_tools(options); !tools) return tools;
@@ -215,7 +235,7 @@ struct GivenTexts {
   bool is_headless = false, draws_nothing = false;
   std::vector<double> view;
   std::vector<std::string> overlays, ports, feels;
-  std::string instruments;
+  std::string instruments, align;
   const CLI::Option* server = nullptr;
 };
 
@@ -354,6 +374,16 @@ void add_hand_options(CLI::App& app, ClientOptions& options, GivenTexts& more) {
 void add_replay_options(CLI::App& app, ClientOptions& options, GivenTexts& more) {
   app.add_option("--replay", options.replay_file, "play a recorded session (.mcap)")
       ->type_name("FILE");
+  app.add_option("--beside", options.beside_file,
+                 "with --replay: a second recording (.mcap), beside the first in one window")
+      ->type_name("FILE");
+  app.add_option("--align", more.align,
+                 "with --beside: let both begin at their start, or each stage of a lesson begin "
+                 "together: start, stage [stage where both have it]")
+      ->check(CLI::IsMember({"start", "stage"}))
+      ->type_name("BY");
+  app.add_flag("--own-views", options.has_own_views,
+               "with --beside: turn each of the two by itself");
   app.add_option("--pictures", options.series_folder,
                  "with --replay: write numbered pictures (PNG) of it instead of playing it")
       ->type_name("FOLDER");
@@ -403,6 +433,8 @@ Status read_further(const GivenTexts& more, ClientOptions& options) {
   if (const auto parsed = parse_overlays(more.overlays, options.overlays); !parsed) return parsed;
   if (const auto parsed = parse_view(more.view, options.view); !parsed) return parsed;
   if (const auto parsed = parse_ports(more.ports, options.ports_m); !parsed) return parsed;
+  if (!more.align.empty())
+    options.align = more.align == "stage" ? replay::Alignment::Stage : replay::Alignment::Start;
   if (const auto parsed = parse_feels(more.feels, options.feels); !parsed) return parsed;
   if (!more.instruments.empty()) {
     auto table = tool::read_instruments(more.instruments);

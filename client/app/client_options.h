@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "client/render/gl_context.h"
+#include "client/replay/paired_source.h"
 #include "client/replay/recorded_hand.h"
 #include "client/replica/session_view.h"
 #include "common/base/result.h"
@@ -54,7 +55,10 @@ struct ClientOptions {
   double answer_at = -1;                // of a lesson: likewise
   double mark_at = -1, return_at = -1;  // instructor: seconds after joining; < 0: not
   std::string script_file, replay_file, summary_file;
-  std::string series_folder;  // for pictures of the recording; empty: it is played
+  std::string beside_file;                 // a second recording beside the first; empty: none
+  std::optional<replay::Alignment> align;  // of the two; nothing: by stages where they have them
+  bool has_own_views = false;              // each of the two is turned by itself
+  std::string series_folder;               // for pictures of the recording; empty: it is played
   double series_from_s = 0, series_to_s = 0, series_rate = 25;  // to 0: the end
   std::string trace_file;                                       // of what devices did and felt
   std::vector<std::string> devices;  // as device::open_device; empty: the mouse or the script

@@ -3,11 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <numbers>
 
 #include "client/render/drawing_priority.h"
 #include "client/replica/client_messages.h"
-#include "client/shape/ribbon.h"
 #include "client/ui/away_text.h"
 #include "client/ui/banner_text.h"
 #include "client/ui/rate_text.h"
@@ -19,21 +17,8 @@ namespace {
 
 constexpr std::uint64_t kHelpNs = 20'000'000'000;  // at the start
 constexpr std::uint64_t kViewNs = 100'000'000;     // between two words on where a view is
-constexpr shape::Colour kLessonColour{240, 228, 66};
-constexpr float kLentTargetMetres = 0.1f;         // before the lens: what others turn about
-constexpr float kLineHalfWidth = 0.0009f;         // m, as in a browser
-constexpr std::uint64_t kFeltBinNs = 62'500'000;  // 160 of them are 10 s
-
-const replica::Participant* owner_of(const replica::Replica& replica, ToolSlot slot) {
-  return replica.find_participant(slot.owner());
-}
-
-tool::ToolShape shape_of(const replica::Replica& replica, ToolSlot slot) {
-  const auto* owner = owner_of(replica, slot);
-  const auto number = static_cast<std::size_t>(slot.number());
-  return owner != nullptr && number < owner->tools.size() ? owner->tools[number]
-                                                          : tool::ToolShape{};
-}
+constexpr float kLentTargetMetres = 0.1f;          // before the lens: what others turn about
+constexpr std::uint64_t kFeltBinNs = 62'500'000;   // 160 of them are 10 s
 
 std::string sync_text(const replica::Replica& replica) {
   char text[80];
@@ -67,32 +52,16 @@ Result<std::unique_ptr<Picture>> Picture::make(const ClientOptions& options,
 Picture::Picture(std::unique_ptr<render::GlContext> context, const ClientOptions& options)
     : role_(options.role),
       context_(std::move(context)),
-      renderer_(*context_),
+      pane_(*context_, options.sees_with),
       hud_(*context_, options.scale),
       shows_help_(options.display == Display::Window),
       overlays_(options.overlays),
-      view_(options.view),
-      sees_with_(options.sees_with) {
-  log::debug("drawing with {}", renderer_.description());
+      view_(options.view) {
+  log::debug("drawing with {}", pane_.renderer().description());
   if (context_->is_software()) {
     const int count = render::yield_to_other_work();
     log::debug("drawing in software: {} threads yield to the tissue, the network and hands", count);
   }
-}
-
-void Picture::frame_camera(const replica::Replica& replica) {
-  const auto& rest = replica.topology().rest_positions;
-  if (rest.empty()) return;
-  Vec3f low = rest.front(), high = low;
-  for (const Vec3f& p : rest) {
-    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
-    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
-  }
-  camera_.frame((low + high) * 0.5f, length(high - low) * 0.5f);
-  constexpr float kRadians = std::numbers::pi_v<float> / 180;
-  camera_.orbit(static_cast<float>(view_.yaw_deg) * kRadians,
-                static_cast<float>(view_.pitch_deg) * kRadians);
-  camera_.zoom(static_cast<float>(1 / view_.zoom));
 }
 
 void Picture::measure(const replica::Replica& replica, std::uint64_t now_ns) {
@@ -119,92 +88,9 @@ ui::HudTray tray_of(const Hands::Choice& choice) {
   return tray;
 }
 
-render::SceneTool Picture::scene_tool(const replica::Replica& replica, const replica::Tool& tool,
-                                      Hands& hands) const {
-  render::SceneTool shown;
-  shown.slot = tool.slot;
-  shown.world_from_tool = tool.world_from_proxy;
-  shown.hand_position = tool.world_from_tool.position;
-  shown.shape = shape_of(replica, tool.slot);
-  shown.verb = tool.verb;
-  shown.has_claim = tool.has_claim;
-  shown.is_silent = tool.is_silent;
-  shown.force_n = tool.force_n;
-  // A person sees the own hand where it is, not where it was a round trip ago, and the tool as far
-  // from it as tissue last kept it.
-  const device::MouseTool* mouse = hands.mouse_tool(tool.slot.number());
-  // A tool that is held still, or lent, is not where its hand is.
-  const auto* own = replica.find_participant(replica.own_slot());
-  const bool follows_hand = own == nullptr || (own->frozen_by.empty() &&
-                                               (own->lent_tools >> tool.slot.number() & 1u) == 0);
-  if (follows_hand && mouse != nullptr && mouse->is_valid() &&
-      tool.slot.owner() == replica.own_slot()) {
-    const Pose hand = mouse->current().world_from_tool;
-    const Vec3f held_back = tool.world_from_proxy.position - tool.world_from_tool.position;
-    shown.world_from_tool = {hand.position + held_back, hand.orientation};
-    shown.hand_position = hand.position;
-    shown.verb = mouse->current().verb;
-  }
-  return shown;
-}
-
-std::vector<render::Hold> Picture::holds(const replica::Replica& replica) {
-  if (held_history_ != replica.history_version()) held_.clear();
-  held_history_ = replica.history_version();
-  std::vector<tool::ToolShape> shapes;
-  for (const auto& tool : surface_.tools()) shapes.push_back(shape_of(replica, tool.slot));
-  // Kept up to date while hidden too: which tissue a grasp took is seen when it takes it.
-  held_.update(surface_.positions(), surface_.tools(), shapes);
-  std::vector<render::Hold> holds;
-  if (!overlays_.holds) return holds;
-  for (const auto& holding : held_.holdings()) holds.push_back({holding.owner, holding.is_grasp});
-  return holds;
-}
-
-render::SceneView Picture::scene_view(const replica::Replica& replica, Hands& hands,
-                                      float seconds) {
-  render::SceneView scene;
-  scene.seconds = seconds;
-  scene.shows_regions = overlays_.regions;
-  scene.shows_arrows = overlays_.arrows;
-  if (!surface_.is_valid()) return scene;
-  scene.topology_version = replica.topology_version();
-  scene.rest_positions = replica.topology().rest_positions;
-  scene.triangles = replica.topology().triangles;
-  scene.is_wound = replica.topology().is_wound;
-  scene.positions = surface_.positions();
-  scene.regions = surface_.regions();
-  scene.blood = surface_.blood();
-  const auto& ghost = replica.ghost();
-  ghost_.clear();
-  if (overlays_.ghost && ghost.epoch == replica.topology().epoch &&
-      ghost.offsets.size() == scene.positions.size())
-    for (std::size_t i = 0; i < scene.positions.size(); ++i)
-      ghost_.push_back(scene.positions[i] + ghost.offsets[i]);
-  scene.ghost_positions = ghost_;
-  scene.holds = holds(replica);
-  for (const replica::Tool& tool : surface_.tools())
-    scene.tools.push_back(scene_tool(replica, tool, hands));
-  lines_.update(replica, scene.positions);
-  drawing_.clear();
-  for (const auto& line : lines_.lines()) {
-    std::vector<shape::RibbonPoint> points;
-    for (const auto& point : line.points) points.push_back({point.position, point.normal});
-    shape::add_ribbon(points, kLineHalfWidth, shape::colour_of_pointer(line.participant.value),
-                      drawing_);
-  }
-  scene.drawing = drawing_;
-  for (const replica::Pointer& pointer : replica.pointers(last_ns_))
-    scene.pointers.push_back(
-        {pointer.position_m, shape::colour_of_pointer(pointer.participant.value)});
-  if (const auto target = lesson_target(replica))
-    scene.pointers.push_back({*target, kLessonColour});
-  return scene;
-}
-
-void Picture::add_participants(const replica::Replica& replica, bool is_replay,
-                               ui::HudModel& model) const {
-  model.greatest_force_n = forces_.greatest();
+std::vector<ui::HudParticipant> Picture::participants_of(const replica::Replica& replica,
+                                                         const Pane& pane, bool is_replay) {
+  std::vector<ui::HudParticipant> participants;
   for (const auto& participant : replica.participants()) {
     ui::HudParticipant shown;
     shown.name = participant.name;
@@ -213,7 +99,7 @@ void Picture::add_participants(const replica::Replica& replica, bool is_replay,
     shown.is_frozen = !participant.frozen_by.empty();
     shown.is_self = !is_replay && participant.slot == replica.own_slot();
     shown.colour = shape::colour_of_slot(participant.slot.value);
-    for (const replica::Tool& tool : surface_.tools()) {
+    for (const replica::Tool& tool : pane.surface().tools()) {
       if (tool.slot.owner() != participant.slot) continue;
       shown.has_tool = true;
       shown.is_silent = tool.is_silent;
@@ -228,30 +114,32 @@ void Picture::add_participants(const replica::Replica& replica, bool is_replay,
       shown.contact_nodes += tool.contact_nodes;
     }
     if (shown.has_tool) {
-      const auto forces = forces_.forces(participant.slot);
+      const auto forces = pane.forces().forces(participant.slot);
       shown.forces_n.assign(forces.begin(), forces.end());
     }
-    model.participants.push_back(std::move(shown));
+    participants.push_back(std::move(shown));
   }
+  return participants;
 }
 
 void Picture::add_own_forces(const replica::Replica& replica, ui::HudModel& model) const {
   const auto own = replica.own_slot();
   std::size_t count = 0;
-  for (const replica::Tool& tool : surface_.tools()) count += tool.slot.owner() == own;
-  for (const replica::Tool& tool : surface_.tools()) {
+  for (const replica::Tool& tool : pane_.surface().tools()) count += tool.slot.owner() == own;
+  for (const replica::Tool& tool : pane_.surface().tools()) {
     if (tool.slot.owner() != own) continue;
     const std::string number = count > 1 ? " " + std::to_string(tool.slot.number() + 1) : "";
     model.own_forces.push_back(
         {"force on your tool" + number, shape::colour_of_slot(own.value), length(tool.force_n)});
   }
   if (count == 0) return;
-  const auto forces = forces_.forces(own);
+  const auto forces = pane_.forces().forces(own);
   model.own_peak_n = *std::ranges::max_element(forces);
 }
 
 void Picture::observe(const replica::Replica& replica, const Hands& hands, std::uint64_t now_ns) {
-  forces_.update(replica);
+  pane_.observe(replica);
+  observe_beside();
   const auto felt = hands.figures();
   for (std::size_t i = 0; i < std::min(felt.size(), felt_forces_.size()); ++i) {
     const auto& state = felt[i].state;
@@ -288,28 +176,6 @@ void Picture::add_felt_hands(const Hands& hands, ui::HudModel& model) const {
   }
 }
 
-void Picture::add_labels(const replica::Replica& replica, const render::SceneView& scene,
-                         ui::HudModel& model) const {
-  for (const render::SceneTool& tool : scene.tools) {
-    const auto* owner = owner_of(replica, tool.slot);
-    const Vec3f collar = tool.world_from_tool.apply({0, 0, tool.shape.radius_m * 7});
-    const auto at = camera_.project(collar, context_->size());
-    if (owner == nullptr || !at) continue;
-    char force[32] = "";
-    if (length(tool.force_n) >= render::kMinArrowNewton)
-      std::snprintf(force, sizeof force, "  %.2f N", length(tool.force_n));
-    model.labels.push_back(
-        {at->x, at->y, owner->name + force, shape::colour_of_slot(tool.slot.owner().value)});
-  }
-  for (const replica::Pointer& pointer : replica.pointers(last_ns_)) {
-    const auto* owner = replica.find_participant(pointer.participant);
-    const auto at = camera_.project(pointer.position_m, context_->size());
-    if (owner == nullptr || !at) continue;
-    model.labels.push_back({at->x, at->y, owner->name + " points here",
-                            shape::colour_of_pointer(pointer.participant.value)});
-  }
-}
-
 void Picture::add_messages(const replica::Replica& replica, std::uint64_t now_ns,
                            ui::HudModel& model) {
   for (const auto& notice : replica.notices()) {
@@ -335,8 +201,7 @@ void Picture::add_messages(const replica::Replica& replica, std::uint64_t now_ns
 }
 
 ui::HudModel Picture::hud_model(const replica::Replica& replica, replica::SessionSource& source,
-                                const render::SceneView& scene, Hands& hands,
-                                std::uint64_t now_ns) const {
+                                Hands& hands, std::uint64_t now_ns) const {
   ui::HudModel model;
   const auto* own = replica.find_participant(replica.own_slot());
   const bool is_replay = source.playback() != nullptr;
@@ -356,7 +221,7 @@ ui::HudModel Picture::hud_model(const replica::Replica& replica, replica::Sessio
   } else if (source.state() == replica::SourceState::Closed) {
     model.status = source.close_reason().text;
     model.status_advice = ui::advice_after(source.close_reason().kind);
-  } else if (!surface_.is_valid())
+  } else if (!pane_.surface().is_valid())
     model.status = "Waiting for the organ ...";
   if (own != nullptr && !own->frozen_by.empty())
     model.frozen_text = own->frozen_by + " keeps your tools where they are.";
@@ -406,11 +271,14 @@ ui::HudModel Picture::hud_model(const replica::Replica& replica, replica::Sessio
   model.shows_rate = overlays_.rate;
   if (overlays_.ghost) model.ghost_text = ui::describe(replica.ghost(), is_replay);
   add_lent_view(replica, is_replay, model);
-  add_participants(replica, is_replay, model);
+  model.greatest_force_n = pane_.forces().greatest();
+  model.participants = participants_of(replica, pane_, is_replay);
   if (!is_replay) add_own_forces(replica, model);
   add_felt_hands(hands, model);
-  add_labels(replica, scene, model);
-  add_messages(replica, now_ns, model);
+  model.labels = pane_.labels(replica);
+  add_measure(model);
+  add_halves(replica, model);
+  if (!beside_) add_messages(replica, now_ns, model);
   if (const auto* playback = source.playback()) {
     const auto seconds = [](Tick tick) { return static_cast<double>(tick) * 1e-3; };
     model.timeline = ui::HudTimeline{seconds(playback->first_tick()),
@@ -418,7 +286,8 @@ ui::HudModel Picture::hud_model(const replica::Replica& replica, replica::Sessio
                                      seconds(playback->position()),
                                      playback->is_playing(),
                                      playback->speed(),
-                                     playback->story()};
+                                     playback->story(),
+                                     is_measuring_};
   }
   return model;
 }
@@ -434,13 +303,15 @@ void Picture::act(const ui::HudActions& actions, const replica::Replica& replica
   if (actions.toggle_arrows) overlays_.arrows = !overlays_.arrows;
   if (actions.toggle_rate) overlays_.rate = !overlays_.rate;
   if (actions.toggle_ghost) overlays_.ghost = !overlays_.ghost;
-  if (actions.reset_camera) frame_camera(replica);
+  if (actions.reset_camera) pane_.frame_camera(replica, view_);
   if (actions.screenshot) wants_screenshot_ = true;
-  if (actions.next_lent_view) lent_.next(scene_.tools, source.playback() != nullptr);
+  if (actions.toggle_measure || (actions.end_measure && is_measuring_)) toggle_measure();
+  if (actions.next_lent_view) pane_.lent().next(pane_.scene().tools, source.playback() != nullptr);
   if (actions.toggle_follow) follows_view_ = !follows_view_;
   // A wish that cannot be sent is lost: whoever presses the key asks again.
   if (actions.set_mark) replica::ask_for_mark(source, false);
   if (actions.return_to_mark) replica::ask_for_mark(source, true);
+  act_beside(actions);
   lead(actions, source);
   if (actions.next_stage) replica::send_lesson_wish(source, replica::LessonWish::Next);
   if (actions.restart_lesson) replica::send_lesson_wish(source, replica::LessonWish::Restart);
@@ -458,61 +329,49 @@ void Picture::share_view(const replica::Replica& replica, replica::SessionSource
   const auto* own = replica.find_participant(replica.own_slot());
   if (own != nullptr && own->leads_view) {
     follows_view_ = false;
-    if (input.right || input.middle) lent_.leave();
-    if (last_ns_ - view_sent_ns_ < kViewNs || !is_framed_) return;
+    if (input.right || input.middle) pane_.lent().leave();
+    if (last_ns_ - view_sent_ns_ < kViewNs || !pane_.is_framed()) return;
     view_sent_ns_ = last_ns_;
-    const auto view = camera_.rays(context_->size());
-    const Vec3f target =
-        camera_.lens() ? view.eye + view.forward * kLentTargetMetres : camera_.centre();
+    const auto view = pane_.camera().rays(pane_.size());
+    const Vec3f target = pane_.camera().lens() ? view.eye + view.forward * kLentTargetMetres
+                                               : pane_.camera().centre();
     replica::send_view(source, view.eye, target);
     return;
   }
   // Whoever moves the view follows nobody.
   if (input.right || input.middle || (input.control && input.wheel != 0)) {
     follows_view_ = false;
-    lent_.leave();
+    leave_lent_views();
   }
   const auto& led = replica.led_view();
-  if (follows_view_ && led) camera_.look(led->eye_m, led->target_m);
+  if (follows_view_ && led) pane_.camera().look(led->eye_m, led->target_m);
 }
 
 void Picture::move_mouse_tool(const replica::Replica& replica, Hands& hands,
                               const device::PointerInput& input, float seconds) {
   device::MouseTool* const mouse = hands.mouse_tool();
   if (mouse == nullptr) return;
-  const auto view = camera_.rays(context_->size());
-  const bool is_own = lent_.slot() && lent_.slot()->owner() == replica.own_slot() &&
-                      hands.mouse_tool(lent_.slot()->number()) == mouse;
-  if (is_own && camera_.lens() && tool::is_endoscope(mouse->shape().form)) {
+  const auto view = pane_.camera().rays(pane_.size());
+  const bool is_own = pane_.lent().slot() && pane_.lent().slot()->owner() == replica.own_slot() &&
+                      hands.mouse_tool(pane_.lent().slot()->number()) == mouse;
+  if (is_own && pane_.camera().lens() && tool::is_endoscope(mouse->shape().form)) {
     mouse->steer(input, view, seconds);
     return;
   }
   mouse->cease_to_steer();
-  mouse->update(input, view, surface_.positions(), replica.topology().triangles, seconds);
-}
-
-void Picture::find_lent_view(const replica::Replica& replica, bool is_recording) {
-  if (sees_with_.empty()) return;
-  for (const auto& shown : scene_.tools) {
-    const auto* owner = owner_of(replica, shown.slot);
-    if (owner == nullptr || owner->name != sees_with_) continue;
-    if (!is_recording && !tool::is_endoscope(shown.shape.form)) continue;
-    lent_.choose(shown.slot);
-    sees_with_.clear();
-    return;
-  }
+  mouse->update(input, view, pane_.surface().positions(), replica.topology().triangles, seconds);
 }
 
 void Picture::add_lent_view(const replica::Replica& replica, bool is_replay,
                             ui::HudModel& model) const {
-  for (const replica::Tool& tool : surface_.tools())
+  for (const replica::Tool& tool : pane_.surface().tools())
     model.can_lend_view |= is_replay || tool::is_endoscope(shape_of(replica, tool.slot).form);
-  if (!camera_.lens() || !lent_.slot()) return;
-  const auto* owner = owner_of(replica, *lent_.slot());
+  if (!pane_.camera().lens() || !pane_.lent().slot()) return;
+  const auto* owner = owner_of(replica, *pane_.lent().slot());
   const std::string name = owner != nullptr ? owner->name : "somebody";
-  const bool is_own = !is_replay && lent_.slot()->owner() == replica.own_slot();
+  const bool is_own = !is_replay && pane_.lent().slot()->owner() == replica.own_slot();
   const std::string whose = is_own ? "your endoscope" : "the endoscope of " + name;
-  model.lent_text = camera_.lens()->is_endoscope
+  model.lent_text = pane_.camera().lens()->is_endoscope
                         ? "You see through " + whose + ": T goes on, right drag ends that."
                         : "You see from behind the tool of " + name + ": T goes on.";
 }
@@ -528,13 +387,10 @@ void Picture::draw(const replica::Replica& replica, replica::SessionSource& sour
       last_ns_ == 0 ? 1e-3f : std::min(static_cast<float>(now_ns - last_ns_) * 1e-9f, 0.25f);
   last_ns_ = now_ns;
   measure(replica, now_ns);
-  surface_.update(replica, now_ns);
   observe(replica, hands, now_ns);
-  if (surface_.is_valid() && !is_framed_) {
-    if (shows_help_) help_until_ns_ = now_ns + kHelpNs;
-    frame_camera(replica);
-    is_framed_ = true;
-  }
+  lay_out();
+  update_beside(now_ns);
+  if (pane_.update(replica, view_, now_ns) && shows_help_) help_until_ns_ = now_ns + kHelpNs;
   // Whoever uses the tool has read enough, and wants to see the organ.
   const auto* own = hands.mouse_tool();
   const bool acts = own != nullptr && own->current().verb != tool::Verb::None;
@@ -545,25 +401,25 @@ void Picture::draw(const replica::Replica& replica, replica::SessionSource& sour
   ask_for_ghost(source);
   context_->poll_events();
   hud_.begin_frame(seconds);
-  const device::PointerInput input = hud_.input();
-  camera_.update(input, context_->size(), seconds);
+  device::PointerInput input = hud_.input();
+  move_cameras(input, seconds);
   share_view(replica, source, input);
   // A hand that held its own camera and moved as that sees would chase itself.
-  if (!lent_.slot() || lent_.slot()->owner() != replica.own_slot())
-    hands.set_view(camera_.orientation());
-  if (surface_.is_valid()) move_mouse_tool(replica, hands, input, seconds);
-  scene_ = scene_view(replica, hands, seconds);
-  find_lent_view(replica, source.playback() != nullptr);
-  lent_.apply(scene_, camera_, source.playback() != nullptr);
+  if (!pane_.lent().slot() || pane_.lent().slot()->owner() != replica.own_slot())
+    hands.set_view(pane_.camera().orientation());
+  take_measure(replica, input);
+  if (pane_.surface().is_valid()) move_mouse_tool(replica, hands, input, seconds);
+  pane_.make_scene(replica, hands, {overlays_, seconds, source.playback() != nullptr});
+  make_beside_scene(seconds);
   load_lesson_image(replica);
-  const auto actions = hud_.draw(hud_model(replica, source, scene_, hands, now_ns));
+  const auto actions = hud_.draw(hud_model(replica, source, hands, now_ns));
   act(actions, replica, source);
   if (actions.take_instrument) hands.take(*actions.take_instrument, source);
   if (actions.answer)
     replica::send_lesson_wish(source, replica::LessonWish::Answer,
                               static_cast<std::uint32_t>(hands.choice().hand));
-  if (actions.switch_hand) hands.switch_hand(input, camera_.rays(context_->size()));
-  renderer_.draw(scene_, camera_);
+  if (actions.switch_hand) hands.switch_hand(input, pane_.camera().rays(pane_.size()));
+  draw_panes(render::Quality::Live);
   hud_.render();
   if (wants_screenshot_ && !saving_.is_busy()) {
     wants_screenshot_ = false;
@@ -581,8 +437,8 @@ void Picture::draw(const replica::Replica& replica, replica::SessionSource& sour
 }
 
 render::Image Picture::image() {
-  scene_.seconds = 0;
-  renderer_.draw(scene_, camera_, render::Quality::Best);
+  stand_still();
+  draw_panes(render::Quality::Best);
   hud_.render();
   return context_->read_image();
 }

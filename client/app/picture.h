@@ -8,13 +8,10 @@
 
 #include "client/app/client_options.h"
 #include "client/app/hands.h"
-#include "client/app/lent_view.h"
+#include "client/app/pane.h"
 #include "client/render/image_texture.h"
-#include "client/render/scene_renderer.h"
-#include "client/replica/drawn_lines.h"
-#include "client/replica/force_history.h"
-#include "client/replica/held_tissue.h"
-#include "client/replica/interpolated_surface.h"
+#include "client/replay/paired_source.h"
+#include "client/replica/peak_rings.h"
 #include "client/ui/hud.h"
 #include "common/base/background.h"
 
@@ -24,6 +21,11 @@ class Picture {
  public:
   static Result<std::unique_ptr<Picture>> make(const ClientOptions& options,
                                                const std::string& title);
+
+  // Shows the second recording beside the first: `second` is what the pair's second has sent.
+  // Both outlive the picture.
+  void stand_beside(const ClientOptions& options, replay::PairedSource& pair,
+                    const replica::Replica& second);
 
   // Draws the session as it is at `now_ns` and acts on what the person does.
   void draw(const replica::Replica& replica, replica::SessionSource& source, Hands& hands,
@@ -41,36 +43,43 @@ class Picture {
   explicit Picture(std::unique_ptr<render::GlContext> context, const ClientOptions& options);
 
   void measure(const replica::Replica& replica, std::uint64_t now_ns);
-  render::SceneView scene_view(const replica::Replica& replica, Hands& hands, float seconds);
-  render::SceneTool scene_tool(const replica::Replica& replica, const replica::Tool& tool,
-                               Hands& hands) const;
-  std::vector<render::Hold> holds(const replica::Replica& replica);
-  void add_participants(const replica::Replica& replica, bool is_replay, ui::HudModel& model) const;
+  static std::vector<ui::HudParticipant> participants_of(const replica::Replica& replica,
+                                                         const Pane& pane, bool is_replay);
   void add_own_forces(const replica::Replica& replica, ui::HudModel& model) const;
   void add_felt_hands(const Hands& hands, ui::HudModel& model) const;
   void add_lesson(const replica::Replica& replica, bool is_replay, ui::HudModel& model) const;
   void load_lesson_image(const replica::Replica& replica);
   void add_pace(const replica::Replica& replica, bool is_replay, ui::HudModel& model) const;
   static void lead(const ui::HudActions& actions, replica::SessionSource& source);
-  // Returns where the point is that a lesson's hands follow.
-  static std::optional<Vec3f> lesson_target(const replica::Replica& replica);
-  void add_labels(const replica::Replica& replica, const render::SceneView& scene,
-                  ui::HudModel& model) const;
   static void add_messages(const replica::Replica& replica, std::uint64_t now_ns,
                            ui::HudModel& model);
   ui::HudModel hud_model(const replica::Replica& replica, replica::SessionSource& source,
-                         const render::SceneView& scene, Hands& hands, std::uint64_t now_ns) const;
+                         Hands& hands, std::uint64_t now_ns) const;
   // Follows the view of who has it, if the person wants to, or says where one's own is.
   void share_view(const replica::Replica& replica, replica::SessionSource& source,
                   const device::PointerInput& input);
   void move_mouse_tool(const replica::Replica& replica, Hands& hands,
                        const device::PointerInput& input, float seconds);
   void add_lent_view(const replica::Replica& replica, bool is_replay, ui::HudModel& model) const;
-  void find_lent_view(const replica::Replica& replica, bool is_recording);
+  // Takes the click that measures out of the input.
+  void take_measure(const replica::Replica& replica, device::PointerInput& input);
+  void add_measure(ui::HudModel& model) const;
+  void toggle_measure();
+  // The parts below are about a second recording, if there is one.
+  void lay_out();
+  void observe_beside();
+  void update_beside(std::uint64_t now_ns);
+  void move_cameras(const device::PointerInput& input, float seconds);
+  void make_beside_scene(float seconds);
+  void draw_panes(render::Quality quality);
+  void stand_still();
+  void act_beside(const ui::HudActions& actions);
+  void leave_lent_views();
+  ui::HudHalf half(std::size_t number, const Pane& pane, const replica::Replica& replica) const;
+  void add_halves(const replica::Replica& replica, ui::HudModel& model) const;
   void ask_for_ghost(replica::SessionSource& source);
   void act(const ui::HudActions& actions, const replica::Replica& replica,
            replica::SessionSource& source);
-  void frame_camera(const replica::Replica& replica);
 
   struct Rate {  // over the last second
     std::uint64_t start_ns = 0, pictures = 0, frames = 0, bytes = 0;
@@ -79,34 +88,31 @@ class Picture {
 
   replica::Role role_;
   std::unique_ptr<render::GlContext> context_;
-  render::SceneRenderer renderer_;
+  Pane pane_;
+  struct Beside {
+    replay::PairedSource& pair;
+    const replica::Replica& replica;
+    Pane pane;
+    bool has_own_view = false;
+    bool is_pointed_at = false;  // the pointer is there, or its button went down there
+  };
+  std::unique_ptr<Beside> beside_;  // null: there is one session
   ui::Hud hud_;
-  render::OrbitCamera camera_;
-  replica::InterpolatedSurface surface_;
-  bool is_framed_ = false;  // the camera, when there is an organ
   std::uint64_t last_ns_ = 0, count_ = 0;
   std::uint64_t help_until_ns_ = 0;  // shown at first, then until asked for; 0: as the person wants
   bool shows_help_ = false, wants_screenshot_ = false;
   Overlays overlays_;
   StartView view_;
   bool has_asked_for_ghost_ = false;
-  std::vector<Vec3f> ghost_;  // where the full solution has the vertices of the last picture
-  replica::ForceHistory forces_;
+  bool is_measuring_ = false, was_left_ = false;
   // Keeps what each device has rendered and what the server said, N.
   using FeltForces = replica::PeakRings<2, ui::kFeltBins, ui::kFeltBins>;
   std::array<FeltForces, kToolsPerHand> felt_forces_;
   bool follows_view_ = false;
-  LentView lent_;
-  std::string sees_with_;  // a participant's name, until there is a tool to see with
   std::uint64_t view_sent_ns_ = 0;
-  replica::DrawnLines lines_;
-  shape::MeshVertices drawing_;  // of the last picture
-  replica::HeldTissue held_;
-  std::uint64_t held_history_ = 0;
   Rate rate_;
   render::ImageTexture lesson_image_;
   std::string lesson_image_file_;  // that it was made from
-  render::SceneView scene_;        // of the last picture; its spans need the replica
   Background saving_;              // writes screenshots
 };
 

@@ -21,11 +21,6 @@ std::vector<std::string> instruments_of(const std::vector<tool::ToolShape>& shap
 
 }  // namespace
 
-std::optional<Vec3f> Picture::lesson_target(const replica::Replica& replica) {
-  if (!replica.lesson() || replica.newest() == nullptr) return std::nullopt;
-  return replica.lesson()->target_m(replica.newest()->tick);
-}
-
 void Picture::add_lesson(const replica::Replica& replica, bool is_replay,
                          ui::HudModel& model) const {
   const auto& lesson = replica.lesson();

@@ -237,6 +237,7 @@ Result<std::optional<ClientOptions>> choose_session(ClientOptions options,
   ui::Hud hud(**context, options.scale);
   const bool has_tried = !message.empty() || own != nullptr;
   options.replay_file.clear();
+  options.beside_file.clear();
   if (const auto person = remembered_person(); person && !options.is_told_who && !has_tried) {
     options.name = person->name;
     options.role = person->role;
@@ -293,6 +294,7 @@ Result<std::optional<ClientOptions>> choose_session(ClientOptions options,
             if (choice->recording.empty())
               return Error{ErrorCode::Usage, "choose a recording, or write its file's name"};
             options.replay_file = choice->recording;
+            options.beside_file = choice->beside;
             return true;
           case ui::StartDeed::Join:
             break;

@@ -15,8 +15,18 @@ namespace trocar::device {
 
 using Triangles = std::span<const std::array<std::uint32_t, 3>>;
 
-// Smallest t > 0 with origin + t direction on a triangle that faces the ray (counter-clockwise seen
-// from the origin).
+// A place on a triangle: weights of its second and third corner.
+struct PickedPlace {
+  float t = 0;  // origin + t direction is the place
+  std::uint32_t triangle = 0;
+  std::array<float, 2> weight{};
+};
+
+// The first place along the ray, t > 0, on a triangle that faces it (counter-clockwise seen from
+// the origin).
+std::optional<PickedPlace> pick_place(std::span<const Vec3f> positions, Triangles triangles,
+                                      const Vec3f& origin, const Vec3f& direction);
+// Only its t.
 std::optional<float> pick(std::span<const Vec3f> positions, Triangles triangles,
                           const Vec3f& origin, const Vec3f& direction);
 

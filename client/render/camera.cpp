@@ -13,7 +13,7 @@ constexpr float kOrbitPerPixel = 0.006f;
 }  // namespace
 
 void OrbitCamera::frame(const Vec3f& centre, float radius) {
-  centre_ = centre;
+  centre_ = body_ = centre;
   radius_ = radius;
   yaw_ = 0;
   pitch_ = 0.42f;
@@ -35,6 +35,14 @@ void OrbitCamera::look(const Vec3f& eye, const Vec3f& target) {
   distance_ = std::clamp(length(back), radius_ * 0.2f, radius_ * 40);
   yaw_ = std::atan2(back.x, back.z);
   pitch_ = std::clamp(std::atan2(back.y, std::hypot(back.x, back.z)), -1.5f, 1.5f);
+}
+
+void OrbitCamera::stand_as(const OrbitCamera& other) {
+  const float size = radius_ / other.radius_;
+  yaw_ = other.yaw_;
+  pitch_ = other.pitch_;
+  distance_ = other.distance_ * size;
+  centre_ = body_ + (other.centre_ - other.body_) * size;
 }
 
 void OrbitCamera::update(const device::PointerInput& input, Size size, float seconds) {

@@ -31,6 +31,8 @@ class OrbitCamera {
   void zoom(float factor);
   // Stands at `eye` and turns about `target`, as far as this camera can: its up is up.
   void look(const Vec3f& eye, const Vec3f& target);
+  // Stands to its body as `other` stands to the other's, in proportion to their sizes.
+  void stand_as(const OrbitCamera& other);
   const Vec3f& centre() const { return centre_; }
   // Sees as this lens does, until told otherwise; without one from where the orbit is.
   void look_through(const std::optional<Lens>& lens) { lens_ = lens; }
@@ -43,7 +45,7 @@ class OrbitCamera {
   std::optional<ScreenPoint> project(const Vec3f& world, Size size) const;  // none behind the eye
 
  private:
-  Vec3f centre_;
+  Vec3f centre_, body_;  // that it turns about, and of the body
   float radius_ = 0.12f;
   float yaw_ = 0, pitch_ = 0.42f, distance_ = 0.5f;
   std::optional<Lens> lens_;

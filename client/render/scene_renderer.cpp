@@ -127,11 +127,11 @@ std::string lit(const char* head, const char* fragment_source) {
   return std::string(head) + kLightingSource + fragment_source;
 }
 
-void blit(GLuint from, GLuint to, Size size) {
+void blit(GLuint from, GLuint to, Size size, int left = 0, int bottom = 0) {
   glBindFramebuffer(GL_READ_FRAMEBUFFER, from);
   glBindFramebuffer(GL_DRAW_FRAMEBUFFER, to);
-  glBlitFramebuffer(0, 0, size.width, size.height, 0, 0, size.width, size.height,
-                    GL_COLOR_BUFFER_BIT, GL_NEAREST);
+  glBlitFramebuffer(0, 0, size.width, size.height, left, bottom, left + size.width,
+                    bottom + size.height, GL_COLOR_BUFFER_BIT, GL_NEAREST);
 }
 
 }  // namespace
@@ -495,9 +495,10 @@ void SceneRenderer::Parts::draw_backdrop(const OrbitCamera& camera) {
   draw_field(camera);
 }
 
-void SceneRenderer::draw(const SceneView& scene, const OrbitCamera& camera, Quality quality) {
+void SceneRenderer::draw(const SceneView& scene, const OrbitCamera& camera, const Region& region,
+                         Quality quality) {
   Parts& parts = *parts_;
-  parts.size = context_.size();
+  parts.size = region.size;
   const auto [width, height] = parts.size;
   if (width <= 0 || height <= 0) return;  // minimised
   glDisable(GL_BLEND);
@@ -527,7 +528,7 @@ void SceneRenderer::draw(const SceneView& scene, const OrbitCamera& camera, Qual
   glDisable(GL_DEPTH_TEST);
   if (camera.lens() && camera.lens()->is_endoscope) parts.draw_scope_mask();
   glBindVertexArray(0);
-  blit(target.framebuffer, context_.framebuffer(), parts.size);
+  blit(target.framebuffer, context_.framebuffer(), parts.size, region.left, region.bottom);
   glBindFramebuffer(GL_FRAMEBUFFER, context_.framebuffer());
 }
 

@@ -67,6 +67,12 @@ struct SceneView {
   float seconds = 0;                           // since the last picture
 };
 
+// A part of the context's framebuffer, pixels, from the lower left corner.
+struct Region {
+  int left = 0, bottom = 0;
+  Size size;
+};
+
 // Live: with samples only where a graphics processor does it. Best: always, for a picture to keep.
 enum class Quality : std::uint8_t { Live, Best };
 
@@ -75,7 +81,9 @@ class SceneRenderer {
   explicit SceneRenderer(const GlContext& context);
   ~SceneRenderer();
 
-  void draw(const SceneView& scene, const OrbitCamera& camera, Quality quality = Quality::Live);
+  // Into this part of the context's framebuffer.
+  void draw(const SceneView& scene, const OrbitCamera& camera, const Region& region,
+            Quality quality = Quality::Live);
   // Says what limits the picture, for --log-level debug: renderer, samples, triangles drawn.
   std::string description() const;
 

@@ -65,6 +65,8 @@ class ReplaySource final : public replica::SessionSource, public replica::Playba
   void seek(Tick tick) override;
   void set_speed(float speed) override;
   std::shared_ptr<const replica::PlaybackStory> story() const override;
+  // With the stages of a lesson; null until the file is read.
+  std::shared_ptr<const RecordedStory> recorded_story() const { return events_.story(); }
 
  private:
   using Entries = std::span<const JournalStream::Entry>;

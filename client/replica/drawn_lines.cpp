@@ -6,9 +6,6 @@
 namespace trocar::replica {
 namespace {
 
-// Farther from the surface at rest a point has lost its tissue.
-constexpr float kLostMetres = 0.004f;
-
 // Weights of the second and third corner of the point of a triangle that is nearest to p (Ericson
 // 2005, section 5.1.5).
 std::array<float, 2> nearest_weights(const Vec3f& p, const Vec3f& a, const Vec3f& b,
@@ -40,10 +37,11 @@ bool is_there(const Topology& topology, std::uint32_t triangle) {
 
 }  // namespace
 
-Attachment attach(const Vec3f& place, const Topology& topology, std::span<const Vec3f> positions) {
+Attachment attach(const Vec3f& place, const Topology& topology, std::span<const Vec3f> positions,
+                  bool in_wound) {
   Attachment best{.triangle = kNoTriangle, .distance_m = std::numeric_limits<float>::max()};
   for (std::uint32_t i = 0; i < topology.triangles.size(); ++i) {
-    if (!is_there(topology, i) || topology.is_wound[i] != 0) continue;
+    if (!is_there(topology, i) || (topology.is_wound[i] != 0) != in_wound) continue;
     const auto& corners = topology.triangles[i];
     const Vec3f &a = positions[corners[0]], &b = positions[corners[1]], &c = positions[corners[2]];
     // The box around a triangle tells of most that they are too far.

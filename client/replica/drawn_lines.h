@@ -24,8 +24,13 @@ struct Attachment {
 };
 inline constexpr std::uint32_t kNoTriangle = 0xffffffffu;
 
-// The nearest outer triangle to `place`, with corners at `positions`. kNoTriangle: there is none.
-Attachment attach(const Vec3f& place, const Topology& topology, std::span<const Vec3f> positions);
+// Farther from the surface at rest a point has lost its tissue.
+inline constexpr float kLostMetres = 0.004f;
+
+// The nearest outer triangle to `place`, or the nearest of a wound, with corners at `positions`.
+// kNoTriangle: there is none.
+Attachment attach(const Vec3f& place, const Topology& topology, std::span<const Vec3f> positions,
+                  bool in_wound = false);
 
 struct DrawnPoint {
   Vec3f position;  // m

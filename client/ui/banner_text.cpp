@@ -54,6 +54,7 @@ std::vector<Banner> banners_of(const HudModel& model) {
                              "disk, and to start the session again."
                            : "The lesson goes on. Tell the host to see to the disk.",
                        RateTone::Warning});
+  if (!model.measure_text.empty()) banners.push_back({model.measure_text, "", RateTone::Calm});
   if (!model.lent_text.empty()) banners.push_back({model.lent_text, "", RateTone::Calm});
   if (!model.view_text.empty()) banners.push_back({model.view_text, "", RateTone::Calm});
   if (banners.size() > kMostBanners) banners.resize(kMostBanners);

@@ -85,7 +85,8 @@ void set_style(float scale) {
 
 }  // namespace
 
-Hud::Hud(render::GlContext& context, double scale) : context_(context) {
+Hud::Hud(render::GlContext& context, double scale)
+    : context_(context), help_(std::make_unique<Box>()) {
   IMGUI_CHECKVERSION();
   ImGui::CreateContext();
   ImGuiIO& io = ImGui::GetIO();
@@ -124,6 +125,12 @@ void Hud::need_letters(const HudModel& model) {
       for (const auto& line : lines) fonts_->need(line);
     }
   }
+  if (model.pair)
+    for (const HudHalf& half : model.pair->halves) {
+      for (const auto* text : {&half.name, &half.organ, &half.stage, &half.stopped})
+        fonts_->need(*text);
+      for (const HudParticipant& participant : half.participants) fonts_->need(participant.name);
+    }
   const auto* story = model.timeline ? model.timeline->story.get() : nullptr;
   if (story != nullptr && story != read_story_)
     for (const auto& event : story->events) fonts_->need(event.text);
@@ -181,14 +188,13 @@ device::PointerInput Hud::input() const {
   return input;
 }
 
-HudActions Hud::draw(const HudModel& model) {
-  HudActions actions;
-  need_letters(model);  // for the next picture
+Sides Hud::draw_session(const HudModel& model, HudActions& actions) {
   if (model.is_away) draw_away_veil();
   const Box session = draw_session_panel(model, scale_);
   const Box people = draw_participants_panel(model, scale_);
   const Box banners = draw_banners(model, session, people, scale_);
-  draw_labels(model, banners, scale_);
+  draw_labels(model.labels, banners, scale_);
+  for (const HudRuler& ruler : model.rulers) draw_ruler(ruler, scale_);
   Box right = model.lesson ? draw_lesson(*model.lesson, people, scale_) : people;
   if (model.figures.blood && model.figures.blood->shed_nl > 0)
     right = draw_blood(*model.figures.blood, right, scale_);
@@ -196,8 +202,20 @@ HudActions Hud::draw(const HudModel& model) {
   draw_own_forces(model, scale_);
   const Box left = model.conduct ? draw_conduct(*model.conduct, session, scale_, actions) : session;
   if (model.tray.hands > 0) draw_tray(model, left, scale_, actions);
-  if (model.timeline) draw_timeline(*model.timeline, scale_, actions);
-  draw_help(model, scale_);
+  return {left, right};
+}
+
+HudActions Hud::draw(const HudModel& model) {
+  HudActions actions;
+  need_letters(model);  // for the next picture
+  Sides sides;
+  if (model.pair)
+    draw_pair(model, scale_);
+  else
+    sides = draw_session(model, actions);
+  Box timeline;
+  if (model.timeline) timeline = draw_timeline(model, scale_, actions);
+  *help_ = draw_help(model, timeline, sides, *help_, scale_);
   ImGui::Render();
   const auto keys = std::exchange(pressed_keys(), {});
   if (ImGui::GetIO().WantTextInput) return actions;
@@ -212,6 +230,12 @@ HudActions Hud::draw(const HudModel& model) {
   actions.toggle_ghost = pressed(GLFW_KEY_G);
   actions.reset_camera = pressed(GLFW_KEY_C);
   actions.screenshot = pressed(GLFW_KEY_F12);
+  if (pressed(GLFW_KEY_D)) actions.toggle_measure = true;
+  if (model.pair) {
+    if (pressed(GLFW_KEY_U)) actions.toggle_own_views = true;
+    if (pressed(GLFW_KEY_B)) actions.toggle_alignment = true;
+  }
+  actions.end_measure = pressed(GLFW_KEY_ESCAPE);
   if (model.lesson) {
     actions.answer =
         model.lesson->can_answer && (pressed(GLFW_KEY_ENTER) || pressed(GLFW_KEY_KP_ENTER));

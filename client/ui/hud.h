@@ -8,6 +8,7 @@
 // the context's framebuffer, render(). Thread: render thread. One Hud per process (Dear ImGui keeps
 // one context).
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -25,6 +26,9 @@
 #include "client/ui/fonts.h"
 
 namespace trocar::ui {
+
+struct Box;  // a part of the screen
+struct Sides;
 
 // The scale of words and panels is in pixels per pixel of the design.
 inline constexpr float kLeastScale = 0.75f, kMostScale = 3;
@@ -52,6 +56,15 @@ struct HudLabel {
   shape::Colour colour;
 };
 
+// A length that is measured: a line between two ends, or one end.
+struct HudRuler {
+  struct End {
+    float x = 0, y = 0;  // pixels
+  };
+  std::vector<End> ends;
+  std::string text;  // "12.3 mm"
+};
+
 struct HudMessage {
   std::string text;
   float age_seconds = 0;  // fades between 4 and 5 s
@@ -63,6 +76,7 @@ struct HudTimeline {
   bool is_playing = false;
   float speed = 1;
   std::shared_ptr<const replica::PlaybackStory> story;  // null: still searched
+  bool is_measuring = false;
 };
 // When the next event after where the recording is takes place, or the one before it; nothing if
 // there is none. While it plays, an event just passed is not the one before.
@@ -119,6 +133,27 @@ struct HudFeltHand {
 };
 inline constexpr std::size_t kFeltBins = 160;  // of them at most
 
+// One of two recordings beside each other.
+struct HudHalf {
+  std::string name;   // of the file
+  std::string organ;  // empty: not known yet
+  double seconds = 0, last_seconds = 0;
+  std::string stage;    // of a lesson; empty: there is none
+  std::string blood;    // lost; empty: none
+  std::string notice;   // that it has ended or waits; empty: it plays
+  std::string stopped;  // why it cannot go on; empty: it can
+  std::vector<HudParticipant> participants;
+  std::vector<HudLabel> labels;
+  HudRuler ruler;
+  float left = 0, width = 0;  // of its picture, pixels
+};
+struct HudPair {
+  std::array<HudHalf, 2> halves;
+  bool is_by_stage = false;
+  std::optional<bool> has_stages;  // to align by; nothing: it is not known yet
+  bool has_own_views = false;
+};
+
 struct HudModel {
   std::string title;          // "127.0.0.1:7690" or a file's name
   std::string organ;          // "liver, 1,553 surface vertices"
@@ -135,8 +170,11 @@ struct HudModel {
   std::vector<HudParticipant> participants;
   std::vector<HudLabel> labels;
   std::vector<HudMessage> messages;
+  std::vector<HudRuler> rulers;
+  std::string measure_text;  // empty: nobody measures
   std::optional<HudTimeline> timeline;
-  float greatest_force_n = 0;  // of all participants' `forces_n`: their common scale
+  std::optional<HudPair> pair;  // stands in place of the panels of one session
+  float greatest_force_n = 0;   // of all participants' `forces_n`: their common scale
   bool shows_regions = true, shows_holds = false, shows_arrows = true, shows_rate = false;
   std::optional<bool> is_recorded;      // of a live session; nothing: it is not known
   std::string recording_text;           // empty: nothing is wrong with the recording
@@ -166,6 +204,8 @@ struct HudActions {
   bool toggle_play = false, pause = false;
   bool set_mark = false, return_to_mark = false, toggle_follow = false;
   bool next_lent_view = false;
+  bool toggle_measure = false, end_measure = false;
+  bool toggle_alignment = false, toggle_own_views = false;
   bool switch_hand = false;
   bool answer = false, next_stage = false, restart_lesson = false;
   std::optional<std::string> mark_named, return_to_named;
@@ -197,11 +237,14 @@ class Hud {
 
  private:
   void need_letters(const HudModel& model);
+  // Draws all panels of one session; returns where they are.
+  Sides draw_session(const HudModel& model, HudActions& actions);
 
   render::GlContext& context_;
   std::optional<Fonts> fonts_;
   const replica::PlaybackStory* read_story_ = nullptr;  // whose letters are there
   float scale_ = 1;
+  std::unique_ptr<Box> help_;  // where the keys stood in the last picture
 };
 
 }  // namespace trocar::ui

@@ -150,14 +150,15 @@ Box draw_session_panel(const HudModel& model, float scale) {
   return box;
 }
 
-Box draw_banners(const HudModel& model, const Box& session, const Box& people, float scale) {
+Box draw_banners(const HudModel& model, const Box& session, const Box& people, float scale,
+                 float top) {
   const std::vector<Banner> banners = banners_of(model);
   if (banners.empty() && model.messages.empty()) return {};
   constexpr float kLeastWidth = 300;
   const float right = people.right > 0 ? people.left : ImGui::GetIO().DisplaySize.x;
   const float width = std::max(right - session.right - 2 * kMargin * scale, kLeastWidth * scale);
   const ImVec2 pad = ImGui::GetStyle().WindowPadding;
-  ImGui::SetNextWindowPos({(session.right + right) / 2, kMargin * scale}, 0, {0.5f, 0});
+  ImGui::SetNextWindowPos({(session.right + right) / 2, top + kMargin * scale}, 0, {0.5f, 0});
   ImGui::Begin("banners", nullptr, kGlass);
   ImGui::PushTextWrapPos(width - pad.x);
   bool is_first = true;
@@ -182,38 +183,25 @@ Box draw_banners(const HudModel& model, const Box& session, const Box& people, f
   return box;
 }
 
-void draw_labels(const HudModel& model, const Box& banners, float scale) {
-  ImDrawList* list = ImGui::GetBackgroundDrawList();
-  for (const HudLabel& label : model.labels) {
-    const ImVec2 size = ImGui::CalcTextSize(label.text.c_str());
-    const ImVec2 pad = {7 * scale, 3 * scale};
-    ImVec2 from = {label.x + 12 * scale, label.y - size.y / 2};
-    const bool is_covered =
-        from.y - pad.y < banners.bottom && from.x < banners.right && from.x + size.x > banners.left;
-    if (is_covered) from.y = banners.bottom + 2 * pad.y;
-    list->AddRectFilled({from.x - pad.x, from.y - pad.y},
-                        {from.x + size.x + pad.x, from.y + size.y + pad.y},
-                        IM_COL32(8, 12, 16, 170), 6 * scale);
-    list->AddRectFilled({from.x - pad.x, from.y - pad.y},
-                        {from.x - pad.x + 3 * scale, from.y + size.y + pad.y},
-                        ImGui::GetColorU32(to_imgui(label.colour)), 2 * scale);
-    list->AddText({from.x + 2 * scale, from.y}, IM_COL32(232, 240, 245, 255), label.text.c_str());
-  }
-}
-
-void draw_help(const HudModel& model, float scale) {
+Box draw_help(const HudModel& model, const Box& timeline, const Sides& sides, const Box& before,
+              float scale) {
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
-  const float bottom = screen.y - (model.timeline ? 132 : kMargin) * scale;
+  const float bottom = (timeline.top > 0 ? timeline.top : screen.y) - kMargin * scale;
   // Under the panel of people: the bar of one's own force is at the left.
-  ImGui::SetNextWindowPos({screen.x - kMargin * scale, bottom}, 0, {1, 1});
+  const bool covers = bottom - (before.bottom - before.top) < sides.right.bottom;
+  if (model.timeline && covers && sides.left.bottom < sides.right.bottom)
+    ImGui::SetNextWindowPos({kMargin * scale, bottom}, 0, {0, 1});
+  else
+    ImGui::SetNextWindowPos({screen.x - kMargin * scale, bottom}, 0, {1, 1});
   ImGui::SetNextWindowBgAlpha(model.shows_help ? 0.86f : 0.45f);
   ImGui::Begin("help", nullptr, kGlass);
   if (!model.shows_help) {
     ImGui::TextDisabled(
         model.has_own_tool ? "1-9 instrument   left button use it   wheel depth   Q E turn   H help"
                            : "right drag turn   Ctrl+wheel zoom   H help");
+    const Box box = box_of_window();
     ImGui::End();
-    return;
+    return box;
   }
   heading("Mouse and keyboard");
   ImGui::Separator();
@@ -242,6 +230,12 @@ void draw_help(const HudModel& model, float scale) {
       help_row(", .", "one picture back or on");
       help_row("Page Up, Page Down", "to the event before or after");
     }
+    if (model.pair) {
+      help_row("U", model.pair->has_own_views ? "one view for both" : "a view for each");
+      if (model.pair->has_stages.value_or(false))
+        help_row("B", model.pair->is_by_stage ? "both from their start" : "stage by stage");
+    }
+    help_row("D", "measure: click two places; D or Esc ends that");
     help_row("right drag", "turn the view");
     help_row("middle drag", "move the view");
     help_row("Ctrl+wheel, + -", "zoom");
@@ -262,7 +256,9 @@ void draw_help(const HudModel& model, float scale) {
   ImGui::TextDisabled("Arrows: force of the tissue on a tool, 20 mm per N.");
   ImGui::TextDisabled("A line from a tool to a small ball: where the hand is, when");
   ImGui::TextDisabled("tissue keeps the tool from it.");
+  const Box box = box_of_window();
   ImGui::End();
+  return box;
 }
 
 void draw_away_veil() {

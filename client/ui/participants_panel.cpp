@@ -75,15 +75,15 @@ void draw_plot(const HudParticipant& p, float greatest_n, float scale) {
 
 // The figures' column is as wide as they get, so that the panel does not breathe with them. 0
 // leaves it as wide as they are.
-float width_of_figures(const HudModel& model) {
+float width_of_figures(std::span<const HudParticipant> people, bool shows_rate) {
   float width = 0;
-  for (const HudParticipant& p : model.participants)
+  for (const HudParticipant& p : people)
     if (p.has_tool)
-      width = std::max(
-          width, ImGui::CalcTextSize(model.shows_rate ? p.is_self ? "00.00 N  000 mN m  000 nodes"
+      width = std::max(width,
+                       ImGui::CalcTextSize(shows_rate ? p.is_self ? "00.00 N  000 mN m  000 nodes"
                                                                   : "00.00 N  000 nodes"
                                                       : "00.00 N")
-                     .x);
+                           .x);
   return width;
 }
 
@@ -102,6 +102,30 @@ void draw_figures(const HudParticipant& p, bool shows_all) {
 
 }  // namespace
 
+void draw_people(std::span<const HudParticipant> people, float greatest_n, bool shows_rate,
+                 float scale) {
+  if (ImGui::BeginTable("list", 5, ImGuiTableFlags_SizingFixedFit)) {
+    for (int column = 0; column < 4; ++column) ImGui::TableSetupColumn("");
+    ImGui::TableSetupColumn("", 0, width_of_figures(people, shows_rate));
+    for (const HudParticipant& p : people) {
+      ImGui::TableNextRow();
+      ImGui::TableNextColumn();
+      draw_dot(p, scale);
+      ImGui::TableNextColumn();
+      if (p.is_self) ImGui::PushFont(bold());
+      ImGui::TextUnformatted((p.is_self ? p.name + " (you)" : p.name).c_str());
+      if (p.is_self) ImGui::PopFont();
+      ImGui::TableNextColumn();
+      draw_doing(p);
+      ImGui::TableNextColumn();
+      draw_plot(p, greatest_n, scale);
+      ImGui::TableNextColumn();
+      draw_figures(p, shows_rate);
+    }
+    ImGui::EndTable();
+  }
+}
+
 Box draw_participants_panel(const HudModel& model, float scale) {
   if (model.participants.empty()) return {};
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
@@ -114,26 +138,7 @@ Box draw_participants_panel(const HudModel& model, float scale) {
                         static_cast<double>(std::max(model.greatest_force_n, kLeastScaleNewton)));
   }
   ImGui::Separator();
-  if (ImGui::BeginTable("list", 5, ImGuiTableFlags_SizingFixedFit)) {
-    for (int column = 0; column < 4; ++column) ImGui::TableSetupColumn("");
-    ImGui::TableSetupColumn("", 0, width_of_figures(model));
-    for (const HudParticipant& p : model.participants) {
-      ImGui::TableNextRow();
-      ImGui::TableNextColumn();
-      draw_dot(p, scale);
-      ImGui::TableNextColumn();
-      if (p.is_self) ImGui::PushFont(bold());
-      ImGui::TextUnformatted((p.is_self ? p.name + " (you)" : p.name).c_str());
-      if (p.is_self) ImGui::PopFont();
-      ImGui::TableNextColumn();
-      draw_doing(p);
-      ImGui::TableNextColumn();
-      draw_plot(p, model.greatest_force_n, scale);
-      ImGui::TableNextColumn();
-      draw_figures(p, model.shows_rate);
-    }
-    ImGui::EndTable();
-  }
+  draw_people(model.participants, model.greatest_force_n, model.shows_rate, scale);
   const Box box = box_of_window();
   ImGui::End();
   return box;

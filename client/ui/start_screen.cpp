@@ -51,6 +51,7 @@ StartChoice StartScreen::choice(StartDeed deed) const {
           .task = task_,
           .is_recorded = is_recorded_,
           .recording = recording_.data(),
+          .beside = beside_,
           .server = server_.data(),
           .code = code_.data(),
           .name = name_.data(),
@@ -206,6 +207,12 @@ void StartScreen::draw_recordings(const StartModel& model) {
   ImGui::Spacing();
   is_touched_ |= ImGui::InputTextWithHint("file", "a recorded session, .mcap", recording_.data(),
                                           recording_.size());
+  if (ImGui::BeginCombo("beside it", beside_.empty() ? "nothing" : beside_.c_str())) {
+    if (ImGui::Selectable("nothing", beside_.empty())) beside_.clear();
+    for (const auto& file : model.recordings)
+      if (ImGui::Selectable(file.c_str(), file == beside_)) beside_ = file;
+    ImGui::EndCombo();
+  }
   if (big_button("Watch")) wanted_ = StartDeed::Watch;
 }
 

@@ -51,6 +51,7 @@ struct StartChoice {
   std::string task;             // instead of an organ; empty: none
   bool is_recorded = true;      // likewise
   std::string recording;        // to watch
+  std::string beside;           // a second one; empty: none
   std::string server, code, name;
   replica::Role role = replica::Role::Surgeon;
   bool brings_tools = false;  // an instructor who holds instruments, too
@@ -84,6 +85,7 @@ class StartScreen {
   std::array<char, 160> code_{};
   std::array<char, 33> name_{};
   std::array<char, 512> recording_{};
+  std::string beside_;
   replica::Role role_;
   bool brings_tools_ = false;
   std::size_t organ_ = 0;

@@ -17,7 +17,7 @@ using Kind = replica::PlaybackEventKind;
 
 constexpr float kCurveHeight = 26, kMarkHeight = 9, kReach = 4;  // pixels of the design
 constexpr std::array<float, 5> kSpeeds{0.1f, 0.25f, 1, 4, 16};
-constexpr float kSpeedWidth = 46;
+constexpr float kSpeedWidth = 46, kMeasureWidth = 74, kChoiceWidth = 118;
 constexpr double kJustPassedSeconds = 1;
 
 ImVec4 colour_of(Kind kind) {
@@ -37,6 +37,15 @@ ImVec4 colour_of(Kind kind) {
 
 double seconds_of(const replica::PlaybackEvent& event) {
   return static_cast<double>(event.tick) / kTicksPerSecond;
+}
+
+// A button that is drawn as pressed while it is on.
+bool pressed_button(const char* name, float width, bool is_on) {
+  if (is_on)
+    ImGui::PushStyleColor(ImGuiCol_Button, ImGui::GetStyle().Colors[ImGuiCol_ButtonActive]);
+  const bool is_clicked = ImGui::Button(name, {width, 0});
+  if (is_on) ImGui::PopStyleColor();
+  return is_clicked;
 }
 
 // Draws the story under the slider, from `left` and `width` wide. Returns the event to tell: the
@@ -94,6 +103,25 @@ const replica::PlaybackEvent* draw_story(const HudTimeline& timeline, float left
   return pointed != nullptr ? pointed : last;
 }
 
+void draw_pair_choices(const HudPair& pair, float scale, HudActions& actions) {
+  const bool has_stages = pair.has_stages.value_or(false);
+  if (has_stages) {
+    if (pressed_button("From the start", kChoiceWidth * scale, !pair.is_by_stage) &&
+        pair.is_by_stage)
+      actions.toggle_alignment = true;
+    ImGui::SameLine();
+    if (pressed_button("Stage by stage", kChoiceWidth * scale, pair.is_by_stage) &&
+        !pair.is_by_stage)
+      actions.toggle_alignment = true;
+    ImGui::SameLine();
+  }
+  if (pressed_button("Own views", kChoiceWidth * scale, pair.has_own_views))
+    actions.toggle_own_views = true;
+  if (has_stages || !pair.has_stages) return;
+  ImGui::SameLine();
+  ImGui::TextDisabled("They have no stages of a lesson in common: both run from their start.");
+}
+
 }  // namespace
 
 std::optional<double> event_beside(const HudTimeline& timeline, bool is_next) {
@@ -108,7 +136,8 @@ std::optional<double> event_beside(const HudTimeline& timeline, bool is_next) {
   return before;
 }
 
-void draw_timeline(const HudTimeline& timeline, float scale, HudActions& actions) {
+Box draw_timeline(const HudModel& model, float scale, HudActions& actions) {
+  const HudTimeline& timeline = *model.timeline;
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
   const float width = std::min(screen.x - 2 * kMargin * scale, 900 * scale);
   ImGui::SetNextWindowPos({screen.x / 2, screen.y - kMargin * scale}, 0, {0.5f, 1});
@@ -123,7 +152,8 @@ void draw_timeline(const HudTimeline& timeline, float scale, HudActions& actions
   const float left = ImGui::GetCursorScreenPos().x;
   const float gap = ImGui::GetStyle().ItemSpacing.x;
   const float bar = ImGui::GetContentRegionAvail().x -
-                    static_cast<float>(kSpeeds.size()) * (kSpeedWidth * scale + gap);
+                    static_cast<float>(kSpeeds.size()) * (kSpeedWidth * scale + gap) -
+                    kMeasureWidth * scale - gap;
   ImGui::SetNextItemWidth(bar);
   if (ImGui::SliderFloat("##seek", &position, static_cast<float>(timeline.first_seconds),
                          static_cast<float>(timeline.last_seconds), text.c_str(),
@@ -131,21 +161,23 @@ void draw_timeline(const HudTimeline& timeline, float scale, HudActions& actions
     actions.seek_seconds = position;
   for (const float speed : kSpeeds) {
     ImGui::SameLine();
-    const bool is_current = timeline.speed == speed;
-    if (is_current)
-      ImGui::PushStyleColor(ImGuiCol_Button, ImGui::GetStyle().Colors[ImGuiCol_ButtonActive]);
     char name[16];
     std::snprintf(name, sizeof name, "%gx", static_cast<double>(speed));
-    if (ImGui::Button(name, {kSpeedWidth * scale, 0})) actions.speed = speed;
-    if (is_current) ImGui::PopStyleColor();
+    if (pressed_button(name, kSpeedWidth * scale, timeline.speed == speed)) actions.speed = speed;
   }
+  ImGui::SameLine();
+  if (pressed_button("Measure", kMeasureWidth * scale, timeline.is_measuring))
+    actions.toggle_measure = true;
   const auto* told = draw_story(timeline, left, bar, scale);
   if (told != nullptr)
     ImGui::TextColored(colour_of(told->kind), "%s  %s", clock_text(seconds_of(*told)).c_str(),
                        told->text.c_str());
   else
     ImGui::TextDisabled("Page Up and Page Down go from event to event.");
+  if (model.pair) draw_pair_choices(*model.pair, scale, actions);
+  const Box box = box_of_window();
   ImGui::End();
+  return box;
 }
 
 }  // namespace trocar::ui

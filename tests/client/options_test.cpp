@@ -79,6 +79,18 @@ TEST(ClientOptions, ARecordedHandIsFelt) {
   EXPECT_EQ((*options)->feel_pull_n_m, 0);
 }
 
+TEST(ClientOptions, TwoRecordingsStandBesideEachOther) {
+  const auto options =
+      parse({"--replay", "x.mcap", "--beside", "y.mcap", "--align", "start", "--own-views"});
+  ASSERT_TRUE(options.ok()) << options.error().message;
+  EXPECT_EQ((*options)->beside_file, "y.mcap");
+  EXPECT_EQ((*options)->align, replay::Alignment::Start);
+  EXPECT_TRUE((*options)->has_own_views);
+  const auto plain = parse({"--replay", "x.mcap", "--beside", "y.mcap"});
+  ASSERT_TRUE(plain.ok()) << plain.error().message;
+  EXPECT_FALSE((*plain)->align);
+}
+
 TEST(ClientOptions, EachWrongValueIsAUsageErrorThatNamesTheOption) {
   const std::vector<std::pair<std::vector<std::string>, std::string>> cases = {
       {{"--size", "5"}, "--size"},
@@ -91,6 +103,14 @@ TEST(ClientOptions, EachWrongValueIsAUsageErrorThatNamesTheOption) {
       {{"--role", "observer", "--script", "x.toml"}, "--script"},
       {{"--replay", "x.mcap", "--script", "x.toml"}, "--replay"},
       {{"--pictures", "out"}, "--replay"},
+      {{"--beside", "y.mcap"}, "--replay"},
+      {{"--replay", "x.mcap", "--align", "stage"}, "--beside"},
+      {{"--replay", "x.mcap", "--own-views"}, "--beside"},
+      {{"--replay", "x.mcap", "--beside", "y.mcap", "--align", "end"}, "--align"},
+      {{"--replay", "x.mcap", "--beside", "y.mcap", "--pictures", "out"}, "--pictures"},
+      {{"--replay", "x.mcap", "--beside", "y.mcap", "--no-render"}, "--no-render"},
+      {{"--replay", "x.mcap", "--beside", "y.mcap", "--device", "haply", "--feel", "Anna"},
+       "--beside"},
       {{"--replay", "x.mcap", "--pictures", "out", "--rate", "0"}, "--rate"},
       {{"--no-render", "--screenshot", "x.png"}, "--screenshot"},
       {{"--show", "regions,shadows"}, "--show"},

@@ -1,0 +1,76 @@
+// A pane lets a click take the place under the pointer, to measure from it.
+
+#include "client/app/pane.h"
+
+#include <gtest/gtest.h>
+
+#include "common/base/timing.h"
+#include "tests/client/synthetic_source.h"
+#include "tests/support/surface_edits.h"
+
+namespace trocar::app {
+namespace {
+
+class PaneTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    auto context = render::make_headless_context({640, 360});
+    ASSERT_TRUE(context.ok()) << context.error().message;
+    context_ = std::move(*context);
+    pane_.emplace(*context_, "");
+    source_.queue_start();
+    step(20);
+  }
+  void step(int frames) {
+    for (int i = 0; i < frames; ++i) {
+      source_.queue_frame();
+      source_.poll(replica_);
+      pane_->observe(replica_);
+      pane_->update(replica_, {}, now_ += 16'000'000);
+      pane_->make_scene(replica_, hands_, {overlays_, 0.016f, false});
+    }
+  }
+
+  std::unique_ptr<render::GlContext> context_;
+  std::optional<Pane> pane_;
+  testing::SyntheticSource source_{testing::make_blob_layout(24, 32, 0.05), "blob"};
+  replica::Replica replica_{[this](const proto::Envelope& m) { return source_.send(m); }};
+  Hands hands_;
+  Overlays overlays_;
+  std::uint64_t now_ = monotonic_ns();
+};
+
+TEST_F(PaneTest, AClickTakesThePlaceUnderThePointer) {
+  EXPECT_FALSE(pane_->measure_at(replica_, 2, 2)) << "there is no tissue";
+  ASSERT_TRUE(pane_->measure_at(replica_, 280, 180));
+  ASSERT_TRUE(pane_->measure_at(replica_, 350, 200));
+  step(1);
+  const auto ruler = pane_->ruler();
+  ASSERT_EQ(ruler.ends.size(), 2u);
+  // The tissue moves by less than this in a frame.
+  EXPECT_NEAR(ruler.ends[0].x, 280, 4);
+  EXPECT_NEAR(ruler.ends[0].y, 180, 4);
+  EXPECT_NEAR(ruler.ends[1].x, 350, 4);
+  EXPECT_NEAR(ruler.ends[1].y, 200, 4);
+  char text[32];
+  std::snprintf(text, sizeof text, "%.1f mm",
+                static_cast<double>(pane_->measured().distance_m().value()) * 1e3);
+  EXPECT_EQ(ruler.text, text);
+  EXPECT_LE(*pane_->measured().distance_m(), 0.11f) << "no more than the blob is wide";
+}
+
+TEST_F(PaneTest, CutsKeepWhatIsMeasured) {
+  ASSERT_TRUE(pane_->measure_at(replica_, 280, 180));
+  ASSERT_TRUE(pane_->measure_at(replica_, 350, 200));
+  step(1);
+  testing::Random random(7);
+  for (int i = 0; i < 12; ++i) {
+    source_.queue_change(testing::random_change(source_.layout(), random));
+    step(2);
+    for (const auto& place : pane_->measured().positions()) EXPECT_TRUE(place) << i;
+  }
+  EXPECT_EQ(pane_->ruler().ends.size(), 2u);
+}
+
+}  // namespace
+}  // namespace trocar::app
