@@ -101,10 +101,11 @@ void bind_session(py::module_& module) {
            "is the direction from the tip along the shaft, up without it; `orientation` a "
            "quaternion x, y, z, w in its place.")
       .def("take", &take, py::arg("hand"), py::kw_only(), py::arg("tool") = 0,
-           py::arg("form") = "plain", py::arg("radius") = usual.radius_m,
-           py::arg("length") = usual.length_m, py::arg("reach") = usual.reach_m,
-           py::arg("half_width") = usual.half_width_m, py::arg("friction") = usual.friction,
-           py::arg("grip") = usual.grip_n, py::arg("edge") = usual.edge_m,
+           py::arg("form") = "plain", py::arg_v("radius", usual.radius_m, "0.005"),
+           py::arg_v("length", usual.length_m, "0.3"), py::arg_v("reach", usual.reach_m, "0.01"),
+           py::arg_v("half_width", usual.half_width_m, "0"),
+           py::arg_v("friction", usual.friction, "0.2"), py::arg_v("grip", usual.grip_n, "8"),
+           py::arg_v("edge", usual.edge_m, "0.02"),
            "Gives a hand another instrument, from the next tick on; lengths in m, grip in N.")
       .def(
           "leave", [](Session& session, int hand) { session.leave(read_hand(hand)); },

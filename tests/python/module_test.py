@@ -9,6 +9,7 @@ import threading
 import unittest
 
 import numpy as np
+import stubs
 import trocar
 
 SCENES = pathlib.Path(os.environ["TROCAR_ROOT"]) / "deploy/scenes"
@@ -122,6 +123,12 @@ class SessionTest(unittest.TestCase):
         self.assertGreater(ticks, 0)
         session.step()
         self.assertEqual(session.tick, ticks + 1)
+
+
+class StubsTest(unittest.TestCase):
+    def test_stubs_are_those_of_the_module(self):
+        path = pathlib.Path(os.environ["TROCAR_ROOT"]) / "deploy/python/trocar.pyi"
+        self.assertEqual(path.read_text(), stubs.stubs())
 
 
 class OrganTest(unittest.TestCase):
