@@ -88,6 +88,21 @@ class SessionTest(unittest.TestCase):
         with self.assertRaises(ValueError):
             positions[0] = 1
 
+    def test_a_cut_leaves_old_views_as_they_were(self):
+        organ = trocar.Organ("plate")
+        session = trocar.Session(organ)
+        session.take(0, form="scalpel", radius=0.001)
+        session.put(0, (-0.02, 0.03, 0), "none")
+        session.step(20)
+        old = session.positions
+        for x in np.linspace(-0.02, 0.02, 100):
+            session.put(0, (x, -0.006, 0), "cut")
+            session.step(8)
+        new = session.positions
+        self.assertEqual(len(old), len(organ.nodes))
+        self.assertGreater(len(new), len(old))
+        self.assertTrue(np.isfinite(old).all() and np.isfinite(new).all())
+
     def test_misuse_is_refused(self):
         session = trocar.Session(self.organ)
         for error, call in (
