@@ -177,6 +177,10 @@ Status SessionJournal::read_surface_deltas(Tick from, Tick to,
                                            const TickVisitor<proto::SurfaceFrame>& visitor) {
   return read_topic(JournalTopic::SurfaceDelta, from, to, visitor);
 }
+Status SessionJournal::read_surface_keys(Tick from, Tick to,
+                                         const TickVisitor<proto::SurfaceFrame>& visitor) {
+  return read_topic(JournalTopic::SurfaceKey, from, to, visitor);
+}
 Status SessionJournal::read_topology_changes(Tick from, Tick to,
                                              const TickVisitor<proto::SurfaceChange>& visitor) {
   return read_topic(JournalTopic::TopologyChange, from, to, visitor);

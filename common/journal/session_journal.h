@@ -67,6 +67,8 @@ class SessionJournal {
   Status read_tick_records(Tick from, Tick to, const TickVisitor<proto::TickRecord>& visitor);
   // Deltas of frames with tick in [from, to], in order.
   Status read_surface_deltas(Tick from, Tick to, const TickVisitor<proto::SurfaceFrame>& visitor);
+  // Surfaces that need no frame before them, likewise.
+  Status read_surface_keys(Tick from, Tick to, const TickVisitor<proto::SurfaceFrame>& visitor);
   Status read_topology_changes(Tick from, Tick to,
                                const TickVisitor<proto::SurfaceChange>& visitor);
   Status read_frame_states(Tick from, Tick to, const TickVisitor<proto::FrameState>& visitor);
