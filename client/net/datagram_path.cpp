@@ -87,6 +87,7 @@ void DatagramPath::begin_try() {
 void DatagramPath::end_try() {
   if (!try_) return;
   boost::system::error_code ignored;
+  loss_.restart();
   try_->socket.close(ignored);
   try_.reset();
 }
@@ -105,7 +106,10 @@ asio::awaitable<void> DatagramPath::receive(std::shared_ptr<Try> current,
     bytes_received_ += count;
     const auto datagram = BytesView(current->room).first(count);
     const bool was_open = current->channel->state() == secure::DatagramChannel::State::Open;
-    current->channel->receive(datagram, [this](BytesView message) { take(message); });
+    current->channel->receive(datagram, [this, datagram](BytesView message) {
+      loss_.note(datagram);
+      take(message);
+    });
     const bool is_open = current->channel->state() == secure::DatagramChannel::State::Open;
     if (is_open && !was_open) {
       last_heard_ = Clock::now();

@@ -23,6 +23,7 @@
 #include <functional>
 #include <memory>
 
+#include "client/net/datagram_loss.h"
 #include "common/base/ids.h"
 #include "common/secure/datagram_channel.h"
 #include "proto/wire.pb.h"
@@ -44,6 +45,7 @@ class DatagramPath {
   bool is_fresh() const;
   std::uint64_t bytes_received() const { return bytes_received_; }
   std::uint64_t bytes_sent() const { return bytes_sent_; }
+  const DatagramLoss& loss() const { return loss_; }
 
  private:
   struct Try;  // one socket and its handshake
@@ -69,6 +71,7 @@ class DatagramPath {
   proto::FrameAck ack_;                                               // frame 0: none yet
   bool has_ack_ = false;
   std::uint32_t received_ = 0;
+  DatagramLoss loss_;
   std::uint64_t bytes_received_ = 0, bytes_sent_ = 0;
   std::shared_ptr<bool> is_alive_ = std::make_shared<bool>(true);
 };

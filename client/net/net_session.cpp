@@ -69,27 +69,6 @@ void NetSource::Session::request_close(const std::string& reason) {
   asio::post(context_, [this, reason] { begin_close(reason); });
 }
 
-replica::SourceStatistics NetSource::Session::statistics() const {
-  const auto absence = comeback_.figures(monotonic_ns());
-  return {.bytes_received = bytes_received_,
-          .bytes_sent = bytes_sent_,
-          .messages_received = messages_received_,
-          .frames_received = frames_received_,
-          .sends_dropped = sends_dropped_,
-          .round_trip_seconds = round_trip_seconds_,
-          .shortest_round_trip_seconds = shortest_round_trip_seconds_,
-          .datagram_bytes_received = datagram_bytes_received_,
-          .datagram_bytes_sent = datagram_bytes_sent_,
-          .slices_received = slices_received_,
-          .hand_messages_refused = hand_messages_refused_,
-          .has_server_clock = has_server_clock_,
-          .server_offset_us = server_offset_us_,
-          .returns = absence.returns,
-          .longest_away_seconds = absence.longest_seconds,
-          .away_seconds = absence.away_seconds,
-          .away_left_seconds = absence.left_seconds};
-}
-
 std::string NetSource::Session::server_name() const {
   const bool is_ipv6 = options_.host.find(':') != std::string::npos;
   return (is_ipv6 ? "[" + options_.host + "]" : options_.host) + ":" +
@@ -490,6 +469,8 @@ void NetSource::Session::begin_datagrams() {
 void NetSource::Session::deliver_datagram(std::shared_ptr<const proto::Envelope> message,
                                           std::size_t bytes) {
   datagram_bytes_received_ = datagrams_->bytes_received();
+  datagrams_received_ = datagrams_->loss().received();
+  datagrams_lost_ = datagrams_->loss().lost();
   last_datagram_ = Clock::now();
   const bool is_expected = message->has_surface_slice() || message->has_frame_state_part() ||
                            message->has_surface_change() || message->has_haptic_patches();

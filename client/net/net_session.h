@@ -142,6 +142,7 @@ class NetSource::Session {
   std::atomic<std::uint64_t> bytes_received_{0}, bytes_sent_{0}, messages_received_{0};
   std::atomic<std::uint64_t> frames_received_{0}, sends_dropped_{0};
   std::atomic<std::uint64_t> datagram_bytes_received_{0}, datagram_bytes_sent_{0};
+  std::atomic<std::uint64_t> datagrams_received_{0}, datagrams_lost_{0};
   std::atomic<std::uint64_t> slices_received_{0}, hand_messages_refused_{0};
   std::atomic<double> round_trip_seconds_{0}, shortest_round_trip_seconds_{0};
   std::atomic<double> server_offset_us_{0};

@@ -65,7 +65,8 @@ struct SourceStatistics {
   double round_trip_seconds = 0;           // last Ping to Pong; 0 before the first
   double shortest_round_trip_seconds = 0;  // of the last 16
   std::uint64_t datagram_bytes_received = 0, datagram_bytes_sent = 0;  // sealed
-  std::uint64_t slices_received = 0;                                   // SurfaceSlice messages
+  std::uint64_t datagrams_received = 0, datagrams_lost = 0;  // on the way here, of one connection
+  std::uint64_t slices_received = 0;                         // SurfaceSlice messages
   std::uint64_t hand_messages_refused = 0;  // parts of what hands feel that were not as they may be
   bool has_server_clock = false;            // the offset is known
   double server_offset_us = 0;              // the server's monotonic clock less this client's

@@ -7,9 +7,11 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <filesystem>
 
 #include "common/base/assert.h"
 #include "common/base/checksum.h"
+#include "common/base/timing.h"
 
 namespace trocar::journal {
 namespace {
@@ -28,6 +30,16 @@ bool is_device(const std::string& path) {
   return stat(path.c_str(), &status) == 0 && !S_ISREG(status.st_mode) && !S_ISDIR(status.st_mode);
 }
 
+// The name of a new file survives a loss of power only once its folder was written. A file system
+// that cannot do that does no harm.
+void sync_folder_of(const std::string& path) {
+  const auto folder = std::filesystem::path(path).parent_path();
+  const int fd = open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (fd < 0) return;
+  [[maybe_unused]] const int result = fsync(fd);
+  ::close(fd);
+}
+
 }  // namespace
 
 Result<std::unique_ptr<McapWriter>> McapWriter::create(const std::string& path,
@@ -43,11 +55,16 @@ Result<std::unique_ptr<McapWriter>> McapWriter::create(const std::string& path,
   Bytes start(kMcapMagic.begin(), kMcapMagic.end());
   put_header(start, header);
   if (Status written = writer->append(start); !written.ok()) return written.error();
+  if (options.sync_ns > 0) sync_folder_of(path);
   return writer;
 }
 
 McapWriter::McapWriter(std::string path, int fd, const McapWriterOptions& options)
-    : path_(std::move(path)), fd_(fd), options_(options), zstd_(ZSTD_createCCtx()) {}
+    : path_(std::move(path)), fd_(fd), options_(options), zstd_(ZSTD_createCCtx()) {
+  if (!options_.clock_ns) options_.clock_ns = monotonic_ns;
+  if (!options_.synchronise) options_.synchronise = ::fdatasync;
+  last_sync_ns_ = options_.clock_ns();
+}
 
 McapWriter::~McapWriter() {
   ZSTD_freeCCtx(zstd_);
@@ -157,7 +174,7 @@ Status McapWriter::flush() {
   chunk_indexes_.push_back(std::move(index));
   chunk_.clear();
   chunk_messages_ = 0;
-  return {};
+  return sync_if_due();
 }
 
 Status McapWriter::write_metadata(const McapMetadata& metadata) {
@@ -190,9 +207,16 @@ Status McapWriter::append(BytesView bytes) {
 Status McapWriter::sync() {
   if (!failure_.ok()) return failure_;
   // A pipe or device cannot be synchronised, and needs not be.
-  if (fdatasync(fd_) != 0 && errno != EINVAL && errno != EROFS)
+  if (options_.synchronise(fd_) != 0 && errno != EINVAL && errno != EROFS)
     failure_ = io_error(path_, "synchronise");
+  ++sync_count_;
+  last_sync_ns_ = options_.clock_ns();
   return failure_;
+}
+
+Status McapWriter::sync_if_due() {
+  if (options_.sync_ns == 0 || options_.clock_ns() - last_sync_ns_ < options_.sync_ns) return {};
+  return sync();
 }
 
 Status McapWriter::write_summary() {

@@ -6,11 +6,13 @@
 // record boundary. A chunk closes after 250 ms of log time or 256 KiB, whichever comes first; a
 // message over 64 KiB gets a chunk of its own, so that reading the small channels skips it. Each
 // chunk repeats the schemas and channels that its messages use: any chunk can be read alone.
-// close() adds summary and footer.
+// close() adds summary and footer. With `sync_ns` a power failure, too, loses little: chunks are
+// then brought to the disk while it is written.
 //
 // Memory: one chunk, plus some 200 bytes of index per chunk written. One thread. After an error
 // every call returns it again and nothing more is written.
 
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -26,6 +28,10 @@ struct McapWriterOptions {
   std::size_t chunk_bytes = 256 * 1024;
   std::size_t isolate_bytes = 64 * 1024;
   bool compress = true;  // zstd level 1, where that is smaller
+  // A chunk that ends so long after the last sync is followed by one. 0: only close() syncs.
+  std::uint64_t sync_ns = 0;
+  std::function<std::uint64_t()> clock_ns;  // monotonic; empty: the system's
+  std::function<int(int fd)> synchronise;   // as fdatasync; empty: that
 };
 
 class McapWriter {
@@ -52,6 +58,7 @@ class McapWriter {
   [[nodiscard]] Status close();  // flush, summary, footer, fdatasync; call once
 
   std::uint64_t bytes_written() const { return file_offset_; }
+  std::uint64_t sync_count() const { return sync_count_; }
   const McapStatistics& statistics() const { return statistics_; }
 
  private:
@@ -71,6 +78,7 @@ class McapWriter {
   void declare(ChannelState& state);
   BytesView compress_chunk();
   Status append(BytesView bytes);
+  Status sync_if_due();
   Status write_summary();
 
   std::string path_;
@@ -81,6 +89,7 @@ class McapWriter {
   std::uint64_t file_offset_ = 0;
   std::uint32_t data_crc_ = 0;
   std::uint64_t last_log_time_ = 0;
+  std::uint64_t last_sync_ns_ = 0, sync_count_ = 0;
 
   std::vector<SchemaState> schemas_;    // [id - 1]
   std::vector<ChannelState> channels_;  // [id - 1]

@@ -101,6 +101,7 @@ class SessionJournalWriter {
   [[nodiscard]] Status flush() { return mcap_->flush(); }
   [[nodiscard]] Status close() { return mcap_->close(); }  // once, at the session's end
   std::uint64_t bytes_written() const { return mcap_->bytes_written(); }
+  std::uint64_t sync_count() const { return mcap_->sync_count(); }
   const McapStatistics& statistics() const { return mcap_->statistics(); }
 
  private:

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cerrno>
 
 #include "common/base/checksum.h"
 #include "tests/journal/mcap_files.h"
@@ -9,6 +10,47 @@ namespace trocar::journal {
 namespace {
 
 using namespace testing;  // NOLINT: the helpers of this folder
+
+TEST(mcap, each_second_is_brought_to_the_disk_once) {
+  const TemporaryFolder folder;
+  std::uint64_t now = 0;
+  std::vector<std::uint64_t> times;
+  auto writer = create(folder.file("a.mcap"), {.sync_ns = 875 * kMillisecond,
+                                               .clock_ns = [&] { return now; },
+                                               .synchronise =
+                                                   [&](int) {
+                                                     times.push_back(now);
+                                                     return 0;
+                                                   }});
+  const auto id = writer->add_channel("/a", "text", 0);
+  constexpr std::uint64_t kSeconds = 10;
+  for (std::uint64_t i = 0; i <= kSeconds * 1000; ++i) {
+    now = i * kMillisecond;
+    ASSERT_TRUE(writer->write(id, kStart + now, kStart + now, payload_of(7, 40)).ok());
+  }
+  EXPECT_EQ(writer->sync_count(), kSeconds);
+  for (std::size_t i = 0; i < times.size(); ++i) EXPECT_EQ(times[i], (i + 1) * 1000 * kMillisecond);
+  ASSERT_TRUE(writer->close().ok());
+  EXPECT_EQ(writer->sync_count(), kSeconds + 1);
+}
+
+TEST(mcap, a_disk_that_cannot_keep_it_ends_the_recording) {
+  const TemporaryFolder folder;
+  std::uint64_t now = 0;
+  auto writer = create(folder.file("a.mcap"), {.sync_ns = 1,
+                                               .clock_ns = [&] { return ++now; },
+                                               .synchronise =
+                                                   [](int) {
+                                                     errno = EIO;
+                                                     return -1;
+                                                   }});
+  const auto id = writer->add_channel("/a", "text", 0);
+  ASSERT_TRUE(writer->write(id, kStart, kStart, payload_of(0, 40)).ok());
+  const Status status = writer->flush();
+  ASSERT_FALSE(status.ok());
+  EXPECT_NE(status.error().message.find("cannot synchronise"), std::string::npos);
+  EXPECT_FALSE(writer->write(id, kStart, kStart, payload_of(0, 40)).ok());
+}
 
 TEST(mcap, round_trip_in_order) {
   const TemporaryFolder folder;

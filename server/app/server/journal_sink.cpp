@@ -23,6 +23,7 @@ class RecordedSession : public JournalSink {
   }
   void end_early(const std::string& reason) override { recorder_->end_early(reason); }
   std::size_t queued_bytes() const override { return recorder_->queued_bytes(); }
+  std::uint64_t sync_count() const override { return recorder_->sync_count(); }
   Status close() override { return recorder_->close(); }
   wire::RecordingState state() const override { return recorder_->state(); }
 

@@ -37,6 +37,8 @@ class JournalSink {
   virtual void end_early(const std::string& /*reason*/) {}
   // Any thread may ask how many bytes were taken and are not written yet.
   virtual std::size_t queued_bytes() const { return 0; }
+  // Any thread may ask how often what was written was brought to the disk.
+  virtual std::uint64_t sync_count() const { return 0; }
   // I/O thread, after the simulation thread has ended.
   virtual Status close() = 0;
   // Any thread, at any time: whether everything has been recorded so far.

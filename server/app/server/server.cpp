@@ -443,6 +443,7 @@ std::string Server::metrics() const {
                         .access = gate ? gate->counters() : access::GateCounters{},
                         .recording = recording_state(),
                         .recording_queued_bytes = journal_ ? journal_->queued_bytes() : 0,
+                        .recording_syncs = journal_ ? journal_->sync_count() : 0,
                         .disk = disk_});
 }
 

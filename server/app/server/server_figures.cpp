@@ -108,6 +108,10 @@ void add_recording(const ServerFigures& f, Exposition& text) {
                number(f.recording.frames_missing));
   text.gauge("recording_queued_bytes", "Bytes that wait to be written.",
              number(f.recording_queued_bytes));
+  text.counter("recording_syncs_total",
+               "Times that the recording was brought to the disk. A loss of power takes what came "
+               "after the last, about a second.",
+               number(f.recording_syncs));
   const auto& sample = f.disk.newest();
   if (!sample) return;
   text.gauge("recording_bytes", "Size of the recording.", number(sample->recorded_bytes));

@@ -31,6 +31,7 @@ struct ServerFigures {
   access::GateCounters access;
   wire::RecordingState recording;
   std::size_t recording_queued_bytes = 0;
+  std::uint64_t recording_syncs = 0;
   const monitoring::DiskWatch& disk;
 };
 

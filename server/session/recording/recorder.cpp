@@ -51,19 +51,22 @@ class FileSink final : public MessageSink {
 Result<std::unique_ptr<Recorder>> Recorder::create(const std::string& path,
                                                    const organ::Organ& organ,
                                                    const wire::SurfaceLayout& layout,
-                                                   const Beginning& beginning) {
+                                                   const Beginning& beginning,
+                                                   journal::McapWriterOptions options) {
   const Tick begin_tick = beginning.continues ? beginning.continues->tick : 0;
   const std::uint64_t now = utc_ns();
   const std::uint64_t hash = organ::organ_hash(organ);
-  auto writer = journal::SessionJournalWriter::create(
-      path, {.start_utc_ns = now - begin_tick * kTickNanoseconds,
-             .organ_name = organ.name,
-             .organ_hash = hash,
-             .reduction = beginning.reduction,
-             .has_external_loads = !beginning.loads.empty(),
-             .starts_from_snapshot = beginning.starts_from_snapshot,
-             .has_implicit_strain = beginning.has_implicit_strain,
-             .continues = beginning.continues});
+  auto writer =
+      journal::SessionJournalWriter::create(path,
+                                            {.start_utc_ns = now - begin_tick * kTickNanoseconds,
+                                             .organ_name = organ.name,
+                                             .organ_hash = hash,
+                                             .reduction = beginning.reduction,
+                                             .has_external_loads = !beginning.loads.empty(),
+                                             .starts_from_snapshot = beginning.starts_from_snapshot,
+                                             .has_implicit_strain = beginning.has_implicit_strain,
+                                             .continues = beginning.continues},
+                                            options);
   if (!writer) return writer.error();
   if (auto s = (*writer)->write(journal::JournalTopic::Organ, 0, now, organ::encode_organ(organ));
       !s)
@@ -190,6 +193,7 @@ bool Recorder::write_queued() {
     }
     queued_bytes_.fetch_sub(queued->bytes, std::memory_order_relaxed);
   }
+  sync_count_.store(writer_->sync_count(), std::memory_order_relaxed);
   return any;
 }
 

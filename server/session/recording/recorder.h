@@ -13,6 +13,9 @@
 // disk error ends the recording, is logged once, and close() returns it. Both show in state() at
 // once, so that the session can tell everybody.
 //
+// Each second the writer thread brings the file to the disk (fdatasync), so that a loss of power
+// takes about that much. While a disk is busy with it, what comes waits in the queues.
+//
 // Every 30 s an Overview follows, in a chunk of its own.
 //
 // Changes of the surface are written with their frame. From epoch 1 on each keyframe (1 Hz) follows
@@ -65,12 +68,14 @@ class Recorder {
   static constexpr std::size_t kQueueHands = 512;    // 2 s of 32 tools
   static constexpr std::size_t kQueueLessons = 256;  // 5 s of two who point
 
+  // Chunks end each 250 ms, so every fourth is followed by a sync though the clock is not exact.
+  static constexpr std::uint64_t kSyncNs = 875'000'000;
+
   // Creates the file with organ and topology; copies what it keeps. Fails if the file exists or
   // cannot be written.
-  static Result<std::unique_ptr<Recorder>> create(const std::string& path,
-                                                  const organ::Organ& organ,
-                                                  const wire::SurfaceLayout& layout,
-                                                  const Beginning& beginning = {});
+  static Result<std::unique_ptr<Recorder>> create(
+      const std::string& path, const organ::Organ& organ, const wire::SurfaceLayout& layout,
+      const Beginning& beginning = {}, journal::McapWriterOptions options = {.sync_ns = kSyncNs});
   ~Recorder();
 
   // Simulation thread.
@@ -90,8 +95,9 @@ class Recorder {
   Status close();
   // After close().
   const RecorderCounters& counters() const { return counters_; }
-  // Any thread may call it at any time.
+  // Any thread may call these at any time.
   wire::RecordingState state() const;
+  std::uint64_t sync_count() const { return sync_count_.load(std::memory_order_relaxed); }
 
  private:
   struct Presence {
@@ -144,7 +150,7 @@ class Recorder {
   std::string early_reason_;             // I/O thread, until `ends_early_`
   std::atomic<bool> ends_early_{false};
 
-  std::atomic<std::uint64_t> frames_dropped_{0};
+  std::atomic<std::uint64_t> frames_dropped_{0}, sync_count_{0};
   SpscQueue<QueuedFrame> frames_{kQueueFrames};
   SpscQueue<Presence> presences_{kQueueParticipants};
   SpscQueue<wire::HandRecord> hands_{kQueueHands};
