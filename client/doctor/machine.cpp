@@ -63,7 +63,7 @@ Graphics measure_graphics(const Visited& visited, double seconds) {
   const auto draw = [&] {
     for (int i = 0; i < kPicturesAtOnce; ++i) {
       camera.orbit(0.01f, 0);
-      renderer.draw(scene, camera);
+      renderer.draw(scene, camera, {.size = (*context)->size()});
       (*context)->present();
     }
     (void)(*context)->read_image();  // waits for them

@@ -263,9 +263,10 @@ CommandLine::CommandLine() {
 
 void CommandLine::add_session_options() {
   organ_ =
-      app_.add_option("--organ", options_.organ,
-                      "built-in organ (liver, elastic-liver, lattice, plate, stomach, chest, pegs), an "
-                      ".organ file or a .msh mesh")
+      app_.add_option(
+              "--organ", options_.organ,
+              "built-in organ (liver, elastic-liver, lattice, plate, stomach, chest, pegs), an "
+              ".organ file or a .msh mesh")
           ->type_name("NAME|FILE")
           ->capture_default_str();
   app_.add_option(

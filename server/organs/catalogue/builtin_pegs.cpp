@@ -13,7 +13,7 @@ constexpr Vec3d kCell_m{0.006, 0.005, 0.006};
 constexpr int kBoardX = 25, kBoardZ = 15;  // cells of the board, one high
 constexpr int kPegHeight = 4;              // cells above it
 constexpr int kRing = 4, kRingHeight = 2;  // cells; the middle ones of its side are its hole
-constexpr double kRingGap_m = 1e-4;            // between ring and board; it settles by that
+constexpr double kRingGap_m = 1e-4;        // between ring and board; it settles by that
 struct PegCell {
   int i, k;
 };

@@ -23,10 +23,11 @@ Result<organ::Organ> load_organ(const std::string& spec) {
     for (const std::string& warning : imported->warnings) log::warn("{}: {}", spec, warning);
     return std::move(imported->organ);
   }
-  return Error{ErrorCode::BadFile,
-               "organ '" + spec +
-                   "' is neither liver, elastic-liver, lattice, plate, stomach, chest nor pegs, nor "
-                   "an .organ file or a mesh that can be imported"};
+  return Error{
+      ErrorCode::BadFile,
+      "organ '" + spec +
+          "' is neither liver, elastic-liver, lattice, plate, stomach, chest nor pegs, nor "
+          "an .organ file or a mesh that can be imported"};
 }
 
 }  // namespace trocar::catalogue
