@@ -19,8 +19,10 @@ Status ImageTexture::load(const std::string& bytes) {
   stbi_uc* pixels =
       stbi_load_from_memory(reinterpret_cast<const stbi_uc*>(bytes.data()),
                             static_cast<int>(bytes.size()), &width_, &height_, &channels, 4);
-  if (pixels == nullptr)
+  if (pixels == nullptr) {
+    width_ = height_ = 0;
     return Error{ErrorCode::BadFile, std::string("picture: ") + stbi_failure_reason()};
+  }
   glGenTextures(1, &name_);
   glBindTexture(GL_TEXTURE_2D, name_);
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR_MIPMAP_LINEAR);
