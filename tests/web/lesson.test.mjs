@@ -1,6 +1,7 @@
 // A lesson in headless Chromium, against the real programs: what an instructor does on the page, what
 // others see of it, and that the recording of it verifies.
 import assert from 'node:assert/strict';
+import { copyFile, readFile, writeFile } from 'node:fs/promises';
 import { after, before, test } from 'node:test';
 import { close, endAll, kPatience, launch, live, openBrowser, portOf, sleep, until } from './browser.mjs';
 
@@ -27,10 +28,18 @@ async function manage(name, what) {
 }
 const picture = async (page, name) => { if (TROCAR_PICTURES) await page.screenshot({ path: `${TROCAR_PICTURES}/${name}.png` }); };
 
+// A lesson that ships, with a picture of another one.
+async function writeLesson(file) {
+  const lessons = `${TROCAR_ROOT}/common/lesson/lessons`, text = await readFile(`${lessons}/follow-the-point.toml`, 'utf8');
+  await copyFile(`${lessons}/move-the-rings.jpg`, `${TROCAR_WORK}/rings.jpg`);
+  await writeFile(file, text.replaceAll(/^goal = .*$/gm, '$&\npicture = "rings.jpg"'));
+  return file;
+}
+
 before(async () => {
   browser = await openBrowser();
   context = await browser.newContext({ viewport: { width: 1280, height: 720 } });
-  server = launch('trocar-server', ['--listen', '127.0.0.1:0', '--no-announce', '--lesson', 'follow-the-point',
+  server = launch('trocar-server', ['--listen', '127.0.0.1:0', '--no-announce', '--lesson', await writeLesson(`${TROCAR_WORK}/lesson.toml`),
     '--journal', `${TROCAR_WORK}/lesson.mcap`, '--ready-file', `${TROCAR_WORK}/server.port`]);
   server.port = await portOf(server, `${TROCAR_WORK}/server.port`);
   await until('join codes', () => /observer\s+\S{19}/.test(server.text));
@@ -44,6 +53,13 @@ before(async () => {
   await live(olga);
 }, { timeout: 120_000 });
 after(() => endAll(browser), { timeout: 30_000 });
+
+test('a stage shows its picture', kTest, async () => {
+  const image = olga.getByAltText('What to do, as a picture');
+  await image.waitFor({ timeout: kPatience });
+  await until('it is drawn', () => image.evaluate(shown => shown.naturalWidth > 100));
+  await picture(olga, 'lesson-picture');
+});
 
 test('a tool that is frozen stays, and goes back when it is released', kTest, async () => {
   hand = launch('trocar-client', ['--server', `127.0.0.1:${server.port}`, '--name', 'Sam', '--no-render', '--join', server.codes.surgeon,
