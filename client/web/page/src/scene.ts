@@ -440,7 +440,7 @@ export class Picture {
       const at = new Vector3(...position);
       drawn.group.position.copy(at).addScaledVector(along, -kPointerLength);
       drawn.group.quaternion.setFromUnitVectors(new Vector3(0, 0, 1), along);
-      drawn.label.textContent = participant === kLessonPoint ? 'Follow this point' : this.guide.pointerLabel(participant);
+      drawn.label.textContent = participant === kLessonPoint ? 'Your goal' : this.guide.pointerLabel(participant);
       drawn.label.style.setProperty('--own', `#${this.pointerColour(participant).toString(16).padStart(6, '0')}`);
       at.project(this.main.drawn);
       drawn.label.style.transform = `translate(${this.onCanvas(at).map(n => `${n.toFixed(1)}px`).join(', ')})`;
