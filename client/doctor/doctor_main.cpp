@@ -1,7 +1,5 @@
 // trocar-doctor: says whether this machine can take part in a session, and what to do if not.
 
-#include <fmt/format.h>
-
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
@@ -12,6 +10,7 @@
 #include "client/doctor/visitor.h"
 #include "common/base/cpu.h"
 #include "common/base/log.h"
+#include "common/base/number_option.h"
 #include "common/base/version.h"
 #include "common/discovery/finder.h"
 #include "common/secure/join_code.h"
@@ -43,17 +42,6 @@ struct DoctorOptions {
   VisitOptions visit;
   bool is_json = false;
 };
-
-// Unlike CLI::Range it refuses what is not a number.
-CLI::Validator from_to(double least, double most) {
-  return {[=](std::string& text) {
-            double value = 0;
-            if (CLI::detail::lexical_cast(text, value) && value >= least && value <= most)
-              return std::string();
-            return fmt::format("{} is not a number from {} to {}", text, least, most);
-          },
-          fmt::format("{} to {}", least, most)};
-}
 
 // No value: --help or --version was asked for and printed.
 Result<std::optional<DoctorOptions>> parse(int argc, char** argv) {

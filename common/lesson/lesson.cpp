@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "common/math/tube.h"
+#include "common/wire/lesson.h"
 
 namespace trocar::lesson {
 namespace {
@@ -89,9 +90,9 @@ Status add_picture(Lesson& lesson, Picture picture, std::string_view source) {
   const auto bad = [&](const std::string& why) {
     return Error{ErrorCode::BadFile, fmt::format("{}: picture {}: {}", source, picture.name, why)};
   };
-  if (picture.bytes.size() > kPictureLimitBytes)
+  if (picture.bytes.size() > wire::kMostPictureBytes)
     return bad(
-        fmt::format("has {} bytes, allowed are {}", picture.bytes.size(), kPictureLimitBytes));
+        fmt::format("has {} bytes, allowed are {}", picture.bytes.size(), wire::kMostPictureBytes));
   if (!picture.bytes.starts_with("\x89PNG\r\n\x1a\n") && !picture.bytes.starts_with("\xff\xd8\xff"))
     return bad("is neither a PNG nor a JPEG file");
   if (lesson.find_picture(picture.name) == nullptr) lesson.pictures.push_back(std::move(picture));

@@ -15,7 +15,7 @@
 
 namespace trocar::lesson {
 
-inline constexpr std::size_t kFileLimitBytes = 64 * 1024, kPictureLimitBytes = 64 * 1024;
+inline constexpr std::size_t kFileLimitBytes = 64 * 1024;
 inline constexpr std::size_t kMostStages = 16, kMostStructures = 16, kMostScores = 12;
 inline constexpr std::size_t kMostLinePoints = 32;
 inline constexpr double kPascalPerMmHg = 133.322;

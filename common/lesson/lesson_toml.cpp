@@ -3,6 +3,7 @@
 #include "common/lesson/lesson.h"
 #include "common/lesson/lesson_texts.h"
 #include "common/tool/toml_reader.h"
+#include "common/wire/lesson.h"
 
 namespace trocar::lesson {
 namespace {
@@ -287,10 +288,11 @@ std::string list_lessons() {
 Result<Lesson> read_lesson(const std::filesystem::path& file) {
   const auto text = tool::read_text_file(file, kFileLimitBytes, "lesson");
   if (!text) return text.error();
-  return with_pictures(
-      read_lesson_text(*text, file.string()), file.string(), [&](const std::string& wanted) {
-        return tool::read_text_file(file.parent_path() / wanted, kPictureLimitBytes, "picture");
-      });
+  return with_pictures(read_lesson_text(*text, file.string()), file.string(),
+                       [&](const std::string& wanted) {
+                         return tool::read_text_file(file.parent_path() / wanted,
+                                                     wire::kMostPictureBytes, "picture");
+                       });
 }
 
 }  // namespace trocar::lesson

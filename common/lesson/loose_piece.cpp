@@ -5,13 +5,15 @@
 
 namespace trocar::lesson {
 
-Components::Components(const wire::SurfaceLayout& layout) : parent_(layout.vertex_count()) {
+Components::Components(const wire::SurfaceLayout& layout)
+    : parent_(layout.vertex_count()), is_held_(layout.vertex_count()) {
   std::iota(parent_.begin(), parent_.end(), 0u);
   for (const auto& corners : layout.triangles) {
     if (!corners[0].is_valid()) continue;
     join(corners[0].value, corners[1].value);
     join(corners[0].value, corners[2].value);
   }
+  for (const auto vertex : layout.fixed_vertices) is_held_[of(vertex.value)] = 1;
 }
 
 std::uint32_t Components::of(std::uint32_t vertex) {
@@ -22,14 +24,12 @@ std::uint32_t Components::of(std::uint32_t vertex) {
 std::vector<TriangleIndex> find_loose_piece(const wire::SurfaceLayout& layout,
                                             const Vec3d& place_m) {
   Components components(layout);
-  std::vector<std::uint8_t> is_held(layout.vertex_count());
-  for (const auto vertex : layout.fixed_vertices) is_held[components.of(vertex.value)] = 1;
   double nearest = std::numeric_limits<double>::max();
   std::optional<std::uint32_t> wanted;
   for (std::uint32_t t = 0; t < layout.triangles.size(); ++t) {
     if (!layout.has_triangle(TriangleIndex(t))) continue;
     const auto component = components.of(layout.triangles[t][0].value);
-    if (is_held[component] != 0) continue;
+    if (components.is_held(component)) continue;
     for (const auto corner : layout.triangles[t])
       if (const double d = length_squared(layout.rest_m(corner) - place_m); d < nearest)
         nearest = d, wanted = component;

@@ -15,10 +15,13 @@ class Components {
  public:
   explicit Components(const wire::SurfaceLayout& layout);
   std::uint32_t of(std::uint32_t vertex);
+  // Something holds the part of this vertex, as of() has it.
+  bool is_held(std::uint32_t part) const { return is_held_[part] != 0; }
 
  private:
   void join(std::uint32_t a, std::uint32_t b) { parent_[of(a)] = of(b); }
   std::vector<std::uint32_t> parent_;
+  std::vector<std::uint8_t> is_held_;  // by vertex
 };
 
 // The triangles of the loose piece that lies nearest to a place at rest, ascending; empty where all

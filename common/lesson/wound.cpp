@@ -108,15 +108,13 @@ Incision measure_incision(const wire::SurfaceLayout& layout, std::span<const Vec
 std::optional<Specimen> find_specimen(const wire::SurfaceLayout& layout,
                                       const Structure& structure) {
   Components components(layout);
-  std::vector<std::uint8_t> is_fixed(layout.vertex_count());
-  for (const auto vertex : layout.fixed_vertices) is_fixed[components.of(vertex.value)] = 1;
   const auto centre = (structure.from_m + structure.to_m) / 2;
   std::vector<double> angle(layout.vertex_count());
   const auto for_each_free = [&](auto visit) {
     for (std::uint32_t t = 0; t < layout.triangles.size(); ++t) {
       if (!layout.has_triangle(TriangleIndex(t))) continue;
       const auto component = components.of(layout.triangles[t][0].value);
-      if (is_fixed[component] == 0) visit(t, component);
+      if (!components.is_held(component)) visit(t, component);
     }
   };
   for_each_free([&](std::uint32_t t, std::uint32_t component) {

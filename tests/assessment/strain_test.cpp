@@ -6,6 +6,7 @@
 
 #include "proto/journal.pb.h"
 #include "server/organs/catalogue/builtin_organs.h"
+#include "server/session/recording/lesson_frames.h"
 #include "tests/recording/recorded_simulation.h"
 #include "tests/support/files.h"
 
@@ -74,6 +75,25 @@ TEST_F(StrainMapTest, VolumesOfStructuresArePartsOfIt) {
   EXPECT_NEAR(map.volume_within_m3(ball), volume, 0.02 * volume);
 }
 
+// Returns the area of wound at rest that the recording ends with, both sides, m^2.
+double wound_of(const std::string& file) {
+  const auto session = recording::open_session_parts(file);
+  EXPECT_TRUE(session.ok());
+  double area = 0;
+  const auto visit = [&](const recording::LessonFrame& frame) {
+    const auto& layout = *frame.moment.layout;
+    area = 0;
+    for (std::size_t t = 0; t < layout.triangles.size(); ++t) {
+      const auto& [a, b, c] = layout.triangles[t];
+      if (layout.is_wound[t] == 0 || !a.is_valid()) continue;
+      const auto from = layout.rest_m(a);
+      area += length(cross(layout.rest_m(b) - from, layout.rest_m(c) - from)) / 2;
+    }
+  };
+  EXPECT_TRUE(recording::read_lesson_frames(*session, visit, [](const std::string&) {}));
+  return area;
+}
+
 // The session is simulated again, to the same bits or not at all.
 TEST(MeasureStrain, OfASessionThatPressesGraspsAndCuts) {
   const trocar::testing::TemporaryFolder folder;
@@ -87,6 +107,7 @@ TEST(MeasureStrain, OfASessionThatPressesGraspsAndCuts) {
   EXPECT_GT(damage->volume_m3, 1e-7);
   EXPECT_LT(damage->volume_m3, 1.6e-3);  // the whole liver
   EXPECT_GT(damage->cut_m2, 1e-5);
+  EXPECT_NEAR(damage->cut_m2, wound_of(file) / 2, 0.02 * damage->cut_m2) << "one side of two";
   EXPECT_EQ(damage->torn_m2, 0) << "its tissue does not tear";
   // One hash is another.
   recording::testing::copy_journal(file, other, [](std::string_view topic, auto& message) {

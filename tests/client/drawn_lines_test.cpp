@@ -8,18 +8,10 @@
 
 #include "client/shape/ribbon.h"
 #include "proto/wire.pb.h"
+#include "tests/client/square.h"
 
 namespace trocar::replica {
 namespace {
-
-// Two triangles of 10 mm that make a square at z = 0, seen from +z.
-Topology square() {
-  Topology topology;
-  topology.rest_positions = {{0, 0, 0}, {0.01f, 0, 0}, {0.01f, 0.01f, 0}, {0, 0.01f, 0}};
-  topology.triangles = {{0, 1, 2}, {0, 2, 3}};
-  topology.is_wound = {0, 0};
-  return topology;
-}
 
 TEST(DrawnLines, APlaceIsAttachedToTheNearestTriangle) {
   const auto topology = square();

@@ -4,17 +4,10 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/client/square.h"
+
 namespace trocar::replica {
 namespace {
-
-// Two triangles of 10 mm that make a square at z = 0, seen from +z.
-Topology square() {
-  Topology topology;
-  topology.rest_positions = {{0, 0, 0}, {0.01f, 0, 0}, {0.01f, 0.01f, 0}, {0, 0.01f, 0}};
-  topology.triangles = {{0, 1, 2}, {0, 2, 3}};
-  topology.is_wound = {0, 0};
-  return topology;
-}
 
 // Measures from the corner 0 to the middle of the edge from 1 to 2.
 MeasuredPlaces measured(const Topology& topology) {

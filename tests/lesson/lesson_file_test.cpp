@@ -4,6 +4,7 @@
 
 #include "common/lesson/lesson.h"
 #include "common/lesson/lesson_texts.h"
+#include "common/wire/lesson.h"
 #include "tests/support/files.h"
 
 namespace trocar::lesson {
@@ -64,7 +65,7 @@ TEST(LessonFile, AStageHasAPictureBesideTheFile) {
   EXPECT_EQ(error_with("a.txt"), file + ": picture a.txt: is neither a PNG nor a JPEG file");
   EXPECT_NE(error_with("b.png").find("b.png"), std::string::npos);
   EXPECT_NE(error_with("../a.png").find("without a folder"), std::string::npos);
-  write(folder.file("large.png"), std::string(kPictureLimitBytes + 1, 'x'));
+  write(folder.file("large.png"), std::string(wire::kMostPictureBytes + 1, 'x'));
   EXPECT_NE(error_with("large.png").find("allowed"), std::string::npos) << error_with("large.png");
 }
 

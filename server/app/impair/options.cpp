@@ -6,6 +6,7 @@
 #include <charconv>
 #include <cmath>
 
+#include "common/base/number_option.h"
 #include "common/base/version.h"
 
 namespace trocar::app {
@@ -41,17 +42,6 @@ Limits: 64 streams and 256 peers of datagrams, who are forgotten after 60 s of s
 Exit codes: 0 ok, also after Ctrl-C or SIGTERM; 2 command line, 3 bad file, 5 port taken, machine
 not known or processor too old.
 )";
-
-// Unlike CLI::Range it refuses what is not a number.
-CLI::Validator from_to(double least, double most) {
-  return {[=](std::string& text) {
-            double value = 0;
-            if (CLI::detail::lexical_cast(text, value) && value >= least && value <= most)
-              return std::string();
-            return fmt::format("{} is not a number from {} to {}", text, least, most);
-          },
-          fmt::format("{} to {}", least, most)};
-}
 
 // Holds what one direction is told, in the units of the command line.
 struct DirectionText {
