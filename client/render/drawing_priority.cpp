@@ -8,6 +8,8 @@
 #include <fstream>
 #include <string>
 
+#include "common/base/time_slice.h"
+
 namespace trocar::render {
 namespace {
 
@@ -21,6 +23,7 @@ bool draws(const std::filesystem::path& task) {
 }
 
 bool lower(id_t thread) {
+  ask_for_short_slices(static_cast<pid_t>(thread));
   if (getpriority(PRIO_PROCESS, thread) >= kNiceness) return true;
   return setpriority(PRIO_PROCESS, thread, kNiceness) == 0;
 }

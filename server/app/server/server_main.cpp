@@ -4,6 +4,7 @@
 
 #include "common/base/cpu.h"
 #include "common/base/log.h"
+#include "common/base/time_slice.h"
 #include "server/app/server/check_start.h"
 #include "server/app/server/options.h"
 #include "server/app/server/server.h"
@@ -32,6 +33,7 @@ int main(int argc, char** argv) {
   if (const auto set = trocar::log::configure(kProgram, level); !set)
     return trocar::report(kProgram, set.error());
   if (options.checks_config) return check_config(options);
+  trocar::ask_for_short_slices();  // and for all threads that are started from here on
   if (const auto run = trocar::app::run_server(options); !run)
     return trocar::report(kProgram,
                           {run.error().code, options.origins.placed(run.error().message)});
