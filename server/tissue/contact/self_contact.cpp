@@ -249,40 +249,71 @@ bool SelfContactFinder::begins(Site site, Site nearest, float squared, bool is_o
          dot(closest.from, touch.own) <= -touch.shift;
 }
 
-// Whether a node without a pair meets the surface across from it: first the other side of its
-// wound.
-bool SelfContactFinder::meets(Site site, std::size_t first, std::size_t end,
-                              const world::World& world, ClosestPoint& closest, Touch& touch) {
-  const auto passed = static_cast<float>(travel_ - list_.travel);
-  while (first < end && list_.far_until[first] > passed) ++first;
-  if (first == end) return false;
-  const Vec3f p = position(site, world);
-  const bool is_moved = has_moved(site, kMovedSlacks * slack_m_, world);
-  float least = reach_m_ * reach_m_, least_of_lips = least;
-  Site nearest = kNoSite, nearest_of_lips = kNoSite;
-  const bool looks_at_all = paces_[site] == Pace::Looks;
-  for (auto i = first; i < end; ++i) {
-    if (list_.far_until[i] > passed) continue;
-    const auto& pair = list_.pairs[i];
-    if (!looks_at_all && paces_[pair.across] != Pace::Looks) continue;
-    const Vec3f way = position(pair.across, world) - p;
-    const float squared = length_squared(way);
-    if (squared > reach_m_ * reach_m_)
-      list_.far_until[i] = passed + 0.5f * (std::sqrt(squared) - reach_m_) - kRounding_m;
-    if (squared < least_of_lips && can_meet_lip(site, pair.across, world) &&
-        dot(normal(site, Sort::Wound, world), normal(pair.across, Sort::Wound, world)) <=
-            kStaysFacing) {
-      least_of_lips = squared;
-      nearest_of_lips = pair.across;
-    }
-    if (squared < least && can_meet_other(site, pair.across, is_moved, world)) {
-      least = squared;
-      nearest = pair.across;
+bool SelfContactFinder::begins(Site site, const Nearest& nearest, const world::World& world,
+                               ClosestPoint& closest, Touch& touch) {
+  return (nearest.of_lips != kNoSite &&
+          begins(site, nearest.of_lips, nearest.squared_of_lips, true, world, closest, touch)) ||
+         (nearest.other != kNoSite &&
+          begins(site, nearest.other, nearest.squared_other, false, world, closest, touch));
+}
+
+float SelfContactFinder::squared_distance(std::size_t listed, const world::World& world) {
+  const auto& pair = list_.pairs[listed];
+  const float squared = length_squared(position(pair.across, world) - position(pair.node, world));
+  if (squared > reach_now_m_ * reach_now_m_)
+    list_.far_until[listed] = passed_m_ + 0.5f * (std::sqrt(squared) - reach_m_) - kRounding_m;
+  return squared;
+}
+
+SelfContactFinder::Nearest SelfContactFinder::nothing_near() const {
+  const float squared = reach_now_m_ * reach_now_m_;
+  return {kNoSite, kNoSite, squared, squared};
+}
+
+// Those across are considered in ascending order: of equals the first is the nearest.
+void SelfContactFinder::consider(Site site, Site across, float squared, const world::World& world,
+                                 Nearest& nearest) {
+  if (squared < nearest.squared_of_lips && can_meet_lip(site, across, world) &&
+      dot(normal(site, Sort::Wound, world), normal(across, Sort::Wound, world)) <= kStaysFacing) {
+    nearest.squared_of_lips = squared;
+    nearest.of_lips = across;
+  }
+  if (squared < nearest.squared_other &&
+      can_meet_other(site, across, has_moved(site, kMovedSlacks * slack_m_, world), world)) {
+    nearest.squared_other = squared;
+    nearest.other = across;
+  }
+}
+
+// Nodes that look stir those that they are listed with. Who waits and has no pair meets nobody but
+// them, so that its nearest are found here, without a search through all with whom it is listed.
+void SelfContactFinder::stir(const world::World& world) {
+  const auto& runs = list_.runs;
+  for (std::size_t r = 0; r < runs.size(); ++r) {
+    const Site site = runs[r].node;
+    if (paces_[site] != Pace::Looks) continue;
+    for (auto i = std::size_t{runs[r].first}; i < end_of_run(r); ++i) {
+      if (is_far(i)) continue;
+      const Site across = list_.pairs[i].across;
+      if (std::exchange(stirred_stamp_[across], tick_current_) != tick_current_)
+        stirred_nearest_[across] = nothing_near();
+      if (paces_[across] == Pace::Looks || has_pair_[across] == 1) continue;
+      consider(across, site, squared_distance(i, world), world, stirred_nearest_[across]);
     }
   }
-  return (nearest_of_lips != kNoSite &&
-          begins(site, nearest_of_lips, least_of_lips, true, world, closest, touch)) ||
-         (nearest != kNoSite && begins(site, nearest, least, false, world, closest, touch));
+}
+
+SelfContactFinder::Nearest SelfContactFinder::find_nearest(Site site, std::size_t first,
+                                                           std::size_t end,
+                                                           const world::World& world) {
+  auto nearest = nothing_near();
+  const bool looks_at_all = paces_[site] == Pace::Looks;
+  for (auto i = first; i < end; ++i) {
+    const Site across = list_.pairs[i].across;
+    if (is_far(i) || (!looks_at_all && paces_[across] != Pace::Looks)) continue;
+    consider(site, across, squared_distance(i, world), world, nearest);
+  }
+  return nearest;
 }
 
 // Returns the corners of a triangle around which the search for a nearer point goes on from its
@@ -325,10 +356,12 @@ bool SelfContactFinder::stays(Site site, TriangleIndex triangle, const world::Wo
 void SelfContactFinder::find_pace(const world::World& world, std::span<const NodeIndex> paired) {
   using world::NodeClass;
   is_any_awake_ = false;
+  fastest_squared_ = 0;
   auto pair = paired.begin();
   for (const Site s : surface_.sites()) {
     const bool has_pair = pair != paired.end() && pair->value == s;
     if (has_pair) ++pair;
+    has_pair_[s] = has_pair ? 1 : 0;
     const auto node_class = world.node_classes[s];
     const float squared = length_squared(world.velocities[s]);
     const bool is_asleep =
@@ -339,6 +372,7 @@ void SelfContactFinder::find_pace(const world::World& world, std::span<const Nod
         may_be_fresh || is_turn(phases_[s], ticks_within(kLookDrift_m, squared), world);
     paces_[s] = is_asleep ? Pace::Asleep : looks ? Pace::Looks : Pace::Waits;
     is_any_awake_ |= !is_asleep;
+    fastest_squared_ = std::max(fastest_squared_, squared);
   }
 }
 
@@ -447,12 +481,12 @@ void SelfContactFinder::find(const world::World& world, SelfContactTable& pairs,
     std::ranges::fill(stirred_stamp_, 0u);
     tick_current_ = 1;
   }
-  for (std::size_t r = 0; r < runs.size(); ++r) {
-    if (paces_[runs[r].node] != Pace::Looks) continue;
-    const auto passed = static_cast<float>(travel_ - list_.travel);
-    for (auto i = std::size_t{runs[r].first}; i < end_of_run(r); ++i)
-      if (list_.far_until[i] <= passed) stirred_stamp_[list_.pairs[i].across] = tick_current_;
-  }
+  // No two nodes approach faster than twice the fastest moves.
+  reach_now_m_ = std::min(
+      reach_m_, corner_reach_m_ + margin_of(2.001f * std::sqrt(fastest_squared_)) + kRounding_m);
+  passed_m_ = static_cast<float>(travel_ - list_.travel);
+  far_limit_m_ = passed_m_ - 0.5f * (reach_m_ - reach_now_m_);
+  stir(world);
   std::swap(old_pairs_, pairs);
   pairs.clear();
   // Nodes with a pair and nodes with something listed, together ascending.
@@ -473,14 +507,18 @@ void SelfContactFinder::find(const world::World& world, SelfContactTable& pairs,
         continue;
       }
     }
-    const bool looks = stirred_stamp_[site] == tick_current_ || paces_[site] == Pace::Looks;
+    const bool is_stirred = stirred_stamp_[site] == tick_current_;
     ClosestPoint closest;
     Touch touch;
     if (is_old && stays(site, old_pairs_.triangles()[i], world, closest, touch))
       touch.shift = eased_shift(site, old_pairs_.triangles()[i], old_pairs_.places()[i], closest,
                                 touch, world);
-    else if (!is_listed || !looks ||
-             !meets(site, runs[r].first, end_of_run(r), world, closest, touch))
+    else if (!is_listed || !(is_stirred || paces_[site] == Pace::Looks) ||
+             !begins(site,
+                     is_stirred && !is_old && paces_[site] != Pace::Looks
+                         ? stirred_nearest_[site]
+                         : find_nearest(site, runs[r].first, end_of_run(r), world),
+                     world, closest, touch))
       continue;
     ++pairs_looked_at_;
     add_pair(site, closest.triangle, {closest.weights, touch.normal, touch.shift}, world, pairs,

@@ -32,7 +32,7 @@
 //
 // Work: pairs of nodes that can come near are listed with slack, and again for those nodes that
 // have moved a part of it: O(surface nodes + these x their surroundings), over several ticks. Every
-// tick: O(pairs of nodes listed), nothing where nothing is near.
+// tick: O(pairs with nodes that look), nothing where nothing is near.
 // An edit adds the pairs around it to the list, and to the one that is being made: O(what is within
 // reach of it), and a look at each surface node's place.
 // Pairs are a function of the state: results do not depend on when lists were made.
@@ -162,13 +162,21 @@ class SelfContactFinder {
     float facing = 0, closing = 0;  // cosine of both normals; m/s
   };
 
+  // The nodes across from one that are nearest to it so far: on the other side of its wound, and
+  // elsewhere.
+  struct Nearest {
+    Site of_lips = 0, other = 0;  // kNoSite: none
+    float squared_of_lips = 0, squared_other = 0;
+  };
+
   // A list holds the pairs of nodes that can come near, and the travel at which it was begun. Each
   // node has a reference position, see begin_list(), and a flag that says whether this is away from
   // the node's rest position.
   struct List {
-    std::vector<NodePair> pairs;   // ascending
-    std::vector<Run> runs;         // of pairs, per node that has some; ascending
-    std::vector<float> far_until;  // per pair: beyond reach_m_ before so much more travel, m
+    std::vector<NodePair> pairs;  // ascending
+    std::vector<Run> runs;        // of pairs, per node that has some; ascending
+    // Per pair: it is beyond reach_m_ before so much travel, m, from when the list was begun.
+    std::vector<float> far_until;
     double travel = 0;
     float least_distance = 1;  // m, of a pair, when it began
     std::vector<Vec3f> references;
@@ -220,12 +228,20 @@ class SelfContactFinder {
   bool can_meet_other(Site site, Site across, bool is_moved, const world::World& world);
   bool begins(Site site, Site nearest, float squared, bool is_of_lips, const world::World& world,
               ClosestPoint& closest, Touch& touch);
+  bool begins(Site site, const Nearest& nearest, const world::World& world, ClosestPoint& closest,
+              Touch& touch);
   std::size_t end_of_run(std::size_t run) const {
     return run + 1 < list_.runs.size() ? list_.runs[run + 1].first : list_.pairs.size();
   }
+  // Returns whether no pair can begin between these two in this tick.
+  bool is_far(std::size_t listed) const { return list_.far_until[listed] > far_limit_m_; }
+  // Returns the squared distance, m2, of two that are listed, and remembers it if it is large.
+  float squared_distance(std::size_t listed, const world::World& world);
+  Nearest nothing_near() const;
+  void consider(Site site, Site across, float squared, const world::World& world, Nearest& nearest);
+  void stir(const world::World& world);
   // Searches list_.pairs from `first` to `end`.
-  bool meets(Site site, std::size_t first, std::size_t end, const world::World& world,
-             ClosestPoint& closest, Touch& touch);
+  Nearest find_nearest(Site site, std::size_t first, std::size_t end, const world::World& world);
   bool stays(Site site, TriangleIndex triangle, const world::World& world, ClosestPoint& closest,
              Touch& touch);
   void find_pace(const world::World& world, std::span<const NodeIndex> paired);
@@ -268,11 +284,18 @@ class SelfContactFinder {
   std::vector<Site> grid_sites_;      // what it numbers
 
   // Scratch.
-  std::vector<Pace> paces_;                // per node, of this tick; for surface nodes
-  bool is_any_awake_ = true;               // of these
+  std::vector<Pace> paces_;    // per node, of this tick; for surface nodes
+  bool is_any_awake_ = true;   // of these
+  float fastest_squared_ = 0;  // of these, m2/s2
+  // Pairs begin within reach_now_m_ in this tick; of a listed pair with a larger far_until than
+  // far_limit_m_ the nodes are farther apart.
+  float reach_now_m_ = 0, passed_m_ = 0, far_limit_m_ = 0;
   std::vector<std::uint32_t> near_stamp_;  // per node
-  // Per node: in this tick a node that looks is listed with it.
+  // Per node: in this tick a node that looks is listed with it. If it waits and has no pair, these
+  // are the nearest of those that look.
   std::vector<std::uint32_t> stirred_stamp_;
+  std::vector<Nearest> stirred_nearest_;
+  std::vector<std::uint8_t> has_pair_;  // per node; before the tick
   std::uint32_t near_current_ = 0;
   // These normals are of this tick where their stamp is tick_current_. normals_ has one per node
   // and sort; ups_ has one per triangle, as long as twice its area.

@@ -19,6 +19,8 @@ constexpr std::size_t kReservedPairs = 1u << 15;
 constexpr float kSlackEdges = 1, kMaxSlack_m = 0.006f;
 // The nearest corner of a triangle is this far from any point on it at most, in longest edges.
 constexpr float kCornerReach = 0.6f;
+// Of a pair whose distance nobody knows: no travel is less.
+constexpr float kMayBeNear_m = -1;
 // Nodes in a cube of this width look for pairs in the same ticks.
 constexpr float kPhaseCube_m = 0.03f;
 
@@ -71,6 +73,8 @@ void SelfContactFinder::extend() {
   is_due_.resize(count);
   near_stamp_.resize(count);
   stirred_stamp_.resize(count);
+  stirred_nearest_.resize(count);
+  has_pair_.resize(count);
   paces_.resize(count);
   normals_.resize(2 * count);
   normal_stamp_.resize(2 * count);
@@ -124,7 +128,8 @@ void SelfContactFinder::relocated(std::span<const NodeIndex> nodes, const world:
   std::ranges::sort(relocated_);
   const auto is_one = [&](Site s) { return std::ranges::binary_search(relocated_, s); };
   for (std::size_t i = 0; i < list_.pairs.size(); ++i)
-    if (is_one(list_.pairs[i].node) || is_one(list_.pairs[i].across)) list_.far_until[i] = 0;
+    if (is_one(list_.pairs[i].node) || is_one(list_.pairs[i].across))
+      list_.far_until[i] = kMayBeNear_m;
   list_pairs_of(relocated_, list_);
   add_to_list(found_, list_);
   list_.least_distance = 0;
@@ -181,7 +186,7 @@ void SelfContactFinder::add_to_list(std::vector<NodePair>& found, List& list) {
     const auto place = old + fresh - 1;
     const bool is_old = old > 0 && found[fresh - 1] < pairs[old - 1];
     pairs[place] = is_old ? pairs[old - 1] : found[fresh - 1];
-    list.far_until[place] = is_old ? list.far_until[old - 1] : 0;
+    list.far_until[place] = is_old ? list.far_until[old - 1] : kMayBeNear_m;
     --(is_old ? old : fresh);
   }
   list.runs.clear();
@@ -244,7 +249,7 @@ void SelfContactFinder::keep_pairs() {
   for (const auto& pair : list_.pairs) {
     if (is_due_[pair.node] == 1 || is_due_[pair.across] == 1) continue;
     next_list_.pairs.push_back(pair);
-    next_list_.far_until.push_back(0);
+    next_list_.far_until.push_back(kMayBeNear_m);
     least_squared =
         std::min(least_squared, length_squared(references[pair.node] - references[pair.across]));
   }
