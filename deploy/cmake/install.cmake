@@ -45,6 +45,9 @@ endforeach()
 add_custom_target(manuals DEPENDS ${manuals})
 
 install(FILES "${files}/trocar@.service" DESTINATION lib/systemd/system COMPONENT server)
+install(FILES "${files}/trocar-hall.service" DESTINATION lib/systemd/system COMPONENT server)
+install(FILES "${PROJECT_SOURCE_DIR}/deploy/trocar-hall.toml.example"
+  DESTINATION "${doc}/trocar-server/examples" RENAME trocar-hall.toml COMPONENT server)
 install(FILES "${PROJECT_SOURCE_DIR}/deploy/trocar-server.toml.example"
   DESTINATION "${doc}/trocar-server/examples" RENAME trocar-server.toml COMPONENT server)
 install(DIRECTORY "${PROJECT_SOURCE_DIR}/deploy/monitoring" DESTINATION "${doc}/trocar-server/examples" COMPONENT server)

@@ -20,12 +20,14 @@ trocar_stage_median_seconds{stage="hash"} 0.00001
 trocar_people{role="surgeon"} 2
 trocar_people{role="observer"} 1
 trocar_people_away 1
+trocar_claims 4
 )";
 
 TEST(FiguresText, ReadsTheFiguresOfAServer) {
   const auto figures = read_figures(kText);
   EXPECT_EQ(figures.ticks, 12345u);
   EXPECT_EQ(figures.people, 3) << "who is away is counted once";
+  EXPECT_EQ(figures.claims, 4);
   EXPECT_DOUBLE_EQ(figures.time_rate, 0.98);
   EXPECT_DOUBLE_EQ(figures.tick_median_s, 0.0004);
   EXPECT_DOUBLE_EQ(figures.tick_p99_s, 0.0007);

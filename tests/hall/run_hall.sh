@@ -63,6 +63,11 @@ start_hall() {
   done
   at=127.0.0.1:$(cat ready)
 }
+needs_client() {
+  [ -x "$bin/trocar-client" ] && return
+  echo "hall: SKIPPED in part: trocar-client is not built"
+  exit 77
+}
 # Asks until the words are there.
 wait_for() { # SECONDS WORDS COMMAND...
   local seconds=$1 words=$2
@@ -147,7 +152,17 @@ test_room() {
   wait_for 60 '"peak_cores": [0-9.]*[1-9]' curl -s "http://$at/sessions/lattice-1"
   "$bin/trocar-hall" end lattice-1 --at "$at" --key hall.key >ended || fail "no end"
   "$bin/trocar-hall" start half --at "$at" --key hall.key >started || fail "there is room now"
-  grep -q '"lattice"' hall-state/sessions.json || fail "what it took is not kept"
+  grep -q '"measured_cores": {}' hall-state/sessions.json || fail "an idle session tells of its kind"
+  "$bin/trocar-hall" end half-1 --at "$at" --key hall.key >ended || fail "no end"
+  needs_client
+  "$bin/trocar-hall" start lattice --at "$at" --key hall.key >started || fail "no start"
+  "$bin/trocar-client" --no-render --name Ada --role surgeon --server "$(field lattice-1 address)" \
+    --join "$(sed -n 's/^ *surgeon *\([^ ]*\) .*/\1/p' started)" --script "$root/deploy/scenes/press.toml" \
+    --seconds 60 >client.log 2>&1 &
+  children+=($!)
+  wait_for 60 '"busy_windows": 3' cat hall-state/sessions.json
+  "$bin/trocar-hall" end lattice-1 --at "$at" --key hall.key >ended || fail "no end"
+  grep -qE '"lattice": 0*\.?[0-9]*[1-9]' hall-state/sessions.json || fail "what a busy one took is not kept"
 }
 
 # Kills the server of the only session.
@@ -202,10 +217,7 @@ test_killed() {
   "$bin/trocar-journal" verify session-2.mcap >"$out/verified" || [ $? = 6 ] || fail "$(cat "$out/verified")"
   cd "$out"
   "$bin/trocar-hall" end rings-1 --at "$at" --key hall.key >ended || fail "it cannot be forgotten"
-  [ -x "$bin/trocar-client" ] || {
-    echo "hall: SKIPPED in part: trocar-client is not built"
-    exit 77
-  }
+  needs_client
 }
 
 test_found() {

@@ -30,6 +30,7 @@ HallState some_state() {
   session.since_unix_s = 1'700'000'000;
   session.codes = {{"surgeon", "7K3M-9QXZ-4T2B-WN8C"}};
   session.peak_cores = 0.75;
+  session.busy_windows = 4;
   return {.sessions = {session}, .measured_cores = {{"liver", 0.5}}};
 }
 

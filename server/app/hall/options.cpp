@@ -54,7 +54,7 @@ Status parse_at(HallOptions& options) {
 
 Result<std::optional<HallOptions>> parse_hall_command_line(int argc, char** argv) {
   HallOptions options;
-  CLI::App app{"Starts, lists and ends sessions on one machine.", "trocar-hall"};
+  CLI::App app{"Holds many sessions on one machine: it starts and ends them on request.", "trocar-hall"};
   app.footer(kHallExamples);
   app.set_version_flag("--version", std::string("trocar-hall ") + kVersion);
   auto* config = app.add_option("--config", options.config_file,

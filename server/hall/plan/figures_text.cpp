@@ -28,6 +28,8 @@ void take(std::string_view name, double value, ServerFigures& figures) {
     figures.ticks = static_cast<std::uint64_t>(std::min(value, kMostTicks));
   else if (name == "trocar_people")
     figures.people += static_cast<int>(std::min(value, kMostPeople));
+  else if (name == "trocar_claims")
+    figures.claims = static_cast<int>(std::min(value, kMostPeople));
   else if (name == "trocar_time_rate")
     figures.time_rate = value;
   else if (name == "trocar_tick_median_seconds")

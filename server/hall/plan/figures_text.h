@@ -10,6 +10,7 @@ namespace trocar::hall {
 struct ServerFigures {
   std::uint64_t ticks = 0;
   int people = 0;
+  int claims = 0;        // tools that act on tissue
   double time_rate = 0;  // simulated over real time
   double tick_median_s = 0, tick_p99_s = 0;
   double slowest_stage_s = 0;  // median

@@ -99,6 +99,7 @@ Json describe(const Session& session, const HallConfig& config, bool is_trusted)
   json["ticks"] = session.figures.ticks;
   json["tick_median_s"] = session.figures.tick_median_s;
   json["tick_p99_s"] = session.figures.tick_p99_s;
+  json["slowest_stage_s"] = session.figures.slowest_stage_s;
   json["cores"] = session.cores;
   json["peak_cores"] = session.peak_cores;
   json["restarts"] = session.restarts;

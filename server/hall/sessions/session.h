@@ -39,6 +39,7 @@ struct SavedSession {
   std::map<std::string, std::string> codes;  // join codes by role
   bool is_ending = false;
   double peak_cores = 0;  // 0: not measured yet
+  int busy_windows = 0;   // over which processor time was measured while tools acted
 };
 
 struct Session : SavedSession {
@@ -50,7 +51,8 @@ struct Session : SavedSession {
   double probe_at_s = 0, restart_at_s = 0, kill_at_s = 0, running_since_s = 0;
   // The window over which processor time is measured; begins at 0: there is none.
   double window_from_s = 0, window_processor_s = 0;
-  double cores = 0;  // in the last window
+  bool has_acted = false;  // a tool, in this window
+  double cores = 0;        // in the last window
 };
 
 // Files in the session's folder.

@@ -28,9 +28,11 @@ namespace fs = std::filesystem;
 
 constexpr std::chrono::milliseconds kLookPeriod{250};
 constexpr double kProbePeriod_s = 0.5;
-constexpr double kKillAfter_s = 60;     // of a server that was told to end
-constexpr double kSettled_s = 3;        // after the start, before anything is measured
-constexpr double kWindow_s = 5;         // over which processor time is measured
+constexpr double kKillAfter_s = 60;  // of a server that was told to end
+constexpr double kSettled_s = 3;     // after the start, before anything is measured
+constexpr double kWindow_s = 5;      // over which processor time is measured
+// An idle session tells little of its kind: so many windows with tools at work are needed.
+constexpr int kLeastBusyWindows = 3;
 constexpr double kPeakStep = 0.05;      // cores; a smaller growth is not written down
 constexpr double kForgetting = 0.8;     // a kind of session that takes less now is believed slowly
 constexpr std::size_t kLogTail = 4096;  // bytes
@@ -371,7 +373,7 @@ void Sessions::fail(Session& session, const std::string& why) {
 void Sessions::finish(Session& session) {
   session.state = SessionState::Ended;
   session.server.reset();
-  if (session.peak_cores > 0) {
+  if (session.busy_windows >= kLeastBusyWindows) {
     auto& measured = measured_cores_[session.offer.name];
     measured = std::max(session.peak_cores, kForgetting * measured);
   }
@@ -409,19 +411,21 @@ void Sessions::measure(Session& session) {
   const auto processor_s = session.server->processor_seconds();
   const double at_s = now_s();
   if (!processor_s || at_s - session.running_since_s < kSettled_s) return;
+  session.has_acted |= session.figures.claims > 0;
   const double span_s = at_s - session.window_from_s;
   if (session.window_from_s > 0 && span_s < kWindow_s) return;
   if (session.window_from_s > 0) {
     const auto& figures = session.figures;
     session.cores = measured_cores(*processor_s - session.window_processor_s, span_s,
                                    figures.is_paused ? 0 : figures.tick_median_s);
-    if (session.cores > session.peak_cores + kPeakStep) {
-      session.peak_cores = session.cores;
-      save();
-    }
+    const bool is_new = session.peak_cores == 0 || session.cores > session.peak_cores + kPeakStep;
+    session.busy_windows += session.has_acted;
+    session.peak_cores = std::max(session.peak_cores, session.cores);
+    if (is_new || session.has_acted) save();
   }
   session.window_from_s = at_s;
   session.window_processor_s = *processor_s;
+  session.has_acted = false;
 }
 
 void Sessions::save() {

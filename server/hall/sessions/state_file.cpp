@@ -34,7 +34,8 @@ Json to_json(const SavedSession& session) {
           {"since_unix_s", session.since_unix_s},
           {"codes", session.codes},
           {"is_ending", session.is_ending},
-          {"peak_cores", session.peak_cores}};
+          {"peak_cores", session.peak_cores},
+          {"busy_windows", session.busy_windows}};
 }
 
 // Throws what nlohmann::json and whole_number() throw.
@@ -59,6 +60,7 @@ SavedSession session_in(const Json& json) {
   session.codes = json.at("codes").get<std::map<std::string, std::string>>();
   session.is_ending = json.at("is_ending").get<bool>();
   session.peak_cores = json.at("peak_cores").get<double>();
+  session.busy_windows = whole_number<int>(json, "busy_windows");
   if (!is_name(session.name)) throw std::out_of_range("name is no name");
   return session;
 }
