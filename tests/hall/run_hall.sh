@@ -52,9 +52,9 @@ lattice='[[offer]]
 name = "lattice"
 organ = "lattice"
 cores = 0.4'
-start_hall() {
+start_hall() { # OPTION...
   rm -f ready
-  "$bin/trocar-hall" --config hall.toml --ready-file ready 2>>hall.log &
+  "$bin/trocar-hall" --config hall.toml --ready-file ready "$@" 2>>hall.log &
   hall=$!
   for _ in $(seq 200); do
     [ -s ready ] && break
@@ -88,7 +88,7 @@ test_sessions() {
   configure 'cores = 100' "$lattice" '[[offer]]' 'name = "rings"' 'lesson = "move-the-rings"'
   "$bin/trocar-hall" --config hall.toml --check-config | grep -q fine || fail "the file is not fine"
   [ ! -e hall-state ] || fail "a check has made something"
-  start_hall
+  start_hall --log-format json
   [ "$(stat -c %a hall.key)" = 600 ] || fail "others may read the key"
   [ "$(curl -s "http://$at/healthz")" = ok ] || fail "it is not healthy"
   "$bin/trocar-hall" start rings --name group-a --at "$at" --key hall.key >started || fail "no start"
@@ -134,6 +134,10 @@ test_sessions() {
   kill -TERM $hall
   wait $hall || fail "the hall ended with $?"
   hall=
+  grep -v '^{"time":"[^"]*Z","program":"trocar-hall","level":"[a-z]*","message":".*"}$' hall.log &&
+    fail "lines of the log that are no objects"
+  grep -q '^{"time":.*"program":"trocar-server".*at 127.0.0.1' recordings/*group-a/server.log ||
+    fail "the log of a server is not of objects"
   for recording in recordings/*lattice*/session.mcap; do
     "$bin/trocar-journal" verify "$recording" >verified || fail "$(cat verified)"
   done

@@ -11,6 +11,7 @@
 #include <functional>
 
 #include "common/base/cpu.h"
+#include "common/base/json_log.h"
 #include "common/base/log.h"
 #include "common/base/text_file.h"
 #include "server/app/hall/hall_commands.h"
@@ -101,6 +102,7 @@ int run(int argc, char** argv) {
   if (const auto set = log::configure(kProgram, options.checks_config ? "off" : options.log_level);
       !set)
     return report(kProgram, set.error());
+  log::use_format(options.log_format);
   if (options.checks_config) return check_config(options);
   const auto ran =
       options.command == HallCommand::Serve ? run_hall(options) : run_hall_command(options);

@@ -77,6 +77,7 @@ Result<HallStart> prepare_hall(const HallOptions& options) {
   auto config = read_config(options);
   if (!config) return config.error();
   start.config = std::move(*config);
+  start.config.log_format = options.log_format;
   if (const auto there = check_program(); !there) return there.error();
   start.server_program = server_program();
   auto key = read_or_make_hall_key(start.config.key_file);

@@ -54,7 +54,8 @@ Status parse_at(HallOptions& options) {
 
 Result<std::optional<HallOptions>> parse_hall_command_line(int argc, char** argv) {
   HallOptions options;
-  CLI::App app{"Holds many sessions on one machine: it starts and ends them on request.", "trocar-hall"};
+  CLI::App app{"Holds many sessions on one machine: it starts and ends them on request.",
+               "trocar-hall"};
   app.footer(kHallExamples);
   app.set_version_flag("--version", std::string("trocar-hall ") + kVersion);
   auto* config = app.add_option("--config", options.config_file,
@@ -68,6 +69,11 @@ Result<std::optional<HallOptions>> parse_hall_command_line(int argc, char** argv
   app.add_option("--log-level", options.log_level, "error, warn, info, debug or off")
       ->check(CLI::IsMember({"error", "warn", "info", "debug", "off"}))
       ->type_name("LEVEL")
+      ->capture_default_str();
+  app.add_option("--log-format", options.log_format,
+                 "how it is said: text, or json: an object per line")
+      ->check(CLI::IsMember({"text", "json"}))
+      ->type_name("FORMAT")
       ->capture_default_str();
   app.require_subcommand(0, 1);
   auto* list = app.add_subcommand("list", "says which sessions run");

@@ -15,7 +15,7 @@ enum class HallCommand : std::uint8_t { Serve, List, Start, End };
 struct HallOptions {
   HallCommand command = HallCommand::Serve;
   // These belong to a hall itself.
-  std::string config_file, ready_file, log_level = "info";
+  std::string config_file, ready_file, log_level = "info", log_format = "text";
   bool checks_config = false;
   // These belong to a command.
   std::string at = "127.0.0.1:7694", host;

@@ -3,6 +3,7 @@
 #include <cstdio>
 
 #include "common/base/cpu.h"
+#include "common/base/json_log.h"
 #include "common/base/log.h"
 #include "server/app/server/check_start.h"
 #include "server/app/server/options.h"
@@ -31,6 +32,7 @@ int main(int argc, char** argv) {
   const auto level = options.checks_config ? std::string("off") : options.log_level;
   if (const auto set = trocar::log::configure(kProgram, level); !set)
     return trocar::report(kProgram, set.error());
+  trocar::log::use_format(options.log_format);
   if (options.checks_config) return check_config(options);
   if (const auto run = trocar::app::run_server(options); !run)
     return trocar::report(kProgram,

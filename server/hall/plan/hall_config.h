@@ -47,6 +47,7 @@ struct HallConfig {
   int restarts = 3;  // of one session
   double code_hours = 12;
   std::vector<Offer> offers;
+  std::string log_format = "text";  // of its servers; the command line says it
 
   const Offer* find_offer(const std::string& name) const;  // null: there is none
   std::string list_offers() const;                         // "liver, find-the-lump"

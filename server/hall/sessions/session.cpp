@@ -71,7 +71,8 @@ std::vector<std::string> server_arguments(const SavedSession& session, const Hal
                                      "--state",      server_state(config).string(),
                                      "--announce",   session.name,
                                      "--code-hours", fmt::format("{}", config.code_hours),
-                                     "--workers",    std::to_string(session.offer.workers)};
+                                     "--workers",    std::to_string(session.offer.workers),
+                                     "--log-format", config.log_format};
   const auto add = [&arguments](const char* option, const std::string& value) {
     arguments.insert(arguments.end(), {option, value});
   };

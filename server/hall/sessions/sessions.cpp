@@ -58,7 +58,15 @@ bool is_free(const std::string& address, std::uint16_t port) {
   return !error;
 }
 
-// The last line that a server has said, without its time.
+// The message of a line of a log, which is text or JSON.
+std::string message_of(const std::string& line) {
+  const auto json = Json::parse(line, nullptr, false);
+  if (!json.is_object()) return line;
+  const auto message = json.find("message");
+  return message != json.end() && message->is_string() ? message->get<std::string>() : line;
+}
+
+// The last line that a server has said.
 std::string last_words(const fs::path& log) {
   std::ifstream file(log, std::ios::binary | std::ios::ate);
   const auto size = static_cast<std::streamoff>(file.tellg());
@@ -67,7 +75,7 @@ std::string last_words(const fs::path& log) {
   std::string last = "it has said nothing";
   for (std::string line; std::getline(file, line);)
     if (!line.empty()) last = line;
-  return printable(last, kMostFailureText);
+  return printable(message_of(last), kMostFailureText);
 }
 
 bool has_content(const fs::path& file) {
