@@ -131,6 +131,10 @@ test_sessions() {
   code=0
   "$bin/trocar-hall" end group-a --at "$at" --key hall.key 2>said || code=$?
   [ $code = 4 ] || fail "a second end: $code, $(cat said)"
+  [ "$(stat -c %a hall-state/audit.jsonl)" = 600 ] || fail "others may read the audit log"
+  grep -q '"event":"start","name":"group-a","role":"","address":"127.0.0.1"' hall-state/audit.jsonl &&
+    grep -q '"event":"end","name":"group-a"' hall-state/audit.jsonl &&
+    grep -q '"reason":"the key is wrong"' hall-state/audit.jsonl || fail "audit: $(cat hall-state/audit.jsonl)"
   kill -TERM $hall
   wait $hall || fail "the hall ended with $?"
   hall=

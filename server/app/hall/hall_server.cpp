@@ -19,6 +19,7 @@
 #include "common/base/no_throw.h"
 #include "common/base/printable.h"
 #include "common/secure/digest.h"
+#include "server/session/access/audit_log.h"
 #include "server/session/monitoring/exposition.h"
 
 namespace trocar::app {
@@ -101,12 +102,13 @@ struct HallServer::Core : std::enable_shared_from_this<HallServer::Core> {
   asio::io_context& context;
   hall::Sessions& sessions;
   const secure::Digest key;
+  access::AuditLog audit;
   tcp::acceptor acceptor;
   std::size_t open = 0;
   bool is_stopping = false;
 
-  Core(asio::io_context& io, hall::Sessions& all, const std::string& secret)
-      : context(io), sessions(all), key(digest_of(secret)), acceptor(io) {}
+  Core(asio::io_context& io, hall::Sessions& all, const std::string& secret, access::AuditLog log)
+      : context(io), sessions(all), key(digest_of(secret)), audit(std::move(log)), acceptor(io) {}
 
   asio::awaitable<void> accept(std::shared_ptr<Core> self) {
     asio::steady_timer retry(context);
@@ -128,7 +130,15 @@ struct HallServer::Core : std::enable_shared_from_this<HallServer::Core> {
     }
   }
 
+  // `what`: start, end or refusal.
+  void note(const std::string& what, const std::string& name, const std::string& peer,
+            const std::string& reason = {}) {
+    audit.write({.event = what, .name = name, .role = "", .address = peer, .reason = reason});
+  }
+
   asio::awaitable<void> serve(beast::tcp_stream stream) {
+    beast::error_code unknown;
+    const auto peer = stream.socket().remote_endpoint(unknown).address().to_string();
     beast::flat_buffer buffer(kMostHeadBytes + hall::kMostRequestBytes);
     http::request_parser<http::string_body> parser;
     parser.header_limit(kMostHeadBytes);
@@ -141,7 +151,7 @@ struct HallServer::Core : std::enable_shared_from_this<HallServer::Core> {
     else if (failed)
       co_return;
     else
-      given = co_await answer_to(parser.get());
+      given = co_await answer_to(parser.get(), peer);
     Answer answer(given.status, parser.get().version());
     answer.keep_alive(false);
     answer.set(http::field::content_type, given.type);
@@ -167,9 +177,10 @@ struct HallServer::Core : std::enable_shared_from_this<HallServer::Core> {
     return is_key ? Trust::Full : Trust::Wrong;
   }
 
-  asio::awaitable<Reply> answer_to(const Request& request) {
+  asio::awaitable<Reply> answer_to(const Request& request, const std::string& peer) {
     const auto trust = trust_in(request);
     if (trust == Trust::Wrong) {
+      note("refusal", "", peer, "the key is wrong");
       asio::steady_timer delay(context, kWrongKeyDelay);
       co_await delay.async_wait(kNoThrow);
       co_return refusal(http::status::unauthorized, "the key is wrong: name the hall's file of it");
@@ -184,8 +195,8 @@ struct HallServer::Core : std::enable_shared_from_this<HallServer::Core> {
                         "there are GET and POST of /sessions, GET and DELETE of /sessions/NAME");
     if (trust != Trust::Full)
       co_return refusal(http::status::unauthorized, "this needs the hall's key");
-    if (is_start) co_return start(request.body());
-    co_return co_await end(path.substr(kOneSession.size()));
+    if (is_start) co_return start(request.body(), peer);
+    co_return co_await end(path.substr(kOneSession.size()), peer);
   }
 
   Reply get(const std::string& path, bool is_trusted) const {
@@ -210,18 +221,23 @@ struct HallServer::Core : std::enable_shared_from_this<HallServer::Core> {
                                                 ": ask for /sessions, /healthz or /metrics");
   }
 
-  Reply start(const std::string& body) {
+  Reply start(const std::string& body, const std::string& peer) {
     if (is_stopping) return refusal(http::status::service_unavailable, "the hall ends");
     const auto request = hall::parse_start_request(body);
     if (!request) return refusal(status_of(request.error()), request.error().message);
     const auto started = sessions.start(*request);
-    if (!started) return refusal(status_of(started.error()), started.error().message);
+    if (!started) {
+      note("refusal", request->name, peer, started.error().message);
+      return refusal(status_of(started.error()), started.error().message);
+    }
+    note("start", (*started)->name, peer);
     return reply(hall::describe(**started, sessions.config(), true), http::status::created);
   }
 
-  asio::awaitable<Reply> end(std::string name) {
+  asio::awaitable<Reply> end(std::string name, std::string peer) {
     const auto ended = sessions.end(name);
     if (!ended) co_return refusal(http::status::not_found, ended.error().message);
+    note("end", name, peer);
     const auto session = *ended;
     const auto deadline = std::chrono::steady_clock::now() + kEndDeadline;
     asio::steady_timer timer(context);
@@ -245,7 +261,9 @@ Result<std::unique_ptr<HallServer>> HallServer::listen(asio::io_context& context
     return Error{ErrorCode::Usage, "listen: '" + config.address +
                                        "' is not an IPv4 or IPv6 address: use 127.0.0.1 for this "
                                        "machine only"};
-  const auto core = std::make_shared<Core>(context, sessions, key);
+  auto audit = access::AuditLog::open(config.state_folder / "audit.jsonl");
+  if (!audit) return audit.error();
+  const auto core = std::make_shared<Core>(context, sessions, key, std::move(*audit));
   const tcp::endpoint endpoint(ip, config.port);
   auto& acceptor = core->acceptor;
   acceptor.open(endpoint.protocol(), error);

@@ -8,6 +8,7 @@
 //   409 DELETE /sessions/NAME  ends it; answers when its recording is closed GET /healthz, /metrics
 //   as those of trocar-server
 //
+// The hall's audit log says who has started and ended sessions, and who was refused.
 // What changes something needs "Authorization: Bearer KEY". Errors are {"error": "one line"}.
 //
 // Bounds: kMostConnections at a time, one request each, kMostHeadBytes and kMostRequestBytes of it
