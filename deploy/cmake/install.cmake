@@ -3,7 +3,7 @@
 # <prefix>/share/trocar/web. Files of /etc belong to the packages alone (deploy/cmake/package.cmake).
 include(GNUInstallDirs)
 set(TROCAR_COMPONENT_PROGRAMS
-  server:trocar-server client:trocar-client client:trocar-doctor web:trocar-web
+  server:trocar-server server:trocar-hall client:trocar-client client:trocar-doctor web:trocar-web
   tools:trocar-organ tools:trocar-sim tools:trocar-journal tools:trocar-impair)
 set(files "${PROJECT_SOURCE_DIR}/deploy/install")
 set(share "${CMAKE_INSTALL_DATADIR}")
@@ -45,6 +45,9 @@ endforeach()
 add_custom_target(manuals DEPENDS ${manuals})
 
 install(FILES "${files}/trocar@.service" DESTINATION lib/systemd/system COMPONENT server)
+install(FILES "${files}/trocar-hall.service" DESTINATION lib/systemd/system COMPONENT server)
+install(FILES "${PROJECT_SOURCE_DIR}/deploy/trocar-hall.toml.example"
+  DESTINATION "${doc}/trocar-server/examples" RENAME trocar-hall.toml COMPONENT server)
 install(FILES "${PROJECT_SOURCE_DIR}/deploy/trocar-server.toml.example"
   DESTINATION "${doc}/trocar-server/examples" RENAME trocar-server.toml COMPONENT server)
 install(DIRECTORY "${PROJECT_SOURCE_DIR}/deploy/monitoring" DESTINATION "${doc}/trocar-server/examples" COMPONENT server)

@@ -25,7 +25,7 @@ foreach(name IN LISTS packaged)
   install(FILES "${debian}/copyright" "${PROJECT_BINARY_DIR}/debian/changelog.Debian.gz"
     DESTINATION "share/doc/trocar-${name}" COMPONENT of_${name} EXCLUDE_FROM_ALL)
 endforeach()
-install(FILES "${files}/lesson.toml" DESTINATION /etc/trocar COMPONENT of_server EXCLUDE_FROM_ALL)
+install(FILES "${files}/lesson.toml" "${files}/hall.toml" DESTINATION /etc/trocar COMPONENT of_server EXCLUDE_FROM_ALL)
 install(FILES "${files}/web.toml" DESTINATION /etc/trocar COMPONENT of_web EXCLUDE_FROM_ALL)
 install(FILES "${files}/trocar-server.conf" DESTINATION lib/sysusers.d COMPONENT of_server EXCLUDE_FROM_ALL)
 install(FILES "${files}/trocar-web.conf" DESTINATION lib/sysusers.d COMPONENT of_web EXCLUDE_FROM_ALL)
@@ -61,7 +61,8 @@ set(processor "The programs need a processor with AVX2 (x86-64-v3).")
 set(CPACK_DEBIAN_SERVER_DESCRIPTION "surgery simulator: server of a session
 Trocar lets several people, each at a machine of their own, work on one
 organ that one server owns. This package has the server. It can run as a
-service of systemd, one for each session, and records what is done.
+service of systemd, one for each session, and records what is done. A
+hall starts sessions on request.
 ${processor}")
 set(CPACK_DEBIAN_CLIENT_DESCRIPTION "surgery simulator: window of a participant
 Trocar lets several people, each at a machine of their own, work on one

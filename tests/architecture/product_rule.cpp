@@ -14,6 +14,8 @@ constexpr std::array kProduct{"common/",
                               "server/app/config/",
                               "server/app/server/",
                               "server/app/web/",
+                              "server/hall/",
+                              "server/app/hall/",
                               "server/web/",
                               "server/app/journal/",
                               "server/app/impair/"};

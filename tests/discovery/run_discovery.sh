@@ -94,6 +94,16 @@ serve hidden --listen 0.0.0.0:0 --no-announce
 serve local --listen 127.0.0.1:0
 serve named --listen 0.0.0.0:0
 wait_for 15 grep -q 'announced on the local network as' "$folder/two.log"
+# A session of a hall is found like the others.
+printf '%s\n' 'listen = "127.0.0.1:0"' "key = '$folder/hall.key'" "recordings = '$folder/recordings'" \
+  "state = '$folder/hall'" 'sessions-listen = "0.0.0.0"' 'ports = [17750, 17759]' 'figures-ports = [17760, 17769]' \
+  '[[offer]]' 'name = "lattice"' 'organ = "lattice"' 'cores = 0.05' >"$folder/hall.toml"
+XDG_STATE_HOME=$folder/state XDG_RUNTIME_DIR=$folder "$bin/trocar-hall" --config "$folder/hall.toml" \
+  --ready-file "$folder/hall.port" >"$folder/hall.log" 2>&1 &
+pids+=($!)
+wait_for 30 test -s "$folder/hall.port" || { cat "$folder/hall.log"; exit 1; }
+"$bin/trocar-hall" start lattice --name ward-3 --at "127.0.0.1:$(cat "$folder/hall.port")" --key "$folder/hall.key" \
+  >"$folder/ward.out" 2>&1 || { cat "$folder/ward.out" "$folder/hall.log"; failed=1; }
 timeout 60 "$bin/trocar-client" --insecure-loopback --no-render --name Ada --seconds 12 \
   --server "127.0.0.1:$(cat "$folder/two.port")" >"$folder/ada.log" 2>&1 &
 pids+=($!)
@@ -105,6 +115,7 @@ row() { grep -E "$1" "$folder/list" >/dev/null || { echo "no row: $1"; cat "$fol
 row "^Lesson ONE +lattice +0 +yes +[0-9.]+:$(cat "$folder/one.port")\$"
 row "^Lesson ONE #2 +lattice +1 +no +[0-9.]+:$(cat "$folder/two.port")\$"
 row "^lattice at .* +lattice +0 +yes +[0-9.]+:$(cat "$folder/named.port")\$"
+row "^ward-3 +lattice +0 +yes +[0-9.]+:177[0-9]+\$"
 for name in hidden local; do
   grep -q ":$(cat "$folder/$name.port")\$" "$folder/list" && { echo "$name is announced"; failed=1; }
 done

@@ -92,7 +92,7 @@ check "a processor without AVX2 is refused" refuses_processor
 check "the packages and what they need" install_all
 [ $failures -eq 0 ] || fail 1 "the packages cannot be installed"
 check "each program starts" inside sh -c \
-  'for p in server client organ sim journal impair; do trocar-$p --version || exit 1; done'
+  'for p in server hall client organ sim journal impair; do trocar-$p --version || exit 1; done'
 check "completions are sound" inside bash -c \
   'for f in /usr/share/bash-completion/completions/trocar-*; do . $f; complete -p ${f##*/} || exit 1; done'
 check "each program has a page for man" inside sh -c \
@@ -138,7 +138,7 @@ check "units are sound" inside sh -c \
   'cp /lib/systemd/system/trocar*.service /packages && cd /packages && mv trocar@.service trocar@lesson.service &&
     systemd-analyze verify --man=no ./trocar*.service'
 check "the configurations are sound" inside sh -c \
-  'trocar-server --config /etc/trocar/lesson.toml --check-config && { ! [ -e /usr/bin/trocar-web ] || trocar-web --config /etc/trocar/web.toml --check-config; }'
+  'trocar-server --config /etc/trocar/lesson.toml --check-config && trocar-hall --config /etc/trocar/hall.toml --check-config && { ! [ -e /usr/bin/trocar-web ] || trocar-web --config /etc/trocar/web.toml --check-config; }'
 # What the unit does, as far as it goes without systemd: folders, user, command.
 session() { # SECONDS
   inside install -d -o trocar -g trocar -m 0750 /var/lib/trocar /var/lib/trocar/recordings

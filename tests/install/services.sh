@@ -81,6 +81,21 @@ killed() {
   kill -KILL "$before" && sleep 4 && systemctl is-active trocar@lesson &&
     [ "$(systemctl show -P MainPID trocar@lesson)" != "$before" ]
 }
+hall() { # COMMAND...
+  runuser -u trocar -- trocar-hall "$@" --key /var/lib/trocar/hall.key
+}
+hall_session() {
+  systemctl start trocar-hall && logs trocar-hall listening && hall start follow-the-point --name one | grep surgeon
+}
+hall_killed() {
+  local before
+  before=$(systemctl show -P MainPID trocar-hall)
+  kill -KILL "$before" && logs trocar-hall 'one: found again' && hall list | grep -q 'one  *running'
+}
+hall_stop() {
+  systemctl stop trocar-hall && [ "$(systemctl show -P Result trocar-hall)" = success ] &&
+    trocar-journal verify "$recordings"/*-one/session.mcap
+}
 removal() {
   systemctl enable trocar@lesson trocar-web && logs trocar@lesson 'at 127.0.0.1'
   apt-get remove -y 'trocar-*' && ! systemctl is-active trocar@lesson && ! systemctl is-active trocar-web &&
@@ -98,6 +113,10 @@ check "systemd finds trocar-web exposed below 2 of 10" hardened trocar-web
 check "an upgrade leaves a running session alone" upgrade
 check "a killed session starts again" killed
 check "a wrong configuration does not" wrong
+check "a hall starts a session as a service" hall_session
+check "a killed hall finds its session again" hall_killed
+check "a stopped hall closes the recording" hall_stop
+check "systemd finds trocar-hall exposed below 2 of 10" hardened trocar-hall
 check "a removal ends what runs, and keeps recordings" removal
 check "a purge under systemd" apt-get purge -y 'trocar-*'
 systemctl poweroff

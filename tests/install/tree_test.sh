@@ -12,15 +12,15 @@ cmake --install "$build" --prefix "$work/usr" --strip >"$work/log" 2>&1 || { tai
 if grep -v "^-- \(Installing: $work\|Install configuration\)" "$work/log"; then
   fault "these lie outside of the prefix, or are no files"
 fi
-programs=(server organ sim journal impair web)
+programs=(server hall organ sim journal impair web)
 if grep -q '^TROCAR_CLIENT:BOOL=ON' "$build/CMakeCache.txt"; then programs+=(client); fi
 for program in "${programs[@]}"; do
   "$work/usr/bin/trocar-$program" --version >/dev/null || fault "trocar-$program does not start"
 done
-for file in lib/systemd/system/trocar@.service lib/systemd/system/trocar-web.service \
+for file in lib/systemd/system/trocar@.service lib/systemd/system/trocar-hall.service lib/systemd/system/trocar-web.service \
   share/applications/trocar-join.desktop share/mime/packages/trocar.xml share/icons/hicolor/scalable/apps/trocar.svg \
   share/trocar/scenes/incise.toml share/doc/trocar/LICENSE share/doc/trocar/docs/install.md \
-  share/doc/trocar-server/examples/trocar-server.toml \
+  share/doc/trocar-server/examples/trocar-server.toml share/doc/trocar-server/examples/trocar-hall.toml \
   share/doc/trocar-server/examples/monitoring/alerts.yml share/doc/trocar-web/examples/trocar-web.toml; do
   [ -s "$work/usr/$file" ] || fault "$file is missing"
 done
@@ -32,6 +32,9 @@ cd "$work"
   fault "$(cat "$work/log")"
 "$work/usr/bin/trocar-server" --config "$work/usr/share/doc/trocar-server/examples/trocar-server.toml" --check-config \
   >"$work/log" 2>&1 || fault "$(cat "$work/log")"
+for file in "$root/deploy/install/hall.toml" "$work/usr/share/doc/trocar-server/examples/trocar-hall.toml"; do
+  XDG_STATE_HOME=$work "$work/usr/bin/trocar-hall" --config "$file" --check-config >"$work/log" 2>&1 || fault "$(cat "$work/log")"
+done
 if [ -e "$work/usr/share/trocar/web/index.html" ]; then
   "$work/usr/bin/trocar-web" --config "$root/deploy/install/web.toml" --check-config >"$work/log" 2>&1 ||
     fault "$(cat "$work/log")"
@@ -48,6 +51,7 @@ for program in "${programs[@]}"; do
   complete_words "trocar-$program" --he | grep -qx -- --help || fault "trocar-$program --he is not completed"
 done
 complete_words trocar-server --log-level d | grep -qx debug || fault "trocar-server --log-level d is not completed"
+complete_words trocar-hall st | grep -qx start || fault "trocar-hall st is not completed"
 complete_words trocar-journal ver | grep -qx verify || fault "trocar-journal ver is not completed"
 complete_words trocar-journal verify --js | grep -qx -- --json || fault "trocar-journal verify --js is not completed"
 

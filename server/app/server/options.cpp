@@ -321,6 +321,11 @@ void CommandLine::add_session_options() {
       ->check(CLI::IsMember({"error", "warn", "info", "debug", "off"}))
       ->type_name("LEVEL")
       ->capture_default_str();
+  app_.add_option("--log-format", options_.log_format,
+                  "how it is said: text, or json: an object per line")
+      ->check(CLI::IsMember({"text", "json"}))
+      ->type_name("FORMAT")
+      ->capture_default_str();
 }
 
 void CommandLine::add_config_options() {

@@ -41,7 +41,7 @@ struct ServerOptions {
   bool has_fixed_decisions = false;
   double budget_ms = 0.8;  // of a tick's millisecond for its work
   unsigned workers = 1;
-  std::string log_level = "info";
+  std::string log_level = "info", log_format = "text";
   std::string config_file;     // empty: none
   bool checks_config = false;  // instead of hosting a session
   OptionOrigins origins;

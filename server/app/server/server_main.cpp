@@ -3,6 +3,7 @@
 #include <cstdio>
 
 #include "common/base/cpu.h"
+#include "common/base/json_log.h"
 #include "common/base/log.h"
 #include "common/base/time_slice.h"
 #include "server/app/server/check_start.h"
@@ -32,6 +33,7 @@ int main(int argc, char** argv) {
   const auto level = options.checks_config ? std::string("off") : options.log_level;
   if (const auto set = trocar::log::configure(kProgram, level); !set)
     return trocar::report(kProgram, set.error());
+  trocar::log::use_format(options.log_format);
   if (options.checks_config) return check_config(options);
   trocar::ask_for_short_slices();  // and for all threads that are started from here on
   if (const auto run = trocar::app::run_server(options); !run)

@@ -104,6 +104,11 @@ CommandLine::CommandLine() {
       ->check(CLI::IsMember({"error", "warn", "info", "debug", "off"}))
       ->type_name("LEVEL")
       ->capture_default_str();
+  app_.add_option("--log-format", options_.log_format,
+                  "how it is said: text, or json: an object per line")
+      ->check(CLI::IsMember({"text", "json"}))
+      ->type_name("FORMAT")
+      ->capture_default_str();
   auto* config = app_.set_config("--config", "",
                                  "options from this file (TOML), each without its dashes; the "
                                  "command line wins")

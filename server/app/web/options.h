@@ -28,7 +28,7 @@ struct WebOptions {
   int check_limit_s = 3600;  // of one recording's check
   double seconds = 0;        // 0: until told to end
   std::string ready_file;
-  std::string log_level = "info";
+  std::string log_level = "info", log_format = "text";
   bool checks_config = false;
   std::string config_file;
   OptionOrigins origins;

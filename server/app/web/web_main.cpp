@@ -10,6 +10,7 @@
 #include <cstdio>
 
 #include "common/base/cpu.h"
+#include "common/base/json_log.h"
 #include "common/base/log.h"
 #include "common/base/text_file.h"
 #include "server/app/web/web_start.h"
@@ -81,6 +82,7 @@ int run(int argc, char** argv) {
   if (const auto set = log::configure(kProgram, options.checks_config ? "off" : options.log_level);
       !set)
     return report(kProgram, set.error());
+  log::use_format(options.log_format);
   if (options.checks_config) return check_config(options);
   if (const auto ran = run_web(options); !ran)
     return report(kProgram, {ran.error().code, options.origins.placed(ran.error().message)});

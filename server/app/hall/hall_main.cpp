@@ -1,0 +1,118 @@
+// trocar-hall: starts, lists and ends sessions on one machine.
+
+#include "common/base/asio.h"  // before Boost: see there
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/signal_set.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <functional>
+
+#include "common/base/cpu.h"
+#include "common/base/json_log.h"
+#include "common/base/log.h"
+#include "common/base/text_file.h"
+#include "server/app/hall/hall_commands.h"
+#include "server/app/hall/hall_server.h"
+#include "server/app/hall/hall_start.h"
+#include "server/hall/sessions/sessions.h"
+
+namespace trocar::app {
+namespace {
+
+constexpr const char* kProgram = "trocar-hall";
+constexpr std::chrono::milliseconds kEndPoll{100};
+
+// All sessions end in order; the hall ends when their recordings are closed.
+class Ending {
+ public:
+  Ending(asio::io_context& context, hall::Sessions& sessions, HallServer& server)
+      : context_(context), sessions_(sessions), server_(server), timer_(context) {}
+
+  void begin() {
+    server_.stop();
+    sessions_.end_all();
+    wait();
+  }
+
+ private:
+  void wait() {
+    if (sessions_.list().empty()) {
+      sessions_.stop();
+      return context_.stop();
+    }
+    timer_.expires_after(kEndPoll);
+    timer_.async_wait([this](boost::system::error_code error) {
+      if (!error) wait();
+    });
+  }
+
+  asio::io_context& context_;
+  hall::Sessions& sessions_;
+  HallServer& server_;
+  asio::steady_timer timer_;
+};
+
+Status run_hall(const HallOptions& options) {
+  auto start = prepare_hall(options);
+  if (!start) return start.error();
+  asio::io_context context{1};
+  auto sessions =
+      hall::Sessions::open(context, std::move(start->config), std::move(start->server_program));
+  if (!sessions) return sessions.error();
+  auto server = HallServer::listen(context, **sessions, start->key);
+  if (!server) return server.error();
+  Ending ending(context, **sessions, **server);
+  asio::signal_set signals(context, SIGINT, SIGTERM);
+  signals.async_wait([&](boost::system::error_code error, int) {
+    if (!error) ending.begin();
+  });
+  (*sessions)->watch();
+  if (!options.ready_file.empty())
+    if (auto written =
+            write_text_file(options.ready_file, std::to_string((*server)->port()) + "\n");
+        !written)
+      return written;
+  log::info("listening at {}:{}, Ctrl-C ends it and its sessions", (*sessions)->config().address,
+            (*server)->port());
+  try {
+    context.run();
+  } catch (const std::exception& exception) {
+    return Error{ErrorCode::ResourceMissing,
+                 std::string("the hall has ended: its network thread failed (") + exception.what() +
+                     "); its sessions go on, start it again"};
+  }
+  return {};
+}
+
+int check_config(const HallOptions& options) {
+  if (const auto fine = check_hall_start(options); !fine)
+    return report(kProgram, {ErrorCode::Usage, fine.error().message});
+  std::printf("%s: fine\n", options.config_file.c_str());
+  return static_cast<int>(ExitCode::Ok);
+}
+
+int run(int argc, char** argv) {
+  const auto parsed = parse_hall_command_line(argc, argv);
+  if (!parsed) return report(kProgram, parsed.error());
+  if (!*parsed) return static_cast<int>(ExitCode::Ok);
+  const auto& options = **parsed;
+  if (const auto set = log::configure(kProgram, options.checks_config ? "off" : options.log_level);
+      !set)
+    return report(kProgram, set.error());
+  log::use_format(options.log_format);
+  if (options.checks_config) return check_config(options);
+  const auto ran =
+      options.command == HallCommand::Serve ? run_hall(options) : run_hall_command(options);
+  return ran ? static_cast<int>(ExitCode::Ok) : report(kProgram, ran.error());
+}
+
+}  // namespace
+}  // namespace trocar::app
+
+int main(int argc, char** argv) {
+  trocar::require_cpu_features(trocar::app::kProgram);
+  return trocar::app::run(argc, argv);
+}

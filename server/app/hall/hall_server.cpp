@@ -1,0 +1,298 @@
+#include "server/app/hall/hall_server.h"
+
+#include <fmt/format.h>
+
+#include <boost/asio/awaitable.hpp>
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/beast/core/flat_buffer.hpp>
+#include <boost/beast/core/tcp_stream.hpp>
+#include <boost/beast/http.hpp>
+#include <map>
+#include <optional>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "common/base/json.h"
+#include "common/base/no_throw.h"
+#include "common/base/printable.h"
+#include "common/secure/digest.h"
+#include "server/session/access/audit_log.h"
+#include "server/session/monitoring/exposition.h"
+
+namespace trocar::app {
+namespace {
+
+namespace beast = boost::beast;
+namespace http = beast::http;
+using tcp = asio::ip::tcp;
+using Request = http::request<http::string_body>;
+using Answer = http::response<http::string_body>;
+
+constexpr std::chrono::milliseconds kAcceptRetry{200}, kEndPoll{100};
+constexpr std::string_view kBearer = "Bearer ";
+constexpr std::string_view kSessions = "/sessions", kOneSession = "/sessions/";
+
+enum class Trust : std::uint8_t { None, Wrong, Full };
+
+struct Reply {
+  http::status status = http::status::ok;
+  std::string body, type = "application/json";
+};
+
+Reply reply(const Json& json, http::status status = http::status::ok) {
+  return {.status = status, .body = to_text(json)};
+}
+
+Reply refusal(http::status status, const std::string& why) {
+  return reply({{"error", why}}, status);
+}
+
+http::status status_of(const Error& error) {
+  switch (error.code) {
+    case ErrorCode::BadMessage:
+      return http::status::bad_request;
+    case ErrorCode::Refused:
+      return http::status::conflict;
+    default:
+      return http::status::service_unavailable;
+  }
+}
+
+secure::Digest digest_of(std::string_view text) {
+  return secure::sha256({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
+}
+
+std::string exposition(const hall::Sessions& sessions) {
+  std::map<std::string, double> by_state;
+  std::vector<monitoring::Labelled> people, rate, cores;
+  for (const auto& session : sessions.list()) {
+    ++by_state[hall::name_of(session->state)];
+    people.emplace_back(session->name, session->figures.people);
+    rate.emplace_back(session->name, session->figures.time_rate);
+    cores.emplace_back(session->name, session->cores);
+  }
+  std::vector<monitoring::Labelled> states;
+  for (const auto* state : {"starting", "running", "ending", "failed"})
+    states.emplace_back(state, by_state[state]);
+  const auto& counters = sessions.counters();
+  const auto count = [](std::uint64_t number) { return static_cast<double>(number); };
+  monitoring::Exposition text("trocar_hall_");
+  text.gauges("sessions", "Sessions by state.", "state", states);
+  text.gauge("sessions_most", "Sessions that may run.", sessions.config().most_sessions);
+  text.gauge("cores", "Cores that sessions may take together.", sessions.config().cores);
+  text.gauge("cores_taken", "Cores that are counted as taken.", sessions.taken_cores());
+  text.counter("started_total", "Sessions that were started.", count(counters.started));
+  text.counter("refused_total", "Requests to start one that were refused.",
+               count(counters.refused));
+  text.counter("restarted_total", "Starts from a recording after a server was killed.",
+               count(counters.restarted));
+  text.counter("failed_total", "Sessions that have failed.", count(counters.failed));
+  text.gauges("session_people", "People in a session.", "session", people);
+  text.gauges("session_time_rate", "Simulated time over real time of a session.", "session", rate);
+  text.gauges("session_cores", "Processor seconds per second of a session.", "session", cores);
+  return text.text();
+}
+
+}  // namespace
+
+struct HallServer::Core : std::enable_shared_from_this<HallServer::Core> {
+  asio::io_context& context;
+  hall::Sessions& sessions;
+  const secure::Digest key;
+  access::AuditLog audit;
+  tcp::acceptor acceptor;
+  std::size_t open = 0;
+  bool is_stopping = false;
+
+  Core(asio::io_context& io, hall::Sessions& all, const std::string& secret, access::AuditLog log)
+      : context(io), sessions(all), key(digest_of(secret)), audit(std::move(log)), acceptor(io) {}
+
+  asio::awaitable<void> accept(std::shared_ptr<Core> self) {
+    asio::steady_timer retry(context);
+    while (!is_stopping) {
+      auto [error, socket] = co_await acceptor.async_accept(kNoThrow);
+      if (is_stopping) co_return;
+      if (error) {
+        retry.expires_after(kAcceptRetry);
+        co_await retry.async_wait(kNoThrow);
+        continue;
+      }
+      if (open >= kMostConnections) continue;  // closes it
+      ++open;
+      asio::co_spawn(context, serve(beast::tcp_stream(std::move(socket))),
+                     [self](const std::exception_ptr& failure) {
+                       --self->open;
+                       rethrow(failure);
+                     });
+    }
+  }
+
+  // `what`: start, end or refusal.
+  void note(const std::string& what, const std::string& name, const std::string& peer,
+            const std::string& reason = {}) {
+    audit.write({.event = what, .name = name, .role = "", .address = peer, .reason = reason});
+  }
+
+  asio::awaitable<void> serve(beast::tcp_stream stream) {
+    beast::error_code unknown;
+    const auto peer = stream.socket().remote_endpoint(unknown).address().to_string();
+    beast::flat_buffer buffer(kMostHeadBytes + hall::kMostRequestBytes);
+    http::request_parser<http::string_body> parser;
+    parser.header_limit(kMostHeadBytes);
+    parser.body_limit(hall::kMostRequestBytes);
+    stream.expires_after(kRequestDeadline);
+    const auto [failed, count] = co_await http::async_read(stream, buffer, parser, kNoThrow);
+    Reply given;
+    if (failed == http::error::body_limit)
+      given = refusal(http::status::payload_too_large, "the request is longer than 4096 bytes");
+    else if (failed)
+      co_return;
+    else
+      given = co_await answer_to(parser.get(), peer);
+    Answer answer(given.status, parser.get().version());
+    answer.keep_alive(false);
+    answer.set(http::field::content_type, given.type);
+    answer.set(http::field::cache_control, "no-store");
+    answer.set("X-Content-Type-Options", "nosniff");
+    if (given.status == http::status::unauthorized)
+      answer.set(http::field::www_authenticate, "Bearer");
+    answer.body() = std::move(given.body);
+    answer.prepare_payload();
+    stream.expires_after(kRequestDeadline);
+    const auto [unsent, bytes] = co_await http::async_write(stream, answer, kNoThrow);
+    if (unsent) co_return;
+    beast::error_code ignored;
+    stream.socket().shutdown(tcp::socket::shutdown_send, ignored);
+  }
+
+  Trust trust_in(const Request& request) const {
+    const auto given = request[http::field::authorization];
+    if (given.empty()) return Trust::None;
+    if (!given.starts_with(kBearer)) return Trust::Wrong;
+    const auto told = given.substr(kBearer.size());
+    const bool is_key = secure::equal_in_constant_time(digest_of({told.data(), told.size()}), key);
+    return is_key ? Trust::Full : Trust::Wrong;
+  }
+
+  asio::awaitable<Reply> answer_to(const Request& request, const std::string& peer) {
+    const auto trust = trust_in(request);
+    if (trust == Trust::Wrong) {
+      note("refusal", "", peer, "the key is wrong");
+      asio::steady_timer delay(context, kWrongKeyDelay);
+      co_await delay.async_wait(kNoThrow);
+      co_return refusal(http::status::unauthorized, "the key is wrong: name the hall's file of it");
+    }
+    const std::string path(request.target().data(), request.target().size());
+    const auto method = request.method();
+    if (method == http::verb::get) co_return get(path, trust == Trust::Full);
+    const bool is_start = method == http::verb::post && path == kSessions;
+    const bool is_end = method == http::verb::delete_ && path.starts_with(kOneSession);
+    if (!is_start && !is_end)
+      co_return refusal(http::status::method_not_allowed,
+                        "there are GET and POST of /sessions, GET and DELETE of /sessions/NAME");
+    if (trust != Trust::Full)
+      co_return refusal(http::status::unauthorized, "this needs the hall's key");
+    if (is_start) co_return start(request.body(), peer);
+    co_return co_await end(path.substr(kOneSession.size()), peer);
+  }
+
+  Reply get(const std::string& path, bool is_trusted) const {
+    if (path == "/healthz") return {.body = "ok\n", .type = "text/plain; charset=utf-8"};
+    if (path == "/metrics")
+      return {.body = exposition(sessions), .type = monitoring::kExpositionType};
+    const auto& config = sessions.config();
+    if (path == kSessions) {
+      Json json{{"sessions", Json::array()}};
+      for (const auto& session : sessions.list())
+        json["sessions"].push_back(hall::describe(*session, config, is_trusted));
+      json["cores"] = config.cores;
+      json["cores_taken"] = sessions.taken_cores();
+      json["may_start"] = Json::array();
+      for (const auto& offer : config.offers) json["may_start"].push_back(offer.name);
+      return reply(json);
+    }
+    if (path.starts_with(kOneSession))
+      if (const auto session = sessions.find(path.substr(kOneSession.size())))
+        return reply(hall::describe(*session, config, is_trusted));
+    return refusal(http::status::not_found, "there is no " + printable(path, 64) +
+                                                ": ask for /sessions, /healthz or /metrics");
+  }
+
+  Reply start(const std::string& body, const std::string& peer) {
+    if (is_stopping) return refusal(http::status::service_unavailable, "the hall ends");
+    const auto request = hall::parse_start_request(body);
+    if (!request) return refusal(status_of(request.error()), request.error().message);
+    const auto started = sessions.start(*request);
+    if (!started) {
+      note("refusal", request->name, peer, started.error().message);
+      return refusal(status_of(started.error()), started.error().message);
+    }
+    note("start", (*started)->name, peer);
+    return reply(hall::describe(**started, sessions.config(), true), http::status::created);
+  }
+
+  asio::awaitable<Reply> end(std::string name, std::string peer) {
+    const auto ended = sessions.end(name);
+    if (!ended) co_return refusal(http::status::not_found, ended.error().message);
+    note("end", name, peer);
+    const auto session = *ended;
+    const auto deadline = std::chrono::steady_clock::now() + kEndDeadline;
+    asio::steady_timer timer(context);
+    while (session->state != hall::SessionState::Ended &&
+           std::chrono::steady_clock::now() < deadline) {
+      timer.expires_after(kEndPoll);
+      co_await timer.async_wait(kNoThrow);
+    }
+    const bool has_ended = session->state == hall::SessionState::Ended;
+    co_return reply(hall::describe(*session, sessions.config(), true),
+                    has_ended ? http::status::ok : http::status::accepted);
+  }
+};
+
+Result<std::unique_ptr<HallServer>> HallServer::listen(asio::io_context& context,
+                                                       hall::Sessions& sessions, std::string key) {
+  const auto& config = sessions.config();
+  boost::system::error_code error;
+  const auto ip = asio::ip::make_address(config.address, error);
+  if (error)
+    return Error{ErrorCode::Usage, "listen: '" + config.address +
+                                       "' is not an IPv4 or IPv6 address: use 127.0.0.1 for this "
+                                       "machine only"};
+  auto audit = access::AuditLog::open(config.state_folder / "audit.jsonl");
+  if (!audit) return audit.error();
+  const auto core = std::make_shared<Core>(context, sessions, key, std::move(*audit));
+  const tcp::endpoint endpoint(ip, config.port);
+  auto& acceptor = core->acceptor;
+  acceptor.open(endpoint.protocol(), error);
+  if (!error) acceptor.set_option(tcp::acceptor::reuse_address(true), error);
+  if (!error) acceptor.bind(endpoint, error);
+  if (!error) acceptor.listen(asio::socket_base::max_listen_connections, error);
+  if (error)
+    return Error{ErrorCode::ResourceMissing,
+                 fmt::format("listen: {}:{}: {}, choose another port", config.address, config.port,
+                             error.message())};
+  asio::co_spawn(context, core->accept(core), rethrow);
+  return std::unique_ptr<HallServer>(new HallServer(core));
+}
+
+HallServer::HallServer(std::shared_ptr<Core> core) : core_(std::move(core)) {}
+
+HallServer::~HallServer() {
+  stop();
+}
+
+std::uint16_t HallServer::port() const {
+  boost::system::error_code ignored;
+  return core_->acceptor.local_endpoint(ignored).port();
+}
+
+void HallServer::stop() {
+  core_->is_stopping = true;
+  boost::system::error_code ignored;
+  core_->acceptor.close(ignored);
+}
+
+}  // namespace trocar::app

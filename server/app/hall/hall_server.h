@@ -1,0 +1,57 @@
+#pragma once
+
+// The hall answers over HTTP:
+//
+//   GET /sessions          all of them; join codes only with the key
+//   GET /sessions/NAME     one of them
+//   POST /sessions         {"start": "find-the-lump", "name": "group-a"}: 201 and the session, or
+//   409 DELETE /sessions/NAME  ends it; answers when its recording is closed GET /healthz, /metrics
+//   as those of trocar-server
+//
+// The hall's audit log says who has started and ended sessions, and who was refused.
+// What changes something needs "Authorization: Bearer KEY". Errors are {"error": "one line"}.
+//
+// Bounds: kMostConnections at a time, one request each, kMostHeadBytes and kMostRequestBytes of it
+// within kRequestDeadline. A wrong key is answered after kWrongKeyDelay.
+//
+// Thread: the one that runs the I/O context.
+
+#include "common/base/asio.h"  // before Boost: see there
+
+#include <boost/asio/io_context.hpp>
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "common/base/result.h"
+#include "server/hall/sessions/sessions.h"
+
+namespace trocar::app {
+
+class HallServer {
+ public:
+  static constexpr std::size_t kMostConnections = 32;
+  static constexpr std::size_t kMostHeadBytes = 8192;
+  static constexpr std::chrono::seconds kRequestDeadline{5};
+  static constexpr std::chrono::seconds kWrongKeyDelay{1};
+  static constexpr std::chrono::seconds kEndDeadline{90};
+
+  // `sessions` outlives it. ErrorCode::Usage for what is no address, ErrorCode::ResourceMissing
+  // when it cannot be had.
+  static Result<std::unique_ptr<HallServer>> listen(asio::io_context& context,
+                                                    hall::Sessions& sessions, std::string key);
+  ~HallServer();
+
+  std::uint16_t port() const;
+  // Closes the port; requests that are under way get their answer.
+  void stop();
+
+ private:
+  struct Core;
+  explicit HallServer(std::shared_ptr<Core> core);
+
+  std::shared_ptr<Core> core_;  // shared with the coroutines, which may outlive this object
+};
+
+}  // namespace trocar::app

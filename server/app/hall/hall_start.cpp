@@ -1,0 +1,103 @@
+#include "server/app/hall/hall_start.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <thread>
+
+#include "common/base/log.h"
+#include "common/secure/digest.h"
+#include "common/secure/private_files.h"
+#include "server/organs/catalogue/load_organ.h"
+
+namespace trocar::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kMadeKeyBytes = 32;
+constexpr std::size_t kLeastKey = 32, kMostKey = 256;  // characters
+
+fs::path server_program() {
+  std::error_code ignored;
+  return fs::read_symlink("/proc/self/exe", ignored).parent_path() / "trocar-server";
+}
+
+// A key goes over HTTP in one word.
+bool is_key(const std::string& text) {
+  return text.size() >= kLeastKey && text.size() <= kMostKey &&
+         std::ranges::all_of(text, [](char c) { return c > ' ' && c <= '~'; });
+}
+
+Result<std::string> read_or_make_hall_key(const fs::path& file) {
+  std::error_code ignored;
+  if (fs::exists(file, ignored)) return read_key(file);
+  std::array<std::uint8_t, kMadeKeyBytes> random{};
+  secure::fill_random(random);
+  const auto key = secure::to_hex(random);
+  if (const auto written = secure::write_private_file(file, key + "\n"); !written)
+    return written.error();
+  log::info("{}: the hall's key, made now", file.string());
+  return key;
+}
+
+Result<hall::HallConfig> read_config(const HallOptions& options) {
+  const double cores = std::max(1u, std::thread::hardware_concurrency());
+  auto config = hall::read_hall_config(options.config_file, cores);
+  if (!config || !config->state_folder.empty()) return config;
+  const auto state = secure::default_state_folder();
+  if (!state) return state.error();
+  config->state_folder = *state / "hall";
+  return config;
+}
+
+Status check_program() {
+  const auto program = server_program();
+  if (::access(program.c_str(), X_OK) == 0) return {};
+  return Error{ErrorCode::ResourceMissing,
+               program.string() + ": is missing, it has to lie beside trocar-hall"};
+}
+
+}  // namespace
+
+Result<std::string> read_key(const fs::path& file) {
+  auto text = secure::read_private_file(file);
+  if (!text) return text;
+  while (text->ends_with('\n') || text->ends_with('\r')) text->pop_back();
+  if (is_key(*text)) return text;
+  return Error{ErrorCode::BadFile,
+               file.string() +
+                   ": holds no key of 32 to 256 printable characters without spaces: "
+                   "remove it, and the hall makes another"};
+}
+
+Result<HallStart> prepare_hall(const HallOptions& options) {
+  HallStart start;
+  auto config = read_config(options);
+  if (!config) return config.error();
+  start.config = std::move(*config);
+  start.config.log_format = options.log_format;
+  if (const auto there = check_program(); !there) return there.error();
+  start.server_program = server_program();
+  auto key = read_or_make_hall_key(start.config.key_file);
+  if (!key) return key.error();
+  start.key = std::move(*key);
+  return start;
+}
+
+Status check_hall_start(const HallOptions& options) {
+  const auto config = read_config(options);
+  if (!config) return config.error();
+  if (const auto there = check_program(); !there) return there;
+  std::error_code ignored;
+  if (fs::exists(config->key_file, ignored))
+    if (const auto key = read_key(config->key_file); !key) return key.error();
+  for (const auto& offer : config->offers)
+    if (const auto organ = catalogue::load_organ(offer.organ); !organ)
+      return Error{organ.error().code,
+                   options.config_file + ": offer " + offer.name + ": " + organ.error().message};
+  return {};
+}
+
+}  // namespace trocar::app

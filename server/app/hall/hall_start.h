@@ -1,0 +1,28 @@
+#pragma once
+
+// Before the first session a hall needs its configuration, its key and its folders.
+
+#include <filesystem>
+#include <string>
+
+#include "common/base/result.h"
+#include "server/app/hall/options.h"
+#include "server/hall/plan/hall_config.h"
+
+namespace trocar::app {
+
+struct HallStart {
+  hall::HallConfig config;
+  std::string key;
+  std::filesystem::path server_program;
+};
+
+// Reads what is there, and makes key and folder of state if they are missing.
+Result<HallStart> prepare_hall(const HallOptions& options);
+// Says whether prepare_hall() would succeed, and whether each organ can be read, without making
+// anything.
+Status check_hall_start(const HallOptions& options);
+// The key as a file has it, without the line's end. Others may not read that file.
+Result<std::string> read_key(const std::filesystem::path& file);
+
+}  // namespace trocar::app

@@ -1,0 +1,115 @@
+#include "server/app/hall/options.h"
+
+#include <CLI/CLI.hpp>
+#include <charconv>
+
+#include "common/base/version.h"
+
+namespace trocar::app {
+namespace {
+
+constexpr const char* kHallExamples = R"(
+Examples:
+  trocar-hall --config hall.toml
+      sessions on request, as that file allows; deploy/trocar-hall.toml.example explains every key
+  trocar-hall --config hall.toml --check-config
+      would a start with this file succeed?
+  trocar-hall start find-the-lump --key hall.key
+      starts a session and prints its address and join codes
+  trocar-hall list --key hall.key
+      the sessions that run, with their codes; without the key also, but then without codes
+  trocar-hall end find-the-lump-1 --key hall.key
+      ends it, and returns when its recording is closed
+
+The key is a file that the hall makes at its first start. Ctrl-C or SIGTERM ends the hall and all its
+sessions in order. When it is killed, its sessions go on, and the next hall finds them again.
+Exit codes: 0 ok, also after Ctrl-C, 2 command line, 3 bad file, 4 the hall says no, 5 port taken or no
+hall there.
+)";
+
+void add_command_options(CLI::App& command, HallOptions& options) {
+  command.add_option("--at", options.at, "where the hall is")
+      ->type_name("HOST:PORT")
+      ->capture_default_str();
+  command.add_option("--key", options.key_file, "file with the hall's key")->type_name("FILE");
+}
+
+Status parse_at(HallOptions& options) {
+  const auto& text = options.at;
+  const auto colon = text.rfind(':');
+  const Error bad{ErrorCode::Usage,
+                  "--at: '" + text + "' is not HOST:PORT, such as 127.0.0.1:7694"};
+  if (colon == std::string::npos || colon == 0) return bad;
+  options.host = text.substr(0, colon);
+  if (options.host.starts_with('[') && options.host.ends_with(']'))
+    options.host = options.host.substr(1, options.host.size() - 2);
+  const char* end = text.data() + text.size();
+  const auto parsed = std::from_chars(text.data() + colon + 1, end, options.port);
+  if (options.host.empty() || parsed.ec != std::errc{} || parsed.ptr != end || options.port == 0)
+    return bad;
+  return {};
+}
+
+}  // namespace
+
+Result<std::optional<HallOptions>> parse_hall_command_line(int argc, char** argv) {
+  HallOptions options;
+  CLI::App app{"Holds many sessions on one machine: it starts and ends them on request.",
+               "trocar-hall"};
+  app.footer(kHallExamples);
+  app.set_version_flag("--version", std::string("trocar-hall ") + kVersion);
+  auto* config = app.add_option("--config", options.config_file,
+                                "be a hall, with the configuration in this file (TOML)")
+                     ->type_name("FILE");
+  app.add_flag("--check-config", options.checks_config,
+               "check the file as a start would, and exit with 0 or 2")
+      ->needs(config);
+  app.add_option("--ready-file", options.ready_file, "write the port to this file when listening")
+      ->type_name("FILE");
+  app.add_option("--log-level", options.log_level, "error, warn, info, debug or off")
+      ->check(CLI::IsMember({"error", "warn", "info", "debug", "off"}))
+      ->type_name("LEVEL")
+      ->capture_default_str();
+  app.add_option("--log-format", options.log_format,
+                 "how it is said: text, or json: an object per line")
+      ->check(CLI::IsMember({"text", "json"}))
+      ->type_name("FORMAT")
+      ->capture_default_str();
+  app.require_subcommand(0, 1);
+  auto* list = app.add_subcommand("list", "says which sessions run");
+  auto* start = app.add_subcommand("start", "starts a session, and says where it is");
+  auto* end = app.add_subcommand("end", "ends a session");
+  for (auto* command : {list, start, end}) add_command_options(*command, options);
+  start->add_option("what", options.what, "lesson or organ, as the hall's configuration names it")
+      ->required()
+      ->type_name("LESSON");
+  start->add_option("--name", options.name, "name of the session [the lesson's, with a number]")
+      ->type_name("NAME");
+  end->add_option("session", options.what, "its name")->required()->type_name("NAME");
+  for (auto* command : {list, start})
+    command->add_flag("--json", options.is_json, "write JSON, for scripts");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() != 0)
+      return Error{ErrorCode::Usage, std::string(error.what()) + " (see --help)"};
+    app.exit(error);
+    return std::optional<HallOptions>();
+  }
+  options.command = list->parsed()    ? HallCommand::List
+                    : start->parsed() ? HallCommand::Start
+                    : end->parsed()   ? HallCommand::End
+                                      : HallCommand::Serve;
+  if (options.command == HallCommand::Serve) {
+    if (options.config_file.empty())
+      return Error{ErrorCode::Usage,
+                   "--config: is missing, name a file, or give one of list, start and end"};
+    return std::optional(std::move(options));
+  }
+  if (const auto parsed = parse_at(options); !parsed) return parsed.error();
+  if (options.key_file.empty() && options.command != HallCommand::List)
+    return Error{ErrorCode::Usage, "--key: is missing, name the file of the hall's key"};
+  return std::optional(std::move(options));
+}
+
+}  // namespace trocar::app

@@ -1,0 +1,260 @@
+#!/usr/bin/env bash
+# run_hall.sh TEST BUILD OUT: whole halls with real servers, as somebody would use them.
+#
+#   sessions  start, list and end over commands and HTTP; keys; what is refused
+#   room      a hall of one core takes what fits and names the numbers of what does not
+#   killed    a killed server goes on from its recording; a client comes back; the third time it fails
+#   found     a killed hall leaves its sessions running, and the next one finds them
+#
+# Exit code 77: curl is missing, or a client that was not built.
+set -euo pipefail
+test=$1 bin=$(cd "$2/bin" && pwd) out=$3
+root=$(cd "$(dirname "$0")/../.." && pwd)
+command -v curl >/dev/null || {
+  echo "hall: SKIPPED: curl is missing"
+  exit 77
+}
+rm -rf "$out"
+mkdir -p "$out/run"
+chmod 700 "$out/run"
+cd "$out"
+export XDG_STATE_HOME=$out/state XDG_RUNTIME_DIR=$out/run
+hall=
+children=()
+# Servers outlive their hall: each is ended by its own id.
+cleanup() {
+  local pid
+  [ -z "$hall" ] || kill "$hall" 2>/dev/null || true
+  for pid in "${children[@]}" $(pids); do kill -KILL "$pid" 2>/dev/null || true; done
+}
+trap cleanup EXIT
+fail() {
+  echo "hall: $*"
+  tail -n 30 hall*.log recordings/*/server.log 2>/dev/null || true
+  exit 1
+}
+pids() { sed -n 's/.*"pid": \([1-9][0-9]*\).*/\1/p' hall-state/sessions.json 2>/dev/null || true; }
+# Each test has ports of its own, so that they can run side by side.
+case $test in
+  sessions) base=17710 ;;
+  room) base=17720 ;;
+  killed) base=17730 ;;
+  found) base=17740 ;;
+  *) fail "$test: no such test" ;;
+esac
+
+configure() { # LINES...
+  printf '%s\n' 'listen = "127.0.0.1:0"' 'key = "hall.key"' 'recordings = "recordings"' \
+    'state = "hall-state"' "ports = [$base, $((base + 4))]" \
+    "figures-ports = [$((base + 5)), $((base + 9))]" 'most-sessions = 3' "$@" >hall.toml
+}
+lattice='[[offer]]
+name = "lattice"
+organ = "lattice"
+cores = 0.4'
+start_hall() { # OPTION...
+  rm -f ready
+  "$bin/trocar-hall" --config hall.toml --ready-file ready "$@" 2>>hall.log &
+  hall=$!
+  for _ in $(seq 200); do
+    [ -s ready ] && break
+    kill -0 $hall 2>/dev/null || fail "the hall does not start"
+    sleep 0.05
+  done
+  at=127.0.0.1:$(cat ready)
+}
+needs_client() {
+  [ -x "$bin/trocar-client" ] && return
+  echo "hall: SKIPPED in part: trocar-client is not built"
+  exit 77
+}
+# Asks until the words are there.
+wait_for() { # SECONDS WORDS COMMAND...
+  local seconds=$1 words=$2
+  shift 2
+  for _ in $(seq $((seconds * 5))); do
+    "$@" 2>/dev/null | grep -q -- "$words" && return
+    sleep 0.2
+  done
+  fail "'$*' never says '$words': $("$@" 2>&1 || true)"
+}
+list() { "$bin/trocar-hall" list --at "$at" --key hall.key "$@"; }
+field() { # SESSION FIELD: of GET /sessions/NAME
+  curl -s "http://$at/sessions/$1" | sed -n "s/^  \"$2\": \"\{0,1\}\([^\",]*\).*/\1/p"
+}
+status() { curl -s -o answer -w '%{http_code}' "$@"; }
+
+test_sessions() {
+  configure 'cores = 100' "$lattice" '[[offer]]' 'name = "rings"' 'lesson = "move-the-rings"'
+  "$bin/trocar-hall" --config hall.toml --check-config | grep -q fine || fail "the file is not fine"
+  [ ! -e hall-state ] || fail "a check has made something"
+  start_hall --log-format json
+  [ "$(stat -c %a hall.key)" = 600 ] || fail "others may read the key"
+  [ "$(curl -s "http://$at/healthz")" = ok ] || fail "it is not healthy"
+  "$bin/trocar-hall" start rings --name group-a --at "$at" --key hall.key >started || fail "no start"
+  grep -q '^group-a: running at 127.0.0.1:' started || fail "$(cat started)"
+  grep -qE 'surgeon +[0-9A-Z]{4}-' started || fail "no code: $(cat started)"
+  [ "$(field group-a lesson)" = move-the-rings ] || fail "another lesson"
+  [ "$(field group-a organ)" = pegs ] || fail "another organ"
+  # Codes are for who has the key.
+  curl -s "http://$at/sessions" | grep -q codes && fail "codes without the key"
+  list | grep -qE 'surgeon +[0-9A-Z]{4}-' || fail "no codes with the key"
+  key=$(cat hall.key)
+  post=(-X POST "http://$at/sessions")
+  [ "$(status "${post[@]}" -d '{"start":"lattice"}')" = 401 ] || fail "a start without the key"
+  [ "$(status "${post[@]}" -H "Authorization: Bearer ${key}0" -d '{"start":"lattice"}')" = 401 ] ||
+    fail "a start with a wrong key"
+  [ "$(status -X DELETE "http://$at/sessions/group-a")" = 401 ] || fail "an end without the key"
+  post+=(-H "Authorization: Bearer $key")
+  [ "$(status "${post[@]}" -d '{"start":"spleen"}')" = 409 ] || fail "an unknown organ"
+  grep -q 'lattice, rings' answer || fail "it does not say what there is: $(cat answer)"
+  [ "$(status "${post[@]}" -d '{"start":"rings","name":"group-a"}')" = 409 ] || fail "a name twice"
+  [ "$(status "${post[@]}" -d '{"start":"rings","organ":"liver"}')" = 400 ] || fail "an unknown key"
+  head -c 5000 /dev/zero >large
+  [ "$(status "${post[@]}" --data-binary @large)" = 413 ] || fail "a large request"
+  [ "$(status -X PUT "http://$at/sessions")" = 405 ] || fail "another method"
+  [ "$(status "http://$at/../etc/passwd" --path-as-is)" = 404 ] || fail "another path"
+  [ "$(status "${post[@]}" -d '{"start":"lattice"}')" = 201 ] || fail "$(cat answer)"
+  [ "$(status "${post[@]}" -d '{"start":"lattice"}')" = 201 ] || fail "$(cat answer)"
+  [ "$(status "${post[@]}" -d '{"start":"lattice"}')" = 409 ] || fail "more than most-sessions"
+  grep -q 'allows 3' answer || fail "$(cat answer)"
+  wait_for 60 running list
+  curl -s "http://$at/metrics" | grep -q '^trocar_hall_sessions{state="running"}' || fail "no figures"
+  # A second hall may not have the same state.
+  code=0
+  "$bin/trocar-hall" --config hall.toml >second.log 2>&1 || code=$?
+  [ $code = 5 ] || fail "a second hall: $code, $(cat second.log)"
+  "$bin/trocar-hall" end group-a --at "$at" --key hall.key >ended || fail "no end"
+  recording=$(sed -n 's/^group-a: ended, recorded in //p' ended)
+  "$bin/trocar-journal" verify "$recording" >verified || fail "$(cat verified)"
+  list | grep -q group-a && fail "it has not gone"
+  code=0
+  "$bin/trocar-hall" end group-a --at "$at" --key hall.key 2>said || code=$?
+  [ $code = 4 ] || fail "a second end: $code, $(cat said)"
+  [ "$(stat -c %a hall-state/audit.jsonl)" = 600 ] || fail "others may read the audit log"
+  grep -q '"event":"start","name":"group-a","role":"","address":"127.0.0.1"' hall-state/audit.jsonl &&
+    grep -q '"event":"end","name":"group-a"' hall-state/audit.jsonl &&
+    grep -q '"reason":"the key is wrong"' hall-state/audit.jsonl || fail "audit: $(cat hall-state/audit.jsonl)"
+  kill -TERM $hall
+  wait $hall || fail "the hall ended with $?"
+  hall=
+  grep -v '^{"time":"[^"]*Z","program":"trocar-hall","level":"[a-z]*","message":".*"}$' hall.log &&
+    fail "lines of the log that are no objects"
+  grep -q '^{"time":.*"program":"trocar-server".*at 127.0.0.1' recordings/*group-a/server.log ||
+    fail "the log of a server is not of objects"
+  for recording in recordings/*lattice*/session.mcap; do
+    "$bin/trocar-journal" verify "$recording" >verified || fail "$(cat verified)"
+  done
+}
+
+test_room() {
+  configure 'cores = 1' "$lattice" '[[offer]]' 'name = "half"' 'organ = "lattice"' 'cores = 0.7'
+  start_hall
+  "$bin/trocar-hall" start lattice --at "$at" --key hall.key >started || fail "no start"
+  code=0
+  "$bin/trocar-hall" start half --at "$at" --key hall.key 2>said || code=$?
+  [ $code = 4 ] || fail "it was not refused: $code"
+  grep -qE 'half needs 0.70 cores, and [0-9.]+ of 1.00 are taken \(lattice-1 [0-9.]+\)' said ||
+    fail "$(cat said)"
+  # It measures what the session takes.
+  wait_for 60 '"peak_cores": [0-9.]*[1-9]' curl -s "http://$at/sessions/lattice-1"
+  "$bin/trocar-hall" end lattice-1 --at "$at" --key hall.key >ended || fail "no end"
+  "$bin/trocar-hall" start half --at "$at" --key hall.key >started || fail "there is room now"
+  grep -q '"measured_cores": {}' hall-state/sessions.json || fail "an idle session tells of its kind"
+  "$bin/trocar-hall" end half-1 --at "$at" --key hall.key >ended || fail "no end"
+  needs_client
+  "$bin/trocar-hall" start lattice --at "$at" --key hall.key >started || fail "no start"
+  "$bin/trocar-client" --no-render --name Ada --role surgeon --server "$(field lattice-1 address)" \
+    --join "$(sed -n 's/^ *surgeon *\([^ ]*\) .*/\1/p' started)" --script "$root/deploy/scenes/press.toml" \
+    --seconds 60 >client.log 2>&1 &
+  children+=($!)
+  wait_for 60 '"busy_windows": 3' cat hall-state/sessions.json
+  "$bin/trocar-hall" end lattice-1 --at "$at" --key hall.key >ended || fail "no end"
+  grep -qE '"lattice": 0*\.?[0-9]*[1-9]' hall-state/sessions.json || fail "what a busy one took is not kept"
+}
+
+# Kills the server of the only session.
+kill_server() {
+  local pid
+  pid=$(pids)
+  [ -n "$pid" ] || fail "no server"
+  kill -KILL "$pid"
+}
+
+test_killed() {
+  configure 'cores = 100' 'restarts = 2' '[[offer]]' 'name = "rings"' 'lesson = "move-the-rings"'
+  start_hall
+  "$bin/trocar-hall" start rings --at "$at" --key hall.key >started || fail "no start"
+  address=$(field rings-1 address)
+  code=$(sed -n 's/^ *surgeon *\([^ ]*\) .*/\1/p' started)
+  if [ -x "$bin/trocar-client" ]; then
+    "$bin/trocar-client" --no-render --name Ada --role surgeon --server "$address" --join "$code" \
+      --script "$root/deploy/scenes/lift.toml" --seconds 120 >client.log 2>&1 &
+    children+=($!)
+    wait_for 60 '"people": 1' curl -s "http://$at/sessions/rings-1"
+  fi
+  sleep 2
+  before=$(field rings-1 ticks)
+  kill_server
+  wait_for 60 '"restarts": 1' curl -s "http://$at/sessions/rings-1"
+  wait_for 60 '"state": "running"' curl -s "http://$at/sessions/rings-1"
+  wait_for 60 "\"ticks\": [1-9]" curl -s "http://$at/sessions/rings-1"
+  [ "$(field rings-1 ticks)" -gt $((before * 9 / 10)) ] || fail "ticks: $before, then $(field rings-1 ticks)"
+  [ "$(field rings-1 address)" = "$address" ] || fail "another address"
+  [ "$(field rings-1 organ)" = pegs ] || fail "another organ"
+  list | grep -q "$code" || fail "another code"
+  if [ -x "$bin/trocar-client" ]; then
+    grep -q 'the lesson goes on: Move the rings' recordings/*/server.log || fail "the lesson does not go on"
+    wait_for 60 'Ada (surgeon) is back' cat recordings/*/server.log
+    "$bin/trocar-client" --no-render --name Bea --role surgeon --server "$address" --join "$code" \
+      --seconds 2 >bea.log 2>&1 || fail "the old code is not good: $(cat bea.log)"
+  fi
+  # Both recordings are one session: the second says after which tick it goes on.
+  wait_for 60 session-2.mcap ls recordings/*/
+  sleep 2
+  kill_server
+  wait_for 60 '"restarts": 2' curl -s "http://$at/sessions/rings-1"
+  wait_for 60 '"state": "running"' curl -s "http://$at/sessions/rings-1"
+  sleep 2
+  kill_server
+  wait_for 60 '"state": "failed"' curl -s "http://$at/sessions/rings-1"
+  list | grep -q 'was killed by signal 9 after 2 restarts' || fail "$(list)"
+  cd recordings/*/
+  "$bin/trocar-journal" info session-2.mcap --json | grep -q '"file": "session.mcap"' ||
+    fail "session-2.mcap does not say what it goes on with"
+  "$bin/trocar-journal" verify session-2.mcap >"$out/verified" || [ $? = 6 ] || fail "$(cat "$out/verified")"
+  cd "$out"
+  "$bin/trocar-hall" end rings-1 --at "$at" --key hall.key >ended || fail "it cannot be forgotten"
+  needs_client
+}
+
+test_found() {
+  configure 'cores = 100' "$lattice"
+  start_hall
+  "$bin/trocar-hall" start lattice --name one --at "$at" --key hall.key >one || fail "no start"
+  "$bin/trocar-hall" start lattice --name two --at "$at" --key hall.key >two || fail "no start"
+  before=$(pids | sort)
+  kill -KILL $hall
+  wait $hall || true
+  sleep 1
+  for pid in $before; do kill -0 "$pid" || fail "a server has ended with its hall"; done
+  # One server dies while no hall looks, and its place in the table of processes is no server's.
+  killed=$(sed -n '/"name": "two"/,/started_at/s/.*"pid": \([0-9]*\).*/\1/p' hall-state/sessions.json)
+  kill -KILL "$killed"
+  sleep 1
+  start_hall
+  wait_for 60 '"state": "running"' curl -s "http://$at/sessions/one"
+  wait_for 60 '"state": "running"' curl -s "http://$at/sessions/two"
+  [ "$(field one restarts)" = 0 ] || fail "one was started again"
+  [ "$(field two restarts)" = 1 ] || fail "two was not started again"
+  pids | grep -qx "$(grep -vx "$killed" <<<"$before")" || fail "one is another process"
+  list | grep -q "$(sed -n 's/^ *surgeon *\([^ ]*\) .*/\1/p' one)" || fail "its codes are not known"
+  "$bin/trocar-hall" end one --at "$at" --key hall.key >ended || fail "no end"
+  "$bin/trocar-journal" verify recordings/*-one/session.mcap >verified || fail "$(cat verified)"
+  kill -TERM $hall
+  wait $hall || fail "the hall ended with $?"
+  hall=
+  "$bin/trocar-journal" verify recordings/*-two/session-2.mcap >verified || fail "$(cat verified)"
+}
+
+"test_$test"
