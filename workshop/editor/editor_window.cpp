@@ -92,15 +92,17 @@ void EditorWindow::draw(float seconds) {
   auto input = hud_.input();
   input.x -= static_cast<float>(left);
   camera_.update(input, region_.size, seconds);
-  const auto actions =
-      draw_panel(editor_, figures_, materials_, static_cast<float>(left) / pixels, state_);
+  const auto actions = draw_panel(editor_, figures_, press_.figures(), materials_,
+                                  static_cast<float>(left) / pixels, state_);
   paint(input);
+  press(input, seconds);
   draw_brush(input);
   take_keys();
   act(actions);
   follow_organ();
   auto scene = view_.scene(state_.shows_held, state_.shows_regions);
   scene.seconds = seconds;
+  press_.add_to(scene);
   ImGui::Render();
   renderer_.draw(scene, camera_, region_);
   hud_.render();
@@ -121,6 +123,7 @@ void EditorWindow::take_keys() {
     if (key.code == GLFW_KEY_1) state_.mode = Mode::Look;
     if (key.code == GLFW_KEY_2) state_.mode = Mode::Hold;
     if (key.code == GLFW_KEY_3) state_.mode = Mode::Region;
+    if (key.code == GLFW_KEY_4) state_.mode = Mode::Press;
     if (key.code == GLFW_KEY_C) camera_.frame({}, view_.radius_m());
     if (key.code == GLFW_KEY_F12) wants_picture_ = true;
   }
@@ -170,6 +173,24 @@ void EditorWindow::paint(const device::PointerInput& input) {
   }
   last_x_ = input.x;
   last_y_ = input.y;
+}
+
+void EditorWindow::press(const device::PointerInput& input, float seconds) {
+  if (state_.mode == Mode::Press && !input.control && input.wheel != 0)
+    state_.press_mm = std::clamp(state_.press_mm + input.wheel, kLeastPress_mm, kMostPress_mm);
+  const bool is_left = input.left && state_.mode == Mode::Press;
+  if (!press_.is_pressed() && is_left && input.is_over_scene && !was_pressing_) {
+    if (const auto place = view_.place_at(camera_.rays(region_.size), input.x, input.y))
+      press_.begin(editor_.organ(), editor_.version(), static_cast<double>(state_.tip_mm) * 1e-3,
+                   to_float(place->position_m), to_float(view_.normal_at(*place)));
+  }
+  was_pressing_ = is_left;
+  if (!press_.is_pressed()) return;
+  if (is_left)
+    press_.go_on(static_cast<double>(state_.press_mm) * 1e-3, seconds);
+  else
+    press_.end();
+  view_.move(press_.displacements());
 }
 
 void EditorWindow::dab(const edit::SurfacePlace& place, bool takes_away) {
@@ -265,7 +286,8 @@ void EditorWindow::ask_for_end() {
 }
 
 void EditorWindow::draw_brush(const device::PointerInput& input) {
-  if (state_.mode == Mode::Look || !input.is_over_scene) return;
+  const bool has_ring = state_.mode == Mode::Hold || state_.mode == Mode::Region;
+  if (!has_ring || !input.is_over_scene) return;
   const auto place = view_.place_at(camera_.rays(region_.size), input.x, input.y);
   if (!place) return;
   const Vec3f normal = to_float(view_.normal_at(*place)), centre = to_float(place->position_m);
@@ -290,6 +312,7 @@ void EditorWindow::take_picture() {
                       .count();
   const std::string file = "trocar-" + std::to_string(ms) + ".png";
   auto scene = view_.scene(state_.shows_held, state_.shows_regions);
+  press_.add_to(scene);
   renderer_.draw(scene, camera_, region_, render::Quality::Best);
   hud_.render();
   const auto written = render::write_png(context_->read_image(), file);

@@ -14,6 +14,7 @@
 #include "client/ui/hud.h"
 #include "server/organs/edit/editor.h"
 #include "server/organs/edit/surface_brush.h"
+#include "workshop/editor/hand_press.h"
 #include "workshop/editor/organ_view.h"
 #include "workshop/editor/panel.h"
 
@@ -45,6 +46,7 @@ class EditorWindow {
   void take_keys();
   void act(const PanelActions& actions);
   void paint(const device::PointerInput& input);
+  void press(const device::PointerInput& input, float seconds);
   void dab(const edit::SurfacePlace& place, bool takes_away);
   void dab_region(const edit::SurfacePlace& place, bool takes_away);
   // A new region of these nodes with the name in the panel. False: it cannot be, or not yet.
@@ -64,13 +66,14 @@ class EditorWindow {
   render::SceneRenderer renderer_;
   ui::Hud hud_;
   OrganView view_;
+  HandPress press_;
   edit::SurfaceBrush brush_;
   render::OrbitCamera camera_;
   render::Region region_;  // of the organ's picture, beside the panel
   PanelState state_;
   PanelFigures figures_;
   std::uint64_t seen_version_ = 0;
-  bool is_stroke_ = false, was_left_ = false;
+  bool is_stroke_ = false, was_left_ = false, was_pressing_ = false;
   float last_x_ = 0, last_y_ = 0;        // of the pointer in a stroke, pixels
   std::vector<NodeIndex> stroke_nodes_;  // of a region that begins
   std::string saved_file_;               // which this window may write again without a question

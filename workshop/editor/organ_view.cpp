@@ -16,8 +16,8 @@ OrganView::OrganView(const mesh::TetMesh& mesh) : mesh_(mesh) {
   for (const auto& [a, b, c] : mesh.boundary_triangles)
     triangles_.push_back({vertex_of[a.value], vertex_of[b.value], vertex_of[c.value]});
   positions_ = rest_;
-  regions_.assign(rest_.size(), 0);
-  holds_.assign(rest_.size(), {});
+  parts_.assign(rest_.size(), 0);
+  is_held_.assign(rest_.size(), 0);
   radius_m_ = static_cast<float>(length(organ::size_of(mesh)) / 2);
 }
 
@@ -25,10 +25,20 @@ void OrganView::colour(const organ::Organ& organ) {
   const auto map = organ::material_map(organ);
   for (std::size_t v = 0; v < rest_.size(); ++v) {
     const NodeIndex node = mesh_.surface_nodes[v];
-    const bool is_held = std::ranges::binary_search(organ.fixed_nodes, node);
-    holds_[v] = is_held ? render::Hold{kHeldColour, true} : render::Hold{};
-    regions_[v] = map.nodes[node.value];
+    is_held_[v] = std::ranges::binary_search(organ.fixed_nodes, node) ? 1 : 0;
+    parts_[v] = map.nodes[node.value];
   }
+}
+
+std::vector<render::Hold> OrganView::colours(bool shows_held, bool shows_regions) const {
+  std::vector<render::Hold> colours(rest_.size());
+  for (std::size_t v = 0; v < rest_.size(); ++v) {
+    if (shows_held && is_held_[v] != 0)
+      colours[v] = {kHeldColour, true};
+    else if (shows_regions && parts_[v] != 0)
+      colours[v] = {colour_of_part(parts_[v] - 1u), true};
+  }
+  return colours;
 }
 
 void OrganView::move(std::span<const Vec3f> displacements) {
@@ -62,9 +72,7 @@ render::SceneView OrganView::scene(bool shows_held, bool shows_regions) const {
   scene.rest_positions = rest_;
   scene.triangles = triangles_;
   scene.positions = positions_;
-  scene.regions = regions_;
-  scene.shows_regions = shows_regions;
-  if (shows_held) scene.holds = holds_;
+  scene.holds = colours(shows_held, shows_regions);
   return scene;
 }
 

@@ -17,6 +17,11 @@ namespace trocar::editor {
 
 // Held nodes have the colour of this participant's slot in a session.
 inline constexpr std::uint8_t kHeldColour = 1;
+// Regions have other slots' colours, and each another one than its neighbours in number.
+constexpr std::uint8_t colour_of_part(std::size_t region) {
+  constexpr std::array<std::uint8_t, 7> kSlots{0, 2, 3, 6, 5, 7, 8};
+  return kSlots[region % kSlots.size()];
+}
 
 class OrganView {
  public:
@@ -33,14 +38,16 @@ class OrganView {
 
   // The spans are of this object.
   render::SceneView scene(bool shows_held, bool shows_regions) const;
+  // The colour of each surface node, in the order of mesh.surface_nodes.
+  std::vector<render::Hold> colours(bool shows_held, bool shows_regions) const;
   float radius_m() const { return radius_m_; }  // half the diagonal of the rest bounding box
 
  private:
   const mesh::TetMesh& mesh_;
   std::vector<Vec3f> rest_, positions_;  // per surface node
   std::vector<std::array<std::uint32_t, 3>> triangles_;
-  std::vector<std::uint16_t> regions_;
-  std::vector<render::Hold> holds_;
+  std::vector<std::uint16_t> parts_;   // per surface node: 0 the organ's own, r + 1 regions[r]
+  std::vector<std::uint8_t> is_held_;  // likewise
   float radius_m_ = 0.1f;
 };
 

@@ -77,6 +77,7 @@ void draw_modes(PanelState& state) {
   mode("1  does nothing", Mode::Look);
   mode("2  holds nodes, with Shift lets go", Mode::Hold);
   mode("3  paints a region, with Shift takes away", Mode::Region);
+  mode("4  presses, the wheel goes deeper", Mode::Press);
   if (state.mode == Mode::Hold || state.mode == Mode::Region)
     ImGui::SliderFloat("radius", &state.brush_mm, kLeastBrush_mm, kMostBrush_mm, "%.1f mm",
                        ImGuiSliderFlags_Logarithmic | ImGuiSliderFlags_AlwaysClamp);
@@ -111,7 +112,7 @@ void draw_regions(const edit::Editor& editor, const PanelFigures& figures, Panel
   heading("Regions");
   for (std::size_t r = 0; r < regions.size(); ++r) {
     ImGui::PushID(static_cast<int>(r));
-    patch(colour_of(shape::colour_of_region(static_cast<int>(r) + 1)));
+    patch(colour_of(shape::colour_of_slot(colour_of_part(r))));
     if (ImGui::RadioButton(regions[r].name.c_str(), state.region == r)) {
       state.region = r;
       state.part = r;
@@ -136,7 +137,7 @@ void draw_material(const edit::Editor& editor, const PanelFigures& figures,
   heading("Material");
   const auto& regions = editor.organ().regions;
   const auto name_of = [&](const edit::Part& part) {
-    return part ? "region " + regions[*part].name : std::string("the organ's own");
+    return part ? regions[*part].name : std::string("the organ's own");
   };
   if (ImGui::BeginCombo("of", name_of(state.part).c_str())) {
     for (std::size_t p = 0; p <= regions.size(); ++p) {
@@ -166,6 +167,23 @@ void draw_material(const edit::Editor& editor, const PanelFigures& figures,
     ImGui::SliderFloat("Young's modulus", &state.young_modulus_kpa, 0.1f, 1000, "%.2f kPa",
                        ImGuiSliderFlags_Logarithmic | ImGuiSliderFlags_AlwaysClamp);
   actions.use_material = button("Make it of this", !editor.organ().mesh.tets.empty());
+}
+
+void draw_press(const PressFigures& press, PanelState& state) {
+  heading("Press");
+  ImGui::SliderFloat("tip's radius", &state.tip_mm, kLeastTip_mm, kMostTip_mm, "%.1f mm",
+                     ImGuiSliderFlags_AlwaysClamp);
+  ImGui::SliderFloat("goes in", &state.press_mm, kLeastPress_mm, kMostPress_mm, "%.1f mm",
+                     ImGuiSliderFlags_AlwaysClamp);
+  ImGui::Text("%.3f N at %.2f mm", static_cast<double>(press.force_n),
+              static_cast<double>(press.depth_mm));
+  ImGui::SameLine();
+  ImGui::TextDisabled("most %.3f N", static_cast<double>(press.most_n));
+  ImGui::PlotLines("##force", press.forces_n.data(), static_cast<int>(press.forces_n.size()), 0,
+                   "force over time", 0, std::max(press.most_n * 1.1f, 0.05f),
+                   {ImGui::GetContentRegionAvail().x, ImGui::GetFontSize() * 6});
+  if (press.share < 0.95f)
+    ImGui::TextDisabled("time goes at %.0f %% of its pace", static_cast<double>(press.share) * 100);
 }
 
 void draw_saving(const edit::Editor& editor, const PanelFigures& figures, PanelState& state,
@@ -211,6 +229,7 @@ void draw_questions(PanelState& state, PanelActions& actions) {
 }  // namespace
 
 PanelActions draw_panel(const edit::Editor& editor, const PanelFigures& figures,
+                        const PressFigures& press,
                         std::span<const material::HyperelasticMaterial> materials, float width,
                         PanelState& state) {
   PanelActions actions;
@@ -222,6 +241,7 @@ PanelActions draw_panel(const edit::Editor& editor, const PanelFigures& figures,
   ImGui::PopStyleVar();
   ImGui::PushItemWidth(width * 0.52f);
   draw_figures(figures);
+  draw_saving(editor, figures, state, actions);
   draw_modes(state);
   if (state.mode == Mode::Region) {
     draw_regions(editor, figures, state, actions);
@@ -229,6 +249,8 @@ PanelActions draw_panel(const edit::Editor& editor, const PanelFigures& figures,
     draw_material(editor, figures, materials, state, actions);
   } else if (state.mode == Mode::Hold) {
     draw_box(state, actions);
+  } else if (state.mode == Mode::Press) {
+    draw_press(press, state);
   }
   heading("Colours");
   ImGui::Checkbox("##held", &state.shows_held);
@@ -236,7 +258,6 @@ PanelActions draw_panel(const edit::Editor& editor, const PanelFigures& figures,
   patch(colour_of(shape::colour_of_slot(kHeldColour)));
   ImGui::TextUnformatted("held nodes");
   ImGui::Checkbox("regions", &state.shows_regions);
-  draw_saving(editor, figures, state, actions);
   ImGui::PopItemWidth();
   ImGui::End();
   draw_questions(state, actions);

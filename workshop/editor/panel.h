@@ -15,6 +15,7 @@ inline constexpr float kPanelLetters = 24;
 // Draws it `width` pixels wide and returns what the person wants. `materials`: those that can be
 // chosen, with their sources.
 PanelActions draw_panel(const edit::Editor& editor, const PanelFigures& figures,
+                        const PressFigures& press,
                         std::span<const material::HyperelasticMaterial> materials, float width,
                         PanelState& state);
 

@@ -14,10 +14,12 @@
 
 namespace trocar::editor {
 
-enum class Mode : std::uint8_t { Look, Hold, Region };
+enum class Mode : std::uint8_t { Look, Hold, Region, Press };
 
 inline constexpr float kLeastBrush_mm = 1, kMostBrush_mm = 100;
 inline constexpr float kMostPaintDepth_mm = 200;
+inline constexpr float kLeastTip_mm = 2, kMostTip_mm = 30;
+inline constexpr float kLeastPress_mm = 1, kMostPress_mm = 50;
 
 struct PanelState {
   Mode mode = Mode::Look;
@@ -31,6 +33,7 @@ struct PanelState {
   edit::Part part;         // of which a material is chosen
   std::size_t choice = 0;  // of the materials; the one after the last is neo-Hookean
   float young_modulus_kpa = 4;
+  float tip_mm = 10, press_mm = 6;  // radius, and how far the hand goes in
   bool shows_held = true, shows_regions = true;
   std::string message;
   bool is_trouble = false;
@@ -47,6 +50,13 @@ struct PanelState {
     message = std::move(text);
     is_trouble = is_bad;
   }
+};
+
+// A press that goes on, or the last one.
+struct PressFigures {
+  float force_n = 0, depth_mm = 0, most_n = 0;
+  float share = 1;              // of simulated time in real time
+  std::vector<float> forces_n;  // one a published frame
 };
 
 // A button that was pressed sets one of these.
