@@ -138,6 +138,21 @@ TEST(Editor, RefusesRegionsThatCannotBe) {
   EXPECT_EQ(editor.organ(), first);
 }
 
+TEST(Editor, RenamesARegion) {
+  Editor editor(liver());
+  const auto all = box(editor.organ(), "all");
+  ASSERT_TRUE(editor.add_region("a", all).ok());
+  ASSERT_TRUE(editor.rename_region(0, "lump").ok());
+  EXPECT_EQ(editor.organ().regions[0].name, "lump");
+  EXPECT_FALSE(editor.rename_region(0, "").ok());
+  EXPECT_FALSE(editor.rename_region(1, "b").ok());
+  ASSERT_TRUE(editor.add_region("b", all).ok());
+  EXPECT_FALSE(editor.rename_region(1, "lump").ok()) << "it is taken";
+  editor.undo();
+  editor.undo();
+  EXPECT_EQ(editor.organ().regions[0].name, "a");
+}
+
 TEST(Editor, LaterRegionsWin) {
   Editor editor(liver());
   const auto all = box(editor.organ(), "all");

@@ -31,11 +31,12 @@ TEST(PanelState, TheBoxIsInMillimetres) {
   PanelState state;
   state.low_mm = {-10, -20, -30};
   state.high_mm = {10, 20, 30};
-  state.is_on_surface = false;
   const auto box = state.box();
   EXPECT_NEAR(box.low_m.y, -0.020, 1e-9);
   EXPECT_NEAR(box.high_m.z, 0.030, 1e-9);
-  EXPECT_FALSE(box.is_on_surface);
+  EXPECT_TRUE(box.is_on_surface);
+  state.mode = Mode::Region;
+  EXPECT_FALSE(state.box().is_on_surface) << "a region needs whole tets";
 }
 
 }  // namespace

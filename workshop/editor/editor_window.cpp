@@ -138,6 +138,13 @@ void EditorWindow::act(const PanelActions& actions) {
   if (actions.remove_region && state_.region) editor_.remove_region(*state_.region);
   if (actions.raise_region && state_.region && editor_.raise_region(*state_.region))
     state_.region = state_.part = editor_.organ().regions.size() - 1;
+  if (actions.rename_region && state_.region) {
+    const auto renamed = editor_.rename_region(*state_.region, state_.new_name.data());
+    if (renamed)
+      state_.new_name = {};
+    else
+      state_.say(renamed.error().message, true);
+  }
   if (actions.use_material) use_material();
   if (actions.save) save(false);
   if (actions.replace) save(true);

@@ -92,13 +92,13 @@ void draw_box(PanelState& state, PanelActions& actions) {
   ImGui::InputFloat3("to", state.high_mm.data(), "%.1f");
   for (auto* bounds : {&state.low_mm, &state.high_mm})
     for (float& bound : *bounds) bound = std::clamp(bound, -2000.0f, 2000.0f);
-  ImGui::Checkbox("surface alone", &state.is_on_surface);
   if (state.mode == Mode::Region) {
     actions.paint_box = button("Into the region");
     ImGui::SameLine();
     actions.unpaint_box = button("Out of it", state.region.has_value());
     return;
   }
+  ImGui::Checkbox("surface alone", &state.is_on_surface);
   actions.hold_box = button("Hold these");
   ImGui::SameLine();
   actions.release_box = button("Let go of these");
@@ -121,11 +121,13 @@ void draw_regions(const edit::Editor& editor, const PanelFigures& figures, Panel
     ImGui::TextDisabled("%zu %s", figures.part_elements[r + 1], figures.element);
     ImGui::PopID();
   }
-  if (ImGui::RadioButton("a new one:", !state.region)) state.region.reset();
-  ImGui::SameLine();
+  if (ImGui::RadioButton("a new one", !state.region)) state.region.reset();
   ImGui::SetNextItemWidth(-1);
-  ImGui::InputTextWithHint("##name", "its name", state.new_name.data(), state.new_name.size());
+  ImGui::InputTextWithHint("##name", state.region ? "another name" : "its name",
+                           state.new_name.data(), state.new_name.size());
   if (!state.region) return;
+  actions.rename_region = button("Rename", state.new_name[0] != 0);
+  ImGui::SameLine();
   actions.raise_region = button("Over the others", *state.region + 1 < regions.size());
   ImGui::SameLine();
   actions.remove_region = button("Remove");
@@ -139,7 +141,14 @@ void draw_material(const edit::Editor& editor, const PanelFigures& figures,
   const auto name_of = [&](const edit::Part& part) {
     return part ? regions[*part].name : std::string("the organ's own");
   };
-  if (ImGui::BeginCombo("of", name_of(state.part).c_str())) {
+  const auto before = [](const char* text) {
+    ImGui::AlignTextToFramePadding();
+    ImGui::TextDisabled("%s", text);
+    ImGui::SameLine(ImGui::GetFontSize() * 5);
+  };
+  before("of");
+  ImGui::SetNextItemWidth(-1);
+  if (ImGui::BeginCombo("##part", name_of(state.part).c_str())) {
     for (std::size_t p = 0; p <= regions.size(); ++p) {
       const edit::Part part = p == 0 ? edit::Part{} : edit::Part{p - 1};
       ImGui::PushID(static_cast<int>(p));
@@ -148,12 +157,14 @@ void draw_material(const edit::Editor& editor, const PanelFigures& figures,
     }
     ImGui::EndCombo();
   }
-  ImGui::TextDisabled("is");
-  ImGui::SameLine();
+  before("is now");
   ImGui::TextUnformatted(figures.part_materials[state.part ? *state.part + 1 : 0].c_str());
   const bool is_measured = state.choice < materials.size();
   const char* kByHand = "neo-Hookean, by hand";
-  if (ImGui::BeginCombo("becomes", is_measured ? materials[state.choice].name.c_str() : kByHand)) {
+  before("becomes");
+  ImGui::SetNextItemWidth(-1);
+  if (ImGui::BeginCombo("##material",
+                        is_measured ? materials[state.choice].name.c_str() : kByHand)) {
     for (std::size_t m = 0; m < materials.size(); ++m)
       if (ImGui::Selectable(materials[m].name.c_str(), m == state.choice)) state.choice = m;
     if (ImGui::Selectable(kByHand, !is_measured)) state.choice = materials.size();
@@ -198,9 +209,10 @@ void draw_saving(const edit::Editor& editor, const PanelFigures& figures, PanelS
   ImGui::TextDisabled("%s", editor.has_unsaved_changes() ? "not saved" : "");
   ImGui::SetNextItemWidth(-1);
   ImGui::InputText("##file", state.file.data(), state.file.size());
+  // Its line is there without words, too, so that nothing moves under the pointer.
+  wrapped(state.message.empty() ? " " : state.message,
+          colour_of(state.is_trouble ? ui::kOrange : ui::kSkyBlue));
   for (const auto& remark : figures.remarks) wrapped(remark, colour_of(ui::kYellow));
-  if (!state.message.empty())
-    wrapped(state.message, colour_of(state.is_trouble ? ui::kOrange : ui::kSkyBlue));
 }
 
 void draw_questions(PanelState& state, PanelActions& actions) {
@@ -251,6 +263,7 @@ PanelActions draw_panel(const edit::Editor& editor, const PanelFigures& figures,
     draw_box(state, actions);
   } else if (state.mode == Mode::Press) {
     draw_press(press, state);
+    draw_material(editor, figures, materials, state, actions);
   }
   heading("Colours");
   ImGui::Checkbox("##held", &state.shows_held);

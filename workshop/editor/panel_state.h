@@ -39,12 +39,12 @@ struct PanelState {
   bool is_trouble = false;
   bool asks_to_replace = false, asks_to_close = false;
 
-  // The box of the six numbers.
+  // The box of the six numbers. A region is of what lies inside it, too.
   edit::BoxRule box() const {
     const auto metres = [](const std::array<float, 3>& mm) {
       return Vec3d{mm[0] * 1e-3, mm[1] * 1e-3, mm[2] * 1e-3};
     };
-    return {metres(low_mm), metres(high_mm), is_on_surface};
+    return {metres(low_mm), metres(high_mm), is_on_surface && mode != Mode::Region};
   }
   void say(std::string text, bool is_bad = false) {
     message = std::move(text);
@@ -63,7 +63,8 @@ struct PressFigures {
 struct PanelActions {
   bool undo = false, redo = false, save = false, replace = false, close = false;
   bool hold_box = false, release_box = false, hold_none = false;
-  bool paint_box = false, unpaint_box = false, remove_region = false, raise_region = false;
+  bool paint_box = false, unpaint_box = false, remove_region = false, raise_region = false,
+       rename_region = false;
   bool use_material = false;
 };
 

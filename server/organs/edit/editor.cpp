@@ -120,7 +120,7 @@ bool Editor::release(std::span<const NodeIndex> nodes) {
   });
 }
 
-Result<std::size_t> Editor::add_region(const std::string& name, std::span<const NodeIndex> nodes) {
+Status Editor::check_name(const std::string& name) const {
   if (!is_name(name))
     return Error{ErrorCode::Usage, "the name of a region must have 1 to " +
                                        std::to_string(kMostNameBytes) + " printable bytes"};
@@ -128,6 +128,11 @@ Result<std::size_t> Editor::add_region(const std::string& name, std::span<const 
       organ_.regions.end())
     return Error{ErrorCode::Usage,
                  "region '" + name + "': the organ has one of that name, choose another"};
+  return {};
+}
+
+Result<std::size_t> Editor::add_region(const std::string& name, std::span<const NodeIndex> nodes) {
+  if (auto checked = check_name(name); !checked) return checked.error();
   if (organ_.regions.size() >= organ::kMaxRegions)
     return Error{ErrorCode::Usage, "region '" + name + "': the organ has " +
                                        std::to_string(organ::kMaxRegions) +
@@ -162,6 +167,13 @@ bool Editor::remove_region(std::size_t region) {
   if (region >= organ_.regions.size()) return false;
   return change(
       [&] { organ_.regions.erase(organ_.regions.begin() + static_cast<std::ptrdiff_t>(region)); });
+}
+
+Status Editor::rename_region(std::size_t region, const std::string& name) {
+  if (region >= organ_.regions.size()) return Error{ErrorCode::Usage, "there is no such region"};
+  if (auto checked = check_name(name); !checked) return checked;
+  change([&] { organ_.regions[region].name = name; });
+  return {};
 }
 
 bool Editor::raise_region(std::size_t region) {

@@ -51,6 +51,8 @@ class Editor {
   bool add_to_region(std::size_t region, std::span<const NodeIndex> nodes);
   bool take_from_region(std::size_t region, std::span<const NodeIndex> nodes);
   bool remove_region(std::size_t region);
+  // Error: as of add_region()'s names, or there is no such region.
+  Status rename_region(std::size_t region, const std::string& name);
   // It comes after the others. Returns whether it did not before.
   bool raise_region(std::size_t region);
 
@@ -102,6 +104,7 @@ class Editor {
   // the same.
   template <typename Change>
   bool change(const Change& make);
+  Status check_name(const std::string& name) const;
   Status change_material(Part part, const material::Material& material);
   const material::Material* material_of(Part part) const;
 
