@@ -112,8 +112,12 @@ void EditorWindow::draw(float seconds) {
 
 void EditorWindow::take_keys() {
   const auto keys = ui::Hud::take_keys();
+  constexpr auto kAnyPopup = ImGuiPopupFlags_AnyPopupId | ImGuiPopupFlags_AnyPopupLevel;
   if (ImGui::GetIO().WantTextInput) return;
+  const bool is_asked = ImGui::IsPopupOpen("", kAnyPopup);  // and has to answer first
   for (const auto& key : keys) {
+    if (key.code == GLFW_KEY_F12) wants_picture_ = true;
+    if (is_asked) continue;
     if (key.has_control) {
       if (writes(key.code, 'z')) key.has_shift ? editor_.redo() : editor_.undo();
       if (writes(key.code, 'y')) editor_.redo();
@@ -125,7 +129,6 @@ void EditorWindow::take_keys() {
     if (key.code == GLFW_KEY_3) state_.mode = Mode::Region;
     if (key.code == GLFW_KEY_4) state_.mode = Mode::Press;
     if (key.code == GLFW_KEY_C) camera_.frame({}, view_.radius_m());
-    if (key.code == GLFW_KEY_F12) wants_picture_ = true;
   }
 }
 
@@ -275,12 +278,15 @@ void EditorWindow::save(bool may_replace) {
     saved_file_ = file;
     state_.say("Saved: " + file);
     log::info("saved: {}", file);
+    is_over_ = state_.closes_when_saved;
     return;
   }
-  if (saved.error().code == ErrorCode::Refused)
+  if (saved.error().code == ErrorCode::Refused) {
     state_.asks_to_replace = true;
-  else
-    state_.say(saved.error().message, true);
+    return;
+  }
+  state_.closes_when_saved = false;
+  state_.say(saved.error().message, true);
 }
 
 void EditorWindow::ask_for_end() {
@@ -289,6 +295,7 @@ void EditorWindow::ask_for_end() {
     return;
   }
   glfwSetWindowShouldClose(context_->window(), GLFW_FALSE);
+  state_.closes_when_saved = false;
   state_.asks_to_close = true;
 }
 

@@ -172,7 +172,7 @@ void draw_material(const edit::Editor& editor, const PanelFigures& figures,
   }
   ImGui::PushStyleColor(ImGuiCol_Text, ImGui::GetStyleColorVec4(ImGuiCol_TextDisabled));
   ImGui::TextWrapped("%s", is_measured ? materials[state.choice].source.c_str()
-                                       : "Chosen by you, not measured; Poisson's ratio 0.45.");
+                                       : "Poisson's ratio 0.45. Chosen by you, not measured.");
   ImGui::PopStyleColor();
   if (!is_measured)
     ImGui::SliderFloat("Young's modulus", &state.young_modulus_kpa, 0.1f, 1000, "%.2f kPa",
@@ -191,10 +191,13 @@ void draw_press(const PressFigures& press, PanelState& state) {
   ImGui::SameLine();
   ImGui::TextDisabled("most %.3f N", static_cast<double>(press.most_n));
   ImGui::PlotLines("##force", press.forces_n.data(), static_cast<int>(press.forces_n.size()), 0,
-                   "force over time", 0, std::max(press.most_n * 1.1f, 0.05f),
+                   nullptr, 0, std::max(press.most_n * 1.1f, 0.05f),
                    {ImGui::GetContentRegionAvail().x, ImGui::GetFontSize() * 6});
   if (press.share < 0.95f)
-    ImGui::TextDisabled("time goes at %.0f %% of its pace", static_cast<double>(press.share) * 100);
+    ImGui::TextDisabled("force over time, at %.0f %% of its pace",
+                        static_cast<double>(press.share) * 100);
+  else
+    ImGui::TextDisabled("force over time");
 }
 
 void draw_saving(const edit::Editor& editor, const PanelFigures& figures, PanelState& state,
@@ -224,12 +227,14 @@ void draw_questions(PanelState& state, PanelActions& actions) {
     ImGui::Text("%s is there already.", state.file.data());
     actions.replace = ImGui::Button("Replace it");
     ImGui::SameLine();
-    if (ImGui::Button("Keep it") || actions.replace) ImGui::CloseCurrentPopup();
+    const bool keeps = ImGui::Button("Keep it");
+    if (keeps) state.closes_when_saved = false;
+    if (keeps || actions.replace) ImGui::CloseCurrentPopup();
     ImGui::EndPopup();
   }
   if (ImGui::BeginPopupModal("Not saved", nullptr, kPopup)) {
     ImGui::TextUnformatted("What you changed is not saved.");
-    actions.save = actions.save || ImGui::Button("Save it");
+    if (ImGui::Button("Save it")) actions.save = state.closes_when_saved = true;
     ImGui::SameLine();
     actions.close = ImGui::Button("Leave without it");
     ImGui::SameLine();

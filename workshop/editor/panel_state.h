@@ -38,6 +38,7 @@ struct PanelState {
   std::string message;
   bool is_trouble = false;
   bool asks_to_replace = false, asks_to_close = false;
+  bool closes_when_saved = false;
 
   // The box of the six numbers. A region is of what lies inside it, too.
   edit::BoxRule box() const {
