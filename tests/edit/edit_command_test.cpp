@@ -43,6 +43,17 @@ TEST(EditCommand, OpensAnOrganAsItIs) {
   EXPECT_FALSE(editor->has_unsaved_changes());
 }
 
+TEST(EditCommand, ABuiltInOrganGoesBeforeAFolderOfItsName) {
+  const auto before = fs::current_path();
+  const auto folder = fs::path(::testing::TempDir()) / "edit_command_folder";
+  fs::create_directories(folder / "plate");
+  fs::current_path(folder);
+  const auto editor = open(*parse({"plate"}));
+  fs::current_path(before);
+  ASSERT_TRUE(editor.ok()) << editor.error().message;
+  EXPECT_EQ(editor->organ(), *catalogue::load_organ("plate"));
+}
+
 TEST(EditCommand, ReleasesBeforeItHolds) {
   const auto editor = open(*parse({"--hold", "y=0..,surface", "--release", "all", "lattice"}));
   ASSERT_TRUE(editor.ok()) << editor.error().message;

@@ -22,7 +22,11 @@ Result<organ::Organ> read(const EditCommand& command) {
   if (!path.has_filename()) path = path.parent_path();  // of a folder with a slash at its end
   const bool is_import = !command.unit.empty() || command.nodes || !command.labels.empty();
   const bool is_dicom = dicom::is_dicom(path);
-  if (!is_import && !is_dicom) return catalogue::load_organ(command.organ);
+  if (!is_import) {
+    // A built-in organ goes before a folder of its name.
+    auto loaded = catalogue::load_organ(command.organ);
+    if (loaded || !is_dicom) return loaded;
+  }
   if (!is_dicom && !catalogue::can_be_imported(path))
     return Error{ErrorCode::Usage, command.organ +
                                        ": --unit, --nodes and --labels are of meshes, surfaces and "
