@@ -24,16 +24,14 @@ constexpr float kLayoutWidth = 1160, kLayoutHeight = 620;
 
 // Keys that went down since the last picture. Dear ImGui samples keys once per picture and would
 // miss a short press at a low rate. GLFW callbacks carry no context of ours, and there is one Hud.
-struct PressedKey {
-  int code = 0;
-  bool has_shift = false;
-};
-std::vector<PressedKey>& pressed_keys() {
-  static std::vector<PressedKey> keys;
+std::vector<KeyPress>& pressed_keys() {
+  static std::vector<KeyPress> keys;
   return keys;
 }
 void remember_key(GLFWwindow*, int key, int, int action, int modifiers) {
-  if (action == GLFW_PRESS) pressed_keys().push_back({key, (modifiers & GLFW_MOD_SHIFT) != 0});
+  if (action == GLFW_PRESS)
+    pressed_keys().push_back(
+        {key, (modifiers & GLFW_MOD_SHIFT) != 0, (modifiers & GLFW_MOD_CONTROL) != 0});
 }
 
 // It is what is asked for, or what the monitor says, as far as the panels fit into the window.
@@ -220,7 +218,7 @@ HudActions Hud::draw(const HudModel& model) {
   const auto keys = std::exchange(pressed_keys(), {});
   if (ImGui::GetIO().WantTextInput) return actions;
   const auto pressed = [&](int code) {
-    return std::ranges::find(keys, code, &PressedKey::code) != keys.end();
+    return std::ranges::find(keys, code, &KeyPress::code) != keys.end();
   };
   actions.toggle_help = pressed(GLFW_KEY_H) || pressed(GLFW_KEY_F1);
   actions.toggle_regions = pressed(GLFW_KEY_O);
@@ -272,9 +270,12 @@ HudActions Hud::draw(const HudModel& model) {
   return actions;
 }
 
+std::vector<KeyPress> Hud::take_keys() {
+  return std::exchange(pressed_keys(), {});
+}
+
 bool Hud::take_enter() {
-  const auto keys = std::exchange(pressed_keys(), {});
-  return std::ranges::any_of(keys, [](const PressedKey& key) {
+  return std::ranges::any_of(take_keys(), [](const KeyPress& key) {
     return key.code == GLFW_KEY_ENTER || key.code == GLFW_KEY_KP_ENTER;
   });
 }

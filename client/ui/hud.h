@@ -215,6 +215,12 @@ struct HudActions {
   std::optional<float> speed;
 };
 
+// A key that went down, as GLFW numbers keys, with the modifiers that were held.
+struct KeyPress {
+  int code = 0;
+  bool has_shift = false, has_control = false;
+};
+
 class Hud {
  public:
   // `scale`: of words and panels, kLeastScale to kMostScale; 0: as the monitor says. It is less
@@ -227,6 +233,9 @@ class Hud {
   void begin_frame(float seconds);
   device::PointerInput input() const;
   HudActions draw(const HudModel& model);
+  // Returns the keys that went down since the last picture, in their order; for what is drawn in
+  // place of a model.
+  static std::vector<KeyPress> take_keys();
   // Whether Enter went down since the last picture; for what is drawn in place of a model.
   static bool take_enter();
   void render();  // may be repeated: the same again

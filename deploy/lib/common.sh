@@ -38,7 +38,8 @@ absolute() {
 }
 
 # All programs, as deploy/build and deploy/demo build them.
-all_programs=(trocar-server trocar-hall trocar-client trocar-organ trocar-sim trocar-journal trocar-impair trocar-web trocar-doctor)
+all_programs=(trocar-server trocar-hall trocar-client trocar-organ trocar-organ-edit trocar-sim trocar-journal trocar-impair
+  trocar-web trocar-doctor)
 
 # build PRESET [TARGET...]: configures if needed and builds. Tests are there if the script sets
 # with_tests=true, after deploy/setup --with-tests; the page for browsers if its tools are there, which a

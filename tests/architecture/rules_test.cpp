@@ -21,7 +21,8 @@ class Rules : public ::testing::Test {
     write("CMakeLists.txt",
           "set(TROCAR_LAYERS # the order\n  common/base common/math\n  proto common/wire\n"
           "  server/tissue/world server/tissue/step server/session/net\n  client/net "
-          "client/render)\nset(TROCAR_STATE_FOLDERS common/math server/tissue/world "
+          "client/render\n  workshop/editor)\nset(TROCAR_STATE_FOLDERS common/math "
+          "server/tissue/world "
           "server/tissue/step)\n");
     library("common/base", "SOURCES a.cpp HEADERS a.h timing.h");
     write("common/base/a.h", "#pragma once\n#include <vector>\n");
@@ -157,6 +158,14 @@ TEST_F(Rules, ServerAndClientInEitherDirectionAreFound) {
   library("client/net", "SOURCES n.cpp USES proto");
   library("server/session/net", "SOURCES n.cpp USES common/wire client/net");
   expect_one(check_folders(tree()), "server/session/net/CMakeLists.txt:1: ", "do not see");
+}
+
+TEST_F(Rules, TheWorkshopSeesServerAndClientAndNobodySeesIt) {
+  library("workshop/editor", "HEADERS e.h DEPENDS client/render server/tissue/world");
+  write("workshop/editor/e.h", "#pragma once\n");
+  EXPECT_TRUE(check_folders(tree()).empty());
+  library("client/render", "SOURCES r.cpp USES workshop/editor");
+  expect_one(check_folders(tree()), "client/render/CMakeLists.txt:1: ", "do not see");
 }
 
 TEST_F(Rules, WhatIsSharedSeesNeitherServerNorClient) {

@@ -14,6 +14,7 @@
 #include "common/base/log.h"
 #include "common/base/version.h"
 #include "server/app/organ/organ_calibrate.h"
+#include "server/app/organ/organ_edit.h"
 #include "server/app/organ/organ_experiments.h"
 #include "server/app/organ/organ_export.h"
 #include "server/app/organ/organ_identify.h"
@@ -66,6 +67,10 @@ Examples:
       its figures, for other programs
   trocar-organ inspect spleen.organ --picture spleen.png
       its figures, and how it looks from three sides
+  trocar-organ edit spleen.organ
+      a window in which its nodes are held, its regions painted, and its tissue pressed
+  trocar-organ edit spleen.organ --headless --release all --hold y=..-40,surface --out low.organ
+      the same without a window: held below y = -40 mm, into low.organ
   trocar-organ export spleen.organ --out spleen.vtu --unit mm
       its mesh, for ParaView
   trocar-organ settle spleen.organ --gravity 0,-9.81,0
@@ -104,6 +109,7 @@ struct Options {
   std::string picture;
   std::optional<bool> has_averaged_strain;
   ExportCommand exported;
+  edit_command::EditCommand edited;
   FitCommand fit;
   SettleCommand settle;
   CalibrateCommand calibrate;
@@ -407,6 +413,9 @@ void add_commands(CLI::App& app, Options& options) {
                    "also draw it from three sides, into this .png file")
       ->type_name("FILE");
   add_export_command(app, options.exported);
+  edit_command::add_options(
+      *app.add_subcommand("edit", "hold nodes, paint regions and try an organ, in a window"),
+      options.edited);
   for (auto* command : {make, import}) {
     command
         ->add_option("--material", options.material,
@@ -488,6 +497,8 @@ int run(int argc, char** argv) {
     status = run_import(options);
   else if (app.got_subcommand("export"))
     status = run_export(options.exported);
+  else if (app.got_subcommand("edit"))
+    status = run_edit(options.edited, argc, argv);
   else if (app.got_subcommand("fit"))
     status = run_fit(options.fit);
   else if (app.got_subcommand("settle"))

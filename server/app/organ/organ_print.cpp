@@ -3,11 +3,10 @@
 #include <algorithm>
 #include <cinttypes>
 #include <cstdio>
-#include <numeric>
 
 #include "common/base/json.h"
 #include "server/organs/material/material_keys.h"
-#include "server/organs/organ/organ_file.h"
+#include "server/organs/organ/organ_figures.h"
 
 namespace trocar::app {
 namespace {
@@ -29,28 +28,6 @@ EdgeLengths edge_lengths(const mesh::TetMesh& mesh) {
     lengths.mean_mm += l / static_cast<double>(pairs.size());
   }
   return lengths;
-}
-
-// Returns the volume that the surface encloses: that of the tets where there are any, and that of a
-// lattice too.
-double enclosed_volume(const mesh::TetMesh& mesh) {
-  double volume = 0;
-  for (const auto& [a, b, c] : mesh.boundary_triangles)
-    volume += dot(cross(mesh.rest_positions[a.value], mesh.rest_positions[b.value]),
-                  mesh.rest_positions[c.value]) /
-              6;
-  return volume;
-}
-
-Vec3d size_mm(const mesh::TetMesh& mesh) {
-  Vec3d half{};  // the rest bounding box is centred on the origin
-  for (const Vec3d& p : mesh.rest_positions)
-    half = {std::max(half.x, p.x), std::max(half.y, p.y), std::max(half.z, p.z)};
-  return half * 2e3;
-}
-
-double mass_kg(const organ::Organ& organ) {
-  return std::accumulate(organ.node_masses_kg.begin(), organ.node_masses_kg.end(), 0.0);
 }
 
 std::size_t nodes_with_fibres(const organ::Organ& organ) {
@@ -168,7 +145,7 @@ const char* name_of(material::ElasticLaw law) {
 
 void print_text(const organ::Organ& organ) {
   const mesh::TetMesh& mesh = organ.mesh;
-  const Vec3d size = size_mm(mesh);
+  const Vec3d size = organ::size_of(mesh) * 1e3;
   const EdgeLengths edges = edge_lengths(mesh);
   std::printf("%s  (%s)\n", organ.name.c_str(), organ.source.c_str());
   std::printf("  nodes               %s, %s of them on the surface\n",
@@ -183,8 +160,8 @@ void print_text(const organ::Organ& organ) {
   const Vec3d offset = organ.source_offset_m * 1e3;
   std::printf("  offset              %.4g %.4g %.4g mm: add it to a position to get the source's\n",
               offset.x, offset.y, offset.z);
-  std::printf("  volume              %.4g l\n", enclosed_volume(mesh) * 1e3);
-  std::printf("  mass                %.4g kg\n", mass_kg(organ));
+  std::printf("  volume              %.4g l\n", organ::enclosed_volume(mesh) * 1e3);
+  std::printf("  mass                %.4g kg\n", organ::mass_kg(organ));
   std::printf("  edge lengths        %.2f / %.2f / %.2f mm (least, mean, largest)\n", edges.min_mm,
               edges.mean_mm, edges.max_mm);
   if (!mesh.tets.empty()) {
@@ -210,9 +187,9 @@ void print_json(const organ::Organ& organ) {
             {"edges", mesh.edges.size()},
             {"links", mesh.links.size()},
             {"surface_triangles", mesh.boundary_triangles.size()},
-            {"size_mm", array_of(size_mm(mesh))},
-            {"volume_l", enclosed_volume(mesh) * 1e3},
-            {"mass_kg", mass_kg(organ)},
+            {"size_mm", array_of(organ::size_of(mesh) * 1e3)},
+            {"volume_l", organ::enclosed_volume(mesh) * 1e3},
+            {"mass_kg", organ::mass_kg(organ)},
             {"edge_mm", {{"min", edges.min_mm}, {"mean", edges.mean_mm}, {"max", edges.max_mm}}},
             {"dihedral_deg", nullptr}};
   if (!mesh.tets.empty()) {

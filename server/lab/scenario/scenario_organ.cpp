@@ -22,16 +22,6 @@ bool holds_an_element(const mesh::TetMesh& mesh, const NodeList& nodes) {
                            : std::ranges::any_of(mesh.tets, is_in);
 }
 
-// Returns a weight per node to which its mass is proportional: the lumped mass, kg, or, without
-// tets, the density of the node's material, kg/m^3.
-std::vector<double> mass_weights(const organ::Organ& organ) {
-  if (!organ.mesh.tets.empty()) return organ::lumped_masses(organ);
-  std::vector<double> densities;
-  for (const auto index : organ::material_map(organ).nodes)
-    densities.push_back(organ::material_at(organ, index).density_kg_m3);
-  return densities;
-}
-
 }  // namespace
 
 Result<organ::Organ> Resolver::source_organ() const {
@@ -109,7 +99,7 @@ Status Resolver::change_material(const MaterialChange& change, const organ::Orga
 }
 
 Status Resolver::change_materials(organ::Organ& organ) const {
-  const auto before = mass_weights(organ);
+  const auto before = organ::mass_weights(organ);
   const auto check = [&](const Place& place) -> Status {
     if (auto status = validate(organ); !status) return wrong(place, status.error().message);
     return {};
@@ -137,10 +127,7 @@ Status Resolver::change_materials(organ::Organ& organ) const {
     if (auto s = change_material(rule.material, organ, region->material); !s) return s;
     if (auto s = check(rule.material.place); !s) return s;
   }
-  // In proportion to density, whatever the masses were made from.
-  const auto after = mass_weights(organ);
-  for (std::size_t i = 0; i < after.size(); ++i)
-    if (after[i] != before[i]) organ.node_masses_kg[i] *= after[i] / before[i];
+  organ::follow_weights(organ, before);
   return {};
 }
 

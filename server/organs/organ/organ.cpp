@@ -15,7 +15,6 @@ constexpr double kMaxSize_m = 2.0;
 constexpr double kCentreTolerance_m = 1e-6;
 constexpr double kUnitTolerance = 1e-6;
 constexpr std::size_t kMaxTextBytes = 4096;
-constexpr std::size_t kMaxRegions = 1000;
 
 double stress_free_volume(const Organ& organ, std::size_t tet) {
   const auto& p = organ.stress_free();
@@ -311,6 +310,20 @@ std::vector<double> lumped_masses(const Organ& organ) {
     for (const NodeIndex node : organ.mesh.tets[t]) masses[node.value] += quarter;
   }
   return masses;
+}
+
+std::vector<double> mass_weights(const Organ& organ) {
+  if (!organ.mesh.tets.empty()) return lumped_masses(organ);
+  std::vector<double> densities;
+  for (const auto index : material_map(organ).nodes)
+    densities.push_back(material_at(organ, index).density_kg_m3);
+  return densities;
+}
+
+void follow_weights(Organ& organ, const std::vector<double>& weights_before) {
+  const auto after = mass_weights(organ);
+  for (std::size_t i = 0; i < after.size(); ++i)
+    if (after[i] != weights_before[i]) organ.node_masses_kg[i] *= after[i] / weights_before[i];
 }
 
 std::uint64_t organ_hash(const Organ& organ) {

@@ -15,6 +15,8 @@
 
 namespace trocar::organ {
 
+inline constexpr std::size_t kMaxRegions = 1000;
+
 struct Organ {
   std::string name;    // "liver" or another built-in one's, or the file's stem
   std::string source;  // one line: generator and parameters, or the imported file's name
@@ -78,6 +80,13 @@ Spring spring_along(const Vec3d& along, const material::Material& own, const Vec
 
 // m_i = sum over tets k at node i of rho_k V_k / 4 (Nakao 2003 eq. 4). Needs tets.
 std::vector<double> lumped_masses(const Organ& organ);
+
+// A weight per node to which its mass is proportional: the lumped mass, kg, or, without tets, the
+// density of the node's material, kg/m^3.
+std::vector<double> mass_weights(const Organ& organ);
+// Brings the node masses from weights that the organ had before to those that it has now, whatever
+// the masses were made from. Equal weights leave a mass as it is, to the bit.
+void follow_weights(Organ& organ, const std::vector<double>& weights_before);
 
 // XXH3-64 over the organ's arrays (not over a file's bytes): names a mesh and material for files
 // and sessions that depend on it. Each array is preceded by its length (u64); in order: rest
