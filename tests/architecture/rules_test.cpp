@@ -21,7 +21,7 @@ class Rules : public ::testing::Test {
     write("CMakeLists.txt",
           "set(TROCAR_LAYERS # the order\n  common/base common/math\n  proto common/wire\n"
           "  server/tissue/world server/tissue/step server/session/net\n  client/net "
-          "client/render\n  workshop/editor)\nset(TROCAR_STATE_FOLDERS common/math "
+          "client/render\n  client/editor)\nset(TROCAR_STATE_FOLDERS common/math "
           "server/tissue/world "
           "server/tissue/step)\n");
     library("common/base", "SOURCES a.cpp HEADERS a.h timing.h");
@@ -160,11 +160,11 @@ TEST_F(Rules, ServerAndClientInEitherDirectionAreFound) {
   expect_one(check_folders(tree()), "server/session/net/CMakeLists.txt:1: ", "do not see");
 }
 
-TEST_F(Rules, TheWorkshopSeesServerAndClientAndNobodySeesIt) {
-  library("workshop/editor", "HEADERS e.h DEPENDS client/render server/tissue/world");
-  write("workshop/editor/e.h", "#pragma once\n");
+TEST_F(Rules, TheEditorSeesServerAndClientAndNobodySeesIt) {
+  library("client/editor", "HEADERS e.h DEPENDS client/render server/tissue/world");
+  write("client/editor/e.h", "#pragma once\n");
   EXPECT_TRUE(check_folders(tree()).empty());
-  library("client/render", "SOURCES r.cpp USES workshop/editor");
+  library("client/render", "SOURCES r.cpp USES client/editor");
   expect_one(check_folders(tree()), "client/render/CMakeLists.txt:1: ", "do not see");
 }
 

@@ -36,8 +36,8 @@ anchors() {
 is_name_of_source() { # SCOPE::NAME
   local scope=${1%::*} name=${1##*::}
   scope=${scope##*::}
-  grep -rqwF --include='*.h' --include='*.cpp' -- "$scope::$name" common server client workshop && return
-  grep -rlE --include='*.h' "^namespace trocar::$scope " common server client workshop |
+  grep -rqwF --include='*.h' --include='*.cpp' -- "$scope::$name" common server client && return
+  grep -rlE --include='*.h' "^namespace trocar::$scope " common server client |
     xargs -r grep -qwE "(class|struct) $name"
 }
 
@@ -58,7 +58,7 @@ check_links() {
     # Paths of the source in code spans.
     while read -r target; do
       [ -e "$target" ] || fault "$page: names $target, which does not exist"
-    done < <(grep -oE '`(server|client|common|workshop|proto|tests|deploy)/[A-Za-z0-9_./-]*[A-Za-z0-9_]`' "$page" |
+    done < <(grep -oE '`(server|client|common|proto|tests|deploy)/[A-Za-z0-9_./-]*[A-Za-z0-9_]`' "$page" |
       tr -d '`' | sort -u)
     # Names of the source in code spans, as scope::name.
     while read -r target; do

@@ -13,7 +13,7 @@ fresh() {
   cp -r "$root/docs" "$copy"
 }
 # Sources are only read.
-for folder in server client common workshop proto tests deploy CMakeLists.txt LICENSE; do
+for folder in server client common proto tests deploy CMakeLists.txt LICENSE; do
   ln -s "$root/$folder" "$copy/$folder"
 done
 

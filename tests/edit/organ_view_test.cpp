@@ -1,6 +1,6 @@
 // The organ in the editor's window: where a pixel meets it, and which colour its nodes have.
 
-#include "workshop/editor/organ_view.h"
+#include "client/editor/organ_view.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // The figures of the editor's panel are in the units that people read.
 
-#include "workshop/editor/panel_state.h"
+#include "client/editor/panel_state.h"
 
 #include <gtest/gtest.h>
 

@@ -1,7 +1,7 @@
 #pragma once
 
 // The options of trocar-organ edit. With a window another program shows the organ
-// (workshop/editor); it reads the same command line. So what is opened and edited by options is
+// (client/editor); it reads the same command line. So what is opened and edited by options is
 // here, once.
 
 #include <CLI/CLI.hpp>

@@ -158,9 +158,11 @@ SelfContactFinder::ClosestPoint SelfContactFinder::closest_point(Site site, Tria
 SelfContactFinder::ClosestPoint SelfContactFinder::closest_point_around(
     Site site, std::span<const Site> around, bool is_of_lips, const world::World& world) {
   ClosestPoint best;
-  for (const auto corner : around)
-    for (const auto t : surface_.triangles_of(corner)) {
-      if (this->is_of_lips(site, t) != is_of_lips) continue;
+  for (std::size_t k = 0; k < around.size(); ++k)
+    for (const auto t : surface_.triangles_of(around[k])) {
+      const bool is_seen = std::ranges::any_of(
+          around.first(k), [&](Site s) { return std::ranges::count(surface_[t], s) > 0; });
+      if (is_seen || this->is_of_lips(site, t) != is_of_lips) continue;
       const ClosestPoint closest = closest_point(site, t, world);
       const bool is_better = !best.triangle.is_valid() || closest.squared < best.squared ||
                              (closest.squared == best.squared && closest.triangle < best.triangle);

@@ -1,4 +1,4 @@
-#include "workshop/editor/editor_window.h"
+#include "client/editor/editor_window.h"
 
 #include <algorithm>
 #include <chrono>

@@ -6,10 +6,10 @@
 #include <memory>
 #include <span>
 
+#include "client/editor/panel_state.h"
 #include "client/render/scene_renderer.h"
 #include "common/math/vec3.h"
 #include "server/lab/press/press_trial.h"
-#include "workshop/editor/panel_state.h"
 
 namespace trocar::editor {
 

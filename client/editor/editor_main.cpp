@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "client/editor/editor_window.h"
 #include "common/base/cpu.h"
 #include "common/base/log.h"
 #include "common/base/timing.h"
@@ -13,7 +14,6 @@
 #include "server/app/edit_command/edit_command.h"
 #include "server/organs/edit/save.h"
 #include "server/organs/material/material_file.h"
-#include "workshop/editor/editor_window.h"
 
 namespace trocar::editor {
 namespace {

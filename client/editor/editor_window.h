@@ -8,15 +8,15 @@
 #include <string>
 #include <vector>
 
+#include "client/editor/hand_press.h"
+#include "client/editor/organ_view.h"
+#include "client/editor/panel.h"
 #include "client/render/camera.h"
 #include "client/render/gl_context.h"
 #include "client/render/scene_renderer.h"
 #include "client/ui/hud.h"
 #include "server/organs/edit/editor.h"
 #include "server/organs/edit/surface_brush.h"
-#include "workshop/editor/hand_press.h"
-#include "workshop/editor/organ_view.h"
-#include "workshop/editor/panel.h"
 
 namespace trocar::editor {
 

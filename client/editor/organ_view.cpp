@@ -1,4 +1,4 @@
-#include "workshop/editor/organ_view.h"
+#include "client/editor/organ_view.h"
 
 #include <algorithm>
 

@@ -1,4 +1,4 @@
-#include "workshop/editor/hand_press.h"
+#include "client/editor/hand_press.h"
 
 #include <algorithm>
 

@@ -5,7 +5,7 @@
 
 #include <span>
 
-#include "workshop/editor/panel_state.h"
+#include "client/editor/panel_state.h"
 
 namespace trocar::editor {
 

@@ -1,4 +1,4 @@
-#include "workshop/editor/panel_state.h"
+#include "client/editor/panel_state.h"
 
 #include <cstdio>
 

@@ -1,12 +1,12 @@
-#include "workshop/editor/panel.h"
+#include "client/editor/panel.h"
 
 #include <imgui.h>
 
 #include <algorithm>
 
+#include "client/editor/organ_view.h"
 #include "client/shape/tool_mesh.h"
 #include "client/ui/palette.h"
-#include "workshop/editor/organ_view.h"
 
 namespace trocar::editor {
 namespace {
