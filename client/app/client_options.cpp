@@ -11,6 +11,7 @@
 #include <map>
 
 #include "client/ui/hud.h"
+#include "common/base/number_option.h"
 #include "common/base/printable.h"
 #include "common/base/version.h"
 #include "common/secure/join_code.h"
@@ -262,7 +263,7 @@ void add_session_options(CLI::App& app, ClientOptions& options, GivenTexts& more
                "frames and hands over the TCP stream alone");
   app.add_option("--wait", options.wait_s, "how long to try while no server is there yet")
       ->type_name("S")
-      ->check(CLI::Range(0.0, 3600.0))
+      ->check(from_to(0, 3600))
       ->capture_default_str();
   app.add_option("--name", options.name, "how others see you, unique in the session")
       ->type_name("NAME");
@@ -283,11 +284,11 @@ void add_picture_options(CLI::App& app, ClientOptions& options, GivenTexts& more
   app.add_option("--scale", options.scale,
                  "how large words and panels are, as far as they fit [as the monitor says]")
       ->type_name("FACTOR")
-      ->check(CLI::Range(double{ui::kLeastScale}, double{ui::kMostScale}));
+      ->check(from_to(double{ui::kLeastScale}, double{ui::kMostScale}));
   app.add_option("--fps", options.pictures_per_second,
                  "pictures per second [window 60, headless 15, fewer in software]")
       ->type_name("N")
-      ->check(CLI::Range(1.0, 240.0));
+      ->check(from_to(1, 240));
   app.add_option(
          "--show", more.overlays,
          "what is drawn over the picture: regions, holds, arrows, rate, ghost, or nothing; keys "
@@ -306,24 +307,24 @@ void add_picture_options(CLI::App& app, ClientOptions& options, GivenTexts& more
   app.add_option("--screenshot-at", options.screenshot_at,
                  "seconds after joining at which it is taken [the last picture]")
       ->type_name("S")
-      ->check(CLI::Range(0.0, 1e6));
+      ->check(from_to(0, 1e6));
 }
 
 void add_time_options(CLI::App& app, ClientOptions& options) {
   app.add_option("--seconds", options.seconds, "leave after this many seconds")
       ->type_name("N")
-      ->check(CLI::Range(0.0, 1e9));
+      ->check(from_to(0, 1e9));
   app.add_option("--answer-at", options.answer_at,
                  "in a lesson: say that it is here so many seconds after joining")
       ->type_name("S")
-      ->check(CLI::Range(0.0, 1e6));
+      ->check(from_to(0, 1e6));
   app.add_option("--mark-at", options.mark_at,
                  "as instructor: mark the organ so many seconds after joining")
       ->type_name("S")
-      ->check(CLI::Range(0.0, 1e6));
+      ->check(from_to(0, 1e6));
   app.add_option("--return-at", options.return_at, "as instructor: return it to the mark then")
       ->type_name("S")
-      ->check(CLI::Range(0.0, 1e6));
+      ->check(from_to(0, 1e6));
 }
 
 void add_hand_options(CLI::App& app, ClientOptions& options, GivenTexts& more) {
@@ -359,12 +360,12 @@ void add_hand_options(CLI::App& app, ClientOptions& options, GivenTexts& more) {
   app.add_option("--device-motion", options.device_motion,
                  "how far the tool goes where the device goes 1")
       ->type_name("SCALE")
-      ->check(CLI::Range(0.01, 20.0))
+      ->check(from_to(0.01, 20))
       ->capture_default_str();
   app.add_option("--device-force", options.device_force,
                  "the force on the hand where the tool feels 1")
       ->type_name("SCALE")
-      ->check(CLI::Range(0.0, 10.0))
+      ->check(from_to(0, 10))
       ->capture_default_str();
   app.add_option("--hand-trace", options.trace_file,
                  "write what each device did and felt, a row for each millisecond (CSV)")
@@ -389,14 +390,14 @@ void add_replay_options(CLI::App& app, ClientOptions& options, GivenTexts& more)
       ->type_name("FOLDER");
   app.add_option("--from", options.series_from_s, "with --pictures: first second of the recording")
       ->type_name("S")
-      ->check(CLI::Range(0.0, 1e6));
+      ->check(from_to(0, 1e6));
   app.add_option("--to", options.series_to_s, "with --pictures: last second; 0: the end")
       ->type_name("S")
-      ->check(CLI::Range(0.0, 1e6));
+      ->check(from_to(0, 1e6));
   app.add_option("--rate", options.series_rate,
                  "with --pictures: of them per second of the recording")
       ->type_name("N")
-      ->check(CLI::Range(0.1, 120.0))
+      ->check(from_to(0.1, 120))
       ->capture_default_str();
   app.add_option("--feel", more.feels,
                  "with --replay and --device: feel what this participant felt, with tool 0 or 1; "
@@ -407,7 +408,7 @@ void add_replay_options(CLI::App& app, ClientOptions& options, GivenTexts& more)
   app.add_option("--feel-pull", options.feel_pull_n_m,
                  "stiffness of the spring that leads the hand along with --feel, N/m; 0: none")
       ->type_name("N/M")
-      ->check(CLI::Range(0.0, 500.0))
+      ->check(from_to(0, 500))
       ->capture_default_str();
 }
 

@@ -1,5 +1,5 @@
 # What `cmake --install build/release` copies, as one component for each package: server, client, tools,
-# web and doc. Programs look for nothing but what lies beside them: the page of trocar-web is in
+# web, python and doc. Programs look for nothing but what lies beside them: the page of trocar-web is in
 # <prefix>/share/trocar/web. Files of /etc belong to the packages alone (deploy/cmake/package.cmake).
 include(GNUInstallDirs)
 set(TROCAR_COMPONENT_PROGRAMS
@@ -70,6 +70,25 @@ if(TROCAR_WEB)
   # Each file lies there compressed, too: the program sends it as it is.
   install(DIRECTORY "${PROJECT_BINARY_DIR}/web/page/" DESTINATION "${share}/trocar/web" COMPONENT web
     FILE_PERMISSIONS OWNER_READ OWNER_WRITE GROUP_READ WORLD_READ)
+endif()
+
+# Debian's Python looks here below /usr/local; the package has another folder (deploy/cmake/package.cmake).
+if(TROCAR_PYTHON)
+  target_link_options(trocar_module PRIVATE -Wl,-z,relro,-z,now)
+  set(python_files "${PROJECT_SOURCE_DIR}/deploy/python")
+  install(TARGETS trocar_module LIBRARY COMPONENT python PERMISSIONS OWNER_READ OWNER_WRITE GROUP_READ WORLD_READ
+    DESTINATION "lib/python${Python_VERSION_MAJOR}.${Python_VERSION_MINOR}/dist-packages")
+  install(FILES "${python_files}/trocar.pyi" COMPONENT python
+    DESTINATION "lib/python${Python_VERSION_MAJOR}.${Python_VERSION_MINOR}/dist-packages")
+  # They find the scenarios in the folder beside theirs.
+  foreach(component IN ITEMS python of_python)
+    set(all)
+    if(component STREQUAL "of_python")
+      set(all EXCLUDE_FROM_ALL)
+    endif()
+    install(DIRECTORY "${python_files}/" DESTINATION "${share}/trocar/python" COMPONENT ${component} ${all}
+      FILES_MATCHING PATTERN "*.py")
+  endforeach()
 endif()
 
 install(FILES "${PROJECT_SOURCE_DIR}/README.md" "${PROJECT_SOURCE_DIR}/LICENSE" DESTINATION "${doc}/trocar"

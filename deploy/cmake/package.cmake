@@ -16,18 +16,34 @@ if(NOT entry MATCHES "\"${PROJECT_VERSION}\"")
   message(FATAL_ERROR "common/base/version.h: says ${entry}, and CMakeLists.txt ${PROJECT_VERSION}")
 endif()
 set(packaged server client tools web doc)
+if(TROCAR_PYTHON)
+  list(APPEND packaged python)
+endif()
+# package_name(<variable> <component>): Debian names modules for Python by another rule.
+function(package_name variable component)
+  set(${variable} "trocar-${component}" PARENT_SCOPE)
+  if(component STREQUAL "python")
+    set(${variable} "python3-trocar" PARENT_SCOPE)
+  endif()
+endfunction()
 if(GZIP_PROGRAM)
   file(MAKE_DIRECTORY "${PROJECT_BINARY_DIR}/debian")
   execute_process(COMMAND "${GZIP_PROGRAM}" -9nc "${debian}/changelog"
     OUTPUT_FILE "${PROJECT_BINARY_DIR}/debian/changelog.Debian.gz" COMMAND_ERROR_IS_FATAL ANY)
 endif()
 foreach(name IN LISTS packaged)
+  package_name(package ${name})
   install(FILES "${debian}/copyright" "${PROJECT_BINARY_DIR}/debian/changelog.Debian.gz"
-    DESTINATION "share/doc/trocar-${name}" COMPONENT of_${name} EXCLUDE_FROM_ALL)
+    DESTINATION "share/doc/${package}" COMPONENT of_${name} EXCLUDE_FROM_ALL)
 endforeach()
 install(FILES "${files}/lesson.toml" "${files}/hall.toml" DESTINATION /etc/trocar COMPONENT of_server EXCLUDE_FROM_ALL)
 install(FILES "${files}/web.toml" DESTINATION /etc/trocar COMPONENT of_web EXCLUDE_FROM_ALL)
 install(FILES "${files}/trocar-server.conf" DESTINATION lib/sysusers.d COMPONENT of_server EXCLUDE_FROM_ALL)
+if(TROCAR_PYTHON)
+  install(TARGETS trocar_module LIBRARY DESTINATION lib/python3/dist-packages COMPONENT of_python EXCLUDE_FROM_ALL
+    PERMISSIONS OWNER_READ OWNER_WRITE GROUP_READ WORLD_READ)
+  install(FILES "${python_files}/trocar.pyi" DESTINATION lib/python3/dist-packages COMPONENT of_python EXCLUDE_FROM_ALL)
+endif()
 install(FILES "${files}/trocar-web.conf" DESTINATION lib/sysusers.d COMPONENT of_web EXCLUDE_FROM_ALL)
 
 set(CPACK_GENERATOR DEB)
@@ -48,10 +64,15 @@ set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
 set(CPACK_COMPONENTS_ALL)
 foreach(name IN LISTS packaged)
   string(TOUPPER ${name} key)
-  list(APPEND CPACK_COMPONENTS_ALL ${name} of_${name})
+  package_name(package ${name})
+  # Debian's own modules have another folder than what is installed below /usr/local.
+  if(NOT name STREQUAL "python")
+    list(APPEND CPACK_COMPONENTS_ALL ${name})
+  endif()
+  list(APPEND CPACK_COMPONENTS_ALL of_${name})
   set(CPACK_COMPONENT_${key}_GROUP ${name})
   set(CPACK_COMPONENT_OF_${key}_GROUP ${name})
-  set(CPACK_DEBIAN_${key}_PACKAGE_NAME trocar-${name})
+  set(CPACK_DEBIAN_${key}_PACKAGE_NAME ${package})
   set(CPACK_DEBIAN_${key}_PACKAGE_SECTION science)
   set(CPACK_DEBIAN_${key}_PACKAGE_CONTROL_EXTRA "${debian}/any/preinst")
 endforeach()
@@ -80,6 +101,11 @@ Trocar lets several people, each at a machine of their own, work on one
 organ that one server owns. This package serves a page on which people
 watch sessions and recordings, and on which an instructor leads a lesson.
 ${processor}")
+set(CPACK_DEBIAN_PYTHON_DESCRIPTION "surgery simulator: module for Python
+Trocar lets several people, each at a machine of their own, work on one
+organ that one server owns. This package runs its engine inside Python 3:
+organs, scenarios, sessions and recordings as arrays of numpy.
+${processor}")
 set(CPACK_DEBIAN_DOC_DESCRIPTION "surgery simulator: the book
 Trocar lets several people, each at a machine of their own, work on one
 organ that one server owns. This package has its book: how lessons are
@@ -98,6 +124,15 @@ set(CPACK_DEBIAN_TOOLS_PACKAGE_SUGGESTS "trocar-client, trocar-doc, weasyprint")
 set(CPACK_DEBIAN_WEB_PACKAGE_DEPENDS "${sysusers}")
 set(CPACK_DEBIAN_WEB_PACKAGE_RECOMMENDS "trocar-tools")
 set(CPACK_DEBIAN_WEB_PACKAGE_SUGGESTS "trocar-server, trocar-doc")
+set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
+if(TROCAR_PYTHON)
+  # It is for one version of Python.
+  math(EXPR next "${Python_VERSION_MINOR} + 1")
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS
+    "python3 (>= 3.${Python_VERSION_MINOR}), python3 (<< 3.${next}), python3-numpy")
+endif()
+set(CPACK_DEBIAN_PYTHON_PACKAGE_RECOMMENDS "trocar-tools")
+set(CPACK_DEBIAN_PYTHON_PACKAGE_SUGGESTS "python3-matplotlib, python3-pandas, trocar-doc")
 set(CPACK_DEBIAN_DOC_PACKAGE_SECTION doc)
 set(CPACK_DEBIAN_DOC_PACKAGE_ARCHITECTURE all)
 set(CPACK_DEBIAN_DOC_PACKAGE_CONTROL_EXTRA)

@@ -1,5 +1,11 @@
-# The Python module needs position-independent code of every library it is made of. Inlining stays as
-# it is without: no other library may put its own functions in the place of ours.
+# The Python module is made of the same libraries as the programs, so these are position-independent.
+# Hidden, and with -fno-semantic-interposition, a function is still called directly and inlined: nobody
+# can put another in its place. Programs are compiled and linked as before.
+function(make_position_independent target)
+  set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE ON)
+  target_compile_options(${target} PRIVATE -fvisibility=hidden -fno-semantic-interposition)
+endfunction()
+
 if(TROCAR_PYTHON)
   # Debian's own, for which pybind11 and numpy are packaged; another may come first on PATH.
   set(Python_EXECUTABLE "/usr/bin/python3" CACHE FILEPATH "Python that the module is for")
@@ -10,7 +16,5 @@ if(TROCAR_PYTHON)
     set(TROCAR_PYTHON OFF)
   endif()
 endif()
-if(TROCAR_PYTHON)
-  set(CMAKE_POSITION_INDEPENDENT_CODE ON)
-  add_compile_options(-fvisibility=hidden -fno-semantic-interposition)
-endif()
+# Nothing where the module is not built.
+add_custom_target(python_module)

@@ -1,4 +1,4 @@
-"""Reads the tools of a recording into pandas and prints how hard each pressed.
+"""Reads the tools of a recording into pandas and prints the force on each, N, over all frames.
 
 Needs trocar and pandas (python3-pandas); without pandas it says so and exits with 5.
 """
@@ -21,6 +21,7 @@ def main():
     with trocar.Recording(options.recording) as recording:
         table = pandas.DataFrame(recording.tools())
     table["force_n"] = (table[["fx_n", "fy_n", "fz_n"]] ** 2).sum(axis=1) ** 0.5
+    print("Force of the tissue on each tool, N, frame by frame")
     print(table.groupby("tool")["force_n"].describe())
     return 0
 

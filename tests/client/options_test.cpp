@@ -99,6 +99,7 @@ TEST(ClientOptions, EachWrongValueIsAUsageErrorThatNamesTheOption) {
       {{"--role", "nurse"}, "--role"},
       {{"--fps", "0"}, "--fps"},
       {{"--wait", "-1"}, "--wait"},
+      {{"--wait", "nan"}, "--wait"},
       {{"--screenshot-at", "-3"}, "--screenshot-at"},
       {{"--role", "observer", "--script", "x.toml"}, "--script"},
       {{"--replay", "x.mcap", "--script", "x.toml"}, "--replay"},

@@ -117,6 +117,23 @@ check "a picture without a display" as ada \
   'trocar-client --replay lesson.mcap --headless --size 640x360 --seconds 3 --screenshot picture.png && test -s picture.png'
 check "a scenario" as ada 'trocar-sim /usr/share/trocar/scenes/pull.toml --out pull'
 check "an organ" as ada 'trocar-organ make plate && trocar-organ inspect plate.organ'
+# The first lines of docs/python.md, and an example that needs the scenes of the tools.
+press() {
+  cat >"$root/home/ada/press.py" <<'PYTHON'
+import trocar
+organ = trocar.Organ("liver")
+session = trocar.Session(organ)
+top = organ.nodes[organ.nodes[:, 2].argmax()]
+session.put(0, top + [0, 0, 0.01], "push", shaft=(0, 0, 1))
+session.step(100)
+session.put(0, top - [0, 0, 0.004], "push", shaft=(0, 0, 1))
+session.step(200)
+assert session.force()[2] > 0
+print(session.force(), "N", session.state_hash())
+PYTHON
+  as ada '/usr/bin/python3 press.py && /usr/bin/python3 /usr/share/trocar/python/fit_material.py'
+}
+if [ -e "$root"/usr/lib/python3/dist-packages/trocar.pyi ]; then check "a press in Python" press; fi
 
 page() {
   local port answer
@@ -168,9 +185,11 @@ recordings() { find "$root/var/lib/trocar/recordings" -name '*.mcap' | wc -l; }
 check "others cannot read its recordings" as ada '! ls /var/lib/trocar/recordings'
 
 # ---- Removal and return ----
-remove_all() { inside sh -c 'apt-get remove -y "trocar-*"'; }
+all=$(cd "$packages" && printf '%s\n' *.deb | sed 's/_.*//' | tr '\n' ' ')
+remove_all() { inside sh -c "apt-get remove -y $all"; }
 check "removal" remove_all
-check "no program is left" inside sh -c '! ls /usr/bin/trocar-* /usr/share/trocar /usr/lib/systemd/system/trocar*'
+check "no program is left" inside sh -c \
+  '[ -z "$(ls -d /usr/bin/trocar-* /usr/share/trocar /usr/lib/systemd/system/trocar* /usr/lib/python3/dist-packages/trocar*)" ]'
 check "configuration, codes and recordings are" test -e "$root/etc/trocar/lesson.toml" -a \
   -e "$root/var/lib/trocar/state/codes-7699.json" -a "$(recordings)" = 1
 check "the same packages again" install_all
@@ -186,7 +205,7 @@ check "the first recording is there, and a second one" test "$(recordings)" = 2
 check "an upgrade keeps what somebody changed in /etc" inside sh -c \
   'echo "# mine" >>/etc/trocar/lesson.toml; dpkg -i /packages/trocar-server_*.deb && tail -n 1 /etc/trocar/lesson.toml | grep -q mine'
 
-check "purge" inside sh -c 'apt-get purge -y "trocar-*"'
+check "purge" inside sh -c "apt-get purge -y $all"
 nothing_left() {
   # systemd removes the folder in /run at the end of a session.
   rm -rf "$root/run/trocar-lesson"

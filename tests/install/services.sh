@@ -98,7 +98,7 @@ hall_stop() {
 }
 removal() {
   systemctl enable trocar@lesson trocar-web && logs trocar@lesson 'at 127.0.0.1'
-  apt-get remove -y 'trocar-*' && ! systemctl is-active trocar@lesson && ! systemctl is-active trocar-web &&
+  apt-get remove -y 'trocar-*' '~i~npython3-trocar' && ! systemctl is-active trocar@lesson && ! systemctl is-active trocar-web &&
     ls "$recordings"/*.mcap
 }
 

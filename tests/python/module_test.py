@@ -42,6 +42,19 @@ class ScenarioTest(unittest.TestCase):
                 self.assertRaisesRegex(ValueError, "closed", call)
         self.assertEqual(result.values["middle_displacement"].shape, (75, 3))
 
+    def test_tools_of_a_recording_are_columns(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "feel.mcap"
+            scene = pathlib.Path(__file__).with_name("feel.toml")
+            subprocess.run([os.environ["TROCAR_SIM"], scene, "--journal", path, "--out", folder], check=True,
+                           stdout=subprocess.DEVNULL)
+            with trocar.Recording(path) as recording:
+                columns = recording.tools()
+        self.assertEqual({len(column) for column in columns.values()}, {len(columns["tick"])})
+        self.assertEqual(set(columns["verb"]), {"push"})
+        self.assertEqual(columns["fy_n"][0], 0)
+        self.assertGreater(columns["fy_n"][-1], 0)  # of the tissue: outward
+
     def test_errors_name_the_line(self):
         with self.assertRaises(trocar.Error) as caught:
             trocar.Scenario.parse("[organ]\nsource = \"block\"\nspaced = 1\n", "x.toml")

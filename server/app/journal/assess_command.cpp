@@ -14,6 +14,7 @@
 
 #include "common/base/exit_code.h"
 #include "common/base/log.h"
+#include "common/base/number_option.h"
 #include "common/base/text_file.h"
 #include "server/app/journal/program_name.h"
 #include "server/app/journal/run_program.h"
@@ -196,14 +197,14 @@ void add_options(CLI::App& command, AssessOptions& options) {
   command
       .add_option("--force-limit", options.force_limit_n,
                   "in N, where a stage has no limit of its own")
-      ->check(CLI::Range(0.01, 100.0))
+      ->check(from_to(0.01, 100))
       ->capture_default_str();
   command.add_flag("--strain", options.measures_strain,
                    "how much tissue was strained too far: simulates the session again");
   command
       .add_option("--strain-limit", options.strain_limit,
                   "with --strain: the greatest principal strain that tissue bears")
-      ->check(CLI::Range(0.01, 2.0))
+      ->check(from_to(0.01, 2))
       ->capture_default_str();
   command.add_flag("--pseudonyms", options.has_pseudonyms, "write Person 1, 2, ... for names");
   command.add_flag("--json", options.as_json, "print one JSON object");

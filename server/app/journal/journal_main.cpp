@@ -285,9 +285,9 @@ int run(int argc, char** argv) {
       ->type_name("FILE");
   try {
     app.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
-    const int code = app.exit(e);
-    return code == 0 ? 0 : static_cast<int>(ExitCode::Usage);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return app.exit(error);
+    return report(kProgram, {ErrorCode::Usage, std::string(error.what()) + " (see --help)"});
   }
   if (auto s = log::configure(kProgram, log_level); !s) return report(kProgram, s.error());
   if (measure->parsed()) return assess(assess_options);

@@ -12,6 +12,7 @@
 
 #include "common/base/cpu.h"
 #include "common/base/log.h"
+#include "common/base/number_option.h"
 #include "common/base/version.h"
 #include "server/app/organ/organ_calibrate.h"
 #include "server/app/organ/organ_edit.h"
@@ -394,12 +395,12 @@ void add_commands(CLI::App& app, Options& options) {
       ->check(CLI::IsMember({"springs", "tensor-mass", "neo-hookean"}));
   import->add_option("--young-modulus", options.young_modulus_pa, "of its tissue, Pa [4000]")
       ->type_name("E")
-      ->check(CLI::Range(1.0, 1e12));
+      ->check(from_to(1, 1e12));
   import
       ->add_option("--poisson-ratio", options.poisson_ratio,
                    "of tensor-mass and neo-hookean tissue, 0 to 0.4999 [0.45]")
       ->type_name("NU")
-      ->check(CLI::Range(0.0, 0.4999));
+      ->check(from_to(0, 0.4999));
 
   auto* inspect = app.add_subcommand("inspect", "check an organ and print its figures");
   inspect

@@ -6,6 +6,7 @@
 #include <cinttypes>
 #include <cstdio>
 
+#include "common/base/number_option.h"
 #include "server/app/sim/program_name.h"
 #include "server/lab/finite_elements/scenario_solve.h"
 #include "server/lab/scenario/field_files.h"
@@ -151,7 +152,7 @@ void add_fem_options(CLI::App& app, FemCommand& command) {
       ->group(group);
   app.add_option("--bulk-ratio", command.bulk_ratio, "its bulk modulus over C10 [its own]")
       ->type_name("RATIO")
-      ->check(CLI::Range(2.0, 1e6))
+      ->check(from_to(2, 1e6))
       ->group(group);
   app.add_option("--response", command.response,
                  "static runs: instantaneous, or equilibrium after all relaxation [instantaneous]")
@@ -160,7 +161,7 @@ void add_fem_options(CLI::App& app, FemCommand& command) {
       ->group(group);
   app.add_option("--step-ms", command.step_ms, "dynamic runs: step of time [1]")
       ->type_name("MS")
-      ->check(CLI::Range(0.001, 1e6))
+      ->check(from_to(0.001, 1e6))
       ->group(group);
   app.add_option("--resume", command.resume,
                  "go on from this state of the same run; every run leaves one, fem.state in its "

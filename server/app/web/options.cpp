@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <charconv>
 
+#include "common/base/number_option.h"
 #include "common/base/version.h"
 #include "common/secure/loopback.h"
 #include "server/app/config/config_file.h"
@@ -97,7 +98,7 @@ CommandLine::CommandLine() {
       ->type_name("ADDR:PORT");
   app_.add_option("--seconds", options_.seconds, "end after this many seconds [Ctrl-C]")
       ->type_name("N")
-      ->check(CLI::Range(0.0, 1e9));
+      ->check(from_to(0, 1e9));
   app_.add_option("--ready-file", options_.ready_file, "write the port to this file when listening")
       ->type_name("FILE");
   app_.add_option("--log-level", options_.log_level, "error, warn, info, debug or off")
