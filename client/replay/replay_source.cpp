@@ -27,6 +27,12 @@ std::optional<std::uint32_t> major_of(const std::string& protocol) {
   return major;
 }
 
+// Recordings of 0.1.0 may have a frame at a later time than its own, where somebody came or went
+// while the disk was slow. It is left out, and the next keyframe goes on.
+bool is_late(Tick tick, const JournalStream::Entry& entry) {
+  return tick < entry.tick;
+}
+
 // A watcher's slot that nobody in the recording had, so that no tool seems to be ours.
 std::uint32_t free_observer_slot(const journal::SessionInfo& info) {
   for (std::uint32_t slot = kMaxHands; slot < kMaxParticipants; ++slot)
@@ -287,13 +293,13 @@ Status ReplaySource::deliver_surface(Entries entries, replica::MessageSink& sink
       if (entry.topic != topic) continue;
       if (Status parsed = parse(topic, entry.tick, stream_->bytes_of(entry), frame); !parsed.ok())
         return parsed;
-      if (frame.tick() != entry.tick || frame.is_keyframe() != is_key)
+      if (frame.tick() > entry.tick || frame.is_keyframe() != is_key)
         return stream_->malformed(topic, entry.tick, "is a frame of another kind or tick");
       if (is_key && needs_key_ && frame.epoch() != epoch_)
         if (const auto topology = stream_->last_before(JournalTopic::Topology, entry.tick))
           if (Status done = deliver_topology(topology->tick, topology->data, sink); !done.ok())
             return done;
-      if (frame.epoch() != epoch_) continue;
+      if (frame.epoch() != epoch_ || is_late(frame.tick(), entry)) continue;
       if (is_key ? !needs_key_ && frame.frame() <= frame_
                  : needs_key_ || frame.base_frame() != frame_)
         continue;
@@ -314,8 +320,9 @@ Status ReplaySource::deliver_state(const JournalStream::Entry& entry, replica::M
   proto::FrameState& state = *state_message_.mutable_frame_state();
   if (Status parsed = parse(entry.topic, entry.tick, stream_->bytes_of(entry), state); !parsed.ok())
     return parsed;
-  if (state.tick() != entry.tick)
+  if (state.tick() > entry.tick)
     return stream_->malformed(entry.topic, entry.tick, "is of another tick");
+  if (is_late(state.tick(), entry)) return {};
   if (state.frame() != frame_ || needs_key_) return {};
   if (is_seeking_ && entry.tick < states_from_)
     held_state_.Swap(&state_message_);

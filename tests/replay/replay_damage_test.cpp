@@ -167,6 +167,31 @@ TEST_F(ReplayDamageTest, FrameOfAnotherTickClosesTheSource) {
   EXPECT_EQ(player.replica.newest()->frame, 49u);
 }
 
+// A frame that was written with the time of a later one.
+TEST_F(ReplayDamageTest, ALateFrameIsLeftOutAndTheNextKeyframeGoesOn) {
+  RecordingOptions options{.frames = 300};
+  options.tamper = [](JournalTopic topic, Frame frame, Bytes& bytes) {
+    proto::SurfaceFrame message;
+    if (topic != JournalTopic::SurfaceDelta || frame != 50) return true;
+    message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
+    message.set_tick(message.tick() - kTicksPerFrame);
+    bytes.resize(message.ByteSizeLong());
+    message.SerializeToArray(bytes.data(), static_cast<int>(bytes.size()));
+    return true;
+  };
+  const Truth truth = record_session(path_, options);
+  Player player(path_);
+  bool has_stood = false;
+  for (player.step(0); player.source->is_playing(); player.step(16)) {
+    player.expect_honest(truth);
+    const auto* newest = player.replica.newest();
+    has_stood |= newest != nullptr && newest->frame < player.source->position() / kTicksPerFrame;
+  }
+  EXPECT_TRUE(has_stood);
+  EXPECT_EQ(player.source->state(), SourceState::Live);
+  EXPECT_EQ(player.replica.newest()->frame, truth.last_frame);
+}
+
 // Bytes changed inside messages whose chunk is sound: a file that somebody made.
 TEST_F(ReplayDamageTest, ChangedMessagesNeverCrashNorShowAWrongSurface) {
   for (std::uint32_t seed = 1; seed <= 60; ++seed) {

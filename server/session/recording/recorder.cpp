@@ -222,8 +222,11 @@ Status Recorder::write_presence(const Presence& presence) {
   roster_ = participants::Roster(presence.present);
   proto::Participants message;
   replication::describe(presence.present, message);
-  overview_.add_presence(not_before_last(presence.tick), message);
-  return writer_->write_participants(not_before_last(presence.tick), utc_ns(), message);
+  // Frames that still wait may not become younger by it: then it goes with the one before them.
+  const bool has_waiting = queued_bytes() > 0;
+  const Tick tick = has_waiting ? last_tick_ : not_before_last(presence.tick);
+  overview_.add_presence(tick, message);
+  return writer_->write_participants(tick, utc_ns(), message);
 }
 
 Status Recorder::write_hand(const wire::HandRecord& record) {

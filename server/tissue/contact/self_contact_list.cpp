@@ -19,7 +19,7 @@ constexpr std::size_t kReservedPairs = 1u << 15;
 constexpr float kSlackEdges = 1, kMaxSlack_m = 0.006f;
 // The nearest corner of a triangle is this far from any point on it at most, in longest edges.
 constexpr float kCornerReach = 0.6f;
-// Of a pair whose distance nobody knows: no travel is less.
+// A pair whose distance nobody knows has this far_until, which is less than any travel.
 constexpr float kMayBeNear_m = -1;
 // Nodes in a cube of this width look for pairs in the same ticks.
 constexpr float kPhaseCube_m = 0.03f;
