@@ -13,6 +13,7 @@
 #include "client/ui/hud.h"
 #include "common/base/number_option.h"
 #include "common/base/printable.h"
+#include "common/base/size_option.h"
 #include "common/base/version.h"
 #include "common/secure/join_code.h"
 #include "common/wire/role.h"
@@ -51,22 +52,6 @@ Ends with the session, with --seconds, Ctrl-C, or the window. Exit codes: 0 ok, 
 std::string version_text() {
   return std::string("trocar-client ") + kVersion + ", sim_version " + std::to_string(kSimVersion) +
          ", protocol " + std::to_string(kProtocolMajor) + "." + std::to_string(kProtocolMinor);
-}
-
-Status parse_size(const std::string& text, render::Size& size) {
-  const Error bad{ErrorCode::Usage,
-                  "--size: '" + text + "' is not WxH from 64x64 to 7680x4320, such as 1280x720"};
-  const auto x = text.find('x');
-  if (x == std::string::npos) return bad;
-  const char* const begin = text.data();
-  const char* const end = begin + text.size();
-  const auto width = std::from_chars(begin, begin + x, size.width);
-  const auto height = std::from_chars(begin + x + 1, end, size.height);
-  if (width.ec != std::errc{} || width.ptr != begin + x || height.ec != std::errc{} ||
-      height.ptr != end || size.width < 64 || size.height < 64 || size.width > 7680 ||
-      size.height > 4320)
-    return bad;
-  return {};
 }
 
 Status parse_overlays(const std::vector<std::string>& names, Overlays& overlays) {
@@ -429,8 +414,11 @@ Status read_further(const GivenTexts& more, ClientOptions& options) {
     options.display = Display::Headless;
   options.is_told_who = !options.name.empty();
   if (options.name.empty()) options.name = default_name();
-  if (!more.size.empty())
-    if (const auto parsed = parse_size(more.size, options.size); !parsed) return parsed;
+  if (!more.size.empty()) {
+    const auto size = parse_size(more.size, 64, 64);
+    if (!size) return size.error();
+    options.size = {size->first, size->second};
+  }
   if (const auto parsed = parse_overlays(more.overlays, options.overlays); !parsed) return parsed;
   if (const auto parsed = parse_view(more.view, options.view); !parsed) return parsed;
   if (const auto parsed = parse_ports(more.ports, options.ports_m); !parsed) return parsed;

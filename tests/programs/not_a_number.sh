@@ -22,6 +22,7 @@ refuses trocar-doctor --seconds
 refuses trocar-web --seconds
 refuses trocar-organ import none.obj --young-modulus
 refuses trocar-organ import none.obj --poisson-ratio
+refuses trocar-organ edit plate --headless --scale
 refuses trocar-sim none.toml --solver fem --step-ms
 refuses trocar-sim none.toml --solver fem --bulk-ratio
 refuses trocar-journal assess none.mcap --force-limit

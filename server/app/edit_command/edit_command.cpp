@@ -5,6 +5,8 @@
 #include <filesystem>
 
 #include "common/base/log.h"
+#include "common/base/number_option.h"
+#include "common/base/size_option.h"
 #include "server/organs/catalogue/load_organ.h"
 #include "server/organs/dicom/dicom_reader.h"
 #include "server/organs/edit/box_rule.h"
@@ -175,24 +177,13 @@ void add_options(CLI::App& app, EditCommand& command) {
   app.add_option("--size", command.size, "of the window, pixels")
       ->type_name("WxH")
       ->capture_default_str();
-  app.add_option("--scale", command.scale, "of words and panels, 0.75 to 3; 0: as the monitor says")
+  app.add_option("--scale", command.scale, "of words and panels [as the monitor says]")
       ->type_name("S")
-      ->check(CLI::Range(0.0, 3.0))
-      ->capture_default_str();
+      ->check(from_to(0.75, 3));
 }
 
 Result<std::pair<int, int>> window_size(const EditCommand& command) {
-  std::pair<int, int> size;
-  const auto& text = command.size;
-  const auto* end = text.data() + text.size();
-  const auto first = std::from_chars(text.data(), end, size.first);
-  const bool has_cross = first.ec == std::errc{} && first.ptr != end && *first.ptr == 'x';
-  const auto second = std::from_chars(has_cross ? first.ptr + 1 : end, end, size.second);
-  if (!has_cross || second.ec != std::errc{} || second.ptr != end || size.first < 640 ||
-      size.first > 7680 || size.second < 400 || size.second > 4320)
-    return Error{ErrorCode::Usage,
-                 "--size: '" + text.substr(0, 60) + "' is not within 640x400 to 7680x4320"};
-  return size;
+  return parse_size(command.size, 640, 400);
 }
 
 Result<edit::Editor> open(const EditCommand& command) {

@@ -48,7 +48,7 @@ class ServerProcess {
   const ProcessId& id() const { return id_; }
   // Nothing while it runs; does not wait.
   std::optional<Ending> poll();
-  // Never reaches another process of that id.
+  // It never reaches another process of that id.
   void signal(int number) const;
   // Processor seconds so far, of all its threads; nothing once it has ended.
   std::optional<double> processor_seconds() const;
