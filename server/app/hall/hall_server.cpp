@@ -3,8 +3,6 @@
 #include <fmt/format.h>
 
 #include <boost/asio/awaitable.hpp>
-#include <boost/asio/co_spawn.hpp>
-#include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
 #include <boost/beast/core/tcp_stream.hpp>
@@ -21,17 +19,17 @@
 #include "common/secure/digest.h"
 #include "server/session/access/audit_log.h"
 #include "server/session/monitoring/exposition.h"
+#include "server/session/monitoring/http_acceptor.h"
 
 namespace trocar::app {
 namespace {
 
 namespace beast = boost::beast;
 namespace http = beast::http;
-using tcp = asio::ip::tcp;
 using Request = http::request<http::string_body>;
 using Answer = http::response<http::string_body>;
 
-constexpr std::chrono::milliseconds kAcceptRetry{200}, kEndPoll{100};
+constexpr std::chrono::milliseconds kEndPoll{100};
 constexpr std::string_view kBearer = "Bearer ";
 constexpr std::string_view kSessions = "/sessions", kOneSession = "/sessions/";
 
@@ -98,37 +96,18 @@ std::string exposition(const hall::Sessions& sessions) {
 
 }  // namespace
 
-struct HallServer::Core : std::enable_shared_from_this<HallServer::Core> {
-  asio::io_context& context;
+struct HallServer::Core {
   hall::Sessions& sessions;
   const secure::Digest key;
   access::AuditLog audit;
-  tcp::acceptor acceptor;
-  std::size_t open = 0;
-  bool is_stopping = false;
+  monitoring::HttpAcceptor acceptor;
 
-  Core(asio::io_context& io, hall::Sessions& all, const std::string& secret, access::AuditLog log)
-      : context(io), sessions(all), key(digest_of(secret)), audit(std::move(log)), acceptor(io) {}
-
-  asio::awaitable<void> accept(std::shared_ptr<Core> self) {
-    asio::steady_timer retry(context);
-    while (!is_stopping) {
-      auto [error, socket] = co_await acceptor.async_accept(kNoThrow);
-      if (is_stopping) co_return;
-      if (error) {
-        retry.expires_after(kAcceptRetry);
-        co_await retry.async_wait(kNoThrow);
-        continue;
-      }
-      if (open >= kMostConnections) continue;  // closes it
-      ++open;
-      asio::co_spawn(context, serve(beast::tcp_stream(std::move(socket))),
-                     [self](const std::exception_ptr& failure) {
-                       --self->open;
-                       rethrow(failure);
-                     });
-    }
-  }
+  Core(asio::io_context& context, hall::Sessions& all, const std::string& secret,
+       access::AuditLog log)
+      : sessions(all),
+        key(digest_of(secret)),
+        audit(std::move(log)),
+        acceptor(context, kMostConnections) {}
 
   // `what`: start, end or refusal.
   void note(const std::string& what, const std::string& name, const std::string& peer,
@@ -165,7 +144,7 @@ struct HallServer::Core : std::enable_shared_from_this<HallServer::Core> {
     const auto [unsent, bytes] = co_await http::async_write(stream, answer, kNoThrow);
     if (unsent) co_return;
     beast::error_code ignored;
-    stream.socket().shutdown(tcp::socket::shutdown_send, ignored);
+    stream.socket().shutdown(asio::socket_base::shutdown_send, ignored);
   }
 
   Trust trust_in(const Request& request) const {
@@ -181,7 +160,7 @@ struct HallServer::Core : std::enable_shared_from_this<HallServer::Core> {
     const auto trust = trust_in(request);
     if (trust == Trust::Wrong) {
       note("refusal", "", peer, "the key is wrong");
-      asio::steady_timer delay(context, kWrongKeyDelay);
+      asio::steady_timer delay(acceptor.context(), kWrongKeyDelay);
       co_await delay.async_wait(kNoThrow);
       co_return refusal(http::status::unauthorized, "the key is wrong: name the hall's file of it");
     }
@@ -222,7 +201,7 @@ struct HallServer::Core : std::enable_shared_from_this<HallServer::Core> {
   }
 
   Reply start(const std::string& body, const std::string& peer) {
-    if (is_stopping) return refusal(http::status::service_unavailable, "the hall ends");
+    if (acceptor.is_stopping()) return refusal(http::status::service_unavailable, "the hall ends");
     const auto request = hall::parse_start_request(body);
     if (!request) return refusal(status_of(request.error()), request.error().message);
     const auto started = sessions.start(*request);
@@ -240,7 +219,7 @@ struct HallServer::Core : std::enable_shared_from_this<HallServer::Core> {
     note("end", name, peer);
     const auto session = *ended;
     const auto deadline = std::chrono::steady_clock::now() + kEndDeadline;
-    asio::steady_timer timer(context);
+    asio::steady_timer timer(acceptor.context());
     while (session->state != hall::SessionState::Ended &&
            std::chrono::steady_clock::now() < deadline) {
       timer.expires_after(kEndPoll);
@@ -255,26 +234,13 @@ struct HallServer::Core : std::enable_shared_from_this<HallServer::Core> {
 Result<std::unique_ptr<HallServer>> HallServer::listen(asio::io_context& context,
                                                        hall::Sessions& sessions, std::string key) {
   const auto& config = sessions.config();
-  boost::system::error_code error;
-  const auto ip = asio::ip::make_address(config.address, error);
-  if (error)
-    return Error{ErrorCode::Usage, "listen: '" + config.address +
-                                       "' is not an IPv4 or IPv6 address: use 127.0.0.1 for this "
-                                       "machine only"};
   auto audit = access::AuditLog::open(config.state_folder / "audit.jsonl");
   if (!audit) return audit.error();
   const auto core = std::make_shared<Core>(context, sessions, key, std::move(*audit));
-  const tcp::endpoint endpoint(ip, config.port);
-  auto& acceptor = core->acceptor;
-  acceptor.open(endpoint.protocol(), error);
-  if (!error) acceptor.set_option(tcp::acceptor::reuse_address(true), error);
-  if (!error) acceptor.bind(endpoint, error);
-  if (!error) acceptor.listen(asio::socket_base::max_listen_connections, error);
-  if (error)
-    return Error{ErrorCode::ResourceMissing,
-                 fmt::format("listen: {}:{}: {}, choose another port", config.address, config.port,
-                             error.message())};
-  asio::co_spawn(context, core->accept(core), rethrow);
+  if (const auto opened = core->acceptor.open(config.address, config.port, "listen"); !opened)
+    return opened.error();
+  core->acceptor.start(
+      [at = core.get()](beast::tcp_stream stream) { return at->serve(std::move(stream)); }, core);
   return std::unique_ptr<HallServer>(new HallServer(core));
 }
 
@@ -285,14 +251,11 @@ HallServer::~HallServer() {
 }
 
 std::uint16_t HallServer::port() const {
-  boost::system::error_code ignored;
-  return core_->acceptor.local_endpoint(ignored).port();
+  return core_->acceptor.port();
 }
 
 void HallServer::stop() {
-  core_->is_stopping = true;
-  boost::system::error_code ignored;
-  core_->acceptor.close(ignored);
+  core_->acceptor.stop();
 }
 
 }  // namespace trocar::app

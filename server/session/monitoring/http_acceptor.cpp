@@ -1,0 +1,78 @@
+#include "server/session/monitoring/http_acceptor.h"
+
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <exception>
+#include <utility>
+
+#include "common/base/no_throw.h"
+
+namespace trocar::monitoring {
+namespace {
+
+namespace beast = boost::beast;
+using tcp = asio::ip::tcp;
+
+constexpr std::chrono::milliseconds kAcceptRetry{200};
+
+}  // namespace
+
+Status check_address(const std::string& address, const std::string& named) {
+  boost::system::error_code error;
+  asio::ip::make_address(address, error);
+  if (!error) return {};
+  return Error{ErrorCode::Usage, named + ": '" + address +
+                                     "' is not an IPv4 or IPv6 address: use 127.0.0.1 for this "
+                                     "machine only"};
+}
+
+Status HttpAcceptor::open(const std::string& address, std::uint16_t port,
+                          const std::string& named) {
+  if (auto checked = check_address(address, named); !checked) return checked;
+  boost::system::error_code error;
+  const tcp::endpoint endpoint(asio::ip::make_address(address, error), port);
+  acceptor_.open(endpoint.protocol(), error);
+  if (!error) acceptor_.set_option(tcp::acceptor::reuse_address(true), error);
+  if (!error) acceptor_.bind(endpoint, error);
+  if (!error) acceptor_.listen(asio::socket_base::max_listen_connections, error);
+  if (!error) return {};
+  return Error{ErrorCode::ResourceMissing, named + ": " + address + ":" + std::to_string(port) +
+                                               ": " + error.message() + ", choose another port"};
+}
+
+void HttpAcceptor::start(Serve serve, const std::shared_ptr<void>& owner) {
+  asio::co_spawn(context_, accept(std::move(serve), owner), rethrow);
+}
+
+asio::awaitable<void> HttpAcceptor::accept(Serve serve, std::shared_ptr<void> owner) {
+  asio::steady_timer retry(context_);
+  while (!is_stopping_) {
+    auto [error, socket] = co_await acceptor_.async_accept(kNoThrow);
+    if (is_stopping_) co_return;
+    if (error) {
+      retry.expires_after(kAcceptRetry);
+      co_await retry.async_wait(kNoThrow);
+      continue;
+    }
+    if (open_ >= most_connections_) continue;  // closes it
+    ++open_;
+    asio::co_spawn(context_, serve(beast::tcp_stream(std::move(socket))),
+                   [this, owner](const std::exception_ptr& failure) {
+                     --open_;
+                     rethrow(failure);
+                   });
+  }
+}
+
+std::uint16_t HttpAcceptor::port() const {
+  boost::system::error_code ignored;
+  return acceptor_.local_endpoint(ignored).port();
+}
+
+void HttpAcceptor::stop() {
+  is_stopping_ = true;
+  boost::system::error_code ignored;
+  acceptor_.close(ignored);
+}
+
+}  // namespace trocar::monitoring
