@@ -28,8 +28,7 @@ struct Bodies {
   void tick() {
     contacts.clear();
     finder.find(world, pairs, contacts);
-    const auto report = solver.solve(contacts, near, {.sweeps = sweeps}, world);
-    finder.surface_moved(report.largest_move_m);
+    solver.solve(contacts, near, {.sweeps = sweeps}, world);
   }
   template <typename Velocity>
   void set_velocities(Velocity&& velocity) {
@@ -203,7 +202,6 @@ TEST(Points, PressNoHarderForBeingLookedAtAnew) {
       bodies.world.velocities[n] = way * 1000.0f;
     }
     ++bodies.world.tick;
-    bodies.finder.surface_moved(4e-4f);
     bodies.contacts.clear();
     bodies.finder.find(bodies.world, bodies.pairs, bodies.contacts);
     for (const auto& point : bodies.contacts.self_points()) {
@@ -436,7 +434,6 @@ TEST(Squeeze, PairsThatLieStillAreSeldomLookedAt) {
     const auto before = pairs;
     list.points.clear();
     finder.find(world, pairs, list);
-    finder.surface_moved(0);
     looked_at += finder.pairs_looked_at();
     ASSERT_EQ(pairs.nodes().size(), count);
     for (std::size_t k = 0; k < count; ++k) {

@@ -251,6 +251,7 @@ void RateController::apply(const Step& step) {
   }
   if (sweeps_ == highest_sweeps_) return;
   decisions_.sweeps = sweeps_[0];
+  if (sweeps_ == lowest_sweeps_) decisions_.linger_ticks = limits_.linger_ticks;
   for (std::size_t layer = 1; layer < step::kSweepLayers; ++layer)
     decisions_.layer_sweeps[layer - 1] = sweeps_[layer];
 }

@@ -6,7 +6,8 @@
 //
 // What is given up, in this order, one step at a time, and taken back in reverse:
 //   1. sweeps of layer 3 and deeper down to RateLimits::layer_sweeps, then of layer 2, then of
-//      layer 1, then of the touched nodes down to RateLimits::touched_sweeps;
+//      layer 1, then of the touched nodes down to RateLimits::touched_sweeps; with the last of
+//      these nodes that have left the queue linger for RateLimits::linger_ticks;
 //   2. how often far nodes are swept, up to once in RateLimits::far_interval ticks;
 //   3. nodes of the queue, by a sixteenth at a time, down to RateLimits::nodes.
 // While a tool touches, room that is left goes into accuracy above what was asked for (`extra`):
@@ -50,6 +51,7 @@ struct RateLimits {
   step::TickDecisions highest;  // when there is room for all
   // The least. A layer's sweeps should not be fewer than those of the far nodes.
   std::uint32_t touched_sweeps = 2, layer_sweeps = 1, nodes = 200;
+  std::uint32_t linger_ticks = 25;
   std::uint32_t far_interval = 1;
   std::uint32_t most_far_sweeps = 0;  // of `extra`; 0: nothing above what was asked for
   double budget_us = 800;             // of a tick's time for its work

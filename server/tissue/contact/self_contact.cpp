@@ -49,7 +49,6 @@ constexpr float kComesBack = 1e-3f, kComesBack_m = 5e-8f, kComesBackPerWay = 0.0
 // A pair whose triangle an edit has replaced presses no deeper than this.
 constexpr float kDeepestAnew_m = 2e-5f;
 constexpr float kNoLimit_n = 1e6f;
-constexpr std::uint32_t kNoSite = 0xffffffffu;
 // A triangle's corners may move against each other so many times as far as its node may drift: its
 // normal then turns by some hundredths of a radian.
 constexpr float kCornerDrifts = 16;
@@ -228,8 +227,7 @@ bool SelfContactFinder::can_meet_lip(Site site, Site across, const world::World&
 
 bool SelfContactFinder::can_meet_other(Site site, Site across, bool is_moved,
                                        const world::World& world) {
-  if (!(is_moved || has_moved(across, kMovedSlacks * slack_m_, world) ||
-        surface_.faced_at_rest(site, across)) ||
+  if (!(is_moved || has_moved(across, moved_m_, world) || surface_.faced_at_rest(site, across)) ||
       !surface_.is_of_any(site) || !surface_.is_of_any(across))
     return false;
   return dot(main_normal(site, world), main_normal(across, world)) <= kStaysFacing &&
@@ -244,7 +242,7 @@ bool SelfContactFinder::begins(Site site, Site nearest, float squared, bool is_o
   if (!closest.triangle.is_valid()) return false;
   touch = touch_at(site, closest, world);
   // Nothing here may let in what find() or a list would not have looked at.
-  const float margin = margin_of(touch.closing), reach = corner_reach_m_ + margin;
+  const float margin = margin_of(touch.closing), reach = corner_reaches_[nearest] + margin;
   return touch.facing < kBeginsFacing && touch.gap >= 0 && closest.squared < margin * margin &&
          squared < reach * reach && lies_along(touch.aside, touch.gap) &&
          dot(closest.from, normalized(up(closest.triangle, world), touch.normal)) >= touch.shift &&
@@ -262,26 +260,26 @@ bool SelfContactFinder::begins(Site site, const Nearest& nearest, const world::W
 float SelfContactFinder::squared_distance(std::size_t listed, const world::World& world) {
   const auto& pair = list_.pairs[listed];
   const float squared = length_squared(position(pair.across, world) - position(pair.node, world));
-  if (squared > reach_now_m_ * reach_now_m_)
-    list_.far_until[listed] = passed_m_ + 0.5f * (std::sqrt(squared) - reach_m_) - kRounding_m;
+  const float reach = reach_of(pair.node, pair.across);
+  const float reach_now = reach - (kSelfMaxMargin_m - margin_now_m_);
+  if (squared > reach_now * reach_now)
+    list_.far_until[listed] =
+        travels_[pair.node] + travels_[pair.across] + (std::sqrt(squared) - reach) - kRounding_m;
   return squared;
-}
-
-SelfContactFinder::Nearest SelfContactFinder::nothing_near() const {
-  const float squared = reach_now_m_ * reach_now_m_;
-  return {kNoSite, kNoSite, squared, squared};
 }
 
 // Those across are considered in ascending order: of equals the first is the nearest.
 void SelfContactFinder::consider(Site site, Site across, float squared, const world::World& world,
                                  Nearest& nearest) {
+  const float reach = corner_reaches_[across] + margin_now_m_;
+  if (squared >= reach * reach) return;
   if (squared < nearest.squared_of_lips && can_meet_lip(site, across, world) &&
       dot(normal(site, Sort::Wound, world), normal(across, Sort::Wound, world)) <= kStaysFacing) {
     nearest.squared_of_lips = squared;
     nearest.of_lips = across;
   }
   if (squared < nearest.squared_other &&
-      can_meet_other(site, across, has_moved(site, kMovedSlacks * slack_m_, world), world)) {
+      can_meet_other(site, across, has_moved(site, moved_m_, world), world)) {
     nearest.squared_other = squared;
     nearest.other = across;
   }
@@ -298,7 +296,7 @@ void SelfContactFinder::stir(const world::World& world) {
       if (is_far(i)) continue;
       const Site across = list_.pairs[i].across;
       if (std::exchange(stirred_stamp_[across], tick_current_) != tick_current_)
-        stirred_nearest_[across] = nothing_near();
+        stirred_nearest_[across] = {};
       if (paces_[across] == Pace::Looks || has_pair_[across] == 1) continue;
       consider(across, site, squared_distance(i, world), world, stirred_nearest_[across]);
     }
@@ -308,7 +306,7 @@ void SelfContactFinder::stir(const world::World& world) {
 SelfContactFinder::Nearest SelfContactFinder::find_nearest(Site site, std::size_t first,
                                                            std::size_t end,
                                                            const world::World& world) {
-  auto nearest = nothing_near();
+  Nearest nearest;
   const bool looks_at_all = paces_[site] == Pace::Looks;
   for (auto i = first; i < end; ++i) {
     const Site across = list_.pairs[i].across;
@@ -465,17 +463,17 @@ void SelfContactFinder::add_pair(Site site, TriangleIndex triangle, const Place&
 }
 
 void SelfContactFinder::find(const world::World& world, SelfContactTable& pairs, ContactList& out) {
-  keep_list(world);
   pairs_looked_at_ = 0;
   find_pace(world, pairs.nodes());
+  // No two nodes approach faster than twice the fastest moves.
+  margin_now_m_ =
+      std::min(kSelfMaxMargin_m, margin_of(2.001f * std::sqrt(fastest_squared_)) + kRounding_m);
   if (!is_any_awake_) return;
+  keep_list(world);
   const auto& runs = list_.runs;
-  // Two nodes are nearer to each other than their references by no more than this, m.
-  const float moved =
-      2 * (kReferenceSlacks * slack_m_ + static_cast<float>(travel_ - list_.travel));
-  // Nodes that are farther apart than this, m, begin no pair, however fast they approach.
-  const float reach = corner_reach_m_ + margin_of(2 * last_move_m_ / kTickSeconds);
-  const bool is_far = runs.empty() || list_.least_distance - moved > reach;
+  // Two nodes are nearer to each other than their references by slack_m_ at most.
+  const bool is_far =
+      runs.empty() || list_.least_distance - slack_m_ > corner_reach_m_ + margin_now_m_;
   if (is_far && pairs.nodes().empty()) return;
   if (++tick_current_ == 0) {
     std::ranges::fill(normal_stamp_, 0u);
@@ -483,11 +481,6 @@ void SelfContactFinder::find(const world::World& world, SelfContactTable& pairs,
     std::ranges::fill(stirred_stamp_, 0u);
     tick_current_ = 1;
   }
-  // No two nodes approach faster than twice the fastest moves.
-  reach_now_m_ = std::min(
-      reach_m_, corner_reach_m_ + margin_of(2.001f * std::sqrt(fastest_squared_)) + kRounding_m);
-  passed_m_ = static_cast<float>(travel_ - list_.travel);
-  far_limit_m_ = passed_m_ - 0.5f * (reach_m_ - reach_now_m_);
   stir(world);
   std::swap(old_pairs_, pairs);
   pairs.clear();

@@ -37,6 +37,7 @@
 // reach of it), and a look at each surface node's place.
 // Pairs are a function of the state: results do not depend on when lists were made.
 
+#include <algorithm>
 #include <span>
 #include <vector>
 
@@ -108,17 +109,8 @@ class SelfContactFinder {
   // After ContactFinder::find(): brings the pairs up to date and adds their points to `out`.
   void find(const world::World& world, SelfContactTable& pairs, ContactList& out);
 
-  // No node has moved by more than this since the last call.
-  void surface_moved(float at_most_m) {
-    travel_ += static_cast<double>(at_most_m);
-    last_move_m_ = at_most_m;
-  }
-
   // The world has its new nodes.
   void update(const topology::Edit& edit, const world::World& world);
-
-  // These nodes are somewhere else than surface_moved() says. Ascending, or in ascending runs.
-  void relocated(std::span<const NodeIndex> nodes, const world::World& world);
 
   // Lists made, and pairs of nodes in the last one.
   std::uint64_t lists_made() const { return lists_made_; }
@@ -130,10 +122,8 @@ class SelfContactFinder {
   using Site = SelfSurface::Site;
   using Sort = SelfSurface::Sort;
   using Place = SelfContactPlace;
-  // Nodes this far from rest, in slacks, are listed; a pair needs one that is farther than
-  // kListedSlacks + 1/2, unless it faced something this near at rest.
-  static constexpr float kReferenceSlacks = 0.25f;
-  static constexpr float kListedSlacks = 0.5f, kMovedSlacks = kListedSlacks + 0.5f;
+  static constexpr Site kNoSite = 0xffffffffu;
+  static constexpr float kNoDistance = 1e9f;
 
   // A node sleeps, waits for others to look, or looks for pairs in this tick.
   enum class Pace : std::uint8_t { Asleep, Waits, Looks };
@@ -165,24 +155,24 @@ class SelfContactFinder {
   // The nodes across from one that are nearest to it so far: on the other side of its wound, and
   // elsewhere.
   struct Nearest {
-    Site of_lips = 0, other = 0;  // kNoSite: none
-    float squared_of_lips = 0, squared_other = 0;
+    Site of_lips = kNoSite, other = kNoSite;
+    float squared_of_lips = kNoDistance, squared_other = kNoDistance;  // m^2
   };
 
-  // A list holds the pairs of nodes that can come near, and the travel at which it was begun. Each
-  // node has a reference position, see begin_list(), and a flag that says whether this is away from
-  // the node's rest position.
+  // A list holds the pairs of nodes that can come near. Each node has a reference position, see
+  // begin_list(), and a flag that says whether this is away from the node's rest position.
   struct List {
     std::vector<NodePair> pairs;  // ascending
     std::vector<Run> runs;        // of pairs, per node that has some; ascending
-    // Per pair: it is beyond reach_m_ before so much travel, m, from when the list was begun.
+    // Per pair: it is beyond reach_of() before both nodes' travels_ together are this, m.
     std::vector<float> far_until;
-    double travel = 0;
-    float least_distance = 1;  // m, of a pair, when it began
+    float least_distance = 1;  // m, of the references of a pair
     std::vector<Vec3f> references;
     std::vector<std::uint8_t> has_left;
   };
 
+  void follow_motion(const world::World& world);
+  void forget_travels();
   void keep_list(const world::World& world);
   void begin_list();
   void go_on_listing(double share, const world::World& world);
@@ -212,6 +202,15 @@ class SelfContactFinder {
   const Vec3f& main_normal(Site site, const world::World& world) {
     return normal(site, surface_.is_of(site, Sort::Skin) ? Sort::Skin : Sort::Wound, world);
   }
+  float measured_corner_reach(Site site) const;
+  void update_corner_reaches(std::span<const Site> sites);
+  void forget_distances(std::span<const Site> sites);
+  // Returns how far apart two nodes may be, m, so that a pair of one with a triangle at the other
+  // begins, with the greatest margin.
+  float reach_of(Site site, Site other) const {
+    return std::max(corner_reaches_[site], corner_reaches_[other]) + kSelfMaxMargin_m;
+  }
+  float range_of(Site site, Site other) const { return reach_of(site, other) + slack_m_; }
   Vec3f normal_towards(Site site, const Vec3f& theirs, const world::World& world);
   const Vec3f& up(TriangleIndex triangle, const world::World& world);
   // The wound of the triangle is one that the node is on a lip of.
@@ -234,10 +233,13 @@ class SelfContactFinder {
     return run + 1 < list_.runs.size() ? list_.runs[run + 1].first : list_.pairs.size();
   }
   // Returns whether no pair can begin between these two in this tick.
-  bool is_far(std::size_t listed) const { return list_.far_until[listed] > far_limit_m_; }
+  bool is_far(std::size_t listed) const {
+    const auto& [node, across] = list_.pairs[listed];
+    return list_.far_until[listed] >
+           travels_[node] + travels_[across] - (kSelfMaxMargin_m - margin_now_m_);
+  }
   // Returns the squared distance, m2, of two that are listed, and remembers it if it is large.
   float squared_distance(std::size_t listed, const world::World& world);
-  Nearest nothing_near() const;
   void consider(Site site, Site across, float squared, const world::World& world, Nearest& nearest);
   void stir(const world::World& world);
   // Searches list_.pairs from `first` to `end`.
@@ -262,12 +264,20 @@ class SelfContactFinder {
   std::vector<std::uint8_t> is_close_at_rest_;  // per node: something may face it there
   // Per node: neighbours look in the same ticks, so that in between nobody in a place looks.
   std::vector<std::uint8_t> phases_;
-  float slack_m_ = 0, corner_reach_m_ = 0;  // see begin_list()
-  float reach_m_ = 0;                       // with the greatest margin
+  float slack_m_ = 0;  // see begin_list()
+  // A pair needs a node that is this far from rest, m, unless it faced something at rest.
+  float moved_m_ = 0;
+  // Per node: any point on a triangle at it whose nearest corner it is lies within so far, m, of
+  // it, and the largest that there may be.
+  std::vector<float> corner_reaches_;
+  float corner_reach_m_ = 0;
+  float reach_m_ = 0;  // with the greatest margin
 
   bool has_list_ = false;
-  double travel_ = 0;
-  float last_move_m_ = 1;  // of any node, in the last tick
+  // Per node: where it was in the last tick, and how far it has gone, m.
+  std::vector<Vec3f> places_;
+  std::vector<float> travels_;
+  float farthest_m_ = 0;  // of a node, from its reference
   std::uint64_t lists_made_ = 0;
   std::size_t pairs_looked_at_ = 0;
   List list_;
@@ -284,12 +294,10 @@ class SelfContactFinder {
   std::vector<Site> grid_sites_;      // what it numbers
 
   // Scratch.
-  std::vector<Pace> paces_;    // per node, of this tick; for surface nodes
-  bool is_any_awake_ = true;   // of these
-  float fastest_squared_ = 0;  // of these, m2/s2
-  // Pairs begin within reach_now_m_ in this tick; of a listed pair with a larger far_until than
-  // far_limit_m_ the nodes are farther apart.
-  float reach_now_m_ = 0, passed_m_ = 0, far_limit_m_ = 0;
+  std::vector<Pace> paces_;                // per node, of this tick; for surface nodes
+  bool is_any_awake_ = true;               // of these
+  float fastest_squared_ = 0;              // of these, m2/s2
+  float margin_now_m_ = 0;                 // Pairs begin within this in this tick.
   std::vector<std::uint32_t> near_stamp_;  // per node
   // Per node: in this tick a node that looks is listed with it. If it waits and has no pair, these
   // are the nearest of those that look.
@@ -304,7 +312,7 @@ class SelfContactFinder {
   std::uint32_t tick_current_ = 0;
   SelfContactTable old_pairs_;
   std::vector<NodePair> found_;  // of an edit
-  std::vector<Site> around_, looking_, corners_, relocated_;
+  std::vector<Site> around_, looking_, corners_, grown_;
 };
 
 }  // namespace trocar::contact

@@ -15,9 +15,16 @@ constexpr std::size_t kReferencesPerTick = 512, kSitesPerTick = 32;
 // Taking references is this part of the work on a list.
 constexpr double kReferencesShare = 0.3;
 constexpr std::size_t kReservedPairs = 1u << 15;
-// How far the surface may move between lists, in mean edges; in metres at most kMaxSlack_m.
-constexpr float kSlackEdges = 1, kMaxSlack_m = 0.006f;
-// The nearest corner of a triangle is this far from any point on it at most, in longest edges.
+// How far a node is from rest that may meet others, in mean edges; in metres at most kMaxMoved_m.
+constexpr float kMovedEdges = 1, kMaxMoved_m = 0.006f;
+// How far the surface may move between lists, as a part of that.
+constexpr float kSlack = 0.5f;
+// A new list is begun when a node is so far from its reference, and looks again for those that are
+// so far then, in slacks.
+constexpr float kBegins = 0.375f, kDue = 0.25f;
+// Travels are rounded up, and are forgotten before float has no room for a tick's.
+constexpr float kLonger = 1.0001f, kTravelRounding_m = 6e-8f, kLongestTravel_m = 0.5f;
+// The nearest corner of a triangle is this far from any point on it at most, in its longest edges.
 constexpr float kCornerReach = 0.6f;
 // A pair whose distance nobody knows has this far_until, which is less than any travel.
 constexpr float kMayBeNear_m = -1;
@@ -33,7 +40,8 @@ std::uint8_t phase_at(const Vec3f& place) {
 }  // namespace
 
 SelfContactFinder::SelfContactFinder(const organ::Organ& organ) : surface_(organ), grid_(1, 1) {
-  slack_m_ = std::clamp(kSlackEdges * surface_.mean_edge_m(), 1e-4f, kMaxSlack_m);
+  moved_m_ = std::clamp(kMovedEdges * surface_.mean_edge_m(), 1e-4f, kMaxMoved_m);
+  slack_m_ = kSlack * moved_m_;
   // An edge far longer than the mean one is a flaw of the mesh.
   corner_reach_m_ = kCornerReach * std::min(surface_.longest_edge_m(), 3 * surface_.mean_edge_m());
   reach_m_ = kSelfMaxMargin_m + corner_reach_m_;
@@ -48,8 +56,9 @@ SelfContactFinder::SelfContactFinder(const organ::Organ& organ) : surface_(organ
   found_.reserve(kReservedPairs);
   next_found_.reserve(kReservedPairs);
   extend();
-  // Two nodes that have both moved by kMovedSlacks come this much nearer.
-  const float range = reach_m_ + 2 * kMovedSlacks * slack_m_;
+  update_corner_reaches(sites);
+  // Two nodes that have both moved by this come so much nearer.
+  const float range = reach_m_ + 2 * moved_m_;
   grid_ = PointGrid(range, sites.size());
   grid_.build(sites.size(), [&](std::size_t i) { return surface_.rest_position(sites[i]); });
   for (const Site s : sites)
@@ -64,6 +73,9 @@ SelfContactFinder::SelfContactFinder(const organ::Organ& organ) : surface_(organ
 void SelfContactFinder::extend() {
   const auto count = surface_.node_count();
   is_close_at_rest_.resize(count);
+  corner_reaches_.resize(count);
+  places_.resize(count);
+  travels_.resize(count);
   for (auto s = static_cast<Site>(phases_.size()); s < count; ++s)
     phases_.push_back(phase_at(surface_.rest_position(s)));
   for (auto* list : {&list_, &next_list_}) {
@@ -82,9 +94,41 @@ void SelfContactFinder::extend() {
   up_stamp_.resize(surface_.triangle_count());
 }
 
+float SelfContactFinder::measured_corner_reach(Site site) const {
+  float squared = 0;
+  for (const auto t : surface_.triangles_of(site)) {
+    const auto& [a, b, c] = surface_[t];
+    const Vec3f &pa = surface_.rest_position(a), &pb = surface_.rest_position(b),
+                &pc = surface_.rest_position(c);
+    squared = std::max(
+        {squared, length_squared(pa - pb), length_squared(pb - pc), length_squared(pc - pa)});
+  }
+  return std::min(kCornerReach * std::sqrt(squared), corner_reach_m_);
+}
+
+// Pairs of nodes that now reach farther are looked at again.
+void SelfContactFinder::update_corner_reaches(std::span<const Site> sites) {
+  grown_.clear();
+  for (const Site s : sites) {
+    const float reach = measured_corner_reach(s);
+    if (reach > corner_reaches_[s]) grown_.push_back(s);
+    corner_reaches_[s] = reach;
+  }
+  forget_distances(grown_);
+}
+
+// sites: ascending.
+void SelfContactFinder::forget_distances(std::span<const Site> sites) {
+  if (sites.empty()) return;
+  const auto is_one = [&](Site s) { return std::ranges::binary_search(sites, s); };
+  for (std::size_t i = 0; i < list_.pairs.size(); ++i)
+    if (is_one(list_.pairs[i].node) || is_one(list_.pairs[i].across))
+      list_.far_until[i] = kMayBeNear_m;
+}
+
 void SelfContactFinder::set_reference(Site site, const world::World& world, List& list) const {
   list.references[site] = position(site, world);
-  list.has_left[site] = has_moved(site, kListedSlacks * slack_m_, world) ? 1 : 0;
+  list.has_left[site] = has_moved(site, moved_m_ - 0.5f * slack_m_, world) ? 1 : 0;
 }
 
 // Adds the pairs of nodes that the edit has changed to the present list and to the next one.
@@ -96,10 +140,12 @@ void SelfContactFinder::update(const topology::Edit& edit, const world::World& w
   const Site unseen = !has_references && is_listing_ ? before[sites_seen_] : Site{0};
   surface_.update(edit, world);
   extend();
+  update_corner_reaches(surface_.updated());
   for (const auto node : edit.surface.touched) is_close_at_rest_[node.value] = 1;
   for (const auto node : edit.surface.surfaced) {
     const Site s = node.value;
     set_reference(s, world, list_);
+    places_[s] = list_.references[s];
     is_due_[s] = 0;
     if (has_references || s < unseen) set_reference(s, world, next_list_);
   }
@@ -113,26 +159,6 @@ void SelfContactFinder::update(const topology::Edit& edit, const world::World& w
   sites_seen_ = sites.size();
   list_pairs_of(surface_.updated(), next_list_);
   next_found_.insert(next_found_.end(), found_.begin(), found_.end());
-}
-
-// Their pairs are listed from where they are now. A list that is being made is begun again.
-void SelfContactFinder::relocated(std::span<const NodeIndex> nodes, const world::World& world) {
-  is_listing_ = false;
-  if (!has_list_) return;
-  relocated_.clear();
-  for (const auto node : nodes)
-    if (surface_.is_of_any(node.value)) {
-      relocated_.push_back(node.value);
-      set_reference(node.value, world, list_);
-    }
-  std::ranges::sort(relocated_);
-  const auto is_one = [&](Site s) { return std::ranges::binary_search(relocated_, s); };
-  for (std::size_t i = 0; i < list_.pairs.size(); ++i)
-    if (is_one(list_.pairs[i].node) || is_one(list_.pairs[i].across))
-      list_.far_until[i] = kMayBeNear_m;
-  list_pairs_of(relocated_, list_);
-  add_to_list(found_, list_);
-  list_.least_distance = 0;
 }
 
 // Returns whether the node may meet nodes that do not look around themselves.
@@ -161,7 +187,8 @@ void SelfContactFinder::list_pairs_of(std::span<const Site> sites, List& list) {
     auto known = std::ranges::lower_bound(list.pairs, NodePair{s, 0});
     for (const Site other : looks_around(s, list) ? around_ : looking_) {
       const float squared = length_squared(references[s] - references[other]);
-      if (squared > range * range || other == s) continue;
+      const float pair_range = range_of(s, other);
+      if (squared > pair_range * pair_range || other == s) continue;
       while (known != list.pairs.end() && *known < NodePair{s, other}) ++known;
       const bool is_known = known != list.pairs.end() && *known == NodePair{s, other};
       if (is_known || !may_meet(s, other, list)) continue;
@@ -175,7 +202,9 @@ void SelfContactFinder::list_pairs_of(std::span<const Site> sites, List& list) {
 
 // Inserts pairs that the list lacks. `found` has each from both sides, some of them twice.
 void SelfContactFinder::add_to_list(std::vector<NodePair>& found, List& list) {
-  std::ranges::sort(found);
+  std::ranges::sort(found, {}, [](const NodePair& pair) {
+    return std::uint64_t{pair.node} << 32 | pair.across;  // in one comparison
+  });
   found.erase(std::unique(found.begin(), found.end()), found.end());
   auto& pairs = list.pairs;
   // Entries are merged from the back, so that each moves only once.
@@ -194,16 +223,15 @@ void SelfContactFinder::add_to_list(std::vector<NodePair>& found, List& list) {
     if (i == 0 || pairs[i].node != pairs[i - 1].node) list.runs.push_back({pairs[i].node, i});
 }
 
-// The list has all pairs of nodes whose references are within reach_m_ + slack_m_ and that may
-// meet: if they faced each other at rest or one of the references at least is kListedSlacks from
+// The list has all pairs of nodes whose references are within range_of() and that may
+// meet: if they faced each other at rest or one of the references at least is nearly moved_m_ from
 // rest, and they are not near each other as the uncut organ is; or, of wounds, if they are not
 // beside each other on one lip, or one of the references is as far from rest as what is beside. A
 // reference is where the node was when its surroundings were last looked through; it is never
-// farther than slack_m_ / 2 from where the node is now. So each pair that is within reach_m_ is on
-// the list, and only what moves is looked through again.
+// farther than slack_m_ / 2 from where the node is now. So each pair that is within reach_of() is
+// on the list, and only what moves is looked through again.
 void SelfContactFinder::begin_list() {
   is_listing_ = true;
-  next_list_.travel = travel_;
   next_list_.least_distance = 1;
   next_list_.pairs.clear();
   next_list_.far_until.clear();
@@ -212,7 +240,7 @@ void SelfContactFinder::begin_list() {
 }
 
 void SelfContactFinder::set_references(std::size_t end, const world::World& world) {
-  const float far = kReferenceSlacks * slack_m_;
+  const float far = kDue * slack_m_;
   for (; sites_seen_ < end; ++sites_seen_) {
     const Site s = surface_.sites()[sites_seen_];
     const Vec3f& old = list_.references[s];
@@ -246,10 +274,11 @@ void SelfContactFinder::order_due() {
 void SelfContactFinder::keep_pairs() {
   const auto& references = next_list_.references;
   float least_squared = next_list_.least_distance * next_list_.least_distance;
-  for (const auto& pair : list_.pairs) {
+  for (std::size_t i = 0; i < list_.pairs.size(); ++i) {
+    const auto& pair = list_.pairs[i];
     if (is_due_[pair.node] == 1 || is_due_[pair.across] == 1) continue;
     next_list_.pairs.push_back(pair);
-    next_list_.far_until.push_back(kMayBeNear_m);
+    next_list_.far_until.push_back(list_.far_until[i]);
     least_squared =
         std::min(least_squared, length_squared(references[pair.node] - references[pair.across]));
   }
@@ -312,7 +341,9 @@ void SelfContactFinder::list_around(Site site) {
   grid_.visit(next_list_.references[site], reach_m_ + slack_m_,
               [&](std::uint32_t place, float squared) {
                 const Site other = grid_sites_[place];
-                if (other == site || !may_meet(site, other, next_list_)) return;
+                const float range = range_of(site, other);
+                if (squared > range * range || other == site) return;
+                if (!may_meet(site, other, next_list_)) return;
                 if (!was_cut && !surface_.was_cut(other)) {
                   if (!std::exchange(is_stamped, true)) stamp_near_sites();
                   if (near_stamp_[other] == near_current_) return;
@@ -324,20 +355,48 @@ void SelfContactFinder::list_around(Site site) {
   next_list_.least_distance = std::min(next_list_.least_distance, std::sqrt(least_squared));
 }
 
-// Made anew when the surface has moved by an eighth of the slack since it was last begun, and done
-// before that is a quarter: a node that was not due then, up to a quarter from its reference, is
-// not beyond half.
+// Measures how far nodes have gone since the last tick, and are from their references. A piece that
+// flies is clear of all others, and counts again where it lands.
+void SelfContactFinder::follow_motion(const world::World& world) {
+  float farthest_squared = 0, longest = 0;
+  for (const Site s : surface_.sites()) {
+    const bool flies = paces_[s] == Pace::Asleep && length_squared(world.velocities[s]) > 0;
+    if (flies) continue;
+    const Vec3f place = position(s, world);
+    const float squared = length_squared(place - places_[s]);
+    if (squared > 0) {
+      places_[s] = place;
+      travels_[s] += kLonger * std::sqrt(squared) + kTravelRounding_m;
+      longest = std::max(longest, travels_[s]);
+    }
+    farthest_squared = std::max(farthest_squared, length_squared(place - list_.references[s]));
+  }
+  farthest_m_ = std::sqrt(farthest_squared);
+  if (longest > kLongestTravel_m) forget_travels();
+}
+
+void SelfContactFinder::forget_travels() {
+  std::ranges::fill(travels_, 0.0f);
+  for (auto* list : {&list_, &next_list_}) std::ranges::fill(list->far_until, kMayBeNear_m);
+}
+
+// Made anew when a node is farther than kBegins slacks from its reference, and done before that is
+// half a slack.
 void SelfContactFinder::keep_list(const world::World& world) {
-  const auto used = [this] {
-    return (travel_ - list_.travel) / static_cast<double>(kReferenceSlacks * slack_m_);
-  };
-  if (!is_listing_ && has_list_ && used() <= 0.5) return;
+  follow_motion(world);
+  const float half = 0.5f * slack_m_, begins = kBegins * slack_m_;
+  if (!has_list_) {
+    begin_list();
+    return go_on_listing(1, world);
+  }
+  if (!is_listing_ && farthest_m_ <= begins) return;
   if (!is_listing_) begin_list();
-  go_on_listing(has_list_ ? 3 * (used() - 0.5) : 1, world);
-  if (used() <= 1) return;
-  if (is_listing_) go_on_listing(1, world);
-  if (used() <= 1) return;
-  // It moved farther than that since it began.
+  const auto share = (farthest_m_ - begins) / (half - begins);
+  go_on_listing(static_cast<double>(share), world);
+  if (is_listing_) return;
+  // Somebody may have gone as far since the new list took its reference.
+  follow_motion(world);
+  if (farthest_m_ <= half) return;
   begin_list();
   go_on_listing(1, world);
 }

@@ -96,7 +96,6 @@ void Pieces::wake(std::size_t place, world::World& world) {
     if (world.node_classes[node.value] == NodeClass::Asleep)
       world.node_classes[node.value] = NodeClass::Far;
   changed_.insert(changed_.end(), nodes.begin(), nodes.end());
-  if (manners_[place] == Manner::Flying) landed_.insert(landed_.end(), nodes.begin(), nodes.end());
   manners_[place] = Manner::Awake;
   is_all_asleep_ = false;
 }
@@ -203,7 +202,6 @@ void Pieces::lay_down(std::size_t place, world::World& world) {
     world.velocities[node.value] = {};
   }
   changed_.insert(changed_.end(), nodes.begin(), nodes.end());
-  if (manners_[place] == Manner::Flying) landed_.insert(landed_.end(), nodes.begin(), nodes.end());
   manners_[place] = Manner::Asleep;
   world.still_ticks[place] = 0;
 }

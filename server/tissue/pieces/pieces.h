@@ -65,9 +65,7 @@ class Pieces {
 
   // Nodes whose class or motion has changed here since clear_changes().
   std::span<const NodeIndex> changed() const { return changed_; }
-  // Those that have been carried and are no longer.
-  std::span<const NodeIndex> landed() const { return landed_; }
-  void clear_changes() { changed_.clear(), landed_.clear(); }
+  void clear_changes() { changed_.clear(); }
 
   const PieceList& list() const { return list_; }
 
@@ -112,7 +110,7 @@ class Pieces {
   std::vector<Box<float>> boxes_;
   bool has_boxes_ = false;
   bool is_all_asleep_ = false;
-  std::vector<NodeIndex> changed_, landed_, free_, turning_;
+  std::vector<NodeIndex> changed_, free_, turning_;
 };
 
 }  // namespace trocar::pieces

@@ -54,10 +54,11 @@ void ActiveSet::collect_whole(world::World& world) {
 
 std::span<const NodeIndex> ActiveSet::settle(const PropagationQueue& queue,
                                              std::span<const float> residuals_n,
-                                             world::World& world) {
+                                             std::uint32_t linger_ticks, world::World& world) {
   const auto below = [](const Vec3f& v, float limit) { return length_squared(v) < limit * limit; };
   settled_.clear();
   if (world.boundary == Boundary::Whole) return settled_;
+  const auto enough = world.boundary == Boundary::Graded ? linger_ticks : kQuietTicks;
   for (std::size_t i = 0; i < nodes_.size(); ++i) {
     const auto n = nodes_[i].value;
     if (queue.contains(nodes_[i])) continue;
@@ -66,7 +67,7 @@ std::span<const NodeIndex> ActiveSet::settle(const PropagationQueue& queue,
                            below(world.velocities[n], kQuietSpeedMetresPerSecond) &&
                            below(world.displacements[n], kQuietDisplacementMetres));
     world.quiet_ticks[n] = is_quiet ? static_cast<std::uint16_t>(world.quiet_ticks[n] + 1) : 0;
-    if (world.quiet_ticks[n] < kQuietTicks) continue;
+    if (world.quiet_ticks[n] < enough) continue;
     world.node_classes[n] = NodeClass::Far;
     world.quiet_ticks[n] = 0;
     if (world.boundary == Boundary::Graded) continue;

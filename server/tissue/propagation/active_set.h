@@ -6,7 +6,7 @@
 // being swept and stops only when, for 100 ticks in a row, its residual force, speed and
 // displacement all stayed below thresholds: nothing freezes with a dent.
 // Boundary::Graded: all other nodes move too, with fewer sweeps; a node that left the queue keeps
-// all sweeps for 100 ticks, so that a change of class disturbs nothing.
+// all sweeps for 100 ticks, so that a change of class disturbs nothing; fewer where time is short.
 // Boundary::Whole: every node that is not fixed is in the set, in ascending order, and stays.
 // O(nodes in the set) per tick.
 
@@ -41,9 +41,11 @@ class ActiveSet {
   std::span<const NodeIndex> nodes() const { return nodes_; }
 
   // After the solve: counts ticks of lingering nodes (`residuals_n`: per entry of nodes()) and
-  // lets go of those that are due. Returns the nodes whose displacement it set to zero.
+  // lets go of those that are due: Graded: after linger_ticks. Returns the nodes whose displacement
+  // it set to zero.
   std::span<const NodeIndex> settle(const PropagationQueue& queue,
-                                    std::span<const float> residuals_n, world::World& world);
+                                    std::span<const float> residuals_n, std::uint32_t linger_ticks,
+                                    world::World& world);
 
  private:
   void collect_whole(world::World& world);

@@ -23,9 +23,8 @@ void hand_out(const topology::Edit& edit, const world::World& world, ContactWork
   solve.solver.update_topology(edit.topology, world);  // and with it its far field
 }
 
-void hand_out_pieces(const world::World& world, ContactWork& contact, SolveWork& solve) {
+void hand_out_pieces(const world::World& world, SolveWork& solve) {
   solve.solver.read_state(world, solve.pieces.changed());
-  if (!solve.pieces.landed().empty()) contact.self_finder.relocated(solve.pieces.landed(), world);
   solve.pieces.clear_changes();
 }
 
@@ -36,7 +35,7 @@ void hand_out(const topology::Edit& edit, State& state, ContactWork& contact, Ne
   hand_out(edit, state);
   solve.pieces.update(edit, state.world);
   hand_out(edit, state.world, contact, near, solve);
-  hand_out_pieces(state.world, contact, solve);
+  hand_out_pieces(state.world, solve);
   solve.solver.refresh_relaxed_forces(state.world);
 }
 

@@ -184,6 +184,8 @@ Status validate(const TickDecisions& d) {
     return out_of_range("boundary", static_cast<int>(d.boundary), "0 (frozen) to 2 (whole)");
   if (d.far_interval < 1 || d.far_interval > kMaxFarInterval)
     return out_of_range("far_interval", d.far_interval, "1 to 3 ticks");
+  if (d.linger_ticks < 1 || d.linger_ticks > propagation::kQuietTicks)
+    return out_of_range("linger_ticks", d.linger_ticks, "1 to 100 ticks");
   if (d.far_sweeps > kMaxFarSweeps)
     return out_of_range("far_sweeps", d.far_sweeps, "0 (as the organ needs) to 16");
   if (!(d.over_relaxation >= 1.0f && d.over_relaxation <= 1.9f))

@@ -50,7 +50,7 @@ ContactReport find_contacts(State& state, bool has_self_contact, bool may_rest,
                             ContactWork& contact, SolveWork& solve) {
   if (!may_rest) {
     solve.pieces.wake(state.world);
-    hand_out_pieces(state.world, contact, solve);
+    hand_out_pieces(state.world, solve);
   }
   auto& found = contact.found;
   contact.finder.find(
@@ -61,7 +61,7 @@ ContactReport find_contacts(State& state, bool has_self_contact, bool may_rest,
   };
   find_self();
   if (solve.pieces.wake_touched(found, state.world)) {
-    hand_out_pieces(state.world, contact, solve);
+    hand_out_pieces(state.world, solve);
     found.points.resize(found.self_begin);
     found.self_seeds.clear();
     find_self();
@@ -194,7 +194,8 @@ SolveReport solve(const contact::ContactList& contacts, const propagation::Propa
   auto report =
       solve_steps(contacts, nodes, settings_of(decisions, work, modelled ? modelled->far : nullptr),
                   decisions.policy.steps_per_tick, loads, world, work.solver);
-  const auto settled = active.settle(queue, work.solver.residuals_n(), world);
+  const auto settled =
+      active.settle(queue, work.solver.residuals_n(), decisions.linger_ticks, world);
   work.solver.read_state(world, settled);
   report.largest_move_m += settled.empty() ? 0 : propagation::kQuietDisplacementMetres;
   report.layer_nodes = layer_nodes;
@@ -204,9 +205,7 @@ SolveReport solve(const contact::ContactList& contacts, const propagation::Propa
 }
 
 // These look only at what may have moved far enough, and are told how far that is.
-// Self-contact is told where a carried piece lands, and not how far it has been carried.
 void note_motion(float largest_move_m, float carried_m, ContactWork& contact, CutWork& cut) {
-  contact.self_finder.surface_moved(largest_move_m);
   const float any_move_m = std::max(largest_move_m, carried_m);
   contact.finder.surface_moved(any_move_m);
   cut.travel_m += static_cast<double>(any_move_m);
@@ -271,7 +270,7 @@ SolveReport solve_awake(const contact::ContactList& contacts, bool may_rest,
   pieces::Pieces::Motion motion;
   if (may_rest) {
     motion = pieces.end_step(contacts, state.world);
-    hand_out_pieces(state.world, context.contact, work);
+    hand_out_pieces(state.world, work);
   }
   report.largest_move_m += motion.awake_m;
   note_motion(report.largest_move_m, motion.carried_m, context.contact, context.cut);

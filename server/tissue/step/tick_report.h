@@ -8,6 +8,7 @@
 #include "common/base/tick.h"
 #include "common/wire/figures.h"
 #include "server/tissue/blades/cut_report.h"
+#include "server/tissue/propagation/active_set.h"
 #include "server/tissue/world/world.h"
 
 namespace trocar::step {
@@ -47,6 +48,9 @@ struct TickDecisions {
   // Graded: forces in the far field from the energies, not from matrices about a recent pose.
   bool is_far_exact = false;
   std::uint32_t far_interval = 1;  // Graded: ticks from one sweep of a far node to the next
+
+  // Graded: nodes that have left the queue stay active for so long.
+  std::uint32_t linger_ticks = propagation::kQuietTicks;
 
   bool is_reduction_off = false;  // the full solver, whatever a session's reduction has
 
