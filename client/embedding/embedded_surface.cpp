@@ -8,10 +8,10 @@
 namespace trocar::embedding {
 namespace {
 
-constexpr float kAtCorner = 1e-4f;       // shares of a fine triangle: as good as none
-constexpr float kOnEdge = 1e-3f;         // likewise, of a face
-constexpr float kLeastSkirt_m = 20e-6f;  // lower ones are not seen
-constexpr float kLeastFacing = 0.1f;     // cosine of a face that lies under a triangle
+constexpr float kAtCorner = 1e-4f;    // shares of a fine triangle: as good as none
+constexpr float kOnEdge = 1e-3f;      // likewise, of a face
+constexpr float kSkirtShare = 0.12f;  // of the edge of a rim: so far a skirt reaches below it
+constexpr float kLeastFacing = 0.1f;  // cosine of a face that lies under a triangle
 constexpr std::size_t kMostUnder = 256;
 
 float mean_edge(std::span<const Vec3f> positions, std::span<const TriangleCorners> triangles) {
@@ -353,35 +353,30 @@ void EmbeddedSurface::add_skirt(std::uint32_t triangle, const Part& part, std::u
   };
   for (std::size_t k = 0; k < 3; ++k) {
     if (!faces_under_[part.face].is_rim[k]) continue;
-    const Vec3f along =
-        normalized((rest_[corners[(k + 1) % 3]] - rest_[corners[k]]) * 1e3f, Vec3f{});
+    const Vec3f edge = rest_[corners[(k + 1) % 3]] - rest_[corners[k]];
+    // The rim of the wound is drawn as a curve, which may lie lower than its edge.
+    const Vec3f below = normal * (-kSkirtShare * length(edge));
+    const Vec3f sideways = cross(normalized(edge * 1e3f, Vec3f{}), normal);
     for (std::uint32_t i = 0; i < part.count; ++i) {
       if (!is_on_edge(point(i), face, k) || !is_on_edge(point(i + 1), face, k)) continue;
       const std::size_t first = next_vertices_.size();
-      bool is_seen = false;
       for (const std::uint32_t end : {i, i + 1}) {
         const PartPoint& p = point(end);
         Vertex vertex;
         vertex.corner = corners;
         vertex.weight = p.weight;
-        vertex.normal = cross(along, normal);
+        vertex.normal = sideways;
         Vec3f base, top;
         for (std::size_t n = 0; n < 3; ++n) {
           base += rest_[corners[n]] * p.weight[n];
           top += shape_.positions[shape_.triangles[triangle][n]] * p.share[n];
         }
         vertex.offset = top - base;
-        is_seen |= length(vertex.offset) > kLeastSkirt_m;
         next_vertices_.push_back(vertex);
         next_looks_.push_back({top, 1, {}});
-        vertex.offset = {};
+        vertex.offset = below;
         next_vertices_.push_back(vertex);
-        next_looks_.push_back({base, 1, {}});
-      }
-      if (!is_seen) {
-        next_vertices_.resize(first);
-        next_looks_.resize(first);
-        continue;
+        next_looks_.push_back({base + below, 1, {}});
       }
       const auto at = fine + static_cast<std::uint32_t>(first) - next_parted_.back().first_vertex;
       next_part_triangles_.push_back({at, at + 1, at + 2});
@@ -438,7 +433,7 @@ void EmbeddedSurface::update(std::span<const Vec3f> positions) {
       normals_[i] = normalized(normals_[a] * v.weight[0] + normals_[b] * v.weight[1], v.normal);
       continue;
     }
-    const auto& [a, b, c] = v.corner;
+    const std::uint32_t a = v.corner[0], b = v.corner[1], c = v.corner[2];
     if ((moved_[a] | moved_[b] | moved_[c]) == 0) continue;
     ++moved_count_;
     Turn turn;

@@ -19,6 +19,8 @@ namespace {
 
 using journal::JournalTopic;
 
+constexpr std::size_t kMaxOrganBytes = 64 * 1024 * 1024;  // larger ones have no fine surface
+
 // "1.0" -> 1; nothing if it is no number.
 std::optional<std::uint32_t> major_of(const std::string& protocol) {
   std::uint32_t major = 0;
@@ -173,7 +175,8 @@ void ReplaySource::welcome(replica::MessageSink& sink) {
 void ReplaySource::deliver_fine_surface(replica::MessageSink& sink) {
   const auto found = stream_->last_before(JournalTopic::Organ, first_tick());
   proto::Organ organ;
-  if (!found || !organ.ParseFromArray(found->data.data(), static_cast<int>(found->data.size())))
+  if (!found || found->data.size() > kMaxOrganBytes) return;
+  if (!organ.ParseFromArray(found->data.data(), static_cast<int>(found->data.size())))
     return;
   if (!organ.has_fine_surface()) return;
   auto surface = wire::read(organ.fine_surface());

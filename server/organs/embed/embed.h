@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/math/vec3.h"
 #include "common/wire/fine_surface.h"
 #include "server/organs/mesh/raw_tets.h"
 #include "server/organs/mesh/tet_mesh.h"
