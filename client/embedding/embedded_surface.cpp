@@ -27,8 +27,6 @@ float mean_edge(std::span<const Vec3f> positions, std::span<const TriangleCorner
 
 }  // namespace
 
-// ---- edges of the outside ----
-
 void EmbeddedSurface::EdgeSet::clear(std::size_t most) {
   const std::size_t size = std::bit_ceil(std::max<std::size_t>(2 * most, 16));
   slots_.assign(size, ~std::uint64_t{0});
@@ -51,8 +49,6 @@ bool EmbeddedSurface::EdgeSet::has(std::uint32_t a, std::uint32_t b) const {
   const std::uint64_t key = std::uint64_t{a} << 32 | b;
   return slots_[find(key)] == key;
 }
-
-// ---- following the coarse surface ----
 
 EmbeddedSurface::EmbeddedSurface(FineShape shape) : shape_(std::move(shape)) {
   shape_normals_.assign(shape_.positions.size(), Vec3f{});
@@ -405,8 +401,6 @@ void EmbeddedSurface::list_triangles() {
     skirts_ += parted.skirts;
   }
 }
-
-// ---- moving with it ----
 
 void EmbeddedSurface::update(std::span<const Vec3f> positions) {
   moved_count_ = 0;

@@ -52,7 +52,7 @@ struct CoarseShape {
 
 class EmbeddedSurface {
  public:
-  // What of a vertex does not move.
+  // This of a vertex does not move.
   struct Look {
     Vec3f rest;     // m
     float rim = 0;  // 0; -1 on a rim; 1 on a skirt
@@ -145,7 +145,7 @@ class EmbeddedSurface {
   std::vector<std::uint32_t> face_of_;  // per fine vertex: the coarse triangle it rides on
   float farthest_m_ = 0;
 
-  // The coarse surface at rest.
+  // This is the coarse surface at rest.
   std::vector<Vec3f> rest_;
   std::vector<TriangleCorners> coarse_;  // the outside, of equal corners where there is none
   std::vector<std::uint32_t> faces_;     // numbers of the outside

@@ -40,7 +40,7 @@ void Parting::split(const Polygon& whole, const Point& a, const Point& b, Polygo
   }
 }
 
-// Of two line segments, a b and c d.
+// Returns that of two line segments, a b and c d.
 double Parting::distance(const Point& a, const Point& b, const Point& c, const Point& d) {
   const auto to_segment = [](const Point& p, const Point& from, const Point& to) {
     const double x = to.x - from.x, y = to.y - from.y;

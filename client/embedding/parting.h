@@ -31,7 +31,7 @@ struct FaceUnder {
   std::array<bool, 3> is_rim{};  // of the edge from corner k to the next
 };
 
-// Which of a triangle's corners, and of its edges from corner k to the next, are near a rim.
+// Tells which of a triangle's corners, and of its edges from corner k to the next, a rim is near.
 struct RimTouch {
   bool is_any = false;
   std::array<bool, 3> corners{}, edges{};
@@ -53,7 +53,7 @@ class Parting {
   bool look_at(const std::array<Vec3f, 3>& base, const Vec3f& chart,
                std::span<const FaceUnder> faces);
   const RimTouch& rims() const { return rims_; }
-  // Of the triangle that was looked at.
+  // Parts the triangle that was looked at.
   void part();
   const std::vector<Part>& parts() const { return parts_; }
   const std::vector<PartPoint>& points() const { return points_; }

@@ -176,8 +176,7 @@ void ReplaySource::deliver_fine_surface(replica::MessageSink& sink) {
   const auto found = stream_->last_before(JournalTopic::Organ, first_tick());
   proto::Organ organ;
   if (!found || found->data.size() > kMaxOrganBytes) return;
-  if (!organ.ParseFromArray(found->data.data(), static_cast<int>(found->data.size())))
-    return;
+  if (!organ.ParseFromArray(found->data.data(), static_cast<int>(found->data.size()))) return;
   if (!organ.has_fine_surface()) return;
   auto surface = wire::read(organ.fine_surface());
   if (!surface) {

@@ -129,8 +129,8 @@ class Replica final : public MessageSink {
   // large and the small. It only grows between two values of `history_version`.
   const Topology& topology() const { return topology_; }
   std::uint64_t topology_version() const { return topology_version_; }
-  // What is drawn instead of the surface's outside, at rest; null: that itself, or it is not whole
-  // yet. It is another one when another pointer is returned.
+  // Returns what is drawn instead of the surface's outside, at rest; null: that itself, or it is
+  // not whole yet. Another pointer means another one.
   const std::shared_ptr<const wire::FineSurface>& fine_surface() const { return fine_surface_; }
   // Ascending by tick, at most kHistoryFrames; `history_version` counts restarts (seek, topology).
   const std::deque<SessionFrame>& history() const { return history_; }

@@ -51,7 +51,7 @@ class SmoothSurface {
              std::span<const std::uint8_t> is_wound, std::size_t triangle_budget);
 
   const std::vector<TriangleCorners>& triangles() const { return fine_triangles_; }
-  // So many of the triangles are of the outside, the first ones.
+  // The first so many of the triangles are of the outside.
   std::size_t outer_triangle_count() const {
     return coarse_triangles_.empty()
                ? 0

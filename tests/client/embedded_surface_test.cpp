@@ -131,8 +131,8 @@ double area_of(const EmbeddedSurface& surface) {
   return sum;
 }
 
-// Which coarse vertices go on where a vertex is, within three triangles of the outside. Across a
-// wound the outside does not go on, but around its end.
+// Tells which coarse vertices a vertex is joined to, within three triangles of the outside. Across
+// a wound the outside does not go on, but around its end.
 class Neighbours {
  public:
   explicit Neighbours(const Coarse& coarse) : around_(coarse.rest.size()) {

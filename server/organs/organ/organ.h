@@ -35,7 +35,7 @@ struct Organ {
   // or zero where Material::fibre_direction holds. Empty: it holds everywhere.
   std::vector<Vec3d> fibre_directions;
   DepthTable depth_table;  // empty: not calibrated
-  // What clients draw instead of the mesh's surface; empty: that. It changes no result.
+  // Clients draw this instead of the mesh's surface; empty: that. It changes no result.
   wire::FineSurface fine_surface;
 
   // Geometry from which energies measure strain.

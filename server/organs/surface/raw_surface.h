@@ -16,7 +16,7 @@ struct RawSurface {
   std::vector<mesh::Triangle> triangles;  // valid indices into `positions`
   // The file's number of the face of each triangle, from 1: a face of more corners is several.
   std::vector<std::int64_t> face_numbers;
-  // Where each triangle's corners are in a picture, u to the right and v upward, 0 to 1; empty: the
+  // Each triangle's corners are here in a picture, u to the right and v upward, 0 to 1; empty: the
   // file does not say it.
   std::vector<std::array<std::array<double, 2>, 3>> corner_texture;
 };
