@@ -10,7 +10,9 @@ void Replicator::give_fine_surface(Client& client) {
   const Frame newest = encoder_.current()->frame;
   const bool has_arrived = client.fine_parts == 0 || client.acknowledged > client.fine_frame;
   const bool is_paused = newest == client.fine_frame;
-  if (!(has_arrived || is_paused) || connections_.outstanding_bytes(client.id) > 0) return;
+  if (!has_arrived && !is_paused) return;
+  // The newest frame may still be there, but no queue.
+  if (connections_.outstanding_bytes(client.id) > options_.skip_above_bytes / 4) return;
   if (!send(client, options_.fine_surface[client.fine_parts])) return;  // the next time
   ++client.fine_parts;
   client.fine_frame = newest;
