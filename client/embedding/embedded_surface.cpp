@@ -129,7 +129,9 @@ void EmbeddedSurface::bind(std::uint32_t vertex) {
   face_of_[vertex] = place.face;
   Vertex& v = vertices_[vertex];
   if (place.face == kNoFace) {
+    // It is nowhere near, which no organ's own surface is: any vertex carries it.
     v.corner = {};
+    v.weight = {1, 0, 0};
     v.offset = shape_.positions[vertex] - rest_[0];
     return;
   }

@@ -6,7 +6,8 @@
 namespace trocar::embedding {
 namespace {
 
-constexpr int kMostCells = 48;  // along a side
+constexpr int kMostCells = 48;        // along a side
+constexpr float kMostReachCells = 2;  // farther away nothing is looked for
 
 bool has_area(const TriangleCorners& t) {
   return t[0] != t[1];
@@ -116,8 +117,6 @@ void FaceGrid::find(const Box<float>& box, std::vector<std::uint32_t>& found) co
 FacePlace FaceGrid::nearest(const Vec3f& p, const Vec3f& normal) const {
   FacePlace best, any;
   if (entries_.empty()) return best;
-  const Vec3f centre = (all_.least + all_.most) * 0.5f;
-  const float most = length(all_.most - all_.least) + length(p - centre);
   for (float reach = 0.25f * cell_m_;; reach *= 2) {
     Box<float> box;
     box.include(p);
@@ -142,7 +141,9 @@ FacePlace FaceGrid::nearest(const Vec3f& p, const Vec3f& normal) const {
       }
     });
     if (best.face != kNoFace && best.distance_m <= reach) return best;
-    if (reach > most) return best.face != kNoFace ? best : any;
+    if (reach <= kMostReachCells * cell_m_) continue;
+    if (best.face == kNoFace) best = any;
+    return best.distance_m <= 2 * reach ? best : FacePlace{};
   }
 }
 

@@ -37,7 +37,8 @@ class FaceGrid {
   // Appends the triangles whose cells meet the box, each once, in no order.
   void find(const Box<float>& box, std::vector<std::uint32_t>& found) const;
   // The nearest triangle that faces along `normal`, within 90 degrees; of any side if none does.
-  // kNoFace: there are none at all.
+  // kNoFace: there is none within about two cells. So a surface that is elsewhere, from a server
+  // that means harm, takes no longer than one that fits.
   FacePlace nearest(const Vec3f& p, const Vec3f& normal) const;
 
   float cell_m() const { return cell_m_; }

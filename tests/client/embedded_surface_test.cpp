@@ -239,6 +239,29 @@ TEST(EmbeddedSurface, PartsAlongCutsAndNowhereElse) {
               surface.triangles().size(), surface.skirt_count());
 }
 
+TEST(EmbeddedSurface, OneThatIsElsewhereDoesNoHarm) {
+  FineShape fine = fine_liver();
+  for (std::size_t v = 0; v < fine.positions.size(); v += 2) fine.positions[v] += {1.5f, 0, 0};
+  EmbeddedSurface surface(fine);
+  const Coarse coarse = liver_at_rest();
+  surface.follow(coarse.shape());
+  surface.update(coarse.rest);
+  EXPECT_LT(farthest(surface.positions(), fine.positions), kExact_m);
+  surface.follow({});
+  surface.update({});
+  // A triangle that lies on an edge does none, nor does one that is as large as the organ.
+  const Vec3f a = coarse.rest[coarse.triangles[0][0]], b = coarse.rest[coarse.triangles[0][1]];
+  EmbeddedSurface slender({{a, b, (a + b) * 0.5f, {0.1f, 0, 0}, {-0.1f, 0, 0}, {0, 0.1f, 0}},
+                           {{0, 1, 2}, {3, 4, 5}},
+                           {}});
+  Coarse cut = coarse;
+  cut.is_wound.assign(cut.triangles.size(), 0);
+  for (std::size_t i = 0; i < cut.triangles.size(); i += 3) cut.is_wound[i] = 1;
+  slender.follow(cut.shape());
+  slender.update(cut.rest);
+  for (const Vec3f& p : slender.positions()) EXPECT_TRUE(is_finite(p));
+}
+
 TEST(EmbeddedSurface, MovesOnlyWhatMoves) {
   EmbeddedSurface surface(fine_liver());
   const Coarse coarse = liver_at_rest();
