@@ -85,13 +85,17 @@ Status fit(const mesh::TetMesh& mesh, const EmbedOptions& options, EmbeddedFine&
         cross(mesh.rest_positions[t[1].value] - a, mesh.rest_positions[t[2].value] - a));
   }
   if (result.farthest_m > most) {
-    const Vec3d in_file = (worst + options.offset_m) / metres_of(options.unit);
+    const auto in_file = [&](double c) {
+      return std::round(c / metres_of(options.unit) * 1e6) / 1e6 + 0.0;  // no minus before zero
+    };
+    const Vec3d place = worst + options.offset_m;
     return bad(options,
                fmt::format("the vertex at {:.5g} {:.5g} {:.5g} is {:.2f} mm from the surface of "
                            "the mesh, may be {:.2f} mm, half of its mean edge: is it the same "
                            "organ, in the same unit and place? A mesh that is finer or coarser "
                            "fits otherwise (--nodes)",
-                           in_file.x, in_file.y, in_file.z, 1e3 * result.farthest_m, 1e3 * most));
+                           in_file(place.x), in_file(place.y), in_file(place.z),
+                           1e3 * result.farthest_m, 1e3 * most));
   }
   double agrees = 0;
   for (const auto& t : surface.triangles) agrees += dot(normal(surface, t), outward[t[0]]);
