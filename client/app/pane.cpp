@@ -127,6 +127,7 @@ void Pane::make_scene(const replica::Replica& replica, const Hands& hands, const
     scene_.rest_positions = replica.topology().rest_positions;
     scene_.triangles = replica.topology().triangles;
     scene_.is_wound = replica.topology().is_wound;
+    scene_.fine_surface = replica.fine_surface();
     scene_.positions = surface_.positions();
     scene_.regions = surface_.regions();
     scene_.blood = surface_.blood();

@@ -6,8 +6,10 @@
 #include <string>
 
 #include "client/render/field_source.h"
+#include "client/render/fine_layer.h"
 #include "client/render/ghost_net.h"
 #include "client/render/gl.h"
+#include "client/render/organ_vertex.h"
 #include "client/render/shader.h"
 #include "client/render/shader_sources.h"
 #include "client/shape/blood_film.h"
@@ -32,12 +34,6 @@ constexpr float kScopeClearMetres = 0.05f, kScopeHazePerMetre = 4.0f;
 constexpr float kHazePerMiddle = 0.55f;  // over the distance of what one looks at
 constexpr std::size_t kTriangleBudgetSoftware = 24'000, kTriangleBudget = 100'000;
 
-struct Tint {
-  float r = 0, g = 0, b = 0, a = 0;  // colour weighted by a
-  Tint operator+(const Tint& o) const { return {r + o.r, g + o.g, b + o.b, a + o.a}; }
-  Tint operator*(float s) const { return {r * s, g * s, b * s, a * s}; }
-};
-
 Tint tint_of(Colour c) {
   const auto linear = [](std::uint8_t v) {
     const float x = static_cast<float>(v) / 255;
@@ -45,12 +41,6 @@ Tint tint_of(Colour c) {
   };
   return {linear(c.r), linear(c.g), linear(c.b), 1};
 }
-
-struct OrganVertex {
-  Vec3f position, normal;
-  std::array<std::uint8_t, 4> tint;
-  std::array<std::int8_t, 4> lip;  // a normal; w: how much of the surface blood covers
-};
 
 struct RestVertex {
   Vec3f position;
@@ -149,6 +139,7 @@ struct SceneRenderer::Parts {
   Shader field{kFieldVertexSource, lit(kPlainHead, kFieldFragmentSource).c_str()};
   Shader scope_mask{kFieldVertexSource, kScopeMaskSource};
   GhostNet ghost_net;
+  FineLayer fine;
   VertexArray organ_array, tool_array, field_array;
   GLuint rest_buffer = 0, index_buffer = 0, noise = 0;
   Target sharp, plain;  // with and without samples
@@ -202,16 +193,11 @@ SceneRenderer::Parts::Parts(const GlContext& context)
 
   glBindVertexArray(organ_array.array);
   glBindBuffer(GL_ARRAY_BUFFER, organ_array.buffer);
-  constexpr GLsizei kStride = sizeof(OrganVertex);
-  glVertexAttribPointer(0, 3, GL_FLOAT, GL_FALSE, kStride, offset(0));
-  glVertexAttribPointer(1, 3, GL_FLOAT, GL_FALSE, kStride, offset(offsetof(OrganVertex, normal)));
-  glVertexAttribPointer(2, 4, GL_UNSIGNED_BYTE, GL_TRUE, kStride,
-                        offset(offsetof(OrganVertex, tint)));
-  glVertexAttribPointer(4, 4, GL_BYTE, GL_TRUE, kStride, offset(offsetof(OrganVertex, lip)));
+  describe_organ_vertices();
   glGenBuffers(1, &rest_buffer);
   glBindBuffer(GL_ARRAY_BUFFER, rest_buffer);
   glVertexAttribPointer(3, 4, GL_FLOAT, GL_FALSE, sizeof(RestVertex), offset(0));
-  for (GLuint i = 0; i < 5; ++i) glEnableVertexAttribArray(i);
+  glEnableVertexAttribArray(3);
   glGenBuffers(1, &index_buffer);
   glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, index_buffer);
 
@@ -294,20 +280,14 @@ void SceneRenderer::Parts::upload_organ(const SceneView& scene) {
   surface.update(scene.positions);
   fade_tints(scene);
   cover_with_blood(surface, scene.blood, static_cast<float>(wire::kBloodLevelMetres), covers);
-  const auto byte = [](float v) {
-    return static_cast<std::uint8_t>(std::clamp(v, 0.0f, 1.0f) * 255);
-  };
-  for (std::size_t i = 0; i < vertices.size(); ++i) {
-    const Tint& t = tints[i];
-    const float whole = t.a > 1e-3f ? 1 / t.a : 0.0f;
-    vertices[i] = {surface.positions()[i],
-                   surface.normals()[i],
-                   {byte(t.r * whole), byte(t.g * whole), byte(t.b * whole), byte(t.a)},
-                   lip_bytes(surface.lips()[i], covers[i])};
-  }
+  for (std::size_t i = 0; i < vertices.size(); ++i)
+    vertices[i] = organ_vertex(surface.positions()[i], surface.normals()[i], tints[i],
+                               surface.lips()[i], covers[i]);
   glBindBuffer(GL_ARRAY_BUFFER, organ_array.buffer);
   glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(vertices.size() * sizeof(OrganVertex)),
                vertices.data(), GL_STREAM_DRAW);
+  const std::size_t coarse = surface.coarse_vertex_count();
+  fine.upload(scene.positions, std::span(tints).first(coarse), std::span(covers).first(coarse));
 }
 
 void SceneRenderer::Parts::set_lights(const Shader& shader, const OrbitCamera& camera) const {
@@ -352,9 +332,18 @@ void SceneRenderer::Parts::draw_organ(const SceneView& scene, const OrbitCamera&
   organ.set_array("shadow_tip", tips.data(), shadow_count);
   organ.set_array("shadow_shaft", shafts.data(), shadow_count);
   glEnable(GL_CULL_FACE);
+  // The fine surface takes the place of the outside.
+  const std::size_t first = fine.is_shown() ? surface.outer_triangle_count() : 0;
+  organ.set("picture", 1);
+  organ.set("has_picture", 0);
   glBindVertexArray(organ_array.array);
-  glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(surface.triangles().size() * 3),
-                 GL_UNSIGNED_INT, nullptr);
+  glDrawElements(GL_TRIANGLES, static_cast<GLsizei>((surface.triangles().size() - first) * 3),
+                 GL_UNSIGNED_INT, offset(first * sizeof(TriangleCorners)));
+  organ.set("has_picture", fine.picture() != 0 ? 1 : 0);
+  glActiveTexture(GL_TEXTURE1);
+  glBindTexture(GL_TEXTURE_2D, fine.picture());
+  glActiveTexture(GL_TEXTURE0);
+  fine.draw();
   glDisable(GL_CULL_FACE);
 }
 
@@ -506,6 +495,8 @@ void SceneRenderer::draw(const SceneView& scene, const OrbitCamera& camera, cons
   glDisable(GL_DEPTH_TEST);
   glViewport(0, 0, width, height);
   if (scene.topology_version != parts.topology_version) parts.load_topology(scene);
+  parts.fine.follow(scene.fine_surface, {scene.rest_positions, scene.triangles, scene.is_wound},
+                    scene.topology_version);
   const bool is_sharp = quality == Quality::Best || !parts.is_software;
   Target& target = is_sharp ? parts.sharp : parts.plain;
   target.resize(parts.size);
@@ -535,7 +526,8 @@ void SceneRenderer::draw(const SceneView& scene, const OrbitCamera& camera, cons
 std::string SceneRenderer::description() const {
   return parts_->renderer_name + ", " +
          std::to_string(parts_->is_software ? 0 : parts_->sharp.samples) + " samples, " +
-         std::to_string(parts_->surface.triangles().size()) + " triangles";
+         std::to_string(parts_->surface.triangles().size()) + " triangles" +
+         (parts_->fine.is_shown() ? ", fine " + std::to_string(parts_->fine.triangle_count()) : "");
 }
 
 }  // namespace trocar::render

@@ -16,6 +16,7 @@
 #include "common/base/ids.h"
 #include "common/math/frame.h"
 #include "common/tool/tool.h"
+#include "common/wire/fine_surface.h"
 
 namespace trocar::render {
 
@@ -55,6 +56,7 @@ struct SceneView {
   std::span<const std::array<std::uint32_t, 3>>
       triangles;                           // those with equal corners are not drawn
   std::span<const std::uint8_t> is_wound;  // per triangle: shows the inside; may be empty
+  std::shared_ptr<const wire::FineSurface> fine_surface;  // drawn instead of the outside; or null
   std::span<const Vec3f> positions;        // m, as many as rest_positions; empty: no organ yet
   std::span<const std::uint16_t> regions;  // per vertex; may be empty
   std::span<const float> blood;            // per vertex: levels (wire/blood_codec.h); may be empty

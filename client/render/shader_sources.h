@@ -8,8 +8,8 @@ namespace trocar::render {
 // Two lamps that move with the camera (a key light from above right, a cool one from the left), and
 // soft light from above. Prefixed to both lit shaders, after one of the two heads. Powers are
 // written as products: on a software rasteriser they are most of the picture's time.
-inline constexpr const char* kFineHead = "#version 330 core\n#define FINE 1\n";
-inline constexpr const char* kPlainHead = "#version 330 core\n";
+inline constexpr const char* kFineHead = "#version 330 core\n#define FINE 1\n#define PICTURE 1\n";
+inline constexpr const char* kPlainHead = "#version 330 core\n#define PICTURE 1\n";
 inline constexpr const char* kLightingSource = R"(uniform vec3 eye;
 uniform vec3 key_direction;
 uniform vec3 fill_direction;
@@ -44,9 +44,11 @@ layout(location = 2) in vec4 overlay;
 layout(location = 3) in vec4 rest;
 // The normal of a rim, elsewhere as the other one; w: how much of the surface blood covers.
 layout(location = 4) in vec4 lip;
+layout(location = 5) in vec2 texture_place;
 uniform mat4 clip_from_world;
 out vec3 world_position, world_normal, rest_position, lip_normal;
 out float rim, covered;
+out vec2 picture_place;
 out vec4 tint;
 void main() {
   world_position = position;
@@ -56,6 +58,7 @@ void main() {
   lip_normal = lip.xyz;
   covered = max(lip.w, 0.0);
   tint = overlay;
+  picture_place = texture_place;
   gl_Position = clip_from_world * vec4(position, 1.0);
 }
 )";
@@ -63,9 +66,14 @@ void main() {
 inline constexpr const char* kOrganFragmentSource = R"(
 in vec3 world_position, world_normal, rest_position, lip_normal;
 in float rim, covered;
+in vec2 picture_place;
 in vec4 tint;
 out vec4 colour;
 uniform sampler3D noise;       // rgb: slope of the relief, a: its height
+#ifdef PICTURE
+uniform sampler2D picture;     // of the outside
+uniform int has_picture;
+#endif
 uniform vec2 haze;             // from this distance on (m), so much per metre; 0: none
 uniform int shadow_count;
 uniform vec4 shadow_tip[8];    // xyz tip, w radius
@@ -138,6 +146,13 @@ void main() {
     float mottle = clamp(0.70 * coarse.a + 0.30 * fine.a, 0.0, 1.0);
     albedo = mix(vec3(0.068, 0.0115, 0.0090), vec3(0.138, 0.0245, 0.0165), mottle);
     albedo *= 0.93 + 0.14 * fine.a;
+#ifdef PICTURE
+    if (has_picture != 0) {
+      // Painted as it is to be seen: darkened to how tissue answers these lamps.
+      vec3 painted = texture(picture, picture_place).rgb;
+      albedo = painted * painted * (0.30 + 0.04 * fine.a);
+    }
+#endif
     // At a wound's lip the capsule ends, and a thin line of blood seeps out.
     float edge = seam * seam;
     edge *= edge;

@@ -10,12 +10,16 @@
 #include "common/base/ids.h"
 #include "common/base/log.h"
 #include "common/base/version.h"
+#include "common/wire/fine_surface.h"
 #include "common/wire/framing.h"
+#include "proto/organ.pb.h"
 
 namespace trocar::replay {
 namespace {
 
 using journal::JournalTopic;
+
+constexpr std::size_t kMaxOrganBytes = 64 * 1024 * 1024;  // larger ones have no fine surface
 
 // "1.0" -> 1; nothing if it is no number.
 std::optional<std::uint32_t> major_of(const std::string& protocol) {
@@ -80,7 +84,10 @@ void ReplaySource::poll(replica::MessageSink& sink) {
     const Tick target = *seek_target_;
     seek_target_.reset();
     set_pace(static_cast<double>(target), now);
-    if (!has_welcomed_) welcome(sink);
+    if (!has_welcomed_) {
+      welcome(sink);
+      deliver_fine_surface(sink);
+    }
     done = run_seek(target, sink);
   } else if (is_playing_) {
     const Tick target = std::min(static_cast<Tick>(pace_tick(now)), last_tick());
@@ -163,6 +170,23 @@ void ReplaySource::welcome(replica::MessageSink& sink) {
   welcome.set_ticks_per_frame(static_cast<std::uint32_t>(kTicksPerFrame));
   deliver(other_, seek_target_.value_or(position_), sink);
   has_welcomed_ = true;
+}
+
+void ReplaySource::deliver_fine_surface(replica::MessageSink& sink) {
+  const auto found = stream_->last_before(JournalTopic::Organ, first_tick());
+  proto::Organ organ;
+  if (!found || found->data.size() > kMaxOrganBytes) return;
+  if (!organ.ParseFromArray(found->data.data(), static_cast<int>(found->data.size()))) return;
+  if (!organ.has_fine_surface()) return;
+  auto surface = wire::read(organ.fine_surface());
+  if (!surface) {
+    log::warn("{}: {}; the organ is drawn without it", stream_->path(), surface.error().message);
+    return;
+  }
+  for (auto& part : wire::parts_of(*surface)) {
+    other_.mutable_fine_surface_part()->Swap(&part);
+    deliver(other_, first_tick(), sink);
+  }
 }
 
 Status ReplaySource::run_seek(Tick target, replica::MessageSink& sink) {

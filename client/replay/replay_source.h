@@ -76,6 +76,8 @@ class ReplaySource final : public replica::SessionSource, public replica::Playba
   double pace_tick(std::uint64_t now_ns) const;
   std::uint64_t due_ns(Tick tick) const;
   void welcome(replica::MessageSink& sink);
+  // Hands on the organ's fine surface, if it has one that can be read.
+  void deliver_fine_surface(replica::MessageSink& sink);
   Status run_seek(Tick target, replica::MessageSink& sink);
   Status run_until(Tick target, replica::MessageSink& sink);
   Status start_from_key(Tick target, replica::MessageSink& sink);

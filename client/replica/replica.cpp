@@ -82,6 +82,8 @@ void Replica::on_message(const proto::Envelope& message, std::uint64_t arrival_n
       return apply_topology(message.surface_topology());
     case proto::Envelope::kSurfaceChange:
       return apply_change(message.surface_change(), bytes);
+    case proto::Envelope::kFineSurfacePart:
+      return apply_fine_surface(message.fine_surface_part());
     case proto::Envelope::kSurfaceFrame:
       return apply_surface(message.surface_frame(), arrival_ns);
     case proto::Envelope::kSurfaceSlice:
@@ -188,6 +190,15 @@ void Replica::apply_change(const proto::SurfaceChange& message, std::size_t byte
   counters_.change_bytes += bytes;
   newest_change_us_ = message.server_time_us();
   if (!is_layout_new_) to_show_.push_back(std::move(*change));
+}
+
+void Replica::apply_fine_surface(const proto::FineSurfacePart& message) {
+  const auto is_whole = fine_parts_.add(message);
+  if (!is_whole.ok()) return fail(is_whole.error().message);
+  if (!*is_whole) return;
+  auto surface = std::make_shared<const wire::FineSurface>(fine_parts_.take());
+  // Who comes back gets the same again.
+  if (fine_surface_ == nullptr || *fine_surface_ != *surface) fine_surface_ = std::move(surface);
 }
 
 void Replica::show_layout() {

@@ -34,6 +34,7 @@
 #include "client/replica/session_source.h"
 #include "client/replica/session_view.h"
 #include "common/base/result.h"
+#include "common/wire/fine_surface.h"
 #include "common/wire/recording_state.h"
 #include "common/wire/surface_layout.h"
 
@@ -41,6 +42,7 @@ namespace trocar::proto {
 class Barrier;
 class ClaimEvent;
 class Drawing;
+class FineSurfacePart;
 class FrameState;
 class GhostFrame;
 class LessonProgress;
@@ -127,6 +129,9 @@ class Replica final : public MessageSink {
   // large and the small. It only grows between two values of `history_version`.
   const Topology& topology() const { return topology_; }
   std::uint64_t topology_version() const { return topology_version_; }
+  // Returns what is drawn instead of the surface's outside, at rest; null: that itself, or it is
+  // not whole yet. Another pointer means another one.
+  const std::shared_ptr<const wire::FineSurface>& fine_surface() const { return fine_surface_; }
   // Ascending by tick, at most kHistoryFrames; `history_version` counts restarts (seek, topology).
   const std::deque<SessionFrame>& history() const { return history_; }
   std::uint64_t history_version() const { return history_version_; }
@@ -174,6 +179,7 @@ class Replica final : public MessageSink {
   void begin_anew();
   void apply_topology(const proto::SurfaceTopology& message);
   void apply_change(const proto::SurfaceChange& message, std::size_t bytes);
+  void apply_fine_surface(const proto::FineSurfacePart& message);
   void apply_surface(const proto::SurfaceFrame& message, std::uint64_t arrival_ns);
   void apply_state(const proto::FrameState& message);
   void apply_participants(const proto::Participants& message);
@@ -228,6 +234,8 @@ class Replica final : public MessageSink {
   Topology topology_;
   std::uint64_t newest_change_us_ = 0, shown_change_us_ = 0;
   std::uint64_t topology_version_ = 0;
+  wire::FineSurfaceAssembler fine_parts_;
+  std::shared_ptr<const wire::FineSurface> fine_surface_;
   std::deque<SessionFrame> history_;
   std::uint64_t history_version_ = 0;
   wire::QuantisedSurface scratch_;  // the frame being reconstructed

@@ -51,6 +51,12 @@ class SmoothSurface {
              std::span<const std::uint8_t> is_wound, std::size_t triangle_budget);
 
   const std::vector<TriangleCorners>& triangles() const { return fine_triangles_; }
+  // The first so many of the triangles are of the outside.
+  std::size_t outer_triangle_count() const {
+    return coarse_triangles_.empty()
+               ? 0
+               : first_wound_triangle_ * (fine_triangles_.size() / coarse_triangles_.size());
+  }
   std::size_t coarse_vertex_count() const { return coarse_vertex_count_; }
   std::size_t vertex_count() const {
     return coarse_vertex_count_ + rim_.size() + midpoints_.size();

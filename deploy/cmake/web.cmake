@@ -75,12 +75,14 @@ template <typename... Parts> void warn(const Parts&...) {}
   file(MAKE_DIRECTORY "${generated}")
   add_custom_command(
     OUTPUT "${generated}/proto/wire.pb.cc" "${generated}/proto/wire.pb.h"
+           "${generated}/proto/fine_surface.pb.cc" "${generated}/proto/fine_surface.pb.h"
     COMMAND protobuf::protoc "--proto_path=${PROJECT_SOURCE_DIR}" "--cpp_out=lite:${generated}" proto/wire.proto
+            proto/fine_surface.proto
     WORKING_DIRECTORY "${PROJECT_SOURCE_DIR}"
-    DEPENDS "${PROJECT_SOURCE_DIR}/proto/wire.proto" VERBATIM)
+    DEPENDS "${PROJECT_SOURCE_DIR}/proto/wire.proto" "${PROJECT_SOURCE_DIR}/proto/fine_surface.proto" VERBATIM)
   set(protobuf "${TROCAR_PROTOBUF_SOURCE}/src")
   file(STRINGS "${TROCAR_PROTOBUF_SOURCE}/cmake/libprotobuf-lite.cmake" listed REGEX "\\.cc$")
-  set(sources ${ARG_SOURCES} "${generated}/proto/wire.pb.cc")
+  set(sources ${ARG_SOURCES} "${generated}/proto/wire.pb.cc" "${generated}/proto/fine_surface.pb.cc")
   foreach(line IN LISTS listed)
     string(REGEX REPLACE "^.*/src/" "" line "${line}")
     if(NOT line MATCHES "io_win32|arenaz_sampler")

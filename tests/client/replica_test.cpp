@@ -360,6 +360,48 @@ TEST_F(ReplicaTest, TheGhostIsTakenWhereItFits) {
   expect_in_step();
 }
 
+wire::FineSurface fine_triangle() {
+  wire::FineSurface fine;
+  for (const std::int32_t q : {0, 20'000, 40'000}) fine.quanta.push_back({q, q * q % 997, 0});
+  fine.triangles.push_back({0, 1, 2});
+  return fine;
+}
+
+TEST_F(ReplicaTest, AFineSurfaceIsThereOnceItIsWhole) {
+  start();
+  EXPECT_EQ(replica_.fine_surface(), nullptr);
+  auto fine = fine_triangle();
+  fine.texture.resize(3);
+  fine.picture = "\x89PNG\r\n\x1a\n" + std::string(wire::kFinePartBytes, 'x');
+  const auto give = [&] {
+    for (const auto& part : wire::parts_of(fine)) {
+      proto::Envelope envelope;
+      *envelope.mutable_fine_surface_part() = part;
+      replica_.on_message(envelope, 0, 100);
+      advance(1);
+    }
+  };
+  give();
+  ASSERT_NE(replica_.fine_surface(), nullptr);
+  EXPECT_EQ(*replica_.fine_surface(), fine);
+  expect_in_step();
+  // Who comes back is sent it again, which is not another one.
+  const auto* before = replica_.fine_surface().get();
+  give();
+  EXPECT_EQ(replica_.fine_surface().get(), before);
+}
+
+TEST_F(ReplicaTest, AFineSurfaceThatIsNoneIsAFault) {
+  start();
+  auto parts = wire::parts_of(fine_triangle());
+  parts[0].mutable_payload()->push_back('\xff');
+  proto::Envelope envelope;
+  *envelope.mutable_fine_surface_part() = parts[0];
+  replica_.on_message(envelope, 0, 100);
+  ASSERT_FALSE(replica_.fault().ok());
+  EXPECT_NE(replica_.fault().error().message.find("FineSurfacePart.payload"), std::string::npos);
+}
+
 TEST_F(ReplicaTest, InvalidMessagesAreAFaultThatNamesTheField) {
   const auto fault_of = [&](auto change) {
     testing::SyntheticSource source(testing::make_blob_layout(6, 8, 0.08));

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <array>
 #include <string>
 
 #include "server/organs/formats/obj_reader.h"
@@ -83,6 +84,23 @@ TEST(SurfaceReaders, SplitFacesOfMoreCorners) {
   const auto raw = parse_obj("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\nf 1 2 3\n", "a.obj");
   ASSERT_TRUE(raw.ok()) << raw.error().message;
   EXPECT_EQ(raw->face_numbers, (std::vector<std::int64_t>{1, 1, 2}));
+}
+
+TEST(ObjReader, CornersHaveTheirPlacesInAPicture) {
+  const std::string text =
+      "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 0.5\n"
+      "f 1/1/1 2/2 3/3 4/-1\n";
+  const auto raw = parse_obj(text, "a.obj");
+  ASSERT_TRUE(raw.ok()) << raw.error().message;
+  ASSERT_EQ(raw->corner_texture.size(), 2u);
+  EXPECT_EQ(raw->corner_texture[1][2], (std::array<double, 2>{0, 0.5}));
+  // None has one if a corner lacks it.
+  const auto some = parse_obj(text + "f 1 2 3\n", "a.obj");
+  ASSERT_TRUE(some.ok());
+  EXPECT_TRUE(some->corner_texture.empty());
+  const auto wrong = parse_obj(text + "f 1/1 2/5 3/3\n", "a.obj");
+  ASSERT_FALSE(wrong.ok());
+  EXPECT_EQ(wrong.error().message, "a.obj:10: refers to texture coordinate 5, the file has 4");
 }
 
 TEST(SurfaceReaders, ErrorsSayWhereAndWhat) {

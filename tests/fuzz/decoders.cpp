@@ -16,12 +16,14 @@
 #include "common/tool/instrument.h"
 #include "common/tool/script.h"
 #include "common/wire/blood_codec.h"
+#include "common/wire/fine_surface.h"
 #include "common/wire/framing.h"
 #include "common/wire/hand_report_messages.h"
 #include "common/wire/haptic_messages.h"
 #include "common/wire/surface_codec.h"
 #include "common/wire/surface_messages.h"
 #include "common/wire/surface_slices.h"
+#include "proto/fine_surface.pb.h"
 #include "proto/journal.pb.h"
 #include "proto/wire.pb.h"
 #include "server/lab/scenario/scenario.h"
@@ -173,6 +175,12 @@ bool decode_handshake(BytesView bytes) {
 
 bool decode_topology(BytesView bytes) {
   proto::SurfaceTopology message;
+  return message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())) &&
+         checked(wire::read(message));
+}
+
+bool decode_fine_surface(BytesView bytes) {
+  proto::FineSurface message;
   return message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())) &&
          checked(wire::read(message));
 }
@@ -335,6 +343,7 @@ constexpr Decoder kDecoders[] = {
     {"handshake", decode_handshake},
     {"surface_topology", decode_topology},
     {"surface_change", decode_change},
+    {"fine_surface", decode_fine_surface},
     {"journal", decode_journal},
     {"organ", decode_organ},
     {"reduction", decode_reduction},

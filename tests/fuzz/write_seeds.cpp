@@ -7,10 +7,12 @@
 
 #include "common/secure/datagram_channel.h"
 #include "common/wire/blood_codec.h"
+#include "common/wire/fine_surface.h"
 #include "common/wire/hand_report_messages.h"
 #include "common/wire/haptic_messages.h"
 #include "common/wire/surface_messages.h"
 #include "common/wire/surface_slices.h"
+#include "proto/fine_surface.pb.h"
 #include "proto/wire.pb.h"
 #include "server/organs/catalogue/builtin_organs.h"
 #include "server/organs/organ/local_reduction_file.h"
@@ -66,6 +68,16 @@ void save_surfaces() {
   proto::SurfaceChange message;
   wire::write(change, after, message);
   save("surface_change", "split_edge", message);
+  wire::FineSurface fine;
+  for (const std::int32_t q : {0, 20'000, 40'000}) {
+    fine.quanta.push_back({q, q * q % 997, 0});
+    fine.texture.push_back({q / 2, q % 999});
+  }
+  fine.triangles.push_back({0, 1, 2});
+  fine.picture = "\x89PNG\r\n\x1a\n";
+  proto::FineSurface fine_message;
+  wire::write(fine, fine_message);
+  save("fine_surface", "painted_triangle", fine_message);
 }
 
 void save_slices() {

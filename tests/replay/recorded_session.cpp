@@ -3,6 +3,7 @@
 #include "common/base/assert.h"
 #include "common/wire/surface_codec.h"
 #include "common/wire/surface_messages.h"
+#include "proto/organ.pb.h"
 #include "tests/client/synthetic_source.h"
 #include "tests/support/surface_edits.h"
 
@@ -98,6 +99,13 @@ Truth record_session(const std::string& path, const RecordingOptions& options) {
   proto::SurfaceTopology topology;
   for (const auto& message : start.messages)
     if (message.has_surface_topology()) topology = message.surface_topology();
+  if (options.has_fine_surface) {
+    proto::Organ organ;
+    for (const int step : {0, 0, 0, 9, 0, 0, 0, 9, 0})
+      organ.mutable_fine_surface()->add_position_step(step);
+    for (const int step : {0, 1, 1}) organ.mutable_fine_surface()->add_corner_step(step);
+    recorder.write(JournalTopic::Organ, 0, organ);
+  }
   recorder.write(JournalTopic::Topology, 0, topology);
   recorder.write_participants(0, 1);
 

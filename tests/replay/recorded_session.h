@@ -31,6 +31,7 @@ struct RecordingOptions {
   Frame claim_at = 0;   // a refusal in this frame
   Frame join_at = 0;    // from one participant to two
   Frame stage_at = 0;   // a lesson's stage begins in this frame, and the lesson ends 100 later
+  bool has_fine_surface = false;  // of the organ: one triangle
   bool is_finished = true;
   journal::McapWriterOptions container;
   std::uint32_t protocol_major = kProtocolMajor;

@@ -47,6 +47,32 @@ TEST_F(ReplaySourceTest, PlaysEveryFrameBitForBit) {
   EXPECT_EQ(player.source->statistics().bytes_received, counters.bytes);
 }
 
+TEST_F(ReplaySourceTest, ShowsTheOrgansFineSurface) {
+  const Truth truth = record({.frames = 100, .has_fine_surface = true});
+  Player player(path_);
+  player.step(0);
+  ASSERT_NE(player.replica.fine_surface(), nullptr);
+  EXPECT_EQ(player.replica.fine_surface()->triangles.size(), 1u);
+  player.source->seek(50 * kTicksPerFrame);
+  player.step(0);
+  ASSERT_NO_FATAL_FAILURE(player.expect_truth(truth));
+  EXPECT_NE(player.replica.fine_surface(), nullptr);
+}
+
+TEST_F(ReplaySourceTest, AFineSurfaceThatIsNoneIsLeftOut) {
+  const Truth truth = record({.frames = 100,
+                              .has_fine_surface = true,
+                              .tamper = [](journal::JournalTopic topic, Frame, Bytes& bytes) {
+                                // The last corner's step.
+                                if (topic == journal::JournalTopic::Organ) bytes.back() = 0x7f;
+                                return true;
+                              }});
+  Player player(path_);
+  player.step(0);
+  EXPECT_EQ(player.replica.fine_surface(), nullptr);
+  ASSERT_NO_FATAL_FAILURE(player.expect_truth(truth));
+}
+
 TEST_F(ReplaySourceTest, UnevenPollsMissNothing) {
   const Truth truth = record({.frames = 400, .cut_at = 133});
   Player player(path_);

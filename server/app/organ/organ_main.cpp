@@ -16,6 +16,7 @@
 #include "common/base/version.h"
 #include "server/app/organ/organ_calibrate.h"
 #include "server/app/organ/organ_edit.h"
+#include "server/app/organ/organ_embed.h"
 #include "server/app/organ/organ_experiments.h"
 #include "server/app/organ/organ_export.h"
 #include "server/app/organ/organ_identify.h"
@@ -62,6 +63,8 @@ Examples:
       the same mesh, in metres, of neo-Hookean tets of 6 kPa
   trocar-organ import spleen.stl --unit mm --nodes 2000
       a closed surface, filled with tets
+  trocar-organ import spleen.stl --unit mm --nodes 2000 --embed spleen.stl
+      the same, drawn as finely as the file is
   trocar-organ import scan.nii.gz --labels 1:liver,2:tumour
       two structures of a segmented scan, as one organ of two regions
   trocar-organ inspect spleen.organ --json
@@ -102,6 +105,7 @@ struct Options {
   std::string import_name;
   std::optional<int> import_nodes;
   std::string import_labels;
+  std::string embedded, embedded_picture;
   bool unit_is_said = false;
   std::string law;
   std::optional<double> young_modulus_pa, poisson_ratio;
@@ -297,6 +301,11 @@ Status run_import(const Options& options) {
   give_regions_its_material(imported->organ);
   if (auto changed = change_organ(options, true, imported->organ); !changed) return changed;
   give_regions_its_material(imported->organ);
+  if (auto embedded = embed_surface(
+          {.file = options.embedded, .picture = options.embedded_picture, .unit = *unit},
+          imported->organ);
+      !embedded)
+    return embedded;
   for (const std::string& note : imported->notes)
     std::fprintf(stderr, "%s: %s: %s\n", kProgram, options.import_file.c_str(), note.c_str());
   say_what_was_chosen(options, imported->organ.material);
@@ -387,6 +396,15 @@ void add_commands(CLI::App& app, Options& options) {
       ->capture_default_str();
   import->add_option("--name", options.import_name, "name of the organ [the file's]")
       ->type_name("NAME");
+  import
+      ->add_option("--embed", options.embedded,
+                   "a fine surface that is drawn instead of the mesh's and is cut with it: .stl, "
+                   ".obj or .ply, in the unit and place of FILE; at most 200,000 triangles")
+      ->type_name("FINE");
+  import
+      ->add_option("--embed-picture", options.embedded_picture,
+                   "what is painted on it by its texture coordinates: .png or .jpg, at most 4 MiB")
+      ->type_name("FILE");
   import->add_option("--out", options.out, "file to write [<file's name>.organ, here]")
       ->type_name("FILE");
 

@@ -156,6 +156,10 @@ void print_text(const organ::Organ& organ) {
   else
     std::printf("  links               %s\n", grouped(mesh.links.size()).c_str());
   std::printf("  surface triangles   %s\n", grouped(mesh.boundary_triangles.size()).c_str());
+  if (const auto& fine = organ.fine_surface; !fine.empty())
+    std::printf("  fine surface        %s triangles, %s vertices%s\n",
+                grouped(fine.triangles.size()).c_str(), grouped(fine.quanta.size()).c_str(),
+                fine.picture.empty() ? "" : ", with a picture");
   std::printf("  size                %.1f x %.1f x %.1f mm\n", size.x, size.y, size.z);
   const Vec3d offset = organ.source_offset_m * 1e3;
   std::printf("  offset              %.4g %.4g %.4g mm: add it to a position to get the source's\n",

@@ -173,6 +173,7 @@ Status Server::open() {
   replication.has_datagrams = tcp_->has_datagrams();
   replication.lesson = options_.lesson;
   replication.course = std::move(start_.course);
+  replication.fine_surface = replication::encode_fine_surface(organ.fine_surface);
   replication.haptic_laws = touch::haptic_laws(organ);
   replication.return_seconds = options_.access.return_seconds;
   replication.places = limits.places;

@@ -5,6 +5,7 @@
 
 #include "server/lab/scenario/relaxed_organ.h"
 #include "server/lab/scenario/scenario_run.h"
+#include "server/organs/embed/embed.h"
 
 namespace trocar::scenario {
 
@@ -36,6 +37,7 @@ Result<Settled> settle(organ::Organ organ, const Vec3d& gravity_m_s2,
     return Error{ErrorCode::BadFile, name + text};
   }
   auto free = organ.stress_free();
+  const mesh::TetMesh before = organ.mesh;
   auto& rest = organ.mesh.rest_positions;
   for (std::size_t i = 0; i < rest.size(); ++i) {
     const Vec3d move = to_double(run.world().displacements[i]);
@@ -45,6 +47,7 @@ Result<Settled> settle(organ::Organ organ, const Vec3d& gravity_m_s2,
   }
   const Vec3d centre = mesh::centre_on_origin(organ.mesh);
   for (auto& position : free) position -= centre;
+  embed::carry(before, rest, organ.fine_surface);
   organ.source_offset_m += centre;
   organ.stress_free_positions_m = std::move(free);
   if (auto s = organ::validate(organ); !s)

@@ -362,6 +362,7 @@ Status validate(const Organ& organ) {
   if (auto s = check_fibres(organ); !s) return s;
   if (auto s = check_regions(organ); !s) return s;
   if (auto s = validate(organ.depth_table); !s) return broken(organ, s.error().message);
+  if (auto s = wire::validate(organ.fine_surface); !s) return broken(organ, s.error().message);
   return check_material(organ, organ.material);
 }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "common/math/vec3.h"
+#include "common/wire/fine_surface.h"
 #include "server/organs/material/material.h"
 #include "server/organs/mesh/tet_mesh.h"
 #include "server/organs/organ/depth_table.h"
@@ -34,6 +35,8 @@ struct Organ {
   // or zero where Material::fibre_direction holds. Empty: it holds everywhere.
   std::vector<Vec3d> fibre_directions;
   DepthTable depth_table;  // empty: not calibrated
+  // Clients draw this instead of the mesh's surface; empty: that. It changes no result.
+  wire::FineSurface fine_surface;
 
   // Geometry from which energies measure strain.
   const std::vector<Vec3d>& stress_free() const {
@@ -92,7 +95,8 @@ void follow_weights(Organ& organ, const std::vector<double>& weights_before);
 // and sessions that depend on it. Each array is preceded by its length (u64); in order: rest
 // positions, tets, links, boundary triangles, fixed nodes, node masses, the numbers of the
 // material, of each region with its nodes, gravity, stress-free positions, directions of fibres if
-// there are any. Name, source, source offset and depth table are left out: they change no result.
+// there are any. Name, source, source offset, depth table and fine surface are left out: they
+// change no result.
 std::uint64_t organ_hash(const Organ& organ);
 
 // Validates mesh, sizes and ranges; the rest bounding box is centred on the origin and at most 2 m.

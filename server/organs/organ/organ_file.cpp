@@ -222,6 +222,7 @@ Bytes encode_organ(const Organ& organ) {
   for (const Vec3d& f : organ.fibre_directions) put_vector(f, message.mutable_fibre_direction());
   if (!organ.depth_table.empty())
     put_depth_table(organ.depth_table, *message.mutable_depth_table());
+  if (!organ.fine_surface.empty()) wire::write(organ.fine_surface, *message.mutable_fine_surface());
   Bytes bytes(message.ByteSizeLong());
   TROCAR_ASSERT(message.SerializeToArray(bytes.data(), static_cast<int>(bytes.size())));
   return bytes;
@@ -265,6 +266,11 @@ Result<Organ> decode_within(BytesView bytes, std::size_t file_bytes) {
       !s)
     return s.error();
   if (message.has_depth_table()) organ.depth_table = take_depth_table(message.depth_table());
+  if (message.has_fine_surface()) {
+    auto fine = wire::read(message.fine_surface());
+    if (!fine) return bad("organ: " + fine.error().message);
+    organ.fine_surface = std::move(*fine);
+  }
   if (auto s = validate(organ); !s) return s.error();
   return organ;
 }

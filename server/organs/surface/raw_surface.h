@@ -2,6 +2,7 @@
 
 // Triangles as a file gives them, before anything is known about them.
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -15,6 +16,9 @@ struct RawSurface {
   std::vector<mesh::Triangle> triangles;  // valid indices into `positions`
   // The file's number of the face of each triangle, from 1: a face of more corners is several.
   std::vector<std::int64_t> face_numbers;
+  // Each triangle's corners are here in a picture, u to the right and v upward, 0 to 1; empty: the
+  // file does not say it.
+  std::vector<std::array<std::array<double, 2>, 3>> corner_texture;
 };
 
 }  // namespace trocar::surface

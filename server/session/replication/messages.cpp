@@ -101,6 +101,16 @@ wire::SharedBytes encode_participants(const std::vector<participants::Participan
   return wire::encode_envelope(envelope);
 }
 
+std::vector<wire::SharedBytes> encode_fine_surface(const wire::FineSurface& surface) {
+  std::vector<wire::SharedBytes> messages;
+  for (auto& part : wire::parts_of(surface)) {
+    proto::Envelope envelope;
+    envelope.mutable_fine_surface_part()->Swap(&part);
+    messages.push_back(wire::encode_envelope(envelope));
+  }
+  return messages;
+}
+
 wire::SharedBytes encode_topology(const wire::SurfaceLayout& layout,
                                   const std::string& organ_name) {
   proto::Envelope envelope;

@@ -41,6 +41,7 @@ wire::SharedBytes encode_welcome(ParticipantSlot slot, std::uint64_t organ_hash,
                                  std::uint32_t return_seconds = 0);
 wire::SharedBytes encode_participants(const std::vector<participants::Participant>& present,
                                       bool is_closed, std::span<const std::string> waiting);
+std::vector<wire::SharedBytes> encode_fine_surface(const wire::FineSurface& surface);
 wire::SharedBytes encode_topology(const wire::SurfaceLayout& layout, const std::string& organ_name);
 // `layout`: the one that the change was applied to.
 wire::SharedBytes encode_surface_change(const wire::SurfaceChange& change,

@@ -392,6 +392,7 @@ std::optional<Replicator::Ending> Replicator::handle_ack(Client& client,
     return Ending{EndReason::ProtocolError,
                   "FrameAck.frame: " + std::to_string(frame) + " was not given to you yet"};
   client.feed.acknowledge(encoder_, frame);
+  client.acknowledged = std::max(client.acknowledged, frame);
   if (client.participant) note_answer(client.participant->slot, ack);
   return std::nullopt;
 }
@@ -489,6 +490,7 @@ void Replicator::publish(std::span<const step::SharedFrame> frames) {
     if (!client->listens()) continue;
     if (client->participant) give_touch(*client);
     give_frame(*client, false);
+    give_fine_surface(*client);
   }
   settle_participants();
 }
@@ -498,7 +500,10 @@ void Replicator::attend() {
   put_out_revoked();
   if (encoder_.current() && !barrier_)
     for (const auto& [id, client] : clients_)
-      if (client->listens()) give_frame(*client, false);
+      if (client->listens()) {
+        give_frame(*client, false);
+        give_fine_surface(*client);
+      }
   settle_participants();
 }
 

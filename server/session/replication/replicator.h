@@ -233,6 +233,8 @@ class Replicator final : public net::ConnectionHandler {
   // True if the client has the newest frame afterwards, or it is on its way. `is_required`: do not
   // skip.
   bool give_frame(Client& client, bool is_required);
+  // Gives it the next part of the fine surface, if there is room (replicator_fine.cpp).
+  void give_fine_surface(Client& client);
   // Tells it what its tools feel in the newest frame, if a hand feels them.
   void give_touch(Client& client);
   void end_session(Client& client, const Ending& ending);

@@ -33,6 +33,9 @@ struct Replicator::Client {
   bool is_welcome = false;
   FrameFeed feed;
   bool wants_ghost = false;
+  std::size_t fine_parts = 0;  // of the fine surface, sent so far
+  Frame fine_frame = 0;        // the newest one when the last of them was sent
+  Frame acknowledged = 0;      // the newest one
   bool has_sent_datagrams = false;
   std::uint64_t pointed_ns = 0;  // when it pointed last; 0: it does not
   std::uint64_t viewed_ns = 0;   // when it said last where its view is

@@ -45,7 +45,10 @@ struct ReplicatorOptions {
   std::optional<lesson::Lesson> lesson;      // empty: the session gives none
   std::shared_ptr<lesson::Course> course;    // of a session that goes on; null: from the beginning
   std::vector<wire::HapticLaw> haptic_laws;  // how the organ answers tools, for hands that feel it
-  bool has_datagrams = false;                // the transport takes them; clients are told
+  // The organ's fine surface, in messages; empty: it has none. It fills what room there is in an
+  // outbox after what is fresh.
+  std::vector<wire::SharedBytes> fine_surface;
+  bool has_datagrams = false;  // the transport takes them; clients are told
   // Null: everybody may come, in any role. It outlives the replicator.
   access::Gate* gate = nullptr;
   // Whether anybody wants the ghost, after each change; empty: the session has none.

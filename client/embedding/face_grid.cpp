@@ -1,0 +1,150 @@
+#include "client/embedding/face_grid.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace trocar::embedding {
+namespace {
+
+constexpr int kMostCells = 48;        // along a side
+constexpr float kMostReachCells = 2;  // farther away nothing is looked for
+
+bool has_area(const TriangleCorners& t) {
+  return t[0] != t[1];
+}
+
+}  // namespace
+
+// Ericson 2005, section 5.1.5.
+FacePlace nearest_on(const Vec3f& p, const Vec3f& a, const Vec3f& b, const Vec3f& c) {
+  const auto at = [&](float v, float w) {
+    FacePlace place{.face = 0, .weight = {1 - v - w, v, w}};
+    place.distance_m = length(a + (b - a) * v + (c - a) * w - p);
+    return place;
+  };
+  const Vec3f ab = b - a, ac = c - a, ap = p - a;
+  const float d1 = dot(ab, ap), d2 = dot(ac, ap);
+  if (d1 <= 0 && d2 <= 0) return at(0, 0);
+  const Vec3f bp = p - b;
+  const float d3 = dot(ab, bp), d4 = dot(ac, bp);
+  if (d3 >= 0 && d4 <= d3) return at(1, 0);
+  const float vc = d1 * d4 - d3 * d2;
+  if (vc <= 0 && d1 >= 0 && d3 <= 0) return at(d1 / std::max(d1 - d3, 1e-30f), 0);
+  const Vec3f cp = p - c;
+  const float d5 = dot(ab, cp), d6 = dot(ac, cp);
+  if (d6 >= 0 && d5 <= d6) return at(0, 1);
+  const float vb = d5 * d2 - d1 * d6;
+  if (vb <= 0 && d2 >= 0 && d6 <= 0) return at(0, d2 / std::max(d2 - d6, 1e-30f));
+  const float va = d3 * d6 - d5 * d4;
+  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) {
+    const float w = (d4 - d3) / std::max((d4 - d3) + (d5 - d6), 1e-30f);
+    return at(1 - w, w);
+  }
+  const float whole = std::max(va + vb + vc, 1e-30f);
+  return at(vb / whole, vc / whole);
+}
+
+std::array<int, 3> FaceGrid::cell_of(const Vec3f& p) const {
+  const auto along = [this](float x, int size) {
+    return static_cast<int>(std::clamp(x / cell_m_, 0.0f, static_cast<float>(size - 1)));
+  };
+  const Vec3f from = p - origin_;
+  return {along(from.x, size_[0]), along(from.y, size_[1]), along(from.z, size_[2])};
+}
+
+template <typename Visit>
+void FaceGrid::for_cells(const Box<float>& box, const Visit& visit) const {
+  const auto low = cell_of(box.least), high = cell_of(box.most);
+  for (int z = low[2]; z <= high[2]; ++z)
+    for (int y = low[1]; y <= high[1]; ++y)
+      for (int x = low[0]; x <= high[0]; ++x)
+        visit(static_cast<std::size_t>((z * size_[1] + y) * size_[0] + x));
+}
+
+void FaceGrid::build(std::span<const Vec3f> positions, std::span<const TriangleCorners> triangles,
+                     std::span<const std::uint8_t> is_left_out, float cell_m) {
+  positions_ = positions;
+  triangles_ = triangles;
+  const auto is_in = [&](std::size_t i) {
+    return has_area(triangles[i]) && (i >= is_left_out.size() || is_left_out[i] == 0);
+  };
+  const auto box_of = [&](std::size_t i) {
+    Box<float> box;
+    for (const std::uint32_t v : triangles[i]) box.include(positions[v]);
+    return box;
+  };
+  all_ = {};
+  for (std::size_t i = 0; i < triangles.size(); ++i)
+    if (is_in(i))
+      for (const std::uint32_t v : triangles[i]) all_.include(positions[v]);
+  const bool is_empty = all_.least.x > all_.most.x;
+  const Vec3f extent = is_empty ? Vec3f{} : all_.most - all_.least;
+  origin_ = is_empty ? Vec3f{} : all_.least;
+  cell_m_ = std::max({cell_m, std::max({extent.x, extent.y, extent.z}) / kMostCells, 1e-6f});
+  size_ = {static_cast<int>(extent.x / cell_m_) + 1, static_cast<int>(extent.y / cell_m_) + 1,
+           static_cast<int>(extent.z / cell_m_) + 1};
+  const auto cells = static_cast<std::size_t>(size_[0] * size_[1] * size_[2]);
+  first_.assign(cells + 1, 0);
+  for (std::size_t i = 0; i < triangles.size(); ++i)
+    if (is_in(i)) for_cells(box_of(i), [this](std::size_t cell) { ++first_[cell + 1]; });
+  for (std::size_t cell = 0; cell < cells; ++cell) first_[cell + 1] += first_[cell];
+  entries_.resize(first_[cells]);
+  for (std::size_t i = 0; i < triangles.size(); ++i)
+    if (is_in(i))
+      for_cells(box_of(i), [&](std::size_t cell) {
+        entries_[first_[cell]++] = static_cast<std::uint32_t>(i);
+      });
+  // Each cell's first is now that of the next one.
+  for (std::size_t cell = cells; cell > 0; --cell) first_[cell] = first_[cell - 1];
+  first_[0] = 0;
+  seen_.assign(triangles.size(), 0);
+  query_ = 0;
+}
+
+void FaceGrid::find(const Box<float>& box, std::vector<std::uint32_t>& found) const {
+  if (!all_.overlaps(box)) return;
+  ++query_;
+  for_cells(box, [&](std::size_t cell) {
+    for (std::uint32_t i = first_[cell]; i < first_[cell + 1]; ++i) {
+      const std::uint32_t face = entries_[i];
+      if (seen_[face] == query_) continue;
+      seen_[face] = query_;
+      found.push_back(face);
+    }
+  });
+}
+
+FacePlace FaceGrid::nearest(const Vec3f& p, const Vec3f& normal) const {
+  FacePlace best, any;
+  if (entries_.empty()) return best;
+  for (float reach = 0.25f * cell_m_;; reach *= 2) {
+    Box<float> box;
+    box.include(p);
+    box.grow(reach);
+    ++query_;
+    const auto consider = [](FacePlace& kept, const FacePlace& place) {
+      const bool is_nearer = place.distance_m < kept.distance_m ||
+                             (place.distance_m == kept.distance_m && place.face < kept.face);
+      if (kept.face == kNoFace || is_nearer) kept = place;
+    };
+    for_cells(box, [&](std::size_t cell) {
+      for (std::uint32_t i = first_[cell]; i < first_[cell + 1]; ++i) {
+        const std::uint32_t face = entries_[i];
+        if (seen_[face] == query_) continue;
+        seen_[face] = query_;
+        const auto& [a, b, c] = triangles_[face];
+        FacePlace place = nearest_on(p, positions_[a], positions_[b], positions_[c]);
+        place.face = face;
+        consider(any, place);
+        const Vec3f n = cross(positions_[b] - positions_[a], positions_[c] - positions_[a]);
+        if (dot(n, normal) > 0) consider(best, place);
+      }
+    });
+    if (best.face != kNoFace && best.distance_m <= reach) return best;
+    if (reach <= kMostReachCells * cell_m_) continue;
+    if (best.face == kNoFace) best = any;
+    return best.distance_m <= 2 * reach ? best : FacePlace{};
+  }
+}
+
+}  // namespace trocar::embedding

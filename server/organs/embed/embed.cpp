@@ -1,0 +1,170 @@
+#include "server/organs/embed/embed.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include "server/organs/surface/triangle_tree.h"
+
+namespace trocar::embed {
+namespace {
+
+constexpr double kFarthest_m = 1.9;  // from the origin, within what a message may say
+
+double mean_edge(const mesh::TetMesh& mesh) {
+  double sum = 0;
+  for (const auto& t : mesh.boundary_triangles)
+    for (std::size_t k = 0; k < 3; ++k)
+      sum += length(mesh.rest_positions[t[(k + 1) % 3].value] - mesh.rest_positions[t[k].value]);
+  return sum / static_cast<double>(3 * mesh.boundary_triangles.size());
+}
+
+std::array<std::int32_t, 2> texture_quanta(const std::array<double, 2>& place) {
+  const auto quantum = [](double c) {
+    return static_cast<std::int32_t>(
+        std::lround(std::clamp(c, -16.0, 16.0) / wire::kTextureQuantum));
+  };
+  return {quantum(place[0]), quantum(place[1])};
+}
+
+// Gives each place on the grid, and in a picture, one vertex.
+class Vertices {
+ public:
+  explicit Vertices(wire::FineSurface& surface) : surface_(surface) {}
+  std::uint32_t at(const std::array<std::int32_t, 3>& place,
+                   const std::array<std::int32_t, 2>* texture) {
+    const std::array<std::int32_t, 5> key{place[0], place[1], place[2],
+                                          texture != nullptr ? (*texture)[0] : 0,
+                                          texture != nullptr ? (*texture)[1] : 0};
+    const auto [known, is_new] =
+        known_.try_emplace(key, static_cast<std::uint32_t>(surface_.quanta.size()));
+    if (is_new) {
+      surface_.quanta.push_back(place);
+      if (texture != nullptr) surface_.texture.push_back(*texture);
+    }
+    return known->second;
+  }
+
+ private:
+  wire::FineSurface& surface_;
+  std::map<std::array<std::int32_t, 5>, std::uint32_t> known_;
+};
+
+Vec3d position(const wire::FineSurface& surface, std::uint32_t vertex) {
+  const auto& [x, y, z] = surface.quanta[vertex];
+  return Vec3d{double(x), double(y), double(z)} * wire::kFineQuantumMetres;
+}
+
+Vec3d normal(const wire::FineSurface& surface, const std::array<std::uint32_t, 3>& t) {
+  const Vec3d a = position(surface, t[0]);
+  return cross(position(surface, t[1]) - a, position(surface, t[2]) - a);
+}
+
+Error bad(const EmbedOptions& options, const std::string& what) {
+  return {ErrorCode::BadFile, options.name + ": " + what};
+}
+
+// Compares with the mesh: how far away, and which way it looks.
+Status fit(const mesh::TetMesh& mesh, const EmbedOptions& options, EmbeddedFine& result) {
+  const surface::TriangleTree tree(mesh.rest_positions, mesh.boundary_triangles);
+  const double most = kMostEdgesAway * mean_edge(mesh);
+  auto& surface = result.surface;
+  std::vector<Vec3d> outward;
+  Vec3d worst;
+  for (std::uint32_t v = 0; v < surface.quanta.size(); ++v) {
+    const Vec3d p = position(surface, v);
+    const auto near = tree.nearest(p);
+    if (const double away = std::sqrt(near.distance_squared); away > result.farthest_m)
+      result.farthest_m = away, worst = p;
+    const auto& t = mesh.boundary_triangles[near.triangle];
+    const Vec3d a = mesh.rest_positions[t[0].value];
+    outward.push_back(
+        cross(mesh.rest_positions[t[1].value] - a, mesh.rest_positions[t[2].value] - a));
+  }
+  if (result.farthest_m > most) {
+    const auto in_file = [&](double c) {
+      return std::round(c / metres_of(options.unit) * 1e6) / 1e6 + 0.0;  // no minus before zero
+    };
+    const Vec3d place = worst + options.offset_m;
+    return bad(options,
+               fmt::format("the vertex at {:.5g} {:.5g} {:.5g} is {:.2f} mm from the surface of "
+                           "the mesh, may be {:.2f} mm, half of its mean edge: is it the same "
+                           "organ, in the same unit and place? A mesh that is finer or coarser "
+                           "fits otherwise (--nodes)",
+                           in_file(place.x), in_file(place.y), in_file(place.z),
+                           1e3 * result.farthest_m, 1e3 * most));
+  }
+  double agrees = 0;
+  for (const auto& t : surface.triangles) agrees += dot(normal(surface, t), outward[t[0]]);
+  if (agrees < 0) {
+    for (auto& t : surface.triangles) std::swap(t[1], t[2]);
+    result.warnings.push_back("the fine surface looked inward, all of its triangles were turned");
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<EmbeddedFine> embed(const surface::RawSurface& raw, const mesh::TetMesh& mesh,
+                           const EmbedOptions& options) {
+  if (mesh.boundary_triangles.empty()) return bad(options, "the organ has no surface to ride on");
+  if (raw.triangles.size() > wire::kMaxFineTriangles)
+    return bad(options, fmt::format("has {} triangles, a fine surface may have {}",
+                                    raw.triangles.size(), wire::kMaxFineTriangles));
+  EmbeddedFine result;
+  result.surface.picture = options.picture;
+  Vertices vertices(result.surface);
+  const double unit = metres_of(options.unit);
+  std::size_t dropped = 0;
+  for (std::size_t i = 0; i < raw.triangles.size(); ++i) {
+    std::array<std::uint32_t, 3> corners{};
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vec3d p = raw.positions[raw.triangles[i][k].value] * unit - options.offset_m;
+      if (!is_finite(p) || std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) > kFarthest_m)
+        return bad(options, fmt::format("triangle {}: a corner is more than 1.9 m from the organ's "
+                                        "centre: is it in the same unit?",
+                                        i + 1));
+      std::array<std::int32_t, 2> texture{};
+      if (!raw.corner_texture.empty()) texture = texture_quanta(raw.corner_texture[i][k]);
+      corners[k] =
+          vertices.at(wire::fine_quanta(p), raw.corner_texture.empty() ? nullptr : &texture);
+    }
+    const auto& [a, b, c] = corners;
+    const bool has_area = a != b && b != c && c != a && length(normal(result.surface, corners)) > 0;
+    if (has_area)
+      result.surface.triangles.push_back(corners);
+    else
+      ++dropped;
+  }
+  if (dropped > 0)
+    result.warnings.push_back(fmt::format("dropped {} triangles without an area", dropped));
+  if (result.surface.triangles.empty()) return bad(options, "has no triangles to embed");
+  if (Status valid = wire::validate(result.surface); !valid.ok())
+    return bad(options, valid.error().message);
+  if (Status fits = fit(mesh, options, result); !fits.ok()) return fits.error();
+  return result;
+}
+
+void carry(const mesh::TetMesh& before, std::span<const Vec3d> now, wire::FineSurface& surface) {
+  if (surface.empty()) return;
+  const surface::TriangleTree tree(before.rest_positions, before.boundary_triangles);
+  for (std::uint32_t v = 0; v < surface.quanta.size(); ++v) {
+    const Vec3d p = position(surface, v);
+    const auto near = tree.nearest(p);
+    const auto& t = before.boundary_triangles[near.triangle];
+    const auto& rest = before.rest_positions;
+    const Vec3d a = rest[t[0].value], b = rest[t[1].value], c = rest[t[2].value];
+    const Vec3d n = cross(b - a, c - a);
+    const double whole = std::max(dot(n, n), 1e-30);
+    const double of_b = dot(cross(near.point - a, c - a), n) / whole,
+                 of_c = dot(cross(b - a, near.point - a), n) / whole;
+    const auto moved = [&](NodeIndex node) { return now[node.value] - rest[node.value]; };
+    surface.quanta[v] = wire::fine_quanta(p + moved(t[0]) * (1 - of_b - of_c) + moved(t[1]) * of_b +
+                                          moved(t[2]) * of_c);
+  }
+}
+
+}  // namespace trocar::embed

@@ -1,0 +1,48 @@
+#pragma once
+
+// A fine surface for an organ, from the triangles of a file (common/wire/fine_surface.h says what
+// it is for). It need not be closed: it is drawn, and nothing is computed of it.
+//
+// Each vertex must be near the surface of the organ's mesh, by which clients move it: at most half
+// of the mean edge there. Repaired, with a warning: triangles that repeat a corner or have no area
+// are dropped, vertices at the same place and with the same place in a picture are welded, unused
+// ones dropped, and a surface that looks inward is turned.
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/math/vec3.h"
+#include "common/wire/fine_surface.h"
+#include "server/organs/mesh/raw_tets.h"
+#include "server/organs/mesh/tet_mesh.h"
+#include "server/organs/surface/raw_surface.h"
+
+namespace trocar::embed {
+
+inline constexpr double kMostEdgesAway = 0.5;  // of the mean edge of the mesh's surface
+
+struct EmbedOptions {
+  mesh::Unit unit = mesh::Unit::Metre;
+  Vec3d offset_m;       // of the organ's origin in the file's frame
+  std::string picture;  // a PNG or JPEG file's bytes; empty: none
+  std::string name;     // it starts each error, usually the file's path
+};
+
+struct EmbeddedFine {
+  wire::FineSurface surface;
+  double farthest_m = 0;              // of a vertex from the mesh's surface
+  std::vector<std::string> warnings;  // one line each
+};
+
+// `mesh`: the organ's, with its boundary. Error: a vertex is too far away, which names the place;
+// limits of wire::FineSurface; there is nothing to embed.
+Result<EmbeddedFine> embed(const surface::RawSurface& raw, const mesh::TetMesh& mesh,
+                           const EmbedOptions& options);
+
+// Moves a surface from the mesh's rest pose to another one of its nodes: each vertex as the nearest
+// place on the mesh's surface. Nothing if there is no surface.
+void carry(const mesh::TetMesh& before, std::span<const Vec3d> now, wire::FineSurface& surface);
+
+}  // namespace trocar::embed

@@ -1,0 +1,281 @@
+// A fine surface on the coarse one: exact at rest, rigid where that is, and parted by a real
+// operation with eight cuts as by nothing else.
+//
+// The fine surface is that of the same liver in smaller tets, so that no edge lies on another.
+
+#include "client/embedding/embedded_surface.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <random>
+#include <set>
+
+#include "common/math/frame.h"
+#include "common/tool/script.h"
+#include "server/organs/catalogue/builtin_organs.h"
+#include "server/tissue/step/simulation.h"
+
+namespace trocar::embedding {
+namespace {
+
+constexpr float kExact_m = 1e-6f;   // of the request
+constexpr double kLostArea = 1e-3;  // likewise: 0.1 %
+constexpr int kFineTets = 100'000;
+
+FineShape fine_liver() {
+  const auto organ = catalogue::make_liver(kFineTets);
+  const auto& mesh = organ->mesh;
+  FineShape shape;
+  std::vector<std::uint32_t> slot(mesh.node_count(), kNoFace);
+  for (const auto& triangle : mesh.boundary_triangles) {
+    auto& corners = shape.triangles.emplace_back();
+    for (std::size_t k = 0; k < 3; ++k) {
+      std::uint32_t& v = slot[triangle[k].value];
+      if (v == kNoFace) {
+        v = static_cast<std::uint32_t>(shape.positions.size());
+        shape.positions.push_back(to_float(mesh.rest_positions[triangle[k].value]));
+      }
+      corners[k] = v;
+    }
+  }
+  return shape;
+}
+
+struct Coarse {
+  std::vector<Vec3f> rest, positions;
+  std::vector<TriangleCorners> triangles;
+  std::vector<std::uint8_t> is_wound;
+
+  CoarseShape shape() const { return {rest, triangles, is_wound}; }
+};
+
+Coarse coarse_of(const wire::SurfaceLayout& layout) {
+  Coarse coarse;
+  for (const auto& q : layout.rest_quanta) coarse.rest.push_back(wire::to_metres(q));
+  for (std::size_t i = 0; i < layout.triangles.size(); ++i) {
+    const auto& t = layout.triangles[i];
+    coarse.triangles.push_back(layout.has_triangle(TriangleIndex(i))
+                                   ? TriangleCorners{t[0].value, t[1].value, t[2].value}
+                                   : TriangleCorners{});
+  }
+  coarse.is_wound = layout.is_wound;
+  coarse.positions = coarse.rest;
+  return coarse;
+}
+
+Coarse liver_at_rest() {
+  return coarse_of(step::Simulation(*catalogue::make_liver()).layout());
+}
+
+// Calls `visit` with the coarse surface at rest, and after each change of it by
+// deploy/scenes/eight-cuts.toml.
+template <typename Visit>
+void operate(const Visit& visit) {
+  step::Simulation simulation(*catalogue::make_liver());
+  const auto script = tool::parse_script(TROCAR_SOURCE_DIR "/deploy/scenes/eight-cuts.toml");
+  ASSERT_TRUE(script.ok());
+  const auto& mesh = simulation.organ().mesh;
+  std::vector<Vec3f> rest;
+  for (const auto& p : mesh.rest_positions) rest.push_back(to_float(p));
+  std::vector<tool::SurfaceTriangle> surface;
+  for (const auto& [a, b, c] : mesh.boundary_triangles)
+    surface.push_back({a.value, b.value, c.value});
+  hands::HandJoin join{.slot = {0}, .tool_count = static_cast<int>(script->tools.size())};
+  std::vector<tool::AnchorPoint> anchors;
+  Tick last = 0;
+  for (std::size_t t = 0; t < script->tools.size(); ++t) {
+    join.shapes[t] = script->tools[t].shape;
+    anchors.push_back(*tool::find_anchor(*script->tools[t].anchor, rest, surface));
+    last = std::max(last, static_cast<Tick>(script->tools[t].keys.back().time_s * 1e3));
+  }
+  visit(coarse_of(simulation.layout()));
+  std::uint32_t epoch = simulation.layout().epoch;
+  for (Tick tick = 1; tick <= last; ++tick) {
+    hands::TickInputs inputs;
+    if (tick == 1) inputs.joins.push_back(join);
+    for (std::size_t t = 0; t < script->tools.size() && tick % 8 == 1; ++t)
+      inputs.samples.push_back(
+          {tool_slot({0}, static_cast<int>(t)),
+           tool::sample(script->tools[t], static_cast<double>(tick) * 1e-3, anchors[t])});
+    simulation.tick(inputs, {});
+    const auto frame = simulation.pop_frame();
+    if (!frame || simulation.layout().epoch == epoch) continue;
+    epoch = simulation.layout().epoch;
+    Coarse coarse = coarse_of(simulation.layout());
+    for (std::size_t v = 0; v < coarse.rest.size() && v < frame->surface.size(); ++v)
+      coarse.positions[v] += wire::to_metres(frame->surface[v]);
+    visit(coarse);
+  }
+}
+
+double area_of(const Vec3f& a, const Vec3f& b, const Vec3f& c) {
+  return 0.5 * double{length(cross(b - a, c - a))};
+}
+
+double area_of(const FineShape& shape) {
+  double sum = 0;
+  for (const auto& [a, b, c] : shape.triangles)
+    sum += area_of(shape.positions[a], shape.positions[b], shape.positions[c]);
+  return sum;
+}
+
+double area_of(const EmbeddedSurface& surface) {
+  double sum = 0;
+  const auto triangles = surface.triangles();
+  for (const auto& [a, b, c] : triangles.first(triangles.size() - surface.skirt_count()))
+    sum += area_of(surface.positions()[a], surface.positions()[b], surface.positions()[c]);
+  return sum;
+}
+
+// Tells which coarse vertices a vertex is joined to, within three triangles of the outside. Across
+// a wound the outside does not go on, but around its end.
+class Neighbours {
+ public:
+  explicit Neighbours(const Coarse& coarse) : around_(coarse.rest.size()) {
+    for (std::size_t i = 0; i < coarse.triangles.size(); ++i) {
+      const auto& t = coarse.triangles[i];
+      if (t[0] == t[1] || coarse.is_wound[i] != 0) continue;
+      for (const std::uint32_t v : t)
+        for (const std::uint32_t w : t) around_[v].insert(w);
+    }
+  }
+  bool are_near(std::uint32_t from, std::uint32_t to) const {
+    std::set<std::uint32_t> reached{from};
+    for (int step = 0; step < 3; ++step) {
+      auto next = reached;
+      for (const std::uint32_t v : reached) next.insert(around_[v].begin(), around_[v].end());
+      reached = std::move(next);
+    }
+    return reached.contains(to);
+  }
+
+ private:
+  std::vector<std::set<std::uint32_t>> around_;
+};
+
+std::size_t triangles_across(const EmbeddedSurface& surface, const Coarse& coarse) {
+  const Neighbours neighbours(coarse);
+  std::size_t across = 0;
+  for (const auto& triangle : surface.triangles()) {
+    std::set<std::uint32_t> carriers;
+    for (const std::uint32_t v : triangle)
+      for (const std::uint32_t c : surface.carriers(v))
+        if (c != kNoFace) carriers.insert(c);
+    for (const std::uint32_t c : carriers)
+      if (!neighbours.are_near(*carriers.begin(), c)) {
+        ++across;
+        break;
+      }
+  }
+  return across;
+}
+
+float farthest(std::span<const Vec3f> a, std::span<const Vec3f> b) {
+  float most = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) most = std::max(most, length(a[i] - b[i]));
+  return most;
+}
+
+TEST(EmbeddedSurface, IsExactAtRest) {
+  const FineShape fine = fine_liver();
+  EmbeddedSurface surface(fine);
+  const Coarse coarse = liver_at_rest();
+  surface.follow(coarse.shape());
+  surface.update(coarse.rest);
+  ASSERT_EQ(surface.vertex_count(), fine.positions.size());
+  EXPECT_LT(farthest(surface.positions(), fine.positions), kExact_m);
+  EXPECT_EQ(surface.parted_count(), 0u);
+  EXPECT_EQ(surface.triangles().size(), fine.triangles.size());
+}
+
+TEST(EmbeddedSurface, PartsAlongCutsAndNowhereElse) {
+  const FineShape fine = fine_liver();
+  const double area = area_of(fine);
+  EmbeddedSurface surface(fine);
+  Coarse last;
+  int changes = 0;
+  operate([&](const Coarse& coarse) {
+    surface.follow(coarse.shape());
+    if (++changes % 16 == 0) {
+      surface.update(coarse.rest);
+      EXPECT_NEAR(area_of(surface) / area, 1, kLostArea) << "after change " << changes;
+    }
+    last = coarse;
+  });
+  ASSERT_GT(changes, 50);
+  EXPECT_GT(surface.parted_count(), 100u);
+  EXPECT_LT(surface.parted_count(), fine.triangles.size() / 4);
+
+  surface.update(last.rest);
+  EXPECT_NEAR(area_of(surface) / area, 1, kLostArea);
+  for (std::size_t v = 0; v < surface.vertex_count(); ++v)
+    ASSERT_LT(length(surface.positions()[v] - surface.looks()[v].rest), kExact_m);
+  EXPECT_EQ(triangles_across(surface, last), 0u);
+
+  // A rigid motion of what was cut.
+  const Pose motion{{0.03f, -0.02f, 0.05f}, normalized(Quatf{0.3f, -0.5f, 0.2f, 0.8f})};
+  std::vector<Vec3f> moved;
+  for (const Vec3f& p : last.rest) moved.push_back(motion.apply(p));
+  surface.update(moved);
+  float most = 0;
+  for (std::size_t v = 0; v < surface.vertex_count(); ++v)
+    most = std::max(most, length(surface.positions()[v] - motion.apply(surface.looks()[v].rest)));
+  EXPECT_LT(most, kExact_m);
+
+  // Who joins now sees the same.
+  EmbeddedSurface late(fine);
+  late.follow(last.shape());
+  late.update(last.positions);
+  surface.update(last.positions);
+  EXPECT_EQ(late.parted_count(), surface.parted_count());
+  EXPECT_EQ(late.vertex_count(), surface.vertex_count());
+  EXPECT_NEAR(area_of(late) / area_of(surface), 1, 1e-4);
+  std::printf("%zu changes, %zu of %zu triangles in parts, %zu drawn, %zu of skirts\n",
+              static_cast<std::size_t>(changes), surface.parted_count(), fine.triangles.size(),
+              surface.triangles().size(), surface.skirt_count());
+}
+
+TEST(EmbeddedSurface, OneThatIsElsewhereDoesNoHarm) {
+  FineShape fine = fine_liver();
+  for (std::size_t v = 0; v < fine.positions.size(); v += 2) fine.positions[v] += {1.5f, 0, 0};
+  EmbeddedSurface surface(fine);
+  const Coarse coarse = liver_at_rest();
+  surface.follow(coarse.shape());
+  surface.update(coarse.rest);
+  EXPECT_LT(farthest(surface.positions(), fine.positions), kExact_m);
+  surface.follow({});
+  surface.update({});
+  // A triangle that lies on an edge does none, nor does one that is as large as the organ.
+  const Vec3f a = coarse.rest[coarse.triangles[0][0]], b = coarse.rest[coarse.triangles[0][1]];
+  EmbeddedSurface slender({{a, b, (a + b) * 0.5f, {0.1f, 0, 0}, {-0.1f, 0, 0}, {0, 0.1f, 0}},
+                           {{0, 1, 2}, {3, 4, 5}},
+                           {}});
+  Coarse cut = coarse;
+  cut.is_wound.assign(cut.triangles.size(), 0);
+  for (std::size_t i = 0; i < cut.triangles.size(); i += 3) cut.is_wound[i] = 1;
+  slender.follow(cut.shape());
+  slender.update(cut.rest);
+  for (const Vec3f& p : slender.positions()) EXPECT_TRUE(is_finite(p));
+}
+
+TEST(EmbeddedSurface, MovesOnlyWhatMoves) {
+  EmbeddedSurface surface(fine_liver());
+  const Coarse coarse = liver_at_rest();
+  surface.follow(coarse.shape());
+  surface.update(coarse.rest);
+  EXPECT_EQ(surface.moved_count(), surface.vertex_count());
+  surface.update(coarse.rest);
+  EXPECT_EQ(surface.moved_count(), 0u);
+  auto moved = coarse.rest;
+  moved[7].y += 1e-3f;
+  surface.update(moved);
+  EXPECT_GT(surface.moved_count(), 0u);
+  EXPECT_LT(surface.moved_count(), surface.vertex_count() / 20);
+}
+
+}  // namespace
+}  // namespace trocar::embedding
