@@ -12,6 +12,6 @@ inline constexpr std::uint32_t kSimVersion = 21;
 
 // Wire protocol. Major must match; a newer minor only adds fields and messages.
 inline constexpr std::uint32_t kProtocolMajor = 1;
-inline constexpr std::uint32_t kProtocolMinor = 20;
+inline constexpr std::uint32_t kProtocolMinor = 21;
 
 }  // namespace trocar
