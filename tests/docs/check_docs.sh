@@ -115,7 +115,7 @@ check_section() { # HEADING COMMAND...
 check_options() {
   local program sub page option known
   known=$(mktemp)
-  for program in trocar-server trocar-hall trocar-client trocar-organ trocar-sim trocar-journal trocar-impair trocar-web trocar-doctor; do
+  for program in trocar-server trocar-hall trocar-client trocar-organ trocar-sim trocar-journal trocar-impair trocar-web trocar-relay trocar-doctor; do
     [ -x "$bin/$program" ] || { fault "$bin/$program: is not built"; rm -f "$known"; return; }
     check_section "## $program" "$bin/$program"
     "$bin/$program" --help | options_of_help >>"$known"
