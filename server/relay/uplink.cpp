@@ -239,6 +239,8 @@ void Uplink::take_welcome(const proto::Welcome& welcome) {
   const bool has_token = welcome.return_token().size() == participants::kReturnTokenBytes;
   token_ = has_token ? welcome.return_token() : std::string();
   next_ping_.cancel();
+  for (const auto& address : welcome.further_address())
+    bridge_.note_further(options_.server.name, address);
   if (const auto hand_on = events_.welcome) hand_on(welcome);
 }
 

@@ -113,6 +113,23 @@ TEST_F(RelayPrograms, watchers_of_a_killed_relay_go_to_the_other_one) {
   EXPECT_EQ(other.wait(20), 0);
 }
 
+TEST_F(RelayPrograms, a_relay_of_a_killed_relay_goes_to_the_other_one) {
+  auto other = start_relay("Other", session_.address());
+  auto relay =
+      start_relay("Relay", session_.address(), "127.0.0.1:0", {"--also", address_of("Other")});
+  auto third = start_relay("Third", address_of("Relay"));
+  auto ann = watch("Ann", address_of("Third"));
+  ASSERT_TRUE(says("Third", "watchers here"));
+  relay.signal(SIGKILL);
+  EXPECT_EQ(relay.wait(10), 128 + SIGKILL);
+  ASSERT_TRUE(says("Third", "back in the session"));
+  expect_a_good_end({"Ann"});
+  EXPECT_EQ(json_number(session_.summary_of("Ann"), "returns"), 0);
+  EXPECT_EQ(ann.wait(20), 0);
+  EXPECT_EQ(third.wait(20), 0);
+  EXPECT_EQ(other.wait(20), 0);
+}
+
 TEST_F(RelayPrograms, a_session_that_goes_on_goes_on_for_the_watchers_of_its_relay) {
   auto relay = start_relay("Relay", session_.address());
   auto hand = session_.hand("Sam", kScenes / "slices.toml");

@@ -138,6 +138,7 @@ void Seat::take(BytesView envelope, bool is_last) {
     if (message.has_welcome()) {
       is_welcome_ = true;
       slot_ = message.welcome().participant();
+      if (carrier_) carrier_->note_further(message.welcome());
     }
     if (message.has_goodbye()) {
       why_ = message.goodbye().text();
