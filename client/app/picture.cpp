@@ -94,6 +94,8 @@ std::vector<ui::HudParticipant> Picture::participants_of(const replica::Replica&
   for (const auto& participant : replica.participants()) {
     ui::HudParticipant shown;
     shown.name = participant.name;
+    if (participant.relayed > 0)
+      shown.name += " (" + std::to_string(participant.relayed) + " watch)";
     shown.role = participant.role;
     shown.is_away = participant.is_away;
     shown.is_frozen = !participant.frozen_by.empty();

@@ -27,6 +27,7 @@ constexpr std::chrono::milliseconds kEndPoll{1};  // of a connection's coroutine
 
 NetSource::Session::Session(NetSourceOptions options)
     : options_(std::move(options)),
+      places_{{options_.host, options_.port}},
       inbound_(options_.inbound_capacity),
       outbound_(options_.outbound_capacity) {
   asio::co_spawn(context_, run(), [this](std::exception_ptr failure) {
@@ -235,6 +236,7 @@ asio::awaitable<bool> NetSource::Session::come_back() {
                    [this](std::exception_ptr failure) { end_if_failed(failure); });
     const bool is_ready = co_await try_to_connect(deadline);
     if (is_ready) co_return true;
+    place_ = (place_ + 1) % places_.size();
   }
   end_absence();
   co_return false;
@@ -248,6 +250,16 @@ void NetSource::Session::note_welcome(const proto::Welcome& welcome) {
     comeback_.end(now);
   }
   if (options_.can_return) comeback_.allow(welcome.return_token(), welcome.return_seconds());
+  // Without a certificate to compare, a server could send its clients anywhere.
+  if (options_.join_code)
+    for (const auto& address : welcome.further_address()) note_place(address);
+}
+
+void NetSource::Session::note_place(const std::string& address) {
+  NetSourceOptions read;
+  if (places_.size() >= kMostPlaces || !parse_server_address(address, read).ok()) return;
+  const Place place{read.host, read.port};
+  if (std::ranges::find(places_, place) == places_.end()) places_.push_back(place);
 }
 
 void NetSource::Session::end_after_stream() {
@@ -314,8 +326,9 @@ asio::awaitable<bool> NetSource::Session::connect() {
 
 // One try at each of the server's addresses. False: the session has ended, or another may help.
 asio::awaitable<bool> NetSource::Session::try_to_connect(Clock::time_point deadline) {
-  const auto [unresolved, endpoints] =
-      co_await resolver_.async_resolve(options_.host, std::to_string(options_.port), kNoThrow);
+  const auto place = places_[place_];
+  const auto port = std::to_string(place.port);
+  const auto [unresolved, endpoints] = co_await resolver_.async_resolve(place.host, port, kNoThrow);
   if (unresolved) why_not_ = unresolved.message();
   for (const auto& endpoint : endpoints) {
     if (is_done_ || Clock::now() >= deadline) break;
@@ -338,7 +351,7 @@ asio::awaitable<bool> NetSource::Session::try_to_connect(Clock::time_point deadl
 // False: the session has ended, or another try may help.
 asio::awaitable<bool> NetSource::Session::secure_stream() {
   if (!stream_->has_tls()) co_return true;
-  const auto error = co_await stream_->begin_tls(options_.host);
+  const auto error = co_await stream_->begin_tls(places_[place_].host);
   if (is_done_) co_return false;
   if (error) {
     end_insecure(error);

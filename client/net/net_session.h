@@ -77,6 +77,7 @@ class NetSource::Session {
   // The connection is no good any more.
   void break_connection(std::string why);
   void note_welcome(const proto::Welcome& welcome);
+  void note_place(const std::string& address);
   // The server closed before it answered: when many come at once it makes room for others.
   bool may_try_again() const;
   bool may_come_back() const { return comeback_.is_allowed() && !is_closing_ && !is_done_; }
@@ -105,7 +106,17 @@ class NetSource::Session {
   void stop_io();
   wire::SharedBytes encode_hello() const;
 
+  // The session may be found there: as the options say first, then as its Welcomes do.
+  struct Place {
+    std::string host;
+    std::uint16_t port = 0;
+    bool operator==(const Place&) const = default;
+  };
+  static constexpr std::size_t kMostPlaces = 9;
+
   const NetSourceOptions options_;
+  std::vector<Place> places_;
+  std::size_t place_ = 0;  // that is, or was last, connected to
   asio::io_context context_{1};
   tcp::socket socket_{context_};  // while it connects
   std::optional<secure::Stream> stream_;

@@ -501,6 +501,7 @@ void Replica::apply_participants(const proto::Participants& message) {
     participant.frozen_by = entry.frozen_by();
     participant.lent_tools = entry.lent_tools();
     participant.leads_view = entry.leads_view();
+    participant.relayed = entry.relayed_watchers();
     participants_.push_back(std::move(participant));
   }
   std::ranges::sort(participants_, {}, &Participant::slot);

@@ -35,6 +35,7 @@ struct Participant {
   std::string frozen_by;         // who keeps the tools where they are; empty: nobody
   std::uint32_t lent_tools = 0;  // a bit each: handed over, it moves beside its hand's place
   bool leads_view = false;       // the view to follow is this one's
+  std::uint32_t relayed = 0;     // so many more watch through this one
 };
 
 struct Tool {

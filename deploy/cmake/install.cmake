@@ -3,7 +3,7 @@
 # <prefix>/share/trocar/web. Files of /etc belong to the packages alone (deploy/cmake/package.cmake).
 include(GNUInstallDirs)
 set(TROCAR_COMPONENT_PROGRAMS
-  server:trocar-server server:trocar-hall client:trocar-client client:trocar-doctor client:trocar-organ-edit
+  server:trocar-server server:trocar-hall server:trocar-relay client:trocar-client client:trocar-doctor client:trocar-organ-edit
   web:trocar-web
   tools:trocar-organ tools:trocar-sim tools:trocar-journal tools:trocar-impair)
 set(files "${PROJECT_SOURCE_DIR}/deploy/install")
@@ -51,6 +51,9 @@ install(FILES "${PROJECT_SOURCE_DIR}/deploy/trocar-hall.toml.example"
   DESTINATION "${doc}/trocar-server/examples" RENAME trocar-hall.toml COMPONENT server)
 install(FILES "${PROJECT_SOURCE_DIR}/deploy/trocar-server.toml.example"
   DESTINATION "${doc}/trocar-server/examples" RENAME trocar-server.toml COMPONENT server)
+install(FILES "${files}/trocar-relay@.service" DESTINATION lib/systemd/system COMPONENT server)
+install(FILES "${PROJECT_SOURCE_DIR}/deploy/trocar-relay.toml.example"
+  DESTINATION "${doc}/trocar-server/examples" RENAME trocar-relay.toml COMPONENT server)
 install(DIRECTORY "${PROJECT_SOURCE_DIR}/deploy/monitoring" DESTINATION "${doc}/trocar-server/examples" COMPONENT server)
 
 install(FILES "${files}/trocar-client.desktop" "${files}/trocar-join.desktop" "${files}/trocar-replay.desktop"

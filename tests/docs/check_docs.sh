@@ -115,7 +115,7 @@ check_section() { # HEADING COMMAND...
 check_options() {
   local program sub page option known
   known=$(mktemp)
-  for program in trocar-server trocar-hall trocar-client trocar-organ trocar-sim trocar-journal trocar-impair trocar-web trocar-doctor; do
+  for program in trocar-server trocar-hall trocar-client trocar-organ trocar-sim trocar-journal trocar-impair trocar-web trocar-relay trocar-doctor; do
     [ -x "$bin/$program" ] || { fault "$bin/$program: is not built"; rm -f "$known"; return; }
     check_section "## $program" "$bin/$program"
     "$bin/$program" --help | options_of_help >>"$known"
@@ -128,8 +128,8 @@ check_options() {
     [ -f "$program" ] && [ -x "$program" ] || continue
     bash "$program" --help | grep -oE -- '--[a-z][a-z0-9-]*' >>"$known"
   done
-  # Of cmake, systemctl and podman.
-  printf '%s\n' --preset --install --prefix --component --strip --now --rm --init >>"$known"
+  # Of cmake, systemctl, podman and bench_crowd.
+  printf '%s\n' --relays --watchers --preset --install --prefix --component --strip --now --rm --init >>"$known"
   for page in "${pages[@]}"; do
     while read -r option; do
       grep -qxF -- "$option" "$known" || fault "$page: names $option, which no program or script has"

@@ -12,15 +12,16 @@ cmake --install "$build" --prefix "$work/usr" --strip >"$work/log" 2>&1 || { tai
 if grep -v "^-- \(Installing: $work\|Install configuration\)" "$work/log"; then
   fault "these lie outside of the prefix, or are no files"
 fi
-programs=(server hall organ sim journal impair web)
+programs=(server hall relay organ sim journal impair web)
 if grep -q '^TROCAR_CLIENT:BOOL=ON' "$build/CMakeCache.txt"; then programs+=(client); fi
 for program in "${programs[@]}"; do
   "$work/usr/bin/trocar-$program" --version >/dev/null || fault "trocar-$program does not start"
 done
-for file in lib/systemd/system/trocar@.service lib/systemd/system/trocar-hall.service lib/systemd/system/trocar-web.service \
+for file in lib/systemd/system/trocar@.service lib/systemd/system/trocar-hall.service 'lib/systemd/system/trocar-relay@.service' lib/systemd/system/trocar-web.service \
   share/applications/trocar-join.desktop share/mime/packages/trocar.xml share/icons/hicolor/scalable/apps/trocar.svg \
   share/trocar/scenes/incise.toml share/doc/trocar/LICENSE share/doc/trocar/docs/install.md \
   share/doc/trocar-server/examples/trocar-server.toml share/doc/trocar-server/examples/trocar-hall.toml \
+  share/doc/trocar-server/examples/trocar-relay.toml \
   share/doc/trocar-server/examples/monitoring/alerts.yml share/doc/trocar-web/examples/trocar-web.toml; do
   [ -s "$work/usr/$file" ] || fault "$file is missing"
 done
@@ -36,6 +37,8 @@ cd "$work"
 "$work/usr/bin/trocar-server" --config "$root/deploy/install/lesson.toml" --check-config >"$work/log" 2>&1 ||
   fault "$(cat "$work/log")"
 "$work/usr/bin/trocar-server" --config "$work/usr/share/doc/trocar-server/examples/trocar-server.toml" --check-config \
+  >"$work/log" 2>&1 || fault "$(cat "$work/log")"
+"$work/usr/bin/trocar-relay" --config "$work/usr/share/doc/trocar-server/examples/trocar-relay.toml" --check-config \
   >"$work/log" 2>&1 || fault "$(cat "$work/log")"
 for file in "$root/deploy/install/hall.toml" "$work/usr/share/doc/trocar-server/examples/trocar-hall.toml"; do
   XDG_STATE_HOME=$work "$work/usr/bin/trocar-hall" --config "$file" --check-config >"$work/log" 2>&1 || fault "$(cat "$work/log")"

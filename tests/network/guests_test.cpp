@@ -265,5 +265,31 @@ TEST_F(Guests, each_answers_for_the_last_frame) {
   EXPECT_TRUE(is_complete);
 }
 
+Envelope report_of(std::uint32_t watchers) {
+  Envelope envelope;
+  envelope.mutable_relay_report()->set_watchers(watchers);
+  return envelope;
+}
+
+TEST_F(Guests, an_observer_may_say_how_many_watch_through_it) {
+  RawClient relay(session_.port());
+  ASSERT_TRUE(relay.join("Relay", proto::ROLE_OBSERVER));
+  ASSERT_TRUE(relay.send(report_of(250)));
+  std::uint32_t shown = 0;
+  while (shown != 250) {
+    const auto people = relay.receive(Envelope::kParticipants);
+    ASSERT_TRUE(people);
+    shown = people->participants().participant(0).relayed_watchers();
+  }
+  ASSERT_TRUE(relay.send(report_of(100'001)));
+  const auto goodbye = relay.read_goodbye();
+  ASSERT_TRUE(goodbye);
+  EXPECT_EQ(goodbye->reason(), proto::GOODBYE_PROTOCOL_ERROR);
+  RawClient surgeon(session_.port());
+  ASSERT_TRUE(surgeon.join("Sam", proto::ROLE_SURGEON));
+  ASSERT_TRUE(surgeon.send(report_of(1)));
+  EXPECT_EQ(surgeon.read_goodbye()->reason(), proto::GOODBYE_ROLE);
+}
+
 }  // namespace
 }  // namespace trocar::testing

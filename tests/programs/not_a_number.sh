@@ -20,6 +20,8 @@ refuses trocar-client --seconds
 refuses trocar-client --replay none.mcap --pictures none --rate
 refuses trocar-doctor --seconds
 refuses trocar-web --seconds
+refuses trocar-relay --seconds
+refuses trocar-relay --max-watchers
 refuses trocar-organ import none.obj --young-modulus
 refuses trocar-organ import none.obj --poisson-ratio
 refuses trocar-organ edit plate --headless --scale

@@ -55,5 +55,12 @@ TEST(JoinRequest, AWrongCodeCountsAsATry) {
   }
 }
 
+TEST(JoinRequest, OfAPageThatComesBackIsTriedAgainWhileItsSessionIsAway) {
+  JoinRequest request;
+  EXPECT_EQ(reason_of_absence(request), proto::GOODBYE_SERVER_CLOSING);
+  request.return_token = Bytes(16, 1);
+  EXPECT_EQ(reason_of_absence(request), proto::GOODBYE_TIMEOUT);
+}
+
 }  // namespace
 }  // namespace trocar::bridge

@@ -11,9 +11,12 @@
 #include <boost/beast/core/flat_buffer.hpp>
 #include <boost/beast/core/tcp_stream.hpp>
 #include <boost/beast/http.hpp>
+#include <ctime>
 
 #include "common/base/no_throw.h"
 #include "common/base/printable.h"
+#include "server/app/hall/hall_bus.h"
+#include "server/hall/bus/proof.h"
 
 namespace trocar::app {
 namespace {
@@ -51,6 +54,17 @@ asio::awaitable<void> exchange(beast::tcp_stream& stream, const std::string& hos
   answer.body = std::move(parser.get().body());
 }
 
+Result<Json> read_answer(unsigned status, const std::string& body, const std::string& where) {
+  auto json = Json::parse(body, nullptr, false);
+  if (!json.is_object())
+    return Error{ErrorCode::BadMessage, where + ": what answers is no hall: give --at HOST:PORT"};
+  if (status < 300) return json;
+  const auto why = json.find("error");
+  return Error{ErrorCode::Refused, why != json.end() && why->is_string()
+                                       ? printable(why->get<std::string>())
+                                       : fmt::format("the hall says no ({})", status)};
+}
+
 }  // namespace
 
 Result<Json> HallClient::ask(const std::string& method, const std::string& path,
@@ -71,14 +85,20 @@ Result<Json> HallClient::ask(const std::string& method, const std::string& path,
   if (!answer.trouble.empty())
     return Error{ErrorCode::ResourceMissing, where + ": no hall answers (" + answer.trouble +
                                                  "): start trocar-hall, or give --at HOST:PORT"};
-  auto json = Json::parse(answer.body, nullptr, false);
-  if (!json.is_object())
-    return Error{ErrorCode::BadMessage, where + ": what answers is no hall: give --at HOST:PORT"};
-  if (answer.status < 300) return json;
-  const auto why = json.find("error");
-  return Error{ErrorCode::Refused, why != json.end() && why->is_string()
-                                       ? printable(why->get<std::string>())
-                                       : fmt::format("the hall says no ({})", answer.status)};
+  return read_answer(answer.status, answer.body, where);
+}
+
+Result<Json> BusHallClient::ask(const std::string& method, const std::string& path,
+                                const std::string& body, std::chrono::seconds deadline) const {
+  const auto request = hall::write_bus_request(method, path, body, key_, std::time(nullptr));
+  const auto text = bus_.ask(request_subject(name_), request, deadline);
+  if (!text) return text.error();
+  const auto answer = Json::parse(*text, nullptr, false);
+  const bool is_answer = answer.is_object() && answer.contains("status") &&
+                         answer["status"].is_number_unsigned() && answer.contains("body") &&
+                         answer["body"].is_string();
+  if (!is_answer) return Error{ErrorCode::BadMessage, name_ + ": what answers is no hall"};
+  return read_answer(answer["status"].get<unsigned>(), answer["body"].get<std::string>(), name_);
 }
 
 }  // namespace trocar::app

@@ -1,6 +1,6 @@
 #pragma once
 
-// Asks a hall over HTTP, one request at a time; waits for the answer.
+// Asks a hall, one request at a time, and waits for the answer: over HTTP, or over a bus.
 
 #include <chrono>
 #include <cstdint>
@@ -8,25 +8,47 @@
 
 #include "common/base/json.h"
 #include "common/base/result.h"
+#include "server/hall/bus/bus.h"
 
 namespace trocar::app {
 
-class HallClient {
+class HallConnection {
+ public:
+  virtual ~HallConnection() = default;
+  // `method`: GET, POST or DELETE. ErrorCode::Refused with the hall's own line if it says no,
+  // ErrorCode::ResourceMissing if there is no hall, ErrorCode::BadMessage for what is no answer of
+  // one (1 MiB of JSON at most).
+  virtual Result<Json> ask(const std::string& method, const std::string& path,
+                           const std::string& body, std::chrono::seconds deadline) const = 0;
+};
+
+class HallClient final : public HallConnection {
  public:
   // `key`: empty if there is none.
   HallClient(std::string host, std::uint16_t port, std::string key)
       : host_(std::move(host)), port_(port), key_(std::move(key)) {}
 
-  // `method`: GET, POST or DELETE. ErrorCode::Refused with the hall's own line if it says no,
-  // ErrorCode::ResourceMissing if there is no hall, ErrorCode::BadMessage for what is no answer of
-  // one (1 MiB of JSON at most).
   Result<Json> ask(const std::string& method, const std::string& path, const std::string& body,
-                   std::chrono::seconds deadline) const;
+                   std::chrono::seconds deadline) const override;
 
  private:
   const std::string host_;
   const std::uint16_t port_;
   const std::string key_;
+};
+
+class BusHallClient final : public HallConnection {
+ public:
+  // `bus` outlives it. `name`: the hall's.
+  BusHallClient(hall::Bus& bus, std::string name, std::string key)
+      : bus_(bus), name_(std::move(name)), key_(std::move(key)) {}
+
+  Result<Json> ask(const std::string& method, const std::string& path, const std::string& body,
+                   std::chrono::seconds deadline) const override;
+
+ private:
+  hall::Bus& bus_;
+  const std::string name_, key_;
 };
 
 }  // namespace trocar::app

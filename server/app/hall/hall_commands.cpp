@@ -2,20 +2,24 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <thread>
 
 #include "common/base/json.h"
 #include "common/base/printable.h"
+#include "server/app/hall/hall_bus.h"
 #include "server/app/hall/hall_client.h"
 #include "server/app/hall/hall_server.h"
 #include "server/app/hall/hall_start.h"
+#include "server/hall/bus/bus.h"
 #include "server/hall/plan/hall_config.h"
 
 namespace trocar::app {
 namespace {
 
 constexpr std::chrono::seconds kAnswer{10};
+constexpr std::chrono::milliseconds kBusWait{700};  // for all halls to answer
 constexpr std::chrono::milliseconds kStartPoll{300};
 constexpr int kStartPolls = 600;  // 3 min: large organs need long
 
@@ -53,26 +57,30 @@ void print_session(const Json& session) {
   print_codes(session);
 }
 
-Status list(const HallClient& client, bool is_json) {
-  const auto answer = client.ask("GET", "/sessions", "", kAnswer);
-  if (!answer) return answer.error();
-  if (is_json) {
-    print(to_text(*answer));
-    return {};
-  }
-  const auto sessions = answer->value("sessions", Json::array());
+// Prints the sessions of one hall, as GET /sessions has them.
+void print_directory(const Json& hall) {
+  const auto sessions = hall.value("sessions", Json::array());
   if (sessions.empty()) print("No session runs.\n");
   if (!sessions.empty())
     print(fmt::format("{:<20} {:<9} {:<14} {:>6} {:>6} {:>6}  {:<20}  {}\n", "session", "state",
                       "organ", "people", "time", "cores", "since", "address"));
   for (const auto& session : sessions)
     if (session.is_object()) print_session(session);
-  print(fmt::format("{:.2f} of {:.2f} cores are taken.\n", number(*answer, "cores_taken"),
-                    number(*answer, "cores")));
+  print(fmt::format("{:.2f} of {:.2f} cores are taken.\n", number(hall, "cores_taken"),
+                    number(hall, "cores")));
+}
+
+Status list(const HallConnection& client, bool is_json) {
+  const auto answer = client.ask("GET", "/sessions", "", kAnswer);
+  if (!answer) return answer.error();
+  if (is_json)
+    print(to_text(*answer));
+  else
+    print_directory(*answer);
   return {};
 }
 
-Status start(const HallClient& client, const HallOptions& options) {
+Status start(const HallConnection& client, const HallOptions& options) {
   Json request{{"start", options.what}};
   if (!options.name.empty()) request["name"] = options.name;
   auto session = client.ask("POST", "/sessions",
@@ -98,7 +106,7 @@ Status start(const HallClient& client, const HallOptions& options) {
   return {};
 }
 
-Status end(const HallClient& client, const std::string& name) {
+Status end(const HallConnection& client, const std::string& name) {
   if (!hall::is_name(name))
     return Error{ErrorCode::Usage, printable(name, 64) + ": is no name of a session, see list"};
   const auto session =
@@ -106,6 +114,95 @@ Status end(const HallClient& client, const std::string& name) {
   if (!session) return session.error();
   print(fmt::format("{}: {}, recorded in {}\n", name, word(*session, "state"),
                     word(*session, "recording")));
+  return {};
+}
+
+// ---- all halls of a bus ----
+
+double room_of(const Json& hall) {
+  return number(hall, "cores") - number(hall, "cores_taken");
+}
+
+bool has_session(const Json& hall, const std::string& name) {
+  const auto sessions = hall.value("sessions", Json::array());
+  return std::ranges::any_of(sessions, [&](const Json& session) {
+    return session.is_object() && word(session, "name") == name;
+  });
+}
+
+bool may_start(const Json& hall, const std::string& what) {
+  const auto offers = hall.value("may_start", Json::array());
+  const auto sessions = hall.value("sessions", Json::array());
+  return std::ranges::find(offers, Json(what)) != offers.end() &&
+         static_cast<double>(sessions.size()) < number(hall, "sessions_most");
+}
+
+// A name of a hall is a part of a subject.
+bool is_hall_name(const std::string& name) {
+  const auto is_fine = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '-';
+  };
+  return !name.empty() && name.size() <= 128 && std::ranges::all_of(name, is_fine);
+}
+
+// Returns those that answer, the one with the most room first.
+std::vector<Json> halls_of(hall::Bus& bus) {
+  std::vector<Json> halls;
+  for (const auto& text : bus.ask_all(kDirectorySubject, "", kBusWait)) {
+    auto hall = Json::parse(text, nullptr, false);
+    if (hall.is_object() && is_hall_name(word(hall, "hall"))) halls.push_back(std::move(hall));
+  }
+  std::ranges::stable_sort(halls,
+                           [](const Json& a, const Json& b) { return room_of(a) > room_of(b); });
+  return halls;
+}
+
+void list_all(const std::vector<Json>& halls, bool is_json) {
+  if (is_json) return print(to_text(Json{{"halls", halls}}));
+  if (halls.empty()) print("No hall answers.\n");
+  for (const auto& hall : halls) {
+    print(word(hall, "hall") + "\n");
+    print_directory(hall);
+  }
+}
+
+Status start_anywhere(hall::Bus& bus, const std::vector<Json>& halls, const HallOptions& options,
+                      const std::string& key) {
+  Error why{ErrorCode::Refused,
+            options.what + ": no hall that answers may start it, see list --nats"};
+  for (const auto& hall : halls) {
+    if (!may_start(hall, options.what)) continue;
+    const auto name = word(hall, "hall");
+    const auto started = start(BusHallClient(bus, name, key), options);
+    if (started) return {};
+    why = {started.error().code, name + ": " + started.error().message};
+    // Whoever has less room might still have enough, but it says no for another reason.
+    if (started.error().code != ErrorCode::Refused) break;
+  }
+  return why;
+}
+
+Status end_anywhere(hall::Bus& bus, const std::vector<Json>& halls, const std::string& name,
+                    const std::string& key) {
+  std::vector<std::string> with_it;
+  for (const auto& hall : halls)
+    if (has_session(hall, name)) with_it.push_back(word(hall, "hall"));
+  if (with_it.empty())
+    return Error{ErrorCode::Refused,
+                 printable(name, 64) + ": no hall that answers has such a session"};
+  if (with_it.size() > 1)
+    return Error{ErrorCode::Refused, name + ": " + with_it[0] + " and " + with_it[1] +
+                                         " both have such a session, end it with --at HOST:PORT"};
+  return end(BusHallClient(bus, with_it[0], key), name);
+}
+
+Status run_on_bus(const HallOptions& options, const std::string& key) {
+  const auto bus = hall::Bus::connect(options.nats_url, "trocar-hall command", false);
+  if (!bus) return bus.error();
+  const auto halls = halls_of(**bus);
+  if (options.command == HallCommand::Start) return start_anywhere(**bus, halls, options, key);
+  if (options.command == HallCommand::End) return end_anywhere(**bus, halls, options.what, key);
+  list_all(halls, options.is_json);
   return {};
 }
 
@@ -118,6 +215,7 @@ Status run_hall_command(const HallOptions& options) {
     if (!read) return Error{read.error().code, "--key: " + read.error().message};
     key = std::move(*read);
   }
+  if (!options.nats_url.empty()) return run_on_bus(options, key);
   const HallClient client(options.host, options.port, key);
   switch (options.command) {
     case HallCommand::List:

@@ -9,11 +9,13 @@
 #include <csignal>
 #include <cstdio>
 #include <functional>
+#include <memory>
 
 #include "common/base/cpu.h"
 #include "common/base/json_log.h"
 #include "common/base/log.h"
 #include "common/base/text_file.h"
+#include "server/app/hall/hall_bus.h"
 #include "server/app/hall/hall_commands.h"
 #include "server/app/hall/hall_server.h"
 #include "server/app/hall/hall_start.h"
@@ -28,11 +30,13 @@ constexpr std::chrono::milliseconds kEndPoll{100};
 // All sessions end in order; the hall ends when their recordings are closed.
 class Ending {
  public:
-  Ending(asio::io_context& context, hall::Sessions& sessions, HallServer& server)
-      : context_(context), sessions_(sessions), server_(server), timer_(context) {}
+  // `bus`: null: none.
+  Ending(asio::io_context& context, hall::Sessions& sessions, HallServer& server, HallBus* bus)
+      : context_(context), sessions_(sessions), server_(server), bus_(bus), timer_(context) {}
 
   void begin() {
     server_.stop();
+    if (bus_ != nullptr) bus_->stop();
     sessions_.end_all();
     wait();
   }
@@ -52,6 +56,7 @@ class Ending {
   asio::io_context& context_;
   hall::Sessions& sessions_;
   HallServer& server_;
+  HallBus* const bus_;
   asio::steady_timer timer_;
 };
 
@@ -64,7 +69,14 @@ Status run_hall(const HallOptions& options) {
   if (!sessions) return sessions.error();
   auto server = HallServer::listen(context, **sessions, start->key);
   if (!server) return server.error();
-  Ending ending(context, **sessions, **server);
+  std::unique_ptr<HallBus> bus;
+  if (!options.nats_url.empty()) {
+    auto opened = HallBus::open(context, **server, options.nats_url, start->key);
+    if (!opened) return opened.error();
+    bus = std::move(*opened);
+    log::info("on the bus as {}", bus->name());
+  }
+  Ending ending(context, **sessions, **server, bus.get());
   asio::signal_set signals(context, SIGINT, SIGTERM);
   signals.async_wait([&](boost::system::error_code error, int) {
     if (!error) ending.begin();

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <boost/asio/awaitable.hpp>
+#include <boost/asio/co_spawn.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
 #include <boost/beast/core/tcp_stream.hpp>
@@ -165,7 +166,11 @@ struct HallServer::Core {
       co_return refusal(http::status::unauthorized, "the key is wrong: name the hall's file of it");
     }
     const std::string path(request.target().data(), request.target().size());
-    const auto method = request.method();
+    co_return co_await route(request.method(), path, request.body(), trust, peer);
+  }
+
+  asio::awaitable<Reply> route(http::verb method, std::string path, std::string body, Trust trust,
+                               std::string peer) {
     if (method == http::verb::get) co_return get(path, trust == Trust::Full);
     const bool is_start = method == http::verb::post && path == kSessions;
     const bool is_end = method == http::verb::delete_ && path.starts_with(kOneSession);
@@ -174,8 +179,40 @@ struct HallServer::Core {
                         "there are GET and POST of /sessions, GET and DELETE of /sessions/NAME");
     if (trust != Trust::Full)
       co_return refusal(http::status::unauthorized, "this needs the hall's key");
-    if (is_start) co_return start(request.body(), peer);
+    if (is_start) co_return start(body, peer);
     co_return co_await end(path.substr(kOneSession.size()), peer);
+  }
+
+  Json directory(bool is_trusted) const {
+    const auto& config = sessions.config();
+    Json json{{"sessions", Json::array()}};
+    for (const auto& session : sessions.list())
+      json["sessions"].push_back(hall::describe(*session, config, is_trusted));
+    json["cores"] = config.cores;
+    json["cores_taken"] = sessions.taken_cores();
+    json["sessions_most"] = config.most_sessions;
+    json["may_start"] = Json::array();
+    for (const auto& offer : config.offers) json["may_start"].push_back(offer.name);
+    return json;
+  }
+
+  // Answers one request that came over a bus.
+  asio::awaitable<void> answer_bus(hall::BusRequest request, hall::Proof proof,
+                                   std::function<void(const std::string&)> answer) {
+    Reply given;
+    if (proof == hall::Proof::Wrong) {
+      note("refusal", "", "bus", "the proof is wrong");
+      given = refusal(http::status::unauthorized,
+                      "the key is wrong, or the clocks of both machines differ by a minute");
+    } else if (request.body.size() > hall::kMostRequestBytes) {
+      given = refusal(http::status::payload_too_large, "the request is longer than 4096 bytes");
+    } else {
+      const auto trust = proof == hall::Proof::Right ? Trust::Full : Trust::None;
+      given = co_await route(http::string_to_verb(request.method), request.path, request.body,
+                             trust, "bus");
+    }
+    answer(Json{{"status", static_cast<int>(given.status)}, {"body", given.body}}.dump(
+        -1, ' ', false, Json::error_handler_t::replace));
   }
 
   Reply get(const std::string& path, bool is_trusted) const {
@@ -183,16 +220,7 @@ struct HallServer::Core {
     if (path == "/metrics")
       return {.body = exposition(sessions), .type = monitoring::kExpositionType};
     const auto& config = sessions.config();
-    if (path == kSessions) {
-      Json json{{"sessions", Json::array()}};
-      for (const auto& session : sessions.list())
-        json["sessions"].push_back(hall::describe(*session, config, is_trusted));
-      json["cores"] = config.cores;
-      json["cores_taken"] = sessions.taken_cores();
-      json["may_start"] = Json::array();
-      for (const auto& offer : config.offers) json["may_start"].push_back(offer.name);
-      return reply(json);
-    }
+    if (path == kSessions) return reply(directory(is_trusted));
     if (path.starts_with(kOneSession))
       if (const auto session = sessions.find(path.substr(kOneSession.size())))
         return reply(hall::describe(*session, config, is_trusted));
@@ -252,6 +280,18 @@ HallServer::~HallServer() {
 
 std::uint16_t HallServer::port() const {
   return core_->acceptor.port();
+}
+
+void HallServer::answer(const hall::BusRequest& request, hall::Proof proof,
+                        std::function<void(const std::string&)> answer) {
+  asio::co_spawn(core_->acceptor.context(), core_->answer_bus(request, proof, std::move(answer)),
+                 [core = core_](std::exception_ptr failure) { rethrow(failure); });
+}
+
+std::string HallServer::directory(const std::string& hall_name) const {
+  auto json = core_->directory(false);
+  json["hall"] = hall_name;
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
 void HallServer::stop() {

@@ -21,10 +21,12 @@
 #include <boost/asio/io_context.hpp>
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 
 #include "common/base/result.h"
+#include "server/hall/bus/proof.h"
 #include "server/hall/sessions/sessions.h"
 
 namespace trocar::app {
@@ -46,6 +48,14 @@ class HallServer {
   std::uint16_t port() const;
   // Closes the port; requests that are under way get their answer.
   void stop();
+
+  // The same for a request that came over a bus, at HTTP's paths. `answer` gets {"status": N,
+  // "body":
+  // "..."}, once.
+  void answer(const hall::BusRequest& request, hall::Proof proof,
+              std::function<void(const std::string&)> answer);
+  // Returns what GET /sessions says to who has no key, with the hall's name.
+  std::string directory(const std::string& hall_name) const;
 
  private:
   struct Core;

@@ -20,6 +20,12 @@ Examples:
       the sessions that run, with their codes; without the key also, but then without codes
   trocar-hall end find-the-lump-1 --key hall.key
       ends it, and returns when its recording is closed
+  trocar-hall --config hall.toml --nats nats://10.0.0.2:4222
+      a hall that others find over NATS; all of them need the same key
+  trocar-hall start find-the-lump --nats nats://10.0.0.2:4222 --key hall.key
+      starts it on the hall with the most room
+  trocar-hall list --nats nats://10.0.0.2:4222
+      the sessions of all halls
 
 The key is a file that the hall makes at its first start. Ctrl-C or SIGTERM ends the hall and all its
 sessions in order. When it is killed, its sessions go on, and the next hall finds them again.
@@ -31,6 +37,8 @@ void add_command_options(CLI::App& command, HallOptions& options) {
   command.add_option("--at", options.at, "where the hall is")
       ->type_name("HOST:PORT")
       ->capture_default_str();
+  command.add_option("--nats", options.nats_url, "ask all halls of this NATS instead")
+      ->type_name("URL");
   command.add_option("--key", options.key_file, "file with the hall's key")->type_name("FILE");
 }
 
@@ -64,6 +72,9 @@ Result<std::optional<HallOptions>> parse_hall_command_line(int argc, char** argv
   app.add_flag("--check-config", options.checks_config,
                "check the file as a start would, and exit with 0 or 2")
       ->needs(config);
+  app.add_option("--nats", options.nats_url,
+                 "tell others over this NATS what runs here, and take their requests [no]")
+      ->type_name("URL");
   app.add_option("--ready-file", options.ready_file, "write the port to this file when listening")
       ->type_name("FILE");
   app.add_option("--log-level", options.log_level, "error, warn, info, debug or off")

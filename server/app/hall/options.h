@@ -24,6 +24,7 @@ struct HallOptions {
   std::string what;        // the lesson to start, the session to end
   std::string name;        // of a new session; empty: the hall gives one
   bool is_json = false;
+  std::string nats_url;  // of both; empty: none
 };
 
 // Nothing if the program is done (after --help or --version).

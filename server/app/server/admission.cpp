@@ -1,14 +1,9 @@
 #include "server/app/server/admission.h"
 
-#include <arpa/inet.h>
 #include <fmt/format.h>
-#include <ifaddrs.h>
-#include <net/if.h>
-#include <sys/socket.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdio>
 #include <ctime>
@@ -18,6 +13,7 @@
 #include "common/secure/kept_identity.h"
 #include "common/secure/loopback.h"
 #include "common/secure/private_files.h"
+#include "common/secure/public_host.h"
 
 namespace trocar::app {
 namespace {
@@ -27,45 +23,6 @@ namespace fs = std::filesystem;
 Result<fs::path> state_folder(const AccessOptions& options) {
   if (!options.state_folder.empty()) return fs::absolute(options.state_folder);
   return secure::default_state_folder();
-}
-
-// The address from which packets to other networks leave; empty without such a network. Connecting
-// a socket for datagrams sends nothing.
-std::string routed_address() {
-  sockaddr_in to{}, from{};
-  to.sin_family = AF_INET;
-  to.sin_port = htons(9);
-  ::inet_pton(AF_INET, "192.0.2.1", &to.sin_addr);  // an example of RFC 5737, which nobody has
-  socklen_t size = sizeof from;
-  const int datagrams = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-  if (datagrams < 0) return {};
-  const bool is_found =
-      ::connect(datagrams, reinterpret_cast<const sockaddr*>(&to), sizeof to) == 0 &&
-      ::getsockname(datagrams, reinterpret_cast<sockaddr*>(&from), &size) == 0;
-  ::close(datagrams);
-  std::array<char, INET_ADDRSTRLEN> text{};
-  if (!is_found || !::inet_ntop(AF_INET, &from.sin_addr, text.data(), text.size())) return {};
-  return text.data();
-}
-
-// An address by which others may reach this machine; where it listens, if that is one.
-std::string public_host(const std::string& listens_at) {
-  const bool is_any = listens_at == "0.0.0.0" || listens_at == "::";
-  if (!is_any)
-    return listens_at.find(':') == std::string::npos ? listens_at : "[" + listens_at + "]";
-  if (auto routed = routed_address(); !routed.empty()) return routed;
-  std::string found = "HOST";
-  ifaddrs* all = nullptr;
-  if (::getifaddrs(&all) != 0) return found;
-  for (const auto* entry = all; entry != nullptr && found == "HOST"; entry = entry->ifa_next) {
-    const bool is_up = (entry->ifa_flags & IFF_UP) != 0 && (entry->ifa_flags & IFF_LOOPBACK) == 0;
-    if (entry->ifa_addr == nullptr || entry->ifa_addr->sa_family != AF_INET || !is_up) continue;
-    std::array<char, INET_ADDRSTRLEN> text{};
-    const auto* address = reinterpret_cast<const sockaddr_in*>(entry->ifa_addr);
-    if (::inet_ntop(AF_INET, &address->sin_addr, text.data(), text.size())) found = text.data();
-  }
-  ::freeifaddrs(all);
-  return found;
 }
 
 std::int64_t expiry(const AccessOptions& options) {
@@ -85,7 +42,7 @@ std::string invitation_head(double hours) {
 
 std::string invitation_line(const std::string& role, const secure::JoinCode& code,
                             const std::string& address, std::uint16_t port) {
-  const auto server = public_host(address) + ":" + std::to_string(port);
+  const auto server = secure::public_host(address) + ":" + std::to_string(port);
   return fmt::format("  {:<10}  {}  {}\n", role, secure::to_text(code),
                      secure::to_link(server, code));
 }

@@ -3,13 +3,13 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <charconv>
 
 #include "common/base/printable.h"
 #include "common/base/version.h"
 #include "common/base/workers.h"
 #include "common/discovery/notice.h"
 #include "server/app/config/config_file.h"
+#include "server/app/config/place.h"
 #include "server/app/server/journal_sink.h"
 #include "server/tissue/step/simulation.h"
 
@@ -368,28 +368,6 @@ Status CommandLine::finish() {
   if (const auto parsed = parse_listen_address(listen_, options_); !parsed) return parsed;
   if (const auto parsed = parse_metrics_address(metrics_, options_); !parsed) return parsed;
   return step::validate(options_.decisions);
-}
-
-}  // namespace
-
-namespace {
-
-Status parse_place(const char* option, const char* example, const std::string& text,
-                   std::string& host, std::uint16_t& port) {
-  const Error bad{ErrorCode::Usage,
-                  fmt::format("{}: '{}' is not ADDRESS:PORT, such as {}", option, text, example)};
-  const auto colon = text.rfind(':');
-  if (colon == std::string::npos || colon == 0) return bad;
-  std::string address = text.substr(0, colon);
-  if (address.starts_with('[') && address.ends_with(']'))
-    address = address.substr(1, address.size() - 2);
-  std::uint16_t number = 0;
-  const char* end = text.data() + text.size();
-  const auto parsed = std::from_chars(text.data() + colon + 1, end, number);
-  if (address.empty() || parsed.ec != std::errc{} || parsed.ptr != end) return bad;
-  host = std::move(address);
-  port = number;
-  return {};
 }
 
 }  // namespace

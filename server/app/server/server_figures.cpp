@@ -55,9 +55,10 @@ void add_people(const ServerFigures& f, Exposition& text) {
   std::array<double, 4> by_role{};
   const std::array roles{wire::Role::Surgeon, wire::Role::Assistant, wire::Role::Instructor,
                          wire::Role::Observer};
-  double away = 0;
+  double away = 0, relayed = 0;
   for (const auto& who : f.people) {
     away += who.is_away;
+    relayed += who.is_away ? 0 : who.relayed;
     for (std::size_t i = 0; i < roles.size(); ++i) by_role[i] += who.role == roles[i];
   }
   std::vector<Labelled> series;
@@ -65,6 +66,7 @@ void add_people(const ServerFigures& f, Exposition& text) {
     series.emplace_back(wire::name_of(roles[i]), by_role[i]);
   text.gauges("people", "People in the session.", "role", series);
   text.gauge("people_away", "Of these, who have lost the connection and may return.", away);
+  text.gauge("people_relayed", "Further people who watch through relays.", relayed);
   text.counter("joins_total", "Joins that were let in.", number(f.replication.sessions));
   text.counter("joins_refused_total", "Joins that were refused at the door.",
                number(f.access.refused));

@@ -122,6 +122,10 @@ void Roster::set_frozen_by(ParticipantSlot slot, std::string who) {
   if (slot.is_valid() && slots_[slot.value]) slots_[slot.value]->frozen_by = std::move(who);
 }
 
+void Roster::set_relayed(ParticipantSlot slot, std::uint32_t watchers) {
+  if (slot.is_valid() && slots_[slot.value]) slots_[slot.value]->relayed = watchers;
+}
+
 void Roster::set_lent(ToolSlot tool, bool is_lent) {
   const auto owner = tool.owner();
   if (!owner.is_valid() || !slots_[owner.value]) return;

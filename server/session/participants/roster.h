@@ -28,6 +28,7 @@ struct Participant {
   bool is_away = false;                // the connection is lost, the place is kept
   std::string frozen_by;               // who keeps the tools where they are; empty: nobody
   bool leads_view = false;             // the view to follow is this one's
+  std::uint32_t relayed = 0;           // so many more watch through this one
   std::uint8_t lent_tools = 0;  // a bit each: it moves beside its hand's place, see held_tools.h
 };
 
@@ -64,6 +65,7 @@ class Roster {
   void leave(ParticipantSlot slot);
   void set_away(ParticipantSlot slot, bool is_away);
   void set_frozen_by(ParticipantSlot slot, std::string who);
+  void set_relayed(ParticipantSlot slot, std::uint32_t watchers);
   void set_lent(ToolSlot tool, bool is_lent);
   // Nobody else leads then; an invalid slot: nobody at all.
   void set_leader(ParticipantSlot slot);

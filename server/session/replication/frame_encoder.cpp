@@ -23,6 +23,14 @@ Bytes serialise(const proto::Envelope& envelope) {
   return bytes;
 }
 
+// Returns a FrameState without the envelope that is around it in `framed`.
+std::string body_of_state(const Bytes& framed) {
+  proto::Envelope envelope;
+  const auto body = BytesView(framed).subspan(wire::kHeaderBytes);
+  if (!wire::decode_envelope(body, envelope).ok()) return {};
+  return envelope.frame_state().SerializeAsString();
+}
+
 }  // namespace
 
 wire::SharedBytes FrameEncoder::wrap(const step::PublishedFrame* baseline,
@@ -47,14 +55,15 @@ wire::SharedBytes FrameEncoder::wrap(const step::PublishedFrame* baseline,
   return wire::encode_envelope(envelope);
 }
 
-void FrameEncoder::set_current(step::SharedFrame frame, std::uint64_t server_time_us) {
+void FrameEncoder::set_current(step::SharedFrame frame, std::uint64_t server_time_us,
+                               wire::SharedBytes state) {
   current_ = std::move(frame);
   server_time_us_ = server_time_us;
   recent_[current_->frame % kRecentFrames] = current_;
   slices_.clear();
   state_parts_.clear();
   keyframe_.reset();
-  state_.reset();
+  state_ = std::move(state);
   deltas_.clear();
 }
 
@@ -142,7 +151,7 @@ const FrameEncoder::Datagrams& FrameEncoder::slices_from(const step::PublishedFr
 
 const FrameEncoder::Datagrams& FrameEncoder::state_parts() {
   if (!state_parts_.empty()) return state_parts_;
-  const auto whole = encode_frame_state_body(*current_);
+  const auto whole = body_of_state(*state());
   const auto room = secure::kDatagramMessageBytes - kPartOverheadBytes;
   const auto parts = (whole.size() + room - 1) / room;
   if (parts > kMostParts) return state_parts_;  // the picture goes without figures and tools

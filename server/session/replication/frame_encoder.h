@@ -29,8 +29,10 @@ struct EncodeStatistics {
 
 class FrameEncoder {
  public:
-  // `server_time_us`: what clients measure the frame's age by.
-  void set_current(step::SharedFrame frame, std::uint64_t server_time_us);
+  // `server_time_us`: what clients measure the frame's age by. `state`: the frame's FrameState as
+  // another server has encoded it; null: it is made of the frame.
+  void set_current(step::SharedFrame frame, std::uint64_t server_time_us,
+                   wire::SharedBytes state = nullptr);
   const step::SharedFrame& current() const { return current_; }
   // Null if it is not among the last 64.
   step::SharedFrame find(Frame frame) const;

@@ -85,6 +85,7 @@ void describe(const std::vector<participants::Participant>& present, proto::Part
     entry.set_frozen_by(participant.frozen_by);
     entry.set_lent_tools(participant.lent_tools);
     entry.set_leads_view(participant.leads_view);
+    entry.set_relayed_watchers(participant.relayed);
     for (const auto& shape : participant.tools) {
       wire::write(shape, *entry.add_tool());
     }
@@ -173,12 +174,6 @@ wire::SharedBytes encode_frame_state(const step::PublishedFrame& frame) {
   proto::Envelope envelope;
   describe(frame, *envelope.mutable_frame_state());
   return wire::encode_envelope(envelope);
-}
-
-std::string encode_frame_state_body(const step::PublishedFrame& frame) {
-  proto::FrameState message;
-  describe(frame, message);
-  return message.SerializeAsString();
 }
 
 std::string describe(const hands::ClaimEvent& event, const participants::Roster& roster) {

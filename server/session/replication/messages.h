@@ -48,8 +48,6 @@ wire::SharedBytes encode_surface_change(const wire::SurfaceChange& change,
                                         const wire::SurfaceLayout& layout,
                                         std::uint64_t server_time_us);
 wire::SharedBytes encode_frame_state(const step::PublishedFrame& frame);
-// It has no envelope around it.
-std::string encode_frame_state_body(const step::PublishedFrame& frame);
 wire::SharedBytes encode_claim_event(const hands::ClaimEvent& event,
                                      const participants::Roster& roster);
 // `name`: of the mark; empty: it has none.

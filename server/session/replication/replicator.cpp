@@ -252,6 +252,8 @@ std::optional<Replicator::Ending> Replicator::handle_message(Client& client, Byt
       client.feed.want_keyframe();
       if (encoder_.current() && client.feed.is_keyframe_due()) give_frame(client, false);
       return std::nullopt;
+    case proto::Envelope::kRelayReport:
+      return handle_relay_report(client, envelope.relay_report());
     case proto::Envelope::kPing: {
       // A pong that does not fit is left out: the client measures again in a moment.
       send(client, encode_pong(envelope.ping().client_time_us(), newest_tick(),

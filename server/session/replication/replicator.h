@@ -75,6 +75,7 @@ class LessonRecord;
 class LessonRequest;
 class MarkRequest;
 class PointRequest;
+class RelayReport;
 class StrokeRequest;
 class TeachEvent;
 class TeachRequest;
@@ -162,6 +163,7 @@ class Replicator final : public net::ConnectionHandler {
   std::optional<Ending> welcome_guest(Client& guest);
   // Handles what a carrier says for itself.
   std::optional<Ending> handle_carrier(Client& carrier, const proto::Envelope& message);
+  std::optional<Ending> handle_relay_report(Client& client, const proto::RelayReport& report);
   void note_answer(ParticipantSlot slot, const proto::FrameAck& ack);
   // Returns the place to which this Hello comes back; null: there is none.
   const participants::Participant* find_own_place(const HelloRequest& request) const;

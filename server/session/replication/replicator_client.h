@@ -20,7 +20,8 @@ struct Replicator::Client {
         hand_moments(options.max_hand_moments_per_second, options.clock_ns()),
         sayings(1, options.clock_ns()),
         strokes(10, options.clock_ns()),
-        changes(5, options.clock_ns()) {}
+        changes(5, options.clock_ns()),
+        reports(1, options.clock_ns()) {}
 
   // True for who is told what everybody is told, and given frames.
   bool listens() const { return is_carrier || (participant && carrier == 0); }
@@ -40,7 +41,8 @@ struct Replicator::Client {
   std::uint64_t pointed_ns = 0;  // when it pointed last; 0: it does not
   std::uint64_t viewed_ns = 0;   // when it said last where its view is
   std::array<std::optional<std::uint32_t>, kToolsPerHand> last_sequence;
-  pacing::Allowance messages, bytes, hand_moments, sayings, strokes, changes;  // that it may send
+  pacing::Allowance messages, bytes, hand_moments, sayings, strokes, changes,
+      reports;  // that it may send
 };
 
 }  // namespace trocar::replication

@@ -1,11 +1,17 @@
 // The replicator's part about guests: people who watch over a connection that carries many. Each is
-// let in, listed and put out as anybody; frames, events and lists go to the carrier, once.
+// let in, listed and put out as anybody; frames, events and lists go to the carrier, once. Those
+// who watch through a relay are known by their number alone.
 
 #include "proto/wire.pb.h"
 #include "server/session/replication/messages.h"
 #include "server/session/replication/replicator_client.h"
 
 namespace trocar::replication {
+namespace {
+
+constexpr std::uint32_t kMostRelayed = 100'000;
+
+}  // namespace
 
 std::optional<Replicator::Ending> Replicator::check_guest(Client& guest,
                                                           const proto::Envelope& message) {
@@ -34,6 +40,22 @@ std::optional<Replicator::Ending> Replicator::welcome_guest(Client& guest) {
   carrier.is_carrier = true;
   carrier.feed.pace();
   return show_all(carrier);
+}
+
+std::optional<Replicator::Ending> Replicator::handle_relay_report(
+    Client& client, const proto::RelayReport& report) {
+  if (client.participant->role != participants::Role::Observer)
+    return Ending{EndReason::Role, std::string("RelayReport: an observer may relay, and no ") +
+                                       participants::name_of(client.participant->role)};
+  if (report.watchers() > kMostRelayed)
+    return Ending{EndReason::ProtocolError,
+                  "RelayReport.watchers: " + std::to_string(report.watchers()) + ", at most " +
+                      std::to_string(kMostRelayed)};
+  if (!client.reports.take(1, options_.clock_ns()))
+    return Ending{EndReason::ProtocolError, "RelayReport: more than one in a second"};
+  roster_.set_relayed(client.participant->slot, report.watchers());
+  are_participants_told_ = false;  // the recording does not need it
+  return std::nullopt;
 }
 
 std::optional<Replicator::Ending> Replicator::handle_carrier(Client& carrier,

@@ -1,6 +1,7 @@
 #include "server/web/bridge/bridge.h"
 
 #include <algorithm>
+#include <charconv>
 
 #include "common/secure/certificate.h"
 #include "server/web/bridge/carrier.h"
@@ -9,6 +10,7 @@ namespace trocar::bridge {
 namespace {
 
 constexpr std::size_t kMostKnownCertificates = 64;
+constexpr std::size_t kMostAddressBytes = 300;
 
 }  // namespace
 
@@ -30,6 +32,26 @@ std::shared_ptr<Carrier> Bridge::carrier_of(const SessionAddress& session,
   place = carrier;
   carrier->start();
   return carrier;
+}
+
+void Bridge::note_further(const std::string& session, const std::string& address) {
+  const auto colon = address.rfind(':');
+  if (colon == std::string::npos || colon == 0 || address.size() > kMostAddressBytes) return;
+  SessionAddress place{address, address.substr(0, colon), 0};
+  if (place.host.starts_with('[') && place.host.ends_with(']'))
+    place.host = place.host.substr(1, place.host.size() - 2);
+  const char* end = address.data() + address.size();
+  const auto parsed = std::from_chars(address.data() + colon + 1, end, place.port);
+  if (place.host.empty() || parsed.ec != std::errc{} || parsed.ptr != end) return;
+  auto& places = further_[session];
+  const bool is_known = std::ranges::find(places, address, &SessionAddress::name) != places.end();
+  if (!is_known && places.size() < kMostFurther) places.push_back(std::move(place));
+}
+
+const std::vector<SessionAddress>& Bridge::further_of(const std::string& session) const {
+  static const std::vector<SessionAddress> kNone;
+  const auto found = further_.find(session);
+  return found == further_.end() ? kNone : found->second;
 }
 
 secure::HalfCode Bridge::code_of(BytesView der) {

@@ -105,6 +105,11 @@ asio::awaitable<bool> Carrier::say(std::uint32_t number, BytesView envelope, boo
   co_return true;
 }
 
+void Carrier::note_further(const proto::Welcome& welcome) {
+  for (const auto& address : welcome.further_address())
+    bridge_.note_further(session_.name, address);
+}
+
 void Carrier::queue(const proto::Envelope& message) {
   upward_.push_back(wire::encode_envelope(message));
   upward_bytes_ += upward_.back()->size();

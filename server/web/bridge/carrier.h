@@ -33,6 +33,7 @@
 namespace trocar::proto {
 class Envelope;
 class Goodbye;
+class Welcome;
 }  // namespace trocar::proto
 
 namespace trocar::bridge {
@@ -57,6 +58,9 @@ class Carrier : public std::enable_shared_from_this<Carrier> {
   void remove(std::uint32_t number);
   // Waits for room. `envelope` empty: nothing but that this was the last. False: it has ended.
   asio::awaitable<bool> say(std::uint32_t number, BytesView envelope, bool is_last);
+
+  // Other addresses of the session, as its Welcome to a seat names them.
+  void note_further(const proto::Welcome& welcome);
 
   SessionCopy& copy() { return copy_; }
   const ServerClock& clock() const { return clock_; }

@@ -17,6 +17,10 @@ std::string text_at(const Json& json, const char* key) {
 
 }  // namespace
 
+int reason_of_absence(const JoinRequest& request) {
+  return request.return_token.empty() ? proto::GOODBYE_SERVER_CLOSING : proto::GOODBYE_TIMEOUT;
+}
+
 std::optional<JoinRefusal> read_join_request(BytesView text, JoinRequest& request) {
   const JoinRefusal no_request{JoinFault::Form, "the page said something else than who joins"};
   if (text.size() > kMostJoinBytes) return no_request;

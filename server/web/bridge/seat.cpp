@@ -56,7 +56,7 @@ asio::awaitable<void> Seat::run(const SessionAddress& session) {
       rethrow(failure);
     });
   } else if (!is_last_) {
-    refuse(proto::GOODBYE_SERVER_CLOSING, "the session does not answer: try again in a moment");
+    refuse(reason_of_absence(request_), "the session does not answer: try again in a moment");
   }
   co_await write_down();
   if (is_there) {
@@ -75,7 +75,7 @@ asio::awaitable<bool> Seat::join(const SessionAddress& session) {
   const bool is_reached = co_await carrier_->reach();
   if (is_cut_) co_return false;
   if (!is_reached) {
-    refuse(proto::GOODBYE_SERVER_CLOSING, carrier_->why());
+    refuse(reason_of_absence(request_), carrier_->why());
     co_return false;
   }
   if (carrier_->code() != request_.code.certificate) {
@@ -138,6 +138,7 @@ void Seat::take(BytesView envelope, bool is_last) {
     if (message.has_welcome()) {
       is_welcome_ = true;
       slot_ = message.welcome().participant();
+      if (carrier_) carrier_->note_further(message.welcome());
     }
     if (message.has_goodbye()) {
       why_ = message.goodbye().text();

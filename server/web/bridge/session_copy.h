@@ -54,7 +54,12 @@ class SessionCopy {
   // These are of the newest frame.
   Frame frame() const { return current_->frame; }
   Tick tick() const { return current_ ? current_->tick : 0; }
+  std::uint32_t epoch() const { return current_->epoch; }
+  std::uint64_t server_time_us() const { return current_->server_time_us; }
   std::uint32_t surface_crc() const { return current_->surface_crc; }
+  const wire::QuantisedSurface& surface() const { return current_->surface; }
+  // Empty where the session does not bleed.
+  const wire::BloodLevels& blood() const { return current_->blood; }
   // The session's last, once it has said that.
   std::optional<Frame> last_frame() const { return last_frame_; }
   wire::SharedBytes keyframe();

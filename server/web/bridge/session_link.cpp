@@ -43,10 +43,20 @@ asio::awaitable<bool> SessionLink::open(const SessionAddress& session) {
 }
 
 asio::awaitable<bool> SessionLink::connect(const SessionAddress& session) {
+  bool is_there = co_await connect_to(session);
+  const auto further = bridge_.further_of(session.name);
+  for (const auto& place : further) {
+    if (is_there || is_cut_) break;
+    is_there = co_await connect_to(place);
+  }
+  if (!is_there) why_ = "the session at " + session.name + " cannot be reached: is it running?";
+  co_return is_there;
+}
+
+asio::awaitable<bool> SessionLink::connect_to(const SessionAddress& place) {
   tcp::resolver resolver(executor_);
-  const std::string port = std::to_string(session.port);
-  const auto [unresolved, endpoints] =
-      co_await resolver.async_resolve(session.host, port, kNoThrow);
+  const std::string port = std::to_string(place.port);
+  const auto [unresolved, endpoints] = co_await resolver.async_resolve(place.host, port, kNoThrow);
   if (!unresolved) {
     for (const auto& entry : endpoints) {
       if (is_cut_) break;
@@ -62,7 +72,6 @@ asio::awaitable<bool> SessionLink::connect(const SessionAddress& session) {
       co_return true;
     }
   }
-  why_ = "the session at " + session.name + " cannot be reached: is it running?";
   co_return false;
 }
 

@@ -25,7 +25,8 @@ class SessionLink {
   // `bridge` outlives this.
   SessionLink(asio::any_io_executor executor, Bridge& bridge);
 
-  // Takes five seconds at most. False: why() says what is wrong, in one line.
+  // Tries the session's own address, then others that it has named. Takes five seconds at most.
+  // False: why() says what is wrong, in one line.
   asio::awaitable<bool> open(const SessionAddress& session);
   const std::string& why() const { return why_; }
   // Returns that of the certificate, once it is open.
@@ -40,6 +41,7 @@ class SessionLink {
 
  private:
   asio::awaitable<bool> connect(const SessionAddress& session);
+  asio::awaitable<bool> connect_to(const SessionAddress& place);
   asio::awaitable<bool> begin_tls(const SessionAddress& session);
 
   asio::any_io_executor executor_;

@@ -121,7 +121,7 @@ asio::awaitable<bool> Watcher::reach_session(const SessionAddress& session) {
   if (!is_open) {
     ++bridge_.counters.unreachable;
     std::string text = link_.why();
-    co_await refuse(proto::GOODBYE_SERVER_CLOSING, std::move(text));
+    co_await refuse(reason_of_absence(request_), std::move(text));
     co_return false;
   }
   if (link_.code() != request_.code.certificate) {

@@ -1,0 +1,93 @@
+#include "server/app/hall/hall_bus.h"
+
+#include <unistd.h>
+
+#include <array>
+#include <boost/asio/post.hpp>
+#include <cctype>
+#include <chrono>
+#include <ctime>
+
+namespace trocar::app {
+namespace {
+
+constexpr std::chrono::seconds kPublishPeriod{2};
+
+}  // namespace
+
+std::string request_subject(const std::string& hall_name) {
+  return "trocar.hall." + hall_name + ".request";
+}
+
+std::string hall_name(std::uint16_t port) {
+  std::array<char, 256> machine{};
+  std::string name;
+  if (::gethostname(machine.data(), machine.size() - 1) == 0) name = machine.data();
+  if (name.empty()) name = "hall";
+  for (char& c : name) {
+    c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    const bool is_fine = (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9');
+    if (!is_fine) c = '-';
+  }
+  return name + "-" + std::to_string(port);
+}
+
+HallBus::HallBus(asio::io_context& context, HallServer& server, const std::string& key)
+    : context_(context),
+      server_(server),
+      name_(hall_name(server.port())),
+      proofs_(key),
+      timer_(context) {}
+
+Result<std::unique_ptr<HallBus>> HallBus::open(asio::io_context& context, HallServer& server,
+                                               const std::string& url, const std::string& key) {
+  std::unique_ptr<HallBus> made(new HallBus(context, server, key));
+  auto bus = hall::Bus::connect(url, "trocar-hall " + made->name_, true);
+  if (!bus) return bus.error();
+  made->bus_ = std::move(*bus);
+  if (const auto subscribed = made->subscribe(); !subscribed) return subscribed.error();
+  made->publish_often();
+  return made;
+}
+
+// The bus calls on threads of its own; answers are made on the context's.
+Status HallBus::subscribe() {
+  const std::weak_ptr<bool> alive = is_alive_;
+  const auto heard = bus_->subscribe(
+      kDirectorySubject, [this, alive](const std::string&, const std::string& answer_to) {
+        asio::post(context_, [this, alive, answer_to] {
+          if (!alive.expired() && !answer_to.empty())
+            bus_->publish(answer_to, server_.directory(name_));
+        });
+      });
+  if (!heard) return heard;
+  return bus_->subscribe(
+      request_subject(name_), [this, alive](const std::string& text, const std::string& answer_to) {
+        asio::post(context_, [this, alive, text, answer_to] {
+          if (alive.expired() || answer_to.empty()) return;
+          const auto request = hall::read_bus_request(text);
+          if (!request) return;
+          const auto proof = proofs_.check(*request, std::time(nullptr));
+          const std::weak_ptr<hall::Bus> bus = bus_;
+          server_.answer(*request, proof, [bus, answer_to](const std::string& answer) {
+            if (const auto still = bus.lock()) still->publish(answer_to, answer);
+          });
+        });
+      });
+}
+
+void HallBus::publish_often() {
+  bus_->publish(kStateSubject, server_.directory(name_));
+  timer_.expires_after(kPublishPeriod);
+  timer_.async_wait([this](boost::system::error_code error) {
+    if (!error) publish_often();
+  });
+}
+
+void HallBus::stop() {
+  is_alive_.reset();
+  timer_.cancel();
+  bus_.reset();
+}
+
+}  // namespace trocar::app

@@ -1,0 +1,54 @@
+#pragma once
+
+// A hall on a bus: it says every two seconds what runs in it and what room is left, answers who
+// asks for that, and takes the requests of its HTTP port over the bus as well.
+//
+//   trocar.hall.state           published: a directory, as GET /sessions has it, with "hall"
+//   trocar.hall.directory       asked: every hall answers with its directory
+//   trocar.hall.NAME.request    asked: one hall answers (server/hall/bus/proof.h)
+//
+// Thread: that of the I/O context.
+
+#include "common/base/asio.h"  // before Boost: see there
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <memory>
+#include <string>
+
+#include "common/base/result.h"
+#include "server/app/hall/hall_server.h"
+#include "server/hall/bus/bus.h"
+#include "server/hall/bus/proof.h"
+
+namespace trocar::app {
+
+inline constexpr const char* kStateSubject = "trocar.hall.state";
+inline constexpr const char* kDirectorySubject = "trocar.hall.directory";
+std::string request_subject(const std::string& hall_name);
+// Returns this machine's name and the port, as a hall's name: lower-case letters, digits, hyphens.
+std::string hall_name(std::uint16_t port);
+
+class HallBus {
+ public:
+  // Takes `context` and `server`, which outlive it. ErrorCode::Usage for a wrong URL.
+  static Result<std::unique_ptr<HallBus>> open(asio::io_context& context, HallServer& server,
+                                               const std::string& url, const std::string& key);
+  void stop();
+  const std::string& name() const { return name_; }
+
+ private:
+  HallBus(asio::io_context& context, HallServer& server, const std::string& key);
+  Status subscribe();
+  void publish_often();
+
+  asio::io_context& context_;
+  HallServer& server_;
+  const std::string name_;
+  hall::ProofCheck proofs_;
+  asio::steady_timer timer_;
+  std::shared_ptr<hall::Bus> bus_;
+  std::shared_ptr<bool> is_alive_ = std::make_shared<bool>(true);
+};
+
+}  // namespace trocar::app

@@ -1,0 +1,232 @@
+#include "server/app/relay/options.h"
+
+#include <CLI/CLI.hpp>
+
+#include "common/base/number_option.h"
+#include "common/base/printable.h"
+#include "common/base/version.h"
+#include "server/app/config/config_file.h"
+#include "server/app/config/place.h"
+
+namespace trocar::app {
+namespace {
+
+constexpr const char* kExampleFile = "deploy/trocar-relay.toml.example";
+constexpr const char* kExamples = R"(
+Examples:
+  trocar-relay --to 127.0.0.1:7690
+      for the server on this machine; prints the code for those who watch through the relay
+  trocar-relay --to trocar://10.0.0.5:7690/7K3M-9QXZ-4T2B-WN8C --port 7695
+      for a server elsewhere, with an observer's link as it printed it, and open to the network
+  trocar-client --role observer --join CODE --server HOST:7695
+  trocar-web --session HOST:7695
+      who watches uses the relay as if it were the server
+  trocar-relay --to 10.0.0.5:7690 --code CODE --certificate relay.crt --key relay.key --also b:7695
+      one of two relays with one certificate, so that one code and one link is good for both
+  trocar-relay --config relay.toml --check-config
+      are these options fine? deploy/trocar-relay.toml.example has all of them
+
+Exit codes: 0 ok, also when the session has ended, 2 command line, 3 bad file, 4 refused by the
+server, 5 port taken or no server.
+)";
+constexpr std::size_t kMostNameBytes = 29;  // a number may follow
+constexpr std::size_t kMostFurther = 8;
+
+CLI::Validator short_name() {
+  return {[](std::string& text) -> std::string {
+            const bool is_fine = is_printable(text) && !text.empty() &&
+                                 text.size() <= kMostNameBytes && text.front() != ' ' &&
+                                 text.back() != ' ';
+            return is_fine ? "" : "is not a name of 1 to 29 printable bytes";
+          },
+          ""};
+}
+
+class CommandLine {
+ public:
+  CommandLine();
+
+  CLI::App& app() { return app_; }
+  RelayOptions& options() { return options_; }
+  // Checks one option alone, as if nothing else had been given.
+  Status check(const std::string& key, const std::string& text);
+  Status finish();
+
+ private:
+  void add_access_options();
+  Status read_server();
+  Status read_further();
+
+  RelayOptions options_;
+  std::string to_ = "127.0.0.1:7690", code_, listen_ = "127.0.0.1:7695", metrics_;
+  std::vector<std::string> further_;
+  int port_ = -1;
+  const CLI::Option* listening_ = nullptr;
+  CLI::App app_{"Passes a session on to many who watch: to its server they are one.",
+                "trocar-relay"};
+};
+
+CommandLine::CommandLine() {
+  app_.footer(kExamples);
+  app_.set_version_flag("--version", std::string("trocar-relay ") + kVersion + ", protocol " +
+                                         std::to_string(kProtocolMajor) + "." +
+                                         std::to_string(kProtocolMinor))
+      ->configurable(false);
+  app_.get_help_ptr()->configurable(false);
+  app_.add_option("--to", to_, "the session's server, or an observer's link to it")
+      ->type_name("HOST:PORT|LINK")
+      ->capture_default_str();
+  app_.add_option("--code", code_,
+                  "an observer's join code of that server [of the link, or of a server on this "
+                  "machine]")
+      ->type_name("CODE");
+  listening_ =
+      app_.add_option("--listen", listen_, "where watchers reach it; port 0 takes any free one")
+          ->type_name("ADDR:PORT")
+          ->capture_default_str();
+  app_.add_option("--port", port_, "the same for any network: as --listen 0.0.0.0:PORT")
+      ->type_name("PORT")
+      ->check(from_to(0, 65'535));
+  app_.add_option("--name", options_.name, "how the server lists it [Relay and its port]")
+      ->type_name("NAME")
+      ->check(short_name());
+  app_.add_option("--also", further_,
+                  "another relay or server of this session with the same certificate, which "
+                  "watchers try when this one is gone; may be given several times")
+      ->type_name("HOST:PORT");
+  app_.add_flag("--no-datagrams", options_.is_stream_only,
+                "frames over the TCP stream alone, where lost packets hold up the picture");
+  app_.add_option("--max-watchers", options_.most_watchers, "people who watch through it")
+      ->type_name("N")
+      ->check(from_to(1, 10'000))
+      ->capture_default_str();
+  app_.add_option("--metrics", metrics_,
+                  "where monitoring reads /healthz, /readyz and /metrics, without TLS [nowhere]")
+      ->type_name("ADDR:PORT");
+  app_.add_option("--seconds", options_.seconds, "end after this many seconds [with the session]")
+      ->type_name("N")
+      ->check(from_to(0, 1e9));
+  app_.add_option("--ready-file", options_.ready_file,
+                  "write the port to this file when there is a picture to show")
+      ->type_name("FILE");
+  app_.add_option("--log-level", options_.log_level, "error, warn, info, debug or off")
+      ->check(CLI::IsMember({"error", "warn", "info", "debug", "off"}))
+      ->type_name("LEVEL")
+      ->capture_default_str();
+  app_.add_option("--log-format", options_.log_format,
+                  "how it is said: text, or json: an object per line")
+      ->check(CLI::IsMember({"text", "json"}))
+      ->type_name("FORMAT")
+      ->capture_default_str();
+  auto* config = app_.set_config("--config", "",
+                                 "options from this file (TOML), each without its dashes; the "
+                                 "command line wins")
+                     ->type_name("FILE");
+  app_.add_flag("--check-config", options_.checks_config,
+                "check all options as a start would, and exit with 0 or 2")
+      ->needs(config)
+      ->configurable(false);
+  add_access_options();
+}
+
+void CommandLine::add_access_options() {
+  auto* access = app_.add_option_group("Access", "TLS and keys");
+  access
+      ->add_option("--state", options_.state_folder,
+                   "folder of certificate and key: that of a server on this machine makes its "
+                   "codes good here, too [~/.local/state/trocar]")
+      ->type_name("DIR");
+  auto* certificate = access
+                          ->add_option("--certificate", options_.certificate_file,
+                                       "use this certificate (PEM) instead of the state folder's")
+                          ->type_name("FILE");
+  auto* key = access->add_option("--key", options_.key_file, "the certificate's key (PEM)")
+                  ->type_name("FILE");
+  certificate->needs(key);
+  key->needs(certificate);
+}
+
+Status CommandLine::check(const std::string& key, const std::string& text) {
+  const auto refused = [&key](const std::string& message) {
+    for (const auto& name : {"--" + key + ": ", key + ": "})
+      if (message.starts_with(name)) return Error{ErrorCode::Usage, message.substr(name.size())};
+    return Error{ErrorCode::Usage, message};
+  };
+  auto* option = app_.get_option("--" + key);
+  try {
+    option->add_result(text);
+    option->run_callback();
+  } catch (const CLI::ParseError& error) {
+    return refused(error.what());
+  }
+  const auto finished = finish();
+  return finished ? finished : refused(finished.error().message);
+}
+
+Status CommandLine::read_server() {
+  std::string server = to_;
+  if (to_.starts_with("trocar://")) {
+    const auto link = secure::parse_invitation(to_);
+    if (!link) return Error{ErrorCode::Usage, "--to: " + link.error().message};
+    server = link->server;
+    options_.code = link->code;
+  }
+  if (!code_.empty()) {
+    const auto code = secure::parse_join_code(code_);
+    if (!code) return Error{ErrorCode::Usage, "--code: " + code.error().message};
+    options_.code = *code;
+  }
+  options_.server.name = server;
+  return parse_place("--to", "127.0.0.1:7690", server, options_.server.host, options_.server.port);
+}
+
+Status CommandLine::read_further() {
+  options_.further_addresses.clear();
+  if (further_.size() > kMostFurther)
+    return Error{ErrorCode::Usage, "--also: " + std::to_string(further_.size()) +
+                                       " addresses, at most " + std::to_string(kMostFurther)};
+  for (const auto& text : further_) {
+    std::string host;
+    std::uint16_t port = 0;
+    if (auto s = parse_place("--also", "10.0.0.6:7695", text, host, port); !s) return s;
+    options_.further_addresses.push_back(text);
+  }
+  return {};
+}
+
+Status CommandLine::finish() {
+  if (auto s = read_server(); !s) return s;
+  if (auto s = read_further(); !s) return s;
+  if (auto s = parse_place("--listen", "127.0.0.1:7695", listen_, options_.address, options_.port);
+      !s)
+    return s;
+  if (port_ >= 0) {
+    if (listening_->count() > 0)
+      return Error{ErrorCode::Usage, "--port: --listen says the port already, leave one out"};
+    options_.address = "0.0.0.0";
+    options_.port = static_cast<std::uint16_t>(port_);
+  }
+  if (metrics_.empty()) return {};
+  return parse_place("--metrics", "127.0.0.1:7696", metrics_, options_.metrics_address,
+                     options_.metrics_port);
+}
+
+}  // namespace
+
+Result<std::optional<RelayOptions>> parse_relay_command_line(int argc, char** argv) {
+  CommandLine line;
+  auto& options = line.options();
+  const CheckOption check = [](const std::string& key, const std::string& text) {
+    return CommandLine().check(key, text);
+  };
+  const auto parsed =
+      parse_with_config(line.app(), argc, argv, check, options.origins, kExampleFile);
+  if (!parsed) return parsed.error();
+  if (!*parsed) return std::optional<RelayOptions>();
+  if (const auto finished = line.finish(); !finished)
+    return Error{ErrorCode::Usage, options.origins.placed(finished.error().message)};
+  options.config_file = config_file_of(line.app());
+  return std::optional(std::move(options));
+}
+
+}  // namespace trocar::app

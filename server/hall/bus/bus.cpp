@@ -1,0 +1,164 @@
+#include "server/hall/bus/bus.h"
+
+#ifdef TROCAR_HAS_NATS
+#include <nats/nats.h>
+
+#endif
+
+namespace trocar::hall {
+
+#ifdef TROCAR_HAS_NATS
+
+namespace {
+
+using std::chrono::milliseconds;
+using Clock = std::chrono::steady_clock;
+
+constexpr int kReconnectWaitMs = 250, kConnectTimeoutMs = 2000, kEndTimeoutMs = 2000;
+
+Error error_of(natsStatus status, const std::string& what) {
+  const bool is_usage = status == NATS_INVALID_ARG || status == NATS_ADDRESS_MISSING;
+  return {is_usage ? ErrorCode::Usage : ErrorCode::ResourceMissing,
+          "--nats: " + what + " (" + natsStatus_GetText(status) + ")"};
+}
+
+std::string text_of(natsMsg* message) {
+  const auto size = static_cast<std::size_t>(natsMsg_GetDataLength(message));
+  return size > 0 && size <= Bus::kMostTextBytes ? std::string(natsMsg_GetData(message), size)
+                                                 : std::string();
+}
+
+struct OptionsDeleter {
+  void operator()(natsOptions* options) const { natsOptions_Destroy(options); }
+};
+// With such a call, the library connects while others go on.
+void note_connection(natsConnection*, void*) {}
+
+void hand_on(natsConnection*, natsSubscription*, natsMsg* message, void* closure) {
+  const auto& take = *static_cast<const Bus::Take*>(closure);
+  const char* reply = natsMsg_GetReply(message);
+  const auto text = text_of(message);
+  const std::string answer_to = reply != nullptr ? reply : "";
+  natsMsg_Destroy(message);
+  take(text, answer_to);
+}
+
+}  // namespace
+
+struct Bus::Parts {
+  natsConnection* connection = nullptr;
+  std::vector<std::unique_ptr<Take>> takes;
+  std::vector<natsSubscription*> subscriptions;
+};
+
+Bus::Bus(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
+
+// Nothing that was subscribed is called any more once all threads of the library have ended.
+Bus::~Bus() {
+  for (auto* subscription : parts_->subscriptions) natsSubscription_Destroy(subscription);
+  natsConnection_Destroy(parts_->connection);
+  nats_CloseAndWait(kEndTimeoutMs);
+}
+
+Result<std::unique_ptr<Bus>> Bus::connect(const std::string& url, const std::string& name,
+                                          bool is_patient) {
+  natsOptions* made = nullptr;
+  auto status = natsOptions_Create(&made);
+  const std::unique_ptr<natsOptions, OptionsDeleter> options(made);
+  if (status == NATS_OK) status = natsOptions_SetURL(made, url.c_str());
+  if (status == NATS_OK) status = natsOptions_SetName(made, name.c_str());
+  if (status == NATS_OK) status = natsOptions_SetTimeout(made, kConnectTimeoutMs);
+  if (status == NATS_OK) status = natsOptions_SetMaxReconnect(made, -1);
+  if (status == NATS_OK) status = natsOptions_SetReconnectWait(made, kReconnectWaitMs);
+  if (status == NATS_OK && is_patient)
+    status = natsOptions_SetRetryOnFailedConnect(made, true, note_connection, nullptr);
+  if (status != NATS_OK)
+    return Error{ErrorCode::Usage,
+                 "--nats: '" + url + "' is not a URL of NATS, such as nats://127.0.0.1:4222"};
+  auto parts = std::make_unique<Parts>();
+  status = natsConnection_Connect(&parts->connection, made);
+  const bool is_there = status == NATS_OK || (is_patient && status == NATS_NOT_YET_CONNECTED);
+  if (!is_there) return error_of(status, "no NATS answers at " + url);
+  return std::unique_ptr<Bus>(new Bus(std::move(parts)));
+}
+
+Status Bus::subscribe(const std::string& subject, Take take) {
+  parts_->takes.push_back(std::make_unique<Take>(std::move(take)));
+  natsSubscription* made = nullptr;
+  const auto status = natsConnection_Subscribe(&made, parts_->connection, subject.c_str(), hand_on,
+                                               parts_->takes.back().get());
+  if (status != NATS_OK) return error_of(status, subject + " cannot be heard");
+  parts_->subscriptions.push_back(made);
+  return {};
+}
+
+bool Bus::publish(const std::string& subject, const std::string& text) {
+  return text.size() <= kMostTextBytes &&
+         natsConnection_Status(parts_->connection) == NATS_CONN_STATUS_CONNECTED &&
+         natsConnection_PublishString(parts_->connection, subject.c_str(), text.c_str()) == NATS_OK;
+}
+
+std::vector<std::string> Bus::ask_all(const std::string& subject, const std::string& text,
+                                      milliseconds wait) {
+  std::vector<std::string> answers;
+  natsInbox* inbox = nullptr;
+  if (natsInbox_Create(&inbox) != NATS_OK) return answers;
+  natsSubscription* made = nullptr;
+  auto status = natsConnection_SubscribeSync(&made, parts_->connection, inbox);
+  if (status == NATS_OK)
+    status = natsConnection_PublishRequestString(parts_->connection, subject.c_str(), inbox,
+                                                 text.c_str());
+  const auto end = Clock::now() + wait;
+  while (status == NATS_OK && Clock::now() < end) {
+    const auto left = std::chrono::ceil<milliseconds>(end - Clock::now());
+    natsMsg* message = nullptr;
+    status = natsSubscription_NextMsg(&message, made, left.count());
+    if (status != NATS_OK) break;
+    if (auto answer = text_of(message); !answer.empty()) answers.push_back(std::move(answer));
+    natsMsg_Destroy(message);
+  }
+  natsSubscription_Destroy(made);
+  natsInbox_Destroy(inbox);
+  return answers;
+}
+
+Result<std::string> Bus::ask(const std::string& subject, const std::string& text,
+                             milliseconds deadline) {
+  natsMsg* message = nullptr;
+  const auto status = natsConnection_RequestString(&message, parts_->connection, subject.c_str(),
+                                                   text.c_str(), deadline.count());
+  if (status != NATS_OK) return error_of(status, "no hall answers");
+  auto answer = text_of(message);
+  natsMsg_Destroy(message);
+  return answer;
+}
+
+#else
+
+struct Bus::Parts {};
+
+Bus::Bus(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
+Bus::~Bus() = default;
+
+Result<std::unique_ptr<Bus>> Bus::connect(const std::string&, const std::string&, bool) {
+  return Error{ErrorCode::Usage,
+               "--nats: these programs were built without NATS: install libnats-dev, and build "
+               "them again"};
+}
+Status Bus::subscribe(const std::string&, Take) {
+  return {};
+}
+bool Bus::publish(const std::string&, const std::string&) {
+  return false;
+}
+std::vector<std::string> Bus::ask_all(const std::string&, const std::string&,
+                                      std::chrono::milliseconds) {
+  return {};
+}
+Result<std::string> Bus::ask(const std::string&, const std::string&, std::chrono::milliseconds) {
+  return Error{ErrorCode::ResourceMissing, "no hall answers"};
+}
+
+#endif
+
+}  // namespace trocar::hall
