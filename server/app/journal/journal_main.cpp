@@ -19,6 +19,7 @@
 #include "server/app/journal/assess_command.h"
 #include "server/app/journal/copy_commands.h"
 #include "server/app/journal/program_name.h"
+#include "server/app/journal/push_command.h"
 #include "server/session/recording/anonymise.h"
 #include "server/session/recording/force_table.h"
 #include "server/session/recording/lesson_table.h"
@@ -245,6 +246,8 @@ int run(int argc, char** argv) {
       "  trocar-journal assess session.mcap --html report.html\n"
       "                                                measure what people did, stage by stage\n"
       "  trocar-journal assess out/ --html curves.html learning curves over a folder of sessions\n"
+      "  trocar-journal push recordings s3://lessons/2026 --endpoint https://s3.example\n"
+      "                                                bring a folder to S3-compatible storage\n"
       "  trocar-journal repair killed.mcap whole.mcap  for other programs that read MCAP\n"
       "  trocar-journal merge session.mcap session-2.mcap whole.mcap\n"
       "                                                one file of a session whose server was "
@@ -306,6 +309,9 @@ int run(int argc, char** argv) {
   TrimCommand trim_command;
   auto* cut = app.add_subcommand("trim", "Cut a shorter recording out of one");
   add_options(*cut, trim_command);
+  PushCommand push_command;
+  auto* bring = app.add_subcommand("push", "Bring recordings to S3-compatible storage");
+  add_options(*bring, push_command);
   std::string reduction_file;
   check->add_option("--reduction", reduction_file, "of the session, if it had one")
       ->type_name("FILE");
@@ -318,6 +324,7 @@ int run(int argc, char** argv) {
   if (auto s = log::configure(kProgram, log_level); !s) return report(kProgram, s.error());
   if (measure->parsed()) return assess(assess_options);
   if (cut->parsed()) return trim_recording(trim_command);
+  if (bring->parsed()) return push(push_command);
   if (join->parsed()) return merge_parts(merge_options);
   if (mend->parsed()) return repair(path, repaired_path);
   if (hide->parsed()) return take_names_out(path, repaired_path, keeps_words);
