@@ -22,7 +22,10 @@ void cut_off(const std::string& whole, double share, const std::string& part) {
       BytesView(bytes).first(static_cast<std::size_t>(share * static_cast<double>(bytes.size()))));
 }
 
-void go_on(const std::string& part, const std::string& whole, const std::string& next, Tick until) {
+namespace {
+
+void go_on_with(const std::string& part, const std::string& whole, const std::string& next,
+                Tick until, bool has_people) {
   auto session = resume_session(part, {});
   ASSERT_TRUE(session.ok()) << session.error().message;
   auto& simulation = session->simulation;
@@ -31,7 +34,9 @@ void go_on(const std::string& part, const std::string& whole, const std::string&
   if (session->bleeding) beginning.bleeding = session->bleeding->rules();
   auto recorder = Recorder::create(next, simulation.organ(), simulation.layout(), beginning);
   ASSERT_TRUE(recorder.ok()) << recorder.error().message;
-  (*recorder)->record_participants(session->participants, 0);
+  hands::TickInputs leaves;
+  for (const auto& who : session->participants) leaves.leaves.push_back(who.slot);
+  if (has_people) (*recorder)->record_participants(session->participants, 0);
   Bytes state, blood;
   simulation.write_snapshot(state);
   auto snapshot = std::make_shared<const Bytes>(std::move(state));
@@ -46,9 +51,13 @@ void go_on(const std::string& part, const std::string& whole, const std::string&
   const auto read = read_ticks(**journal, [&](const step::TickRecord& record, bool& stop) {
     stop = record.tick >= until;
     if (record.tick <= simulation.current_tick()) return Status();
-    const auto& done = simulation.tick(record.inputs, record.decisions);
-    EXPECT_EQ(done.state_hash, record.state_hash);
-    records.push_back({done.tick, record.decisions, record.inputs, done.state_hash});
+    const auto& inputs = has_people ? record.inputs : leaves;
+    const auto& done = simulation.tick(inputs, record.decisions);
+    if (has_people) {
+      EXPECT_EQ(done.state_hash, record.state_hash);
+    }
+    records.push_back({done.tick, record.decisions, inputs, done.state_hash});
+    leaves.clear();
     auto frame = simulation.pop_frame();
     if (!frame) return Status();
     if (session->bleeding)
@@ -62,6 +71,17 @@ void go_on(const std::string& part, const std::string& whole, const std::string&
   });
   EXPECT_TRUE(read.ok()) << read.error().message;
   ASSERT_TRUE((*recorder)->close().ok());
+}
+
+}  // namespace
+
+void go_on(const std::string& part, const std::string& whole, const std::string& next, Tick until) {
+  go_on_with(part, whole, next, until, true);
+}
+
+void go_on_alone(const std::string& part, const std::string& whole, const std::string& next,
+                 Tick until) {
+  go_on_with(part, whole, next, until, false);
 }
 
 }  // namespace trocar::recording::testing

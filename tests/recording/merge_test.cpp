@@ -119,6 +119,19 @@ TEST_F(Merge, ASessionThatBleedsVerifiesToo) {
   EXPECT_GT(report->bled_surfaces, 0u);
 }
 
+TEST_F(Merge, WhoDoesNotComeBackIsThereNoMore) {
+  const auto& parts = dry();
+  const auto first = folder_.file("session.mcap"), second = folder_.file("session-2.mcap");
+  cut_off(parts.whole, 0.3, first);  // so that more than the second follows in which a list is new
+  go_on_alone(first, parts.whole, second, kRecordedTicks);
+  const auto merged = merge({first, second}, to_);
+  ASSERT_TRUE(merged.ok()) << merged.error().message;
+  ASSERT_LT(merged->joins.front() + 1100, kRecordedTicks);
+  const auto report = verify_journal(to_);
+  ASSERT_TRUE(report.ok());
+  EXPECT_EQ(report->verdict(), Verdict::Verified) << report->why();
+}
+
 TEST_F(Merge, AnEndThatWasCutShortStaysMissing) {
   const auto& parts = dry();
   for (const auto* part : {&parts.first, &parts.second})

@@ -120,7 +120,7 @@ class Merger {
     if (auto noted = copy_.copy_metadata(**reader, is_last); !noted) return noted;
     const auto& info = part.journal->info();
     if (number > 0)
-      if (auto joined = join(info.begin_tick()); !joined) return joined;
+      if (auto joined = join(*part.journal); !joined) return joined;
     const journal::JournalTimes times{info.start_utc_ns};
     const Tick until = std::min(part.until, info.last_tick);
     Tick state_tick = 0;
@@ -145,7 +145,8 @@ class Merger {
     return {};
   }
 
-  Status join(Tick tick) {
+  Status join(journal::SessionJournal& next) {
+    const Tick tick = next.info().begin_tick();
     report_.joins.push_back(tick);
     proto::JournalGap mark;
     mark.set_first_tick(tick + 1);
@@ -153,6 +154,14 @@ class Merger {
     mark.set_is_join(true);
     if (auto written = copy_.write(JournalTopic::Gap, tick, publish_time_ns_, mark); !written)
       return written;
+    // Who was there is there no more, unless the next server says so at once.
+    const auto list = next.participants_before(tick);
+    if (!list) return list.error();
+    if (!*list)
+      if (auto written = copy_.write(JournalTopic::Participants, tick, publish_time_ns_,
+                                     proto::Participants());
+          !written)
+        return written;
     // A server that goes on has no drawings of the one before.
     if (!has_drawn_) return {};
     return copy_.write(journal::topic_name(JournalTopic::Drawing), tick, publish_time_ns_,
