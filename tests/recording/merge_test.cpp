@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "common/base/checksum.h"
 #include "common/journal/session_journal.h"
 #include "proto/journal.pb.h"
 #include "proto/wire.pb.h"

@@ -8,6 +8,7 @@
 #include <optional>
 #include <utility>
 
+#include "common/base/checksum.h"
 #include "common/base/version.h"
 #include "common/journal/mcap_reader.h"
 #include "common/wire/surface_messages.h"
