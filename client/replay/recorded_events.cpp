@@ -117,7 +117,8 @@ class Reader {
       proto::JournalGap gap;
       if (gap.ParseFromArray(data.data(), static_cast<int>(data.size())))
         add(std::min(gap.first_tick() == 0 ? tick : gap.first_tick(), last_), Kind::Gap,
-            std::to_string(gap.messages()) + " messages are missing from here on");
+            gap.is_join() ? "another server went on here"
+                          : std::to_string(gap.messages()) + " messages are missing from here on");
       return !is_stopping_;
     });
   }

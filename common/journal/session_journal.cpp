@@ -60,12 +60,15 @@ Status SessionJournal::read_info() {
     reduction.file = text("reduction_file");
     reduction.source = text("reduction_source");
   }
-  if (entries.contains("continues_tick")) {
-    auto& continues = info_.continues.emplace();
-    if (!parse_number(entries, "continues_tick", 10, continues.tick))
+  for (const auto& [name, from] :
+       {std::pair{"continues", &info_.continues}, {"trimmed", &info_.trimmed}}) {
+    const auto tick = std::string(name) + "_tick";
+    if (!entries.contains(tick)) continue;
+    from->emplace();
+    if (!parse_number(entries, tick.c_str(), 10, (*from)->tick))
       return Error{ErrorCode::BadFile, mcap_->path() + ": metadata " + kSessionMetadataName +
-                                           " has a continues_tick that is no number"};
-    continues.file = text("continues_file");
+                                           " has a " + tick + " that is no number"};
+    (*from)->file = text((std::string(name) + "_file").c_str());
   }
   info_.has_external_loads = entries.contains("external_loads");
   info_.starts_from_snapshot = text("start") == "snapshot";
@@ -97,6 +100,7 @@ Status SessionJournal::read_participants() {
   };
   const TickVisitor<proto::JournalGap> count = [this](Tick, const proto::JournalGap& gap) {
     info_.gap_messages += gap.messages();
+    if (gap.is_join()) info_.joins.push_back(gap.last_tick());
     return true;
   };
   for (const Status& read : {read_topic(JournalTopic::Participants, 0, everything, note),

@@ -35,16 +35,18 @@ struct SessionInfo {
   // A scenario solved for the forces of averaged strain, whatever a session of that organ does.
   bool has_implicit_strain = false;
   std::optional<Continuation> continues;         // with which journal's session it goes on
+  std::optional<Continuation> trimmed;           // of which journal it is what came after a tick
   Tick last_tick = 0;                            // of the last message
   std::vector<proto::Participant> participants;  // everyone who was ever in, in order of joining
   std::uint64_t gap_messages = 0;                // that the session dropped while recording
+  std::vector<Tick> joins;                       // after these, another server has gone on
   bool is_finished = false;                      // by its writer; not if it was repaired
   std::string summary;                           // one line for people
 
   // The tick after which this journal begins.
-  Tick begin_tick() const { return continues ? continues->tick : 0; }
+  Tick begin_tick() const { return continues ? continues->tick : trimmed ? trimmed->tick : 0; }
   // The state after that tick is that of the first snapshot, and does not follow from the organ.
-  bool begins_with_snapshot() const { return continues || starts_from_snapshot; }
+  bool begins_with_snapshot() const { return continues || trimmed || starts_from_snapshot; }
 };
 
 template <typename Message>

@@ -49,6 +49,10 @@ Result<std::unique_ptr<SessionJournalWriter>> SessionJournalWriter::create(
     metadata.entries["continues_file"] = session.continues->file;
     metadata.entries["continues_tick"] = std::to_string(session.continues->tick);
   }
+  if (session.trimmed) {
+    metadata.entries["trimmed_file"] = session.trimmed->file;
+    metadata.entries["trimmed_tick"] = std::to_string(session.trimmed->tick);
+  }
   if (session.has_external_loads) metadata.entries["external_loads"] = "in /loads";
   if (session.starts_from_snapshot) metadata.entries["start"] = "snapshot";
   if (session.has_implicit_strain) metadata.entries["averaged_strain"] = "implicit";

@@ -29,6 +29,7 @@ struct SessionDescription {
   bool starts_from_snapshot = false;              // likewise
   bool has_implicit_strain = false;               // likewise
   std::optional<Continuation> continues;          // nothing: it begins with the session
+  std::optional<Continuation> trimmed;            // nothing: nothing was taken off its beginning
 };
 
 class SessionJournalWriter {
@@ -98,6 +99,9 @@ class SessionJournalWriter {
   [[nodiscard]] Status write_overview(Tick tick, std::uint64_t now_ns,
                                       const proto::Overview& overview);
 
+  [[nodiscard]] Status write_metadata(const McapMetadata& metadata) {
+    return mcap_->write_metadata(metadata);
+  }
   [[nodiscard]] Status flush() { return mcap_->flush(); }
   [[nodiscard]] Status close() { return mcap_->close(); }  // once, at the session's end
   std::uint64_t bytes_written() const { return mcap_->bytes_written(); }

@@ -82,6 +82,9 @@ struct ReductionDescription {
 // A journal that goes on with the session of another one, after the server was killed: its first
 // snapshot is of this tick, and its ticks go on from there. The metadata say so as continues_file
 // and continues_tick; absent in a journal that has its session from the start.
+//
+// A journal of which a part was taken off says likewise, as trimmed_file and trimmed_tick, of which
+// journal it is what came after a tick.
 struct Continuation {
   std::string file;  // of the other journal, without folders
   Tick tick = 0;     // the last one that counts in it

@@ -82,6 +82,19 @@ TEST_F(Resume, AKilledServersSessionGoesOnAndEverybodyComesBack) {
   const auto info = journal({"info", next_.string(), "--json"}, 0);
   EXPECT_EQ(json_value(info, "file"), "session.mcap") << info;
   EXPECT_EQ(json_value(info, "tick"), json_value(before, "last_tick"));
+  // Both are one recording, which verifies across the crash.
+  const auto whole = (session_.folder / "whole.mcap").string();
+  const auto merged = journal({"merge", session_.journal.string(), next_.string(), whole}, 0);
+  EXPECT_NE(merged.find("of 2 recordings"), std::string::npos) << merged;
+  const auto report = journal({"verify", whole, "--json"}, 0);
+  EXPECT_EQ(json_value(report, "first_tick"), "1") << report;
+  // And its last seconds, across the crash, are one.
+  const auto crash = std::stod(json_value(before, "last_tick")) * 1e-3;
+  const auto part = (session_.folder / "part.mcap").string();
+  journal(
+      {"trim", whole, part, "--from", std::to_string(crash - 1), "--to", std::to_string(crash + 1)},
+      0);
+  journal({"verify", part}, 0);
 }
 
 std::vector<proto::LessonStage> stages_in(const fs::path& file) {

@@ -1,10 +1,11 @@
 // A recording in headless Chromium: what a person does with it besides playing.
 import assert from 'node:assert/strict';
+import { execFileSync, spawn } from 'node:child_process';
 import fs from 'node:fs';
 import { createRequire } from 'node:module';
 import { base, kPatience, live, openPage, prepare, test, until, world } from './browser.mjs';
 
-const { TROCAR_MODULES, TROCAR_RECORDING, TROCAR_WORK, TROCAR_PICTURES } = process.env;
+const { TROCAR_BUILD, TROCAR_MODULES, TROCAR_RECORDING, TROCAR_WORK, TROCAR_PICTURES } = process.env;
 prepare(null, ['--insecure-loopback', '--recordings', `${TROCAR_WORK}/recordings`]);
 
 const keyOf = () => world.web.text.match(/#recordings=(\w+)/)[1];
@@ -57,6 +58,32 @@ test('the events of the overview are those of the recording, and little is loade
   });
   assert.ok(counts.known >= counts.all && counts.all > 0, JSON.stringify(counts));
   assert.ok(counts.end >= counts.last, JSON.stringify(counts));
+  assert.deepEqual(page.faults, []);
+  await page.close();
+});
+
+test('a recording of two servers plays on where the second one went on', async () => {
+  const program = name => `${TROCAR_BUILD}/bin/${name}`, at = name => `${TROCAR_WORK}/${name}`;
+  const serve = (...more) => spawn(program('trocar-server'), ['--insecure-loopback', '--listen', '127.0.0.1:0', '--no-announce', ...more], { stdio: 'ignore' });
+  const ended = server => new Promise(resolve => server.on('exit', resolve));
+  const first = serve('--organ', 'elastic-liver', '--journal', at('first.mcap'), '--ready-file', at('first.ready'));
+  await until('the server', () => fs.existsSync(at('first.ready')));
+  await new Promise(resolve => setTimeout(resolve, 2500));
+  first.kill('SIGKILL');
+  await ended(first);
+  assert.equal(await ended(serve('--resume', at('first.mcap'), '--journal', at('second.mcap'), '--seconds', '2')), 0);
+  execFileSync(program('trocar-journal'), ['merge', at('first.mcap'), at('second.mcap'), at('recordings/merged.mcap')]);
+  const { joins: [join] } = JSON.parse(execFileSync(program('trocar-journal'), ['info', at('recordings/merged.mcap'), '--json']));
+  const page = await open('merged.mcap');
+  await page.locator('.events').getByText('Another server went on here').waitFor({ timeout: kPatience });
+  await page.evaluate(tick => window.trocar.player.seek(tick), join - 500);
+  await page.evaluate(() => { window.trocar.player.play(); });
+  // The surface moves on with the time: frames come every 16 ticks.
+  const { late } = await until('the end', async () => {
+    const { tick, last, frame } = await page.evaluate(() => ({ tick: window.trocar.player.tick, last: window.trocar.recording.lastTick, frame: window.trocar.replica.newestFrame }));
+    return tick >= last ? { late: tick - 16 * frame } : null;
+  });
+  assert.ok(late <= 16, `the surface is ${late} ticks behind`);
   assert.deepEqual(page.faults, []);
   await page.close();
 });

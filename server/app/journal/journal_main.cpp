@@ -17,7 +17,9 @@
 #include "common/journal/session_journal.h"
 #include "common/wire/role.h"
 #include "server/app/journal/assess_command.h"
+#include "server/app/journal/copy_commands.h"
 #include "server/app/journal/program_name.h"
+#include "server/app/journal/push_command.h"
 #include "server/session/recording/anonymise.h"
 #include "server/session/recording/force_table.h"
 #include "server/session/recording/lesson_table.h"
@@ -42,9 +44,13 @@ Json json_of(const journal::SessionInfo& info, const journal::McapReader& mcap) 
   for (const auto& [id, channel] : mcap.channels()) channels[channel.topic] = count_of(mcap, id);
   Json continues;
   if (info.continues) continues = {{"file", info.continues->file}, {"tick", info.continues->tick}};
+  Json trimmed;
+  if (info.trimmed) trimmed = {{"file", info.trimmed->file}, {"tick", info.trimmed->tick}};
   return {{"seconds", seconds_of(info)},
           {"last_tick", info.last_tick},
           {"continues", continues},
+          {"trimmed", trimmed},
+          {"joins", info.joins},
           {"sim_version", info.sim_version},
           {"protocol", info.protocol},
           {"organ", info.organ_name},
@@ -77,6 +83,11 @@ int show_info(const std::string& path, bool as_json) {
   if (info.continues)
     std::printf("  continues    %s, after tick %" PRIu64 "\n", info.continues->file.c_str(),
                 info.continues->tick);
+  if (info.trimmed)
+    std::printf("  trimmed      out of %s, after tick %" PRIu64 "\n", info.trimmed->file.c_str(),
+                info.trimmed->tick);
+  for (const auto tick : info.joins)
+    std::printf("  join         another server went on after tick %" PRIu64 "\n", tick);
   if (info.has_external_loads) std::printf("  loads        of a scenario, besides its tools\n");
   if (info.starts_from_snapshot)
     std::printf("  start        the first snapshot, not the organ at rest\n");
@@ -124,6 +135,7 @@ Json json_of(const recording::VerifyReport& r) {
           {"snapshots_continued", r.snapshots_continued},
           {"participants_verified", r.participants_verified},
           {"damaged_chunks", r.damaged_chunks},
+          {"joins", r.joins},
           {"last_hash", hex64(r.last_hash)},
           {"container", r.container}};
 }
@@ -139,6 +151,8 @@ std::string text_of(const std::string& path, const recording::VerifyReport& r) {
       r.frames_verified, r.surfaces_verified, r.surfaces_decoded, r.snapshots_verified,
       r.snapshots_continued, r.participants_verified);
   if (r.bled_surfaces > 0) out += fmt::format("{} of these surfaces with blood\n", r.bled_surfaces);
+  for (const auto tick : r.joins)
+    out += fmt::format("another server went on after tick {}, from that state\n", tick);
   out += r.why();
   if (r.verdict() == recording::Verdict::Verified)
     out += fmt::format("verified to tick {}, hash {:016x}\n", r.last_tick, r.last_hash);
@@ -232,7 +246,14 @@ int run(int argc, char** argv) {
       "  trocar-journal assess session.mcap --html report.html\n"
       "                                                measure what people did, stage by stage\n"
       "  trocar-journal assess out/ --html curves.html learning curves over a folder of sessions\n"
+      "  trocar-journal push recordings s3://lessons/2026 --endpoint https://s3.example\n"
+      "                                                bring a folder to S3-compatible storage\n"
       "  trocar-journal repair killed.mcap whole.mcap  for other programs that read MCAP\n"
+      "  trocar-journal merge session.mcap session-2.mcap whole.mcap\n"
+      "                                                one file of a session whose server was "
+      "killed\n"
+      "  trocar-journal trim session.mcap part.mcap --from 60 --to 90\n"
+      "                                                half a minute of it, which verifies\n"
       "  trocar-journal anonymise session.mcap shared.mcap\n"
       "                                                a copy without names, which verifies\n"
       "Exit codes: 0 verified, 1 difference found, 2 usage, 3 file cannot be read, 6 not all "
@@ -280,6 +301,17 @@ int run(int argc, char** argv) {
     command->add_option("FILE", path, "a journal (.mcap)")->required();
     command->add_flag("--json", as_json, "print one JSON object");
   }
+  MergeOptions merge_options;
+  auto* join = app.add_subcommand(
+      "merge",
+      "Put the recordings of one session together that servers have left that were killed");
+  add_options(*join, merge_options);
+  TrimCommand trim_command;
+  auto* cut = app.add_subcommand("trim", "Cut a shorter recording out of one");
+  add_options(*cut, trim_command);
+  PushCommand push_command;
+  auto* bring = app.add_subcommand("push", "Bring recordings to S3-compatible storage");
+  add_options(*bring, push_command);
   std::string reduction_file;
   check->add_option("--reduction", reduction_file, "of the session, if it had one")
       ->type_name("FILE");
@@ -291,6 +323,9 @@ int run(int argc, char** argv) {
   }
   if (auto s = log::configure(kProgram, log_level); !s) return report(kProgram, s.error());
   if (measure->parsed()) return assess(assess_options);
+  if (cut->parsed()) return trim_recording(trim_command);
+  if (bring->parsed()) return push(push_command);
+  if (join->parsed()) return merge_parts(merge_options);
   if (mend->parsed()) return repair(path, repaired_path);
   if (hide->parsed()) return take_names_out(path, repaired_path, keeps_words);
   if (give->parsed()) {

@@ -286,6 +286,10 @@ void CommandLine::add_session_options() {
                   "where monitoring reads /healthz, /readyz and /metrics, without TLS [nowhere]")
       ->type_name("ADDR:PORT")
       ->group("Network");
+  app_.add_flag(
+          "--agones", options_.is_agones,
+          "tell Agones, in a Kubernetes cluster, that the session is ready, well, busy or over")
+      ->group("Network");
   app_.add_option("--announce", options_.announced_name,
                   "name of the session on the local network (DNS-SD) [the organ's and "
                   "the machine's; told unless --listen is this machine only]")

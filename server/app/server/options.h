@@ -28,6 +28,7 @@ struct ServerOptions {
   bool is_stream_only = false;  // no datagrams
   std::string metrics_address;  // empty: no figures for monitoring
   std::uint16_t metrics_port = 0;
+  bool is_agones = false;  // a sidecar of Agones listens on this machine
   AccessOptions access;
   LimitOptions limits;
   std::string announced_name;      // on the local network; empty: made from organ and machine

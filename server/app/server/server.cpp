@@ -16,8 +16,10 @@
 #include <cmath>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <functional>
+#include <utility>
 #include <vector>
 
 #include "common/base/log.h"
@@ -31,6 +33,7 @@
 #include "server/app/server/session_start.h"
 #include "server/app/server/simulation_loop.h"
 #include "server/app/server/summary.h"
+#include "server/session/agones/agones.h"
 #include "server/session/ghost/ghost.h"
 #include "server/session/guests/guest_connections.h"
 #include "server/session/monitoring/disk_watch.h"
@@ -90,6 +93,7 @@ class Server {
   void show_ghost(std::shared_ptr<const ghost::GhostReport> report);
   void warn_if_slow();
   Status open_figures();
+  Status open_sidecar();
   wire::RecordingState recording_state() const;
   // Looks at the disk of the recording now and then, warns, and ends the recording before it is
   // full.
@@ -121,6 +125,8 @@ class Server {
   std::unique_ptr<discovery::Announcer> announcer_;        // null: the session is not announced
   std::unique_ptr<replication::Replicator> replicator_;
   std::unique_ptr<monitoring::FiguresServer> figures_;  // null: not asked for
+  std::uint16_t sidecar_port_ = agones::kDefaultPort;
+  std::unique_ptr<agones::Sidecar> sidecar_;  // null: not asked for
   monitoring::DiskWatch disk_;
   FrameHandover handover_{[this] { asio::post(io_, [this] { publish_frames(); }); }};
   std::vector<step::SharedFrame> frames_;
@@ -137,6 +143,7 @@ class Server {
 };
 
 Status Server::open() {
+  if (const auto opened = open_sidecar(); !opened) return opened;
   const auto& organ = simulation_.organ();
   const auto& layout = simulation_.layout();
   net::TcpServerOptions tcp{.address = options_.address, .port = options_.port};
@@ -239,6 +246,7 @@ void Server::restore_people() {
 void Server::note_participants(const std::vector<participants::Participant>& present, Tick tick) {
   if (journal_) journal_->record_participants(present, tick);
   if (announcer_) announcer_->set_people(static_cast<int>(present.size()));
+  if (sidecar_) sidecar_->set_people(present.size());
   std::vector<KeptPlace> places;
   for (const auto& who : present)
     if (const auto* token = replicator_->absences().find(who.slot))
@@ -312,6 +320,7 @@ Status Server::run() {
   std::fflush(stdout);
   newest_ns_ = monotonic_ns();
   loop_->start();
+  if (sidecar_) sidecar_->start();
   const Status ran = net::run(io_);
   if (!ran.ok()) {
     log::error("{}", ran.error().message);
@@ -386,6 +395,16 @@ Status Server::open_figures() {
   if (!listening) return listening.error();
   figures_ = std::move(*listening);
   log::info("figures at {}:{}/metrics", options_.metrics_address, figures_->port());
+  return {};
+}
+
+Status Server::open_sidecar() {
+  if (!options_.is_agones) return {};
+  const auto port = agones::sidecar_port(std::getenv(agones::kPortVariable));
+  if (!port) return port.error();
+  sidecar_port_ = *port;
+  sidecar_ = std::make_unique<agones::Sidecar>(
+      io_, *port, [this] { return ill(); }, [this] { return not_ready(); });
   return {};
 }
 
@@ -480,6 +499,10 @@ void Server::wait_for(std::function<bool()> is_done, milliseconds deadline,
 Status Server::finish() {
   Status closed;
   if (journal_) closed = journal_->close();
+  // The cluster may take the machine away from here on.
+  if (std::exchange(sidecar_, nullptr))
+    if (const auto told = agones::shut_down(sidecar_port_); !told)
+      log::warn("{}", told.error().message);
   const auto& report = loop_->report();
   std::size_t equal = 0;
   for (const auto& result : barrier_) equal += result.is_equal;

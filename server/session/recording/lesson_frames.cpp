@@ -56,10 +56,14 @@ class FrameReader {
       case JournalTopic::SurfaceKey:
       case JournalTopic::SurfaceDelta:
         return follow(proto::SurfaceFrame());
-      case JournalTopic::Gap:
+      case JournalTopic::Gap: {
+        proto::JournalGap gap;
+        if (!parse(gap)) return false;
         surface_.skip();
-        note_("frames were dropped while recording: measures may differ from those told");
+        if (!gap.is_join())
+          note_("frames were dropped while recording: measures may differ from those told");
         return true;
+      }
       case JournalTopic::Claims: {
         proto::ClaimLog log;
         if (!parse(log)) return false;

@@ -71,32 +71,49 @@ void OverviewBuilder::add_stage(Tick tick, const proto::LessonStage& stage) {
   *entry.mutable_stage() = stage;
 }
 
+void OverviewBuilder::add_claim(const proto::ClaimEvent& event) {
+  if (has_room(event.ByteSizeLong())) *overview_.add_claim() = event;
+}
+
+void OverviewBuilder::add_change(Tick tick) {
+  if ((last_change_ && tick - *last_change_ < kChangePeriod) || !has_room(0)) return;
+  overview_.add_change_tick(tick);
+  last_change_ = tick;
+}
+
 void OverviewBuilder::add_frame(const step::PublishedFrame& frame,
                                 const participants::Roster& roster) {
   for (const auto& event : frame.claim_events) {
     proto::ClaimEvent message;
     replication::describe(event, roster, message);
-    if (has_room(message.ByteSizeLong())) *overview_.add_claim() = std::move(message);
+    add_claim(message);
   }
-  const bool has_changed = frame.change || frame.new_layout;
-  if (has_changed && (!last_change_ || frame.tick - *last_change_ >= kChangePeriod) &&
-      has_room(0)) {
-    overview_.add_change_tick(frame.tick);
-    last_change_ = frame.tick;
-  }
+  if (frame.change || frame.new_layout) add_change(frame.tick);
+  std::vector<ToolMoment> tools;
+  tools.reserve(frame.tools.size());
+  for (const auto& tool : frame.tools)
+    tools.push_back({.tool = tool.tool,
+                     .verb = static_cast<std::uint32_t>(tool.verb),
+                     .has_claim = tool.has_claim,
+                     .force_n = tool.force_n,
+                     .tip = tool.world_from_proxy.position});
+  add_tools(frame.tick, tools);
+}
+
+void OverviewBuilder::add_tools(Tick tick, std::span<const ToolMoment> tools) {
   std::array<std::optional<Vec3f>, kMaxTools> tips;
-  for (const auto& tool : frame.tools) {
+  for (const auto& tool : tools) {
     auto found = std::ranges::find(bin_tools_, tool.tool, &BinTool::tool);
     if (found == bin_tools_.end()) found = bin_tools_.insert(found, {.tool = tool.tool});
-    const Vec3f tip = tool.world_from_proxy.position;
-    found->state = 1 + static_cast<std::uint32_t>(tool.verb) + (tool.has_claim ? kHasClaim : 0);
+    found->state = 1 + tool.verb + (tool.has_claim ? kHasClaim : 0);
     found->force_n = std::max(found->force_n, length(tool.force_n));
-    found->tip = tip;
-    if (const auto& before = last_tip_[tool.tool.value]) found->path_m += length(tip - *before);
-    tips[tool.tool.value] = tip;
+    found->tip = tool.tip;
+    if (const auto& before = last_tip_[tool.tool.value])
+      found->path_m += length(tool.tip - *before);
+    tips[tool.tool.value] = tool.tip;
   }
   last_tip_ = tips;
-  if (frame.tick >= bin_end_) close_bin();
+  if (tick >= bin_end_) close_bin();
 }
 
 void OverviewBuilder::close_bin() {

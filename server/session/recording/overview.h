@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "common/base/ids.h"
@@ -29,8 +30,20 @@ class OverviewBuilder {
   // begin: the tick after which the recording begins.
   explicit OverviewBuilder(Tick begin);
 
+  // It is a tool in one frame.
+  struct ToolMoment {
+    ToolSlot tool;
+    std::uint32_t verb = 0;  // as tool::Verb
+    bool has_claim = false;
+    Vec3f force_n, tip;  // world frame; the tip is the proxy's
+  };
+
   // roster: names for claim events.
   void add_frame(const step::PublishedFrame& frame, const participants::Roster& roster);
+  // The same in parts, of which the tools come last.
+  void add_claim(const proto::ClaimEvent& event);
+  void add_change(Tick tick);
+  void add_tools(Tick tick, std::span<const ToolMoment> tools);
   void add_presence(Tick tick, const proto::Participants& present);
   void add_gap(const proto::JournalGap& gap);
   void add_lesson(const proto::TeachEvent& event);

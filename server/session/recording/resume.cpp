@@ -36,13 +36,14 @@ Status check_info(const std::string& path, const journal::SessionInfo& info) {
   return {};
 }
 
-// The last tick up to which no record is missing, which must be the last one there is.
-Result<Tick> last_whole_tick(journal::SessionJournal& journal, const std::string& path) {
+// The last tick up to which no record is missing, which must be the last one there is, or `until`.
+Result<Tick> last_whole_tick(journal::SessionJournal& journal, const std::string& path,
+                             Tick until) {
   Tick last = journal.info().begin_tick(), missing = 0;
   const Status read = read_ticks(journal, [&](const step::TickRecord& record, bool& stop) {
     if (record.tick != last + 1) missing = last + 1;
-    stop = missing != 0;
     last = record.tick;
+    stop = missing != 0 || last >= until;
     return Status();
   });
   if (!read) return read.error();
@@ -115,8 +116,8 @@ bool has_these_tools(const step::Simulation& simulation, const participants::Par
   return true;
 }
 
-Status read_participants(journal::SessionJournal& journal, ResumedSession& session) {
-  const auto list = journal.participants_before(kEnd);
+Status read_participants(journal::SessionJournal& journal, Tick until, ResumedSession& session) {
+  const auto list = journal.participants_before(until);
   if (!list) return list.error();
   std::array<bool, kMaxHands> is_named{};
   if (*list) session.participants = participants_of(**list);
@@ -144,7 +145,7 @@ Result<ResumedSession> resume_session(const std::string& path, const ResumeOptio
   if (!organ) return organ.error();
   auto reduction = reduction_of(path, journal.info(), *organ, options.reduction_file);
   if (!reduction) return reduction.error();
-  const auto last = last_whole_tick(journal, path);
+  const auto last = last_whole_tick(journal, path, options.until.value_or(kEnd));
   if (!last) return last.error();
   auto bleeding = recorded_bleeding(journal, path);
   if (!bleeding) return bleeding.error();
@@ -161,7 +162,8 @@ Result<ResumedSession> resume_session(const std::string& path, const ResumeOptio
   if (!hash) return hash.error();
   session.state_hash = *hash;
   if (const auto begun = begin_as_restored(session.simulation); !begun) return begun.error();
-  if (const auto read = read_participants(journal, session); !read) return read.error();
+  if (const auto read = read_participants(journal, options.until.value_or(kEnd), session); !read)
+    return read.error();
   auto recorded = recorded_course(path, *last);
   if (!recorded) return recorded.error();
   session.course = std::move(recorded->course);

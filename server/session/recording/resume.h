@@ -22,6 +22,8 @@ namespace trocar::recording {
 struct ResumeOptions {
   std::string reduction_file;  // of the session; empty: it had none
   unsigned workers = 1;
+  // After this tick instead of the last: of a frame, and one that was recorded.
+  std::optional<Tick> until;
 };
 
 struct ResumedSession {

@@ -1,10 +1,22 @@
 #include "server/session/recording/session_parts.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <filesystem>
 #include <utility>
 
 namespace trocar::recording {
+
+std::string mismatch(const journal::SessionInfo& earlier, const journal::SessionInfo& later) {
+  if (!later.continues) return "begins with a session of its own";
+  const Tick tick = later.continues->tick;
+  if (earlier.organ_hash != later.organ_hash) return "has another organ";
+  if (earlier.begin_tick() >= tick || earlier.last_tick < tick)
+    return fmt::format("goes on after tick {}, which is not among ticks {} to {} of it", tick,
+                       earlier.begin_tick() + 1, earlier.last_tick);
+  return {};
+}
 
 Result<SessionParts> open_session_parts(const std::string& path) {
   auto journal = journal::SessionJournal::open(path);
@@ -29,9 +41,7 @@ Result<SessionParts> open_session_parts(const std::string& path) {
       lacks("which has to lie beside it");
       break;
     }
-    const auto& earlier = (*before)->info();
-    if (earlier.organ_hash != info.organ_hash || earlier.begin_tick() >= continues->tick ||
-        earlier.last_tick < continues->tick) {
+    if (!mismatch((*before)->info(), info).empty()) {
       lacks("and the file of that name is of another session");
       break;
     }
@@ -39,6 +49,8 @@ Result<SessionParts> open_session_parts(const std::string& path) {
     session.parts.push_back(
         {.path = (folder / name).string(), .journal = std::move(*before), .until = until});
   }
+  if (const auto& trimmed = session.parts.back().journal->info().trimmed)
+    session.missing = "it was cut out of " + trimmed->file + ": what came before is not here";
   std::ranges::reverse(session.parts);
   return session;
 }

@@ -28,6 +28,9 @@ struct SessionParts {
   std::string missing;             // a line about what is not there before the first; else empty
 };
 
+// Empty: `later` goes on with `earlier`, after a tick that it has; else why it does not.
+std::string mismatch(const journal::SessionInfo& earlier, const journal::SessionInfo& later);
+
 // Error: the recording itself cannot be read.
 Result<SessionParts> open_session_parts(const std::string& path);
 

@@ -96,9 +96,11 @@ Verifier::Verifier(const journal::SessionInfo& info, step::Simulation simulation
       simulation_(std::move(simulation)),
       messages_(simulation_.organ().name, simulation_.layout()) {
   if (bleeding) bleeding_.emplace(std::move(*bleeding));
-  next_tick_ = info_.begin_tick() + 1;
+  begin_tick_ = info_.begin_tick();
+  begins_with_snapshot_ = info_.begins_with_snapshot();
+  next_tick_ = begin_tick_ + 1;
   if (!report_.is_resimulated) return;
-  is_in_step_ = !info_.begins_with_snapshot();
+  is_in_step_ = !begins_with_snapshot_;
   if (!is_in_step_) return;
   proto::SurfaceTopology topology;
   wire::write(simulation_.layout(), simulation_.organ().name, topology);
@@ -221,7 +223,7 @@ void Verifier::check_snapshot(const proto::WorldSnapshot& snapshot) {
     return differ(
         {tick, kSnapshots, "organ_hash", hex64(snapshot.organ_hash()), hex64(info_.organ_hash)});
   if (!report_.is_resimulated) return;
-  if (waits_for_begin() && tick == info_.begin_tick()) return begin_from(snapshot);
+  if (waits_for_begin() && tick == begin_tick_) return begin_from(snapshot);
   if (snapshots_.size() >= kMostPending)
     return add_reason(fmt::format("tick {}: too many snapshots wait for their tick", tick));
   snapshots_[tick] = snapshot;
@@ -316,6 +318,10 @@ bool Verifier::restore_blood(const proto::WorldSnapshot& snapshot) {
 }
 
 void Verifier::begin_from(const proto::WorldSnapshot& snapshot) {
+  if (std::exchange(knows_begin_, false)) {
+    if (!is_state(snapshot)) return;
+    ++report_.snapshots_verified;
+  }
   const Status restored =
       simulation_.restore_snapshot(bytes_of(std::string_view(snapshot.state())));
   if (!restored.ok() || simulation_.current_tick() != snapshot.tick())
@@ -331,10 +337,9 @@ void Verifier::begin_from(const proto::WorldSnapshot& snapshot) {
     differ({snapshot.tick(), "/topology", field->field, field->recorded, field->simulated});
 }
 
-// The simulation is at this tick, and so is a snapshot.
-void Verifier::compare_snapshot(Tick tick) {
-  const auto found = snapshots_.find(tick);
-  const auto recorded = bytes_of(std::string_view(found->second.state()));
+bool Verifier::is_state(const proto::WorldSnapshot& snapshot) {
+  const Tick tick = snapshot.tick();
+  const auto recorded = bytes_of(std::string_view(snapshot.state()));
   Bytes state;
   simulation_.write_snapshot(state);
   const auto [in_recorded, in_state] = std::ranges::mismatch(recorded, state);
@@ -343,15 +348,25 @@ void Verifier::compare_snapshot(Tick tick) {
     const auto text = [](auto at, auto end) {
       return at == end ? std::string("nothing") : fmt::format("0x{:02x}", *at);
     };
-    return differ({tick, kSnapshots, fmt::format("byte {} of state", in_state - state.begin()),
-                   text(in_recorded, recorded.end()), text(in_state, state.end())});
+    differ({tick, kSnapshots, fmt::format("byte {} of state", in_state - state.begin()),
+            text(in_recorded, recorded.end()), text(in_state, state.end())});
+    return false;
   }
   Bytes blood;
   if (bleeding_) bleeding_->write_state(blood);
-  const auto recorded_blood = bytes_of(std::string_view(found->second.bleeding()));
-  if (!std::ranges::equal(recorded_blood, blood))
-    return differ({tick, kSnapshots, "bleeding", fmt::format("{} bytes", recorded_blood.size()),
-                   fmt::format("{} others", blood.size())});
+  const auto recorded_blood = bytes_of(std::string_view(snapshot.bleeding()));
+  const bool is_blood_equal = std::ranges::equal(recorded_blood, blood);
+  if (!is_blood_equal)
+    differ({tick, kSnapshots, "bleeding", fmt::format("{} bytes", recorded_blood.size()),
+            fmt::format("{} others", blood.size())});
+  return is_blood_equal;
+}
+
+// The simulation is at this tick, and so is a snapshot.
+void Verifier::compare_snapshot(Tick tick) {
+  const auto found = snapshots_.find(tick);
+  if (!is_state(found->second)) return;
+  const auto recorded = bytes_of(std::string_view(found->second.state()));
   ++report_.snapshots_verified;
   if (continuations_.size() >= kMostPending)
     return add_reason(fmt::format("tick {}: too many snapshots at once to go on from", tick));
@@ -375,7 +390,26 @@ void Verifier::continue_snapshots(std::uint64_t hash) {
       continuations_, [&](const Continuation& restored) { return restored.until <= record_.tick; });
 }
 
+void Verifier::check_join(Tick tick) {
+  surface_.skip();
+  if (tick + 1 < next_tick_ || tick > report_.last_tick)
+    return add_reason(
+        fmt::format("a join after tick {} comes after tick {}", tick, next_tick_ - 1));
+  note_missing(tick + 1);
+  next_tick_ = tick + 1;
+  report_.joins.push_back(tick);
+  if (!report_.is_resimulated) return;
+  knows_begin_ = is_in_step_;
+  begin_tick_ = tick;
+  begins_with_snapshot_ = true;
+  first_topology_.reset();
+  records_.clear();
+  is_in_step_ = false;
+  has_key_schedule_ = true;
+}
+
 void Verifier::check_gap(const proto::JournalGap& gap) {
+  if (gap.is_join()) return check_join(gap.last_tick());
   gap_end_ = gap.last_tick();
   add_reason(ticks_text(gap.first_tick(), gap.last_tick()) +
              ": a marked gap, the session did not record them");

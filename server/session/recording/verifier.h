@@ -55,8 +55,8 @@ class Verifier {
   };
 
   bool waits_for_begin() const {
-    return info_.begins_with_snapshot() && report_.is_resimulated &&
-           next_tick_ == info_.begin_tick() + 1 && !is_in_step_;
+    return begins_with_snapshot_ && report_.is_resimulated && next_tick_ == begin_tick_ + 1 &&
+           !is_in_step_;
   }
   void differ(Difference difference);
   void add_reason(std::string reason);
@@ -64,12 +64,16 @@ class Verifier {
   void check_batch(const proto::TickBatch& batch);
   void check_record(const proto::TickRecord& message);
   void check_gap(const proto::JournalGap& gap);
+  // Another server has gone on from the state after that tick.
+  void check_join(Tick tick);
   void note_missing(Tick before);
   bool start_from_snapshot(Tick tick);
   // False: the snapshot's blood is none, which is told.
   bool restore_blood(const proto::WorldSnapshot& snapshot);
   // A journal that does not begin with the organ at rest begins with the state to go on from.
   void begin_from(const proto::WorldSnapshot& snapshot);
+  // False: the snapshot is not the state that the simulation is in, which is told.
+  bool is_state(const proto::WorldSnapshot& snapshot);
   void compare_snapshot(Tick tick);
   void continue_snapshots(std::uint64_t hash);
   void begin_frame(step::PublishedFrame& frame);
@@ -92,6 +96,9 @@ class Verifier {
   std::vector<step::TickRecord> records_;                      // since the last frame
   std::unique_ptr<google::protobuf::Message> first_topology_;  // until there is that state
   Tick next_tick_ = 1;                              // of the record that should come next
+  Tick begin_tick_ = 0;                             // after which it begins, or went on at a join
+  bool begins_with_snapshot_ = false;               // the state after begin_tick_ is one
+  bool knows_begin_ = false;                        // and it was simulated, too
   bool is_in_step_ = true;                          // the simulation is where the recording is
   bool is_frame_whole_ = true;                      // simulated in full since the last one
   bool has_key_schedule_ = true;                    // it is known when keyframes are due

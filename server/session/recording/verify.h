@@ -65,6 +65,7 @@ struct VerifyReport {
   std::uint64_t bled_surfaces = 0;          // of those decoded, with levels of blood
   std::uint64_t participants_verified = 0;  // frames in which they were compared
   std::uint64_t damaged_chunks = 0;
+  std::vector<Tick> joins;  // after these, another server has gone on, from an equal state
   std::optional<Difference> first_difference;
   std::vector<std::string> reasons;  // why not all could be verified; at most kMostReasons
   std::uint64_t reasons_left_out = 0;

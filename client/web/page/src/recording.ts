@@ -77,7 +77,7 @@ export interface RecordedEvent { tick: number; kind: EventKind; text: string }
 const kFields: Record<string, number> = { '/surface/key': 2, '/surface/delta': 2, '/frame_state': 3, '/topology/change': 8, '/topology': 18, '/participants': 19, '/drawing': 40 };
 const kEventTopics = ['/participants', '/claims', '/topology/change', '/gap', '/lesson'], kMostEvents = 5000;
 const kCutPause = 1500; // ticks after which a cut is another one; an overview names one tick a second
-const kShown = ['/surface/delta', '/frame_state', '/drawing', ...kEventTopics];
+const kShown = ['/surface/delta', '/surface/key', '/topology', '/frame_state', '/drawing', ...kEventTopics];
 const kNothingDrawn = new Uint8Array([0x10, 0]); // a Drawing without strokes, which replaces what was
 type Message = McapTypes.TypedMcapRecords['Message'];
 
@@ -138,10 +138,17 @@ export class Recording {
   }
   // Yields what comes after `tick`, in order.
   async *follow(tick: number): AsyncGenerator<Item> {
+    let held: Item[] = [];
     for await (const m of this.reader.readMessages({ topics: kShown, startTime: this.time(tick + 1) })) {
-      yield this.item(m);
-      if (this.topic(m) === '/lesson') yield* this.pointing(m);
+      const item = this.item(m);
+      if (held[0] !== undefined && held[0].tick !== item.tick) {
+        yield* shownOf(held);
+        held = [];
+      }
+      held.push(item);
+      if (item.topic === '/lesson') held.push(...this.pointing(m));
     }
+    yield* shownOf(held);
   }
   // What the replica shows of a lesson besides the drawing.
   private *pointing(m: Message): Generator<Item> {
@@ -162,6 +169,12 @@ export class Recording {
   async *survey(after: number): AsyncGenerator<Item> {
     for await (const m of this.reader.readMessages({ topics: [...kEventTopics, '/frame_state'], startTime: this.time(after + 1) })) yield this.item(m);
   }
+}
+
+// Items of one tick. A keyframe says the same as a delta; where there is none, it replaces the surface.
+function shownOf(items: Item[]): Item[] {
+  if (!items.some(item => item.topic === '/surface/delta')) return items;
+  return items.filter(item => item.topic !== '/surface/key' && item.topic !== '/topology');
 }
 
 export const kBadOverview = 'The overview of this recording cannot be read.';
@@ -225,7 +238,10 @@ export class EventLog {
     if (stage.isOver) this.add({ tick, kind: 'lesson', text: `The lesson is over: ${stage.points.toFixed(0)} of 100 points` });
     else if (isNew) this.add({ tick, kind: 'lesson', text: `Stage ${stage.stage + 1} of ${stage.stages}: ${stage.name}` });
   }
-  private addGap(gap: JournalGap): void { this.add({ tick: Number(gap.firstTick), kind: 'gap', text: `${gap.messages} messages are missing here` }); }
+  private addGap(gap: JournalGap): void {
+    const text = gap.isJoin ? 'Another server went on here' : `${gap.messages} messages are missing here`;
+    this.add({ tick: Number(gap.firstTick), kind: 'gap', text });
+  }
   private addCut(tick: number): void {
     if (tick - this.lastCut > kCutPause || tick < this.lastCut) this.add({ tick, kind: 'cut', text: 'Tissue is cut or tears' });
     this.lastCut = tick;

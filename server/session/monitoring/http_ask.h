@@ -1,0 +1,38 @@
+#pragma once
+
+// One request to another program over HTTP, without TLS, and its answer.
+
+#include "common/base/asio.h"  // before Boost: see there
+
+#include <boost/asio/awaitable.hpp>
+#include <chrono>
+#include <cstdint>
+#include <string>
+
+#include "common/base/result.h"
+
+namespace trocar::monitoring {
+
+struct HttpQuestion {
+  std::string host;
+  std::uint16_t port = 0;
+  std::string method, path;          // GET, POST or DELETE
+  std::string body;                  // JSON
+  std::string key;                   // as a bearer's token; empty: none
+  std::chrono::seconds deadline{5};  // for all of it
+};
+
+struct HttpAnswer {
+  unsigned status = 0;
+  std::string body;
+};
+
+inline constexpr std::size_t kMostAnswerBytes = 1u << 20;
+
+// Runs on the coroutine's executor. ErrorCode::ResourceMissing with the reason if nothing answers
+// in time, or what answers speaks no HTTP, or says more than kMostAnswerBytes.
+asio::awaitable<Result<HttpAnswer>> ask(HttpQuestion question);
+// The same for who has no I/O thread: returns when there is the answer.
+Result<HttpAnswer> ask_and_wait(HttpQuestion question);
+
+}  // namespace trocar::monitoring

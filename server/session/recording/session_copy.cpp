@@ -1,0 +1,149 @@
+#include "server/session/recording/session_copy.h"
+
+#include <unistd.h>
+
+#include <charconv>
+#include <filesystem>
+#include <utility>
+
+#include "common/journal/mcap_repair.h"
+#include "proto/journal.pb.h"
+#include "proto/wire.pb.h"
+#include "server/session/recording/read_back.h"
+
+namespace trocar::recording {
+namespace {
+
+namespace fs = std::filesystem;
+using journal::JournalTopic;
+
+constexpr std::string_view kToolTopic = "/tool/";
+
+Error exists(const std::string& path) {
+  return {ErrorCode::Usage, path + ": exists already, no recording is overwritten"};
+}
+
+// "1.20" of a file.
+bool parse_protocol(const std::string& text, std::uint32_t& major, std::uint32_t& minor) {
+  const char* end = text.data() + text.size();
+  const auto first = std::from_chars(text.data(), end, major);
+  if (first.ec != std::errc() || first.ptr == end || *first.ptr != '.') return false;
+  const auto second = std::from_chars(first.ptr + 1, end, minor);
+  return second.ec == std::errc() && second.ptr == end;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<SessionCopy>> SessionCopy::create(const std::string& to,
+                                                         const journal::SessionInfo& session) {
+  std::error_code ignored;
+  if (fs::exists(to, ignored)) return exists(to);
+  journal::SessionDescription description{.start_utc_ns = session.start_utc_ns,
+                                          .sim_version = session.sim_version,
+                                          .organ_name = session.organ_name,
+                                          .organ_hash = session.organ_hash,
+                                          .reduction = session.reduction,
+                                          .has_external_loads = session.has_external_loads,
+                                          .starts_from_snapshot = session.starts_from_snapshot,
+                                          .has_implicit_strain = session.has_implicit_strain,
+                                          .continues = session.continues,
+                                          .trimmed = session.trimmed};
+  if (session.start_utc_ns == 0 ||
+      !parse_protocol(session.protocol, description.protocol_major, description.protocol_minor))
+    return Error{ErrorCode::BadFile,
+                 to + ": the recording does not say when it began, or with which protocol"};
+  const auto temporary = to + ".part-" + std::to_string(::getpid());
+  auto writer = journal::SessionJournalWriter::create(temporary, description);
+  if (!writer) return writer.error();
+  return std::unique_ptr<SessionCopy>(
+      new SessionCopy(to, temporary, std::move(*writer), session.begin_tick()));
+}
+
+SessionCopy::SessionCopy(std::string to, std::string temporary,
+                         std::unique_ptr<journal::SessionJournalWriter> writer, Tick begin)
+    : to_(std::move(to)),
+      temporary_(std::move(temporary)),
+      writer_(std::move(writer)),
+      overview_(begin),
+      begin_(begin),
+      last_tick_(begin) {}
+
+SessionCopy::~SessionCopy() {
+  writer_.reset();
+  std::error_code ignored;
+  if (!temporary_.empty()) fs::remove(temporary_, ignored);
+}
+
+Status SessionCopy::write_metadata(const journal::McapMetadata& metadata) {
+  return writer_->write_metadata(metadata);
+}
+
+Status SessionCopy::copy_metadata(const journal::McapReader& reader, bool keeps_repair) {
+  for (const auto& metadata : reader.metadata()) {
+    if (metadata.name == journal::kSessionMetadataName) continue;
+    if (metadata.name == journal::kRepairedMetadataName && !keeps_repair) continue;
+    if (!noted_.emplace(metadata.name, metadata.entries).second) continue;
+    if (auto written = writer_->write_metadata(metadata); !written) return written;
+  }
+  return {};
+}
+
+Status SessionCopy::write(std::string_view topic, Tick tick, std::uint64_t publish_time_ns,
+                          BytesView bytes) {
+  last_publish_time_ns_ = publish_time_ns;
+  if (topic.starts_with(kToolTopic)) {
+    proto::ToolState state;
+    if (!state.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())) ||
+        state.tool() >= kMaxTools)
+      return Error{ErrorCode::BadFile, std::string(topic) + ": the message at tick " +
+                                           std::to_string(tick) + " cannot be read"};
+    ++messages_;
+    return writer_->write_tool({static_cast<std::uint8_t>(state.tool())}, tick, publish_time_ns,
+                               state);
+  }
+  const auto known = journal::topic_of(topic);
+  if (!known)
+    return Error{ErrorCode::BadFile, std::string(topic) +
+                                         ": this release does not know that channel, use the one "
+                                         "that recorded it"};
+  if (*known == JournalTopic::Overview) return {};
+  ++messages_;
+  // The organ is written at tick 0, wherever the recording begins.
+  if (*known != JournalTopic::Organ) last_tick_ = tick;
+  if (auto written = writer_->write(*known, tick, publish_time_ns, bytes); !written) return written;
+  const auto full = overview_.take(*known, tick, bytes);
+  return full ? write_overview(*full, publish_time_ns) : Status(full.error());
+}
+
+Status SessionCopy::write(JournalTopic topic, Tick tick, std::uint64_t publish_time_ns,
+                          const google::protobuf::Message& message) {
+  scratch_.resize(message.ByteSizeLong());
+  message.SerializeWithCachedSizesToArray(scratch_.data());
+  return write(journal::topic_name(topic), tick, publish_time_ns, scratch_);
+}
+
+Status SessionCopy::write_overview(const std::optional<proto::Overview>& overview,
+                                   std::uint64_t publish_time_ns) {
+  if (!overview) return {};
+  return writer_->write_overview(last_tick_, publish_time_ns, *overview);
+}
+
+Status SessionCopy::finish(const journal::McapMetadata& note) {
+  if (auto written = write_overview(overview_.rest(), last_publish_time_ns_); !written)
+    return written;
+  if (auto flushed = writer_->flush(); !flushed) return flushed;
+  if (auto noted = writer_->write_metadata(note); !noted) return noted;
+  if (auto closed = writer_->close(); !closed) return closed;
+  if (auto read =
+          read_back(temporary_, {.messages = messages_, .begin = begin_, .end = last_tick_});
+      !read)
+    return read;
+  std::error_code failed;
+  if (fs::exists(to_, failed)) return exists(to_);
+  fs::rename(temporary_, to_, failed);
+  if (failed) return Error{ErrorCode::ResourceMissing, to_ + ": " + failed.message()};
+  temporary_.clear();
+  return {};
+}
+
+}  // namespace trocar::recording

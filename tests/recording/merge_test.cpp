@@ -1,0 +1,215 @@
+// The recordings of a session whose servers were killed become one, which says what a session
+// without a crash says.
+
+#include "server/session/recording/merge.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <memory>
+
+#include "common/base/checksum.h"
+#include "common/journal/session_journal.h"
+#include "proto/journal.pb.h"
+#include "proto/wire.pb.h"
+#include "server/session/recording/session_parts.h"
+#include "server/session/recording/verify.h"
+#include "tests/recording/continued_session.h"
+#include "tests/recording/read_recording.h"
+#include "tests/recording/recorded_simulation.h"
+#include "tests/support/files.h"
+
+namespace trocar::recording::testing {
+namespace {
+
+namespace fs = std::filesystem;
+using trocar::testing::TemporaryFolder;
+
+const auto kAll = [](auto, auto&) { return true; };
+
+// A session in three parts, simulated once for all tests that do not change it.
+struct Parts {
+  explicit Parts(bool bleeds) {
+    record_simulation(whole, 0, bleeds);
+    cut_off(whole, 0.45, first);
+    go_on(first, whole, folder.file("full.mcap"), kRecordedTicks);
+    cut_off(folder.file("full.mcap"), 0.6, second);
+    go_on(second, whole, third, kRecordedTicks);
+  }
+  std::vector<std::string> all() const { return {first, second, third}; }
+
+  TemporaryFolder folder;
+  std::string whole = folder.file("whole.mcap"), first = folder.file("session.mcap"),
+              second = folder.file("session-2.mcap"), third = folder.file("session-3.mcap");
+};
+
+const Parts& dry() {
+  static const Parts parts(false);
+  return parts;
+}
+
+class Merge : public ::testing::Test {
+ protected:
+  void expect_refusal(const std::vector<std::string>& parts, const std::string& says) {
+    const auto merged = merge(parts, to_);
+    ASSERT_FALSE(merged.ok());
+    EXPECT_NE(merged.error().message.find(says), std::string::npos) << merged.error().message;
+    EXPECT_EQ(merged.error().message.find('\n'), std::string::npos);
+    EXPECT_EQ(std::distance(fs::directory_iterator(folder_.file("")), {}), files_)
+        << "nothing is left behind";
+  }
+
+  TemporaryFolder folder_;
+  std::string to_ = folder_.file("merged.mcap");
+  std::ptrdiff_t files_ = 0;  // that a test has put there
+};
+
+TEST_F(Merge, ThreePartsAreOneRecordingThatVerifies) {
+  const auto& parts = dry();
+  const auto merged = merge({parts.second, parts.third, parts.first}, to_);
+  ASSERT_TRUE(merged.ok()) << merged.error().message;
+  ASSERT_EQ(merged->joins.size(), 2u);
+  EXPECT_EQ(merged->parts, parts.all());
+  EXPECT_EQ(merged->torn_frames, 0u);
+  EXPECT_TRUE(merged->has_end);
+  EXPECT_EQ(merged->last_tick, kRecordedTicks);
+  const auto report = verify_journal(to_), whole = verify_journal(parts.whole);
+  ASSERT_TRUE(report.ok() && whole.ok());
+  EXPECT_EQ(report->verdict(), Verdict::Verified) << report->why();
+  EXPECT_EQ(report->ticks_verified, kRecordedTicks);
+  EXPECT_EQ(report->frames_verified, whole->frames_verified);
+  EXPECT_EQ(report->last_hash, whole->last_hash);
+  EXPECT_EQ(report->joins, merged->joins);
+  auto journal = journal::SessionJournal::open(to_);
+  ASSERT_TRUE(journal.ok());
+  const auto& info = (*journal)->info();
+  EXPECT_EQ(info.joins, merged->joins);
+  EXPECT_EQ(info.gap_messages, 0u);
+  EXPECT_EQ(info.begin_tick(), 0u);
+  EXPECT_TRUE(info.is_finished);
+  auto first = journal::SessionJournal::open(parts.first);
+  ASSERT_TRUE(first.ok());
+  EXPECT_EQ(info.start_utc_ns, (*first)->info().start_utc_ns);
+  const auto again = open_session_parts(to_);
+  ASSERT_TRUE(again.ok());
+  EXPECT_EQ(again->parts.size(), 1u);
+  EXPECT_EQ(again->missing, "");
+}
+
+TEST_F(Merge, ItShowsWhatASessionWithoutACrashShows) {
+  ASSERT_TRUE(merge(dry().all(), to_).ok());
+  EXPECT_EQ(surfaces_of(to_), surfaces_of(dry().whole));
+  const auto merged = overviews_of(to_), whole = overviews_of(dry().whole);
+  ASSERT_EQ(merged.size(), whole.size());
+  for (std::size_t i = 0; i < merged.size(); ++i) {
+    EXPECT_EQ(merged[i].bins(), whole[i].bins());
+    ASSERT_EQ(merged[i].tool_size(), whole[i].tool_size());
+    for (int tool = 0; tool < merged[i].tool_size(); ++tool)
+      EXPECT_EQ(merged[i].tool(tool).SerializeAsString(), whole[i].tool(tool).SerializeAsString());
+    EXPECT_EQ(merged[i].claim_size(), whole[i].claim_size());
+  }
+}
+
+TEST_F(Merge, ASessionThatBleedsVerifiesToo) {
+  const Parts parts(true);
+  const auto merged = merge(parts.all(), to_);
+  ASSERT_TRUE(merged.ok()) << merged.error().message;
+  const auto report = verify_journal(to_);
+  ASSERT_TRUE(report.ok());
+  EXPECT_EQ(report->verdict(), Verdict::Verified) << report->why();
+  EXPECT_GT(report->bled_surfaces, 0u);
+}
+
+TEST_F(Merge, WhoDoesNotComeBackIsThereNoMore) {
+  const auto& parts = dry();
+  const auto first = folder_.file("session.mcap"), second = folder_.file("session-2.mcap");
+  cut_off(parts.whole, 0.3, first);  // so that more than the second follows in which a list is new
+  go_on_alone(first, parts.whole, second, kRecordedTicks);
+  const auto merged = merge({first, second}, to_);
+  ASSERT_TRUE(merged.ok()) << merged.error().message;
+  ASSERT_LT(merged->joins.front() + 1100, kRecordedTicks);
+  const auto report = verify_journal(to_);
+  ASSERT_TRUE(report.ok());
+  EXPECT_EQ(report->verdict(), Verdict::Verified) << report->why();
+}
+
+TEST_F(Merge, AnEndThatWasCutShortStaysMissing) {
+  const auto& parts = dry();
+  for (const auto* part : {&parts.first, &parts.second})
+    fs::copy(*part, folder_.file(fs::path(*part).filename().string()));
+  const auto merged = merge({folder_.file("session.mcap"), folder_.file("session-2.mcap")}, to_);
+  ASSERT_TRUE(merged.ok()) << merged.error().message;
+  EXPECT_FALSE(merged->has_end);
+  const auto report = verify_journal(to_);
+  ASSERT_TRUE(report.ok());
+  EXPECT_EQ(report->verdict(), Verdict::NotVerified);
+  ASSERT_EQ(report->reasons.size(), 1u) << report->why();
+  EXPECT_NE(report->reasons.front().find("it has no end"), std::string::npos) << report->why();
+}
+
+TEST_F(Merge, WhatAKilledServerHasNotWrittenOfAFrameIsNamed) {
+  const auto& parts = dry();
+  auto second = journal::SessionJournal::open(parts.second);
+  ASSERT_TRUE(second.ok());
+  const Tick join = (*second)->info().begin_tick();
+  copy_journal(parts.first, folder_.file("session.mcap"),
+               [&](std::string_view topic, const google::protobuf::Message& message) {
+                 return topic != "/frame_state" ||
+                        static_cast<const proto::FrameState&>(message).tick() != join;
+               });
+  for (const auto* part : {&parts.second, &parts.third})
+    fs::copy(*part, folder_.file(fs::path(*part).filename().string()));
+  const auto merged = merge({folder_.file("session.mcap"), folder_.file("session-2.mcap"),
+                             folder_.file("session-3.mcap")},
+                            to_);
+  ASSERT_TRUE(merged.ok()) << merged.error().message;
+  EXPECT_EQ(merged->torn_frames, 1u);
+  const auto report = verify_journal(to_);
+  ASSERT_TRUE(report.ok());
+  EXPECT_EQ(report->verdict(), Verdict::NotVerified);
+  EXPECT_NE(report->why().find("a message on /frame_state is missing"), std::string::npos)
+      << report->why();
+}
+
+TEST_F(Merge, AStateThatDoesNotFollowIsFound) {
+  ASSERT_TRUE(merge(dry().all(), to_).ok());
+  const auto changed = folder_.file("changed.mcap");
+  int snapshots = 0;
+  copy_journal(to_, changed, [&](std::string_view topic, google::protobuf::Message& message) {
+    if (topic != "/world/snapshot" || ++snapshots != 3) return true;  // that of the second part
+    auto& snapshot = static_cast<proto::WorldSnapshot&>(message);
+    auto state = snapshot.state();
+    state.back() = static_cast<char>(state.back() ^ 1);
+    snapshot.set_state(state);
+    snapshot.set_state_hash(xxh3_64(bytes_of(std::string_view(state))));
+    return true;
+  });
+  const auto report = verify_journal(changed);
+  ASSERT_TRUE(report.ok());
+  EXPECT_EQ(report->verdict(), Verdict::Different) << report->why();
+}
+
+TEST_F(Merge, RefusesPartsThatDoNotContinueEachOther) {
+  const auto& parts = dry();
+  expect_refusal({parts.first, folder_.file("none.mcap")}, "none.mcap");
+  expect_refusal({parts.first, parts.third}, "session-2.mcap: is a part of this session, too");
+  expect_refusal({parts.second, parts.third}, "session.mcap: is a part of this session, too");
+  expect_refusal({parts.first, parts.whole}, "is no part of this session");
+  expect_refusal({parts.first, parts.first}, "there is nothing to merge");
+  files_ = 1;
+  fs::copy(parts.second, folder_.file("session-2.mcap"));
+  expect_refusal({parts.first, folder_.file("session-2.mcap")}, "is no part of this session");
+  files_ = 2;
+  copy_journal(parts.first, folder_.file("session.mcap"), kAll, kSimVersion + 1);
+  expect_refusal({folder_.file("session.mcap"), folder_.file("session-2.mcap")},
+                 "was recorded by another release");
+}
+
+TEST_F(Merge, OverwritesNothing) {
+  files_ = 1;
+  trocar::testing::save_file(to_, {});
+  expect_refusal(dry().all(), "exists already");
+}
+
+}  // namespace
+}  // namespace trocar::recording::testing
