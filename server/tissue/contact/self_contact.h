@@ -204,7 +204,7 @@ class SelfContactFinder {
   }
   float measured_corner_reach(Site site) const;
   void update_corner_reaches(std::span<const Site> sites);
-  void forget_distances(std::span<const Site> sites);
+  static void forget_distances(Site site, List& list);
   // Returns how far apart two nodes may be, m, so that a pair of one with a triangle at the other
   // begins, with the greatest margin.
   float reach_of(Site site, Site other) const {
@@ -312,7 +312,7 @@ class SelfContactFinder {
   std::uint32_t tick_current_ = 0;
   SelfContactTable old_pairs_;
   std::vector<NodePair> found_;  // of an edit
-  std::vector<Site> around_, looking_, corners_, grown_;
+  std::vector<Site> around_, looking_, corners_;
 };
 
 }  // namespace trocar::contact

@@ -108,22 +108,23 @@ float SelfContactFinder::measured_corner_reach(Site site) const {
 
 // Pairs of nodes that now reach farther are looked at again.
 void SelfContactFinder::update_corner_reaches(std::span<const Site> sites) {
-  grown_.clear();
   for (const Site s : sites) {
-    const float reach = measured_corner_reach(s);
-    if (reach > corner_reaches_[s]) grown_.push_back(s);
-    corner_reaches_[s] = reach;
+    const float reach = measured_corner_reach(s), before = std::exchange(corner_reaches_[s], reach);
+    if (!(reach > before)) continue;
+    for (auto* list : {&list_, &next_list_}) forget_distances(s, *list);
   }
-  forget_distances(grown_);
 }
 
-// sites: ascending.
-void SelfContactFinder::forget_distances(std::span<const Site> sites) {
-  if (sites.empty()) return;
-  const auto is_one = [&](Site s) { return std::ranges::binary_search(sites, s); };
-  for (std::size_t i = 0; i < list_.pairs.size(); ++i)
-    if (is_one(list_.pairs[i].node) || is_one(list_.pairs[i].across))
-      list_.far_until[i] = kMayBeNear_m;
+// A list has each pair from both sides.
+void SelfContactFinder::forget_distances(Site site, List& list) {
+  const auto& pairs = list.pairs;
+  const auto place_of = [&](NodePair pair) {
+    return static_cast<std::size_t>(std::ranges::lower_bound(pairs, pair) - pairs.begin());
+  };
+  for (auto i = place_of({site, 0}); i < pairs.size() && pairs[i].node == site; ++i) {
+    list.far_until[i] = kMayBeNear_m;
+    list.far_until[place_of({pairs[i].across, site})] = kMayBeNear_m;
+  }
 }
 
 void SelfContactFinder::set_reference(Site site, const world::World& world, List& list) const {
