@@ -4,10 +4,13 @@
 #include "server/session/recording/merge.h"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
+#include <csignal>
 #include <filesystem>
 #include <memory>
 
+#include "common/base/bytes.h"
 #include "common/base/checksum.h"
 #include "common/base/version.h"
 #include "common/journal/session_journal.h"
@@ -275,6 +278,37 @@ TEST_F(Merge, OverwritesNothing) {
   files_ = 1;
   trocar::testing::save_file(to_, {});
   expect_refusal(dry().all(), "exists already");
+}
+
+TEST_F(Merge, AFileThatIsMadeMeanwhileStays) {
+  auto journal = journal::SessionJournal::open(dry().whole);
+  ASSERT_TRUE(journal.ok());
+  auto organ = (*journal)->organ();
+  auto copy = SessionCopy::create(to_, (*journal)->info());
+  ASSERT_TRUE(organ.ok() && copy.ok());
+  ASSERT_TRUE((*copy)->write(journal::JournalTopic::Organ, 0, 1, *organ).ok());
+  trocar::testing::save_file(to_, bytes_of(std::string_view("another")));
+  const auto finished = (*copy)->finish({"test", {}});
+  ASSERT_FALSE(finished.ok());
+  EXPECT_NE(finished.error().message.find("exists already"), std::string::npos);
+  EXPECT_EQ(fs::file_size(to_), 7u);
+}
+
+// A limit of this process stands for a disk without room.
+TEST_F(Merge, ADiskWithoutRoomIsToldOfTheOutput) {
+  const auto parts = dry().all();
+  rlimit before{};
+  ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
+  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+  const rlimit small{.rlim_cur = 100'000, .rlim_max = before.rlim_max};
+  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &small), 0);
+  const auto merged = merge(parts, to_);
+  setrlimit(RLIMIT_FSIZE, &before);
+  std::signal(SIGXFSZ, handler);
+  ASSERT_FALSE(merged.ok());
+  EXPECT_EQ(merged.error().code, ErrorCode::ResourceMissing);
+  EXPECT_TRUE(merged.error().message.starts_with(to_)) << merged.error().message;
+  EXPECT_TRUE(fs::is_empty(folder_.file("")));
 }
 
 }  // namespace
