@@ -100,7 +100,7 @@ Status SessionJournal::read_participants() {
   };
   const TickVisitor<proto::JournalGap> count = [this](Tick, const proto::JournalGap& gap) {
     info_.gap_messages += gap.messages();
-    if (gap.is_join()) info_.joins.push_back(gap.last_tick());
+    if (gap.is_join() && info_.joins.size() < kMostParts) info_.joins.push_back(gap.last_tick());
     return true;
   };
   for (const Status& read : {read_topic(JournalTopic::Participants, 0, everything, note),

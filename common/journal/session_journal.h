@@ -19,6 +19,9 @@
 
 namespace trocar::journal {
 
+// A session has as many recordings at most; one that is merged of them has as many joins.
+inline constexpr std::size_t kMostParts = 64;
+
 // Its texts are printable, whoever wrote the recording.
 struct SessionInfo {
   std::uint64_t start_utc_ns = 0;
@@ -39,9 +42,9 @@ struct SessionInfo {
   Tick last_tick = 0;                            // of the last message
   std::vector<proto::Participant> participants;  // everyone who was ever in, in order of joining
   std::uint64_t gap_messages = 0;                // that the session dropped while recording
-  std::vector<Tick> joins;                       // after these, another server has gone on
-  bool is_finished = false;                      // by its writer; not if it was repaired
-  std::string summary;                           // one line for people
+  std::vector<Tick> joins;   // after these, another server has gone on; kMostParts at most
+  bool is_finished = false;  // by its writer; not if it was repaired
+  std::string summary;       // one line for people
 
   // The tick after which this journal begins.
   Tick begin_tick() const { return continues ? continues->tick : trimmed ? trimmed->tick : 0; }

@@ -14,7 +14,7 @@ import threading
 SERVER, JOURNAL, OUT = sys.argv[1:4]
 CLIENT = os.path.join(os.path.dirname(SERVER), "trocar-client")
 RECORDING = f"{OUT}/session.mcap"
-told, was_whole = [], []
+told, was_whole, had_summary = [], [], []
 
 
 class Sidecar(http.server.BaseHTTPRequestHandler):
@@ -29,6 +29,7 @@ class Sidecar(http.server.BaseHTTPRequestHandler):
         assert self.rfile.read(int(self.headers["Content-Length"])) == b"{}"
         if self.path == "/shutdown":
             was_whole.append(subprocess.run([JOURNAL, "verify", RECORDING], capture_output=True, check=False).returncode)
+            had_summary.append(os.path.exists(f"{OUT}/summary.json"))
         told.append(self.path)
         self.answer(b"{}")
 
@@ -53,7 +54,8 @@ def main():
     environment = {**os.environ, "XDG_STATE_HOME": f"{OUT}/state", "XDG_RUNTIME_DIR": f"{OUT}/run",
                    "AGONES_SDK_HTTP_PORT": str(sidecar.server_port)}
     command = [SERVER, "--agones", "--organ", "lattice", "--listen", "127.0.0.1:0", "--insecure-loopback",
-               "--ready-file", f"{OUT}/ready", "--journal", RECORDING, "--seconds", "6"]
+               "--ready-file", f"{OUT}/ready", "--journal", RECORDING, "--seconds", "6",
+               "--summary", f"{OUT}/summary.json"]
     with subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True) as server:
         while not os.path.exists(f"{OUT}/ready") and server.poll() is None:
             pass
@@ -73,6 +75,8 @@ def main():
         fail(f"it was told {told}")
     if was_whole != [0]:
         fail(f"the recording was not whole at the end: {was_whole}")
+    if had_summary != [True]:
+        fail("the figures of the run were not written at the end")
     if "ready as trocar-1, reached at 10.0.0.7:7412" not in said:
         fail(f"the log does not say where it is reached: {said}")
     environment["AGONES_SDK_HTTP_PORT"] = "http"

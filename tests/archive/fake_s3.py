@@ -7,7 +7,7 @@ import http.server
 import threading
 import urllib.parse
 
-KEY_ID, SECRET, TOKEN, REGION = "AKIDEXAMPLE", "wJalrXUtnFEMI/K7MDENG+bPxRfiCYEXAMPLEKEY", "a/session+token==", "eu-west-7"
+KEY_ID, SECRET, TOKEN, REGION = "AKIDEXAMPLE", "wJalrXUtnFEMI/K7MDENG+bPxRfiCYEXAMPLEKEY", "a/session+token==" + "T" * 2000, "eu-west-7"
 
 
 def signature_of(handler, body):
@@ -40,6 +40,7 @@ class Storage:
         self.objects = {}      # key: (bytes, checksum)
         self.uploads = {}      # id: (key, checksum, {number: bytes})
         self.fails_after = -1  # parts, then it answers 503
+        self.brings = {}       # key: bytes that another program brings before the next object is made
         self.requests = []     # method, path and query
         self.refused = []
         storage = self
@@ -72,7 +73,7 @@ class Storage:
                 key = urllib.parse.unquote(path).removeprefix("/lessons").removeprefix("/")
                 return self.act(key, words, body)
 
-            do_GET = do_HEAD = do_PUT = do_POST = serve
+            do_GET = do_HEAD = do_PUT = do_POST = do_DELETE = serve
 
             def act(self, key, words, body):
                 checksum = self.headers.get("x-amz-meta-sha256", "")
@@ -92,6 +93,15 @@ class Storage:
                     entries = "".join(f"<Part><PartNumber>{number}</PartNumber><ETag>&quot;{hashlib.md5(part).hexdigest()}"
                                       f"&quot;</ETag><Size>{len(part)}</Size></Part>" for number, part in parts.items())
                     return self.answer(200, f"<ListPartsResult>{entries}</ListPartsResult>".encode())
+                if self.command == "DELETE":
+                    storage.uploads.pop(words["uploadId"])
+                    return self.answer(204)
+                if "partNumber" not in words and "uploads" not in words:
+                    for name, content in storage.brings.items():
+                        storage.objects[name] = (content, hashlib.sha256(content).hexdigest())
+                    storage.brings = {}
+                    if self.headers["If-None-Match"] == "*" and key in storage.objects:
+                        return self.answer(412, b"<Error><Code>PreconditionFailed</Code><Message>It is there.</Message></Error>")
                 if self.command == "PUT" and "uploadId" not in words:
                     storage.objects[key] = (body, checksum)
                     return self.answer(200, ETag='"x"')
@@ -102,7 +112,7 @@ class Storage:
                     parts[int(words["partNumber"])] = body
                     return self.answer(200, ETag=f'"{hashlib.md5(body).hexdigest()}"')
                 if "uploads" in words:
-                    name = f"id/{len(storage.uploads)}+="
+                    name = f"id/{len(storage.requests)}+="
                     storage.uploads[name] = (key, checksum, {})
                     return self.answer(200, f"<R><UploadId>{name}</UploadId></R>".encode())
                 of, checksum, parts = storage.uploads.pop(words["uploadId"])

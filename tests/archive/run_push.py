@@ -70,6 +70,34 @@ def main():
     expect("3 parts, 2 of them were there" in said, f"parts are sent twice: {said}")
     expect(not storage.uploads, "an upload is left")
 
+    # An interrupted upload of another file is given up: its checksum is not this file's.
+    other = f"{OUT}/recordings/other.mcap"
+    write_recording(other, 2 * PART + 10_000)
+    with open(other, "r+b") as file:
+        file.seek(PART + 1000)
+        file.write(b"another file")
+    storage.fails_after = 2
+    code, said = push(other, "s3://lessons", *at, "--part-mb", "5")
+    expect(code != 0 and len(storage.uploads) == 1, f"other interrupted: {code} {said}")
+    storage.fails_after = -1
+    other_bytes = write_recording(other, 2 * PART + 10_000)
+    code, said = push(other, "s3://lessons", *at, "--part-mb", "5")
+    expect(code == 0 and storage.objects.get("other.mcap") == (other_bytes, hashlib.sha256(other_bytes).hexdigest()),
+           f"another file's upload: {code} {said}")
+    expect(not storage.uploads, "the other file's upload is left")
+    os.remove(other)
+
+    # What another program brings while it is sent stays, in one part and in several.
+    for size in (1000, 2 * PART):
+        write_recording(other, size)
+        storage.objects.pop("other.mcap", None)
+        storage.brings = {"other.mcap": b"theirs"}
+        code, said = push(other, "s3://lessons", *at, "--part-mb", "5")
+        expect(code == 4 and "other content" in said and storage.objects["other.mcap"][0] == b"theirs",
+               f"brought meanwhile: {code} {said}")
+        expect(not storage.uploads, "an upload is left")
+    os.remove(other)
+
     # Something else of that name stays as it is.
     write_recording(large, 2000)
     code, said = push(large, "s3://lessons", *at)
@@ -95,6 +123,7 @@ def main():
             ((small, "lessons/x", *at), None, "is not of the form s3://", 2),
             ((small, "s3://L/x", *at), None, "a bucket has 3 to 63", 2),
             ((small, "s3://lessons", "--endpoint", "http://storage.example"), None, "without TLS", 2),
+            ((small, "s3://lessons", "--endpoint", "http://127.anything.example"), None, "without TLS", 2),
             ((small, "s3://lessons", "--endpoint", "ftp://127.0.0.1"), None, "not of the form https://", 2),
             ((small, "s3://lessons", "--endpoint", f"{storage.endpoint}/path"), None, "not of the form", 2),
             ((small, "s3://lessons", *at), {}, "AWS_ACCESS_KEY_ID: is not set", 2),

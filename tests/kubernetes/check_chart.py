@@ -5,6 +5,7 @@ manifest is checked field by field against the parts of the published schemas th
 there, or of another type, is an error, as the servers of a cluster refuse it. Exit code 77: python3-yaml is missing.
 """
 
+import json
 import os
 import re
 import subprocess
@@ -27,10 +28,11 @@ LABELS = {"*": str}
 META = {"!name": str, "labels": LABELS}
 RESOURCES = {"requests": {"cpu": str, "memory": str}, "limits": {"memory": str}}
 CONTAINER = {"!name": str, "!image": str, "args": [str], "ports": [{"name": str, "!containerPort": int, "protocol": str}],
-             "resources": RESOURCES, "volumeMounts": [{"!name": str, "!mountPath": str}],
+             "resources": RESOURCES, "volumeMounts": [{"!name": str, "!mountPath": str, "subPathExpr": str}],
+             "env": [{"!name": str, "valueFrom": {"fieldRef": {"!fieldPath": str}}}],
              "securityContext": {"allowPrivilegeEscalation": bool, "capabilities": {"drop": [str]}}}
 POD = {"!containers": [CONTAINER], "terminationGracePeriodSeconds": int, "securityContext": {"fsGroup": int},
-       "volumes": [{"!name": str, "emptyDir": {"sizeLimit": str}}]}
+       "volumes": [{"!name": str, "persistentVolumeClaim": {"!claimName": str}}]}
 HEALTH = {"disabled": bool, "initialDelaySeconds": int, "periodSeconds": int, "failureThreshold": int}
 # Source: agones.dev, "GameServer Specification" and "Fleet Specification" (agones.dev/v1).
 GAME_SERVER = {"!ports": [{"!name": str, "!portPolicy": ["Dynamic", "Static", "Passthrough"], "!containerPort": int,
@@ -39,6 +41,12 @@ GAME_SERVER = {"!ports": [{"!name": str, "!portPolicy": ["Dynamic", "Static", "P
 FLEET = {"!apiVersion": str, "!kind": str, "!metadata": META,
          "!spec": {"!replicas": int, "scheduling": ["Packed", "Distributed"],
                    "!template": {"metadata": {"labels": LABELS}, "!spec": GAME_SERVER}}}
+# Source: agones.dev, "FleetAutoscaler Specification" and "GameServerAllocation Specification".
+AUTOSCALER = {"!apiVersion": ["autoscaling.agones.dev/v1"], "!kind": ["FleetAutoscaler"], "!metadata": META,
+              "!spec": {"!fleetName": str,
+                        "!policy": {"!type": ["Buffer"], "!buffer": {"!bufferSize": int, "!maxReplicas": int}}}}
+ALLOCATION = {"!apiVersion": ["allocation.agones.dev/v1"], "!kind": ["GameServerAllocation"],
+              "!spec": {"!selectors": [{"!matchLabels": LABELS}]}}
 SERVICE = {"!apiVersion": str, "!kind": str, "!metadata": META,
            "!spec": {"clusterIP": str, "publishNotReadyAddresses": bool, "!selector": LABELS,
                      "!ports": [{"name": str, "!port": int, "targetPort": str, "protocol": str}]}}
@@ -96,6 +104,17 @@ def read(path):
         return file.read()
 
 
+def check_notes(notes):
+    """People paste its lines: each command has to be whole in one, and what it creates has to be taken."""
+    created = re.findall(r"^ *echo '(.*)' \| kubectl create -f -$", notes, re.MULTILINE)
+    if len(created) != 1 or "<<" in notes:
+        return fault("NOTES.txt: has no command of one line that takes a session")
+    allocation = json.loads(created[0])
+    check(allocation, ALLOCATION, "NOTES.txt")
+    if allocation["spec"]["selectors"] != [{"matchLabels": {"agones.dev/fleet": NAME}}]:
+        fault("NOTES.txt: takes no session of this fleet")
+
+
 def main():
     chart, values = yaml.safe_load(read(f"{CHART}/Chart.yaml")), yaml.safe_load(read(f"{CHART}/values.yaml"))
     check(chart, {"!apiVersion": ["v2"], "!name": str, "description": str, "type": ["application", "library"],
@@ -105,8 +124,10 @@ def main():
     for value in values:
         if not any(f".Values.{value} " in read(f"{CHART}/templates/{name}") for name in filled):
             fault(f"values.yaml: {value}: no template has it")
-    fleet, service = (yaml.safe_load(filled[name]) for name in ("fleet.yaml", "service.yaml"))
+    fleet, service, scaler = (yaml.safe_load(filled[name]) for name in ("fleet.yaml", "service.yaml", "autoscaler.yaml"))
     check(fleet, FLEET, "fleet")
+    check(scaler, AUTOSCALER, "autoscaler")
+    check_notes(filled["NOTES.txt"])
     check(service, SERVICE, "service")
     if faults:
         return
@@ -134,9 +155,19 @@ def main():
     health = game_server["health"]
     if health["periodSeconds"] < 2 * 2:
         fault("fleet: the server says every 2 s that it is well, which is too seldom for that period")
-    mounted = container["volumeMounts"][0]["mountPath"]
-    if f"WORKDIR {mounted}" not in image:
-        fault(f"fleet: the image does not record in {mounted}")
+    mount, volume = container["volumeMounts"][0], game_server["template"]["spec"]["volumes"][0]
+    if f"WORKDIR {mount['mountPath']}" not in image:
+        fault(f"fleet: the image does not record in {mount['mountPath']}")
+    # Recordings outlive the pod, each session's in a folder of its own.
+    if mount["name"] != volume["name"] or "persistentVolumeClaim" not in volume:
+        fault("fleet: recordings are lost with their pod")
+    variables = {entry["name"]: entry["valueFrom"]["fieldRef"]["fieldPath"] for entry in container["env"]}
+    if [variables.get(name) for name in re.findall(r"\$\((.*?)\)", mount["subPathExpr"])] != ["metadata.name"]:
+        fault("fleet: sessions share one folder of recordings")
+    if scaler["spec"]["fleetName"] != fleet["metadata"]["name"]:
+        fault("autoscaler: it is of another fleet")
+    if scaler["spec"]["policy"]["buffer"]["maxReplicas"] < scaler["spec"]["policy"]["buffer"]["bufferSize"]:
+        fault("autoscaler: keeps more ready than there may be")
 
 
 main()

@@ -4,14 +4,20 @@
 #include "server/session/recording/merge.h"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
+#include <csignal>
 #include <filesystem>
 #include <memory>
 
+#include "common/base/bytes.h"
 #include "common/base/checksum.h"
+#include "common/base/version.h"
 #include "common/journal/session_journal.h"
+#include "common/journal/session_journal_writer.h"
 #include "proto/journal.pb.h"
 #include "proto/wire.pb.h"
+#include "server/session/recording/session_copy.h"
 #include "server/session/recording/session_parts.h"
 #include "server/session/recording/verify.h"
 #include "tests/recording/continued_session.h"
@@ -205,10 +211,104 @@ TEST_F(Merge, RefusesPartsThatDoNotContinueEachOther) {
                  "was recorded by another release");
 }
 
+// A part that was not written by a server: its messages come before the place where it goes on.
+TEST_F(Merge, RefusesTicksThatGoBack) {
+  const auto first = folder_.file("session.mcap"), second = folder_.file("session-2.mcap");
+  fs::copy(dry().first, first);
+  auto journal = journal::SessionJournal::open(first);
+  ASSERT_TRUE(journal.ok());
+  const auto& info = (*journal)->info();
+  const Tick join = info.last_tick;
+  files_ = 2;
+  for (const bool is_tool : {false, true}) {
+    fs::remove(second);
+    auto writer = journal::SessionJournalWriter::create(
+        second, {.start_utc_ns = info.start_utc_ns,
+                 .sim_version = info.sim_version,
+                 .organ_name = info.organ_name,
+                 .organ_hash = info.organ_hash,
+                 .reduction = info.reduction,
+                 .has_external_loads = false,
+                 .starts_from_snapshot = false,
+                 .has_implicit_strain = false,
+                 .continues = journal::Continuation{"session.mcap", join},
+                 .trimmed = {}});
+    ASSERT_TRUE(writer.ok()) << writer.error().message;
+    const auto written =
+        is_tool ? (*writer)->write_tool({0}, join - 50, 1, proto::ToolState())
+                : (*writer)->write(journal::JournalTopic::Claims, join - 50, 1, proto::ClaimLog());
+    ASSERT_TRUE(written.ok() && (*writer)->close().ok());
+    expect_refusal({first, second}, is_tool ? "/tool/0: a message at tick" : "a message at tick");
+  }
+}
+
+TEST_F(Merge, JoinsThatNoMergeWritesAreToldAndBounded) {
+  auto journal = journal::SessionJournal::open(dry().whole);
+  auto reader = journal::McapReader::open(dry().whole);
+  ASSERT_TRUE(journal.ok() && reader.ok());
+  const auto& info = (*journal)->info();
+  auto copy = SessionCopy::create(to_, info);
+  ASSERT_TRUE(copy.ok());
+  const journal::JournalTimes times{info.start_utc_ns};
+  Status written;
+  (*reader)->read({}, {}, [&](const journal::McapMessage& message) {
+    written = (*copy)->write((*reader)->channels().at(message.channel_id).topic,
+                             times.tick(message.log_time), message.publish_time, message.data);
+    return written.ok();
+  });
+  ASSERT_TRUE(written.ok()) << written.error().message;
+  proto::JournalGap mark;
+  mark.set_first_tick(info.last_tick + 1);
+  mark.set_last_tick(info.last_tick);
+  mark.set_is_join(true);
+  for (std::size_t i = 0; i < 2 * journal::kMostParts; ++i)
+    ASSERT_TRUE((*copy)->write(journal::JournalTopic::Gap, info.last_tick, 1, mark).ok());
+  ASSERT_TRUE((*copy)->finish({"test", {}}).ok());
+  const auto report = verify_journal(to_);
+  ASSERT_TRUE(report.ok());
+  EXPECT_EQ(report->verdict(), Verdict::NotVerified) << report->why();
+  EXPECT_NE(report->why().find("is there twice"), std::string::npos) << report->why();
+  EXPECT_EQ(report->joins.size(), 1u);
+  auto again = journal::SessionJournal::open(to_);
+  ASSERT_TRUE(again.ok());
+  EXPECT_EQ((*again)->info().joins.size(), journal::kMostParts);
+}
+
 TEST_F(Merge, OverwritesNothing) {
   files_ = 1;
   trocar::testing::save_file(to_, {});
   expect_refusal(dry().all(), "exists already");
+}
+
+TEST_F(Merge, AFileThatIsMadeMeanwhileStays) {
+  auto journal = journal::SessionJournal::open(dry().whole);
+  ASSERT_TRUE(journal.ok());
+  auto organ = (*journal)->organ();
+  auto copy = SessionCopy::create(to_, (*journal)->info());
+  ASSERT_TRUE(organ.ok() && copy.ok());
+  ASSERT_TRUE((*copy)->write(journal::JournalTopic::Organ, 0, 1, *organ).ok());
+  trocar::testing::save_file(to_, bytes_of(std::string_view("another")));
+  const auto finished = (*copy)->finish({"test", {}});
+  ASSERT_FALSE(finished.ok());
+  EXPECT_NE(finished.error().message.find("exists already"), std::string::npos);
+  EXPECT_EQ(fs::file_size(to_), 7u);
+}
+
+// A limit of this process stands for a disk without room.
+TEST_F(Merge, ADiskWithoutRoomIsToldOfTheOutput) {
+  const auto parts = dry().all();
+  rlimit before{};
+  ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
+  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+  const rlimit small{.rlim_cur = 100'000, .rlim_max = before.rlim_max};
+  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &small), 0);
+  const auto merged = merge(parts, to_);
+  setrlimit(RLIMIT_FSIZE, &before);
+  std::signal(SIGXFSZ, handler);
+  ASSERT_FALSE(merged.ok());
+  EXPECT_EQ(merged.error().code, ErrorCode::ResourceMissing);
+  EXPECT_TRUE(merged.error().message.starts_with(to_)) << merged.error().message;
+  EXPECT_TRUE(fs::is_empty(folder_.file("")));
 }
 
 }  // namespace

@@ -109,6 +109,7 @@ class Server {
   void wait_for(std::function<bool()> is_done, milliseconds deadline, std::function<void()> then);
   void say_goodbye();
   Status finish();
+  Status write_end();
 
   const ServerOptions& options_;
   const std::unique_ptr<Admission> admission_;
@@ -497,12 +498,18 @@ void Server::wait_for(std::function<bool()> is_done, milliseconds deadline,
 }
 
 Status Server::finish() {
-  Status closed;
-  if (journal_) closed = journal_->close();
+  const Status written = write_end();
   // The cluster may take the machine away from here on.
   if (std::exchange(sidecar_, nullptr))
     if (const auto told = agones::shut_down(sidecar_port_); !told)
       log::warn("{}", told.error().message);
+  return written;
+}
+
+// Closes the recording, and writes the figures of the run.
+Status Server::write_end() {
+  Status closed;
+  if (journal_) closed = journal_->close();
   const auto& report = loop_->report();
   std::size_t equal = 0;
   for (const auto& result : barrier_) equal += result.is_equal;

@@ -6,6 +6,7 @@
 #include <boost/asio/steady_timer.hpp>
 #include <charconv>
 #include <cstring>
+#include <set>
 #include <utility>
 
 #include "common/base/json.h"
@@ -76,7 +77,7 @@ struct Sidecar::Core {
   const std::function<std::string()> ill, not_ready;
   asio::steady_timer ready_timer, health_timer;
   bool is_stopping = false, is_ready = false, has_people = false, is_allocated = false;
-  bool is_trouble_said = false;
+  std::set<std::string> troubled;  // paths whose trouble is said
 
   Core(asio::io_context& io, std::uint16_t at, std::function<std::string()> is_ill,
        std::function<std::string()> is_not_ready)
@@ -87,12 +88,12 @@ struct Sidecar::Core {
         ready_timer(io),
         health_timer(io) {}
 
-  // Only the first of several is said, until one is taken again.
+  // Only the first trouble of a path is said, until that path is taken again.
   bool note(const char* path, const Status& status) {
-    if (!status && !std::exchange(is_trouble_said, true))
+    if (!status && troubled.insert(path).second)
       log::warn("Agones: {} at port {} was not taken ({}), it is said again", path, port,
                 status.error().message);
-    if (status) is_trouble_said = false;
+    if (status) troubled.erase(path);
     return status.ok();
   }
 

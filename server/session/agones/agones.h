@@ -7,9 +7,10 @@
 //   POST /health     every kHealthPeriod, while nothing is wrong
 //   POST /allocate   when the first person joins, so that nobody's session is scaled away
 //   GET  /gameserver once ready: name, and the address at which others reach it
-//   POST /shutdown   when the recording is closed
+//   POST /shutdown   when everything is written
 //
-// The sidecar may start after this program: what it did not take is said again after a second.
+// The sidecar may start after this program: what it did not take is said again, /ready after
+// kRetry, /health and /allocate after kHealthPeriod.
 // One thread: the one that runs the I/O context.
 
 #include "common/base/asio.h"  // before Boost: see there

@@ -19,7 +19,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr long kOk = 200, kNotFound = 404;
+constexpr long kOk = 200, kNoContent = 204, kNotFound = 404, kThereAlready = 412;
+// The storage takes nothing in place of what another program has brought meanwhile.
+const Fields::value_type kOnlyNew{"if-none-match", "*"};
 
 class Hash {
  public:
@@ -146,28 +148,50 @@ class Push {
   Status send_whole() {
     const auto bytes = file_.read(0);
     if (!bytes) return bytes.error();
-    const auto answer = ask({.method = "PUT",
-                             .key = key_,
-                             .headers = {{kChecksumHeader, file_.sha256()}},
-                             .body = *bytes});
-    if (!answer) return answer.error();
-    ++report_.parts_sent;
+    const Request request{.method = "PUT",
+                          .key = key_,
+                          .headers = {kOnlyNew, {kChecksumHeader, file_.sha256()}},
+                          .body = *bytes};
+    const auto taken = store(request);
+    if (!taken) return taken.error();
+    report_.parts_sent += *taken;
     return {};
+  }
+
+  // Asks for what makes an object. False: another program made one of that name meanwhile.
+  Result<bool> store(const Request& request) {
+    const auto answer = client_.ask(request);
+    if (!answer) return answer.error();
+    if (answer->status == kThereAlready) {
+      report_.was_there = true;  // with what content, the last question says
+      return false;
+    }
+    // The storage may find that something is wrong when it has answered already.
+    if (answer->status != kOk || answer->body.find("<Error>") != std::string::npos)
+      return client_.refusal(request, *answer);
+    return true;
   }
 
   Status send_parts() {
     auto upload = unfinished_upload();
     if (!upload) return upload.error();
     std::map<std::size_t, std::string> there;  // tags of parts, by number from 0
-    if (upload->empty()) {
-      if (upload = begin_upload(); !upload) return upload.error();
-    } else if (auto listed = list_parts(*upload, there); !listed) {
-      return listed;
+    if (!upload->empty()) {
+      const auto is_ours = list_parts(*upload, there);
+      if (!is_ours) return is_ours.error();
+      if (!*is_ours) {
+        // It is of another file, and would get the checksum of that.
+        if (auto dropped = drop_upload(*upload); !dropped) return dropped;
+        there.clear();
+        upload->clear();
+      }
     }
+    if (upload->empty())
+      if (upload = begin_upload(); !upload) return upload.error();
     std::string parts;
     for (std::size_t part = 0; part < file_.count(); ++part) {
       auto& tag = there[part];
-      if (tag == '"' + file_.md5(part) + '"') {
+      if (!tag.empty()) {
         ++report_.parts_there;
       } else if (auto sent = send_part(*upload, part, tag); !sent) {
         return sent;
@@ -182,12 +206,21 @@ class Push {
     const Request last{.method = "POST",
                        .key = key_,
                        .query = {{"uploadId", *upload}},
+                       .headers = {kOnlyNew},
                        .body = bytes_of(std::string_view(body))};
-    const auto done = ask(last);
-    if (!done) return done.error();
-    // The storage may find that something is wrong when it has answered already.
-    return done->body.find("<Error>") == std::string::npos ? Status()
-                                                           : client_.refusal(last, *done);
+    const auto taken = store(last);
+    if (!taken) return taken.error();
+    return *taken ? Status() : drop_upload(*upload);
+  }
+
+  // One that is no longer there is no error.
+  Status drop_upload(const std::string& upload) {
+    const Request request{.method = "DELETE", .key = key_, .query = {{"uploadId", upload}}};
+    const auto answer = client_.ask(request);
+    if (!answer) return answer.error();
+    if (answer->status == kOk || answer->status == kNoContent || answer->status == kNotFound)
+      return {};
+    return client_.refusal(request, *answer);
   }
 
   // The newest that was begun for this object; empty if there is none.
@@ -219,21 +252,26 @@ class Push {
     return id;
   }
 
-  Status list_parts(const std::string& upload, std::map<std::size_t, std::string>& there) {
+  // Fills in the tags of the parts that are there. False: there are none, or one is not of this
+  // file.
+  Result<bool> list_parts(const std::string& upload, std::map<std::size_t, std::string>& there) {
     const auto answer = ask({.key = key_, .query = {{"uploadId", upload}}});
     if (!answer) return answer.error();
     std::size_t from = 0;
     for (;;) {
       const auto entry = element_text(answer->body, "Part", from);
-      if (entry.empty()) return {};
+      if (entry.empty()) return !there.empty();
       const auto text = [&entry](const char* name) {
         std::size_t at = 0;
         return element_text(entry, name, at);
       };
-      for (std::size_t part = 0; part < file_.count(); ++part)
-        if (text("PartNumber") == std::to_string(part + 1) &&
-            text("Size") == std::to_string(file_.size_of(part)))
-          there[part] = text("ETag");
+      const auto number = text("PartNumber");
+      std::size_t part = 0;
+      while (part < file_.count() && number != std::to_string(part + 1)) ++part;
+      if (part == file_.count() || text("Size") != std::to_string(file_.size_of(part)) ||
+          text("ETag") != '"' + file_.md5(part) + '"')
+        return false;
+      there[part] = text("ETag");
     }
   }
 

@@ -11,6 +11,7 @@
 
 #include "common/base/printable.h"
 #include "common/secure/digest.h"
+#include "common/secure/loopback.h"
 
 namespace trocar::archive {
 namespace {
@@ -18,8 +19,10 @@ namespace {
 constexpr long kConnectSeconds = 10, kStillSeconds = 60;
 constexpr std::size_t kMostReason = 200;
 
-bool is_loopback(std::string_view host) {
-  return host == "localhost" || host == "[::1]" || host.starts_with("127.");
+// host: a name or an address, one of version 6 in brackets.
+bool is_this_machine(std::string host) {
+  if (host.starts_with('[') && host.ends_with(']')) host = host.substr(1, host.size() - 2);
+  return host == "localhost" || secure::is_loopback(host);
 }
 
 // Encodes as signatures want it: everything but letters, digits and -._~ in hexadecimal.
@@ -89,7 +92,7 @@ Result<Credentials> credentials_of_environment() {
     if (text->empty())
       return Error{ErrorCode::Usage, fmt::format("{}: is not set: storage wants a key", name)};
   for (const auto* text : {&credentials.key_id, &credentials.secret, &credentials.session_token})
-    if (printable(*text) != *text)
+    if (!is_printable(*text))
       return Error{ErrorCode::Usage, "AWS_...: the keys in the environment are no plain text"};
   return credentials;
 }
@@ -124,7 +127,7 @@ Result<Place> read_place(const std::string& url, const std::string& endpoint, bo
                  endpoint + ": is not of the form https://host or https://host:port"};
   const auto host = host_port.starts_with('[') ? host_port.substr(0, host_port.find(']') + 1)
                                                : host_port.substr(0, host_port.find(':'));
-  if (is_plain && !allows_plain && !is_loopback(host))
+  if (is_plain && !allows_plain && !is_this_machine(host))
     return Error{ErrorCode::Usage, endpoint +
                                        ": is another machine without TLS, where recordings can be "
                                        "read on their way: use https://, or give --plain-http"};

@@ -44,7 +44,7 @@ struct Request {
   const char* method = "GET";  // GET, HEAD, PUT, POST or DELETE
   std::string key;             // of the object; empty: the bucket itself
   Fields query;                // in order of their names
-  Fields headers;              // beginning with x-amz-, lower case
+  Fields headers;              // lower case
   BytesView body;
 };
 

@@ -19,7 +19,7 @@ struct HttpQuestion {
   std::string method, path;          // GET, POST or DELETE
   std::string body;                  // JSON
   std::string key;                   // as a bearer's token; empty: none
-  std::chrono::seconds deadline{5};  // for all of it
+  std::chrono::seconds deadline{5};  // for all of it, after the host's name is looked up
 };
 
 struct HttpAnswer {
@@ -30,9 +30,10 @@ struct HttpAnswer {
 inline constexpr std::size_t kMostAnswerBytes = 1u << 20;
 
 // Runs on the coroutine's executor. ErrorCode::ResourceMissing with the reason if nothing answers
-// in time, or what answers speaks no HTTP, or says more than kMostAnswerBytes.
+// in time, or what answers speaks no HTTP, or says more than kMostAnswerBytes. The deadline does
+// not hold for the name: its servers have their own. An address needs none.
 asio::awaitable<Result<HttpAnswer>> ask(HttpQuestion question);
-// The same for who has no I/O thread: returns when there is the answer.
+// The same for who has no I/O thread: returns when there is the answer, or the error.
 Result<HttpAnswer> ask_and_wait(HttpQuestion question);
 
 }  // namespace trocar::monitoring

@@ -138,6 +138,8 @@ class Merger {
           publish_time_ns_ = message.publish_time;
           return written.ok();
         });
+    // Others are of the file that is written.
+    if (!written && written.error().code != ErrorCode::BadFile) return written;
     if (!written) return refused_part(part.path, written.error().message);
     if (read.damaged_chunks > 0) return refused_part(part.path, read.first_damage.message);
     if (!is_last && state_tick != until) ++report_.torn_frames;

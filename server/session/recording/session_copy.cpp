@@ -1,9 +1,15 @@
 #include "server/session/recording/session_copy.h"
 
+#include <fcntl.h>
+#include <fmt/format.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <charconv>
+#include <cstdio>
+#include <cstring>
 #include <filesystem>
+#include <limits>
 #include <utility>
 
 #include "common/journal/mcap_repair.h"
@@ -21,6 +27,21 @@ constexpr std::string_view kToolTopic = "/tool/";
 
 Error exists(const std::string& path) {
   return {ErrorCode::Usage, path + ": exists already, no recording is overwritten"};
+}
+
+// Gives the file its name; a file of that name stays as it is.
+Status rename_to_new(const std::string& from, const std::string& to) {
+  if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return {};
+  int failed = errno;
+  // A file system that cannot do that in one step takes two.
+  if (failed == EINVAL || failed == ENOSYS) {
+    std::error_code ignored;
+    if (fs::exists(to, ignored)) return exists(to);
+    if (::rename(from.c_str(), to.c_str()) == 0) return {};
+    failed = errno;
+  }
+  if (failed == EEXIST) return exists(to);
+  return Error{ErrorCode::ResourceMissing, to + ": " + std::strerror(failed)};
 }
 
 // "1.20" of a file.
@@ -55,18 +76,20 @@ Result<std::unique_ptr<SessionCopy>> SessionCopy::create(const std::string& to,
   const auto temporary = to + ".part-" + std::to_string(::getpid());
   auto writer = journal::SessionJournalWriter::create(temporary, description);
   if (!writer) return writer.error();
-  return std::unique_ptr<SessionCopy>(
-      new SessionCopy(to, temporary, std::move(*writer), session.begin_tick()));
+  return std::unique_ptr<SessionCopy>(new SessionCopy(to, temporary, std::move(*writer),
+                                                      session.start_utc_ns, session.begin_tick()));
 }
 
 SessionCopy::SessionCopy(std::string to, std::string temporary,
-                         std::unique_ptr<journal::SessionJournalWriter> writer, Tick begin)
+                         std::unique_ptr<journal::SessionJournalWriter> writer,
+                         std::uint64_t start_utc_ns, Tick begin)
     : to_(std::move(to)),
       temporary_(std::move(temporary)),
       writer_(std::move(writer)),
       overview_(begin),
       begin_(begin),
-      last_tick_(begin) {}
+      last_tick_(begin),
+      most_ticks_((std::numeric_limits<std::uint64_t>::max() - start_utc_ns) / kTickNanoseconds) {}
 
 SessionCopy::~SessionCopy() {
   writer_.reset();
@@ -90,6 +113,12 @@ Status SessionCopy::copy_metadata(const journal::McapReader& reader, bool keeps_
 
 Status SessionCopy::write(std::string_view topic, Tick tick, std::uint64_t publish_time_ns,
                           BytesView bytes) {
+  if (topic == journal::topic_name(JournalTopic::Overview)) return {};
+  if (tick < written_tick_ || tick > most_ticks_)
+    return Error{ErrorCode::BadFile,
+                 fmt::format("{}: a message at tick {}, from {} to {} are possible there", topic,
+                             tick, written_tick_, most_ticks_)};
+  written_tick_ = tick;
   last_publish_time_ns_ = publish_time_ns;
   if (topic.starts_with(kToolTopic)) {
     proto::ToolState state;
@@ -106,7 +135,6 @@ Status SessionCopy::write(std::string_view topic, Tick tick, std::uint64_t publi
     return Error{ErrorCode::BadFile, std::string(topic) +
                                          ": this release does not know that channel, use the one "
                                          "that recorded it"};
-  if (*known == JournalTopic::Overview) return {};
   ++messages_;
   // The organ is written at tick 0, wherever the recording begins.
   if (*known != JournalTopic::Organ) last_tick_ = tick;
@@ -125,7 +153,7 @@ Status SessionCopy::write(JournalTopic topic, Tick tick, std::uint64_t publish_t
 Status SessionCopy::write_overview(const std::optional<proto::Overview>& overview,
                                    std::uint64_t publish_time_ns) {
   if (!overview) return {};
-  return writer_->write_overview(last_tick_, publish_time_ns, *overview);
+  return writer_->write_overview(written_tick_, publish_time_ns, *overview);
 }
 
 Status SessionCopy::finish(const journal::McapMetadata& note) {
@@ -138,10 +166,7 @@ Status SessionCopy::finish(const journal::McapMetadata& note) {
           read_back(temporary_, {.messages = messages_, .begin = begin_, .end = last_tick_});
       !read)
     return read;
-  std::error_code failed;
-  if (fs::exists(to_, failed)) return exists(to_);
-  fs::rename(temporary_, to_, failed);
-  if (failed) return Error{ErrorCode::ResourceMissing, to_ + ": " + failed.message()};
+  if (auto named = rename_to_new(temporary_, to_); !named) return named;
   temporary_.clear();
   return {};
 }

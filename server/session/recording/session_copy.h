@@ -33,8 +33,8 @@ class SessionCopy {
   // Copies what a recording says besides its session, once. keeps_repair: also that it was
   // repaired.
   Status copy_metadata(const journal::McapReader& reader, bool keeps_repair);
-  // Ticks must not decrease. Overviews are left out: they are made anew. Error: this program does
-  // not know the topic, or the message is none of it.
+  // Overviews are left out: they are made anew. Error: the tick is before that of the message
+  // before, this program does not know the topic, or the message is none of it.
   Status write(std::string_view topic, Tick tick, std::uint64_t publish_time_ns, BytesView bytes);
   Status write(journal::JournalTopic topic, Tick tick, std::uint64_t publish_time_ns,
                const google::protobuf::Message& message);
@@ -46,7 +46,8 @@ class SessionCopy {
 
  private:
   SessionCopy(std::string to, std::string temporary,
-              std::unique_ptr<journal::SessionJournalWriter> writer, Tick begin);
+              std::unique_ptr<journal::SessionJournalWriter> writer, std::uint64_t start_utc_ns,
+              Tick begin);
   Status write_overview(const std::optional<proto::Overview>& overview,
                         std::uint64_t publish_time_ns);
 
@@ -56,6 +57,8 @@ class SessionCopy {
   std::set<std::pair<std::string, journal::StringMap>> noted_;
   Bytes scratch_;
   Tick begin_ = 0, last_tick_ = 0;
+  Tick written_tick_ = 0;      // of the last message, whatever its topic
+  const Tick most_ticks_ = 0;  // whose times a recording can hold
   std::uint64_t messages_ = 0, last_publish_time_ns_ = 0;
 };
 

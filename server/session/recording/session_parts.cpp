@@ -32,8 +32,8 @@ Result<SessionParts> open_session_parts(const std::string& path) {
       session.missing =
           "it goes on with " + name.string() + ", " + why + ": what came before is not here";
     };
-    if (session.parts.size() == kMostParts) {
-      lacks("and is the " + std::to_string(kMostParts) + "th part");
+    if (session.parts.size() == journal::kMostParts) {
+      lacks("and is the " + std::to_string(journal::kMostParts) + "th part");
       break;
     }
     auto before = journal::SessionJournal::open((folder / name).string());

@@ -14,8 +14,6 @@
 
 namespace trocar::recording {
 
-inline constexpr std::size_t kMostParts = 64;
-
 struct SessionPart {
   std::string path;
   std::unique_ptr<journal::SessionJournal> journal;

@@ -274,6 +274,8 @@ Result<TrimReport> trim(const std::string& from_path, const std::string& to_path
   Status written;
   if (!cut->is_at_start) written = trimmer.begin(session ? &*session : nullptr);
   if (written) written = trimmer.copy_rest();
+  // Other errors are of the file that is written.
+  if (!written && written.error().code != ErrorCode::BadFile) return written.error();
   if (!written) return refused_trim(from_path, written.error().message);
   report.messages = (*copy)->messages();
   const journal::McapMetadata note{kTrimmedMetadataName,

@@ -395,6 +395,11 @@ void Verifier::check_join(Tick tick) {
   if (tick + 1 < next_tick_ || tick > report_.last_tick)
     return add_reason(
         fmt::format("a join after tick {} comes after tick {}", tick, next_tick_ - 1));
+  if (!report_.joins.empty() && report_.joins.back() == tick)
+    return add_reason(fmt::format("a join after tick {} is there twice", tick));
+  if (report_.joins.size() == journal::kMostParts)
+    return add_reason(fmt::format("a join after tick {} is one more than the {} that a session has",
+                                  tick, journal::kMostParts));
   note_missing(tick + 1);
   next_tick_ = tick + 1;
   report_.joins.push_back(tick);
