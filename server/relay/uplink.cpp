@@ -25,14 +25,6 @@ std::uint64_t ns_of(std::chrono::milliseconds time) {
   return static_cast<std::uint64_t>(time.count()) * 1'000'000;
 }
 
-wire::SharedBytes framed(const Bytes& body) {
-  Bytes bytes(wire::kHeaderBytes + body.size());
-  for (std::size_t i = 0; i < wire::kHeaderBytes; ++i)
-    bytes[i] = static_cast<std::uint8_t>(body.size() >> (8 * i));
-  std::copy(body.begin(), body.end(), bytes.begin() + wire::kHeaderBytes);
-  return std::make_shared<const Bytes>(std::move(bytes));
-}
-
 }  // namespace
 
 Uplink::Uplink(asio::any_io_executor executor, UplinkOptions options, UplinkEvents events)
@@ -228,7 +220,7 @@ bool Uplink::take(const Bytes& body) {
   }
   const auto hand_on = events_.message;  // a copy: it may stop this
   if (!is_welcome_ || !hand_on) return true;
-  const auto taken = hand_on(message, framed(body));
+  const auto taken = hand_on(message, wire::frame_body(body));
   if (!taken) why_ = printable(taken.error().message, 200);
   return taken.ok();
 }
