@@ -141,6 +141,7 @@ void Uplink::say_hello() {
   hello.set_join_secret(options_.code.secret.data(), options_.code.secret.size());
   hello.set_acks_every_frame(true);
   hello.set_can_return(true);
+  hello.set_relays(true);
   hello.set_return_token(token_);
   say(envelope);
 }
@@ -231,8 +232,6 @@ void Uplink::take_welcome(const proto::Welcome& welcome) {
   const bool has_token = welcome.return_token().size() == participants::kReturnTokenBytes;
   token_ = has_token ? welcome.return_token() : std::string();
   next_ping_.cancel();
-  for (const auto& address : welcome.further_address())
-    bridge_.note_further(options_.server.name, address);
   if (const auto hand_on = events_.welcome) hand_on(welcome);
 }
 
