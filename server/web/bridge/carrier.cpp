@@ -99,7 +99,7 @@ asio::awaitable<bool> Carrier::say(std::uint32_t number, BytesView envelope, boo
 
 void Carrier::note_further(const proto::Welcome& welcome) {
   for (const auto& address : welcome.further_address())
-    bridge_.note_further(session_.name, address);
+    bridge_.note_further(session_.name, link_.code(), address);
 }
 
 void Carrier::queue(const proto::Envelope& message) {
