@@ -205,7 +205,9 @@ void NetSource::Session::break_connection(std::string why) {
   datagrams_.reset();
   why_not_ = "it closed the connection before it answered";
   if (may_come_back()) {
-    if (!comeback_.is_away())
+    if (comeback_.is_away())  // no Welcome came: another address may have one
+      place_ = (place_ + 1) % places_.size();
+    else
       log::warn("the connection to {} broke ({}): trying again", server_name(), why_broken_);
     comeback_.begin(monotonic_ns());
   }
@@ -384,14 +386,14 @@ bool NetSource::Session::accept_server() {
   const bool is_right =
       options_.trusts_ca ||
       secure::code_of_certificate(stream_->peer_certificate_der()) == code_->certificate;
-  if (!is_right) {
+  if (!is_right && place_ > 0)
+    why_not_ = places_[place_].host + " shows another certificate";
+  else if (!is_right)
     end(replica::CloseKind::Refused,
         server_name() +
             " is not the server of this join code, its certificate is another: nothing was sent; "
             "check the code's first eight characters and the address");
-    return false;
-  }
-  return true;
+  return is_right;
 }
 
 asio::awaitable<bool> NetSource::Session::read_exactly(std::uint8_t* to, std::size_t count) {
@@ -507,9 +509,12 @@ bool NetSource::Session::try_push(Arrival arrival) {
 }
 
 void NetSource::Session::end_if_final(const proto::Envelope& message) {
-  const bool has_timed_out =
-      message.has_goodbye() && message.goodbye().reason() == proto::GOODBYE_TIMEOUT;
-  if (has_timed_out && may_come_back())
+  const bool has_timed_out = message.goodbye().reason() == proto::GOODBYE_TIMEOUT;
+  // Another address that says no does not end the session at the server's own.
+  const bool is_elsewhere = place_ > 0 && comeback_.is_away();
+  if (is_elsewhere && message.has_goodbye())
+    log::warn("{} says no: {}", places_[place_].host, message.goodbye().text());
+  if (message.has_goodbye() && (has_timed_out || is_elsewhere) && may_come_back())
     return break_connection("the server has heard nothing for too long");
   if (message.has_goodbye()) {
     const bool is_over = message.goodbye().reason() == proto::GOODBYE_SERVER_CLOSING;

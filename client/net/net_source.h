@@ -13,8 +13,9 @@
 //   datagram path (datagram_path.h): slices of frames in, samples and acknowledgements out
 //
 // A connection that breaks, or is silent for 3 s, is made again: the source is Away meanwhile. It
-// tries for as long as the server keeps the place, and comes back with the token of Welcome, here or
-// at another address that Welcome has named; the server's certificate must be the same as before. Then Welcome, topology and keyframe come anew.
+// tries for as long as the server keeps the place, and comes back with the token of Welcome, here
+// or at another address that Welcome has named, with the same certificate. One of those that says
+// no is left out, and the next is tried. Then Welcome, topology and keyframe come anew.
 //
 // Inbound queue full, by messages or by bytes: nothing is read until there is room, so TCP holds
 // the server back and the server skips frames for us; nothing is dropped and nothing grows.

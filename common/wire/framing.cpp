@@ -15,6 +15,15 @@ SharedBytes encode_envelope(const proto::Envelope& envelope) {
   return std::make_shared<const Bytes>(std::move(frame));
 }
 
+SharedBytes frame_body(BytesView body) {
+  TROCAR_ASSERT(!body.empty() && body.size() <= kMaxDownstreamBytes);
+  Bytes frame(kHeaderBytes + body.size());
+  const auto length = static_cast<std::uint32_t>(body.size());
+  std::memcpy(frame.data(), &length, sizeof length);
+  std::memcpy(frame.data() + kHeaderBytes, body.data(), body.size());
+  return std::make_shared<const Bytes>(std::move(frame));
+}
+
 Result<std::uint32_t> decode_length(std::span<const std::uint8_t, kHeaderBytes> header,
                                     std::uint32_t limit) {
   std::uint32_t length = 0;

@@ -24,6 +24,10 @@ using SharedBytes = std::shared_ptr<const Bytes>;  // one immutable buffer may g
 // Returns header and encoding in one buffer.
 SharedBytes encode_envelope(const proto::Envelope& envelope);
 
+// Returns header and body in one buffer. `body`: an encoded Envelope, as decode_envelope() takes
+// it.
+SharedBytes frame_body(BytesView body);
+
 // Reads the length from a header; it is an error if it is zero or over `limit`.
 Result<std::uint32_t> decode_length(std::span<const std::uint8_t, kHeaderBytes> header,
                                     std::uint32_t limit);

@@ -48,7 +48,7 @@ void Crowd::begin(const proto::Welcome& welcome) {
   copy_ = std::make_unique<bridge::SessionCopy>();
   barrier_frame_.reset();
   is_new_ = true;
-  reported_ = 0;
+  if (reported_ != 0) reported_.reset();
   if (is_other) restart();
 }
 
@@ -187,9 +187,9 @@ void Crowd::report_number() {
   if (is_new_ || watchers_here_ == reported_ || now - reported_ns_ < kReportIntervalNs) return;
   reported_ = watchers_here_;
   reported_ns_ = now;
-  log::info("{} watchers here", reported_);
+  log::info("{} watchers here", watchers_here_);
   proto::Envelope envelope;
-  envelope.mutable_relay_report()->set_watchers(static_cast<std::uint32_t>(reported_));
+  envelope.mutable_relay_report()->set_watchers(static_cast<std::uint32_t>(watchers_here_));
   options_.say_up(envelope);
 }
 

@@ -139,7 +139,7 @@ class Crowd final : public net::ConnectionHandler {
   access::TryLimiter limiter_;
   std::map<net::ConnectionId, std::unique_ptr<Watcher>> watchers_;
   std::size_t watchers_here_ = 0;
-  std::size_t reported_ = 0;
+  std::optional<std::size_t> reported_ = 0;  // empty: the server has an earlier number
   std::uint64_t reported_ns_ = 0;
   bool is_new_ = false;  // no frame has come since the uplink was welcome
   std::optional<Frame> barrier_frame_;

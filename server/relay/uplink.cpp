@@ -25,14 +25,6 @@ std::uint64_t ns_of(std::chrono::milliseconds time) {
   return static_cast<std::uint64_t>(time.count()) * 1'000'000;
 }
 
-wire::SharedBytes framed(const Bytes& body) {
-  Bytes bytes(wire::kHeaderBytes + body.size());
-  for (std::size_t i = 0; i < wire::kHeaderBytes; ++i)
-    bytes[i] = static_cast<std::uint8_t>(body.size() >> (8 * i));
-  std::copy(body.begin(), body.end(), bytes.begin() + wire::kHeaderBytes);
-  return std::make_shared<const Bytes>(std::move(bytes));
-}
-
 }  // namespace
 
 Uplink::Uplink(asio::any_io_executor executor, UplinkOptions options, UplinkEvents events)
@@ -149,6 +141,7 @@ void Uplink::say_hello() {
   hello.set_join_secret(options_.code.secret.data(), options_.code.secret.size());
   hello.set_acks_every_frame(true);
   hello.set_can_return(true);
+  hello.set_relays(true);
   hello.set_return_token(token_);
   say(envelope);
 }
@@ -228,7 +221,7 @@ bool Uplink::take(const Bytes& body) {
   }
   const auto hand_on = events_.message;  // a copy: it may stop this
   if (!is_welcome_ || !hand_on) return true;
-  const auto taken = hand_on(message, framed(body));
+  const auto taken = hand_on(message, wire::frame_body(body));
   if (!taken) why_ = printable(taken.error().message, 200);
   return taken.ok();
 }
@@ -239,8 +232,6 @@ void Uplink::take_welcome(const proto::Welcome& welcome) {
   const bool has_token = welcome.return_token().size() == participants::kReturnTokenBytes;
   token_ = has_token ? welcome.return_token() : std::string();
   next_ping_.cancel();
-  for (const auto& address : welcome.further_address())
-    bridge_.note_further(options_.server.name, address);
   if (const auto hand_on = events_.welcome) hand_on(welcome);
 }
 

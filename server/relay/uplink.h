@@ -7,8 +7,10 @@
 //      \ lost (broken, or silent for 3 s): again after 0.2 s, then longer pauses of up to 2 s
 //      \ over: the server has said Goodbye for good, or there was no way back for too long
 //
-// It comes back with the token of the Welcome before. A name that is taken gets a number. What goes
-// up waits for the socket: at most 256 KiB, more of it is left out. Thread: that of its executor.
+// It comes back with the token of the Welcome before, and to the address that it was given alone:
+// addresses that a Welcome names may be its own, and then it would watch itself. A name that is
+// taken gets a number. What goes up waits for the socket: at most 256 KiB, more of it is left out.
+// Thread: that of its executor.
 
 #include "common/base/asio.h"  // before Boost: see there
 

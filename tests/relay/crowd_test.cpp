@@ -217,6 +217,25 @@ TEST_F(RelayedSession, one_too_many_is_told_so_and_the_server_knows_the_number) 
   EXPECT_EQ(said(Envelope::kRelayReport)->relay_report().watchers(), kMostWatchers - 1);
 }
 
+TEST_F(RelayedSession, the_server_hears_that_all_have_left_while_it_was_away) {
+  auto ann = watcher("Ann");
+  ASSERT_TRUE(ann->follow());
+  const auto attend = [this] { crowd_->attend(); };
+  on_io(attend);
+  ASSERT_TRUE(said(Envelope::kRelayReport));
+  EXPECT_EQ(said(Envelope::kRelayReport)->relay_report().watchers(), 1u);
+  uplink_.reset();
+  ASSERT_TRUE(session_.wait_for_sessions(0));
+  ann.reset();
+  for (int i = 0; i < 5000 && on_io([this] { return crowd_->watcher_count(); }) > 0; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  session_.publish(10);
+  join_server(session_);
+  clock_ns_ += 2'000'000'000;
+  on_io(attend);
+  EXPECT_EQ(said(Envelope::kRelayReport)->relay_report().watchers(), 0u);
+}
+
 TEST_F(RelayedSession, who_asks_for_more_than_pictures_is_told_why_not) {
   auto ann = watcher("Ann");
   ASSERT_TRUE(ann->follow());

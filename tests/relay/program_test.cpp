@@ -11,6 +11,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr const char* kItself = "127.0.0.1:17798";
+
 class RelayPrograms : public ::testing::Test {
  protected:
   Program start_relay(const std::string& name, const std::string& to,
@@ -113,21 +115,40 @@ TEST_F(RelayPrograms, watchers_of_a_killed_relay_go_to_the_other_one) {
   EXPECT_EQ(other.wait(20), 0);
 }
 
-TEST_F(RelayPrograms, a_relay_of_a_killed_relay_goes_to_the_other_one) {
-  auto other = start_relay("Other", session_.address());
-  auto relay =
-      start_relay("Relay", session_.address(), "127.0.0.1:0", {"--also", address_of("Other")});
-  auto third = start_relay("Third", address_of("Relay"));
-  auto ann = watch("Ann", address_of("Third"));
-  ASSERT_TRUE(says("Third", "watchers here"));
+TEST_F(RelayPrograms, an_address_that_says_no_does_not_end_those_who_come_back) {
+  auto full = start_relay("Full", session_.address(), "127.0.0.1:0", {"--max-watchers", "1"});
+  auto other = start_relay("Other", session_.address(), "127.0.0.1:0",
+                           {"--state", (session_.folder / "other-state").string()});
+  auto ben = watch("Ben", address_of("Full"));
+  ASSERT_TRUE(says("Full", "watchers here"));
+  auto relay = start_relay("Relay", session_.address(), "127.0.0.1:0",
+                           {"--also", address_of("Other"), "--also", address_of("Full")});
+  auto ann = watch("Ann", address_of("Relay"));
+  ASSERT_TRUE(says("Relay", "watchers here"));
   relay.signal(SIGKILL);
   EXPECT_EQ(relay.wait(10), 128 + SIGKILL);
-  ASSERT_TRUE(says("Third", "back in the session"));
-  expect_a_good_end({"Ann"});
-  EXPECT_EQ(json_number(session_.summary_of("Ann"), "returns"), 0);
+  ASSERT_TRUE(says("Ann", "says no"));
+  auto next = start_relay("Next", session_.address(), address_of("Relay"));
+  ASSERT_TRUE(says("Ann", "back in the session"));
+  expect_a_good_end({"Ann", "Ben"});
   EXPECT_EQ(ann.wait(20), 0);
-  EXPECT_EQ(third.wait(20), 0);
-  EXPECT_EQ(other.wait(20), 0);
+  EXPECT_EQ(ben.wait(20), 0);
+}
+
+TEST_F(RelayPrograms, a_relay_does_not_follow_the_addresses_of_a_relay_back_to_itself) {
+  auto first = start_relay("First", session_.address(), "127.0.0.1:17797", {"--also", kItself});
+  auto second = start_relay("Second", address_of("First"), kItself);
+  auto ann = watch("Ann", address_of("Second"));
+  ASSERT_TRUE(says("Second", "watchers here"));
+  first.signal(SIGKILL);
+  EXPECT_EQ(first.wait(10), 128 + SIGKILL);
+  ASSERT_TRUE(says("Second", "trying again"));
+  auto next = start_relay("Next", session_.address(), "127.0.0.1:17797");
+  ASSERT_TRUE(says("Second", "back in the session"));
+  expect_a_good_end({"Ann"});
+  EXPECT_EQ(ann.wait(20), 0);
+  EXPECT_EQ(second.wait(20), 0);
+  EXPECT_EQ(next.wait(20), 0);
 }
 
 TEST_F(RelayPrograms, a_session_that_goes_on_goes_on_for_the_watchers_of_its_relay) {
@@ -152,6 +173,16 @@ TEST_F(RelayPrograms, a_session_that_goes_on_goes_on_for_the_watchers_of_its_rel
   EXPECT_EQ(hand.wait(20), 0);
   EXPECT_EQ(ann.wait(20), 0) << read_text(session_.folder / "Ann.log");
   expect_the_last_picture("Ann");
+}
+
+TEST_F(RelayPrograms, a_code_of_another_role_is_a_refusal) {
+  const auto log = session_.folder / "surgeon.log";
+  Program relay("trocar-relay",
+                {"--to", find_invitation(session_.folder / "server.log", "surgeon").link,
+                 "--listen", "127.0.0.1:0"},
+                log);
+  EXPECT_EQ(relay.wait(30), 4);
+  EXPECT_NE(read_text(log).find("give it the observer's"), std::string::npos) << read_text(log);
 }
 
 TEST_F(RelayPrograms, a_wrong_code_is_a_refusal) {

@@ -63,6 +63,18 @@ TEST_F(GateTest, a_check_takes_no_use_and_the_last_use_is_taken_once) {
   EXPECT_EQ(gate.counters().wrong_tries, 0u);
 }
 
+TEST_F(GateTest, a_relay_comes_with_an_observers_code_alone) {
+  auto gate = make(-1);
+  Applicant relay{"10.0.0.1", "Relay", wire::Role::Observer};
+  EXPECT_FALSE(gate.check(relay, secret_)) << "a surgeon may watch";
+  relay.relays = true;
+  const auto refusal = gate.check(relay, secret_);
+  ASSERT_TRUE(refusal);
+  EXPECT_EQ(refusal->kind, RefusalKind::RoleNotAllowed);
+  EXPECT_NE(refusal->text.find("give it the observer's"), std::string::npos) << refusal->text;
+  EXPECT_FALSE(gate.check(relay, *gate.book().issue(wire::Role::Observer, kNow + 10, -1)));
+}
+
 TEST_F(GateTest, a_hello_without_a_code_is_refused_and_no_try) {
   auto gate = make(-1);
   Applicant ada{"10.0.0.1", "Ada", wire::Role::Surgeon};

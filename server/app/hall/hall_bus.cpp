@@ -36,7 +36,7 @@ HallBus::HallBus(asio::io_context& context, HallServer& server, const std::strin
     : context_(context),
       server_(server),
       name_(hall_name(server.port())),
-      proofs_(key),
+      proofs_(name_, key, std::time(nullptr)),
       timer_(context) {}
 
 Result<std::unique_ptr<HallBus>> HallBus::open(asio::io_context& context, HallServer& server,
@@ -55,32 +55,46 @@ Status HallBus::subscribe() {
   const std::weak_ptr<bool> alive = is_alive_;
   const auto heard = bus_->subscribe(
       kDirectorySubject, [this, alive](const std::string&, const std::string& answer_to) {
+        if (!may_wait()) return;
         asio::post(context_, [this, alive, answer_to] {
-          if (!alive.expired() && !answer_to.empty())
-            bus_->publish(answer_to, server_.directory(name_));
+          if (alive.expired()) return;
+          --waiting_;
+          if (!answer_to.empty()) bus_->publish(answer_to, server_.directory(name_));
         });
       });
   if (!heard) return heard;
-  return bus_->subscribe(
-      request_subject(name_), [this, alive](const std::string& text, const std::string& answer_to) {
-        asio::post(context_, [this, alive, text, answer_to] {
-          if (alive.expired() || answer_to.empty()) return;
-          const auto request = hall::read_bus_request(text);
-          if (!request) return;
-          const auto proof = proofs_.check(*request, std::time(nullptr));
-          const std::weak_ptr<hall::Bus> bus = bus_;
-          server_.answer(*request, proof, [bus, answer_to](const std::string& answer) {
-            if (const auto still = bus.lock()) still->publish(answer_to, answer);
-          });
-        });
-      });
+  return bus_->subscribe(request_subject(name_),
+                         [this, alive](const std::string& text, const std::string& answer_to) {
+                           if (text.size() > kMostRequestText || !may_wait()) return;
+                           asio::post(context_, [this, alive, text, answer_to] {
+                             if (alive.expired()) return;
+                             --waiting_;
+                             if (!answer_to.empty()) take_request(text, answer_to);
+                           });
+                         });
+}
+
+bool HallBus::may_wait() {
+  if (++waiting_ <= kMostWaiting) return true;
+  --waiting_;
+  return false;
+}
+
+void HallBus::take_request(const std::string& text, const std::string& answer_to) {
+  const auto request = hall::read_bus_request(text);
+  if (!request) return;
+  const auto proof = proofs_.check(*request, std::time(nullptr));
+  const std::weak_ptr<hall::Bus> bus = bus_;
+  server_.answer(*request, proof, [bus, answer_to](const std::string& answer) {
+    if (const auto still = bus.lock()) still->publish(answer_to, answer);
+  });
 }
 
 void HallBus::publish_often() {
   bus_->publish(kStateSubject, server_.directory(name_));
   timer_.expires_after(kPublishPeriod);
   timer_.async_wait([this](boost::system::error_code error) {
-    if (!error) publish_often();
+    if (!error && bus_) publish_often();
   });
 }
 

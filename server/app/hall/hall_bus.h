@@ -7,10 +7,12 @@
 //   trocar.hall.directory       asked: every hall answers with its directory
 //   trocar.hall.NAME.request    asked: one hall answers (server/hall/bus/proof.h)
 //
-// Thread: that of the I/O context.
+// At most kMostWaiting messages wait for the hall's thread, of kMostRequestText bytes each: more
+// are left out. Thread: that of the I/O context.
 
 #include "common/base/asio.h"  // before Boost: see there
 
+#include <atomic>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <memory>
@@ -31,6 +33,9 @@ std::string hall_name(std::uint16_t port);
 
 class HallBus {
  public:
+  static constexpr int kMostWaiting = 64;
+  static constexpr std::size_t kMostRequestText = 16 * 1024;
+
   // Takes `context` and `server`, which outlive it. ErrorCode::Usage for a wrong URL.
   static Result<std::unique_ptr<HallBus>> open(asio::io_context& context, HallServer& server,
                                                const std::string& url, const std::string& key);
@@ -40,7 +45,10 @@ class HallBus {
  private:
   HallBus(asio::io_context& context, HallServer& server, const std::string& key);
   Status subscribe();
+  // Takes one place of kMostWaiting; false: all are taken. Thread: any one.
+  bool may_wait();
   void publish_often();
+  void take_request(const std::string& text, const std::string& answer_to);
 
   asio::io_context& context_;
   HallServer& server_;
@@ -48,6 +56,7 @@ class HallBus {
   hall::ProofCheck proofs_;
   asio::steady_timer timer_;
   std::shared_ptr<hall::Bus> bus_;
+  std::atomic<int> waiting_ = 0;  // messages for the hall's thread
   std::shared_ptr<bool> is_alive_ = std::make_shared<bool>(true);
 };
 

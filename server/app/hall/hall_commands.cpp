@@ -80,11 +80,15 @@ Status list(const HallConnection& client, bool is_json) {
   return {};
 }
 
-Status start(const HallConnection& client, const HallOptions& options) {
+Result<Json> ask_to_start(const HallConnection& client, const HallOptions& options) {
   Json request{{"start", options.what}};
   if (!options.name.empty()) request["name"] = options.name;
-  auto session = client.ask("POST", "/sessions",
-                            request.dump(-1, ' ', false, Json::error_handler_t::replace), kAnswer);
+  return client.ask("POST", "/sessions",
+                    request.dump(-1, ' ', false, Json::error_handler_t::replace), kAnswer);
+}
+
+// Waits until a session that a hall has taken runs, and shows it.
+Status await_start(const HallConnection& client, const HallOptions& options, Result<Json> session) {
   if (!session) return session.error();
   const auto name = word(*session, "name");
   if (!hall::is_name(name))
@@ -104,6 +108,10 @@ Status start(const HallConnection& client, const HallOptions& options) {
   print(fmt::format("{}: {} at {}\n", name, word(*session, "state"), word(*session, "address")));
   print_codes(*session);
   return {};
+}
+
+Status start(const HallConnection& client, const HallOptions& options) {
+  return await_start(client, options, ask_to_start(client, options));
 }
 
 Status end(const HallConnection& client, const std::string& name) {
@@ -173,11 +181,14 @@ Status start_anywhere(hall::Bus& bus, const std::vector<Json>& halls, const Hall
   for (const auto& hall : halls) {
     if (!may_start(hall, options.what)) continue;
     const auto name = word(hall, "hall");
-    const auto started = start(BusHallClient(bus, name, key), options);
+    const BusHallClient client(bus, name, key);
+    auto asked = ask_to_start(client, options);
+    // Only a hall that has said no has certainly started nothing: then the next one is asked.
+    const bool is_refused = !asked && asked.error().code == ErrorCode::Refused;
+    const auto started = await_start(client, options, std::move(asked));
     if (started) return {};
     why = {started.error().code, name + ": " + started.error().message};
-    // Whoever has less room might still have enough, but it says no for another reason.
-    if (started.error().code != ErrorCode::Refused) break;
+    if (!is_refused) break;
   }
   return why;
 }

@@ -17,6 +17,7 @@
 #include "common/base/json.h"
 #include "common/base/no_throw.h"
 #include "common/base/printable.h"
+#include "common/base/timing.h"
 #include "common/secure/digest.h"
 #include "server/session/access/audit_log.h"
 #include "server/session/monitoring/exposition.h"
@@ -31,6 +32,7 @@ using Request = http::request<http::string_body>;
 using Answer = http::response<http::string_body>;
 
 constexpr std::chrono::milliseconds kEndPoll{100};
+constexpr std::uint64_t kWrongProofNoteNs = 1'000'000'000;
 constexpr std::string_view kBearer = "Bearer ";
 constexpr std::string_view kSessions = "/sessions", kOneSession = "/sessions/";
 
@@ -101,6 +103,7 @@ struct HallServer::Core {
   hall::Sessions& sessions;
   const secure::Digest key;
   access::AuditLog audit;
+  std::uint64_t wrong_proof_ns = 0;  // when one was last noted
   monitoring::HttpAcceptor acceptor;
 
   Core(asio::io_context& context, hall::Sessions& all, const std::string& secret,
@@ -201,9 +204,15 @@ struct HallServer::Core {
                                    std::function<void(const std::string&)> answer) {
     Reply given;
     if (proof == hall::Proof::Wrong) {
-      note("refusal", "", "bus", "the proof is wrong");
-      given = refusal(http::status::unauthorized,
-                      "the key is wrong, or the clocks of both machines differ by a minute");
+      const auto now = monotonic_ns();
+      if (wrong_proof_ns == 0 || now - wrong_proof_ns >= kWrongProofNoteNs) {
+        wrong_proof_ns = now;
+        note("refusal", "", "bus", "the proof is wrong");
+      }
+      given =
+          refusal(http::status::unauthorized,
+                  "the key is wrong, the clocks of both machines differ by a minute, or the hall "
+                  "has only just started");
     } else if (request.body.size() > hall::kMostRequestBytes) {
       given = refusal(http::status::payload_too_large, "the request is longer than 4096 bytes");
     } else {

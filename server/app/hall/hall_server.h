@@ -4,9 +4,9 @@
 //
 //   GET /sessions          all of them; join codes only with the key
 //   GET /sessions/NAME     one of them
-//   POST /sessions         {"start": "find-the-lump", "name": "group-a"}: 201 and the session, or
-//   409 DELETE /sessions/NAME  ends it; answers when its recording is closed GET /healthz, /metrics
-//   as those of trocar-server
+//   POST /sessions         {"start": "find-the-lump", "name": "group-a"}: 201 and it, or 409
+//   DELETE /sessions/NAME  ends it; answers when its recording is closed
+//   GET /healthz, /metrics as those of trocar-server
 //
 // The hall's audit log says who has started and ended sessions, and who was refused.
 // What changes something needs "Authorization: Bearer KEY". Errors are {"error": "one line"}.
@@ -49,9 +49,8 @@ class HallServer {
   // Closes the port; requests that are under way get their answer.
   void stop();
 
-  // The same for a request that came over a bus, at HTTP's paths. `answer` gets {"status": N,
-  // "body":
-  // "..."}, once.
+  // The same for a request that came over a bus, at HTTP's paths. `answer` gets an object with
+  // "status", a number, and "body", a text, once. Wrong proofs are noted once a second at most.
   void answer(const hall::BusRequest& request, hall::Proof proof,
               std::function<void(const std::string&)> answer);
   // Returns what GET /sessions says to who has no key, with the hall's name.

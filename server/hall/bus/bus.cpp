@@ -1,11 +1,29 @@
 #include "server/hall/bus/bus.h"
 
+#include <algorithm>
+
 #ifdef TROCAR_HAS_NATS
 #include <nats/nats.h>
 
 #endif
 
 namespace trocar::hall {
+
+std::string without_passwords(const std::string& url) {
+  std::string masked;
+  for (std::size_t begin = 0; begin <= url.size();) {
+    const auto comma = std::min(url.find(',', begin), url.size());
+    std::string part = url.substr(begin, comma - begin);
+    if (const auto at = part.rfind('@'); at != std::string::npos) {
+      const auto scheme = part.find("://");
+      const auto from = scheme != std::string::npos && scheme < at ? scheme + 3 : 0;
+      part.replace(from, at - from, "***");
+    }
+    masked += (begin > 0 ? "," : "") + part;
+    begin = comma + 1;
+  }
+  return masked;
+}
 
 #ifdef TROCAR_HAS_NATS
 
@@ -73,12 +91,12 @@ Result<std::unique_ptr<Bus>> Bus::connect(const std::string& url, const std::str
   if (status == NATS_OK && is_patient)
     status = natsOptions_SetRetryOnFailedConnect(made, true, note_connection, nullptr);
   if (status != NATS_OK)
-    return Error{ErrorCode::Usage,
-                 "--nats: '" + url + "' is not a URL of NATS, such as nats://127.0.0.1:4222"};
+    return Error{ErrorCode::Usage, "--nats: '" + without_passwords(url) +
+                                       "' is not a URL of NATS, such as nats://127.0.0.1:4222"};
   auto parts = std::make_unique<Parts>();
   status = natsConnection_Connect(&parts->connection, made);
   const bool is_there = status == NATS_OK || (is_patient && status == NATS_NOT_YET_CONNECTED);
-  if (!is_there) return error_of(status, "no NATS answers at " + url);
+  if (!is_there) return error_of(status, "no NATS answers at " + without_passwords(url));
   return std::unique_ptr<Bus>(new Bus(std::move(parts)));
 }
 

@@ -18,6 +18,9 @@
 
 namespace trocar::hall {
 
+// Returns `url` without what stands before an @ in each of its addresses: "nats://***@HOST:PORT".
+std::string without_passwords(const std::string& url);
+
 class Bus {
  public:
   static constexpr std::size_t kMostTextBytes = 256 * 1024;

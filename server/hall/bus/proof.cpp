@@ -14,10 +14,11 @@ BytesView view_of(const std::string& text) {
   return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
 }
 
-secure::Digest proof_of(const BusRequest& request, const std::string& key) {
+secure::Digest proof_of(const std::string& hall, const BusRequest& request,
+                        const std::string& key) {
   // Lengths stand before texts, so that no two requests give the same bytes.
   std::string all;
-  for (const auto& part : {request.method, request.path, request.body, request.once})
+  for (const auto& part : {hall, request.method, request.path, request.body, request.once})
     all += std::to_string(part.size()) + ":" + part + ";";
   all += std::to_string(request.unix_s);
   return secure::hmac_sha256(view_of(key), view_of(all));
@@ -30,9 +31,9 @@ std::string text_at(const Json& json, const char* key) {
 
 }  // namespace
 
-std::string write_bus_request(const std::string& method, const std::string& path,
-                              const std::string& body, const std::string& key,
-                              std::int64_t unix_s) {
+std::string write_bus_request(const std::string& hall, const std::string& method,
+                              const std::string& path, const std::string& body,
+                              const std::string& key, std::int64_t unix_s) {
   BusRequest request{.method = method, .path = path, .body = body};
   Json json{{"method", method}, {"path", path}, {"body", body}};
   if (!key.empty()) {
@@ -42,7 +43,7 @@ std::string write_bus_request(const std::string& method, const std::string& path
     request.unix_s = unix_s;
     json["time"] = unix_s;
     json["once"] = request.once;
-    json["proof"] = secure::to_hex(proof_of(request, key));
+    json["proof"] = secure::to_hex(proof_of(hall, request, key));
   }
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
@@ -65,12 +66,12 @@ Result<BusRequest> read_bus_request(const std::string& text) {
 Proof ProofCheck::check(const BusRequest& request, std::int64_t now_unix_s) {
   if (request.proof.empty()) return Proof::None;
   std::erase_if(used_, [&](const auto& entry) { return entry.second < now_unix_s; });
-  const bool is_now =
-      request.unix_s >= now_unix_s - kMostSkew_s && request.unix_s <= now_unix_s + kMostSkew_s;
+  const bool is_now = request.unix_s >= now_unix_s - kMostSkew_s &&
+                      request.unix_s <= now_unix_s + kMostSkew_s && request.unix_s > start_unix_s_;
   const bool is_new = request.once.size() == 2 * kOnceBytes && !used_.contains(request.once) &&
                       used_.size() < kMostKept;
-  const bool is_proved =
-      secure::equal_in_constant_time(secure::from_hex(request.proof), proof_of(request, key_));
+  const bool is_proved = secure::equal_in_constant_time(secure::from_hex(request.proof),
+                                                        proof_of(hall_, request, key_));
   if (!is_now || !is_new || !is_proved) return Proof::Wrong;
   used_[request.once] = request.unix_s + kMostSkew_s + 1;
   return Proof::Right;

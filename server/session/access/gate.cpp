@@ -66,6 +66,11 @@ std::optional<Refusal> Gate::check(Applicant& applicant, BytesView secret, bool 
                    std::string("join code: it is one for ") + wire::name_of(verdict.role) +
                        "s and does not make you " + wire::name_of(applicant.role) +
                        ", come with --role " + wire::name_of(verdict.role)};
+  if (applicant.relays && verdict.role != wire::Role::Observer)
+    return Refusal{RefusalKind::RoleNotAllowed,
+                   std::string("join code: it is one for ") + wire::name_of(verdict.role) +
+                       "s, and a relay hands its code on to all who watch: give it the "
+                       "observer's, with --code"};
   applicant.code = verdict.id;
   return std::nullopt;
 }

@@ -33,6 +33,7 @@ struct Applicant {
   std::string name;  // as it was sent
   wire::Role role = wire::Role::Unknown;
   std::uint32_t code = 0;  // number in the book once it was found good
+  bool relays = false;     // it hands its code on to all who watch
 };
 
 struct GateOptions {

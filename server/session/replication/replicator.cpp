@@ -314,6 +314,7 @@ std::optional<Replicator::Ending> Replicator::admit(Client& client, const proto:
   end_absences(options_.clock_ns());
   auto* gate = options_.gate;
   client.applicant = {connections_.peer_address(client.id), request->name, request->role};
+  client.applicant.relays = request->relays;
   if (const auto* place = find_own_place(*request)) return come_back(client, *place);
   if (gate) {
     const bool has_wrong_token =

@@ -70,6 +70,7 @@ Result<HelloRequest> check_hello(const proto::Hello& hello, EndReason& reason) {
   request.role = wire::role_of(hello.role());
   request.join_secret.assign(hello.join_secret().begin(), hello.join_secret().end());
   request.can_return = hello.can_return();
+  request.relays = hello.relays();
   request.return_token.assign(hello.return_token().begin(), hello.return_token().end());
   for (const auto& tool : hello.tool()) request.tools.push_back(wire::read(tool));
   return request;

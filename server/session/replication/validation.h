@@ -62,6 +62,7 @@ struct HelloRequest {
   Bytes join_secret;                   // not yet checked: the gate does
   bool acks_every_frame = false;
   bool can_return = false;
+  bool relays = false;
   Bytes return_token;  // not yet checked; empty: none
 };
 // `reason` is set on error.

@@ -34,7 +34,8 @@ std::shared_ptr<Carrier> Bridge::carrier_of(const SessionAddress& session,
   return carrier;
 }
 
-void Bridge::note_further(const std::string& session, const std::string& address) {
+void Bridge::note_further(const std::string& session, const secure::HalfCode& code,
+                          const std::string& address) {
   const auto colon = address.rfind(':');
   if (colon == std::string::npos || colon == 0 || address.size() > kMostAddressBytes) return;
   SessionAddress place{address, address.substr(0, colon), 0};
@@ -43,13 +44,15 @@ void Bridge::note_further(const std::string& session, const std::string& address
   const char* end = address.data() + address.size();
   const auto parsed = std::from_chars(address.data() + colon + 1, end, place.port);
   if (place.host.empty() || parsed.ec != std::errc{} || parsed.ptr != end) return;
-  auto& places = further_[session];
+  auto& further = further_[session];
+  if (further.code != code) further = {code, {}};
+  auto& places = further.places;
   const bool is_known = std::ranges::find(places, address, &SessionAddress::name) != places.end();
   if (!is_known && places.size() < kMostFurther) places.push_back(std::move(place));
 }
 
-const std::vector<SessionAddress>& Bridge::further_of(const std::string& session) const {
-  static const std::vector<SessionAddress> kNone;
+const Bridge::Further& Bridge::further_of(const std::string& session) const {
+  static const Further kNone;
   const auto found = further_.find(session);
   return found == further_.end() ? kNone : found->second;
 }

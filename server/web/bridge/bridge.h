@@ -51,8 +51,13 @@ class Bridge {
   // Other addresses of a session, as its Welcome names them: they are tried when its own does not
   // answer. At most kMostFurther of a session are kept; what is no HOST:PORT is left out.
   static constexpr std::size_t kMostFurther = 8;
-  void note_further(const std::string& session, const std::string& address);
-  const std::vector<SessionAddress>& further_of(const std::string& session) const;
+  struct Further {
+    secure::HalfCode code{};  // of the certificate that has named them
+    std::vector<SessionAddress> places;
+  };
+  void note_further(const std::string& session, const secure::HalfCode& code,
+                    const std::string& address);
+  const Further& further_of(const std::string& session) const;
   const secure::TlsContext& tls() const { return tls_; }
   // The half code of a certificate takes 40 ms to find: it is kept for those that were seen.
   secure::HalfCode code_of(BytesView der);
@@ -64,8 +69,8 @@ class Bridge {
   std::vector<SessionAddress> sessions_;
   secure::TlsContext tls_;
   std::map<Bytes, secure::HalfCode> known_;
-  std::map<std::string, std::vector<SessionAddress>> further_;  // by the session's name
-  std::map<std::string, std::weak_ptr<Carrier>> carriers_;      // by the session's name
+  std::map<std::string, Further> further_;                  // by the session's name
+  std::map<std::string, std::weak_ptr<Carrier>> carriers_;  // by the session's name
 };
 
 }  // namespace trocar::bridge

@@ -18,14 +18,6 @@ constexpr std::size_t kMostUpwardBytes = 256 * 1024;
 constexpr std::chrono::milliseconds kPingInterval{1000};
 constexpr auto kNever = asio::steady_timer::time_point::max();
 
-wire::SharedBytes framed(const Bytes& body) {
-  Bytes bytes(wire::kHeaderBytes + body.size());
-  for (std::size_t i = 0; i < wire::kHeaderBytes; ++i)
-    bytes[i] = static_cast<std::uint8_t>(body.size() >> (8 * i));
-  std::copy(body.begin(), body.end(), bytes.begin() + wire::kHeaderBytes);
-  return std::make_shared<const Bytes>(std::move(bytes));
-}
-
 }  // namespace
 
 Carrier::Carrier(asio::any_io_executor executor, Bridge& bridge, SessionAddress session)
@@ -107,7 +99,7 @@ asio::awaitable<bool> Carrier::say(std::uint32_t number, BytesView envelope, boo
 
 void Carrier::note_further(const proto::Welcome& welcome) {
   for (const auto& address : welcome.further_address())
-    bridge_.note_further(session_.name, address);
+    bridge_.note_further(session_.name, link_.code(), address);
 }
 
 void Carrier::queue(const proto::Envelope& message) {
@@ -174,7 +166,7 @@ bool Carrier::take(const Bytes& body) {
       return false;
     default:
       if (!std::exchange(is_carrying_, true)) next_ping_.cancel();
-      return spread(message, framed(body));
+      return spread(message, wire::frame_body(body));
   }
 }
 

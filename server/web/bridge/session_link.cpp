@@ -4,6 +4,7 @@
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
 #include <boost/asio/ip/tcp.hpp>
+#include <memory>
 
 #include "common/base/no_throw.h"
 #include "server/web/bridge/bridge.h"
@@ -30,55 +31,56 @@ void SessionLink::cut() {
 
 // Coroutines here hold no temporaries across a co_await: GCC 12 miscompiles some of them otherwise.
 asio::awaitable<bool> SessionLink::open(const SessionAddress& session) {
-  deadline_.expires_after(kReachDeadline);
-  deadline_.async_wait([this](boost::system::error_code error) {
-    boost::system::error_code ignored;
-    if (!error && stream_) stream_->socket().close(ignored);
-  });
-  const bool is_there = co_await connect(session);
-  bool is_open = false;
-  if (is_there) is_open = co_await begin_tls(session);
-  deadline_.cancel();
-  co_return is_open && !is_cut_;
-}
-
-asio::awaitable<bool> SessionLink::connect(const SessionAddress& session) {
-  bool is_there = co_await connect_to(session);
-  const auto further = bridge_.further_of(session.name);
-  for (const auto& place : further) {
-    if (is_there || is_cut_) break;
-    is_there = co_await connect_to(place);
-  }
-  if (!is_there) why_ = "the session at " + session.name + " cannot be reached: is it running?";
-  co_return is_there;
-}
-
-asio::awaitable<bool> SessionLink::connect_to(const SessionAddress& place) {
-  tcp::resolver resolver(executor_);
-  const std::string port = std::to_string(place.port);
-  const auto [unresolved, endpoints] = co_await resolver.async_resolve(place.host, port, kNoThrow);
-  if (!unresolved) {
-    for (const auto& entry : endpoints) {
-      if (is_cut_) break;
-      tcp::socket socket(executor_);
-      boost::system::error_code ignored;
-      const tcp::endpoint endpoint = entry.endpoint();
-      socket.open(endpoint.protocol(), ignored);
-      socket.set_option(asio::socket_base::receive_buffer_size(kReceiveBytes), ignored);
-      stream_.emplace(std::move(socket), bridge_.tls());
-      const auto [error] = co_await stream_->socket().async_connect(endpoint, kNoThrow);
-      if (error) continue;
-      stream_->socket().set_option(tcp::no_delay(true), ignored);
-      co_return true;
-    }
+  why_ = "the session at " + session.name + " cannot be reached: is it running?";
+  const bool is_open = co_await open_at(session);
+  if (is_open) co_return true;
+  const auto further = bridge_.further_of(session.name);  // a copy: others may add to them
+  for (const auto& place : further.places) {
+    if (is_cut_) break;
+    const bool is_there = co_await open_at(place);
+    if (is_there && code_ == further.code) co_return true;
+    if (is_there)
+      why_ = place.name + " is no other address of this session: its certificate differs";
   }
   co_return false;
 }
 
-asio::awaitable<bool> SessionLink::begin_tls(const SessionAddress& session) {
-  const auto error = co_await stream_->begin_tls(session.host);
+asio::awaitable<bool> SessionLink::open_at(const SessionAddress& place) {
+  tcp::resolver resolver(executor_);
+  const std::string port = std::to_string(place.port);
+  const auto [unresolved, endpoints] = co_await resolver.async_resolve(place.host, port, kNoThrow);
+  if (unresolved) co_return false;
+  for (const auto& entry : endpoints) {
+    if (is_cut_) break;
+    // A deadline that has just passed is no other try's.
+    const auto is_under_way = std::make_shared<bool>(true);
+    deadline_.expires_after(kReachDeadline);
+    deadline_.async_wait([this, is_under_way](boost::system::error_code error) {
+      boost::system::error_code ignored;
+      if (!error && *is_under_way) stream_->socket().close(ignored);
+    });
+    const tcp::endpoint endpoint = entry.endpoint();
+    const bool is_open = co_await try_at(place, endpoint);
+    *is_under_way = false;
+    deadline_.cancel();
+    if (is_open) co_return !is_cut_;
+  }
+  co_return false;
+}
+
+asio::awaitable<bool> SessionLink::try_at(const SessionAddress& place,
+                                          const asio::ip::tcp::endpoint& endpoint) {
+  tcp::socket socket(executor_);
+  boost::system::error_code ignored;
+  socket.open(endpoint.protocol(), ignored);
+  socket.set_option(asio::socket_base::receive_buffer_size(kReceiveBytes), ignored);
+  stream_.emplace(std::move(socket), bridge_.tls());
+  const auto [refused] = co_await stream_->socket().async_connect(endpoint, kNoThrow);
+  if (refused || is_cut_) co_return false;
+  stream_->socket().set_option(tcp::no_delay(true), ignored);
+  const auto error = co_await stream_->begin_tls(place.host);
   if (error) {
-    why_ = session.name + ": " + secure::describe_handshake_failure(error);
+    why_ = place.name + ": " + secure::describe_handshake_failure(error);
     co_return false;
   }
   const Bytes der = stream_->peer_certificate_der();

@@ -7,6 +7,7 @@
 
 #include <boost/asio/any_io_executor.hpp>
 #include <boost/asio/awaitable.hpp>
+#include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <optional>
 #include <string>
@@ -25,8 +26,9 @@ class SessionLink {
   // `bridge` outlives this.
   SessionLink(asio::any_io_executor executor, Bridge& bridge);
 
-  // Tries the session's own address, then others that it has named. Takes five seconds at most.
-  // False: why() says what is wrong, in one line.
+  // Tries the session's own address, then others that it has named, where the certificate has to be
+  // the one that has named them. Each try takes five seconds at most, TLS with it. False: why()
+  // says what is wrong, in one line.
   asio::awaitable<bool> open(const SessionAddress& session);
   const std::string& why() const { return why_; }
   // Returns that of the certificate, once it is open.
@@ -40,9 +42,10 @@ class SessionLink {
   void cut();
 
  private:
-  asio::awaitable<bool> connect(const SessionAddress& session);
-  asio::awaitable<bool> connect_to(const SessionAddress& place);
-  asio::awaitable<bool> begin_tls(const SessionAddress& session);
+  asio::awaitable<bool> open_at(const SessionAddress& place);
+  // `endpoint`: one of those that the place's name has.
+  asio::awaitable<bool> try_at(const SessionAddress& place,
+                               const asio::ip::tcp::endpoint& endpoint);
 
   asio::any_io_executor executor_;
   Bridge& bridge_;
